@@ -1,0 +1,1 @@
+#include "pictura/apps/drawing.h"

@@ -1,0 +1,1 @@
+#include "pictura/common/renderer.h"

@@ -1,0 +1,1 @@
+#include "pictura/simulator/simulator.h"

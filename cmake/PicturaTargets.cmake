@@ -1,0 +1,72 @@
+# How every target of this project is made: flags through one interface target, includes as `pictura/FOLDER/FILE.h` in
+# the tree as when installed, and tests that know where map files may be.
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_CXX_VISIBILITY_PRESET hidden)
+set(CMAKE_VISIBILITY_INLINES_HIDDEN ON)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release)
+endif()
+
+find_package(OpenMP REQUIRED)
+find_package(fmt REQUIRED)
+
+# <build>/include/pictura/FOLDER -> FOLDER: sources include their headers by the names that users have after install.
+set(PICTURA_INCLUDE_DIR ${PROJECT_BINARY_DIR}/include)
+file(MAKE_DIRECTORY ${PICTURA_INCLUDE_DIR}/pictura)
+foreach(folder common map simulator backend_cpu backend_cuda backend_gl training apps tests)
+  file(CREATE_LINK ${PROJECT_SOURCE_DIR}/${folder} ${PICTURA_INCLUDE_DIR}/pictura/${folder} SYMBOLIC)
+endforeach()
+configure_file(${PROJECT_SOURCE_DIR}/common/version.h.in ${PICTURA_INCLUDE_DIR}/pictura/version.h @ONLY)
+
+add_library(pictura_flags INTERFACE)
+target_include_directories(pictura_flags INTERFACE
+  $<BUILD_INTERFACE:${PICTURA_INCLUDE_DIR}> $<INSTALL_INTERFACE:include>)
+target_compile_options(pictura_flags INTERFACE
+  $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wpedantic -Wshadow>
+  $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_WERROR}>>:-Werror>
+  # The arithmetic contract: a product and a sum round twice on every device, and nothing is reordered.
+  $<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off -fno-math-errno -fno-trapping-math>
+  $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_CPU_ARCH}>>:-march=${PICTURA_CPU_ARCH}>)
+if(PICTURA_SANITIZE)
+  target_compile_options(pictura_flags INTERFACE -fsanitize=${PICTURA_SANITIZE} -fno-omit-frame-pointer -g
+    -fno-sanitize-recover=all)
+  target_link_options(pictura_flags INTERFACE -fsanitize=${PICTURA_SANITIZE})
+endif()
+
+# pictura_add_library(NAME SOURCES... [PUBLIC libs...] [PRIVATE libs...]): static library pictura_NAME, alias
+# pictura::NAME.
+function(pictura_add_library name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;PUBLIC;PRIVATE")
+  add_library(pictura_${name} STATIC ${arg_SOURCES})
+  add_library(pictura::${name} ALIAS pictura_${name})
+  set_target_properties(pictura_${name} PROPERTIES EXPORT_NAME ${name})
+  target_link_libraries(pictura_${name} PUBLIC pictura_flags ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
+endfunction()
+
+# pictura_add_test(NAME SOURCES... LINK libs... [LABELS labels...]): GoogleTest binary NAME_test, every test its own
+# ctest entry, with PICTURA_DATA set to ../shared/data where that exists and the caller has not set it.
+function(pictura_add_test name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;LINK;LABELS")
+  find_package(GTest REQUIRED)
+  include(GoogleTest)
+  add_executable(${name}_test ${arg_SOURCES})
+  target_link_libraries(${name}_test PRIVATE pictura_flags ${arg_LINK} GTest::gmock GTest::gtest_main)
+  set(properties TIMEOUT 900)
+  if(arg_LABELS)
+    list(APPEND properties LABELS "${arg_LABELS}")
+  endif()
+  if(PICTURA_TEST_ENVIRONMENT)
+    list(APPEND properties ENVIRONMENT "${PICTURA_TEST_ENVIRONMENT}")
+  endif()
+  gtest_discover_tests(${name}_test DISCOVERY_TIMEOUT 120 PROPERTIES ${properties})
+endfunction()
+
+if(NOT DEFINED ENV{PICTURA_DATA} AND EXISTS ${PROJECT_SOURCE_DIR}/../shared/data)
+  get_filename_component(data_folder ${PROJECT_SOURCE_DIR}/../shared/data REALPATH)
+  set(PICTURA_TEST_ENVIRONMENT PICTURA_DATA=${data_folder})
+endif()

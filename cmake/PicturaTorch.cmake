@@ -1,0 +1,34 @@
+# libtorch from the torch wheel of the virtual environment (or of python3), as one imported target `pictura_torch`.
+# The wheel's own CMake package is not used: it demands nvcc for CPU targets and links CUDA into everything.
+
+set(PICTURA_HAS_TORCH OFF)
+if(NOT PICTURA_WITH_TORCH STREQUAL OFF)
+  set(pictura_pythons)
+  foreach(venv ${PICTURA_VENV} $ENV{PICTURA_VENV} ${PROJECT_SOURCE_DIR}/.venv)
+    if(EXISTS ${venv}/bin/python)
+      list(APPEND pictura_pythons ${venv}/bin/python)
+    endif()
+  endforeach()
+  foreach(python ${pictura_pythons} python3)
+    execute_process(COMMAND ${python} -c
+      "import importlib.util as u, importlib.metadata as m; print(u.find_spec('torch').submodule_search_locations[0], m.version('torch'))"
+      OUTPUT_VARIABLE pictura_torch_found ERROR_QUIET OUTPUT_STRIP_TRAILING_WHITESPACE RESULT_VARIABLE failed)
+    if(failed EQUAL 0 AND pictura_torch_found MATCHES "^(.+) ([0-9]+\\.[0-9]+)[^ ]*$")
+      set(torch_root ${CMAKE_MATCH_1})
+      if(CMAKE_MATCH_2 VERSION_GREATER_EQUAL 2.9)
+        set(PICTURA_HAS_TORCH ON)
+        break()
+      endif()
+    endif()
+  endforeach()
+  if(PICTURA_HAS_TORCH)
+    add_library(pictura_torch INTERFACE)
+    target_include_directories(pictura_torch SYSTEM INTERFACE
+      ${torch_root}/include ${torch_root}/include/torch/csrc/api/include)
+    target_link_libraries(pictura_torch INTERFACE ${torch_root}/lib/libtorch_cpu.so ${torch_root}/lib/libc10.so)
+    target_link_options(pictura_torch INTERFACE -Wl,-rpath,${torch_root}/lib)
+    message(STATUS "torch: ${torch_root}")
+  elseif(PICTURA_WITH_TORCH STREQUAL ON)
+    message(FATAL_ERROR "PICTURA_WITH_TORCH=ON, but no torch 2.9 or later: run scripts/setup, or set PICTURA_VENV")
+  endif()
+endif()

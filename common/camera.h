@@ -1,0 +1,50 @@
+// Cameras and rigs. Ego frame: x forward, y left, z up, metres. Images: origin at the top left, pixel centres at +0.5.
+// A rig's origin is the rear axle on the ground for vehicles and cyclists and the box centre on the ground for
+// pedestrians.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pictura/common/math.h"
+
+namespace pictura {
+
+/// A pinhole camera on a body.
+struct Camera {
+  std::string name;
+  int width_px = 0, height_px = 0;
+  float focal_x_px = 0, focal_y_px = 0;      // focal lengths
+  float center_x_px = 0, center_y_px = 0;    // principal point, from the image's top left corner
+  Vec3 position_m;                           // in the ego frame
+  float yaw_rad = 0;                         // about z, counter-clockwise; 0 looks forward
+  float pitch_rad = 0;                       // positive looks up
+  float roll_rad = 0;                        // positive turns the camera clockwise, as seen from behind it
+};
+
+/// N cameras of any sizes. A camera's index in the rig is its index in an ImageBatch.
+struct Rig {
+  std::vector<Camera> cameras;
+};
+
+/// Bodies shorter than this have the x offsets of their cameras shrunk in proportion (DESIGN: every camera is over its
+/// own body).
+constexpr float kRigReferenceLength_m = 4.5f;
+
+/// The paper's four cameras (appendix, table of the camera rig): front, front-left, front-right and back, focal length
+/// 1545 px at 1920x1080, scaled to the size asked for. Throws unless both sizes are in [1, 8192].
+Rig paper_rig(int width_px = 96, int height_px = 54);
+
+/// Reads a rig from a TOML file (docs/image.md shows one). Throws Error naming the file, the camera and the key.
+Rig load_rig(const std::string& path);
+
+/// Throws Error unless the rig has 1 to 64 cameras with sizes in [1, 8192] px, positive focal lengths and finite poses.
+void validate(const Rig& rig);
+
+/// Rotation rows right, down, forward of the camera in the ego frame: camera coordinates are (right, down, forward).
+struct CameraAxes {
+  Vec3 right, down, forward;
+};
+CameraAxes camera_axes(const Camera& camera);
+
+}  // namespace pictura

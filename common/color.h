@@ -1,0 +1,63 @@
+// The palette: one base colour per kind of thing (per face for agents), and the brightness that fades it to black with
+// range. Vehicles take RAP's colours (vita-epfl/RAP, renderer.py); the other hues are ours, see docs/image.md.
+#pragma once
+
+#include "pictura/common/hd.h"
+#include "pictura/common/math.h"
+
+namespace pictura {
+
+/// Colour with channels in [0, 1].
+struct Rgb {
+  float r = 0, g = 0, b = 0;
+};
+
+PICTURA_HD constexpr Rgb rgb8(int r, int g, int b) {
+  return {static_cast<float>(r) / 255.0f, static_cast<float>(g) / 255.0f, static_cast<float>(b) / 255.0f};
+}
+PICTURA_HD constexpr Rgb operator*(Rgb c, float s) { return {c.r * s, c.g * s, c.b * s}; }
+
+enum class AgentClass : uint8_t { vehicle, cyclist, pedestrian };
+constexpr int kNumAgentClasses = 3;
+
+/// Faces of a cuboid, in the order of the palette.
+enum class BoxFace : uint8_t { front, back, left, right, top };
+constexpr int kNumBoxFaces = 5;
+
+/// Range at which every colour has faded to black.
+constexpr float kVisibleRange_m = 120.0f;
+
+PICTURA_HD constexpr Rgb agent_color(AgentClass agent_class, BoxFace face) {
+  const Rgb colors[kNumAgentClasses][kNumBoxFaces] = {
+      {rgb8(247, 37, 133), rgb8(76, 201, 240), rgb8(114, 9, 183), rgb8(67, 97, 238), rgb8(58, 12, 163)},
+      {rgb8(255, 190, 11), rgb8(251, 133, 0), rgb8(214, 96, 10), rgb8(255, 214, 92), rgb8(150, 75, 0)},
+      {rgb8(128, 237, 153), rgb8(34, 139, 84), rgb8(87, 204, 120), rgb8(56, 163, 165), rgb8(22, 96, 66)},
+  };
+  return colors[static_cast<int>(agent_class)][static_cast<int>(face)];
+}
+
+/// State of a traffic light; `off` (or no state) draws nothing.
+enum class LightState : uint8_t { off, red, yellow, green };
+
+PICTURA_HD constexpr Rgb light_color(LightState state) {
+  switch (state) {
+    case LightState::red: return rgb8(255, 0, 0);
+    case LightState::yellow: return rgb8(255, 200, 0);
+    case LightState::green: return rgb8(0, 255, 0);
+    default: return {};
+  }
+}
+
+constexpr Rgb kWallColor = rgb8(141, 153, 174);
+constexpr Rgb kWhiteMarkColor = rgb8(225, 230, 240);
+constexpr Rgb kYellowMarkColor = rgb8(240, 200, 60);
+constexpr Rgb kRoadEdgeColor = rgb8(200, 36, 35);
+constexpr Rgb kCrosswalkColor = rgb8(206, 131, 63);
+constexpr Rgb kStopLineColor = rgb8(98, 183, 249);
+
+/// Linear fade to black at 120 m; mean_depth_m is the mean over a primitive's vertices of camera z in [0, 120].
+PICTURA_HD constexpr float depth_brightness(float mean_depth_m) {
+  return clamp(1.0f - mean_depth_m / kVisibleRange_m, 0.0f, 1.0f);
+}
+
+}  // namespace pictura

@@ -1,0 +1,46 @@
+// The errors of the library. Messages say where (file, line, element), what was expected and what came. Nothing in the
+// library prints or exits; the command turns an Error into one `error: ...` line and an exit status.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+#include <string>
+
+namespace pictura {
+
+/// The work failed: bad input, a missing file, a full disk.
+class Error : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// The caller asked for something that cannot be asked for; the command exits with 2.
+class UsageError : public Error {
+ public:
+  using Error::Error;
+};
+
+/// The user pressed ^C; what was finished is saved, and the command exits with 130.
+class Interrupted : public Error {
+ public:
+  using Error::Error;
+};
+
+template <typename... Args>
+[[noreturn]] void fail(fmt::format_string<Args...> format, Args&&... args) {
+  throw Error(fmt::format(format, std::forward<Args>(args)...));
+}
+
+template <typename... Args>
+[[noreturn]] void fail_usage(fmt::format_string<Args...> format, Args&&... args) {
+  throw UsageError(fmt::format(format, std::forward<Args>(args)...));
+}
+
+/// Guards the door of a public function: throws Error with the formatted message unless `condition` holds.
+#define PICTURA_CHECK(condition, ...)              \
+  do {                                             \
+    if (!(condition)) ::pictura::fail(__VA_ARGS__); \
+  } while (0)
+
+}  // namespace pictura

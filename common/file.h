@@ -1,0 +1,24 @@
+// Files that are read whole and written beside their name, then renamed: a reader never sees half a file, and a full
+// disk or a killed process leaves the old one.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <string_view>
+
+namespace pictura {
+
+/// The bytes of a file. Throws Error naming the path and the reason; refuses files above max_bytes and folders.
+std::string read_file(const std::string& path, std::size_t max_bytes = std::size_t{1} << 30);
+
+/// Calls write(temporary_path), then renames the temporary file to path. Whatever happens, no temporary file is left.
+/// Throws Error naming the path and the reason.
+void write_renamed(const std::string& path, const std::function<void(const std::string& temporary_path)>& write);
+
+/// Writes the bytes beside path and renames.
+void write_file(const std::string& path, std::string_view bytes);
+
+/// Makes the folder and its parents. Throws Error naming it unless it is there and can be written to afterwards.
+void make_output_folder(const std::string& path);
+
+}  // namespace pictura

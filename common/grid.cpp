@@ -1,0 +1,47 @@
+#include "pictura/common/grid.h"
+
+#include <cmath>
+
+#include "pictura/common/error.h"
+
+namespace pictura {
+
+Grid::Grid(Span<const Aabb2> boxes, float cell_m) : cell_m_(cell_m) {
+  PICTURA_CHECK(cell_m > 0, "grid: expected a positive cell size, got {}", cell_m);
+  Vec2 low{0, 0}, high{0, 0};
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    const Aabb2& box = boxes[i];
+    for (const float value : {box.low.x, box.low.y, box.high.x, box.high.y}) {
+      PICTURA_CHECK(std::isfinite(value), "grid: item {}: expected finite coordinates, got {}", i, value);
+    }
+    low = i == 0 ? box.low : Vec2{min_of(low.x, box.low.x), min_of(low.y, box.low.y)};
+    high = i == 0 ? box.high : Vec2{max_of(high.x, box.high.x), max_of(high.y, box.high.y)};
+  }
+  origin_m_ = low;
+  const double cells_x = std::floor((static_cast<double>(high.x) - low.x) / cell_m) + 1;
+  const double cells_y = std::floor((static_cast<double>(high.y) - low.y) / cell_m) + 1;
+  PICTURA_CHECK(cells_x * cells_y <= double{1 << 26}, "grid: an area of {} x {} m is too large for cells of {} m",
+                high.x - low.x, high.y - low.y, cell_m);
+  num_x_ = static_cast<int>(cells_x);
+  num_y_ = static_cast<int>(cells_y);
+
+  // Counting sort: how many items a cell has, where its range begins, then the items themselves in order.
+  const GridView grid = view();
+  auto for_each_cell = [&](const Aabb2& box, auto&& visit) {
+    for (int y = grid.cell_y(box.low.y); y <= grid.cell_y(box.high.y); ++y) {
+      for (int x = grid.cell_x(box.low.x); x <= grid.cell_x(box.high.x); ++x) {
+        visit(static_cast<std::size_t>(y) * static_cast<std::size_t>(num_x_) + static_cast<std::size_t>(x));
+      }
+    }
+  };
+  begin_.assign(static_cast<std::size_t>(num_x_) * static_cast<std::size_t>(num_y_) + 1, 0);
+  for (const Aabb2& box : boxes) for_each_cell(box, [&](std::size_t cell) { ++begin_[cell + 1]; });
+  for (std::size_t cell = 1; cell < begin_.size(); ++cell) begin_[cell] += begin_[cell - 1];
+  items_.resize(static_cast<std::size_t>(begin_.back()));
+  std::vector<int32_t> next(begin_.begin(), begin_.end() - 1);
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    for_each_cell(boxes[i], [&](std::size_t cell) { items_[static_cast<std::size_t>(next[cell]++)] = static_cast<int32_t>(i); });
+  }
+}
+
+}  // namespace pictura

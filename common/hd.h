@@ -1,0 +1,35 @@
+// Host-device vocabulary: PICTURA_HD marks a function that runs on both devices. This is the only file that asks which
+// compiler reads it; it gives every other shared header its fixed-width integers and C maths, also under NVRTC, which
+// has no standard library.
+#pragma once
+
+#if defined(__CUDACC__)
+#define PICTURA_HD __host__ __device__
+#else
+#define PICTURA_HD
+#endif
+
+#if defined(__CUDACC_RTC__)
+namespace pictura {
+using uint8_t = unsigned char;
+using int32_t = int;
+using uint16_t = unsigned short;
+using uint32_t = unsigned int;
+using int64_t = long long;
+using uint64_t = unsigned long long;
+using size_t = unsigned long;
+}  // namespace pictura
+#else
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+namespace pictura {
+using std::int32_t;
+using std::int64_t;
+using std::size_t;
+using std::uint16_t;
+using std::uint32_t;
+using std::uint64_t;
+using std::uint8_t;
+}  // namespace pictura
+#endif

@@ -1,0 +1,88 @@
+#include "pictura/common/make_renderer.h"
+
+#include <cstring>
+#include <limits>
+
+#include "pictura/common/error.h"
+
+namespace pictura {
+
+// Each backend's one public symbol; declared here so that nothing else sees them.
+std::unique_ptr<Renderer> make_cpu_renderer(const RendererConfig& config);
+#ifdef PICTURA_HAS_CUDA
+std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config);
+/// Empty where a CUDA device can be used, else why not.
+std::string cuda_unavailable();
+#endif
+
+namespace {
+
+// Draws black, so that everything around a renderer can run without one.
+class NullRenderer final : public Renderer {
+ public:
+  explicit NullRenderer(const RendererConfig& config) : config_(config) { validate(config_.rig); }
+  std::string_view name() const override { return "null"; }
+  MemorySpace space() const override { return MemorySpace::host; }
+  const RendererConfig& config() const override { return config_; }
+  GeometryHandle upload(const StaticGeometry&) override { return next_handle_++; }
+
+  void render(const SceneBatch&, Span<const View> views, const ImageBatch& images_out, Stream) override {
+    PICTURA_CHECK(images_out.space == MemorySpace::host, "renderer null: expected images in host memory");
+    const std::size_t value_bytes = images_out.format == PixelFormat::u8 ? 1 : images_out.format == PixelFormat::f16 ? 2 : 4;
+    for (const CameraImages& camera : images_out.cameras) {
+      const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
+      for (std::size_t view = 0; view < views.size(); ++view) {
+        auto* first = static_cast<uint8_t*>(camera.data) + view * static_cast<std::size_t>(camera.view_stride) * value_bytes;
+        std::memset(first, 0, 3 * pixels * value_bytes);
+        for (std::size_t i = view * pixels; i < (view + 1) * pixels; ++i) {
+          if (camera.depth_m) camera.depth_m[i] = std::numeric_limits<float>::infinity();
+          if (camera.class_id) camera.class_id[i] = 0;
+          if (camera.instance_id) camera.instance_id[i] = 0;
+        }
+      }
+    }
+  }
+
+  void visibility(const SceneBatch&, Span<const View>, Span<const VisibilityQuery> queries, Span<float> visibility_out,
+                  Stream) override {
+    for (std::size_t i = 0; i < queries.size(); ++i) visibility_out[i] = std::numeric_limits<float>::quiet_NaN();
+  }
+
+ private:
+  RendererConfig config_;
+  GeometryHandle next_handle_ = 0;
+};
+
+std::string joined(const std::vector<std::string>& names) { return fmt::format("{}", fmt::join(names, ", ")); }
+
+}  // namespace
+
+std::vector<std::string> renderer_names() {
+#ifdef PICTURA_HAS_CUDA
+  return {"cpu", "cuda", "null", "auto"};
+#else
+  return {"cpu", "null", "auto"};
+#endif
+}
+
+std::unique_ptr<Renderer> make_renderer(const std::string& name, const RendererConfig& config, std::string* choice_out) {
+  auto chosen = [&](const std::string& choice) {
+    if (choice_out) *choice_out = choice;
+  };
+  if (name == "cpu") return chosen("cpu: asked for"), make_cpu_renderer(config);
+  if (name == "null") return chosen("null: asked for"), std::make_unique<NullRenderer>(config);
+#ifdef PICTURA_HAS_CUDA
+  const std::string why_not_cuda = cuda_unavailable();
+  if (name == "cuda") {
+    PICTURA_CHECK(why_not_cuda.empty(), "renderer cuda: {}", why_not_cuda);
+    return chosen("cuda: asked for"), make_cuda_renderer(config);
+  }
+  if (name == "auto" && why_not_cuda.empty()) return chosen("cuda: a device was found"), make_cuda_renderer(config);
+#else
+  const std::string why_not_cuda = "this build has no CUDA";
+#endif
+  if (name == "auto") return chosen(fmt::format("cpu: {}", why_not_cuda)), make_cpu_renderer(config);
+  fail_usage("renderer: expected one of {}; got '{}'", joined(renderer_names()), name);
+}
+
+}  // namespace pictura

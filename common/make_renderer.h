@@ -1,0 +1,21 @@
+// Renderers by name: the one place that knows every backend.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pictura/common/renderer.h"
+
+namespace pictura {
+
+/// "cpu", "cuda", "gl", "null" (draws black: for running the rest without a renderer), or "auto": cuda where a device
+/// is found, else cpu; `choice_out`, if given, receives what was chosen and why. Throws UsageError listing the known
+/// names; Error when the backend cannot run here.
+std::unique_ptr<Renderer> make_renderer(const std::string& name, const RendererConfig& config,
+                                        std::string* choice_out = nullptr);
+
+/// Names that this build knows, in the order that messages list them.
+std::vector<std::string> renderer_names();
+
+}  // namespace pictura

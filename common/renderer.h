@@ -1,0 +1,53 @@
+// The interface of everything that draws: `cpu`, `cuda`, `gl` and `null`. Made by name in make_renderer.h.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "pictura/common/camera.h"
+#include "pictura/common/image.h"
+#include "pictura/common/scene.h"
+
+namespace pictura {
+
+struct RendererConfig {
+  Rig rig = paper_rig();
+  int num_threads = 0;                 // host threads; 0: all
+  float line_floor_px = 0.35f;         // least width of a strip on screen, measured across it; 0 turns the floor off
+  bool debug_palette = false;          // tint halted and parked agents
+};
+
+/// Asks how much of an agent a view sees.
+struct VisibilityQuery {
+  int32_t view = 0;
+  int32_t agent = 0;                   // index into SceneBatch::agents
+};
+
+/// An object serves one thread at a time; distinct objects are independent.
+class Renderer {
+ public:
+  virtual ~Renderer() = default;
+  Renderer() = default;
+  Renderer(const Renderer&) = delete;
+  Renderer& operator=(const Renderer&) = delete;
+
+  virtual std::string_view name() const = 0;
+  /// Where scenes are read from and images written to.
+  virtual MemorySpace space() const = 0;
+  virtual const RendererConfig& config() const = 0;
+
+  /// Takes a copy of a map's geometry; the handle names it in SceneBatch::geometry and is valid for the object's life.
+  virtual GeometryHandle upload(const StaticGeometry& geometry) = 0;
+
+  /// Draws every camera of the rig for every view: each pixel of `images_out` is written. Throws Error when a span lies
+  /// in the wrong memory space, a handle or index is out of range, or the images do not fit the rig and views.
+  virtual void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out,
+                      Stream stream = {}) = 0;
+
+  /// For each query: coverage of the agent in the view's images over its coverage when drawn alone, summed over the
+  /// cameras, in [0, 1]; NaN where it is in no camera's frame. `visibility_out` has the queries' length.
+  virtual void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
+                          Span<float> visibility_out, Stream stream = {}) = 0;
+};
+
+}  // namespace pictura

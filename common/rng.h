@@ -1,0 +1,79 @@
+// Counter-based random numbers: Philox4x32-10 (Salmon et al., SC 2011). A draw is a pure function of who asks, when and
+// for what, so results depend neither on the number of threads nor on how a batch is split over devices.
+#pragma once
+
+#include "pictura/common/hd.h"
+#include "pictura/common/math.h"
+
+namespace pictura {
+
+struct Philox4 {
+  uint32_t word[4];
+};
+
+/// Philox4x32 with ten rounds: the 128-bit block of a counter under a 64-bit key.
+PICTURA_HD inline Philox4 philox4x32_10(Philox4 counter, uint32_t key0, uint32_t key1) {
+  for (int round = 0; round < 10; ++round) {
+    const uint64_t product0 = uint64_t{0xD2511F53u} * counter.word[0];
+    const uint64_t product1 = uint64_t{0xCD9E8D57u} * counter.word[2];
+    counter = {{static_cast<uint32_t>(product1 >> 32) ^ counter.word[1] ^ key0, static_cast<uint32_t>(product1),
+                static_cast<uint32_t>(product0 >> 32) ^ counter.word[3] ^ key1, static_cast<uint32_t>(product0)}};
+    key0 += 0x9E3779B9u;
+    key1 += 0xBB67AE85u;
+  }
+  return counter;
+}
+
+/// What a random number is for. Two purposes never share a draw; append only, since runs are named by their seed.
+enum class Purpose : uint8_t {
+  world_size,
+  map_choice,
+  spawn,
+  agent_class,
+  agent_size,
+  goals,
+  conditioning,
+  lights,
+  parked_cars,
+  walls,
+  action,
+  initial_state,
+  minibatch,
+  parameters,
+  town,
+};
+
+/// A stream of draws for one (seed, world, agent, episode, step, purpose). Ids are global across ranks.
+class RandomStream {
+ public:
+  PICTURA_HD RandomStream(uint64_t seed, uint32_t world, uint32_t agent, uint32_t episode, uint32_t step,
+                          Purpose purpose)
+      : key0_(static_cast<uint32_t>(seed)),
+        key1_(static_cast<uint32_t>(seed >> 32)),
+        counter_{{world, (agent & 0xFFFu) | (static_cast<uint32_t>(purpose) << 12), episode, step}} {}
+
+  /// 32 uniform bits. A stream holds 16,384 of them.
+  PICTURA_HD uint32_t bits() {
+    if (next_ == 4) {
+      block_ = philox4x32_10(counter_, key0_, key1_);
+      counter_.word[1] += 1u << 20;
+      next_ = 0;
+    }
+    return block_.word[next_++];
+  }
+
+  /// Uniform in [0, 1), 24 bits.
+  PICTURA_HD float uniform() { return static_cast<float>(bits() >> 8) * 0x1p-24f; }
+  /// Uniform in [low, high).
+  PICTURA_HD float uniform(float low, float high) { return low + (high - low) * uniform(); }
+  /// Uniform in {0, ..., n - 1}, n >= 1 (multiply-shift; bias below n / 2^32).
+  PICTURA_HD int below(int n) { return static_cast<int>((uint64_t{bits()} * static_cast<uint32_t>(n)) >> 32); }
+
+ private:
+  uint32_t key0_, key1_;
+  Philox4 counter_;
+  Philox4 block_{};
+  int next_ = 4;
+};
+
+}  // namespace pictura

@@ -1,0 +1,70 @@
+#include "pictura/common/scene.h"
+
+#include <cmath>
+
+#include "pictura/common/error.h"
+
+namespace pictura {
+
+namespace {
+
+constexpr float kGeometryCell_m = 20.0f;
+// A mitre longer than this many half-widths (a turn sharper than about 150 degrees) is cut back.
+constexpr float kMaxMiter = 4.0f;
+
+template <typename Piece>
+Aabb2 piece_box(const Piece& piece, float margin_m) {
+  return {{min_of(piece.a_m.x, piece.b_m.x) - margin_m, min_of(piece.a_m.y, piece.b_m.y) - margin_m},
+          {max_of(piece.a_m.x, piece.b_m.x) + margin_m, max_of(piece.a_m.y, piece.b_m.y) + margin_m}};
+}
+
+Vec2 unit(Vec2 v) { return v * (1.0f / length(v)); }
+
+}  // namespace
+
+void StaticGeometry::build_grids() {
+  std::vector<Aabb2> boxes;
+  for (const Strip& strip : strips) boxes.push_back(piece_box(strip, strip.width_m));
+  strip_grid = Grid(boxes, kGeometryCell_m);
+  boxes.clear();
+  for (const WallFace& wall : walls) boxes.push_back(piece_box(wall, 0.0f));
+  wall_grid = Grid(boxes, kGeometryCell_m);
+}
+
+void append_strips(Span<const Vec3> points_m, float width_m, Rgb color, StripKind kind, std::vector<Strip>* strips_out) {
+  PICTURA_CHECK(points_m.size() >= 2, "polyline: expected at least two points, got {}", points_m.size());
+
+  // Points with pieces of at most kMaxPiece_m between them, without repeated ones.
+  std::vector<Vec3> points{points_m[0]};
+  for (std::size_t i = 1; i < points_m.size(); ++i) {
+    const Vec3 a = points.back(), b = points_m[i];
+    const float piece_m = length(b.xy() - a.xy());
+    if (piece_m < 1e-4f) continue;
+    const int pieces = static_cast<int>(std::ceil(piece_m / kMaxPiece_m));
+    for (int k = 1; k <= pieces; ++k) {
+      points.push_back(k == pieces ? b : a + (b - a) * (static_cast<float>(k) / static_cast<float>(pieces)));
+    }
+  }
+  if (points.size() < 2) return;
+
+  // The side vector of a point: left normal at the ends, mitre between its two pieces inside; a closed polyline is
+  // mitred at its seam too.
+  const std::size_t last = points.size() - 1;
+  const bool closed = last >= 3 && length(points[last] - points[0]) < 1e-4f;
+  auto piece_left = [&](std::size_t i) { return left_normal(unit(points[i + 1].xy() - points[i].xy())); };
+  auto mitre = [&](Vec2 before, Vec2 after) {
+    const Vec2 sum = before + after;
+    const float scale = 2.0f / max_of(dot(sum, sum), 4.0f / square(kMaxMiter));
+    return sum * scale;
+  };
+  auto side = [&](std::size_t i) {
+    if (i == 0) return closed ? mitre(piece_left(last - 1), piece_left(0)) : piece_left(0);
+    if (i == last) return closed ? mitre(piece_left(last - 1), piece_left(0)) : piece_left(last - 1);
+    return mitre(piece_left(i - 1), piece_left(i));
+  };
+  for (std::size_t i = 0; i < last; ++i) {
+    strips_out->push_back({points[i], points[i + 1], side(i), side(i + 1), width_m, color, kind});
+  }
+}
+
+}  // namespace pictura

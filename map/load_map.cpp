@@ -1,0 +1,1 @@
+#include "pictura/map/load_map.h"

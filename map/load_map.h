@@ -1,0 +1,19 @@
+// From what a user writes after MAP to a RoadMap: the one function that knows all kinds of maps.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "pictura/map/road_map.h"
+
+namespace pictura {
+
+/// Loads `name`: a file (.xodr), a town's name looked up as NAME.xodr in the map folder, or `procedural[:SEED]`.
+/// Throws Error naming the file and the line or element; UsageError when there is no such map.
+std::shared_ptr<const RoadMap> load_map(const std::string& name);
+
+/// $PICTURA_DATA, or $XDG_DATA_HOME/pictura/maps, or ~/.local/share/pictura/maps. CARLA's towns are looked for here and
+/// in its folder `carla`.
+std::string map_folder();
+
+}  // namespace pictura

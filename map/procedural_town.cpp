@@ -1,0 +1,1 @@
+#include "pictura/map/procedural_town.h"

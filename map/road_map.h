@@ -1,0 +1,138 @@
+// RoadMap: the validated, immutable road network that everything else reads, whatever file it came from. Positions are
+// float metres about an origin kept in double; indices are into the vectors of the same RoadMap, -1 means none.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pictura/common/grid.h"
+#include "pictura/common/math.h"
+#include "pictura/common/span.h"
+
+namespace pictura {
+
+enum class LaneType : uint8_t {
+  driving, bidirectional, parking, ramp,            // drivable
+  shoulder, sidewalk, biking, median, border, stop, restricted, other,
+};
+
+/// Drivable lanes make the surface whose outline the road edges are.
+constexpr bool is_drivable(LaneType type) { return type <= LaneType::ramp; }
+const char* to_string(LaneType type);
+
+/// A half-open range of elements of one of RoadMap's vectors.
+struct IndexRange {
+  int32_t begin = 0, end = 0;
+  int32_t size() const { return end - begin; }
+};
+
+/// A sample of a lane's centre line, in the direction of travel, at most kMaxPiece_m from the next.
+struct LanePoint {
+  Vec3 position_m;
+  float heading_rad = 0;
+  float width_m = 0;
+  float s_m = 0;                          // arc length from the lane's start
+};
+
+struct Lane {
+  LaneType type = LaneType::other;
+  bool in_junction = false;
+  bool is_endless = false;                // a route along successors (and lane changes) goes on for ever from here
+  int32_t junction = -1;
+  IndexRange points;                      // RoadMap::lane_points, at least two
+  IndexRange successors, predecessors;    // RoadMap::lane_links: lanes
+  int32_t left_neighbor = -1, right_neighbor = -1;  // same direction, driving, change permitted by geometry
+  float length_m = 0;
+  float speed_limit_mps = 0;
+  int32_t source_road = 0, source_section = 0, source_lane = 0;  // as the file names it; see RoadMap::road_names
+};
+
+enum class MarkColor : uint8_t { white, yellow };
+
+/// A painted line, one per stripe and dash run: a double line is two markings, a broken one is many.
+struct Marking {
+  IndexRange points;                      // RoadMap::marking_points, at least two
+  float width_m = 0;
+  MarkColor color = MarkColor::white;
+  bool broken = false;
+};
+
+/// A piece of the outline of the drivable surface, drivable on its right side, at most kMaxPiece_m long.
+struct RoadEdge {
+  Vec3 a_m, b_m;
+};
+
+struct Crosswalk {
+  IndexRange outline;                     // RoadMap::outline_points, a closed ring without the repeated point
+};
+
+struct ParkingSpace {
+  Vec3 center_m;
+  float heading_rad = 0;
+  float length_m = 0, width_m = 0;
+};
+
+/// A traffic light: its stop line, head, phase, and the lanes that it holds (incoming and connecting ones).
+struct TrafficLight {
+  Vec3 stop_a_m, stop_b_m;                // the stop line, left end first as seen by traffic
+  float stop_heading_rad = 0;             // direction of the traffic that it stops
+  Vec3 head_m;                            // centre of the head
+  Vec2 head_facing;                       // unit vector towards the traffic that it is meant for
+  int32_t junction = -1;
+  int32_t phase = 0;                      // rank of its controller in the junction
+  IndexRange lanes;                       // RoadMap::light_lanes, incoming lanes first, then connecting ones
+  std::string name;                       // the signal's id in the file
+};
+
+struct Junction {
+  std::string name;                       // id in the file
+  int32_t num_phases = 0;                 // 0: no lights
+};
+
+/// A straight piece of a building line behind the sidewalk, where walls may stand.
+struct BuildingLine {
+  Vec3 a_m, b_m;                          // the road lies to the right of a -> b
+};
+
+/// Counts that `pictura map` prints and that tests compare with the file.
+struct MapFacts {
+  int32_t roads = 0, junction_roads = 0, junctions = 0, signal_junctions = 0, lanes = 0, driving_lanes = 0;
+  double driving_lane_km = 0, driving_lane_km_in_junctions = 0;
+  int32_t traffic_lights = 0, stop_lines = 0, crosswalks = 0, parking_spaces = 0;
+  double z_min_m = 0, z_max_m = 0;
+};
+
+struct RoadMap {
+  std::string name;                       // "Town01", "procedural:7", or the file's stem
+  std::array<double, 3> origin_m{};       // file coordinates of this map's (0, 0, 0)
+  std::vector<std::string> road_names;    // [roads] id in the file
+
+  std::vector<Lane> lanes;
+  std::vector<LanePoint> lane_points;
+  std::vector<int32_t> lane_links;
+  std::vector<Marking> markings;
+  std::vector<Vec3> marking_points;
+  std::vector<RoadEdge> road_edges;
+  std::vector<Crosswalk> crosswalks;
+  std::vector<Vec3> outline_points;
+  std::vector<ParkingSpace> parking_spaces;
+  std::vector<TrafficLight> lights;
+  std::vector<int32_t> light_lanes;
+  std::vector<Junction> junctions;
+  std::vector<BuildingLine> building_lines;
+  MapFacts facts;
+
+  Span<const LanePoint> points_of(const Lane& lane) const {
+    return {lane_points.data() + lane.points.begin, static_cast<size_t>(lane.points.size())};
+  }
+  Span<const int32_t> links(IndexRange range) const {
+    return {lane_links.data() + range.begin, static_cast<size_t>(range.size())};
+  }
+};
+
+/// Throws Error naming the element unless every index, length, width and coordinate is sound and links are mutual.
+void validate(const RoadMap& map);
+
+}  // namespace pictura

@@ -1,0 +1,1 @@
+#include "pictura/training/training.h"
