@@ -81,17 +81,16 @@ Rig load_rig(const std::string& path) {
     PICTURA_CHECK(row, "{}: camera {}: expected a table", path, i);
     Camera camera;
     camera.name = (*row)["name"].value_or(fmt::format("camera{}", i));
-    double focal_px = 0, center_x_px = -1, center_y_px = -1, yaw_deg = 0, pitch_deg = 0, roll_deg = 0;
+    double width = 0, height = 0, focal_px = 0, center_x_px = -1, center_y_px = -1, yaw_deg = 0, pitch_deg = 0, roll_deg = 0;
     double x_m = 0, y_m = 0, z_m = 0;
-    std::int64_t width_px = 0, height_px = 0;
     for (const auto& [key, value] : *row) {
       const std::string_view name = key.str();
       if (name == "name") continue;
       const auto number = value.value<double>();
       PICTURA_CHECK(number.has_value(), "{}:{}: camera {} '{}': {}: expected a number", path, value.source().begin.line,
                     i, camera.name, name);
-      if (name == "width_px") width_px = static_cast<std::int64_t>(*number);
-      else if (name == "height_px") height_px = static_cast<std::int64_t>(*number);
+      if (name == "width_px") width = *number;
+      else if (name == "height_px") height = *number;
       else if (name == "focal_px") focal_px = *number;
       else if (name == "center_x_px") center_x_px = *number;
       else if (name == "center_y_px") center_y_px = *number;
@@ -105,14 +104,14 @@ Rig load_rig(const std::string& path) {
                 "center_y_px x_m y_m z_m yaw_deg pitch_deg roll_deg",
                 path, value.source().begin.line, i, camera.name, name);
     }
-    PICTURA_CHECK(width_px >= 1 && width_px <= kMaxSize_px && height_px >= 1 && height_px <= kMaxSize_px,
+    PICTURA_CHECK(width >= 1 && width <= kMaxSize_px && height >= 1 && height <= kMaxSize_px,
                   "{}: camera {} '{}': expected a size of 1x1 to {}x{} pixels, got {}x{}", path, i, camera.name,
-                  kMaxSize_px, kMaxSize_px, width_px, height_px);
-    camera.width_px = static_cast<int>(width_px);
-    camera.height_px = static_cast<int>(height_px);
+                  kMaxSize_px, kMaxSize_px, width, height);
+    camera.width_px = static_cast<int>(width);
+    camera.height_px = static_cast<int>(height);
     camera.focal_x_px = camera.focal_y_px = static_cast<float>(focal_px);
-    camera.center_x_px = static_cast<float>(center_x_px < 0 ? 0.5 * static_cast<double>(width_px) : center_x_px);
-    camera.center_y_px = static_cast<float>(center_y_px < 0 ? 0.5 * static_cast<double>(height_px) : center_y_px);
+    camera.center_x_px = static_cast<float>(center_x_px < 0 ? 0.5 * camera.width_px : center_x_px);
+    camera.center_y_px = static_cast<float>(center_y_px < 0 ? 0.5 * camera.height_px : center_y_px);
     camera.position_m = {static_cast<float>(x_m), static_cast<float>(y_m), static_cast<float>(z_m)};
     camera.yaw_rad = radians(yaw_deg);
     camera.pitch_rad = radians(pitch_deg);

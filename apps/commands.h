@@ -1,0 +1,19 @@
+// The subcommands of `pictura`, one file each. A function here registers its command with CLI11; the command's callback
+// does the work and throws Error, UsageError or Interrupted, which main() turns into one line and an exit status.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace pictura {
+
+void add_town_command(CLI::App& app);
+void add_map_command(CLI::App& app);
+void add_render_command(CLI::App& app);
+void add_simulate_command(CLI::App& app);
+#ifdef PICTURA_HAS_TORCH
+void add_train_command(CLI::App& app);
+void add_evaluate_command(CLI::App& app);
+#endif
+void add_bench_command(CLI::App& app);
+
+}  // namespace pictura

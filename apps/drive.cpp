@@ -1,0 +1,94 @@
+#include "pictura/apps/drive.h"
+
+#include "pictura/common/error.h"
+#include "pictura/common/make_renderer.h"
+#include "pictura/common/rng.h"
+#include "pictura/map/load_map.h"
+#ifdef PICTURA_HAS_TORCH
+#include "pictura/training/training.h"
+#endif
+
+namespace pictura {
+
+std::unique_ptr<Simulator> make_world(const WorldOptions& options) {
+  if (options.agents < 1 || options.agents > kMaxAgentsPerWorld) {
+    fail_usage("--agents: expected 1 to {}, got {}", kMaxAgentsPerWorld, options.agents);
+  }
+  SimulatorConfig config;
+  config.seed = options.seed;
+  config.num_threads = options.num_threads;
+  config.walls = options.walls;
+  config.fixed_lights = true;
+  config.vector_observations = options.vector_observations;
+  auto simulator = make_simulator("cpu", config, {load_map(options.map)}, {{0, static_cast<int>(options.agents), 0}});
+  simulator->reset();
+  return simulator;
+}
+
+void upload_geometries(const Simulator& simulator, Renderer* renderer_out) {
+  GeometryHandle expected = 0;
+  for (const StaticGeometry& geometry : simulator.geometries()) {
+    const GeometryHandle handle = renderer_out->upload(geometry);
+    PICTURA_CHECK(handle == expected++, "renderer {}: expected handle {}, got {}", renderer_out->name(), expected - 1, handle);
+  }
+}
+
+namespace {
+
+class RandomPilot final : public Pilot {
+ public:
+  explicit RandomPilot(uint64_t seed) : seed_(seed) {}
+  void act(Simulator&, Span<int32_t> actions_out) override {
+    for (size_t slot = 0; slot < actions_out.size(); ++slot) {
+      RandomStream random(seed_, 0, static_cast<uint32_t>(slot), 0, step_, Purpose::action);
+      actions_out[slot] = random.below(kNumActions);
+    }
+    ++step_;
+  }
+
+ private:
+  uint64_t seed_;
+  uint32_t step_ = 0;
+};
+
+class IdlePilot final : public Pilot {
+ public:
+  void act(Simulator&, Span<int32_t> actions_out) override {
+    constexpr int kNoJerk = 2 * kNumLatActions + 1;
+    for (int32_t& action : actions_out) action = kNoJerk;
+  }
+};
+
+#ifdef PICTURA_HAS_TORCH
+class PolicyPilot final : public Pilot {
+ public:
+  PolicyPilot(const std::string& checkpoint, const Simulator& simulator, const std::string& backend, int num_threads)
+      : driver_(load_driver(checkpoint, num_threads)) {
+    if (!driver_->needs_images()) return;
+    renderer_ = make_renderer(backend, {.rig = driver_->rig(), .num_threads = num_threads});
+    upload_geometries(simulator, renderer_.get());
+  }
+  void act(Simulator& simulator, Span<int32_t> actions_out) override {
+    driver_->act(simulator, renderer_.get(), /*argmax=*/true, actions_out);
+  }
+
+ private:
+  std::unique_ptr<Driver> driver_;
+  std::unique_ptr<Renderer> renderer_;
+};
+#endif
+
+}  // namespace
+
+std::unique_ptr<Pilot> make_pilot(const std::string& name, uint64_t seed, [[maybe_unused]] const Simulator& simulator,
+                                  [[maybe_unused]] const std::string& backend, [[maybe_unused]] int num_threads) {
+  if (name == "random") return std::make_unique<RandomPilot>(seed);
+  if (name == "idle") return std::make_unique<IdlePilot>();
+#ifdef PICTURA_HAS_TORCH
+  return std::make_unique<PolicyPilot>(name, simulator, backend, num_threads);
+#else
+  fail_usage("--policy: expected random or idle (this build has no torch for checkpoints), got '{}'", name);
+#endif
+}
+
+}  // namespace pictura

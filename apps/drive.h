@@ -1,0 +1,40 @@
+// Who drives in `render` and `simulate`: random actions, no action, or a saved policy, on one world of one map.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "pictura/common/renderer.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+/// Options that every command with a world shares.
+struct WorldOptions {
+  std::string map;
+  int64_t agents = 32;
+  uint64_t seed = 0;
+  int num_threads = 0;
+  bool walls = true;
+  bool vector_observations = true;
+};
+
+/// One world of options.agents vehicles on the map, at the start of its first episode, whose lights keep evaluation's
+/// timing. Throws UsageError when the number of agents is out of range.
+std::unique_ptr<Simulator> make_world(const WorldOptions& options);
+
+/// Uploads the simulator's geometries, so that handles equal map indices.
+void upload_geometries(const Simulator& simulator, Renderer* renderer_out);
+
+/// Chooses the actions of all slots.
+class Pilot {
+ public:
+  virtual ~Pilot() = default;
+  virtual void act(Simulator& simulator, Span<int32_t> actions_out) = 0;
+};
+
+/// "random" (uniform, keyed by seed, slot and step), "idle" (no jerk), or a checkpoint's path (argmax; needs torch).
+std::unique_ptr<Pilot> make_pilot(const std::string& name, uint64_t seed, const Simulator& simulator,
+                                  const std::string& backend, int num_threads);
+
+}  // namespace pictura

@@ -1,0 +1,56 @@
+// The `pictura` command: subcommands, exit statuses (0 done, 1 the work failed, 2 wrong usage, 130 after ^C) and the
+// one line that an error gets.
+#include <cstdio>
+
+#include "pictura/apps/commands.h"
+#include "pictura/common/error.h"
+#include "pictura/common/interrupt.h"
+#include "pictura/version.h"
+
+int main(int argc, char** argv) {
+  using namespace pictura;
+  CLI::App app{"Self-play driving from rendered views: maps, simulation, images, training and evaluation.\n"
+               "MAP is a .xodr file, a CARLA town's name (looked up in $PICTURA_DATA), or procedural[:SEED]."};
+  app.name("pictura");
+  app.set_version_flag("--version", PICTURA_VERSION);
+  app.require_subcommand(1);
+  app.footer("Examples:\n"
+             "  pictura town --seed 7 --blocks 3x3 --out town.xodr\n"
+             "  pictura map procedural:7 --png map.png\n"
+             "  pictura render procedural --agents 40 --steps 50 --views 4 --out images\n"
+             "  pictura simulate procedural --agents 40 --steps 300 --video drive.mp4\n"
+             "  pictura train --config configs/demo.toml --out runs/demo\n"
+             "Every subcommand explains itself: pictura render --help");
+  add_town_command(app);
+  add_map_command(app);
+  add_render_command(app);
+  add_simulate_command(app);
+#ifdef PICTURA_HAS_TORCH
+  add_train_command(app);
+  add_evaluate_command(app);
+#endif
+  add_bench_command(app);
+
+  catch_interrupts();
+  try {
+    app.parse(argc, argv);
+    return 0;
+  } catch (const CLI::Success& success) {  // --help, --version
+    return app.exit(success);
+  } catch (const CLI::ParseError& error) {
+    std::fprintf(stderr, "error: %s (pictura --help explains the usage)\n", error.what());
+    return 2;
+  } catch (const UsageError& error) {
+    std::fprintf(stderr, "error: %s\n", error.what());
+    return 2;
+  } catch (const Interrupted& error) {
+    std::fprintf(stderr, "error: %s\n", error.what());
+    return 130;
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "error: out of memory\n");
+    return 1;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "error: %s\n", error.what());
+    return 1;
+  }
+}

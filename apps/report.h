@@ -1,0 +1,45 @@
+// What commands print: one JSON object on stdout for machines, a progress line with ETA on stderr for people.
+#pragma once
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace pictura {
+
+/// Keys keep the order in which they were set.
+using Json = nlohmann::ordered_json;
+
+/// The number, or null where it is infinite or NaN.
+Json finite_or_null(double value);
+
+/// Prints one object and a newline on stdout.
+void print_json(const Json& object);
+
+/// "1 h 02 min", "3 min 05 s" or "12 s".
+std::string format_duration(double seconds);
+
+/// "1.2 M", "34.5 K" or "678".
+std::string format_count(double value);
+
+/// One line on stderr, rewritten in place on a terminal and printed every ten seconds elsewhere.
+class ProgressLine {
+ public:
+  ~ProgressLine();
+  void update(const std::string& text);
+  /// Prints the last text once and for all.
+  void finish();
+
+ private:
+  std::string text_;
+  bool dirty_ = false;
+  std::chrono::steady_clock::time_point last_print_{};
+};
+
+/// Parses "AxB" with both numbers in [1, max]. Throws UsageError naming the option.
+struct Pair {
+  int first, second;
+};
+Pair parse_pair(const std::string& option, const std::string& text, int max);
+
+}  // namespace pictura

@@ -1,0 +1,85 @@
+// The paper's rig, camera axes, and rigs read from files.
+#include "pictura/common/camera.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "pictura/common/error.h"
+
+namespace pictura {
+namespace {
+
+using testing::HasSubstr;
+
+std::string message_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+std::string written(const std::string& text) {
+  const std::string path = testing::TempDir() + "/pictura_rig_test.toml";
+  std::ofstream(path) << text;
+  return path;
+}
+
+TEST(Rig, ThePapersRigHasItsFieldOfView) {
+  const Rig rig = paper_rig();
+  ASSERT_EQ(rig.cameras.size(), 4u);
+  const Camera& front = rig.cameras[0];
+  EXPECT_EQ(front.width_px, 96);
+  EXPECT_EQ(front.height_px, 54);
+  EXPECT_NEAR(2 * std::atan(0.5 * front.width_px / front.focal_x_px) * 180 / 3.14159265, 63.7, 0.05);
+  EXPECT_NEAR(2 * std::atan(0.5 * front.height_px / front.focal_y_px) * 180 / 3.14159265, 38.5, 0.05);
+  EXPECT_FLOAT_EQ(rig.cameras[1].yaw_rad, 55.0f * kPi / 180.0f);
+  EXPECT_FLOAT_EQ(rig.cameras[3].position_m.x, -0.47f);
+}
+
+TEST(Camera, AxesFollowYawAndPitch) {
+  Camera camera;
+  camera.yaw_rad = kHalfPi;  // looks left
+  CameraAxes axes = camera_axes(camera);
+  EXPECT_NEAR(axes.forward.y, 1, 1e-6);
+  EXPECT_NEAR(axes.right.x, 1, 1e-6);
+  EXPECT_NEAR(axes.down.z, -1, 1e-6);
+  camera.yaw_rad = 0;
+  camera.pitch_rad = 0.1f;  // looks up
+  axes = camera_axes(camera);
+  EXPECT_NEAR(axes.forward.z, std::sin(0.1), 1e-6);
+  EXPECT_NEAR(axes.down.x, std::sin(0.1), 1e-6);
+  EXPECT_NEAR(dot(axes.right, axes.down), 0, 1e-6);
+}
+
+TEST(Rig, ARigFileIsRead) {
+  const Rig rig = load_rig(written("[[camera]]\nname = \"wide\"\nwidth_px = 64\nheight_px = 32\nfocal_px = 30\nx_m = 1.5\n"
+                                   "z_m = 1.4\nyaw_deg = 90\n\n[[camera]]\nwidth_px = 97\nheight_px = 55\nfocal_px = 80.5\n"));
+  ASSERT_EQ(rig.cameras.size(), 2u);
+  EXPECT_EQ(rig.cameras[0].name, "wide");
+  EXPECT_FLOAT_EQ(rig.cameras[0].yaw_rad, kHalfPi);
+  EXPECT_FLOAT_EQ(rig.cameras[0].center_x_px, 32);
+  EXPECT_EQ(rig.cameras[1].width_px, 97);
+}
+
+TEST(Rig, BadRigsAreRefusedByName) {
+  EXPECT_THAT(message_of([] { load_rig(written("[[camera]]\nname = \"a\"\nwidth_px = 0\nheight_px = 0\nfocal_px = 3\n")); }),
+              HasSubstr("camera 0 'a': expected a size of 1x1"));
+  EXPECT_THAT(message_of([] { load_rig(written("[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = -3\n")); }),
+              HasSubstr("positive focal"));
+  EXPECT_THAT(message_of([] { load_rig(written("[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = 3\nzoom = 2\n")); }),
+              HasSubstr("unknown key 'zoom'"));
+  EXPECT_THAT(message_of([] { load_rig(written("[[camera]]\nwidth_px = nan\nheight_px = 8\nfocal_px = 3\n")); }),
+              HasSubstr("expected a size"));
+  EXPECT_THAT(message_of([] { load_rig(written("[[camera\n")); }), HasSubstr(":1: "));
+  EXPECT_THAT(message_of([] { load_rig(written("x = 1\n")); }), HasSubstr("[[camera]]"));
+  EXPECT_THAT(message_of([] { load_rig("/no/such/rig.toml"); }), HasSubstr("/no/such/rig.toml: no such file"));
+  EXPECT_THAT(message_of([] { paper_rig(0, 54); }), HasSubstr("got 0x54"));
+}
+
+}  // namespace
+}  // namespace pictura

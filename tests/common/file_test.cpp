@@ -1,0 +1,89 @@
+// Files written beside and renamed; PNG and hash.
+#include "pictura/common/file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "pictura/common/error.h"
+#include "pictura/common/hash.h"
+#include "pictura/common/image.h"
+
+namespace pictura {
+namespace {
+
+namespace fs = std::filesystem;
+
+class FileTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = testing::TempDir() + "/pictura_file_test";
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  size_t files_in_folder() const {
+    return static_cast<size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+  }
+  std::string folder_;
+};
+
+TEST_F(FileTest, AFailedWriteKeepsTheOldFileAndLeavesNothingBeside) {
+  const std::string path = folder_ + "/a.txt";
+  write_file(path, "old");
+  EXPECT_THROW(write_renamed(path,
+                             [](const std::string& temporary) {
+                               std::ofstream(temporary) << "half";
+                               throw Error("disk full");
+                             }),
+               Error);
+  EXPECT_EQ(read_file(path), "old");
+  EXPECT_EQ(files_in_folder(), 1u);
+}
+
+TEST_F(FileTest, ErrorsNameThePath) {
+  EXPECT_THROW(read_file(folder_ + "/missing"), Error);
+  EXPECT_THROW(read_file(folder_), Error);
+  EXPECT_THROW(write_file("/proc/nowhere/a", "x"), Error);
+  EXPECT_THROW(make_output_folder("/proc/nowhere"), Error);
+  write_file(folder_ + "/file", "x");
+  EXPECT_THROW(make_output_folder(folder_ + "/file"), Error);
+  EXPECT_THROW(read_file("/dev/zero", 1 << 20), Error) << "endless files stop at the limit";
+  try {
+    write_file("/proc/nowhere/a", "x");
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), testing::StartsWith("/proc/nowhere/a: cannot be written"));
+  }
+}
+
+TEST_F(FileTest, PngKeepsEveryPixel) {
+  std::vector<uint8_t> rgb;
+  for (int i = 0; i < 5 * 3 * 3; ++i) rgb.push_back(static_cast<uint8_t>(i * 5));
+  write_png(folder_ + "/a.png", 5, 3, rgb);
+  const RgbImage image = read_png(folder_ + "/a.png");
+  EXPECT_EQ(image.width_px, 5);
+  EXPECT_EQ(image.height_px, 3);
+  EXPECT_EQ(image.rgb, rgb);
+  EXPECT_THROW(write_png(folder_ + "/b.png", 5, 4, rgb), Error);
+}
+
+TEST(Hash, IsFnv1a) {
+  Hash64 hash;
+  hash.add_bytes("a", 1);
+  EXPECT_EQ(hash.hex(), "af63dc4c8601ec8c");  // published test vector of FNV-1a, 64 bits
+}
+
+TEST(HostImages, MixedSizesGetOneBlockEach) {
+  Rig rig = paper_rig(8, 4);
+  rig.cameras[2].width_px = 5;
+  HostImages images(rig, 3);
+  EXPECT_EQ(images.bytes().size(), 3u * 3 * (3 * 8 * 4 + 5 * 4));
+  EXPECT_EQ(images.camera(0).view_stride, 3 * 3 * 8 * 4);
+  EXPECT_EQ(images.camera(2).view_stride, 3 * 5 * 4);
+  const auto* first = static_cast<const uint8_t*>(images.camera(0).data);
+  EXPECT_EQ(static_cast<const uint8_t*>(images.camera(3).data) - first, 2 * 3 * 8 * 4) << "camera 3 is the third of its size";
+}
+
+}  // namespace
+}  // namespace pictura

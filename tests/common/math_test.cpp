@@ -1,0 +1,63 @@
+// Our own transcendental functions against libm in double, over the ranges that their comments promise.
+#include "pictura/common/math.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace pictura {
+namespace {
+
+TEST(Math, SineAndCosineAreWithin2e7OverTenThousandRadians) {
+  double worst = 0;
+  for (int i = -200000; i <= 200000; ++i) {
+    const float x = static_cast<float>(i) * 0.05f;
+    const SinCos sc = sincos_of(x);
+    worst = std::max({worst, std::abs(sc.sin - std::sin(double{x})), std::abs(sc.cos - std::cos(double{x}))});
+  }
+  EXPECT_LT(worst, 2e-7);
+}
+
+TEST(Math, ArcTangentIsWithin2e7InEveryQuadrant) {
+  double worst = 0;
+  for (int i = 0; i < 3600; ++i) {
+    const double angle = (i - 1800) * 3.14159265358979 / 1800.0;
+    for (const double radius : {1e-3, 1.0, 1e4}) {
+      const auto y = static_cast<float>(radius * std::sin(angle)), x = static_cast<float>(radius * std::cos(angle));
+      worst = std::max(worst, std::abs(atan2_of(y, x) - std::atan2(double{y}, double{x})));
+    }
+  }
+  EXPECT_LT(worst, 4e-7);  // near pi one step of a float is 2.4e-7
+  EXPECT_EQ(atan2_of(0.0f, 0.0f), 0.0f);
+  EXPECT_EQ(atan2_of(-2.0f, 0.0f), -kHalfPi);
+}
+
+TEST(Math, ExponentialIsWithin2e7Relative) {
+  for (int i = -8600; i <= 8700; ++i) {
+    const float x = static_cast<float>(i) * 0.01f;
+    const double truth = std::exp(double{x});
+    ASSERT_NEAR(exp_of(x) / truth, 1.0, 2e-7) << "x = " << x;
+  }
+  EXPECT_EQ(exp_of(-100.0f), 0.0f);
+  EXPECT_TRUE(std::isfinite(exp_of(1000.0f)));
+}
+
+TEST(Math, WrappedAnglesStayWithinPiAndKeepTheirDirection) {
+  for (int i = -1000; i <= 1000; ++i) {
+    const float x = static_cast<float>(i) * 0.37f;
+    const float wrapped = wrap_angle(x);
+    ASSERT_LE(std::abs(wrapped), kPi);
+    ASSERT_NEAR(std::sin(double{wrapped}), std::sin(double{x}), 3e-5);
+    ASSERT_NEAR(std::cos(double{wrapped}), std::cos(double{x}), 3e-5);
+  }
+}
+
+TEST(Math, CrossProductIsPositiveToTheLeft) {
+  EXPECT_GT(cross(Vec2{1, 0}, Vec2{0, 1}), 0.0f);
+  const Vec3 up = cross(Vec3{1, 0, 0}, Vec3{0, 1, 0});
+  EXPECT_EQ(up.z, 1.0f);
+  EXPECT_EQ(left_normal(Vec2{1, 0}).y, 1.0f);
+}
+
+}  // namespace
+}  // namespace pictura

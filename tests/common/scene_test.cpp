@@ -1,0 +1,66 @@
+// Polylines into mitred strips, and renderers by name.
+#include "pictura/common/scene.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/common/error.h"
+#include "pictura/common/make_renderer.h"
+
+namespace pictura {
+namespace {
+
+TEST(Strips, AreAtMostTenMetresAndShareTheirEdges) {
+  const std::vector<Vec3> points{{0, 0, 0}, {25, 0, 1}, {25, 10, 1}};
+  std::vector<Strip> strips;
+  append_strips(points, 0.2f, kWhiteMarkColor, StripKind::lane_mark, &strips);
+  ASSERT_EQ(strips.size(), 4u);  // 3 pieces of 25/3 m and one of 10 m
+  for (const Strip& strip : strips) EXPECT_LE(length(strip.b_m.xy() - strip.a_m.xy()), kMaxPiece_m + 1e-4f);
+  for (size_t i = 1; i < strips.size(); ++i) {
+    EXPECT_EQ(strips[i].side_a.x, strips[i - 1].side_b.x);
+    EXPECT_EQ(strips[i].side_a.y, strips[i - 1].side_b.y);
+  }
+  // The mitre of a right angle points to the inner corner: (-1, 1), so that both borders keep their distance of 1.
+  EXPECT_NEAR(strips[3].side_a.x, -1, 1e-6);
+  EXPECT_NEAR(strips[3].side_a.y, 1, 1e-6);
+  EXPECT_NEAR(strips[1].a_m.z, 1.0 / 3, 1e-6);
+}
+
+TEST(Strips, RepeatedPointsAreSkippedAndSharpTurnsBounded) {
+  const std::vector<Vec3> points{{0, 0, 0}, {0, 0, 0}, {5, 0, 0}, {0, 0.01f, 0}};
+  std::vector<Strip> strips;
+  append_strips(points, 0.2f, kWhiteMarkColor, StripKind::lane_mark, &strips);
+  ASSERT_EQ(strips.size(), 2u);
+  EXPECT_LT(length(strips[0].side_b), 4.01f);
+  const std::vector<Vec3> single{{1, 2, 3}};
+  EXPECT_THROW(append_strips(single, 0.2f, kWhiteMarkColor, StripKind::lane_mark, &strips), Error);
+}
+
+TEST(Renderers, AnUnknownNameListsTheKnownOnes) {
+  try {
+    make_renderer("vulkan", {});
+    FAIL() << "expected an error";
+  } catch (const UsageError& error) {
+    EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("cpu"), testing::HasSubstr("'vulkan'")));
+  }
+}
+
+TEST(Renderers, AutoSaysWhatItChose) {
+  std::string choice;
+  EXPECT_NE(make_renderer("auto", {}, &choice), nullptr);
+  EXPECT_THAT(choice, testing::ContainsRegex("^(cpu|cuda): "));
+}
+
+TEST(Renderers, NullDrawsBlack) {
+  RendererConfig config;
+  config.rig = paper_rig(8, 4);
+  const auto renderer = make_renderer("null", config);
+  HostImages images(config.rig, 2);
+  for (uint8_t& byte : images.bytes()) byte = 7;
+  const std::vector<View> views(2);
+  renderer->render({}, views, images.batch());
+  for (const uint8_t byte : images.bytes()) ASSERT_EQ(byte, 0);
+}
+
+}  // namespace
+}  // namespace pictura
