@@ -1,0 +1,107 @@
+// `pictura simulate`: drives one world with a policy, counts what happens, and films it from above and from the cameras.
+#include <chrono>
+
+#include "pictura/apps/commands.h"
+#include "pictura/apps/drawing.h"
+#include "pictura/apps/drive.h"
+#include "pictura/apps/film.h"
+#include "pictura/apps/report.h"
+#include "pictura/common/error.h"
+#include "pictura/common/interrupt.h"
+#include "pictura/map/load_map.h"
+
+namespace pictura {
+
+namespace {
+
+struct Arguments {
+  WorldOptions world;
+  int steps = 300;
+  std::string policy = "random", backend = "auto", video;
+  int film_agent = 0;
+  bool json = false;
+};
+
+void run(const Arguments& arguments) {
+  const auto simulator = make_world(arguments.world);
+  const SpawnReport spawned = simulator->spawn_report();
+  const auto pilot =
+      make_pilot(arguments.policy, arguments.world.seed, *simulator, arguments.backend, arguments.world.num_threads);
+  std::unique_ptr<Film> film;
+  if (!arguments.video.empty()) {
+    film = std::make_unique<Film>(arguments.video, *simulator, arguments.film_agent, arguments.world.num_threads);
+  }
+
+  std::vector<int32_t> actions(static_cast<size_t>(simulator->num_slots()));
+  ProgressLine line;
+  double simulate_s = 0;
+  int step = 0;
+  for (; step < arguments.steps && !interrupted(); ++step) {
+    if (film) film->add_frame(*simulator);
+    pilot->act(*simulator, actions);
+    const auto begin = std::chrono::steady_clock::now();
+    simulator->step(actions);
+    simulate_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    line.update(fmt::format("step {}/{}", step + 1, arguments.steps));
+  }
+  line.finish();
+  if (film) film->close();
+
+  const SimulatorTotals& totals = simulator->totals();
+  const Json object{{"backend", simulator->name()},
+                    {"map", simulator->maps()[0]->name},
+                    {"asked", spawned.asked},
+                    {"spawned", spawned.spawned},
+                    {"refused", spawned.refused},
+                    {"steps", step},
+                    {"agent_steps", totals.agent_steps},
+                    {"agent_steps_per_s", finite_or_null(static_cast<double>(totals.agent_steps) / simulate_s)},
+                    {"slot_steps_per_s", finite_or_null(static_cast<double>(totals.slot_steps) / simulate_s)},
+                    {"episodes", totals.episodes},
+                    {"goals_reached", totals.goals_reached},
+                    {"waypoints_reached", totals.waypoints_reached},
+                    {"collisions", totals.collisions},
+                    {"at_fault_collisions", totals.at_fault_collisions},
+                    {"off_road", totals.off_road},
+                    {"red_light", totals.red_light},
+                    {"wall_contacts", totals.wall_contacts},
+                    {"km_driven", totals.distance_m / 1000},
+                    {"state_hash", fmt::format("{:016x}", simulator->state_hash())}};
+  if (arguments.json) {
+    print_json(object);
+  } else {
+    for (const auto& [key, value] : object.items()) {
+      fmt::print("{:20} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+    }
+  }
+  if (step < arguments.steps) throw Interrupted(fmt::format("interrupted at step {} of {}", step, arguments.steps));
+}
+
+}  // namespace
+
+void add_simulate_command(CLI::App& app) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("simulate", "Drive a world and count what happens");
+  command->add_option("MAP", arguments->world.map, "A .xodr file, a town's name, or procedural[:SEED]")->required();
+  command->add_option("--agents", arguments->world.agents, "Vehicles in the world")->capture_default_str();
+  command->add_option("--steps", arguments->steps, "Steps of 0.1 s")->check(CLI::PositiveNumber)->capture_default_str();
+  command->add_option("--seed", arguments->world.seed, "Places, sizes, goals and actions")->capture_default_str();
+  command->add_option("--policy", arguments->policy, "random, idle, or a checkpoint that train wrote")->capture_default_str();
+  command->add_option("--backend", arguments->backend, "Renderer for policies that see: cpu, cuda or auto")->capture_default_str();
+  command->add_option("--video", arguments->video, "Film it into this .mp4 or .gif: from above and from one agent's cameras");
+  command->add_option("--film-agent", arguments->film_agent, "The agent that the film follows")
+      ->check(CLI::NonNegativeNumber)->capture_default_str();
+  command->add_option("--threads", arguments->world.num_threads, "Host threads; 0: all")->capture_default_str();
+  command->add_flag("!--no-walls", arguments->world.walls, "Leave out the walls along the building lines");
+  command->add_flag("--json", arguments->json, "Print one JSON object");
+  command->footer("Examples:\n  pictura simulate Town01 --agents 80 --steps 600 --policy random --json\n"
+                  "  pictura simulate procedural:1 --policy runs/demo/checkpoint.ckpt --video drive.mp4");
+  command->callback([arguments] {
+    if (arguments->film_agent >= arguments->world.agents) {
+      fail_usage("--film-agent: expected 0 to {}, got {}", arguments->world.agents - 1, arguments->film_agent);
+    }
+    run(*arguments);
+  });
+}
+
+}  // namespace pictura

@@ -1,0 +1,233 @@
+"""The `pictura` command from outside: its JSON, its exit statuses, and what bad input gets.
+
+Run by ctest, one entry per class: python3 command_test.py PICTURA [unittest arguments].
+"""
+
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+PICTURA = ""
+CONFIGS = pathlib.Path(__file__).resolve().parents[2] / "configs"
+# A policy and a world so small that an update takes well under a second.
+TINY = [
+    "--config", str(CONFIGS / "smoke.toml"),
+    "--set", "simulator.num_slots=6", "--set", "simulator.min_agents=3", "--set", "simulator.max_agents=3",
+    "--set", "train.num_steps=8", "--set", "train.minibatch_size=48", "--set", "train.schedule_updates=4",
+    "--set", "render.width_px=16", "--set", "render.height_px=9", "--set", "run.num_threads=2",
+]  # fmt: skip
+
+
+def run(*arguments, timeout=300):
+    return subprocess.run([PICTURA, *map(str, arguments)], capture_output=True, text=True, timeout=timeout)
+
+
+class CommandCase(unittest.TestCase):
+    def setUp(self):
+        self._folder = tempfile.TemporaryDirectory(prefix="pictura-test-")
+        self.folder = pathlib.Path(self._folder.name)
+
+    def tearDown(self):
+        self._folder.cleanup()
+
+    def json_of(self, *arguments):
+        result = run(*arguments, "--json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return json.loads(result.stdout)
+
+    def assert_refused(self, status, message, *arguments):
+        result = run(*arguments)
+        self.assertEqual(result.returncode, status, result.stdout + result.stderr)
+        self.assertEqual(result.stdout, "")
+        lines = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
+        self.assertEqual(len(lines), 1, result.stderr)
+        self.assertIn(message, result.stderr)
+
+    def town(self, seed=3, blocks="2x2"):
+        path = self.folder / f"town{seed}.xodr"
+        self.json_of("town", "--seed", seed, "--blocks", blocks, "--out", path)
+        return path
+
+
+class Usage(CommandCase):
+    def test_help_teaches_by_example(self):
+        for command in ["town", "map", "render", "simulate", "bench", "train", "evaluate"]:
+            result = run(command, "--help")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn(f"pictura {command}", result.stdout)
+
+    def test_wrong_usage_exits_with_2(self):
+        self.assert_refused(2, "--out", "town", "--seed", 1)
+        self.assert_refused(2, "--blocks", "town", "--blocks", "3", "--out", self.folder / "t.xodr")
+        self.assert_refused(2, "--blocks", "town", "--blocks", "0x2", "--out", self.folder / "t.xodr")
+        self.assertEqual(run("fly").returncode, 2)
+        self.assertEqual(run().returncode, 2)
+
+
+class Maps(CommandCase):
+    def test_a_town_is_a_function_of_its_seed(self):
+        first = self.town(seed=5).read_bytes()
+        self.assertEqual(first, self.town(seed=5).read_bytes())
+        self.assertNotEqual(first, self.town(seed=6).read_bytes())
+
+    def test_facts_have_their_keys_and_the_picture_is_drawn(self):
+        picture = self.folder / "map.png"
+        facts = self.json_of("map", self.town(), "--png", picture)
+        keys = """map roads junction_roads junctions signal_junctions lanes driving_lanes driving_lane_km traffic_lights
+                  stop_lines crosswalks parking_spaces z_min_m z_max_m load_ms""".split()
+        self.assertEqual([key for key in keys if key not in facts], [])
+        self.assertGreater(facts["driving_lane_km"], 0.5)
+        self.assertGreater(facts["traffic_lights"], 0)
+        self.assertEqual(picture.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+
+    def test_bad_files_are_refused_by_name(self):
+        text = self.town().read_text()
+        bad = self.folder / "bad.xodr"
+        cases = {
+            "truncated": text[: len(text) // 2],
+            "not OpenDRIVE": "<html><body/></html>",
+            "not XML": "hello",
+            "empty": "",
+            "NaN": text.replace('length="', 'length="nan', 1) if 'length="nan' not in text else text,
+            "NUL bytes": text[:5000] + "\0" * 50 + text[5000:],
+        }
+        for name, content in cases.items():
+            with self.subTest(name):
+                bad.write_text(content)
+                self.assert_refused(1, "bad.xodr", "map", bad)
+        self.assert_refused(2, "Atlantis", "map", "Atlantis")
+        self.assert_refused(2, "procedural:x", "map", "procedural:x")
+        self.assert_refused(1, "/proc/nowhere", "map", self.town(), "--png", "/proc/nowhere/map.png")
+
+
+class Images(CommandCase):
+    def test_images_are_written_and_hash_alike_for_any_number_of_threads(self):
+        town = self.town()
+        hashes = set()
+        for threads in (1, 2, 3):
+            out = self.folder / f"images{threads}"
+            result = self.json_of("render", town, "--agents", 12, "--steps", 20, "--views", 3, "--size", "48x27",
+                                  "--backend", "cpu", "--threads", threads, "--out", out)  # fmt: skip
+            self.assertEqual((result["backend"], result["images"], result["cameras"]), ("cpu", 12, 4))
+            self.assertGreater(result["agent_steps_per_s"], 0)
+            self.assertEqual(len(list(out.glob("agent*.png"))), 12)
+            self.assertTrue((out / "contact_sheet.png").exists())
+            hashes.add(result["image_hash"])
+        self.assertEqual(len(hashes), 1)
+        self.assertRegex(hashes.pop(), "^[0-9a-f]{16}$")
+
+    def test_bad_arguments_are_refused_by_name(self):
+        town = self.town()
+        render = ["render", town, "--out", self.folder / "images"]
+        self.assert_refused(2, "0x0", *render, "--size", "0x0")
+        self.assert_refused(2, "vulkan", *render, "--backend", "vulkan")
+        self.assert_refused(2, "got 0", *render, "--agents", 0)
+        self.assert_refused(2, "100000000", *render, "--agents", 100_000_000)
+        self.assert_refused(2, "--views", *render, "--agents", 2, "--views", 3)
+        self.assert_refused(1, "/proc/nowhere", "render", town, "--out", "/proc/nowhere")
+        rig = self.folder / "rig.toml"
+        rig.write_text("[[camera]]\nname = 'flat'\nwidth_px = 0\nheight_px = 0\nfocal_px = 10\n")
+        self.assert_refused(1, "flat", *render, "--rig", rig)
+
+
+class Simulation(CommandCase):
+    def test_the_state_is_a_function_of_the_seed_alone(self):
+        town = self.town()
+        hashes = {}
+        for seed, threads in [(1, 1), (1, 2), (2, 1)]:
+            result = self.json_of("simulate", town, "--agents", 30, "--steps", 120, "--seed", seed, "--policy", "random",
+                                  "--threads", threads)  # fmt: skip
+            keys = """backend map asked spawned refused steps agent_steps agent_steps_per_s goals_reached collisions
+                      at_fault_collisions off_road red_light km_driven state_hash""".split()
+            self.assertEqual([key for key in keys if key not in result], [])
+            self.assertEqual(result["asked"], 30)
+            self.assertEqual(result["spawned"] + result["refused"], 30)
+            hashes.setdefault(seed, set()).add(result["state_hash"])
+        self.assertEqual(len(hashes[1]), 1)
+        self.assertNotEqual(hashes[1], hashes[2])
+
+    def test_a_world_that_is_too_small_says_what_it_refused(self):
+        result = self.json_of("simulate", self.town(blocks="1x1"), "--agents", 1024, "--steps", 5, "--policy", "idle")
+        self.assertEqual(result["asked"], 1024)
+        self.assertEqual(result["spawned"] + result["refused"], 1024)
+        self.assertGreater(result["refused"], 0)
+
+    def test_a_video_is_written(self):
+        video = self.folder / "drive.mp4"
+        self.json_of("simulate", self.town(), "--agents", 5, "--steps", 12, "--policy", "random", "--video", video)
+        self.assertGreater(video.stat().st_size, 2000)
+
+    def test_bad_arguments_are_refused_by_name(self):
+        simulate = ["simulate", self.town()]
+        self.assert_refused(2, "got 0", *simulate, "--agents", 0)
+        self.assert_refused(2, "100000000", *simulate, "--agents", 100_000_000)
+        self.assert_refused(1, "no/such.ckpt", *simulate, "--policy", "no/such.ckpt")
+        self.assert_refused(1, "/proc/nowhere", *simulate, "--agents", 2, "--steps", 2, "--video", "/proc/nowhere/a.mp4")
+
+
+class Training(CommandCase):
+    def test_resume_is_exact(self):
+        whole = self.json_of("train", *TINY, "--set", "train.updates=4", "--out", self.folder / "whole")
+        self.json_of("train", *TINY, "--set", "train.updates=2", "--out", self.folder / "parts")
+        parts = self.json_of("train", *TINY, "--set", "train.updates=4", "--out", self.folder / "parts", "--resume")
+        for key in ("policy_hash", "updates", "agent_steps"):
+            self.assertEqual(whole[key], parts[key], key)
+        for name in ("checkpoint.ckpt", "untrained.ckpt", "policy.safetensors", "progress.csv", "learning_curve.png"):
+            self.assertTrue((self.folder / "whole" / name).exists(), name)
+
+    def test_bad_input_is_refused_by_name(self):
+        out = ["--out", self.folder / "run"]
+        self.assert_refused(1, "train.speed", "train", *TINY, "--set", "train.speed=3", *out)
+        self.assert_refused(1, "simulator.num_slots", "train", *TINY, "--set", "simulator.num_slots=0", *out)
+        self.assert_refused(1, "simulator.num_slots", "train", *TINY, "--set", "simulator.num_slots=100000000000", *out)
+        self.assert_refused(1, "render.width_px", "train", *TINY, "--set", "render.width_px=0", *out)
+        self.assert_refused(1, "/proc/nowhere", "train", *TINY, "--out", "/proc/nowhere")
+        self.assert_refused(1, "no/such.toml", "train", "--config", "no/such.toml", *out)
+
+    def test_broken_and_foreign_checkpoints_are_refused(self):
+        out = self.folder / "run"
+        self.json_of("train", *TINY, "--set", "train.updates=1", "--out", out)
+        self.assert_refused(1, "policy.", "train", *TINY, "--set", "policy.backbone_width=48", "--set", "train.updates=2",
+                            "--out", out, "--resume")  # fmt: skip
+        checkpoint = out / "checkpoint.ckpt"
+        data = checkpoint.read_bytes()
+        evaluate = ["--map", "procedural:1", "--agents", 2, "--scenarios", 1, "--steps", 2]
+        for name, content in [("truncated", data[: len(data) // 2]), ("foreign", b"PK\x03\x04" + data[4:]), ("empty", b"")]:
+            with self.subTest(name):
+                checkpoint.write_bytes(content)
+                self.assert_refused(1, "checkpoint.ckpt", "evaluate", checkpoint, *evaluate)
+
+    def test_an_interrupt_leaves_a_checkpoint_to_go_on_from(self):
+        out = self.folder / "run"
+        arguments = [PICTURA, "train", *TINY, "--set", "train.updates=100000", "--set", "train.checkpoint_every=1"]
+        process = subprocess.Popen([*arguments, "--out", str(out)], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        deadline = time.monotonic() + 120
+        while not (out / "checkpoint.ckpt").exists() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, 130, errors)
+        self.assertIn(b"error: interrupted", errors)
+        result = self.json_of("evaluate", out / "checkpoint.ckpt", "--map", "procedural:1", "--agents", 2, "--scenarios", 1,
+                              "--steps", 2)  # fmt: skip
+        self.assertEqual(result["rows"][0]["scenarios"], 1)
+
+    def test_evaluation_has_its_keys(self):
+        out = self.folder / "run"
+        self.json_of("train", *TINY, "--set", "train.updates=1", "--out", out)
+        result = self.json_of("evaluate", out / "checkpoint.ckpt", "--map", "procedural:1", "--density", "light", "--agents", 8,
+                              "--scenarios", 2, "--steps", 40)  # fmt: skip
+        keys = """density scenarios steps at_fault_collision_rate off_road_rate red_light_rate goals_per_vehicle
+                  km_per_infraction km_driven""".split()
+        self.assertEqual([key for key in keys if key not in result["rows"][0]], [])
+
+
+if __name__ == "__main__":
+    PICTURA = os.path.abspath(sys.argv.pop(1))
+    unittest.main()
