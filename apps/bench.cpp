@@ -42,18 +42,25 @@ void report(bool json, const std::string& workload, const std::string& backend, 
     std::sort(result.values.begin(), result.values.end());
     const size_t n = result.values.size();
     const double median = 0.5 * (result.values[(n - 1) / 2] + result.values[n / 2]);
-    rows.push_back({{"name", result.name}, {"value", median}, {"unit", result.unit}, {"min", result.values.front()},
-                    {"max", result.values.back()}, {"repeats", n}});
+    rows.push_back({{"name", result.name},
+                    {"value", median},
+                    {"unit", result.unit},
+                    {"min", result.values.front()},
+                    {"max", result.values.back()},
+                    {"repeats", n}});
   }
   if (json) {
-    return print_json({{"workload", workload}, {"backend", backend}, {"device", processor_name()},
-                       {"commit", PICTURA_COMMIT}, {"results", rows}});
+    return print_json({{"workload", workload},
+                       {"backend", backend},
+                       {"device", processor_name()},
+                       {"commit", PICTURA_COMMIT},
+                       {"results", rows}});
   }
   fmt::print("{}\nbackend {} on {}, commit {}\n", workload, backend, processor_name(), PICTURA_COMMIT);
   for (const Json& row : rows) {
     fmt::print("{:32} {:>14.6g} {:18} (min {:.6g}, max {:.6g}, {} repeats)\n", row["name"].get<std::string>(),
-               row["value"].get<double>(), row["unit"].get<std::string>(), row["min"].get<double>(), row["max"].get<double>(),
-               row["repeats"].get<int>());
+               row["value"].get<double>(), row["unit"].get<std::string>(), row["min"].get<double>(),
+               row["max"].get<double>(), row["repeats"].get<int>());
   }
 }
 
@@ -68,7 +75,8 @@ struct Arguments {
 
 /// Where no map is named: the town that the numbers of docs/ are about, or the procedural one where it is missing.
 std::string default_map() {
-  return std::filesystem::exists(map_folder() + "/Town01.xodr") || std::filesystem::exists(map_folder() + "/carla/Town01.xodr")
+  return std::filesystem::exists(map_folder() + "/Town01.xodr") ||
+                 std::filesystem::exists(map_folder() + "/carla/Town01.xodr")
              ? "Town01"
              : "procedural:1";
 }
@@ -91,7 +99,8 @@ void bench_simulate(const Arguments& arguments) {
     const auto pilot = make_pilot("random", world.seed, *simulator, "cpu", world.num_threads);
     std::vector<int32_t> actions = advance(simulator.get(), pilot.get(), 20);
     const std::string suffix = vector_observations ? "" : " without entity sets";
-    BenchResult live{"step" + suffix, "agent_steps_per_s", {}}, slots{"step" + suffix + ", slots", "slot_steps_per_s", {}};
+    BenchResult live{"step" + suffix, "agent_steps_per_s", {}},
+        slots{"step" + suffix + ", slots", "slot_steps_per_s", {}};
     for (int repeat = 0; repeat < arguments.repeats; ++repeat) {
       const SimulatorTotals before = simulator->totals();
       const auto begin = Clock::now();
@@ -125,7 +134,8 @@ void bench_render(const Arguments& arguments) {
   advance(simulator.get(), pilot.get(), 30);
   const auto renderer =
       make_renderer(arguments.backend, {.rig = paper_rig(size.first, size.second), .num_threads = world.num_threads});
-  PICTURA_CHECK(renderer->space() == MemorySpace::host, "bench render: expected a host backend, got {}", renderer->name());
+  PICTURA_CHECK(renderer->space() == MemorySpace::host, "bench render: expected a host backend, got {}",
+                renderer->name());
   upload_geometries(*simulator, renderer.get());
   const Span<const View> views = simulator->views();
   HostImages images(renderer->config().rig, static_cast<int>(views.size()));
@@ -142,13 +152,15 @@ void bench_render(const Arguments& arguments) {
     }
     const double agent_steps = static_cast<double>(views.size()) * calls;
     rate.values.push_back(agent_steps / elapsed_s);
-    image_ms.values.push_back(1e3 * elapsed_s / (agent_steps * static_cast<double>(renderer->config().rig.cameras.size())));
+    image_ms.values.push_back(1e3 * elapsed_s /
+                              (agent_steps * static_cast<double>(renderer->config().rig.cameras.size())));
     if (interrupted()) throw Interrupted("interrupted");
   }
-  report(arguments.json,
-         fmt::format("render: {}, {} agents, walls {}, all egos x {} cameras x {}, {} threads", world.map, world.agents,
-                     world.walls ? "on" : "off", renderer->config().rig.cameras.size(), arguments.size, world.num_threads),
-         std::string(renderer->name()), {rate, image_ms});
+  report(
+      arguments.json,
+      fmt::format("render: {}, {} agents, walls {}, all egos x {} cameras x {}, {} threads", world.map, world.agents,
+                  world.walls ? "on" : "off", renderer->config().rig.cameras.size(), arguments.size, world.num_threads),
+      std::string(renderer->name()), {rate, image_ms});
 }
 
 #ifdef PICTURA_HAS_TORCH
@@ -160,7 +172,8 @@ void bench_train(const Arguments& arguments) {
   auto begin = Clock::now();
   options.on_progress = [&](const TrainProgress& progress) {
     // The first update warms caches and allocators up.
-    if (progress.update > 1) rate.values.push_back(static_cast<double>(progress.agent_steps - steps_before) / seconds_since(begin));
+    if (progress.update > 1)
+      rate.values.push_back(static_cast<double>(progress.agent_steps - steps_before) / seconds_since(begin));
     steps_before = progress.agent_steps;
     begin = Clock::now();
   };
@@ -177,7 +190,8 @@ void bench_train(const Arguments& arguments) {
 void add_bench_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("bench", "Measure rates: bench render, bench simulate, bench train");
   command->require_subcommand(1);
-  command->footer("Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n  pictura bench render --size 192x108");
+  command->footer(
+      "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n  pictura bench render --size 192x108");
   auto add = [command](const std::string& name, const std::string& help, void (*run)(const Arguments&)) {
     auto arguments = std::make_shared<Arguments>();
     CLI::App* sub = command->add_subcommand(name, help);
@@ -201,7 +215,8 @@ void add_bench_command(CLI::App& app) {
   add_world(render, render_arguments.get());
   render->add_option("--backend", render_arguments->backend)->capture_default_str();
   render->add_option("--size", render_arguments->size, "WxH in pixels")->capture_default_str();
-  const auto [simulate, simulate_arguments] = add("simulate", "Steps of a world, observations included", bench_simulate);
+  const auto [simulate, simulate_arguments] =
+      add("simulate", "Steps of a world, observations included", bench_simulate);
   add_world(simulate, simulate_arguments.get());
 #ifdef PICTURA_HAS_TORCH
   const auto [train_command, train_arguments] = add("train", "Rollouts and updates of a configuration", bench_train);

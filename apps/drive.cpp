@@ -29,7 +29,8 @@ void upload_geometries(const Simulator& simulator, Renderer* renderer_out) {
   GeometryHandle expected = 0;
   for (const StaticGeometry& geometry : simulator.geometries()) {
     const GeometryHandle handle = renderer_out->upload(geometry);
-    PICTURA_CHECK(handle == expected++, "renderer {}: expected handle {}, got {}", renderer_out->name(), expected - 1, handle);
+    PICTURA_CHECK(handle == expected++, "renderer {}: expected handle {}, got {}", renderer_out->name(), expected - 1,
+                  handle);
   }
 }
 

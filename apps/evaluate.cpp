@@ -12,12 +12,12 @@ const std::map<std::string, Density> kDensities{
     {"light", Density::light}, {"medium", Density::medium}, {"dense", Density::dense}};
 
 void print_table(const std::vector<EvaluateRow>& rows) {
-  fmt::print("{:10} {:>9} {:>6} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "density", "scenarios", "steps", "vehicles",
-             "at-fault", "off-road", "red light", "goals", "km/infr.", "km");
+  fmt::print("{:10} {:>9} {:>6} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "density", "scenarios", "steps",
+             "vehicles", "at-fault", "off-road", "red light", "goals", "km/infr.", "km");
   for (const EvaluateRow& row : rows) {
-    fmt::print("{:10} {:>9} {:>6} {:>9} {:>9.4f} {:>9.4f} {:>9.4f} {:>9.3f} {:>9.3f} {:>9.2f}\n", row.density, row.scenarios,
-               row.steps, row.vehicle_episodes, row.at_fault_collision_rate, row.off_road_rate, row.red_light_rate,
-               row.goals_per_vehicle, row.km_per_infraction, row.km_driven);
+    fmt::print("{:10} {:>9} {:>6} {:>9} {:>9.4f} {:>9.4f} {:>9.4f} {:>9.3f} {:>9.3f} {:>9.2f}\n", row.density,
+               row.scenarios, row.steps, row.vehicle_episodes, row.at_fault_collision_rate, row.off_road_rate,
+               row.red_light_rate, row.goals_per_vehicle, row.km_per_infraction, row.km_driven);
   }
 }
 
@@ -36,17 +36,25 @@ void add_evaluate_command(CLI::App& app) {
   command->add_option("CHECKPOINT", options.checkpoint, "A checkpoint that train wrote")->required();
   command->add_option("--map", options.maps, "Maps that the scenarios are spread over")->capture_default_str();
   command->add_option("--density", arguments->densities, "light, medium, dense: 60, 120, 150 agents a world")
-      ->check(CLI::IsMember({"light", "medium", "dense"}))->capture_default_str();
+      ->check(CLI::IsMember({"light", "medium", "dense"}))
+      ->capture_default_str();
   command->add_option("--agents", options.agents_per_world, "Agents a world, instead of the densities' own numbers")
       ->check(CLI::Range(1, kMaxAgentsPerWorld));
-  command->add_option("--scenarios", options.scenarios, "Scenarios per density")->check(CLI::PositiveNumber)->capture_default_str();
-  command->add_option("--steps", options.steps, "Steps of 0.1 s per scenario")->check(CLI::PositiveNumber)->capture_default_str();
+  command->add_option("--scenarios", options.scenarios, "Scenarios per density")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_option("--steps", options.steps, "Steps of 0.1 s per scenario")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   command->add_flag("--sampled", arguments->sampled, "Draw actions from the policy instead of taking the most likely");
   command->add_option("--seed", options.seed, "Scenarios are drawn from it")->capture_default_str();
-  command->add_option("--backend", options.backend, "Renderer for policies that see: cpu, cuda or auto")->capture_default_str();
+  command->add_option("--backend", options.backend, "Renderer for policies that see: cpu, cuda or auto")
+      ->capture_default_str();
   command->add_option("--threads", options.num_threads, "Host threads; 0: all")->capture_default_str();
   command->add_flag("--json", arguments->json, "Print one JSON object");
-  command->footer("Example:\n  pictura evaluate runs/town01/checkpoint.ckpt --map Town01 --density light --scenarios 4 --steps 600");
+  command->footer(
+      "Example:\n  pictura evaluate runs/town01/checkpoint.ckpt --map Town01 --density light --scenarios 4 --steps "
+      "600");
   command->callback([arguments] {
     EvaluateOptions& evaluation = arguments->evaluate;
     evaluation.argmax = !arguments->sampled;
@@ -75,7 +83,10 @@ void add_evaluate_command(CLI::App& app) {
                        {"waypoints_per_vehicle", finite_or_null(row.waypoints_per_vehicle)},
                        {"return_per_vehicle", finite_or_null(row.return_per_vehicle)}});
     }
-    print_json({{"checkpoint", evaluation.checkpoint}, {"argmax", evaluation.argmax}, {"seed", evaluation.seed}, {"rows", table}});
+    print_json({{"checkpoint", evaluation.checkpoint},
+                {"argmax", evaluation.argmax},
+                {"seed", evaluation.seed},
+                {"rows", table}});
   });
 }
 

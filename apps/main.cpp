@@ -9,18 +9,20 @@
 
 int main(int argc, char** argv) {
   using namespace pictura;
-  CLI::App app{"Self-play driving from rendered views: maps, simulation, images, training and evaluation.\n"
-               "MAP is a .xodr file, a CARLA town's name (looked up in $PICTURA_DATA), or procedural[:SEED]."};
+  CLI::App app{
+      "Self-play driving from rendered views: maps, simulation, images, training and evaluation.\n"
+      "MAP is a .xodr file, a CARLA town's name (looked up in $PICTURA_DATA), or procedural[:SEED]."};
   app.name("pictura");
   app.set_version_flag("--version", PICTURA_VERSION);
   app.require_subcommand(1);
-  app.footer("Examples:\n"
-             "  pictura town --seed 7 --blocks 3x3 --out town.xodr\n"
-             "  pictura map procedural:7 --png map.png\n"
-             "  pictura render procedural --agents 40 --steps 50 --views 4 --out images\n"
-             "  pictura simulate procedural --agents 40 --steps 300 --video drive.mp4\n"
-             "  pictura train --config configs/demo.toml --out runs/demo\n"
-             "Every subcommand explains itself: pictura render --help");
+  app.footer(
+      "Examples:\n"
+      "  pictura town --seed 7 --blocks 3x3 --out town.xodr\n"
+      "  pictura map procedural:7 --png map.png\n"
+      "  pictura render procedural --agents 40 --steps 50 --views 4 --out images\n"
+      "  pictura simulate procedural --agents 40 --steps 300 --video drive.mp4\n"
+      "  pictura train --config configs/demo.toml --out runs/demo\n"
+      "Every subcommand explains itself: pictura render --help");
   add_town_command(app);
   add_map_command(app);
   add_render_command(app);

@@ -4,6 +4,7 @@
 #include "pictura/apps/commands.h"
 #include "pictura/apps/drawing.h"
 #include "pictura/apps/report.h"
+#include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
 
 namespace pictura {
@@ -19,7 +20,8 @@ void add_map_command(CLI::App& app) {
   command->add_option("MAP", arguments->map, "A .xodr file, a town's name, or procedural[:SEED]")->required();
   command->add_option("--png", arguments->png, "Draw lanes, markings, edges, lights and crosswalks into this file");
   command->add_option("--size", arguments->size_px, "Longer side of the picture in pixels")
-      ->check(CLI::Range(64, 16384))->capture_default_str();
+      ->check(CLI::Range(64, 16384))
+      ->capture_default_str();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer("Examples:\n  pictura map Town01 --json\n  pictura map procedural:7 --png town.png");
   command->callback([arguments] {
@@ -45,8 +47,10 @@ void add_map_command(CLI::App& app) {
                       {"load_ms", load_ms}};
     if (arguments->json) return print_json(object);
     for (const auto& [key, value] : object.items()) {
-      fmt::print("{:18} {}\n", key, value.is_string() ? value.get<std::string>()
-                                    : value.is_number_float() ? fmt::format("{:.2f}", value.get<double>()) : value.dump());
+      fmt::print("{:18} {}\n", key,
+                 value.is_string()         ? value.get<std::string>()
+                 : value.is_number_float() ? fmt::format("{:.2f}", value.get<double>())
+                                           : value.dump());
     }
     if (!arguments->png.empty()) fmt::print("drawn into {}\n", arguments->png);
   });

@@ -41,7 +41,8 @@ void run(const Arguments& arguments) {
   make_output_folder(arguments.out);
 
   const auto simulator = make_world(arguments.world);
-  const auto pilot = make_pilot("random", arguments.world.seed, *simulator, arguments.backend, arguments.world.num_threads);
+  const auto pilot =
+      make_pilot("random", arguments.world.seed, *simulator, arguments.backend, arguments.world.num_threads);
   std::vector<int32_t> actions(static_cast<size_t>(simulator->num_slots()));
   for (int step = 0; step < arguments.steps; ++step) {
     if (interrupted()) throw Interrupted(fmt::format("interrupted at step {} of {}", step, arguments.steps));
@@ -66,7 +67,8 @@ void run(const Arguments& arguments) {
   for (int view = 0; view < num_views; ++view) {
     for (int camera = 0; camera < num_cameras; ++camera) {
       const CameraImages& image = images.camera(camera);
-      write_png(fmt::format("{}/agent{:03}_{}.png", arguments.out, view, config.rig.cameras[static_cast<size_t>(camera)].name),
+      write_png(fmt::format("{}/agent{:03}_{}.png", arguments.out, view,
+                            config.rig.cameras[static_cast<size_t>(camera)].name),
                 image.width_px, image.height_px, images.interleaved(view, camera));
     }
   }
@@ -74,7 +76,7 @@ void run(const Arguments& arguments) {
   draw_contact_sheet(images, config.rig, num_views, sheet);
 
   Hash64 hash;
-  hash.add(images.bytes());
+  hash.add(Span<const uint8_t>(images.bytes()));
   const double rate = num_views / seconds[2];
   if (arguments.json) {
     print_json({{"backend", renderer->name()},
@@ -85,8 +87,8 @@ void run(const Arguments& arguments) {
                 {"out", arguments.out},
                 {"contact_sheet", sheet}});
   } else {
-    fmt::print("{} images in {}, contact sheet {}; {} agent-steps/s drawn by {}; image hash {}\n", num_views * num_cameras,
-               arguments.out, sheet, format_count(rate), renderer->name(), hash.hex());
+    fmt::print("{} images in {}, contact sheet {}; {} agent-steps/s drawn by {}; image hash {}\n",
+               num_views * num_cameras, arguments.out, sheet, format_count(rate), renderer->name(), hash.hex());
   }
 }
 
@@ -99,14 +101,20 @@ void add_render_command(CLI::App& app) {
   command->add_option("--agents", arguments->world.agents, "Vehicles in the world")->capture_default_str();
   command->add_option("--seed", arguments->world.seed, "Places, sizes and actions")->capture_default_str();
   command->add_option("--steps", arguments->steps, "Steps of random actions before the pictures")
-      ->check(CLI::NonNegativeNumber)->capture_default_str();
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   command->add_option("--views", arguments->views, "Draw the cameras of the first so many agents")
-      ->check(CLI::PositiveNumber)->capture_default_str();
-  CLI::Option* size = command->add_option("--size", arguments->size, "Image size in pixels, WxH")->capture_default_str();
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  CLI::Option* size =
+      command->add_option("--size", arguments->size, "Image size in pixels, WxH")->capture_default_str();
   command->add_option("--backend", arguments->backend, "cpu, cuda, null or auto")->capture_default_str();
   command->add_option("--rig", arguments->rig, "TOML file with [[camera]] tables instead of the paper's four cameras");
-  command->add_option("--line-floor", arguments->line_floor_px, "Least width of a line on screen in pixels; 0 turns it off")
-      ->check(CLI::NonNegativeNumber)->capture_default_str();
+  command
+      ->add_option("--line-floor", arguments->line_floor_px,
+                   "Least width of a line on screen in pixels; 0 turns it off")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   command->add_flag("!--no-walls", arguments->world.walls, "Leave out the walls along the building lines");
   command->add_option("--threads", arguments->world.num_threads, "Host threads; 0: all")->capture_default_str();
   command->add_option("--out", arguments->out, "Folder for the pictures")->required();

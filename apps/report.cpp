@@ -1,10 +1,10 @@
 #include "pictura/apps/report.h"
 
-#include <unistd.h>
-
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+
+#include <unistd.h>
 
 #include "pictura/common/error.h"
 

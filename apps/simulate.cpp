@@ -1,4 +1,5 @@
-// `pictura simulate`: drives one world with a policy, counts what happens, and films it from above and from the cameras.
+// `pictura simulate`: drives one world with a policy, counts what happens, and films it from above and from the
+// cameras.
 #include <chrono>
 
 #include "pictura/apps/commands.h"
@@ -86,16 +87,21 @@ void add_simulate_command(CLI::App& app) {
   command->add_option("--agents", arguments->world.agents, "Vehicles in the world")->capture_default_str();
   command->add_option("--steps", arguments->steps, "Steps of 0.1 s")->check(CLI::PositiveNumber)->capture_default_str();
   command->add_option("--seed", arguments->world.seed, "Places, sizes, goals and actions")->capture_default_str();
-  command->add_option("--policy", arguments->policy, "random, idle, or a checkpoint that train wrote")->capture_default_str();
-  command->add_option("--backend", arguments->backend, "Renderer for policies that see: cpu, cuda or auto")->capture_default_str();
-  command->add_option("--video", arguments->video, "Film it into this .mp4 or .gif: from above and from one agent's cameras");
+  command->add_option("--policy", arguments->policy, "random, idle, or a checkpoint that train wrote")
+      ->capture_default_str();
+  command->add_option("--backend", arguments->backend, "Renderer for policies that see: cpu, cuda or auto")
+      ->capture_default_str();
+  command->add_option("--video", arguments->video,
+                      "Film it into this .mp4 or .gif: from above and from one agent's cameras");
   command->add_option("--film-agent", arguments->film_agent, "The agent that the film follows")
-      ->check(CLI::NonNegativeNumber)->capture_default_str();
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   command->add_option("--threads", arguments->world.num_threads, "Host threads; 0: all")->capture_default_str();
   command->add_flag("!--no-walls", arguments->world.walls, "Leave out the walls along the building lines");
   command->add_flag("--json", arguments->json, "Print one JSON object");
-  command->footer("Examples:\n  pictura simulate Town01 --agents 80 --steps 600 --policy random --json\n"
-                  "  pictura simulate procedural:1 --policy runs/demo/checkpoint.ckpt --video drive.mp4");
+  command->footer(
+      "Examples:\n  pictura simulate Town01 --agents 80 --steps 600 --policy random --json\n"
+      "  pictura simulate procedural:1 --policy runs/demo/checkpoint.ckpt --video drive.mp4");
   command->callback([arguments] {
     if (arguments->film_agent >= arguments->world.agents) {
       fail_usage("--film-agent: expected 0 to {}, got {}", arguments->world.agents - 1, arguments->film_agent);

@@ -1,6 +1,7 @@
 // `pictura town`: writes a procedural town as OpenDRIVE.
 #include "pictura/apps/commands.h"
 #include "pictura/apps/report.h"
+#include "pictura/common/error.h"
 #include "pictura/common/file.h"
 #include "pictura/map/procedural_town.h"
 
@@ -18,7 +19,8 @@ void add_town_command(CLI::App& app) {
   command->add_option("--blocks", arguments->blocks, "Blocks of houses along x and y, as AxB")->capture_default_str();
   command->add_option("--out", arguments->out, "The .xodr file to write")->required();
   command->add_flag("--json", arguments->json, "Print one JSON object");
-  command->footer("Example:\n  pictura town --seed 7 --blocks 4x3 --out town.xodr && pictura map town.xodr --png town.png");
+  command->footer(
+      "Example:\n  pictura town --seed 7 --blocks 4x3 --out town.xodr && pictura map town.xodr --png town.png");
   command->callback([arguments] {
     const Pair blocks = parse_pair("--blocks", arguments->blocks, 32);
     arguments->town.blocks_x = blocks.first;
@@ -26,10 +28,14 @@ void add_town_command(CLI::App& app) {
     const std::string text = procedural_town(arguments->town);
     write_file(arguments->out, text);
     if (arguments->json) {
-      print_json({{"out", arguments->out}, {"seed", arguments->town.seed}, {"blocks_x", blocks.first},
-                  {"blocks_y", blocks.second}, {"bytes", text.size()}});
+      print_json({{"out", arguments->out},
+                  {"seed", arguments->town.seed},
+                  {"blocks_x", blocks.first},
+                  {"blocks_y", blocks.second},
+                  {"bytes", text.size()}});
     } else {
-      fmt::print("{}: {} bytes; look at it with: pictura map {} --png town.png\n", arguments->out, text.size(), arguments->out);
+      fmt::print("{}: {} bytes; look at it with: pictura map {} --png town.png\n", arguments->out, text.size(),
+                 arguments->out);
     }
   });
 }

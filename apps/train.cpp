@@ -14,21 +14,25 @@ void add_train_command(CLI::App& app) {
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("train", "Train a policy by self-play (PPO)");
-  command->add_option("--config", arguments->train.config_path, "TOML file; configs/ holds smoke, demo, town01 and paper")
+  command
+      ->add_option("--config", arguments->train.config_path, "TOML file; configs/ holds smoke, demo, town01 and paper")
       ->required();
-  command->add_option("--set", arguments->train.overrides, "Override a key, as train.updates=2; may be given many times")
+  command
+      ->add_option("--set", arguments->train.overrides, "Override a key, as train.updates=2; may be given many times")
       ->allow_extra_args(false);
   command->add_option("--out", arguments->train.out_folder, "Folder for checkpoints, curves and logs")->required();
   command->add_flag("--resume", arguments->train.resume, "Go on from the checkpoint in --out");
   command->add_flag("--json", arguments->json, "Print one JSON object");
-  command->footer("Examples:\n  pictura train --config configs/demo.toml --out runs/demo\n"
-                  "  pictura train --config configs/town01.toml --set run.seed=3 --set train.updates=50 --out runs/town01\n"
-                  "  pictura train --config configs/town01.toml --out runs/town01 --resume");
+  command->footer(
+      "Examples:\n  pictura train --config configs/demo.toml --out runs/demo\n"
+      "  pictura train --config configs/town01.toml --set run.seed=3 --set train.updates=50 --out runs/town01\n"
+      "  pictura train --config configs/town01.toml --out runs/town01 --resume");
   command->callback([arguments] {
     ProgressLine line;
     arguments->train.on_progress = [&line](const TrainProgress& progress) {
       line.update(fmt::format("update {}/{}  {} agent-steps  {} agent-steps/s  return {:.2f}  goals/km {:.2f}  ETA {}",
-                              progress.update, progress.updates, format_count(static_cast<double>(progress.agent_steps)),
+                              progress.update, progress.updates,
+                              format_count(static_cast<double>(progress.agent_steps)),
                               format_count(progress.agent_steps_per_s), progress.episode_return, progress.goals_per_km,
                               format_duration(progress.eta_s)));
     };
@@ -46,10 +50,11 @@ void add_train_command(CLI::App& app) {
                   {"learning_curve", curve}});
     } else {
       fmt::print("{} agent-steps in {} updates, {:.1f} km driven; checkpoint {}, policy hash {}, curve {}\n",
-                 format_count(static_cast<double>(report.agent_steps)), report.updates, report.km_driven, report.checkpoint,
-                 report.policy_hash, curve);
+                 format_count(static_cast<double>(report.agent_steps)), report.updates, report.km_driven,
+                 report.checkpoint, report.policy_hash, curve);
     }
-    if (report.interrupted) throw Interrupted(fmt::format("interrupted; go on with --resume --out {}", arguments->train.out_folder));
+    if (report.interrupted)
+      throw Interrupted(fmt::format("interrupted; go on with --resume --out {}", arguments->train.out_folder));
   });
 }
 

@@ -28,6 +28,8 @@ target_include_directories(pictura_flags INTERFACE
   $<BUILD_INTERFACE:${PICTURA_INCLUDE_DIR}> $<INSTALL_INTERFACE:include>)
 target_compile_options(pictura_flags INTERFACE
   $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wpedantic -Wshadow>
+  # Designated initializers leave the rest to the members' own defaults, on purpose.
+  $<$<COMPILE_LANGUAGE:CXX>:-Wno-missing-field-initializers>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_WERROR}>>:-Werror>
   # The arithmetic contract: a product and a sum round twice on every device, and nothing is reordered.
   $<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off -fno-math-errno -fno-trapping-math>

@@ -25,8 +25,8 @@ if(NOT PICTURA_WITH_TORCH STREQUAL OFF)
     add_library(pictura_torch INTERFACE)
     target_include_directories(pictura_torch SYSTEM INTERFACE
       ${torch_root}/include ${torch_root}/include/torch/csrc/api/include)
-    target_link_libraries(pictura_torch INTERFACE ${torch_root}/lib/libtorch_cpu.so ${torch_root}/lib/libc10.so)
-    target_link_options(pictura_torch INTERFACE -Wl,-rpath,${torch_root}/lib)
+    # By name, not by path: the wheel's folder also holds a libgomp, which is then the one that the program loads.
+    target_link_libraries(pictura_torch INTERFACE -L${torch_root}/lib -ltorch_cpu -lc10 -Wl,-rpath,${torch_root}/lib)
     message(STATUS "torch: ${torch_root}")
   elseif(PICTURA_WITH_TORCH STREQUAL ON)
     message(FATAL_ERROR "PICTURA_WITH_TORCH=ON, but no torch 2.9 or later: run scripts/setup, or set PICTURA_VENV")

@@ -1,8 +1,8 @@
 #include "pictura/common/camera.h"
 
-#include <toml++/toml.h>
-
 #include <cmath>
+
+#include <toml++/toml.h>
 
 #include "pictura/common/error.h"
 #include "pictura/common/file.h"
@@ -81,7 +81,8 @@ Rig load_rig(const std::string& path) {
     PICTURA_CHECK(row, "{}: camera {}: expected a table", path, i);
     Camera camera;
     camera.name = (*row)["name"].value_or(fmt::format("camera{}", i));
-    double width = 0, height = 0, focal_px = 0, center_x_px = -1, center_y_px = -1, yaw_deg = 0, pitch_deg = 0, roll_deg = 0;
+    double width = 0, height = 0, focal_px = 0, center_x_px = -1, center_y_px = -1, yaw_deg = 0, pitch_deg = 0,
+           roll_deg = 0;
     double x_m = 0, y_m = 0, z_m = 0;
     for (const auto& [key, value] : *row) {
       const std::string_view name = key.str();
@@ -89,20 +90,33 @@ Rig load_rig(const std::string& path) {
       const auto number = value.value<double>();
       PICTURA_CHECK(number.has_value(), "{}:{}: camera {} '{}': {}: expected a number", path, value.source().begin.line,
                     i, camera.name, name);
-      if (name == "width_px") width = *number;
-      else if (name == "height_px") height = *number;
-      else if (name == "focal_px") focal_px = *number;
-      else if (name == "center_x_px") center_x_px = *number;
-      else if (name == "center_y_px") center_y_px = *number;
-      else if (name == "x_m") x_m = *number;
-      else if (name == "y_m") y_m = *number;
-      else if (name == "z_m") z_m = *number;
-      else if (name == "yaw_deg") yaw_deg = *number;
-      else if (name == "pitch_deg") pitch_deg = *number;
-      else if (name == "roll_deg") roll_deg = *number;
-      else fail("{}:{}: camera {} '{}': unknown key '{}'; known: name width_px height_px focal_px center_x_px "
-                "center_y_px x_m y_m z_m yaw_deg pitch_deg roll_deg",
-                path, value.source().begin.line, i, camera.name, name);
+      if (name == "width_px")
+        width = *number;
+      else if (name == "height_px")
+        height = *number;
+      else if (name == "focal_px")
+        focal_px = *number;
+      else if (name == "center_x_px")
+        center_x_px = *number;
+      else if (name == "center_y_px")
+        center_y_px = *number;
+      else if (name == "x_m")
+        x_m = *number;
+      else if (name == "y_m")
+        y_m = *number;
+      else if (name == "z_m")
+        z_m = *number;
+      else if (name == "yaw_deg")
+        yaw_deg = *number;
+      else if (name == "pitch_deg")
+        pitch_deg = *number;
+      else if (name == "roll_deg")
+        roll_deg = *number;
+      else
+        fail(
+            "{}:{}: camera {} '{}': unknown key '{}'; known: name width_px height_px focal_px center_x_px "
+            "center_y_px x_m y_m z_m yaw_deg pitch_deg roll_deg",
+            path, value.source().begin.line, i, camera.name, name);
     }
     PICTURA_CHECK(width >= 1 && width <= kMaxSize_px && height >= 1 && height <= kMaxSize_px,
                   "{}: camera {} '{}': expected a size of 1x1 to {}x{} pixels, got {}x{}", path, i, camera.name,

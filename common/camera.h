@@ -14,12 +14,12 @@ namespace pictura {
 struct Camera {
   std::string name;
   int width_px = 0, height_px = 0;
-  float focal_x_px = 0, focal_y_px = 0;      // focal lengths
-  float center_x_px = 0, center_y_px = 0;    // principal point, from the image's top left corner
-  Vec3 position_m;                           // in the ego frame
-  float yaw_rad = 0;                         // about z, counter-clockwise; 0 looks forward
-  float pitch_rad = 0;                       // positive looks up
-  float roll_rad = 0;                        // positive turns the camera clockwise, as seen from behind it
+  float focal_x_px = 0, focal_y_px = 0;    // focal lengths
+  float center_x_px = 0, center_y_px = 0;  // principal point, from the image's top left corner
+  Vec3 position_m;                         // in the ego frame
+  float yaw_rad = 0;                       // about z, counter-clockwise; 0 looks forward
+  float pitch_rad = 0;                     // positive looks up
+  float roll_rad = 0;                      // positive turns the camera clockwise, as seen from behind it
 };
 
 /// N cameras of any sizes. A camera's index in the rig is its index in an ImageBatch.

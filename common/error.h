@@ -2,10 +2,10 @@
 // library prints or exits; the command turns an Error into one `error: ...` line and an exit status.
 #pragma once
 
-#include <fmt/format.h>
-
 #include <stdexcept>
 #include <string>
+
+#include <fmt/format.h>
 
 namespace pictura {
 
@@ -38,8 +38,8 @@ template <typename... Args>
 }
 
 /// Guards the door of a public function: throws Error with the formatted message unless `condition` holds.
-#define PICTURA_CHECK(condition, ...)              \
-  do {                                             \
+#define PICTURA_CHECK(condition, ...)               \
+  do {                                              \
     if (!(condition)) ::pictura::fail(__VA_ARGS__); \
   } while (0)
 

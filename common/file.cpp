@@ -1,12 +1,12 @@
 #include "pictura/common/file.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+
+#include <fcntl.h>
+#include <unistd.h>
 
 #include "pictura/common/error.h"
 
@@ -34,9 +34,9 @@ std::string read_file(const std::string& path, std::size_t max_bytes) {
 void write_renamed(const std::string& path, const std::function<void(const std::string&)>& write) {
   // The ending stays, for writers that choose a format by it.
   const fs::path target(path);
-  const std::string temporary =
-      (target.parent_path() / fmt::format(".{}.{}.tmp{}", target.stem().string(), getpid(), target.extension().string()))
-          .string();
+  const std::string temporary = (target.parent_path() / fmt::format(".{}.{}.tmp{}", target.stem().string(), getpid(),
+                                                                    target.extension().string()))
+                                    .string();
   try {
     write(temporary);
     // On disk before the rename, so that a crash never leaves an empty file under the final name.

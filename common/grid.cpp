@@ -40,7 +40,8 @@ Grid::Grid(Span<const Aabb2> boxes, float cell_m) : cell_m_(cell_m) {
   items_.resize(static_cast<std::size_t>(begin_.back()));
   std::vector<int32_t> next(begin_.begin(), begin_.end() - 1);
   for (std::size_t i = 0; i < boxes.size(); ++i) {
-    for_each_cell(boxes[i], [&](std::size_t cell) { items_[static_cast<std::size_t>(next[cell]++)] = static_cast<int32_t>(i); });
+    for_each_cell(boxes[i],
+                  [&](std::size_t cell) { items_[static_cast<std::size_t>(next[cell]++)] = static_cast<int32_t>(i); });
   }
 }
 

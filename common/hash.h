@@ -2,10 +2,10 @@
 // be compared by. Not for security.
 #pragma once
 
-#include <fmt/format.h>
-
 #include <cstdint>
 #include <string>
+
+#include <fmt/format.h>
 
 #include "pictura/common/span.h"
 

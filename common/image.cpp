@@ -1,8 +1,8 @@
 #include "pictura/common/image.h"
 
-#include <png.h>
-
 #include <map>
+
+#include <png.h>
 
 #include "pictura/common/error.h"
 #include "pictura/common/file.h"
@@ -70,9 +70,10 @@ std::vector<uint8_t> HostImages::interleaved(int view, int camera_index) const {
 }
 
 void write_png(const std::string& path, int width_px, int height_px, Span<const uint8_t> rgb) {
-  PICTURA_CHECK(width_px > 0 && height_px > 0 &&
-                    rgb.size() == std::size_t{3} * static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px),
-                "{}: expected {}x{} RGB pixels, got {} bytes", path, width_px, height_px, rgb.size());
+  PICTURA_CHECK(
+      width_px > 0 && height_px > 0 &&
+          rgb.size() == std::size_t{3} * static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px),
+      "{}: expected {}x{} RGB pixels, got {} bytes", path, width_px, height_px, rgb.size());
   write_renamed(path, [&](const std::string& temporary) {
     png_image image{};
     image.version = PNG_IMAGE_VERSION;
@@ -87,12 +88,13 @@ void write_png(const std::string& path, int width_px, int height_px, Span<const 
 RgbImage read_png(const std::string& path) {
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
-  PICTURA_CHECK(png_image_begin_read_from_file(&image, path.c_str()), "{}: not a readable PNG: {}", path, image.message);
+  PICTURA_CHECK(png_image_begin_read_from_file(&image, path.c_str()), "{}: not a readable PNG: {}", path,
+                image.message);
   image.format = PNG_FORMAT_RGB;
   RgbImage result{static_cast<int>(image.width), static_cast<int>(image.height), {}};
   result.rgb.resize(PNG_IMAGE_SIZE(image));
-  PICTURA_CHECK(png_image_finish_read(&image, nullptr, result.rgb.data(), 0, nullptr), "{}: not a readable PNG: {}", path,
-                image.message);
+  PICTURA_CHECK(png_image_finish_read(&image, nullptr, result.rgb.data(), 0, nullptr), "{}: not a readable PNG: {}",
+                path, image.message);
   return result;
 }
 

@@ -18,11 +18,11 @@ enum class PixelFormat : uint8_t { u8, f16, f32 };
 /// view * view_stride + (channel * height + y) * width + x of `data`.
 struct CameraImages {
   int width_px = 0, height_px = 0;
-  void* data = nullptr;                 // colour, of ImageBatch::format
-  int64_t view_stride = 0;              // elements from one view's image to the next
-  float* depth_m = nullptr;             // optional [views, height, width]; infinity where nothing is
-  uint8_t* class_id = nullptr;          // optional, class of the front surface at the pixel centre; 0 nothing
-  uint16_t* instance_id = nullptr;      // optional, 1 + index of the agent in its world; 0 none
+  void* data = nullptr;             // colour, of ImageBatch::format
+  int64_t view_stride = 0;          // elements from one view's image to the next
+  float* depth_m = nullptr;         // optional [views, height, width]; infinity where nothing is
+  uint8_t* class_id = nullptr;      // optional, class of the front surface at the pixel centre; 0 nothing
+  uint16_t* instance_id = nullptr;  // optional, 1 + index of the agent in its world; 0 none
 };
 
 /// What render() fills.
@@ -30,7 +30,7 @@ struct ImageBatch {
   MemorySpace space = MemorySpace::host;
   PixelFormat format = PixelFormat::u8;
   int num_views = 0;
-  Span<const CameraImages> cameras;     // [cameras of the rig]
+  Span<const CameraImages> cameras;  // [cameras of the rig]
 };
 
 /// Host memory for the images of a rig, colour only: one block per distinct size, in the order of first appearance.
@@ -57,7 +57,7 @@ class HostImages {
 void write_png(const std::string& path, int width_px, int height_px, Span<const uint8_t> rgb);
 struct RgbImage {
   int width_px = 0, height_px = 0;
-  std::vector<uint8_t> rgb;             // [height, width, 3]
+  std::vector<uint8_t> rgb;  // [height, width, 3]
 };
 /// Reads any PNG as 8-bit RGB. Throws Error naming the path.
 RgbImage read_png(const std::string& path);

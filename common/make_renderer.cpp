@@ -28,11 +28,14 @@ class NullRenderer final : public Renderer {
 
   void render(const SceneBatch&, Span<const View> views, const ImageBatch& images_out, Stream) override {
     PICTURA_CHECK(images_out.space == MemorySpace::host, "renderer null: expected images in host memory");
-    const std::size_t value_bytes = images_out.format == PixelFormat::u8 ? 1 : images_out.format == PixelFormat::f16 ? 2 : 4;
+    const std::size_t value_bytes = images_out.format == PixelFormat::u8    ? 1
+                                    : images_out.format == PixelFormat::f16 ? 2
+                                                                            : 4;
     for (const CameraImages& camera : images_out.cameras) {
       const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
       for (std::size_t view = 0; view < views.size(); ++view) {
-        auto* first = static_cast<uint8_t*>(camera.data) + view * static_cast<std::size_t>(camera.view_stride) * value_bytes;
+        auto* first =
+            static_cast<uint8_t*>(camera.data) + view * static_cast<std::size_t>(camera.view_stride) * value_bytes;
         std::memset(first, 0, 3 * pixels * value_bytes);
         for (std::size_t i = view * pixels; i < (view + 1) * pixels; ++i) {
           if (camera.depth_m) camera.depth_m[i] = std::numeric_limits<float>::infinity();
@@ -65,7 +68,8 @@ std::vector<std::string> renderer_names() {
 #endif
 }
 
-std::unique_ptr<Renderer> make_renderer(const std::string& name, const RendererConfig& config, std::string* choice_out) {
+std::unique_ptr<Renderer> make_renderer(const std::string& name, const RendererConfig& config,
+                                        std::string* choice_out) {
   auto chosen = [&](const std::string& choice) {
     if (choice_out) *choice_out = choice;
   };

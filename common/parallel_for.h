@@ -2,11 +2,11 @@
 // is carried to the caller; which one, when several bodies throw, is the lowest item's.
 #pragma once
 
-#include <omp.h>
-
 #include <cstdint>
 #include <exception>
 #include <limits>
+
+#include <omp.h>
 
 namespace pictura {
 

@@ -12,15 +12,15 @@ namespace pictura {
 
 struct RendererConfig {
   Rig rig = paper_rig();
-  int num_threads = 0;                 // host threads; 0: all
-  float line_floor_px = 0.35f;         // least width of a strip on screen, measured across it; 0 turns the floor off
-  bool debug_palette = false;          // tint halted and parked agents
+  int num_threads = 0;          // host threads; 0: all
+  float line_floor_px = 0.35f;  // least width of a strip on screen, measured across it; 0 turns the floor off
+  bool debug_palette = false;   // tint halted and parked agents
 };
 
 /// Asks how much of an agent a view sees.
 struct VisibilityQuery {
   int32_t view = 0;
-  int32_t agent = 0;                   // index into SceneBatch::agents
+  int32_t agent = 0;  // index into SceneBatch::agents
 };
 
 /// An object serves one thread at a time; distinct objects are independent.

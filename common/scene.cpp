@@ -31,7 +31,8 @@ void StaticGeometry::build_grids() {
   wall_grid = Grid(boxes, kGeometryCell_m);
 }
 
-void append_strips(Span<const Vec3> points_m, float width_m, Rgb color, StripKind kind, std::vector<Strip>* strips_out) {
+void append_strips(Span<const Vec3> points_m, float width_m, Rgb color, StripKind kind,
+                   std::vector<Strip>* strips_out) {
   PICTURA_CHECK(points_m.size() >= 2, "polyline: expected at least two points, got {}", points_m.size());
 
   // Points with pieces of at most kMaxPiece_m between them, without repeated ones.

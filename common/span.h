@@ -12,10 +12,16 @@ class Span {
   constexpr Span() = default;
   PICTURA_HD constexpr Span(T* data, size_t size) : data_(data), size_(size) {}
   template <typename Container>
-    requires requires(Container& c, T*& p) { p = c.data(); c.size(); }
+    requires requires(Container& c, T*& p) {
+      p = c.data();
+      c.size();
+    }
   PICTURA_HD constexpr Span(Container& container) : data_(container.data()), size_(container.size()) {}
   template <typename Container>
-    requires requires(const Container& c, T*& p) { p = c.data(); c.size(); }
+    requires requires(const Container& c, T*& p) {
+      p = c.data();
+      c.size();
+    }
   PICTURA_HD constexpr Span(const Container& container) : data_(container.data()), size_(container.size()) {}
 
   PICTURA_HD constexpr T& operator[](size_t i) const { return data_[i]; }

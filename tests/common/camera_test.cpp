@@ -1,11 +1,11 @@
 // The paper's rig, camera axes, and rigs read from files.
 #include "pictura/common/camera.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <filesystem>
 #include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 
 #include "pictura/common/error.h"
 
@@ -57,8 +57,9 @@ TEST(Camera, AxesFollowYawAndPitch) {
 }
 
 TEST(Rig, ARigFileIsRead) {
-  const Rig rig = load_rig(written("[[camera]]\nname = \"wide\"\nwidth_px = 64\nheight_px = 32\nfocal_px = 30\nx_m = 1.5\n"
-                                   "z_m = 1.4\nyaw_deg = 90\n\n[[camera]]\nwidth_px = 97\nheight_px = 55\nfocal_px = 80.5\n"));
+  const Rig rig =
+      load_rig(written("[[camera]]\nname = \"wide\"\nwidth_px = 64\nheight_px = 32\nfocal_px = 30\nx_m = 1.5\n"
+                       "z_m = 1.4\nyaw_deg = 90\n\n[[camera]]\nwidth_px = 97\nheight_px = 55\nfocal_px = 80.5\n"));
   ASSERT_EQ(rig.cameras.size(), 2u);
   EXPECT_EQ(rig.cameras[0].name, "wide");
   EXPECT_FLOAT_EQ(rig.cameras[0].yaw_rad, kHalfPi);
@@ -67,12 +68,14 @@ TEST(Rig, ARigFileIsRead) {
 }
 
 TEST(Rig, BadRigsAreRefusedByName) {
-  EXPECT_THAT(message_of([] { load_rig(written("[[camera]]\nname = \"a\"\nwidth_px = 0\nheight_px = 0\nfocal_px = 3\n")); }),
-              HasSubstr("camera 0 'a': expected a size of 1x1"));
+  EXPECT_THAT(
+      message_of([] { load_rig(written("[[camera]]\nname = \"a\"\nwidth_px = 0\nheight_px = 0\nfocal_px = 3\n")); }),
+      HasSubstr("camera 0 'a': expected a size of 1x1"));
   EXPECT_THAT(message_of([] { load_rig(written("[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = -3\n")); }),
               HasSubstr("positive focal"));
-  EXPECT_THAT(message_of([] { load_rig(written("[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = 3\nzoom = 2\n")); }),
-              HasSubstr("unknown key 'zoom'"));
+  EXPECT_THAT(
+      message_of([] { load_rig(written("[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = 3\nzoom = 2\n")); }),
+      HasSubstr("unknown key 'zoom'"));
   EXPECT_THAT(message_of([] { load_rig(written("[[camera]]\nwidth_px = nan\nheight_px = 8\nfocal_px = 3\n")); }),
               HasSubstr("expected a size"));
   EXPECT_THAT(message_of([] { load_rig(written("[[camera\n")); }), HasSubstr(":1: "));

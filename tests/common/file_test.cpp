@@ -1,11 +1,11 @@
 // Files written beside and renamed; PNG and hash.
 #include "pictura/common/file.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <filesystem>
 #include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 
 #include "pictura/common/error.h"
 #include "pictura/common/hash.h"
@@ -82,7 +82,8 @@ TEST(HostImages, MixedSizesGetOneBlockEach) {
   EXPECT_EQ(images.camera(0).view_stride, 3 * 3 * 8 * 4);
   EXPECT_EQ(images.camera(2).view_stride, 3 * 5 * 4);
   const auto* first = static_cast<const uint8_t*>(images.camera(0).data);
-  EXPECT_EQ(static_cast<const uint8_t*>(images.camera(3).data) - first, 2 * 3 * 8 * 4) << "camera 3 is the third of its size";
+  EXPECT_EQ(static_cast<const uint8_t*>(images.camera(3).data) - first, 2 * 3 * 8 * 4)
+      << "camera 3 is the third of its size";
 }
 
 }  // namespace

@@ -1,9 +1,9 @@
 // The uniform grid against a brute-force look-up.
 #include "pictura/common/grid.h"
 
-#include <gtest/gtest.h>
-
 #include <limits>
+
+#include <gtest/gtest.h>
 
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"

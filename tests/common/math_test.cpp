@@ -1,9 +1,9 @@
 // Our own transcendental functions against libm in double, over the ranges that their comments promise.
 #include "pictura/common/math.h"
 
-#include <gtest/gtest.h>
-
 #include <cmath>
+
+#include <gtest/gtest.h>
 
 namespace pictura {
 namespace {

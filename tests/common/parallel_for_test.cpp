@@ -1,11 +1,11 @@
 // Every item once, and the lowest item's exception.
 #include "pictura/common/parallel_for.h"
 
-#include <gtest/gtest.h>
-
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include <gtest/gtest.h>
 
 namespace pictura {
 namespace {

@@ -1,10 +1,10 @@
 // Our Philox against Random123's, and what streams promise.
 #include "pictura/common/rng.h"
 
+#include <set>
+
 #include <Random123/philox.h>
 #include <gtest/gtest.h>
-
-#include <set>
 
 namespace pictura {
 namespace {
@@ -64,7 +64,7 @@ TEST(Rng, UniformDrawsHaveTheMomentsOfTheirRange) {
     ++histogram[static_cast<size_t>(random.below(7))];
   }
   const double mean = sum / kDraws, variance = sum_squares / kDraws - mean * mean;
-  EXPECT_NEAR(mean, 7.0, 0.13);                // 4 standard errors of sqrt(100 / 12 / 8000)
+  EXPECT_NEAR(mean, 7.0, 0.13);  // 4 standard errors of sqrt(100 / 12 / 8000)
   EXPECT_NEAR(variance, 100.0 / 12.0, 0.4);
   for (const int count : histogram) EXPECT_NEAR(count, kDraws / 7.0, 130);
 }

@@ -1,0 +1,63 @@
+// A Cairo image surface that frees itself, its colours, and text. Private to the drawing library.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include <cairo.h>
+
+#include "pictura/common/color.h"
+#include "pictura/common/image.h"
+
+namespace pictura {
+
+/// 0xRRGGBB.
+constexpr Rgb hex(uint32_t rrggbb) {
+  return rgb8(static_cast<int>(rrggbb >> 16) & 255, static_cast<int>(rrggbb >> 8) & 255,
+              static_cast<int>(rrggbb) & 255);
+}
+
+enum class Align { left, center, right };
+
+struct TextStyle {
+  double size_px = 12;
+  bool bold = false;
+  Align align = Align::left;
+  Rgb color = hex(0x22262B);
+};
+
+/// Opaque pixels to draw on; user space is pixels until somebody changes the matrix.
+class Canvas {
+ public:
+  /// Filled with one colour. Throws Error when the surface cannot be made.
+  Canvas(int width_px, int height_px, Rgb background);
+
+  int width_px() const { return width_px_; }
+  int height_px() const { return height_px_; }
+  cairo_t* context() const { return context_.get(); }
+  cairo_surface_t* surface() const { return surface_.get(); }
+
+  void set_color(Rgb color, double alpha = 1);
+  void fill_rectangle(double x, double y, double width, double height, Rgb color, double alpha = 1);
+  /// A rectangle with round corners, as a path.
+  void round_rectangle_path(double x, double y, double width, double height, double radius);
+  /// Text whose baseline is at y, turned by `angle_rad` counter-clockwise. Returns its advance in pixels.
+  double text(double x, double y, const std::string& words, const TextStyle& style, double angle_rad = 0);
+  double text_width(const std::string& words, const TextStyle& style) const;
+
+  /// Throws Error naming Cairo's reason when anything went wrong since the canvas was made.
+  RgbImage image() const;
+
+ private:
+  struct Free {
+    void operator()(cairo_t* context) const { cairo_destroy(context); }
+    void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
+  };
+  void select_font(const TextStyle& style) const;
+
+  int width_px_, height_px_;
+  std::unique_ptr<cairo_surface_t, Free> surface_;
+  std::unique_ptr<cairo_t, Free> context_;
+};
+
+}  // namespace pictura

@@ -1,0 +1,38 @@
+// Line plots for people: several panels in one picture, several series in each.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pictura/common/image.h"
+
+namespace pictura {
+
+/// One line; points that are not finite leave a gap.
+struct PlotSeries {
+  std::string name;
+  std::vector<double> x, y;  // equally many
+};
+
+struct PlotPanel {
+  std::string title, x_label, y_label;
+  std::vector<PlotSeries> series;
+};
+
+struct PlotOptions {
+  int panel_width_px = 560, panel_height_px = 360;
+  int columns = 2;
+  std::string title;
+};
+
+/// Panels in rows of options.columns, with axes, ticks at round numbers, a grid and a legend where there is more than
+/// one series. Throws Error when there is no panel, a series has unequal x and y, or a size is out of [64, 8192] px.
+RgbImage draw_plots(const std::vector<PlotPanel>& panels, const PlotOptions& options = {});
+
+/// draw_plots() as a PNG file. Throws Error naming the path.
+void draw_plots_png(const std::vector<PlotPanel>& panels, const std::string& path, const PlotOptions& options = {});
+
+/// Round positions for axis ticks: a step of 1, 2 or 5 times a power of ten, about `wanted` of them within [low, high].
+std::vector<double> round_ticks(double low, double high, int wanted);
+
+}  // namespace pictura

@@ -1,0 +1,62 @@
+// One simulated world from above: the road map, its lights as they are now, and the agents as boxes. North is up. The
+// map is drawn once, in tiles, so that a frame costs little more than its agents.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pictura/common/image.h"
+#include "pictura/common/scene.h"
+#include "pictura/map/road_map.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+/// Where a picture from above looks.
+struct TopCamera {
+  Vec2 center_m;
+  float px_per_m = 4;
+};
+
+/// What moves in one world; spans are read while drawing alone.
+struct WorldFrame {
+  Span<const AgentBox> agents;    // of this world alone
+  Span<const LightState> lights;  // [map.lights]
+  Span<const uint8_t> dimmed;     // [agents], or empty: 1 for those that halted
+  int highlighted = -1;           // index of an agent that gets a halo, and whose waypoints these are
+  Span<const Vec2> waypoints_m;   // those not yet passed, nearest first
+  std::string caption;            // one line at the top left, or empty
+};
+
+/// Draws frames of one size of worlds on one map. The map must outlive it.
+class WorldPainter {
+ public:
+  /// Throws Error unless both sizes are in [16, 8192] px.
+  WorldPainter(const RoadMap& map, int width_px, int height_px);
+  ~WorldPainter();
+
+  int width_px() const;
+  int height_px() const;
+
+  /// The camera that shows the whole map, with a small margin.
+  TopCamera whole_map() const;
+  /// The camera that shows width_m metres from side to side around a place, which may move from frame to frame.
+  TopCamera around(Vec2 center_m, float width_m) const;
+
+  /// Pixel coordinates of a place.
+  Vec2 pixel_of(const TopCamera& camera, Vec2 place_m) const;
+
+  RgbImage draw(const WorldFrame& frame, const TopCamera& camera);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Draws one world of a simulator whose arrays lie in host memory; `followed` (a slot of that world counted from its
+/// first, or -1) is highlighted with its waypoints and, where follow_width_m > 0, the camera stays over it.
+RgbImage draw_world(WorldPainter& painter, Simulator& simulator, int world, int followed = -1, float follow_width_m = 0,
+                    const std::string& caption = {});
+
+}  // namespace pictura

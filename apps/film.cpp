@@ -1,0 +1,1 @@
+#include "pictura/apps/film.h"

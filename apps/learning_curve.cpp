@@ -1,0 +1,1 @@
+#include "pictura/apps/learning_curve.h"
