@@ -68,7 +68,21 @@ function(pictura_add_test name)
   gtest_discover_tests(${name}_test DISCOVERY_TIMEOUT 120 PROPERTIES ${properties})
 endfunction()
 
+# What tests find in their environment.
+set(PICTURA_TEST_ENVIRONMENT)
 if(NOT DEFINED ENV{PICTURA_DATA} AND EXISTS ${PROJECT_SOURCE_DIR}/../shared/data)
   get_filename_component(data_folder ${PROJECT_SOURCE_DIR}/../shared/data REALPATH)
-  set(PICTURA_TEST_ENVIRONMENT PICTURA_DATA=${data_folder})
+  list(APPEND PICTURA_TEST_ENVIRONMENT PICTURA_DATA=${data_folder})
+endif()
+if(PICTURA_SANITIZE MATCHES thread)
+  # Archer tells the sanitizer about OpenMP's own synchronisation; without it every parallel loop looks like a race.
+  execute_process(COMMAND ${CMAKE_CXX_COMPILER} -print-file-name=libarcher.so
+    OUTPUT_VARIABLE archer OUTPUT_STRIP_TRAILING_WHITESPACE)
+  if(NOT EXISTS ${archer})
+    message(FATAL_ERROR "the thread sanitizer needs clang with libomp's Archer (package libomp-dev); ${archer} is missing")
+  endif()
+  list(APPEND PICTURA_TEST_ENVIRONMENT OMP_TOOL_LIBRARIES=${archer} TSAN_OPTIONS=ignore_noninstrumented_modules=1)
+elseif(PICTURA_SANITIZE MATCHES address)
+  list(APPEND PICTURA_TEST_ENVIRONMENT UBSAN_OPTIONS=print_stacktrace=1
+    LSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/support/leaks.txt:print_suppressions=0)
 endif()
