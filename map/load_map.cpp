@@ -1,1 +1,85 @@
 #include "pictura/map/load_map.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "pictura/common/error.h"
+#include "pictura/map/opendrive.h"
+#include "pictura/map/procedural_town.h"
+
+namespace pictura {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kProcedural = "procedural";
+constexpr std::string_view kExtension = ".xodr";
+
+std::vector<fs::path> town_folders() { return {fs::path(map_folder()), fs::path(map_folder()) / "carla"}; }
+
+/// The towns that the map folder holds, by name, sorted.
+std::vector<std::string> known_towns() {
+  std::vector<std::string> names;
+  for (const fs::path& folder : town_folders()) {
+    std::error_code error;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+      if (entry.path().extension() == kExtension) names.push_back(entry.path().stem().string());
+    }
+  }
+  std::sort(names.begin(), names.end());
+  names.erase(std::unique(names.begin(), names.end()), names.end());
+  return names;
+}
+
+/// The seed of `procedural[:SEED]`, or nothing when the name is not of that kind.
+std::optional<uint64_t> procedural_seed(std::string_view name) {
+  if (name == kProcedural) return 0;
+  if (!name.starts_with(kProcedural) || name[kProcedural.size()] != ':') return std::nullopt;
+  const std::string_view digits = name.substr(kProcedural.size() + 1);
+  uint64_t seed = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), seed);
+  if (error != std::errc() || end != digits.data() + digits.size()) {
+    fail_usage("map '{}': expected procedural or procedural:SEED with an integer from 0, got '{}'", name, digits);
+  }
+  return seed;
+}
+
+}  // namespace
+
+std::string map_folder() {
+  auto variable = [](const char* name) -> std::string {
+    const char* value = std::getenv(name);
+    return value ? value : "";
+  };
+  if (const std::string data = variable("PICTURA_DATA"); !data.empty()) return data;
+  if (const std::string data = variable("XDG_DATA_HOME"); !data.empty()) return data + "/pictura/maps";
+  return variable("HOME") + "/.local/share/pictura/maps";
+}
+
+std::shared_ptr<const RoadMap> load_map(const std::string& name) {
+  if (const std::optional<uint64_t> seed = procedural_seed(name)) {
+    auto map = std::make_shared<RoadMap>(parse_opendrive(procedural_town({.seed = *seed}), name));
+    map->name = fmt::format("{}:{}", kProcedural, *seed);
+    return map;
+  }
+  std::error_code error;
+  if (name.ends_with(kExtension)) return std::make_shared<RoadMap>(load_opendrive(name));
+  if (fs::exists(name, error) && !fs::is_directory(name, error)) {
+    fail_usage("map '{}': expected a file that ends in {}", name, kExtension);
+  }
+  if (!name.empty() && name.find('/') == std::string::npos) {
+    for (const fs::path& folder : town_folders()) {
+      const fs::path path = folder / (name + std::string(kExtension));
+      if (fs::exists(path, error)) return std::make_shared<RoadMap>(load_opendrive(path.string()));
+    }
+  }
+  fail_usage("map '{}': expected an {} file, procedural[:SEED], or a town in {}: {}", name, kExtension, map_folder(),
+             fmt::join(known_towns(), ", "));
+}
+
+}  // namespace pictura

@@ -7,8 +7,8 @@
 namespace pictura {
 
 struct MapGeometryOptions {
-  bool walls = true;                      // walls along the building lines
-  uint64_t wall_seed = 0;                 // which stretches of the building lines stand
+  bool walls = true;                        // walls along the building lines
+  uint64_t wall_seed = 0;                   // which stretches of the building lines stand
   float light_half_angle_rad = kPi / 3.0f;  // half of the angle within which a head is seen (60 degrees)
 };
 

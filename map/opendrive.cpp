@@ -1,1 +1,39 @@
 #include "pictura/map/opendrive.h"
+
+#include <filesystem>
+
+#include "pictura/common/file.h"
+#include "pictura/map/opendrive_build.h"
+#include "pictura/map/opendrive_reader.h"
+
+namespace pictura {
+
+RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options) {
+  PICTURA_CHECK(options.chord_error_m >= 1e-3f && options.chord_error_m <= 10.0f,
+                "OpenDRIVE options: expected a chord error in [0.001, 10] m, got {}", options.chord_error_m);
+  opendrive::Network network;
+  opendrive::read_network(text, source, &network);
+
+  RoadMap map;
+  map.name = std::filesystem::path(source).stem().string();
+  opendrive::Build build{network, options, &map};
+  opendrive::choose_origin(&build);
+  opendrive::build_lanes(&build);
+  opendrive::link_lanes(&build);
+  opendrive::set_speed_limits(&build);
+  opendrive::find_endless_lanes(&build);
+  opendrive::build_road_edges(&build);
+  opendrive::build_markings(&build);
+  opendrive::build_objects(&build);
+  opendrive::build_lights(&build);
+  opendrive::build_building_lines(&build);
+  opendrive::count_facts(&build);
+  validate(map);
+  return map;
+}
+
+RoadMap load_opendrive(const std::string& path, const OpenDriveOptions& options) {
+  return parse_opendrive(read_file(path), path, options);
+}
+
+}  // namespace pictura

@@ -9,7 +9,7 @@
 namespace pictura {
 
 struct OpenDriveOptions {
-  float chord_error_m = 0.02f;            // greatest distance of a sampled curve from the true one
+  float chord_error_m = 0.02f;  // greatest distance of a sampled curve from the true one
 };
 
 /// Parses the text of an OpenDRIVE file. `source` names it in messages. Throws Error naming source, road, element and

@@ -14,8 +14,18 @@
 namespace pictura {
 
 enum class LaneType : uint8_t {
-  driving, bidirectional, parking, ramp,            // drivable
-  shoulder, sidewalk, biking, median, border, stop, restricted, other,
+  driving,
+  bidirectional,
+  parking,
+  ramp,  // drivable
+  shoulder,
+  sidewalk,
+  biking,
+  median,
+  border,
+  stop,
+  restricted,
+  other,
 };
 
 /// Drivable lanes make the surface whose outline the road edges are.
@@ -33,16 +43,16 @@ struct LanePoint {
   Vec3 position_m;
   float heading_rad = 0;
   float width_m = 0;
-  float s_m = 0;                          // arc length from the lane's start
+  float s_m = 0;  // arc length from the lane's start
 };
 
 struct Lane {
   LaneType type = LaneType::other;
   bool in_junction = false;
-  bool is_endless = false;                // a route along successors (and lane changes) goes on for ever from here
+  bool is_endless = false;  // a route along successors (and lane changes) goes on for ever from here
   int32_t junction = -1;
-  IndexRange points;                      // RoadMap::lane_points, at least two
-  IndexRange successors, predecessors;    // RoadMap::lane_links: lanes
+  IndexRange points;                                // RoadMap::lane_points, at least two
+  IndexRange successors, predecessors;              // RoadMap::lane_links: lanes
   int32_t left_neighbor = -1, right_neighbor = -1;  // same direction, driving, change permitted by geometry
   float length_m = 0;
   float speed_limit_mps = 0;
@@ -53,7 +63,7 @@ enum class MarkColor : uint8_t { white, yellow };
 
 /// A painted line, one per stripe and dash run: a double line is two markings, a broken one is many.
 struct Marking {
-  IndexRange points;                      // RoadMap::marking_points, at least two
+  IndexRange points;  // RoadMap::marking_points, at least two
   float width_m = 0;
   MarkColor color = MarkColor::white;
   bool broken = false;
@@ -65,7 +75,7 @@ struct RoadEdge {
 };
 
 struct Crosswalk {
-  IndexRange outline;                     // RoadMap::outline_points, a closed ring without the repeated point
+  IndexRange outline;  // RoadMap::outline_points, a closed ring without the repeated point
 };
 
 struct ParkingSpace {
@@ -76,24 +86,24 @@ struct ParkingSpace {
 
 /// A traffic light: its stop line, head, phase, and the lanes that it holds (incoming and connecting ones).
 struct TrafficLight {
-  Vec3 stop_a_m, stop_b_m;                // the stop line, left end first as seen by traffic
-  float stop_heading_rad = 0;             // direction of the traffic that it stops
-  Vec3 head_m;                            // centre of the head
-  Vec2 head_facing;                       // unit vector towards the traffic that it is meant for
+  Vec3 stop_a_m, stop_b_m;     // the stop line, left end first as seen by traffic
+  float stop_heading_rad = 0;  // direction of the traffic that it stops
+  Vec3 head_m;                 // centre of the head
+  Vec2 head_facing;            // unit vector towards the traffic that it is meant for
   int32_t junction = -1;
-  int32_t phase = 0;                      // rank of its controller in the junction
-  IndexRange lanes;                       // RoadMap::light_lanes, incoming lanes first, then connecting ones
-  std::string name;                       // the signal's id in the file
+  int32_t phase = 0;  // rank of its controller in the junction
+  IndexRange lanes;   // RoadMap::light_lanes, incoming lanes first, then connecting ones
+  std::string name;   // the signal's id in the file
 };
 
 struct Junction {
-  std::string name;                       // id in the file
-  int32_t num_phases = 0;                 // 0: no lights
+  std::string name;        // id in the file
+  int32_t num_phases = 0;  // 0: no lights
 };
 
 /// A straight piece of a building line behind the sidewalk, where walls may stand.
 struct BuildingLine {
-  Vec3 a_m, b_m;                          // the road lies to the right of a -> b
+  Vec3 a_m, b_m;  // the road lies to the right of a -> b
 };
 
 /// Counts that `pictura map` prints and that tests compare with the file.
@@ -105,9 +115,9 @@ struct MapFacts {
 };
 
 struct RoadMap {
-  std::string name;                       // "Town01", "procedural:7", or the file's stem
-  std::array<double, 3> origin_m{};       // file coordinates of this map's (0, 0, 0)
-  std::vector<std::string> road_names;    // [roads] id in the file
+  std::string name;                     // "Town01", "procedural:7", or the file's stem
+  std::array<double, 3> origin_m{};     // file coordinates of this map's (0, 0, 0)
+  std::vector<std::string> road_names;  // [roads] id in the file
 
   std::vector<Lane> lanes;
   std::vector<LanePoint> lane_points;

@@ -1,0 +1,69 @@
+// The stages that turn a Network into a RoadMap, in the order in which parse_opendrive runs them. Each fills its own
+// vectors of the map and reads those of the stages before it.
+#pragma once
+
+#include <vector>
+
+#include "pictura/common/scene.h"
+#include "pictura/map/opendrive.h"
+#include "pictura/map/opendrive_curves.h"
+#include "pictura/map/opendrive_model.h"
+#include "pictura/map/polyline.h"
+
+namespace pictura::opendrive {
+
+/// Indices into RoadMap::lanes of a section's lanes, outwards from the center; -1 where there is no surface.
+struct SectionLanes {
+  std::vector<int32_t> left, right;
+
+  int32_t of(int id) const {
+    const std::vector<int32_t>& side = id > 0 ? left : right;
+    const std::size_t index = static_cast<std::size_t>(id > 0 ? id : -id) - 1;
+    return id != 0 && index < side.size() ? side[index] : -1;
+  }
+};
+
+/// What the stages share.
+struct Build {
+  const Network& network;
+  const OpenDriveOptions& options;
+  RoadMap* map;
+  SampleBudget budget{20'000'000};
+  std::vector<std::vector<SectionLanes>> lanes;  // [roads][sections]
+
+  /// File coordinates to the map's.
+  Vec3 to_map(double x, double y, double z) const {
+    return {static_cast<float>(x - map->origin_m[0]), static_cast<float>(y - map->origin_m[1]),
+            static_cast<float>(z - map->origin_m[2])};
+  }
+  Vec3 to_map(const Point3& p) const { return to_map(p.x, p.y, p.z); }
+};
+
+/// Lanes with a positive id lie left of the reference line and are travelled against s (right-hand traffic).
+constexpr bool travels_forward(int lane_id) { return lane_id < 0; }
+
+/// The origin, in the middle of the reference lines, in whole metres.
+void choose_origin(Build* build);
+
+/// Lanes of every type but "none", their centre lines, neighbours and links, speed limits, and which are endless.
+void build_lanes(Build* build);
+void link_lanes(Build* build);
+void set_speed_limits(Build* build);
+void find_endless_lanes(Build* build);
+
+/// The outline of the drivable surface.
+void build_road_edges(Build* build);
+
+/// Painted lines, crosswalks and parking spaces.
+void build_markings(Build* build);
+void build_objects(Build* build);
+
+/// Junctions and traffic lights.
+void build_lights(Build* build);
+
+/// Where walls may stand.
+void build_building_lines(Build* build);
+
+void count_facts(Build* build);
+
+}  // namespace pictura::opendrive

@@ -1,0 +1,39 @@
+// Counts over a finished map.
+#include <algorithm>
+
+#include "pictura/map/opendrive_build.h"
+
+namespace pictura::opendrive {
+
+void count_facts(Build* build) {
+  const Network& network = build->network;
+  const RoadMap& map = *build->map;
+  MapFacts facts;
+  facts.roads = static_cast<int32_t>(network.roads.size());
+  facts.junction_roads = static_cast<int32_t>(std::count_if(
+      network.roads.begin(), network.roads.end(), [](const FileRoad& road) { return !road.junction.empty(); }));
+  facts.junctions = static_cast<int32_t>(map.junctions.size());
+  facts.signal_junctions = static_cast<int32_t>(std::count_if(
+      map.junctions.begin(), map.junctions.end(), [](const Junction& junction) { return junction.num_phases > 0; }));
+  facts.lanes = static_cast<int32_t>(map.lanes.size());
+  bool first = true;
+  for (const Lane& lane : map.lanes) {
+    if (lane.type != LaneType::driving) continue;
+    ++facts.driving_lanes;
+    facts.driving_lane_km += 1e-3 * static_cast<double>(lane.length_m);
+    if (lane.in_junction) facts.driving_lane_km_in_junctions += 1e-3 * static_cast<double>(lane.length_m);
+    for (const LanePoint& point : map.points_of(lane)) {
+      const double z = static_cast<double>(point.position_m.z) + map.origin_m[2];
+      facts.z_min_m = first ? z : std::min(facts.z_min_m, z);
+      facts.z_max_m = first ? z : std::max(facts.z_max_m, z);
+      first = false;
+    }
+  }
+  facts.traffic_lights = static_cast<int32_t>(map.lights.size());
+  facts.stop_lines = facts.traffic_lights;
+  facts.crosswalks = static_cast<int32_t>(map.crosswalks.size());
+  facts.parking_spaces = static_cast<int32_t>(map.parking_spaces.size());
+  build->map->facts = facts;
+}
+
+}  // namespace pictura::opendrive

@@ -1,0 +1,284 @@
+#include "pictura/map/road_edges.h"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "pictura/common/grid.h"
+#include "pictura/common/scene.h"
+
+namespace pictura {
+
+namespace {
+
+constexpr double kLevel_m = 2.0;
+constexpr double kCrack_m = 0.05;        // a gap this wide between two bands is a crack and no edge
+constexpr double kCoincident_m = 0.004;  // borders nearer than this are one border
+constexpr double kStep_m = 0.5;          // borders are tested at least this often
+constexpr double kTransition_m = 0.002;  // where an outline begins and ends is found to this
+constexpr double kJoin_m = 0.06;         // ends of outlines nearer than this are joined
+constexpr double kMinOutline_m = 0.3;
+constexpr float kCell_m = 4.0f;
+
+struct Point2 {
+  double x = 0, y = 0;
+};
+
+double cross_of(const Point3& a, const Point3& b, const Point2& p) {
+  return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
+}
+
+Point3 lerp(const Point3& a, const Point3& b, double u) {
+  return {a.x + u * (b.x - a.x), a.y + u * (b.y - a.y), a.z + u * (b.z - a.z)};
+}
+
+double plan_distance(const Point3& a, const Point3& b) { return std::hypot(b.x - a.x, b.y - a.y); }
+
+/// All quads of all bands in a grid, to ask which bands cover a place.
+class Surface {
+ public:
+  explicit Surface(const std::vector<SurfaceBand>& bands) {
+    std::vector<Aabb2> boxes;
+    for (std::size_t band = 0; band < bands.size(); ++band) {
+      const auto& [left, right] = bands[band];
+      for (std::size_t i = 0; i + 1 < left.size(); ++i) {
+        const Quad quad{{left[i], right[i], right[i + 1], left[i + 1]}, static_cast<int32_t>(band)};
+        Aabb2 box{{1e30f, 1e30f}, {-1e30f, -1e30f}};
+        for (const Point3& corner : quad.corners) {
+          const float x = static_cast<float>(corner.x), y = static_cast<float>(corner.y);
+          box.low = {min_of(box.low.x, x), min_of(box.low.y, y)};
+          box.high = {max_of(box.high.x, x), max_of(box.high.y, y)};
+        }
+        quads_.push_back(quad);
+        boxes.push_back(box);
+      }
+    }
+    grid_ = Grid(boxes, kCell_m);
+  }
+
+  /// Calls visit(band) for every band that covers `p` at about the height `z`, until it returns true; says whether one
+  /// did.
+  template <typename Visit>
+  bool any_band_at(const Point2& p, double z, Visit&& visit) const {
+    const GridView grid = grid_.view();
+    const Vec2 place{static_cast<float>(p.x), static_cast<float>(p.y)};
+    if (!grid.contains(place)) return false;
+    const std::size_t cell = static_cast<std::size_t>(grid.cell_y(place.y)) * static_cast<std::size_t>(grid.num_x) +
+                             static_cast<std::size_t>(grid.cell_x(place.x));
+    for (int32_t i = grid.begin[cell]; i < grid.begin[cell + 1]; ++i) {
+      const Quad& quad = quads_[static_cast<std::size_t>(grid.items[static_cast<std::size_t>(i)])];
+      if (contains(quad, p, z) && visit(quad.band)) return true;
+    }
+    return false;
+  }
+
+ private:
+  struct Quad {
+    Point3 corners[4];  // counter-clockwise: left, right, next right, next left
+    int32_t band = 0;
+  };
+
+  /// Two triangles, so that a quad that is not convex is still covered as drawn.
+  static bool contains(const Quad& quad, const Point2& p, double z) {
+    const Point3* c = quad.corners;
+    const double mean_z = 0.25 * (c[0].z + c[1].z + c[2].z + c[3].z);
+    if (std::abs(z - mean_z) >= kLevel_m) return false;
+    return in_triangle(c[0], c[1], c[2], p) || in_triangle(c[0], c[2], c[3], p);
+  }
+  static bool in_triangle(const Point3& a, const Point3& b, const Point3& c, const Point2& p) {
+    const double ab = cross_of(a, b, p), bc = cross_of(b, c, p), ca = cross_of(c, a, p);
+    return (ab >= 0 && bc >= 0 && ca >= 0) || (ab <= 0 && bc <= 0 && ca <= 0);
+  }
+
+  std::vector<Quad> quads_;
+  Grid grid_;
+};
+
+/// Walks the four sides of each band clockwise, surface to the right, and keeps what lies on the outline.
+class Tracer {
+ public:
+  Tracer(const std::vector<SurfaceBand>& bands, const Surface& surface) : bands_(bands), surface_(surface) {}
+
+  std::vector<std::vector<Point3>> trace() {
+    for (std::size_t band = 0; band < bands_.size(); ++band) {
+      const SurfaceBand& sides = bands_[band];
+      band_ = static_cast<int32_t>(band);
+      auto is_narrow = [&](std::size_t i) { return plan_distance(sides.left[i], sides.right[i]) < kCrack_m; };
+      const std::size_t last = sides.left.size() - 1;
+      for (std::size_t i = 0; i < last; ++i) {
+        side(sides.left[i], sides.left[i + 1], is_narrow(i) && is_narrow(i + 1));
+      }
+      side(sides.left[last], sides.right[last], is_narrow(last));
+      for (std::size_t i = last; i > 0; --i) {
+        side(sides.right[i], sides.right[i - 1], is_narrow(i) && is_narrow(i - 1));
+      }
+      side(sides.right[0], sides.left[0], is_narrow(0));
+      finish_run();
+    }
+    return std::move(runs_);
+  }
+
+ private:
+  /// One straight piece of the walk.
+  void side(const Point3& a, const Point3& b, bool skipped) {
+    const double length_m = plan_distance(a, b);
+    if (skipped) finish_run();
+    if (skipped || length_m < 1e-9) return;
+    const Point2 outward{-(b.y - a.y) / length_m, (b.x - a.x) / length_m};
+    const int steps = std::max(1, static_cast<int>(std::ceil(length_m / kStep_m)));
+    // Just inside the ends, where the neighbouring piece has the say.
+    const double margin = std::min(0.25, 1e-4 / length_m);
+    double before = margin;
+    bool kept_before = is_outline(lerp(a, b, before), outward);
+    if (kept_before) {
+      append(a);
+    } else {
+      finish_run();
+    }
+    for (int step = 1; step <= steps; ++step) {
+      const double here = step == steps ? 1.0 - margin : static_cast<double>(step) / steps;
+      const bool kept = is_outline(lerp(a, b, here), outward);
+      if (kept != kept_before) {
+        double low = before, high = here;
+        while ((high - low) * length_m > kTransition_m) {
+          const double middle = 0.5 * (low + high);
+          (is_outline(lerp(a, b, middle), outward) == kept_before ? low : high) = middle;
+        }
+        append(lerp(a, b, kept ? high : low));
+        if (!kept) finish_run();
+      }
+      before = here;
+      kept_before = kept;
+    }
+    if (kept_before) append(b);
+  }
+
+  /// Whether no other band covers the place just outside, and this band is the one to draw a border that several share.
+  bool is_outline(const Point3& p, const Point2& outward) const {
+    auto at = [&](double distance) { return Point2{p.x + distance * outward.x, p.y + distance * outward.y}; };
+    auto is_other = [&](int32_t band) { return band != band_; };
+    const Point2 just_outside = at(kCoincident_m);
+    if (surface_.any_band_at(just_outside, p.z, is_other)) return false;
+    if (surface_.any_band_at(at(kCrack_m), p.z, is_other)) return false;
+    return !surface_.any_band_at(at(-kCoincident_m), p.z, [&](int32_t band) { return band < band_; });
+  }
+
+  void append(const Point3& p) {
+    if (run_.empty() || plan_distance(run_.back(), p) > 1e-6) run_.push_back(p);
+  }
+  void finish_run() {
+    if (run_.size() >= 2) runs_.push_back(std::move(run_));
+    run_.clear();
+  }
+
+  const std::vector<SurfaceBand>& bands_;
+  const Surface& surface_;
+  int32_t band_ = 0;
+  std::vector<Point3> run_;
+  std::vector<std::vector<Point3>> runs_;
+};
+
+/// Joins runs whose end lies at another's beginning, so that pieces may be merged across bands.
+class Joiner {
+ public:
+  explicit Joiner(std::vector<std::vector<Point3>> runs) : runs_(std::move(runs)), used_(runs_.size(), false) {
+    for (std::size_t i = 0; i < runs_.size(); ++i) {
+      starts_[key(runs_[i].front(), 0, 0)].push_back(i);
+      ends_[key(runs_[i].back(), 0, 0)].push_back(i);
+    }
+  }
+
+  std::vector<std::vector<Point3>> join() {
+    std::vector<std::vector<Point3>> joined;
+    // Open outlines from their beginnings first, then what is left: rings.
+    for (const bool rings : {false, true}) {
+      for (std::size_t i = 0; i < runs_.size(); ++i) {
+        if (used_[i] || (!rings && has_predecessor(i))) continue;
+        std::vector<Point3> outline;
+        for (std::size_t at = i; at != kNone; at = next_of(outline.back())) {
+          used_[at] = true;
+          outline.insert(outline.end(), runs_[at].begin(), runs_[at].end());
+        }
+        joined.push_back(std::move(outline));
+      }
+    }
+    return joined;
+  }
+
+ private:
+  static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+  using Buckets = std::unordered_map<int64_t, std::vector<std::size_t>>;
+
+  static int64_t key(const Point3& p, int dx, int dy) {
+    const int64_t x = static_cast<int64_t>(std::floor(p.x)) + dx, y = static_cast<int64_t>(std::floor(p.y)) + dy;
+    return x * 4'000'037 + y;
+  }
+
+  template <typename Visit>
+  static void near(const Buckets& buckets, const Point3& p, Visit&& visit) {
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        const auto bucket = buckets.find(key(p, dx, dy));
+        if (bucket == buckets.end()) continue;
+        for (const std::size_t item : bucket->second) visit(item);
+      }
+    }
+  }
+
+  static double gap(const Point3& a, const Point3& b) {
+    return std::abs(a.z - b.z) < kLevel_m ? plan_distance(a, b) : 1e300;
+  }
+
+  std::size_t next_of(const Point3& end) const {
+    std::size_t best = kNone;
+    double best_gap = kJoin_m;
+    near(starts_, end, [&](std::size_t i) {
+      if (used_[i] || gap(end, runs_[i].front()) > best_gap) return;
+      best = i;
+      best_gap = gap(end, runs_[i].front());
+    });
+    return best;
+  }
+
+  bool has_predecessor(std::size_t i) const {
+    bool found = false;
+    near(ends_, runs_[i].front(), [&](std::size_t other) {
+      found = found || (other != i && !used_[other] && gap(runs_[other].back(), runs_[i].front()) <= kJoin_m);
+    });
+    return found;
+  }
+
+  std::vector<std::vector<Point3>> runs_;
+  std::vector<bool> used_;
+  Buckets starts_, ends_;
+};
+
+}  // namespace
+
+std::vector<RoadEdge> outline_of(const std::vector<SurfaceBand>& bands, double chord_error_m) {
+  std::vector<RoadEdge> edges;
+  if (bands.empty()) return edges;
+  const Surface surface(bands);
+  for (const std::vector<Point3>& outline : Joiner(Tracer(bands, surface).trace()).join()) {
+    std::vector<CurvePoint> points;
+    double length_m = 0;
+    for (const Point3& p : outline) {
+      if (!points.empty()) {
+        const double step_m = std::hypot(p.x - points.back().x, p.y - points.back().y);
+        if (step_m < 1e-3) continue;
+        length_m += step_m;
+      }
+      points.push_back({length_m, p.x, p.y, p.z, 0});
+    }
+    if (length_m < kMinOutline_m) continue;
+    const std::vector<std::size_t> kept = thin_polyline(points, chord_error_m, kMaxPiece_m);
+    auto to_vec3 = [](const CurvePoint& p) {
+      return Vec3{static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
+    };
+    for (std::size_t i = 1; i < kept.size(); ++i)
+      edges.push_back({to_vec3(points[kept[i - 1]]), to_vec3(points[kept[i]])});
+  }
+  return edges;
+}
+
+}  // namespace pictura
