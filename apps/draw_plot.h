@@ -26,7 +26,8 @@ struct PlotOptions {
 };
 
 /// Panels in rows of options.columns, with axes, ticks at round numbers, a grid and a legend where there is more than
-/// one series. Throws Error when there is no panel, a series has unequal x and y, or a size is out of [64, 8192] px.
+/// one series. Throws Error when there is no panel, a series has unequal x and y, or a panel is not of 160x140 to
+/// 8192x8192 px.
 RgbImage draw_plots(const std::vector<PlotPanel>& panels, const PlotOptions& options = {});
 
 /// draw_plots() as a PNG file. Throws Error naming the path.

@@ -23,7 +23,7 @@ struct TopCamera {
 struct WorldFrame {
   Span<const AgentBox> agents;    // of this world alone
   Span<const LightState> lights;  // [map.lights]
-  Span<const uint8_t> dimmed;     // [agents], or empty: 1 for those that halted
+  Span<const uint8_t> status;     // [agents] AgentStatus, or empty: all active
   int highlighted = -1;           // index of an agent that gets a halo, and whose waypoints these are
   Span<const Vec2> waypoints_m;   // those not yet passed, nearest first
   std::string caption;            // one line at the top left, or empty

@@ -1,0 +1,188 @@
+#include "pictura/apps/draw_plot.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "pictura/apps/draw_canvas.h"
+#include "pictura/common/error.h"
+
+namespace pictura {
+
+namespace {
+
+constexpr Rgb kAxisColor = hex(0x3A3F46), kGridColor = hex(0xE3E5E8), kLabelColor = hex(0x5A6068);
+constexpr std::array<Rgb, 7> kSeriesColors{hex(0x1F6FEB), hex(0xE8590C), hex(0x2B8A3E), hex(0x9C36B5),
+                                           hex(0xC92A2A), hex(0x0B7285), hex(0x846358)};
+constexpr double kLeft_px = 74, kRight_px = 18, kTop_px = 40, kBottom_px = 50;
+
+struct Range {
+  double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
+  void add(double value) {
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  /// Never empty, with a little air.
+  Range padded(double share) const {
+    if (!(low <= high)) return {0, 1};
+    const double air = high > low ? share * (high - low) : std::max(0.5 * std::abs(low), 0.5);
+    return {low - air, high + air};
+  }
+};
+
+/// "1.5M", "20k", "0.02": as many decimals as the step between ticks asks for.
+std::string tick_text(double value, double step) {
+  const double magnitude = std::max(std::abs(value), step);
+  double unit = 1;
+  const char* suffix = "";
+  if (magnitude >= 1e9) {
+    unit = 1e9, suffix = "G";
+  } else if (magnitude >= 1e6) {
+    unit = 1e6, suffix = "M";
+  } else if (magnitude >= 1e4) {
+    unit = 1e3, suffix = "k";
+  }
+  if (std::abs(value) < 1e-9 * step) return "0";
+  if (magnitude < 1e-4) return fmt::format("{:.2g}", value);
+  const int decimals = std::clamp(static_cast<int>(std::ceil(-std::log10(step / unit) - 1e-9)), 0, 6);
+  return fmt::format("{:.{}f}{}", value / unit, decimals, suffix);
+}
+
+bool drawable(const PlotSeries& series, size_t i) { return std::isfinite(series.x[i]) && std::isfinite(series.y[i]); }
+
+void draw_legend(Canvas& canvas, const PlotPanel& panel, double left, double top, double width) {
+  const TextStyle style{.size_px = 12, .color = hex(0x22262B)};
+  double widest = 0;
+  for (const PlotSeries& series : panel.series) widest = std::max(widest, canvas.text_width(series.name, style));
+  const double box_width = widest + 44, row = 18;
+  const double x = left + width - box_width - 8, y = top + 8;
+  canvas.round_rectangle_path(x, y, box_width, row * static_cast<double>(panel.series.size()) + 8, 4);
+  canvas.set_color(hex(0xFFFFFF), 0.85);
+  cairo_fill_preserve(canvas.context());
+  canvas.set_color(kGridColor);
+  cairo_set_line_width(canvas.context(), 1);
+  cairo_stroke(canvas.context());
+  for (size_t i = 0; i < panel.series.size(); ++i) {
+    const double middle = y + 4 + row * (static_cast<double>(i) + 0.5);
+    canvas.fill_rectangle(x + 8, middle - 1.25, 20, 2.5, kSeriesColors[i % kSeriesColors.size()]);
+    canvas.text(x + 36, middle + 4, panel.series[i].name, style);
+  }
+}
+
+void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, double width_px, double height_px) {
+  Range x_data, y_data;
+  for (const PlotSeries& series : panel.series) {
+    for (size_t i = 0; i < series.x.size(); ++i) {
+      if (!drawable(series, i)) continue;
+      x_data.add(series.x[i]);
+      y_data.add(series.y[i]);
+    }
+  }
+  const Range xs = x_data.padded(0.0), ys = y_data.padded(0.06);
+  const double left = x0 + kLeft_px, top = y0 + kTop_px;
+  const double width = width_px - kLeft_px - kRight_px, height = height_px - kTop_px - kBottom_px;
+  const auto to_x = [&](double x) { return left + width * (x - xs.low) / (xs.high - xs.low); };
+  const auto to_y = [&](double y) { return top + height * (ys.high - y) / (ys.high - ys.low); };
+  cairo_t* context = canvas.context();
+
+  canvas.text(x0 + 0.5 * (kLeft_px + width_px - kRight_px), y0 + 24, panel.title,
+              {.size_px = 15, .bold = true, .align = Align::center});
+  const TextStyle tick_style{.size_px = 11.5, .align = Align::center, .color = kLabelColor};
+  const TextStyle y_tick_style{.size_px = 11.5, .align = Align::right, .color = kLabelColor};
+  const std::vector<double> x_ticks = round_ticks(xs.low, xs.high, std::max(2, static_cast<int>(width / 80)));
+  const std::vector<double> y_ticks = round_ticks(ys.low, ys.high, std::max(2, static_cast<int>(height / 45)));
+  const auto step_of = [](const std::vector<double>& ticks) { return ticks.size() > 1 ? ticks[1] - ticks[0] : 1.0; };
+  for (const double tick : x_ticks) {
+    canvas.fill_rectangle(std::round(to_x(tick)), top, 1, height, kGridColor);
+    canvas.text(to_x(tick), top + height + 17, tick_text(tick, step_of(x_ticks)), tick_style);
+  }
+  for (const double tick : y_ticks) {
+    canvas.fill_rectangle(left, std::round(to_y(tick)), width, 1, kGridColor);
+    canvas.text(left - 8, to_y(tick) + 4, tick_text(tick, step_of(y_ticks)), y_tick_style);
+  }
+  canvas.fill_rectangle(left - 1, top, 1, height + 1, kAxisColor);
+  canvas.fill_rectangle(left - 1, top + height, width + 1, 1, kAxisColor);
+  const TextStyle label_style{.size_px = 12.5, .align = Align::center, .color = kAxisColor};
+  canvas.text(left + 0.5 * width, y0 + height_px - 12, panel.x_label, label_style);
+  canvas.text(x0 + 17, top + 0.5 * height, panel.y_label, label_style, 0.5 * static_cast<double>(kPi));
+
+  cairo_save(context);
+  cairo_rectangle(context, left - 1, top - 2, width + 3, height + 4);
+  cairo_clip(context);
+  cairo_set_line_width(context, 2);
+  cairo_set_line_join(context, CAIRO_LINE_JOIN_ROUND);
+  cairo_set_line_cap(context, CAIRO_LINE_CAP_ROUND);
+  for (size_t s = 0; s < panel.series.size(); ++s) {
+    const PlotSeries& series = panel.series[s];
+    canvas.set_color(kSeriesColors[s % kSeriesColors.size()]);
+    for (size_t i = 0; i < series.x.size(); ++i) {
+      if (!drawable(series, i)) {
+        cairo_stroke(context);
+        continue;
+      }
+      const bool starts = i == 0 || !drawable(series, i - 1);
+      const bool alone = starts && (i + 1 == series.x.size() || !drawable(series, i + 1));
+      if (starts) cairo_move_to(context, to_x(series.x[i]), to_y(series.y[i]));
+      cairo_line_to(context, to_x(series.x[i]), to_y(series.y[i]));
+      if (alone) {
+        cairo_stroke(context);
+        cairo_arc(context, to_x(series.x[i]), to_y(series.y[i]), 3, 0, kTwoPi);
+        cairo_fill(context);
+      }
+    }
+    cairo_stroke(context);
+  }
+  cairo_restore(context);
+  if (panel.series.size() > 1) draw_legend(canvas, panel, left, top, width);
+}
+
+}  // namespace
+
+std::vector<double> round_ticks(double low, double high, int wanted) {
+  std::vector<double> ticks;
+  if (!(high > low) || wanted < 1 || !std::isfinite(high - low)) return ticks;
+  const double raw = (high - low) / wanted;
+  const double power = std::pow(10.0, std::floor(std::log10(raw)));
+  const double ratio = raw / power;
+  const double step = power * (ratio < 1.5 ? 1 : (ratio < 3.5 ? 2 : (ratio < 7.5 ? 5 : 10)));
+  const double first = std::ceil(low / step - 1e-9), last = std::floor(high / step + 1e-9);
+  for (double i = first; i <= last; ++i) ticks.push_back(i * step);
+  return ticks;
+}
+
+RgbImage draw_plots(const std::vector<PlotPanel>& panels, const PlotOptions& options) {
+  PICTURA_CHECK(!panels.empty(), "plot '{}': expected at least one panel", options.title);
+  PICTURA_CHECK(options.panel_width_px >= 160 && options.panel_width_px <= 8192 && options.panel_height_px >= 140 &&
+                    options.panel_height_px <= 8192 && options.columns >= 1,
+                "plot '{}': expected panels of 160x140 to 8192x8192 px and 1 column or more, got {}x{} and {}",
+                options.title, options.panel_width_px, options.panel_height_px, options.columns);
+  for (const PlotPanel& panel : panels) {
+    for (const PlotSeries& series : panel.series) {
+      PICTURA_CHECK(series.x.size() == series.y.size(),
+                    "plot '{}', series '{}': expected equally many x and y, got {} and {}", panel.title, series.name,
+                    series.x.size(), series.y.size());
+    }
+  }
+  const int num_panels = static_cast<int>(panels.size());
+  const int columns = std::min(options.columns, num_panels), rows = (num_panels + columns - 1) / columns;
+  const int top = options.title.empty() ? 6 : 44;
+  Canvas canvas(columns * options.panel_width_px + 12, top + rows * options.panel_height_px + 6, hex(0xFFFFFF));
+  if (!options.title.empty()) {
+    canvas.text(0.5 * canvas.width_px(), 31, options.title, {.size_px = 19, .bold = true, .align = Align::center});
+  }
+  for (int i = 0; i < num_panels; ++i) {
+    draw_panel(canvas, panels[static_cast<size_t>(i)], 6 + i % columns * options.panel_width_px,
+               top + i / columns * options.panel_height_px, options.panel_width_px, options.panel_height_px);
+  }
+  return canvas.image();
+}
+
+void draw_plots_png(const std::vector<PlotPanel>& panels, const std::string& path, const PlotOptions& options) {
+  const RgbImage image = draw_plots(panels, options);
+  write_png(path, image.width_px, image.height_px, image.rgb);
+}
+
+}  // namespace pictura
