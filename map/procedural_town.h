@@ -9,7 +9,7 @@ namespace pictura {
 
 struct TownOptions {
   uint64_t seed = 0;
-  int blocks_x = 3, blocks_y = 3;         // blocks of houses, in [1, 32] each
+  int blocks_x = 3, blocks_y = 3;  // blocks of houses, in [1, 32] each
 };
 
 /// The .xodr text; equal options give equal bytes. Throws UsageError when the number of blocks is out of range.
