@@ -1,5 +1,6 @@
 #include "pictura/map/map_geometry.h"
 
+#include <array>
 #include <cmath>
 
 #include "pictura/common/rng.h"
@@ -9,6 +10,12 @@ namespace pictura {
 namespace {
 
 constexpr float kRoadEdgeWidth_m = 0.15f;
+constexpr float kCrosswalkWidth_m = 0.3f;  // of the line around a crosswalk
+constexpr float kStopLineWidth_m = 0.4f;
+// Buildings of 1 to 4 pieces (about 8 m each) with gaps of 1 or 2 between most of them.
+constexpr int kMaxBuildingPieces = 4, kMaxGapPieces = 2;
+constexpr float kTerracedShare = 0.3f;
+constexpr float kMinWall_m = 3.0f, kMaxWall_m = 12.0f;
 
 Rgb mark_color(MarkColor color) { return color == MarkColor::yellow ? kYellowMarkColor : kWhiteMarkColor; }
 
@@ -38,12 +45,43 @@ StaticGeometry make_static_geometry(const RoadMap& map, const MapGeometryOptions
                   marking.width_m, mark_color(marking.color), StripKind::lane_mark, &geometry.strips);
   }
   append_road_edges(map, &geometry.strips);
+  for (const Crosswalk& crosswalk : map.crosswalks) {
+    std::vector<Vec3> ring(map.outline_points.begin() + crosswalk.outline.begin,
+                           map.outline_points.begin() + crosswalk.outline.end);
+    ring.push_back(ring.front());
+    append_strips(ring, kCrosswalkWidth_m, kCrosswalkColor, StripKind::crosswalk, &geometry.strips);
+  }
+  for (std::size_t i = 0; i < map.lights.size(); ++i) {
+    const TrafficLight& light = map.lights[i];
+    const std::array<Vec3, 2> stop_line{light.stop_a_m, light.stop_b_m};
+    append_strips(stop_line, kStopLineWidth_m, kStopLineColor, StripKind::stop_line, &geometry.strips);
+    geometry.heads.push_back(
+        {light.head_m, light.head_facing, cos_of(options.light_half_angle_rad), static_cast<int32_t>(i)});
+  }
   if (options.walls) geometry.walls = make_walls(map, options);
   geometry.num_signals = static_cast<int32_t>(map.lights.size());
   geometry.build_grids();
   return geometry;
 }
 
-std::vector<WallFace> make_walls(const RoadMap&, const MapGeometryOptions&) { return {}; }
+std::vector<WallFace> make_walls(const RoadMap& map, const MapGeometryOptions& options) {
+  std::vector<WallFace> walls;
+  uint32_t drawn = 0;
+  int pieces_left = 0;
+  bool stands = false;
+  float height_m = 0;
+  for (const BuildingLine& line : map.building_lines) {
+    if (pieces_left == 0) {
+      // The next building or the next gap, of so many pieces of building line.
+      RandomStream random(options.wall_seed, 0, 0, drawn++, 0, Purpose::walls);
+      stands = !stands || random.uniform() < kTerracedShare;
+      pieces_left = 1 + random.below(stands ? kMaxBuildingPieces : kMaxGapPieces);
+      height_m = random.uniform(kMinWall_m, kMaxWall_m);
+    }
+    --pieces_left;
+    if (stands) walls.push_back({line.a_m, line.b_m, height_m});
+  }
+  return walls;
+}
 
 }  // namespace pictura

@@ -71,7 +71,7 @@ Pose pose_on(const GeometryPiece& piece, double ds) {
       y += gauss.weight * std::sin(heading);
     }
   }
-  return {piece.x + x * panel, piece.y + y * panel, heading_at(ds)};
+  return {piece.x + x * panel, piece.y + y * panel, heading_at(ds), k0 + rate * ds};
 }
 
 Pose pose_at(const FileRoad& road, double s) {

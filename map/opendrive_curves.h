@@ -8,7 +8,7 @@
 namespace pictura::opendrive {
 
 struct Pose {
-  double x = 0, y = 0, heading = 0;
+  double x = 0, y = 0, heading = 0, curvature = 0;
 };
 
 /// The pose `ds` behind the start of a piece: exact for lines and arcs, Gauss-Legendre quadrature for spirals.

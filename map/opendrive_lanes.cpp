@@ -1,6 +1,7 @@
 // Lanes from sections: centre lines in the direction of travel, neighbours, links, speed limits, endless routes.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include "pictura/map/opendrive_build.h"
@@ -10,13 +11,23 @@ namespace pictura::opendrive {
 namespace {
 
 constexpr float kDefaultSpeedLimit_mps = 15.0f;
-// Half of the step over which a heading is measured.
-constexpr double kHeadingStep_m = 1e-3;
+// Half of the step over which slopes are measured: files have steps of some millimetres between their cubics.
+constexpr double kHeadingStep_m = 0.1;
 // Float coordinates keep a resolution of 8 mm within this range of the origin.
 constexpr double kMaxMapRadius_m = 1e5;
 
 /// Types that one may drive through from lane to lane; routes are made of them.
 bool is_route(LaneType type) { return type == LaneType::driving || type == LaneType::ramp; }
+
+/// Heading of the curve at t(s) = center_t(s), towards growing s: the slope of t turns it away from the reference line,
+/// more so where t runs inside a curve.
+template <typename CenterT>
+double heading_along(const FileRoad& road, const FileSection& section, double s, const CenterT& center_t) {
+  const double before = std::max(s - kHeadingStep_m, section.s), after = std::min(s + kHeadingStep_m, section.end);
+  const double slope = (center_t(after) - center_t(before)) / (after - before);
+  const Pose pose = pose_at(road, s);
+  return pose.heading + std::atan2(slope, 1.0 - pose.curvature * center_t(s));
+}
 
 Lane make_lane(Build* build, const FileRoad& road, const FileSection& section, const FileLane& lane) {
   const bool forward = travels_forward(lane.id);
@@ -39,11 +50,8 @@ Lane make_lane(Build* build, const FileRoad& road, const FileSection& section, c
   for (std::size_t i = 0; i < points.size(); ++i) {
     const CurvePoint& point = points[i];
     if (i > 0) length_m += std::hypot(point.x - points[i - 1].x, point.y - points[i - 1].y);
-    const double before = std::max(point.s - kHeadingStep_m, section.s);
-    const double after = std::min(point.s + kHeadingStep_m, section.end);
-    const Point3 a = point_at(road, before, center_t(before)), b = point_at(road, after, center_t(after));
-    const double sign = forward ? 1.0 : -1.0;
-    const double heading = std::atan2(sign * (b.y - a.y), sign * (b.x - a.x));
+    const double heading = std::remainder(
+        heading_along(road, section, point.s, center_t) + (forward ? 0.0 : std::numbers::pi), 2 * std::numbers::pi);
     build->map->lane_points.push_back({build->to_map(point.x, point.y, point.z), static_cast<float>(heading),
                                        static_cast<float>(point.width), static_cast<float>(length_m)});
   }

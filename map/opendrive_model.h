@@ -102,6 +102,7 @@ struct FileSignal {
 /// Says that a signal holds for lanes [from_lane, to_lane] of the road on which the reference stands.
 struct SignalReference {
   std::string signal;
+  double s = 0;
   int from_lane = 0, to_lane = 0;  // 0, 0: the file names none
   Where where;
 };

@@ -1,6 +1,7 @@
 // What is painted on the roads of an OpenDRIVE network: lane marks, crosswalks, parking spaces.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "pictura/map/opendrive_build.h"
 
@@ -12,6 +13,9 @@ constexpr double kDefaultMarkWidth_m = 0.125;
 constexpr double kMinMarkLength_m = 0.05;
 // Dashes of 3 m with gaps of 9 m, the pattern of North American roads, which CARLA's towns imitate.
 constexpr double kDash_m = 3.0, kDashPeriod_m = 12.0;
+
+// Corners nearer to each other than this are one.
+constexpr float kSamePoint_m = 1e-3f;
 
 /// One stripe of a mark: how far its middle lies left of the border, in mark widths, and whether it is broken.
 struct Stripe {
@@ -60,6 +64,65 @@ void add_mark(Build* build, const FileRoad& road, const FileSection& section, co
   }
 }
 
+void add_crosswalk(Build* build, const FileRoad& road, const FileObject& object) {
+  std::vector<FileObject::Corner> corners = object.outline;
+  if (corners.empty()) {
+    const double u = 0.5 * object.length, v = 0.5 * object.width;
+    if (u <= 0 || v <= 0) object.where.fail("expected a crosswalk with an outline, or a length and a width");
+    corners = {{u, v}, {-u, v}, {-u, -v}, {u, -v}};
+  }
+  const Point3 origin = point_at(road, object.s, object.t);
+  const double heading = pose_at(road, object.s).heading + object.heading;
+  RoadMap& map = *build->map;
+  const std::size_t first = map.outline_points.size();
+  for (const FileObject::Corner& corner : corners) {
+    Point3 p;
+    if (corner.along_road) {
+      p = point_at(road, corner.u, corner.v);
+      p.z += corner.z;
+    } else {
+      p = {origin.x + corner.u * std::cos(heading) - corner.v * std::sin(heading),
+           origin.y + corner.u * std::sin(heading) + corner.v * std::cos(heading),
+           origin.z + object.z_offset + corner.z};
+    }
+    const Vec3 point = build->to_map(p);
+    if (map.outline_points.size() == first || length(point - map.outline_points.back()) > kSamePoint_m) {
+      map.outline_points.push_back(point);
+    }
+  }
+  if (map.outline_points.size() > first + 1 &&
+      length(map.outline_points.back() - map.outline_points[first]) <= kSamePoint_m) {
+    map.outline_points.pop_back();
+  }
+  if (map.outline_points.size() < first + 3) {
+    object.where.fail("expected a crosswalk with at least three distinct corners, got {}",
+                      map.outline_points.size() - first);
+  }
+  map.crosswalks.push_back({{static_cast<int32_t>(first), static_cast<int32_t>(map.outline_points.size())}});
+}
+
+void add_parking_space(Build* build, const FileRoad& road, const FileObject& object) {
+  ParkingSpace space;
+  Point3 center = point_at(road, object.s, object.t);
+  center.z += object.z_offset;
+  space.center_m = build->to_map(center);
+  double heading = pose_at(road, object.s).heading + object.heading;
+  double length_m = object.length, width_m = object.width;
+  if (!(length_m > 0 && width_m > 0)) object.where.fail("expected a parking space with a length and a width");
+  // Cars stand along the longer side, whichever the file calls its length.
+  if (width_m > length_m) {
+    std::swap(width_m, length_m);
+    heading += 0.5 * std::numbers::pi;
+  }
+  // Of the two ways to stand in it: the one of the traffic on this side of the road.
+  const double traffic = pose_at(road, object.s).heading + (object.t > 0 ? std::numbers::pi : 0.0);
+  if (std::cos(heading - traffic) < 0) heading += std::numbers::pi;
+  space.heading_rad = static_cast<float>(std::remainder(heading, 2 * std::numbers::pi));
+  space.length_m = static_cast<float>(length_m);
+  space.width_m = static_cast<float>(width_m);
+  build->map->parking_spaces.push_back(space);
+}
+
 }  // namespace
 
 void build_markings(Build* build) {
@@ -79,6 +142,16 @@ void build_markings(Build* build) {
   }
 }
 
-void build_objects(Build*) {}
+void build_objects(Build* build) {
+  for (const FileRoad& road : build->network.roads) {
+    for (const FileObject& object : road.objects) {
+      if (object.type == "crosswalk") {
+        add_crosswalk(build, road, object);
+      } else {
+        add_parking_space(build, road, object);
+      }
+    }
+  }
+}
 
 }  // namespace pictura::opendrive

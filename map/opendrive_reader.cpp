@@ -454,6 +454,7 @@ void read_signals(const Element& road_element, FileRoad* road) {
     SignalReference reference;
     reference.where = element.where();
     reference.signal = element.text("id");
+    reference.s = element.number_in("s", -kMaxRoadLength_m, kMaxRoadLength_m);
     bool any = false;
     element.each("validity", [&](const Element& validity) {
       reference.from_lane = validity.integer("fromLane");

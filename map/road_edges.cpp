@@ -4,7 +4,6 @@
 #include <cmath>
 #include <unordered_map>
 
-#include "pictura/common/grid.h"
 #include "pictura/common/scene.h"
 
 namespace pictura {
@@ -18,81 +17,12 @@ constexpr double kStep_m = 0.5;          // borders are tested at least this oft
 constexpr double kTransition_m = 0.002;  // where an outline begins and ends is found to this
 constexpr double kJoin_m = 0.06;         // ends of outlines nearer than this are joined
 constexpr double kMinOutline_m = 0.3;
-constexpr float kCell_m = 4.0f;
-
-struct Point2 {
-  double x = 0, y = 0;
-};
-
-double cross_of(const Point3& a, const Point3& b, const Point2& p) {
-  return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
-}
 
 Point3 lerp(const Point3& a, const Point3& b, double u) {
   return {a.x + u * (b.x - a.x), a.y + u * (b.y - a.y), a.z + u * (b.z - a.z)};
 }
 
 double plan_distance(const Point3& a, const Point3& b) { return std::hypot(b.x - a.x, b.y - a.y); }
-
-/// All quads of all bands in a grid, to ask which bands cover a place.
-class Surface {
- public:
-  explicit Surface(const std::vector<SurfaceBand>& bands) {
-    std::vector<Aabb2> boxes;
-    for (std::size_t band = 0; band < bands.size(); ++band) {
-      const auto& [left, right] = bands[band];
-      for (std::size_t i = 0; i + 1 < left.size(); ++i) {
-        const Quad quad{{left[i], right[i], right[i + 1], left[i + 1]}, static_cast<int32_t>(band)};
-        Aabb2 box{{1e30f, 1e30f}, {-1e30f, -1e30f}};
-        for (const Point3& corner : quad.corners) {
-          const float x = static_cast<float>(corner.x), y = static_cast<float>(corner.y);
-          box.low = {min_of(box.low.x, x), min_of(box.low.y, y)};
-          box.high = {max_of(box.high.x, x), max_of(box.high.y, y)};
-        }
-        quads_.push_back(quad);
-        boxes.push_back(box);
-      }
-    }
-    grid_ = Grid(boxes, kCell_m);
-  }
-
-  /// Calls visit(band) for every band that covers `p` at about the height `z`, until it returns true; says whether one
-  /// did.
-  template <typename Visit>
-  bool any_band_at(const Point2& p, double z, Visit&& visit) const {
-    const GridView grid = grid_.view();
-    const Vec2 place{static_cast<float>(p.x), static_cast<float>(p.y)};
-    if (!grid.contains(place)) return false;
-    const std::size_t cell = static_cast<std::size_t>(grid.cell_y(place.y)) * static_cast<std::size_t>(grid.num_x) +
-                             static_cast<std::size_t>(grid.cell_x(place.x));
-    for (int32_t i = grid.begin[cell]; i < grid.begin[cell + 1]; ++i) {
-      const Quad& quad = quads_[static_cast<std::size_t>(grid.items[static_cast<std::size_t>(i)])];
-      if (contains(quad, p, z) && visit(quad.band)) return true;
-    }
-    return false;
-  }
-
- private:
-  struct Quad {
-    Point3 corners[4];  // counter-clockwise: left, right, next right, next left
-    int32_t band = 0;
-  };
-
-  /// Two triangles, so that a quad that is not convex is still covered as drawn.
-  static bool contains(const Quad& quad, const Point2& p, double z) {
-    const Point3* c = quad.corners;
-    const double mean_z = 0.25 * (c[0].z + c[1].z + c[2].z + c[3].z);
-    if (std::abs(z - mean_z) >= kLevel_m) return false;
-    return in_triangle(c[0], c[1], c[2], p) || in_triangle(c[0], c[2], c[3], p);
-  }
-  static bool in_triangle(const Point3& a, const Point3& b, const Point3& c, const Point2& p) {
-    const double ab = cross_of(a, b, p), bc = cross_of(b, c, p), ca = cross_of(c, a, p);
-    return (ab >= 0 && bc >= 0 && ca >= 0) || (ab <= 0 && bc <= 0 && ca <= 0);
-  }
-
-  std::vector<Quad> quads_;
-  Grid grid_;
-};
 
 /// Walks the four sides of each band clockwise, surface to the right, and keeps what lies on the outline.
 class Tracer {
@@ -258,7 +188,7 @@ class Joiner {
 std::vector<RoadEdge> outline_of(const std::vector<SurfaceBand>& bands, double chord_error_m) {
   std::vector<RoadEdge> edges;
   if (bands.empty()) return edges;
-  const Surface surface(bands);
+  const Surface surface(bands, kLevel_m);
   for (const std::vector<Point3>& outline : Joiner(Tracer(bands, surface).trace()).join()) {
     std::vector<CurvePoint> points;
     double length_m = 0;

@@ -1,19 +1,12 @@
 // The outline of a surface that is given as overlapping bands (lanes), level by level.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
-#include "pictura/map/polyline.h"
 #include "pictura/map/road_map.h"
+#include "pictura/map/surface.h"
 
 namespace pictura {
-
-/// A piece of surface between two borders of equally many points; going along them, left is on the left. Samples must
-/// be fine enough that straight pieces between them count as the surface.
-struct SurfaceBand {
-  std::vector<Point3> left, right;
-};
 
 /// The outline of the union of the bands, as pieces of at most kMaxPiece_m with the surface on their right, each within
 /// `chord_error_m` of the true outline. Surfaces more than 2 m apart in height do not touch. Cracks of up to 5 cm

@@ -1,0 +1,136 @@
+// The surface of an OpenDRIVE network, as bands: road edges are the outline of its drivable part, and building lines
+// run where there is none.
+#include <algorithm>
+#include <cmath>
+
+#include "pictura/map/opendrive_build.h"
+#include "pictura/map/road_edges.h"
+
+namespace pictura::opendrive {
+
+namespace {
+
+// Edges: the surface is followed much more closely than what is drawn of it.
+constexpr double kEdgeBandChordError_m = 0.001;
+// Building lines keep their distance anyway.
+constexpr double kLotBandChordError_m = 0.05;
+constexpr double kBandPiece_m = 2.0;
+
+constexpr double kSetback_m = 1.0;    // of a building from the outermost lane
+constexpr double kLotDepth_m = 6.0;   // free ground that a building needs behind its line
+constexpr double kClearance_m = 0.5;  // from any surface, at its ends too
+constexpr double kProbeStep_m = 1.0;
+constexpr double kBuildingPiece_m = 8.0;  // of a building line
+constexpr double kAnyLevel_m = 1e9;
+
+SurfaceBand lane_band(Build* build, const FileRoad& road, const FileSection& section, const FileLane& lane,
+                      double chord_error_m) {
+  const int left = lane.id > 0 ? lane.id : lane.id + 1, right = lane.id > 0 ? lane.id - 1 : lane.id;
+  auto border = [&](int which, double s) {
+    const Point3 p = point_at(road, s, border_t(road, section, which, s));
+    return Point3{p.x - build->map->origin_m[0], p.y - build->map->origin_m[1], p.z - build->map->origin_m[2]};
+  };
+  // Both borders get the same stations, the union of what either needs.
+  const std::vector<double> breaks = formula_changes(road, section, lane.id, section.s, section.end);
+  std::vector<double> stations;
+  for (const int which : {left, right}) {
+    const std::vector<CurvePoint> points =
+        sample_curve(breaks, chord_error_m, kBandPiece_m, &build->budget, [&](double s) {
+          const Point3 p = border(which, s);
+          return CurvePoint{s, p.x, p.y, p.z, 0};
+        });
+    for (const CurvePoint& point : points) stations.push_back(point.s);
+  }
+  std::sort(stations.begin(), stations.end());
+  SurfaceBand band;
+  double previous = -1;
+  for (const double s : stations) {
+    if (s - previous < 1e-4) continue;
+    band.left.push_back(border(left, s));
+    band.right.push_back(border(right, s));
+    previous = s;
+  }
+  return band;
+}
+
+template <typename Wanted>
+std::vector<SurfaceBand> lane_bands(Build* build, double chord_error_m, Wanted&& wanted) {
+  std::vector<SurfaceBand> bands;
+  for (const FileRoad& road : build->network.roads) {
+    for (const FileSection& section : road.sections) {
+      for (const std::vector<FileLane>* side : {&section.left, &section.right}) {
+        for (const FileLane& lane : *side) {
+          if (!wanted(lane)) continue;
+          SurfaceBand band = lane_band(build, road, section, lane, chord_error_m);
+          if (band.left.size() >= 2) bands.push_back(std::move(band));
+        }
+      }
+    }
+  }
+  return bands;
+}
+
+/// The outermost lane with a surface, or 0.
+int outermost_lane(const std::vector<FileLane>& side) {
+  for (std::size_t i = side.size(); i-- > 0;) {
+    if (!side[i].is_void) return side[i].id;
+  }
+  return 0;
+}
+
+/// Whether a building may stand along a-b, seen with the road on its right: no surface on, at or close behind it.
+bool is_free(const Surface& surface, const Point3& a, const Point3& b) {
+  const double length_m = std::hypot(b.x - a.x, b.y - a.y);
+  const Point2 along{(b.x - a.x) / length_m, (b.y - a.y) / length_m};
+  const int steps = static_cast<int>(std::ceil((length_m + 2 * kClearance_m) / kProbeStep_m));
+  for (int i = 0; i <= steps; ++i) {
+    const double u = -kClearance_m + (length_m + 2 * kClearance_m) * i / steps;
+    for (double depth = -kClearance_m; depth <= kLotDepth_m; depth += kProbeStep_m) {
+      const Point2 probe{a.x + u * along.x - depth * along.y, a.y + u * along.y + depth * along.x};
+      if (surface.any_band_at(probe, 0, [](int32_t) { return true; })) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+void build_road_edges(Build* build) {
+  const std::vector<SurfaceBand> bands =
+      lane_bands(build, kEdgeBandChordError_m, [](const FileLane& lane) { return is_drivable(lane.type); });
+  build->map->road_edges = outline_of(bands, build->options.chord_error_m);
+}
+
+void build_building_lines(Build* build) {
+  const Surface surface(lane_bands(build, kLotBandChordError_m, [](const FileLane& lane) { return !lane.is_void; }),
+                        kAnyLevel_m);
+  for (const FileRoad& road : build->network.roads) {
+    if (!road.junction.empty()) continue;
+    for (const FileSection& section : road.sections) {
+      for (const int sign : {1, -1}) {
+        const int outermost = outermost_lane(sign > 0 ? section.left : section.right);
+        if (outermost == 0) continue;
+        auto at = [&](double s) {
+          const Point3 p = point_at(road, s, border_t(road, section, outermost, s) + sign * kSetback_m);
+          return Point3{p.x - build->map->origin_m[0], p.y - build->map->origin_m[1], p.z - build->map->origin_m[2]};
+        };
+        const int pieces = std::max(1, static_cast<int>(std::round((section.end - section.s) / kBuildingPiece_m)));
+        const double step = (section.end - section.s) / pieces;
+        for (int i = 0; i < pieces; ++i) {
+          build->budget.spend();
+          // With the road to the right: against s on its left side, with s on its right side.
+          const double low = section.s + i * step, high = i + 1 == pieces ? section.end : section.s + (i + 1) * step;
+          const Point3 a = at(sign > 0 ? low : high), b = at(sign > 0 ? high : low);
+          const double length_m = std::hypot(b.x - a.x, b.y - a.y);
+          if (length_m < 2 * kClearance_m || length_m > kMaxPiece_m || !is_free(surface, a, b)) continue;
+          auto to_vec3 = [](const Point3& p) {
+            return Vec3{static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
+          };
+          build->map->building_lines.push_back({to_vec3(a), to_vec3(b)});
+        }
+      }
+    }
+  }
+}
+
+}  // namespace pictura::opendrive

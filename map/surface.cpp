@@ -1,0 +1,49 @@
+#include "pictura/map/surface.h"
+
+#include <cmath>
+
+namespace pictura {
+
+namespace {
+
+constexpr float kCell_m = 4.0f;
+
+double cross_of(const Point3& a, const Point3& b, const Point2& p) {
+  return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
+}
+
+bool in_triangle(const Point3& a, const Point3& b, const Point3& c, const Point2& p) {
+  const double ab = cross_of(a, b, p), bc = cross_of(b, c, p), ca = cross_of(c, a, p);
+  return (ab >= 0 && bc >= 0 && ca >= 0) || (ab <= 0 && bc <= 0 && ca <= 0);
+}
+
+}  // namespace
+
+Surface::Surface(const std::vector<SurfaceBand>& bands, double level_m) : level_m_(level_m) {
+  std::vector<Aabb2> boxes;
+  for (std::size_t band = 0; band < bands.size(); ++band) {
+    const auto& [left, right] = bands[band];
+    for (std::size_t i = 0; i + 1 < left.size(); ++i) {
+      const Quad quad{{left[i], right[i], right[i + 1], left[i + 1]}, static_cast<int32_t>(band)};
+      Aabb2 box{{1e30f, 1e30f}, {-1e30f, -1e30f}};
+      for (const Point3& corner : quad.corners) {
+        const float x = static_cast<float>(corner.x), y = static_cast<float>(corner.y);
+        box.low = {min_of(box.low.x, x), min_of(box.low.y, y)};
+        box.high = {max_of(box.high.x, x), max_of(box.high.y, y)};
+      }
+      quads_.push_back(quad);
+      boxes.push_back(box);
+    }
+  }
+  grid_ = Grid(boxes, kCell_m);
+}
+
+/// Two triangles, so that a quad that is not convex is still covered as drawn.
+bool Surface::contains(const Quad& quad, const Point2& p, double z) const {
+  const Point3* c = quad.corners;
+  const double mean_z = 0.25 * (c[0].z + c[1].z + c[2].z + c[3].z);
+  if (std::abs(z - mean_z) >= level_m_) return false;
+  return in_triangle(c[0], c[1], c[2], p) || in_triangle(c[0], c[2], c[3], p);
+}
+
+}  // namespace pictura
