@@ -16,16 +16,16 @@ struct TrainProgress {
   int64_t update = 0, updates = 0;
   int64_t agent_steps = 0;
   double agent_steps_per_s = 0;
-  double episode_return = 0;              // mean over agent episodes that ended lately; NaN before the first
-  double goals_per_km = 0;                // goals per km driven, lately
+  double episode_return = 0;  // mean over agent episodes that ended lately; NaN before the first
+  double goals_per_km = 0;    // goals per km driven, lately
   double eta_s = 0;
 };
 
 struct TrainOptions {
-  std::string config_path;                // TOML, see configs/paper.toml for every field
-  std::vector<std::string> overrides;     // "train.updates=2"
+  std::string config_path;             // TOML, see configs/paper.toml for every field
+  std::vector<std::string> overrides;  // "train.updates=2"
   std::string out_folder;
-  bool resume = false;                    // go on from out_folder's checkpoint
+  bool resume = false;  // go on from out_folder's checkpoint
   std::function<void(const TrainProgress&)> on_progress;
 };
 
@@ -56,13 +56,13 @@ class Driver {
 /// Throws Error naming the file when it is no checkpoint, truncated, or of another observation schema.
 std::unique_ptr<Driver> load_driver(const std::string& checkpoint_path, int num_threads);
 
-enum class Density { light, medium, dense };      // 60, 120 and 150 agents a world
+enum class Density { light, medium, dense };  // 60, 120 and 150 agents a world
 
 struct EvaluateOptions {
   std::string checkpoint;
-  std::vector<std::string> maps;                  // as load_map takes them; the paper's eight towns
+  std::vector<std::string> maps;  // as load_map takes them; the paper's eight towns
   std::vector<Density> densities{Density::light, Density::medium, Density::dense};
-  int agents_per_world = 0;                       // > 0: instead of the densities' own numbers
+  int agents_per_world = 0;  // > 0: instead of the densities' own numbers
   int scenarios = 200, steps = 3000;
   bool argmax = true;
   uint64_t seed = 1;
@@ -77,7 +77,7 @@ struct EvaluateRow {
   int scenarios = 0, steps = 0;
   int64_t vehicle_episodes = 0;
   double at_fault_collision_rate = 0, off_road_rate = 0, red_light_rate = 0, goals_per_vehicle = 0;
-  double km_per_infraction = 0;                   // infinity when there was none
+  double km_per_infraction = 0;  // infinity when there was none
   double km_driven = 0;
   double waypoints_per_vehicle = 0, return_per_vehicle = 0;
 };

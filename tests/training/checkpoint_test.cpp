@@ -1,0 +1,205 @@
+// Files: checkpoints that come back whole or are refused by name, safetensors, TensorBoard records.
+#include "pictura/training/checkpoint.h"
+
+#include <cstring>
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "pictura/common/error.h"
+#include "pictura/common/file.h"
+#include "pictura/training/event_file.h"
+#include "pictura/training/training.h"
+
+namespace pictura {
+namespace {
+
+using ::testing::HasSubstr;
+
+class Folder : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ =
+        ::testing::TempDir() + "/pictura_checkpoint_" + ::testing::UnitTest::GetInstance()->current_test_info()->name();
+    std::filesystem::remove_all(folder_);
+    make_output_folder(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  std::string folder_;
+};
+
+Config small_config() {
+  Config config;
+  config.policy.modality = Modality::vector;
+  config.policy.embedding_width = 4;
+  config.policy.backbone_width = 8;
+  return config;
+}
+
+Checkpoint small_checkpoint(const Policy& policy, const Config& config) {
+  Checkpoint c;
+  c.config = config;
+  c.rig = paper_rig(16, 9);
+  c.update = 12;
+  c.agent_steps = 3456;
+  c.distance_m = 7.25;
+  c.adam_steps = 24;
+  c.filter_average = 0.1234567890123;
+  c.parameters = policy.parameters();
+  for (const NamedTensor& p : policy.parameters()) {
+    c.first_moments.push_back({p.name, at::full_like(p.value, 1.5)});
+    c.second_moments.push_back({p.name, at::full_like(p.value, 2.5)});
+  }
+  c.simulator = {1, 2, 3, 255};
+  return c;
+}
+
+std::string message_of(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+using CheckpointFile = Folder;
+
+TEST_F(CheckpointFile, ComesBackWhole) {
+  const Config config = small_config();
+  const Policy policy(config.policy, 4, 1);
+  write_checkpoint(folder_ + "/a.ckpt", small_checkpoint(policy, config));
+  const Checkpoint back = read_checkpoint(folder_ + "/a.ckpt");
+  EXPECT_EQ(to_toml(back.config), to_toml(config));
+  EXPECT_EQ(back.update, 12);
+  EXPECT_EQ(back.agent_steps, 3456);
+  EXPECT_EQ(back.distance_m, 7.25);
+  EXPECT_EQ(back.adam_steps, 24);
+  EXPECT_EQ(back.filter_average, 0.1234567890123);
+  EXPECT_EQ(back.simulator, (std::vector<uint8_t>{1, 2, 3, 255}));
+  ASSERT_EQ(back.rig.cameras.size(), 4u);
+  EXPECT_EQ(back.rig.cameras[1].yaw_rad, paper_rig(16, 9).cameras[1].yaw_rad);
+  EXPECT_EQ(back.rig.cameras[3].focal_y_px, paper_rig(16, 9).cameras[3].focal_y_px);
+
+  const Policy other(config.policy, 4, 2);
+  EXPECT_NE(other.hash(), policy.hash());
+  restore_tensors(back, back.parameters, other.parameters());
+  EXPECT_EQ(other.hash(), policy.hash());
+  EXPECT_EQ(back.second_moments[3].value.flatten()[0].item<float>(), 2.5f);
+}
+
+TEST_F(CheckpointFile, OtherArchitecturesAreRefusedByName) {
+  Config config = small_config();
+  const Policy policy(config.policy, 4, 1);
+  write_checkpoint(folder_ + "/a.ckpt", small_checkpoint(policy, config));
+  const Checkpoint saved = read_checkpoint(folder_ + "/a.ckpt");
+  config.policy.backbone_width = 16;
+  const Policy wider(config.policy, 4, 1);
+  const std::string wide = message_of([&] { restore_tensors(saved, saved.parameters, wider.parameters()); });
+  EXPECT_THAT(wide, ::testing::AllOf(HasSubstr("a.ckpt"), HasSubstr("backbone.0.weight"), HasSubstr("[16, 24]"),
+                                     HasSubstr("[8, 24]")));
+  config = small_config();
+  config.policy.modality = Modality::perspective;
+  const Policy seeing(config.policy, 4, 1);
+  EXPECT_THAT(message_of([&] { restore_tensors(saved, saved.parameters, seeing.parameters()); }),
+              HasSubstr("no parameter 'conv.0.weight'"));
+}
+
+TEST_F(CheckpointFile, BrokenFilesAreRefused) {
+  const Config config = small_config();
+  const Policy policy(config.policy, 4, 1);
+  const std::string path = folder_ + "/a.ckpt", broken = folder_ + "/b.ckpt";
+  write_checkpoint(path, small_checkpoint(policy, config));
+  const std::string whole = read_file(path);
+  auto refuse = [&](const std::string& bytes) {
+    write_file(broken, bytes);
+    return message_of([&] { read_checkpoint(broken); });
+  };
+  // At every length there is an error that names the file, and never anything else.
+  for (size_t size = 0; size < whole.size(); size += 97) {
+    EXPECT_THAT(refuse(whole.substr(0, size)), HasSubstr("b.ckpt")) << size;
+  }
+  EXPECT_THAT(refuse(whole.substr(0, whole.size() - 1)), HasSubstr("truncated"));
+  EXPECT_THAT(refuse("hello, this is no checkpoint at all"), HasSubstr("not a checkpoint"));
+  std::string changed = whole;
+  changed[whole.size() - 20] = static_cast<char>(changed[whole.size() - 20] ^ 1);
+  EXPECT_THAT(refuse(changed), HasSubstr("damaged"));
+  changed = whole;
+  changed[8] = 9;
+  EXPECT_THAT(refuse(changed), HasSubstr("version"));
+  changed = whole;
+  std::swap(changed[12], changed[15]);
+  EXPECT_THAT(refuse(changed), HasSubstr("byte order"));
+  changed = whole;
+  changed.replace(changed.find("\"lanes\":[80,7]"), 14, "\"lanes\":[80,8]");
+  EXPECT_THAT(refuse(changed),
+              ::testing::AllOf(HasSubstr("observation schema: lanes"), HasSubstr("[80,7]"), HasSubstr("[80,8]")));
+  changed = whole;
+  changed[30] = '}';
+  EXPECT_THAT(refuse(changed), HasSubstr("header"));
+  EXPECT_THAT(message_of([&] { load_driver(folder_ + "/none.ckpt", 1); }), HasSubstr("no such file"));
+}
+
+TEST_F(CheckpointFile, SafetensorsHoldEveryParameter) {
+  const Config config = small_config();
+  const Policy policy(config.policy, 4, 1);
+  write_safetensors(folder_ + "/p.safetensors", policy.parameters(), to_toml(config));
+  const std::string bytes = read_file(folder_ + "/p.safetensors");
+  uint64_t header_bytes = 0;
+  std::memcpy(&header_bytes, bytes.data(), 8);
+  EXPECT_EQ(header_bytes % 8, 0u);
+  const auto header = nlohmann::json::parse(bytes.substr(8, header_bytes));
+  EXPECT_EQ(header.size(), policy.parameters().size() + 1);
+  size_t end = 0;
+  for (const NamedTensor& p : policy.parameters()) {
+    const auto& entry = header.at(p.name);
+    EXPECT_EQ(entry.at("dtype"), "F32");
+    EXPECT_EQ(entry.at("shape").get<std::vector<int64_t>>(), p.value.sizes().vec());
+    const size_t begin = entry.at("data_offsets")[0];
+    EXPECT_EQ(begin, end);
+    end = entry.at("data_offsets")[1];
+    EXPECT_EQ(0, std::memcmp(bytes.data() + 8 + header_bytes + begin, p.value.const_data_ptr(), end - begin)) << p.name;
+  }
+  EXPECT_EQ(8 + header_bytes + end, bytes.size());
+}
+
+using Events = Folder;
+
+TEST(Crc32c, KnownAnswers) {
+  EXPECT_EQ(crc32c("123456789"), 0xE3069283u);            // the check value of the CRC catalogue
+  EXPECT_EQ(crc32c(std::string(32, '\0')), 0x8A9136AAu);  // RFC 3720, B.4
+  EXPECT_EQ(crc32c(std::string(32, '\xff')), 0x62A8AB43u);
+}
+
+TEST_F(Events, RecordsAreFramedAsTfRecords) {
+  {
+    EventFile events(folder_);
+    events.write(300, {{"loss", 0.5}});
+  }
+  const std::string path = std::filesystem::directory_iterator(folder_)->path();
+  const std::string bytes = read_file(path);
+  size_t offset = 0;
+  std::vector<std::string> records;
+  while (offset < bytes.size()) {
+    uint64_t length = 0;
+    uint32_t length_crc = 0, data_crc = 0;
+    ASSERT_LE(offset + 16, bytes.size());
+    std::memcpy(&length, bytes.data() + offset, 8);
+    std::memcpy(&length_crc, bytes.data() + offset + 8, 4);
+    records.push_back(bytes.substr(offset + 12, length));
+    std::memcpy(&data_crc, bytes.data() + offset + 12 + length, 4);
+    auto masked = [](uint32_t crc) { return ((crc >> 15) | (crc << 17)) + 0xA282EAD8u; };
+    EXPECT_EQ(length_crc, masked(crc32c(bytes.substr(offset, 8))));
+    EXPECT_EQ(data_crc, masked(crc32c(records.back())));
+    offset += 16 + length;
+  }
+  ASSERT_EQ(records.size(), 2u);
+  EXPECT_THAT(records[0], HasSubstr("brain.Event:2"));
+  // After the time (tag 0x09 and 8 bytes): step 300, then summary { value { tag: "loss" simple_value: 0.5 } }.
+  const std::string expected("\x10\xac\x02\x2a\x0d\x0a\x0b\x0a\x04loss\x15\x00\x00\x00\x3f", 18);
+  EXPECT_EQ(records[1].substr(9), expected);
+}
+
+}  // namespace
+}  // namespace pictura

@@ -1,0 +1,117 @@
+// The configuration: reading, refusing, writing back.
+#include "pictura/training/config.h"
+
+#include <gmock/gmock.h>
+
+#include "pictura/common/error.h"
+#include "pictura/common/file.h"
+
+namespace pictura {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+std::string message_of(const std::string& text, const std::vector<std::string>& overrides = {}) {
+  try {
+    parse_config(text, "a.toml", overrides);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Config, DefaultsAreThePapersTables) {
+  const Config c = parse_config("", "a.toml");
+  EXPECT_EQ(c.simulator.num_slots, 20 * 1024);
+  EXPECT_EQ(c.train.num_steps * int64_t{c.simulator.num_slots}, 2621440);
+  EXPECT_EQ(c.train.minibatch_size, 65536);
+  EXPECT_EQ(c.train.gamma, 0.999);
+  EXPECT_EQ(c.train.learning_rate, 5e-4);
+  EXPECT_EQ(c.simulator.conditioning[static_cast<size_t>(Conditioning::collision)].high, 3.0f);
+  EXPECT_TRUE(c.simulator.conditioning[static_cast<size_t>(Conditioning::acceleration)].mixture);
+}
+
+TEST(Config, PaperFileSaysNothingElseThanTheDefaults) {
+  const Config paper = load_config(PICTURA_SOURCE_DIR "/configs/paper.toml");
+  EXPECT_EQ(first_difference(Config{}, paper), "");
+  EXPECT_EQ(to_toml(paper), to_toml(Config{}));
+}
+
+TEST(Config, EveryFileInConfigsReads) {
+  for (const char* name : {"smoke", "demo", "town01", "paper"}) {
+    EXPECT_NO_THROW(load_config(fmt::format("{}/configs/{}.toml", PICTURA_SOURCE_DIR, name))) << name;
+  }
+}
+
+TEST(Config, WrittenTextReadsBackEqual) {
+  Config c;
+  c.run.seed = 77;
+  c.simulator.maps = {"a \"quoted\" name", "b"};
+  c.simulator.conditioning[0] = {3.3f, 4.7f, false};
+  c.policy.modality = Modality::vector;
+  c.train.learning_rate = 1.0 / 3.0;
+  c.train.ent_coef = 0;
+  const Config back = parse_config(to_toml(c), "b.toml");
+  EXPECT_EQ(to_toml(back), to_toml(c));
+  EXPECT_EQ(back.simulator.maps, c.simulator.maps);
+  EXPECT_EQ(back.train.learning_rate, c.train.learning_rate);
+  EXPECT_EQ(back.simulator.conditioning[0].low, 3.3f);
+}
+
+TEST(Config, OverridesWinAndMayNameNewKeysAndBareWords) {
+  const Config c = parse_config(
+      "[train]\nupdates = 5\n", "a.toml",
+      {"train.updates=2", "run.backend=cpu", "simulator.conditioning.collision=[1, 2]", "simulator.maps=[\"Town01\"]"});
+  EXPECT_EQ(c.train.updates, 2);
+  EXPECT_EQ(c.run.backend, "cpu");
+  EXPECT_EQ(c.simulator.conditioning[static_cast<size_t>(Conditioning::collision)].low, 1.0f);
+  EXPECT_EQ(c.simulator.maps.size(), 1u);
+}
+
+TEST(Config, ErrorsNameFileLineAndKey) {
+  EXPECT_THAT(message_of("[train]\nupdates = 5\nlearning_rat = 1\n"),
+              AllOf(HasSubstr("a.toml:3:"), HasSubstr("train.learning_rat")));
+  EXPECT_THAT(message_of("[run]\ngamma = 0.9\n"),
+              AllOf(HasSubstr("a.toml:2:"), HasSubstr("did you mean 'train.gamma'")));
+  EXPECT_THAT(message_of("[simulator]\nnum_slots = 0\n"),
+              AllOf(HasSubstr("a.toml:2: simulator.num_slots"), HasSubstr("got 0")));
+  EXPECT_THAT(message_of("[simulator]\nnum_slots = 100000000\n"), HasSubstr("got 100000000"));
+  EXPECT_THAT(message_of("[simulator]\nnum_slots = 1.5\n"), HasSubstr("expected an integer"));
+  EXPECT_THAT(message_of("[render]\nwidth_px = 0\nheight_px = 0\n"), HasSubstr("render.width_px"));
+  EXPECT_THAT(message_of("[train]\ngamma = nan\n"), HasSubstr("train.gamma"));
+  EXPECT_THAT(message_of("[train]\ngamma = \"a\"\n"), HasSubstr("expected a number"));
+  EXPECT_THAT(message_of("[policy]\nmodality = \"sonar\"\n"), HasSubstr("perspective"));
+  EXPECT_THAT(message_of("[policy]\nconv_strides = [1, 2]\n"), HasSubstr("policy.conv_strides"));
+  EXPECT_THAT(message_of("[policy]\nattention_heads = 3\n"), HasSubstr("divisor"));
+  EXPECT_THAT(message_of("[simulator.conditioning]\ncollision = [3, 1]\n"), HasSubstr("low <= high"));
+  EXPECT_THAT(message_of("[simulator.conditioning]\nthrottle = [1.1, 1.2]\n"), HasSubstr("low <= 1 <= high"));
+  EXPECT_THAT(message_of("[simulator]\nmin_agents = 9\nmax_agents = 8\n"), HasSubstr("a.toml:2: simulator.min_agents"));
+  EXPECT_THAT(message_of("[train]\nupdates = \n"), HasSubstr("a.toml:2"));
+  EXPECT_THAT(message_of("simulator = 5\n"), HasSubstr("a.toml:1"));
+  EXPECT_THAT(message_of("", {"train.updates=0"}), AllOf(HasSubstr("--set train.updates"), HasSubstr("got 0")));
+  EXPECT_THAT(message_of("", {"train.updates"}), HasSubstr("expected section.key=value"));
+  EXPECT_THAT(message_of("", {"nonsense.key=1"}), HasSubstr("nonsense"));
+}
+
+TEST(Config, DifferencesAreNamedExceptForThoseThatMayDiffer) {
+  Config a, b;
+  b.train.updates = 3;
+  b.run.num_threads = 9;
+  EXPECT_EQ(first_difference(a, b), "");
+  b.policy.backbone_width = 256;
+  EXPECT_THAT(first_difference(a, b), AllOf(HasSubstr("policy.backbone_width"), HasSubstr("512"), HasSubstr("256")));
+}
+
+TEST(Config, EvaluationFixesConditioningAndLightsAndEndsNothingEarly) {
+  const SimulatorConfig s = evaluation_simulator_config(Config{}, 3000);
+  EXPECT_EQ(s.episode_steps, 3000);
+  EXPECT_GT(s.reset_inactive_fraction, 1.0f);
+  EXPECT_TRUE(s.fixed_lights);
+  for (const ConditioningRange& range : s.conditioning) EXPECT_EQ(range.low, range.high);
+  EXPECT_EQ(s.conditioning[static_cast<size_t>(Conditioning::delta_goal_m)].low, 2.0f);
+  EXPECT_EQ(s.conditioning[static_cast<size_t>(Conditioning::throttle)].low, 1.0f);
+}
+
+}  // namespace
+}  // namespace pictura

@@ -1,0 +1,173 @@
+// The policies: shapes, gradients, masks, initialisation.
+#include "pictura/training/policy.h"
+
+#include <cmath>
+
+#include <ATen/Parallel.h>
+#include <ATen/core/grad_mode.h>
+#include <gtest/gtest.h>
+
+namespace pictura {
+namespace {
+
+Config::PolicySection tiny(Modality modality) {
+  Config::PolicySection c;
+  c.modality = modality;
+  c.conv_channels = {3, 4};
+  c.conv_kernels = {3, 3};
+  c.conv_strides = {2, 1};
+  c.num_queries = 2;
+  c.attention_heads = 2;
+  c.attention_mlp = 5;
+  c.embedding_width = 4;
+  c.backbone_layers = 2;
+  c.backbone_width = 6;
+  return c;
+}
+
+// Numbers without a pattern, a function of the index alone.
+at::Tensor numbers(at::IntArrayRef shape, double phase) {
+  int64_t count = 1;
+  for (const int64_t size : shape) count *= size;
+  return (at::arange(count, at::kDouble) * 1.7 + phase).sin().reshape(shape);
+}
+
+Observation observation(Modality modality, int64_t batch) {
+  Observation o;
+  o.ego = numbers({batch, kEgoFeatures}, 0);
+  o.conditioning = numbers({batch, kNumConditioning}, 1);
+  o.waypoints = numbers({batch, kNumWaypoints * kWaypointFeatures}, 2);
+  if (modality == Modality::vector) {
+    o.partners = numbers({batch, kMaxPartners, kPartnerFeatures}, 3);
+    o.lanes = numbers({batch, kMaxLanes, kLaneFeatures}, 4);
+    o.boundaries = numbers({batch, kMaxBoundaries, kBoundaryFeatures}, 5);
+    o.controls = numbers({batch, kMaxControls, kControlFeatures}, 6);
+    o.set_counts = at::tensor({3, 80, 5, 0, 0, 7, 80, 10}, at::kInt)
+                       .reshape({2, 4})
+                       .repeat({(batch + 1) / 2, 1})
+                       .narrow(0, 0, batch);
+  } else {
+    // Two sizes in one rig: cameras 0 and 2 are 8x6, camera 1 is 5x4.
+    auto bytes = [](at::IntArrayRef shape, double phase) { return (numbers(shape, phase) * 120 + 128).to(at::kByte); };
+    o.images = {{bytes({batch, 2, 3, 6, 8}, 7), {0, 2}}, {bytes({batch, 1, 3, 4, 5}, 8), {1}}};
+  }
+  return o;
+}
+
+// A scalar that depends on every output.
+double scalar_of(const Policy& policy, const Observation& o, bool with_gradient) {
+  const at::AutoGradMode mode(with_gradient);
+  const Policy::Output output = policy.forward(o);
+  const at::Tensor weights = numbers(output.logits.sizes(), 9);
+  const at::Tensor loss = (at::log_softmax(output.logits, 1) * weights).sum() + (output.value * output.value).sum();
+  if (with_gradient) loss.backward();
+  return loss.item<double>();
+}
+
+class BothModalities : public ::testing::TestWithParam<Modality> {};
+INSTANTIATE_TEST_SUITE_P(Policy, BothModalities, ::testing::Values(Modality::perspective, Modality::vector));
+
+TEST_P(BothModalities, GradientsEqualDifferenceQuotients) {
+  const Policy policy(tiny(GetParam()), 3, 5, at::kDouble);
+  const Observation o = observation(GetParam(), 2);
+  scalar_of(policy, o, true);
+  const at::NoGradGuard no_grad;
+  int64_t checked = 0;
+  for (const NamedTensor& parameter : policy.parameters()) {
+    ASSERT_TRUE(parameter.value.grad().defined()) << parameter.name;
+    double* values = parameter.value.data_ptr<double>();
+    const double* gradient = parameter.value.grad().contiguous().const_data_ptr<double>();
+    const int64_t stride = std::max<int64_t>(1, parameter.value.numel() / 7);
+    for (int64_t i = 0; i < parameter.value.numel(); i += stride, ++checked) {
+      const double value = values[i], h = 1e-5;
+      values[i] = value + h;
+      const double above = scalar_of(policy, o, false);
+      values[i] = value - h;
+      const double below = scalar_of(policy, o, false);
+      values[i] = value;
+      EXPECT_NEAR(gradient[i], (above - below) / (2 * h), 1e-6 * (1 + std::abs(gradient[i])))
+          << parameter.name << " " << i;
+    }
+  }
+  EXPECT_GT(checked, 100);
+}
+
+TEST_P(BothModalities, HasThePapersShapes) {
+  Config::PolicySection config;
+  config.modality = GetParam();
+  const Policy policy(config, 4, 1);
+  auto shape_of = [&](const std::string& name) {
+    for (const NamedTensor& p : policy.parameters()) {
+      if (p.name == name) return p.value.sizes().vec();
+    }
+    return std::vector<int64_t>{};
+  };
+  EXPECT_EQ(shape_of("backbone.0.weight"), (std::vector<int64_t>{512, 384}));
+  EXPECT_EQ(shape_of("backbone.3.weight"), (std::vector<int64_t>{512, 512}));
+  EXPECT_EQ(shape_of("actor.weight"), (std::vector<int64_t>{12, 512}));
+  EXPECT_EQ(shape_of("critic.weight"), (std::vector<int64_t>{1, 512}));
+  if (GetParam() == Modality::perspective) {
+    EXPECT_EQ(shape_of("project.weight"), (std::vector<int64_t>{256, 512}));
+    EXPECT_EQ(shape_of("attention.queries"), (std::vector<int64_t>{4, 16, 128}));
+    EXPECT_EQ(shape_of("ego.hidden.weight"), (std::vector<int64_t>{64, 7}));
+  } else {
+    EXPECT_EQ(shape_of("lanes.hidden.weight"), (std::vector<int64_t>{64, 7}));
+    EXPECT_EQ(shape_of("ego.hidden.weight"), (std::vector<int64_t>{64, 9}));
+  }
+}
+
+TEST_P(BothModalities, FirstPolicyIsNearlyUniformAndDoesNotDependOnThreads) {
+  Config::PolicySection config = tiny(GetParam());
+  at::set_num_threads(1);
+  const Policy one(config, 3, 42);
+  at::set_num_threads(2);
+  const Policy two(config, 3, 42), other(config, 3, 43);
+  EXPECT_EQ(one.hash(), two.hash());
+  EXPECT_NE(one.hash(), other.hash());
+
+  const Observation o = observation(GetParam(), 4);
+  const Policy doubles(config, 3, 42, at::kDouble);
+  const at::NoGradGuard no_grad;
+  const at::Tensor probabilities = at::softmax(doubles.forward(o).logits, 1);
+  EXPECT_GT(probabilities.min().item<double>(), 0.9 / 12);
+  EXPECT_LT(probabilities.max().item<double>(), 1.1 / 12);
+}
+
+TEST(Policy, AgentsOfABatchDoNotMix) {
+  const Policy policy(tiny(Modality::perspective), 3, 5, at::kDouble);
+  const at::NoGradGuard no_grad;
+  const Observation o = observation(Modality::perspective, 3);
+  const at::Tensor all = policy.forward(o).logits;
+  const at::Tensor last = policy.forward(o.map([](const at::Tensor& t) { return t.narrow(0, 2, 1); })).logits;
+  EXPECT_LT((all[2] - last[0]).abs().max().item<double>(), 1e-12);
+}
+
+TEST(Policy, EveryCameraCounts) {
+  const Policy policy(tiny(Modality::perspective), 3, 5, at::kDouble);
+  const at::NoGradGuard no_grad;
+  const Observation o = observation(Modality::perspective, 1);
+  const at::Tensor before = policy.forward(o).value;
+  for (const auto& [block, camera] : {std::pair{0, 0}, std::pair{0, 1}, std::pair{1, 0}}) {
+    Observation changed = o.map([](const at::Tensor& t) { return t.clone(); });
+    changed.images[static_cast<size_t>(block)].pixels.select(1, camera).fill_(0);
+    EXPECT_GT((policy.forward(changed).value - before).abs().item<double>(), 1e-9) << block << " " << camera;
+  }
+}
+
+TEST(MaskedMax, IgnoresPaddingAndGivesZeroForEmptySets) {
+  const at::Tensor members = at::tensor({-3.0, -1.0, 9.0, /**/ 5.0, 6.0, 7.0}, at::kDouble).reshape({2, 3, 1});
+  const at::Tensor largest = masked_max(members, at::tensor({2, 0}, at::kInt));
+  EXPECT_EQ(largest[0][0].item<double>(), -1.0);
+  EXPECT_EQ(largest[1][0].item<double>(), 0.0);
+}
+
+TEST(MaskedMax, PaddingGetsNoGradient) {
+  at::Tensor members = at::tensor({-3.0, -1.0, 9.0, /**/ 5.0, 6.0, 7.0}, at::kDouble).reshape({2, 3, 1});
+  members.requires_grad_();
+  masked_max(members, at::tensor({2, 0}, at::kInt)).sum().backward();
+  const at::Tensor expected = at::tensor({0.0, 1.0, 0.0, 0.0, 0.0, 0.0}, at::kDouble).reshape({2, 3, 1});
+  EXPECT_TRUE(at::equal(members.grad(), expected));
+}
+
+}  // namespace
+}  // namespace pictura

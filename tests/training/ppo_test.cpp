@@ -1,0 +1,304 @@
+// PPO: advantages, filter, schedule, shuffles, and that it learns.
+#include "pictura/training/ppo.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include <ATen/Parallel.h>
+#include <ATen/core/grad_mode.h>
+#include <gmock/gmock.h>
+
+#include "pictura/common/error.h"
+#include "pictura/common/rng.h"
+#include "pictura/training/gae.h"
+#include "pictura/training/observer.h"
+
+namespace pictura {
+namespace {
+
+// One agent, written as the recursion stands in the literature.
+std::vector<float> plain_gae(const std::vector<float>& rewards, const std::vector<float>& values,
+                             const std::vector<uint8_t>& terminated, const std::vector<uint8_t>& truncated,
+                             const std::vector<uint8_t>& valid, float gamma, float gae_lambda) {
+  std::vector<float> advantages(rewards.size());
+  float later = 0;
+  for (size_t t = rewards.size(); t-- > 0;) {
+    if (!valid[t]) {
+      later = 0;
+    } else if (terminated[t]) {
+      later = rewards[t] + gamma * 0.0f - values[t] + gamma * gae_lambda * 0.0f;
+    } else {
+      const float delta = rewards[t] + gamma * values[t + 1] - values[t];
+      later = delta + gamma * gae_lambda * (truncated[t] ? 0.0f : later);
+    }
+    advantages[t] = later;
+  }
+  return advantages;
+}
+
+TEST(Gae, EqualsThePlainRecursionExactly) {
+  const size_t num_steps = 37, num_slots = 53;
+  RandomStream stream(1, 2, 3, 4, 5, Purpose::initial_state);
+  std::vector<float> rewards(num_steps * num_slots), values((num_steps + 1) * num_slots);
+  std::vector<uint8_t> terminated(rewards.size()), truncated(rewards.size()), valid(rewards.size());
+  for (float& x : rewards) x = stream.uniform(-1, 1);
+  for (float& x : values) x = stream.uniform(-1, 1);
+  for (size_t i = 0; i < rewards.size(); ++i) {
+    terminated[i] = stream.below(9) == 0;
+    truncated[i] = stream.below(9) == 0;
+    valid[i] = stream.below(5) != 0;
+  }
+  std::vector<float> advantages(rewards.size());
+  gae(num_steps, num_slots, rewards.data(), values.data(), terminated.data(), truncated.data(), valid.data(), 0.97f,
+      0.9f, advantages.data());
+  auto column = [&](const auto& all, size_t slot) {
+    std::decay_t<decltype(all)> one;
+    for (size_t i = slot; i < all.size(); i += num_slots) one.push_back(all[i]);
+    return one;
+  };
+  for (size_t slot = 0; slot < num_slots; ++slot) {
+    EXPECT_EQ(column(advantages, slot), plain_gae(column(rewards, slot), column(values, slot), column(terminated, slot),
+                                                  column(truncated, slot), column(valid, slot), 0.97f, 0.9f));
+  }
+}
+
+TEST(Gae, TruncationBootstrapsTerminationDoesNotAndResetsAreMasked) {
+  // One slot, gamma 0.5, lambda 1. Step 1 ends the episode, step 2 is the reset, step 3 begins anew.
+  const float rewards[] = {1, 2, 100, 4}, values[] = {10, 20, 40, 80, 160};
+  const uint8_t none[] = {0, 0, 0, 0}, end[] = {0, 1, 0, 0}, valid[] = {1, 1, 0, 1};
+  float advantages[4];
+  gae(4, 1, rewards, values, none, end, valid, 0.5f, 1.0f, advantages);
+  EXPECT_EQ(advantages[3], 4 + 80 - 80);
+  EXPECT_EQ(advantages[2], 0);
+  EXPECT_EQ(advantages[1], 2 + 20 - 20);  // bootstraps from the final observation's value, 40
+  EXPECT_EQ(advantages[0], 1 + 10 - 10 + 0.5f * 2);
+  gae(4, 1, rewards, values, end, none, valid, 0.5f, 1.0f, advantages);
+  EXPECT_EQ(advantages[1], 2 - 20);
+  EXPECT_EQ(advantages[0], 1 + 10 - 10 + 0.5f * (2 - 20));
+}
+
+TEST(AdvantageFilter, FollowsTheExponentialAverageOfTheMaxima) {
+  AdvantageFilter filter;
+  EXPECT_FLOAT_EQ(filter.threshold(8, 0.25, 0.01), 0.08f);
+  EXPECT_FLOAT_EQ(filter.threshold(4, 0.25, 0.01), 0.07f);  // 0.25 * 4 + 0.75 * 8 = 7
+  EXPECT_FLOAT_EQ(filter.threshold(0, 0.25, 0.01), 0.0525f);
+}
+
+TEST(Schedule, IsACosineThatEndsAtZero) {
+  EXPECT_DOUBLE_EQ(cosine_rate(2.0, 0, 100), 2.0);
+  EXPECT_NEAR(cosine_rate(2.0, 25, 100), 1 + std::sqrt(0.5), 1e-12);
+  EXPECT_NEAR(cosine_rate(2.0, 50, 100), 1.0, 1e-12);
+  EXPECT_NEAR(cosine_rate(2.0, 100, 100), 0.0, 1e-12);
+  EXPECT_NEAR(cosine_rate(2.0, 150, 100), 0.0, 1e-12);
+}
+
+TEST(Shuffle, IsAPermutationThatOnlyItsArgumentsDecide) {
+  const std::vector<int64_t> a = shuffled(1000, 1, 2, 3);
+  EXPECT_EQ(a, shuffled(1000, 1, 2, 3));
+  EXPECT_NE(a, shuffled(1000, 1, 2, 4));
+  EXPECT_NE(a, shuffled(1000, 1, 3, 3));
+  EXPECT_EQ(std::set<int64_t>(a.begin(), a.end()).size(), 1000u);
+  EXPECT_EQ(*std::max_element(a.begin(), a.end()), 999);
+}
+
+TEST(DrawAction, FollowsTheCumulativeProbabilities) {
+  const float log_probs[] = {std::log(0.25f), std::log(0.5f), std::log(0.25f)};
+  EXPECT_EQ(draw_action({log_probs, 3}, 0.0f), 0);
+  EXPECT_EQ(draw_action({log_probs, 3}, 0.24f), 0);
+  EXPECT_EQ(draw_action({log_probs, 3}, 0.26f), 1);
+  EXPECT_EQ(draw_action({log_probs, 3}, 0.74f), 1);
+  EXPECT_EQ(draw_action({log_probs, 3}, 0.9999999f), 2);
+}
+
+TEST(AdamW, StepsAsLoshchilovAndHutterDefineIt) {
+  Config::PolicySection section;
+  section.modality = Modality::vector;
+  section.embedding_width = section.backbone_width = section.backbone_layers = 1;
+  const Policy policy(section, 1, 3);
+  Config::Train train;
+  train.weight_decay = 0.1;
+  train.max_grad_norm = 1e9;
+  AdamW optimizer(policy, train);
+  at::Tensor weight = policy.parameters()[0].value;  // every other parameter has no gradient and stays
+  const std::vector<double> gradients{0.5, -0.25};
+  const double start = weight.flatten()[0].item<double>();
+  double expected = start, m = 0, v = 0;
+  for (size_t t = 0; t < gradients.size(); ++t) {
+    weight.mutable_grad() = at::full_like(weight, gradients[t]);
+    optimizer.step(0.01);
+    m = 0.9 * m + 0.1 * gradients[t];
+    v = 0.999 * v + 0.001 * gradients[t] * gradients[t];
+    const double power = static_cast<double>(t) + 1;
+    const double m_hat = m / (1 - std::pow(0.9, power)), v_hat = v / (1 - std::pow(0.999, power));
+    expected += -0.01 * 0.1 * expected - 0.01 * m_hat / (std::sqrt(v_hat) + 1e-8);
+  }
+  EXPECT_NEAR(weight.flatten()[0].item<double>(), expected, 1e-6);
+  EXPECT_GT(std::abs(expected - start), 1e-3);
+}
+
+// A task for PPO without a simulator. The agent sees a sign s in its ego vector; "go" pays nothing at once but makes
+// the next step's right action pay: credit has to travel over one step.
+struct Corridor {
+  static constexpr int64_t kSlots = 128, kSteps = 8;
+  static constexpr int kGo = 7;
+
+  Rollout rollout;
+  at::Tensor open = at::zeros({kSlots}, at::kFloat), sign = at::ones({kSlots}, at::kFloat);
+
+  Corridor() : rollout(storage(), kSteps, kSlots) {}
+
+  static Observation storage() {
+    const int64_t rows = kSteps + 1;
+    Observation o;
+    o.ego = at::zeros({rows, kSlots, kEgoFeatures}, at::kFloat);
+    o.conditioning = at::zeros({rows, kSlots, kNumConditioning}, at::kFloat);
+    o.waypoints = at::zeros({rows, kSlots, kNumWaypoints * kWaypointFeatures}, at::kFloat);
+    o.partners = at::zeros({rows, kSlots, 1, kPartnerFeatures}, at::kFloat);
+    o.lanes = at::zeros({rows, kSlots, 1, kLaneFeatures}, at::kFloat);
+    o.boundaries = at::zeros({rows, kSlots, 1, kBoundaryFeatures}, at::kFloat);
+    o.controls = at::zeros({rows, kSlots, 1, kControlFeatures}, at::kFloat);
+    o.set_counts = at::zeros({rows, kSlots, 4}, at::kInt);
+    return o;
+  }
+
+  // Mean reward per step of one rollout.
+  double play(const Policy& policy, int64_t update) {
+    for (int64_t t = 0; t <= kSteps; ++t) {
+      const Observation row = row_of(rollout.observation, t);
+      at::Tensor ego = row.ego;
+      ego.select(1, 0).copy_(sign);
+      ego.select(1, 1).copy_(open);
+      const Decision decision = decide(policy, row, 50);
+      rollout.values.select(0, t).copy_(decision.value);
+      if (t == kSteps) break;
+      for (int64_t slot = 0; slot < kSlots; ++slot) {
+        RandomStream stream(9, 0, static_cast<uint32_t>(slot), static_cast<uint32_t>(update), static_cast<uint32_t>(t),
+                            Purpose::action);
+        const float* log_probs = decision.log_probs.const_data_ptr<float>() + slot * kNumActions;
+        const int action = draw_action({log_probs, kNumActions}, stream.uniform());
+        const bool was_open = open[slot].item<float>() > 0;
+        const int right = sign[slot].item<float>() > 0 ? 2 : 10;
+        rollout.actions[t][slot] = action;
+        rollout.log_probs[t][slot] = log_probs[action];
+        rollout.rewards[t][slot] = was_open && action == right ? 1.0f : 0.0f;
+        rollout.valid[t][slot] = 1;
+        open[slot] = !was_open && action == kGo ? 1.0f : 0.0f;
+        sign[slot] = stream.below(2) ? 1.0f : -1.0f;
+      }
+    }
+    return rollout.rewards.mean().item<double>();
+  }
+};
+
+TEST(Ppo, LearnsATaskWithDelayedReward) {
+  at::set_num_threads(1);
+  const at::AutoGradMode mode(true);
+  Config::PolicySection section;
+  section.modality = Modality::vector;
+  section.embedding_width = 8;
+  section.backbone_layers = 2;
+  section.backbone_width = 32;
+  const Policy policy(section, 1, 7);
+  Config::Train train;
+  train.minibatch_size = 256;
+  train.forward_chunk = 100;
+  train.learning_rate = 3e-3;
+  train.schedule_updates = 60;
+  train.gamma = 0.9;
+  train.update_epochs = 4;
+  AdamW optimizer(policy, train);
+  AdvantageFilter filter;
+  Corridor corridor;
+  double first = 0, last = 0;
+  UpdateStats stats;
+  for (int64_t update = 0; update < 40; ++update) {
+    last = corridor.play(policy, update);
+    if (update == 0) first = last;
+    corridor.rollout.compute_advantages(train.gamma, train.gae_lambda);
+    stats = ppo_update(policy, corridor.rollout, train, 1, update, &optimizer, &filter);
+  }
+  // Chance is 1/12 of 1/13; perfect play is paid every other step.
+  EXPECT_LT(first, 0.05);
+  EXPECT_GT(last, 0.4);
+  EXPECT_GT(stats.kept_fraction, 0.0);
+}
+
+TEST(Ppo, ChunksChangeNothingButRounding) {
+  at::set_num_threads(1);
+  Config::PolicySection section;
+  section.modality = Modality::vector;
+  section.embedding_width = 8;
+  section.backbone_layers = 1;
+  section.backbone_width = 16;
+  const Policy whole(section, 1, 7), chunked(section, 1, 7);
+  Config::Train train;
+  train.minibatch_size = 512;
+  for (const Policy* policy : {&whole, &chunked}) {
+    train.forward_chunk = policy == &whole ? 100000 : 60;
+    Corridor corridor;
+    corridor.play(*policy, 0);
+    corridor.rollout.rewards.copy_(
+        at::arange(corridor.rollout.rewards.numel(), at::kFloat).sin().reshape_as(corridor.rollout.rewards));
+    corridor.rollout.compute_advantages(0.9, 0.9);
+    AdamW optimizer(*policy, train);
+    AdvantageFilter filter;
+    ppo_update(*policy, corridor.rollout, train, 1, 0, &optimizer, &filter);
+  }
+  for (size_t i = 0; i < whole.parameters().size(); ++i) {
+    const at::NoGradGuard no_grad;
+    EXPECT_LT((whole.parameters()[i].value - chunked.parameters()[i].value).abs().max().item<double>(), 2e-4);
+  }
+}
+
+TEST(Ppo, InvalidTransitionsTeachNothing) {
+  at::set_num_threads(1);
+  Config::PolicySection section;
+  section.modality = Modality::vector;
+  section.embedding_width = section.backbone_width = 8;
+  section.backbone_layers = 1;
+  const Policy a(section, 1, 7), b(section, 1, 7);
+  Config::Train train;
+  for (const Policy* policy : {&a, &b}) {
+    Corridor corridor;
+    corridor.play(*policy, 0);
+    corridor.rollout.rewards.copy_(
+        at::arange(corridor.rollout.rewards.numel(), at::kFloat).sin().reshape_as(corridor.rollout.rewards));
+    corridor.rollout.valid.narrow(1, 0, 40).zero_();
+    if (policy == &b) corridor.rollout.rewards.narrow(1, 0, 40).fill_(50);
+    corridor.rollout.compute_advantages(0.9, 0.9);
+    AdamW optimizer(*policy, train);
+    AdvantageFilter filter;
+    const UpdateStats stats = ppo_update(*policy, corridor.rollout, train, 1, 0, &optimizer, &filter);
+    EXPECT_LT(stats.kept_fraction, 1.0001);
+  }
+  EXPECT_EQ(a.hash(), b.hash());
+}
+
+TEST(Ppo, NanIsAnError) {
+  Config::PolicySection section;
+  section.modality = Modality::vector;
+  section.embedding_width = section.backbone_width = 8;
+  const Policy policy(section, 1, 7);
+  Config::Train train;
+  Corridor corridor;
+  corridor.play(policy, 0);
+  corridor.rollout.rewards.fill_(1);
+  corridor.rollout.compute_advantages(0.9, 0.9);
+  {
+    const at::NoGradGuard no_grad;
+    at::Tensor bias = policy.parameters().back().value;
+    bias.fill_(std::nan(""));
+  }
+  AdamW optimizer(policy, train);
+  AdvantageFilter filter;
+  try {
+    ppo_update(policy, corridor.rollout, train, 1, 4, &optimizer, &filter);
+    FAIL() << "expected an Error";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("update 5: the loss is not finite"));
+  }
+}
+
+}  // namespace
+}  // namespace pictura

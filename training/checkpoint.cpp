@@ -1,0 +1,237 @@
+#include "pictura/training/checkpoint.h"
+
+#include <bit>
+#include <cstring>
+
+#include <ATen/core/grad_mode.h>
+#include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
+
+#include "pictura/common/error.h"
+#include "pictura/common/file.h"
+#include "pictura/common/hash.h"
+
+namespace pictura {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr char kMagic[8] = {'P', 'I', 'C', 'T', 'C', 'K', 'P', 'T'};
+constexpr uint32_t kVersion = 1;
+constexpr uint32_t kByteOrder = 0x01020304;
+constexpr size_t kPreamble = sizeof(kMagic) + 2 * sizeof(uint32_t) + sizeof(uint64_t);
+
+// What a policy's numbers mean; it cannot drive where this differs.
+ordered_json schema() {
+  return {{"ego", {kEgoFeatures}},
+          {"partners", {kMaxPartners, kPartnerFeatures}},
+          {"lanes", {kMaxLanes, kLaneFeatures}},
+          {"boundaries", {kMaxBoundaries, kBoundaryFeatures}},
+          {"controls", {kMaxControls, kControlFeatures}},
+          {"conditioning", {kNumConditioning}},
+          {"waypoints", {kNumWaypoints, kWaypointFeatures}},
+          {"actions", {kNumLongActions, kNumLatActions}}};
+}
+
+ordered_json rig_to_json(const Rig& rig) {
+  ordered_json cameras = ordered_json::array();
+  for (const Camera& c : rig.cameras) {
+    cameras.push_back({{"name", c.name},
+                       {"size_px", {c.width_px, c.height_px}},
+                       {"focal_px", {c.focal_x_px, c.focal_y_px}},
+                       {"center_px", {c.center_x_px, c.center_y_px}},
+                       {"position_m", {c.position_m.x, c.position_m.y, c.position_m.z}},
+                       {"yaw_pitch_roll_rad", {c.yaw_rad, c.pitch_rad, c.roll_rad}}});
+  }
+  return cameras;
+}
+
+Rig rig_from_json(const ordered_json& cameras) {
+  Rig rig;
+  for (const ordered_json& json : cameras) {
+    Camera c;
+    c.name = json.at("name");
+    c.width_px = json.at("size_px").at(0);
+    c.height_px = json.at("size_px").at(1);
+    c.focal_x_px = json.at("focal_px").at(0);
+    c.focal_y_px = json.at("focal_px").at(1);
+    c.center_x_px = json.at("center_px").at(0);
+    c.center_y_px = json.at("center_px").at(1);
+    c.position_m = {json.at("position_m").at(0), json.at("position_m").at(1), json.at("position_m").at(2)};
+    c.yaw_rad = json.at("yaw_pitch_roll_rad").at(0);
+    c.pitch_rad = json.at("yaw_pitch_roll_rad").at(1);
+    c.roll_rad = json.at("yaw_pitch_roll_rad").at(2);
+    rig.cameras.push_back(c);
+  }
+  validate(rig);
+  return rig;
+}
+
+std::string bytes_of(const at::Tensor& tensor) {
+  const at::Tensor host = tensor.detach().to(at::kCPU, at::kFloat).contiguous();
+  return {static_cast<const char*>(host.const_data_ptr()), host.nbytes()};
+}
+
+template <typename T>
+void append(std::string* bytes, T value) {
+  bytes->append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+template <typename T>
+T at_offset(const std::string& bytes, size_t offset) {
+  T value;
+  std::memcpy(&value, bytes.data() + offset, sizeof value);
+  return value;
+}
+
+std::string hash_of(std::string_view bytes) {
+  Hash64 hash;
+  hash.add_bytes(bytes.data(), bytes.size());
+  return hash.hex();
+}
+
+}  // namespace
+
+void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
+  std::string data;
+  auto describe = [&](const std::vector<NamedTensor>& tensors) {
+    ordered_json list = ordered_json::array();
+    for (const NamedTensor& tensor : tensors) {
+      list.push_back({{"name", tensor.name}, {"shape", tensor.value.sizes().vec()}, {"offset", data.size()}});
+      data += bytes_of(tensor.value);
+    }
+    return list;
+  };
+  ordered_json header;
+  header["config"] = to_toml(checkpoint.config);
+  header["schema"] = schema();
+  header["rig"] = rig_to_json(checkpoint.rig);
+  header["counters"] = {{"update", checkpoint.update},
+                        {"agent_steps", checkpoint.agent_steps},
+                        {"distance_m", checkpoint.distance_m},
+                        {"adam_steps", checkpoint.adam_steps},
+                        {"filter_average", checkpoint.filter_average}};
+  header["parameters"] = describe(checkpoint.parameters);
+  header["first_moments"] = describe(checkpoint.first_moments);
+  header["second_moments"] = describe(checkpoint.second_moments);
+  header["simulator"] = {{"offset", data.size()}, {"bytes", checkpoint.simulator.size()}};
+  data.append(reinterpret_cast<const char*>(checkpoint.simulator.data()), checkpoint.simulator.size());
+  header["data"] = {{"bytes", data.size()}, {"hash", hash_of(data)}};
+
+  const std::string text = header.dump();
+  std::string file(kMagic, sizeof kMagic);
+  append(&file, kVersion);
+  append(&file, kByteOrder);
+  append(&file, static_cast<uint64_t>(text.size()));
+  write_file(path, file + text + data);
+}
+
+Checkpoint read_checkpoint(const std::string& path) {
+  const std::string file = read_file(path, size_t{1} << 36);
+  PICTURA_CHECK(file.size() >= sizeof kMagic && std::memcmp(file.data(), kMagic, sizeof kMagic) == 0,
+                "{}: not a checkpoint: expected it to begin with PICTCKPT", path);
+  PICTURA_CHECK(file.size() >= kPreamble, "{}: truncated: {} bytes", path, file.size());
+  PICTURA_CHECK(at_offset<uint32_t>(file, 12) == kByteOrder, "{}: written on a machine of another byte order", path);
+  const auto version = at_offset<uint32_t>(file, 8);
+  PICTURA_CHECK(version == kVersion, "{}: expected checkpoint version {}, got {}", path, kVersion, version);
+  const auto header_bytes = at_offset<uint64_t>(file, 16);
+  PICTURA_CHECK(header_bytes <= file.size() - kPreamble, "{}: truncated: its header has {} bytes, the file {}", path,
+                header_bytes, file.size());
+
+  Checkpoint result;
+  result.path = path;
+  try {
+    const ordered_json header = ordered_json::parse(file.substr(kPreamble, header_bytes));
+    const ordered_json expected_schema = schema();
+    for (const auto& [name, shape] : expected_schema.items()) {
+      const ordered_json& saved = header.at("schema").at(name);
+      PICTURA_CHECK(saved == shape, "{}: observation schema: {}: expected {}, got {}", path, name, shape.dump(),
+                    saved.dump());
+    }
+    const std::string_view data = std::string_view(file).substr(kPreamble + header_bytes);
+    const auto data_bytes = header.at("data").at("bytes").get<uint64_t>();
+    PICTURA_CHECK(data.size() == data_bytes, "{}: truncated: expected {} bytes of data, got {}", path, data_bytes,
+                  data.size());
+    PICTURA_CHECK(hash_of(data) == header.at("data").at("hash").get<std::string>(),
+                  "{}: damaged: its data do not have the hash that its header names", path);
+
+    auto tensors = [&](const char* list) {
+      std::vector<NamedTensor> all;
+      for (const ordered_json& entry : header.at(list)) {
+        const auto shape = entry.at("shape").get<std::vector<int64_t>>();
+        const auto offset = entry.at("offset").get<uint64_t>();
+        uint64_t bytes = sizeof(float);
+        for (const int64_t size : shape) {
+          PICTURA_CHECK(size > 0 && size <= static_cast<int64_t>(data.size()), "{}: {}: bad shape", path, list);
+          bytes *= static_cast<uint64_t>(size);
+          PICTURA_CHECK(bytes <= data.size(), "{}: {}: bad shape", path, list);
+        }
+        PICTURA_CHECK(offset <= data.size() - bytes, "{}: {}: bad offset", path, list);
+        at::Tensor value = at::empty(shape, at::kFloat);
+        std::memcpy(value.data_ptr(), data.data() + offset, bytes);
+        all.push_back({entry.at("name").get<std::string>(), value});
+      }
+      return all;
+    };
+    result.parameters = tensors("parameters");
+    result.first_moments = tensors("first_moments");
+    result.second_moments = tensors("second_moments");
+    const auto offset = header.at("simulator").at("offset").get<uint64_t>();
+    const auto bytes = header.at("simulator").at("bytes").get<uint64_t>();
+    PICTURA_CHECK(bytes <= data.size() && offset <= data.size() - bytes, "{}: simulator: bad offset", path);
+    const auto* first = reinterpret_cast<const uint8_t*>(data.data()) + offset;
+    result.simulator.assign(first, first + bytes);
+
+    const ordered_json& counters = header.at("counters");
+    result.update = counters.at("update");
+    result.agent_steps = counters.at("agent_steps");
+    result.distance_m = counters.at("distance_m");
+    result.adam_steps = counters.at("adam_steps");
+    result.filter_average = counters.at("filter_average");
+    result.rig = rig_from_json(header.at("rig"));
+    result.config = parse_config(header.at("config").get<std::string>(), path + ": config");
+  } catch (const nlohmann::json::exception& error) {
+    fail("{}: its header cannot be read: {}", path, error.what());
+  }
+  return result;
+}
+
+void restore_tensors(const Checkpoint& checkpoint, const std::vector<NamedTensor>& saved,
+                     const std::vector<NamedTensor>& parameters) {
+  const at::NoGradGuard no_grad;
+  for (const NamedTensor& parameter : parameters) {
+    const auto found = std::find_if(saved.begin(), saved.end(),
+                                    [&](const NamedTensor& candidate) { return candidate.name == parameter.name; });
+    PICTURA_CHECK(found != saved.end(), "{}: of another architecture: it has no parameter '{}'", checkpoint.path,
+                  parameter.name);
+    PICTURA_CHECK(found->value.sizes() == parameter.value.sizes(),
+                  "{}: of another architecture: parameter '{}': expected [{}], got [{}]", checkpoint.path,
+                  parameter.name, fmt::join(parameter.value.sizes(), ", "), fmt::join(found->value.sizes(), ", "));
+    at::Tensor target = parameter.value;
+    target.copy_(found->value);
+  }
+  PICTURA_CHECK(saved.size() == parameters.size(), "{}: of another architecture: expected {} parameters, got {}",
+                checkpoint.path, parameters.size(), saved.size());
+}
+
+void write_safetensors(const std::string& path, const std::vector<NamedTensor>& tensors,
+                       const std::string& config_toml) {
+  static_assert(std::endian::native == std::endian::little, "safetensors are little endian");
+  std::string data;
+  ordered_json header;
+  header["__metadata__"] = {{"format", "pt"}, {"config", config_toml}};
+  for (const NamedTensor& tensor : tensors) {
+    const size_t begin = data.size();
+    data += bytes_of(tensor.value);
+    header[tensor.name] = {
+        {"dtype", "F32"}, {"shape", tensor.value.sizes().vec()}, {"data_offsets", {begin, data.size()}}};
+  }
+  std::string text = header.dump();
+  text.append((8 - text.size() % 8) % 8, ' ');  // data begin on a multiple of eight bytes
+  std::string file;
+  append(&file, static_cast<uint64_t>(text.size()));
+  write_file(path, file + text + data);
+}
+
+}  // namespace pictura

@@ -1,0 +1,38 @@
+// What a run saves: one file from which training goes on exactly and a policy can be loaded. Layout: the eight bytes
+// PICTCKPT, u32 version, u32 byte order mark, u64 length of a JSON header, the header, the data that it describes.
+#pragma once
+
+#include "pictura/training/policy.h"
+
+namespace pictura {
+
+struct Checkpoint {
+  std::string path;  // where it was read from, for messages
+  Config config;
+  Rig rig;
+  int64_t update = 0;  // updates done
+  int64_t agent_steps = 0;
+  double distance_m = 0;  // driven by all agents
+  int64_t adam_steps = 0;
+  double filter_average = -1;  // of AdvantageFilter
+  std::vector<NamedTensor> parameters, first_moments, second_moments;
+  std::vector<uint8_t> simulator;  // Simulator::save(), at the start of update `update`
+};
+
+/// Writes beside path and renames.
+void write_checkpoint(const std::string& path, const Checkpoint& checkpoint);
+
+/// Throws Error naming the file when it is no checkpoint, truncated, damaged, of another version or byte order, or of
+/// another observation schema (naming the entry that differs).
+Checkpoint read_checkpoint(const std::string& path);
+
+/// Copies `saved` into `parameters` in place. Throws Error naming the checkpoint and the first tensor that is missing
+/// or of another shape.
+void restore_tensors(const Checkpoint& checkpoint, const std::vector<NamedTensor>& saved,
+                     const std::vector<NamedTensor>& parameters);
+
+/// The policy's weights as safetensors, which other tools read: u64 length, JSON, raw data.
+void write_safetensors(const std::string& path, const std::vector<NamedTensor>& tensors,
+                       const std::string& config_toml);
+
+}  // namespace pictura

@@ -1,0 +1,448 @@
+#include "pictura/training/config.h"
+
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <set>
+
+#include <fmt/ranges.h>
+#include <toml++/toml.h>
+
+#include "pictura/common/error.h"
+#include "pictura/common/file.h"
+
+namespace pictura {
+
+namespace {
+
+// The list of keys, in the order in which they are written. Reader and writer both walk it, so no key can be read and
+// not written. A visitor takes (key, value, range...).
+template <typename AnyConfig, typename Visitor>
+void visit(AnyConfig& c, Visitor&& v) {
+  const double inf = std::numeric_limits<double>::infinity();
+  v.integer("run.seed", c.run.seed, 0, std::numeric_limits<int64_t>::max());
+  v.integer("run.num_threads", c.run.num_threads, 0, 4096);
+  v.text("run.backend", c.run.backend);
+
+  v.texts("simulator.maps", c.simulator.maps);
+  v.integer("simulator.num_slots", c.simulator.num_slots, 1, 1 << 22);
+  v.integer("simulator.min_agents", c.simulator.min_agents, 1, kMaxAgentsPerWorld);
+  v.integer("simulator.max_agents", c.simulator.max_agents, 1, kMaxAgentsPerWorld);
+  v.integer("simulator.episode_steps", c.simulator.episode_steps, 1, 1 << 24);
+  v.number("simulator.reset_inactive_fraction", c.simulator.reset_inactive_fraction, 1e-6, 2);
+  v.number("simulator.pedestrian_fraction", c.simulator.pedestrian_fraction, 0, 1);
+  v.number("simulator.cyclist_fraction", c.simulator.cyclist_fraction, 0, 1);
+  v.integer("simulator.parked_cars", c.simulator.parked_cars, 0, kMaxAgentsPerWorld);
+  v.flag("simulator.walls", c.simulator.walls);
+  v.integer("simulator.wall_seed", c.simulator.wall_seed, 0, std::numeric_limits<int64_t>::max());
+  for (int i = 0; i < kNumConditioning; ++i) {
+    v.range(std::string("simulator.conditioning.") + kConditioningNames[i], c.simulator.conditioning[size_t(i)]);
+  }
+
+  v.integer("render.width_px", c.render.width_px, 1, 8192);
+  v.integer("render.height_px", c.render.height_px, 1, 8192);
+  v.text("render.rig", c.render.rig);
+  v.number("render.line_floor_px", c.render.line_floor_px, 0, 16);
+
+  v.modality("policy.modality", c.policy.modality);
+  v.flag("policy.auxiliary", c.policy.auxiliary);
+  v.integers("policy.conv_channels", c.policy.conv_channels, 1, 4096);
+  v.integers("policy.conv_kernels", c.policy.conv_kernels, 1, 31);
+  v.integers("policy.conv_strides", c.policy.conv_strides, 1, 16);
+  v.integer("policy.num_queries", c.policy.num_queries, 1, 4096);
+  v.integer("policy.attention_heads", c.policy.attention_heads, 1, 64);
+  v.integer("policy.attention_mlp", c.policy.attention_mlp, 0, 1 << 16);
+  v.integer("policy.embedding_width", c.policy.embedding_width, 1, 1 << 14);
+  v.integer("policy.backbone_layers", c.policy.backbone_layers, 1, 64);
+  v.integer("policy.backbone_width", c.policy.backbone_width, 1, 1 << 14);
+
+  v.integer("train.updates", c.train.updates, 1, int64_t{1} << 40);
+  v.integer("train.schedule_updates", c.train.schedule_updates, 1, int64_t{1} << 40);
+  v.integer("train.num_steps", c.train.num_steps, 1, 1 << 16);
+  v.integer("train.minibatch_size", c.train.minibatch_size, 1, int64_t{1} << 32);
+  v.integer("train.update_epochs", c.train.update_epochs, 1, 1000);
+  v.integer("train.forward_chunk", c.train.forward_chunk, 1, int64_t{1} << 32);
+  v.number("train.gamma", c.train.gamma, 0, 1);
+  v.number("train.gae_lambda", c.train.gae_lambda, 0, 1);
+  v.number("train.clip_coef", c.train.clip_coef, 1e-6, 100);
+  v.number("train.vf_coef", c.train.vf_coef, 0, 1e6);
+  v.number("train.ent_coef", c.train.ent_coef, 0, 1e6);
+  v.number("train.learning_rate", c.train.learning_rate, 0, 100);
+  v.number("train.adam_beta1", c.train.adam_beta1, 0, 0.999999);
+  v.number("train.adam_beta2", c.train.adam_beta2, 0, 0.99999999);
+  v.number("train.adam_eps", c.train.adam_eps, 1e-30, 1);
+  v.number("train.weight_decay", c.train.weight_decay, 0, 100);
+  v.number("train.max_grad_norm", c.train.max_grad_norm, 1e-9, inf);
+  v.flag("train.norm_adv", c.train.norm_adv);
+  v.number("train.adv_filter_threshold", c.train.adv_filter_threshold, 0, 1);
+  v.number("train.adv_filter_ema", c.train.adv_filter_ema, 1e-6, 1);
+  v.integer("train.checkpoint_every", c.train.checkpoint_every, 1, int64_t{1} << 40);
+
+  for (int i = 0; i < kNumConditioning; ++i) {
+    v.number(std::string("evaluate.conditioning.") + kConditioningNames[i], c.evaluate.conditioning[size_t(i)], -1e6,
+             1e6);
+  }
+}
+
+// Floats are kept as the shortest text that reads back to the same float; so 0.8f is 0.8, not 0.800000011920929.
+std::string shortest(float value) { return fmt::format("{}", value); }
+std::string shortest(double value) {
+  const std::string text = fmt::format("{}", value);
+  return text.find_first_of(".en") == std::string::npos ? text + ".0" : text;
+}
+
+class Reader {
+ public:
+  Reader(const toml::table& table, std::string source, const std::set<std::string>& overridden)
+      : table_(table), source_(std::move(source)), overridden_(overridden) {}
+
+  template <typename Int>
+  void integer(const std::string& key, Int& value, int64_t low, int64_t high) {
+    if (const toml::node* node = find(key)) {
+      const int64_t number = integer_of(key, *node, low, high);
+      value = static_cast<Int>(number);
+    }
+  }
+
+  void number(const std::string& key, double& value, double low, double high) {
+    if (const toml::node* node = find(key)) value = number_of(key, *node, low, high);
+  }
+
+  void flag(const std::string& key, bool& value) {
+    if (const toml::node* node = find(key)) {
+      if (!node->is_boolean()) refuse(key, *node, "expected true or false");
+      value = node->as_boolean()->get();
+    }
+  }
+
+  void text(const std::string& key, std::string& value) {
+    if (const toml::node* node = find(key)) value = text_of(key, *node);
+  }
+
+  void texts(const std::string& key, std::vector<std::string>& value) {
+    if (const toml::node* node = find(key)) {
+      value.clear();
+      for (const toml::node& element : elements_of(key, *node)) value.push_back(text_of(key, element));
+    }
+  }
+
+  void integers(const std::string& key, std::vector<int>& value, int64_t low, int64_t high) {
+    if (const toml::node* node = find(key)) {
+      value.clear();
+      for (const toml::node& element : elements_of(key, *node)) {
+        value.push_back(static_cast<int>(integer_of(key, element, low, high)));
+      }
+    }
+  }
+
+  void modality(const std::string& key, Modality& value) {
+    if (const toml::node* node = find(key)) {
+      const std::string name = text_of(key, *node);
+      if (name == "perspective")
+        value = Modality::perspective;
+      else if (name == "vector")
+        value = Modality::vector;
+      else
+        refuse(key, *node, "expected \"perspective\" or \"vector\"");
+    }
+  }
+
+  void range(const std::string& key, ConditioningRange& value) {
+    if (const toml::node* node = find(key)) {
+      const toml::array& pair = elements_of(key, *node);
+      if (pair.size() != 2) refuse(key, *node, "expected [low, high]");
+      value.low = static_cast<float>(number_of(key, pair[0], -1e6, 1e6));
+      value.high = static_cast<float>(number_of(key, pair[1], -1e6, 1e6));
+      if (value.low > value.high) refuse(key, *node, "expected low <= high");
+      if (value.mixture && !(value.low > 0 && value.low <= 1 && value.high >= 1)) {
+        refuse(key, *node, "expected 0 < low <= 1 <= high");
+      }
+    }
+  }
+
+  /// Throws for the first key of the table that no call asked for.
+  void refuse_unknown(const toml::table& table, const std::string& prefix = "") const {
+    for (const auto& [name, node] : table) {
+      const std::string key = prefix + std::string(name.str());
+      if (const toml::table* inner = node.as_table(); inner && sections_.count(key))
+        refuse_unknown(*inner, key + ".");
+      else if (!known_.count(key))
+        fail("{}: unknown key '{}'{}", where(key, node), key, suggestion(key));
+    }
+  }
+
+  [[noreturn]] void refuse(const std::string& key, const toml::node& node, const std::string& expected) const {
+    std::ostringstream got;
+    node.visit([&](const auto& value) { got << value; });
+    fail("{}: {}: {}, got {}", where(key, node), key, expected, got.str());
+  }
+  [[noreturn]] void refuse(const std::string& key, const std::string& message) const {
+    const toml::node* node = table_.at_path(key).node();
+    fail("{}: {}: {}", node ? where(key, *node) : source_, key, message);
+  }
+
+ private:
+  const toml::node* find(const std::string& key) {
+    known_.insert(key);
+    for (size_t dot = key.find('.'); dot != std::string::npos; dot = key.find('.', dot + 1)) {
+      sections_.insert(key.substr(0, dot));
+    }
+    return table_.at_path(key).node();
+  }
+
+  std::string where(const std::string& key, const toml::node& node) const {
+    if (overridden_.count(key)) return "--set " + key;
+    return fmt::format("{}:{}", source_, node.source().begin.line);
+  }
+
+  int64_t integer_of(const std::string& key, const toml::node& node, int64_t low, int64_t high) const {
+    if (!node.is_integer() || node.as_integer()->get() < low || node.as_integer()->get() > high) {
+      refuse(key, node, fmt::format("expected an integer in [{}, {}]", low, high));
+    }
+    return node.as_integer()->get();
+  }
+
+  double number_of(const std::string& key, const toml::node& node, double low, double high) const {
+    const auto number = node.value<double>();
+    if (!number || !(*number >= low && *number <= high)) {
+      refuse(key, node, fmt::format("expected a number in [{}, {}]", low, high));
+    }
+    return *number;
+  }
+
+  std::string text_of(const std::string& key, const toml::node& node) const {
+    if (!node.is_string()) refuse(key, node, "expected a string");
+    return node.as_string()->get();
+  }
+
+  const toml::array& elements_of(const std::string& key, const toml::node& node) const {
+    if (!node.is_array() || node.as_array()->empty()) refuse(key, node, "expected a list with one element or more");
+    return *node.as_array();
+  }
+
+  // The known key that ends alike, for those who forgot or confused the section.
+  std::string suggestion(const std::string& key) const {
+    const std::string last = key.substr(key.rfind('.') + 1);
+    for (const std::string& known : known_) {
+      if (known.substr(known.rfind('.') + 1) == last) return fmt::format("; did you mean '{}'?", known);
+    }
+    return "; configs/paper.toml names every key";
+  }
+
+  const toml::table& table_;
+  std::string source_;
+  const std::set<std::string>& overridden_;
+  std::set<std::string> known_, sections_;
+};
+
+class Writer {
+ public:
+  template <typename Int>
+  void integer(const std::string& key, const Int& value, int64_t, int64_t) {
+    line(key, fmt::format("{}", value));
+  }
+  void number(const std::string& key, const double& value, double, double) { line(key, shortest(value)); }
+  void flag(const std::string& key, const bool& value) { line(key, value ? "true" : "false"); }
+  void text(const std::string& key, const std::string& value) { line(key, quoted(value)); }
+  void texts(const std::string& key, const std::vector<std::string>& values) {
+    std::vector<std::string> all;
+    for (const std::string& value : values) all.push_back(quoted(value));
+    line(key, fmt::format("[{}]", fmt::join(all, ", ")));
+  }
+  void integers(const std::string& key, const std::vector<int>& values, int64_t, int64_t) {
+    line(key, fmt::format("[{}]", fmt::join(values, ", ")));
+  }
+  void modality(const std::string& key, const Modality& value) {
+    line(key, value == Modality::perspective ? "\"perspective\"" : "\"vector\"");
+  }
+  void range(const std::string& key, const ConditioningRange& value) {
+    line(key, fmt::format("[{}, {}]", shortest(value.low), shortest(value.high)));
+  }
+
+  std::string toml;                                        // the whole file
+  std::vector<std::pair<std::string, std::string>> lines;  // key, value as written
+
+ private:
+  static std::string quoted(const std::string& value) {
+    std::ostringstream out;
+    out << toml::value<std::string>(value);
+    return out.str();
+  }
+
+  void line(const std::string& key, const std::string& value) {
+    const size_t dot = key.rfind('.');
+    if (const std::string section = key.substr(0, dot); section != section_) {
+      toml += fmt::format("{}[{}]\n", section_.empty() ? "" : "\n", section);
+      section_ = section;
+    }
+    toml += fmt::format("{} = {}\n", key.substr(dot + 1), value);
+    lines.emplace_back(key, value);
+  }
+  std::string section_;
+};
+
+// "train.updates=2" into the table; a value that is no TOML is taken as a string, so that run.backend=cpu works.
+std::string apply_override(const std::string& text, toml::table* table_inout) {
+  const size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0) fail_usage("--set {}: expected section.key=value", text);
+  const std::string key = text.substr(0, equals), value = text.substr(equals + 1);
+  toml::table parsed;
+  try {
+    parsed = toml::parse("value = " + value);
+  } catch (const toml::parse_error&) {
+    parsed.insert("value", value);
+  }
+  if (parsed.size() != 1) fail_usage("--set {}: expected one value", text);
+  toml::table* section = table_inout;
+  size_t begin = 0;
+  for (size_t dot = key.find('.'); dot != std::string::npos; begin = dot + 1, dot = key.find('.', begin)) {
+    const std::string name = key.substr(begin, dot - begin);
+    if (!section->contains(name)) section->insert(name, toml::table{});
+    section = section->get(name)->as_table();
+    if (!section) fail_usage("--set {}: '{}' is no section", text, key.substr(0, dot));
+  }
+  parsed.get("value")->visit([&](auto& node) { section->insert_or_assign(key.substr(begin), std::move(node)); });
+  return key;
+}
+
+void check_contradictions(const Config& c, const Reader& reader) {
+  if (c.simulator.min_agents > c.simulator.max_agents) {
+    reader.refuse("simulator.min_agents", fmt::format("expected at most simulator.max_agents ({}), got {}",
+                                                      c.simulator.max_agents, c.simulator.min_agents));
+  }
+  if (c.simulator.pedestrian_fraction + c.simulator.cyclist_fraction > 1) {
+    reader.refuse("simulator.pedestrian_fraction",
+                  fmt::format("expected at most 1 together with simulator.cyclist_fraction, got {} + {}",
+                              c.simulator.pedestrian_fraction, c.simulator.cyclist_fraction));
+  }
+  const size_t layers = c.policy.conv_channels.size();
+  for (const auto& [key, values] : {std::pair{"policy.conv_kernels", &c.policy.conv_kernels},
+                                    std::pair{"policy.conv_strides", &c.policy.conv_strides}}) {
+    if (values->size() != layers) {
+      reader.refuse(key,
+                    fmt::format("expected {} values, as policy.conv_channels has, got {}", layers, values->size()));
+    }
+  }
+  for (const int kernel : c.policy.conv_kernels) {
+    if (kernel % 2 == 0) reader.refuse("policy.conv_kernels", fmt::format("expected odd sizes, got {}", kernel));
+  }
+  if (c.policy.conv_channels.back() % c.policy.attention_heads != 0) {
+    reader.refuse("policy.attention_heads",
+                  fmt::format("expected a divisor of the last of policy.conv_channels ({}), got {}",
+                              c.policy.conv_channels.back(), c.policy.attention_heads));
+  }
+  const double images =
+      double(c.train.num_steps + 1) * c.simulator.num_slots * c.render.width_px * c.render.height_px * 12;
+  if (c.policy.modality == Modality::perspective && images > 1e12) {
+    reader.refuse(
+        "simulator.num_slots",
+        fmt::format("{} agents, {} steps and {}x{} images need {:.0f} GB for one rollout", c.simulator.num_slots,
+                    c.train.num_steps, c.render.width_px, c.render.height_px, images / 1e9));
+  }
+}
+
+}  // namespace
+
+std::array<double, kNumConditioning> Config::Evaluate::default_conditioning() {
+  // Safe and eager: full penalties, no bias in the lane, goals within 2 m at any speed, unscaled dynamics.
+  std::array<double, kNumConditioning> values{};
+  auto set = [&](Conditioning which, double value) { values[static_cast<size_t>(which)] = value; };
+  set(Conditioning::delta_goal_m, 2);
+  set(Conditioning::v_goal_mps, 20);
+  set(Conditioning::collision, 3);
+  set(Conditioning::off_road, 3);
+  set(Conditioning::stop_line, 1);
+  set(Conditioning::comfort, 0.05);
+  set(Conditioning::lane_align, 2.5e-2);
+  set(Conditioning::vel_align, 1);
+  set(Conditioning::lane_center, 7.5e-3);
+  set(Conditioning::center_bias_m, 0);
+  set(Conditioning::velocity, 2.5e-3);
+  set(Conditioning::reverse, 7.5e-3);
+  set(Conditioning::overspeed, 0.05);
+  set(Conditioning::timestep, 2.5e-5);
+  set(Conditioning::throttle, 1);
+  set(Conditioning::steer, 1);
+  set(Conditioning::acceleration, 1);
+  return values;
+}
+
+Config parse_config(const std::string& text, const std::string& source, const std::vector<std::string>& overrides) {
+  toml::table table;
+  try {
+    table = toml::parse(text, source);
+  } catch (const toml::parse_error& error) {
+    fail("{}:{}: {}", source, error.source().begin.line, error.description());
+  }
+  std::set<std::string> overridden;
+  for (const std::string& text_of_one : overrides) overridden.insert(apply_override(text_of_one, &table));
+
+  Config config;
+  Reader reader(table, source, overridden);
+  visit(config, reader);
+  reader.refuse_unknown(table);
+  check_contradictions(config, reader);
+  return config;
+}
+
+Config load_config(const std::string& path, const std::vector<std::string>& overrides) {
+  Config config = parse_config(read_file(path, 1 << 20), path, overrides);
+  if (std::filesystem::path rig = config.render.rig; !rig.empty() && rig.is_relative()) {
+    config.render.rig = (std::filesystem::path(path).parent_path() / rig).string();
+  }
+  return config;
+}
+
+std::string to_toml(const Config& config) {
+  Writer writer;
+  visit(config, writer);
+  return writer.toml;
+}
+
+std::string first_difference(const Config& saved, const Config& now) {
+  Writer before, after;
+  visit(saved, before);
+  visit(now, after);
+  for (size_t i = 0; i < before.lines.size(); ++i) {
+    const auto& [key, value] = before.lines[i];
+    if (key == "train.updates" || key == "train.checkpoint_every" || key == "run.num_threads") continue;
+    if (value != after.lines[i].second) return fmt::format("{}: {} became {}", key, value, after.lines[i].second);
+  }
+  return "";
+}
+
+Rig rig_of(const Config& config) {
+  return config.render.rig.empty() ? paper_rig(config.render.width_px, config.render.height_px)
+                                   : load_rig(config.render.rig);
+}
+
+SimulatorConfig simulator_config(const Config& config) {
+  SimulatorConfig result;
+  result.seed = config.run.seed;
+  result.num_threads = config.run.num_threads;
+  result.episode_steps = config.simulator.episode_steps;
+  result.reset_inactive_fraction = static_cast<float>(config.simulator.reset_inactive_fraction);
+  result.pedestrian_fraction = static_cast<float>(config.simulator.pedestrian_fraction);
+  result.cyclist_fraction = static_cast<float>(config.simulator.cyclist_fraction);
+  result.parked_cars = config.simulator.parked_cars;
+  result.walls = config.simulator.walls;
+  result.wall_seed = config.simulator.wall_seed;
+  result.auxiliary_observations = config.policy.modality == Modality::vector && config.policy.auxiliary;
+  result.vector_observations = config.policy.modality == Modality::vector;
+  result.conditioning = config.simulator.conditioning;
+  return result;
+}
+
+SimulatorConfig evaluation_simulator_config(const Config& config, int steps) {
+  SimulatorConfig result = simulator_config(config);
+  result.episode_steps = steps;
+  result.reset_inactive_fraction = 2;
+  result.fixed_lights = true;
+  for (size_t i = 0; i < result.conditioning.size(); ++i) {
+    const auto value = static_cast<float>(config.evaluate.conditioning[i]);
+    result.conditioning[i] = {value, value, false};
+  }
+  return result;
+}
+
+}  // namespace pictura

@@ -1,0 +1,106 @@
+// The one configuration of training and evaluation: what it may say, its defaults (the paper's tables), its reading and
+// its writing. docs/training.md explains every key; configs/*.toml are examples.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "pictura/common/camera.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+enum class Modality { perspective, vector };
+
+struct Config {
+  struct Run {
+    uint64_t seed = 1;             // names the whole run
+    int num_threads = 0;           // of simulator, renderer and torch; 0: all
+    std::string backend = "auto";  // cpu, cuda, auto, or null (cpu simulator, black images)
+  } run;
+
+  struct SimulatorSection {
+    std::vector<std::string> maps{"Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07", "Town10HD"};
+    int num_slots = 20480;                 // concurrent agents, over all worlds
+    int min_agents = 1, max_agents = 120;  // agents per world ~ U{min, max}
+    int episode_steps = 1280;
+    double reset_inactive_fraction = 0.4;  // a world resets when this part of its agents is inactive
+    double pedestrian_fraction = 0.1, cyclist_fraction = 0.1;
+    int parked_cars = 32;  // per episode and world
+    bool walls = true;
+    uint64_t wall_seed = 0;
+    /// Training distributions: [simulator.conditioning] NAME = [low, high]; see simulator/conditioning.h for the names.
+    std::array<ConditioningRange, kNumConditioning> conditioning = SimulatorConfig::default_conditioning();
+  } simulator;
+
+  struct Render {
+    int width_px = 96, height_px = 54;  // of each camera of the paper's rig
+    std::string rig;                    // a rig file (docs/image.md) instead; relative to the configuration's folder
+    double line_floor_px = 0.35;
+  } render;
+
+  struct PolicySection {
+    Modality modality = Modality::perspective;
+    bool auxiliary = false;  // vector: fill the slots that no camera could (the paper's Vectorized)
+    std::vector<int> conv_channels{32, 64, 64, 128, 128};
+    std::vector<int> conv_kernels{5, 3, 3, 3, 3};
+    std::vector<int> conv_strides{2, 2, 2, 1, 1};
+    int num_queries = 16;  // learned queries per camera
+    int attention_heads = 4;
+    int attention_mlp = 256;   // hidden width of the block's MLP; 0: none
+    int embedding_width = 64;  // of every group
+    int backbone_layers = 4, backbone_width = 512;
+  } policy;
+
+  struct Train {
+    int64_t updates = 19074;           // when to stop
+    int64_t schedule_updates = 19074;  // horizon of the cosine schedule; 50 B agent steps
+    int num_steps = 128;               // steps of a rollout
+    int64_t minibatch_size = 65536;
+    int update_epochs = 2;
+    int64_t forward_chunk = 2048;  // transitions that go through the network at once; gradients accumulate
+    double gamma = 0.999, gae_lambda = 0.95;
+    double clip_coef = 0.2;
+    double vf_coef = 0.5, ent_coef = 0.01;
+    double learning_rate = 5e-4;
+    double adam_beta1 = 0.9, adam_beta2 = 0.999, adam_eps = 1e-8, weight_decay = 0.01;
+    double max_grad_norm = 0.5;
+    bool norm_adv = true;                // per minibatch
+    double adv_filter_threshold = 0.01;  // of the running max |advantage|; 0: keep everything
+    double adv_filter_ema = 0.25;        // weight of the newest rollout in the running max
+    int64_t checkpoint_every = 20;       // updates
+  } train;
+
+  struct Evaluate {
+    /// What every agent is conditioned on: [evaluate.conditioning] NAME = value.
+    std::array<double, kNumConditioning> conditioning = default_conditioning();
+    static std::array<double, kNumConditioning> default_conditioning();
+  } evaluate;
+};
+
+/// Reads a TOML text. `overrides` are "section.key=value" and win. Throws Error naming source:line and key for unknown
+/// keys, wrong types, values out of range and contradictions.
+Config parse_config(const std::string& text, const std::string& source, const std::vector<std::string>& overrides = {});
+
+/// Reads a file; render.rig becomes relative to the caller's folder.
+Config load_config(const std::string& path, const std::vector<std::string>& overrides = {});
+
+/// Every key with its value, as TOML that parse_config reads back to an equal Config.
+std::string to_toml(const Config& config);
+
+/// Key of the first setting in which the two differ, with both values, or empty. Settings that say when to stop, how
+/// often to save and on how many threads (train.updates, train.checkpoint_every, run.num_threads) may differ.
+std::string first_difference(const Config& saved, const Config& now);
+
+/// The rig that render describes.
+Rig rig_of(const Config& config);
+
+/// What the simulator is told for training: entity sets only for the vector modality.
+SimulatorConfig simulator_config(const Config& config);
+
+/// The same for evaluation (paper, appendix, evaluation protocol): episodes of `steps` that nothing ends early, fixed
+/// conditioning, fixed lights.
+SimulatorConfig evaluation_simulator_config(const Config& config, int steps);
+
+}  // namespace pictura

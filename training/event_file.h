@@ -1,0 +1,33 @@
+// Scalars for TensorBoard: records of the TFRecord format (length, masked CRC-32C, data, masked CRC-32C), each holding
+// an Event message of TensorFlow's event.proto, encoded by hand.
+#pragma once
+
+#include <fstream>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "pictura/common/hd.h"
+
+namespace pictura {
+
+using Scalars = std::vector<std::pair<std::string, double>>;
+
+class EventFile {
+ public:
+  /// Opens folder/events.out.tfevents.<time>.<process>. Throws Error naming the path.
+  explicit EventFile(const std::string& folder);
+  /// Appends one event and flushes. Throws Error when the disk is full.
+  void write(int64_t step, const Scalars& scalars);
+
+ private:
+  void write_record(const std::string& event);
+  std::string path_;
+  std::ofstream out_;
+};
+
+/// CRC-32C (Castagnoli, reflected polynomial 0x82F63B78).
+uint32_t crc32c(std::string_view bytes);
+
+}  // namespace pictura

@@ -1,0 +1,247 @@
+#include "pictura/training/policy.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "pictura/common/error.h"
+#include "pictura/common/hash.h"
+#include "pictura/common/rng.h"
+
+namespace pictura {
+
+/// Draws parameters in the order in which they are asked for and remembers them by name.
+class ParameterMaker {
+ public:
+  ParameterMaker(uint64_t seed, at::ScalarType type, std::vector<NamedTensor>* parameters_out)
+      : seed_(seed), type_(type), parameters_(parameters_out) {}
+
+  /// Normal with standard deviation gain / sqrt(fan_in), fan_in being all dimensions but the first.
+  at::Tensor normal(const std::string& name, at::IntArrayRef shape, double gain) {
+    const at::Tensor drawn = at::empty(shape, at::kFloat);
+    const double deviation = gain / std::sqrt(static_cast<double>(drawn.numel() / shape[0]));
+    float* values = drawn.data_ptr<float>();
+    for (int64_t i = 0; i < drawn.numel(); ++i) {
+      // Box-Muller, one stream per element.
+      RandomStream stream(seed_, static_cast<uint32_t>(parameters_->size()), 0, static_cast<uint32_t>(i), 0,
+                          Purpose::parameters);
+      const double radius = std::sqrt(-2.0 * std::log(1.0 - stream.uniform()));
+      const double angle = 2.0 * std::numbers::pi * stream.uniform();
+      values[i] = static_cast<float>(deviation * radius * std::cos(angle));
+    }
+    return add(name, drawn);
+  }
+  at::Tensor constant(const std::string& name, at::IntArrayRef shape, double value) {
+    return add(name, at::full(shape, value, at::kFloat));
+  }
+
+  Policy::Linear linear(const std::string& name, int64_t in, int64_t out, double gain) {
+    return {normal(name + ".weight", {out, in}, gain), constant(name + ".bias", {out}, 0)};
+  }
+  /// The paper's per-group encoder, a 2-layer MLP.
+  Policy::GroupEncoder group(const std::string& name, int64_t in, int64_t width) {
+    return {linear(name + ".hidden", in, width, std::numbers::sqrt2), linear(name + ".out", width, width, 1.0)};
+  }
+
+ private:
+  at::Tensor add(const std::string& name, const at::Tensor& drawn) {
+    at::Tensor parameter = drawn.to(type_);
+    parameter.requires_grad_();
+    parameters_->push_back({name, parameter});
+    return parameter;
+  }
+
+  uint64_t seed_;
+  at::ScalarType type_;
+  std::vector<NamedTensor>* parameters_;
+};
+
+namespace {
+
+template <typename Linear>
+at::Tensor apply(const Linear& layer, const at::Tensor& x) {
+  return at::linear(x, layer.weight, layer.bias);
+}
+
+template <typename GroupEncoder>
+at::Tensor encode(const GroupEncoder& group, const at::Tensor& x) {
+  return apply(group.out, gelu(apply(group.hidden, x)));
+}
+
+}  // namespace
+
+at::Tensor masked_max(const at::Tensor& members, const at::Tensor& counts) {
+  const at::Tensor index = at::arange(members.size(1), counts.options());
+  const at::Tensor is_padding = index.unsqueeze(0) >= counts.unsqueeze(1);
+  const at::Tensor largest =
+      members.masked_fill(is_padding.unsqueeze(2), -std::numeric_limits<double>::infinity()).amax(1);
+  return largest.masked_fill((counts == 0).unsqueeze(1), 0);
+}
+
+/// Four entity sets, each through its own MLP and a masked max over its members.
+class VectorEncoder final : public SceneEncoder {
+ public:
+  VectorEncoder(const Config::PolicySection& config, ParameterMaker* make) {
+    const std::pair<const char*, int> groups[] = {{"partners", kPartnerFeatures},
+                                                  {"lanes", kLaneFeatures},
+                                                  {"boundaries", kBoundaryFeatures},
+                                                  {"controls", kControlFeatures}};
+    for (const auto& [name, features] : groups) groups_.push_back(make->group(name, features, config.embedding_width));
+  }
+
+  at::Tensor forward(const Observation& o) const override {
+    const at::Tensor* sets[] = {&o.partners, &o.lanes, &o.boundaries, &o.controls};
+    std::vector<at::Tensor> embeddings;
+    for (size_t i = 0; i < groups_.size(); ++i) {
+      embeddings.push_back(masked_max(encode(groups_[i], *sets[i]), o.set_counts.select(1, static_cast<int64_t>(i))));
+    }
+    return at::cat(embeddings, 1);
+  }
+
+ private:
+  std::vector<Policy::GroupEncoder> groups_;
+};
+
+/// A convolutional stack shared by all cameras; per camera, learned queries that cross-attend over its feature map and
+/// are averaged; all cameras concatenated and projected to the width of the four sets that they replace.
+class PerspectiveEncoder final : public SceneEncoder {
+ public:
+  PerspectiveEncoder(const Config::PolicySection& config, int num_cameras, ParameterMaker* make)
+      : config_(config), num_cameras_(num_cameras), width_(config.conv_channels.back()) {
+    int64_t in = 3;
+    for (size_t i = 0; i < config.conv_channels.size(); ++i) {
+      const int64_t out = config.conv_channels[i], kernel = config.conv_kernels[i];
+      const std::string name = fmt::format("conv.{}", i);
+      convolutions_.push_back({make->normal(name + ".weight", {out, in, kernel, kernel}, std::numbers::sqrt2),
+                               make->constant(name + ".bias", {out}, 0)});
+      in = out;
+    }
+    position_ = make->linear("attention.position", kPositionFeatures, width_, 0.5);
+    token_norm_ = norm("attention.token_norm", make);
+    queries_ = make->normal("attention.queries", {num_cameras, config.num_queries, width_}, std::sqrt(double(width_)));
+    query_norm_ = norm("attention.query_norm", make);
+    query_ = make->linear("attention.query", width_, width_, 1.0);
+    key_ = make->linear("attention.key", width_, width_, 1.0);
+    value_ = make->linear("attention.value", width_, width_, 1.0);
+    out_ = make->linear("attention.out", width_, width_, 1.0);
+    if (config.attention_mlp > 0) {
+      mlp_norm_ = norm("attention.mlp_norm", make);
+      mlp_hidden_ = make->linear("attention.mlp_hidden", width_, config.attention_mlp, std::numbers::sqrt2);
+      mlp_out_ = make->linear("attention.mlp_out", config.attention_mlp, width_, 1.0);
+    }
+    project_ = make->linear("project", num_cameras * width_, 4 * config.embedding_width, 1.0);
+  }
+
+  at::Tensor forward(const Observation& o) const override {
+    std::vector<at::Tensor> per_camera(static_cast<size_t>(num_cameras_));
+    for (const ImageBlock& block : o.images) {
+      const at::Tensor pooled = pool(block);  // [batch, cameras, width]
+      for (size_t i = 0; i < block.cameras.size(); ++i) {
+        per_camera[static_cast<size_t>(block.cameras[i])] = pooled.select(1, static_cast<int64_t>(i));
+      }
+    }
+    return apply(project_, at::cat(per_camera, 1));
+  }
+
+ private:
+  // Sines and cosines of the pixel's place in the image, so that attention knows where a token stands whatever the
+  // image's size.
+  static constexpr int64_t kPositionFeatures = 8;
+
+  struct Norm {
+    at::Tensor weight, bias;
+  };
+  Norm norm(const std::string& name, ParameterMaker* make) const {
+    return {make->constant(name + ".weight", {width_}, 1), make->constant(name + ".bias", {width_}, 0)};
+  }
+  at::Tensor apply_norm(const Norm& n, const at::Tensor& x) const {
+    return at::layer_norm(x, {width_}, n.weight, n.bias);
+  }
+
+  static at::Tensor position_features(int64_t height, int64_t width, const at::TensorOptions& options) {
+    auto axis = [&](int64_t size) { return (at::arange(size, options) + 0.5) * (std::numbers::pi / double(size)); };
+    const at::Tensor y = axis(height).unsqueeze(1).expand({height, width}).flatten();
+    const at::Tensor x = axis(width).unsqueeze(0).expand({height, width}).flatten();
+    return at::stack({x.cos(), y.cos(), x.sin(), y.sin(), (2 * x).cos(), (2 * y).cos(), (2 * x).sin(), (2 * y).sin()},
+                     1);
+  }
+
+  at::Tensor pool(const ImageBlock& block) const {
+    const int64_t batch = block.pixels.size(0), cameras = block.pixels.size(1), heads = config_.attention_heads;
+    at::Tensor x =
+        block.pixels.flatten(0, 1).to(queries_.scalar_type()).div(255.0).contiguous(at::MemoryFormat::ChannelsLast);
+    for (size_t i = 0; i < convolutions_.size(); ++i) {
+      x = gelu(at::conv2d(x, convolutions_[i].weight, convolutions_[i].bias, {config_.conv_strides[i]},
+                          {config_.conv_kernels[i] / 2}));
+    }
+    const at::Tensor where = apply(position_, position_features(x.size(2), x.size(3), queries_.options()));
+    const at::Tensor tokens = apply_norm(token_norm_, x.flatten(2).transpose(1, 2) + where);  // [images, h w, width]
+
+    // [.., n, width] -> [.., heads, n, width / heads]
+    auto split = [&](const at::Tensor& t) { return t.unflatten(-1, {heads, width_ / heads}).transpose(-3, -2); };
+    const at::Tensor queries = queries_.index_select(0, at::tensor(block.cameras, at::kLong));
+    const at::Tensor q = split(apply(query_, apply_norm(query_norm_, queries)))
+                             .unsqueeze(0)
+                             .expand({batch, cameras, heads, config_.num_queries, width_ / heads})
+                             .flatten(0, 1);
+    at::Tensor pooled = at::scaled_dot_product_attention(q, split(apply(key_, tokens)), split(apply(value_, tokens)));
+    pooled = apply(out_, pooled.transpose(1, 2).flatten(2)).unflatten(0, {batch, cameras}) + queries;
+    if (config_.attention_mlp > 0) {
+      pooled = pooled + apply(mlp_out_, gelu(apply(mlp_hidden_, apply_norm(mlp_norm_, pooled))));
+    }
+    return pooled.mean(2);
+  }
+
+  const Config::PolicySection config_;
+  const int num_cameras_;
+  const int64_t width_;
+  std::vector<Policy::Linear> convolutions_;  // weights [out, in, kernel, kernel]
+  at::Tensor queries_;
+  Norm token_norm_, query_norm_, mlp_norm_;
+  Policy::Linear position_, query_, key_, value_, out_, mlp_hidden_, mlp_out_, project_;
+};
+
+Policy::Policy(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type) : type_(type) {
+  ParameterMaker make(seed, type, &parameters_);
+  const bool sees_images = config.modality == Modality::perspective;
+  if (sees_images)
+    scene_ = std::make_unique<PerspectiveEncoder>(config, num_cameras, &make);
+  else
+    scene_ = std::make_unique<VectorEncoder>(config, &make);
+  ego_features_ = sees_images ? kEgoFeatures - 2 : kEgoFeatures;
+  const int64_t width = config.embedding_width;
+  ego_ = make.group("ego", ego_features_, width);
+  conditioning_ = make.group("conditioning", kNumConditioning + kNumWaypoints * kWaypointFeatures, width);
+  int64_t in = 6 * width;
+  for (int i = 0; i < config.backbone_layers; ++i) {
+    backbone_.push_back(make.linear(fmt::format("backbone.{}", i), in, config.backbone_width, std::numbers::sqrt2));
+    in = config.backbone_width;
+  }
+  // A small actor head: every action is about as likely as any other at first.
+  actor_ = make.linear("actor", in, kNumActions, 0.01);
+  critic_ = make.linear("critic", in, 1, 1.0);
+}
+
+Policy::Output Policy::forward(const Observation& o) const {
+  at::Tensor x = at::cat({scene_->forward(o), encode(ego_, o.ego.narrow(1, 0, ego_features_)),
+                          encode(conditioning_, at::cat({o.conditioning, o.waypoints}, 1))},
+                         1);
+  for (const Linear& layer : backbone_) x = gelu(apply(layer, x));
+  return {apply(actor_, x), apply(critic_, x).squeeze(1)};
+}
+
+int64_t Policy::num_parameters() const {
+  int64_t sum = 0;
+  for (const NamedTensor& parameter : parameters_) sum += parameter.value.numel();
+  return sum;
+}
+
+std::string Policy::hash() const {
+  Hash64 hash;
+  for (const NamedTensor& parameter : parameters_) {
+    const at::Tensor host = parameter.value.detach().cpu().contiguous();
+    hash.add_bytes(host.const_data_ptr(), host.nbytes());
+  }
+  return hash.hex();
+}
+
+}  // namespace pictura
