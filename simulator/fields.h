@@ -1,12 +1,9 @@
 // The state of all agents as structure of arrays, declared once: name, type, first value, and what it is. Allocation,
-// reset, hashing, comparison, checkpoints and bindings all come from this list, in this order.
+// reset, hashing, comparison, checkpoints and bindings all come from this list, in this order. simulator/agent_state.h
+// owns them on the host.
 #pragma once
 
-#include <vector>
-
-#include "pictura/common/hash.h"
 #include "pictura/common/hd.h"
-#include "pictura/common/span.h"
 
 namespace pictura {
 
@@ -17,63 +14,61 @@ enum class AgentStatus : uint8_t { active, halted, parked, absent };
 enum Event : uint8_t {
   kEventNone = 0,
   kEventCollision = 1,
-  kEventAtFault = 2,         // with kEventCollision
+  kEventAtFault = 2,  // with kEventCollision
   kEventOffRoad = 4,
   kEventRedLight = 8,
   kEventWall = 16,
-  kEventGoal = 32,           // a chain's last waypoint was passed
-  kEventWaypoint = 64,       // an intermediate waypoint was passed
+  kEventGoal = 32,         // a chain's last waypoint was passed
+  kEventWaypoint = 64,     // an intermediate waypoint was passed
+  kEventMetricGoal = 128,  // a chain's last waypoint was passed within 2 m
 };
+/// The events that halt.
+constexpr int kInfractions = kEventCollision | kEventOffRoad | kEventRedLight | kEventWall;
+
+constexpr int kNumWaypoints = 3;
 
 // X(name, type, per agent, first value, comment)
-#define PICTURA_AGENT_FIELDS(X)                                                                                      \
-  X(x_m, float, 1, 0, "rear axle, or the centre of a pedestrian")                                                    \
-  X(y_m, float, 1, 0, "")                                                                                            \
-  X(z_m, float, 1, 0, "height of the road under it")                                                                 \
-  X(heading_rad, float, 1, 0, "counter-clockwise from x, in [-pi, pi]")                                              \
-  X(cos_heading, float, 1, 1, "")                                                                                    \
-  X(sin_heading, float, 1, 0, "")                                                                                    \
-  X(speed_mps, float, 1, 0, "signed, along the heading")                                                             \
-  X(accel_long_mps2, float, 1, 0, "")                                                                                \
-  X(accel_lat_mps2, float, 1, 0, "positive to the left")                                                             \
-  X(steer_rad, float, 1, 0, "front wheel angle, positive to the left")                                               \
-  X(jerk_long_mps3, float, 1, 0, "realised in the last step")                                                        \
-  X(jerk_lat_mps3, float, 1, 0, "")                                                                                  \
-  X(length_m, float, 1, 0, "of the box")                                                                             \
-  X(width_m, float, 1, 0, "")                                                                                        \
-  X(height_m, float, 1, 0, "")                                                                                       \
-  X(lane, int32_t, 1, -1, "current lane, -1 none")                                                                   \
-  X(lane_offset_m, float, 1, 0, "signed, positive to the left of the centre line")                                   \
-  X(lane_angle_rad, float, 1, 0, "heading less the lane's direction, in [-pi, pi]")                                  \
-  X(speed_limit_mps, float, 1, 0, "of the current lane")                                                             \
-  X(waypoint_x_m, float, 3, 0, "the goal chain; passed ones stay until the chain is renewed")                        \
-  X(waypoint_y_m, float, 3, 0, "")                                                                                   \
-  X(waypoint_z_m, float, 3, 0, "")                                                                                   \
-  X(next_waypoint, int32_t, 1, 0, "index of the active one, in [0, 3)")                                              \
-  X(goal_lane, int32_t, 1, -1, "lane of the last waypoint, where the next chain starts")                             \
-  X(goal_lane_s_m, float, 1, 0, "arc length of the last waypoint on it")                                             \
-  X(goal_chains, int32_t, 1, 0, "chains drawn in this episode")                                                      \
-  X(conditioning, float, 17, 0, "reward coefficients and dynamics multipliers; see simulator/conditioning.h")        \
-  X(agent_class, uint8_t, 1, 0, "AgentClass")                                                                        \
-  X(status, uint8_t, 1, 3, "AgentStatus")                                                                            \
-  X(halt_reason, uint8_t, 1, 0, "Event bits that halted it")                                                         \
-  X(events, uint8_t, 1, 0, "Event bits of the last step")                                                            \
-  X(goals_reached, int32_t, 1, 0, "last waypoints passed within 2 m in this episode")                                \
-  X(waypoints_reached, int32_t, 1, 0, "waypoints of any kind that paid or passed in this episode")                   \
-  X(distance_m, float, 1, 0, "sum of |speed| dt in this episode")                                                    \
-  X(episode_events, uint8_t, 1, 0, "union of the episode's event bits")                                              \
+#define PICTURA_AGENT_FIELDS(X)                                                                               \
+  X(x_m, float, 1, 0, "rear axle, or the centre of a pedestrian")                                             \
+  X(y_m, float, 1, 0, "")                                                                                     \
+  X(z_m, float, 1, 0, "height of the road under it")                                                          \
+  X(heading_rad, float, 1, 0, "counter-clockwise from x, in [-pi, pi]")                                       \
+  X(cos_heading, float, 1, 1, "")                                                                             \
+  X(sin_heading, float, 1, 0, "")                                                                             \
+  X(speed_mps, float, 1, 0, "signed, along the heading")                                                      \
+  X(accel_long_mps2, float, 1, 0, "")                                                                         \
+  X(accel_lat_mps2, float, 1, 0, "positive to the left")                                                      \
+  X(steer_rad, float, 1, 0, "front wheel angle, positive to the left")                                        \
+  X(jerk_long_mps3, float, 1, 0, "realised in the last step")                                                 \
+  X(jerk_lat_mps3, float, 1, 0, "")                                                                           \
+  X(length_m, float, 1, 0, "of the box")                                                                      \
+  X(width_m, float, 1, 0, "")                                                                                 \
+  X(height_m, float, 1, 0, "")                                                                                \
+  X(lane, int32_t, 1, -1, "current lane, -1 none")                                                            \
+  X(lane_offset_m, float, 1, 0, "signed, positive to the left of the centre line")                            \
+  X(lane_angle_rad, float, 1, 0, "heading less the lane's direction, in [-pi, pi]")                           \
+  X(speed_limit_mps, float, 1, 0, "of the current lane")                                                      \
+  X(waypoint_x_m, float, 3, 0, "the goal chain; passed ones stay until the chain is renewed")                 \
+  X(waypoint_y_m, float, 3, 0, "")                                                                            \
+  X(waypoint_z_m, float, 3, 0, "")                                                                            \
+  X(next_waypoint, int32_t, 1, 0, "index of the active one, in [0, 3)")                                       \
+  X(goal_lane, int32_t, 1, -1, "lane of the last waypoint, where the next chain starts")                      \
+  X(goal_lane_s_m, float, 1, 0, "arc length of the last waypoint on it")                                      \
+  X(goal_chains, int32_t, 1, 0, "chains drawn in this episode")                                               \
+  X(goal_x_m, float, 1, 0, "last waypoint that the metric Goals waits for, see rules/step.h")                 \
+  X(goal_y_m, float, 1, 0, "")                                                                                \
+  X(goal_z_m, float, 1, 0, "")                                                                                \
+  X(goal_open, uint8_t, 1, 0, "1 while the metric waits for it")                                              \
+  X(conditioning, float, 17, 0, "reward coefficients and dynamics multipliers; see simulator/conditioning.h") \
+  X(agent_class, uint8_t, 1, 0, "AgentClass")                                                                 \
+  X(status, uint8_t, 1, 3, "AgentStatus")                                                                     \
+  X(halt_reason, uint8_t, 1, 0, "Event bits that halted it")                                                  \
+  X(events, uint8_t, 1, 0, "Event bits of the last step")                                                     \
+  X(goals_reached, int32_t, 1, 0, "last waypoints passed within 2 m in this episode")                         \
+  X(waypoints_reached, int32_t, 1, 0, "waypoints of any kind that paid or passed in this episode")            \
+  X(distance_m, float, 1, 0, "sum of |speed| dt in this episode")                                             \
+  X(episode_events, uint8_t, 1, 0, "union of the episode's event bits")                                       \
   X(episode_return, float, 1, 0, "sum of rewards in this episode")
-
-/// Owner of the fields, on the host.
-struct AgentState {
-#define X(name, type, per_agent, first, comment) std::vector<type> name;
-  PICTURA_AGENT_FIELDS(X)
-#undef X
-
-  void resize(size_t num_agents);
-  /// Adds the bytes of every field, in the order of the list.
-  void hash(Hash64* hash_inout) const;
-};
 
 /// What rules read and write: pointers alone, on either device.
 struct AgentStateView {
@@ -82,6 +77,12 @@ struct AgentStateView {
 #undef X
 };
 
-AgentStateView view_of(AgentState* state);
+/// Gives every field of one agent its first value.
+PICTURA_HD inline void reset_fields(const AgentStateView& agents, int slot) {
+#define X(name, type, per_agent, first, comment) \
+  for (int i = 0; i < (per_agent); ++i) agents.name[slot * (per_agent) + i] = static_cast<type>(first);
+  PICTURA_AGENT_FIELDS(X)
+#undef X
+}
 
 }  // namespace pictura

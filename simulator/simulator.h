@@ -12,30 +12,29 @@
 #include "pictura/common/scene.h"
 #include "pictura/map/map_geometry.h"
 #include "pictura/map/road_map.h"
+#include "pictura/simulator/actions.h"
 #include "pictura/simulator/conditioning.h"
 #include "pictura/simulator/fields.h"
+#include "pictura/simulator/observation.h"
 
 namespace pictura {
 
-constexpr int kNumLongActions = 4;                 // jerk -15, -4, 0, 4 m/s3
-constexpr int kNumLatActions = 3;                  // jerk -4, 0, 4 m/s3, positive to the left
-constexpr int kNumActions = kNumLongActions * kNumLatActions;  // index = long * 3 + lat
-constexpr int kNumWaypoints = 3;
 constexpr int kMaxAgentsPerWorld = 4096;
+constexpr int kMaxSlots = 1 << 22;  // controlled agents of one simulator
 
 struct SimulatorConfig {
   uint64_t seed = 0;
-  int num_threads = 0;                             // host threads; 0: all
+  int num_threads = 0;  // host threads; 0: all
   float dt_s = 0.1f;
   int episode_steps = 1280;
-  float reset_inactive_fraction = 0.4f;            // a world resets when this part of its agents is inactive; > 1: never
+  float reset_inactive_fraction = 0.4f;  // a world resets when this part of its agents is inactive; > 1: never
   float pedestrian_fraction = 0.0f, cyclist_fraction = 0.0f;
-  int parked_cars = 0;                             // per episode and world
+  int parked_cars = 0;  // per episode and world
   bool walls = false;
   uint64_t wall_seed = 0;
-  bool fixed_lights = false;                       // evaluation: 10/3/2 s; else timings are drawn per episode
-  bool auxiliary_observations = true;              // false: the auxiliary slots hold zeros (the like-for-like baseline)
-  bool vector_observations = true;                 // false: entity sets are not computed (perspective training)
+  bool fixed_lights = false;           // evaluation: 10/3/2 s; else timings are drawn per episode
+  bool auxiliary_observations = true;  // false: the auxiliary slots hold zeros (the like-for-like baseline)
+  bool vector_observations = true;     // false: entity sets are not computed (perspective training)
   std::array<ConditioningRange, kNumConditioning> conditioning = default_conditioning();
 
   static std::array<ConditioningRange, kNumConditioning> default_conditioning();
@@ -45,58 +44,37 @@ struct SimulatorConfig {
 struct WorldSpec {
   int map = 0;
   int num_agents = 0;
-  uint32_t global_world = 0;                       // id across ranks, keys its random numbers
+  uint32_t global_world = 0;  // id across ranks, keys its random numbers
 };
 
-/// World sizes drawn from U{min_agents, max_agents} until they fill num_slots exactly (the last is cut to fit); maps are
-/// taken in turn. Throws UsageError unless 1 <= min <= max <= 4096 and num_slots >= 1.
+/// World sizes drawn from U{min_agents, max_agents} until they fill num_slots exactly (the last is cut to fit); maps
+/// are taken in turn. Throws UsageError unless 1 <= min <= max <= 4096 and num_slots >= 1.
 std::vector<WorldSpec> draw_worlds(uint64_t seed, int num_slots, int min_agents, int max_agents, int num_maps);
-
-// Sizes of the observation (paper, table of the policy architecture).
-constexpr int kEgoFeatures = 9;                    // 7 and two auxiliary slots
-constexpr int kMaxPartners = 16, kPartnerFeatures = 8;     // 7 and one auxiliary slot
-constexpr int kMaxLanes = 80, kLaneFeatures = 7;
-constexpr int kMaxBoundaries = 80, kBoundaryFeatures = 7;
-constexpr int kMaxControls = 10, kControlFeatures = 7;
-constexpr int kWaypointFeatures = 3;
-
-/// Observations of all slots; entity sets are padded with zeros up to their counts. docs/observation.md defines every
-/// slot, its unit and its scale.
-struct ObservationView {
-  Span<float> ego;                                 // [slots, kEgoFeatures]
-  Span<float> partners;                            // [slots, kMaxPartners, kPartnerFeatures]
-  Span<float> lanes;                               // [slots, kMaxLanes, kLaneFeatures]
-  Span<float> boundaries;                          // [slots, kMaxBoundaries, kBoundaryFeatures]
-  Span<float> controls;                            // [slots, kMaxControls, kControlFeatures]
-  Span<int32_t> set_counts;                        // [slots, 4] filled partners, lanes, boundaries, controls
-  Span<float> conditioning;                        // [slots, kNumConditioning] scaled to [-1, 1]
-  Span<float> waypoints;                           // [slots, kNumWaypoints, kWaypointFeatures] ego frame
-};
 
 /// What step() returns besides observations. Spans stay at one address for the life of the simulator.
 struct StepResult {
-  Span<const float> reward;                        // [slots]
-  Span<const uint8_t> terminated;                  // [slots] 1: an infraction ended the agent's episode in this step
-  Span<const uint8_t> truncated;                   // [slots] 1: the episode ended for another reason; bootstrap
-  Span<const uint8_t> valid;                       // [slots] 1: the agent was active when the step began: learn from it
+  Span<const float> reward;        // [slots]
+  Span<const uint8_t> terminated;  // [slots] 1: an infraction ended the agent's episode in this step
+  Span<const uint8_t> truncated;   // [slots] 1: the episode ended for another reason; bootstrap
+  Span<const uint8_t> valid;       // [slots] 1: the agent was active when the step began: learn from it
 };
 
 /// Totals since construction, over all worlds; counts are of controlled agents.
 struct SimulatorTotals {
-  int64_t agent_steps = 0;                         // active agents advanced by one step
-  int64_t slot_steps = 0;                          // slots times steps
-  int64_t episodes = 0;                            // worlds reset after their first episode
+  int64_t agent_steps = 0;  // active agents advanced by one step
+  int64_t slot_steps = 0;   // slots times steps
+  int64_t episodes = 0;     // worlds reset after their first episode
   int64_t goals_reached = 0, waypoints_reached = 0;
   int64_t collisions = 0, at_fault_collisions = 0, off_road = 0, red_light = 0, wall_contacts = 0;
   double distance_m = 0;
   double reward = 0;
-  int64_t finished_agent_episodes = 0;             // agents whose episode ended
-  double finished_return = 0;                      // sum of their returns
+  int64_t finished_agent_episodes = 0;  // agents whose episode ended
+  double finished_return = 0;           // sum of their returns
 };
 
 /// What became of the agents that were asked for, per world, in the current episode.
 struct SpawnReport {
-  int64_t asked = 0, spawned = 0, refused = 0;     // asked == spawned + refused
+  int64_t asked = 0, spawned = 0, refused = 0;  // asked == spawned + refused
 };
 
 class Simulator {

@@ -1,0 +1,49 @@
+#include "pictura/simulator/agent_state.h"
+
+#include <cstring>
+
+namespace pictura {
+
+AgentState::AgentState(size_t num_agents){
+#define X(name, type, per_agent, first, comment) name.assign(num_agents*(per_agent), static_cast<type>(first));
+    PICTURA_AGENT_FIELDS(X)
+#undef X
+}
+
+AgentStateView AgentState::view() {
+#define X(name, type, per_agent, first, comment) name.data(),
+  return {PICTURA_AGENT_FIELDS(X)};
+#undef X
+}
+
+void AgentState::add_to(Hash64* hash_inout) const {
+#define X(name, type, per_agent, first, comment) hash_inout->add(Span<const type>(name));
+    PICTURA_AGENT_FIELDS(X)
+#undef X
+}
+
+size_t AgentState::size_bytes() const {
+  size_t size = 0;
+#define X(name, type, per_agent, first, comment) size += name.size() * sizeof(type);
+  PICTURA_AGENT_FIELDS(X)
+#undef X
+  return size;
+}
+
+void AgentState::copy_to(uint8_t* bytes_out) const {
+#define X(name, type, per_agent, first, comment)                   \
+  std::memcpy(bytes_out, name.data(), name.size() * sizeof(type)); \
+  bytes_out += name.size() * sizeof(type);
+  PICTURA_AGENT_FIELDS(X)
+#undef X
+}
+
+void AgentState::assign_from(const uint8_t* bytes) {
+#define X(name, type, per_agent, first, comment)               \
+  std::memcpy(name.data(), bytes, name.size() * sizeof(type)); \
+  bytes += name.size() * sizeof(type);
+  PICTURA_AGENT_FIELDS(X)
+#undef X
+}
+
+}  // namespace pictura

@@ -1,0 +1,28 @@
+// Owner of the agents' fields on the host.
+#pragma once
+
+#include <vector>
+
+#include "pictura/common/hash.h"
+#include "pictura/simulator/fields.h"
+
+namespace pictura {
+
+struct AgentState {
+#define X(name, type, per_agent, first, comment) std::vector<type> name;
+  PICTURA_AGENT_FIELDS(X)
+#undef X
+
+  /// Gives every field of num_agents agents its first value.
+  explicit AgentState(size_t num_agents = 0);
+  AgentStateView view();
+  /// Adds the bytes of every field, in the order of the list.
+  void add_to(Hash64* hash_inout) const;
+  size_t size_bytes() const;
+  /// Writes the bytes of every field, in the order of the list: size_bytes() of them.
+  void copy_to(uint8_t* bytes_out) const;
+  /// Reads back what copy_to wrote for as many agents; `bytes` holds at least size_bytes() bytes.
+  void assign_from(const uint8_t* bytes);
+};
+
+}  // namespace pictura

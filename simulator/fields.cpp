@@ -1,1 +1,0 @@
-#include "pictura/simulator/fields.h"

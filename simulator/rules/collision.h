@@ -1,0 +1,124 @@
+// Contact of oriented boxes: with each other, over the whole step so that nothing tunnels, and with barriers. Who is at
+// fault follows the paper (appendix, metric definitions).
+#pragma once
+
+#include "pictura/common/math.h"
+#include "pictura/common/scene.h"
+#include "pictura/simulator/rules/map_view.h"
+
+namespace pictura {
+
+/// A rectangle on the ground.
+struct OrientedBox {
+  Vec2 center_m;
+  Vec2 forward;  // unit vector
+  float half_length_m = 0, half_width_m = 0;
+};
+
+PICTURA_HD inline OrientedBox footprint(const AgentBox& box) {
+  return {box.center_m.xy(), {box.cos_heading, box.sin_heading}, 0.5f * box.length_m, 0.5f * box.width_m};
+}
+
+PICTURA_HD inline float radius(const AgentBox& box) { return 0.5f * sqrtf(square(box.length_m) + square(box.width_m)); }
+
+/// Half of the extent of `box` along the unit vector `axis`.
+PICTURA_HD inline float half_extent(const OrientedBox& box, Vec2 axis) {
+  return box.half_length_m * fabsf(dot(box.forward, axis)) + box.half_width_m * fabsf(cross(box.forward, axis));
+}
+
+/// Separating axes of two rectangles: touching counts as overlapping.
+PICTURA_HD inline bool overlap(const OrientedBox& a, const OrientedBox& b) {
+  const Vec2 between = b.center_m - a.center_m;
+  const Vec2 axes[4] = {a.forward, left_normal(a.forward), b.forward, left_normal(b.forward)};
+  for (int i = 0; i < 4; ++i) {
+    if (fabsf(dot(between, axes[i])) > half_extent(a, axes[i]) + half_extent(b, axes[i])) return false;
+  }
+  return true;
+}
+
+PICTURA_HD inline bool same_level(const AgentBox& a, const AgentBox& b) {
+  return a.center_m.z < b.center_m.z + b.height_m && b.center_m.z < a.center_m.z + a.height_m;
+}
+
+/// The box on its way from `from` (fraction 0) to `to` (fraction 1). Headings differ by little within a step.
+PICTURA_HD inline OrientedBox between(const AgentBox& from, const AgentBox& to, float fraction) {
+  OrientedBox box = footprint(to);
+  const Vec2 start{from.cos_heading, from.sin_heading};
+  box.center_m = from.center_m.xy() + (to.center_m - from.center_m).xy() * fraction;
+  const Vec2 forward = start + (box.forward - start) * fraction;
+  const float norm = length(forward);
+  if (norm > 0.0f) box.forward = forward * (1.0f / norm);
+  return box;
+}
+
+/// Whether two boxes that move during a step touch at its end or on the way. The way is cut so finely that the boxes
+/// approach each other by less than the narrower one's width between two looks.
+PICTURA_HD inline bool collide(const AgentBox& a_from, const AgentBox& a_to, const AgentBox& b_from,
+                               const AgentBox& b_to) {
+  const Vec2 a_path = (a_to.center_m - a_from.center_m).xy();
+  const Vec2 b_path = (b_to.center_m - b_from.center_m).xy();
+  const float approach = length(a_path - b_path);
+  const Vec2 apart = (b_to.center_m - a_to.center_m).xy();
+  if (dot(apart, apart) > square(radius(a_to) + radius(b_to) + approach) || !same_level(a_to, b_to)) return false;
+  if (overlap(footprint(a_to), footprint(b_to))) return true;
+  constexpr int kMaxLooks = 16;
+  const int looks = clamp(static_cast<int>(approach / (0.5f * min_of(a_to.width_m, b_to.width_m))), 0, kMaxLooks);
+  for (int i = 1; i <= looks; ++i) {
+    const float fraction = static_cast<float>(i) / static_cast<float>(looks + 1);
+    if (overlap(between(a_from, a_to, fraction), between(b_from, b_to, fraction))) return true;
+  }
+  return false;
+}
+
+/// Paper: at fault unless essentially stopped or struck from behind. Struck from behind: not reversing, and the other's
+/// centre lies within 45 degrees of straight back, seen from the middle of the own rear bumper.
+PICTURA_HD inline bool at_fault(const AgentBox& own, float own_speed_mps, const AgentBox& other) {
+  constexpr float kStopped_mps = 0.2f;
+  if (fabsf(own_speed_mps) < kStopped_mps) return false;
+  if (own_speed_mps < 0.0f) return true;
+  const Vec2 forward{own.cos_heading, own.sin_heading};
+  const Vec2 rear = own.center_m.xy() - forward * (0.5f * own.length_m);
+  const Vec2 to_other = other.center_m.xy() - rear;
+  return dot(to_other, forward) > -fabsf(cross(forward, to_other));
+}
+
+/// Whether the segment a-b touches the box: it is cut to the box's slab along each axis of the box.
+PICTURA_HD inline bool touches(const OrientedBox& box, Vec2 a_m, Vec2 b_m) {
+  const Vec2 a = a_m - box.center_m;
+  const Vec2 step = b_m - a_m;
+  float enter = 0.0f, leave = 1.0f;
+  const Vec2 axes[2] = {box.forward, left_normal(box.forward)};
+  const float half[2] = {box.half_length_m, box.half_width_m};
+  for (int i = 0; i < 2; ++i) {
+    const float start = dot(a, axes[i]);
+    const float slope = dot(step, axes[i]);
+    if (slope == 0.0f) {
+      if (fabsf(start) > half[i]) return false;
+      continue;
+    }
+    const float t0 = (-half[i] - start) / slope;
+    const float t1 = (half[i] - start) / slope;
+    enter = max_of(enter, min_of(t0, t1));
+    leave = min_of(leave, max_of(t0, t1));
+    if (enter > leave) return false;
+  }
+  return true;
+}
+
+/// Whether the box touches any barrier on its level. Boxes are longer than a step's way, so that consecutive ones
+/// overlap and no barrier is passed unnoticed.
+PICTURA_HD inline bool touches_any(const OrientedBox& box, float z_m, Span<const Barrier> barriers,
+                                   const GridView& cells) {
+  const float reach = box.half_length_m + box.half_width_m;
+  const Span<const int32_t> items = items_at(cells, box.center_m);
+  for (size_t i = 0; i < items.size(); ++i) {
+    const Barrier& barrier = barriers[static_cast<size_t>(items[i])];
+    const Vec2 to_middle = (barrier.a_m + barrier.b_m) * 0.5f - box.center_m;
+    const Vec2 half = (barrier.b_m - barrier.a_m) * 0.5f;
+    if (fabsf(to_middle.x) > fabsf(half.x) + reach || fabsf(to_middle.y) > fabsf(half.y) + reach) continue;
+    if (fabsf(barrier.z_m - z_m) < kLevel_m && touches(box, barrier.a_m, barrier.b_m)) return true;
+  }
+  return false;
+}
+
+}  // namespace pictura

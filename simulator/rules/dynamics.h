@@ -1,0 +1,82 @@
+// The jerk-controlled kinematic bicycle: actions are longitudinal and lateral jerks, the state moves along an arc about
+// the rear axle (Gigaflow's dynamics; formulae after the public reference of the paper's vectorised core).
+#pragma once
+
+#include "pictura/common/math.h"
+#include "pictura/simulator/actions.h"
+#include "pictura/simulator/rules/limits.h"
+
+namespace pictura {
+
+struct Motion {
+  float x_m = 0, y_m = 0, heading_rad = 0;
+  float speed_mps = 0;
+  float accel_long_mps2 = 0, accel_lat_mps2 = 0;
+  float steer_rad = 0;
+  float jerk_long_mps3 = 0, jerk_lat_mps3 = 0;  // realised in the step
+};
+
+struct Controls {
+  float jerk_long_mps3 = 0, jerk_lat_mps3 = 0;  // lateral: positive to the left
+};
+
+/// Of an action index, long * 3 + lat (paper: 4 x 3 bins).
+PICTURA_HD constexpr Controls controls_of_action(int action) {
+  const float jerk_long[kNumLongActions] = {-15.0f, -4.0f, 0.0f, 4.0f};
+  const float jerk_lat[kNumLatActions] = {-4.0f, 0.0f, 4.0f};
+  return {jerk_long[action / kNumLatActions], jerk_lat[action % kNumLatActions]};
+}
+
+/// Multipliers of the conditioning, and the body.
+struct DynamicsParameters {
+  float throttle = 1, steer = 1, acceleration = 1;
+  float wheelbase_m = 2.7f;
+};
+
+/// `value` unless it left `before`'s sign, which stops at zero first.
+PICTURA_HD inline float stop_at_zero(float before, float value, float low, float high) {
+  return before * value < 0.0f ? 0.0f : clamp(value, low, high);
+}
+
+/// One step of dt_s. Accelerations, speed and steering respect `limits`; the lateral acceleration is written back from
+/// the steering angle that was reached.
+PICTURA_HD inline Motion move(const Motion& from, Controls controls, const DynamicsParameters& parameters,
+                              const ClassLimits& limits, float dt_s) {
+  constexpr float kMinTurningSpeed_mps = 1.0f;
+  constexpr float kStraight = 1e-5f;
+  Motion to = from;
+  to.accel_long_mps2 =
+      stop_at_zero(from.accel_long_mps2, from.accel_long_mps2 + parameters.throttle * controls.jerk_long_mps3 * dt_s,
+                   limits.min_accel_mps2, limits.max_accel_mps2 * parameters.acceleration);
+  const float wanted_lat =
+      stop_at_zero(from.accel_lat_mps2, from.accel_lat_mps2 + parameters.steer * controls.jerk_lat_mps3 * dt_s,
+                   -limits.max_lat_accel_mps2, limits.max_lat_accel_mps2);
+  to.speed_mps =
+      stop_at_zero(from.speed_mps, from.speed_mps + 0.5f * (to.accel_long_mps2 + from.accel_long_mps2) * dt_s,
+                   limits.min_speed_mps, limits.max_speed_mps);
+
+  const float turning_speed = max_of(fabsf(to.speed_mps), kMinTurningSpeed_mps);
+  const float wanted_steer = atan_of(wanted_lat / square(turning_speed) * parameters.wheelbase_m);
+  const float max_change = limits.max_steer_rate_radps * dt_s;
+  to.steer_rad = clamp(from.steer_rad + clamp(wanted_steer - from.steer_rad, -max_change, max_change),
+                       -limits.max_steer_rad, limits.max_steer_rad);
+  const float curvature = tan_of(to.steer_rad) / parameters.wheelbase_m;
+  to.accel_lat_mps2 = square(to.speed_mps) * curvature;
+
+  const float distance = 0.5f * (to.speed_mps + from.speed_mps) * dt_s;
+  const float turn = distance * curvature;
+  Vec2 local{distance, 0.0f};
+  if (fabsf(curvature) >= kStraight && fabsf(turn) >= kStraight) {
+    const SinCos arc = sincos_of(turn);
+    local = {arc.sin / curvature, (1.0f - arc.cos) / curvature};
+  }
+  const SinCos heading = sincos_of(from.heading_rad);
+  to.x_m = from.x_m + (local.x * heading.cos - local.y * heading.sin);
+  to.y_m = from.y_m + (local.x * heading.sin + local.y * heading.cos);
+  to.heading_rad = wrap_angle(from.heading_rad + turn);
+  to.jerk_long_mps3 = (to.accel_long_mps2 - from.accel_long_mps2) / dt_s;
+  to.jerk_lat_mps3 = (to.accel_lat_mps2 - from.accel_lat_mps2) / dt_s;
+  return to;
+}
+
+}  // namespace pictura

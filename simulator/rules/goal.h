@@ -1,0 +1,72 @@
+// Goal chains: three waypoints along the lane network, 20 to 60 m apart along the route, lane changes included; and
+// when a waypoint is passed. The route goes only where it never ends.
+#pragma once
+
+#include "pictura/common/rng.h"
+#include "pictura/simulator/rules/road.h"
+
+namespace pictura {
+
+constexpr float kMinWaypointGap_m = 20.0f, kMaxWaypointGap_m = 60.0f;
+constexpr float kLaneChangeChance = 0.25f;
+/// Waypoints count on their level only.
+constexpr float kWaypointLevel_m = 4.0f;
+/// The metric Goals counts last waypoints passed within this distance (paper, metric definitions).
+constexpr float kMetricGoalRadius_m = 2.0f;
+
+struct RoutePoint {
+  int32_t lane = -1;
+  float s_m = 0;
+};
+
+/// The neighbour of a point, `side` < 0 left, else right, at the same fraction of its lane; the point itself where
+/// there is none.
+PICTURA_HD inline RoutePoint beside(const MapView& map, RoutePoint at, int side) {
+  const MapLane& lane = map.lanes[static_cast<size_t>(at.lane)];
+  const int32_t neighbor = side < 0 ? lane.left : lane.right;
+  if (neighbor < 0) return at;
+  return {neighbor, at.s_m * (map.lanes[static_cast<size_t>(neighbor)].length_m / lane.length_m)};
+}
+
+/// Walks distance_m along lanes, choosing among successors with equal chance. Where a lane has no successor from which
+/// the route goes on, it changes to a neighbour that has one.
+PICTURA_HD inline RoutePoint walk(const MapView& map, RoutePoint at, float distance_m, RandomStream* random_inout) {
+  constexpr int kMaxLanesWalked = 64;  // lanes shorter than a metre in a row: a bound, not a rule
+  for (int i = 0; i < kMaxLanesWalked; ++i) {
+    const MapLane* lane = &map.lanes[static_cast<size_t>(at.lane)];
+    const float left_m = lane->length_m - at.s_m;
+    if (distance_m <= left_m) return {at.lane, at.s_m + distance_m};
+    for (int side = -1; side <= 1 && lane->num_successors == 0; side += 2) {
+      const RoutePoint changed = beside(map, at, side);
+      if (map.lanes[static_cast<size_t>(changed.lane)].num_successors == 0) continue;
+      at = changed;
+      lane = &map.lanes[static_cast<size_t>(at.lane)];
+    }
+    if (lane->num_successors == 0) break;
+    distance_m -= left_m;
+    const int choice = random_inout->below(lane->num_successors);
+    at = {map.successors[static_cast<size_t>(lane->first_successor + choice)], 0.0f};
+  }
+  return {at.lane, map.lanes[static_cast<size_t>(at.lane)].length_m};
+}
+
+/// The next waypoint of a route: perhaps a lane change, then the gap.
+PICTURA_HD inline RoutePoint next_waypoint(const MapView& map, RoutePoint at, RandomStream* random_inout) {
+  const float gap_m = random_inout->uniform(kMinWaypointGap_m, kMaxWaypointGap_m);
+  const float change = random_inout->uniform();
+  if (change < kLaneChangeChance) at = beside(map, at, change < 0.5f * kLaneChangeChance ? -1 : 1);
+  return walk(map, at, gap_m, random_inout);
+}
+
+/// Whether the way from `from` to `to` comes within radius_m of `goal`, on its level.
+PICTURA_HD inline bool passes(Vec3 from, Vec3 to, Vec3 goal, float radius_m) {
+  if (fabsf(to.z - goal.z) >= kWaypointLevel_m) return false;
+  const Vec2 way = to.xy() - from.xy();
+  const Vec2 to_goal = goal.xy() - from.xy();
+  const float way2 = dot(way, way);
+  const float t = way2 > 0.0f ? clamp(dot(to_goal, way) / way2, 0.0f, 1.0f) : 0.0f;
+  const Vec2 apart = to_goal - way * t;
+  return dot(apart, apart) < square(radius_m);
+}
+
+}  // namespace pictura

@@ -1,0 +1,37 @@
+// What each class of agent can do and how big it is; docs/simulator.md prints this table. Vehicle limits are those of
+// the jerk model (reference implementation of the paper's dynamics); those of cyclists and pedestrians are ours.
+#pragma once
+
+#include "pictura/common/color.h"
+#include "pictura/common/hd.h"
+
+namespace pictura {
+
+struct ClassLimits {
+  float min_speed_mps, max_speed_mps;
+  float min_accel_mps2, max_accel_mps2;  // longitudinal; the maximum is scaled by the acceleration multiplier
+  float max_lat_accel_mps2;
+  float max_steer_rad, max_steer_rate_radps;
+  float min_length_m, max_length_m, min_width_m, max_width_m, height_m;
+};
+
+PICTURA_HD constexpr ClassLimits class_limits(AgentClass agent_class) {
+  switch (agent_class) {
+    case AgentClass::cyclist: return {-1.0f, 8.0f, -4.0f, 1.5f, 3.0f, 0.7f, 1.2f, 1.6f, 1.9f, 0.5f, 0.7f, 1.7f};
+    case AgentClass::pedestrian: return {-1.0f, 2.5f, -4.0f, 2.0f, 2.0f, 1.0f, 4.0f, 0.4f, 0.6f, 0.4f, 0.7f, 1.7f};
+    default: return {-2.0f, 20.0f, -5.0f, 2.5f, 4.0f, 0.55f, 0.6f, 3.5f, 5.5f, 1.6f, 2.2f, 1.5f};
+  }
+}
+
+/// No class is faster.
+constexpr float kMaxSpeed_mps = 20.0f;
+
+constexpr float kWheelbasePerLength = 0.6f;
+
+/// From the reference point to the box's centre: the rear axle lies half a wheelbase behind it, except that pedestrians
+/// are referred to by their centre.
+PICTURA_HD constexpr float reference_to_center(AgentClass agent_class, float length_m) {
+  return agent_class == AgentClass::pedestrian ? 0.0f : 0.5f * kWheelbasePerLength * length_m;
+}
+
+}  // namespace pictura

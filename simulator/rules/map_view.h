@@ -1,0 +1,87 @@
+// What rules read of a map: flat arrays and cell lists that both devices can hold. simulator/world_map.h makes them
+// from a RoadMap. Cell lists come in two kinds: `*_cells` list, for a point's one cell, everything within reach of any
+// point in it; `near_*` list what is worth observing from it, nearest to the cell's centre first.
+#pragma once
+
+#include "pictura/common/grid.h"
+#include "pictura/common/math.h"
+#include "pictura/common/span.h"
+
+namespace pictura {
+
+/// How far from a lane's centre line an agent still counts as being on that lane.
+constexpr float kLaneReach_m = 5.0f;
+/// Two places whose heights differ by less are on the same level.
+constexpr float kLevel_m = 2.0f;
+/// No box has a longer half-diagonal.
+constexpr float kMaxBoxRadius_m = 3.2f;
+/// Within which a stop line can be violated.
+constexpr float kStopLineReach_m = 10.0f;
+
+/// A straight piece of a drivable lane's centre line, in the direction of travel.
+struct LaneSegment {
+  Vec3 a_m;
+  Vec2 direction;  // unit vector
+  float length_m = 0;
+  float slope = 0;        // rise per metre
+  float heading_rad = 0;  // of the lane at a
+  float turn_rad = 0;     // heading at the end less heading at a
+  float half_width_m = 0;
+  float s_m = 0;     // arc length of a
+  int32_t lane = 0;  // index into MapView::lanes
+};
+
+struct MapLane {
+  int32_t first_segment = 0, num_segments = 0;
+  int32_t first_successor = 0, num_successors = 0;  // of MapView::successors: lanes from which a route goes on for ever
+  int32_t left = -1, right = -1;                    // neighbours of that kind
+  float length_m = 0;
+  float speed_limit_mps = 0;
+  int32_t light = -1;     // the stop line that holds it
+  uint8_t is_driven = 0;  // agents associate with it; else it is only part of the drivable surface (parking)
+};
+
+/// A piece of the drivable surface's outline, or the foot of a wall.
+struct Barrier {
+  Vec2 a_m, b_m;
+  float z_m = 0;  // at its middle
+};
+
+struct StopLine {
+  Vec3 left_m, right_m;
+  Vec3 middle_m;
+  Vec2 direction;  // of the traffic that it stops
+  float half_length_m = 0;
+  int32_t junction = -1, phase = 0, num_phases = 1;
+};
+
+/// A lane or boundary as the policy sees it: at most kMaxPiece_m long.
+struct ObservedPiece {
+  Vec3 middle_m;
+  float half_length_m = 0;
+  Vec2 direction;
+  float width_m = 0;
+};
+
+struct MapView {
+  Span<const LaneSegment> segments;
+  Span<const MapLane> lanes;
+  Span<const int32_t> successors;
+  Span<const Barrier> edges, walls;
+  Span<const StopLine> stop_lines;
+  Span<const int32_t> spawn_lanes;
+  Span<const float> spawn_end_m;  // [spawn_lanes] running sum of their lengths
+  Span<const ObservedPiece> lane_pieces, boundary_pieces;
+  GridView segment_cells, edge_cells, wall_cells, stop_line_cells;
+  GridView near_lane_pieces, near_boundary_pieces, near_stop_lines;
+  Vec2 low_m, high_m;  // of the drivable surface
+};
+
+/// The list of the cell that holds p; points outside belong to the nearest cell.
+PICTURA_HD inline Span<const int32_t> items_at(const GridView& cells, Vec2 p) {
+  const size_t cell = static_cast<size_t>(cells.cell_y(p.y) * cells.num_x + cells.cell_x(p.x));
+  const int32_t begin = cells.begin[cell];
+  return cells.items.subspan(static_cast<size_t>(begin), static_cast<size_t>(cells.begin[cell + 1] - begin));
+}
+
+}  // namespace pictura

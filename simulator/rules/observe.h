@@ -1,0 +1,255 @@
+// What an agent observes, in its own frame (x forward, y left, at the reference point) and scaled to about [-1, 1].
+// docs/observation.md is the table of slots, units and scales; the constants here are its source.
+#pragma once
+
+#include "pictura/simulator/observation.h"
+#include "pictura/simulator/rules/step.h"
+
+namespace pictura {
+
+// What a value of 1 means.
+constexpr float kScalePosition_m = 120.0f, kScaleHeight_m = 10.0f, kScaleSpeed_mps = 20.0f;
+constexpr float kScaleLength_m = 6.0f, kScaleWidth_m = 3.0f, kScaleHalfPiece_m = 5.0f, kScaleLaneWidth_m = 5.0f;
+constexpr float kScaleSteer_rad = 0.55f, kScaleAccelLong_mps2 = 5.0f, kScaleAccelLat_mps2 = 4.0f;
+
+// What is in sight.
+constexpr float kPartnerRange_m = 100.0f, kControlRange_m = 100.0f;
+constexpr float kRoadAhead_m = 120.0f, kRoadBehind_m = 20.0f, kRoadAside_m = 30.0f;
+
+/// The ego frame.
+struct EgoFrame {
+  Vec3 origin_m;
+  Vec2 forward;
+
+  PICTURA_HD Vec2 turn(Vec2 v) const { return {dot(v, forward), cross(forward, v)}; }
+  PICTURA_HD Vec3 to_local(Vec3 p) const {
+    const Vec2 xy = turn(p.xy() - origin_m.xy());
+    return {xy.x, xy.y, p.z - origin_m.z};
+  }
+};
+
+PICTURA_HD inline EgoFrame ego_frame(const AgentStateView& agents, int slot) {
+  return {{agents.x_m[slot], agents.y_m[slot], agents.z_m[slot]}, {agents.cos_heading[slot], agents.sin_heading[slot]}};
+}
+
+PICTURA_HD inline void observe_ego(const WorldView& world, int slot, float* out) {
+  const AgentStateView& agents = world.agents;
+  out[0] = agents.speed_mps[slot] / kScaleSpeed_mps;
+  out[1] = agents.length_m[slot] / kScaleLength_m;
+  out[2] = agents.width_m[slot] / kScaleWidth_m;
+  out[3] = agents.steer_rad[slot] / kScaleSteer_rad;
+  out[4] = agents.accel_long_mps2[slot] / kScaleAccelLong_mps2;
+  out[5] = agents.accel_lat_mps2[slot] / kScaleAccelLat_mps2;
+  out[6] = agents.speed_limit_mps[slot] / kScaleSpeed_mps;
+  const bool auxiliary = world.options.auxiliary_observations;
+  out[7] = auxiliary ? agents.lane_offset_m[slot] / kNoLaneOffset_m : 0.0f;
+  out[8] = auxiliary && agents.lane[slot] >= 0 ? cos_of(agents.lane_angle_rad[slot]) : 0.0f;
+}
+
+/// Scaled by the paper's training ranges, whatever the run's own are, so that a policy reads the same number for the
+/// same coefficient everywhere; fixed coefficients read 0.
+PICTURA_HD inline void observe_conditioning(const WorldView& world, int slot, float* out) {
+  for (int i = 0; i < kNumConditioning; ++i) {
+    const ConditioningRange range = world.options.conditioning_scale[i];
+    const float value = world.agents.conditioning[slot * kNumConditioning + i];
+    out[i] = range.high > range.low ? clamp(2.0f * (value - range.low) / (range.high - range.low) - 1.0f, -1.0f, 1.0f)
+                                    : 0.0f;
+  }
+}
+
+/// The active waypoint first, then those after it; where the chain has no more, its last one again.
+PICTURA_HD inline void observe_waypoints(const WorldView& world, int slot, const EgoFrame& frame, float* out) {
+  for (int i = 0; i < kNumWaypoints; ++i) {
+    const int index = min_of(world.agents.next_waypoint[slot] + i, kNumWaypoints - 1);
+    const Vec3 local = frame.to_local(waypoint_of(world.agents, slot, index));
+    out[kWaypointFeatures * i] = local.x / kScalePosition_m;
+    out[kWaypointFeatures * i + 1] = local.y / kScalePosition_m;
+    out[kWaypointFeatures * i + 2] = local.z / kScaleHeight_m;
+  }
+}
+
+/// The nearest things seen so far, in ascending order of distance, then index.
+template <int capacity>
+struct Nearest {
+  float distance2[capacity];
+  int32_t item[capacity];
+  int count = 0;
+
+  PICTURA_HD float worst() const { return count < capacity ? 3e38f : distance2[capacity - 1]; }
+  PICTURA_HD void insert(float d2, int32_t index) {
+    if (count == capacity && !before(d2, index, capacity - 1)) return;
+    int at = count < capacity ? count++ : capacity - 1;
+    for (; at > 0 && before(d2, index, at - 1); --at) {
+      distance2[at] = distance2[at - 1];
+      item[at] = item[at - 1];
+    }
+    distance2[at] = d2;
+    item[at] = index;
+  }
+  PICTURA_HD bool before(float d2, int32_t index, int at) const {
+    return d2 < distance2[at] || (d2 == distance2[at] && index < item[at]);
+  }
+};
+
+/// Finds the partners of `agent` by distance from its reference point to their box centres: the near cells first, and
+/// the far ones only when the near ones cannot settle it.
+PICTURA_HD inline Nearest<kMaxPartners> nearest_partners(const WorldView& world, int agent, Vec2 origin) {
+  const GridView& cells = world.box_cells;
+  Nearest<kMaxPartners> nearest;
+  const float reaches[2] = {cells.cell_m, kPartnerRange_m};
+  for (int pass = 0; pass < 2; ++pass) {
+    const float reach = reaches[pass];
+    nearest.count = 0;
+    const int x0 = cells.cell_x(origin.x - reach), x1 = cells.cell_x(origin.x + reach);
+    const int y0 = cells.cell_y(origin.y - reach), y1 = cells.cell_y(origin.y + reach);
+    for (int y = y0; y <= y1; ++y) {
+      const int32_t begin = cells.begin[static_cast<size_t>(y * cells.num_x + x0)];
+      const int32_t end = cells.begin[static_cast<size_t>(y * cells.num_x + x1 + 1)];
+      for (int32_t i = begin; i < end; ++i) {
+        const int32_t other = cells.items[static_cast<size_t>(i)];
+        if (other == agent) continue;
+        const Vec2 apart = world.boxes[other].center_m.xy() - origin;
+        const float d2 = dot(apart, apart);
+        if (d2 < square(kPartnerRange_m)) nearest.insert(d2, other);
+      }
+    }
+    if (nearest.count == kMaxPartners && nearest.worst() <= square(reach)) break;
+  }
+  return nearest;
+}
+
+PICTURA_HD inline int observe_partners(const WorldView& world, int agent, const EgoFrame& frame, float* out) {
+  const Nearest<kMaxPartners> nearest = nearest_partners(world, agent, frame.origin_m.xy());
+  for (int i = 0; i < nearest.count; ++i) {
+    const int other = nearest.item[i];
+    const AgentBox& box = world.boxes[other];
+    const Vec3 local = frame.to_local(box.center_m);
+    const Vec2 heading = frame.turn({box.cos_heading, box.sin_heading});
+    const bool moves = world.options.auxiliary_observations && other < world.num_agents;
+    out[0] = local.x / kScalePosition_m;
+    out[1] = local.y / kScalePosition_m;
+    out[2] = local.z / kScaleHeight_m;
+    out[3] = box.length_m / kScaleLength_m;
+    out[4] = box.width_m / kScaleWidth_m;
+    out[5] = heading.x;
+    out[6] = heading.y;
+    out[7] = moves ? world.agents.speed_mps[world.first_slot + other] / kScaleSpeed_mps : 0.0f;
+    out += kPartnerFeatures;
+  }
+  return nearest.count;
+}
+
+/// Lanes or boundaries: of the pieces listed for the ego's cell, the first `capacity` whose middles are in sight.
+PICTURA_HD inline int observe_pieces(Span<const ObservedPiece> pieces, const GridView& near, const EgoFrame& frame,
+                                     int capacity, float* out) {
+  constexpr float kPerPosition = 1.0f / kScalePosition_m, kPerHeight = 1.0f / kScaleHeight_m;
+  const Span<const int32_t> items = items_at(near, frame.origin_m.xy());
+  int count = 0;
+  for (size_t i = 0; i < items.size() && count < capacity; ++i) {
+    const ObservedPiece& piece = pieces[static_cast<size_t>(items[i])];
+    const Vec3 local = frame.to_local(piece.middle_m);
+    if (local.x > kRoadAhead_m || local.x < -kRoadBehind_m || fabsf(local.y) > kRoadAside_m) continue;
+    const Vec2 direction = frame.turn(piece.direction);
+    out[0] = local.x * kPerPosition;
+    out[1] = local.y * kPerPosition;
+    out[2] = local.z * kPerHeight;
+    out[3] = piece.half_length_m * (1.0f / kScaleHalfPiece_m);
+    out[4] = direction.x;
+    out[5] = direction.y;
+    out[6] = piece.width_m * (1.0f / kScaleLaneWidth_m);
+    out += kLaneFeatures;
+    ++count;
+  }
+  return count;
+}
+static_assert(kLaneFeatures == kBoundaryFeatures);
+
+PICTURA_HD constexpr float light_code(LightState state) {
+  switch (state) {
+    case LightState::red: return 1.0f;
+    case LightState::yellow: return 0.5f;
+    case LightState::green: return -1.0f;
+    default: return 0.0f;
+  }
+}
+
+/// The nearest stop lines: left and right end, height, state, and whether it holds the ego's lane.
+PICTURA_HD inline int observe_controls(const WorldView& world, int slot, const EgoFrame& frame, float* out) {
+  const Span<const int32_t> items = items_at(world.map.near_stop_lines, frame.origin_m.xy());
+  Nearest<kMaxControls> nearest;
+  for (size_t i = 0; i < items.size(); ++i) {
+    const Vec2 apart = world.map.stop_lines[static_cast<size_t>(items[i])].middle_m.xy() - frame.origin_m.xy();
+    const float d2 = dot(apart, apart);
+    if (d2 < square(kControlRange_m)) nearest.insert(d2, items[i]);
+  }
+  const int32_t lane = world.agents.lane[slot];
+  const int32_t own_light = lane < 0 ? -1 : world.map.lanes[static_cast<size_t>(lane)].light;
+  for (int i = 0; i < nearest.count; ++i) {
+    const int32_t light = nearest.item[i];
+    const StopLine& line = world.map.stop_lines[static_cast<size_t>(light)];
+    const Vec3 left = frame.to_local(line.left_m);
+    const Vec3 right = frame.to_local(line.right_m);
+    out[0] = left.x / kScalePosition_m;
+    out[1] = left.y / kScalePosition_m;
+    out[2] = right.x / kScalePosition_m;
+    out[3] = right.y / kScalePosition_m;
+    out[4] = 0.5f * (left.z + right.z) / kScaleHeight_m;
+    out[5] = light_code(world.lights[light]);
+    out[6] = light == own_light ? 1.0f : 0.0f;
+    out += kControlFeatures;
+  }
+  return nearest.count;
+}
+
+/// Zeros a set's rows from `count` to what the last observation of the slot filled.
+PICTURA_HD inline void pad_set(float* out, int features, int count, int32_t* filled_inout) {
+  for (int i = count * features; i < *filled_inout * features; ++i) out[i] = 0.0f;
+  *filled_inout = count;
+}
+
+/// Whether anybody learns from or acts on the agent's observation: it drives, or this is its last one.
+PICTURA_HD inline bool observes(const WorldView& world, int agent) {
+  return is_active(world, agent) || (world.agents.events[world.first_slot + agent] & kInfractions) != 0;
+}
+
+/// Writes the whole observation of one agent: all zeros for the absent and for those that halted in an earlier step.
+/// Sets are written if `entity_sets`.
+PICTURA_HD inline void observe(const WorldView& world, int agent, bool entity_sets, const ObservationView& out) {
+  const size_t slot = static_cast<size_t>(world.first_slot + agent);
+  const int slot_index = world.first_slot + agent;
+  const bool blind = !observes(world, agent);
+  float* ego = out.ego.data() + slot * kEgoFeatures;
+  float* conditioning = out.conditioning.data() + slot * kNumConditioning;
+  float* waypoints = out.waypoints.data() + slot * kNumWaypoints * kWaypointFeatures;
+  const EgoFrame frame = ego_frame(world.agents, slot_index);
+  if (blind) {
+    for (int i = 0; i < kEgoFeatures; ++i) ego[i] = 0.0f;
+    for (int i = 0; i < kNumConditioning; ++i) conditioning[i] = 0.0f;
+    for (int i = 0; i < kNumWaypoints * kWaypointFeatures; ++i) waypoints[i] = 0.0f;
+  } else {
+    observe_ego(world, slot_index, ego);
+    observe_conditioning(world, slot_index, conditioning);
+    observe_waypoints(world, slot_index, frame, waypoints);
+  }
+  if (!entity_sets) return;
+
+  float* partners = out.partners.data() + slot * kMaxPartners * kPartnerFeatures;
+  float* lanes = out.lanes.data() + slot * kMaxLanes * kLaneFeatures;
+  float* boundaries = out.boundaries.data() + slot * kMaxBoundaries * kBoundaryFeatures;
+  float* controls = out.controls.data() + slot * kMaxControls * kControlFeatures;
+  int counts[4] = {};
+  if (!blind) {
+    counts[0] = observe_partners(world, agent, frame, partners);
+    counts[1] = observe_pieces(world.map.lane_pieces, world.map.near_lane_pieces, frame, kMaxLanes, lanes);
+    counts[2] =
+        observe_pieces(world.map.boundary_pieces, world.map.near_boundary_pieces, frame, kMaxBoundaries, boundaries);
+    counts[3] = observe_controls(world, slot_index, frame, controls);
+  }
+  int32_t* filled = out.set_counts.data() + slot * 4;
+  pad_set(partners, kPartnerFeatures, counts[0], filled);
+  pad_set(lanes, kLaneFeatures, counts[1], filled + 1);
+  pad_set(boundaries, kBoundaryFeatures, counts[2], filled + 2);
+  pad_set(controls, kControlFeatures, counts[3], filled + 3);
+}
+
+}  // namespace pictura

@@ -1,0 +1,105 @@
+// Where an agent is on the lane network: its lane, with hysteresis, its offset and angle, the height of the road, and
+// whether a point is on the drivable surface.
+#pragma once
+
+#include "pictura/simulator/rules/map_view.h"
+
+namespace pictura {
+
+constexpr float kDefaultSpeedLimit_mps = 15.0f;
+/// What an agent without a lane sees as its offset (reference implementation); its angle is then a right angle.
+constexpr float kNoLaneOffset_m = 4.0f;
+
+/// An agent's relation to its lane.
+struct LaneFit {
+  int32_t lane = -1;
+  float offset_m = kNoLaneOffset_m;  // positive to the left of the centre line
+  float angle_rad = kHalfPi;         // heading less the lane's direction
+  float z_m = 0;
+  float speed_limit_mps = kDefaultSpeedLimit_mps;
+};
+
+/// A point's foot on a segment.
+struct Foot {
+  float along_m = 0;  // in [0, length]
+  float distance_m = 0;
+  float side = 0;  // positive to the left
+};
+
+PICTURA_HD inline Foot foot_on(const LaneSegment& segment, Vec2 p) {
+  const Vec2 from_a = p - segment.a_m.xy();
+  const float along = clamp(dot(from_a, segment.direction), 0.0f, segment.length_m);
+  return {along, length(from_a - segment.direction * along), cross(segment.direction, from_a)};
+}
+
+/// The lane that fits position and heading best: distance to its centre line (weight 0.7 per 4 m) and angle to it
+/// (0.3 per half turn), with 0.05 against leaving current_lane (-1: none), so that an agent between two lanes keeps its
+/// own. z_m is the agent's present height: only lanes on its level count. Nothing within kLaneReach_m: no lane, and
+/// z_m stays.
+PICTURA_HD inline LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float heading_rad, int32_t current_lane) {
+  constexpr float kDistanceWeight = 0.7f / 4.0f;
+  constexpr float kAngleWeight = 0.3f / kPi;
+  constexpr float kHysteresis = 0.05f;
+  LaneFit best;
+  best.z_m = z_m;
+  float best_score = 1e9f;
+  const Span<const int32_t> items = items_at(map.segment_cells, p);
+  for (size_t i = 0; i < items.size(); ++i) {
+    const LaneSegment& segment = map.segments[static_cast<size_t>(items[i])];
+    const MapLane& lane = map.lanes[static_cast<size_t>(segment.lane)];
+    if (!lane.is_driven) continue;
+    const Foot foot = foot_on(segment, p);
+    const float height = segment.a_m.z + segment.slope * foot.along_m;
+    const float score_without_angle =
+        kDistanceWeight * foot.distance_m + (segment.lane == current_lane ? 0.0f : kHysteresis);
+    if (foot.distance_m > kLaneReach_m || score_without_angle >= best_score || fabsf(height - z_m) >= kLevel_m)
+      continue;
+    const float lane_heading = segment.heading_rad + segment.turn_rad * (foot.along_m / segment.length_m);
+    const float angle = wrap_angle(heading_rad - lane_heading);
+    const float score = score_without_angle + kAngleWeight * fabsf(angle);
+    if (score >= best_score) continue;
+    best_score = score;
+    best = {segment.lane, foot.side < 0.0f ? -foot.distance_m : foot.distance_m, angle, height, lane.speed_limit_mps};
+  }
+  return best;
+}
+
+/// Whether a point lies on the drivable surface of its level: within half a width of some drivable lane's centre line.
+PICTURA_HD inline bool is_on_road(const MapView& map, Vec2 p, float z_m) {
+  constexpr float kTolerance_m = 0.1f;  // the seams between neighbouring lanes
+  const Span<const int32_t> items = items_at(map.segment_cells, p);
+  for (size_t i = 0; i < items.size(); ++i) {
+    const LaneSegment& segment = map.segments[static_cast<size_t>(items[i])];
+    const Foot foot = foot_on(segment, p);
+    const float height = segment.a_m.z + segment.slope * foot.along_m;
+    if (foot.distance_m <= segment.half_width_m + kTolerance_m && fabsf(height - z_m) < kLevel_m) return true;
+  }
+  return false;
+}
+
+/// A place on a lane's centre line.
+struct LanePose {
+  Vec3 position_m;
+  float heading_rad = 0;
+};
+
+/// At arc length s_m, clamped to the lane.
+PICTURA_HD inline LanePose pose_on_lane(const MapView& map, int32_t lane_index, float s_m) {
+  const MapLane& lane = map.lanes[static_cast<size_t>(lane_index)];
+  int low = lane.first_segment, high = lane.first_segment + lane.num_segments - 1;
+  while (low < high) {
+    const int middle = (low + high + 1) / 2;
+    if (map.segments[static_cast<size_t>(middle)].s_m <= s_m) {
+      low = middle;
+    } else {
+      high = middle - 1;
+    }
+  }
+  const LaneSegment& segment = map.segments[static_cast<size_t>(low)];
+  const float along = clamp(s_m - segment.s_m, 0.0f, segment.length_m);
+  const Vec2 xy = segment.a_m.xy() + segment.direction * along;
+  return {{xy.x, xy.y, segment.a_m.z + segment.slope * along},
+          wrap_angle(segment.heading_rad + segment.turn_rad * (along / segment.length_m))};
+}
+
+}  // namespace pictura

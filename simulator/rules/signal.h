@@ -1,0 +1,95 @@
+// Traffic lights: when each phase of a junction shows which colour, and what counts as running a red light.
+#pragma once
+
+#include "pictura/common/color.h"
+#include "pictura/common/rng.h"
+#include "pictura/simulator/rules/map_view.h"
+
+namespace pictura {
+
+/// The cycle of one stop line in one episode, in steps. Of the phases of a junction one after the other is green, then
+/// yellow, then red, while the others are red.
+struct LightPlan {
+  int32_t green_steps = 0, yellow_steps = 0, red_steps = 0;
+  int32_t offset_steps = 0;
+  int32_t phase = 0, num_phases = 1;
+  uint8_t is_off = 0;
+  uint8_t padding[3] = {};
+};
+
+/// Draws a stop line's plan. Training: green U(1, 10) s, yellow U(1.5, 2.25) s, red U(0.3, 10) s and the offset are
+/// drawn per junction and episode; in a fifth of the episodes every light is off, else a fifth of the lights are.
+/// Evaluation (`fixed`): 10, 3 and 2 s, only the offset is drawn and no light is off. Lines without a junction cycle
+/// alone.
+PICTURA_HD inline LightPlan draw_light_plan(const StopLine& line, int32_t light, bool fixed, float dt_s, uint64_t seed,
+                                            uint32_t world, uint32_t episode) {
+  constexpr float kOffFraction = 0.2f;
+  constexpr uint32_t kEpisodeKey = 0, kJunctionKey = 1, kLightKey = 2, kLoneLightKey = 3;
+  // The stream's agent and step say whose draws these are: the episode's, a junction's, a light's.
+  const uint32_t group = static_cast<uint32_t>(line.junction >= 0 ? line.junction : light);
+  RandomStream timing(seed, world, line.junction >= 0 ? kJunctionKey : kLoneLightKey, episode, group, Purpose::lights);
+  const float green_s = timing.uniform(1.0f, 10.0f);
+  const float yellow_s = timing.uniform(1.5f, 2.25f);
+  const float red_s = timing.uniform(0.3f, 10.0f);
+  LightPlan plan;
+  plan.green_steps = max_of(1, static_cast<int>((fixed ? 10.0f : green_s) / dt_s + 0.5f));
+  plan.yellow_steps = max_of(1, static_cast<int>((fixed ? 3.0f : yellow_s) / dt_s + 0.5f));
+  plan.red_steps = max_of(1, static_cast<int>((fixed ? 2.0f : red_s) / dt_s + 0.5f));
+  plan.phase = line.phase;
+  plan.num_phases = line.num_phases;
+  plan.offset_steps = timing.below(plan.num_phases * (plan.green_steps + plan.yellow_steps + plan.red_steps));
+  if (!fixed) {
+    RandomStream whole_episode(seed, world, kEpisodeKey, episode, 0, Purpose::lights);
+    RandomStream own(seed, world, kLightKey, episode, static_cast<uint32_t>(light), Purpose::lights);
+    plan.is_off = whole_episode.uniform() < kOffFraction || own.uniform() < kOffFraction;
+  }
+  return plan;
+}
+
+PICTURA_HD inline LightState light_state(const LightPlan& plan, int step) {
+  if (plan.is_off) return LightState::off;
+  const int slot_steps = plan.green_steps + plan.yellow_steps + plan.red_steps;
+  const int t = (plan.offset_steps + step) % (plan.num_phases * slot_steps);
+  if (t / slot_steps != plan.phase) return LightState::red;
+  const int in_slot = t % slot_steps;
+  if (in_slot < plan.green_steps) return LightState::green;
+  return in_slot < plan.green_steps + plan.yellow_steps ? LightState::yellow : LightState::red;
+}
+
+/// An agent's step, as far as red lights are concerned.
+struct Crossing {
+  Vec2 bumper_before, bumper_after;  // middle of the front bumper
+  Vec2 forward;                      // unit vector after the step
+  float z_m = 0;
+  int32_t lane_before = -1, lane_after = -1;
+};
+
+/// Whether the step violates stop line `light`, whose state during the step (the one that the agent saw before it) is
+/// `state`: the front bumper crosses it while it is red, or the agent changes from a lane that no light holds into one
+/// that this light holds, its bumper already past the line, while it is red. In both cases on the line's level, heading
+/// within 45 degrees of its traffic and within 10 m of its middle. Standing on a line that turns red, or clearing the
+/// junction behind it, is none.
+PICTURA_HD inline bool violates(const MapView& map, int32_t light, const Crossing& crossing, LightState state) {
+  constexpr float kCos45 = 0.70710678f;
+  constexpr float kSideTolerance_m = 0.5f;
+  if (state != LightState::red) return false;
+  const StopLine& line = map.stop_lines[static_cast<size_t>(light)];
+  const Vec2 past = crossing.bumper_after - line.middle_m.xy();
+  if (dot(past, past) > square(kStopLineReach_m) || dot(crossing.forward, line.direction) < kCos45 ||
+      fabsf(line.middle_m.z - crossing.z_m) >= kLevel_m) {
+    return false;
+  }
+  const float along_before = dot(crossing.bumper_before - line.middle_m.xy(), line.direction);
+  const float along_after = dot(past, line.direction);
+  if (along_after < 0.0f) return false;
+  if (along_before < 0.0f) {
+    const float fraction = along_before / (along_before - along_after);
+    const Vec2 at = crossing.bumper_before + (crossing.bumper_after - crossing.bumper_before) * fraction;
+    if (fabsf(cross(line.direction, at - line.middle_m.xy())) <= line.half_length_m + kSideTolerance_m) return true;
+  }
+  return crossing.lane_before >= 0 && crossing.lane_after >= 0 && crossing.lane_before != crossing.lane_after &&
+         map.lanes[static_cast<size_t>(crossing.lane_before)].light < 0 &&
+         map.lanes[static_cast<size_t>(crossing.lane_after)].light == light;
+}
+
+}  // namespace pictura

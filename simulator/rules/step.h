@@ -1,0 +1,160 @@
+// One step of one agent, in three phases with a barrier between them, so that every phase reads only what an earlier
+// one has finished: advance (own motion, road, lights, goals), collisions (everybody's boxes), settle (reward,
+// halting).
+#pragma once
+
+#include "pictura/simulator/rules/collision.h"
+#include "pictura/simulator/rules/reward.h"
+#include "pictura/simulator/rules/spawn.h"
+
+namespace pictura {
+
+PICTURA_HD inline bool is_active(const WorldView& world, int agent) {
+  return world.agents.status[world.first_slot + agent] == static_cast<uint8_t>(AgentStatus::active);
+}
+
+PICTURA_HD inline Vec2 front_bumper(const AgentBox& box) {
+  return box.center_m.xy() + Vec2{box.cos_heading, box.sin_heading} * (0.5f * box.length_m);
+}
+
+PICTURA_HD inline bool runs_red_light(const WorldView& world, const AgentBox& before, const AgentBox& after,
+                                      int32_t lane_before, int32_t lane_after) {
+  const Crossing crossing{front_bumper(before), front_bumper(after), {after.cos_heading, after.sin_heading},
+                          after.center_m.z,     lane_before,         lane_after};
+  const Span<const int32_t> lights = items_at(world.map.stop_line_cells, crossing.bumper_after);
+  for (size_t i = 0; i < lights.size(); ++i) {
+    const int32_t light = lights[i];
+    if (violates(world.map, light, crossing, world.lights[light])) return true;
+  }
+  return false;
+}
+
+PICTURA_HD inline Vec3 waypoint_of(const AgentStateView& agents, int slot, int index) {
+  const int i = slot * kNumWaypoints + index;
+  return {agents.waypoint_x_m[i], agents.waypoint_y_m[i], agents.waypoint_z_m[i]};
+}
+
+/// Passes waypoints along the way from `from` to where the agent is; returns event bits. The last waypoint becomes the
+/// metric's goal when it becomes the active one, and stays it until it has been passed within kMetricGoalRadius_m or
+/// the next chain's last waypoint replaces it: a wide reward radius does not keep an agent from reaching it.
+PICTURA_HD inline int pass_waypoints(const WorldView& world, int agent, Vec3 from) {
+  const AgentStateView& agents = world.agents;
+  const int slot = world.first_slot + agent;
+  const Vec3 to{agents.x_m[slot], agents.y_m[slot], agents.z_m[slot]};
+  int events = kEventNone;
+  if (agents.goal_open[slot] &&
+      passes(from, to, {agents.goal_x_m[slot], agents.goal_y_m[slot], agents.goal_z_m[slot]}, kMetricGoalRadius_m)) {
+    agents.goal_open[slot] = 0;
+    ++agents.goals_reached[slot];
+    events |= kEventMetricGoal;
+  }
+  const int index = agents.next_waypoint[slot];
+  const float radius_m = agents.conditioning[slot * kNumConditioning + static_cast<int>(Conditioning::delta_goal_m)];
+  if (!passes(from, to, waypoint_of(agents, slot, index), radius_m)) return events;
+  ++agents.waypoints_reached[slot];
+  if (index + 1 == kNumWaypoints) {
+    draw_goal_chain(world, agent);
+    return events | kEventGoal;
+  }
+  agents.next_waypoint[slot] = index + 1;
+  if (index + 2 == kNumWaypoints) {
+    const Vec3 goal = waypoint_of(agents, slot, index + 1);
+    agents.goal_x_m[slot] = goal.x;
+    agents.goal_y_m[slot] = goal.y;
+    agents.goal_z_m[slot] = goal.z;
+    agents.goal_open[slot] = 1;
+  }
+  return events | kEventWaypoint;
+}
+
+/// Phase 1: moves an active agent and finds what the road says about it.
+PICTURA_HD inline void advance(const WorldView& world, int agent, int32_t action) {
+  const AgentStateView& agents = world.agents;
+  const int slot = world.first_slot + agent;
+  world.boxes_before[agent] = world.boxes[agent];
+  agents.events[slot] = kEventNone;
+  if (!is_active(world, agent)) return;
+
+  const AgentClass agent_class = class_of(agents, slot);
+  const float* conditioning = agents.conditioning + slot * kNumConditioning;
+  DynamicsParameters parameters;
+  parameters.throttle = conditioning[static_cast<int>(Conditioning::throttle)];
+  parameters.steer = conditioning[static_cast<int>(Conditioning::steer)];
+  parameters.acceleration = conditioning[static_cast<int>(Conditioning::acceleration)];
+  parameters.wheelbase_m = kWheelbasePerLength * agents.length_m[slot];
+  const Vec3 from{agents.x_m[slot], agents.y_m[slot], agents.z_m[slot]};
+  const Motion motion = move(motion_of(agents, slot), controls_of_action(action), parameters, class_limits(agent_class),
+                             world.options.dt_s);
+  store_motion(agents, slot, motion);
+  agents.distance_m[slot] += fabsf(motion.speed_mps) * world.options.dt_s;
+
+  const int32_t lane_before = agents.lane[slot];
+  store_fit(agents, slot, fit_lane(world.map, {motion.x_m, motion.y_m}, from.z, motion.heading_rad, lane_before));
+  const AgentBox box = world.boxes[agent] = box_of(agents, slot);
+
+  int events = pass_waypoints(world, agent, from);
+  const OrientedBox print = footprint(box);
+  if (touches_any(print, box.center_m.z, world.map.walls, world.map.wall_cells)) events |= kEventWall;
+  if (agent_class != AgentClass::pedestrian) {
+    if (touches_any(print, box.center_m.z, world.map.edges, world.map.edge_cells) ||
+        !is_on_road(world.map, print.center_m, box.center_m.z)) {
+      events |= kEventOffRoad;
+    }
+    if (runs_red_light(world, world.boxes_before[agent], box, lane_before, agents.lane[slot])) events |= kEventRedLight;
+  }
+  agents.events[slot] = static_cast<uint8_t>(events);
+}
+
+/// Phase 2: finds the collisions of an active agent with every other box, halted and parked ones included.
+PICTURA_HD inline void find_collisions(const WorldView& world, int agent) {
+  if (!is_active(world, agent)) return;
+  const AgentBox& own = world.boxes[agent];
+  const AgentBox& own_before = world.boxes_before[agent];
+  const GridView& cells = world.box_cells;
+  const int slot = world.first_slot + agent;
+  const float own_reach = radius(own) + kMaxBoxRadius_m + 2.0f * kMaxSpeed_mps * world.options.dt_s;
+  const int x0 = cells.cell_x(own.center_m.x - own_reach), x1 = cells.cell_x(own.center_m.x + own_reach);
+  const int y0 = cells.cell_y(own.center_m.y - own_reach), y1 = cells.cell_y(own.center_m.y + own_reach);
+  int events = kEventNone;
+  for (int y = y0; y <= y1; ++y) {
+    const int32_t begin = cells.begin[static_cast<size_t>(y * cells.num_x + x0)];
+    const int32_t end = cells.begin[static_cast<size_t>(y * cells.num_x + x1 + 1)];
+    for (int32_t i = begin; i < end; ++i) {
+      const int32_t other = cells.items[static_cast<size_t>(i)];
+      if (other == agent || !collide(own_before, own, world.boxes_before[other], world.boxes[other])) continue;
+      events |= kEventCollision;
+      if (at_fault(own, world.agents.speed_mps[slot], world.boxes[other])) events |= kEventAtFault;
+    }
+  }
+  world.agents.events[slot] = static_cast<uint8_t>(world.agents.events[slot] | events);
+}
+
+/// Phase 3: the reward of an active agent, and its halt after an infraction. Returns the reward.
+PICTURA_HD inline float settle(const WorldView& world, int agent) {
+  if (!is_active(world, agent)) return 0.0f;
+  const AgentStateView& agents = world.agents;
+  const int slot = world.first_slot + agent;
+  const int events = agents.events[slot];
+  StepFacts facts;
+  facts.motion = motion_of(agents, slot);
+  facts.fit = fit_of(agents, slot);
+  facts.passed_waypoint = (events & kEventWaypoint) != 0;
+  facts.passed_last_waypoint = (events & kEventGoal) != 0;
+  facts.collision = (events & kEventCollision) != 0;
+  facts.off_road = (events & (kEventOffRoad | kEventWall)) != 0;
+  facts.red_light = (events & kEventRedLight) != 0;
+  const float reward = reward_terms(facts, agents.conditioning + slot * kNumConditioning, world.options.dt_s).total();
+  agents.episode_return[slot] += reward;
+  agents.episode_events[slot] = static_cast<uint8_t>(agents.episode_events[slot] | events);
+
+  const int infractions = events & kInfractions;
+  if (infractions == 0) return reward;
+  agents.halt_reason[slot] = static_cast<uint8_t>(infractions);
+  agents.status[slot] = static_cast<uint8_t>(AgentStatus::halted);
+  agents.speed_mps[slot] = agents.accel_long_mps2[slot] = agents.accel_lat_mps2[slot] = 0.0f;
+  agents.steer_rad[slot] = agents.jerk_long_mps3[slot] = agents.jerk_lat_mps3[slot] = 0.0f;
+  world.boxes[agent] = box_of(agents, slot);
+  return reward;
+}
+
+}  // namespace pictura

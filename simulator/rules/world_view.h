@@ -1,0 +1,105 @@
+// One world as the rules see it: its map, its agents, its lights and how it is conditioned. Pointers alone, on either
+// device; the executor owns what they point to.
+#pragma once
+
+#include "pictura/common/scene.h"
+#include "pictura/simulator/conditioning.h"
+#include "pictura/simulator/fields.h"
+#include "pictura/simulator/rules/dynamics.h"
+#include "pictura/simulator/rules/road.h"
+#include "pictura/simulator/rules/signal.h"
+
+namespace pictura {
+
+/// The part of the configuration that rules depend on.
+struct RuleOptions {
+  float dt_s = 0.1f;
+  int episode_steps = 1280;
+  float reset_inactive_fraction = 0.4f;
+  float pedestrian_fraction = 0, cyclist_fraction = 0;
+  bool fixed_lights = false;
+  bool auxiliary_observations = true;
+  ConditioningRange conditioning[kNumConditioning] = {};        // to draw from
+  ConditioningRange conditioning_scale[kNumConditioning] = {};  // what the policy sees as [-1, 1]
+};
+
+struct WorldView {
+  MapView map;
+  RuleOptions options;
+  uint64_t seed = 0;
+  uint32_t global_world = 0;
+  uint32_t episode = 0;
+  AgentStateView agents{};           // of all worlds, indexed by slot
+  int first_slot = 0;                // of this world
+  int num_agents = 0;                // controlled
+  int num_boxes = 0;                 // controlled and parked
+  AgentBox* boxes = nullptr;         // [num_boxes] this world's part of the scene: controlled, then parked
+  AgentBox* boxes_before = nullptr;  // [num_boxes] as they stood before the step
+  GridView box_cells;                // box indices by the cell of their centres
+  LightPlan* light_plans = nullptr;  // [stop lines]
+  LightState* lights = nullptr;      // [stop lines] as observed before the step, and during it
+};
+
+PICTURA_HD inline AgentClass class_of(const AgentStateView& agents, int slot) {
+  return static_cast<AgentClass>(agents.agent_class[slot]);
+}
+
+PICTURA_HD inline Motion motion_of(const AgentStateView& agents, int slot) {
+  return {agents.x_m[slot],
+          agents.y_m[slot],
+          agents.heading_rad[slot],
+          agents.speed_mps[slot],
+          agents.accel_long_mps2[slot],
+          agents.accel_lat_mps2[slot],
+          agents.steer_rad[slot],
+          agents.jerk_long_mps3[slot],
+          agents.jerk_lat_mps3[slot]};
+}
+
+PICTURA_HD inline void store_motion(const AgentStateView& agents, int slot, const Motion& motion) {
+  const SinCos heading = sincos_of(motion.heading_rad);
+  agents.x_m[slot] = motion.x_m;
+  agents.y_m[slot] = motion.y_m;
+  agents.heading_rad[slot] = motion.heading_rad;
+  agents.cos_heading[slot] = heading.cos;
+  agents.sin_heading[slot] = heading.sin;
+  agents.speed_mps[slot] = motion.speed_mps;
+  agents.accel_long_mps2[slot] = motion.accel_long_mps2;
+  agents.accel_lat_mps2[slot] = motion.accel_lat_mps2;
+  agents.steer_rad[slot] = motion.steer_rad;
+  agents.jerk_long_mps3[slot] = motion.jerk_long_mps3;
+  agents.jerk_lat_mps3[slot] = motion.jerk_lat_mps3;
+}
+
+PICTURA_HD inline LaneFit fit_of(const AgentStateView& agents, int slot) {
+  return {agents.lane[slot], agents.lane_offset_m[slot], agents.lane_angle_rad[slot], agents.z_m[slot],
+          agents.speed_limit_mps[slot]};
+}
+
+PICTURA_HD inline void store_fit(const AgentStateView& agents, int slot, const LaneFit& fit) {
+  agents.lane[slot] = fit.lane;
+  agents.lane_offset_m[slot] = fit.offset_m;
+  agents.lane_angle_rad[slot] = fit.angle_rad;
+  agents.z_m[slot] = fit.z_m;
+  agents.speed_limit_mps[slot] = fit.speed_limit_mps;
+}
+
+/// The agent's box in the scene; nothing of an absent agent is drawn or met.
+PICTURA_HD inline AgentBox box_of(const AgentStateView& agents, int slot) {
+  const AgentStatus status = static_cast<AgentStatus>(agents.status[slot]);
+  const float ahead = reference_to_center(class_of(agents, slot), agents.length_m[slot]);
+  AgentBox box;
+  box.center_m = {agents.x_m[slot] + ahead * agents.cos_heading[slot],
+                  agents.y_m[slot] + ahead * agents.sin_heading[slot], agents.z_m[slot]};
+  box.cos_heading = agents.cos_heading[slot];
+  box.sin_heading = agents.sin_heading[slot];
+  box.length_m = agents.length_m[slot];
+  box.width_m = agents.width_m[slot];
+  box.height_m = agents.height_m[slot];
+  box.agent_class = class_of(agents, slot);
+  box.palette = status == AgentStatus::halted ? 1 : status == AgentStatus::parked ? 2 : 0;
+  box.drawn = status != AgentStatus::absent;
+  return box;
+}
+
+}  // namespace pictura

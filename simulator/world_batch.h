@@ -1,0 +1,75 @@
+// The memory of a simulator on the host: every array that a step reads or writes, sized once, with each world's part of
+// it as a WorldView. Executors hold one and run the rules over it; saving, restoring and hashing are the same for all.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "pictura/simulator/agent_state.h"
+#include "pictura/simulator/rules/world_view.h"
+#include "pictura/simulator/simulator.h"
+#include "pictura/simulator/world_map.h"
+
+namespace pictura {
+
+struct WorldBatch {
+  /// Checks everything that comes from outside: throws UsageError for what cannot be asked for, Error naming the map
+  /// for one that no world can run on.
+  WorldBatch(const SimulatorConfig& config, std::vector<std::shared_ptr<const RoadMap>> maps,
+             std::vector<WorldSpec> worlds);
+  WorldBatch(const WorldBatch&) = delete;
+  WorldBatch& operator=(const WorldBatch&) = delete;
+
+  int num_worlds() const { return static_cast<int>(worlds.size()); }
+  int num_slots() const { return slot_begin.back(); }
+  WorldView world(int index);
+  ObservationView observation_view();
+
+  uint64_t state_hash() const;
+  std::vector<uint8_t> save() const;
+  void restore(Span<const uint8_t> bytes);
+
+  SimulatorConfig config;
+  std::vector<std::shared_ptr<const RoadMap>> maps;
+  std::vector<WorldSpec> worlds;
+  RuleOptions options;
+  std::vector<WorldMap> world_maps;                         // [maps]
+  std::vector<int32_t> slot_begin, box_begin, light_begin;  // [worlds + 1]
+
+  // State. box_cells and what a step returns are made anew by every step and are not saved.
+  AgentState agents;
+  std::vector<AgentBox> boxes, boxes_before;  // the scene's agents
+  std::vector<LightPlan> light_plans;
+  std::vector<LightState> lights;
+  std::vector<int32_t> episode_step, episode_index;  // [worlds]
+  std::vector<uint8_t> episode_over;                 // [worlds] the next step resets
+  std::vector<int32_t> spawned;                      // [worlds] in the current episode
+  std::vector<SimulatorTotals> world_totals;         // [worlds]
+
+  std::vector<CellLists> box_cells;  // [worlds]
+  std::vector<float> reward;         // [slots], as the following
+  std::vector<uint8_t> terminated, truncated, valid;
+  std::vector<View> views;
+  std::vector<GeometryHandle> geometry;  // [worlds]
+  SceneBatch scene;
+
+ private:
+  struct SavedHeader {
+    std::array<char, 8> magic{'P', 'I', 'C', 'S', 'T', 'A', 'T', 'E'};
+    uint32_t version = 1;
+    uint32_t byte_order = 0x01020304;
+    uint64_t fingerprint = 0;
+  };
+  SavedHeader make_header() const;
+  size_t saved_bytes() const;
+  /// Of everything that a saved state must have in common with the simulator that restores it.
+  uint64_t fingerprint() const;
+  template <typename Self, typename Visit>
+  static void visit_saved(Self& self, Visit&& visit);
+
+  std::vector<float> ego_, partners_, lanes_, boundaries_, controls_, conditioning_, waypoints_;
+  std::vector<int32_t> set_counts_;
+};
+
+}  // namespace pictura

@@ -1,0 +1,302 @@
+#include "pictura/simulator/world_map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "pictura/common/error.h"
+#include "pictura/simulator/rules/collision.h"
+#include "pictura/simulator/rules/observe.h"
+#include "pictura/simulator/rules/road.h"
+
+namespace pictura {
+namespace {
+
+/// Observed pieces follow curves within this distance, so that junctions do not fill the observation with short pieces.
+constexpr float kObservedChordError_m = 0.25f;
+/// Pieces listed per cell: more than are observed, since some of them lie out of sight of a given heading.
+constexpr size_t kListedPieces = 160;
+constexpr float kNearCell_m = 10.0f;
+constexpr float kLookupCell_m = 5.0f;
+/// Agents stay this close to drivable lanes; cells farther out list nothing to observe.
+constexpr float kObserverReach_m = 15.0f;
+
+Aabb2 box_of_segment(Vec2 a, Vec2 b, float reach_m) {
+  return {{std::min(a.x, b.x) - reach_m, std::min(a.y, b.y) - reach_m},
+          {std::max(a.x, b.x) + reach_m, std::max(a.y, b.y) + reach_m}};
+}
+
+float distance_to_segment(Vec2 p, Vec2 a, Vec2 b) {
+  const Vec2 way = b - a;
+  const float way2 = dot(way, way);
+  const float t = way2 > 0 ? std::clamp(dot(p - a, way) / way2, 0.0f, 1.0f) : 0.0f;
+  return length(p - a - way * t);
+}
+
+/// Cuts a polyline into observed pieces: as long as kMaxPiece_m and kObservedChordError_m allow.
+void append_pieces(const std::vector<Vec3>& points, float width_m, std::vector<ObservedPiece>* pieces_out) {
+  for (size_t begin = 0; begin + 1 < points.size();) {
+    size_t end = begin + 1;
+    const auto fits = [&](size_t last) {
+      if (length(points[last].xy() - points[begin].xy()) > kMaxPiece_m) return false;
+      for (size_t i = begin + 1; i < last; ++i) {
+        if (distance_to_segment(points[i].xy(), points[begin].xy(), points[last].xy()) > kObservedChordError_m)
+          return false;
+      }
+      return true;
+    };
+    while (end + 1 < points.size() && fits(end + 1)) ++end;
+    const Vec2 way = points[end].xy() - points[begin].xy();
+    const float way_m = length(way);
+    // What is longer than a piece may be is cut evenly.
+    const int cuts = std::max(1, static_cast<int>(std::ceil(way_m / kMaxPiece_m - 1e-4f)));
+    for (int i = 0; i < cuts && way_m > 0; ++i) {
+      const float fraction = (static_cast<float>(i) + 0.5f) / static_cast<float>(cuts);
+      pieces_out->push_back({points[begin] + (points[end] - points[begin]) * fraction,
+                             0.5f * way_m / static_cast<float>(cuts), way * (1.0f / way_m), width_m});
+    }
+    begin = end;
+  }
+}
+
+void add_lanes(const RoadMap& map, WorldMap* out) {
+  out->lanes.resize(map.lanes.size());
+  for (size_t index = 0; index < map.lanes.size(); ++index) {
+    const Lane& lane = map.lanes[index];
+    MapLane& flat = out->lanes[index];
+    flat.first_segment = static_cast<int32_t>(out->segments.size());
+    flat.first_successor = static_cast<int32_t>(out->successors.size());
+    if (!is_drivable(lane.type)) continue;
+    flat.is_driven = lane.type != LaneType::parking;
+    flat.speed_limit_mps = lane.speed_limit_mps > 0 ? lane.speed_limit_mps : kDefaultSpeedLimit_mps;
+
+    std::vector<Vec3> line;
+    const Span<const LanePoint> points = map.points_of(lane);
+    float widest = 0, s = 0;
+    for (size_t i = 0; i < points.size(); ++i) {
+      widest = std::max(widest, points[i].width_m);
+      line.push_back(points[i].position_m);
+      if (i + 1 == points.size()) break;
+      const LanePoint& a = points[i];
+      const LanePoint& b = points[i + 1];
+      const Vec2 way = (b.position_m - a.position_m).xy();
+      LaneSegment segment;
+      segment.length_m = length(way);
+      if (!(segment.length_m > 0)) continue;
+      segment.a_m = a.position_m;
+      segment.direction = way * (1.0f / segment.length_m);
+      segment.slope = (b.position_m.z - a.position_m.z) / segment.length_m;
+      segment.heading_rad = a.heading_rad;
+      segment.turn_rad = wrap_angle(b.heading_rad - a.heading_rad);
+      segment.half_width_m = 0.5f * std::max(a.width_m, b.width_m);
+      segment.s_m = s;
+      segment.lane = static_cast<int32_t>(index);
+      s += segment.length_m;
+      out->segments.push_back(segment);
+    }
+    flat.length_m = s;
+    flat.num_segments = static_cast<int32_t>(out->segments.size()) - flat.first_segment;
+    if (flat.is_driven) append_pieces(line, widest, &out->lane_pieces);
+
+    const auto goes_on = [&](int32_t other) { return other >= 0 && map.lanes[static_cast<size_t>(other)].is_endless; };
+    for (const int32_t successor : map.links(lane.successors)) {
+      if (goes_on(successor)) out->successors.push_back(successor);
+    }
+    flat.num_successors = static_cast<int32_t>(out->successors.size()) - flat.first_successor;
+    flat.left = goes_on(lane.left_neighbor) ? lane.left_neighbor : -1;
+    flat.right = goes_on(lane.right_neighbor) ? lane.right_neighbor : -1;
+    if (lane.is_endless && !lane.in_junction && flat.is_driven && s > 0) {
+      out->spawn_lanes.push_back(static_cast<int32_t>(index));
+      out->spawn_end_m.push_back((out->spawn_end_m.empty() ? 0.0f : out->spawn_end_m.back()) + s);
+    }
+  }
+}
+
+void add_barriers(const RoadMap& map, Span<const WallFace> walls, WorldMap* out) {
+  std::vector<Vec3> line;
+  const auto finish_line = [&] {
+    if (line.size() > 1) append_pieces(line, 0.0f, &out->boundary_pieces);
+    line.clear();
+  };
+  for (const RoadEdge& edge : map.road_edges) {
+    out->edges.push_back({edge.a_m.xy(), edge.b_m.xy(), 0.5f * (edge.a_m.z + edge.b_m.z)});
+    // Consecutive edges that share a point make one line.
+    if (line.empty() || line.back().x != edge.a_m.x || line.back().y != edge.a_m.y) {
+      finish_line();
+      line.push_back(edge.a_m);
+    }
+    line.push_back(edge.b_m);
+  }
+  finish_line();
+  for (const WallFace& wall : walls) {
+    out->walls.push_back({wall.a_m.xy(), wall.b_m.xy(), 0.5f * (wall.a_m.z + wall.b_m.z)});
+  }
+}
+
+void add_stop_lines(const RoadMap& map, WorldMap* out) {
+  for (size_t index = 0; index < map.lights.size(); ++index) {
+    const TrafficLight& light = map.lights[index];
+    StopLine line;
+    line.left_m = light.stop_a_m;
+    line.right_m = light.stop_b_m;
+    line.middle_m = (light.stop_a_m + light.stop_b_m) * 0.5f;
+    line.direction = {std::cos(light.stop_heading_rad), std::sin(light.stop_heading_rad)};
+    line.half_length_m = 0.5f * length((light.stop_b_m - light.stop_a_m).xy());
+    line.junction = light.junction;
+    line.phase = light.phase;
+    line.num_phases =
+        light.junction < 0 ? 1 : std::max(1, map.junctions[static_cast<size_t>(light.junction)].num_phases);
+    out->stop_lines.push_back(line);
+    for (int32_t i = light.lanes.begin; i < light.lanes.end; ++i) {
+      int32_t& held_by = out->lanes[static_cast<size_t>(map.light_lanes[static_cast<size_t>(i)])].light;
+      if (held_by < 0) held_by = static_cast<int32_t>(index);
+    }
+  }
+}
+
+template <typename Item, typename ToBox>
+Grid cells_of(const std::vector<Item>& items, ToBox&& to_box) {
+  std::vector<Aabb2> boxes;
+  boxes.reserve(items.size());
+  for (const Item& item : items) boxes.push_back(to_box(item));
+  return Grid(boxes, kLookupCell_m);
+}
+
+/// For every cell that an observer may stand in, the items whose points lie within range of its centre, nearest first,
+/// cut by `keep` (how many of the sorted distances to keep).
+template <typename Keep>
+CellLists lists_by_distance(const WorldMap& map, const std::vector<Vec2>& points, float range_m, Keep&& keep) {
+  CellLists lists;
+  lists.origin_m = map.low_m;
+  lists.cell_m = kNearCell_m;
+  lists.num_x = static_cast<int>((map.high_m.x - map.low_m.x) / kNearCell_m) + 1;
+  lists.num_y = static_cast<int>((map.high_m.y - map.low_m.y) / kNearCell_m) + 1;
+  const size_t num_cells = static_cast<size_t>(lists.num_x) * static_cast<size_t>(lists.num_y);
+
+  std::vector<uint8_t> is_occupied(num_cells, 0);
+  const GridView cells = lists.view();
+  for (const LaneSegment& segment : map.segments) {
+    const Vec2 a = segment.a_m.xy();
+    const Aabb2 box = box_of_segment(a, a + segment.direction * segment.length_m, kObserverReach_m);
+    for (int y = cells.cell_y(box.low.y); y <= cells.cell_y(box.high.y); ++y) {
+      for (int x = cells.cell_x(box.low.x); x <= cells.cell_x(box.high.x); ++x) {
+        is_occupied[static_cast<size_t>(y) * static_cast<size_t>(lists.num_x) + static_cast<size_t>(x)] = 1;
+      }
+    }
+  }
+
+  std::vector<Aabb2> boxes;
+  for (const Vec2& point : points) boxes.push_back({point, point});
+  const Grid grid(boxes, 20.0f);
+  const GridView point_cells = grid.view();
+  std::vector<std::pair<float, int32_t>> found;
+  std::vector<float> distances;
+  lists.begin.assign(1, 0);
+  for (size_t cell = 0; cell < num_cells; ++cell) {
+    if (is_occupied[cell] && !points.empty()) {
+      const Vec2 center = lists.origin_m + Vec2{static_cast<float>(cell % static_cast<size_t>(lists.num_x)) + 0.5f,
+                                                static_cast<float>(cell / static_cast<size_t>(lists.num_x)) + 0.5f} *
+                                               kNearCell_m;
+      found.clear();
+      for (int y = point_cells.cell_y(center.y - range_m); y <= point_cells.cell_y(center.y + range_m); ++y) {
+        for (int x = point_cells.cell_x(center.x - range_m); x <= point_cells.cell_x(center.x + range_m); ++x) {
+          const size_t c = static_cast<size_t>(y * point_cells.num_x + x);
+          for (int32_t i = point_cells.begin[c]; i < point_cells.begin[c + 1]; ++i) {
+            const int32_t item = point_cells.items[static_cast<size_t>(i)];
+            const float distance = length(points[static_cast<size_t>(item)] - center);
+            if (distance <= range_m) found.emplace_back(distance, item);
+          }
+        }
+      }
+      std::sort(found.begin(), found.end());
+      distances.clear();
+      for (const auto& [distance, item] : found) distances.push_back(distance);
+      found.resize(keep(distances));
+      for (const auto& [distance, item] : found) lists.items.push_back(item);
+    }
+    lists.begin.push_back(static_cast<int32_t>(lists.items.size()));
+  }
+  return lists;
+}
+
+std::vector<Vec2> middles_of(const std::vector<ObservedPiece>& pieces) {
+  std::vector<Vec2> middles;
+  for (const ObservedPiece& piece : pieces) middles.push_back(piece.middle_m.xy());
+  return middles;
+}
+
+}  // namespace
+
+WorldMap make_world_map(const RoadMap& map, Span<const WallFace> walls) {
+  WorldMap out;
+  add_lanes(map, &out);
+  PICTURA_CHECK(!out.segments.empty(), "map {}: expected at least one drivable lane, got none", map.name);
+  add_barriers(map, walls, &out);
+  add_stop_lines(map, &out);
+
+  out.low_m = out.high_m = out.segments.front().a_m.xy();
+  for (const LaneSegment& segment : out.segments) {
+    const Vec2 a = segment.a_m.xy();
+    const Aabb2 box = box_of_segment(a, a + segment.direction * segment.length_m, kObserverReach_m);
+    out.low_m = {std::min(out.low_m.x, box.low.x), std::min(out.low_m.y, box.low.y)};
+    out.high_m = {std::max(out.high_m.x, box.high.x), std::max(out.high_m.y, box.high.y)};
+  }
+
+  out.segment_cells = cells_of(out.segments, [](const LaneSegment& segment) {
+    const Vec2 a = segment.a_m.xy();
+    return box_of_segment(a, a + segment.direction * segment.length_m,
+                          std::max(kLaneReach_m, segment.half_width_m + 0.1f));
+  });
+  const auto barrier_box = [](const Barrier& barrier) {
+    return box_of_segment(barrier.a_m, barrier.b_m, kMaxBoxRadius_m);
+  };
+  out.edge_cells = cells_of(out.edges, barrier_box);
+  out.wall_cells = cells_of(out.walls, barrier_box);
+  out.stop_line_cells = cells_of(out.stop_lines, [](const StopLine& line) {
+    return box_of_segment(line.middle_m.xy(), line.middle_m.xy(), kStopLineReach_m);
+  });
+
+  const float sight_m = std::sqrt(square(kRoadAhead_m) + square(kRoadAside_m)) + kNearCell_m;
+  const auto first_pieces = [](const std::vector<float>& distances) {
+    return std::min(distances.size(), kListedPieces);
+  };
+  out.near_lane_pieces = lists_by_distance(out, middles_of(out.lane_pieces), sight_m, first_pieces);
+  out.near_boundary_pieces = lists_by_distance(out, middles_of(out.boundary_pieces), sight_m, first_pieces);
+  std::vector<Vec2> line_middles;
+  for (const StopLine& line : out.stop_lines) line_middles.push_back(line.middle_m.xy());
+  // Whatever can be among the nearest kMaxControls from anywhere in the cell: a cell's diagonal farther than the last
+  // of them is from its centre.
+  out.near_stop_lines =
+      lists_by_distance(out, line_middles, kControlRange_m + kNearCell_m, [](const std::vector<float>& distances) {
+        if (distances.size() <= kMaxControls) return distances.size();
+        const float last = distances[kMaxControls - 1] + std::sqrt(2.0f) * kNearCell_m;
+        return static_cast<size_t>(std::upper_bound(distances.begin(), distances.end(), last) - distances.begin());
+      });
+  return out;
+}
+
+MapView WorldMap::view() const {
+  MapView view;
+  view.segments = segments;
+  view.lanes = lanes;
+  view.successors = successors;
+  view.edges = edges;
+  view.walls = walls;
+  view.stop_lines = stop_lines;
+  view.spawn_lanes = spawn_lanes;
+  view.spawn_end_m = spawn_end_m;
+  view.lane_pieces = lane_pieces;
+  view.boundary_pieces = boundary_pieces;
+  view.segment_cells = segment_cells.view();
+  view.edge_cells = edge_cells.view();
+  view.wall_cells = wall_cells.view();
+  view.stop_line_cells = stop_line_cells.view();
+  view.near_lane_pieces = near_lane_pieces.view();
+  view.near_boundary_pieces = near_boundary_pieces.view();
+  view.near_stop_lines = near_stop_lines.view();
+  view.low_m = low_m;
+  view.high_m = high_m;
+  return view;
+}
+
+}  // namespace pictura

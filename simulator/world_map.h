@@ -1,0 +1,44 @@
+// A RoadMap flattened into what the rules read: pieces, links and cell lists. Made once per map, shared by all worlds
+// on it.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "pictura/common/scene.h"
+#include "pictura/map/road_map.h"
+#include "pictura/simulator/rules/map_view.h"
+
+namespace pictura {
+
+/// Lists of items per cell, in a chosen order.
+struct CellLists {
+  Vec2 origin_m;
+  float cell_m = 1;
+  int num_x = 1, num_y = 1;
+  std::vector<int32_t> begin{0, 0};
+  std::vector<int32_t> items;
+
+  GridView view() const { return {origin_m, cell_m, num_x, num_y, begin, items}; }
+};
+
+struct WorldMap {
+  std::vector<LaneSegment> segments;
+  std::vector<MapLane> lanes;  // of the RoadMap, in its order; those that are not drivable have no segments
+  std::vector<int32_t> successors;
+  std::vector<Barrier> edges, walls;
+  std::vector<StopLine> stop_lines;  // of RoadMap::lights, in its order
+  std::vector<int32_t> spawn_lanes;
+  std::vector<float> spawn_end_m;
+  std::vector<ObservedPiece> lane_pieces, boundary_pieces;
+  Grid segment_cells, edge_cells, wall_cells, stop_line_cells;
+  CellLists near_lane_pieces, near_boundary_pieces, near_stop_lines;
+  Vec2 low_m, high_m;
+
+  MapView view() const;
+};
+
+/// Throws Error naming the map when it has no drivable lane.
+WorldMap make_world_map(const RoadMap& map, Span<const WallFace> walls);
+
+}  // namespace pictura
