@@ -11,6 +11,7 @@ namespace {
 constexpr double kWidthTolerance_m = 0.01;
 // Formulae that begin this close to a section's ends belong to its neighbour or to itself, whichever begins there.
 constexpr double kSectionMargin_m = 1e-5;
+constexpr double kMaxOffset_m = 1e4, kMaxHeight_m = 1e4;
 // Spirals are integrated in panels that turn by at most this; five points are then exact to rounding.
 constexpr double kPanelTurn_rad = 0.5;
 
@@ -49,6 +50,13 @@ double Profile::value(double s) const {
   return cubic.a + ds * (cubic.b + ds * (cubic.c + ds * cubic.d));
 }
 
+double Profile::slope(double s) const {
+  if (cubics.empty() || s < cubics.front().s - 1e-6) return 0;
+  const Cubic& cubic = item_at(cubics, s);
+  const double ds = s - cubic.s;
+  return cubic.b + ds * (2 * cubic.c + ds * 3 * cubic.d);
+}
+
 Pose pose_on(const GeometryPiece& piece, double ds) {
   const double k0 = piece.start_curvature;
   const double rate = (piece.end_curvature - k0) / piece.length;
@@ -81,7 +89,12 @@ Pose pose_at(const FileRoad& road, double s) {
 
 Point3 point_at(const FileRoad& road, double s, double t) {
   const Pose pose = pose_at(road, s);
-  return {pose.x - t * std::sin(pose.heading), pose.y + t * std::cos(pose.heading), road.elevation.value(s)};
+  const double z = road.elevation.value(s);
+  if (!(std::abs(t) <= kMaxOffset_m && std::abs(z) <= kMaxHeight_m)) {
+    road.where.fail("at s {:.3f} something lies {} m beside it at a height of {} m; expected at most {} and {} m", s, t,
+                    z, kMaxOffset_m, kMaxHeight_m);
+  }
+  return {pose.x - t * std::sin(pose.heading), pose.y + t * std::cos(pose.heading), z};
 }
 
 double lane_width(const FileSection& section, const FileLane& lane, double s) {
@@ -97,19 +110,27 @@ double border_t(const FileRoad& road, const FileSection& section, int border, do
   return t;
 }
 
+double border_slope(const FileRoad& road, const FileSection& section, int border, double s) {
+  const double here = inside(section, s);
+  double slope = road.lane_offset.slope(here);
+  for (int i = 0; i < border; ++i) slope += section.left[static_cast<std::size_t>(i)].width.slope(here - section.s);
+  for (int i = 0; i < -border; ++i) slope -= section.right[static_cast<std::size_t>(i)].width.slope(here - section.s);
+  return slope;
+}
+
 std::vector<double> formula_changes(const FileRoad& road, const FileSection& section, int border, double begin,
                                     double end) {
   std::vector<double> changes{begin};
-  auto add = [&](double s) {
-    if (s > begin && s < end) changes.push_back(s);
+  auto add_all = [&](const auto& items, double offset) {
+    auto item = std::upper_bound(items.begin(), items.end(), begin - offset,
+                                 [](double s, const auto& candidate) { return s < candidate.s; });
+    for (; item != items.end() && item->s + offset < end; ++item) changes.push_back(item->s + offset);
   };
-  for (const GeometryPiece& piece : road.geometry) add(piece.s);
-  for (const Cubic& cubic : road.elevation.cubics) add(cubic.s);
-  for (const Cubic& cubic : road.lane_offset.cubics) add(cubic.s);
+  add_all(road.geometry, 0);
+  add_all(road.elevation.cubics, 0);
+  add_all(road.lane_offset.cubics, 0);
   const std::vector<FileLane>& side = border > 0 ? section.left : section.right;
-  for (int i = 0; i < std::abs(border); ++i) {
-    for (const Cubic& cubic : side[static_cast<std::size_t>(i)].width.cubics) add(section.s + cubic.s);
-  }
+  for (int i = 0; i < std::abs(border); ++i) add_all(side[static_cast<std::size_t>(i)].width.cubics, section.s);
   std::sort(changes.begin() + 1, changes.end());
   changes.push_back(end);
   return changes;

@@ -24,6 +24,9 @@ Point3 point_at(const FileRoad& road, double s, double t);
 /// (-k). Throws Error naming the lane whose width is negative there.
 double border_t(const FileRoad& road, const FileSection& section, int border, double s);
 
+/// How fast that t grows with s.
+double border_slope(const FileRoad& road, const FileSection& section, int border, double s);
+
 /// Width of a lane at s.
 double lane_width(const FileSection& section, const FileLane& lane, double s);
 

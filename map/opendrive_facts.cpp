@@ -20,8 +20,11 @@ void count_facts(Build* build) {
   for (const Lane& lane : map.lanes) {
     if (lane.type != LaneType::driving) continue;
     ++facts.driving_lanes;
-    facts.driving_lane_km += 1e-3 * static_cast<double>(lane.length_m);
-    if (lane.in_junction) facts.driving_lane_km_in_junctions += 1e-3 * static_cast<double>(lane.length_m);
+    // Along the reference line, as the file itself measures.
+    const FileRoad& road = network.roads[static_cast<std::size_t>(lane.source_road)];
+    const FileSection& section = road.sections[static_cast<std::size_t>(lane.source_section)];
+    facts.driving_lane_km += 1e-3 * (section.end - section.s);
+    if (lane.in_junction) facts.driving_lane_km_in_junctions += 1e-3 * (section.end - section.s);
     for (const LanePoint& point : map.points_of(lane)) {
       const double z = static_cast<double>(point.position_m.z) + map.origin_m[2];
       facts.z_min_m = first ? z : std::min(facts.z_min_m, z);

@@ -1,6 +1,7 @@
 // Lanes from sections: centre lines in the direction of travel, neighbours, links, speed limits, endless routes.
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <set>
 
@@ -11,22 +12,22 @@ namespace pictura::opendrive {
 namespace {
 
 constexpr float kDefaultSpeedLimit_mps = 15.0f;
-// Half of the step over which slopes are measured: files have steps of some millimetres between their cubics.
-constexpr double kHeadingStep_m = 0.1;
+// Lanes whose ends lie further apart than this do not continue each other, whatever the file says (Town03 links two
+// neighbouring lanes to the same next one).
+constexpr float kMaxLinkGap_m = 1.0f;
 // Float coordinates keep a resolution of 8 mm within this range of the origin.
 constexpr double kMaxMapRadius_m = 1e5;
 
 /// Types that one may drive through from lane to lane; routes are made of them.
 bool is_route(LaneType type) { return type == LaneType::driving || type == LaneType::ramp; }
 
-/// Heading of the curve at t(s) = center_t(s), towards growing s: the slope of t turns it away from the reference line,
-/// more so where t runs inside a curve.
-template <typename CenterT>
-double heading_along(const FileRoad& road, const FileSection& section, double s, const CenterT& center_t) {
-  const double before = std::max(s - kHeadingStep_m, section.s), after = std::min(s + kHeadingStep_m, section.end);
-  const double slope = (center_t(after) - center_t(before)) / (after - before);
+/// Heading of a lane's centre line towards growing s: the slope of t turns it away from the reference line, more so
+/// where it runs inside a curve. Slopes come from the formulae, since files have steps between them.
+double center_heading(const FileRoad& road, const FileSection& section, int inner, int outer, double s) {
+  const double t = 0.5 * (border_t(road, section, inner, s) + border_t(road, section, outer, s));
+  const double slope = 0.5 * (border_slope(road, section, inner, s) + border_slope(road, section, outer, s));
   const Pose pose = pose_at(road, s);
-  return pose.heading + std::atan2(slope, 1.0 - pose.curvature * center_t(s));
+  return pose.heading + std::atan2(slope, 1.0 - pose.curvature * t);
 }
 
 Lane make_lane(Build* build, const FileRoad& road, const FileSection& section, const FileLane& lane) {
@@ -50,8 +51,9 @@ Lane make_lane(Build* build, const FileRoad& road, const FileSection& section, c
   for (std::size_t i = 0; i < points.size(); ++i) {
     const CurvePoint& point = points[i];
     if (i > 0) length_m += std::hypot(point.x - points[i - 1].x, point.y - points[i - 1].y);
-    const double heading = std::remainder(
-        heading_along(road, section, point.s, center_t) + (forward ? 0.0 : std::numbers::pi), 2 * std::numbers::pi);
+    const double heading =
+        std::remainder(center_heading(road, section, inner, lane.id, point.s) + (forward ? 0.0 : std::numbers::pi),
+                       2 * std::numbers::pi);
     build->map->lane_points.push_back({build->to_map(point.x, point.y, point.z), static_cast<float>(heading),
                                        static_cast<float>(point.width), static_cast<float>(length_m)});
   }
@@ -177,8 +179,17 @@ class Linker {
     const LaneType type_a = build_.map->lanes[static_cast<std::size_t>(lane_a)].type;
     const LaneType type_b = build_.map->lanes[static_cast<std::size_t>(lane_b)].type;
     if (type_a != type_b && !(is_drivable(type_a) && is_drivable(type_b))) return;
-    if (is_exit(a) && !is_exit(b)) links_.emplace(lane_a, lane_b);
-    if (is_exit(b) && !is_exit(a)) links_.emplace(lane_b, lane_a);
+    if (is_exit(a) && !is_exit(b)) add_in_order(lane_a, lane_b);
+    if (is_exit(b) && !is_exit(a)) add_in_order(lane_b, lane_a);
+  }
+
+  void add_in_order(int32_t from, int32_t to) {
+    const RoadMap& map = *build_.map;
+    const Vec3 end =
+        map.lane_points[static_cast<std::size_t>(map.lanes[static_cast<std::size_t>(from)].points.end) - 1].position_m;
+    const Vec3 begin =
+        map.lane_points[static_cast<std::size_t>(map.lanes[static_cast<std::size_t>(to)].points.begin)].position_m;
+    if (length(end - begin) <= kMaxLinkGap_m) links_.emplace(from, to);
   }
 
   int32_t lane_at(const LaneEnd& end) const {
@@ -284,30 +295,36 @@ void link_lanes(Build* build) { Linker(build).link_all(); }
 void set_speed_limits(Build* build) {
   RoadMap& map = *build->map;
   for (Lane& lane : map.lanes) {
-    lane.speed_limit_mps =
-        static_cast<float>(build->network.roads[static_cast<std::size_t>(lane.source_road)].speed_limit_mps);
+    const FileRoad& road = build->network.roads[static_cast<std::size_t>(lane.source_road)];
+    const FileSection& section = road.sections[static_cast<std::size_t>(lane.source_section)];
+    lane.speed_limit_mps = static_cast<float>(road.speed_limit_at(0.5 * (section.s + section.end)));
   }
   // Lanes without a limit, as those of junctions, take the highest of the lanes that lead into them, then of those that
   // they lead to, over as many lanes as it takes.
-  auto inherit = [&](IndexRange Lane::* range) {
-    for (bool changed = true; changed;) {
-      changed = false;
-      std::vector<float> inherited(map.lanes.size(), 0.0f);
-      for (std::size_t i = 0; i < map.lanes.size(); ++i) {
-        if (map.lanes[i].speed_limit_mps > 0) continue;
-        for (const int32_t other : map.links(map.lanes[i].*range)) {
-          inherited[i] = max_of(inherited[i], map.lanes[static_cast<std::size_t>(other)].speed_limit_mps);
+  auto inherit = [&](IndexRange Lane::* onward) {
+    std::vector<int32_t> known;
+    for (std::size_t i = 0; i < map.lanes.size(); ++i) {
+      if (map.lanes[i].speed_limit_mps > 0) known.push_back(static_cast<int32_t>(i));
+    }
+    while (!known.empty()) {
+      std::map<int32_t, float> inherited;
+      for (const int32_t from : known) {
+        const Lane& lane = map.lanes[static_cast<std::size_t>(from)];
+        for (const int32_t to : map.links(lane.*onward)) {
+          if (map.lanes[static_cast<std::size_t>(to)].speed_limit_mps > 0) continue;
+          float& limit = inherited[to];
+          limit = max_of(limit, lane.speed_limit_mps);
         }
       }
-      for (std::size_t i = 0; i < map.lanes.size(); ++i) {
-        if (inherited[i] <= 0) continue;
-        map.lanes[i].speed_limit_mps = inherited[i];
-        changed = true;
+      known.clear();
+      for (const auto& [lane, limit] : inherited) {
+        map.lanes[static_cast<std::size_t>(lane)].speed_limit_mps = limit;
+        known.push_back(lane);
       }
     }
   };
-  inherit(&Lane::predecessors);
   inherit(&Lane::successors);
+  inherit(&Lane::predecessors);
   for (Lane& lane : map.lanes) {
     if (lane.speed_limit_mps <= 0) lane.speed_limit_mps = kDefaultSpeedLimit_mps;
   }
@@ -315,29 +332,42 @@ void set_speed_limits(Build* build) {
 
 void find_endless_lanes(Build* build) {
   RoadMap& map = *build->map;
-  // Lanes between which one may change share a group; a group lives while one of its lanes leads to a living group.
+  // Lanes between which one may change share a group, named by its leftmost lane. A group dies when none of its lanes
+  // leads to a living group, and takes with it what only led there.
   std::vector<std::size_t> group(map.lanes.size());
+  std::vector<std::vector<std::size_t>> members(map.lanes.size());
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
     std::size_t leftmost = i;
     while (map.lanes[leftmost].left_neighbor >= 0)
       leftmost = static_cast<std::size_t>(map.lanes[leftmost].left_neighbor);
     group[i] = leftmost;
+    members[leftmost].push_back(i);
   }
-  std::vector<bool> lives(map.lanes.size(), true);
-  for (bool changed = true; changed;) {
-    std::vector<bool> leads_on(map.lanes.size(), false);
-    for (std::size_t i = 0; i < map.lanes.size(); ++i) {
-      if (!is_route(map.lanes[i].type)) continue;
-      for (const int32_t next : map.links(map.lanes[i].successors)) {
-        const std::size_t lane = static_cast<std::size_t>(next);
-        if (is_route(map.lanes[lane].type) && lives[group[lane]]) leads_on[group[i]] = true;
+  auto is_route_lane = [&](int32_t lane) { return is_route(map.lanes[static_cast<std::size_t>(lane)].type); };
+  std::vector<int> ways_on(map.lanes.size(), 0);
+  for (std::size_t i = 0; i < map.lanes.size(); ++i) {
+    if (!is_route(map.lanes[i].type)) continue;
+    for (const int32_t next : map.links(map.lanes[i].successors)) ways_on[group[i]] += is_route_lane(next) ? 1 : 0;
+  }
+  std::vector<std::size_t> dead;
+  for (std::size_t i = 0; i < map.lanes.size(); ++i) {
+    if (group[i] == i && ways_on[i] == 0) dead.push_back(i);
+  }
+  while (!dead.empty()) {
+    const std::size_t died = dead.back();
+    dead.pop_back();
+    for (const std::size_t lane : members[died]) {
+      if (!is_route(map.lanes[lane].type)) continue;
+      for (const int32_t before : map.links(map.lanes[lane].predecessors)) {
+        if (!is_route_lane(before)) continue;
+        const std::size_t other = group[static_cast<std::size_t>(before)];
+        if (--ways_on[other] == 0) dead.push_back(other);
       }
     }
-    changed = leads_on != lives;
-    lives = std::move(leads_on);
   }
-  for (std::size_t i = 0; i < map.lanes.size(); ++i)
-    map.lanes[i].is_endless = is_route(map.lanes[i].type) && lives[group[i]];
+  for (std::size_t i = 0; i < map.lanes.size(); ++i) {
+    map.lanes[i].is_endless = is_route(map.lanes[i].type) && ways_on[group[i]] > 0;
+  }
 }
 
 }  // namespace pictura::opendrive

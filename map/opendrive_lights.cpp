@@ -15,7 +15,7 @@ constexpr std::string_view kLightType = "1000001";
 constexpr double kNearHeadHeight_m = 3.5, kFarHeadHeight_m = 5.5;
 // A head further behind the stop line than this hangs on the far side.
 constexpr float kFarHead_m = 5.0f;
-constexpr int kMaxLaneId = 1000;
+constexpr int kMaxLaneId = 64;
 
 struct SignalPlace {
   const FileRoad* road = nullptr;
@@ -69,7 +69,14 @@ class LightBuilder {
   /// Phases are the ranks of the sequence numbers of a junction's controllers, of those that control a light.
   void find_phases() {
     std::unordered_map<std::string, const FileController*> controllers;
-    for (const FileController& controller : build_.network.controllers) controllers.emplace(controller.id, &controller);
+    for (const FileController& controller : build_.network.controllers) {
+      if (!controllers.emplace(controller.id, &controller).second) {
+        controller.where.fail("attribute id: another controller has it already");
+      }
+      for (const std::string& signal : controller.signals) {
+        if (!signals_.contains(signal)) controller.where.fail("controls signal {}, which does not exist", signal);
+      }
+    }
     for (std::size_t j = 0; j < build_.network.junctions.size(); ++j) {
       std::map<int, std::vector<std::string>> lights_of_sequence;
       for (const std::string& id : build_.network.junctions[j].controllers) {
@@ -78,8 +85,7 @@ class LightBuilder {
           build_.network.junctions[j].where.fail("refers to controller {}, which does not exist", id);
         }
         for (const std::string& signal : controller->second->signals) {
-          const auto found = signals_.find(signal);
-          if (found == signals_.end() || ranked_[found->second].signal->type != kLightType) continue;
+          if (ranked_[signals_.at(signal)].signal->type != kLightType) continue;
           lights_of_sequence[controller->second->sequence].push_back(signal);
         }
       }

@@ -49,6 +49,7 @@ struct Profile {
   std::vector<Cubic> cubics;
 
   double value(double s) const;
+  double slope(double s) const;
 };
 
 /// A piece of a reference line: curvature falls linearly from one end to the other (line: 0 and 0, arc: equal).
@@ -123,7 +124,7 @@ struct FileRoad {
   std::string id, junction;  // junction is empty when the road is none's
   double length = 0;
   RoadLink predecessor, successor;
-  double speed_limit_mps = 0;  // 0: the file gives none
+  Profile speed_limit_mps;  // constants; 0 where the file gives none
   std::vector<GeometryPiece> geometry;
   Profile elevation, lane_offset;
   std::vector<FileSection> sections;
@@ -131,6 +132,8 @@ struct FileRoad {
   std::vector<FileSignal> signals;
   std::vector<SignalReference> signal_references;
   Where where;
+
+  double speed_limit_at(double s) const { return speed_limit_mps.value(s); }
 };
 
 struct LaneLink {
@@ -155,6 +158,7 @@ struct FileController {
   std::string id;
   int sequence = 0;
   std::vector<std::string> signals;
+  Where where;
 };
 
 struct Network {

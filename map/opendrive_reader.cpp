@@ -21,7 +21,7 @@ constexpr double kStationTolerance_m = 1e-3;
 // Sections that editors leave behind when they snap; no lane can be built from less.
 constexpr double kMinSection_m = 1e-3;
 constexpr double kMaxLaneWidth_m = 1e3;
-constexpr int kMaxLanesPerSide = 1000;
+constexpr int kMaxLanesPerSide = 64;
 
 std::string_view trim(std::string_view text) {
   const char* const blanks = " \t\r\n";
@@ -518,9 +518,11 @@ FileRoad read_road(const Element& element) {
     road.predecessor = read_road_link(link.child("predecessor"));
     road.successor = read_road_link(link.child("successor"));
   }
-  if (const Element type = element.child("type")) {
-    if (const Element speed = type.child("speed")) road.speed_limit_mps = speed_mps(speed);
-  }
+  element.each("type", [&](const Element& type) {
+    const Element speed = type.child("speed");
+    road.speed_limit_mps.cubics.push_back(
+        {.s = type.number_in("s", 0, road.length), .a = speed ? speed_mps(speed) : 0});
+  });
   std::vector<Element> geometry;
   element.needed_child("planView").each("geometry", [&](const Element& piece) {
     geometry.push_back(piece);
@@ -595,6 +597,7 @@ void read_network(std::string_view text, const std::string& source_name, Network
   root.each("controller", [&](const Element& element) {
     FileController controller;
     controller.id = element.text("id");
+    controller.where = element.with_owner(fmt::format("controller {}", controller.id)).where();
     controller.sequence = element.has("sequence") ? element.integer("sequence") : 0;
     element.each("control", [&](const Element& control) { controller.signals.push_back(control.text("signalId")); });
     network.controllers.push_back(std::move(controller));

@@ -44,6 +44,7 @@ template <typename Eval>
 std::vector<CurvePoint> sample_curve(const std::vector<double>& breaks, double tolerance_m, double max_piece_m,
                                      SampleBudget* budget, Eval&& eval) {
   constexpr int kMaxDepth = 24;
+  constexpr double kMinStep = 0.01;
   std::vector<CurvePoint> dense{eval(breaks.front())};
   auto refine = [&](auto&& self, const CurvePoint& a, const CurvePoint& b, int depth) -> void {
     budget->spend();
@@ -54,7 +55,7 @@ std::vector<CurvePoint> sample_curve(const std::vector<double>& breaks, double t
       for (const double fraction : {0.25, 0.75}) {
         fine = fine && chord_error(a, b, eval(a.s + fraction * (b.s - a.s))) <= 0.25 * tolerance_m;
       }
-      if (!fine && b.s - a.s > 1e-3) {
+      if (!fine && b.s - a.s > kMinStep) {
         self(self, a, middle, depth + 1);
         self(self, middle, b, depth + 1);
         return;

@@ -109,7 +109,7 @@ struct BuildingLine {
 /// Counts that `pictura map` prints and that tests compare with the file.
 struct MapFacts {
   int32_t roads = 0, junction_roads = 0, junctions = 0, signal_junctions = 0, lanes = 0, driving_lanes = 0;
-  double driving_lane_km = 0, driving_lane_km_in_junctions = 0;
+  double driving_lane_km = 0, driving_lane_km_in_junctions = 0;  // along the roads' reference lines
   int32_t traffic_lights = 0, stop_lines = 0, crosswalks = 0, parking_spaces = 0;
   double z_min_m = 0, z_max_m = 0;
 };
