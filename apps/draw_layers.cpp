@@ -207,7 +207,7 @@ void MapLayers::paint(Canvas& canvas, Vec2 left_top_m, double px_per_m) const {
   }
 
   canvas.set_color(kEdgeColor);
-  cairo_set_line_width(context, width_of(0.15, 0.9));
+  cairo_set_line_width(context, width_of(0.15, 0.7));
   cairo_set_line_cap(context, CAIRO_LINE_CAP_ROUND);
   for (const RoadEdge& edge : map_.road_edges) {
     Aabb2 box = nothing();

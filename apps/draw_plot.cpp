@@ -53,20 +53,46 @@ std::string tick_text(double value, double step) {
 
 bool drawable(const PlotSeries& series, size_t i) { return std::isfinite(series.x[i]) && std::isfinite(series.y[i]); }
 
-void draw_legend(Canvas& canvas, const PlotPanel& panel, double left, double top, double width) {
+/// Where a box of that size covers the fewest points: one of the four corners of the plot.
+struct Place {
+  double x, y;
+};
+Place emptiest_corner(const std::vector<Place>& points, Place top_left, double width, double height, double box_width,
+                      double box_height) {
+  constexpr double kAir_px = 8;
+  const double left = top_left.x + kAir_px, right = top_left.x + width - box_width - kAir_px;
+  const double top = top_left.y + kAir_px, bottom = top_left.y + height - box_height - kAir_px;
+  Place best{right, top};
+  long fewest = std::numeric_limits<long>::max();
+  for (const Place corner : {Place{right, top}, Place{left, top}, Place{right, bottom}, Place{left, bottom}}) {
+    const long covered = std::count_if(points.begin(), points.end(), [&](const Place& p) {
+      return p.x >= corner.x && p.x <= corner.x + box_width && p.y >= corner.y && p.y <= corner.y + box_height;
+    });
+    if (covered < fewest) {
+      fewest = covered;
+      best = corner;
+    }
+  }
+  return best;
+}
+
+/// `points`: every point of the panel, in pixels.
+void draw_legend(Canvas& canvas, const PlotPanel& panel, const std::vector<Place>& points, Place top_left, double width,
+                 double height) {
   const TextStyle style{.size_px = 12, .color = hex(0x22262B)};
   double widest = 0;
   for (const PlotSeries& series : panel.series) widest = std::max(widest, canvas.text_width(series.name, style));
-  const double box_width = widest + 44, row = 18;
-  const double x = left + width - box_width - 8, y = top + 8;
-  canvas.round_rectangle_path(x, y, box_width, row * static_cast<double>(panel.series.size()) + 8, 4);
+  constexpr double kRow_px = 18;
+  const double box_width = widest + 44, box_height = kRow_px * static_cast<double>(panel.series.size()) + 8;
+  const auto [x, y] = emptiest_corner(points, top_left, width, height, box_width, box_height);
+  canvas.round_rectangle_path(x, y, box_width, box_height, 4);
   canvas.set_color(hex(0xFFFFFF), 0.85);
   cairo_fill_preserve(canvas.context());
   canvas.set_color(kGridColor);
   cairo_set_line_width(canvas.context(), 1);
   cairo_stroke(canvas.context());
   for (size_t i = 0; i < panel.series.size(); ++i) {
-    const double middle = y + 4 + row * (static_cast<double>(i) + 0.5);
+    const double middle = y + 4 + kRow_px * (static_cast<double>(i) + 0.5);
     canvas.fill_rectangle(x + 8, middle - 1.25, 20, 2.5, kSeriesColors[i % kSeriesColors.size()]);
     canvas.text(x + 36, middle + 4, panel.series[i].name, style);
   }
@@ -115,6 +141,7 @@ void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, do
   cairo_set_line_width(context, 2);
   cairo_set_line_join(context, CAIRO_LINE_JOIN_ROUND);
   cairo_set_line_cap(context, CAIRO_LINE_CAP_ROUND);
+  std::vector<Place> points;
   for (size_t s = 0; s < panel.series.size(); ++s) {
     const PlotSeries& series = panel.series[s];
     canvas.set_color(kSeriesColors[s % kSeriesColors.size()]);
@@ -123,6 +150,7 @@ void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, do
         cairo_stroke(context);
         continue;
       }
+      points.push_back({to_x(series.x[i]), to_y(series.y[i])});
       const bool starts = i == 0 || !drawable(series, i - 1);
       const bool alone = starts && (i + 1 == series.x.size() || !drawable(series, i + 1));
       if (starts) cairo_move_to(context, to_x(series.x[i]), to_y(series.y[i]));
@@ -136,7 +164,7 @@ void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, do
     cairo_stroke(context);
   }
   cairo_restore(context);
-  if (panel.series.size() > 1) draw_legend(canvas, panel, left, top, width);
+  if (panel.series.size() > 1) draw_legend(canvas, panel, points, {left, top}, width, height);
 }
 
 }  // namespace

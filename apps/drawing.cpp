@@ -31,7 +31,6 @@ void draw_scale_bar(Canvas& canvas, const Metrics& m, double px_per_m) {
   const double length_m = most_m >= 5 * power ? 5 * power : (most_m >= 2 * power ? 2 * power : power);
   const double width = length_m * px_per_m, height = m.px(6);
   const double x = canvas.width_px() - m.px(24) - width, y = canvas.height_px() - m.px(22);
-  canvas.fill_rectangle(x - m.px(12), y - m.px(30), width + m.px(24), m.px(46), kPanelColor, 0.85);
   canvas.fill_rectangle(x, y, width, height, hex(0x22262B));
   canvas.fill_rectangle(x + 0.25 * width, y + 0.25 * height, 0.25 * width, 0.5 * height, kPanelColor);
   canvas.fill_rectangle(x + 0.75 * width, y + 0.25 * height, 0.25 * width, 0.5 * height, kPanelColor);
@@ -97,18 +96,20 @@ RgbImage draw_map(const RoadMap& map, int size_px) {
   PICTURA_CHECK(size_px >= 64 && size_px <= 16384, "picture of {}: expected a size of 64 to 16384 px, got {}", map.name,
                 size_px);
   const Metrics m{size_px / 1600.0};
-  const double band = m.px(96), margin = m.px(28);
+  // Above the map a band for its name and legend, below it a strip for the scale bar.
+  const double band = m.px(96), margin = m.px(28), strip = m.px(36);
   const Aabb2 bounds = bounds_of(map);
   const double width_m = std::max(1.0f, bounds.high.x - bounds.low.x),
                height_m = std::max(1.0f, bounds.high.y - bounds.low.y);
   // The longer side of the whole picture, band included, is size_px; a narrow map still gets room for its title.
   const double room = size_px - 2 * margin;
-  const double px_per_m = std::min(room / width_m, (room - band) / height_m);
+  const double px_per_m = std::min(room / width_m, (room - band - strip) / height_m);
   const int width_px =
       std::clamp(static_cast<int>(std::ceil(width_m * px_per_m + 2 * margin)), size_px * 3 / 5, size_px);
-  const int height_px = std::clamp(static_cast<int>(std::ceil(height_m * px_per_m + 2 * margin + band)), 1, size_px);
+  const int height_px =
+      std::clamp(static_cast<int>(std::ceil(height_m * px_per_m + 2 * margin + band + strip)), 1, size_px);
 
-  Canvas canvas(std::max(width_px, width_px > height_px ? size_px : width_px), height_px, kGroundColor);
+  Canvas canvas(width_px, height_px, kGroundColor);
   const Vec2 left_top{static_cast<float>(0.5 * (bounds.low.x + bounds.high.x) - 0.5 * canvas.width_px() / px_per_m),
                       static_cast<float>(bounds.high.y + (margin + band) / px_per_m)};
   MapLayers(map).paint(canvas, left_top, px_per_m);
