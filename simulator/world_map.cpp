@@ -14,8 +14,6 @@ namespace {
 
 /// Observed pieces follow curves within this distance, so that junctions do not fill the observation with short pieces.
 constexpr float kObservedChordError_m = 0.25f;
-/// Pieces listed per cell: more than are observed, since some of them lie out of sight of a given heading.
-constexpr size_t kListedPieces = 160;
 constexpr float kNearCell_m = 10.0f;
 constexpr float kLookupCell_m = 5.0f;
 /// Agents stay this close to drivable lanes; cells farther out list nothing to observe.
@@ -162,10 +160,16 @@ Grid cells_of(const std::vector<Item>& items, ToBox&& to_box) {
   return Grid(boxes, kLookupCell_m);
 }
 
+struct Neighbor {
+  float distance_m;
+  int32_t item;
+};
+
 /// For every cell that an observer may stand in, the items whose points lie within range of its centre, nearest first,
-/// cut by `keep` (how many of the sorted distances to keep).
-template <typename Keep>
-CellLists lists_by_distance(const WorldMap& map, const std::vector<Vec2>& points, float range_m, Keep&& keep) {
+/// go through `append(center, neighbors, &lists)`, which appends lists_per_cell lists.
+template <typename Append>
+CellLists lists_by_distance(const WorldMap& map, const std::vector<Vec2>& points, float range_m, int lists_per_cell,
+                            Append&& append) {
   CellLists lists;
   lists.origin_m = map.low_m;
   lists.cell_m = kNearCell_m;
@@ -189,8 +193,7 @@ CellLists lists_by_distance(const WorldMap& map, const std::vector<Vec2>& points
   for (const Vec2& point : points) boxes.push_back({point, point});
   const Grid grid(boxes, 20.0f);
   const GridView point_cells = grid.view();
-  std::vector<std::pair<float, int32_t>> found;
-  std::vector<float> distances;
+  std::vector<Neighbor> found;
   lists.begin.assign(1, 0);
   for (size_t cell = 0; cell < num_cells; ++cell) {
     if (is_occupied[cell] && !points.empty()) {
@@ -204,25 +207,72 @@ CellLists lists_by_distance(const WorldMap& map, const std::vector<Vec2>& points
           for (int32_t i = point_cells.begin[c]; i < point_cells.begin[c + 1]; ++i) {
             const int32_t item = point_cells.items[static_cast<size_t>(i)];
             const float distance = length(points[static_cast<size_t>(item)] - center);
-            if (distance <= range_m) found.emplace_back(distance, item);
+            if (distance <= range_m) found.push_back({distance, item});
           }
         }
       }
-      std::sort(found.begin(), found.end());
-      distances.clear();
-      for (const auto& [distance, item] : found) distances.push_back(distance);
-      found.resize(keep(distances));
-      for (const auto& [distance, item] : found) lists.items.push_back(item);
+      std::sort(found.begin(), found.end(), [](const Neighbor& a, const Neighbor& b) {
+        return a.distance_m < b.distance_m || (a.distance_m == b.distance_m && a.item < b.item);
+      });
+      append(center, found, &lists);
+    } else {
+      lists.begin.insert(lists.begin.end(), static_cast<size_t>(lists_per_cell), lists.begin.back());
     }
-    lists.begin.push_back(static_cast<int32_t>(lists.items.size()));
   }
   return lists;
 }
 
-std::vector<Vec2> middles_of(const std::vector<ObservedPiece>& pieces) {
+void end_list(CellLists* lists_inout) { lists_inout->begin.push_back(static_cast<int32_t>(lists_inout->items.size())); }
+
+/// Whether a piece at `offset` from a cell's centre may be in the sight of somebody in the cell who heads within a
+/// sector; never wrong about a piece that is.
+bool may_be_seen(Vec2 offset, float distance_m, float sector_middle_rad) {
+  const float margin_m = 0.5f * std::sqrt(2.0f) * kNearCell_m + 0.1f;
+  const float half_sector = kPi / kSectors;
+  // As seen by the heading of the sector that turns most towards it.
+  const float off_axis =
+      std::max(0.0f, std::fabs(wrap_angle(std::atan2(offset.y, offset.x) - sector_middle_rad)) - half_sector);
+  const float ahead = distance_m * std::cos(off_axis), aside = distance_m * std::sin(off_axis);
+  if (ahead > kRoadAhead_m + margin_m || ahead < -kRoadBehind_m - margin_m) return false;
+  // A piece behind comes into the window sideways too, as the heading turns away from it: keep what is that close.
+  const float close_m = std::sqrt(square(kRoadBehind_m + margin_m) + square(kRoadAside_m + margin_m));
+  return aside <= kRoadAside_m + margin_m || distance_m <= close_m;
+}
+
+CellLists lists_of_pieces(const WorldMap& map, const std::vector<ObservedPiece>& pieces) {
   std::vector<Vec2> middles;
   for (const ObservedPiece& piece : pieces) middles.push_back(piece.middle_m.xy());
-  return middles;
+  const float sight_m = std::sqrt(square(kRoadAhead_m) + square(kRoadAside_m)) + kNearCell_m;
+  return lists_by_distance(
+      map, middles, sight_m, kSectors, [&](Vec2 center, const std::vector<Neighbor>& neighbors, CellLists* lists) {
+        for (int sector = 0; sector < kSectors; ++sector) {
+          const float heading = -kPi + (static_cast<float>(sector) + 0.5f) * (kTwoPi / kSectors);
+          for (const Neighbor& near : neighbors) {
+            if (may_be_seen(middles[static_cast<size_t>(near.item)] - center, near.distance_m, heading)) {
+              lists->items.push_back(near.item);
+            }
+          }
+          end_list(lists);
+        }
+      });
+}
+
+/// Whatever can be among the nearest kMaxControls from anywhere in the cell: as far from its centre as the last of them
+/// and a cell's diagonal.
+CellLists lists_of_stop_lines(const WorldMap& map) {
+  std::vector<Vec2> middles;
+  for (const StopLine& line : map.stop_lines) middles.push_back(line.middle_m.xy());
+  return lists_by_distance(map, middles, kControlRange_m + kNearCell_m, 1,
+                           [](Vec2, const std::vector<Neighbor>& neighbors, CellLists* lists) {
+                             const float last_m =
+                                 neighbors.size() < kMaxControls
+                                     ? INFINITY
+                                     : neighbors[kMaxControls - 1].distance_m + std::sqrt(2.0f) * kNearCell_m;
+                             for (const Neighbor& near : neighbors) {
+                               if (near.distance_m <= last_m) lists->items.push_back(near.item);
+                             }
+                             end_list(lists);
+                           });
 }
 
 }  // namespace
@@ -256,22 +306,9 @@ WorldMap make_world_map(const RoadMap& map, Span<const WallFace> walls) {
     return box_of_segment(line.middle_m.xy(), line.middle_m.xy(), kStopLineReach_m);
   });
 
-  const float sight_m = std::sqrt(square(kRoadAhead_m) + square(kRoadAside_m)) + kNearCell_m;
-  const auto first_pieces = [](const std::vector<float>& distances) {
-    return std::min(distances.size(), kListedPieces);
-  };
-  out.near_lane_pieces = lists_by_distance(out, middles_of(out.lane_pieces), sight_m, first_pieces);
-  out.near_boundary_pieces = lists_by_distance(out, middles_of(out.boundary_pieces), sight_m, first_pieces);
-  std::vector<Vec2> line_middles;
-  for (const StopLine& line : out.stop_lines) line_middles.push_back(line.middle_m.xy());
-  // Whatever can be among the nearest kMaxControls from anywhere in the cell: a cell's diagonal farther than the last
-  // of them is from its centre.
-  out.near_stop_lines =
-      lists_by_distance(out, line_middles, kControlRange_m + kNearCell_m, [](const std::vector<float>& distances) {
-        if (distances.size() <= kMaxControls) return distances.size();
-        const float last = distances[kMaxControls - 1] + std::sqrt(2.0f) * kNearCell_m;
-        return static_cast<size_t>(std::upper_bound(distances.begin(), distances.end(), last) - distances.begin());
-      });
+  out.near_lane_pieces = lists_of_pieces(out, out.lane_pieces);
+  out.near_boundary_pieces = lists_of_pieces(out, out.boundary_pieces);
+  out.near_stop_lines = lists_of_stop_lines(out);
   return out;
 }
 

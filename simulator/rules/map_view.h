@@ -1,6 +1,6 @@
 // What rules read of a map: flat arrays and cell lists that both devices can hold. simulator/world_map.h makes them
 // from a RoadMap. Cell lists come in two kinds: `*_cells` list, for a point's one cell, everything within reach of any
-// point in it; `near_*` list what is worth observing from it, nearest to the cell's centre first.
+// point in it; `near_*` list what may be observed from it, nearest to the cell's centre first.
 #pragma once
 
 #include "pictura/common/grid.h"
@@ -73,15 +73,28 @@ struct MapView {
   Span<const float> spawn_end_m;  // [spawn_lanes] running sum of their lengths
   Span<const ObservedPiece> lane_pieces, boundary_pieces;
   GridView segment_cells, edge_cells, wall_cells, stop_line_cells;
-  GridView near_lane_pieces, near_boundary_pieces, near_stop_lines;
+  GridView near_lane_pieces, near_boundary_pieces;  // per cell and sector
+  GridView near_stop_lines;
   Vec2 low_m, high_m;  // of the drivable surface
 };
 
+PICTURA_HD inline Span<const int32_t> list_of(const GridView& lists, size_t index) {
+  const int32_t begin = lists.begin[index];
+  return lists.items.subspan(static_cast<size_t>(begin), static_cast<size_t>(lists.begin[index + 1] - begin));
+}
+
 /// The list of the cell that holds p; points outside belong to the nearest cell.
 PICTURA_HD inline Span<const int32_t> items_at(const GridView& cells, Vec2 p) {
-  const size_t cell = static_cast<size_t>(cells.cell_y(p.y) * cells.num_x + cells.cell_x(p.x));
-  const int32_t begin = cells.begin[cell];
-  return cells.items.subspan(static_cast<size_t>(begin), static_cast<size_t>(cells.begin[cell + 1] - begin));
+  return list_of(cells, static_cast<size_t>(cells.cell_y(p.y) * cells.num_x + cells.cell_x(p.x)));
+}
+
+/// What there is to observe depends on where one looks: pieces are listed per cell and per eighth of a turn.
+constexpr int kSectors = 8;
+
+/// The list of the cell that holds p and of the sector that holds the heading, in [-pi, pi].
+PICTURA_HD inline Span<const int32_t> items_at(const GridView& cells, Vec2 p, float heading_rad) {
+  const int sector = clamp(static_cast<int>((heading_rad + kPi) * (kSectors / kTwoPi)), 0, kSectors - 1);
+  return list_of(cells, static_cast<size_t>((cells.cell_y(p.y) * cells.num_x + cells.cell_x(p.x)) * kSectors + sector));
 }
 
 }  // namespace pictura

@@ -91,17 +91,22 @@ struct Nearest {
   }
 };
 
-/// Finds the partners of `agent` by distance from its reference point to their box centres: the near cells first, and
-/// the far ones only when the near ones cannot settle it.
+/// The partners of `agent` by distance from its reference point to their box centres: from the near cells where enough
+/// stand there, else from all that are in range.
 PICTURA_HD inline Nearest<kMaxPartners> nearest_partners(const WorldView& world, int agent, Vec2 origin) {
   const GridView& cells = world.box_cells;
   Nearest<kMaxPartners> nearest;
-  const float reaches[2] = {cells.cell_m, kPartnerRange_m};
-  for (int pass = 0; pass < 2; ++pass) {
-    const float reach = reaches[pass];
-    nearest.count = 0;
+  for (float reach = cells.cell_m;; reach = kPartnerRange_m) {
     const int x0 = cells.cell_x(origin.x - reach), x1 = cells.cell_x(origin.x + reach);
     const int y0 = cells.cell_y(origin.y - reach), y1 = cells.cell_y(origin.y + reach);
+    const bool is_near = reach < kPartnerRange_m;
+    int found = 0;
+    for (int y = y0; y <= y1 && is_near; ++y) {
+      found += cells.begin[static_cast<size_t>(y * cells.num_x + x1 + 1)] -
+               cells.begin[static_cast<size_t>(y * cells.num_x + x0)];
+    }
+    if (is_near && found <= kMaxPartners) continue;
+    nearest.count = 0;
     for (int y = y0; y <= y1; ++y) {
       const int32_t begin = cells.begin[static_cast<size_t>(y * cells.num_x + x0)];
       const int32_t end = cells.begin[static_cast<size_t>(y * cells.num_x + x1 + 1)];
@@ -113,9 +118,8 @@ PICTURA_HD inline Nearest<kMaxPartners> nearest_partners(const WorldView& world,
         if (d2 < square(kPartnerRange_m)) nearest.insert(d2, other);
       }
     }
-    if (nearest.count == kMaxPartners && nearest.worst() <= square(reach)) break;
+    if (!is_near || (nearest.count == kMaxPartners && nearest.worst() <= square(reach))) return nearest;
   }
-  return nearest;
 }
 
 PICTURA_HD inline int observe_partners(const WorldView& world, int agent, const EgoFrame& frame, float* out) {
@@ -139,26 +143,28 @@ PICTURA_HD inline int observe_partners(const WorldView& world, int agent, const 
   return nearest.count;
 }
 
-/// Lanes or boundaries: of the pieces listed for the ego's cell, the first `capacity` whose middles are in sight.
-PICTURA_HD inline int observe_pieces(Span<const ObservedPiece> pieces, const GridView& near, const EgoFrame& frame,
+/// Lanes or boundaries: of the pieces listed for the ego's cell, the first `capacity` whose middles are in sight. Rows
+/// are written before it is known whether they count, which spares an unpredictable branch; the row after the last may
+/// hold a leftover.
+PICTURA_HD inline int observe_pieces(Span<const ObservedPiece> pieces, Span<const int32_t> items, const EgoFrame& frame,
                                      int capacity, float* out) {
   constexpr float kPerPosition = 1.0f / kScalePosition_m, kPerHeight = 1.0f / kScaleHeight_m;
-  const Span<const int32_t> items = items_at(near, frame.origin_m.xy());
+  constexpr float kPerHalfPiece = 1.0f / kScaleHalfPiece_m, kPerWidth = 1.0f / kScaleLaneWidth_m;
+  constexpr float kMiddle_m = 0.5f * (kRoadAhead_m - kRoadBehind_m), kHalf_m = 0.5f * (kRoadAhead_m + kRoadBehind_m);
   int count = 0;
   for (size_t i = 0; i < items.size() && count < capacity; ++i) {
     const ObservedPiece& piece = pieces[static_cast<size_t>(items[i])];
     const Vec3 local = frame.to_local(piece.middle_m);
-    if (local.x > kRoadAhead_m || local.x < -kRoadBehind_m || fabsf(local.y) > kRoadAside_m) continue;
     const Vec2 direction = frame.turn(piece.direction);
-    out[0] = local.x * kPerPosition;
-    out[1] = local.y * kPerPosition;
-    out[2] = local.z * kPerHeight;
-    out[3] = piece.half_length_m * (1.0f / kScaleHalfPiece_m);
-    out[4] = direction.x;
-    out[5] = direction.y;
-    out[6] = piece.width_m * (1.0f / kScaleLaneWidth_m);
-    out += kLaneFeatures;
-    ++count;
+    float* row = out + count * kLaneFeatures;
+    row[0] = local.x * kPerPosition;
+    row[1] = local.y * kPerPosition;
+    row[2] = local.z * kPerHeight;
+    row[3] = piece.half_length_m * kPerHalfPiece;
+    row[4] = direction.x;
+    row[5] = direction.y;
+    row[6] = piece.width_m * kPerWidth;
+    count += static_cast<int>(fabsf(local.x - kMiddle_m) <= kHalf_m) & static_cast<int>(fabsf(local.y) <= kRoadAside_m);
   }
   return count;
 }
@@ -201,9 +207,10 @@ PICTURA_HD inline int observe_controls(const WorldView& world, int slot, const E
   return nearest.count;
 }
 
-/// Zeros a set's rows from `count` to what the last observation of the slot filled.
-PICTURA_HD inline void pad_set(float* out, int features, int count, int32_t* filled_inout) {
-  for (int i = count * features; i < *filled_inout * features; ++i) out[i] = 0.0f;
+/// Zeros a set's rows from `count` to what the last observation of the slot filled, and one leftover at least.
+PICTURA_HD inline void pad_set(float* out, int features, int capacity, int count, int32_t* filled_inout) {
+  const int end = min_of(capacity, max_of(count + 1, *filled_inout));
+  for (int i = count * features; i < end * features; ++i) out[i] = 0.0f;
   *filled_inout = count;
 }
 
@@ -240,16 +247,19 @@ PICTURA_HD inline void observe(const WorldView& world, int agent, bool entity_se
   int counts[4] = {};
   if (!blind) {
     counts[0] = observe_partners(world, agent, frame, partners);
-    counts[1] = observe_pieces(world.map.lane_pieces, world.map.near_lane_pieces, frame, kMaxLanes, lanes);
-    counts[2] =
-        observe_pieces(world.map.boundary_pieces, world.map.near_boundary_pieces, frame, kMaxBoundaries, boundaries);
+    const Vec2 origin = frame.origin_m.xy();
+    const float heading_rad = world.agents.heading_rad[slot];
+    counts[1] = observe_pieces(world.map.lane_pieces, items_at(world.map.near_lane_pieces, origin, heading_rad), frame,
+                               kMaxLanes, lanes);
+    counts[2] = observe_pieces(world.map.boundary_pieces, items_at(world.map.near_boundary_pieces, origin, heading_rad),
+                               frame, kMaxBoundaries, boundaries);
     counts[3] = observe_controls(world, slot_index, frame, controls);
   }
   int32_t* filled = out.set_counts.data() + slot * 4;
-  pad_set(partners, kPartnerFeatures, counts[0], filled);
-  pad_set(lanes, kLaneFeatures, counts[1], filled + 1);
-  pad_set(boundaries, kBoundaryFeatures, counts[2], filled + 2);
-  pad_set(controls, kControlFeatures, counts[3], filled + 3);
+  pad_set(partners, kPartnerFeatures, kMaxPartners, counts[0], filled);
+  pad_set(lanes, kLaneFeatures, kMaxLanes, counts[1], filled + 1);
+  pad_set(boundaries, kBoundaryFeatures, kMaxBoundaries, counts[2], filled + 2);
+  pad_set(controls, kControlFeatures, kMaxControls, counts[3], filled + 3);
 }
 
 }  // namespace pictura
