@@ -35,7 +35,7 @@ constexpr double kMinParkingStreet_m = 36;
 // From a node to the mouths of its arms: far enough for the sidewalk to turn the corner, near enough for turning lanes
 // and crossing lanes to leave no hole between them.
 constexpr double kMouth_m = 12, kAvenueMouth_m = 17, kBendMouth_m = 20;
-constexpr double kMinArmAngle_rad = 75 * kPiD / 180;
+constexpr double kMinArmAngle_rad = 75 * kPiD / 180, kMinOppositeAngle_rad = 150 * kPiD / 180;
 constexpr double kMinStreetRadius_m = 30;
 // A right turn from or to the outer of two lanes hugs its corner, so that it meets the left turn beside it.
 constexpr double kTightTurn = 0.7;
@@ -368,7 +368,8 @@ void Town::curve_streets() {
     for (size_t a = 0; a < kNumDirections; ++a) {
       for (size_t b = 0; b < a; ++b) {
         if (headings[a] == kNone || headings[b] == kNone) continue;
-        if (std::abs(wrapped(headings[a] - headings[b])) < kMinArmAngle_rad) return true;
+        const double least = a - b == 2 ? kMinOppositeAngle_rad : kMinArmAngle_rad;
+        if (std::abs(wrapped(headings[a] - headings[b])) < least) return true;
       }
     }
     return false;

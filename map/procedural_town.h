@@ -1,5 +1,6 @@
-// A town from a seed, as OpenDRIVE text: a grid of straight and curved streets with three- and four-arm junctions and
-// phased lights. It goes through the same importer as any other file.
+// A town from a seed, as OpenDRIVE text: a grid of straight and curved streets with parking bays and sidewalks, three-
+// and four-arm junctions with crosswalks and one light phase per approach (heads on the near or the far side), and a
+// ring around it that may be an avenue of two lanes each way. It goes through the same importer as any other file.
 #pragma once
 
 #include <cstdint>

@@ -427,10 +427,10 @@ void check_town(const TownOptions& options) {
     EXPECT_NEAR(length(light.stop_b_m.xy() - light.stop_a_m.xy()), 3.5f, 3.6f);
     EXPECT_LT(dot(light.head_facing, direction(light.stop_heading_rad)), -0.9f);
     // The head stands to the right of its traffic, near the line, or across the junction on the street that goes on,
-    // which may bend by 30 degrees.
+    // which bends by at most 30 degrees: its chord leaves by 15.
     const Vec2 to_head = light.head_m.xy() - stop;
     const float ahead_m = dot(direction(light.stop_heading_rad), to_head);
-    EXPECT_LT(cross(direction(light.stop_heading_rad), to_head), 0.25f * max_of(0.0f, ahead_m));
+    EXPECT_LT(cross(direction(light.stop_heading_rad), to_head), 0.28f * max_of(0.0f, ahead_m));
     EXPECT_LT(length(to_head), 50.0f);
     bool incoming = false, connecting = false;
     for (int32_t k = light.lanes.begin; k < light.lanes.end; ++k) {
