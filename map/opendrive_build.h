@@ -28,7 +28,7 @@ struct Build {
   const Network& network;
   const OpenDriveOptions& options;
   RoadMap* map;
-  SampleBudget budget{20'000'000};
+  SampleBudget budget{10'000'000};
   std::vector<std::vector<SectionLanes>> lanes;  // [roads][sections]
 
   /// File coordinates to the map's.

@@ -45,15 +45,16 @@ std::vector<CurvePoint> sample_curve(const std::vector<double>& breaks, double t
                                      SampleBudget* budget, Eval&& eval) {
   constexpr int kMaxDepth = 24;
   constexpr double kMinStep = 0.01;
+  constexpr double kDenseShare = 0.1;  // of the tolerance: spent on sampling; the rest on thinning
   std::vector<CurvePoint> dense{eval(breaks.front())};
   auto refine = [&](auto&& self, const CurvePoint& a, const CurvePoint& b, int depth) -> void {
     budget->spend();
     if (depth < kMaxDepth) {
       bool fine = std::hypot(b.x - a.x, b.y - a.y) <= max_piece_m;
       CurvePoint middle = eval(0.5 * (a.s + b.s));
-      fine = fine && chord_error(a, b, middle) <= 0.25 * tolerance_m;
+      fine = fine && chord_error(a, b, middle) <= kDenseShare * tolerance_m;
       for (const double fraction : {0.25, 0.75}) {
-        fine = fine && chord_error(a, b, eval(a.s + fraction * (b.s - a.s))) <= 0.25 * tolerance_m;
+        fine = fine && chord_error(a, b, eval(a.s + fraction * (b.s - a.s))) <= kDenseShare * tolerance_m;
       }
       if (!fine && b.s - a.s > kMinStep) {
         self(self, a, middle, depth + 1);
@@ -68,7 +69,7 @@ std::vector<CurvePoint> sample_curve(const std::vector<double>& breaks, double t
     refine(refine, CurvePoint(dense.back()), eval(breaks[i]), 0);
   }
   std::vector<CurvePoint> kept;
-  for (const std::size_t index : thin_polyline(dense, 0.75 * tolerance_m, max_piece_m)) kept.push_back(dense[index]);
+  for (const std::size_t index : thin_polyline(dense, (1 - kDenseShare) * tolerance_m, max_piece_m)) kept.push_back(dense[index]);
   return kept;
 }
 

@@ -1,0 +1,305 @@
+// CARLA's eight towns against what their files are known to hold, and what must be true of any map made from them.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <ctime>
+#include <filesystem>
+#include <map>
+
+#include "pictura/common/scene.h"
+#include "pictura/map/load_map.h"
+
+namespace pictura {
+namespace {
+
+struct TownFacts {
+  const char* name;
+  int roads, junction_roads, junctions;
+  double driving_lane_km, driving_lane_km_in_junctions, z_min_m, z_max_m;
+  int lights, signal_junctions;
+  std::map<int, int> junctions_with_phases;
+  int controlled_incoming_lanes, crosswalks, parking_spaces;
+};
+
+// Counted in the files, without this importer. Town10HD has two more signals of a light's type, without references.
+const TownFacts kTowns[] = {
+    {"Town01", 122, 96, 12, 6.4, 1.4, 0, 0, 36, 12, {{3, 12}}, 36, 0, 0},
+    {"Town02", 84, 64, 8, 2.9, 0.8, 0, 0, 24, 8, {{3, 8}}, 24, 0, 0},
+    {"Town03", 369, 287, 35, 13.8, 6.0, -0.9, 8.5, 38, 11, {{3, 6}, {4, 5}}, 55, 73, 121},
+    {"Town04", 276, 223, 27, 33.4, 8.4, 0, 11, 43, 12, {{3, 5}, {4, 7}}, 50, 27, 0},
+    {"Town05", 323, 270, 21, 23.9, 6.5, 0, 10, 54, 15, {{1, 1}, {3, 4}, {4, 10}}, 111, 66, 0},
+    {"Town06", 200, 128, 23, 25.5, 6.4, 0, 0, 19, 8, {{2, 5}, {3, 3}}, 66, 14, 0},
+    {"Town07", 277, 209, 31, 7.1, 2.7, -0.7, 9.4, 17, 5, {{3, 3}, {4, 2}}, 18, 7, 0},
+    {"Town10HD", 108, 85, 9, 6.0, 2.8, 0, 0, 15, 5, {{2, 1}, {3, 3}, {4, 1}}, 30, 16, 0},
+};
+
+class CarlaTowns : public ::testing::TestWithParam<TownFacts> {
+ protected:
+  void SetUp() override {
+    const std::string file = map_folder() + "/carla/" + GetParam().name + ".xodr";
+    if (!std::filesystem::exists(file)) GTEST_SKIP() << "needs " << file << "; set PICTURA_DATA";
+    const std::clock_t begin = std::clock();
+    map_ = load_map(GetParam().name);
+    load_s_ = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  }
+
+  const Lane& lane(int32_t index) const { return map_->lanes[static_cast<std::size_t>(index)]; }
+
+  std::shared_ptr<const RoadMap> map_;
+  double load_s_ = 0;
+};
+
+INSTANTIATE_TEST_SUITE_P(All, CarlaTowns, ::testing::ValuesIn(kTowns),
+                         [](const ::testing::TestParamInfo<TownFacts>& town) { return std::string(town.param.name); });
+
+TEST_P(CarlaTowns, HoldWhatTheirFilesHold) {
+  const TownFacts& expected = GetParam();
+  const MapFacts& facts = map_->facts;
+  EXPECT_EQ(map_->name, expected.name);
+  EXPECT_EQ(facts.roads, expected.roads);
+  EXPECT_EQ(facts.junction_roads, expected.junction_roads);
+  EXPECT_EQ(facts.junctions, expected.junctions);
+  EXPECT_NEAR(facts.driving_lane_km, expected.driving_lane_km, 0.1);
+  EXPECT_NEAR(facts.driving_lane_km_in_junctions, expected.driving_lane_km_in_junctions, 0.1);
+  EXPECT_NEAR(facts.z_min_m, expected.z_min_m, 0.05);
+  EXPECT_NEAR(facts.z_max_m, expected.z_max_m, 0.05);
+  EXPECT_EQ(facts.traffic_lights, expected.lights);
+  EXPECT_EQ(facts.stop_lines, expected.lights);
+  EXPECT_EQ(facts.signal_junctions, expected.signal_junctions);
+  EXPECT_EQ(facts.crosswalks, expected.crosswalks);
+  EXPECT_EQ(facts.parking_spaces, expected.parking_spaces);
+  std::map<int, int> phases;
+  for (const Junction& junction : map_->junctions) {
+    if (junction.num_phases > 0) ++phases[junction.num_phases];
+  }
+  EXPECT_EQ(phases, expected.junctions_with_phases);
+  int incoming = 0;
+  for (const TrafficLight& light : map_->lights) {
+    for (int32_t i = light.lanes.begin; i < light.lanes.end; ++i) {
+      incoming += lane(map_->light_lanes[static_cast<std::size_t>(i)]).in_junction ? 0 : 1;
+    }
+  }
+  EXPECT_EQ(incoming, expected.controlled_incoming_lanes);
+  EXPECT_LT(load_s_, 2.0);
+}
+
+TEST_P(CarlaTowns, LanesContinueEachOther) {
+  double lane_km = 0;
+  for (const Lane& from : map_->lanes) {
+    if (from.type != LaneType::driving) continue;
+    lane_km += 1e-3 * static_cast<double>(from.length_m);
+    EXPECT_TRUE(from.is_endless);  // no town has a dead end
+    const LanePoint end = map_->lane_points[static_cast<std::size_t>(from.points.end) - 1];
+    for (const int32_t next : map_->links(from.successors)) {
+      if (lane(next).type != LaneType::driving) continue;
+      const LanePoint begin = map_->lane_points[static_cast<std::size_t>(lane(next).points.begin)];
+      EXPECT_LT(length(begin.position_m - end.position_m), 0.02);
+      EXPECT_LT(std::abs(wrap_angle(begin.heading_rad - end.heading_rad)), 0.1);
+    }
+    for (const int32_t neighbor : {from.left_neighbor, from.right_neighbor}) {
+      if (neighbor < 0) continue;
+      const LanePoint beside = map_->lane_points[static_cast<std::size_t>(lane(neighbor).points.end) - 1];
+      EXPECT_NEAR(length(beside.position_m - end.position_m), 0.5f * (beside.width_m + end.width_m), 0.01);
+    }
+  }
+  // True lengths differ from those along the reference lines only by what lanes gain and lose in curves.
+  EXPECT_NEAR(lane_km, map_->facts.driving_lane_km, 0.01 * map_->facts.driving_lane_km);
+}
+
+TEST_P(CarlaTowns, LightsFaceTheirTrafficAndStandAtItsLine) {
+  for (const TrafficLight& light : map_->lights) {
+    const Vec2 heading{std::cos(light.stop_heading_rad), std::sin(light.stop_heading_rad)};
+    EXPECT_NEAR(dot(light.head_facing, heading), -1, 1e-5);
+    // Left end first, square to the traffic.
+    const Vec2 line = light.stop_b_m.xy() - light.stop_a_m.xy();
+    EXPECT_GT(cross(line, heading), 0.99f * length(line));
+    float incoming_width_m = 0;
+    for (int32_t i = light.lanes.begin; i < light.lanes.end; ++i) {
+      const Lane& held = lane(map_->light_lanes[static_cast<std::size_t>(i)]);
+      if (held.in_junction) {
+        EXPECT_EQ(held.junction, light.junction);
+        const LanePoint begin = map_->lane_points[static_cast<std::size_t>(held.points.begin)];
+        EXPECT_LT(std::abs(dot(begin.position_m.xy() - light.stop_a_m.xy(), heading)), 0.1f);
+      } else {
+        incoming_width_m += map_->lane_points[static_cast<std::size_t>(held.points.end) - 1].width_m;
+      }
+    }
+    EXPECT_GE(length(line), incoming_width_m - 0.01f);
+    EXPECT_LT(length(light.head_m.xy() - light.stop_a_m.xy()), 70.0f);
+  }
+}
+
+/// Road edges in a grid, for queries by place.
+class EdgeGrid {
+ public:
+  explicit EdgeGrid(const RoadMap& map) : edges_(map.road_edges) {
+    std::vector<Aabb2> boxes;
+    for (const RoadEdge& edge : edges_) {
+      boxes.push_back({{min_of(edge.a_m.x, edge.b_m.x), min_of(edge.a_m.y, edge.b_m.y)},
+                       {max_of(edge.a_m.x, edge.b_m.x), max_of(edge.a_m.y, edge.b_m.y)}});
+    }
+    grid_ = Grid(boxes, 10.0f);
+  }
+
+  /// Whether `test(edge)` holds for an edge of about the height of `p` in a square of `reach_m` about it.
+  template <typename Test>
+  bool any_near(Vec3 p, float reach_m, Test&& test) const {
+    const GridView grid = grid_.view();
+    for (int y = grid.cell_y(p.y - reach_m); y <= grid.cell_y(p.y + reach_m); ++y) {
+      for (int x = grid.cell_x(p.x - reach_m); x <= grid.cell_x(p.x + reach_m); ++x) {
+        const std::size_t cell = static_cast<std::size_t>(y * grid.num_x + x);
+        for (int32_t i = grid.begin[cell]; i < grid.begin[cell + 1]; ++i) {
+          const RoadEdge& edge = edges_[static_cast<std::size_t>(grid.items[static_cast<std::size_t>(i)])];
+          if (std::abs(0.5f * (edge.a_m.z + edge.b_m.z) - p.z) < 2.0f && test(edge)) return true;
+        }
+      }
+    }
+    return false;
+  }
+
+ private:
+  const std::vector<RoadEdge>& edges_;
+  Grid grid_;
+};
+
+/// Whether a segment meets the box of half-size (half_length, half_width) about `center`.
+bool box_meets(const RoadEdge& edge, Vec3 center, float heading_rad, float half_length, float half_width) {
+  const float c = std::cos(heading_rad), s = std::sin(heading_rad);
+  auto local = [&](Vec3 p) {
+    const float dx = p.x - center.x, dy = p.y - center.y;
+    return Vec2{dx * c + dy * s, -dx * s + dy * c};
+  };
+  const Vec2 a = local(edge.a_m), d = local(edge.b_m) - a;
+  float low = 0, high = 1;
+  const std::array<std::array<float, 3>, 2> slabs{{{a.x, d.x, half_length}, {a.y, d.y, half_width}}};
+  for (const auto& [start, step, half] : slabs) {
+    if (step == 0) {
+      if (std::abs(start) > half) return false;
+      continue;
+    }
+    const float u = (-half - start) / step, v = (half - start) / step;
+    low = max_of(low, min_of(u, v));
+    high = min_of(high, max_of(u, v));
+  }
+  return low <= high;
+}
+
+TEST_P(CarlaTowns, ACarOnItsLaneTouchesNoRoadEdge) {
+  const EdgeGrid edges(*map_);
+  int poses = 0, touched = 0;
+  for (const Lane& driven : map_->lanes) {
+    if (driven.type != LaneType::driving) continue;
+    const Span<const LanePoint> points = map_->points_of(driven);
+    for (std::size_t i = 1; i < points.size(); ++i) {
+      const LanePoint &a = points[i - 1], &b = points[i];
+      for (float u = 0; u < 1; u += 0.5f / (b.s_m - a.s_m)) {
+        // Lanes that open from nothing or taper off are narrower than a car there: Town06 has five, Town07 one.
+        bool tapers = false;
+        for (const LanePoint& near : points) {
+          tapers = tapers || (near.width_m < 0.05f && std::abs(near.s_m - a.s_m) < 30.0f);
+        }
+        if (tapers) continue;
+        ++poses;
+        const Vec3 center = a.position_m + (b.position_m - a.position_m) * u;
+        const float heading = a.heading_rad + u * wrap_angle(b.heading_rad - a.heading_rad);
+        const bool touches = edges.any_near(center, 2.5f, [&](const RoadEdge& edge) {
+          return box_meets(edge, center, heading, 2.25f, 1.0f);
+        });
+        touched += touches ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(poses, 5000);
+  EXPECT_EQ(touched, 0);
+}
+
+/// The drivable surface once more, from the map's own lane points, to hold against the edges.
+bool is_drivable_at(const RoadMap& map, const GridView& grid, const std::vector<std::pair<int32_t, int32_t>>& pieces,
+                    Vec3 p, float margin_m) {
+  if (!grid.contains(p.xy())) return false;
+  const std::size_t cell = static_cast<std::size_t>(grid.cell_y(p.y) * grid.num_x + grid.cell_x(p.x));
+  for (int32_t i = grid.begin[cell]; i < grid.begin[cell + 1]; ++i) {
+    const auto& [lane, point] = pieces[static_cast<std::size_t>(grid.items[static_cast<std::size_t>(i)])];
+    const LanePoint& a = map.lane_points[static_cast<std::size_t>(point)];
+    const LanePoint& b = map.lane_points[static_cast<std::size_t>(point) + 1];
+    const Vec2 d = b.position_m.xy() - a.position_m.xy(), r = p.xy() - a.position_m.xy();
+    const float u = dot(r, d) / dot(d, d);
+    if (u < -margin_m / length(d) || u > 1 + margin_m / length(d)) continue;
+    if (std::abs(p.z - a.position_m.z - u * (b.position_m.z - a.position_m.z)) > 2.0f) continue;
+    if (std::abs(cross(d, r)) / length(d) < 0.5f * (a.width_m + u * (b.width_m - a.width_m)) + margin_m) return true;
+  }
+  return false;
+}
+
+TEST_P(CarlaTowns, EdgesStandExactlyWhereTheDrivableSurfaceEnds) {
+  std::vector<Aabb2> boxes;
+  std::vector<std::pair<int32_t, int32_t>> pieces;
+  for (std::size_t l = 0; l < map_->lanes.size(); ++l) {
+    if (!is_drivable(map_->lanes[l].type)) continue;
+    for (int32_t i = map_->lanes[l].points.begin; i + 1 < map_->lanes[l].points.end; ++i) {
+      const LanePoint &a = map_->lane_points[static_cast<std::size_t>(i)],
+                      &b = map_->lane_points[static_cast<std::size_t>(i) + 1];
+      const float reach = 0.5f * max_of(a.width_m, b.width_m) + 0.5f;
+      pieces.emplace_back(static_cast<int32_t>(l), i);
+      boxes.push_back({{min_of(a.position_m.x, b.position_m.x) - reach, min_of(a.position_m.y, b.position_m.y) - reach},
+                       {max_of(a.position_m.x, b.position_m.x) + reach, max_of(a.position_m.y, b.position_m.y) + reach}});
+    }
+  }
+  const Grid surface(boxes, 5.0f);
+  const EdgeGrid edges(*map_);
+
+  // Every edge has the surface on its right and nothing on its left.
+  int wrong_side = 0;
+  for (const RoadEdge& edge : map_->road_edges) {
+    const Vec3 along = edge.b_m - edge.a_m, middle = (edge.a_m + edge.b_m) * 0.5f;
+    if (length(along) < 0.3f) continue;
+    const Vec2 left = left_normal(along.xy()) * (0.15f / length(along.xy()));
+    const bool right_is_in = is_drivable_at(*map_, surface.view(), pieces, {middle.x - left.x, middle.y - left.y, middle.z}, 0.06f);
+    const bool left_is_in = is_drivable_at(*map_, surface.view(), pieces, {middle.x + left.x, middle.y + left.y, middle.z}, -0.06f);
+    wrong_side += !right_is_in || left_is_in ? 1 : 0;
+  }
+  EXPECT_EQ(wrong_side, 0) << "of " << map_->road_edges.size();
+
+  // Wherever a lane's border has no surface beyond it, an edge stands; where surface goes on, none crosses.
+  int borders = 0, missing = 0, across = 0;
+  for (const auto& [lane, point] : pieces) {
+    const LanePoint &a = map_->lane_points[static_cast<std::size_t>(point)],
+                    &b = map_->lane_points[static_cast<std::size_t>(point) + 1];
+    if (b.s_m - a.s_m < 0.2f || min_of(a.width_m, b.width_m) < 1.0f) continue;
+    const Vec3 along = b.position_m - a.position_m;
+    const Vec2 left = left_normal(along.xy()) * (1.0f / length(along.xy()));
+    for (const float u : {0.3f, 0.7f}) {
+      const Vec3 center = a.position_m + along * u;
+      const float half = 0.5f * (a.width_m + u * (b.width_m - a.width_m));
+      for (const float side : {1.0f, -1.0f}) {
+        auto beyond = [&](float distance) {
+          return Vec3{center.x + side * (half + distance) * left.x, center.y + side * (half + distance) * left.y, center.z};
+        };
+        ++borders;
+        const RoadEdge probe{beyond(-half), beyond(0.3f)};
+        const bool crossed = edges.any_near(center, half + 0.5f, [&](const RoadEdge& edge) {
+          const Vec2 p = probe.b_m.xy() - probe.a_m.xy(), e = edge.b_m.xy() - edge.a_m.xy();
+          const Vec2 to_a = edge.a_m.xy() - probe.a_m.xy();
+          const float det = cross(p, e);
+          if (det == 0) return false;
+          const float on_probe = cross(to_a, e) / det, on_edge = cross(to_a, p) / det;
+          return on_probe >= 0 && on_probe <= 1 && on_edge >= 0 && on_edge <= 1;
+        });
+        bool all_in = true, none_in = true;
+        for (const float distance : {0.1f, 0.15f, 0.2f, 0.25f, 0.3f}) {
+          all_in = all_in && is_drivable_at(*map_, surface.view(), pieces, beyond(distance), -0.03f);
+          none_in = none_in && !is_drivable_at(*map_, surface.view(), pieces, beyond(distance), 0.06f);
+        }
+        missing += none_in && !crossed ? 1 : 0;
+        across += all_in && crossed ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(borders, 1000);
+  EXPECT_EQ(missing, 0) << "of " << borders;
+  EXPECT_EQ(across, 0) << "of " << borders;
+}
+
+}  // namespace
+}  // namespace pictura

@@ -1,0 +1,160 @@
+// What malformed OpenDRIVE files get: an Error that names source, line, road and element, and nothing worse.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/common/error.h"
+#include "pictura/map/opendrive.h"
+#include "pictura/tests/map/small_roads.h"
+
+namespace pictura {
+namespace {
+
+using test::file_of;
+using test::lane_of;
+using test::line_at;
+using test::RoadText;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+std::string message_of(const std::string& text) {
+  try {
+    parse_opendrive(text, "bad.xodr");
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "(no error)";
+}
+
+std::string good_file() {
+  RoadText road;
+  road.right = lane_of(-1, "driving", 3);
+  return file_of(road.text());
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  if (at == std::string::npos) throw std::runtime_error("nothing to replace: " + from);
+  return text.replace(at, from.size(), to);
+}
+
+TEST(OpenDriveErrors, TheUnspoiltFileIsGood) { EXPECT_EQ(message_of(good_file()), "(no error)"); }
+
+TEST(OpenDriveErrors, WhatIsNotOpenDriveIsRefused) {
+  EXPECT_THAT(message_of(""), HasSubstr("bad.xodr"));
+  EXPECT_THAT(message_of("P6 640 480 255"), HasSubstr("bad.xodr"));
+  EXPECT_THAT(message_of("<svg/>"), AllOf(HasSubstr("expected OpenDRIVE"), HasSubstr("<svg>")));
+  EXPECT_THAT(message_of("<OpenDRIVE/>"), HasSubstr("<road>"));
+}
+
+TEST(OpenDriveErrors, EveryTruncationIsRefused) {
+  const std::string text = good_file();
+  for (std::size_t length = 0; length + 14 < text.size(); ++length) {
+    EXPECT_NE(message_of(text.substr(0, length)), "(no error)") << length;
+  }
+}
+
+TEST(OpenDriveErrors, AttributesAreCheckedAndNamedWithTheirLine) {
+  const std::string text = good_file();
+  // <geometry> is on the seventh line: three of the file's head, <road>, <link>, <planView>, <geometry>.
+  for (const auto& [from, to, expected] : std::vector<std::array<std::string, 3>>{
+           {"x=\"0\"", "x=\"nan\"", "bad.xodr:7: road 1: <geometry>: attribute x: expected a finite number, got 'nan'"},
+           {"x=\"0\"", "x=\"inf\"", "attribute x"},
+           {"x=\"0\"", "x=\"12abc\"", "attribute x: expected a finite number, got '12abc'"},
+           {"x=\"0\"", "", "attribute x is missing"},
+           {"length=\"100\"><line/>", "length=\"0\"><line/>", "bad.xodr:7: road 1: <geometry>: attribute length"},
+           {"length=\"100\"><line/>", "length=\"-5\"><line/>", "attribute length: expected a number in"},
+           {"length=\"100\"><line/>", "length=\"50\"><line/>", "ends at 50"},
+           {"length=\"100\" junction", "length=\"-100\" junction", "bad.xodr:4: road 1: <road>: attribute length"},
+           {"length=\"100\" junction", "length=\"1e9\" junction", "attribute length: expected a number in"},
+           {"<line/>", "<arc/>", "<arc>: attribute curvature is missing"},
+           {"<line/>", "<arc curvature=\"1e9\"/>", "expected a curve of at most"},
+           {"<line/>", "<paramPoly3/>", "<paramPoly3> is not supported"},
+           {"<line/>", "", "expected a <line>, <arc> or <spiral>"},
+           {"id=\"-1\"", "id=\"one\"", "attribute id: expected an integer, got 'one'"},
+           {"id=\"-1\"", "id=\"1\"", "does not belong in <right>"},
+           {"id=\"-1\"", "id=\"-2\"", "expected -1"},
+           {"type=\"driving\"", "type=\"flying\"", "'flying' is not a lane type"},
+           {"a=\"3\"", "a=\"-3\"", "expected a width in"},
+           {"a=\"3\"", "a=\"3\" e=\"0\" x=\"", "bad.xodr"},
+           {"b=\"0\"", "b=\"-1\"", "its width at s"},
+           {"b=\"0\"", "b=\"1e200\"", "expected at most"},
+           {"junction=\"-1\"", "junction=\"5\"", "belongs to junction 5, which does not exist"},
+           {"junction=\"-1\"", "junction=\"-1\" rule=\"LHT\"", "attribute rule"},
+           {"<link></link>", "<link><successor elementType=\"road\" elementId=\"9\" contactPoint=\"start\"/></link>",
+            "bad.xodr:5: road 1: <successor>: refers to road 9, which does not exist"},
+           {"<link></link>", "<link><successor elementType=\"junction\" elementId=\"9\"/></link>",
+            "refers to junction 9, which does not exist"},
+           {"<link></link>", "<link><successor elementType=\"road\" elementId=\"1\"/></link>", "contactPoint is missing"},
+           {"<laneSection s=\"0\">", "<laneSection s=\"5\">", "expected the first section at 0"},
+           {"<lanes>", "<lateralProfile><superelevation s=\"0\" a=\"0.1\" b=\"0\" c=\"0\" d=\"0\"/></lateralProfile><lanes>",
+            "<superelevation>: banked roads are not supported"},
+           {"<lanes>", "<lanes><laneOffset s=\"0\" a=\"1e300\" b=\"0\" c=\"0\" d=\"0\"/>", "beside it"},
+       }) {
+    EXPECT_THAT(message_of(replaced(text, from, to)), HasSubstr(expected)) << from << " -> " << to;
+  }
+}
+
+TEST(OpenDriveErrors, GapsBetweenGeometriesAreMeasured) {
+  RoadText road;
+  road.right = lane_of(-1, "driving", 3);
+  road.geometry = line_at(0, 0, 0, 0, 50) + line_at(50, 50.5, 0, 0, 50);
+  EXPECT_THAT(message_of(file_of(road.text())), AllOf(HasSubstr("bad.xodr:8"), HasSubstr("begins 0.500 m from")));
+  road.geometry = line_at(0, 0, 0, 0, 50) + line_at(49, 50, 0, 0, 51);
+  EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("expected 50"));
+  road.geometry = line_at(0, 0, 0, 0, 50) + line_at(50, 50.001, 0, 0, 50);
+  EXPECT_EQ(message_of(file_of(road.text())), "(no error)");
+}
+
+TEST(OpenDriveErrors, IdsAreUnique) {
+  RoadText road;
+  road.right = lane_of(-1, "driving", 3);
+  EXPECT_THAT(message_of(file_of(road.text() + road.text())), HasSubstr("road 1: <road>: attribute id: another road"));
+  EXPECT_THAT(message_of(file_of(road.text() + "<junction id=\"1\"/><junction id=\"1\"/>")), HasSubstr("another junction"));
+  road.rest = R"(<signals><signal id="5" s="0" t="0"/><signal id="5" s="1" t="0"/></signals>)";
+  EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("another signal has 5 already"));
+}
+
+TEST(OpenDriveErrors, LinksMustLeadSomewhere) {
+  RoadText road;
+  road.link = R"(<successor elementType="road" elementId="1" contactPoint="start"/>)";
+  road.right = lane_of(-1, "driving", 3, R"(<link><successor id="-4"/></link>)");
+  EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("is linked to lane -4 of road 1, which does not exist"));
+  road.right = lane_of(-1, "driving", 3);
+  for (const auto& [connection, expected] : std::vector<std::array<std::string, 2>>{
+           {R"(incomingRoad="1" connectingRoad="8" contactPoint="start")", "refers to road 8"},
+           {R"(incomingRoad="8" connectingRoad="1" contactPoint="start")", "refers to road 8"},
+           {R"(incomingRoad="1" connectingRoad="1" contactPoint="middle")", "expected start or end, got 'middle'"}}) {
+    EXPECT_THAT(message_of(file_of(road.text() + "<junction id=\"3\"><connection id=\"0\" " + connection +
+                                   "/></junction>")),
+                HasSubstr(expected));
+  }
+  road.rest = R"(<signals><signalReference id="77" s="0" t="0"/></signals>)";
+  EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("refers to signal 77, which does not exist"));
+  road.rest = "";
+  EXPECT_THAT(message_of(file_of(road.text() + "<controller id=\"4\"><control signalId=\"6\"/></controller>")),
+              HasSubstr("controller 4: <controller>: controls signal 6"));
+}
+
+TEST(OpenDriveErrors, WindingCurvesDoNotEatTheMemory) {
+  // A cubic of height that rises and falls by kilometres within metres.
+  RoadText road;
+  road.length = 1e5;
+  road.right = lane_of(-1, "driving", 3);
+  road.elevation = R"(<elevation s="0" a="0" b="0" c="0" d="1e-3"/>)";
+  EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("expected at most"));
+  road.elevation = "";
+  const std::string text = file_of(road.text());
+  const RoadMap map = parse_opendrive(text, "long.xodr");
+  EXPECT_LT(map.lane_points.size(), 20'000u);
+  // Ten kilometres of lane that swings by hundreds of metres a hundred times.
+  road.length = 1e4;
+  road.geometry.clear();
+  for (int i = 0; i < 100; ++i) {
+    road.geometry += line_at(100.0 * i, 100.0 * i, 0, 0, 100);
+    road.lane_offset += fmt::format(R"(<laneOffset s="{}" a="0" b="30" c="-0.9" d="0.006"/>)", 100 * i);
+  }
+  EXPECT_LT(parse_opendrive(file_of(road.text()), "wobble.xodr").lane_points.size(), 100'000u);
+}
+
+}  // namespace
+}  // namespace pictura
