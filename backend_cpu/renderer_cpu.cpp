@@ -1,1 +1,125 @@
-#include "pictura/common/renderer.h"
+// The oracle: the CPU renderer. It checks its input, places the cameras, and spreads images over OpenMP threads.
+#include <deque>
+#include <memory>
+
+#include <omp.h>
+
+#include "pictura/backend_cpu/renderer_cpu_image.h"
+#include "pictura/common/error.h"
+#include "pictura/common/parallel_for.h"
+#include "pictura/common/raster_check.h"
+
+namespace pictura {
+
+std::unique_ptr<Renderer> make_cpu_renderer(const RendererConfig& config);
+
+namespace {
+
+class CpuRenderer final : public Renderer {
+ public:
+  explicit CpuRenderer(const RendererConfig& config)
+      : config_(config),
+        cameras_(pinhole_cameras(config.rig)),
+        drawers_(static_cast<std::size_t>(resolve_num_threads(config.num_threads))) {
+    validate(config_.rig);
+    PICTURA_CHECK(config_.line_floor_px >= 0 && config_.line_floor_px <= kGuardBand_px,
+                  "renderer cpu: expected a line floor of 0 to {} pixels, got {}", kGuardBand_px,
+                  config_.line_floor_px);
+  }
+  std::string_view name() const override { return "cpu"; }
+  MemorySpace space() const override { return MemorySpace::host; }
+  const RendererConfig& config() const override { return config_; }
+
+  GeometryHandle upload(const StaticGeometry& geometry) override {
+    check_geometry(name(), geometry);
+    copies_.push_back(geometry);
+    geometries_.push_back(raster_geometry(copies_.back()));
+    return static_cast<GeometryHandle>(geometries_.size()) - 1;
+  }
+
+  void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream) override {
+    check_images(name(), config_.rig, space(), views.size(), images_out);
+    check_scene(name(), scene, geometries_);
+    check_views(name(), scene, views);
+    const std::size_t num_cameras = cameras_.size();
+    parallel_for(num_threads(), static_cast<int64_t>(views.size() * num_cameras), [&](int64_t image) {
+      const std::size_t view = static_cast<std::size_t>(image) / num_cameras;
+      const std::size_t camera = static_cast<std::size_t>(image) % num_cameras;
+      ImageDrawer& drawer = drawers_[static_cast<std::size_t>(omp_get_thread_num())];
+      drawer.prepare(request(scene, views[view], camera));
+      drawer.draw(target(images_out, view, camera));
+    });
+  }
+
+  void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
+                  Span<float> visibility_out, Stream) override {
+    check_scene(name(), scene, geometries_);
+    check_views(name(), scene, views);
+    PICTURA_CHECK(visibility_out.size() == queries.size(),
+                  "renderer cpu: visibility: expected room for {} values, got {}", queries.size(),
+                  visibility_out.size());
+    for (std::size_t i = 0; i < queries.size(); ++i) {
+      const VisibilityQuery& query = queries[i];
+      PICTURA_CHECK(query.view >= 0 && static_cast<std::size_t>(query.view) < views.size() && query.agent >= 0 &&
+                        static_cast<std::size_t>(query.agent) < scene.agents.size(),
+                    "renderer cpu: visibility query {}: expected a view below {} and an agent below {}, got {} and {}",
+                    i, views.size(), scene.agents.size(), query.view, query.agent);
+    }
+    parallel_for(num_threads(), static_cast<int64_t>(queries.size()), [&](int64_t i) {
+      const VisibilityQuery& query = queries[static_cast<std::size_t>(i)];
+      ImageDrawer& drawer = drawers_[static_cast<std::size_t>(omp_get_thread_num())];
+      double seen = 0, alone = 0;
+      for (std::size_t camera = 0; camera < cameras_.size(); ++camera) {
+        drawer.prepare(request(scene, views[static_cast<std::size_t>(query.view)], camera));
+        const ImageDrawer::Coverage coverage = drawer.coverage_of(query.agent);
+        seen += coverage.seen;
+        alone += coverage.alone;
+      }
+      visibility_out[static_cast<std::size_t>(i)] =
+          alone > 0 ? static_cast<float>(std::min(1.0, seen / alone)) : std::numeric_limits<float>::quiet_NaN();
+    });
+  }
+
+ private:
+  int num_threads() const { return static_cast<int>(drawers_.size()); }
+
+  ImageRequest request(const SceneBatch& scene, const View& view, std::size_t camera) const {
+    const GeometryHandle handle = scene.geometry[static_cast<std::size_t>(view.world)];
+    return {&geometries_[static_cast<std::size_t>(handle)],
+            &scene,
+            &view,
+            place_camera(cameras_[camera], view),
+            config_.line_floor_px,
+            config_.debug_palette};
+  }
+
+  static ImageTarget target(const ImageBatch& images, std::size_t view, std::size_t camera) {
+    const CameraImages& out = images.cameras[camera];
+    const int64_t offset = static_cast<int64_t>(view) * out.view_stride;
+    const std::size_t pixels = static_cast<std::size_t>(out.width_px) * static_cast<std::size_t>(out.height_px);
+    ImageTarget target{images.format};
+    if (images.format == PixelFormat::u8) {
+      target.color = static_cast<uint8_t*>(out.data) + offset;
+    } else {
+      target.color = static_cast<float*>(out.data) + offset;
+    }
+    if (out.depth_m) target.depth_m = out.depth_m + view * pixels;
+    if (out.class_id) target.class_id = out.class_id + view * pixels;
+    if (out.instance_id) target.instance_id = out.instance_id + view * pixels;
+    return target;
+  }
+
+  RendererConfig config_;
+  std::vector<PinholeCamera> cameras_;  // in the ego frame
+  std::deque<StaticGeometry> copies_;   // their addresses stay: geometries_ point into them
+  std::vector<RasterGeometry> geometries_;
+  std::vector<ImageDrawer> drawers_;  // one per thread
+};
+
+}  // namespace
+
+std::unique_ptr<Renderer> make_cpu_renderer(const RendererConfig& config) {
+  return std::make_unique<CpuRenderer>(config);
+}
+
+}  // namespace pictura

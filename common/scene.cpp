@@ -12,22 +12,16 @@ constexpr float kGeometryCell_m = 20.0f;
 // A mitre longer than this many half-widths (a turn sharper than about 150 degrees) is cut back.
 constexpr float kMaxMiter = 4.0f;
 
-template <typename Piece>
-Aabb2 piece_box(const Piece& piece, float margin_m) {
-  return {{min_of(piece.a_m.x, piece.b_m.x) - margin_m, min_of(piece.a_m.y, piece.b_m.y) - margin_m},
-          {max_of(piece.a_m.x, piece.b_m.x) + margin_m, max_of(piece.a_m.y, piece.b_m.y) + margin_m}};
-}
-
 Vec2 unit(Vec2 v) { return v * (1.0f / length(v)); }
 
 }  // namespace
 
 void StaticGeometry::build_grids() {
   std::vector<Aabb2> boxes;
-  for (const Strip& strip : strips) boxes.push_back(piece_box(strip, strip.width_m));
+  for (const Strip& strip : strips) boxes.push_back(ground_box(strip));
   strip_grid = Grid(boxes, kGeometryCell_m);
   boxes.clear();
-  for (const WallFace& wall : walls) boxes.push_back(piece_box(wall, 0.0f));
+  for (const WallFace& wall : walls) boxes.push_back(ground_box(wall));
   wall_grid = Grid(boxes, kGeometryCell_m);
 }
 

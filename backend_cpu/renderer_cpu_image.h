@@ -1,0 +1,83 @@
+// Draws one image: gathers what a camera may see, orders it front to back, and composites it row by row. All rules are
+// the shared ones of common/raster*.h; here is only the traversal, and the memory that it reuses from image to image.
+#pragma once
+
+#include <vector>
+
+#include "pictura/common/image.h"
+#include "pictura/common/raster_coverage.h"
+#include "pictura/common/raster_cull.h"
+#include "pictura/common/raster_order.h"
+
+namespace pictura {
+
+/// What one image shows.
+struct ImageRequest {
+  const RasterGeometry* geometry = nullptr;
+  const SceneBatch* scene = nullptr;
+  const View* view = nullptr;
+  PinholeCamera camera;  // in the world
+  float line_floor_px = 0;
+  bool debug_palette = false;
+};
+
+/// Where one image goes.
+struct ImageTarget {
+  PixelFormat format = PixelFormat::u8;
+  void* color = nullptr;  // [3, height, width]
+  float* depth_m = nullptr;
+  uint8_t* class_id = nullptr;
+  uint16_t* instance_id = nullptr;
+};
+
+/// An object serves one thread.
+class ImageDrawer {
+ public:
+  /// Collects and orders what the image shows.
+  void prepare(const ImageRequest& request);
+  /// Draws what was prepared.
+  void draw(const ImageTarget& target);
+  /// Sum over pixels of what an agent weighs in the prepared image and, in `alone`, of what it would weigh without all
+  /// others.
+  struct Coverage {
+    double seen = 0, alone = 0;
+  };
+  Coverage coverage_of(int32_t agent);
+
+ private:
+  // A thing that is drawn, with its faces.
+  struct Item {
+    int32_t face_begin = 0, face_end = 0;
+    PixelBox box;
+    SurfaceClass surface = SurfaceClass::nothing;
+    int32_t strip_kind = 0;
+    int32_t agent = -1;
+    bool is_background = false;  // a strip that lies behind all solids
+    OrderKey key;
+    Extent extent;
+  };
+
+  template <typename MakeFaces>
+  Item* add_item(MakeFaces&& make_faces);
+  void gather_agents();
+  void gather_walls();
+  void gather_lights();
+  void gather_strips();
+  void sort_items();
+  template <typename Visit>
+  void visit_pixels(const Item& item, int y_begin, int y_end, Visit&& visit) const;
+  void draw_planes(const ImageTarget& target) const;
+
+  ImageRequest request_;
+  Frustum frustum_;
+  std::vector<PolygonEdge> edges_;
+  std::vector<ScreenFace> faces_;
+  std::vector<Item> items_;
+  std::vector<int32_t> order_;        // items front to back
+  std::vector<int32_t> foreground_;   // items that need a pairwise order, nearest first
+  std::vector<uint64_t> is_before_;   // [foreground][words] bit j of row i: j is drawn before i
+  std::vector<int32_t> waiting_for_;  // how many items are still to be drawn before one
+  std::vector<PixelState> pixels_;
+};
+
+}  // namespace pictura

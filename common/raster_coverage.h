@@ -1,0 +1,352 @@
+// From a face in camera coordinates to pixels: clipping, projection, and for each pixel the exact area that a convex
+// polygon covers and which of 64 samples it covers. Faces are composited front to back; the samples say how much of a
+// partly covered pixel is still free. Shared by both devices, which therefore agree bit for bit.
+#pragma once
+
+#include "pictura/common/raster_camera.h"
+#include "pictura/common/raster_shapes.h"
+
+namespace pictura {
+
+/// Clipping by five planes adds at most one corner each; one more is room for a cut while it is made.
+constexpr int kMaxPolygonCorners = kMaxFaceCorners + 6;
+
+/// Clips a convex face to the near plane and the guard band. Writes to polygon_out (camera coordinates, room for
+/// kMaxPolygonCorners) and returns the number of corners; below 3 nothing is left.
+PICTURA_HD inline int clip_face(const Frustum& f, const Vec3* corners, int count, Vec3* polygon_out) {
+  auto inside = [&](int plane, Vec3 p) {
+    switch (plane) {
+      case 0: return p.z - kNear_m;
+      case 1: return p.x - f.x_low * p.z;
+      case 2: return f.x_high * p.z - p.x;
+      case 3: return p.y - f.y_low * p.z;
+      default: return f.y_high * p.z - p.y;
+    }
+  };
+  unsigned crossed = 0;  // planes that some corner is outside of
+  for (int plane = 0; plane < 5; ++plane) {
+    int outside = 0;
+    for (int i = 0; i < count; ++i) outside += inside(plane, corners[i]) < 0.0f;
+    if (outside == count) return 0;
+    if (outside > 0) crossed |= 1u << plane;
+  }
+  Vec3 buffer[kMaxPolygonCorners];
+  const Vec3* from = corners;
+  int remaining_planes = 0;
+  for (int plane = 0; plane < 5; ++plane) remaining_planes += (crossed >> plane) & 1u;
+  if (remaining_planes == 0) {
+    for (int i = 0; i < count; ++i) polygon_out[i] = corners[i];
+    return count;
+  }
+  // The buffers alternate so that the last plane writes to polygon_out.
+  for (int plane = 0; plane < 5; ++plane) {
+    if (!((crossed >> plane) & 1u)) continue;
+    Vec3* to = (remaining_planes & 1) ? polygon_out : buffer;
+    int kept = 0;
+    Vec3 previous = from[count - 1];
+    float previous_inside = inside(plane, previous);
+    // Only a face that is not quite convex could outgrow the room; it loses corners then.
+    for (int i = 0; i < count && kept + 2 <= kMaxPolygonCorners; ++i) {
+      const Vec3 current = from[i];
+      const float current_inside = inside(plane, current);
+      // A cut is computed from its inner corner, whichever way round: faces that share an edge get the same point.
+      if (previous_inside >= 0.0f && current_inside < 0.0f) {
+        to[kept++] = previous + (current - previous) * (previous_inside / (previous_inside - current_inside));
+      } else if (previous_inside < 0.0f && current_inside >= 0.0f) {
+        to[kept++] = current + (previous - current) * (current_inside / (current_inside - previous_inside));
+      }
+      if (current_inside >= 0.0f) to[kept++] = current;
+      previous = current;
+      previous_inside = current_inside;
+    }
+    if (kept < 3) return 0;
+    count = kept;
+    from = to;
+    --remaining_planes;
+  }
+  return count;
+}
+
+PICTURA_HD inline Vec2 project(const PinholeCamera& camera, Vec3 p) {
+  const float inverse_depth = 1.0f / p.z;
+  return {camera.center_x_px + camera.focal_x_px * (p.x * inverse_depth),
+          camera.center_y_px + camera.focal_y_px * (p.y * inverse_depth)};
+}
+
+/// An edge of a polygon on screen. Its numbers do not depend on the direction in which a face walks it, but for the
+/// signs of a and b: two faces that share an edge split areas and samples between them exactly.
+struct PolygonEdge {
+  float x0 = 0, y0 = 0;  // the upper end
+  float y1 = 0;          // the lower end's y
+  float dx_dy = 0;       // 0 for level edges, which bound no area
+  float dy_dx = 0;       // 0 for upright edges
+  float a = 0, b = 0;    // inside: a * (x - x0) + b * (y - y0) >= 0
+};
+
+/// Edges whose ends are closer in x than this are upright: samples lie to one side of them or the other.
+constexpr float kUpright_px = 1e-6f;
+
+PICTURA_HD inline PolygonEdge make_edge(Vec2 from, Vec2 to) {
+  const bool downward = from.y < to.y || (from.y == to.y && from.x < to.x);
+  const Vec2 upper = downward ? from : to, lower = downward ? to : from;
+  const float dx = lower.x - upper.x, dy = lower.y - upper.y;
+  PolygonEdge edge;
+  edge.x0 = upper.x;
+  edge.y0 = upper.y;
+  edge.y1 = lower.y;
+  edge.dx_dy = dy > 0.0f ? dx / dy : 0.0f;
+  edge.dy_dx = fabsf(dx) >= kUpright_px ? dy / dx : 0.0f;
+  edge.a = downward ? -dy : dy;
+  edge.b = downward ? dx : -dx;
+  return edge;
+}
+
+/// Pixels that a polygon may touch: half-open ranges within the image.
+struct PixelBox {
+  int32_t x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;
+};
+
+PICTURA_HD constexpr bool overlap(const PixelBox& a, const PixelBox& b) {
+  return a.x_begin < b.x_end && b.x_begin < a.x_end && a.y_begin < b.y_end && b.y_begin < a.y_end;
+}
+PICTURA_HD constexpr PixelBox united(const PixelBox& a, const PixelBox& b) {
+  return {min_of(a.x_begin, b.x_begin), max_of(a.x_end, b.x_end), min_of(a.y_begin, b.y_begin),
+          max_of(a.y_end, b.y_end)};
+}
+
+/// A convex polygon on screen, without its edges, which stand in a pool.
+struct ScreenFace {
+  int32_t edge_begin = 0, edge_count = 0;
+  PixelBox box;
+  Rgb color;
+  // Inverse depth at a point of the screen, clamped to what the face's corners have.
+  float inverse_depth_x = 0, inverse_depth_y = 0, inverse_depth_0 = 0;
+  float inverse_depth_low = 0, inverse_depth_high = 0;
+};
+
+/// Projects a clipped face (camera coordinates). Writes its edges to edges_out (room for `count`) and all of face_out
+/// but edge_begin. False where it covers nothing.
+PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Vec3* polygon, int count, Rgb color,
+                                        PolygonEdge* edges_out, ScreenFace* face_out) {
+  Vec2 corner[kMaxPolygonCorners];
+  Vec2 low{1e30f, 1e30f}, high{-1e30f, -1e30f};
+  float depth_low = 1e30f, depth_high = 0.0f;
+  for (int i = 0; i < count; ++i) {
+    corner[i] = project(camera, polygon[i]);
+    low = {min_of(low.x, corner[i].x), min_of(low.y, corner[i].y)};
+    high = {max_of(high.x, corner[i].x), max_of(high.y, corner[i].y)};
+    depth_low = min_of(depth_low, polygon[i].z);
+    depth_high = max_of(depth_high, polygon[i].z);
+  }
+  const PixelBox box{
+      max_of(static_cast<int>(floorf(low.x)), 0), min_of(static_cast<int>(floorf(high.x)) + 1, camera.width_px),
+      max_of(static_cast<int>(floorf(low.y)), 0), min_of(static_cast<int>(floorf(high.y)) + 1, camera.height_px)};
+  if (box.x_begin >= box.x_end || box.y_begin >= box.y_end) return false;
+  float twice_area = 0.0f;
+  for (int i = 1; i + 1 < count; ++i) twice_area += cross(corner[i] - corner[0], corner[i + 1] - corner[0]);
+  if (fabsf(twice_area) < 1e-6f) return false;
+
+  int edges = 0;
+  for (int i = 0; i < count; ++i) {
+    const Vec2 from = corner[i], to = corner[i + 1 < count ? i + 1 : 0];
+    if (from.x == to.x && from.y == to.y) continue;
+    edges_out[edges++] = twice_area > 0.0f ? make_edge(from, to) : make_edge(to, from);
+  }
+  face_out->edge_count = edges;
+  face_out->box = box;
+  face_out->color = color;
+
+  // n . p = n . p0 on the face's plane, and p = depth * ray: inverse depth is linear in the ray.
+  Vec3 normal{};
+  for (int i = 1; i + 1 < count; ++i) normal = normal + cross(polygon[i] - polygon[0], polygon[i + 1] - polygon[0]);
+  const float offset = dot(normal, polygon[0]);
+  const float scale = offset != 0.0f ? 1.0f / offset : 0.0f;
+  face_out->inverse_depth_x = normal.x * scale / camera.focal_x_px;
+  face_out->inverse_depth_y = normal.y * scale / camera.focal_y_px;
+  face_out->inverse_depth_0 = normal.z * scale - face_out->inverse_depth_x * camera.center_x_px -
+                              face_out->inverse_depth_y * camera.center_y_px;
+  face_out->inverse_depth_low = 1.0f / depth_high;
+  face_out->inverse_depth_high = 1.0f / depth_low;
+  return true;
+}
+
+/// Depth (camera z) of a face at a point of the screen.
+PICTURA_HD inline float face_depth_m(const ScreenFace& face, float x_px, float y_px) {
+  const float inverse = face.inverse_depth_0 + face.inverse_depth_x * x_px + face.inverse_depth_y * y_px;
+  return 1.0f / clamp(inverse, face.inverse_depth_low, face.inverse_depth_high);
+}
+
+PICTURA_HD inline bool covers_point(const PolygonEdge* edges, int count, float x_px, float y_px) {
+  for (int i = 0; i < count; ++i) {
+    if (edges[i].a * (x_px - edges[i].x0) + edges[i].b * (y_px - edges[i].y0) < 0.0f) return false;
+  }
+  return true;
+}
+
+/// The samples of a pixel: 8 columns of 8 rows, each column shifted down by its own part of a row, so that 64 different
+/// heights occur: road scenes are full of nearly level edges. Sample (column, row) is bit 8 * column + row.
+constexpr int kSampleColumns = 8;
+constexpr uint64_t kAllSamples = ~uint64_t{0};
+/// Offset of a column's first sample from the pixel's top, in rows.
+PICTURA_HD constexpr float sample_column_offset(int column) {
+  // Bit reversal of the column, so that neighbouring columns have distant offsets.
+  const int reversed = ((column & 1) << 2) | (column & 2) | ((column & 4) >> 2);
+  return (static_cast<float>(reversed) + 0.5f) / 8.0f;
+}
+
+/// What a polygon covers of one pixel.
+struct PixelCoverage {
+  float area = 0;  // in [0, 1]
+  uint64_t samples = 0;
+};
+
+/// Less than this of a pixel is nothing; more than one minus kFullCoverage with every sample is all of it.
+constexpr float kLeastCoverage = 1e-4f;
+constexpr float kFullCoverage = 1e-3f;
+
+/// Samples on the inner side of an edge; left_px and top_px are the pixel's corner relative to the edge's upper end.
+PICTURA_HD inline uint64_t samples_inside(const PolygonEdge& edge, float left_px, float top_px) {
+  uint64_t samples = 0;
+  if (edge.dy_dx == 0.0f && fabsf(edge.b) < kUpright_px) {
+    for (int column = 0; column < kSampleColumns; ++column) {
+      const bool right_of = left_px + (static_cast<float>(column) + 0.5f) / 8.0f >= 0.0f;
+      if (right_of) samples |= uint64_t{0xFF} << (8 * column);
+    }
+    return edge.a > 0.0f ? samples : ~samples;
+  }
+  const float slope = edge.dy_dx * 8.0f, top = top_px * 8.0f;
+  for (int column = 0; column < kSampleColumns; ++column) {
+    const float x_px = left_px + (static_cast<float>(column) + 0.5f) / 8.0f;
+    const float first_row = x_px * slope - top - sample_column_offset(column);
+    const int rows_above = static_cast<int>(ceilf(clamp(first_row, 0.0f, 8.0f)));
+    samples |= ((uint64_t{0xFF} << rows_above) & 0xFF) << (8 * column);
+  }
+  return edge.b > 0.0f ? samples : ~samples;
+}
+
+/// Mean over a segment, whose x runs from xa to xb relative to a pixel of width 1, of the pixel's width to its left.
+PICTURA_HD inline float mean_width_left(float xa, float xb) {
+  const float low = min_of(xa, xb), high = max_of(xa, xb);
+  if (high <= 0.0f) return 0.0f;
+  if (low >= 1.0f) return 1.0f;
+  if (low >= 0.0f && high <= 1.0f) return 0.5f * (low + high);
+  const float inner_low = max_of(low, 0.0f), inner_high = min_of(high, 1.0f);
+  const float beyond = high - inner_high;
+  return (0.5f * (inner_high - inner_low) * (inner_high + inner_low) + beyond) / (high - low);
+}
+
+/// Exact area of a convex polygon in pixel (x, y), and the samples that it covers.
+PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int count, int x, int y) {
+  PixelCoverage coverage{0.0f, kAllSamples};
+  const float x_px = static_cast<float>(x), y_px = static_cast<float>(y);
+  bool crossed = false;
+  for (int i = 0; i < count; ++i) {
+    const PolygonEdge& edge = edges[i];
+    const float left_px = x_px - edge.x0, top_px = y_px - edge.y0;
+    const float at_corner = edge.a * left_px + edge.b * top_px;
+    if (at_corner + max_of(edge.a, 0.0f) + max_of(edge.b, 0.0f) <= 0.0f) return {0.0f, 0};
+    if (at_corner + min_of(edge.a, 0.0f) + min_of(edge.b, 0.0f) < 0.0f) {
+      crossed = true;
+      coverage.samples &= samples_inside(edge, left_px, top_px);
+    }
+    // Signed area to the left of the edge within the pixel: what right borders add and left borders take away.
+    const float from = clamp(edge.y0 - y_px, 0.0f, 1.0f), to = clamp(edge.y1 - y_px, 0.0f, 1.0f);
+    if (to > from) {
+      const float width = mean_width_left((from + top_px) * edge.dx_dy - left_px, (to + top_px) * edge.dx_dy - left_px);
+      coverage.area += edge.a < 0.0f ? (to - from) * width : (from - to) * width;
+    }
+  }
+  if (!crossed || (coverage.samples == kAllSamples && coverage.area > 1.0f - kFullCoverage)) return {1.0f, kAllSamples};
+  if (coverage.area < kLeastCoverage) return {0.0f, 0};
+  coverage.area = min_of(coverage.area, 1.0f);
+  return coverage;
+}
+
+/// Range of pixels of row y that the polygon may touch, and within it the range that it covers fully.
+struct RowSpan {
+  int32_t begin = 0, end = 0, full_begin = 0, full_end = 0;
+};
+
+PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const PixelBox& box, int y) {
+  const float y_px = static_cast<float>(y);
+  float touch_low = static_cast<float>(box.x_begin), touch_high = static_cast<float>(box.x_end);
+  float full_low = touch_low, full_high = touch_high;
+  for (int i = 0; i < count; ++i) {
+    const PolygonEdge& edge = edges[i];
+    const float at_row = edge.b * (y_px - edge.y0) - edge.a * edge.x0;
+    const float most = at_row + max_of(edge.b, 0.0f), least = at_row + min_of(edge.b, 0.0f);
+    if (edge.a > 0.0f) {
+      touch_low = max_of(touch_low, -most / edge.a - 1.0f);
+      full_low = max_of(full_low, -least / edge.a);
+    } else if (edge.a < 0.0f) {
+      touch_high = min_of(touch_high, -most / edge.a);
+      full_high = min_of(full_high, -least / edge.a - 1.0f);
+    } else if (most <= 0.0f) {
+      return {};
+    } else if (least < 0.0f) {
+      full_high = -1.0f;
+    }
+  }
+  // A little leeway: the exact tests of pixel_coverage decide at the borders.
+  constexpr float kLeeway_px = 1e-3f;
+  const float begin = static_cast<float>(box.x_begin), end = static_cast<float>(box.x_end);
+  auto first_at_or_after = [&](float x) { return static_cast<int>(ceilf(clamp(x, begin, end))); };
+  auto first_after = [&](float x) { return static_cast<int>(floorf(clamp(x, begin - 1.0f, end - 1.0f))) + 1; };
+  RowSpan span;
+  span.begin = first_at_or_after(touch_low - kLeeway_px);
+  span.end = max_of(first_after(touch_high + kLeeway_px), span.begin);
+  span.full_begin = min_of(max_of(first_at_or_after(full_low + kLeeway_px), span.begin), span.end);
+  span.full_end = min_of(max_of(first_after(full_high - kLeeway_px), span.full_begin), span.end);
+  return span;
+}
+
+PICTURA_HD inline int count_bits(uint64_t bits) {
+  bits = bits - ((bits >> 1) & 0x5555555555555555ull);
+  bits = (bits & 0x3333333333333333ull) + ((bits >> 2) & 0x3333333333333333ull);
+  bits = (bits + (bits >> 4)) & 0x0F0F0F0F0F0F0F0Full;
+  return static_cast<int>((bits * 0x0101010101010101ull) >> 56);
+}
+
+/// A pixel while faces are laid over it front to back.
+struct PixelState {
+  Rgb color;
+  float free_area = 1.0f;  // share of the pixel that nothing covers yet
+  uint64_t free_samples = kAllSamples;
+};
+
+/// Lays a face over what is still free of a pixel and returns its weight in the pixel's colour. A face in front of
+/// everything weighs its exact area; behind others, its area times the free share of its samples. A sliver without a
+/// sample shows only where nothing is in front of it, so that what is hidden changes nothing.
+PICTURA_HD inline float composite(PixelState* pixel, const PixelCoverage& coverage, Rgb color) {
+  if (coverage.area <= 0.0f) return 0.0f;
+  float weight;
+  if (coverage.samples == kAllSamples && coverage.area == 1.0f) {
+    weight = pixel->free_area;
+  } else {
+    const uint64_t seen = coverage.samples & pixel->free_samples;
+    if (coverage.samples == 0) {
+      weight = pixel->free_samples == kAllSamples ? coverage.area : 0.0f;
+    } else if (seen == coverage.samples) {
+      weight = coverage.area;
+    } else {
+      weight =
+          coverage.area * (static_cast<float>(count_bits(seen)) / static_cast<float>(count_bits(coverage.samples)));
+    }
+    weight = min_of(weight, pixel->free_area);
+  }
+  pixel->color.r += weight * color.r;
+  pixel->color.g += weight * color.g;
+  pixel->color.b += weight * color.b;
+  pixel->free_area -= weight;
+  pixel->free_samples &= ~coverage.samples;
+  // What rounding leaves free between faces that share an edge is not free.
+  if (pixel->free_samples == 0 && pixel->free_area < kFullCoverage) pixel->free_area = 0.0f;
+  return weight;
+}
+
+/// A channel as an unsigned byte.
+PICTURA_HD inline uint8_t to_byte(float channel) {
+  return static_cast<uint8_t>(clamp(channel, 0.0f, 1.0f) * 255.0f + 0.5f);
+}
+
+}  // namespace pictura

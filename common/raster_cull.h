@@ -1,0 +1,72 @@
+// Which things of a scene may appear in an image: those that touch the camera's frustum within the visible range, found
+// through the uniform grids, less those that a view leaves out. Shared by both devices.
+#pragma once
+
+#include "pictura/common/raster_camera.h"
+#include "pictura/common/raster_shapes.h"
+
+namespace pictura {
+
+/// A map's looks with what culling needs to know of them: how long the longest pieces are, because a piece is drawn as
+/// long as the mean depth of its corners is within range.
+struct RasterGeometry {
+  StaticGeometryView pieces;
+  float longest_strip_m = 0, longest_wall_m = 0;
+};
+
+PICTURA_HD inline float far_of(float longest_piece_m) { return kVisibleRange_m + longest_piece_m; }
+
+/// Half of a strip's greatest extent: length, mitres and width.
+PICTURA_HD inline float strip_radius_m(const Strip& strip) {
+  const float side = max_of(length(strip.side_a), length(strip.side_b));
+  return 0.5f * (length(strip.b_m - strip.a_m) + side * strip.width_m);
+}
+
+PICTURA_HD inline float wall_radius_m(const WallFace& wall) {
+  return 0.5f * (length(wall.b_m - wall.a_m) + wall.height_m);
+}
+
+PICTURA_HD inline bool may_show(const Strip& strip, const PinholeCamera& camera, const Frustum& f, float far_m) {
+  // The floor on its width may widen a strip by less than the guard band, which the frustum includes.
+  return ball_in_frustum(f, to_camera(camera, (strip.a_m + strip.b_m) * 0.5f), strip_radius_m(strip), far_m);
+}
+
+PICTURA_HD inline bool may_show(const WallFace& wall, const PinholeCamera& camera, const Frustum& f, float far_m) {
+  const Vec3 center = (wall.a_m + wall.b_m) * 0.5f + Vec3{0.0f, 0.0f, 0.5f * wall.height_m};
+  return ball_in_frustum(f, to_camera(camera, center), wall_radius_m(wall), far_m);
+}
+
+PICTURA_HD inline bool may_show(const AgentBox& box, const PinholeCamera& camera, const Frustum& f) {
+  const Vec3 center = box.center_m + Vec3{0.0f, 0.0f, 0.5f * box.height_m};
+  const float radius_m = 0.5f * length(Vec3{box.length_m, box.width_m, box.height_m});
+  return box.drawn != 0 && ball_in_frustum(f, to_camera(camera, center), radius_m, far_of(2.0f * radius_m));
+}
+
+/// Whether a view leaves an agent out: its own ego and those it hides.
+PICTURA_HD inline bool is_left_out(const View& view, Span<const int32_t> hidden_agents, int32_t agent) {
+  if (agent == view.ego_agent) return true;
+  for (int32_t i = view.hidden_begin; i < view.hidden_end; ++i) {
+    if (hidden_agents[static_cast<size_t>(i)] == agent) return true;
+  }
+  return false;
+}
+
+/// Calls visit(item) once for each item of a grid in the cells that a box on the ground touches; box_of(item) is what
+/// the grid files it under. Lanes share the work: lane i of n takes every n-th cell.
+template <typename BoxOf, typename Visit>
+PICTURA_HD inline void for_each_item(const GridView& grid, const Aabb2& query_box, BoxOf&& box_of, Visit&& visit,
+                                     int lane = 0, int num_lanes = 1) {
+  const CellRange cells = cells_of(grid, query_box);
+  const int columns = cells.x_end - cells.x_begin;
+  const int count = columns * (cells.y_end - cells.y_begin);
+  for (int cell = lane; cell < count; cell += num_lanes) {
+    const int x = cells.x_begin + cell % columns, y = cells.y_begin + cell / columns;
+    const size_t at = static_cast<size_t>(y) * static_cast<size_t>(grid.num_x) + static_cast<size_t>(x);
+    for (int32_t i = grid.begin[at]; i < grid.begin[at + 1]; ++i) {
+      const int32_t item = grid.items[static_cast<size_t>(i)];
+      if (is_first_visit(grid, cells, box_of(item), x, y)) visit(item);
+    }
+  }
+}
+
+}  // namespace pictura

@@ -1,0 +1,187 @@
+// What each primitive of a scene looks like to a camera: its visible faces as convex polygons in camera coordinates,
+// each with its colour already faded, and the rule that keeps thin strips visible. Shared by both devices.
+#pragma once
+
+#include "pictura/common/raster_camera.h"
+
+namespace pictura {
+
+/// What the class plane of an image says of the front surface at a pixel's centre.
+enum class SurfaceClass : uint8_t { nothing, vehicle, cyclist, pedestrian, wall, light, strip };
+/// Class of a strip: kClassOfStrip + StripKind.
+constexpr int kClassOfStrip = static_cast<int>(SurfaceClass::strip);
+
+/// Sides of the polygon that a light's disk is drawn as, of the disk's area.
+constexpr int kLightSides = 24;
+/// Corners that a face may have before clipping.
+constexpr int kMaxFaceCorners = kLightSides;
+
+/// Brightness of a face: the mean over its corners of their depth clamped to the visible range. A face that has faded
+/// to 0 is not drawn, and so hides nothing.
+PICTURA_HD inline float face_brightness(const Vec3* corners, int count) {
+  float sum_m = 0.0f;
+  for (int i = 0; i < count; ++i) sum_m += clamp(corners[i].z, 0.0f, kVisibleRange_m);
+  return depth_brightness(sum_m / static_cast<float>(count));
+}
+
+/// Colour of an agent's face before it fades; the debug palette pales halted agents and greys parked ones.
+PICTURA_HD inline Rgb agent_face_color(const AgentBox& box, BoxFace face, bool debug_palette) {
+  const Rgb color = agent_color(box.agent_class, face);
+  if (!debug_palette || box.palette == 0) return color;
+  const float tint = box.palette == 1 ? 1.0f : 0.35f;
+  return {0.5f * (color.r + tint), 0.5f * (color.g + tint), 0.5f * (color.b + tint)};
+}
+
+/// Calls emit(corners, count, color) for each face of the box that is turned to the camera. The underside, seen from
+/// roads below a bridge, has the top's colour.
+template <typename Emit>
+PICTURA_HD inline void agent_faces(const AgentBox& box, const PinholeCamera& camera, bool debug_palette, Emit&& emit) {
+  const Vec2 ahead{box.cos_heading, box.sin_heading};
+  const Vec2 along = ahead * (0.5f * box.length_m), across = left_normal(ahead) * (0.5f * box.width_m);
+  const Vec2 center = box.center_m.xy();
+  // Corners front-left, rear-left, rear-right, front-right: on the ground, then on the roof.
+  const Vec2 ground[4] = {center + along + across, center - along + across, center - along - across,
+                          center + along - across};
+  Vec3 corner[8];
+  for (int i = 0; i < 4; ++i) {
+    corner[i] = to_camera(camera, {ground[i].x, ground[i].y, box.center_m.z});
+    corner[i + 4] = to_camera(camera, {ground[i].x, ground[i].y, box.center_m.z + box.height_m});
+  }
+  auto face = [&](BoxFace name, int a, int b, int c, int d) {
+    const Vec3 corners[4] = {corner[a], corner[b], corner[c], corner[d]};
+    const float brightness = face_brightness(corners, 4);
+    if (brightness > 0.0f) emit(corners, 4, agent_face_color(box, name, debug_palette) * brightness);
+  };
+  const Vec2 from_center = camera.position_m.xy() - center;
+  const float ahead_m = dot(from_center, ahead), left_m = cross(ahead, from_center);
+  if (ahead_m > 0.5f * box.length_m) face(BoxFace::front, 3, 0, 4, 7);
+  if (ahead_m < -0.5f * box.length_m) face(BoxFace::back, 1, 2, 6, 5);
+  if (left_m > 0.5f * box.width_m) face(BoxFace::left, 0, 1, 5, 4);
+  if (left_m < -0.5f * box.width_m) face(BoxFace::right, 2, 3, 7, 6);
+  if (camera.position_m.z > box.center_m.z + box.height_m) face(BoxFace::top, 4, 5, 6, 7);
+  if (camera.position_m.z < box.center_m.z) face(BoxFace::top, 3, 2, 1, 0);
+}
+
+/// The wall's face; seen from both sides.
+template <typename Emit>
+PICTURA_HD inline void wall_faces(const WallFace& wall, const PinholeCamera& camera, Emit&& emit) {
+  const Vec3 up{0.0f, 0.0f, wall.height_m};
+  const Vec3 corners[4] = {to_camera(camera, wall.a_m), to_camera(camera, wall.b_m), to_camera(camera, wall.b_m + up),
+                           to_camera(camera, wall.a_m + up)};
+  const float brightness = face_brightness(corners, 4);
+  if (brightness > 0.0f) emit(corners, 4, wall.color * brightness);
+}
+
+/// Whether a camera at position_m is in front of the head and within its half-angle, seen on the ground plane.
+PICTURA_HD inline bool light_is_visible(const LightHead& head, LightState state, Vec3 position_m) {
+  if (state == LightState::off) return false;
+  const Vec2 to_eye = position_m.xy() - head.position_m.xy();
+  const float ahead_m = dot(to_eye, head.facing);
+  return ahead_m > 0.0f && ahead_m >= head.cos_half_angle * length(to_eye);
+}
+
+/// The disk of a lit head.
+template <typename Emit>
+PICTURA_HD inline void light_faces(const LightHead& head, LightState state, const PinholeCamera& camera, Emit&& emit) {
+  if (!light_is_visible(head, state, camera.position_m)) return;
+  // Radius of the regular polygon with the disk's area.
+  const SinCos step = sincos_of(kTwoPi / kLightSides);
+  const float radius_m = kLightRadius_m * sqrtf(kTwoPi / (kLightSides * step.sin));
+  const Vec2 left = left_normal(head.facing);
+  Vec3 corners[kLightSides];
+  float c = 1.0f, s = 0.0f;
+  for (int i = 0; i < kLightSides; ++i) {
+    const Vec2 ground = head.position_m.xy() + left * (radius_m * c);
+    corners[i] = to_camera(camera, {ground.x, ground.y, head.position_m.z + radius_m * s});
+    const float next_c = c * step.cos - s * step.sin;
+    s = s * step.cos + c * step.sin;
+    c = next_c;
+  }
+  const float brightness = face_brightness(corners, kLightSides);
+  if (brightness > 0.0f) emit(corners, kLightSides, light_color(state) * brightness);
+}
+
+/// The strip's four corners in the world: left of a, right of a, right of b, left of b.
+PICTURA_HD inline void strip_corners(const Strip& strip, Vec3* corners_out) {
+  const Vec2 at_a = strip.side_a * (0.5f * strip.width_m), at_b = strip.side_b * (0.5f * strip.width_m);
+  const Vec3 a = strip.a_m, b = strip.b_m;
+  corners_out[0] = {a.x + at_a.x, a.y + at_a.y, a.z};
+  corners_out[1] = {a.x - at_a.x, a.y - at_a.y, a.z};
+  corners_out[2] = {b.x - at_b.x, b.y - at_b.y, b.z};
+  corners_out[3] = {b.x + at_b.x, b.y + at_b.y, b.z};
+}
+
+/// Pushes the two corners of one end of a strip apart, along the normal of the strip on screen, until they are floor_px
+/// apart in that direction. Depths stay. `ahead` is the strip's direction on screen.
+PICTURA_HD inline void widen_strip_end(const PinholeCamera& camera, Vec2 ahead, float floor_px, Vec3* left,
+                                       Vec3* right) {
+  if (left->z < kNear_m || right->z < kNear_m) return;
+  const Vec2 normal = left_normal(ahead);
+  const Vec2 gap{camera.focal_x_px * (left->x / left->z - right->x / right->z),
+                 camera.focal_y_px * (left->y / left->z - right->y / right->z)};
+  const float width_px = dot(gap, normal);
+  if (fabsf(width_px) >= floor_px) return;
+  const float missing_px = 0.5f * (floor_px - fabsf(width_px));
+  const Vec2 push = normal * (width_px < 0.0f ? -missing_px : missing_px);
+  left->x += push.x * left->z / camera.focal_x_px;
+  left->y += push.y * left->z / camera.focal_y_px;
+  right->x -= push.x * right->z / camera.focal_x_px;
+  right->y -= push.y * right->z / camera.focal_y_px;
+}
+
+/// A strip's corners as drawn, in camera coordinates, after the floor on its width on screen; `corners` are its own
+/// corners in camera coordinates. The part of its centre line behind the near plane is cut off first, so that the floor
+/// is measured where the strip can be seen. False where nothing is left.
+PICTURA_HD inline bool widen_strip(const PinholeCamera& camera, float floor_px, Vec3* corners) {
+  Vec3 a = (corners[0] + corners[1]) * 0.5f, b = (corners[3] + corners[2]) * 0.5f;
+  if (a.z < kNear_m && b.z < kNear_m) {
+    // Only a corner may still reach past the near plane; it is too close for any floor.
+    return corners[0].z > kNear_m || corners[1].z > kNear_m || corners[2].z > kNear_m || corners[3].z > kNear_m;
+  }
+  if (floor_px <= 0.0f) return true;
+  // Centre line in front of the near plane, and its direction on screen.
+  const float a_in = a.z - kNear_m, b_in = b.z - kNear_m;
+  bool cut_a = false, cut_b = false;
+  if (a_in < 0.0f) {
+    const float t = a_in / (a_in - b_in);
+    corners[0] = corners[0] + (corners[3] - corners[0]) * t;
+    corners[1] = corners[1] + (corners[2] - corners[1]) * t;
+    a = a + (b - a) * t;
+    cut_a = true;
+  } else if (b_in < 0.0f) {
+    const float t = b_in / (b_in - a_in);
+    corners[3] = corners[3] + (corners[0] - corners[3]) * t;
+    corners[2] = corners[2] + (corners[1] - corners[2]) * t;
+    b = b + (a - b) * t;
+    cut_b = true;
+  }
+  const Vec2 on_screen{camera.focal_x_px * (b.x / b.z - a.x / a.z), camera.focal_y_px * (b.y / b.z - a.y / a.z)};
+  const float length_px = length(on_screen);
+  if (length_px < 1e-6f) return true;
+  const Vec2 ahead = on_screen * (1.0f / length_px);
+  if (!cut_a) widen_strip_end(camera, ahead, floor_px, &corners[0], &corners[1]);
+  if (!cut_b) widen_strip_end(camera, ahead, floor_px, &corners[3], &corners[2]);
+  return true;
+}
+
+/// The strip's face, at least floor_px wide on screen.
+template <typename Emit>
+PICTURA_HD inline void strip_faces(const Strip& strip, const PinholeCamera& camera, float floor_px, Emit&& emit) {
+  Vec3 corners[4];
+  strip_corners(strip, corners);
+  for (int i = 0; i < 4; ++i) corners[i] = to_camera(camera, corners[i]);
+  const float brightness = face_brightness(corners, 4);
+  if (brightness > 0.0f && widen_strip(camera, floor_px, corners)) emit(corners, 4, strip.color * brightness);
+}
+
+/// Where strips overlap in one plane, the lower rank is painted over the higher.
+PICTURA_HD inline int strip_rank(StripKind kind) {
+  switch (kind) {
+    case StripKind::stop_line: return 0;
+    case StripKind::crosswalk: return 1;
+    case StripKind::lane_mark: return 2;
+    default: return 3;
+  }
+}
+
+}  // namespace pictura

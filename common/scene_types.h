@@ -1,0 +1,99 @@
+// The plain data that scenes are made of, readable on both devices: what a map's looks consist of, what moves, and from
+// where images are drawn. Right-handed metres, headings in radians counter-clockwise, z up.
+#pragma once
+
+#include "pictura/common/color.h"
+#include "pictura/common/grid_view.h"
+#include "pictura/common/span.h"
+#include "pictura/common/stream.h"
+
+namespace pictura {
+
+/// What a strip on the road is; its class in the optional class plane is kClassOfStrip + kind.
+enum class StripKind : uint8_t { lane_mark, road_edge, crosswalk, stop_line };
+
+/// One straight piece, at most kMaxPiece_m long, of a polyline painted on the road. Its corners are a -+ side_a * w/2
+/// and b -+ side_b * w/2: the sides are mitred, so that consecutive pieces share an edge and neither overlap nor gape.
+struct Strip {
+  Vec3 a_m, b_m;        // the two ends of the centre line
+  Vec2 side_a, side_b;  // horizontal offset to the left per metre of half-width, at a and at b
+  float width_m = 0;
+  Rgb color;
+  StripKind kind = StripKind::lane_mark;
+};
+constexpr float kMaxPiece_m = 10.0f;
+
+/// An opaque vertical face from the ground up, seen from both sides.
+struct WallFace {
+  Vec3 a_m, b_m;  // the two ends of its foot
+  float height_m = 0;
+  Rgb color = kWallColor;
+};
+
+/// A disk of kLightRadius_m that shows its signal's state to those in front of it.
+struct LightHead {
+  Vec3 position_m;  // centre of the disk
+  Vec2 facing;      // unit vector, towards those it is meant for
+  float cos_half_angle = 0.5f;
+  int32_t signal = 0;  // index into the world's light states: the stop line that it governs
+};
+constexpr float kLightRadius_m = 0.5f;
+
+/// What the uniform grids file a piece under.
+PICTURA_HD inline Aabb2 ground_box(const Strip& strip) {
+  const Vec2 a = strip.a_m.xy(), b = strip.b_m.xy();
+  return {{min_of(a.x, b.x) - strip.width_m, min_of(a.y, b.y) - strip.width_m},
+          {max_of(a.x, b.x) + strip.width_m, max_of(a.y, b.y) + strip.width_m}};
+}
+PICTURA_HD inline Aabb2 ground_box(const WallFace& wall) {
+  return {{min_of(wall.a_m.x, wall.b_m.x), min_of(wall.a_m.y, wall.b_m.y)},
+          {max_of(wall.a_m.x, wall.b_m.x), max_of(wall.a_m.y, wall.b_m.y)}};
+}
+
+/// What both devices read of a map's looks.
+struct StaticGeometryView {
+  Span<const Strip> strips;
+  Span<const WallFace> walls;
+  Span<const LightHead> heads;
+  GridView strip_grid, wall_grid;
+  int32_t num_signals = 0;
+};
+
+/// An agent's oriented box, standing upright on the ground.
+struct AgentBox {
+  Vec3 center_m;  // centre of the box's foot
+  float cos_heading = 1, sin_heading = 0;
+  float length_m = 0, width_m = 0, height_m = 0;
+  AgentClass agent_class = AgentClass::vehicle;
+  uint8_t palette = 0;  // 0: the class's colours; 1: halted, 2: parked, in the debug palette alone
+  uint8_t drawn = 1;    // 0: not in any image
+  uint8_t padding = 0;
+};
+
+/// Index of a StaticGeometry in the renderer that it was uploaded to.
+using GeometryHandle = int32_t;
+
+/// Everything that moves, for all worlds, of one step. Spans lie in `space`.
+struct SceneBatch {
+  MemorySpace space = MemorySpace::host;
+  Span<const int32_t> world_begin;      // [worlds + 1] first agent of each world; ends with the number of agents
+  Span<const AgentBox> agents;          // [agents] controlled and parked alike
+  Span<const GeometryHandle> geometry;  // [worlds]
+  Span<const int32_t> light_begin;      // [worlds + 1] first light state of each world
+  Span<const LightState> light_states;  // [light_begin.back()]
+  Span<const int32_t> hidden_agents;    // lists that views point into; usually empty
+};
+
+/// Where a rig stands. The ego's own box is left out of its images.
+struct View {
+  int32_t world = 0;
+  int32_t ego_agent = -1;  // index into SceneBatch::agents, or -1: nobody is left out
+  Vec3 origin_m;           // the rig's origin, on the ground
+  float cos_heading = 1, sin_heading = 0;
+  float body_length_m = kRigBodyLength_m;    // shrinks the x offsets of the cameras of short bodies
+  int32_t hidden_begin = 0, hidden_end = 0;  // further agents left out: a range of SceneBatch::hidden_agents
+
+  static constexpr float kRigBodyLength_m = 4.5f;
+};
+
+}  // namespace pictura

@@ -1,0 +1,148 @@
+#include "pictura/tests/support/image_scenes.h"
+
+#include <random>
+
+namespace pictura {
+
+AgentBox make_box(AgentClass agent_class, Vec3 center_m, float heading_rad, Vec3 size_m) {
+  const SinCos heading = sincos_of(heading_rad);
+  AgentBox box;
+  box.center_m = center_m;
+  box.cos_heading = heading.cos;
+  box.sin_heading = heading.sin;
+  box.length_m = size_m.x;
+  box.width_m = size_m.y;
+  box.height_m = size_m.z;
+  box.agent_class = agent_class;
+  return box;
+}
+
+View make_view(Vec3 origin_m, float heading_rad) {
+  const SinCos heading = sincos_of(heading_rad);
+  View view;
+  view.origin_m = origin_m;
+  view.cos_heading = heading.cos;
+  view.sin_heading = heading.sin;
+  return view;
+}
+
+void add_polyline(StaticGeometry* geometry, std::vector<Vec3> points_m, float width_m, StripKind kind) {
+  const Rgb color = kind == StripKind::road_edge   ? kRoadEdgeColor
+                    : kind == StripKind::crosswalk ? kCrosswalkColor
+                    : kind == StripKind::stop_line ? kStopLineColor
+                                                   : kWhiteMarkColor;
+  append_strips(points_m, width_m, color, kind, &geometry->strips);
+}
+
+namespace {
+
+constexpr float kBlock_m = 60.0f;
+constexpr int kBlocks = 5;
+constexpr float kHalfRoad_m = 7.0f;
+
+// Boxes are apart when circles around them are; crude, and enough for disjoint footprints.
+bool apart(const AgentBox& a, const AgentBox& b) {
+  auto radius = [](const AgentBox& box) { return 0.5f * length(Vec2{box.length_m, box.width_m}); };
+  return length(a.center_m.xy() - b.center_m.xy()) > radius(a) + radius(b) + 0.1f;
+}
+
+}  // namespace
+
+SyntheticTown make_synthetic_town(uint64_t seed, int num_agents) {
+  std::mt19937_64 random(seed);
+  auto uniform = [&](float low, float high) {
+    return low + (high - low) * static_cast<float>(random() >> 40) / static_cast<float>(1 << 24);
+  };
+  SyntheticTown town;
+  StaticGeometry& geometry = town.geometry;
+
+  // Streets along x and y. at(u, v) is a point u along and v across the street `line`.
+  for (int along_y = 0; along_y < 2; ++along_y) {
+    for (int line = 0; line <= kBlocks; ++line) {
+      const float offset = static_cast<float>(line) * kBlock_m;
+      auto at = [&](float u, float v) { return along_y ? Vec3{offset - v, u, 0} : Vec3{u, offset + v, 0}; };
+      for (int block = 0; block < kBlocks; ++block) {
+        const float begin = static_cast<float>(block) * kBlock_m + kHalfRoad_m + 2;
+        const float end = static_cast<float>(block + 1) * kBlock_m - kHalfRoad_m - 2;
+        add_polyline(&geometry, {at(begin, 0.1f), at(end, 0.1f)}, 0.15f, StripKind::lane_mark);
+        add_polyline(&geometry, {at(begin, -0.1f), at(end, -0.1f)}, 0.15f, StripKind::lane_mark);
+        for (float dash = begin; dash + 3 < end; dash += 9) {
+          for (const float v : {-3.5f, 3.5f}) {
+            add_polyline(&geometry, {at(dash, v), at(dash + 3, v)}, 0.15f, StripKind::lane_mark);
+          }
+        }
+        for (const float v : {-kHalfRoad_m, kHalfRoad_m}) {
+          const float bend = v > 0 ? 2.0f : -2.0f;
+          add_polyline(&geometry,
+                       {at(begin - 2, v + bend), at(begin - 0.5f, v + 0.2f * bend), at(begin, v), at(end, v),
+                        at(end + 0.5f, v + 0.2f * bend), at(end + 2, v + bend)},
+                       0.2f, StripKind::road_edge);
+        }
+        add_polyline(&geometry, {at(end - 3, -kHalfRoad_m + 0.3f), at(end - 3, -0.3f)}, 0.4f, StripKind::stop_line);
+        for (const float u : {end - 1.5f, end + 1.5f}) {
+          add_polyline(&geometry, {at(u, -kHalfRoad_m), at(u, kHalfRoad_m)}, 0.3f, StripKind::crosswalk);
+        }
+        // A head on the far side of the crossing for traffic along +u.
+        LightHead head;
+        head.position_m = at(end + 2 * kHalfRoad_m + 6, -kHalfRoad_m - 1);
+        head.position_m.z = 5;
+        head.facing = along_y ? Vec2{0, -1} : Vec2{-1, 0};
+        head.signal = geometry.num_signals++;
+        geometry.heads.push_back(head);
+        town.scene.light_states.push_back(static_cast<LightState>(random() % 4));
+        // Houses on one side of the sidewalk, with gaps.
+        for (float u = begin + 4; u + 8 < end; u += 12) {
+          if (random() % 4 == 0) continue;
+          const float v = kHalfRoad_m + 4;
+          WallFace wall;
+          wall.a_m = at(u, v);
+          wall.b_m = at(u + uniform(6, 11), v);
+          wall.height_m = uniform(3, 9);
+          geometry.walls.push_back(wall);
+        }
+      }
+    }
+  }
+  geometry.build_grids();
+
+  for (int tries = 0; static_cast<int>(town.scene.agents.size()) < num_agents && tries < 100 * num_agents; ++tries) {
+    const bool along_y = random() % 2;
+    const float offset = static_cast<float>(random() % (kBlocks + 1)) * kBlock_m;
+    const float u = uniform(0, kBlocks * kBlock_m);
+    const uint64_t draw = random() % 10;
+    const bool back = random() % 2;
+    AgentClass agent_class = AgentClass::vehicle;
+    Vec3 size{uniform(3.8f, 5.2f), uniform(1.7f, 2.1f), uniform(1.4f, 2.2f)};
+    float v = (random() % 2 ? 1.75f : 5.25f) * (back ? 1.0f : -1.0f) + uniform(-0.3f, 0.3f);
+    if (draw == 0) {
+      agent_class = AgentClass::pedestrian;
+      size = {0.6f, 0.6f, uniform(1.5f, 1.9f)};
+      v = (back ? 1.0f : -1.0f) * (kHalfRoad_m + 2);
+    } else if (draw == 1) {
+      agent_class = AgentClass::cyclist;
+      size = {1.8f, 0.6f, 1.7f};
+    }
+    const float heading = (along_y ? kHalfPi : 0.0f) + (back ? kPi : 0.0f) + uniform(-0.15f, 0.15f);
+    const AgentBox box =
+        make_box(agent_class, along_y ? Vec3{offset - v, u, 0} : Vec3{u, offset + v, 0}, heading, size);
+    bool free = true;
+    for (const AgentBox& other : town.scene.agents) free = free && apart(box, other);
+    if (free) town.scene.agents.push_back(box);
+  }
+  for (std::size_t i = 0; i < town.scene.agents.size(); ++i) {
+    const AgentBox& box = town.scene.agents[i];
+    if (box.agent_class != AgentClass::vehicle) continue;
+    View view;
+    view.ego_agent = static_cast<int32_t>(i);
+    view.cos_heading = box.cos_heading;
+    view.sin_heading = box.sin_heading;
+    view.body_length_m = box.length_m;
+    const float rear_axle_m = -0.3f * box.length_m;
+    view.origin_m = box.center_m + Vec3{rear_axle_m * box.cos_heading, rear_axle_m * box.sin_heading, 0};
+    town.views.push_back(view);
+  }
+  town.scene.end_world(0);
+  return town;
+}
+
+}  // namespace pictura
