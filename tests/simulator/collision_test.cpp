@@ -1,0 +1,142 @@
+#include "pictura/simulator/rules/collision.h"
+
+#include <gtest/gtest.h>
+
+#include "pictura/common/rng.h"
+#include "pictura/tests/simulator/stage.h"
+#include "pictura/tests/simulator/test_maps.h"
+
+namespace pictura {
+namespace {
+
+AgentBox make_box(float x, float y, float heading_rad = 0, float length_m = 4, float width_m = 2) {
+  AgentBox box;
+  box.center_m = {x, y, 0};
+  box.cos_heading = cos_of(heading_rad);
+  box.sin_heading = sin_of(heading_rad);
+  box.length_m = length_m;
+  box.width_m = width_m;
+  box.height_m = 1.5f;
+  return box;
+}
+
+bool contains(const OrientedBox& box, Vec2 p) {
+  const Vec2 d = p - box.center_m;
+  return std::abs(dot(d, box.forward)) <= box.half_length_m && std::abs(cross(box.forward, d)) <= box.half_width_m;
+}
+
+/// Whether a dense grid of points of `a` (its rim included) has one in `b`.
+bool overlap_by_points(const OrientedBox& a, const OrientedBox& b) {
+  constexpr int kPoints = 80;
+  for (int i = 0; i <= kPoints; ++i) {
+    for (int j = 0; j <= kPoints; ++j) {
+      const Vec2 p = a.center_m + a.forward * (a.half_length_m * (2.0f * static_cast<float>(i) / kPoints - 1)) +
+                     left_normal(a.forward) * (a.half_width_m * (2.0f * static_cast<float>(j) / kPoints - 1));
+      if (contains(b, p)) return true;
+    }
+  }
+  return false;
+}
+
+TEST(Collision, OverlapAgreesWithPoints) {
+  RandomStream random(1, 0, 0, 0, 0, Purpose::town);
+  int overlaps = 0, undecided = 0;
+  for (int i = 0; i < 400; ++i) {
+    const OrientedBox a =
+        footprint(make_box(0, 0, random.uniform(-3, 3), random.uniform(1, 6), random.uniform(0.5f, 2)));
+    OrientedBox b = footprint(make_box(random.uniform(-5, 5), random.uniform(-4, 4), random.uniform(-3, 3),
+                                       random.uniform(1, 6), random.uniform(0.5f, 2)));
+    // Points miss overlaps thinner than their spacing: those are left out.
+    OrientedBox smaller = b, larger = b;
+    smaller.half_length_m -= 0.1f;
+    smaller.half_width_m -= 0.1f;
+    larger.half_length_m += 0.1f;
+    larger.half_width_m += 0.1f;
+    const bool surely = overlap_by_points(a, smaller), perhaps = overlap_by_points(a, larger);
+    if (surely != perhaps) {
+      ++undecided;
+      continue;
+    }
+    overlaps += surely;
+    EXPECT_EQ(overlap(a, b), surely) << i;
+    EXPECT_EQ(overlap(b, a), surely) << i;
+  }
+  EXPECT_GT(overlaps, 50);
+  EXPECT_LT(undecided, 100);
+}
+
+TEST(Collision, NothingTunnelsHeadOn) {
+  // Two cyclists, 1.6 x 0.5 m, pass through each other within one step: 2 m of way each.
+  const AgentBox a_from = make_box(0, 0, 0, 1.6f, 0.5f), a_to = make_box(2, 0, 0, 1.6f, 0.5f);
+  const AgentBox b_from = make_box(2, 0.2f, kPi, 1.6f, 0.5f), b_to = make_box(0, 0.2f, kPi, 1.6f, 0.5f);
+  EXPECT_FALSE(overlap(footprint(a_to), footprint(b_to)));
+  EXPECT_TRUE(collide(a_from, a_to, b_from, b_to));
+  // A pedestrian crosses a lane's line of travel at the wrong instant: hit on the way, free at both ends.
+  const AgentBox walker = make_box(3.2f, 0, 0, 0.4f, 0.4f);
+  EXPECT_TRUE(collide(make_box(0, 0), make_box(2, 0), walker, walker));
+  EXPECT_FALSE(
+      collide(make_box(0, 0), make_box(2, 0), make_box(3.2f, 3, 0, 0.4f, 0.4f), make_box(3.2f, 3, 0, 0.4f, 0.4f)));
+}
+
+TEST(Collision, SweptAt20MetresPerSecondAcrossAThinBox) {
+  // A car at 20 m/s crosses a thin standing box sideways: before and after it does not touch.
+  const AgentBox thin = make_box(0, 0, 0, 0.4f, 0.4f);
+  const AgentBox from = make_box(0, -1.21f, kHalfPi, 1.6f, 0.5f), to = make_box(0, 1.21f, kHalfPi, 1.6f, 0.5f);
+  EXPECT_FALSE(overlap(footprint(thin), footprint(from)));
+  EXPECT_FALSE(overlap(footprint(thin), footprint(to)));
+  EXPECT_TRUE(collide(from, to, thin, thin));
+  EXPECT_TRUE(collide(thin, thin, from, to));
+}
+
+TEST(Collision, LevelsDoNotMeet) {
+  AgentBox below = make_box(0, 0), above = make_box(1, 0);
+  above.center_m.z = 5;
+  EXPECT_FALSE(collide(below, below, above, above));
+  above.center_m.z = 1;
+  EXPECT_TRUE(collide(below, below, above, above));
+}
+
+TEST(Collision, FaultFollowsThePaper) {
+  const AgentBox own = make_box(0, 0);
+  EXPECT_TRUE(at_fault(own, 5, make_box(4, 0)));           // rammed the one ahead
+  EXPECT_TRUE(at_fault(own, 5, make_box(0, 2, kHalfPi)));  // side against side
+  EXPECT_FALSE(at_fault(own, 0.1f, make_box(4, 0)));       // stood still
+  EXPECT_FALSE(at_fault(own, -0.1f, make_box(-4, 0)));
+  EXPECT_FALSE(at_fault(own, 5, make_box(-4, 0.8f)));  // struck from behind
+  EXPECT_TRUE(at_fault(own, -1, make_box(-4, 0)));     // backed into it
+}
+
+TEST(Collision, SegmentTouchesBox) {
+  const OrientedBox box = footprint(make_box(0, 0, 0.3f));
+  EXPECT_TRUE(touches(box, {-10, 0}, {10, 0}));
+  EXPECT_TRUE(touches(box, {0.1f, 0.1f}, {0.2f, 0.2f}));  // wholly inside
+  EXPECT_FALSE(touches(box, {-10, 3}, {10, 3}));
+  EXPECT_FALSE(touches(box, {3, 0}, {10, 0}));
+  EXPECT_TRUE(touches(box, {0, 0}, {0, 0}));
+}
+
+TEST(Collision, BothHaltAndOnlyTheRammerIsAtFault) {
+  testing::Stage stage(testing::stadium(200, 1), 3);
+  stage.put(0, {50, 0}, 0, 10);
+  stage.put(1, {54.5f, 0}, 0, 5);
+  stage.put(2, {100, 0}, 0, 5);
+  stage.set(0, Conditioning::collision, 2);
+  const std::vector<float> rewards = stage.step();
+  EXPECT_EQ(stage.events(0), kEventCollision | kEventAtFault);
+  EXPECT_EQ(stage.events(1), kEventCollision);
+  EXPECT_EQ(stage.events(2), kEventNone);
+  EXPECT_EQ(stage.batch.agents.status[0], static_cast<uint8_t>(AgentStatus::halted));
+  EXPECT_EQ(stage.batch.agents.status[1], static_cast<uint8_t>(AgentStatus::halted));
+  EXPECT_EQ(stage.batch.agents.speed_mps[0], 0);
+  EXPECT_NEAR(rewards[0], -3, 0.01);
+  EXPECT_NEAR(rewards[1], -0.5, 0.01);
+  // Halted agents stay in the way and earn nothing more.
+  stage.put(2, {46.5f, 0}, 0, 10);
+  const std::vector<float> later = stage.step();
+  EXPECT_EQ(later[0], 0);
+  EXPECT_EQ(stage.events(0), kEventNone);
+  EXPECT_EQ(stage.events(2), kEventCollision | kEventAtFault);
+}
+
+}  // namespace
+}  // namespace pictura

@@ -1,0 +1,193 @@
+// Every slot of the observation, recomputed by hand on a straight road.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "pictura/simulator/rules/observe.h"
+#include "pictura/tests/simulator/stage.h"
+#include "pictura/tests/simulator/test_maps.h"
+
+namespace pictura {
+namespace {
+
+struct Observation : ::testing::Test {
+  Observation() : stage(make_map(), 20) {
+    // The ego heads east at (100, 0.5); 18 others stand ahead of it on the left lane; the last one is far away.
+    stage.put(0, {100, 0.5f}, 0.1f, 6);
+    for (int i = 1; i <= 18; ++i) stage.put(i, {105.0f + 5 * static_cast<float>(i), 4}, kPi, 2);
+    stage.put(19, {0, 40}, kPi, 2);
+  }
+  static std::shared_ptr<const RoadMap> make_map() {
+    auto map = testing::stadium(200, 2);
+    testing::add_light(map.get(), 120, 8, 2, {0, 4});
+    return map;
+  }
+  void look() { observe(stage.world(), 0, true, stage.batch.observation_view()); }
+  /// A point in the ego frame.
+  static Vec2 local(float x, float y) {
+    const float c = std::cos(0.1f), s = std::sin(0.1f);
+    return {(x - 100) * c + (y - 0.5f) * s, -(x - 100) * s + (y - 0.5f) * c};
+  }
+
+  testing::Stage stage;
+};
+
+TEST_F(Observation, Ego) {
+  AgentState& agents = stage.batch.agents;
+  agents.steer_rad[0] = 0.22f;
+  agents.accel_long_mps2[0] = -2;
+  agents.accel_lat_mps2[0] = 1;
+  look();
+  const float* ego = stage.batch.observation_view().ego.data();
+  const float expected[kEgoFeatures] = {6 / 20.0f, 4 / 6.0f,   2 / 3.0f,    0.4f,          -0.4f,
+                                        1 / 4.0f,  10 / 20.0f, 0.5f / 4.0f, std::cos(0.1f)};
+  for (int i = 0; i < kEgoFeatures; ++i) EXPECT_NEAR(ego[i], expected[i], 1e-5) << i;
+}
+
+TEST_F(Observation, PartnersAreTheNearestInOrder) {
+  look();
+  const ObservationView out = stage.batch.observation_view();
+  ASSERT_EQ(out.set_counts[0], kMaxPartners);
+  for (int i = 0; i < kMaxPartners; ++i) {
+    const float* row = out.partners.data() + i * kPartnerFeatures;
+    // Heading west: the box's centre lies 1.2 m west of its rear axle.
+    const Vec2 at = local(105.0f + 5 * static_cast<float>(i + 1) - 1.2f, 4);
+    EXPECT_NEAR(row[0], at.x / 120, 1e-5) << i;
+    EXPECT_NEAR(row[1], at.y / 120, 1e-5) << i;
+    EXPECT_EQ(row[2], 0);
+    EXPECT_NEAR(row[3], 4 / 6.0, 1e-6);
+    EXPECT_NEAR(row[4], 2 / 3.0, 1e-6);
+    EXPECT_NEAR(row[5], std::cos(kPi - 0.1), 1e-6);
+    EXPECT_NEAR(row[6], std::sin(kPi - 0.1), 1e-6);
+    EXPECT_NEAR(row[7], 2 / 20.0, 1e-6);
+  }
+}
+
+TEST_F(Observation, AuxiliarySlotsCanBeZero) {
+  stage.batch.options.auxiliary_observations = false;
+  look();
+  const ObservationView out = stage.batch.observation_view();
+  EXPECT_EQ(out.ego[7], 0);
+  EXPECT_EQ(out.ego[8], 0);
+  EXPECT_NE(out.ego[0], 0);
+  for (size_t i = 0; i < kMaxPartners; ++i) EXPECT_EQ(out.partners[i * kPartnerFeatures + 7], 0);
+}
+
+TEST_F(Observation, ControlsAreStopLinesWithStateAndWhetherTheyHoldTheEgo) {
+  stage.batch.lights[0] = LightState::red;
+  look();
+  const ObservationView out = stage.batch.observation_view();
+  ASSERT_EQ(out.set_counts[3], 1);
+  const Vec2 left = local(120, 6), right = local(120, -2);
+  const float expected[kControlFeatures] = {left.x / 120, left.y / 120, right.x / 120, right.y / 120, 0, 1, 1};
+  for (size_t i = 0; i < kControlFeatures; ++i) EXPECT_NEAR(out.controls[i], expected[i], 1e-5) << i;
+  stage.batch.lights[0] = LightState::green;
+  look();
+  EXPECT_EQ(out.controls[5], -1);
+  stage.batch.lights[0] = LightState::yellow;
+  look();
+  EXPECT_EQ(out.controls[5], 0.5f);
+  for (size_t i = kControlFeatures; i < kMaxControls * kControlFeatures; ++i) EXPECT_EQ(out.controls[i], 0);
+}
+
+TEST_F(Observation, WaypointsStartWithTheActiveOne) {
+  AgentState& agents = stage.batch.agents;
+  for (size_t i = 0; i < 3; ++i) {
+    agents.waypoint_x_m[i] = 110 + 30 * static_cast<float>(i);
+    agents.waypoint_y_m[i] = 4 * static_cast<float>(i);
+    agents.waypoint_z_m[i] = 1;
+  }
+  agents.next_waypoint[0] = 1;
+  look();
+  const ObservationView out = stage.batch.observation_view();
+  for (int i = 0; i < 3; ++i) {
+    const int index = std::min(1 + i, 2);
+    const Vec2 at = local(110 + 30 * static_cast<float>(index), 4 * static_cast<float>(index));
+    EXPECT_NEAR(out.waypoints[static_cast<size_t>(3 * i)], at.x / 120, 1e-5);
+    EXPECT_NEAR(out.waypoints[static_cast<size_t>(3 * i + 1)], at.y / 120, 1e-5);
+    EXPECT_NEAR(out.waypoints[static_cast<size_t>(3 * i + 2)], 0.1, 1e-6);
+  }
+}
+
+TEST_F(Observation, ConditioningIsScaledByThePapersRanges) {
+  stage.set(0, Conditioning::delta_goal_m, 7);
+  stage.set(0, Conditioning::v_goal_mps, 20);
+  stage.set(0, Conditioning::center_bias_m, 0.25f);
+  stage.set(0, Conditioning::throttle, 1.25f);
+  look();
+  const ObservationView out = stage.batch.observation_view();
+  EXPECT_NEAR(out.conditioning[static_cast<size_t>(Conditioning::delta_goal_m)], 0, 1e-6);
+  EXPECT_NEAR(out.conditioning[static_cast<size_t>(Conditioning::v_goal_mps)], 1, 1e-6);
+  EXPECT_NEAR(out.conditioning[static_cast<size_t>(Conditioning::collision)], -1, 1e-6);
+  EXPECT_NEAR(out.conditioning[static_cast<size_t>(Conditioning::center_bias_m)], 0.5, 1e-6);
+  EXPECT_EQ(out.conditioning[static_cast<size_t>(Conditioning::velocity)], 0);
+  EXPECT_NEAR(out.conditioning[static_cast<size_t>(Conditioning::throttle)], 1, 1e-6);
+}
+
+/// What is listed must be what is in sight: checked against all pieces of the map, from many places and headings.
+TEST_F(Observation, LanesAndBoundariesAreAllThatIsInSight) {
+  RandomStream random(5, 0, 0, 0, 0, Purpose::town);
+  const WorldMap& map = stage.batch.world_maps[0];
+  for (int i = 0; i < 300; ++i) {
+    const float heading = random.uniform(-kPi, kPi);
+    const Vec2 at{random.uniform(0, 200), random.uniform(-1, 5)};
+    stage.put(0, at, heading, 0);
+    look();
+    const ObservationView out = stage.batch.observation_view();
+    for (const bool lanes : {true, false}) {
+      const std::vector<ObservedPiece>& pieces = lanes ? map.lane_pieces : map.boundary_pieces;
+      const Span<const float> rows = lanes ? out.lanes : out.boundaries;
+      int in_sight = 0, found = 0;
+      for (const ObservedPiece& piece : pieces) {
+        const Vec2 d = piece.middle_m.xy() - at;
+        const Vec2 forward{cos_of(heading), sin_of(heading)};
+        const float x = dot(d, forward), y = cross(forward, d);
+        if (x > 120 || x < -20 || std::abs(y) > 30) continue;
+        ++in_sight;
+        for (size_t row = 0; row < 80; ++row) {
+          const float* r = rows.data() + row * kLaneFeatures;
+          if (std::abs(r[0] * 120 - x) < 1e-3 && std::abs(r[1] * 120 - y) < 1e-3 &&
+              std::abs(r[3] * 5 - piece.half_length_m) < 1e-4 &&
+              std::abs(r[4] - dot(piece.direction, forward)) < 1e-4 &&
+              std::abs(r[5] - cross(forward, piece.direction)) < 1e-4) {
+            ++found;
+            break;
+          }
+        }
+      }
+      ASSERT_LT(in_sight, 80);
+      EXPECT_EQ(out.set_counts[lanes ? 1 : 2], in_sight) << i;
+      EXPECT_EQ(found, in_sight) << i;
+      for (size_t k = static_cast<size_t>(in_sight) * kLaneFeatures; k < 80 * kLaneFeatures; ++k) ASSERT_EQ(rows[k], 0);
+    }
+  }
+}
+
+TEST_F(Observation, PiecesAreAtMostTenMetresLong) {
+  for (const auto* pieces : {&stage.batch.world_maps[0].lane_pieces, &stage.batch.world_maps[0].boundary_pieces}) {
+    double total = 0;
+    for (const ObservedPiece& piece : *pieces) {
+      EXPECT_LE(piece.half_length_m, 5.001f);
+      total += 2 * piece.half_length_m;
+    }
+    EXPECT_GT(total, 1000);
+  }
+}
+
+TEST_F(Observation, HaltedAndAbsentAgentsObserveNothingButTheyAreSeen) {
+  AgentState& agents = stage.batch.agents;
+  agents.status[1] = static_cast<uint8_t>(AgentStatus::halted);
+  agents.events[1] = kEventNone;
+  look();
+  const ObservationView out = stage.batch.observation_view();
+  EXPECT_NEAR(out.partners[0], local(108.8f, 4).x / 120, 1e-5);
+  observe(stage.world(), 1, true, out);
+  for (size_t i = 0; i < kEgoFeatures; ++i) EXPECT_EQ(out.ego[kEgoFeatures + i], 0);
+  for (size_t i = 0; i < kMaxLanes * kLaneFeatures; ++i) EXPECT_EQ(out.lanes[kMaxLanes * kLaneFeatures + i], 0);
+  agents.events[1] = kEventCollision;  // the step in which it halted: its last observation
+  observe(stage.world(), 1, true, out);
+  EXPECT_NE(out.ego[kEgoFeatures + 1], 0);
+}
+
+}  // namespace
+}  // namespace pictura

@@ -1,0 +1,87 @@
+#include "pictura/simulator/rules/road.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "pictura/tests/simulator/stage.h"
+#include "pictura/tests/simulator/test_maps.h"
+
+namespace pictura {
+namespace {
+
+TEST(Road, FitsTheLaneUnderIt) {
+  const WorldMap map = make_world_map(*testing::stadium(200, 2), {});
+  const LaneFit fit = fit_lane(map.view(), {55, 0.5f}, 0, 0.1f, -1);
+  EXPECT_EQ(fit.lane, 0);
+  EXPECT_NEAR(fit.offset_m, 0.5f, 1e-5);
+  EXPECT_NEAR(fit.angle_rad, 0.1f, 1e-6);
+  EXPECT_EQ(fit.speed_limit_mps, 10);
+  EXPECT_NEAR(fit_lane(map.view(), {55, 3.2f}, 0, 0, -1).offset_m, -0.8f, 1e-5);
+  EXPECT_EQ(fit_lane(map.view(), {55, 3.2f}, 0, 0, -1).lane, 4);
+  EXPECT_EQ(fit_lane(map.view(), {55, 16}, 0, 0, -1).lane, -1);
+}
+
+TEST(Road, KeepsItsLaneNearTheBorder) {
+  const WorldMap map = make_world_map(*testing::stadium(200, 2), {});
+  // 2.1 m is nearer to lane 4 by 0.2 m, which weighs 0.035: less than the 0.05 for leaving.
+  EXPECT_EQ(fit_lane(map.view(), {55, 2.1f}, 0, 0, 0).lane, 0);
+  EXPECT_EQ(fit_lane(map.view(), {55, 2.1f}, 0, 0, 4).lane, 4);
+  EXPECT_EQ(fit_lane(map.view(), {55, 2.3f}, 0, 0, 0).lane, 4);
+}
+
+TEST(Road, PrefersTheLaneThatPointsItsWay) {
+  // Two opposite lanes at y = 0 and y = 40 of a stadium are far apart; on a ring, heading decides nothing.
+  const WorldMap map = make_world_map(*testing::ring_road(30), {});
+  const LaneFit fit = fit_lane(map.view(), {0, -31}, 0, 0, -1);
+  EXPECT_NEAR(fit.offset_m, -1, 0.02);
+  EXPECT_NEAR(fit.angle_rad, 0, 0.01);
+}
+
+TEST(Road, LevelsAreApart) {
+  const WorldMap map = make_world_map(*testing::stadium(200, 1), {});
+  EXPECT_EQ(fit_lane(map.view(), {55, 0}, 3, 0, -1).lane, -1);
+  EXPECT_FALSE(is_on_road(map.view(), {55, 0}, 3));
+  EXPECT_TRUE(is_on_road(map.view(), {55, 0}, 1));
+}
+
+TEST(Road, KnowsTheDrivableSurface) {
+  const WorldMap map = make_world_map(*testing::stadium(200, 2), {});
+  EXPECT_TRUE(is_on_road(map.view(), {55, -1.9f}, 0));
+  EXPECT_TRUE(is_on_road(map.view(), {55, 5.9f}, 0));
+  EXPECT_FALSE(is_on_road(map.view(), {55, -2.3f}, 0));
+  EXPECT_FALSE(is_on_road(map.view(), {55, 20}, 0));
+}
+
+TEST(Road, PosesFollowTheArcLength) {
+  const WorldMap map = make_world_map(*testing::ring_road(30), {});
+  const LanePose pose = pose_on_lane(map.view(), 1, 30 * 0.5f);
+  const float angle = kHalfPi + 0.5f;
+  EXPECT_NEAR(pose.position_m.x, 30 * std::cos(angle), 0.1);
+  EXPECT_NEAR(pose.position_m.y, 30 * std::sin(angle), 0.1);
+  EXPECT_NEAR(pose.heading_rad, wrap_angle(angle + kHalfPi), 0.01);
+}
+
+TEST(Road, OffRoadWhenTheBoxTouchesAnEdge) {
+  testing::Stage stage(testing::stadium(200, 1), 2);
+  // Half a width of 1 m: the edge at y = -2 is touched from y = -1 on.
+  stage.put(0, {50, -0.98f}, 0, 5);
+  stage.put(1, {100, -1.02f}, 0, 5);
+  stage.set(1, Conditioning::off_road, 1.5f);
+  const std::vector<float> rewards = stage.step();
+  EXPECT_EQ(stage.events(0), kEventNone);
+  EXPECT_EQ(stage.events(1), kEventOffRoad);
+  EXPECT_NEAR(rewards[1], -1.5, 0.01);
+  EXPECT_EQ(stage.batch.agents.halt_reason[1], kEventOffRoad);
+}
+
+TEST(Road, OffRoadWhenTheCenterLeavesTheSurface) {
+  auto map = testing::stadium(200, 1);
+  map->road_edges.clear();
+  testing::Stage stage(map, 1);
+  stage.put(0, {50, -1.9f}, -0.3f, 10);
+  EXPECT_EQ((stage.step(), stage.events(0)), kEventOffRoad);
+}
+
+}  // namespace
+}  // namespace pictura

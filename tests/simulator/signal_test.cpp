@@ -1,0 +1,182 @@
+#include "pictura/simulator/rules/signal.h"
+
+#include <map>
+
+#include <gtest/gtest.h>
+
+#include "pictura/tests/simulator/stage.h"
+#include "pictura/tests/simulator/test_maps.h"
+
+namespace pictura {
+namespace {
+
+StopLine line_of_phase(int phase, int num_phases) {
+  StopLine line;
+  line.junction = 3;
+  line.phase = phase;
+  line.num_phases = num_phases;
+  return line;
+}
+
+TEST(Signal, FixedTimingSharesTheCycleAmongPhases) {
+  // Three phases of 10 + 3 + 2 s: in 90 s each is green for 20 s, yellow for 6 s and red for the rest.
+  std::vector<LightPlan> plans;
+  for (int phase = 0; phase < 3; ++phase) {
+    plans.push_back(draw_light_plan(line_of_phase(phase, 3), phase, true, 0.1f, 7, 0, 0));
+  }
+  std::vector<std::map<LightState, int>> counts(3);
+  for (int step = 0; step < 900; ++step) {
+    int moving = 0;
+    for (size_t phase = 0; phase < 3; ++phase) {
+      const LightState state = light_state(plans[phase], step);
+      ++counts[phase][state];
+      moving += state == LightState::green || state == LightState::yellow;
+    }
+    EXPECT_LE(moving, 1) << step;
+  }
+  for (const auto& count : counts) {
+    EXPECT_EQ(count.at(LightState::green), 200);
+    EXPECT_EQ(count.at(LightState::yellow), 60);
+    EXPECT_EQ(count.at(LightState::red), 640);
+  }
+}
+
+TEST(Signal, TrainingTimingIsDrawnPerJunctionAndEpisode) {
+  int episodes_off = 0, lights_off = 0, lights = 0;
+  double green_s = 0;
+  constexpr int kEpisodes = 2000;
+  for (uint32_t episode = 0; episode < kEpisodes; ++episode) {
+    LightPlan first = draw_light_plan(line_of_phase(0, 2), 0, false, 0.1f, 7, 0, episode);
+    LightPlan second = draw_light_plan(line_of_phase(1, 2), 1, false, 0.1f, 7, 0, episode);
+    EXPECT_EQ(first.green_steps, second.green_steps);
+    EXPECT_EQ(first.offset_steps, second.offset_steps);
+    EXPECT_GE(first.green_steps, 10);
+    EXPECT_LE(first.green_steps, 100);
+    EXPECT_GE(first.yellow_steps, 15);
+    EXPECT_LE(first.yellow_steps, 23);
+    EXPECT_GE(first.red_steps, 3);
+    EXPECT_LE(first.red_steps, 100);
+    green_s += 0.1 * first.green_steps / kEpisodes;
+    episodes_off += first.is_off && second.is_off;
+    lights_off += first.is_off != second.is_off;
+    lights += 2;
+  }
+  EXPECT_NEAR(green_s, 5.5, 0.3);
+  EXPECT_NEAR(episodes_off / double{kEpisodes}, 0.2 + 0.8 * 0.04, 0.04);
+  EXPECT_NEAR(lights_off / double{kEpisodes}, 0.8 * 2 * 0.2 * 0.8, 0.04);
+}
+
+/// A straight of two lanes at y = 0 and y = 4; at x = 100 a line holds the right one (lane 0), and only it.
+struct RedLight : ::testing::Test {
+  RedLight() : stage(make_map(), 1) {}
+  static std::shared_ptr<const RoadMap> make_map() {
+    auto map = testing::stadium(200, 2);
+    testing::add_light(map.get(), 100, 4, 1, {0});
+    return map;
+  }
+  /// Puts the front bumper at x_m: 4 m long, so 3.2 m ahead of the rear axle.
+  void put_bumper(float x_m, float y_m, float heading_rad, float speed_mps) {
+    const Vec2 forward{std::cos(heading_rad), std::sin(heading_rad)};
+    stage.put(0, Vec2{x_m, y_m} - forward * 3.2f, heading_rad, speed_mps);
+  }
+  int step_with(LightState state) {
+    stage.batch.lights[0] = state;
+    stage.step();
+    return stage.events(0);
+  }
+
+  testing::Stage stage;
+};
+
+TEST_F(RedLight, CrossingOnRedIsAnEvent) {
+  stage.set(0, Conditioning::stop_line, 0.75f);
+  put_bumper(99.5f, 0, 0, 10);
+  stage.batch.lights[0] = LightState::red;
+  EXPECT_NEAR(stage.step()[0], -0.75, 0.01);
+  EXPECT_EQ(stage.events(0), kEventRedLight);
+  EXPECT_EQ(stage.batch.agents.status[0], static_cast<uint8_t>(AgentStatus::halted));
+}
+
+TEST_F(RedLight, OtherColoursAreNone) {
+  for (const LightState state : {LightState::green, LightState::yellow, LightState::off}) {
+    put_bumper(99.5f, 0, 0, 10);
+    EXPECT_EQ(step_with(state), kEventNone);
+  }
+}
+
+TEST_F(RedLight, StoppingBeforeTheLineIsNone) {
+  put_bumper(98.5f, 0, 0, 10);
+  EXPECT_EQ(step_with(LightState::red), kEventNone);
+  EXPECT_EQ(step_with(LightState::red), kEventRedLight);  // but half a metre later it is over
+}
+
+TEST_F(RedLight, StandingOnALineThatTurnsRedIsNone) {
+  put_bumper(101, 0, 0, 0);
+  EXPECT_EQ(step_with(LightState::yellow), kEventNone);
+  EXPECT_EQ(step_with(LightState::red), kEventNone);
+  put_bumper(101, 0, 0, 8);  // and driving on from there neither
+  EXPECT_EQ(step_with(LightState::red), kEventNone);
+  EXPECT_EQ(step_with(LightState::red), kEventNone);
+}
+
+TEST_F(RedLight, TheOtherWayIsNone) {
+  put_bumper(100.5f, 0, kPi, 10);
+  EXPECT_EQ(step_with(LightState::red), kEventNone);
+  put_bumper(100, 2.3f, 1.0f, 10);  // 57 degrees across
+  EXPECT_EQ(step_with(LightState::red), kEventNone);
+}
+
+TEST_F(RedLight, TheNextLaneIsNone) {
+  put_bumper(99.5f, 4, 0, 10);
+  EXPECT_EQ(step_with(LightState::red), kEventNone);
+}
+
+TEST_F(RedLight, ChangingIntoTheLanePastTheLineIsAnEvent) {
+  // From the free lane, its bumper 3 m past the line, it turns into the held one: associated with it once its rear axle
+  // is nearer to that one by more than the hysteresis.
+  put_bumper(103, 0.8f, -0.3f, 5);
+  stage.batch.agents.lane[0] = 4;
+  EXPECT_EQ(step_with(LightState::red), kEventRedLight);
+  put_bumper(103, 0.8f, -0.3f, 5);
+  stage.batch.agents.lane[0] = 4;
+  EXPECT_EQ(step_with(LightState::green), kEventNone);
+}
+
+TEST_F(RedLight, ChangingIntoTheLaneBeforeTheLineIsNone) {
+  put_bumper(95, 0.8f, -0.3f, 5);
+  stage.batch.agents.lane[0] = 4;
+  EXPECT_EQ(step_with(LightState::red), kEventNone);
+  EXPECT_EQ(stage.batch.agents.lane[0], 0);
+}
+
+TEST_F(RedLight, ChangingIntoTheLaneFarPastTheLineIsNone) {
+  put_bumper(111, 0.8f, -0.3f, 5);
+  stage.batch.agents.lane[0] = 4;
+  EXPECT_EQ(step_with(LightState::red), kEventNone);
+  EXPECT_EQ(stage.batch.agents.lane[0], 0);
+}
+
+TEST_F(RedLight, TurningRightIntoTheHeldLaneIsNone) {
+  // From the left across the road into the held lane, past the line: still 60 degrees off its direction.
+  put_bumper(103, 0.3f, -1.05f, 5);
+  stage.batch.agents.lane[0] = 4;
+  EXPECT_EQ(step_with(LightState::red), kEventNone);
+  // And before the line, well aligned.
+  put_bumper(97, 0.3f, -0.5f, 3);
+  stage.batch.agents.lane[0] = 4;
+  EXPECT_EQ(step_with(LightState::red), kEventNone);
+}
+
+TEST_F(RedLight, AnotherLevelIsNone) {
+  auto map = testing::stadium(200, 2);
+  testing::add_light(map.get(), 100, 4, 1, {0});
+  map->lights[0].stop_a_m.z = map->lights[0].stop_b_m.z = 6;
+  testing::Stage bridge(map, 1);
+  bridge.put(0, {96.3f, 0}, 0, 10);
+  bridge.batch.lights[0] = LightState::red;
+  bridge.step();
+  EXPECT_EQ(bridge.events(0), kEventNone);
+}
+
+}  // namespace
+}  // namespace pictura

@@ -1,0 +1,368 @@
+// The simulator as its users see it: worlds, spawning, episodes, determinism, saving, bad input.
+#include "pictura/simulator/simulator.h"
+
+#include <cmath>
+#include <cstdlib>
+
+#include <gtest/gtest.h>
+
+#include "pictura/common/error.h"
+#include "pictura/common/rng.h"
+#include "pictura/map/load_map.h"
+#include "pictura/tests/simulator/test_maps.h"
+
+namespace pictura {
+namespace {
+
+constexpr int32_t kCoast = 2 * kNumLatActions + 1;
+
+std::unique_ptr<Simulator> make(const SimulatorConfig& config, std::shared_ptr<const RoadMap> map,
+                                std::vector<WorldSpec> worlds) {
+  return make_simulator("cpu", config, {std::move(map)}, std::move(worlds));
+}
+
+/// Actions that keep most agents driving: mostly none, sometimes a push, keyed by slot and step.
+std::vector<int32_t> some_actions(int num_slots, uint32_t step) {
+  std::vector<int32_t> actions;
+  for (int slot = 0; slot < num_slots; ++slot) {
+    RandomStream random(9, 0, static_cast<uint32_t>(slot), 0, step, Purpose::action);
+    actions.push_back(random.uniform() < 0.3f ? random.below(kNumActions) : kCoast);
+  }
+  return actions;
+}
+
+void run(Simulator* simulator, int steps, uint32_t first_step = 0) {
+  for (int i = 0; i < steps; ++i) {
+    simulator->step(some_actions(simulator->num_slots(), first_step + static_cast<uint32_t>(i)));
+  }
+}
+
+TEST(Worlds, FillTheSlotsExactly) {
+  const std::vector<WorldSpec> worlds = draw_worlds(3, 20480, 1, 120, 8);
+  int slots = 0, smallest = 1000, largest = 0;
+  for (size_t i = 0; i < worlds.size(); ++i) {
+    EXPECT_EQ(worlds[i].map, static_cast<int>(i % 8));
+    EXPECT_EQ(worlds[i].global_world, i);
+    slots += worlds[i].num_agents;
+    smallest = std::min(smallest, worlds[i].num_agents);
+    largest = std::max(largest, worlds[i].num_agents);
+  }
+  EXPECT_EQ(slots, 20480);
+  EXPECT_LE(smallest, 3);
+  EXPECT_EQ(largest, 120);
+  EXPECT_NEAR(static_cast<double>(worlds.size()), 20480 / 60.5, 40);
+  EXPECT_EQ(draw_worlds(3, 50, 50, 50, 1).size(), 1u);
+}
+
+TEST(Worlds, RefuseWhatCannotBeAskedFor) {
+  EXPECT_THROW(draw_worlds(0, 0, 1, 120, 1), UsageError);
+  EXPECT_THROW(draw_worlds(0, 100'000'000, 1, 120, 1), UsageError);
+  EXPECT_THROW(draw_worlds(0, 10, 0, 120, 1), UsageError);
+  EXPECT_THROW(draw_worlds(0, 10, 5, 4, 1), UsageError);
+  EXPECT_THROW(draw_worlds(0, 10, 1, 5000, 1), UsageError);
+  EXPECT_THROW(draw_worlds(0, 10, 1, 5, 0), UsageError);
+}
+
+TEST(Simulator, RefusesWhatCannotBeAskedFor) {
+  const auto map = testing::ring_road(40);
+  EXPECT_THROW(make_simulator("warp", {}, {map}, {{0, 1, 0}}), UsageError);
+  EXPECT_THROW(make({}, map, {{0, 0, 0}}), UsageError);
+  EXPECT_THROW(make({}, map, {{0, 100'000'000, 0}}), UsageError);
+  EXPECT_THROW(make({}, map, {{1, 1, 0}}), UsageError);
+  EXPECT_THROW(make({}, map, {}), UsageError);
+  EXPECT_THROW(make({}, nullptr, {{0, 1, 0}}), UsageError);
+  EXPECT_THROW(make_simulator("cpu", {}, {}, {{0, 1, 0}}), UsageError);
+  EXPECT_THROW(make({.dt_s = 0}, map, {{0, 1, 0}}), UsageError);
+  EXPECT_THROW(make({.dt_s = NAN}, map, {{0, 1, 0}}), UsageError);
+  EXPECT_THROW(make({.episode_steps = 0}, map, {{0, 1, 0}}), UsageError);
+  EXPECT_THROW(make({.pedestrian_fraction = 0.6f, .cyclist_fraction = 0.6f}, map, {{0, 1, 0}}), UsageError);
+  SimulatorConfig config;
+  config.conditioning[0] = {-1, 5, false};
+  EXPECT_THROW(make(config, map, {{0, 1, 0}}), UsageError);
+  try {
+    make_simulator("warp", {}, {map}, {{0, 1, 0}});
+  } catch (const UsageError& error) {
+    EXPECT_NE(std::string(error.what()).find("cpu, auto"), std::string::npos);
+  }
+}
+
+TEST(Simulator, RefusesAMapThatNobodyCanSpawnOn) {
+  auto dead_end = testing::ring_road(40);
+  for (Lane& lane : dead_end->lanes) lane.is_endless = false;
+  EXPECT_THROW(make({}, dead_end, {{0, 1, 0}}), Error);
+  EXPECT_THROW(make({}, std::make_shared<RoadMap>(), {{0, 1, 0}}), Error);
+}
+
+TEST(Simulator, RefusesActionsOutOfRangeAndStaysAsItWas) {
+  const auto simulator = make({}, testing::ring_road(40), {{0, 4, 0}});
+  const uint64_t before = simulator->state_hash();
+  std::vector<int32_t> actions(4, kCoast);
+  for (const int32_t bad : {-1, kNumActions}) {
+    actions[3] = bad;
+    EXPECT_THROW(simulator->step(actions), Error);
+  }
+  EXPECT_THROW(simulator->step(Span<const int32_t>(actions).subspan(0, 3)), Error);
+  EXPECT_EQ(simulator->state_hash(), before);
+}
+
+TEST(Simulator, SpawnsWithoutOverlapAndCountsRefusals) {
+  // A ring of 251 m holds some forty cars with half a metre of clearance; 200 are asked for.
+  const auto simulator = make({}, testing::ring_road(40), {{0, 200, 0}});
+  const SpawnReport report = simulator->spawn_report();
+  EXPECT_EQ(report.asked, 200);
+  EXPECT_EQ(report.spawned + report.refused, report.asked);
+  EXPECT_GT(report.spawned, 25);
+  EXPECT_LT(report.spawned, 55);
+  const SceneBatch& scene = simulator->scene();
+  int drawn = 0;
+  for (size_t i = 0; i < 200; ++i) {
+    const AgentBox& a = scene.agents[i];
+    drawn += a.drawn;
+    if (!a.drawn) {
+      EXPECT_EQ(simulator->state().status[i], static_cast<uint8_t>(AgentStatus::absent));
+      EXPECT_EQ(simulator->views()[i].ego_agent, -1);
+      continue;
+    }
+    EXPECT_GE(a.length_m, 3.5f);
+    EXPECT_LE(a.length_m, 5.5f);
+    EXPECT_GE(a.width_m, 1.6f);
+    EXPECT_LE(a.width_m, 2.2f);
+    // On the ring, along it.
+    EXPECT_NEAR(length(a.center_m.xy()), 40, 0.2);
+    EXPECT_NEAR(a.center_m.x * a.cos_heading + a.center_m.y * a.sin_heading, 0, 2);
+    for (size_t j = 0; j < i; ++j) {
+      const AgentBox& b = scene.agents[j];
+      if (!b.drawn) continue;
+      EXPECT_GT(length((a.center_m - b.center_m).xy()), 0.4f * (a.length_m + b.length_m));
+    }
+  }
+  EXPECT_EQ(drawn, report.spawned);
+  // Refusals do not stop the others; they are never valid.
+  const StepResult result = simulator->step(std::vector<int32_t>(200, kCoast));
+  for (size_t i = 0; i < 200; ++i) EXPECT_EQ(result.valid[i], scene.agents[i].drawn);
+}
+
+TEST(Simulator, ViewsStandAtTheRearAxle) {
+  const auto simulator = make({}, testing::ring_road(40), {{0, 2, 0}, {0, 3, 1}});
+  EXPECT_EQ(simulator->scene().world_begin[2], 5);
+  for (size_t i = 0; i < 5; ++i) {
+    const View& view = simulator->views()[i];
+    const AgentBox& box = simulator->scene().agents[i];
+    EXPECT_EQ(view.world, i < 2 ? 0 : 1);
+    EXPECT_EQ(view.ego_agent, static_cast<int>(i));
+    EXPECT_NEAR(box.center_m.x - view.origin_m.x, 0.3f * box.length_m * box.cos_heading, 1e-4);
+    EXPECT_NEAR(box.center_m.y - view.origin_m.y, 0.3f * box.length_m * box.sin_heading, 1e-4);
+    EXPECT_EQ(view.body_length_m, box.length_m);
+  }
+}
+
+TEST(Simulator, EpisodesEndInTimeAndResetInTheNextStep) {
+  const auto simulator = make({.episode_steps = 5}, testing::ring_road(40), {{0, 3, 0}});
+  const std::vector<int32_t> actions(3, kCoast);
+  const float first_x_m = simulator->state().x_m[0];
+  for (int step = 1; step <= 5; ++step) {
+    const StepResult result = simulator->step(actions);
+    for (size_t i = 0; i < 3; ++i) {
+      EXPECT_EQ(result.valid[i], 1) << step;
+      EXPECT_EQ(result.terminated[i], 0);
+      EXPECT_EQ(result.truncated[i], step == 5);
+    }
+  }
+  EXPECT_EQ(simulator->episode_step()[0], 5);
+  EXPECT_EQ(simulator->state().x_m[0], first_x_m);                         // nobody moved: still the old episode
+  const StepResult result = simulator->step(std::vector<int32_t>(3, -7));  // ignored
+  for (size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(result.valid[i], 0);
+    EXPECT_EQ(result.truncated[i], 0);
+    EXPECT_EQ(result.reward[i], 0);
+  }
+  EXPECT_EQ(simulator->episode_step()[0], 0);
+  EXPECT_EQ(simulator->episode_index()[0], 1);
+  EXPECT_NE(simulator->state().x_m[0], first_x_m);
+  EXPECT_EQ(simulator->step(actions).valid[0], 1);
+  const SimulatorTotals& totals = simulator->totals();
+  EXPECT_EQ(totals.agent_steps, 18);
+  EXPECT_EQ(totals.slot_steps, 21);
+  EXPECT_EQ(totals.episodes, 1);
+  EXPECT_EQ(totals.finished_agent_episodes, 3);
+}
+
+TEST(Simulator, InfractionsTerminateAndTooManyOfThemEndTheEpisode) {
+  // Full throttle straight on leaves the ring; the fourth of ten to halt ends the episode.
+  const auto simulator = make({}, testing::ring_road(40), {{0, 10, 0}});
+  std::vector<int32_t> actions(10, 3 * kNumLatActions + 1);
+  std::vector<uint8_t> halted(10, 0);
+  int num_halted = 0;
+  for (int step = 0; step < 300; ++step) {
+    const StepResult result = simulator->step(actions);
+    bool ended = false;
+    for (size_t i = 0; i < 10; ++i) {
+      EXPECT_EQ(result.valid[i], !halted[i]);
+      EXPECT_FALSE(result.terminated[i] && result.truncated[i]);
+      if (halted[i]) {
+        EXPECT_EQ(result.reward[i], 0);
+        EXPECT_EQ(result.terminated[i], 0);
+      }
+      halted[i] |= result.terminated[i];
+      ended |= result.truncated[i] != 0;
+    }
+    num_halted = static_cast<int>(std::count(halted.begin(), halted.end(), 1));
+    EXPECT_EQ(ended, num_halted >= 4) << step;
+    if (ended) break;
+  }
+  EXPECT_GE(num_halted, 4);
+  EXPECT_EQ(simulator->step(actions).valid[0], 0);
+  EXPECT_EQ(simulator->episode_index()[0], 1);
+}
+
+TEST(Simulator, EpisodesDifferAndResetReturnsToTheFirst) {
+  const auto simulator = make({.episode_steps = 20}, testing::ring_road(40), {{0, 8, 0}});
+  const uint64_t first = simulator->state_hash();
+  run(simulator.get(), 21);
+  EXPECT_NE(simulator->state_hash(), first);
+  simulator->reset();
+  EXPECT_EQ(simulator->state_hash(), first);
+  const auto other_seed = make({.seed = 1, .episode_steps = 20}, testing::ring_road(40), {{0, 8, 0}});
+  EXPECT_NE(other_seed->state_hash(), first);
+}
+
+TEST(Simulator, AWorldIsTheSameWhateverStandsBesideIt) {
+  const auto map = testing::stadium(200, 2);
+  const auto both = make({.num_threads = 1}, map, {{0, 12, 0}, {0, 12, 1}});
+  const auto second = make({.num_threads = 1}, map, {{0, 12, 1}});
+  for (int step = 0; step < 60; ++step) {
+    std::vector<int32_t> actions = some_actions(24, static_cast<uint32_t>(step));
+    both->step(actions);
+    second->step(Span<const int32_t>(actions).subspan(12, 12));
+  }
+  for (int i = 0; i < 12; ++i) {
+    EXPECT_EQ(both->state().x_m[12 + i], second->state().x_m[i]);
+    EXPECT_EQ(both->state().episode_return[12 + i], second->state().episode_return[i]);
+  }
+}
+
+TEST(Simulator, ThreadsDoNotMatter) {
+  auto map = testing::stadium(200, 2);
+  testing::add_light(map.get(), 100, 8, 2, {0, 4});
+  std::vector<uint64_t> hashes;
+  for (const int threads : {1, 2, 3}) {
+    const auto simulator = make({.num_threads = threads}, map, draw_worlds(2, 150, 1, 40, 1));
+    run(simulator.get(), 300);
+    hashes.push_back(simulator->state_hash());
+    EXPECT_GT(simulator->totals().agent_steps, 20000);
+  }
+  EXPECT_EQ(hashes[0], hashes[1]);
+  EXPECT_EQ(hashes[0], hashes[2]);
+}
+
+TEST(Simulator, SaveAndRestoreContinueIdentically) {
+  auto map = testing::stadium(200, 2);
+  testing::add_light(map.get(), 100, 8, 2, {0, 4});
+  const std::vector<WorldSpec> worlds = draw_worlds(2, 60, 1, 40, 1);
+  const SimulatorConfig config{.seed = 4, .episode_steps = 70};
+  const auto original = make(config, map, worlds);
+  run(original.get(), 100);
+  const std::vector<uint8_t> bytes = original->save();
+  const auto copy = make(config, map, worlds);
+  copy->restore(bytes);
+  const auto equal = [&] {
+    const ObservationView a = original->observations(), b = copy->observations();
+    EXPECT_EQ(original->state_hash(), copy->state_hash());
+    EXPECT_TRUE(std::equal(a.ego.begin(), a.ego.end(), b.ego.begin()));
+    EXPECT_TRUE(std::equal(a.partners.begin(), a.partners.end(), b.partners.begin()));
+    EXPECT_TRUE(std::equal(a.lanes.begin(), a.lanes.end(), b.lanes.begin()));
+    EXPECT_TRUE(std::equal(a.controls.begin(), a.controls.end(), b.controls.begin()));
+    EXPECT_EQ(original->totals().agent_steps, copy->totals().agent_steps);
+    EXPECT_EQ(original->totals().distance_m, copy->totals().distance_m);
+    EXPECT_EQ(original->views()[7].origin_m.x, copy->views()[7].origin_m.x);
+  };
+  equal();
+  run(original.get(), 100, 100);
+  run(copy.get(), 100, 100);
+  equal();
+
+  EXPECT_THROW(copy->restore({}), Error);
+  EXPECT_THROW(copy->restore(Span<const uint8_t>(bytes).subspan(0, bytes.size() - 1)), Error);
+  std::vector<uint8_t> broken = bytes;
+  broken[0] ^= 1;
+  EXPECT_THROW(copy->restore(broken), Error);
+  EXPECT_THROW(make({.seed = 5, .episode_steps = 70}, map, worlds)->restore(bytes), Error);
+  equal();
+}
+
+TEST(Simulator, ConditioningIsDrawnAsThePaperSays) {
+  const auto simulator = make({}, testing::stadium(1500, 2), draw_worlds(1, 4000, 100, 100, 1));
+  const AgentStateView state = simulator->state();
+  for (int c = 0; c < kNumConditioning; ++c) {
+    const ConditioningRange& range = kPaperConditioning[c];
+    double sum = 0;
+    int below_one = 0;
+    for (int i = 0; i < 4000; ++i) {
+      const float value = state.conditioning[i * kNumConditioning + c];
+      ASSERT_GE(value, range.low);
+      ASSERT_LE(value, range.high);
+      sum += value;
+      below_one += value < 1;
+    }
+    const double spread = range.high - range.low;
+    const double mean = range.mixture ? 0.25 * (range.low + 2 + range.high) : 0.5 * (range.low + range.high);
+    EXPECT_NEAR(sum / 4000, mean, 0.02 * spread + 1e-9) << kConditioningNames[c];
+    if (range.mixture) {
+      EXPECT_NEAR(below_one, 2000, 130);
+    }
+  }
+}
+
+TEST(Simulator, WithoutVectorObservationsTheRestIsTheSame) {
+  const auto with = make({}, testing::ring_road(40), {{0, 8, 0}});
+  const auto without = make({.vector_observations = false}, testing::ring_road(40), {{0, 8, 0}});
+  run(with.get(), 50);
+  run(without.get(), 50);
+  EXPECT_EQ(with->state_hash(), without->state_hash());
+  EXPECT_TRUE(without->observations().lanes.empty());
+  const Span<float> a = with->observations().ego, b = without->observations().ego;
+  EXPECT_TRUE(std::equal(a.begin(), a.end(), b.begin()));
+}
+
+TEST(Simulator, CyclistsAreSmallerAndSlower) {
+  const auto simulator = make({.cyclist_fraction = 0.5f}, testing::stadium(1500, 2), {{0, 100, 0}});
+  run(simulator.get(), 20);
+  int cyclists = 0;
+  for (size_t i = 0; i < 100; ++i) {
+    const AgentBox& box = simulator->scene().agents[i];
+    if (box.agent_class != AgentClass::cyclist) continue;
+    ++cyclists;
+    EXPECT_LE(box.length_m, 1.9f);
+    EXPECT_LE(box.width_m, 0.7f);
+  }
+  EXPECT_NEAR(cyclists, 50, 18);
+}
+
+/// On a real town: long enough for every event to happen, the counts must fit together.
+TEST(Simulator, Town01HoldsTogether) {
+  const char* data = std::getenv("PICTURA_DATA");
+  if (!data) GTEST_SKIP() << "PICTURA_DATA names no folder of maps";
+  const auto map = load_map("Town01");
+  std::vector<uint64_t> hashes;
+  for (const int threads : {1, 2, 3}) {
+    const auto simulator = make({.num_threads = threads}, map, {{0, 60, 0}, {0, 60, 1}});
+    EXPECT_EQ(simulator->spawn_report().refused, 0);
+    // Nobody spawns in an infraction: a step without moving is no event.
+    simulator->step(std::vector<int32_t>(120, kCoast));
+    EXPECT_EQ(simulator->totals().collisions + simulator->totals().off_road + simulator->totals().red_light, 0);
+    run(simulator.get(), 300);
+    hashes.push_back(simulator->state_hash());
+    const SimulatorTotals& totals = simulator->totals();
+    EXPECT_GT(totals.agent_steps, 10000);
+    EXPECT_GT(totals.off_road, 0);
+    EXPECT_GT(totals.distance_m, 1000);
+    EXPECT_LE(totals.at_fault_collisions, totals.collisions);
+    const AgentStateView state = simulator->state();
+    for (int i = 0; i < 120; ++i) EXPECT_TRUE(std::isfinite(state.x_m[i]) && std::isfinite(state.episode_return[i]));
+  }
+  EXPECT_EQ(hashes[0], hashes[1]);
+  EXPECT_EQ(hashes[0], hashes[2]);
+}
+
+}  // namespace
+}  // namespace pictura

@@ -1,0 +1,69 @@
+#include "pictura/tests/simulator/stage.h"
+
+namespace pictura::testing {
+
+Stage::Stage(std::shared_ptr<const RoadMap> map, int num_agents)
+    : batch(SimulatorConfig{}, {std::move(map)}, {WorldSpec{0, num_agents, 0}}) {
+  for (int agent = 0; agent < num_agents; ++agent) {
+    const auto i = static_cast<size_t>(agent);
+    batch.agents.length_m[i] = 4;
+    batch.agents.width_m[i] = 2;
+    batch.agents.height_m[i] = 1.5f;
+    for (int c = 0; c < kNumConditioning; ++c) {
+      set(agent, static_cast<Conditioning>(c), c < kNumRewardConditioning ? kPaperConditioning[c].low : 1.0f);
+    }
+    batch.boxes[i] = batch.boxes_before[i] = box_of(batch.agents.view(), agent);
+    // Out of everybody's way until a test sets other ones.
+    for (size_t k = 0; k < kNumWaypoints; ++k) batch.agents.waypoint_x_m[i * kNumWaypoints + k] = 1e6f;
+  }
+  for (LightState& light : batch.lights) light = LightState::green;
+  sort_boxes();
+}
+
+void Stage::set(int agent, Conditioning which, float value) {
+  batch.agents.conditioning[static_cast<size_t>(agent * kNumConditioning + static_cast<int>(which))] = value;
+}
+
+void Stage::put(int agent, Vec2 position_m, float heading_rad, float speed_mps) {
+  const WorldView view = world();
+  Motion motion;
+  motion.x_m = position_m.x;
+  motion.y_m = position_m.y;
+  motion.heading_rad = heading_rad;
+  motion.speed_mps = speed_mps;
+  store_motion(view.agents, agent, motion);
+  store_fit(view.agents, agent, fit_lane(view.map, position_m, 0, heading_rad, -1));
+  view.agents.status[agent] = static_cast<uint8_t>(AgentStatus::active);
+  view.boxes[agent] = view.boxes_before[agent] = box_of(view.agents, agent);
+  sort_boxes();
+}
+
+void Stage::sort_boxes() {
+  // Everybody into one list per cell, by brute force.
+  CellLists& cells = batch.box_cells[0];
+  const GridView view = cells.view();
+  cells.items.clear();
+  for (int cell = 0; cell < cells.num_x * cells.num_y; ++cell) {
+    cells.begin[static_cast<size_t>(cell)] = static_cast<int32_t>(cells.items.size());
+    for (size_t i = 0; i < batch.boxes.size(); ++i) {
+      const Vec3 at = batch.boxes[i].center_m;
+      if (batch.boxes[i].drawn && view.cell_y(at.y) * cells.num_x + view.cell_x(at.x) == cell) {
+        cells.items.push_back(static_cast<int32_t>(i));
+      }
+    }
+  }
+  cells.begin.back() = static_cast<int32_t>(cells.items.size());
+}
+
+std::vector<float> Stage::step(int32_t action) {
+  const WorldView view = world();
+  for (int agent = 0; agent < view.num_agents; ++agent) advance(view, agent, action);
+  sort_boxes();
+  const WorldView sorted = world();
+  for (int agent = 0; agent < view.num_agents; ++agent) find_collisions(sorted, agent);
+  std::vector<float> rewards;
+  for (int agent = 0; agent < view.num_agents; ++agent) rewards.push_back(settle(sorted, agent));
+  return rewards;
+}
+
+}  // namespace pictura::testing

@@ -1,0 +1,35 @@
+// A world whose agents a test puts where it wants them, stepped phase by phase through the rules.
+#pragma once
+
+#include <memory>
+
+#include "pictura/simulator/rules/observe.h"
+#include "pictura/simulator/rules/spawn.h"
+#include "pictura/simulator/rules/step.h"
+#include "pictura/simulator/world_batch.h"
+
+namespace pictura::testing {
+
+constexpr int32_t kCoast = 2 * kNumLatActions + 1;  // no jerk
+
+class Stage {
+ public:
+  /// num_agents vehicles of 4 x 2 m, absent until they are put somewhere; all conditioning at `low` of the paper's
+  /// ranges but for the dynamics multipliers, which are 1; lights green.
+  Stage(std::shared_ptr<const RoadMap> map, int num_agents);
+
+  /// Puts the rear axle there and finds the lane.
+  void put(int agent, Vec2 position_m, float heading_rad, float speed_mps);
+  void set(int agent, Conditioning which, float value);
+  /// The same action for everybody. Returns the rewards.
+  std::vector<float> step(int32_t action = kCoast);
+  int events(int agent) const { return batch.agents.events[static_cast<size_t>(agent)]; }
+  WorldView world() { return batch.world(0); }
+
+  WorldBatch batch;
+
+ private:
+  void sort_boxes();
+};
+
+}  // namespace pictura::testing

@@ -1,0 +1,23 @@
+// Small road maps made by hand, whose every number a test can compute.
+#pragma once
+
+#include <memory>
+
+#include "pictura/map/road_map.h"
+
+namespace pictura::testing {
+
+/// A circular one-way road of `radius_m` about the origin, driven counter-clockwise, one lane of 4 m, cut into four
+/// lanes of a quarter each, with road edges on both sides.
+std::shared_ptr<RoadMap> ring_road(float radius_m);
+
+/// A stadium-shaped one-way road: two straights of `straight_m` along x, at y = 0 (eastwards) and y = 40 (westwards),
+/// joined by half circles. `num_lanes` lanes of 4 m, lane 0 outermost (right), with neighbours. Lane i of the southern
+/// straight is at y = 4 i.
+std::shared_ptr<RoadMap> stadium(float straight_m, int num_lanes);
+
+/// Adds a light whose stop line crosses all southern lanes of a stadium at x_m, held by `junction` and phase 0 of
+/// num_phases.
+void add_light(RoadMap* map, float x_m, float width_m, int num_phases, std::vector<int32_t> held_lanes);
+
+}  // namespace pictura::testing
