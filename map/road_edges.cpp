@@ -59,7 +59,7 @@ class Tracer {
     // Just inside the ends, where the neighbouring piece has the say.
     const double margin = std::min(0.25, 1e-4 / length_m);
     double before = margin;
-    bool kept_before = is_outline(lerp(a, b, before), outward);
+    bool kept_before = is_outline(lerp(a, b, before), outward, band_);
     if (kept_before) {
       append(a);
     } else {
@@ -67,12 +67,12 @@ class Tracer {
     }
     for (int step = 1; step <= steps; ++step) {
       const double here = step == steps ? 1.0 - margin : static_cast<double>(step) / steps;
-      const bool kept = is_outline(lerp(a, b, here), outward);
+      const bool kept = is_outline(lerp(a, b, here), outward, band_);
       if (kept != kept_before) {
         double low = before, high = here;
         while ((high - low) * length_m > kTransition_m) {
           const double middle = 0.5 * (low + high);
-          (is_outline(lerp(a, b, middle), outward) == kept_before ? low : high) = middle;
+          (is_outline(lerp(a, b, middle), outward, band_) == kept_before ? low : high) = middle;
         }
         append(lerp(a, b, kept ? high : low));
         if (!kept) finish_run();
@@ -83,14 +83,30 @@ class Tracer {
     if (kept_before) append(b);
   }
 
-  /// Whether no other band covers the place just outside, and this band is the one to draw a border that several share.
-  bool is_outline(const Point3& p, const Point2& outward) const {
+  /// Whether no other band covers the place just outside `p` on the border of `band`, and no band of a lower index is
+  /// to draw a border that both share. Bands that share a border within kCoincident_m may each lie a little further out
+  /// than another, so the question goes down to whether the lower one really draws it: one of them always does.
+  bool is_outline(const Point3& p, const Point2& outward, int32_t band) const {
     auto at = [&](double distance) { return Point2{p.x + distance * outward.x, p.y + distance * outward.y}; };
-    auto is_other = [&](int32_t band) { return band != band_; };
-    const Point2 just_outside = at(kCoincident_m);
-    if (surface_.any_band_at(just_outside, p.z, is_other)) return false;
+    auto is_other = [&](int32_t other) { return other != band; };
+    if (surface_.any_band_at(at(kCoincident_m), p.z, is_other)) return false;
     if (surface_.any_band_at(at(kCrack_m), p.z, is_other)) return false;
-    return !surface_.any_band_at(at(-kCoincident_m), p.z, [&](int32_t band) { return band < band_; });
+    std::vector<int32_t> sharers;
+    surface_.any_band_at(at(-kCoincident_m), p.z, [&](int32_t other) {
+      if (other < band && (sharers.empty() || sharers.back() != other)) sharers.push_back(other);
+      return false;
+    });
+    for (const int32_t sharer : sharers) {
+      double inside = -kCoincident_m, outside = kCoincident_m;
+      for (int halving = 0; halving < 6; ++halving) {
+        const double middle = 0.5 * (inside + outside);
+        const bool covered = surface_.any_band_at(at(middle), p.z, [&](int32_t other) { return other == sharer; });
+        (covered ? inside : outside) = middle;
+      }
+      const Point2 border = at(inside);
+      if (is_outline({border.x, border.y, p.z}, outward, sharer)) return false;
+    }
+    return true;
   }
 
   void append(const Point3& p) {

@@ -84,9 +84,11 @@ TEST(OpenDriveErrors, AttributesAreCheckedAndNamedWithTheirLine) {
             "bad.xodr:5: road 1: <successor>: refers to road 9, which does not exist"},
            {"<link></link>", "<link><successor elementType=\"junction\" elementId=\"9\"/></link>",
             "refers to junction 9, which does not exist"},
-           {"<link></link>", "<link><successor elementType=\"road\" elementId=\"1\"/></link>", "contactPoint is missing"},
+           {"<link></link>", "<link><successor elementType=\"road\" elementId=\"1\"/></link>",
+            "contactPoint is missing"},
            {"<laneSection s=\"0\">", "<laneSection s=\"5\">", "expected the first section at 0"},
-           {"<lanes>", "<lateralProfile><superelevation s=\"0\" a=\"0.1\" b=\"0\" c=\"0\" d=\"0\"/></lateralProfile><lanes>",
+           {"<lanes>",
+            "<lateralProfile><superelevation s=\"0\" a=\"0.1\" b=\"0\" c=\"0\" d=\"0\"/></lateralProfile><lanes>",
             "<superelevation>: banked roads are not supported"},
            {"<lanes>", "<lanes><laneOffset s=\"0\" a=\"1e300\" b=\"0\" c=\"0\" d=\"0\"/>", "beside it"},
        }) {
@@ -109,7 +111,8 @@ TEST(OpenDriveErrors, IdsAreUnique) {
   RoadText road;
   road.right = lane_of(-1, "driving", 3);
   EXPECT_THAT(message_of(file_of(road.text() + road.text())), HasSubstr("road 1: <road>: attribute id: another road"));
-  EXPECT_THAT(message_of(file_of(road.text() + "<junction id=\"1\"/><junction id=\"1\"/>")), HasSubstr("another junction"));
+  EXPECT_THAT(message_of(file_of(road.text() + "<junction id=\"1\"/><junction id=\"1\"/>")),
+              HasSubstr("another junction"));
   road.rest = R"(<signals><signal id="5" s="0" t="0"/><signal id="5" s="1" t="0"/></signals>)";
   EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("another signal has 5 already"));
 }
@@ -124,9 +127,9 @@ TEST(OpenDriveErrors, LinksMustLeadSomewhere) {
            {R"(incomingRoad="1" connectingRoad="8" contactPoint="start")", "refers to road 8"},
            {R"(incomingRoad="8" connectingRoad="1" contactPoint="start")", "refers to road 8"},
            {R"(incomingRoad="1" connectingRoad="1" contactPoint="middle")", "expected start or end, got 'middle'"}}) {
-    EXPECT_THAT(message_of(file_of(road.text() + "<junction id=\"3\"><connection id=\"0\" " + connection +
-                                   "/></junction>")),
-                HasSubstr(expected));
+    EXPECT_THAT(
+        message_of(file_of(road.text() + "<junction id=\"3\"><connection id=\"0\" " + connection + "/></junction>")),
+        HasSubstr(expected));
   }
   road.rest = R"(<signals><signalReference id="77" s="0" t="0"/></signals>)";
   EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("refers to signal 77, which does not exist"));

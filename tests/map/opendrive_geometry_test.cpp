@@ -1,8 +1,8 @@
 // Where lanes run: small OpenDRIVE files against coordinates computed by hand.
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <map>
+
+#include <gtest/gtest.h>
 
 #include "pictura/common/scene.h"
 #include "pictura/map/opendrive.h"
@@ -20,8 +20,8 @@ RoadMap parse(const std::string& contents) { return parse_opendrive(file_of(cont
 
 const Lane& lane_named(const RoadMap& map, const std::string& road, int section, int lane) {
   for (const Lane& candidate : map.lanes) {
-    if (map.road_names[static_cast<std::size_t>(candidate.source_road)] == road && candidate.source_section == section &&
-        candidate.source_lane == lane) {
+    if (map.road_names[static_cast<std::size_t>(candidate.source_road)] == road &&
+        candidate.source_section == section && candidate.source_lane == lane) {
       return candidate;
     }
   }
@@ -69,8 +69,8 @@ TEST(OpenDriveGeometry, ArcLanesKeepTheirRadiusWithinTheChordError) {
   // A quarter turn to the left with radius 50 about (0, 50); the right lane's centre has radius 52.
   RoadText road;
   road.length = 25 * M_PI;
-  road.geometry = fmt::format(R"(<geometry s="0" x="0" y="0" hdg="0" length="{}"><arc curvature="0.02"/></geometry>)",
-                              road.length);
+  road.geometry =
+      fmt::format(R"(<geometry s="0" x="0" y="0" hdg="0" length="{}"><arc curvature="0.02"/></geometry>)", road.length);
   road.right = lane_of(-1, "driving", 4);
   const RoadMap map = parse(road.text());
   const Span<const LanePoint> points = map.points_of(map.lanes[0]);
@@ -107,9 +107,8 @@ TEST(OpenDriveGeometry, OffsetsWidthsAndHeightsFollowTheirCubics) {
   RoadText road;
   road.lane_offset = R"(<laneOffset s="0" a="1" b="0.01" c="0" d="0"/><laneOffset s="60" a="1.6" b="0" c="0" d="0"/>)";
   road.elevation = R"(<elevation s="0" a="2" b="0.1" c="-0.001" d="0"/>)";
-  road.right =
-      R"(<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0.001" d="-0.00001"/></lane>)"
-      R"(<lane id="-2" type="parking"><width sOffset="0" a="2" b="0" c="0" d="0"/></lane>)";
+  road.right = R"(<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0.001" d="-0.00001"/></lane>)"
+               R"(<lane id="-2" type="parking"><width sOffset="0" a="2" b="0" c="0" d="0"/></lane>)";
   const RoadMap map = parse(road.text());
   auto offset = [](double s) { return s < 60 ? 1 + 0.01 * s : 1.6; };
   auto width = [](double s) { return 3 + 0.001 * s * s - 0.00001 * s * s * s; };
@@ -118,9 +117,7 @@ TEST(OpenDriveGeometry, OffsetsWidthsAndHeightsFollowTheirCubics) {
   for (const Lane* lane : {&driving, &parking}) {
     const Span<const LanePoint> points = map.points_of(*lane);
     ASSERT_GE(points.size(), 10u);
-    auto center = [&](double s) {
-      return lane == &driving ? offset(s) - 0.5 * width(s) : offset(s) - width(s) - 1;
-    };
+    auto center = [&](double s) { return lane == &driving ? offset(s) - 0.5 * width(s) : offset(s) - width(s) - 1; };
     for (std::size_t i = 0; i < points.size(); ++i) {
       const double s = points[i].position_m.x + map.origin_m[0];
       expect_at(map, points[i].position_m, s, center(s), z(s));
@@ -145,13 +142,12 @@ TEST(OpenDriveGeometry, CoordinatesAreKeptFarFromTheFilesOrigin) {
 TEST(OpenDriveLanes, SectionsAreJoinedAndNeighboursStandSideBySide) {
   RoadText road;
   const std::string left = lane_of(1, "driving", 3, R"(<link><successor id="1"/></link>)");
-  road.sections =
-      "<laneSection s=\"0\"><left>" + lane_of(1, "driving", 3, R"(<link><successor id="2"/></link>)") +
-      "</left><center/><right>" + lane_of(-1, "driving", 3, R"(<link><successor id="-1"/></link>)") +
-      lane_of(-2, "driving", 3, R"(<link><successor id="-2"/></link>)") + lane_of(-3, "shoulder", 1) +
-      "</right></laneSection>\n<laneSection s=\"40\"><left>" + lane_of(1, "driving", 0.5) +
-      lane_of(2, "driving", 3, R"(<link><predecessor id="1"/></link>)") + "</left><center/><right>" +
-      lane_of(-1, "driving", 3) + lane_of(-2, "driving", 3) + "</right></laneSection>\n";
+  road.sections = "<laneSection s=\"0\"><left>" + lane_of(1, "driving", 3, R"(<link><successor id="2"/></link>)") +
+                  "</left><center/><right>" + lane_of(-1, "driving", 3, R"(<link><successor id="-1"/></link>)") +
+                  lane_of(-2, "driving", 3, R"(<link><successor id="-2"/></link>)") + lane_of(-3, "shoulder", 1) +
+                  "</right></laneSection>\n<laneSection s=\"40\"><left>" + lane_of(1, "driving", 0.5) +
+                  lane_of(2, "driving", 3, R"(<link><predecessor id="1"/></link>)") + "</left><center/><right>" +
+                  lane_of(-1, "driving", 3) + lane_of(-2, "driving", 3) + "</right></laneSection>\n";
   const RoadMap map = parse(road.text());
   const Lane &a1 = lane_named(map, "1", 0, -1), &a2 = lane_named(map, "1", 0, -2), &b1 = lane_named(map, "1", 1, -1);
   EXPECT_EQ(list(map, a1.successors), std::vector<int32_t>{index_of(map, b1)});
@@ -171,7 +167,8 @@ TEST(OpenDriveLanes, SectionsAreJoinedAndNeighboursStandSideBySide) {
 TEST(OpenDriveLanes, ASectionOfAMicrometreIsBridged) {
   RoadText road;
   auto section = [](const char* s, const char* link) {
-    return fmt::format("<laneSection s=\"{}\"><center/><right>{}</right></laneSection>\n", s, lane_of(-1, "driving", 3, link));
+    return fmt::format("<laneSection s=\"{}\"><center/><right>{}</right></laneSection>\n", s,
+                       lane_of(-1, "driving", 3, link));
   };
   road.sections = section("0", R"(<link><successor id="-1"/></link>)") +
                   section("50", R"(<link><predecessor id="-1"/><successor id="-1"/></link>)") +
@@ -184,12 +181,15 @@ TEST(OpenDriveLanes, ASectionOfAMicrometreIsBridged) {
 
 TEST(OpenDriveLanes, TypesOfAllVersionsAreKnown) {
   const std::map<std::string, LaneType> types = {
-      {"driving", LaneType::driving},        {"bidirectional", LaneType::bidirectional}, {"entry", LaneType::ramp},
-      {"exit", LaneType::ramp},              {"onRamp", LaneType::ramp},                 {"offRamp", LaneType::ramp},
-      {"connectingRamp", LaneType::ramp},    {"parking", LaneType::parking},             {"stop", LaneType::stop},
-      {"restricted", LaneType::restricted},  {"biking", LaneType::biking},               {"curb", LaneType::border},
-      {"walking", LaneType::sidewalk},       {"sidewalk", LaneType::sidewalk},           {"median", LaneType::median},
-      {"special1", LaneType::other},         {"shoulder", LaneType::shoulder}};
+      {"driving", LaneType::driving},     {"bidirectional", LaneType::bidirectional},
+      {"entry", LaneType::ramp},          {"exit", LaneType::ramp},
+      {"onRamp", LaneType::ramp},         {"offRamp", LaneType::ramp},
+      {"connectingRamp", LaneType::ramp}, {"parking", LaneType::parking},
+      {"stop", LaneType::stop},           {"restricted", LaneType::restricted},
+      {"biking", LaneType::biking},       {"curb", LaneType::border},
+      {"walking", LaneType::sidewalk},    {"sidewalk", LaneType::sidewalk},
+      {"median", LaneType::median},       {"special1", LaneType::other},
+      {"shoulder", LaneType::shoulder}};
   for (const auto& [name, type] : types) {
     RoadText road;
     road.right = lane_of(-1, name, 3);
@@ -264,8 +264,8 @@ TEST(OpenDriveLanes, ARingIsEndlessAndADeadEndIsNotUnlessOneCanChangeLanes) {
   // A circle of radius 20 that leads into itself; only the outer of its two lanes does.
   RoadText ring;
   ring.length = 40 * M_PI;
-  ring.geometry = fmt::format(R"(<geometry s="0" x="0" y="0" hdg="0" length="{}"><arc curvature="0.05"/></geometry>)",
-                              ring.length);
+  ring.geometry =
+      fmt::format(R"(<geometry s="0" x="0" y="0" hdg="0" length="{}"><arc curvature="0.05"/></geometry>)", ring.length);
   ring.link = R"(<predecessor elementType="road" elementId="1" contactPoint="end"/>)"
               R"(<successor elementType="road" elementId="1" contactPoint="start"/>)";
   ring.right = lane_of(-1, "driving", 3) + lane_of(-2, "driving", 3, R"(<link><successor id="-2"/></link>)");
@@ -349,9 +349,8 @@ TEST(OpenDriveLights, StopLineHeadPhaseAndLanesFollowFromTheReferences) {
       R"(<signal id="51" type="1000001" s="18" t="5" orientation="+"/>)"
       R"(<signalReference id="50" s="12" t="0" orientation="+"><validity fromLane="-2" toLane="-1"/></signalReference>)"
       R"(</signals>)";
-  const std::string controllers =
-      R"(<controller id="90" sequence="3"><control signalId="50"/></controller>)"
-      R"(<controller id="91" sequence="1"><control signalId="51"/></controller>)";
+  const std::string controllers = R"(<controller id="90" sequence="3"><control signalId="50"/></controller>)"
+                                  R"(<controller id="91" sequence="1"><control signalId="51"/></controller>)";
   const RoadMap map =
       parse(three_roads(signals, R"(<controller id="90" type="0"/><controller id="91" type="0"/>)") + controllers);
   ASSERT_EQ(map.lights.size(), 1u);  // 51 holds no lane
@@ -369,8 +368,9 @@ TEST(OpenDriveLights, StopLineHeadPhaseAndLanesFollowFromTheReferences) {
   const std::vector<int32_t> expected = {
       index_of(map, lane_named(map, "1", 0, -1)), index_of(map, lane_named(map, "1", 0, -2)),
       index_of(map, lane_named(map, "2", 0, -1)), index_of(map, lane_named(map, "2", 0, -2))};
-  EXPECT_EQ(std::vector<int32_t>(map.light_lanes.begin() + light.lanes.begin, map.light_lanes.begin() + light.lanes.end),
-            expected);
+  EXPECT_EQ(
+      std::vector<int32_t>(map.light_lanes.begin() + light.lanes.begin, map.light_lanes.begin() + light.lanes.end),
+      expected);
 }
 
 }  // namespace

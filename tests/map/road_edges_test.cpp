@@ -1,11 +1,12 @@
 // Outlines of hand-made surfaces: lengths, sides, mouths, levels, cracks; and a brute-force check on random ones.
-#include <gtest/gtest.h>
+#include "pictura/map/road_edges.h"
 
 #include <cmath>
 
+#include <gtest/gtest.h>
+
 #include "pictura/common/rng.h"
 #include "pictura/common/scene.h"
-#include "pictura/map/road_edges.h"
 
 namespace pictura {
 namespace {
@@ -51,8 +52,8 @@ TEST(RoadEdges, NeighboursShareNoEdge) {
   EXPECT_NEAR(total_length(outline({band_of(0, 2, 0, 40, 4), band_of(0, -2, 0, 40, 4)})), 96, 0.05);
   EXPECT_NEAR(total_length(outline({band_of(0, 2, 0, 40, 4), band_of(40, -2, M_PI, 40, 4)})), 96, 0.05);
   EXPECT_NEAR(total_length(outline({band_of(0, 0, 0, 20, 4), band_of(20, 0, 0, 20, 4)})), 88, 0.05);
-  EXPECT_NEAR(total_length(outline({band_of(0, 0, 0, 40, 4), band_of(0, 0, 0, 40, 4), band_of(40, 0, M_PI, 40, 4)})), 88,
-              0.05);
+  EXPECT_NEAR(total_length(outline({band_of(0, 0, 0, 40, 4), band_of(0, 0, 0, 40, 4), band_of(40, 0, M_PI, 40, 4)})),
+              88, 0.05);
 }
 
 TEST(RoadEdges, AStepInWidthIsClosedOff) {
