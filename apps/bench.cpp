@@ -204,12 +204,9 @@ void add_bench_command(CLI::App& app) {
   };
   auto add_world = [](CLI::App* sub, Arguments* arguments) {
     sub->add_option("--map", arguments->world.map, "Default: Town01 where it is found, else procedural:1");
-    sub->add_option("--agents", arguments->world.agents, "Vehicles in the world")->capture_default_str();
-    sub->add_option("--seed", arguments->world.seed)->capture_default_str();
-    sub->add_option("--threads", arguments->world.num_threads, "Host threads; 0: all")->capture_default_str();
+    add_world_options(sub, &arguments->world);
     sub->add_option("--repeats", arguments->repeats)->check(CLI::PositiveNumber)->capture_default_str();
     sub->add_option("--repeat-seconds", arguments->repeat_s)->check(CLI::PositiveNumber)->capture_default_str();
-    sub->add_flag("!--no-walls", arguments->world.walls, "Leave out the walls");
   };
   const auto [render, render_arguments] = add("render", "Images of every agent of a world", bench_render);
   add_world(render, render_arguments.get());

@@ -10,17 +10,25 @@
 
 namespace pictura {
 
+void add_world_options(CLI::App* command, WorldOptions* options_out) {
+  command->add_option("--agents", options_out->agents, "Vehicles in the world")
+      ->check(CLI::Range(1, kMaxAgentsPerWorld))
+      ->capture_default_str();
+  command->add_option("--seed", options_out->seed, "Places, sizes, goals and actions")->capture_default_str();
+  command->add_option("--threads", options_out->num_threads, "Host threads; 0: all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_flag("!--no-walls", options_out->walls, "Leave out the walls along the building lines");
+}
+
 std::unique_ptr<Simulator> make_world(const WorldOptions& options) {
-  if (options.agents < 1 || options.agents > kMaxAgentsPerWorld) {
-    fail_usage("--agents: expected 1 to {}, got {}", kMaxAgentsPerWorld, options.agents);
-  }
   SimulatorConfig config;
   config.seed = options.seed;
   config.num_threads = options.num_threads;
   config.walls = options.walls;
   config.fixed_lights = true;
   config.vector_observations = options.vector_observations;
-  auto simulator = make_simulator("cpu", config, {load_map(options.map)}, {{0, static_cast<int>(options.agents), 0}});
+  auto simulator = make_simulator("cpu", config, {load_map(options.map)}, {{0, options.agents, 0}});
   simulator->reset();
   return simulator;
 }

@@ -4,6 +4,8 @@
 #include <memory>
 #include <string>
 
+#include <CLI/CLI.hpp>
+
 #include "pictura/common/renderer.h"
 #include "pictura/simulator/simulator.h"
 
@@ -12,15 +14,18 @@ namespace pictura {
 /// Options that every command with a world shares.
 struct WorldOptions {
   std::string map;
-  int64_t agents = 32;
+  int agents = 32;
   uint64_t seed = 0;
   int num_threads = 0;
   bool walls = true;
   bool vector_observations = true;
 };
 
+/// Adds --agents, --seed, --threads and --no-walls, which fill *options_out.
+void add_world_options(CLI::App* command, WorldOptions* options_out);
+
 /// One world of options.agents vehicles on the map, at the start of its first episode, whose lights keep evaluation's
-/// timing. Throws UsageError when the number of agents is out of range.
+/// timing.
 std::unique_ptr<Simulator> make_world(const WorldOptions& options);
 
 /// Uploads the simulator's geometries, so that handles equal map indices.

@@ -98,8 +98,7 @@ void add_render_command(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("render", "Write what the cameras of some agents see");
   command->add_option("MAP", arguments->world.map, "A .xodr file, a town's name, or procedural[:SEED]")->required();
-  command->add_option("--agents", arguments->world.agents, "Vehicles in the world")->capture_default_str();
-  command->add_option("--seed", arguments->world.seed, "Places, sizes and actions")->capture_default_str();
+  add_world_options(command, &arguments->world);
   command->add_option("--steps", arguments->steps, "Steps of random actions before the pictures")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
@@ -115,8 +114,6 @@ void add_render_command(CLI::App& app) {
                    "Least width of a line on screen in pixels; 0 turns it off")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command->add_flag("!--no-walls", arguments->world.walls, "Leave out the walls along the building lines");
-  command->add_option("--threads", arguments->world.num_threads, "Host threads; 0: all")->capture_default_str();
   command->add_option("--out", arguments->out, "Folder for the pictures")->required();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer("Example:\n  pictura render Town01 --agents 80 --steps 100 --views 6 --size 192x108 --out images");

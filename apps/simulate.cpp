@@ -84,9 +84,8 @@ void add_simulate_command(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("simulate", "Drive a world and count what happens");
   command->add_option("MAP", arguments->world.map, "A .xodr file, a town's name, or procedural[:SEED]")->required();
-  command->add_option("--agents", arguments->world.agents, "Vehicles in the world")->capture_default_str();
+  add_world_options(command, &arguments->world);
   command->add_option("--steps", arguments->steps, "Steps of 0.1 s")->check(CLI::PositiveNumber)->capture_default_str();
-  command->add_option("--seed", arguments->world.seed, "Places, sizes, goals and actions")->capture_default_str();
   command->add_option("--policy", arguments->policy, "random, idle, or a checkpoint that train wrote")
       ->capture_default_str();
   command->add_option("--backend", arguments->backend, "Renderer for policies that see: cpu, cuda or auto")
@@ -96,8 +95,6 @@ void add_simulate_command(CLI::App& app) {
   command->add_option("--film-agent", arguments->film_agent, "The agent that the film follows")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command->add_option("--threads", arguments->world.num_threads, "Host threads; 0: all")->capture_default_str();
-  command->add_flag("!--no-walls", arguments->world.walls, "Leave out the walls along the building lines");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Examples:\n  pictura simulate Town01 --agents 80 --steps 600 --policy random --json\n"

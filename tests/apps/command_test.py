@@ -127,7 +127,7 @@ class Images(CommandCase):
         render = ["render", town, "--out", self.folder / "images"]
         self.assert_refused(2, "0x0", *render, "--size", "0x0")
         self.assert_refused(2, "vulkan", *render, "--backend", "vulkan")
-        self.assert_refused(2, "got 0", *render, "--agents", 0)
+        self.assert_refused(2, "--agents", *render, "--agents", 0)
         self.assert_refused(2, "100000000", *render, "--agents", 100_000_000)
         self.assert_refused(2, "--views", *render, "--agents", 2, "--views", 3)
         self.assert_refused(1, "/proc/nowhere", "render", town, "--out", "/proc/nowhere")
@@ -165,7 +165,7 @@ class Simulation(CommandCase):
 
     def test_bad_arguments_are_refused_by_name(self):
         simulate = ["simulate", self.town()]
-        self.assert_refused(2, "got 0", *simulate, "--agents", 0)
+        self.assert_refused(2, "--agents", *simulate, "--agents", 0)
         self.assert_refused(2, "100000000", *simulate, "--agents", 100_000_000)
         self.assert_refused(1, "no/such.ckpt", *simulate, "--policy", "no/such.ckpt")
         self.assert_refused(1, "/proc/nowhere", *simulate, "--agents", 2, "--steps", 2, "--video", "/proc/nowhere/a.mp4")
