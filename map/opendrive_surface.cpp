@@ -14,7 +14,7 @@ namespace {
 constexpr double kEdgeBandChordError_m = 0.001;
 // Building lines keep their distance anyway.
 constexpr double kLotBandChordError_m = 0.05;
-constexpr double kBandPiece_m = 2.0;
+constexpr double kBandPiece_m = 5.0;
 
 constexpr double kSetback_m = 1.0;    // of a building from the outermost lane
 constexpr double kLotDepth_m = 6.0;   // free ground that a building needs behind its line

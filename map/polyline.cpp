@@ -21,7 +21,7 @@ std::vector<std::size_t> thin_polyline(const std::vector<CurvePoint>& points, do
     std::size_t last = first + 1;
     for (std::size_t next = last + 1; next < points.size(); ++next) {
       const CurvePoint &a = points[first], &b = points[next];
-      if (std::hypot(b.x - a.x, b.y - a.y) > max_piece_m) break;
+      if (std::hypot(b.x - a.x, b.y - a.y) > max_piece_m + kPieceSlack) break;
       bool close = true;
       for (std::size_t i = first + 1; i < next && close; ++i) close = chord_error(a, b, points[i]) <= tolerance_m;
       if (!close) break;

@@ -10,6 +10,9 @@
 
 namespace pictura {
 
+/// Rounding may make pieces longer than asked for by this much.
+constexpr double kPieceSlack = 1e-6;
+
 /// A place in a file's or a map's coordinates, before it is rounded to float.
 struct Point3 {
   double x = 0, y = 0, z = 0;
@@ -45,12 +48,13 @@ std::vector<CurvePoint> sample_curve(const std::vector<double>& breaks, double t
                                      SampleBudget* budget, Eval&& eval) {
   constexpr int kMaxDepth = 24;
   constexpr double kMinStep = 0.01;
+  constexpr double kStepsPerPiece = 4;
   constexpr double kDenseShare = 0.1;  // of the tolerance: spent on sampling; the rest on thinning
   std::vector<CurvePoint> dense{eval(breaks.front())};
   auto refine = [&](auto&& self, const CurvePoint& a, const CurvePoint& b, int depth) -> void {
     budget->spend();
     if (depth < kMaxDepth) {
-      bool fine = std::hypot(b.x - a.x, b.y - a.y) <= max_piece_m;
+      bool fine = std::hypot(b.x - a.x, b.y - a.y) <= max_piece_m + kPieceSlack;
       CurvePoint middle = eval(0.5 * (a.s + b.s));
       fine = fine && chord_error(a, b, middle) <= kDenseShare * tolerance_m;
       for (const double fraction : {0.25, 0.75}) {
@@ -65,11 +69,17 @@ std::vector<CurvePoint> sample_curve(const std::vector<double>& breaks, double t
     dense.push_back(b);
   };
   for (std::size_t i = 1; i < breaks.size(); ++i) {
-    if (breaks[i] <= dense.back().s) continue;
-    refine(refine, CurvePoint(dense.back()), eval(breaks[i]), 0);
+    const double begin = dense.back().s, span = breaks[i] - begin;
+    if (span <= 0) continue;
+    // Even steps, several to a piece, so that thinning can come close to the longest piece that is allowed.
+    const int steps = static_cast<int>(std::ceil(kStepsPerPiece * span / max_piece_m - kPieceSlack));
+    for (int step = 1; step <= steps; ++step) {
+      refine(refine, CurvePoint(dense.back()), eval(step == steps ? breaks[i] : begin + span * step / steps), 0);
+    }
   }
   std::vector<CurvePoint> kept;
-  for (const std::size_t index : thin_polyline(dense, (1 - kDenseShare) * tolerance_m, max_piece_m)) kept.push_back(dense[index]);
+  for (const std::size_t index : thin_polyline(dense, (1 - kDenseShare) * tolerance_m, max_piece_m))
+    kept.push_back(dense[index]);
   return kept;
 }
 

@@ -1,0 +1,116 @@
+// What a map looks like: strips, heads and walls of a small road, of a procedural town, and of Town01.
+#include "pictura/map/map_geometry.h"
+
+#include <cmath>
+#include <filesystem>
+
+#include <gtest/gtest.h>
+
+#include "pictura/map/load_map.h"
+#include "pictura/map/opendrive.h"
+#include "pictura/tests/map/small_roads.h"
+
+namespace pictura {
+namespace {
+
+int count_of(const StaticGeometry& geometry, StripKind kind) {
+  int count = 0;
+  for (const Strip& strip : geometry.strips) count += strip.kind == kind ? 1 : 0;
+  return count;
+}
+
+TEST(MapGeometry, AStraightRoadHasItsMarksAndItsFrame) {
+  test::RoadText road;
+  road.center_mark = R"(<roadMark sOffset="0" type="solid" color="yellow" width="0.12"/>)";
+  road.left = test::lane_of(1, "driving", 4);
+  road.right = test::lane_of(-1, "driving", 4);
+  road.rest = R"(<objects><object id="2" type="crosswalk" s="50" t="0" length="4" width="3"/></objects>)";
+  const RoadMap map = parse_opendrive(test::file_of(road.text()), "small.xodr");
+  const StaticGeometry geometry = make_static_geometry(map, {.walls = false});
+  EXPECT_EQ(count_of(geometry, StripKind::lane_mark), 10);
+  EXPECT_EQ(count_of(geometry, StripKind::road_edge), 22);  // 100 m twice and 8 m twice
+  EXPECT_EQ(count_of(geometry, StripKind::crosswalk), 4);
+  EXPECT_EQ(count_of(geometry, StripKind::stop_line), 0);
+  EXPECT_TRUE(geometry.walls.empty());
+  for (const Strip& strip : geometry.strips) {
+    EXPECT_LE(length(strip.b_m - strip.a_m), kMaxPiece_m + 1e-3f);
+    if (strip.kind == StripKind::lane_mark) {
+      EXPECT_FLOAT_EQ(strip.width_m, 0.12f);
+      EXPECT_EQ(strip.color.b, kYellowMarkColor.b);
+    }
+  }
+}
+
+TEST(MapGeometry, LightsHaveAHeadAndAStopLineEach) {
+  const std::shared_ptr<const RoadMap> map = load_map("procedural:3");
+  ASSERT_GT(map->lights.size(), 0u);
+  const StaticGeometry geometry = make_static_geometry(*map, {.light_half_angle_rad = 1.0f});
+  ASSERT_EQ(geometry.heads.size(), map->lights.size());
+  EXPECT_EQ(geometry.num_signals, static_cast<int32_t>(map->lights.size()));
+  for (std::size_t i = 0; i < geometry.heads.size(); ++i) {
+    EXPECT_EQ(geometry.heads[i].signal, static_cast<int32_t>(i));
+    EXPECT_EQ(geometry.heads[i].position_m.x, map->lights[i].head_m.x);
+    EXPECT_NEAR(geometry.heads[i].cos_half_angle, std::cos(1.0f), 1e-5f);
+  }
+  EXPECT_GE(count_of(geometry, StripKind::stop_line), static_cast<int>(map->lights.size()));
+}
+
+class Walls : public ::testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override {
+    const std::string name = GetParam();
+    if (name.starts_with("Town") && !std::filesystem::exists(map_folder() + "/carla/" + name + ".xodr")) {
+      GTEST_SKIP() << "needs " << name << ".xodr; set PICTURA_DATA";
+    }
+    map_ = load_map(name);
+  }
+  std::shared_ptr<const RoadMap> map_;
+};
+
+INSTANTIATE_TEST_SUITE_P(All, Walls, ::testing::Values("Town01", "Town03", "procedural:1"));
+
+TEST_P(Walls, FollowTheirSeedAndLeaveGaps) {
+  const std::vector<WallFace> walls = make_walls(*map_, {.wall_seed = 7}), again = make_walls(*map_, {.wall_seed = 7}),
+                              other = make_walls(*map_, {.wall_seed = 8});
+  ASSERT_EQ(walls.size(), again.size());
+  for (std::size_t i = 0; i < walls.size(); ++i) {
+    EXPECT_EQ(walls[i].a_m.x, again[i].a_m.x);
+    EXPECT_EQ(walls[i].height_m, again[i].height_m);
+    EXPECT_GE(walls[i].height_m, 3.0f);
+    EXPECT_LE(walls[i].height_m, 12.0f);
+    EXPECT_LE(length(walls[i].b_m.xy() - walls[i].a_m.xy()), kMaxPiece_m);
+  }
+  bool differs = walls.size() != other.size();
+  for (std::size_t i = 0; i < std::min(walls.size(), other.size()); ++i) {
+    differs = differs || walls[i].a_m.x != other[i].a_m.x;
+  }
+  EXPECT_TRUE(differs);
+  EXPECT_GT(walls.size(), map_->building_lines.size() / 2);
+  EXPECT_LT(walls.size(), map_->building_lines.size() * 95 / 100);
+  EXPECT_TRUE(make_static_geometry(*map_, {.walls = false}).walls.empty());
+  EXPECT_EQ(make_static_geometry(*map_, {.wall_seed = 7}).walls.size(), walls.size());
+}
+
+TEST_P(Walls, StandOnNoLaneAndHaveTheRoadOnTheirRight) {
+  ASSERT_GT(map_->building_lines.size(), 50u);
+  for (const BuildingLine& line : map_->building_lines) {
+    const Vec2 along = line.b_m.xy() - line.a_m.xy(), middle = (line.a_m.xy() + line.b_m.xy()) * 0.5f;
+    float nearest_m = 1e9f;
+    bool on_right = false;
+    for (const Lane& lane : map_->lanes) {
+      for (const LanePoint& point : map_->points_of(lane)) {
+        for (const Vec2 place : {line.a_m.xy(), middle, line.b_m.xy()}) {
+          const float clear_m = length(point.position_m.xy() - place) - 0.5f * point.width_m;
+          ASSERT_GT(clear_m, 0.3f) << "at " << place.x << ", " << place.y;
+          if (clear_m >= nearest_m) continue;
+          nearest_m = clear_m;
+          on_right = cross(along, point.position_m.xy() - place) < 0;
+        }
+      }
+    }
+    EXPECT_TRUE(on_right) << "at " << middle.x << ", " << middle.y;
+  }
+}
+
+}  // namespace
+}  // namespace pictura
