@@ -123,6 +123,9 @@ void build_building_lines(Build* build) {
           const Point3 a = at(sign > 0 ? low : high), b = at(sign > 0 ? high : low);
           const double length_m = std::hypot(b.x - a.x, b.y - a.y);
           if (length_m < 2 * kClearance_m || length_m > kMaxPiece_m || !is_free(surface, a, b)) continue;
+          // Inside a bend that is tighter than the line's offset the line folds back.
+          const double heading = pose_at(road, 0.5 * (low + high)).heading;
+          if (sign * ((b.x - a.x) * std::cos(heading) + (b.y - a.y) * std::sin(heading)) < 0.5 * length_m) continue;
           auto to_vec3 = [](const Point3& p) {
             return Vec3{static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
           };
