@@ -1,0 +1,266 @@
+// The shared coverage and order rules against brute force.
+#include <algorithm>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/common/raster_coverage.h"
+#include "pictura/common/raster_order.h"
+#include "pictura/tests/support/image_scenes.h"
+
+namespace pictura {
+namespace {
+
+// A convex polygon with corners in order around a point.
+std::vector<Vec2> random_polygon(std::mt19937& random, int corners) {
+  std::uniform_real_distribution<float> unit(0, 1);
+  std::vector<float> angles;
+  for (int i = 0; i < corners; ++i) angles.push_back(kTwoPi * unit(random));
+  std::sort(angles.begin(), angles.end());
+  const Vec2 center{4 + 2 * unit(random), 4 + 2 * unit(random)};
+  const float rx = 0.2f + 5 * unit(random), ry = 0.05f + 3 * unit(random);
+  std::vector<Vec2> polygon;
+  for (const float angle : angles) {
+    const SinCos sc = sincos_of(angle);
+    polygon.push_back({center.x + rx * sc.cos, center.y + ry * sc.sin});
+  }
+  return polygon;
+}
+
+std::vector<PolygonEdge> edges_of(const std::vector<Vec2>& polygon) {
+  std::vector<PolygonEdge> edges;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    edges.push_back(make_edge(polygon[i], polygon[(i + 1) % polygon.size()]));
+  }
+  return edges;
+}
+
+// Area of a polygon within a pixel by cutting it with the pixel's four sides, in double precision.
+double clipped_area(const std::vector<Vec2>& polygon, int x, int y) {
+  struct P {
+    double x, y;
+  };
+  std::vector<P> points;
+  for (const Vec2& p : polygon) points.push_back({p.x, p.y});
+  for (int side = 0; side < 4; ++side) {
+    auto inside = [&](P p) {
+      return side == 0 ? p.x - x : side == 1 ? x + 1 - p.x : side == 2 ? p.y - y : y + 1 - p.y;
+    };
+    std::vector<P> kept;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const P a = points[i], b = points[(i + 1) % points.size()];
+      const double da = inside(a), db = inside(b);
+      if (da >= 0) kept.push_back(a);
+      if ((da >= 0) != (db >= 0))
+        kept.push_back({a.x + (b.x - a.x) * da / (da - db), a.y + (b.y - a.y) * da / (da - db)});
+    }
+    points = kept;
+  }
+  double area = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const P a = points[i], b = points[(i + 1) % points.size()];
+    area += 0.5 * (a.x * b.y - b.x * a.y);
+  }
+  return area;
+}
+
+TEST(Coverage, AreaIsExactAndSamplesAreThoseInside) {
+  std::mt19937 random(1);
+  for (int round = 0; round < 400; ++round) {
+    const std::vector<Vec2> polygon = random_polygon(random, 3 + round % 5);
+    const std::vector<PolygonEdge> edges = edges_of(polygon);
+    const int count = static_cast<int>(edges.size());
+    for (int y = 0; y < 10; ++y) {
+      for (int x = 0; x < 10; ++x) {
+        const PixelCoverage coverage = pixel_coverage(edges.data(), count, x, y);
+        const double area = clipped_area(polygon, x, y);
+        ASSERT_NEAR(coverage.area, area, kFullCoverage + 1e-5) << round;
+        if (area > 2 * kLeastCoverage && area < 0.998) {
+          ASSERT_NEAR(coverage.area, area, 2e-5) << round;
+        }
+        for (int column = 0; column < 8; ++column) {
+          for (int row = 0; row < 8; ++row) {
+            const float sample_x = static_cast<float>(x) + (static_cast<float>(column) + 0.5f) / 8;
+            const float sample_y = static_cast<float>(y) + (static_cast<float>(row) + sample_column_offset(column)) / 8;
+            const bool in = (coverage.samples >> (8 * column + row)) & 1;
+            // Distance to the nearest edge, negative outside.
+            double inner = 1e9;
+            for (std::size_t i = 0; i < polygon.size(); ++i) {
+              const Vec2 a = polygon[i], ab = polygon[(i + 1) % polygon.size()] - a;
+              inner = std::min<double>(inner, cross(ab, Vec2{sample_x, sample_y} - a) / length(ab));
+            }
+            if (std::abs(inner) > 1e-4 && area > 2 * kLeastCoverage) {
+              ASSERT_EQ(in, inner > 0) << round;
+            }
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(Coverage, ASharedEdgeSplitsAreaAndSamplesWithoutGapOrOverlap) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<float> unit(0, 8);
+  for (int round = 0; round < 2000; ++round) {
+    // Two triangles on either side of the segment ab, both larger than the pixels that are looked at.
+    const Vec2 a{unit(random), -50}, b{unit(random), 60};
+    const bool level = round % 2;
+    auto turned = [&](Vec2 p) { return level ? Vec2{p.y, p.x} : p; };
+    const std::vector<Vec2> right{turned(a), turned({500, 3}), turned(b)},
+        left{turned(b), turned({-500, 5}), turned(a)};
+    auto oriented = [&](std::vector<Vec2> polygon) {
+      if (level) std::reverse(polygon.begin(), polygon.end());
+      return edges_of(polygon);
+    };
+    const auto one = oriented(right), other = oriented(left);
+    for (int i = 0; i < 8; ++i) {
+      const int x = level ? 4 : i, y = level ? i : 4;
+      const PixelCoverage c = pixel_coverage(one.data(), 3, x, y), d = pixel_coverage(other.data(), 3, x, y);
+      ASSERT_EQ(c.samples & d.samples, 0u);
+      if (c.area > 0 && d.area > 0) {
+        ASSERT_EQ(c.samples | d.samples, kAllSamples);
+        // A pixel that lacks less than kFullCoverage counts as full.
+        const bool rounded = c.area == 1.0f || d.area == 1.0f;
+        ASSERT_NEAR(c.area + d.area, 1, rounded ? kFullCoverage : 1e-5);
+      }
+    }
+  }
+}
+
+TEST(Coverage, RowSpansAgreeWithPixels) {
+  std::mt19937 random(3);
+  for (int round = 0; round < 400; ++round) {
+    const std::vector<PolygonEdge> edges = edges_of(random_polygon(random, 3 + round % 6));
+    const int count = static_cast<int>(edges.size());
+    const PixelBox box{0, 12, 0, 12};
+    for (int y = 0; y < 12; ++y) {
+      const RowSpan span = row_span(edges.data(), count, box, y);
+      for (int x = 0; x < 12; ++x) {
+        const PixelCoverage coverage = pixel_coverage(edges.data(), count, x, y);
+        if (x < span.begin || x >= span.end) {
+          ASSERT_EQ(coverage.area, 0.0f);
+        }
+        if (x >= span.full_begin && x < span.full_end) {
+          ASSERT_EQ(coverage.area, 1.0f);
+          ASSERT_EQ(coverage.samples, kAllSamples);
+        }
+      }
+    }
+  }
+}
+
+TEST(Coverage, WhatIsHiddenWeighsNothing) {
+  PixelState pixel;
+  EXPECT_EQ(composite(&pixel, {1.0f, kAllSamples}, {1, 0, 0}), 1.0f);
+  EXPECT_EQ(composite(&pixel, {1.0f, kAllSamples}, {0, 1, 0}), 0.0f);
+  EXPECT_EQ(composite(&pixel, {0.01f, 0}, {0, 1, 0}), 0.0f);
+  EXPECT_EQ(pixel.color.g, 0.0f);
+}
+
+TEST(Coverage, TwoFacesOfOneThirdAndTwoThirdsFillAPixel) {
+  PixelState pixel;
+  const uint64_t third = 0xFFFFFFull;  // any split of the samples
+  composite(&pixel, {1.0f / 3, third}, {1, 1, 1});
+  composite(&pixel, {2.0f / 3, ~third}, {1, 1, 1});
+  EXPECT_NEAR(pixel.color.r, 1, 1e-6);
+  EXPECT_EQ(pixel.free_area, 0.0f);
+}
+
+TEST(Coverage, ClippingKeepsWhatIsInFront) {
+  Rig rig = paper_rig();
+  PinholeCamera camera;
+  camera.right = {1, 0, 0};
+  camera.down = {0, 1, 0};
+  camera.forward = {0, 0, 1};
+  camera.focal_x_px = camera.focal_y_px = 50;
+  camera.center_x_px = camera.center_y_px = 50;
+  camera.width_px = camera.height_px = 100;
+  const Frustum frustum = make_frustum(camera);
+  Vec3 polygon[kMaxPolygonCorners];
+  // A floor from behind the camera to 10 m ahead, 1 m below: cut at the bottom of the guard band, y = 58/50 of the
+  // depth.
+  const Vec3 floor[4] = {{-0.5f, 1, -5}, {0.5f, 1, -5}, {0.5f, 1, 10}, {-0.5f, 1, 10}};
+  const int count = clip_face(frustum, floor, 4, polygon);
+  ASSERT_EQ(count, 4);
+  float nearest = 1e9f;
+  for (int i = 0; i < count; ++i) nearest = std::min(nearest, polygon[i].z);
+  EXPECT_NEAR(nearest, 50.0f / 58.0f, 1e-5);
+  const Vec3 behind[3] = {{0, 0, -1}, {1, 0, -1}, {0, 1, 0.05f}};
+  EXPECT_EQ(clip_face(frustum, behind, 3, polygon), 0);
+}
+
+// Which of two extents is hit first along rays from the camera: -1 a, 1 b, 0 never both.
+int order_by_rays(const AgentBox& a, const AgentBox& b) {
+  auto enter = [](const AgentBox& box, Vec2 ray) {
+    const Vec2 ahead{box.cos_heading, box.sin_heading}, left = left_normal(ahead);
+    float from = 0, to = 1e9f;
+    for (const auto& [axis, half] : {std::pair{ahead, 0.5f * box.length_m}, std::pair{left, 0.5f * box.width_m}}) {
+      const float speed = dot(ray, axis), at = dot(box.center_m.xy(), axis);
+      float t0 = (at - half) / speed, t1 = (at + half) / speed;
+      if (t0 > t1) std::swap(t0, t1);
+      from = std::max(from, t0);
+      to = std::min(to, t1);
+    }
+    return from < to ? from : -1;
+  };
+  int verdict = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const SinCos sc = sincos_of(kTwoPi * static_cast<float>(i) / 2000);
+    const float ta = enter(a, {sc.cos, sc.sin}), tb = enter(b, {sc.cos, sc.sin});
+    if (ta < 0 || tb < 0 || std::abs(ta - tb) < 1e-3f) continue;
+    verdict = ta < tb ? -1 : 1;
+  }
+  return verdict;
+}
+
+TEST(Order, OfDisjointBoxesIsWhatRaysSee) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<float> place(-20, 20), size(0.1f, 25), angle(-3, 3);
+  int compared = 0;
+  for (int round = 0; round < 3000; ++round) {
+    auto box = [&] {
+      return make_box(AgentClass::vehicle, {place(random), place(random), 0}, angle(random), {size(random), 0.2f, 2});
+    };
+    const AgentBox a = box(), b = box();
+    const Extent ea = agent_extent(a, {0, 0, 1}), eb = agent_extent(b, {0, 0, 1});
+    // Only disjoint pairs have an order.
+    Clearance apart;
+    look_across_sides(ea, ea, eb, &apart);
+    look_across_sides(eb, ea, eb, &apart);
+    if (!apart.a_is_free && !apart.b_is_free) continue;
+    if (nearest_distance2(ea) == 0 || nearest_distance2(eb) == 0) continue;
+    const int seen = order_by_rays(a, b);
+    if (seen == 0) continue;
+    ++compared;
+    ASSERT_EQ(order_of(ea, eb), seen) << round;
+    ASSERT_EQ(order_of(eb, ea), -seen) << round;
+  }
+  EXPECT_GT(compared, 300);
+}
+
+TEST(Order, OfLevelsIsByHeight) {
+  // A car on a bridge above a car, from below, from above, and from between the two.
+  const AgentBox low = make_box(AgentClass::vehicle, {20, 0, 0}, 0, {4, 2, 1.5f});
+  const AgentBox high = make_box(AgentClass::vehicle, {20, 0, 6}, 0, {4, 2, 1.5f});
+  for (const auto& [eye_z, expected] : {std::pair{1.0f, -1}, std::pair{10.0f, 1}, std::pair{4.0f, 0}}) {
+    EXPECT_EQ(order_of(agent_extent(low, {0, 0, eye_z}), agent_extent(high, {0, 0, eye_z})), expected) << eye_z;
+  }
+  // A strip under a car, and the strip of a bridge above it.
+  Strip ground;
+  ground.a_m = {10, 0, 0};
+  ground.b_m = {20, 0, 0};
+  ground.side_a = ground.side_b = {0, 1};
+  ground.width_m = 0.2f;
+  Strip bridge = ground;
+  bridge.a_m.z = bridge.b_m.z = 6;
+  const Vec3 eye{0, 0, 1.5f};
+  EXPECT_EQ(order_of(strip_extent(ground, 0, eye), agent_extent(low, eye)), 1);
+  // The bridge's marks and the car below it are seen apart from between, and the marks hide the car from above.
+  EXPECT_NE(order_of(strip_extent(bridge, 1, eye), agent_extent(low, eye)), -1);
+  EXPECT_EQ(order_of(strip_extent(bridge, 1, {0, 0, 12}), agent_extent(low, {0, 0, 12})), -1);
+}
+
+}  // namespace
+}  // namespace pictura

@@ -1,0 +1,156 @@
+// The oracle against the truth.
+#include <cmath>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/common/make_renderer.h"
+#include "pictura/common/raster_coverage.h"
+#include "pictura/tests/support/image_scenes.h"
+#include "pictura/tests/support/image_truth.h"
+#include "pictura/tests/support/tolerances.h"
+
+namespace pictura {
+namespace {
+
+std::vector<float> drawn(const HostImages& images, int view, int camera) {
+  const CameraImages& out = images.camera(camera);
+  const float* first = static_cast<const float*>(out.data) + view * out.view_stride;
+  return {first, first + 3 * out.width_px * out.height_px};
+}
+
+struct Quality {
+  PooledError oracle, oracle_u8, supersampled;
+};
+
+Quality measure(const StaticGeometry& geometry, const SceneOwner& scene, const std::vector<View>& views,
+                const RendererConfig& config) {
+  const auto renderer = make_renderer("cpu", config);
+  renderer->upload(geometry);
+  HostImages images(config.rig, static_cast<int>(views.size()), PixelFormat::f32);
+  renderer->render(scene.batch(), views, images.batch());
+  Quality quality;
+  for (std::size_t view = 0; view < views.size(); ++view) {
+    for (std::size_t k = 0; k < config.rig.cameras.size(); ++k) {
+      const Camera& camera = config.rig.cameras[k];
+      const TruthImage truth = trace_image(geometry, scene.batch(), views[view], camera, config.line_floor_px);
+      if (truth.blank()) continue;
+      const TruthImage coarse =
+          trace_image(geometry, scene.batch(), views[view], camera, config.line_floor_px, TruthSamples::grid_2x2);
+      std::vector<float> image = drawn(images, static_cast<int>(view), static_cast<int>(k));
+      quality.oracle.add(image, truth.rgb);
+      for (float& channel : image) channel = static_cast<float>(to_byte(channel)) / 255.0f;
+      quality.oracle_u8.add(image, truth.rgb);
+      quality.supersampled.add(coarse.rgb, truth.rgb);
+    }
+  }
+  return quality;
+}
+
+TEST(Quality, TownsAreWithinThePromisedError) {
+  Quality pooled;
+  for (const uint64_t seed : {1, 2, 3}) {
+    SyntheticTown town = make_synthetic_town(seed, 120);
+    town.views.resize(4);
+    const Quality quality = measure(town.geometry, town.scene, town.views, {.rig = paper_rig(), .num_threads = 1});
+    RecordProperty("psnr_db_seed_" + std::to_string(seed), fmt::format("{:.2f}", quality.oracle.psnr_db()));
+    fmt::print("seed {}: {:.2f} dB, u8 {:.2f} dB, 2x2 samples {:.2f} dB, worst {:.1f}/255, {:.3f} % beyond 1/255\n",
+               seed, quality.oracle.psnr_db(), quality.oracle_u8.psnr_db(), quality.supersampled.psnr_db(),
+               255 * quality.oracle.max_error(), 100 * quality.oracle.share_above(1.0 / 255));
+    EXPECT_GE(quality.oracle.psnr_db(), kLeastOraclePsnr_db);
+    EXPECT_GE(quality.oracle.psnr_db(), quality.supersampled.psnr_db() + kOracleGain_db);
+    EXPECT_LE(quality.oracle.max_error(), kWorstOracleError);
+  }
+}
+
+TEST(Quality, OddSizesAndMixedRigsToo) {
+  SyntheticTown town = make_synthetic_town(5, 60);
+  town.views.resize(2);
+  RendererConfig config{.rig = paper_rig(97, 55), .num_threads = 1};
+  config.rig.cameras.resize(2);
+  config.rig.cameras[1] = paper_rig(33, 71).cameras[1];
+  config.rig.cameras[1].pitch_rad = -0.2f;
+  config.rig.cameras[1].roll_rad = 0.3f;
+  EXPECT_GE(measure(town.geometry, town.scene, town.views, config).oracle.psnr_db(), kLeastOraclePsnr_db);
+}
+
+// A bright wall across the view, 20 m ahead, and things before it.
+StaticGeometry bright_wall() {
+  StaticGeometry geometry;
+  WallFace wall;
+  wall.a_m = {20, -60, -5};
+  wall.b_m = {20, 60, -5};
+  wall.height_m = 30;
+  wall.color = {1, 1, 1};
+  geometry.walls.push_back(wall);
+  geometry.build_grids();
+  return geometry;
+}
+
+Quality measure_boxes(const StaticGeometry& geometry, const std::vector<AgentBox>& boxes) {
+  SceneOwner scene;
+  scene.agents = boxes;
+  scene.end_world(0);
+  return measure(geometry, scene, {make_view({0, 0, 0}, 0)}, {.rig = paper_rig(), .num_threads = 1});
+}
+
+TEST(Quality, FacesOfACuboidDoNotLeakTheWallBehindThem) {
+  for (int i = 0; i < 8; ++i) {
+    const float turn = 0.1f + 0.37f * static_cast<float>(i);
+    const Quality quality =
+        measure_boxes(bright_wall(), {make_box(AgentClass::vehicle, {8, 0.3f, 0}, turn, {4, 1.9f, 1.3f})});
+    EXPECT_LE(quality.oracle.max_error(), kSharedEdgeError) << turn;
+  }
+}
+
+TEST(Quality, AgentsThatStraddleTheNearPlane) {
+  // Beside the camera, partly behind it, its side face crossing the near plane.
+  const Quality quality =
+      measure_boxes(bright_wall(), {make_box(AgentClass::vehicle, {2.0f, 1.2f, 0}, 0.2f, {4.5f, 1.9f, 1.7f})});
+  EXPECT_GE(quality.oracle.psnr_db(), kLeastOraclePsnr_db);
+}
+
+TEST(Quality, AWallThroughTheImageAndCarsOnBothSides) {
+  StaticGeometry geometry;
+  WallFace wall;
+  wall.a_m = {-20, 2, 0};
+  wall.b_m = {90, -4, 0};
+  wall.height_m = 2.5f;
+  geometry.walls.push_back(wall);
+  geometry.build_grids();
+  std::vector<AgentBox> boxes;
+  for (int i = 0; i < 6; ++i) {
+    const float x = 8 + 10 * static_cast<float>(i);
+    boxes.push_back(make_box(AgentClass::vehicle, {x, 6.5f - 0.05f * x, 0}, 0.3f, {4.2f, 1.8f, 1.5f}));
+    boxes.push_back(make_box(AgentClass::vehicle, {x + 4, -6.5f - 0.05f * x, 0}, -0.2f, {4.2f, 1.8f, 2.8f}));
+  }
+  EXPECT_GE(measure_boxes(geometry, boxes).oracle.psnr_db(), kLeastOraclePsnr_db);
+}
+
+TEST(Quality, RoadsOnTwoLevels) {
+  // A bridge across the view, with marks and cars on it, above a road with marks and cars.
+  StaticGeometry geometry;
+  for (const float y : {-3.5f, 0.0f, 3.5f})
+    add_polyline(&geometry, {{-20, y, 0}, {110, y, 0}}, 0.15f, StripKind::lane_mark);
+  for (const float x : {30.0f, 33.5f, 37.0f})
+    add_polyline(&geometry, {{x, -60, 6}, {x, 60, 6}}, 0.2f, StripKind::road_edge);
+  geometry.build_grids();
+  std::vector<AgentBox> boxes;
+  for (int i = 0; i < 5; ++i) {
+    const float at = static_cast<float>(i);
+    boxes.push_back(make_box(AgentClass::vehicle, {12 + 14 * at, 1.8f, 0}, 0.02f, {4.2f, 1.8f, 1.5f}));
+    boxes.push_back(make_box(AgentClass::vehicle, {31.7f, -20 + 9 * at, 6}, kHalfPi, {4.2f, 1.8f, 1.5f}));
+  }
+  // From the lower road, and from the bridge.
+  SceneOwner scene;
+  scene.agents = boxes;
+  scene.end_world(0);
+  const std::vector<View> views{make_view({-2, -1.8f, 0}, 0), make_view({35.2f, -12, 6}, 1.2f),
+                                make_view({5, 0, 14}, 0.1f)};
+  EXPECT_GE(measure(geometry, scene, views, {.rig = paper_rig(), .num_threads = 1}).oracle.psnr_db(),
+            kLeastOraclePsnr_db);
+}
+
+}  // namespace
+}  // namespace pictura

@@ -1,0 +1,564 @@
+// What the CPU renderer promises about images: invariances, rules, planes, visibility, and clear errors.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/common/error.h"
+#include "pictura/common/make_renderer.h"
+#include "pictura/common/raster_shapes.h"
+#include "pictura/tests/support/image_scenes.h"
+#include "pictura/tests/support/tolerances.h"
+
+namespace pictura {
+namespace {
+
+using testing::HasSubstr;
+
+// One camera at the origin of the ego frame, 1.5 m up, looking ahead, with round numbers.
+Rig simple_rig(int width_px = 100, int height_px = 100, float focal_px = 50) {
+  Camera camera;
+  camera.name = "simple";
+  camera.width_px = width_px;
+  camera.height_px = height_px;
+  camera.focal_x_px = camera.focal_y_px = focal_px;
+  camera.center_x_px = 0.5f * static_cast<float>(width_px);
+  camera.center_y_px = 0.5f * static_cast<float>(height_px);
+  camera.position_m = {0, 0, 1.5f};
+  return {{camera}};
+}
+
+struct Drawn {
+  std::vector<float> rgb;
+  int width_px, height_px;
+  Rgb at(int x, int y, int image = 0) const {
+    const auto plane = static_cast<std::size_t>(width_px * height_px);
+    const std::size_t i = 3 * plane * static_cast<std::size_t>(image) + static_cast<std::size_t>(y * width_px + x);
+    return {rgb[i], rgb[i + plane], rgb[i + 2 * plane]};
+  }
+};
+
+Drawn draw(const StaticGeometry& geometry, const SceneOwner& scene, const std::vector<View>& views,
+           const RendererConfig& config) {
+  const auto renderer = make_renderer("cpu", config);
+  renderer->upload(geometry);
+  HostImages images(config.rig, static_cast<int>(views.size()), PixelFormat::f32);
+  renderer->render(scene.batch(), views, images.batch());
+  const auto bytes = images.bytes();
+  std::vector<float> rgb(bytes.size() / sizeof(float));
+  std::memcpy(rgb.data(), bytes.data(), bytes.size());
+  return {rgb, config.rig.cameras[0].width_px, config.rig.cameras[0].height_px};
+}
+
+StaticGeometry no_geometry() {
+  StaticGeometry geometry;
+  geometry.build_grids();
+  return geometry;
+}
+
+SceneOwner scene_of(std::vector<AgentBox> agents) {
+  SceneOwner scene;
+  scene.agents = std::move(agents);
+  scene.end_world(0);
+  return scene;
+}
+
+void expect_color(Rgb actual, Rgb expected, float tolerance = 1e-5f) {
+  EXPECT_NEAR(actual.r, expected.r, tolerance);
+  EXPECT_NEAR(actual.g, expected.g, tolerance);
+  EXPECT_NEAR(actual.b, expected.b, tolerance);
+}
+
+TEST(CpuRenderer, DrawsABoxWhereAHandComputesIt) {
+  // The back of a car 10 m ahead: 2 m wide, 1 m high. At 50 px/m/m: x from 50 - 5 to 50 + 5, y from 50 + 50 * 0.5/10
+  // (roof, 1 m up) to 50 + 50 * 1.5/10 (ground): 52.5 to 57.5.
+  const SceneOwner scene = scene_of({make_box(AgentClass::vehicle, {12, 0, 0}, 0, {4, 2, 1})});
+  const Drawn image = draw(no_geometry(), scene, {make_view({}, 0)}, {.rig = simple_rig(), .num_threads = 1});
+  const Rgb back = rgb8(76, 201, 240) * (1 - 10.0f / 120), top = rgb8(58, 12, 163) * (1 - 12.0f / 120);
+  expect_color(image.at(50, 55), back);
+  expect_color(image.at(45, 53), back);
+  expect_color(image.at(54, 56), back);
+  expect_color(image.at(44, 55), {});
+  expect_color(image.at(55, 55), {});
+  expect_color(image.at(50, 57), back * 0.5f);
+  // Row 52: the roof reaches from 50 + 25/14 = 51.79 to 52.5, the back covers the lower half.
+  expect_color(image.at(50, 52), {0.5f * (top.r + back.r), 0.5f * (top.g + back.g), 0.5f * (top.b + back.b)});
+  const float roof_part = 52 - (50 + 25.0f / 14);
+  expect_color(image.at(50, 51), top * roof_part);
+}
+
+TEST(CpuRenderer, EachClassAndFaceHasItsColor) {
+  for (const AgentClass agent_class : {AgentClass::vehicle, AgentClass::cyclist, AgentClass::pedestrian}) {
+    const std::pair<float, BoxFace> turns[] = {
+        {0.0f, BoxFace::back}, {kPi, BoxFace::front}, {kHalfPi, BoxFace::left}, {-kHalfPi, BoxFace::right}};
+    for (const auto& [heading, face] : turns) {
+      const SceneOwner scene = scene_of({make_box(agent_class, {12, 0, 0}, heading, {4, 4, 3})});
+      const Drawn image = draw(no_geometry(), scene, {make_view({}, 0)}, {.rig = simple_rig(), .num_threads = 1});
+      expect_color(image.at(50, 52), agent_color(agent_class, face) * (1 - 10.0f / 120), 1e-4f);
+    }
+  }
+}
+
+TEST(CpuRenderer, FadesToBlackAtTheVisibleRange) {
+  float last = 1;
+  for (const float x : {5.0f, 30.0f, 60.0f, 90.0f, 119.0f}) {
+    StaticGeometry geometry;
+    WallFace wall;
+    wall.a_m = {x, -5, 0};
+    wall.b_m = {x, 5, 0};
+    wall.height_m = 5;
+    wall.color = {1, 1, 1};
+    geometry.walls.push_back(wall);
+    geometry.build_grids();
+    const Drawn image = draw(geometry, scene_of({}), {make_view({}, 0)}, {.rig = simple_rig(), .num_threads = 1});
+    EXPECT_NEAR(image.at(50, 49).r, 1 - x / 120, 1e-5) << x;
+    EXPECT_LT(image.at(50, 49).r, last);
+    last = image.at(50, 49).r;
+  }
+  const SceneOwner far = scene_of({make_box(AgentClass::vehicle, {123, 0, 0}, 0, {4, 2, 5})});
+  for (const float channel :
+       draw(no_geometry(), far, {make_view({}, 0)}, {.rig = simple_rig(), .num_threads = 1}).rgb) {
+    ASSERT_EQ(channel, 0.0f);
+  }
+}
+
+// A mark 0.3 m wide along x, from 5 to 115 m ahead, 2 m to the left.
+StaticGeometry long_mark() {
+  StaticGeometry geometry;
+  add_polyline(&geometry, {{5, 2, 0}, {115, 2, 0}}, 0.3f, StripKind::lane_mark);
+  geometry.build_grids();
+  return geometry;
+}
+
+// Sum over a row of what the mark covers of each pixel.
+double row_coverage(const Drawn& image, int y) {
+  double sum = 0;
+  for (int x = 0; x < image.width_px; ++x) sum += image.at(x, y).r;
+  return sum;
+}
+
+TEST(CpuRenderer, StripsTaperWithDepth) {
+  // Without a floor, a row shows the strip 0.3 * f / depth wide, faded by its depth.
+  const Drawn image = draw(long_mark(), scene_of({}), {make_view({}, 0)},
+                           {.rig = simple_rig(200, 200, 100), .num_threads = 1, .line_floor_px = 0});
+  for (const int y : {108, 112, 118}) {
+    const double depth = 100 * 1.5 / (y + 0.5 - 100);
+    // Brightness is that of a piece of 10 m: within 5 m of the depth there.
+    const double expected = 0.3 * 100 / depth * kWhiteMarkColor.r;
+    EXPECT_NEAR(row_coverage(image, y), expected * (1 - depth / 120), expected * 6.0 / 120) << y;
+  }
+}
+
+TEST(CpuRenderer, TheFloorKeepsFarStripsVisible) {
+  const StaticGeometry geometry = long_mark();
+  auto far_row = [&](float floor_px) {
+    return row_coverage(draw(geometry, scene_of({}), {make_view({}, 0)},
+                             {.rig = simple_rig(100, 100), .num_threads = 1, .line_floor_px = floor_px}),
+                        51);
+  };
+  EXPECT_GT(far_row(0.35f), 1.3 * far_row(0));
+  EXPECT_GT(far_row(0.7f), 1.3 * far_row(0.35f));
+}
+
+TEST(CpuRenderer, TheFloorIsMeasuredAcrossTheStripOnScreen) {
+  // A mark across the view 40 m ahead, 0.3 m wide: 50 * 1.5 * 0.3 / 1600 = 0.014 px high. The floor makes it 0.35.
+  StaticGeometry geometry;
+  add_polyline(&geometry, {{40, 9, 0}, {40, -1, 0}}, 0.3f, StripKind::stop_line);
+  geometry.build_grids();
+  const Drawn image = draw(geometry, scene_of({}), {make_view({}, 0)}, {.rig = simple_rig(), .num_threads = 1});
+  const float covered = (image.at(45, 51).b + image.at(45, 52).b) / (kStopLineColor.b * (1 - 40.0f / 120));
+  EXPECT_NEAR(covered, 0.35f, 1e-3);
+}
+
+TEST(CpuRenderer, LightsShowTheirStateToThoseInFrontAlone) {
+  StaticGeometry geometry = no_geometry();
+  LightHead head;
+  head.position_m = {20, 0, 1.5f};
+  head.facing = {-1, 0};
+  head.signal = 1;
+  geometry.heads.push_back(head);
+  geometry.num_signals = 2;
+  auto center = [&](LightState state, Vec3 eye, float heading) {
+    SceneOwner scene;
+    scene.light_states = {LightState::green, state};
+    scene.end_world(0);
+    return draw(geometry, scene, {make_view(eye, heading)}, {.rig = simple_rig(100, 100, 150), .num_threads = 1})
+        .at(50, 50);
+  };
+  const float fade = 1 - 20.0f / 120;
+  expect_color(center(LightState::red, {0, 0, 0}, 0), rgb8(255, 0, 0) * fade, 1e-4f);
+  expect_color(center(LightState::yellow, {0, 0, 0}, 0), rgb8(255, 200, 0) * fade, 1e-4f);
+  expect_color(center(LightState::off, {0, 0, 0}, 0), {});
+  expect_color(center(LightState::red, {40, 0, 0}, kPi), {});                          // from behind
+  EXPECT_GT(center(LightState::red, {10.5f, 16, 0}, atan2_of(-16, 9.5f)).r, 0.5f);     // 59 degrees off
+  EXPECT_EQ(center(LightState::red, {11.0f, 16.5f, 0}, atan2_of(-16.5f, 9)).r, 0.0f);  // 61 degrees off
+  // Area of the disk: a circle of 0.5 m at 20 m is 3.75 px in radius.
+  SceneOwner scene;
+  scene.light_states = {LightState::off, LightState::red};
+  scene.end_world(0);
+  const Drawn image = draw(geometry, scene, {make_view({}, 0)}, {.rig = simple_rig(100, 100, 150), .num_threads = 1});
+  double area = 0;
+  for (int y = 0; y < 100; ++y) area += row_coverage(image, y);
+  EXPECT_NEAR(area / fade, kPi * 3.75 * 3.75, 1e-3);
+}
+
+TEST(CpuRenderer, AWallInFrontHidesAnAgentToTheLastBit) {
+  StaticGeometry geometry;
+  WallFace wall;
+  wall.a_m = {10, -8, 0};
+  wall.b_m = {10, 8, 0};
+  wall.height_m = 6;
+  geometry.walls.push_back(wall);
+  add_polyline(&geometry, {{2, -1, 0}, {60, -2, 0}}, 0.2f, StripKind::lane_mark);
+  geometry.build_grids();
+  const AgentBox near = make_box(AgentClass::cyclist, {7, 1, 0}, 0.4f, {1.8f, 0.6f, 1.7f});
+  const AgentBox hidden = make_box(AgentClass::vehicle, {20, 2, 0}, 0.4f, {4, 2, 2});
+  const std::vector<View> views{make_view({}, 0.05f)};
+  const RendererConfig config{.rig = paper_rig(97, 55), .num_threads = 1};
+  EXPECT_EQ(draw(geometry, scene_of({near, hidden}), views, config).rgb,
+            draw(geometry, scene_of({near}), views, config).rgb);
+  // ... and without the wall it shows.
+  const StaticGeometry open = no_geometry();
+  EXPECT_NE(draw(open, scene_of({near, hidden}), views, config).rgb, draw(open, scene_of({near}), views, config).rgb);
+}
+
+TEST(CpuRenderer, EgoHiddenAndUndrawnAgentsAreLeftOut) {
+  std::vector<AgentBox> boxes{make_box(AgentClass::vehicle, {0, 0, 0}, 0, {4.5f, 2, 1.5f}),
+                              make_box(AgentClass::vehicle, {10, 0, 0}, 0, {4, 2, 1.5f}),
+                              make_box(AgentClass::pedestrian, {8, 3, 0}, 0, {0.6f, 0.6f, 1.7f})};
+  SceneOwner scene = scene_of(boxes);
+  scene.hidden_agents = {2, 1};
+  View view = make_view({}, 0);
+  view.ego_agent = 0;
+  View without = view;
+  without.hidden_begin = 1;
+  without.hidden_end = 2;
+  const RendererConfig config{.rig = simple_rig(), .num_threads = 1};
+  const Drawn images = draw(no_geometry(), scene, {view, without}, config);
+  EXPECT_GT(images.at(50, 55, 0).b, 0.5f);
+  EXPECT_EQ(images.at(50, 55, 1).b, 0.0f);
+  EXPECT_GT(images.at(29, 52, 1).g, 0.5f);
+  scene.agents[2].drawn = 0;
+  EXPECT_EQ(draw(no_geometry(), scene, {without}, config).at(29, 52).g, 0.0f);
+}
+
+TEST(CpuRenderer, ImagesDoNotDependOnTheNumberOfThreads) {
+  const SyntheticTown town = make_synthetic_town(3, 60);
+  std::vector<float> first;
+  for (const int threads : {1, 2, 7}) {
+    const Drawn images =
+        draw(town.geometry, town.scene, town.views, {.rig = paper_rig(48, 27), .num_threads = threads});
+    if (first.empty()) first = images.rgb;
+    EXPECT_EQ(images.rgb, first) << threads;
+  }
+}
+
+void expect_close(const std::vector<float>& a, const std::vector<float>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  std::size_t far = 0;
+  double worst = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double error = std::abs(static_cast<double>(a[i]) - b[i]);
+    worst = std::max(worst, error);
+    far += error > 1.0 / 255;
+  }
+  EXPECT_LE(worst, kMovedSceneError);
+  EXPECT_LE(static_cast<double>(far), kMovedSceneShare * static_cast<double>(a.size()));
+}
+
+// The town moved by a rotation about z, a shift, or a mirroring of y.
+SyntheticTown moved(const SyntheticTown& town, float turn_rad, Vec3 shift_m, bool mirror) {
+  const SinCos sc = sincos_of(turn_rad);
+  auto direction = [&](Vec2 v) {
+    if (mirror) v.y = -v.y;
+    return Vec2{v.x * sc.cos - v.y * sc.sin, v.x * sc.sin + v.y * sc.cos};
+  };
+  auto place = [&](Vec3 p) {
+    const Vec2 turned = direction(p.xy());
+    return Vec3{turned.x, turned.y, p.z} + shift_m;
+  };
+  SyntheticTown out = town;
+  for (Strip& strip : out.geometry.strips) {
+    strip.a_m = place(strip.a_m);
+    strip.b_m = place(strip.b_m);
+    strip.side_a = direction(strip.side_a);
+    strip.side_b = direction(strip.side_b);
+  }
+  for (WallFace& wall : out.geometry.walls) {
+    wall.a_m = place(wall.a_m);
+    wall.b_m = place(wall.b_m);
+  }
+  for (LightHead& head : out.geometry.heads) {
+    head.position_m = place(head.position_m);
+    head.facing = direction(head.facing);
+  }
+  out.geometry.build_grids();
+  for (AgentBox& box : out.scene.agents) {
+    box.center_m = place(box.center_m);
+    const Vec2 heading = direction({box.cos_heading, box.sin_heading});
+    box.cos_heading = heading.x;
+    box.sin_heading = heading.y;
+  }
+  for (View& view : out.views) {
+    view.origin_m = place(view.origin_m);
+    const Vec2 heading = direction({view.cos_heading, view.sin_heading});
+    view.cos_heading = heading.x;
+    view.sin_heading = heading.y;
+  }
+  return out;
+}
+
+TEST(CpuRenderer, MovingTheWorldChangesNothing) {
+  SyntheticTown town = make_synthetic_town(4, 80);
+  town.views.resize(6);
+  const RendererConfig config{.rig = paper_rig(), .num_threads = 1};
+  const std::vector<float> here = draw(town.geometry, town.scene, town.views, config).rgb;
+  const SyntheticTown shifted = moved(town, 0, {256, -512, 32}, false);
+  expect_close(draw(shifted.geometry, shifted.scene, shifted.views, config).rgb, here);
+  const SyntheticTown turned = moved(town, 1.1f, {}, false);
+  expect_close(draw(turned.geometry, turned.scene, turned.views, config).rgb, here);
+}
+
+TEST(CpuRenderer, AMirroredWorldGivesMirroredImages) {
+  SyntheticTown town = make_synthetic_town(6, 80);
+  // Faces to the left and right differ in colour; walls and marks do not.
+  town.scene = scene_of({});
+  town.scene.light_begin = {0, 0};
+  town.views.resize(4);
+  for (View& view : town.views) view.ego_agent = -1;
+  RendererConfig config{.rig = simple_rig(96, 54, 77), .num_threads = 1};
+  const Drawn here = draw(town.geometry, town.scene, town.views, config);
+  const SyntheticTown mirrored = moved(town, 0, {}, true);
+  Drawn there = draw(mirrored.geometry, mirrored.scene, mirrored.views, config);
+  for (std::size_t row = 0; row < there.rgb.size() / 96; ++row) {
+    std::reverse(there.rgb.begin() + static_cast<std::ptrdiff_t>(96 * row),
+                 there.rgb.begin() + static_cast<std::ptrdiff_t>(96 * (row + 1)));
+  }
+  // Samples are not mirrored, so pixels that several things share differ by the oracle's own error.
+  double worst = 0;
+  for (std::size_t i = 0; i < there.rgb.size(); ++i) {
+    worst = std::max(worst, std::abs(static_cast<double>(there.rgb[i]) - here.rgb[i]));
+  }
+  EXPECT_LE(worst, kWorstOracleError);
+}
+
+TEST(CpuRenderer, ShortBodiesCarryTheirCamerasOverThemselves) {
+  Rig rig = simple_rig();
+  rig.cameras[0].position_m.x = 1.6f;
+  const SceneOwner scene = scene_of({make_box(AgentClass::vehicle, {12, 0, 0}, 0, {4, 2, 1})});
+  View person = make_view({}, 0);
+  person.body_length_m = 0.45f;  // the camera is 0.16 m ahead
+  const Drawn one = draw(no_geometry(), scene, {person}, {.rig = rig, .num_threads = 1});
+  rig.cameras[0].position_m.x = 0.16f;
+  const Drawn other = draw(no_geometry(), scene, {make_view({}, 0)}, {.rig = rig, .num_threads = 1});
+  for (std::size_t i = 0; i < one.rgb.size(); ++i) ASSERT_NEAR(one.rgb[i], other.rgb[i], 1e-5);
+}
+
+TEST(CpuRenderer, DrawsSizesFromOnePixelAndRigsOfMixedSizes) {
+  SyntheticTown town = make_synthetic_town(7, 40);
+  town.views.resize(3);
+  Rig rig = paper_rig(1, 1);
+  rig.cameras[1] = paper_rig(97, 55).cameras[1];
+  rig.cameras[2] = paper_rig(20, 200).cameras[2];
+  const auto renderer = make_renderer("cpu", {.rig = rig, .num_threads = 2});
+  renderer->upload(town.geometry);
+  HostImages images(rig, 3);
+  for (uint8_t& byte : images.bytes()) byte = 0xAA;
+  renderer->render(town.scene.batch(), town.views, images.batch());
+  // The same cameras alone give the same images.
+  for (int k = 0; k < 4; ++k) {
+    Rig alone;
+    alone.cameras = {rig.cameras[static_cast<std::size_t>(k)]};
+    const auto single = make_renderer("cpu", {.rig = alone, .num_threads = 1});
+    single->upload(town.geometry);
+    HostImages expected(alone, 3);
+    single->render(town.scene.batch(), town.views, expected.batch());
+    for (int view = 0; view < 3; ++view) EXPECT_EQ(images.interleaved(view, k), expected.interleaved(view, 0)) << k;
+  }
+}
+
+TEST(CpuRenderer, LargeImagesAreDrawnInBandsWithoutSeams) {
+  // A wall with a slanted top over 300 rows: every row's coverage follows the line.
+  const SceneOwner scene = scene_of({make_box(AgentClass::vehicle, {6, 0, 0}, 0.5f, {4, 2, 1.6f})});
+  const Drawn large =
+      draw(no_geometry(), scene, {make_view({}, 0)}, {.rig = simple_rig(600, 600, 300), .num_threads = 1});
+  const Drawn small = draw(no_geometry(), scene, {make_view({}, 0)}, {.rig = simple_rig(100, 100), .num_threads = 1});
+  for (int y = 0; y < 100; ++y) {
+    for (int x = 0; x < 100; ++x) {
+      Rgb mean;
+      for (int j = 0; j < 6; ++j) {
+        for (int i = 0; i < 6; ++i) {
+          const Rgb fine = large.at(6 * x + i, 6 * y + j);
+          mean = {mean.r + fine.r / 36, mean.g + fine.g / 36, mean.b + fine.b / 36};
+        }
+      }
+      expect_color(small.at(x, y), mean, 1e-3f);
+    }
+  }
+}
+
+TEST(CpuRenderer, PlanesTellDepthClassAndInstance) {
+  StaticGeometry geometry;
+  WallFace wall;
+  wall.a_m = {30, -40, 0};
+  wall.b_m = {30, 40, 0};
+  wall.height_m = 4;
+  geometry.walls.push_back(wall);
+  add_polyline(&geometry, {{5, 5, 0}, {5, -5, 0}}, 1.0f, StripKind::stop_line);
+  geometry.build_grids();
+  const SceneOwner scene = scene_of({make_box(AgentClass::vehicle, {50, 0, 0}, 0, {4, 2, 1}),
+                                     make_box(AgentClass::pedestrian, {10, 0, 0}, 0, {0.6f, 0.6f, 1.8f})});
+  const RendererConfig config{.rig = simple_rig(), .num_threads = 1};
+  const auto renderer = make_renderer("cpu", config);
+  renderer->upload(geometry);
+  HostImages images(config.rig, 1);
+  CameraImages out = images.camera(0);
+  std::vector<float> depth(10000);
+  std::vector<uint8_t> classes(10000);
+  std::vector<uint16_t> instances(10000);
+  out.depth_m = depth.data();
+  out.class_id = classes.data();
+  out.instance_id = instances.data();
+  const std::vector<CameraImages> cameras{out};
+  const std::vector<View> views{make_view({}, 0)};
+  renderer->render(scene.batch(), views, {MemorySpace::host, PixelFormat::u8, 1, cameras});
+  auto check = [&](int x, int y, double depth_m, int class_id, int instance) {
+    const auto i = static_cast<std::size_t>(100 * y + x);
+    if (std::isinf(depth_m)) {
+      EXPECT_EQ(depth[i], std::numeric_limits<float>::infinity());
+    } else {
+      EXPECT_NEAR(depth[i], depth_m, 1e-3);
+    }
+    EXPECT_EQ(classes[i], class_id);
+    EXPECT_EQ(instances[i], instance);
+  };
+  check(50, 5, std::numeric_limits<double>::infinity(), 0, 0);
+  check(50, 52, 9.7, 3, 2);
+  check(30, 51, 30, 4, 0);
+  // The ground at row 64 is 50 * 1.5 / 14.5 m away; stop lines are the last kind of strip.
+  check(50, 64, 50 * 1.5 / 14.5, kClassOfStrip + 3, 0);
+}
+
+TEST(CpuRenderer, VisibilityIsTheShareThatIsSeen) {
+  // A pillar of 1 m before the right half of a car's back; the same car beside it; one out of sight.
+  StaticGeometry geometry;
+  WallFace wall;
+  wall.a_m = {10, 0, 0};
+  wall.b_m = {10, -8, 0};
+  wall.height_m = 8;
+  geometry.walls.push_back(wall);
+  geometry.build_grids();
+  const SceneOwner scene = scene_of({make_box(AgentClass::vehicle, {22, 0, 0}, 0, {4, 2, 1.5f}),
+                                     make_box(AgentClass::vehicle, {22, 6, 0}, 0, {4, 2, 1.5f}),
+                                     make_box(AgentClass::vehicle, {22, -6, 0}, 0, {4, 2, 1.5f}),
+                                     make_box(AgentClass::vehicle, {-20, 0, 0}, 0, {4, 2, 1.5f})});
+  const auto renderer = make_renderer("cpu", {.rig = simple_rig(), .num_threads = 2});
+  renderer->upload(geometry);
+  const std::vector<View> views{make_view({}, 0)};
+  const std::vector<VisibilityQuery> queries{{0, 0}, {0, 1}, {0, 2}, {0, 3}};
+  std::vector<float> visibility(4);
+  renderer->visibility(scene.batch(), views, queries, visibility);
+  EXPECT_NEAR(visibility[0], 0.5, 1e-4);
+  EXPECT_NEAR(visibility[1], 1.0, 1e-6);
+  EXPECT_EQ(visibility[2], 0.0f);
+  EXPECT_TRUE(std::isnan(visibility[3]));
+}
+
+class CpuRendererErrors : public testing::Test {
+ protected:
+  void SetUp() override {
+    renderer_ = make_renderer("cpu", {.rig = paper_rig(8, 8), .num_threads = 1});
+    handle_ = renderer_->upload(no_geometry());
+    scene_ = scene_of({make_box(AgentClass::vehicle, {5, 0, 0}, 0, {4, 2, 1})});
+    views_ = {make_view({}, 0)};
+  }
+  void expect_error(const char* what) {
+    try {
+      renderer_->render(scene_.batch(), views_, images_.batch());
+      ADD_FAILURE() << "expected an error about " << what;
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), HasSubstr(what));
+    }
+  }
+  std::unique_ptr<Renderer> renderer_;
+  GeometryHandle handle_ = -1;
+  SceneOwner scene_;
+  std::vector<View> views_;
+  HostImages images_{paper_rig(8, 8), 1};
+};
+
+TEST_F(CpuRendererErrors, GoodInputIsFine) {
+  EXPECT_EQ(handle_, 0);
+  EXPECT_NO_THROW(renderer_->render(scene_.batch(), views_, images_.batch()));
+  HostImages none(paper_rig(8, 8), 0);
+  EXPECT_NO_THROW(renderer_->render({}, {}, none.batch()));
+}
+TEST_F(CpuRendererErrors, ImagesOfAnotherSpaceSizeOrNumber) {
+  ImageBatch images = images_.batch();
+  images.space = MemorySpace::cuda;
+  EXPECT_THROW(renderer_->render(scene_.batch(), views_, images), Error);
+  images = images_.batch();
+  images.format = PixelFormat::f16;
+  EXPECT_THROW(renderer_->render(scene_.batch(), views_, images), Error);
+  images_ = HostImages(paper_rig(8, 9), 1);
+  expect_error("8x9");
+  images_ = HostImages(paper_rig(8, 8), 2);
+  expect_error("1 views");
+  Rig three = paper_rig(8, 8);
+  three.cameras.pop_back();
+  images_ = HostImages(three, 1);
+  expect_error("4 cameras");
+}
+TEST_F(CpuRendererErrors, ScenesInDeviceMemory) {
+  SceneBatch scene = scene_.batch();
+  scene.space = MemorySpace::cuda;
+  EXPECT_THROW(renderer_->render(scene, views_, images_.batch()), Error);
+}
+TEST_F(CpuRendererErrors, HandlesAndIndicesOutOfRange) {
+  views_[0].world = 1;
+  expect_error("world below 1");
+  views_[0] = make_view({}, 0);
+  views_[0].ego_agent = 1;
+  expect_error("ego below 1");
+  views_[0] = make_view({}, 0);
+  views_[0].hidden_end = 3;
+  expect_error("hidden agents");
+  views_[0] = make_view({}, 0);
+  scene_.geometry[0] = 4;
+  expect_error("geometry handle below 1, got 4");
+  scene_.geometry[0] = 0;
+  scene_.world_begin = {0, 2};
+  expect_error("world_begin");
+}
+TEST_F(CpuRendererErrors, PosesThatAreNotNumbers) {
+  views_[0].origin_m.y = std::numeric_limits<float>::quiet_NaN();
+  expect_error("finite pose");
+  views_[0] = make_view({}, 0);
+  views_[0].cos_heading = 0;
+  expect_error("finite pose");
+  views_[0] = make_view({}, 0);
+  scene_.agents[0].center_m.x = std::numeric_limits<float>::infinity();
+  expect_error("agent 0");
+  scene_.agents[0].drawn = 0;  // an undrawn agent may be anywhere
+  EXPECT_NO_THROW(renderer_->render(scene_.batch(), views_, images_.batch()));
+}
+TEST_F(CpuRendererErrors, QueriesAndGeometryAndConfig) {
+  const std::vector<VisibilityQuery> queries{{0, 7}};
+  std::vector<float> visibility(1);
+  EXPECT_THROW(renderer_->visibility(scene_.batch(), views_, queries, visibility), Error);
+  StaticGeometry geometry = no_geometry();
+  geometry.heads.push_back({});
+  EXPECT_THROW(renderer_->upload(geometry), Error);
+  geometry = no_geometry();
+  geometry.strips.push_back({});
+  geometry.strips[0].a_m.z = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THROW(renderer_->upload(geometry), Error);
+  EXPECT_THROW(make_renderer("cpu", {.rig = paper_rig(8, 8), .line_floor_px = -1}), Error);
+  EXPECT_THROW(make_renderer("cpu", {.rig = {}}), Error);
+}
+
+}  // namespace
+}  // namespace pictura

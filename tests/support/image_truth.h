@@ -1,0 +1,42 @@
+// The truth that renderers are measured against: a small ray caster in double precision. Every pixel is the box filter
+// of the nearest drawn primitive, by point samples. It shares the colours, the brightness and the widths of strips with
+// the renderers, and neither their projection nor their coverage nor their order.
+#pragma once
+
+#include <vector>
+
+#include "pictura/common/renderer.h"
+
+namespace pictura {
+
+struct TruthImage {
+  int width_px = 0, height_px = 0;
+  std::vector<float> rgb;  // [3, height, width] in [0, 1]
+  bool blank() const;
+};
+
+enum class TruthSamples {
+  low_discrepancy_1024,  // the truth
+  grid_2x2,              // what 2x2 supersampling of a z-buffer shows
+};
+
+/// One camera's image of one view of a host scene with one geometry for all worlds.
+TruthImage trace_image(const StaticGeometry& geometry, const SceneBatch& scene, const View& view, const Camera& camera,
+                       float line_floor_px, TruthSamples samples = TruthSamples::low_discrepancy_1024);
+
+/// Pools the squared error of many images; channels in [0, 1].
+class PooledError {
+ public:
+  void add(const std::vector<float>& image, const std::vector<float>& truth);
+  double psnr_db() const;
+  double max_error() const { return max_error_; }
+  /// Share of channel values that are further than this from the truth.
+  double share_above(double error) const;
+
+ private:
+  double squared_ = 0, max_error_ = 0;
+  std::size_t count_ = 0;
+  std::vector<std::size_t> histogram_ = std::vector<std::size_t>(1025);  // of |error| in steps of 1/1024
+};
+
+}  // namespace pictura

@@ -1,0 +1,27 @@
+// How far apart images may be, each with its reason. Channel values are in [0, 1].
+#pragma once
+
+namespace pictura {
+
+/// Least pooled PSNR of the oracle against the truth. The design's promise; 61 dB is what town-like scenes measure, and
+/// the truth's own error with 1,024 samples a pixel is about 68 dB.
+constexpr double kLeastOraclePsnr_db = 55.0;
+/// 2x2 supersampling, the bar that the paper compares with, must stay this far behind.
+constexpr double kOracleGain_db = 20.0;
+/// Worst channel of the oracle on a lone cuboid before a wall: where three faces meet, visibility is known to 1/64 of a
+/// pixel. Coverage taken for alpha errs by up to 64/255 there.
+constexpr double kSharedEdgeError = 1.0 / 64;
+/// Worst channel anywhere in the quality scenes: several partly covered things share a pixel, and visibility is known
+/// to 1/64 of each.
+constexpr double kWorstOracleError = 16.0 / 255;
+/// A scene moved as a whole: single precision moves corners by about 1e-5 px for each 100 m from the origin; a sample
+/// may fall to the other side of an edge, worth up to 1/64 of a pixel twice.
+constexpr double kMovedSceneError = 8.0 / 255;
+/// ... and only few values may change that much; the others by rounding.
+constexpr double kMovedSceneShare = 1e-3;
+/// The CUDA renderer against the oracle: the design's promise. Aim: 0.
+constexpr double kKernelError = 1.0 / 255;
+constexpr double kKernelShareWithin = 0.9999;
+constexpr double kKernelWorstError = 4.0 / 255;
+
+}  // namespace pictura
