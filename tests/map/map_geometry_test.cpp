@@ -102,10 +102,12 @@ TEST_P(Walls, StandOnNoLaneAndHaveTheRoadOnTheirRight) {
         for (const Vec2 place : {line.a_m.xy(), middle, line.b_m.xy()}) {
           const float clear_m = length(point.position_m.xy() - place) - 0.5f * point.width_m;
           ASSERT_GT(clear_m, 0.3f) << "at " << place.x << ", " << place.y;
-          if (clear_m >= nearest_m) continue;
-          nearest_m = clear_m;
-          on_right = cross(along, point.position_m.xy() - place) < 0;
         }
+        // The road wraps round the corners of a block: its side is judged from the middle.
+        const float clear_m = length(point.position_m.xy() - middle) - 0.5f * point.width_m;
+        if (clear_m >= nearest_m) continue;
+        nearest_m = clear_m;
+        on_right = cross(along, point.position_m.xy() - middle) < 0;
       }
     }
     EXPECT_TRUE(on_right) << "at " << middle.x << ", " << middle.y;
