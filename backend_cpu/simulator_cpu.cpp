@@ -120,6 +120,13 @@ class SimulatorCpu final : public Simulator {
     report.asked = batch_.num_slots();
     for (const int32_t spawned : batch_.spawned) report.spawned += spawned;
     report.refused = report.asked - report.spawned;
+    report.parked_asked = int64_t{batch_.num_worlds()} * batch_.config.parked_cars;
+    for (int w = 0; w < batch_.num_worlds(); ++w) {
+      const auto index = static_cast<size_t>(w);
+      const auto begin = batch_.boxes.begin() + batch_.box_begin[index] + batch_.worlds[index].num_agents;
+      report.parked_placed += std::count_if(begin, batch_.boxes.begin() + batch_.box_begin[index + 1],
+                                            [](const AgentBox& box) { return box.drawn != 0; });
+    }
     return report;
   }
   const SimulatorTotals& totals() const override { return totals_; }
@@ -180,6 +187,7 @@ class SimulatorCpu final : public Simulator {
                           world.options.dt_s, world.seed, world.global_world, world.episode);
       world.lights[light] = light_state(world.light_plans[light], 0);
     }
+    for (int car = 0; car < world.num_boxes - world.num_agents; ++car) place_parked_car(world, car);
     int spawned = 0;
     for (int agent = 0; agent < world.num_agents; ++agent) {
       draw_agent(world, agent);

@@ -75,6 +75,7 @@ struct SimulatorTotals {
 /// What became of the agents that were asked for, per world, in the current episode.
 struct SpawnReport {
   int64_t asked = 0, spawned = 0, refused = 0;  // asked == spawned + refused
+  int64_t parked_asked = 0, parked_placed = 0;
 };
 
 class Simulator {
@@ -114,7 +115,7 @@ class Simulator {
   /// Steps done in the current episode of each world, and the number of that episode.
   virtual Span<const int32_t> episode_step() const = 0;
   virtual Span<const int32_t> episode_index() const = 0;
-  /// Over every field of the state and the light states, in documented order; equal on every executor.
+  /// Over every field of the state, the light states and the parked cars, in documented order; equal on every executor.
   virtual uint64_t state_hash() const = 0;
 
   /// The whole state as bytes, for exact resume, and back. Throws Error when the bytes are of another configuration.

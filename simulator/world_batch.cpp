@@ -33,8 +33,6 @@ void check(const SimulatorConfig& config) {
   PICTURA_CHECK(config.pedestrian_fraction == 0,
                 "simulator: pedestrian_fraction: this version has no pedestrians yet, got {}",
                 config.pedestrian_fraction);
-  PICTURA_CHECK(config.parked_cars == 0, "simulator: parked_cars: this version has no parked cars yet, got {}",
-                config.parked_cars);
   for (int i = 0; i < kNumConditioning; ++i) {
     const ConditioningRange& range = config.conditioning[static_cast<size_t>(i)];
     const bool is_positive = i == static_cast<int>(Conditioning::delta_goal_m) || i >= kNumRewardConditioning;
@@ -177,6 +175,10 @@ uint64_t WorldBatch::state_hash() const {
   Hash64 hash;
   agents.add_to(&hash);
   hash.add(Span<const LightState>(lights));
+  for (size_t w = 0; w < worlds.size(); ++w) {
+    const int first_parked = box_begin[w] + worlds[w].num_agents;
+    hash.add(Span<const AgentBox>(boxes.data() + first_parked, static_cast<size_t>(box_begin[w + 1] - first_parked)));
+  }
   return hash.value();
 }
 

@@ -152,6 +152,55 @@ void add_stop_lines(const RoadMap& map, WorldMap* out) {
   }
 }
 
+/// The spot outside the kerb nearest to p, if that is within reach_m. Right-hand traffic: the kerb is to the right of
+/// the cars beside it, and a road edge has the road on its own right, so the cars point against it.
+void add_kerb_spot(Vec3 p, float reach_m, WorldMap* out) {
+  const Barrier* nearest = nullptr;
+  float best_m = reach_m;
+  for (const Barrier& edge : out->edges) {
+    if (std::fabs(edge.z_m - p.z) >= kLevel_m) continue;
+    const float distance = distance_to_segment(p.xy(), edge.a_m, edge.b_m);
+    if (distance >= best_m) continue;
+    best_m = distance;
+    nearest = &edge;
+  }
+  if (!nearest) return;
+  const Vec2 way = nearest->b_m - nearest->a_m;
+  const float way_m = length(way);
+  if (!(way_m > 0)) return;
+  const Vec2 along = way * (1.0f / way_m);
+  const Vec2 at = nearest->a_m + along * std::clamp(dot(p.xy() - nearest->a_m, along), 0.0f, way_m);
+  out->parking_spots.push_back({{at.x, at.y, p.z}, std::atan2(-along.y, -along.x), left_normal(along)});
+}
+
+/// Parking spaces, and outside junctions a spot every few metres of parking lanes and of the kerbs beside shoulders and
+/// sidewalks.
+void add_parking_spots(const RoadMap& map, WorldMap* out) {
+  constexpr float kSpacing_m = 7.0f;
+  for (const ParkingSpace& space : map.parking_spaces) {
+    out->parking_spots.push_back({space.center_m, space.heading_rad, {}});
+  }
+  for (const Lane& lane : map.lanes) {
+    const bool is_kerb = lane.type == LaneType::shoulder || lane.type == LaneType::sidewalk;
+    if (lane.in_junction || (!is_kerb && lane.type != LaneType::parking)) continue;
+    const Span<const LanePoint> points = map.points_of(lane);
+    float next_s = 0.5f * kSpacing_m;
+    for (size_t i = 0; i + 1 < points.size(); ++i) {
+      const LanePoint& a = points[i];
+      const LanePoint& b = points[i + 1];
+      for (; next_s < b.s_m; next_s += kSpacing_m) {
+        const float fraction = std::clamp((next_s - a.s_m) / (b.s_m - a.s_m), 0.0f, 1.0f);
+        const Vec3 at = a.position_m + (b.position_m - a.position_m) * fraction;
+        if (is_kerb) {
+          add_kerb_spot(at, 0.5f * a.width_m + 1.0f, out);
+        } else {
+          out->parking_spots.push_back({at, a.heading_rad, {}});
+        }
+      }
+    }
+  }
+}
+
 template <typename Item, typename ToBox>
 Grid cells_of(const std::vector<Item>& items, ToBox&& to_box) {
   std::vector<Aabb2> boxes;
@@ -283,6 +332,7 @@ WorldMap make_world_map(const RoadMap& map, Span<const WallFace> walls) {
   PICTURA_CHECK(!out.segments.empty(), "map {}: expected at least one drivable lane, got none", map.name);
   add_barriers(map, walls, &out);
   add_stop_lines(map, &out);
+  add_parking_spots(map, &out);
 
   out.low_m = out.high_m = out.segments.front().a_m.xy();
   for (const LaneSegment& segment : out.segments) {
@@ -322,6 +372,7 @@ MapView WorldMap::view() const {
   view.stop_lines = stop_lines;
   view.spawn_lanes = spawn_lanes;
   view.spawn_end_m = spawn_end_m;
+  view.parking_spots = parking_spots;
   view.lane_pieces = lane_pieces;
   view.boundary_pieces = boundary_pieces;
   view.segment_cells = segment_cells.view();

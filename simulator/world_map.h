@@ -30,6 +30,7 @@ struct WorldMap {
   std::vector<StopLine> stop_lines;  // of RoadMap::lights, in its order
   std::vector<int32_t> spawn_lanes;
   std::vector<float> spawn_end_m;
+  std::vector<ParkingSpot> parking_spots;
   std::vector<ObservedPiece> lane_pieces, boundary_pieces;
   Grid segment_cells, edge_cells, wall_cells, stop_line_cells;
   CellLists near_lane_pieces, near_boundary_pieces, near_stop_lines;

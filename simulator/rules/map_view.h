@@ -55,6 +55,13 @@ struct StopLine {
   int32_t junction = -1, phase = 0, num_phases = 1;
 };
 
+/// Where a car may be parked: on the spot, or outside a kerb that runs through it.
+struct ParkingSpot {
+  Vec3 position_m;
+  float heading_rad = 0;
+  Vec2 outward;  // unit vector away from the road; null on parking lanes and spaces
+};
+
 /// A lane or boundary as the policy sees it: at most kMaxPiece_m long.
 struct ObservedPiece {
   Vec3 middle_m;
@@ -71,6 +78,7 @@ struct MapView {
   Span<const StopLine> stop_lines;
   Span<const int32_t> spawn_lanes;
   Span<const float> spawn_end_m;  // [spawn_lanes] running sum of their lengths
+  Span<const ParkingSpot> parking_spots;
   Span<const ObservedPiece> lane_pieces, boundary_pieces;
   GridView segment_cells, edge_cells, wall_cells, stop_line_cells;
   GridView near_lane_pieces, near_boundary_pieces;  // per cell and sector

@@ -88,24 +88,62 @@ PICTURA_HD inline RoutePoint draw_spawn_point(const MapView& map, RandomStream* 
   return {map.spawn_lanes[low], at_m - begin_m};
 }
 
-/// Whether a box may be put there: on its lane's surface, clear of barriers and of the boxes [0, num_others).
-PICTURA_HD inline bool has_room(const WorldView& world, const AgentBox& box, int num_others) {
+/// Whether a box keeps kSpawnClearance_m from the boxes [begin, end).
+PICTURA_HD inline bool is_clear(const WorldView& world, const AgentBox& box, int begin, int end) {
   AgentBox inflated = box;
   inflated.length_m += 2.0f * kSpawnClearance_m;
   inflated.width_m += 2.0f * kSpawnClearance_m;
-  for (int i = 0; i < num_others; ++i) {
+  for (int i = begin; i < end; ++i) {
     const AgentBox& other = world.boxes[i];
     const Vec2 apart = (other.center_m - box.center_m).xy();
     if (!other.drawn || dot(apart, apart) > square(radius(inflated) + kMaxBoxRadius_m)) continue;
     if (same_level(inflated, other) && overlap(footprint(inflated), footprint(other))) return false;
   }
-  return !touches_any(footprint(box), box.center_m.z, world.map.edges, world.map.edge_cells) &&
-         !touches_any(footprint(box), box.center_m.z, world.map.walls, world.map.wall_cells) &&
-         is_on_road(world.map, box.center_m.xy(), box.center_m.z);
+  return true;
 }
 
-/// Puts the agent on a lane, standing still along it, clear of the agents before it; it stays absent when kSpawnTries
-/// places were taken. Returns whether it was placed.
+PICTURA_HD inline bool touches_barrier(const MapView& map, const AgentBox& box) {
+  return touches_any(footprint(box), box.center_m.z, map.edges, map.edge_cells) ||
+         touches_any(footprint(box), box.center_m.z, map.walls, map.wall_cells);
+}
+
+/// Parks car `car` of the world, clear of the parked ones before it: on a parking lane or space, or outside a kerb and
+/// off the road. It is not drawn, and nobody meets it, when kSpawnTries places were taken.
+PICTURA_HD inline bool place_parked_car(const WorldView& world, int car) {
+  constexpr float kKerbGap_m = 0.2f;
+  const MapView& map = world.map;
+  const int index = world.num_agents + car;
+  const ClassLimits limits = class_limits(AgentClass::vehicle);
+  RandomStream random = agent_stream(world, car, 0, Purpose::parked_cars);
+  AgentBox box;
+  box.length_m = random.uniform(limits.min_length_m, limits.max_length_m);
+  box.width_m = random.uniform(limits.min_width_m, limits.max_width_m);
+  box.height_m = limits.height_m;
+  box.palette = 2;
+  for (int i = 0; i < kSpawnTries && !map.parking_spots.empty(); ++i) {
+    const ParkingSpot& spot =
+        map.parking_spots[static_cast<size_t>(random.below(static_cast<int>(map.parking_spots.size())))];
+    const Vec2 center = spot.position_m.xy() + spot.outward * (kKerbGap_m + 0.5f * box.width_m);
+    const SinCos heading = sincos_of(spot.heading_rad);
+    box.center_m = {center.x, center.y, spot.position_m.z};
+    box.cos_heading = heading.cos;
+    box.sin_heading = heading.sin;
+    const bool is_at_kerb = dot(spot.outward, spot.outward) > 0.0f;
+    if (touches_barrier(map, box) || (is_at_kerb && is_on_road(map, center, box.center_m.z)) ||
+        !is_clear(world, box, world.num_agents, index)) {
+      continue;
+    }
+    world.boxes[index] = world.boxes_before[index] = box;
+    return true;
+  }
+  box.center_m = {};
+  box.drawn = 0;
+  world.boxes[index] = world.boxes_before[index] = box;
+  return false;
+}
+
+/// Puts the agent on a lane, standing still along it, clear of parked cars and of the agents before it; it stays absent
+/// when kSpawnTries places were taken. Returns whether it was placed.
 PICTURA_HD inline bool place_agent(const WorldView& world, int agent) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
@@ -122,7 +160,11 @@ PICTURA_HD inline bool place_agent(const WorldView& world, int agent) {
     agents.z_m[slot] = pose.position_m.z;
     agents.status[slot] = static_cast<uint8_t>(AgentStatus::active);
     world.boxes[agent] = box_of(agents, slot);
-    if (!has_room(world, world.boxes[agent], agent)) continue;
+    const AgentBox& box = world.boxes[agent];
+    if (touches_barrier(world.map, box) || !is_on_road(world.map, box.center_m.xy(), box.center_m.z) ||
+        !is_clear(world, box, 0, agent) || !is_clear(world, box, world.num_agents, world.num_boxes)) {
+      continue;
+    }
     world.boxes_before[agent] = world.boxes[agent];
     store_fit(agents, slot, fit_lane(world.map, pose.position_m.xy(), pose.position_m.z, pose.heading_rad, at.lane));
     agents.goal_lane[slot] = at.lane;

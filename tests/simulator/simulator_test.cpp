@@ -338,6 +338,43 @@ TEST(Simulator, CyclistsAreSmallerAndSlower) {
   EXPECT_NEAR(cyclists, 50, 18);
 }
 
+TEST(Simulator, ParkedCarsStandOffTheRoadAndInTheWay) {
+  auto map = testing::ring_road(40);
+  // A sidewalk outside the outer edge, at 42 m: cars of 1.6 to 2.2 m stand 0.2 m from it.
+  Lane sidewalk;
+  sidewalk.type = LaneType::sidewalk;
+  sidewalk.points.begin = static_cast<int32_t>(map->lane_points.size());
+  for (int i = 0; i <= 120; ++i) {
+    const float angle = kTwoPi * static_cast<float>(i) / 120;
+    map->lane_points.push_back(
+        {{43.5f * std::cos(angle), 43.5f * std::sin(angle), 0}, angle, 3, 2.27f * static_cast<float>(i)});
+  }
+  sidewalk.points.end = static_cast<int32_t>(map->lane_points.size());
+  map->lanes.push_back(sidewalk);
+  const auto simulator = make({.episode_steps = 30, .parked_cars = 12}, map, {{0, 4, 0}, {0, 3, 1}});
+  const SpawnReport report = simulator->spawn_report();
+  EXPECT_EQ(report.parked_asked, 24);
+  EXPECT_EQ(report.parked_placed, 24);
+  const SceneBatch& scene = simulator->scene();
+  EXPECT_EQ(scene.world_begin[1], 16);
+  EXPECT_EQ(scene.world_begin[2], 31);
+  for (size_t i = 4; i < 16; ++i) {
+    const AgentBox& box = scene.agents[i];
+    EXPECT_EQ(box.palette, 2);
+    EXPECT_NEAR(length(box.center_m.xy()), 42.2f + 0.5f * box.width_m, 0.1);
+    // As the counter-clockwise traffic.
+    EXPECT_GT(box.center_m.x * box.sin_heading - box.center_m.y * box.cos_heading, 40);
+  }
+  const AgentBox first = scene.agents[4];
+  const uint64_t hash = simulator->state_hash();
+  run(simulator.get(), 10);
+  EXPECT_EQ(scene.agents[4].center_m.x, first.center_m.x);
+  run(simulator.get(), 30, 10);
+  EXPECT_NE(scene.agents[4].center_m.x, first.center_m.x);  // another episode
+  simulator->reset();
+  EXPECT_EQ(simulator->state_hash(), hash);
+}
+
 /// On a real town: long enough for every event to happen, the counts must fit together.
 TEST(Simulator, Town01HoldsTogether) {
   const char* data = std::getenv("PICTURA_DATA");

@@ -75,10 +75,10 @@ std::shared_ptr<RoadMap> ring_road(float radius_m) {
     const float begin = kHalfPi * static_cast<float>(quarter);
     const Arc middle = make_arc({}, radius_m, begin, begin + kHalfPi);
     add_lane(map.get(), middle.points, middle.headings);
-    // Drivable to the right of an edge: the inner one runs against the traffic.
-    Arc inner = make_arc({}, radius_m - 0.5f * kLaneWidth_m, begin, begin + kHalfPi);
-    add_edges(map.get(), {inner.points.rbegin(), inner.points.rend()});
-    add_edges(map.get(), make_arc({}, radius_m + 0.5f * kLaneWidth_m, begin, begin + kHalfPi).points);
+    // Drivable to the right of an edge: the outer one runs against the traffic.
+    const Arc outer = make_arc({}, radius_m + 0.5f * kLaneWidth_m, begin, begin + kHalfPi);
+    add_edges(map.get(), make_arc({}, radius_m - 0.5f * kLaneWidth_m, begin, begin + kHalfPi).points);
+    add_edges(map.get(), {outer.points.rbegin(), outer.points.rend()});
   }
   for (int quarter = 0; quarter < 4; ++quarter) link(map.get(), quarter, (quarter + 1) % 4);
   return map;
@@ -108,11 +108,12 @@ std::shared_ptr<RoadMap> stadium(float straight_m, int num_lanes) {
       if (lane + 1 < num_lanes) map->lanes[static_cast<size_t>(index)].left_neighbor = index + 4;
     }
   }
-  for (const Arc& part : parts_at(-0.5f * kLaneWidth_m)) add_edges(map.get(), part.points);
-  std::vector<Arc> inner = parts_at(kLaneWidth_m * (static_cast<float>(num_lanes) - 0.5f));
-  for (auto part = inner.rbegin(); part != inner.rend(); ++part) {
+  const std::vector<Arc> outer = parts_at(-0.5f * kLaneWidth_m);
+  for (auto part = outer.rbegin(); part != outer.rend(); ++part) {
     add_edges(map.get(), {part->points.rbegin(), part->points.rend()});
   }
+  for (const Arc& part : parts_at(kLaneWidth_m * (static_cast<float>(num_lanes) - 0.5f)))
+    add_edges(map.get(), part.points);
   return map;
 }
 
