@@ -5,9 +5,7 @@
 #include <vector>
 
 #include "pictura/common/image.h"
-#include "pictura/common/raster_coverage.h"
-#include "pictura/common/raster_cull.h"
-#include "pictura/common/raster_order.h"
+#include "pictura/common/raster_item.h"
 
 namespace pictura {
 
@@ -45,34 +43,37 @@ class ImageDrawer {
   Coverage coverage_of(int32_t agent);
 
  private:
-  // A thing that is drawn, with its faces.
-  struct Item {
-    int32_t face_begin = 0, face_end = 0;
-    PixelBox box;
-    SurfaceClass surface = SurfaceClass::nothing;
-    int32_t strip_kind = 0;
-    int32_t agent = -1;
-    bool is_background = false;  // a strip that lies behind all solids
-    OrderKey key;
-    Extent extent;
+  class EdgePool {
+   public:
+    void clear() { edges_.clear(); }
+    int32_t take(int count) {
+      edges_.resize(edges_.size() + static_cast<std::size_t>(count));
+      return static_cast<int32_t>(edges_.size()) - count;
+    }
+    PolygonEdge* at(int32_t index) { return edges_.data() + index; }
+    const PolygonEdge* at(int32_t index) const { return edges_.data() + index; }
+
+   private:
+    std::vector<PolygonEdge> edges_;
   };
 
+  // Adds a thing whose faces make_faces(emit) emits, unless none of them is in the image.
   template <typename MakeFaces>
-  Item* add_item(MakeFaces&& make_faces);
+  void add_item(const RasterItem& item, MakeFaces&& make_faces);
   void gather_agents();
   void gather_walls();
   void gather_lights();
   void gather_strips();
   void sort_items();
   template <typename Visit>
-  void visit_pixels(const Item& item, int y_begin, int y_end, Visit&& visit) const;
+  void visit_pixels(const RasterItem& item, int y_begin, int y_end, Visit&& visit) const;
   void draw_planes(const ImageTarget& target) const;
 
   ImageRequest request_;
-  Frustum frustum_;
-  std::vector<PolygonEdge> edges_;
+  ImageSetting setting_;
+  EdgePool edges_;
   std::vector<ScreenFace> faces_;
-  std::vector<Item> items_;
+  std::vector<RasterItem> items_;
   std::vector<int32_t> order_;        // items front to back
   std::vector<int32_t> foreground_;   // items that need a pairwise order, nearest first
   std::vector<uint64_t> is_before_;   // [foreground][words] bit j of row i: j is drawn before i

@@ -36,6 +36,12 @@ PICTURA_HD inline bool may_show(const WallFace& wall, const PinholeCamera& camer
   return ball_in_frustum(f, to_camera(camera, center), wall_radius_m(wall), far_m);
 }
 
+PICTURA_HD inline bool may_show(const LightHead& head, const PinholeCamera& camera, const Frustum& f) {
+  // A little more than the disk: the polygon that it is drawn as has the disk's area.
+  const float radius_m = 1.1f * kLightRadius_m;
+  return ball_in_frustum(f, to_camera(camera, head.position_m), radius_m, far_of(2.0f * radius_m));
+}
+
 PICTURA_HD inline bool may_show(const AgentBox& box, const PinholeCamera& camera, const Frustum& f) {
   const Vec3 center = box.center_m + Vec3{0.0f, 0.0f, 0.5f * box.height_m};
   const float radius_m = 0.5f * length(Vec3{box.length_m, box.width_m, box.height_m});

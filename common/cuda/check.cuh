@@ -1,0 +1,17 @@
+// Errors of the CUDA runtime as Error.
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include "pictura/common/error.h"
+
+namespace pictura {
+
+inline void check_cuda(cudaError_t status, const char* what) {
+  PICTURA_CHECK(status == cudaSuccess, "cuda: {}: {}", what, cudaGetErrorString(status));
+}
+
+}  // namespace pictura
+
+/// Throws Error naming the call when it fails.
+#define PICTURA_CUDA(call) ::pictura::check_cuda((call), #call)
