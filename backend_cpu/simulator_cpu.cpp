@@ -1,5 +1,4 @@
-#include "pictura/backend_cpu/simulator_cpu.h"
-
+// The simulator's oracle: the rules of simulator/rules/ run world by world on host threads.
 #include <algorithm>
 
 #include "pictura/common/error.h"
@@ -8,6 +7,7 @@
 #include "pictura/simulator/rules/observe.h"
 #include "pictura/simulator/rules/spawn.h"
 #include "pictura/simulator/rules/step.h"
+#include "pictura/simulator/simulator.h"
 #include "pictura/simulator/world_batch.h"
 
 namespace pictura {
@@ -266,7 +266,7 @@ class SimulatorCpu final : public Simulator {
 
 }  // namespace
 
-std::unique_ptr<Simulator> make_simulator_cpu(const SimulatorConfig& config,
+std::unique_ptr<Simulator> make_cpu_simulator(const SimulatorConfig& config,
                                               std::vector<std::shared_ptr<const RoadMap>> maps,
                                               std::vector<WorldSpec> worlds) {
   return std::make_unique<SimulatorCpu>(config, std::move(maps), std::move(worlds));

@@ -83,5 +83,18 @@ TEST(Road, OffRoadWhenTheCenterLeavesTheSurface) {
   EXPECT_EQ((stage.step(), stage.events(0)), kEventOffRoad);
 }
 
+TEST(Road, WallsHaltAndAreCountedApart) {
+  const auto map = testing::stadium(200, 1);
+  testing::Stage stage(map, 2);
+  const std::vector<WallFace> walls{{{60, -1, 0}, {60, 1, 0}, 3}, {{160, -1, 8}, {160, 1, 8}, 3}};
+  stage.batch.world_maps[0] = make_world_map(*map, walls);
+  stage.set(0, Conditioning::off_road, 2);
+  stage.put(0, {56.3f, 0}, 0, 10);   // bumper at 59.5
+  stage.put(1, {156.3f, 0}, 0, 10);  // that wall is on a bridge
+  EXPECT_NEAR(stage.step()[0], -2, 0.01);
+  EXPECT_EQ(stage.events(0), kEventWall);
+  EXPECT_EQ(stage.events(1), kEventNone);
+}
+
 }  // namespace
 }  // namespace pictura
