@@ -1,0 +1,241 @@
+// The CUDA renderer against the oracle, on a device. Without one these tests are skipped, unless PICTURA_REQUIRE_GPU=1
+// says that there must be one.
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/common/cuda/device_buffer.cuh"
+#include "pictura/common/error.h"
+#include "pictura/common/make_renderer.h"
+#include "pictura/tests/support/image_scenes.h"
+#include "pictura/tests/support/tolerances.h"
+
+namespace pictura {
+
+std::string cuda_unavailable();
+
+namespace {
+
+using testing::HasSubstr;
+
+class CudaRendererTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const std::string why = cuda_unavailable();
+    if (why.empty()) return;
+    const char* required = std::getenv("PICTURA_REQUIRE_GPU");
+    if (required && std::string(required) == "1") FAIL() << "PICTURA_REQUIRE_GPU=1, but " << why;
+    GTEST_SKIP() << "no CUDA device: " << why;
+  }
+};
+
+// A host scene's copy in device memory.
+struct DeviceScene {
+  DeviceBuffer<int32_t> world_begin, geometry, light_begin, hidden_agents;
+  DeviceBuffer<AgentBox> agents;
+  DeviceBuffer<LightState> light_states;
+  explicit DeviceScene(const SceneBatch& host)
+      : world_begin(host.world_begin),
+        geometry(host.geometry),
+        light_begin(host.light_begin),
+        hidden_agents(host.hidden_agents),
+        agents(host.agents),
+        light_states(host.light_states) {}
+  SceneBatch batch() const {
+    return {MemorySpace::cuda,  world_begin.span(),  agents.span(),       geometry.span(),
+            light_begin.span(), light_states.span(), hidden_agents.span()};
+  }
+};
+
+// All outputs of a batch of images, one camera after the other, on the host.
+struct Outputs {
+  std::vector<float> color;
+  std::vector<float> depth_m;
+  std::vector<uint8_t> class_id;
+  std::vector<uint16_t> instance_id;
+};
+
+Outputs draw_on_host(const SyntheticTown& town, const RendererConfig& config) {
+  const auto renderer = make_renderer("cpu", config);
+  renderer->upload(town.geometry);
+  Outputs out;
+  for (std::size_t k = 0; k < config.rig.cameras.size(); ++k) {
+    // One camera at a time keeps the memory simple.
+    RendererConfig single = config;
+    single.rig.cameras = {config.rig.cameras[k]};
+    const auto one = make_renderer("cpu", single);
+    one->upload(town.geometry);
+    const auto pixels = static_cast<std::size_t>(single.rig.cameras[0].width_px * single.rig.cameras[0].height_px);
+    const std::size_t views = town.views.size();
+    std::vector<float> color(3 * pixels * views), depth(pixels * views);
+    std::vector<uint8_t> classes(pixels * views);
+    std::vector<uint16_t> instances(pixels * views);
+    const std::vector<CameraImages> cameras{{single.rig.cameras[0].width_px, single.rig.cameras[0].height_px,
+                                             color.data(), static_cast<int64_t>(3 * pixels), depth.data(),
+                                             classes.data(), instances.data()}};
+    one->render(town.scene.batch(), town.views,
+                {MemorySpace::host, PixelFormat::f32, static_cast<int>(views), cameras});
+    out.color.insert(out.color.end(), color.begin(), color.end());
+    out.depth_m.insert(out.depth_m.end(), depth.begin(), depth.end());
+    out.class_id.insert(out.class_id.end(), classes.begin(), classes.end());
+    out.instance_id.insert(out.instance_id.end(), instances.begin(), instances.end());
+  }
+  return out;
+}
+
+Outputs draw_on_device(const SyntheticTown& town, const RendererConfig& config) {
+  const auto renderer = make_renderer("cuda", config);
+  renderer->upload(town.geometry);
+  const DeviceScene scene(town.scene.batch());
+  const DeviceBuffer<View> views{Span<const View>(town.views)};
+  struct Camera {
+    DeviceBuffer<float> color, depth_m;
+    DeviceBuffer<uint8_t> class_id;
+    DeviceBuffer<uint16_t> instance_id;
+  };
+  std::vector<Camera> buffers;
+  std::vector<CameraImages> cameras;
+  for (const auto& camera : config.rig.cameras) {
+    const auto pixels = static_cast<std::size_t>(camera.width_px * camera.height_px);
+    const std::size_t all = pixels * town.views.size();
+    buffers.push_back({DeviceBuffer<float>(3 * all), DeviceBuffer<float>(all), DeviceBuffer<uint8_t>(all),
+                       DeviceBuffer<uint16_t>(all)});
+    cameras.push_back({camera.width_px, camera.height_px, buffers.back().color.data(), static_cast<int64_t>(3 * pixels),
+                       buffers.back().depth_m.data(), buffers.back().class_id.data(),
+                       buffers.back().instance_id.data()});
+  }
+  renderer->render(scene.batch(), views.span(),
+                   {MemorySpace::cuda, PixelFormat::f32, static_cast<int>(town.views.size()), cameras});
+  Outputs out;
+  auto append = [](auto* to, const auto& buffer) {
+    const std::size_t begin = to->size();
+    to->resize(begin + buffer.size());
+    buffer.copy_to_host(to->data() + begin);
+  };
+  for (const Camera& camera : buffers) {
+    append(&out.color, camera.color);
+    append(&out.depth_m, camera.depth_m);
+    append(&out.class_id, camera.class_id);
+    append(&out.instance_id, camera.instance_id);
+  }
+  return out;
+}
+
+void expect_parity(const SyntheticTown& town, const RendererConfig& config) {
+  const Outputs host = draw_on_host(town, config), device = draw_on_device(town, config);
+  ASSERT_EQ(host.color.size(), device.color.size());
+  std::size_t within = 0, equal = 0;
+  double worst = 0;
+  for (std::size_t i = 0; i < host.color.size(); ++i) {
+    const double error = std::abs(static_cast<double>(host.color[i]) - device.color[i]);
+    within += error <= kKernelError;
+    equal += error == 0;
+    worst = std::max(worst, error);
+  }
+  const double count = static_cast<double>(host.color.size());
+  fmt::print("{} values: {:.6f} % equal, {:.6f} % within 1/255, worst {:.4f}/255\n", host.color.size(),
+             100 * static_cast<double>(equal) / count, 100 * static_cast<double>(within) / count, 255 * worst);
+  EXPECT_GE(static_cast<double>(within), kKernelShareWithin * count);
+  EXPECT_LE(worst, kKernelWorstError);
+  // Planes are of one surface or another at a pixel's centre: no rounding shows but at edges.
+  std::size_t differ = 0;
+  for (std::size_t i = 0; i < host.depth_m.size(); ++i) {
+    differ += host.class_id[i] != device.class_id[i] || host.instance_id[i] != device.instance_id[i] ||
+              !(host.depth_m[i] == device.depth_m[i] || std::abs(host.depth_m[i] - device.depth_m[i]) < 1e-3f);
+  }
+  EXPECT_LE(static_cast<double>(differ), (1 - kKernelShareWithin) * static_cast<double>(host.depth_m.size()));
+}
+
+TEST_F(CudaRendererTest, TownsLookLikeTheOracle) { expect_parity(make_synthetic_town(1, 120), {.rig = paper_rig()}); }
+
+TEST_F(CudaRendererTest, OddSizesAndMixedRigsDoToo) {
+  SyntheticTown town = make_synthetic_town(2, 60);
+  town.views.resize(5);
+  Rig rig = paper_rig(97, 55);
+  rig.cameras[1] = paper_rig(1, 1).cameras[1];
+  rig.cameras[2] = paper_rig(40, 130).cameras[2];
+  expect_parity(town, {.rig = rig, .line_floor_px = 0});
+}
+
+TEST_F(CudaRendererTest, NothingIsCutOffInCrowdedImages) {
+  // A wide view over 900 people and thousands of strips: far more than the first pass has room for.
+  SyntheticTown town = make_synthetic_town(3, 0);
+  town.scene = {};
+  for (int i = 0; i < 900; ++i) {
+    const float x = 10 + 1.5f * static_cast<float>(i % 45), y = 1.5f * static_cast<float>(i / 45) - 15;
+    town.scene.agents.push_back(
+        make_box(AgentClass::pedestrian, {x, y, 0}, 0.1f * static_cast<float>(i), {0.6f, 0.6f, 1.2f}));
+  }
+  town.scene.light_states.assign(static_cast<std::size_t>(town.geometry.num_signals), LightState::red);
+  town.scene.end_world(0);
+  town.views = {make_view({0, 0, 6}, 0.05f), make_view({80, 3, 0}, kPi)};
+  expect_parity(town, {.rig = paper_rig()});
+}
+
+TEST_F(CudaRendererTest, VisibilityAgrees) {
+  SyntheticTown town = make_synthetic_town(4, 60);
+  town.views.resize(3);
+  std::vector<VisibilityQuery> queries;
+  for (int32_t view = 0; view < 3; ++view) {
+    for (int32_t agent = 0; agent < 60; ++agent) queries.push_back({view, agent});
+  }
+  const RendererConfig config{.rig = paper_rig()};
+  const auto host = make_renderer("cpu", config), device = make_renderer("cuda", config);
+  host->upload(town.geometry);
+  device->upload(town.geometry);
+  std::vector<float> expected(queries.size()), actual(queries.size());
+  host->visibility(town.scene.batch(), town.views, queries, expected);
+  const DeviceScene scene(town.scene.batch());
+  const DeviceBuffer<View> views{Span<const View>(town.views)};
+  const DeviceBuffer<VisibilityQuery> device_queries{Span<const VisibilityQuery>(queries)};
+  const DeviceBuffer<float> result(queries.size());
+  device->visibility(scene.batch(), views.span(), device_queries.span(), {result.data(), result.size()});
+  result.copy_to_host(actual.data());
+  for (std::size_t i = 0; i < queries.size(); ++i) {
+    if (std::isnan(expected[i])) {
+      EXPECT_TRUE(std::isnan(actual[i])) << i;
+    } else {
+      EXPECT_NEAR(actual[i], expected[i], 1e-5) << i;
+    }
+  }
+}
+
+TEST_F(CudaRendererTest, FaultsOfTheDeviceAreThrownByTheNextCall) {
+  SyntheticTown town = make_synthetic_town(5, 5);
+  town.views.resize(1);
+  const RendererConfig config{.rig = paper_rig(8, 8)};
+  const auto renderer = make_renderer("cuda", config);
+  renderer->upload(town.geometry);
+  const DeviceScene scene(town.scene.batch());
+  HostImages shape(config.rig, 1);
+  DeviceBuffer<uint8_t> memory(shape.bytes().size());
+  std::vector<CameraImages> cameras;
+  for (std::size_t k = 0; k < 4; ++k) {
+    cameras.push_back(shape.camera(static_cast<int>(k)));
+    cameras[k].data = memory.data() + 3 * 64 * k;
+  }
+  const ImageBatch images{MemorySpace::cuda, PixelFormat::u8, 1, cameras};
+  std::vector<View> bad = town.views;
+  bad[0].world = 9;
+  const DeviceBuffer<View> views{Span<const View>(bad)}, good{Span<const View>(town.views)};
+  EXPECT_NO_THROW(renderer->render(scene.batch(), views.span(), images));
+  PICTURA_CUDA(cudaDeviceSynchronize());
+  try {
+    renderer->render(scene.batch(), good.span(), images);
+    ADD_FAILURE() << "expected the fault of the earlier call";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("no such world"));
+  }
+  EXPECT_NO_THROW(renderer->render(scene.batch(), good.span(), images));
+  // What the host can see is refused at once.
+  EXPECT_THROW(renderer->render(town.scene.batch(), good.span(), images), Error);
+  EXPECT_THROW(renderer->render(scene.batch(), good.span(), shape.batch()), Error);
+}
+
+}  // namespace
+}  // namespace pictura
