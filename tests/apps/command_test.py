@@ -6,6 +6,7 @@ Run by ctest, one entry per class: python3 command_test.py PICTURA [unittest arg
 import json
 import os
 import pathlib
+import re
 import shutil
 import signal
 import subprocess
@@ -31,7 +32,7 @@ def run(*arguments, timeout=300):
 
 def has_torch():
     """Whether this build can train: commands that need torch are missing from builds without it."""
-    return " train " in run("--help").stdout
+    return re.search("^  train ", run("--help").stdout, re.MULTILINE) is not None
 
 
 class CommandCase(unittest.TestCase):
