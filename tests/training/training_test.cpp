@@ -2,6 +2,7 @@
 #include "pictura/training/training.h"
 
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 #include <sstream>
 
@@ -9,6 +10,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/file.h"
+#include "pictura/common/interrupt.h"
 #include "pictura/training/config.h"
 
 namespace pictura {
@@ -74,6 +76,25 @@ TEST_F(Training, WritesWhatItPromisesAndStartsFromItsSeed) {
   EXPECT_EQ(again.policy_hash, report.policy_hash);
   const TrainReport other = train(options("other", {"train.updates=1", "run.seed=2"}));
   EXPECT_NE(other.policy_hash, report.policy_hash);
+}
+
+TEST_F(Training, InterruptedRunSavesAndGoesOnExactly) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  TrainOptions stopped = options("stopped");
+  stopped.on_progress = [](const TrainProgress& progress) {
+    if (progress.update == 2) std::raise(SIGINT);
+  };
+  // In a process of its own, since the flag that ^C sets is never taken back.
+  EXPECT_EXIT(
+      {
+        catch_interrupts();
+        const TrainReport report = train(stopped);
+        std::exit(report.interrupted && report.updates == 2 ? 0 : 1);
+      },
+      ::testing::ExitedWithCode(0), "");
+  TrainOptions rest = options("stopped");
+  rest.resume = true;
+  EXPECT_EQ(train(rest).policy_hash, train(options("whole")).policy_hash);
 }
 
 TEST_F(Training, RefusesToResumeUnderAnotherConfigurationByName) {
