@@ -118,6 +118,10 @@ TEST(Quality, AWallThroughTheImageAndCarsOnBothSides) {
   wall.b_m = {90, -4, 0};
   wall.height_m = 2.5f;
   geometry.walls.push_back(wall);
+  // Another up a slope, behind the cars to the left.
+  wall.a_m = {15, 14, -1};
+  wall.b_m = {60, 20, 4};
+  geometry.walls.push_back(wall);
   geometry.build_grids();
   std::vector<AgentBox> boxes;
   for (int i = 0; i < 6; ++i) {

@@ -36,7 +36,9 @@ struct Facet {
     const double depth = dot(normal, origin) / along;
     if (!(depth >= kNear_m)) return kFar;
     const Point p = ray * depth - origin;
-    const double at_u = dot(p, u) / dot(u, u), at_v = dot(p, v) / dot(v, v);
+    // The sides of a wall with a sloping foot are not at right angles.
+    const double area2 = dot(normal, normal);
+    const double at_u = dot(cross(p, v), normal) / area2, at_v = dot(cross(u, p), normal) / area2;
     if (is_disk) return at_u * at_u + at_v * at_v <= 1 ? depth : kFar;
     return at_u >= 0 && at_u <= 1 && at_v >= 0 && at_v <= 1 ? depth : kFar;
   }
