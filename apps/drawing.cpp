@@ -57,8 +57,8 @@ std::vector<LegendEntry> legend_of(const RoadMap& map) {
                                                                     {LaneType::median, "median"},
                                                                     {LaneType::other, "other"}}};
   for (const auto& [type, words] : kTypes) {
-    const bool used =
-        std::any_of(map.lanes.begin(), map.lanes.end(), [&](const Lane& lane) { return lane.type == type; });
+    const auto is_of_type = [wanted = type](const Lane& lane) { return lane.type == wanted; };
+    const bool used = std::any_of(map.lanes.begin(), map.lanes.end(), is_of_type);
     if (used) entries.push_back({words, lane_color(type), LegendEntry::area});
   }
   if (!map.road_edges.empty()) entries.push_back({"road edge", hex(0xC8312F), LegendEntry::line});

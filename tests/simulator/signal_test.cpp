@@ -42,7 +42,7 @@ TEST(Signal, FixedTimingSharesTheCycleAmongPhases) {
 }
 
 TEST(Signal, TrainingTimingIsDrawnPerJunctionAndEpisode) {
-  int episodes_off = 0, lights_off = 0, lights = 0;
+  int episodes_off = 0, lights_off = 0;
   double green_s = 0;
   constexpr int kEpisodes = 2000;
   for (uint32_t episode = 0; episode < kEpisodes; ++episode) {
@@ -59,7 +59,6 @@ TEST(Signal, TrainingTimingIsDrawnPerJunctionAndEpisode) {
     green_s += 0.1 * first.green_steps / kEpisodes;
     episodes_off += first.is_off && second.is_off;
     lights_off += first.is_off != second.is_off;
-    lights += 2;
   }
   EXPECT_NEAR(green_s, 5.5, 0.3);
   EXPECT_NEAR(episodes_off / double{kEpisodes}, 0.2 + 0.8 * 0.04, 0.04);
@@ -165,6 +164,64 @@ TEST_F(RedLight, TurningRightIntoTheHeldLaneIsNone) {
   put_bumper(97, 0.3f, -0.5f, 3);
   stage.batch.agents.lane[0] = 4;
   EXPECT_EQ(step_with(LightState::red), kEventNone);
+}
+
+/// A straight in three: to x = 100 (lane 0), 2 m that the light holds (lane 4), and onwards behind the stop line at
+/// x = 102 (lane 5, held too).
+std::shared_ptr<const RoadMap> short_section(bool is_endless) {
+  auto map = testing::stadium(200, 1);
+  const auto append = [&map](std::vector<float> x_m, int32_t next) {
+    Lane lane = map->lanes[0];
+    lane.points.begin = static_cast<int32_t>(map->lane_points.size());
+    for (const float x : x_m) map->lane_points.push_back({{x, 0, 0}, 0, 4, x - x_m[0]});
+    lane.points.end = static_cast<int32_t>(map->lane_points.size());
+    lane.length_m = x_m.back() - x_m.front();
+    lane.successors.begin = static_cast<int32_t>(map->lane_links.size());
+    map->lane_links.push_back(next);
+    lane.successors.end = lane.successors.begin + 1;
+    map->lanes.push_back(lane);
+  };
+  append({100, 102}, 5);
+  append({102, 150, 200}, 1);
+  map->lanes[0].points.end = map->lanes[0].points.begin + 11;
+  map->lanes[0].length_m = 100;
+  map->lane_links[static_cast<size_t>(map->lanes[0].successors.begin)] = 4;
+  map->lanes[4].is_endless = map->lanes[5].is_endless = is_endless;
+  testing::add_light(map.get(), 102, 4, 1, {4, 5});
+  return map;
+}
+
+TEST(RedLightSection, DrivingOnToTheNextLaneIsNone) {
+  for (const bool is_endless : {true, false}) {
+    testing::Stage stage(short_section(is_endless), 1);
+    stage.put(0, {99.8f, 0}, 0, 10);  // its bumper is a metre past the line: it crossed on yellow
+    ASSERT_EQ(stage.batch.agents.lane[0], 0);
+    stage.batch.lights[0] = LightState::red;
+    stage.step();
+    EXPECT_EQ(stage.batch.agents.lane[0], 4);
+    EXPECT_EQ(stage.events(0), kEventNone);
+    // So fast that the short lane is left out.
+    stage.put(0, {100.2f, 0}, 0, 20);
+    stage.batch.agents.lane[0] = 0;
+    stage.step();
+    EXPECT_EQ(stage.batch.agents.lane[0], 5);
+    EXPECT_EQ(stage.events(0), kEventNone);
+    // But the bumper's crossing is an event whatever the lanes.
+    stage.put(0, {98.3f, 0}, 0, 10);
+    stage.step();
+    EXPECT_EQ(stage.events(0), kEventRedLight);
+  }
+}
+
+TEST(RedLightSection, LaneChangesAreWhatNoRouteDoes) {
+  const WorldMap map = make_world_map(*short_section(false), {});
+  EXPECT_FALSE(is_lane_change(map.view(), 0, 0));
+  EXPECT_FALSE(is_lane_change(map.view(), 0, 4));
+  EXPECT_FALSE(is_lane_change(map.view(), 0, 5));
+  EXPECT_FALSE(is_lane_change(map.view(), 5, 4));  // backing up
+  EXPECT_FALSE(is_lane_change(map.view(), -1, 4));
+  EXPECT_FALSE(is_lane_change(map.view(), 4, -1));
+  EXPECT_TRUE(is_lane_change(map.view(), 0, 2));
 }
 
 TEST_F(RedLight, AnotherLevelIsNone) {
