@@ -222,7 +222,7 @@ class SimulatorCpu final : public Simulator {
       if (!batch_.valid[slot]) continue;
       ++totals.agent_steps;
       totals.reward += batch_.reward[slot];
-      totals.distance_m += fabsf(speed_mps) * world.options.dt_s;
+      totals.distance_m += driven_m(speed_mps, world.options.dt_s);
       count_events(world.agents.events[slot], &totals);
     }
     for (size_t light = 0; light < world.map.stop_lines.size(); ++light) {

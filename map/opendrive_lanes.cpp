@@ -6,12 +6,12 @@
 #include <set>
 
 #include "pictura/map/opendrive_build.h"
+#include "pictura/map/speed_limit.h"
 
 namespace pictura::opendrive {
 
 namespace {
 
-constexpr float kDefaultSpeedLimit_mps = 15.0f;
 // Lanes whose ends lie further apart than this do not continue each other, whatever the file says (Town03 links two
 // neighbouring lanes to the same next one).
 constexpr float kMaxLinkGap_m = 1.0f;

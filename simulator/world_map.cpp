@@ -66,7 +66,7 @@ void add_lanes(const RoadMap& map, WorldMap* out) {
     flat.first_successor = static_cast<int32_t>(out->successors.size());
     if (!is_drivable(lane.type)) continue;
     flat.is_driven = lane.type != LaneType::parking;
-    flat.speed_limit_mps = lane.speed_limit_mps > 0 ? lane.speed_limit_mps : kDefaultSpeedLimit_mps;
+    flat.speed_limit_mps = lane.speed_limit_mps;
 
     std::vector<Vec3> line;
     const Span<const LanePoint> points = map.points_of(lane);
@@ -101,6 +101,10 @@ void add_lanes(const RoadMap& map, WorldMap* out) {
       if (goes_on(successor)) out->successors.push_back(successor);
     }
     flat.num_successors = static_cast<int32_t>(out->successors.size()) - flat.first_successor;
+    for (const int32_t successor : map.links(lane.successors)) {
+      if (!goes_on(successor)) out->successors.push_back(successor);
+    }
+    flat.num_all_successors = static_cast<int32_t>(out->successors.size()) - flat.first_successor;
     flat.left = goes_on(lane.left_neighbor) ? lane.left_neighbor : -1;
     flat.right = goes_on(lane.right_neighbor) ? lane.right_neighbor : -1;
     if (lane.is_endless && !lane.in_junction && flat.is_driven && s > 0) {
@@ -215,10 +219,12 @@ struct Neighbor {
 };
 
 /// For every cell that an observer may stand in, the items whose points lie within range of its centre, nearest first,
-/// go through `append(center, neighbors, &lists)`, which appends lists_per_cell lists.
+/// go through `append(center, neighbors, &lists)`, which appends lists_per_cell lists. Throws Error naming the map when
+/// they would take more than a gigabyte: so they also fit their 32-bit ends.
 template <typename Append>
-CellLists lists_by_distance(const WorldMap& map, const std::vector<Vec2>& points, float range_m, int lists_per_cell,
-                            Append&& append) {
+CellLists lists_by_distance(const WorldMap& map, const std::string& map_name, const std::vector<Vec2>& points,
+                            float range_m, int lists_per_cell, Append&& append) {
+  constexpr size_t kMaxItems = size_t{1} << 28;
   CellLists lists;
   lists.origin_m = map.low_m;
   lists.cell_m = kNearCell_m;
@@ -263,6 +269,11 @@ CellLists lists_by_distance(const WorldMap& map, const std::vector<Vec2>& points
       std::sort(found.begin(), found.end(), [](const Neighbor& a, const Neighbor& b) {
         return a.distance_m < b.distance_m || (a.distance_m == b.distance_m && a.item < b.item);
       });
+      // Before they are made, since one cell may ask for all.
+      PICTURA_CHECK(lists.items.size() + found.size() * static_cast<size_t>(lists_per_cell) <= kMaxItems,
+                    "map {}: expected lists of what is near of at most {} entries in all, got more: too much lies "
+                    "within {} m of ({}, {})",
+                    map_name, kMaxItems, range_m, center.x, center.y);
       append(center, found, &lists);
     } else {
       lists.begin.insert(lists.begin.end(), static_cast<size_t>(lists_per_cell), lists.begin.back());
@@ -288,12 +299,13 @@ bool may_be_seen(Vec2 offset, float distance_m, float sector_middle_rad) {
   return aside <= kRoadAside_m + margin_m || distance_m <= close_m;
 }
 
-CellLists lists_of_pieces(const WorldMap& map, const std::vector<ObservedPiece>& pieces) {
+CellLists lists_of_pieces(const WorldMap& map, const std::string& map_name, const std::vector<ObservedPiece>& pieces) {
   std::vector<Vec2> middles;
   for (const ObservedPiece& piece : pieces) middles.push_back(piece.middle_m.xy());
   const float sight_m = std::sqrt(square(kRoadAhead_m) + square(kRoadAside_m)) + kNearCell_m;
   return lists_by_distance(
-      map, middles, sight_m, kSectors, [&](Vec2 center, const std::vector<Neighbor>& neighbors, CellLists* lists) {
+      map, map_name, middles, sight_m, kSectors,
+      [&](Vec2 center, const std::vector<Neighbor>& neighbors, CellLists* lists) {
         for (int sector = 0; sector < kSectors; ++sector) {
           const float heading = -kPi + (static_cast<float>(sector) + 0.5f) * (kTwoPi / kSectors);
           for (const Neighbor& near : neighbors) {
@@ -308,10 +320,10 @@ CellLists lists_of_pieces(const WorldMap& map, const std::vector<ObservedPiece>&
 
 /// Whatever can be among the nearest kMaxControls from anywhere in the cell: as far from its centre as the last of them
 /// and a cell's diagonal.
-CellLists lists_of_stop_lines(const WorldMap& map) {
+CellLists lists_of_stop_lines(const WorldMap& map, const std::string& map_name) {
   std::vector<Vec2> middles;
   for (const StopLine& line : map.stop_lines) middles.push_back(line.middle_m.xy());
-  return lists_by_distance(map, middles, kControlRange_m + kNearCell_m, 1,
+  return lists_by_distance(map, map_name, middles, kControlRange_m + kNearCell_m, 1,
                            [](Vec2, const std::vector<Neighbor>& neighbors, CellLists* lists) {
                              const float last_m =
                                  neighbors.size() < kMaxControls
@@ -345,7 +357,7 @@ WorldMap make_world_map(const RoadMap& map, Span<const WallFace> walls) {
   out.segment_cells = cells_of(out.segments, [](const LaneSegment& segment) {
     const Vec2 a = segment.a_m.xy();
     return box_of_segment(a, a + segment.direction * segment.length_m,
-                          std::max(kLaneReach_m, segment.half_width_m + 0.1f));
+                          std::max(kLaneReach_m, segment.half_width_m + kSeamTolerance_m));
   });
   const auto barrier_box = [](const Barrier& barrier) {
     return box_of_segment(barrier.a_m, barrier.b_m, kMaxBoxRadius_m);
@@ -356,9 +368,9 @@ WorldMap make_world_map(const RoadMap& map, Span<const WallFace> walls) {
     return box_of_segment(line.middle_m.xy(), line.middle_m.xy(), kStopLineReach_m);
   });
 
-  out.near_lane_pieces = lists_of_pieces(out, out.lane_pieces);
-  out.near_boundary_pieces = lists_of_pieces(out, out.boundary_pieces);
-  out.near_stop_lines = lists_of_stop_lines(out);
+  out.near_lane_pieces = lists_of_pieces(out, map.name, out.lane_pieces);
+  out.near_boundary_pieces = lists_of_pieces(out, map.name, out.boundary_pieces);
+  out.near_stop_lines = lists_of_stop_lines(out, map.name);
   return out;
 }
 
@@ -382,8 +394,6 @@ MapView WorldMap::view() const {
   view.near_lane_pieces = near_lane_pieces.view();
   view.near_boundary_pieces = near_boundary_pieces.view();
   view.near_stop_lines = near_stop_lines.view();
-  view.low_m = low_m;
-  view.high_m = high_m;
   return view;
 }
 

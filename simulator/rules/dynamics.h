@@ -33,6 +33,9 @@ struct DynamicsParameters {
   float wheelbase_m = 2.7f;
 };
 
+/// What a step adds to the distance driven, at the speed that it reached.
+PICTURA_HD inline float driven_m(float speed_mps, float dt_s) { return fabsf(speed_mps) * dt_s; }
+
 /// `value` unless it left `before`'s sign, which stops at zero first.
 PICTURA_HD inline float stop_at_zero(float before, float value, float low, float high) {
   return before * value < 0.0f ? 0.0f : clamp(value, low, high);

@@ -4,6 +4,7 @@
 
 #include "pictura/common/color.h"
 #include "pictura/common/hd.h"
+#include "pictura/common/math.h"
 
 namespace pictura {
 
@@ -25,6 +26,18 @@ PICTURA_HD constexpr ClassLimits class_limits(AgentClass agent_class) {
 
 /// No class is faster.
 constexpr float kMaxSpeed_mps = 20.0f;
+/// No box has a longer half-diagonal.
+constexpr float kMaxBoxRadius_m = 3.2f;
+/// No step lasts longer: contact with barriers is looked for at its end alone.
+constexpr float kMaxStep_s = 0.1f;
+
+PICTURA_HD constexpr bool keeps_bounds(const ClassLimits& limits) {
+  return square(limits.max_length_m) + square(limits.max_width_m) <= square(2.0f * kMaxBoxRadius_m) &&
+         limits.max_speed_mps <= kMaxSpeed_mps && -limits.min_speed_mps <= kMaxSpeed_mps &&
+         limits.max_speed_mps * kMaxStep_s <= limits.min_length_m;
+}
+static_assert(keeps_bounds(class_limits(AgentClass::vehicle)) && keeps_bounds(class_limits(AgentClass::cyclist)) &&
+              keeps_bounds(class_limits(AgentClass::pedestrian)));
 
 constexpr float kWheelbasePerLength = 0.6f;
 

@@ -3,7 +3,7 @@
 // point in it; `near_*` list what may be observed from it, nearest to the cell's centre first.
 #pragma once
 
-#include "pictura/common/grid.h"
+#include "pictura/common/grid_view.h"
 #include "pictura/common/math.h"
 #include "pictura/common/span.h"
 
@@ -13,8 +13,6 @@ namespace pictura {
 constexpr float kLaneReach_m = 5.0f;
 /// Two places whose heights differ by less are on the same level.
 constexpr float kLevel_m = 2.0f;
-/// No box has a longer half-diagonal.
-constexpr float kMaxBoxRadius_m = 3.2f;
 /// Within which a stop line can be violated.
 constexpr float kStopLineReach_m = 10.0f;
 
@@ -33,8 +31,9 @@ struct LaneSegment {
 
 struct MapLane {
   int32_t first_segment = 0, num_segments = 0;
-  int32_t first_successor = 0, num_successors = 0;  // of MapView::successors: lanes from which a route goes on for ever
-  int32_t left = -1, right = -1;                    // neighbours of that kind
+  // Of MapView::successors: first those from which a route goes on for ever, num_successors of them, then the others.
+  int32_t first_successor = 0, num_successors = 0, num_all_successors = 0;
+  int32_t left = -1, right = -1;  // neighbours from which a route goes on for ever
   float length_m = 0;
   float speed_limit_mps = 0;
   int32_t light = -1;     // the stop line that holds it
@@ -83,7 +82,6 @@ struct MapView {
   GridView segment_cells, edge_cells, wall_cells, stop_line_cells;
   GridView near_lane_pieces, near_boundary_pieces;  // per cell and sector
   GridView near_stop_lines;
-  Vec2 low_m, high_m;  // of the drivable surface
 };
 
 PICTURA_HD inline Span<const int32_t> list_of(const GridView& lists, size_t index) {

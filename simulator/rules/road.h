@@ -2,11 +2,13 @@
 // whether a point is on the drivable surface.
 #pragma once
 
+#include "pictura/map/speed_limit.h"
 #include "pictura/simulator/rules/map_view.h"
 
 namespace pictura {
 
-constexpr float kDefaultSpeedLimit_mps = 15.0f;
+/// How far beyond half a lane's width its surface still reaches, over the seams between neighbouring lanes.
+constexpr float kSeamTolerance_m = 0.1f;
 /// What an agent without a lane sees as its offset (reference implementation); its angle is then a right angle.
 constexpr float kNoLaneOffset_m = 4.0f;
 
@@ -66,13 +68,12 @@ PICTURA_HD inline LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float 
 
 /// Whether a point lies on the drivable surface of its level: within half a width of some drivable lane's centre line.
 PICTURA_HD inline bool is_on_road(const MapView& map, Vec2 p, float z_m) {
-  constexpr float kTolerance_m = 0.1f;  // the seams between neighbouring lanes
   const Span<const int32_t> items = items_at(map.segment_cells, p);
   for (size_t i = 0; i < items.size(); ++i) {
     const LaneSegment& segment = map.segments[static_cast<size_t>(items[i])];
     const Foot foot = foot_on(segment, p);
     const float height = segment.a_m.z + segment.slope * foot.along_m;
-    if (foot.distance_m <= segment.half_width_m + kTolerance_m && fabsf(height - z_m) < kLevel_m) return true;
+    if (foot.distance_m <= segment.half_width_m + kSeamTolerance_m && fabsf(height - z_m) < kLevel_m) return true;
   }
   return false;
 }

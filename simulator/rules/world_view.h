@@ -2,7 +2,7 @@
 // device; the executor owns what they point to.
 #pragma once
 
-#include "pictura/common/scene.h"
+#include "pictura/common/scene_types.h"
 #include "pictura/simulator/conditioning.h"
 #include "pictura/simulator/fields.h"
 #include "pictura/simulator/rules/dynamics.h"
@@ -97,7 +97,7 @@ PICTURA_HD inline AgentBox box_of(const AgentStateView& agents, int slot) {
   box.width_m = agents.width_m[slot];
   box.height_m = agents.height_m[slot];
   box.agent_class = class_of(agents, slot);
-  box.palette = status == AgentStatus::halted ? 1 : status == AgentStatus::parked ? 2 : 0;
+  box.palette = status == AgentStatus::halted ? 1 : 0;
   box.drawn = status != AgentStatus::absent;
   return box;
 }
