@@ -3,7 +3,7 @@
 #pragma once
 
 #include "pictura/common/math.h"
-#include "pictura/common/scene.h"
+#include "pictura/common/scene_types.h"
 #include "pictura/simulator/rules/map_view.h"
 
 namespace pictura {
@@ -70,16 +70,19 @@ PICTURA_HD inline bool collide(const AgentBox& a_from, const AgentBox& a_to, con
   return false;
 }
 
-/// Paper: at fault unless essentially stopped or struck from behind. Struck from behind: not reversing, and the other's
-/// centre lies within 45 degrees of straight back, seen from the middle of the own rear bumper.
-PICTURA_HD inline bool at_fault(const AgentBox& own, float own_speed_mps, const AgentBox& other) {
+/// Paper: at fault unless essentially stopped or struck from behind. Struck from behind: not reversing, and before the
+/// step, when the two did not touch yet, the end of the other that was nearer (the middle of its front, unless it backs
+/// up) still lay behind the plane of the own rear bumper. Speed is that of the step.
+PICTURA_HD inline bool at_fault(const AgentBox& own_before, float own_speed_mps, const AgentBox& other_before) {
   constexpr float kStopped_mps = 0.2f;
   if (fabsf(own_speed_mps) < kStopped_mps) return false;
   if (own_speed_mps < 0.0f) return true;
-  const Vec2 forward{own.cos_heading, own.sin_heading};
-  const Vec2 rear = own.center_m.xy() - forward * (0.5f * own.length_m);
-  const Vec2 to_other = other.center_m.xy() - rear;
-  return dot(to_other, forward) > -fabsf(cross(forward, to_other));
+  const Vec2 forward{own_before.cos_heading, own_before.sin_heading};
+  const Vec2 other_forward{other_before.cos_heading, other_before.sin_heading};
+  const float rear = -0.5f * own_before.length_m;
+  const float nearer_end = dot((other_before.center_m - own_before.center_m).xy(), forward) +
+                           0.5f * other_before.length_m * fabsf(dot(other_forward, forward));
+  return nearer_end > rear;
 }
 
 /// Whether the segment a-b touches the box: it is cut to the box's slab along each axis of the box.

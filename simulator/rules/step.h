@@ -86,7 +86,7 @@ PICTURA_HD inline void advance(const WorldView& world, int agent, int32_t action
   const Motion motion = move(motion_of(agents, slot), controls_of_action(action), parameters, class_limits(agent_class),
                              world.options.dt_s);
   store_motion(agents, slot, motion);
-  agents.distance_m[slot] += fabsf(motion.speed_mps) * world.options.dt_s;
+  agents.distance_m[slot] += driven_m(motion.speed_mps, world.options.dt_s);
 
   const int32_t lane_before = agents.lane[slot];
   store_fit(agents, slot, fit_lane(world.map, {motion.x_m, motion.y_m}, from.z, motion.heading_rad, lane_before));
@@ -123,7 +123,7 @@ PICTURA_HD inline void find_collisions(const WorldView& world, int agent) {
       const int32_t other = cells.items[static_cast<size_t>(i)];
       if (other == agent || !collide(own_before, own, world.boxes_before[other], world.boxes[other])) continue;
       events |= kEventCollision;
-      if (at_fault(own, world.agents.speed_mps[slot], world.boxes[other])) events |= kEventAtFault;
+      if (at_fault(own_before, world.agents.speed_mps[slot], world.boxes_before[other])) events |= kEventAtFault;
     }
   }
   world.agents.events[slot] = static_cast<uint8_t>(world.agents.events[slot] | events);

@@ -102,8 +102,51 @@ TEST(Collision, FaultFollowsThePaper) {
   EXPECT_TRUE(at_fault(own, 5, make_box(0, 2, kHalfPi)));  // side against side
   EXPECT_FALSE(at_fault(own, 0.1f, make_box(4, 0)));       // stood still
   EXPECT_FALSE(at_fault(own, -0.1f, make_box(-4, 0)));
-  EXPECT_FALSE(at_fault(own, 5, make_box(-4, 0.8f)));  // struck from behind
-  EXPECT_TRUE(at_fault(own, -1, make_box(-4, 0)));     // backed into it
+  EXPECT_FALSE(at_fault(own, 5, make_box(-4.1f, 0.8f)));  // struck from behind
+  EXPECT_TRUE(at_fault(own, -1, make_box(-4, 0)));        // backed into it
+}
+
+TEST(Collision, FaultIsJudgedByTheRearPlaneBeforeTheStep) {
+  const AgentBox own = make_box(0, 0);
+  // A cyclist whose front stands 5 cm behind the bumper, at the corner: more than 45 degrees off straight back.
+  EXPECT_FALSE(at_fault(own, 5, make_box(-2.9f, 1.2f, 0, 1.7f, 0.6f)));
+  EXPECT_FALSE(at_fault(own, 5, make_box(-2.9f, -1.2f, 0, 1.7f, 0.6f)));
+  // Beside the bumper it is a side hit.
+  EXPECT_TRUE(at_fault(own, 5, make_box(-2.7f, 1.4f, 0, 1.7f, 0.6f)));
+  // Head on, both are at fault.
+  EXPECT_TRUE(at_fault(own, 5, make_box(4.1f, 0.5f, kPi)));
+  EXPECT_TRUE(at_fault(make_box(4.1f, 0.5f, kPi), 5, own));
+  // From the side into the door, and from the side behind the bumper.
+  EXPECT_TRUE(at_fault(own, 5, make_box(-1, 3.1f, -kHalfPi)));
+  EXPECT_FALSE(at_fault(own, 5, make_box(-2.5f, 3.1f, -kHalfPi)));
+  // Who backs into the tail comes from behind too.
+  EXPECT_FALSE(at_fault(own, 5, make_box(-4.1f, 0, kPi)));
+  // All that holds in any direction.
+  EXPECT_FALSE(at_fault(
+      make_box(7, 3, 2), 5,
+      make_box(7 - 2.9f * cos_of(2) - 1.2f * sin_of(2), 3 - 2.9f * sin_of(2) + 1.2f * cos_of(2), 2, 1.7f, 0.6f)));
+}
+
+TEST(Collision, ARearEndAtSpeedIsTheRammersFaultAlone) {
+  // Bumpers 0.1 m apart, 1.5 m aside: the rammer ends 1.4 m inside the other, its centre beside the bumper rather than
+  // behind it.
+  testing::Stage stage(testing::stadium(200, 2), 2);
+  stage.put(0, {50, 0.5f}, 0, 20);
+  stage.put(1, {54.1f, 2}, 0, 5);
+  stage.step();
+  EXPECT_EQ(stage.events(0), kEventCollision | kEventAtFault);
+  EXPECT_EQ(stage.events(1), kEventCollision);
+}
+
+TEST(Collision, ACyclistAtTheRearCornerIsAtFaultAlone) {
+  testing::Stage stage(testing::stadium(200, 2), 2);
+  stage.batch.agents.length_m[0] = 1.7f;
+  stage.batch.agents.width_m[0] = 0.6f;
+  stage.put(0, {52.05f, 1.2f}, 0, 8);  // front at 53.41, the other's rear at 53.45
+  stage.put(1, {54.25f, 0}, 0, 3);
+  stage.step();
+  EXPECT_EQ(stage.events(0), kEventCollision | kEventAtFault);
+  EXPECT_EQ(stage.events(1), kEventCollision);
 }
 
 TEST(Collision, SegmentTouchesBox) {
