@@ -64,11 +64,35 @@ struct Crossing {
   int32_t lane_before = -1, lane_after = -1;
 };
 
+PICTURA_HD inline Span<const int32_t> successors_of(const MapView& map, int32_t lane) {
+  const MapLane& from = map.lanes[static_cast<size_t>(lane)];
+  return map.successors.subspan(static_cast<size_t>(from.first_successor),
+                                static_cast<size_t>(from.num_all_successors));
+}
+
+/// Whether `to` follows `from`, directly or past one lane that is shorter than a step's way.
+PICTURA_HD inline bool follows(const MapView& map, int32_t from, int32_t to) {
+  const Span<const int32_t> next = successors_of(map, from);
+  for (size_t i = 0; i < next.size(); ++i) {
+    if (next[i] == to) return true;
+    const Span<const int32_t> after = successors_of(map, next[i]);
+    for (size_t j = 0; j < after.size(); ++j) {
+      if (after[j] == to) return true;
+    }
+  }
+  return false;
+}
+
+/// Whether an agent has changed lanes, rather than driven on (or back) from one to the next of its route.
+PICTURA_HD inline bool is_lane_change(const MapView& map, int32_t before, int32_t after) {
+  return before >= 0 && after >= 0 && before != after && !follows(map, before, after) && !follows(map, after, before);
+}
+
 /// Whether the step violates stop line `light`, whose state during the step (the one that the agent saw before it) is
 /// `state`: the front bumper crosses it while it is red, or the agent changes from a lane that no light holds into one
 /// that this light holds, its bumper already past the line, while it is red. In both cases on the line's level, heading
-/// within 45 degrees of its traffic and within 10 m of its middle. Standing on a line that turns red, or clearing the
-/// junction behind it, is none.
+/// within 45 degrees of its traffic and within 10 m of its middle. Standing on a line that turns red, clearing the
+/// junction behind it, or entering the next lane of the route is none.
 PICTURA_HD inline bool violates(const MapView& map, int32_t light, const Crossing& crossing, LightState state) {
   constexpr float kCos45 = 0.70710678f;
   constexpr float kSideTolerance_m = 0.5f;
@@ -87,7 +111,7 @@ PICTURA_HD inline bool violates(const MapView& map, int32_t light, const Crossin
     const Vec2 at = crossing.bumper_before + (crossing.bumper_after - crossing.bumper_before) * fraction;
     if (fabsf(cross(line.direction, at - line.middle_m.xy())) <= line.half_length_m + kSideTolerance_m) return true;
   }
-  return crossing.lane_before >= 0 && crossing.lane_after >= 0 && crossing.lane_before != crossing.lane_after &&
+  return is_lane_change(map, crossing.lane_before, crossing.lane_after) &&
          map.lanes[static_cast<size_t>(crossing.lane_before)].light < 0 &&
          map.lanes[static_cast<size_t>(crossing.lane_after)].light == light;
 }

@@ -221,7 +221,9 @@ TEST(RedLightSection, LaneChangesAreWhatNoRouteDoes) {
   EXPECT_FALSE(is_lane_change(map.view(), 5, 4));  // backing up
   EXPECT_FALSE(is_lane_change(map.view(), -1, 4));
   EXPECT_FALSE(is_lane_change(map.view(), 4, -1));
-  EXPECT_TRUE(is_lane_change(map.view(), 0, 2));
+  const WorldMap side_by_side = make_world_map(*testing::stadium(200, 2), {});
+  EXPECT_TRUE(is_lane_change(side_by_side.view(), 4, 0));
+  EXPECT_TRUE(is_lane_change(side_by_side.view(), 4, 1));
 }
 
 TEST_F(RedLight, AnotherLevelIsNone) {
