@@ -21,11 +21,12 @@ namespace pictura {
 
 constexpr int kMaxAgentsPerWorld = 4096;
 constexpr int kMaxSlots = 1 << 22;  // controlled agents of one simulator
+constexpr int kMaxBoxes = 1 << 24;  // controlled agents and parked cars of one simulator; as many lights
 
 struct SimulatorConfig {
   uint64_t seed = 0;
   int num_threads = 0;  // host threads; 0: all
-  float dt_s = 0.1f;
+  float dt_s = 0.1f;    // in [0.01, 0.1]
   int episode_steps = 1280;
   float reset_inactive_fraction = 0.4f;  // a world resets when this part of its agents is inactive; > 1: never
   float pedestrian_fraction = 0.0f, cyclist_fraction = 0.0f;
@@ -104,7 +105,8 @@ class Simulator {
   virtual ObservationView observations() = 0;
   /// The scene of all worlds: controlled agents in slot order, each world's parked cars after its controlled agents.
   virtual const SceneBatch& scene() = 0;
-  /// One view per slot; those of absent agents (never spawned) see nothing of their own world's agents being left out.
+  /// One view per slot. That of an absent agent (one that found no place to spawn) stands at its map's origin and
+  /// leaves nobody out: it can be drawn like any other, its images mean nothing, and its slot is never valid.
   virtual Span<const View> views() = 0;
   /// One per map, in the order of maps(), for Renderer::upload; its handle must equal the map's index.
   virtual std::vector<StaticGeometry> geometries() const = 0;

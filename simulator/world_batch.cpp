@@ -6,6 +6,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/hash.h"
+#include "pictura/simulator/rules/collision.h"
 #include "pictura/simulator/rules/limits.h"
 
 namespace pictura {
@@ -16,7 +17,10 @@ constexpr float kBoxCell_m = 25.0f;
 void check(const SimulatorConfig& config) {
   const auto in = [](float value, float low, float high) { return value >= low && value <= high; };
   if (config.num_threads < 0) fail_usage("simulator: threads: expected 0 (all) or more, got {}", config.num_threads);
-  if (!in(config.dt_s, 0.01f, 0.5f)) fail_usage("simulator: dt_s: expected 0.01 to 0.5, got {}", config.dt_s);
+  // Contact is looked for on the assumption that nothing drives farther in a step than it is long.
+  if (!in(config.dt_s, 0.01f, kMaxStep_s)) {
+    fail_usage("simulator: dt_s: expected 0.01 to {}, got {}", kMaxStep_s, config.dt_s);
+  }
   if (config.episode_steps < 1)
     fail_usage("simulator: episode_steps: expected at least 1, got {}", config.episode_steps);
   if (!(config.reset_inactive_fraction > 0)) {
@@ -44,13 +48,14 @@ void check(const SimulatorConfig& config) {
   }
 }
 
-void check(const std::vector<std::shared_ptr<const RoadMap>>& maps, const std::vector<WorldSpec>& worlds) {
+void check(const SimulatorConfig& config, const std::vector<std::shared_ptr<const RoadMap>>& maps,
+           const std::vector<WorldSpec>& worlds) {
   if (maps.empty()) fail_usage("simulator: expected at least one map");
   for (const auto& map : maps) {
     if (!map) fail_usage("simulator: expected maps, got a null pointer");
   }
   if (worlds.empty()) fail_usage("simulator: expected at least one world");
-  int64_t slots = 0;
+  int64_t slots = 0, lights = 0;
   for (const WorldSpec& world : worlds) {
     if (world.map < 0 || world.map >= static_cast<int>(maps.size())) {
       fail_usage("simulator: world {}: expected a map in [0, {}), got {}", world.global_world, maps.size(), world.map);
@@ -60,8 +65,21 @@ void check(const std::vector<std::shared_ptr<const RoadMap>>& maps, const std::v
                  world.num_agents);
     }
     slots += world.num_agents;
+    lights += static_cast<int64_t>(maps[static_cast<size_t>(world.map)]->lights.size());
   }
   if (slots > kMaxSlots) fail_usage("simulator: expected at most {} agents in all, got {}", kMaxSlots, slots);
+  const auto num_worlds = static_cast<int64_t>(worlds.size());
+  const int64_t boxes = slots + num_worlds * config.parked_cars;
+  if (boxes > kMaxBoxes) {
+    fail_usage(
+        "simulator: expected at most {} boxes in all, got {} ({} bytes): {} agents, and {} parked cars in each of {} "
+        "worlds",
+        kMaxBoxes, boxes, boxes * static_cast<int64_t>(2 * sizeof(AgentBox)), slots, config.parked_cars, num_worlds);
+  }
+  if (lights > kMaxBoxes) {
+    fail_usage("simulator: expected at most {} traffic lights in all, got {} ({} bytes) in {} worlds", kMaxBoxes,
+               lights, lights * static_cast<int64_t>(sizeof(LightPlan) + sizeof(LightState)), num_worlds);
+  }
 }
 
 RuleOptions rule_options(const SimulatorConfig& config) {
@@ -78,15 +96,181 @@ RuleOptions rule_options(const SimulatorConfig& config) {
   return options;
 }
 
-CellLists empty_box_cells(const WorldMap& map, size_t num_boxes) {
+/// Of one world; without room for cells and boxes yet.
+CellLists box_grid(const WorldMap& map) {
   CellLists cells;
   cells.origin_m = map.low_m;
   cells.cell_m = kBoxCell_m;
   cells.num_x = static_cast<int>((map.high_m.x - map.low_m.x) / kBoxCell_m) + 1;
   cells.num_y = static_cast<int>((map.high_m.y - map.low_m.y) / kBoxCell_m) + 1;
+  return cells;
+}
+
+/// Throws UsageError when the worlds' box cells would take more than a gigabyte: each world has its own.
+void check_box_cells(const std::vector<WorldMap>& world_maps, const std::vector<WorldSpec>& worlds) {
+  constexpr int64_t kMaxCells = int64_t{1} << 28;
+  std::vector<int64_t> cells_of_map;
+  for (const WorldMap& map : world_maps) {
+    const CellLists grid = box_grid(map);
+    cells_of_map.push_back(int64_t{grid.num_x} * grid.num_y + 1);
+  }
+  int64_t cells = 0;
+  for (const WorldSpec& world : worlds) cells += cells_of_map[static_cast<size_t>(world.map)];
+  if (cells > kMaxCells) {
+    fail_usage("simulator: expected worlds of at most {} cells of {} m in all, got {} ({} bytes) in {} worlds",
+               kMaxCells, kBoxCell_m, cells, cells * static_cast<int64_t>(sizeof(int32_t)), worlds.size());
+  }
+}
+
+CellLists empty_box_cells(const WorldMap& map, size_t num_boxes) {
+  CellLists cells = box_grid(map);
   cells.begin.assign(static_cast<size_t>(cells.num_x) * static_cast<size_t>(cells.num_y) + 1, 0);
   cells.items.assign(num_boxes, 0);
   return cells;
+}
+
+/// Hashes values that have no padding.
+template <typename... Values>
+void add_values(Hash64* hash_inout, const Values&... values) {
+  (hash_inout->add_bytes(&values, sizeof(values)), ...);
+}
+
+void add_name(Hash64* hash_inout, const std::string& name) {
+  add_values(hash_inout, name.size());
+  hash_inout->add_bytes(name.data(), name.size());
+}
+
+void add_range(Hash64* hash_inout, IndexRange range) { add_values(hash_inout, range.begin, range.end); }
+
+/// Of everything in a map that the simulator reads.
+uint64_t fingerprint(const RoadMap& map) {
+  static_assert(sizeof(LanePoint) == 6 * sizeof(float) && sizeof(RoadEdge) == 6 * sizeof(float));
+  static_assert(sizeof(ParkingSpace) == 6 * sizeof(float) && sizeof(BuildingLine) == 6 * sizeof(float));
+  Hash64 hash;
+  add_name(&hash, map.name);
+  for (const Lane& lane : map.lanes) {
+    add_values(&hash, lane.type, lane.in_junction, lane.is_endless, lane.left_neighbor, lane.right_neighbor,
+               lane.speed_limit_mps);
+    add_range(&hash, lane.points);
+    add_range(&hash, lane.successors);
+  }
+  hash.add(Span<const LanePoint>(map.lane_points));
+  hash.add(Span<const int32_t>(map.lane_links));
+  hash.add(Span<const RoadEdge>(map.road_edges));
+  hash.add(Span<const ParkingSpace>(map.parking_spaces));
+  hash.add(Span<const BuildingLine>(map.building_lines));
+  for (const TrafficLight& light : map.lights) {
+    add_values(&hash, light.stop_a_m, light.stop_b_m, light.stop_heading_rad, light.junction, light.phase);
+    add_range(&hash, light.lanes);
+  }
+  hash.add(Span<const int32_t>(map.light_lanes));
+  for (const Junction& junction : map.junctions) add_values(&hash, junction.num_phases);
+  return hash.value();
+}
+
+/// What a saved state must have in common with the simulator that restores it, by the names that a mismatch is told by.
+struct Fingerprint {
+  std::string name;
+  uint64_t value = 0;
+};
+
+std::vector<Fingerprint> fingerprints(const WorldBatch& batch) {
+  std::vector<Fingerprint> prints;
+  const auto add = [&prints](std::string name, const auto&... values) {
+    Hash64 hash;
+    add_values(&hash, values...);
+    prints.push_back({std::move(name), hash.value()});
+  };
+  const SimulatorConfig& config = batch.config;
+  add("seed", config.seed);
+  add("time (dt_s, episode_steps, reset_inactive_fraction)", config.dt_s, config.episode_steps,
+      config.reset_inactive_fraction);
+  add("population (pedestrian_fraction, cyclist_fraction, parked_cars)", config.pedestrian_fraction,
+      config.cyclist_fraction, config.parked_cars);
+  add("walls (walls, wall_seed)", config.walls, config.wall_seed);
+  add("fixed_lights", config.fixed_lights);
+  Hash64 conditioning, worlds;
+  for (const ConditioningRange& range : config.conditioning) {
+    add_values(&conditioning, range.low, range.high, range.mixture);
+  }
+  prints.push_back({"conditioning", conditioning.value()});
+  for (const WorldSpec& world : batch.worlds) add_values(&worlds, world.map, world.num_agents, world.global_world);
+  prints.push_back({"worlds", worlds.value()});
+  add("number of maps", batch.maps.size());
+  for (const auto& map : batch.maps) prints.push_back({fmt::format("map {}", map->name), fingerprint(*map)});
+  return prints;
+}
+
+bool all_finite(const std::vector<float>& values) {
+  return std::all_of(values.begin(), values.end(), [](float value) { return std::isfinite(value); });
+}
+template <typename Integer>
+bool all_finite(const std::vector<Integer>&) {
+  return true;
+}
+
+/// Throws Error naming the field unless every value can be stepped on: indices exist and numbers are finite.
+void check_restored(const WorldBatch& batch) {
+  constexpr float kMaxCoordinate_m = 1e6f;
+  const AgentState& agents = batch.agents;
+#define X(name, type, per_agent, first, comment) \
+  PICTURA_CHECK(all_finite(agents.name), "simulator state: {}: expected finite numbers", #name);
+  PICTURA_AGENT_FIELDS(X)
+#undef X
+  const auto expect = [](bool is_sound, size_t slot, const char* field, auto value) {
+    PICTURA_CHECK(is_sound, "simulator state: agent {}: {}: {} is out of range", slot, field, value);
+  };
+  for (size_t w = 0; w < batch.worlds.size(); ++w) {
+    const std::vector<MapLane>& lanes = batch.world_maps[static_cast<size_t>(batch.worlds[w].map)].lanes;
+    const auto is_lane = [&lanes](int32_t lane) {
+      return lane >= 0 && static_cast<size_t>(lane) < lanes.size() && lanes[static_cast<size_t>(lane)].num_segments > 0;
+    };
+    for (auto slot = static_cast<size_t>(batch.slot_begin[w]); slot < static_cast<size_t>(batch.slot_begin[w + 1]);
+         ++slot) {
+      const auto status = static_cast<AgentStatus>(agents.status[slot]);
+      expect(status == AgentStatus::active || status == AgentStatus::halted || status == AgentStatus::absent, slot,
+             "status", static_cast<int>(status));
+      expect(agents.agent_class[slot] < kNumAgentClasses, slot, "agent_class",
+             static_cast<int>(agents.agent_class[slot]));
+      expect(agents.lane[slot] == -1 || is_lane(agents.lane[slot]), slot, "lane", agents.lane[slot]);
+      expect(is_lane(agents.goal_lane[slot]) || (agents.goal_lane[slot] == -1 && status == AgentStatus::absent), slot,
+             "goal_lane", agents.goal_lane[slot]);
+      expect(agents.next_waypoint[slot] >= 0 && agents.next_waypoint[slot] < kNumWaypoints, slot, "next_waypoint",
+             agents.next_waypoint[slot]);
+      expect(agents.goal_chains[slot] >= 0, slot, "goal_chains", agents.goal_chains[slot]);
+      expect(std::fabs(agents.x_m[slot]) <= kMaxCoordinate_m, slot, "x_m", agents.x_m[slot]);
+      expect(std::fabs(agents.y_m[slot]) <= kMaxCoordinate_m, slot, "y_m", agents.y_m[slot]);
+    }
+    PICTURA_CHECK(batch.spawned[w] >= 0 && batch.spawned[w] <= batch.worlds[w].num_agents,
+                  "simulator state: world {}: spawned: {} is out of range", w, batch.spawned[w]);
+    PICTURA_CHECK(batch.episode_step[w] >= 0 && batch.episode_step[w] <= batch.config.episode_steps,
+                  "simulator state: world {}: episode_step: {} is out of range", w, batch.episode_step[w]);
+    PICTURA_CHECK(batch.episode_index[w] >= 0, "simulator state: world {}: episode_index: {} is out of range", w,
+                  batch.episode_index[w]);
+  }
+  for (const std::vector<AgentBox>* boxes : {&batch.boxes, &batch.boxes_before}) {
+    for (size_t i = 0; i < boxes->size(); ++i) {
+      const AgentBox& box = (*boxes)[i];
+      const Vec3 at = box.center_m;
+      // Comparisons are false for what is not a number.
+      PICTURA_CHECK(std::fabs(at.x) <= kMaxCoordinate_m && std::fabs(at.y) <= kMaxCoordinate_m &&
+                        std::fabs(at.z) <= kMaxCoordinate_m && std::fabs(box.cos_heading) <= 1.001f &&
+                        std::fabs(box.sin_heading) <= 1.001f && box.length_m >= 0 && box.width_m >= 0 &&
+                        box.height_m >= 0 && radius(box) <= kMaxBoxRadius_m && box.height_m <= kMaxCoordinate_m &&
+                        static_cast<int>(box.agent_class) < kNumAgentClasses,
+                    "simulator state: boxes: box {}: pose, size or class is out of range", i);
+    }
+  }
+  for (size_t i = 0; i < batch.light_plans.size(); ++i) {
+    const LightPlan& plan = batch.light_plans[i];
+    const int64_t slot_steps = int64_t{plan.green_steps} + plan.yellow_steps + plan.red_steps;
+    PICTURA_CHECK(plan.green_steps >= 0 && plan.yellow_steps >= 0 && plan.red_steps >= 0 && slot_steps >= 1 &&
+                      plan.num_phases >= 1 && plan.phase >= 0 && plan.offset_steps >= 0 &&
+                      plan.offset_steps < slot_steps * plan.num_phases && slot_steps * plan.num_phases <= INT32_MAX / 2,
+                  "simulator state: light_plans: light {}: the plan is out of range", i);
+    PICTURA_CHECK(batch.lights[i] <= LightState::green, "simulator state: lights: light {}: {} is out of range", i,
+                  static_cast<int>(batch.lights[i]));
+  }
 }
 
 }  // namespace
@@ -95,7 +279,7 @@ WorldBatch::WorldBatch(const SimulatorConfig& config_in, std::vector<std::shared
                        std::vector<WorldSpec> worlds_in)
     : config(config_in), maps(std::move(maps_in)), worlds(std::move(worlds_in)) {
   check(config);
-  check(maps, worlds);
+  check(config, maps, worlds);
   options = rule_options(config);
   for (const auto& map : maps) {
     const MapGeometryOptions geometry_options{.walls = config.walls, .wall_seed = config.wall_seed};
@@ -105,6 +289,7 @@ WorldBatch::WorldBatch(const SimulatorConfig& config_in, std::vector<std::shared
                   "map {}: expected a lane outside junctions from which a route goes on for ever, got none", map->name);
   }
 
+  check_box_cells(world_maps, worlds);
   slot_begin = box_begin = light_begin = {0};
   for (const WorldSpec& world : worlds) {
     const WorldMap& map = world_maps[static_cast<size_t>(world.map)];
@@ -182,39 +367,6 @@ uint64_t WorldBatch::state_hash() const {
   return hash.value();
 }
 
-uint64_t WorldBatch::fingerprint() const {
-  Hash64 hash;
-  const auto add = [&hash](const auto& value) { hash.add_bytes(&value, sizeof(value)); };
-  add(config.seed);
-  add(config.dt_s);
-  add(config.episode_steps);
-  add(config.reset_inactive_fraction);
-  add(config.pedestrian_fraction);
-  add(config.cyclist_fraction);
-  add(config.parked_cars);
-  add(config.walls);
-  add(config.wall_seed);
-  add(config.fixed_lights);
-  for (const ConditioningRange& range : config.conditioning) {
-    add(range.low);
-    add(range.high);
-    add(range.mixture);
-  }
-  for (const auto& map : maps) {
-    hash.add_bytes(map->name.data(), map->name.size());
-    add(map->lanes.size());
-    add(map->lane_points.size());
-    add(map->road_edges.size());
-    add(map->lights.size());
-  }
-  for (const WorldSpec& world : worlds) {
-    add(world.map);
-    add(world.num_agents);
-    add(world.global_world);
-  }
-  return hash.value();
-}
-
 /// Calls visit(data, bytes) for every saved array but the agents' fields.
 template <typename Self, typename Visit>
 void WorldBatch::visit_saved(Self& self, Visit&& visit) {
@@ -230,35 +382,47 @@ void WorldBatch::visit_saved(Self& self, Visit&& visit) {
   array(self.world_totals);
 }
 
-WorldBatch::SavedHeader WorldBatch::make_header() const {
-  SavedHeader header{};
-  header.fingerprint = fingerprint();
-  return header;
-}
-
 size_t WorldBatch::saved_bytes() const {
-  size_t sum = sizeof(SavedHeader) + agents.size_bytes();
+  size_t sum = agents.size_bytes();
   visit_saved(*this, [&sum](const void*, size_t size) { sum += size; });
   return sum;
 }
 
-std::vector<uint8_t> WorldBatch::save() const {
-  const SavedHeader header = make_header();
-  std::vector<uint8_t> bytes(saved_bytes());
-  std::memcpy(bytes.data(), &header, sizeof(header));
-  uint8_t* next = bytes.data() + sizeof(header);
-  agents.copy_to(next);
-  next += agents.size_bytes();
-  visit_saved(*this, [&next](const void* data, size_t size) {
-    if (size > 0) std::memcpy(next, data, size);
-    next += size;
+void WorldBatch::assign_from(const uint8_t* bytes) {
+  agents.assign_from(bytes);
+  bytes += agents.size_bytes();
+  visit_saved(*this, [&bytes](void* data, size_t size) {
+    if (size > 0) std::memcpy(data, bytes, size);
+    bytes += size;
   });
+}
+
+void WorldBatch::copy_to(uint8_t* bytes_out) const {
+  agents.copy_to(bytes_out);
+  bytes_out += agents.size_bytes();
+  visit_saved(*this, [&bytes_out](const void* data, size_t size) {
+    if (size > 0) std::memcpy(bytes_out, data, size);
+    bytes_out += size;
+  });
+}
+
+std::vector<uint8_t> WorldBatch::save() const {
+  const std::vector<Fingerprint> prints = fingerprints(*this);
+  SavedHeader header;
+  header.num_fingerprints = prints.size();
+  const size_t prints_bytes = prints.size() * sizeof(uint64_t);
+  std::vector<uint8_t> bytes(sizeof(header) + prints_bytes + saved_bytes());
+  std::memcpy(bytes.data(), &header, sizeof(header));
+  for (size_t i = 0; i < prints.size(); ++i) {
+    std::memcpy(bytes.data() + sizeof(header) + i * sizeof(uint64_t), &prints[i].value, sizeof(uint64_t));
+  }
+  copy_to(bytes.data() + sizeof(header) + prints_bytes);
   return bytes;
 }
 
 void WorldBatch::restore(Span<const uint8_t> bytes) {
-  const SavedHeader expected = make_header();
-  SavedHeader header{};
+  const SavedHeader expected;
+  SavedHeader header;
   PICTURA_CHECK(bytes.size() >= sizeof(header), "simulator state: expected at least {} bytes, got {}", sizeof(header),
                 bytes.size());
   std::memcpy(&header, bytes.data(), sizeof(header));
@@ -267,17 +431,30 @@ void WorldBatch::restore(Span<const uint8_t> bytes) {
                 "simulator state: written by a machine of another byte order");
   PICTURA_CHECK(header.version == expected.version, "simulator state: expected version {}, got {}", expected.version,
                 header.version);
-  PICTURA_CHECK(header.fingerprint == expected.fingerprint,
-                "simulator state: of another configuration (seed, rules, maps or worlds differ)");
-  PICTURA_CHECK(bytes.size() == saved_bytes(), "simulator state: expected {} bytes, got {}", saved_bytes(),
-                bytes.size());
-  const uint8_t* next = bytes.data() + sizeof(header);
-  agents.assign_from(next);
-  next += agents.size_bytes();
-  visit_saved(*this, [&next](void* data, size_t size) {
-    if (size > 0) std::memcpy(data, next, size);
-    next += size;
-  });
+  const std::vector<Fingerprint> prints = fingerprints(*this);
+  for (size_t i = 0; i < prints.size(); ++i) {
+    const size_t at = sizeof(header) + i * sizeof(uint64_t);
+    PICTURA_CHECK(bytes.size() >= at + sizeof(uint64_t),
+                  "simulator state: ends within its fingerprints, after {} bytes", bytes.size());
+    uint64_t saved = 0;
+    std::memcpy(&saved, bytes.data() + at, sizeof(saved));
+    PICTURA_CHECK(saved == prints[i].value, "simulator state: saved with another {}", prints[i].name);
+  }
+  PICTURA_CHECK(header.num_fingerprints == prints.size(), "simulator state: expected {} fingerprints, got {}",
+                prints.size(), header.num_fingerprints);
+  const size_t begin = sizeof(header) + prints.size() * sizeof(uint64_t);
+  PICTURA_CHECK(bytes.size() == begin + saved_bytes(), "simulator state: expected {} bytes, got {}",
+                begin + saved_bytes(), bytes.size());
+
+  std::vector<uint8_t> present(saved_bytes());
+  copy_to(present.data());
+  assign_from(bytes.data() + begin);
+  try {
+    check_restored(*this);
+  } catch (const Error&) {
+    assign_from(present.data());
+    throw;
+  }
 }
 
 }  // namespace pictura

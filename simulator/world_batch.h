@@ -28,6 +28,8 @@ struct WorldBatch {
 
   uint64_t state_hash() const;
   std::vector<uint8_t> save() const;
+  /// Throws Error, and leaves everything as it was, when the bytes are of another simulator, naming what differs, or
+  /// when a field holds what no simulator saved.
   void restore(Span<const uint8_t> bytes);
 
   SimulatorConfig config;
@@ -57,14 +59,14 @@ struct WorldBatch {
  private:
   struct SavedHeader {
     std::array<char, 8> magic{'P', 'I', 'C', 'S', 'T', 'A', 'T', 'E'};
-    uint32_t version = 1;
+    uint32_t version = 2;
     uint32_t byte_order = 0x01020304;
-    uint64_t fingerprint = 0;
+    uint64_t num_fingerprints = 0;  // that follow: what saver and restorer must have in common
   };
-  SavedHeader make_header() const;
+  /// Bytes of the state without its header, and the state to and from so many.
   size_t saved_bytes() const;
-  /// Of everything that a saved state must have in common with the simulator that restores it.
-  uint64_t fingerprint() const;
+  void copy_to(uint8_t* bytes_out) const;
+  void assign_from(const uint8_t* bytes);
   template <typename Self, typename Visit>
   static void visit_saved(Self& self, Visit&& visit);
 

@@ -3,10 +3,13 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <functional>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "pictura/common/error.h"
+#include "pictura/common/raster_check.h"
 #include "pictura/common/rng.h"
 #include "pictura/map/load_map.h"
 #include "pictura/tests/simulator/test_maps.h"
@@ -74,6 +77,7 @@ TEST(Simulator, RefusesWhatCannotBeAskedFor) {
   EXPECT_THROW(make_simulator("cpu", {}, {}, {{0, 1, 0}}), UsageError);
   EXPECT_THROW(make({.dt_s = 0}, map, {{0, 1, 0}}), UsageError);
   EXPECT_THROW(make({.dt_s = NAN}, map, {{0, 1, 0}}), UsageError);
+  EXPECT_THROW(make({.dt_s = 0.11f}, map, {{0, 1, 0}}), UsageError);  // cars would jump over what is in their way
   EXPECT_THROW(make({.episode_steps = 0}, map, {{0, 1, 0}}), UsageError);
   EXPECT_THROW(make({.pedestrian_fraction = 0.6f, .cyclist_fraction = 0.6f}, map, {{0, 1, 0}}), UsageError);
   SimulatorConfig config;
@@ -84,6 +88,37 @@ TEST(Simulator, RefusesWhatCannotBeAskedFor) {
   } catch (const UsageError& error) {
     EXPECT_NE(std::string(error.what()).find("cpu, auto"), std::string::npos);
   }
+}
+
+/// The message of the error that `body` throws, of that type; empty when it throws none.
+template <typename Expected, typename Body>
+std::string message_of(Body&& body) {
+  try {
+    body();
+  } catch (const Expected& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Simulator, RefusesMoreThanFitsBeforeItAllocates) {
+  using ::testing::HasSubstr;
+  const auto worlds_of = [](int count) {
+    std::vector<WorldSpec> worlds;
+    for (int w = 0; w < count; ++w) worlds.push_back({0, 1, static_cast<uint32_t>(w)});
+    return worlds;
+  };
+  const auto refuse = [&worlds_of](const SimulatorConfig& config, std::shared_ptr<const RoadMap> map, int worlds) {
+    return message_of<UsageError>([&] { make(config, std::move(map), worlds_of(worlds)); });
+  };
+  // 4,194,304 agents alone with 4,096 parked cars each: 1.7e10 boxes.
+  EXPECT_THAT(refuse({.parked_cars = 4096}, testing::ring_road(40), kMaxSlots), HasSubstr("got 17184063488 ("));
+  // 5,000 lights in each of 4,000 worlds.
+  auto lit = testing::ring_road(40);
+  for (int i = 0; i < 5000; ++i) testing::add_light(lit.get(), 0, 4, 1, {0});
+  EXPECT_THAT(refuse({}, lit, 4000), HasSubstr("lights in all, got 20000000 ("));
+  // A road of 5 km, with its own cells in each of 500,000 worlds.
+  EXPECT_THAT(refuse({}, testing::stadium(5000, 1), 500'000), HasSubstr("cells of 25 m in all"));
 }
 
 TEST(Simulator, RefusesAMapThatNobodyCanSpawnOn) {
@@ -137,6 +172,8 @@ TEST(Simulator, SpawnsWithoutOverlapAndCountsRefusals) {
     }
   }
   EXPECT_EQ(drawn, report.spawned);
+  // Absent agents' views can be drawn with the others'.
+  EXPECT_NO_THROW(check_views("cpu", scene, simulator->views()));
   // Refusals do not stop the others; they are never valid.
   const StepResult result = simulator->step(std::vector<int32_t>(200, kCoast));
   for (size_t i = 0; i < 200; ++i) EXPECT_EQ(result.valid[i], scene.agents[i].drawn);
@@ -288,6 +325,73 @@ TEST(Simulator, SaveAndRestoreContinueIdentically) {
   EXPECT_THROW(copy->restore(broken), Error);
   EXPECT_THROW(make({.seed = 5, .episode_steps = 70}, map, worlds)->restore(bytes), Error);
   equal();
+}
+
+TEST(Simulator, RestoreSaysWhatDiffers) {
+  using ::testing::HasSubstr;
+  const auto make_map = [] {
+    auto map = testing::stadium(200, 2);
+    testing::add_light(map.get(), 100, 8, 2, {0, 4});
+    return map;
+  };
+  const std::vector<WorldSpec> worlds{{0, 4, 0}};
+  const std::vector<uint8_t> bytes = make({}, make_map(), worlds)->save();
+  const auto difference = [&](const SimulatorConfig& config, std::shared_ptr<const RoadMap> map) {
+    const auto simulator = make(config, std::move(map), worlds);
+    return message_of<Error>([&] { simulator->restore(bytes); });
+  };
+  EXPECT_EQ(difference({}, make_map()), "");
+  EXPECT_EQ(difference({.num_threads = 1, .vector_observations = false}, make_map()), "");
+  EXPECT_THAT(difference({.seed = 1}, make_map()), HasSubstr("seed"));
+  EXPECT_THAT(difference({.dt_s = 0.05f}, make_map()), HasSubstr("dt_s"));
+  EXPECT_THAT(difference({.cyclist_fraction = 0.5f}, make_map()), HasSubstr("cyclist_fraction"));
+  EXPECT_THAT(difference({.wall_seed = 1}, make_map()), HasSubstr("wall_seed"));
+  EXPECT_THAT(difference({.fixed_lights = true}, make_map()), HasSubstr("fixed_lights"));
+  SimulatorConfig config;
+  config.conditioning[3].high = 2;
+  EXPECT_THAT(difference(config, make_map()), HasSubstr("conditioning"));
+  // A map with as many of everything, but one of them edited.
+  const std::vector<std::function<void(RoadMap*)>> edits{
+      [](RoadMap* map) { map->lane_points[5].position_m.z += 0.5f; },
+      [](RoadMap* map) { map->lanes[2].speed_limit_mps = 11; },
+      [](RoadMap* map) { std::swap(map->lane_links[0], map->lane_links[2]); },
+      [](RoadMap* map) { map->road_edges[7].a_m.x += 0.01f; },
+      [](RoadMap* map) { map->lights[0].stop_a_m.x += 0.01f; },
+      [](RoadMap* map) { map->light_lanes[1] = 5; },
+  };
+  for (size_t i = 0; i < edits.size(); ++i) {
+    const auto map = make_map();
+    edits[i](map.get());
+    EXPECT_THAT(difference({}, map), HasSubstr("map stadium")) << i;
+  }
+}
+
+TEST(Simulator, RestoreRefusesFieldsOutOfRangeAndStaysAsItWas) {
+  using ::testing::HasSubstr;
+  const auto map = testing::stadium(200, 2);
+  const std::vector<WorldSpec> worlds{{0, 4, 0}};
+  const auto simulator = make({}, map, worlds);
+  run(simulator.get(), 3);
+  const uint64_t hash = simulator->state_hash();
+  const auto refusal = [&](const std::function<void(AgentStateView)>& spoil) {
+    const auto spoilt = make({}, map, worlds);
+    spoil(spoilt->state());
+    const std::vector<uint8_t> bytes = spoilt->save();
+    const std::string message = message_of<Error>([&] { simulator->restore(bytes); });
+    EXPECT_EQ(simulator->state_hash(), hash);
+    return message;
+  };
+  EXPECT_THAT(refusal([](AgentStateView state) { state.lane[3] = 8; }), HasSubstr("agent 3: lane: 8"));
+  EXPECT_THAT(refusal([](AgentStateView state) { state.lane[3] = -2; }), HasSubstr("agent 3: lane: -2"));
+  EXPECT_THAT(refusal([](AgentStateView state) { state.goal_lane[1] = -1; }), HasSubstr("agent 1: goal_lane: -1"));
+  EXPECT_THAT(refusal([](AgentStateView state) { state.next_waypoint[0] = 3; }), HasSubstr("next_waypoint: 3"));
+  EXPECT_THAT(refusal([](AgentStateView state) { state.agent_class[2] = 3; }), HasSubstr("agent_class: 3"));
+  EXPECT_THAT(refusal([](AgentStateView state) { state.status[2] = 4; }), HasSubstr("status: 4"));
+  EXPECT_THAT(refusal([](AgentStateView state) { state.status[2] = 2; }), HasSubstr("status: 2"));
+  EXPECT_THAT(refusal([](AgentStateView state) { state.x_m[2] = NAN; }), HasSubstr("x_m"));
+  EXPECT_THAT(refusal([](AgentStateView state) { state.y_m[2] = 1e9f; }), HasSubstr("agent 2: y_m"));
+  EXPECT_THAT(refusal([](AgentStateView state) { state.conditioning[20] = INFINITY; }), HasSubstr("conditioning"));
+  EXPECT_EQ(message_of<Error>([&] { simulator->restore(make({}, map, worlds)->save()); }), "");
 }
 
 TEST(Simulator, ConditioningIsDrawnAsThePaperSays) {
