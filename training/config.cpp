@@ -39,9 +39,9 @@ void visit(AnyConfig& c, Visitor&& v) {
     v.range(std::string("simulator.conditioning.") + kConditioningNames[i], c.simulator.conditioning[size_t(i)]);
   }
 
-  v.integer("render.width_px", c.render.width_px, 1, 8192);
-  v.integer("render.height_px", c.render.height_px, 1, 8192);
   v.text("render.rig", c.render.rig);
+  v.integer_unless("render.rig", !c.render.rig.empty(), "render.width_px", c.render.width_px, 1, 8192);
+  v.integer_unless("render.rig", !c.render.rig.empty(), "render.height_px", c.render.height_px, 1, 8192);
   v.number("render.line_floor_px", c.render.line_floor_px, 0, 16);
 
   v.modality("policy.modality", c.policy.modality);
@@ -102,6 +102,14 @@ class Reader {
       const int64_t number = integer_of(key, *node, low, high);
       value = static_cast<Int>(number);
     }
+  }
+
+  /// A key that means nothing once `other` is set, which must have been visited before.
+  template <typename Int>
+  void integer_unless(const std::string& other, bool is_set, const std::string& key, Int& value, int64_t low,
+                      int64_t high) {
+    if (find(key) && is_set) refuse(key, fmt::format("has no effect together with {}: leave one of them out", other));
+    integer(key, value, low, high);
   }
 
   void number(const std::string& key, double& value, double low, double high) {
@@ -241,6 +249,11 @@ class Writer {
   void integer(const std::string& key, const Int& value, int64_t, int64_t) {
     line(key, fmt::format("{}", value));
   }
+  template <typename Int>
+  void integer_unless(const std::string&, bool is_set, const std::string& key, const Int& value, int64_t low,
+                      int64_t high) {
+    if (!is_set) integer(key, value, low, high);
+  }
   void number(const std::string& key, const double& value, double, double) { line(key, shortest(value)); }
   void flag(const std::string& key, const bool& value) { line(key, value ? "true" : "false"); }
   void text(const std::string& key, const std::string& value) { line(key, quoted(value)); }
@@ -331,13 +344,8 @@ void check_contradictions(const Config& c, const Reader& reader) {
                   fmt::format("expected a divisor of the last of policy.conv_channels ({}), got {}",
                               c.policy.conv_channels.back(), c.policy.attention_heads));
   }
-  const double images =
-      double(c.train.num_steps + 1) * c.simulator.num_slots * c.render.width_px * c.render.height_px * 12;
-  if (c.policy.modality == Modality::perspective && images > 1e12) {
-    reader.refuse(
-        "simulator.num_slots",
-        fmt::format("{} agents, {} steps and {}x{} images need {:.0f} GB for one rollout", c.simulator.num_slots,
-                    c.train.num_steps, c.render.width_px, c.render.height_px, images / 1e9));
+  if (c.policy.auxiliary && c.policy.modality == Modality::perspective) {
+    reader.refuse("policy.auxiliary", "has no effect with the modality \"perspective\": images have no such slots");
   }
 }
 

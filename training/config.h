@@ -35,8 +35,8 @@ struct Config {
   } simulator;
 
   struct Render {
-    int width_px = 96, height_px = 54;  // of each camera of the paper's rig
-    std::string rig;                    // a rig file (docs/image.md) instead; relative to the configuration's folder
+    std::string rig;                    // a rig file (docs/image.md); relative to the configuration's folder
+    int width_px = 96, height_px = 54;  // without one: of each camera of the paper's rig
     double line_floor_px = 0.35;
   } render;
 

@@ -94,6 +94,21 @@ TEST(Config, ErrorsNameFileLineAndKey) {
   EXPECT_THAT(message_of("", {"nonsense.key=1"}), HasSubstr("nonsense"));
 }
 
+TEST(Config, KeysWithoutEffectAreRefused) {
+  EXPECT_THAT(message_of("[policy]\nmodality = \"perspective\"\nauxiliary = true\n"),
+              AllOf(HasSubstr("a.toml:3: policy.auxiliary"), HasSubstr("no effect")));
+  EXPECT_EQ(message_of("[policy]\nmodality = \"vector\"\nauxiliary = true\n"), "");
+  EXPECT_THAT(message_of("[render]\nwidth_px = 96\nrig = \"r.toml\"\n"),
+              AllOf(HasSubstr("a.toml:2: render.width_px"), HasSubstr("render.rig")));
+  EXPECT_THAT(message_of("[render]\nrig = \"r.toml\"\n", {"render.height_px=9"}),
+              AllOf(HasSubstr("--set render.height_px"), HasSubstr("render.rig")));
+  // What is written for a run with a rig file can be read again.
+  const Config c = parse_config("[render]\nrig = \"r.toml\"\n", "a.toml");
+  EXPECT_EQ(to_toml(parse_config(to_toml(c), "b.toml")), to_toml(c));
+  EXPECT_THAT(first_difference(c, Config{}), HasSubstr("render.rig"));
+  EXPECT_THAT(first_difference(Config{}, c), HasSubstr("render.rig"));
+}
+
 TEST(Config, DifferencesAreNamedExceptForThoseThatMayDiffer) {
   Config a, b;
   b.train.updates = 3;
