@@ -112,6 +112,13 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
                         {"distance_m", checkpoint.distance_m},
                         {"adam_steps", checkpoint.adam_steps},
                         {"filter_average", checkpoint.filter_average}};
+  header["recent"] = ordered_json::array();
+  for (const RecentUpdate& r : checkpoint.recent) {
+    header["recent"].push_back({{"goals", r.goals},
+                                {"finished", r.finished},
+                                {"distance_m", r.distance_m},
+                                {"finished_return", r.finished_return}});
+  }
   header["parameters"] = describe(checkpoint.parameters);
   header["first_moments"] = describe(checkpoint.first_moments);
   header["second_moments"] = describe(checkpoint.second_moments);
@@ -189,12 +196,34 @@ Checkpoint read_checkpoint(const std::string& path) {
     result.distance_m = counters.at("distance_m");
     result.adam_steps = counters.at("adam_steps");
     result.filter_average = counters.at("filter_average");
+    // A run saved without it goes on as exactly; its averages alone begin anew.
+    for (const ordered_json& json : header.value("recent", ordered_json::array())) {
+      result.recent.push_back(
+          {json.at("goals"), json.at("finished"), json.at("distance_m"), json.at("finished_return")});
+    }
     result.rig = rig_from_json(header.at("rig"));
     result.config = parse_config(header.at("config").get<std::string>(), path + ": config");
   } catch (const nlohmann::json::exception& error) {
     fail("{}: its header cannot be read: {}", path, error.what());
   }
   return result;
+}
+
+std::string first_difference(const Rig& saved, const Rig& now) {
+  if (saved.cameras.size() != now.cameras.size()) {
+    return fmt::format("{} cameras became {}", saved.cameras.size(), now.cameras.size());
+  }
+  const ordered_json before = rig_to_json(saved), after = rig_to_json(now);
+  for (size_t c = 0; c < before.size(); ++c) {
+    for (const auto& [property, value] : before[c].items()) {
+      const ordered_json& other = after[c].at(property);
+      if (value != other) {
+        return fmt::format("camera '{}': {}: {} became {}", saved.cameras[c].name, property, value.dump(),
+                           other.dump());
+      }
+    }
+  }
+  return "";
 }
 
 void restore_tensors(const Checkpoint& checkpoint, const std::vector<NamedTensor>& saved,
@@ -208,6 +237,9 @@ void restore_tensors(const Checkpoint& checkpoint, const std::vector<NamedTensor
     PICTURA_CHECK(found->value.sizes() == parameter.value.sizes(),
                   "{}: of another architecture: parameter '{}': expected [{}], got [{}]", checkpoint.path,
                   parameter.name, fmt::join(parameter.value.sizes(), ", "), fmt::join(found->value.sizes(), ", "));
+    PICTURA_CHECK(at::isfinite(found->value).all().item<bool>(),
+                  "{}: parameter '{}': expected finite numbers, got infinities or NaN", checkpoint.path,
+                  parameter.name);
     at::Tensor target = parameter.value;
     target.copy_(found->value);
   }

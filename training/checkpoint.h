@@ -6,6 +6,12 @@
 
 namespace pictura {
 
+/// What the progress line averages over: one update's part of it.
+struct RecentUpdate {
+  int64_t goals = 0, finished = 0;  // finished: agent episodes that ended
+  double distance_m = 0, finished_return = 0;
+};
+
 struct Checkpoint {
   std::string path;  // where it was read from, for messages
   Config config;
@@ -15,6 +21,7 @@ struct Checkpoint {
   double distance_m = 0;  // driven by all agents
   int64_t adam_steps = 0;
   double filter_average = -1;  // of AdvantageFilter
+  std::vector<RecentUpdate> recent;
   std::vector<NamedTensor> parameters, first_moments, second_moments;
   std::vector<uint8_t> simulator;  // Simulator::save(), at the start of update `update`
 };
@@ -26,8 +33,11 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint);
 /// another observation schema (naming the entry that differs).
 Checkpoint read_checkpoint(const std::string& path);
 
-/// Copies `saved` into `parameters` in place. Throws Error naming the checkpoint and the first tensor that is missing
-/// or of another shape.
+/// Camera and property in which the two rigs first differ, with both values, or empty.
+std::string first_difference(const Rig& saved, const Rig& now);
+
+/// Copies `saved` into `parameters` in place. Throws Error naming the checkpoint and the first tensor that is missing,
+/// of another shape, or holds a number that is not finite: such a policy would still choose actions.
 void restore_tensors(const Checkpoint& checkpoint, const std::vector<NamedTensor>& saved,
                      const std::vector<NamedTensor>& parameters);
 

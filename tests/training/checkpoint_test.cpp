@@ -1,8 +1,10 @@
 // Files: checkpoints that come back whole or are refused by name, safetensors, TensorBoard records.
 #include "pictura/training/checkpoint.h"
 
+#include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <limits>
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
@@ -46,6 +48,7 @@ Checkpoint small_checkpoint(const Policy& policy, const Config& config) {
   c.distance_m = 7.25;
   c.adam_steps = 24;
   c.filter_average = 0.1234567890123;
+  c.recent = {{1, 2, 3.1, -4.123456789012345}, {5, 6, 7, 8}};
   c.parameters = policy.parameters();
   for (const NamedTensor& p : policy.parameters()) {
     c.first_moments.push_back({p.name, at::full_like(p.value, 1.5)});
@@ -77,6 +80,13 @@ TEST_F(CheckpointFile, ComesBackWhole) {
   EXPECT_EQ(back.distance_m, 7.25);
   EXPECT_EQ(back.adam_steps, 24);
   EXPECT_EQ(back.filter_average, 0.1234567890123);
+  ASSERT_EQ(back.recent.size(), 2u);
+  EXPECT_EQ(back.recent[0].goals, 1);
+  EXPECT_EQ(back.recent[0].finished, 2);
+  EXPECT_EQ(back.recent[0].distance_m, 3.1);
+  EXPECT_EQ(back.recent[0].finished_return, -4.123456789012345);
+  EXPECT_EQ(back.recent[1].finished_return, 8);
+  EXPECT_EQ(first_difference(back.rig, paper_rig(16, 9)), "");
   EXPECT_EQ(back.simulator, (std::vector<uint8_t>{1, 2, 3, 255}));
   ASSERT_EQ(back.rig.cameras.size(), 4u);
   EXPECT_EQ(back.rig.cameras[1].yaw_rad, paper_rig(16, 9).cameras[1].yaw_rad);
@@ -104,6 +114,32 @@ TEST_F(CheckpointFile, OtherArchitecturesAreRefusedByName) {
   const Policy seeing(config.policy, 4, 1);
   EXPECT_THAT(message_of([&] { restore_tensors(saved, saved.parameters, seeing.parameters()); }),
               HasSubstr("no parameter 'conv.0.weight'"));
+}
+
+TEST_F(CheckpointFile, WeightsThatAreNotFiniteAreRefusedByName) {
+  const Config config = small_config();
+  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+    const Policy policy(config.policy, 4, 1);
+    at::Tensor weight = policy.parameters()[3].value.detach();
+    weight.flatten()[1] = bad;
+    write_checkpoint(folder_ + "/a.ckpt", small_checkpoint(policy, config));
+    EXPECT_THAT(
+        message_of([&] { load_driver(folder_ + "/a.ckpt", 1); }),
+        ::testing::AllOf(HasSubstr("a.ckpt"), HasSubstr("'" + policy.parameters()[3].name + "'"), HasSubstr("finite")));
+  }
+}
+
+TEST(Rigs, DifferencesAreNamed) {
+  const Rig saved = paper_rig(16, 9);
+  Rig now = saved;
+  now.cameras[2].yaw_rad += 0.25f;
+  EXPECT_THAT(first_difference(saved, now),
+              ::testing::AllOf(HasSubstr("'" + saved.cameras[2].name + "'"), HasSubstr("yaw_pitch_roll_rad")));
+  now = saved;
+  now.cameras[0].focal_x_px = std::nextafter(now.cameras[0].focal_x_px, 1e9f);
+  EXPECT_THAT(first_difference(saved, now), HasSubstr("focal_px"));
+  now.cameras.pop_back();
+  EXPECT_EQ(first_difference(saved, now), "4 cameras became 3");
 }
 
 TEST_F(CheckpointFile, BrokenFilesAreRefused) {
