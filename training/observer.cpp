@@ -1,6 +1,7 @@
 #include "pictura/training/observer.h"
 
 #include <chrono>
+#include <cstring>
 
 #include <ATen/core/grad_mode.h>
 
@@ -41,7 +42,32 @@ std::vector<ImageBlock> image_blocks(const Rig& rig, int64_t rows, int64_t slots
   return blocks;
 }
 
+// Moves element i of `pixels` [slots, ...] to slots[i], which ascend, and blackens all others. From the end, so that
+// nothing is overwritten before it has moved.
+void spread(const std::vector<int64_t>& slots, const at::Tensor& pixels) {
+  const auto bytes = static_cast<size_t>(pixels.stride(0));
+  uint8_t* const first = pixels.data_ptr<uint8_t>();
+  auto element = [&](int64_t i) { return first + static_cast<size_t>(i) * bytes; };
+  int64_t end = pixels.size(0);
+  for (auto i = static_cast<int64_t>(slots.size()); i-- > 0;) {
+    const int64_t slot = slots[static_cast<size_t>(i)];
+    if (slot != i) std::memcpy(element(slot), element(i), bytes);
+    std::memset(element(slot + 1), 0, static_cast<size_t>(end - slot - 1) * bytes);
+    end = slot;
+  }
+  std::memset(first, 0, static_cast<size_t>(end) * bytes);
+}
+
 }  // namespace
+
+std::vector<int64_t> active_slots(Simulator& simulator) {
+  const AgentStateView state = simulator.state();
+  std::vector<int64_t> slots;
+  for (int slot = 0; slot < simulator.num_slots(); ++slot) {
+    if (static_cast<AgentStatus>(state.status[slot]) == AgentStatus::active) slots.push_back(slot);
+  }
+  return slots;
+}
 
 std::string simulator_name(const std::string& backend) { return backend == "null" ? "cpu" : backend; }
 
@@ -81,6 +107,17 @@ Observation Observer::allocate(int64_t rows) const {
   return o;
 }
 
+double Observer::bytes_per_row() const {
+  double bytes = 0;
+  allocate(0).map([&](const at::Tensor& t) {
+    double row = static_cast<double>(t.element_size());
+    for (const int64_t size : t.sizes().slice(1)) row *= static_cast<double>(size);
+    bytes += row;
+    return t;
+  });
+  return bytes;
+}
+
 void Observer::observe(const Observation& out) {
   const ObservationView view = simulator_.observations();
   out.ego.copy_(wrap(view.ego, out.ego.sizes()));
@@ -107,9 +144,12 @@ void Observer::observe(const Observation& out) {
       images.view_stride = block.pixels.size(1) * image;
     }
   }
-  const Span<const View> views = simulator_.views();
+  const std::vector<int64_t> seeing = active_slots(simulator_);
+  std::vector<View> views;
+  for (const int64_t slot : seeing) views.push_back(simulator_.views()[static_cast<size_t>(slot)]);
   renderer_->render(simulator_.scene(), views,
                     {MemorySpace::host, PixelFormat::u8, static_cast<int>(views.size()), cameras});
+  for (const ImageBlock& block : out.images) spread(seeing, block.pixels);
   render_s_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 

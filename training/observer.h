@@ -12,6 +12,9 @@ std::unique_ptr<Renderer> make_policy_renderer(const Config& config, const Rig& 
 /// Name of the simulator's executor for run.backend ("null" is a renderer alone).
 std::string simulator_name(const std::string& backend);
 
+/// Slots whose agents are neither halted nor absent, in ascending order.
+std::vector<int64_t> active_slots(Simulator& simulator);
+
 class Observer {
  public:
   /// Both must outlive it; without a renderer the observation is the vector one. Throws Error when either is on a
@@ -21,7 +24,12 @@ class Observer {
   /// Uninitialised storage for `rows` observations of all slots, [rows, slots, ...].
   Observation allocate(int64_t rows) const;
 
-  /// Writes what every slot sees now into one row of such storage; images are drawn in place.
+  /// Of one such row.
+  double bytes_per_row() const;
+
+  /// Writes what every slot sees now into one row of such storage. Images are drawn in place, those of active agents
+  /// alone: nobody learns from what the others see, and theirs are black. (An agent whose episode is cut off is still
+  /// active in its final observation, from which its value is bootstrapped.)
   void observe(const Observation& row_out);
 
   /// Seconds spent drawing so far.
