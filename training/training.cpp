@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include <ATen/Parallel.h>
+#include <unistd.h>
 
 #include "pictura/common/error.h"
 #include "pictura/common/file.h"
@@ -29,6 +30,24 @@ double seconds_since(Clock::time_point start) { return std::chrono::duration<dou
 
 // "Lately" in the progress line: this many updates.
 constexpr size_t kRecentUpdates = 10;
+
+double physical_memory_bytes() {
+  return static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+
+// Room for what all agents see in one rollout and after it. Memory is handed out before it is there, so a rollout that
+// can never fit is refused here and not killed later.
+Observation allocate_rollout(const Observer& observer, const Config& config) {
+  const int64_t rows = int64_t{config.train.num_steps} + 1;
+  const double row_bytes = observer.bytes_per_row(), bytes = static_cast<double>(rows) * row_bytes;
+  PICTURA_CHECK(
+      bytes <= physical_memory_bytes(),
+      "train: a rollout of {} agents (simulator.num_slots) and {} steps (train.num_steps) needs {:.1f} GB for "
+      "observations of {:.0f} bytes; this machine has {:.1f} GB",
+      config.simulator.num_slots, config.train.num_steps, bytes / 1e9, row_bytes / config.simulator.num_slots,
+      physical_memory_bytes() / 1e9);
+  return observer.allocate(rows);
+}
 
 // What happened in one rollout: differences of the simulator's totals.
 struct Happened {
@@ -113,7 +132,7 @@ class Trainer {
         observer_(simulator_.get(), renderer_.get()),
         policy_(config.policy, static_cast<int>(rig_.cameras.size()), config.run.seed),
         optimizer_(policy_, config.train),
-        rollout_(observer_.allocate(config.train.num_steps + 1), config.train.num_steps, simulator_->num_slots()) {}
+        rollout_(allocate_rollout(observer_, config), config.train.num_steps, simulator_->num_slots()) {}
 
   std::string checkpoint_path() const { return out_folder_ + "/checkpoint.ckpt"; }
 
@@ -127,11 +146,15 @@ class Trainer {
     const Checkpoint saved = read_checkpoint(checkpoint_path());
     const std::string difference = first_difference(saved.config, config_);
     PICTURA_CHECK(difference.empty(), "{}: saved under another configuration: {}", saved.path, difference);
+    const std::string rig_difference = first_difference(saved.rig, rig_);
+    PICTURA_CHECK(rig_difference.empty(), "{}: saved with other cameras than {} has: {}", saved.path,
+                  config_.render.rig.empty() ? "the paper's rig" : config_.render.rig, rig_difference);
     restore_tensors(saved, saved.parameters, policy_.parameters());
     restore_tensors(saved, saved.first_moments, optimizer_.first_moments);
     restore_tensors(saved, saved.second_moments, optimizer_.second_moments);
     optimizer_.steps = saved.adam_steps;
     filter_.average = saved.filter_average;
+    recent_.assign(saved.recent.begin(), saved.recent.end());
     simulator_->restore(saved.simulator);
     update_ = saved.update;
     agent_steps_ = saved.agent_steps;
@@ -173,7 +196,7 @@ class Trainer {
       ++update_;
       agent_steps_ += happened.agent_steps;
       distance_m_ += happened.distance_m;
-      recent_.push_back(happened);
+      recent_.push_back({happened.goals, happened.finished, happened.distance_m, happened.finished_return});
       if (recent_.size() > kRecentUpdates) recent_.pop_front();
 
       const double elapsed_s = seconds_since(start);
@@ -264,18 +287,18 @@ class Trainer {
   double episode_return() const {
     double sum = 0;
     int64_t finished = 0;
-    for (const Happened& h : recent_) sum += h.finished_return, finished += h.finished;
+    for (const RecentUpdate& h : recent_) sum += h.finished_return, finished += h.finished;
     return sum / static_cast<double>(finished);  // NaN before the first
   }
   double goals_per_km() const {
     double km = 0;
     int64_t goals = 0;
-    for (const Happened& h : recent_) km += h.distance_m / 1000, goals += h.goals;
+    for (const RecentUpdate& h : recent_) km += h.distance_m / 1000, goals += h.goals;
     return static_cast<double>(goals) / km;
   }
 
-  static Scalars scalars_of(const TrainProgress& progress, const Happened& h, const UpdateStats& stats, double rate,
-                            const PhaseTimes& times) {
+  Scalars scalars_of(const TrainProgress& progress, const Happened& h, const UpdateStats& stats, double rate,
+                     const PhaseTimes& times) const {
     const auto steps = static_cast<double>(h.agent_steps);
     const double km = h.distance_m / 1000;
     return {{"charts/agent_steps", static_cast<double>(progress.agent_steps)},
@@ -284,7 +307,7 @@ class Trainer {
             {"charts/episode_return", progress.episode_return},
             {"charts/reward_per_step", h.reward / steps},
             {"charts/live_share", steps / static_cast<double>(h.slot_steps)},
-            {"driving/mean_speed_mps", h.distance_m / (0.1 * steps)},
+            {"driving/mean_speed_mps", h.distance_m / (static_cast<double>(simulator_->config().dt_s) * steps)},
             {"driving/goals_per_km", static_cast<double>(h.goals) / km},
             {"driving/waypoints_per_km", static_cast<double>(h.waypoints) / km},
             {"driving/waypoints_per_1000_steps", 1000 * static_cast<double>(h.waypoints) / steps},
@@ -318,6 +341,7 @@ class Trainer {
     checkpoint.distance_m = distance_m_;
     checkpoint.adam_steps = optimizer_.steps;
     checkpoint.filter_average = filter_.average;
+    checkpoint.recent.assign(recent_.begin(), recent_.end());
     checkpoint.parameters = policy_.parameters();
     checkpoint.first_moments = optimizer_.first_moments;
     checkpoint.second_moments = optimizer_.second_moments;
@@ -337,7 +361,7 @@ class Trainer {
   Rollout rollout_;
   int64_t update_ = 0, agent_steps_ = 0;
   double distance_m_ = 0;
-  std::deque<Happened> recent_;
+  std::deque<RecentUpdate> recent_;
   double forward_s_ = 0, simulate_s_ = 0;
 };
 
