@@ -21,6 +21,29 @@ void print_table(const std::vector<EvaluateRow>& rows) {
   }
 }
 
+void print_report(const EvaluateOptions& options, const EvaluateReport& report) {
+  Json table = Json::array();
+  for (const EvaluateRow& row : report.rows) {
+    table.push_back({{"density", row.density},
+                     {"scenarios", row.scenarios},
+                     {"steps", row.steps},
+                     {"vehicle_episodes", row.vehicle_episodes},
+                     {"at_fault_collision_rate", finite_or_null(row.at_fault_collision_rate)},
+                     {"off_road_rate", finite_or_null(row.off_road_rate)},
+                     {"red_light_rate", finite_or_null(row.red_light_rate)},
+                     {"goals_per_vehicle", finite_or_null(row.goals_per_vehicle)},
+                     {"km_per_infraction", finite_or_null(row.km_per_infraction)},
+                     {"km_driven", row.km_driven},
+                     {"waypoints_per_vehicle", finite_or_null(row.waypoints_per_vehicle)},
+                     {"return_per_vehicle", finite_or_null(row.return_per_vehicle)}});
+  }
+  print_json({{"checkpoint", options.checkpoint},
+              {"argmax", options.argmax},
+              {"seed", options.seed},
+              {"interrupted", report.interrupted},
+              {"rows", table}});
+}
+
 }  // namespace
 
 void add_evaluate_command(CLI::App& app) {
@@ -65,28 +88,16 @@ void add_evaluate_command(CLI::App& app) {
     evaluation.on_progress = [&line](double done, double eta_s) {
       line.update(fmt::format("evaluating: {:.0f} %  ETA {}", 100 * done, format_duration(eta_s)));
     };
-    const std::vector<EvaluateRow> rows = evaluate(evaluation);
+    const EvaluateReport report = evaluate(evaluation);
     line.finish();
-    if (!arguments->json) return print_table(rows);
-    Json table = Json::array();
-    for (const EvaluateRow& row : rows) {
-      table.push_back({{"density", row.density},
-                       {"scenarios", row.scenarios},
-                       {"steps", row.steps},
-                       {"vehicle_episodes", row.vehicle_episodes},
-                       {"at_fault_collision_rate", finite_or_null(row.at_fault_collision_rate)},
-                       {"off_road_rate", finite_or_null(row.off_road_rate)},
-                       {"red_light_rate", finite_or_null(row.red_light_rate)},
-                       {"goals_per_vehicle", finite_or_null(row.goals_per_vehicle)},
-                       {"km_per_infraction", finite_or_null(row.km_per_infraction)},
-                       {"km_driven", row.km_driven},
-                       {"waypoints_per_vehicle", finite_or_null(row.waypoints_per_vehicle)},
-                       {"return_per_vehicle", finite_or_null(row.return_per_vehicle)}});
+    if (arguments->json)
+      print_report(evaluation, report);
+    else
+      print_table(report.rows);
+    if (report.interrupted) {
+      throw Interrupted(fmt::format("interrupted; {} of {} densities are finished", report.rows.size(),
+                                    evaluation.agents_per_world > 0 ? 1 : evaluation.densities.size()));
     }
-    print_json({{"checkpoint", evaluation.checkpoint},
-                {"argmax", evaluation.argmax},
-                {"seed", evaluation.seed},
-                {"rows", table}});
   });
 }
 

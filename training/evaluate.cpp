@@ -113,21 +113,13 @@ struct Tally {
   }
 };
 
-bool anyone_active(Simulator& simulator) {
-  const AgentStateView state = simulator.state();
-  for (int slot = 0; slot < simulator.num_slots(); ++slot) {
-    if (static_cast<AgentStatus>(state.status[slot]) == AgentStatus::active) return true;
-  }
-  return false;
-}
-
 }  // namespace
 
 std::unique_ptr<Driver> load_driver(const std::string& checkpoint_path, int num_threads) {
   return std::make_unique<PolicyDriver>(read_checkpoint(checkpoint_path), num_threads);
 }
 
-std::vector<EvaluateRow> evaluate(const EvaluateOptions& options) {
+EvaluateReport evaluate(const EvaluateOptions& options) {
   if (options.scenarios < 1) fail_usage("evaluate: expected one scenario or more, got {}", options.scenarios);
   if (options.steps < 1) fail_usage("evaluate: expected one step or more, got {}", options.steps);
   if (options.maps.empty()) fail_usage("evaluate: expected one map or more");
@@ -153,14 +145,15 @@ std::vector<EvaluateRow> evaluate(const EvaluateOptions& options) {
 
   const auto start = std::chrono::steady_clock::now();
   std::unique_ptr<Renderer> renderer;
-  std::vector<EvaluateRow> rows;
+  EvaluateReport report;
   for (const DensityOf& density : densities) {
     Tally tally;
     const int per_batch = worlds_per_batch(checkpoint, density.agents);
     for (int first = 0; first < options.scenarios; first += per_batch) {
       std::vector<WorldSpec> worlds;
       for (int scenario = first; scenario < std::min(first + per_batch, options.scenarios); ++scenario) {
-        worlds.push_back({scenario % static_cast<int>(maps.size()), density.agents, static_cast<uint32_t>(scenario)});
+        worlds.push_back({scenario % static_cast<int>(maps.size()), density.agents,
+                          kFirstEvaluationWorld + static_cast<uint32_t>(scenario)});
       }
       const std::unique_ptr<Simulator> simulator =
           make_simulator(simulator_name(options.backend), simulator_config, maps, worlds);
@@ -169,8 +162,11 @@ std::vector<EvaluateRow> evaluate(const EvaluateOptions& options) {
       simulator->reset();
       std::vector<int32_t> actions(static_cast<size_t>(simulator->num_slots()));
       // Halted agents stay as they are, so a batch is over when nobody is left to drive.
-      for (int step = 0; step < options.steps && anyone_active(*simulator); ++step) {
-        if (interrupted()) throw Interrupted("evaluate: interrupted");
+      for (int step = 0; step < options.steps && !active_slots(*simulator).empty(); ++step) {
+        if (interrupted()) {
+          report.interrupted = true;
+          return report;
+        }
         driver.act(*simulator, renderer.get(), options.argmax, actions);
         simulator->step(actions);
         if (options.on_progress && step % 10 == 0) {
@@ -183,10 +179,10 @@ std::vector<EvaluateRow> evaluate(const EvaluateOptions& options) {
       const AgentStateView state = simulator->state();
       for (int slot = 0; slot < simulator->num_slots(); ++slot) tally.add(state, slot);
     }
-    rows.push_back(tally.row(density.name, options.scenarios, options.steps));
+    report.rows.push_back(tally.row(density.name, options.scenarios, options.steps));
   }
   if (options.on_progress) options.on_progress(1, 0);
-  return rows;
+  return report;
 }
 
 }  // namespace pictura

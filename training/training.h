@@ -58,6 +58,9 @@ std::unique_ptr<Driver> load_driver(const std::string& checkpoint_path, int num_
 
 enum class Density { light, medium, dense };  // 60, 120 and 150 agents a world
 
+/// Worlds of training are numbered from 0 and are never as many.
+constexpr uint32_t kFirstEvaluationWorld = 0x80000000u;
+
 struct EvaluateOptions {
   std::string checkpoint;
   std::vector<std::string> maps;  // as load_map takes them; the paper's eight towns
@@ -82,6 +85,13 @@ struct EvaluateRow {
   double waypoints_per_vehicle = 0, return_per_vehicle = 0;
 };
 
-std::vector<EvaluateRow> evaluate(const EvaluateOptions& options);
+struct EvaluateReport {
+  std::vector<EvaluateRow> rows;  // of the densities that were finished, in the order in which they were asked for
+  bool interrupted = false;       // ^C came (common/interrupt.h) before the last one was
+};
+
+/// Scenario k is on map k modulo the number of maps and draws its random numbers as world kFirstEvaluationWorld + k, so
+/// that it repeats no world of training whatever the seeds. Throws Error naming file and key for bad input.
+EvaluateReport evaluate(const EvaluateOptions& options);
 
 }  // namespace pictura

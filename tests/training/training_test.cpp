@@ -1,9 +1,12 @@
 // Training end to end on a few vehicles of the procedural town: files, exact resume, ^C's boundary, evaluation.
 #include "pictura/training/training.h"
 
+#include <algorithm>
 #include <cmath>
 #include <csignal>
+#include <cstring>
 #include <filesystem>
+#include <functional>
 #include <sstream>
 
 #include <gmock/gmock.h>
@@ -11,7 +14,8 @@
 #include "pictura/common/error.h"
 #include "pictura/common/file.h"
 #include "pictura/common/interrupt.h"
-#include "pictura/training/config.h"
+#include "pictura/map/load_map.h"
+#include "pictura/training/observer.h"
 
 namespace pictura {
 namespace {
@@ -42,6 +46,26 @@ class Training : public ::testing::Test {
   std::string folder_;
 };
 
+std::string message_of(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+std::vector<std::vector<std::string>> read_table(const std::string& path) {
+  std::vector<std::vector<std::string>> rows;
+  std::istringstream lines(read_file(path));
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream cells(line);
+    rows.emplace_back();
+    for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(cell);
+  }
+  return rows;
+}
+
 TEST_F(Training, ResumesExactly) {
   const TrainReport whole = train(options("whole"));
   EXPECT_EQ(whole.updates, 4);
@@ -55,12 +79,101 @@ TEST_F(Training, ResumesExactly) {
   EXPECT_EQ(resumed.policy_hash, whole.policy_hash);
   EXPECT_EQ(resumed.agent_steps, whole.agent_steps);
   EXPECT_EQ(resumed.km_driven, whole.km_driven);
+  ASSERT_TRUE(std::isfinite(whole.episode_return));
+  EXPECT_EQ(resumed.episode_return, whole.episode_return);
 
-  // One row per update, once each, after the head.
-  std::istringstream csv(read_file(folder_ + "/parts/progress.csv"));
-  std::vector<std::string> first_cells;
-  for (std::string line; std::getline(csv, line);) first_cells.push_back(line.substr(0, line.find(',')));
-  EXPECT_THAT(first_cells, ::testing::ElementsAre("update", "1", "2", "3", "4"));
+  // One row per update, once each, after the head; and but for the clock every number is the whole run's.
+  const std::vector<std::vector<std::string>> parts = read_table(folder_ + "/parts/progress.csv"),
+                                              all = read_table(folder_ + "/whole/progress.csv");
+  ASSERT_EQ(parts.size(), 5u);
+  ASSERT_EQ(all.size(), 5u);
+  for (size_t row = 0; row < parts.size(); ++row) {
+    EXPECT_EQ(parts[row][0], row == 0 ? "update" : std::to_string(row));
+    ASSERT_EQ(parts[row].size(), parts[0].size());
+    for (size_t column = 0; column < parts[row].size(); ++column) {
+      const std::string& name = parts[0][column];
+      if (name.ends_with("_s") && !name.ends_with("_mps")) continue;
+      EXPECT_EQ(parts[row][column], all[row][column]) << name << " of row " << row;
+    }
+  }
+}
+
+TEST_F(Training, RefusesToResumeWithOtherCamerasByName) {
+  make_output_folder(folder_);
+  auto write_rig = [&](double yaw_deg) {
+    write_file(folder_ + "/rig.toml", fmt::format("[[camera]]\nname = \"ahead\"\nwidth_px = 16\nheight_px = 9\n"
+                                                  "focal_px = 8\nx_m = 1\nz_m = 1.5\nyaw_deg = {}\n",
+                                                  yaw_deg));
+    // The run's configuration must name the rig and not the sizes that smoke.toml has.
+    write_file(folder_ + "/config.toml",
+               "[simulator]\nmaps = [\"procedural\"]\nmax_agents = 8\npedestrian_fraction = 0\ncyclist_fraction = "
+               "0\nwalls = false\nparked_cars = 0\n[render]\nrig = \"rig.toml\"\n"
+               "[policy]\nbackbone_width = 32\n[train]\nminibatch_size = 64\nforward_chunk = 64\n");
+  };
+  write_rig(0);
+  TrainOptions o = options("run", {"train.updates=1"});
+  o.config_path = folder_ + "/config.toml";
+  std::erase_if(o.overrides, [](const std::string& text) { return text.starts_with("render."); });
+  train(o);
+  write_rig(10);
+  o.resume = true;
+  o.overrides.push_back("train.updates=2");
+  EXPECT_THAT(message_of([&] { train(o); }), AllOf(HasSubstr("checkpoint.ckpt"), HasSubstr("rig.toml"),
+                                                   HasSubstr("'ahead'"), HasSubstr("yaw_pitch_roll_rad")));
+  write_rig(0);
+  EXPECT_EQ(train(o).updates, 2);
+}
+
+TEST_F(Training, RolloutsThatCannotFitAreRefused) {
+  // 65,537 rows of 8,000 observations: with the vector ones 2.8 TB or so, with large images far more.
+  const std::vector<std::string> huge = {"train.num_steps=65536", "simulator.num_slots=8000"};
+  TrainOptions vector = options("vector", huge);
+  vector.overrides.push_back("policy.modality=vector");
+  EXPECT_THAT(message_of([&] { train(vector); }),
+              AllOf(HasSubstr("simulator.num_slots"), HasSubstr("train.num_steps"), HasSubstr("GB")));
+  TrainOptions images = options("images", huge);
+  images.overrides.push_back("render.width_px=256");
+  EXPECT_THAT(message_of([&] { train(images); }), HasSubstr("simulator.num_slots"));
+}
+
+TEST_F(Training, ImagesAreDrawnForActiveAgentsAlone) {
+  const Config config = load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml", {"run.num_threads=1", "run.backend=cpu"});
+  const std::unique_ptr<Simulator> simulator =
+      make_simulator("cpu", simulator_config(config), {load_map("procedural")}, draw_worlds(1, 24, 8, 8, 1));
+  const Rig rig = rig_of(config);
+  const std::unique_ptr<Renderer> renderer = make_policy_renderer(config, rig, *simulator);
+  Observer observer(simulator.get(), renderer.get());
+  const Observation storage = observer.allocate(1), row = row_of(storage, 0);
+  EXPECT_EQ(observer.bytes_per_row(),
+            24 * (4.0 * (kEgoFeatures + kNumConditioning + kNumWaypoints * kWaypointFeatures) +
+                  4 * 3 * config.render.width_px * config.render.height_px));
+  simulator->reset();
+  // Full throttle and full lock: some leave the road, and some do so before the others.
+  std::vector<int32_t> actions(24);
+  for (size_t i = 0; i < actions.size(); ++i) actions[i] = static_cast<int32_t>(i) % kNumActions;
+  size_t halted = 0;
+  for (int step = 0; step < 60 && halted < 6; ++step) {
+    simulator->step(Span<const int32_t>(actions));
+    halted = 24 - active_slots(*simulator).size();
+  }
+  ASSERT_GT(halted, 0u);
+  ASSERT_LT(halted, 24u);
+  row.images[0].pixels.fill_(77);
+  observer.observe(row);
+
+  HostImages all(rig, 24);
+  renderer->render(simulator->scene(), simulator->views(), all.batch());
+  const auto image_bytes = static_cast<size_t>(row.images[0].pixels.stride(0));
+  ASSERT_EQ(all.bytes().size(), 24 * image_bytes);
+  const std::vector<int64_t> seeing = active_slots(*simulator);
+  const std::vector<uint8_t> black(image_bytes, 0);
+  for (int64_t slot = 0; slot < 24; ++slot) {
+    const bool sees = std::find(seeing.begin(), seeing.end(), slot) != seeing.end();
+    const uint8_t* const expected = sees ? all.bytes().data() + static_cast<size_t>(slot) * image_bytes : black.data();
+    EXPECT_EQ(0, std::memcmp(row.images[0].pixels.const_data_ptr<uint8_t>() + static_cast<size_t>(slot) * image_bytes,
+                             expected, image_bytes))
+        << "slot " << slot << (sees ? ", active" : ", halted");
+  }
 }
 
 TEST_F(Training, WritesWhatItPromisesAndStartsFromItsSeed) {
@@ -124,7 +237,9 @@ TEST_F(Training, VectorPolicyTrainsAndIsEvaluated) {
   o.backend = "cpu";
   double done = 0;
   o.on_progress = [&](double fraction, double) { done = fraction; };
-  const std::vector<EvaluateRow> rows = evaluate(o);
+  const EvaluateReport evaluated = evaluate(o);
+  EXPECT_FALSE(evaluated.interrupted);
+  const std::vector<EvaluateRow>& rows = evaluated.rows;
   ASSERT_EQ(rows.size(), 1u);
   EXPECT_EQ(rows[0].scenarios, 3);
   EXPECT_LE(rows[0].vehicle_episodes, 18);
@@ -135,12 +250,69 @@ TEST_F(Training, VectorPolicyTrainsAndIsEvaluated) {
     EXPECT_LE(rate, 1);
   }
   // The same again, and drawn actions are something else.
-  const std::vector<EvaluateRow> again = evaluate(o);
+  const std::vector<EvaluateRow> again = evaluate(o).rows;
   EXPECT_EQ(again[0].km_driven, rows[0].km_driven);
   o.argmax = false;
-  EXPECT_NE(evaluate(o)[0].km_driven, rows[0].km_driven);
+  EXPECT_NE(evaluate(o).rows[0].km_driven, rows[0].km_driven);
   o.scenarios = 0;
   EXPECT_THROW(evaluate(o), UsageError);
+}
+
+TEST_F(Training, InterruptedEvaluationKeepsWhatItFinished) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EvaluateOptions o;
+  o.checkpoint = train(options("run", {"train.updates=1", "policy.modality=vector"})).checkpoint;
+  o.maps = {"procedural"};
+  o.scenarios = 1;
+  o.steps = 5;
+  o.num_threads = 1;
+  o.backend = "cpu";
+  // Of 60, 120 and 150 agents the first 60 are done at 18 %.
+  o.on_progress = [](double fraction, double) {
+    if (fraction > 0.2) std::raise(SIGINT);
+  };
+  EXPECT_EXIT(
+      {
+        catch_interrupts();
+        const EvaluateReport report = evaluate(o);
+        std::exit(report.interrupted && report.rows.size() == 1 && report.rows[0].density == "light" &&
+                          report.rows[0].km_driven > 0
+                      ? 0
+                      : 1);
+      },
+      ::testing::ExitedWithCode(0), "");
+}
+
+TEST_F(Training, EvaluationRepeatsNoWorldOfTraining) {
+  static_assert(kFirstEvaluationWorld >= uint32_t{kMaxSlots}, "training has at most one world per agent");
+  EvaluateOptions o;
+  o.checkpoint = train(options("run", {"train.updates=1", "policy.modality=vector"})).checkpoint;
+  o.maps = {"procedural"};
+  o.agents_per_world = 6;
+  o.scenarios = 1;
+  o.steps = 10;
+  o.num_threads = 1;
+  o.backend = "cpu";
+  // The same drive by hand, in the world of that number.
+  auto return_per_vehicle = [&](uint32_t global_world) {
+    SimulatorConfig config = evaluation_simulator_config(load_config(folder_ + "/run/config.toml"), o.steps);
+    config.seed = o.seed;
+    const std::unique_ptr<Simulator> simulator =
+        make_simulator("cpu", config, {load_map("procedural")}, {WorldSpec{0, 6, global_world}});
+    const std::unique_ptr<Driver> driver = load_driver(o.checkpoint, 1);
+    simulator->reset();
+    std::vector<int32_t> actions(6);
+    for (int step = 0; step < o.steps; ++step) {
+      driver->act(*simulator, nullptr, /*argmax=*/true, actions);
+      simulator->step(Span<const int32_t>(actions));
+    }
+    double sum = 0;
+    for (int slot = 0; slot < 6; ++slot) sum += static_cast<double>(simulator->state().episode_return[slot]);
+    return sum / 6;
+  };
+  const double evaluated = evaluate(o).rows.at(0).return_per_vehicle;
+  EXPECT_EQ(evaluated, return_per_vehicle(kFirstEvaluationWorld));
+  EXPECT_NE(evaluated, return_per_vehicle(0));
 }
 
 TEST_F(Training, PerspectivePolicyIsEvaluatedFromItsImages) {
@@ -153,7 +325,7 @@ TEST_F(Training, PerspectivePolicyIsEvaluatedFromItsImages) {
   o.steps = 3;
   o.num_threads = 1;
   o.backend = "cpu";
-  const std::vector<EvaluateRow> rows = evaluate(o);
+  const std::vector<EvaluateRow> rows = evaluate(o).rows;
   ASSERT_EQ(rows.size(), 1u);
   EXPECT_EQ(rows[0].density, "light");
   EXPECT_GT(rows[0].vehicle_episodes, 0);
