@@ -23,6 +23,9 @@ foreach(folder common map simulator backend_cpu backend_cuda backend_gl training
 endforeach()
 configure_file(${PROJECT_SOURCE_DIR}/common/version.h.in ${PICTURA_INCLUDE_DIR}/pictura/version.h @ONLY)
 
+include(CheckCXXCompilerFlag)
+check_cxx_compiler_flag(-Wdangling-reference PICTURA_HAS_WDANGLING_REFERENCE)
+
 add_library(pictura_flags INTERFACE)
 target_include_directories(pictura_flags INTERFACE
   $<BUILD_INTERFACE:${PICTURA_INCLUDE_DIR}> $<INSTALL_INTERFACE:include>)
@@ -30,6 +33,8 @@ target_compile_options(pictura_flags INTERFACE
   $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wpedantic -Wshadow>
   # Designated initializers leave the rest to the members' own defaults, on purpose.
   $<$<COMPILE_LANGUAGE:CXX>:-Wno-missing-field-initializers>
+  # g++ 13 takes every reference that a function returns for one into its temporary arguments.
+  $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_HAS_WDANGLING_REFERENCE}>>:-Wno-dangling-reference>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_WERROR}>>:-Werror>
   # The arithmetic contract: a product and a sum round twice on every device, and nothing is reordered.
   $<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off -fno-math-errno -fno-trapping-math>

@@ -76,11 +76,13 @@ std::unique_ptr<Renderer> make_renderer(const std::string& name, const RendererC
   if (name == "cpu") return chosen("cpu: asked for"), make_cpu_renderer(config);
   if (name == "null") return chosen("null: asked for"), std::make_unique<NullRenderer>(config);
 #ifdef PICTURA_HAS_CUDA
-  const std::string why_not_cuda = cuda_unavailable();
+  const std::string unavailable = cuda_unavailable();
   if (name == "cuda") {
-    PICTURA_CHECK(why_not_cuda.empty(), "renderer cuda: {}", why_not_cuda);
+    PICTURA_CHECK(unavailable.empty(), "renderer cuda: {}", unavailable);
     return chosen("cuda: asked for"), make_cuda_renderer(config);
   }
+  const std::string why_not_cuda =
+      config.space == MemorySpace::cuda ? unavailable : "scenes and images lie in host memory";
   if (name == "auto" && why_not_cuda.empty()) return chosen("cuda: a device was found"), make_cuda_renderer(config);
 #else
   const std::string why_not_cuda = "this build has no CUDA";
