@@ -41,7 +41,8 @@ void check(const SimulatorConfig& config) {
     const ConditioningRange& range = config.conditioning[static_cast<size_t>(i)];
     const bool is_positive = i == static_cast<int>(Conditioning::delta_goal_m) || i >= kNumRewardConditioning;
     if (!std::isfinite(range.low) || !std::isfinite(range.high) || range.low > range.high ||
-        (is_positive && range.low <= 0) || (range.mixture && (range.low > 1 || range.high < 1))) {
+        (is_positive && range.low <= 0) ||
+        (range.mixture && range.low != range.high && (range.low > 1 || range.high < 1))) {
       fail_usage("simulator: conditioning {}: expected finite low <= high{}{}, got {} and {}", kConditioningNames[i],
                  is_positive ? ", above 0" : "", range.mixture ? ", around 1" : "", range.low, range.high);
     }

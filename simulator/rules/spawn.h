@@ -11,10 +11,10 @@ constexpr int kSpawnTries = 32;
 constexpr float kSpawnClearance_m = 0.5f;  // between a new box and every other
 constexpr float kPedestrianGoalRadius_m = 0.5f;
 
-/// Draws one coefficient: U(low, high), or a mixture of U(low, 1) and U(1, high) with equal chance.
+/// Draws one coefficient: U(low, high), or a mixture of U(low, 1) and U(1, high) with equal chance. Equal bounds fix it.
 PICTURA_HD inline float draw_conditioning(const ConditioningRange& range, RandomStream* random_inout) {
   const float u = random_inout->uniform();
-  if (!range.mixture) return range.low + (range.high - range.low) * u;
+  if (!range.mixture || range.low == range.high) return range.low + (range.high - range.low) * u;
   return u < 0.5f ? range.low + (1.0f - range.low) * (2.0f * u) : 1.0f + (range.high - 1.0f) * (2.0f * u - 1.0f);
 }
 
