@@ -162,8 +162,9 @@ class Reader {
       value.low = static_cast<float>(number_of(key, pair[0], -1e6, 1e6));
       value.high = static_cast<float>(number_of(key, pair[1], -1e6, 1e6));
       if (value.low > value.high) refuse(key, *node, "expected low <= high");
-      if (value.mixture && !(value.low > 0 && value.low <= 1 && value.high >= 1)) {
-        refuse(key, *node, "expected 0 < low <= 1 <= high");
+      const bool is_fixed = value.low == value.high;
+      if (value.mixture && !(value.low > 0 && (is_fixed || (value.low <= 1 && value.high >= 1)))) {
+        refuse(key, *node, "expected 0 < low <= 1 <= high, or low = high > 0");
       }
     }
   }

@@ -86,6 +86,8 @@ TEST(Config, ErrorsNameFileLineAndKey) {
   EXPECT_THAT(message_of("[policy]\nattention_heads = 3\n"), HasSubstr("divisor"));
   EXPECT_THAT(message_of("[simulator.conditioning]\ncollision = [3, 1]\n"), HasSubstr("low <= high"));
   EXPECT_THAT(message_of("[simulator.conditioning]\nthrottle = [1.1, 1.2]\n"), HasSubstr("low <= 1 <= high"));
+  EXPECT_THAT(message_of("[simulator.conditioning]\nthrottle = [0, 0]\n"), HasSubstr("low = high > 0"));
+  EXPECT_EQ(message_of("[simulator.conditioning]\nthrottle = [0.9, 0.9]\n"), "");
   EXPECT_THAT(message_of("[simulator]\nmin_agents = 9\nmax_agents = 8\n"), HasSubstr("a.toml:2: simulator.min_agents"));
   EXPECT_THAT(message_of("[train]\nupdates = \n"), HasSubstr("a.toml:2"));
   EXPECT_THAT(message_of("simulator = 5\n"), HasSubstr("a.toml:1"));
