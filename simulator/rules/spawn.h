@@ -11,7 +11,8 @@ constexpr int kSpawnTries = 32;
 constexpr float kSpawnClearance_m = 0.5f;  // between a new box and every other
 constexpr float kPedestrianGoalRadius_m = 0.5f;
 
-/// Draws one coefficient: U(low, high), or a mixture of U(low, 1) and U(1, high) with equal chance. Equal bounds fix it.
+/// Draws one coefficient: U(low, high), or a mixture of U(low, 1) and U(1, high) with equal chance. Equal bounds fix
+/// it.
 PICTURA_HD inline float draw_conditioning(const ConditioningRange& range, RandomStream* random_inout) {
   const float u = random_inout->uniform();
   if (!range.mixture || range.low == range.high) return range.low + (range.high - range.low) * u;
