@@ -24,7 +24,8 @@ std::string message_of(const std::function<void()>& call) {
 }
 
 std::string written(const std::string& text) {
-  const std::string path = testing::TempDir() + "/pictura_rig_test.toml";
+  const std::string path =
+      testing::TempDir() + "/pictura_rig_" + testing::UnitTest::GetInstance()->current_test_info()->name() + ".toml";
   std::ofstream(path) << text;
   return path;
 }

@@ -19,10 +19,13 @@ namespace fs = std::filesystem;
 class FileTest : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = testing::TempDir() + "/pictura_file_test";
+    // One folder per test: ctest runs them side by side.
+    folder_ =
+        testing::TempDir() + "/pictura_file_test_" + testing::UnitTest::GetInstance()->current_test_info()->name();
     fs::remove_all(folder_);
     fs::create_directories(folder_);
   }
+  void TearDown() override { fs::remove_all(folder_); }
   size_t files_in_folder() const {
     return static_cast<size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
   }
