@@ -95,8 +95,8 @@ void bench_simulate(const Arguments& arguments) {
   for (const bool vector_observations : {true, false}) {
     WorldOptions world = arguments.world;
     world.vector_observations = vector_observations;
-    const auto simulator = make_world(world);
-    const auto pilot = make_pilot("random", world.seed, *simulator, "cpu", world.num_threads);
+    const auto pilot = make_pilot("random", world.seed, "cpu", world.num_threads);
+    const auto simulator = make_world(world, pilot.get());
     std::vector<int32_t> actions = advance(simulator.get(), pilot.get(), 20);
     const std::string suffix = vector_observations ? "" : " without entity sets";
     BenchResult live{"step" + suffix, "agent_steps_per_s", {}},
@@ -129,8 +129,8 @@ void bench_render(const Arguments& arguments) {
   const Pair size = parse_pair("--size", arguments.size, 8192);
   WorldOptions world = arguments.world;
   world.vector_observations = false;
-  const auto simulator = make_world(world);
-  const auto pilot = make_pilot("random", world.seed, *simulator, "cpu", world.num_threads);
+  const auto pilot = make_pilot("random", world.seed, "cpu", world.num_threads);
+  const auto simulator = make_world(world, pilot.get());
   advance(simulator.get(), pilot.get(), 30);
   const auto renderer =
       make_renderer(arguments.backend, {.rig = paper_rig(size.first, size.second), .num_threads = world.num_threads});

@@ -21,18 +21,6 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
   command->add_flag("!--no-walls", options_out->walls, "Leave out the walls along the building lines");
 }
 
-std::unique_ptr<Simulator> make_world(const WorldOptions& options) {
-  SimulatorConfig config;
-  config.seed = options.seed;
-  config.num_threads = options.num_threads;
-  config.walls = options.walls;
-  config.fixed_lights = true;
-  config.vector_observations = options.vector_observations;
-  auto simulator = make_simulator("cpu", config, {load_map(options.map)}, {{0, options.agents, 0}});
-  simulator->reset();
-  return simulator;
-}
-
 void upload_geometries(const Simulator& simulator, Renderer* renderer_out) {
   GeometryHandle expected = 0;
   for (const StaticGeometry& geometry : simulator.geometries()) {
@@ -71,11 +59,21 @@ class IdlePilot final : public Pilot {
 #ifdef PICTURA_HAS_TORCH
 class PolicyPilot final : public Pilot {
  public:
-  PolicyPilot(const std::string& checkpoint, const Simulator& simulator, const std::string& backend, int num_threads)
+  PolicyPilot(const std::string& checkpoint, const std::string& backend, int num_threads)
       : driver_(load_driver(checkpoint, num_threads)) {
-    if (!driver_->needs_images()) return;
-    renderer_ = make_renderer(backend, {.rig = driver_->rig(), .num_threads = num_threads});
-    upload_geometries(simulator, renderer_.get());
+    if (driver_->needs_images()) {
+      renderer_ = make_renderer(backend, {.rig = driver_->rig(), .num_threads = num_threads});
+    }
+  }
+  void adapt(SimulatorConfig* config_inout) const override {
+    const SimulatorConfig known = driver_->evaluation_world();
+    config_inout->conditioning = known.conditioning;
+    config_inout->auxiliary_observations = known.auxiliary_observations;
+    config_inout->vector_observations = known.vector_observations;
+    config_inout->walls = config_inout->walls && known.walls;
+  }
+  void enter(const Simulator& simulator) override {
+    if (renderer_) upload_geometries(simulator, renderer_.get());
   }
   void act(Simulator& simulator, Span<int32_t> actions_out) override {
     driver_->act(simulator, renderer_.get(), /*argmax=*/true, actions_out);
@@ -89,15 +87,28 @@ class PolicyPilot final : public Pilot {
 
 }  // namespace
 
-std::unique_ptr<Pilot> make_pilot(const std::string& name, uint64_t seed, [[maybe_unused]] const Simulator& simulator,
-                                  [[maybe_unused]] const std::string& backend, [[maybe_unused]] int num_threads) {
+std::unique_ptr<Pilot> make_pilot(const std::string& name, uint64_t seed, [[maybe_unused]] const std::string& backend,
+                                  [[maybe_unused]] int num_threads) {
   if (name == "random") return std::make_unique<RandomPilot>(seed);
   if (name == "idle") return std::make_unique<IdlePilot>();
 #ifdef PICTURA_HAS_TORCH
-  return std::make_unique<PolicyPilot>(name, simulator, backend, num_threads);
+  return std::make_unique<PolicyPilot>(name, backend, num_threads);
 #else
   fail_usage("--policy: expected random or idle (this build has no torch for checkpoints), got '{}'", name);
 #endif
+}
+
+std::unique_ptr<Simulator> make_world(const WorldOptions& options, Pilot* pilot) {
+  SimulatorConfig config;
+  config.seed = options.seed;
+  config.num_threads = options.num_threads;
+  config.walls = options.walls;
+  config.fixed_lights = true;
+  config.vector_observations = options.vector_observations;
+  pilot->adapt(&config);
+  auto simulator = make_simulator("cpu", config, {load_map(options.map)}, {{0, options.agents, 0}});
+  pilot->enter(*simulator);
+  return simulator;
 }
 
 }  // namespace pictura

@@ -24,10 +24,6 @@ struct WorldOptions {
 /// Adds --agents, --seed, --threads and --no-walls, which fill *options_out.
 void add_world_options(CLI::App* command, WorldOptions* options_out);
 
-/// One world of options.agents vehicles on the map, at the start of its first episode, whose lights keep evaluation's
-/// timing.
-std::unique_ptr<Simulator> make_world(const WorldOptions& options);
-
 /// Uploads the simulator's geometries, so that handles equal map indices.
 void upload_geometries(const Simulator& simulator, Renderer* renderer_out);
 
@@ -35,11 +31,18 @@ void upload_geometries(const Simulator& simulator, Renderer* renderer_out);
 class Pilot {
  public:
   virtual ~Pilot() = default;
+  /// Makes the world one that this pilot can drive in; does nothing for pilots that look at nothing.
+  virtual void adapt(SimulatorConfig*) const {}
+  /// Takes what the pilot needs of the world before its first act().
+  virtual void enter(const Simulator&) {}
   virtual void act(Simulator& simulator, Span<int32_t> actions_out) = 0;
 };
 
 /// "random" (uniform, keyed by seed, slot and step), "idle" (no jerk), or a checkpoint's path (argmax; needs torch).
-std::unique_ptr<Pilot> make_pilot(const std::string& name, uint64_t seed, const Simulator& simulator,
-                                  const std::string& backend, int num_threads);
+std::unique_ptr<Pilot> make_pilot(const std::string& name, uint64_t seed, const std::string& backend, int num_threads);
+
+/// One world of options.agents vehicles on the map, at the start of its first episode, with evaluation's light timing,
+/// which the pilot has entered.
+std::unique_ptr<Simulator> make_world(const WorldOptions& options, Pilot* pilot);
 
 }  // namespace pictura

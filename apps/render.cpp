@@ -40,9 +40,8 @@ void run(const Arguments& arguments) {
   if (arguments.backend == "auto") fmt::print(stderr, "backend {}\n", choice);
   make_output_folder(arguments.out);
 
-  const auto simulator = make_world(arguments.world);
-  const auto pilot =
-      make_pilot("random", arguments.world.seed, *simulator, arguments.backend, arguments.world.num_threads);
+  const auto pilot = make_pilot("random", arguments.world.seed, arguments.backend, arguments.world.num_threads);
+  const auto simulator = make_world(arguments.world, pilot.get());
   std::vector<int32_t> actions(static_cast<size_t>(simulator->num_slots()));
   for (int step = 0; step < arguments.steps; ++step) {
     if (interrupted()) throw Interrupted(fmt::format("interrupted at step {} of {}", step, arguments.steps));

@@ -24,10 +24,9 @@ struct Arguments {
 };
 
 void run(const Arguments& arguments) {
-  const auto simulator = make_world(arguments.world);
+  const auto pilot = make_pilot(arguments.policy, arguments.world.seed, arguments.backend, arguments.world.num_threads);
+  const auto simulator = make_world(arguments.world, pilot.get());
   const SpawnReport spawned = simulator->spawn_report();
-  const auto pilot =
-      make_pilot(arguments.policy, arguments.world.seed, *simulator, arguments.backend, arguments.world.num_threads);
   std::unique_ptr<Film> film;
   if (!arguments.video.empty()) {
     film = std::make_unique<Film>(arguments.video, *simulator, arguments.film_agent, arguments.world.num_threads);

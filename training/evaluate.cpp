@@ -28,6 +28,9 @@ class PolicyDriver final : public Driver {
 
   bool needs_images() const override { return config_.policy.modality == Modality::perspective; }
   const Rig& rig() const override { return rig_; }
+  SimulatorConfig evaluation_world() const override {
+    return evaluation_simulator_config(config_, config_.simulator.episode_steps);
+  }
 
   void act(Simulator& simulator, Renderer* renderer, bool argmax, Span<int32_t> actions_out) override {
     PICTURA_CHECK(!needs_images() || renderer, "driver: this policy needs images: give it a renderer");

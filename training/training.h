@@ -48,6 +48,8 @@ class Driver {
   /// Whether it needs images; then `renderer` below must have been made with rig().
   virtual bool needs_images() const = 0;
   virtual const Rig& rig() const = 0;
+  /// The world that the policy is evaluated in: fixed conditioning and lights, the observations that it was trained on.
+  virtual SimulatorConfig evaluation_world() const = 0;
   /// Fills actions_out [slots] from the simulator's present observations and, where needed, images drawn by `renderer`,
   /// which holds the simulator's geometries. argmax, or a draw from the policy (keyed as in training).
   virtual void act(Simulator& simulator, Renderer* renderer, bool argmax, Span<int32_t> actions_out) = 0;
