@@ -1,4 +1,6 @@
 // `pictura train`: self-play PPO from a configuration file, with a progress line, and the learning curve as a picture.
+#include <cmath>
+
 #include "pictura/apps/commands.h"
 #include "pictura/apps/learning_curve.h"
 #include "pictura/apps/report.h"
@@ -30,10 +32,12 @@ void add_train_command(CLI::App& app) {
   command->callback([arguments] {
     ProgressLine line;
     arguments->train.on_progress = [&line](const TrainProgress& progress) {
-      line.update(fmt::format("update {}/{}  {} agent-steps  {} agent-steps/s  return {:.2f}  goals/km {:.2f}  ETA {}",
+      const std::string episode_return =
+          std::isfinite(progress.episode_return) ? fmt::format("{:.2f}", progress.episode_return) : "-";
+      line.update(fmt::format("update {}/{}  {} agent-steps  {} agent-steps/s  return {}  goals/km {:.2f}  ETA {}",
                               progress.update, progress.updates,
                               format_count(static_cast<double>(progress.agent_steps)),
-                              format_count(progress.agent_steps_per_s), progress.episode_return, progress.goals_per_km,
+                              format_count(progress.agent_steps_per_s), episode_return, progress.goals_per_km,
                               format_duration(progress.eta_s)));
     };
     const TrainReport report = train(arguments->train);

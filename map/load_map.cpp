@@ -78,8 +78,9 @@ std::shared_ptr<const RoadMap> load_map(const std::string& name) {
       if (fs::exists(path, error)) return std::make_shared<RoadMap>(load_opendrive(path.string()));
     }
   }
-  fail_usage("map '{}': expected an {} file, procedural[:SEED], or a town in {}: {}", name, kExtension, map_folder(),
-             fmt::join(known_towns(), ", "));
+  const std::vector<std::string> towns = known_towns();
+  fail_usage("map '{}': expected an {} file, procedural[:SEED], or a town in {}, which has {}", name, kExtension,
+             map_folder(), towns.empty() ? "none" : fmt::format("{}", fmt::join(towns, ", ")));
 }
 
 }  // namespace pictura
