@@ -1,5 +1,6 @@
 // `pictura bench`: rates of rendering, simulation and training as medians of several repeats, with the device's name,
 // the commit and the workload beside them.
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 
@@ -75,19 +76,16 @@ struct Arguments {
 
 /// Where no map is named: the town that the numbers of docs/ are about, or the procedural one where it is missing.
 std::string default_map() {
-  return std::filesystem::exists(map_folder() + "/Town01.xodr") ||
-                 std::filesystem::exists(map_folder() + "/carla/Town01.xodr")
-             ? "Town01"
-             : "procedural:1";
+  const std::vector<std::string> towns = known_towns();
+  return std::binary_search(towns.begin(), towns.end(), "Town01") ? "Town01" : "procedural:1";
 }
 
-std::vector<int32_t> advance(Simulator* simulator, Pilot* pilot, int steps) {
-  std::vector<int32_t> actions(static_cast<size_t>(simulator->num_slots()));
+void advance(Simulator* simulator, Pilot* pilot, int steps, std::vector<int32_t>* actions_inout) {
+  actions_inout->resize(static_cast<size_t>(simulator->num_slots()));
   for (int step = 0; step < steps; ++step) {
-    pilot->act(*simulator, actions);
-    simulator->step(actions);
+    pilot->act(*simulator, *actions_inout);
+    simulator->step(*actions_inout);
   }
-  return actions;
 }
 
 void bench_simulate(const Arguments& arguments) {
@@ -97,7 +95,8 @@ void bench_simulate(const Arguments& arguments) {
     world.vector_observations = vector_observations;
     const auto pilot = make_pilot("random", world.seed, "cpu", world.num_threads);
     const auto simulator = make_world(world, pilot.get());
-    std::vector<int32_t> actions = advance(simulator.get(), pilot.get(), 20);
+    std::vector<int32_t> actions;
+    advance(simulator.get(), pilot.get(), 20, &actions);
     const std::string suffix = vector_observations ? "" : " without entity sets";
     BenchResult live{"step" + suffix, "agent_steps_per_s", {}},
         slots{"step" + suffix + ", slots", "slot_steps_per_s", {}};
@@ -106,10 +105,7 @@ void bench_simulate(const Arguments& arguments) {
       const auto begin = Clock::now();
       double elapsed_s = 0;
       while (elapsed_s < arguments.repeat_s) {
-        for (int step = 0; step < 20; ++step) {
-          pilot->act(*simulator, actions);
-          simulator->step(actions);
-        }
+        advance(simulator.get(), pilot.get(), 20, &actions);
         elapsed_s = seconds_since(begin);
       }
       live.values.push_back(static_cast<double>(simulator->totals().agent_steps - before.agent_steps) / elapsed_s);
@@ -131,7 +127,8 @@ void bench_render(const Arguments& arguments) {
   world.vector_observations = false;
   const auto pilot = make_pilot("random", world.seed, "cpu", world.num_threads);
   const auto simulator = make_world(world, pilot.get());
-  advance(simulator.get(), pilot.get(), 30);
+  std::vector<int32_t> actions;
+  advance(simulator.get(), pilot.get(), 30, &actions);
   const auto renderer =
       make_renderer(arguments.backend, {.rig = paper_rig(size.first, size.second), .num_threads = world.num_threads});
   PICTURA_CHECK(renderer->space() == MemorySpace::host, "bench render: expected a host backend, got {}",

@@ -9,7 +9,6 @@
 
 namespace pictura {
 
-namespace {
 std::size_t bytes_per_value(PixelFormat format) {
   switch (format) {
     case PixelFormat::u8: return 1;
@@ -17,7 +16,6 @@ std::size_t bytes_per_value(PixelFormat format) {
     default: return 4;
   }
 }
-}  // namespace
 
 HostImages::HostImages(const Rig& rig, int num_views, PixelFormat format) : format_(format), num_views_(num_views) {
   validate(rig);

@@ -14,6 +14,9 @@ namespace pictura {
 
 enum class PixelFormat : uint8_t { u8, f16, f32 };
 
+/// Size of one channel of one pixel.
+std::size_t bytes_per_value(PixelFormat format);
+
 /// Where one camera's images lie: pixel (view, channel, y, x) is element
 /// view * view_stride + (channel * height + y) * width + x of `data`.
 struct CameraImages {

@@ -28,9 +28,7 @@ class NullRenderer final : public Renderer {
 
   void render(const SceneBatch&, Span<const View> views, const ImageBatch& images_out, Stream) override {
     PICTURA_CHECK(images_out.space == MemorySpace::host, "renderer null: expected images in host memory");
-    const std::size_t value_bytes = images_out.format == PixelFormat::u8    ? 1
-                                    : images_out.format == PixelFormat::f16 ? 2
-                                                                            : 4;
+    const std::size_t value_bytes = bytes_per_value(images_out.format);
     for (const CameraImages& camera : images_out.cameras) {
       const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
       for (std::size_t view = 0; view < views.size(); ++view) {

@@ -22,20 +22,6 @@ constexpr std::string_view kExtension = ".xodr";
 
 std::vector<fs::path> town_folders() { return {fs::path(map_folder()), fs::path(map_folder()) / "carla"}; }
 
-/// The towns that the map folder holds, by name, sorted.
-std::vector<std::string> known_towns() {
-  std::vector<std::string> names;
-  for (const fs::path& folder : town_folders()) {
-    std::error_code error;
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-      if (entry.path().extension() == kExtension) names.push_back(entry.path().stem().string());
-    }
-  }
-  std::sort(names.begin(), names.end());
-  names.erase(std::unique(names.begin(), names.end()), names.end());
-  return names;
-}
-
 /// The seed of `procedural[:SEED]`, or nothing when the name is not of that kind.
 std::optional<uint64_t> procedural_seed(std::string_view name) {
   if (name == kProcedural) return 0;
@@ -50,6 +36,19 @@ std::optional<uint64_t> procedural_seed(std::string_view name) {
 }
 
 }  // namespace
+
+std::vector<std::string> known_towns() {
+  std::vector<std::string> names;
+  for (const fs::path& folder : town_folders()) {
+    std::error_code error;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+      if (entry.path().extension() == kExtension) names.push_back(entry.path().stem().string());
+    }
+  }
+  std::sort(names.begin(), names.end());
+  names.erase(std::unique(names.begin(), names.end()), names.end());
+  return names;
+}
 
 std::string map_folder() {
   auto variable = [](const char* name) -> std::string {

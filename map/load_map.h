@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "pictura/map/road_map.h"
 
@@ -15,5 +16,8 @@ std::shared_ptr<const RoadMap> load_map(const std::string& name);
 /// $PICTURA_DATA, or $XDG_DATA_HOME/pictura/maps, or ~/.local/share/pictura/maps. CARLA's towns are looked for here and
 /// in its folder `carla`.
 std::string map_folder();
+
+/// The towns that the map folder holds, by name, sorted.
+std::vector<std::string> known_towns();
 
 }  // namespace pictura
