@@ -3,7 +3,7 @@
 #include "pictura/apps/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/file.h"
-#include "pictura/map/procedural_town.h"
+#include "pictura/map/procedural/procedural_town.h"
 
 namespace pictura {
 

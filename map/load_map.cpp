@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "pictura/common/error.h"
-#include "pictura/map/opendrive.h"
-#include "pictura/map/procedural_town.h"
+#include "pictura/map/opendrive/opendrive.h"
+#include "pictura/map/procedural/procedural_town.h"
 
 namespace pictura {
 

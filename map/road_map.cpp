@@ -161,6 +161,20 @@ const char* to_string(LaneType type) {
   return "unknown";
 }
 
+const char* to_string(MarkColor color) {
+  switch (color) {
+    case MarkColor::white: return "white";
+    case MarkColor::yellow: return "yellow";
+    case MarkColor::red: return "red";
+    case MarkColor::green: return "green";
+    case MarkColor::blue: return "blue";
+    case MarkColor::orange: return "orange";
+    case MarkColor::violet: return "violet";
+    case MarkColor::black: return "black";
+  }
+  return "unknown";
+}
+
 void validate(const RoadMap& map) {
   try {
     validate_lanes(map);

@@ -59,7 +59,8 @@ struct Lane {
   int32_t source_road = 0, source_section = 0, source_lane = 0;  // as the file names it; see RoadMap::road_names
 };
 
-enum class MarkColor : uint8_t { white, yellow };
+enum class MarkColor : uint8_t { white, yellow, red, green, blue, orange, violet, black };
+const char* to_string(MarkColor color);
 
 /// A painted line, one per stripe and dash run: a double line is two markings, a broken one is many.
 struct Marking {
@@ -84,6 +85,22 @@ struct ParkingSpace {
   float length_m = 0, width_m = 0;
 };
 
+/// A stop line that the file paints, whether a light or a sign governs it or nothing does.
+struct StopLine {
+  Vec3 a_m, b_m;
+  float width_m = 0;
+};
+
+/// A sign at the road: what the file says of it, and the lanes for which it holds (by its validity and references).
+struct Sign {
+  std::string name;           // the signal's id in the file
+  std::string type, subtype;  // of the catalogue of `country`; "206" is a stop sign in OpenDRIVE's own
+  std::string country;
+  Vec3 position_m;
+  float heading_rad = 0;  // of the traffic for which it stands
+  IndexRange lanes;       // RoadMap::sign_lanes
+};
+
 /// A traffic light: its stop line, head, phase, and the lanes that it holds (incoming and connecting ones).
 struct TrafficLight {
   Vec3 stop_a_m, stop_b_m;     // the stop line, left end first as seen by traffic
@@ -106,17 +123,31 @@ struct BuildingLine {
   Vec3 a_m, b_m;  // the road lies to the right of a -> b
 };
 
+/// Where a file says something: the road's index in RoadMap::road_names (-1: on no road) and the line of its element
+/// (0: derived, or the map came from no text).
+struct SourceElement {
+  int32_t road = -1, line = 0;
+};
+
+/// The origin of every element, parallel to RoadMap's vectors of the same names.
+struct Provenance {
+  std::vector<SourceElement> lanes, markings, road_edges, crosswalks, parking_spaces, stop_lines, signs, lights,
+      junctions, building_lines;
+};
+
 /// Counts that `pictura map` prints and that tests compare with the file.
 struct MapFacts {
   int32_t roads = 0, junction_roads = 0, junctions = 0, signal_junctions = 0, lanes = 0, driving_lanes = 0;
   double driving_lane_km = 0, driving_lane_km_in_junctions = 0;  // along the roads' reference lines
   int32_t traffic_lights = 0, stop_lines = 0, crosswalks = 0, parking_spaces = 0;
+  int32_t painted_stop_lines = 0, signs = 0;
   double z_min_m = 0, z_max_m = 0;
 };
 
 struct RoadMap {
   std::string name;                     // "Town01", "procedural:7", or the file's stem
   std::array<double, 3> origin_m{};     // file coordinates of this map's (0, 0, 0)
+  std::string geo_reference;            // how the file's coordinates lie on the globe, a PROJ string; may be empty
   std::vector<std::string> road_names;  // [roads] id in the file
 
   std::vector<Lane> lanes;
@@ -128,11 +159,15 @@ struct RoadMap {
   std::vector<Crosswalk> crosswalks;
   std::vector<Vec3> outline_points;
   std::vector<ParkingSpace> parking_spaces;
+  std::vector<StopLine> stop_lines;
+  std::vector<Sign> signs;
+  std::vector<int32_t> sign_lanes;
   std::vector<TrafficLight> lights;
   std::vector<int32_t> light_lanes;
   std::vector<Junction> junctions;
   std::vector<BuildingLine> building_lines;
   MapFacts facts;
+  Provenance provenance;
 
   Span<const LanePoint> points_of(const Lane& lane) const {
     return {lane_points.data() + lane.points.begin, static_cast<size_t>(lane.points.size())};

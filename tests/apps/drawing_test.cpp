@@ -18,8 +18,8 @@
 #include "pictura/apps/draw_world.h"
 #include "pictura/apps/video.h"
 #include "pictura/common/error.h"
-#include "pictura/map/opendrive.h"
-#include "pictura/map/procedural_town.h"
+#include "pictura/map/opendrive/opendrive.h"
+#include "pictura/map/procedural/procedural_town.h"
 
 namespace pictura {
 namespace {

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "pictura/map/load_map.h"
-#include "pictura/map/opendrive.h"
+#include "pictura/map/opendrive/opendrive.h"
 #include "pictura/tests/map/small_roads.h"
 
 namespace pictura {

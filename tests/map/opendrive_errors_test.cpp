@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "pictura/common/error.h"
-#include "pictura/map/opendrive.h"
+#include "pictura/map/opendrive/opendrive.h"
 #include "pictura/tests/map/small_roads.h"
 
 namespace pictura {

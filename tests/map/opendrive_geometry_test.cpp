@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "pictura/common/scene.h"
-#include "pictura/map/opendrive.h"
+#include "pictura/map/opendrive/opendrive.h"
 #include "pictura/tests/map/small_roads.h"
 
 namespace pictura {

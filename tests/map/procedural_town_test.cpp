@@ -1,6 +1,6 @@
 // Procedural towns: the text on its own, by an evaluation of lines, arcs and widths that shares no code with the writer
 // or the importer, and then the town as the importer reads it.
-#include "pictura/map/procedural_town.h"
+#include "pictura/map/procedural/procedural_town.h"
 
 #include <cmath>
 #include <map>
@@ -14,7 +14,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/grid.h"
-#include "pictura/map/opendrive.h"
+#include "pictura/map/opendrive/opendrive.h"
 
 namespace pictura {
 namespace {

@@ -1,10 +1,10 @@
-#include "pictura/map/opendrive.h"
+#include "pictura/map/opendrive/opendrive.h"
 
 #include <filesystem>
 
 #include "pictura/common/file.h"
-#include "pictura/map/opendrive_build.h"
-#include "pictura/map/opendrive_reader.h"
+#include "pictura/map/opendrive/build.h"
+#include "pictura/map/opendrive/reader.h"
 
 namespace pictura {
 

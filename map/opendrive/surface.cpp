@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pictura/map/opendrive_build.h"
+#include "pictura/map/opendrive/build.h"
 #include "pictura/map/road_edges.h"
 
 namespace pictura::opendrive {

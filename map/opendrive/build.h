@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "pictura/common/scene.h"
-#include "pictura/map/opendrive.h"
-#include "pictura/map/opendrive_curves.h"
-#include "pictura/map/opendrive_model.h"
+#include "pictura/map/opendrive/curves.h"
+#include "pictura/map/opendrive/model.h"
+#include "pictura/map/opendrive/opendrive.h"
 #include "pictura/map/polyline.h"
 
 namespace pictura::opendrive {

@@ -2,7 +2,7 @@
 // and widths. In double and in the file's own coordinates.
 #pragma once
 
-#include "pictura/map/opendrive_model.h"
+#include "pictura/map/opendrive/model.h"
 #include "pictura/map/polyline.h"
 
 namespace pictura::opendrive {

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <set>
 
-#include "pictura/map/opendrive_build.h"
+#include "pictura/map/opendrive/build.h"
 #include "pictura/map/speed_limit.h"
 
 namespace pictura::opendrive {

@@ -1,7 +1,7 @@
 // From the text of an OpenDRIVE file to its Network.
 #pragma once
 
-#include "pictura/map/opendrive_model.h"
+#include "pictura/map/opendrive/model.h"
 
 namespace pictura::opendrive {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include "pictura/map/opendrive_build.h"
+#include "pictura/map/opendrive/build.h"
 
 namespace pictura::opendrive {
 

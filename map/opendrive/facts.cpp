@@ -1,7 +1,7 @@
 // Counts over a finished map.
 #include <algorithm>
 
-#include "pictura/map/opendrive_build.h"
+#include "pictura/map/opendrive/build.h"
 
 namespace pictura::opendrive {
 

@@ -1,7 +1,7 @@
 // Writes a town as OpenDRIVE 1.4: nodes of a jittered grid, streets between them as lines and arcs, a junction with one
 // phase per approach at every node of three or four arms, a plain bend at the four corners. Reference lines are
 // computed in double and written with ten decimals, so that pieces meet within a nanometre.
-#include "pictura/map/procedural_town.h"
+#include "pictura/map/procedural/procedural_town.h"
 
 #include <array>
 #include <cmath>

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "pictura/map/opendrive_build.h"
+#include "pictura/map/opendrive/build.h"
 
 namespace pictura::opendrive {
 

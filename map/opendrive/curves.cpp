@@ -1,4 +1,4 @@
-#include "pictura/map/opendrive_curves.h"
+#include "pictura/map/opendrive/curves.h"
 
 #include <algorithm>
 #include <cmath>
@@ -134,21 +134,6 @@ std::vector<double> formula_changes(const FileRoad& road, const FileSection& sec
   std::sort(changes.begin() + 1, changes.end());
   changes.push_back(end);
   return changes;
-}
-
-const FileLane* FileSection::lane(int id) const {
-  const std::vector<FileLane>& side = id > 0 ? left : right;
-  const std::size_t index = static_cast<std::size_t>(std::abs(id)) - 1;
-  return id != 0 && index < side.size() ? &side[index] : nullptr;
-}
-
-std::size_t Source::line_at(std::ptrdiff_t offset) const {
-  const std::size_t end = std::min(static_cast<std::size_t>(std::max<std::ptrdiff_t>(offset, 0)), text.size());
-  return 1 + static_cast<std::size_t>(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(end), '\n'));
-}
-
-void Where::fail_with(const std::string& message) const {
-  pictura::fail("{}:{}: {}: <{}>: {}", source->name, source->line_at(offset), owner, element, message);
 }
 
 }  // namespace pictura::opendrive

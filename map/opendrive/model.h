@@ -15,12 +15,18 @@
 
 namespace pictura::opendrive {
 
-/// The file's name and text; turns an element's byte offset into a line for messages.
-struct Source {
-  std::string name;
-  std::string_view text;
+/// The file's name and text; turns an element's byte offset into a line, counted from 1.
+class Source {
+ public:
+  Source() = default;
+  Source(std::string name, std::string_view text);
 
-  std::size_t line_at(std::ptrdiff_t offset) const;
+  const std::string& name() const { return name_; }
+  int32_t line_at(std::ptrdiff_t offset) const;
+
+ private:
+  std::string name_;
+  std::vector<std::ptrdiff_t> line_ends_;
 };
 
 /// Where an element stands: its byte offset in the text and what it belongs to ("road 12", "junction 3").
@@ -29,6 +35,8 @@ struct Where {
   std::ptrdiff_t offset = 0;
   std::string owner;
   const char* element = "";
+
+  int32_t line() const { return source ? source->line_at(offset) : 0; }
 
   /// Throws Error "SOURCE:LINE: OWNER: <element>: message".
   [[noreturn]] void fail_with(const std::string& message) const;
