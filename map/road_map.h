@@ -86,7 +86,7 @@ struct ParkingSpace {
 };
 
 /// A stop line that the file paints, whether a light or a sign governs it or nothing does.
-struct StopLine {
+struct PaintedStopLine {
   Vec3 a_m, b_m;
   float width_m = 0;
 };
@@ -159,7 +159,7 @@ struct RoadMap {
   std::vector<Crosswalk> crosswalks;
   std::vector<Vec3> outline_points;
   std::vector<ParkingSpace> parking_spaces;
-  std::vector<StopLine> stop_lines;
+  std::vector<PaintedStopLine> stop_lines;
   std::vector<Sign> signs;
   std::vector<int32_t> sign_lanes;
   std::vector<TrafficLight> lights;
