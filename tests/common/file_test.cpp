@@ -1,7 +1,6 @@
 // Files written beside and renamed; PNG and hash.
 #include "pictura/common/file.h"
 
-#include <filesystem>
 #include <fstream>
 
 #include <gmock/gmock.h>
@@ -10,30 +9,18 @@
 #include "pictura/common/error.h"
 #include "pictura/common/hash.h"
 #include "pictura/common/image.h"
+#include "pictura/tests/support/scratch_folder.h"
 
 namespace pictura {
 namespace {
 
-namespace fs = std::filesystem;
-
 class FileTest : public testing::Test {
  protected:
-  void SetUp() override {
-    // One folder per test: ctest runs them side by side.
-    folder_ =
-        testing::TempDir() + "/pictura_file_test_" + testing::UnitTest::GetInstance()->current_test_info()->name();
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-  size_t files_in_folder() const {
-    return static_cast<size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
-  }
-  std::string folder_;
+  test::ScratchFolder folder_;
 };
 
 TEST_F(FileTest, AFailedWriteKeepsTheOldFileAndLeavesNothingBeside) {
-  const std::string path = folder_ + "/a.txt";
+  const std::string path = folder_ / "a.txt";
   write_file(path, "old");
   EXPECT_THROW(write_renamed(path,
                              [](const std::string& temporary) {
@@ -42,16 +29,16 @@ TEST_F(FileTest, AFailedWriteKeepsTheOldFileAndLeavesNothingBeside) {
                              }),
                Error);
   EXPECT_EQ(read_file(path), "old");
-  EXPECT_EQ(files_in_folder(), 1u);
+  EXPECT_EQ(folder_.num_entries(), 1u);
 }
 
 TEST_F(FileTest, ErrorsNameThePath) {
-  EXPECT_THROW(read_file(folder_ + "/missing"), Error);
-  EXPECT_THROW(read_file(folder_), Error);
+  EXPECT_THROW(read_file(folder_ / "missing"), Error);
+  EXPECT_THROW(read_file(folder_.path()), Error);
   EXPECT_THROW(write_file("/proc/nowhere/a", "x"), Error);
   EXPECT_THROW(make_output_folder("/proc/nowhere"), Error);
-  write_file(folder_ + "/file", "x");
-  EXPECT_THROW(make_output_folder(folder_ + "/file"), Error);
+  write_file(folder_ / "file", "x");
+  EXPECT_THROW(make_output_folder(folder_ / "file"), Error);
   EXPECT_THROW(read_file("/dev/zero", 1 << 20), Error) << "endless files stop at the limit";
   try {
     write_file("/proc/nowhere/a", "x");
@@ -63,12 +50,12 @@ TEST_F(FileTest, ErrorsNameThePath) {
 TEST_F(FileTest, PngKeepsEveryPixel) {
   std::vector<uint8_t> rgb;
   for (int i = 0; i < 5 * 3 * 3; ++i) rgb.push_back(static_cast<uint8_t>(i * 5));
-  write_png(folder_ + "/a.png", 5, 3, rgb);
-  const RgbImage image = read_png(folder_ + "/a.png");
+  write_png(folder_ / "a.png", 5, 3, rgb);
+  const RgbImage image = read_png(folder_ / "a.png");
   EXPECT_EQ(image.width_px, 5);
   EXPECT_EQ(image.height_px, 3);
   EXPECT_EQ(image.rgb, rgb);
-  EXPECT_THROW(write_png(folder_ + "/b.png", 5, 4, rgb), Error);
+  EXPECT_THROW(write_png(folder_ / "b.png", 5, 4, rgb), Error);
 }
 
 TEST(Hash, IsFnv1a) {
