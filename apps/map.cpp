@@ -25,8 +25,9 @@ void add_map_command(CLI::App& app) {
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer("Examples:\n  pictura map Town01 --json\n  pictura map procedural:7 --png town.png");
   command->callback([arguments] {
+    LoadReport report;
     const auto begin = std::chrono::steady_clock::now();
-    const std::shared_ptr<const RoadMap> map = load_map(arguments->map);
+    const std::shared_ptr<const RoadMap> map = load_map(arguments->map, {}, &report);
     const double load_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
     if (!arguments->png.empty()) draw_map_png(*map, arguments->png, arguments->size_px);
     const MapFacts& facts = map->facts;
@@ -44,6 +45,7 @@ void add_map_command(CLI::App& app) {
                       {"parking_spaces", facts.parking_spaces},
                       {"z_min_m", facts.z_min_m},
                       {"z_max_m", facts.z_max_m},
+                      {"cached", report.cached},
                       {"load_ms", load_ms}};
     if (arguments->json) return print_json(object);
     for (const auto& [key, value] : object.items()) {

@@ -8,7 +8,8 @@
 #include <vector>
 
 #include "pictura/common/error.h"
-#include "pictura/map/opendrive/opendrive.h"
+#include "pictura/common/file.h"
+#include "pictura/map/map_cache.h"
 #include "pictura/map/procedural/procedural_town.h"
 
 namespace pictura {
@@ -33,6 +34,36 @@ std::optional<uint64_t> procedural_seed(std::string_view name) {
     fail_usage("map '{}': expected procedural or procedural:SEED with an integer from 0, got '{}'", name, digits);
   }
   return seed;
+}
+
+/// Keeps an encoded map for the next load, where that is possible.
+void try_to_keep(const std::string& cache_path, const std::string& bytes) {
+  try {
+    make_output_folder(fs::path(cache_path).parent_path().string());
+    write_file(cache_path, bytes);
+  } catch (const Error&) {
+    // A folder that cannot be written to is the user's choice, or not his to change.
+  }
+}
+
+RoadMap load_file(const std::string& path, const OpenDriveOptions& options, LoadReport* report) {
+  const std::string text = read_file(path);
+  const std::string cache_path = map_cache_path(path, options);
+  if (cache_path.empty()) return parse_opendrive(text, path, options);
+  const MapCacheKey key = map_cache_key(text, options);
+  std::error_code error;
+  if (fs::exists(cache_path, error)) {
+    try {
+      RoadMap map = decode_map(read_file(cache_path), key, cache_path);
+      report->cached = true;
+      return map;
+    } catch (const Error& refusal) {
+      report->cache_refusal = refusal.what();
+    }
+  }
+  RoadMap map = parse_opendrive(text, path, options);
+  try_to_keep(cache_path, encode_map(map, key));
+  return map;
 }
 
 }  // namespace
@@ -60,21 +91,25 @@ std::string map_folder() {
   return variable("HOME") + "/.local/share/pictura/maps";
 }
 
-std::shared_ptr<const RoadMap> load_map(const std::string& name) {
+std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDriveOptions& options,
+                                        LoadReport* report_out) {
+  LoadReport unused;
+  LoadReport& report = report_out ? *report_out : unused;
+  report = {};
   if (const std::optional<uint64_t> seed = procedural_seed(name)) {
-    auto map = std::make_shared<RoadMap>(parse_opendrive(procedural_town({.seed = *seed}), name));
+    auto map = std::make_shared<RoadMap>(parse_opendrive(procedural_town({.seed = *seed}), name, options));
     map->name = fmt::format("{}:{}", kProcedural, *seed);
     return map;
   }
   std::error_code error;
-  if (name.ends_with(kExtension)) return std::make_shared<RoadMap>(load_opendrive(name));
+  if (name.ends_with(kExtension)) return std::make_shared<RoadMap>(load_file(name, options, &report));
   if (fs::exists(name, error) && !fs::is_directory(name, error)) {
     fail_usage("map '{}': expected a file that ends in {}", name, kExtension);
   }
   if (!name.empty() && name.find('/') == std::string::npos) {
     for (const fs::path& folder : town_folders()) {
       const fs::path path = folder / (name + std::string(kExtension));
-      if (fs::exists(path, error)) return std::make_shared<RoadMap>(load_opendrive(path.string()));
+      if (fs::exists(path, error)) return std::make_shared<RoadMap>(load_file(path.string(), options, &report));
     }
   }
   const std::vector<std::string> towns = known_towns();

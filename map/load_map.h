@@ -5,13 +5,22 @@
 #include <string>
 #include <vector>
 
+#include "pictura/map/opendrive/opendrive.h"
 #include "pictura/map/road_map.h"
 
 namespace pictura {
 
-/// Loads `name`: a file (.xodr), a town's name looked up as NAME.xodr in the map folder, or `procedural[:SEED]`.
+/// How a map came to be loaded.
+struct LoadReport {
+  bool cached = false;        // the map is the one that an earlier load left in the cache
+  std::string cache_refusal;  // why a cached file was there and not used, or empty
+};
+
+/// Loads `name`: a file (.xodr), a town's name looked up as NAME.xodr in the map folder, or `procedural[:SEED]`. Files
+/// are imported once and kept in the cache (map_cache.h); a cache that cannot be read or written costs time alone.
 /// Throws Error naming the file and the line or element; UsageError when there is no such map.
-std::shared_ptr<const RoadMap> load_map(const std::string& name);
+std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDriveOptions& options = {},
+                                        LoadReport* report_out = nullptr);
 
 /// $PICTURA_DATA, or $XDG_DATA_HOME/pictura/maps, or ~/.local/share/pictura/maps. CARLA's towns are looked for here and
 /// in its folder `carla`.

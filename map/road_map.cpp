@@ -124,6 +124,24 @@ void validate_looks(const RoadMap& map) {
   }
 }
 
+void validate_signs(const RoadMap& map) {
+  for (std::size_t i = 0; i < map.stop_lines.size(); ++i) {
+    const PaintedStopLine& line = map.stop_lines[i];
+    check_point("painted stop line", i, line.a_m);
+    check_point("painted stop line", i, line.b_m);
+    check_number("painted stop line", i, "width_m", line.width_m, 1e-3f, 10.0f);
+  }
+  for (std::size_t i = 0; i < map.signs.size(); ++i) {
+    const Sign& sign = map.signs[i];
+    check_point("sign", i, sign.position_m);
+    check_number("sign", i, "heading_rad", sign.heading_rad, -kPi - 1e-4f, kPi + 1e-4f);
+    check_range("sign", i, "lanes", sign.lanes, map.sign_lanes.size(), 0);
+  }
+  for (std::size_t i = 0; i < map.sign_lanes.size(); ++i) {
+    check_index("sign lane", i, "lane", map.sign_lanes[i], map.lanes.size(), 0);
+  }
+}
+
 void validate_lights(const RoadMap& map) {
   for (std::size_t i = 0; i < map.lights.size(); ++i) {
     const TrafficLight& light = map.lights[i];
@@ -139,6 +157,29 @@ void validate_lights(const RoadMap& map) {
   for (std::size_t i = 0; i < map.light_lanes.size(); ++i) {
     check_index("light lane", i, "lane", map.light_lanes[i], map.lanes.size(), 0);
   }
+}
+
+/// Either every element has its source or, in a map that came from no text, none has.
+void validate_provenance(const RoadMap& map) {
+  const auto check = [&](const char* what, const std::vector<SourceElement>& sources, std::size_t count) {
+    PICTURA_CHECK(sources.empty() || sources.size() == count, "provenance: expected the sources of {} {}s, got {}",
+                  count, what, sources.size());
+    for (std::size_t i = 0; i < sources.size(); ++i) {
+      check_index(what, i, "source road", sources[i].road, map.road_names.size(), -1);
+      PICTURA_CHECK(sources[i].line >= 0, "{} {}: source line: expected 0 or more, got {}", what, i, sources[i].line);
+    }
+  };
+  const Provenance& provenance = map.provenance;
+  check("lane", provenance.lanes, map.lanes.size());
+  check("marking", provenance.markings, map.markings.size());
+  check("road edge", provenance.road_edges, map.road_edges.size());
+  check("crosswalk", provenance.crosswalks, map.crosswalks.size());
+  check("parking space", provenance.parking_spaces, map.parking_spaces.size());
+  check("painted stop line", provenance.stop_lines, map.stop_lines.size());
+  check("sign", provenance.signs, map.signs.size());
+  check("light", provenance.lights, map.lights.size());
+  check("junction", provenance.junctions, map.junctions.size());
+  check("building line", provenance.building_lines, map.building_lines.size());
 }
 
 }  // namespace
@@ -179,7 +220,9 @@ void validate(const RoadMap& map) {
   try {
     validate_lanes(map);
     validate_looks(map);
+    validate_signs(map);
     validate_lights(map);
+    validate_provenance(map);
   } catch (const Error& error) {
     fail("map {}: {}", map.name, error.what());
   }

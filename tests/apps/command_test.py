@@ -14,6 +14,7 @@ import sys
 import tempfile
 import time
 import unittest
+import unittest.mock
 
 PICTURA = ""
 CONFIGS = pathlib.Path(__file__).resolve().parents[2] / "configs"
@@ -87,11 +88,23 @@ class Maps(CommandCase):
         picture = self.folder / "map.png"
         facts = self.json_of("map", self.town(), "--png", picture)
         keys = """map roads junction_roads junctions signal_junctions lanes driving_lanes driving_lane_km traffic_lights
-                  stop_lines crosswalks parking_spaces z_min_m z_max_m load_ms""".split()
+                  stop_lines crosswalks parking_spaces z_min_m z_max_m cached load_ms""".split()
         self.assertEqual([key for key in keys if key not in facts], [])
         self.assertGreater(facts["driving_lane_km"], 0.5)
         self.assertGreater(facts["traffic_lights"], 0)
         self.assertEqual(picture.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+
+    def test_the_second_load_comes_from_the_cache(self):
+        town = self.town()
+        cache = {"XDG_CACHE_HOME": str(self.folder / "cache"), "PICTURA_CACHE": ""}
+        with unittest.mock.patch.dict(os.environ, cache):
+            first, second = self.json_of("map", town), self.json_of("map", town)
+            self.assertEqual([first.pop("cached"), second.pop("cached")], [False, True])
+            self.assertLess(second.pop("load_ms"), first.pop("load_ms"))
+            self.assertEqual(first, second)
+            self.assertEqual(len(list(self.folder.glob("cache/pictura/maps/*.map"))), 1)
+            with unittest.mock.patch.dict(os.environ, {"PICTURA_CACHE": "off"}):
+                self.assertFalse(self.json_of("map", town)["cached"])
 
     def test_bad_files_are_refused_by_name(self):
         text = self.town().read_text()

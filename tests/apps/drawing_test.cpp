@@ -20,11 +20,14 @@
 #include "pictura/common/error.h"
 #include "pictura/map/opendrive/opendrive.h"
 #include "pictura/map/procedural/procedural_town.h"
+#include "pictura/tests/support/scratch_folder.h"
 
 namespace pictura {
 namespace {
 
 namespace fs = std::filesystem;
+using test::EnvironmentVariable;
+using test::ScratchFolder;
 using testing::HasSubstr;
 
 struct Pixel {
@@ -55,23 +58,6 @@ const RoadMap& town() {
   static const RoadMap map = parse_opendrive(procedural_town({3, 2, 2}), "town");
   return map;
 }
-
-/// A folder that goes away with the test.
-class Folder {
- public:
-  Folder() {
-    std::string name = (fs::temp_directory_path() / "pictura_drawing_XXXXXX").string();
-    path_ = mkdtemp(name.data());
-  }
-  ~Folder() { fs::remove_all(path_); }
-  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-  size_t num_files() const {
-    return static_cast<size_t>(std::distance(fs::directory_iterator(path_), fs::directory_iterator()));
-  }
-
- private:
-  fs::path path_;
-};
 
 template <typename Function>
 std::string error_of(Function function) {
@@ -321,10 +307,10 @@ TEST(DrawMap, RefusesWhatCannotBeDrawn) {
   EXPECT_THAT(error_of([] { draw_map(RoadMap{}, 300); }), HasSubstr("nothing to draw"));
   EXPECT_THAT(error_of([] { draw_map_png(town(), "/nonexistent/a/map.png", 300); }),
               HasSubstr("/nonexistent/a/map.png"));
-  const Folder folder;
+  const ScratchFolder folder;
   draw_map_png(town(), folder / "map.png", 300);
   EXPECT_EQ(read_png(folder / "map.png").rgb, draw_map(town(), 300).rgb);
-  EXPECT_EQ(folder.num_files(), 1u);
+  EXPECT_EQ(folder.num_entries(), 1u);
 }
 
 TEST(ContactSheet, EnlargesEveryPixelWithoutSmoothing) {
@@ -415,7 +401,7 @@ bool has_children() { return !(waitpid(-1, nullptr, WNOHANG) < 0 && errno == ECH
 
 TEST(Video, HoldsTheFramesThatWereGiven) {
   if (!has_ffmpeg()) GTEST_SKIP() << "no ffmpeg and ffprobe on this machine";
-  const Folder folder;
+  const ScratchFolder folder;
   for (const std::string ending : {"mp4", "gif"}) {
     const std::string path = folder / ("film." + ending);
     VideoWriter video(path, 64, 48, 10);
@@ -438,12 +424,12 @@ TEST(Video, HoldsTheFramesThatWereGiven) {
     }
     EXPECT_THAT(error_of([&] { video.add(solid(64, 48, {0, 0, 0})); }), HasSubstr("has ended"));
   }
-  EXPECT_EQ(folder.num_files(), 2u);
+  EXPECT_EQ(folder.num_entries(), 2u);
 }
 
 TEST(Video, OddSidesLoseTheirLastPixel) {
   if (!has_ffmpeg()) GTEST_SKIP() << "no ffmpeg and ffprobe on this machine";
-  const Folder folder;
+  const ScratchFolder folder;
   VideoWriter video(folder / "odd.mp4", 65, 47, 30);
   video.add(solid(65, 47, {90, 90, 90}));
   video.finish();
@@ -459,43 +445,33 @@ TEST(Video, RefusesBadPathsAndFrames) {
   EXPECT_THROW(VideoWriter("film.mp4", 0, 48, 10), Error);
   EXPECT_THROW(VideoWriter("film.mp4", 64, 48, 0), Error);
   EXPECT_THROW(VideoWriter("film.mp4", 64, 48, std::nan("")), Error);
-  const Folder folder;
+  const ScratchFolder folder;
   {
     VideoWriter video(folder / "film.mp4", 64, 48, 10);
     EXPECT_THAT(error_of([&] { video.add(solid(48, 64, {0, 0, 0})); }), HasSubstr("64x48 px, got 48x64"));
     EXPECT_THAT(error_of([&] { video.finish(); }), HasSubstr("needs a frame"));
     video.add(solid(64, 48, {0, 0, 0}));
   }
-  EXPECT_EQ(folder.num_files(), 0u) << "an unfinished film leaves nothing";
+  EXPECT_EQ(folder.num_entries(), 0u) << "an unfinished film leaves nothing";
   EXPECT_FALSE(has_children());
 }
 
-/// Runs with PATH set to a folder of our own.
-class OtherPath {
- public:
-  explicit OtherPath(const std::string& path) : old_(std::getenv("PATH")) { setenv("PATH", path.c_str(), 1); }
-  ~OtherPath() { setenv("PATH", old_.c_str(), 1); }
-
- private:
-  std::string old_;
-};
-
 TEST(Video, SaysThatFfmpegIsMissing) {
-  const Folder folder, empty;
-  const OtherPath path(empty / "");
+  const ScratchFolder folder, empty;
+  const EnvironmentVariable path("PATH", empty.path());
   const std::string message = error_of([&] { VideoWriter(folder / "film.mp4", 64, 48, 10); });
   EXPECT_THAT(message, HasSubstr("ffmpeg program"));
-  EXPECT_EQ(folder.num_files(), 0u);
+  EXPECT_EQ(folder.num_entries(), 0u);
 }
 
 TEST(Video, PassesOnWhatFfmpegSaidLast) {
-  const Folder folder, programs;
+  const ScratchFolder folder, programs;
   {
     std::ofstream script(programs / "ffmpeg");
     script << "#!/bin/sh\necho first line >&2\necho 'Unknown encoder' >&2\nexit 3\n";
   }
   fs::permissions(programs / "ffmpeg", fs::perms::owner_all);
-  const OtherPath path(programs / "");
+  const EnvironmentVariable path("PATH", programs.path());
   const std::string file = folder / "film.mp4";
   const std::string message = error_of([&] {
     VideoWriter video(file, 640, 480, 10);
@@ -504,7 +480,7 @@ TEST(Video, PassesOnWhatFfmpegSaidLast) {
     video.finish();
   });
   EXPECT_EQ(message, file + ": ffmpeg ended with status 3: Unknown encoder");
-  EXPECT_EQ(folder.num_files(), 0u);
+  EXPECT_EQ(folder.num_entries(), 0u);
   EXPECT_FALSE(has_children());
 }
 

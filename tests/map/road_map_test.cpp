@@ -6,10 +6,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
+#include "pictura/tests/support/scratch_folder.h"
 
 namespace pictura {
 namespace {
@@ -17,7 +17,11 @@ namespace {
 using ::testing::HasSubstr;
 
 TEST(RoadMap, EveryDamageIsFoundAndNamed) {
-  const RoadMap sound = *load_map("procedural:2");
+  RoadMap sound = *load_map("procedural:2");
+  sound.sign_lanes = {0};
+  sound.signs = {{"1", "206", "-1", "OpenDRIVE", {1, 2, 3}, 0, {0, 1}}};
+  sound.stop_lines = {{{1, 2, 3}, {4, 5, 6}, 0.3f}};
+  sound.provenance.signs = {{0, 7}};
   ASSERT_NO_THROW(validate(sound));
   ASSERT_FALSE(sound.lights.empty());
   ASSERT_FALSE(sound.markings.empty());
@@ -48,6 +52,15 @@ TEST(RoadMap, EveryDamageIsFoundAndNamed) {
       {"facing", [](RoadMap* map) { map->lights[0].head_facing = {0, 0}; }},
       {"stop line", [](RoadMap* map) { map->lights[0].stop_b_m = map->lights[0].stop_a_m; }},
       {"light lane", [](RoadMap* map) { map->light_lanes[0] = -1; }},
+      {"painted stop line 0", [&](RoadMap* map) { map->stop_lines[0].b_m.x = nan; }},
+      {"painted stop line 0: width_m", [](RoadMap* map) { map->stop_lines[0].width_m = 0; }},
+      {"sign 0: lanes", [](RoadMap* map) { map->signs[0].lanes.end = 2; }},
+      {"sign 0: heading_rad", [&](RoadMap* map) { map->signs[0].heading_rad = nan; }},
+      {"sign lane 0", [](RoadMap* map) { map->sign_lanes[0] = 1 << 20; }},
+      {"1 signs, got 2", [](RoadMap* map) { map->provenance.signs.push_back({}); }},
+      {"lanes, got 1", [](RoadMap* map) { map->provenance.lanes = {{0, 1}}; }},
+      {"sign 0: source road", [](RoadMap* map) { map->provenance.signs[0].road = 1 << 20; }},
+      {"sign 0: source line", [](RoadMap* map) { map->provenance.signs[0].line = -1; }},
   };
   for (const auto& [expected, damage] : damages) {
     RoadMap map = sound;
@@ -73,18 +86,10 @@ TEST(LoadMap, ProceduralTownsAreNamedByTheirSeed) {
 class LoadMapFiles : public ::testing::Test {
  protected:
   void SetUp() override {
-    const char* before = std::getenv("PICTURA_DATA");
-    before_ = before ? before : "";
-    folder_ = std::filesystem::temp_directory_path() / fmt::format("pictura_load_map_{}", ::getpid());
-    std::filesystem::create_directories(folder_ / "carla");
+    std::filesystem::create_directory(folder_ / "carla");
     std::ofstream(folder_ / "Here.xodr") << "<OpenDRIVE><road id=\"1\" ";
-    std::ofstream(folder_ / "carla" / "There.xodr") << "<OpenDRIVE/>";
+    std::ofstream(folder_ / "carla/There.xodr") << "<OpenDRIVE/>";
     std::ofstream(folder_ / "picture.png") << "png";
-    ::setenv("PICTURA_DATA", folder_.c_str(), 1);
-  }
-  void TearDown() override {
-    ::setenv("PICTURA_DATA", before_.c_str(), 1);
-    std::filesystem::remove_all(folder_);
   }
   std::string message_of(const std::string& name) {
     try {
@@ -94,8 +99,8 @@ class LoadMapFiles : public ::testing::Test {
     }
     return "(no error)";
   }
-  std::filesystem::path folder_;
-  std::string before_;
+  test::ScratchFolder folder_;
+  test::EnvironmentVariable data_{"PICTURA_DATA", folder_.path()};
 };
 
 TEST_F(LoadMapFiles, UnknownNamesListWhatThereIs) {
@@ -104,14 +109,14 @@ TEST_F(LoadMapFiles, UnknownNamesListWhatThereIs) {
   EXPECT_THAT(message_of("Nowhere"), HasSubstr("procedural"));
   EXPECT_THROW(load_map(""), UsageError);
   EXPECT_THROW(load_map("../Here"), UsageError);
-  EXPECT_THROW(load_map((folder_ / "picture.png").string()), UsageError);
-  EXPECT_THROW(load_map(folder_.string()), UsageError);
+  EXPECT_THROW(load_map(folder_ / "picture.png"), UsageError);
+  EXPECT_THROW(load_map(folder_.path()), UsageError);
 }
 
 TEST_F(LoadMapFiles, BadFilesAreNamed) {
   EXPECT_THAT(message_of("Here"), HasSubstr("Here.xodr:1"));
   EXPECT_THAT(message_of("There"), HasSubstr("There.xodr"));
-  EXPECT_THAT(message_of((folder_ / "missing.xodr").string()), HasSubstr("missing.xodr"));
+  EXPECT_THAT(message_of(folder_ / "missing.xodr"), HasSubstr("missing.xodr"));
 }
 
 }  // namespace

@@ -1,0 +1,9 @@
+# Run at every build in which one of SOURCES changed: writes OUTPUT with a hash of their contents and of COMPILER.
+set(hashes "${COMPILER}")
+foreach(source ${SOURCES})
+  file(SHA256 ${source} hash)
+  string(APPEND hashes " ${hash}")
+endforeach()
+string(SHA256 hash "${hashes}")
+string(SUBSTRING ${hash} 0 16 hash)
+file(WRITE ${OUTPUT} "// The sources that maps are imported by, as one number.\n#pragma once\n\n#define PICTURA_MAP_FINGERPRINT 0x${hash}ull\n")

@@ -1,0 +1,58 @@
+// The fields of RoadMap and of everything in it, listed once: what writes, reads or compares whole maps goes through
+// these lists. A structured binding must name every field, so a list that misses one does not compile.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <tuple>
+
+#include "pictura/map/opendrive/opendrive.h"
+#include "pictura/map/road_map.h"
+
+/// Defines fields_of(value), a tuple of references to all fields in the order of their declaration, and
+/// field_names_of(value), their names separated by ", ".
+#define PICTURA_FIELDS(Type, ...)            \
+  inline auto fields_of(Type& value) {       \
+    auto& [__VA_ARGS__] = value;             \
+    return std::tie(__VA_ARGS__);            \
+  }                                          \
+  inline auto fields_of(const Type& value) { \
+    const auto& [__VA_ARGS__] = value;       \
+    return std::tie(__VA_ARGS__);            \
+  }                                          \
+  constexpr std::string_view field_names_of(const Type&) { return #__VA_ARGS__; }
+
+namespace pictura {
+
+PICTURA_FIELDS(Vec2, x, y)
+PICTURA_FIELDS(Vec3, x, y, z)
+PICTURA_FIELDS(IndexRange, begin, end)
+PICTURA_FIELDS(LanePoint, position_m, heading_rad, width_m, s_m)
+PICTURA_FIELDS(Lane, type, in_junction, is_endless, junction, points, successors, predecessors, left_neighbor,
+               right_neighbor, length_m, speed_limit_mps, source_road, source_section, source_lane)
+PICTURA_FIELDS(Marking, points, width_m, color, broken)
+PICTURA_FIELDS(RoadEdge, a_m, b_m)
+PICTURA_FIELDS(Crosswalk, outline)
+PICTURA_FIELDS(ParkingSpace, center_m, heading_rad, length_m, width_m)
+PICTURA_FIELDS(PaintedStopLine, a_m, b_m, width_m)
+PICTURA_FIELDS(Sign, name, type, subtype, country, position_m, heading_rad, lanes)
+PICTURA_FIELDS(TrafficLight, stop_a_m, stop_b_m, stop_heading_rad, head_m, head_facing, junction, phase, lanes, name)
+PICTURA_FIELDS(Junction, name, num_phases)
+PICTURA_FIELDS(BuildingLine, a_m, b_m)
+PICTURA_FIELDS(SourceElement, road, line)
+PICTURA_FIELDS(Provenance, lanes, markings, road_edges, crosswalks, parking_spaces, stop_lines, signs, lights,
+               junctions, building_lines)
+PICTURA_FIELDS(MapFacts, roads, junction_roads, junctions, signal_junctions, lanes, driving_lanes, driving_lane_km,
+               driving_lane_km_in_junctions, traffic_lights, stop_lines, crosswalks, parking_spaces, painted_stop_lines,
+               signs, z_min_m, z_max_m)
+PICTURA_FIELDS(RoadMap, name, origin_m, geo_reference, road_names, lanes, lane_points, lane_links, markings,
+               marking_points, road_edges, crosswalks, outline_points, parking_spaces, stop_lines, signs, sign_lanes,
+               lights, light_lanes, junctions, building_lines, facts, provenance)
+
+PICTURA_FIELDS(OpenDriveOptions, chord_error_m)
+
+/// Where two maps first differ, in any bit, as a path like "lanes[3].length_m" or "lights: 8 and 9 of them"; empty when
+/// they are equal.
+std::string first_difference(const RoadMap& a, const RoadMap& b);
+
+}  // namespace pictura
