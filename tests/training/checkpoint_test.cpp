@@ -11,6 +11,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/file.h"
+#include "pictura/tests/support/scratch_folder.h"
 #include "pictura/training/event_file.h"
 #include "pictura/training/training.h"
 
@@ -21,14 +22,7 @@ using ::testing::HasSubstr;
 
 class Folder : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ =
-        ::testing::TempDir() + "/pictura_checkpoint_" + ::testing::UnitTest::GetInstance()->current_test_info()->name();
-    std::filesystem::remove_all(folder_);
-    make_output_folder(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-  std::string folder_;
+  test::ScratchFolder folder_;
 };
 
 Config small_config() {
@@ -72,8 +66,8 @@ using CheckpointFile = Folder;
 TEST_F(CheckpointFile, ComesBackWhole) {
   const Config config = small_config();
   const Policy policy(config.policy, 4, 1);
-  write_checkpoint(folder_ + "/a.ckpt", small_checkpoint(policy, config));
-  const Checkpoint back = read_checkpoint(folder_ + "/a.ckpt");
+  write_checkpoint(folder_ / "a.ckpt", small_checkpoint(policy, config));
+  const Checkpoint back = read_checkpoint(folder_ / "a.ckpt");
   EXPECT_EQ(to_toml(back.config), to_toml(config));
   EXPECT_EQ(back.update, 12);
   EXPECT_EQ(back.agent_steps, 3456);
@@ -102,8 +96,8 @@ TEST_F(CheckpointFile, ComesBackWhole) {
 TEST_F(CheckpointFile, OtherArchitecturesAreRefusedByName) {
   Config config = small_config();
   const Policy policy(config.policy, 4, 1);
-  write_checkpoint(folder_ + "/a.ckpt", small_checkpoint(policy, config));
-  const Checkpoint saved = read_checkpoint(folder_ + "/a.ckpt");
+  write_checkpoint(folder_ / "a.ckpt", small_checkpoint(policy, config));
+  const Checkpoint saved = read_checkpoint(folder_ / "a.ckpt");
   config.policy.backbone_width = 16;
   const Policy wider(config.policy, 4, 1);
   const std::string wide = message_of([&] { restore_tensors(saved, saved.parameters, wider.parameters()); });
@@ -122,9 +116,9 @@ TEST_F(CheckpointFile, WeightsThatAreNotFiniteAreRefusedByName) {
     const Policy policy(config.policy, 4, 1);
     at::Tensor weight = policy.parameters()[3].value.detach();
     weight.flatten()[1] = bad;
-    write_checkpoint(folder_ + "/a.ckpt", small_checkpoint(policy, config));
+    write_checkpoint(folder_ / "a.ckpt", small_checkpoint(policy, config));
     EXPECT_THAT(
-        message_of([&] { load_driver(folder_ + "/a.ckpt", 1); }),
+        message_of([&] { load_driver(folder_ / "a.ckpt", 1); }),
         ::testing::AllOf(HasSubstr("a.ckpt"), HasSubstr("'" + policy.parameters()[3].name + "'"), HasSubstr("finite")));
   }
 }
@@ -145,7 +139,7 @@ TEST(Rigs, DifferencesAreNamed) {
 TEST_F(CheckpointFile, BrokenFilesAreRefused) {
   const Config config = small_config();
   const Policy policy(config.policy, 4, 1);
-  const std::string path = folder_ + "/a.ckpt", broken = folder_ + "/b.ckpt";
+  const std::string path = folder_ / "a.ckpt", broken = folder_ / "b.ckpt";
   write_checkpoint(path, small_checkpoint(policy, config));
   const std::string whole = read_file(path);
   auto refuse = [&](const std::string& bytes) {
@@ -174,14 +168,14 @@ TEST_F(CheckpointFile, BrokenFilesAreRefused) {
   changed = whole;
   changed[30] = '}';
   EXPECT_THAT(refuse(changed), HasSubstr("header"));
-  EXPECT_THAT(message_of([&] { load_driver(folder_ + "/none.ckpt", 1); }), HasSubstr("no such file"));
+  EXPECT_THAT(message_of([&] { load_driver(folder_ / "none.ckpt", 1); }), HasSubstr("no such file"));
 }
 
 TEST_F(CheckpointFile, SafetensorsHoldEveryParameter) {
   const Config config = small_config();
   const Policy policy(config.policy, 4, 1);
-  write_safetensors(folder_ + "/p.safetensors", policy.parameters(), to_toml(config));
-  const std::string bytes = read_file(folder_ + "/p.safetensors");
+  write_safetensors(folder_ / "p.safetensors", policy.parameters(), to_toml(config));
+  const std::string bytes = read_file(folder_ / "p.safetensors");
   uint64_t header_bytes = 0;
   std::memcpy(&header_bytes, bytes.data(), 8);
   EXPECT_EQ(header_bytes % 8, 0u);
@@ -210,10 +204,10 @@ TEST(Crc32c, KnownAnswers) {
 
 TEST_F(Events, RecordsAreFramedAsTfRecords) {
   {
-    EventFile events(folder_);
+    EventFile events(folder_.path());
     events.write(300, {{"loss", 0.5}});
   }
-  const std::string path = std::filesystem::directory_iterator(folder_)->path();
+  const std::string path = std::filesystem::directory_iterator(folder_.path())->path();
   const std::string bytes = read_file(path);
   size_t offset = 0;
   std::vector<std::string> records;

@@ -15,6 +15,7 @@
 #include "pictura/common/file.h"
 #include "pictura/common/interrupt.h"
 #include "pictura/map/load_map.h"
+#include "pictura/tests/support/scratch_folder.h"
 #include "pictura/training/observer.h"
 
 namespace pictura {
@@ -25,17 +26,10 @@ using ::testing::HasSubstr;
 
 class Training : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ =
-        ::testing::TempDir() + "/pictura_training_" + ::testing::UnitTest::GetInstance()->current_test_info()->name();
-    std::filesystem::remove_all(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
   TrainOptions options(const std::string& run, const std::vector<std::string>& more = {}) const {
     TrainOptions o;
     o.config_path = PICTURA_SOURCE_DIR "/configs/smoke.toml";
-    o.out_folder = folder_ + "/" + run;
+    o.out_folder = folder_ / run;
     o.overrides = {
         "run.num_threads=1",         "run.backend=cpu",    "render.width_px=16",          "render.height_px=9",
         "simulator.num_slots=8",     "train.num_steps=12", "policy.conv_channels=[4, 8]", "policy.conv_kernels=[3, 3]",
@@ -43,7 +37,7 @@ class Training : public ::testing::Test {
     o.overrides.insert(o.overrides.end(), more.begin(), more.end());
     return o;
   }
-  std::string folder_;
+  test::ScratchFolder folder_;
 };
 
 std::string message_of(const std::function<void()>& work) {
@@ -83,8 +77,8 @@ TEST_F(Training, ResumesExactly) {
   EXPECT_EQ(resumed.episode_return, whole.episode_return);
 
   // One row per update, once each, after the head; and but for the clock every number is the whole run's.
-  const std::vector<std::vector<std::string>> parts = read_table(folder_ + "/parts/progress.csv"),
-                                              all = read_table(folder_ + "/whole/progress.csv");
+  const std::vector<std::vector<std::string>> parts = read_table(folder_ / "parts/progress.csv"),
+                                              all = read_table(folder_ / "whole/progress.csv");
   ASSERT_EQ(parts.size(), 5u);
   ASSERT_EQ(all.size(), 5u);
   for (size_t row = 0; row < parts.size(); ++row) {
@@ -99,20 +93,19 @@ TEST_F(Training, ResumesExactly) {
 }
 
 TEST_F(Training, RefusesToResumeWithOtherCamerasByName) {
-  make_output_folder(folder_);
   auto write_rig = [&](double yaw_deg) {
-    write_file(folder_ + "/rig.toml", fmt::format("[[camera]]\nname = \"ahead\"\nwidth_px = 16\nheight_px = 9\n"
-                                                  "focal_px = 8\nx_m = 1\nz_m = 1.5\nyaw_deg = {}\n",
-                                                  yaw_deg));
+    write_file(folder_ / "rig.toml", fmt::format("[[camera]]\nname = \"ahead\"\nwidth_px = 16\nheight_px = 9\n"
+                                                 "focal_px = 8\nx_m = 1\nz_m = 1.5\nyaw_deg = {}\n",
+                                                 yaw_deg));
     // The run's configuration must name the rig and not the sizes that smoke.toml has.
-    write_file(folder_ + "/config.toml",
+    write_file(folder_ / "config.toml",
                "[simulator]\nmaps = [\"procedural\"]\nmax_agents = 8\npedestrian_fraction = 0\ncyclist_fraction = "
                "0\nwalls = false\nparked_cars = 0\n[render]\nrig = \"rig.toml\"\n"
                "[policy]\nbackbone_width = 32\n[train]\nminibatch_size = 64\nforward_chunk = 64\n");
   };
   write_rig(0);
   TrainOptions o = options("run", {"train.updates=1"});
-  o.config_path = folder_ + "/config.toml";
+  o.config_path = folder_ / "config.toml";
   std::erase_if(o.overrides, [](const std::string& text) { return text.starts_with("render."); });
   train(o);
   write_rig(10);
@@ -179,10 +172,10 @@ TEST_F(Training, ImagesAreDrawnForActiveAgentsAlone) {
 TEST_F(Training, WritesWhatItPromisesAndStartsFromItsSeed) {
   const TrainReport report = train(options("run", {"train.updates=1"}));
   for (const char* name : {"config.toml", "untrained.ckpt", "checkpoint.ckpt", "policy.safetensors", "progress.csv"}) {
-    EXPECT_TRUE(std::filesystem::exists(folder_ + "/run/" + name)) << name;
+    EXPECT_TRUE(std::filesystem::exists(folder_ / (std::string("run/") + name))) << name;
   }
-  EXPECT_EQ(report.checkpoint, folder_ + "/run/checkpoint.ckpt");
-  const Config resolved = load_config(folder_ + "/run/config.toml");
+  EXPECT_EQ(report.checkpoint, folder_ / "run/checkpoint.ckpt");
+  const Config resolved = load_config(folder_ / "run/config.toml");
   EXPECT_EQ(resolved.train.updates, 1);
   EXPECT_EQ(resolved.render.width_px, 16);
   const TrainReport again = train(options("again", {"train.updates=1"}));
@@ -295,7 +288,7 @@ TEST_F(Training, EvaluationRepeatsNoWorldOfTraining) {
   o.backend = "cpu";
   // The same drive by hand, in the world of that number.
   auto return_per_vehicle = [&](uint32_t global_world) {
-    SimulatorConfig config = evaluation_simulator_config(load_config(folder_ + "/run/config.toml"), o.steps);
+    SimulatorConfig config = evaluation_simulator_config(load_config(folder_ / "run/config.toml"), o.steps);
     config.seed = o.seed;
     const std::unique_ptr<Simulator> simulator =
         make_simulator("cpu", config, {load_map("procedural")}, {WorldSpec{0, 6, global_world}});
