@@ -1,19 +1,32 @@
 #include "pictura/apps/draw_canvas.h"
 
+#include <cairo-svg.h>
+
 #include "pictura/common/error.h"
 
 namespace pictura {
 
-Canvas::Canvas(int width_px, int height_px, Rgb background)
-    : width_px_(width_px),
+Canvas::Canvas(cairo_surface_t* surface, const std::string& name, int width_px, int height_px, Rgb background)
+    : name_(name),
+      width_px_(width_px),
       height_px_(height_px),
-      surface_(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width_px, height_px)),
+      surface_(surface),
       context_(cairo_create(surface_.get())) {
-  const cairo_status_t status = cairo_surface_status(surface_.get());
-  PICTURA_CHECK(status == CAIRO_STATUS_SUCCESS, "picture of {}x{} px: {}", width_px, height_px,
-                cairo_status_to_string(status));
+  check(cairo_surface_status(surface_.get()));
   set_color(background);
   cairo_paint(context());
+}
+
+Canvas::Canvas(int width_px, int height_px, Rgb background)
+    : Canvas(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width_px, height_px),
+             fmt::format("picture of {}x{} px", width_px, height_px), width_px, height_px, background) {}
+
+Canvas::Canvas(const std::string& svg_path, int width_px, int height_px, Rgb background)
+    : Canvas(cairo_svg_surface_create(svg_path.c_str(), width_px, height_px), svg_path, width_px, height_px,
+             background) {}
+
+void Canvas::check(cairo_status_t status) const {
+  PICTURA_CHECK(status == CAIRO_STATUS_SUCCESS, "{}: {}", name_, cairo_status_to_string(status));
 }
 
 void Canvas::set_color(Rgb color, double alpha) { cairo_set_source_rgba(context(), color.r, color.g, color.b, alpha); }
@@ -60,9 +73,7 @@ double Canvas::text(double x, double y, const std::string& words, const TextStyl
 }
 
 RgbImage Canvas::image() const {
-  const cairo_status_t status = cairo_status(context());
-  PICTURA_CHECK(status == CAIRO_STATUS_SUCCESS, "picture of {}x{} px: {}", width_px_, height_px_,
-                cairo_status_to_string(status));
+  check(cairo_status(context()));
   cairo_surface_flush(surface());
   const unsigned char* data = cairo_image_surface_get_data(surface());
   const auto stride = static_cast<size_t>(cairo_image_surface_get_stride(surface()));
@@ -78,6 +89,12 @@ RgbImage Canvas::image() const {
     }
   }
   return image;
+}
+
+void Canvas::finish() {
+  check(cairo_status(context()));
+  cairo_surface_finish(surface());
+  check(cairo_surface_status(surface()));
 }
 
 }  // namespace pictura

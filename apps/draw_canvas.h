@@ -1,4 +1,4 @@
-// A Cairo image surface that frees itself, its colours, and text. Private to the drawing library.
+// A Cairo surface that frees itself, its colours, and text. Private to the drawing library.
 #pragma once
 
 #include <memory>
@@ -26,11 +26,13 @@ struct TextStyle {
   Rgb color = hex(0x22262B);
 };
 
-/// Opaque pixels to draw on; user space is pixels until somebody changes the matrix.
+/// Something opaque to draw on, pixels or an SVG file; user space is pixels until somebody changes the matrix.
 class Canvas {
  public:
-  /// Filled with one colour. Throws Error when the surface cannot be made.
+  /// Pixels, filled with one colour. Throws Error when the surface cannot be made.
   Canvas(int width_px, int height_px, Rgb background);
+  /// An SVG file, complete after finish(). Throws Error naming the path.
+  Canvas(const std::string& svg_path, int width_px, int height_px, Rgb background);
 
   int width_px() const { return width_px_; }
   int height_px() const { return height_px_; }
@@ -45,16 +47,21 @@ class Canvas {
   double text(double x, double y, const std::string& words, const TextStyle& style, double angle_rad = 0);
   double text_width(const std::string& words, const TextStyle& style) const;
 
-  /// Throws Error naming Cairo's reason when anything went wrong since the canvas was made.
+  /// The pixels. Throws Error naming Cairo's reason when anything went wrong since the canvas was made.
   RgbImage image() const;
+  /// Ends the SVG file. Throws Error as image() does.
+  void finish();
 
  private:
   struct Free {
     void operator()(cairo_t* context) const { cairo_destroy(context); }
     void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
   };
+  Canvas(cairo_surface_t* surface, const std::string& name, int width_px, int height_px, Rgb background);
+  void check(cairo_status_t status) const;
   void select_font(const TextStyle& style) const;
 
+  std::string name_;  // in messages
   int width_px_, height_px_;
   std::unique_ptr<cairo_surface_t, Free> surface_;
   std::unique_ptr<cairo_t, Free> context_;

@@ -1,61 +1,113 @@
-// `pictura map`: the facts of a map, and its picture from above.
+// `pictura map`: the facts of a map, its elements, and its picture from above.
 #include <chrono>
 
 #include "pictura/apps/commands.h"
 #include "pictura/apps/drawing.h"
+#include "pictura/apps/map_listing.h"
 #include "pictura/apps/report.h"
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
 
 namespace pictura {
 
+namespace {
+
+struct Arguments {
+  std::string map, png, svg;
+  int size_px = 1600;
+  std::vector<double> box, at;
+  double radius_m = 50;
+  bool json = false, full = false;
+};
+
+std::optional<FileBox> shown_box(const Arguments& arguments) {
+  if (!arguments.box.empty()) return FileBox{arguments.box[0], arguments.box[1], arguments.box[2], arguments.box[3]};
+  if (arguments.at.empty()) return std::nullopt;
+  const double x = arguments.at[0], y = arguments.at[1], radius = arguments.radius_m;
+  return FileBox{x - radius, y - radius, x + radius, y + radius};
+}
+
+Json facts_of(const RoadMap& map) {
+  const MapFacts& facts = map.facts;
+  return {{"map", map.name},
+          {"roads", facts.roads},
+          {"junction_roads", facts.junction_roads},
+          {"junctions", facts.junctions},
+          {"signal_junctions", facts.signal_junctions},
+          {"lanes", facts.lanes},
+          {"driving_lanes", facts.driving_lanes},
+          {"driving_lane_km", facts.driving_lane_km},
+          {"traffic_lights", facts.traffic_lights},
+          {"stop_lines", facts.stop_lines},
+          {"painted_stop_lines", facts.painted_stop_lines},
+          {"signs", facts.signs},
+          {"crosswalks", facts.crosswalks},
+          {"parking_spaces", facts.parking_spaces},
+          {"z_min_m", facts.z_min_m},
+          {"z_max_m", facts.z_max_m}};
+}
+
+void print_table(const Json& object) {
+  for (const auto& [key, value] : object.items()) {
+    fmt::print("{:18} {}\n", key,
+               value.is_string()         ? value.get<std::string>()
+               : value.is_number_float() ? fmt::format("{:.2f}", value.get<double>())
+                                         : value.dump());
+  }
+}
+
+void run_map(const Arguments& arguments) {
+  if (arguments.full && !arguments.json) fail_usage("--full: lists elements as JSON; expected --json with it");
+  LoadReport report;
+  const auto begin = std::chrono::steady_clock::now();
+  const std::shared_ptr<const RoadMap> map = load_map(arguments.map, {}, &report);
+  const double load_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  const MapPictureOptions picture{.size_px = arguments.size_px, .box = shown_box(arguments)};
+  if (!arguments.png.empty()) draw_map_png(*map, arguments.png, picture);
+  if (!arguments.svg.empty()) draw_map_svg(*map, arguments.svg, picture);
+  Json object = facts_of(*map);
+  object["cached"] = report.cached;
+  if (!report.cache_refusal.empty()) object["cache_refused"] = report.cache_refusal;
+  object["load_ms"] = load_ms;
+  if (arguments.full) return print_listing(object, *map);
+  if (arguments.json) return print_json(object);
+  print_table(object);
+  for (const std::string& path : {arguments.png, arguments.svg}) {
+    if (!path.empty()) fmt::print("drawn into {}\n", path);
+  }
+}
+
+}  // namespace
+
 void add_map_command(CLI::App& app) {
-  struct Arguments {
-    std::string map, png;
-    int size_px = 1600;
-    bool json = false;
-  };
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("map", "Print a map's facts and draw it from above");
+  CLI::App* command = app.add_subcommand("map", "Print a map's facts, list its elements, draw it from above");
   command->add_option("MAP", arguments->map, "A .xodr file, a town's name, or procedural[:SEED]")->required();
-  command->add_option("--png", arguments->png, "Draw lanes, markings, edges, lights and crosswalks into this file");
+  command->add_option(
+      "--png", arguments->png,
+      "Draw lanes, markings, edges, lights, signs, crosswalks, parking and building lines into this file");
+  command->add_option("--svg", arguments->svg, "Draw the same as lines and areas, to look closer");
   command->add_option("--size", arguments->size_px, "Longer side of the picture in pixels")
       ->check(CLI::Range(64, 16384))
       ->capture_default_str();
+  CLI::Option* box =
+      command->add_option("--box", arguments->box, "Draw this part alone: two corners, in the file's metres")
+          ->expected(4)
+          ->type_name("X0 Y0 X1 Y1");
+  CLI::Option* at =
+      command->add_option("--at", arguments->at, "Draw the surroundings of this place, in the file's metres")
+          ->expected(2)
+          ->type_name("X Y")
+          ->excludes(box);
+  command->add_option("--radius", arguments->radius_m, "How far to draw around --at, in metres")
+      ->needs(at)
+      ->capture_default_str();
   command->add_flag("--json", arguments->json, "Print one JSON object");
-  command->footer("Examples:\n  pictura map Town01 --json\n  pictura map procedural:7 --png town.png");
-  command->callback([arguments] {
-    LoadReport report;
-    const auto begin = std::chrono::steady_clock::now();
-    const std::shared_ptr<const RoadMap> map = load_map(arguments->map, {}, &report);
-    const double load_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
-    if (!arguments->png.empty()) draw_map_png(*map, arguments->png, arguments->size_px);
-    const MapFacts& facts = map->facts;
-    const Json object{{"map", map->name},
-                      {"roads", facts.roads},
-                      {"junction_roads", facts.junction_roads},
-                      {"junctions", facts.junctions},
-                      {"signal_junctions", facts.signal_junctions},
-                      {"lanes", facts.lanes},
-                      {"driving_lanes", facts.driving_lanes},
-                      {"driving_lane_km", facts.driving_lane_km},
-                      {"traffic_lights", facts.traffic_lights},
-                      {"stop_lines", facts.stop_lines},
-                      {"crosswalks", facts.crosswalks},
-                      {"parking_spaces", facts.parking_spaces},
-                      {"z_min_m", facts.z_min_m},
-                      {"z_max_m", facts.z_max_m},
-                      {"cached", report.cached},
-                      {"load_ms", load_ms}};
-    if (arguments->json) return print_json(object);
-    for (const auto& [key, value] : object.items()) {
-      fmt::print("{:18} {}\n", key,
-                 value.is_string()         ? value.get<std::string>()
-                 : value.is_number_float() ? fmt::format("{:.2f}", value.get<double>())
-                                           : value.dump());
-    }
-    if (!arguments->png.empty()) fmt::print("drawn into {}\n", arguments->png);
-  });
+  command->add_flag("--full", arguments->full, "With --json: list every element and where the file says it");
+  command->footer(
+      "Examples:\n  pictura map Town01 --json\n  pictura map procedural:7 --png town.png\n"
+      "  pictura map Town03 --svg crossing.svg --at 0 0 --radius 40");
+  command->callback([arguments] { run_map(*arguments); });
 }
 
 }  // namespace pictura

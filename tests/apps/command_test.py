@@ -94,6 +94,42 @@ class Maps(CommandCase):
         self.assertGreater(facts["traffic_lights"], 0)
         self.assertEqual(picture.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
 
+    def test_parts_are_drawn_as_pixels_and_as_lines(self):
+        town, pixels, lines = self.town(), self.folder / "part.png", self.folder / "part.svg"
+        facts = self.json_of("map", town, "--png", pixels, "--svg", lines, "--at", 10, 20, "--radius", 30, "--size", 400)
+        self.assertEqual(pixels.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertIn("</svg>", lines.read_text())
+        whole = self.folder / "whole.png"
+        self.json_of("map", town, "--png", whole, "--size", 400)
+        self.assertNotEqual(whole.read_bytes(), pixels.read_bytes())
+        box = self.folder / "box.png"
+        self.json_of("map", town, "--png", box, "--box", -20, -10, 40, 50, "--size", 400)
+        self.assertEqual(box.read_bytes(), pixels.read_bytes())
+        self.assert_refused(1, "shows nothing", "map", town, "--png", box, "--at", 9000, 0)
+        self.assert_refused(2, "--at", "map", town, "--png", box, "--at", 0, 0, "--box", 0, 0, 1, 1)
+        self.assertGreater(facts["lanes"], 0)
+
+    def test_the_full_listing_has_every_element_and_its_source(self):
+        town = self.town()
+        text = town.read_text().splitlines()
+        listing = self.json_of("map", town, "--full")
+        elements = listing["elements"]
+        for key, fact in [("lanes", "lanes"), ("lights", "traffic_lights"), ("crosswalks", "crosswalks"), ("signs", "signs"),
+                          ("junctions", "junctions"), ("parking_spaces", "parking_spaces")]:  # fmt: skip
+            self.assertEqual(len(elements[key]), listing[fact], key)
+            self.assertEqual([element["index"] for element in elements[key]], list(range(listing[fact])))
+        roads = set(re.findall(r'<road [^>]*\bid="([^"]*)"', town.read_text()))
+        self.assertEqual({lane["source"]["road"] for lane in elements["lanes"]}, roads)
+        elements_of = {"lanes": "<lane ", "lights": "<signal ", "crosswalks": "<object ", "junctions": "<junction "}
+        for key, element_name in elements_of.items():
+            for element in elements[key]:
+                line = element.get("source", {}).get("line")
+                if line:
+                    self.assertIn(element_name, text[line - 1])
+        first = elements["lanes"][0]
+        self.assertIn(0, elements["lanes"][first["successors"][0]]["predecessors"])
+        self.assert_refused(2, "--full", "map", town, "--full")
+
     def test_the_second_load_comes_from_the_cache(self):
         town = self.town()
         cache = {"XDG_CACHE_HOME": str(self.folder / "cache"), "PICTURA_CACHE": ""}

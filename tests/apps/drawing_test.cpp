@@ -1,6 +1,7 @@
 // Pictures and films for people: facts about single pixels, sizes and files.
 #include "pictura/apps/drawing.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
@@ -18,8 +19,10 @@
 #include "pictura/apps/draw_world.h"
 #include "pictura/apps/video.h"
 #include "pictura/common/error.h"
+#include "pictura/common/file.h"
 #include "pictura/map/opendrive/opendrive.h"
 #include "pictura/map/procedural/procedural_town.h"
+#include "pictura/tests/map/small_roads.h"
 #include "pictura/tests/support/scratch_folder.h"
 
 namespace pictura {
@@ -41,6 +44,9 @@ Pixel at(const RgbImage& image, int x, int y) {
   return {p[0], p[1], p[2]};
 }
 Pixel at(const RgbImage& image, Vec2 p) { return at(image, static_cast<int>(p.x), static_cast<int>(p.y)); }
+
+/// The largest difference of a channel.
+int distance(Pixel a, Pixel b) { return std::max({std::abs(a.r - b.r), std::abs(a.g - b.g), std::abs(a.b - b.b)}); }
 
 int count(const RgbImage& image, Pixel wanted) {
   int found = 0;
@@ -289,27 +295,134 @@ TEST(DrawWorld, ShowsTheAgentsOfOneWorldAndFollowsOne) {
 
 TEST(DrawMap, FillsItsSizeAndShowsLanesAndEdges) {
   for (const int size : {300, 1000}) {
-    const RgbImage image = draw_map(town(), size);
+    const RgbImage image = draw_map(town(), {.size_px = size});
     EXPECT_EQ(std::max(image.width_px, image.height_px), size);
     EXPECT_GT(count(image, {91, 97, 107}), size * size / 50);     // driving lanes
     EXPECT_GT(count(image, {211, 206, 194}), size * size / 100);  // sidewalks
     EXPECT_GT(count(image, kGround), size * size / 5);            // blocks of houses
   }
   const RoadMap wide = parse_opendrive(procedural_town({3, 6, 1}), "wide");
-  const RgbImage image = draw_map(wide, 800);
+  const RgbImage image = draw_map(wide, {.size_px = 800});
   EXPECT_EQ(image.width_px, 800);
   EXPECT_LT(image.height_px, 400);
 }
 
+/// One lane of 100 m along y = 0 from x = 0; the map's origin is (1000, 500) in the file.
+RoadMap one_road() {
+  const test::RoadText road{.geometry = test::line_at(0, 1000, 500, 0, 100), .right = test::lane_of(-1, "driving", 4)};
+  return parse_opendrive(test::file_of(road.text()), "one_road");
+}
+
+/// A picture of the 80 m x 30 m about the middle of one_road(), and where its places are.
+struct Closeup {
+  explicit Closeup(const RoadMap& road_map)
+      : map(road_map), image(draw_map(map, {.size_px = 800, .box = FileBox{1010, 485, 1090, 515}})) {}
+  /// As draw_map lays it out: margins of 28 px and a strip of 36 px below, at half of its 1600 px.
+  Pixel at_m(float x_m, float y_m) const {
+    constexpr float kPxPerM = (800 - 28) / 80.0f;
+    return at(image,
+              Vec2{400 + (x_m - 50) * kPxPerM, static_cast<float>(image.height_px) - 14 - 18 - (y_m + 15) * kPxPerM});
+  }
+  const RoadMap& map;
+  RgbImage image;
+};
+
+TEST(DrawMap, ShowsAPartInFileCoordinates) {
+  const RoadMap map = one_road();
+  ASSERT_EQ(map.origin_m[0], 1000);
+  ASSERT_EQ(map.origin_m[1], 500);
+  const Closeup closeup(map);
+  EXPECT_EQ(closeup.image.width_px, 800);
+  const Pixel driving{91, 97, 107}, edge{200, 49, 47};
+  EXPECT_EQ(closeup.at_m(30, -1.0f), driving);
+  EXPECT_EQ(closeup.at_m(30, -3.4f), driving);
+  // Lines of a pixel or two, between other colours.
+  EXPECT_LT(distance(closeup.at_m(30, -4), edge), 80);
+  EXPECT_LT(distance(closeup.at_m(30, 0), edge), 80);
+  EXPECT_EQ(closeup.at_m(30, -4.6f), kGround);
+  EXPECT_EQ(closeup.at_m(30, 1.0f), kGround);
+  int white = 0;
+  for (float x = 10; x < 90; x += 0.1f) white += closeup.at_m(x, -2).r > 140;
+  EXPECT_GT(white, 10) << "arrows along the lane";
+}
+
+TEST(DrawMap, HeadsShowWhereTheyFaceAndHowWide) {
+  RoadMap map = one_road();
+  TrafficLight light;
+  light.stop_a_m = {60, 0, 0};
+  light.stop_b_m = {60, -4, 0};
+  light.head_m = {60, 8, 5};
+  light.head_facing = {-1, 0};
+  light.phase = 1;
+  map.lights = {light};
+  map.junctions = {{"7", 2}};
+  const Closeup closeup(map);
+  const Pixel phase{255, 122, 26};
+  EXPECT_EQ(closeup.at_m(60, 8), phase) << "the head";
+  EXPECT_EQ(closeup.at_m(60, -2), phase) << "its stop line";
+  const auto around = [&](float angle_deg) {  // from the direction that it faces
+    const float angle_rad = kPi + angle_deg * kPi / 180;
+    return closeup.at_m(60 + 4 * std::cos(angle_rad), 8 + 4 * std::sin(angle_rad));
+  };
+  for (const float inside : {-55.0f, 0.0f, 55.0f}) EXPECT_NE(around(inside), kGround) << inside;
+  for (const float outside : {-65.0f, 65.0f, 120.0f}) EXPECT_EQ(around(outside), kGround) << outside;
+}
+
+TEST(DrawMap, ShowsSignsPaintAndBuildingLines) {
+  RoadMap map = one_road();
+  const Closeup plain(map);
+  const Pixel sign{214, 36, 127}, building{138, 90, 60}, violet{176, 124, 255};
+  for (const Pixel ink : {sign, violet}) EXPECT_EQ(count(plain.image, ink), 0);
+  EXPECT_EQ(plain.at_m(40, 9), kGround);
+  map.signs = {{"1", "206", "", "OpenDRIVE", {30, -9, 2}, 0, {}}};
+  map.building_lines = {{{70, 9, 0}, {30, 9, 0}}};  // buildings to the south
+  map.stop_lines = {{{40, 0, 0}, {40, -4, 0}, 0.5f}};
+  map.marking_points = {{50, -1, 0}, {80, -1, 0}};
+  map.markings = {{{0, 2}, 0.4f, MarkColor::violet, false}};
+  const Closeup full(map);
+  EXPECT_EQ(full.at_m(30, -9), sign);
+  EXPECT_LT(full.at_m(28.6f, -9).g, 200) << "a tail towards the traffic, which drives east";
+  EXPECT_EQ(full.at_m(28.6f, -8.5f), kGround);
+  EXPECT_LT(distance(full.at_m(40, 9), building), 40);
+  EXPECT_NE(full.at_m(40, 8.4f), kGround);
+  EXPECT_EQ(full.at_m(40, 9.6f), kGround);
+  EXPECT_EQ(full.at_m(40, -3), (Pixel{255, 255, 255})) << "the stop line";
+  EXPECT_NEAR(full.at_m(60, -1).b, violet.b, 15);
+}
+
+TEST(DrawMap, TheSvgHasTheSameSizeAndIsWhole) {
+  const ScratchFolder folder;
+  draw_map_svg(town(), folder / "map.svg", {.size_px = 700});
+  const RgbImage image = draw_map(town(), {.size_px = 700});
+  const std::string svg = read_file(folder / "map.svg");
+  EXPECT_THAT(svg, HasSubstr(fmt::format("viewBox=\"0 0 {} {}\"", image.width_px, image.height_px)));
+  EXPECT_THAT(svg, testing::EndsWith("</svg>\n"));
+  size_t paths = 0;
+  for (size_t i = svg.find("<path"); i != std::string::npos; i = svg.find("<path", i + 1)) ++paths;
+  EXPECT_GT(paths, 2 * town().lanes.size());
+  EXPECT_EQ(folder.num_entries(), 1u);
+  EXPECT_THAT(error_of([] { draw_map_svg(town(), "/nonexistent/a/map.svg"); }), HasSubstr("/nonexistent/a/"));
+}
+
+TEST(DrawMap, RefusesPartsThatShowNothing) {
+  const RoadMap map = one_road();
+  const auto message = [&](FileBox box) { return error_of([&] { draw_map(map, {.box = box}); }); };
+  EXPECT_THAT(message({1090, 485, 1010, 515}), HasSubstr("expected a box of 1 to 1000000 m"));
+  EXPECT_THAT(message({1010, 500, 1010, 515}), HasSubstr("expected a box"));
+  EXPECT_THAT(message({1010, 500, std::nan(""), 515}), HasSubstr("expected a box"));
+  EXPECT_THAT(message({0, 0, 1e9, 15}), HasSubstr("expected a box"));
+  EXPECT_THAT(message({0, 500, 900, 515}), HasSubstr("which lies in (998, 496) to (1102, 500)"));
+}
+
 TEST(DrawMap, RefusesWhatCannotBeDrawn) {
-  EXPECT_THROW(draw_map(town(), 63), Error);
-  EXPECT_THROW(draw_map(town(), 20000), Error);
-  EXPECT_THAT(error_of([] { draw_map(RoadMap{}, 300); }), HasSubstr("nothing to draw"));
-  EXPECT_THAT(error_of([] { draw_map_png(town(), "/nonexistent/a/map.png", 300); }),
+  EXPECT_THROW(draw_map(town(), {.size_px = 63}), Error);
+  EXPECT_THROW(draw_map(town(), {.size_px = 20000}), Error);
+  EXPECT_THAT(error_of([] { draw_map(RoadMap{}, {.size_px = 300}); }), HasSubstr("nothing to draw"));
+  EXPECT_THAT(error_of([] { draw_map_png(town(), "/nonexistent/a/map.png", {.size_px = 300}); }),
               HasSubstr("/nonexistent/a/map.png"));
   const ScratchFolder folder;
-  draw_map_png(town(), folder / "map.png", 300);
-  EXPECT_EQ(read_png(folder / "map.png").rgb, draw_map(town(), 300).rgb);
+  draw_map_png(town(), folder / "map.png", {.size_px = 300});
+  EXPECT_EQ(read_png(folder / "map.png").rgb, draw_map(town(), {.size_px = 300}).rgb);
   EXPECT_EQ(folder.num_entries(), 1u);
 }
 
