@@ -18,6 +18,11 @@ constexpr double kTransition_m = 0.002;  // where an outline begins and ends is 
 constexpr double kJoin_m = 0.06;         // ends of outlines nearer than this are joined
 constexpr double kMinOutline_m = 0.3;
 
+/// A place on an outline and the band whose border it is.
+struct OutlinePoint : Point3 {
+  int32_t band = 0;
+};
+
 Point3 lerp(const Point3& a, const Point3& b, double u) {
   return {a.x + u * (b.x - a.x), a.y + u * (b.y - a.y), a.z + u * (b.z - a.z)};
 }
@@ -29,7 +34,7 @@ class Tracer {
  public:
   Tracer(const std::vector<SurfaceBand>& bands, const Surface& surface) : bands_(bands), surface_(surface) {}
 
-  std::vector<std::vector<Point3>> trace() {
+  std::vector<std::vector<OutlinePoint>> trace() {
     for (std::size_t band = 0; band < bands_.size(); ++band) {
       const SurfaceBand& sides = bands_[band];
       band_ = static_cast<int32_t>(band);
@@ -110,7 +115,7 @@ class Tracer {
   }
 
   void append(const Point3& p) {
-    if (run_.empty() || plan_distance(run_.back(), p) > 1e-6) run_.push_back(p);
+    if (run_.empty() || plan_distance(run_.back(), p) > 1e-6) run_.push_back({p, band_});
   }
   void finish_run() {
     if (run_.size() >= 2) runs_.push_back(std::move(run_));
@@ -120,27 +125,27 @@ class Tracer {
   const std::vector<SurfaceBand>& bands_;
   const Surface& surface_;
   int32_t band_ = 0;
-  std::vector<Point3> run_;
-  std::vector<std::vector<Point3>> runs_;
+  std::vector<OutlinePoint> run_;
+  std::vector<std::vector<OutlinePoint>> runs_;
 };
 
 /// Joins runs whose end lies at another's beginning, so that pieces may be merged across bands.
 class Joiner {
  public:
-  explicit Joiner(std::vector<std::vector<Point3>> runs) : runs_(std::move(runs)), used_(runs_.size(), false) {
+  explicit Joiner(std::vector<std::vector<OutlinePoint>> runs) : runs_(std::move(runs)), used_(runs_.size(), false) {
     for (std::size_t i = 0; i < runs_.size(); ++i) {
       starts_[key(runs_[i].front(), 0, 0)].push_back(i);
       ends_[key(runs_[i].back(), 0, 0)].push_back(i);
     }
   }
 
-  std::vector<std::vector<Point3>> join() {
-    std::vector<std::vector<Point3>> joined;
+  std::vector<std::vector<OutlinePoint>> join() {
+    std::vector<std::vector<OutlinePoint>> joined;
     // Open outlines from their beginnings first, then what is left: rings.
     for (const bool rings : {false, true}) {
       for (std::size_t i = 0; i < runs_.size(); ++i) {
         if (used_[i] || (!rings && has_predecessor(i))) continue;
-        std::vector<Point3> outline;
+        std::vector<OutlinePoint> outline;
         for (std::size_t at = i; at != kNone; at = next_of(outline.back())) {
           used_[at] = true;
           outline.insert(outline.end(), runs_[at].begin(), runs_[at].end());
@@ -194,35 +199,40 @@ class Joiner {
     return found;
   }
 
-  std::vector<std::vector<Point3>> runs_;
+  std::vector<std::vector<OutlinePoint>> runs_;
   std::vector<bool> used_;
   Buckets starts_, ends_;
 };
 
 }  // namespace
 
-std::vector<RoadEdge> outline_of(const std::vector<SurfaceBand>& bands, double chord_error_m) {
+std::vector<RoadEdge> outline_of(const std::vector<SurfaceBand>& bands, double chord_error_m,
+                                 std::vector<int32_t>* bands_out) {
   std::vector<RoadEdge> edges;
   if (bands.empty()) return edges;
   const Surface surface(bands, kLevel_m);
-  for (const std::vector<Point3>& outline : Joiner(Tracer(bands, surface).trace()).join()) {
+  for (const std::vector<OutlinePoint>& outline : Joiner(Tracer(bands, surface).trace()).join()) {
     std::vector<CurvePoint> points;
+    std::vector<int32_t> bands_of_points;
     double length_m = 0;
-    for (const Point3& p : outline) {
+    for (const OutlinePoint& p : outline) {
       if (!points.empty()) {
         const double step_m = std::hypot(p.x - points.back().x, p.y - points.back().y);
         if (step_m < 1e-3) continue;
         length_m += step_m;
       }
       points.push_back({length_m, p.x, p.y, p.z, 0});
+      bands_of_points.push_back(p.band);
     }
     if (length_m < kMinOutline_m) continue;
     const std::vector<std::size_t> kept = thin_polyline(points, chord_error_m, kMaxPiece_m);
     auto to_vec3 = [](const CurvePoint& p) {
       return Vec3{static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
     };
-    for (std::size_t i = 1; i < kept.size(); ++i)
+    for (std::size_t i = 1; i < kept.size(); ++i) {
       edges.push_back({to_vec3(points[kept[i - 1]]), to_vec3(points[kept[i]])});
+      if (bands_out) bands_out->push_back(bands_of_points[kept[i - 1]]);
+    }
   }
   return edges;
 }

@@ -6,6 +6,7 @@
 
 #include "pictura/common/scene.h"
 #include "pictura/map/opendrive/curves.h"
+#include "pictura/map/opendrive/faults.h"
 #include "pictura/map/opendrive/model.h"
 #include "pictura/map/opendrive/opendrive.h"
 #include "pictura/map/polyline.h"
@@ -27,9 +28,15 @@ struct SectionLanes {
 struct Build {
   const Network& network;
   const OpenDriveOptions& options;
+  Faults* faults;
   RoadMap* map;
   SampleBudget budget{10'000'000};
   std::vector<std::vector<SectionLanes>> lanes;  // [roads][sections]
+  struct LanePlace {
+    const FileSection* section;
+    const FileLane* lane;
+  };
+  std::vector<LanePlace> file_lanes;  // parallel to RoadMap::lanes
 
   /// File coordinates to the map's.
   Vec3 to_map(double x, double y, double z) const {
@@ -39,11 +46,22 @@ struct Build {
   Vec3 to_map(const Point3& p) const { return to_map(p.x, p.y, p.z); }
 };
 
-/// Lanes with a positive id lie left of the reference line and are travelled against s (right-hand traffic).
-constexpr bool travels_forward(int lane_id) { return lane_id < 0; }
+/// Types that one may drive through from lane to lane; routes are made of them.
+constexpr bool is_route(LaneType type) { return type == LaneType::driving || type == LaneType::ramp; }
+
+/// Whether traffic runs along s on the side of that sign: on the right of the reference line where it keeps right.
+constexpr bool travels_forward(const FileRoad& road, int side) { return (side < 0) != road.left_hand; }
+inline bool travels_forward(const FileRoad& road, const FileLane& lane) {
+  return travels_forward(road, lane.id) != (lane.direction == LaneDirection::reversed);
+}
 
 /// The origin, in the middle of the reference lines, in whole metres.
 void choose_origin(Build* build);
+
+/// The provenance of something that stands on road `road` of the network.
+inline SourceElement source_of(std::size_t road, const Where& where) {
+  return {static_cast<int32_t>(road), where.line()};
+}
 
 /// Lanes of every type but "none", their centre lines, neighbours and links, speed limits, and which are endless.
 void build_lanes(Build* build);
@@ -54,12 +72,12 @@ void find_endless_lanes(Build* build);
 /// The outline of the drivable surface.
 void build_road_edges(Build* build);
 
-/// Painted lines, crosswalks and parking spaces.
+/// Painted lines, crosswalks, parking spaces and stop lines.
 void build_markings(Build* build);
 void build_objects(Build* build);
 
-/// Junctions and traffic lights.
-void build_lights(Build* build);
+/// Junctions, traffic lights and signs.
+void build_signals(Build* build);
 
 /// Where walls may stand.
 void build_building_lines(Build* build);

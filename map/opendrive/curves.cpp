@@ -7,11 +7,8 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Below this a width is taken for 0: what writers' rounding leaves of a lane that tapers off.
-constexpr double kWidthTolerance_m = 0.01;
 // Formulae that begin this close to a section's ends belong to its neighbour or to itself, whichever begins there.
 constexpr double kSectionMargin_m = 1e-5;
-constexpr double kMaxOffset_m = 1e4, kMaxHeight_m = 1e4;
 // Spirals are integrated in panels that turn by at most this; five points are then exact to rounding.
 constexpr double kPanelTurn_rad = 0.5;
 
@@ -41,7 +38,84 @@ double inside(const FileSection& section, double s) {
 /// sin(x) / x.
 double sinc(double x) { return std::abs(x) < 1e-6 ? 1.0 - x * x / 6.0 : std::sin(x) / x; }
 
+double value_of(const std::array<double, 4>& c, double p) { return c[0] + p * (c[1] + p * (c[2] + p * c[3])); }
+double slope_of(const std::array<double, 4>& c, double p) { return c[1] + p * (2 * c[2] + p * 3 * c[3]); }
+double bend_of(const std::array<double, 4>& c, double p) { return 2 * c[2] + p * 6 * c[3]; }
+
+double speed_of(const PlaneCubic& cubic, double p) { return std::hypot(slope_of(cubic.u, p), slope_of(cubic.v, p)); }
+
+double length_between(const PlaneCubic& cubic, double from, double to) {
+  double sum = 0;
+  for (const GaussPoint& gauss : kGauss) sum += gauss.weight * speed_of(cubic, from + gauss.position * (to - from));
+  return sum * (to - from);
+}
+
+/// The p at which `share` of the curve's length lies behind: Newton's method in the panel of the table that holds it.
+double parameter_at(const PlaneCubic& cubic, double share) {
+  const auto& lengths = cubic.arc_length;
+  const double target = std::clamp(share, 0.0, 1.0) * lengths.back();
+  const std::size_t panels = lengths.size() - 1;
+  std::size_t panel = 0;
+  while (panel + 1 < panels && lengths[panel + 1] < target) ++panel;
+  const double low = cubic.p_end * static_cast<double>(panel) / static_cast<double>(panels);
+  const double high = cubic.p_end * static_cast<double>(panel + 1) / static_cast<double>(panels);
+  double p = low;
+  for (int step = 0; step < 8; ++step) {
+    const double missing = target - lengths[panel] - length_between(cubic, low, p);
+    const double speed = speed_of(cubic, p);
+    if (speed < 1e-9 || std::abs(missing) < 1e-12) break;
+    p = std::clamp(p + missing / speed, low, high);
+  }
+  return p;
+}
+
+Pose pose_on_cubic(const GeometryPiece& piece, double ds) {
+  const PlaneCubic& cubic = *piece.cubic;
+  const double p = parameter_at(cubic, ds / piece.length);
+  const double u = value_of(cubic.u, p), v = value_of(cubic.v, p);
+  const double du = slope_of(cubic.u, p), dv = slope_of(cubic.v, p);
+  const double speed = std::max(speed_of(cubic, p), 1e-9);
+  const double c = std::cos(piece.heading), s = std::sin(piece.heading);
+  return {piece.x + u * c - v * s, piece.y + u * s + v * c, piece.heading + std::atan2(dv, du),
+          (du * bend_of(cubic.v, p) - dv * bend_of(cubic.u, p)) / (speed * speed * speed)};
+}
+
+double shape_height(const std::vector<CrossSection>& shape, double s, double t) {
+  if (shape.empty()) return 0;
+  const CrossSection& before = item_at(shape, s);
+  const std::size_t index = static_cast<std::size_t>(&before - shape.data());
+  const double here = before.height.value(t);
+  if (s <= before.s || index + 1 == shape.size()) return here;
+  const CrossSection& after = shape[index + 1];
+  return here + (s - before.s) / (after.s - before.s) * (after.height.value(t) - here);
+}
+
+bool is_banked(const FileRoad& road) {
+  return !(road.superelevation.cubics.empty() && road.left_crossfall.cubics.empty() &&
+           road.right_crossfall.cubics.empty() && road.shape.empty());
+}
+
+/// `t`, or the inner border of the first lane on its way outwards that keeps level.
+double banked_part(const FileRoad& road, double s, double t) {
+  const FileSection& section = item_at(road.sections, s);
+  for (const FileLane& lane : t > 0 ? section.left : section.right) {
+    if (!lane.is_level) continue;
+    const double border = border_t(road, section, inner_border(lane.id), s);
+    return t > 0 ? std::min(t, border) : std::max(t, border);
+  }
+  return t;
+}
+
 }  // namespace
+
+void measure(PlaneCubic* cubic) {
+  const std::size_t panels = cubic->arc_length.size() - 1;
+  for (std::size_t i = 0; i < panels; ++i) {
+    const double step = cubic->p_end / static_cast<double>(panels);
+    cubic->arc_length[i + 1] =
+        cubic->arc_length[i] + length_between(*cubic, static_cast<double>(i) * step, static_cast<double>(i + 1) * step);
+  }
+}
 
 double Profile::value(double s) const {
   if (cubics.empty() || s < cubics.front().s - 1e-6) return 0;
@@ -58,6 +132,7 @@ double Profile::slope(double s) const {
 }
 
 Pose pose_on(const GeometryPiece& piece, double ds) {
+  if (piece.cubic) return pose_on_cubic(piece, ds);
   const double k0 = piece.start_curvature;
   const double rate = (piece.end_curvature - k0) / piece.length;
   auto heading_at = [&](double x) { return piece.heading + x * (k0 + 0.5 * rate * x); };
@@ -66,7 +141,7 @@ Pose pose_on(const GeometryPiece& piece, double ds) {
     const double half_turn = 0.5 * k0 * ds;
     const double chord = ds * sinc(half_turn);
     return {piece.x + chord * std::cos(piece.heading + half_turn),
-            piece.y + chord * std::sin(piece.heading + half_turn), piece.heading + k0 * ds};
+            piece.y + chord * std::sin(piece.heading + half_turn), piece.heading + k0 * ds, k0};
   }
   const double turn = std::max(std::abs(k0), std::abs(piece.end_curvature)) * std::abs(ds);
   const int panels = 1 + static_cast<int>(turn / kPanelTurn_rad);
@@ -88,33 +163,76 @@ Pose pose_at(const FileRoad& road, double s) {
 }
 
 Point3 point_at(const FileRoad& road, double s, double t) {
+  s = std::clamp(s, 0.0, road.length);
   const Pose pose = pose_at(road, s);
-  const double z = road.elevation.value(s);
-  if (!(std::abs(t) <= kMaxOffset_m && std::abs(z) <= kMaxHeight_m)) {
-    road.where.fail("at s {:.3f} something lies {} m beside it at a height of {} m; expected at most {} and {} m", s, t,
-                    z, kMaxOffset_m, kMaxHeight_m);
+  double lateral = t, z = road.elevation.value(s);
+  if (is_banked(road)) {
+    const double banked = banked_part(road, s, t);
+    const double roll = road.superelevation.value(s);
+    const double fall = (t > 0 ? road.left_crossfall : road.right_crossfall).value(s);
+    lateral = t - banked + banked * std::cos(roll);
+    z += banked * std::sin(roll) - std::abs(banked) * std::tan(fall) + shape_height(road.shape, s, banked);
   }
-  return {pose.x - t * std::sin(pose.heading), pose.y + t * std::cos(pose.heading), z};
+  return {pose.x - lateral * std::sin(pose.heading), pose.y + lateral * std::cos(pose.heading), z};
 }
 
-double lane_width(const FileSection& section, const FileLane& lane, double s) {
-  const double width = lane.width.value(inside(section, s) - section.s);
-  if (width < -kWidthTolerance_m) lane.where.fail("its width at s {:.3f} is {:.3f} m; expected at least 0", s, width);
-  return std::max(width, 0.0);
+Point3 point_on_lane(const FileRoad& road, const FileSection& section, const FileLane& lane, double s,
+                     double outer_share) {
+  const double outer = border_t(road, section, lane.id, s);
+  double t = outer;
+  if (lane.id != 0) t -= (1 - outer_share) * (outer - border_t(road, section, inner_border(lane.id), s));
+  Point3 point = point_at(road, s, t);
+  if (!lane.inner_height.cubics.empty()) {
+    const double ds = inside(section, s) - section.s;
+    point.z += (1 - outer_share) * lane.inner_height.value(ds) + outer_share * lane.outer_height.value(ds);
+  }
+  return point;
+}
+
+double heading_between(const FileRoad& road, const FileSection& section, int inner, int outer, double s) {
+  const double t = 0.5 * (border_t(road, section, inner, s) + border_t(road, section, outer, s));
+  const double slope = 0.5 * (border_slope(road, section, inner, s) + border_slope(road, section, outer, s));
+  const double roll = road.superelevation.value(s);
+  const double lateral = t * std::cos(roll);
+  const double lateral_slope = slope * std::cos(roll) - t * std::sin(roll) * road.superelevation.slope(s);
+  const Pose pose = pose_at(road, s);
+  // The slope of the offset turns the line away from the reference line, more so where it runs inside a curve. Slopes
+  // come from the formulae, since files have steps between them.
+  return pose.heading + std::atan2(lateral_slope, 1.0 - pose.curvature * lateral);
+}
+
+double lane_width(const FileRoad& road, const FileSection& section, const FileLane& lane, double s) {
+  if (lane.border.cubics.empty()) return std::max(lane.width.value(inside(section, s) - section.s), 0.0);
+  return std::abs(border_t(road, section, lane.id, s) - border_t(road, section, inner_border(lane.id), s));
 }
 
 double border_t(const FileRoad& road, const FileSection& section, int border, double s) {
-  double t = road.lane_offset.value(inside(section, s));
-  for (int i = 0; i < border; ++i) t += lane_width(section, section.left[static_cast<std::size_t>(i)], s);
-  for (int i = 0; i < -border; ++i) t -= lane_width(section, section.right[static_cast<std::size_t>(i)], s);
+  const double here = inside(section, s);
+  const double sign = border > 0 ? 1 : -1;
+  const std::vector<FileLane>& side = border > 0 ? section.left : section.right;
+  double t = road.lane_offset.value(here);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(std::abs(border)); ++i) {
+    if (side[i].border.cubics.empty()) {
+      t += sign * std::max(side[i].width.value(here - section.s), 0.0);
+    } else {
+      t = sign * std::max(sign * side[i].border.value(here - section.s), sign * t);
+    }
+  }
   return t;
 }
 
 double border_slope(const FileRoad& road, const FileSection& section, int border, double s) {
   const double here = inside(section, s);
+  const double sign = border > 0 ? 1 : -1;
+  const std::vector<FileLane>& side = border > 0 ? section.left : section.right;
   double slope = road.lane_offset.slope(here);
-  for (int i = 0; i < border; ++i) slope += section.left[static_cast<std::size_t>(i)].width.slope(here - section.s);
-  for (int i = 0; i < -border; ++i) slope -= section.right[static_cast<std::size_t>(i)].width.slope(here - section.s);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(std::abs(border)); ++i) {
+    if (side[i].border.cubics.empty()) {
+      slope += sign * side[i].width.slope(here - section.s);
+    } else {
+      slope = side[i].border.slope(here - section.s);
+    }
+  }
   return slope;
 }
 
@@ -127,10 +245,17 @@ std::vector<double> formula_changes(const FileRoad& road, const FileSection& sec
     for (; item != items.end() && item->s + offset < end; ++item) changes.push_back(item->s + offset);
   };
   add_all(road.geometry, 0);
-  add_all(road.elevation.cubics, 0);
-  add_all(road.lane_offset.cubics, 0);
+  for (const Profile* profile :
+       {&road.elevation, &road.lane_offset, &road.superelevation, &road.left_crossfall, &road.right_crossfall}) {
+    add_all(profile->cubics, 0);
+  }
+  add_all(road.shape, 0);
   const std::vector<FileLane>& side = border > 0 ? section.left : section.right;
-  for (int i = 0; i < std::abs(border); ++i) add_all(side[static_cast<std::size_t>(i)].width.cubics, section.s);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(std::abs(border)); ++i) {
+    for (const Profile* profile : {&side[i].width, &side[i].border, &side[i].inner_height}) {
+      add_all(profile->cubics, section.s);
+    }
+  }
   std::sort(changes.begin() + 1, changes.end());
   changes.push_back(end);
   return changes;

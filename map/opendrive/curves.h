@@ -1,5 +1,5 @@
-// Positions on and beside a reference line: OpenDRIVE's lines, arcs and spirals, and the cubics for heights, offsets
-// and widths. In double and in the file's own coordinates.
+// Positions on and beside a reference line: OpenDRIVE's lines, arcs, spirals and plane cubics, and the cubics for
+// heights, banking, offsets and widths. In double and in the file's own coordinates.
 #pragma once
 
 #include "pictura/map/opendrive/model.h"
@@ -11,27 +11,42 @@ struct Pose {
   double x = 0, y = 0, heading = 0, curvature = 0;
 };
 
-/// The pose `ds` behind the start of a piece: exact for lines and arcs, Gauss-Legendre quadrature for spirals.
+/// Fills the lengths of a cubic along its p_end.
+void measure(PlaneCubic* cubic);
+
+/// The pose `ds` behind the start of a piece: exact for lines and arcs, Gauss-Legendre quadrature for spirals. Plane
+/// cubics are passed evenly along their arc, so that their end is the piece's.
 Pose pose_on(const GeometryPiece& piece, double ds);
 
 /// The pose of the reference line at s, which is clamped to the road.
 Pose pose_at(const FileRoad& road, double s);
 
-/// The point `t` metres to the left of the reference line at s, at the road's height.
+/// The point `t` metres to the left of the reference line at s, along the banked road and at its height. s is clamped
+/// to the road.
 Point3 point_at(const FileRoad& road, double s, double t);
 
+/// The same for a place on a lane: `outer_share` is 0 on its inner border, 1 on its outer one. Adds the lane's height.
+Point3 point_on_lane(const FileRoad& road, const FileSection& section, const FileLane& lane, double s,
+                     double outer_share);
+
+/// Heading of the line in the middle between two borders, towards growing s.
+double heading_between(const FileRoad& road, const FileSection& section, int inner, int outer, double s);
+
 /// Lateral position t of a lane's border at s. Border 0 is the center line, border k (-k) the outer border of lane k
-/// (-k). Throws Error naming the lane whose width is negative there.
+/// (-k). Widths below 0 count as 0.
 double border_t(const FileRoad& road, const FileSection& section, int border, double s);
 
 /// How fast that t grows with s.
 double border_slope(const FileRoad& road, const FileSection& section, int border, double s);
 
-/// Width of a lane at s.
-double lane_width(const FileSection& section, const FileLane& lane, double s);
+/// Width of a lane at s, along the banked road.
+double lane_width(const FileRoad& road, const FileSection& section, const FileLane& lane, double s);
 
-/// Every s in [begin, end] at which a formula changes: pieces and cubics of the reference line, height and offset, and
-/// the widths of lanes up to `border`. Sorted, with begin and end themselves.
+/// The border on the inside of a lane.
+constexpr int inner_border(int lane_id) { return lane_id > 0 ? lane_id - 1 : lane_id + 1; }
+
+/// Every s in [begin, end] at which a formula changes: pieces and cubics of the reference line, heights and offset, and
+/// the widths and heights of lanes up to `border`. Sorted, with begin and end themselves.
 std::vector<double> formula_changes(const FileRoad& road, const FileSection& section, int border, double begin,
                                     double end);
 

@@ -2,7 +2,6 @@
 
 #include <charconv>
 #include <cmath>
-#include <cstring>
 
 namespace pictura::opendrive {
 
@@ -15,60 +14,9 @@ std::string_view trim(std::string_view text) {
   return text.substr(first, text.find_last_not_of(blanks) - first + 1);
 }
 
-/// The element's name as a literal: places in the file outlive the document.
-const char* element_name(const pugi::xml_node& node) {
-  static constexpr const char* kNames[] = {"OpenDRIVE",
-                                           "road",
-                                           "link",
-                                           "predecessor",
-                                           "successor",
-                                           "type",
-                                           "speed",
-                                           "planView",
-                                           "geometry",
-                                           "line",
-                                           "arc",
-                                           "spiral",
-                                           "poly3",
-                                           "paramPoly3",
-                                           "elevation",
-                                           "lanes",
-                                           "laneOffset",
-                                           "laneSection",
-                                           "left",
-                                           "center",
-                                           "right",
-                                           "lane",
-                                           "width",
-                                           "border",
-                                           "roadMark",
-                                           "objects",
-                                           "object",
-                                           "outline",
-                                           "cornerRoad",
-                                           "signals",
-                                           "cornerLocal",
-                                           "signal",
-                                           "signalReference",
-                                           "validity",
-                                           "controller",
-                                           "control",
-                                           "junction",
-                                           "connection",
-                                           "laneLink",
-                                           "superelevation",
-                                           "elevationProfile",
-                                           "lateralProfile",
-                                           "shape"};
-  for (const char* known : kNames) {
-    if (std::strcmp(known, node.name()) == 0) return known;
-  }
-  return "element";
-}
-
 }  // namespace
 
-Where Element::where() const { return {source_, node_.offset_debug(), owner_, element_name(node_)}; }
+Where Element::where() const { return {source_, node_.offset_debug(), owner_, node_.name()}; }
 
 Element Element::needed_child(const char* name) const {
   const Element element = child(name);
@@ -106,6 +54,13 @@ double Element::number_in(const char* attribute, double low, double high) const 
   return value;
 }
 
+bool Element::flag(const char* attribute) const {
+  const std::string value = text(attribute, "false");
+  if (value == "true" || value == "1") return true;
+  if (value == "false" || value == "0") return false;
+  fail("attribute {}: expected true or false, got '{}'", attribute, value);
+}
+
 int Element::integer(const char* attribute) const {
   const std::string value = text(attribute);
   const std::string_view digits = trim(value);
@@ -117,22 +72,27 @@ int Element::integer(const char* attribute) const {
   return result;
 }
 
+Cubic read_cubic(const Element& element, const char* station, double length) {
+  return {.s = element.number_in(station, -kStationTolerance_m, length + kStationTolerance_m),
+          .a = element.number("a"),
+          .b = element.number("b"),
+          .c = element.number("c"),
+          .d = element.number("d")};
+}
+
+void append_cubic(const Element& element, const Cubic& cubic, Profile* profile) {
+  if (!profile->cubics.empty() && cubic.s < profile->cubics.back().s) {
+    element.fail("begins at {}; expected at least {}, where the one before it begins", cubic.s,
+                 profile->cubics.back().s);
+  }
+  profile->cubics.push_back(cubic);
+}
+
 Profile read_profile(const Element& parent, const char* name, const char* station, double length) {
   Profile profile;
   if (!parent) return profile;
-  parent.each(name, [&](const Element& element) {
-    Cubic cubic;
-    cubic.s = element.number_in(station, -kStationTolerance_m, length + kStationTolerance_m);
-    cubic.a = element.number("a");
-    cubic.b = element.number("b");
-    cubic.c = element.number("c");
-    cubic.d = element.number("d");
-    if (!profile.cubics.empty() && cubic.s < profile.cubics.back().s) {
-      element.fail("attribute {}: expected at least the previous one's {}, got {}", station, profile.cubics.back().s,
-                   cubic.s);
-    }
-    profile.cubics.push_back(cubic);
-  });
+  parent.each(name,
+              [&](const Element& element) { append_cubic(element, read_cubic(element, station, length), &profile); });
   return profile;
 }
 

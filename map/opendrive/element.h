@@ -49,7 +49,14 @@ class Element {
   double number(const char* attribute) const;
   double number(const char* attribute, double fallback) const { return has(attribute) ? number(attribute) : fallback; }
   double number_in(const char* attribute, double low, double high) const;
+  double number_in(const char* attribute, double low, double high, double fallback) const {
+    return has(attribute) ? number_in(attribute, low, high) : fallback;
+  }
   int integer(const char* attribute) const;
+  bool flag(const char* attribute) const;  // false where there is none
+
+  /// The text between the element's tags.
+  std::string content() const { return node_.text().as_string(); }
 
  private:
   pugi::xml_node node_;
@@ -59,6 +66,12 @@ class Element {
 
 // Stations that differ by less are the same.
 inline constexpr double kStationTolerance_m = 1e-3;
+
+/// A cubic whose station, the attribute of that name, lies within [0, length].
+Cubic read_cubic(const Element& element, const char* station, double length);
+
+/// Appends the cubic of `element`, which must not lie before the last one.
+void append_cubic(const Element& element, const Cubic& cubic, Profile* profile);
 
 /// The cubics in the children `name` of `parent`, whose stations (their attribute `station`) ascend within [0, length].
 Profile read_profile(const Element& parent, const char* name, const char* station, double length);

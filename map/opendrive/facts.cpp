@@ -15,16 +15,17 @@ void count_facts(Build* build) {
   facts.junctions = static_cast<int32_t>(map.junctions.size());
   facts.signal_junctions = static_cast<int32_t>(std::count_if(
       map.junctions.begin(), map.junctions.end(), [](const Junction& junction) { return junction.num_phases > 0; }));
-  facts.lanes = static_cast<int32_t>(map.lanes.size());
   bool first = true;
-  for (const Lane& lane : map.lanes) {
+  for (std::size_t i = 0; i < map.lanes.size(); ++i) {
+    const Lane& lane = map.lanes[i];
+    const auto [section, file_lane] = build->file_lanes[i];
+    // Lanes that are cut where their speed limit changes are one lane of the file.
+    if (!file_lane->is_continued) ++facts.lanes;
     if (lane.type != LaneType::driving) continue;
-    ++facts.driving_lanes;
+    if (!file_lane->is_continued) ++facts.driving_lanes;
     // Along the reference line, as the file itself measures.
-    const FileRoad& road = network.roads[static_cast<std::size_t>(lane.source_road)];
-    const FileSection& section = road.sections[static_cast<std::size_t>(lane.source_section)];
-    facts.driving_lane_km += 1e-3 * (section.end - section.s);
-    if (lane.in_junction) facts.driving_lane_km_in_junctions += 1e-3 * (section.end - section.s);
+    facts.driving_lane_km += 1e-3 * (section->end - section->s);
+    if (lane.in_junction) facts.driving_lane_km_in_junctions += 1e-3 * (section->end - section->s);
     for (const LanePoint& point : map.points_of(lane)) {
       const double z = static_cast<double>(point.position_m.z) + map.origin_m[2];
       facts.z_min_m = first ? z : std::min(facts.z_min_m, z);
@@ -35,6 +36,8 @@ void count_facts(Build* build) {
   facts.traffic_lights = static_cast<int32_t>(map.lights.size());
   facts.stop_lines = facts.traffic_lights;
   facts.crosswalks = static_cast<int32_t>(map.crosswalks.size());
+  facts.painted_stop_lines = static_cast<int32_t>(map.stop_lines.size());
+  facts.signs = static_cast<int32_t>(map.signs.size());
   facts.parking_spaces = static_cast<int32_t>(map.parking_spaces.size());
   build->map->facts = facts;
 }

@@ -21,7 +21,7 @@ int32_t Source::line_at(std::ptrdiff_t offset) const {
 }
 
 void Where::fail_with(const std::string& message) const {
-  pictura::fail("{}:{}: {}: <{}>: {}", source->name(), line(), owner, element, message);
+  pictura::fail("{}:{}: {}: <{}>: {}", source ? source->name() : "network", line(), owner, element, message);
 }
 
 }  // namespace pictura::opendrive

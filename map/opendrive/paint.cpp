@@ -1,4 +1,4 @@
-// What is painted on the roads of an OpenDRIVE network: lane marks, crosswalks, parking spaces.
+// What is painted on the roads of an OpenDRIVE network: lane marks, crosswalks, stop lines, parking spaces.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -9,72 +9,135 @@ namespace pictura::opendrive {
 
 namespace {
 
-constexpr double kDefaultMarkWidth_m = 0.125;
+constexpr double kDefaultMarkWidth_m = 0.125, kBoldMarkWidth_m = 0.25;
+constexpr double kStopLineWidth_m = 0.4, kMinStopLine_m = 0.1, kMinParking_m = 0.1;
 constexpr double kMinMarkLength_m = 0.05;
 // Dashes of 3 m with gaps of 9 m, the pattern of North American roads, which CARLA's towns imitate.
 constexpr double kDash_m = 3.0, kDashPeriod_m = 12.0;
+// Botts' dots are 4 inches wide; one stands every 48 inches.
+constexpr double kDot_m = 0.1016, kDotPeriod_m = 1.2192;
 
 // Corners nearer to each other than this are one.
 constexpr float kSamePoint_m = 1e-3f;
 
-/// One stripe of a mark: how far its middle lies left of the border, in mark widths, and whether it is broken.
+/// One stripe of a mark. Dashes lie at origin + i * period, for as many i as `count` or the mark's length allow.
 struct Stripe {
-  double left_widths = 0;
+  double left = 0;  // of the border
+  double width = 0;
+  MarkColor color = MarkColor::white;
   bool broken = false;
+  double dash = 0, period = 0, origin = 0;
+  bool once = false;
 };
 
 /// The stripes of a mark's type. Double lines leave one width between their stripes; the first word names the stripe
 /// nearer to the center lane, which is to the left on the right side of the road.
-std::vector<Stripe> stripes_of(const std::string& type, int lane_id) {
-  const double inner = lane_id > 0 ? -1.0 : 1.0;
-  if (type == "solid") return {{0, false}};
-  if (type == "broken") return {{0, true}};
-  if (type == "solid solid") return {{inner, false}, {-inner, false}};
-  if (type == "broken broken") return {{inner, true}, {-inner, true}};
-  if (type == "solid broken") return {{inner, false}, {-inner, true}};
-  if (type == "broken solid") return {{inner, true}, {-inner, false}};
+std::vector<Stripe> stripes_of_type(const RoadMark& mark, int lane_id) {
+  const double width = mark.width > 0 ? mark.width : mark.bold ? kBoldMarkWidth_m : kDefaultMarkWidth_m;
+  const double inner = lane_id > 0 ? -width : width;
+  // Dashes are counted from the road's start, so that they run on across sections and changes of mark.
+  auto solid = [&](double left) { return Stripe{.left = left, .width = width, .color = mark.color}; };
+  auto broken = [&](double left) {
+    return Stripe{
+        .left = left, .width = width, .color = mark.color, .broken = true, .dash = kDash_m, .period = kDashPeriod_m};
+  };
+  if (mark.type == "solid") return {solid(0)};
+  if (mark.type == "broken") return {broken(0)};
+  if (mark.type == "solid solid") return {solid(inner), solid(-inner)};
+  if (mark.type == "broken broken") return {broken(inner), broken(-inner)};
+  if (mark.type == "solid broken") return {solid(inner), broken(-inner)};
+  if (mark.type == "broken solid") return {broken(inner), solid(-inner)};
+  if (mark.type == "botts dots") {
+    return {{.width = kDot_m, .color = mark.color, .broken = true, .dash = kDot_m, .period = kDotPeriod_m}};
+  }
   return {};
 }
 
-void add_mark(Build* build, const FileRoad& road, const FileSection& section, const FileLane& lane,
-              const RoadMark& mark, double begin, double end) {
-  const double width = mark.width > 0 ? mark.width : kDefaultMarkWidth_m;
-  RoadMap& map = *build->map;
-  for (const Stripe& stripe : stripes_of(mark.type, lane.id)) {
-    const double period = stripe.broken ? kDashPeriod_m : end - begin;
-    const double dash = stripe.broken ? kDash_m : end - begin;
-    // Dashes are counted from the road's start, so that they run on across sections and changes of mark.
-    double dash_begin = stripe.broken ? std::floor(begin / period) * period : begin;
-    for (; dash_begin < end; dash_begin += period) {
-      const double from = std::max(dash_begin, begin), to = std::min(dash_begin + dash, end);
-      if (to - from < kMinMarkLength_m) continue;
-      const std::vector<CurvePoint> points = sample_curve(
-          formula_changes(road, section, lane.id, from, to), build->options.chord_error_m, kMaxPiece_m, &build->budget,
-          [&](double s) {
-            const Point3 p = point_at(road, s, border_t(road, section, lane.id, s) + stripe.left_widths * width);
-            return CurvePoint{s, p.x, p.y, p.z, 0};
-          });
-      const int32_t first = static_cast<int32_t>(map.marking_points.size());
-      for (const CurvePoint& point : points) map.marking_points.push_back(build->to_map(point.x, point.y, point.z));
-      map.markings.push_back({{first, static_cast<int32_t>(map.marking_points.size())},
-                              static_cast<float>(width),
-                              mark.color,
-                              stripe.broken});
-    }
-  }
+/// What the mark lists itself goes before its type's own pattern. `begin` is its s.
+std::vector<Stripe> stripes_of(const RoadMark& mark, int lane_id, double begin) {
+  if (mark.type == "none") return {};
+  if (mark.lines.empty() && mark.explicit_lines.empty()) return stripes_of_type(mark, lane_id);
+  std::vector<Stripe> stripes;
+  auto add = [&](const MarkLine& line, bool once) {
+    const double width = line.width > 0 ? line.width : mark.width > 0 ? mark.width : kDefaultMarkWidth_m;
+    stripes.push_back({.left = line.t_offset,
+                       .width = width,
+                       .color = line.color.value_or(mark.color),
+                       .broken = once || line.space > 0,
+                       .dash = line.length,
+                       .period = line.length + line.space,
+                       .origin = begin + line.s_offset,
+                       .once = once});
+  };
+  for (const MarkLine& line : mark.lines) add(line, false);
+  for (const MarkLine& line : mark.explicit_lines) add(line, true);
+  return stripes;
 }
 
-void add_crosswalk(Build* build, const FileRoad& road, const FileObject& object) {
+class MarkPainter {
+ public:
+  MarkPainter(Build* build, std::size_t road, const FileSection& section, const FileLane& lane)
+      : build_(*build), road_index_(road), road_(build->network.roads[road]), section_(section), lane_(lane) {}
+
+  /// Paints from `begin` to `end` what the mark asks for.
+  void paint(const RoadMark& mark, double begin, double end) {
+    const double mark_begin = section_.s + mark.s_offset;
+    for (const Stripe& stripe : stripes_of(mark, lane_.id, mark_begin)) {
+      if (!stripe.broken) {
+        add(mark, stripe, begin, end);
+        continue;
+      }
+      const double last = stripe.once ? 0 : std::floor((end - stripe.origin) / stripe.period);
+      for (double i = stripe.once ? 0 : std::floor((begin - stripe.origin) / stripe.period); i <= last; ++i) {
+        const double dash_begin = stripe.origin + i * stripe.period;
+        add(mark, stripe, std::max(dash_begin, begin), std::min(dash_begin + stripe.dash, end));
+      }
+    }
+  }
+
+ private:
+  void add(const RoadMark& mark, const Stripe& stripe, double from, double to) {
+    if (to - from < kMinMarkLength_m) return;
+    RoadMap& map = *build_.map;
+    std::vector<double> breaks = formula_changes(road_, section_, lane_.id, from, to);
+    const double mark_begin = section_.s + mark.s_offset;
+    for (const Cubic& sway : mark.sway.cubics) {
+      if (mark_begin + sway.s > from && mark_begin + sway.s < to) breaks.push_back(mark_begin + sway.s);
+    }
+    std::sort(breaks.begin(), breaks.end());
+    const std::vector<CurvePoint> points =
+        sample_curve(breaks, build_.options.chord_error_m, kMaxPiece_m, &build_.budget, [&](double s) {
+          const double height = point_on_lane(road_, section_, lane_, s, 1).z;
+          const double t = border_t(road_, section_, lane_.id, s) + stripe.left + mark.sway.value(s - mark_begin);
+          const Point3 p = point_at(road_, s, t);
+          return CurvePoint{s, p.x, p.y, lane_.inner_height.cubics.empty() ? p.z : height, 0};
+        });
+    const int32_t first = static_cast<int32_t>(map.marking_points.size());
+    for (const CurvePoint& point : points) map.marking_points.push_back(build_.to_map(point.x, point.y, point.z));
+    map.markings.push_back({{first, static_cast<int32_t>(map.marking_points.size())},
+                            static_cast<float>(stripe.width),
+                            stripe.color,
+                            stripe.broken});
+    map.provenance.markings.push_back(source_of(road_index_, mark.where));
+  }
+
+  Build& build_;
+  std::size_t road_index_;
+  const FileRoad& road_;
+  const FileSection& section_;
+  const FileLane& lane_;
+};
+
+/// The corners of an object: its outline, or those of its box.
+std::vector<Vec3> corners_of(Build* build, const FileRoad& road, const FileObject& object) {
   std::vector<FileObject::Corner> corners = object.outline;
   if (corners.empty()) {
     const double u = 0.5 * object.length, v = 0.5 * object.width;
-    if (u <= 0 || v <= 0) object.where.fail("expected a crosswalk with an outline, or a length and a width");
     corners = {{u, v}, {-u, v}, {-u, -v}, {u, -v}};
   }
   const Point3 origin = point_at(road, object.s, object.t);
   const double heading = pose_at(road, object.s).heading + object.heading;
-  RoadMap& map = *build->map;
-  const std::size_t first = map.outline_points.size();
+  std::vector<Vec3> points;
   for (const FileObject::Corner& corner : corners) {
     Point3 p;
     if (corner.along_road) {
@@ -86,53 +149,113 @@ void add_crosswalk(Build* build, const FileRoad& road, const FileObject& object)
            origin.z + object.z_offset + corner.z};
     }
     const Vec3 point = build->to_map(p);
-    if (map.outline_points.size() == first || length(point - map.outline_points.back()) > kSamePoint_m) {
-      map.outline_points.push_back(point);
-    }
+    if (points.empty() || length(point - points.back()) > kSamePoint_m) points.push_back(point);
   }
-  if (map.outline_points.size() > first + 1 &&
-      length(map.outline_points.back() - map.outline_points[first]) <= kSamePoint_m) {
-    map.outline_points.pop_back();
-  }
-  if (map.outline_points.size() < first + 3) {
-    object.where.fail("expected a crosswalk with at least three distinct corners, got {}",
-                      map.outline_points.size() - first);
-  }
-  map.crosswalks.push_back({{static_cast<int32_t>(first), static_cast<int32_t>(map.outline_points.size())}});
+  if (points.size() > 1 && length(points.back() - points.front()) <= kSamePoint_m) points.pop_back();
+  return points;
 }
 
-void add_parking_space(Build* build, const FileRoad& road, const FileObject& object) {
+void add_crosswalk(Build* build, std::size_t road, const FileObject& object) {
+  if (object.outline.empty() && !(object.length > 0 && object.width > 0)) {
+    object.where.fail("expected a crosswalk with an outline, or a length and a width");
+  }
+  const std::vector<Vec3> corners = corners_of(build, build->network.roads[road], object);
+  if (corners.size() < 3) {
+    object.where.fail("expected a crosswalk with at least three distinct corners, got {}", corners.size());
+  }
+  RoadMap& map = *build->map;
+  const int32_t first = static_cast<int32_t>(map.outline_points.size());
+  map.outline_points.insert(map.outline_points.end(), corners.begin(), corners.end());
+  map.crosswalks.push_back({{first, static_cast<int32_t>(map.outline_points.size())}});
+  map.provenance.crosswalks.push_back(source_of(road, object.where));
+}
+
+/// A stop line lies along the longer extent of its corners, in the middle of the shorter one, which is its width.
+void add_stop_line(Build* build, std::size_t road, const FileObject& object) {
+  const std::vector<Vec3> corners = corners_of(build, build->network.roads[road], object);
+  Vec2 along{};
+  for (const Vec3 a : corners) {
+    for (const Vec3 b : corners) {
+      if (length((b - a).xy()) > length(along)) along = (b - a).xy();
+    }
+  }
+  if (length(along) < kMinStopLine_m) {
+    object.where.fail("expected a stop line at least {} m long, got {}", kMinStopLine_m, length(along));
+  }
+  if (corners.size() >= 4) {
+    // Of a box the longest extent is a diagonal; its longest side runs along it.
+    along = {};
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      const Vec2 side = (corners[(i + 1) % corners.size()] - corners[i]).xy();
+      if (length(side) > length(along)) along = side;
+    }
+  }
+  along = along * (1.0f / length(along));
+  float low = 0, high = 0, left = 0, right = 0, z_low = corners[0].z, z_high = corners[0].z;
+  for (const Vec3 corner : corners) {
+    const Vec2 from_first = (corner - corners[0]).xy();
+    const float u = dot(from_first, along), v = cross(along, from_first);
+    if (u < low) z_low = corner.z;
+    if (u > high) z_high = corner.z;
+    low = min_of(low, u);
+    high = max_of(high, u);
+    left = max_of(left, v);
+    right = min_of(right, v);
+  }
+  const Vec2 middle = corners[0].xy() + left_normal(along) * (0.5f * (left + right));
+  const Vec2 a = middle + along * low, b = middle + along * high;
+  const float width_m = left - right > 0.05f ? left - right : static_cast<float>(kStopLineWidth_m);
+  build->map->stop_lines.push_back({{a.x, a.y, z_low}, {b.x, b.y, z_high}, width_m});
+  build->map->provenance.stop_lines.push_back(source_of(road, object.where));
+}
+
+void add_parking_space(Build* build, std::size_t road_index, const FileObject& object) {
+  const FileRoad& road = build->network.roads[road_index];
   ParkingSpace space;
   Point3 center = point_at(road, object.s, object.t);
   center.z += object.z_offset;
   space.center_m = build->to_map(center);
   double heading = pose_at(road, object.s).heading + object.heading;
   double length_m = object.length, width_m = object.width;
-  if (!(length_m > 0 && width_m > 0)) object.where.fail("expected a parking space with a length and a width");
+  if (!(length_m >= kMinParking_m && width_m >= kMinParking_m)) {
+    object.where.fail("expected a parking space with a length and a width of at least {} m, got {} and {}",
+                      kMinParking_m, length_m, width_m);
+  }
   // Cars stand along the longer side, whichever the file calls its length.
   if (width_m > length_m) {
     std::swap(width_m, length_m);
     heading += 0.5 * std::numbers::pi;
   }
   // Of the two ways to stand in it: the one of the traffic on this side of the road.
-  const double traffic = pose_at(road, object.s).heading + (object.t > 0 ? std::numbers::pi : 0.0);
+  const bool forward = travels_forward(road, object.t > 0 ? 1 : -1);
+  const double traffic = pose_at(road, object.s).heading + (forward ? 0.0 : std::numbers::pi);
   if (std::cos(heading - traffic) < 0) heading += std::numbers::pi;
   space.heading_rad = static_cast<float>(std::remainder(heading, 2 * std::numbers::pi));
   space.length_m = static_cast<float>(length_m);
   space.width_m = static_cast<float>(width_m);
   build->map->parking_spaces.push_back(space);
+  build->map->provenance.parking_spaces.push_back(source_of(road_index, object.where));
+}
+
+void add_object(Build* build, std::size_t road, const FileObject& object) {
+  switch (object.kind) {
+    case FileObject::Kind::crosswalk: return add_crosswalk(build, road, object);
+    case FileObject::Kind::parking_space: return add_parking_space(build, road, object);
+    case FileObject::Kind::stop_line: return add_stop_line(build, road, object);
+  }
 }
 
 }  // namespace
 
 void build_markings(Build* build) {
-  for (const FileRoad& road : build->network.roads) {
-    for (const FileSection& section : road.sections) {
+  for (std::size_t road = 0; road < build->network.roads.size(); ++road) {
+    for (const FileSection& section : build->network.roads[road].sections) {
       auto add_lane = [&](const FileLane& lane) {
+        MarkPainter painter(build, road, section, lane);
         for (std::size_t i = 0; i < lane.marks.size(); ++i) {
           const double begin = section.s + std::max(0.0, lane.marks[i].s_offset);
           const double end = i + 1 < lane.marks.size() ? section.s + lane.marks[i + 1].s_offset : section.end;
-          if (end > begin) add_mark(build, road, section, lane, lane.marks[i], begin, std::min(end, section.end));
+          if (end > begin) painter.paint(lane.marks[i], begin, std::min(end, section.end));
         }
       };
       add_lane(section.center);
@@ -143,13 +266,9 @@ void build_markings(Build* build) {
 }
 
 void build_objects(Build* build) {
-  for (const FileRoad& road : build->network.roads) {
-    for (const FileObject& object : road.objects) {
-      if (object.type == "crosswalk") {
-        add_crosswalk(build, road, object);
-      } else {
-        add_parking_space(build, road, object);
-      }
+  for (std::size_t road = 0; road < build->network.roads.size(); ++road) {
+    for (const FileObject& object : build->network.roads[road].objects) {
+      build->faults->attempt([&] { add_object(build, road, object); });
     }
   }
 }

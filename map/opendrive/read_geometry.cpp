@@ -1,5 +1,6 @@
 // Reference lines: <geometry> in plan, heights along it.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "pictura/map/opendrive/curves.h"
@@ -10,8 +11,44 @@ namespace pictura::opendrive {
 namespace {
 
 constexpr double kMaxCoordinate_m = 1e8;
-constexpr double kMaxTurn_rad = 100.0;  // of one geometry: 16 turns of a helix are enough
-constexpr double kMaxGap_m = 0.1;       // between two geometries of a reference line
+constexpr double kMaxTurn_rad = 100.0;    // of one geometry: 16 turns of a helix are enough
+constexpr double kMaxGap_m = 0.1;         // between two geometries of a reference line
+constexpr double kMaxLengthError = 0.01;  // of the length that a <paramPoly3> states, beside that gap
+
+std::array<double, 4> coefficients(const Element& element, const char* suffix) {
+  std::array<double, 4> result{};
+  for (std::size_t i = 0; i < 4; ++i) {
+    result[i] = element.number_in(fmt::format("{}{}", "abcd"[i], suffix).c_str(), -kMaxCoordinate_m, kMaxCoordinate_m);
+  }
+  return result;
+}
+
+/// v as a cubic of u; u ends where the curve is as long as the piece.
+PlaneCubic read_poly3(const Element& element, double length) {
+  PlaneCubic cubic{.u = {0, 1, 0, 0}, .v = coefficients(element, "")};
+  double low = 0, high = length;
+  for (int halving = 0; halving < 60; ++halving) {
+    cubic.p_end = 0.5 * (low + high);
+    measure(&cubic);
+    (cubic.arc_length.back() < length ? low : high) = cubic.p_end;
+  }
+  return cubic;
+}
+
+PlaneCubic read_param_poly3(const Element& element, double length) {
+  PlaneCubic cubic{.u = coefficients(element, "U"), .v = coefficients(element, "V")};
+  const std::string range = element.text("pRange", "normalized");
+  if (range != "normalized" && range != "arcLength") {
+    element.fail("attribute pRange: expected normalized or arcLength, got '{}'", range);
+  }
+  cubic.p_end = range == "arcLength" ? length : 1.0;
+  measure(&cubic);
+  const double curve_m = cubic.arc_length.back();
+  if (!(std::abs(curve_m - length) <= kMaxGap_m + kMaxLengthError * length)) {
+    element.fail("its curve is {:.3f} m long; expected the geometry's length, {} m", curve_m, length);
+  }
+  return cubic;
+}
 
 GeometryPiece read_geometry(const Element& element) {
   GeometryPiece piece;
@@ -22,16 +59,21 @@ GeometryPiece read_geometry(const Element& element) {
   piece.length = element.number_in("length", 0, kMaxRoadLength_m);
   if (piece.length == 0) element.fail("attribute length: expected more than 0");
   if (element.child("line")) return piece;
+  if (const Element poly3 = element.child("poly3")) {
+    piece.cubic = read_poly3(poly3, piece.length);
+    return piece;
+  }
+  if (const Element poly3 = element.child("paramPoly3")) {
+    piece.cubic = read_param_poly3(poly3, piece.length);
+    return piece;
+  }
   if (const Element arc = element.child("arc")) {
     piece.start_curvature = piece.end_curvature = arc.number("curvature");
   } else if (const Element spiral = element.child("spiral")) {
     piece.start_curvature = spiral.number("curvStart");
     piece.end_curvature = spiral.number("curvEnd");
   } else {
-    for (const char* other : {"poly3", "paramPoly3"}) {
-      if (element.child(other)) element.fail("<{}> is not supported; expected <line>, <arc> or <spiral>", other);
-    }
-    element.fail("expected a <line>, <arc> or <spiral> in it, found none");
+    element.fail("expected a <line>, <arc>, <spiral>, <poly3> or <paramPoly3> in it, found none");
   }
   const double turn = std::max(std::abs(piece.start_curvature), std::abs(piece.end_curvature)) * piece.length;
   if (!(turn <= kMaxTurn_rad)) element.fail("expected a curve of at most {} rad, got {}", kMaxTurn_rad, turn);
@@ -65,15 +107,56 @@ void check_geometry(const std::vector<Element>& elements, const FileRoad& road) 
   }
 }
 
-void refuse_superelevation(const Element& road_element) {
-  const Element lateral = road_element.child("lateralProfile");
+bool is_zero(const Profile& profile) {
+  return std::all_of(profile.cubics.begin(), profile.cubics.end(),
+                     [](const Cubic& c) { return c.a == 0 && c.b == 0 && c.c == 0 && c.d == 0; });
+}
+
+/// Cubics of t at stations of s: one cross-section for each s.
+std::vector<CrossSection> read_shape(const Element& lateral, double road_length) {
+  std::vector<CrossSection> sections;
+  lateral.each("shape", [&](const Element& element) {
+    const double s = element.number_in("s", 0, road_length + kStationTolerance_m);
+    if (!sections.empty() && s < sections.back().s) {
+      element.fail("attribute s: expected at least the previous one's {}, got {}", sections.back().s, s);
+    }
+    if (sections.empty() || s > sections.back().s) sections.push_back({s, {}});
+    Profile& height = sections.back().height;
+    const Cubic cubic{.s = element.number_in("t", -kMaxOffset_m, kMaxOffset_m),
+                      .a = element.number("a"),
+                      .b = element.number("b"),
+                      .c = element.number("c"),
+                      .d = element.number("d")};
+    if (!height.cubics.empty() && cubic.s < height.cubics.back().s) {
+      element.fail("attribute t: expected at least the previous one's {}, got {}", height.cubics.back().s, cubic.s);
+    }
+    height.cubics.push_back(cubic);
+  });
+  if (std::all_of(sections.begin(), sections.end(), [](const CrossSection& c) { return is_zero(c.height); })) {
+    sections.clear();
+  }
+  return sections;
+}
+
+/// Superelevation, crossfall (1.4) and shape. Profiles that are zero all along, as most are, are left out.
+void read_banking(const Element& lateral, FileRoad* road) {
   if (!lateral) return;
-  for (const char* name : {"superelevation", "shape"}) {
-    lateral.each(name, [&](const Element& element) {
-      for (const char* coefficient : {"a", "b", "c", "d"}) {
-        if (std::abs(element.number(coefficient, 0)) > 1e-9) element.fail("banked roads are not supported");
-      }
-    });
+  if (const Element strips = lateral.child("crossSectionSurface")) {
+    strips.fail("cross-sections as strips are not supported; expected <superelevation> or <shape>");
+  }
+  road->superelevation = read_profile(lateral, "superelevation", "s", road->length);
+  lateral.each("crossfall", [&](const Element& element) {
+    const std::string side = element.text("side", "both");
+    if (side != "left" && side != "right" && side != "both") {
+      element.fail("attribute side: expected left, right or both, got '{}'", side);
+    }
+    const Cubic cubic = read_cubic(element, "s", road->length);
+    if (side != "right") append_cubic(element, cubic, &road->left_crossfall);
+    if (side != "left") append_cubic(element, cubic, &road->right_crossfall);
+  });
+  road->shape = read_shape(lateral, road->length);
+  for (Profile* profile : {&road->superelevation, &road->left_crossfall, &road->right_crossfall}) {
+    if (is_zero(*profile)) profile->cubics.clear();
   }
 }
 
@@ -88,7 +171,7 @@ void read_reference_line(const Element& road_element, FileRoad* road) {
   if (geometry.empty()) road_element.child("planView").fail("expected a <geometry> in it, found none");
   check_geometry(geometry, *road);
   road->elevation = read_profile(road_element.child("elevationProfile"), "elevation", "s", road->length);
-  refuse_superelevation(road_element);
+  read_banking(road_element.child("lateralProfile"), road);
 }
 
 }  // namespace pictura::opendrive

@@ -4,6 +4,7 @@
 #include <unordered_map>
 
 #include "pictura/map/opendrive/read_parts.h"
+#include "pictura/map/opendrive/sections.h"
 
 namespace pictura::opendrive {
 
@@ -11,7 +12,7 @@ namespace {
 
 // Sections that editors leave behind when they snap; no lane can be built from less.
 constexpr double kMinSection_m = 1e-3;
-constexpr double kMaxLaneWidth_m = 1e3;
+constexpr double kMaxLaneWidth_m = 1e3, kMaxLaneHeight_m = 100;
 constexpr int kMaxLanesPerSide = 64;
 
 LaneType lane_type(const Element& element, const std::string& name) {
@@ -54,58 +55,88 @@ LaneType lane_type(const Element& element, const std::string& name) {
   return found->second;
 }
 
-void read_marks(const Element& lane, double section_length, std::vector<RoadMark>* marks_out) {
-  lane.each("roadMark", [&](const Element& element) {
-    RoadMark mark;
-    mark.s_offset = element.number("sOffset", 0);
-    // Marks that begin behind the section's end are met in CARLA's towns; they show nothing.
-    if (mark.s_offset > section_length + kStationTolerance_m) return;
-    if (!marks_out->empty() && mark.s_offset < marks_out->back().s_offset) {
-      element.fail("attribute sOffset: expected at least the previous one's {}, got {}", marks_out->back().s_offset,
-                   mark.s_offset);
+Profile read_constants(const Element& lane, const char* name, double section_length,
+                       double (*value_of)(const Element&)) {
+  Profile profile;
+  lane.each(name, [&](const Element& element) {
+    const double s = element.number_in("sOffset", 0, section_length + kStationTolerance_m, 0);
+    if (!profile.cubics.empty() && s < profile.cubics.back().s) {
+      element.fail("attribute sOffset: expected at least the previous one's {}, got {}", profile.cubics.back().s, s);
     }
-    mark.type = element.text("type");
-    mark.color = element.text("color", "standard") == "yellow" ? MarkColor::yellow : MarkColor::white;
-    if (element.has("width")) mark.width = element.number_in("width", 0, 10);
-    marks_out->push_back(mark);
+    profile.cubics.push_back({.s = s, .a = value_of(element)});
   });
+  return profile;
 }
 
-FileLane read_lane(const Element& element, double section_length) {
+LaneDirection read_direction(const Element& element) {
+  const std::string text = element.text("direction", "standard");
+  if (text == "standard") return LaneDirection::standard;
+  if (text == "reversed") return LaneDirection::reversed;
+  if (text == "both") return LaneDirection::both;
+  element.fail("attribute direction: expected standard, reversed or both, got '{}'", text);
+}
+
+void read_type(const Element& element, FileLane* lane) {
+  lane->type_name = element.text("type");
+  lane->type = lane_type(element, lane->type_name);
+  lane->is_void = lane->type_name == "none";
+  lane->is_level = element.flag("level");
+  lane->direction = read_direction(element);
+  if (lane->direction == LaneDirection::both && lane->type == LaneType::driving) lane->type = LaneType::bidirectional;
+}
+
+void read_width(const Element& element, double section_length, FileLane* lane) {
+  const bool by_border = !element.child("width") && element.child("border");
+  const char* const name = by_border ? "border" : "width";
+  const Profile profile = read_profile(element, name, "sOffset", section_length);
+  if (profile.cubics.empty()) element.fail("expected a <width> or <border> in it, found none");
+  if (std::abs(profile.cubics.front().s) > kStationTolerance_m) {
+    element.fail("expected its first <{}> at sOffset 0, got {}", name, profile.cubics.front().s);
+  }
+  for (const Cubic& cubic : profile.cubics) {
+    const double low = by_border ? -kMaxOffset_m : -kStationTolerance_m;
+    const double high = by_border ? kMaxOffset_m : kMaxLaneWidth_m;
+    if (!(cubic.a >= low && cubic.a <= high)) {
+      element.fail("<{}> attribute a: expected a number in [{}, {}] m, got {}", name, low, high, cubic.a);
+    }
+  }
+  (by_border ? lane->border : lane->width) = profile;
+}
+
+FileLane read_lane(const Element& element, double section_length, Faults* faults) {
   FileLane lane;
   lane.where = element.where();
   lane.id = element.integer("id");
-  lane.type_name = element.text("type");
-  lane.type = lane_type(element, lane.type_name);
-  lane.is_void = lane.type_name == "none";
+  // A faulty lane keeps its place between its neighbours, without a surface.
+  bool is_sound = faults->attempt([&] { read_type(element, &lane); });
   if (const Element link = element.child("link")) {
-    if (const Element end = link.child("predecessor")) lane.predecessor = end.integer("id");
-    if (const Element end = link.child("successor")) lane.successor = end.integer("id");
+    link.each("predecessor",
+              [&](const Element& end) { faults->attempt([&] { lane.predecessors.push_back(end.integer("id")); }); });
+    link.each("successor",
+              [&](const Element& end) { faults->attempt([&] { lane.successors.push_back(end.integer("id")); }); });
   }
-  read_marks(element, section_length, &lane.marks);
+  lane.marks = read_marks(element, section_length, faults);
   if (lane.id == 0) return lane;
-  lane.width = read_profile(element, "width", "sOffset", section_length);
-  if (lane.width.cubics.empty()) {
-    if (element.child("border")) element.fail("lanes given by <border> are not supported; expected <width>");
-    element.fail("expected a <width> in it, found none");
-  }
-  if (std::abs(lane.width.cubics.front().s) > kStationTolerance_m) {
-    element.fail("expected its first <width> at sOffset 0, got {}", lane.width.cubics.front().s);
-  }
-  for (const Cubic& cubic : lane.width.cubics) {
-    if (!(cubic.a >= -kStationTolerance_m && cubic.a <= kMaxLaneWidth_m)) {
-      element.fail("<width> attribute a: expected a width in [0, {}] m, got {}", kMaxLaneWidth_m, cubic.a);
-    }
-  }
+  is_sound = faults->attempt([&] { read_width(element, section_length, &lane); }) && is_sound;
+  faults->attempt([&] {
+    lane.inner_height = read_constants(element, "height", section_length, [](const Element& e) {
+      return e.number_in("inner", -kMaxLaneHeight_m, kMaxLaneHeight_m);
+    });
+    lane.outer_height = read_constants(element, "height", section_length, [](const Element& e) {
+      return e.number_in("outer", -kMaxLaneHeight_m, kMaxLaneHeight_m);
+    });
+  });
+  faults->attempt([&] { lane.speed_limit_mps = read_constants(element, "speed", section_length, &read_speed_mps); });
+  lane.is_void = lane.is_void || !is_sound;
   return lane;
 }
 
-void read_side(const Element& section, const char* side, int sign, double section_length,
+void read_side(const Element& section, const char* side, int sign, double section_length, Faults* faults,
                std::vector<FileLane>* lanes_out) {
   const Element parent = section.child(side);
   if (!parent) return;
   parent.each("lane", [&](const Element& element) {
-    FileLane lane = read_lane(element, section_length);
+    FileLane lane = read_lane(element, section_length, faults);
     if (lane.id * sign <= 0) element.fail("attribute id: {} does not belong in <{}>", lane.id, side);
     lanes_out->push_back(std::move(lane));
   });
@@ -125,56 +156,75 @@ void read_side(const Element& section, const char* side, int sign, double sectio
 /// Takes a section out of the road: its neighbours' lane links lead through it.
 void bridge_section(std::vector<FileSection>* sections, std::size_t index) {
   const FileSection removed = (*sections)[index];
-  auto lead_through = [&](FileSection& section, std::optional<int> FileLane::* link) {
+  auto lead_through = [&](FileSection& section, std::vector<int> FileLane::* links) {
     for (std::vector<FileLane>* side : {&section.left, &section.right}) {
       for (FileLane& lane : *side) {
-        if (!(lane.*link)) continue;
-        const FileLane* through = removed.lane(*(lane.*link));
-        lane.*link = through ? through->*link : std::nullopt;
+        std::vector<int> beyond;
+        for (const int id : lane.*links) {
+          if (const FileLane* through = removed.lane(id)) {
+            beyond.insert(beyond.end(), (through->*links).begin(), (through->*links).end());
+          }
+        }
+        lane.*links = beyond;
       }
     }
   };
   if (index > 0) {
-    lead_through((*sections)[index - 1], &FileLane::successor);
+    lead_through((*sections)[index - 1], &FileLane::successors);
     (*sections)[index - 1].end = removed.end;
   }
   if (index + 1 < sections->size()) {
     FileSection& next = (*sections)[index + 1];
-    lead_through(next, &FileLane::predecessor);
+    lead_through(next, &FileLane::predecessors);
     // Cubics and marks are relative to the section's start, which stays where it is.
   }
   sections->erase(sections->begin() + static_cast<std::ptrdiff_t>(index));
 }
 
-}  // namespace
-
-void read_lanes(const Element& road_element, FileRoad* road) {
-  const Element lanes = road_element.needed_child("lanes");
-  road->lane_offset = read_profile(lanes, "laneOffset", "s", road->length);
+/// The sections on both sides of the road, or on one: those with singleSide go on until the next of their side.
+std::vector<FileSection> read_sections(const Element& lanes, double road_length, Faults* faults) {
   std::vector<Element> elements;
   lanes.each("laneSection", [&](const Element& element) { elements.push_back(element); });
   if (elements.empty()) lanes.fail("expected a <laneSection> in it, found none");
+  std::vector<FileSection> sections;
   for (std::size_t i = 0; i < elements.size(); ++i) {
     FileSection section;
-    section.s = elements[i].number_in("s", 0, road->length);
-    section.end = i + 1 < elements.size() ? elements[i + 1].number_in("s", 0, road->length) : road->length;
+    section.s = elements[i].number_in("s", 0, road_length);
+    section.end = i + 1 < elements.size() ? elements[i + 1].number_in("s", 0, road_length) : road_length;
     if (i == 0 && section.s > kStationTolerance_m) {
       elements[i].fail("attribute s: expected the first section at 0, got {}", section.s);
     }
     if (section.end < section.s) {
       elements[i + 1].fail("attribute s: expected at least the previous section's {}, got {}", section.s, section.end);
     }
-    if (elements[i].text("singleSide", "false") == "true") {
-      elements[i].fail("attribute singleSide: one-sided sections are not supported");
+    std::size_t both_sided = i + 1;
+    while (both_sided < elements.size() && elements[both_sided].flag("singleSide")) ++both_sided;
+    const double reach = both_sided < elements.size() ? elements[both_sided].number("s") : road_length;
+    const double length = std::max(reach, section.end) - section.s;
+    read_side(elements[i], "left", 1, length, faults, &section.left);
+    read_side(elements[i], "right", -1, length, faults, &section.right);
+    if (i > 0 && elements[i].flag("singleSide")) {
+      FileSection& before = sections.back();
+      if (section.left.empty()) section.left = lanes_further_on(&before.left, section.s - before.s);
+      if (section.right.empty()) section.right = lanes_further_on(&before.right, section.s - before.s);
     }
-    const double length = section.end - section.s;
-    read_side(elements[i], "left", 1, length, &section.left);
-    read_side(elements[i], "right", -1, length, &section.right);
+    for (std::vector<FileLane>* side : {&section.left, &section.right}) {
+      for (FileLane& lane : *side) lane.section = lane.is_continued ? lane.section : static_cast<int>(i);
+    }
     if (const Element center = elements[i].child("center")) {
-      if (const Element lane = center.child("lane")) section.center = read_lane(lane, length);
+      if (const Element lane = center.child("lane")) section.center = read_lane(lane, length, faults);
     }
-    road->sections.push_back(std::move(section));
+    sections.push_back(std::move(section));
   }
+  return sections;
+}
+
+}  // namespace
+
+void read_lanes(const Element& road_element, Faults* faults, FileRoad* road) {
+  const Element lanes = road_element.needed_child("lanes");
+  road->lane_offset = read_profile(lanes, "laneOffset", "s", road->length);
+  road->sections = read_sections(lanes, road->length, faults);
   for (std::size_t i = road->sections.size(); i-- > 0;) {
     if (road->sections.size() > 1 && road->sections[i].end - road->sections[i].s < kMinSection_m) {
       bridge_section(&road->sections, i);

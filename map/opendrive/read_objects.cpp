@@ -1,65 +1,183 @@
-// What stands on and beside a road: objects (crosswalks, parking spaces), signals and references to them.
+// What stands on and beside a road: objects (crosswalks, parking spaces, stop lines), signals and references to them.
+#include <cctype>
+#include <cmath>
+#include <optional>
+
 #include "pictura/map/opendrive/read_parts.h"
 
 namespace pictura::opendrive {
 
-void read_objects(const Element& road_element, FileRoad* road) {
+namespace {
+
+// Objects may stand this far before or behind their road.
+constexpr double kOverhang_m = 10;
+// Objects repeated closer than this are one continuous thing.
+constexpr double kMinRepeat_m = 0.1;
+constexpr double kMaxSize_m = 1e3;
+
+bool contains_word(std::string text, std::string_view word) {
+  std::erase_if(text, [](unsigned char c) { return std::isalnum(c) == 0; });
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text.find(word) != std::string::npos;
+}
+
+/// The kinds that make a RoadMap; nothing for all others. Stop lines have no type of their own in OpenDRIVE: they are
+/// road marks of the subtype signalLines, or objects of that name.
+std::optional<FileObject::Kind> kind_of(const Element& element) {
+  const std::string type = element.text("type", "none");
+  if (type == "crosswalk") return FileObject::Kind::crosswalk;
+  if (type == "parking" || type == "parkingSpace") return FileObject::Kind::parking_space;
+  if (type == "roadMark" && element.text("subtype", "") == "signalLines") return FileObject::Kind::stop_line;
+  if (contains_word(type, "stopline") || contains_word(element.text("subtype", ""), "stopline") ||
+      contains_word(element.text("name", ""), "stopline")) {
+    return FileObject::Kind::stop_line;
+  }
+  return std::nullopt;
+}
+
+double read_station(const Element& element, double road_length) {
+  return element.number_in("s", -kOverhang_m, road_length + kOverhang_m);
+}
+
+double read_offset(const Element& element, const char* attribute) {
+  return element.number_in(attribute, -kMaxOffset_m, kMaxOffset_m);
+}
+
+double read_height(const Element& element, const char* attribute) {
+  return element.number_in(attribute, -kMaxHeight_m, kMaxHeight_m, 0);
+}
+
+std::vector<FileObject::Corner> read_outline(const Element& element, double road_length) {
+  Element outline = element.child("outline");
+  if (const Element outlines = element.child("outlines"); !outline && outlines) {
+    // The outer one of several; the others are holes or parts of it.
+    outlines.each("outline", [&](const Element& candidate) {
+      if (!outline || (candidate.flag("outer") && !outline.flag("outer"))) outline = candidate;
+    });
+  }
+  std::vector<FileObject::Corner> corners;
+  if (!outline) return corners;
+  outline.each_child([&](const Element& corner) {
+    if (corner.name() == "cornerLocal") {
+      corners.push_back({read_offset(corner, "u"), read_offset(corner, "v"), read_height(corner, "z"), false});
+    } else if (corner.name() == "cornerRoad") {
+      corners.push_back({read_station(corner, road_length), read_offset(corner, "t"), read_height(corner, "dz"), true});
+    }
+  });
+  return corners;
+}
+
+FileObject read_object(const Element& element, FileObject::Kind kind, double road_length) {
+  FileObject object;
+  object.where = element.where();
+  object.kind = kind;
+  object.id = element.text("id", "");
+  object.name = element.text("name", "");
+  object.s = read_station(element, road_length);
+  object.t = read_offset(element, "t");
+  object.z_offset = read_height(element, "zOffset");
+  object.heading = element.number_in("hdg", -1e3, 1e3, 0);
+  object.length = element.number_in("length", 0, kMaxSize_m, 0);
+  object.width = element.number_in("width", 0, kMaxSize_m, 0);
+  object.outline = read_outline(element, road_length);
+  return object;
+}
+
+/// The object once, or at every place of its <repeat> elements, changing linearly along each.
+std::vector<FileObject> repeated(const Element& element, const FileObject& object, double road_length) {
+  std::vector<FileObject> copies;
+  element.each("repeat", [&](const Element& repeat) {
+    const double begin = repeat.number_in("s", 0, road_length);
+    const double length = repeat.number_in("length", 0, road_length + kOverhang_m);
+    const double distance = repeat.number_in("distance", 0, kMaxRoadLength_m);
+    if (distance < kMinRepeat_m) {
+      repeat.fail("attribute distance: expected at least {} m (continuous objects are not supported), got {}",
+                  kMinRepeat_m, distance);
+    }
+    for (const FileObject::Corner& corner : object.outline) {
+      if (corner.along_road) repeat.fail("objects with <cornerRoad> cannot be repeated");
+    }
+    auto between = [&](const char* start, const char* end, double fallback, double u) {
+      const double a = repeat.number_in(start, -kMaxOffset_m, kMaxOffset_m, fallback);
+      return a + u * (repeat.number_in(end, -kMaxOffset_m, kMaxOffset_m, a) - a);
+    };
+    for (int i = 0; i * distance <= length + kStationTolerance_m; ++i) {
+      const double u = length > 0 ? std::min(1.0, i * distance / length) : 0;
+      FileObject copy = object;
+      copy.s = std::min(begin + i * distance, road_length);
+      copy.t = between("tStart", "tEnd", object.t, u);
+      copy.z_offset = between("zOffsetStart", "zOffsetEnd", object.z_offset, u);
+      copy.width = between("widthStart", "widthEnd", object.width, u);
+      copy.length = between("lengthStart", "lengthEnd", object.length, u);
+      copies.push_back(std::move(copy));
+    }
+  });
+  if (copies.empty()) copies.push_back(object);
+  return copies;
+}
+
+Orientation read_orientation(const Element& element) {
+  const std::string text = element.text("orientation", "none");
+  if (text == "+") return Orientation::along;
+  if (text == "-") return Orientation::against;
+  if (text == "none") return Orientation::either;
+  element.fail("attribute orientation: expected +, - or none, got '{}'", text);
+}
+
+std::vector<LaneRange> read_validity(const Element& element) {
+  std::vector<LaneRange> ranges;
+  element.each("validity", [&](const Element& validity) {
+    ranges.push_back({validity.integer("fromLane"), validity.integer("toLane")});
+  });
+  return ranges;
+}
+
+FileSignal read_signal(const Element& element, double road_length) {
+  FileSignal signal;
+  signal.where = element.where();
+  signal.id = element.text("id");
+  signal.type = element.text("type", "");
+  signal.subtype = element.text("subtype", "");
+  signal.country = element.text("country", "");
+  signal.name = element.text("name", "");
+  signal.is_dynamic = element.text("dynamic", "no") == "yes";
+  signal.s = read_station(element, road_length);
+  signal.t = read_offset(element, "t");
+  signal.z_offset = read_height(element, "zOffset");
+  signal.heading_offset = element.number_in("hOffset", -1e3, 1e3, 0);
+  signal.orientation = read_orientation(element);
+  signal.validity = read_validity(element);
+  return signal;
+}
+
+}  // namespace
+
+void read_objects(const Element& road_element, Faults* faults, FileRoad* road) {
   const Element objects = road_element.child("objects");
   if (!objects) return;
   objects.each("object", [&](const Element& element) {
-    FileObject object;
-    object.type = element.text("type", "none");
-    if (object.type != "crosswalk" && object.type != "parking" && object.type != "parkingSpace") return;
-    object.where = element.where();
-    object.s = element.number_in("s", -kMaxRoadLength_m, kMaxRoadLength_m);
-    object.t = element.number_in("t", -kMaxRoadLength_m, kMaxRoadLength_m);
-    object.z_offset = element.number("zOffset", 0);
-    object.heading = element.number("hdg", 0);
-    object.length = element.number("length", 0);
-    object.width = element.number("width", 0);
-    Element outline = element.child("outline");
-    if (!outline) {
-      if (const Element outlines = element.child("outlines")) outline = outlines.child("outline");
-    }
-    if (outline) {
-      outline.each_child([&](const Element& corner) {
-        if (corner.name() == "cornerLocal") {
-          object.outline.push_back({corner.number("u"), corner.number("v"), corner.number("z", 0), false});
-        } else if (corner.name() == "cornerRoad") {
-          object.outline.push_back({corner.number("s"), corner.number("t"), corner.number("dz", 0), true});
-        }
-      });
-    }
-    road->objects.push_back(std::move(object));
+    faults->attempt([&] {
+      const std::optional<FileObject::Kind> kind = kind_of(element);
+      if (!kind) return;
+      for (FileObject& copy : repeated(element, read_object(element, *kind, road->length), road->length)) {
+        road->objects.push_back(std::move(copy));
+      }
+    });
   });
 }
 
-void read_signals(const Element& road_element, FileRoad* road) {
+void read_signals(const Element& road_element, Faults* faults, FileRoad* road) {
   const Element signals = road_element.child("signals");
   if (!signals) return;
   signals.each("signal", [&](const Element& element) {
-    FileSignal signal;
-    signal.where = element.where();
-    signal.id = element.text("id");
-    signal.type = element.text("type", "");
-    signal.s = element.number_in("s", -kMaxRoadLength_m, kMaxRoadLength_m);
-    signal.t = element.number_in("t", -kMaxRoadLength_m, kMaxRoadLength_m);
-    signal.z_offset = element.number("zOffset", 0);
-    road->signals.push_back(std::move(signal));
+    faults->attempt([&] { road->signals.push_back(read_signal(element, road->length)); });
   });
   signals.each("signalReference", [&](const Element& element) {
-    SignalReference reference;
-    reference.where = element.where();
-    reference.signal = element.text("id");
-    reference.s = element.number_in("s", -kMaxRoadLength_m, kMaxRoadLength_m);
-    bool any = false;
-    element.each("validity", [&](const Element& validity) {
-      reference.from_lane = validity.integer("fromLane");
-      reference.to_lane = validity.integer("toLane");
-      road->signal_references.push_back(reference);
-      any = true;
+    faults->attempt([&] {
+      road->signal_references.push_back({element.text("id"), read_station(element, road->length),
+                                         element.number("t", 0), read_orientation(element), read_validity(element),
+                                         element.where()});
     });
-    if (!any) road->signal_references.push_back(reference);
   });
 }
 

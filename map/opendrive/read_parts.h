@@ -1,26 +1,32 @@
-// The parts of read_network: one function for each part of a road, in files of their own.
+// The parts of read_network: one function for each part of a road, in files of their own. Whatever can be left out by
+// itself when it is faulty is read in a Faults::attempt.
 #pragma once
 
 #include "pictura/map/opendrive/element.h"
+#include "pictura/map/opendrive/faults.h"
 
 namespace pictura::opendrive {
 
 inline constexpr double kMaxRoadLength_m = 1e5;
+inline constexpr double kMaxOffset_m = 1e4, kMaxHeight_m = 1e4;
 
-/// <planView> and <elevationProfile>: the reference line. Needs the road's length.
+/// <planView>, <elevationProfile> and <lateralProfile>: the reference line and its heights. Needs the road's length.
 void read_reference_line(const Element& road_element, FileRoad* road);
 
 /// <lanes>: offset, sections, lanes with their marks.
-void read_lanes(const Element& road_element, FileRoad* road);
+void read_lanes(const Element& road_element, Faults* faults, FileRoad* road);
 
-/// <objects> and <signals>.
-void read_objects(const Element& road_element, FileRoad* road);
-void read_signals(const Element& road_element, FileRoad* road);
+/// The <roadMark> elements of a lane whose section has the given length.
+std::vector<RoadMark> read_marks(const Element& lane_element, double section_length, Faults* faults);
+
+/// <objects> and <signals>. Need the road's length.
+void read_objects(const Element& road_element, Faults* faults, FileRoad* road);
+void read_signals(const Element& road_element, Faults* faults, FileRoad* road);
 
 /// <link> of a road, <junction> and <controller>.
-void read_road_links(const Element& road_element, FileRoad* road);
-FileJunction read_junction(const Element& element);
-FileController read_controller(const Element& element);
+void read_road_links(const Element& road_element, Faults* faults, FileRoad* road);
+FileJunction read_junction(const Element& element, Faults* faults);
+FileController read_controller(const Element& element, Faults* faults);
 
 /// The attributes max and unit of a <speed>, in m/s; 0 where there is no limit.
 double read_speed_mps(const Element& element);

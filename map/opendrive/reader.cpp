@@ -1,14 +1,49 @@
 #include "pictura/map/opendrive/reader.h"
 
-#include <pugixml.hpp>
+#include <cmath>
 
+#include "pictura/map/opendrive/document.h"
+#include "pictura/map/opendrive/extent.h"
 #include "pictura/map/opendrive/read_parts.h"
 
 namespace pictura::opendrive {
 
 namespace {
 
-FileRoad read_road(const Element& element) {
+/// What the header adds to the file's coordinates: a turn about the origin, then a shift.
+struct Offset {
+  double x = 0, y = 0, z = 0, heading = 0;
+};
+
+Offset read_header(const Element& header, std::string* geo_reference_out) {
+  if (!header) return {};
+  if (const Element reference = header.child("geoReference")) *geo_reference_out = reference.content();
+  const Element offset = header.child("offset");
+  if (!offset) return {};
+  return {offset.number_in("x", -1e8, 1e8), offset.number_in("y", -1e8, 1e8),
+          offset.number_in("z", -kMaxHeight_m, kMaxHeight_m, 0), offset.number_in("hdg", -1e3, 1e3, 0)};
+}
+
+void apply(const Offset& offset, FileRoad* road) {
+  const double c = std::cos(offset.heading), s = std::sin(offset.heading);
+  for (GeometryPiece& piece : road->geometry) {
+    const double x = piece.x, y = piece.y;
+    piece.x = offset.x + x * c - y * s;
+    piece.y = offset.y + x * s + y * c;
+    piece.heading += offset.heading;
+  }
+  if (offset.z == 0) return;
+  if (road->elevation.cubics.empty()) road->elevation.cubics.push_back({});
+  for (Cubic& cubic : road->elevation.cubics) cubic.a += offset.z;
+}
+
+bool is_left_hand(const Element& road_element) {
+  const std::string rule = road_element.text("rule", "RHT");
+  if (rule != "RHT" && rule != "LHT") road_element.fail("attribute rule: expected RHT or LHT, got '{}'", rule);
+  return rule == "LHT";
+}
+
+FileRoad read_road(const Element& element, const Offset& offset, Faults* faults) {
   FileRoad road;
   road.where = element.where();
   road.id = element.text("id");
@@ -16,18 +51,35 @@ FileRoad read_road(const Element& element) {
   if (road.length == 0) element.fail("attribute length: expected more than 0");
   const std::string junction = element.text("junction", "-1");
   if (junction != "-1") road.junction = junction;
-  if (element.text("rule", "RHT") != "RHT") element.fail("attribute rule: only right-hand traffic (RHT) is supported");
-  read_road_links(element, &road);
+  road.left_hand = is_left_hand(element);
+  read_road_links(element, faults, &road);
   element.each("type", [&](const Element& type) {
-    const Element speed = type.child("speed");
-    road.speed_limit_mps.cubics.push_back(
-        {.s = type.number_in("s", 0, road.length), .a = speed ? read_speed_mps(speed) : 0});
+    faults->attempt([&] {
+      const Element speed = type.child("speed");
+      append_cubic(type, {.s = type.number_in("s", 0, road.length), .a = speed ? read_speed_mps(speed) : 0},
+                   &road.speed_limit_mps);
+    });
   });
   read_reference_line(element, &road);
-  read_lanes(element, &road);
-  read_objects(element, &road);
-  read_signals(element, &road);
+  read_lanes(element, faults, &road);
+  read_objects(element, faults, &road);
+  read_signals(element, faults, &road);
+  apply(offset, &road);
+  check_extent(faults, &road);
   return road;
+}
+
+/// Appends `item`, which must be the only one of its id.
+template <typename Item>
+void append(Item item, const Element& element, std::vector<Item>* items, std::unordered_map<std::string, int>* index) {
+  if (!index->emplace(item.id, static_cast<int>(items->size())).second) {
+    element.fail("attribute id: another {} has it already", element.name());
+  }
+  items->push_back(std::move(item));
+}
+
+Element owned(const Element& element) {
+  return element.with_owner(fmt::format("{} {}", element.name(), element.text("id")));
 }
 
 }  // namespace
@@ -43,39 +95,36 @@ double read_speed_mps(const Element& element) {
   element.fail("attribute unit: expected m/s, km/h or mph, got '{}'", unit);
 }
 
-void read_network(std::string_view text, const std::string& source_name, Network* network_out) {
+void read_network(std::string_view text, const std::string& source_name, Faults* faults, Network* network_out) {
   Network& network = *network_out;
   network = Network();
   network.source = Source(source_name, text);
   pugi::xml_document document;
-  const pugi::xml_parse_result parsed =
-      document.load_buffer(text.data(), text.size(), pugi::parse_default, pugi::encoding_utf8);
-  if (!parsed) {
-    pictura::fail("{}:{}: expected well-formed XML: {}", source_name, network.source.line_at(parsed.offset),
-                  parsed.description());
-  }
+  read_document(text, network.source, &document);
   const Element root(document.child("OpenDRIVE"), &network.source, "file");
   if (!root) {
     pictura::fail("{}: expected OpenDRIVE, got an XML file whose root is <{}>", source_name,
                   document.document_element().name());
   }
+  if (const Element include = root.child("include")) include.fail("files of several parts are not supported");
+  Offset offset;
+  faults->attempt([&] { offset = read_header(root.child("header"), &network.geo_reference); });
   root.each("road", [&](const Element& element) {
-    const Element road = element.with_owner(fmt::format("road {}", element.text("id")));
-    network.roads.push_back(read_road(road));
-    if (!network.road_index.emplace(network.roads.back().id, static_cast<int>(network.roads.size()) - 1).second) {
-      road.fail("attribute id: another road has it already");
-    }
+    faults->attempt([&] {
+      const Element road = owned(element);
+      append(read_road(road, offset, faults), road, &network.roads, &network.road_index);
+    });
   });
-  if (network.roads.empty()) root.fail("expected at least one <road> in it, found none");
+  if (network.roads.empty()) root.fail("expected at least one sound <road> in it, found none");
   root.each("junction", [&](const Element& element) {
-    const Element junction = element.with_owner(fmt::format("junction {}", element.text("id")));
-    network.junctions.push_back(read_junction(junction));
-    const int index = static_cast<int>(network.junctions.size()) - 1;
-    if (!network.junction_index.emplace(network.junctions.back().id, index).second) {
-      junction.fail("attribute id: another junction has it already");
-    }
+    faults->attempt([&] {
+      const Element junction = owned(element);
+      append(read_junction(junction, faults), junction, &network.junctions, &network.junction_index);
+    });
   });
-  root.each("controller", [&](const Element& element) { network.controllers.push_back(read_controller(element)); });
+  root.each("controller", [&](const Element& element) {
+    faults->attempt([&] { network.controllers.push_back(read_controller(element, faults)); });
+  });
 }
 
 }  // namespace pictura::opendrive

@@ -25,15 +25,15 @@ constexpr double kAnyLevel_m = 1e9;
 
 SurfaceBand lane_band(Build* build, const FileRoad& road, const FileSection& section, const FileLane& lane,
                       double chord_error_m) {
-  const int left = lane.id > 0 ? lane.id : lane.id + 1, right = lane.id > 0 ? lane.id - 1 : lane.id;
-  auto border = [&](int which, double s) {
-    const Point3 p = point_at(road, s, border_t(road, section, which, s));
+  const double left = lane.id > 0 ? 1 : 0, right = 1 - left;  // shares of the way outwards
+  auto border = [&](double outer_share, double s) {
+    const Point3 p = point_on_lane(road, section, lane, s, outer_share);
     return Point3{p.x - build->map->origin_m[0], p.y - build->map->origin_m[1], p.z - build->map->origin_m[2]};
   };
   // Both borders get the same stations, the union of what either needs.
   const std::vector<double> breaks = formula_changes(road, section, lane.id, section.s, section.end);
   std::vector<double> stations;
-  for (const int which : {left, right}) {
+  for (const double which : {left, right}) {
     const std::vector<CurvePoint> points =
         sample_curve(breaks, chord_error_m, kBandPiece_m, &build->budget, [&](double s) {
           const Point3 p = border(which, s);
@@ -53,19 +53,20 @@ SurfaceBand lane_band(Build* build, const FileRoad& road, const FileSection& sec
   return band;
 }
 
+/// One band for each wanted lane of the map; `roads_out`, unless null, gets the road of each.
 template <typename Wanted>
-std::vector<SurfaceBand> lane_bands(Build* build, double chord_error_m, Wanted&& wanted) {
+std::vector<SurfaceBand> lane_bands(Build* build, double chord_error_m, std::vector<int32_t>* roads_out,
+                                    Wanted&& wanted) {
   std::vector<SurfaceBand> bands;
-  for (const FileRoad& road : build->network.roads) {
-    for (const FileSection& section : road.sections) {
-      for (const std::vector<FileLane>* side : {&section.left, &section.right}) {
-        for (const FileLane& lane : *side) {
-          if (!wanted(lane)) continue;
-          SurfaceBand band = lane_band(build, road, section, lane, chord_error_m);
-          if (band.left.size() >= 2) bands.push_back(std::move(band));
-        }
-      }
-    }
+  for (std::size_t i = 0; i < build->map->lanes.size(); ++i) {
+    const int32_t road = build->map->lanes[i].source_road;
+    const auto [section, lane] = build->file_lanes[i];
+    if (!wanted(*lane)) continue;
+    SurfaceBand band =
+        lane_band(build, build->network.roads[static_cast<std::size_t>(road)], *section, *lane, chord_error_m);
+    if (band.left.size() < 2) continue;
+    bands.push_back(std::move(band));
+    if (roads_out) roads_out->push_back(road);
   }
   return bands;
 }
@@ -96,15 +97,20 @@ bool is_free(const Surface& surface, const Point3& a, const Point3& b) {
 }  // namespace
 
 void build_road_edges(Build* build) {
+  std::vector<int32_t> roads, bands_of_edges;
   const std::vector<SurfaceBand> bands =
-      lane_bands(build, kEdgeBandChordError_m, [](const FileLane& lane) { return is_drivable(lane.type); });
-  build->map->road_edges = outline_of(bands, build->options.chord_error_m);
+      lane_bands(build, kEdgeBandChordError_m, &roads, [](const FileLane& lane) { return is_drivable(lane.type); });
+  build->map->road_edges = outline_of(bands, build->options.chord_error_m, &bands_of_edges);
+  for (const int32_t band : bands_of_edges) {
+    build->map->provenance.road_edges.push_back({roads[static_cast<std::size_t>(band)], 0});
+  }
 }
 
 void build_building_lines(Build* build) {
-  const Surface surface(lane_bands(build, kLotBandChordError_m, [](const FileLane& lane) { return !lane.is_void; }),
+  const Surface surface(lane_bands(build, kLotBandChordError_m, nullptr, [](const FileLane&) { return true; }),
                         kAnyLevel_m);
-  for (const FileRoad& road : build->network.roads) {
+  for (std::size_t r = 0; r < build->network.roads.size(); ++r) {
+    const FileRoad& road = build->network.roads[r];
     if (!road.junction.empty()) continue;
     for (const FileSection& section : road.sections) {
       for (const int sign : {1, -1}) {
@@ -130,6 +136,7 @@ void build_building_lines(Build* build) {
             return Vec3{static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
           };
           build->map->building_lines.push_back({to_vec3(a), to_vec3(b)});
+          build->map->provenance.building_lines.push_back({static_cast<int32_t>(r), 0});
         }
       }
     }

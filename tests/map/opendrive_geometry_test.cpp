@@ -346,7 +346,7 @@ TEST(OpenDrivePaint, CrosswalksAndParkingSpacesStandWhereTheyShould) {
 TEST(OpenDriveLights, StopLineHeadPhaseAndLanesFollowFromTheReferences) {
   const std::string signals =
       R"(<signals><signal id="50" type="1000001" s="18" t="-5" zOffset="-0.5" orientation="+"/>)"
-      R"(<signal id="51" type="1000001" s="18" t="5" orientation="+"/>)"
+      R"(<signal id="51" type="1000001" s="18" t="5" orientation="+"><validity fromLane="0" toLane="0"/></signal>)"
       R"(<signalReference id="50" s="12" t="0" orientation="+"><validity fromLane="-2" toLane="-1"/></signalReference>)"
       R"(</signals>)";
   const std::string controllers = R"(<controller id="90" sequence="3"><control signalId="50"/></controller>)"

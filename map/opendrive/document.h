@@ -1,0 +1,16 @@
+// The XML document of an OpenDRIVE file, refused unless it is of a shape that is safe to read.
+#pragma once
+
+#include <string_view>
+
+#include <pugixml.hpp>
+
+#include "pictura/map/opendrive/model.h"
+
+namespace pictura::opendrive {
+
+/// Parses `text`. Throws Error naming source and line for anything but well-formed UTF-8 XML without a document type,
+/// nested at most 64 deep, with attributes of at most 64 KiB.
+void read_document(std::string_view text, const Source& source, pugi::xml_document* document_out);
+
+}  // namespace pictura::opendrive

@@ -1,0 +1,69 @@
+#include "pictura/map/opendrive/extent.h"
+
+#include <cmath>
+
+#include "pictura/map/opendrive/curves.h"
+#include "pictura/map/opendrive/read_parts.h"
+
+namespace pictura::opendrive {
+
+namespace {
+
+// Below this a width is taken for 0: what writers' rounding leaves of a lane that tapers off.
+constexpr double kWidthTolerance_m = 0.01;
+constexpr double kMaxBanking_rad = 0.5;
+// Between its stations everything is a cubic of s, and a cubic is within a small factor of its values at five places.
+constexpr int kProbes = 4;
+
+template <typename Probe>
+void at_probes(const std::vector<double>& stations, Probe&& probe) {
+  for (std::size_t i = 1; i < stations.size(); ++i) {
+    for (int k = 0; k <= kProbes; ++k) probe(stations[i - 1] + k * (stations[i] - stations[i - 1]) / kProbes);
+  }
+}
+
+void check_widths(const FileRoad& road, const FileSection& section, const FileLane& lane) {
+  at_probes(formula_changes(road, section, lane.id, section.s, section.end), [&](double s) {
+    const double ds = std::min(s, section.end - 1e-6) - section.s;
+    const double width =
+        lane.border.cubics.empty()
+            ? lane.width.value(ds)
+            : (lane.id > 0 ? 1 : -1) * (lane.border.value(ds) - border_t(road, section, inner_border(lane.id), s));
+    if (!(width >= -kWidthTolerance_m)) {
+      lane.where.fail("its width at s {:.3f} is {:.3f} m; expected at least 0", s, width);
+    }
+  });
+}
+
+void check_place(const FileRoad& road, const FileSection& section, int border, double s) {
+  const double t = border_t(road, section, border, s);
+  const double roll = road.superelevation.value(s);
+  const double fall = std::max(std::abs(road.left_crossfall.value(s)), std::abs(road.right_crossfall.value(s)));
+  if (!(std::abs(roll) <= kMaxBanking_rad && fall <= kMaxBanking_rad)) {
+    road.where.fail("at s {:.3f} it is banked by {} rad; expected at most {}", s, std::max(std::abs(roll), fall),
+                    kMaxBanking_rad);
+  }
+  const double z = point_at(road, s, t).z;
+  if (!(std::abs(t) <= kMaxOffset_m && std::abs(z) <= kMaxHeight_m)) {
+    road.where.fail("at s {:.3f} something lies {} m beside it at a height of {} m; expected at most {} and {} m", s, t,
+                    z, kMaxOffset_m, kMaxHeight_m);
+  }
+}
+
+}  // namespace
+
+void check_extent(Faults* faults, FileRoad* road) {
+  for (FileSection& section : road->sections) {
+    for (std::vector<FileLane>* side : {&section.left, &section.right}) {
+      for (FileLane& lane : *side) {
+        if (!faults->attempt([&] { check_widths(*road, section, lane); })) lane.is_void = true;
+      }
+    }
+    for (const int border : {static_cast<int>(section.left.size()), -static_cast<int>(section.right.size())}) {
+      at_probes(formula_changes(*road, section, border, section.s, section.end),
+                [&](double s) { check_place(*road, section, border, s); });
+    }
+  }
+}
+
+}  // namespace pictura::opendrive
