@@ -49,7 +49,7 @@ PICTURA_FIELDS(RoadMap, name, origin_m, geo_reference, road_names, lanes, lane_p
                marking_points, road_edges, crosswalks, outline_points, parking_spaces, stop_lines, signs, sign_lanes,
                lights, light_lanes, junctions, building_lines, facts, provenance)
 
-PICTURA_FIELDS(OpenDriveOptions, chord_error_m)
+PICTURA_FIELDS(OpenDriveOptions, chord_error_m, lenient)
 
 /// Where two maps first differ, in any bit, as a path like "lanes[3].length_m" or "lights: 8 and 9 of them"; empty when
 /// they are equal.

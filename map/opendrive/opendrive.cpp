@@ -15,7 +15,8 @@ constexpr std::size_t kMaxFile_bytes = std::size_t{1} << 29;
 
 }  // namespace
 
-RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options) {
+RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options,
+                        std::vector<std::string>* warnings_out) {
   PICTURA_CHECK(options.chord_error_m >= 1e-3f && options.chord_error_m <= 10.0f,
                 "OpenDRIVE options: expected a chord error in [0.001, 10] m, got {}", options.chord_error_m);
   opendrive::Faults faults(options.lenient);
@@ -39,12 +40,13 @@ RoadMap parse_opendrive(std::string_view text, const std::string& source, const 
   opendrive::build_building_lines(&build);
   opendrive::count_facts(&build);
   validate(map);
-  if (options.warnings) *options.warnings = faults.take_warnings();
+  if (warnings_out) *warnings_out = faults.take_warnings();
   return map;
 }
 
-RoadMap load_opendrive(const std::string& path, const OpenDriveOptions& options) {
-  return parse_opendrive(read_file(path, kMaxFile_bytes), path, options);
+RoadMap load_opendrive(const std::string& path, const OpenDriveOptions& options,
+                       std::vector<std::string>* warnings_out) {
+  return parse_opendrive(read_file(path, kMaxFile_bytes), path, options, warnings_out);
 }
 
 }  // namespace pictura

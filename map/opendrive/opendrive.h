@@ -11,17 +11,17 @@ namespace pictura {
 
 struct OpenDriveOptions {
   float chord_error_m = 0.02f;  // greatest distance of a sampled curve from the true one
-  // Faulty parts are left out where the rest makes a map without them, each with a message in `warnings`, instead of
-  // ending the reading.
-  bool lenient = false;
-  std::vector<std::string>* warnings = nullptr;
+  bool lenient = false;         // faulty parts are left out where the rest makes a map without them
 };
 
 /// Parses the text of an OpenDRIVE file. `source` names it in messages. Throws Error naming source, road, element and
-/// line for anything malformed.
-RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options = {});
+/// line for anything malformed; when lenient, `warnings_out` (unless null) gets a message of that kind for every part
+/// left out, and only what leaves no map throws.
+RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options = {},
+                        std::vector<std::string>* warnings_out = nullptr);
 
-/// Reads and parses a file.
-RoadMap load_opendrive(const std::string& path, const OpenDriveOptions& options = {});
+/// Reads and parses a file of at most 512 MiB.
+RoadMap load_opendrive(const std::string& path, const OpenDriveOptions& options = {},
+                       std::vector<std::string>* warnings_out = nullptr);
 
 }  // namespace pictura
