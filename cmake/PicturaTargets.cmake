@@ -39,7 +39,9 @@ target_compile_options(pictura_flags INTERFACE
   # The arithmetic contract: a product and a sum round twice on every device, and nothing is reordered.
   $<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off -fno-math-errno -fno-trapping-math>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_CPU_ARCH}>>:-march=${PICTURA_CPU_ARCH}>)
+set(PICTURA_IS_SANITIZED 0)  # for tests that time something
 if(PICTURA_SANITIZE)
+  set(PICTURA_IS_SANITIZED 1)
   target_compile_options(pictura_flags INTERFACE -fsanitize=${PICTURA_SANITIZE} -fno-omit-frame-pointer -g
     -fno-sanitize-recover=all)
   target_link_options(pictura_flags INTERFACE -fsanitize=${PICTURA_SANITIZE})
