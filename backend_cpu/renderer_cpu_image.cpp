@@ -1,6 +1,7 @@
 #include "pictura/backend_cpu/renderer_cpu_image.h"
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 
 namespace pictura {
@@ -8,13 +9,15 @@ namespace pictura {
 namespace {
 // Images are composited in bands of rows, so that the state of their pixels stays in the cache whatever their size.
 constexpr int kBandPixels = 1 << 14;
+constexpr int32_t kNone = -1;
 }  // namespace
 
 template <typename MakeFaces>
 void ImageDrawer::add_item(const RasterItem& item, MakeFaces&& make_faces) {
   ItemFaces faces;
-  make_faces(
-      [&](const Vec3* corners, int count, Rgb color) { add_face(setting_, corners, count, color, edges_, &faces); });
+  make_faces([&](const Vec3* corners, int count, const FacePlane& plane, Rgb color) {
+    add_face(setting_, corners, count, plane, color, edges_, &faces);
+  });
   if (faces.count == 0) return;
   items_.push_back(item);
   items_.back().box = faces.box;
@@ -65,8 +68,6 @@ void ImageDrawer::gather_lights() {
 
 void ImageDrawer::gather_strips() {
   const RasterGeometry& geometry = *request_.geometry;
-  float lowest_foot_m = kNoFoot_m;
-  for (const RasterItem& solid : items_) lowest_foot_m = min_of(lowest_foot_m, foot_of(solid));
   const float far_m = far_of(geometry.longest_strip_m);
   for_each_item(
       geometry.pieces.strip_grid, frustum_ground_box(setting_.camera, setting_.frustum, far_m),
@@ -74,9 +75,26 @@ void ImageDrawer::gather_strips() {
       [&](int32_t i) {
         const Strip& strip = geometry.pieces.strips[static_cast<std::size_t>(i)];
         if (!may_show(strip, setting_.camera, setting_.frustum, far_m)) return;
-        add_item(strip_item(setting_, strip, i, lowest_foot_m),
+        add_item(strip_item(setting_, strip, i),
                  [&](auto&& emit) { strip_faces(strip, setting_.camera, setting_.line_floor_px, emit); });
       });
+}
+
+void ImageDrawer::find_background() {
+  GroundHeights heights;
+  for (const RasterItem& item : items_) {
+    const Interval of_item = heights_of(item.extent);
+    if (item.extent.is_strip) {
+      heights.strips.low = min_of(heights.strips.low, of_item.low);
+      heights.strips.high = max_of(heights.strips.high, of_item.high);
+    } else {
+      heights.lowest_foot_m = min_of(heights.lowest_foot_m, of_item.low);
+    }
+  }
+  if (!ground_is_level(heights)) return;
+  for (RasterItem& item : items_) {
+    if (item.extent.is_strip) put_in_background(&item);
+  }
 }
 
 void ImageDrawer::sort_items() {
@@ -90,40 +108,78 @@ void ImageDrawer::sort_items() {
   };
   std::sort(order_.begin(), order_.end(), by_key);
   std::sort(foreground_.begin(), foreground_.end(), by_key);
+  const auto background = static_cast<std::ptrdiff_t>(order_.size());
+  find_hidings();
+  sort_foreground();
+  std::rotate(order_.begin(), order_.begin() + background, order_.end());
+}
 
-  // Pairwise order of what overlaps on screen, then a topological sort that takes the nearest of those that nothing is
-  // in front of any more; in a cycle, the nearest.
-  const std::size_t count = foreground_.size(), words = (count + 63) / 64;
-  is_before_.assign(count * words, 0);
+// Pairwise order of what meets on screen. A sweep over x finds the pairs whose boxes overlap.
+void ImageDrawer::find_hidings() {
+  const std::size_t count = foreground_.size();
+  hidings_.clear();
+  first_hiding_.assign(count, kNone);
   waiting_for_.assign(count, 0);
+  sweep_.clear();
   for (std::size_t i = 0; i < count; ++i) {
-    const RasterItem& a = items_[static_cast<std::size_t>(foreground_[i])];
-    for (std::size_t j = i + 1; j < count; ++j) {
-      const int first = order_on_screen(a, items_[static_cast<std::size_t>(foreground_[j])]);
-      if (first == 0) continue;
-      const std::size_t before = first < 0 ? i : j, after = first < 0 ? j : i;
-      is_before_[before * words + after / 64] |= uint64_t{1} << (after % 64);
-      ++waiting_for_[after];
+    sweep_.push_back({items_[static_cast<std::size_t>(foreground_[i])].box, static_cast<int32_t>(i)});
+  }
+  std::sort(sweep_.begin(), sweep_.end(),
+            [](const PlacedBox& a, const PlacedBox& b) { return a.box.x_begin < b.box.x_begin; });
+  for (std::size_t i = 0; i < count; ++i) {
+    const PlacedBox& a = sweep_[i];
+    for (std::size_t j = i + 1; j < count && sweep_[j].box.x_begin < a.box.x_end; ++j) {
+      const PlacedBox& b = sweep_[j];
+      if (a.box.y_begin >= b.box.y_end || b.box.y_begin >= a.box.y_end) continue;
+      const int32_t nearer = min_of(a.place, b.place), farther = max_of(a.place, b.place);
+      const int32_t order =
+          order_on_screen(items_[static_cast<std::size_t>(foreground_[static_cast<std::size_t>(nearer)])],
+                          items_[static_cast<std::size_t>(foreground_[static_cast<std::size_t>(farther)])],
+                          faces_.data(), edges_.at(0));
+      if (order == 0) continue;
+      const int32_t front = order < 0 ? nearer : farther, behind = order < 0 ? farther : nearer;
+      const int32_t weight = order < 0 ? -order : order;
+      int32_t& first = first_hiding_[static_cast<std::size_t>(front)];
+      hidings_.push_back({behind, weight, first});
+      first = static_cast<int32_t>(hidings_.size()) - 1;
+      waiting_for_[static_cast<std::size_t>(behind)] += weight;
     }
   }
-  const std::size_t background = order_.size();
-  constexpr int32_t kTaken = -1;
-  std::size_t first_left = 0;
+}
+
+// A topological sort that takes the nearest of those that nothing is in front of any more; in a cycle, the one of which
+// least is hidden by what is left.
+void ImageDrawer::sort_foreground() {
+  const std::size_t count = foreground_.size();
+  constexpr int64_t kTaken = -1;
+  ready_.clear();  // a heap of places, the nearest on top
+  for (std::size_t i = 0; i < count; ++i) {
+    if (waiting_for_[i] == 0) ready_.push_back(static_cast<int32_t>(i));
+  }
   for (std::size_t taken = 0; taken < count; ++taken) {
-    while (waiting_for_[first_left] == kTaken) ++first_left;
-    std::size_t next = first_left;
-    while (next < count && waiting_for_[next] != 0) ++next;
-    if (next == count) next = first_left;
-    order_.push_back(foreground_[next]);
-    waiting_for_[next] = kTaken;
-    for (std::size_t word = 0; word < words; ++word) {
-      for (uint64_t bits = is_before_[next * words + word]; bits != 0; bits &= bits - 1) {
-        int32_t& waiting = waiting_for_[64 * word + static_cast<std::size_t>(__builtin_ctzll(bits))];
-        if (waiting != kTaken) --waiting;
+    std::size_t next = 0;
+    if (!ready_.empty()) {
+      std::pop_heap(ready_.begin(), ready_.end(), std::greater<>());
+      next = static_cast<std::size_t>(ready_.back());
+      ready_.pop_back();
+    } else {
+      while (waiting_for_[next] == kTaken) ++next;
+      for (std::size_t i = next + 1; i < count; ++i) {
+        if (waiting_for_[i] != kTaken && waiting_for_[i] < waiting_for_[next]) next = i;
       }
     }
+    order_.push_back(foreground_[next]);
+    waiting_for_[next] = kTaken;
+    for (int32_t at = first_hiding_[next]; at != kNone; at = hidings_[static_cast<std::size_t>(at)].next) {
+      const Hiding& hiding = hidings_[static_cast<std::size_t>(at)];
+      int64_t& waiting = waiting_for_[static_cast<std::size_t>(hiding.behind)];
+      if (waiting == kTaken) continue;
+      waiting -= hiding.weight;
+      if (waiting > 0) continue;
+      ready_.push_back(hiding.behind);
+      std::push_heap(ready_.begin(), ready_.end(), std::greater<>());
+    }
   }
-  std::rotate(order_.begin(), order_.begin() + static_cast<std::ptrdiff_t>(background), order_.end());
 }
 
 void ImageDrawer::prepare(const ImageRequest& request) {
@@ -136,6 +192,7 @@ void ImageDrawer::prepare(const ImageRequest& request) {
   gather_walls();
   gather_lights();
   gather_strips();
+  find_background();
   sort_items();
 }
 

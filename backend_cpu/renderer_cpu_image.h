@@ -57,6 +57,17 @@ class ImageDrawer {
     std::vector<PolygonEdge> edges_;
   };
 
+  // That an item of the foreground is drawn before another.
+  struct Hiding {
+    int32_t behind, weight;  // which other, and order_on_screen's weight
+    int32_t next;            // the next of what the item hides, or -1
+  };
+
+  struct PlacedBox {
+    PixelBox box;
+    int32_t place;  // in foreground_
+  };
+
   // Adds a thing whose faces make_faces(emit) emits, unless none of them is in the image.
   template <typename MakeFaces>
   void add_item(const RasterItem& item, MakeFaces&& make_faces);
@@ -64,7 +75,10 @@ class ImageDrawer {
   void gather_walls();
   void gather_lights();
   void gather_strips();
+  void find_background();
   void sort_items();
+  void find_hidings();
+  void sort_foreground();
   template <typename Visit>
   void visit_pixels(const RasterItem& item, int y_begin, int y_end, Visit&& visit) const;
   void draw_planes(const ImageTarget& target) const;
@@ -74,10 +88,13 @@ class ImageDrawer {
   EdgePool edges_;
   std::vector<ScreenFace> faces_;
   std::vector<RasterItem> items_;
-  std::vector<int32_t> order_;        // items front to back
-  std::vector<int32_t> foreground_;   // items that need a pairwise order, nearest first
-  std::vector<uint64_t> is_before_;   // [foreground][words] bit j of row i: j is drawn before i
-  std::vector<int32_t> waiting_for_;  // how many items are still to be drawn before one
+  std::vector<int32_t> order_;       // items front to back
+  std::vector<int32_t> foreground_;  // items that need a pairwise order, nearest first
+  std::vector<PlacedBox> sweep_;     // [foreground]
+  std::vector<Hiding> hidings_;
+  std::vector<int32_t> first_hiding_;  // [foreground] the first in hidings_ of what an item hides, or -1
+  std::vector<int64_t> waiting_for_;   // [foreground] weight of what hides an item and is still to be drawn
+  std::vector<int32_t> ready_;         // of the foreground: what nothing hides that is still to be drawn
   std::vector<PixelState> pixels_;
 };
 

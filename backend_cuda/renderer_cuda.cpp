@@ -50,7 +50,8 @@ class ScratchBuffers {
   DeviceBuffer<RasterItem> items_;
   DeviceBuffer<ScreenFace> faces_;
   DeviceBuffer<PolygonEdge> edges_;
-  DeviceBuffer<int32_t> order_, foreground_, waiting_;
+  DeviceBuffer<int32_t> order_, foreground_;
+  DeviceBuffer<int64_t> waiting_;
 };
 
 // A map's looks in device memory.

@@ -13,8 +13,9 @@ struct BlockState {
   View view;
   int32_t world_begin, world_end, light_begin, light_end;
   int32_t num_items, num_faces, num_edges, num_background, num_foreground;
-  int32_t overflow, usable, next;
-  uint32_t lowest_foot;  // ordered_bits of a float
+  int32_t overflow, usable;
+  unsigned long long next;                        // of the items left, waiting weight and place of the one to draw
+  uint32_t lowest_foot, strips_low, strips_high;  // ordered_bits of floats
   double sums[kThreads];
 };
 
@@ -24,7 +25,7 @@ __device__ BlockState& block_state() {
   return *reinterpret_cast<BlockState*>(bytes);
 }
 
-// Floats as integers that sort alike, for atomicMin.
+// Floats as integers that sort alike, for atomicMin and atomicMax.
 __device__ uint32_t ordered_bits(float value) {
   const uint32_t bits = __float_as_uint(value);
   return bits & 0x80000000u ? ~bits : bits | 0x80000000u;
@@ -40,7 +41,8 @@ struct BlockScratch {
   RasterItem* items;
   ScreenFace* faces;
   PolygonEdge* edges;
-  int32_t *order, *foreground, *waiting;
+  int32_t *order, *foreground;
+  int64_t* waiting;
   int32_t max_items, max_faces, max_edges;
 };
 
@@ -75,8 +77,8 @@ struct FaceSink {
   const ImageSetting* setting;
   EdgePool pool;
   ItemFaces faces;
-  __device__ void operator()(const Vec3* corners, int count, Rgb color) {
-    add_face(*setting, corners, count, color, pool, &faces);
+  __device__ void operator()(const Vec3* corners, int count, const FacePlane& plane, Rgb color) {
+    add_face(*setting, corners, count, plane, color, pool, &faces);
   }
 };
 
@@ -163,13 +165,6 @@ __device__ void gather(BlockState* state, const BlockScratch& scratch, const Dra
       add(light_item(setting, head, i), [&](auto&& emit) { light_faces(head, light, setting.camera, emit); });
     }
   }
-  __syncthreads();
-  const int32_t solids = min_of(state->num_items, scratch.max_items);
-  for (int32_t i = lane; i < solids; i += kThreads) {
-    atomicMin(&state->lowest_foot, ordered_bits(foot_of(scratch.items[i])));
-  }
-  __syncthreads();
-  const float lowest_foot_m = from_ordered_bits(state->lowest_foot);
   const float strip_far_m = far_of(geometry.longest_strip_m);
   for_each_item(
       geometry.pieces.strip_grid, frustum_ground_box(setting.camera, setting.frustum, strip_far_m),
@@ -177,10 +172,34 @@ __device__ void gather(BlockState* state, const BlockScratch& scratch, const Dra
       [&](int32_t i) {
         const Strip& strip = geometry.pieces.strips[static_cast<size_t>(i)];
         if (!may_show(strip, setting.camera, setting.frustum, strip_far_m)) return;
-        add(strip_item(setting, strip, i, lowest_foot_m),
+        add(strip_item(setting, strip, i),
             [&](auto&& emit) { strip_faces(strip, setting.camera, setting.line_floor_px, emit); });
       },
       lane, kThreads);
+  __syncthreads();
+}
+
+// Tells strips of level ground from what needs a pairwise order. All threads of the block.
+__device__ void find_background(BlockState* state, const BlockScratch& scratch) {
+  const int lane = static_cast<int>(threadIdx.x);
+  for (int32_t i = lane; i < state->num_items; i += kThreads) {
+    const Extent& extent = scratch.items[i].extent;
+    const Interval heights = heights_of(extent);
+    if (extent.is_strip) {
+      atomicMin(&state->strips_low, ordered_bits(heights.low));
+      atomicMax(&state->strips_high, ordered_bits(heights.high));
+    } else {
+      atomicMin(&state->lowest_foot, ordered_bits(heights.low));
+    }
+  }
+  __syncthreads();
+  const GroundHeights heights{from_ordered_bits(state->lowest_foot),
+                              {from_ordered_bits(state->strips_low), from_ordered_bits(state->strips_high)}};
+  if (ground_is_level(heights)) {
+    for (int32_t i = lane; i < state->num_items; i += kThreads) {
+      if (scratch.items[i].extent.is_strip) put_in_background(&scratch.items[i]);
+    }
+  }
   __syncthreads();
 }
 
@@ -208,36 +227,41 @@ __device__ void sort_items(BlockState* state, const BlockScratch& scratch) {
     }
   }
   __syncthreads();
-  // How many items must be drawn before each; taking one lets go of those that it is in front of.
-  auto is_before = [&](int32_t first, int32_t second) {
-    const RasterItem& a = scratch.items[scratch.foreground[first]];
-    const RasterItem& b = scratch.items[scratch.foreground[second]];
-    return first < second ? order_on_screen(a, b) < 0 : order_on_screen(b, a) > 0;
+  // Weight of what must be drawn before each item; taking one lets go of what it is in front of.
+  auto weight_before = [&](int32_t first, int32_t second) {
+    const RasterItem& a = scratch.items[scratch.foreground[min_of(first, second)]];
+    const RasterItem& b = scratch.items[scratch.foreground[max_of(first, second)]];
+    const int32_t order = order_on_screen(a, b, scratch.faces, scratch.edges);
+    return max_of(first < second ? -order : order, 0);
   };
   for (int32_t i = lane; i < foreground; i += kThreads) {
-    int32_t waiting = 0;
-    for (int32_t j = 0; j < foreground; ++j) waiting += j != i && is_before(j, i);
+    int64_t waiting = 0;
+    for (int32_t j = 0; j < foreground; ++j) waiting += j != i ? weight_before(j, i) : 0;
     scratch.waiting[i] = waiting;
   }
-  constexpr int32_t kTaken = -1;
+  constexpr int64_t kTaken = -1;
+  constexpr int kPlaceBits = 24;
+  constexpr unsigned long long kNone = ~0ull;
   for (int32_t taken = 0; taken < foreground; ++taken) {
-    if (lane == 0) state->next = 2 * foreground;
+    if (lane == 0) state->next = kNone;
     __syncthreads();
-    // The nearest that nothing is in front of; in a cycle, the nearest.
-    int32_t best = 2 * foreground;
+    // The nearest that nothing is in front of; in a cycle, the one of which least is hidden.
+    unsigned long long best = kNone;
     for (int32_t i = lane; i < foreground; i += kThreads) {
-      const int32_t waiting = scratch.waiting[i];
-      if (waiting != kTaken) best = min_of(best, waiting == 0 ? i : foreground + i);
+      if (scratch.waiting[i] == kTaken) continue;
+      const unsigned long long candidate =
+          static_cast<unsigned long long>(scratch.waiting[i]) << kPlaceBits | static_cast<unsigned long long>(i);
+      best = candidate < best ? candidate : best;
     }
     atomicMin(&state->next, best);
     __syncthreads();
-    const int32_t next = state->next < foreground ? state->next : state->next - foreground;
+    const int32_t next = static_cast<int32_t>(state->next & ((1ull << kPlaceBits) - 1));
     for (int32_t i = lane; i < foreground; i += kThreads) {
       if (i == next) {
         scratch.order[taken] = scratch.foreground[next];
         scratch.waiting[i] = kTaken;
-      } else if (scratch.waiting[i] > 0 && is_before(next, i)) {
-        --scratch.waiting[i];
+      } else if (scratch.waiting[i] > 0) {
+        scratch.waiting[i] -= weight_before(next, i);
       }
     }
     __syncthreads();
@@ -251,7 +275,10 @@ __device__ bool prepare(BlockState* state, const BlockScratch& scratch, const Dr
   if (threadIdx.x == 0) {
     state->num_items = state->num_faces = state->num_edges = state->num_foreground = 0;
     state->overflow = 0;
-    state->lowest_foot = ordered_bits(kNoFoot_m);
+    const GroundHeights none;
+    state->lowest_foot = ordered_bits(none.lowest_foot_m);
+    state->strips_low = ordered_bits(none.strips.low);
+    state->strips_high = ordered_bits(none.strips.high);
     state->usable = set_view(state, task, view) ? 1 : 0;
     if (state->usable) {
       const PinholeCamera placed = place_camera(task.cameras[camera].camera, state->view);
@@ -262,6 +289,7 @@ __device__ bool prepare(BlockState* state, const BlockScratch& scratch, const Dr
   if (!state->usable) return false;
   gather(state, scratch, task);
   if (state->overflow) return false;
+  find_background(state, scratch);
   sort_items(state, scratch);
   return true;
 }

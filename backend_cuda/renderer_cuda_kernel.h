@@ -35,7 +35,7 @@ struct Scratch {
   PolygonEdge* edges = nullptr;
   int32_t* order = nullptr;       // [blocks][max_items] front to back
   int32_t* foreground = nullptr;  // [blocks][max_items] nearest first
-  int32_t* waiting = nullptr;     // [blocks][max_items] of the foreground
+  int64_t* waiting = nullptr;     // [blocks][max_items] of the foreground: weight of what is still in front
   int32_t blocks = 0, max_items = 0, max_faces = 0, max_edges = 0;
 };
 

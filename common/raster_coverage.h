@@ -77,7 +77,7 @@ PICTURA_HD inline Vec2 project(const PinholeCamera& camera, Vec3 p) {
 /// signs of a and b: two faces that share an edge split areas and samples between them exactly.
 struct PolygonEdge {
   float x0 = 0, y0 = 0;  // the upper end
-  float y1 = 0;          // the lower end's y
+  float x1 = 0, y1 = 0;  // the lower end
   float dx_dy = 0;       // 0 for level edges, which bound no area
   float dy_dx = 0;       // 0 for upright edges
   float a = 0, b = 0;    // inside: a * (x - x0) + b * (y - y0) >= 0
@@ -93,12 +93,28 @@ PICTURA_HD inline PolygonEdge make_edge(Vec2 from, Vec2 to) {
   PolygonEdge edge;
   edge.x0 = upper.x;
   edge.y0 = upper.y;
+  edge.x1 = lower.x;
   edge.y1 = lower.y;
   edge.dx_dy = dy > 0.0f ? dx / dy : 0.0f;
   edge.dy_dx = fabsf(dx) >= kUpright_px ? dy / dx : 0.0f;
   edge.a = downward ? -dy : dy;
   edge.b = downward ? dx : -dx;
   return edge;
+}
+
+/// The ends of an edge in the order in which a face is walked that has its inside to the right on screen.
+PICTURA_HD inline bool runs_downward(const PolygonEdge& edge) {
+  return edge.a < 0.0f || (edge.a == 0.0f && edge.b > 0.0f);
+}
+PICTURA_HD inline Vec2 edge_from(const PolygonEdge& edge) {
+  return runs_downward(edge) ? Vec2{edge.x0, edge.y0} : Vec2{edge.x1, edge.y1};
+}
+PICTURA_HD inline Vec2 edge_to(const PolygonEdge& edge) {
+  return runs_downward(edge) ? Vec2{edge.x1, edge.y1} : Vec2{edge.x0, edge.y0};
+}
+/// Distance of a point from an edge, positive inside, in multiples of the edge's length.
+PICTURA_HD inline float inner_distance(const PolygonEdge& edge, Vec2 p) {
+  return edge.a * (p.x - edge.x0) + edge.b * (p.y - edge.y0);
 }
 
 /// Pixels that a polygon may touch: half-open ranges within the image.
@@ -119,15 +135,17 @@ struct ScreenFace {
   int32_t edge_begin = 0, edge_count = 0;
   PixelBox box;
   Rgb color;
-  // Inverse depth at a point of the screen, clamped to what the face's corners have.
+  // Inverse depth at a point of the screen, and its range over the face's corners.
   float inverse_depth_x = 0, inverse_depth_y = 0, inverse_depth_0 = 0;
   float inverse_depth_low = 0, inverse_depth_high = 0;
+  float plane_distance_m = 0;  // from the camera to the face's plane
 };
 
-/// Projects a clipped face (camera coordinates). Writes its edges to edges_out (room for `count`) and all of face_out
-/// but edge_begin. False where it covers nothing.
-PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Vec3* polygon, int count, Rgb color,
-                                        PolygonEdge* edges_out, ScreenFace* face_out) {
+/// Projects a clipped face (camera coordinates), which lies in `plane`. Writes its edges to edges_out (room for
+/// `count`) and all of face_out but edge_begin. False where it covers nothing.
+PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Vec3* polygon, int count,
+                                        const FacePlane& plane, Rgb color, PolygonEdge* edges_out,
+                                        ScreenFace* face_out) {
   Vec2 corner[kMaxPolygonCorners];
   Vec2 low{1e30f, 1e30f}, high{-1e30f, -1e30f};
   float depth_low = 1e30f, depth_high = 0.0f;
@@ -156,29 +174,32 @@ PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Vec3*
   face_out->box = box;
   face_out->color = color;
 
-  // n . p = n . p0 on the face's plane, and p = depth * ray: inverse depth is linear in the ray.
-  Vec3 normal{};
-  for (int i = 1; i + 1 < count; ++i) normal = normal + cross(polygon[i] - polygon[0], polygon[i + 1] - polygon[0]);
-  const float offset = dot(normal, polygon[0]);
-  const float scale = offset != 0.0f ? 1.0f / offset : 0.0f;
-  face_out->inverse_depth_x = normal.x * scale / camera.focal_x_px;
-  face_out->inverse_depth_y = normal.y * scale / camera.focal_y_px;
-  face_out->inverse_depth_0 = normal.z * scale - face_out->inverse_depth_x * camera.center_x_px -
+  // normal . p = offset on the face's plane, and p = depth * ray: inverse depth is linear in the ray.
+  const float scale = plane.offset != 0.0f ? 1.0f / plane.offset : 0.0f;
+  face_out->inverse_depth_x = plane.normal.x * scale / camera.focal_x_px;
+  face_out->inverse_depth_y = plane.normal.y * scale / camera.focal_y_px;
+  face_out->inverse_depth_0 = plane.normal.z * scale - face_out->inverse_depth_x * camera.center_x_px -
                               face_out->inverse_depth_y * camera.center_y_px;
+  const float norm = length(plane.normal);
+  face_out->plane_distance_m = norm > 0.0f ? fabsf(plane.offset) / norm : 0.0f;
   face_out->inverse_depth_low = 1.0f / depth_high;
   face_out->inverse_depth_high = 1.0f / depth_low;
   return true;
 }
 
-/// Depth (camera z) of a face at a point of the screen.
+/// 1 / depth of a face's plane at a point of the screen; negative where the plane is behind the camera.
+PICTURA_HD inline float inverse_depth(const ScreenFace& face, Vec2 at_px) {
+  return face.inverse_depth_0 + face.inverse_depth_x * at_px.x + face.inverse_depth_y * at_px.y;
+}
+
+/// Depth (camera z) of a face at a point of the screen, within the depths of its corners.
 PICTURA_HD inline float face_depth_m(const ScreenFace& face, float x_px, float y_px) {
-  const float inverse = face.inverse_depth_0 + face.inverse_depth_x * x_px + face.inverse_depth_y * y_px;
-  return 1.0f / clamp(inverse, face.inverse_depth_low, face.inverse_depth_high);
+  return 1.0f / clamp(inverse_depth(face, {x_px, y_px}), face.inverse_depth_low, face.inverse_depth_high);
 }
 
 PICTURA_HD inline bool covers_point(const PolygonEdge* edges, int count, float x_px, float y_px) {
   for (int i = 0; i < count; ++i) {
-    if (edges[i].a * (x_px - edges[i].x0) + edges[i].b * (y_px - edges[i].y0) < 0.0f) return false;
+    if (inner_distance(edges[i], {x_px, y_px}) < 0.0f) return false;
   }
   return true;
 }

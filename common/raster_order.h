@@ -1,18 +1,17 @@
-// Which of two things is in front: the one on the camera's side of a plane that separates them. Solids are upright
-// prisms, so planes through their sides and level planes decide; strips add the plane that they lie in. Everything is
-// relative to the camera, which is the origin. Shared by both devices.
+// Which of two things is in front. Of two convex things that do not intersect, one is on the camera's side of a plane
+// that separates them, and so is nearer wherever both are seen: the middle of what their faces share on screen decides.
+// Shared by both devices.
 #pragma once
 
+#include "pictura/common/raster_coverage.h"
 #include "pictura/common/raster_shapes.h"
 
 namespace pictura {
 
-/// What a thing occupies: corners in the ground plane, each with the heights of its lower end; prisms reach up by
-/// height_m from there, strips have no height.
+/// What a thing covers of the ground, relative to the camera: corners with the heights of its lower end.
 struct Extent {
   Vec2 corner[4];
   float low_m[4] = {};
-  float height_m = 0;
   int32_t corners = 0;
   bool is_strip = false;
   uint32_t rank = 0;  // of strips: the lower is painted over the higher where they overlap on one level
@@ -29,7 +28,6 @@ PICTURA_HD inline Extent agent_extent(const AgentBox& box, Vec3 eye_m) {
   extent.corner[2] = center.xy() - along - across;
   extent.corner[3] = center.xy() + along - across;
   for (float& low : extent.low_m) low = center.z;
-  extent.height_m = box.height_m;
   return extent;
 }
 
@@ -40,7 +38,6 @@ PICTURA_HD inline Extent wall_extent(const WallFace& wall, Vec3 eye_m) {
   extent.corner[1] = wall.b_m.xy() - eye_m.xy();
   extent.low_m[0] = wall.a_m.z - eye_m.z;
   extent.low_m[1] = wall.b_m.z - eye_m.z;
-  extent.height_m = wall.height_m;
   return extent;
 }
 
@@ -52,7 +49,6 @@ PICTURA_HD inline Extent light_extent(const LightHead& head, Vec3 eye_m) {
   extent.corner[0] = center.xy() + left;
   extent.corner[1] = center.xy() - left;
   extent.low_m[0] = extent.low_m[1] = center.z - kLightRadius_m;
-  extent.height_m = 2.0f * kLightRadius_m;
   return extent;
 }
 
@@ -93,116 +89,116 @@ PICTURA_HD inline float nearest_distance2(const Extent& e) {
 }
 
 struct Interval {
-  float low = 0, high = 0;
+  float low = 1e30f, high = -1e30f;
 };
 
-PICTURA_HD inline Interval project_on(const Extent& e, Vec3 axis) {
-  Interval interval{1e30f, -1e30f};
-  const float up = axis.z * e.height_m;
+/// Heights of an extent's lower end above the camera.
+PICTURA_HD inline Interval heights_of(const Extent& e) {
+  Interval heights;
   for (int i = 0; i < e.corners; ++i) {
-    const float at = axis.x * e.corner[i].x + axis.y * e.corner[i].y + axis.z * e.low_m[i];
-    interval.low = min_of(interval.low, at + min_of(up, 0.0f));
-    interval.high = max_of(interval.high, at + max_of(up, 0.0f));
+    heights.low = min_of(heights.low, e.low_m[i]);
+    heights.high = max_of(heights.high, e.low_m[i]);
   }
-  return interval;
+  return heights;
 }
 
-/// What is known of two things: whether some separating plane shows that nothing hides the one or the other.
-struct Clearance {
-  bool a_is_free = false, b_is_free = false;  // b cannot hide a; a cannot hide b
+/// Whether two extents overlap on the ground plane: no side of either separates them. Touching is no overlap.
+PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
+  constexpr float kTouching_m = 1e-3f;
+  auto project = [](const Extent& e, Vec2 axis) {
+    Interval interval;
+    for (int i = 0; i < e.corners; ++i) {
+      interval.low = min_of(interval.low, dot(axis, e.corner[i]));
+      interval.high = max_of(interval.high, dot(axis, e.corner[i]));
+    }
+    return interval;
+  };
+  auto separated_by_side_of = [&](const Extent& e) {
+    for (int i = 0; i < e.corners; ++i) {
+      const Vec2 side = e.corner[i + 1 < e.corners ? i + 1 : 0] - e.corner[i];
+      const float norm = length(side);
+      if (norm < 1e-6f) continue;
+      const Vec2 axis = left_normal(side) * (1.0f / norm);
+      const Interval of_a = project(a, axis), of_b = project(b, axis);
+      if (min_of(of_a.high, of_b.high) - max_of(of_a.low, of_b.low) <= kTouching_m) return true;
+    }
+    return false;
+  };
+  return !separated_by_side_of(a) && !separated_by_side_of(b);
+}
+
+/// Whether a solid stands on a strip, which then lies behind it (see kStanding_m).
+PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip) {
+  auto corner = [](const Extent& e, int i) { return Vec3{e.corner[i].x, e.corner[i].y, e.low_m[i]}; };
+  Vec3 middle{};
+  for (int i = 0; i < solid.corners; ++i) middle = middle + corner(solid, i);
+  middle = middle * (1.0f / static_cast<float>(solid.corners));
+  const Vec3 normal = cross(corner(strip, 2) - corner(strip, 0), corner(strip, 3) - corner(strip, 1));
+  const float above_m = dot(normal, middle - corner(strip, 0));
+  return fabsf(above_m) <= kStanding_m * fabsf(normal.z) && overlap_on_ground(solid, strip);
+}
+
+/// What two faces share on screen.
+struct SharedRegion {
+  float area_px2 = 0;
+  Vec2 middle_px;  // mean of its corners
 };
 
-/// Adds what planes across `axis` say. Touching, and penetrating by at most tolerance_m, counts as apart.
-PICTURA_HD inline void look_across(Vec3 axis, const Extent& a, const Extent& b, float tolerance_m, Clearance* clear) {
-  const Interval ia = project_on(a, axis), ib = project_on(b, axis);
-  auto apart = [&](Interval lower, Interval upper, bool* lower_is_free, bool* upper_is_free) {
-    if (upper.low < lower.high - tolerance_m) return;
-    const float middle = 0.5f * (lower.high + upper.low);
-    // Any plane of the gap will do: the camera (0) is on the lower one's side of some if the gap's end is not below it.
-    if (max_of(upper.low, middle) >= 0.0f) *lower_is_free = true;
-    if (min_of(lower.high, middle) <= 0.0f) *upper_is_free = true;
-  };
-  apart(ia, ib, &clear->a_is_free, &clear->b_is_free);
-  apart(ib, ia, &clear->b_is_free, &clear->a_is_free);
-}
-
-PICTURA_HD inline void look_across_sides(const Extent& sides_of, const Extent& a, const Extent& b, Clearance* clear) {
-  constexpr float kTouching_m = 1e-3f;
-  auto look = [&](Vec2 normal) {
-    const float norm = length(normal);
-    if (norm < 1e-6f) return;
-    look_across({normal.x / norm, normal.y / norm, 0.0f}, a, b, kTouching_m, clear);
-  };
-  if (sides_of.corners == 2) {
-    const Vec2 along = sides_of.corner[1] - sides_of.corner[0];
-    look(left_normal(along));
-    look(along);
-    return;
+/// Whether some edge of a face has all of another on its outer side.
+PICTURA_HD inline bool is_outside(const PolygonEdge* edges, int count, const PolygonEdge* borders, int num_borders) {
+  for (int j = 0; j < num_borders; ++j) {
+    bool outside = true;
+    for (int i = 0; i < count && outside; ++i) outside = inner_distance(borders[j], edge_from(edges[i])) <= 0.0f;
+    if (outside) return true;
   }
-  // Boxes have two pairs of parallel sides; a strip's long sides are parallel and its mitred ends are not.
-  const int sides = sides_of.is_strip ? 3 : 2;
-  for (int i = 0; i < sides; ++i) look(left_normal(sides_of.corner[i + 1] - sides_of.corner[i]));
+  return false;
 }
 
-/// Normal of the plane that a strip lies in, upwards.
-PICTURA_HD inline Vec3 strip_normal(const Extent& strip) {
-  const Vec3 p0{strip.corner[0].x, strip.corner[0].y, strip.low_m[0]},
-      p1{strip.corner[1].x, strip.corner[1].y, strip.low_m[1]},
-      p2{strip.corner[2].x, strip.corner[2].y, strip.low_m[2]},
-      p3{strip.corner[3].x, strip.corner[3].y, strip.low_m[3]};
-  const Vec3 normal = cross(p2 - p0, p3 - p1);
-  const float norm = length(normal);
-  if (norm < 1e-9f) return {0.0f, 0.0f, 1.0f};
-  return normal * ((normal.z < 0.0f ? -1.0f : 1.0f) / norm);
-}
-
-/// How far a solid's foot may dip below a strip that it stands on: upright boxes on slopes do.
-constexpr float kStanding_m = 0.5f;
-/// Strips whose planes are closer than this are one level, where rank decides.
-constexpr float kSameLevel_m = 0.05f;
-
-/// Which of two things must be drawn first, being in front: -1 a, 1 b, 0 neither hides the other. Where they intersect,
-/// a is (callers pass things in order of distance, then number), but for strips, which lie behind what stands on them.
-PICTURA_HD inline int order_of(const Extent& a, const Extent& b) {
-  Clearance clear;
-  look_across_sides(a, a, b, &clear);
-  look_across_sides(b, a, b, &clear);
-  if (clear.a_is_free && clear.b_is_free) return 0;
-  if (a.is_strip && b.is_strip) {
-    const Vec3 normal = strip_normal(a);
-    const Interval ia = project_on(a, normal), ib = project_on(b, normal);
-    const bool same_level = ib.low < ia.high + kSameLevel_m && ia.low < ib.high + kSameLevel_m;
-    if (same_level && !clear.a_is_free && !clear.b_is_free) return a.rank < b.rank ? -1 : 1;
-    if (!same_level) {
-      look_across({0.0f, 0.0f, 1.0f}, a, b, 0.0f, &clear);
-      look_across(normal, a, b, 0.0f, &clear);
-      look_across(strip_normal(b), a, b, 0.0f, &clear);
-    }
-  } else if (a.is_strip || b.is_strip) {
-    const Extent& strip = a.is_strip ? a : b;
-    const Extent& solid = a.is_strip ? b : a;
-    const Vec3 normal = strip_normal(strip);
-    const Interval plane = project_on(strip, normal), body = project_on(solid, normal);
-    const bool camera_above = 0.5f * (plane.low + plane.high) <= 0.0f;
-    if (body.low >= plane.low - kStanding_m) {
-      bool& upper_is_free = a.is_strip ? clear.b_is_free : clear.a_is_free;
-      bool& lower_is_free = a.is_strip ? clear.a_is_free : clear.b_is_free;
-      (camera_above ? upper_is_free : lower_is_free) = true;
-    } else {
-      look_across(normal, a, b, 0.0f, &clear);
-      look_across({0.0f, 0.0f, 1.0f}, a, b, 0.0f, &clear);
-    }
-    if (!clear.a_is_free && !clear.b_is_free) return (camera_above == a.is_strip) ? 1 : -1;
-  } else {
-    look_across({0.0f, 0.0f, 1.0f}, a, b, 0.0f, &clear);
+/// The border of the intersection of two convex faces consists of the parts of each one's edges that lie within the
+/// other: their ends give its middle, and Green's theorem its area. Where edges coincide they count twice.
+PICTURA_HD inline SharedRegion shared_region(const ScreenFace& a, const ScreenFace& b, const PolygonEdge* edges) {
+  const PolygonEdge *of_a = edges + a.edge_begin, *of_b = edges + b.edge_begin;
+  SharedRegion region;
+  if (is_outside(of_a, a.edge_count, of_b, b.edge_count) || is_outside(of_b, b.edge_count, of_a, a.edge_count)) {
+    return region;
   }
-  if (clear.a_is_free && clear.b_is_free) return 0;
-  return clear.b_is_free ? 1 : -1;
+  const Vec2 origin = edge_from(of_a[0]);  // near by, for precision
+  Vec2 sum{};
+  float twice_area = 0.0f;
+  int corners = 0;
+  auto add_parts = [&](const PolygonEdge* parts, int num_parts, const PolygonEdge* borders, int num_borders) {
+    for (int i = 0; i < num_parts; ++i) {
+      const Vec2 from = edge_from(parts[i]), to = edge_to(parts[i]);
+      float begin = 0.0f, end = 1.0f;
+      for (int j = 0; j < num_borders && begin < end; ++j) {
+        const float at_from = inner_distance(borders[j], from), at_to = inner_distance(borders[j], to);
+        if (at_from < 0.0f && at_to < 0.0f) end = 0.0f;
+        if (at_from < 0.0f)
+          begin = max_of(begin, at_from / (at_from - at_to));
+        else if (at_to < 0.0f)
+          end = min_of(end, at_from / (at_from - at_to));
+      }
+      if (begin >= end) continue;
+      const Vec2 p = from + (to - from) * begin - origin, q = from + (to - from) * end - origin;
+      sum = sum + p + q;
+      twice_area += cross(p, q);
+      corners += 2;
+    }
+  };
+  add_parts(of_a, a.edge_count, of_b, b.edge_count);
+  add_parts(of_b, b.edge_count, of_a, a.edge_count);
+  if (corners == 0) return region;
+  region.area_px2 = 0.5f * twice_area;
+  region.middle_px = origin + sum * (1.0f / static_cast<float>(corners));
+  return region;
 }
 
-/// A level strip below every foot and below the camera lies behind all solids and needs no pairwise test.
-PICTURA_HD inline bool lies_behind_all(float strip_high_m, float lowest_foot_m) {
-  return strip_high_m < 0.0f && strip_high_m <= lowest_foot_m + 0.3f;
+/// Whether two strips are of one level where a ray meets them: the nearer point is close to the other's plane. Takes
+/// the inverse depths along the ray and the camera's distances from the planes.
+PICTURA_HD inline bool of_one_level(float inverse_a, float distance_a_m, float inverse_b, float distance_b_m) {
+  const float nearer = max_of(inverse_a, inverse_b);
+  const float gap_m = fabsf(inverse_a - inverse_b) * (inverse_a < inverse_b ? distance_a_m : distance_b_m);
+  return gap_m < kSameLevel_m * nearer;
 }
 
 /// Key of the order in which the pairwise test takes things: nearest first, then by number.

@@ -16,6 +16,17 @@ constexpr int kLightSides = 24;
 /// Corners that a face may have before clipping.
 constexpr int kMaxFaceCorners = kLightSides;
 
+/// The plane that a face lies in, in camera coordinates: normal . p = offset. The normal's length is of no importance.
+struct FacePlane {
+  Vec3 normal;
+  float offset = 0;
+};
+PICTURA_HD inline FacePlane face_plane(const Vec3* corners, int count) {
+  Vec3 normal{};
+  for (int i = 1; i + 1 < count; ++i) normal = normal + cross(corners[i] - corners[0], corners[i + 1] - corners[0]);
+  return {normal, dot(normal, corners[0])};
+}
+
 /// Brightness of a face: the mean over its corners of their depth clamped to the visible range. A face that has faded
 /// to 0 is not drawn, and so hides nothing.
 PICTURA_HD inline float face_brightness(const Vec3* corners, int count) {
@@ -32,8 +43,8 @@ PICTURA_HD inline Rgb agent_face_color(const AgentBox& box, BoxFace face, bool d
   return {0.5f * (color.r + tint), 0.5f * (color.g + tint), 0.5f * (color.b + tint)};
 }
 
-/// Calls emit(corners, count, color) for each face of the box that is turned to the camera. The underside, seen from
-/// roads below a bridge, has the top's colour.
+/// Calls emit(corners, count, plane, color) for each face of the box that is turned to the camera. The underside, seen
+/// from roads below a bridge, has the top's colour.
 template <typename Emit>
 PICTURA_HD inline void agent_faces(const AgentBox& box, const PinholeCamera& camera, bool debug_palette, Emit&& emit) {
   const Vec2 ahead{box.cos_heading, box.sin_heading};
@@ -50,7 +61,8 @@ PICTURA_HD inline void agent_faces(const AgentBox& box, const PinholeCamera& cam
   auto face = [&](BoxFace name, int a, int b, int c, int d) {
     const Vec3 corners[4] = {corner[a], corner[b], corner[c], corner[d]};
     const float brightness = face_brightness(corners, 4);
-    if (brightness > 0.0f) emit(corners, 4, agent_face_color(box, name, debug_palette) * brightness);
+    if (brightness > 0.0f)
+      emit(corners, 4, face_plane(corners, 4), agent_face_color(box, name, debug_palette) * brightness);
   };
   const Vec2 from_center = camera.position_m.xy() - center;
   const float ahead_m = dot(from_center, ahead), left_m = cross(ahead, from_center);
@@ -69,7 +81,7 @@ PICTURA_HD inline void wall_faces(const WallFace& wall, const PinholeCamera& cam
   const Vec3 corners[4] = {to_camera(camera, wall.a_m), to_camera(camera, wall.b_m), to_camera(camera, wall.b_m + up),
                            to_camera(camera, wall.a_m + up)};
   const float brightness = face_brightness(corners, 4);
-  if (brightness > 0.0f) emit(corners, 4, wall.color * brightness);
+  if (brightness > 0.0f) emit(corners, 4, face_plane(corners, 4), wall.color * brightness);
 }
 
 /// Whether a camera at position_m is in front of the head and within its half-angle, seen on the ground plane.
@@ -98,7 +110,9 @@ PICTURA_HD inline void light_faces(const LightHead& head, LightState state, cons
     c = next_c;
   }
   const float brightness = face_brightness(corners, kLightSides);
-  if (brightness > 0.0f) emit(corners, kLightSides, light_color(state) * brightness);
+  if (brightness > 0.0f) {
+    emit(corners, kLightSides, face_plane(corners, kLightSides), light_color(state) * brightness);
+  }
 }
 
 /// The strip's four corners in the world: left of a, right of a, right of b, left of b.
@@ -164,17 +178,24 @@ PICTURA_HD inline bool widen_strip(const PinholeCamera& camera, float floor_px, 
   return true;
 }
 
-/// The strip's face, at least floor_px wide on screen.
+/// The strip's face, at least floor_px wide on screen, in the plane of the strip itself.
 template <typename Emit>
 PICTURA_HD inline void strip_faces(const Strip& strip, const PinholeCamera& camera, float floor_px, Emit&& emit) {
   Vec3 corners[4];
   strip_corners(strip, corners);
   for (int i = 0; i < 4; ++i) corners[i] = to_camera(camera, corners[i]);
   const float brightness = face_brightness(corners, 4);
-  if (brightness > 0.0f && widen_strip(camera, floor_px, corners)) emit(corners, 4, strip.color * brightness);
+  const FacePlane plane = face_plane(corners, 4);
+  if (brightness > 0.0f && widen_strip(camera, floor_px, corners)) emit(corners, 4, plane, strip.color * brightness);
 }
 
-/// Where strips overlap in one plane, the lower rank is painted over the higher.
+/// Strips that are closer than this are of one level: there rank decides, and not depth.
+constexpr float kSameLevel_m = 0.05f;
+/// A solid stands on a strip where its foot overlaps the strip on the ground plane and, in its middle, lies at most
+/// this far from the strip's plane: upright boxes dip into slopes.
+constexpr float kStanding_m = 0.5f;
+
+/// Where strips of one level overlap, the lower rank is painted over the higher.
 PICTURA_HD inline int strip_rank(StripKind kind) {
   switch (kind) {
     case StripKind::stop_line: return 0;

@@ -1,13 +1,12 @@
-// The shared coverage and order rules against brute force.
+// The shared coverage rules against brute force.
 #include <algorithm>
 #include <random>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "pictura/common/camera.h"
 #include "pictura/common/raster_coverage.h"
-#include "pictura/common/raster_order.h"
-#include "pictura/tests/support/image_scenes.h"
 
 namespace pictura {
 namespace {
@@ -189,77 +188,6 @@ TEST(Coverage, ClippingKeepsWhatIsInFront) {
   EXPECT_NEAR(nearest, 50.0f / 58.0f, 1e-5);
   const Vec3 behind[3] = {{0, 0, -1}, {1, 0, -1}, {0, 1, 0.05f}};
   EXPECT_EQ(clip_face(frustum, behind, 3, polygon), 0);
-}
-
-// Which of two extents is hit first along rays from the camera: -1 a, 1 b, 0 never both.
-int order_by_rays(const AgentBox& a, const AgentBox& b) {
-  auto enter = [](const AgentBox& box, Vec2 ray) {
-    const Vec2 ahead{box.cos_heading, box.sin_heading}, left = left_normal(ahead);
-    float from = 0, to = 1e9f;
-    for (const auto& [axis, half] : {std::pair{ahead, 0.5f * box.length_m}, std::pair{left, 0.5f * box.width_m}}) {
-      const float speed = dot(ray, axis), at = dot(box.center_m.xy(), axis);
-      float t0 = (at - half) / speed, t1 = (at + half) / speed;
-      if (t0 > t1) std::swap(t0, t1);
-      from = std::max(from, t0);
-      to = std::min(to, t1);
-    }
-    return from < to ? from : -1;
-  };
-  int verdict = 0;
-  for (int i = 0; i < 2000; ++i) {
-    const SinCos sc = sincos_of(kTwoPi * static_cast<float>(i) / 2000);
-    const float ta = enter(a, {sc.cos, sc.sin}), tb = enter(b, {sc.cos, sc.sin});
-    if (ta < 0 || tb < 0 || std::abs(ta - tb) < 1e-3f) continue;
-    verdict = ta < tb ? -1 : 1;
-  }
-  return verdict;
-}
-
-TEST(Order, OfDisjointBoxesIsWhatRaysSee) {
-  std::mt19937 random(4);
-  std::uniform_real_distribution<float> place(-20, 20), size(0.1f, 25), angle(-3, 3);
-  int compared = 0;
-  for (int round = 0; round < 3000; ++round) {
-    auto box = [&] {
-      return make_box(AgentClass::vehicle, {place(random), place(random), 0}, angle(random), {size(random), 0.2f, 2});
-    };
-    const AgentBox a = box(), b = box();
-    const Extent ea = agent_extent(a, {0, 0, 1}), eb = agent_extent(b, {0, 0, 1});
-    // Only disjoint pairs have an order.
-    Clearance apart;
-    look_across_sides(ea, ea, eb, &apart);
-    look_across_sides(eb, ea, eb, &apart);
-    if (!apart.a_is_free && !apart.b_is_free) continue;
-    if (nearest_distance2(ea) == 0 || nearest_distance2(eb) == 0) continue;
-    const int seen = order_by_rays(a, b);
-    if (seen == 0) continue;
-    ++compared;
-    ASSERT_EQ(order_of(ea, eb), seen) << round;
-    ASSERT_EQ(order_of(eb, ea), -seen) << round;
-  }
-  EXPECT_GT(compared, 300);
-}
-
-TEST(Order, OfLevelsIsByHeight) {
-  // A car on a bridge above a car, from below, from above, and from between the two.
-  const AgentBox low = make_box(AgentClass::vehicle, {20, 0, 0}, 0, {4, 2, 1.5f});
-  const AgentBox high = make_box(AgentClass::vehicle, {20, 0, 6}, 0, {4, 2, 1.5f});
-  for (const auto& [eye_z, expected] : {std::pair{1.0f, -1}, std::pair{10.0f, 1}, std::pair{4.0f, 0}}) {
-    EXPECT_EQ(order_of(agent_extent(low, {0, 0, eye_z}), agent_extent(high, {0, 0, eye_z})), expected) << eye_z;
-  }
-  // A strip under a car, and the strip of a bridge above it.
-  Strip ground;
-  ground.a_m = {10, 0, 0};
-  ground.b_m = {20, 0, 0};
-  ground.side_a = ground.side_b = {0, 1};
-  ground.width_m = 0.2f;
-  Strip bridge = ground;
-  bridge.a_m.z = bridge.b_m.z = 6;
-  const Vec3 eye{0, 0, 1.5f};
-  EXPECT_EQ(order_of(strip_extent(ground, 0, eye), agent_extent(low, eye)), 1);
-  // The bridge's marks and the car below it are seen apart from between, and the marks hide the car from above.
-  EXPECT_NE(order_of(strip_extent(bridge, 1, eye), agent_extent(low, eye)), -1);
-  EXPECT_EQ(order_of(strip_extent(bridge, 1, {0, 0, 12}), agent_extent(low, {0, 0, 12})), -1);
 }
 
 }  // namespace

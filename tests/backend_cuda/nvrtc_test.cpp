@@ -81,8 +81,8 @@ struct Sink {
   const ImageSetting* setting;
   Pool* pool;
   ItemFaces faces;
-  __device__ void operator()(const Vec3* corners, int count, Rgb color) {
-    add_face(*setting, corners, count, color, *pool, &faces);
+  __device__ void operator()(const Vec3* corners, int count, const FacePlane& plane, Rgb color) {
+    add_face(*setting, corners, count, plane, color, *pool, &faces);
   }
 };
 __global__ void kernel(const AgentBox* box, const Strip* strip, const PinholeCamera* camera, const View* view, float* out) {
@@ -93,13 +93,13 @@ __global__ void kernel(const AgentBox* box, const Strip* strip, const PinholeCam
   agent_faces(*box, placed, false, sink);
   const RasterItem a = agent_item(setting, *box, 0, 0);
   strip_faces(*strip, placed, 0.35f, sink);
-  const RasterItem b = strip_item(setting, *strip, 0, foot_of(a));
+  const RasterItem b = strip_item(setting, *strip, 0);
   PixelState pixel;
   for (int i = 0; i < sink.faces.count; ++i) {
     const ScreenFace& face = sink.faces.face[i];
     composite(&pixel, pixel_coverage(pool.at(face.edge_begin), face.edge_count, 3, 4), face.color);
   }
-  *out = pixel.color.r + static_cast<float>(order_on_screen(a, b));
+  *out = pixel.color.r + static_cast<float>(order_on_screen(a, b, sink.faces.face, pool.at(0)));
 }
 )";
 

@@ -28,6 +28,7 @@ struct Facet {
   Point origin, u, v;  // corner and sides; of a disk, centre and two radii
   bool is_disk = false;
   Rgb color;
+  int solid = 0;  // index into Tracer::solids
   // Depth of the hit along the ray (x, y, 1), or kFar.
   double hit(Point ray) const {
     const Point normal = cross(u, v);
@@ -48,13 +49,28 @@ struct Facet {
   }
 };
 
+// What a facet belongs to: its foot in the world, and what the planes say of it.
+struct Solid {
+  std::vector<Point> foot;  // corners
+  uint8_t class_id = 0;
+  uint16_t instance_id = 0;
+  Point middle() const {
+    Point sum;
+    for (Point corner : foot) sum = sum + corner;
+    return sum * (1.0 / static_cast<double>(foot.size()));
+  }
+};
+
 // A strip as drawn: the cone of directions through its four corners, and the plane that it is painted on.
 struct PaintedStrip {
   Point edge_normal[4];  // inwards
-  Point plane;
+  Point plane;           // unit normal
   double offset = 0;
+  double nearest_m = 0, farthest_m = 0;  // depths of its corners
   uint32_t rank = 0;
+  uint8_t class_id = 0;
   Rgb color;
+  std::vector<int> carries;  // solids that stand on it
   bool covers(Point ray) const {
     for (const Point& normal : edge_normal) {
       if (dot(normal, ray) < 0) return false;
@@ -65,11 +81,39 @@ struct PaintedStrip {
     const double depth = offset / dot(plane, ray);
     return depth > 0 ? depth : kFar;
   }
+  double distance_to(Point p) const { return std::abs(dot(plane, p) - offset); }
 };
 
 struct Tracer {
+  std::vector<Solid> solids;
   std::vector<Facet> facets;
   std::vector<PaintedStrip> strips;
+};
+
+// The rays through a rectangle of the image.
+struct Cone {
+  Point corner[4], middle;
+  double middle2 = 0, spread = 0;
+  template <typename RayAt>
+  Cone(RayAt&& ray_at, double x_low, double y_low, double x_high, double y_high)
+      : corner{ray_at(x_low, y_low), ray_at(x_high, y_low), ray_at(x_low, y_high), ray_at(x_high, y_high)},
+        middle(ray_at(0.5 * (x_low + x_high), 0.5 * (y_low + y_high))),
+        middle2(dot(middle, middle)),
+        spread(std::sqrt(dot(corner[3] - corner[0], corner[3] - corner[0]))) {}
+  // Whether the ball around the facet touches the cone.
+  bool may_meet(const Facet& facet) const {
+    const Point center = facet.center();
+    const double along = dot(center, middle) / middle2;
+    const Point off = center - middle * along;
+    const double reach = facet.radius() + spread * (std::abs(along) + facet.radius());
+    return dot(off, off) <= reach * reach;
+  }
+  // Whether no edge of the strip has all of the cone on its outer side.
+  bool may_meet(const PaintedStrip& strip) const {
+    return std::none_of(std::begin(strip.edge_normal), std::end(strip.edge_normal), [&](Point normal) {
+      return std::all_of(std::begin(corner), std::end(corner), [&](Point ray) { return dot(normal, ray) < 0; });
+    });
+  }
 };
 
 class Eye {
@@ -110,14 +154,17 @@ void add_rectangle(Tracer* tracer, const Eye& eye, Point origin, Point u, Point 
   const Point corners[4] = {eye(origin), eye(origin + u), eye(origin + u + v), eye(origin + v)};
   const double fade = brightness(corners, 4);
   if (fade <= 0) return;
-  tracer->facets.push_back(
-      {corners[0], corners[1] - corners[0], corners[3] - corners[0], false, color * static_cast<float>(fade)});
+  tracer->facets.push_back({corners[0], corners[1] - corners[0], corners[3] - corners[0], false,
+                            color * static_cast<float>(fade), static_cast<int>(tracer->solids.size()) - 1});
 }
 
-void add_agent(Tracer* tracer, const Eye& eye, const AgentBox& box) {
+void add_agent(Tracer* tracer, const Eye& eye, const AgentBox& box, uint16_t instance_id) {
   const Point ahead{box.cos_heading, box.sin_heading, 0}, left{-box.sin_heading, box.cos_heading, 0};
   const Point length = ahead * box.length_m, width = left * box.width_m, height{0, 0, box.height_m};
   const Point rear_right = point(box.center_m) - length * 0.5 - width * 0.5;
+  tracer->solids.push_back({{rear_right, rear_right + length, rear_right + length + width, rear_right + width},
+                            static_cast<uint8_t>(1 + static_cast<int>(box.agent_class)),
+                            instance_id});
   const Point to_eye = eye.position() - point(box.center_m);
   auto color = [&](BoxFace face) { return agent_color(box.agent_class, face); };
   if (dot(to_eye, ahead) > 0.5 * box.length_m) {
@@ -136,6 +183,12 @@ void add_agent(Tracer* tracer, const Eye& eye, const AgentBox& box) {
   if (to_eye.z < 0) add_rectangle(tracer, eye, rear_right, length, width, color(BoxFace::top));
 }
 
+void add_wall(Tracer* tracer, const Eye& eye, const WallFace& wall) {
+  const Point a = point(wall.a_m), b = point(wall.b_m);
+  tracer->solids.push_back({{a, b}, static_cast<uint8_t>(SurfaceClass::wall), 0});
+  add_rectangle(tracer, eye, a, b - a, {0, 0, wall.height_m}, wall.color);
+}
+
 void add_light(Tracer* tracer, const Eye& eye, const LightHead& head, LightState state) {
   if (state == LightState::off) return;
   const Point center = point(head.position_m), facing{head.facing.x, head.facing.y, 0};
@@ -146,12 +199,52 @@ void add_light(Tracer* tracer, const Eye& eye, const LightHead& head, LightState
   const Point at = eye(center);
   const double fade = brightness(&at, 1);
   if (fade <= 0) return;
+  tracer->solids.push_back({{center - left * kLightRadius_m - Point{0, 0, kLightRadius_m},
+                             center + left * kLightRadius_m - Point{0, 0, kLightRadius_m}},
+                            static_cast<uint8_t>(SurfaceClass::light),
+                            0});
   tracer->facets.push_back({at, eye.direction(left * kLightRadius_m), eye.direction({0, 0, kLightRadius_m}), true,
-                            light_color(state) * static_cast<float>(fade)});
+                            light_color(state) * static_cast<float>(fade),
+                            static_cast<int>(tracer->solids.size()) - 1});
 }
 
-void add_strip(Tracer* tracer, const Eye& eye, const PinholeCamera& pinhole, float floor_px, const Strip& strip,
-               uint32_t index) {
+// Whether two convex outlines on the ground overlap: no side of either separates them by a millimetre or less.
+bool overlap_on_ground(const std::vector<Point>& a, const std::vector<Point>& b) {
+  auto separates = [&](Point normal) {
+    double low_a = kFar, high_a = -kFar, low_b = kFar, high_b = -kFar;
+    for (Point p : a) low_a = std::min(low_a, dot(normal, p)), high_a = std::max(high_a, dot(normal, p));
+    for (Point p : b) low_b = std::min(low_b, dot(normal, p)), high_b = std::max(high_b, dot(normal, p));
+    return std::min(high_a, high_b) - std::max(low_a, low_b) <= 1e-3;
+  };
+  for (const std::vector<Point>* outline : {&a, &b}) {
+    for (std::size_t i = 0; i < outline->size(); ++i) {
+      const Point side = (*outline)[(i + 1) % outline->size()] - (*outline)[i];
+      const double length = std::hypot(side.x, side.y);
+      if (length > 1e-6 && separates({-side.y / length, side.x / length, 0})) return false;
+    }
+  }
+  return true;
+}
+
+// Solids whose foot lies over the strip and, in its middle, at most kStanding_m above or below the strip's plane.
+std::vector<int> solids_on(const Tracer& tracer, const Vec3* strip_corners) {
+  std::vector<Point> outline;
+  for (int i = 0; i < 4; ++i) outline.push_back(point(strip_corners[i]));
+  const Point normal = cross(outline[2] - outline[0], outline[3] - outline[1]);
+  if (normal.z == 0) return {};
+  std::vector<int> standing;
+  for (std::size_t i = 0; i < tracer.solids.size(); ++i) {
+    const Point above = tracer.solids[i].middle() - outline[0];
+    const double height_m = dot(normal, above) / normal.z;
+    if (std::abs(height_m) <= kStanding_m && overlap_on_ground(tracer.solids[i].foot, outline)) {
+      standing.push_back(static_cast<int>(i));
+    }
+  }
+  return standing;
+}
+
+void add_strip(Tracer* tracer, const Eye& eye, const PinholeCamera& pinhole, const Cone& image, float floor_px,
+               const Strip& strip, uint32_t index) {
   Vec3 world[4];
   strip_corners(strip, world);
   Point corners[4];
@@ -164,14 +257,85 @@ void add_strip(Tracer* tracer, const Eye& eye, const PinholeCamera& pinhole, flo
   if (fade <= 0 || !widen_strip(pinhole, floor_px, widened)) return;
   PaintedStrip painted;
   painted.plane = cross(corners[2] - corners[0], corners[3] - corners[1]);
+  painted.plane = painted.plane * (1 / std::max(1e-30, std::sqrt(dot(painted.plane, painted.plane))));
   painted.offset = dot(painted.plane, corners[0]);
+  painted.class_id = static_cast<uint8_t>(kClassOfStrip + static_cast<int>(strip.kind));
   painted.rank = static_cast<uint32_t>(strip_rank(strip.kind)) << 28 | index;
   painted.color = strip.color * static_cast<float>(fade);
   Point as_drawn[4];
   for (int i = 0; i < 4; ++i) as_drawn[i] = point(widened[i]);
   const double side = dot(cross(as_drawn[2] - as_drawn[0], as_drawn[3] - as_drawn[1]), as_drawn[0]) > 0 ? 1 : -1;
   for (int i = 0; i < 4; ++i) painted.edge_normal[i] = cross(as_drawn[i], as_drawn[(i + 1) % 4]) * side;
+  if (!image.may_meet(painted)) return;
+  painted.carries = solids_on(*tracer, world);
+  auto by_depth = [](Point a, Point b) { return a.z < b.z; };
+  painted.nearest_m = std::max<double>(kNear_m, std::min_element(as_drawn, as_drawn + 4, by_depth)->z);
+  painted.farthest_m = std::max_element(as_drawn, as_drawn + 4, by_depth)->z;
   tracer->strips.push_back(painted);
+}
+
+// What may be seen through a cone.
+struct Candidates {
+  std::vector<const Facet*> facets;
+  std::vector<const PaintedStrip*> strips;
+};
+
+Candidates all_of(const Tracer& tracer) {
+  Candidates all;
+  for (const Facet& facet : tracer.facets) all.facets.push_back(&facet);
+  for (const PaintedStrip& strip : tracer.strips) all.strips.push_back(&strip);
+  return all;
+}
+
+Candidates within(const Candidates& candidates, const Cone& cone) {
+  Candidates kept;
+  for (const Facet* facet : candidates.facets) {
+    if (cone.may_meet(*facet)) kept.facets.push_back(facet);
+  }
+  for (const PaintedStrip* strip : candidates.strips) {
+    if (cone.may_meet(*strip)) kept.strips.push_back(strip);
+  }
+  return kept;
+}
+
+// What a ray meets first.
+struct Surface {
+  const Rgb* color = nullptr;  // null: nothing
+  const Facet* facet = nullptr;
+  const PaintedStrip* strip = nullptr;
+  double depth = kFar;
+};
+
+// The nearest surface: of facets and of strips the one of least depth, but of strips that lie within kSameLevel_m of
+// each other there the one of least rank, and never a strip before a solid that stands on it.
+Surface front_of(const Candidates& candidates, Point ray) {
+  Surface front;
+  for (const Facet* facet : candidates.facets) {
+    const double at = facet->hit(ray);
+    if (at < front.depth) front = {&facet->color, facet, nullptr, at};
+  }
+  const PaintedStrip* painted = nullptr;
+  double painted_depth = kFar;
+  for (const PaintedStrip* strip : candidates.strips) {
+    if (!strip->covers(ray)) continue;
+    const double at = strip->depth(ray);
+    if (at < kNear_m) continue;
+    if (front.facet && std::count(strip->carries.begin(), strip->carries.end(), front.facet->solid)) continue;
+    const bool nearer = at < painted_depth;
+    bool comes_first = nearer || !painted;
+    if (painted && std::max(at, painted_depth) < kFar) {
+      const double gap_m = nearer ? painted->distance_to(ray * at) : strip->distance_to(ray * painted_depth);
+      if (gap_m < kSameLevel_m) comes_first = strip->rank < painted->rank;
+    }
+    if (comes_first) {
+      painted = strip;
+      painted_depth = at;
+    }
+  }
+  if (painted && (!front.facet || painted_depth < front.depth)) {
+    front = {&painted->color, nullptr, painted, std::clamp(painted_depth, painted->nearest_m, painted->farthest_m)};
+  }
+  return front;
 }
 
 }  // namespace
@@ -186,6 +350,10 @@ TruthImage trace_image(const StaticGeometry& geometry, const SceneBatch& scene, 
   rig.cameras = {camera};
   const PinholeCamera pinhole = pinhole_cameras(rig)[0];
   const Eye eye(camera, view);
+  auto ray_at = [&](double x, double y) {
+    return Point{(x - camera.center_x_px) / camera.focal_x_px, (y - camera.center_y_px) / camera.focal_y_px, 1};
+  };
+  const Cone whole(ray_at, 0, 0, camera.width_px, camera.height_px);
   Tracer tracer;
   const auto world = static_cast<std::size_t>(view.world);
   for (int32_t i = scene.world_begin[world]; i < scene.world_begin[world + 1]; ++i) {
@@ -193,11 +361,9 @@ TruthImage trace_image(const StaticGeometry& geometry, const SceneBatch& scene, 
     const auto hidden = scene.hidden_agents.subspan(static_cast<std::size_t>(view.hidden_begin),
                                                     static_cast<std::size_t>(view.hidden_end - view.hidden_begin));
     if (!box.drawn || i == view.ego_agent || std::count(hidden.begin(), hidden.end(), i)) continue;
-    add_agent(&tracer, eye, box);
+    add_agent(&tracer, eye, box, static_cast<uint16_t>(1 + i - scene.world_begin[world]));
   }
-  for (const WallFace& wall : geometry.walls) {
-    add_rectangle(&tracer, eye, point(wall.a_m), point(wall.b_m) - point(wall.a_m), {0, 0, wall.height_m}, wall.color);
-  }
+  for (const WallFace& wall : geometry.walls) add_wall(&tracer, eye, wall);
   const auto lights = static_cast<std::size_t>(scene.light_begin[world]);
   if (scene.light_begin[world + 1] > scene.light_begin[world]) {
     for (const LightHead& head : geometry.heads) {
@@ -205,7 +371,7 @@ TruthImage trace_image(const StaticGeometry& geometry, const SceneBatch& scene, 
     }
   }
   for (std::size_t i = 0; i < geometry.strips.size(); ++i) {
-    add_strip(&tracer, eye, pinhole, line_floor_px, geometry.strips[i], static_cast<uint32_t>(i));
+    add_strip(&tracer, eye, pinhole, whole, line_floor_px, geometry.strips[i], static_cast<uint32_t>(i));
   }
 
   std::vector<double> offset_x, offset_y;
@@ -222,62 +388,20 @@ TruthImage trace_image(const StaticGeometry& geometry, const SceneBatch& scene, 
 
   const int width = camera.width_px, height = camera.height_px;
   TruthImage image{width, height, std::vector<float>(static_cast<std::size_t>(3 * width * height))};
-  auto ray_at = [&](double x, double y) {
-    return Point{(x - camera.center_x_px) / camera.focal_x_px, (y - camera.center_y_px) / camera.focal_y_px, 1};
-  };
-  std::vector<const Facet*> near_facets;
-  std::vector<const PaintedStrip*> near_strips;
+  // What may appear in the image, then in each of its rows, then in each pixel.
+  const Candidates in_image = within(all_of(tracer), whole);
   for (int y = 0; y < height; ++y) {
+    const Candidates in_row = within(in_image, Cone(ray_at, 0, y, width, y + 1));
     for (int x = 0; x < width; ++x) {
-      // What may appear in this pixel: facets whose ball touches the pixel's cone, strips not outside of one edge.
-      const Point corner[4] = {ray_at(x, y), ray_at(x + 1, y), ray_at(x, y + 1), ray_at(x + 1, y + 1)};
-      const Point middle = ray_at(x + 0.5, y + 0.5);
-      const double middle2 = dot(middle, middle);
-      const double spread = std::sqrt(dot(corner[3] - corner[0], corner[3] - corner[0]));
-      near_facets.clear();
-      for (const Facet& facet : tracer.facets) {
-        const Point center = facet.center();
-        const double along = dot(center, middle) / middle2;
-        const Point off = center - middle * along;
-        const double reach = facet.radius() + spread * (std::abs(along) + facet.radius());
-        if (dot(off, off) <= reach * reach) near_facets.push_back(&facet);
-      }
-      near_strips.clear();
-      for (const PaintedStrip& strip : tracer.strips) {
-        const bool outside = std::any_of(std::begin(strip.edge_normal), std::end(strip.edge_normal), [&](Point normal) {
-          return std::all_of(std::begin(corner), std::end(corner), [&](Point ray) { return dot(normal, ray) < 0; });
-        });
-        if (!outside) near_strips.push_back(&strip);
-      }
+      const Candidates in_pixel = within(in_row, Cone(ray_at, x, y, x + 1, y + 1));
       double sum[3] = {};
       for (std::size_t s = 0; s < offset_x.size(); ++s) {
         const Point ray = ray_at(x + offset_x[s], y + offset_y[s]);
-        double depth = kFar;
-        const Rgb* color = nullptr;
-        for (const Facet* facet : near_facets) {
-          const double at = facet->hit(ray);
-          if (at < depth) {
-            depth = at;
-            color = &facet->color;
-          }
-        }
-        const PaintedStrip* front = nullptr;
-        double front_depth = kFar;
-        for (const PaintedStrip* strip : near_strips) {
-          if (!strip->covers(ray)) continue;
-          const double at = strip->depth(ray);
-          if (at < kNear_m) continue;
-          const bool same = front && (at == front_depth || std::abs(at - front_depth) < 1e-3 * at);
-          if (!front || (same ? strip->rank < front->rank : at < front_depth)) {
-            front = strip;
-            front_depth = at;
-          }
-        }
-        if (front && (!color || front_depth < depth)) color = &front->color;
-        if (!color) continue;
-        sum[0] += color->r;
-        sum[1] += color->g;
-        sum[2] += color->b;
+        const Surface front = front_of(in_pixel, ray);
+        if (!front.color) continue;
+        sum[0] += front.color->r;
+        sum[1] += front.color->g;
+        sum[2] += front.color->b;
       }
       for (int channel = 0; channel < 3; ++channel) {
         image.rgb[static_cast<std::size_t>((channel * height + y) * width + x)] =
