@@ -4,7 +4,7 @@ include(CMakePackageConfigHelpers)
 set(installed pictura_flags pictura_common pictura_map pictura_simulator pictura_backend_cpu pictura_simulator_cpu
               pictura_renderer pictura_make_simulator)
 if(PICTURA_HAS_CUDA)
-  list(APPEND installed pictura_cuda_flags pictura_backend_cuda)
+  list(APPEND installed pictura_cuda_flags pictura_backend_cuda pictura_simulator_cuda)
 endif()
 install(TARGETS ${installed} EXPORT pictura ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(TARGETS pictura RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})

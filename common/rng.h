@@ -62,6 +62,13 @@ class RandomStream {
     return block_.word[next_++];
   }
 
+  /// Passes over `count` draws, each of 32 bits.
+  PICTURA_HD void skip(int count) {
+    for (; count > 0 && next_ < 4; --count) ++next_;
+    counter_.word[1] += static_cast<uint32_t>(count / 4) << 20;
+    for (count %= 4; count > 0; --count) bits();
+  }
+
   /// Uniform in [0, 1), 24 bits.
   PICTURA_HD float uniform() { return static_cast<float>(bits() >> 8) * 0x1p-24f; }
   /// Uniform in [low, high).

@@ -15,16 +15,23 @@ constexpr int kMaxBoundaries = 80, kBoundaryFeatures = 7;
 constexpr int kMaxControls = 10, kControlFeatures = 7;
 constexpr int kWaypointFeatures = 3;
 
-/// Observations of all slots; entity sets are padded with zeros up to their counts.
+// X(name, type, per slot, is entity set, comment): the arrays of an observation, [slots, per slot].
+#define PICTURA_OBSERVATION_ARRAYS(X)                                                  \
+  X(ego, float, kEgoFeatures, false, "")                                               \
+  X(partners, float, kMaxPartners* kPartnerFeatures, true, "[kMaxPartners, features]") \
+  X(lanes, float, kMaxLanes* kLaneFeatures, true, "")                                  \
+  X(boundaries, float, kMaxBoundaries* kBoundaryFeatures, true, "")                    \
+  X(controls, float, kMaxControls* kControlFeatures, true, "")                         \
+  X(set_counts, int32_t, 4, true, "filled partners, lanes, boundaries, controls")      \
+  X(conditioning, float, kNumConditioning, false, "scaled to [-1, 1]")                 \
+  X(waypoints, float, kNumWaypoints* kWaypointFeatures, false, "ego frame")
+
+/// Observations of all slots; entity sets are padded with zeros up to their counts, and empty where they are not asked
+/// for.
 struct ObservationView {
-  Span<float> ego;           // [slots, kEgoFeatures]
-  Span<float> partners;      // [slots, kMaxPartners, kPartnerFeatures]
-  Span<float> lanes;         // [slots, kMaxLanes, kLaneFeatures]
-  Span<float> boundaries;    // [slots, kMaxBoundaries, kBoundaryFeatures]
-  Span<float> controls;      // [slots, kMaxControls, kControlFeatures]
-  Span<int32_t> set_counts;  // [slots, 4] filled partners, lanes, boundaries, controls
-  Span<float> conditioning;  // [slots, kNumConditioning] scaled to [-1, 1]
-  Span<float> waypoints;     // [slots, kNumWaypoints, kWaypointFeatures] ego frame
+#define X(name, type, per_slot, is_set, comment) Span<type> name;
+  PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
 };
 
 }  // namespace pictura

@@ -1,6 +1,6 @@
 // The interface of the simulator: many worlds, each on one map, stepped together. Executors (`cpu`, `cuda`) are made by
-// name in make_simulator.h and give bit-identical state. All arrays are indexed by slot: the controlled agents of world
-// 0, then those of world 1, and so on.
+// name and give bit-identical state. All arrays are indexed by slot: the controlled agents of world 0, then those of
+// world 1, and so on. Spans lie in the memory of space(): what `cuda` returns is written by work on a stream.
 #pragma once
 
 #include <array>
@@ -16,6 +16,7 @@
 #include "pictura/simulator/conditioning.h"
 #include "pictura/simulator/fields.h"
 #include "pictura/simulator/observation.h"
+#include "pictura/simulator/totals.h"
 
 namespace pictura {
 
@@ -25,8 +26,9 @@ constexpr int kMaxBoxes = 1 << 24;  // controlled agents and parked cars of one 
 
 struct SimulatorConfig {
   uint64_t seed = 0;
-  int num_threads = 0;  // host threads; 0: all
-  float dt_s = 0.1f;    // in [0.01, 0.1]
+  MemorySpace space = MemorySpace::host;  // where the caller wants observations and scenes; `auto` chooses by it
+  int num_threads = 0;                    // host threads; 0: all
+  float dt_s = 0.1f;                      // in [0.01, 0.1]
   int episode_steps = 1280;
   float reset_inactive_fraction = 0.4f;  // a world resets when this part of its agents is inactive; > 1: never
   float pedestrian_fraction = 0.0f, cyclist_fraction = 0.0f;
@@ -60,19 +62,6 @@ struct StepResult {
   Span<const uint8_t> valid;       // [slots] 1: the agent was active when the step began: learn from it
 };
 
-/// Totals since construction, over all worlds; counts are of controlled agents.
-struct SimulatorTotals {
-  int64_t agent_steps = 0;  // active agents advanced by one step
-  int64_t slot_steps = 0;   // slots times steps
-  int64_t episodes = 0;     // worlds reset after their first episode
-  int64_t goals_reached = 0, waypoints_reached = 0;
-  int64_t collisions = 0, at_fault_collisions = 0, off_road = 0, red_light = 0, wall_contacts = 0;
-  double distance_m = 0;
-  double reward = 0;
-  int64_t finished_agent_episodes = 0;  // agents whose episode ended
-  double finished_return = 0;           // sum of their returns
-};
-
 /// What became of the agents that were asked for, per world, in the current episode.
 struct SpawnReport {
   int64_t asked = 0, spawned = 0, refused = 0;  // asked == spawned + refused
@@ -87,6 +76,7 @@ class Simulator {
   Simulator& operator=(const Simulator&) = delete;
 
   virtual std::string_view name() const = 0;
+  /// Where actions are read from, and where results, observations, scenes and state lie.
   virtual MemorySpace space() const = 0;
   virtual const SimulatorConfig& config() const = 0;
   virtual const std::vector<std::shared_ptr<const RoadMap>>& maps() const = 0;
@@ -94,12 +84,17 @@ class Simulator {
   virtual int num_slots() const = 0;
 
   /// Starts a new episode in every world (episode 0 of the seed) and writes observations and scene.
-  virtual void reset() = 0;
+  virtual void reset(Stream stream = {}) = 0;
 
   /// Advances every world by one step. actions: [slots], each in [0, kNumActions); those of inactive agents are
   /// ignored. A world whose last step ended its episode is reset instead, and its slots are not valid in that step
-  /// (next-step autoreset). Throws Error on an action out of range.
-  virtual StepResult step(Span<const int32_t> actions) = 0;
+  /// (next-step autoreset). Throws Error on an action out of range, which leaves the state as it was; on a device the
+  /// next call, or check(), throws it. There a step allocates nothing and waits for nothing, and a CUDA graph can
+  /// capture it.
+  virtual StepResult step(Span<const int32_t> actions, Stream stream = {}) = 0;
+
+  /// Waits until everything asked for is done; throws Error when a step was refused since the last call that threw.
+  virtual void check() = 0;
 
   /// Of the state after the last reset() or step().
   virtual ObservationView observations() = 0;
@@ -112,11 +107,13 @@ class Simulator {
   virtual std::vector<StaticGeometry> geometries() const = 0;
 
   virtual AgentStateView state() = 0;
-  virtual SpawnReport spawn_report() const = 0;
-  virtual const SimulatorTotals& totals() const = 0;
   /// Steps done in the current episode of each world, and the number of that episode.
   virtual Span<const int32_t> episode_step() const = 0;
   virtual Span<const int32_t> episode_index() const = 0;
+
+  // On a device each of the following waits until everything asked for is done, and copies to the host.
+  virtual SpawnReport spawn_report() const = 0;
+  virtual const SimulatorTotals& totals() const = 0;
   /// Over every field of the state, the light states and the parked cars, in documented order; equal on every executor.
   virtual uint64_t state_hash() const = 0;
 
@@ -125,9 +122,13 @@ class Simulator {
   virtual void restore(Span<const uint8_t> bytes) = 0;
 };
 
-/// Makes an executor by name: "cpu", "cuda" or "auto". Throws UsageError listing the known names.
+/// The executors of this build, and "auto".
+std::vector<std::string> simulator_names();
+
+/// Makes an executor by name. `auto` is `cuda` where config.space asks for it and a device is found, else `cpu`;
+/// choice_out says what was chosen and why. Throws UsageError listing the known names, Error where there is no device.
 std::unique_ptr<Simulator> make_simulator(const std::string& name, const SimulatorConfig& config,
                                           std::vector<std::shared_ptr<const RoadMap>> maps,
-                                          std::vector<WorldSpec> worlds);
+                                          std::vector<WorldSpec> worlds, std::string* choice_out = nullptr);
 
 }  // namespace pictura

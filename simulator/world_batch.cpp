@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <numeric>
 
 #include "pictura/common/error.h"
 #include "pictura/common/hash.h"
@@ -312,25 +313,11 @@ WorldBatch::WorldBatch(const SimulatorConfig& config_in, std::vector<std::shared
   episode_over.resize(worlds.size());
   world_totals.resize(worlds.size());
 
-  reward.resize(slots);
-  terminated.resize(slots);
-  truncated = valid = terminated;
-  views.resize(slots);
   scene.world_begin = box_begin;
   scene.agents = boxes;
   scene.geometry = geometry;
   scene.light_begin = light_begin;
   scene.light_states = lights;
-
-  ego_.resize(slots * kEgoFeatures);
-  conditioning_.resize(slots * kNumConditioning);
-  waypoints_.resize(slots * kNumWaypoints * kWaypointFeatures);
-  if (!config.vector_observations) return;
-  partners_.resize(slots * kMaxPartners * kPartnerFeatures);
-  lanes_.resize(slots * kMaxLanes * kLaneFeatures);
-  boundaries_.resize(slots * kMaxBoundaries * kBoundaryFeatures);
-  controls_.resize(slots * kMaxControls * kControlFeatures);
-  set_counts_.resize(slots * 4);
 }
 
 WorldView WorldBatch::world(int index) {
@@ -338,12 +325,14 @@ WorldView WorldBatch::world(int index) {
   WorldView view;
   view.map = world_maps[static_cast<size_t>(worlds[w].map)].view();
   view.options = options;
+  view.index = index;
   view.seed = config.seed;
   view.global_world = worlds[w].global_world;
   view.episode = static_cast<uint32_t>(episode_index[w]);
   view.agents = agents.view();
   view.first_slot = slot_begin[w];
   view.num_agents = worlds[w].num_agents;
+  view.first_box = box_begin[w];
   view.num_boxes = box_begin[w + 1] - box_begin[w];
   view.boxes = boxes.data() + box_begin[w];
   view.boxes_before = boxes_before.data() + box_begin[w];
@@ -353,8 +342,31 @@ WorldView WorldBatch::world(int index) {
   return view;
 }
 
-ObservationView WorldBatch::observation_view() {
-  return {ego_, partners_, lanes_, boundaries_, controls_, set_counts_, conditioning_, waypoints_};
+SpawnReport WorldBatch::spawn_report() const {
+  SpawnReport report;
+  report.asked = num_slots();
+  report.spawned = std::accumulate(spawned.begin(), spawned.end(), int64_t{0});
+  report.refused = report.asked - report.spawned;
+  report.parked_asked = int64_t{num_worlds()} * config.parked_cars;
+  for (size_t w = 0; w < worlds.size(); ++w) {
+    report.parked_placed +=
+        std::count_if(boxes.begin() + box_begin[w] + worlds[w].num_agents, boxes.begin() + box_begin[w + 1],
+                      [](const AgentBox& box) { return box.drawn != 0; });
+  }
+  return report;
+}
+
+SimulatorTotals WorldBatch::totals() const {
+  SimulatorTotals sum;
+  for (const SimulatorTotals& part : world_totals) sum.add(part);
+  return sum;
+}
+
+std::vector<StaticGeometry> WorldBatch::geometries() const {
+  std::vector<StaticGeometry> geometries;
+  const MapGeometryOptions geometry_options{.walls = config.walls, .wall_seed = config.wall_seed};
+  for (const auto& map : maps) geometries.push_back(make_static_geometry(*map, geometry_options));
+  return geometries;
 }
 
 uint64_t WorldBatch::state_hash() const {
@@ -368,32 +380,18 @@ uint64_t WorldBatch::state_hash() const {
   return hash.value();
 }
 
-/// Calls visit(data, bytes) for every saved array but the agents' fields.
-template <typename Self, typename Visit>
-void WorldBatch::visit_saved(Self& self, Visit&& visit) {
-  const auto array = [&visit](auto& values) { visit(values.data(), values.size() * sizeof(*values.data())); };
-  array(self.boxes);
-  array(self.boxes_before);
-  array(self.light_plans);
-  array(self.lights);
-  array(self.episode_step);
-  array(self.episode_index);
-  array(self.episode_over);
-  array(self.spawned);
-  array(self.world_totals);
-}
-
 size_t WorldBatch::saved_bytes() const {
   size_t sum = agents.size_bytes();
-  visit_saved(*this, [&sum](const void*, size_t size) { sum += size; });
+  visit_state(*this, *this, [&sum](const auto& array, const auto&) { sum += array.size() * sizeof(*array.data()); });
   return sum;
 }
 
 void WorldBatch::assign_from(const uint8_t* bytes) {
   agents.assign_from(bytes);
   bytes += agents.size_bytes();
-  visit_saved(*this, [&bytes](void* data, size_t size) {
-    if (size > 0) std::memcpy(data, bytes, size);
+  visit_state(*this, *this, [&bytes](auto& array, auto&) {
+    const size_t size = array.size() * sizeof(*array.data());
+    if (size > 0) std::memcpy(array.data(), bytes, size);
     bytes += size;
   });
 }
@@ -401,8 +399,9 @@ void WorldBatch::assign_from(const uint8_t* bytes) {
 void WorldBatch::copy_to(uint8_t* bytes_out) const {
   agents.copy_to(bytes_out);
   bytes_out += agents.size_bytes();
-  visit_saved(*this, [&bytes_out](const void* data, size_t size) {
-    if (size > 0) std::memcpy(bytes_out, data, size);
+  visit_state(*this, *this, [&bytes_out](const auto& array, const auto&) {
+    const size_t size = array.size() * sizeof(*array.data());
+    if (size > 0) std::memcpy(bytes_out, array.data(), size);
     bytes_out += size;
   });
 }
@@ -456,6 +455,24 @@ void WorldBatch::restore(Span<const uint8_t> bytes) {
     assign_from(present.data());
     throw;
   }
+}
+
+HostResults::HostResults(size_t num_slots, bool entity_sets)
+    : reward(num_slots),
+      terminated(num_slots),
+      truncated(num_slots),
+      valid(num_slots),
+      views(num_slots){
+#define X(name, type, per_slot, is_set, comment) \
+  if (entity_sets || !(is_set)) name##_.resize(num_slots* static_cast<size_t>(per_slot));
+          PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
+      }
+
+      ObservationView HostResults::observation_view() {
+#define X(name, type, per_slot, is_set, comment) name##_,
+  return {PICTURA_OBSERVATION_ARRAYS(X)};
+#undef X
 }
 
 }  // namespace pictura

@@ -1,5 +1,6 @@
-// The memory of a simulator on the host: every array that a step reads or writes, sized once, with each world's part of
-// it as a WorldView. Executors hold one and run the rules over it; saving, restoring and hashing are the same for all.
+// The state of a simulator on the host: everything that is saved, sized once, with each world's part of it as a
+// WorldView. An executor on the host runs the rules over it; one on a device mirrors it there. Checking, saving,
+// restoring and hashing are the same for all.
 #pragma once
 
 #include <array>
@@ -7,7 +8,7 @@
 #include <vector>
 
 #include "pictura/simulator/agent_state.h"
-#include "pictura/simulator/rules/world_view.h"
+#include "pictura/simulator/rules/episode.h"
 #include "pictura/simulator/simulator.h"
 #include "pictura/simulator/world_map.h"
 
@@ -24,7 +25,9 @@ struct WorldBatch {
   int num_worlds() const { return static_cast<int>(worlds.size()); }
   int num_slots() const { return slot_begin.back(); }
   WorldView world(int index);
-  ObservationView observation_view();
+  SpawnReport spawn_report() const;
+  SimulatorTotals totals() const;
+  std::vector<StaticGeometry> geometries() const;
 
   uint64_t state_hash() const;
   std::vector<uint8_t> save() const;
@@ -39,7 +42,7 @@ struct WorldBatch {
   std::vector<WorldMap> world_maps;                         // [maps]
   std::vector<int32_t> slot_begin, box_begin, light_begin;  // [worlds + 1]
 
-  // State. box_cells and what a step returns are made anew by every step and are not saved.
+  // State. box_cells are made anew by every step and are not saved.
   AgentState agents;
   std::vector<AgentBox> boxes, boxes_before;  // the scene's agents
   std::vector<LightPlan> light_plans;
@@ -49,12 +52,24 @@ struct WorldBatch {
   std::vector<int32_t> spawned;                      // [worlds] in the current episode
   std::vector<SimulatorTotals> world_totals;         // [worlds]
 
-  std::vector<CellLists> box_cells;  // [worlds]
-  std::vector<float> reward;         // [slots], as the following
-  std::vector<uint8_t> terminated, truncated, valid;
-  std::vector<View> views;
+  std::vector<CellLists> box_cells;      // [worlds]
   std::vector<GeometryHandle> geometry;  // [worlds]
   SceneBatch scene;
+
+  /// Calls visit(array of a, array of b) for every array of the state but the agents' fields, in the order in which
+  /// they are saved. a and b have members of the same names.
+  template <typename A, typename B, typename Visit>
+  static void visit_state(A& a, B& b, Visit&& visit) {
+    visit(a.boxes, b.boxes);
+    visit(a.boxes_before, b.boxes_before);
+    visit(a.light_plans, b.light_plans);
+    visit(a.lights, b.lights);
+    visit(a.episode_step, b.episode_step);
+    visit(a.episode_index, b.episode_index);
+    visit(a.episode_over, b.episode_over);
+    visit(a.spawned, b.spawned);
+    visit(a.world_totals, b.world_totals);
+  }
 
  private:
   struct SavedHeader {
@@ -67,11 +82,22 @@ struct WorldBatch {
   size_t saved_bytes() const;
   void copy_to(uint8_t* bytes_out) const;
   void assign_from(const uint8_t* bytes);
-  template <typename Self, typename Visit>
-  static void visit_saved(Self& self, Visit&& visit);
+};
 
-  std::vector<float> ego_, partners_, lanes_, boundaries_, controls_, conditioning_, waypoints_;
-  std::vector<int32_t> set_counts_;
+/// What an executor on the host writes for its users, besides the state.
+struct HostResults {
+  HostResults(size_t num_slots, bool entity_sets);
+  ObservationView observation_view();
+  StepArrays step_arrays() { return {reward.data(), terminated.data(), truncated.data(), valid.data()}; }
+
+  std::vector<float> reward;  // [slots], as the following
+  std::vector<uint8_t> terminated, truncated, valid;
+  std::vector<View> views;
+
+ private:
+#define X(name, type, per_slot, is_set, comment) std::vector<type> name##_;
+  PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
 };
 
 }  // namespace pictura

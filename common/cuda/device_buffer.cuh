@@ -39,6 +39,14 @@ class DeviceBuffer {
   T* data() const { return data_; }
   std::size_t size() const { return size_; }
   Span<const T> span() const { return {data_, size_}; }
+  /// Copies size() elements from the host; returns when they can be overwritten there.
+  void copy_from_host(const T* host) {
+    if (size_ > 0) PICTURA_CUDA(cudaMemcpy(data_, host, size_ * sizeof(T), cudaMemcpyHostToDevice));
+  }
+  /// Sets every byte.
+  void fill(int byte) {
+    if (size_ > 0) PICTURA_CUDA(cudaMemset(data_, byte, size_ * sizeof(T)));
+  }
   /// Waits for the device's work and copies to the host.
   void copy_to_host(T* host) const {
     if (size_ > 0) PICTURA_CUDA(cudaMemcpy(host, data_, size_ * sizeof(T), cudaMemcpyDeviceToHost));

@@ -1,15 +1,81 @@
-// When a world's episode ends.
+// A world's episode: its lights, what a step returns and counts, and when it ends.
 #pragma once
 
-#include "pictura/simulator/rules/world_view.h"
+#include "pictura/simulator/rules/step.h"
+#include "pictura/simulator/totals.h"
 
 namespace pictura {
+
+/// Where the results of a step go: arrays over all slots, as StepResult names them.
+struct StepArrays {
+  float* reward = nullptr;
+  uint8_t* terminated = nullptr;
+  uint8_t* truncated = nullptr;
+  uint8_t* valid = nullptr;
+};
+
+PICTURA_HD inline void clear_result(const StepArrays& results, int slot) {
+  results.reward[slot] = 0.0f;
+  results.terminated[slot] = results.truncated[slot] = results.valid[slot] = 0;
+}
+
+/// Actions of agents that do not drive are ignored.
+PICTURA_HD inline bool is_sound_action(const WorldView& world, int agent, int32_t action) {
+  return !is_active(world, agent) || (action >= 0 && action < kNumActions);
+}
+
+/// Draws the episode's cycle of one stop line and shows its first state.
+PICTURA_HD inline void begin_light(const WorldView& world, int light) {
+  world.light_plans[light] =
+      draw_light_plan(world.map.stop_lines[static_cast<size_t>(light)], light, world.options.fixed_lights,
+                      world.options.dt_s, world.seed, world.global_world, world.episode);
+  world.lights[light] = light_state(world.light_plans[light], 0);
+}
+
+PICTURA_HD inline void count_events(int events, SimulatorTotals* totals_inout) {
+  totals_inout->goals_reached += (events & kEventMetricGoal) != 0;
+  totals_inout->waypoints_reached += (events & (kEventWaypoint | kEventGoal)) != 0;
+  totals_inout->collisions += (events & kEventCollision) != 0;
+  totals_inout->at_fault_collisions += (events & kEventAtFault) != 0;
+  totals_inout->off_road += (events & kEventOffRoad) != 0;
+  totals_inout->red_light += (events & kEventRedLight) != 0;
+  totals_inout->wall_contacts += (events & kEventWall) != 0;
+}
+
+/// Settles one agent (phase 3), writes its reward and end, and counts its step. Returns whether it drives on.
+PICTURA_HD inline bool settle_and_count(const WorldView& world, int agent, const StepArrays& results,
+                                        SimulatorTotals* totals_inout) {
+  const int slot = world.first_slot + agent;
+  const float speed_mps = world.agents.speed_mps[slot];
+  const float reward = settle(world, agent);
+  const bool drives = is_active(world, agent);
+  results.reward[slot] = reward;
+  results.terminated[slot] = results.valid[slot] && !drives;
+  if (results.valid[slot]) {
+    ++totals_inout->agent_steps;
+    totals_inout->reward += static_cast<double>(reward);
+    totals_inout->distance_m += static_cast<double>(driven_m(speed_mps, world.options.dt_s));
+    count_events(world.agents.events[slot], totals_inout);
+  }
+  return drives;
+}
 
 /// After `steps` steps, with `spawned` agents of which `active` still drive: time is up, or too many are inactive.
 PICTURA_HD inline bool episode_ends(const RuleOptions& options, int steps, int spawned, int active) {
   if (steps >= options.episode_steps) return true;
   const float inactive = static_cast<float>(spawned - active);
   return spawned > 0 && inactive >= options.reset_inactive_fraction * static_cast<float>(spawned);
+}
+
+/// Once it is known whether the world's episode ends with this step: cuts off who still drives, and counts whose
+/// episode is over.
+PICTURA_HD inline void finish_agent(const WorldView& world, int agent, bool ends, const StepArrays& results,
+                                    SimulatorTotals* totals_inout) {
+  const int slot = world.first_slot + agent;
+  results.truncated[slot] = ends && is_active(world, agent);
+  if (!results.terminated[slot] && !results.truncated[slot]) return;
+  ++totals_inout->finished_agent_episodes;
+  totals_inout->finished_return += static_cast<double>(world.agents.episode_return[slot]);
 }
 
 }  // namespace pictura

@@ -84,6 +84,29 @@ struct MapView {
   GridView near_stop_lines;
 };
 
+/// Calls visit(&span) for every array of the view, so that they can be copied to another memory.
+template <typename Visit>
+PICTURA_HD void visit_arrays(MapView* view, Visit&& visit) {
+  visit(&view->segments);
+  visit(&view->lanes);
+  visit(&view->successors);
+  visit(&view->edges);
+  visit(&view->walls);
+  visit(&view->stop_lines);
+  visit(&view->spawn_lanes);
+  visit(&view->spawn_end_m);
+  visit(&view->parking_spots);
+  visit(&view->lane_pieces);
+  visit(&view->boundary_pieces);
+  GridView* const lists[] = {&view->segment_cells,   &view->edge_cells,       &view->wall_cells,
+                             &view->stop_line_cells, &view->near_lane_pieces, &view->near_boundary_pieces,
+                             &view->near_stop_lines};
+  for (GridView* cells : lists) {
+    visit(&cells->begin);
+    visit(&cells->items);
+  }
+}
+
 PICTURA_HD inline Span<const int32_t> list_of(const GridView& lists, size_t index) {
   const int32_t begin = lists.begin[index];
   return lists.items.subspan(static_cast<size_t>(begin), static_cast<size_t>(lists.begin[index + 1] - begin));

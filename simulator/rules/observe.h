@@ -143,28 +143,31 @@ PICTURA_HD inline int observe_partners(const WorldView& world, int agent, const 
   return nearest.count;
 }
 
+/// Writes the row of a piece; returns whether its middle is in sight.
+PICTURA_HD inline bool observe_piece(const ObservedPiece& piece, const EgoFrame& frame, float* row) {
+  constexpr float kPerPosition = 1.0f / kScalePosition_m, kPerHeight = 1.0f / kScaleHeight_m;
+  constexpr float kPerHalfPiece = 1.0f / kScaleHalfPiece_m, kPerWidth = 1.0f / kScaleLaneWidth_m;
+  constexpr float kMiddle_m = 0.5f * (kRoadAhead_m - kRoadBehind_m), kHalf_m = 0.5f * (kRoadAhead_m + kRoadBehind_m);
+  const Vec3 local = frame.to_local(piece.middle_m);
+  const Vec2 direction = frame.turn(piece.direction);
+  row[0] = local.x * kPerPosition;
+  row[1] = local.y * kPerPosition;
+  row[2] = local.z * kPerHeight;
+  row[3] = piece.half_length_m * kPerHalfPiece;
+  row[4] = direction.x;
+  row[5] = direction.y;
+  row[6] = piece.width_m * kPerWidth;
+  return static_cast<int>(fabsf(local.x - kMiddle_m) <= kHalf_m) & static_cast<int>(fabsf(local.y) <= kRoadAside_m);
+}
+
 /// Lanes or boundaries: of the pieces listed for the ego's cell, the first `capacity` whose middles are in sight. Rows
 /// are written before it is known whether they count, which spares an unpredictable branch; the row after the last may
 /// hold a leftover.
 PICTURA_HD inline int observe_pieces(Span<const ObservedPiece> pieces, Span<const int32_t> items, const EgoFrame& frame,
                                      int capacity, float* out) {
-  constexpr float kPerPosition = 1.0f / kScalePosition_m, kPerHeight = 1.0f / kScaleHeight_m;
-  constexpr float kPerHalfPiece = 1.0f / kScaleHalfPiece_m, kPerWidth = 1.0f / kScaleLaneWidth_m;
-  constexpr float kMiddle_m = 0.5f * (kRoadAhead_m - kRoadBehind_m), kHalf_m = 0.5f * (kRoadAhead_m + kRoadBehind_m);
   int count = 0;
   for (size_t i = 0; i < items.size() && count < capacity; ++i) {
-    const ObservedPiece& piece = pieces[static_cast<size_t>(items[i])];
-    const Vec3 local = frame.to_local(piece.middle_m);
-    const Vec2 direction = frame.turn(piece.direction);
-    float* row = out + count * kLaneFeatures;
-    row[0] = local.x * kPerPosition;
-    row[1] = local.y * kPerPosition;
-    row[2] = local.z * kPerHeight;
-    row[3] = piece.half_length_m * kPerHalfPiece;
-    row[4] = direction.x;
-    row[5] = direction.y;
-    row[6] = piece.width_m * kPerWidth;
-    count += static_cast<int>(fabsf(local.x - kMiddle_m) <= kHalf_m) & static_cast<int>(fabsf(local.y) <= kRoadAside_m);
+    count += observe_piece(pieces[static_cast<size_t>(items[i])], frame, out + count * kLaneFeatures);
   }
   return count;
 }
@@ -219,47 +222,89 @@ PICTURA_HD inline bool observes(const WorldView& world, int agent) {
   return is_active(world, agent) || (world.agents.events[world.first_slot + agent] & kInfractions) != 0;
 }
 
-/// Writes the whole observation of one agent: all zeros for the absent and for those that halted in an earlier step.
-/// Sets are written if `entity_sets`.
-PICTURA_HD inline void observe(const WorldView& world, int agent, bool entity_sets, const ObservationView& out) {
-  const size_t slot = static_cast<size_t>(world.first_slot + agent);
-  const int slot_index = world.first_slot + agent;
-  const bool blind = !observes(world, agent);
-  float* ego = out.ego.data() + slot * kEgoFeatures;
-  float* conditioning = out.conditioning.data() + slot * kNumConditioning;
-  float* waypoints = out.waypoints.data() + slot * kNumWaypoints * kWaypointFeatures;
-  const EgoFrame frame = ego_frame(world.agents, slot_index);
-  if (blind) {
-    for (int i = 0; i < kEgoFeatures; ++i) ego[i] = 0.0f;
-    for (int i = 0; i < kNumConditioning; ++i) conditioning[i] = 0.0f;
-    for (int i = 0; i < kNumWaypoints * kWaypointFeatures; ++i) waypoints[i] = 0.0f;
-  } else {
-    observe_ego(world, slot_index, ego);
-    observe_conditioning(world, slot_index, conditioning);
-    observe_waypoints(world, slot_index, frame, waypoints);
+/// What is no set: all zeros for the absent and for those that halted in an earlier step.
+PICTURA_HD inline void observe_own(const WorldView& world, int agent, const ObservationView& out) {
+  const int slot = world.first_slot + agent;
+  const size_t row = static_cast<size_t>(slot);
+  float* ego = out.ego.data() + row * kEgoFeatures;
+  float* conditioning = out.conditioning.data() + row * kNumConditioning;
+  float* waypoints = out.waypoints.data() + row * kNumWaypoints * kWaypointFeatures;
+  if (observes(world, agent)) {
+    observe_ego(world, slot, ego);
+    observe_conditioning(world, slot, conditioning);
+    observe_waypoints(world, slot, ego_frame(world.agents, slot), waypoints);
+    return;
   }
-  if (!entity_sets) return;
+  for (int i = 0; i < kEgoFeatures; ++i) ego[i] = 0.0f;
+  for (int i = 0; i < kNumConditioning; ++i) conditioning[i] = 0.0f;
+  for (int i = 0; i < kNumWaypoints * kWaypointFeatures; ++i) waypoints[i] = 0.0f;
+}
 
-  float* partners = out.partners.data() + slot * kMaxPartners * kPartnerFeatures;
-  float* lanes = out.lanes.data() + slot * kMaxLanes * kLaneFeatures;
-  float* boundaries = out.boundaries.data() + slot * kMaxBoundaries * kBoundaryFeatures;
-  float* controls = out.controls.data() + slot * kMaxControls * kControlFeatures;
-  int counts[4] = {};
-  if (!blind) {
-    counts[0] = observe_partners(world, agent, frame, partners);
-    const Vec2 origin = frame.origin_m.xy();
-    const float heading_rad = world.agents.heading_rad[slot];
-    counts[1] = observe_pieces(world.map.lane_pieces, items_at(world.map.near_lane_pieces, origin, heading_rad), frame,
-                               kMaxLanes, lanes);
-    counts[2] = observe_pieces(world.map.boundary_pieces, items_at(world.map.near_boundary_pieces, origin, heading_rad),
-                               frame, kMaxBoundaries, boundaries);
-    counts[3] = observe_controls(world, slot_index, frame, controls);
+/// The entity sets, in the order of ObservationView::set_counts.
+enum class EntitySet : int32_t { partners, lanes, boundaries, controls };
+constexpr int kNumEntitySets = 4;
+
+/// Where a set of one slot is written.
+struct SetRows {
+  float* rows = nullptr;
+  int features = 0, capacity = 0;
+  int32_t* count = nullptr;
+};
+
+PICTURA_HD inline SetRows set_rows(const ObservationView& out, int slot, EntitySet set) {
+  const size_t row = static_cast<size_t>(slot);
+  int32_t* count = out.set_counts.data() + row * kNumEntitySets + static_cast<int>(set);
+  switch (set) {
+    case EntitySet::partners:
+      return {out.partners.data() + row * kMaxPartners * kPartnerFeatures, kPartnerFeatures, kMaxPartners, count};
+    case EntitySet::lanes: return {out.lanes.data() + row * kMaxLanes * kLaneFeatures, kLaneFeatures, kMaxLanes, count};
+    case EntitySet::boundaries:
+      return {out.boundaries.data() + row * kMaxBoundaries * kBoundaryFeatures, kBoundaryFeatures, kMaxBoundaries,
+              count};
+    default:
+      return {out.controls.data() + row * kMaxControls * kControlFeatures, kControlFeatures, kMaxControls, count};
   }
-  int32_t* filled = out.set_counts.data() + slot * 4;
-  pad_set(partners, kPartnerFeatures, kMaxPartners, counts[0], filled);
-  pad_set(lanes, kLaneFeatures, kMaxLanes, counts[1], filled + 1);
-  pad_set(boundaries, kBoundaryFeatures, kMaxBoundaries, counts[2], filled + 2);
-  pad_set(controls, kControlFeatures, kMaxControls, counts[3], filled + 3);
+}
+
+/// The pieces of a map that a set of them shows, and which of them can be seen from where the agent is.
+struct PieceList {
+  Span<const ObservedPiece> pieces;
+  Span<const int32_t> items;
+};
+
+PICTURA_HD inline PieceList pieces_near(const WorldView& world, int slot, EntitySet set) {
+  const Vec2 at{world.agents.x_m[slot], world.agents.y_m[slot]};
+  const float heading_rad = world.agents.heading_rad[slot];
+  return set == EntitySet::lanes
+             ? PieceList{world.map.lane_pieces, items_at(world.map.near_lane_pieces, at, heading_rad)}
+             : PieceList{world.map.boundary_pieces, items_at(world.map.near_boundary_pieces, at, heading_rad)};
+}
+
+/// One entity set: empty for the absent and for those that halted in an earlier step.
+PICTURA_HD inline void observe_set(const WorldView& world, int agent, EntitySet set, const ObservationView& out) {
+  const int slot = world.first_slot + agent;
+  const SetRows rows = set_rows(out, slot, set);
+  int count = 0;
+  if (observes(world, agent)) {
+    const EgoFrame frame = ego_frame(world.agents, slot);
+    if (set == EntitySet::partners) {
+      count = observe_partners(world, agent, frame, rows.rows);
+    } else if (set == EntitySet::controls) {
+      count = observe_controls(world, slot, frame, rows.rows);
+    } else {
+      const PieceList near = pieces_near(world, slot, set);
+      count = observe_pieces(near.pieces, near.items, frame, rows.capacity, rows.rows);
+    }
+  }
+  pad_set(rows.rows, rows.features, rows.capacity, count, rows.count);
+}
+
+/// Writes the whole observation of one agent. Sets are written if `entity_sets`.
+PICTURA_HD inline void observe(const WorldView& world, int agent, bool entity_sets, const ObservationView& out) {
+  observe_own(world, agent, out);
+  for (int set = 0; entity_sets && set < kNumEntitySets; ++set) {
+    observe_set(world, agent, static_cast<EntitySet>(set), out);
+  }
 }
 
 }  // namespace pictura

@@ -108,12 +108,18 @@ PICTURA_HD inline bool touches_barrier(const MapView& map, const AgentBox& box) 
          touches_any(footprint(box), box.center_m.z, map.walls, map.wall_cells);
 }
 
-/// Parks car `car` of the world, clear of the parked ones before it: on a parking lane or space, or outside a kerb and
-/// off the road. It is not drawn, and nobody meets it, when kSpawnTries places were taken.
-PICTURA_HD inline bool place_parked_car(const WorldView& world, int car) {
+/// Where parked car `car` of the world is put at its try `i`. There must be spots.
+PICTURA_HD inline const ParkingSpot& parking_spot(const WorldView& world, int car, int i) {
+  constexpr int kDrawsBefore = 2;  // its length and width
+  RandomStream random = agent_stream(world, car, 0, Purpose::parked_cars);
+  random.skip(kDrawsBefore + i);
+  const Span<const ParkingSpot> spots = world.map.parking_spots;
+  return spots[static_cast<size_t>(random.below(static_cast<int>(spots.size())))];
+}
+
+/// Parked car `car` on `spot`, or outside the kerb there.
+PICTURA_HD inline AgentBox parked_box(const WorldView& world, int car, const ParkingSpot& spot) {
   constexpr float kKerbGap_m = 0.2f;
-  const MapView& map = world.map;
-  const int index = world.num_agents + car;
   const ClassLimits limits = class_limits(AgentClass::vehicle);
   RandomStream random = agent_stream(world, car, 0, Purpose::parked_cars);
   AgentBox box;
@@ -121,37 +127,53 @@ PICTURA_HD inline bool place_parked_car(const WorldView& world, int car) {
   box.width_m = random.uniform(limits.min_width_m, limits.max_width_m);
   box.height_m = limits.height_m;
   box.palette = 2;
-  for (int i = 0; i < kSpawnTries && !map.parking_spots.empty(); ++i) {
-    const ParkingSpot& spot =
-        map.parking_spots[static_cast<size_t>(random.below(static_cast<int>(map.parking_spots.size())))];
-    const Vec2 center = spot.position_m.xy() + spot.outward * (kKerbGap_m + 0.5f * box.width_m);
-    const SinCos heading = sincos_of(spot.heading_rad);
-    box.center_m = {center.x, center.y, spot.position_m.z};
-    box.cos_heading = heading.cos;
-    box.sin_heading = heading.sin;
-    const bool is_at_kerb = dot(spot.outward, spot.outward) > 0.0f;
-    if (touches_barrier(map, box) || (is_at_kerb && is_on_road(map, center, box.center_m.z)) ||
-        !is_clear(world, box, world.num_agents, index)) {
-      continue;
-    }
-    world.boxes[index] = world.boxes_before[index] = box;
-    return true;
-  }
-  box.center_m = {};
-  box.drawn = 0;
-  world.boxes[index] = world.boxes_before[index] = box;
-  return false;
+  const Vec2 center = spot.position_m.xy() + spot.outward * (kKerbGap_m + 0.5f * box.width_m);
+  const SinCos heading = sincos_of(spot.heading_rad);
+  box.center_m = {center.x, center.y, spot.position_m.z};
+  box.cos_heading = heading.cos;
+  box.sin_heading = heading.sin;
+  return box;
 }
 
-/// Puts the agent on a lane, standing still along it, clear of parked cars and of the agents before it; it stays absent
-/// when kSpawnTries places were taken. Returns whether it was placed.
-PICTURA_HD inline bool place_agent(const WorldView& world, int agent) {
+/// Whether the map permits the box on its spot: clear of barriers, and off the road where that is beside a kerb.
+PICTURA_HD inline bool may_park(const MapView& map, const AgentBox& box, const ParkingSpot& spot) {
+  const bool is_at_kerb = dot(spot.outward, spot.outward) > 0.0f;
+  return !touches_barrier(map, box) && !(is_at_kerb && is_on_road(map, box.center_m.xy(), box.center_m.z));
+}
+
+/// Parks car `car` at its try `i`; with -1 it found no place, is not drawn, and nobody meets it.
+PICTURA_HD inline void put_parked_car(const WorldView& world, int car, int i) {
+  AgentBox box = parked_box(world, car, i < 0 ? ParkingSpot{} : parking_spot(world, car, i));
+  box.drawn = i >= 0;
+  if (i < 0) box.center_m = {};
+  world.boxes[world.num_agents + car] = world.boxes_before[world.num_agents + car] = box;
+}
+
+/// The place of try `i` of an agent.
+PICTURA_HD inline RoutePoint spawn_point(const WorldView& world, int agent, int i) {
+  RandomStream random = agent_stream(world, agent, 0, Purpose::spawn);
+  random.skip(i);
+  return draw_spawn_point(world.map, &random);
+}
+
+/// The agent's box where it stands along a lane at its try `i`.
+PICTURA_HD inline AgentBox spawn_box(const WorldView& world, int agent, int i) {
+  const RoutePoint at = spawn_point(world, agent, i);
+  const LanePose pose = pose_on_lane(world.map, at.lane, at.s_m);
+  return box_at(world.agents, world.first_slot + agent, pose.position_m, sincos_of(pose.heading_rad));
+}
+
+/// Whether the map permits an agent's box there: clear of barriers, its centre on the road.
+PICTURA_HD inline bool may_spawn(const MapView& map, const AgentBox& box) {
+  return !touches_barrier(map, box) && is_on_road(map, box.center_m.xy(), box.center_m.z);
+}
+
+/// Puts the agent at the place of its try `i`, standing still, and draws its first goals; with -1 it stays absent.
+PICTURA_HD inline void put_agent(const WorldView& world, int agent, int i) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
-  if (world.map.spawn_lanes.empty()) return false;
-  RandomStream random = agent_stream(world, agent, 0, Purpose::spawn);
-  for (int i = 0; i < kSpawnTries; ++i) {
-    const RoutePoint at = draw_spawn_point(world.map, &random);
+  if (i >= 0) {
+    const RoutePoint at = spawn_point(world, agent, i);
     const LanePose pose = pose_on_lane(world.map, at.lane, at.s_m);
     Motion motion;
     motion.x_m = pose.position_m.x;
@@ -160,24 +182,15 @@ PICTURA_HD inline bool place_agent(const WorldView& world, int agent) {
     store_motion(agents, slot, motion);
     agents.z_m[slot] = pose.position_m.z;
     agents.status[slot] = static_cast<uint8_t>(AgentStatus::active);
-    world.boxes[agent] = box_of(agents, slot);
-    const AgentBox& box = world.boxes[agent];
-    if (touches_barrier(world.map, box) || !is_on_road(world.map, box.center_m.xy(), box.center_m.z) ||
-        !is_clear(world, box, 0, agent) || !is_clear(world, box, world.num_agents, world.num_boxes)) {
-      continue;
-    }
-    world.boxes_before[agent] = world.boxes[agent];
-    store_fit(agents, slot, fit_lane(world.map, pose.position_m.xy(), pose.position_m.z, pose.heading_rad, at.lane));
     agents.goal_lane[slot] = at.lane;
     agents.goal_lane_s_m[slot] = at.s_m;
-    draw_goal_chain(world, agent);
-    return true;
   }
-  store_motion(agents, slot, Motion{});
-  agents.z_m[slot] = 0.0f;
-  agents.status[slot] = static_cast<uint8_t>(AgentStatus::absent);
   world.boxes[agent] = world.boxes_before[agent] = box_of(agents, slot);
-  return false;
+  if (i < 0) return;
+  store_fit(agents, slot,
+            fit_lane(world.map, {agents.x_m[slot], agents.y_m[slot]}, agents.z_m[slot], agents.heading_rad[slot],
+                     agents.goal_lane[slot]));
+  draw_goal_chain(world, agent);
 }
 
 }  // namespace pictura

@@ -26,12 +26,14 @@ struct RuleOptions {
 struct WorldView {
   MapView map;
   RuleOptions options;
+  int index = 0;  // among the simulator's worlds
   uint64_t seed = 0;
   uint32_t global_world = 0;
   uint32_t episode = 0;
   AgentStateView agents{};           // of all worlds, indexed by slot
   int first_slot = 0;                // of this world
   int num_agents = 0;                // controlled
+  int first_box = 0;                 // of this world, in the scene
   int num_boxes = 0;                 // controlled and parked
   AgentBox* boxes = nullptr;         // [num_boxes] this world's part of the scene: controlled, then parked
   AgentBox* boxes_before = nullptr;  // [num_boxes] as they stood before the step
@@ -84,22 +86,43 @@ PICTURA_HD inline void store_fit(const AgentStateView& agents, int slot, const L
   agents.speed_limit_mps[slot] = fit.speed_limit_mps;
 }
 
-/// The agent's box in the scene; nothing of an absent agent is drawn or met.
-PICTURA_HD inline AgentBox box_of(const AgentStateView& agents, int slot) {
-  const AgentStatus status = static_cast<AgentStatus>(agents.status[slot]);
+/// A box of the agent's class and size whose reference point stands at `position_m`.
+PICTURA_HD inline AgentBox box_at(const AgentStateView& agents, int slot, Vec3 position_m, SinCos heading) {
   const float ahead = reference_to_center(class_of(agents, slot), agents.length_m[slot]);
   AgentBox box;
-  box.center_m = {agents.x_m[slot] + ahead * agents.cos_heading[slot],
-                  agents.y_m[slot] + ahead * agents.sin_heading[slot], agents.z_m[slot]};
-  box.cos_heading = agents.cos_heading[slot];
-  box.sin_heading = agents.sin_heading[slot];
+  box.center_m = {position_m.x + ahead * heading.cos, position_m.y + ahead * heading.sin, position_m.z};
+  box.cos_heading = heading.cos;
+  box.sin_heading = heading.sin;
   box.length_m = agents.length_m[slot];
   box.width_m = agents.width_m[slot];
   box.height_m = agents.height_m[slot];
   box.agent_class = class_of(agents, slot);
+  return box;
+}
+
+/// The agent's box in the scene; nothing of an absent agent is drawn or met.
+PICTURA_HD inline AgentBox box_of(const AgentStateView& agents, int slot) {
+  const AgentStatus status = static_cast<AgentStatus>(agents.status[slot]);
+  AgentBox box = box_at(agents, slot, {agents.x_m[slot], agents.y_m[slot], agents.z_m[slot]},
+                        {agents.sin_heading[slot], agents.cos_heading[slot]});
   box.palette = status == AgentStatus::halted ? 1 : 0;
   box.drawn = status != AgentStatus::absent;
   return box;
+}
+
+/// Where the agent's cameras stand; that of an absent agent leaves nobody out, see Simulator::views().
+PICTURA_HD inline View view_of(const WorldView& world, int agent) {
+  View view;
+  view.world = world.index;
+  if (!world.boxes[agent].drawn) return view;
+  const AgentStateView& agents = world.agents;
+  const int slot = world.first_slot + agent;
+  view.ego_agent = world.first_box + agent;
+  view.origin_m = {agents.x_m[slot], agents.y_m[slot], agents.z_m[slot]};
+  view.cos_heading = agents.cos_heading[slot];
+  view.sin_heading = agents.sin_heading[slot];
+  view.body_length_m = agents.length_m[slot];
+  return view;
 }
 
 }  // namespace pictura

@@ -22,7 +22,7 @@ struct Observation : ::testing::Test {
     testing::add_light(map.get(), 120, 8, 2, {0, 4});
     return map;
   }
-  void look() { observe(stage.world(), 0, true, stage.batch.observation_view()); }
+  void look() { observe(stage.world(), 0, true, stage.results.observation_view()); }
   /// A point in the ego frame.
   static Vec2 local(float x, float y) {
     const float c = std::cos(0.1f), s = std::sin(0.1f);
@@ -38,7 +38,7 @@ TEST_F(Observation, Ego) {
   agents.accel_long_mps2[0] = -2;
   agents.accel_lat_mps2[0] = 1;
   look();
-  const float* ego = stage.batch.observation_view().ego.data();
+  const float* ego = stage.results.observation_view().ego.data();
   const float expected[kEgoFeatures] = {6 / 20.0f, 4 / 6.0f,   2 / 3.0f,    0.4f,          -0.4f,
                                         1 / 4.0f,  10 / 20.0f, 0.5f / 4.0f, std::cos(0.1f)};
   for (int i = 0; i < kEgoFeatures; ++i) EXPECT_NEAR(ego[i], expected[i], 1e-5) << i;
@@ -46,7 +46,7 @@ TEST_F(Observation, Ego) {
 
 TEST_F(Observation, PartnersAreTheNearestInOrder) {
   look();
-  const ObservationView out = stage.batch.observation_view();
+  const ObservationView out = stage.results.observation_view();
   ASSERT_EQ(out.set_counts[0], kMaxPartners);
   for (int i = 0; i < kMaxPartners; ++i) {
     const float* row = out.partners.data() + i * kPartnerFeatures;
@@ -66,7 +66,7 @@ TEST_F(Observation, PartnersAreTheNearestInOrder) {
 TEST_F(Observation, AuxiliarySlotsCanBeZero) {
   stage.batch.options.auxiliary_observations = false;
   look();
-  const ObservationView out = stage.batch.observation_view();
+  const ObservationView out = stage.results.observation_view();
   EXPECT_EQ(out.ego[7], 0);
   EXPECT_EQ(out.ego[8], 0);
   EXPECT_NE(out.ego[0], 0);
@@ -76,7 +76,7 @@ TEST_F(Observation, AuxiliarySlotsCanBeZero) {
 TEST_F(Observation, ControlsAreStopLinesWithStateAndWhetherTheyHoldTheEgo) {
   stage.batch.lights[0] = LightState::red;
   look();
-  const ObservationView out = stage.batch.observation_view();
+  const ObservationView out = stage.results.observation_view();
   ASSERT_EQ(out.set_counts[3], 1);
   const Vec2 left = local(120, 6), right = local(120, -2);
   const float expected[kControlFeatures] = {left.x / 120, left.y / 120, right.x / 120, right.y / 120, 0, 1, 1};
@@ -99,7 +99,7 @@ TEST_F(Observation, WaypointsStartWithTheActiveOne) {
   }
   agents.next_waypoint[0] = 1;
   look();
-  const ObservationView out = stage.batch.observation_view();
+  const ObservationView out = stage.results.observation_view();
   for (int i = 0; i < 3; ++i) {
     const int index = std::min(1 + i, 2);
     const Vec2 at = local(110 + 30 * static_cast<float>(index), 4 * static_cast<float>(index));
@@ -115,7 +115,7 @@ TEST_F(Observation, ConditioningIsScaledByThePapersRanges) {
   stage.set(0, Conditioning::center_bias_m, 0.25f);
   stage.set(0, Conditioning::throttle, 1.25f);
   look();
-  const ObservationView out = stage.batch.observation_view();
+  const ObservationView out = stage.results.observation_view();
   EXPECT_NEAR(out.conditioning[static_cast<size_t>(Conditioning::delta_goal_m)], 0, 1e-6);
   EXPECT_NEAR(out.conditioning[static_cast<size_t>(Conditioning::v_goal_mps)], 1, 1e-6);
   EXPECT_NEAR(out.conditioning[static_cast<size_t>(Conditioning::collision)], -1, 1e-6);
@@ -133,7 +133,7 @@ TEST_F(Observation, LanesAndBoundariesAreAllThatIsInSight) {
     const Vec2 at{random.uniform(0, 200), random.uniform(-1, 5)};
     stage.put(0, at, heading, 0);
     look();
-    const ObservationView out = stage.batch.observation_view();
+    const ObservationView out = stage.results.observation_view();
     for (const bool lanes : {true, false}) {
       const std::vector<ObservedPiece>& pieces = lanes ? map.lane_pieces : map.boundary_pieces;
       const Span<const float> rows = lanes ? out.lanes : out.boundaries;
@@ -179,7 +179,7 @@ TEST_F(Observation, HaltedAndAbsentAgentsObserveNothingButTheyAreSeen) {
   agents.status[1] = static_cast<uint8_t>(AgentStatus::halted);
   agents.events[1] = kEventNone;
   look();
-  const ObservationView out = stage.batch.observation_view();
+  const ObservationView out = stage.results.observation_view();
   EXPECT_NEAR(out.partners[0], local(108.8f, 4).x / 120, 1e-5);
   observe(stage.world(), 1, true, out);
   for (size_t i = 0; i < kEgoFeatures; ++i) EXPECT_EQ(out.ego[kEgoFeatures + i], 0);

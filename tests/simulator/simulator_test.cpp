@@ -10,8 +10,8 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/raster_check.h"
-#include "pictura/common/rng.h"
 #include "pictura/map/load_map.h"
+#include "pictura/tests/simulator/same_bits.h"
 #include "pictura/tests/simulator/test_maps.h"
 
 namespace pictura {
@@ -24,19 +24,9 @@ std::unique_ptr<Simulator> make(const SimulatorConfig& config, std::shared_ptr<c
   return make_simulator("cpu", config, {std::move(map)}, std::move(worlds));
 }
 
-/// Actions that keep most agents driving: mostly none, sometimes a push, keyed by slot and step.
-std::vector<int32_t> some_actions(int num_slots, uint32_t step) {
-  std::vector<int32_t> actions;
-  for (int slot = 0; slot < num_slots; ++slot) {
-    RandomStream random(9, 0, static_cast<uint32_t>(slot), 0, step, Purpose::action);
-    actions.push_back(random.uniform() < 0.3f ? random.below(kNumActions) : kCoast);
-  }
-  return actions;
-}
-
 void run(Simulator* simulator, int steps, uint32_t first_step = 0) {
   for (int i = 0; i < steps; ++i) {
-    simulator->step(some_actions(simulator->num_slots(), first_step + static_cast<uint32_t>(i)));
+    simulator->step(testing::mixed_actions(simulator->num_slots(), first_step + static_cast<uint32_t>(i)));
   }
 }
 
@@ -268,7 +258,7 @@ TEST(Simulator, AWorldIsTheSameWhateverStandsBesideIt) {
   const auto both = make({.num_threads = 1}, map, {{0, 12, 0}, {0, 12, 1}});
   const auto second = make({.num_threads = 1}, map, {{0, 12, 1}});
   for (int step = 0; step < 60; ++step) {
-    std::vector<int32_t> actions = some_actions(24, static_cast<uint32_t>(step));
+    std::vector<int32_t> actions = testing::mixed_actions(24, static_cast<uint32_t>(step));
     both->step(actions);
     second->step(Span<const int32_t>(actions).subspan(12, 12));
   }

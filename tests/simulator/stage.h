@@ -27,6 +27,7 @@ class Stage {
   WorldView world() { return batch.world(0); }
 
   WorldBatch batch;
+  HostResults results;
 
  private:
   void sort_boxes();
