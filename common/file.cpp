@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "pictura/common/error.h"
@@ -14,20 +15,70 @@ namespace pictura {
 
 namespace fs = std::filesystem;
 
-std::string read_file(const std::string& path, std::size_t max_bytes) {
-  std::error_code code;
-  const fs::file_status status = fs::status(path, code);
-  PICTURA_CHECK(fs::exists(status), "{}: no such file", path);
-  PICTURA_CHECK(!fs::is_directory(status), "{}: expected a file, got a folder", path);
-  std::ifstream in(path, std::ios::binary);
-  PICTURA_CHECK(in, "{}: cannot be opened: {}", path, std::strerror(errno));
-  std::string bytes;
-  char buffer[1 << 16];
-  while (in.read(buffer, sizeof buffer) || in.gcount() > 0) {
-    bytes.append(buffer, static_cast<std::size_t>(in.gcount()));
-    PICTURA_CHECK(bytes.size() <= max_bytes, "{}: larger than {} bytes", path, max_bytes);
+namespace {
+
+/// An open file that closes itself.
+class OpenFile {
+ public:
+  explicit OpenFile(const std::string& path) : path_(path), fd_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
+    PICTURA_CHECK(fd_ >= 0 || errno != ENOENT, "{}: no such file", path_);
+    PICTURA_CHECK(fd_ >= 0, "{}: cannot be opened: {}", path_, std::strerror(errno));
   }
-  PICTURA_CHECK(!in.bad(), "{}: reading failed: {}", path, std::strerror(errno));
+  ~OpenFile() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  OpenFile(const OpenFile&) = delete;
+  OpenFile& operator=(const OpenFile&) = delete;
+
+  struct stat status() const {
+    struct stat result{};
+    PICTURA_CHECK(::fstat(fd_, &result) == 0, "{}: cannot be asked for its size: {}", path_, std::strerror(errno));
+    return result;
+  }
+
+  /// Appends the next bytes, at most `count`; returns how many there were, 0 at the end.
+  std::size_t append_to(std::string* bytes, std::size_t count) const {
+    const std::size_t before = bytes->size();
+    bytes->resize(before + count);
+    ssize_t got = 0;
+    do {
+      got = ::read(fd_, bytes->data() + before, count);
+    } while (got < 0 && errno == EINTR);
+    PICTURA_CHECK(got >= 0, "{}: reading failed: {}", path_, std::strerror(errno));
+    bytes->resize(before + static_cast<std::size_t>(got));
+    return static_cast<std::size_t>(got);
+  }
+
+ private:
+  const std::string& path_;
+  int fd_;
+};
+
+bool is_same_version(const struct stat& a, const struct stat& b) {
+  return a.st_size == b.st_size && a.st_mtim.tv_sec == b.st_mtim.tv_sec && a.st_mtim.tv_nsec == b.st_mtim.tv_nsec;
+}
+
+}  // namespace
+
+std::string read_file(const std::string& path, std::size_t max_bytes) {
+  const OpenFile file(path);
+  const struct stat before = file.status();
+  PICTURA_CHECK(!S_ISDIR(before.st_mode), "{}: expected a file, got a folder", path);
+  // Pipes and the like have no size to be asked for beforehand.
+  const bool is_regular = S_ISREG(before.st_mode);
+  const auto check_size = [&](std::size_t bytes) {
+    PICTURA_CHECK(bytes <= max_bytes, "{}: larger than {} bytes", path, max_bytes);
+  };
+  if (is_regular) check_size(static_cast<std::size_t>(before.st_size));
+  constexpr std::size_t kChunk_bytes = std::size_t{1} << 16;
+  std::string bytes;
+  if (is_regular) bytes.reserve(static_cast<std::size_t>(before.st_size) + kChunk_bytes);
+  while (file.append_to(&bytes, kChunk_bytes) > 0) check_size(bytes.size());
+  if (is_regular) {
+    // Files of the kernel's own have no size, and bytes all the same.
+    const bool is_whole = before.st_size == 0 || bytes.size() == static_cast<std::size_t>(before.st_size);
+    PICTURA_CHECK(is_whole && is_same_version(before, file.status()), "{}: changed while it was read", path);
+  }
   return bytes;
 }
 

@@ -8,7 +8,8 @@
 
 namespace pictura {
 
-/// The bytes of a file. Throws Error naming the path and the reason; refuses files above max_bytes and folders.
+/// The bytes of a file. Throws Error naming the path and the reason; refuses folders, files above max_bytes, and files
+/// whose size or time of change differ before and after reading.
 std::string read_file(const std::string& path, std::size_t max_bytes = std::size_t{1} << 30);
 
 /// Calls write(temporary_path), then renames the temporary file to path. Whatever happens, no temporary file is left.

@@ -91,6 +91,10 @@ class Linker {
     }
     if (link.kind != RoadLink::Kind::road) return;
     const RoadLink& back = link_at(road_of(road_named(link.id, link.where)), link.contact);
+    if (link.id == road.id && (link.contact == end || back.kind != RoadLink::Kind::road)) {
+      link.where.fail("its {} is linked to the road's own {}, which is not linked back", name_of(end),
+                      name_of(link.contact));
+    }
     if (back.kind == RoadLink::Kind::road && (back.id != road.id || back.contact != end)) {
       link.where.fail("the {} of road {} is linked to the {} of road {} instead of the {} of this one",
                       name_of(link.contact), link.id, name_of(back.contact), back.id, name_of(end));

@@ -1,7 +1,10 @@
 // Files written beside and renamed; PNG and hash.
 #include "pictura/common/file.h"
 
+#include <atomic>
+#include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -45,6 +48,37 @@ TEST_F(FileTest, ErrorsNameThePath) {
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), testing::StartsWith("/proc/nowhere/a: cannot be written"));
   }
+}
+
+TEST_F(FileTest, AFileThatChangesWhileItIsReadIsRefused) {
+  const std::string path = folder_ / "growing";
+  write_file(path, std::string(std::size_t{64} << 20, 'x'));
+  EXPECT_EQ(read_file(path).size(), std::size_t{64} << 20);
+  std::atomic<bool> stop{false}, started{false};
+  std::thread writer([&] {
+    std::ofstream out(path, std::ios::app);
+    while (!stop) {
+      out << 'y' << std::flush;
+      started = true;
+    }
+  });
+  while (!started) std::this_thread::yield();
+  std::string message;
+  try {
+    read_file(path);
+  } catch (const Error& error) {
+    message = error.what();
+  }
+  stop = true;
+  writer.join();
+  EXPECT_EQ(message, path + ": changed while it was read");
+}
+
+TEST_F(FileTest, LargeFilesAreRefusedBeforeTheyAreRead) {
+  const std::string path = folder_ / "sparse";
+  write_file(path, "x");
+  std::filesystem::resize_file(path, std::uintmax_t{1} << 40);
+  EXPECT_THROW(read_file(path), Error);
 }
 
 TEST_F(FileTest, PngKeepsEveryPixel) {

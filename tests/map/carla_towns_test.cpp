@@ -1,4 +1,5 @@
 // CARLA's eight towns against what their files are known to hold, and what must be true of any map made from them.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <ctime>
@@ -20,18 +21,19 @@ struct TownFacts {
   int lights, signal_junctions;
   std::map<int, int> junctions_with_phases;
   int controlled_incoming_lanes, crosswalks, parking_spaces;
+  int painted_stop_lines, painted_near_lights, stop_signs, yield_signs;
 };
 
 // Counted in the files, without this importer. Town10HD has two more signals of a light's type, without references.
 const TownFacts kTowns[] = {
-    {"Town01", 122, 96, 12, 6.4, 1.4, 0, 0, 36, 12, {{3, 12}}, 36, 0, 0},
-    {"Town02", 84, 64, 8, 2.9, 0.8, 0, 0, 24, 8, {{3, 8}}, 24, 0, 0},
-    {"Town03", 369, 287, 35, 13.8, 6.0, -0.9, 8.5, 38, 11, {{3, 6}, {4, 5}}, 55, 73, 121},
-    {"Town04", 276, 223, 27, 33.4, 8.4, 0, 11, 43, 12, {{3, 5}, {4, 7}}, 50, 27, 0},
-    {"Town05", 323, 270, 21, 23.9, 6.5, 0, 10, 54, 15, {{1, 1}, {3, 4}, {4, 10}}, 111, 66, 0},
-    {"Town06", 200, 128, 23, 25.5, 6.4, 0, 0, 19, 8, {{2, 5}, {3, 3}}, 66, 14, 0},
-    {"Town07", 277, 209, 31, 7.1, 2.7, -0.7, 9.4, 17, 5, {{3, 3}, {4, 2}}, 18, 7, 0},
-    {"Town10HD", 108, 85, 9, 6.0, 2.8, 0, 0, 15, 5, {{2, 1}, {3, 3}, {4, 1}}, 30, 16, 0},
+    {"Town01", 122, 96, 12, 6.4, 1.4, 0, 0, 36, 12, {{3, 12}}, 36, 0, 0, 0, 0, 0, 0},
+    {"Town02", 84, 64, 8, 2.9, 0.8, 0, 0, 24, 8, {{3, 8}}, 24, 0, 0, 0, 0, 0, 0},
+    {"Town03", 369, 287, 35, 13.8, 6.0, -0.9, 8.5, 38, 11, {{3, 6}, {4, 5}}, 55, 73, 121, 7, 0, 0, 0},
+    {"Town04", 276, 223, 27, 33.4, 8.4, 0, 11, 43, 12, {{3, 5}, {4, 7}}, 50, 27, 0, 9, 5, 0, 0},
+    {"Town05", 323, 270, 21, 23.9, 6.5, 0, 10, 54, 15, {{1, 1}, {3, 4}, {4, 10}}, 111, 66, 0, 10, 8, 5, 0},
+    {"Town06", 200, 128, 23, 25.5, 6.4, 0, 0, 19, 8, {{2, 5}, {3, 3}}, 66, 14, 0, 17, 9, 0, 0},
+    {"Town07", 277, 209, 31, 7.1, 2.7, -0.7, 9.4, 17, 5, {{3, 3}, {4, 2}}, 18, 7, 0, 1, 1, 19, 20},
+    {"Town10HD", 108, 85, 9, 6.0, 2.8, 0, 0, 15, 5, {{2, 1}, {3, 3}, {4, 1}}, 30, 16, 0, 21, 15, 3, 1},
 };
 
 class CarlaTowns : public ::testing::TestWithParam<TownFacts> {
@@ -82,6 +84,26 @@ TEST_P(CarlaTowns, HoldWhatTheirFilesHold) {
   }
   EXPECT_EQ(incoming, expected.controlled_incoming_lanes);
   EXPECT_LT(load_s_, 2.0);
+
+  EXPECT_EQ(facts.painted_stop_lines, expected.painted_stop_lines);
+  EXPECT_EQ(map_->stop_lines.size(), static_cast<std::size_t>(expected.painted_stop_lines));
+  int near = 0;
+  for (const PaintedStopLine& line : map_->stop_lines) {
+    near += std::any_of(map_->lights.begin(), map_->lights.end(), [&](const TrafficLight& light) {
+      const Vec2 painted = (line.a_m.xy() + line.b_m.xy()) * 0.5f;
+      return length(painted - (light.stop_a_m.xy() + light.stop_b_m.xy()) * 0.5f) < 8.0f;
+    });
+  }
+  EXPECT_EQ(near, expected.painted_near_lights);
+  EXPECT_EQ(facts.signs, expected.stop_signs + expected.yield_signs);
+  std::map<std::string, int> signs;
+  for (const Sign& sign : map_->signs) {
+    ++signs[sign.type];
+    EXPECT_GT(sign.lanes.size(), 0) << sign.name;
+  }
+  EXPECT_EQ(signs["206"], expected.stop_signs);
+  EXPECT_EQ(signs["205"], expected.yield_signs);
+  EXPECT_FALSE(map_->geo_reference.empty());
 }
 
 TEST_P(CarlaTowns, LanesContinueEachOther) {

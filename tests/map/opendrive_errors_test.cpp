@@ -119,7 +119,8 @@ TEST(OpenDriveErrors, IdsAreUnique) {
 
 TEST(OpenDriveErrors, LinksMustLeadSomewhere) {
   RoadText road;
-  road.link = R"(<successor elementType="road" elementId="1" contactPoint="start"/>)";
+  road.link = R"(<predecessor elementType="road" elementId="1" contactPoint="end"/>)"
+              R"(<successor elementType="road" elementId="1" contactPoint="start"/>)";
   road.right = lane_of(-1, "driving", 3, R"(<link><successor id="-4"/></link>)");
   EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("is linked to lane -4 of road 1, which does not exist"));
   road.right = lane_of(-1, "driving", 3);
@@ -136,6 +137,102 @@ TEST(OpenDriveErrors, LinksMustLeadSomewhere) {
   road.rest = "";
   EXPECT_THAT(message_of(file_of(road.text() + "<controller id=\"4\"><control signalId=\"6\"/></controller>")),
               HasSubstr("controller 4: <controller>: controls signal 6"));
+}
+
+TEST(OpenDriveErrors, RoadsThatContradictEachOtherAreRefused) {
+  auto link = [](const char* end, const char* road, const char* contact) {
+    return fmt::format(R"(<{} elementType="road" elementId="{}" contactPoint="{}"/>)", end, road, contact);
+  };
+  RoadText a, b, c;
+  for (RoadText* road : {&a, &b, &c}) road->right = lane_of(-1, "driving", 3);
+  b.id = "2";
+  b.geometry = line_at(0, 100, 0, 0, 100);
+  c.id = "3";
+  c.geometry = line_at(0, 100, 50, 0, 100);
+  // A road that is its own predecessor is a ring, whose end says so too.
+  for (const char* contact : {"start", "end"}) {
+    a.link = link("predecessor", "1", contact);
+    EXPECT_THAT(message_of(file_of(a.text())),
+                HasSubstr(fmt::format("its start is linked to the road's own {}, which is not linked back", contact)));
+  }
+  a.link = link("predecessor", "1", "end");
+  a.link += link("successor", "2", "start");
+  EXPECT_THAT(message_of(file_of(a.text() + b.text())),
+              HasSubstr("bad.xodr:5: road 1: <predecessor>: the end of road 1 is linked to the start of road 2"));
+  // 1 goes on into 2, which says that it comes from 3.
+  a.link = link("successor", "2", "start");
+  b.link = link("predecessor", "3", "end");
+  EXPECT_THAT(message_of(file_of(a.text() + b.text() + c.text())),
+              HasSubstr("road 1: <successor>: the start of road 2 is linked to the end of road 3 instead of the end"));
+  b.link = link("predecessor", "1", "end");
+  EXPECT_EQ(message_of(file_of(a.text() + b.text() + c.text())), "(no error)");
+}
+
+TEST(OpenDriveErrors, SectionsAreInOrder) {
+  RoadText road;
+  auto section = [](int s) {
+    return fmt::format("<laneSection s=\"{}\"><center/><right>{}</right></laneSection>\n", s,
+                       lane_of(-1, "driving", 3));
+  };
+  road.sections = section(0) + section(60) + section(30);
+  EXPECT_THAT(message_of(file_of(road.text())),
+              AllOf(HasSubstr("<laneSection>: attribute s"), HasSubstr("at least the previous section's 60, got 30")));
+  road.sections = section(0) + section(120);
+  EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("<laneSection>: attribute s: expected a number in [0, 100]"));
+}
+
+TEST(OpenDriveErrors, WhatIsNotSupportedIsRefusedByName) {
+  RoadText road;
+  road.right = lane_of(-1, "driving", 3);
+  for (const char* type : {"virtual", "crossing"}) {
+    EXPECT_THAT(
+        message_of(file_of(road.text() + fmt::format("<junction id=\"3\" type=\"{}\"/>", type))),
+        HasSubstr(fmt::format("junction 3: <junction>: attribute type: '{}' junctions are not supported", type)));
+  }
+  road.link = R"(<successor elementType="road" elementId="1" elementS="5" elementDir="+"/>)";
+  EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("<successor>: attribute elementS: links to the middle"));
+  road.link = "";
+  EXPECT_THAT(message_of(file_of("<include file=\"other.xodr\"/>" + road.text())), HasSubstr("<include>"));
+}
+
+TEST(OpenDriveErrors, HostileFilesAreRefusedAtTheDoor) {
+  const std::string text = good_file();
+  // Entities that grow a thousandfold with each level.
+  EXPECT_THAT(message_of(replaced(text, "<OpenDRIVE>", "<!DOCTYPE a [<!ENTITY b \"&a;&a;\">]><OpenDRIVE>")),
+              HasSubstr("bad.xodr:2: a document type (<!DOCTYPE>) is not supported"));
+  std::string nul = text;
+  nul[text.find("driving")] = '\0';
+  EXPECT_THAT(message_of(nul), HasSubstr("bad.xodr:13: expected UTF-8 text, got the byte 0x00"));
+  EXPECT_THAT(message_of(replaced(text, "driving", "driv\xffing")), HasSubstr("got the byte 0xff"));
+  EXPECT_THAT(message_of(replaced(text, "driving", "\xc3\xa9")), HasSubstr("is not a lane type"));
+  std::string nested, closed;
+  for (int i = 0; i < 100'000; ++i) {
+    nested += "<a>";
+    closed += "</a>";
+  }
+  EXPECT_THAT(message_of(replaced(text, "<header", nested + closed + "<header")), HasSubstr("more than 64 deep"));
+  EXPECT_THAT(message_of(replaced(text, "type=\"driving\"", "type=\"" + std::string(1 << 20, 'x') + "\"")),
+              HasSubstr("bad.xodr:13: <lane> attribute type: expected at most 65536 bytes, got 1048576"));
+}
+
+TEST(OpenDriveErrors, ObjectsAndSignalsStandAtTheirRoad) {
+  RoadText road;
+  road.right = lane_of(-1, "driving", 3);
+  for (
+      const auto& [rest, expected] : std::vector<std::array<std::string, 2>>{
+          {R"(<objects><object id="1" type="crosswalk" s="500" t="0" length="2" width="2"/></objects>)",
+           "<object>: attribute s: expected a number in [-10, 110], got 500"},
+          {R"(<objects><object id="1" type="crosswalk" s="5" t="0"/></objects>)", "with an outline, or a length"},
+          {R"(<objects><object id="1" type="parking" s="5" t="0" length="5"/></objects>)", "with a length and a width"},
+          {R"(<objects><object id="1" type="stopLine" s="5" t="0"/></objects>)", "a stop line at least"},
+          {R"(<objects><object id="1" type="crosswalk" s="5" t="0"><outline><cornerLocal u="1" v="0"/></outline></object></objects>)",
+           "three distinct corners, got 1"},
+          {R"(<signals><signal id="1" s="5" t="1e9"/></signals>)", "<signal>: attribute t: expected a number in"},
+          {R"(<signals><signal id="1" s="5" t="1" orientation="left"/></signals>)",
+           "expected +, - or none, got 'left'"}}) {
+    road.rest = rest;
+    EXPECT_THAT(message_of(file_of(road.text())), HasSubstr(expected)) << rest;
+  }
 }
 
 TEST(OpenDriveErrors, WindingCurvesDoNotEatTheMemory) {

@@ -11,36 +11,14 @@
 namespace pictura {
 namespace {
 
-using test::file_of;
+using test::expect_at;
+using test::index_of;
+using test::lane_named;
 using test::lane_of;
 using test::line_at;
+using test::list;
+using test::parse;
 using test::RoadText;
-
-RoadMap parse(const std::string& contents) { return parse_opendrive(file_of(contents), "small.xodr"); }
-
-const Lane& lane_named(const RoadMap& map, const std::string& road, int section, int lane) {
-  for (const Lane& candidate : map.lanes) {
-    if (map.road_names[static_cast<std::size_t>(candidate.source_road)] == road &&
-        candidate.source_section == section && candidate.source_lane == lane) {
-      return candidate;
-    }
-  }
-  throw std::runtime_error(fmt::format("no lane {} in section {} of road {}", lane, section, road));
-}
-
-int32_t index_of(const RoadMap& map, const Lane& lane) { return static_cast<int32_t>(&lane - map.lanes.data()); }
-
-std::vector<int32_t> list(const RoadMap& map, IndexRange range) {
-  const Span<const int32_t> links = map.links(range);
-  return {links.begin(), links.end()};
-}
-
-/// File coordinates of a point.
-void expect_at(const RoadMap& map, Vec3 p, double x, double y, double z = 0) {
-  EXPECT_NEAR(p.x + map.origin_m[0], x, 1e-4);
-  EXPECT_NEAR(p.y + map.origin_m[1], y, 1e-4);
-  EXPECT_NEAR(p.z + map.origin_m[2], z, 1e-4);
-}
 
 TEST(OpenDriveGeometry, LanesOfALineRunInTheDirectionOfTravel) {
   RoadText road;
@@ -277,70 +255,6 @@ TEST(OpenDriveLanes, ARingIsEndlessAndADeadEndIsNotUnlessOneCanChangeLanes) {
   EXPECT_TRUE(lane_named(map, "1", 0, -2).is_endless);
   EXPECT_TRUE(lane_named(map, "1", 0, -1).is_endless);
   EXPECT_FALSE(lane_named(map, "2", 0, -1).is_endless);
-}
-
-TEST(OpenDrivePaint, MarksHaveTheirPatternsColoursAndWidths) {
-  auto marks = [](const std::string& attributes) {
-    RoadText road;
-    road.center_mark = "<roadMark sOffset=\"0\" " + attributes + "/>";
-    road.right = lane_of(-1, "driving", 3);
-    return parse(road.text());
-  };
-  const RoadMap solid = marks(R"(type="solid" color="yellow" width="0.2")");
-  ASSERT_EQ(solid.markings.size(), 1u);
-  EXPECT_EQ(solid.markings[0].color, MarkColor::yellow);
-  EXPECT_FLOAT_EQ(solid.markings[0].width_m, 0.2f);
-  EXPECT_FALSE(solid.markings[0].broken);
-
-  // Dashes of 3 m every 12 m begin at 0, 12, ..., 96.
-  const RoadMap broken = marks(R"(type="broken" color="white")");
-  ASSERT_EQ(broken.markings.size(), 9u);
-  for (std::size_t i = 0; i < 9; ++i) {
-    const Vec3 a = broken.marking_points[static_cast<std::size_t>(broken.markings[i].points.begin)];
-    const Vec3 b = broken.marking_points[static_cast<std::size_t>(broken.markings[i].points.end) - 1];
-    expect_at(broken, a, 12.0 * static_cast<double>(i), 0);
-    expect_at(broken, b, 12.0 * static_cast<double>(i) + 3, 0);
-    EXPECT_TRUE(broken.markings[i].broken);
-  }
-
-  // The center line's first word is its left stripe, one width from the middle.
-  const RoadMap both = marks(R"(type="solid broken" color="white" width="0.1")");
-  ASSERT_EQ(both.markings.size(), 10u);
-  for (const Marking& marking : both.markings) {
-    expect_at(both, both.marking_points[static_cast<std::size_t>(marking.points.begin)],
-              both.marking_points[static_cast<std::size_t>(marking.points.begin)].x + both.origin_m[0],
-              marking.broken ? -0.1 : 0.1);
-  }
-  EXPECT_EQ(marks(R"(type="solid solid" color="white")").markings.size(), 2u);
-  EXPECT_EQ(marks(R"(type="none" color="white")").markings.size(), 0u);
-  EXPECT_EQ(marks(R"(type="curb" color="white")").markings.size(), 0u);
-}
-
-TEST(OpenDrivePaint, CrosswalksAndParkingSpacesStandWhereTheyShould) {
-  RoadText road;
-  road.geometry = line_at(0, 0, 0, M_PI / 2, 100);
-  road.right = lane_of(-1, "driving", 3);
-  road.rest =
-      R"(<objects><object id="1" type="crosswalk" s="10" t="2" zOffset="0.5" hdg="0"><outline>)"
-      R"(<cornerLocal u="1" v="1" z="0"/><cornerLocal u="-1" v="1" z="0"/><cornerLocal u="-1" v="-1" z="0"/>)"
-      R"(<cornerLocal u="1" v="1" z="0"/></outline></object>)"
-      R"(<object id="2" type="crosswalk" s="0" t="0"><outline><cornerRoad s="20" t="3" dz="0"/>)"
-      R"(<cornerRoad s="22" t="3" dz="0"/><cornerRoad s="22" t="-3" dz="1"/></outline></object>)"
-      R"(<object id="3" type="parking" s="30" t="-4" hdg="1.5707963267948966" length="2" width="5"/></objects>)";
-  const RoadMap map = parse(road.text());
-  ASSERT_EQ(map.crosswalks.size(), 2u);
-  ASSERT_EQ(map.crosswalks[0].outline.size(), 3);
-  // Along the road is +y here, and its left is -x.
-  expect_at(map, map.outline_points[0], -3, 11, 0.5);
-  expect_at(map, map.outline_points[1], -3, 9, 0.5);
-  expect_at(map, map.outline_points[2], -1, 9, 0.5);
-  expect_at(map, map.outline_points[3], -3, 20);
-  expect_at(map, map.outline_points[5], 3, 22, 1);
-  ASSERT_EQ(map.parking_spaces.size(), 1u);
-  expect_at(map, map.parking_spaces[0].center_m, 4, 30);
-  EXPECT_FLOAT_EQ(map.parking_spaces[0].length_m, 5);
-  EXPECT_FLOAT_EQ(map.parking_spaces[0].width_m, 2);
-  EXPECT_NEAR(map.parking_spaces[0].heading_rad, M_PI / 2, 1e-5);
 }
 
 TEST(OpenDriveLights, StopLineHeadPhaseAndLanesFollowFromTheReferences) {

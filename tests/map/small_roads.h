@@ -1,9 +1,14 @@
 // Small OpenDRIVE files for tests, put together from text.
 #pragma once
 
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "pictura/map/opendrive/opendrive.h"
 
 namespace pictura::test {
 
@@ -33,7 +38,9 @@ struct RoadText {
   std::string link;         // contents of <link>
   std::string type;         // whole <type> elements
   std::string geometry;     // contents of <planView>; empty: a straight line along x
+  std::string rule;         // "LHT", or empty
   std::string elevation;    // whole <elevation> elements
+  std::string lateral;      // contents of <lateralProfile>
   std::string lane_offset;  // whole <laneOffset> elements
   std::string center_mark;  // whole <roadMark> elements
   std::string left, right;  // whole <lane> elements of the one section
@@ -50,11 +57,39 @@ struct RoadText {
       lanes += "</laneSection>\n";
     }
     return fmt::format(
-        "<road id=\"{}\" length=\"{}\" junction=\"{}\">\n<link>{}</link>\n{}<planView>\n{}</planView>\n"
-        "<elevationProfile>{}</elevationProfile>\n<lanes>{}{}</lanes>\n{}</road>\n",
-        id, length, junction, link, type, geometry.empty() ? line_at(0, 0, 0, 0, length) : geometry, elevation,
-        lane_offset, lanes, rest);
+        "<road id=\"{}\" length=\"{}\" junction=\"{}\"{}>\n<link>{}</link>\n{}<planView>\n{}</planView>\n"
+        "<elevationProfile>{}</elevationProfile>\n{}<lanes>{}{}</lanes>\n{}</road>\n",
+        id, length, junction, rule.empty() ? "" : " rule=\"" + rule + "\"", link, type,
+        geometry.empty() ? line_at(0, 0, 0, 0, length) : geometry, elevation,
+        lateral.empty() ? "" : "<lateralProfile>" + lateral + "</lateralProfile>\n", lane_offset, lanes, rest);
   }
 };
+
+/// The map of a file with the given contents of <OpenDRIVE>.
+inline RoadMap parse(const std::string& contents) { return parse_opendrive(file_of(contents), "small.xodr"); }
+
+inline const Lane& lane_named(const RoadMap& map, const std::string& road, int section, int lane) {
+  for (const Lane& candidate : map.lanes) {
+    if (map.road_names[static_cast<std::size_t>(candidate.source_road)] == road &&
+        candidate.source_section == section && candidate.source_lane == lane) {
+      return candidate;
+    }
+  }
+  throw std::runtime_error(fmt::format("no lane {} in section {} of road {}", lane, section, road));
+}
+
+inline int32_t index_of(const RoadMap& map, const Lane& lane) { return static_cast<int32_t>(&lane - map.lanes.data()); }
+
+inline std::vector<int32_t> list(const RoadMap& map, IndexRange range) {
+  const Span<const int32_t> links = map.links(range);
+  return {links.begin(), links.end()};
+}
+
+/// File coordinates of a point.
+inline void expect_at(const RoadMap& map, Vec3 p, double x, double y, double z = 0) {
+  EXPECT_NEAR(p.x + map.origin_m[0], x, 1e-4);
+  EXPECT_NEAR(p.y + map.origin_m[1], y, 1e-4);
+  EXPECT_NEAR(p.z + map.origin_m[2], z, 1e-4);
+}
 
 }  // namespace pictura::test
