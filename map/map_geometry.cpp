@@ -1,5 +1,6 @@
 #include "pictura/map/map_geometry.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -12,12 +13,33 @@ namespace {
 constexpr float kRoadEdgeWidth_m = 0.15f;
 constexpr float kCrosswalkWidth_m = 0.3f;  // of the line around a crosswalk
 constexpr float kStopLineWidth_m = 0.4f;
+constexpr float kSameStopLine_m = 8.0f;
 // Buildings of 1 to 4 pieces (about 8 m each) with gaps of 1 or 2 between most of them.
 constexpr int kMaxBuildingPieces = 4, kMaxGapPieces = 2;
 constexpr float kTerracedShare = 0.3f;
 constexpr float kMinWall_m = 3.0f, kMaxWall_m = 12.0f;
 
-Rgb mark_color(MarkColor color) { return color == MarkColor::yellow ? kYellowMarkColor : kWhiteMarkColor; }
+Rgb mark_color(MarkColor color) {
+  switch (color) {
+    case MarkColor::white: return kWhiteMarkColor;
+    case MarkColor::yellow: return kYellowMarkColor;
+    case MarkColor::red: return rgb8(200, 60, 60);
+    case MarkColor::green: return rgb8(60, 180, 90);
+    case MarkColor::blue: return rgb8(70, 110, 220);
+    case MarkColor::orange: return rgb8(240, 140, 40);
+    case MarkColor::violet: return rgb8(150, 80, 200);
+    case MarkColor::black: return {};
+  }
+  return kWhiteMarkColor;
+}
+
+/// Whether a light's stop line is this one: files paint theirs up to some metres into the junction.
+bool has_light(const RoadMap& map, const PaintedStopLine& line) {
+  const Vec3 middle = (line.a_m + line.b_m) * 0.5f;
+  return std::any_of(map.lights.begin(), map.lights.end(), [&](const TrafficLight& light) {
+    return length((light.stop_a_m + light.stop_b_m) * 0.5f - middle) < kSameStopLine_m;
+  });
+}
 
 /// Consecutive edges that meet end to end, as one polyline each, so that their strips are mitred.
 void append_road_edges(const RoadMap& map, std::vector<Strip>* strips_out) {
@@ -50,6 +72,11 @@ StaticGeometry make_static_geometry(const RoadMap& map, const MapGeometryOptions
                            map.outline_points.begin() + crosswalk.outline.end);
     ring.push_back(ring.front());
     append_strips(ring, kCrosswalkWidth_m, kCrosswalkColor, StripKind::crosswalk, &geometry.strips);
+  }
+  for (const PaintedStopLine& line : map.stop_lines) {
+    if (has_light(map, line)) continue;
+    const std::array<Vec3, 2> ends{line.a_m, line.b_m};
+    append_strips(ends, line.width_m, kStopLineColor, StripKind::stop_line, &geometry.strips);
   }
   for (std::size_t i = 0; i < map.lights.size(); ++i) {
     const TrafficLight& light = map.lights[i];

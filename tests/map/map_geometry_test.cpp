@@ -41,6 +41,40 @@ TEST(MapGeometry, AStraightRoadHasItsMarksAndItsFrame) {
   }
 }
 
+TEST(MapGeometry, MarksHaveTheColourOfTheFile) {
+  std::vector<float> reds;
+  for (const char* color : {"white", "yellow", "red", "green", "blue", "orange", "violet", "black"}) {
+    test::RoadText road;
+    road.center_mark = fmt::format(R"(<roadMark sOffset="0" type="solid" color="{}"/>)", color);
+    road.right = test::lane_of(-1, "driving", 4);
+    const StaticGeometry geometry = make_static_geometry(test::parse(road.text()), {.walls = false});
+    for (const Strip& strip : geometry.strips) {
+      if (strip.kind != StripKind::lane_mark) continue;
+      reds.push_back(strip.color.r);
+      break;
+    }
+  }
+  ASSERT_EQ(reds.size(), 8u);
+  EXPECT_FLOAT_EQ(reds[0], kWhiteMarkColor.r);
+  EXPECT_FLOAT_EQ(reds[1], kYellowMarkColor.r);
+  EXPECT_GT(reds[2], 2 * reds[3]);
+  EXPECT_FLOAT_EQ(reds[7], 0);
+}
+
+TEST(MapGeometry, PaintedStopLinesAreDrawnWhereNoLightDrawsItsOwn) {
+  const std::string line =
+      R"(<objects><object id="1" type="stopLine" s="{}" t="-3" length="0.5" width="6"/></objects>)";
+  const std::string light = R"(<signals><signal id="50" type="1000001" s="1" t="-7"/></signals>)";
+  for (const auto& [s, lines] : std::vector<std::pair<int, int>>{{3, 1}, {15, 2}}) {
+    const RoadMap map =
+        test::parse(test::three_roads(fmt::format(fmt::runtime(line), s) + light, R"(<controller id="90" type="0"/>)") +
+                    R"(<controller id="90"><control signalId="50"/></controller>)");
+    ASSERT_EQ(map.lights.size(), 1u);
+    ASSERT_EQ(map.stop_lines.size(), 1u);
+    EXPECT_EQ(count_of(make_static_geometry(map, {.walls = false}), StripKind::stop_line), lines) << s;
+  }
+}
+
 TEST(MapGeometry, LightsHaveAHeadAndAStopLineEach) {
   const std::shared_ptr<const RoadMap> map = load_map("procedural:3");
   ASSERT_GT(map->lights.size(), 0u);

@@ -19,6 +19,7 @@ using test::line_at;
 using test::list;
 using test::parse;
 using test::RoadText;
+using test::three_roads;
 
 TEST(OpenDriveGeometry, LanesOfALineRunInTheDirectionOfTravel) {
   RoadText road;
@@ -182,31 +183,6 @@ TEST(OpenDriveLanes, TypesOfAllVersionsAreKnown) {
   expect_at(map, map.lane_points[0].position_m, 0, -4.5);
 }
 
-/// Roads 1 (along x to 100), 3 (from 120 on) and 2 between them in junction 7; road 1 has no limit on its way back.
-std::string three_roads(const std::string& rest_of_2 = "", const std::string& junction_more = "") {
-  RoadText a, b, c;
-  a.link = R"(<successor elementType="junction" elementId="7"/>)";
-  a.type = R"(<type s="0" type="town"><speed max="36" unit="km/h"/></type>)";
-  a.right = lane_of(-1, "driving", 3) + lane_of(-2, "driving", 3);
-  b.id = "2";
-  b.junction = "7";
-  b.length = 20;
-  b.geometry = line_at(0, 100, 0, 0, 20);
-  b.link = R"(<predecessor elementType="road" elementId="1" contactPoint="end"/>)"
-           R"(<successor elementType="road" elementId="3" contactPoint="start"/>)";
-  b.right = lane_of(-1, "driving", 3, R"(<link><predecessor id="-1"/><successor id="-1"/></link>)") +
-            lane_of(-2, "driving", 3, R"(<link><predecessor id="-2"/><successor id="-2"/></link>)");
-  b.rest = rest_of_2;
-  c.id = "3";
-  c.link = R"(<predecessor elementType="junction" elementId="7"/>)";
-  c.geometry = line_at(0, 120, 0, 0, 100);
-  c.right = lane_of(-1, "driving", 3) + lane_of(-2, "driving", 3);
-  return a.text() + b.text() + c.text() +
-         R"(<junction id="7" name=""><connection id="0" incomingRoad="1" connectingRoad="2" contactPoint="start">)"
-         R"(<laneLink from="-1" to="-1"/><laneLink from="-2" to="-2"/></connection>)" +
-         junction_more + "</junction>\n";
-}
-
 TEST(OpenDriveLanes, JunctionLanesAreLinkedAndInheritTheirSpeedLimit) {
   const RoadMap map = parse(three_roads());
   const Lane &a = lane_named(map, "1", 0, -2), &b = lane_named(map, "2", 0, -2), &c = lane_named(map, "3", 0, -2);
@@ -255,36 +231,6 @@ TEST(OpenDriveLanes, ARingIsEndlessAndADeadEndIsNotUnlessOneCanChangeLanes) {
   EXPECT_TRUE(lane_named(map, "1", 0, -2).is_endless);
   EXPECT_TRUE(lane_named(map, "1", 0, -1).is_endless);
   EXPECT_FALSE(lane_named(map, "2", 0, -1).is_endless);
-}
-
-TEST(OpenDriveLights, StopLineHeadPhaseAndLanesFollowFromTheReferences) {
-  const std::string signals =
-      R"(<signals><signal id="50" type="1000001" s="18" t="-5" zOffset="-0.5" orientation="+"/>)"
-      R"(<signal id="51" type="1000001" s="18" t="5" orientation="+"><validity fromLane="0" toLane="0"/></signal>)"
-      R"(<signalReference id="50" s="12" t="0" orientation="+"><validity fromLane="-2" toLane="-1"/></signalReference>)"
-      R"(</signals>)";
-  const std::string controllers = R"(<controller id="90" sequence="3"><control signalId="50"/></controller>)"
-                                  R"(<controller id="91" sequence="1"><control signalId="51"/></controller>)";
-  const RoadMap map =
-      parse(three_roads(signals, R"(<controller id="90" type="0"/><controller id="91" type="0"/>)") + controllers);
-  ASSERT_EQ(map.lights.size(), 1u);  // 51 holds no lane
-  const TrafficLight& light = map.lights[0];
-  EXPECT_EQ(light.name, "50");
-  EXPECT_EQ(light.junction, 0);
-  EXPECT_EQ(light.phase, 1);
-  EXPECT_EQ(map.junctions[0].num_phases, 2);
-  expect_at(map, light.stop_a_m, 100, 0);
-  expect_at(map, light.stop_b_m, 100, -6);
-  EXPECT_NEAR(light.stop_heading_rad, 0, 1e-6);
-  EXPECT_NEAR(light.head_facing.x, -1, 1e-6);
-  EXPECT_NEAR(light.head_facing.y, 0, 1e-6);
-  expect_at(map, light.head_m, 118, -5, 5.0);  // beyond the junction: 5.5 m above the post's foot
-  const std::vector<int32_t> expected = {
-      index_of(map, lane_named(map, "1", 0, -1)), index_of(map, lane_named(map, "1", 0, -2)),
-      index_of(map, lane_named(map, "2", 0, -1)), index_of(map, lane_named(map, "2", 0, -2))};
-  EXPECT_EQ(
-      std::vector<int32_t>(map.light_lanes.begin() + light.lanes.begin, map.light_lanes.begin() + light.lanes.end),
-      expected);
 }
 
 }  // namespace

@@ -65,6 +65,33 @@ struct RoadText {
   }
 };
 
+/// Roads 1 (along x to 100), 3 (from 120 on) and 2 between them in junction 7; road 1 has no limit on its way back.
+inline std::string three_roads(const std::string& rest_of_2 = "", const std::string& junction_more = "",
+                               const std::string& rest_of_1 = "") {
+  RoadText a, b, c;
+  a.link = R"(<successor elementType="junction" elementId="7"/>)";
+  a.type = R"(<type s="0" type="town"><speed max="36" unit="km/h"/></type>)";
+  a.right = lane_of(-1, "driving", 3) + lane_of(-2, "driving", 3);
+  a.rest = rest_of_1;
+  b.id = "2";
+  b.junction = "7";
+  b.length = 20;
+  b.geometry = line_at(0, 100, 0, 0, 20);
+  b.link = R"(<predecessor elementType="road" elementId="1" contactPoint="end"/>)"
+           R"(<successor elementType="road" elementId="3" contactPoint="start"/>)";
+  b.right = lane_of(-1, "driving", 3, R"(<link><predecessor id="-1"/><successor id="-1"/></link>)") +
+            lane_of(-2, "driving", 3, R"(<link><predecessor id="-2"/><successor id="-2"/></link>)");
+  b.rest = rest_of_2;
+  c.id = "3";
+  c.link = R"(<predecessor elementType="junction" elementId="7"/>)";
+  c.geometry = line_at(0, 120, 0, 0, 100);
+  c.right = lane_of(-1, "driving", 3) + lane_of(-2, "driving", 3);
+  return a.text() + b.text() + c.text() +
+         R"(<junction id="7" name=""><connection id="0" incomingRoad="1" connectingRoad="2" contactPoint="start">)"
+         R"(<laneLink from="-1" to="-1"/><laneLink from="-2" to="-2"/></connection>)" +
+         junction_more + "</junction>\n";
+}
+
 /// The map of a file with the given contents of <OpenDRIVE>.
 inline RoadMap parse(const std::string& contents) { return parse_opendrive(file_of(contents), "small.xodr"); }
 
