@@ -67,7 +67,7 @@ void report(bool json, const std::string& workload, const std::string& backend, 
 
 struct Arguments {
   WorldOptions world{.agents = 120, .num_threads = 1};
-  std::string backend = "cpu", size = "96x54";
+  std::string backend = "cpu", size = "96x54", samples = "1";
   int repeats = 7;
   double repeat_s = 1.0;
   std::string config = "configs/smoke.toml";
@@ -129,8 +129,9 @@ void bench_render(const Arguments& arguments) {
   const auto simulator = make_world(world, pilot.get());
   std::vector<int32_t> actions;
   advance(simulator.get(), pilot.get(), 30, &actions);
-  const auto renderer =
-      make_renderer(arguments.backend, {.rig = paper_rig(size.first, size.second), .num_threads = world.num_threads});
+  const auto renderer = make_renderer(arguments.backend, {.rig = paper_rig(size.first, size.second),
+                                                          .num_threads = world.num_threads,
+                                                          .samples = parse_samples("--samples", arguments.samples)});
   PICTURA_CHECK(renderer->space() == MemorySpace::host, "bench render: expected a host backend, got {}",
                 renderer->name());
   upload_geometries(*simulator, renderer.get());
@@ -209,6 +210,8 @@ void add_bench_command(CLI::App& app) {
   add_world(render, render_arguments.get());
   render->add_option("--backend", render_arguments->backend)->capture_default_str();
   render->add_option("--size", render_arguments->size, "WxH in pixels")->capture_default_str();
+  render->add_option("--samples", render_arguments->samples, "Of a pixel, for gl: 1, N (MSAA) or NxN (supersampling)")
+      ->capture_default_str();
   const auto [simulate, simulate_arguments] =
       add("simulate", "Steps of a world, observations included", bench_simulate);
   add_world(simulate, simulate_arguments.get());

@@ -18,7 +18,7 @@ namespace {
 struct Arguments {
   WorldOptions world;
   int steps = 50, views = 4;
-  std::string size = "96x54", backend = "auto", rig, out;
+  std::string size = "96x54", backend = "auto", samples = "1", rig, out;
   float line_floor_px = RendererConfig{}.line_floor_px;
   bool size_given = false, json = false;
 };
@@ -33,6 +33,7 @@ void run(const Arguments& arguments) {
   config.rig = arguments.rig.empty() ? paper_rig(size.first, size.second) : load_rig(arguments.rig);
   config.num_threads = arguments.world.num_threads;
   config.line_floor_px = arguments.line_floor_px;
+  config.samples = parse_samples("--samples", arguments.samples);
   std::string choice;
   const auto renderer = make_renderer(arguments.backend, config, &choice);
   PICTURA_CHECK(renderer->space() == MemorySpace::host,
@@ -106,7 +107,12 @@ void add_render_command(CLI::App& app) {
       ->capture_default_str();
   CLI::Option* size =
       command->add_option("--size", arguments->size, "Image size in pixels, WxH")->capture_default_str();
-  command->add_option("--backend", arguments->backend, "cpu, cuda, null or auto")->capture_default_str();
+  command->add_option("--backend", arguments->backend, "cpu, cuda, gl, gl:egl, gl:osmesa, null or auto")
+      ->capture_default_str();
+  command
+      ->add_option("--samples", arguments->samples,
+                   "Of a pixel, for gl: 1, N (MSAA) or NxN (supersampling); the others compute exact coverage")
+      ->capture_default_str();
   command->add_option("--rig", arguments->rig, "TOML file with [[camera]] tables instead of the paper's four cameras");
   command
       ->add_option("--line-floor", arguments->line_floor_px,

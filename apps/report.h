@@ -6,6 +6,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "pictura/common/renderer.h"
+
 namespace pictura {
 
 /// Keys keep the order in which they were set.
@@ -42,5 +44,8 @@ struct Pair {
   int first, second;
 };
 Pair parse_pair(const std::string& option, const std::string& text, int max);
+
+/// Parses "4" (MSAA) or "4x4" (supersampling). Throws UsageError naming the option.
+PixelSamples parse_samples(const std::string& option, const std::string& text);
 
 }  // namespace pictura

@@ -15,6 +15,11 @@ std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config);
 std::string cuda_unavailable();
 #endif
 
+#ifdef PICTURA_HAS_GL
+std::unique_ptr<Renderer> make_gl_renderer(const std::string& name, const RendererConfig& config,
+                                           std::string* choice_out);
+#endif
+
 namespace {
 
 // Draws black, so that everything around a renderer can run without one.
@@ -59,11 +64,15 @@ std::string joined(const std::vector<std::string>& names) { return fmt::format("
 }  // namespace
 
 std::vector<std::string> renderer_names() {
+  std::vector<std::string> names{"cpu"};
 #ifdef PICTURA_HAS_CUDA
-  return {"cpu", "cuda", "null", "auto"};
-#else
-  return {"cpu", "null", "auto"};
+  names.push_back("cuda");
 #endif
+#ifdef PICTURA_HAS_GL
+  names.insert(names.end(), {"gl", "gl:egl", "gl:osmesa"});
+#endif
+  names.insert(names.end(), {"null", "auto"});
+  return names;
 }
 
 std::unique_ptr<Renderer> make_renderer(const std::string& name, const RendererConfig& config,
@@ -71,6 +80,12 @@ std::unique_ptr<Renderer> make_renderer(const std::string& name, const RendererC
   auto chosen = [&](const std::string& choice) {
     if (choice_out) *choice_out = choice;
   };
+#ifdef PICTURA_HAS_GL
+  if (name == "gl" || name == "gl:egl" || name == "gl:osmesa") return make_gl_renderer(name, config, choice_out);
+#endif
+  if (config.samples != PixelSamples{}) {
+    fail_usage("renderer {}: samples: only gl takes samples; the others compute exact coverage", name);
+  }
   if (name == "cpu") return chosen("cpu: asked for"), make_cpu_renderer(config);
   if (name == "null") return chosen("null: asked for"), std::make_unique<NullRenderer>(config);
 #ifdef PICTURA_HAS_CUDA

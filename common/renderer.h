@@ -10,12 +10,20 @@
 
 namespace pictura {
 
+/// Point samples that a pixel's colour is the mean of. `gl` alone takes them; the others compute exact coverage.
+struct PixelSamples {
+  int grid = 1;         // supersampling: grid x grid
+  int multisample = 1;  // MSAA: the driver's pattern, or more samples where it lacks this number
+  bool operator==(const PixelSamples&) const = default;
+};
+
 struct RendererConfig {
   Rig rig = paper_rig();
   MemorySpace space = MemorySpace::host;  // where the caller keeps scenes and images; `auto` chooses by it
   int num_threads = 0;                    // host threads; 0: all
   float line_floor_px = 0.35f;            // least width of a strip on screen, measured across it; 0 turns the floor off
   bool debug_palette = false;             // tint halted and parked agents
+  PixelSamples samples;
 };
 
 /// Asks how much of an agent a view sees.

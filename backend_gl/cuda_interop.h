@@ -1,0 +1,56 @@
+// The way between this backend and CUDA on one GPU: scenes come from device memory, images go to device memory without
+// passing through the host. No CUDA type is seen here; cuda_interop.cpp, which sees them, is built where CUDA is.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "pictura/common/renderer.h"
+
+namespace pictura::gl {
+
+/// Rows of bytes from a buffer to memory.
+struct RowCopy {
+  std::size_t from = 0, from_pitch = 0;  // offset in the buffer, and from row to row
+  std::byte* to = nullptr;
+  std::size_t to_pitch = 0;
+  std::size_t row_bytes = 0, rows = 0;
+};
+
+/// A buffer object that CUDA may read.
+class CudaBuffer {
+ public:
+  virtual ~CudaBuffer() = default;
+  /// Puts the copies to device memory on the stream, after all OpenGL that was asked for before and before all that is
+  /// asked for after. The buffer's context is current.
+  virtual void copy(Span<const RowCopy> copies, Stream stream) = 0;
+};
+
+/// A host copy of a scene and its views.
+struct HostScene {
+  std::vector<int32_t> world_begin, light_begin, hidden_agents;
+  std::vector<AgentBox> agents;
+  std::vector<GeometryHandle> geometry;
+  std::vector<LightState> light_states;
+  std::vector<View> views;
+  SceneBatch batch() const {
+    return {MemorySpace::host, world_begin, agents, geometry, light_begin, light_states, hidden_agents};
+  }
+};
+
+class CudaInterop {
+ public:
+  virtual ~CudaInterop() = default;
+  /// CUDA's number of the device that is the calling thread's.
+  virtual int device() const = 0;
+  /// Registers a buffer object of the current context.
+  virtual std::unique_ptr<CudaBuffer> share(unsigned int buffer) const = 0;
+  /// Waits for the stream and copies what lies in device memory.
+  virtual void copy_to_host(const SceneBatch& scene, Span<const View> views, Stream stream,
+                            HostScene* scene_out) const = 0;
+};
+
+/// Throws Error where no CUDA device can be used. Defined where the build has CUDA.
+std::unique_ptr<CudaInterop> make_cuda_interop();
+
+}  // namespace pictura::gl

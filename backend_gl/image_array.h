@@ -1,0 +1,63 @@
+// Images of one size as the layers of one array texture: room for a whole batch, the samples of every pixel, and the
+// pass that averages them into planar images in a buffer.
+#pragma once
+
+#include <initializer_list>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "pictura/backend_gl/cuda_interop.h"
+#include "pictura/backend_gl/gl_functions.h"
+#include "pictura/common/renderer.h"
+
+namespace pictura::gl {
+
+/// A linked program. Throws Error with the compiler's log.
+GLuint make_program(const Functions& gl, std::initializer_list<std::pair<GLenum, std::string>> shaders);
+
+/// Throws Error naming `where` after anything that OpenGL complained of.
+void check_errors(const Functions& gl, const std::string& where);
+
+/// The context is current wherever anything of this class is called, the destructor included.
+class ImageArray {
+ public:
+  /// `renderer` begins errors; images are copied to device memory where `interop` is given, else to the host. Throws
+  /// Error where this driver has no room for one image, or not so many samples.
+  ImageArray(const Functions& gl, std::string renderer, const PixelSamples& samples, const CudaInterop* interop,
+             int width_px, int height_px);
+  ~ImageArray() { release(); }
+  ImageArray(const ImageArray&) = delete;
+  ImageArray& operator=(const ImageArray&) = delete;
+
+  /// Makes room for `images`, or for as many of them as the driver and a fixed amount of memory allow; returns that.
+  int reserve(int images, PixelFormat format);
+  /// Clears all layers and has them drawn into from now on.
+  void begin();
+  /// Averages the samples of the first `images` layers into the buffer.
+  void resolve(int images);
+  /// Appends what copy() is to do to bring consecutive images to `out`: three planes each, an image every `stride`
+  /// values.
+  void plan_copy(int first, int images, void* out, int64_t stride, std::vector<RowCopy>* copies_out) const;
+  /// On the host, returns when the copies are made; on a device they are put on the stream.
+  void copy(Span<const RowCopy> copies, Stream stream);
+
+ private:
+  // Of the present format.
+  int most_layers() const;
+  std::size_t plane_bytes() const;
+  GLuint make_texture(GLenum format) const;
+  void release();
+
+  const Functions& gl_;
+  const std::string renderer_;
+  const PixelSamples samples_;
+  const CudaInterop* interop_;
+  const int width_px_, height_px_;  // of an image
+  PixelFormat format_ = PixelFormat::u8;
+  int layers_ = 0;
+  GLuint color_ = 0, depth_ = 0, framebuffer_ = 0, output_ = 0, resolve_program_ = 0;
+  std::unique_ptr<CudaBuffer> on_device_;
+};
+
+}  // namespace pictura::gl

@@ -1,0 +1,91 @@
+// The two programs of the pipeline: faces to samples, and samples to the planar images that callers get.
+#pragma once
+
+namespace pictura::gl {
+
+constexpr const char* kFaceVertexShader = R"(#version 450 core
+#extension GL_ARB_shader_viewport_layer_array : require
+layout(location = 0) in vec4 corner0;  // camera coordinates, and by what the depth is divided that is compared
+layout(location = 1) in vec4 corner1;
+layout(location = 2) in vec4 corner2;
+layout(location = 3) in vec4 corner3;
+layout(location = 4) in vec3 color;
+layout(location = 5) in int layer;
+uniform vec4 projection;  // scale of x and y, offset of x and y
+uniform float near_m;
+flat out vec3 face_color;
+void main() {
+  // A strip of two triangles goes across the quadrilateral.
+  vec4 p = gl_VertexID == 0 ? corner0 : gl_VertexID == 1 ? corner1 : gl_VertexID == 2 ? corner3 : corner2;
+  // Inverse depth: 1 at the near plane, 0 infinitely far.
+  gl_Position = vec4(projection.xy * p.xy + projection.zw * p.z, near_m * p.w, p.z);
+  gl_Layer = layer;
+  face_color = color;
+}
+)";
+
+constexpr const char* kFaceFragmentShader = R"(#version 450 core
+flat in vec3 face_color;
+out vec4 color;
+void main() { color = vec4(face_color, 1.0); }
+)";
+
+/// Needs, defined before it: MULTISAMPLE and PACKED as 0 or 1. An invocation makes what one word of each colour plane
+/// holds: four bytes (PACKED), or one float.
+constexpr const char* kResolveShader = R"(
+#if MULTISAMPLE
+uniform sampler2DMSArray drawn;
+#else
+uniform sampler2DArray drawn;
+#endif
+uniform ivec2 size;      // of an image in pixels
+uniform int grid;        // texels of a pixel along each axis
+uniform int samples;     // of a texel
+uniform int plane_words;
+layout(local_size_x = 64) in;
+layout(std430, binding = 0) writeonly buffer Images {
+#if PACKED
+  uint words[];
+#else
+  float words[];
+#endif
+};
+
+vec3 mean_of(ivec2 pixel, int layer) {
+  vec3 sum = vec3(0.0);
+  for (int y = 0; y < grid; ++y) {
+    for (int x = 0; x < grid; ++x) {
+      ivec3 texel = ivec3(grid * pixel + ivec2(x, y), layer);
+#if MULTISAMPLE
+      for (int i = 0; i < samples; ++i) sum += texelFetch(drawn, texel, i).rgb;
+#else
+      sum += texelFetch(drawn, texel, 0).rgb;
+#endif
+    }
+  }
+  return clamp(sum / float(grid * grid * samples), 0.0, 1.0);
+}
+
+void main() {
+  int word = int(gl_GlobalInvocationID.x), layer = int(gl_GlobalInvocationID.y);
+  if (word >= plane_words) return;
+#if PACKED
+  uvec3 value = uvec3(0);
+  for (int i = 0; i < 4; ++i) {
+    int pixel = 4 * word + i;
+    if (pixel < size.x * size.y) {
+      vec3 mean = mean_of(ivec2(pixel % size.x, pixel / size.x), layer);
+      value |= uvec3(mean * 255.0 + 0.5) << (8 * i);
+    }
+  }
+#else
+  vec3 value = mean_of(ivec2(word % size.x, word / size.x), layer);
+#endif
+  int first = 3 * layer * plane_words + word;
+  words[first] = value.r;
+  words[first + plane_words] = value.g;
+  words[first + 2 * plane_words] = value.b;
+}
+)";
+
+}  // namespace pictura::gl

@@ -1,0 +1,20 @@
+#include <dlfcn.h>
+
+#include "pictura/backend_gl/gl_context.h"
+#include "pictura/common/error.h"
+
+namespace pictura::gl {
+
+SharedLibrary::SharedLibrary(const std::string& renderer, const std::string& file, const std::string& debian_package)
+    : renderer_(renderer), file_(file), handle_(dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE)) {
+  PICTURA_CHECK(handle_, "renderer {}: cannot open {} (Debian package {}): {}", renderer, file, debian_package,
+                dlerror());
+}
+
+void* SharedLibrary::function(const char* name) const {
+  void* const address = dlsym(handle_, name);
+  PICTURA_CHECK(address, "renderer {}: {} has no function {}", renderer_, file_, name);
+  return address;
+}
+
+}  // namespace pictura::gl

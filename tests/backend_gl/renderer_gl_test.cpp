@@ -1,0 +1,322 @@
+// The OpenGL baseline against the oracle, within the tolerances of its samples, and what else a renderer promises.
+#include <algorithm>
+#include <functional>
+#include <thread>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/common/raster_coverage.h"
+#include "pictura/tests/backend_gl/gl_support.h"
+#include "pictura/tests/support/image_truth.h"
+#include "pictura/tests/support/tolerances.h"
+
+namespace pictura {
+namespace {
+
+using testing::HasSubstr;
+
+class GlRenderer : public testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override {
+    const std::string why = missing(GetParam());
+    if (!why.empty()) GTEST_SKIP() << why;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Contexts, GlRenderer, testing::Values("gl:osmesa", "gl:egl"),
+                         [](const auto& name) { return std::string(name.param).substr(3); });
+
+struct SampledQuality {
+  PixelSamples samples;
+  double least_psnr_db;
+};
+constexpr SampledQuality kQualities[] = {{{.grid = 1}, kLeastGlPsnr1_db},
+                                         {{.multisample = 4}, kLeastGlPsnrMsaa4_db},
+                                         {{.grid = 2}, kLeastGlPsnr2x2_db},
+                                         {{.grid = 4}, kLeastGlPsnr4x4_db},
+                                         {{.grid = 8}, kLeastGlPsnr8x8_db}};
+
+SyntheticTown town_of(uint64_t seed, int num_views) {
+  SyntheticTown town = make_synthetic_town(seed, 120);
+  town.views.resize(static_cast<std::size_t>(num_views));
+  return town;
+}
+
+double psnr_db(const std::vector<float>& image, const std::vector<float>& truth) {
+  PooledError error;
+  error.add(image, truth);
+  return error.psnr_db();
+}
+
+TEST_P(GlRenderer, DrawsWhatTheOracleDraws) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    const SyntheticTown town = town_of(seed, 8);
+    RendererConfig config{.num_threads = 1};
+    const std::vector<float> oracle = draw("cpu", town.geometry, town.scene, town.views, config);
+    for (const SampledQuality& quality : kQualities) {
+      config.samples = quality.samples;
+      const double measured_db = psnr_db(draw(GetParam(), town.geometry, town.scene, town.views, config), oracle);
+      fmt::print("seed {}, {}x{} grid, {} samples: {:.2f} dB\n", seed, quality.samples.grid, quality.samples.grid,
+                 quality.samples.multisample, measured_db);
+      EXPECT_GE(measured_db, quality.least_psnr_db);
+    }
+  }
+}
+
+TEST_P(GlRenderer, TheTolerancesSeeFaults) {
+  const SyntheticTown town = town_of(1, 8);
+  const RendererConfig config{.num_threads = 1};
+  const std::vector<float> oracle = draw("cpu", town.geometry, town.scene, town.views, config);
+  RendererConfig shifted = config, without_floor = config, tinted = config;
+  for (Camera& camera : shifted.rig.cameras) camera.center_x_px += 0.5f;
+  without_floor.line_floor_px = 0;
+  tinted.debug_palette = true;
+  SceneOwner halted = town.scene;
+  for (AgentBox& box : halted.agents) box.palette = 1;
+  StaticGeometry edges_on_top = town.geometry;
+  for (Strip& strip : edges_on_top.strips) {
+    if (strip.kind == StripKind::road_edge) strip.kind = StripKind::stop_line;
+  }
+  for (const SampledQuality& quality : kQualities) {
+    auto sampled_db = [&](const StaticGeometry& geometry, const SceneOwner& scene, RendererConfig with_fault) {
+      with_fault.samples = quality.samples;
+      return psnr_db(draw(GetParam(), geometry, scene, town.views, with_fault), oracle);
+    };
+    EXPECT_LT(sampled_db(town.geometry, town.scene, shifted), quality.least_psnr_db);
+    EXPECT_LT(sampled_db(town.geometry, halted, tinted), quality.least_psnr_db);
+    // What concerns thin lines alone is lost in the noise of few samples.
+    if (quality.least_psnr_db < kLeastGlPsnr2x2_db) continue;
+    EXPECT_LT(sampled_db(town.geometry, town.scene, without_floor), quality.least_psnr_db);
+    if (quality.least_psnr_db < kLeastGlPsnr8x8_db) continue;
+    EXPECT_LT(sampled_db(edges_on_top, town.scene, config), quality.least_psnr_db);
+  }
+}
+
+TEST_P(GlRenderer, AnySizeAndMixedRigs) {
+  const SyntheticTown town = town_of(5, 3);
+  RendererConfig config{.rig = paper_rig(97, 55), .num_threads = 1};
+  config.rig.cameras[1] = paper_rig(33, 71).cameras[1];
+  config.rig.cameras[1].pitch_rad = -0.2f;
+  config.rig.cameras[1].roll_rad = 0.3f;
+  config.rig.cameras[2] = paper_rig(1, 1).cameras[2];
+  config.rig.cameras[3].focal_x_px *= 0.5f;  // of the first one's size, and another projection
+  config.rig.cameras[3].center_y_px += 7.25f;
+  config.samples.grid = 8;
+  RendererConfig exact = config;
+  exact.samples = {};
+  EXPECT_GE(psnr_db(draw(GetParam(), town.geometry, town.scene, town.views, config),
+                    draw("cpu", town.geometry, town.scene, town.views, exact)),
+            kLeastGlPsnr8x8_db);
+}
+
+TEST_P(GlRenderer, RoadsOnTwoLevels) {
+  // A bridge across the view, with marks and cars on it, above a road with marks and cars.
+  StaticGeometry geometry;
+  for (const float y : {-3.5f, 0.0f, 3.5f}) {
+    add_polyline(&geometry, {{-20, y, 0}, {110, y, 0}}, 0.15f, StripKind::lane_mark);
+  }
+  for (const float x : {30.0f, 33.5f, 37.0f}) {
+    add_polyline(&geometry, {{x, -60, 6}, {x, 60, 6}}, 0.2f, StripKind::road_edge);
+  }
+  geometry.build_grids();
+  SceneOwner scene;
+  for (int i = 0; i < 5; ++i) {
+    const float at = static_cast<float>(i);
+    // One car dips into the road, as upright boxes do on slopes.
+    const float dip_m = i == 1 ? 0.3f : 0.0f;
+    scene.agents.push_back(make_box(AgentClass::vehicle, {12 + 14 * at, 1.8f, -dip_m}, 0.02f, {4.2f, 4.5f, 1.5f}));
+    scene.agents.push_back(make_box(AgentClass::vehicle, {31.7f, -20 + 9 * at, 6}, kHalfPi, {4.2f, 1.8f, 1.5f}));
+  }
+  scene.end_world(0);
+  // From the lower road, from the bridge, and from above both.
+  const std::vector<View> views{make_view({-2, -1.8f, 0}, 0), make_view({35.2f, -12, 6}, 1.2f),
+                                make_view({5, 0, 14}, 0.1f)};
+  RendererConfig config{.num_threads = 1};
+  const std::vector<float> oracle = draw("cpu", geometry, scene, views, config);
+  config.samples.grid = 8;
+  EXPECT_GE(psnr_db(draw(GetParam(), geometry, scene, views, config), oracle), kLeastGlPsnr8x8_db);
+}
+
+// One camera, 1.5 m up, looking straight ahead.
+Rig simple_rig() {
+  Camera camera;
+  camera.name = "simple";
+  camera.width_px = camera.height_px = 100;
+  camera.focal_x_px = camera.focal_y_px = 50;
+  camera.center_x_px = camera.center_y_px = 50;
+  camera.position_m = {0, 0, 1.5f};
+  return {{camera}};
+}
+
+TEST_P(GlRenderer, StripsOfOneLevelLieOverEachOtherByKindThenIndex) {
+  // All cover the same patch of road, 2 to 10 m ahead, at heights of which each rounds differently.
+  for (const float z : {0.0f, 0.1f, -0.3f, 1.0f / 3}) {
+    StaticGeometry geometry;
+    const StripKind kinds[] = {StripKind::road_edge, StripKind::lane_mark, StripKind::lane_mark, StripKind::crosswalk,
+                               StripKind::stop_line};
+    const Rgb colors[] = {kRoadEdgeColor, kWhiteMarkColor, kYellowMarkColor, kCrosswalkColor, kStopLineColor};
+    const Rgb on_top[] = {kRoadEdgeColor, kWhiteMarkColor, kWhiteMarkColor, kCrosswalkColor, kStopLineColor};
+    for (int count = 1; count <= 5; ++count) {
+      const int i = count - 1;
+      const float at = static_cast<float>(i);
+      append_strips(std::vector<Vec3>{{2 - 0.3f * at, 0.07f * at, z}, {10 + 0.5f * at, -0.04f * at, z}}, 3, colors[i],
+                    kinds[i], &geometry.strips);
+      geometry.build_grids();
+      SceneOwner scene;
+      scene.end_world(0);
+      const RendererConfig config{.rig = simple_rig(), .num_threads = 1};
+      const std::vector<float> image = draw(GetParam(), geometry, scene, {make_view({}, 0.01f)}, config);
+      int mixed = 0;
+      for (int y = 60; y < 70; ++y) {
+        for (int x = 45; x < 55; ++x) {
+          const auto pixel = static_cast<std::size_t>(100 * y + x);
+          const float r = image[pixel], g = image[pixel + 10000], b = image[pixel + 20000];
+          // Compared by hue: pieces fade by their distance.
+          const Rgb& top = on_top[i];
+          mixed += r == 0 || std::abs(r * top.g - g * top.r) > 1e-3f || std::abs(b * top.g - g * top.b) > 1e-3f;
+        }
+      }
+      EXPECT_EQ(mixed, 0) << count << " strips at " << z << " m";
+    }
+  }
+}
+
+TEST_P(GlRenderer, BatchesLargerThanAnArrayAreTheSameImages) {
+  // More images of a size than OpenGL promises layers (2048), in two cameras: arrays end within a camera's views.
+  const SyntheticTown town = town_of(3, 16);
+  RendererConfig config{.rig = paper_rig(3, 2), .num_threads = 1};
+  config.rig.cameras.resize(2);
+  const std::vector<float> once = draw(GetParam(), town.geometry, town.scene, town.views, config);
+  std::vector<View> many;
+  constexpr std::size_t kTimes = 150;
+  for (std::size_t i = 0; i < kTimes; ++i) many.insert(many.end(), town.views.begin(), town.views.end());
+  const std::vector<float> images = draw(GetParam(), town.geometry, town.scene, many, config);
+  ASSERT_EQ(images.size(), kTimes * once.size());
+  for (std::size_t i = 0; i < kTimes; ++i) {
+    ASSERT_TRUE(std::equal(once.begin(), once.end(), images.begin() + static_cast<std::ptrdiff_t>(i * once.size())))
+        << "repeat " << i;
+  }
+}
+
+std::vector<uint8_t> draw_bytes(Renderer* renderer, const SyntheticTown& town, const std::vector<View>& views) {
+  HostImages images(renderer->config().rig, static_cast<int>(views.size()));
+  renderer->render(town.scene.batch(), views, images.batch());
+  return {images.bytes().begin(), images.bytes().end()};
+}
+
+TEST_P(GlRenderer, BytesAreTheRoundedColors) {
+  const SyntheticTown town = town_of(4, 4);
+  for (const PixelSamples samples : {PixelSamples{.grid = 1}, PixelSamples{.grid = 3}}) {
+    const RendererConfig config{.rig = paper_rig(97, 55), .num_threads = 1, .samples = samples};
+    const std::vector<float> colors = draw(GetParam(), town.geometry, town.scene, town.views, config);
+    const auto renderer = make_renderer(GetParam(), config);
+    renderer->upload(town.geometry);
+    const std::vector<uint8_t> bytes = draw_bytes(renderer.get(), town, town.views);
+    ASSERT_EQ(bytes.size(), colors.size());
+    for (std::size_t i = 0; i < bytes.size(); ++i) {
+      // Samples are rounded before they are averaged, and the mean after.
+      ASSERT_NEAR(bytes[i], to_byte(colors[i]), samples.grid > 1 ? 1 : 0) << "value " << i;
+    }
+  }
+}
+
+TEST_P(GlRenderer, RenderersAreIndependent) {
+  const SyntheticTown town = town_of(1, 6), other_town = town_of(2, 6);
+  auto alone = [](const std::string& backend, const SyntheticTown& shown, PixelSamples samples) {
+    const auto renderer = make_renderer(backend, {.num_threads = 1, .samples = samples});
+    renderer->upload(shown.geometry);
+    return draw_bytes(renderer.get(), shown, shown.views);
+  };
+  const auto expected = alone(GetParam(), town, {}), expected_other = alone(GetParam(), other_town, {.grid = 2});
+  const auto first = make_renderer(GetParam(), {.num_threads = 1});
+  const auto second = make_renderer(GetParam(), {.num_threads = 1, .samples = {.grid = 2}});
+  // Of another library, if this machine has it.
+  const std::string other = std::string(GetParam()) == "gl:egl" ? "gl:osmesa" : "gl:egl";
+  const auto third = missing(other).empty() ? make_renderer(other, {.num_threads = 1}) : nullptr;
+  first->upload(town.geometry);
+  second->upload(other_town.geometry);
+  if (third) third->upload(other_town.geometry);
+  for (int repeat = 0; repeat < 3; ++repeat) {
+    EXPECT_EQ(draw_bytes(first.get(), town, town.views), expected);
+    if (third) draw_bytes(third.get(), other_town, other_town.views);
+    EXPECT_EQ(draw_bytes(second.get(), other_town, other_town.views), expected_other);
+  }
+}
+
+TEST_P(GlRenderer, ServesOneThreadAfterTheOther) {
+  const SyntheticTown town = town_of(1, 4);
+  const auto renderer = make_renderer(GetParam(), {.num_threads = 1});
+  renderer->upload(town.geometry);
+  const std::vector<uint8_t> here = draw_bytes(renderer.get(), town, town.views);
+  std::vector<uint8_t> there;
+  std::thread([&] { there = draw_bytes(renderer.get(), town, town.views); }).join();
+  EXPECT_EQ(there, here);
+  // A smaller batch, and then the old one, through memory that has grown.
+  const std::vector<View> fewer(town.views.begin(), town.views.begin() + 1);
+  const std::vector<uint8_t> first = draw_bytes(renderer.get(), town, fewer);
+  EXPECT_TRUE(std::equal(first.begin(), first.end(), here.begin()));
+  EXPECT_EQ(draw_bytes(renderer.get(), town, town.views), here);
+  EXPECT_TRUE(draw_bytes(renderer.get(), town, {}).empty());
+}
+
+void expect_error(const std::function<void()>& call, const std::string& part) {
+  try {
+    call();
+    ADD_FAILURE() << "expected an Error with: " << part;
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr(part));
+  }
+}
+
+TEST_P(GlRenderer, RefusesByNameWhatItDoesNotOffer) {
+  const std::string name = GetParam();
+  const SyntheticTown town = town_of(1, 1);
+  const auto renderer = make_renderer(name, {.num_threads = 1});
+  renderer->upload(town.geometry);
+  HostImages images(renderer->config().rig, 1);
+  std::vector<CameraImages> cameras(images.batch().cameras.begin(), images.batch().cameras.end());
+  std::vector<float> depth(96 * 54);
+  cameras[2].depth_m = depth.data();
+  ImageBatch with_depth = images.batch();
+  with_depth.cameras = cameras;
+  expect_error([&] { renderer->render(town.scene.batch(), town.views, with_depth); },
+               "renderer " + name + ": images: camera 2: depth, class and instance planes");
+  float visibility = 0;
+  expect_error(
+      [&] {
+        const VisibilityQuery query;
+        renderer->visibility(town.scene.batch(), town.views, Span<const VisibilityQuery>(&query, 1),
+                             Span<float>(&visibility, 1));
+      },
+      "renderer " + name + ": visibility");
+  HostImages halves(renderer->config().rig, 1, PixelFormat::f16);
+  expect_error([&] { renderer->render(town.scene.batch(), town.views, halves.batch()); }, "got f16");
+  expect_error([&] { make_renderer(name, {.samples = {.multisample = 64}}); }, "this driver's limit for MSAA, got 64");
+  expect_error([&] { make_renderer(name, {.rig = paper_rig(8192, 8), .samples = {.grid = 16}}); },
+               "samples along an axis, which is this driver's limit, got 131072");
+  expect_error([&] { make_renderer(name, {.samples = {.grid = 0}}); }, "expected 1 sample or more");
+}
+
+TEST(GlNames, AnUnknownOneListsAll) {
+  expect_error([] { make_renderer("gl:glx", {}); }, "gl, gl:egl, gl:osmesa");
+}
+
+TEST(GlNames, OthersTakeNoSamples) {
+  expect_error([] { make_renderer("cpu", {.samples = {.grid = 4}}); }, "renderer cpu: samples: only gl takes samples");
+}
+
+TEST(GlNames, GlSaysWhichContextItTook) {
+  if (!missing("gl:osmesa").empty() && !missing("gl:egl").empty()) GTEST_SKIP() << "neither OSMesa nor EGL";
+  std::string choice;
+  const auto renderer = make_renderer("gl", {}, &choice);
+  EXPECT_EQ(choice.substr(0, choice.find(": ")), renderer->name());
+  EXPECT_EQ(renderer->name(), missing("gl:egl").empty() ? "gl:egl" : "gl:osmesa");
+}
+
+TEST(GlNames, OsmesaDrawsInHostMemoryAlone) {
+  expect_error([] { make_renderer("gl:osmesa", {.space = MemorySpace::cuda}); }, "renderer gl:osmesa: draws in host");
+}
+
+}  // namespace
+}  // namespace pictura
