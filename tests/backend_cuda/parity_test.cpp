@@ -9,9 +9,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "pictura/common/cuda/device_buffer.cuh"
 #include "pictura/common/error.h"
 #include "pictura/common/make_renderer.h"
+#include "pictura/tests/support/device_scene.cuh"
 #include "pictura/tests/support/image_scenes.h"
 #include "pictura/tests/support/tolerances.h"
 
@@ -31,24 +31,6 @@ class CudaRendererTest : public testing::Test {
     const char* required = std::getenv("PICTURA_REQUIRE_GPU");
     if (required && std::string(required) == "1") FAIL() << "PICTURA_REQUIRE_GPU=1, but " << why;
     GTEST_SKIP() << "no CUDA device: " << why;
-  }
-};
-
-// A host scene's copy in device memory.
-struct DeviceScene {
-  DeviceBuffer<int32_t> world_begin, geometry, light_begin, hidden_agents;
-  DeviceBuffer<AgentBox> agents;
-  DeviceBuffer<LightState> light_states;
-  explicit DeviceScene(const SceneBatch& host)
-      : world_begin(host.world_begin),
-        geometry(host.geometry),
-        light_begin(host.light_begin),
-        hidden_agents(host.hidden_agents),
-        agents(host.agents),
-        light_states(host.light_states) {}
-  SceneBatch batch() const {
-    return {MemorySpace::cuda,  world_begin.span(),  agents.span(),       geometry.span(),
-            light_begin.span(), light_states.span(), hidden_agents.span()};
   }
 };
 
