@@ -78,9 +78,12 @@ def self_test() -> None:
         "simulator/b.cpp": "#include <torch/torch.h>\n",
         "map/c.cpp": '#include "road_map.h"\n',
         "map/d.cpp": "#ifdef __CUDACC__\n#endif\n",
+        "backend_gl/f.cpp": "#include <GL/glcorearb.h>\n#include <cuda_runtime_api.h>\n",
+        "backend_gl/cuda_interop.cpp": "#include <cuda_gl_interop.h>\n",
+        "common/g.h": "#include <EGL/egl.h>\n",
         "training/e.cpp": '#include <torch/torch.h>\n#include "pictura/simulator/simulator.h"\n',
     }
-    expected = {"common/a.h", "backend_cpu/renderer_cpu.cpp", "simulator/b.cpp", "map/c.cpp", "map/d.cpp"}
+    expected = {"common/a.h", "backend_cpu/renderer_cpu.cpp", "simulator/b.cpp", "map/c.cpp", "map/d.cpp", "backend_gl/f.cpp", "common/g.h"}
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)
         for name, text in cases.items():
