@@ -18,7 +18,7 @@ namespace pictura::gl {
   X(DeleteVertexArrays) X(DepthFunc) X(DispatchCompute) X(DrawArraysInstancedBaseInstance) X(Enable) \
   X(EnableVertexArrayAttrib) X(GetError) X(GetIntegerv) X(GetProgramInfoLog) X(GetProgramiv) X(GetShaderInfoLog) \
   X(GetShaderiv) X(GetString) X(GetStringi) X(GetTextureLevelParameteriv) X(GetUniformLocation) X(LinkProgram) \
-  X(MapNamedBufferRange) X(MemoryBarrier) X(NamedBufferData) X(NamedBufferStorage) X(NamedBufferSubData) \
+  X(MapNamedBufferRange) X(MemoryBarrier) X(NamedBufferData) X(NamedBufferStorage) \
   X(NamedFramebufferTexture) X(ProgramUniform1f) X(ProgramUniform1i) X(ProgramUniform2i) X(ProgramUniform4f) \
   X(ShaderSource) X(TextureStorage3D) X(TextureStorage3DMultisample) X(UnmapNamedBuffer) X(UseProgram) \
   X(VertexArrayAttribBinding) X(VertexArrayAttribFormat) X(VertexArrayAttribIFormat) \

@@ -10,7 +10,7 @@ namespace pictura::gl {
 
 namespace {
 
-// Memory of one array, unless a single image needs more.
+// Memory for the samples of one array, unless a single image needs more.
 constexpr int64_t kArrayBytes = int64_t{256} << 20;
 
 GLenum color_format(PixelFormat format) { return format == PixelFormat::u8 ? GL_RGBA8 : GL_RGBA32F; }
@@ -117,13 +117,24 @@ void ImageArray::release() {
   layers_ = 0;
 }
 
-int ImageArray::reserve(int images, PixelFormat format) {
+int ImageArray::reserve(int64_t images, PixelFormat format) {
   if (format_ != format) release();
   format_ = format;
-  const int wanted = std::min(images, most_layers());
+  const int wanted = static_cast<int>(std::min<int64_t>(images, most_layers()));
   if (wanted <= layers_) return layers_;
   release();
   layers_ = wanted;
+  try {
+    make_storage();
+    make_resolve_program();
+  } catch (...) {
+    release();
+    throw;
+  }
+  return layers_;
+}
+
+void ImageArray::make_storage() {
   color_ = make_texture(color_format(format_));
   depth_ = make_texture(GL_DEPTH_COMPONENT32F);
   gl_.CreateFramebuffers(1, &framebuffer_);
@@ -138,7 +149,9 @@ int ImageArray::reserve(int images, PixelFormat format) {
   const GLenum status = gl_.CheckNamedFramebufferStatus(framebuffer_, GL_FRAMEBUFFER);
   PICTURA_CHECK(status == GL_FRAMEBUFFER_COMPLETE, "{}: OpenGL framebuffer status {:#x}", where, status);
   if (interop_) on_device_ = interop_->share(output_);
+}
 
+void ImageArray::make_resolve_program() {
   // The driver may have taken more samples than were asked for.
   GLint samples = 1;
   if (samples_.multisample > 1) gl_.GetTextureLevelParameteriv(color_, 0, GL_TEXTURE_SAMPLES, &samples);
@@ -153,7 +166,6 @@ int ImageArray::reserve(int images, PixelFormat format) {
   set("grid", samples_.grid);
   set("samples", samples);
   set("plane_words", static_cast<GLint>(plane_bytes() / 4));
-  return layers_;
 }
 
 void ImageArray::begin() {

@@ -31,7 +31,7 @@ class ImageArray {
   ImageArray& operator=(const ImageArray&) = delete;
 
   /// Makes room for `images`, or for as many of them as the driver and a fixed amount of memory allow; returns that.
-  int reserve(int images, PixelFormat format);
+  int reserve(int64_t images, PixelFormat format);
   /// Clears all layers and has them drawn into from now on.
   void begin();
   /// Averages the samples of the first `images` layers into the buffer.
@@ -47,6 +47,8 @@ class ImageArray {
   int most_layers() const;
   std::size_t plane_bytes() const;
   GLuint make_texture(GLenum format) const;
+  void make_storage();
+  void make_resolve_program();
   void release();
 
   const Functions& gl_;

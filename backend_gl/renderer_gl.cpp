@@ -153,7 +153,7 @@ class GlRenderer final : public Renderer {
     for (SizeGroup& group : groups_) {
       // Images are taken camera by camera, so that each camera's views are consecutive.
       const int64_t total = static_cast<int64_t>(views.size() * group.cameras.size());
-      const int room = group.array->reserve(static_cast<int>(std::min<int64_t>(total, 1 << 20)), images_out.format);
+      const int room = group.array->reserve(total, images_out.format);
       for (int64_t begin = 0; begin < total; begin += room) {
         draw_images(group, begin, std::min(total, begin + room), scene, views, images_out, stream);
       }
