@@ -4,6 +4,8 @@
 #include <functional>
 #include <limits>
 
+#include "pictura/common/raster_gather.h"
+
 namespace pictura {
 
 namespace {
@@ -26,58 +28,25 @@ void ImageDrawer::add_item(const RasterItem& item, MakeFaces&& make_faces) {
   items_.back().face_end = static_cast<int32_t>(faces_.size());
 }
 
-void ImageDrawer::gather_agents() {
+void ImageDrawer::gather() {
   const SceneBatch& scene = *request_.scene;
-  const auto world = static_cast<std::size_t>(request_.view->world);
-  const int32_t world_begin = scene.world_begin[world];
-  for (int32_t agent = world_begin; agent < scene.world_begin[world + 1]; ++agent) {
-    const AgentBox& box = scene.agents[static_cast<std::size_t>(agent)];
-    if (!may_show(box, setting_.camera, setting_.frustum)) continue;
-    if (is_left_out(*request_.view, scene.hidden_agents, agent)) continue;
+  const View& view = *request_.view;
+  const RasterGeometry& geometry = *request_.geometry;
+  const int32_t world_begin = scene.world_begin[static_cast<std::size_t>(view.world)];
+  visit_agents(setting_, scene, view, [&](const AgentBox& box, int32_t agent) {
     add_item(agent_item(setting_, box, agent, world_begin),
              [&](auto&& emit) { agent_faces(box, setting_.camera, setting_.debug_palette, emit); });
-  }
-}
-
-void ImageDrawer::gather_walls() {
-  const RasterGeometry& geometry = *request_.geometry;
-  const float far_m = far_of(geometry.longest_wall_m);
-  for_each_item(
-      geometry.pieces.wall_grid, frustum_ground_box(setting_.camera, setting_.frustum, far_m),
-      [&](int32_t i) { return ground_box(geometry.pieces.walls[static_cast<std::size_t>(i)]); },
-      [&](int32_t i) {
-        const WallFace& wall = geometry.pieces.walls[static_cast<std::size_t>(i)];
-        if (!may_show(wall, setting_.camera, setting_.frustum, far_m)) return;
-        add_item(wall_item(setting_, wall, i), [&](auto&& emit) { wall_faces(wall, setting_.camera, emit); });
-      });
-}
-
-void ImageDrawer::gather_lights() {
-  const SceneBatch& scene = *request_.scene;
-  const auto world = static_cast<std::size_t>(request_.view->world);
-  const auto light_begin = static_cast<std::size_t>(scene.light_begin[world]);
-  if (light_begin == static_cast<std::size_t>(scene.light_begin[world + 1])) return;
-  const Span<const LightHead> heads = request_.geometry->pieces.heads;
-  for (std::size_t i = 0; i < heads.size(); ++i) {
-    if (!may_show(heads[i], setting_.camera, setting_.frustum)) continue;
-    const LightState state = scene.light_states[light_begin + static_cast<std::size_t>(heads[i].signal)];
-    add_item(light_item(setting_, heads[i], static_cast<int32_t>(i)),
-             [&](auto&& emit) { light_faces(heads[i], state, setting_.camera, emit); });
-  }
-}
-
-void ImageDrawer::gather_strips() {
-  const RasterGeometry& geometry = *request_.geometry;
-  const float far_m = far_of(geometry.longest_strip_m);
-  for_each_item(
-      geometry.pieces.strip_grid, frustum_ground_box(setting_.camera, setting_.frustum, far_m),
-      [&](int32_t i) { return ground_box(geometry.pieces.strips[static_cast<std::size_t>(i)]); },
-      [&](int32_t i) {
-        const Strip& strip = geometry.pieces.strips[static_cast<std::size_t>(i)];
-        if (!may_show(strip, setting_.camera, setting_.frustum, far_m)) return;
-        add_item(strip_item(setting_, strip, i),
-                 [&](auto&& emit) { strip_faces(strip, setting_.camera, setting_.line_floor_px, emit); });
-      });
+  });
+  visit_walls(setting_, geometry, [&](const WallFace& wall, int32_t i) {
+    add_item(wall_item(setting_, wall, i), [&](auto&& emit) { wall_faces(wall, setting_.camera, emit); });
+  });
+  visit_lights(setting_, geometry, scene, view, [&](const LightHead& head, LightState state, int32_t i) {
+    add_item(light_item(setting_, head, i), [&](auto&& emit) { light_faces(head, state, setting_.camera, emit); });
+  });
+  visit_strips(setting_, geometry, [&](const Strip& strip, int32_t i) {
+    add_item(strip_item(setting_, strip, i),
+             [&](auto&& emit) { strip_faces(strip, setting_.camera, setting_.line_floor_px, emit); });
+  });
 }
 
 void ImageDrawer::find_background() {
@@ -188,10 +157,7 @@ void ImageDrawer::prepare(const ImageRequest& request) {
   edges_.clear();
   faces_.clear();
   items_.clear();
-  gather_agents();
-  gather_walls();
-  gather_lights();
-  gather_strips();
+  gather();
   find_background();
   sort_items();
 }

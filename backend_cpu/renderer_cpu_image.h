@@ -71,10 +71,7 @@ class ImageDrawer {
   // Adds a thing whose faces make_faces(emit) emits, unless none of them is in the image.
   template <typename MakeFaces>
   void add_item(const RasterItem& item, MakeFaces&& make_faces);
-  void gather_agents();
-  void gather_walls();
-  void gather_lights();
-  void gather_strips();
+  void gather();
   void find_background();
   void sort_items();
   void find_hidings();

@@ -15,26 +15,18 @@ constexpr float kPushStep = 2e-5f, kMostPush = 0.02f;
 // What the compared depth of a corner beyond the horizon of a strip's plane is a multiple of: as good as infinite.
 constexpr float kLeastNearness = 1e-4f;
 
-// normal . p = offset, in camera coordinates.
-struct Plane {
-  Vec3 normal;
-  float offset = 0;
-};
-
-// The plane whose depths decide about a strip: its own, and not that of its corners as drawn, which the floor on its
-// width moves; lowered, seen from above, by how far solids that stand on it may dip into it.
-Plane depth_plane(const Strip& strip, const PinholeCamera& camera) {
-  const Extent extent = strip_extent(strip, 0, camera.position_m);
-  const Vec3 normal = strip_normal(extent);
-  const Interval heights = project_on(extent, normal);
-  const float height_m = 0.5f * (heights.low + heights.high);
-  const bool camera_above = height_m <= 0.0f;
-  return {{dot(camera.right, normal), dot(camera.down, normal), dot(camera.forward, normal)},
-          camera_above ? height_m - kStanding_m : height_m};
+// A strip's plane, lowered, where it is below the camera, by how far solids that stand on it may dip into it: compared
+// by depth, they are then in front.
+FacePlane lowered(const FacePlane& plane, const PinholeCamera& camera) {
+  const Vec3 up{camera.right.z, camera.down.z, camera.forward.z};
+  const float above = dot(plane.normal, up);  // also the scale of the offset: above * height of the plane
+  const bool camera_above = plane.offset * above <= 0.0f;
+  return {plane.normal, camera_above ? plane.offset - kStanding_m * above : plane.offset};
 }
 
-float nearness(const Plane& plane, Vec3 p) {
-  return plane.offset == 0.0f ? 1.0f : std::max(dot(plane.normal, p) / plane.offset, kLeastNearness);
+// Depth of a corner over the depth of the plane there. The floor on a strip's width moves its corners out of its plane.
+float nearness(const FacePlane& plane, Vec3 corner) {
+  return plane.offset == 0.0f ? 1.0f : std::max(dot(plane.normal, corner) / plane.offset, kLeastNearness);
 }
 
 }  // namespace
@@ -44,11 +36,14 @@ void ImageFaces::gather(const ImageSetting& setting, const RasterGeometry& geome
   faces_.clear();
   strips_.clear();
   // A convex polygon as a fan of quadrilaterals; with an odd number of corners the last one is a triangle.
-  auto emit = [&](const Vec3* corners, int count, Rgb color) {
+  auto add = [&](const Vec3* corners, int count, Rgb color, auto&& nearness_of) {
+    auto corner = [&](int i) { return FaceInstance::Corner{corners[i], nearness_of(corners[i])}; };
     for (int i = 1; i + 1 < count; i += 2) {
-      faces_.push_back(
-          {{{corners[0]}, {corners[i]}, {corners[i + 1]}, {corners[std::min(i + 2, count - 1)]}}, color, layer});
+      faces_.push_back({{corner(0), corner(i), corner(i + 1), corner(std::min(i + 2, count - 1))}, color, layer});
     }
+  };
+  auto emit = [&](const Vec3* corners, int count, const FacePlane&, Rgb color) {
+    add(corners, count, color, [](Vec3) { return 1.0f; });
   };
   visit_agents(setting, scene, view,
                [&](const AgentBox& box, int32_t) { agent_faces(box, setting.camera, setting.debug_palette, emit); });
@@ -64,12 +59,11 @@ void ImageFaces::gather(const ImageSetting& setting, const RasterGeometry& geome
   float push = 1.0f;
   for (const RankedStrip& ranked : strips_) {
     push += step;
-    const std::size_t first = faces_.size();
-    strip_faces(*ranked.strip, setting.camera, setting.line_floor_px, emit);
-    const Plane plane = depth_plane(*ranked.strip, setting.camera);
-    for (std::size_t i = first; i < faces_.size(); ++i) {
-      for (FaceInstance::Corner& corner : faces_[i].corner) corner.nearness = nearness(plane, corner.at) / push;
-    }
+    auto emit_strip = [&](const Vec3* corners, int count, const FacePlane& plane, Rgb color) {
+      const FacePlane compared = lowered(plane, setting.camera);
+      add(corners, count, color, [&](Vec3 corner) { return nearness(compared, corner) / push; });
+    };
+    strip_faces(*ranked.strip, setting.camera, setting.line_floor_px, emit_strip);
   }
 }
 
