@@ -17,22 +17,33 @@ void add_town_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("town", "Write a procedural town as an OpenDRIVE file");
   command->add_option("--seed", arguments->town.seed, "Equal seeds give equal files")->capture_default_str();
   command->add_option("--blocks", arguments->blocks, "Blocks of houses along x and y, as AxB")->capture_default_str();
+  for (const TownFeature& feature : town_features()) {
+    command->add_option(fmt::format("--{}", feature.name), arguments->town.*feature.value, feature.help)
+        ->check(CLI::Range(feature.low, feature.high))
+        ->capture_default_str();
+  }
   command->add_option("--out", arguments->out, "The .xodr file to write")->required();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
-      "Example:\n  pictura town --seed 7 --blocks 4x3 --out town.xodr && pictura map town.xodr --png town.png");
+      "Shares take at least one of what they choose from unless they are 0.\n"
+      "Examples:\n"
+      "  pictura town --seed 7 --blocks 4x3 --out town.xodr && pictura map town.xodr --png town.png\n"
+      "  pictura town --roundabouts 1 --ring-road 0 --hills-m 0 --out roundabouts.xodr\n"
+      "Maps with options need no file: pictura map procedural:7:blocks=4x3,roundabouts=1");
   command->callback([arguments] {
-    const Pair blocks = parse_pair("--blocks", arguments->blocks, 32);
+    const Pair blocks = parse_pair("--blocks", arguments->blocks, kMaxTownBlocks);
     arguments->town.blocks_x = blocks.first;
     arguments->town.blocks_y = blocks.second;
     const std::string text = procedural_town(arguments->town);
     write_file(arguments->out, text);
     if (arguments->json) {
-      print_json({{"out", arguments->out},
+      Json object{{"out", arguments->out},
                   {"seed", arguments->town.seed},
                   {"blocks_x", blocks.first},
                   {"blocks_y", blocks.second},
-                  {"bytes", text.size()}});
+                  {"bytes", text.size()}};
+      for (const TownFeature& feature : town_features()) object[feature.name] = arguments->town.*feature.value;
+      print_json(object);
     } else {
       fmt::print("{}: {} bytes; look at it with: pictura map {} --png town.png\n", arguments->out, text.size(),
                  arguments->out);

@@ -1,7 +1,6 @@
 #include "pictura/map/load_map.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
@@ -23,17 +22,11 @@ constexpr std::string_view kExtension = ".xodr";
 
 std::vector<fs::path> town_folders() { return {fs::path(map_folder()), fs::path(map_folder()) / "carla"}; }
 
-/// The seed of `procedural[:SEED]`, or nothing when the name is not of that kind.
-std::optional<uint64_t> procedural_seed(std::string_view name) {
-  if (name == kProcedural) return 0;
+/// The options of `procedural[:SEED[:NAME=VALUE,...]]`, or nothing when the name is not of that kind.
+std::optional<TownOptions> procedural_options(std::string_view name) {
+  if (name == kProcedural) return TownOptions();
   if (!name.starts_with(kProcedural) || name[kProcedural.size()] != ':') return std::nullopt;
-  const std::string_view digits = name.substr(kProcedural.size() + 1);
-  uint64_t seed = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), seed);
-  if (error != std::errc() || end != digits.data() + digits.size()) {
-    fail_usage("map '{}': expected procedural or procedural:SEED with an integer from 0, got '{}'", name, digits);
-  }
-  return seed;
+  return parse_town_options(name.substr(kProcedural.size() + 1), name);
 }
 
 /// Keeps an encoded map for the next load, where that is possible.
@@ -96,9 +89,9 @@ std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDrive
   LoadReport unused;
   LoadReport& report = report_out ? *report_out : unused;
   report = {};
-  if (const std::optional<uint64_t> seed = procedural_seed(name)) {
-    auto map = std::make_shared<RoadMap>(parse_opendrive(procedural_town({.seed = *seed}), name, options));
-    map->name = fmt::format("{}:{}", kProcedural, *seed);
+  if (const std::optional<TownOptions> town = procedural_options(name)) {
+    auto map = std::make_shared<RoadMap>(parse_opendrive(procedural_town(*town), name, options));
+    map->name = name == kProcedural ? fmt::format("{}:{}", kProcedural, town->seed) : name;
     return map;
   }
   std::error_code error;
@@ -113,8 +106,8 @@ std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDrive
     }
   }
   const std::vector<std::string> towns = known_towns();
-  fail_usage("map '{}': expected an {} file, procedural[:SEED], or a town in {}, which has {}", name, kExtension,
-             map_folder(), towns.empty() ? "none" : fmt::format("{}", fmt::join(towns, ", ")));
+  fail_usage("map '{}': expected an {} file, procedural[:SEED[:OPTIONS]], or a town in {}, which has {}", name,
+             kExtension, map_folder(), towns.empty() ? "none" : fmt::format("{}", fmt::join(towns, ", ")));
 }
 
 }  // namespace pictura

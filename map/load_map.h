@@ -16,9 +16,10 @@ struct LoadReport {
   std::string cache_refusal;  // why a cached file was there and not used, or empty
 };
 
-/// Loads `name`: a file (.xodr), a town's name looked up as NAME.xodr in the map folder, or `procedural[:SEED]`. Files
-/// are imported once and kept in the cache (map_cache.h); a cache that cannot be read or written costs time alone.
-/// Throws Error naming the file and the line or element; UsageError when there is no such map.
+/// Loads `name`: a file (.xodr), a town's name looked up as NAME.xodr in the map folder, or
+/// `procedural[:SEED[:NAME=VALUE,...]]`. Files are imported once and kept in the cache (map_cache.h); a cache that
+/// cannot be read or written costs time alone. Throws Error naming the file and the line or element; UsageError when
+/// there is no such map.
 std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDriveOptions& options = {},
                                         LoadReport* report_out = nullptr);
 

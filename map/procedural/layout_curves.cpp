@@ -1,0 +1,214 @@
+// Where streets run: the headings of arms, how far junctions reach, and the curves between their mouths.
+#include "pictura/map/procedural/layout.h"
+#include "pictura/map/procedural/movements.h"
+#include "pictura/map/procedural/roundabout_shape.h"
+
+namespace pictura::town {
+
+namespace {
+
+enum Draw : uint32_t { kCurved = 100, kCurveShape, kSlipLanes };
+
+constexpr double degrees(double angle) { return angle * kPi_rad / 180; }
+
+// Arms are at least this far apart: where all are of the grid, and where a diagonal squeezes in.
+constexpr double kMinGap_rad = degrees(72), kMinOppositeGap_rad = degrees(150), kMinFiveArmGap_rad = degrees(62);
+// Neighbouring arms that are further apart meet without a corner.
+constexpr double kFlatGap_rad = degrees(140);
+constexpr double kMinMouth_m = 9, kMinBendMouth_m = 10;
+constexpr double kOverpassMargin_m = 2;
+constexpr double kSlipRadius_m = 16;
+// Streets with a slip lane, and those that one leads into, are at least this long between their mouths; a lane that
+// opens on the inside of a sharper curve would open at once.
+constexpr double kMinSlipStreet_m = 42, kMinSlipExit_m = 25, kMinSlipStreetRadius_m = 60;
+
+double side_width_m(const Street& street) {
+  return street.lanes * kLaneWidth_m + kShoulderWidth_m + (street.has_sidewalks ? kSidewalkWidth_m : 0);
+}
+
+}  // namespace
+
+double right_turn_radius_m(double gap_rad) {
+  constexpr double kLeast_m = 7.5, kMost_m = 12, kOverlap = 0.95;
+  return std::clamp(kOverlap * kLaneWidth_m / (1 - std::sin(0.5 * gap_rad)), kLeast_m, kMost_m);
+}
+
+void Layout::set_arm_heading(int street, bool at_start, double heading) {
+  Street& s = streets_[street];
+  (at_start ? s.leave : s.arrive) = at_start ? heading : heading + kPi_rad;
+  for (Arm& arm : nodes_[at_start ? s.from : s.to].arms) {
+    if (arm.street == street && arm.at_start == at_start) arm.heading = heading;
+  }
+}
+
+void Layout::set_headings() {
+  for (int s = 0; s < static_cast<int>(streets_.size()); ++s) {
+    const Node &from = nodes_[streets_[s].from], &to = nodes_[streets_[s].to];
+    const double heading = std::atan2(to.y - from.y, to.x - from.x);
+    set_arm_heading(s, true, heading);
+    set_arm_heading(s, false, heading + kPi_rad);
+  }
+  for (Node& node : nodes_) {
+    const bool has_diagonal =
+        std::any_of(node.arms.begin(), node.arms.end(), [](const Arm& arm) { return arm.direction % 2 == 1; });
+    if (has_diagonal) spread_arms(&node);
+  }
+}
+
+/// Turns the arms of a node with a diagonal away from each other until every two have room.
+void Layout::spread_arms(Node* node) {
+  const int count = node->degree();
+  const double wanted = std::min(kMinFiveArmGap_rad, 0.97 * 2 * kPi_rad / count);
+  constexpr int kSweeps = 200;
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    for (int i = 0; i < count; ++i) {
+      const Arm a = node->arm(i), b = node->arm(i + 1);
+      const double missing = wanted - full_turn(b.heading - a.heading);
+      if (missing <= 0) continue;
+      set_arm_heading(a.street, a.at_start, a.heading - 0.5 * missing);
+      set_arm_heading(b.street, b.at_start, b.heading + 0.5 * missing);
+    }
+  }
+}
+
+bool Layout::is_crowded(const Node& node) const {
+  for (int i = 0; i < node.degree(); ++i) {
+    for (int j = 0; j < i; ++j) {
+      const Arm &a = node.arm(i), &b = node.arm(j);
+      const double least = opposite(a.direction) == b.direction ? kMinOppositeGap_rad : kMinGap_rad;
+      if (std::abs(wrapped(a.heading - b.heading)) < least) return true;
+    }
+  }
+  return false;
+}
+
+/// Bends streets one by one: in an arc or an S, as much as their neighbours at both ends leave room for.
+void Layout::curve_streets() {
+  std::vector<int> candidates;
+  for (int s = 0; s < static_cast<int>(streets_.size()); ++s) {
+    bool may_bend = true;
+    for (const int n : {streets_[s].from, streets_[s].to}) {
+      may_bend = may_bend && nodes_[n].kind != NodeKind::overpass;
+      for (const Arm& arm : nodes_[n].arms) may_bend = may_bend && arm.direction % 2 == 0;
+    }
+    if (may_bend) candidates.push_back(s);
+  }
+  for (const int s : pick(options_.curved, candidates, kCurved)) {
+    const Node &from = nodes_[streets_[s].from], &to = nodes_[streets_[s].to];
+    const double straight = streets_[s].leave;
+    RandomStream stream = draw(kCurveShape, s);
+    double angle = (stream.below(2) ? 1 : -1) * static_cast<double>(stream.uniform(0.16f, 0.4f));
+    constexpr float kArcShare = 0.6f;  // the rest are S-curves
+    const double arrive_sign = stream.uniform() < kArcShare ? -1 : 1;
+    for (;; angle *= 0.7) {
+      if (std::abs(angle) < 0.05) angle = 0;
+      set_arm_heading(s, true, straight + angle);
+      set_arm_heading(s, false, straight + arrive_sign * angle + kPi_rad);
+      if (angle == 0) break;
+      if (is_crowded(from) || is_crowded(to)) continue;
+      if (sharpest_curvature(curve_of(streets_[s])) <= 1 / kMinStreetRadius_m) break;
+    }
+  }
+}
+
+/// From the node to the end of an arm: as far as the corners with its two neighbours need.
+double Layout::mouth_distance_m(const Node& node, int index) const {
+  const Arm& arm = node.arm(index);
+  const Street& street = streets_[arm.street];
+  if (node.kind == NodeKind::overpass) {
+    return std::max(side_width_m(streets_[node.arm(index + 1).street]),
+                    side_width_m(streets_[node.arm(index - 1).street])) +
+           kOverpassMargin_m;
+  }
+  if (node.is_bend()) {
+    constexpr double kInnerRadius_m = 10;
+    const double gap = std::abs(wrapped(node.arm(index + 1).heading - arm.heading));
+    return std::max(kMinBendMouth_m, (side_width_m(street) + kInnerRadius_m) / std::tan(0.5 * gap));
+  }
+  if (node.kind == NodeKind::roundabout) {
+    double mouth = 0;
+    for (const int side : {1, -1}) {
+      const double gap = full_turn(side * (node.arm(index + side).heading - arm.heading));
+      mouth = std::max(mouth, roundabout_mouth_m(roundabout_half_angle(gap)));
+    }
+    return mouth;
+  }
+  double mouth = kMinMouth_m;
+  for (const int side : {1, -1}) {  // the neighbour on the left, then on the right, as seen from the node
+    const Arm& left = side > 0 ? node.arm(index + 1) : arm;
+    const Arm& right = side > 0 ? arm : node.arm(index - 1);
+    const double gap = full_turn(left.heading - right.heading);
+    if (gap > kFlatGap_rad) continue;
+    // Traffic that comes in by the right arm turns right into the left one. Its path begins on the left border of the
+    // outermost lane of the one and ends on that of the other.
+    const double in_offset = (streets_[right.street].lanes - (has_slip(right) ? 0 : 1)) * kLaneWidth_m;
+    const double out_offset = (streets_[left.street].lanes - 1) * kLaneWidth_m;
+    const double own = side > 0 ? in_offset : out_offset, other = side > 0 ? out_offset : in_offset;
+    const double radius = has_slip(right) ? kSlipRadius_m : right_turn_radius_m(gap);
+    mouth = std::max(mouth, (other + own * std::cos(gap)) / std::sin(gap) + radius / std::tan(0.5 * gap));
+  }
+  return mouth;
+}
+
+Curve Layout::curve_of(const Street& street) const {
+  const auto mouth = [&](int n) {
+    const Node& node = nodes_[n];
+    int index = 0;
+    while (&streets_[node.arms[index].street] != &street) ++index;
+    return mouth_distance_m(node, index);
+  };
+  const Node &from = nodes_[street.from], &to = nodes_[street.to];
+  return biarc(ahead({from.x, from.y, street.leave}, mouth(street.from)),
+               ahead({to.x, to.y, street.arrive}, -mouth(street.to)));
+}
+
+/// Right turns at lights, where both streets are long enough for the wider corner.
+void Layout::choose_slip_lanes() {
+  struct Turn {
+    int node, arm;
+  };
+  std::vector<Turn> turns;
+  std::vector<int> candidates;
+  for (int n = 0; n < static_cast<int>(nodes_.size()); ++n) {
+    const Node& node = nodes_[n];
+    const bool has_diagonal =
+        std::any_of(node.arms.begin(), node.arms.end(), [](const Arm& arm) { return arm.direction % 2 == 1; });
+    if (!node.is_crossing() || !node.has_lights || has_diagonal) continue;
+    for (int i = 0; i < node.degree(); ++i) {
+      // The lanes of a stem are needed for both its directions.
+      if (straight_on(node, i) < 0 && streets_[node.arm(i).street].lanes > 1) continue;
+      if (full_turn(node.arm(i + 1).heading - node.arm(i).heading) > degrees(115)) continue;
+      candidates.push_back(static_cast<int>(turns.size()));
+      turns.push_back({n, i});
+    }
+  }
+  auto wanted = pick(options_.slip_lanes, candidates, kSlipLanes).size();
+  for (const int candidate : shuffled(candidates, kSlipLanes)) {
+    if (wanted == 0) break;
+    const Node& node = nodes_[turns[candidate].node];
+    const Arm &in = node.arm(turns[candidate].arm), &out = node.arm(turns[candidate].arm + 1);
+    Street &street = streets_[in.street], &exit = streets_[out.street];
+    bool& slip = in.at_start ? street.slip_at_start : street.slip_at_end;
+    slip = true;
+    Curve in_curve = curve_of(street), out_curve = curve_of(exit);
+    const int ends = (street.slip_at_start ? 1 : 0) + (street.slip_at_end ? 1 : 0);
+    const int exit_ends = (exit.slip_at_start ? 1 : 0) + (exit.slip_at_end ? 1 : 0);
+    slip = sharpest_curvature(in_curve) <= 1 / kMinSlipStreetRadius_m &&
+           sharpest_curvature(out_curve) <= 1 / kMinStreetRadius_m &&
+           number_stations(&in_curve) >= ends * kMinSlipStreet_m &&
+           number_stations(&out_curve) >= std::max(kMinSlipExit_m, exit_ends * kMinSlipStreet_m);
+    if (slip) --wanted;
+  }
+}
+
+void Layout::lay_curves() {
+  for (Node& node : nodes_) {
+    for (int i = 0; i < node.degree(); ++i) node.arms[i].mouth_m = mouth_distance_m(node, i);
+  }
+  for (Street& street : streets_) {
+    street.curve = curve_of(street);
+    street.length_m = number_stations(&street.curve);
+  }
+}
+
+}  // namespace pictura::town

@@ -1,0 +1,66 @@
+// How high crossings lie: on gentle hills, the upper street of an overpass clear of the lower one, no street too steep.
+#include <cmath>
+
+#include "pictura/map/procedural/elevation.h"
+#include "pictura/map/procedural/layout.h"
+
+namespace pictura::town {
+
+namespace {
+
+enum Draw : uint32_t { kHills = 200 };
+
+constexpr double kClearance_m = 5.5;  // between the surfaces of an overpass
+constexpr int kSweeps = 2000;
+
+}  // namespace
+
+void Layout::set_heights() {
+  // The sum of three waves, between 0 and hills_m.
+  constexpr int kWaves = 3;
+  struct Wave {
+    double x = 0, y = 0, phase = 0;
+  } waves[kWaves];
+  for (int i = 0; i < kWaves; ++i) {
+    RandomStream stream = draw(kHills, i);
+    const double direction = static_cast<double>(stream.uniform()) * 2 * kPi_rad;
+    const double number = 2 * kPi_rad / static_cast<double>(stream.uniform(200, 600));
+    waves[i] = {number * std::cos(direction), number * std::sin(direction),
+                static_cast<double>(stream.uniform()) * 2 * kPi_rad};
+  }
+  for (Node& node : nodes_) {
+    double sum = 0;
+    for (const Wave& wave : waves) sum += std::sin(wave.x * node.x + wave.y * node.y + wave.phase);
+    node.z = node.upper_z = options_.hills_m * 0.5 * (1 + sum / kWaves);
+  }
+  // Heights that no street forbids, by moving the ends of every street that is too steep towards each other, and the
+  // streets of overpasses apart, until all agree.
+  const auto height = [&](int n, const Street& street) -> double& {
+    const bool is_upper =
+        nodes_[n].kind == NodeKind::overpass && (street.direction % 4 == 2) == nodes_[n].upper_runs_north;
+    return is_upper ? nodes_[n].upper_z : nodes_[n].z;
+  };
+  bool agreed = false;
+  for (int sweep = 0; sweep < kSweeps && !agreed; ++sweep) {
+    agreed = true;
+    for (Node& node : nodes_) {
+      if (node.kind != NodeKind::overpass) continue;
+      const double missing = kClearance_m - (node.upper_z - node.z);
+      node.upper_z += 0.5 * missing;
+      node.z -= 0.5 * missing;
+    }
+    for (const Street& street : streets_) {
+      double &from = height(street.from, street), &to = height(street.to, street);
+      const double excess = std::abs(to - from) - greatest_climb_m(street.length_m);
+      if (excess <= 1e-9) continue;
+      agreed = false;
+      from += std::copysign(0.5 * excess, to - from);
+      to += std::copysign(0.5 * excess, from - to);
+    }
+  }
+  for (Node& node : nodes_) {
+    if (node.kind != NodeKind::overpass) node.upper_z = node.z;
+  }
+}
+
+}  // namespace pictura::town

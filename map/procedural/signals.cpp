@@ -1,0 +1,115 @@
+// Traffic lights: one, with a controller and a phase of its own, for every approach of a crossing.
+#include <cmath>
+#include <limits>
+
+#include "pictura/map/opendrive/curves.h"
+#include "pictura/map/procedural/town_builder.h"
+
+namespace pictura::town {
+
+namespace {
+
+constexpr double kPostSetback_m = 0.8;  // of a post, behind the kerb
+// Near-side heads: on a post beyond the stop line, or on an arm over the lanes, high enough for what passes below.
+constexpr double kNearPost_m = 3, kNearArm_m = 4, kArmRise_m = 2;
+
+struct Place {
+  double x = 0, y = 0, z_offset_m = 0;
+};
+
+double behind_kerb_m(int lanes) { return lanes * kLaneWidth_m + kShoulderWidth_m + kPostSetback_m; }
+
+Place at(Pose pose, double z_offset_m = 0) { return {pose.x, pose.y, z_offset_m}; }
+
+/// Just beyond the stop line: beside a single lane, over several.
+Place near_side(Pose arriving, int lanes, bool has_slip) {
+  if (lanes == 1 && !has_slip) return at(ahead(to_the_right(arriving, behind_kerb_m(1)), kNearPost_m));
+  return at(ahead(to_the_right(arriving, 0.5 * lanes * kLaneWidth_m), kNearArm_m), kArmRise_m);
+}
+
+/// Beyond the junction between the two arms to either side of the direction of travel, behind both their kerbs.
+Place far_side_between(const Layout& layout, const Node& node, int arm) {
+  const double forward = node.arm(arm).heading + kPi_rad;
+  double nearest = 0.5 * kPi_rad;
+  int most_lanes = 0;
+  for (int i = 0; i < node.degree(); ++i) {
+    if (i == arm) continue;
+    nearest = std::min(nearest, std::abs(wrapped(node.arm(i).heading - forward)));
+    most_lanes = std::max(most_lanes, layout.streets()[node.arm(i).street].lanes);
+  }
+  return at(ahead({node.x, node.y, forward}, behind_kerb_m(most_lanes) / std::sin(nearest)));
+}
+
+/// A place in the terms of a road: the foot on its reference line and the distance to the left of it.
+struct Foot {
+  double s = 0, t = std::numeric_limits<double>::infinity();
+};
+
+Foot foot_on(const opendrive::FileRoad& road, const Place& place) {
+  constexpr int kStarts = 8, kSteps = 30;
+  constexpr double kOff_m = 1e-6;
+  Foot best;
+  for (int start = 0; start <= kStarts; ++start) {
+    double s = road.length * start / kStarts;
+    for (int step = 0; step < kSteps; ++step) {
+      const opendrive::Pose pose = opendrive::pose_at(road, s);
+      const double dx = place.x - pose.x, dy = place.y - pose.y;
+      const double along = dx * std::cos(pose.heading) + dy * std::sin(pose.heading);
+      const double left = dy * std::cos(pose.heading) - dx * std::sin(pose.heading);
+      if (std::abs(along) < kOff_m && std::abs(left) < std::abs(best.t)) best = {s, left};
+      s = std::clamp(s + along / std::max(0.2, 1 - pose.curvature * left), 0.0, road.length);
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+void TownBuilder::add_lights(const Node& node, const std::vector<Movement>& movements, const std::vector<int>& roads,
+                             opendrive::FileJunction* junction) {
+  for (int i = 0; i < node.degree(); ++i) {
+    const Arm& arm = node.arm(i);
+    const int straight = straight_on(node, i);
+    Place place = near_side(turned_back(mouth_of(node, arm)), street_of(arm).lanes, layout_.has_slip(arm));
+    if (node.far_side_heads && straight >= 0) {
+      const Arm& exit = node.arm(straight);
+      place = at(to_the_right(mouth_of(node, exit), behind_kerb_m(street_of(exit).lanes)));
+    } else if (node.far_side_heads) {
+      place = far_side_between(layout_, node, i);
+    }
+    // The signal belongs to the connecting road that passes closest.
+    int carrier = roads[0];
+    Foot foot;
+    for (const int candidate : roads) {
+      const Foot other = foot_on(road(candidate), place);
+      if (std::abs(other.t) >= std::abs(foot.t)) continue;
+      foot = other;
+      carrier = candidate;
+    }
+    opendrive::FileSignal signal;
+    signal.id = next_id();
+    signal.type = "1000001";
+    signal.subtype = "-1";
+    signal.country = "OpenDRIVE";
+    signal.is_dynamic = true;
+    signal.s = foot.s;
+    signal.t = foot.t;
+    signal.z_offset = place.z_offset_m;
+    for (std::size_t m = 0; m < movements.size(); ++m) {
+      if (movements[m].from != i || movements[m].is_slip) continue;
+      opendrive::SignalReference reference;
+      reference.signal = signal.id;
+      reference.validity = {{-movements[m].lanes, -1}};
+      road(roads[m]).signal_references.push_back(std::move(reference));
+    }
+    opendrive::FileController controller;
+    controller.id = next_id();
+    controller.sequence = i;
+    controller.signals.push_back(signal.id);
+    junction->controllers.push_back(controller.id);
+    network_.controllers.push_back(std::move(controller));
+    road(carrier).signals.push_back(std::move(signal));
+  }
+}
+
+}  // namespace pictura::town

@@ -1,0 +1,82 @@
+// Lays a planned town: fills a Network with roads, lanes, links, junctions, lights and objects.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pictura/map/opendrive/model.h"
+#include "pictura/map/procedural/cross_section.h"
+#include "pictura/map/procedural/layout.h"
+#include "pictura/map/procedural/movements.h"
+
+namespace pictura::town {
+
+/// One end of a road of the network.
+struct RoadEnd {
+  int road = -1;
+  bool at_start = false;
+};
+
+/// The sides of a road where it ends.
+struct EndSides {
+  Side left, right;
+};
+
+class TownBuilder {
+ public:
+  explicit TownBuilder(const Layout& layout);
+
+  opendrive::Network take() { return std::move(network_); }
+
+ private:
+  void lay_street(int street);
+  void lay_bend(const Node& node, const Arm& from, const Arm& to, double height_m);
+  // crossings.cpp
+  void lay_crossing(const Node& node);
+  int lay_movement(const Node& node, const Movement& movement, opendrive::FileJunction* junction);
+  void add_crosswalk(const Arm& arm, int carrier);
+  // roundabouts.cpp
+  void lay_roundabout(const Node& node);
+  // signals.cpp
+  void add_lights(const Node& node, const std::vector<Movement>& movements, const std::vector<int>& roads,
+                  opendrive::FileJunction* junction);
+
+  const Street& street_of(const Arm& arm) const { return layout_.streets()[arm.street]; }
+  /// Streets are the first roads, in their order.
+  static RoadEnd end_of(const Arm& arm) { return {arm.street, arm.at_start}; }
+  static Pose mouth_of(const Node& node, const Arm& arm) { return ahead({node.x, node.y, arm.heading}, arm.mouth_m); }
+
+  /// Adds a road of one section; its right side, and its left one unless it is one-way.
+  int add_road(Curve curve, double height_m, const std::string& junction, double speed_mps, const Side& left,
+               const Side& right, const SectionStyle& style);
+  EndSides& sides_at(RoadEnd end) { return end_sides_[2 * end.road + (end.at_start ? 0 : 1)]; }
+  /// The side of those who arrive at the end, or who leave from it; and the id of a lane on it, 0: none.
+  const Side& side(RoadEnd end, bool arriving) {
+    return arriving == end.at_start ? sides_at(end).left : sides_at(end).right;
+  }
+  int lane_id(RoadEnd end, bool arriving, LaneKind kind, int index = 0) {
+    return side(end, arriving).rank(kind, index) * (arriving == end.at_start ? 1 : -1);
+  }
+  void set_lane_link(RoadEnd end, int lane, int other);
+  void set_road_link(RoadEnd end, RoadEnd other);
+  void set_junction_link(RoadEnd end, const std::string& junction);
+  /// Joins two ends with each other, lane by lane, both ways.
+  void join(RoadEnd a, RoadEnd b);
+  /// Leads lanes that arrive at `from` over the connecting road, which begins there and ends at `to`.
+  void connect(RoadEnd from, int connecting, RoadEnd to, const Movement& movement, opendrive::FileJunction* junction);
+  void finish_junction(opendrive::FileJunction junction);
+
+  std::string next_id() { return fmt::format("{}", next_id_++); }
+  opendrive::FileRoad& road(int index) { return network_.roads[index]; }
+
+  const Layout& layout_;
+  opendrive::Network network_;
+  std::vector<EndSides> end_sides_;  // [roads][start, end]
+  int next_id_ = 1000000;            // of everything that is not a road
+};
+
+inline constexpr double mph(double speed) { return speed * 0.44704; }
+inline constexpr double kStreetSpeed_mps = mph(25), kAvenueSpeed_mps = mph(35), kJunctionSpeed_mps = mph(20),
+                        kRoundaboutSpeed_mps = mph(15);
+
+}  // namespace pictura::town

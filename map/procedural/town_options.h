@@ -1,0 +1,50 @@
+// What a procedural town is made of: its seed, its size, and how much of each feature it has.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+namespace pictura {
+
+/// Shares lie in [0, 1]. A share of things that a town chooses from takes at least one of them unless it is 0.
+struct TownOptions {
+  uint64_t seed = 0;
+  int blocks_x = 3, blocks_y = 3;  // blocks of houses, in [1, 32] each
+  double block_m = 90;             // mean distance between crossings
+  double density = 0.9;            // of the streets that can go, how many stay
+  double curved = 0.6;             // of the streets
+  double five_arms = 0.2;          // of the inner crossings, by a diagonal street
+  double roundabouts = 0.2;        // of the crossings of single-lane streets
+  double avenues = 0.2;            // of the inner rows and columns: two or more lanes each way
+  double max_lanes = 3;            // each way, of avenues and the ring road
+  double ring_road = 1;            // chance that an avenue runs around the town
+  double slip_lanes = 0.1;         // of the right turns at lights that have room for one
+  double hills_m = 6;              // greatest difference in height, before grades are limited
+  double overpasses = 0.1;         // of the inner crossings of four arms
+  double crosswalks = 0.9;         // of the crossings
+  double sidewalks = 0.95;         // of the streets
+  double parking = 0.4;            // of the sides of single-lane streets
+  double lights = 0.8;             // of the crossings that are no roundabouts
+  double far_side = 0.5;           // of the crossings with lights: heads beyond the junction
+};
+
+/// An option that is a number: its name in commands and map names, its range, and what it means.
+struct TownFeature {
+  const char* name;
+  double TownOptions::* value;
+  double low, high;
+  const char* help;
+};
+
+const std::vector<TownFeature>& town_features();
+constexpr int kMaxTownBlocks = 32;
+
+/// Throws UsageError naming the option, its range and its value.
+void check_town_options(const TownOptions& options);
+
+/// The options of `SEED[:NAME=VALUE,...]`, where NAME is `blocks` (as AxB) or a feature's. `map_name` is what the user
+/// wrote, for messages. Throws UsageError.
+TownOptions parse_town_options(std::string_view text, std::string_view map_name);
+
+}  // namespace pictura

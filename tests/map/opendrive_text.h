@@ -1,0 +1,56 @@
+// OpenDRIVE text on its own, for tests: an evaluation of lines, arcs, widths and heights that shares no code with the
+// writer or the importer, and the rules of the standard that can be stated in a few lines.
+#pragma once
+
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include <pugixml.hpp>
+
+namespace pictura::test {
+
+class OpenDriveText {
+ public:
+  explicit OpenDriveText(const std::string& text);
+
+  pugi::xml_node root() const { return document_.child("OpenDRIVE"); }
+  pugi::xml_node road(const std::string& id) const {
+    const auto found = roads_.find(id);
+    return found == roads_.end() ? pugi::xml_node() : found->second;
+  }
+  int count(const char* xpath) const { return static_cast<int>(document_.select_nodes(xpath).size()); }
+
+ private:
+  pugi::xml_document document_;
+  std::unordered_map<std::string, pugi::xml_node> roads_;
+};
+
+/// What the text breaks of OpenDRIVE 1.4: needed attributes, ascending stations, lanes counted from the center, unique
+/// ids, links that lead somewhere and are mutual, and junctions whose connections say what their roads say.
+std::vector<std::string> broken_rules(const OpenDriveText& text);
+
+struct Pose {
+  double x = 0, y = 0, heading = 0;
+};
+
+/// On a line or an arc, `ds` from its start.
+Pose on_geometry(const pugi::xml_node& geometry, double ds);
+
+/// The borders of a lane at an end of its road, the direction of +s there, and the height and the grade along +s.
+struct LaneEnd {
+  double inner_x = 0, inner_y = 0, outer_x = 0, outer_y = 0, heading = 0, z = 0, grade = 0;
+};
+LaneEnd lane_end(const pugi::xml_node& road, int lane, bool at_start);
+
+/// The lane of that id in the first or the last section of a road; none: an empty node.
+pugi::xml_node lane_at(const pugi::xml_node& road, int lane, bool at_start);
+
+/// All lanes of a section, from left to right, without the center.
+std::vector<pugi::xml_node> lanes_of(const pugi::xml_node& section);
+
+inline bool is(const pugi::xml_node& node, const char* attribute, const char* value) {
+  return std::string(node.attribute(attribute).value()) == value;
+}
+
+}  // namespace pictura::test
