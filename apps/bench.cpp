@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "pictura/apps/bench.h"
 #include "pictura/apps/commands.h"
 #include "pictura/apps/drive.h"
 #include "pictura/apps/report.h"
@@ -20,15 +21,6 @@ namespace pictura {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
-
-struct BenchResult {
-  std::string name, unit;
-  std::vector<double> values;  // one per repeat
-};
-
 std::string processor_name() {
   std::ifstream in("/proc/cpuinfo");
   for (std::string line; std::getline(in, line);) {
@@ -37,7 +29,9 @@ std::string processor_name() {
   return "unknown processor";
 }
 
-void report(bool json, const std::string& workload, const std::string& backend, std::vector<BenchResult> results) {
+}  // namespace
+
+void report_benchmark(bool json, const std::string& workload, const std::string& backend, std::vector<BenchResult> results) {
   Json rows = Json::array();
   for (BenchResult& result : results) {
     std::sort(result.values.begin(), result.values.end());
@@ -64,6 +58,12 @@ void report(bool json, const std::string& workload, const std::string& backend, 
                row["max"].get<double>(), row["repeats"].get<int>());
   }
 }
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
 struct Arguments {
   WorldOptions world{.agents = 120, .num_threads = 1};
@@ -115,7 +115,7 @@ void bench_simulate(const Arguments& arguments) {
     results.push_back(live);
     results.push_back(slots);
   }
-  report(arguments.json,
+  report_benchmark(arguments.json,
          fmt::format("simulate: {}, {} agents, random actions with resets, {} threads", arguments.world.map,
                      arguments.world.agents, arguments.world.num_threads),
          "cpu", results);
@@ -154,7 +154,7 @@ void bench_render(const Arguments& arguments) {
                               (agent_steps * static_cast<double>(renderer->config().rig.cameras.size())));
     if (interrupted()) throw Interrupted("interrupted");
   }
-  report(
+  report_benchmark(
       arguments.json,
       fmt::format("render: {}, {} agents, walls {}, all egos x {} cameras x {}, {} threads", world.map, world.agents,
                   world.walls ? "on" : "off", renderer->config().rig.cameras.size(), arguments.size, world.num_threads),
@@ -179,14 +179,14 @@ void bench_train(const Arguments& arguments) {
   std::filesystem::remove_all(folder);
   if (trained.interrupted) throw Interrupted("interrupted");
   PICTURA_CHECK(!rate.values.empty(), "bench train: {}: expected at least 2 updates", arguments.config);
-  report(arguments.json, fmt::format("train: {}, rollout and update", arguments.config), "cpu", {rate});
+  report_benchmark(arguments.json, fmt::format("train: {}, rollout and update", arguments.config), "cpu", {rate});
 }
 #endif
 
 }  // namespace
 
 void add_bench_command(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("bench", "Measure rates: bench render, bench simulate, bench train");
+  CLI::App* command = app.add_subcommand("bench", "Measure rates and quality: bench render, bench simulate, bench train, bench quality");
   command->require_subcommand(1);
   command->footer(
       "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n  pictura bench render --size 192x108");
@@ -218,6 +218,9 @@ void add_bench_command(CLI::App& app) {
 #ifdef PICTURA_HAS_TORCH
   const auto [train_command, train_arguments] = add("train", "Rollouts and updates of a configuration", bench_train);
   train_command->add_option("--config", train_arguments->config, "TOML file")->capture_default_str();
+#endif
+#ifdef PICTURA_HAS_BENCH
+  add_quality_benchmark(*command);
 #endif
 }
 

@@ -1,4 +1,5 @@
 // The oracle: the CPU renderer. It checks its input, places the cameras, and spreads images over OpenMP threads.
+#include <cstddef>
 #include <deque>
 #include <memory>
 
@@ -38,7 +39,7 @@ class CpuRenderer final : public Renderer {
   }
 
   void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream) override {
-    check_images(name(), config_.rig, space(), views.size(), images_out);
+    check_images(name(), config_.rig, space(), views.size(), images_out, /*draws_f16=*/true);
     check_scene(name(), scene, geometries_);
     check_views(name(), scene, views);
     const std::size_t num_cameras = cameras_.size();
@@ -98,11 +99,7 @@ class CpuRenderer final : public Renderer {
     const int64_t offset = static_cast<int64_t>(view) * out.view_stride;
     const std::size_t pixels = static_cast<std::size_t>(out.width_px) * static_cast<std::size_t>(out.height_px);
     ImageTarget target{images.format};
-    if (images.format == PixelFormat::u8) {
-      target.color = static_cast<uint8_t*>(out.data) + offset;
-    } else {
-      target.color = static_cast<float*>(out.data) + offset;
-    }
+    target.color = static_cast<std::byte*>(out.data) + offset * static_cast<int64_t>(bytes_per_value(images.format));
     if (out.depth_m) target.depth_m = out.depth_m + view * pixels;
     if (out.class_id) target.class_id = out.class_id + view * pixels;
     if (out.instance_id) target.instance_id = out.instance_id + view * pixels;

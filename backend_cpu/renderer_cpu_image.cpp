@@ -212,11 +212,20 @@ void ImageDrawer::draw(const ImageTarget& target) {
     };
     if (target.format == PixelFormat::u8) {
       write(static_cast<uint8_t*>(target.color), [](float channel) { return to_byte(channel); });
+    } else if (target.format == PixelFormat::f16) {
+      write(static_cast<uint16_t*>(target.color), [](float channel) { return to_half(channel); });
     } else {
       write(static_cast<float*>(target.color), [](float channel) { return clamp(channel, 0.0f, 1.0f); });
     }
   }
   if (target.depth_m || target.class_id || target.instance_id) draw_planes(target);
+}
+
+void ImageDrawer::visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit) const {
+  for (const int32_t i : order_) {
+    visit_pixels(items_[static_cast<std::size_t>(i)], 0, setting_.camera.height_px,
+                 [&](int index, auto&& coverage, const ScreenFace& face) { visit(index, coverage(), face.color); });
+  }
 }
 
 void ImageDrawer::draw_planes(const ImageTarget& target) const {

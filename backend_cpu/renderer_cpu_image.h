@@ -2,6 +2,7 @@
 // the shared ones of common/raster*.h; here is only the traversal, and the memory that it reuses from image to image.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "pictura/common/image.h"
@@ -41,6 +42,9 @@ class ImageDrawer {
     double seen = 0, alone = 0;
   };
   Coverage coverage_of(int32_t agent);
+  /// Calls visit(y * width + x, coverage, colour) for what each face may cover of each pixel of the prepared image, front
+  /// to back: for measuring other ways to composite.
+  void visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit) const;
 
  private:
   class EdgePool {

@@ -28,10 +28,10 @@ void check_ranges(std::string_view renderer, std::string_view name, Span<const i
 }  // namespace
 
 void check_images(std::string_view renderer, const Rig& rig, MemorySpace space, std::size_t num_views,
-                  const ImageBatch& images) {
+                  const ImageBatch& images, bool draws_f16) {
   PICTURA_CHECK(images.space == space, "renderer {}: images: expected {} memory, got {}", renderer, name_of(space),
                 name_of(images.space));
-  PICTURA_CHECK(images.format == PixelFormat::u8 || images.format == PixelFormat::f32,
+  PICTURA_CHECK(draws_f16 || images.format != PixelFormat::f16,
                 "renderer {}: images: expected the format u8 or f32, got f16", renderer);
   PICTURA_CHECK(images.num_views >= 0 && static_cast<std::size_t>(images.num_views) == num_views,
                 "renderer {}: images: expected room for {} views, got {}", renderer, num_views, images.num_views);

@@ -8,9 +8,10 @@
 
 namespace pictura {
 
-/// Throws Error unless the images lie in `space`, fit the rig and the number of views, and have a known format.
+/// Throws Error unless the images lie in `space`, fit the rig and the number of views, and have a format that the
+/// renderer draws: u8, f32 and, where it says so, f16.
 void check_images(std::string_view renderer, const Rig& rig, MemorySpace space, std::size_t num_views,
-                  const ImageBatch& images);
+                  const ImageBatch& images, bool draws_f16 = false);
 
 /// Throws Error unless all spans of a host scene fit together, handles are below num_geometries, lights suffice for the
 /// geometries' signals, and every agent's box is finite.

@@ -365,6 +365,17 @@ PICTURA_HD inline float composite(PixelState* pixel, const PixelCoverage& covera
   return weight;
 }
 
+/// A channel as an IEEE half, rounded to nearest, ties to even.
+PICTURA_HD inline uint16_t to_half(float channel) {
+  float mantissa = clamp(channel, 0.0f, 1.0f);
+  // Below 2^-14 halves are multiples of 2^-24.
+  if (mantissa < 6.103515625e-5f) return static_cast<uint16_t>(rintf(mantissa * 16777216.0f));
+  int exponent = 15;
+  for (; mantissa < 1.0f; --exponent) mantissa = mantissa * 2.0f;
+  // A mantissa that rounds up to 2 carries into the exponent.
+  return static_cast<uint16_t>(1024 * exponent + static_cast<int>(rintf((mantissa - 1.0f) * 1024.0f)));
+}
+
 /// A channel as an unsigned byte.
 PICTURA_HD inline uint8_t to_byte(float channel) {
   return static_cast<uint8_t>(clamp(channel, 0.0f, 1.0f) * 255.0f + 0.5f);

@@ -1,65 +1,25 @@
 // The oracle against the truth.
-#include <cmath>
-
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "pictura/common/make_renderer.h"
-#include "pictura/common/raster_coverage.h"
-#include "pictura/tests/support/image_scenes.h"
-#include "pictura/tests/support/image_truth.h"
+#include "pictura/bench/quality.h"
 #include "pictura/tests/support/tolerances.h"
 
 namespace pictura {
 namespace {
 
-std::vector<float> drawn(const HostImages& images, int view, int camera) {
-  const CameraImages& out = images.camera(camera);
-  const float* first = static_cast<const float*>(out.data) + view * out.view_stride;
-  return {first, first + 3 * out.width_px * out.height_px};
-}
-
-struct Quality {
-  PooledError oracle, oracle_u8, supersampled;
-};
-
-Quality measure(const StaticGeometry& geometry, const SceneOwner& scene, const std::vector<View>& views,
-                const RendererConfig& config) {
-  const auto renderer = make_renderer("cpu", config);
-  renderer->upload(geometry);
-  HostImages images(config.rig, static_cast<int>(views.size()), PixelFormat::f32);
-  renderer->render(scene.batch(), views, images.batch());
-  Quality quality;
-  for (std::size_t view = 0; view < views.size(); ++view) {
-    for (std::size_t k = 0; k < config.rig.cameras.size(); ++k) {
-      const Camera& camera = config.rig.cameras[k];
-      const TruthImage truth = trace_image(geometry, scene.batch(), views[view], camera, config.line_floor_px);
-      if (truth.blank()) continue;
-      const TruthImage coarse =
-          trace_image(geometry, scene.batch(), views[view], camera, config.line_floor_px, TruthSamples::grid_2x2);
-      std::vector<float> image = drawn(images, static_cast<int>(view), static_cast<int>(k));
-      quality.oracle.add(image, truth.rgb);
-      for (float& channel : image) channel = static_cast<float>(to_byte(channel)) / 255.0f;
-      quality.oracle_u8.add(image, truth.rgb);
-      quality.supersampled.add(coarse.rgb, truth.rgb);
-    }
-  }
-  return quality;
-}
-
 TEST(Quality, TownsAreWithinThePromisedError) {
-  Quality pooled;
   for (const uint64_t seed : {1, 2, 3}) {
     SyntheticTown town = make_synthetic_town(seed, 120);
     town.views.resize(4);
-    const Quality quality = measure(town.geometry, town.scene, town.views, {.rig = paper_rig(), .num_threads = 1});
+    const Quality quality = measure_quality(town.geometry, town.scene.batch(), town.views, {.rig = paper_rig(), .num_threads = 1});
     RecordProperty("psnr_db_seed_" + std::to_string(seed), fmt::format("{:.2f}", quality.oracle.psnr_db()));
     fmt::print("seed {}: {:.2f} dB, u8 {:.2f} dB, 2x2 samples {:.2f} dB, worst {:.1f}/255, {:.3f} % beyond 1/255\n",
-               seed, quality.oracle.psnr_db(), quality.oracle_u8.psnr_db(), quality.supersampled.psnr_db(),
+               seed, quality.oracle.psnr_db(), quality.oracle_bytes.psnr_db(), quality.grid_2x2.psnr_db(),
                255 * quality.oracle.max_error(), 100 * quality.oracle.share_above(1.0 / 255));
     EXPECT_GE(quality.oracle.psnr_db(), kLeastOraclePsnr_db);
-    EXPECT_GE(quality.oracle.psnr_db(), quality.supersampled.psnr_db() + kOracleGain_db);
+    EXPECT_GE(quality.oracle.psnr_db(), quality.grid_2x2.psnr_db() + kOracleGain_db);
     EXPECT_LE(quality.oracle.max_error(), kWorstOracleError);
   }
 }
@@ -72,7 +32,7 @@ TEST(Quality, OddSizesAndMixedRigsToo) {
   config.rig.cameras[1] = paper_rig(33, 71).cameras[1];
   config.rig.cameras[1].pitch_rad = -0.2f;
   config.rig.cameras[1].roll_rad = 0.3f;
-  EXPECT_GE(measure(town.geometry, town.scene, town.views, config).oracle.psnr_db(), kLeastOraclePsnr_db);
+  EXPECT_GE(measure_quality(town.geometry, town.scene.batch(), town.views, config).oracle.psnr_db(), kLeastOraclePsnr_db);
 }
 
 // A bright wall across the view, 20 m ahead, and things before it.
@@ -92,7 +52,8 @@ Quality measure_boxes(const StaticGeometry& geometry, const std::vector<AgentBox
   SceneOwner scene;
   scene.agents = boxes;
   scene.end_world(0);
-  return measure(geometry, scene, {make_view({0, 0, 0}, 0)}, {.rig = paper_rig(), .num_threads = 1});
+  return measure_quality(geometry, scene.batch(), std::vector<View>{make_view({0, 0, 0}, 0)},
+                         {.rig = paper_rig(), .num_threads = 1});
 }
 
 TEST(Quality, FacesOfACuboidDoNotLeakTheWallBehindThem) {
@@ -152,7 +113,7 @@ TEST(Quality, RoadsOnTwoLevels) {
   scene.end_world(0);
   const std::vector<View> views{make_view({-2, -1.8f, 0}, 0), make_view({35.2f, -12, 6}, 1.2f),
                                 make_view({5, 0, 14}, 0.1f)};
-  EXPECT_GE(measure(geometry, scene, views, {.rig = paper_rig(), .num_threads = 1}).oracle.psnr_db(),
+  EXPECT_GE(measure_quality(geometry, scene.batch(), views, {.rig = paper_rig(), .num_threads = 1}).oracle.psnr_db(),
             kLeastOraclePsnr_db);
 }
 

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <utility>
 
 #include "pictura/common/raster_check.h"
 #include "pictura/common/raster_shapes.h"
@@ -344,72 +346,139 @@ bool TruthImage::blank() const {
   return std::all_of(rgb.begin(), rgb.end(), [](float channel) { return channel == 0; });
 }
 
+namespace {
+
+// What one camera sees of one view, ready to be sampled.
+class Sight {
+ public:
+  Sight(const StaticGeometry& geometry, const SceneBatch& scene, const View& view, const Camera& camera,
+        float line_floor_px)
+      : camera_(camera), whole_(cone(0, 0, camera.width_px, camera.height_px)) {
+    const Eye eye(camera, view);
+    const auto world = static_cast<std::size_t>(view.world);
+    for (int32_t i = scene.world_begin[world]; i < scene.world_begin[world + 1]; ++i) {
+      const AgentBox& box = scene.agents[static_cast<std::size_t>(i)];
+      const auto hidden = scene.hidden_agents.subspan(static_cast<std::size_t>(view.hidden_begin),
+                                                      static_cast<std::size_t>(view.hidden_end - view.hidden_begin));
+      if (!box.drawn || i == view.ego_agent || std::count(hidden.begin(), hidden.end(), i)) continue;
+      add_agent(&tracer_, eye, box, static_cast<uint16_t>(1 + i - scene.world_begin[world]));
+    }
+    for (const WallFace& wall : geometry.walls) add_wall(&tracer_, eye, wall);
+    const auto lights = static_cast<std::size_t>(scene.light_begin[world]);
+    if (scene.light_begin[world + 1] > scene.light_begin[world]) {
+      for (const LightHead& head : geometry.heads) {
+        add_light(&tracer_, eye, head, scene.light_states[lights + static_cast<std::size_t>(head.signal)]);
+      }
+    }
+    Rig rig;
+    rig.cameras = {camera};
+    const PinholeCamera pinhole = pinhole_cameras(rig)[0];
+    for (std::size_t i = 0; i < geometry.strips.size(); ++i) {
+      add_strip(&tracer_, eye, pinhole, whole_, line_floor_px, geometry.strips[i], static_cast<uint32_t>(i));
+    }
+  }
+
+  // Calls visit(x, y, candidates) for each pixel, with what may appear in it.
+  template <typename Visit>
+  void for_each_pixel(Visit&& visit) const {
+    // What may appear in the image, then in each of its rows, then in each pixel.
+    const Candidates in_image = within(all_of(tracer_), whole_);
+    for (int y = 0; y < camera_.height_px; ++y) {
+      const Candidates in_row = within(in_image, cone(0, y, camera_.width_px, y + 1));
+      for (int x = 0; x < camera_.width_px; ++x) visit(x, y, within(in_row, cone(x, y, x + 1, y + 1)));
+    }
+  }
+
+  Point ray_at(double x, double y) const {
+    return {(x - camera_.center_x_px) / camera_.focal_x_px, (y - camera_.center_y_px) / camera_.focal_y_px, 1};
+  }
+  const Tracer& tracer() const { return tracer_; }
+
+ private:
+  Cone cone(double x_low, double y_low, double x_high, double y_high) const {
+    return Cone([this](double x, double y) { return ray_at(x, y); }, x_low, y_low, x_high, y_high);
+  }
+
+  Camera camera_;
+  Cone whole_;
+  Tracer tracer_;
+};
+
+// Offsets of a pixel's samples from its corner.
+std::vector<std::pair<double, double>> sample_offsets(TruthSamples samples) {
+  if (samples == TruthSamples::center) return {{0.5, 0.5}};
+  if (samples == TruthSamples::grid_2x2) return {{0.25, 0.25}, {0.75, 0.25}, {0.25, 0.75}, {0.75, 0.75}};
+  // Additive recurrence on the plastic number (M. Roberts' R2 sequence).
+  std::vector<std::pair<double, double>> offsets;
+  for (int i = 0; i < 1024; ++i) {
+    offsets.emplace_back(std::fmod(0.5 + 0.7548776662466927 * i, 1.0), std::fmod(0.5 + 0.5698402909980532 * i, 1.0));
+  }
+  return offsets;
+}
+
+}  // namespace
+
 TruthImage trace_image(const StaticGeometry& geometry, const SceneBatch& scene, const View& view, const Camera& camera,
                        float line_floor_px, TruthSamples samples) {
-  Rig rig;
-  rig.cameras = {camera};
-  const PinholeCamera pinhole = pinhole_cameras(rig)[0];
-  const Eye eye(camera, view);
-  auto ray_at = [&](double x, double y) {
-    return Point{(x - camera.center_x_px) / camera.focal_x_px, (y - camera.center_y_px) / camera.focal_y_px, 1};
-  };
-  const Cone whole(ray_at, 0, 0, camera.width_px, camera.height_px);
-  Tracer tracer;
-  const auto world = static_cast<std::size_t>(view.world);
-  for (int32_t i = scene.world_begin[world]; i < scene.world_begin[world + 1]; ++i) {
-    const AgentBox& box = scene.agents[static_cast<std::size_t>(i)];
-    const auto hidden = scene.hidden_agents.subspan(static_cast<std::size_t>(view.hidden_begin),
-                                                    static_cast<std::size_t>(view.hidden_end - view.hidden_begin));
-    if (!box.drawn || i == view.ego_agent || std::count(hidden.begin(), hidden.end(), i)) continue;
-    add_agent(&tracer, eye, box, static_cast<uint16_t>(1 + i - scene.world_begin[world]));
-  }
-  for (const WallFace& wall : geometry.walls) add_wall(&tracer, eye, wall);
-  const auto lights = static_cast<std::size_t>(scene.light_begin[world]);
-  if (scene.light_begin[world + 1] > scene.light_begin[world]) {
-    for (const LightHead& head : geometry.heads) {
-      add_light(&tracer, eye, head, scene.light_states[lights + static_cast<std::size_t>(head.signal)]);
-    }
-  }
-  for (std::size_t i = 0; i < geometry.strips.size(); ++i) {
-    add_strip(&tracer, eye, pinhole, whole, line_floor_px, geometry.strips[i], static_cast<uint32_t>(i));
-  }
-
-  std::vector<double> offset_x, offset_y;
-  if (samples == TruthSamples::grid_2x2) {
-    offset_x = {0.25, 0.75, 0.25, 0.75};
-    offset_y = {0.25, 0.25, 0.75, 0.75};
-  } else {
-    // Additive recurrence on the plastic number (M. Roberts' R2 sequence).
-    for (int i = 0; i < 1024; ++i) {
-      offset_x.push_back(std::fmod(0.5 + 0.7548776662466927 * i, 1.0));
-      offset_y.push_back(std::fmod(0.5 + 0.5698402909980532 * i, 1.0));
-    }
-  }
-
+  const Sight sight(geometry, scene, view, camera, line_floor_px);
+  const auto offsets = sample_offsets(samples);
   const int width = camera.width_px, height = camera.height_px;
-  TruthImage image{width, height, std::vector<float>(static_cast<std::size_t>(3 * width * height))};
-  // What may appear in the image, then in each of its rows, then in each pixel.
-  const Candidates in_image = within(all_of(tracer), whole);
-  for (int y = 0; y < height; ++y) {
-    const Candidates in_row = within(in_image, Cone(ray_at, 0, y, width, y + 1));
-    for (int x = 0; x < width; ++x) {
-      const Candidates in_pixel = within(in_row, Cone(ray_at, x, y, x + 1, y + 1));
-      double sum[3] = {};
-      for (std::size_t s = 0; s < offset_x.size(); ++s) {
-        const Point ray = ray_at(x + offset_x[s], y + offset_y[s]);
-        const Surface front = front_of(in_pixel, ray);
-        if (!front.color) continue;
-        sum[0] += front.color->r;
-        sum[1] += front.color->g;
-        sum[2] += front.color->b;
-      }
-      for (int channel = 0; channel < 3; ++channel) {
-        image.rgb[static_cast<std::size_t>((channel * height + y) * width + x)] =
-            static_cast<float>(sum[channel] / static_cast<double>(offset_x.size()));
-      }
+  const auto plane = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  TruthImage image{width,
+                   height,
+                   std::vector<float>(3 * plane),
+                   std::vector<float>(plane),
+                   std::vector<uint8_t>(plane),
+                   std::vector<uint16_t>(plane)};
+  sight.for_each_pixel([&](int x, int y, const Candidates& in_pixel) {
+    const std::size_t pixel = static_cast<std::size_t>(y * width + x);
+    double sum[3] = {};
+    for (const auto& [dx, dy] : offsets) {
+      const Surface front = front_of(in_pixel, sight.ray_at(x + dx, y + dy));
+      if (!front.color) continue;
+      sum[0] += front.color->r;
+      sum[1] += front.color->g;
+      sum[2] += front.color->b;
     }
-  }
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      image.rgb[channel * plane + pixel] = static_cast<float>(sum[channel] / static_cast<double>(offsets.size()));
+    }
+    const Surface at_center = front_of(in_pixel, sight.ray_at(x + 0.5, y + 0.5));
+    image.depth_m[pixel] = static_cast<float>(at_center.depth);
+    if (at_center.strip) image.class_id[pixel] = at_center.strip->class_id;
+    if (at_center.facet) {
+      const Solid& solid = sight.tracer().solids[static_cast<std::size_t>(at_center.facet->solid)];
+      image.class_id[pixel] = solid.class_id;
+      image.instance_id[pixel] = solid.instance_id;
+    }
+  });
   return image;
+}
+
+TruthVisibility trace_visibility(const StaticGeometry& geometry, const SceneBatch& scene, const View& view,
+                                 const Rig& rig, float line_floor_px, int32_t agent) {
+  const auto offsets = sample_offsets(TruthSamples::low_discrepancy_1024);
+  const int instance_id = 1 + agent - scene.world_begin[static_cast<std::size_t>(view.world)];
+  double seen = 0, alone = 0;
+  for (const Camera& camera : rig.cameras) {
+    const Sight sight(geometry, scene, view, camera, line_floor_px);
+    auto is_wanted = [&](const Facet* facet) {
+      return sight.tracer().solids[static_cast<std::size_t>(facet->solid)].instance_id == instance_id;
+    };
+    sight.for_each_pixel([&](int x, int y, const Candidates& in_pixel) {
+      Candidates wanted;
+      std::copy_if(in_pixel.facets.begin(), in_pixel.facets.end(), std::back_inserter(wanted.facets), is_wanted);
+      if (wanted.facets.empty()) return;
+      for (const auto& [dx, dy] : offsets) {
+        const Point ray = sight.ray_at(x + dx, y + dy);
+        if (!front_of(wanted, ray).facet) continue;
+        const Surface front = front_of(in_pixel, ray);
+        alone += 1;
+        seen += front.facet && is_wanted(front.facet);
+      }
+    });
+  }
+  return {seen / alone, alone / static_cast<double>(offsets.size())};
 }
 
 void PooledError::add(const std::vector<float>& image, const std::vector<float>& truth) {
@@ -420,6 +489,13 @@ void PooledError::add(const std::vector<float>& image, const std::vector<float>&
     ++histogram_[static_cast<std::size_t>(std::min(1024.0, error * 1024))];
   }
   count_ += image.size();
+}
+
+void PooledError::add(const PooledError& other) {
+  squared_ += other.squared_;
+  max_error_ = std::max(max_error_, other.max_error_);
+  count_ += other.count_;
+  for (std::size_t i = 0; i < histogram_.size(); ++i) histogram_[i] += other.histogram_[i];
 }
 
 double PooledError::psnr_db() const { return 10 * std::log10(static_cast<double>(count_) / squared_); }

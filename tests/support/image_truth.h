@@ -1,6 +1,7 @@
 // The truth that renderers are measured against: a small ray caster in double precision. Every pixel is the box filter
-// of the nearest drawn primitive, by point samples. It shares the colours, the brightness and the widths of strips with
-// the renderers, and neither their projection nor their coverage nor their order.
+// of the nearest drawn primitive, by point samples. It shares with the renderers the colours, the brightness, the widths
+// and ranks of strips and the two lengths that say what is of one level and what stands on what, and neither their
+// projection nor their coverage nor their order.
 #pragma once
 
 #include <vector>
@@ -12,22 +13,36 @@ namespace pictura {
 struct TruthImage {
   int width_px = 0, height_px = 0;
   std::vector<float> rgb;  // [3, height, width] in [0, 1]
+  // Of the front surface at each pixel's centre, [height, width], as in CameraImages.
+  std::vector<float> depth_m;
+  std::vector<uint8_t> class_id;
+  std::vector<uint16_t> instance_id;
   bool blank() const;
 };
 
 enum class TruthSamples {
   low_discrepancy_1024,  // the truth
   grid_2x2,              // what 2x2 supersampling of a z-buffer shows
+  center,                // ... and one sample a pixel
 };
 
 /// One camera's image of one view of a host scene with one geometry for all worlds.
 TruthImage trace_image(const StaticGeometry& geometry, const SceneBatch& scene, const View& view, const Camera& camera,
                        float line_floor_px, TruthSamples samples = TruthSamples::low_discrepancy_1024);
 
+/// Share of the samples in which an agent is in front of everything, over those in which it would be seen alone, summed
+/// over the rig's cameras; `alone_px` is the latter in pixels. NaN where it is in no frame.
+struct TruthVisibility {
+  double share = 0, alone_px = 0;
+};
+TruthVisibility trace_visibility(const StaticGeometry& geometry, const SceneBatch& scene, const View& view,
+                                 const Rig& rig, float line_floor_px, int32_t agent);
+
 /// Pools the squared error of many images; channels in [0, 1].
 class PooledError {
  public:
   void add(const std::vector<float>& image, const std::vector<float>& truth);
+  void add(const PooledError& other);
   double psnr_db() const;
   double max_error() const { return max_error_; }
   /// Share of channel values that are further than this from the truth.

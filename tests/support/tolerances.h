@@ -6,6 +6,8 @@ namespace pictura {
 /// Least pooled PSNR of the oracle against the truth. The design's promise; 61 dB is what town-like scenes measure, and
 /// the truth's own error with 1,024 samples a pixel is about 68 dB.
 constexpr double kLeastOraclePsnr_db = 55.0;
+/// Least PSNR of the worst single image: an image that shows little but one crowded horizon.
+constexpr double kLeastImagePsnr_db = 45.0;
 /// 2x2 supersampling, the bar that the paper compares with, must stay this far behind.
 constexpr double kOracleGain_db = 20.0;
 /// Worst channel of the oracle on a lone cuboid before a wall: where three faces meet, visibility is known to 1/64 of a
@@ -14,11 +16,23 @@ constexpr double kSharedEdgeError = 1.0 / 64;
 /// Worst channel anywhere in the quality scenes: several partly covered things share a pixel, and visibility is known
 /// to 1/64 of each.
 constexpr double kWorstOracleError = 16.0 / 255;
+/// Share of pixels whose planes may tell of another surface than the truth: a pixel's centre lies on an edge to within
+/// rounding, or strips of two levels cross there and are ordered as wholes.
+constexpr double kPlaneShare = 1e-3;
+/// Relative error of the depth plane where both tell of the same kind of surface.
+constexpr double kDepthError = 1e-3;
+/// Visibility of an agent of 4 pixels or more: the design's promise. The truth's own error is about 0.005 there.
+constexpr double kVisibilityError = 0.02;
 /// A scene moved as a whole: single precision moves corners by about 1e-5 px for each 100 m from the origin; a sample
 /// may fall to the other side of an edge, worth up to 1/64 of a pixel twice.
 constexpr double kMovedSceneError = 8.0 / 255;
 /// ... and only few values may change that much; the others by rounding.
 constexpr double kMovedSceneShare = 1e-3;
+/// Sum of a box's faces against its silhouette, relative: exact but for rounding and the least coverage.
+constexpr double kSilhouetteError = 1e-4;
+/// A line in two pieces against the line in one, by channel: their common edge is split exactly, and the pieces' ends are
+/// rounded to 1e-5 px.
+constexpr double kSplitLineError = 1e-4;
 /// The CUDA renderer against the oracle: the design's promise. Aim: 0.
 constexpr double kKernelError = 1.0 / 255;
 constexpr double kKernelShareWithin = 0.9999;

@@ -1,0 +1,192 @@
+#include "pictura/bench/quality.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pictura/backend_cpu/renderer_cpu_image.h"
+#include "pictura/common/parallel_for.h"
+#include "pictura/common/raster_check.h"
+#include "pictura/common/rng.h"
+#include "pictura/map/load_map.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+Snapshot drive_snapshot(const SnapshotOptions& options) {
+  SimulatorConfig config;
+  config.seed = options.seed;
+  config.num_threads = options.num_threads;
+  config.walls = options.walls;
+  config.fixed_lights = true;
+  config.vector_observations = false;
+  config.cyclist_fraction = 0.1f;
+  const auto simulator = make_simulator("cpu", config, {load_map(options.map)}, {{0, options.agents, 0}});
+  std::vector<int32_t> actions(static_cast<std::size_t>(simulator->num_slots()));
+  for (int step = 0; step < options.steps; ++step) {
+    for (std::size_t slot = 0; slot < actions.size(); ++slot) {
+      RandomStream random(options.seed, 0, static_cast<uint32_t>(slot), 0, static_cast<uint32_t>(step),
+                          Purpose::action);
+      actions[slot] = random.below(kNumActions);
+    }
+    simulator->step(actions);
+  }
+  const SceneBatch scene = simulator->scene();
+  Snapshot snapshot;
+  snapshot.geometry = simulator->geometries()[0];
+  snapshot.scene.agents.assign(scene.agents.begin(), scene.agents.end());
+  snapshot.scene.light_states.assign(scene.light_states.begin(), scene.light_states.end());
+  snapshot.scene.end_world(0);
+  const Span<const View> views = simulator->views();
+  const auto wanted = std::min(static_cast<std::size_t>(options.views), views.size());
+  for (std::size_t i = 0; i < wanted; ++i) snapshot.views.push_back(views[i * views.size() / wanted]);
+  return snapshot;
+}
+
+void Quality::add(const Quality& other) {
+  one_sample.add(other.one_sample);
+  grid_2x2.add(other.grid_2x2);
+  area.add(other.area);
+  oracle.add(other.oracle);
+  oracle_bytes.add(other.oracle_bytes);
+  worst_image_db = std::min(worst_image_db, other.worst_image_db);
+  images += other.images;
+}
+
+namespace {
+
+// One image in all ways, [3, height, width] in [0, 1].
+struct Ways {
+  TruthImage truth;
+  std::vector<float> one_sample, grid_2x2, area, oracle;
+};
+
+// Exact areas taken for opacity: each face covers its area's share of what is left of the pixel.
+std::vector<float> draw_areas(ImageDrawer* drawer, std::size_t pixels) {
+  std::vector<float> rgb(3 * pixels), left(pixels, 1.0f);
+  drawer->visit_fragments([&](int pixel, const PixelCoverage& coverage, Rgb color) {
+    const auto i = static_cast<std::size_t>(pixel);
+    const float weight = coverage.area * left[i];
+    left[i] -= weight;
+    rgb[i] += weight * color.r;
+    rgb[i + pixels] += weight * color.g;
+    rgb[i + 2 * pixels] += weight * color.b;
+  });
+  return rgb;
+}
+
+Ways draw_all_ways(const StaticGeometry& geometry, const SceneBatch& scene, const View& view, const Camera& camera,
+                   float line_floor_px) {
+  auto trace = [&](TruthSamples samples) {
+    return trace_image(geometry, scene, view, camera, line_floor_px, samples);
+  };
+  Ways ways{trace(TruthSamples::low_discrepancy_1024), trace(TruthSamples::center).rgb,
+            trace(TruthSamples::grid_2x2).rgb, {}, {}};
+  const RasterGeometry raster = raster_geometry(geometry);
+  const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
+  Rig rig;
+  rig.cameras = {camera};
+  ImageDrawer drawer;
+  drawer.prepare({&raster, &scene, &view, place_camera(pinhole_cameras(rig)[0], view), line_floor_px, false});
+  ways.oracle.resize(3 * pixels);
+  drawer.draw({PixelFormat::f32, ways.oracle.data()});
+  ways.area = draw_areas(&drawer, pixels);
+  return ways;
+}
+
+double psnr_db(const std::vector<float>& image, const std::vector<float>& truth) {
+  PooledError error;
+  error.add(image, truth);
+  return error.psnr_db();
+}
+
+}  // namespace
+
+Quality measure_quality(const StaticGeometry& geometry, const SceneBatch& scene, Span<const View> views,
+                        const RendererConfig& config) {
+  const std::size_t cameras = config.rig.cameras.size(), images = views.size() * cameras;
+  std::vector<Ways> ways(images);
+  parallel_for(resolve_num_threads(config.num_threads), static_cast<int64_t>(images), [&](int64_t i) {
+    const auto image = static_cast<std::size_t>(i);
+    ways[image] = draw_all_ways(geometry, scene, views[image / cameras], config.rig.cameras[image % cameras],
+                                config.line_floor_px);
+  });
+  Quality quality;
+  for (const Ways& image : ways) {
+    if (image.truth.blank()) continue;
+    const std::vector<float>& truth = image.truth.rgb;
+    std::vector<float> bytes = image.oracle;
+    for (float& channel : bytes) channel = static_cast<float>(to_byte(channel)) / 255.0f;
+    quality.one_sample.add(image.one_sample, truth);
+    quality.grid_2x2.add(image.grid_2x2, truth);
+    quality.area.add(image.area, truth);
+    quality.oracle.add(image.oracle, truth);
+    quality.oracle_bytes.add(bytes, truth);
+    quality.worst_image_db = std::min(quality.worst_image_db, psnr_db(image.oracle, truth));
+    ++quality.images;
+  }
+  return quality;
+}
+
+namespace {
+
+constexpr int kCropWidth_px = 32, kCropHeight_px = 18, kZoom = 8, kGap_px = 4;
+
+// Top left corner of the crop in which area coverage and one sample err most.
+std::pair<int, int> worst_crop(const Ways& ways, int width, int height) {
+  const int crop_width = std::min(kCropWidth_px, width), crop_height = std::min(kCropHeight_px, height);
+  std::pair<int, int> worst{0, 0};
+  double worst_error = -1;
+  for (int y0 = 0; y0 + crop_height <= height; y0 += 2) {
+    for (int x0 = 0; x0 + crop_width <= width; x0 += 2) {
+      double error = 0;
+      for (int channel = 0; channel < 3; ++channel) {
+        for (int y = y0; y < y0 + crop_height; ++y) {
+          for (int x = x0; x < x0 + crop_width; ++x) {
+            const auto i = static_cast<std::size_t>((channel * height + y) * width + x);
+            error += std::abs(ways.area[i] - ways.truth.rgb[i]) + std::abs(ways.grid_2x2[i] - ways.truth.rgb[i]);
+          }
+        }
+      }
+      if (error > worst_error) worst_error = error, worst = {x0, y0};
+    }
+  }
+  return worst;
+}
+
+}  // namespace
+
+void write_quality_figure(const std::string& path, Span<const Snapshot> snapshots, const RendererConfig& config) {
+  const Camera& camera = config.rig.cameras.at(0);
+  const int crop_width = std::min(kCropWidth_px, camera.width_px);
+  const int crop_height = std::min(kCropHeight_px, camera.height_px);
+  constexpr int kColumns = 5;
+  const int rows = static_cast<int>(snapshots.size());
+  const int width = kColumns * (crop_width * kZoom + kGap_px) - kGap_px;
+  const int height = rows * (crop_height * kZoom + kGap_px) - kGap_px;
+  // White between the crops: the images' ground is black.
+  std::vector<uint8_t> sheet(static_cast<std::size_t>(3 * width) * static_cast<std::size_t>(height), 255);
+  for (int row = 0; row < rows; ++row) {
+    const Snapshot& snapshot = snapshots[static_cast<std::size_t>(row)];
+    const Ways ways = draw_all_ways(snapshot.geometry, snapshot.scene.batch(), snapshot.views.at(0), camera,
+                                    config.line_floor_px);
+    const auto [x0, y0] = worst_crop(ways, camera.width_px, camera.height_px);
+    const std::vector<float>* images[kColumns] = {&ways.truth.rgb, &ways.oracle, &ways.area, &ways.grid_2x2,
+                                                  &ways.one_sample};
+    for (int column = 0; column < kColumns; ++column) {
+      for (int y = 0; y < crop_height * kZoom; ++y) {
+        for (int x = 0; x < crop_width * kZoom; ++x) {
+          for (int channel = 0; channel < 3; ++channel) {
+            const int from = (channel * camera.height_px + y0 + y / kZoom) * camera.width_px + x0 + x / kZoom;
+            const int to_x = column * (crop_width * kZoom + kGap_px) + x;
+            const int to_y = row * (crop_height * kZoom + kGap_px) + y;
+            sheet[static_cast<std::size_t>(3 * (to_y * width + to_x) + channel)] =
+                to_byte((*images[column])[static_cast<std::size_t>(from)]);
+          }
+        }
+      }
+    }
+  }
+  write_png(path, width, height, sheet);
+}
+
+}  // namespace pictura

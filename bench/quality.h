@@ -1,0 +1,56 @@
+// How far images are from the truth: the ray caster of tests/support/image_truth.h against the CPU renderer and against
+// simpler ways to draw the same scene. Used by `pictura bench quality` and by tests, and by nothing that is installed.
+#pragma once
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "pictura/tests/support/image_scenes.h"
+#include "pictura/tests/support/image_truth.h"
+
+namespace pictura {
+
+/// A moment of one world on one map, ready to be drawn.
+struct Snapshot {
+  StaticGeometry geometry;
+  SceneOwner scene;         // one world with handle 0
+  std::vector<View> views;  // a choice of the agents, spread over them all
+};
+
+struct SnapshotOptions {
+  std::string map = "procedural:1";
+  int agents = 120;
+  uint64_t seed = 0;
+  int steps = 30;  // of random actions
+  int views = 8;
+  bool walls = true;
+  int num_threads = 0;  // 0: all
+};
+
+/// Drives a world with random actions; one agent in ten is a cyclist. Throws Error when the map cannot
+/// be read.
+Snapshot drive_snapshot(const SnapshotOptions& options);
+
+/// Error against the truth, pooled over the images that are not blank.
+struct Quality {
+  PooledError one_sample;    // a z-buffer's, at the pixel's centre
+  PooledError grid_2x2;      // ... with 2x2 supersampling
+  PooledError area;          // exact areas taken for opacity, in the oracle's order
+  PooledError oracle;        // the CPU renderer
+  PooledError oracle_bytes;  // ... rounded to bytes
+  double worst_image_db = std::numeric_limits<double>::infinity();  // of the oracle
+  int images = 0;
+
+  void add(const Quality& other);
+};
+
+/// Draws all views with every camera of config.rig, on config.num_threads threads.
+Quality measure_quality(const StaticGeometry& geometry, const SceneBatch& scene, Span<const View> views,
+                        const RendererConfig& config);
+
+/// Writes one picture with a row for each snapshot: of its first view's first camera the crop that the simpler ways get
+/// most wrong, in the truth, the oracle, area coverage, 2x2 samples and one sample, enlarged without smoothing.
+void write_quality_figure(const std::string& path, Span<const Snapshot> snapshots, const RendererConfig& config);
+
+}  // namespace pictura

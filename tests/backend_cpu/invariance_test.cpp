@@ -1,0 +1,242 @@
+// What must not change an image: moving the world as a whole, mirroring it, cutting lines up, hiding what is hidden, the
+// number of threads and the order of the input.
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "pictura/tests/support/image_drawing.h"
+#include "pictura/tests/support/tolerances.h"
+
+namespace pictura {
+namespace {
+
+// Area of the convex hull of some points, by A. Andrew's monotone chain.
+double hull_area(std::vector<Vec2> points) {
+  std::sort(points.begin(), points.end(), [](Vec2 a, Vec2 b) { return a.x < b.x || (a.x == b.x && a.y < b.y); });
+  std::vector<Vec2> hull;
+  for (int side = 0; side < 2; ++side) {
+    const std::size_t begin = hull.size();
+    for (const Vec2 p : points) {
+      while (hull.size() >= begin + 2 && cross(hull.back() - hull[hull.size() - 2], p - hull.back()) <= 0) hull.pop_back();
+      hull.push_back(p);
+    }
+    hull.pop_back();
+    std::reverse(points.begin(), points.end());
+  }
+  double twice_area = 0;
+  for (std::size_t i = 0; i < hull.size(); ++i) twice_area += cross(hull[i], hull[(i + 1) % hull.size()]);
+  return 0.5 * std::abs(twice_area);
+}
+
+Strip straight_strip(Vec3 a_m, Vec3 b_m, float width_m) {
+  const Vec2 along = b_m.xy() - a_m.xy();
+  Strip strip;
+  strip.a_m = a_m;
+  strip.b_m = b_m;
+  strip.side_a = strip.side_b = left_normal(along) * (1 / length(along));
+  strip.width_m = width_m;
+  strip.color = {1, 1, 1};
+  return strip;
+}
+
+TEST(Invariance, AWallInFrontHidesAnAgentToTheLastBit) {
+  StaticGeometry geometry;
+  WallFace wall;
+  wall.a_m = {10, -8, 0};
+  wall.b_m = {10, 8, 0};
+  wall.height_m = 6;
+  geometry.walls.push_back(wall);
+  add_polyline(&geometry, {{2, -1, 0}, {60, -2, 0}}, 0.2f, StripKind::lane_mark);
+  geometry.build_grids();
+  const AgentBox near = make_box(AgentClass::cyclist, {7, 1, 0}, 0.4f, {1.8f, 0.6f, 1.7f});
+  const AgentBox hidden = make_box(AgentClass::vehicle, {20, 2, 0}, 0.4f, {4, 2, 2});
+  const std::vector<View> views{make_view({}, 0.05f)};
+  const RendererConfig config{.rig = paper_rig(97, 55), .num_threads = 1};
+  EXPECT_EQ(draw(geometry, scene_of({near, hidden}), views, config).rgb,
+            draw(geometry, scene_of({near}), views, config).rgb);
+  // ... and without the wall it shows.
+  const StaticGeometry open = no_geometry();
+  EXPECT_NE(draw(open, scene_of({near, hidden}), views, config).rgb, draw(open, scene_of({near}), views, config).rgb);
+}
+
+TEST(Invariance, ImagesDoNotDependOnTheNumberOfThreads) {
+  const SyntheticTown town = make_synthetic_town(3, 60);
+  std::vector<float> first;
+  for (const int threads : {1, 2, 7}) {
+    const Drawn images =
+        draw(town.geometry, town.scene, town.views, {.rig = paper_rig(48, 27), .num_threads = threads});
+    if (first.empty()) first = images.rgb;
+    EXPECT_EQ(images.rgb, first) << threads;
+  }
+}
+
+void expect_close(const std::vector<float>& a, const std::vector<float>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  std::size_t far = 0;
+  double worst = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double error = std::abs(static_cast<double>(a[i]) - b[i]);
+    worst = std::max(worst, error);
+    far += error > 1.0 / 255;
+  }
+  EXPECT_LE(worst, kMovedSceneError);
+  EXPECT_LE(static_cast<double>(far), kMovedSceneShare * static_cast<double>(a.size()));
+}
+
+// The town moved by a rotation about z, a shift, or a mirroring of y.
+SyntheticTown moved(const SyntheticTown& town, float turn_rad, Vec3 shift_m, bool mirror) {
+  const SinCos sc = sincos_of(turn_rad);
+  auto direction = [&](Vec2 v) {
+    if (mirror) v.y = -v.y;
+    return Vec2{v.x * sc.cos - v.y * sc.sin, v.x * sc.sin + v.y * sc.cos};
+  };
+  auto place = [&](Vec3 p) {
+    const Vec2 turned = direction(p.xy());
+    return Vec3{turned.x, turned.y, p.z} + shift_m;
+  };
+  SyntheticTown out = town;
+  for (Strip& strip : out.geometry.strips) {
+    strip.a_m = place(strip.a_m);
+    strip.b_m = place(strip.b_m);
+    strip.side_a = direction(strip.side_a);
+    strip.side_b = direction(strip.side_b);
+  }
+  for (WallFace& wall : out.geometry.walls) {
+    wall.a_m = place(wall.a_m);
+    wall.b_m = place(wall.b_m);
+  }
+  for (LightHead& head : out.geometry.heads) {
+    head.position_m = place(head.position_m);
+    head.facing = direction(head.facing);
+  }
+  out.geometry.build_grids();
+  for (AgentBox& box : out.scene.agents) {
+    box.center_m = place(box.center_m);
+    const Vec2 heading = direction({box.cos_heading, box.sin_heading});
+    box.cos_heading = heading.x;
+    box.sin_heading = heading.y;
+  }
+  for (View& view : out.views) {
+    view.origin_m = place(view.origin_m);
+    const Vec2 heading = direction({view.cos_heading, view.sin_heading});
+    view.cos_heading = heading.x;
+    view.sin_heading = heading.y;
+  }
+  return out;
+}
+
+TEST(Invariance, MovingTheWorldChangesNothing) {
+  SyntheticTown town = make_synthetic_town(4, 80);
+  town.views.resize(6);
+  const RendererConfig config{.rig = paper_rig(), .num_threads = 1};
+  const std::vector<float> here = draw(town.geometry, town.scene, town.views, config).rgb;
+  const SyntheticTown shifted = moved(town, 0, {256, -512, 32}, false);
+  expect_close(draw(shifted.geometry, shifted.scene, shifted.views, config).rgb, here);
+  const SyntheticTown turned = moved(town, 1.1f, {}, false);
+  expect_close(draw(turned.geometry, turned.scene, turned.views, config).rgb, here);
+}
+
+TEST(Invariance, AMirroredWorldGivesMirroredImages) {
+  SyntheticTown town = make_synthetic_town(6, 80);
+  // Faces to the left and right differ in colour; walls and marks do not.
+  town.scene = scene_of({});
+  town.scene.light_begin = {0, 0};
+  town.views.resize(4);
+  for (View& view : town.views) view.ego_agent = -1;
+  RendererConfig config{.rig = simple_rig(96, 54, 77), .num_threads = 1};
+  const Drawn here = draw(town.geometry, town.scene, town.views, config);
+  const SyntheticTown mirrored = moved(town, 0, {}, true);
+  Drawn there = draw(mirrored.geometry, mirrored.scene, mirrored.views, config);
+  for (std::size_t row = 0; row < there.rgb.size() / 96; ++row) {
+    std::reverse(there.rgb.begin() + static_cast<std::ptrdiff_t>(96 * row),
+                 there.rgb.begin() + static_cast<std::ptrdiff_t>(96 * (row + 1)));
+  }
+  // Samples are not mirrored, so pixels that several things share differ by the oracle's own error.
+  double worst = 0;
+  for (std::size_t i = 0; i < there.rgb.size(); ++i) {
+    worst = std::max(worst, std::abs(static_cast<double>(there.rgb[i]) - here.rgb[i]));
+  }
+  EXPECT_LE(worst, kWorstOracleError);
+}
+
+TEST(Invariance, TheOrderOfTheInputDoesNotShow) {
+  SyntheticTown town = make_synthetic_town(8, 100);
+  town.views.resize(4);
+  for (View& view : town.views) view.ego_agent = -1;
+  const RendererConfig config{.rig = paper_rig(), .num_threads = 1};
+  const std::vector<float> before = draw(town.geometry, town.scene, town.views, config).rgb;
+  std::mt19937 random(1);
+  std::shuffle(town.scene.agents.begin(), town.scene.agents.end(), random);
+  std::shuffle(town.geometry.walls.begin(), town.geometry.walls.end(), random);
+  std::shuffle(town.geometry.heads.begin(), town.geometry.heads.end(), random);
+  // Of strips of one kind the index decides which is on top, so those keep their order, and kinds are dealt anew.
+  std::stable_sort(town.geometry.strips.begin(), town.geometry.strips.end(),
+                   [](const Strip& a, const Strip& b) { return a.kind > b.kind; });
+  town.geometry.build_grids();
+  EXPECT_EQ(draw(town.geometry, town.scene, town.views, config).rgb, before);
+}
+
+// Sum of what is covered of all pixels, of a scene in which everything has one colour.
+double covered_px(const Drawn& image, float color) {
+  double sum = 0;
+  for (int y = 0; y < image.height_px; ++y) {
+    for (int x = 0; x < image.width_px; ++x) sum += image.at(x, y).r;
+  }
+  return sum / static_cast<double>(color);
+}
+
+TEST(Invariance, TheFacesOfABoxSumToItsSilhouette) {
+  // Coverage is the share of a pixel that is not the wall behind: a white wall, and the box's red channel left out.
+  StaticGeometry geometry;
+  WallFace wall;
+  wall.a_m = {30, -90, -30};
+  wall.b_m = {30, 90, -30};
+  wall.height_m = 80;
+  wall.color = {0, 1, 0};
+  geometry.walls.push_back(wall);
+  geometry.build_grids();
+  const float behind = 1 - 30.0f / 120;
+  for (int i = 0; i < 12; ++i) {
+    const AgentBox box = make_box(AgentClass::vehicle, {9, 0.2f, 0}, 0.3f + 0.5f * static_cast<float>(i), {4, 1.8f, 1.2f});
+    const Drawn with = draw(geometry, scene_of({box}), {make_view({}, 0)}, {.rig = simple_rig(), .num_threads = 1});
+    const Drawn alone = draw(no_geometry(), scene_of({box}), {make_view({}, 0)}, {.rig = simple_rig(), .num_threads = 1});
+    // The silhouette: hull of the projected corners.
+    std::vector<Vec2> corners;
+    for (int corner = 0; corner < 8; ++corner) {
+      const Vec2 ahead{box.cos_heading, box.sin_heading};
+      const Vec2 ground = box.center_m.xy() + ahead * (corner & 1 ? 2.0f : -2.0f) +
+                          left_normal(ahead) * (corner & 2 ? 0.9f : -0.9f);
+      const float z = corner & 4 ? 1.2f : 0.0f;
+      corners.push_back({50 - 50 * ground.y / ground.x, 50 - 50 * (z - 1.5f) / ground.x});
+    }
+    const double silhouette_px = hull_area(corners);
+    // What the wall loses is what the faces cover.
+    double lost_px = 0;
+    for (int y = 0; y < 100; ++y) {
+      for (int x = 0; x < 100; ++x) lost_px += (behind - (with.at(x, y).g - alone.at(x, y).g)) / behind;
+    }
+    EXPECT_NEAR(lost_px, silhouette_px, kSilhouetteError * silhouette_px) << i;
+  }
+}
+
+TEST(Invariance, TwoPiecesOfALineCoverWhatTheWholeLineDoes) {
+  // Brightness is by the piece, so the line lies across the view: all of it at one depth.
+  for (const float tilt : {0.0f, 0.05f}) {
+    const Vec3 a{20, 8, 0}, b{20, -6, tilt * 14};
+    StaticGeometry whole, halves;
+    whole.strips.push_back(straight_strip(a, b, 0.4f));
+    const Vec3 middle = (a + b) * 0.5f;
+    halves.strips.push_back(straight_strip(a, middle, 0.4f));
+    halves.strips.push_back(straight_strip(middle, b, 0.4f));
+    whole.build_grids();
+    halves.build_grids();
+    const RendererConfig config{.rig = simple_rig(97, 55, 60), .num_threads = 1};
+    const Drawn one = draw(whole, scene_of({}), {make_view({}, 0)}, config);
+    const Drawn two = draw(halves, scene_of({}), {make_view({}, 0)}, config);
+    EXPECT_GT(covered_px(one, 1), 10);
+    for (std::size_t i = 0; i < one.rgb.size(); ++i) ASSERT_NEAR(one.rgb[i], two.rgb[i], kSplitLineError) << tilt;
+  }
+}
+
+}  // namespace
+}  // namespace pictura

@@ -1,0 +1,45 @@
+// The oracle against the truth on whole maps: CARLA's towns, with their hills and bridges, and procedural ones; agents
+// of all kinds on the move, walls and lights on.
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "pictura/bench/quality.h"
+#include "pictura/map/load_map.h"
+#include "pictura/tests/support/tolerances.h"
+
+namespace pictura {
+namespace {
+
+class TownQuality : public testing::TestWithParam<const char*> {};
+
+TEST_P(TownQuality, IsWithinThePromisedError) {
+  const std::string map = GetParam();
+  const std::vector<std::string> towns = known_towns();
+  if (map.starts_with("Town") && !std::binary_search(towns.begin(), towns.end(), map)) {
+    GTEST_SKIP() << "needs " << map << ".xodr; set PICTURA_DATA";
+  }
+  const Snapshot snapshot = drive_snapshot({.map = map, .views = 8});
+  const Quality quality =
+      measure_quality(snapshot.geometry, snapshot.scene.batch(), snapshot.views, {.rig = paper_rig()});
+  fmt::print("{}: {:.2f} dB over {} images, worst image {:.2f} dB, worst value {:.1f}/255; 2x2 samples {:.2f} dB\n", map,
+             quality.oracle.psnr_db(), quality.images, quality.worst_image_db, 255 * quality.oracle.max_error(),
+             quality.grid_2x2.psnr_db());
+  EXPECT_GE(quality.images, 20);
+  EXPECT_GE(quality.oracle.psnr_db(), kLeastOraclePsnr_db);
+  EXPECT_GE(quality.worst_image_db, kLeastImagePsnr_db);
+  EXPECT_GE(quality.oracle.psnr_db(), quality.grid_2x2.psnr_db() + kOracleGain_db);
+}
+
+INSTANTIATE_TEST_SUITE_P(Maps, TownQuality,
+                         testing::Values("Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07", "Town10HD",
+                                         "procedural:1", "procedural:2"),
+                         [](const auto& map) {
+                           std::string name = map.param;
+                           std::replace(name.begin(), name.end(), ':', '_');
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace pictura
