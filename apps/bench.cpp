@@ -1,10 +1,11 @@
 // `pictura bench`: rates of rendering, simulation and training as medians of several repeats, with the device's name,
 // the commit and the workload beside them.
+#include "pictura/apps/bench.h"
+
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
 
-#include "pictura/apps/bench.h"
 #include "pictura/apps/commands.h"
 #include "pictura/apps/drive.h"
 #include "pictura/apps/report.h"
@@ -31,7 +32,8 @@ std::string processor_name() {
 
 }  // namespace
 
-void report_benchmark(bool json, const std::string& workload, const std::string& backend, std::vector<BenchResult> results) {
+void report_benchmark(bool json, const std::string& workload, const std::string& backend,
+                      std::vector<BenchResult> results) {
   Json rows = Json::array();
   for (BenchResult& result : results) {
     std::sort(result.values.begin(), result.values.end());
@@ -116,9 +118,9 @@ void bench_simulate(const Arguments& arguments) {
     results.push_back(slots);
   }
   report_benchmark(arguments.json,
-         fmt::format("simulate: {}, {} agents, random actions with resets, {} threads", arguments.world.map,
-                     arguments.world.agents, arguments.world.num_threads),
-         "cpu", results);
+                   fmt::format("simulate: {}, {} agents, random actions with resets, {} threads", arguments.world.map,
+                               arguments.world.agents, arguments.world.num_threads),
+                   "cpu", results);
 }
 
 void bench_render(const Arguments& arguments) {
@@ -186,7 +188,8 @@ void bench_train(const Arguments& arguments) {
 }  // namespace
 
 void add_bench_command(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("bench", "Measure rates and quality: bench render, bench simulate, bench train, bench quality");
+  CLI::App* command = app.add_subcommand(
+      "bench", "Measure rates and quality: bench render, bench simulate, bench train, bench quality");
   command->require_subcommand(1);
   command->footer(
       "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n  pictura bench render --size 192x108");

@@ -1,5 +1,5 @@
-// `pictura bench quality`: how far images are from the truth, a ray caster with 1,024 samples a pixel, at the paper's five
-// sizes: the oracle beside a z-buffer with one sample and 2x2 samples, and beside exact areas taken for opacity.
+// `pictura bench quality`: how far images are from the truth, a ray caster with 1,024 samples a pixel, at the paper's
+// five sizes: the oracle beside a z-buffer with one sample and 2x2 samples, and beside exact areas taken for opacity.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -52,8 +52,7 @@ void run(Arguments arguments) {
     for (std::size_t i = 0; i < snapshots.size(); ++i) {
       if (interrupted()) throw Interrupted("interrupted");
       progress.update(fmt::format("{} on {}", text, arguments.maps[i]));
-      quality.add(
-          measure_quality(snapshots[i].geometry, snapshots[i].scene.batch(), snapshots[i].views, config));
+      quality.add(measure_quality(snapshots[i].geometry, snapshots[i].scene.batch(), snapshots[i].views, config));
     }
     images += quality.images;
     auto add = [&](const std::string& way, double psnr_db) {
@@ -74,10 +73,11 @@ void run(Arguments arguments) {
   }
   report_benchmark(
       arguments.json,
-      fmt::format("quality: PSNR against 1,024 samples a pixel, {} images that are not blank, maps {}, {} agents, walls {}, "
-                  "{} views x 4 cameras each, line floor {} px",
-                  images, fmt::join(arguments.maps, " "), arguments.world.agents, arguments.world.walls ? "on" : "off",
-                  arguments.world.views, arguments.line_floor_px),
+      fmt::format(
+          "quality: PSNR against 1,024 samples a pixel, {} images that are not blank, maps {}, {} agents, walls {}, "
+          "{} views x 4 cameras each, line floor {} px",
+          images, fmt::join(arguments.maps, " "), arguments.world.agents, arguments.world.walls ? "on" : "off",
+          arguments.world.views, arguments.line_floor_px),
       "cpu", results);
 }
 

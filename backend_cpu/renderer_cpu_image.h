@@ -42,8 +42,8 @@ class ImageDrawer {
     double seen = 0, alone = 0;
   };
   Coverage coverage_of(int32_t agent);
-  /// Calls visit(y * width + x, coverage, colour) for what each face may cover of each pixel of the prepared image, front
-  /// to back: for measuring other ways to composite.
+  /// Calls visit(y * width + x, coverage, colour) for what each face may cover of each pixel of the prepared image,
+  /// front to back: for measuring other ways to composite.
   void visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit) const;
 
  private:

@@ -76,11 +76,12 @@ std::vector<float> draw_areas(ImageDrawer* drawer, std::size_t pixels) {
 
 Ways draw_all_ways(const StaticGeometry& geometry, const SceneBatch& scene, const View& view, const Camera& camera,
                    float line_floor_px) {
-  auto trace = [&](TruthSamples samples) {
-    return trace_image(geometry, scene, view, camera, line_floor_px, samples);
-  };
-  Ways ways{trace(TruthSamples::low_discrepancy_1024), trace(TruthSamples::center).rgb,
-            trace(TruthSamples::grid_2x2).rgb, {}, {}};
+  auto trace = [&](TruthSamples samples) { return trace_image(geometry, scene, view, camera, line_floor_px, samples); };
+  Ways ways{trace(TruthSamples::low_discrepancy_1024),
+            trace(TruthSamples::center).rgb,
+            trace(TruthSamples::grid_2x2).rgb,
+            {},
+            {}};
   const RasterGeometry raster = raster_geometry(geometry);
   const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
   Rig rig;
@@ -167,8 +168,8 @@ void write_quality_figure(const std::string& path, Span<const Snapshot> snapshot
   std::vector<uint8_t> sheet(static_cast<std::size_t>(3 * width) * static_cast<std::size_t>(height), 255);
   for (int row = 0; row < rows; ++row) {
     const Snapshot& snapshot = snapshots[static_cast<std::size_t>(row)];
-    const Ways ways = draw_all_ways(snapshot.geometry, snapshot.scene.batch(), snapshot.views.at(0), camera,
-                                    config.line_floor_px);
+    const Ways ways =
+        draw_all_ways(snapshot.geometry, snapshot.scene.batch(), snapshot.views.at(0), camera, config.line_floor_px);
     const auto [x0, y0] = worst_crop(ways, camera.width_px, camera.height_px);
     const std::vector<float>* images[kColumns] = {&ways.truth.rgb, &ways.oracle, &ways.area, &ways.grid_2x2,
                                                   &ways.one_sample};

@@ -1,5 +1,5 @@
-// What must not change an image: moving the world as a whole, mirroring it, cutting lines up, hiding what is hidden, the
-// number of threads and the order of the input.
+// What must not change an image: moving the world as a whole, mirroring it, cutting lines up, hiding what is hidden,
+// the number of threads and the order of the input.
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -17,7 +17,8 @@ double hull_area(std::vector<Vec2> points) {
   for (int side = 0; side < 2; ++side) {
     const std::size_t begin = hull.size();
     for (const Vec2 p : points) {
-      while (hull.size() >= begin + 2 && cross(hull.back() - hull[hull.size() - 2], p - hull.back()) <= 0) hull.pop_back();
+      while (hull.size() >= begin + 2 && cross(hull.back() - hull[hull.size() - 2], p - hull.back()) <= 0)
+        hull.pop_back();
       hull.push_back(p);
     }
     hull.pop_back();
@@ -197,15 +198,17 @@ TEST(Invariance, TheFacesOfABoxSumToItsSilhouette) {
   geometry.build_grids();
   const float behind = 1 - 30.0f / 120;
   for (int i = 0; i < 12; ++i) {
-    const AgentBox box = make_box(AgentClass::vehicle, {9, 0.2f, 0}, 0.3f + 0.5f * static_cast<float>(i), {4, 1.8f, 1.2f});
+    const AgentBox box =
+        make_box(AgentClass::vehicle, {9, 0.2f, 0}, 0.3f + 0.5f * static_cast<float>(i), {4, 1.8f, 1.2f});
     const Drawn with = draw(geometry, scene_of({box}), {make_view({}, 0)}, {.rig = simple_rig(), .num_threads = 1});
-    const Drawn alone = draw(no_geometry(), scene_of({box}), {make_view({}, 0)}, {.rig = simple_rig(), .num_threads = 1});
+    const Drawn alone =
+        draw(no_geometry(), scene_of({box}), {make_view({}, 0)}, {.rig = simple_rig(), .num_threads = 1});
     // The silhouette: hull of the projected corners.
     std::vector<Vec2> corners;
     for (int corner = 0; corner < 8; ++corner) {
       const Vec2 ahead{box.cos_heading, box.sin_heading};
-      const Vec2 ground = box.center_m.xy() + ahead * (corner & 1 ? 2.0f : -2.0f) +
-                          left_normal(ahead) * (corner & 2 ? 0.9f : -0.9f);
+      const Vec2 ground =
+          box.center_m.xy() + ahead * (corner & 1 ? 2.0f : -2.0f) + left_normal(ahead) * (corner & 2 ? 0.9f : -0.9f);
       const float z = corner & 4 ? 1.2f : 0.0f;
       corners.push_back({50 - 50 * ground.y / ground.x, 50 - 50 * (z - 1.5f) / ground.x});
     }

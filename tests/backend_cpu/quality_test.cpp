@@ -1,9 +1,10 @@
 // The oracle against the truth.
+#include "pictura/bench/quality.h"
+
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "pictura/bench/quality.h"
 #include "pictura/tests/support/tolerances.h"
 
 namespace pictura {
@@ -13,7 +14,8 @@ TEST(Quality, TownsAreWithinThePromisedError) {
   for (const uint64_t seed : {1, 2, 3}) {
     SyntheticTown town = make_synthetic_town(seed, 120);
     town.views.resize(4);
-    const Quality quality = measure_quality(town.geometry, town.scene.batch(), town.views, {.rig = paper_rig(), .num_threads = 1});
+    const Quality quality =
+        measure_quality(town.geometry, town.scene.batch(), town.views, {.rig = paper_rig(), .num_threads = 1});
     RecordProperty("psnr_db_seed_" + std::to_string(seed), fmt::format("{:.2f}", quality.oracle.psnr_db()));
     fmt::print("seed {}: {:.2f} dB, u8 {:.2f} dB, 2x2 samples {:.2f} dB, worst {:.1f}/255, {:.3f} % beyond 1/255\n",
                seed, quality.oracle.psnr_db(), quality.oracle_bytes.psnr_db(), quality.grid_2x2.psnr_db(),
@@ -32,7 +34,8 @@ TEST(Quality, OddSizesAndMixedRigsToo) {
   config.rig.cameras[1] = paper_rig(33, 71).cameras[1];
   config.rig.cameras[1].pitch_rad = -0.2f;
   config.rig.cameras[1].roll_rad = 0.3f;
-  EXPECT_GE(measure_quality(town.geometry, town.scene.batch(), town.views, config).oracle.psnr_db(), kLeastOraclePsnr_db);
+  EXPECT_GE(measure_quality(town.geometry, town.scene.batch(), town.views, config).oracle.psnr_db(),
+            kLeastOraclePsnr_db);
 }
 
 // A bright wall across the view, 20 m ahead, and things before it.

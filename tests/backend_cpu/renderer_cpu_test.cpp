@@ -9,8 +9,8 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/make_renderer.h"
-#include "pictura/common/raster_shapes.h"
 #include "pictura/common/raster_coverage.h"
+#include "pictura/common/raster_shapes.h"
 #include "pictura/tests/support/image_drawing.h"
 #include "pictura/tests/support/tolerances.h"
 

@@ -23,8 +23,8 @@ TEST_P(TownQuality, IsWithinThePromisedError) {
   const Snapshot snapshot = drive_snapshot({.map = map, .views = 8});
   const Quality quality =
       measure_quality(snapshot.geometry, snapshot.scene.batch(), snapshot.views, {.rig = paper_rig()});
-  fmt::print("{}: {:.2f} dB over {} images, worst image {:.2f} dB, worst value {:.1f}/255; 2x2 samples {:.2f} dB\n", map,
-             quality.oracle.psnr_db(), quality.images, quality.worst_image_db, 255 * quality.oracle.max_error(),
+  fmt::print("{}: {:.2f} dB over {} images, worst image {:.2f} dB, worst value {:.1f}/255; 2x2 samples {:.2f} dB\n",
+             map, quality.oracle.psnr_db(), quality.images, quality.worst_image_db, 255 * quality.oracle.max_error(),
              quality.grid_2x2.psnr_db());
   EXPECT_GE(quality.images, 20);
   EXPECT_GE(quality.oracle.psnr_db(), kLeastOraclePsnr_db);
@@ -33,8 +33,8 @@ TEST_P(TownQuality, IsWithinThePromisedError) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Maps, TownQuality,
-                         testing::Values("Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07", "Town10HD",
-                                         "procedural:1", "procedural:2"),
+                         testing::Values("Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07",
+                                         "Town10HD", "procedural:1", "procedural:2"),
                          [](const auto& map) {
                            std::string name = map.param;
                            std::replace(name.begin(), name.end(), ':', '_');

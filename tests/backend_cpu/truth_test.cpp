@@ -12,7 +12,8 @@
 namespace pictura {
 namespace {
 
-// A road that climbs by 12 %, with marks, a stop line, a bridge over it, walls along it, lights, and upright agents on it.
+// A road that climbs by 12 %, with marks, a stop line, a bridge over it, walls along it, lights, and upright agents on
+// it.
 Snapshot hill() {
   Snapshot hill;
   auto road = [](float x, float y) { return Vec3{x, y, x < 10 ? 0.0f : 0.12f * (x - 10)}; };
@@ -44,7 +45,8 @@ Snapshot hill() {
   hill.geometry.build_grids();
   for (int i = 0; i < 7; ++i) {
     const float x = 7 + 9 * static_cast<float>(i), y = i % 2 ? 1.8f : -1.8f;
-    hill.scene.agents.push_back(make_box(AgentClass::vehicle, road(x, y), 0.1f * static_cast<float>(i), {4.4f, 1.9f, 1.5f}));
+    hill.scene.agents.push_back(
+        make_box(AgentClass::vehicle, road(x, y), 0.1f * static_cast<float>(i), {4.4f, 1.9f, 1.5f}));
     hill.scene.agents.push_back(make_box(AgentClass::pedestrian, road(x + 3, 8.5f), 0, {0.6f, 0.6f, 1.75f}));
     hill.scene.agents.push_back(make_box(AgentClass::cyclist, road(x + 2, -5.5f), 0, {1.8f, 0.6f, 1.7f}));
   }
@@ -110,8 +112,8 @@ PlaneDifference compare_planes(const Snapshot& snapshot, const Camera& camera) {
       ++difference.pixels;
       difference.classes += classes[i] != truth.class_id[i];
       difference.instances += instances[i] != truth.instance_id[i];
-      const bool same_depth = depth[i] == truth.depth_m[i] ||
-                              std::abs(depth[i] - truth.depth_m[i]) <= kDepthError * truth.depth_m[i];
+      const bool same_depth =
+          depth[i] == truth.depth_m[i] || std::abs(depth[i] - truth.depth_m[i]) <= kDepthError * truth.depth_m[i];
       difference.depths += classes[i] == truth.class_id[i] && !same_depth;
     }
   }

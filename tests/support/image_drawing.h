@@ -36,7 +36,7 @@ struct Drawn {
 };
 
 inline Drawn draw(const StaticGeometry& geometry, const SceneOwner& scene, const std::vector<View>& views,
-           const RendererConfig& config) {
+                  const RendererConfig& config) {
   const auto renderer = make_renderer("cpu", config);
   renderer->upload(geometry);
   HostImages images(config.rig, static_cast<int>(views.size()), PixelFormat::f32);

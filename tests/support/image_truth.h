@@ -1,7 +1,7 @@
 // The truth that renderers are measured against: a small ray caster in double precision. Every pixel is the box filter
-// of the nearest drawn primitive, by point samples. It shares with the renderers the colours, the brightness, the widths
-// and ranks of strips and the two lengths that say what is of one level and what stands on what, and neither their
-// projection nor their coverage nor their order.
+// of the nearest drawn primitive, by point samples. It shares with the renderers the colours, the brightness, the
+// widths and ranks of strips and the two lengths that say what is of one level and what stands on what, and neither
+// their projection nor their coverage nor their order.
 #pragma once
 
 #include <vector>

@@ -28,11 +28,11 @@ constexpr double kVisibilityError = 0.02;
 constexpr double kMovedSceneError = 8.0 / 255;
 /// ... and only few values may change that much; the others by rounding.
 constexpr double kMovedSceneShare = 1e-3;
-/// Sum of a box's faces against its silhouette, relative: exact but for rounding and for the up to 1e-3 of a pixel at the
-/// border that is taken for nothing or for all of it (kFullCoverage).
+/// Sum of a box's faces against its silhouette, relative: exact but for rounding and for the up to 1e-3 of a pixel at
+/// the border that is taken for nothing or for all of it (kFullCoverage).
 constexpr double kSilhouetteError = 3e-4;
-/// A line in two pieces against the line in one, by channel: their common edge is split exactly, and the pieces' ends are
-/// rounded to 1e-5 px.
+/// A line in two pieces against the line in one, by channel: their common edge is split exactly, and the pieces' ends
+/// are rounded to 1e-5 px.
 constexpr double kSplitLineError = 1e-4;
 /// The CUDA renderer against the oracle: the design's promise. Aim: 0.
 constexpr double kKernelError = 1.0 / 255;
