@@ -131,6 +131,13 @@ FileLane read_lane(const Element& element, double section_length, Faults* faults
   return lane;
 }
 
+FileLane read_center_lane(const Element& element, double section_length, Faults* faults) {
+  if (const int id = element.integer("id"); id != 0) {
+    element.fail("attribute id: expected 0 for the center lane, got {}", id);
+  }
+  return read_lane(element, section_length, faults);
+}
+
 void read_side(const Element& section, const char* side, int sign, double section_length, Faults* faults,
                std::vector<FileLane>* lanes_out) {
   const Element parent = section.child(side);
@@ -212,7 +219,9 @@ std::vector<FileSection> read_sections(const Element& lanes, double road_length,
       for (FileLane& lane : *side) lane.section = lane.is_continued ? lane.section : static_cast<int>(i);
     }
     if (const Element center = elements[i].child("center")) {
-      if (const Element lane = center.child("lane")) section.center = read_lane(lane, length, faults);
+      if (const Element lane = center.child("lane")) {
+        faults->attempt([&] { section.center = read_center_lane(lane, length, faults); });
+      }
     }
     sections.push_back(std::move(section));
   }

@@ -73,6 +73,7 @@ TEST(OpenDriveErrors, AttributesAreCheckedAndNamedWithTheirLine) {
            {"id=\"-1\"", "id=\"one\"", "attribute id: expected an integer, got 'one'"},
            {"id=\"-1\"", "id=\"1\"", "does not belong in <right>"},
            {"id=\"-1\"", "id=\"-2\"", "expected -1"},
+           {"id=\"0\"", "id=\"3\"", "expected 0 for the center lane, got 3"},
            {"type=\"driving\"", "type=\"flying\"", "'flying' is not a lane type"},
            {"a=\"3\"", "a=\"-3\"", "<width> attribute a: expected a number in"},
            {"a=\"3\"", "a=\"3\" e=\"0\" x=\"", "bad.xodr"},
