@@ -7,6 +7,8 @@ namespace pictura::opendrive {
 
 namespace {
 
+constexpr int kMaxInteger = 1'000'000'000;
+
 std::string_view trim(std::string_view text) {
   const char* const blanks = " \t\r\n";
   const std::size_t first = text.find_first_not_of(blanks);
@@ -66,8 +68,8 @@ int Element::integer(const char* attribute) const {
   const std::string_view digits = trim(value);
   int result = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), result);
-  if (error != std::errc() || end != digits.data() + digits.size()) {
-    fail("attribute {}: expected an integer, got '{}'", attribute, value);
+  if (error != std::errc() || end != digits.data() + digits.size() || result < -kMaxInteger || result > kMaxInteger) {
+    fail("attribute {}: expected an integer within {} of 0, got '{}'", attribute, kMaxInteger, value);
   }
   return result;
 }

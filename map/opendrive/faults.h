@@ -25,16 +25,23 @@ class Faults {
       part();
       return true;
     } catch (const Error& error) {
-      warnings_.emplace_back(error.what());
+      ++num_faults_;
+      if (warnings_.size() < kMaxWarnings) warnings_.emplace_back(error.what());
       return false;
     }
   }
 
-  bool is_lenient() const { return lenient_; }
-  std::vector<std::string> take_warnings() { return std::move(warnings_); }
+  /// The messages of the first faults and, where there were more, how many.
+  std::vector<std::string> take_warnings() {
+    if (num_faults_ > warnings_.size()) warnings_.push_back(fmt::format("and {} more", num_faults_ - warnings_.size()));
+    return std::move(warnings_);
+  }
 
  private:
+  static constexpr std::size_t kMaxWarnings = 10'000;
+
   bool lenient_;
+  std::size_t num_faults_ = 0;
   std::vector<std::string> warnings_;
 };
 

@@ -13,6 +13,7 @@ namespace {
 constexpr double kOverhang_m = 10;
 // Objects repeated closer than this are one continuous thing.
 constexpr double kMinRepeat_m = 0.1;
+constexpr std::size_t kMaxCopies = 10'000;
 constexpr double kMaxSize_m = 1e3;
 
 bool contains_word(std::string text, std::string_view word) {
@@ -110,6 +111,7 @@ std::vector<FileObject> repeated(const Element& element, const FileObject& objec
       copy.width = between("widthStart", "widthEnd", object.width, u);
       copy.length = between("lengthStart", "lengthEnd", object.length, u);
       copies.push_back(std::move(copy));
+      if (copies.size() > kMaxCopies) repeat.fail("expected at most {} copies of an object", kMaxCopies);
     }
   });
   if (copies.empty()) copies.push_back(object);

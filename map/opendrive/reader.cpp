@@ -10,6 +10,8 @@ namespace pictura::opendrive {
 
 namespace {
 
+constexpr double kMinRoadLength_m = 1e-3;
+
 /// What the header adds to the file's coordinates: a turn about the origin, then a shift.
 struct Offset {
   double x = 0, y = 0, z = 0, heading = 0;
@@ -48,7 +50,9 @@ FileRoad read_road(const Element& element, const Offset& offset, Faults* faults)
   road.where = element.where();
   road.id = element.text("id");
   road.length = element.number_in("length", 0, kMaxRoadLength_m);
-  if (road.length == 0) element.fail("attribute length: expected more than 0");
+  if (road.length < kMinRoadLength_m) {
+    element.fail("attribute length: expected at least {}, got {}", kMinRoadLength_m, road.length);
+  }
   const std::string junction = element.text("junction", "-1");
   if (junction != "-1") road.junction = junction;
   road.left_hand = is_left_hand(element);

@@ -70,9 +70,11 @@ TEST(OpenDriveErrors, AttributesAreCheckedAndNamedWithTheirLine) {
            {"<line/>", "<arc curvature=\"1e9\"/>", "expected a curve of at most"},
            {"<line/>", "<paramPoly3/>", "<paramPoly3>: attribute aU is missing"},
            {"<line/>", "", "expected a <line>, <arc>, <spiral>, <poly3> or <paramPoly3>"},
-           {"id=\"-1\"", "id=\"one\"", "attribute id: expected an integer, got 'one'"},
+           {"id=\"-1\"", "id=\"one\"", "attribute id: expected an integer within 1000000000 of 0, got 'one'"},
            {"id=\"-1\"", "id=\"1\"", "does not belong in <right>"},
            {"id=\"-1\"", "id=\"-2\"", "expected -1"},
+           {"id=\"-1\"", "id=\"-2147483648\"", "expected an integer within 1000000000 of 0"},
+           {"length=\"100\" junction", "length=\"1e-4\" junction", "attribute length: expected at least 0.001"},
            {"id=\"0\"", "id=\"3\"", "expected 0 for the center lane, got 3"},
            {"type=\"driving\"", "type=\"flying\"", "'flying' is not a lane type"},
            {"a=\"3\"", "a=\"-3\"", "<width> attribute a: expected a number in"},
@@ -229,6 +231,8 @@ TEST(OpenDriveErrors, ObjectsAndSignalsStandAtTheirRoad) {
           {R"(<objects><object id="1" type="crosswalk" s="5" t="0"><outline><cornerLocal u="1" v="0"/></outline></object></objects>)",
            "three distinct corners, got 1"},
           {R"(<signals><signal id="1" s="5" t="1e9"/></signals>)", "<signal>: attribute t: expected a number in"},
+          {R"(<objects><object id="1" type="parking" s="5" t="0" length="5" width="2"><repeat s="0" length="100" distance="0.1"/><repeat s="0" length="0.1" distance="1e-7"/></object></objects>)",
+           "<repeat>: attribute distance: expected at least 0.1"},
           {R"(<signals><signal id="1" s="5" t="1" orientation="left"/></signals>)",
            "expected +, - or none, got 'left'"}}) {
     road.rest = rest;

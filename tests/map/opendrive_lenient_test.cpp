@@ -107,6 +107,14 @@ TEST(OpenDriveLenient, JunctionsOfUnknownKindsConnectNothing) {
   EXPECT_EQ(read.map.junctions.size(), 1u);
 }
 
+TEST(OpenDriveLenient, ManyFaultsAreCountedRatherThanListed) {
+  RoadText road = second_road();
+  for (int i = 0; i < 10'050; ++i) road.center_mark += "<roadMark/>";
+  const LenientMap read = read_leniently(file_of(road.text()));
+  ASSERT_EQ(read.warnings.size(), 10'001u);
+  EXPECT_EQ(read.warnings.back(), "and 50 more");
+}
+
 TEST(OpenDriveLenient, WhatLeavesNoMapIsStillAnError) {
   EXPECT_THROW(read_leniently(""), Error);
   EXPECT_THROW(read_leniently("<OpenDRIVE/>"), Error);
