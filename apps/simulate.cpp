@@ -53,6 +53,8 @@ void run(const Arguments& arguments) {
                     {"asked", spawned.asked},
                     {"spawned", spawned.spawned},
                     {"refused", spawned.refused},
+                    {"refused_no_place", spawned.refused_no_place},
+                    {"refused_taken", spawned.refused_taken},
                     {"steps", step},
                     {"agent_steps", totals.agent_steps},
                     {"agent_steps_per_s", finite_or_null(static_cast<double>(totals.agent_steps) / simulate_s)},

@@ -144,7 +144,7 @@ class SimulatorCpu final : public Simulator {
     int spawned = 0;
     for (int agent = 0; agent < world.num_agents; ++agent) {
       draw_agent(world, agent);
-      const int chosen = first_try(true, [&](int i) {
+      const int chosen = first_try(has_places(world, agent), [&](int i) {
         const AgentBox box = spawn_box(world, agent, i);
         return may_spawn(world.map, box) && is_clear(world, box, 0, agent) &&
                is_clear(world, box, world.num_agents, world.num_boxes);

@@ -179,6 +179,7 @@ class SimulatorCuda final : public Simulator {
     synchronize();
     state_.boxes.copy_to_host(batch_->boxes.data());
     state_.spawned.copy_to_host(batch_->spawned.data());
+    agents_.refusal.copy_to_host(batch_->agents.refusal.data());
     return batch_->spawn_report();
   }
   const SimulatorTotals& totals() const override {

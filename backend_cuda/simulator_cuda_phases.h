@@ -153,6 +153,7 @@ PICTURA_HD void begin_episode(const Team& team, const SimulatorArrays& arrays, i
   team.for_each(num_parked, [&](int car) { put_parked_car(world, car, scratch.chosen_try[world.num_agents + car]); });
   const auto agent_at = [&](int agent, int i) { return spawn_box(world, agent, i); };
   choose_tries(team, world, scratch, 0, world.num_agents, agent_at, [&](int agent, int i) {
+    if (!has_places(world, agent)) return false;
     const AgentBox box = spawn_box(world, agent, i);
     return may_spawn(world.map, box) && is_clear(world, box, world.num_agents, world.num_boxes);
   });

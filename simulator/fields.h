@@ -10,6 +10,13 @@ namespace pictura {
 /// How a controlled agent stands in its episode. Halted agents stay where they are, in everybody's way.
 enum class AgentStatus : uint8_t { active, halted, parked, absent };
 
+/// Why an agent found no place at the start of its episode.
+enum class Refusal : uint8_t {
+  none,
+  no_place,  // the map has nowhere to stand for its class
+  taken,     // all places that it tried were taken, or too near to something
+};
+
 /// Why an agent halted; also the events of a step, as bits.
 enum Event : uint8_t {
   kEventNone = 0,
@@ -28,46 +35,47 @@ constexpr int kInfractions = kEventCollision | kEventOffRoad | kEventRedLight | 
 constexpr int kNumWaypoints = 3;
 
 // X(name, type, per agent, first value, comment)
-#define PICTURA_AGENT_FIELDS(X)                                                                               \
-  X(x_m, float, 1, 0, "rear axle, or the centre of a pedestrian")                                             \
-  X(y_m, float, 1, 0, "")                                                                                     \
-  X(z_m, float, 1, 0, "height of the road under it")                                                          \
-  X(heading_rad, float, 1, 0, "counter-clockwise from x, in [-pi, pi]")                                       \
-  X(cos_heading, float, 1, 1, "")                                                                             \
-  X(sin_heading, float, 1, 0, "")                                                                             \
-  X(speed_mps, float, 1, 0, "signed, along the heading")                                                      \
-  X(accel_long_mps2, float, 1, 0, "")                                                                         \
-  X(accel_lat_mps2, float, 1, 0, "positive to the left")                                                      \
-  X(steer_rad, float, 1, 0, "front wheel angle, positive to the left")                                        \
-  X(jerk_long_mps3, float, 1, 0, "realised in the last step")                                                 \
-  X(jerk_lat_mps3, float, 1, 0, "")                                                                           \
-  X(length_m, float, 1, 0, "of the box")                                                                      \
-  X(width_m, float, 1, 0, "")                                                                                 \
-  X(height_m, float, 1, 0, "")                                                                                \
-  X(lane, int32_t, 1, -1, "current lane, -1 none")                                                            \
-  X(lane_offset_m, float, 1, 0, "signed, positive to the left of the centre line")                            \
-  X(lane_angle_rad, float, 1, 0, "heading less the lane's direction, in [-pi, pi]")                           \
-  X(speed_limit_mps, float, 1, 0, "of the current lane")                                                      \
-  X(waypoint_x_m, float, 3, 0, "the goal chain; passed ones stay until the chain is renewed")                 \
-  X(waypoint_y_m, float, 3, 0, "")                                                                            \
-  X(waypoint_z_m, float, 3, 0, "")                                                                            \
-  X(next_waypoint, int32_t, 1, 0, "index of the active one, in [0, 3)")                                       \
-  X(goal_lane, int32_t, 1, -1, "lane of the last waypoint, where the next chain starts")                      \
-  X(goal_lane_s_m, float, 1, 0, "arc length of the last waypoint on it")                                      \
-  X(goal_chains, int32_t, 1, 0, "chains drawn in this episode")                                               \
-  X(goal_x_m, float, 1, 0, "last waypoint that the metric Goals waits for, see rules/step.h")                 \
-  X(goal_y_m, float, 1, 0, "")                                                                                \
-  X(goal_z_m, float, 1, 0, "")                                                                                \
-  X(goal_open, uint8_t, 1, 0, "1 while the metric waits for it")                                              \
-  X(conditioning, float, 17, 0, "reward coefficients and dynamics multipliers; see simulator/conditioning.h") \
-  X(agent_class, uint8_t, 1, 0, "AgentClass")                                                                 \
-  X(status, uint8_t, 1, 3, "AgentStatus")                                                                     \
-  X(halt_reason, uint8_t, 1, 0, "Event bits that halted it")                                                  \
-  X(events, uint8_t, 1, 0, "Event bits of the last step")                                                     \
-  X(goals_reached, int32_t, 1, 0, "last waypoints passed within 2 m in this episode")                         \
-  X(waypoints_reached, int32_t, 1, 0, "waypoints of any kind that paid or passed in this episode")            \
-  X(distance_m, float, 1, 0, "sum of |speed| dt in this episode")                                             \
-  X(episode_events, uint8_t, 1, 0, "union of the episode's event bits")                                       \
+#define PICTURA_AGENT_FIELDS(X)                                                                                  \
+  X(x_m, float, 1, 0, "rear axle, or the centre of a pedestrian")                                                \
+  X(y_m, float, 1, 0, "")                                                                                        \
+  X(z_m, float, 1, 0, "height of the road under it")                                                             \
+  X(heading_rad, float, 1, 0, "counter-clockwise from x, in [-pi, pi]")                                          \
+  X(cos_heading, float, 1, 1, "")                                                                                \
+  X(sin_heading, float, 1, 0, "")                                                                                \
+  X(speed_mps, float, 1, 0, "signed, along the heading")                                                         \
+  X(accel_long_mps2, float, 1, 0, "")                                                                            \
+  X(accel_lat_mps2, float, 1, 0, "positive to the left")                                                         \
+  X(steer_rad, float, 1, 0, "front wheel angle, positive to the left")                                           \
+  X(jerk_long_mps3, float, 1, 0, "realised in the last step")                                                    \
+  X(jerk_lat_mps3, float, 1, 0, "")                                                                              \
+  X(length_m, float, 1, 0, "of the box")                                                                         \
+  X(width_m, float, 1, 0, "")                                                                                    \
+  X(height_m, float, 1, 0, "")                                                                                   \
+  X(lane, int32_t, 1, -1, "current lane, -1 none")                                                               \
+  X(lane_offset_m, float, 1, 0, "signed, positive to the left of the centre line")                               \
+  X(lane_angle_rad, float, 1, 0, "heading less the lane's direction, in [-pi, pi]")                              \
+  X(speed_limit_mps, float, 1, 0, "of the current lane")                                                         \
+  X(waypoint_x_m, float, 3, 0, "the goal chain; passed ones stay until the chain is renewed")                    \
+  X(waypoint_y_m, float, 3, 0, "")                                                                               \
+  X(waypoint_z_m, float, 3, 0, "")                                                                               \
+  X(next_waypoint, int32_t, 1, 0, "index of the active one, in [0, 3)")                                          \
+  X(goal_lane, int32_t, 1, -1, "lane (or piece of a walkway) of the last waypoint, where the next chain starts") \
+  X(goal_lane_s_m, float, 1, 0, "arc length of the last waypoint on it")                                         \
+  X(goal_chains, int32_t, 1, 0, "chains drawn in this episode")                                                  \
+  X(goal_x_m, float, 1, 0, "last waypoint that the metric Goals waits for, see rules/step.h")                    \
+  X(goal_y_m, float, 1, 0, "")                                                                                   \
+  X(goal_z_m, float, 1, 0, "")                                                                                   \
+  X(goal_open, uint8_t, 1, 0, "1 while the metric waits for it")                                                 \
+  X(conditioning, float, 17, 0, "reward coefficients and dynamics multipliers; see simulator/conditioning.h")    \
+  X(agent_class, uint8_t, 1, 0, "AgentClass")                                                                    \
+  X(status, uint8_t, 1, 3, "AgentStatus")                                                                        \
+  X(refusal, uint8_t, 1, 0, "Refusal, of an absent agent")                                                       \
+  X(halt_reason, uint8_t, 1, 0, "Event bits that halted it")                                                     \
+  X(events, uint8_t, 1, 0, "Event bits of the last step")                                                        \
+  X(goals_reached, int32_t, 1, 0, "last waypoints passed within 2 m in this episode")                            \
+  X(waypoints_reached, int32_t, 1, 0, "waypoints of any kind that paid or passed in this episode")               \
+  X(distance_m, float, 1, 0, "sum of |speed| dt in this episode")                                                \
+  X(episode_events, uint8_t, 1, 0, "union of the episode's event bits")                                          \
   X(episode_return, float, 1, 0, "sum of rewards in this episode")
 
 /// What rules read and write: pointers alone, on either device.

@@ -62,9 +62,10 @@ struct StepResult {
   Span<const uint8_t> valid;       // [slots] 1: the agent was active when the step began: learn from it
 };
 
-/// What became of the agents that were asked for, per world, in the current episode.
+/// What became of the agents that were asked for, over all worlds, in their current episodes.
 struct SpawnReport {
-  int64_t asked = 0, spawned = 0, refused = 0;  // asked == spawned + refused
+  int64_t asked = 0, spawned = 0, refused = 0;      // asked == spawned + refused
+  int64_t refused_no_place = 0, refused_taken = 0;  // the reasons: Refusal of each absent agent
   int64_t parked_asked = 0, parked_placed = 0;
 };
 

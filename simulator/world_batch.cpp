@@ -35,9 +35,6 @@ void check(const SimulatorConfig& config) {
   if (config.parked_cars < 0 || config.parked_cars > kMaxAgentsPerWorld) {
     fail_usage("simulator: parked_cars: expected 0 to {}, got {}", kMaxAgentsPerWorld, config.parked_cars);
   }
-  PICTURA_CHECK(config.pedestrian_fraction == 0,
-                "simulator: pedestrian_fraction: this version has no pedestrians yet, got {}",
-                config.pedestrian_fraction);
   for (int i = 0; i < kNumConditioning; ++i) {
     const ConditioningRange& range = config.conditioning[static_cast<size_t>(i)];
     const bool is_positive = i == static_cast<int>(Conditioning::delta_goal_m) || i >= kNumRewardConditioning;
@@ -161,6 +158,8 @@ uint64_t fingerprint(const RoadMap& map) {
   hash.add(Span<const RoadEdge>(map.road_edges));
   hash.add(Span<const ParkingSpace>(map.parking_spaces));
   hash.add(Span<const BuildingLine>(map.building_lines));
+  for (const Crosswalk& crosswalk : map.crosswalks) add_range(&hash, crosswalk.outline);
+  hash.add(Span<const Vec3>(map.outline_points));
   for (const TrafficLight& light : map.lights) {
     add_values(&hash, light.stop_a_m, light.stop_b_m, light.stop_heading_rad, light.junction, light.phase);
     add_range(&hash, light.lanes);
@@ -223,7 +222,9 @@ void check_restored(const WorldBatch& batch) {
     PICTURA_CHECK(is_sound, "simulator state: agent {}: {}: {} is out of range", slot, field, value);
   };
   for (size_t w = 0; w < batch.worlds.size(); ++w) {
-    const std::vector<MapLane>& lanes = batch.world_maps[static_cast<size_t>(batch.worlds[w].map)].lanes;
+    const WorldMap& map = batch.world_maps[static_cast<size_t>(batch.worlds[w].map)];
+    const std::vector<MapLane>& lanes = map.lanes;
+    const auto num_walk_pieces = static_cast<int32_t>(map.walkways.pieces.size());
     const auto is_lane = [&lanes](int32_t lane) {
       return lane >= 0 && static_cast<size_t>(lane) < lanes.size() && lanes[static_cast<size_t>(lane)].num_segments > 0;
     };
@@ -235,8 +236,11 @@ void check_restored(const WorldBatch& batch) {
       expect(agents.agent_class[slot] < kNumAgentClasses, slot, "agent_class",
              static_cast<int>(agents.agent_class[slot]));
       expect(agents.lane[slot] == -1 || is_lane(agents.lane[slot]), slot, "lane", agents.lane[slot]);
-      expect(is_lane(agents.goal_lane[slot]) || (agents.goal_lane[slot] == -1 && status == AgentStatus::absent), slot,
-             "goal_lane", agents.goal_lane[slot]);
+      const int32_t goal_lane = agents.goal_lane[slot];
+      const bool is_way = agents.agent_class[slot] == static_cast<uint8_t>(AgentClass::pedestrian)
+                              ? goal_lane >= 0 && goal_lane < num_walk_pieces
+                              : is_lane(goal_lane);
+      expect(is_way || (goal_lane == -1 && status == AgentStatus::absent), slot, "goal_lane", goal_lane);
       expect(agents.next_waypoint[slot] >= 0 && agents.next_waypoint[slot] < kNumWaypoints, slot, "next_waypoint",
              agents.next_waypoint[slot]);
       expect(agents.goal_chains[slot] >= 0, slot, "goal_chains", agents.goal_chains[slot]);
@@ -346,7 +350,12 @@ SpawnReport WorldBatch::spawn_report() const {
   SpawnReport report;
   report.asked = num_slots();
   report.spawned = std::accumulate(spawned.begin(), spawned.end(), int64_t{0});
-  report.refused = report.asked - report.spawned;
+  const auto refused_for = [this](Refusal reason) {
+    return std::count(agents.refusal.begin(), agents.refusal.end(), static_cast<uint8_t>(reason));
+  };
+  report.refused_no_place = refused_for(Refusal::no_place);
+  report.refused_taken = refused_for(Refusal::taken);
+  report.refused = report.refused_no_place + report.refused_taken;
   report.parked_asked = int64_t{num_worlds()} * config.parked_cars;
   for (size_t w = 0; w < worlds.size(); ++w) {
     report.parked_placed +=

@@ -74,7 +74,7 @@ struct WorldBatch {
  private:
   struct SavedHeader {
     std::array<char, 8> magic{'P', 'I', 'C', 'S', 'T', 'A', 'T', 'E'};
-    uint32_t version = 2;
+    uint32_t version = 3;
     uint32_t byte_order = 0x01020304;
     uint64_t num_fingerprints = 0;  // that follow: what saver and restorer must have in common
   };

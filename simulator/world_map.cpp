@@ -368,6 +368,13 @@ WorldMap make_world_map(const RoadMap& map, Span<const WallFace> walls) {
     return box_of_segment(line.middle_m.xy(), line.middle_m.xy(), kStopLineReach_m);
   });
 
+  out.walkways = make_walkways(map, out.view());
+  std::vector<WalkPiece> pairs;
+  for (size_t i = 0; i < out.walkways.pieces.size(); i += 2) pairs.push_back(out.walkways.pieces[i]);
+  out.walk_cells = cells_of(pairs, [](const WalkPiece& piece) {
+    return box_of_segment(piece.a_m.xy(), piece.a_m.xy() + piece.direction * piece.length_m, kWalkReach_m);
+  });
+
   out.near_lane_pieces = lists_of_pieces(out, map.name, out.lane_pieces);
   out.near_boundary_pieces = lists_of_pieces(out, map.name, out.boundary_pieces);
   out.near_stop_lines = lists_of_stop_lines(out, map.name);
@@ -384,6 +391,10 @@ MapView WorldMap::view() const {
   view.stop_lines = stop_lines;
   view.spawn_lanes = spawn_lanes;
   view.spawn_end_m = spawn_end_m;
+  view.walk_pieces = walkways.pieces;
+  view.walk_end_m = walkways.end_m;
+  view.walk_leave_begin = walkways.leave_begin;
+  view.walk_leaving = walkways.leaving;
   view.parking_spots = parking_spots;
   view.lane_pieces = lane_pieces;
   view.boundary_pieces = boundary_pieces;
@@ -391,6 +402,7 @@ MapView WorldMap::view() const {
   view.edge_cells = edge_cells.view();
   view.wall_cells = wall_cells.view();
   view.stop_line_cells = stop_line_cells.view();
+  view.walk_cells = walk_cells.view();
   view.near_lane_pieces = near_lane_pieces.view();
   view.near_boundary_pieces = near_boundary_pieces.view();
   view.near_stop_lines = near_stop_lines.view();

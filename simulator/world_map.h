@@ -8,6 +8,7 @@
 #include "pictura/common/scene.h"
 #include "pictura/map/road_map.h"
 #include "pictura/simulator/rules/map_view.h"
+#include "pictura/simulator/walkways.h"
 
 namespace pictura {
 
@@ -30,9 +31,10 @@ struct WorldMap {
   std::vector<StopLine> stop_lines;  // of RoadMap::lights, in its order
   std::vector<int32_t> spawn_lanes;
   std::vector<float> spawn_end_m;
+  Walkways walkways;
   std::vector<ParkingSpot> parking_spots;
   std::vector<ObservedPiece> lane_pieces, boundary_pieces;
-  Grid segment_cells, edge_cells, wall_cells, stop_line_cells;
+  Grid segment_cells, edge_cells, wall_cells, stop_line_cells, walk_cells;
   CellLists near_lane_pieces, near_boundary_pieces, near_stop_lines;
   Vec2 low_m, high_m;
 

@@ -14,11 +14,6 @@ constexpr float kWaypointLevel_m = 4.0f;
 /// The metric Goals counts last waypoints passed within this distance (paper, metric definitions).
 constexpr float kMetricGoalRadius_m = 2.0f;
 
-struct RoutePoint {
-  int32_t lane = -1;
-  float s_m = 0;
-};
-
 /// The neighbour of a point, `side` < 0 left, else right, at the same fraction of its lane; the point itself where
 /// there is none.
 PICTURA_HD inline RoutePoint beside(const MapView& map, RoutePoint at, int side) {

@@ -46,6 +46,19 @@ struct Barrier {
   float z_m = 0;  // at its middle
 };
 
+/// A straight piece of a way for pedestrians, in one direction; the one of the other direction has the index next to
+/// it, 2k beside 2k + 1.
+struct WalkPiece {
+  Vec3 a_m;
+  Vec2 direction;  // unit vector
+  float length_m = 0;
+  float slope = 0;  // rise per metre
+  float heading_rad = 0;
+  int32_t to_node = 0;  // where it ends
+};
+/// How far from a walkway a pedestrian still stands at its height.
+constexpr float kWalkReach_m = 5.0f;
+
 struct StopLine {
   Vec3 left_m, right_m;
   Vec3 middle_m;
@@ -77,9 +90,14 @@ struct MapView {
   Span<const StopLine> stop_lines;
   Span<const int32_t> spawn_lanes;
   Span<const float> spawn_end_m;  // [spawn_lanes] running sum of their lengths
+  Span<const WalkPiece> walk_pieces;
+  Span<const float> walk_end_m;          // [walk_pieces] running sum of their lengths
+  Span<const int32_t> walk_leave_begin;  // [walk nodes + 1] of walk_leaving: the pieces that leave a node
+  Span<const int32_t> walk_leaving;
   Span<const ParkingSpot> parking_spots;
   Span<const ObservedPiece> lane_pieces, boundary_pieces;
   GridView segment_cells, edge_cells, wall_cells, stop_line_cells;
+  GridView walk_cells;                              // of pairs of walk_pieces
   GridView near_lane_pieces, near_boundary_pieces;  // per cell and sector
   GridView near_stop_lines;
 };
@@ -95,12 +113,16 @@ PICTURA_HD void visit_arrays(MapView* view, Visit&& visit) {
   visit(&view->stop_lines);
   visit(&view->spawn_lanes);
   visit(&view->spawn_end_m);
+  visit(&view->walk_pieces);
+  visit(&view->walk_end_m);
+  visit(&view->walk_leave_begin);
+  visit(&view->walk_leaving);
   visit(&view->parking_spots);
   visit(&view->lane_pieces);
   visit(&view->boundary_pieces);
-  GridView* const lists[] = {&view->segment_cells,   &view->edge_cells,       &view->wall_cells,
-                             &view->stop_line_cells, &view->near_lane_pieces, &view->near_boundary_pieces,
-                             &view->near_stop_lines};
+  GridView* const lists[] = {&view->segment_cells,        &view->edge_cells,     &view->wall_cells,
+                             &view->stop_line_cells,      &view->walk_cells,     &view->near_lane_pieces,
+                             &view->near_boundary_pieces, &view->near_stop_lines};
   for (GridView* cells : lists) {
     visit(&cells->begin);
     visit(&cells->items);

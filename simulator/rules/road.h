@@ -78,6 +78,12 @@ PICTURA_HD inline bool is_on_road(const MapView& map, Vec2 p, float z_m) {
   return false;
 }
 
+/// A place on a route: on a lane, or for pedestrians on a piece of a walkway.
+struct RoutePoint {
+  int32_t lane = -1;
+  float s_m = 0;
+};
+
 /// A place on a lane's centre line.
 struct LanePose {
   Vec3 position_m;

@@ -3,6 +3,7 @@
 
 #include "pictura/simulator/rules/collision.h"
 #include "pictura/simulator/rules/goal.h"
+#include "pictura/simulator/rules/walk.h"
 #include "pictura/simulator/rules/world_view.h"
 
 namespace pictura {
@@ -53,42 +54,6 @@ PICTURA_HD inline void draw_agent(const WorldView& world, int agent) {
   goal_radius_m = min_of(goal_radius_m, kPedestrianGoalRadius_m);
 }
 
-/// Draws a new goal chain that starts where the last one ended.
-PICTURA_HD inline void draw_goal_chain(const WorldView& world, int agent) {
-  const AgentStateView& agents = world.agents;
-  const int slot = world.first_slot + agent;
-  RandomStream random = agent_stream(world, agent, static_cast<uint32_t>(agents.goal_chains[slot]), Purpose::goals);
-  RoutePoint at{agents.goal_lane[slot], agents.goal_lane_s_m[slot]};
-  for (int i = 0; i < kNumWaypoints; ++i) {
-    at = next_waypoint(world.map, at, &random);
-    const LanePose pose = pose_on_lane(world.map, at.lane, at.s_m);
-    agents.waypoint_x_m[slot * kNumWaypoints + i] = pose.position_m.x;
-    agents.waypoint_y_m[slot * kNumWaypoints + i] = pose.position_m.y;
-    agents.waypoint_z_m[slot * kNumWaypoints + i] = pose.position_m.z;
-  }
-  agents.next_waypoint[slot] = 0;
-  agents.goal_lane[slot] = at.lane;
-  agents.goal_lane_s_m[slot] = at.s_m;
-  ++agents.goal_chains[slot];
-}
-
-/// A place uniform over the length of all spawnable lanes.
-PICTURA_HD inline RoutePoint draw_spawn_point(const MapView& map, RandomStream* random_inout) {
-  const size_t count = map.spawn_lanes.size();
-  const float at_m = random_inout->uniform(0.0f, map.spawn_end_m[count - 1]);
-  size_t low = 0, high = count - 1;
-  while (low < high) {
-    const size_t middle = (low + high) / 2;
-    if (map.spawn_end_m[middle] > at_m) {
-      high = middle;
-    } else {
-      low = middle + 1;
-    }
-  }
-  const float begin_m = low == 0 ? 0.0f : map.spawn_end_m[low - 1];
-  return {map.spawn_lanes[low], at_m - begin_m};
-}
-
 /// Whether a box keeps kSpawnClearance_m from the boxes [begin, end).
 PICTURA_HD inline bool is_clear(const WorldView& world, const AgentBox& box, int begin, int end) {
   AgentBox inflated = box;
@@ -103,9 +68,61 @@ PICTURA_HD inline bool is_clear(const WorldView& world, const AgentBox& box, int
   return true;
 }
 
+PICTURA_HD inline bool touches_wall(const MapView& map, const AgentBox& box) {
+  return touches_any(footprint(box), box.center_m.z, map.walls, map.wall_cells);
+}
+
 PICTURA_HD inline bool touches_barrier(const MapView& map, const AgentBox& box) {
-  return touches_any(footprint(box), box.center_m.z, map.edges, map.edge_cells) ||
-         touches_any(footprint(box), box.center_m.z, map.walls, map.wall_cells);
+  return touches_any(footprint(box), box.center_m.z, map.edges, map.edge_cells) || touches_wall(map, box);
+}
+
+/// Where pedestrians walk, and everybody else drives.
+PICTURA_HD inline bool walks(const WorldView& world, int agent) {
+  return class_of(world.agents, world.first_slot + agent) == AgentClass::pedestrian;
+}
+
+PICTURA_HD inline LanePose pose_of(const WorldView& world, int agent, RoutePoint at) {
+  return walks(world, agent) ? pose_on_walk(world.map, at.lane, at.s_m) : pose_on_lane(world.map, at.lane, at.s_m);
+}
+
+PICTURA_HD inline LaneFit fit_agent(const WorldView& world, int agent, Vec2 p, float z_m, float heading_rad,
+                                    int32_t current_lane) {
+  return walks(world, agent) ? fit_walk(world.map, p, z_m, heading_rad, current_lane)
+                             : fit_lane(world.map, p, z_m, heading_rad, current_lane);
+}
+
+/// The next waypoint of a pedestrian: the gap, and then on until no parked car stands there.
+PICTURA_HD inline RoutePoint next_walk_waypoint(const WorldView& world, int agent, RoutePoint at,
+                                                RandomStream* random_inout) {
+  constexpr float kStride_m = 1.0f;
+  constexpr int kMaxStrides = 64;
+  at = stroll(world.map, at, random_inout->uniform(kMinWaypointGap_m, kMaxWaypointGap_m), random_inout);
+  for (int i = 0; i < kMaxStrides; ++i) {
+    const LanePose pose = pose_on_walk(world.map, at.lane, at.s_m);
+    const AgentBox box = box_at(world.agents, world.first_slot + agent, pose.position_m, sincos_of(pose.heading_rad));
+    if (is_clear(world, box, world.num_agents, world.num_boxes)) break;
+    at = stroll(world.map, at, kStride_m, random_inout);
+  }
+  return at;
+}
+
+/// Draws a new goal chain that starts where the last one ended.
+PICTURA_HD inline void draw_goal_chain(const WorldView& world, int agent) {
+  const AgentStateView& agents = world.agents;
+  const int slot = world.first_slot + agent;
+  RandomStream random = agent_stream(world, agent, static_cast<uint32_t>(agents.goal_chains[slot]), Purpose::goals);
+  RoutePoint at{agents.goal_lane[slot], agents.goal_lane_s_m[slot]};
+  for (int i = 0; i < kNumWaypoints; ++i) {
+    at = walks(world, agent) ? next_walk_waypoint(world, agent, at, &random) : next_waypoint(world.map, at, &random);
+    const LanePose pose = pose_of(world, agent, at);
+    agents.waypoint_x_m[slot * kNumWaypoints + i] = pose.position_m.x;
+    agents.waypoint_y_m[slot * kNumWaypoints + i] = pose.position_m.y;
+    agents.waypoint_z_m[slot * kNumWaypoints + i] = pose.position_m.z;
+  }
+  agents.next_waypoint[slot] = 0;
+  agents.goal_lane[slot] = at.lane;
+  agents.goal_lane_s_m[slot] = at.s_m;
+  ++agents.goal_chains[slot];
 }
 
 /// Where parked car `car` of the world is put at its try `i`. There must be spots.
@@ -149,22 +166,47 @@ PICTURA_HD inline void put_parked_car(const WorldView& world, int car, int i) {
   world.boxes[world.num_agents + car] = world.boxes_before[world.num_agents + car] = box;
 }
 
-/// The place of try `i` of an agent.
+/// A place uniform over lengths whose running sum is end_m; its lane is an index into them.
+PICTURA_HD inline RoutePoint draw_place(Span<const float> end_m, RandomStream* random_inout) {
+  const float at_m = random_inout->uniform(0.0f, end_m[end_m.size() - 1]);
+  size_t low = 0, high = end_m.size() - 1;
+  while (low < high) {
+    const size_t middle = (low + high) / 2;
+    if (end_m[middle] > at_m) {
+      high = middle;
+    } else {
+      low = middle + 1;
+    }
+  }
+  return {static_cast<int32_t>(low), at_m - (low == 0 ? 0.0f : end_m[low - 1])};
+}
+
+/// Whether the map has any place where the agent could stand.
+PICTURA_HD inline bool has_places(const WorldView& world, int agent) {
+  return walks(world, agent) ? !world.map.walk_pieces.empty() : !world.map.spawn_lanes.empty();
+}
+
+/// The place of try `i` of an agent, uniform over the length of all spawnable lanes, or for pedestrians over that of
+/// all walkways in both directions. There must be places.
 PICTURA_HD inline RoutePoint spawn_point(const WorldView& world, int agent, int i) {
   RandomStream random = agent_stream(world, agent, 0, Purpose::spawn);
   random.skip(i);
-  return draw_spawn_point(world.map, &random);
+  if (walks(world, agent)) return draw_place(world.map.walk_end_m, &random);
+  RoutePoint at = draw_place(world.map.spawn_end_m, &random);
+  at.lane = world.map.spawn_lanes[static_cast<size_t>(at.lane)];
+  return at;
 }
 
-/// The agent's box where it stands along a lane at its try `i`.
+/// The agent's box where it stands at its try `i`, along a lane or a walkway.
 PICTURA_HD inline AgentBox spawn_box(const WorldView& world, int agent, int i) {
-  const RoutePoint at = spawn_point(world, agent, i);
-  const LanePose pose = pose_on_lane(world.map, at.lane, at.s_m);
+  const LanePose pose = pose_of(world, agent, spawn_point(world, agent, i));
   return box_at(world.agents, world.first_slot + agent, pose.position_m, sincos_of(pose.heading_rad));
 }
 
-/// Whether the map permits an agent's box there: clear of barriers, its centre on the road.
+/// Whether the map permits an agent's box there: clear of barriers, its centre on the road. Pedestrians need only keep
+/// clear of walls.
 PICTURA_HD inline bool may_spawn(const MapView& map, const AgentBox& box) {
+  if (box.agent_class == AgentClass::pedestrian) return !touches_wall(map, box);
   return !touches_barrier(map, box) && is_on_road(map, box.center_m.xy(), box.center_m.z);
 }
 
@@ -174,7 +216,7 @@ PICTURA_HD inline void put_agent(const WorldView& world, int agent, int i) {
   const int slot = world.first_slot + agent;
   if (i >= 0) {
     const RoutePoint at = spawn_point(world, agent, i);
-    const LanePose pose = pose_on_lane(world.map, at.lane, at.s_m);
+    const LanePose pose = pose_of(world, agent, at);
     Motion motion;
     motion.x_m = pose.position_m.x;
     motion.y_m = pose.position_m.y;
@@ -186,7 +228,10 @@ PICTURA_HD inline void put_agent(const WorldView& world, int agent, int i) {
     agents.goal_lane_s_m[slot] = at.s_m;
   }
   world.boxes[agent] = world.boxes_before[agent] = box_of(agents, slot);
-  if (i < 0) return;
+  if (i < 0) {
+    agents.refusal[slot] = static_cast<uint8_t>(has_places(world, agent) ? Refusal::taken : Refusal::no_place);
+    return;
+  }
   store_fit(agents, slot,
             fit_lane(world.map, {agents.x_m[slot], agents.y_m[slot]}, agents.z_m[slot], agents.heading_rad[slot],
                      agents.goal_lane[slot]));

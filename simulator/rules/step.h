@@ -89,7 +89,7 @@ PICTURA_HD inline void advance(const WorldView& world, int agent, int32_t action
   agents.distance_m[slot] += driven_m(motion.speed_mps, world.options.dt_s);
 
   const int32_t lane_before = agents.lane[slot];
-  store_fit(agents, slot, fit_lane(world.map, {motion.x_m, motion.y_m}, from.z, motion.heading_rad, lane_before));
+  store_fit(agents, slot, fit_agent(world, agent, {motion.x_m, motion.y_m}, from.z, motion.heading_rad, lane_before));
   const AgentBox box = world.boxes[agent] = box_of(agents, slot);
 
   int events = pass_waypoints(world, agent, from);

@@ -106,7 +106,7 @@ void expect_parity(const SimulatorConfig& config, const Maps& maps, const std::v
 
 SimulatorConfig whole_world() {
   SimulatorConfig config;
-  config.cyclist_fraction = 0.2f;
+  config.pedestrian_fraction = config.cyclist_fraction = 0.1f;
   config.parked_cars = 32;
   config.walls = true;
   return config;

@@ -37,7 +37,7 @@ void expect_same(const SimulatorConfig& config, const std::vector<std::shared_pt
 TEST(Phases, GiveTheBitsOfTheCpuExecutorInAnyOrderOfThreads) {
   SimulatorConfig config;
   config.episode_steps = 60;
-  config.cyclist_fraction = 0.2f;
+  config.pedestrian_fraction = config.cyclist_fraction = 0.2f;
   config.parked_cars = 12;
   config.walls = true;
   const std::vector<std::shared_ptr<const RoadMap>> maps{load_map("procedural:1"), load_map("procedural:2"),
@@ -79,7 +79,7 @@ TEST(Phases, CarlaTowns) {
   if (towns.empty()) GTEST_SKIP() << "no towns: set PICTURA_DATA";
   SimulatorConfig config;
   config.episode_steps = 15;
-  config.cyclist_fraction = 0.1f;
+  config.pedestrian_fraction = config.cyclist_fraction = 0.1f;
   config.parked_cars = 32;
   config.walls = true;
   for (const std::string& town : towns) {

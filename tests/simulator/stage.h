@@ -16,7 +16,7 @@ class Stage {
  public:
   /// num_agents vehicles of 4 x 2 m, absent until they are put somewhere; all conditioning at `low` of the paper's
   /// ranges but for the dynamics multipliers, which are 1; lights green.
-  Stage(std::shared_ptr<const RoadMap> map, int num_agents);
+  Stage(std::shared_ptr<const RoadMap> map, int num_agents, const SimulatorConfig& config = {});
 
   /// Puts the rear axle there and finds the lane.
   void put(int agent, Vec2 position_m, float heading_rad, float speed_mps);

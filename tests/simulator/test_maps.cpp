@@ -133,4 +133,26 @@ void add_light(RoadMap* map, float x_m, float width_m, int num_phases, std::vect
   map->lights.push_back(light);
 }
 
+int32_t add_side_lane(RoadMap* map, LaneType type, const std::vector<Vec3>& points) {
+  std::vector<float> headings;
+  for (size_t i = 0; i < points.size(); ++i) {
+    const size_t from = i + 1 < points.size() ? i : i - 1;
+    const Vec2 way = (points[from + 1] - points[from]).xy();
+    headings.push_back(std::atan2(way.y, way.x));
+  }
+  const int32_t index = add_lane(map, points, headings);
+  Lane& lane = map->lanes[static_cast<size_t>(index)];
+  lane.type = type;
+  lane.is_endless = false;
+  return index;
+}
+
+void add_crosswalk(RoadMap* map, const std::vector<Vec3>& corners) {
+  Crosswalk crosswalk;
+  crosswalk.outline.begin = static_cast<int32_t>(map->outline_points.size());
+  map->outline_points.insert(map->outline_points.end(), corners.begin(), corners.end());
+  crosswalk.outline.end = static_cast<int32_t>(map->outline_points.size());
+  map->crosswalks.push_back(crosswalk);
+}
+
 }  // namespace pictura::testing

@@ -20,4 +20,10 @@ std::shared_ptr<RoadMap> stadium(float straight_m, int num_lanes);
 /// num_phases.
 void add_light(RoadMap* map, float x_m, float width_m, int num_phases, std::vector<int32_t> held_lanes);
 
+/// Adds a lane of that type along `points`, which nothing leads to by links; returns its index.
+int32_t add_side_lane(RoadMap* map, LaneType type, const std::vector<Vec3>& points);
+
+/// Adds a crosswalk with those corners.
+void add_crosswalk(RoadMap* map, const std::vector<Vec3>& corners);
+
 }  // namespace pictura::testing

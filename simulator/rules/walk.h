@@ -1,0 +1,57 @@
+// Where pedestrians go: along the pieces of the walkways, turning back at dead ends.
+#pragma once
+
+#include "pictura/common/rng.h"
+#include "pictura/simulator/rules/road.h"
+
+namespace pictura {
+
+/// At distance s_m from the start of a piece, heading along it.
+PICTURA_HD inline LanePose pose_on_walk(const MapView& map, int32_t piece_index, float s_m) {
+  const WalkPiece& piece = map.walk_pieces[static_cast<size_t>(piece_index)];
+  const float along = clamp(s_m, 0.0f, piece.length_m);
+  const Vec2 xy = piece.a_m.xy() + piece.direction * along;
+  return {{xy.x, xy.y, piece.a_m.z + piece.slope * along}, piece.heading_rad};
+}
+
+/// Walks distance_m on from s_m on a piece. At a node each way but the one back is as likely.
+PICTURA_HD inline RoutePoint stroll(const MapView& map, RoutePoint at, float distance_m, RandomStream* random_inout) {
+  constexpr int kMaxPiecesWalked = 1024;  // pieces of a few centimetres in a row: a bound, not a rule
+  for (int i = 0; i < kMaxPiecesWalked; ++i) {
+    const WalkPiece& piece = map.walk_pieces[static_cast<size_t>(at.lane)];
+    const float left_m = piece.length_m - at.s_m;
+    if (distance_m <= left_m) return {at.lane, at.s_m + distance_m};
+    distance_m -= left_m;
+    const int32_t begin = map.walk_leave_begin[static_cast<size_t>(piece.to_node)];
+    const int32_t ways = map.walk_leave_begin[static_cast<size_t>(piece.to_node) + 1] - begin;
+    const int32_t back = at.lane ^ 1;
+    int32_t next = back;
+    for (int32_t k = 0, choice = ways > 1 ? random_inout->below(ways - 1) : -1; k < ways && choice >= 0; ++k) {
+      const int32_t way = map.walk_leaving[static_cast<size_t>(begin + k)];
+      if (way != back && choice-- == 0) next = way;
+    }
+    at = {next, 0.0f};
+  }
+  return {at.lane, 0.0f};
+}
+
+/// The lane that fits as in fit_lane(). Pedestrians stand at the height of the nearest walkway within kWalkReach_m on
+/// their level, unless the lane is nearer.
+PICTURA_HD inline LaneFit fit_walk(const MapView& map, Vec2 p, float z_m, float heading_rad, int32_t current_lane) {
+  LaneFit fit = fit_lane(map, p, z_m, heading_rad, current_lane);
+  float nearest_m = fit.lane < 0 ? kWalkReach_m : fabsf(fit.offset_m);
+  const Span<const int32_t> items = items_at(map.walk_cells, p);
+  for (size_t i = 0; i < items.size(); ++i) {
+    const WalkPiece& piece = map.walk_pieces[2 * static_cast<size_t>(items[i])];
+    const Vec2 from_a = p - piece.a_m.xy();
+    const float along = clamp(dot(from_a, piece.direction), 0.0f, piece.length_m);
+    const float distance_m = length(from_a - piece.direction * along);
+    const float height = piece.a_m.z + piece.slope * along;
+    if (distance_m >= nearest_m || fabsf(height - z_m) >= kLevel_m) continue;
+    nearest_m = distance_m;
+    fit.z_m = height;
+  }
+  return fit;
+}
+
+}  // namespace pictura

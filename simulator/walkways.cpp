@@ -1,0 +1,216 @@
+#include "pictura/simulator/walkways.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "pictura/simulator/rules/road.h"
+
+namespace pictura {
+namespace {
+
+constexpr float kSamePlace_m = 0.75f;     // ends of lanes this close are one place
+constexpr float kMinPiece_m = 0.05f;      // shorter pieces are none
+constexpr float kCrossingReach_m = 8.0f;  // from the end of a crosswalk to the walk that it leads to
+
+struct Edge {
+  int32_t a = 0, b = 0;  // nodes
+  bool on_crosswalk = false;
+};
+
+struct Network {
+  std::vector<Vec3> nodes;
+  std::vector<Edge> edges;
+
+  int32_t add_node(Vec3 at) {
+    nodes.push_back(at);
+    return static_cast<int32_t>(nodes.size()) - 1;
+  }
+  Vec3 at(int32_t node) const { return nodes[static_cast<size_t>(node)]; }
+};
+
+bool same_place(Vec3 a, Vec3 b) { return length((a - b).xy()) < kSamePlace_m && std::fabs(a.z - b.z) < kLevel_m; }
+
+/// The lines along which one walks beside the road.
+void add_lanes(const RoadMap& map, Network* out) {
+  const auto is_sidewalk = [](const Lane& lane) { return lane.type == LaneType::sidewalk; };
+  const bool has_sidewalks = std::any_of(map.lanes.begin(), map.lanes.end(), is_sidewalk);
+  const LaneType walked = has_sidewalks ? LaneType::sidewalk : LaneType::shoulder;
+  std::vector<int32_t> ends;
+  for (const Lane& lane : map.lanes) {
+    if (lane.type != walked) continue;
+    const Span<const LanePoint> points = map.points_of(lane);
+    int32_t before = out->add_node(points[0].position_m);
+    ends.push_back(before);
+    for (size_t i = 1; i < points.size(); ++i) {
+      const int32_t node = out->add_node(points[i].position_m);
+      out->edges.push_back({before, node});
+      before = node;
+    }
+    ends.push_back(before);
+  }
+  // Lanes that meet are joined at the earlier one's end. From left to right, so that only near ones are compared.
+  std::sort(ends.begin(), ends.end(), [out](int32_t a, int32_t b) {
+    return out->at(a).x < out->at(b).x || (out->at(a).x == out->at(b).x && a < b);
+  });
+  std::vector<int32_t> place(out->nodes.size());
+  std::iota(place.begin(), place.end(), 0);
+  for (size_t i = 0; i < ends.size(); ++i) {
+    for (size_t j = i + 1; j < ends.size() && out->at(ends[j]).x - out->at(ends[i]).x < kSamePlace_m; ++j) {
+      if (!same_place(out->at(ends[i]), out->at(ends[j]))) continue;
+      int32_t& later = place[static_cast<size_t>(ends[j])];
+      if (later == ends[j]) later = place[static_cast<size_t>(ends[i])];
+    }
+  }
+  for (Edge& edge : out->edges) {
+    edge.a = place[static_cast<size_t>(edge.a)];
+    edge.b = place[static_cast<size_t>(edge.b)];
+  }
+}
+
+/// Leaves out what is too short to be a piece, and what crosses the road.
+void drop_edges_on_road(const MapView& roads, Network* out) {
+  const auto is_unfit = [&](const Edge& edge) {
+    const Vec3 a = out->at(edge.a), b = out->at(edge.b), middle = (a + b) * 0.5f;
+    return length((b - a).xy()) < kMinPiece_m || is_on_road(roads, middle.xy(), middle.z);
+  };
+  out->edges.erase(std::remove_if(out->edges.begin(), out->edges.end(), is_unfit), out->edges.end());
+}
+
+/// The way over a crosswalk: the middle line of the least rectangle about its outline, along its longer side.
+void add_middle_line(Span<const Vec3> outline, Vec3* a_out, Vec3* b_out) {
+  float least_area = INFINITY;
+  for (size_t i = 0; i < outline.size(); ++i) {
+    const Vec2 side = (outline[(i + 1) % outline.size()] - outline[i]).xy();
+    const float side_m = length(side);
+    if (!(side_m > 0)) continue;
+    const Vec2 along = side * (1.0f / side_m), across = left_normal(along);
+    Vec2 low{INFINITY, INFINITY}, high{-INFINITY, -INFINITY};
+    float z = 0;
+    for (const Vec3& corner : outline) {
+      const Vec2 p{dot(corner.xy(), along), dot(corner.xy(), across)};
+      low = {std::min(low.x, p.x), std::min(low.y, p.y)};
+      high = {std::max(high.x, p.x), std::max(high.y, p.y)};
+      z += corner.z / static_cast<float>(outline.size());
+    }
+    const Vec2 size = high - low, middle = (low + high) * 0.5f;
+    if (size.x * size.y >= least_area) continue;
+    least_area = size.x * size.y;
+    const Vec2 half = size.x >= size.y ? Vec2{0.5f * size.x, 0.0f} : Vec2{0.0f, 0.5f * size.y};
+    const auto place = [&](Vec2 p) {
+      const Vec2 xy = along * p.x + across * p.y;
+      return Vec3{xy.x, xy.y, z};
+    };
+    *a_out = place(middle - half);
+    *b_out = place(middle + half);
+  }
+}
+
+/// The node nearest to p beside the road, made by cutting an edge where it lies between nodes; -1 where none is within
+/// reach.
+int32_t node_near(Vec3 p, Network* network_inout) {
+  const size_t num_edges = network_inout->edges.size();
+  size_t nearest = num_edges;
+  float best_m = kCrossingReach_m, best_t = 0;
+  for (size_t i = 0; i < num_edges; ++i) {
+    if (network_inout->edges[i].on_crosswalk) continue;
+    const Vec3 a = network_inout->at(network_inout->edges[i].a), b = network_inout->at(network_inout->edges[i].b);
+    const Vec2 way = (b - a).xy();
+    const float way2 = dot(way, way);
+    const float t = way2 > 0 ? std::clamp(dot((p - a).xy(), way) / way2, 0.0f, 1.0f) : 0.0f;
+    const float distance_m = length((p - a).xy() - way * t);
+    if (distance_m >= best_m || std::fabs(a.z + (b.z - a.z) * t - p.z) >= kLevel_m) continue;
+    best_m = distance_m;
+    best_t = t;
+    nearest = i;
+  }
+  if (nearest == num_edges) return -1;
+  const Edge edge = network_inout->edges[nearest];
+  const Vec3 a = network_inout->at(edge.a), way = network_inout->at(edge.b) - a;
+  if (best_t * length(way.xy()) < kMinPiece_m) return edge.a;
+  if ((1 - best_t) * length(way.xy()) < kMinPiece_m) return edge.b;
+  const int32_t node = network_inout->add_node(a + way * best_t);
+  network_inout->edges[nearest].b = node;
+  network_inout->edges.push_back({node, edge.b});
+  return node;
+}
+
+void add_crosswalks(const RoadMap& map, Network* out) {
+  for (const Crosswalk& crosswalk : map.crosswalks) {
+    Vec3 end_m[2];
+    const auto corners = static_cast<size_t>(crosswalk.outline.size());
+    add_middle_line({map.outline_points.data() + crosswalk.outline.begin, corners}, &end_m[0], &end_m[1]);
+    if (length((end_m[1] - end_m[0]).xy()) < kMinPiece_m) continue;
+    int32_t before = -1;
+    for (const Vec3& at : end_m) {
+      const int32_t walk = node_near(at, out);
+      const bool is_there = walk >= 0 && length((at - out->at(walk)).xy()) < kMinPiece_m;
+      const int32_t end = is_there ? walk : out->add_node(at);
+      if (walk >= 0 && !is_there) out->edges.push_back({walk, end, true});
+      if (before >= 0) out->edges.push_back({before, end, true});
+      before = end;
+    }
+  }
+}
+
+/// Leaves out networks in which there is nowhere to go.
+void drop_short_networks(Network* out) {
+  std::vector<int32_t> root(out->nodes.size());
+  std::iota(root.begin(), root.end(), 0);
+  const auto root_of = [&root](int32_t node) {
+    while (root[static_cast<size_t>(node)] != node) {
+      node = root[static_cast<size_t>(node)] = root[static_cast<size_t>(root[static_cast<size_t>(node)])];
+    }
+    return static_cast<size_t>(node);
+  };
+  for (const Edge& edge : out->edges) root[root_of(edge.a)] = static_cast<int32_t>(root_of(edge.b));
+  std::vector<float> length_m(out->nodes.size(), 0);
+  for (const Edge& edge : out->edges) length_m[root_of(edge.a)] += length((out->at(edge.b) - out->at(edge.a)).xy());
+  out->edges.erase(std::remove_if(out->edges.begin(), out->edges.end(),
+                                  [&](const Edge& edge) { return length_m[root_of(edge.a)] < kMinWalk_m; }),
+                   out->edges.end());
+}
+
+WalkPiece piece_between(Vec3 a, Vec3 b, int32_t to_node) {
+  const Vec2 way = (b - a).xy();
+  WalkPiece piece;
+  piece.a_m = a;
+  piece.length_m = length(way);
+  piece.direction = way * (1.0f / piece.length_m);
+  piece.slope = (b.z - a.z) / piece.length_m;
+  piece.heading_rad = std::atan2(way.y, way.x);
+  piece.to_node = to_node;
+  return piece;
+}
+
+}  // namespace
+
+Walkways make_walkways(const RoadMap& map, const MapView& roads) {
+  Network network;
+  add_lanes(map, &network);
+  drop_edges_on_road(roads, &network);
+  add_crosswalks(map, &network);
+  drop_short_networks(&network);
+
+  Walkways out;
+  std::vector<int32_t> from_node;
+  float sum_m = 0;
+  for (const Edge& edge : network.edges) {
+    for (const auto& [from, to] : {std::pair{edge.a, edge.b}, std::pair{edge.b, edge.a}}) {
+      out.pieces.push_back(piece_between(network.at(from), network.at(to), to));
+      out.end_m.push_back(sum_m += out.pieces.back().length_m);
+      from_node.push_back(from);
+    }
+  }
+  out.leave_begin.assign(network.nodes.size() + 1, 0);
+  for (const int32_t node : from_node) ++out.leave_begin[static_cast<size_t>(node) + 1];
+  std::partial_sum(out.leave_begin.begin(), out.leave_begin.end(), out.leave_begin.begin());
+  out.leaving.resize(out.pieces.size());
+  std::vector<int32_t> next(out.leave_begin.begin(), out.leave_begin.end() - 1);
+  for (size_t i = 0; i < from_node.size(); ++i) {
+    out.leaving[static_cast<size_t>(next[static_cast<size_t>(from_node[i])]++)] = static_cast<int32_t>(i);
+  }
+  return out;
+}
+
+}  // namespace pictura
