@@ -20,9 +20,10 @@ constexpr double kDot_m = 0.1016, kDotPeriod_m = 1.2192;
 // Corners nearer to each other than this are one.
 constexpr float kSamePoint_m = 1e-3f;
 
-/// One stripe of a mark. Dashes lie at origin + i * period, for as many i as `count` or the mark's length allow.
+/// One stripe of a mark, `left` of the border. Dashes begin at origin + i * period along the road, for i = 0 alone
+/// where they are painted once.
 struct Stripe {
-  double left = 0;  // of the border
+  double left = 0;
   double width = 0;
   MarkColor color = MarkColor::white;
   bool broken = false;
@@ -107,10 +108,11 @@ class MarkPainter {
     std::sort(breaks.begin(), breaks.end());
     const std::vector<CurvePoint> points =
         sample_curve(breaks, build_.options.chord_error_m, kMaxPiece_m, &build_.budget, [&](double s) {
-          const double height = point_on_lane(road_, section_, lane_, s, 1).z;
           const double t = border_t(road_, section_, lane_.id, s) + stripe.left + mark.sway.value(s - mark_begin);
           const Point3 p = point_at(road_, s, t);
-          return CurvePoint{s, p.x, p.y, lane_.inner_height.cubics.empty() ? p.z : height, 0};
+          // On a raised lane the mark lies at the height of its border.
+          const bool is_raised = !lane_.inner_height.cubics.empty();
+          return CurvePoint{s, p.x, p.y, is_raised ? point_on_lane(road_, section_, lane_, s, 1).z : p.z, 0};
         });
     const int32_t first = static_cast<int32_t>(map.marking_points.size());
     for (const CurvePoint& point : points) map.marking_points.push_back(build_.to_map(point.x, point.y, point.z));

@@ -136,8 +136,11 @@ TEST(OpenDriveBanking, LevelLanesKeepTheHeightOfTheirInnerBorder) {
 }
 
 TEST(OpenDriveBanking, LanesStandAsHighAsTheirHeightSays) {
-  const RoadMap map = banked("", "", R"(<height sOffset="0" inner="0.1" outer="0.2"/>)");
+  const RoadMap map = banked("", "",
+                             R"(<height sOffset="0" inner="0.1" outer="0.2"/>)"
+                             R"(<roadMark sOffset="0" type="solid" color="white"/>)");
   EXPECT_NEAR(first_of(map, -2).z, 0.15, 1e-6);
+  expect_at(map, map.marking_points[0], 0, -6, 0.2);
   EXPECT_NEAR(first_of(map, -1).z, 0, 1e-6);
 }
 
