@@ -152,10 +152,30 @@ PICTURA_HD inline AgentBox parked_box(const WorldView& world, int car, const Par
   return box;
 }
 
-/// Whether the map permits the box on its spot: clear of barriers, and off the road where that is beside a kerb.
+/// Whether the box reaches into a lane that is driven on, on its level, by more than kSeamTolerance_m.
+PICTURA_HD inline bool covers_driven_lane(const MapView& map, const AgentBox& box) {
+  const OrientedBox print = footprint(box);
+  const Span<const int32_t> items = items_at(map.segment_cells, print.center_m);
+  for (size_t i = 0; i < items.size(); ++i) {
+    const LaneSegment& segment = map.segments[static_cast<size_t>(items[i])];
+    const float half_m = 0.5f * segment.length_m;
+    const OrientedBox surface{segment.a_m.xy() + segment.direction * half_m, segment.direction, half_m,
+                              segment.half_width_m - kSeamTolerance_m};
+    const float height = segment.a_m.z + segment.slope * half_m;
+    if (map.lanes[static_cast<size_t>(segment.lane)].is_driven && fabsf(height - box.center_m.z) < kLevel_m &&
+        overlap(print, surface)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// Whether the map permits the box on its spot: clear of barriers and of lanes that are driven on, and off the road
+/// where that is beside a kerb.
 PICTURA_HD inline bool may_park(const MapView& map, const AgentBox& box, const ParkingSpot& spot) {
   const bool is_at_kerb = dot(spot.outward, spot.outward) > 0.0f;
-  return !touches_barrier(map, box) && !(is_at_kerb && is_on_road(map, box.center_m.xy(), box.center_m.z));
+  return !touches_barrier(map, box) && !covers_driven_lane(map, box) &&
+         !(is_at_kerb && is_on_road(map, box.center_m.xy(), box.center_m.z));
 }
 
 /// Parks car `car` at its try `i`; with -1 it found no place, is not drawn, and nobody meets it.
