@@ -6,8 +6,9 @@ namespace pictura::town {
 namespace {
 
 constexpr double kWidest_m = 1e9;
+constexpr double kMostTurnRadius_m = 14;  // of the left border of a turn that is no right turn
 // Lanes that turn across the junction are wider half-way, so that what comes beside them leaves no sliver between.
-constexpr double kTurningWidth_m = 4.5;
+constexpr double kTurningWidth_m = 4;
 constexpr double kCrosswalkBegin_m = 0.6, kCrosswalkEnd_m = 3.4;  // beyond the stop line
 constexpr Side kNoSide{.driving = 0, .has_shoulder = false, .has_sidewalk = false};
 
@@ -41,8 +42,9 @@ int TownBuilder::lay_movement(const Node& node, const Movement& movement, opendr
   const bool has_corner =
       turns_right && first_in + movement.lanes == in_lanes && movement.first_out + movement.lanes == out.lanes;
   const bool is_straight = straight_on(node, movement.from) == movement.to;
-  const double radius =
-      turns_right && !movement.is_slip ? right_turn_radius_m(full_turn(to.heading - from.heading)) : kWidest_m;
+  const double radius = movement.is_slip ? kWidest_m
+                        : turns_right    ? right_turn_radius_m(full_turn(to.heading - from.heading))
+                                         : kMostTurnRadius_m;
   const double speed = !is_straight ? kJunctionSpeed_mps : in.is_avenue ? kAvenueSpeed_mps : kStreetSpeed_mps;
   const Side right{.driving = movement.lanes,
                    .has_shoulder = has_corner,
