@@ -11,6 +11,7 @@ namespace {
 
 // Below this a width is taken for 0: what writers' rounding leaves of a lane that tapers off.
 constexpr double kWidthTolerance_m = 0.01;
+constexpr double kMaxWidth_m = 500;
 constexpr double kMaxBanking_rad = 0.5;
 // Between its stations everything is a cubic of s, and a cubic is within a small factor of its values at five places.
 constexpr int kProbes = 4;
@@ -31,6 +32,9 @@ void check_widths(const FileRoad& road, const FileSection& section, const FileLa
             : (lane.id > 0 ? 1 : -1) * (lane.border.value(ds) - border_t(road, section, inner_border(lane.id), s));
     if (!(width >= -kWidthTolerance_m)) {
       lane.where.fail("its width at s {:.3f} is {:.3f} m; expected at least 0", s, width);
+    }
+    if (!(width <= kMaxWidth_m)) {
+      lane.where.fail("its width at s {:.3f} is {:.3f} m; expected at most {}", s, width, kMaxWidth_m);
     }
   });
 }

@@ -81,6 +81,7 @@ TEST(OpenDriveErrors, AttributesAreCheckedAndNamedWithTheirLine) {
            {"a=\"3\"", "a=\"3\" e=\"0\" x=\"", "bad.xodr"},
            {"b=\"0\"", "b=\"-1\"", "its width at s"},
            {"b=\"0\"", "b=\"1e200\"", "expected at most"},
+           {"b=\"0\"", "b=\"9\"", "its width at s 75.000 is 678.000 m; expected at most 500"},
            {"junction=\"-1\"", "junction=\"5\"", "belongs to junction 5, which does not exist"},
            {"junction=\"-1\"", "junction=\"-1\" rule=\"XHT\"", "attribute rule: expected RHT or LHT, got 'XHT'"},
            {"<link></link>", "<link><successor elementType=\"road\" elementId=\"9\" contactPoint=\"start\"/></link>",
