@@ -1,7 +1,6 @@
 #include "pictura/backend_cpu/renderer_cpu_image.h"
 
 #include <algorithm>
-#include <functional>
 #include <limits>
 
 #include "pictura/common/raster_gather.h"
@@ -9,146 +8,15 @@
 namespace pictura {
 
 namespace {
-// Images are composited in bands of rows, so that the state of their pixels stays in the cache whatever their size.
+// Images are drawn in bands of rows, so that their fragments stay in the cache whatever their size.
 constexpr int kBandPixels = 1 << 14;
-constexpr int32_t kNone = -1;
 }  // namespace
 
-template <typename MakeFaces>
-void ImageDrawer::add_item(const RasterItem& item, MakeFaces&& make_faces) {
-  ItemFaces faces;
-  make_faces([&](const Vec3* corners, int count, const FacePlane& plane, Rgb color) {
-    add_face(setting_, corners, count, plane, color, edges_, &faces);
-  });
-  if (faces.count == 0) return;
-  items_.push_back(item);
-  items_.back().box = faces.box;
-  items_.back().face_begin = static_cast<int32_t>(faces_.size());
-  faces_.insert(faces_.end(), faces.face, faces.face + faces.count);
-  items_.back().face_end = static_cast<int32_t>(faces_.size());
-}
-
-void ImageDrawer::gather() {
-  const SceneBatch& scene = *request_.scene;
-  const View& view = *request_.view;
-  const RasterGeometry& geometry = *request_.geometry;
-  const int32_t world_begin = scene.world_begin[static_cast<std::size_t>(view.world)];
-  visit_agents(setting_, scene, view, [&](const AgentBox& box, int32_t agent) {
-    add_item(agent_item(setting_, box, agent, world_begin),
-             [&](auto&& emit) { agent_faces(box, setting_.camera, setting_.debug_palette, emit); });
-  });
-  visit_walls(setting_, geometry, [&](const WallFace& wall, int32_t i) {
-    add_item(wall_item(setting_, wall, i), [&](auto&& emit) { wall_faces(wall, setting_.camera, emit); });
-  });
-  visit_lights(setting_, geometry, scene, view, [&](const LightHead& head, LightState state, int32_t i) {
-    add_item(light_item(setting_, head, i), [&](auto&& emit) { light_faces(head, state, setting_.camera, emit); });
-  });
-  visit_strips(setting_, geometry, [&](const Strip& strip, int32_t i) {
-    add_item(strip_item(setting_, strip, i),
-             [&](auto&& emit) { strip_faces(strip, setting_.camera, setting_.line_floor_px, emit); });
-  });
-}
-
-void ImageDrawer::find_background() {
-  GroundHeights heights;
-  for (const RasterItem& item : items_) {
-    const Interval of_item = heights_of(item.extent);
-    if (item.extent.is_strip) {
-      heights.strips.low = min_of(heights.strips.low, of_item.low);
-      heights.strips.high = max_of(heights.strips.high, of_item.high);
-    } else {
-      heights.lowest_foot_m = min_of(heights.lowest_foot_m, of_item.low);
-    }
-  }
-  if (!ground_is_level(heights)) return;
-  for (RasterItem& item : items_) {
-    if (item.extent.is_strip) put_in_background(&item);
-  }
-}
-
-void ImageDrawer::sort_items() {
-  order_.clear();
-  foreground_.clear();
-  for (std::size_t i = 0; i < items_.size(); ++i) {
-    (items_[i].is_background ? order_ : foreground_).push_back(static_cast<int32_t>(i));
-  }
-  auto by_key = [&](int32_t a, int32_t b) {
-    return items_[static_cast<std::size_t>(a)].key < items_[static_cast<std::size_t>(b)].key;
+auto ImageDrawer::face_maker(FaceOwner owner) {
+  return [this, owner](const Vec3* corners, int count, const FacePlane& plane, Rgb color) {
+    ScreenFace face;
+    if (make_face(setting_, owner, corners, count, plane, color, edges_, &face)) faces_.push_back(face);
   };
-  std::sort(order_.begin(), order_.end(), by_key);
-  std::sort(foreground_.begin(), foreground_.end(), by_key);
-  const auto background = static_cast<std::ptrdiff_t>(order_.size());
-  find_hidings();
-  sort_foreground();
-  std::rotate(order_.begin(), order_.begin() + background, order_.end());
-}
-
-// Pairwise order of what meets on screen. A sweep over x finds the pairs whose boxes overlap.
-void ImageDrawer::find_hidings() {
-  const std::size_t count = foreground_.size();
-  hidings_.clear();
-  first_hiding_.assign(count, kNone);
-  waiting_for_.assign(count, 0);
-  sweep_.clear();
-  for (std::size_t i = 0; i < count; ++i) {
-    sweep_.push_back({items_[static_cast<std::size_t>(foreground_[i])].box, static_cast<int32_t>(i)});
-  }
-  std::sort(sweep_.begin(), sweep_.end(),
-            [](const PlacedBox& a, const PlacedBox& b) { return a.box.x_begin < b.box.x_begin; });
-  for (std::size_t i = 0; i < count; ++i) {
-    const PlacedBox& a = sweep_[i];
-    for (std::size_t j = i + 1; j < count && sweep_[j].box.x_begin < a.box.x_end; ++j) {
-      const PlacedBox& b = sweep_[j];
-      if (a.box.y_begin >= b.box.y_end || b.box.y_begin >= a.box.y_end) continue;
-      const int32_t nearer = min_of(a.place, b.place), farther = max_of(a.place, b.place);
-      const int32_t order =
-          order_on_screen(items_[static_cast<std::size_t>(foreground_[static_cast<std::size_t>(nearer)])],
-                          items_[static_cast<std::size_t>(foreground_[static_cast<std::size_t>(farther)])],
-                          faces_.data(), edges_.at(0));
-      if (order == 0) continue;
-      const int32_t front = order < 0 ? nearer : farther, behind = order < 0 ? farther : nearer;
-      const int32_t weight = order < 0 ? -order : order;
-      int32_t& first = first_hiding_[static_cast<std::size_t>(front)];
-      hidings_.push_back({behind, weight, first});
-      first = static_cast<int32_t>(hidings_.size()) - 1;
-      waiting_for_[static_cast<std::size_t>(behind)] += weight;
-    }
-  }
-}
-
-// A topological sort that takes the nearest of those that nothing is in front of any more; in a cycle, the one of which
-// least is hidden by what is left.
-void ImageDrawer::sort_foreground() {
-  const std::size_t count = foreground_.size();
-  constexpr int64_t kTaken = -1;
-  ready_.clear();  // a heap of places, the nearest on top
-  for (std::size_t i = 0; i < count; ++i) {
-    if (waiting_for_[i] == 0) ready_.push_back(static_cast<int32_t>(i));
-  }
-  for (std::size_t taken = 0; taken < count; ++taken) {
-    std::size_t next = 0;
-    if (!ready_.empty()) {
-      std::pop_heap(ready_.begin(), ready_.end(), std::greater<>());
-      next = static_cast<std::size_t>(ready_.back());
-      ready_.pop_back();
-    } else {
-      while (waiting_for_[next] == kTaken) ++next;
-      for (std::size_t i = next + 1; i < count; ++i) {
-        if (waiting_for_[i] != kTaken && waiting_for_[i] < waiting_for_[next]) next = i;
-      }
-    }
-    order_.push_back(foreground_[next]);
-    waiting_for_[next] = kTaken;
-    for (int32_t at = first_hiding_[next]; at != kNone; at = hidings_[static_cast<std::size_t>(at)].next) {
-      const Hiding& hiding = hidings_[static_cast<std::size_t>(at)];
-      int64_t& waiting = waiting_for_[static_cast<std::size_t>(hiding.behind)];
-      if (waiting == kTaken) continue;
-      waiting -= hiding.weight;
-      if (waiting > 0) continue;
-      ready_.push_back(hiding.behind);
-      std::push_heap(ready_.begin(), ready_.end(), std::greater<>());
-    }
-  }
 }
 
 void ImageDrawer::prepare(const ImageRequest& request) {
@@ -156,31 +24,83 @@ void ImageDrawer::prepare(const ImageRequest& request) {
   setting_ = {request.camera, make_frustum(request.camera), request.line_floor_px, request.debug_palette};
   edges_.clear();
   faces_.clear();
-  items_.clear();
-  gather();
-  find_background();
-  sort_items();
+  visit_agents(setting_, *request.scene, *request.view, [&](const AgentBox& box, int32_t agent) {
+    agent_faces(box, setting_.camera, setting_.debug_palette, face_maker(agent_owner(box, agent - world_begin())));
+  });
+  visit_walls(setting_, *request.geometry, [&](const WallFace& wall, int32_t index) {
+    wall_faces(wall, setting_.camera, face_maker(wall_owner(index)));
+  });
+  visit_lights(setting_, *request.geometry, *request.scene, *request.view,
+               [&](const LightHead& head, LightState state, int32_t index) {
+                 light_faces(head, state, setting_.camera, face_maker(light_owner(index)));
+               });
+  visit_strips(setting_, *request.geometry, [&](const Strip& strip, int32_t index) {
+    strip_faces(strip, setting_.camera, setting_.line_floor_px, face_maker(strip_owner(strip, index)));
+  });
 }
 
-// Calls visit(pixel index in rows y_begin.., coverage, face) for each pixel of the rows that the item may cover.
-template <typename Visit>
-void ImageDrawer::visit_pixels(const RasterItem& item, int y_begin, int y_end, Visit&& visit) const {
+bool ImageDrawer::stands(uint32_t solid, uint32_t strip) const {
+  const StaticGeometryView& pieces = request_.geometry->pieces;
+  return stands_on(extent_of(solid, pieces, *request_.scene, world_begin()),
+                   extent_of(strip, pieces, *request_.scene, world_begin()));
+}
+
+// Spreads faces over the pixels of some rows.
+void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
   const int width = setting_.camera.width_px;
-  for (int32_t f = item.face_begin; f < item.face_end; ++f) {
+  first_fragment_.assign(static_cast<std::size_t>((rows.y_end - rows.y_begin) * width), -1);
+  fragments_.clear();
+  for (int32_t f = faces.begin; f < faces.end; ++f) {
     const ScreenFace& face = faces_[static_cast<std::size_t>(f)];
     const PolygonEdge* edges = edges_.at(face.edge_begin);
-    for (int y = max_of(y_begin, face.box.y_begin); y < min_of(y_end, face.box.y_end); ++y) {
+    for (int y = max_of(rows.y_begin, face.box.y_begin); y < min_of(rows.y_end, face.box.y_end); ++y) {
+      int32_t* row = first_fragment_.data() + (y - rows.y_begin) * width;
+      auto add = [&](int x, const PixelCoverage& coverage) {
+        if (coverage.area <= 0.0f) return;
+        fragments_.push_back({make_fragment(face, f, coverage, x, y), row[x]});
+        row[x] = static_cast<int32_t>(fragments_.size()) - 1;
+      };
       const RowSpan span = row_span(edges, face.edge_count, face.box, y);
-      const int row = (y - y_begin) * width;
-      for (int x = span.begin; x < span.full_begin; ++x) {
-        visit(row + x, [&] { return pixel_coverage(edges, face.edge_count, x, y); }, face);
+      for (int x = span.begin; x < span.full_begin; ++x) add(x, pixel_coverage(edges, face.edge_count, x, y));
+      for (int x = span.full_begin; x < span.full_end; ++x) add(x, {1.0f, kAllSamples});
+      for (int x = span.full_end; x < span.end; ++x) add(x, pixel_coverage(edges, face.edge_count, x, y));
+    }
+  }
+}
+
+// The list of one pixel, for lay_fragments.
+class ImageDrawer::PixelList {
+ public:
+  static constexpr int kEnd = -1;
+  PixelList(std::vector<LinkedFragment>* fragments, int32_t first) : fragments_(*fragments), first_(first) {}
+  int begin() const { return first_; }
+  int next(int place) const { return fragments_[static_cast<std::size_t>(place)].next; }
+  const Fragment& at(int place) const { return fragments_[static_cast<std::size_t>(place)].fragment; }
+  void remove(int place, int before) {
+    (before == kEnd ? first_ : fragments_[static_cast<std::size_t>(before)].next) = next(place);
+  }
+
+ private:
+  std::vector<LinkedFragment>& fragments_;
+  int32_t first_;
+};
+
+template <typename Lay, typename Finish>
+void ImageDrawer::lay_rows(RowRange rows, Lay&& lay, Finish&& finish) {
+  const int width = setting_.camera.width_px;
+  int pixel = 0;
+  for (int y = rows.y_begin; y < rows.y_end; ++y) {
+    for (int x = 0; x < width; ++x, ++pixel) {
+      PixelList list(&fragments_, first_fragment_[static_cast<std::size_t>(pixel)]);
+      if (list.begin() == PixelList::kEnd) {
+        finish(pixel, Rgb{});
+        continue;
       }
-      for (int x = span.full_begin; x < span.full_end; ++x) {
-        visit(row + x, [&] { return PixelCoverage{1.0f, kAllSamples}; }, face);
-      }
-      for (int x = span.full_end; x < span.end; ++x) {
-        visit(row + x, [&] { return pixel_coverage(edges, face.edge_count, x, y); }, face);
-      }
+      finish(pixel,
+             lay_fragments(
+                 list, faces_.data(), x, y, [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); },
+                 [&](const Fragment& fragment, float weight) { lay(pixel, fragment, weight); })
+                 .color);
     }
   }
 }
@@ -189,100 +109,101 @@ void ImageDrawer::draw(const ImageTarget& target) {
   const int width = setting_.camera.width_px, height = setting_.camera.height_px;
   const int band_rows = max_of(1, min_of(height, kBandPixels / width));
   const int64_t plane = int64_t{width} * height;
-  for (int y_begin = 0; y_begin < height; y_begin += band_rows) {
-    const int y_end = min_of(height, y_begin + band_rows);
-    const int count = (y_end - y_begin) * width;
-    pixels_.assign(static_cast<std::size_t>(count), PixelState{});
-    for (const int32_t i : order_) {
-      visit_pixels(items_[static_cast<std::size_t>(i)], y_begin, y_end,
-                   [&](int index, auto&& coverage, const ScreenFace& face) {
-                     PixelState& pixel = pixels_[static_cast<std::size_t>(index)];
-                     if (pixel.free_area > 0.0f) composite(&pixel, coverage(), face.color);
-                   });
+  auto draw_as = [&](auto* out, auto&& value_of) {
+    for (int y_begin = 0; y_begin < height; y_begin += band_rows) {
+      const RowRange rows{y_begin, min_of(height, y_begin + band_rows)};
+      make_fragments({0, static_cast<int32_t>(faces_.size())}, rows);
+      auto* first = out + int64_t{y_begin} * width;
+      lay_rows(
+          rows, [](int, const Fragment&, float) {},
+          [&](int pixel, Rgb color) {
+            first[pixel] = value_of(color.r);
+            first[plane + pixel] = value_of(color.g);
+            first[2 * plane + pixel] = value_of(color.b);
+          });
     }
-    const int64_t first = int64_t{y_begin} * width;
-    auto write = [&](auto* out, auto&& value_of) {
-      out += first;
-      for (int i = 0; i < count; ++i) {
-        const Rgb& color = pixels_[static_cast<std::size_t>(i)].color;
-        out[i] = value_of(color.r);
-        out[plane + i] = value_of(color.g);
-        out[2 * plane + i] = value_of(color.b);
-      }
-    };
-    if (target.format == PixelFormat::u8) {
-      write(static_cast<uint8_t*>(target.color), [](float channel) { return to_byte(channel); });
-    } else if (target.format == PixelFormat::f16) {
-      write(static_cast<uint16_t*>(target.color), [](float channel) { return to_half(channel); });
-    } else {
-      write(static_cast<float*>(target.color), [](float channel) { return clamp(channel, 0.0f, 1.0f); });
-    }
+  };
+  if (target.format == PixelFormat::u8) {
+    draw_as(static_cast<uint8_t*>(target.color), [](float channel) { return to_byte(channel); });
+  } else if (target.format == PixelFormat::f16) {
+    draw_as(static_cast<uint16_t*>(target.color), [](float channel) { return to_half(channel); });
+  } else {
+    draw_as(static_cast<float*>(target.color), [](float channel) { return clamp(channel, 0.0f, 1.0f); });
   }
   if (target.depth_m || target.class_id || target.instance_id) draw_planes(target);
 }
 
-void ImageDrawer::visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit) const {
-  for (const int32_t i : order_) {
-    visit_pixels(items_[static_cast<std::size_t>(i)], 0, setting_.camera.height_px,
-                 [&](int index, auto&& coverage, const ScreenFace& face) { visit(index, coverage(), face.color); });
-  }
+void ImageDrawer::visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit) {
+  const RowRange rows{0, setting_.camera.height_px};
+  make_fragments({0, static_cast<int32_t>(faces_.size())}, rows);
+  lay_rows(
+      rows,
+      [&](int pixel, const Fragment& fragment, float) {
+        visit(pixel, fragment.coverage, faces_[static_cast<std::size_t>(fragment.face)].color);
+      },
+      [](int, Rgb) {});
 }
 
 void ImageDrawer::draw_planes(const ImageTarget& target) const {
   const int width = setting_.camera.width_px, height = setting_.camera.height_px;
-  const std::size_t plane = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  if (target.depth_m) std::fill_n(target.depth_m, plane, std::numeric_limits<float>::infinity());
-  if (target.class_id) std::fill_n(target.class_id, plane, uint8_t{0});
-  if (target.instance_id) std::fill_n(target.instance_id, plane, uint16_t{0});
-  const int32_t world_begin = request_.scene->world_begin[static_cast<std::size_t>(request_.view->world)];
-  // Back to front, so that what is in front is written last.
-  for (auto i = order_.rbegin(); i != order_.rend(); ++i) {
-    const RasterItem& item = items_[static_cast<std::size_t>(*i)];
-    for (int32_t f = item.face_begin; f < item.face_end; ++f) {
-      const ScreenFace& face = faces_[static_cast<std::size_t>(f)];
-      for (int y = face.box.y_begin; y < face.box.y_end; ++y) {
-        for (int x = face.box.x_begin; x < face.box.x_end; ++x) {
-          const float x_px = static_cast<float>(x) + 0.5f, y_px = static_cast<float>(y) + 0.5f;
-          if (!covers_point(edges_.at(face.edge_begin), face.edge_count, x_px, y_px)) continue;
-          const std::size_t pixel =
-              static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
-          if (target.depth_m) target.depth_m[pixel] = face_depth_m(face, x_px, y_px);
-          if (target.class_id) {
-            target.class_id[pixel] = item.class_id;
-          }
-          if (target.instance_id) {
-            target.instance_id[pixel] = instance_of(item, world_begin);
-          }
-        }
+  std::vector<FrontFace> fronts(static_cast<std::size_t>(width));
+  auto offer = [&](int y, auto&& take) {
+    for (const ScreenFace& face : faces_) {
+      if (y < face.box.y_begin || y >= face.box.y_end) continue;
+      for (int x = face.box.x_begin; x < face.box.x_end; ++x) {
+        const Vec2 center{static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f};
+        if (!covers_point(edges_.at(face.edge_begin), face.edge_count, center.x, center.y)) continue;
+        take(fronts[static_cast<std::size_t>(x)], face, center);
       }
+    }
+  };
+  for (int y = 0; y < height; ++y) {
+    std::fill(fronts.begin(), fronts.end(), FrontFace{});
+    offer(y, [](FrontFace& front, const ScreenFace& face, Vec2 at) { front.offer(face, at); });
+    offer(y, [](FrontFace& front, const ScreenFace& face, Vec2 at) { front.offer_again(face, at); });
+    for (int x = 0; x < width; ++x) {
+      const Vec2 center{static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f};
+      const ScreenFace* face = fronts[static_cast<std::size_t>(x)].front(
+          center, [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
+      const std::size_t pixel =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+      if (target.depth_m) {
+        target.depth_m[pixel] = face ? face_depth_m(*face, center.x, center.y) : std::numeric_limits<float>::infinity();
+      }
+      if (target.class_id) target.class_id[pixel] = face ? face->class_id : uint8_t{0};
+      if (target.instance_id) target.instance_id[pixel] = face ? instance_of(*face) : uint16_t{0};
     }
   }
 }
 
 ImageDrawer::Coverage ImageDrawer::coverage_of(int32_t agent) {
-  const auto found = std::find_if(order_.begin(), order_.end(),
-                                  [&](int32_t i) { return items_[static_cast<std::size_t>(i)].agent == agent; });
+  const uint32_t number = thing_number(kAgentKind, agent - world_begin());
+  auto is_wanted = [number](const ScreenFace& face) { return face.number == number; };
+  const auto begin = std::find_if(faces_.begin(), faces_.end(), is_wanted);
+  const auto end = std::find_if_not(begin, faces_.end(), is_wanted);
+  const FaceRange wanted{static_cast<int32_t>(begin - faces_.begin()), static_cast<int32_t>(end - faces_.begin())};
+  int y_begin = setting_.camera.height_px, y_end = 0;
+  for (auto face = begin; face != end; ++face) {
+    y_begin = min_of(y_begin, face->box.y_begin);
+    y_end = max_of(y_end, face->box.y_end);
+  }
+  const int band_rows = max_of(1, kBandPixels / setting_.camera.width_px);
   Coverage sum;
-  if (found == order_.end()) return sum;
-  const RasterItem& wanted = items_[static_cast<std::size_t>(*found)];
-  const int width = setting_.camera.width_px;
-  const int band_rows = max_of(1, kBandPixels / width);
-  for (int y_begin = wanted.box.y_begin; y_begin < wanted.box.y_end; y_begin += band_rows) {
-    const int y_end = min_of(wanted.box.y_end, y_begin + band_rows);
-    auto weigh = [&](std::vector<int32_t>::const_iterator begin) {
+  for (; y_begin < y_end; y_begin += band_rows) {
+    const RowRange rows{y_begin, min_of(y_end, y_begin + band_rows)};
+    auto weigh = [&](FaceRange faces) {
       double weight = 0;
-      pixels_.assign(static_cast<std::size_t>((y_end - y_begin) * width), PixelState{});
-      for (auto i = begin; i <= found; ++i) {
-        const RasterItem& item = items_[static_cast<std::size_t>(*i)];
-        visit_pixels(item, y_begin, y_end, [&](int index, auto&& coverage, const ScreenFace& face) {
-          const float laid = composite(&pixels_[static_cast<std::size_t>(index)], coverage(), face.color);
-          if (&item == &wanted) weight += laid;
-        });
-      }
+      make_fragments(faces, rows);
+      lay_rows(
+          rows,
+          [&](int, const Fragment& fragment, float weighs) {
+            if (fragment.face >= wanted.begin && fragment.face < wanted.end) weight += static_cast<double>(weighs);
+          },
+          [](int, Rgb) {});
       return weight;
     };
-    sum.seen += weigh(order_.cbegin());
-    sum.alone += weigh(found);
+    sum.seen += weigh({0, static_cast<int32_t>(faces_.size())});
+    sum.alone += weigh(wanted);
   }
   return sum;
 }

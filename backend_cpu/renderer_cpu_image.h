@@ -1,5 +1,6 @@
-// Draws one image: gathers what a camera may see, orders it front to back, and composites it row by row. All rules are
-// the shared ones of common/raster*.h; here is only the traversal, and the memory that it reuses from image to image.
+// Draws one image: makes the faces of all that a camera may see, spreads them over the pixels as fragments, and lays
+// the fragments of each pixel front to back. All rules are the shared ones of common/raster*.h; here is only the
+// traversal, and the memory that it reuses from image to image.
 #pragma once
 
 #include <functional>
@@ -32,7 +33,7 @@ struct ImageTarget {
 /// An object serves one thread.
 class ImageDrawer {
  public:
-  /// Collects and orders what the image shows.
+  /// Makes the faces of what the image shows.
   void prepare(const ImageRequest& request);
   /// Draws what was prepared.
   void draw(const ImageTarget& target);
@@ -42,9 +43,9 @@ class ImageDrawer {
     double seen = 0, alone = 0;
   };
   Coverage coverage_of(int32_t agent);
-  /// Calls visit(y * width + x, coverage, colour) for what each face may cover of each pixel of the prepared image,
-  /// front to back: for measuring other ways to composite.
-  void visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit) const;
+  /// Calls visit(y * width + x, coverage, colour) for what each face covers of each pixel of the prepared image, front
+  /// to back up to what hides the rest: for measuring other ways to composite.
+  void visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit);
 
  private:
   class EdgePool {
@@ -61,42 +62,38 @@ class ImageDrawer {
     std::vector<PolygonEdge> edges_;
   };
 
-  // That an item of the foreground is drawn before another.
-  struct Hiding {
-    int32_t behind, weight;  // which other, and order_on_screen's weight
-    int32_t next;            // the next of what the item hides, or -1
+  // A fragment and the next of its pixel.
+  struct LinkedFragment {
+    Fragment fragment;
+    int32_t next;
+  };
+  class PixelList;
+
+  // The faces [begin, end), and rows [y_begin, y_end) of the image.
+  struct FaceRange {
+    int32_t begin, end;
+  };
+  struct RowRange {
+    int y_begin, y_end;
   };
 
-  struct PlacedBox {
-    PixelBox box;
-    int32_t place;  // in foreground_
-  };
-
-  // Adds a thing whose faces make_faces(emit) emits, unless none of them is in the image.
-  template <typename MakeFaces>
-  void add_item(const RasterItem& item, MakeFaces&& make_faces);
-  void gather();
-  void find_background();
-  void sort_items();
-  void find_hidings();
-  void sort_foreground();
-  template <typename Visit>
-  void visit_pixels(const RasterItem& item, int y_begin, int y_end, Visit&& visit) const;
+  // Takes the faces that a thing emits.
+  auto face_maker(FaceOwner owner);
+  void make_fragments(FaceRange faces, RowRange rows);
+  // Lays the fragments of all pixels of the rows: lay(pixel index, fragment, weight) for
+  // each, then finish(pixel index, color).
+  template <typename Lay, typename Finish>
+  void lay_rows(RowRange rows, Lay&& lay, Finish&& finish);
   void draw_planes(const ImageTarget& target) const;
+  bool stands(uint32_t solid, uint32_t strip) const;
+  int32_t world_begin() const { return request_.scene->world_begin[static_cast<std::size_t>(request_.view->world)]; }
 
   ImageRequest request_;
   ImageSetting setting_;
   EdgePool edges_;
   std::vector<ScreenFace> faces_;
-  std::vector<RasterItem> items_;
-  std::vector<int32_t> order_;       // items front to back
-  std::vector<int32_t> foreground_;  // items that need a pairwise order, nearest first
-  std::vector<PlacedBox> sweep_;     // [foreground]
-  std::vector<Hiding> hidings_;
-  std::vector<int32_t> first_hiding_;  // [foreground] the first in hidings_ of what an item hides, or -1
-  std::vector<int64_t> waiting_for_;   // [foreground] weight of what hides an item and is still to be drawn
-  std::vector<int32_t> ready_;         // of the foreground: what nothing hides that is still to be drawn
-  std::vector<PixelState> pixels_;
+  std::vector<int32_t> first_fragment_;  // [pixels of some rows] the head of each one's list
+  std::vector<LinkedFragment> fragments_;
 };
 
 }  // namespace pictura

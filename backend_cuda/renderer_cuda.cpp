@@ -18,52 +18,46 @@ std::string cuda_unavailable();
 namespace {
 
 constexpr int kMaxWorldAgents = 4096;
-// Most images fit into this; the rest are drawn with room for a whole map.
-constexpr int kSmallItems = 384, kSmallFaces = 640, kSmallEdges = 3072;
-constexpr int kSmallBlocksPerProcessor = 4, kLargeBlocks = 8;
+constexpr int kLargeBlocks = 8;
+// Fragments of one row of an image that the second launch has room for.
+constexpr int kLargeFragments = 1 << 18;
 
+// Owns what a launch's blocks work in.
 class ScratchBuffers {
  public:
   ScratchBuffers() = default;
-  ScratchBuffers(int blocks, int items, int faces, int edges)
-      : blocks_(blocks),
-        max_items_(items),
-        max_faces_(faces),
-        max_edges_(edges),
-        items_(count(blocks, items)),
-        faces_(count(blocks, faces)),
-        edges_(count(blocks, edges)),
-        order_(count(blocks, items)),
-        foreground_(count(blocks, items)),
-        waiting_(count(blocks, items)) {}
-  int max_items() const { return max_items_; }
-  cuda::Scratch view() const {
-    return {items_.data(),   faces_.data(), edges_.data(), order_.data(), foreground_.data(),
-            waiting_.data(), blocks_,       max_items_,    max_faces_,    max_edges_};
+  ScratchBuffers(const cuda::Scratch& sizes, std::size_t bytes_per_block)
+      : scratch_(sizes),
+        faces_(count(sizes.blocks, sizes.max_faces)),
+        edges_(count(sizes.blocks, sizes.max_edges)),
+        bytes_(static_cast<std::size_t>(sizes.blocks) * bytes_per_block) {
+    scratch_.faces = faces_.data();
+    scratch_.edges = edges_.data();
+    scratch_.bytes = bytes_.data();
   }
+  const cuda::Scratch& view() const { return scratch_; }
 
  private:
   static std::size_t count(int blocks, int each) {
     return static_cast<std::size_t>(blocks) * static_cast<std::size_t>(each);
   }
-  int blocks_ = 0, max_items_ = 0, max_faces_ = 0, max_edges_ = 0;
-  DeviceBuffer<RasterItem> items_;
+  cuda::Scratch scratch_;
   DeviceBuffer<ScreenFace> faces_;
   DeviceBuffer<PolygonEdge> edges_;
-  DeviceBuffer<int32_t> order_, foreground_;
-  DeviceBuffer<int64_t> waiting_;
+  DeviceBuffer<unsigned char> bytes_;
 };
 
 // A map's looks in device memory.
-struct DeviceGeometry {
+struct UploadedGeometry {
   DeviceBuffer<Strip> strips;
   DeviceBuffer<WallFace> walls;
   DeviceBuffer<LightHead> heads;
   DeviceBuffer<int32_t> strip_begin, strip_items, wall_begin, wall_items;
-  RasterGeometry view;
+  DeviceBuffer<cuda::Ball> strip_balls;
+  cuda::DeviceGeometry view;
 
-  explicit DeviceGeometry(const StaticGeometry& host)
-      : strips(host.view().strips), walls(host.view().walls), heads(host.view().heads), view(raster_geometry(host)) {
+  explicit UploadedGeometry(const StaticGeometry& host)
+      : strips(host.view().strips), walls(host.view().walls), heads(host.view().heads) {
     auto grid = [](const GridView& grid_on_host, DeviceBuffer<int32_t>* begin, DeviceBuffer<int32_t>* items) {
       *begin = DeviceBuffer<int32_t>(grid_on_host.begin);
       *items = DeviceBuffer<int32_t>(grid_on_host.items);
@@ -72,11 +66,17 @@ struct DeviceGeometry {
       on_device.items = items->span();
       return on_device;
     };
-    view.pieces.strips = strips.span();
-    view.pieces.walls = walls.span();
-    view.pieces.heads = heads.span();
-    view.pieces.strip_grid = grid(host.strip_grid.view(), &strip_begin, &strip_items);
-    view.pieces.wall_grid = grid(host.wall_grid.view(), &wall_begin, &wall_items);
+    view.raster = raster_geometry(host);
+    StaticGeometryView& pieces_on_device = view.raster.pieces;
+    pieces_on_device.strips = strips.span();
+    pieces_on_device.walls = walls.span();
+    pieces_on_device.heads = heads.span();
+    pieces_on_device.strip_grid = grid(host.strip_grid.view(), &strip_begin, &strip_items);
+    pieces_on_device.wall_grid = grid(host.wall_grid.view(), &wall_begin, &wall_items);
+    std::vector<cuda::Ball> balls;
+    for (const Strip& strip : host.strips) balls.push_back({strip_middle(strip), strip_radius_m(strip)});
+    strip_balls = DeviceBuffer<cuda::Ball>(Span<const cuda::Ball>(balls));
+    view.strip_balls = strip_balls.span();
   }
   int pieces() const { return static_cast<int>(strips.size() + walls.size() + heads.size()); }
 };
@@ -91,8 +91,9 @@ class CudaRenderer final : public Renderer {
     int device = 0, processors = 0;
     PICTURA_CUDA(cudaGetDevice(&device));
     PICTURA_CUDA(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device));
-    small_ = ScratchBuffers(kSmallBlocksPerProcessor * processors, kSmallItems, kSmallFaces, kSmallEdges);
-    overflow_count_ = DeviceBuffer<int32_t>(1);
+    PICTURA_CUDA(cuda::prepare_kernels());
+    small_ = ScratchBuffers(cuda::small_scratch(processors), 0);
+    counters_ = DeviceBuffer<int32_t>(2);
     fault_.host()->view = -1;
   }
   std::string_view name() const override { return "cuda"; }
@@ -104,9 +105,9 @@ class CudaRenderer final : public Renderer {
     // Frames in flight may read the table of geometries that is replaced here.
     PICTURA_CUDA(cudaDeviceSynchronize());
     geometries_.emplace_back(geometry);
-    std::vector<RasterGeometry> views;
-    for (const DeviceGeometry& each : geometries_) views.push_back(each.view);
-    geometry_views_ = DeviceBuffer<RasterGeometry>(Span<const RasterGeometry>(views));
+    std::vector<cuda::DeviceGeometry> views;
+    for (const UploadedGeometry& each : geometries_) views.push_back(each.view);
+    geometry_views_ = DeviceBuffer<cuda::DeviceGeometry>(Span<const cuda::DeviceGeometry>(views));
     most_pieces_ = std::max(most_pieces_, geometries_.back().pieces());
     most_heads_ = std::max(most_heads_, static_cast<int>(geometry.heads.size()));
     return static_cast<GeometryHandle>(geometries_.size()) - 1;
@@ -116,7 +117,10 @@ class CudaRenderer final : public Renderer {
     throw_fault();
     check_images(name(), config_.rig, space(), views.size(), images_out);
     const cuda::DrawTask task = draw_task(scene, views, &images_out);
-    cuda::launch_draw(task, small_.view(), large_.view(), static_cast<cudaStream_t>(stream.handle));
+    if (task.num_views * task.num_cameras == 0) return;
+    const auto on_stream = static_cast<cudaStream_t>(stream.handle);
+    PICTURA_CUDA(cudaMemsetAsync(counters_.data(), 0, counters_.size() * sizeof(int32_t), on_stream));
+    cuda::launch_draw(task, small_.view(), large_.view(), on_stream);
     PICTURA_CUDA(cudaGetLastError());
   }
 
@@ -157,7 +161,8 @@ class CudaRenderer final : public Renderer {
     task.line_floor_px = config_.line_floor_px;
     task.debug_palette = config_.debug_palette;
     task.fault = fault_.device();
-    task.overflow_count = overflow_count_.data();
+    task.next_image = counters_.data();
+    task.overflow_count = counters_.data() + 1;
     task.overflow_images = overflow_images_.data();
     const std::vector<PinholeCamera> cameras = pinhole_cameras(config_.rig);
     for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -167,6 +172,10 @@ class CudaRenderer final : public Renderer {
       task.cameras[i] = {cameras[i], out.data, out.view_stride, out.depth_m, out.class_id, out.instance_id};
     }
     task.as_float = images && images->format == PixelFormat::f32;
+    task.wants_planes =
+        images && std::any_of(images->cameras.begin(), images->cameras.end(), [](const CameraImages& camera) {
+          return camera.depth_m || camera.class_id || camera.instance_id;
+        });
     return task;
   }
 
@@ -174,12 +183,17 @@ class CudaRenderer final : public Renderer {
   void grow(const SceneBatch& scene, std::size_t images) {
     if (overflow_images_.size() < images) overflow_images_ = DeviceBuffer<int32_t>(images);
     const int agents = static_cast<int>(std::min<std::size_t>(scene.agents.size(), kMaxWorldAgents));
-    const int items = std::max(1, most_pieces_ + agents);
-    if (items <= large_.max_items()) return;
-    // Agents show up to three faces, everything else one; faces of four corners have at most nine edges when clipped.
-    const int faces = most_pieces_ + kMaxItemFaces * agents;
+    // Agents turn up to three faces to a camera, everything else one; faces of four corners have at most nine edges
+    // when clipped.
+    cuda::Scratch sizes;
+    sizes.blocks = kLargeBlocks;
+    sizes.max_faces = std::max(1, most_pieces_ + 3 * agents);
+    if (sizes.max_faces <= large_.view().max_faces) return;
+    sizes.max_edges = 9 * sizes.max_faces + kMaxPolygonCorners * most_heads_;
+    sizes.max_pieces = (most_pieces_ + 31) / 32 * 32;
+    sizes.max_fragments = kLargeFragments;
     large_ = ScratchBuffers();
-    large_ = ScratchBuffers(kLargeBlocks, items, faces, 9 * faces + kMaxPolygonCorners * most_heads_);
+    large_ = ScratchBuffers(sizes, cuda::block_bytes(sizes));
   }
 
   void throw_fault() {
@@ -197,11 +211,12 @@ class CudaRenderer final : public Renderer {
   }
 
   RendererConfig config_;
-  std::vector<DeviceGeometry> geometries_;
-  DeviceBuffer<RasterGeometry> geometry_views_;
+  std::vector<UploadedGeometry> geometries_;
+  DeviceBuffer<cuda::DeviceGeometry> geometry_views_;
   int most_pieces_ = 0, most_heads_ = 0;
   ScratchBuffers small_, large_;
-  DeviceBuffer<int32_t> overflow_count_, overflow_images_;
+  DeviceBuffer<int32_t> counters_;  // the next image of the first launch; those left to the second
+  DeviceBuffer<int32_t> overflow_images_;
   MappedValue<cuda::Fault> fault_;
 };
 

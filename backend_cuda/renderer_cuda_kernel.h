@@ -1,6 +1,5 @@
-// What the host tells the drawing kernels. A block draws one image at a time: it gathers what the camera may see into
-// its own scratch memory, orders it, and composites the pixels. Images that outgrow a block's scratch go to a second
-// launch of fewer blocks with room for everything.
+// What the host tells the drawing kernels. A block draws one image at a time. Most images fit into its shared memory;
+// those that do not are left to a second launch of fewer blocks, whose memory has room for all that a world can hold.
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -21,6 +20,18 @@ struct CameraSlot {
   uint16_t* instance_id = nullptr;
 };
 
+/// A strip's surroundings, for culling without a look at the strip itself.
+struct Ball {
+  Vec3 center_m;
+  float radius_m = 0;
+};
+
+/// A map's looks in device memory.
+struct DeviceGeometry {
+  RasterGeometry raster;
+  Span<const Ball> strip_balls;  // [strips]
+};
+
 /// What was wrong with a view: written by the kernels, thrown by the next call.
 struct Fault {
   int32_t view = -1;  // -1: none
@@ -28,32 +39,38 @@ struct Fault {
 };
 enum FaultKind : int32_t { kBadWorld = 1, kBadGeometry, kBadPose, kTooManyAgents, kBadQuery, kNoRoom };
 
-/// A block's memory, and how many things fit into it.
+/// Memory of the blocks of a launch, and how much each of them has.
 struct Scratch {
-  RasterItem* items = nullptr;  // [blocks][max_items], and so on
-  ScreenFace* faces = nullptr;
-  PolygonEdge* edges = nullptr;
-  int32_t* order = nullptr;       // [blocks][max_items] front to back
-  int32_t* foreground = nullptr;  // [blocks][max_items] nearest first
-  int64_t* waiting = nullptr;     // [blocks][max_items] of the foreground: weight of what is still in front
-  int32_t blocks = 0, max_items = 0, max_faces = 0, max_edges = 0;
+  ScreenFace* faces = nullptr;     // [blocks][max_faces]
+  PolygonEdge* edges = nullptr;    // [blocks][max_edges]
+  unsigned char* bytes = nullptr;  // of the second launch: [blocks][block_bytes()]
+  int32_t blocks = 0, max_faces = 0, max_edges = 0, max_pieces = 0, max_fragments = 0;
 };
 
 struct DrawTask {
   SceneBatch scene;  // in device memory, like all that follows
   const View* views = nullptr;
   int32_t num_views = 0, num_cameras = 0;
-  const RasterGeometry* geometries = nullptr;
+  const DeviceGeometry* geometries = nullptr;
   int32_t num_geometries = 0;
   int32_t max_world_agents = 0;
   float line_floor_px = 0;
   bool debug_palette = false;
   bool as_float = false;  // else bytes
+  bool wants_planes = false;
   Fault* fault = nullptr;
+  int32_t* next_image = nullptr;       // of the first launch; 0 before it
   int32_t* overflow_count = nullptr;   // images left to the second launch; 0 before the first
   int32_t* overflow_images = nullptr;  // [images]
   CameraSlot cameras[kMaxCameras];
 };
+
+/// What the blocks of the first launch have room for, and how many of them a device of so many processors runs at once.
+Scratch small_scratch(int processors);
+/// What is to be done once before the first launch.
+cudaError_t prepare_kernels();
+/// Bytes that a block of the second launch needs besides faces and edges.
+std::size_t block_bytes(const Scratch& large);
 
 /// Draws all images; both launches.
 void launch_draw(const DrawTask& task, const Scratch& small, const Scratch& large, cudaStream_t stream);

@@ -51,9 +51,8 @@ void ImageFaces::gather(const ImageSetting& setting, const RasterGeometry& geome
   visit_lights(setting, geometry, scene, view, [&](const LightHead& head, LightState state, int32_t) {
     light_faces(head, state, setting.camera, emit);
   });
-  visit_strips(setting, geometry, [&](const Strip& strip, int32_t index) {
-    strips_.push_back({rank_of(strip, static_cast<uint32_t>(index)), &strip});
-  });
+  visit_strips(setting, geometry,
+               [&](const Strip& strip, int32_t index) { strips_.push_back({strip_number(strip, index), &strip}); });
   std::sort(strips_.begin(), strips_.end(), [](const RankedStrip& a, const RankedStrip& b) { return a.rank < b.rank; });
   const float step = std::min(kPushStep, kMostPush / static_cast<float>(strips_.size() + 1));
   float push = 1.0f;

@@ -33,3 +33,16 @@ using std::uint64_t;
 using std::uint8_t;
 }  // namespace pictura
 #endif
+
+namespace pictura {
+
+/// Number of bits that are set.
+PICTURA_HD inline int count_bits(uint64_t bits) {
+#if defined(__CUDA_ARCH__)
+  return __popcll(bits);
+#else
+  return __builtin_popcountll(bits);
+#endif
+}
+
+}  // namespace pictura

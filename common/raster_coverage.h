@@ -77,7 +77,7 @@ PICTURA_HD inline Vec2 project(const PinholeCamera& camera, Vec3 p) {
 /// signs of a and b: two faces that share an edge split areas and samples between them exactly.
 struct PolygonEdge {
   float x0 = 0, y0 = 0;  // the upper end
-  float x1 = 0, y1 = 0;  // the lower end
+  float y1 = 0;          // the lower end's y
   float dx_dy = 0;       // 0 for level edges, which bound no area
   float dy_dx = 0;       // 0 for upright edges
   float a = 0, b = 0;    // inside: a * (x - x0) + b * (y - y0) >= 0
@@ -93,7 +93,6 @@ PICTURA_HD inline PolygonEdge make_edge(Vec2 from, Vec2 to) {
   PolygonEdge edge;
   edge.x0 = upper.x;
   edge.y0 = upper.y;
-  edge.x1 = lower.x;
   edge.y1 = lower.y;
   edge.dx_dy = dy > 0.0f ? dx / dy : 0.0f;
   edge.dy_dx = fabsf(dx) >= kUpright_px ? dy / dx : 0.0f;
@@ -102,16 +101,6 @@ PICTURA_HD inline PolygonEdge make_edge(Vec2 from, Vec2 to) {
   return edge;
 }
 
-/// The ends of an edge in the order in which a face is walked that has its inside to the right on screen.
-PICTURA_HD inline bool runs_downward(const PolygonEdge& edge) {
-  return edge.a < 0.0f || (edge.a == 0.0f && edge.b > 0.0f);
-}
-PICTURA_HD inline Vec2 edge_from(const PolygonEdge& edge) {
-  return runs_downward(edge) ? Vec2{edge.x0, edge.y0} : Vec2{edge.x1, edge.y1};
-}
-PICTURA_HD inline Vec2 edge_to(const PolygonEdge& edge) {
-  return runs_downward(edge) ? Vec2{edge.x1, edge.y1} : Vec2{edge.x0, edge.y0};
-}
 /// Distance of a point from an edge, positive inside, in multiples of the edge's length.
 PICTURA_HD inline float inner_distance(const PolygonEdge& edge, Vec2 p) {
   return edge.a * (p.x - edge.x0) + edge.b * (p.y - edge.y0);
@@ -122,14 +111,6 @@ struct PixelBox {
   int32_t x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;
 };
 
-PICTURA_HD constexpr bool overlap(const PixelBox& a, const PixelBox& b) {
-  return a.x_begin < b.x_end && b.x_begin < a.x_end && a.y_begin < b.y_end && b.y_begin < a.y_end;
-}
-PICTURA_HD constexpr PixelBox united(const PixelBox& a, const PixelBox& b) {
-  return {min_of(a.x_begin, b.x_begin), max_of(a.x_end, b.x_end), min_of(a.y_begin, b.y_begin),
-          max_of(a.y_end, b.y_end)};
-}
-
 /// A convex polygon on screen, without its edges, which stand in a pool.
 struct ScreenFace {
   int32_t edge_begin = 0, edge_count = 0;
@@ -139,6 +120,8 @@ struct ScreenFace {
   float inverse_depth_x = 0, inverse_depth_y = 0, inverse_depth_0 = 0;
   float inverse_depth_low = 0, inverse_depth_high = 0;
   float plane_distance_m = 0;  // from the camera to the face's plane
+  uint32_t number = 0;         // of the thing that it belongs to, see raster_order.h
+  uint8_t class_id = 0;        // of the class plane
 };
 
 /// Projects a clipped face (camera coordinates), which lies in `plane`. Writes its edges to edges_out (room for
@@ -319,13 +302,6 @@ PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const Pi
   span.full_begin = min_of(max_of(first_at_or_after(full_low + kLeeway_px), span.begin), span.end);
   span.full_end = min_of(max_of(first_after(full_high - kLeeway_px), span.full_begin), span.end);
   return span;
-}
-
-PICTURA_HD inline int count_bits(uint64_t bits) {
-  bits = bits - ((bits >> 1) & 0x5555555555555555ull);
-  bits = (bits & 0x3333333333333333ull) + ((bits >> 2) & 0x3333333333333333ull);
-  bits = (bits + (bits >> 4)) & 0x0F0F0F0F0F0F0F0Full;
-  return static_cast<int>((bits * 0x0101010101010101ull) >> 56);
 }
 
 /// A pixel while faces are laid over it front to back.

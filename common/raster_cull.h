@@ -16,6 +16,8 @@ struct RasterGeometry {
 
 PICTURA_HD inline float far_of(float longest_piece_m) { return kVisibleRange_m + longest_piece_m; }
 
+PICTURA_HD inline Vec3 strip_middle(const Strip& strip) { return (strip.a_m + strip.b_m) * 0.5f; }
+
 /// Half of a strip's greatest extent: length, mitres and width.
 PICTURA_HD inline float strip_radius_m(const Strip& strip) {
   const float side = max_of(length(strip.side_a), length(strip.side_b));
@@ -28,7 +30,7 @@ PICTURA_HD inline float wall_radius_m(const WallFace& wall) {
 
 PICTURA_HD inline bool may_show(const Strip& strip, const PinholeCamera& camera, const Frustum& f, float far_m) {
   // The floor on its width may widen a strip by less than the guard band, which the frustum includes.
-  return ball_in_frustum(f, to_camera(camera, (strip.a_m + strip.b_m) * 0.5f), strip_radius_m(strip), far_m);
+  return ball_in_frustum(f, to_camera(camera, strip_middle(strip)), strip_radius_m(strip), far_m);
 }
 
 PICTURA_HD inline bool may_show(const WallFace& wall, const PinholeCamera& camera, const Frustum& f, float far_m) {

@@ -1,6 +1,7 @@
-// Which of two things is in front. Of two convex things that do not intersect, one is on the camera's side of a plane
-// that separates them, and so is nearer wherever both are seen: the middle of what their faces share on screen decides.
-// Shared by both devices.
+// Which of two faces is in front where both cover a pixel, and how the fragments of a pixel are laid over each other,
+// front to back. The order is found in each pixel anew, at the middle of what two fragments share of its samples: there
+// the nearer plane is in front, whatever cycles, slopes and intersections make of an order of whole things. Shared by
+// both devices.
 #pragma once
 
 #include "pictura/common/raster_coverage.h"
@@ -8,114 +9,90 @@
 
 namespace pictura {
 
-/// What a thing covers of the ground, relative to the camera: corners with the heights of its lower end.
+// Numbers of things are unique within an image: kind, then index. Those of strips ascend with their rank.
+constexpr int kKindShift = 30, kRankShift = 28;
+constexpr uint32_t kAgentKind = 0, kWallKind = 1, kLightKind = 2, kStripKind = 3;
+constexpr uint32_t kIndexMask = (1u << kRankShift) - 1;
+
+PICTURA_HD constexpr uint32_t thing_number(uint32_t kind, int32_t index) {
+  return (kind << kKindShift) | static_cast<uint32_t>(index);
+}
+/// index: the strip's place among the geometry's strips.
+PICTURA_HD inline uint32_t strip_number(const Strip& strip, int32_t index) {
+  return (kStripKind << kKindShift) | (static_cast<uint32_t>(strip_rank(strip.kind)) << kRankShift) |
+         static_cast<uint32_t>(index);
+}
+PICTURA_HD constexpr uint32_t kind_of(uint32_t number) { return number >> kKindShift; }
+PICTURA_HD constexpr int32_t index_of(uint32_t number) { return static_cast<int32_t>(number & kIndexMask); }
+PICTURA_HD constexpr bool is_strip(const ScreenFace& face) { return kind_of(face.number) == kStripKind; }
+
+/// What a thing covers of the ground: corners with the heights of its lower end.
 struct Extent {
-  Vec2 corner[4];
-  float low_m[4] = {};
+  Vec3 corner[4];
   int32_t corners = 0;
-  bool is_strip = false;
-  uint32_t rank = 0;  // of strips: the lower is painted over the higher where they overlap on one level
 };
 
-PICTURA_HD inline Extent agent_extent(const AgentBox& box, Vec3 eye_m) {
-  const Vec2 ahead{box.cos_heading, box.sin_heading};
-  const Vec2 along = ahead * (0.5f * box.length_m), across = left_normal(ahead) * (0.5f * box.width_m);
-  const Vec3 center = box.center_m - eye_m;
+PICTURA_HD inline Extent extent_of(const AgentBox& box) {
   Extent extent;
   extent.corners = 4;
-  extent.corner[0] = center.xy() + along + across;
-  extent.corner[1] = center.xy() - along + across;
-  extent.corner[2] = center.xy() - along - across;
-  extent.corner[3] = center.xy() + along - across;
-  for (float& low : extent.low_m) low = center.z;
+  cuboid_face_corners(box, kUnderside, extent.corner);
   return extent;
 }
-
-PICTURA_HD inline Extent wall_extent(const WallFace& wall, Vec3 eye_m) {
+PICTURA_HD inline Extent extent_of(const WallFace& wall) {
   Extent extent;
   extent.corners = 2;
-  extent.corner[0] = wall.a_m.xy() - eye_m.xy();
-  extent.corner[1] = wall.b_m.xy() - eye_m.xy();
-  extent.low_m[0] = wall.a_m.z - eye_m.z;
-  extent.low_m[1] = wall.b_m.z - eye_m.z;
+  extent.corner[0] = wall.a_m;
+  extent.corner[1] = wall.b_m;
   return extent;
 }
-
-PICTURA_HD inline Extent light_extent(const LightHead& head, Vec3 eye_m) {
+PICTURA_HD inline Extent extent_of(const LightHead& head) {
   const Vec2 left = left_normal(head.facing) * kLightRadius_m;
-  const Vec3 center = head.position_m - eye_m;
+  const Vec3 lowest = head.position_m - Vec3{0.0f, 0.0f, kLightRadius_m};
   Extent extent;
   extent.corners = 2;
-  extent.corner[0] = center.xy() + left;
-  extent.corner[1] = center.xy() - left;
-  extent.low_m[0] = extent.low_m[1] = center.z - kLightRadius_m;
+  extent.corner[0] = lowest + Vec3{left.x, left.y, 0.0f};
+  extent.corner[1] = lowest - Vec3{left.x, left.y, 0.0f};
   return extent;
 }
-
-/// Ranks strips by kind, then by index.
-PICTURA_HD inline uint32_t rank_of(const Strip& strip, uint32_t index) {
-  return (static_cast<uint32_t>(strip_rank(strip.kind)) << 28) | index;
-}
-
-PICTURA_HD inline Extent strip_extent(const Strip& strip, uint32_t index, Vec3 eye_m) {
-  Vec3 corners[4];
-  strip_corners(strip, corners);
+PICTURA_HD inline Extent extent_of(const Strip& strip) {
   Extent extent;
   extent.corners = 4;
-  extent.is_strip = true;
-  extent.rank = rank_of(strip, index);
-  for (int i = 0; i < 4; ++i) {
-    extent.corner[i] = corners[i].xy() - eye_m.xy();
-    extent.low_m[i] = corners[i].z - eye_m.z;
-  }
+  strip_corners(strip, extent.corner);
   return extent;
 }
 
-/// Square of the distance on the ground from the camera to the nearest point of an extent; 0 above or inside it.
-PICTURA_HD inline float nearest_distance2(const Extent& e) {
-  float nearest = 1e30f;
-  int left_of = 0, right_of = 0;
-  for (int i = 0; i < e.corners; ++i) {
-    const Vec2 a = e.corner[i], b = e.corner[i + 1 < e.corners ? i + 1 : 0], ab = b - a;
-    const float length2 = dot(ab, ab);
-    const float t = length2 > 0.0f ? clamp(-dot(a, ab) / length2, 0.0f, 1.0f) : 0.0f;
-    const Vec2 p = a + ab * t;
-    nearest = min_of(nearest, dot(p, p));
-    const float side = cross(a, b);
-    left_of += side >= 0.0f;
-    right_of += side <= 0.0f;
+/// The extent of a thing of an image, by its number.
+PICTURA_HD inline Extent extent_of(uint32_t number, const StaticGeometryView& pieces, const SceneBatch& scene,
+                                   int32_t world_begin) {
+  const int32_t index = index_of(number);
+  switch (kind_of(number)) {
+    case kAgentKind: return extent_of(scene.agents[static_cast<size_t>(world_begin + index)]);
+    case kWallKind: return extent_of(pieces.walls[static_cast<size_t>(index)]);
+    case kLightKind: return extent_of(pieces.heads[static_cast<size_t>(index)]);
+    default: return extent_of(pieces.strips[static_cast<size_t>(index)]);
   }
-  return e.corners > 2 && (left_of == e.corners || right_of == e.corners) ? 0.0f : nearest;
-}
-
-struct Interval {
-  float low = 1e30f, high = -1e30f;
-};
-
-/// Heights of an extent's lower end above the camera.
-PICTURA_HD inline Interval heights_of(const Extent& e) {
-  Interval heights;
-  for (int i = 0; i < e.corners; ++i) {
-    heights.low = min_of(heights.low, e.low_m[i]);
-    heights.high = max_of(heights.high, e.low_m[i]);
-  }
-  return heights;
 }
 
 /// Whether two extents overlap on the ground plane: no side of either separates them. Touching is no overlap.
 PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
   constexpr float kTouching_m = 1e-3f;
-  auto project = [](const Extent& e, Vec2 axis) {
+  struct Interval {
+    float low = 1e30f, high = -1e30f;
+  };
+  // Relative to a point near by, for precision.
+  const Vec2 origin = a.corner[0].xy();
+  auto project = [&](const Extent& e, Vec2 axis) {
     Interval interval;
     for (int i = 0; i < e.corners; ++i) {
-      interval.low = min_of(interval.low, dot(axis, e.corner[i]));
-      interval.high = max_of(interval.high, dot(axis, e.corner[i]));
+      const float at = dot(axis, e.corner[i].xy() - origin);
+      interval.low = min_of(interval.low, at);
+      interval.high = max_of(interval.high, at);
     }
     return interval;
   };
   auto separated_by_side_of = [&](const Extent& e) {
     for (int i = 0; i < e.corners; ++i) {
-      const Vec2 side = e.corner[i + 1 < e.corners ? i + 1 : 0] - e.corner[i];
+      const Vec2 side = e.corner[i + 1 < e.corners ? i + 1 : 0].xy() - e.corner[i].xy();
       const float norm = length(side);
       if (norm < 1e-6f) continue;
       const Vec2 axis = left_normal(side) * (1.0f / norm);
@@ -129,68 +106,11 @@ PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
 
 /// Whether a solid stands on a strip, which then lies behind it (see kStanding_m).
 PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip) {
-  auto corner = [](const Extent& e, int i) { return Vec3{e.corner[i].x, e.corner[i].y, e.low_m[i]}; };
-  Vec3 middle{};
-  for (int i = 0; i < solid.corners; ++i) middle = middle + corner(solid, i);
-  middle = middle * (1.0f / static_cast<float>(solid.corners));
-  const Vec3 normal = cross(corner(strip, 2) - corner(strip, 0), corner(strip, 3) - corner(strip, 1));
-  const float above_m = dot(normal, middle - corner(strip, 0));
-  return fabsf(above_m) <= kStanding_m * fabsf(normal.z) && overlap_on_ground(solid, strip);
-}
-
-/// What two faces share on screen.
-struct SharedRegion {
-  float area_px2 = 0;
-  Vec2 middle_px;  // mean of its corners
-};
-
-/// Whether some edge of a face has all of another on its outer side.
-PICTURA_HD inline bool is_outside(const PolygonEdge* edges, int count, const PolygonEdge* borders, int num_borders) {
-  for (int j = 0; j < num_borders; ++j) {
-    bool outside = true;
-    for (int i = 0; i < count && outside; ++i) outside = inner_distance(borders[j], edge_from(edges[i])) <= 0.0f;
-    if (outside) return true;
-  }
-  return false;
-}
-
-/// The border of the intersection of two convex faces consists of the parts of each one's edges that lie within the
-/// other: their ends give its middle, and Green's theorem its area. Where edges coincide they count twice.
-PICTURA_HD inline SharedRegion shared_region(const ScreenFace& a, const ScreenFace& b, const PolygonEdge* edges) {
-  const PolygonEdge *of_a = edges + a.edge_begin, *of_b = edges + b.edge_begin;
-  SharedRegion region;
-  if (is_outside(of_a, a.edge_count, of_b, b.edge_count) || is_outside(of_b, b.edge_count, of_a, a.edge_count)) {
-    return region;
-  }
-  const Vec2 origin = edge_from(of_a[0]);  // near by, for precision
-  Vec2 sum{};
-  float twice_area = 0.0f;
-  int corners = 0;
-  auto add_parts = [&](const PolygonEdge* parts, int num_parts, const PolygonEdge* borders, int num_borders) {
-    for (int i = 0; i < num_parts; ++i) {
-      const Vec2 from = edge_from(parts[i]), to = edge_to(parts[i]);
-      float begin = 0.0f, end = 1.0f;
-      for (int j = 0; j < num_borders && begin < end; ++j) {
-        const float at_from = inner_distance(borders[j], from), at_to = inner_distance(borders[j], to);
-        if (at_from < 0.0f && at_to < 0.0f) end = 0.0f;
-        if (at_from < 0.0f)
-          begin = max_of(begin, at_from / (at_from - at_to));
-        else if (at_to < 0.0f)
-          end = min_of(end, at_from / (at_from - at_to));
-      }
-      if (begin >= end) continue;
-      const Vec2 p = from + (to - from) * begin - origin, q = from + (to - from) * end - origin;
-      sum = sum + p + q;
-      twice_area += cross(p, q);
-      corners += 2;
-    }
-  };
-  add_parts(of_a, a.edge_count, of_b, b.edge_count);
-  add_parts(of_b, b.edge_count, of_a, a.edge_count);
-  if (corners == 0) return region;
-  region.area_px2 = 0.5f * twice_area;
-  region.middle_px = origin + sum * (1.0f / static_cast<float>(corners));
-  return region;
+  Vec3 sum{};
+  for (int i = 0; i < solid.corners; ++i) sum = sum + (solid.corner[i] - strip.corner[0]);
+  const Vec3 middle = sum * (1.0f / static_cast<float>(solid.corners));
+  const Vec3 normal = cross(strip.corner[2] - strip.corner[0], strip.corner[3] - strip.corner[1]);
+  return fabsf(dot(normal, middle)) <= kStanding_m * fabsf(normal.z) && overlap_on_ground(solid, strip);
 }
 
 /// Whether two strips are of one level where a ray meets them: the nearer point is close to the other's plane. Takes
@@ -201,13 +121,105 @@ PICTURA_HD inline bool of_one_level(float inverse_a, float distance_a_m, float i
   return gap_m < kSameLevel_m * nearer;
 }
 
-/// Key of the order in which the pairwise test takes things: nearest first, then by number.
-struct OrderKey {
-  float distance2 = 0;
-  uint32_t number = 0;
+/// Whether face a is in front of face b at a point of the screen that both cover. `stands(solid, strip)` says, by their
+/// numbers, whether a solid stands on a strip.
+template <typename Stands>
+PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec2 at_px, Stands&& stands) {
+  const float depth_a = inverse_depth(a, at_px), depth_b = inverse_depth(b, at_px);
+  const bool strip_a = is_strip(a), strip_b = is_strip(b);
+  if (strip_a && strip_b && of_one_level(depth_a, a.plane_distance_m, depth_b, b.plane_distance_m)) {
+    return a.number < b.number;
+  }
+  // Beyond the horizon a plane is infinitely far.
+  const float nearness_a = max_of(depth_a, 0.0f), nearness_b = max_of(depth_b, 0.0f);
+  const bool first = nearness_a != nearness_b ? nearness_a > nearness_b : a.number < b.number;
+  if (strip_a == strip_b || first != strip_a) return first;
+  // A strip before a solid that stands on it: the solid dips into the road.
+  return stands(strip_a ? b.number : a.number, strip_a ? a.number : b.number) ? !first : first;
+}
+
+/// Middle of some samples, from the pixel's corner; of none, the pixel's middle.
+PICTURA_HD inline Vec2 middle_of(uint64_t samples) {
+  const int count = count_bits(samples);
+  if (count == 0) return {0.5f, 0.5f};
+  // Sums over the samples of the bits of their column and row.
+  const int column_0 = count_bits(samples & 0xFF00FF00FF00FF00ull),
+            column_1 = count_bits(samples & 0xFFFF0000FFFF0000ull),
+            column_2 = count_bits(samples & 0xFFFFFFFF00000000ull);
+  const int rows = count_bits(samples & 0xAAAAAAAAAAAAAAAAull) + 2 * count_bits(samples & 0xCCCCCCCCCCCCCCCCull) +
+                   4 * count_bits(samples & 0xF0F0F0F0F0F0F0F0ull);
+  const int columns = column_0 + 2 * column_1 + 4 * column_2;
+  const int offsets = 4 * column_0 + 2 * column_1 + column_2;  // in eighths of a row, see sample_column_offset
+  const float n = static_cast<float>(count);
+  return {(static_cast<float>(columns) + 0.5f * n) / (8.0f * n),
+          (static_cast<float>(rows) + (static_cast<float>(offsets) + 0.5f * n) / 8.0f) / (8.0f * n)};
+}
+
+/// What a face covers of one pixel.
+struct Fragment {
+  PixelCoverage coverage;
+  float nearness = 0;  // inverse depth of the face in the middle of its samples
+  int32_t face = 0;
 };
-PICTURA_HD constexpr bool operator<(const OrderKey& a, const OrderKey& b) {
-  return a.distance2 < b.distance2 || (a.distance2 == b.distance2 && a.number < b.number);
+
+PICTURA_HD inline Fragment make_fragment(const ScreenFace& face, int32_t face_index, const PixelCoverage& coverage,
+                                         int x, int y) {
+  const Vec2 middle = Vec2{static_cast<float>(x), static_cast<float>(y)} + middle_of(coverage.samples);
+  return {coverage, max_of(inverse_depth(face, middle), 0.0f), face_index};
+}
+
+/// Lays the fragments of pixel (x, y) over each other, front to back. `list` holds them in any order: begin() is a
+/// first place, next(place) the one after it, kEnd none; at(place) a Fragment; remove(place, before) takes out a place,
+/// given the one before it. `lay(fragment, weight)` hears what each weighs in the pixel's colour. Next comes the
+/// nearest or, where something that is left is in front of that, the nearest of what is in front of it, and so on; in a
+/// cycle, the nearest after all.
+template <typename List, typename Stands, typename Lay>
+PICTURA_HD inline PixelState lay_fragments(List& list, const ScreenFace* faces, int x, int y, Stands&& stands,
+                                           Lay&& lay) {
+  const Vec2 corner{static_cast<float>(x), static_cast<float>(y)};
+  auto is_nearer = [&](const Fragment& a, const Fragment& b) {
+    if (a.nearness != b.nearness) return a.nearness > b.nearness;
+    const uint32_t number_a = faces[a.face].number, number_b = faces[b.face].number;
+    return number_a != number_b ? number_a < number_b : a.face < b.face;
+  };
+  struct Found {
+    int place = List::kEnd, before = List::kEnd;
+    Fragment fragment;
+  };
+  // The nearest of the fragments that `wanted` accepts.
+  auto find_nearest = [&](auto&& wanted) {
+    Found nearest;
+    for (int i = list.begin(), before = List::kEnd; i != List::kEnd; before = i, i = list.next(i)) {
+      const Fragment candidate = list.at(i);
+      if (nearest.place != List::kEnd && !is_nearer(candidate, nearest.fragment)) continue;
+      if (wanted(candidate)) nearest = {i, before, candidate};
+    }
+    return nearest;
+  };
+  PixelState pixel;
+  while (pixel.free_area > 0.0f && list.begin() != List::kEnd) {
+    const Found nearest = find_nearest([](const Fragment&) { return true; });
+    Found front = nearest;
+    constexpr int kMostInFront = 16;  // of what lies in front of each other in one pixel; more is a cycle
+    for (int step = 0; list.next(list.begin()) != List::kEnd; ++step) {
+      const Found hiding = find_nearest([&](const Fragment& other) {
+        // What touches no sample counts as being wherever the other is.
+        const uint64_t own = front.fragment.coverage.samples;
+        const uint64_t shared = own ? own & other.coverage.samples : other.coverage.samples;
+        if (shared == 0 || other.face == front.fragment.face) return false;
+        return is_in_front(faces[other.face], faces[front.fragment.face], corner + middle_of(shared), stands);
+      });
+      if (hiding.place == List::kEnd) break;
+      front = hiding;
+      if (step == kMostInFront) {
+        front = nearest;
+        break;
+      }
+    }
+    lay(front.fragment, composite(&pixel, front.fragment.coverage, faces[front.fragment.face].color));
+    list.remove(front.place, front.before);
+  }
+  return pixel;
 }
 
 }  // namespace pictura

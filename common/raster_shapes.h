@@ -43,35 +43,72 @@ PICTURA_HD inline Rgb agent_face_color(const AgentBox& box, BoxFace face, bool d
   return {0.5f * (color.r + tint), 0.5f * (color.g + tint), 0.5f * (color.b + tint)};
 }
 
-/// Calls emit(corners, count, plane, color) for each face of the box that is turned to the camera. The underside, seen
-/// from roads below a bridge, has the top's colour.
-template <typename Emit>
-PICTURA_HD inline void agent_faces(const AgentBox& box, const PinholeCamera& camera, bool debug_palette, Emit&& emit) {
+/// Faces that a cuboid may turn to a camera: those of BoxFace, and the underside, which roads below a bridge see and
+/// which has the top's colour.
+constexpr int kUnderside = kNumBoxFaces, kNumCuboidFaces = kNumBoxFaces + 1;
+
+/// Whether a camera at eye_m is on the outer side of a face of a box.
+PICTURA_HD inline bool faces_eye(const AgentBox& box, int face, Vec3 eye_m) {
+  const Vec2 ahead{box.cos_heading, box.sin_heading};
+  const Vec2 from_center = eye_m.xy() - box.center_m.xy();
+  const float ahead_m = dot(from_center, ahead), left_m = cross(ahead, from_center);
+  switch (face) {
+    case static_cast<int>(BoxFace::front): return ahead_m > 0.5f * box.length_m;
+    case static_cast<int>(BoxFace::back): return ahead_m < -0.5f * box.length_m;
+    case static_cast<int>(BoxFace::left): return left_m > 0.5f * box.width_m;
+    case static_cast<int>(BoxFace::right): return left_m < -0.5f * box.width_m;
+    case static_cast<int>(BoxFace::top): return eye_m.z > box.center_m.z + box.height_m;
+    default: return eye_m.z < box.center_m.z;
+  }
+}
+
+/// The four corners of a face of a box, in the world. Corners 0 to 3 of the box are front left, rear left, rear right
+/// and front right on the ground, 4 to 7 the same on the roof.
+PICTURA_HD inline void cuboid_face_corners(const AgentBox& box, int face, Vec3* corners_out) {
   const Vec2 ahead{box.cos_heading, box.sin_heading};
   const Vec2 along = ahead * (0.5f * box.length_m), across = left_normal(ahead) * (0.5f * box.width_m);
   const Vec2 center = box.center_m.xy();
-  // Corners front-left, rear-left, rear-right, front-right: on the ground, then on the roof.
-  const Vec2 ground[4] = {center + along + across, center - along + across, center - along - across,
-                          center + along - across};
-  Vec3 corner[8];
-  for (int i = 0; i < 4; ++i) {
-    corner[i] = to_camera(camera, {ground[i].x, ground[i].y, box.center_m.z});
-    corner[i + 4] = to_camera(camera, {ground[i].x, ground[i].y, box.center_m.z + box.height_m});
-  }
-  auto face = [&](BoxFace name, int a, int b, int c, int d) {
-    const Vec3 corners[4] = {corner[a], corner[b], corner[c], corner[d]};
-    const float brightness = face_brightness(corners, 4);
-    if (brightness > 0.0f)
-      emit(corners, 4, face_plane(corners, 4), agent_face_color(box, name, debug_palette) * brightness);
+  auto corner = [&](int i) {
+    const Vec2 at_end = (i & 3) == 0 || (i & 3) == 3 ? center + along : center - along;
+    const Vec2 ground = (i & 3) < 2 ? at_end + across : at_end - across;
+    return Vec3{ground.x, ground.y, i < 4 ? box.center_m.z : box.center_m.z + box.height_m};
   };
-  const Vec2 from_center = camera.position_m.xy() - center;
-  const float ahead_m = dot(from_center, ahead), left_m = cross(ahead, from_center);
-  if (ahead_m > 0.5f * box.length_m) face(BoxFace::front, 3, 0, 4, 7);
-  if (ahead_m < -0.5f * box.length_m) face(BoxFace::back, 1, 2, 6, 5);
-  if (left_m > 0.5f * box.width_m) face(BoxFace::left, 0, 1, 5, 4);
-  if (left_m < -0.5f * box.width_m) face(BoxFace::right, 2, 3, 7, 6);
-  if (camera.position_m.z > box.center_m.z + box.height_m) face(BoxFace::top, 4, 5, 6, 7);
-  if (camera.position_m.z < box.center_m.z) face(BoxFace::top, 3, 2, 1, 0);
+  auto set = [&](int a, int b, int c, int d) {
+    corners_out[0] = corner(a);
+    corners_out[1] = corner(b);
+    corners_out[2] = corner(c);
+    corners_out[3] = corner(d);
+  };
+  switch (face) {
+    case static_cast<int>(BoxFace::front): return set(3, 0, 4, 7);
+    case static_cast<int>(BoxFace::back): return set(1, 2, 6, 5);
+    case static_cast<int>(BoxFace::left): return set(0, 1, 5, 4);
+    case static_cast<int>(BoxFace::right): return set(2, 3, 7, 6);
+    case static_cast<int>(BoxFace::top): return set(4, 5, 6, 7);
+    default: return set(3, 2, 1, 0);
+  }
+}
+
+/// Calls emit(corners, count, plane, color) for one face of a box, in camera coordinates.
+template <typename Emit>
+PICTURA_HD inline void cuboid_face(const AgentBox& box, int face, const PinholeCamera& camera, bool debug_palette,
+                                   Emit&& emit) {
+  Vec3 corners[4];
+  cuboid_face_corners(box, face, corners);
+  for (int i = 0; i < 4; ++i) corners[i] = to_camera(camera, corners[i]);
+  const float brightness = face_brightness(corners, 4);
+  const BoxFace painted = face == kUnderside ? BoxFace::top : static_cast<BoxFace>(face);
+  if (brightness > 0.0f) {
+    emit(corners, 4, face_plane(corners, 4), agent_face_color(box, painted, debug_palette) * brightness);
+  }
+}
+
+/// ... for each face that is turned to the camera.
+template <typename Emit>
+PICTURA_HD inline void agent_faces(const AgentBox& box, const PinholeCamera& camera, bool debug_palette, Emit&& emit) {
+  for (int face = 0; face < kNumCuboidFaces; ++face) {
+    if (faces_eye(box, face, camera.position_m)) cuboid_face(box, face, camera, debug_palette, emit);
+  }
 }
 
 /// The wall's face; seen from both sides.

@@ -1,5 +1,7 @@
-// The shared order rules against brute force: what faces share on screen, and which of two things is in front.
+// The shared order rules against brute force: which of two faces is in front, and in which order a pixel's fragments
+// are laid over each other.
 #include <algorithm>
+#include <bit>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -11,37 +13,72 @@
 namespace pictura {
 namespace {
 
+using Extents = std::vector<std::pair<uint32_t, Extent>>;
+
 // Things as a camera at eye_m that looks along x sees them, and their order.
 class Sight {
  public:
+  // Faces of a thing.
+  using Thing = std::vector<ScreenFace>;
+
   explicit Sight(Vec3 eye_m, float pitch_rad = 0) {
     Camera camera;
-    camera.width_px = camera.height_px = 200;
+    camera.width_px = camera.height_px = kSize;
     camera.focal_x_px = camera.focal_y_px = 60;
-    camera.center_x_px = camera.center_y_px = 100;
+    camera.center_x_px = camera.center_y_px = 0.5f * kSize;
     camera.position_m = eye_m;
     camera.pitch_rad = pitch_rad;
     setting_.camera = place_camera(pinhole_cameras({{camera}})[0], View{});
     setting_.frustum = make_frustum(setting_.camera);
     setting_.line_floor_px = 0.35f;
   }
-  RasterItem see(const AgentBox& box) {
-    return keep(agent_item(setting_, box, 0, 0), [&](auto&& emit) { agent_faces(box, setting_.camera, false, emit); });
+  Thing see(const AgentBox& box, int32_t index = 0) {
+    return keep(agent_owner(box, index), extent_of(box),
+                [&](auto&& emit) { agent_faces(box, setting_.camera, false, emit); });
   }
-  RasterItem see(const WallFace& wall) {
-    return keep(wall_item(setting_, wall, 0), [&](auto&& emit) { wall_faces(wall, setting_.camera, emit); });
+  Thing see(const WallFace& wall) {
+    return keep(wall_owner(0), extent_of(wall), [&](auto&& emit) { wall_faces(wall, setting_.camera, emit); });
   }
-  RasterItem see(const Strip& strip, int32_t index = 0) {
-    return keep(strip_item(setting_, strip, index),
+  Thing see(const Strip& strip, int32_t index = 0) {
+    return keep(strip_owner(strip, index), extent_of(strip),
                 [&](auto&& emit) { strip_faces(strip, setting_.camera, setting_.line_floor_px, emit); });
   }
-  // -1 the first is in front, 1 the second, 0 they do not meet.
-  int order(const RasterItem& a, const RasterItem& b) const {
-    const int32_t order = order_on_screen(a, b, faces_.data(), edges_.data());
-    return (order > 0) - (order < 0);
+  // Calls visit(face of a, face of b, point) for a grid of points of the image that both cover.
+  template <typename Visit>
+  void where_both(const Thing& a, const Thing& b, Visit&& visit) const {
+    for (const ScreenFace& of_a : a) {
+      for (const ScreenFace& of_b : b) {
+        const PixelBox box = of_a.box;
+        for (float y = static_cast<float>(box.y_begin) + 0.1f; y < static_cast<float>(box.y_end); y += kStep_px) {
+          for (float x = static_cast<float>(box.x_begin) + 0.1f; x < static_cast<float>(box.x_end); x += kStep_px) {
+            if (covers(of_a, {x, y}) && covers(of_b, {x, y})) visit(of_a, of_b, Vec2{x, y});
+          }
+        }
+      }
+    }
+  }
+  bool in_front(const ScreenFace& a, const ScreenFace& b, Vec2 at) const {
+    return is_in_front(a, b, at,
+                       [&](uint32_t solid, uint32_t strip) { return stands_on(extent(solid), extent(strip)); });
+  }
+  // -1 the first is in front wherever both are seen, 1 the second, 0 they do not meet, 2 it depends on where.
+  int order(const Thing& a, const Thing& b) const {
+    int first = 0, second = 0;
+    where_both(a, b, [&](const ScreenFace& of_a, const ScreenFace& of_b, Vec2 at) {
+      EXPECT_NE(in_front(of_a, of_b, at), in_front(of_b, of_a, at));
+      (in_front(of_a, of_b, at) ? first : second) += 1;
+    });
+    return first && second ? 2 : first ? -1 : second ? 1 : 0;
+  }
+  Vec3 ray(Vec2 at) const {
+    const PinholeCamera& camera = setting_.camera;
+    return camera.right * ((at.x - camera.center_x_px) / camera.focal_x_px) +
+           camera.down * ((at.y - camera.center_y_px) / camera.focal_y_px) + camera.forward;
   }
 
  private:
+  static constexpr int kSize = 100;
+  static constexpr float kStep_px = 0.2f;
   struct Pool {
     std::vector<PolygonEdge>* edges;
     int32_t take(int count) {
@@ -51,22 +88,28 @@ class Sight {
     PolygonEdge* at(int32_t index) { return edges->data() + index; }
   };
   template <typename MakeFaces>
-  RasterItem keep(RasterItem item, MakeFaces&& make_faces) {
-    ItemFaces faces;
+  Thing keep(FaceOwner owner, const Extent& extent, MakeFaces&& make_faces) {
+    Thing thing;
     Pool pool{&edges_};
     make_faces([&](const Vec3* corners, int count, const FacePlane& plane, Rgb color) {
-      add_face(setting_, corners, count, plane, color, pool, &faces);
+      ScreenFace face;
+      if (make_face(setting_, owner, corners, count, plane, color, pool, &face)) thing.push_back(face);
     });
-    item.box = faces.box;
-    item.face_begin = static_cast<int32_t>(faces_.size());
-    faces_.insert(faces_.end(), faces.face, faces.face + faces.count);
-    item.face_end = static_cast<int32_t>(faces_.size());
-    return item;
+    extents_.emplace_back(owner.number, extent);
+    return thing;
+  }
+  bool covers(const ScreenFace& face, Vec2 at) const {
+    return covers_point(edges_.data() + face.edge_begin, face.edge_count, at.x, at.y);
+  }
+  // Of the thing seen last under a number.
+  const Extent& extent(uint32_t number) const {
+    return std::find_if(extents_.rbegin(), extents_.rend(), [&](const auto& seen) { return seen.first == number; })
+        ->second;
   }
 
   ImageSetting setting_;
   std::vector<PolygonEdge> edges_;
-  std::vector<ScreenFace> faces_;
+  Extents extents_;
 };
 
 Strip strip_between(Vec3 a_m, Vec3 b_m, StripKind kind = StripKind::lane_mark, float width_m = 0.2f) {
@@ -81,80 +124,7 @@ Strip strip_between(Vec3 a_m, Vec3 b_m, StripKind kind = StripKind::lane_mark, f
   return strip;
 }
 
-// Corners of a convex polygon around a point, clockwise on screen.
-std::vector<Vec2> random_polygon(std::mt19937& random) {
-  std::uniform_real_distribution<float> unit(0, 1);
-  std::vector<float> angles(3 + random() % 4);
-  for (float& angle : angles) angle = kTwoPi * unit(random);
-  std::sort(angles.begin(), angles.end());
-  const Vec2 center{50 + 6 * unit(random), 40 + 6 * unit(random)};
-  const float rx = 0.5f + 8 * unit(random), ry = 0.1f + 4 * unit(random);
-  std::vector<Vec2> polygon;
-  for (const float angle : angles) polygon.push_back(center + Vec2{rx * cos_of(angle), ry * sin_of(angle)});
-  return polygon;
-}
-
-ScreenFace append_face(const std::vector<Vec2>& polygon, std::vector<PolygonEdge>* edges) {
-  ScreenFace face;
-  face.edge_begin = static_cast<int32_t>(edges->size());
-  face.edge_count = static_cast<int32_t>(polygon.size());
-  for (std::size_t i = 0; i < polygon.size(); ++i) {
-    edges->push_back(make_edge(polygon[i], polygon[(i + 1) % polygon.size()]));
-  }
-  return face;
-}
-
-// Area of the intersection of two convex polygons, the one cut by the sides of the other.
-double intersection_area(std::vector<Vec2> polygon, const std::vector<Vec2>& by) {
-  for (std::size_t side = 0; side < by.size(); ++side) {
-    const Vec2 from = by[side], to = by[(side + 1) % by.size()];
-    auto inside = [&](Vec2 p) { return cross(to - from, p - from); };
-    std::vector<Vec2> kept;
-    for (std::size_t i = 0; i < polygon.size(); ++i) {
-      const Vec2 p = polygon[i], q = polygon[(i + 1) % polygon.size()];
-      const float at_p = inside(p), at_q = inside(q);
-      if (at_p >= 0) kept.push_back(p);
-      if ((at_p >= 0) != (at_q >= 0)) kept.push_back(p + (q - p) * (at_p / (at_p - at_q)));
-    }
-    polygon = kept;
-  }
-  double twice_area = 0;
-  for (std::size_t i = 1; i + 1 < polygon.size(); ++i) {
-    twice_area += cross(polygon[i] - polygon[0], polygon[i + 1] - polygon[0]);
-  }
-  return 0.5 * twice_area;
-}
-
-TEST(SharedRegion, HasTheAreaOfTheIntersectionAndLiesWithinIt) {
-  std::mt19937 random(1);
-  int meet = 0, apart = 0;
-  for (int round = 0; round < 4000; ++round) {
-    const std::vector<Vec2> a = random_polygon(random), b = random_polygon(random);
-    std::vector<PolygonEdge> edges;
-    const ScreenFace face_a = append_face(a, &edges), face_b = append_face(b, &edges);
-    const SharedRegion region = shared_region(face_a, face_b, edges.data());
-    const double expected = intersection_area(a, b);
-    // Corners near x = 50 are known to 4e-6 px.
-    ASSERT_NEAR(region.area_px2, expected, 1e-3) << round;
-    (expected > 1e-3 ? meet : apart) += 1;
-    if (expected <= 1e-3) continue;
-    for (const PolygonEdge& edge : edges) {
-      ASSERT_GE(inner_distance(edge, region.middle_px), -1e-3f) << round;
-    }
-  }
-  EXPECT_GT(meet, 1000);
-  EXPECT_GT(apart, 200);
-}
-
-TEST(SharedRegion, OfAFaceWithItselfIsTheFaceAndOfNeighboursNothing) {
-  const std::vector<Vec2> left{{10, 10}, {14, 11}, {14, 13}, {10, 12}}, right{{14, 11}, {17, 9}, {17, 15}, {14, 13}};
-  std::vector<PolygonEdge> edges;
-  const ScreenFace a = append_face(left, &edges), b = append_face(right, &edges), again = append_face(left, &edges);
-  EXPECT_NEAR(shared_region(a, again, edges.data()).area_px2, 2 * 8, 1e-4);  // both borders count
-  EXPECT_NEAR(shared_region(a, b, edges.data()).area_px2, 0, 1e-4);
-}
-
-// Depth along x at which a ray (1, y, z) from the eye enters a box; -1 where it misses.
+// How many times as far as it is long a ray from the eye goes before it enters a box; -1 where it misses.
 float enter(const AgentBox& box, Vec3 eye, Vec3 ray) {
   const Vec3 ahead{box.cos_heading, box.sin_heading, 0}, left{-box.sin_heading, box.cos_heading, 0}, up{0, 0, 1};
   const Vec3 middle = box.center_m + up * (0.5f * box.height_m) - eye;
@@ -174,30 +144,23 @@ TEST(Order, OfDisjointBoxesIsWhatRaysSee) {
   std::uniform_real_distribution<float> ahead(4, 40), aside(-15, 15), foot(-3, 1), size(0.2f, 20), angle(-3, 3);
   const Vec3 eye{0, 0, 1};
   int compared = 0;
-  for (int round = 0; round < 4000; ++round) {
+  for (int round = 0; round < 1500; ++round) {
     auto box = [&] {
       return make_box(AgentClass::vehicle, {ahead(random), aside(random), foot(random)}, angle(random),
                       {size(random), 0.5f, 2});
     };
     const AgentBox a = box(), b = box();
-    if (overlap_on_ground(agent_extent(a, eye), agent_extent(b, eye))) continue;
+    if (overlap_on_ground(extent_of(a), extent_of(b))) continue;
     Sight sight(eye);
-    const RasterItem item_a = sight.see(a), item_b = sight.see(b);
-    int a_first = 0, b_first = 0;
-    for (int y = 0; y < 60; ++y) {
-      for (int x = 0; x < 60; ++x) {
-        const Vec3 ray{1, (static_cast<float>(x) - 29.5f) / 20, (static_cast<float>(y) - 29.5f) / 20};
-        const float at_a = enter(a, eye, ray), at_b = enter(b, eye, ray);
-        if (at_a > kNear_m && at_b > kNear_m) (at_a < at_b ? a_first : b_first) += 1;
-      }
-    }
-    if (a_first + b_first < 3) continue;
-    ++compared;
-    ASSERT_EQ(std::min(a_first, b_first), 0) << round;
-    ASSERT_EQ(sight.order(item_a, item_b), a_first ? -1 : 1) << round;
-    ASSERT_EQ(sight.order(item_b, item_a), a_first ? 1 : -1) << round;
+    const Sight::Thing seen_a = sight.see(a, 0), seen_b = sight.see(b, 1);
+    sight.where_both(seen_a, seen_b, [&](const ScreenFace& of_a, const ScreenFace& of_b, Vec2 at) {
+      const float at_a = enter(a, eye, sight.ray(at)), at_b = enter(b, eye, sight.ray(at));
+      if (at_a < 0 || at_b < 0) return;  // the border, where rounding decides
+      EXPECT_EQ(sight.in_front(of_a, of_b, at), at_a < at_b) << round;
+      ++compared;
+    });
   }
-  EXPECT_GT(compared, 150);
+  EXPECT_GT(compared, 20000);
 }
 
 TEST(Order, OfLevelsIsByHeight) {
@@ -208,7 +171,7 @@ TEST(Order, OfLevelsIsByHeight) {
   for (const auto& [eye_z, pitch, expected] :
        {std::tuple{-3.0f, 0.5f, -1}, std::tuple{20.0f, -0.9f, 1}, std::tuple{4.0f, 0.0f, 0}}) {
     Sight sight({0, 0, eye_z}, pitch);
-    EXPECT_EQ(sight.order(sight.see(low), sight.see(high)), expected) << eye_z;
+    EXPECT_EQ(sight.order(sight.see(low, 0), sight.see(high, 1)), expected) << eye_z;
     EXPECT_EQ(sight.order(sight.see(low), sight.see(bridge)), expected) << eye_z;
   }
 }
@@ -240,13 +203,13 @@ TEST(Order, WhatStandsOnAStripIsInFrontOfItEvenWhereItDipsIn) {
   EXPECT_EQ(sight.order(sight.see(mark), sight.see(car)), 1);
   EXPECT_EQ(sight.order(sight.see(car), sight.see(mark)), -1);
   // The same car beyond the end of the strip does not stand on it, and neither does one on a road 2 m below.
-  EXPECT_TRUE(stands_on(agent_extent(car, {}), strip_extent(mark, 0, {})));
+  EXPECT_TRUE(stands_on(extent_of(car), extent_of(mark)));
   AgentBox beyond = car;
   beyond.center_m.x = 23;
-  EXPECT_FALSE(stands_on(agent_extent(beyond, {}), strip_extent(mark, 0, {})));
+  EXPECT_FALSE(stands_on(extent_of(beyond), extent_of(mark)));
   AgentBox below = car;
   below.center_m.z -= 2;
-  EXPECT_FALSE(stands_on(agent_extent(below, {}), strip_extent(mark, 0, {})));
+  EXPECT_FALSE(stands_on(extent_of(below), extent_of(mark)));
 }
 
 TEST(Order, StripsInFrontOfAWallOrBehindIt) {
@@ -258,6 +221,88 @@ TEST(Order, StripsInFrontOfAWallOrBehindIt) {
   Sight sight({0, 0, 1.5f});
   EXPECT_EQ(sight.order(sight.see(before), sight.see(wall)), -1);
   EXPECT_EQ(sight.order(sight.see(wall), sight.see(beyond)), -1);
+}
+
+TEST(Order, ComparesInTheMiddleOfTheSharedSamples) {
+  std::mt19937_64 random(3);
+  for (int round = 0; round < 2000; ++round) {
+    const uint64_t samples = round % 3 ? random() & random() & random() : random();
+    double x = 0, y = 0;
+    for (int column = 0; column < kSampleColumns; ++column) {
+      for (int row = 0; row < 8; ++row) {
+        if (!(samples >> (8 * column + row) & 1)) continue;
+        x += (column + 0.5) / 8;
+        y += (row + static_cast<double>(sample_column_offset(column))) / 8;
+      }
+    }
+    const int count = std::popcount(samples);
+    if (count == 0) continue;
+    EXPECT_NEAR(middle_of(samples).x, x / count, 1e-6) << samples;
+    EXPECT_NEAR(middle_of(samples).y, y / count, 1e-6) << samples;
+  }
+  EXPECT_EQ(middle_of(kAllSamples).x, 0.5f);
+  EXPECT_EQ(middle_of(kAllSamples).y, 0.5f);
+  EXPECT_EQ(middle_of(0).x, 0.5f);
+}
+
+// A list of fragments, for lay_fragments.
+struct VectorList {
+  static constexpr int kEnd = -1;
+  std::vector<Fragment> fragments;
+  int begin() const { return fragments.empty() ? kEnd : 0; }
+  int next(int place) const { return place + 1 < static_cast<int>(fragments.size()) ? place + 1 : kEnd; }
+  const Fragment& at(int place) const { return fragments[static_cast<std::size_t>(place)]; }
+  void remove(int place, int) { fragments.erase(fragments.begin() + place); }
+};
+
+TEST(Order, OfAPixelsFragmentsDoesNotDependOnTheirList) {
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<float> unit(0, 1);
+  for (int round = 0; round < 500; ++round) {
+    // Planes in one pixel; those of random tilt intersect, and may hide each other in a ring.
+    const float tilt = round % 2 ? 0.1f : 0.0f;
+    std::vector<ScreenFace> faces(2 + random() % 6);
+    VectorList list;
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+      ScreenFace& face = faces[i];
+      face.number = thing_number(tilt > 0 && i % 2 ? kStripKind : kAgentKind, static_cast<int32_t>(i));
+      face.color = {unit(random), unit(random), unit(random)};
+      face.plane_distance_m = 1.5f;
+      face.inverse_depth_0 = 0.05f + 0.05f * unit(random);
+      face.inverse_depth_x = tilt * (unit(random) - 0.5f);
+      face.inverse_depth_y = tilt * (unit(random) - 0.5f);
+      const uint64_t samples = random() & (round % 3 ? random() : kAllSamples);
+      const PixelCoverage coverage{static_cast<float>(std::popcount(samples)) / 64.0f, samples};
+      list.fragments.push_back(make_fragment(face, static_cast<int32_t>(i), coverage, 0, 0));
+    }
+    auto stands = [tilt](uint32_t solid, uint32_t strip) { return tilt > 0 && (solid + strip) % 3 == 0; };
+    auto lay = [&](VectorList from, std::vector<int32_t>* order) {
+      return lay_fragments(from, faces.data(), 0, 0, stands,
+                           [order](const Fragment& fragment, float) { order->push_back(fragment.face); });
+    };
+    std::vector<int32_t> order;
+    const PixelState pixel = lay(list, &order);
+    for (int shuffle = 0; shuffle < 5; ++shuffle) {
+      std::shuffle(list.fragments.begin(), list.fragments.end(), random);
+      std::vector<int32_t> again;
+      const PixelState other = lay(list, &again);
+      ASSERT_EQ(again, order) << round;
+      ASSERT_EQ(other.color.r, pixel.color.r) << round;
+    }
+    // Without rings, whatever was laid before another one that it meets was in front of it.
+    for (std::size_t i = 0; tilt == 0 && i < order.size(); ++i) {
+      for (std::size_t j = i + 1; j < order.size(); ++j) {
+        auto of = [&](std::size_t at) {
+          return *std::find_if(list.fragments.begin(), list.fragments.end(),
+                               [&](const Fragment& fragment) { return fragment.face == order[at]; });
+        };
+        const uint64_t shared = of(i).coverage.samples & of(j).coverage.samples;
+        if (shared == 0) continue;
+        const auto first = static_cast<std::size_t>(order[i]), second = static_cast<std::size_t>(order[j]);
+        ASSERT_TRUE(is_in_front(faces[first], faces[second], middle_of(shared), stands)) << round;
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -77,29 +77,34 @@ struct Pool {
   __device__ int take(int count) { used += count; return used - count; }
   __device__ PolygonEdge* at(int index) { return edges + index; }
 };
-struct Sink {
-  const ImageSetting* setting;
-  Pool* pool;
-  ItemFaces faces;
-  __device__ void operator()(const Vec3* corners, int count, const FacePlane& plane, Rgb color) {
-    add_face(*setting, corners, count, plane, color, *pool, &faces);
-  }
+struct List {
+  static constexpr int kEnd = -1;
+  Fragment fragments[8];
+  int count = 0;
+  __device__ int begin() const { return count - 1; }
+  __device__ int next(int place) const { return place - 1; }
+  __device__ const Fragment& at(int place) const { return fragments[place]; }
+  __device__ void remove(int place, int) { fragments[place] = fragments[--count]; }
 };
 __global__ void kernel(const AgentBox* box, const Strip* strip, const PinholeCamera* camera, const View* view, float* out) {
   const PinholeCamera placed = place_camera(*camera, *view);
   const ImageSetting setting{placed, make_frustum(placed), 0.35f, false};
   Pool pool;
-  Sink sink{&setting, &pool, {}};
-  agent_faces(*box, placed, false, sink);
-  const RasterItem a = agent_item(setting, *box, 0, 0);
-  strip_faces(*strip, placed, 0.35f, sink);
-  const RasterItem b = strip_item(setting, *strip, 0);
-  PixelState pixel;
-  for (int i = 0; i < sink.faces.count; ++i) {
-    const ScreenFace& face = sink.faces.face[i];
-    composite(&pixel, pixel_coverage(pool.at(face.edge_begin), face.edge_count, 3, 4), face.color);
-  }
-  *out = pixel.color.r + static_cast<float>(order_on_screen(a, b, sink.faces.face, pool.at(0)));
+  ScreenFace faces[8];
+  List list;
+  FaceOwner owner = agent_owner(*box, 0);
+  auto add = [&](const Vec3* corners, int count, const FacePlane& plane, Rgb color) {
+    ScreenFace& face = faces[list.count];
+    if (!make_face(setting, owner, corners, count, plane, color, pool, &face)) return;
+    const PixelCoverage coverage = pixel_coverage(pool.at(face.edge_begin), face.edge_count, 3, 4);
+    list.fragments[list.count] = make_fragment(face, list.count, coverage, 3, 4);
+    ++list.count;
+  };
+  agent_faces(*box, placed, false, add);
+  owner = strip_owner(*strip, 0);
+  strip_faces(*strip, placed, 0.35f, add);
+  auto stands = [&](unsigned, unsigned) { return stands_on(extent_of(*box), extent_of(*strip)); };
+  *out = lay_fragments(list, faces, 3, 4, stands, [](const Fragment&, float) {}).color.r;
 }
 )";
 
