@@ -236,8 +236,8 @@ class StillSimulator final : public Simulator {
   const std::vector<std::shared_ptr<const RoadMap>>& maps() const override { return maps_; }
   const std::vector<WorldSpec>& worlds() const override { return worlds_; }
   int num_slots() const override { return 4; }
-  void reset() override {}
-  StepResult step(Span<const int32_t>) override { return {}; }
+  void reset(Stream) override {}
+  StepResult step(Span<const int32_t>, Stream) override { return {}; }
   ObservationView observations() override { return {}; }
   const SceneBatch& scene() override { return scene_; }
   Span<const View> views() override { return {}; }
