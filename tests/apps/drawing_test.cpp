@@ -238,6 +238,7 @@ class StillSimulator final : public Simulator {
   int num_slots() const override { return 4; }
   void reset(Stream) override {}
   StepResult step(Span<const int32_t>, Stream) override { return {}; }
+  void check() override {}
   ObservationView observations() override { return {}; }
   const SceneBatch& scene() override { return scene_; }
   Span<const View> views() override { return {}; }
