@@ -1,0 +1,111 @@
+// The fuzzers' corpus in every test run: each file, and mutations of it, is a map or an Error, in bounded time.
+#include <algorithm>
+#include <ctime>
+#include <filesystem>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/common/file.h"
+#include "pictura/tests/fuzz/fuzz_map.h"
+
+namespace pictura {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> corpus(const std::string& folder) {
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(fs::path(PICTURA_CORPUS) / folder)) {
+    files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+/// Of the processor: other programs share the machine.
+template <typename Fuzz>
+double seconds_of(Fuzz fuzz) {
+  const std::clock_t begin = std::clock();
+  fuzz();
+  return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+}
+
+/// Flips, inserts, removes, repeats and swaps bytes, a few at a time.
+std::string mutated(std::string bytes, std::mt19937* random) {
+  const auto below = [&](size_t count) { return count ? (*random)() % count : 0; };
+  for (size_t edits = 1 + below(2); edits > 0 && !bytes.empty(); --edits) {
+    const size_t at = below(bytes.size()), length = std::min(1 + below(40), bytes.size() - at);
+    switch (below(10)) {
+      case 0: bytes[at] = static_cast<char>((*random)()); break;
+      case 1: bytes.erase(at, length); break;
+      case 2: bytes.insert(below(bytes.size()), bytes.substr(at, length)); break;
+      case 3: bytes.resize(at); break;
+      default: {
+        // Another digit somewhere: most of what a file says is numbers.
+        const size_t digit = bytes.find_first_of("0123456789", at);
+        if (digit != std::string::npos) bytes[digit] = "0123456789-.e"[below(13)];
+      }
+    }
+  }
+  return bytes;
+}
+
+TEST(FuzzCorpus, EveryOpenDriveFileIsAMapOrAnError) {
+  int maps = 0, errors = 0;
+  for (const fs::path& path : corpus("opendrive")) {
+    (test::fuzz_opendrive(read_file(path.string())) ? maps : errors)++;
+  }
+  // Both ends of the importer are reached.
+  EXPECT_GT(maps, 15);
+  EXPECT_GT(errors, 15);
+}
+
+/// What a few hundred bytes can ask for at most: long roads, wound up, upon each other.
+TEST(FuzzCorpus, SmallFilesTakeLittleTime) {
+  for (const fs::path& path : corpus("opendrive_slow")) {
+    const std::string bytes = read_file(path.string());
+    ASSERT_LE(bytes.size(), size_t{65536}) << path;
+    const double seconds = seconds_of([&] { test::fuzz_opendrive(bytes); });
+    fmt::print("{:20} {:6.2f} s\n", path.stem().string(), seconds);
+    EXPECT_LT(seconds, PICTURA_IS_SANITIZED ? 200 : 6) << path << ", imported twice";
+  }
+}
+
+TEST(FuzzCorpus, MutatedOpenDriveFilesAreMapsOrErrors) {
+  std::mt19937 random(11);
+  int maps = 0, errors = 0;
+  for (const fs::path& path : corpus("opendrive")) {
+    const std::string bytes = read_file(path.string());
+    if (bytes.size() > 8192) continue;  // slow under sanitizers, and more of the same
+    for (int i = 0; i < 60; ++i) (test::fuzz_opendrive(mutated(bytes, &random)) ? maps : errors)++;
+  }
+  EXPECT_GT(maps, 100);
+  EXPECT_GT(errors, 500);
+}
+
+TEST(FuzzCorpus, EveryCachedMapIsAMapOrAnError) {
+  for (const fs::path& path : corpus("map_cache")) {
+    const bool is_sound = path.filename() == "sound";
+    EXPECT_TRUE(test::fuzz_map_cache(read_file(path.string())) || !is_sound) << path;
+  }
+}
+
+TEST(FuzzCorpus, EditedCachedMapsAreMapsOrErrors) {
+  std::mt19937 random(12);
+  int maps = 0, errors = 0;
+  for (int i = 0; i < 400; ++i) {
+    std::string input = "e";
+    for (size_t bytes = 5 * (1 + random() % 3); bytes > 0; --bytes) input += static_cast<char>(random());
+    (test::fuzz_map_cache(input) ? maps : errors)++;
+  }
+  EXPECT_GT(maps, 20);
+  EXPECT_GT(errors, 20);
+}
+
+}  // namespace
+}  // namespace pictura
