@@ -7,6 +7,8 @@ namespace pictura {
 namespace {
 
 constexpr float kCell_m = 4.0f;
+// Looks at quads that a surface allows, in all and for each of its quads.
+constexpr int64_t kFreeLooks = 10'000'000, kLooksPerQuad = 5000;  // CARLA's towns take up to 544 for a quad
 
 double cross_of(const Point3& a, const Point3& b, const Point2& p) {
   return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
@@ -36,6 +38,7 @@ Surface::Surface(const std::vector<SurfaceBand>& bands, double level_m) : level_
     }
   }
   grid_ = Grid(boxes, kCell_m);
+  looks_left_ = kFreeLooks + kLooksPerQuad * static_cast<int64_t>(quads_.size());
 }
 
 /// Two triangles, so that a quad that is not convex is still covered as drawn.

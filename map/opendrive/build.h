@@ -30,7 +30,7 @@ struct Build {
   const OpenDriveOptions& options;
   Faults* faults;
   RoadMap* map;
-  SampleBudget budget{10'000'000};
+  SampleBudget budget;
   std::vector<std::vector<SectionLanes>> lanes;  // [roads][sections]
   struct LanePlace {
     const FileSection* section;

@@ -106,7 +106,37 @@ double banked_part(const FileRoad& road, double s, double t) {
   return t;
 }
 
+/// By how much the heading of a spiral has changed ds behind its start.
+double spiral_turn(const GeometryPiece& piece, double ds) {
+  const double rate = (piece.end_curvature - piece.start_curvature) / piece.length;
+  return ds * (piece.start_curvature + 0.5 * rate * ds);
+}
+
+/// The way from one place on a spiral to another within a panel, as seen along its first heading.
+std::array<double, 2> spiral_step(const GeometryPiece& piece, double from, double to) {
+  double x = 0, y = 0;
+  for (const GaussPoint& gauss : kGauss) {
+    const double turn = spiral_turn(piece, from + gauss.position * (to - from));
+    x += gauss.weight * std::cos(turn);
+    y += gauss.weight * std::sin(turn);
+  }
+  return {x * (to - from), y * (to - from)};
+}
+
 }  // namespace
+
+void measure(GeometryPiece* piece) {
+  piece->panels.clear();
+  if (piece->cubic || piece->start_curvature == piece->end_curvature) return;
+  const double turn = std::max(std::abs(piece->start_curvature), std::abs(piece->end_curvature)) * piece->length;
+  const int count = 1 + static_cast<int>(turn / kPanelTurn_rad);
+  std::array<double, 2> place{};
+  for (int i = 0; i < count; ++i) {
+    piece->panels.push_back(place);
+    const auto [dx, dy] = spiral_step(*piece, i * piece->length / count, (i + 1) * piece->length / count);
+    place = {place[0] + dx, place[1] + dy};
+  }
+}
 
 void measure(PlaneCubic* cubic) {
   const std::size_t panels = cubic->arc_length.size() - 1;
@@ -135,7 +165,6 @@ Pose pose_on(const GeometryPiece& piece, double ds) {
   if (piece.cubic) return pose_on_cubic(piece, ds);
   const double k0 = piece.start_curvature;
   const double rate = (piece.end_curvature - k0) / piece.length;
-  auto heading_at = [&](double x) { return piece.heading + x * (k0 + 0.5 * rate * x); };
   if (rate == 0) {
     // The chord of an arc points along its middle heading.
     const double half_turn = 0.5 * k0 * ds;
@@ -143,18 +172,12 @@ Pose pose_on(const GeometryPiece& piece, double ds) {
     return {piece.x + chord * std::cos(piece.heading + half_turn),
             piece.y + chord * std::sin(piece.heading + half_turn), piece.heading + k0 * ds, k0};
   }
-  const double turn = std::max(std::abs(k0), std::abs(piece.end_curvature)) * std::abs(ds);
-  const int panels = 1 + static_cast<int>(turn / kPanelTurn_rad);
-  const double panel = ds / panels;
-  double x = 0, y = 0;
-  for (int i = 0; i < panels; ++i) {
-    for (const GaussPoint& gauss : kGauss) {
-      const double heading = heading_at((i + gauss.position) * panel);
-      x += gauss.weight * std::cos(heading);
-      y += gauss.weight * std::sin(heading);
-    }
-  }
-  return {piece.x + x * panel, piece.y + y * panel, heading_at(ds), k0 + rate * ds};
+  const auto last = static_cast<double>(piece.panels.size() - 1);
+  const double panel = std::min(last, std::floor(ds / piece.length * (last + 1)));
+  const auto& [begin_x, begin_y] = piece.panels[static_cast<std::size_t>(panel)];
+  const auto [dx, dy] = spiral_step(piece, panel * piece.length / (last + 1), ds);
+  const double x = begin_x + dx, y = begin_y + dy, c = std::cos(piece.heading), s = std::sin(piece.heading);
+  return {piece.x + x * c - y * s, piece.y + x * s + y * c, piece.heading + spiral_turn(piece, ds), k0 + rate * ds};
 }
 
 Pose pose_at(const FileRoad& road, double s) {

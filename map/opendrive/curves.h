@@ -14,8 +14,11 @@ struct Pose {
 /// Fills the lengths of a cubic along its p_end.
 void measure(PlaneCubic* cubic);
 
-/// The pose `ds` behind the start of a piece: exact for lines and arcs, Gauss-Legendre quadrature for spirals. Plane
-/// cubics are passed evenly along their arc, so that their end is the piece's.
+/// Fills the panels of a spiral; other pieces have none.
+void measure(GeometryPiece* piece);
+
+/// The pose `ds` behind the start of a piece: exact for lines and arcs, Gauss-Legendre quadrature for spirals, which
+/// must be measured. Plane cubics are passed evenly along their arc, so that their end is the piece's.
 Pose pose_on(const GeometryPiece& piece, double ds);
 
 /// The pose of the reference line at s, which is clamped to the road.

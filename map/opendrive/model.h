@@ -73,6 +73,8 @@ struct GeometryPiece {
   double s = 0, x = 0, y = 0, heading = 0, length = 0;
   double start_curvature = 0, end_curvature = 0;
   std::optional<PlaneCubic> cubic;
+  // Of a spiral: where each of its panels begins, as seen from its start along its heading; see measure() in curves.h.
+  std::vector<std::array<double, 2>> panels;
 };
 
 /// One stripe of a mark, as <line> gives it.

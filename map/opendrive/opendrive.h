@@ -20,8 +20,4 @@ struct OpenDriveOptions {
 RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options = {},
                         std::vector<std::string>* warnings_out = nullptr);
 
-/// Reads and parses a file of at most 512 MiB.
-RoadMap load_opendrive(const std::string& path, const OpenDriveOptions& options = {},
-                       std::vector<std::string>* warnings_out = nullptr);
-
 }  // namespace pictura

@@ -77,6 +77,7 @@ GeometryPiece read_geometry(const Element& element) {
   }
   const double turn = std::max(std::abs(piece.start_curvature), std::abs(piece.end_curvature)) * piece.length;
   if (!(turn <= kMaxTurn_rad)) element.fail("expected a curve of at most {} rad, got {}", kMaxTurn_rad, turn);
+  measure(&piece);
   return piece;
 }
 
