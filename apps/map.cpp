@@ -1,4 +1,5 @@
 // `pictura map`: the facts of a map, its elements, and its picture from above.
+#include <algorithm>
 #include <chrono>
 
 #include "pictura/apps/commands.h"
@@ -6,18 +7,20 @@
 #include "pictura/apps/map_listing.h"
 #include "pictura/apps/report.h"
 #include "pictura/common/error.h"
+#include "pictura/common/file.h"
 #include "pictura/map/load_map.h"
+#include "pictura/map/opendrive/writer.h"
 
 namespace pictura {
 
 namespace {
 
 struct Arguments {
-  std::string map, png, svg;
+  std::string map, png, svg, xodr;
   int size_px = 1600;
   std::vector<double> box, at;
   double radius_m = 50;
-  bool json = false, full = false;
+  bool json = false, full = false, lenient = false;
 };
 
 std::optional<FileBox> shown_box(const Arguments& arguments) {
@@ -56,25 +59,43 @@ void print_table(const Json& object) {
   }
 }
 
+/// One line each on stderr, and how many there were.
+void print_warnings(const std::vector<std::string>& warnings) {
+  constexpr std::size_t kMostLines = 100;
+  for (std::size_t i = 0; i < std::min(warnings.size(), kMostLines); ++i) {
+    fmt::print(stderr, "warning: {}\n", warnings[i]);
+  }
+  if (!warnings.empty()) {
+    fmt::print(stderr, "{} warning{}: these parts are left out\n", warnings.size(), warnings.size() == 1 ? "" : "s");
+  }
+}
+
 void run_map(const Arguments& arguments) {
   if (arguments.full && !arguments.json) fail_usage("--full: lists elements as JSON; expected --json with it");
   LoadReport report;
   const auto begin = std::chrono::steady_clock::now();
-  const std::shared_ptr<const RoadMap> map = load_map(arguments.map, {}, &report);
+  const std::shared_ptr<const RoadMap> map = load_map(arguments.map, {.lenient = arguments.lenient}, &report);
   const double load_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  print_warnings(report.warnings);
   const MapPictureOptions picture{.size_px = arguments.size_px, .box = shown_box(arguments)};
   if (!arguments.png.empty()) draw_map_png(*map, arguments.png, picture);
   if (!arguments.svg.empty()) draw_map_svg(*map, arguments.svg, picture);
+  if (!arguments.xodr.empty()) {
+    const MapText text = map_text(arguments.map);
+    write_file(arguments.xodr, export_opendrive(text.text, text.source));
+  }
   Json object = facts_of(*map);
   object["cached"] = report.cached;
   if (!report.cache_refusal.empty()) object["cache_refused"] = report.cache_refusal;
   object["load_ms"] = load_ms;
+  if (arguments.lenient) object["warnings"] = report.warnings.size();
   if (arguments.full) return print_listing(object, *map);
   if (arguments.json) return print_json(object);
   print_table(object);
   for (const std::string& path : {arguments.png, arguments.svg}) {
     if (!path.empty()) fmt::print("drawn into {}\n", path);
   }
+  if (!arguments.xodr.empty()) fmt::print("written to {}\n", arguments.xodr);
 }
 
 }  // namespace
@@ -102,6 +123,10 @@ void add_map_command(CLI::App& app) {
   command->add_option("--radius", arguments->radius_m, "How far to draw around --at, in metres")
       ->needs(at)
       ->capture_default_str();
+  command->add_option("--xodr", arguments->xodr,
+                      "Write the map as OpenDRIVE, with no more in it than the importer uses");
+  command->add_flag("--lenient", arguments->lenient,
+                    "Leave faulty parts of the file out, with a warning on stderr each");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->add_flag("--full", arguments->full, "With --json: list every element and where the file says it");
   command->footer(

@@ -19,6 +19,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kProcedural = "procedural";
 constexpr std::string_view kExtension = ".xodr";
+constexpr std::size_t kMaxFile_bytes = std::size_t{1} << 29;
 
 std::vector<fs::path> town_folders() { return {fs::path(map_folder()), fs::path(map_folder()) / "carla"}; }
 
@@ -27,6 +28,24 @@ std::optional<TownOptions> procedural_options(std::string_view name) {
   if (name == kProcedural) return TownOptions();
   if (!name.starts_with(kProcedural) || name[kProcedural.size()] != ':') return std::nullopt;
   return parse_town_options(name.substr(kProcedural.size() + 1), name);
+}
+
+/// The file that a name stands for which is not procedural. Throws UsageError when there is none.
+std::string file_of(const std::string& name) {
+  std::error_code error;
+  if (name.ends_with(kExtension)) return name;
+  if (fs::exists(name, error) && !fs::is_directory(name, error)) {
+    fail_usage("map '{}': expected a file that ends in {}", name, kExtension);
+  }
+  if (!name.empty() && name.find('/') == std::string::npos) {
+    for (const fs::path& folder : town_folders()) {
+      const fs::path path = folder / (name + std::string(kExtension));
+      if (fs::exists(path, error)) return path.string();
+    }
+  }
+  const std::vector<std::string> towns = known_towns();
+  fail_usage("map '{}': expected an {} file, procedural[:SEED[:OPTIONS]], or a town in {}, which has {}", name,
+             kExtension, map_folder(), towns.empty() ? "none" : fmt::format("{}", fmt::join(towns, ", ")));
 }
 
 /// Keeps an encoded map for the next load, where that is possible.
@@ -40,9 +59,9 @@ void try_to_keep(const std::string& cache_path, const std::string& bytes) {
 }
 
 RoadMap load_file(const std::string& path, const OpenDriveOptions& options, LoadReport* report) {
-  const std::string text = read_file(path);
+  const std::string text = read_file(path, kMaxFile_bytes);
   const std::string cache_path = map_cache_path(path, options);
-  if (cache_path.empty()) return parse_opendrive(text, path, options);
+  if (cache_path.empty()) return parse_opendrive(text, path, options, &report->warnings);
   const MapCacheKey key = map_cache_key(text, options);
   std::error_code error;
   if (fs::exists(cache_path, error)) {
@@ -54,8 +73,8 @@ RoadMap load_file(const std::string& path, const OpenDriveOptions& options, Load
       report->cache_refusal = refusal.what();
     }
   }
-  RoadMap map = parse_opendrive(text, path, options);
-  try_to_keep(cache_path, encode_map(map, key));
+  RoadMap map = parse_opendrive(text, path, options, &report->warnings);
+  if (report->warnings.empty()) try_to_keep(cache_path, encode_map(map, key));
   return map;
 }
 
@@ -94,20 +113,13 @@ std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDrive
     map->name = name == kProcedural ? fmt::format("{}:{}", kProcedural, town->seed) : name;
     return map;
   }
-  std::error_code error;
-  if (name.ends_with(kExtension)) return std::make_shared<RoadMap>(load_file(name, options, &report));
-  if (fs::exists(name, error) && !fs::is_directory(name, error)) {
-    fail_usage("map '{}': expected a file that ends in {}", name, kExtension);
-  }
-  if (!name.empty() && name.find('/') == std::string::npos) {
-    for (const fs::path& folder : town_folders()) {
-      const fs::path path = folder / (name + std::string(kExtension));
-      if (fs::exists(path, error)) return std::make_shared<RoadMap>(load_file(path.string(), options, &report));
-    }
-  }
-  const std::vector<std::string> towns = known_towns();
-  fail_usage("map '{}': expected an {} file, procedural[:SEED[:OPTIONS]], or a town in {}, which has {}", name,
-             kExtension, map_folder(), towns.empty() ? "none" : fmt::format("{}", fmt::join(towns, ", ")));
+  return std::make_shared<RoadMap>(load_file(file_of(name), options, &report));
+}
+
+MapText map_text(const std::string& name) {
+  if (const std::optional<TownOptions> town = procedural_options(name)) return {procedural_town(*town), name};
+  const std::string path = file_of(name);
+  return {read_file(path, kMaxFile_bytes), path};
 }
 
 }  // namespace pictura

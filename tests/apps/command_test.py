@@ -142,6 +142,27 @@ class Maps(CommandCase):
             with unittest.mock.patch.dict(os.environ, {"PICTURA_CACHE": "off"}):
                 self.assertFalse(self.json_of("map", town)["cached"])
 
+    def test_exports_are_the_same_map(self):
+        first, second = self.folder / "first.xodr", self.folder / "second.xodr"
+        facts = self.json_of("map", "procedural:4", "--xodr", first)
+        again = self.json_of("map", first, "--xodr", second)
+        self.assertEqual(first.read_bytes(), second.read_bytes())
+        same = [key for key in facts if key not in ("map", "load_ms", "cached")]
+        self.assertEqual([facts[key] for key in same], [again[key] for key in same])
+        self.assert_refused(1, "/proc/nowhere", "map", first, "--xodr", "/proc/nowhere/out.xodr")
+
+    def test_lenient_imports_say_what_they_left_out(self):
+        town = self.town()
+        text = town.read_text()
+        town.write_text(text.replace("<signal ", '<signal s="nan" ', 1))
+        self.assert_refused(1, "<signal>", "map", town)
+        result = run("map", town, "--lenient", "--json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        warnings = [line for line in result.stderr.splitlines() if line.startswith("warning: ")]
+        self.assertEqual(len(warnings), json.loads(result.stdout)["warnings"])
+        self.assertGreater(len(warnings), 0)
+        self.assertIn(f"{len(warnings)} warning", result.stderr.splitlines()[-1])
+
     def test_bad_files_are_refused_by_name(self):
         text = self.town().read_text()
         bad = self.folder / "bad.xodr"
