@@ -131,9 +131,11 @@ void bench_render(const Arguments& arguments) {
   const auto simulator = make_world(world, pilot.get());
   std::vector<int32_t> actions;
   advance(simulator.get(), pilot.get(), 30, &actions);
-  const auto renderer = make_renderer(arguments.backend, {.rig = paper_rig(size.first, size.second),
-                                                          .num_threads = world.num_threads,
-                                                          .samples = parse_samples("--samples", arguments.samples)});
+  const RendererConfig config{.rig = paper_rig(size.first, size.second),
+                              .num_threads = world.num_threads,
+                              .samples = parse_samples("--samples", arguments.samples)};
+  std::string choice;
+  const auto renderer = make_renderer(arguments.backend, config, &choice);
   PICTURA_CHECK(renderer->space() == MemorySpace::host, "bench render: expected a host backend, got {}",
                 renderer->name());
   upload_geometries(*simulator, renderer.get());
@@ -158,8 +160,9 @@ void bench_render(const Arguments& arguments) {
   }
   report_benchmark(
       arguments.json,
-      fmt::format("render: {}, {} agents, walls {}, all egos x {} cameras x {}, {} threads", world.map, world.agents,
-                  world.walls ? "on" : "off", renderer->config().rig.cameras.size(), arguments.size, world.num_threads),
+      fmt::format("render: {}, {} agents, walls {}, all egos x {} cameras x {}, {} threads, samples {}, {}", world.map,
+                  world.agents, world.walls ? "on" : "off", config.rig.cameras.size(), arguments.size,
+                  world.num_threads, arguments.samples, choice),
       std::string(renderer->name()), {rate, image_ms});
 }
 

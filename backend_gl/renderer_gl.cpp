@@ -54,7 +54,8 @@ class GlRenderer final : public Renderer {
                   config_.samples.grid, config_.samples.multisample);
     const gl::CurrentContext current(context_.get());
     gl_ = std::make_unique<gl::Functions>(*context_);
-    PICTURA_CHECK(has_extension(*gl_, kLayerExtension), "renderer {}: {} lacks {}", name_, device(), kLayerExtension);
+    device_ = reinterpret_cast<const char*>(gl_->GetString(GL_RENDERER));
+    PICTURA_CHECK(has_extension(*gl_, kLayerExtension), "renderer {}: {} lacks {}", name_, device_, kLayerExtension);
     make_pipeline();
     groups_ = make_groups();  // last: what it made goes, if it throws, while the context is current
   }
@@ -66,7 +67,7 @@ class GlRenderer final : public Renderer {
   MemorySpace space() const override { return interop_ ? MemorySpace::cuda : MemorySpace::host; }
   const RendererConfig& config() const override { return config_; }
   /// What draws, as the driver calls it.
-  std::string device() const { return reinterpret_cast<const char*>(gl_->GetString(GL_RENDERER)); }
+  const std::string& device() const { return device_; }
 
   GeometryHandle upload(const StaticGeometry& geometry) override {
     check_geometry(name_, geometry);
@@ -232,7 +233,7 @@ class GlRenderer final : public Renderer {
   std::vector<PinholeCamera> cameras_;  // in the ego frame
   std::unique_ptr<gl::Context> context_;
   std::unique_ptr<gl::CudaInterop> interop_;  // where scenes and images lie in device memory
-  std::string name_;
+  std::string name_, device_;
   std::unique_ptr<gl::Functions> gl_;
   std::vector<SizeGroup> groups_;
   GLuint program_ = 0, instances_ = 0, vertex_array_ = 0;
@@ -283,7 +284,7 @@ std::unique_ptr<Renderer> make_gl_renderer(const std::string& name, const Render
   }
   const std::string chosen = context->name();
   auto renderer = std::make_unique<GlRenderer>(config, std::move(context), std::move(interop));
-  if (choice_out) *choice_out = fmt::format("{}: {}", chosen, why);
+  if (choice_out) *choice_out = fmt::format("{}: {}; on {}", chosen, why, renderer->device());
   return renderer;
 }
 

@@ -204,6 +204,9 @@ class Images(CommandCase):
         render = ["render", town, "--out", self.folder / "images"]
         self.assert_refused(2, "0x0", *render, "--size", "0x0")
         self.assert_refused(2, "vulkan", *render, "--backend", "vulkan")
+        self.assert_refused(2, "'4x3'", *render, "--samples", "4x3")
+        self.assert_refused(2, "'many'", *render, "--samples", "many")
+        self.assert_refused(2, "renderer cpu: samples", *render, "--backend", "cpu", "--samples", "4x4")
         self.assert_refused(2, "--agents", *render, "--agents", 0)
         self.assert_refused(2, "100000000", *render, "--agents", 100_000_000)
         self.assert_refused(2, "--views", *render, "--agents", 2, "--views", 3)
