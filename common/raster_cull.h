@@ -60,14 +60,13 @@ PICTURA_HD inline bool is_left_out(const View& view, Span<const int32_t> hidden_
 }
 
 /// Calls visit(item) once for each item of a grid in the cells that a box on the ground touches; box_of(item) is what
-/// the grid files it under. Lanes share the work: lane i of n takes every n-th cell.
+/// the grid files it under.
 template <typename BoxOf, typename Visit>
-PICTURA_HD inline void for_each_item(const GridView& grid, const Aabb2& query_box, BoxOf&& box_of, Visit&& visit,
-                                     int lane = 0, int num_lanes = 1) {
+PICTURA_HD inline void for_each_item(const GridView& grid, const Aabb2& query_box, BoxOf&& box_of, Visit&& visit) {
   const CellRange cells = cells_of(grid, query_box);
   const int columns = cells.x_end - cells.x_begin;
   const int count = columns * (cells.y_end - cells.y_begin);
-  for (int cell = lane; cell < count; cell += num_lanes) {
+  for (int cell = 0; cell < count; ++cell) {
     const int x = cells.x_begin + cell % columns, y = cells.y_begin + cell / columns;
     const size_t at = static_cast<size_t>(y) * static_cast<size_t>(grid.num_x) + static_cast<size_t>(x);
     for (int32_t i = grid.begin[at]; i < grid.begin[at + 1]; ++i) {

@@ -1,5 +1,5 @@
-// Which things of a scene an image may show, one kind after the other. Lanes share the work as for_each_item says;
-// where a device has one lane, things come in a fixed order.
+// Which things of a scene an image may show, one kind after the other, in an order that depends on the scene alone: the
+// walk of renderers that give an image to one thread.
 #pragma once
 
 #include "pictura/common/raster_item.h"
@@ -9,9 +9,9 @@ namespace pictura {
 /// Calls visit(box, agent) for each agent of the view's world that the image may show.
 template <typename Visit>
 PICTURA_HD inline void visit_agents(const ImageSetting& setting, const SceneBatch& scene, const View& view,
-                                    Visit&& visit, int lane = 0, int num_lanes = 1) {
+                                    Visit&& visit) {
   const auto world = static_cast<size_t>(view.world);
-  for (int32_t agent = scene.world_begin[world] + lane; agent < scene.world_begin[world + 1]; agent += num_lanes) {
+  for (int32_t agent = scene.world_begin[world]; agent < scene.world_begin[world + 1]; ++agent) {
     const AgentBox& box = scene.agents[static_cast<size_t>(agent)];
     if (!may_show(box, setting.camera, setting.frustum)) continue;
     if (!is_left_out(view, scene.hidden_agents, agent)) visit(box, agent);
@@ -20,8 +20,7 @@ PICTURA_HD inline void visit_agents(const ImageSetting& setting, const SceneBatc
 
 /// Calls visit(wall, index) for each wall that the image may show.
 template <typename Visit>
-PICTURA_HD inline void visit_walls(const ImageSetting& setting, const RasterGeometry& geometry, Visit&& visit,
-                                   int lane = 0, int num_lanes = 1) {
+PICTURA_HD inline void visit_walls(const ImageSetting& setting, const RasterGeometry& geometry, Visit&& visit) {
   const float far_m = far_of(geometry.longest_wall_m);
   const Span<const WallFace> walls = geometry.pieces.walls;
   for_each_item(
@@ -30,19 +29,17 @@ PICTURA_HD inline void visit_walls(const ImageSetting& setting, const RasterGeom
       [&](int32_t i) {
         const WallFace& wall = walls[static_cast<size_t>(i)];
         if (may_show(wall, setting.camera, setting.frustum, far_m)) visit(wall, i);
-      },
-      lane, num_lanes);
+      });
 }
 
 /// Calls visit(head, state, index) for each light head that the image may show.
 template <typename Visit>
 PICTURA_HD inline void visit_lights(const ImageSetting& setting, const RasterGeometry& geometry,
-                                    const SceneBatch& scene, const View& view, Visit&& visit, int lane = 0,
-                                    int num_lanes = 1) {
+                                    const SceneBatch& scene, const View& view, Visit&& visit) {
   const int32_t begin = scene.light_begin[static_cast<size_t>(view.world)];
   if (begin == scene.light_begin[static_cast<size_t>(view.world) + 1]) return;
   const Span<const LightHead> heads = geometry.pieces.heads;
-  for (int32_t i = lane; i < static_cast<int32_t>(heads.size()); i += num_lanes) {
+  for (int32_t i = 0; i < static_cast<int32_t>(heads.size()); ++i) {
     const LightHead& head = heads[static_cast<size_t>(i)];
     if (!may_show(head, setting.camera, setting.frustum)) continue;
     visit(head, scene.light_states[static_cast<size_t>(begin + head.signal)], i);
@@ -51,8 +48,7 @@ PICTURA_HD inline void visit_lights(const ImageSetting& setting, const RasterGeo
 
 /// Calls visit(strip, index) for each strip that the image may show.
 template <typename Visit>
-PICTURA_HD inline void visit_strips(const ImageSetting& setting, const RasterGeometry& geometry, Visit&& visit,
-                                    int lane = 0, int num_lanes = 1) {
+PICTURA_HD inline void visit_strips(const ImageSetting& setting, const RasterGeometry& geometry, Visit&& visit) {
   const float far_m = far_of(geometry.longest_strip_m);
   const Span<const Strip> strips = geometry.pieces.strips;
   for_each_item(
@@ -61,8 +57,7 @@ PICTURA_HD inline void visit_strips(const ImageSetting& setting, const RasterGeo
       [&](int32_t i) {
         const Strip& strip = strips[static_cast<size_t>(i)];
         if (may_show(strip, setting.camera, setting.frustum, far_m)) visit(strip, i);
-      },
-      lane, num_lanes);
+      });
 }
 
 }  // namespace pictura
