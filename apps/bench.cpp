@@ -138,7 +138,7 @@ void bench_render(const Arguments& arguments) {
   const auto renderer = make_renderer(arguments.backend, config, &choice);
   PICTURA_CHECK(renderer->space() == MemorySpace::host, "bench render: expected a host backend, got {}",
                 renderer->name());
-  upload_geometries(*simulator, renderer.get());
+  upload_geometries(simulator->geometries(), renderer.get());
   const Span<const View> views = simulator->views();
   HostImages images(renderer->config().rig, static_cast<int>(views.size()));
   renderer->render(simulator->scene(), views, images.batch());  // warm-up

@@ -13,6 +13,8 @@ namespace pictura {
 namespace {
 
 constexpr int kGap_px = 6, kTop_px = 30, kLeft_px = 64;
+constexpr int kPanelWidth_px = 480, kPanelColumns = 3;
+constexpr Rgb kSheetColor = hex(0x24272C), kLabelColor = hex(0xD8DCE2);
 
 void paste(Canvas& canvas, const HostImages& images, int view, int camera, int x0, int y0, int enlargement) {
   const std::vector<uint8_t> rgb = images.interleaved(view, camera);
@@ -33,8 +35,9 @@ void paste(Canvas& canvas, const HostImages& images, int view, int camera, int x
 
 }  // namespace
 
-RgbImage contact_sheet(const HostImages& images, const Rig& rig, int num_views, int enlargement) {
-  const int num_cameras = static_cast<int>(rig.cameras.size());
+RgbImage contact_sheet(const HostImages& images, const Rig& rig, const std::vector<std::string>& view_names,
+                       int enlargement) {
+  const int num_cameras = static_cast<int>(rig.cameras.size()), num_views = static_cast<int>(view_names.size());
   PICTURA_CHECK(num_views >= 1 && num_cameras >= 1, "contact sheet: expected views and cameras, got {} of {}",
                 num_views, num_cameras);
   int images_width = 0, row_height = 0;
@@ -44,20 +47,27 @@ RgbImage contact_sheet(const HostImages& images, const Rig& rig, int num_views, 
   }
   constexpr int kWantedWidth_px = 1600;
   if (enlargement <= 0) enlargement = std::max(1, kWantedWidth_px / images_width);
-  Canvas canvas(kLeft_px + images_width * enlargement + num_cameras * kGap_px,
-                kTop_px + num_views * (row_height * enlargement + kGap_px), hex(0x24272C));
-  const Rgb label_color = hex(0xD8DCE2);
+  const TextStyle view_style{.size_px = 15, .align = Align::right, .color = kLabelColor};
+  int left_px = kLeft_px;
+  {
+    const Canvas ruler(1, 1, kSheetColor);
+    for (const std::string& name : view_names) {
+      left_px = std::max(left_px, 20 + static_cast<int>(ruler.text_width(name, view_style)));
+    }
+  }
+  Canvas canvas(left_px + images_width * enlargement + num_cameras * kGap_px,
+                kTop_px + num_views * (row_height * enlargement + kGap_px), kSheetColor);
   for (int view = 0; view < num_views; ++view) {
-    int x = kLeft_px;
+    int x = left_px;
     const int y = kTop_px + view * (row_height * enlargement + kGap_px);
-    canvas.text(kLeft_px - 10, y + 0.5 * row_height * enlargement + 5, fmt::format("{}", view),
-                {.size_px = 15, .align = Align::right, .color = label_color});
+    canvas.text(left_px - 10, y + 0.5 * row_height * enlargement + 5, view_names[static_cast<size_t>(view)],
+                view_style);
     for (int camera = 0; camera < num_cameras; ++camera) {
       const Camera& each = rig.cameras[static_cast<size_t>(camera)];
       paste(canvas, images, view, camera, x, y, enlargement);
       if (view == 0) {
         canvas.text(x + 0.5 * each.width_px * enlargement, kTop_px - 10, each.name,
-                    {.size_px = 14, .align = Align::center, .color = label_color});
+                    {.size_px = 14, .align = Align::center, .color = kLabelColor});
       }
       x += each.width_px * enlargement + kGap_px;
     }
@@ -65,9 +75,42 @@ RgbImage contact_sheet(const HostImages& images, const Rig& rig, int num_views, 
   return canvas.image();
 }
 
-void draw_contact_sheet(const HostImages& images, const Rig& rig, int num_views, const std::string& path) {
-  const RgbImage sheet = contact_sheet(images, rig, num_views);
+void draw_contact_sheet(const HostImages& images, const Rig& rig, const std::vector<std::string>& view_names,
+                        const std::string& path) {
+  const RgbImage sheet = contact_sheet(images, rig, view_names);
   write_png(path, sheet.width_px, sheet.height_px, sheet.rgb);
+}
+
+RgbImage captioned(const HostImages& images, int view, int camera, const std::string& caption) {
+  const CameraImages& size = images.camera(camera);
+  const int enlargement = std::max(1, kPanelWidth_px / size.width_px);
+  const int width_px = size.width_px * enlargement, height_px = size.height_px * enlargement;
+  Canvas canvas(width_px, height_px + kTop_px, kSheetColor);
+  paste(canvas, images, view, camera, 0, 0, enlargement);
+  canvas.text(0.5 * width_px, height_px + 20, caption, {.size_px = 15, .align = Align::center, .color = kLabelColor});
+  return canvas.image();
+}
+
+RgbImage assembled(const std::vector<RgbImage>& pictures) {
+  PICTURA_CHECK(!pictures.empty(), "figure: expected one or more pictures");
+  const int width_px = pictures[0].width_px, height_px = pictures[0].height_px;
+  const int columns = std::min(kPanelColumns, static_cast<int>(pictures.size()));
+  const int rows = (static_cast<int>(pictures.size()) + columns - 1) / columns;
+  Canvas canvas(columns * (width_px + kGap_px) - kGap_px, rows * (height_px + kGap_px) - kGap_px, hex(0xFFFFFF));
+  RgbImage all = canvas.image();
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    const RgbImage& picture = pictures[i];
+    PICTURA_CHECK(picture.width_px == width_px && picture.height_px == height_px,
+                  "figure: expected pictures of {}x{} pixels, got {}x{}", width_px, height_px, picture.width_px,
+                  picture.height_px);
+    const int left_px = static_cast<int>(i) % columns * (width_px + kGap_px);
+    const int top_px = static_cast<int>(i) / columns * (height_px + kGap_px);
+    for (int y = 0; y < height_px; ++y) {
+      std::copy_n(picture.rgb.begin() + std::ptrdiff_t{3} * y * width_px, 3 * width_px,
+                  all.rgb.begin() + std::ptrdiff_t{3} * ((top_px + y) * all.width_px + left_px));
+    }
+  }
+  return all;
 }
 
 }  // namespace pictura

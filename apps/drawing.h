@@ -33,10 +33,18 @@ void draw_map_png(const RoadMap& map, const std::string& path, const MapPictureO
 void draw_map_svg(const RoadMap& map, const std::string& path, const MapPictureOptions& options = {});
 
 /// Rows of views, columns of cameras, every image enlarged by one whole factor without smoothing (0: chosen so that the
-/// sheet is about 1600 px wide), labelled with camera names and view numbers. Images must hold u8 colour of the rig.
-RgbImage contact_sheet(const HostImages& images, const Rig& rig, int num_views, int enlargement = 0);
+/// sheet is about 1600 px wide), labelled with camera and view names. Images must hold u8 colour of the rig.
+RgbImage contact_sheet(const HostImages& images, const Rig& rig, const std::vector<std::string>& view_names,
+                       int enlargement = 0);
 
 /// contact_sheet() as a PNG file. Throws Error naming the path.
-void draw_contact_sheet(const HostImages& images, const Rig& rig, int num_views, const std::string& path);
+void draw_contact_sheet(const HostImages& images, const Rig& rig, const std::vector<std::string>& view_names,
+                        const std::string& path);
+
+/// One image, enlarged by a whole factor without smoothing to about 480 px, over its caption.
+RgbImage captioned(const HostImages& images, int view, int camera, const std::string& caption);
+
+/// Pictures of one size in rows of three. Throws Error where there is none, or sizes differ.
+RgbImage assembled(const std::vector<RgbImage>& pictures);
 
 }  // namespace pictura

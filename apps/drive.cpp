@@ -21,9 +21,9 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
   command->add_flag("!--no-walls", options_out->walls, "Leave out the walls along the building lines");
 }
 
-void upload_geometries(const Simulator& simulator, Renderer* renderer_out) {
+void upload_geometries(Span<const StaticGeometry> geometries, Renderer* renderer_out) {
   GeometryHandle expected = 0;
-  for (const StaticGeometry& geometry : simulator.geometries()) {
+  for (const StaticGeometry& geometry : geometries) {
     const GeometryHandle handle = renderer_out->upload(geometry);
     PICTURA_CHECK(handle == expected++, "renderer {}: expected handle {}, got {}", renderer_out->name(), expected - 1,
                   handle);
@@ -73,7 +73,7 @@ class PolicyPilot final : public Pilot {
     config_inout->walls = config_inout->walls && known.walls;
   }
   void enter(const Simulator& simulator) override {
-    if (renderer_) upload_geometries(simulator, renderer_.get());
+    if (renderer_) upload_geometries(simulator.geometries(), renderer_.get());
   }
   void act(Simulator& simulator, Span<int32_t> actions_out) override {
     driver_->act(simulator, renderer_.get(), /*argmax=*/true, actions_out);

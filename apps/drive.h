@@ -24,8 +24,8 @@ struct WorldOptions {
 /// Adds --agents, --seed, --threads and --no-walls, which fill *options_out.
 void add_world_options(CLI::App* command, WorldOptions* options_out);
 
-/// Uploads the simulator's geometries, so that handles equal map indices.
-void upload_geometries(const Simulator& simulator, Renderer* renderer_out);
+/// Uploads geometries to a new renderer, so that handles equal their indices.
+void upload_geometries(Span<const StaticGeometry> geometries, Renderer* renderer_out);
 
 /// Chooses the actions of all slots.
 class Pilot {

@@ -39,7 +39,7 @@ struct Film::Parts {
         frame{kTopWidth_px, kTopHeight_px + kCameraHeight_px, {}},
         video(path, frame.width_px, frame.height_px, kFramesPerSecond) {
     frame.rgb.resize(static_cast<size_t>(frame.width_px) * static_cast<size_t>(frame.height_px) * 3);
-    upload_geometries(simulator, renderer.get());
+    upload_geometries(simulator.geometries(), renderer.get());
   }
 
   int agent;

@@ -1,7 +1,9 @@
-// `pictura render`: drives a world with random actions, then writes what its agents' cameras see.
+// `pictura render`: writes what cameras see, of a scene file or of a world that was driven with random actions.
 #include <chrono>
+#include <filesystem>
 
 #include "pictura/apps/commands.h"
+#include "pictura/apps/draw_planes.h"
 #include "pictura/apps/drawing.h"
 #include "pictura/apps/drive.h"
 #include "pictura/apps/report.h"
@@ -10,6 +12,7 @@
 #include "pictura/common/hash.h"
 #include "pictura/common/interrupt.h"
 #include "pictura/common/make_renderer.h"
+#include "pictura/common/scene_file.h"
 
 namespace pictura {
 
@@ -19,65 +22,84 @@ struct Arguments {
   WorldOptions world;
   int steps = 50, views = 4;
   std::string size = "96x54", backend = "auto", samples = "1", rig, out;
+  std::vector<std::string> planes;
   float line_floor_px = RendererConfig{}.line_floor_px;
-  bool size_given = false, json = false;
+  bool size_given = false, figure = false, json = false;
 };
 
-void run(const Arguments& arguments) {
-  const Pair size = parse_pair("--size", arguments.size, 8192);
-  if (!arguments.rig.empty() && arguments.size_given) fail_usage("--size: the rig of --rig has sizes of its own");
-  if (arguments.views > arguments.world.agents) {
-    fail_usage("--views: expected 1 to {} (one per agent), got {}", arguments.world.agents, arguments.views);
-  }
-  RendererConfig config;
-  config.rig = arguments.rig.empty() ? paper_rig(size.first, size.second) : load_rig(arguments.rig);
+/// What is drawn, and under which names, whether a world was driven there or a file says so.
+struct Subject {
+  std::vector<StaticGeometry> geometries;
+  SceneBatch scene;
+  Span<const View> views;
+  std::vector<std::string> names, captions;  // [views]
+};
+
+bool is_scene_file(const std::string& map) { return std::filesystem::path(map).extension() == ".toml"; }
+
+std::unique_ptr<Renderer> open_renderer(const Arguments& arguments, RendererConfig config) {
   config.num_threads = arguments.world.num_threads;
-  config.line_floor_px = arguments.line_floor_px;
   config.samples = parse_samples("--samples", arguments.samples);
   std::string choice;
-  const auto renderer = make_renderer(arguments.backend, config, &choice);
+  auto renderer = make_renderer(arguments.backend, config, &choice);
   PICTURA_CHECK(renderer->space() == MemorySpace::host,
                 "--backend {}: pictures are written from host memory; choose cpu", renderer->name());
   if (arguments.backend == "auto") fmt::print(stderr, "backend {}\n", choice);
   make_output_folder(arguments.out);
+  return renderer;
+}
 
-  const auto pilot = make_pilot("random", arguments.world.seed, arguments.backend, arguments.world.num_threads);
-  const auto simulator = make_world(arguments.world, pilot.get());
-  std::vector<int32_t> actions(static_cast<size_t>(simulator->num_slots()));
-  for (int step = 0; step < arguments.steps; ++step) {
-    if (interrupted()) throw Interrupted(fmt::format("interrupted at step {} of {}", step, arguments.steps));
-    pilot->act(*simulator, actions);
-    simulator->step(actions);
-  }
-
-  upload_geometries(*simulator, renderer.get());
-  const int num_views = arguments.views;
-  HostImages images(config.rig, num_views);
-  const Span<const View> views = simulator->views().subspan(0, static_cast<size_t>(num_views));
-  renderer->render(simulator->scene(), views, images.batch());  // warm-up
+/// Draws the subject. Returns views per second: the median of five calls after one that warms up.
+double draw(const Subject& subject, Renderer* renderer, HostImages* images_out) {
+  upload_geometries(subject.geometries, renderer);
+  renderer->render(subject.scene, subject.views, images_out->batch());
   std::vector<double> seconds;
   for (int repeat = 0; repeat < 5; ++repeat) {
     const auto begin = std::chrono::steady_clock::now();
-    renderer->render(simulator->scene(), views, images.batch());
+    renderer->render(subject.scene, subject.views, images_out->batch());
     seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
   }
   std::nth_element(seconds.begin(), seconds.begin() + 2, seconds.end());
+  return static_cast<double>(subject.views.size()) / seconds[2];
+}
 
-  const int num_cameras = static_cast<int>(config.rig.cameras.size());
+void write_pictures(const Arguments& arguments, const Subject& subject, const Rig& rig, const HostImages& images) {
+  const int num_views = static_cast<int>(subject.views.size());
   for (int view = 0; view < num_views; ++view) {
-    for (int camera = 0; camera < num_cameras; ++camera) {
+    for (int camera = 0; camera < static_cast<int>(rig.cameras.size()); ++camera) {
       const CameraImages& image = images.camera(camera);
-      write_png(fmt::format("{}/agent{:03}_{}.png", arguments.out, view,
-                            config.rig.cameras[static_cast<size_t>(camera)].name),
-                image.width_px, image.height_px, images.interleaved(view, camera));
+      const std::string stem = fmt::format("{}/{}_{}", arguments.out, subject.names[static_cast<size_t>(view)],
+                                           rig.cameras[static_cast<size_t>(camera)].name);
+      write_png(stem + ".png", image.width_px, image.height_px, images.interleaved(view, camera));
+      for (const std::string& plane : arguments.planes) {
+        const RgbImage picture = plane_picture(images, view, camera, plane_by_name(plane));
+        write_png(fmt::format("{}_{}.png", stem, plane), picture.width_px, picture.height_px, picture.rgb);
+      }
     }
   }
-  const std::string sheet = arguments.out + "/contact_sheet.png";
-  draw_contact_sheet(images, config.rig, num_views, sheet);
+  draw_contact_sheet(images, rig, subject.names, arguments.out + "/contact_sheet.png");
+  if (!arguments.figure) return;
+  std::vector<RgbImage> panels;
+  for (int view = 0; view < num_views; ++view) {
+    panels.push_back(captioned(images, view, 0, subject.captions[static_cast<size_t>(view)]));
+    const RgbImage& panel = panels.back();
+    write_png(fmt::format("{}/{}.png", arguments.out, subject.names[static_cast<size_t>(view)]), panel.width_px,
+              panel.height_px, panel.rgb);
+  }
+  const RgbImage all = assembled(panels);
+  write_png(arguments.out + "/figure.png", all.width_px, all.height_px, all.rgb);
+}
+
+void draw_and_report(const Arguments& arguments, const Subject& subject, Renderer* renderer) {
+  const Rig& rig = renderer->config().rig;
+  const int num_views = static_cast<int>(subject.views.size()), num_cameras = static_cast<int>(rig.cameras.size());
+  HostImages images(rig, num_views, PixelFormat::u8, arguments.planes.empty() ? Planes::none : Planes::all);
+  const double rate = draw(subject, renderer, &images);
+  write_pictures(arguments, subject, rig, images);
 
   Hash64 hash;
   hash.add(Span<const uint8_t>(images.bytes()));
-  const double rate = num_views / seconds[2];
+  const std::string sheet = arguments.out + "/contact_sheet.png";
   if (arguments.json) {
     print_json({{"backend", renderer->name()},
                 {"images", num_views * num_cameras},
@@ -92,12 +114,60 @@ void run(const Arguments& arguments) {
   }
 }
 
+void render_scene_file(const Arguments& arguments) {
+  const SceneFile file = load_scene(arguments.world.map);
+  const auto renderer = open_renderer(arguments, file.config);
+  draw_and_report(arguments, {{file.geometry}, file.scene.batch(), file.views, file.view_names, file.view_captions},
+                  renderer.get());
+}
+
+void render_world(const Arguments& arguments) {
+  const Pair size = parse_pair("--size", arguments.size, 8192);
+  if (!arguments.rig.empty() && arguments.size_given) fail_usage("--size: the rig of --rig has sizes of its own");
+  if (arguments.views > arguments.world.agents) {
+    fail_usage("--views: expected 1 to {} (one per agent), got {}", arguments.world.agents, arguments.views);
+  }
+  RendererConfig config;
+  config.rig = arguments.rig.empty() ? paper_rig(size.first, size.second) : load_rig(arguments.rig);
+  config.line_floor_px = arguments.line_floor_px;
+  const auto renderer = open_renderer(arguments, config);
+
+  const auto pilot = make_pilot("random", arguments.world.seed, arguments.backend, arguments.world.num_threads);
+  const auto simulator = make_world(arguments.world, pilot.get());
+  std::vector<int32_t> actions(static_cast<size_t>(simulator->num_slots()));
+  for (int step = 0; step < arguments.steps; ++step) {
+    if (interrupted()) throw Interrupted(fmt::format("interrupted at step {} of {}", step, arguments.steps));
+    pilot->act(*simulator, actions);
+    simulator->step(actions);
+  }
+
+  Subject subject{simulator->geometries(),
+                  simulator->scene(),
+                  simulator->views().subspan(0, static_cast<size_t>(arguments.views)),
+                  {},
+                  {}};
+  for (int view = 0; view < arguments.views; ++view) subject.names.push_back(fmt::format("agent{:03}", view));
+  subject.captions = subject.names;
+  draw_and_report(arguments, subject, renderer.get());
+}
+
+// A scene file says these things itself.
+void refuse_world_options(const CLI::App& command) {
+  for (const char* option :
+       {"--agents", "--seed", "--no-walls", "--steps", "--views", "--size", "--rig", "--line-floor"}) {
+    if (command.count(option) > 0) fail_usage("{}: has no effect on a scene file, which says that itself", option);
+  }
+}
+
 }  // namespace
 
 void add_render_command(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("render", "Write what the cameras of some agents see");
-  command->add_option("MAP", arguments->world.map, "A .xodr file, a town's name, or procedural[:SEED]")->required();
+  command
+      ->add_option("MAP", arguments->world.map,
+                   "A .xodr file, a town's name, procedural[:SEED], or a scene file (.toml)")
+      ->required();
   add_world_options(command, &arguments->world);
   command->add_option("--steps", arguments->steps, "Steps of random actions before the pictures")
       ->check(CLI::NonNegativeNumber)
@@ -119,13 +189,24 @@ void add_render_command(CLI::App& app) {
                    "Least width of a line on screen in pixels; 0 turns it off")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
+  command->add_option("--planes", arguments->planes, "Also write these planes as pictures: depth, class, instance")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"depth", "class", "instance"}));
+  command->add_flag("--figure", arguments->figure,
+                    "Also write VIEW.png, its first camera enlarged with a caption, and figure.png with all of them");
   command->add_option("--out", arguments->out, "Folder for the pictures")->required();
   command->add_flag("--json", arguments->json, "Print one JSON object");
-  command->footer("Example:\n  pictura render Town01 --agents 80 --steps 100 --views 6 --size 192x108 --out images");
-  command->callback([arguments, size] {
+  command->footer(
+      "Examples:\n  pictura render Town01 --agents 80 --steps 100 --views 6 --size 192x108 --out images\n"
+      "  pictura render tests/golden/crossing.toml --backend cpu --planes depth,class --out images");
+  command->callback([arguments, size, command] {
+    if (is_scene_file(arguments->world.map)) {
+      refuse_world_options(*command);
+      return render_scene_file(*arguments);
+    }
     arguments->size_given = size->count() > 0;
     arguments->world.vector_observations = false;
-    run(*arguments);
+    render_world(*arguments);
   });
 }
 

@@ -1,11 +1,11 @@
 #include "pictura/common/camera.h"
 
 #include <cmath>
-
-#include <toml++/toml.h>
+#include <set>
 
 #include "pictura/common/error.h"
 #include "pictura/common/file.h"
+#include "pictura/common/toml_fields.h"
 
 namespace pictura {
 
@@ -13,8 +13,6 @@ namespace {
 
 constexpr int kMaxSize_px = 8192;
 constexpr std::size_t kMaxCameras = 64;
-
-float radians(double degrees) { return static_cast<float>(degrees * (3.14159265358979323846 / 180.0)); }
 
 }  // namespace
 
@@ -39,7 +37,7 @@ Rig paper_rig(int width_px, int height_px) {
     camera.center_x_px = 0.5f * static_cast<float>(width_px);
     camera.center_y_px = 0.5f * static_cast<float>(height_px);
     camera.position_m = row.position_m;
-    camera.yaw_rad = radians(row.yaw_deg);
+    camera.yaw_rad = radians_of(row.yaw_deg);
     rig.cameras.push_back(camera);
   }
   validate(rig);
@@ -65,73 +63,36 @@ void validate(const Rig& rig) {
   }
 }
 
-Rig load_rig(const std::string& path) {
-  toml::table table;
-  try {
-    table = toml::parse(read_file(path, 1 << 20), path);
-  } catch (const toml::parse_error& error) {
-    fail("{}:{}: {}", path, error.source().begin.line, error.description());
-  }
-  const toml::array* cameras = table["camera"].as_array();
-  PICTURA_CHECK(cameras && !cameras->empty(), "{}: expected one or more [[camera]] tables", path);
-
+Rig read_cameras(TomlFields* fields_inout) {
   Rig rig;
-  for (std::size_t i = 0; i < cameras->size(); ++i) {
-    const toml::table* row = cameras->get(i)->as_table();
-    PICTURA_CHECK(row, "{}: camera {}: expected a table", path, i);
+  std::set<std::string> names;
+  for (TomlFields& row : fields_inout->tables("camera")) {
+    constexpr TomlFields::Range kSize_px{1, kMaxSize_px}, kFocal_px{1e-3, 1e6}, kAny{-1e6, 1e6};
     Camera camera;
-    camera.name = (*row)["name"].value_or(fmt::format("camera{}", i));
-    double width = 0, height = 0, focal_px = 0, center_x_px = -1, center_y_px = -1, yaw_deg = 0, pitch_deg = 0,
-           roll_deg = 0;
-    double x_m = 0, y_m = 0, z_m = 0;
-    for (const auto& [key, value] : *row) {
-      const std::string_view name = key.str();
-      if (name == "name") continue;
-      const auto number = value.value<double>();
-      PICTURA_CHECK(number.has_value(), "{}:{}: camera {} '{}': {}: expected a number", path, value.source().begin.line,
-                    i, camera.name, name);
-      if (name == "width_px")
-        width = *number;
-      else if (name == "height_px")
-        height = *number;
-      else if (name == "focal_px")
-        focal_px = *number;
-      else if (name == "center_x_px")
-        center_x_px = *number;
-      else if (name == "center_y_px")
-        center_y_px = *number;
-      else if (name == "x_m")
-        x_m = *number;
-      else if (name == "y_m")
-        y_m = *number;
-      else if (name == "z_m")
-        z_m = *number;
-      else if (name == "yaw_deg")
-        yaw_deg = *number;
-      else if (name == "pitch_deg")
-        pitch_deg = *number;
-      else if (name == "roll_deg")
-        roll_deg = *number;
-      else
-        fail(
-            "{}:{}: camera {} '{}': unknown key '{}'; known: name width_px height_px focal_px center_x_px "
-            "center_y_px x_m y_m z_m yaw_deg pitch_deg roll_deg",
-            path, value.source().begin.line, i, camera.name, name);
-    }
-    PICTURA_CHECK(width >= 1 && width <= kMaxSize_px && height >= 1 && height <= kMaxSize_px,
-                  "{}: camera {} '{}': expected a size of 1x1 to {}x{} pixels, got {}x{}", path, i, camera.name,
-                  kMaxSize_px, kMaxSize_px, width, height);
-    camera.width_px = static_cast<int>(width);
-    camera.height_px = static_cast<int>(height);
-    camera.focal_x_px = camera.focal_y_px = static_cast<float>(focal_px);
-    camera.center_x_px = static_cast<float>(center_x_px < 0 ? 0.5 * camera.width_px : center_x_px);
-    camera.center_y_px = static_cast<float>(center_y_px < 0 ? 0.5 * camera.height_px : center_y_px);
-    camera.position_m = {static_cast<float>(x_m), static_cast<float>(y_m), static_cast<float>(z_m)};
-    camera.yaw_rad = radians(yaw_deg);
-    camera.pitch_rad = radians(pitch_deg);
-    camera.roll_rad = radians(roll_deg);
+    camera.name = row.file_name("name", fmt::format("camera{}", rig.cameras.size()));
+    row.rename(fmt::format("camera {} '{}'", rig.cameras.size(), camera.name));
+    if (!names.insert(camera.name).second) row.refuse("name", fmt::format("'{}' is taken", camera.name));
+    camera.width_px = row.integer("width_px", kSize_px);
+    camera.height_px = row.integer("height_px", kSize_px);
+    camera.focal_x_px = camera.focal_y_px = row.number("focal_px", kFocal_px);
+    camera.center_x_px = row.number("center_x_px", kAny, 0.5f * static_cast<float>(camera.width_px));
+    camera.center_y_px = row.number("center_y_px", kAny, 0.5f * static_cast<float>(camera.height_px));
+    camera.position_m = {row.number("x_m", kAny, 0), row.number("y_m", kAny, 0), row.number("z_m", kAny, 0)};
+    camera.yaw_rad = radians_of(row.number("yaw_deg", kAny, 0));
+    camera.pitch_rad = radians_of(row.number("pitch_deg", kAny, 0));
+    camera.roll_rad = radians_of(row.number("roll_deg", kAny, 0));
+    row.refuse_unknown();
     rig.cameras.push_back(camera);
   }
+  return rig;
+}
+
+Rig load_rig(const std::string& path) {
+  const toml::table table = parse_toml(read_file(path, 1 << 20), path);
+  TomlFields fields(table, path);
+  const Rig rig = read_cameras(&fields);
+  fields.refuse_unknown();
+  PICTURA_CHECK(!rig.cameras.empty(), "{}: expected one or more [[camera]] tables", path);
   try {
     validate(rig);
   } catch (const Error& error) {

@@ -17,7 +17,8 @@ std::size_t bytes_per_value(PixelFormat format) {
   }
 }
 
-HostImages::HostImages(const Rig& rig, int num_views, PixelFormat format) : format_(format), num_views_(num_views) {
+HostImages::HostImages(const Rig& rig, int num_views, PixelFormat format, Planes planes)
+    : format_(format), num_views_(num_views) {
   validate(rig);
   PICTURA_CHECK(num_views >= 0, "images: expected a number of views of 0 or more, got {}", num_views);
 
@@ -50,6 +51,23 @@ HostImages::HostImages(const Rig& rig, int num_views, PixelFormat format) : form
                   static_cast<std::size_t>(block.next_camera++ * image_values) * bytes_per_value(format);
     images.view_stride = cameras_of_size[size] * image_values;
     cameras_.push_back(images);
+  }
+  if (planes == Planes::none) return;
+  std::size_t pixels = 0;
+  auto pixels_of = [&](const CameraImages& camera) {
+    return static_cast<std::size_t>(num_views) * static_cast<std::size_t>(camera.width_px) *
+           static_cast<std::size_t>(camera.height_px);
+  };
+  for (const CameraImages& camera : cameras_) pixels += pixels_of(camera);
+  depth_m_.resize(pixels);
+  class_id_.resize(pixels);
+  instance_id_.resize(pixels);
+  pixels = 0;
+  for (CameraImages& camera : cameras_) {
+    camera.depth_m = depth_m_.data() + pixels;
+    camera.class_id = class_id_.data() + pixels;
+    camera.instance_id = instance_id_.data() + pixels;
+    pixels += pixels_of(camera);
   }
 }
 

@@ -36,12 +36,14 @@ struct ImageBatch {
   Span<const CameraImages> cameras;  // [cameras of the rig]
 };
 
-/// Host memory for the images of a rig, colour only: one block per distinct size, in the order of first appearance.
+enum class Planes : uint8_t { none, all };  // depth, class and instance
+
+/// Host memory for the images of a rig. Colour: one block per distinct size, in the order of first appearance.
 class HostImages {
  public:
-  HostImages(const Rig& rig, int num_views, PixelFormat format = PixelFormat::u8);
+  HostImages(const Rig& rig, int num_views, PixelFormat format = PixelFormat::u8, Planes planes = Planes::none);
   ImageBatch batch();
-  /// The bytes of all blocks in order: what image_hash is taken over.
+  /// The bytes of all blocks of colour in order: what image_hash is taken over.
   Span<const uint8_t> bytes() const { return bytes_; }
   Span<uint8_t> bytes() { return bytes_; }
   const CameraImages& camera(int index) const { return cameras_[static_cast<size_t>(index)]; }
@@ -52,6 +54,9 @@ class HostImages {
   PixelFormat format_;
   int num_views_;
   std::vector<uint8_t> bytes_;
+  std::vector<float> depth_m_;  // of each plane [cameras][views, height, width], or empty
+  std::vector<uint8_t> class_id_;
+  std::vector<uint16_t> instance_id_;
   std::vector<CameraImages> cameras_;
 };
 

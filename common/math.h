@@ -9,6 +9,9 @@ namespace pictura {
 constexpr float kPi = 3.14159265358979323846f;
 constexpr float kTwoPi = 6.28318530717958647692f;
 constexpr float kHalfPi = 1.57079632679489661923f;
+PICTURA_HD constexpr float radians_of(double degrees) {
+  return static_cast<float>(degrees * (3.14159265358979323846 / 180.0));
+}
 
 struct Vec2 {
   float x = 0, y = 0;

@@ -25,6 +25,28 @@ void StaticGeometry::build_grids() {
   wall_grid = Grid(boxes, kGeometryCell_m);
 }
 
+AgentBox make_box(AgentClass agent_class, Vec3 center_m, float heading_rad, Vec3 size_m) {
+  const SinCos heading = sincos_of(heading_rad);
+  AgentBox box;
+  box.center_m = center_m;
+  box.cos_heading = heading.cos;
+  box.sin_heading = heading.sin;
+  box.length_m = size_m.x;
+  box.width_m = size_m.y;
+  box.height_m = size_m.z;
+  box.agent_class = agent_class;
+  return box;
+}
+
+View make_view(Vec3 origin_m, float heading_rad) {
+  const SinCos heading = sincos_of(heading_rad);
+  View view;
+  view.origin_m = origin_m;
+  view.cos_heading = heading.cos;
+  view.sin_heading = heading.sin;
+  return view;
+}
+
 void append_strips(Span<const Vec3> points_m, float width_m, Rgb color, StripKind kind,
                    std::vector<Strip>* strips_out) {
   PICTURA_CHECK(points_m.size() >= 2, "polyline: expected at least two points, got {}", points_m.size());

@@ -23,6 +23,32 @@ struct StaticGeometry {
   StaticGeometryView view() const { return {strips, walls, heads, strip_grid.view(), wall_grid.view(), num_signals}; }
 };
 
+/// A SceneBatch with its memory, on the host.
+struct SceneOwner {
+  std::vector<int32_t> world_begin{0};
+  std::vector<AgentBox> agents;
+  std::vector<GeometryHandle> geometry;
+  std::vector<int32_t> light_begin{0};
+  std::vector<LightState> light_states;
+  std::vector<int32_t> hidden_agents;
+
+  SceneBatch batch() const {
+    return {MemorySpace::host, world_begin, agents, geometry, light_begin, light_states, hidden_agents};
+  }
+  /// Closes a world: agents and lights added since the last call belong to it.
+  void end_world(GeometryHandle handle) {
+    world_begin.push_back(static_cast<int32_t>(agents.size()));
+    light_begin.push_back(static_cast<int32_t>(light_states.size()));
+    geometry.push_back(handle);
+  }
+};
+
+/// A drawn box of the class's colours; size_m is its length, width and height.
+AgentBox make_box(AgentClass agent_class, Vec3 center_m, float heading_rad, Vec3 size_m);
+
+/// A view at a pose, with nobody left out.
+View make_view(Vec3 origin_m, float heading_rad);
+
 /// Cuts polylines (at least two points each) into mitred strips of at most kMaxPiece_m and appends them.
 void append_strips(Span<const Vec3> points_m, float width_m, Rgb color, StripKind kind, std::vector<Strip>* strips_out);
 

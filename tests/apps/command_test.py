@@ -18,6 +18,7 @@ import unittest.mock
 
 PICTURA = ""
 CONFIGS = pathlib.Path(__file__).resolve().parents[2] / "configs"
+SCENES = pathlib.Path(__file__).resolve().parents[1] / "golden"
 # A policy and a world so small that an update takes well under a second.
 TINY = [
     "--config", str(CONFIGS / "smoke.toml"),
@@ -198,6 +199,28 @@ class Images(CommandCase):
             hashes.add(result["image_hash"])
         self.assertEqual(len(hashes), 1)
         self.assertRegex(hashes.pop(), "^[0-9a-f]{16}$")
+
+    def test_a_scene_file_is_drawn_with_its_planes_and_a_figure(self):
+        out = self.folder / "scene"
+        result = self.json_of("render", SCENES / "left_out.toml", "--backend", "cpu", "--planes", "depth,class,instance",
+                              "--figure", "--out", out)  # fmt: skip
+        self.assertEqual((result["backend"], result["images"], result["cameras"]), ("cpu", 3, 1))
+        self.assertRegex(result["image_hash"], "^[0-9a-f]{16}$")
+        views = ["nobody_hidden", "two_hidden", "from_the_other"]
+        planes = ["", "_depth", "_class", "_instance"]
+        names = [f"{view}_front{plane}.png" for view in views for plane in planes]
+        names += [f"{view}.png" for view in views] + ["figure.png", "contact_sheet.png"]
+        self.assertEqual(sorted(path.name for path in out.iterdir()), sorted(names))
+
+    def test_bad_scene_files_are_refused_with_their_line(self):
+        text = (SCENES / "vehicles.toml").read_text().replace('rig = "rigs/front.toml"', "size_px = [8, 8]")
+        bad = self.folder / "bad.toml"
+        render = ["render", bad, "--backend", "cpu", "--out", self.folder / "images"]
+        bad.write_text(text.replace("length_m = 4.4", "length_m = -1.0"))
+        self.assert_refused(1, "bad.toml:22: agent 0: length_m: expected a number in [0, 1000], got -1", *render)
+        bad.write_text(text)
+        self.assert_refused(2, "--agents: has no effect on a scene file", *render, "--agents", 4)
+        self.assert_refused(2, "colour", *render, "--planes", "colour")
 
     def test_bad_arguments_are_refused_by_name(self):
         town = self.town()

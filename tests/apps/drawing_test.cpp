@@ -15,6 +15,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "pictura/apps/draw_planes.h"
 #include "pictura/apps/draw_plot.h"
 #include "pictura/apps/draw_world.h"
 #include "pictura/apps/video.h"
@@ -434,7 +435,7 @@ TEST(ContactSheet, EnlargesEveryPixelWithoutSmoothing) {
   const CameraImages& camera = images.camera(1);
   auto* data = static_cast<uint8_t*>(camera.data) + 2 * camera.view_stride;
   data[3 * 8 + 5] = 255;
-  const RgbImage sheet = contact_sheet(images, rig, 3, 4);
+  const RgbImage sheet = contact_sheet(images, rig, {"0", "1", "2"}, 4);
   EXPECT_EQ(count(sheet, {255, 0, 0}), 16);
   int x0 = -1, y0 = -1;
   for (int y = 0; y < sheet.height_px && y0 < 0; ++y) {
@@ -449,8 +450,52 @@ TEST(ContactSheet, EnlargesEveryPixelWithoutSmoothing) {
   EXPECT_NE(at(sheet, x0 - 5 * 4 - 1, y0), (Pixel{0, 0, 0}));
   EXPECT_EQ(at(sheet, x0 + 3 * 4 - 1, y0 + 3 * 4 - 1), (Pixel{0, 0, 0}));
   EXPECT_NE(at(sheet, x0 + 3 * 4, y0), (Pixel{0, 0, 0}));
-  EXPECT_GT(contact_sheet(images, rig, 1).width_px, 1500);
-  EXPECT_THROW(contact_sheet(images, rig, 0), Error);
+  EXPECT_GT(contact_sheet(images, rig, {"0"}).width_px, 1500);
+  EXPECT_THROW(contact_sheet(images, rig, {}), Error);
+}
+
+TEST(Figure, PanelsStandInRowsOfThreeOverTheirCaptions) {
+  HostImages images(paper_rig(8, 6), 1);
+  static_cast<uint8_t*>(images.camera(0).data)[0] = 255;  // the corner is red
+  const RgbImage panel = captioned(images, 0, 0, "(a) a corner");
+  EXPECT_EQ(panel.width_px, 480);
+  EXPECT_EQ(count(panel, {255, 0, 0}), 60 * 60);
+  EXPECT_GT(panel.height_px, 360);
+  const RgbImage figure = assembled({panel, panel, panel, panel});
+  EXPECT_EQ(count(figure, {255, 0, 0}), 4 * 60 * 60);
+  EXPECT_EQ(at(figure, 0, panel.height_px + 6), (Pixel{255, 0, 0}));
+  EXPECT_EQ(at(figure, 2 * (panel.width_px + 6), 0), (Pixel{255, 0, 0}));
+  EXPECT_EQ(at(figure, panel.width_px + 3, 0), (Pixel{255, 255, 255}));
+  EXPECT_THROW(assembled({}), Error);
+  EXPECT_THROW(assembled({panel, figure}), Error);
+}
+
+TEST(Planes, HaveTheirColors) {
+  Rig rig = paper_rig(4, 1);
+  HostImages images(rig, 2, PixelFormat::u8, Planes::all);
+  const CameraImages& camera = images.camera(1);
+  const float depths_m[] = {std::numeric_limits<float>::infinity(), 0.5f, 60, 119.99f};
+  for (size_t i = 0; i < 4; ++i) {
+    camera.depth_m[4 + i] = depths_m[i];
+    camera.class_id[4 + i] = static_cast<uint8_t>(3 * i);
+    camera.instance_id[4 + i] = static_cast<uint16_t>(i / 2);
+  }
+  const RgbImage depth = plane_picture(images, 1, 1, Plane::depth);
+  EXPECT_EQ(at(depth, 0, 0), (Pixel{0, 0, 0}));
+  EXPECT_EQ(at(depth, 1, 0), (Pixel{254, 254, 254}));
+  EXPECT_EQ(at(depth, 2, 0), (Pixel{128, 128, 128}));
+  EXPECT_EQ(at(depth, 3, 0), (Pixel{1, 1, 1}));
+  const RgbImage classes = plane_picture(images, 1, 1, Plane::class_id);
+  EXPECT_EQ(at(classes, 0, 0), (Pixel{0, 0, 0}));
+  EXPECT_EQ(at(classes, 1, 0), (Pixel{128, 237, 153}));
+  EXPECT_EQ(at(classes, 2, 0), (Pixel{225, 230, 240}));
+  EXPECT_EQ(at(classes, 3, 0), (Pixel{98, 183, 249}));
+  const RgbImage instances = plane_picture(images, 1, 1, Plane::instance_id);
+  EXPECT_EQ(at(instances, 1, 0), (Pixel{0, 0, 0}));
+  EXPECT_EQ(at(instances, 2, 0), at(instances, 3, 0));
+  EXPECT_NE(at(instances, 2, 0), (Pixel{0, 0, 0}));
+  EXPECT_THROW(plane_by_name("colour"), UsageError);
+  EXPECT_THROW(plane_picture(HostImages(rig, 1), 0, 0, Plane::depth), Error);
 }
 
 TEST(Plots, TicksAreRound) {

@@ -71,16 +71,25 @@ TEST(Rig, ARigFileIsRead) {
 TEST(Rig, BadRigsAreRefusedByName) {
   EXPECT_THAT(
       message_of([] { load_rig(written("[[camera]]\nname = \"a\"\nwidth_px = 0\nheight_px = 0\nfocal_px = 3\n")); }),
-      HasSubstr("camera 0 'a': expected a size of 1x1"));
+      HasSubstr(".toml:3: camera 0 'a': width_px: expected an integer in [1, 8192], got 0"));
   EXPECT_THAT(message_of([] { load_rig(written("[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = -3\n")); }),
-              HasSubstr("positive focal"));
+              HasSubstr("focal_px: expected a number in [0.001, 1000000], got -3"));
   EXPECT_THAT(
       message_of([] { load_rig(written("[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = 3\nzoom = 2\n")); }),
       HasSubstr("unknown key 'zoom'"));
   EXPECT_THAT(message_of([] { load_rig(written("[[camera]]\nwidth_px = nan\nheight_px = 8\nfocal_px = 3\n")); }),
-              HasSubstr("expected a size"));
+              HasSubstr("got nan"));
+  EXPECT_THAT(message_of([] { load_rig(written("[[camera]]\nwidth_px = 8\nheight_px = 8\n")); }),
+              HasSubstr(":1: camera 0 'camera0': focal_px: is missing"));
+  EXPECT_THAT(message_of([] { load_rig(written("[[camera]]\nname = '../a'\n")); }), HasSubstr("'../a'"));
+  EXPECT_THAT(message_of([] {
+                const std::string one = "[[camera]]\nname = 'a'\nwidth_px = 8\nheight_px = 8\nfocal_px = 9\n";
+                load_rig(written(one + one));
+              }),
+              HasSubstr("'a' is taken"));
   EXPECT_THAT(message_of([] { load_rig(written("[[camera\n")); }), HasSubstr(":1: "));
-  EXPECT_THAT(message_of([] { load_rig(written("x = 1\n")); }), HasSubstr("[[camera]]"));
+  EXPECT_THAT(message_of([] { load_rig(written("x = 1\n")); }), HasSubstr("unknown key 'x'"));
+  EXPECT_THAT(message_of([] { load_rig(written("\n")); }), HasSubstr("[[camera]]"));
   EXPECT_THAT(message_of([] { load_rig("/no/such/rig.toml"); }), HasSubstr("/no/such/rig.toml: no such file"));
   EXPECT_THAT(message_of([] { paper_rig(0, 54); }), HasSubstr("got 0x54"));
 }

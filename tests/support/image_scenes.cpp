@@ -4,28 +4,6 @@
 
 namespace pictura {
 
-AgentBox make_box(AgentClass agent_class, Vec3 center_m, float heading_rad, Vec3 size_m) {
-  const SinCos heading = sincos_of(heading_rad);
-  AgentBox box;
-  box.center_m = center_m;
-  box.cos_heading = heading.cos;
-  box.sin_heading = heading.sin;
-  box.length_m = size_m.x;
-  box.width_m = size_m.y;
-  box.height_m = size_m.z;
-  box.agent_class = agent_class;
-  return box;
-}
-
-View make_view(Vec3 origin_m, float heading_rad) {
-  const SinCos heading = sincos_of(heading_rad);
-  View view;
-  view.origin_m = origin_m;
-  view.cos_heading = heading.cos;
-  view.sin_heading = heading.sin;
-  return view;
-}
-
 void add_polyline(StaticGeometry* geometry, std::vector<Vec3> points_m, float width_m, StripKind kind) {
   const Rgb color = kind == StripKind::road_edge   ? kRoadEdgeColor
                     : kind == StripKind::crosswalk ? kCrosswalkColor

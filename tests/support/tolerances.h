@@ -44,4 +44,20 @@ constexpr double kKernelWorstError = 4.0 / 255;
 constexpr double kLeastGlPsnr1_db = 24.0, kLeastGlPsnr2x2_db = 31.7, kLeastGlPsnrMsaa4_db = 34.4,
                  kLeastGlPsnr4x4_db = 39.0, kLeastGlPsnr8x8_db = 46.5;
 
+/// How far a golden scene's images (tests/golden) may be from others of it: the worst value, the share of values that
+/// may be further off than usual, and the pooled PSNR. golden_test shows that seeded faults are beyond each.
+struct ImageTolerance {
+  const char* name;
+  double worst, usual, share_above_usual, least_psnr_db;
+};
+/// The oracle against its own pictures: its arithmetic is the same on every machine (docs/house.md).
+constexpr ImageTolerance kGoldenOracle{"oracle", 0, 0, 0, 0};
+/// The CUDA renderer against the oracle's pictures: the design's promise, as above.
+constexpr ImageTolerance kGoldenKernel{"kernel", kKernelWorstError, kKernelError, 1 - kKernelShareWithin, 0};
+/// The oracle against the truth, in floats: the promised PSNR in every scene, where there is no town to average over.
+/// The worst value is 20/255, where marks of a ramp hide each other edge on; elsewhere it is 12/255.
+constexpr ImageTolerance kGoldenTruth{"truth", 24.0 / 255, 1.0 / 255, 1, kLeastOraclePsnr_db};
+/// The same for images of a single pixel, in which dozens of things share 64 samples and nothing averages out.
+constexpr ImageTolerance kGoldenTruthOnePixel{"truth, one pixel", 8.0 / 255, 1.0 / 255, 1, 0};
+
 }  // namespace pictura

@@ -1,0 +1,19 @@
+// Depth, class and instance planes as pictures.
+#pragma once
+
+#include <string>
+
+#include "pictura/common/image.h"
+
+namespace pictura {
+
+enum class Plane { depth, class_id, instance_id };
+
+/// "depth", "class" or "instance"; throws UsageError for others.
+Plane plane_by_name(const std::string& name);
+
+/// A plane of one image, black where nothing is. Depth: grey 255 x (1 - depth / 120 m), at least 1. Class: the colour
+/// of the thing's kind in docs/image.md (vehicles: their right side's). Instance: a hue per agent, black for all else.
+RgbImage plane_picture(const HostImages& images, int view, int camera, Plane plane);
+
+}  // namespace pictura

@@ -1,0 +1,29 @@
+// A scene in one TOML file: boxes, lines, walls, lights, a rig and views; docs/scene_file.md documents every key. What
+// `pictura render` and the golden tests draw, and what a report of a wrong image should carry.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pictura/common/renderer.h"
+
+namespace pictura {
+
+/// All that a renderer is told to draw a scene; one world of one geometry.
+struct SceneFile {
+  RendererConfig config;  // rig, line floor and palette
+  StaticGeometry geometry;
+  SceneOwner scene;  // its world's geometry handle is 0
+  std::vector<View> views;
+  std::vector<std::string> view_names, view_captions;  // [views]; names may stand in file names
+};
+
+/// Reads a scene's text. A rig file that it names is looked up relative to `folder`. Throws Error naming source, line,
+/// table and key for unknown and missing keys, wrong types, numbers out of range and indices of agents that do not
+/// exist.
+SceneFile parse_scene(const std::string& text, const std::string& source, const std::string& folder = ".");
+
+/// Reads a scene file of up to 1 MiB.
+SceneFile load_scene(const std::string& path);
+
+}  // namespace pictura

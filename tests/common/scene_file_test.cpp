@@ -1,0 +1,187 @@
+// Scenes as text: what each table becomes, and what bad files get.
+#include "pictura/common/scene_file.h"
+
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/common/error.h"
+#include "pictura/common/file.h"
+#include "pictura/tests/support/scratch_folder.h"
+
+namespace pictura {
+namespace {
+
+using testing::HasSubstr;
+
+const std::string kView = "[[view]]\nx_m = 1.0\ny_m = 2.0\nheading_deg = 90.0\n";
+const std::string kAgent =
+    "[[agent]]\nclass = 'cyclist'\nx_m = 5.0\ny_m = -1.0\nheading_deg = 180.0\nlength_m = 1.8\nwidth_m = 0.6\n"
+    "height_m = 1.7\n";
+
+std::string message_of(const std::string& text) {
+  try {
+    parse_scene(text, "s.toml");
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(SceneFile, TheSmallestSceneIsAView) {
+  const SceneFile scene = parse_scene(kView, "s.toml");
+  ASSERT_EQ(scene.views.size(), 1u);
+  EXPECT_EQ(scene.views[0].origin_m.x, 1);
+  EXPECT_EQ(scene.views[0].origin_m.y, 2);
+  EXPECT_NEAR(scene.views[0].sin_heading, 1, 1e-6);
+  EXPECT_EQ(scene.views[0].ego_agent, -1);
+  EXPECT_EQ(scene.views[0].body_length_m, View::kRigBodyLength_m);
+  EXPECT_EQ(scene.view_names[0], "view0");
+  EXPECT_EQ(scene.config.rig.cameras.size(), 4u);
+  EXPECT_EQ(scene.config.rig.cameras[0].width_px, 96);
+  EXPECT_EQ(scene.config.line_floor_px, RendererConfig{}.line_floor_px);
+  EXPECT_EQ(scene.scene.world_begin, (std::vector<int32_t>{0, 0}));
+}
+
+TEST(SceneFile, AgentsViewsAndSettings) {
+  const SceneFile scene = parse_scene("size_px = [33, 21]\nline_floor_px = 0.5\ndebug_palette = true\n" + kAgent +
+                                          "palette = 'parked'\ndrawn = false\n" + kAgent + kView +
+                                          "ego = 1\nhidden = [0, 1]\nname = 'from-1'\ncaption = \"the second's\"\n" +
+                                          kView + "hidden = [1]\nbody_length_m = 3.0\n",
+                                      "s.toml");
+  EXPECT_EQ(scene.config.rig.cameras[3].height_px, 21);
+  EXPECT_EQ(scene.config.line_floor_px, 0.5f);
+  EXPECT_TRUE(scene.config.debug_palette);
+  const AgentBox& box = scene.scene.agents[0];
+  EXPECT_EQ(box.agent_class, AgentClass::cyclist);
+  EXPECT_EQ(box.palette, 2);
+  EXPECT_EQ(box.drawn, 0);
+  EXPECT_NEAR(box.cos_heading, -1, 1e-6);
+  EXPECT_EQ(box.height_m, 1.7f);
+  EXPECT_EQ(scene.scene.agents[1].drawn, 1);
+  EXPECT_EQ(scene.views[0].ego_agent, 1);
+  EXPECT_EQ(scene.views[0].body_length_m, 1.8f);
+  EXPECT_EQ(scene.views[0].hidden_end, 2);
+  EXPECT_EQ(scene.views[1].hidden_begin, 2);
+  EXPECT_EQ(scene.views[1].hidden_end, 3);
+  EXPECT_EQ(scene.views[1].body_length_m, 3);
+  EXPECT_EQ(scene.scene.hidden_agents, (std::vector<int32_t>{0, 1, 1}));
+  EXPECT_EQ(scene.view_names, (std::vector<std::string>{"from-1", "view1"}));
+  EXPECT_EQ(scene.view_captions[0], "the second's");
+}
+
+TEST(SceneFile, WallsAndLights) {
+  const SceneFile scene =
+      parse_scene(kView +
+                      "[[wall]]\npoints_m = [[0, 1], [2, 3, 1], [4, 5]]\nheight_m = 2.5\n"
+                      "[[wall]]\npoints_m = [[0, 1], [2, 3]]\nheight_m = 1\ncolor_rgb = [255, 51, 0]\n"
+                      "[[light]]\nx_m = 7\ny_m = 8\nz_m = 5\nfacing_deg = -90\nstate = 'yellow'\nhalf_angle_deg = 90\n"
+                      "[[light]]\nx_m = 7\ny_m = 8\nfacing_deg = 0\nstate = 'off'\n",
+                  "s.toml");
+  ASSERT_EQ(scene.geometry.walls.size(), 3u);
+  EXPECT_EQ(scene.geometry.walls[0].b_m.z, 1);
+  EXPECT_EQ(scene.geometry.walls[1].a_m.x, 2);
+  EXPECT_EQ(scene.geometry.walls[1].color.r, kWallColor.r);
+  EXPECT_EQ(scene.geometry.walls[2].color.g, 0.2f);
+  ASSERT_EQ(scene.geometry.heads.size(), 2u);
+  EXPECT_EQ(scene.geometry.num_signals, 2);
+  EXPECT_NEAR(scene.geometry.heads[0].facing.y, -1, 1e-6);
+  EXPECT_NEAR(scene.geometry.heads[0].cos_half_angle, 0, 1e-6);
+  EXPECT_NEAR(scene.geometry.heads[1].cos_half_angle, 0.5, 1e-6);
+  EXPECT_EQ(scene.geometry.heads[1].signal, 1);
+  EXPECT_EQ(scene.scene.light_states, (std::vector{LightState::yellow, LightState::off}));
+  EXPECT_EQ(scene.scene.light_begin, (std::vector<int32_t>{0, 2}));
+}
+
+std::vector<Strip> line(const std::string& keys) {
+  return parse_scene(kView + "[[line]]\nwidth_m = 0.2\n" + keys, "s.toml").geometry.strips;
+}
+
+TEST(SceneFile, LinesByStyleAndColor) {
+  const auto solid = line("kind = 'lane_mark'\npoints_m = [[0, 0], [25, 0]]\n");
+  ASSERT_EQ(solid.size(), 3u);
+  EXPECT_EQ(solid[0].color.b, kWhiteMarkColor.b);
+  EXPECT_EQ(line("kind = 'lane_mark'\ncolor = 'yellow'\npoints_m = [[0, 0], [5, 0]]\n")[0].color.b, kYellowMarkColor.b);
+  EXPECT_EQ(line("kind = 'stop_line'\npoints_m = [[0, 0], [5, 0]]\n")[0].color.g, kStopLineColor.g);
+
+  // Dashes of 3 m with gaps of 2 m round a corner: 0-3, 5-8 over the corner at 6 m, 10-12.
+  const auto broken =
+      line("kind = 'road_edge'\nstyle = 'broken'\ndash_m = 3\ngap_m = 2\npoints_m = [[0, 0], [6, 0], [6, 6]]\n");
+  ASSERT_EQ(broken.size(), 4u);
+  EXPECT_NEAR(broken[0].b_m.x, 3, 1e-5);
+  EXPECT_NEAR(broken[1].a_m.x, 5, 1e-5);
+  EXPECT_NEAR(broken[2].b_m.y, 2, 1e-5);
+  EXPECT_EQ(broken[1].side_b.x, broken[2].side_a.x);
+  EXPECT_NEAR(broken[3].a_m.y, 4, 1e-5);
+  EXPECT_NEAR(broken[3].b_m.y, 6, 1e-5);
+
+  // A double line: both sides 0.15 m from the centre line, also round the corner.
+  const auto both =
+      line("kind = 'lane_mark'\nstyle = 'double'\nspacing_m = 0.3\npoints_m = [[0, 0], [6, 0], [6, 6]]\n");
+  ASSERT_EQ(both.size(), 4u);
+  EXPECT_NEAR(both[0].a_m.y, 0.15, 1e-6);
+  EXPECT_NEAR(both[0].b_m.x, 5.85, 1e-6);
+  EXPECT_NEAR(both[1].a_m.x, 5.85, 1e-6);
+  EXPECT_NEAR(both[2].b_m.x, 6.15, 1e-6);
+  EXPECT_NEAR(both[2].b_m.y, -0.15, 1e-6);
+
+  EXPECT_EQ(line("kind = 'crosswalk'\nclosed = true\npoints_m = [[0, 0], [3, 0], [3, 3]]\n").size(), 3u);
+}
+
+TEST(SceneFile, BadFilesAreRefusedWithTheirLine) {
+  EXPECT_THAT(message_of("[[view\n"), HasSubstr("s.toml:1: "));
+  EXPECT_THAT(message_of(""), HasSubstr("expected one or more [[view]] tables"));
+  EXPECT_THAT(message_of("sky = 1\n" + kView), HasSubstr("s.toml:1: unknown key 'sky'"));
+  EXPECT_THAT(message_of(kView + "speed_mps = 1\n"), HasSubstr("s.toml:5: view 0: unknown key 'speed_mps'"));
+  EXPECT_THAT(message_of("[[view]]\nx_m = 1.0\ny_m = 2.0\n"), HasSubstr("s.toml:1: view 0: heading_deg: is missing"));
+  EXPECT_THAT(message_of("[[view]]\nx_m = nan\n"), HasSubstr("s.toml:2: view 0: x_m: expected a number in"));
+  EXPECT_THAT(message_of("[[view]]\nx_m = inf\n"), HasSubstr("got inf"));
+  EXPECT_THAT(message_of("[[view]]\nx_m = '1'\n"), HasSubstr("expected a number"));
+  EXPECT_THAT(message_of("view = 3\n"), HasSubstr("view: expected a list, got 3"));
+  EXPECT_THAT(message_of("view = [3]\n"), HasSubstr("view: expected a table, got 3"));
+  EXPECT_THAT(message_of(kView + "ego = 0\n"), HasSubstr("view 0: ego: the scene has no agents"));
+  EXPECT_THAT(message_of(kAgent + kView + "ego = 1\n"),
+              HasSubstr("s.toml:13: view 0: ego: expected an integer in [0, 0]"));
+  EXPECT_THAT(message_of(kAgent + kView + "hidden = [0, -1]\n"),
+              HasSubstr("hidden: expected an integer in [0, 0], got -1"));
+  EXPECT_THAT(message_of(kAgent + kView + "hidden = [0.0]\n"), HasSubstr("expected an integer"));
+  EXPECT_THAT(message_of(kView + "name = '../a'\n"), HasSubstr("got '../a'"));
+  EXPECT_THAT(message_of(kView + kView + "name = 'view0'\n"), HasSubstr("'view0' is taken"));
+  EXPECT_THAT(message_of(kView + "[[agent]]\nclass = 'tram'\n"),
+              HasSubstr("s.toml:6: agent 0: class: expected one of vehicle, cyclist, pedestrian, got 'tram'"));
+  EXPECT_THAT(message_of(kView + kAgent + "drawn = 1\n"), HasSubstr("drawn: expected true or false, got 1"));
+  const std::string wall = kView + "[[wall]]\nheight_m = 2\npoints_m = ";
+  EXPECT_THAT(message_of(wall + "[[0, 0]]\n"), HasSubstr("wall 0: points_m: expected 2 points or more, got 1"));
+  EXPECT_THAT(message_of(wall + "[[0, 0], [1]]\n"), HasSubstr("expected [x, y] or [x, y, z]"));
+  EXPECT_THAT(message_of(wall + "[[0, 0], [1e9, 1]]\n"), HasSubstr("expected a number in [-10000, 10000]"));
+  EXPECT_THAT(message_of(wall + "[[0, 0], [1, 1]]\ncolor_rgb = [1, 2]\n"), HasSubstr("color_rgb: expected 3 numbers"));
+  EXPECT_THAT(message_of(wall + "[[0, 0], [1, 1]]\ncolor_rgb = [1, 2, 256]\n"), HasSubstr("got 256"));
+  const std::string mark = kView + "[[line]]\nkind = 'lane_mark'\nwidth_m = 0.1\npoints_m = [[0, 0], [9, 0]]\n";
+  EXPECT_THAT(message_of(mark + "dash_m = 1\n"), HasSubstr("unknown key 'dash_m'"));
+  EXPECT_THAT(message_of(mark + "style = 'broken'\ndash_m = 1\n"), HasSubstr("gap_m: is missing"));
+  EXPECT_THAT(message_of(mark + "style = 'broken'\ndash_m = 0.0\ngap_m = 0.0\n"), HasSubstr("dash_m: expected"));
+  EXPECT_THAT(message_of(mark + "color = 'white'\ncolor_rgb = [1, 2, 3]\n"), HasSubstr("color: is for"));
+  EXPECT_THAT(message_of("rig = 'a.toml'\n[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = 9\n" + kView),
+              HasSubstr("rig: has no effect beside [[camera]]"));
+  EXPECT_THAT(message_of("rig = 'no/such.toml'\n" + kView), HasSubstr("no/such.toml: no such file"));
+  EXPECT_THAT(message_of("size_px = [0, 8]\n" + kView), HasSubstr("size_px: expected an integer in [1, 8192], got 0"));
+  EXPECT_THAT(message_of("[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = 9\nzoom = 2\n" + kView),
+              HasSubstr("s.toml:5: camera 0 'camera0': unknown key 'zoom'"));
+  // A line that would be cut into millions of pieces is refused before it is.
+  std::string zigzag = kView + "[[line]]\nkind = 'lane_mark'\nwidth_m = 0.1\npoints_m = [";
+  for (int i = 0; i < 50; ++i) zigzag += "[-9000, 0], [9000, 0], ";
+  EXPECT_THAT(message_of(zigzag + "]\n"), HasSubstr("points_m: expected at most 100000 m of line"));
+}
+
+TEST(SceneFile, ARigFileIsFoundBesideTheScene) {
+  const test::ScratchFolder folder;
+  std::filesystem::create_directory(folder / "rigs");
+  write_file(folder / "rigs/one.toml", "[[camera]]\nname = 'one'\nwidth_px = 8\nheight_px = 4\nfocal_px = 9\n");
+  write_file(folder / "scene.toml", "rig = 'rigs/one.toml'\n" + kView);
+  EXPECT_EQ(load_scene(folder / "scene.toml").config.rig.cameras[0].name, "one");
+  EXPECT_THROW(load_scene(folder / "none.toml"), Error);
+}
+
+}  // namespace
+}  // namespace pictura

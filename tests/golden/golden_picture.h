@@ -1,0 +1,40 @@
+// A scene's images as one picture, and how far two pictures are apart.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pictura/common/scene_file.h"
+#include "pictura/tests/support/image_truth.h"
+#include "pictura/tests/support/tolerances.h"
+
+namespace pictura {
+
+/// Channel values in [0, 1] of all images of a scene: [views x cameras][3 x height x width].
+using Drawing = std::vector<std::vector<float>>;
+
+/// Draws with a backend that reads and writes host memory, in bytes or in floats.
+Drawing draw_scene(Renderer* renderer, const SceneFile& scene, PixelFormat format);
+
+/// The truth's images of the scene.
+Drawing trace_scene(const SceneFile& scene);
+
+/// Rows of views, columns of cameras, grey between and beside them.
+RgbImage to_picture(const SceneFile& scene, const Drawing& drawing);
+
+/// The images of a picture that to_picture() made. Throws Error when its size is not what the scene asks for.
+Drawing from_picture(const SceneFile& scene, const RgbImage& picture);
+
+/// |a - b| times eight.
+Drawing difference(const Drawing& a, const Drawing& b);
+
+/// Every pixel as a square of 4 x 4.
+RgbImage enlarged(const RgbImage& picture);
+
+/// Pools the error over all images.
+PooledError error_of(const Drawing& actual, const Drawing& expected);
+
+/// Why the error is not within the tolerance, or empty.
+std::string complaint(const PooledError& error, const ImageTolerance& tolerance);
+
+}  // namespace pictura
