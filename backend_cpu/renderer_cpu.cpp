@@ -56,16 +56,7 @@ class CpuRenderer final : public Renderer {
                   Span<float> visibility_out, Stream) override {
     check_scene(name(), scene, geometries_);
     check_views(name(), scene, views);
-    PICTURA_CHECK(visibility_out.size() == queries.size(),
-                  "renderer cpu: visibility: expected room for {} values, got {}", queries.size(),
-                  visibility_out.size());
-    for (std::size_t i = 0; i < queries.size(); ++i) {
-      const VisibilityQuery& query = queries[i];
-      PICTURA_CHECK(query.view >= 0 && static_cast<std::size_t>(query.view) < views.size() && query.agent >= 0 &&
-                        static_cast<std::size_t>(query.agent) < scene.agents.size(),
-                    "renderer cpu: visibility query {}: expected a view below {} and an agent below {}, got {} and {}",
-                    i, views.size(), scene.agents.size(), query.view, query.agent);
-    }
+    check_queries(name(), scene, views.size(), queries, visibility_out.size());
     parallel_for(num_threads(), static_cast<int64_t>(queries.size()), [&](int64_t i) {
       const VisibilityQuery& query = queries[static_cast<std::size_t>(i)];
       ImageDrawer& drawer = drawers_[static_cast<std::size_t>(omp_get_thread_num())];

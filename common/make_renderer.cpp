@@ -11,6 +11,7 @@ namespace pictura {
 std::unique_ptr<Renderer> make_cpu_renderer(const RendererConfig& config);
 #ifdef PICTURA_HAS_CUDA
 std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config);
+std::unique_ptr<Renderer> make_cuda_renderer_for_host(const RendererConfig& config);
 /// Empty where a CUDA device can be used, else why not.
 std::string cuda_unavailable();
 #endif
@@ -92,7 +93,8 @@ std::unique_ptr<Renderer> make_renderer(const std::string& name, const RendererC
   const std::string unavailable = cuda_unavailable();
   if (name == "cuda") {
     PICTURA_CHECK(unavailable.empty(), "renderer cuda: {}", unavailable);
-    return chosen("cuda: asked for"), make_cuda_renderer(config);
+    chosen("cuda: asked for");
+    return config.space == MemorySpace::cuda ? make_cuda_renderer(config) : make_cuda_renderer_for_host(config);
   }
   const std::string why_not_cuda =
       config.space == MemorySpace::cuda ? unavailable : "scenes and images lie in host memory";

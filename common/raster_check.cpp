@@ -117,6 +117,19 @@ void check_views(std::string_view renderer, const SceneBatch& scene, Span<const 
   }
 }
 
+void check_queries(std::string_view renderer, const SceneBatch& scene, std::size_t num_views,
+                   Span<const VisibilityQuery> queries, std::size_t num_answers) {
+  PICTURA_CHECK(num_answers == queries.size(), "renderer {}: visibility: expected room for {} values, got {}", renderer,
+                queries.size(), num_answers);
+  for (std::size_t i = 0; i < queries.size(); ++i) {
+    const VisibilityQuery& query = queries[i];
+    PICTURA_CHECK(query.view >= 0 && static_cast<std::size_t>(query.view) < num_views && query.agent >= 0 &&
+                      static_cast<std::size_t>(query.agent) < scene.agents.size(),
+                  "renderer {}: visibility query {}: expected a view below {} and an agent below {}, got {} and {}",
+                  renderer, i, num_views, scene.agents.size(), query.view, query.agent);
+  }
+}
+
 void check_geometry(std::string_view renderer, const StaticGeometry& geometry) {
   for (std::size_t i = 0; i < geometry.strips.size(); ++i) {
     const Strip& strip = geometry.strips[i];

@@ -20,6 +20,10 @@ void check_scene(std::string_view renderer, const SceneBatch& scene, Span<const 
 /// Throws Error unless each view's world, ego and hidden agents exist in the (host) scene and its pose is finite.
 void check_views(std::string_view renderer, const SceneBatch& scene, Span<const View> views);
 
+/// Throws Error unless each query's view and agent exist and there is room for as many answers.
+void check_queries(std::string_view renderer, const SceneBatch& scene, std::size_t num_views,
+                   Span<const VisibilityQuery> queries, std::size_t num_answers);
+
 /// Throws Error unless each piece is finite, has sizes of 0 or more, and names a signal that exists.
 void check_geometry(std::string_view renderer, const StaticGeometry& geometry);
 

@@ -19,7 +19,7 @@ struct PixelSamples {
 
 struct RendererConfig {
   Rig rig = paper_rig();
-  MemorySpace space = MemorySpace::host;  // where the caller keeps scenes and images; `auto` chooses by it
+  MemorySpace space = MemorySpace::host;  // where the caller keeps scenes and images
   int num_threads = 0;                    // host threads; 0: all
   float line_floor_px = 0.35f;            // least width of a strip on screen, measured across it; 0 turns the floor off
   bool debug_palette = false;             // tint halted and parked agents

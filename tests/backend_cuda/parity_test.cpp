@@ -9,9 +9,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "pictura/common/cuda/device_scene.cuh"
 #include "pictura/common/error.h"
 #include "pictura/common/make_renderer.h"
-#include "pictura/tests/support/device_scene.cuh"
 #include "pictura/tests/support/image_scenes.h"
 #include "pictura/tests/support/tolerances.h"
 
@@ -42,74 +42,29 @@ struct Outputs {
   std::vector<uint16_t> instance_id;
 };
 
-Outputs draw_on_host(const SyntheticTown& town, const RendererConfig& config) {
-  const auto renderer = make_renderer("cpu", config);
+Outputs draw(const std::string& backend, const SyntheticTown& town, const RendererConfig& config) {
+  const auto renderer = make_renderer(backend, config);
   renderer->upload(town.geometry);
+  const int num_views = static_cast<int>(town.views.size());
+  HostImages images(config.rig, num_views, PixelFormat::f32, Planes::all);
+  renderer->render(town.scene.batch(), town.views, images.batch());
   Outputs out;
+  auto append = [](auto* to, const auto* from, std::size_t count) { to->insert(to->end(), from, from + count); };
   for (std::size_t k = 0; k < config.rig.cameras.size(); ++k) {
-    // One camera at a time keeps the memory simple.
-    RendererConfig single = config;
-    single.rig.cameras = {config.rig.cameras[k]};
-    const auto one = make_renderer("cpu", single);
-    one->upload(town.geometry);
-    const auto pixels = static_cast<std::size_t>(single.rig.cameras[0].width_px * single.rig.cameras[0].height_px);
-    const std::size_t views = town.views.size();
-    std::vector<float> color(3 * pixels * views), depth(pixels * views);
-    std::vector<uint8_t> classes(pixels * views);
-    std::vector<uint16_t> instances(pixels * views);
-    const std::vector<CameraImages> cameras{{single.rig.cameras[0].width_px, single.rig.cameras[0].height_px,
-                                             color.data(), static_cast<int64_t>(3 * pixels), depth.data(),
-                                             classes.data(), instances.data()}};
-    one->render(town.scene.batch(), town.views,
-                {MemorySpace::host, PixelFormat::f32, static_cast<int>(views), cameras});
-    out.color.insert(out.color.end(), color.begin(), color.end());
-    out.depth_m.insert(out.depth_m.end(), depth.begin(), depth.end());
-    out.class_id.insert(out.class_id.end(), classes.begin(), classes.end());
-    out.instance_id.insert(out.instance_id.end(), instances.begin(), instances.end());
-  }
-  return out;
-}
-
-Outputs draw_on_device(const SyntheticTown& town, const RendererConfig& config) {
-  const auto renderer = make_renderer("cuda", config);
-  renderer->upload(town.geometry);
-  const DeviceScene scene(town.scene.batch());
-  const DeviceBuffer<View> views{Span<const View>(town.views)};
-  struct Camera {
-    DeviceBuffer<float> color, depth_m;
-    DeviceBuffer<uint8_t> class_id;
-    DeviceBuffer<uint16_t> instance_id;
-  };
-  std::vector<Camera> buffers;
-  std::vector<CameraImages> cameras;
-  for (const auto& camera : config.rig.cameras) {
+    const CameraImages& camera = images.camera(static_cast<int>(k));
     const auto pixels = static_cast<std::size_t>(camera.width_px * camera.height_px);
-    const std::size_t all = pixels * town.views.size();
-    buffers.push_back({DeviceBuffer<float>(3 * all), DeviceBuffer<float>(all), DeviceBuffer<uint8_t>(all),
-                       DeviceBuffer<uint16_t>(all)});
-    cameras.push_back({camera.width_px, camera.height_px, buffers.back().color.data(), static_cast<int64_t>(3 * pixels),
-                       buffers.back().depth_m.data(), buffers.back().class_id.data(),
-                       buffers.back().instance_id.data()});
-  }
-  renderer->render(scene.batch(), views.span(),
-                   {MemorySpace::cuda, PixelFormat::f32, static_cast<int>(town.views.size()), cameras});
-  Outputs out;
-  auto append = [](auto* to, const auto& buffer) {
-    const std::size_t begin = to->size();
-    to->resize(begin + buffer.size());
-    buffer.copy_to_host(to->data() + begin);
-  };
-  for (const Camera& camera : buffers) {
-    append(&out.color, camera.color);
-    append(&out.depth_m, camera.depth_m);
-    append(&out.class_id, camera.class_id);
-    append(&out.instance_id, camera.instance_id);
+    for (int view = 0; view < num_views; ++view) {
+      append(&out.color, static_cast<const float*>(camera.data) + view * camera.view_stride, 3 * pixels);
+    }
+    append(&out.depth_m, camera.depth_m, pixels * town.views.size());
+    append(&out.class_id, camera.class_id, pixels * town.views.size());
+    append(&out.instance_id, camera.instance_id, pixels * town.views.size());
   }
   return out;
 }
 
 void expect_parity(const SyntheticTown& town, const RendererConfig& config) {
-  const Outputs host = draw_on_host(town, config), device = draw_on_device(town, config);
+  const Outputs host = draw("cpu", town, config), device = draw("cuda", town, config);
   ASSERT_EQ(host.color.size(), device.color.size());
   std::size_t within = 0, equal = 0;
   double worst = 0;
@@ -172,12 +127,7 @@ TEST_F(CudaRendererTest, VisibilityAgrees) {
   device->upload(town.geometry);
   std::vector<float> expected(queries.size()), actual(queries.size());
   host->visibility(town.scene.batch(), town.views, queries, expected);
-  const DeviceScene scene(town.scene.batch());
-  const DeviceBuffer<View> views{Span<const View>(town.views)};
-  const DeviceBuffer<VisibilityQuery> device_queries{Span<const VisibilityQuery>(queries)};
-  const DeviceBuffer<float> result(queries.size());
-  device->visibility(scene.batch(), views.span(), device_queries.span(), {result.data(), result.size()});
-  result.copy_to_host(actual.data());
+  device->visibility(town.scene.batch(), town.views, queries, actual);
   for (std::size_t i = 0; i < queries.size(); ++i) {
     if (std::isnan(expected[i])) {
       EXPECT_TRUE(std::isnan(actual[i])) << i;
@@ -190,7 +140,7 @@ TEST_F(CudaRendererTest, VisibilityAgrees) {
 TEST_F(CudaRendererTest, FaultsOfTheDeviceAreThrownByTheNextCall) {
   SyntheticTown town = make_synthetic_town(5, 5);
   town.views.resize(1);
-  const RendererConfig config{.rig = paper_rig(8, 8)};
+  const RendererConfig config{.rig = paper_rig(8, 8), .space = MemorySpace::cuda};
   const auto renderer = make_renderer("cuda", config);
   renderer->upload(town.geometry);
   const DeviceScene scene(town.scene.batch());
@@ -217,6 +167,24 @@ TEST_F(CudaRendererTest, FaultsOfTheDeviceAreThrownByTheNextCall) {
   // What the host can see is refused at once.
   EXPECT_THROW(renderer->render(town.scene.batch(), good.span(), images), Error);
   EXPECT_THROW(renderer->render(scene.batch(), good.span(), shape.batch()), Error);
+}
+
+// What lies on the host is checked there, before the device sees it.
+TEST_F(CudaRendererTest, HostCallersLearnAtOnceWhatIsWrong) {
+  SyntheticTown town = make_synthetic_town(5, 5);
+  const RendererConfig config{.rig = paper_rig(8, 8)};
+  const auto renderer = make_renderer("cuda", config);
+  renderer->upload(town.geometry);
+  EXPECT_EQ(renderer->space(), MemorySpace::host);
+  HostImages images(config.rig, static_cast<int>(town.views.size()));
+  EXPECT_NO_THROW(renderer->render(town.scene.batch(), town.views, images.batch()));
+  std::vector<View> bad = town.views;
+  bad[0].world = 9;
+  EXPECT_THROW(renderer->render(town.scene.batch(), bad, images.batch()), Error);
+  std::vector<float> answer(1);
+  const std::vector<VisibilityQuery> query{{0, 99}};
+  EXPECT_THROW(renderer->visibility(town.scene.batch(), town.views, query, answer), Error);
+  EXPECT_NO_THROW(renderer->render(town.scene.batch(), town.views, images.batch()));
 }
 
 }  // namespace

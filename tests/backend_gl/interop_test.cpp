@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "pictura/tests/backend_gl/gl_support.h"
-#include "pictura/tests/support/device_scene.cuh"
 
 namespace pictura {
 namespace {

@@ -1,0 +1,77 @@
+// The CUDA renderer for callers whose scenes and images lie in host memory: it stages them through the device and waits.
+// What the device would only notice later is checked on the host, with the oracle's checks.
+#include <deque>
+#include <memory>
+
+#include "pictura/common/cuda/device_scene.cuh"
+#include "pictura/common/error.h"
+#include "pictura/common/raster_check.h"
+
+namespace pictura {
+
+std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config);
+std::unique_ptr<Renderer> make_cuda_renderer_for_host(const RendererConfig& config);
+
+namespace {
+
+class HostRendererCuda final : public Renderer {
+ public:
+  explicit HostRendererCuda(const RendererConfig& config) : renderer_(make_cuda_renderer(config)) {}
+  std::string_view name() const override { return renderer_->name(); }
+  MemorySpace space() const override { return MemorySpace::host; }
+  const RendererConfig& config() const override { return renderer_->config(); }
+
+  GeometryHandle upload(const StaticGeometry& geometry) override {
+    const GeometryHandle handle = renderer_->upload(geometry);
+    copies_.push_back(geometry);
+    geometries_.push_back(raster_geometry(copies_.back()));
+    return handle;
+  }
+
+  void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override {
+    check_images(name(), config().rig, space(), views.size(), images_out);
+    check_input(scene, views);
+    const auto queue = static_cast<cudaStream_t>(stream.handle);
+    renderer_->render(scene_.assign(scene, queue), views_.assign(views, queue), images_.like(images_out), stream);
+    images_.copy_to_host(images_out, queue);
+    PICTURA_CUDA(cudaStreamSynchronize(queue));
+  }
+
+  void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
+                  Span<float> visibility_out, Stream stream) override {
+    check_input(scene, views);
+    check_queries(name(), scene, views.size(), queries, visibility_out.size());
+    const auto queue = static_cast<cudaStream_t>(stream.handle);
+    const Span<float> result = visibility_.resize(queries.size());
+    renderer_->visibility(scene_.assign(scene, queue), views_.assign(views, queue), queries_.assign(queries, queue),
+                          result, stream);
+    if (!queries.empty()) {
+      PICTURA_CUDA(cudaMemcpyAsync(visibility_out.data(), result.data(), result.size() * sizeof(float),
+                                   cudaMemcpyDeviceToHost, queue));
+    }
+    PICTURA_CUDA(cudaStreamSynchronize(queue));
+  }
+
+ private:
+  void check_input(const SceneBatch& scene, Span<const View> views) const {
+    check_scene(name(), scene, geometries_);
+    check_views(name(), scene, views);
+  }
+
+  std::unique_ptr<Renderer> renderer_;
+  std::deque<StaticGeometry> copies_;  // their addresses stay: geometries_ point into them
+  std::vector<RasterGeometry> geometries_;
+  DeviceScene scene_;
+  DeviceImages images_;
+  DeviceCopy<View> views_;
+  DeviceCopy<VisibilityQuery> queries_;
+  DeviceCopy<float> visibility_;
+};
+
+}  // namespace
+
+std::unique_ptr<Renderer> make_cuda_renderer_for_host(const RendererConfig& config) {
+  return std::make_unique<HostRendererCuda>(config);
+}
+
+}  // namespace pictura
