@@ -8,7 +8,7 @@
 #include <random>
 #include <sstream>
 
-#include "pictura/common/cuda/device_buffer.cuh"
+#include "pictura/common/cuda/device_scene.cuh"
 #include "pictura/common/error.h"
 #include "pictura/common/make_renderer.h"
 #include "pictura/map/load_map.h"
@@ -24,23 +24,6 @@ std::vector<std::string> split(const std::string& text) {
   for (std::string part; std::getline(stream, part, ',');) parts.push_back(part);
   return parts;
 }
-
-struct DeviceScene {
-  DeviceBuffer<int32_t> world_begin, geometry, light_begin, hidden_agents;
-  DeviceBuffer<AgentBox> agents;
-  DeviceBuffer<LightState> light_states;
-  explicit DeviceScene(const SceneBatch& host)
-      : world_begin(host.world_begin),
-        geometry(host.geometry),
-        light_begin(host.light_begin),
-        hidden_agents(host.hidden_agents),
-        agents(host.agents),
-        light_states(host.light_states) {}
-  SceneBatch batch() const {
-    return {MemorySpace::cuda,  world_begin.span(),  agents.span(),       geometry.span(),
-            light_begin.span(), light_states.span(), hidden_agents.span()};
-  }
-};
 
 }  // namespace
 
@@ -92,8 +75,9 @@ int main(int argc, char** argv) {
     std::sscanf(size.c_str(), "%dx%d", &width, &height);
     RendererConfig renderer_config;
     renderer_config.rig = paper_rig(width, height);
-    const auto renderer = make_renderer("cuda", renderer_config);
     const auto oracle = make_renderer("cpu", renderer_config);
+    renderer_config.space = MemorySpace::cuda;
+    const auto renderer = make_renderer("cuda", renderer_config);
     for (const auto& geometry : geometries) {
       renderer->upload(geometry);
       oracle->upload(geometry);
