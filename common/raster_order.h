@@ -168,47 +168,67 @@ PICTURA_HD inline Fragment make_fragment(const ScreenFace& face, int32_t face_in
   return {coverage, max_of(inverse_depth(face, middle), 0.0f), face_index};
 }
 
+/// Order of fragments where nothing says which is in front: the nearer first, then by number.
+PICTURA_HD inline bool is_nearer(const Fragment& a, const Fragment& b, const ScreenFace* faces) {
+  if (a.nearness != b.nearness) return a.nearness > b.nearness;
+  const uint32_t number_a = faces[a.face].number, number_b = faces[b.face].number;
+  return number_a != number_b ? number_a < number_b : a.face < b.face;
+}
+
+/// A fragment of a list, and the places of it and of the one before it.
+template <typename List>
+struct ListedFragment {
+  int place = List::kEnd, before = List::kEnd;
+  Fragment fragment;
+};
+
+/// The nearest fragment of a list.
+template <typename List>
+PICTURA_HD inline ListedFragment<List> find_nearest(const List& list, const ScreenFace* faces) {
+  ListedFragment<List> nearest;
+  for (int i = list.begin(), before = List::kEnd; i != List::kEnd; before = i, i = list.next(i)) {
+    const Fragment candidate = list.at(i);
+    if (nearest.place == List::kEnd || is_nearer(candidate, nearest.fragment, faces)) nearest = {i, before, candidate};
+  }
+  return nearest;
+}
+
+/// The nearest of those fragments of a list that are in front of `behind`; place kEnd where there is none. corner is
+/// the pixel's.
+template <typename List, typename Stands>
+PICTURA_HD inline ListedFragment<List> find_in_front(const List& list, const Fragment& behind, const ScreenFace* faces,
+                                                     Vec2 corner, Stands&& stands) {
+  ListedFragment<List> nearest;
+  const uint64_t own = behind.coverage.samples;
+  for (int i = list.begin(), before = List::kEnd; i != List::kEnd; before = i, i = list.next(i)) {
+    const Fragment other = list.at(i);
+    // What touches no sample counts as being wherever the other is.
+    const uint64_t shared = own ? own & other.coverage.samples : other.coverage.samples;
+    if (shared == 0 || other.face == behind.face) continue;
+    if (nearest.place != List::kEnd && !is_nearer(other, nearest.fragment, faces)) continue;
+    if (is_in_front(faces[other.face], faces[behind.face], corner + middle_of(shared), stands)) {
+      nearest = {i, before, other};
+    }
+  }
+  return nearest;
+}
+
 /// Lays the fragments of pixel (x, y) over each other, front to back. `list` holds them in any order: begin() is a
 /// first place, next(place) the one after it, kEnd none; at(place) a Fragment; remove(place, before) takes out a place,
 /// given the one before it. `lay(fragment, weight)` hears what each weighs in the pixel's colour. Next comes the
 /// nearest or, where something that is left is in front of that, the nearest of what is in front of it, and so on; in a
-/// cycle, the nearest after all.
+/// circle, the nearest after all.
 template <typename List, typename Stands, typename Lay>
 PICTURA_HD inline PixelState lay_fragments(List& list, const ScreenFace* faces, int x, int y, Stands&& stands,
                                            Lay&& lay) {
+  constexpr int kMostInFront = 16;  // of each other, in one pixel; more is a circle
   const Vec2 corner{static_cast<float>(x), static_cast<float>(y)};
-  auto is_nearer = [&](const Fragment& a, const Fragment& b) {
-    if (a.nearness != b.nearness) return a.nearness > b.nearness;
-    const uint32_t number_a = faces[a.face].number, number_b = faces[b.face].number;
-    return number_a != number_b ? number_a < number_b : a.face < b.face;
-  };
-  struct Found {
-    int place = List::kEnd, before = List::kEnd;
-    Fragment fragment;
-  };
-  // The nearest of the fragments that `wanted` accepts.
-  auto find_nearest = [&](auto&& wanted) {
-    Found nearest;
-    for (int i = list.begin(), before = List::kEnd; i != List::kEnd; before = i, i = list.next(i)) {
-      const Fragment candidate = list.at(i);
-      if (nearest.place != List::kEnd && !is_nearer(candidate, nearest.fragment)) continue;
-      if (wanted(candidate)) nearest = {i, before, candidate};
-    }
-    return nearest;
-  };
   PixelState pixel;
   while (pixel.free_area > 0.0f && list.begin() != List::kEnd) {
-    const Found nearest = find_nearest([](const Fragment&) { return true; });
-    Found front = nearest;
-    constexpr int kMostInFront = 16;  // of what lies in front of each other in one pixel; more is a cycle
+    const ListedFragment<List> nearest = find_nearest(list, faces);
+    ListedFragment<List> front = nearest;
     for (int step = 0; list.next(list.begin()) != List::kEnd; ++step) {
-      const Found hiding = find_nearest([&](const Fragment& other) {
-        // What touches no sample counts as being wherever the other is.
-        const uint64_t own = front.fragment.coverage.samples;
-        const uint64_t shared = own ? own & other.coverage.samples : other.coverage.samples;
-        if (shared == 0 || other.face == front.fragment.face) return false;
-        return is_in_front(faces[other.face], faces[front.fragment.face], corner + middle_of(shared), stands);
-      });
+      const ListedFragment<List> hiding = find_in_front(list, front.fragment, faces, corner, stands);
       if (hiding.place == List::kEnd) break;
       front = hiding;
       if (step == kMostInFront) {

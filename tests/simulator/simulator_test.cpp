@@ -76,7 +76,8 @@ TEST(Simulator, RefusesWhatCannotBeAskedFor) {
   try {
     make_simulator("warp", {}, {map}, {{0, 1, 0}});
   } catch (const UsageError& error) {
-    EXPECT_NE(std::string(error.what()).find("cpu, auto"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("cpu, "), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("auto"), std::string::npos);
   }
 }
 

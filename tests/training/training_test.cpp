@@ -187,6 +187,10 @@ TEST_F(Training, WritesWhatItPromisesAndStartsFromItsSeed) {
 TEST_F(Training, InterruptedRunSavesAndGoesOnExactly) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   TrainOptions stopped = options("stopped");
+  // The process that is stopped has a scratch folder of its own; it writes into the one of the process that started it.
+  constexpr const char* kFolder = "PICTURA_TEST_STOPPED_RUN";
+  setenv(kFolder, stopped.out_folder.c_str(), /*overwrite=*/0);
+  stopped.out_folder = std::getenv(kFolder);
   stopped.on_progress = [](const TrainProgress& progress) {
     if (progress.update == 2) std::raise(SIGINT);
   };
