@@ -19,7 +19,7 @@ Snapshot drive_snapshot(const SnapshotOptions& options) {
   config.walls = options.walls;
   config.fixed_lights = true;
   config.vector_observations = false;
-  config.cyclist_fraction = 0.1f;
+  config.cyclist_fraction = config.pedestrian_fraction = 0.1f;
   const auto simulator = make_simulator("cpu", config, {load_map(options.map)}, {{0, options.agents, 0}});
   std::vector<int32_t> actions(static_cast<std::size_t>(simulator->num_slots()));
   for (int step = 0; step < options.steps; ++step) {

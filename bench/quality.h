@@ -28,8 +28,8 @@ struct SnapshotOptions {
   int num_threads = 0;  // 0: all
 };
 
-/// Drives a world with random actions; one agent in ten is a cyclist. Throws Error when the map cannot
-/// be read.
+/// Drives a world with random actions; one agent in ten is a cyclist, one a pedestrian. Throws Error when the map
+/// cannot be read.
 Snapshot drive_snapshot(const SnapshotOptions& options);
 
 /// Error against the truth, pooled over the images that are not blank.

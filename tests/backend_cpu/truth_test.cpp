@@ -84,37 +84,48 @@ TEST(Truth, OddSizesDownToOnePixelAndEightCamerasOfEightSizes) {
   EXPECT_GE(quality_of(snapshot, eight).oracle.psnr_db(), kLeastOraclePsnr_db);
 }
 
-// Planes of the oracle and of the truth at the pixels' centres.
+// The oracle's planes of one image.
+struct Planes {
+  std::vector<float> depth_m;
+  std::vector<uint8_t> class_id;
+  std::vector<uint16_t> instance_id;
+};
+
+Planes planes_of(const StaticGeometry& geometry, const SceneOwner& scene, const View& view, const Camera& camera) {
+  const RendererConfig config{.rig = {{camera}}, .num_threads = 1};
+  const auto renderer = make_renderer("cpu", config);
+  renderer->upload(geometry);
+  const auto pixels = static_cast<std::size_t>(camera.width_px * camera.height_px);
+  Planes planes{std::vector<float>(pixels), std::vector<uint8_t>(pixels), std::vector<uint16_t>(pixels)};
+  HostImages images(config.rig, 1);
+  CameraImages out = images.camera(0);
+  out.depth_m = planes.depth_m.data();
+  out.class_id = planes.class_id.data();
+  out.instance_id = planes.instance_id.data();
+  const std::vector<CameraImages> cameras{out};
+  renderer->render(scene.batch(), std::vector<View>{view}, {MemorySpace::host, PixelFormat::u8, 1, cameras});
+  return planes;
+}
+
+// Pixels whose centres show another surface in the oracle than in the truth.
 struct PlaneDifference {
   std::size_t pixels = 0, classes = 0, instances = 0, depths = 0;
 };
 
 PlaneDifference compare_planes(const Snapshot& snapshot, const Camera& camera) {
-  RendererConfig config{.rig = {{camera}}, .num_threads = 1};
-  const auto renderer = make_renderer("cpu", config);
-  renderer->upload(snapshot.geometry);
-  const auto pixels = static_cast<std::size_t>(camera.width_px * camera.height_px);
   PlaneDifference difference;
   for (const View& view : snapshot.views) {
-    HostImages images(config.rig, 1);
-    std::vector<float> depth(pixels);
-    std::vector<uint8_t> classes(pixels);
-    std::vector<uint16_t> instances(pixels);
-    CameraImages out = images.camera(0);
-    out.depth_m = depth.data();
-    out.class_id = classes.data();
-    out.instance_id = instances.data();
-    const std::vector<CameraImages> cameras{out};
-    renderer->render(snapshot.scene.batch(), std::vector<View>{view}, {MemorySpace::host, PixelFormat::u8, 1, cameras});
-    const TruthImage truth = trace_image(snapshot.geometry, snapshot.scene.batch(), view, camera, config.line_floor_px,
-                                         TruthSamples::center);
-    for (std::size_t i = 0; i < pixels; ++i) {
+    const Planes planes = planes_of(snapshot.geometry, snapshot.scene, view, camera);
+    const TruthImage truth = trace_image(snapshot.geometry, snapshot.scene.batch(), view, camera,
+                                         RendererConfig{}.line_floor_px, TruthSamples::center);
+    for (std::size_t i = 0; i < planes.depth_m.size(); ++i) {
       ++difference.pixels;
-      difference.classes += classes[i] != truth.class_id[i];
-      difference.instances += instances[i] != truth.instance_id[i];
-      const bool same_depth =
-          depth[i] == truth.depth_m[i] || std::abs(depth[i] - truth.depth_m[i]) <= kDepthError * truth.depth_m[i];
-      difference.depths += classes[i] == truth.class_id[i] && !same_depth;
+      const bool same_class = planes.class_id[i] == truth.class_id[i];
+      difference.classes += !same_class;
+      difference.instances += planes.instance_id[i] != truth.instance_id[i];
+      const bool same_depth = planes.depth_m[i] == truth.depth_m[i] ||
+                              std::abs(planes.depth_m[i] - truth.depth_m[i]) <= kDepthError * truth.depth_m[i];
+      difference.depths += same_class && !same_depth;
     }
   }
   return difference;
@@ -146,6 +157,38 @@ TEST(Truth, NoSolidIsInFrontOfTheWrongOne) {
     EXPECT_LE(difference.instances, 1u) << seed;
     EXPECT_LE(difference.classes, 1u) << seed;
   }
+}
+
+TEST(Truth, BoxesThatIntersectAreDrawnWholeOneAfterTheOther) {
+  // A car that has driven into another: each alone, and both.
+  const AgentBox a = make_box(AgentClass::vehicle, {11, 0.5f, 0}, 0.3f, {4.4f, 1.9f, 1.5f});
+  const AgentBox b = make_box(AgentClass::vehicle, {13, -0.6f, 0}, 1.4f, {4.6f, 2.0f, 1.7f});
+  SceneOwner both;
+  both.agents = {a, b};
+  both.hidden_agents = {0, 1};
+  both.end_world(0);
+  StaticGeometry nothing;
+  nothing.build_grids();
+  const Camera camera = paper_rig(192, 108).cameras[0];
+  const View view = make_view({}, 0);
+  View without_a = view, without_b = view;
+  without_a.hidden_end = 1;
+  without_b.hidden_begin = 1;
+  without_b.hidden_end = 2;
+  const Planes all = planes_of(nothing, both, view, camera);
+  const Planes only_a = planes_of(nothing, both, without_b, camera),
+               only_b = planes_of(nothing, both, without_a, camera);
+  std::size_t in_both = 0, a_first = 0;
+  for (std::size_t i = 0; i < all.instance_id.size(); ++i) {
+    if (only_a.instance_id[i] && only_b.instance_id[i]) {
+      ++in_both;
+      a_first += all.instance_id[i] == 1;
+    } else {
+      ASSERT_EQ(all.instance_id[i], only_a.instance_id[i] + only_b.instance_id[i]) << i;
+    }
+  }
+  EXPECT_GT(in_both, 100u);
+  EXPECT_TRUE(a_first == 0 || a_first == in_both) << a_first << " of " << in_both;
 }
 
 TEST(Truth, VisibilityAgrees) {
