@@ -23,6 +23,9 @@ constexpr double kPlaneShare = 1e-3;
 constexpr double kDepthError = 1e-3;
 /// Visibility of an agent of 4 pixels or more: the design's promise. The truth's own error is about 0.005 there.
 constexpr double kVisibilityError = 0.02;
+/// Share of values further off than kWorstOracleError where cars have driven into each other: pixels that the line of
+/// intersection crosses show one of the two alone.
+constexpr double kIntersectionShare = 2e-3;
 /// A scene moved as a whole: single precision moves corners by about 1e-5 px for each 100 m from the origin; a sample
 /// may fall to the other side of an edge, worth up to 1/64 of a pixel twice.
 constexpr double kMovedSceneError = 8.0 / 255;
