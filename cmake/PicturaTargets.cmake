@@ -45,7 +45,7 @@ if(PICTURA_SANITIZE)
   target_compile_options(pictura_flags INTERFACE -fsanitize=${PICTURA_SANITIZE} -fno-omit-frame-pointer -g
     -fno-sanitize-recover=all
     # The checks hide from g++ 13 how long an initializer list is.
-    $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>>:-Wno-array-bounds>)
+    "$<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>>:-Wno-array-bounds;-Wno-stringop-overread>")
   target_link_options(pictura_flags INTERFACE -fsanitize=${PICTURA_SANITIZE})
 endif()
 
