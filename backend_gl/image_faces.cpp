@@ -9,9 +9,9 @@ namespace pictura::gl {
 namespace {
 
 // Strips of one level lie in one plane, where rounding would decide which is in front. Each is therefore pushed away
-// from the camera by its place in the order of ranks: by steps well above the rounding of depths, and in all by less
-// than what parts two levels of road.
-constexpr float kPushStep = 2e-5f, kMostPush = 0.02f;
+// from the camera by its place in the order of ranks: by steps well above the rounding of depths (hardware interpolates
+// them to 24 bits of the whole range), and in all by less than what parts two levels of road.
+constexpr float kPushStep = 1e-4f, kMostPush = 0.02f;
 // What the compared depth of a corner beyond the horizon of a strip's plane is a multiple of: as good as infinite.
 constexpr float kLeastNearness = 1e-4f;
 
