@@ -45,26 +45,55 @@ bool ImageDrawer::stands(uint32_t solid, uint32_t strip) const {
                    extent_of(strip, pieces, *request_.scene, world_begin()));
 }
 
+// Calls visit(y, pixel, span) for each row of a face within some rows; pixel is the index of the row's first.
+template <typename Visit>
+void ImageDrawer::visit_spans(const ScreenFace& face, RowRange rows, Visit&& visit) const {
+  const int width = setting_.camera.width_px;
+  for (int y = max_of(rows.y_begin, face.box.y_begin); y < min_of(rows.y_end, face.box.y_end); ++y) {
+    visit(y, static_cast<std::size_t>(y - rows.y_begin) * static_cast<std::size_t>(width),
+          row_span(edges_.at(face.edge_begin), face.edge_count, face.box, y));
+  }
+}
+
+// Finds, for each pixel of some rows, the nearest face that covers it fully.
+void ImageDrawer::find_full(FaceRange faces, RowRange rows) {
+  full_.assign(static_cast<std::size_t>((rows.y_end - rows.y_begin) * setting_.camera.width_px), FullFace{});
+  for (int32_t f = faces.begin; f < faces.end; ++f) {
+    const ScreenFace& face = faces_[static_cast<std::size_t>(f)];
+    visit_spans(face, rows, [&](int y, std::size_t row, const RowSpan& span) {
+      for (int x = span.full_begin; x < span.full_end; ++x) {
+        FullFace& full = full_[row + static_cast<std::size_t>(x)];
+        const float nearness = middle_nearness(face, x, y);
+        if (nearness > full.nearness) full = {nearness, f};
+      }
+    });
+  }
+}
+
 // Spreads faces over the pixels of some rows.
 void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
-  const int width = setting_.camera.width_px;
-  first_fragment_.assign(static_cast<std::size_t>((rows.y_end - rows.y_begin) * width), -1);
+  find_full(faces, rows);
+  first_fragment_.assign(full_.size(), -1);
   fragments_.clear();
   for (int32_t f = faces.begin; f < faces.end; ++f) {
     const ScreenFace& face = faces_[static_cast<std::size_t>(f)];
     const PolygonEdge* edges = edges_.at(face.edge_begin);
-    for (int y = max_of(rows.y_begin, face.box.y_begin); y < min_of(rows.y_end, face.box.y_end); ++y) {
-      int32_t* row = first_fragment_.data() + (y - rows.y_begin) * width;
-      auto add = [&](int x, const PixelCoverage& coverage) {
-        if (coverage.area <= 0.0f) return;
-        fragments_.push_back({make_fragment(face, f, coverage, x, y), row[x]});
-        row[x] = static_cast<int32_t>(fragments_.size()) - 1;
-      };
-      const RowSpan span = row_span(edges, face.edge_count, face.box, y);
-      for (int x = span.begin; x < span.full_begin; ++x) add(x, pixel_coverage(edges, face.edge_count, x, y));
-      for (int x = span.full_begin; x < span.full_end; ++x) add(x, {1.0f, kAllSamples});
-      for (int x = span.full_end; x < span.end; ++x) add(x, pixel_coverage(edges, face.edge_count, x, y));
-    }
+    visit_spans(face, rows, [&](int y, std::size_t row, const RowSpan& span) {
+      for (int x = span.begin; x < span.end; ++x) {
+        const bool covers_fully = x >= span.full_begin && x < span.full_end;
+        const std::size_t pixel = row + static_cast<std::size_t>(x);
+        const int32_t full = full_[pixel].face;
+        if (full >= 0 && full != f &&
+            !may_show_before(face, faces_[static_cast<std::size_t>(full)], x, y, covers_fully)) {
+          continue;
+        }
+        const PixelCoverage coverage =
+            covers_fully ? PixelCoverage{1.0f, kAllSamples} : pixel_coverage(edges, face.edge_count, x, y);
+        if (coverage.area <= 0.0f) continue;
+        fragments_.push_back({make_fragment(face, f, coverage, x, y), first_fragment_[pixel]});
+        first_fragment_[pixel] = static_cast<int32_t>(fragments_.size()) - 1;
+      }
+    });
   }
 }
 

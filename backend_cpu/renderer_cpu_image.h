@@ -69,6 +69,12 @@ class ImageDrawer {
   };
   class PixelList;
 
+  // The nearest face that covers a pixel fully.
+  struct FullFace {
+    float nearness = -1;
+    int32_t face = -1;
+  };
+
   // The faces [begin, end), and rows [y_begin, y_end) of the image.
   struct FaceRange {
     int32_t begin, end;
@@ -79,6 +85,9 @@ class ImageDrawer {
 
   // Takes the faces that a thing emits.
   auto face_maker(FaceOwner owner);
+  template <typename Visit>
+  void visit_spans(const ScreenFace& face, RowRange rows, Visit&& visit) const;
+  void find_full(FaceRange faces, RowRange rows);
   void make_fragments(FaceRange faces, RowRange rows);
   // Lays the fragments of all pixels of the rows: lay(pixel index, fragment, weight) for
   // each, then finish(pixel index, color).
@@ -92,6 +101,7 @@ class ImageDrawer {
   ImageSetting setting_;
   EdgePool edges_;
   std::vector<ScreenFace> faces_;
+  std::vector<FullFace> full_;           // [pixels of some rows]
   std::vector<int32_t> first_fragment_;  // [pixels of some rows] the head of each one's list
   std::vector<LinkedFragment> fragments_;
 };

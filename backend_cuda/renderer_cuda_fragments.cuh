@@ -42,15 +42,6 @@ __device__ RowJob make_job(const Memory& memory, int num_faces, uint32_t job, in
           static_cast<uint16_t>(span.full_end)};
 }
 
-__device__ inline Vec2 pixel_middle(int x, int y) {
-  return {static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f};
-}
-
-// Nearness of a face in the middle of a pixel, as in make_fragment for a pixel that it covers fully.
-__device__ inline float nearness_at(const ScreenFace& face, int x, int y) {
-  return max_of(inverse_depth(face, pixel_middle(x, y)), 0.0f);
-}
-
 // A pixel's word while the nearest full faces are found: the larger is the nearer; 0 for none. The bits of a nearness
 // sort like the nearness; those that have no room are left off.
 template <typename Memory>
@@ -75,7 +66,7 @@ __device__ void mark_full(const Memory& memory, int num_faces, int width, int y_
     const ScreenFace& face = memory.faces[job.face];
     typename Memory::Word* row = memory.pixels + (job.y - y_begin) * width;
     for (int x = job.full_begin; x < job.full_end; ++x) {
-      const auto mark = full_mark<Memory>(nearness_at(face, x, job.y), job.face);
+      const auto mark = full_mark<Memory>(middle_nearness(face, x, job.y), job.face);
       if (row[x] < mark) atomicMax(&row[x], mark);
     }
     atomicAdd(&memory.state->row_fragments[job.y - y_begin], job.end - job.begin);
@@ -92,24 +83,6 @@ __device__ void start_lists(const Memory& memory, int count) {
     const Word full = face < 0 ? Memory::kNone : static_cast<Word>(face);
     memory.pixels[p] = full << Memory::kHalf | Memory::kNone;
   }
-}
-
-// Whether a face may have to be drawn before the face that covers pixel (x, y) fully: no where it lies well behind it
-// in all of the pixel. Strips may be painted over each other, and a solid may stand on the strip that covers the pixel.
-__device__ inline bool may_show_before(const ScreenFace& face, const ScreenFace& full, int x, int y,
-                                       bool covers_fully) {
-  const bool strip = is_strip(face), strip_below = is_strip(full);
-  const Vec2 middle = pixel_middle(x, y);
-  const float depth = inverse_depth(face, middle), full_depth = inverse_depth(full, middle);
-  if (strip_below && !strip) return true;
-  if (strip_below && strip) {
-    if (!covers_fully || of_one_level(depth, face.plane_distance_m, full_depth, full.plane_distance_m)) return true;
-  }
-  const float rise = covers_fully ? 0.0f
-                                  : 0.5f * (fabsf(face.inverse_depth_x) + fabsf(face.inverse_depth_y) +
-                                            fabsf(full.inverse_depth_x) + fabsf(full.inverse_depth_y));
-  constexpr float kLeeway = 1.004f;  // more than what marks leave off
-  return max_of(depth + rise, 0.0f) * kLeeway >= full_depth;
 }
 
 // Computes what faces cover of the pixels of rows [y_begin, y_end), and links it to the pixels. row_0 is the row of the
@@ -167,7 +140,7 @@ class PixelList {
     has_full_ = full != Memory::kNone;
     if (!has_full_) return;
     const int face = static_cast<int>(full);
-    full_ = {{1.0f, kAllSamples}, nearness_at(memory.faces[face], x, y), face};
+    full_ = {{1.0f, kAllSamples}, middle_nearness(memory.faces[face], x, y), face};
   }
   __device__ int begin() const { return has_full_ ? kFull : head_; }
   __device__ int next(int place) const { return place == kFull ? head_ : place_of(memory_.fragments[place].next); }

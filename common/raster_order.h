@@ -168,6 +168,34 @@ PICTURA_HD inline Fragment make_fragment(const ScreenFace& face, int32_t face_in
   return {coverage, max_of(inverse_depth(face, middle), 0.0f), face_index};
 }
 
+PICTURA_HD inline Vec2 pixel_middle(int x, int y) {
+  return {static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f};
+}
+
+/// Nearness of a face in the middle of a pixel: that of its fragment where it covers the pixel fully.
+PICTURA_HD inline float middle_nearness(const ScreenFace& face, int x, int y) {
+  return max_of(inverse_depth(face, pixel_middle(x, y)), 0.0f);
+}
+
+/// Whether a face may weigh anything in pixel (x, y), which another one, `full`, covers fully: no where it lies well
+/// behind that in all of the pixel. Strips may be painted over each other, and a solid may stand on the strip that
+/// covers the pixel. A fragment of which this is false changes nothing and need not be made.
+PICTURA_HD inline bool may_show_before(const ScreenFace& face, const ScreenFace& full, int x, int y,
+                                       bool covers_fully) {
+  if (is_strip(full) && !is_strip(face)) return true;
+  const Vec2 middle = pixel_middle(x, y);
+  const float depth = inverse_depth(face, middle), full_depth = inverse_depth(full, middle);
+  if (is_strip(full) &&
+      (!covers_fully || of_one_level(depth, face.plane_distance_m, full_depth, full.plane_distance_m))) {
+    return true;
+  }
+  const float rise = covers_fully ? 0.0f
+                                  : 0.5f * (fabsf(face.inverse_depth_x) + fabsf(face.inverse_depth_y) +
+                                            fabsf(full.inverse_depth_x) + fabsf(full.inverse_depth_y));
+  constexpr float kLeeway = 1.004f;  // more than the bits that a kernel may leave off when it looks for `full`
+  return max_of(depth + rise, 0.0f) * kLeeway >= full_depth;
+}
+
 /// Order of fragments where nothing says which is in front: the nearer first, then by number.
 PICTURA_HD inline bool is_nearer(const Fragment& a, const Fragment& b, const ScreenFace* faces) {
   if (a.nearness != b.nearness) return a.nearness > b.nearness;
