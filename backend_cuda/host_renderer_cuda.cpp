@@ -1,5 +1,5 @@
-// The CUDA renderer for callers whose scenes and images lie in host memory: it stages them through the device and waits.
-// What the device would only notice later is checked on the host, with the oracle's checks.
+// The CUDA renderer for callers whose scenes and images lie in host memory: it stages them through the device and
+// waits. What the device would only notice later is checked on the host, with the oracle's checks.
 #include <deque>
 #include <memory>
 

@@ -17,7 +17,8 @@ class DeviceCopy {
   Span<const T> assign(Span<const T> host, cudaStream_t stream) {
     if (buffer_.size() < host.size()) buffer_ = DeviceBuffer<T>(host.size());
     if (!host.empty()) {
-      PICTURA_CUDA(cudaMemcpyAsync(buffer_.data(), host.data(), host.size() * sizeof(T), cudaMemcpyHostToDevice, stream));
+      PICTURA_CUDA(
+          cudaMemcpyAsync(buffer_.data(), host.data(), host.size() * sizeof(T), cudaMemcpyHostToDevice, stream));
     }
     return {buffer_.data(), host.size()};
   }

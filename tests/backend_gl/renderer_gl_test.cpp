@@ -304,7 +304,8 @@ TEST_P(GlRenderer, RefusesByNameWhatItDoesNotOffer) {
       "renderer " + name + ": visibility");
   HostImages halves(renderer->config().rig, 1, PixelFormat::f16);
   expect_error([&] { renderer->render(town.scene.batch(), town.views, halves.batch()); }, "got f16");
-  expect_error([&] { make_renderer(name, {.samples = {.multisample = 1024}}); }, "this driver's limit for MSAA, got 1024");
+  expect_error([&] { make_renderer(name, {.samples = {.multisample = 1024}}); },
+               "this driver's limit for MSAA, got 1024");
   expect_error([&] { make_renderer(name, {.rig = paper_rig(8192, 8), .samples = {.grid = 16}}); },
                "samples along an axis, which is this driver's limit, got 131072");
   expect_error([&] { make_renderer(name, {.samples = {.grid = 0}}); }, "expected 1 sample or more");

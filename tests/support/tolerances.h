@@ -64,9 +64,9 @@ constexpr ImageTolerance kGoldenTruth{"truth", kWorstOracleError, 1.0 / 255, 1, 
 constexpr ImageTolerance kGoldenTruthOnePixel{"truth, one pixel", 10.0 / 255, 1.0 / 255, 1, 0};
 /// The oracle against the truth and against OpenGL where things intersect: within a pixel, one of them is in front.
 constexpr ImageTolerance kGoldenIntersecting{"intersecting", 36.0 / 255, 1.0 / 255, 1, 50};
-/// The OpenGL baseline against the oracle's pictures, with so many samples squared in a pixel that what they miss is less
-/// than any fault that is to be seen. Measured with Mesa's rasterizer: 52.3 dB and 14/255 at worst; other drivers place
-/// samples and round corners differently.
+/// The OpenGL baseline against the oracle's pictures, with so many samples squared in a pixel that what they miss is
+/// less than any fault that is to be seen. Measured with Mesa's rasterizer: 52.3 dB and 14/255 at worst; other drivers
+/// place samples and round corners differently.
 constexpr int kGoldenGlGrid = 16;
 constexpr ImageTolerance kGoldenGl{"gl", 24.0 / 255, 1.0 / 255, 1, 50};
 constexpr ImageTolerance kGoldenGlOnePixel{"gl, one pixel", 12.0 / 255, 1.0 / 255, 1, 0};
