@@ -83,7 +83,9 @@ TEST_P(CarlaTowns, HoldWhatTheirFilesHold) {
     }
   }
   EXPECT_EQ(incoming, expected.controlled_incoming_lanes);
-  if (!PICTURA_IS_SANITIZED) EXPECT_LT(load_s_, 2.0);
+  if (!PICTURA_IS_SANITIZED) {
+    EXPECT_LT(load_s_, 2.0);
+  }
 
   EXPECT_EQ(facts.painted_stop_lines, expected.painted_stop_lines);
   EXPECT_EQ(map_->stop_lines.size(), static_cast<std::size_t>(expected.painted_stop_lines));
