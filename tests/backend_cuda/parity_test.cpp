@@ -2,7 +2,6 @@
 // says that there must be one.
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 
 #include <fmt/format.h>
@@ -12,27 +11,17 @@
 #include "pictura/common/cuda/device_scene.cuh"
 #include "pictura/common/error.h"
 #include "pictura/common/make_renderer.h"
+#include "pictura/tests/backend_cuda/device_test.h"
 #include "pictura/tests/support/image_scenes.h"
 #include "pictura/tests/support/tolerances.h"
 
 namespace pictura {
 
-std::string cuda_unavailable();
-
 namespace {
 
 using testing::HasSubstr;
 
-class CudaRendererTest : public testing::Test {
- protected:
-  void SetUp() override {
-    const std::string why = cuda_unavailable();
-    if (why.empty()) return;
-    const char* required = std::getenv("PICTURA_REQUIRE_GPU");
-    if (required && std::string(required) == "1") FAIL() << "PICTURA_REQUIRE_GPU=1, but " << why;
-    GTEST_SKIP() << "no CUDA device: " << why;
-  }
-};
+class CudaRendererTest : public test::DeviceTest {};
 
 // All outputs of a batch of images, one camera after the other, on the host.
 struct Outputs {

@@ -1,7 +1,6 @@
 // The CUDA simulator against the CPU's, on a device: the same bits. Without a device these tests are skipped, unless
 // PICTURA_REQUIRE_GPU=1 says that there must be one.
 #include <chrono>
-#include <cstdlib>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,27 +8,17 @@
 #include "pictura/common/cuda/device_buffer.cuh"
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
+#include "pictura/tests/backend_cuda/device_test.h"
 #include "pictura/tests/simulator/same_bits.h"
 
 namespace pictura {
-
-std::string cuda_unavailable();
 
 namespace {
 
 using ::testing::HasSubstr;
 using Maps = std::vector<std::shared_ptr<const RoadMap>>;
 
-class CudaSimulatorTest : public ::testing::Test {
- protected:
-  void SetUp() override {
-    const std::string why = cuda_unavailable();
-    if (why.empty()) return;
-    const char* required = std::getenv("PICTURA_REQUIRE_GPU");
-    if (required && std::string(required) == "1") FAIL() << "PICTURA_REQUIRE_GPU=1, but " << why;
-    GTEST_SKIP() << "no CUDA device: " << why;
-  }
-};
+class CudaSimulatorTest : public test::DeviceTest {};
 
 /// Of device memory, once the device has written it.
 template <typename T>
