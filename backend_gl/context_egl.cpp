@@ -19,7 +19,7 @@ constexpr const char* kName = "gl:egl";
 
 /// The entry points of libEGL.
 class Egl {
-  SharedLibrary library_{kName, "libEGL.so.1", "libegl1"};
+  SharedLibrary library_{kName, "libEGL.so.1", "Debian package libegl1"};
   template <typename Function>
   Function function(const char* name) const {
     return reinterpret_cast<Function>(library_.function(name));

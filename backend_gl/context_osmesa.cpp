@@ -50,7 +50,7 @@ class OsmesaContext final : public Context {
     return reinterpret_cast<Function>(library_.function(name));
   }
 
-  SharedLibrary library_{kName, kFile, "libosmesa6"};
+  SharedLibrary library_{kName, kFile, "Debian package libosmesa6"};
   decltype(&OSMesaCreateContextAttribs) create_ = function<decltype(create_)>("OSMesaCreateContextAttribs");
   decltype(&OSMesaDestroyContext) destroy_ = function<decltype(destroy_)>("OSMesaDestroyContext");
   decltype(&OSMesaMakeCurrent) make_current_ = function<decltype(make_current_)>("OSMesaMakeCurrent");

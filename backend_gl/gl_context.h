@@ -5,20 +5,9 @@
 #include <memory>
 #include <string>
 
+#include "pictura/common/shared_library.h"
+
 namespace pictura::gl {
-
-/// A library opened at run time, for the rest of the process: drivers do not survive being unloaded.
-class SharedLibrary {
- public:
-  /// Throws Error naming the library and the Debian package that has it.
-  SharedLibrary(const std::string& renderer, const std::string& file, const std::string& debian_package);
-  /// Address of a function. Throws Error naming it.
-  void* function(const char* name) const;
-
- private:
-  std::string renderer_, file_;
-  void* handle_ = nullptr;
-};
 
 /// An OpenGL 4.5 core context, current nowhere until a CurrentContext makes it so.
 class Context {

@@ -1,6 +1,7 @@
 #include "pictura/common/file.h"
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -112,6 +113,29 @@ void write_file(const std::string& path, std::string_view bytes) {
     out.close();
     PICTURA_CHECK(out, "{}: cannot be written: {}", path, std::strerror(errno));
   });
+}
+
+std::string cache_folder(const std::string& name) {
+  auto variable = [](const char* variable_name) -> std::string {
+    const char* value = std::getenv(variable_name);
+    return value ? value : "";
+  };
+  if (variable("PICTURA_CACHE") == "off") return "";
+  std::string folder = variable("XDG_CACHE_HOME");
+  if (folder.empty()) {
+    const std::string home = variable("HOME");
+    if (home.empty()) return "";
+    folder = home + "/.cache";
+  }
+  return folder + "/pictura/" + name;
+}
+
+void try_to_cache(const std::string& path, std::string_view bytes) {
+  try {
+    make_output_folder(fs::path(path).parent_path().string());
+    write_file(path, bytes);
+  } catch (const Error&) {
+  }
 }
 
 void make_output_folder(const std::string& path) {

@@ -19,6 +19,14 @@ void write_renamed(const std::string& path, const std::function<void(const std::
 /// Writes the bytes beside path and renames.
 void write_file(const std::string& path, std::string_view bytes);
 
+/// The folder for what can be made again: $XDG_CACHE_HOME/pictura/NAME, or ~/.cache/pictura/NAME. Empty when there is
+/// neither, or when $PICTURA_CACHE is `off`.
+std::string cache_folder(const std::string& name);
+
+/// Writes a file of a cache folder, which is made where it is missing. Says nothing when it cannot: such a folder is
+/// the user's choice, or not his to change.
+void try_to_cache(const std::string& path, std::string_view bytes);
+
 /// Makes the folder and its parents. Throws Error naming it unless it is there and can be written to afterwards.
 void make_output_folder(const std::string& path);
 

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -28,5 +29,11 @@ class Hash64 {
  private:
   std::uint64_t state_ = 0xCBF29CE484222325ull;
 };
+
+inline std::uint64_t hash_of(std::string_view bytes) {
+  Hash64 hash;
+  hash.add_bytes(bytes.data(), bytes.size());
+  return hash.value();
+}
 
 }  // namespace pictura

@@ -48,16 +48,6 @@ std::string file_of(const std::string& name) {
              kExtension, map_folder(), towns.empty() ? "none" : fmt::format("{}", fmt::join(towns, ", ")));
 }
 
-/// Keeps an encoded map for the next load, where that is possible.
-void try_to_keep(const std::string& cache_path, const std::string& bytes) {
-  try {
-    make_output_folder(fs::path(cache_path).parent_path().string());
-    write_file(cache_path, bytes);
-  } catch (const Error&) {
-    // A folder that cannot be written to is the user's choice, or not his to change.
-  }
-}
-
 RoadMap load_file(const std::string& path, const OpenDriveOptions& options, LoadReport* report) {
   const std::string text = read_file(path, kMaxFile_bytes);
   const std::string cache_path = map_cache_path(path, options);
@@ -74,7 +64,7 @@ RoadMap load_file(const std::string& path, const OpenDriveOptions& options, Load
     }
   }
   RoadMap map = parse_opendrive(text, path, options, &report->warnings);
-  if (report->warnings.empty()) try_to_keep(cache_path, encode_map(map, key));
+  if (report->warnings.empty()) try_to_cache(cache_path, encode_map(map, key));
   return map;
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <type_traits>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "pictura/common/error.h"
+#include "pictura/common/file.h"
 #include "pictura/common/hash.h"
 #include "pictura/map/map_fields.h"
 #include "pictura/map_fingerprint.h"
@@ -29,12 +29,6 @@ struct Header {
   uint64_t payload_bytes = 0, payload_hash = 0;
 };
 static_assert(std::has_unique_object_representations_v<Header>, "padding would be written without a meaning");
-
-uint64_t hash_of(std::string_view bytes) {
-  Hash64 hash;
-  hash.add_bytes(bytes.data(), bytes.size());
-  return hash.value();
-}
 
 template <typename T>
 using FieldsOf = decltype(fields_of(std::declval<T&>()));
@@ -221,21 +215,12 @@ RoadMap decode_map(std::string_view bytes, const MapCacheKey& key, const std::st
 }
 
 std::string map_cache_path(const std::string& source_path, const OpenDriveOptions& options) {
-  auto variable = [](const char* name) -> std::string {
-    const char* value = std::getenv(name);
-    return value ? value : "";
-  };
-  if (variable("PICTURA_CACHE") == "off") return "";
-  std::string folder = variable("XDG_CACHE_HOME");
-  if (folder.empty()) {
-    const std::string home = variable("HOME");
-    if (home.empty()) return "";
-    folder = home + "/.cache";
-  }
+  const std::string folder = cache_folder("maps");
+  if (folder.empty()) return "";
   std::error_code error;
   const std::filesystem::path source = std::filesystem::weakly_canonical(source_path, error);
   const uint64_t place = hash_of(source.string() + fmt::format(" {:x}", map_cache_key("", options).options));
-  return fmt::format("{}/pictura/maps/{}-{:016x}.map", folder, source.stem().string(), place);
+  return fmt::format("{}/{}-{:016x}.map", folder, source.stem().string(), place);
 }
 
 }  // namespace pictura

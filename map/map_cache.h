@@ -33,8 +33,7 @@ RoadMap decode_map(std::string_view bytes, const MapCacheKey& key, const std::st
 /// The header that encode_map() puts before `payload`.
 std::string map_cache_header(std::string_view payload, const MapCacheKey& key);
 
-/// The file that keeps the map of `source_path` imported with these options: in $XDG_CACHE_HOME/pictura/maps, or
-/// ~/.cache/pictura/maps. Empty when there is neither, or when $PICTURA_CACHE is `off`.
+/// The file that keeps the map of `source_path` imported with these options. Empty when maps are not kept.
 std::string map_cache_path(const std::string& source_path, const OpenDriveOptions& options);
 
 }  // namespace pictura

@@ -11,7 +11,7 @@ namespace {
 
 TEST(GlContext, AMissingLibraryNamesItsDebianPackage) {
   try {
-    SharedLibrary("gl:osmesa", "libNotThere.so.8", "libosmesa6");
+    SharedLibrary("gl:osmesa", "libNotThere.so.8", "Debian package libosmesa6");
     FAIL() << "expected an Error";
   } catch (const Error& error) {
     EXPECT_THAT(error.what(),

@@ -1,14 +1,14 @@
+#include "pictura/common/shared_library.h"
+
 #include <dlfcn.h>
 
-#include "pictura/backend_gl/gl_context.h"
 #include "pictura/common/error.h"
 
-namespace pictura::gl {
+namespace pictura {
 
-SharedLibrary::SharedLibrary(const std::string& renderer, const std::string& file, const std::string& debian_package)
+SharedLibrary::SharedLibrary(const std::string& renderer, const std::string& file, const std::string& source)
     : renderer_(renderer), file_(file), handle_(dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE)) {
-  PICTURA_CHECK(handle_, "renderer {}: cannot open {} (Debian package {}): {}", renderer, file, debian_package,
-                dlerror());
+  PICTURA_CHECK(handle_, "renderer {}: cannot open {} ({}): {}", renderer, file, source, dlerror());
 }
 
 void* SharedLibrary::function(const char* name) const {
@@ -17,4 +17,4 @@ void* SharedLibrary::function(const char* name) const {
   return address;
 }
 
-}  // namespace pictura::gl
+}  // namespace pictura
