@@ -9,14 +9,15 @@
 
 namespace pictura {
 
-std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config);
-std::unique_ptr<Renderer> make_cuda_renderer_for_host(const RendererConfig& config);
+std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config, std::string* origin_out);
+std::unique_ptr<Renderer> make_cuda_renderer_for_host(const RendererConfig& config, std::string* origin_out);
 
 namespace {
 
 class HostRendererCuda final : public Renderer {
  public:
-  explicit HostRendererCuda(const RendererConfig& config) : renderer_(make_cuda_renderer(config)) {}
+  HostRendererCuda(const RendererConfig& config, std::string* origin_out)
+      : renderer_(make_cuda_renderer(config, origin_out)) {}
   std::string_view name() const override { return renderer_->name(); }
   MemorySpace space() const override { return MemorySpace::host; }
   const RendererConfig& config() const override { return renderer_->config(); }
@@ -70,8 +71,8 @@ class HostRendererCuda final : public Renderer {
 
 }  // namespace
 
-std::unique_ptr<Renderer> make_cuda_renderer_for_host(const RendererConfig& config) {
-  return std::make_unique<HostRendererCuda>(config);
+std::unique_ptr<Renderer> make_cuda_renderer_for_host(const RendererConfig& config, std::string* origin_out) {
+  return std::make_unique<HostRendererCuda>(config, origin_out);
 }
 
 }  // namespace pictura

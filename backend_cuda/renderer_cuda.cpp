@@ -4,7 +4,8 @@
 #include <cmath>
 #include <memory>
 
-#include "pictura/backend_cuda/renderer_cuda_kernel.h"
+#include "pictura/backend_cuda/kernel_library.h"
+#include "pictura/backend_cuda/renderer_cuda_launch.h"
 #include "pictura/common/cuda/check.cuh"
 #include "pictura/common/cuda/device_buffer.cuh"
 #include "pictura/common/error.h"
@@ -12,7 +13,7 @@
 
 namespace pictura {
 
-std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config);
+std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config, std::string* origin_out);
 std::string cuda_unavailable();
 
 namespace {
@@ -83,15 +84,12 @@ struct UploadedGeometry {
 
 class CudaRenderer final : public Renderer {
  public:
-  explicit CudaRenderer(const RendererConfig& config) : config_(config) {
-    validate(config_.rig);
-    PICTURA_CHECK(config_.line_floor_px >= 0 && config_.line_floor_px <= kGuardBand_px,
-                  "renderer cuda: expected a line floor of 0 to {} pixels, got {}", kGuardBand_px,
-                  config_.line_floor_px);
+  CudaRenderer(const RendererConfig& config, std::string* origin_out) : config_(checked(config)), library_(config.rig) {
     int device = 0, processors = 0;
     PICTURA_CUDA(cudaGetDevice(&device));
     PICTURA_CUDA(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device));
-    PICTURA_CUDA(cuda::prepare_kernels());
+    PICTURA_CUDA(cuda::prepare_kernels(library_.kernels()));
+    *origin_out = library_.origin();
     small_ = ScratchBuffers(cuda::small_scratch(processors), 0);
     counters_ = DeviceBuffer<int32_t>(2);
     fault_.host()->view = -1;
@@ -120,8 +118,7 @@ class CudaRenderer final : public Renderer {
     if (task.num_views * task.num_cameras == 0) return;
     const auto on_stream = static_cast<cudaStream_t>(stream.handle);
     PICTURA_CUDA(cudaMemsetAsync(counters_.data(), 0, counters_.size() * sizeof(int32_t), on_stream));
-    cuda::launch_draw(task, small_.view(), large_.view(), on_stream);
-    PICTURA_CUDA(cudaGetLastError());
+    PICTURA_CUDA(cuda::launch_draw(library_.kernels(), task, small_.view(), large_.view(), on_stream));
   }
 
   void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
@@ -135,11 +132,19 @@ class CudaRenderer final : public Renderer {
     task.queries = &queries.data()->view;
     task.num_queries = static_cast<int32_t>(queries.size());
     task.visibility = visibility_out.data();
-    cuda::launch_visibility(task, large_.view(), static_cast<cudaStream_t>(stream.handle));
-    PICTURA_CUDA(cudaGetLastError());
+    PICTURA_CUDA(
+        cuda::launch_visibility(library_.kernels(), task, large_.view(), static_cast<cudaStream_t>(stream.handle)));
   }
 
  private:
+  static const RendererConfig& checked(const RendererConfig& config) {
+    validate(config.rig);
+    PICTURA_CHECK(config.line_floor_px >= 0 && config.line_floor_px <= kGuardBand_px,
+                  "renderer cuda: expected a line floor of 0 to {} pixels, got {}", kGuardBand_px,
+                  config.line_floor_px);
+    return config;
+  }
+
   cuda::DrawTask draw_task(const SceneBatch& scene, Span<const View> views, const ImageBatch* images) {
     PICTURA_CHECK(scene.space == MemorySpace::cuda, "renderer cuda: scene: expected cuda memory, got host");
     PICTURA_CHECK(scene.world_begin.empty() || (scene.geometry.size() + 1 == scene.world_begin.size() &&
@@ -211,6 +216,7 @@ class CudaRenderer final : public Renderer {
   }
 
   RendererConfig config_;
+  cuda::KernelLibrary library_;  // outlives the buffers, whose release waits for the device
   std::vector<UploadedGeometry> geometries_;
   DeviceBuffer<cuda::DeviceGeometry> geometry_views_;
   int most_pieces_ = 0, most_heads_ = 0;
@@ -227,13 +233,15 @@ std::string cuda_unavailable() {
   const cudaError_t status = cudaGetDeviceCount(&devices);
   if (status != cudaSuccess) {
     cudaGetLastError();  // the error is ours to report, not the next call's
-    return cudaGetErrorString(status);
+    int driver = 0;
+    const bool has_driver = cudaDriverGetVersion(&driver) == cudaSuccess && driver > 0;
+    return has_driver ? cudaGetErrorString(status) : "no CUDA device: no NVIDIA driver was found";
   }
   return devices > 0 ? "" : "no CUDA device";
 }
 
-std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config) {
-  return std::make_unique<CudaRenderer>(config);
+std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config, std::string* origin_out) {
+  return std::make_unique<CudaRenderer>(config, origin_out);
 }
 
 }  // namespace pictura

@@ -2,8 +2,6 @@
 // those that do not are left to a second launch of fewer blocks, whose memory has room for all that a world can hold.
 #pragma once
 
-#include <cuda_runtime_api.h>
-
 #include "pictura/common/raster_item.h"
 
 namespace pictura::cuda {
@@ -65,22 +63,11 @@ struct DrawTask {
   CameraSlot cameras[kMaxCameras];
 };
 
-/// What the blocks of the first launch have room for, and how many of them a device of so many processors runs at once.
-Scratch small_scratch(int processors);
-/// What is to be done once before the first launch.
-cudaError_t prepare_kernels();
-/// Bytes that a block of the second launch needs besides faces and edges.
-std::size_t block_bytes(const Scratch& large);
-
-/// Draws all images; both launches.
-void launch_draw(const DrawTask& task, const Scratch& small, const Scratch& large, cudaStream_t stream);
-
 struct VisibilityTask {
   DrawTask draw;
   const int32_t* queries = nullptr;  // [2 * num_queries] view, agent
   int32_t num_queries = 0;
   float* visibility = nullptr;
 };
-void launch_visibility(const VisibilityTask& task, const Scratch& large, cudaStream_t stream);
 
 }  // namespace pictura::cuda

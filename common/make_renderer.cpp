@@ -10,8 +10,9 @@ namespace pictura {
 // Each backend's one public symbol; declared here so that nothing else sees them.
 std::unique_ptr<Renderer> make_cpu_renderer(const RendererConfig& config);
 #ifdef PICTURA_HAS_CUDA
-std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config);
-std::unique_ptr<Renderer> make_cuda_renderer_for_host(const RendererConfig& config);
+/// *origin_out receives where the kernels come from.
+std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config, std::string* origin_out);
+std::unique_ptr<Renderer> make_cuda_renderer_for_host(const RendererConfig& config, std::string* origin_out);
 /// Empty where a CUDA device can be used, else why not.
 std::string cuda_unavailable();
 #endif
@@ -91,14 +92,20 @@ std::unique_ptr<Renderer> make_renderer(const std::string& name, const RendererC
   if (name == "null") return chosen("null: asked for"), std::make_unique<NullRenderer>(config);
 #ifdef PICTURA_HAS_CUDA
   const std::string unavailable = cuda_unavailable();
+  auto make_cuda = [&](const char* why) {
+    const auto make = config.space == MemorySpace::cuda ? make_cuda_renderer : make_cuda_renderer_for_host;
+    std::string origin;
+    auto renderer = make(config, &origin);
+    chosen(fmt::format("cuda: {}; {}", why, origin));
+    return renderer;
+  };
   if (name == "cuda") {
     PICTURA_CHECK(unavailable.empty(), "renderer cuda: {}", unavailable);
-    chosen("cuda: asked for");
-    return config.space == MemorySpace::cuda ? make_cuda_renderer(config) : make_cuda_renderer_for_host(config);
+    return make_cuda("asked for");
   }
   const std::string why_not_cuda =
       config.space == MemorySpace::cuda ? unavailable : "scenes and images lie in host memory";
-  if (name == "auto" && why_not_cuda.empty()) return chosen("cuda: a device was found"), make_cuda_renderer(config);
+  if (name == "auto" && why_not_cuda.empty()) return make_cuda("a device was found");
 #else
   const std::string why_not_cuda = "this build has no CUDA";
 #endif

@@ -1,5 +1,4 @@
-// Headers of rules, scene and raster compile without a standard library, for every architecture that we name, on
-// machines that have no GPU.
+// Headers of rules, scene and raster compile without a standard library, on machines that have no GPU.
 #include <algorithm>
 #include <filesystem>
 #include <string>
@@ -55,66 +54,19 @@ std::vector<std::string> shared_headers() {
   return headers;
 }
 
-class Nvrtc : public testing::TestWithParam<std::string> {};
+class NvrtcHeader : public testing::TestWithParam<std::string> {};
 
-TEST_P(Nvrtc, CompilesTheHeaderAlone) {
+TEST_P(NvrtcHeader, CompilesTheHeaderAlone) {
   EXPECT_EQ(compile("#include \"" + GetParam() + "\"\n__global__ void kernel() {}\n", "sm_90"), "");
 }
 
-INSTANTIATE_TEST_SUITE_P(Headers, Nvrtc, testing::ValuesIn(shared_headers()), [](const auto& header) {
+INSTANTIATE_TEST_SUITE_P(All, NvrtcHeader, testing::ValuesIn(shared_headers()), [](const auto& header) {
   std::string name = header.param.substr(header.param.rfind('/') + 1);
   std::replace(name.begin(), name.end(), '.', '_');
   return name;
 });
 
-// A kernel that draws one box and one strip at one pixel: every rule is compiled to code.
-const char* const kDrawing = R"(
-#include "pictura/common/raster_item.h"
-using namespace pictura;
-struct Pool {
-  PolygonEdge edges[64];
-  int used = 0;
-  __device__ int take(int count) { used += count; return used - count; }
-  __device__ PolygonEdge* at(int index) { return edges + index; }
-};
-struct List {
-  static constexpr int kEnd = -1;
-  Fragment fragments[8];
-  int count = 0;
-  __device__ int begin() const { return count - 1; }
-  __device__ int next(int place) const { return place - 1; }
-  __device__ const Fragment& at(int place) const { return fragments[place]; }
-  __device__ void remove(int place, int) { fragments[place] = fragments[--count]; }
-};
-__global__ void kernel(const AgentBox* box, const Strip* strip, const PinholeCamera* camera, const View* view, float* out) {
-  const PinholeCamera placed = place_camera(*camera, *view);
-  const ImageSetting setting{placed, make_frustum(placed), 0.35f, false};
-  Pool pool;
-  ScreenFace faces[8];
-  List list;
-  FaceOwner owner = agent_owner(*box, 0);
-  auto add = [&](const Vec3* corners, int count, const FacePlane& plane, Rgb color) {
-    ScreenFace& face = faces[list.count];
-    if (!make_face(setting, owner, corners, count, plane, color, pool, &face)) return;
-    const PixelCoverage coverage = pixel_coverage(pool.at(face.edge_begin), face.edge_count, 3, 4);
-    list.fragments[list.count] = make_fragment(face, list.count, coverage, 3, 4);
-    ++list.count;
-  };
-  agent_faces(*box, placed, false, add);
-  owner = strip_owner(*strip, 0);
-  strip_faces(*strip, placed, 0.35f, add);
-  auto stands = [&](unsigned, unsigned) { return stands_on(extent_of(*box), extent_of(*strip)); };
-  *out = lay_fragments(list, faces, 3, 4, stands, [](const Fragment&, float) {}).color.r;
-}
-)";
-
-TEST(NvrtcArchitectures, CompileTheRasterRulesToCode) {
-  for (const char* architecture : {"sm_80", "sm_90", "sm_100", "sm_120"}) {
-    EXPECT_EQ(compile(kDrawing, architecture), "") << architecture;
-  }
-}
-
-TEST(NvrtcArchitectures, AHeaderOfTheStandardLibraryIsAFault) {
+TEST(Nvrtc, AHeaderOfTheStandardLibraryIsAFault) {
   EXPECT_NE(compile("#include <vector>\n__global__ void kernel() {}\n", "sm_90"), "");
 }
 

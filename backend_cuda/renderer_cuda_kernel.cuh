@@ -1,9 +1,12 @@
+// The drawing kernels, and how much memory their blocks need. Compiled ahead of time by renderer_cuda_launch.cu, and at
+// run time from a copy of this file and of all that it includes.
+#pragma once
+
 #include "pictura/backend_cuda/renderer_cuda_faces.cuh"
 #include "pictura/backend_cuda/renderer_cuda_fragments.cuh"
+#include "pictura/backend_cuda/renderer_cuda_rig.cuh"
 
 namespace pictura::cuda {
-
-namespace {
 
 // Most images fit into a block of this much.
 constexpr int kSmallBlocksPerProcessor = 3;
@@ -57,12 +60,12 @@ __device__ Memory memory_at(unsigned char* bytes, BlockState* state, const Scrat
 
 constexpr size_t kStateBytes = (sizeof(BlockState) + 15) / 16 * 16;
 
-__host__ size_t small_bytes() {
+__host__ __device__ inline size_t small_bytes() {
   return kStateBytes + memory_bytes<SmallMemory>(kSmallFaces, kSmallPieces, kSmallPixels, kSmallFragments);
 }
 
 // Stores a pixel's colour: element `at` of the first channel, and as far behind it as a plane is large for the others.
-__device__ void write_color(const DrawTask& task, const CameraSlot& slot, int64_t at, int64_t plane, Rgb color) {
+__device__ inline void write_color(const DrawTask& task, const CameraSlot& slot, int64_t at, int64_t plane, Rgb color) {
   const float channels[3] = {color.r, color.g, color.b};
   for (int channel = 0; channel < 3; ++channel) {
     if (task.as_float) {
@@ -77,8 +80,8 @@ __device__ void write_color(const DrawTask& task, const CameraSlot& slot, int64_
 template <typename Memory>
 __device__ void draw_planes(const Memory& memory, const DrawTask& task, const CameraSlot& slot, int32_t view,
                             int num_faces) {
-  const int width = slot.camera.width_px;
-  const int64_t plane = static_cast<int64_t>(width) * slot.camera.height_px;
+  const int width = width_px(slot.camera);
+  const int64_t plane = static_cast<int64_t>(width) * height_px(slot.camera);
   for (int64_t p = threadIdx.x; p < plane; p += kThreads) {
     const int x = static_cast<int>(p % width), y = static_cast<int>(p / width);
     const Vec2 center = pixel_middle(x, y);
@@ -106,7 +109,7 @@ __device__ void draw_planes(const Memory& memory, const DrawTask& task, const Ca
 template <typename Memory>
 __device__ bool draw_image(const Memory& memory, const DrawTask& task, int32_t view, int32_t camera) {
   const CameraSlot& slot = task.cameras[camera];
-  const int width = slot.camera.width_px, height = slot.camera.height_px;
+  const int width = width_px(slot.camera), height = height_px(slot.camera);
   if (width > memory.max_pixels) return false;
   const bool prepared = prepare(memory, task, view, camera);
   if (!prepared && memory.state->usable) return false;
@@ -122,20 +125,20 @@ __device__ bool draw_image(const Memory& memory, const DrawTask& task, int32_t v
   return drawn;
 }
 
-__global__ void __launch_bounds__(kThreads, kSmallBlocksPerProcessor)
-    draw_kernel(const __grid_constant__ DrawTask task, const __grid_constant__ Scratch scratch) {
+extern "C" __global__ void __launch_bounds__(kThreads, kSmallBlocksPerProcessor)
+    pictura_draw(const __grid_constant__ DrawTask task, const __grid_constant__ Scratch scratch) {
   extern __shared__ __align__(16) unsigned char bytes[];
   auto* state = reinterpret_cast<BlockState*>(bytes);
   const SmallMemory memory =
       memory_at<SmallMemory>(bytes + kStateBytes, state, scratch, static_cast<int>(blockIdx.x), kSmallPixels);
-  const int32_t images = task.num_views * task.num_cameras;
+  const int32_t images = task.num_views * num_cameras(task);
   for (;;) {
     __syncthreads();
     if (threadIdx.x == 0) state->image = atomicAdd(task.next_image, 1);
     __syncthreads();
     const int32_t image = state->image;
     if (image >= images) return;
-    if (!draw_image(memory, task, image / task.num_cameras, image % task.num_cameras) && threadIdx.x == 0) {
+    if (!draw_image(memory, task, image / num_cameras(task), image % num_cameras(task)) && threadIdx.x == 0) {
       task.overflow_images[atomicAdd(task.overflow_count, 1)] = image;
     }
   }
@@ -144,28 +147,28 @@ __global__ void __launch_bounds__(kThreads, kSmallBlocksPerProcessor)
 // Pixels of a band of the second launch: a row of the widest image at least.
 constexpr int kLargePixels = 1 << 14;
 
-__device__ LargeMemory large_memory(BlockState* state, const Scratch& scratch) {
+__device__ inline LargeMemory large_memory(BlockState* state, const Scratch& scratch) {
   const size_t bytes =
       memory_bytes<LargeMemory>(scratch.max_faces, scratch.max_pieces, kLargePixels, scratch.max_fragments);
   return memory_at<LargeMemory>(scratch.bytes + blockIdx.x * bytes, state, scratch, static_cast<int>(blockIdx.x),
                                 kLargePixels);
 }
 
-__global__ void __launch_bounds__(kThreads)
-    draw_overflow_kernel(const __grid_constant__ DrawTask task, const __grid_constant__ Scratch scratch) {
+extern "C" __global__ void __launch_bounds__(kThreads)
+    pictura_draw_overflow(const __grid_constant__ DrawTask task, const __grid_constant__ Scratch scratch) {
   alignas(BlockState) __shared__ unsigned char bytes[sizeof(BlockState)];
   auto* state = reinterpret_cast<BlockState*>(bytes);
   const LargeMemory memory = large_memory(state, scratch);
   const int32_t count = *task.overflow_count;
   for (int32_t i = static_cast<int32_t>(blockIdx.x); i < count; i += static_cast<int32_t>(gridDim.x)) {
     const int32_t image = task.overflow_images[i];
-    const int32_t view = image / task.num_cameras;
-    if (!draw_image(memory, task, view, image % task.num_cameras) && threadIdx.x == 0) note_fault(task, view, kNoRoom);
+    const int32_t view = image / num_cameras(task);
+    if (!draw_image(memory, task, view, image % num_cameras(task)) && threadIdx.x == 0) note_fault(task, view, kNoRoom);
   }
 }
 
-__global__ void __launch_bounds__(kThreads)
-    visibility_kernel(const __grid_constant__ VisibilityTask task, const __grid_constant__ Scratch scratch) {
+extern "C" __global__ void __launch_bounds__(kThreads)
+    pictura_visibility(const __grid_constant__ VisibilityTask task, const __grid_constant__ Scratch scratch) {
   alignas(BlockState) __shared__ unsigned char bytes[sizeof(BlockState)];
   auto* state = reinterpret_cast<BlockState*>(bytes);
   const LargeMemory memory = large_memory(state, scratch);
@@ -175,7 +178,7 @@ __global__ void __launch_bounds__(kThreads)
     const bool in_range = view >= 0 && view < task.draw.num_views && agent >= 0 &&
                           agent < static_cast<int32_t>(task.draw.scene.agents.size());
     if (!in_range && threadIdx.x == 0) note_fault(task.draw, q, kBadQuery);
-    for (int32_t camera = 0; in_range && camera < task.draw.num_cameras; ++camera) {
+    for (int32_t camera = 0; in_range && camera < num_cameras(task.draw); ++camera) {
       if (!prepare(memory, task.draw, view, camera)) continue;
       const uint32_t number = thing_number(kAgentKind, agent - state->view.world_begin);
       const int num_faces = state->num_visible;
@@ -209,38 +212,6 @@ __global__ void __launch_bounds__(kThreads)
     }
     __syncthreads();
   }
-}
-
-}  // namespace
-
-Scratch small_scratch(int processors) {
-  Scratch scratch;
-  scratch.blocks = kSmallBlocksPerProcessor * processors;
-  scratch.max_faces = kSmallFaces;
-  scratch.max_edges = kSmallEdges;
-  scratch.max_pieces = kSmallPieces;
-  scratch.max_fragments = kSmallFragments;
-  return scratch;
-}
-
-cudaError_t prepare_kernels() {
-  return cudaFuncSetAttribute(draw_kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                              static_cast<int>(small_bytes()));
-}
-
-std::size_t block_bytes(const Scratch& large) {
-  return memory_bytes<LargeMemory>(large.max_faces, large.max_pieces, kLargePixels, large.max_fragments);
-}
-
-void launch_draw(const DrawTask& task, const Scratch& small, const Scratch& large, cudaStream_t stream) {
-  const int images = task.num_views * task.num_cameras;
-  draw_kernel<<<min_of(images, small.blocks), kThreads, small_bytes(), stream>>>(task, small);
-  draw_overflow_kernel<<<min_of(images, large.blocks), kThreads, 0, stream>>>(task, large);
-}
-
-void launch_visibility(const VisibilityTask& task, const Scratch& large, cudaStream_t stream) {
-  if (task.num_queries == 0) return;
-  visibility_kernel<<<min_of(task.num_queries, large.blocks), kThreads, 0, stream>>>(task, large);
 }
 
 }  // namespace pictura::cuda

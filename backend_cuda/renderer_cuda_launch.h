@@ -1,0 +1,39 @@
+// The drawing kernels as the host sees them: where they come from, how much memory they want, and their launches. All
+// launches are put on a stream and wait for nothing.
+#pragma once
+
+#include <cstddef>
+
+#include <cuda_runtime_api.h>
+
+#include "pictura/backend_cuda/renderer_cuda_kernel.h"
+
+namespace pictura::cuda {
+
+/// The kernels' handles: symbols of this program, or cudaKernel_t of code that was loaded.
+struct KernelSet {
+  const void* draw = nullptr;
+  const void* draw_overflow = nullptr;
+  const void* visibility = nullptr;
+};
+constexpr const char* kDrawName = "pictura_draw";
+constexpr const char* kDrawOverflowName = "pictura_draw_overflow";
+constexpr const char* kVisibilityName = "pictura_visibility";
+
+/// Those that were compiled with this program, for any rig.
+KernelSet ahead_of_time_kernels();
+/// What is to be done once before the first launch.
+cudaError_t prepare_kernels(const KernelSet& kernels);
+
+/// What the blocks of the first launch have room for, and how many of them a device of so many processors runs at once.
+Scratch small_scratch(int processors);
+/// Bytes that a block of the second launch needs besides faces and edges.
+std::size_t block_bytes(const Scratch& large);
+
+/// Draws all images; both launches.
+cudaError_t launch_draw(const KernelSet& kernels, const DrawTask& task, const Scratch& small, const Scratch& large,
+                        cudaStream_t stream);
+cudaError_t launch_visibility(const KernelSet& kernels, const VisibilityTask& task, const Scratch& large,
+                              cudaStream_t stream);
+
+}  // namespace pictura::cuda

@@ -1,0 +1,36 @@
+# Run at every build in which a source changed: writes OUTPUT, a C++ file with the texts of ROOTS and of every header of
+# ours that they include, as backend_cuda/kernel_sources.h declares them. Paths are relative to SOURCE_DIR.
+set(files ${ROOTS})
+set(entries "")
+set(program "")
+foreach(root ${ROOTS})
+  string(APPEND program "#include \\\"pictura/${root}\\\"\\n")
+endforeach()
+while(files)
+  list(POP_FRONT files file)
+  if(file IN_LIST seen)
+    continue()
+  endif()
+  list(APPEND seen ${file})
+  file(READ ${SOURCE_DIR}/${file} text)
+  string(REGEX MATCHALL "#include \"pictura/[^\"]+\"" includes "${text}")
+  foreach(include ${includes})
+    string(REGEX REPLACE "#include \"pictura/(.+)\"" "\\1" header ${include})
+    list(APPEND files ${header})
+  endforeach()
+  string(APPEND entries "    {\"pictura/${file}\", R\"__source__(${text})__source__\"},\n")
+endwhile()
+file(WRITE ${OUTPUT} "// Written by cmake/EmbedSources.cmake.
+#include \"pictura/backend_cuda/kernel_sources.h\"
+
+namespace pictura::cuda {
+
+namespace {
+constexpr KernelSource kHeaders[] = {
+${entries}};
+}  // namespace
+
+KernelProgram renderer_program() { return {\"${program}\", {kHeaders, sizeof kHeaders / sizeof *kHeaders}}; }
+
+}  // namespace pictura::cuda
+")
