@@ -97,39 +97,54 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
   }
 }
 
-// The list of one pixel, for lay_fragments.
-class ImageDrawer::PixelList {
- public:
-  static constexpr int kEnd = -1;
-  PixelList(std::vector<LinkedFragment>* fragments, int32_t first) : fragments_(*fragments), first_(first) {}
-  int begin() const { return first_; }
-  int next(int place) const { return fragments_[static_cast<std::size_t>(place)].next; }
-  const Fragment& at(int place) const { return fragments_[static_cast<std::size_t>(place)].fragment; }
-  void remove(int place, int before) {
-    (before == kEnd ? first_ : fragments_[static_cast<std::size_t>(before)].next) = next(place);
+// Takes the fragments of a pixel, given the first of them, from their list; the nearest first.
+void ImageDrawer::gather_pixel(int32_t first) {
+  pixel_.clear();
+  for (int32_t i = first; i >= 0; i = fragments_[static_cast<std::size_t>(i)].next) {
+    pixel_.push_back(fragments_[static_cast<std::size_t>(i)].fragment);
   }
+  std::sort(pixel_.begin(), pixel_.end(),
+            [this](const Fragment& a, const Fragment& b) { return is_nearer(a, b, faces_.data()); });
+}
 
- private:
-  std::vector<LinkedFragment>& fragments_;
-  int32_t first_;
-};
+// Weighs the gathered fragments of a pixel.
+PixelSum ImageDrawer::weigh_pixel(int x, int y) {
+  const Vec2 corner{static_cast<float>(x), static_cast<float>(y)};
+  PixelSum sum;
+  weights_.resize(pixel_.size());
+  for (std::size_t i = 0; i < pixel_.size(); ++i) {
+    const FreePart free = free_of([this](int k) -> const Fragment& { return pixel_[static_cast<std::size_t>(k)]; },
+                                  static_cast<int>(pixel_.size()), static_cast<int>(i), faces_.data(), corner,
+                                  [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
+    weights_[i] = PixelSum::weight_of(pixel_[i].coverage, free);
+    sum.add(weights_[i], faces_[static_cast<std::size_t>(pixel_[i].face)].color);
+  }
+  return sum;
+}
 
-template <typename Lay, typename Finish>
-void ImageDrawer::lay_rows(RowRange rows, Lay&& lay, Finish&& finish) {
+template <typename Visit, typename Finish>
+void ImageDrawer::weigh_rows(RowRange rows, Visit&& visit, Finish&& finish) {
   const int width = setting_.camera.width_px;
   int pixel = 0;
   for (int y = rows.y_begin; y < rows.y_end; ++y) {
     for (int x = 0; x < width; ++x, ++pixel) {
-      PixelList list(&fragments_, first_fragment_[static_cast<std::size_t>(pixel)]);
-      if (list.begin() == PixelList::kEnd) {
+      const int32_t first = first_fragment_[static_cast<std::size_t>(pixel)];
+      if (first < 0) {
         finish(pixel, Rgb{});
         continue;
       }
-      finish(pixel,
-             lay_fragments(
-                 list, faces_.data(), x, y, [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); },
-                 [&](const Fragment& fragment, float weight) { lay(pixel, fragment, weight); })
-                 .color);
+      const LinkedFragment& alone = fragments_[static_cast<std::size_t>(first)];
+      if (alone.next < 0) {
+        const float weight = alone.fragment.coverage.area;
+        visit(pixel, alone.fragment, weight);
+        finish(pixel, faces_[static_cast<std::size_t>(alone.fragment.face)].color * weight);
+        continue;
+      }
+      gather_pixel(first);
+      const PixelSum sum = weigh_pixel(x, y);
+      const PixelSum::Shares shares = sum.shares();
+      for (std::size_t i = 0; i < pixel_.size(); ++i) visit(pixel, pixel_[i], shares.of(weights_[i]));
+      finish(pixel, sum.color(shares));
     }
   }
 }
@@ -143,7 +158,7 @@ void ImageDrawer::draw(const ImageTarget& target) {
       const RowRange rows{y_begin, min_of(height, y_begin + band_rows)};
       make_fragments({0, static_cast<int32_t>(faces_.size())}, rows);
       auto* first = out + int64_t{y_begin} * width;
-      lay_rows(
+      weigh_rows(
           rows, [](int, const Fragment&, float) {},
           [&](int pixel, Rgb color) {
             first[pixel] = value_of(color.r);
@@ -165,7 +180,7 @@ void ImageDrawer::draw(const ImageTarget& target) {
 void ImageDrawer::visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit) {
   const RowRange rows{0, setting_.camera.height_px};
   make_fragments({0, static_cast<int32_t>(faces_.size())}, rows);
-  lay_rows(
+  weigh_rows(
       rows,
       [&](int pixel, const Fragment& fragment, float) {
         visit(pixel, fragment.coverage, faces_[static_cast<std::size_t>(fragment.face)].color);
@@ -223,7 +238,7 @@ ImageDrawer::Coverage ImageDrawer::coverage_of(int32_t agent) {
     auto weigh = [&](FaceRange faces) {
       double weight = 0;
       make_fragments(faces, rows);
-      lay_rows(
+      weigh_rows(
           rows,
           [&](int, const Fragment& fragment, float weighs) {
             if (fragment.face >= wanted.begin && fragment.face < wanted.end) weight += static_cast<double>(weighs);

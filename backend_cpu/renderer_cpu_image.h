@@ -1,6 +1,6 @@
-// Draws one image: makes the faces of all that a camera may see, spreads them over the pixels as fragments, and lays
-// the fragments of each pixel front to back. All rules are the shared ones of common/raster*.h; here is only the
-// traversal, and the memory that it reuses from image to image.
+// Draws one image: makes the faces of all that a camera may see, spreads them over the pixels as fragments, and weighs
+// the fragments of each pixel. All rules are the shared ones of common/raster*.h; here is only the traversal, and the
+// memory that it reuses from image to image.
 #pragma once
 
 #include <functional>
@@ -43,8 +43,8 @@ class ImageDrawer {
     double seen = 0, alone = 0;
   };
   Coverage coverage_of(int32_t agent);
-  /// Calls visit(y * width + x, coverage, colour) for what each face covers of each pixel of the prepared image, front
-  /// to back up to what hides the rest: for measuring other ways to composite.
+  /// Calls visit(y * width + x, coverage, colour) for what each face covers of each pixel of the prepared image, the
+  /// nearer first, down to what hides the rest: for measuring other ways to composite.
   void visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit);
 
  private:
@@ -67,7 +67,6 @@ class ImageDrawer {
     Fragment fragment;
     int32_t next;
   };
-  class PixelList;
 
   // The nearest face that covers a pixel fully.
   struct FullFace {
@@ -89,10 +88,12 @@ class ImageDrawer {
   void visit_spans(const ScreenFace& face, RowRange rows, Visit&& visit) const;
   void find_full(FaceRange faces, RowRange rows);
   void make_fragments(FaceRange faces, RowRange rows);
-  // Lays the fragments of all pixels of the rows: lay(pixel index, fragment, weight) for
-  // each, then finish(pixel index, color).
-  template <typename Lay, typename Finish>
-  void lay_rows(RowRange rows, Lay&& lay, Finish&& finish);
+  void gather_pixel(int32_t first);
+  PixelSum weigh_pixel(int x, int y);
+  // Weighs the fragments of all pixels of the rows: visit(pixel index, fragment, weight) for each, then
+  // finish(pixel index, color).
+  template <typename Visit, typename Finish>
+  void weigh_rows(RowRange rows, Visit&& visit, Finish&& finish);
   void draw_planes(const ImageTarget& target) const;
   bool stands(uint32_t solid, uint32_t strip) const;
   int32_t world_begin() const { return request_.scene->world_begin[static_cast<std::size_t>(request_.view->world)]; }
@@ -104,6 +105,9 @@ class ImageDrawer {
   std::vector<FullFace> full_;           // [pixels of some rows]
   std::vector<int32_t> first_fragment_;  // [pixels of some rows] the head of each one's list
   std::vector<LinkedFragment> fragments_;
+  // Of one pixel.
+  std::vector<Fragment> pixel_;
+  std::vector<PixelSum::Weight> weights_;
 };
 
 }  // namespace pictura

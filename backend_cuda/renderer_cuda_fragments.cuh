@@ -129,7 +129,7 @@ __device__ void make_fragments(const Memory& memory, int num_faces, int width, i
   }
 }
 
-// A pixel's list, for lay_fragments: the full face, then the stored fragments.
+// A pixel's fragments: the full face, then the stored ones.
 template <typename Memory>
 class PixelList {
  public:
@@ -149,15 +149,6 @@ class PixelList {
     const auto& stored = memory_.fragments[place];
     const uint64_t samples = static_cast<uint64_t>(stored.samples_high) << 32 | stored.samples_low;
     return {{stored.area, samples}, stored.nearness, static_cast<int32_t>(stored.face)};
-  }
-  __device__ void remove(int place, int before) {
-    if (place == kFull) {
-      has_full_ = false;
-    } else if (before == kEnd || before == kFull) {
-      head_ = next(place);
-    } else {
-      memory_.fragments[before].next = memory_.fragments[place].next;
-    }
   }
 
  private:
@@ -180,12 +171,46 @@ __device__ bool stands(const Memory& memory, const DrawTask& task, uint32_t soli
                    extent_of(strip, pieces, task.scene, view.world_begin));
 }
 
+// Weighs the fragments of a pixel: visit(fragment, weight) hears of each. Returns the pixel's colour.
+template <typename Memory, typename Visit>
+__device__ Rgb weigh_pixel(const Memory& memory, const DrawTask& task, const PixelList<Memory>& list, int x, int y,
+                           Visit&& visit) {
+  constexpr int kEnd = PixelList<Memory>::kEnd;
+  const int first = list.begin();
+  if (first == kEnd) return {};
+  if (list.next(first) == kEnd) {
+    const Fragment alone = list.at(first);
+    visit(alone, alone.coverage.area);
+    return memory.faces[alone.face].color * alone.coverage.area;
+  }
+  const Vec2 corner{static_cast<float>(x), static_cast<float>(y)};
+  auto weight_at = [&](int place) {
+    const Fragment fragment = list.at(place);
+    FreePart free = all_free(fragment);
+    for (int other = first; other != kEnd; other = list.next(other)) {
+      if (other == place) continue;
+      hide(&free, fragment, list.at(other), memory.faces, corner,
+           [&](uint32_t solid, uint32_t strip) { return stands(memory, task, solid, strip); });
+    }
+    return PixelSum::weight_of(fragment.coverage, free);
+  };
+  PixelSum sum;
+  for (int place = first; place != kEnd; place = list.next(place)) {
+    sum.add(weight_at(place), memory.faces[list.at(place).face].color);
+  }
+  const PixelSum::Shares shares = sum.shares();
+  for (int place = first; place != kEnd; place = list.next(place)) {
+    visit(list.at(place), shares.of(weight_at(place)));
+  }
+  return sum.color(shares);
+}
+
 // Draws the faces into rows [y_first, y_last), band by band and, within a band, in parts whose fragments have room.
-// lay(fragment, weight) hears of each, finish(x, y, color) of each pixel. False where one row alone has more fragments
-// than there is room for. All threads of the block.
-template <typename Memory, typename Lay, typename Finish>
+// visit(fragment, weight) hears of each, finish(x, y, color) of each pixel. False where one row alone has more
+// fragments than there is room for. All threads of the block.
+template <typename Memory, typename Visit, typename Finish>
 __device__ bool draw_faces(const Memory& memory, const DrawTask& task, int num_faces, int width, int y_first,
-                           int y_last, Lay&& lay, Finish&& finish) {
+                           int y_last, Visit&& visit, Finish&& finish) {
   BlockState* state = memory.state;
   const int thread = static_cast<int>(threadIdx.x);
   const int band_rows = min_of(memory.max_pixels / width, kMaxBandRows);
@@ -215,14 +240,7 @@ __device__ bool draw_faces(const Memory& memory, const DrawTask& task, int num_f
       for (int p = thread; p < (y_end - y_begin) * width; p += kThreads) {
         const int x = p % width, y = y_begin + p / width;
         PixelList<Memory> list(memory, memory.pixels[(y_begin - row_0) * width + p], x, y);
-        Rgb color;
-        if (list.begin() != PixelList<Memory>::kEnd) {
-          color = lay_fragments(
-                      list, memory.faces, x, y,
-                      [&](uint32_t solid, uint32_t strip) { return stands(memory, task, solid, strip); }, lay)
-                      .color;
-        }
-        finish(x, y, color);
+        finish(x, y, weigh_pixel(memory, task, list, x, y, visit));
       }
       __syncthreads();
       y_begin = y_end;

@@ -1,6 +1,5 @@
 // From a face in camera coordinates to pixels: clipping, projection, and for each pixel the exact area that a convex
-// polygon covers and which of 64 samples it covers. Faces are composited front to back; the samples say how much of a
-// partly covered pixel is still free. Shared by both devices, which therefore agree bit for bit.
+// polygon covers and which of 64 samples it covers. Shared by both devices, which therefore agree bit for bit.
 #pragma once
 
 #include "pictura/common/raster_camera.h"
@@ -202,6 +201,18 @@ PICTURA_HD constexpr float sample_column_offset(int column) {
 struct PixelCoverage {
   float area = 0;  // in [0, 1]
   uint64_t samples = 0;
+  PICTURA_HD bool is_full() const { return area == 1.0f && samples == kAllSamples; }
+};
+
+/// Where a coverage counts as being: its samples; a sliver that touches none is wherever another one is.
+PICTURA_HD inline uint64_t reach_of(const PixelCoverage& coverage) {
+  return coverage.samples != 0 ? coverage.samples : kAllSamples;
+}
+
+/// What is free of a coverage that others may hide.
+struct FreePart {
+  uint64_t samples = 0;      // of its reach
+  bool behind_full = false;  // something that covers the whole pixel is in front
 };
 
 /// Less than this of a pixel is nothing; more than one minus kFullCoverage with every sample is all of it.
@@ -302,59 +313,6 @@ PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const Pi
   span.full_begin = min_of(max_of(first_at_or_after(full_low + kLeeway_px), span.begin), span.end);
   span.full_end = min_of(max_of(first_after(full_high - kLeeway_px), span.full_begin), span.end);
   return span;
-}
-
-/// A pixel while faces are laid over it front to back.
-struct PixelState {
-  Rgb color;
-  float free_area = 1.0f;  // share of the pixel that nothing covers yet
-  uint64_t free_samples = kAllSamples;
-};
-
-/// Lays a face over what is still free of a pixel and returns its weight in the pixel's colour. A face in front of
-/// everything weighs its exact area; behind others, its area times the free share of its samples. A sliver without a
-/// sample shows only where nothing is in front of it, so that what is hidden changes nothing.
-PICTURA_HD inline float composite(PixelState* pixel, const PixelCoverage& coverage, Rgb color) {
-  if (coverage.area <= 0.0f) return 0.0f;
-  float weight;
-  if (coverage.samples == kAllSamples && coverage.area == 1.0f) {
-    weight = pixel->free_area;
-  } else {
-    const uint64_t seen = coverage.samples & pixel->free_samples;
-    if (coverage.samples == 0) {
-      weight = pixel->free_samples == kAllSamples ? coverage.area : 0.0f;
-    } else if (seen == coverage.samples) {
-      weight = coverage.area;
-    } else {
-      weight =
-          coverage.area * (static_cast<float>(count_bits(seen)) / static_cast<float>(count_bits(coverage.samples)));
-    }
-    weight = min_of(weight, pixel->free_area);
-  }
-  pixel->color.r += weight * color.r;
-  pixel->color.g += weight * color.g;
-  pixel->color.b += weight * color.b;
-  pixel->free_area -= weight;
-  pixel->free_samples &= ~coverage.samples;
-  // What rounding leaves free between faces that share an edge is not free.
-  if (pixel->free_samples == 0 && pixel->free_area < kFullCoverage) pixel->free_area = 0.0f;
-  return weight;
-}
-
-/// A channel as an IEEE half, rounded to nearest, ties to even.
-PICTURA_HD inline uint16_t to_half(float channel) {
-  float mantissa = clamp(channel, 0.0f, 1.0f);
-  // Below 2^-14 halves are multiples of 2^-24.
-  if (mantissa < 6.103515625e-5f) return static_cast<uint16_t>(rintf(mantissa * 16777216.0f));
-  int exponent = 15;
-  for (; mantissa < 1.0f; --exponent) mantissa = mantissa * 2.0f;
-  // A mantissa that rounds up to 2 carries into the exponent.
-  return static_cast<uint16_t>(1024 * exponent + static_cast<int>(rintf((mantissa - 1.0f) * 1024.0f)));
-}
-
-/// A channel as an unsigned byte.
-PICTURA_HD inline uint8_t to_byte(float channel) {
-  return static_cast<uint8_t>(clamp(channel, 0.0f, 1.0f) * 255.0f + 0.5f);
 }
 
 }  // namespace pictura

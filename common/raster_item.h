@@ -4,6 +4,7 @@
 
 #include "pictura/common/raster_cull.h"
 #include "pictura/common/raster_order.h"
+#include "pictura/common/raster_pixel.h"
 
 namespace pictura {
 

@@ -1,7 +1,6 @@
-// Which of two faces is in front where both cover a pixel, and how the fragments of a pixel are laid over each other,
-// front to back. The order is found in each pixel anew, at the middle of what two fragments share of its samples: there
-// the nearer plane is in front, whatever cycles, slopes and intersections make of an order of whole things. Shared by
-// both devices.
+// Which of two faces is in front where both cover a pixel, and what the fragments of a pixel hide of each other. That
+// is asked of each two anew, at the middle of what they share of the pixel's samples: there the nearer plane is in
+// front, whatever cycles, slopes and intersections make of an order of whole things. Shared by both devices.
 #pragma once
 
 #include "pictura/common/raster_coverage.h"
@@ -196,78 +195,42 @@ PICTURA_HD inline bool may_show_before(const ScreenFace& face, const ScreenFace&
   return max_of(depth + rise, 0.0f) * kLeeway >= full_depth;
 }
 
-/// Order of fragments where nothing says which is in front: the nearer first, then by number.
+/// Order of fragments that does not depend on how they are listed: the nearer first, then by number.
 PICTURA_HD inline bool is_nearer(const Fragment& a, const Fragment& b, const ScreenFace* faces) {
   if (a.nearness != b.nearness) return a.nearness > b.nearness;
   const uint32_t number_a = faces[a.face].number, number_b = faces[b.face].number;
   return number_a != number_b ? number_a < number_b : a.face < b.face;
 }
 
-/// A fragment of a list, and the places of it and of the one before it.
-template <typename List>
-struct ListedFragment {
-  int place = List::kEnd, before = List::kEnd;
-  Fragment fragment;
-};
+/// What others may hide of a fragment, before any has been asked.
+PICTURA_HD inline FreePart all_free(const Fragment& fragment) { return {reach_of(fragment.coverage), false}; }
 
-/// The nearest fragment of a list.
-template <typename List>
-PICTURA_HD inline ListedFragment<List> find_nearest(const List& list, const ScreenFace* faces) {
-  ListedFragment<List> nearest;
-  for (int i = list.begin(), before = List::kEnd; i != List::kEnd; before = i, i = list.next(i)) {
-    const Fragment candidate = list.at(i);
-    if (nearest.place == List::kEnd || is_nearer(candidate, nearest.fragment, faces)) nearest = {i, before, candidate};
-  }
-  return nearest;
+/// Takes from what is free of a fragment what another one of its pixel hides; corner is the pixel's. Faces of one thing
+/// do not hide each other; a sliver hides nothing, and is hidden as a whole.
+template <typename Stands>
+PICTURA_HD inline void hide(FreePart* free, const Fragment& fragment, const Fragment& other, const ScreenFace* faces,
+                            Vec2 corner, Stands&& stands) {
+  const bool both_full = fragment.coverage.is_full() && other.coverage.is_full();
+  if ((free->samples & other.coverage.samples) == 0 && (!both_full || free->behind_full)) return;
+  const ScreenFace &face = faces[fragment.face], &other_face = faces[other.face];
+  if (face.number == other_face.number) return;
+  const Vec2 at = corner + middle_of(other.coverage.samples & reach_of(fragment.coverage));
+  if (!is_in_front(other_face, face, at, stands)) return;
+  free->samples = fragment.coverage.samples != 0 ? free->samples & ~other.coverage.samples : 0;
+  free->behind_full |= both_full;
 }
 
-/// The nearest of those fragments of a list that are in front of `behind`; place kEnd where there is none. corner is
-/// the pixel's.
-template <typename List, typename Stands>
-PICTURA_HD inline ListedFragment<List> find_in_front(const List& list, const Fragment& behind, const ScreenFace* faces,
-                                                     Vec2 corner, Stands&& stands) {
-  ListedFragment<List> nearest;
-  const uint64_t own = behind.coverage.samples;
-  for (int i = list.begin(), before = List::kEnd; i != List::kEnd; before = i, i = list.next(i)) {
-    const Fragment other = list.at(i);
-    // What touches no sample counts as being wherever the other is.
-    const uint64_t shared = own ? own & other.coverage.samples : other.coverage.samples;
-    if (shared == 0 || other.face == behind.face) continue;
-    if (nearest.place != List::kEnd && !is_nearer(other, nearest.fragment, faces)) continue;
-    if (is_in_front(faces[other.face], faces[behind.face], corner + middle_of(shared), stands)) {
-      nearest = {i, before, other};
-    }
+/// What is free of fragment `index` of a pixel's `count`; at(i) is a Fragment.
+template <typename At, typename Stands>
+PICTURA_HD inline FreePart free_of(At&& at, int count, int index, const ScreenFace* faces, Vec2 corner,
+                                   Stands&& stands) {
+  const Fragment fragment = at(index);
+  const bool is_full = fragment.coverage.is_full();
+  FreePart free = all_free(fragment);
+  for (int i = 0; i < count && (free.samples != 0 || (is_full && !free.behind_full)); ++i) {
+    if (i != index) hide(&free, fragment, at(i), faces, corner, stands);
   }
-  return nearest;
-}
-
-/// Lays the fragments of pixel (x, y) over each other, front to back. `list` holds them in any order: begin() is a
-/// first place, next(place) the one after it, kEnd none; at(place) a Fragment; remove(place, before) takes out a place,
-/// given the one before it. `lay(fragment, weight)` hears what each weighs in the pixel's colour. Next comes the
-/// nearest or, where something that is left is in front of that, the nearest of what is in front of it, and so on; in a
-/// circle, the nearest after all.
-template <typename List, typename Stands, typename Lay>
-PICTURA_HD inline PixelState lay_fragments(List& list, const ScreenFace* faces, int x, int y, Stands&& stands,
-                                           Lay&& lay) {
-  constexpr int kMostInFront = 16;  // of each other, in one pixel; more is a circle
-  const Vec2 corner{static_cast<float>(x), static_cast<float>(y)};
-  PixelState pixel;
-  while (pixel.free_area > 0.0f && list.begin() != List::kEnd) {
-    const ListedFragment<List> nearest = find_nearest(list, faces);
-    ListedFragment<List> front = nearest;
-    for (int step = 0; list.next(list.begin()) != List::kEnd; ++step) {
-      const ListedFragment<List> hiding = find_in_front(list, front.fragment, faces, corner, stands);
-      if (hiding.place == List::kEnd) break;
-      front = hiding;
-      if (step == kMostInFront) {
-        front = nearest;
-        break;
-      }
-    }
-    lay(front.fragment, composite(&pixel, front.fragment.coverage, faces[front.fragment.face].color));
-    list.remove(front.place, front.before);
-  }
-  return pixel;
+  return free;
 }
 
 }  // namespace pictura

@@ -7,6 +7,7 @@
 
 #include "pictura/common/camera.h"
 #include "pictura/common/raster_coverage.h"
+#include "pictura/common/raster_pixel.h"
 
 namespace pictura {
 namespace {
@@ -150,21 +151,60 @@ TEST(Coverage, RowSpansAgreeWithPixels) {
   }
 }
 
+// The colour of fragments, each with its coverage, what is free of it, and its colour.
+struct Laid {
+  PixelCoverage coverage;
+  FreePart free;
+  Rgb color;
+};
+Rgb color_of(const std::vector<Laid>& fragments) {
+  PixelSum sum;
+  for (const Laid& laid : fragments) sum.add(PixelSum::weight_of(laid.coverage, laid.free), laid.color);
+  return sum.color();
+}
+
 TEST(Coverage, WhatIsHiddenWeighsNothing) {
-  PixelState pixel;
-  EXPECT_EQ(composite(&pixel, {1.0f, kAllSamples}, {1, 0, 0}), 1.0f);
-  EXPECT_EQ(composite(&pixel, {1.0f, kAllSamples}, {0, 1, 0}), 0.0f);
-  EXPECT_EQ(composite(&pixel, {0.01f, 0}, {0, 1, 0}), 0.0f);
-  EXPECT_EQ(pixel.color.g, 0.0f);
+  const Rgb color = color_of({{{1, kAllSamples}, {kAllSamples}, {1, 0, 0}},
+                              {{1, kAllSamples}, {0, true}, {0, 1, 0}},
+                              {{0.01f, 0}, {0}, {0, 1, 0}},
+                              {{0.5f, 0xFFFFFFFF}, {0}, {0, 1, 0}}});
+  EXPECT_EQ(color.r, 1.0f);
+  EXPECT_EQ(color.g, 0.0f);
 }
 
 TEST(Coverage, TwoFacesOfOneThirdAndTwoThirdsFillAPixel) {
-  PixelState pixel;
   const uint64_t third = 0xFFFFFFull;  // any split of the samples
-  composite(&pixel, {1.0f / 3, third}, {1, 1, 1});
-  composite(&pixel, {2.0f / 3, ~third}, {1, 1, 1});
-  EXPECT_NEAR(pixel.color.r, 1, 1e-6);
-  EXPECT_EQ(pixel.free_area, 0.0f);
+  EXPECT_NEAR(color_of({{{1.0f / 3, third}, {third}, {1, 1, 1}}, {{2.0f / 3, ~third}, {~third}, {1, 1, 1}}}).r, 1,
+              2e-6);
+}
+
+TEST(Coverage, WhatFillsThePixelTakesWhatTheOthersLeave) {
+  // A quarter in front by area, although 20 of 64 samples; then something partly behind it, by samples; then a wall.
+  const uint64_t front = (1ull << 20) - 1, middle = (1ull << 40) - 1;
+  const Rgb color = color_of({{{0.25f, front}, {front}, {1, 0, 0}},
+                              {{0.5f, middle}, {middle & ~front}, {0, 1, 0}},
+                              {{1, kAllSamples}, {~middle}, {0, 0, 1}}});
+  EXPECT_NEAR(color.r, 0.25f, 2e-6f);
+  EXPECT_NEAR(color.g, 0.5f * 20 / 40, 2e-6f);
+  EXPECT_NEAR(color.b, 0.5f, 2e-6f);
+}
+
+TEST(Coverage, WhatFillsThePixelTakesWhatNoSampleSees) {
+  // Two faces that take all samples, but not all of the area.
+  const uint64_t half = 0xFFFFFFFFull;
+  const Rgb color = color_of({{{0.48f, half}, {half}, {1, 0, 0}},
+                              {{0.5f, ~half}, {~half}, {0, 1, 0}},
+                              {{1, kAllSamples}, {0}, {0, 0, 1}},
+                              {{1, kAllSamples}, {0, true}, {1, 1, 1}}});
+  EXPECT_NEAR(color.r, 0.48f, 2e-6f);
+  EXPECT_NEAR(color.b, 0.02f, 2e-6f);
+}
+
+TEST(Coverage, WeightsNeverExceedThePixel) {
+  const uint64_t half = 0xFFFFFFFFull;
+  const Rgb color = color_of({{{0.6f, half}, {half}, {1, 0, 0}}, {{0.9f, kAllSamples}, {~half}, {0, 1, 0}}});
+  EXPECT_NEAR(color.r, 0.6f, 2e-6f);
+  EXPECT_NEAR(color.g, 0.4f, 2e-6f);
 }
 
 TEST(Coverage, ClippingKeepsWhatIsInFront) {

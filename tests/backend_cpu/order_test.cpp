@@ -245,24 +245,14 @@ TEST(Order, ComparesInTheMiddleOfTheSharedSamples) {
   EXPECT_EQ(middle_of(0).x, 0.5f);
 }
 
-// A list of fragments, for lay_fragments.
-struct VectorList {
-  static constexpr int kEnd = -1;
-  std::vector<Fragment> fragments;
-  int begin() const { return fragments.empty() ? kEnd : 0; }
-  int next(int place) const { return place + 1 < static_cast<int>(fragments.size()) ? place + 1 : kEnd; }
-  const Fragment& at(int place) const { return fragments[static_cast<std::size_t>(place)]; }
-  void remove(int place, int) { fragments.erase(fragments.begin() + place); }
-};
-
-TEST(Order, OfAPixelsFragmentsDoesNotDependOnTheirList) {
+TEST(Order, WhatIsFreeOfAPixelsFragmentsDoesNotDependOnTheirList) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<float> unit(0, 1);
   for (int round = 0; round < 500; ++round) {
     // Planes in one pixel; those of random tilt intersect, and may hide each other in a ring.
     const float tilt = round % 2 ? 0.1f : 0.0f;
     std::vector<ScreenFace> faces(2 + random() % 6);
-    VectorList list;
+    std::vector<Fragment> fragments;
     for (std::size_t i = 0; i < faces.size(); ++i) {
       ScreenFace& face = faces[i];
       face.number = thing_number(tilt > 0 && i % 2 ? kStripKind : kAgentKind, static_cast<int32_t>(i));
@@ -273,35 +263,54 @@ TEST(Order, OfAPixelsFragmentsDoesNotDependOnTheirList) {
       face.inverse_depth_y = tilt * (unit(random) - 0.5f);
       const uint64_t samples = random() & (round % 3 ? random() : kAllSamples);
       const PixelCoverage coverage{static_cast<float>(std::popcount(samples)) / 64.0f, samples};
-      list.fragments.push_back(make_fragment(face, static_cast<int32_t>(i), coverage, 0, 0));
+      fragments.push_back(make_fragment(face, static_cast<int32_t>(i), coverage, 0, 0));
     }
     auto stands = [tilt](uint32_t solid, uint32_t strip) { return tilt > 0 && (solid + strip) % 3 == 0; };
-    auto lay = [&](VectorList from, std::vector<int32_t>* order) {
-      return lay_fragments(from, faces.data(), 0, 0, stands,
-                           [order](const Fragment& fragment, float) { order->push_back(fragment.face); });
-    };
-    std::vector<int32_t> order;
-    const PixelState pixel = lay(list, &order);
-    for (int shuffle = 0; shuffle < 5; ++shuffle) {
-      std::shuffle(list.fragments.begin(), list.fragments.end(), random);
-      std::vector<int32_t> again;
-      const PixelState other = lay(list, &again);
-      ASSERT_EQ(again, order) << round;
-      ASSERT_EQ(other.color.r, pixel.color.r) << round;
-    }
-    // Without rings, whatever was laid before another one that it meets was in front of it.
-    for (std::size_t i = 0; tilt == 0 && i < order.size(); ++i) {
-      for (std::size_t j = i + 1; j < order.size(); ++j) {
-        auto of = [&](std::size_t at) {
-          return *std::find_if(list.fragments.begin(), list.fragments.end(),
-                               [&](const Fragment& fragment) { return fragment.face == order[at]; });
-        };
-        const uint64_t shared = of(i).coverage.samples & of(j).coverage.samples;
-        if (shared == 0) continue;
-        const auto first = static_cast<std::size_t>(order[i]), second = static_cast<std::size_t>(order[j]);
-        ASSERT_TRUE(is_in_front(faces[first], faces[second], middle_of(shared), stands)) << round;
+    auto free_by_face = [&](PixelSum* sum) {
+      std::vector<uint64_t> free_samples(faces.size());
+      for (std::size_t i = 0; i < fragments.size(); ++i) {
+        const auto face = static_cast<std::size_t>(fragments[i].face);
+        const FreePart free =
+            free_of([&](int k) { return fragments[static_cast<std::size_t>(k)]; }, static_cast<int>(fragments.size()),
+                    static_cast<int>(i), faces.data(), {}, stands);
+        free_samples[face] = free.samples;
+        sum->add(PixelSum::weight_of(fragments[i].coverage, free), faces[face].color);
       }
+      return free_samples;
+    };
+    PixelSum sum;
+    const std::vector<uint64_t> free = free_by_face(&sum);
+    // No sample belongs to two; without rings, each that is covered belongs to one.
+    uint64_t seen = 0, covered = 0;
+    for (std::size_t i = 0; i < fragments.size(); ++i) {
+      ASSERT_EQ(seen & free[i], 0u) << round;
+      seen |= free[i];
+      covered |= fragments[i].coverage.samples;
     }
+    if (tilt == 0) {
+      ASSERT_EQ(seen, covered) << round;
+    }
+    for (int shuffle = 0; shuffle < 5; ++shuffle) {
+      std::shuffle(fragments.begin(), fragments.end(), random);
+      PixelSum again;
+      ASSERT_EQ(free_by_face(&again), free) << round;
+      ASSERT_EQ(again.color().r, sum.color().r) << round;
+    }
+  }
+}
+
+TEST(Order, ASliverIsHiddenByWhatIsInFrontOfItAndHidesNothing) {
+  std::vector<ScreenFace> faces(2);
+  for (std::size_t i = 0; i < 2; ++i) faces[i].number = thing_number(kWallKind, static_cast<int32_t>(i));
+  auto never = [](uint32_t, uint32_t) { return false; };
+  for (const bool sliver_in_front : {false, true}) {
+    faces[0].inverse_depth_0 = sliver_in_front ? 0.2f : 0.05f;
+    faces[1].inverse_depth_0 = 0.1f;
+    const Fragment fragments[2] = {make_fragment(faces[0], 0, {0.01f, 0}, 0, 0),
+                                   make_fragment(faces[1], 1, {0.5f, 0xFFFFFFFF}, 0, 0)};
+    auto at = [&](int i) { return fragments[i]; };
+    EXPECT_EQ(free_of(at, 2, 0, faces.data(), {}, never).samples, sliver_in_front ? kAllSamples : 0u);
+    EXPECT_EQ(free_of(at, 2, 1, faces.data(), {}, never).samples, 0xFFFFFFFFu);
   }
 }
 

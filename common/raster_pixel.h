@@ -1,0 +1,92 @@
+// What the fragments of a pixel weigh in its colour, given what is free of each, and colours as numbers of an image.
+// Shared by both devices.
+#pragma once
+
+#include "pictura/common/raster_coverage.h"
+
+namespace pictura {
+
+/// What the fragments of a pixel weigh in its colour. Sums are of whole units, so that they do not depend on the order
+/// in which fragments are added.
+class PixelSum {
+ public:
+  /// What is wholly free weighs its exact area; what is partly hidden its area times the share of its reach that is
+  /// free; what covers the whole pixel, behind others but behind nothing that does too, what those leave.
+  enum Kind : uint8_t { kWhole, kPartial, kRest, kNumKinds };
+  struct Weight {
+    float area = 0;
+    Kind kind = kWhole;
+  };
+  /// Factors on the weights of each kind, once all fragments have been added.
+  struct Shares {
+    float of_kind[kNumKinds] = {1.0f, 1.0f, 1.0f};
+    PICTURA_HD float of(Weight weight) const { return weight.area * of_kind[weight.kind]; }
+  };
+
+  PICTURA_HD static Weight weight_of(const PixelCoverage& coverage, const FreePart& free) {
+    const uint64_t reach = reach_of(coverage);
+    if (free.samples == reach) return {coverage.area, kWhole};
+    if (coverage.is_full()) return {free.behind_full ? 0.0f : 1.0f, kRest};
+    return {coverage.area * (static_cast<float>(count_bits(free.samples)) / static_cast<float>(count_bits(reach))),
+            kPartial};
+  }
+
+  PICTURA_HD void add(Weight weight, Rgb color) {
+    Part& part = part_[weight.kind];
+    part.area += to_units(weight.area);
+    part.r += to_units(weight.area * color.r);
+    part.g += to_units(weight.area * color.g);
+    part.b += to_units(weight.area * color.b);
+  }
+
+  PICTURA_HD Shares shares() const {
+    const float whole = area_of(kWhole), partial = area_of(kPartial);
+    // Where they are more than a pixel, what samples know least of gives way.
+    const float for_partial = max_of(1.0f - whole, 0.0f);
+    Shares shares;
+    if (whole > 1.0f) shares.of_kind[kWhole] = 1.0f / whole;
+    if (partial > for_partial) shares.of_kind[kPartial] = for_partial / partial;
+    shares.of_kind[kRest] = max_of(for_partial - partial, 0.0f);
+    return shares;
+  }
+
+  PICTURA_HD Rgb color() const { return color(shares()); }
+  PICTURA_HD Rgb color(const Shares& shares) const {
+    Rgb color;
+    for (int kind = 0; kind < kNumKinds; ++kind) {
+      const float unit = shares.of_kind[kind] * (1.0f / kUnits);
+      color.r += unit * static_cast<float>(part_[kind].r);
+      color.g += unit * static_cast<float>(part_[kind].g);
+      color.b += unit * static_cast<float>(part_[kind].b);
+    }
+    return color;
+  }
+
+ private:
+  static constexpr float kUnits = 1 << 20;  // of a pixel and a channel of 1; a thousand fragments do not overflow
+  PICTURA_HD static int32_t to_units(float value) { return static_cast<int32_t>(value * kUnits + 0.5f); }
+  PICTURA_HD float area_of(Kind kind) const { return static_cast<float>(part_[kind].area) * (1.0f / kUnits); }
+
+  struct Part {
+    int32_t area = 0, r = 0, g = 0, b = 0;
+  };
+  Part part_[kNumKinds];
+};
+
+/// A channel as an IEEE half, rounded to nearest, ties to even.
+PICTURA_HD inline uint16_t to_half(float channel) {
+  float mantissa = clamp(channel, 0.0f, 1.0f);
+  // Below 2^-14 halves are multiples of 2^-24.
+  if (mantissa < 6.103515625e-5f) return static_cast<uint16_t>(rintf(mantissa * 16777216.0f));
+  int exponent = 15;
+  for (; mantissa < 1.0f; --exponent) mantissa = mantissa * 2.0f;
+  // A mantissa that rounds up to 2 carries into the exponent.
+  return static_cast<uint16_t>(1024 * exponent + static_cast<int>(rintf((mantissa - 1.0f) * 1024.0f)));
+}
+
+/// A channel as an unsigned byte.
+PICTURA_HD inline uint8_t to_byte(float channel) {
+  return static_cast<uint8_t>(clamp(channel, 0.0f, 1.0f) * 255.0f + 0.5f);
+}
+
+}  // namespace pictura
