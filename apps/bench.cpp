@@ -68,13 +68,24 @@ using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
 struct Arguments {
-  WorldOptions world{.agents = 120, .num_threads = 1};
+  // Vehicles alone, as the peers that rates are compared with; what a world of all classes costs is an option.
+  WorldOptions world{
+      .agents = 120, .num_threads = 1, .pedestrian_fraction = 0.0f, .cyclist_fraction = 0.0f, .parked_cars = 0};
   std::string backend = "cpu", size = "96x54", samples = "1";
   int repeats = 7;
   double repeat_s = 1.0;
   std::string config = "configs/smoke.toml";
   bool json = false;
 };
+
+/// In words, for the workload of a result.
+std::string population_of(const WorldOptions& world) {
+  const float pedestrians = *world.pedestrian_fraction, cyclists = *world.cyclist_fraction;
+  std::string text = fmt::format("{} agents", world.agents);
+  if (pedestrians > 0 || cyclists > 0) text += fmt::format(" ({} pedestrians, {} cyclists)", pedestrians, cyclists);
+  if (*world.parked_cars > 0) text += fmt::format(", {} parked cars", *world.parked_cars);
+  return text;
+}
 
 /// Where no map is named: the town that the numbers of docs/ are about, or the procedural one where it is missing.
 std::string default_map() {
@@ -118,8 +129,8 @@ void bench_simulate(const Arguments& arguments) {
     results.push_back(slots);
   }
   report_benchmark(arguments.json,
-                   fmt::format("simulate: {}, {} agents, random actions with resets, {} threads", arguments.world.map,
-                               arguments.world.agents, arguments.world.num_threads),
+                   fmt::format("simulate: {}, {}, random actions with resets, {} threads", arguments.world.map,
+                               population_of(arguments.world), arguments.world.num_threads),
                    "cpu", results);
 }
 
@@ -160,8 +171,8 @@ void bench_render(const Arguments& arguments) {
   }
   report_benchmark(
       arguments.json,
-      fmt::format("render: {}, {} agents, walls {}, all egos x {} cameras x {}, {} threads, samples {}, {}", world.map,
-                  world.agents, world.walls ? "on" : "off", config.rig.cameras.size(), arguments.size,
+      fmt::format("render: {}, {}, walls {}, all egos x {} cameras x {}, {} threads, samples {}, {}", world.map,
+                  population_of(world), world.walls ? "on" : "off", config.rig.cameras.size(), arguments.size,
                   world.num_threads, arguments.samples, choice),
       std::string(renderer->name()), {rate, image_ms});
 }

@@ -11,9 +11,16 @@
 namespace pictura {
 
 void add_world_options(CLI::App* command, WorldOptions* options_out) {
-  command->add_option("--agents", options_out->agents, "Vehicles in the world")
+  command->add_option("--agents", options_out->agents, "Vehicles, cyclists and pedestrians in the world")
       ->check(CLI::Range(1, kMaxAgentsPerWorld))
       ->capture_default_str();
+  command->add_option("--pedestrians", options_out->pedestrian_fraction,
+                      "Share of the agents; default: as the policy was trained, else 0.1")
+      ->check(CLI::Range(0.0, 1.0));
+  command->add_option("--cyclists", options_out->cyclist_fraction, "Share of the agents; default: likewise")
+      ->check(CLI::Range(0.0, 1.0));
+  command->add_option("--parked", options_out->parked_cars, "Parked cars; default: likewise, else 32")
+      ->check(CLI::Range(0, kMaxAgentsPerWorld));
   command->add_option("--seed", options_out->seed, "Places, sizes, goals and actions")->capture_default_str();
   command->add_option("--threads", options_out->num_threads, "Host threads; 0: all")
       ->check(CLI::NonNegativeNumber)
@@ -71,6 +78,9 @@ class PolicyPilot final : public Pilot {
     config_inout->auxiliary_observations = known.auxiliary_observations;
     config_inout->vector_observations = known.vector_observations;
     config_inout->walls = config_inout->walls && known.walls;
+    config_inout->pedestrian_fraction = known.pedestrian_fraction;
+    config_inout->cyclist_fraction = known.cyclist_fraction;
+    config_inout->parked_cars = known.parked_cars;
   }
   void enter(const Simulator& simulator) override {
     if (renderer_) upload_geometries(simulator.geometries(), renderer_.get());
@@ -106,6 +116,9 @@ std::unique_ptr<Simulator> make_world(const WorldOptions& options, Pilot* pilot)
   config.fixed_lights = true;
   config.vector_observations = options.vector_observations;
   pilot->adapt(&config);
+  config.pedestrian_fraction = options.pedestrian_fraction.value_or(config.pedestrian_fraction);
+  config.cyclist_fraction = options.cyclist_fraction.value_or(config.cyclist_fraction);
+  config.parked_cars = options.parked_cars.value_or(config.parked_cars);
   auto simulator = make_simulator("cpu", config, {load_map(options.map)}, {{0, options.agents, 0}});
   pilot->enter(*simulator);
   return simulator;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -19,9 +20,12 @@ struct WorldOptions {
   int num_threads = 0;
   bool walls = true;
   bool vector_observations = true;
+  // Where nothing is said, the pilot's world has them, or the paper's where the pilot knows none.
+  std::optional<float> pedestrian_fraction, cyclist_fraction;
+  std::optional<int> parked_cars;
 };
 
-/// Adds --agents, --seed, --threads and --no-walls, which fill *options_out.
+/// Adds --agents, --pedestrians, --cyclists, --parked, --seed, --threads and --no-walls, which fill *options_out.
 void add_world_options(CLI::App* command, WorldOptions* options_out);
 
 /// Uploads geometries to a new renderer, so that handles equal their indices.
@@ -41,7 +45,7 @@ class Pilot {
 /// "random" (uniform, keyed by seed, slot and step), "idle" (no jerk), or a checkpoint's path (argmax; needs torch).
 std::unique_ptr<Pilot> make_pilot(const std::string& name, uint64_t seed, const std::string& backend, int num_threads);
 
-/// One world of options.agents vehicles on the map, at the start of its first episode, with evaluation's light timing,
+/// One world of options.agents agents on the map, at the start of its first episode, with evaluation's light timing,
 /// which the pilot has entered.
 std::unique_ptr<Simulator> make_world(const WorldOptions& options, Pilot* pilot);
 

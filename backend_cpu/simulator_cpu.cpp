@@ -71,7 +71,7 @@ class SimulatorCpu final : public Simulator {
       show(w);
     });
     totals_ = batch_.totals();
-    return {results_.reward, results_.terminated, results_.truncated, results_.valid};
+    return {results_.reward, results_.terminated, results_.truncated, results_.valid, batch_.agents.refusal};
   }
   void check() override {}
 

@@ -159,7 +159,8 @@ class SimulatorCuda final : public Simulator {
                   actions.size());
     cuda::launch_step(arrays(), actions.data(), static_cast<cudaStream_t>(stream.handle));
     PICTURA_CUDA(cudaGetLastError());
-    return {results_.reward.span(), results_.terminated.span(), results_.truncated.span(), results_.valid.span()};
+    return {results_.reward.span(), results_.terminated.span(), results_.truncated.span(), results_.valid.span(),
+            agents_.refusal.span()};
   }
   void check() override {
     synchronize();

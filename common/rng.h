@@ -24,11 +24,11 @@ PICTURA_HD inline Philox4 philox4x32_10(Philox4 counter, uint32_t key0, uint32_t
   return counter;
 }
 
-/// What a random number is for. Two purposes never share a draw; append only, since runs are named by their seed.
+/// What a random number is for. Two purposes never share a draw. Append only: a run is named by its seed, so that no
+/// purpose's number may change.
 enum class Purpose : uint8_t {
-  world_size,
-  map_choice,
-  spawn,
+  world_size = 0,
+  spawn = 2,
   agent_class,
   agent_size,
   goals,

@@ -24,6 +24,7 @@ constexpr int kMaxAgentsPerWorld = 4096;
 constexpr int kMaxSlots = 1 << 22;  // controlled agents of one simulator
 constexpr int kMaxBoxes = 1 << 24;  // controlled agents and parked cars of one simulator; as many lights
 
+/// The defaults are the paper's training world.
 struct SimulatorConfig {
   uint64_t seed = 0;
   MemorySpace space = MemorySpace::host;  // where the caller wants observations and scenes; `auto` chooses by it
@@ -31,9 +32,9 @@ struct SimulatorConfig {
   float dt_s = 0.1f;                      // in [0.01, 0.1]
   int episode_steps = 1280;
   float reset_inactive_fraction = 0.4f;  // a world resets when this part of its agents is inactive; > 1: never
-  float pedestrian_fraction = 0.0f, cyclist_fraction = 0.0f;
-  int parked_cars = 0;  // per episode and world
-  bool walls = false;
+  float pedestrian_fraction = 0.1f, cyclist_fraction = 0.1f;  // of the agents; the rest are vehicles
+  int parked_cars = 32;                                       // per episode and world
+  bool walls = true;
   uint64_t wall_seed = 0;
   bool fixed_lights = false;           // evaluation: 10/3/2 s; else timings are drawn per episode
   bool auxiliary_observations = true;  // false: the auxiliary slots hold zeros (the like-for-like baseline)
@@ -60,6 +61,7 @@ struct StepResult {
   Span<const uint8_t> terminated;  // [slots] 1: an infraction ended the agent's episode in this step
   Span<const uint8_t> truncated;   // [slots] 1: the episode ended for another reason; bootstrap
   Span<const uint8_t> valid;       // [slots] 1: the agent was active when the step began: learn from it
+  Span<const uint8_t> refusal;     // [slots] Refusal: why the agent is absent from this episode, 0 where it is not
 };
 
 /// What became of the agents that were asked for, over all worlds, in their current episodes.

@@ -39,7 +39,7 @@ namespace {
 TEST(Allocation, StepsAllocateNothing) {
   auto map = testing::stadium(200, 2);
   testing::add_light(map.get(), 100, 8, 2, {0, 4});
-  const SimulatorConfig config{.num_threads = 1, .episode_steps = 40};
+  const SimulatorConfig config = testing::cars({.num_threads = 1, .episode_steps = 40});
   const auto simulator = make_simulator("cpu", config, {map}, draw_worlds(2, 60, 1, 30, 1));
   const long before_vector = allocations;
   const std::vector<int32_t> actions(60, 3 * kNumLatActions + 1);

@@ -8,6 +8,7 @@
 #include "pictura/simulator/rules/spawn.h"
 #include "pictura/simulator/simulator.h"
 #include "pictura/simulator/world_batch.h"
+#include "pictura/tests/simulator/test_maps.h"
 
 namespace pictura {
 namespace {
@@ -151,7 +152,8 @@ void drive_everywhere(float cyclist_fraction, int harmless) {
   for (const char* town : {"procedural:1", "procedural:2"}) towns.emplace_back(town);
   for (const std::string& town : towns) {
     SCOPED_TRACE(town);
-    SimulatorConfig config;
+    SimulatorConfig config = testing::cars();
+    config.walls = false;
     config.cyclist_fraction = cyclist_fraction;
     config.fixed_lights = true;
     config.vector_observations = false;

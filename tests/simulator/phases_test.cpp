@@ -39,7 +39,6 @@ TEST(Phases, GiveTheBitsOfTheCpuExecutorInAnyOrderOfThreads) {
   config.episode_steps = 60;
   config.pedestrian_fraction = config.cyclist_fraction = 0.2f;
   config.parked_cars = 12;
-  config.walls = true;
   const std::vector<std::shared_ptr<const RoadMap>> maps{load_map("procedural:1"), load_map("procedural:2"),
                                                          testing::stadium(200, 2)};
   expect_same(config, maps, draw_worlds(5, 300, 1, 60, 3), 150, 1);
@@ -49,14 +48,13 @@ TEST(Phases, GiveTheBitsOfTheCpuExecutorInAnyOrderOfThreads) {
 
 TEST(Phases, PlaceCrowdsAsOneAfterTheOtherWould) {
   // A ring of 251 m takes some forty cars: almost every choice depends on the ones before it.
-  SimulatorConfig config;
-  config.episode_steps = 3;
+  const SimulatorConfig config = testing::cars({.episode_steps = 3});
   expect_same(config, {testing::ring_road(40)}, {{0, 300, 0}, {0, 37, 1}, {0, 1, 2}}, 12, 3);
 }
 
 TEST(Phases, RefuseAnActionOutOfRangeAndChangeNothing) {
   const auto map = testing::stadium(200, 2);
-  testing::ShuffledExecutor executor({}, {map}, {{0, 30, 0}, {0, 10, 1}}, 4);
+  testing::ShuffledExecutor executor(testing::cars(), {map}, {{0, 30, 0}, {0, 10, 1}}, 4);
   std::vector<int32_t> actions = testing::mixed_actions(40, 0);
   executor.step(actions);
   const std::vector<uint8_t> before = executor.batch.save();
@@ -79,9 +77,6 @@ TEST(Phases, CarlaTowns) {
   if (towns.empty()) GTEST_SKIP() << "no towns: set PICTURA_DATA";
   SimulatorConfig config;
   config.episode_steps = 15;
-  config.pedestrian_fraction = config.cyclist_fraction = 0.1f;
-  config.parked_cars = 32;
-  config.walls = true;
   for (const std::string& town : towns) {
     SCOPED_TRACE(town);
     expect_same(config, {load_map(town)}, {{0, 120, 0}}, 40, 5);

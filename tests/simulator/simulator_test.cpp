@@ -11,6 +11,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/raster_check.h"
 #include "pictura/map/load_map.h"
+#include "pictura/simulator/rules/limits.h"
 #include "pictura/tests/simulator/same_bits.h"
 #include "pictura/tests/simulator/test_maps.h"
 
@@ -107,20 +108,20 @@ TEST(Simulator, RefusesMoreThanFitsBeforeItAllocates) {
   // 5,000 lights in each of 4,000 worlds.
   auto lit = testing::ring_road(40);
   for (int i = 0; i < 5000; ++i) testing::add_light(lit.get(), 0, 4, 1, {0});
-  EXPECT_THAT(refuse({}, lit, 4000), HasSubstr("lights in all, got 20000000 ("));
+  EXPECT_THAT(refuse(testing::cars(), lit, 4000), HasSubstr("lights in all, got 20000000 ("));
   // A road of 5 km, with its own cells in each of 500,000 worlds.
-  EXPECT_THAT(refuse({}, testing::stadium(5000, 1), 500'000), HasSubstr("cells of 25 m in all"));
+  EXPECT_THAT(refuse(testing::cars(), testing::stadium(5000, 1), 500'000), HasSubstr("cells of 25 m in all"));
 }
 
 TEST(Simulator, RefusesAMapThatNobodyCanSpawnOn) {
   auto dead_end = testing::ring_road(40);
   for (Lane& lane : dead_end->lanes) lane.is_endless = false;
-  EXPECT_THROW(make({}, dead_end, {{0, 1, 0}}), Error);
-  EXPECT_THROW(make({}, std::make_shared<RoadMap>(), {{0, 1, 0}}), Error);
+  EXPECT_THROW(make(testing::cars(), dead_end, {{0, 1, 0}}), Error);
+  EXPECT_THROW(make(testing::cars(), std::make_shared<RoadMap>(), {{0, 1, 0}}), Error);
 }
 
 TEST(Simulator, RefusesActionsOutOfRangeAndStaysAsItWas) {
-  const auto simulator = make({}, testing::ring_road(40), {{0, 4, 0}});
+  const auto simulator = make(testing::cars(), testing::ring_road(40), {{0, 4, 0}});
   const uint64_t before = simulator->state_hash();
   std::vector<int32_t> actions(4, kCoast);
   for (const int32_t bad : {-1, kNumActions}) {
@@ -133,7 +134,7 @@ TEST(Simulator, RefusesActionsOutOfRangeAndStaysAsItWas) {
 
 TEST(Simulator, SpawnsWithoutOverlapAndCountsRefusals) {
   // A ring of 251 m holds some forty cars with half a metre of clearance; 200 are asked for.
-  const auto simulator = make({}, testing::ring_road(40), {{0, 200, 0}});
+  const auto simulator = make(testing::cars(), testing::ring_road(40), {{0, 200, 0}});
   const SpawnReport report = simulator->spawn_report();
   EXPECT_EQ(report.asked, 200);
   EXPECT_EQ(report.spawned + report.refused, report.asked);
@@ -171,7 +172,7 @@ TEST(Simulator, SpawnsWithoutOverlapAndCountsRefusals) {
 }
 
 TEST(Simulator, ViewsStandAtTheRearAxle) {
-  const auto simulator = make({}, testing::ring_road(40), {{0, 2, 0}, {0, 3, 1}});
+  const auto simulator = make(testing::cars(), testing::ring_road(40), {{0, 2, 0}, {0, 3, 1}});
   EXPECT_EQ(simulator->scene().world_begin[2], 5);
   for (size_t i = 0; i < 5; ++i) {
     const View& view = simulator->views()[i];
@@ -185,7 +186,7 @@ TEST(Simulator, ViewsStandAtTheRearAxle) {
 }
 
 TEST(Simulator, EpisodesEndInTimeAndResetInTheNextStep) {
-  const auto simulator = make({.episode_steps = 5}, testing::ring_road(40), {{0, 3, 0}});
+  const auto simulator = make(testing::cars({.episode_steps = 5}), testing::ring_road(40), {{0, 3, 0}});
   const std::vector<int32_t> actions(3, kCoast);
   const float first_x_m = simulator->state().x_m[0];
   for (int step = 1; step <= 5; ++step) {
@@ -217,7 +218,7 @@ TEST(Simulator, EpisodesEndInTimeAndResetInTheNextStep) {
 
 TEST(Simulator, InfractionsTerminateAndTooManyOfThemEndTheEpisode) {
   // Full throttle straight on leaves the ring; the fourth of ten to halt ends the episode.
-  const auto simulator = make({}, testing::ring_road(40), {{0, 10, 0}});
+  const auto simulator = make(testing::cars(), testing::ring_road(40), {{0, 10, 0}});
   std::vector<int32_t> actions(10, 3 * kNumLatActions + 1);
   std::vector<uint8_t> halted(10, 0);
   int num_halted = 0;
@@ -244,20 +245,20 @@ TEST(Simulator, InfractionsTerminateAndTooManyOfThemEndTheEpisode) {
 }
 
 TEST(Simulator, EpisodesDifferAndResetReturnsToTheFirst) {
-  const auto simulator = make({.episode_steps = 20}, testing::ring_road(40), {{0, 8, 0}});
+  const auto simulator = make(testing::cars({.episode_steps = 20}), testing::ring_road(40), {{0, 8, 0}});
   const uint64_t first = simulator->state_hash();
   run(simulator.get(), 21);
   EXPECT_NE(simulator->state_hash(), first);
   simulator->reset();
   EXPECT_EQ(simulator->state_hash(), first);
-  const auto other_seed = make({.seed = 1, .episode_steps = 20}, testing::ring_road(40), {{0, 8, 0}});
+  const auto other_seed = make(testing::cars({.seed = 1, .episode_steps = 20}), testing::ring_road(40), {{0, 8, 0}});
   EXPECT_NE(other_seed->state_hash(), first);
 }
 
 TEST(Simulator, AWorldIsTheSameWhateverStandsBesideIt) {
   const auto map = testing::stadium(200, 2);
-  const auto both = make({.num_threads = 1}, map, {{0, 12, 0}, {0, 12, 1}});
-  const auto second = make({.num_threads = 1}, map, {{0, 12, 1}});
+  const auto both = make(testing::cars({.num_threads = 1}), map, {{0, 12, 0}, {0, 12, 1}});
+  const auto second = make(testing::cars({.num_threads = 1}), map, {{0, 12, 1}});
   for (int step = 0; step < 60; ++step) {
     std::vector<int32_t> actions = testing::mixed_actions(24, static_cast<uint32_t>(step));
     both->step(actions);
@@ -274,7 +275,7 @@ TEST(Simulator, ThreadsDoNotMatter) {
   testing::add_light(map.get(), 100, 8, 2, {0, 4});
   std::vector<uint64_t> hashes;
   for (const int threads : {1, 2, 3}) {
-    const auto simulator = make({.num_threads = threads}, map, draw_worlds(2, 150, 1, 40, 1));
+    const auto simulator = make(testing::cars({.num_threads = threads}), map, draw_worlds(2, 150, 1, 40, 1));
     run(simulator.get(), 300);
     hashes.push_back(simulator->state_hash());
     EXPECT_GT(simulator->totals().agent_steps, 20000);
@@ -287,7 +288,7 @@ TEST(Simulator, SaveAndRestoreContinueIdentically) {
   auto map = testing::stadium(200, 2);
   testing::add_light(map.get(), 100, 8, 2, {0, 4});
   const std::vector<WorldSpec> worlds = draw_worlds(2, 60, 1, 40, 1);
-  const SimulatorConfig config{.seed = 4, .episode_steps = 70};
+  const SimulatorConfig config = testing::cars({.seed = 4, .episode_steps = 70});
   const auto original = make(config, map, worlds);
   run(original.get(), 100);
   const std::vector<uint8_t> bytes = original->save();
@@ -314,7 +315,7 @@ TEST(Simulator, SaveAndRestoreContinueIdentically) {
   std::vector<uint8_t> broken = bytes;
   broken[0] ^= 1;
   EXPECT_THROW(copy->restore(broken), Error);
-  EXPECT_THROW(make({.seed = 5, .episode_steps = 70}, map, worlds)->restore(bytes), Error);
+  EXPECT_THROW(make(testing::cars({.seed = 5, .episode_steps = 70}), map, worlds)->restore(bytes), Error);
   equal();
 }
 
@@ -361,11 +362,11 @@ TEST(Simulator, RestoreRefusesFieldsOutOfRangeAndStaysAsItWas) {
   using ::testing::HasSubstr;
   const auto map = testing::stadium(200, 2);
   const std::vector<WorldSpec> worlds{{0, 4, 0}};
-  const auto simulator = make({}, map, worlds);
+  const auto simulator = make(testing::cars(), map, worlds);
   run(simulator.get(), 3);
   const uint64_t hash = simulator->state_hash();
   const auto refusal = [&](const std::function<void(AgentStateView)>& spoil) {
-    const auto spoilt = make({}, map, worlds);
+    const auto spoilt = make(testing::cars(), map, worlds);
     spoil(spoilt->state());
     const std::vector<uint8_t> bytes = spoilt->save();
     const std::string message = message_of<Error>([&] { simulator->restore(bytes); });
@@ -382,11 +383,11 @@ TEST(Simulator, RestoreRefusesFieldsOutOfRangeAndStaysAsItWas) {
   EXPECT_THAT(refusal([](AgentStateView state) { state.x_m[2] = NAN; }), HasSubstr("x_m"));
   EXPECT_THAT(refusal([](AgentStateView state) { state.y_m[2] = 1e9f; }), HasSubstr("agent 2: y_m"));
   EXPECT_THAT(refusal([](AgentStateView state) { state.conditioning[20] = INFINITY; }), HasSubstr("conditioning"));
-  EXPECT_EQ(message_of<Error>([&] { simulator->restore(make({}, map, worlds)->save()); }), "");
+  EXPECT_EQ(message_of<Error>([&] { simulator->restore(make(testing::cars(), map, worlds)->save()); }), "");
 }
 
 TEST(Simulator, ConditioningIsDrawnAsThePaperSays) {
-  const auto simulator = make({}, testing::stadium(1500, 2), draw_worlds(1, 4000, 100, 100, 1));
+  const auto simulator = make(testing::cars(), testing::stadium(1500, 2), draw_worlds(1, 4000, 100, 100, 1));
   const AgentStateView state = simulator->state();
   for (int c = 0; c < kNumConditioning; ++c) {
     const ConditioningRange& range = kPaperConditioning[c];
@@ -409,8 +410,8 @@ TEST(Simulator, ConditioningIsDrawnAsThePaperSays) {
 }
 
 TEST(Simulator, WithoutVectorObservationsTheRestIsTheSame) {
-  const auto with = make({}, testing::ring_road(40), {{0, 8, 0}});
-  const auto without = make({.vector_observations = false}, testing::ring_road(40), {{0, 8, 0}});
+  const auto with = make(testing::cars(), testing::ring_road(40), {{0, 8, 0}});
+  const auto without = make(testing::cars({.vector_observations = false}), testing::ring_road(40), {{0, 8, 0}});
   run(with.get(), 50);
   run(without.get(), 50);
   EXPECT_EQ(with->state_hash(), without->state_hash());
@@ -419,8 +420,32 @@ TEST(Simulator, WithoutVectorObservationsTheRestIsTheSame) {
   EXPECT_TRUE(std::equal(a.begin(), a.end(), b.begin()));
 }
 
+TEST(Simulator, ClassesComeInThePapersSharesEachWithItsSizes) {
+  SimulatorConfig config;
+  EXPECT_EQ(config.parked_cars, 32);
+  EXPECT_TRUE(config.walls);
+  config.vector_observations = false;
+  constexpr int kAgents = 4000;
+  const auto simulator = make(config, load_map("procedural:1"), draw_worlds(1, kAgents, 100, 100, 1));
+  const AgentStateView state = simulator->state();
+  int counts[kNumAgentClasses] = {};
+  for (int i = 0; i < kAgents; ++i) {
+    ++counts[state.agent_class[i]];
+    const ClassLimits limits = class_limits(static_cast<AgentClass>(state.agent_class[i]));
+    ASSERT_GE(state.length_m[i], limits.min_length_m);
+    ASSERT_LE(state.length_m[i], limits.max_length_m);
+    ASSERT_GE(state.width_m[i], limits.min_width_m);
+    ASSERT_LE(state.width_m[i], limits.max_width_m);
+    ASSERT_EQ(state.height_m[i], limits.height_m);
+  }
+  // Three standard deviations of a binomial distribution.
+  EXPECT_NEAR(counts[static_cast<int>(AgentClass::vehicle)], 0.8 * kAgents, 76);
+  EXPECT_NEAR(counts[static_cast<int>(AgentClass::cyclist)], 0.1 * kAgents, 57);
+  EXPECT_NEAR(counts[static_cast<int>(AgentClass::pedestrian)], 0.1 * kAgents, 57);
+}
+
 TEST(Simulator, CyclistsAreSmallerAndSlower) {
-  const auto simulator = make({.cyclist_fraction = 0.5f}, testing::stadium(1500, 2), {{0, 100, 0}});
+  const auto simulator = make({.pedestrian_fraction = 0, .cyclist_fraction = 0.5f}, testing::stadium(1500, 2), {{0, 100, 0}});
   run(simulator.get(), 20);
   int cyclists = 0;
   for (size_t i = 0; i < 100; ++i) {
@@ -446,7 +471,7 @@ TEST(Simulator, ParkedCarsStandOffTheRoadAndInTheWay) {
   }
   sidewalk.points.end = static_cast<int32_t>(map->lane_points.size());
   map->lanes.push_back(sidewalk);
-  const auto simulator = make({.episode_steps = 30, .parked_cars = 12}, map, {{0, 4, 0}, {0, 3, 1}});
+  const auto simulator = make({.episode_steps = 30, .pedestrian_fraction = 0, .cyclist_fraction = 0, .parked_cars = 12}, map, {{0, 4, 0}, {0, 3, 1}});
   const SpawnReport report = simulator->spawn_report();
   EXPECT_EQ(report.parked_asked, 24);
   EXPECT_EQ(report.parked_placed, 24);

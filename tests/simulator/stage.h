@@ -7,6 +7,7 @@
 #include "pictura/simulator/rules/spawn.h"
 #include "pictura/simulator/rules/step.h"
 #include "pictura/simulator/world_batch.h"
+#include "pictura/tests/simulator/test_maps.h"
 
 namespace pictura::testing {
 
@@ -16,7 +17,7 @@ class Stage {
  public:
   /// num_agents vehicles of 4 x 2 m, absent until they are put somewhere; all conditioning at `low` of the paper's
   /// ranges but for the dynamics multipliers, which are 1; lights green.
-  Stage(std::shared_ptr<const RoadMap> map, int num_agents, const SimulatorConfig& config = {});
+  Stage(std::shared_ptr<const RoadMap> map, int num_agents, const SimulatorConfig& config = cars());
 
   /// Puts the rear axle there and finds the lane.
   void put(int agent, Vec2 position_m, float heading_rad, float speed_mps);

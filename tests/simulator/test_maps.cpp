@@ -68,6 +68,12 @@ Arc make_straight(Vec2 from, Vec2 to) {
 
 }  // namespace
 
+SimulatorConfig cars(SimulatorConfig config) {
+  config.pedestrian_fraction = config.cyclist_fraction = 0;
+  config.parked_cars = 0;
+  return config;
+}
+
 std::shared_ptr<RoadMap> ring_road(float radius_m) {
   auto map = std::make_shared<RoadMap>();
   map->name = "ring";

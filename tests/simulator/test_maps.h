@@ -1,11 +1,15 @@
-// Small road maps made by hand, whose every number a test can compute.
+// Small road maps made by hand, whose every number a test can compute, and the population for them.
 #pragma once
 
 #include <memory>
 
 #include "pictura/map/road_map.h"
+#include "pictura/simulator/simulator.h"
 
 namespace pictura::testing {
+
+/// The configuration with vehicles alone: no pedestrians, cyclists or parked cars, for which these maps have no places.
+SimulatorConfig cars(SimulatorConfig config = {});
 
 /// A circular one-way road of `radius_m` about the origin, driven counter-clockwise, one lane of 4 m, cut into four
 /// lanes of a quarter each, with road edges on both sides.

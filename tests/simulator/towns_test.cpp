@@ -16,9 +16,6 @@ namespace {
 
 SimulatorConfig whole_world() {
   SimulatorConfig config;
-  config.pedestrian_fraction = config.cyclist_fraction = 0.1f;
-  config.parked_cars = 32;
-  config.walls = true;
   config.vector_observations = false;
   return config;
 }
@@ -43,6 +40,8 @@ TEST(Towns, AccountForEveryAgentThatIsAskedFor) {
       ++counts[state.refusal[i]];
     }
     EXPECT_EQ(report.asked, 1024);
+    const StepResult result = simulator->step(std::vector<int32_t>(1024, 0));
+    EXPECT_TRUE(std::equal(result.refusal.begin(), result.refusal.end(), state.refusal)) << "a step says why";
     EXPECT_EQ(report.spawned, counts[0]);
     EXPECT_EQ(report.refused_no_place, counts[1]);
     EXPECT_EQ(report.refused_taken, counts[2]);

@@ -117,7 +117,7 @@ TEST(Walkways, StrollsHaveTheirLengthAndTurnBackAtDeadEnds) {
 }
 
 SimulatorConfig walkers_only() {
-  SimulatorConfig config;
+  SimulatorConfig config = testing::cars();
   config.pedestrian_fraction = 1;
   return config;
 }
@@ -214,7 +214,7 @@ TEST(Pedestrians, DoNotAimAtPlacesUnderParkedCars) {
 }
 
 TEST(Pedestrians, AreRefusedWhereThereIsNowhereToWalk) {
-  SimulatorConfig config;
+  SimulatorConfig config = testing::cars();
   config.pedestrian_fraction = 0.5f;
   const auto simulator = make_simulator("cpu", config, {testing::ring_road(100)}, {{0, 40, 0}});
   const SpawnReport report = simulator->spawn_report();
@@ -236,14 +236,10 @@ TEST(Pedestrians, AreRefusedWhereThereIsNowhereToWalk) {
 TEST(Pedestrians, WalkInEveryTown) {
   const std::vector<std::string> towns = known_towns();
   if (towns.empty()) GTEST_SKIP() << "no towns: set PICTURA_DATA";
-  SimulatorConfig config;
-  config.pedestrian_fraction = config.cyclist_fraction = 0.1f;
-  config.parked_cars = 32;
-  config.walls = true;
   for (const std::string& town : towns) {
     SCOPED_TRACE(town);
     const auto map = load_map(town);
-    const auto simulator = make_simulator("cpu", config, {map}, {{0, 120, 0}});
+    const auto simulator = make_simulator("cpu", {}, {map}, {{0, 120, 0}});
     EXPECT_EQ(simulator->spawn_report().spawned, 120);
     const Walkways walkways = world_map(*map).walkways;
     EXPECT_GT(total_m(walkways), 2000);
