@@ -36,7 +36,7 @@ class SimulatorCpu final : public Simulator {
   SimulatorCpu(const SimulatorConfig& config, std::vector<std::shared_ptr<const RoadMap>> maps,
                std::vector<WorldSpec> worlds)
       : batch_(config, std::move(maps), std::move(worlds)),
-        results_(static_cast<size_t>(batch_.num_slots()), config.vector_observations) {
+        results_(static_cast<size_t>(batch_.num_slots()), config) {
     reset({});
   }
 

@@ -78,15 +78,15 @@ struct DeviceResults {
   DeviceBuffer<float> reward;
   DeviceBuffer<uint8_t> terminated, truncated, valid;
   DeviceBuffer<View> views;
-#define X(name, type, per_slot, is_set, comment) DeviceBuffer<type> name;
+#define X(name, type, per_slot, part, comment) DeviceBuffer<type> name;
   PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
 
-  DeviceResults(size_t slots, bool entity_sets)
+  DeviceResults(size_t slots, const SimulatorConfig& config)
       : reward(slots), terminated(slots), truncated(slots), valid(slots), views(slots) {
     // Zeroed, since of a set's rows only those up to its last count are zeroed later.
-#define X(name, type, per_slot, is_set, comment)                                                  \
-  if (entity_sets || !(is_set)) name = DeviceBuffer<type>(slots * static_cast<size_t>(per_slot)); \
+#define X(name, type, per_slot, part, comment)                                                 \
+  if (config.observes(part)) name = DeviceBuffer<type>(slots * static_cast<size_t>(per_slot)); \
   name.fill(0);
     PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
@@ -98,7 +98,7 @@ struct DeviceResults {
   }
   StepArrays step_arrays() const { return {reward.data(), terminated.data(), truncated.data(), valid.data()}; }
   ObservationView observations() const {
-#define X(name, type, per_slot, is_set, comment) Span<type>(name.data(), name.size()),
+#define X(name, type, per_slot, part, comment) Span<type>(name.data(), name.size()),
     return {PICTURA_OBSERVATION_ARRAYS(X)};
 #undef X
   }
@@ -122,7 +122,7 @@ class SimulatorCuda final : public Simulator {
                 std::vector<WorldSpec> worlds)
       : batch_(std::make_unique<WorldBatch>(config, std::move(maps), std::move(worlds))),
         agents_(static_cast<size_t>(batch_->num_slots())),
-        results_(static_cast<size_t>(batch_->num_slots()), config.vector_observations) {
+        results_(static_cast<size_t>(batch_->num_slots()), config) {
     for (const WorldMap& map : batch_->world_maps) maps_.emplace_back(map.view());
     WorldBatch::visit_state(*batch_, state_, [](const auto& host, auto& device) { device = device_copy(host); });
     world_begin_ = device_copy(batch_->box_begin);

@@ -304,14 +304,15 @@ struct ShowAgent {
   }
 };
 
-/// Lanes or boundaries of a slot, as many pieces at a time as the warp has lanes.
+/// Lanes, boundaries or walls of a slot, as many pieces at a time as the warp has lanes.
 struct ShowPieces {
   SimulatorArrays arrays;
-  static constexpr int kSets = 2;
+  PICTURA_HD int num_sets() const { return arrays.observations.walls.empty() ? 2 : 3; }
   template <typename Lanes>
   PICTURA_HD void operator()(const Lanes& lanes, int item) const {
-    const int slot = item / kSets;
-    const EntitySet set = item % kSets == 0 ? EntitySet::lanes : EntitySet::boundaries;
+    constexpr EntitySet kSets[3] = {EntitySet::lanes, EntitySet::boundaries, EntitySet::walls};
+    const int slot = item / num_sets();
+    const EntitySet set = kSets[item % num_sets()];
     const WorldView& world = arrays.world_of(slot);
     const SetRows rows = set_rows(arrays.observations, slot, set);
     int count = 0;
@@ -344,7 +345,8 @@ struct ShowPieces {
 template <typename Launch>
 void launch_show(const Launch& launch, const SimulatorArrays& arrays) {
   launch.threads((arrays.entity_sets ? ShowAgent::kParts : 1) * arrays.num_slots, ShowAgent{arrays});
-  if (arrays.entity_sets) launch.warps(ShowPieces::kSets * arrays.num_slots, ShowPieces{arrays});
+  const ShowPieces pieces{arrays};
+  if (arrays.entity_sets) launch.warps(pieces.num_sets() * arrays.num_slots, pieces);
 }
 
 /// Episode 0 of every world.

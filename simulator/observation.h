@@ -13,23 +13,33 @@ constexpr int kMaxPartners = 16, kPartnerFeatures = 8;  // 7 and one auxiliary s
 constexpr int kMaxLanes = 80, kLaneFeatures = 7;
 constexpr int kMaxBoundaries = 80, kBoundaryFeatures = 7;
 constexpr int kMaxControls = 10, kControlFeatures = 7;
+constexpr int kMaxWalls = 80, kWallFeatures = 7;
 constexpr int kWaypointFeatures = 3;
 
-// X(name, type, per slot, is entity set, comment): the arrays of an observation, [slots, per slot].
-#define PICTURA_OBSERVATION_ARRAYS(X)                                                  \
-  X(ego, float, kEgoFeatures, false, "")                                               \
-  X(partners, float, kMaxPartners* kPartnerFeatures, true, "[kMaxPartners, features]") \
-  X(lanes, float, kMaxLanes* kLaneFeatures, true, "")                                  \
-  X(boundaries, float, kMaxBoundaries* kBoundaryFeatures, true, "")                    \
-  X(controls, float, kMaxControls* kControlFeatures, true, "")                         \
-  X(set_counts, int32_t, 4, true, "filled partners, lanes, boundaries, controls")      \
-  X(conditioning, float, kNumConditioning, false, "scaled to [-1, 1]")                 \
-  X(waypoints, float, kNumWaypoints* kWaypointFeatures, false, "ego frame")
+/// The entity sets, in the order of ObservationView::set_counts.
+enum class EntitySet : int32_t { partners, lanes, boundaries, controls, walls };
+constexpr int kNumEntitySets = 5;
+
+/// Which arrays are there: what is no set always, sets with SimulatorConfig::vector_observations, walls if they are
+/// asked for besides.
+enum class ObservationPart : uint8_t { own, sets, walls };
+
+// X(name, type, per slot, part, comment): the arrays of an observation, [slots, per slot].
+#define PICTURA_OBSERVATION_ARRAYS(X)                                                                   \
+  X(ego, float, kEgoFeatures, ObservationPart::own, "")                                                 \
+  X(partners, float, kMaxPartners* kPartnerFeatures, ObservationPart::sets, "[kMaxPartners, features]") \
+  X(lanes, float, kMaxLanes* kLaneFeatures, ObservationPart::sets, "")                                  \
+  X(boundaries, float, kMaxBoundaries* kBoundaryFeatures, ObservationPart::sets, "")                    \
+  X(controls, float, kMaxControls* kControlFeatures, ObservationPart::sets, "")                         \
+  X(walls, float, kMaxWalls* kWallFeatures, ObservationPart::walls, "")                                 \
+  X(set_counts, int32_t, kNumEntitySets, ObservationPart::sets, "filled rows of each EntitySet")        \
+  X(conditioning, float, kNumConditioning, ObservationPart::own, "scaled to [-1, 1]")                   \
+  X(waypoints, float, kNumWaypoints* kWaypointFeatures, ObservationPart::own, "ego frame")
 
 /// Observations of all slots; entity sets are padded with zeros up to their counts, and empty where they are not asked
 /// for.
 struct ObservationView {
-#define X(name, type, per_slot, is_set, comment) Span<type> name;
+#define X(name, type, per_slot, part, comment) Span<type> name;
   PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
 };

@@ -39,9 +39,14 @@ struct SimulatorConfig {
   bool fixed_lights = false;           // evaluation: 10/3/2 s; else timings are drawn per episode
   bool auxiliary_observations = true;  // false: the auxiliary slots hold zeros (the like-for-like baseline)
   bool vector_observations = true;     // false: entity sets are not computed (perspective training)
+  bool wall_observations = false;      // with them the set of walls, which is empty where walls are off
   std::array<ConditioningRange, kNumConditioning> conditioning = default_conditioning();
 
   static std::array<ConditioningRange, kNumConditioning> default_conditioning();
+  bool observes(ObservationPart part) const {
+    return part == ObservationPart::own ||
+           (vector_observations && (part != ObservationPart::walls || wall_observations));
+  }
 };
 
 /// One world: which of the simulator's maps it is on, and how many controlled agents it asks for.

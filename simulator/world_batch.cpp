@@ -290,7 +290,7 @@ WorldBatch::WorldBatch(const SimulatorConfig& config_in, std::vector<std::shared
   for (const auto& map : maps) {
     const MapGeometryOptions geometry_options{.walls = config.walls, .wall_seed = config.wall_seed};
     const std::vector<WallFace> walls = config.walls ? make_walls(*map, geometry_options) : std::vector<WallFace>{};
-    world_maps.push_back(make_world_map(*map, walls));
+    world_maps.push_back(make_world_map(*map, walls, config.observes(ObservationPart::walls)));
     PICTURA_CHECK(!world_maps.back().spawn_lanes.empty(),
                   "map {}: expected a lane outside junctions from which a route goes on for ever, got none", map->name);
   }
@@ -466,20 +466,20 @@ void WorldBatch::restore(Span<const uint8_t> bytes) {
   }
 }
 
-HostResults::HostResults(size_t num_slots, bool entity_sets)
+HostResults::HostResults(size_t num_slots, const SimulatorConfig& config)
     : reward(num_slots),
       terminated(num_slots),
       truncated(num_slots),
       valid(num_slots),
       views(num_slots){
-#define X(name, type, per_slot, is_set, comment) \
-  if (entity_sets || !(is_set)) name##_.resize(num_slots* static_cast<size_t>(per_slot));
+#define X(name, type, per_slot, part, comment) \
+  if (config.observes(part)) name##_.resize(num_slots* static_cast<size_t>(per_slot));
           PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
       }
 
       ObservationView HostResults::observation_view() {
-#define X(name, type, per_slot, is_set, comment) name##_,
+#define X(name, type, per_slot, part, comment) name##_,
   return {PICTURA_OBSERVATION_ARRAYS(X)};
 #undef X
 }

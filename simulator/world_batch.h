@@ -86,7 +86,7 @@ struct WorldBatch {
 
 /// What an executor on the host writes for its users, besides the state.
 struct HostResults {
-  HostResults(size_t num_slots, bool entity_sets);
+  HostResults(size_t num_slots, const SimulatorConfig& config);
   ObservationView observation_view();
   StepArrays step_arrays() { return {reward.data(), terminated.data(), truncated.data(), valid.data()}; }
 
@@ -95,7 +95,7 @@ struct HostResults {
   std::vector<View> views;
 
  private:
-#define X(name, type, per_slot, is_set, comment) std::vector<type> name##_;
+#define X(name, type, per_slot, part, comment) std::vector<type> name##_;
   PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
 };

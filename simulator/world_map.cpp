@@ -31,8 +31,8 @@ float distance_to_segment(Vec2 p, Vec2 a, Vec2 b) {
   return length(p - a - way * t);
 }
 
-/// Cuts a polyline into observed pieces: as long as kMaxPiece_m and kObservedChordError_m allow.
-void append_pieces(const std::vector<Vec3>& points, float width_m, std::vector<ObservedPiece>* pieces_out) {
+/// Cuts a polyline into observed pieces of that extent: as long as kMaxPiece_m and kObservedChordError_m allow.
+void append_pieces(const std::vector<Vec3>& points, float extent, std::vector<ObservedPiece>* pieces_out) {
   for (size_t begin = 0; begin + 1 < points.size();) {
     size_t end = begin + 1;
     const auto fits = [&](size_t last) {
@@ -51,7 +51,7 @@ void append_pieces(const std::vector<Vec3>& points, float width_m, std::vector<O
     for (int i = 0; i < cuts && way_m > 0; ++i) {
       const float fraction = (static_cast<float>(i) + 0.5f) / static_cast<float>(cuts);
       pieces_out->push_back({points[begin] + (points[end] - points[begin]) * fraction,
-                             0.5f * way_m / static_cast<float>(cuts), way * (1.0f / way_m), width_m});
+                             0.5f * way_m / static_cast<float>(cuts), way * (1.0f / way_m), extent});
     }
     begin = end;
   }
@@ -94,7 +94,7 @@ void add_lanes(const RoadMap& map, WorldMap* out) {
     }
     flat.length_m = s;
     flat.num_segments = static_cast<int32_t>(out->segments.size()) - flat.first_segment;
-    if (flat.is_driven) append_pieces(line, widest, &out->lane_pieces);
+    if (flat.is_driven) append_pieces(line, widest * (1.0f / kScaleLaneWidth_m), &out->lane_pieces);
 
     const auto goes_on = [&](int32_t other) { return other >= 0 && map.lanes[static_cast<size_t>(other)].is_endless; };
     for (const int32_t successor : map.links(lane.successors)) {
@@ -132,6 +132,7 @@ void add_barriers(const RoadMap& map, Span<const WallFace> walls, WorldMap* out)
   finish_line();
   for (const WallFace& wall : walls) {
     out->walls.push_back({wall.a_m.xy(), wall.b_m.xy(), 0.5f * (wall.a_m.z + wall.b_m.z)});
+    append_pieces({wall.a_m, wall.b_m}, wall.height_m * (1.0f / kScaleWallHeight_m), &out->wall_pieces);
   }
 }
 
@@ -338,7 +339,7 @@ CellLists lists_of_stop_lines(const WorldMap& map, const std::string& map_name) 
 
 }  // namespace
 
-WorldMap make_world_map(const RoadMap& map, Span<const WallFace> walls) {
+WorldMap make_world_map(const RoadMap& map, Span<const WallFace> walls, bool observe_walls) {
   WorldMap out;
   add_lanes(map, &out);
   PICTURA_CHECK(!out.segments.empty(), "map {}: expected at least one drivable lane, got none", map.name);
@@ -377,6 +378,7 @@ WorldMap make_world_map(const RoadMap& map, Span<const WallFace> walls) {
 
   out.near_lane_pieces = lists_of_pieces(out, map.name, out.lane_pieces);
   out.near_boundary_pieces = lists_of_pieces(out, map.name, out.boundary_pieces);
+  if (observe_walls) out.near_wall_pieces = lists_of_pieces(out, map.name, out.wall_pieces);
   out.near_stop_lines = lists_of_stop_lines(out, map.name);
   return out;
 }
@@ -398,6 +400,7 @@ MapView WorldMap::view() const {
   view.parking_spots = parking_spots;
   view.lane_pieces = lane_pieces;
   view.boundary_pieces = boundary_pieces;
+  view.wall_pieces = wall_pieces;
   view.segment_cells = segment_cells.view();
   view.edge_cells = edge_cells.view();
   view.wall_cells = wall_cells.view();
@@ -405,6 +408,7 @@ MapView WorldMap::view() const {
   view.walk_cells = walk_cells.view();
   view.near_lane_pieces = near_lane_pieces.view();
   view.near_boundary_pieces = near_boundary_pieces.view();
+  view.near_wall_pieces = near_wall_pieces.view();
   view.near_stop_lines = near_stop_lines.view();
   return view;
 }

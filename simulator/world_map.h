@@ -33,15 +33,15 @@ struct WorldMap {
   std::vector<float> spawn_end_m;
   Walkways walkways;
   std::vector<ParkingSpot> parking_spots;
-  std::vector<ObservedPiece> lane_pieces, boundary_pieces;
+  std::vector<ObservedPiece> lane_pieces, boundary_pieces, wall_pieces;
   Grid segment_cells, edge_cells, wall_cells, stop_line_cells, walk_cells;
-  CellLists near_lane_pieces, near_boundary_pieces, near_stop_lines;
+  CellLists near_lane_pieces, near_boundary_pieces, near_wall_pieces, near_stop_lines;
   Vec2 low_m, high_m;
 
   MapView view() const;
 };
 
-/// Throws Error naming the map when it has no drivable lane.
-WorldMap make_world_map(const RoadMap& map, Span<const WallFace> walls);
+/// Walls can be observed on it if `observe_walls`. Throws Error naming the map when it has no drivable lane.
+WorldMap make_world_map(const RoadMap& map, Span<const WallFace> walls, bool observe_walls = false);
 
 }  // namespace pictura

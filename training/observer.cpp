@@ -103,7 +103,7 @@ Observation Observer::allocate(int64_t rows) const {
   o.lanes = at::empty({rows, slots, kMaxLanes, kLaneFeatures}, at::kFloat);
   o.boundaries = at::empty({rows, slots, kMaxBoundaries, kBoundaryFeatures}, at::kFloat);
   o.controls = at::empty({rows, slots, kMaxControls, kControlFeatures}, at::kFloat);
-  o.set_counts = at::empty({rows, slots, 4}, at::kInt);
+  o.set_counts = at::empty({rows, slots, kNumEntitySets}, at::kInt);
   return o;
 }
 

@@ -24,7 +24,7 @@ struct Observation {
   at::Tensor conditioning;                           // [batch, kNumConditioning]
   at::Tensor waypoints;                              // [batch, kNumWaypoints * kWaypointFeatures]
   at::Tensor partners, lanes, boundaries, controls;  // [batch, members, features]
-  at::Tensor set_counts;                             // i32 [batch, 4]
+  at::Tensor set_counts;                             // i32 [batch, kNumEntitySets]
   std::vector<ImageBlock> images;
 
   /// Applies f to every defined tensor.

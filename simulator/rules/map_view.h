@@ -74,12 +74,12 @@ struct ParkingSpot {
   Vec2 outward;  // unit vector away from the road; null on parking lanes and spaces
 };
 
-/// A lane or boundary as the policy sees it: at most kMaxPiece_m long.
+/// A piece of a lane, boundary or wall as the policy sees it: at most kMaxPiece_m long.
 struct ObservedPiece {
-  Vec3 middle_m;
+  Vec3 middle_m;  // on the ground
   float half_length_m = 0;
   Vec2 direction;
-  float width_m = 0;
+  float extent = 0;  // a lane's width or a wall's height, scaled as it is observed; a boundary has none
 };
 
 struct MapView {
@@ -95,10 +95,10 @@ struct MapView {
   Span<const int32_t> walk_leave_begin;  // [walk nodes + 1] of walk_leaving: the pieces that leave a node
   Span<const int32_t> walk_leaving;
   Span<const ParkingSpot> parking_spots;
-  Span<const ObservedPiece> lane_pieces, boundary_pieces;
+  Span<const ObservedPiece> lane_pieces, boundary_pieces, wall_pieces;
   GridView segment_cells, edge_cells, wall_cells, stop_line_cells;
-  GridView walk_cells;                              // of pairs of walk_pieces
-  GridView near_lane_pieces, near_boundary_pieces;  // per cell and sector
+  GridView walk_cells;                                                // of pairs of walk_pieces
+  GridView near_lane_pieces, near_boundary_pieces, near_wall_pieces;  // per cell and sector
   GridView near_stop_lines;
 };
 
@@ -120,9 +120,10 @@ PICTURA_HD void visit_arrays(MapView* view, Visit&& visit) {
   visit(&view->parking_spots);
   visit(&view->lane_pieces);
   visit(&view->boundary_pieces);
-  GridView* const lists[] = {&view->segment_cells,        &view->edge_cells,     &view->wall_cells,
-                             &view->stop_line_cells,      &view->walk_cells,     &view->near_lane_pieces,
-                             &view->near_boundary_pieces, &view->near_stop_lines};
+  visit(&view->wall_pieces);
+  GridView* const lists[] = {&view->segment_cells,        &view->edge_cells,       &view->wall_cells,
+                             &view->stop_line_cells,      &view->walk_cells,       &view->near_lane_pieces,
+                             &view->near_boundary_pieces, &view->near_wall_pieces, &view->near_stop_lines};
   for (GridView* cells : lists) {
     visit(&cells->begin);
     visit(&cells->items);

@@ -10,6 +10,7 @@ namespace pictura {
 // What a value of 1 means.
 constexpr float kScalePosition_m = 120.0f, kScaleHeight_m = 10.0f, kScaleSpeed_mps = 20.0f;
 constexpr float kScaleLength_m = 6.0f, kScaleWidth_m = 3.0f, kScaleHalfPiece_m = 5.0f, kScaleLaneWidth_m = 5.0f;
+constexpr float kScaleWallHeight_m = 12.0f;
 constexpr float kScaleSteer_rad = 0.55f, kScaleAccelLong_mps2 = 5.0f, kScaleAccelLat_mps2 = 4.0f;
 
 // What is in sight.
@@ -146,7 +147,7 @@ PICTURA_HD inline int observe_partners(const WorldView& world, int agent, const 
 /// Writes the row of a piece; returns whether its middle is in sight.
 PICTURA_HD inline bool observe_piece(const ObservedPiece& piece, const EgoFrame& frame, float* row) {
   constexpr float kPerPosition = 1.0f / kScalePosition_m, kPerHeight = 1.0f / kScaleHeight_m;
-  constexpr float kPerHalfPiece = 1.0f / kScaleHalfPiece_m, kPerWidth = 1.0f / kScaleLaneWidth_m;
+  constexpr float kPerHalfPiece = 1.0f / kScaleHalfPiece_m;
   constexpr float kMiddle_m = 0.5f * (kRoadAhead_m - kRoadBehind_m), kHalf_m = 0.5f * (kRoadAhead_m + kRoadBehind_m);
   const Vec3 local = frame.to_local(piece.middle_m);
   const Vec2 direction = frame.turn(piece.direction);
@@ -156,11 +157,11 @@ PICTURA_HD inline bool observe_piece(const ObservedPiece& piece, const EgoFrame&
   row[3] = piece.half_length_m * kPerHalfPiece;
   row[4] = direction.x;
   row[5] = direction.y;
-  row[6] = piece.width_m * kPerWidth;
+  row[6] = piece.extent;
   return static_cast<int>(fabsf(local.x - kMiddle_m) <= kHalf_m) & static_cast<int>(fabsf(local.y) <= kRoadAside_m);
 }
 
-/// Lanes or boundaries: of the pieces listed for the ego's cell, the first `capacity` whose middles are in sight. Rows
+/// Lanes, boundaries or walls: of the pieces listed for the ego's cell, the first `capacity` whose middles are in sight. Rows
 /// are written before it is known whether they count, which spares an unpredictable branch; the row after the last may
 /// hold a leftover.
 PICTURA_HD inline int observe_pieces(Span<const ObservedPiece> pieces, Span<const int32_t> items, const EgoFrame& frame,
@@ -171,7 +172,7 @@ PICTURA_HD inline int observe_pieces(Span<const ObservedPiece> pieces, Span<cons
   }
   return count;
 }
-static_assert(kLaneFeatures == kBoundaryFeatures);
+static_assert(kLaneFeatures == kBoundaryFeatures && kLaneFeatures == kWallFeatures);
 
 PICTURA_HD constexpr float light_code(LightState state) {
   switch (state) {
@@ -240,9 +241,10 @@ PICTURA_HD inline void observe_own(const WorldView& world, int agent, const Obse
   for (int i = 0; i < kNumWaypoints * kWaypointFeatures; ++i) waypoints[i] = 0.0f;
 }
 
-/// The entity sets, in the order of ObservationView::set_counts.
-enum class EntitySet : int32_t { partners, lanes, boundaries, controls };
-constexpr int kNumEntitySets = 4;
+/// How many sets are written: all, or all but the walls.
+PICTURA_HD inline int num_observed_sets(const ObservationView& out) {
+  return out.walls.empty() ? static_cast<int>(EntitySet::walls) : kNumEntitySets;
+}
 
 /// Where a set of one slot is written.
 struct SetRows {
@@ -261,6 +263,7 @@ PICTURA_HD inline SetRows set_rows(const ObservationView& out, int slot, EntityS
     case EntitySet::boundaries:
       return {out.boundaries.data() + row * kMaxBoundaries * kBoundaryFeatures, kBoundaryFeatures, kMaxBoundaries,
               count};
+    case EntitySet::walls: return {out.walls.data() + row * kMaxWalls * kWallFeatures, kWallFeatures, kMaxWalls, count};
     default:
       return {out.controls.data() + row * kMaxControls * kControlFeatures, kControlFeatures, kMaxControls, count};
   }
@@ -275,9 +278,12 @@ struct PieceList {
 PICTURA_HD inline PieceList pieces_near(const WorldView& world, int slot, EntitySet set) {
   const Vec2 at{world.agents.x_m[slot], world.agents.y_m[slot]};
   const float heading_rad = world.agents.heading_rad[slot];
-  return set == EntitySet::lanes
-             ? PieceList{world.map.lane_pieces, items_at(world.map.near_lane_pieces, at, heading_rad)}
-             : PieceList{world.map.boundary_pieces, items_at(world.map.near_boundary_pieces, at, heading_rad)};
+  const MapView& map = world.map;
+  switch (set) {
+    case EntitySet::lanes: return {map.lane_pieces, items_at(map.near_lane_pieces, at, heading_rad)};
+    case EntitySet::walls: return {map.wall_pieces, items_at(map.near_wall_pieces, at, heading_rad)};
+    default: return {map.boundary_pieces, items_at(map.near_boundary_pieces, at, heading_rad)};
+  }
 }
 
 /// One entity set: empty for the absent and for those that halted in an earlier step.
@@ -302,7 +308,7 @@ PICTURA_HD inline void observe_set(const WorldView& world, int agent, EntitySet 
 /// Writes the whole observation of one agent. Sets are written if `entity_sets`.
 PICTURA_HD inline void observe(const WorldView& world, int agent, bool entity_sets, const ObservationView& out) {
   observe_own(world, agent, out);
-  for (int set = 0; entity_sets && set < kNumEntitySets; ++set) {
+  for (int set = 0; entity_sets && set < num_observed_sets(out); ++set) {
     observe_set(world, agent, static_cast<EntitySet>(set), out);
   }
 }

@@ -39,15 +39,15 @@ bool same(Span<T> host, Span<T> device) {
 
 /// A device observation's copy.
 struct HostObservation {
-#define X(name, type, per_slot, is_set, comment) std::vector<type> name;
+#define X(name, type, per_slot, part, comment) std::vector<type> name;
   PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
   explicit HostObservation(const ObservationView& device){
-#define X(name, type, per_slot, is_set, comment) name = on_host(device.name);
+#define X(name, type, per_slot, part, comment) name = on_host(device.name);
       PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
   } ObservationView view() {
-#define X(name, type, per_slot, is_set, comment) name,
+#define X(name, type, per_slot, part, comment) name,
     return {PICTURA_OBSERVATION_ARRAYS(X)};
 #undef X
   }
@@ -95,9 +95,7 @@ void expect_parity(const SimulatorConfig& config, const Maps& maps, const std::v
 
 SimulatorConfig whole_world() {
   SimulatorConfig config;
-  config.pedestrian_fraction = config.cyclist_fraction = 0.1f;
-  config.parked_cars = 32;
-  config.walls = true;
+  config.wall_observations = true;
   return config;
 }
 
@@ -214,7 +212,7 @@ TEST_F(CudaSimulatorTest, AnActionOutOfRangeChangesNothingAndIsThrownLater) {
 // Printed, not judged: the paper's number of agents, with and without entity sets.
 TEST_F(CudaSimulatorTest, RateOf20480Agents) {
   for (const bool sets : {true, false}) {
-    SimulatorConfig config = whole_world();
+    SimulatorConfig config;
     config.vector_observations = sets;
     const Maps maps{load_map("procedural:1"), load_map("procedural:2"), load_map("procedural:3")};
     const auto cuda = make_simulator("cuda", config, maps, draw_worlds(1, 20480, 1, 120, 3));

@@ -11,7 +11,7 @@ namespace pictura {
 namespace {
 
 struct Observation : ::testing::Test {
-  Observation() : stage(make_map(), 20) {
+  Observation() : stage(make_map(), 20, testing::cars({.wall_observations = true})) {
     // The ego heads east at (100, 0.5); 18 others stand ahead of it on the left lane; the last one is far away.
     stage.put(0, {100, 0.5f}, 0.1f, 6);
     for (int i = 1; i <= 18; ++i) stage.put(i, {105.0f + 5 * static_cast<float>(i), 4}, kPi, 2);
@@ -20,6 +20,8 @@ struct Observation : ::testing::Test {
   static std::shared_ptr<const RoadMap> make_map() {
     auto map = testing::stadium(200, 2);
     testing::add_light(map.get(), 120, 8, 2, {0, 4});
+    // Buildings south of the road, in pieces of 12 m; the first piece always stands.
+    for (float x = 120; x > -20; x -= 12) map->building_lines.push_back({{x, -9, 0.5f}, {x - 12, -9, 0.5f}});
     return map;
   }
   void look() { observe(stage.world(), 0, true, stage.results.observation_view()); }
@@ -125,7 +127,7 @@ TEST_F(Observation, ConditioningIsScaledByThePapersRanges) {
 }
 
 /// What is listed must be what is in sight: checked against all pieces of the map, from many places and headings.
-TEST_F(Observation, LanesAndBoundariesAreAllThatIsInSight) {
+TEST_F(Observation, LanesBoundariesAndWallsAreAllThatIsInSight) {
   RandomStream random(5, 0, 0, 0, 0, Purpose::town);
   const WorldMap& map = stage.batch.world_maps[0];
   for (int i = 0; i < 300; ++i) {
@@ -134,9 +136,10 @@ TEST_F(Observation, LanesAndBoundariesAreAllThatIsInSight) {
     stage.put(0, at, heading, 0);
     look();
     const ObservationView out = stage.results.observation_view();
-    for (const bool lanes : {true, false}) {
-      const std::vector<ObservedPiece>& pieces = lanes ? map.lane_pieces : map.boundary_pieces;
-      const Span<const float> rows = lanes ? out.lanes : out.boundaries;
+    for (const EntitySet set : {EntitySet::lanes, EntitySet::boundaries, EntitySet::walls}) {
+      const bool lanes = set == EntitySet::lanes, walls = set == EntitySet::walls;
+      const std::vector<ObservedPiece>& pieces = lanes ? map.lane_pieces : walls ? map.wall_pieces : map.boundary_pieces;
+      const Span<const float> rows = lanes ? out.lanes : walls ? out.walls : out.boundaries;
       int in_sight = 0, found = 0;
       for (const ObservedPiece& piece : pieces) {
         const Vec2 d = piece.middle_m.xy() - at;
@@ -156,7 +159,7 @@ TEST_F(Observation, LanesAndBoundariesAreAllThatIsInSight) {
         }
       }
       ASSERT_LT(in_sight, 80);
-      EXPECT_EQ(out.set_counts[lanes ? 1 : 2], in_sight) << i;
+      EXPECT_EQ(out.set_counts[static_cast<size_t>(set)], in_sight) << i;
       EXPECT_EQ(found, in_sight) << i;
       for (size_t k = static_cast<size_t>(in_sight) * kLaneFeatures; k < 80 * kLaneFeatures; ++k) ASSERT_EQ(rows[k], 0);
     }
@@ -164,14 +167,56 @@ TEST_F(Observation, LanesAndBoundariesAreAllThatIsInSight) {
 }
 
 TEST_F(Observation, PiecesAreAtMostTenMetresLong) {
-  for (const auto* pieces : {&stage.batch.world_maps[0].lane_pieces, &stage.batch.world_maps[0].boundary_pieces}) {
+  const WorldMap& map = stage.batch.world_maps[0];
+  const auto total_of = [](const std::vector<ObservedPiece>& pieces) {
     double total = 0;
-    for (const ObservedPiece& piece : *pieces) {
+    for (const ObservedPiece& piece : pieces) {
       EXPECT_LE(piece.half_length_m, 5.001f);
       total += 2 * piece.half_length_m;
     }
-    EXPECT_GT(total, 1000);
+    return total;
+  };
+  // Two straights of 200 m and two half circles, of radius 20 m and 16 m; edges 2 m aside of either.
+  const double lanes_m = 4 * 200 + kTwoPi * (20 + 16), edges_m = 4 * 200 + kTwoPi * (22 + 14);
+  EXPECT_NEAR(total_of(map.lane_pieces), lanes_m, 0.01 * lanes_m);
+  EXPECT_NEAR(total_of(map.boundary_pieces), edges_m, 0.01 * edges_m);
+  EXPECT_NEAR(total_of(map.wall_pieces), 12.0 * static_cast<double>(map.walls.size()), 1e-3);
+}
+
+TEST_F(Observation, WallsAreTheirPiecesWithTheirHeights) {
+  look();
+  const ObservationView out = stage.results.observation_view();
+  const std::vector<WallFace> walls = make_walls(*stage.batch.maps[0], {.wall_seed = 0});
+  ASSERT_GT(walls.size(), 2u);
+  ASSERT_EQ(walls[0].a_m.x, 120);
+  ASSERT_EQ(walls[0].b_m.x, 108);
+  // The first stands from x = 120 to 108, 9 m south: two pieces of 6 m, which point west, the road to their right.
+  int found = 0;
+  for (const float x : {117.0f, 111.0f}) {
+    const Vec2 at = local(x, -9);
+    const float expected[kWallFeatures] = {
+        at.x / 120, at.y / 120, 0.5f / 10, 3 / 5.0f, std::cos(kPi - 0.1f), std::sin(kPi - 0.1f), walls[0].height_m / 12};
+    for (int row = 0; row < out.set_counts[4]; ++row) {
+      const float* r = out.walls.data() + row * kWallFeatures;
+      if (std::abs(r[0] - expected[0]) > 1e-5) continue;
+      ++found;
+      for (int i = 0; i < kWallFeatures; ++i) EXPECT_NEAR(r[i], expected[i], 1e-5) << i;
+    }
   }
+  EXPECT_EQ(found, 2);
+}
+
+TEST_F(Observation, WallsAreThereOnlyWhereTheyAreAskedFor) {
+  const auto map = make_map();
+  EXPECT_TRUE(testing::Stage(map, 1).results.observation_view().walls.empty());
+  SimulatorConfig config = testing::cars({.walls = false, .wall_observations = true});
+  testing::Stage without(map, 1, config);
+  without.put(0, {100, 0.5f}, 0.1f, 6);
+  observe(without.world(), 0, true, without.results.observation_view());
+  EXPECT_EQ(without.results.observation_view().set_counts[4], 0);
+  EXPECT_EQ(without.results.observation_view().walls.size(), size_t{kMaxWalls * kWallFeatures});
+  config.vector_observations = false;
+  EXPECT_TRUE(testing::Stage(map, 1, config).results.observation_view().walls.empty());
 }
 
 TEST_F(Observation, HaltedAndAbsentAgentsObserveNothingButTheyAreSeen) {

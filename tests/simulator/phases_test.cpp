@@ -39,6 +39,7 @@ TEST(Phases, GiveTheBitsOfTheCpuExecutorInAnyOrderOfThreads) {
   config.episode_steps = 60;
   config.pedestrian_fraction = config.cyclist_fraction = 0.2f;
   config.parked_cars = 12;
+  config.wall_observations = true;
   const std::vector<std::shared_ptr<const RoadMap>> maps{load_map("procedural:1"), load_map("procedural:2"),
                                                          testing::stadium(200, 2)};
   expect_same(config, maps, draw_worlds(5, 300, 1, 60, 3), 150, 1);

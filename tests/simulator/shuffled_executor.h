@@ -75,7 +75,7 @@ class ShuffledExecutor {
   ShuffledExecutor(const SimulatorConfig& config, std::vector<std::shared_ptr<const RoadMap>> maps,
                    std::vector<WorldSpec> worlds, unsigned shuffle_seed)
       : batch(config, std::move(maps), std::move(worlds)),
-        results(static_cast<size_t>(batch.num_slots()), config.vector_observations),
+        results(static_cast<size_t>(batch.num_slots()), config),
         random_(shuffle_seed),
         cell_items_(batch.boxes.size()),
         chosen_try_(batch.boxes.size()),

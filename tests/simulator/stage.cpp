@@ -3,7 +3,7 @@
 namespace pictura::testing {
 
 Stage::Stage(std::shared_ptr<const RoadMap> map, int num_agents, const SimulatorConfig& config)
-    : batch(config, {std::move(map)}, {WorldSpec{0, num_agents, 0}}), results(static_cast<size_t>(num_agents), true) {
+    : batch(config, {std::move(map)}, {WorldSpec{0, num_agents, 0}}), results(static_cast<size_t>(num_agents), config) {
   for (int agent = 0; agent < num_agents; ++agent) {
     const auto i = static_cast<size_t>(agent);
     batch.agents.length_m[i] = 4;
