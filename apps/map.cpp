@@ -8,7 +8,9 @@
 #include "pictura/apps/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/file.h"
+#include "pictura/map/blind_approaches.h"
 #include "pictura/map/load_map.h"
+#include "pictura/map/map_geometry.h"
 #include "pictura/map/opendrive/writer.h"
 
 namespace pictura {
@@ -50,6 +52,15 @@ Json facts_of(const RoadMap& map) {
           {"z_max_m", facts.z_max_m}};
 }
 
+/// With the walls that simulations have by default.
+void add_blind_approaches(const RoadMap& map, Json* object_out) {
+  const std::vector<WallFace> walls = make_walls(map, {});
+  const BlindApproaches count = count_blind_approaches(map, walls);
+  (*object_out)["walls"] = walls.size();
+  (*object_out)["approaches"] = count.approaches;
+  (*object_out)["blind_approaches"] = count.blind;
+}
+
 void print_table(const Json& object) {
   for (const auto& [key, value] : object.items()) {
     fmt::print("{:18} {}\n", key,
@@ -85,6 +96,7 @@ void run_map(const Arguments& arguments) {
     write_file(arguments.xodr, export_opendrive(text.text, text.source));
   }
   Json object = facts_of(*map);
+  add_blind_approaches(*map, &object);
   object["cached"] = report.cached;
   if (!report.cache_refusal.empty()) object["cache_refused"] = report.cache_refusal;
   object["load_ms"] = load_ms;

@@ -101,7 +101,8 @@ class Walls : public ::testing::TestWithParam<const char*> {
   std::shared_ptr<const RoadMap> map_;
 };
 
-INSTANTIATE_TEST_SUITE_P(All, Walls, ::testing::Values("Town01", "Town03", "procedural:1"));
+INSTANTIATE_TEST_SUITE_P(All, Walls, ::testing::Values("Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07",
+                                                "Town10HD", "procedural:1", "procedural:2"));
 
 TEST_P(Walls, FollowTheirSeedAndLeaveGaps) {
   const std::vector<WallFace> walls = make_walls(*map_, {.wall_seed = 7}), again = make_walls(*map_, {.wall_seed = 7}),
@@ -125,6 +126,38 @@ TEST_P(Walls, FollowTheirSeedAndLeaveGaps) {
   EXPECT_EQ(make_static_geometry(*map_, {.wall_seed = 7}).walls.size(), walls.size());
 }
 
+bool cross_each_other(Vec2 a, Vec2 b, Vec2 c, Vec2 d) {
+  const auto side = [](Vec2 from, Vec2 to, Vec2 p) { return cross(to - from, p - from) > 0; };
+  return side(a, b, c) != side(a, b, d) && side(c, d, a) != side(c, d, b);
+}
+
+/// Up to 60 m, as long as the street bends by less than 15 degrees: beyond that a building beside it may hide what is ahead.
+TEST_P(Walls, LeaveSightAlongStreets) {
+  constexpr float kSight_m = 60, kBend_rad = 15 * kPi / 180;
+  const std::vector<WallFace> walls = make_walls(*map_, {});
+  int looks = 0;
+  for (const Lane& lane : map_->lanes) {
+    if (!is_drivable(lane.type) || lane.in_junction) continue;
+    const Span<const LanePoint> points = map_->points_of(lane);
+    for (std::size_t from = 0, to = 0; from < points.size(); ++from) {
+      to = std::max(to, from);
+      while (to + 1 < points.size() && points[to + 1].s_m <= points[from].s_m + kSight_m &&
+             std::abs(wrap_angle(points[to + 1].heading_rad - points[from].heading_rad)) < kBend_rad) {
+        ++to;
+      }
+      const Vec3 eye = points[from].position_m, ahead = points[to].position_m;
+      ++looks;
+      for (const WallFace& wall : walls) {
+        if (std::abs(wall.a_m.z - eye.z) > 2) continue;
+        ASSERT_FALSE(cross_each_other(eye.xy(), ahead.xy(), wall.a_m.xy(), wall.b_m.xy()))
+            << "from " << eye.x << ", " << eye.y << " to " << ahead.x << ", " << ahead.y;
+      }
+    }
+  }
+  EXPECT_GT(looks, 100);
+}
+
+/// Lanes of every type: what is driven on, parked on and walked on.
 TEST_P(Walls, StandOnNoLaneAndHaveTheRoadOnTheirRight) {
   ASSERT_GT(map_->building_lines.size(), 50u);
   for (const BuildingLine& line : map_->building_lines) {
