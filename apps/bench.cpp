@@ -169,12 +169,11 @@ void bench_render(const Arguments& arguments) {
                               (agent_steps * static_cast<double>(renderer->config().rig.cameras.size())));
     if (interrupted()) throw Interrupted("interrupted");
   }
-  report_benchmark(
-      arguments.json,
-      fmt::format("render: {}, {}, walls {}, all egos x {} cameras x {}, {} threads, samples {}, {}", world.map,
-                  population_of(world), world.walls ? "on" : "off", config.rig.cameras.size(), arguments.size,
-                  world.num_threads, arguments.samples, choice),
-      std::string(renderer->name()), {rate, image_ms});
+  report_benchmark(arguments.json,
+                   fmt::format("render: {}, {}, walls {}, all egos x {} cameras x {}, {} threads, samples {}, {}",
+                               world.map, population_of(world), world.walls ? "on" : "off", config.rig.cameras.size(),
+                               arguments.size, world.num_threads, arguments.samples, choice),
+                   std::string(renderer->name()), {rate, image_ms});
 }
 
 #ifdef PICTURA_HAS_TORCH

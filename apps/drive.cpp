@@ -14,8 +14,9 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
   command->add_option("--agents", options_out->agents, "Vehicles, cyclists and pedestrians in the world")
       ->check(CLI::Range(1, kMaxAgentsPerWorld))
       ->capture_default_str();
-  command->add_option("--pedestrians", options_out->pedestrian_fraction,
-                      "Share of the agents; default: as the policy was trained, else 0.1")
+  command
+      ->add_option("--pedestrians", options_out->pedestrian_fraction,
+                   "Share of the agents; default: as the policy was trained, else 0.1")
       ->check(CLI::Range(0.0, 1.0));
   command->add_option("--cyclists", options_out->cyclist_fraction, "Share of the agents; default: likewise")
       ->check(CLI::Range(0.0, 1.0));

@@ -153,9 +153,8 @@ void render_world(const Arguments& arguments) {
 
 // A scene file says these things itself.
 void refuse_world_options(const CLI::App& command) {
-  for (const char* option :
-       {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--steps", "--views", "--size",
-        "--rig", "--line-floor"}) {
+  for (const char* option : {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--steps",
+                             "--views", "--size", "--rig", "--line-floor"}) {
     if (command.count(option) > 0) fail_usage("{}: has no effect on a scene file, which says that itself", option);
   }
 }

@@ -35,8 +35,7 @@ class SimulatorCpu final : public Simulator {
  public:
   SimulatorCpu(const SimulatorConfig& config, std::vector<std::shared_ptr<const RoadMap>> maps,
                std::vector<WorldSpec> worlds)
-      : batch_(config, std::move(maps), std::move(worlds)),
-        results_(static_cast<size_t>(batch_.num_slots()), config) {
+      : batch_(config, std::move(maps), std::move(worlds)), results_(static_cast<size_t>(batch_.num_slots()), config) {
     reset({});
   }
 

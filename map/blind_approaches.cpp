@@ -17,11 +17,11 @@ constexpr float kSameLevel_m = 2.0f;
 
 /// A way through a junction, with the lanes that lead to it.
 struct Path {
-  int32_t approach = -1;      // the lane before the junction
-  int32_t road = -1;          // on which that lies
-  std::vector<Vec3> points;   // from far enough before the junction, if the lanes reach so far
-  std::vector<float> s_m;     // [points] arc length, 0 where the junction begins
-  size_t first_inside = 0;    // the point at arc length 0
+  int32_t approach = -1;     // the lane before the junction
+  int32_t road = -1;         // on which that lies
+  std::vector<Vec3> points;  // from far enough before the junction, if the lanes reach so far
+  std::vector<float> s_m;    // [points] arc length, 0 where the junction begins
+  size_t first_inside = 0;   // the point at arc length 0
 };
 
 bool is_driven(const Lane& lane) { return is_drivable(lane.type) && lane.type != LaneType::parking; }

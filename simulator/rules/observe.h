@@ -161,9 +161,9 @@ PICTURA_HD inline bool observe_piece(const ObservedPiece& piece, const EgoFrame&
   return static_cast<int>(fabsf(local.x - kMiddle_m) <= kHalf_m) & static_cast<int>(fabsf(local.y) <= kRoadAside_m);
 }
 
-/// Lanes, boundaries or walls: of the pieces listed for the ego's cell, the first `capacity` whose middles are in sight. Rows
-/// are written before it is known whether they count, which spares an unpredictable branch; the row after the last may
-/// hold a leftover.
+/// Lanes, boundaries or walls: of the pieces listed for the ego's cell, the first `capacity` whose middles are in
+/// sight. Rows are written before it is known whether they count, which spares an unpredictable branch; the row after
+/// the last may hold a leftover.
 PICTURA_HD inline int observe_pieces(Span<const ObservedPiece> pieces, Span<const int32_t> items, const EgoFrame& frame,
                                      int capacity, float* out) {
   int count = 0;

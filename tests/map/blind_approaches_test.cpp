@@ -95,7 +95,8 @@ TEST(BlindApproaches, EveryTownHasSome) {
   for (const std::string& town : towns) {
     SCOPED_TRACE(town);
     const auto map = load_map(town);
-    const BlindApproaches without = count_blind_approaches(*map, {}), with = count_blind_approaches(*map, make_walls(*map, {}));
+    const BlindApproaches without = count_blind_approaches(*map, {}),
+                          with = count_blind_approaches(*map, make_walls(*map, {}));
     EXPECT_EQ(without.blind + without.hidden, 0);
     EXPECT_EQ(with.approaches, without.approaches);
     EXPECT_GT(with.blind, 0);

@@ -101,8 +101,9 @@ class Walls : public ::testing::TestWithParam<const char*> {
   std::shared_ptr<const RoadMap> map_;
 };
 
-INSTANTIATE_TEST_SUITE_P(All, Walls, ::testing::Values("Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07",
-                                                "Town10HD", "procedural:1", "procedural:2"));
+INSTANTIATE_TEST_SUITE_P(All, Walls,
+                         ::testing::Values("Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07",
+                                           "Town10HD", "procedural:1", "procedural:2"));
 
 TEST_P(Walls, FollowTheirSeedAndLeaveGaps) {
   const std::vector<WallFace> walls = make_walls(*map_, {.wall_seed = 7}), again = make_walls(*map_, {.wall_seed = 7}),
@@ -131,7 +132,8 @@ bool cross_each_other(Vec2 a, Vec2 b, Vec2 c, Vec2 d) {
   return side(a, b, c) != side(a, b, d) && side(c, d, a) != side(c, d, b);
 }
 
-/// Up to 60 m, as long as the street bends by less than 15 degrees: beyond that a building beside it may hide what is ahead.
+/// Up to 60 m, as long as the street bends by less than 15 degrees: beyond that a building beside it may hide what is
+/// ahead.
 TEST_P(Walls, LeaveSightAlongStreets) {
   constexpr float kSight_m = 60, kBend_rad = 15 * kPi / 180;
   const std::vector<WallFace> walls = make_walls(*map_, {});

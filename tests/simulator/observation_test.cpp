@@ -138,7 +138,9 @@ TEST_F(Observation, LanesBoundariesAndWallsAreAllThatIsInSight) {
     const ObservationView out = stage.results.observation_view();
     for (const EntitySet set : {EntitySet::lanes, EntitySet::boundaries, EntitySet::walls}) {
       const bool lanes = set == EntitySet::lanes, walls = set == EntitySet::walls;
-      const std::vector<ObservedPiece>& pieces = lanes ? map.lane_pieces : walls ? map.wall_pieces : map.boundary_pieces;
+      const std::vector<ObservedPiece>& pieces = lanes   ? map.lane_pieces
+                                                 : walls ? map.wall_pieces
+                                                         : map.boundary_pieces;
       const Span<const float> rows = lanes ? out.lanes : walls ? out.walls : out.boundaries;
       int in_sight = 0, found = 0;
       for (const ObservedPiece& piece : pieces) {
@@ -194,8 +196,13 @@ TEST_F(Observation, WallsAreTheirPiecesWithTheirHeights) {
   int found = 0;
   for (const float x : {117.0f, 111.0f}) {
     const Vec2 at = local(x, -9);
-    const float expected[kWallFeatures] = {
-        at.x / 120, at.y / 120, 0.5f / 10, 3 / 5.0f, std::cos(kPi - 0.1f), std::sin(kPi - 0.1f), walls[0].height_m / 12};
+    const float expected[kWallFeatures] = {at.x / 120,
+                                           at.y / 120,
+                                           0.5f / 10,
+                                           3 / 5.0f,
+                                           std::cos(kPi - 0.1f),
+                                           std::sin(kPi - 0.1f),
+                                           walls[0].height_m / 12};
     for (int row = 0; row < out.set_counts[4]; ++row) {
       const float* r = out.walls.data() + row * kWallFeatures;
       if (std::abs(r[0] - expected[0]) > 1e-5) continue;

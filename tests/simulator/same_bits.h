@@ -19,7 +19,7 @@ bool same_bits(Span<T> a, Span<T> b) {
 
 /// Name of the first array and element that differ; empty where all bits are equal.
 inline std::string first_difference(const ObservationView& a, const ObservationView& b) {
-#define X(name, type, per_slot, part, comment)                                                                  \
+#define X(name, type, per_slot, part, comment)                                                                    \
   if (!same_bits(a.name, b.name)) {                                                                               \
     for (size_t i = 0; i < a.name.size(); ++i) {                                                                  \
       if (!same_bits(a.name.subspan(i, 1), b.name.subspan(i, 1)))                                                 \

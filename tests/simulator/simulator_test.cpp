@@ -445,7 +445,8 @@ TEST(Simulator, ClassesComeInThePapersSharesEachWithItsSizes) {
 }
 
 TEST(Simulator, CyclistsAreSmallerAndSlower) {
-  const auto simulator = make({.pedestrian_fraction = 0, .cyclist_fraction = 0.5f}, testing::stadium(1500, 2), {{0, 100, 0}});
+  const auto simulator =
+      make({.pedestrian_fraction = 0, .cyclist_fraction = 0.5f}, testing::stadium(1500, 2), {{0, 100, 0}});
   run(simulator.get(), 20);
   int cyclists = 0;
   for (size_t i = 0; i < 100; ++i) {
@@ -471,7 +472,8 @@ TEST(Simulator, ParkedCarsStandOffTheRoadAndInTheWay) {
   }
   sidewalk.points.end = static_cast<int32_t>(map->lane_points.size());
   map->lanes.push_back(sidewalk);
-  const auto simulator = make({.episode_steps = 30, .pedestrian_fraction = 0, .cyclist_fraction = 0, .parked_cars = 12}, map, {{0, 4, 0}, {0, 3, 1}});
+  const auto simulator = make({.episode_steps = 30, .pedestrian_fraction = 0, .cyclist_fraction = 0, .parked_cars = 12},
+                              map, {{0, 4, 0}, {0, 3, 1}});
   const SpawnReport report = simulator->spawn_report();
   EXPECT_EQ(report.parked_asked, 24);
   EXPECT_EQ(report.parked_placed, 24);
