@@ -107,19 +107,24 @@ void ImageDrawer::gather_pixel(int32_t first) {
             [this](const Fragment& a, const Fragment& b) { return is_nearer(a, b, faces_.data()); });
 }
 
-// Weighs the gathered fragments of a pixel.
-PixelSum ImageDrawer::weigh_pixel(int x, int y) {
+// Finds what is free of the gathered fragments of a pixel.
+void ImageDrawer::hide_fragments(int x, int y) {
   const Vec2 corner{static_cast<float>(x), static_cast<float>(y)};
-  PixelSum sum;
-  weights_.resize(pixel_.size());
+  free_.clear();
+  for (const Fragment& fragment : pixel_) free_.push_back(reach_of(fragment.coverage));
   for (std::size_t i = 0; i < pixel_.size(); ++i) {
-    const FreePart free = free_of([this](int k) -> const Fragment& { return pixel_[static_cast<std::size_t>(k)]; },
-                                  static_cast<int>(pixel_.size()), static_cast<int>(i), faces_.data(), corner,
-                                  [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
-    weights_[i] = PixelSum::weight_of(pixel_[i].coverage, free);
-    sum.add(weights_[i], faces_[static_cast<std::size_t>(pixel_[i].face)].color);
+    const PixelCoverage& a = pixel_[i].coverage;
+    for (std::size_t j = i + 1; j < pixel_.size(); ++j) {
+      const PixelCoverage& b = pixel_[j].coverage;
+      // Nothing is left that they could hide of each other.
+      if ((free_[i] & b.samples) == 0 && (free_[j] & a.samples) == 0) continue;
+      const Hidden hidden = hide_each_other(a, b, faces_[static_cast<std::size_t>(pixel_[i].face)],
+                                            faces_[static_cast<std::size_t>(pixel_[j].face)], corner,
+                                            [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
+      free_[i] &= ~hidden.of_a;
+      free_[j] &= ~hidden.of_b;
+    }
   }
-  return sum;
 }
 
 template <typename Visit, typename Finish>
@@ -141,7 +146,13 @@ void ImageDrawer::weigh_rows(RowRange rows, Visit&& visit, Finish&& finish) {
         continue;
       }
       gather_pixel(first);
-      const PixelSum sum = weigh_pixel(x, y);
+      hide_fragments(x, y);
+      PixelSum sum;
+      weights_.resize(pixel_.size());
+      for (std::size_t i = 0; i < pixel_.size(); ++i) {
+        weights_[i] = PixelSum::weight_of(pixel_[i].coverage, free_[i]);
+        sum.add(weights_[i], faces_[static_cast<std::size_t>(pixel_[i].face)].color);
+      }
       const PixelSum::Shares shares = sum.shares();
       for (std::size_t i = 0; i < pixel_.size(); ++i) visit(pixel, pixel_[i], shares.of(weights_[i]));
       finish(pixel, sum.color(shares));

@@ -89,7 +89,7 @@ class ImageDrawer {
   void find_full(FaceRange faces, RowRange rows);
   void make_fragments(FaceRange faces, RowRange rows);
   void gather_pixel(int32_t first);
-  PixelSum weigh_pixel(int x, int y);
+  void hide_fragments(int x, int y);
   // Weighs the fragments of all pixels of the rows: visit(pixel index, fragment, weight) for each, then
   // finish(pixel index, color).
   template <typename Visit, typename Finish>
@@ -107,6 +107,7 @@ class ImageDrawer {
   std::vector<LinkedFragment> fragments_;
   // Of one pixel.
   std::vector<Fragment> pixel_;
+  std::vector<uint64_t> free_;
   std::vector<PixelSum::Weight> weights_;
 };
 

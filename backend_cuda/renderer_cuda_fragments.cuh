@@ -186,11 +186,14 @@ __device__ Rgb weigh_pixel(const Memory& memory, const DrawTask& task, const Pix
   const Vec2 corner{static_cast<float>(x), static_cast<float>(y)};
   auto weight_at = [&](int place) {
     const Fragment fragment = list.at(place);
-    FreePart free = all_free(fragment);
+    uint64_t free = reach_of(fragment.coverage);
     for (int other = first; other != kEnd; other = list.next(other)) {
       if (other == place) continue;
-      hide(&free, fragment, list.at(other), memory.faces, corner,
-           [&](uint32_t solid, uint32_t strip) { return stands(memory, task, solid, strip); });
+      const Fragment of_other = list.at(other);
+      free &= ~hide_each_other(fragment.coverage, of_other.coverage, memory.faces[fragment.face],
+                               memory.faces[of_other.face], corner,
+                               [&](uint32_t solid, uint32_t strip) { return stands(memory, task, solid, strip); })
+                   .of_a;
     }
     return PixelSum::weight_of(fragment.coverage, free);
   };

@@ -82,17 +82,20 @@ struct PolygonEdge {
   float a = 0, b = 0;    // inside: a * (x - x0) + b * (y - y0) >= 0
 };
 
-/// Edges whose ends are closer in x than this are upright: samples lie to one side of them or the other.
-constexpr float kUpright_px = 1e-6f;
+/// Edges whose ends are closer in x than this are upright: samples lie to one side of them or the other. Those whose
+/// ends are closer in y are level, and bound no area.
+constexpr float kUpright_px = 1e-6f, kLevel_px = 1e-6f;
 
 PICTURA_HD inline PolygonEdge make_edge(Vec2 from, Vec2 to) {
   const bool downward = from.y < to.y || (from.y == to.y && from.x < to.x);
   const Vec2 upper = downward ? from : to, lower = downward ? to : from;
-  const float dx = lower.x - upper.x, dy = lower.y - upper.y;
+  const float dx = lower.x - upper.x;
+  const bool is_level = lower.y - upper.y < kLevel_px;
+  const float dy = is_level ? 0.0f : lower.y - upper.y;
   PolygonEdge edge;
   edge.x0 = upper.x;
   edge.y0 = upper.y;
-  edge.y1 = lower.y;
+  edge.y1 = is_level ? upper.y : lower.y;
   edge.dx_dy = dy > 0.0f ? dx / dy : 0.0f;
   edge.dy_dx = fabsf(dx) >= kUpright_px ? dy / dx : 0.0f;
   edge.a = downward ? -dy : dy;
@@ -209,12 +212,6 @@ PICTURA_HD inline uint64_t reach_of(const PixelCoverage& coverage) {
   return coverage.samples != 0 ? coverage.samples : kAllSamples;
 }
 
-/// What is free of a coverage that others may hide.
-struct FreePart {
-  uint64_t samples = 0;      // of its reach
-  bool behind_full = false;  // something that covers the whole pixel is in front
-};
-
 /// Less than this of a pixel is nothing; more than one minus kFullCoverage with every sample is all of it.
 constexpr float kLeastCoverage = 1e-4f;
 constexpr float kFullCoverage = 1e-3f;
@@ -288,18 +285,23 @@ PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const Pi
   float full_low = touch_low, full_high = touch_high;
   for (int i = 0; i < count; ++i) {
     const PolygonEdge& edge = edges[i];
-    const float at_row = edge.b * (y_px - edge.y0) - edge.a * edge.x0;
-    const float most = at_row + max_of(edge.b, 0.0f), least = at_row + min_of(edge.b, 0.0f);
+    const float above_px = y_px - edge.y0;
+    if (edge.a == 0.0f) {
+      // Level: the row is on one side of it, or it runs through the row.
+      const float at_row = edge.b * above_px;
+      if (at_row + max_of(edge.b, 0.0f) <= 0.0f) return {};
+      if (at_row + min_of(edge.b, 0.0f) < 0.0f) full_high = -1.0f;
+      continue;
+    }
+    // Where the edge's line enters the row, and where it leaves it.
+    const float enter = edge.x0 + above_px * edge.dx_dy, leave = edge.x0 + (above_px + 1.0f) * edge.dx_dy;
+    const float low = min_of(enter, leave), high = max_of(enter, leave);
     if (edge.a > 0.0f) {
-      touch_low = max_of(touch_low, -most / edge.a - 1.0f);
-      full_low = max_of(full_low, -least / edge.a);
-    } else if (edge.a < 0.0f) {
-      touch_high = min_of(touch_high, -most / edge.a);
-      full_high = min_of(full_high, -least / edge.a - 1.0f);
-    } else if (most <= 0.0f) {
-      return {};
-    } else if (least < 0.0f) {
-      full_high = -1.0f;
+      touch_low = max_of(touch_low, low - 1.0f);
+      full_low = max_of(full_low, high);
+    } else {
+      touch_high = min_of(touch_high, high);
+      full_high = min_of(full_high, low - 1.0f);
     }
   }
   // A little leeway: the exact tests of pixel_coverage decide at the borders.

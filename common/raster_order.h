@@ -202,35 +202,32 @@ PICTURA_HD inline bool is_nearer(const Fragment& a, const Fragment& b, const Scr
   return number_a != number_b ? number_a < number_b : a.face < b.face;
 }
 
-/// What others may hide of a fragment, before any has been asked.
-PICTURA_HD inline FreePart all_free(const Fragment& fragment) { return {reach_of(fragment.coverage), false}; }
-
-/// Takes from what is free of a fragment what another one of its pixel hides; corner is the pixel's. Faces of one thing
-/// do not hide each other; a sliver hides nothing, and is hidden as a whole.
-template <typename Stands>
-PICTURA_HD inline void hide(FreePart* free, const Fragment& fragment, const Fragment& other, const ScreenFace* faces,
-                            Vec2 corner, Stands&& stands) {
-  const bool both_full = fragment.coverage.is_full() && other.coverage.is_full();
-  if ((free->samples & other.coverage.samples) == 0 && (!both_full || free->behind_full)) return;
-  const ScreenFace &face = faces[fragment.face], &other_face = faces[other.face];
-  if (face.number == other_face.number) return;
-  const Vec2 at = corner + middle_of(other.coverage.samples & reach_of(fragment.coverage));
-  if (!is_in_front(other_face, face, at, stands)) return;
-  free->samples = fragment.coverage.samples != 0 ? free->samples & ~other.coverage.samples : 0;
-  free->behind_full |= both_full;
+/// Where two fragments of a pixel meet: the samples that both cover. A sliver that touches no sample counts as being
+/// wherever the other is. None: neither hides anything of the other.
+PICTURA_HD inline uint64_t shared_samples(const PixelCoverage& a, const PixelCoverage& b) {
+  return a.samples != 0 && b.samples != 0 ? a.samples & b.samples : a.samples | b.samples;
 }
 
-/// What is free of fragment `index` of a pixel's `count`; at(i) is a Fragment.
-template <typename At, typename Stands>
-PICTURA_HD inline FreePart free_of(At&& at, int count, int index, const ScreenFace* faces, Vec2 corner,
-                                   Stands&& stands) {
-  const Fragment fragment = at(index);
-  const bool is_full = fragment.coverage.is_full();
-  FreePart free = all_free(fragment);
-  for (int i = 0; i < count && (free.samples != 0 || (is_full && !free.behind_full)); ++i) {
-    if (i != index) hide(&free, fragment, at(i), faces, corner, stands);
-  }
-  return free;
+/// The samples that a fragment loses to one in front of it. A sliver is hidden as a whole and hides nothing; what
+/// covers the whole pixel is hidden only by what does so too (see PixelSum).
+PICTURA_HD inline uint64_t lost_to(const PixelCoverage& fragment, const PixelCoverage& in_front) {
+  if (fragment.samples == 0) return kAllSamples;
+  return fragment.is_full() && !in_front.is_full() ? 0 : in_front.samples;
+}
+
+/// What two fragments of a pixel hide of each other.
+struct Hidden {
+  uint64_t of_a = 0, of_b = 0;
+};
+
+/// ... where they share samples; corner is the pixel's. Faces of one thing do not hide each other.
+template <typename Stands>
+PICTURA_HD inline Hidden hide_each_other(const PixelCoverage& a, const PixelCoverage& b, const ScreenFace& face_a,
+                                         const ScreenFace& face_b, Vec2 corner, Stands&& stands) {
+  const uint64_t shared = shared_samples(a, b);
+  if (shared == 0 || face_a.number == face_b.number) return {};
+  if (is_in_front(face_a, face_b, corner + middle_of(shared), stands)) return {0, lost_to(b, a)};
+  return {lost_to(a, b), 0};
 }
 
 }  // namespace pictura

@@ -11,7 +11,7 @@ namespace pictura {
 class PixelSum {
  public:
   /// What is wholly free weighs its exact area; what is partly hidden its area times the share of its reach that is
-  /// free; what covers the whole pixel, behind others but behind nothing that does too, what those leave.
+  /// free; what covers the whole pixel, and is behind nothing that does too, what the others leave.
   enum Kind : uint8_t { kWhole, kPartial, kRest, kNumKinds };
   struct Weight {
     float area = 0;
@@ -23,12 +23,12 @@ class PixelSum {
     PICTURA_HD float of(Weight weight) const { return weight.area * of_kind[weight.kind]; }
   };
 
-  PICTURA_HD static Weight weight_of(const PixelCoverage& coverage, const FreePart& free) {
+  /// free: what is left of the coverage's reach after all that others hide.
+  PICTURA_HD static Weight weight_of(const PixelCoverage& coverage, uint64_t free) {
+    if (coverage.is_full()) return {free != 0 ? 1.0f : 0.0f, kRest};
     const uint64_t reach = reach_of(coverage);
-    if (free.samples == reach) return {coverage.area, kWhole};
-    if (coverage.is_full()) return {free.behind_full ? 0.0f : 1.0f, kRest};
-    return {coverage.area * (static_cast<float>(count_bits(free.samples)) / static_cast<float>(count_bits(reach))),
-            kPartial};
+    if (free == reach) return {coverage.area, kWhole};
+    return {coverage.area * (static_cast<float>(count_bits(free)) / static_cast<float>(count_bits(reach))), kPartial};
   }
 
   PICTURA_HD void add(Weight weight, Rgb color) {

@@ -151,10 +151,10 @@ TEST(Coverage, RowSpansAgreeWithPixels) {
   }
 }
 
-// The colour of fragments, each with its coverage, what is free of it, and its colour.
+// The colour of fragments, each with its coverage, its free samples, and its colour.
 struct Laid {
   PixelCoverage coverage;
-  FreePart free;
+  uint64_t free;
   Rgb color;
 };
 Rgb color_of(const std::vector<Laid>& fragments) {
@@ -164,26 +164,25 @@ Rgb color_of(const std::vector<Laid>& fragments) {
 }
 
 TEST(Coverage, WhatIsHiddenWeighsNothing) {
-  const Rgb color = color_of({{{1, kAllSamples}, {kAllSamples}, {1, 0, 0}},
-                              {{1, kAllSamples}, {0, true}, {0, 1, 0}},
-                              {{0.01f, 0}, {0}, {0, 1, 0}},
-                              {{0.5f, 0xFFFFFFFF}, {0}, {0, 1, 0}}});
+  const Rgb color = color_of({{{1, kAllSamples}, kAllSamples, {1, 0, 0}},
+                              {{1, kAllSamples}, 0, {0, 1, 0}},
+                              {{0.01f, 0}, 0, {0, 1, 0}},
+                              {{0.5f, 0xFFFFFFFF}, 0, {0, 1, 0}}});
   EXPECT_EQ(color.r, 1.0f);
   EXPECT_EQ(color.g, 0.0f);
 }
 
 TEST(Coverage, TwoFacesOfOneThirdAndTwoThirdsFillAPixel) {
   const uint64_t third = 0xFFFFFFull;  // any split of the samples
-  EXPECT_NEAR(color_of({{{1.0f / 3, third}, {third}, {1, 1, 1}}, {{2.0f / 3, ~third}, {~third}, {1, 1, 1}}}).r, 1,
-              2e-6);
+  EXPECT_NEAR(color_of({{{1.0f / 3, third}, third, {1, 1, 1}}, {{2.0f / 3, ~third}, ~third, {1, 1, 1}}}).r, 1, 2e-6);
 }
 
 TEST(Coverage, WhatFillsThePixelTakesWhatTheOthersLeave) {
   // A quarter in front by area, although 20 of 64 samples; then something partly behind it, by samples; then a wall.
   const uint64_t front = (1ull << 20) - 1, middle = (1ull << 40) - 1;
-  const Rgb color = color_of({{{0.25f, front}, {front}, {1, 0, 0}},
-                              {{0.5f, middle}, {middle & ~front}, {0, 1, 0}},
-                              {{1, kAllSamples}, {~middle}, {0, 0, 1}}});
+  const Rgb color = color_of({{{0.25f, front}, front, {1, 0, 0}},
+                              {{0.5f, middle}, middle & ~front, {0, 1, 0}},
+                              {{1, kAllSamples}, kAllSamples, {0, 0, 1}}});
   EXPECT_NEAR(color.r, 0.25f, 2e-6f);
   EXPECT_NEAR(color.g, 0.5f * 20 / 40, 2e-6f);
   EXPECT_NEAR(color.b, 0.5f, 2e-6f);
@@ -192,17 +191,17 @@ TEST(Coverage, WhatFillsThePixelTakesWhatTheOthersLeave) {
 TEST(Coverage, WhatFillsThePixelTakesWhatNoSampleSees) {
   // Two faces that take all samples, but not all of the area.
   const uint64_t half = 0xFFFFFFFFull;
-  const Rgb color = color_of({{{0.48f, half}, {half}, {1, 0, 0}},
-                              {{0.5f, ~half}, {~half}, {0, 1, 0}},
-                              {{1, kAllSamples}, {0}, {0, 0, 1}},
-                              {{1, kAllSamples}, {0, true}, {1, 1, 1}}});
+  const Rgb color = color_of({{{0.48f, half}, half, {1, 0, 0}},
+                              {{0.5f, ~half}, ~half, {0, 1, 0}},
+                              {{1, kAllSamples}, kAllSamples, {0, 0, 1}},
+                              {{1, kAllSamples}, 0, {1, 1, 1}}});
   EXPECT_NEAR(color.r, 0.48f, 2e-6f);
   EXPECT_NEAR(color.b, 0.02f, 2e-6f);
 }
 
 TEST(Coverage, WeightsNeverExceedThePixel) {
   const uint64_t half = 0xFFFFFFFFull;
-  const Rgb color = color_of({{{0.6f, half}, {half}, {1, 0, 0}}, {{0.9f, kAllSamples}, {~half}, {0, 1, 0}}});
+  const Rgb color = color_of({{{0.6f, half}, half, {1, 0, 0}}, {{0.9f, kAllSamples}, ~half, {0, 1, 0}}});
   EXPECT_NEAR(color.r, 0.6f, 2e-6f);
   EXPECT_NEAR(color.g, 0.4f, 2e-6f);
 }

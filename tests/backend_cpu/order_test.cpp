@@ -267,16 +267,18 @@ TEST(Order, WhatIsFreeOfAPixelsFragmentsDoesNotDependOnTheirList) {
     }
     auto stands = [tilt](uint32_t solid, uint32_t strip) { return tilt > 0 && (solid + strip) % 3 == 0; };
     auto free_by_face = [&](PixelSum* sum) {
-      std::vector<uint64_t> free_samples(faces.size());
-      for (std::size_t i = 0; i < fragments.size(); ++i) {
-        const auto face = static_cast<std::size_t>(fragments[i].face);
-        const FreePart free =
-            free_of([&](int k) { return fragments[static_cast<std::size_t>(k)]; }, static_cast<int>(fragments.size()),
-                    static_cast<int>(i), faces.data(), {}, stands);
-        free_samples[face] = free.samples;
-        sum->add(PixelSum::weight_of(fragments[i].coverage, free), faces[face].color);
+      std::vector<uint64_t> free(faces.size());
+      for (const Fragment& fragment : fragments) {
+        uint64_t& of_face = free[static_cast<std::size_t>(fragment.face)];
+        of_face = reach_of(fragment.coverage);
+        for (const Fragment& other : fragments) {
+          of_face &= ~hide_each_other(fragment.coverage, other.coverage, faces[static_cast<std::size_t>(fragment.face)],
+                                      faces[static_cast<std::size_t>(other.face)], {}, stands)
+                          .of_a;
+        }
+        sum->add(PixelSum::weight_of(fragment.coverage, of_face), faces[static_cast<std::size_t>(fragment.face)].color);
       }
-      return free_samples;
+      return free;
     };
     PixelSum sum;
     const std::vector<uint64_t> free = free_by_face(&sum);
@@ -299,6 +301,18 @@ TEST(Order, WhatIsFreeOfAPixelsFragmentsDoesNotDependOnTheirList) {
   }
 }
 
+TEST(Order, WhatFillsThePixelIsHiddenOnlyByWhatDoesToo) {
+  std::vector<ScreenFace> faces(2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    faces[i].number = thing_number(kWallKind, static_cast<int32_t>(i));
+    faces[i].inverse_depth_0 = 0.2f - 0.1f * static_cast<float>(i);
+  }
+  auto never = [](uint32_t, uint32_t) { return false; };
+  EXPECT_EQ(hide_each_other({0.5f, 0xFFFF}, {1, kAllSamples}, faces[0], faces[1], {}, never).of_b, 0u);
+  EXPECT_EQ(hide_each_other({1, kAllSamples}, {1, kAllSamples}, faces[0], faces[1], {}, never).of_b, kAllSamples);
+  EXPECT_EQ(hide_each_other({0.5f, 0xFFFF}, {1, kAllSamples}, faces[1], faces[0], {}, never).of_a, kAllSamples);
+}
+
 TEST(Order, ASliverIsHiddenByWhatIsInFrontOfItAndHidesNothing) {
   std::vector<ScreenFace> faces(2);
   for (std::size_t i = 0; i < 2; ++i) faces[i].number = thing_number(kWallKind, static_cast<int32_t>(i));
@@ -306,11 +320,9 @@ TEST(Order, ASliverIsHiddenByWhatIsInFrontOfItAndHidesNothing) {
   for (const bool sliver_in_front : {false, true}) {
     faces[0].inverse_depth_0 = sliver_in_front ? 0.2f : 0.05f;
     faces[1].inverse_depth_0 = 0.1f;
-    const Fragment fragments[2] = {make_fragment(faces[0], 0, {0.01f, 0}, 0, 0),
-                                   make_fragment(faces[1], 1, {0.5f, 0xFFFFFFFF}, 0, 0)};
-    auto at = [&](int i) { return fragments[i]; };
-    EXPECT_EQ(free_of(at, 2, 0, faces.data(), {}, never).samples, sliver_in_front ? kAllSamples : 0u);
-    EXPECT_EQ(free_of(at, 2, 1, faces.data(), {}, never).samples, 0xFFFFFFFFu);
+    const Hidden hidden = hide_each_other({0.01f, 0}, {0.5f, 0xFFFFFFFF}, faces[0], faces[1], {}, never);
+    EXPECT_EQ(hidden.of_a, sliver_in_front ? 0u : kAllSamples);
+    EXPECT_EQ(hidden.of_b, 0u);
   }
 }
 
