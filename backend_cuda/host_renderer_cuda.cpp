@@ -30,7 +30,7 @@ class HostRendererCuda final : public Renderer {
   }
 
   void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override {
-    check_images(name(), config().rig, space(), views.size(), images_out);
+    check_images(name(), config().rig, space(), views.size(), images_out, /*draws_f16=*/true);
     check_input(scene, views);
     const auto queue = static_cast<cudaStream_t>(stream.handle);
     renderer_->render(scene_.assign(scene, queue), views_.assign(views, queue), images_.like(images_out), stream);

@@ -29,7 +29,7 @@ SharedLibrary open_nvrtc() {
     return {"cuda", chosen, kSource};
   }
   const std::string file = fmt::format("libnvrtc.so.{}", CUDART_VERSION / 1000);
-  const std::string beside = fmt::format("{}/{}", PICTURA_CUDA_LIBRARY_DIR, file);
+  const std::string beside = fmt::format("{}/{}", PICTURA_NVRTC_FOLDER, file);
   std::error_code error;
   try {
     return {"cuda", file, kSource};

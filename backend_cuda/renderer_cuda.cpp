@@ -6,6 +6,7 @@
 
 #include "pictura/backend_cuda/kernel_library.h"
 #include "pictura/backend_cuda/renderer_cuda_launch.h"
+#include "pictura/backend_cuda/scratch_plan.h"
 #include "pictura/common/cuda/check.cuh"
 #include "pictura/common/cuda/device_buffer.cuh"
 #include "pictura/common/error.h"
@@ -27,6 +28,7 @@ constexpr int kLargeFragments = 1 << 18;
 class ScratchBuffers {
  public:
   ScratchBuffers() = default;
+  /// Room for sizes.blocks blocks.
   ScratchBuffers(const cuda::Scratch& sizes, std::size_t bytes_per_block)
       : scratch_(sizes),
         faces_(count(sizes.blocks, sizes.max_faces)),
@@ -37,6 +39,10 @@ class ScratchBuffers {
     scratch_.bytes = bytes_.data();
   }
   const cuda::Scratch& view() const { return scratch_; }
+  static std::size_t block_bytes(const cuda::Scratch& sizes, std::size_t bytes_per_block) {
+    return count(1, sizes.max_faces) * sizeof(ScreenFace) + count(1, sizes.max_edges) * sizeof(PolygonEdge) +
+           bytes_per_block;
+  }
 
  private:
   static std::size_t count(int blocks, int each) {
@@ -84,13 +90,14 @@ struct UploadedGeometry {
 
 class CudaRenderer final : public Renderer {
  public:
-  CudaRenderer(const RendererConfig& config, std::string* origin_out) : config_(checked(config)), library_(config.rig) {
-    int device = 0, processors = 0;
+  CudaRenderer(const RendererConfig& config, std::string* origin_out)
+      : config_(checked(config)), cameras_(pinhole_cameras(config.rig)), library_(config.rig) {
+    int device = 0;
     PICTURA_CUDA(cudaGetDevice(&device));
-    PICTURA_CUDA(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device));
+    PICTURA_CUDA(cudaDeviceGetAttribute(&processors_, cudaDevAttrMultiProcessorCount, device));
     PICTURA_CUDA(cuda::prepare_kernels(library_.kernels()));
     *origin_out = library_.origin();
-    small_ = ScratchBuffers(cuda::small_scratch(processors), 0);
+    grow(0, 1);  // what is too little for any scene is told at once
     counters_ = DeviceBuffer<int32_t>(2);
     fault_.host()->view = -1;
   }
@@ -113,12 +120,15 @@ class CudaRenderer final : public Renderer {
 
   void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override {
     throw_fault();
-    check_images(name(), config_.rig, space(), views.size(), images_out);
-    const cuda::DrawTask task = draw_task(scene, views, &images_out);
-    if (task.num_views * task.num_cameras == 0) return;
+    check_images(name(), config_.rig, space(), views.size(), images_out, /*draws_f16=*/true);
+    cuda::DrawTask task = draw_task(scene, views, &images_out);
     const auto on_stream = static_cast<cudaStream_t>(stream.handle);
-    PICTURA_CUDA(cudaMemsetAsync(counters_.data(), 0, counters_.size() * sizeof(int32_t), on_stream));
-    PICTURA_CUDA(cuda::launch_draw(library_.kernels(), task, small_.view(), large_.view(), on_stream));
+    const auto views_at_once = static_cast<int32_t>(plan_.views);
+    for (int32_t left = task.num_views; left > 0; left -= task.num_views, task.first_view += task.num_views) {
+      task.num_views = std::min(left, views_at_once);
+      PICTURA_CUDA(cudaMemsetAsync(counters_.data(), 0, counters_.size() * sizeof(int32_t), on_stream));
+      PICTURA_CUDA(cuda::launch_draw(library_.kernels(), task, small_.view(), large_.view(), on_stream));
+    }
   }
 
   void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
@@ -154,7 +164,7 @@ class CudaRenderer final : public Renderer {
     const std::size_t images_total = views.size() * config_.rig.cameras.size();
     PICTURA_CHECK(images_total < (std::size_t{1} << 31), "renderer cuda: expected fewer than 2^31 images, got {}",
                   images_total);
-    grow(scene, images_total);
+    grow(scene.agents.size(), views.size());
     cuda::DrawTask task;
     task.scene = scene;
     task.views = views.data();
@@ -169,14 +179,13 @@ class CudaRenderer final : public Renderer {
     task.next_image = counters_.data();
     task.overflow_count = counters_.data() + 1;
     task.overflow_images = overflow_images_.data();
-    const std::vector<PinholeCamera> cameras = pinhole_cameras(config_.rig);
-    for (std::size_t i = 0; i < cameras.size(); ++i) {
-      task.cameras[i].camera = cameras[i];
+    for (std::size_t i = 0; i < cameras_.size(); ++i) {
+      task.cameras[i].camera = cameras_[i];
       if (!images) continue;
       const CameraImages& out = images->cameras[i];
-      task.cameras[i] = {cameras[i], out.data, out.view_stride, out.depth_m, out.class_id, out.instance_id};
+      task.cameras[i] = {cameras_[i], out.data, out.view_stride, out.depth_m, out.class_id, out.instance_id};
     }
-    task.as_float = images && images->format == PixelFormat::f32;
+    if (images) task.format = images->format;
     task.wants_planes =
         images && std::any_of(images->cameras.begin(), images->cameras.end(), [](const CameraImages& camera) {
           return camera.depth_m || camera.class_id || camera.instance_id;
@@ -184,21 +193,41 @@ class CudaRenderer final : public Renderer {
     return task;
   }
 
-  // Room for every image, and in the second pass for all that a world can hold: after this nothing is cut off.
-  void grow(const SceneBatch& scene, std::size_t images) {
-    if (overflow_images_.size() < images) overflow_images_ = DeviceBuffer<int32_t>(images);
-    const int agents = static_cast<int>(std::min<std::size_t>(scene.agents.size(), kMaxWorldAgents));
+  // Room for as many views as the bound allows, and in the second launch for all that a world can hold: after this
+  // nothing is cut off. Allocates nothing where an earlier call needed as much.
+  void grow(std::size_t agents_total, std::size_t views) {
+    const int agents = static_cast<int>(std::min<std::size_t>(agents_total, kMaxWorldAgents));
     // Agents turn up to three faces to a camera, everything else one; faces of four corners have at most nine edges
     // when clipped.
-    cuda::Scratch sizes;
-    sizes.blocks = kLargeBlocks;
-    sizes.max_faces = std::max(1, most_pieces_ + 3 * agents);
-    if (sizes.max_faces <= large_.view().max_faces) return;
-    sizes.max_edges = 9 * sizes.max_faces + kMaxPolygonCorners * most_heads_;
-    sizes.max_pieces = (most_pieces_ + 31) / 32 * 32;
-    sizes.max_fragments = kLargeFragments;
+    cuda::Scratch large;
+    large.max_faces = std::max({1, most_pieces_ + 3 * agents, large_.view().max_faces});
+    large.max_edges = 9 * large.max_faces + kMaxPolygonCorners * most_heads_;
+    large.max_pieces = (most_pieces_ + 31) / 32 * 32;
+    large.max_fragments = kLargeFragments;
+    const cuda::Scratch& had = large_.view();
+    if (views <= most_views_ && large.max_faces == had.max_faces && large.max_edges == had.max_edges &&
+        large.max_pieces == had.max_pieces) {
+      return;
+    }
+    const std::size_t most_views = std::max(most_views_, views);
+    cuda::Scratch small = cuda::small_scratch(processors_);
+    const cuda::ScratchNeeds needs{.small_blocks = small.blocks,
+                                   .large_blocks = kLargeBlocks,
+                                   .small_block_bytes = ScratchBuffers::block_bytes(small, 0),
+                                   .large_block_bytes = ScratchBuffers::block_bytes(large, cuda::block_bytes(large)),
+                                   .views = most_views,
+                                   .view_bytes = cameras_.size() * sizeof(int32_t)};
+    plan_ = cuda::plan_scratch(needs, config_.max_scratch_bytes);
+    most_views_ = most_views;
+    small.blocks = plan_.small_blocks;
+    large.blocks = plan_.large_blocks;
+    // Released before it is replaced, or both would count.
+    small_ = ScratchBuffers();
     large_ = ScratchBuffers();
-    large_ = ScratchBuffers(sizes, cuda::block_bytes(sizes));
+    overflow_images_ = DeviceBuffer<int32_t>();
+    small_ = ScratchBuffers(small, 0);
+    large_ = ScratchBuffers(large, cuda::block_bytes(large));
+    overflow_images_ = DeviceBuffer<int32_t>(plan_.views * cameras_.size());
   }
 
   void throw_fault() {
@@ -216,10 +245,13 @@ class CudaRenderer final : public Renderer {
   }
 
   RendererConfig config_;
-  cuda::KernelLibrary library_;  // outlives the buffers, whose release waits for the device
+  std::vector<PinholeCamera> cameras_;  // in the ego frame
+  cuda::KernelLibrary library_;         // outlives the buffers, whose release waits for the device
   std::vector<UploadedGeometry> geometries_;
   DeviceBuffer<cuda::DeviceGeometry> geometry_views_;
-  int most_pieces_ = 0, most_heads_ = 0;
+  int processors_ = 0, most_pieces_ = 0, most_heads_ = 0;
+  std::size_t most_views_ = 0;
+  cuda::ScratchPlan plan_;
   ScratchBuffers small_, large_;
   DeviceBuffer<int32_t> counters_;  // the next image of the first launch; those left to the second
   DeviceBuffer<int32_t> overflow_images_;

@@ -68,10 +68,13 @@ __host__ __device__ inline size_t small_bytes() {
 __device__ inline void write_color(const DrawTask& task, const CameraSlot& slot, int64_t at, int64_t plane, Rgb color) {
   const float channels[3] = {color.r, color.g, color.b};
   for (int channel = 0; channel < 3; ++channel) {
-    if (task.as_float) {
-      static_cast<float*>(slot.color)[at + channel * plane] = clamp(channels[channel], 0.0f, 1.0f);
+    const int64_t element = at + channel * plane;
+    if (task.format == PixelFormat::u8) {
+      static_cast<uint8_t*>(slot.color)[element] = to_byte(channels[channel]);
+    } else if (task.format == PixelFormat::f16) {
+      static_cast<uint16_t*>(slot.color)[element] = to_half(channels[channel]);
     } else {
-      static_cast<uint8_t*>(slot.color)[at + channel * plane] = to_byte(channels[channel]);
+      static_cast<float*>(slot.color)[element] = clamp(channels[channel], 0.0f, 1.0f);
     }
   }
 }
@@ -138,7 +141,8 @@ extern "C" __global__ void __launch_bounds__(kThreads, kSmallBlocksPerProcessor)
     __syncthreads();
     const int32_t image = state->image;
     if (image >= images) return;
-    if (!draw_image(memory, task, image / num_cameras(task), image % num_cameras(task)) && threadIdx.x == 0) {
+    if (!draw_image(memory, task, task.first_view + image / num_cameras(task), image % num_cameras(task)) &&
+        threadIdx.x == 0) {
       task.overflow_images[atomicAdd(task.overflow_count, 1)] = image;
     }
   }
@@ -162,7 +166,7 @@ extern "C" __global__ void __launch_bounds__(kThreads)
   const int32_t count = *task.overflow_count;
   for (int32_t i = static_cast<int32_t>(blockIdx.x); i < count; i += static_cast<int32_t>(gridDim.x)) {
     const int32_t image = task.overflow_images[i];
-    const int32_t view = image / num_cameras(task);
+    const int32_t view = task.first_view + image / num_cameras(task);
     if (!draw_image(memory, task, view, image % num_cameras(task)) && threadIdx.x == 0) note_fault(task, view, kNoRoom);
   }
 }

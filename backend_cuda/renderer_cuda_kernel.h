@@ -48,13 +48,14 @@ struct Scratch {
 struct DrawTask {
   SceneBatch scene;  // in device memory, like all that follows
   const View* views = nullptr;
+  int32_t first_view = 0;  // views [first_view, first_view + num_views) are drawn
   int32_t num_views = 0, num_cameras = 0;
   const DeviceGeometry* geometries = nullptr;
   int32_t num_geometries = 0;
   int32_t max_world_agents = 0;
   float line_floor_px = 0;
   bool debug_palette = false;
-  bool as_float = false;  // else bytes
+  PixelFormat format = PixelFormat::u8;
   bool wants_planes = false;
   Fault* fault = nullptr;
   int32_t* next_image = nullptr;       // of the first launch; 0 before it

@@ -12,6 +12,9 @@ struct Rgb {
   float r = 0, g = 0, b = 0;
 };
 
+/// How a channel is stored: as a byte, or as a number in [0, 1].
+enum class PixelFormat : uint8_t { u8, f16, f32 };
+
 PICTURA_HD constexpr Rgb rgb8(int r, int g, int b) {
   return {static_cast<float>(r) / 255.0f, static_cast<float>(g) / 255.0f, static_cast<float>(b) / 255.0f};
 }

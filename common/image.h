@@ -7,12 +7,11 @@
 #include <vector>
 
 #include "pictura/common/camera.h"
+#include "pictura/common/color.h"
 #include "pictura/common/span.h"
 #include "pictura/common/stream.h"
 
 namespace pictura {
-
-enum class PixelFormat : uint8_t { u8, f16, f32 };
 
 /// Size of one channel of one pixel.
 std::size_t bytes_per_value(PixelFormat format);

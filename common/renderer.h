@@ -24,6 +24,8 @@ struct RendererConfig {
   float line_floor_px = 0.35f;            // least width of a strip on screen, measured across it; 0 turns the floor off
   bool debug_palette = false;             // tint halted and parked agents
   PixelSamples samples;
+  /// cuda: the most device memory that it takes beyond images, scenes and maps; what does not fit is drawn in parts.
+  std::size_t max_scratch_bytes = std::size_t{512} << 20;
 };
 
 /// Asks how much of an agent a view sees.
