@@ -6,7 +6,23 @@
 
 #include <CLI/CLI.hpp>
 
+#include "pictura/apps/drive.h"
+
 namespace pictura {
+
+/// Name of the first processor.
+std::string processor_name();
+/// The agents of a world whose options say all of them, in words.
+std::string population_of(const WorldOptions& world);
+/// Where no map is named: the town that the numbers of docs/ are about, or the procedural one where it is missing.
+std::string default_benchmark_map();
+
+/// What results were measured on.
+struct BenchContext {
+  std::string workload, backend;
+  std::string device = processor_name();
+  std::string driver;  // of a GPU
+};
 
 struct BenchResult {
   std::string name, unit;
@@ -14,10 +30,10 @@ struct BenchResult {
 };
 
 /// Prints medians with their least and greatest values.
-void report_benchmark(bool json, const std::string& workload, const std::string& backend,
-                      std::vector<BenchResult> results);
+void report_benchmark(bool json, const BenchContext& context, std::vector<BenchResult> results);
 
-/// Adds `bench quality`.
+/// Add `bench quality` and `bench render`.
 void add_quality_benchmark(CLI::App& bench);
+void add_render_benchmark(CLI::App& bench);
 
 }  // namespace pictura

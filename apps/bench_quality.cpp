@@ -73,12 +73,13 @@ void run(Arguments arguments) {
   }
   report_benchmark(
       arguments.json,
-      fmt::format(
-          "quality: PSNR against 1,024 samples a pixel, {} images that are not blank, maps {}, {} agents, walls {}, "
-          "{} views x 4 cameras each, line floor {} px",
-          images, fmt::join(arguments.maps, " "), arguments.world.agents, arguments.world.walls ? "on" : "off",
-          arguments.world.views, arguments.line_floor_px),
-      "cpu", results);
+      {fmt::format(
+           "quality: PSNR against 1,024 samples a pixel, {} images that are not blank, maps {}, {} agents, walls {}, "
+           "{} views x 4 cameras each, line floor {} px",
+           images, fmt::join(arguments.maps, " "), arguments.world.agents, arguments.world.walls ? "on" : "off",
+           arguments.world.views, arguments.line_floor_px),
+       "cpu"},
+      results);
 }
 
 }  // namespace

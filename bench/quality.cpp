@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "pictura/backend_cpu/renderer_cpu_image.h"
+#include "pictura/bench/driving.h"
 #include "pictura/common/parallel_for.h"
 #include "pictura/common/raster_check.h"
-#include "pictura/common/rng.h"
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/simulator.h"
 
@@ -21,15 +21,7 @@ Snapshot drive_snapshot(const SnapshotOptions& options) {
   config.vector_observations = false;
   config.cyclist_fraction = config.pedestrian_fraction = 0.1f;
   const auto simulator = make_simulator("cpu", config, {load_map(options.map)}, {{0, options.agents, 0}});
-  std::vector<int32_t> actions(static_cast<std::size_t>(simulator->num_slots()));
-  for (int step = 0; step < options.steps; ++step) {
-    for (std::size_t slot = 0; slot < actions.size(); ++slot) {
-      RandomStream random(options.seed, 0, static_cast<uint32_t>(slot), 0, static_cast<uint32_t>(step),
-                          Purpose::action);
-      actions[slot] = random.below(kNumActions);
-    }
-    simulator->step(actions);
-  }
+  drive_randomly(simulator.get(), options.seed, options.steps);
   const SceneBatch scene = simulator->scene();
   Snapshot snapshot;
   snapshot.geometry = simulator->geometries()[0];

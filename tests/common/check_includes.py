@@ -24,8 +24,8 @@ MAY_INCLUDE = {
 }
 # A backend's simulator executor is a target of its own and may know the simulator.
 EXECUTOR = re.compile(r"^backend_(cpu|cuda)/simulator_(cpu|cuda)[^/]*$")
-# The quality benchmark measures with what tests measure with.
-QUALITY_BENCHMARK = "apps/bench_quality.cpp"
+# Benchmarks of the command measure with bench/.
+BENCHMARKS = {"apps/bench_quality.cpp", "apps/bench_render.cpp"}
 # Libraries that stay in their folders: pattern of the include -> where it may stand.
 STAYS_IN = [
     (re.compile(r"^(torch|ATen|c10)/"), re.compile(r"^(training|tests/training)/")),
@@ -68,7 +68,7 @@ def faults_in(root: pathlib.Path) -> list[str]:
                     continue
                 if EXECUTOR.match(name) and other in {"simulator", "map"}:
                     continue
-                if name == QUALITY_BENCHMARK and other == "bench":
+                if name in BENCHMARKS and other == "bench":
                     continue
                 faults.append(f"{where} {folder}/ may not include {other}/")
     return faults

@@ -1,0 +1,213 @@
+// `pictura bench render`: how fast backends draw what the agents of many worlds see, by backend, size and number of
+// egos, and how much device memory that takes.
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "pictura/apps/bench.h"
+#include "pictura/apps/drive.h"
+#include "pictura/apps/report.h"
+#include "pictura/bench/render.h"
+#include "pictura/common/error.h"
+#include "pictura/map/load_map.h"
+
+namespace pictura {
+
+namespace {
+
+struct Arguments {
+  WorldOptions world{
+      .agents = 120, .num_threads = 1, .pedestrian_fraction = 0.0f, .cyclist_fraction = 0.0f, .parked_cars = 0};
+  std::vector<std::string> maps, backends = {"cpu"}, sizes, samples = {"1"};
+  std::vector<int> egos;
+  std::string sweep, format = "u8";
+  int repeats = 7, checked_views = 8;
+  double repeat_s = 1.0;
+  bool planes = false, host_memory = false, memory = false, json = false;
+};
+
+// What the paper measures, and what lies beyond: see bench/README.md.
+void apply_sweep(Arguments* arguments) {
+  const std::string& sweep = arguments->sweep;
+  if (sweep.empty()) return;
+  if (!arguments->sizes.empty() || (sweep == "egos" && !arguments->egos.empty())) {
+    fail_usage("--sweep {}: chooses sizes or egos itself", sweep);
+  }
+  if (sweep == "egos") {
+    arguments->egos = {64, 128, 256, 512, 1024, 2048, 4096, 8192, 20480};
+    return;
+  }
+  if (sweep == "squares") {
+    arguments->sizes = {"32x32", "64x64", "128x128", "256x256"};
+    arguments->world.walls = false;
+  } else {
+    arguments->sizes = {"32x18", "64x36", "96x54", "192x108", "384x216", "768x432"};
+  }
+  if (arguments->egos.empty()) arguments->egos = {2048};
+}
+
+void apply_defaults(Arguments* arguments) {
+  apply_sweep(arguments);
+  if (arguments->sizes.empty()) arguments->sizes = {"96x54"};
+  if (arguments->egos.empty()) arguments->egos = {0};
+  const std::vector<std::string> towns = known_towns();
+  if (arguments->maps == std::vector<std::string>{"towns"}) {
+    PICTURA_CHECK(!towns.empty(), "--map towns: {} has none", map_folder());
+    arguments->maps = towns;
+  }
+  if (arguments->maps.empty()) arguments->maps = {default_benchmark_map()};
+  const std::size_t cases =
+      arguments->backends.size() * arguments->samples.size() * arguments->sizes.size() * arguments->egos.size();
+  if (arguments->memory && cases > 1) {
+    fail_usage(
+        "--memory: expected one backend, size and number of egos and samples, since drivers keep what an "
+        "earlier case has released; got {} cases",
+        cases);
+  }
+}
+
+bool draws_on_device(const Arguments& arguments, const std::string& backend) {
+  if (arguments.host_memory || cuda_device_name().empty()) return false;
+  return backend == "cuda" || backend == "gl:egl";
+}
+
+RenderCase case_of(const Arguments& arguments, const std::string& backend, const std::string& size,
+                   const std::string& samples, int egos) {
+  const Pair pixels = parse_pair("--size", size, 8192);
+  RenderCase result{.backend = backend, .num_views = egos};
+  result.config.rig = paper_rig(pixels.first, pixels.second);
+  result.config.space = draws_on_device(arguments, backend) ? MemorySpace::cuda : MemorySpace::host;
+  result.config.num_threads = arguments.world.num_threads;
+  result.config.samples = parse_samples("--samples", samples);
+  result.format = arguments.format == "u8"    ? PixelFormat::u8
+                  : arguments.format == "f16" ? PixelFormat::f16
+                                              : PixelFormat::f32;
+  result.planes = arguments.planes ? Planes::all : Planes::none;
+  result.checked_views = arguments.checked_views;
+  result.repeats = arguments.memory ? 0 : arguments.repeats;
+  result.repeat_s = arguments.repeat_s;
+  result.watches_memory = arguments.memory;
+  return result;
+}
+
+void append_results(const std::string& name, const RenderCase& measured, const RenderMeasurement& measurement,
+                    std::vector<BenchResult>* results_out) {
+  BenchResult rate{name, "agent_steps_per_s", {}}, call{name + ", one call", "ms", {}},
+      image{name + ", one image", "ms", {}};
+  const double egos = measured.num_views, cameras = static_cast<double>(measured.config.rig.cameras.size());
+  for (const double ms : measurement.call_ms) {
+    rate.values.push_back(1e3 * egos / ms);
+    call.values.push_back(ms);
+    image.values.push_back(ms / (egos * cameras));
+  }
+  if (!measurement.call_ms.empty()) results_out->insert(results_out->end(), {rate, call, image});
+  if (measurement.checked_values > 0) {
+    const double share =
+        static_cast<double>(measurement.differing_values) / static_cast<double>(measurement.checked_values);
+    results_out->push_back({name + ", values unlike the oracle's", "%", {100 * share}});
+    results_out->push_back({name + ", most unlike", "1/255", {255 * measurement.worst_value}});
+  }
+  if (measured.watches_memory) {
+    constexpr double kGiB = 1 << 30;
+    results_out->push_back({name + ", up front", "GiB", {measurement.up_front_bytes / kGiB}});
+    results_out->push_back({name + ", high-water mark beyond images", "GiB", {measurement.most_bytes / kGiB}});
+    results_out->push_back({name + ", images", "GiB", {measurement.image_bytes / kGiB}});
+  }
+}
+
+void run(Arguments arguments) {
+  apply_defaults(&arguments);
+  ProgressLine progress;
+  progress.update("driving");
+  const WorldOptions& world = arguments.world;
+  const DrivenWorlds worlds =
+      drive_worlds({.maps = arguments.maps,
+                    .num_views = *std::max_element(arguments.egos.begin(), arguments.egos.end()),
+                    .agents = world.agents,
+                    .pedestrian_fraction = *world.pedestrian_fraction,
+                    .cyclist_fraction = *world.cyclist_fraction,
+                    .parked_cars = *world.parked_cars,
+                    .walls = world.walls,
+                    .seed = world.seed});
+  std::vector<BenchResult> results;
+  std::vector<std::string> choices;
+  bool on_device = false;
+  for (const std::string& backend : arguments.backends) {
+    for (const std::string& samples : arguments.samples) {
+      // The others compute exact coverage, once for all numbers of samples.
+      const bool takes_samples = backend.starts_with("gl");
+      if (!takes_samples && samples != arguments.samples.front()) continue;
+      std::string choice;
+      for (const std::string& size : arguments.sizes) {
+        for (const int asked : arguments.egos) {
+          const int egos = asked > 0 ? asked : static_cast<int>(worlds.views.size());
+          const std::string name =
+              fmt::format("{}{} {} {} egos", backend, takes_samples ? " " + samples : "", size, egos);
+          progress.update(name);
+          const RenderCase measured = case_of(arguments, backend, size, takes_samples ? samples : "1", egos);
+          on_device = on_device || measured.config.space == MemorySpace::cuda;
+          const RenderMeasurement measurement = measure_render(worlds, measured);
+          choice = measurement.choice;
+          append_results(name, measured, measurement, &results);
+        }
+      }
+      choices.push_back(choice);
+    }
+  }
+  progress.finish();
+  BenchContext context{
+      .workload = fmt::format("render: {}, {} in each of {} worlds, walls {}, {} cameras, {}{}, {} threads; {}",
+                              fmt::join(arguments.maps, " "), population_of(world), worlds.simulator->worlds().size(),
+                              world.walls ? "on" : "off", paper_rig().cameras.size(), arguments.format,
+                              arguments.planes ? " and planes" : "", world.num_threads, fmt::join(choices, "; ")),
+      .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
+  if (on_device) {
+    context.device = cuda_device_name() + "; " + context.device;
+    context.driver = cuda_driver_name();
+  }
+  report_benchmark(arguments.json, context, results);
+}
+
+}  // namespace
+
+void add_render_benchmark(CLI::App& bench) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = bench.add_subcommand("render", "Images of the agents of many worlds");
+  command
+      ->add_option("--map", arguments->maps,
+                   "Maps, in turn; towns: all of the map folder; default: Town01 where it is found, else procedural:1")
+      ->delimiter(',');
+  add_world_options(command, &arguments->world);
+  command->add_option("--egos", arguments->egos, "Agents drawn in one call; default: all of one world for each map")
+      ->delimiter(',')
+      ->check(CLI::PositiveNumber);
+  command->add_option("--backend", arguments->backends, "cpu, cuda, gl, gl:egl, gl:osmesa")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->add_option("--size", arguments->sizes, "Sizes in pixels, WxH; default: 96x54")->delimiter(',');
+  command->add_option("--samples", arguments->samples, "Of a pixel, for gl: 1, N (MSAA) or NxN (supersampling)")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->add_option("--format", arguments->format)->check(CLI::IsMember({"u8", "f16", "f32"}))->capture_default_str();
+  command->add_flag("--planes", arguments->planes, "Draw depth, class and instance planes too");
+  command->add_flag("--host-memory", arguments->host_memory,
+                    "Keep scenes and images on the host for cuda and gl:egl, too, which else draw in device memory");
+  command
+      ->add_option("--sweep", arguments->sweep,
+                   "sizes: the paper's five and 768x432; squares: without walls; egos: 64 to 20,480")
+      ->check(CLI::IsMember({"sizes", "squares", "egos"}));
+  command->add_flag("--memory", arguments->memory, "Watch device memory in a single case, and time nothing");
+  command->add_option("--check", arguments->checked_views, "Compare so many egos with the oracle before timing")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--repeats", arguments->repeats)->check(CLI::PositiveNumber)->capture_default_str();
+  command->add_option("--repeat-seconds", arguments->repeat_s)->check(CLI::PositiveNumber)->capture_default_str();
+  command->add_flag("--json", arguments->json, "Print one JSON object");
+  command->footer(
+      "Examples:\n  pictura bench render --size 192x108 --threads 0\n"
+      "  pictura bench render --backend cuda,gl:egl --samples 1,4,2x2 --map towns --parked 32 --egos 2048,256 --json");
+  command->callback([arguments] { run(*arguments); });
+}
+
+}  // namespace pictura

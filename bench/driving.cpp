@@ -1,0 +1,61 @@
+#include "pictura/bench/driving.h"
+
+#include "pictura/common/error.h"
+#include "pictura/common/interrupt.h"
+#include "pictura/common/rng.h"
+#include "pictura/map/load_map.h"
+
+namespace pictura {
+
+StepResult drive_randomly(Simulator* simulator, uint64_t seed, int steps) {
+  std::vector<int32_t> actions(static_cast<std::size_t>(simulator->num_slots()));
+  StepResult result;
+  for (int step = 0; step < steps; ++step) {
+    if (interrupted()) throw Interrupted("interrupted");
+    for (std::size_t slot = 0; slot < actions.size(); ++slot) {
+      RandomStream random(seed, 0, static_cast<uint32_t>(slot), 0, static_cast<uint32_t>(step), Purpose::action);
+      actions[slot] = random.below(kNumActions);
+    }
+    result = simulator->step(actions);
+  }
+  return result;
+}
+
+DrivenWorlds drive_worlds(const DrivenOptions& options) {
+  SimulatorConfig config;
+  config.seed = options.seed;
+  config.num_threads = options.num_threads;
+  config.pedestrian_fraction = options.pedestrian_fraction;
+  config.cyclist_fraction = options.cyclist_fraction;
+  config.parked_cars = options.parked_cars;
+  config.walls = options.walls;
+  config.fixed_lights = true;
+  config.vector_observations = false;
+  std::vector<std::shared_ptr<const RoadMap>> maps;
+  for (const std::string& name : options.maps) maps.push_back(load_map(name));
+  const int num_maps = static_cast<int>(maps.size());
+  // An eighth more than the views need, since not every agent finds a place.
+  const int wanted = options.num_views + options.num_views / 8;
+  const int num_worlds = options.num_views > 0 ? (wanted + options.agents - 1) / options.agents : num_maps;
+  std::vector<WorldSpec> specs;
+  for (int i = 0; i < num_worlds; ++i) specs.push_back({i % num_maps, options.agents, static_cast<uint32_t>(i)});
+
+  DrivenWorlds worlds;
+  worlds.simulator = make_simulator("cpu", config, maps, specs);
+  worlds.geometries = worlds.simulator->geometries();
+  const StepResult last = drive_randomly(worlds.simulator.get(), options.seed, options.steps);
+  const Span<const View> views = worlds.simulator->views();
+  for (int agent = 0; agent < options.agents; ++agent) {
+    for (int world = 0; world < num_worlds; ++world) {
+      const auto slot = static_cast<std::size_t>(world * options.agents + agent);
+      if (last.refusal[slot] == 0) worlds.views.push_back(views[slot]);
+    }
+  }
+  PICTURA_CHECK(static_cast<int>(worlds.views.size()) >= options.num_views,
+                "bench: expected {} agents, but only {} of {} found a place", options.num_views, worlds.views.size(),
+                views.size());
+  if (options.num_views > 0) worlds.views.resize(static_cast<std::size_t>(options.num_views));
+  return worlds;
+}
+
+}  // namespace pictura

@@ -1,0 +1,37 @@
+// Worlds for benchmarks: agents of many worlds that have been driven for a while with random actions.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+/// Drives with uniform actions, keyed by seed, slot and step. Returns the last step's result; steps >= 1.
+StepResult drive_randomly(Simulator* simulator, uint64_t seed, int steps);
+
+struct DrivenOptions {
+  std::vector<std::string> maps;
+  int num_views = 0;  // 0: one world a map, all its agents
+  int agents = 120;   // of each world
+  float pedestrian_fraction = 0, cyclist_fraction = 0;
+  int parked_cars = 0;
+  bool walls = true;
+  uint64_t seed = 0;
+  int steps = 30;
+  int num_threads = 0;  // 0: all
+};
+
+struct DrivenWorlds {
+  std::unique_ptr<Simulator> simulator;  // owns the scene
+  std::vector<StaticGeometry> geometries;
+  std::vector<View> views;  // of agents that found a place: one of each world, then the next of each
+};
+
+/// As many worlds as the views need, on the maps in turn. Throws Error when a map cannot be read, or too few agents
+/// find a place.
+DrivenWorlds drive_worlds(const DrivenOptions& options);
+
+}  // namespace pictura

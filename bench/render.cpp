@@ -1,0 +1,141 @@
+#include "pictura/bench/render.h"
+
+#include <chrono>
+#include <cmath>
+#include <cstring>
+
+#include "pictura/common/error.h"
+#include "pictura/common/interrupt.h"
+#include "pictura/common/make_renderer.h"
+#include "pictura/tests/support/tolerances.h"
+#ifdef PICTURA_HAS_CUDA
+#include "pictura/bench/render_device.h"
+#endif
+
+namespace pictura {
+
+namespace {
+
+class HostTarget final : public RenderTarget {
+ public:
+  HostTarget(const DrivenWorlds& worlds, const RenderCase& render_case)
+      : scene_(worlds.simulator->scene()),
+        views_(worlds.views.data(), static_cast<std::size_t>(render_case.num_views)),
+        images_(render_case.config.rig, render_case.num_views, render_case.format, render_case.planes) {}
+  double draw(Renderer* renderer, int calls) override {
+    const auto begin = std::chrono::steady_clock::now();
+    for (int call = 0; call < calls; ++call) renderer->render(scene_, views_, images_.batch());
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count() / calls;
+  }
+  const HostImages& images(int) override { return images_; }
+
+ private:
+  const SceneBatch& scene_;
+  Span<const View> views_;
+  HostImages images_;
+};
+
+double half_to_number(uint16_t half) {
+  const int exponent = half >> 10, mantissa = half & 1023;
+  return exponent > 0 ? std::ldexp(1024 + mantissa, exponent - 25) : std::ldexp(mantissa, -24);
+}
+
+double channel_at(const CameraImages& images, PixelFormat format, int64_t element) {
+  switch (format) {
+    case PixelFormat::u8: return static_cast<const uint8_t*>(images.data)[element] / 255.0;
+    case PixelFormat::f16: return half_to_number(static_cast<const uint16_t*>(images.data)[element]);
+    default: return static_cast<double>(static_cast<const float*>(images.data)[element]);
+  }
+}
+
+void compare_with_oracle(const DrivenWorlds& worlds, const RenderCase& render_case, RenderTarget* target,
+                         RenderMeasurement* result_out) {
+  RendererConfig config{.rig = render_case.config.rig, .line_floor_px = render_case.config.line_floor_px};
+  const auto oracle = make_renderer("cpu", config);
+  for (const StaticGeometry& geometry : worlds.geometries) oracle->upload(geometry);
+  const int checked = std::min(render_case.checked_views, render_case.num_views);
+  HostImages expected(config.rig, checked, render_case.format);
+  oracle->render(worlds.simulator->scene(), {worlds.views.data(), static_cast<std::size_t>(checked)}, expected.batch());
+  const HostImages& actual = target->images(checked);
+  int64_t far_off = 0;
+  for (int k = 0; k < static_cast<int>(config.rig.cameras.size()); ++k) {
+    const CameraImages &wanted = expected.camera(k), &drawn = actual.camera(k);
+    const int64_t values = int64_t{3} * wanted.width_px * wanted.height_px;
+    for (int64_t i = 0; i < checked * values; ++i) {
+      const int64_t view = i / values, value = i % values;
+      const double error = std::abs(channel_at(wanted, render_case.format, view * wanted.view_stride + value) -
+                                    channel_at(drawn, render_case.format, view * drawn.view_stride + value));
+      result_out->worst_value = std::max(result_out->worst_value, error);
+      result_out->differing_values += error > 0;
+      far_off += error > kKernelError + 1e-6;
+    }
+    result_out->checked_values += checked * values;
+  }
+  if (render_case.backend != "cuda") return;
+  PICTURA_CHECK(result_out->worst_value <= kKernelWorstError + 1e-6 &&
+                    static_cast<double>(far_off) <= (1 - kKernelShareWithin) * result_out->checked_values,
+                "bench render: cuda: expected the oracle's images, got {} of {} values off by more than 1/255, and {} "
+                "at worst",
+                far_off, result_out->checked_values, result_out->worst_value);
+}
+
+std::unique_ptr<RenderTarget> make_target(const DrivenWorlds& worlds, const RenderCase& render_case) {
+  if (render_case.config.space == MemorySpace::host) return make_host_target(worlds, render_case);
+#ifdef PICTURA_HAS_CUDA
+  return make_device_target(worlds, render_case);
+#else
+  fail("bench render: this build has no CUDA");
+#endif
+}
+
+std::size_t image_bytes_of(const RenderCase& render_case) {
+  std::size_t values = 0;
+  for (const Camera& camera : render_case.config.rig.cameras) {
+    values += static_cast<std::size_t>(3 * camera.width_px * camera.height_px);
+  }
+  return values * bytes_per_value(render_case.format) * static_cast<std::size_t>(render_case.num_views);
+}
+
+}  // namespace
+
+std::unique_ptr<RenderTarget> make_host_target(const DrivenWorlds& worlds, const RenderCase& render_case) {
+  return std::make_unique<HostTarget>(worlds, render_case);
+}
+
+RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& render_case) {
+  RenderMeasurement result;
+  const auto target = make_target(worlds, render_case);
+  result.image_bytes = static_cast<double>(image_bytes_of(render_case));
+#ifdef PICTURA_HAS_CUDA
+  std::unique_ptr<DeviceMemoryWatch> watch;
+  if (render_case.watches_memory) watch = std::make_unique<DeviceMemoryWatch>();
+#else
+  PICTURA_CHECK(!render_case.watches_memory, "bench render: this build has no CUDA, whose memory could be watched");
+#endif
+  const auto renderer = make_renderer(render_case.backend, render_case.config, &result.choice);
+  for (const StaticGeometry& geometry : worlds.geometries) renderer->upload(geometry);
+#ifdef PICTURA_HAS_CUDA
+  if (watch) result.up_front_bytes = watch->taken_bytes();
+#endif
+  const double first_ms = target->draw(renderer.get(), 1);  // warms up
+  if (render_case.checked_views > 0 && render_case.backend != "cpu" && render_case.backend != "null") {
+    compare_with_oracle(worlds, render_case, target.get(), &result);
+  }
+  const double one_ms = render_case.repeats > 0 ? target->draw(renderer.get(), 1) : first_ms;
+  const int calls = std::max(1, static_cast<int>(1e3 * render_case.repeat_s / one_ms));
+  for (int repeat = 0; repeat < render_case.repeats; ++repeat) {
+    result.call_ms.push_back(target->draw(renderer.get(), calls));
+    if (interrupted()) throw Interrupted("interrupted");
+  }
+#ifdef PICTURA_HAS_CUDA
+  if (watch) result.most_bytes = watch->most_bytes();
+#endif
+  return result;
+}
+
+#ifndef PICTURA_HAS_CUDA
+std::string cuda_device_name() { return ""; }
+std::string cuda_driver_name() { return ""; }
+#endif
+
+}  // namespace pictura

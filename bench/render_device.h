@@ -1,0 +1,32 @@
+// What the rendering benchmark does on a CUDA device.
+#pragma once
+
+#include <atomic>
+#include <thread>
+
+#include "pictura/bench/render.h"
+
+namespace pictura {
+
+/// Times by events of the stream: the device's time, waits for the host between launches included.
+std::unique_ptr<RenderTarget> make_device_target(const DrivenWorlds& worlds, const RenderCase& render_case);
+
+/// Device memory taken since its beginning, by whatever process: a thread asks cudaMemGetInfo all the time.
+class DeviceMemoryWatch {
+ public:
+  DeviceMemoryWatch();
+  ~DeviceMemoryWatch();
+  DeviceMemoryWatch(const DeviceMemoryWatch&) = delete;
+  DeviceMemoryWatch& operator=(const DeviceMemoryWatch&) = delete;
+
+  double taken_bytes() const;
+  double most_bytes() const { return most_bytes_; }
+
+ private:
+  std::size_t free_before_ = 0;
+  std::atomic<double> most_bytes_ = 0;
+  std::atomic<bool> ends_ = false;
+  std::thread poller_;
+};
+
+}  // namespace pictura
