@@ -24,6 +24,7 @@
 #include "pictura/map/opendrive/opendrive.h"
 #include "pictura/map/procedural/procedural_town.h"
 #include "pictura/tests/map/small_roads.h"
+#include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 
 namespace pictura {
@@ -64,16 +65,6 @@ constexpr Pixel kGround{238, 240, 232};
 const RoadMap& town() {
   static const RoadMap map = parse_opendrive(procedural_town({3, 2, 2}), "town");
   return map;
-}
-
-template <typename Function>
-std::string error_of(Function function) {
-  try {
-    function();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 AgentBox box(float x, float y, float heading, AgentClass agent_class = AgentClass::vehicle) {
@@ -151,7 +142,7 @@ TEST(WorldPainter, DrawsNobodyWhoIsAbsentAndDimsTheHalted) {
   EXPECT_EQ(at(image, 285, 150), kGround);
 
   frame.status = Span<const uint8_t>(status).subspan(0, 3);
-  EXPECT_THAT(error_of([&] { painter.draw(frame, painter.whole_map()); }), HasSubstr("4 agents, got 3"));
+  EXPECT_THAT(test::message_of([&] { painter.draw(frame, painter.whole_map()); }), HasSubstr("4 agents, got 3"));
 }
 
 TEST(WorldPainter, MovingTheCameraMovesThePictureAndNothingElse) {
@@ -205,7 +196,7 @@ TEST(WorldPainter, LightsShowTheirState) {
   const std::vector<LightState> two(2);
   WorldFrame frame;
   frame.lights = two;
-  EXPECT_THAT(error_of([&] { painter.draw(frame, painter.whole_map()); }), HasSubstr("1 lights, got 2"));
+  EXPECT_THAT(test::message_of([&] { painter.draw(frame, painter.whole_map()); }), HasSubstr("1 lights, got 2"));
 }
 
 TEST(WorldPainter, RefusesSizesOutOfRange) {
@@ -289,10 +280,10 @@ TEST(DrawWorld, ShowsTheAgentsOfOneWorldAndFollowsOne) {
   EXPECT_EQ(at(image, 250, 100), halo);  // the one after it
   EXPECT_EQ(at(image, 250, 200), kGround) << "a passed waypoint is not drawn";
   EXPECT_EQ(count(draw_world(painter, simulator, 0), halo), 0);
-  EXPECT_THAT(error_of([&] { draw_world(painter, simulator, 2); }), HasSubstr("[0, 2), got 2"));
-  EXPECT_THAT(error_of([&] { draw_world(painter, simulator, 1, 2); }), HasSubstr("below 2, got 2"));
+  EXPECT_THAT(test::message_of([&] { draw_world(painter, simulator, 2); }), HasSubstr("[0, 2), got 2"));
+  EXPECT_THAT(test::message_of([&] { draw_world(painter, simulator, 1, 2); }), HasSubstr("below 2, got 2"));
   simulator.space_ = MemorySpace::cuda;
-  EXPECT_THAT(error_of([&] { draw_world(painter, simulator, 1); }), HasSubstr("host memory"));
+  EXPECT_THAT(test::message_of([&] { draw_world(painter, simulator, 1); }), HasSubstr("host memory"));
 }
 
 TEST(DrawMap, FillsItsSizeAndShowsLanesAndEdges) {
@@ -403,12 +394,12 @@ TEST(DrawMap, TheSvgHasTheSameSizeAndIsWhole) {
   for (size_t i = svg.find("<path"); i != std::string::npos; i = svg.find("<path", i + 1)) ++paths;
   EXPECT_GT(paths, 2 * town().lanes.size());
   EXPECT_EQ(folder.num_entries(), 1u);
-  EXPECT_THAT(error_of([] { draw_map_svg(town(), "/nonexistent/a/map.svg"); }), HasSubstr("/nonexistent/a/"));
+  EXPECT_THAT(test::message_of([] { draw_map_svg(town(), "/nonexistent/a/map.svg"); }), HasSubstr("/nonexistent/a/"));
 }
 
 TEST(DrawMap, RefusesPartsThatShowNothing) {
   const RoadMap map = one_road();
-  const auto message = [&](FileBox box) { return error_of([&] { draw_map(map, {.box = box}); }); };
+  const auto message = [&](FileBox box) { return test::message_of([&] { draw_map(map, {.box = box}); }); };
   EXPECT_THAT(message({1090, 485, 1010, 515}), HasSubstr("expected a box of 1 to 1000000 m"));
   EXPECT_THAT(message({1010, 500, 1010, 515}), HasSubstr("expected a box"));
   EXPECT_THAT(message({1010, 500, std::nan(""), 515}), HasSubstr("expected a box"));
@@ -419,8 +410,8 @@ TEST(DrawMap, RefusesPartsThatShowNothing) {
 TEST(DrawMap, RefusesWhatCannotBeDrawn) {
   EXPECT_THROW(draw_map(town(), {.size_px = 63}), Error);
   EXPECT_THROW(draw_map(town(), {.size_px = 20000}), Error);
-  EXPECT_THAT(error_of([] { draw_map(RoadMap{}, {.size_px = 300}); }), HasSubstr("nothing to draw"));
-  EXPECT_THAT(error_of([] { draw_map_png(town(), "/nonexistent/a/map.png", {.size_px = 300}); }),
+  EXPECT_THAT(test::message_of([] { draw_map(RoadMap{}, {.size_px = 300}); }), HasSubstr("nothing to draw"));
+  EXPECT_THAT(test::message_of([] { draw_map_png(town(), "/nonexistent/a/map.png", {.size_px = 300}); }),
               HasSubstr("/nonexistent/a/map.png"));
   const ScratchFolder folder;
   draw_map_png(town(), folder / "map.png", {.size_px = 300});
@@ -527,7 +518,7 @@ TEST(Plots, DrawSeriesWithGapsInPanels) {
   EXPECT_EQ(three.width_px, 2 * 560 + 12);
   EXPECT_GT(three.height_px, 2 * 360);
   panel.series[0].y.push_back(1);
-  EXPECT_THAT(error_of([&] { draw_plots({panel}); }), HasSubstr("series 'constant'"));
+  EXPECT_THAT(test::message_of([&] { draw_plots({panel}); }), HasSubstr("series 'constant'"));
   EXPECT_THROW(draw_plots({}), Error);
   EXPECT_THROW(draw_plots({PlotPanel{}}, {.panel_width_px = 10}), Error);
   EXPECT_THROW(draw_plots_png({PlotPanel{}}, "/nonexistent/a/plot.png"), Error);
@@ -581,7 +572,7 @@ TEST(Video, HoldsTheFramesThatWereGiven) {
       EXPECT_NEAR(middle[1], colors[i % 3].g, 14) << ending << " frame " << i;
       EXPECT_NEAR(middle[2], colors[i % 3].b, 14) << ending << " frame " << i;
     }
-    EXPECT_THAT(error_of([&] { video.add(solid(64, 48, {0, 0, 0})); }), HasSubstr("has ended"));
+    EXPECT_THAT(test::message_of([&] { video.add(solid(64, 48, {0, 0, 0})); }), HasSubstr("has ended"));
   }
   EXPECT_EQ(folder.num_entries(), 2u);
 }
@@ -598,7 +589,7 @@ TEST(Video, OddSidesLoseTheirLastPixel) {
 
 TEST(Video, RefusesBadPathsAndFrames) {
   if (!has_ffmpeg()) GTEST_SKIP() << "no ffmpeg and ffprobe on this machine";
-  EXPECT_THAT(error_of([] { VideoWriter("/nonexistent/a/film.mp4", 64, 48, 10); }),
+  EXPECT_THAT(test::message_of([] { VideoWriter("/nonexistent/a/film.mp4", 64, 48, 10); }),
               HasSubstr("/nonexistent/a/film.mp4"));
   EXPECT_THROW(VideoWriter("film.avi", 64, 48, 10), UsageError);
   EXPECT_THROW(VideoWriter("film.mp4", 0, 48, 10), Error);
@@ -607,8 +598,8 @@ TEST(Video, RefusesBadPathsAndFrames) {
   const ScratchFolder folder;
   {
     VideoWriter video(folder / "film.mp4", 64, 48, 10);
-    EXPECT_THAT(error_of([&] { video.add(solid(48, 64, {0, 0, 0})); }), HasSubstr("64x48 px, got 48x64"));
-    EXPECT_THAT(error_of([&] { video.finish(); }), HasSubstr("needs a frame"));
+    EXPECT_THAT(test::message_of([&] { video.add(solid(48, 64, {0, 0, 0})); }), HasSubstr("64x48 px, got 48x64"));
+    EXPECT_THAT(test::message_of([&] { video.finish(); }), HasSubstr("needs a frame"));
     video.add(solid(64, 48, {0, 0, 0}));
   }
   EXPECT_EQ(folder.num_entries(), 0u) << "an unfinished film leaves nothing";
@@ -618,7 +609,7 @@ TEST(Video, RefusesBadPathsAndFrames) {
 TEST(Video, SaysThatFfmpegIsMissing) {
   const ScratchFolder folder, empty;
   const EnvironmentVariable path("PATH", empty.path());
-  const std::string message = error_of([&] { VideoWriter(folder / "film.mp4", 64, 48, 10); });
+  const std::string message = test::message_of([&] { VideoWriter(folder / "film.mp4", 64, 48, 10); });
   EXPECT_THAT(message, HasSubstr("ffmpeg program"));
   EXPECT_EQ(folder.num_entries(), 0u);
 }
@@ -632,7 +623,7 @@ TEST(Video, PassesOnWhatFfmpegSaidLast) {
   fs::permissions(programs / "ffmpeg", fs::perms::owner_all);
   const EnvironmentVariable path("PATH", programs.path());
   const std::string file = folder / "film.mp4";
-  const std::string message = error_of([&] {
+  const std::string message = test::message_of([&] {
     VideoWriter video(file, 640, 480, 10);
     // More than any socket holds: the writer must meet the closed end, and live.
     for (int i = 0; i < 30; ++i) video.add(solid(640, 480, {0, 0, 0}));

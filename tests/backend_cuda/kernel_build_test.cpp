@@ -7,9 +7,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "pictura/common/error.h"
 #include "pictura/common/file.h"
 #include "pictura/common/make_renderer.h"
+#include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 
 namespace pictura {
@@ -40,12 +40,7 @@ constexpr cuda::KernelProgram kSmall{
     {&kHeader, 1}};
 
 std::string message_of_build(const cuda::KernelProgram& program, const KernelTarget& target) {
-  try {
-    build_kernels(program, target);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
+  return test::message_of([&] { build_kernels(program, target); });
 }
 
 class KernelArchitecture : public testing::TestWithParam<int> {};
@@ -152,12 +147,7 @@ TEST_F(KernelCache, IsNotNeeded) {
 TEST(NoDevice, CudaIsRefusedAndAutoDrawsOnTheCpuSayingWhy) {
   const std::string why = cuda_unavailable();
   if (why.empty()) GTEST_SKIP() << "this machine has a CUDA device";
-  try {
-    make_renderer("cuda", {});
-    FAIL() << "expected an Error";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.what(), "renderer cuda: " + why);
-  }
+  EXPECT_EQ(test::message_of([] { make_renderer("cuda", {}); }), "renderer cuda: " + why);
   std::string choice;
   EXPECT_EQ(make_renderer("auto", {.space = MemorySpace::cuda}, &choice)->name(), "cpu");
   EXPECT_EQ(choice, "cpu: " + why);

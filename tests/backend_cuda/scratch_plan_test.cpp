@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "pictura/common/error.h"
+#include "pictura/tests/support/error_message.h"
 
 namespace pictura::cuda {
 namespace {
@@ -50,12 +50,8 @@ TEST(ScratchPlan, ABatchIsCutWhereItsViewsDoNotFit) {
 }
 
 TEST(ScratchPlan, SaysHowMuchItNeedsAtLeast) {
-  try {
-    plan_scratch(kNeeds, 1000);
-    FAIL() << "expected an Error";
-  } catch (const Error& error) {
-    EXPECT_STREQ(error.what(), "renderer cuda: max_scratch_bytes: expected at least 20280016, got 1000");
-  }
+  EXPECT_EQ(test::message_of([] { plan_scratch(kNeeds, 1000); }),
+            "renderer cuda: max_scratch_bytes: expected at least 20280016, got 1000");
 }
 
 }  // namespace

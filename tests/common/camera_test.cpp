@@ -8,20 +8,13 @@
 #include <gtest/gtest.h>
 
 #include "pictura/common/error.h"
+#include "pictura/tests/support/error_message.h"
 
 namespace pictura {
 namespace {
 
+using test::message_of;
 using testing::HasSubstr;
-
-std::string message_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 std::string written(const std::string& text) {
   const std::string path =

@@ -8,6 +8,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/file.h"
+#include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 
 namespace pictura {
@@ -21,12 +22,7 @@ const std::string kAgent =
     "height_m = 1.7\n";
 
 std::string message_of(const std::string& text) {
-  try {
-    parse_scene(text, "s.toml");
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
+  return test::message_of([&] { parse_scene(text, "s.toml"); });
 }
 
 TEST(SceneFile, TheSmallestSceneIsAView) {

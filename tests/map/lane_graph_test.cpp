@@ -14,6 +14,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
+#include "pictura/tests/support/error_message.h"
 
 namespace pictura {
 namespace {
@@ -104,12 +105,7 @@ TEST(LaneGraph, RefusesWhatIsNotThere) {
   const RoadMap map = ring();
   const LaneGraph graph(map);
   const auto message_of = [&](LanePlace from, LanePlace to) -> std::string {
-    try {
-      graph.route(from, to);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "no error";
+    return test::message_of([&] { graph.route(from, to); });
   };
   EXPECT_THAT(message_of({5, 0}, {0, 0}), HasSubstr("[0, 5), got 5"));
   EXPECT_THAT(message_of({0, 0}, {-1, 0}), HasSubstr("[0, 5), got -1"));

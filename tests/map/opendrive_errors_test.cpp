@@ -5,6 +5,7 @@
 #include "pictura/common/error.h"
 #include "pictura/map/opendrive/opendrive.h"
 #include "pictura/tests/map/small_roads.h"
+#include "pictura/tests/support/error_message.h"
 
 namespace pictura {
 namespace {
@@ -17,12 +18,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 std::string message_of(const std::string& text) {
-  try {
-    parse_opendrive(text, "bad.xodr");
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "(no error)";
+  return test::message_of([&] { parse_opendrive(text, "bad.xodr"); });
 }
 
 std::string good_file() {
@@ -37,7 +33,7 @@ std::string replaced(std::string text, const std::string& from, const std::strin
   return text.replace(at, from.size(), to);
 }
 
-TEST(OpenDriveErrors, TheUnspoiltFileIsGood) { EXPECT_EQ(message_of(good_file()), "(no error)"); }
+TEST(OpenDriveErrors, TheUnspoiltFileIsGood) { EXPECT_EQ(message_of(good_file()), test::kNoError); }
 
 TEST(OpenDriveErrors, WhatIsNotOpenDriveIsRefused) {
   EXPECT_THAT(message_of(""), HasSubstr("bad.xodr"));
@@ -49,7 +45,7 @@ TEST(OpenDriveErrors, WhatIsNotOpenDriveIsRefused) {
 TEST(OpenDriveErrors, EveryTruncationIsRefused) {
   const std::string text = good_file();
   for (std::size_t length = 0; length + 14 < text.size(); ++length) {
-    EXPECT_NE(message_of(text.substr(0, length)), "(no error)") << length;
+    EXPECT_NE(message_of(text.substr(0, length)), test::kNoError) << length;
   }
 }
 
@@ -108,7 +104,7 @@ TEST(OpenDriveErrors, GapsBetweenGeometriesAreMeasured) {
   road.geometry = line_at(0, 0, 0, 0, 50) + line_at(49, 50, 0, 0, 51);
   EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("expected 50"));
   road.geometry = line_at(0, 0, 0, 0, 50) + line_at(50, 50.001, 0, 0, 50);
-  EXPECT_EQ(message_of(file_of(road.text())), "(no error)");
+  EXPECT_EQ(message_of(file_of(road.text())), test::kNoError);
 }
 
 TEST(OpenDriveErrors, IdsAreUnique) {
@@ -169,7 +165,7 @@ TEST(OpenDriveErrors, RoadsThatContradictEachOtherAreRefused) {
   EXPECT_THAT(message_of(file_of(a.text() + b.text() + c.text())),
               HasSubstr("road 1: <successor>: the start of road 2 is linked to the end of road 3 instead of the end"));
   b.link = link("predecessor", "1", "end");
-  EXPECT_EQ(message_of(file_of(a.text() + b.text() + c.text())), "(no error)");
+  EXPECT_EQ(message_of(file_of(a.text() + b.text() + c.text())), test::kNoError);
 }
 
 TEST(OpenDriveErrors, SectionsAreInOrder) {

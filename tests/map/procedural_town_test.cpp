@@ -11,6 +11,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/tests/map/opendrive_text.h"
+#include "pictura/tests/support/error_message.h"
 
 namespace pictura {
 namespace {
@@ -294,12 +295,7 @@ TEST(ProceduralTownOptions, TheDefaultTownHasEverything) {
 
 TEST(ProceduralTownOptions, RefusesWhatIsOutOfRange) {
   const auto message_of = [](const TownOptions& options) -> std::string {
-    try {
-      procedural_town(options);
-    } catch (const UsageError& error) {
-      return error.what();
-    }
-    return "";
+    return test::message_of<UsageError>([&] { procedural_town(options); });
   };
   for (const auto& [x, y] : {std::pair{0, 3}, {3, 0}, {33, 1}, {1, 33}, {-1, 2}}) {
     EXPECT_THAT(message_of(options_of(0, x, y)),
@@ -328,12 +324,7 @@ TEST(ProceduralTownOptions, AreReadFromMapNames) {
   EXPECT_EQ(options.hills_m, 0);
   EXPECT_EQ(options.parking, TownOptions().parking);
   const auto message_of = [](const char* text) -> std::string {
-    try {
-      parse_town_options(text, "the map");
-    } catch (const UsageError& error) {
-      return error.what();
-    }
-    return "";
+    return test::message_of<UsageError>([&] { parse_town_options(text, "the map"); });
   };
   for (const char* text : {"", "x", "-1", "1x", "18446744073709551616"}) {
     EXPECT_THAT(message_of(text), HasSubstr("expected procedural or procedural:SEED")) << text;

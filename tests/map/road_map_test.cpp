@@ -9,6 +9,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
+#include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 
 namespace pictura {
@@ -92,12 +93,7 @@ class LoadMapFiles : public ::testing::Test {
     std::ofstream(folder_ / "picture.png") << "png";
   }
   std::string message_of(const std::string& name) {
-    try {
-      load_map(name);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "(no error)";
+    return test::message_of([&] { load_map(name); });
   }
   test::ScratchFolder folder_;
   test::EnvironmentVariable data_{"PICTURA_DATA", folder_.path()};

@@ -14,6 +14,7 @@
 #include "pictura/simulator/rules/limits.h"
 #include "pictura/tests/simulator/same_bits.h"
 #include "pictura/tests/simulator/test_maps.h"
+#include "pictura/tests/support/error_message.h"
 
 namespace pictura {
 namespace {
@@ -82,17 +83,6 @@ TEST(Simulator, RefusesWhatCannotBeAskedFor) {
   }
 }
 
-/// The message of the error that `body` throws, of that type; empty when it throws none.
-template <typename Expected, typename Body>
-std::string message_of(Body&& body) {
-  try {
-    body();
-  } catch (const Expected& error) {
-    return error.what();
-  }
-  return "";
-}
-
 TEST(Simulator, RefusesMoreThanFitsBeforeItAllocates) {
   using ::testing::HasSubstr;
   const auto worlds_of = [](int count) {
@@ -101,7 +91,7 @@ TEST(Simulator, RefusesMoreThanFitsBeforeItAllocates) {
     return worlds;
   };
   const auto refuse = [&worlds_of](const SimulatorConfig& config, std::shared_ptr<const RoadMap> map, int worlds) {
-    return message_of<UsageError>([&] { make(config, std::move(map), worlds_of(worlds)); });
+    return test::message_of<UsageError>([&] { make(config, std::move(map), worlds_of(worlds)); });
   };
   // 4,194,304 agents alone with 4,096 parked cars each: 1.7e10 boxes.
   EXPECT_THAT(refuse({.parked_cars = 4096}, testing::ring_road(40), kMaxSlots), HasSubstr("got 17184063488 ("));
@@ -330,10 +320,10 @@ TEST(Simulator, RestoreSaysWhatDiffers) {
   const std::vector<uint8_t> bytes = make({}, make_map(), worlds)->save();
   const auto difference = [&](const SimulatorConfig& config, std::shared_ptr<const RoadMap> map) {
     const auto simulator = make(config, std::move(map), worlds);
-    return message_of<Error>([&] { simulator->restore(bytes); });
+    return test::message_of([&] { simulator->restore(bytes); });
   };
-  EXPECT_EQ(difference({}, make_map()), "");
-  EXPECT_EQ(difference({.num_threads = 1, .vector_observations = false}, make_map()), "");
+  EXPECT_EQ(difference({}, make_map()), test::kNoError);
+  EXPECT_EQ(difference({.num_threads = 1, .vector_observations = false}, make_map()), test::kNoError);
   EXPECT_THAT(difference({.seed = 1}, make_map()), HasSubstr("seed"));
   EXPECT_THAT(difference({.dt_s = 0.05f}, make_map()), HasSubstr("dt_s"));
   EXPECT_THAT(difference({.cyclist_fraction = 0.5f}, make_map()), HasSubstr("cyclist_fraction"));
@@ -369,7 +359,7 @@ TEST(Simulator, RestoreRefusesFieldsOutOfRangeAndStaysAsItWas) {
     const auto spoilt = make(testing::cars(), map, worlds);
     spoil(spoilt->state());
     const std::vector<uint8_t> bytes = spoilt->save();
-    const std::string message = message_of<Error>([&] { simulator->restore(bytes); });
+    const std::string message = test::message_of([&] { simulator->restore(bytes); });
     EXPECT_EQ(simulator->state_hash(), hash);
     return message;
   };
@@ -383,7 +373,7 @@ TEST(Simulator, RestoreRefusesFieldsOutOfRangeAndStaysAsItWas) {
   EXPECT_THAT(refusal([](AgentStateView state) { state.x_m[2] = NAN; }), HasSubstr("x_m"));
   EXPECT_THAT(refusal([](AgentStateView state) { state.y_m[2] = 1e9f; }), HasSubstr("agent 2: y_m"));
   EXPECT_THAT(refusal([](AgentStateView state) { state.conditioning[20] = INFINITY; }), HasSubstr("conditioning"));
-  EXPECT_EQ(message_of<Error>([&] { simulator->restore(make(testing::cars(), map, worlds)->save()); }), "");
+  EXPECT_EQ(test::message_of([&] { simulator->restore(make(testing::cars(), map, worlds)->save()); }), test::kNoError);
 }
 
 TEST(Simulator, ConditioningIsDrawnAsThePaperSays) {

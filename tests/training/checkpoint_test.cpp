@@ -11,6 +11,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/file.h"
+#include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/training/event_file.h"
 #include "pictura/training/training.h"
@@ -18,6 +19,7 @@
 namespace pictura {
 namespace {
 
+using test::message_of;
 using ::testing::HasSubstr;
 
 class Folder : public ::testing::Test {
@@ -50,15 +52,6 @@ Checkpoint small_checkpoint(const Policy& policy, const Config& config) {
   }
   c.simulator = {1, 2, 3, 255};
   return c;
-}
-
-std::string message_of(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 using CheckpointFile = Folder;

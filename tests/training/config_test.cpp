@@ -5,6 +5,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/file.h"
+#include "pictura/tests/support/error_message.h"
 
 namespace pictura {
 namespace {
@@ -13,12 +14,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 std::string message_of(const std::string& text, const std::vector<std::string>& overrides = {}) {
-  try {
-    parse_config(text, "a.toml", overrides);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::message_of([&] { parse_config(text, "a.toml", overrides); });
 }
 
 TEST(Config, DefaultsAreThePapersTables) {
@@ -87,7 +83,7 @@ TEST(Config, ErrorsNameFileLineAndKey) {
   EXPECT_THAT(message_of("[simulator.conditioning]\ncollision = [3, 1]\n"), HasSubstr("low <= high"));
   EXPECT_THAT(message_of("[simulator.conditioning]\nthrottle = [1.1, 1.2]\n"), HasSubstr("low <= 1 <= high"));
   EXPECT_THAT(message_of("[simulator.conditioning]\nthrottle = [0, 0]\n"), HasSubstr("low = high > 0"));
-  EXPECT_EQ(message_of("[simulator.conditioning]\nthrottle = [0.9, 0.9]\n"), "");
+  EXPECT_EQ(message_of("[simulator.conditioning]\nthrottle = [0.9, 0.9]\n"), test::kNoError);
   EXPECT_THAT(message_of("[simulator]\nmin_agents = 9\nmax_agents = 8\n"), HasSubstr("a.toml:2: simulator.min_agents"));
   EXPECT_THAT(message_of("[train]\nupdates = \n"), HasSubstr("a.toml:2"));
   EXPECT_THAT(message_of("simulator = 5\n"), HasSubstr("a.toml:1"));
@@ -99,7 +95,7 @@ TEST(Config, ErrorsNameFileLineAndKey) {
 TEST(Config, KeysWithoutEffectAreRefused) {
   EXPECT_THAT(message_of("[policy]\nmodality = \"perspective\"\nauxiliary = true\n"),
               AllOf(HasSubstr("a.toml:3: policy.auxiliary"), HasSubstr("no effect")));
-  EXPECT_EQ(message_of("[policy]\nmodality = \"vector\"\nauxiliary = true\n"), "");
+  EXPECT_EQ(message_of("[policy]\nmodality = \"vector\"\nauxiliary = true\n"), test::kNoError);
   EXPECT_THAT(message_of("[render]\nwidth_px = 96\nrig = \"r.toml\"\n"),
               AllOf(HasSubstr("a.toml:2: render.width_px"), HasSubstr("render.rig")));
   EXPECT_THAT(message_of("[render]\nrig = \"r.toml\"\n", {"render.height_px=9"}),

@@ -15,12 +15,14 @@
 #include "pictura/common/file.h"
 #include "pictura/common/interrupt.h"
 #include "pictura/map/load_map.h"
+#include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/training/observer.h"
 
 namespace pictura {
 namespace {
 
+using test::message_of;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
@@ -39,15 +41,6 @@ class Training : public ::testing::Test {
   }
   test::ScratchFolder folder_;
 };
-
-std::string message_of(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
 
 std::vector<std::vector<std::string>> read_table(const std::string& path) {
   std::vector<std::vector<std::string>> rows;
