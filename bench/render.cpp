@@ -106,11 +106,11 @@ RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& r
   RenderMeasurement result;
   const auto target = make_target(worlds, render_case);
   result.image_bytes = static_cast<double>(image_bytes_of(render_case));
+  PICTURA_CHECK(!render_case.watches_memory || !cuda_device_name().empty(),
+                "bench render: expected a CUDA device whose memory could be watched, found none");
 #ifdef PICTURA_HAS_CUDA
   std::unique_ptr<DeviceMemoryWatch> watch;
   if (render_case.watches_memory) watch = std::make_unique<DeviceMemoryWatch>();
-#else
-  PICTURA_CHECK(!render_case.watches_memory, "bench render: this build has no CUDA, whose memory could be watched");
 #endif
   const auto renderer = make_renderer(render_case.backend, render_case.config, &result.choice);
   for (const StaticGeometry& geometry : worlds.geometries) renderer->upload(geometry);

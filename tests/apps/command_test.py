@@ -37,6 +37,11 @@ def has_torch():
     return re.search("^  train ", run("--help").stdout, re.MULTILINE) is not None
 
 
+def has_cuda():
+    """Whether this build knows the renderer `cuda`, with a device or without."""
+    return "cpu, cuda" in run("bench", "render", "--backend", "none").stderr
+
+
 class CommandCase(unittest.TestCase):
     def setUp(self):
         self._folder = tempfile.TemporaryDirectory(prefix="pictura-test-")
@@ -274,6 +279,41 @@ class Simulation(CommandCase):
         self.assert_refused(1 if has_torch() else 2, "no/such.ckpt", *simulate, "--policy", "no/such.ckpt")
         if shutil.which("ffmpeg"):
             self.assert_refused(1, "/proc/nowhere", *simulate, "--agents", 2, "--steps", 2, "--video", "/proc/nowhere/a.mp4")
+
+
+class Benchmarks(CommandCase):
+    QUICK = ["--map", "procedural:1", "--agents", 6, "--repeats", 3, "--repeat-seconds", 0.01]
+
+    def test_rendering_is_measured_for_each_backend_size_and_number_of_egos(self):
+        facts = self.json_of("bench", "render", *self.QUICK, "--backend", "cpu,null", "--size", "8x8,9x5", "--egos", "3,5")
+        self.assertLessEqual({"workload", "backend", "device", "commit", "results"}, facts.keys())
+        self.assertIn("6 agents in each of 1 worlds", facts["workload"])
+        rows = {row["name"]: row for row in facts["results"]}
+        cases = [f"{b} {s} {e} egos" for b in ["cpu", "null"] for s in ["8x8", "9x5"] for e in [3, 5]]
+        self.assertEqual(rows.keys(), {f"{case}{of}" for case in cases for of in ["", ", one call", ", one image"]})
+        for row in rows.values():
+            self.assertEqual(row["repeats"], 3)
+            self.assertLessEqual(row["min"], row["value"])
+            self.assertLessEqual(row["value"], row["max"])
+        for case in cases:
+            egos = int(case.split()[-2])
+            rate, call, image = (rows[case + of]["value"] for of in ["", ", one call", ", one image"])
+            self.assertAlmostEqual(rate * call / 1e3 / egos, 1, places=6)
+            self.assertAlmostEqual(image * 4 * egos / call, 1, places=6)
+
+    def test_bad_arguments_are_refused_by_name(self):
+        def refused(status, message, *arguments):
+            self.assert_refused(status, message, "bench", "render", *self.QUICK, *arguments)
+
+        refused(2, "--sweep egos", "--sweep", "egos", "--egos", 3)
+        refused(2, "--sweep sizes", "--sweep", "sizes", "--size", "8x8")
+        refused(2, "--memory: expected one", "--memory", "--egos", "3,4")
+        refused(2, "--size", "--size", "8")
+        refused(2, "vulkan", "--backend", "vulkan")
+        refused(1, "no-town", "--map", self.folder / "no-town.xodr")
+        if not pathlib.Path("/dev/nvidia0").exists():
+            refused(1, "renderer cuda: no CUDA device" if has_cuda() else "expected one of cpu", "--backend", "cuda")
+            refused(1, "CUDA", "--memory", "--egos", 3)
 
 
 class Training(CommandCase):

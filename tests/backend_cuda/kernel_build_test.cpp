@@ -114,6 +114,10 @@ TEST_F(KernelCache, KernelsAreCompiledOnce) {
   EXPECT_NE(kernel_cache_path(kSmall, {80, 4, 96, 54}), kernel_cache_path(kSmall, kPaperRig));
   EXPECT_NE(kernel_cache_path(kSmall, {90, 4, 97, 54}), kernel_cache_path(kSmall, kPaperRig));
   EXPECT_NE(kernel_cache_path(kSmall, {90, 5, 96, 54}), kernel_cache_path(kSmall, kPaperRig));
+  cuda::KernelSource header = kHeader;
+  header.text = "constexpr int kSize = 1;";
+  EXPECT_NE(kernel_cache_path({kSmall.text, {&header, 1}}, kPaperRig), kernel_cache_path(kSmall, kPaperRig));
+  EXPECT_NE(kernel_cache_path({"", kSmall.headers}, kPaperRig), kernel_cache_path(kSmall, kPaperRig));
   const fs::path kept = kernel_cache_path(kSmall, kPaperRig);
   EXPECT_EQ(std::distance(fs::directory_iterator(kept.parent_path()), fs::directory_iterator()), 1);
 }
