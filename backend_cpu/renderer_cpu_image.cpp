@@ -223,7 +223,7 @@ void ImageDrawer::draw_planes(const ImageTarget& target) const {
       const std::size_t pixel =
           static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
       if (target.depth_m) {
-        target.depth_m[pixel] = face ? face_depth_m(*face, center.x, center.y) : std::numeric_limits<float>::infinity();
+        target.depth_m[pixel] = face ? face_depth_m(*face, center) : std::numeric_limits<float>::infinity();
       }
       if (target.class_id) target.class_id[pixel] = face ? face->class_id : uint8_t{0};
       if (target.instance_id) target.instance_id[pixel] = face ? instance_of(*face) : uint16_t{0};

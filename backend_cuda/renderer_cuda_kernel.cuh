@@ -102,7 +102,7 @@ __device__ void draw_planes(const Memory& memory, const DrawTask& task, const Ca
         front.front(center, [&](uint32_t solid, uint32_t strip) { return stands(memory, task, solid, strip); });
     const int64_t at = view * plane + p;
     const float infinity = __uint_as_float(0x7F800000u);
-    if (slot.depth_m) slot.depth_m[at] = face ? face_depth_m(*face, center.x, center.y) : infinity;
+    if (slot.depth_m) slot.depth_m[at] = face ? face_depth_m(*face, center) : infinity;
     if (slot.class_id) slot.class_id[at] = face ? face->class_id : uint8_t{0};
     if (slot.instance_id) slot.instance_id[at] = face ? instance_of(*face) : uint16_t{0};
   }

@@ -178,8 +178,8 @@ PICTURA_HD inline float inverse_depth(const ScreenFace& face, Vec2 at_px) {
 }
 
 /// Depth (camera z) of a face at a point of the screen, within the depths of its corners.
-PICTURA_HD inline float face_depth_m(const ScreenFace& face, float x_px, float y_px) {
-  return 1.0f / clamp(inverse_depth(face, {x_px, y_px}), face.inverse_depth_low, face.inverse_depth_high);
+PICTURA_HD inline float face_depth_m(const ScreenFace& face, Vec2 at_px) {
+  return 1.0f / clamp(inverse_depth(face, at_px), face.inverse_depth_low, face.inverse_depth_high);
 }
 
 PICTURA_HD inline bool covers_point(const PolygonEdge* edges, int count, float x_px, float y_px) {

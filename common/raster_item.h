@@ -69,8 +69,7 @@ class FrontFace {
   /// A second round over the same faces, once all have been offered.
   PICTURA_HD void offer_again(const ScreenFace& face, Vec2 at_px) {
     if (!is_strip(face) || !strip_) return;
-    const float depth = inverse_depth(face, at_px), nearest = inverse_depth(*strip_, at_px);
-    if (!of_one_level(depth, face.plane_distance_m, nearest, strip_->plane_distance_m)) return;
+    if (!of_one_level(face, *strip_, at_px)) return;
     if (!painted_ || face.number < painted_->number) painted_ = &face;
   }
   template <typename Stands>
@@ -81,8 +80,8 @@ class FrontFace {
 
  private:
   PICTURA_HD static bool nearer(const ScreenFace& a, const ScreenFace& b, Vec2 at_px) {
-    const float depth_a = inverse_depth(a, at_px), depth_b = inverse_depth(b, at_px);
-    return depth_a != depth_b ? depth_a > depth_b : a.number < b.number;
+    const float nearness_a = nearness_at(a, at_px), nearness_b = nearness_at(b, at_px);
+    return nearness_a != nearness_b ? nearness_a > nearness_b : a.number < b.number;
   }
   const ScreenFace* solid_ = nullptr;
   const ScreenFace* strip_ = nullptr;    // the nearest

@@ -112,25 +112,27 @@ PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip) {
   return fabsf(dot(normal, middle)) <= kStanding_m * fabsf(normal.z) && overlap_on_ground(solid, strip);
 }
 
-/// Whether two strips are of one level where a ray meets them: the nearer point is close to the other's plane. Takes
-/// the inverse depths along the ray and the camera's distances from the planes.
-PICTURA_HD inline bool of_one_level(float inverse_a, float distance_a_m, float inverse_b, float distance_b_m) {
-  const float nearer = max_of(inverse_a, inverse_b);
-  const float gap_m = fabsf(inverse_a - inverse_b) * (inverse_a < inverse_b ? distance_a_m : distance_b_m);
-  return gap_m < kSameLevel_m * nearer;
+/// Whether two strips are of one level where a ray meets their planes: the nearer point is close to the other's plane.
+PICTURA_HD inline bool of_one_level(const ScreenFace& a, const ScreenFace& b, Vec2 at_px) {
+  const float inverse_a = inverse_depth(a, at_px), inverse_b = inverse_depth(b, at_px);
+  const float gap_m = fabsf(inverse_a - inverse_b) * (inverse_a < inverse_b ? a.plane_distance_m : b.plane_distance_m);
+  return gap_m < kSameLevel_m * max_of(inverse_a, inverse_b);
+}
+
+/// 1 / depth of a face at a point of the screen, for telling which of two is in front there; within the depths of its
+/// corners, which those of a strip may leave by a factor (see kWidenedDepth).
+PICTURA_HD inline float nearness_at(const ScreenFace& face, Vec2 at_px) {
+  const float factor = is_strip(face) ? kWidenedDepth : 1.0f;
+  return clamp(inverse_depth(face, at_px), face.inverse_depth_low * (1.0f / factor), face.inverse_depth_high * factor);
 }
 
 /// Whether face a is in front of face b at a point of the screen that both cover. `stands(solid, strip)` says, by their
 /// numbers, whether a solid stands on a strip.
 template <typename Stands>
 PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec2 at_px, Stands&& stands) {
-  const float depth_a = inverse_depth(a, at_px), depth_b = inverse_depth(b, at_px);
   const bool strip_a = is_strip(a), strip_b = is_strip(b);
-  if (strip_a && strip_b && of_one_level(depth_a, a.plane_distance_m, depth_b, b.plane_distance_m)) {
-    return a.number < b.number;
-  }
-  // Beyond the horizon a plane is infinitely far.
-  const float nearness_a = max_of(depth_a, 0.0f), nearness_b = max_of(depth_b, 0.0f);
+  if (strip_a && strip_b && of_one_level(a, b, at_px)) return a.number < b.number;
+  const float nearness_a = nearness_at(a, at_px), nearness_b = nearness_at(b, at_px);
   const bool first = nearness_a != nearness_b ? nearness_a > nearness_b : a.number < b.number;
   if (strip_a == strip_b || first != strip_a) return first;
   // A strip before a solid that stands on it: the solid dips into the road.
@@ -164,7 +166,7 @@ struct Fragment {
 PICTURA_HD inline Fragment make_fragment(const ScreenFace& face, int32_t face_index, const PixelCoverage& coverage,
                                          int x, int y) {
   const Vec2 middle = Vec2{static_cast<float>(x), static_cast<float>(y)} + middle_of(coverage.samples);
-  return {coverage, max_of(inverse_depth(face, middle), 0.0f), face_index};
+  return {coverage, nearness_at(face, middle), face_index};
 }
 
 PICTURA_HD inline Vec2 pixel_middle(int x, int y) {
@@ -173,7 +175,7 @@ PICTURA_HD inline Vec2 pixel_middle(int x, int y) {
 
 /// Nearness of a face in the middle of a pixel: that of its fragment where it covers the pixel fully.
 PICTURA_HD inline float middle_nearness(const ScreenFace& face, int x, int y) {
-  return max_of(inverse_depth(face, pixel_middle(x, y)), 0.0f);
+  return nearness_at(face, pixel_middle(x, y));
 }
 
 /// Whether a face may weigh anything in pixel (x, y), which another one, `full`, covers fully: no where it lies well
@@ -182,17 +184,11 @@ PICTURA_HD inline float middle_nearness(const ScreenFace& face, int x, int y) {
 PICTURA_HD inline bool may_show_before(const ScreenFace& face, const ScreenFace& full, int x, int y,
                                        bool covers_fully) {
   if (is_strip(full) && !is_strip(face)) return true;
-  const Vec2 middle = pixel_middle(x, y);
-  const float depth = inverse_depth(face, middle), full_depth = inverse_depth(full, middle);
-  if (is_strip(full) &&
-      (!covers_fully || of_one_level(depth, face.plane_distance_m, full_depth, full.plane_distance_m))) {
-    return true;
-  }
-  const float rise = covers_fully ? 0.0f
-                                  : 0.5f * (fabsf(face.inverse_depth_x) + fabsf(face.inverse_depth_y) +
-                                            fabsf(full.inverse_depth_x) + fabsf(full.inverse_depth_y));
+  if (is_strip(full) && (!covers_fully || of_one_level(face, full, pixel_middle(x, y)))) return true;
+  const float rise = 0.5f * (fabsf(face.inverse_depth_x) + fabsf(face.inverse_depth_y) + fabsf(full.inverse_depth_x) +
+                             fabsf(full.inverse_depth_y));
   constexpr float kLeeway = 1.004f;  // more than the bits that a kernel may leave off when it looks for `full`
-  return max_of(depth + rise, 0.0f) * kLeeway >= full_depth;
+  return (middle_nearness(face, x, y) + rise) * kLeeway >= middle_nearness(full, x, y);
 }
 
 /// Order of fragments that does not depend on how they are listed: the nearer first, then by number.
@@ -208,11 +204,38 @@ PICTURA_HD inline uint64_t shared_samples(const PixelCoverage& a, const PixelCov
   return a.samples != 0 && b.samples != 0 ? a.samples & b.samples : a.samples | b.samples;
 }
 
-/// The samples that a fragment loses to one in front of it. A sliver is hidden as a whole and hides nothing; what
-/// covers the whole pixel is hidden only by what does so too (see PixelSum).
-PICTURA_HD inline uint64_t lost_to(const PixelCoverage& fragment, const PixelCoverage& in_front) {
-  if (fragment.samples == 0) return kAllSamples;
-  return fragment.is_full() && !in_front.is_full() ? 0 : in_front.samples;
+/// Samples of a pixel at which a linear function of the screen, given by its value at `middle` and its gradient (not
+/// 0), is positive.
+PICTURA_HD inline uint64_t samples_where_positive(float value, Vec2 gradient, Vec2 middle) {
+  const float scale = 1.0f / length(gradient);
+  const Vec2 up = gradient * scale;
+  const Vec2 zero = middle - up * (value * scale);
+  const PolygonEdge edge = make_edge(zero, zero + Vec2{up.y, -up.x});
+  return samples_inside(edge, -edge.x0, -edge.y0);
+}
+
+/// Of the samples of a pixel that faces a and b of two things share, those at which a is in front: all or none, as in
+/// their middle, but where the planes of two solids intersect near by, those at which that of a is nearer. The others
+/// are those at which b is in front of a.
+template <typename Stands>
+PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFace& b, uint64_t shared, Vec2 corner,
+                                            Stands&& stands) {
+  const Vec2 middle = middle_of(shared), at = corner + middle;
+  // Of the lower number before the higher, so that both ways round are the same arithmetic.
+  const bool swapped = b.number < a.number;
+  const ScreenFace &low = swapped ? b : a, &high = swapped ? a : b;
+  const float lead = inverse_depth(low, at) - inverse_depth(high, at);
+  const Vec2 gradient{low.inverse_depth_x - high.inverse_depth_x, low.inverse_depth_y - high.inverse_depth_y};
+  // No sample is further than a pixel from the middle along either axis.
+  const bool intersect = fabsf(lead) < fabsf(gradient.x) + fabsf(gradient.y) && !is_strip(a) && !is_strip(b);
+  if (!intersect) return is_in_front(a, b, at, stands) ? shared : 0;
+  const uint64_t low_first = samples_where_positive(lead, gradient, middle);
+  return shared & (swapped ? ~low_first : low_first);
+}
+
+/// Whether two fragments fill a pixel exactly, one of them a sliver that touches no sample: pieces that meet there.
+PICTURA_HD inline bool fit_together(const PixelCoverage& a, const PixelCoverage& b) {
+  return (a.samples == 0 || b.samples == 0) && fabsf(a.area + b.area - 1.0f) < kFullCoverage;
 }
 
 /// What two fragments of a pixel hide of each other.
@@ -220,14 +243,19 @@ struct Hidden {
   uint64_t of_a = 0, of_b = 0;
 };
 
-/// ... where they share samples; corner is the pixel's. Faces of one thing do not hide each other.
+/// ... where they share samples; corner is the pixel's. Faces of one thing do not hide each other. A sliver hides
+/// nothing, and is hidden as a whole; what covers the whole pixel is hidden only by what does so too (see PixelSum).
 template <typename Stands>
 PICTURA_HD inline Hidden hide_each_other(const PixelCoverage& a, const PixelCoverage& b, const ScreenFace& face_a,
                                          const ScreenFace& face_b, Vec2 corner, Stands&& stands) {
   const uint64_t shared = shared_samples(a, b);
-  if (shared == 0 || face_a.number == face_b.number) return {};
-  if (is_in_front(face_a, face_b, corner + middle_of(shared), stands)) return {0, lost_to(b, a)};
-  return {lost_to(a, b), 0};
+  if (shared == 0 || face_a.number == face_b.number || fit_together(a, b)) return {};
+  if (a.samples == 0 || b.samples == 0) {
+    const bool a_first = is_in_front(face_a, face_b, corner + middle_of(shared), stands);
+    return {a.samples == 0 && !a_first ? kAllSamples : 0, b.samples == 0 && a_first ? kAllSamples : 0};
+  }
+  const uint64_t a_first = samples_in_front(face_a, face_b, shared, corner, stands);
+  return {a.is_full() && !b.is_full() ? 0 : shared & ~a_first, b.is_full() && !a.is_full() ? 0 : a_first};
 }
 
 }  // namespace pictura

@@ -11,7 +11,7 @@ namespace pictura {
 class PixelSum {
  public:
   /// What is wholly free weighs its exact area; what is partly hidden its area times the share of its reach that is
-  /// free; what covers the whole pixel, and is behind nothing that does too, what the others leave.
+  /// free; what covers the whole pixel that share of what the others leave.
   enum Kind : uint8_t { kWhole, kPartial, kRest, kNumKinds };
   struct Weight {
     float area = 0;
@@ -25,10 +25,11 @@ class PixelSum {
 
   /// free: what is left of the coverage's reach after all that others hide.
   PICTURA_HD static Weight weight_of(const PixelCoverage& coverage, uint64_t free) {
-    if (coverage.is_full()) return {free != 0 ? 1.0f : 0.0f, kRest};
     const uint64_t reach = reach_of(coverage);
+    const float share = static_cast<float>(count_bits(free)) / static_cast<float>(count_bits(reach));
+    if (coverage.is_full()) return {share, kRest};
     if (free == reach) return {coverage.area, kWhole};
-    return {coverage.area * (static_cast<float>(count_bits(free)) / static_cast<float>(count_bits(reach))), kPartial};
+    return {coverage.area * share, kPartial};
   }
 
   PICTURA_HD void add(Weight weight, Rgb color) {
@@ -65,6 +66,9 @@ class PixelSum {
  private:
   static constexpr float kUnits = 1 << 20;  // of a pixel and a channel of 1; a thousand fragments do not overflow
   PICTURA_HD static int32_t to_units(float value) { return static_cast<int32_t>(value * kUnits + 0.5f); }
+  PICTURA_HD static float share_of(uint64_t samples, uint64_t of) {
+    return static_cast<float>(count_bits(samples)) / static_cast<float>(count_bits(of));
+  }
   PICTURA_HD float area_of(Kind kind) const { return static_cast<float>(part_[kind].area) * (1.0f / kUnits); }
 
   struct Part {

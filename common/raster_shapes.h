@@ -228,6 +228,9 @@ PICTURA_HD inline void strip_faces(const Strip& strip, const PinholeCamera& came
 
 /// Strips that are closer than this are of one level: there rank decides, and not depth.
 constexpr float kSameLevel_m = 0.05f;
+/// A strip that is drawn wider than it is stays within this factor of the depths of its corners: where the camera is
+/// close to its plane, that comes near and goes beyond the horizon within a pixel.
+constexpr float kWidenedDepth = 2.0f;
 /// A solid stands on a strip where its foot overlaps the strip on the ground plane and, in its middle, lies at most
 /// this far from the strip's plane: upright boxes dip into slopes.
 constexpr float kStanding_m = 0.5f;

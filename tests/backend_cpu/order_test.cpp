@@ -223,6 +223,20 @@ TEST(Order, StripsInFrontOfAWallOrBehindIt) {
   EXPECT_EQ(sight.order(sight.see(wall), sight.see(beyond)), -1);
 }
 
+TEST(Order, AStripDrawnWiderThanItIsStaysAtItsDepth) {
+  // Its plane almost passes through the eye: on that plane, half of its width on screen would be much nearer, and half
+  // beyond the horizon.
+  const Strip strip = strip_between({40, -4, 0.9995f}, {45, 4, 0.9985f});
+  for (const float wall_at_m : {15.0f, 110.0f}) {
+    WallFace wall;
+    wall.a_m = {wall_at_m, 10, -3};
+    wall.b_m = {wall_at_m, -10, -3};
+    wall.height_m = 8;
+    Sight sight({0, 0, 1});
+    EXPECT_EQ(sight.order(sight.see(strip), sight.see(wall)), wall_at_m < 40 ? 1 : -1) << wall_at_m;
+  }
+}
+
 TEST(Order, ComparesInTheMiddleOfTheSharedSamples) {
   std::mt19937_64 random(3);
   for (int round = 0; round < 2000; ++round) {
@@ -245,27 +259,76 @@ TEST(Order, ComparesInTheMiddleOfTheSharedSamples) {
   EXPECT_EQ(middle_of(0).x, 0.5f);
 }
 
+// A face whose plane has some inverse depth at a pixel's corner and some gradient; it has no edges.
+ScreenFace plane_face(uint32_t number, float inverse_depth_0, Vec2 gradient = {}) {
+  ScreenFace face;
+  face.number = number;
+  face.plane_distance_m = 1.5f;
+  face.inverse_depth_0 = inverse_depth_0;
+  face.inverse_depth_x = gradient.x;
+  face.inverse_depth_y = gradient.y;
+  face.inverse_depth_low = 1e-3f;
+  face.inverse_depth_high = 10;
+  return face;
+}
+
+TEST(Order, SolidsThatIntersectShareSamplesByWhichIsNearer) {
+  std::mt19937_64 random(8);
+  std::uniform_real_distribution<float> unit(0, 1);
+  auto never = [](uint32_t, uint32_t) { return false; };
+  int split = 0;
+  for (int round = 0; round < 2000; ++round) {
+    auto plane = [&](uint32_t number) {
+      return plane_face(number, 0.1f + 0.02f * unit(random), Vec2{unit(random) - 0.5f, unit(random) - 0.5f} * 0.02f);
+    };
+    const ScreenFace a = plane(thing_number(kWallKind, 5)), b = plane(thing_number(kAgentKind, 3));
+    const uint64_t shared = random() | random();
+    const Vec2 corner{static_cast<float>(round % 3), static_cast<float>(round % 5)};
+    const uint64_t a_first = samples_in_front(a, b, shared, corner, never);
+    ASSERT_EQ(samples_in_front(b, a, shared, corner, never), shared & ~a_first) << round;
+    split += a_first != 0 && a_first != shared;
+    for (int sample = 0; sample < 64; ++sample) {
+      if (!(shared >> sample & 1)) continue;
+      const Vec2 at = corner + middle_of(uint64_t{1} << sample);
+      const float lead = inverse_depth(a, at) - inverse_depth(b, at);
+      if (std::abs(lead) < 1e-6f) continue;
+      ASSERT_EQ(a_first >> sample & 1, lead > 0 ? 1u : 0u) << round;
+    }
+  }
+  EXPECT_GT(split, 200);
+}
+
+TEST(Order, TwoFacesThatFillAPixelAndIntersectFillItTogether) {
+  // The first is in front in the left five eighths of the pixel.
+  const ScreenFace first = plane_face(thing_number(kAgentKind, 0), 0.2f, {-0.08f, 0}),
+                   second = plane_face(thing_number(kAgentKind, 1), 0.15f);
+  const PixelCoverage full{1, kAllSamples};
+  const Hidden hidden = hide_each_other(full, full, first, second, {}, [](uint32_t, uint32_t) { return false; });
+  PixelSum sum;
+  sum.add(PixelSum::weight_of(full, ~hidden.of_a), {1, 0, 0});
+  sum.add(PixelSum::weight_of(full, ~hidden.of_b), {0, 1, 0});
+  EXPECT_NEAR(sum.color().r, 5.0 / 8, 1e-5);
+  EXPECT_NEAR(sum.color().g, 3.0 / 8, 1e-5);
+}
+
 TEST(Order, WhatIsFreeOfAPixelsFragmentsDoesNotDependOnTheirList) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<float> unit(0, 1);
   for (int round = 0; round < 500; ++round) {
-    // Planes in one pixel; those of random tilt intersect, and may hide each other in a ring.
+    // Planes in one pixel; those of random tilt intersect, and with strips among them may hide each other in a ring.
     const float tilt = round % 2 ? 0.1f : 0.0f;
+    const bool with_strips = round % 4 == 3;
     std::vector<ScreenFace> faces(2 + random() % 6);
     std::vector<Fragment> fragments;
     for (std::size_t i = 0; i < faces.size(); ++i) {
-      ScreenFace& face = faces[i];
-      face.number = thing_number(tilt > 0 && i % 2 ? kStripKind : kAgentKind, static_cast<int32_t>(i));
-      face.color = {unit(random), unit(random), unit(random)};
-      face.plane_distance_m = 1.5f;
-      face.inverse_depth_0 = 0.05f + 0.05f * unit(random);
-      face.inverse_depth_x = tilt * (unit(random) - 0.5f);
-      face.inverse_depth_y = tilt * (unit(random) - 0.5f);
+      faces[i] = plane_face(thing_number(with_strips && i % 2 ? kStripKind : kAgentKind, static_cast<int32_t>(i)),
+                            0.05f + 0.05f * unit(random), Vec2{unit(random) - 0.5f, unit(random) - 0.5f} * tilt);
+      faces[i].color = {unit(random), unit(random), unit(random)};
       const uint64_t samples = random() & (round % 3 ? random() : kAllSamples);
       const PixelCoverage coverage{static_cast<float>(std::popcount(samples)) / 64.0f, samples};
-      fragments.push_back(make_fragment(face, static_cast<int32_t>(i), coverage, 0, 0));
+      fragments.push_back(make_fragment(faces[i], static_cast<int32_t>(i), coverage, 0, 0));
     }
-    auto stands = [tilt](uint32_t solid, uint32_t strip) { return tilt > 0 && (solid + strip) % 3 == 0; };
+    auto stands = [](uint32_t solid, uint32_t strip) { return (solid + strip) % 3 == 0; };
     auto free_by_face = [&](PixelSum* sum) {
       std::vector<uint64_t> free(faces.size());
       for (const Fragment& fragment : fragments) {
@@ -289,7 +352,7 @@ TEST(Order, WhatIsFreeOfAPixelsFragmentsDoesNotDependOnTheirList) {
       seen |= free[i];
       covered |= fragments[i].coverage.samples;
     }
-    if (tilt == 0) {
+    if (!with_strips) {
       ASSERT_EQ(seen, covered) << round;
     }
     for (int shuffle = 0; shuffle < 5; ++shuffle) {
@@ -302,27 +365,25 @@ TEST(Order, WhatIsFreeOfAPixelsFragmentsDoesNotDependOnTheirList) {
 }
 
 TEST(Order, WhatFillsThePixelIsHiddenOnlyByWhatDoesToo) {
-  std::vector<ScreenFace> faces(2);
-  for (std::size_t i = 0; i < 2; ++i) {
-    faces[i].number = thing_number(kWallKind, static_cast<int32_t>(i));
-    faces[i].inverse_depth_0 = 0.2f - 0.1f * static_cast<float>(i);
-  }
+  const ScreenFace near = plane_face(thing_number(kWallKind, 0), 0.2f),
+                   far = plane_face(thing_number(kWallKind, 1), 0.1f);
   auto never = [](uint32_t, uint32_t) { return false; };
-  EXPECT_EQ(hide_each_other({0.5f, 0xFFFF}, {1, kAllSamples}, faces[0], faces[1], {}, never).of_b, 0u);
-  EXPECT_EQ(hide_each_other({1, kAllSamples}, {1, kAllSamples}, faces[0], faces[1], {}, never).of_b, kAllSamples);
-  EXPECT_EQ(hide_each_other({0.5f, 0xFFFF}, {1, kAllSamples}, faces[1], faces[0], {}, never).of_a, kAllSamples);
+  EXPECT_EQ(hide_each_other({0.5f, 0xFFFF}, {1, kAllSamples}, near, far, {}, never).of_b, 0u);
+  EXPECT_EQ(hide_each_other({1, kAllSamples}, {1, kAllSamples}, near, far, {}, never).of_b, kAllSamples);
+  EXPECT_EQ(hide_each_other({0.5f, 0xFFFF}, {1, kAllSamples}, far, near, {}, never).of_a, 0xFFFFu);
 }
 
 TEST(Order, ASliverIsHiddenByWhatIsInFrontOfItAndHidesNothing) {
-  std::vector<ScreenFace> faces(2);
-  for (std::size_t i = 0; i < 2; ++i) faces[i].number = thing_number(kWallKind, static_cast<int32_t>(i));
   auto never = [](uint32_t, uint32_t) { return false; };
+  const ScreenFace other = plane_face(thing_number(kWallKind, 1), 0.1f);
   for (const bool sliver_in_front : {false, true}) {
-    faces[0].inverse_depth_0 = sliver_in_front ? 0.2f : 0.05f;
-    faces[1].inverse_depth_0 = 0.1f;
-    const Hidden hidden = hide_each_other({0.01f, 0}, {0.5f, 0xFFFFFFFF}, faces[0], faces[1], {}, never);
+    const ScreenFace sliver = plane_face(thing_number(kWallKind, 0), sliver_in_front ? 0.2f : 0.05f);
+    const Hidden hidden = hide_each_other({0.01f, 0}, {0.5f, 0xFFFFFFFF}, sliver, other, {}, never);
     EXPECT_EQ(hidden.of_a, sliver_in_front ? 0u : kAllSamples);
     EXPECT_EQ(hidden.of_b, 0u);
+    // Pieces that meet in a pixel and fill it: neither is behind the other.
+    EXPECT_EQ(hide_each_other({0.01f, 0}, {0.99f, kAllSamples}, sliver, other, {}, never).of_a, 0u);
+    EXPECT_EQ(hide_each_other({0.99f, kAllSamples}, {0.01f, 0}, other, sliver, {}, never).of_b, 0u);
   }
 }
 

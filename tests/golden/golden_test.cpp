@@ -47,12 +47,10 @@ std::unique_ptr<Renderer> oracle_for(const SceneFile& scene) {
 bool is_gl(const std::string& backend) { return backend.starts_with("gl"); }
 
 const ImageTolerance& truth_tolerance_of(const std::string& scene) {
-  if (scene == "overlapping_boxes") return kGoldenIntersecting;
   return scene == "one_pixel" ? kGoldenTruthOnePixel : kGoldenTruth;
 }
 
 const ImageTolerance& gl_tolerance_of(const std::string& scene) {
-  if (scene == "overlapping_boxes") return kGoldenIntersecting;
   return scene == "one_pixel" ? kGoldenGlOnePixel : kGoldenGl;
 }
 

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "pictura/common/raster_check.h"
-#include "pictura/common/raster_shapes.h"
 
 namespace pictura {
 
@@ -79,7 +78,8 @@ struct PaintedStrip {
     }
     return true;
   }
-  double depth(Point ray) const {
+  // Of its plane; infinite beyond the horizon.
+  double plane_depth(Point ray) const {
     const double depth = offset / dot(plane, ray);
     return depth > 0 ? depth : kFar;
   }
@@ -271,7 +271,7 @@ void add_strip(Tracer* tracer, const Eye& eye, const PinholeCamera& pinhole, con
   if (!image.may_meet(painted)) return;
   painted.carries = solids_on(*tracer, world);
   auto by_depth = [](Point a, Point b) { return a.z < b.z; };
-  painted.nearest_m = std::max<double>(kNear_m, std::min_element(as_drawn, as_drawn + 4, by_depth)->z);
+  painted.nearest_m = std::min_element(as_drawn, as_drawn + 4, by_depth)->z;
   painted.farthest_m = std::max_element(as_drawn, as_drawn + 4, by_depth)->z;
   tracer->strips.push_back(painted);
 }
@@ -308,8 +308,8 @@ struct Surface {
   double depth = kFar;
 };
 
-// The nearest surface: of facets and of strips the one of least depth, but of strips that lie within kSameLevel_m of
-// each other there the one of least rank, and never a strip before a solid that stands on it.
+// The nearest surface: of facets and of strips the one of least depth, but of strips whose planes lie within
+// kSameLevel_m of each other there the one of least rank, and never a strip before a solid that stands on it.
 Surface front_of(const Candidates& candidates, Point ray) {
   Surface front;
   for (const Facet* facet : candidates.facets) {
@@ -317,21 +317,23 @@ Surface front_of(const Candidates& candidates, Point ray) {
     if (at < front.depth) front = {&facet->color, facet, nullptr, at};
   }
   const PaintedStrip* painted = nullptr;
-  double painted_depth = kFar;
+  double painted_depth = kFar, painted_plane = kFar;
   for (const PaintedStrip* strip : candidates.strips) {
     if (!strip->covers(ray)) continue;
-    const double at = strip->depth(ray);
+    const double plane = strip->plane_depth(ray),
+                 at = std::clamp(plane, strip->nearest_m / kWidenedDepth, strip->farthest_m * kWidenedDepth);
     if (at < kNear_m) continue;
     if (front.facet && std::count(strip->carries.begin(), strip->carries.end(), front.facet->solid)) continue;
-    const bool nearer = at < painted_depth;
-    bool comes_first = nearer || !painted;
-    if (painted && std::max(at, painted_depth) < kFar) {
-      const double gap_m = nearer ? painted->distance_to(ray * at) : strip->distance_to(ray * painted_depth);
+    bool comes_first = !painted || at < painted_depth;
+    if (painted && std::max(plane, painted_plane) < kFar) {
+      const double gap_m =
+          plane < painted_plane ? painted->distance_to(ray * plane) : strip->distance_to(ray * painted_plane);
       if (gap_m < kSameLevel_m) comes_first = strip->rank < painted->rank;
     }
     if (comes_first) {
       painted = strip;
       painted_depth = at;
+      painted_plane = plane;
     }
   }
   if (painted && (!front.facet || painted_depth < front.depth)) {

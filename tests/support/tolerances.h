@@ -23,9 +23,6 @@ constexpr double kPlaneShare = 1e-3;
 constexpr double kDepthError = 1e-3;
 /// Visibility of an agent of 4 pixels or more: the design's promise. The truth's own error is about 0.005 there.
 constexpr double kVisibilityError = 0.02;
-/// Share of values further off than kWorstOracleError where cars have driven into each other: pixels that the line of
-/// intersection crosses show one of the two alone.
-constexpr double kIntersectionShare = 2e-3;
 /// A scene moved as a whole: single precision moves corners by about 1e-5 px for each 100 m from the origin; a sample
 /// may fall to the other side of an edge, worth up to 1/64 of a pixel twice.
 constexpr double kMovedSceneError = 8.0 / 255;
@@ -62,8 +59,6 @@ constexpr ImageTolerance kGoldenKernel{"kernel", kKernelWorstError, kKernelError
 constexpr ImageTolerance kGoldenTruth{"truth", kWorstOracleError, 1.0 / 255, 1, kLeastOraclePsnr_db};
 /// The same for images of a single pixel, in which dozens of things share 64 samples and nothing averages out.
 constexpr ImageTolerance kGoldenTruthOnePixel{"truth, one pixel", 10.0 / 255, 1.0 / 255, 1, 0};
-/// The oracle against the truth and against OpenGL where things intersect: within a pixel, one of them is in front.
-constexpr ImageTolerance kGoldenIntersecting{"intersecting", 36.0 / 255, 1.0 / 255, 1, 50};
 /// The OpenGL baseline against the oracle's pictures, with so many samples squared in a pixel that what they miss is
 /// less than any fault that is to be seen. Measured with Mesa's rasterizer: 52.3 dB and 14/255 at worst; other drivers
 /// place samples and round corners differently.
