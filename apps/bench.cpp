@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <numeric>
 
 #include "pictura/apps/commands.h"
 #include "pictura/apps/drive.h"
@@ -46,9 +47,11 @@ void report_benchmark(bool json, const BenchContext& context, std::vector<BenchR
     std::sort(result.values.begin(), result.values.end());
     const size_t n = result.values.size();
     const double median = 0.5 * (result.values[(n - 1) / 2] + result.values[n / 2]);
+    const double mean = std::accumulate(result.values.begin(), result.values.end(), 0.0) / static_cast<double>(n);
     rows.push_back({{"name", result.name},
                     {"value", median},
                     {"unit", result.unit},
+                    {"mean", mean},
                     {"min", result.values.front()},
                     {"max", result.values.back()},
                     {"repeats", n}});
@@ -63,9 +66,10 @@ void report_benchmark(bool json, const BenchContext& context, std::vector<BenchR
   fmt::print("{}\nbackend {} on {}{}, commit {}\n", context.workload, context.backend, context.device,
              context.driver.empty() ? "" : ", driver " + context.driver, PICTURA_COMMIT);
   for (const Json& row : rows) {
-    fmt::print("{:50} {:>14.6g} {:18} (min {:.6g}, max {:.6g}, {} repeats)\n", row["name"].get<std::string>(),
-               row["value"].get<double>(), row["unit"].get<std::string>(), row["min"].get<double>(),
-               row["max"].get<double>(), row["repeats"].get<int>());
+    fmt::print("{:50} {:>14.6g} {:18} (mean {:.6g}, min {:.6g}, max {:.6g}, {} repeats)\n",
+               row["name"].get<std::string>(), row["value"].get<double>(), row["unit"].get<std::string>(),
+               row["mean"].get<double>(), row["min"].get<double>(), row["max"].get<double>(),
+               row["repeats"].get<int>());
   }
 }
 
@@ -153,7 +157,8 @@ void bench_train(const Arguments& arguments) {
 
 void add_bench_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
-      "bench", "Measure rates and quality: bench render, bench simulate, bench train, bench quality");
+      "bench",
+      "Measure rates, quality and worlds: bench render, bench simulate, bench train, bench quality, bench worlds");
   command->require_subcommand(1);
   command->footer(
       "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n  pictura bench render --size 192x108");
@@ -182,6 +187,7 @@ void add_bench_command(CLI::App& app) {
 #ifdef PICTURA_HAS_BENCH
   add_quality_benchmark(*command);
   add_render_benchmark(*command);
+  add_worlds_benchmark(*command);
 #endif
 }
 

@@ -29,11 +29,12 @@ struct BenchResult {
   std::vector<double> values;  // one per repeat
 };
 
-/// Prints medians with their least and greatest values.
+/// Prints medians and means with their least and greatest values.
 void report_benchmark(bool json, const BenchContext& context, std::vector<BenchResult> results);
 
-/// Add `bench quality` and `bench render`.
+/// Add `bench quality`, `bench render` and `bench worlds`.
 void add_quality_benchmark(CLI::App& bench);
 void add_render_benchmark(CLI::App& bench);
+void add_worlds_benchmark(CLI::App& bench);
 
 }  // namespace pictura

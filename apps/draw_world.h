@@ -1,5 +1,6 @@
-// One simulated world from above: the road map, its lights as they are now, and the agents as boxes. North is up. The
-// map is drawn once, in tiles, so that a frame costs little more than its agents.
+// One simulated world from above: the road map, its lights as they are now, the agents as boxes, where each is headed,
+// and why some have halted. North is up. The map is drawn once, in tiles, so that a frame costs little more than its
+// agents.
 #pragma once
 
 #include <memory>
@@ -19,21 +20,29 @@ struct TopCamera {
   float px_per_m = 4;
 };
 
-/// What moves in one world; spans are read while drawing alone.
-struct WorldFrame {
-  Span<const AgentBox> agents;    // of this world alone
-  Span<const LightState> lights;  // [map.lights]
-  Span<const uint8_t> status;     // [agents] AgentStatus, or empty: all active
-  int highlighted = -1;           // index of an agent that gets a halo, and whose waypoints these are
-  Span<const Vec2> waypoints_m;   // those not yet passed, nearest first
-  std::string caption;            // one line at the top left, or empty
+/// Where an agent is headed.
+struct AgentGoal {
+  int agent = 0;  // index into WorldFrame::agents
+  Vec2 place_m;
 };
 
-/// Draws frames of one size of worlds on one map. The map must outlive it.
+/// What moves in one world; spans are read while drawing alone.
+struct WorldFrame {
+  Span<const AgentBox> agents;      // of this world alone
+  Span<const LightState> lights;    // [map.lights]
+  Span<const uint8_t> status;       // [agents] AgentStatus, or empty: all active
+  Span<const uint8_t> halt_reason;  // [agents] Event bits: a ring in the colour of the reason, and a legend that counts
+  Span<const AgentGoal> goals;      // a thin line leads to each
+  int highlighted = -1;             // index of an agent that gets a halo, and whose waypoints these are
+  Span<const Vec2> waypoints_m;     // those not yet passed, nearest first
+  std::string caption;              // one line at the top left, or empty
+};
+
+/// Draws frames of one size of worlds on one map, with the walls that stand there. The map must outlive it.
 class WorldPainter {
  public:
   /// Throws Error unless both sizes are in [16, 8192] px.
-  WorldPainter(const RoadMap& map, int width_px, int height_px);
+  WorldPainter(const RoadMap& map, int width_px, int height_px, std::vector<WallFace> walls = {});
   ~WorldPainter();
 
   int width_px() const;
@@ -54,8 +63,9 @@ class WorldPainter {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Draws one world of a simulator whose arrays lie in host memory; `followed` (a slot of that world counted from its
-/// first, or -1) is highlighted with its waypoints and, where follow_width_m > 0, the camera stays over it.
+/// Draws one world of a simulator whose arrays lie in host memory, with the active waypoint of everybody who drives;
+/// `followed` (a slot of that world counted from its first, or -1) is highlighted with all its waypoints and, where
+/// follow_width_m > 0, the camera stays over it.
 RgbImage draw_world(WorldPainter& painter, Simulator& simulator, int world, int followed = -1, float follow_width_m = 0,
                     const std::string& caption = {});
 

@@ -1,4 +1,4 @@
-// A film of one world: from above, following one agent, with that agent's four cameras beneath.
+// A film of one world: from above, with one agent's four cameras beneath.
 #pragma once
 
 #include <memory>
@@ -11,8 +11,9 @@ namespace pictura {
 
 class Film {
  public:
-  /// Opens the file; its format is that of its ending, .mp4 or .gif. Throws Error naming the path.
-  Film(const std::string& path, const Simulator& simulator, int agent, int num_threads);
+  /// Opens the file; its format is that of its ending, .mp4 or .gif. From above it shows `width_m` metres around the
+  /// agent, or with 0 the whole map. Throws Error naming the path.
+  Film(const std::string& path, const Simulator& simulator, int agent, float width_m, int num_threads);
   ~Film();
   /// Adds the simulator's present state.
   void add_frame(Simulator& simulator);

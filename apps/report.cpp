@@ -45,6 +45,11 @@ void ProgressLine::update(const std::string& text) {
   dirty_ = terminal;
 }
 
+void ProgressLine::update(const std::string& text, double done) {
+  const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  update(fmt::format("{}  ETA {}", text, format_duration(elapsed_s * (1 - done) / done)));
+}
+
 void ProgressLine::finish() {
   if (!dirty_) return;
   std::fprintf(stderr, isatty(STDERR_FILENO) ? "\r\033[K%s\n" : "%s\n", text_.c_str());

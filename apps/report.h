@@ -30,13 +30,15 @@ class ProgressLine {
  public:
   ~ProgressLine();
   void update(const std::string& text);
+  /// With the time that is left, when `done` of the work has been done since this line was made.
+  void update(const std::string& text, double done);
   /// Prints the last text once and for all.
   void finish();
 
  private:
   std::string text_;
   bool dirty_ = false;
-  std::chrono::steady_clock::time_point last_print_{};
+  std::chrono::steady_clock::time_point last_print_{}, begin_ = std::chrono::steady_clock::now();
 };
 
 /// Parses "AxB" with both numbers in [1, max]. Throws UsageError naming the option.

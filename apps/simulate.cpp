@@ -1,5 +1,6 @@
 // `pictura simulate`: drives one world with a policy, counts what happens, and films it from above and from the
 // cameras.
+#include <array>
 #include <chrono>
 
 #include "pictura/apps/commands.h"
@@ -20,16 +21,28 @@ struct Arguments {
   int steps = 300;
   std::string policy = "random", backend = "auto", video;
   int film_agent = 0;
+  float film_width_m = 150;
   bool json = false;
 };
+
+std::array<int64_t, kNumAgentClasses> spawned_by_class(Simulator& simulator) {
+  const AgentStateView state = simulator.state();
+  std::array<int64_t, kNumAgentClasses> counts{};
+  for (int slot = 0; slot < simulator.num_slots(); ++slot) {
+    counts[state.agent_class[slot]] += state.status[slot] != static_cast<uint8_t>(AgentStatus::absent);
+  }
+  return counts;
+}
 
 void run(const Arguments& arguments) {
   const auto pilot = make_pilot(arguments.policy, arguments.world.seed, arguments.backend, arguments.world.num_threads);
   const auto simulator = make_world(arguments.world, pilot.get());
   const SpawnReport spawned = simulator->spawn_report();
+  const auto of_class = spawned_by_class(*simulator);
   std::unique_ptr<Film> film;
   if (!arguments.video.empty()) {
-    film = std::make_unique<Film>(arguments.video, *simulator, arguments.film_agent, arguments.world.num_threads);
+    film = std::make_unique<Film>(arguments.video, *simulator, arguments.film_agent, arguments.film_width_m,
+                                  arguments.world.num_threads);
   }
 
   std::vector<int32_t> actions(static_cast<size_t>(simulator->num_slots()));
@@ -42,7 +55,7 @@ void run(const Arguments& arguments) {
     const auto begin = std::chrono::steady_clock::now();
     simulator->step(actions);
     simulate_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    line.update(fmt::format("step {}/{}", step + 1, arguments.steps));
+    line.update(fmt::format("step {}/{}", step + 1, arguments.steps), static_cast<double>(step + 1) / arguments.steps);
   }
   line.finish();
   if (film) film->close();
@@ -55,6 +68,11 @@ void run(const Arguments& arguments) {
                     {"refused", spawned.refused},
                     {"refused_no_place", spawned.refused_no_place},
                     {"refused_taken", spawned.refused_taken},
+                    {"vehicles", of_class[static_cast<size_t>(AgentClass::vehicle)]},
+                    {"cyclists", of_class[static_cast<size_t>(AgentClass::cyclist)]},
+                    {"pedestrians", of_class[static_cast<size_t>(AgentClass::pedestrian)]},
+                    {"parked_asked", spawned.parked_asked},
+                    {"parked_placed", spawned.parked_placed},
                     {"steps", step},
                     {"agent_steps", totals.agent_steps},
                     {"agent_steps_per_s", finite_or_null(static_cast<double>(totals.agent_steps) / simulate_s)},
@@ -91,8 +109,13 @@ void add_simulate_command(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--backend", arguments->backend, "Renderer for policies that see: cpu, cuda or auto")
       ->capture_default_str();
-  command->add_option("--video", arguments->video,
-                      "Film it into this .mp4 or .gif: from above and from one agent's cameras");
+  command->add_option(
+      "--video", arguments->video,
+      "Film it into this .mp4 or .gif: from above, with goals, lights and why agents halted, and from one "
+      "agent's cameras");
+  command->add_option("--film-width", arguments->film_width_m, "Metres that it shows from above; 0: the whole map")
+      ->check(CLI::Range(0.0, 1e5))
+      ->capture_default_str();
   command->add_option("--film-agent", arguments->film_agent, "The agent that the film follows")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();

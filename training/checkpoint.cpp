@@ -85,11 +85,7 @@ T at_offset(const std::string& bytes, size_t offset) {
   return value;
 }
 
-std::string hash_of(std::string_view bytes) {
-  Hash64 hash;
-  hash.add_bytes(bytes.data(), bytes.size());
-  return hash.hex();
-}
+std::string hash_text(std::string_view bytes) { return fmt::format("{:016x}", hash_of(bytes)); }
 
 }  // namespace
 
@@ -124,7 +120,7 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
   header["second_moments"] = describe(checkpoint.second_moments);
   header["simulator"] = {{"offset", data.size()}, {"bytes", checkpoint.simulator.size()}};
   data.append(reinterpret_cast<const char*>(checkpoint.simulator.data()), checkpoint.simulator.size());
-  header["data"] = {{"bytes", data.size()}, {"hash", hash_of(data)}};
+  header["data"] = {{"bytes", data.size()}, {"hash", hash_text(data)}};
 
   const std::string text = header.dump();
   std::string file(kMagic, sizeof kMagic);
@@ -160,7 +156,7 @@ Checkpoint read_checkpoint(const std::string& path) {
     const auto data_bytes = header.at("data").at("bytes").get<uint64_t>();
     PICTURA_CHECK(data.size() == data_bytes, "{}: truncated: expected {} bytes of data, got {}", path, data_bytes,
                   data.size());
-    PICTURA_CHECK(hash_of(data) == header.at("data").at("hash").get<std::string>(),
+    PICTURA_CHECK(hash_text(data) == header.at("data").at("hash").get<std::string>(),
                   "{}: damaged: its data do not have the hash that its header names", path);
 
     auto tensors = [&](const char* list) {

@@ -28,6 +28,9 @@ TINY = [
 ]  # fmt: skip
 
 
+TOWNS = sorted(path.stem for path in pathlib.Path(os.environ.get("PICTURA_DATA", "/nowhere")).glob("carla/*.xodr"))
+
+
 def run(*arguments, timeout=300):
     return subprocess.run([PICTURA, *map(str, arguments)], capture_output=True, text=True, timeout=timeout)
 
@@ -266,6 +269,39 @@ class Simulation(CommandCase):
         self.assertEqual(result["spawned"] + result["refused"], 1024)
         self.assertGreater(result["refused"], 0)
 
+    @unittest.skipUnless(TOWNS, "no towns: set PICTURA_DATA")
+    def test_every_town_takes_a_thousand_agents_or_says_why_not(self):
+        for town in TOWNS:
+            with self.subTest(town):
+                result = self.json_of("simulate", town, "--agents", 1024, "--steps", 2, "--policy", "idle")
+                self.assertEqual(result["asked"], 1024)
+                self.assertEqual(result["spawned"] + result["refused"], 1024)
+                self.assertEqual(result["refused_no_place"] + result["refused_taken"], result["refused"])
+                self.assertEqual(result["vehicles"] + result["cyclists"] + result["pedestrians"], result["spawned"])
+                self.assertGreater(result["vehicles"], 5 * result["cyclists"])
+                self.assertGreater(result["pedestrians"], 0)
+
+    def test_the_population_is_what_is_asked_for(self):
+        town = self.town()
+        result = self.json_of("simulate", town, "--agents", 40, "--steps", 1, "--pedestrians", 0, "--cyclists", 1, "--parked", 3)
+        self.assertEqual((result["vehicles"], result["cyclists"], result["pedestrians"]), (0, result["spawned"], 0))
+        self.assertEqual(result["parked_asked"], 3)
+        self.assertLessEqual(result["parked_placed"], 3)
+        self.assert_refused(2, "fractions", "simulate", town, "--pedestrians", 0.7, "--cyclists", 0.7)
+        self.assert_refused(2, "--parked", "simulate", town, "--parked", -1)
+
+    def test_distributions_over_episodes(self):
+        result = self.json_of("bench", "worlds", "--map", self.town(), "--episodes", 3, "--agents", 30)
+        values = {row["name"].split(": ", 1)[1]: row for row in result["results"]}
+        self.assertEqual({row["repeats"] for row in result["results"]}, {3})
+        classes = sum(values[name]["mean"] for name in ("vehicles", "cyclists", "pedestrians"))
+        refused = sum(values[name]["mean"] for name in ("refused, places taken", "refused, no place"))
+        self.assertAlmostEqual(classes + refused, 30)
+        self.assertEqual(values["of these out of reach"]["max"], 0)
+        self.assertGreater(values["random policy: collisions"]["mean"] + values["random policy: off-road"]["mean"], 0)
+        self.assertGreater(values["lane driver: goals"]["mean"], 0)
+        self.assertEqual(values["lane driver: red lights"]["max"], 0)
+
     @unittest.skipUnless(shutil.which("ffmpeg"), "no ffmpeg on this machine")
     def test_a_video_is_written(self):
         video = self.folder / "drive.mp4"
@@ -276,6 +312,7 @@ class Simulation(CommandCase):
         simulate = ["simulate", self.town()]
         self.assert_refused(2, "--agents", *simulate, "--agents", 0)
         self.assert_refused(2, "100000000", *simulate, "--agents", 100_000_000)
+        self.assert_refused(2, "4097", *simulate, "--agents", 4097)
         self.assert_refused(1 if has_torch() else 2, "no/such.ckpt", *simulate, "--policy", "no/such.ckpt")
         if shutil.which("ffmpeg"):
             self.assert_refused(1, "/proc/nowhere", *simulate, "--agents", 2, "--steps", 2, "--video", "/proc/nowhere/a.mp4")

@@ -145,6 +145,64 @@ TEST(WorldPainter, DrawsNobodyWhoIsAbsentAndDimsTheHalted) {
   EXPECT_THAT(test::message_of([&] { painter.draw(frame, painter.whole_map()); }), HasSubstr("4 agents, got 3"));
 }
 
+TEST(WorldPainter, RingsSayWhyAgentsHaltedAndTheLegendCountsThem) {
+  WorldPainter painter(town(), 800, 600);
+  const std::vector<AgentBox> agents{box(500, 400, 0), box(510, 400, 0), box(500, 410, 0), box(510, 410, 0)};
+  const auto active = static_cast<uint8_t>(AgentStatus::active), halted = static_cast<uint8_t>(AgentStatus::halted);
+  const std::vector<uint8_t> status{halted, halted, active, halted};
+  std::vector<uint8_t> reasons{kEventCollision | kEventAtFault, kEventRedLight, 0, kEventOffRoad};
+  WorldFrame frame;
+  frame.agents = agents;
+  frame.status = status;
+  frame.halt_reason = reasons;
+  const TopCamera camera = painter.around({500, 400}, 80);  // 10 px a metre, rings of 30 px about boxes of 5 m
+  const RgbImage image = painter.draw(frame, camera);
+  const auto ring = [&](size_t agent) {
+    return at(image, painter.pixel_of(camera, agents[agent].center_m.xy()) + Vec2{0, 30});
+  };
+  const Pixel collision{255, 59, 78}, red_light{226, 59, 208}, off_road{255, 154, 31}, wall{201, 138, 75};
+  EXPECT_LT(distance(ring(0), collision), 20);
+  EXPECT_LT(distance(ring(1), red_light), 20);
+  EXPECT_EQ(ring(2), kGround);
+  EXPECT_LT(distance(ring(3), off_road), 20);
+  EXPECT_EQ(count(image, wall), 100) << "in the legend alone, a square of 10 px";
+  // Another count is another legend; the digits stand in its bottom left corner.
+  reasons[1] = kEventCollision;
+  const RgbImage more = painter.draw(frame, camera);
+  int different = 0;
+  for (int y = 600 - 120; y < 590; ++y) {
+    for (int x = 10; x < 142; ++x) different += at(image, x, y) != at(more, x, y);
+  }
+  EXPECT_GT(different, 20);
+  frame.status = {};
+  EXPECT_THAT(error_of([&] { painter.draw(frame, camera); }), HasSubstr("4 agents, got 0 and 4"));
+}
+
+TEST(WorldPainter, WallsStandOnTheGround) {
+  WorldPainter painter(town(), 400, 300, {{{490, 400, 0}, {510, 400, 0}, 5}});
+  const TopCamera camera = painter.around({500, 400}, 40);
+  const RgbImage image = painter.draw({}, camera);
+  EXPECT_EQ(at(image, 200, 150), (Pixel{122, 101, 82}));
+  EXPECT_EQ(at(image, 200, 160), kGround);
+  EXPECT_EQ(at(image, 320, 150), kGround) << "beyond its end";
+}
+
+TEST(WorldPainter, LinesLeadToGoals) {
+  WorldPainter painter(town(), 400, 300);
+  const std::vector<AgentBox> agents{box(500, 400, 0)};
+  const std::vector<AgentGoal> goals{{0, {500, 410}}};
+  WorldFrame frame;
+  frame.agents = agents;
+  frame.goals = goals;
+  const TopCamera camera = painter.around({500, 400}, 40);
+  const RgbImage image = painter.draw(frame, camera);
+  const Vec2 goal = painter.pixel_of(camera, {500, 410});
+  EXPECT_EQ(at(painter.draw({.agents = agents}, camera), goal), kGround);
+  EXPECT_NE(at(image, goal), kGround);
+  EXPECT_NE(at(image, goal + Vec2{0, 30}), kGround) << "on the way";
+  EXPECT_EQ(at(image, goal - Vec2{0, 10}), kGround) << "beyond";
+}
+
 TEST(WorldPainter, MovingTheCameraMovesThePictureAndNothingElse) {
   // 8 px a metre, so that 16 m are 128 px and the cached tiles are cut elsewhere.
   WorldPainter painter(town(), 640, 480), fresh(town(), 640, 480);
@@ -211,6 +269,7 @@ class StillSimulator final : public Simulator {
   StillSimulator() {
     agents_ = {box(500, 400, 0), box(500, 410, 0), box(500, 400, kPi), box(520, 400, 0), box(500, 390, 0)};
     state_.status = status_.data();
+    state_.halt_reason = halt_reason_.data();
     state_.next_waypoint = next_waypoint_.data();
     state_.waypoint_x_m = waypoint_x_m_.data();
     state_.waypoint_y_m = waypoint_y_m_.data();
@@ -256,6 +315,7 @@ class StillSimulator final : public Simulator {
   std::vector<LightState> lights_;
   // Only slot 2 has waypoints to show, of which the first is passed.
   std::vector<uint8_t> status_{0, 0, 0, 1};
+  std::vector<uint8_t> halt_reason_{0, 0, 0, kEventWall};
   std::vector<int32_t> next_waypoint_{0, 0, 1, 0};
   std::vector<float> waypoint_x_m_ = std::vector<float>(12, 505.0f);
   std::vector<float> waypoint_y_m_{0, 0, 0, 0, 0, 0, 395, 400, 405, 0, 0, 0};

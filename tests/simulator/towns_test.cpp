@@ -10,6 +10,8 @@
 #include "pictura/simulator/rules/spawn.h"
 #include "pictura/simulator/simulator.h"
 #include "pictura/simulator/world_batch.h"
+#include "pictura/tests/simulator/goal_places.h"
+#include "pictura/tests/simulator/test_maps.h"
 
 namespace pictura {
 namespace {
@@ -96,36 +98,48 @@ TEST(Towns, ParkedCarsLeaveTheLanesFree) {
 TEST(Towns, EveryGoalCanBeReached) {
   for (const std::string& town : all_towns()) {
     SCOPED_TRACE(town);
-    SimulatorConfig config = whole_world();
     const auto map = load_map(town);
-    const auto simulator = make_simulator("cpu", config, {map}, {{0, 150, 0}});
-    WorldBatch batch(config, {map}, {{0, 150, 0}});
-    batch.restore(simulator->save());
+    WorldBatch batch(whole_world(), {map}, {{0, 150, 0}});
+    batch.restore(make_simulator("cpu", whole_world(), {map}, {{0, 150, 0}})->save());
     const WorldView world = batch.world(0);
-    const LaneGraph graph(*map);
-    int unreachable = 0, chains = 0;
+    // What is drawn again is what the agents were given.
     for (int agent = 0; agent < 150; ++agent) {
-      if (!is_active(world, agent) || walks(world, agent)) continue;
-      // From the first place on, chain after chain, waypoint after waypoint.
-      RoutePoint at = spawn_point(world, agent, 0);
-      for (uint32_t chain = 0; chain < 4; ++chain, ++chains) {
-        RandomStream random = agent_stream(world, agent, chain, Purpose::goals);
-        for (int k = 0; k < kNumWaypoints; ++k) {
-          const RoutePoint next = next_waypoint(world.map, at, &random);
-          const auto place = [&](RoutePoint p) {
-            return LanePlace{p.lane, std::min(p.s_m, map->lanes[static_cast<size_t>(p.lane)].length_m)};
-          };
-          const auto route = graph.route(place(at), place(next));
-          // The gap itself, but for what neighbours differ in length, and a lane of the network's end.
-          unreachable += !route || route->length_m > 2 * kMaxWaypointGap_m;
-          EXPECT_TRUE(map->lanes[static_cast<size_t>(next.lane)].is_endless);
-          at = next;
-        }
+      if (!is_active(world, agent)) continue;
+      const auto places = testing::goal_places(world, agent, 0, testing::spawn_place(world, agent));
+      for (int i = 0; i < kNumWaypoints; ++i) {
+        const Vec3 given = waypoint_of(world.agents, agent, i);
+        const Vec3 drawn = pose_of(world, agent, places[static_cast<size_t>(i)]).position_m;
+        ASSERT_TRUE(given.x == drawn.x && given.y == drawn.y && given.z == drawn.z);
       }
     }
-    EXPECT_GT(chains, 300);
-    EXPECT_EQ(unreachable, 0) << "of " << chains * kNumWaypoints;
+    const auto [on_roads, on_walkways] = testing::follow_goals(world, LaneGraph(*map), 4);
+    EXPECT_GT(on_roads.waypoints, 1000);
+    EXPECT_GT(on_walkways.waypoints, 40);
+    EXPECT_EQ(on_roads.unreachable, 0) << "of " << on_roads.waypoints;
+    EXPECT_EQ(on_walkways.unreachable, 0) << "of " << on_walkways.waypoints;
   }
+}
+
+/// The count above must be able to find what is cut off.
+TEST(Towns, GoalsBeyondAWallCannotBeReached) {
+  const auto map = testing::stadium(200, 1);
+  for (const float y_m : {-5.0f, -8.0f}) {
+    testing::add_side_lane(map.get(), LaneType::sidewalk, {{0, y_m, 0}, {100, y_m, 0}, {200, y_m, 0}});
+  }
+  SimulatorConfig config = testing::cars();
+  config.pedestrian_fraction = 1;
+  const auto unreachable = [&] {
+    WorldBatch batch(config, {map}, {{0, 20, 0}});
+    batch.restore(make_simulator("cpu", config, {map}, {{0, 20, 0}})->save());
+    const auto [on_roads, on_walkways] = testing::follow_goals(batch.world(0), LaneGraph(*map), 4);
+    EXPECT_EQ(on_roads.waypoints, 0);
+    EXPECT_GT(on_walkways.waypoints, 100);
+    return on_walkways.unreachable;
+  };
+  EXPECT_EQ(unreachable(), 0);
+  // A wall across one of the two; the first piece of a building line always stands.
+  map->building_lines = {{{100, -9, 0}, {100, -7, 0}}};
+  EXPECT_GT(unreachable(), 0);
 }
 
 }  // namespace

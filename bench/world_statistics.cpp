@@ -1,0 +1,139 @@
+#include "pictura/bench/world_statistics.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "pictura/common/error.h"
+#include "pictura/common/interrupt.h"
+#include "pictura/simulator/world_batch.h"
+#include "pictura/tests/simulator/goal_places.h"
+#include "pictura/tests/simulator/lane_driver.h"
+
+namespace pictura {
+
+namespace {
+
+/// Quantities in the order in which they were first counted.
+class Counts {
+ public:
+  explicit Counts(int episodes) : episodes_(static_cast<size_t>(episodes)) {}
+
+  double& of(const std::string& name, const std::string& unit, size_t episode) {
+    auto found = std::find_if(all_.begin(), all_.end(), [&name](const EpisodeValues& v) { return v.name == name; });
+    if (found == all_.end()) found = all_.insert(all_.end(), {name, unit, std::vector<double>(episodes_)});
+    return found->values[episode];
+  }
+  std::vector<EpisodeValues> take() { return std::move(all_); }
+
+ private:
+  size_t episodes_;
+  std::vector<EpisodeValues> all_;
+};
+
+/// Who was placed, who was not and why, and which goals are out of reach.
+void count_population(WorldBatch& batch, const LaneGraph& graph, Counts* counts_inout) {
+  constexpr const char* kClasses[kNumAgentClasses] = {"vehicles", "cyclists", "pedestrians"};
+  static_assert(static_cast<int>(AgentClass::cyclist) == 1 && static_cast<int>(AgentClass::pedestrian) == 2);
+  for (int w = 0; w < batch.num_worlds(); ++w) {
+    const WorldView world = batch.world(w);
+    const auto episode = static_cast<size_t>(w);
+    const auto count = [&](const char* name, const char* unit, double value) {
+      counts_inout->of(name, unit, episode) += value;
+    };
+    for (const char* name : kClasses) count(name, "agents", 0);
+    count("refused, places taken", "agents", 0);
+    count("refused, no place", "agents", 0);
+    for (int agent = 0; agent < world.num_agents; ++agent) {
+      const int slot = world.first_slot + agent;
+      switch (static_cast<Refusal>(world.agents.refusal[slot])) {
+        case Refusal::none: count(kClasses[world.agents.agent_class[slot]], "agents", 1); break;
+        case Refusal::taken: count("refused, places taken", "agents", 1); break;
+        case Refusal::no_place: count("refused, no place", "agents", 1); break;
+      }
+    }
+    for (int i = world.num_agents; i < world.num_boxes; ++i) count("parked cars", "cars", world.boxes[i].drawn);
+    const auto [on_roads, on_walkways] = testing::follow_goals(world, graph, 1);
+    count("waypoints of the first chains", "waypoints",
+          static_cast<double>(on_roads.waypoints + on_walkways.waypoints));
+    count("of these out of reach", "waypoints", static_cast<double>(on_roads.unreachable + on_walkways.unreachable));
+    if (interrupted()) throw Interrupted("interrupted");
+  }
+}
+
+void drive_randomly(Simulator& simulator, const WorldStatisticsOptions& options, Counts* counts_inout) {
+  constexpr std::pair<const char*, Event> kEvents[] = {
+      {"random policy: collisions", kEventCollision}, {"random policy: of these at fault", kEventAtFault},
+      {"random policy: off-road", kEventOffRoad},     {"random policy: wall contacts", kEventWall},
+      {"random policy: red lights", kEventRedLight},  {"random policy: goals", kEventMetricGoal}};
+  const AgentStateView state = simulator.state();
+  const std::vector<WorldSpec>& worlds = simulator.worlds();
+  std::vector<int32_t> actions(static_cast<size_t>(simulator.num_slots()));
+  const auto in_first_episode = [](int32_t episode) { return episode == 0; };
+  for (uint32_t step = 0;; ++step) {
+    const Span<const int32_t> before = simulator.episode_index();
+    const std::vector<int32_t> episode(before.begin(), before.end());
+    if (std::none_of(episode.begin(), episode.end(), in_first_episode)) break;
+    for (size_t slot = 0; slot < actions.size(); ++slot) {
+      actions[slot] =
+          RandomStream(options.seed, 0, static_cast<uint32_t>(slot), 0, step, Purpose::action).below(kNumActions);
+    }
+    const StepResult result = simulator.step(actions);
+    size_t slot = 0;
+    for (size_t w = 0; w < worlds.size(); ++w) {
+      const bool counts = episode[w] == 0 && simulator.episode_index()[w] == 0;
+      counts_inout->of("random policy: steps", "steps", w) += counts;
+      for (const size_t end = slot + static_cast<size_t>(worlds[w].num_agents); slot < end; ++slot) {
+        for (const auto& [name, event] : kEvents) {
+          counts_inout->of(name, "agents", w) += counts && result.valid[slot] && (state.events[slot] & event) != 0;
+        }
+      }
+    }
+    if (interrupted()) throw Interrupted("interrupted");
+    if (options.on_progress && step % 10 == 0) options.on_progress(fmt::format("random policy, step {}", step));
+  }
+}
+
+void drive_lanes(const std::shared_ptr<const RoadMap>& map, const SimulatorConfig& config, int episodes,
+                 Counts* counts_inout) {
+  constexpr std::pair<const char*, Event> kReasons[] = {{"lane driver: off-road", kEventOffRoad},
+                                                        {"lane driver: wall contacts", kEventWall},
+                                                        {"lane driver: red lights", kEventRedLight}};
+  const auto driven = testing::drive_lanes(map, config, episodes, config.episode_steps);
+  for (size_t w = 0; w < driven.size(); ++w) {
+    counts_inout->of("lane driver: goals", "goals", w) = driven[w].goals;
+    counts_inout->of("lane driver: distance", "m", w) = driven[w].distance_m;
+    counts_inout->of("lane driver: wait at red lights", "s", w) = driven[w].stops * static_cast<double>(config.dt_s);
+    for (const auto& [name, event] : kReasons) {
+      counts_inout->of(name, "drivers", w) = (driven[w].halt_reason & event) != 0;
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<EpisodeValues> measure_worlds(const std::shared_ptr<const RoadMap>& map,
+                                          const WorldStatisticsOptions& options) {
+  const auto say = [&options](const std::string& phase) {
+    if (options.on_progress) options.on_progress(phase);
+  };
+  SimulatorConfig config;
+  config.seed = options.seed;
+  config.num_threads = options.num_threads;
+  config.vector_observations = false;
+  std::vector<WorldSpec> worlds;
+  for (int w = 0; w < options.episodes; ++w) worlds.push_back({0, options.agents, static_cast<uint32_t>(w)});
+  const auto simulator = make_simulator("cpu", config, {map}, worlds);
+  Counts counts(options.episodes);
+  say("goals");
+  WorldBatch batch(config, {map}, worlds);
+  batch.restore(simulator->save());
+  count_population(batch, LaneGraph(*map), &counts);
+  drive_randomly(*simulator, options, &counts);
+  say("lane driver");
+  config.cyclist_fraction = 0;
+  drive_lanes(map, config, options.episodes, &counts);
+  return counts.take();
+}
+
+}  // namespace pictura
