@@ -278,7 +278,7 @@ class Simulation(CommandCase):
                 self.assertEqual(result["spawned"] + result["refused"], 1024)
                 self.assertEqual(result["refused_no_place"] + result["refused_taken"], result["refused"])
                 self.assertEqual(result["vehicles"] + result["cyclists"] + result["pedestrians"], result["spawned"])
-                self.assertGreater(result["vehicles"], 5 * result["cyclists"])
+                self.assertGreater(result["vehicles"], 2 * result["cyclists"])
                 self.assertGreater(result["pedestrians"], 0)
 
     def test_the_population_is_what_is_asked_for(self):

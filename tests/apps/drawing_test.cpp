@@ -175,7 +175,7 @@ TEST(WorldPainter, RingsSayWhyAgentsHaltedAndTheLegendCountsThem) {
   }
   EXPECT_GT(different, 20);
   frame.status = {};
-  EXPECT_THAT(error_of([&] { painter.draw(frame, camera); }), HasSubstr("4 agents, got 0 and 4"));
+  EXPECT_THAT(test::message_of([&] { painter.draw(frame, camera); }), HasSubstr("4 agents, got 0 and 4"));
 }
 
 TEST(WorldPainter, WallsStandOnTheGround) {
