@@ -149,6 +149,49 @@ TEST(Collision, ACyclistAtTheRearCornerIsAtFaultAlone) {
   EXPECT_EQ(stage.events(1), kEventCollision);
 }
 
+/// A straight road with something at x = 100, and a car that comes at 20 m/s: 2 m a step, from anywhere in between.
+struct At20MetresPerSecond : ::testing::Test {
+  /// The first event that the car meets on the way from x = 80 to x = 110, or none.
+  int meets(testing::Stage* stage, float phase_m) {
+    stage->put(0, {80 + phase_m, 0}, 0, 20);
+    for (int i = 0; i < 15; ++i) {
+      stage->step();
+      if (stage->events(0) != kEventNone) return stage->events(0);
+    }
+    return kEventNone;
+  }
+};
+
+TEST_F(At20MetresPerSecond, NothingIsPassedUnnoticed) {
+  auto map = testing::stadium(200, 1);
+  testing::Stage free_road(map, 1), walker(map, 2);
+  walker.batch.agents.length_m[1] = walker.batch.agents.width_m[1] = 0.4f;
+  map = testing::stadium(200, 1);
+  map->building_lines = {{{100, 1, 0}, {100, -1, 0}}};  // across the road; the first piece always stands
+  testing::Stage wall(map, 1);
+  map = testing::stadium(200, 1);
+  map->road_edges.push_back({{100, 0.2f, 0}, {100, -0.2f, 0}});
+  testing::Stage edge(map, 1);
+  map = testing::stadium(200, 1);
+  testing::add_light(map.get(), 100, 4, 1, {0});
+  testing::Stage light(map, 1), waypoint(testing::stadium(200, 1), 1);
+  light.batch.lights[0] = LightState::red;
+  waypoint.set(0, Conditioning::delta_goal_m, 0.5f);
+  for (float phase_m = 0; phase_m < 2; phase_m += 0.1f) {
+    SCOPED_TRACE(phase_m);
+    EXPECT_EQ(meets(&free_road, phase_m), kEventNone);
+    walker.put(1, {100, 0.9f}, kHalfPi, 0);
+    EXPECT_EQ(meets(&walker, phase_m), kEventCollision | kEventAtFault);
+    EXPECT_EQ(meets(&wall, phase_m), kEventWall);
+    EXPECT_EQ(meets(&edge, phase_m), kEventOffRoad);
+    EXPECT_EQ(meets(&light, phase_m), kEventRedLight);
+    waypoint.batch.agents.waypoint_x_m[0] = 100;
+    waypoint.batch.agents.waypoint_y_m[0] = 0.45f;
+    waypoint.batch.agents.next_waypoint[0] = 0;
+    EXPECT_EQ(meets(&waypoint, phase_m), kEventWaypoint);
+  }
+}
+
 TEST(Collision, SegmentTouchesBox) {
   const OrientedBox box = footprint(make_box(0, 0, 0.3f));
   EXPECT_TRUE(touches(box, {-10, 0}, {10, 0}));

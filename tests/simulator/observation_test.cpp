@@ -65,6 +65,30 @@ TEST_F(Observation, PartnersAreTheNearestInOrder) {
   }
 }
 
+TEST(ObservationOfParkedCars, IsThatOfPartnersAtRest) {
+  SimulatorConfig config = testing::cars();
+  config.parked_cars = 1;
+  testing::Stage parking(testing::stadium(200, 2), 2, config);
+  AgentBox& car = parking.batch.boxes[2];
+  car.center_m = {95, -3.5f, 0.5f};
+  car.cos_heading = 0;
+  car.sin_heading = 1;
+  car.length_m = 5;
+  car.width_m = 1.8f;
+  car.height_m = 1.5f;
+  car.palette = 2;
+  car.drawn = 1;
+  parking.put(1, {130, 4}, kPi, 2);
+  parking.put(0, {100, 0.5f}, 0.1f, 6);
+  observe(parking.world(), 0, true, parking.results.observation_view());
+  const ObservationView out = parking.results.observation_view();
+  ASSERT_EQ(out.set_counts[0], 2);
+  const float c = std::cos(0.1f), s = std::sin(0.1f);
+  const float expected[kPartnerFeatures] = {(-5 * c - 4 * s) / 120,   (5 * s - 4 * c) / 120,    0.05f, 5 / 6.0f, 0.6f,
+                                            std::cos(kHalfPi - 0.1f), std::sin(kHalfPi - 0.1f), 0};
+  for (size_t i = 0; i < kPartnerFeatures; ++i) EXPECT_NEAR(out.partners[i], expected[i], 1e-5) << i;
+}
+
 TEST_F(Observation, AuxiliarySlotsCanBeZero) {
   stage.batch.options.auxiliary_observations = false;
   look();

@@ -206,6 +206,27 @@ TEST(Simulator, EpisodesEndInTimeAndResetInTheNextStep) {
   EXPECT_EQ(totals.finished_agent_episodes, 3);
 }
 
+TEST(Simulator, AnEpisodeLasts1280Steps) {
+  const auto simulator =
+      make(testing::cars({.num_threads = 1, .vector_observations = false}), testing::ring_road(40), {{0, 2, 0}});
+  const std::vector<int32_t> actions(2, kCoast);
+  for (int step = 1; step < 1280; ++step) ASSERT_EQ(simulator->step(actions).truncated[0], 0) << step;
+  EXPECT_EQ(simulator->step(actions).truncated[0], 1);
+}
+
+TEST(Simulator, AWorldHolds4096Agents) {
+  const auto map = load_map("procedural:1");
+  const auto simulator = make({.vector_observations = false}, map, {{0, kMaxAgentsPerWorld, 0}});
+  EXPECT_EQ(kMaxAgentsPerWorld, 4096);
+  run(simulator.get(), 3);
+  const SpawnReport report = simulator->spawn_report();
+  EXPECT_EQ(report.asked, 4096);
+  EXPECT_EQ(report.spawned + report.refused, 4096);
+  EXPECT_GT(report.spawned, 500);
+  EXPECT_GT(simulator->totals().agent_steps, 2 * report.spawned);
+  EXPECT_THROW(make({}, map, {{0, kMaxAgentsPerWorld + 1, 0}}), UsageError);
+}
+
 TEST(Simulator, InfractionsTerminateAndTooManyOfThemEndTheEpisode) {
   // Full throttle straight on leaves the ring; the fourth of ten to halt ends the episode.
   const auto simulator = make(testing::cars(), testing::ring_road(40), {{0, 10, 0}});
