@@ -42,7 +42,7 @@ void ImageDrawer::prepare(const ImageRequest& request) {
 bool ImageDrawer::stands(uint32_t solid, uint32_t strip) const {
   const StaticGeometryView& pieces = request_.geometry->pieces;
   return stands_on(extent_of(solid, pieces, *request_.scene, world_begin()),
-                   extent_of(strip, pieces, *request_.scene, world_begin()));
+                   extent_of(strip, pieces, *request_.scene, world_begin()), setting_.camera.position_m);
 }
 
 // Calls visit(y, pixel, span) for each row of a face within some rows; pixel is the index of the row's first.

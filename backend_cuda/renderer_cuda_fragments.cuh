@@ -168,7 +168,7 @@ __device__ bool stands(const Memory& memory, const DrawTask& task, uint32_t soli
   const ViewState& view = memory.state->view;
   const StaticGeometryView& pieces = view.geometry->raster.pieces;
   return stands_on(extent_of(solid, pieces, task.scene, view.world_begin),
-                   extent_of(strip, pieces, task.scene, view.world_begin));
+                   extent_of(strip, pieces, task.scene, view.world_begin), memory.state->setting.camera.position_m);
 }
 
 // Weighs the fragments of a pixel: visit(fragment, weight) hears of each. Returns the pixel's colour.

@@ -12,8 +12,10 @@ namespace {
 // from the camera by its place in the order of ranks: by steps well above the rounding of depths (hardware interpolates
 // them to 24 bits of the whole range), and in all by less than what parts two levels of road.
 constexpr float kPushStep = 1e-4f, kMostPush = 0.02f;
-// What the compared depth of a corner beyond the horizon of a strip's plane is a multiple of: as good as infinite.
-constexpr float kLeastNearness = 1e-4f;
+
+// Bounds on what the compared depth of a strip's corner is divided by: as good as infinitely far, beyond the horizon of
+// its plane, and as near as the oracle lets it come.
+constexpr float kLeastNearness = 1e-4f, kMostNearness = kWidenedDepth;
 
 // A strip's plane, lowered, where it is below the camera, by how far solids that stand on it may dip into it: compared
 // by depth, they are then in front.
@@ -26,7 +28,8 @@ FacePlane lowered(const FacePlane& plane, const PinholeCamera& camera) {
 
 // Depth of a corner over the depth of the plane there. The floor on a strip's width moves its corners out of its plane.
 float nearness(const FacePlane& plane, Vec3 corner) {
-  return plane.offset == 0.0f ? 1.0f : std::max(dot(plane.normal, corner) / plane.offset, kLeastNearness);
+  if (plane.offset == 0.0f) return 1.0f;
+  return clamp(dot(plane.normal, corner) / plane.offset, kLeastNearness, kMostNearness);
 }
 
 }  // namespace

@@ -103,12 +103,13 @@ PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
   return !separated_by_side_of(a) && !separated_by_side_of(b);
 }
 
-/// Whether a solid stands on a strip, which then lies behind it (see kStanding_m).
-PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip) {
+/// Whether a solid stands on a strip that is seen from above, which then lies behind it (see kStanding_m).
+PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip, Vec3 eye_m) {
   Vec3 sum{};
   for (int i = 0; i < solid.corners; ++i) sum = sum + (solid.corner[i] - strip.corner[0]);
   const Vec3 middle = sum * (1.0f / static_cast<float>(solid.corners));
   const Vec3 normal = cross(strip.corner[2] - strip.corner[0], strip.corner[3] - strip.corner[1]);
+  if (dot(normal, eye_m - strip.corner[0]) * normal.z <= 0.0f) return false;
   return fabsf(dot(normal, middle)) <= kStanding_m * fabsf(normal.z) && overlap_on_ground(solid, strip);
 }
 
@@ -127,7 +128,7 @@ PICTURA_HD inline float nearness_at(const ScreenFace& face, Vec2 at_px) {
 }
 
 /// Whether face a is in front of face b at a point of the screen that both cover. `stands(solid, strip)` says, by their
-/// numbers, whether a solid stands on a strip.
+/// numbers, whether stands_on() holds.
 template <typename Stands>
 PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec2 at_px, Stands&& stands) {
   const bool strip_a = is_strip(a), strip_b = is_strip(b);

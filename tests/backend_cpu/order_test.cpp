@@ -58,8 +58,9 @@ class Sight {
     }
   }
   bool in_front(const ScreenFace& a, const ScreenFace& b, Vec2 at) const {
-    return is_in_front(a, b, at,
-                       [&](uint32_t solid, uint32_t strip) { return stands_on(extent(solid), extent(strip)); });
+    return is_in_front(a, b, at, [&](uint32_t solid, uint32_t strip) {
+      return stands_on(extent(solid), extent(strip), setting_.camera.position_m);
+    });
   }
   // -1 the first is in front wherever both are seen, 1 the second, 0 they do not meet, 2 it depends on where.
   int order(const Thing& a, const Thing& b) const {
@@ -203,13 +204,16 @@ TEST(Order, WhatStandsOnAStripIsInFrontOfItEvenWhereItDipsIn) {
   EXPECT_EQ(sight.order(sight.see(mark), sight.see(car)), 1);
   EXPECT_EQ(sight.order(sight.see(car), sight.see(mark)), -1);
   // The same car beyond the end of the strip does not stand on it, and neither does one on a road 2 m below.
-  EXPECT_TRUE(stands_on(extent_of(car), extent_of(mark)));
+  const Vec3 eye{0, 0, 1};
+  EXPECT_TRUE(stands_on(extent_of(car), extent_of(mark), eye));
+  // Seen from below the road, the mark is in front of the car.
+  EXPECT_FALSE(stands_on(extent_of(car), extent_of(mark), {0, 0, -4}));
   AgentBox beyond = car;
   beyond.center_m.x = 23;
-  EXPECT_FALSE(stands_on(extent_of(beyond), extent_of(mark)));
+  EXPECT_FALSE(stands_on(extent_of(beyond), extent_of(mark), eye));
   AgentBox below = car;
   below.center_m.z -= 2;
-  EXPECT_FALSE(stands_on(extent_of(below), extent_of(mark)));
+  EXPECT_FALSE(stands_on(extent_of(below), extent_of(mark), eye));
 }
 
 TEST(Order, StripsInFrontOfAWallOrBehindIt) {

@@ -106,7 +106,6 @@ INSTANTIATE_TEST_SUITE_P(Scenes, Golden, testing::ValuesIn(names_of(".toml")),
 
 TEST_P(Golden, LooksLikeItsPicture) {
   const SceneFile scene = load_scene(scene_path(GetParam()));
-  if (is_gl(options.backend) && GetParam() == "edge_on") GTEST_SKIP() << "OpenGL draws half of a strip seen edge on";
   std::string why_not;
   const auto renderer = backend_for(scene, &why_not);
   if (!renderer) GTEST_SKIP() << why_not;

@@ -228,12 +228,13 @@ bool overlap_on_ground(const std::vector<Point>& a, const std::vector<Point>& b)
   return true;
 }
 
-// Solids whose foot lies over the strip and, in its middle, at most kStanding_m above or below the strip's plane.
-std::vector<int> solids_on(const Tracer& tracer, const Vec3* strip_corners) {
+// Solids whose foot lies over the strip and, in its middle, at most kStanding_m above or below the strip's plane; none
+// where the strip is seen from below.
+std::vector<int> solids_on(const Tracer& tracer, const Vec3* strip_corners, Point eye) {
   std::vector<Point> outline;
   for (int i = 0; i < 4; ++i) outline.push_back(point(strip_corners[i]));
   const Point normal = cross(outline[2] - outline[0], outline[3] - outline[1]);
-  if (normal.z == 0) return {};
+  if (normal.z == 0 || dot(normal, eye - outline[0]) / normal.z <= 0) return {};
   std::vector<int> standing;
   for (std::size_t i = 0; i < tracer.solids.size(); ++i) {
     const Point above = tracer.solids[i].middle() - outline[0];
@@ -269,7 +270,7 @@ void add_strip(Tracer* tracer, const Eye& eye, const PinholeCamera& pinhole, con
   const double side = dot(cross(as_drawn[2] - as_drawn[0], as_drawn[3] - as_drawn[1]), as_drawn[0]) > 0 ? 1 : -1;
   for (int i = 0; i < 4; ++i) painted.edge_normal[i] = cross(as_drawn[i], as_drawn[(i + 1) % 4]) * side;
   if (!image.may_meet(painted)) return;
-  painted.carries = solids_on(*tracer, world);
+  painted.carries = solids_on(*tracer, world, eye.position());
   auto by_depth = [](Point a, Point b) { return a.z < b.z; };
   painted.nearest_m = std::min_element(as_drawn, as_drawn + 4, by_depth)->z;
   painted.farthest_m = std::max_element(as_drawn, as_drawn + 4, by_depth)->z;
