@@ -262,6 +262,7 @@ class Simulation(CommandCase):
             hashes.setdefault(seed, set()).add(result["state_hash"])
         self.assertEqual(len(hashes[1]), 1)
         self.assertNotEqual(hashes[1], hashes[2])
+        self.assertRegex(run("simulate", town, "--agents", 5, "--steps", 40).stderr, r"step 40/40  ETA 0 s\n$")
 
     def test_a_world_that_is_too_small_says_what_it_refused(self):
         result = self.json_of("simulate", self.town(blocks="1x1"), "--agents", 1024, "--steps", 5, "--policy", "idle")
@@ -305,8 +306,12 @@ class Simulation(CommandCase):
     @unittest.skipUnless(shutil.which("ffmpeg"), "no ffmpeg on this machine")
     def test_a_video_is_written(self):
         video = self.folder / "drive.mp4"
-        self.json_of("simulate", self.town(), "--agents", 5, "--steps", 12, "--policy", "random", "--video", video)
+        film = ["simulate", self.town(), "--agents", 5, "--steps", 12, "--policy", "random", "--video", video]
+        self.json_of(*film)
         self.assertGreater(video.stat().st_size, 2000)
+        self.json_of(*film, "--film-width", 0, "--film-agent", 4)
+        self.assert_refused(2, "--film-agent", *film, "--film-agent", 5)
+        self.assert_refused(2, "--film-width", *film, "--film-width", -1)
 
     def test_bad_arguments_are_refused_by_name(self):
         simulate = ["simulate", self.town()]

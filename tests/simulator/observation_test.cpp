@@ -209,6 +209,26 @@ TEST_F(Observation, PiecesAreAtMostTenMetresLong) {
   EXPECT_NEAR(total_of(map.wall_pieces), 12.0 * static_cast<double>(map.walls.size()), 1e-3);
 }
 
+TEST_F(Observation, PiecesOfTheStraightRoad) {
+  look();
+  const ObservationView out = stage.results.observation_view();
+  const auto expect_row = [](Span<const float> rows, Vec2 at, float heading_rad, float extent) {
+    const float expected[kLaneFeatures] = {
+        at.x / 120, at.y / 120, 0, 5 / 5.0f, std::cos(heading_rad), std::sin(heading_rad), extent};
+    const float* row = nullptr;
+    for (size_t i = 0; i < rows.size() && !row; i += kLaneFeatures) {
+      if (std::abs(rows[i] - expected[0]) < 1e-5 && std::abs(rows[i + 1] - expected[1]) < 1e-5) row = &rows[i];
+    }
+    ASSERT_NE(row, nullptr);
+    for (int i = 0; i < kLaneFeatures; ++i) EXPECT_NEAR(row[i], expected[i], 1e-5) << i;
+  };
+  // From x = 110 to 120: both lanes, 4 m wide, and the edges, which have the road to their right.
+  expect_row(out.lanes, local(115, 0), -0.1f, 4 / 5.0f);
+  expect_row(out.lanes, local(115, 4), -0.1f, 4 / 5.0f);
+  expect_row(out.boundaries, local(115, 6), -0.1f, 0);
+  expect_row(out.boundaries, local(115, -2), kPi - 0.1f, 0);
+}
+
 TEST_F(Observation, WallsAreTheirPiecesWithTheirHeights) {
   look();
   const ObservationView out = stage.results.observation_view();
