@@ -10,6 +10,7 @@
 #include "pictura/common/cuda/check.cuh"
 #include "pictura/common/cuda/device_buffer.cuh"
 #include "pictura/common/error.h"
+#include "pictura/common/grid.h"
 #include "pictura/common/raster_check.h"
 
 namespace pictura {
@@ -33,15 +34,17 @@ class ScratchBuffers {
       : scratch_(sizes),
         faces_(count(sizes.blocks, sizes.max_faces)),
         edges_(count(sizes.blocks, sizes.max_edges)),
+        quads_(count(sizes.blocks, sizes.max_quads)),
         bytes_(static_cast<std::size_t>(sizes.blocks) * bytes_per_block) {
     scratch_.faces = faces_.data();
     scratch_.edges = edges_.data();
+    scratch_.quads = quads_.data();
     scratch_.bytes = bytes_.data();
   }
   const cuda::Scratch& view() const { return scratch_; }
   static std::size_t block_bytes(const cuda::Scratch& sizes, std::size_t bytes_per_block) {
     return count(1, sizes.max_faces) * sizeof(ScreenFace) + count(1, sizes.max_edges) * sizeof(PolygonEdge) +
-           bytes_per_block;
+           count(1, sizes.max_quads) * sizeof(cuda::Quad) + bytes_per_block;
   }
 
  private:
@@ -51,39 +54,73 @@ class ScratchBuffers {
   cuda::Scratch scratch_;
   DeviceBuffer<ScreenFace> faces_;
   DeviceBuffer<PolygonEdge> edges_;
+  DeviceBuffer<cuda::Quad> quads_;
   DeviceBuffer<unsigned char> bytes_;
 };
+
+// Pieces of one kind, by the cell of their middle.
+struct UploadedPieces {
+  DeviceBuffer<int32_t> begin, items;
+  DeviceBuffer<cuda::Ball> balls;
+  cuda::PieceGrid view;
+
+  explicit UploadedPieces(const std::vector<cuda::Ball>& host) {
+    std::vector<Aabb2> middles;
+    for (const cuda::Ball& ball : host) {
+      middles.push_back({ball.center_m.xy(), ball.center_m.xy()});
+      view.largest_radius_m = std::max(view.largest_radius_m, ball.radius_m);
+    }
+    view.largest_radius_m += kLeeway_m;
+    constexpr float kCell_m = 16.0f;
+    const Grid grid(middles, kCell_m);
+    view.cells = grid.view();
+    std::vector<cuda::Ball> sorted;
+    for (const int32_t item : view.cells.items) sorted.push_back(host[static_cast<std::size_t>(item)]);
+    begin = DeviceBuffer<int32_t>(view.cells.begin);
+    items = DeviceBuffer<int32_t>(view.cells.items);
+    balls = DeviceBuffer<cuda::Ball>(Span<const cuda::Ball>(sorted));
+    view.cells.begin = begin.span();
+    view.cells.items = items.span();
+    view.balls = balls.span();
+  }
+
+ private:
+  // More than rounding moves the borders of what is searched.
+  static constexpr float kLeeway_m = 0.1f;
+};
+
+std::vector<cuda::Ball> balls_of(const std::vector<Strip>& strips) {
+  std::vector<cuda::Ball> balls;
+  for (const Strip& strip : strips) balls.push_back({strip_middle(strip), strip_radius_m(strip)});
+  return balls;
+}
+std::vector<cuda::Ball> balls_of(const std::vector<WallFace>& walls) {
+  std::vector<cuda::Ball> balls;
+  for (const WallFace& wall : walls) balls.push_back({wall_middle(wall), wall_radius_m(wall)});
+  return balls;
+}
 
 // A map's looks in device memory.
 struct UploadedGeometry {
   DeviceBuffer<Strip> strips;
   DeviceBuffer<WallFace> walls;
   DeviceBuffer<LightHead> heads;
-  DeviceBuffer<int32_t> strip_begin, strip_items, wall_begin, wall_items;
-  DeviceBuffer<cuda::Ball> strip_balls;
+  UploadedPieces strip_pieces, wall_pieces;
   cuda::DeviceGeometry view;
 
   explicit UploadedGeometry(const StaticGeometry& host)
-      : strips(host.view().strips), walls(host.view().walls), heads(host.view().heads) {
-    auto grid = [](const GridView& grid_on_host, DeviceBuffer<int32_t>* begin, DeviceBuffer<int32_t>* items) {
-      *begin = DeviceBuffer<int32_t>(grid_on_host.begin);
-      *items = DeviceBuffer<int32_t>(grid_on_host.items);
-      GridView on_device = grid_on_host;
-      on_device.begin = begin->span();
-      on_device.items = items->span();
-      return on_device;
-    };
+      : strips(host.view().strips),
+        walls(host.view().walls),
+        heads(host.view().heads),
+        strip_pieces(balls_of(host.strips)),
+        wall_pieces(balls_of(host.walls)) {
     view.raster = raster_geometry(host);
-    StaticGeometryView& pieces_on_device = view.raster.pieces;
-    pieces_on_device.strips = strips.span();
-    pieces_on_device.walls = walls.span();
-    pieces_on_device.heads = heads.span();
-    pieces_on_device.strip_grid = grid(host.strip_grid.view(), &strip_begin, &strip_items);
-    pieces_on_device.wall_grid = grid(host.wall_grid.view(), &wall_begin, &wall_items);
-    std::vector<cuda::Ball> balls;
-    for (const Strip& strip : host.strips) balls.push_back({strip_middle(strip), strip_radius_m(strip)});
-    strip_balls = DeviceBuffer<cuda::Ball>(Span<const cuda::Ball>(balls));
-    view.strip_balls = strip_balls.span();
+    view.raster.pieces = {};
+    view.raster.pieces.strips = strips.span();
+    view.raster.pieces.walls = walls.span();
+    view.raster.pieces.heads = heads.span();
+    view.strips = strip_pieces.view;
+    view.walls = wall_pieces.view;
   }
   int pieces() const { return static_cast<int>(strips.size() + walls.size() + heads.size()); }
 };
@@ -201,12 +238,12 @@ class CudaRenderer final : public Renderer {
     // when clipped.
     cuda::Scratch large;
     large.max_faces = std::max({1, most_pieces_ + 3 * agents, large_.view().max_faces});
+    large.max_visible = large.max_quads = large.max_faces;
+    large.max_lights = std::max(1, most_heads_);
     large.max_edges = 9 * large.max_faces + kMaxPolygonCorners * most_heads_;
-    large.max_pieces = (most_pieces_ + 31) / 32 * 32;
     large.max_fragments = kLargeFragments;
     const cuda::Scratch& had = large_.view();
-    if (views <= most_views_ && large.max_faces == had.max_faces && large.max_edges == had.max_edges &&
-        large.max_pieces == had.max_pieces) {
+    if (views <= most_views_ && large.max_faces == had.max_faces && large.max_edges == had.max_edges) {
       return;
     }
     const std::size_t most_views = std::max(most_views_, views);

@@ -1,12 +1,14 @@
-// What the threads of a block share while they draw an image: what the view shows, the block's memory, and the sums and
-// searches by which they share out work.
+// What the threads of a block share while they draw an image: what the view shows, and the ways in which the lanes of a
+// warp share out uneven work. Warps work on their own; the block waits only between phases.
 #pragma once
 
 #include "pictura/backend_cuda/renderer_cuda_kernel.h"
 
 namespace pictura::cuda {
 
-constexpr int kThreads = 256, kWarpSize = 32, kWarps = kThreads / kWarpSize;
+constexpr int kThreads = 128, kWarpSize = 32, kWarps = kThreads / kWarpSize;
+constexpr unsigned kAllLanes = 0xFFFFFFFFu;
+/// Rows of an image that are drawn at once, at most.
 constexpr int kMaxBandRows = 256;
 
 /// What a view shows.
@@ -16,53 +18,52 @@ struct ViewState {
   int32_t world_begin, world_end, light_begin, light_end;
 };
 
-/// What a face covers of one pixel, linked to the pixel's other fragments.
-template <typename Index>
-struct StoredFragment {
-  float area, nearness;
-  uint32_t samples_low, samples_high;
-  Index next, face;
-};
-
 /// A row of a face: which pixels it touches, and which of those it covers fully.
 struct RowJob {
   int32_t face;
+  uint16_t slot;  // of the face, among those that the warp works on
   uint16_t y, begin, end, full_begin, full_end;
 };
 
+/// What the fragments of one pixel weigh, summed by many threads.
+struct SharedSum {
+  PixelSum::Part part[PixelSum::kNumKinds];
+  int32_t pixel;
+};
+
+/// Edges of a face that a warp keeps at hand; most faces have no more.
+constexpr int kNearEdges = 4;
+
+/// What a warp keeps for its lanes to read of each other.
+struct WarpState {
+  PolygonEdge edges[kWarpSize][kNearEdges];  // of the faces that it works on
+  int32_t edge_begin[kWarpSize], edge_count[kWarpSize];
+  RowJob jobs[kWarpSize];
+  uint32_t queue_a[2 * kWarpSize], queue_b[2 * kWarpSize];
+  uint8_t owners[kWarpSize];
+};
+
+/// A pixel with fewer fragments besides its full face is one thread's.
+constexpr int kShortList = 3;
+__host__ __device__ constexpr int most_sums(int max_fragments) { return max_fragments / kShortList; }
+
+/// Faces that the mark of a pixel's nearest full face can tell apart in 32 bits.
+constexpr int kMarkedFaceBits = 11, kMostMarkedFaces = (1 << kMarkedFaceBits) - 1;
+
 /// In shared memory, whatever the block's other memory is.
 struct BlockState {
+  Scratch scratch;  // this block's
   ViewState view;
   ImageSetting setting;
-  int32_t num_visible, num_edges, num_fragments, overflow, usable, image, part_end;
-  int32_t warp_sums[kWarps];
-  double thread_sums[kThreads];
-  RowJob jobs[kThreads];
-  uint32_t firsts[kThreads + 1];
-  int32_t row_fragments[kMaxBandRows];
+  int32_t num_visible, num_quads, num_lights, num_faces, num_edges, num_fragments, num_sums, next_batch, overflow,
+      usable, image;
+  int32_t row_partial[kMaxBandRows];  // pixels of each row that faces cover partly
+  WarpState warps[kWarps];
 };
 
-/// A block's memory. Index: of faces and fragments, 16 bits where they suffice. Word: two of them.
-template <typename Index_, typename Word_>
-struct BlockMemory {
-  using Index = Index_;
-  using Word = Word_;
-  static constexpr int kHalf = 4 * sizeof(Word);
-  /// Of the lower half of a word: no face, the end of a list.
-  static constexpr Word kNone = (Word{1} << kHalf) - 1;
-
-  BlockState* state;
-  ScreenFace* faces;
-  PolygonEdge* edges;
-  // While things are gathered.
-  uint32_t* seen;     // [max_pieces / 32] a bit for each strip or wall of the map
-  uint32_t* visible;  // [max_faces]
-  // While fragments are made.
-  uint32_t* first_job;  // [max_faces + 1] of each face
-  Word* pixels;         // [max_pixels] of a band
-  StoredFragment<Index>* fragments;
-  int32_t max_faces, max_edges, max_pieces, max_pixels, max_fragments;
-};
+__device__ inline int lane_index() { return static_cast<int>(threadIdx.x) % kWarpSize; }
+__device__ inline int warp_index() { return static_cast<int>(threadIdx.x) / kWarpSize; }
+__device__ inline unsigned lanes_below() { return (1u << lane_index()) - 1; }
 
 __device__ inline bool is_finite(float value) { return fabsf(value) <= 3.4e38f; }
 
@@ -98,48 +99,104 @@ __device__ inline bool set_view(ViewState* state, const DrawTask& task, int32_t 
   return true;
 }
 
-// Sum of the values of the threads before this one; the sum of all in *total_out. All threads of the block.
-__device__ inline int32_t sum_before(BlockState* state, int32_t value, int32_t* total_out) {
-  const int lane = static_cast<int>(threadIdx.x) % kWarpSize, warp = static_cast<int>(threadIdx.x) / kWarpSize;
-  int32_t sum = value;
+// Sum of the values of the lanes up to this one.
+__device__ inline int sum_up_to(int value) {
   for (int step = 1; step < kWarpSize; step *= 2) {
-    const int32_t other = __shfl_up_sync(0xFFFFFFFFu, sum, step);
-    if (lane >= step) sum += other;
+    const int other = __shfl_up_sync(kAllLanes, value, step);
+    if (lane_index() >= step) value += other;
   }
-  __syncthreads();
-  if (lane == kWarpSize - 1) state->warp_sums[warp] = sum;
-  __syncthreads();
-  int32_t before = 0, total = 0;
-  for (int w = 0; w < kWarps; ++w) {
-    if (w < warp) before += state->warp_sums[w];
-    total += state->warp_sums[w];
-  }
-  *total_out = total;
-  return before + sum - value;
+  return value;
 }
+
+// Adds what the lanes of a warp want to a counter; each gets its place.
+__device__ inline int32_t take_places(int32_t* counter, int count) {
+  const int end = sum_up_to(count);
+  int32_t first = 0;
+  if (lane_index() == kWarpSize - 1) first = atomicAdd(counter, end);
+  return __shfl_sync(kAllLanes, first, kWarpSize - 1) + end - count;
+}
+// ... of those that want one.
+__device__ inline int32_t take_place(int32_t* counter, bool wanted) {
+  const unsigned wanting = __ballot_sync(kAllLanes, wanted);
+  int32_t first = 0;
+  if (lane_index() == 0 && wanting != 0) first = atomicAdd(counter, __popc(wanting));
+  return __shfl_sync(kAllLanes, first, 0) + __popc(wanting & lanes_below());
+}
+
+// Shares out what the lanes of a warp bring, `count` items each: visit(owner, k) is called by all lanes, for 32 items
+// at a time, with the lane whose item it is (-1: none is left) and the item's number among that lane's. The items from
+// `first` on, 32 of every `stride`.
+template <typename Visit>
+__device__ inline void share_out(WarpState* warp, int count, Visit&& visit, int first = 0, int stride = kWarpSize) {
+  const int lane = lane_index();
+  const int end = sum_up_to(count), begin = end - count;
+  const int total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
+  // Those that have items, without gaps.
+  const unsigned owning = __ballot_sync(kAllLanes, count > 0);
+  if (count > 0) warp->owners[__popc(owning & lanes_below())] = static_cast<uint8_t>(lane);
+  __syncwarp();
+  const int owner_of_rank = warp->owners[lane];
+  __syncwarp();
+  PICTURA_KEEP_LOOP
+  for (int item = first; item < total; item += stride) {
+    const bool starts_here = count > 0 && begin >= item && begin < item + kWarpSize;
+    const unsigned starts = __reduce_or_sync(kAllLanes, starts_here ? 1u << (begin - item) : 0u);
+    const int before = __popc(__ballot_sync(kAllLanes, count > 0 && begin < item));
+    const int rank = before + __popc(starts & (lanes_below() << 1 | 1u)) - 1;
+    const int owner = __shfl_sync(kAllLanes, owner_of_rank, rank) % kWarpSize;
+    const int k = item + lane - __shfl_sync(kAllLanes, begin, owner);
+    visit(item + lane < total ? owner : -1, k);
+  }
+}
+
+// Pairs of numbers that the lanes of a warp put aside until there are enough for every lane to take one: each lane may
+// push a pair; while is_ready(), take() gives a pair to each lane, or to as many as there are left.
+class WarpQueue {
+ public:
+  __device__ explicit WarpQueue(WarpState* warp) : warp_(warp) {}
+  __device__ void push(bool wanted, uint32_t a, uint32_t b) {
+    const unsigned pushing = __ballot_sync(kAllLanes, wanted);
+    if (wanted) {
+      const int place = count_ + __popc(pushing & lanes_below());
+      warp_->queue_a[place] = a;
+      warp_->queue_b[place] = b;
+    }
+    count_ += __popc(pushing);
+  }
+  __device__ bool is_ready() const { return count_ >= kWarpSize; }
+  __device__ bool is_empty() const { return count_ == 0; }
+  struct Pair {
+    bool is_one;
+    uint32_t a, b;
+  };
+  __device__ Pair take() {
+    __syncwarp();
+    const int first = max_of(count_ - kWarpSize, 0), place = first + lane_index();
+    Pair pair{place < count_, 0, 0};
+    if (pair.is_one) {
+      pair.a = warp_->queue_a[place];
+      pair.b = warp_->queue_b[place];
+    }
+    count_ = first;
+    __syncwarp();
+    return pair;
+  }
+
+ private:
+  WarpState* warp_;
+  int count_ = 0;
+};
 
 // Sum over the threads, in their order. All threads of the block.
-__device__ inline double block_sum(BlockState* state, double value) {
+__device__ inline double block_sum(double value) {
+  __shared__ double of_thread[kThreads];
   __syncthreads();
-  state->thread_sums[threadIdx.x] = value;
+  of_thread[threadIdx.x] = value;
   __syncthreads();
   double sum = 0;
-  for (int i = 0; i < kThreads; ++i) sum += state->thread_sums[i];
+  PICTURA_KEEP_LOOP
+  for (int i = 0; i < kThreads; ++i) sum += of_thread[i];
   return sum;
-}
-
-// The last of `count` ascending firsts that is at most `item`.
-__device__ inline int find_owner(const uint32_t* firsts, int count, uint32_t item) {
-  int low = 0, high = count;
-  while (high - low > 1) {
-    const int middle = (low + high) >> 1;
-    if (firsts[middle] <= item) {
-      low = middle;
-    } else {
-      high = middle;
-    }
-  }
-  return low;
 }
 
 }  // namespace pictura::cuda

@@ -1,7 +1,8 @@
-// From a scene to the faces of one image: threads share out candidates, then faces.
+// From a scene to the faces of one image: warps share out candidates, then faces. Nearly all faces have four corners
+// and need no clipping: those stay in registers; the others, and lights, are put aside and made together.
 #pragma once
 
-#include "pictura/backend_cuda/renderer_cuda_block.cuh"
+#include "pictura/backend_cuda/renderer_cuda_memory.cuh"
 
 namespace pictura::cuda {
 
@@ -9,83 +10,129 @@ namespace pictura::cuda {
 constexpr int kFaceShift = 27;
 constexpr uint32_t kFaceIndexMask = (1u << kFaceShift) - 1;
 
-// Appends the entries of the threads, in their order: entry(k) for each k below count. All threads of the block.
+// Appends `count` entries of each lane: entry(k) for each k below count.
 template <typename Memory, typename Entry>
-__device__ void append_visible(const Memory& memory, int32_t count, Entry&& entry) {
-  int32_t total = 0;
-  const int32_t first = memory.state->num_visible + sum_before(memory.state, count, &total);
-  for (int32_t k = 0; k < count && first + k < memory.max_faces; ++k) memory.visible[first + k] = entry(k);
-  __syncthreads();
-  if (threadIdx.x == 0) memory.state->num_visible += total;
-  __syncthreads();
+__device__ void append_visible(const Memory& memory, int count, Entry&& entry) {
+  const int32_t first = take_places(&memory.state->num_visible, count);
+  PICTURA_KEEP_LOOP
+  for (int k = 0; k < count && first + k < memory.max_visible; ++k) memory.visible[first + k] = entry(k);
 }
 
-// Appends the pieces of a grid that may show, in ascending order. All threads of the block.
-template <typename Memory, typename MayShow>
-__device__ void append_pieces(const Memory& memory, uint32_t kind, int32_t num_pieces, const GridView& grid,
-                              const Aabb2& box, MayShow&& may_show_piece) {
+// The outline on the ground of what a camera sees: its position and the far corners.
+struct GroundOutline {
+  Vec2 corner[5];
+};
+__device__ inline GroundOutline ground_outline(const PinholeCamera& camera, const Frustum& f, float far_m) {
+  GroundOutline outline;
+  outline.corner[0] = camera.position_m.xy();
+  PICTURA_KEEP_LOOP
+  for (int i = 0; i < 4; ++i) {
+    const float x = (i & 1) ? f.x_high : f.x_low, y = (i & 2) ? f.y_high : f.y_low;
+    outline.corner[i + 1] = (camera.position_m + (camera.right * x + camera.down * y + camera.forward) * far_m).xy();
+  }
+  return outline;
+}
+
+// The range in x of an outline's hull between two y; low > high where it does not reach there. Its corners'
+// connections, all of them, have the range of the hull's.
+struct RangeX {
+  float low = 1e30f, high = -1e30f;
+  __device__ void add(float x) {
+    low = min_of(low, x);
+    high = max_of(high, x);
+  }
+};
+__device__ inline RangeX range_between(const GroundOutline& outline, float y_low, float y_high) {
+  RangeX range;
+  PICTURA_KEEP_LOOP
+  for (int i = 1; i < 5; ++i) {
+    PICTURA_KEEP_LOOP
+    for (int j = 0; j < i; ++j) {
+      const Vec2 a = outline.corner[i], b = outline.corner[j];
+      if (max_of(a.y, b.y) < y_low || min_of(a.y, b.y) > y_high) continue;
+      const float slope = a.y != b.y ? (b.x - a.x) / (b.y - a.y) : 0.0f;
+      const float low = min_of(a.x, b.x), high = max_of(a.x, b.x);
+      range.add(clamp(a.x + (clamp(a.y, y_low, y_high) - a.y) * slope, low, high));
+      range.add(clamp(b.x + (clamp(b.y, y_low, y_high) - b.y) * slope, low, high));
+    }
+  }
+  return range;
+}
+
+// Appends the pieces of a map of one kind that may show. All threads of the block; lanes look at the rows of the grid,
+// whose candidates the warps share.
+template <typename Memory>
+__device__ __noinline__ void append_pieces(uint32_t kind, const PieceGrid& pieces, float far_m) {
+  const Memory memory = Memory::current();
   BlockState* state = memory.state;
-  const int thread = static_cast<int>(threadIdx.x);
-  if (num_pieces > memory.max_pieces) {
-    state->overflow = 1;
-    return;
+  const ImageSetting& setting = state->setting;
+  const GridView& grid = pieces.cells;
+  const GroundOutline outline = ground_outline(setting.camera, setting.frustum, far_m);
+  float y_low = 1e30f, y_high = -1e30f;
+  PICTURA_KEEP_LOOP
+  for (const Vec2 corner : outline.corner) {
+    y_low = min_of(y_low, corner.y);
+    y_high = max_of(y_high, corner.y);
   }
-  const int32_t words = (num_pieces + 31) / 32;
-  for (int w = thread; w < words; w += kThreads) memory.seen[w] = 0;
-  const CellRange range = cells_of(grid, box);
-  const int columns = range.x_end - range.x_begin;
-  const int cells = columns * (range.y_end - range.y_begin);
-  for (int first = 0; first < cells; first += kThreads) {
-    // A cell for each thread, then a candidate for each thread.
-    const int cell = first + thread;
-    int32_t count = 0, begin = 0;
-    if (cell < cells) {
-      const int at = (range.y_begin + cell / columns) * grid.num_x + range.x_begin + cell % columns;
-      begin = grid.begin[static_cast<size_t>(at)];
-      count = grid.begin[static_cast<size_t>(at) + 1] - begin;
+  if (grid.items.empty()) return;
+  const int row_begin = grid.cell_y(y_low - pieces.largest_radius_m);
+  const int row_end = grid.cell_y(y_high + pieces.largest_radius_m) + 1;
+  PICTURA_KEEP_LOOP
+  for (int first_row = row_begin; first_row < row_end; first_row += kWarpSize) {
+    const int row = first_row + lane_index();
+    int begin = 0, count = 0;
+    if (row < row_end) {
+      const float row_low = grid.origin_m.y + grid.cell_m * static_cast<float>(row) - pieces.largest_radius_m;
+      const RangeX range = range_between(outline, row_low, row_low + grid.cell_m + 2.0f * pieces.largest_radius_m);
+      if (range.low <= range.high) {
+        const int32_t* row_cells = grid.begin.data() + static_cast<ptrdiff_t>(row) * grid.num_x;
+        begin = row_cells[grid.cell_x(range.low - pieces.largest_radius_m)];
+        count = row_cells[grid.cell_x(range.high + pieces.largest_radius_m) + 1] - begin;
+      }
     }
-    int32_t total = 0;
-    state->firsts[thread] = static_cast<uint32_t>(sum_before(state, count, &total));
-    state->jobs[thread].face = begin;
-    __syncthreads();
-    for (int32_t k = thread; k < total; k += kThreads) {
-      const int owner = find_owner(state->firsts, kThreads, static_cast<uint32_t>(k));
-      const int32_t piece = grid.items[static_cast<size_t>(state->jobs[owner].face + k) - state->firsts[owner]];
-      if (may_show_piece(piece)) atomicOr(&memory.seen[piece >> 5], 1u << (piece & 31));
-    }
-    __syncthreads();
-  }
-  for (int32_t first = 0; first < words; first += kThreads) {
-    const int32_t word = first + thread;
-    uint32_t bits = word < words ? memory.seen[word] : 0;
-    append_visible(memory, __popc(bits), [&](int32_t) {
-      const int32_t piece = 32 * word + __ffs(static_cast<int>(bits)) - 1;
-      bits &= bits - 1;
-      return thing_number(kind, piece);
-    });
+    share_out(
+        &state->warps[warp_index()], count,
+        [&](int owner, int k) {
+          const int place = __shfl_sync(kAllLanes, begin, max_of(owner, 0)) + k;
+          bool shows = false;
+          if (owner >= 0) {
+            const Ball ball = pieces.balls[static_cast<size_t>(place)];
+            shows = ball_in_frustum(setting.frustum, to_camera(setting.camera, ball.center_m), ball.radius_m, far_m);
+          }
+          const int32_t at = take_place(&state->num_visible, shows);
+          if (shows && at < memory.max_visible) {
+            memory.visible[at] = thing_number(kind, grid.items[static_cast<size_t>(place)]);
+          }
+        },
+        warp_index() * kWarpSize, kThreads);
   }
 }
 
-// Lists the faces that may show: of agents, lights, walls, then strips.
+__device__ inline LightState light_state(const DrawTask& task, const ViewState& view, const LightHead& head) {
+  return task.scene.light_states[static_cast<size_t>(view.light_begin + head.signal)];
+}
+
+// Lists the faces that may show. All threads of the block.
 template <typename Memory>
 __device__ void cull(const Memory& memory, const DrawTask& task) {
   BlockState* state = memory.state;
   const ViewState& view = state->view;
   const ImageSetting& setting = state->setting;
   const RasterGeometry& geometry = view.geometry->raster;
-  const int thread = static_cast<int>(threadIdx.x);
-  for (int32_t first = view.world_begin; first < view.world_end; first += kThreads) {
-    const int32_t agent = first + thread;
+  PICTURA_KEEP_LOOP
+  for (int32_t first = view.world_begin + warp_index() * kWarpSize; first < view.world_end; first += kThreads) {
+    const int32_t agent = first + lane_index();
     uint32_t faces = 0;
     if (agent < view.world_end) {
       const AgentBox box = task.scene.agents[static_cast<size_t>(agent)];
       if (may_show(box, setting.camera, setting.frustum) && !is_left_out(view.view, task.scene.hidden_agents, agent)) {
+        PICTURA_KEEP_LOOP
         for (int face = 0; face < kNumCuboidFaces; ++face) {
           if (faces_eye(box, face, setting.camera.position_m)) faces |= 1u << face;
         }
       }
     }
-    append_visible(memory, __popc(faces), [&](int32_t) {
+    append_visible(memory, __popc(faces), [&](int) {
       const uint32_t face = static_cast<uint32_t>(__ffs(static_cast<int>(faces))) - 1;
       faces &= faces - 1;
       return thing_number(kAgentKind, agent - view.world_begin) | face << kFaceShift;
@@ -93,27 +140,20 @@ __device__ void cull(const Memory& memory, const DrawTask& task) {
   }
   const Span<const LightHead> heads = geometry.pieces.heads;
   const int num_heads = view.light_end > view.light_begin ? static_cast<int>(heads.size()) : 0;
-  for (int first = 0; first < num_heads; first += kThreads) {
-    const int head = first + thread;
-    const bool shows = head < num_heads && may_show(heads[static_cast<size_t>(head)], setting.camera, setting.frustum);
-    append_visible(memory, shows ? 1 : 0, [&](int32_t) { return thing_number(kLightKind, head); });
+  PICTURA_KEEP_LOOP
+  for (int first = warp_index() * kWarpSize; first < num_heads; first += kThreads) {
+    const int head = first + lane_index();
+    bool shows = false;
+    if (head < num_heads) {
+      const LightHead light = heads[static_cast<size_t>(head)];
+      shows = may_show(light, setting.camera, setting.frustum) &&
+              light_is_visible(light, light_state(task, view, light), setting.camera.position_m);
+    }
+    const int32_t at = take_place(&state->num_lights, shows);
+    if (shows && at < memory.max_lights) memory.lights[at] = static_cast<uint32_t>(head);
   }
-  const float wall_far_m = far_of(geometry.longest_wall_m);
-  append_pieces(memory, kWallKind, static_cast<int32_t>(geometry.pieces.walls.size()), geometry.pieces.wall_grid,
-                frustum_ground_box(setting.camera, setting.frustum, wall_far_m), [&](int32_t wall) {
-                  return may_show(geometry.pieces.walls[static_cast<size_t>(wall)], setting.camera, setting.frustum,
-                                  wall_far_m);
-                });
-  const float strip_far_m = far_of(geometry.longest_strip_m);
-  append_pieces(memory, kStripKind, static_cast<int32_t>(geometry.pieces.strips.size()), geometry.pieces.strip_grid,
-                frustum_ground_box(setting.camera, setting.frustum, strip_far_m), [&](int32_t strip) {
-                  const Ball ball = view.geometry->strip_balls[static_cast<size_t>(strip)];
-                  return ball_in_frustum(setting.frustum, to_camera(setting.camera, ball.center_m), ball.radius_m,
-                                         strip_far_m);
-                });
-  __syncthreads();
-  if (thread == 0 && state->num_visible > memory.max_faces) state->overflow = 1;
-  __syncthreads();
+  append_pieces<Memory>(kWallKind, view.geometry->walls, far_of(geometry.longest_wall_m));
+  append_pieces<Memory>(kStripKind, view.geometry->strips, far_of(geometry.longest_strip_m));
 }
 
 template <typename Memory>
@@ -128,49 +168,129 @@ struct BlockEdges {
   __device__ PolygonEdge* at(int32_t index) { return memory.edges + index; }
 };
 
-// One copy of the code that clips and projects, whatever emits the face.
+// One copy of the code that clips, for quads and lights.
 template <typename Memory>
-__device__ __noinline__ bool project_face(const Memory& memory, FaceOwner owner, const Vec3* corners, int count,
-                                          const FacePlane& plane, Rgb color, ScreenFace* face_out) {
+__device__ __noinline__ bool clip_and_make(FaceOwner owner, const Vec3* corners, int count, const FacePlane& plane,
+                                           Rgb color, ScreenFace* face_out) {
+  const Memory memory = Memory::current();
   BlockEdges<Memory> edges{memory};
   return make_face(memory.state->setting, owner, corners, count, plane, color, edges, face_out);
 }
 
-// Makes the listed faces; those that cover nothing have an empty box.
+// The face of an entry; false where it has faded to black.
+__device__ inline bool make_quad(const BlockState& state, const DrawTask& task, uint32_t entry, Quad* quad_out) {
+  const ImageSetting& setting = state.setting;
+  const StaticGeometryView& pieces = state.view.geometry->raster.pieces;
+  const uint32_t kind = kind_of(entry);
+  const auto index = static_cast<int32_t>(entry & kFaceIndexMask);
+  bool shows = false;
+  auto emit = [&](const Vec3* corners, int, const FacePlane& plane, Rgb color) {
+    PICTURA_KEEP_LOOP
+    for (int i = 0; i < 4; ++i) quad_out->corner[i] = corners[i];
+    quad_out->plane = plane;
+    quad_out->color = color;
+    shows = true;
+  };
+  if (kind == kStripKind) {
+    const Strip strip = pieces.strips[static_cast<size_t>(index)];
+    quad_out->owner = strip_owner(strip, index);
+    strip_faces(strip, setting.camera, setting.line_floor_px, emit);
+  } else if (kind == kAgentKind) {
+    const AgentBox box = task.scene.agents[static_cast<size_t>(state.view.world_begin + index)];
+    quad_out->owner = agent_owner(box, index);
+    cuboid_face(box, static_cast<int>(entry >> kFaceShift) & 7, setting.camera, setting.debug_palette, emit);
+  } else {
+    quad_out->owner = wall_owner(index);
+    wall_faces(pieces.walls[static_cast<size_t>(index)], setting.camera, emit);
+  }
+  return shows;
+}
+
+// Keeps the faces of those lanes that have one; notes where there is no room.
+template <typename Memory>
+__device__ void keep_face(const Memory& memory, bool has_one, const ScreenFace& face) {
+  const int32_t at = take_place(&memory.state->num_faces, has_one);
+  if (!has_one) return;
+  if (at < memory.max_faces) {
+    memory.faces[at] = face;
+  } else {
+    memory.state->overflow = 1;
+  }
+}
+
+// Makes the faces of what needs no clipping, and puts aside what does.
+template <typename Memory>
+__device__ void make_quads(const Memory& memory, const DrawTask& task) {
+  BlockState* state = memory.state;
+  const int num_visible = state->num_visible;
+  PICTURA_KEEP_LOOP
+  for (int first = warp_index() * kWarpSize; first < num_visible; first += kThreads) {
+    const int i = first + lane_index();
+    Quad quad;
+    bool shows = i < num_visible && make_quad(*state, task, memory.visible[i], &quad);
+    const unsigned crossed = shows ? planes_crossed(state->setting.frustum, quad.corner, 4) : kOutside;
+    const bool put_aside = crossed != 0 && crossed != kOutside;
+    shows = crossed == 0;
+    const int32_t edge_begin = take_places(&state->num_edges, shows ? 4 : 0);
+    if (shows && edge_begin + 4 > memory.max_edges) {
+      state->overflow = 1;
+      shows = false;
+    }
+    ScreenFace face;
+    shows = shows && make_screen_face<4>(state->setting.camera, quad.corner, 4, quad.plane, quad.color,
+                                         memory.edges + edge_begin, &face);
+    face.edge_begin = edge_begin;
+    face.number = quad.owner.number;
+    face.class_id = quad.owner.class_id;
+    keep_face(memory, shows, face);
+    const int32_t at = take_place(&state->num_quads, put_aside);
+    if (put_aside && at < memory.max_quads) memory.quads[at] = quad;
+  }
+}
+
+// Makes the faces of all that shows. All threads of the block.
 template <typename Memory>
 __device__ void make_faces(const Memory& memory, const DrawTask& task) {
-  const ViewState& view = memory.state->view;
-  const ImageSetting& setting = memory.state->setting;
-  const StaticGeometryView& pieces = view.geometry->raster.pieces;
-  for (int32_t i = static_cast<int32_t>(threadIdx.x); i < memory.state->num_visible; i += kThreads) {
-    const uint32_t entry = memory.visible[i];
-    const uint32_t kind = kind_of(entry);
-    const auto index = static_cast<int32_t>(entry & kFaceIndexMask);
+  BlockState* state = memory.state;
+  make_quads(memory, task);
+  __syncthreads();
+  if (state->num_quads > memory.max_quads) {
+    state->overflow = 1;
+    return;
+  }
+  const int num_quads = state->num_quads, num_rest = num_quads + state->num_lights;
+  PICTURA_KEEP_LOOP
+  for (int first = warp_index() * kWarpSize; first < num_rest; first += kThreads) {
+    const int i = first + lane_index();
+    Vec3 corners[kMaxFaceCorners];
+    int count = 0;
+    FacePlane plane;
+    Rgb color;
     FaceOwner owner;
-    ScreenFace face;
-    bool shows = false;
-    auto emit = [&](const Vec3* corners, int count, const FacePlane& plane, Rgb color) {
-      shows = project_face(memory, owner, corners, count, plane, color, &face);
-    };
-    if (kind == kStripKind) {
-      const Strip strip = pieces.strips[static_cast<size_t>(index)];
-      owner = strip_owner(strip, index);
-      strip_faces(strip, setting.camera, setting.line_floor_px, emit);
-    } else if (kind == kAgentKind) {
-      const AgentBox box = task.scene.agents[static_cast<size_t>(view.world_begin + index)];
-      owner = agent_owner(box, index);
-      cuboid_face(box, static_cast<int>(entry >> kFaceShift) & 7, setting.camera, setting.debug_palette, emit);
-    } else if (kind == kWallKind) {
-      owner = wall_owner(index);
-      wall_faces(pieces.walls[static_cast<size_t>(index)], setting.camera, emit);
-    } else {
-      const LightHead head = pieces.heads[static_cast<size_t>(index)];
-      const LightState state = task.scene.light_states[static_cast<size_t>(view.light_begin + head.signal)];
+    if (i < num_quads) {
+      const Quad& quad = memory.quads[i];
+      count = 4;
+      PICTURA_KEEP_LOOP
+      for (int k = 0; k < 4; ++k) corners[k] = quad.corner[k];
+      plane = quad.plane;
+      color = quad.color;
+      owner = quad.owner;
+    } else if (i < num_rest) {
+      const auto index = static_cast<int32_t>(memory.lights[i - num_quads]);
+      const LightHead head = state->view.geometry->raster.pieces.heads[static_cast<size_t>(index)];
       owner = light_owner(index);
-      light_faces(head, state, setting.camera, emit);
+      light_faces(head, light_state(task, state->view, head), state->setting.camera,
+                  [&](const Vec3* of_light, int sides, const FacePlane& its_plane, Rgb its_color) {
+                    count = sides;
+                    PICTURA_KEEP_LOOP
+                    for (int k = 0; k < sides; ++k) corners[k] = of_light[k];
+                    plane = its_plane;
+                    color = its_color;
+                  });
     }
-    if (!shows) face.box = PixelBox{};
-    memory.faces[i] = face;
+    ScreenFace face;
+    const bool shows = count > 0 && clip_and_make<Memory>(owner, corners, count, plane, color, &face);
+    keep_face(memory, shows, face);
   }
   __syncthreads();
 }
@@ -182,7 +302,7 @@ __device__ bool prepare(const Memory& memory, const DrawTask& task, int32_t view
   BlockState* state = memory.state;
   __syncthreads();
   if (threadIdx.x == 0) {
-    state->num_visible = state->num_edges = 0;
+    state->num_visible = state->num_quads = state->num_lights = state->num_edges = state->num_faces = 0;
     state->overflow = 0;
     state->usable = set_view(&state->view, task, view) ? 1 : 0;
     if (state->usable) {
@@ -193,9 +313,10 @@ __device__ bool prepare(const Memory& memory, const DrawTask& task, int32_t view
   __syncthreads();
   if (!state->usable) return false;
   cull(memory, task);
-  if (state->overflow) return false;
+  __syncthreads();
+  if (state->num_visible > memory.max_visible || state->num_lights > memory.max_lights) return false;
   make_faces(memory, task);
-  return !state->overflow;
+  return state->overflow == 0;
 }
 
 }  // namespace pictura::cuda

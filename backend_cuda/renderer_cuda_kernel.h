@@ -18,16 +18,24 @@ struct CameraSlot {
   uint16_t* instance_id = nullptr;
 };
 
-/// A strip's surroundings, for culling without a look at the strip itself.
+/// A piece's surroundings, for culling without a look at the piece itself.
 struct Ball {
   Vec3 center_m;
   float radius_m = 0;
 };
 
+/// Pieces of a map of one kind, each in the cell of its ball's centre alone: no query meets one twice, and the pieces of
+/// neighbouring cells of a row stand side by side.
+struct PieceGrid {
+  GridView cells;
+  Span<const Ball> balls;  // as cells.items
+  float largest_radius_m = 0;
+};
+
 /// A map's looks in device memory.
 struct DeviceGeometry {
   RasterGeometry raster;
-  Span<const Ball> strip_balls;  // [strips]
+  PieceGrid strips, walls;
 };
 
 /// What was wrong with a view: written by the kernels, thrown by the next call.
@@ -37,12 +45,21 @@ struct Fault {
 };
 enum FaultKind : int32_t { kBadWorld = 1, kBadGeometry, kBadPose, kTooManyAgents, kBadQuery, kNoRoom };
 
+/// A face of four corners, in camera coordinates.
+struct Quad {
+  Vec3 corner[4];
+  FacePlane plane;
+  Rgb color;
+  FaceOwner owner;
+};
+
 /// Memory of the blocks of a launch, and how much each of them has.
 struct Scratch {
   ScreenFace* faces = nullptr;     // [blocks][max_faces]
   PolygonEdge* edges = nullptr;    // [blocks][max_edges]
+  Quad* quads = nullptr;           // [blocks][max_quads]
   unsigned char* bytes = nullptr;  // of the second launch: [blocks][block_bytes()]
-  int32_t blocks = 0, max_faces = 0, max_edges = 0, max_pieces = 0, max_fragments = 0;
+  int32_t blocks = 0, max_visible = 0, max_quads = 0, max_lights = 0, max_faces = 0, max_edges = 0, max_fragments = 0;
 };
 
 struct DrawTask {

@@ -26,17 +26,13 @@ cudaError_t prepare_kernels(const KernelSet& kernels) {
 }
 
 Scratch small_scratch(int processors) {
-  Scratch scratch;
+  Scratch scratch = small_sizes();
   scratch.blocks = kSmallBlocksPerProcessor * processors;
-  scratch.max_faces = kSmallFaces;
-  scratch.max_edges = kSmallEdges;
-  scratch.max_pieces = kSmallPieces;
-  scratch.max_fragments = kSmallFragments;
   return scratch;
 }
 
 std::size_t block_bytes(const Scratch& large) {
-  return memory_bytes<LargeMemory>(large.max_faces, large.max_pieces, kLargePixels, large.max_fragments);
+  return large_bytes(large);
 }
 
 cudaError_t launch_draw(const KernelSet& kernels, const DrawTask& task, const Scratch& small, const Scratch& large,
@@ -44,13 +40,13 @@ cudaError_t launch_draw(const KernelSet& kernels, const DrawTask& task, const Sc
   const int images = task.num_views * task.num_cameras;
   const cudaError_t status = launch(kernels.draw, min_of(images, small.blocks), small_bytes(), task, small, stream);
   if (status != cudaSuccess) return status;
-  return launch(kernels.draw_overflow, min_of(images, large.blocks), 0, task, large, stream);
+  return launch(kernels.draw_overflow, min_of(images, large.blocks), kStateBytes, task, large, stream);
 }
 
 cudaError_t launch_visibility(const KernelSet& kernels, const VisibilityTask& task, const Scratch& large,
                               cudaStream_t stream) {
   if (task.num_queries == 0) return cudaSuccess;
-  return launch(kernels.visibility, min_of(task.num_queries, large.blocks), 0, task, large, stream);
+  return launch(kernels.visibility, min_of(task.num_queries, large.blocks), kStateBytes, task, large, stream);
 }
 
 }  // namespace pictura::cuda

@@ -8,6 +8,13 @@
 #else
 #define PICTURA_HD
 #endif
+// Before a loop that a kernel keeps as it is written: unrolled, the code of a kernel does not fit into the instruction
+// caches, and waiting for instructions costs more than a loop does.
+#if defined(__CUDA_ARCH__)
+#define PICTURA_KEEP_LOOP _Pragma("unroll 1")
+#else
+#define PICTURA_KEEP_LOOP
+#endif
 
 #if defined(__CUDACC_RTC__)
 namespace pictura {
@@ -35,6 +42,15 @@ using std::uint8_t;
 #endif
 
 namespace pictura {
+
+/// Number of the lowest bit that is set; `bits` is not 0.
+PICTURA_HD inline int first_bit(uint32_t bits) {
+#if defined(__CUDA_ARCH__)
+  return __ffs(static_cast<int>(bits)) - 1;
+#else
+  return __builtin_ctz(bits);
+#endif
+}
 
 /// Number of bits that are set.
 PICTURA_HD inline int count_bits(uint64_t bits) {

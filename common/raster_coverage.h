@@ -7,47 +7,69 @@
 
 namespace pictura {
 
-/// Clipping by five planes adds at most one corner each; one more is room for a cut while it is made.
-constexpr int kMaxPolygonCorners = kMaxFaceCorners + 6;
+/// Corners that a face of so many may have once it is clipped: five planes add at most one each; one more is room for a
+/// cut while it is made.
+PICTURA_HD constexpr int clipped_corners(int corners) { return corners + 6; }
+constexpr int kMaxPolygonCorners = clipped_corners(kMaxFaceCorners);
+static_assert(kMaxPolygonCorners <= 32);  // pixel_coverage has a bit for each edge
+
+/// How far a point is inside of the five planes of the drawn volume, each by a measure of its own; negative outside.
+constexpr int kClipPlanes = 5;
+PICTURA_HD inline float inside_plane(const Frustum& f, int plane, Vec3 p) {
+  switch (plane) {
+    case 0: return p.z - kNear_m;
+    case 1: return p.x - f.x_low * p.z;
+    case 2: return f.x_high * p.z - p.x;
+    case 3: return p.y - f.y_low * p.z;
+    default: return f.y_high * p.z - p.y;
+  }
+}
+
+/// The planes of the drawn volume that a face (camera coordinates) crosses, a bit for each; kOutside where all of it is
+/// outside of one.
+constexpr unsigned kOutside = ~0u;
+PICTURA_HD inline unsigned planes_crossed(const Frustum& f, const Vec3* corners, int count) {
+  unsigned outside_of_any = 0, outside_of_all = ~0u;
+  PICTURA_KEEP_LOOP
+  for (int i = 0; i < count; ++i) {
+    unsigned outside = 0;
+    for (int plane = 0; plane < kClipPlanes; ++plane) {
+      if (inside_plane(f, plane, corners[i]) < 0.0f) outside |= 1u << plane;
+    }
+    outside_of_any |= outside;
+    outside_of_all &= outside;
+  }
+  return outside_of_all != 0 ? kOutside : outside_of_any;
+}
 
 /// Clips a convex face to the near plane and the guard band. Writes to polygon_out (camera coordinates, room for
-/// kMaxPolygonCorners) and returns the number of corners; below 3 nothing is left.
+/// kRoom = clipped_corners(count) at least) and returns the number of corners; below 3 nothing is left.
+template <int kRoom = kMaxPolygonCorners>
 PICTURA_HD inline int clip_face(const Frustum& f, const Vec3* corners, int count, Vec3* polygon_out) {
-  auto inside = [&](int plane, Vec3 p) {
-    switch (plane) {
-      case 0: return p.z - kNear_m;
-      case 1: return p.x - f.x_low * p.z;
-      case 2: return f.x_high * p.z - p.x;
-      case 3: return p.y - f.y_low * p.z;
-      default: return f.y_high * p.z - p.y;
-    }
-  };
-  unsigned crossed = 0;  // planes that some corner is outside of
-  for (int plane = 0; plane < 5; ++plane) {
-    int outside = 0;
-    for (int i = 0; i < count; ++i) outside += inside(plane, corners[i]) < 0.0f;
-    if (outside == count) return 0;
-    if (outside > 0) crossed |= 1u << plane;
-  }
-  Vec3 buffer[kMaxPolygonCorners];
+  const unsigned crossed = planes_crossed(f, corners, count);
+  if (crossed == kOutside) return 0;
+  Vec3 buffer[kRoom];
   const Vec3* from = corners;
   int remaining_planes = 0;
-  for (int plane = 0; plane < 5; ++plane) remaining_planes += (crossed >> plane) & 1u;
+  for (int plane = 0; plane < kClipPlanes; ++plane) remaining_planes += (crossed >> plane) & 1u;
   if (remaining_planes == 0) {
+    PICTURA_KEEP_LOOP
     for (int i = 0; i < count; ++i) polygon_out[i] = corners[i];
     return count;
   }
   // The buffers alternate so that the last plane writes to polygon_out.
-  for (int plane = 0; plane < 5; ++plane) {
+  PICTURA_KEEP_LOOP
+  for (int plane = 0; plane < kClipPlanes; ++plane) {
     if (!((crossed >> plane) & 1u)) continue;
     Vec3* to = (remaining_planes & 1) ? polygon_out : buffer;
     int kept = 0;
     Vec3 previous = from[count - 1];
-    float previous_inside = inside(plane, previous);
+    float previous_inside = inside_plane(f, plane, previous);
     // Only a face that is not quite convex could outgrow the room; it loses corners then.
-    for (int i = 0; i < count && kept + 2 <= kMaxPolygonCorners; ++i) {
+    PICTURA_KEEP_LOOP
+    for (int i = 0; i < count && kept + 2 <= kRoom; ++i) {
       const Vec3 current = from[i];
-      const float current_inside = inside(plane, current);
+      const float current_inside = inside_plane(f, plane, current);
       // A cut is computed from its inner corner, whichever way round: faces that share an edge get the same point.
       if (previous_inside >= 0.0f && current_inside < 0.0f) {
         to[kept++] = previous + (current - previous) * (previous_inside / (previous_inside - current_inside));
@@ -127,13 +149,15 @@ struct ScreenFace {
 };
 
 /// Projects a clipped face (camera coordinates), which lies in `plane`. Writes its edges to edges_out (room for
-/// `count`) and all of face_out but edge_begin. False where it covers nothing.
+/// `count`, which is at most kRoom) and all of face_out but edge_begin. False where it covers nothing.
+template <int kRoom = kMaxPolygonCorners>
 PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Vec3* polygon, int count,
                                         const FacePlane& plane, Rgb color, PolygonEdge* edges_out,
                                         ScreenFace* face_out) {
-  Vec2 corner[kMaxPolygonCorners];
+  Vec2 corner[kRoom];
   Vec2 low{1e30f, 1e30f}, high{-1e30f, -1e30f};
   float depth_low = 1e30f, depth_high = 0.0f;
+  PICTURA_KEEP_LOOP
   for (int i = 0; i < count; ++i) {
     corner[i] = project(camera, polygon[i]);
     low = {min_of(low.x, corner[i].x), min_of(low.y, corner[i].y)};
@@ -146,10 +170,12 @@ PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Vec3*
       max_of(static_cast<int>(floorf(low.y)), 0), min_of(static_cast<int>(floorf(high.y)) + 1, camera.height_px)};
   if (box.x_begin >= box.x_end || box.y_begin >= box.y_end) return false;
   float twice_area = 0.0f;
+  PICTURA_KEEP_LOOP
   for (int i = 1; i + 1 < count; ++i) twice_area += cross(corner[i] - corner[0], corner[i + 1] - corner[0]);
   if (fabsf(twice_area) < 1e-6f) return false;
 
   int edges = 0;
+  PICTURA_KEEP_LOOP
   for (int i = 0; i < count; ++i) {
     const Vec2 from = corner[i], to = corner[i + 1 < count ? i + 1 : 0];
     if (from.x == to.x && from.y == to.y) continue;
@@ -183,6 +209,7 @@ PICTURA_HD inline float face_depth_m(const ScreenFace& face, Vec2 at_px) {
 }
 
 PICTURA_HD inline bool covers_point(const PolygonEdge* edges, int count, float x_px, float y_px) {
+  PICTURA_KEEP_LOOP
   for (int i = 0; i < count; ++i) {
     if (inner_distance(edges[i], {x_px, y_px}) < 0.0f) return false;
   }
@@ -251,24 +278,33 @@ PICTURA_HD inline float mean_width_left(float xa, float xb) {
 PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int count, int x, int y) {
   PixelCoverage coverage{0.0f, kAllSamples};
   const float x_px = static_cast<float>(x), y_px = static_cast<float>(y);
-  bool crossed = false;
+  // Which edges cross the pixel, and which reach into its row: few of them, so that threads that look at different
+  // edges still take the same steps.
+  unsigned crossing = 0, beside = 0;
+  PICTURA_KEEP_LOOP
   for (int i = 0; i < count; ++i) {
     const PolygonEdge& edge = edges[i];
-    const float left_px = x_px - edge.x0, top_px = y_px - edge.y0;
-    const float at_corner = edge.a * left_px + edge.b * top_px;
+    const float at_corner = edge.a * (x_px - edge.x0) + edge.b * (y_px - edge.y0);
     if (at_corner + max_of(edge.a, 0.0f) + max_of(edge.b, 0.0f) <= 0.0f) return {0.0f, 0};
-    if (at_corner + min_of(edge.a, 0.0f) + min_of(edge.b, 0.0f) < 0.0f) {
-      crossed = true;
-      coverage.samples &= samples_inside(edge, left_px, top_px);
-    }
-    // Signed area to the left of the edge within the pixel: what right borders add and left borders take away.
-    const float from = clamp(edge.y0 - y_px, 0.0f, 1.0f), to = clamp(edge.y1 - y_px, 0.0f, 1.0f);
-    if (to > from) {
-      const float width = mean_width_left((from + top_px) * edge.dx_dy - left_px, (to + top_px) * edge.dx_dy - left_px);
-      coverage.area += edge.a < 0.0f ? (to - from) * width : (from - to) * width;
-    }
+    if (at_corner + min_of(edge.a, 0.0f) + min_of(edge.b, 0.0f) < 0.0f) crossing |= 1u << i;
+    if (edge.y0 < y_px + 1.0f && edge.y1 > y_px) beside |= 1u << i;
   }
-  if (!crossed || (coverage.samples == kAllSamples && coverage.area > 1.0f - kFullCoverage)) return {1.0f, kAllSamples};
+  if (crossing == 0) return {1.0f, kAllSamples};
+  PICTURA_KEEP_LOOP
+  for (; crossing != 0; crossing &= crossing - 1) {
+    const PolygonEdge& edge = edges[first_bit(crossing)];
+    coverage.samples &= samples_inside(edge, x_px - edge.x0, y_px - edge.y0);
+  }
+  // Signed area to the left of the edges within the pixel: what right borders add and left borders take away.
+  PICTURA_KEEP_LOOP
+  for (; beside != 0; beside &= beside - 1) {
+    const PolygonEdge& edge = edges[first_bit(beside)];
+    const float left_px = x_px - edge.x0, top_px = y_px - edge.y0;
+    const float from = clamp(edge.y0 - y_px, 0.0f, 1.0f), to = clamp(edge.y1 - y_px, 0.0f, 1.0f);
+    const float width = mean_width_left((from + top_px) * edge.dx_dy - left_px, (to + top_px) * edge.dx_dy - left_px);
+    coverage.area += edge.a < 0.0f ? (to - from) * width : (from - to) * width;
+  }
+  if (coverage.samples == kAllSamples && coverage.area > 1.0f - kFullCoverage) return {1.0f, kAllSamples};
   if (coverage.area < kLeastCoverage) return {0.0f, 0};
   coverage.area = min_of(coverage.area, 1.0f);
   return coverage;
@@ -283,6 +319,7 @@ PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const Pi
   const float y_px = static_cast<float>(y);
   float touch_low = static_cast<float>(box.x_begin), touch_high = static_cast<float>(box.x_end);
   float full_low = touch_low, full_high = touch_high;
+  PICTURA_KEEP_LOOP
   for (int i = 0; i < count; ++i) {
     const PolygonEdge& edge = edges[i];
     const float above_px = y_px - edge.y0;

@@ -24,6 +24,10 @@ PICTURA_HD inline float strip_radius_m(const Strip& strip) {
   return 0.5f * (length(strip.b_m - strip.a_m) + side * strip.width_m);
 }
 
+PICTURA_HD inline Vec3 wall_middle(const WallFace& wall) {
+  return (wall.a_m + wall.b_m) * 0.5f + Vec3{0.0f, 0.0f, 0.5f * wall.height_m};
+}
+
 PICTURA_HD inline float wall_radius_m(const WallFace& wall) {
   return 0.5f * (length(wall.b_m - wall.a_m) + wall.height_m);
 }
@@ -34,8 +38,7 @@ PICTURA_HD inline bool may_show(const Strip& strip, const PinholeCamera& camera,
 }
 
 PICTURA_HD inline bool may_show(const WallFace& wall, const PinholeCamera& camera, const Frustum& f, float far_m) {
-  const Vec3 center = (wall.a_m + wall.b_m) * 0.5f + Vec3{0.0f, 0.0f, 0.5f * wall.height_m};
-  return ball_in_frustum(f, to_camera(camera, center), wall_radius_m(wall), far_m);
+  return ball_in_frustum(f, to_camera(camera, wall_middle(wall)), wall_radius_m(wall), far_m);
 }
 
 PICTURA_HD inline bool may_show(const LightHead& head, const PinholeCamera& camera, const Frustum& f) {

@@ -82,6 +82,7 @@ PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
   const Vec2 origin = a.corner[0].xy();
   auto project = [&](const Extent& e, Vec2 axis) {
     Interval interval;
+    PICTURA_KEEP_LOOP
     for (int i = 0; i < e.corners; ++i) {
       const float at = dot(axis, e.corner[i].xy() - origin);
       interval.low = min_of(interval.low, at);
@@ -90,6 +91,7 @@ PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
     return interval;
   };
   auto separated_by_side_of = [&](const Extent& e) {
+    PICTURA_KEEP_LOOP
     for (int i = 0; i < e.corners; ++i) {
       const Vec2 side = e.corner[i + 1 < e.corners ? i + 1 : 0].xy() - e.corner[i].xy();
       const float norm = length(side);
@@ -100,12 +102,18 @@ PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
     }
     return false;
   };
-  return !separated_by_side_of(a) && !separated_by_side_of(b);
+  const Extent* extents[2] = {&a, &b};
+  PICTURA_KEEP_LOOP
+  for (const Extent* extent : extents) {
+    if (separated_by_side_of(*extent)) return false;
+  }
+  return true;
 }
 
 /// Whether a solid stands on a strip that is seen from above, which then lies behind it (see kStanding_m).
 PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip, Vec3 eye_m) {
   Vec3 sum{};
+  PICTURA_KEEP_LOOP
   for (int i = 0; i < solid.corners; ++i) sum = sum + (solid.corner[i] - strip.corner[0]);
   const Vec3 middle = sum * (1.0f / static_cast<float>(solid.corners));
   const Vec3 normal = cross(strip.corner[2] - strip.corner[0], strip.corner[3] - strip.corner[1]);

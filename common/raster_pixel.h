@@ -32,13 +32,21 @@ class PixelSum {
     return {coverage.area * share, kPartial};
   }
 
-  PICTURA_HD void add(Weight weight, Rgb color) {
-    Part& part = part_[weight.kind];
-    part.area += to_units(weight.area);
-    part.r += to_units(weight.area * color.r);
-    part.g += to_units(weight.area * color.g);
-    part.b += to_units(weight.area * color.b);
+  /// A weight, and the colour times it, in whole units; those of one kind may be summed in any order.
+  struct Part {
+    int32_t area = 0, r = 0, g = 0, b = 0;
+  };
+  PICTURA_HD static Part part_of(Weight weight, Rgb color) {
+    return {to_units(weight.area), to_units(weight.area * color.r), to_units(weight.area * color.g),
+            to_units(weight.area * color.b)};
   }
+  PICTURA_HD void add(Kind kind, const Part& part) {
+    part_[kind].area += part.area;
+    part_[kind].r += part.r;
+    part_[kind].g += part.g;
+    part_[kind].b += part.b;
+  }
+  PICTURA_HD void add(Weight weight, Rgb color) { add(weight.kind, part_of(weight, color)); }
 
   PICTURA_HD Shares shares() const {
     const float whole = area_of(kWhole), partial = area_of(kPartial);
@@ -71,9 +79,6 @@ class PixelSum {
   }
   PICTURA_HD float area_of(Kind kind) const { return static_cast<float>(part_[kind].area) * (1.0f / kUnits); }
 
-  struct Part {
-    int32_t area = 0, r = 0, g = 0, b = 0;
-  };
   Part part_[kNumKinds];
 };
 

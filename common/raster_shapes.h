@@ -23,6 +23,7 @@ struct FacePlane {
 };
 PICTURA_HD inline FacePlane face_plane(const Vec3* corners, int count) {
   Vec3 normal{};
+  PICTURA_KEEP_LOOP
   for (int i = 1; i + 1 < count; ++i) normal = normal + cross(corners[i] - corners[0], corners[i + 1] - corners[0]);
   return {normal, dot(normal, corners[0])};
 }
@@ -31,6 +32,7 @@ PICTURA_HD inline FacePlane face_plane(const Vec3* corners, int count) {
 /// to 0 is not drawn, and so hides nothing.
 PICTURA_HD inline float face_brightness(const Vec3* corners, int count) {
   float sum_m = 0.0f;
+  PICTURA_KEEP_LOOP
   for (int i = 0; i < count; ++i) sum_m += clamp(corners[i].z, 0.0f, kVisibleRange_m);
   return depth_brightness(sum_m / static_cast<float>(count));
 }
@@ -73,20 +75,20 @@ PICTURA_HD inline void cuboid_face_corners(const AgentBox& box, int face, Vec3* 
     const Vec2 ground = (i & 3) < 2 ? at_end + across : at_end - across;
     return Vec3{ground.x, ground.y, i < 4 ? box.center_m.z : box.center_m.z + box.height_m};
   };
-  auto set = [&](int a, int b, int c, int d) {
-    corners_out[0] = corner(a);
-    corners_out[1] = corner(b);
-    corners_out[2] = corner(c);
-    corners_out[3] = corner(d);
-  };
+  // Four corners a face, three bits each, the first lowest.
+  constexpr int kFrontCorners = 07403, kBackCorners = 05621, kLeftCorners = 04510, kRightCorners = 06732,
+                kTopCorners = 07654, kUndersideCorners = 00123;
+  int corners = kUndersideCorners;
   switch (face) {
-    case static_cast<int>(BoxFace::front): return set(3, 0, 4, 7);
-    case static_cast<int>(BoxFace::back): return set(1, 2, 6, 5);
-    case static_cast<int>(BoxFace::left): return set(0, 1, 5, 4);
-    case static_cast<int>(BoxFace::right): return set(2, 3, 7, 6);
-    case static_cast<int>(BoxFace::top): return set(4, 5, 6, 7);
-    default: return set(3, 2, 1, 0);
+    case static_cast<int>(BoxFace::front): corners = kFrontCorners; break;
+    case static_cast<int>(BoxFace::back): corners = kBackCorners; break;
+    case static_cast<int>(BoxFace::left): corners = kLeftCorners; break;
+    case static_cast<int>(BoxFace::right): corners = kRightCorners; break;
+    case static_cast<int>(BoxFace::top): corners = kTopCorners; break;
+    default: break;
   }
+  PICTURA_KEEP_LOOP
+  for (int i = 0; i < 4; ++i) corners_out[i] = corner(corners >> (3 * i) & 7);
 }
 
 /// Calls emit(corners, count, plane, color) for one face of a box, in camera coordinates.
@@ -95,6 +97,7 @@ PICTURA_HD inline void cuboid_face(const AgentBox& box, int face, const PinholeC
                                    Emit&& emit) {
   Vec3 corners[4];
   cuboid_face_corners(box, face, corners);
+  PICTURA_KEEP_LOOP
   for (int i = 0; i < 4; ++i) corners[i] = to_camera(camera, corners[i]);
   const float brightness = face_brightness(corners, 4);
   const BoxFace painted = face == kUnderside ? BoxFace::top : static_cast<BoxFace>(face);
@@ -115,8 +118,9 @@ PICTURA_HD inline void agent_faces(const AgentBox& box, const PinholeCamera& cam
 template <typename Emit>
 PICTURA_HD inline void wall_faces(const WallFace& wall, const PinholeCamera& camera, Emit&& emit) {
   const Vec3 up{0.0f, 0.0f, wall.height_m};
-  const Vec3 corners[4] = {to_camera(camera, wall.a_m), to_camera(camera, wall.b_m), to_camera(camera, wall.b_m + up),
-                           to_camera(camera, wall.a_m + up)};
+  Vec3 corners[4] = {wall.a_m, wall.b_m, wall.b_m + up, wall.a_m + up};
+  PICTURA_KEEP_LOOP
+  for (int i = 0; i < 4; ++i) corners[i] = to_camera(camera, corners[i]);
   const float brightness = face_brightness(corners, 4);
   if (brightness > 0.0f) emit(corners, 4, face_plane(corners, 4), wall.color * brightness);
 }
@@ -139,6 +143,7 @@ PICTURA_HD inline void light_faces(const LightHead& head, LightState state, cons
   const Vec2 left = left_normal(head.facing);
   Vec3 corners[kLightSides];
   float c = 1.0f, s = 0.0f;
+  PICTURA_KEEP_LOOP
   for (int i = 0; i < kLightSides; ++i) {
     const Vec2 ground = head.position_m.xy() + left * (radius_m * c);
     corners[i] = to_camera(camera, {ground.x, ground.y, head.position_m.z + radius_m * s});
@@ -220,6 +225,7 @@ template <typename Emit>
 PICTURA_HD inline void strip_faces(const Strip& strip, const PinholeCamera& camera, float floor_px, Emit&& emit) {
   Vec3 corners[4];
   strip_corners(strip, corners);
+  PICTURA_KEEP_LOOP
   for (int i = 0; i < 4; ++i) corners[i] = to_camera(camera, corners[i]);
   const float brightness = face_brightness(corners, 4);
   const FacePlane plane = face_plane(corners, 4);
