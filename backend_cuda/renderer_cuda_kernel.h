@@ -24,8 +24,8 @@ struct Ball {
   float radius_m = 0;
 };
 
-/// Pieces of a map of one kind, each in the cell of its ball's centre alone: no query meets one twice, and the pieces of
-/// neighbouring cells of a row stand side by side.
+/// Pieces of a map of one kind, each in the cell of its ball's centre alone: no query meets one twice, and the pieces
+/// of neighbouring cells of a row stand side by side.
 struct PieceGrid {
   GridView cells;
   Span<const Ball> balls;  // as cells.items

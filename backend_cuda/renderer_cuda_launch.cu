@@ -31,9 +31,7 @@ Scratch small_scratch(int processors) {
   return scratch;
 }
 
-std::size_t block_bytes(const Scratch& large) {
-  return large_bytes(large);
-}
+std::size_t block_bytes(const Scratch& large) { return large_bytes(large); }
 
 cudaError_t launch_draw(const KernelSet& kernels, const DrawTask& task, const Scratch& small, const Scratch& large,
                         cudaStream_t stream) {
