@@ -150,6 +150,29 @@ TEST_F(Observation, ConditioningIsScaledByThePapersRanges) {
   EXPECT_NEAR(out.conditioning[static_cast<size_t>(Conditioning::throttle)], 1, 1e-6);
 }
 
+TEST_F(Observation, EveryCoefficientHasThePapersRange) {
+  // The paper's table, in the order of conditioning.h; what is fixed reads 0.
+  const float lows[kNumConditioning] = {2,     0, 0,       0, 0, 0,    2.5e-4f, 0,       2.5e-4f,
+                                        -0.5f, 0, 2.5e-4f, 0, 0, 0.8f, 0.8f,    2 / 3.0f};
+  const float highs[kNumConditioning] = {12,   20, 3,       3, 1, 0.1f,  2.5e-2f, 1,   7.5e-3f,
+                                         0.5f, 0,  7.5e-3f, 1, 0, 1.25f, 1.25f,   1.5f};
+  for (const float share : {0.0f, 0.25f, 1.0f}) {
+    for (int i = 0; i < kNumConditioning; ++i) {
+      stage.set(0, static_cast<Conditioning>(i), lows[i] + share * (highs[i] - lows[i]));
+    }
+    look();
+    const ObservationView out = stage.results.observation_view();
+    for (size_t i = 0; i < kNumConditioning; ++i) {
+      const bool is_fixed = lows[i] == highs[i];
+      EXPECT_NEAR(out.conditioning[i], is_fixed ? 0 : 2 * share - 1, 1e-5) << kConditioningNames[i];
+    }
+  }
+  // Beyond the range, as a pedestrian's goal radius, it is clamped.
+  stage.set(0, Conditioning::delta_goal_m, 0.5f);
+  look();
+  EXPECT_EQ(stage.results.observation_view().conditioning[0], -1);
+}
+
 /// What is listed must be what is in sight: checked against all pieces of the map, from many places and headings.
 TEST_F(Observation, LanesBoundariesAndWallsAreAllThatIsInSight) {
   RandomStream random(5, 0, 0, 0, 0, Purpose::town);
