@@ -84,12 +84,13 @@ void expect_close(const std::vector<float>& a, const std::vector<float>& b) {
   EXPECT_LE(static_cast<double>(far), kMovedSceneShare * static_cast<double>(a.size()));
 }
 
+constexpr SinCos kNoTurn{.sin = 0, .cos = 1};
+
 // The town moved by a rotation about z, a shift, or a mirroring of y.
-SyntheticTown moved(const SyntheticTown& town, float turn_rad, Vec3 shift_m, bool mirror) {
-  const SinCos sc = sincos_of(turn_rad);
+SyntheticTown moved(const SyntheticTown& town, SinCos turn, Vec3 shift_m, bool mirror) {
   auto direction = [&](Vec2 v) {
     if (mirror) v.y = -v.y;
-    return Vec2{v.x * sc.cos - v.y * sc.sin, v.x * sc.sin + v.y * sc.cos};
+    return Vec2{v.x * turn.cos - v.y * turn.sin, v.x * turn.sin + v.y * turn.cos};
   };
   auto place = [&](Vec3 p) {
     const Vec2 turned = direction(p.xy());
@@ -131,10 +132,20 @@ TEST(Invariance, MovingTheWorldChangesNothing) {
   town.views.resize(6);
   const RendererConfig config{.rig = paper_rig(), .num_threads = 1};
   const std::vector<float> here = draw(town.geometry, town.scene, town.views, config).rgb;
-  const SyntheticTown shifted = moved(town, 0, {256, -512, 32}, false);
+  const SyntheticTown shifted = moved(town, kNoTurn, {256, -512, 32}, false);
   expect_close(draw(shifted.geometry, shifted.scene, shifted.views, config).rgb, here);
-  const SyntheticTown turned = moved(town, 1.1f, {}, false);
+  const SyntheticTown turned = moved(town, sincos_of(1.1f), {}, false);
   expect_close(draw(turned.geometry, turned.scene, turned.views, config).rgb, here);
+}
+
+TEST(Invariance, AQuarterTurnOfTheWorldChangesNoBit) {
+  // Exact, as it only swaps coordinates and their signs.
+  SyntheticTown town = make_synthetic_town(4, 80);
+  town.views.resize(6);
+  const RendererConfig config{.rig = paper_rig(), .num_threads = 1};
+  const std::vector<float> here = draw(town.geometry, town.scene, town.views, config).rgb;
+  const SyntheticTown turned = moved(town, {.sin = 1, .cos = 0}, {}, false);
+  EXPECT_EQ(draw(turned.geometry, turned.scene, turned.views, config).rgb, here);
 }
 
 TEST(Invariance, AMirroredWorldGivesMirroredImages) {
@@ -146,7 +157,7 @@ TEST(Invariance, AMirroredWorldGivesMirroredImages) {
   for (View& view : town.views) view.ego_agent = -1;
   RendererConfig config{.rig = simple_rig(96, 54, 77), .num_threads = 1};
   const Drawn here = draw(town.geometry, town.scene, town.views, config);
-  const SyntheticTown mirrored = moved(town, 0, {}, true);
+  const SyntheticTown mirrored = moved(town, kNoTurn, {}, true);
   Drawn there = draw(mirrored.geometry, mirrored.scene, mirrored.views, config);
   for (std::size_t row = 0; row < there.rgb.size() / 96; ++row) {
     std::reverse(there.rgb.begin() + static_cast<std::ptrdiff_t>(96 * row),
