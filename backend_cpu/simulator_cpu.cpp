@@ -182,7 +182,9 @@ class SimulatorCpu final : public Simulator {
     const auto lane_of = [&lanes](int agent) { return &lanes[static_cast<size_t>(agent % kTotalsLanes)]; };
     int active = 0;
     for (int agent = 0; agent < world.num_agents; ++agent) {
-      active += settle_and_count(world, agent, results, lane_of(agent));
+      const float step_m = settle_agent(world, agent, results);
+      count_agent(world, agent, results, step_m, lane_of(agent));
+      active += is_active(world, agent);
     }
     for (int light = 0; light < static_cast<int>(world.map.stop_lines.size()); ++light) {
       world.lights[light] = light_state(world.light_plans[light], steps);

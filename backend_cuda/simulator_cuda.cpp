@@ -1,6 +1,7 @@
 // The simulator in device memory: WorldBatch checks, describes and saves it on the host, kernels step its copy. Nothing
 // here waits for the device but what copies to or from the host.
 #include <memory>
+#include <numeric>
 #include <type_traits>
 
 #include "pictura/backend_cuda/simulator_cuda_kernel.h"
@@ -106,14 +107,59 @@ struct DeviceResults {
 
 /// What the phases need besides state and results.
 struct DeviceScratch {
-  DeviceBuffer<WorldView> worlds;
+  DeviceBuffer<WorldView> worlds, next_worlds;
   DeviceBuffer<cuda::WorldScratch> of_worlds;
   DeviceBuffer<int32_t> world_of_slot;
-  DeviceBuffer<int32_t> cell_begin, cell_items, chosen_try, next_try;
+  DeviceBuffer<int32_t> cell_begin, cell_items;  // each world's one cell: {0, boxes}; and 0, 1, 2, ...
+  DeviceBuffer<AgentBox> try_boxes;
   DeviceBuffer<uint32_t> free_tries;
-  DeviceBuffer<uint8_t> begins;
+  DeviceBuffer<int32_t> known_tries, chosen_try, next_try;
+  DeviceBuffer<float> step_m;
   DeviceBuffer<int32_t> refused_slot;
   MappedValue<int64_t> refusal;
+};
+
+/// The part of the state that an episode begins with, for the next one.
+struct DeviceNext {
+  DeviceAgents agents;
+  DeviceBuffer<AgentBox> boxes;
+  DeviceBuffer<LightPlan> light_plans;
+  DeviceBuffer<LightState> lights;
+  DeviceBuffer<int32_t> spawned;
+
+  explicit DeviceNext(const WorldBatch& batch)
+      : agents(static_cast<size_t>(batch.num_slots())),
+        boxes(batch.boxes.size()),
+        light_plans(batch.light_plans.size()),
+        lights(batch.lights.size()),
+        spawned(batch.worlds.size()) {}
+};
+
+/// A stream beside the caller's, and what ties them together.
+class SideStream {
+ public:
+  SideStream() {
+    PICTURA_CUDA(cudaStreamCreateWithFlags(&streams_.side, cudaStreamNonBlocking));
+    for (cudaEvent_t* event : {&streams_.forked, &streams_.joined}) {
+      PICTURA_CUDA(cudaEventCreateWithFlags(event, cudaEventDisableTiming));
+    }
+  }
+  SideStream(const SideStream&) = delete;
+  SideStream& operator=(const SideStream&) = delete;
+  ~SideStream() {
+    for (cudaEvent_t event : {streams_.forked, streams_.joined}) {
+      if (event) cudaEventDestroy(event);
+    }
+    if (streams_.side) cudaStreamDestroy(streams_.side);
+  }
+  cuda::StepStreams beside(Stream stream) const {
+    cuda::StepStreams streams = streams_;
+    streams.main = static_cast<cudaStream_t>(stream.handle);
+    return streams;
+  }
+
+ private:
+  cuda::StepStreams streams_;
 };
 
 class SimulatorCuda final : public Simulator {
@@ -122,6 +168,7 @@ class SimulatorCuda final : public Simulator {
                 std::vector<WorldSpec> worlds)
       : batch_(std::make_unique<WorldBatch>(config, std::move(maps), std::move(worlds))),
         agents_(static_cast<size_t>(batch_->num_slots())),
+        next_(*batch_),
         results_(static_cast<size_t>(batch_->num_slots()), config) {
     for (const WorldMap& map : batch_->world_maps) maps_.emplace_back(map.view());
     WorldBatch::visit_state(*batch_, state_, [](const auto& host, auto& device) { device = device_copy(host); });
@@ -149,7 +196,7 @@ class SimulatorCuda final : public Simulator {
 
   void reset(Stream stream) override {
     throw_refused();
-    cuda::launch_reset(arrays(), static_cast<cudaStream_t>(stream.handle));
+    cuda::launch_reset(arrays(), side_.beside(stream));
     PICTURA_CUDA(cudaGetLastError());
   }
 
@@ -157,7 +204,7 @@ class SimulatorCuda final : public Simulator {
     throw_refused();
     PICTURA_CHECK(actions.size() == static_cast<size_t>(num_slots()), "step: expected {} actions, got {}", num_slots(),
                   actions.size());
-    cuda::launch_step(arrays(), actions.data(), static_cast<cudaStream_t>(stream.handle));
+    cuda::launch_step(arrays(), actions.data(), side_.beside(stream));
     PICTURA_CUDA(cudaGetLastError());
     return {results_.reward.span(), results_.terminated.span(), results_.truncated.span(), results_.valid.span(),
             agents_.refusal.span()};
@@ -205,7 +252,7 @@ class SimulatorCuda final : public Simulator {
     WorldBatch::visit_state(*batch_, state_, [](auto& host, auto& device) { device.copy_from_host(host.data()); });
     upload_worlds();
     results_.clear();
-    cuda::launch_restored(arrays(), nullptr);
+    cuda::launch_restored(arrays(), side_.beside({}));
     PICTURA_CUDA(cudaGetLastError());
     synchronize();
   }
@@ -235,55 +282,68 @@ class SimulatorCuda final : public Simulator {
   void allocate_scratch() {
     const size_t num_worlds = batch_->worlds.size(), num_boxes = batch_->boxes.size();
     std::vector<int32_t> world_of_slot;
-    size_t num_cells = 0;
+    std::vector<int32_t> cell_begin;
+    int32_t most_boxes = 0;
     for (size_t w = 0; w < num_worlds; ++w) {
       world_of_slot.insert(world_of_slot.end(), static_cast<size_t>(batch_->worlds[w].num_agents),
                            static_cast<int32_t>(w));
-      num_cells += batch_->box_cells[w].begin.size();
+      const int32_t boxes = batch_->box_begin[w + 1] - batch_->box_begin[w];
+      cell_begin.insert(cell_begin.end(), {0, boxes});
+      most_boxes = std::max(most_boxes, boxes);
     }
+    std::vector<int32_t> cell_items(static_cast<size_t>(most_boxes));
+    std::iota(cell_items.begin(), cell_items.end(), 0);
     scratch_.world_of_slot = device_copy(world_of_slot);
     scratch_.worlds = DeviceBuffer<WorldView>(num_worlds);
+    scratch_.next_worlds = DeviceBuffer<WorldView>(num_worlds);
     scratch_.of_worlds = DeviceBuffer<cuda::WorldScratch>(num_worlds);
-    scratch_.cell_begin = DeviceBuffer<int32_t>(num_cells);
-    scratch_.cell_items = DeviceBuffer<int32_t>(num_boxes);
+    scratch_.cell_begin = device_copy(cell_begin);
+    scratch_.cell_items = device_copy(cell_items);
+    scratch_.try_boxes = DeviceBuffer<AgentBox>(num_boxes * cuda::kTriesAtOnce);
+    scratch_.free_tries = DeviceBuffer<uint32_t>(num_boxes);
+    scratch_.known_tries = DeviceBuffer<int32_t>(num_boxes);
     scratch_.chosen_try = DeviceBuffer<int32_t>(num_boxes);
     scratch_.next_try = DeviceBuffer<int32_t>(num_boxes);
-    scratch_.free_tries = DeviceBuffer<uint32_t>(num_boxes);
-    scratch_.begins = DeviceBuffer<uint8_t>(num_worlds);
+    scratch_.step_m = DeviceBuffer<float>(world_of_slot.size());
     scratch_.refused_slot = DeviceBuffer<int32_t>(1);
     *scratch_.refusal.host() = -1;
   }
 
   /// The worlds as the rules see them, at the episodes that the host's state is in, over device memory.
   void upload_worlds() {
-    std::vector<WorldView> worlds;
+    std::vector<WorldView> worlds, next_worlds;
     std::vector<cuda::WorldScratch> of_worlds;
-    int32_t* cell_begin = scratch_.cell_begin.data();
     for (int w = 0; w < batch_->num_worlds(); ++w) {
       const auto index = static_cast<size_t>(w);
       const int32_t first_box = batch_->box_begin[index], first_light = batch_->light_begin[index];
       WorldView view = batch_->world(w);
-      const size_t num_begins = view.box_cells.begin.size();
       view.map = maps_[static_cast<size_t>(batch_->worlds[index].map)].view();
       view.agents = agents_.view();
       view.boxes = state_.boxes.data() + first_box;
       view.boxes_before = state_.boxes_before.data() + first_box;
-      view.box_cells.begin = {cell_begin, num_begins};
-      view.box_cells.items = {scratch_.cell_items.data() + first_box, static_cast<size_t>(view.num_boxes)};
+      view.box_cells = cuda::one_cell({scratch_.cell_begin.data() + 2 * w, 2},
+                                      {scratch_.cell_items.data(), static_cast<size_t>(view.num_boxes)});
       view.light_plans = state_.light_plans.data() + first_light;
       view.lights = state_.lights.data() + first_light;
       worlds.push_back(view);
-      of_worlds.push_back({cell_begin, scratch_.cell_items.data() + first_box, scratch_.free_tries.data() + first_box,
+      view.agents = next_.agents.view();
+      view.boxes = view.boxes_before = next_.boxes.data() + first_box;
+      view.light_plans = next_.light_plans.data() + first_light;
+      view.lights = next_.lights.data() + first_light;
+      next_worlds.push_back(view);
+      of_worlds.push_back({scratch_.try_boxes.data() + first_box * cuda::kTriesAtOnce,
+                           scratch_.free_tries.data() + first_box, scratch_.known_tries.data() + first_box,
                            scratch_.chosen_try.data() + first_box, scratch_.next_try.data() + first_box});
-      cell_begin += num_begins;
     }
     scratch_.worlds.copy_from_host(worlds.data());
+    scratch_.next_worlds.copy_from_host(next_worlds.data());
     scratch_.of_worlds.copy_from_host(of_worlds.data());
   }
 
   cuda::SimulatorArrays arrays() {
     cuda::SimulatorArrays arrays;
     arrays.worlds = scratch_.worlds.data();
+    arrays.next_worlds = scratch_.next_worlds.data();
     arrays.scratch = scratch_.of_worlds.data();
     arrays.world_of_slot = scratch_.world_of_slot.data();
     arrays.num_worlds = batch_->num_worlds();
@@ -297,7 +357,8 @@ class SimulatorCuda final : public Simulator {
     arrays.views = results_.views.data();
     arrays.observations = results_.observations();
     arrays.entity_sets = batch_->config.vector_observations;
-    arrays.begins = scratch_.begins.data();
+    arrays.step_m = scratch_.step_m.data();
+    arrays.next_spawned = next_.spawned.data();
     arrays.refused_slot = scratch_.refused_slot.data();
     arrays.refusal = scratch_.refusal.device();
     return arrays;
@@ -308,8 +369,10 @@ class SimulatorCuda final : public Simulator {
   std::vector<DeviceMap> maps_;
   DeviceAgents agents_;
   DeviceState state_;
+  DeviceNext next_;
   DeviceResults results_;
   DeviceScratch scratch_;
+  SideStream side_;
   DeviceBuffer<int32_t> world_begin_, light_begin_;
   DeviceBuffer<GeometryHandle> geometry_;
   SceneBatch scene_;

@@ -1,18 +1,104 @@
-// How the simulator's phases are started on a device: a thread per item, a block per world, or a warp per item. Kernels
-// of a stream follow one another, which is the barrier between phases.
+// How the simulator's phases are started on a device: a thread or a group of lanes per item, or a block per world.
+// Kernels of a stream follow one another, which is the barrier between phases.
 #include "pictura/backend_cuda/simulator_cuda_kernel.h"
+
+#include <type_traits>
 
 namespace pictura::cuda {
 namespace {
 
-constexpr int kThreads = 128;  // per block
-constexpr int kWarp = 32;
+constexpr int kThreads = 128;      // per block
+constexpr int kTeamThreads = 512;  // a world's start is one long chain of work: as wide as its loops
 
 struct DeviceAtomics {
   /// Returns the value before.
   __device__ int32_t add(int32_t* value, int32_t change) const { return atomicAdd(value, change); }
   __device__ void lower(int32_t* value, int32_t bound) const { atomicMin(value, bound); }
   __device__ void set_bits(uint32_t* value, uint32_t bits) const { atomicOr(value, bits); }
+};
+
+/// The nearest of the things offered by a warp's lanes: the lane of rank k holds the k-th, as squared distance and item.
+template <int capacity>
+class NearestOfWarp {
+  static_assert(capacity <= kWarp);
+
+ public:
+  __device__ int count() const { return min(capacity, __popc(__ballot_sync(~0u, key_ != kNone))); }
+  /// at: the caller's own rank.
+  __device__ int32_t item(int) const { return static_cast<int32_t>(key_); }
+  __device__ float worst() const {
+    return __uint_as_float(static_cast<uint32_t>(__shfl_sync(~0u, key_, capacity - 1) >> 32));
+  }
+  __device__ void offer(bool is_one, float distance2, int32_t item) {
+    const uint64_t offered =
+        is_one ? uint64_t{__float_as_uint(distance2)} << 32 | static_cast<uint32_t>(item) : kNone;
+    const bool is_first = threadIdx.x % kWarp == 0;
+    const uint64_t worst = __shfl_sync(~0u, key_, capacity - 1);
+    for (uint32_t better = __ballot_sync(~0u, offered < worst); better != 0; better &= better - 1) {
+      const uint64_t next = __shfl_sync(~0u, offered, __ffs(static_cast<int>(better)) - 1);
+      const uint64_t before = __shfl_up_sync(~0u, key_, 1);
+      if (next < key_) key_ = is_first || before < next ? next : before;
+    }
+  }
+
+ private:
+  static constexpr uint64_t kNone = ~uint64_t{0};
+  uint64_t key_ = kNone;
+};
+
+/// A group of a warp's lanes, beside other groups.
+template <int kGroup>
+struct DeviceLanes {
+  static constexpr int kSize = kGroup;
+  template <int capacity>
+  using Nearest = NearestOfWarp<capacity>;
+  float* rows = nullptr;
+
+  __device__ static constexpr int size() { return kSize; }
+  __device__ int rank() const { return static_cast<int>(threadIdx.x) % kSize; }
+  __device__ void wait() const { __syncwarp(mask()); }
+  __device__ bool any(bool value) const { return __any_sync(mask(), value); }
+  __device__ uint32_t ballot(bool value) const { return __ballot_sync(mask(), value) >> first(); }
+  __device__ int count_before(uint32_t lanes) const { return __popc(lanes & ((1u << rank()) - 1u)); }
+  __device__ int sum(int value) const { return __reduce_add_sync(mask(), value); }
+  template <typename T>
+  __device__ T from(int rank, const T& value) const {
+    static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(uint32_t) == 0);
+    uint32_t words[sizeof(T) / sizeof(uint32_t)];
+    memcpy(words, &value, sizeof(T));
+    for (uint32_t& word : words) word = __shfl_sync(mask(), word, rank, kSize);
+    T result;
+    memcpy(&result, words, sizeof(T));
+    return result;
+  }
+  template <typename T>
+  __device__ T of_lowest(float score, int index, const T& value) const {
+    // Bits of floats that are not negative are ordered as the floats are.
+    const uint32_t lowest = __reduce_min_sync(mask(), __float_as_uint(score));
+    const bool is_lowest = __float_as_uint(score) == lowest;
+    const int first_index = __reduce_min_sync(mask(), is_lowest ? index : INT_MAX);
+    return from(__ffs(static_cast<int>(ballot(is_lowest && index == first_index))) - 1, value);
+  }
+  /// Room for ShowAgent::kStaging floats.
+  __device__ float* staging() const { return rows; }
+  /// Writes the first `filled` of staging(), then zeros up to `end` or a little beyond, but not beyond `capacity`.
+  __device__ void write(const float* values, int filled, int end, int capacity, float* out) const {
+    if (capacity % 4 != 0) {
+      for (int i = rank(); i < end; i += kSize) out[i] = i < filled ? values[i] : 0.0f;
+      return;
+    }
+    for (int i = 4 * rank(); i < end; i += 4 * kSize) {
+      float4 four = *reinterpret_cast<const float4*>(values + i);
+      if (i + 3 >= filled) {
+        four = {i < filled ? four.x : 0.0f, i + 1 < filled ? four.y : 0.0f, i + 2 < filled ? four.z : 0.0f, 0.0f};
+      }
+      *reinterpret_cast<float4*>(out + i) = four;
+    }
+  }
+
+ private:
+  __device__ static unsigned first() { return threadIdx.x % kWarp / kSize * kSize; }
+  __device__ static unsigned mask() { return (~0u >> (kWarp - kSize)) << first(); }
 };
 
 /// The threads of a block.
@@ -22,19 +108,17 @@ struct DeviceTeam : DeviceAtomics {
   /// body(i) for all i in [0, count); then everybody waits for everybody.
   template <typename Body>
   __device__ void for_each(int count, const Body& body) const {
-    for (int i = static_cast<int>(threadIdx.x); i < count; i += kThreads) body(i);
+    for (int i = static_cast<int>(threadIdx.x); i < count; i += kTeamThreads) body(i);
     __syncthreads();
   }
-};
-
-/// The lanes of a warp.
-struct DeviceLanes {
-  __device__ int size() const { return kWarp; }
-  __device__ int rank() const { return static_cast<int>(threadIdx.x) % kWarp; }
-  __device__ uint32_t ballot(bool value) const { return __ballot_sync(~0u, value); }
-  __device__ int count(uint32_t lanes) const { return __popc(lanes); }
-  __device__ int count_before(uint32_t lanes) const { return __popc(lanes & ((1u << rank()) - 1u)); }
-  __device__ void wait() const { __syncwarp(); }
+  /// body(lanes, i) likewise.
+  template <typename Body>
+  __device__ void for_each_by_lanes(int count, const Body& body) const {
+    for (int i = static_cast<int>(threadIdx.x) / kWarp; i < count; i += kTeamThreads / kWarp) {
+      body(DeviceLanes<kWarp>{}, i);
+    }
+    __syncthreads();
+  }
 };
 
 template <typename Phase>
@@ -43,51 +127,80 @@ __global__ void __launch_bounds__(kThreads) run_threads(int32_t count, Phase pha
   if (item < count) phase(DeviceAtomics{}, static_cast<int32_t>(item));
 }
 
-template <typename Phase>
-__global__ void __launch_bounds__(kThreads) run_teams(Phase phase) {
-  // Raw memory: TeamMemory's members have first values, which shared memory cannot have.
-  __shared__ __align__(alignof(TeamMemory)) unsigned char memory[sizeof(TeamMemory)];
-  DeviceTeam team;
-  team.shared = reinterpret_cast<TeamMemory*>(memory);
-  phase(team, static_cast<int32_t>(blockIdx.x));
+template <int kGroup, typename Phase>
+__global__ void __launch_bounds__(kThreads) run_lanes(int32_t count, Phase phase) {
+  const int64_t item = (int64_t{blockIdx.x} * kThreads + threadIdx.x) / kGroup;
+  if (item < count) phase(DeviceLanes<kGroup>{}, static_cast<int32_t>(item));
+}
+
+/// Lanes with memory of their own.
+__global__ void __launch_bounds__(kThreads) run_show(int32_t count, ShowAgent phase) {
+  __shared__ float4 staging[kThreads / kWarp][ShowAgent::kStaging / 4];
+  static_assert(ShowAgent::kStaging % 4 == 0);
+  const int64_t item = (int64_t{blockIdx.x} * kThreads + threadIdx.x) / kWarp;
+  DeviceLanes<kWarp> lanes;
+  lanes.rows = reinterpret_cast<float*>(staging[threadIdx.x / kWarp]);
+  if (item < count) phase(lanes, static_cast<int32_t>(item));
 }
 
 template <typename Phase>
-__global__ void __launch_bounds__(kThreads) run_warps(int32_t count, Phase phase) {
-  const int64_t item = (int64_t{blockIdx.x} * kThreads + threadIdx.x) / kWarp;
-  if (item < count) phase(DeviceLanes{}, static_cast<int32_t>(item));
+__global__ void __launch_bounds__(kTeamThreads) run_teams(Phase phase) {
+  __shared__ TeamMemory memory;
+  DeviceTeam team;
+  team.shared = &memory;
+  phase(team, static_cast<int32_t>(blockIdx.x));
 }
 
 /// Errors stay with the runtime until the caller asks for the last one.
 struct DeviceLaunch {
-  cudaStream_t stream;
+  StepStreams streams;
 
   static unsigned blocks_for(int64_t threads) { return static_cast<unsigned>((threads + kThreads - 1) / kThreads); }
-  void fill(void* memory, size_t size, int byte) const { cudaMemsetAsync(memory, byte, size, stream); }
+  void fill(void* memory, size_t size, int byte) const { cudaMemsetAsync(memory, byte, size, streams.main); }
   template <typename Phase>
   void threads(int32_t count, const Phase& phase) const {
-    run_threads<<<blocks_for(count), kThreads, 0, stream>>>(count, phase);
+    run_threads<<<blocks_for(count), kThreads, 0, streams.main>>>(count, phase);
+  }
+  template <int kGroup, typename Phase>
+  void lanes(int32_t count, const Phase& phase) const {
+    if constexpr (std::is_same_v<Phase, ShowAgent>) {
+      static_assert(kGroup == kWarp);
+      run_show<<<blocks_for(int64_t{count} * kGroup), kThreads, 0, streams.main>>>(count, phase);
+    } else {
+      run_lanes<kGroup><<<blocks_for(int64_t{count} * kGroup), kThreads, 0, streams.main>>>(count, phase);
+    }
   }
   template <typename Phase>
   void teams(int32_t count, const Phase& phase) const {
-    run_teams<<<static_cast<unsigned>(count), kThreads, 0, stream>>>(phase);
+    run_teams<<<static_cast<unsigned>(count), kTeamThreads, 0, streams.main>>>(phase);
   }
-  template <typename Phase>
-  void warps(int32_t count, const Phase& phase) const {
-    run_warps<<<blocks_for(int64_t{count} * kWarp), kThreads, 0, stream>>>(count, phase);
+  /// Both at once: what `aside` starts on the launch that it is given, beside what `here` starts on this one. What
+  /// follows waits for both.
+  template <typename Aside, typename Here>
+  void beside(const Aside& aside, const Here& here) const {
+    cudaEventRecord(streams.forked, streams.main);
+    cudaStreamWaitEvent(streams.side, streams.forked, 0);
+    DeviceLaunch launch = *this;
+    launch.streams.main = streams.side;
+    aside(launch);
+    here();
+    cudaEventRecord(streams.joined, streams.side);
+    cudaStreamWaitEvent(streams.main, streams.joined, 0);
   }
 };
 
 }  // namespace
 
-void launch_reset(const SimulatorArrays& arrays, cudaStream_t stream) { launch_reset(DeviceLaunch{stream}, arrays); }
-
-void launch_restored(const SimulatorArrays& arrays, cudaStream_t stream) {
-  launch_restored(DeviceLaunch{stream}, arrays);
+void launch_reset(const SimulatorArrays& arrays, const StepStreams& streams) {
+  launch_reset(DeviceLaunch{streams}, arrays);
 }
 
-void launch_step(const SimulatorArrays& arrays, const int32_t* actions, cudaStream_t stream) {
-  launch_step(DeviceLaunch{stream}, arrays, actions);
+void launch_restored(const SimulatorArrays& arrays, const StepStreams& streams) {
+  launch_restored(DeviceLaunch{streams}, arrays);
+}
+
+void launch_step(const SimulatorArrays& arrays, const int32_t* actions, const StepStreams& streams) {
+  launch_step(DeviceLaunch{streams}, arrays, actions);
 }
 
 }  // namespace pictura::cuda

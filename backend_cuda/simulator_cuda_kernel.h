@@ -8,8 +8,14 @@
 
 namespace pictura::cuda {
 
-void launch_reset(const SimulatorArrays& arrays, cudaStream_t stream);
-void launch_restored(const SimulatorArrays& arrays, cudaStream_t stream);
-void launch_step(const SimulatorArrays& arrays, const int32_t* actions, cudaStream_t stream);
+/// The caller's stream, and one beside it for what may overlap, which the events tie to it; a graph captures both.
+struct StepStreams {
+  cudaStream_t main = nullptr, side = nullptr;
+  cudaEvent_t forked = nullptr, joined = nullptr;
+};
+
+void launch_reset(const SimulatorArrays& arrays, const StepStreams& streams);
+void launch_restored(const SimulatorArrays& arrays, const StepStreams& streams);
+void launch_step(const SimulatorArrays& arrays, const int32_t* actions, const StepStreams& streams);
 
 }  // namespace pictura::cuda

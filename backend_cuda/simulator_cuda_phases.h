@@ -1,9 +1,9 @@
 // The CUDA executor's step as phases over agents and worlds, each of which reads only what an earlier one has finished.
 // They say what every thread does and not how threads are started, so that a host can run them too, in any order:
 //   threads  one thread per item: phase(atomics, item)
+//   lanes    lanes in lockstep (simulator/rules/lanes.h), a group of them per item: phase(lanes, item)
 //   teams    threads that wait for each other, one team per world: phase(team, world)
-//   warps    lanes in lockstep, one warp per item: phase(lanes, item)
-// simulator_cuda_kernel.cu starts them on a device; tests/simulator/shuffled_launch.h on a host.
+// simulator_cuda_kernel.cu starts them on a device; tests/simulator/shuffled_executor.h on a host.
 #pragma once
 
 #include "pictura/simulator/rules/episode.h"
@@ -12,11 +12,16 @@
 
 namespace pictura::cuda {
 
-/// One world's memory for sorting and spawning.
+/// How many lanes share an agent: about as many as there are lane segments, barriers and boxes to look at.
+constexpr int kLanesPerAgent = 8, kWarp = 32;
+/// Tries of a box that are looked at together. Most boxes stand at one of the first; the others of 32 are for crowds.
+constexpr int kTriesAtOnce = 4;
+
+/// One world's memory for spawning.
 struct WorldScratch {
-  int32_t* cell_begin = nullptr;  // of the world's box_cells, as the following
-  int32_t* cell_items = nullptr;
-  uint32_t* free_tries = nullptr;  // [boxes] which of its tries the map permits, as bits
+  AgentBox* try_boxes = nullptr;   // [boxes, kTriesAtOnce] the first tries
+  uint32_t* free_tries = nullptr;  // [boxes] which of the known tries the map permits, as bits
+  int32_t* known_tries = nullptr;  // [boxes] how many have been looked at
   int32_t* chosen_try = nullptr;   // [boxes] -1: none
   int32_t* next_try = nullptr;     // [boxes]
 };
@@ -31,7 +36,8 @@ PICTURA_HD constexpr int64_t refusal(int32_t slot, int32_t action) {
 
 /// Everything that the phases read and write, in one memory.
 struct SimulatorArrays {
-  WorldView* worlds = nullptr;             // [num_worlds]
+  WorldView* worlds = nullptr;             // [num_worlds] their box_cells are one cell, which lists all boxes
+  WorldView* next_worlds = nullptr;        // [num_worlds] the same worlds, over memory for their next episode
   const WorldScratch* scratch = nullptr;   // [num_worlds]
   const int32_t* world_of_slot = nullptr;  // [num_slots]
   int32_t num_worlds = 0, num_slots = 0;
@@ -46,8 +52,9 @@ struct SimulatorArrays {
   View* views = nullptr;
   ObservationView observations;
   uint8_t entity_sets = 0;
-  // Of the present step.
-  uint8_t* begins = nullptr;        // [num_worlds] an episode begins in it
+  // Between phases and steps.
+  float* step_m = nullptr;          // [num_slots] driven in the present step
+  int32_t* next_spawned = nullptr;  // [num_worlds] in the next episode
   int32_t* refused_slot = nullptr;  // the lowest one with an action out of range, or kNoSlot
   int64_t* refusal = nullptr;       // the first since the host looked, or -1
 
@@ -55,46 +62,17 @@ struct SimulatorArrays {
   PICTURA_HD bool is_refused() const { return *refused_slot != kNoSlot; }
 };
 
+/// A world's boxes as one cell: with a warp to look at them, all are looked at sooner than they are sorted.
+PICTURA_HD inline GridView one_cell(Span<const int32_t> begin, Span<const int32_t> items) {
+  constexpr float kWhole_m = 1e9f;
+  return {{}, kWhole_m, 1, 1, begin, items};
+}
+
 /// What a team's threads share.
 struct TeamMemory {
-  static constexpr int kParts = 64;
-  SimulatorTotals lanes[kTotalsLanes];
-  int32_t parts[kParts];
-  int32_t value;
+  int32_t lowest_changed;
+  int32_t someone_wants_more;
 };
-
-/// Sorts the boxes that stand anywhere into their cells, by counting. Within a cell they come in any order, on which no
-/// rule depends.
-template <typename Team>
-PICTURA_HD void sort_into_cells(const Team& team, const WorldView& world, const WorldScratch& scratch) {
-  const GridView& cells = world.box_cells;
-  const int num_cells = cells.num_x * cells.num_y;
-  int32_t* begin = scratch.cell_begin;
-  const auto cell_of = [&](const AgentBox& box) {
-    return cells.cell_y(box.center_m.y) * cells.num_x + cells.cell_x(box.center_m.x);
-  };
-  team.for_each(num_cells + 1, [&](int cell) { begin[cell] = 0; });
-  team.for_each(world.num_boxes, [&](int i) {
-    if (world.boxes[i].drawn) team.add(&begin[cell_of(world.boxes[i])], 1);
-  });
-  // The end of each cell, for now: sums of equal parts of the cells, then within them.
-  const int per_part = num_cells / TeamMemory::kParts + 1;
-  const auto end_of = [&](int part) { return min_of((part + 1) * per_part, num_cells + 1); };
-  int32_t* parts = team.memory().parts;
-  team.for_each(TeamMemory::kParts, [&](int part) {
-    int32_t sum = 0;
-    for (int cell = part * per_part; cell < end_of(part); ++cell) sum += begin[cell];
-    parts[part] = sum;
-  });
-  team.for_each(TeamMemory::kParts, [&](int part) {
-    int32_t sum = 0;
-    for (int before = 0; before < part; ++before) sum += parts[before];
-    for (int cell = part * per_part; cell < end_of(part); ++cell) begin[cell] = sum += begin[cell];
-  });
-  team.for_each(world.num_boxes, [&](int i) {
-    if (world.boxes[i].drawn) scratch.cell_items[team.add(&begin[cell_of(world.boxes[i])], -1) - 1] = i;
-  });
-}
 
 /// Finds for each of `count` boxes, which are the world's from first_box on, the first of its tries that the map
 /// permits and that is clear of the boxes before it: what placing them one after the other would find. All choose at
@@ -103,67 +81,123 @@ PICTURA_HD void sort_into_cells(const Team& team, const WorldView& world, const 
 template <typename Team, typename BoxOfTry, typename Permits>
 PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const WorldScratch& scratch, int first_box,
                              int count, const BoxOfTry& box_of_try, const Permits& permits) {
-  static_assert(kSpawnTries <= 32);
+  static_assert(kSpawnTries <= 32 && kSpawnTries % kTriesAtOnce == 0);
   AgentBox* boxes = world.boxes + first_box;
+  AgentBox* try_boxes = scratch.try_boxes + first_box * kTriesAtOnce;
   uint32_t* free_tries = scratch.free_tries + first_box;
+  int32_t* known_tries = scratch.known_tries + first_box;
   int32_t* chosen_try = scratch.chosen_try + first_box;
   int32_t* next_try = scratch.next_try + first_box;
+  const auto box_at_try = [&](int i, int t) {
+    return t < kTriesAtOnce ? try_boxes[i * kTriesAtOnce + t] : box_of_try(i, t);
+  };
+  const auto wants_more = [&](int i) { return next_try[i] < 0 && known_tries[i] < kSpawnTries; };
+  TeamMemory& memory = team.memory();
   team.for_each(count, [&](int i) {
     boxes[i].drawn = 0;
     free_tries[i] = 0;
-    chosen_try[i] = -1;
+    known_tries[i] = 0;
+    chosen_try[i] = next_try[i] = -1;
   });
-  team.for_each(count * kSpawnTries, [&](int k) {
-    if (permits(k / kSpawnTries, k % kSpawnTries)) team.set_bits(&free_tries[k / kSpawnTries], 1u << (k % kSpawnTries));
-  });
-  int32_t& lowest_changed = team.memory().value;
   for (int settled = 0; settled < count;) {
-    team.for_each(1, [&](int) { lowest_changed = count; });
-    team.for_each(count - settled, [&](int k) {
-      const int i = settled + k;
-      next_try[i] = -1;
-      for (int t = 0; t < kSpawnTries && next_try[i] < 0; ++t) {
-        if ((free_tries[i] >> t & 1u) && is_clear(world, box_of_try(i, t), first_box, first_box + i)) next_try[i] = t;
-      }
-      if (next_try[i] != chosen_try[i]) team.lower(&lowest_changed, i);
-    });
-    const int changed = lowest_changed;
-    team.for_each(count - settled, [&](int k) {
+    const int unsettled = count - settled;
+    for (bool more = true; more;) {
+      team.for_each(unsettled * kTriesAtOnce, [&](int k) {
+        const int i = settled + k / kTriesAtOnce;
+        if (!wants_more(i)) return;
+        const int t = known_tries[i] + k % kTriesAtOnce;
+        const AgentBox box = box_of_try(i, t);
+        if (t < kTriesAtOnce) try_boxes[i * kTriesAtOnce + t] = box;
+        if (permits(i, t, box)) team.set_bits(&free_tries[i], 1u << t);
+      });
+      team.for_each(unsettled, [&](int k) {
+        if (wants_more(settled + k)) known_tries[settled + k] += kTriesAtOnce;
+        if (k > 0) return;
+        memory.someone_wants_more = 0;
+        memory.lowest_changed = count;
+      });
+      team.for_each_by_lanes(unsettled, [&](const auto& lanes, int k) {
+        const int i = settled + k;
+        int chosen = -1;
+        for (int t = 0; t < known_tries[i] && chosen < 0; ++t) {
+          if ((free_tries[i] >> t & 1u) && is_clear(world, box_at_try(i, t), first_box, first_box + i, lanes)) {
+            chosen = t;
+          }
+        }
+        lanes.wait();
+        if (lanes.rank() > 0) return;
+        next_try[i] = chosen;
+        if (wants_more(i)) memory.someone_wants_more = 1;
+        if (chosen != chosen_try[i]) team.lower(&memory.lowest_changed, i);
+      });
+      more = memory.someone_wants_more != 0;
+    }
+    const int changed = memory.lowest_changed;
+    team.for_each(unsettled, [&](int k) {
       const int i = settled + k;
       if (next_try[i] == chosen_try[i]) return;
       chosen_try[i] = next_try[i];
-      if (chosen_try[i] >= 0) boxes[i] = box_of_try(i, chosen_try[i]);
+      if (chosen_try[i] >= 0) boxes[i] = box_at_try(i, chosen_try[i]);
       boxes[i].drawn = chosen_try[i] >= 0;
     });
     settled = changed + 1;
   }
 }
 
+/// Begins the episode that `world` says; counts who found a place.
 template <typename Team>
-PICTURA_HD void begin_episode(const Team& team, const SimulatorArrays& arrays, int w) {
-  const WorldView& world = arrays.worlds[w];
-  const WorldScratch& scratch = arrays.scratch[w];
+PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const WorldScratch& scratch,
+                              int32_t* spawned_out) {
   const int num_parked = world.num_boxes - world.num_agents;
   team.for_each(static_cast<int>(world.map.stop_lines.size()), [&](int light) { begin_light(world, light); });
   team.for_each(world.num_agents, [&](int agent) { draw_agent(world, agent); });
-  const auto parked_at = [&](int car, int i) { return parked_box(world, car, parking_spot(world, car, i)); };
-  choose_tries(team, world, scratch, world.num_agents, num_parked, parked_at, [&](int car, int i) {
-    return !world.map.parking_spots.empty() && may_park(world.map, parked_at(car, i), parking_spot(world, car, i));
-  });
+  const auto parked_at = [&](int car, int i) {
+    return parked_box(world, car, world.map.parking_spots.empty() ? ParkingSpot{} : parking_spot(world, car, i));
+  };
+  choose_tries(team, world, scratch, world.num_agents, num_parked, parked_at,
+               [&](int car, int i, const AgentBox& box) {
+                 return !world.map.parking_spots.empty() && may_park(world.map, box, parking_spot(world, car, i));
+               });
   team.for_each(num_parked, [&](int car) { put_parked_car(world, car, scratch.chosen_try[world.num_agents + car]); });
-  const auto agent_at = [&](int agent, int i) { return spawn_box(world, agent, i); };
-  choose_tries(team, world, scratch, 0, world.num_agents, agent_at, [&](int agent, int i) {
-    if (!has_places(world, agent)) return false;
-    const AgentBox box = spawn_box(world, agent, i);
-    return may_spawn(world.map, box) && is_clear(world, box, world.num_agents, world.num_boxes);
+  const auto agent_at = [&](int agent, int i) {
+    return has_places(world, agent) ? spawn_box(world, agent, i) : AgentBox{};
+  };
+  choose_tries(team, world, scratch, 0, world.num_agents, agent_at, [&](int agent, int, const AgentBox& box) {
+    return has_places(world, agent) && may_spawn(world.map, box) &&
+           is_clear(world, box, world.num_agents, world.num_boxes);
   });
-  team.for_each(1, [&](int) { arrays.spawned[w] = 0; });
+  team.for_each(1, [&](int) { *spawned_out = 0; });
   team.for_each(world.num_agents, [&](int agent) {
     put_agent(world, agent, scratch.chosen_try[agent]);
-    if (scratch.chosen_try[agent] >= 0) team.add(&arrays.spawned[w], 1);
+    if (scratch.chosen_try[agent] >= 0) team.add(spawned_out, 1);
   });
-  sort_into_cells(team, world, scratch);
 }
+
+/// Begins episode 0 in every world.
+struct BeginFirstEpisode {
+  SimulatorArrays arrays;
+  template <typename Team>
+  PICTURA_HD void operator()(const Team& team, int w) const {
+    team.for_each(1, [&](int) {
+      arrays.episode_over[w] = 0;
+      arrays.episode_step[w] = arrays.episode_index[w] = 0;
+      arrays.worlds[w].episode = 0;
+    });
+    begin_episode(team, arrays.worlds[w], arrays.scratch[w], &arrays.spawned[w]);
+  }
+};
+
+/// Makes the next episode of the worlds whose present one is over, beside it: a start depends on nothing that a step
+/// changes. The next step takes it.
+struct PrepareEpisode {
+  SimulatorArrays arrays;
+  template <typename Team>
+  PICTURA_HD void operator()(const Team& team, int w) const {
+    if (arrays.is_refused() || !arrays.episode_over[w]) return;
+    team.for_each(1, [&](int) { arrays.next_worlds[w].episode = static_cast<uint32_t>(arrays.episode_index[w] + 1); });
+    begin_episode(team, arrays.next_worlds[w], arrays.scratch[w], &arrays.next_spawned[w]);
+  }
+};
 
 /// Finds the lowest slot whose action is out of range.
 struct CheckActions {
@@ -177,176 +211,191 @@ struct CheckActions {
   }
 };
 
-/// Counts the step of each world, or begins its next episode.
-struct BeginStep {
-  SimulatorArrays arrays;
-  const int32_t* actions;
-  template <typename Team>
-  PICTURA_HD void operator()(const Team& team, int w) const {
-    if (arrays.is_refused()) {
-      team.for_each(w == 0, [&](int) {
-        if (*arrays.refusal < 0) *arrays.refusal = refusal(*arrays.refused_slot, actions[*arrays.refused_slot]);
-      });
-      return;
-    }
-    team.for_each(1, [&](int) {
-      arrays.begins[w] = arrays.episode_over[w];
-      arrays.world_totals[w].slot_steps += arrays.worlds[w].num_agents;
-      ++arrays.episode_step[w];
-      if (!arrays.begins[w]) return;
-      arrays.episode_over[w] = 0;
-      arrays.episode_step[w] = 0;
-      arrays.worlds[w].episode = static_cast<uint32_t>(++arrays.episode_index[w]);
-      ++arrays.world_totals[w].episodes;
-    });
-    if (arrays.begins[w]) begin_episode(team, arrays, w);
-  }
-};
-
-/// Begins episode 0 in every world.
-struct BeginFirstEpisode {
-  SimulatorArrays arrays;
-  template <typename Team>
-  PICTURA_HD void operator()(const Team& team, int w) const {
-    team.for_each(1, [&](int) {
-      arrays.episode_over[w] = 0;
-      arrays.episode_step[w] = arrays.episode_index[w] = 0;
-      arrays.worlds[w].episode = 0;
-    });
-    begin_episode(team, arrays, w);
-  }
-};
-
+/// Moves an agent, or takes it into the episode that was prepared.
 struct Advance {
   SimulatorArrays arrays;
   const int32_t* actions;
-  template <typename Atomics>
-  PICTURA_HD void operator()(const Atomics&, int slot) const {
+  template <typename Lanes>
+  PICTURA_HD void operator()(const Lanes& lanes, int slot) const {
     if (arrays.is_refused()) return;
-    const WorldView& world = arrays.world_of(slot);
-    if (arrays.begins[world.index]) return clear_result(arrays.results, slot);
+    const int w = arrays.world_of_slot[slot];
+    const WorldView& world = arrays.worlds[w];
     const int agent = slot - world.first_slot;
-    arrays.results.valid[slot] = is_active(world, agent);
-    advance(world, agent, actions[slot]);
+    if (!arrays.episode_over[w]) {
+      const bool drives = is_active(world, agent);
+      if (lanes.rank() == 0) arrays.results.valid[slot] = drives;
+      return advance(world, agent, actions[slot], lanes);
+    }
+    if (lanes.rank() > 0) return;
+    const WorldView& next = arrays.next_worlds[w];
+    clear_result(arrays.results, slot);
+    copy_fields(next.agents, world.agents, slot);
+    world.boxes[agent] = world.boxes_before[agent] = next.boxes[agent];
   }
 };
 
-struct SortBoxes {
+/// Collisions, reward and halt of an agent.
+struct Settle {
   SimulatorArrays arrays;
-  template <typename Team>
-  PICTURA_HD void operator()(const Team& team, int w) const {
-    if (arrays.is_refused() || arrays.begins[w]) return;
-    sort_into_cells(team, arrays.worlds[w], arrays.scratch[w]);
+  template <typename Lanes>
+  PICTURA_HD void operator()(const Lanes& lanes, int slot) const {
+    const int w = arrays.world_of_slot[slot];
+    if (arrays.is_refused() || arrays.episode_over[w]) return;
+    const WorldView& world = arrays.worlds[w];
+    const int agent = slot - world.first_slot;
+    find_collisions(world, agent, lanes);
+    if (lanes.rank() == 0) arrays.step_m[slot] = settle_agent(world, agent, arrays.results);
   }
 };
 
-struct FindCollisions {
-  SimulatorArrays arrays;
-  template <typename Atomics>
-  PICTURA_HD void operator()(const Atomics&, int slot) const {
-    if (arrays.is_refused()) return;
-    const WorldView& world = arrays.world_of(slot);
-    if (!arrays.begins[world.index]) find_collisions(world, slot - world.first_slot);
-  }
-};
-
-/// Rewards, halts and counts, the next state of the lights, and whether the episode is over.
+/// Counts a world's step, moves its lights on, and says whether its episode is over; or ends the move into its next
+/// episode.
 struct FinishStep {
   SimulatorArrays arrays;
-  template <typename Team>
-  PICTURA_HD void operator()(const Team& team, int w) const {
-    if (arrays.is_refused() || arrays.begins[w]) return;
-    const WorldView& world = arrays.worlds[w];
-    TeamMemory& memory = team.memory();
-    const int steps = arrays.episode_step[w];
-    team.for_each(kTotalsLanes, [&](int lane) {
-      SimulatorTotals totals;
-      int32_t active = 0;
-      for (int agent = lane; agent < world.num_agents; agent += kTotalsLanes) {
-        active += settle_and_count(world, agent, arrays.results, &totals);
-      }
-      memory.lanes[lane] = totals;
-      memory.parts[lane] = active;
-    });
-    team.for_each(static_cast<int>(world.map.stop_lines.size()),
-                  [&](int light) { world.lights[light] = light_state(world.light_plans[light], steps); });
-    int32_t active = 0;
-    for (int lane = 0; lane < kTotalsLanes; ++lane) active += memory.parts[lane];
-    const bool ends = episode_ends(world.options, steps, arrays.spawned[w], active);
-    team.for_each(kTotalsLanes, [&](int lane) {
-      for (int agent = lane; agent < world.num_agents; agent += kTotalsLanes) {
-        finish_agent(world, agent, ends, arrays.results, &memory.lanes[lane]);
-      }
-    });
-    team.for_each(1, [&](int) {
-      SimulatorTotals sum;
-      for (int lane = 0; lane < kTotalsLanes; ++lane) sum.add(memory.lanes[lane]);
-      arrays.world_totals[w].add(sum);
-      arrays.episode_over[w] = ends;
-    });
-  }
-  static_assert(kTotalsLanes <= TeamMemory::kParts);
-};
-
-/// What of a slot's observation one thread writes: itself and its view, or one of the sets.
-struct ShowAgent {
-  SimulatorArrays arrays;
-  static constexpr int kParts = 3;
-  template <typename Atomics>
-  PICTURA_HD void operator()(const Atomics&, int item) const {
-    const int part = item / arrays.num_slots, slot = item % arrays.num_slots;
-    const WorldView& world = arrays.world_of(slot);
-    const int agent = slot - world.first_slot;
-    if (part == 1) return observe_set(world, agent, EntitySet::partners, arrays.observations);
-    if (part == 2) return observe_set(world, agent, EntitySet::controls, arrays.observations);
-    observe_own(world, agent, arrays.observations);
-    arrays.views[slot] = view_of(world, agent);
-  }
-};
-
-/// Lanes, boundaries or walls of a slot, as many pieces at a time as the warp has lanes.
-struct ShowPieces {
-  SimulatorArrays arrays;
-  PICTURA_HD int num_sets() const { return arrays.observations.walls.empty() ? 2 : 3; }
+  const int32_t* actions;
   template <typename Lanes>
-  PICTURA_HD void operator()(const Lanes& lanes, int item) const {
-    constexpr EntitySet kSets[3] = {EntitySet::lanes, EntitySet::boundaries, EntitySet::walls};
-    const int slot = item / num_sets();
-    const EntitySet set = kSets[item % num_sets()];
-    const WorldView& world = arrays.world_of(slot);
-    const SetRows rows = set_rows(arrays.observations, slot, set);
-    int count = 0;
-    if (observes(world, slot - world.first_slot)) {
-      const EgoFrame frame = ego_frame(world.agents, slot);
-      const PieceList near = pieces_near(world, slot, set);
-      const int num_items = static_cast<int>(near.items.size());
-      for (int first = 0; first < num_items && count < rows.capacity; first += lanes.size()) {
-        const int i = first + lanes.rank();
-        float row[kLaneFeatures];
-        const bool in_sight =
-            i < num_items &&
-            observe_piece(near.pieces[static_cast<size_t>(near.items[static_cast<size_t>(i)])], frame, row);
-        const uint32_t seen = lanes.ballot(in_sight);
-        const int at = count + lanes.count_before(seen);
-        for (int f = 0; f < kLaneFeatures && in_sight && at < rows.capacity; ++f) {
-          rows.rows[at * kLaneFeatures + f] = row[f];
-        }
-        count = min_of(rows.capacity, count + lanes.count(seen));
-      }
-    }
-    for (int i = count * kLaneFeatures + lanes.rank(); i < *rows.count * kLaneFeatures; i += lanes.size()) {
-      rows.rows[i] = 0.0f;
+  PICTURA_HD void operator()(const Lanes& lanes, int w) const {
+    if (arrays.is_refused()) return refuse(lanes, w);
+    const bool begins = arrays.episode_over[w] != 0;
+    SimulatorTotals totals;
+    bool ends = false;
+    if (begins) {
+      take_next(lanes, w);
+    } else {
+      ends = count(lanes, w, &totals);
     }
     lanes.wait();
-    if (lanes.rank() == 0) *rows.count = count;
+    if (lanes.rank() > 0) return;
+    totals.slot_steps = arrays.worlds[w].num_agents;
+    totals.episodes = begins;
+    arrays.world_totals[w].add(totals);
+    arrays.episode_over[w] = ends;
+    ++arrays.episode_step[w];
+    if (!begins) return;
+    arrays.episode_step[w] = 0;
+    arrays.worlds[w].episode = static_cast<uint32_t>(++arrays.episode_index[w]);
+    arrays.spawned[w] = arrays.next_spawned[w];
+  }
+
+ private:
+  template <typename Lanes>
+  PICTURA_HD void refuse(const Lanes& lanes, int w) const {
+    if (w > 0 || lanes.rank() > 0 || *arrays.refusal >= 0) return;
+    *arrays.refusal = refusal(*arrays.refused_slot, actions[*arrays.refused_slot]);
+  }
+
+  /// What belongs to no agent.
+  template <typename Lanes>
+  PICTURA_HD void take_next(const Lanes& lanes, int w) const {
+    const WorldView &world = arrays.worlds[w], &next = arrays.next_worlds[w];
+    for (int i = world.num_agents + lanes.rank(); i < world.num_boxes; i += lanes.size()) {
+      world.boxes[i] = world.boxes_before[i] = next.boxes[i];
+    }
+    for (int i = lanes.rank(); i < static_cast<int>(world.map.stop_lines.size()); i += lanes.size()) {
+      world.light_plans[i] = next.light_plans[i];
+      world.lights[i] = next.lights[i];
+    }
+  }
+
+  /// Returns whether the episode is over.
+  template <typename Lanes>
+  PICTURA_HD bool count(const Lanes& lanes, int w, SimulatorTotals* totals_out) const {
+    const WorldView& world = arrays.worlds[w];
+    const int steps = arrays.episode_step[w] + 1;
+    constexpr int kParts = kTotalsLanes / Lanes::kSize;  // of the totals' lanes, that one of these sums up
+    SimulatorTotals parts[kParts];
+    const auto for_each_agent = [&](const auto& body) {
+      for (int part = 0; part < kParts; ++part) {
+        for (int agent = part * Lanes::kSize + lanes.rank(); agent < world.num_agents; agent += kTotalsLanes) {
+          body(agent, &parts[part]);
+        }
+      }
+    };
+    int active = 0;
+    for_each_agent([&](int agent, SimulatorTotals* part) {
+      count_agent(world, agent, arrays.results, arrays.step_m[world.first_slot + agent], part);
+      active += is_active(world, agent);
+    });
+    const bool ends = episode_ends(world.options, steps, arrays.spawned[w], lanes.sum(active));
+    for_each_agent(
+        [&](int agent, SimulatorTotals* part) { finish_agent(world, agent, ends, arrays.results, part); });
+    for (int lane = 0; lane < kTotalsLanes; ++lane) {
+      totals_out->add(lanes.from(lane % Lanes::kSize, parts[lane / Lanes::kSize]));
+    }
+    for (int i = lanes.rank(); i < static_cast<int>(world.map.stop_lines.size()); i += lanes.size()) {
+      world.lights[i] = light_state(world.light_plans[i], steps);
+    }
+    return ends;
+  }
+};
+
+/// What a group of lanes writes of a slot's observation: one of the sets, or the rest and the view.
+struct ShowAgent {
+  SimulatorArrays arrays;
+  /// The sets that are asked for, after the rest.
+  PICTURA_HD int num_parts() const { return 1 + (arrays.entity_sets ? num_observed_sets(arrays.observations) : 0); }
+  /// Floats that the rows of any set need.
+  static constexpr int kStaging = max_of(max_of(max_of(kMaxLanes, kMaxBoundaries), kMaxWalls) * kLaneFeatures,
+                                         max_of(kMaxPartners * kPartnerFeatures, kMaxControls * kControlFeatures));
+
+  template <typename Lanes>
+  PICTURA_HD void operator()(const Lanes& lanes, int item) const {
+    const int slot = item / num_parts(), part = item % num_parts();
+    const WorldView& world = arrays.world_of(slot);
+    const int agent = slot - world.first_slot;
+    if (part > 0) return show_set(lanes, world, agent, static_cast<EntitySet>(part - 1));
+    observe_own(world, agent, arrays.observations, lanes);
+    if (lanes.rank() == lanes.size() - 1) arrays.views[slot] = view_of(world, agent);
+  }
+
+ private:
+  /// The rows are put together in the lanes' own memory, so that they are written whole and in order.
+  template <typename Lanes>
+  PICTURA_HD void show_set(const Lanes& lanes, const WorldView& world, int agent, EntitySet set) const {
+    const int slot = world.first_slot + agent;
+    const SetRows out = set_rows(arrays.observations, slot, set);
+    float* rows = lanes.staging();
+    int count = 0;
+    if (observes(world, agent)) {
+      const EgoFrame frame = ego_frame(world.agents, slot);
+      if (set == EntitySet::partners) {
+        count = observe_partners(world, agent, frame, rows, lanes);
+      } else if (set == EntitySet::controls) {
+        count = observe_controls(world, slot, frame, rows, lanes);
+      } else {
+        count = gather_pieces(lanes, pieces_near(world, slot, set), frame, out.capacity, rows);
+      }
+    }
+    const int end = max_of(count, *out.count);
+    lanes.wait();
+    lanes.write(rows, count * out.features, end * out.features, out.capacity * out.features, out.rows);
+    if (lanes.rank() == 0) *out.count = count;
+  }
+
+  /// observe_pieces() by as many pieces at a time as there are lanes.
+  template <typename Lanes>
+  PICTURA_HD static int gather_pieces(const Lanes& lanes, const PieceList& near, const EgoFrame& frame, int capacity,
+                                      float* rows) {
+    const int num_items = static_cast<int>(near.items.size());
+    int count = 0;
+    for (int first = 0; first < num_items && count < capacity; first += lanes.size()) {
+      const int i = first + lanes.rank();
+      const int32_t item = near.items[static_cast<size_t>(min_of(i, num_items - 1))];
+      float row[kLaneFeatures];
+      const bool in_sight = observe_piece(near.pieces[static_cast<size_t>(item)], frame, row) && i < num_items;
+      const uint32_t seen = lanes.ballot(in_sight);
+      const int at = count + lanes.count_before(seen);
+      for (int f = 0; f < kLaneFeatures && in_sight && at < capacity; ++f) rows[at * kLaneFeatures + f] = row[f];
+      count = min_of(capacity, count + count_bits(seen));
+    }
+    return count;
   }
 };
 
 template <typename Launch>
 void launch_show(const Launch& launch, const SimulatorArrays& arrays) {
-  launch.threads((arrays.entity_sets ? ShowAgent::kParts : 1) * arrays.num_slots, ShowAgent{arrays});
-  const ShowPieces pieces{arrays};
-  if (arrays.entity_sets) launch.warps(pieces.num_sets() * arrays.num_slots, pieces);
+  const ShowAgent show{arrays};
+  launch.template lanes<kWarp>(show.num_parts() * arrays.num_slots, show);
 }
 
 /// Episode 0 of every world.
@@ -360,8 +409,7 @@ void launch_reset(const Launch& launch, const SimulatorArrays& arrays) {
 template <typename Launch>
 void launch_restored(const Launch& launch, const SimulatorArrays& arrays) {
   launch.fill(arrays.refused_slot, sizeof(int32_t), kNoSlot & 0xFF);
-  launch.fill(arrays.begins, static_cast<size_t>(arrays.num_worlds), 0);
-  launch.teams(arrays.num_worlds, SortBoxes{arrays});
+  launch.teams(arrays.num_worlds, PrepareEpisode{arrays});
   launch_show(launch, arrays);
 }
 
@@ -369,12 +417,11 @@ template <typename Launch>
 void launch_step(const Launch& launch, const SimulatorArrays& arrays, const int32_t* actions) {
   launch.fill(arrays.refused_slot, sizeof(int32_t), kNoSlot & 0xFF);
   launch.threads(arrays.num_slots, CheckActions{arrays, actions});
-  launch.teams(arrays.num_worlds, BeginStep{arrays, actions});
-  launch.threads(arrays.num_slots, Advance{arrays, actions});
-  launch.teams(arrays.num_worlds, SortBoxes{arrays});
-  launch.threads(arrays.num_slots, FindCollisions{arrays});
-  launch.teams(arrays.num_worlds, FinishStep{arrays});
-  launch_show(launch, arrays);
+  launch.template lanes<kLanesPerAgent>(arrays.num_slots, Advance{arrays, actions});
+  launch.template lanes<kLanesPerAgent>(arrays.num_slots, Settle{arrays});
+  launch.template lanes<kWarp>(arrays.num_worlds, FinishStep{arrays, actions});
+  launch.beside([&](const Launch& aside) { aside.teams(arrays.num_worlds, PrepareEpisode{arrays}); },
+                [&] { launch_show(launch, arrays); });
 }
 
 }  // namespace pictura::cuda

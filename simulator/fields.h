@@ -85,6 +85,14 @@ struct AgentStateView {
 #undef X
 };
 
+/// Copies every field of one agent.
+PICTURA_HD inline void copy_fields(const AgentStateView& from, const AgentStateView& to, int slot) {
+#define X(name, type, per_agent, first, comment) \
+  for (int i = 0; i < (per_agent); ++i) to.name[slot * (per_agent) + i] = from.name[slot * (per_agent) + i];
+  PICTURA_AGENT_FIELDS(X)
+#undef X
+}
+
 /// Gives every field of one agent its first value.
 PICTURA_HD inline void reset_fields(const AgentStateView& agents, int slot) {
 #define X(name, type, per_agent, first, comment) \

@@ -65,7 +65,7 @@ void add_lanes(const RoadMap& map, WorldMap* out) {
     flat.first_segment = static_cast<int32_t>(out->segments.size());
     flat.first_successor = static_cast<int32_t>(out->successors.size());
     if (!is_drivable(lane.type)) continue;
-    flat.is_driven = lane.type != LaneType::parking;
+    const bool is_driven = lane.type != LaneType::parking;
     flat.speed_limit_mps = lane.speed_limit_mps;
 
     std::vector<Vec3> line;
@@ -89,12 +89,13 @@ void add_lanes(const RoadMap& map, WorldMap* out) {
       segment.half_width_m = 0.5f * std::max(a.width_m, b.width_m);
       segment.s_m = s;
       segment.lane = static_cast<int32_t>(index);
+      segment.is_driven = is_driven;
       s += segment.length_m;
       out->segments.push_back(segment);
     }
     flat.length_m = s;
     flat.num_segments = static_cast<int32_t>(out->segments.size()) - flat.first_segment;
-    if (flat.is_driven) append_pieces(line, widest * (1.0f / kScaleLaneWidth_m), &out->lane_pieces);
+    if (is_driven) append_pieces(line, widest * (1.0f / kScaleLaneWidth_m), &out->lane_pieces);
 
     const auto goes_on = [&](int32_t other) { return other >= 0 && map.lanes[static_cast<size_t>(other)].is_endless; };
     for (const int32_t successor : map.links(lane.successors)) {
@@ -107,7 +108,7 @@ void add_lanes(const RoadMap& map, WorldMap* out) {
     flat.num_all_successors = static_cast<int32_t>(out->successors.size()) - flat.first_successor;
     flat.left = goes_on(lane.left_neighbor) ? lane.left_neighbor : -1;
     flat.right = goes_on(lane.right_neighbor) ? lane.right_neighbor : -1;
-    if (lane.is_endless && !lane.in_junction && flat.is_driven && s > 0) {
+    if (lane.is_endless && !lane.in_junction && is_driven && s > 0) {
       out->spawn_lanes.push_back(static_cast<int32_t>(index));
       out->spawn_end_m.push_back((out->spawn_end_m.empty() ? 0.0f : out->spawn_end_m.back()) + s);
     }

@@ -4,6 +4,7 @@
 
 #include "pictura/common/math.h"
 #include "pictura/common/scene_types.h"
+#include "pictura/simulator/rules/lanes.h"
 #include "pictura/simulator/rules/map_view.h"
 
 namespace pictura {
@@ -110,18 +111,20 @@ PICTURA_HD inline bool touches(const OrientedBox& box, Vec2 a_m, Vec2 b_m) {
 
 /// Whether the box touches any barrier on its level. Boxes are longer than a step's way, so that consecutive ones
 /// overlap and no barrier is passed unnoticed.
-PICTURA_HD inline bool touches_any(const OrientedBox& box, float z_m, Span<const Barrier> barriers,
-                                   const GridView& cells) {
+template <typename Lanes = OneLane>
+PICTURA_HD bool touches_any(const OrientedBox& box, float z_m, Span<const Barrier> barriers, const GridView& cells,
+                            const Lanes& lanes = {}) {
   const float reach = box.half_length_m + box.half_width_m;
   const Span<const int32_t> items = items_at(cells, box.center_m);
-  for (size_t i = 0; i < items.size(); ++i) {
+  bool found = false;
+  for (size_t i = static_cast<size_t>(lanes.rank()); i < items.size() && !found; i += static_cast<size_t>(lanes.size())) {
     const Barrier& barrier = barriers[static_cast<size_t>(items[i])];
     const Vec2 to_middle = (barrier.a_m + barrier.b_m) * 0.5f - box.center_m;
     const Vec2 half = (barrier.b_m - barrier.a_m) * 0.5f;
     if (fabsf(to_middle.x) > fabsf(half.x) + reach || fabsf(to_middle.y) > fabsf(half.y) + reach) continue;
-    if (fabsf(barrier.z_m - z_m) < kLevel_m && touches(box, barrier.a_m, barrier.b_m)) return true;
+    found = fabsf(barrier.z_m - z_m) < kLevel_m && touches(box, barrier.a_m, barrier.b_m);
   }
-  return false;
+  return lanes.any(found);
 }
 
 }  // namespace pictura

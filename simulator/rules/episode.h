@@ -42,22 +42,24 @@ PICTURA_HD inline void count_events(int events, SimulatorTotals* totals_inout) {
   totals_inout->wall_contacts += (events & kEventWall) != 0;
 }
 
-/// Settles one agent (phase 3), writes its reward and end, and counts its step. Returns whether it drives on.
-PICTURA_HD inline bool settle_and_count(const WorldView& world, int agent, const StepArrays& results,
-                                        SimulatorTotals* totals_inout) {
+/// Settles one agent (phase 3) and writes its reward and end. Returns how far it drove in the step, in metres.
+PICTURA_HD inline float settle_agent(const WorldView& world, int agent, const StepArrays& results) {
   const int slot = world.first_slot + agent;
-  const float speed_mps = world.agents.speed_mps[slot];
-  const float reward = settle(world, agent);
-  const bool drives = is_active(world, agent);
-  results.reward[slot] = reward;
-  results.terminated[slot] = results.valid[slot] && !drives;
-  if (results.valid[slot]) {
-    ++totals_inout->agent_steps;
-    totals_inout->reward += static_cast<double>(reward);
-    totals_inout->distance_m += static_cast<double>(driven_m(speed_mps, world.options.dt_s));
-    count_events(world.agents.events[slot], totals_inout);
-  }
-  return drives;
+  const float step_m = driven_m(world.agents.speed_mps[slot], world.options.dt_s);
+  results.reward[slot] = settle(world, agent);
+  results.terminated[slot] = results.valid[slot] && !is_active(world, agent);
+  return step_m;
+}
+
+/// Counts the step of an agent that has been settled and drove step_m in it.
+PICTURA_HD inline void count_agent(const WorldView& world, int agent, const StepArrays& results, float step_m,
+                                   SimulatorTotals* totals_inout) {
+  const int slot = world.first_slot + agent;
+  if (!results.valid[slot]) return;
+  ++totals_inout->agent_steps;
+  totals_inout->reward += static_cast<double>(results.reward[slot]);
+  totals_inout->distance_m += static_cast<double>(step_m);
+  count_events(world.agents.events[slot], totals_inout);
 }
 
 /// After `steps` steps, with `spawned` agents of which `active` still drive: time is up, or too many are inactive.

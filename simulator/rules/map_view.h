@@ -25,8 +25,9 @@ struct LaneSegment {
   float heading_rad = 0;  // of the lane at a
   float turn_rad = 0;     // heading at the end less heading at a
   float half_width_m = 0;
-  float s_m = 0;     // arc length of a
-  int32_t lane = 0;  // index into MapView::lanes
+  float s_m = 0;          // arc length of a
+  int32_t lane = 0;       // index into MapView::lanes
+  int32_t is_driven = 0;  // agents associate with its lane; else it is only part of the drivable surface (parking)
 };
 
 struct MapLane {
@@ -36,8 +37,7 @@ struct MapLane {
   int32_t left = -1, right = -1;  // neighbours from which a route goes on for ever
   float length_m = 0;
   float speed_limit_mps = 0;
-  int32_t light = -1;     // the stop line that holds it
-  uint8_t is_driven = 0;  // agents associate with it; else it is only part of the drivable surface (parking)
+  int32_t light = -1;  // the stop line that holds it
 };
 
 /// A piece of the drivable surface's outline, or the foot of a wall.

@@ -49,8 +49,9 @@ PICTURA_HD inline void observe_ego(const WorldView& world, int slot, float* out)
 
 /// Scaled by the paper's training ranges, whatever the run's own are, so that a policy reads the same number for the
 /// same coefficient everywhere; fixed coefficients read 0.
-PICTURA_HD inline void observe_conditioning(const WorldView& world, int slot, float* out) {
-  for (int i = 0; i < kNumConditioning; ++i) {
+template <typename Lanes = OneLane>
+PICTURA_HD void observe_conditioning(const WorldView& world, int slot, float* out, const Lanes& lanes = {}) {
+  for (int i = lanes.rank(); i < kNumConditioning; i += lanes.size()) {
     const ConditioningRange range = world.options.conditioning_scale[i];
     const float value = world.agents.conditioning[slot * kNumConditioning + i];
     out[i] = range.high > range.low ? clamp(2.0f * (value - range.low) / (range.high - range.low) - 1.0f, -1.0f, 1.0f)
@@ -59,8 +60,10 @@ PICTURA_HD inline void observe_conditioning(const WorldView& world, int slot, fl
 }
 
 /// The active waypoint first, then those after it; where the chain has no more, its last one again.
-PICTURA_HD inline void observe_waypoints(const WorldView& world, int slot, const EgoFrame& frame, float* out) {
-  for (int i = 0; i < kNumWaypoints; ++i) {
+template <typename Lanes = OneLane>
+PICTURA_HD void observe_waypoints(const WorldView& world, int slot, const EgoFrame& frame, float* out,
+                                  const Lanes& lanes = {}) {
+  for (int i = lanes.rank(); i < kNumWaypoints; i += lanes.size()) {
     const int index = min_of(world.agents.next_waypoint[slot] + i, kNumWaypoints - 1);
     const Vec3 local = frame.to_local(waypoint_of(world.agents, slot, index));
     out[kWaypointFeatures * i] = local.x / kScalePosition_m;
@@ -69,34 +72,12 @@ PICTURA_HD inline void observe_waypoints(const WorldView& world, int slot, const
   }
 }
 
-/// The nearest things seen so far, in ascending order of distance, then index.
-template <int capacity>
-struct Nearest {
-  float distance2[capacity];
-  int32_t item[capacity];
-  int count = 0;
-
-  PICTURA_HD float worst() const { return count < capacity ? 3e38f : distance2[capacity - 1]; }
-  PICTURA_HD void insert(float d2, int32_t index) {
-    if (count == capacity && !before(d2, index, capacity - 1)) return;
-    int at = count < capacity ? count++ : capacity - 1;
-    for (; at > 0 && before(d2, index, at - 1); --at) {
-      distance2[at] = distance2[at - 1];
-      item[at] = item[at - 1];
-    }
-    distance2[at] = d2;
-    item[at] = index;
-  }
-  PICTURA_HD bool before(float d2, int32_t index, int at) const {
-    return d2 < distance2[at] || (d2 == distance2[at] && index < item[at]);
-  }
-};
-
 /// The partners of `agent` by distance from its reference point to their box centres: from the near cells where enough
 /// stand there, else from all that are in range.
-PICTURA_HD inline Nearest<kMaxPartners> nearest_partners(const WorldView& world, int agent, Vec2 origin) {
+template <typename Lanes>
+PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin, const Lanes& lanes) {
+  using Nearest = typename Lanes::template Nearest<kMaxPartners>;
   const GridView& cells = world.box_cells;
-  Nearest<kMaxPartners> nearest;
   for (float reach = cells.cell_m;; reach = kPartnerRange_m) {
     const int x0 = cells.cell_x(origin.x - reach), x1 = cells.cell_x(origin.x + reach);
     const int y0 = cells.cell_y(origin.y - reach), y1 = cells.cell_y(origin.y + reach);
@@ -107,26 +88,33 @@ PICTURA_HD inline Nearest<kMaxPartners> nearest_partners(const WorldView& world,
                cells.begin[static_cast<size_t>(y * cells.num_x + x0)];
     }
     if (is_near && found <= kMaxPartners) continue;
-    nearest.count = 0;
+    Nearest nearest;
     for (int y = y0; y <= y1; ++y) {
       const int32_t begin = cells.begin[static_cast<size_t>(y * cells.num_x + x0)];
       const int32_t end = cells.begin[static_cast<size_t>(y * cells.num_x + x1 + 1)];
-      for (int32_t i = begin; i < end; ++i) {
+      for (int32_t first = begin; first < end; first += lanes.size()) {
+        const int32_t i = min_of(first + lanes.rank(), end - 1);
         const int32_t other = cells.items[static_cast<size_t>(i)];
-        if (other == agent) continue;
-        const Vec2 apart = world.boxes[other].center_m.xy() - origin;
+        const AgentBox& box = world.boxes[other];
+        const Vec2 apart = box.center_m.xy() - origin;
         const float d2 = dot(apart, apart);
-        if (d2 < square(kPartnerRange_m)) nearest.insert(d2, other);
+        const bool is_one =
+            first + lanes.rank() < end && other != agent && box.drawn && d2 < square(kPartnerRange_m);
+        nearest.offer(is_one, d2, other);
       }
     }
-    if (!is_near || (nearest.count == kMaxPartners && nearest.worst() <= square(reach))) return nearest;
+    if (!is_near || (nearest.count() == kMaxPartners && nearest.worst() <= square(reach))) return nearest;
   }
 }
 
-PICTURA_HD inline int observe_partners(const WorldView& world, int agent, const EgoFrame& frame, float* out) {
-  const Nearest<kMaxPartners> nearest = nearest_partners(world, agent, frame.origin_m.xy());
-  for (int i = 0; i < nearest.count; ++i) {
-    const int other = nearest.item[i];
+template <typename Lanes = OneLane>
+PICTURA_HD int observe_partners(const WorldView& world, int agent, const EgoFrame& frame, float* rows,
+                                const Lanes& lanes = {}) {
+  const auto nearest = nearest_partners(world, agent, frame.origin_m.xy(), lanes);
+  const int count = nearest.count();
+  for (int i = lanes.rank(); i < count; i += lanes.size()) {
+    float* out = rows + i * kPartnerFeatures;
+    const int other = nearest.item(i);
     const AgentBox& box = world.boxes[other];
     const Vec3 local = frame.to_local(box.center_m);
     const Vec2 heading = frame.turn({box.cos_heading, box.sin_heading});
@@ -139,9 +127,8 @@ PICTURA_HD inline int observe_partners(const WorldView& world, int agent, const 
     out[5] = heading.x;
     out[6] = heading.y;
     out[7] = moves ? world.agents.speed_mps[world.first_slot + other] / kScaleSpeed_mps : 0.0f;
-    out += kPartnerFeatures;
   }
-  return nearest.count;
+  return count;
 }
 
 /// Writes the row of a piece; returns whether its middle is in sight.
@@ -184,18 +171,25 @@ PICTURA_HD constexpr float light_code(LightState state) {
 }
 
 /// The nearest stop lines: left and right end, height, state, and whether it holds the ego's lane.
-PICTURA_HD inline int observe_controls(const WorldView& world, int slot, const EgoFrame& frame, float* out) {
+template <typename Lanes = OneLane>
+PICTURA_HD int observe_controls(const WorldView& world, int slot, const EgoFrame& frame, float* rows,
+                                const Lanes& lanes = {}) {
   const Span<const int32_t> items = items_at(world.map.near_stop_lines, frame.origin_m.xy());
-  Nearest<kMaxControls> nearest;
-  for (size_t i = 0; i < items.size(); ++i) {
-    const Vec2 apart = world.map.stop_lines[static_cast<size_t>(items[i])].middle_m.xy() - frame.origin_m.xy();
+  const int num_items = static_cast<int>(items.size());
+  typename Lanes::template Nearest<kMaxControls> nearest;
+  for (int first = 0; first < num_items; first += lanes.size()) {
+    const int i = first + lanes.rank();
+    const int32_t light = items[static_cast<size_t>(min_of(i, num_items - 1))];
+    const Vec2 apart = world.map.stop_lines[static_cast<size_t>(light)].middle_m.xy() - frame.origin_m.xy();
     const float d2 = dot(apart, apart);
-    if (d2 < square(kControlRange_m)) nearest.insert(d2, items[i]);
+    nearest.offer(i < num_items && d2 < square(kControlRange_m), d2, light);
   }
   const int32_t lane = world.agents.lane[slot];
   const int32_t own_light = lane < 0 ? -1 : world.map.lanes[static_cast<size_t>(lane)].light;
-  for (int i = 0; i < nearest.count; ++i) {
-    const int32_t light = nearest.item[i];
+  const int count = nearest.count();
+  for (int i = lanes.rank(); i < count; i += lanes.size()) {
+    float* out = rows + i * kControlFeatures;
+    const int32_t light = nearest.item(i);
     const StopLine& line = world.map.stop_lines[static_cast<size_t>(light)];
     const Vec3 left = frame.to_local(line.left_m);
     const Vec3 right = frame.to_local(line.right_m);
@@ -206,9 +200,8 @@ PICTURA_HD inline int observe_controls(const WorldView& world, int slot, const E
     out[4] = 0.5f * (left.z + right.z) / kScaleHeight_m;
     out[5] = light_code(world.lights[light]);
     out[6] = light == own_light ? 1.0f : 0.0f;
-    out += kControlFeatures;
   }
-  return nearest.count;
+  return count;
 }
 
 /// Zeros a set's rows from `count` to what the last observation of the slot filled, and one leftover at least.
@@ -224,21 +217,22 @@ PICTURA_HD inline bool observes(const WorldView& world, int agent) {
 }
 
 /// What is no set: all zeros for the absent and for those that halted in an earlier step.
-PICTURA_HD inline void observe_own(const WorldView& world, int agent, const ObservationView& out) {
+template <typename Lanes = OneLane>
+PICTURA_HD void observe_own(const WorldView& world, int agent, const ObservationView& out, const Lanes& lanes = {}) {
   const int slot = world.first_slot + agent;
   const size_t row = static_cast<size_t>(slot);
   float* ego = out.ego.data() + row * kEgoFeatures;
   float* conditioning = out.conditioning.data() + row * kNumConditioning;
   float* waypoints = out.waypoints.data() + row * kNumWaypoints * kWaypointFeatures;
   if (observes(world, agent)) {
-    observe_ego(world, slot, ego);
-    observe_conditioning(world, slot, conditioning);
-    observe_waypoints(world, slot, ego_frame(world.agents, slot), waypoints);
+    if (lanes.rank() == 0) observe_ego(world, slot, ego);
+    observe_conditioning(world, slot, conditioning, lanes);
+    observe_waypoints(world, slot, ego_frame(world.agents, slot), waypoints, lanes);
     return;
   }
-  for (int i = 0; i < kEgoFeatures; ++i) ego[i] = 0.0f;
-  for (int i = 0; i < kNumConditioning; ++i) conditioning[i] = 0.0f;
-  for (int i = 0; i < kNumWaypoints * kWaypointFeatures; ++i) waypoints[i] = 0.0f;
+  for (int i = lanes.rank(); i < kEgoFeatures; i += lanes.size()) ego[i] = 0.0f;
+  for (int i = lanes.rank(); i < kNumConditioning; i += lanes.size()) conditioning[i] = 0.0f;
+  for (int i = lanes.rank(); i < kNumWaypoints * kWaypointFeatures; i += lanes.size()) waypoints[i] = 0.0f;
 }
 
 /// How many sets are written: all, or all but the walls.

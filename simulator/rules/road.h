@@ -3,6 +3,7 @@
 #pragma once
 
 #include "pictura/map/speed_limit.h"
+#include "pictura/simulator/rules/lanes.h"
 #include "pictura/simulator/rules/map_view.h"
 
 namespace pictura {
@@ -38,7 +39,9 @@ PICTURA_HD inline Foot foot_on(const LaneSegment& segment, Vec2 p) {
 /// (0.3 per half turn), with 0.05 against leaving current_lane (-1: none), so that an agent between two lanes keeps its
 /// own. z_m is the agent's present height: only lanes on its level count. Nothing within kLaneReach_m: no lane, and
 /// z_m stays.
-PICTURA_HD inline LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float heading_rad, int32_t current_lane) {
+template <typename Lanes = OneLane>
+PICTURA_HD LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float heading_rad, int32_t current_lane,
+                            const Lanes& lanes = {}) {
   constexpr float kDistanceWeight = 0.7f / 4.0f;
   constexpr float kAngleWeight = 0.3f / kPi;
   constexpr float kHysteresis = 0.05f;
@@ -46,10 +49,11 @@ PICTURA_HD inline LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float 
   best.z_m = z_m;
   float best_score = 1e9f;
   const Span<const int32_t> items = items_at(map.segment_cells, p);
-  for (size_t i = 0; i < items.size(); ++i) {
-    const LaneSegment& segment = map.segments[static_cast<size_t>(items[i])];
-    const MapLane& lane = map.lanes[static_cast<size_t>(segment.lane)];
-    if (!lane.is_driven) continue;
+  const int num_items = static_cast<int>(items.size());
+  int best_item = num_items;
+  for (int i = lanes.rank(); i < num_items; i += lanes.size()) {
+    const LaneSegment& segment = map.segments[static_cast<size_t>(items[static_cast<size_t>(i)])];
+    if (!segment.is_driven) continue;
     const Foot foot = foot_on(segment, p);
     const float height = segment.a_m.z + segment.slope * foot.along_m;
     const float score_without_angle =
@@ -61,21 +65,25 @@ PICTURA_HD inline LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float 
     const float score = score_without_angle + kAngleWeight * fabsf(angle);
     if (score >= best_score) continue;
     best_score = score;
-    best = {segment.lane, foot.side < 0.0f ? -foot.distance_m : foot.distance_m, angle, height, lane.speed_limit_mps};
+    best_item = i;
+    best = {segment.lane, foot.side < 0.0f ? -foot.distance_m : foot.distance_m, angle, height,
+            map.lanes[static_cast<size_t>(segment.lane)].speed_limit_mps};
   }
-  return best;
+  return lanes.of_lowest(best_score, best_item, best);
 }
 
 /// Whether a point lies on the drivable surface of its level: within half a width of some drivable lane's centre line.
-PICTURA_HD inline bool is_on_road(const MapView& map, Vec2 p, float z_m) {
+template <typename Lanes = OneLane>
+PICTURA_HD bool is_on_road(const MapView& map, Vec2 p, float z_m, const Lanes& lanes = {}) {
   const Span<const int32_t> items = items_at(map.segment_cells, p);
-  for (size_t i = 0; i < items.size(); ++i) {
+  bool is_on = false;
+  for (size_t i = static_cast<size_t>(lanes.rank()); i < items.size() && !is_on; i += static_cast<size_t>(lanes.size())) {
     const LaneSegment& segment = map.segments[static_cast<size_t>(items[i])];
     const Foot foot = foot_on(segment, p);
     const float height = segment.a_m.z + segment.slope * foot.along_m;
-    if (foot.distance_m <= segment.half_width_m + kSeamTolerance_m && fabsf(height - z_m) < kLevel_m) return true;
+    is_on = foot.distance_m <= segment.half_width_m + kSeamTolerance_m && fabsf(height - z_m) < kLevel_m;
   }
-  return false;
+  return lanes.any(is_on);
 }
 
 /// A place on a route: on a lane, or for pedestrians on a piece of a walkway.

@@ -55,17 +55,19 @@ PICTURA_HD inline void draw_agent(const WorldView& world, int agent) {
 }
 
 /// Whether a box keeps kSpawnClearance_m from the boxes [begin, end).
-PICTURA_HD inline bool is_clear(const WorldView& world, const AgentBox& box, int begin, int end) {
+template <typename Lanes = OneLane>
+PICTURA_HD bool is_clear(const WorldView& world, const AgentBox& box, int begin, int end, const Lanes& lanes = {}) {
   AgentBox inflated = box;
   inflated.length_m += 2.0f * kSpawnClearance_m;
   inflated.width_m += 2.0f * kSpawnClearance_m;
-  for (int i = begin; i < end; ++i) {
+  bool is_taken = false;
+  for (int i = begin + lanes.rank(); i < end && !is_taken; i += lanes.size()) {
     const AgentBox& other = world.boxes[i];
     const Vec2 apart = (other.center_m - box.center_m).xy();
     if (!other.drawn || dot(apart, apart) > square(radius(inflated) + kMaxBoxRadius_m)) continue;
-    if (same_level(inflated, other) && overlap(footprint(inflated), footprint(other))) return false;
+    is_taken = same_level(inflated, other) && overlap(footprint(inflated), footprint(other));
   }
-  return true;
+  return !lanes.any(is_taken);
 }
 
 PICTURA_HD inline bool touches_wall(const MapView& map, const AgentBox& box) {
@@ -85,10 +87,11 @@ PICTURA_HD inline LanePose pose_of(const WorldView& world, int agent, RoutePoint
   return walks(world, agent) ? pose_on_walk(world.map, at.lane, at.s_m) : pose_on_lane(world.map, at.lane, at.s_m);
 }
 
-PICTURA_HD inline LaneFit fit_agent(const WorldView& world, int agent, Vec2 p, float z_m, float heading_rad,
-                                    int32_t current_lane) {
-  return walks(world, agent) ? fit_walk(world.map, p, z_m, heading_rad, current_lane)
-                             : fit_lane(world.map, p, z_m, heading_rad, current_lane);
+template <typename Lanes>
+PICTURA_HD LaneFit fit_agent(const WorldView& world, int agent, Vec2 p, float z_m, float heading_rad,
+                             int32_t current_lane, const Lanes& lanes) {
+  return walks(world, agent) ? fit_walk(world.map, p, z_m, heading_rad, current_lane, lanes)
+                             : fit_lane(world.map, p, z_m, heading_rad, current_lane, lanes);
 }
 
 /// The next waypoint of a pedestrian: the gap, and then on until no parked car stands there.
@@ -162,7 +165,7 @@ PICTURA_HD inline bool covers_driven_lane(const MapView& map, const AgentBox& bo
     const OrientedBox surface{segment.a_m.xy() + segment.direction * half_m, segment.direction, half_m,
                               segment.half_width_m - kSeamTolerance_m};
     const float height = segment.a_m.z + segment.slope * half_m;
-    if (map.lanes[static_cast<size_t>(segment.lane)].is_driven && fabsf(height - box.center_m.z) < kLevel_m &&
+    if (segment.is_driven && fabsf(height - box.center_m.z) < kLevel_m &&
         overlap(print, surface)) {
       return true;
     }

@@ -67,13 +67,18 @@ PICTURA_HD inline int pass_waypoints(const WorldView& world, int agent, Vec3 fro
   return events | kEventWaypoint;
 }
 
-/// Phase 1: moves an active agent and finds what the road says about it.
-PICTURA_HD inline void advance(const WorldView& world, int agent, int32_t action) {
+/// Phase 1: moves an active agent and finds what the road says about it. Its first lane alone writes, once all have read.
+template <typename Lanes = OneLane>
+PICTURA_HD void advance(const WorldView& world, int agent, int32_t action, const Lanes& lanes = {}) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
-  world.boxes_before[agent] = world.boxes[agent];
-  agents.events[slot] = kEventNone;
-  if (!is_active(world, agent)) return;
+  const AgentBox before = world.boxes[agent];
+  if (!is_active(world, agent)) {
+    if (lanes.rank() > 0) return;
+    world.boxes_before[agent] = before;
+    agents.events[slot] = kEventNone;
+    return;
+  }
 
   const AgentClass agent_class = class_of(agents, slot);
   const float* conditioning = agents.conditioning + slot * kNumConditioning;
@@ -85,28 +90,34 @@ PICTURA_HD inline void advance(const WorldView& world, int agent, int32_t action
   const Vec3 from{agents.x_m[slot], agents.y_m[slot], agents.z_m[slot]};
   const Motion motion = move(motion_of(agents, slot), controls_of_action(action), parameters, class_limits(agent_class),
                              world.options.dt_s);
-  store_motion(agents, slot, motion);
-  agents.distance_m[slot] += driven_m(motion.speed_mps, world.options.dt_s);
-
   const int32_t lane_before = agents.lane[slot];
-  store_fit(agents, slot, fit_agent(world, agent, {motion.x_m, motion.y_m}, from.z, motion.heading_rad, lane_before));
-  const AgentBox box = world.boxes[agent] = box_of(agents, slot);
+  const LaneFit fit =
+      fit_agent(world, agent, {motion.x_m, motion.y_m}, from.z, motion.heading_rad, lane_before, lanes);
+  const AgentBox box = box_at(agents, slot, {motion.x_m, motion.y_m, fit.z_m}, sincos_of(motion.heading_rad));
 
-  int events = pass_waypoints(world, agent, from);
+  int events = kEventNone;
   const OrientedBox print = footprint(box);
-  if (touches_any(print, box.center_m.z, world.map.walls, world.map.wall_cells)) events |= kEventWall;
+  if (touches_any(print, box.center_m.z, world.map.walls, world.map.wall_cells, lanes)) events |= kEventWall;
   if (agent_class != AgentClass::pedestrian) {
-    if (touches_any(print, box.center_m.z, world.map.edges, world.map.edge_cells) ||
-        !is_on_road(world.map, print.center_m, box.center_m.z)) {
+    if (touches_any(print, box.center_m.z, world.map.edges, world.map.edge_cells, lanes) ||
+        !is_on_road(world.map, print.center_m, box.center_m.z, lanes)) {
       events |= kEventOffRoad;
     }
-    if (runs_red_light(world, world.boxes_before[agent], box, lane_before, agents.lane[slot])) events |= kEventRedLight;
+    if (runs_red_light(world, before, box, lane_before, fit.lane)) events |= kEventRedLight;
   }
-  agents.events[slot] = static_cast<uint8_t>(events);
+  lanes.wait();
+  if (lanes.rank() > 0) return;
+  world.boxes_before[agent] = before;
+  world.boxes[agent] = box;
+  store_motion(agents, slot, motion);
+  store_fit(agents, slot, fit);
+  agents.distance_m[slot] += driven_m(motion.speed_mps, world.options.dt_s);
+  agents.events[slot] = static_cast<uint8_t>(events | pass_waypoints(world, agent, from));
 }
 
 /// Phase 2: finds the collisions of an active agent with every other box, halted and parked ones included.
-PICTURA_HD inline void find_collisions(const WorldView& world, int agent) {
+template <typename Lanes = OneLane>
+PICTURA_HD void find_collisions(const WorldView& world, int agent, const Lanes& lanes = {}) {
   if (!is_active(world, agent)) return;
   const AgentBox& own = world.boxes[agent];
   const AgentBox& own_before = world.boxes_before[agent];
@@ -115,21 +126,29 @@ PICTURA_HD inline void find_collisions(const WorldView& world, int agent) {
   const float own_reach = radius(own) + kMaxBoxRadius_m + 2.0f * kMaxSpeed_mps * world.options.dt_s;
   const int x0 = cells.cell_x(own.center_m.x - own_reach), x1 = cells.cell_x(own.center_m.x + own_reach);
   const int y0 = cells.cell_y(own.center_m.y - own_reach), y1 = cells.cell_y(own.center_m.y + own_reach);
-  int events = kEventNone;
+  bool collides = false, is_at_fault = false;
   for (int y = y0; y <= y1; ++y) {
     const int32_t begin = cells.begin[static_cast<size_t>(y * cells.num_x + x0)];
     const int32_t end = cells.begin[static_cast<size_t>(y * cells.num_x + x1 + 1)];
-    for (int32_t i = begin; i < end; ++i) {
+    for (int32_t i = begin + lanes.rank(); i < end; i += lanes.size()) {
       const int32_t other = cells.items[static_cast<size_t>(i)];
-      if (other == agent || !collide(own_before, own, world.boxes_before[other], world.boxes[other])) continue;
-      events |= kEventCollision;
-      if (at_fault(own_before, world.agents.speed_mps[slot], world.boxes_before[other])) events |= kEventAtFault;
+      if (other == agent || !world.boxes[other].drawn ||
+          !collide(own_before, own, world.boxes_before[other], world.boxes[other])) {
+        continue;
+      }
+      collides = true;
+      is_at_fault = is_at_fault || at_fault(own_before, world.agents.speed_mps[slot], world.boxes_before[other]);
     }
   }
-  world.agents.events[slot] = static_cast<uint8_t>(world.agents.events[slot] | events);
+  collides = lanes.any(collides);
+  is_at_fault = lanes.any(is_at_fault);
+  if (lanes.rank() > 0 || !collides) return;
+  uint8_t& events = world.agents.events[slot];
+  events = static_cast<uint8_t>(events | kEventCollision | (is_at_fault ? kEventAtFault : kEventNone));
 }
 
-/// Phase 3: the reward of an active agent, and its halt after an infraction. Returns the reward.
+/// Phase 3: the reward of an active agent, and its halt after an infraction. Returns the reward. Nothing that it writes
+/// is read by another agent's phase 2.
 PICTURA_HD inline float settle(const WorldView& world, int agent) {
   if (!is_active(world, agent)) return 0.0f;
   const AgentStateView& agents = world.agents;
@@ -153,7 +172,7 @@ PICTURA_HD inline float settle(const WorldView& world, int agent) {
   agents.status[slot] = static_cast<uint8_t>(AgentStatus::halted);
   agents.speed_mps[slot] = agents.accel_long_mps2[slot] = agents.accel_lat_mps2[slot] = 0.0f;
   agents.steer_rad[slot] = agents.jerk_long_mps3[slot] = agents.jerk_lat_mps3[slot] = 0.0f;
-  world.boxes[agent] = box_of(agents, slot);
+  world.boxes[agent].palette = kHaltedPalette;
   return reward;
 }
 

@@ -100,12 +100,14 @@ PICTURA_HD inline AgentBox box_at(const AgentStateView& agents, int slot, Vec3 p
   return box;
 }
 
+constexpr uint8_t kHaltedPalette = 1;
+
 /// The agent's box in the scene; nothing of an absent agent is drawn or met.
 PICTURA_HD inline AgentBox box_of(const AgentStateView& agents, int slot) {
   const AgentStatus status = static_cast<AgentStatus>(agents.status[slot]);
   AgentBox box = box_at(agents, slot, {agents.x_m[slot], agents.y_m[slot], agents.z_m[slot]},
                         {agents.sin_heading[slot], agents.cos_heading[slot]});
-  box.palette = status == AgentStatus::halted ? 1 : 0;
+  box.palette = status == AgentStatus::halted ? kHaltedPalette : 0;
   box.drawn = status != AgentStatus::absent;
   return box;
 }

@@ -3,8 +3,11 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 #include <random>
+
+#include <gtest/gtest.h>
 
 #include "pictura/backend_cuda/simulator_cuda_phases.h"
 #include "pictura/simulator/world_batch.h"
@@ -26,6 +29,19 @@ void shuffled(std::mt19937* random, int count, const Body& body) {
   for (const int i : order) body(i);
 }
 
+/// A group of one lane.
+struct HostLanes : OneLane {
+  float* rows = nullptr;
+  float* staging() const { return rows; }
+  uint32_t ballot(bool value) const { return value; }
+  int count_before(uint32_t) const { return 0; }
+  void write(const float* values, int filled, int end, int capacity, float* out) const {
+    ASSERT_LE(end, capacity);
+    std::copy(values, values + filled, out);
+    std::fill(out + filled, out + std::max(filled, end), 0.0f);
+  }
+};
+
 struct ShuffledTeam : HostAtomics {
   std::mt19937* random;
   cuda::TeamMemory* shared;
@@ -34,16 +50,10 @@ struct ShuffledTeam : HostAtomics {
   void for_each(int count, const Body& body) const {
     shuffled(random, count, body);
   }
-};
-
-/// A warp of one.
-struct OneLane {
-  int size() const { return 1; }
-  int rank() const { return 0; }
-  uint32_t ballot(bool value) const { return value; }
-  int count(uint32_t lanes) const { return static_cast<int>(lanes); }
-  int count_before(uint32_t) const { return 0; }
-  void wait() const {}
+  template <typename Body>
+  void for_each_by_lanes(int count, const Body& body) const {
+    shuffled(random, count, [&body](int i) { body(HostLanes{}, i); });
+  }
 };
 
 struct ShuffledLaunch {
@@ -63,9 +73,21 @@ struct ShuffledLaunch {
       phase(team, i);
     });
   }
-  template <typename Phase>
-  void warps(int32_t count, const Phase& phase) const {
-    shuffled(random, count, [&phase](int i) { phase(OneLane{}, i); });
+  template <int kGroup, typename Phase>
+  void lanes(int32_t count, const Phase& phase) const {
+    shuffled(random, count, [&phase](int i) {
+      std::array<float, cuda::ShowAgent::kStaging> rows{};
+      HostLanes lanes;
+      lanes.rows = rows.data();
+      phase(lanes, i);
+    });
+  }
+  template <typename Aside, typename Here>
+  void beside(const Aside& aside, const Here& here) const {
+    const bool is_first = (*random)() % 2 == 0;
+    if (is_first) aside(*this);
+    here();
+    if (!is_first) aside(*this);
   }
 };
 
@@ -77,20 +99,37 @@ class ShuffledExecutor {
       : batch(config, std::move(maps), std::move(worlds)),
         results(static_cast<size_t>(batch.num_slots()), config),
         random_(shuffle_seed),
+        next_agents_(static_cast<size_t>(batch.num_slots())),
+        next_boxes_(batch.boxes.size()),
+        next_light_plans_(batch.light_plans.size()),
+        next_lights_(batch.lights.size()),
+        next_spawned_(batch.worlds.size()),
         cell_items_(batch.boxes.size()),
+        try_boxes_(batch.boxes.size() * cuda::kTriesAtOnce),
+        free_tries_(batch.boxes.size()),
+        known_tries_(batch.boxes.size()),
         chosen_try_(batch.boxes.size()),
         next_try_(batch.boxes.size()),
-        free_tries_(batch.boxes.size()),
-        begins_(batch.worlds.size()) {
+        step_m_(static_cast<size_t>(batch.num_slots())) {
+    std::iota(cell_items_.begin(), cell_items_.end(), 0);
+    for (int w = 0; w < batch.num_worlds(); ++w) {
+      cell_begin_.insert(cell_begin_.end(), {0, batch.world(w).num_boxes});
+    }
     for (int w = 0; w < batch.num_worlds(); ++w) {
       const auto first_box = static_cast<size_t>(batch.box_begin[static_cast<size_t>(w)]);
       WorldView view = batch.world(w);
-      cell_begin_.emplace_back(view.box_cells.begin.size());
-      view.box_cells.begin = cell_begin_.back();
-      view.box_cells.items = {cell_items_.data() + first_box, static_cast<size_t>(view.num_boxes)};
-      scratch_.push_back({cell_begin_.back().data(), cell_items_.data() + first_box, free_tries_.data() + first_box,
-                          chosen_try_.data() + first_box, next_try_.data() + first_box});
+      const auto first_light = static_cast<size_t>(batch.light_begin[static_cast<size_t>(w)]);
+      view.box_cells = cuda::one_cell({cell_begin_.data() + 2 * w, 2},
+                                      {cell_items_.data(), static_cast<size_t>(view.num_boxes)});
+      scratch_.push_back({try_boxes_.data() + first_box * cuda::kTriesAtOnce, free_tries_.data() + first_box,
+                          known_tries_.data() + first_box, chosen_try_.data() + first_box,
+                          next_try_.data() + first_box});
       worlds_.push_back(view);
+      view.agents = next_agents_.view();
+      view.boxes = view.boxes_before = next_boxes_.data() + first_box;
+      view.light_plans = next_light_plans_.data() + first_light;
+      view.lights = next_lights_.data() + first_light;
+      next_worlds_.push_back(view);
       world_of_slot_.insert(world_of_slot_.end(), static_cast<size_t>(view.num_agents), w);
     }
     launch_reset(ShuffledLaunch{&random_}, arrays());
@@ -106,6 +145,7 @@ class ShuffledExecutor {
   cuda::SimulatorArrays arrays() {
     cuda::SimulatorArrays arrays;
     arrays.worlds = worlds_.data();
+    arrays.next_worlds = next_worlds_.data();
     arrays.scratch = scratch_.data();
     arrays.world_of_slot = world_of_slot_.data();
     arrays.num_worlds = batch.num_worlds();
@@ -119,20 +159,26 @@ class ShuffledExecutor {
     arrays.views = results.views.data();
     arrays.observations = results.observation_view();
     arrays.entity_sets = batch.config.vector_observations;
-    arrays.begins = begins_.data();
+    arrays.step_m = step_m_.data();
+    arrays.next_spawned = next_spawned_.data();
     arrays.refused_slot = &refused_slot_;
     arrays.refusal = &refusal_;
     return arrays;
   }
 
   std::mt19937 random_;
-  std::vector<WorldView> worlds_;
+  std::vector<WorldView> worlds_, next_worlds_;
+  AgentState next_agents_;
+  std::vector<AgentBox> next_boxes_;
+  std::vector<LightPlan> next_light_plans_;
+  std::vector<LightState> next_lights_;
+  std::vector<int32_t> next_spawned_;
   std::vector<cuda::WorldScratch> scratch_;
-  std::vector<int32_t> world_of_slot_;
-  std::vector<std::vector<int32_t>> cell_begin_;
-  std::vector<int32_t> cell_items_, chosen_try_, next_try_;
+  std::vector<int32_t> world_of_slot_, cell_begin_, cell_items_;
+  std::vector<AgentBox> try_boxes_;
   std::vector<uint32_t> free_tries_;
-  std::vector<uint8_t> begins_;
+  std::vector<int32_t> known_tries_, chosen_try_, next_try_;
+  std::vector<float> step_m_;
   int32_t refused_slot_ = 0;
   int64_t refusal_ = -1;
 };

@@ -82,7 +82,7 @@ TEST(Towns, ParkedCarsLeaveTheLanesFree) {
             const LaneSegment& segment = view.map.segments[static_cast<size_t>(item)];
             const Vec2 from_a = p - segment.a_m.xy();
             const float along = dot(from_a, segment.direction);
-            if (!view.map.lanes[static_cast<size_t>(segment.lane)].is_driven || along < 0 || along > segment.length_m ||
+            if (!segment.is_driven || along < 0 || along > segment.length_m ||
                 std::fabs(segment.a_m.z - box.center_m.z) > 1) {
               continue;
             }

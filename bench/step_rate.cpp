@@ -1,0 +1,81 @@
+#include "pictura/bench/step_rate.h"
+
+#include <chrono>
+
+#include "pictura/common/error.h"
+#include "pictura/common/rng.h"
+#ifdef PICTURA_HAS_CUDA
+#include "pictura/common/cuda/device_buffer.cuh"
+#endif
+
+namespace pictura {
+
+namespace {
+
+constexpr size_t kActionSets = 64;
+
+std::vector<int32_t> draw_actions(uint64_t seed, int num_slots, uint32_t step) {
+  std::vector<int32_t> actions;
+  for (int slot = 0; slot < num_slots; ++slot) {
+    RandomStream random(seed, 0, static_cast<uint32_t>(slot), 0, step, Purpose::action);
+    actions.push_back(random.below(kNumActions));
+  }
+  return actions;
+}
+
+}  // namespace
+
+struct StepBench::Actions {
+  std::vector<std::vector<int32_t>> host;
+#ifdef PICTURA_HAS_CUDA
+  std::vector<DeviceBuffer<int32_t>> device;
+#endif
+  std::vector<Span<const int32_t>> sets;  // where the simulator reads them
+};
+
+StepBench::StepBench(Simulator* simulator, uint64_t seed)
+    : simulator_(simulator), actions_(std::make_unique<Actions>()) {
+  for (uint32_t step = 0; step < kActionSets; ++step) {
+    actions_->host.push_back(draw_actions(seed, simulator->num_slots(), step));
+  }
+  for (const std::vector<int32_t>& set : actions_->host) {
+    if (simulator->space() == MemorySpace::host) {
+      actions_->sets.push_back(set);
+      continue;
+    }
+#ifdef PICTURA_HAS_CUDA
+    actions_->device.emplace_back(Span<const int32_t>(set));
+    actions_->sets.push_back(actions_->device.back().span());
+#else
+    fail("step bench: simulator {}: this build reaches no device memory", simulator->name());
+#endif
+  }
+}
+
+StepBench::~StepBench() = default;
+
+StepTiming StepBench::run(int64_t steps) {
+  using Clock = std::chrono::steady_clock;
+  simulator_->check();
+  const SimulatorTotals before = simulator_->totals();
+  const auto begin = Clock::now();
+  for (int64_t step = 0; step < steps; ++step) simulator_->step(actions_->sets[next_++ % kActionSets]);
+  simulator_->check();
+  const double elapsed_s = std::chrono::duration<double>(Clock::now() - begin).count();
+  const SimulatorTotals after = simulator_->totals();
+  return {steps, elapsed_s, after.agent_steps - before.agent_steps, after.slot_steps - before.slot_steps};
+}
+
+StepTiming StepBench::run_for(double duration_s, int64_t steps_between_looks) {
+  StepTiming sum;
+  while (sum.elapsed_s < duration_s) {
+    const StepTiming part = run(steps_between_looks);
+    sum.steps += part.steps;
+    sum.elapsed_s += part.elapsed_s;
+    sum.agent_steps += part.agent_steps;
+    sum.slot_steps += part.slot_steps;
+  }
+  return sum;
+}
+
+}  // namespace pictura

@@ -1,0 +1,39 @@
+// How fast a simulator steps, on any executor: random actions lie where it reads them, and nothing but steps is timed.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+/// One timed run of steps, waited for at its end.
+struct StepTiming {
+  int64_t steps = 0;
+  double elapsed_s = 0;
+  int64_t agent_steps = 0;  // of active agents
+  int64_t slot_steps = 0;
+};
+
+/// Steps one simulator with uniform random actions, which are drawn and uploaded beforehand, and taken in turn.
+class StepBench {
+ public:
+  StepBench(Simulator* simulator, uint64_t seed);
+  ~StepBench();
+  StepBench(const StepBench&) = delete;
+  StepBench& operator=(const StepBench&) = delete;
+
+  /// Takes `steps` steps and waits for them.
+  StepTiming run(int64_t steps);
+  /// Takes steps for at least `duration_s`; waits after every `steps_between_looks`, since a look at the clock has to.
+  StepTiming run_for(double duration_s, int64_t steps_between_looks);
+
+ private:
+  struct Actions;
+  Simulator* simulator_;
+  std::unique_ptr<Actions> actions_;
+  size_t next_ = 0;
+};
+
+}  // namespace pictura

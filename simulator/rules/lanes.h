@@ -1,0 +1,63 @@
+// How the loops of one agent's rules are shared out: rules that look at many things take `lanes`, threads in lockstep
+// that all call the rule with the same arguments, each take every size()-th thing, and all return the same. A host calls
+// them with OneLane. Only what does not depend on the order of things is shared out: whether any of them is so, and the
+// least of them.
+#pragma once
+
+#include "pictura/common/hd.h"
+
+namespace pictura {
+
+/// The nearest of the things offered, in ascending order of squared distance, then item.
+template <int capacity>
+class NearestOfOneLane {
+ public:
+  PICTURA_HD int count() const { return count_; }
+  PICTURA_HD int32_t item(int at) const { return item_[at]; }
+  PICTURA_HD float worst() const { return count_ < capacity ? 3e38f : distance2_[capacity - 1]; }
+  PICTURA_HD void offer(bool is_one, float distance2, int32_t item) {
+    if (!is_one || (count_ == capacity && !before(distance2, item, capacity - 1))) return;
+    int at = count_ < capacity ? count_++ : capacity - 1;
+    for (; at > 0 && before(distance2, item, at - 1); --at) {
+      distance2_[at] = distance2_[at - 1];
+      item_[at] = item_[at - 1];
+    }
+    distance2_[at] = distance2;
+    item_[at] = item;
+  }
+
+ private:
+  PICTURA_HD bool before(float distance2, int32_t item, int at) const {
+    return distance2 < distance2_[at] || (distance2 == distance2_[at] && item < item_[at]);
+  }
+
+  float distance2_[capacity];
+  int32_t item_[capacity];
+  int count_ = 0;
+};
+
+/// A thread alone.
+struct OneLane {
+  static constexpr int kSize = 1;
+  template <int capacity>
+  using Nearest = NearestOfOneLane<capacity>;
+
+  PICTURA_HD static constexpr int size() { return kSize; }
+  PICTURA_HD int rank() const { return 0; }
+  /// What each lane wrote before, every lane sees after.
+  PICTURA_HD void wait() const {}
+  PICTURA_HD bool any(bool value) const { return value; }
+  PICTURA_HD int sum(int value) const { return value; }
+  /// The value of the lane with the lowest (score, index); scores are not negative.
+  template <typename T>
+  PICTURA_HD T of_lowest(float, int, const T& value) const {
+    return value;
+  }
+  /// The value of the lane of that rank.
+  template <typename T>
+  PICTURA_HD T from(int, const T& value) const {
+    return value;
+  }
+};
+
+}  // namespace pictura
