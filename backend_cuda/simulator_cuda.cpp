@@ -115,6 +115,7 @@ struct DeviceScratch {
   DeviceBuffer<uint32_t> free_tries;
   DeviceBuffer<int32_t> known_tries, chosen_try, next_try;
   DeviceBuffer<float> step_m;
+  DeviceBuffer<uint8_t> began, prepares;
   DeviceBuffer<int32_t> refused_slot;
   MappedValue<int64_t> refusal;
 };
@@ -139,7 +140,10 @@ struct DeviceNext {
 class SideStream {
  public:
   SideStream() {
-    PICTURA_CUDA(cudaStreamCreateWithFlags(&streams_.side, cudaStreamNonBlocking));
+    // Of a higher priority: what is put there is little, and everybody waits for its end.
+    int lowest = 0, highest = 0;
+    PICTURA_CUDA(cudaDeviceGetStreamPriorityRange(&lowest, &highest));
+    PICTURA_CUDA(cudaStreamCreateWithPriority(&streams_.side, cudaStreamNonBlocking, highest));
     for (cudaEvent_t* event : {&streams_.forked, &streams_.joined}) {
       PICTURA_CUDA(cudaEventCreateWithFlags(event, cudaEventDisableTiming));
     }
@@ -305,6 +309,8 @@ class SimulatorCuda final : public Simulator {
     scratch_.chosen_try = DeviceBuffer<int32_t>(num_boxes);
     scratch_.next_try = DeviceBuffer<int32_t>(num_boxes);
     scratch_.step_m = DeviceBuffer<float>(world_of_slot.size());
+    scratch_.began = DeviceBuffer<uint8_t>(num_worlds);
+    scratch_.prepares = DeviceBuffer<uint8_t>(num_worlds);
     scratch_.refused_slot = DeviceBuffer<int32_t>(1);
     *scratch_.refusal.host() = -1;
   }
@@ -326,6 +332,7 @@ class SimulatorCuda final : public Simulator {
       view.light_plans = state_.light_plans.data() + first_light;
       view.lights = state_.lights.data() + first_light;
       worlds.push_back(view);
+      ++view.episode;
       view.agents = next_.agents.view();
       view.boxes = view.boxes_before = next_.boxes.data() + first_box;
       view.light_plans = next_.light_plans.data() + first_light;
@@ -358,6 +365,8 @@ class SimulatorCuda final : public Simulator {
     arrays.observations = results_.observations();
     arrays.entity_sets = batch_->config.vector_observations;
     arrays.step_m = scratch_.step_m.data();
+    arrays.began = scratch_.began.data();
+    arrays.prepares = scratch_.prepares.data();
     arrays.next_spawned = next_.spawned.data();
     arrays.refused_slot = scratch_.refused_slot.data();
     arrays.refusal = scratch_.refusal.device();

@@ -112,10 +112,10 @@ struct DeviceTeam : DeviceAtomics {
     __syncthreads();
   }
   /// body(lanes, i) likewise.
-  template <typename Body>
+  template <int kGroup, typename Body>
   __device__ void for_each_by_lanes(int count, const Body& body) const {
-    for (int i = static_cast<int>(threadIdx.x) / kWarp; i < count; i += kTeamThreads / kWarp) {
-      body(DeviceLanes<kWarp>{}, i);
+    for (int i = static_cast<int>(threadIdx.x) / kGroup; i < count; i += kTeamThreads / kGroup) {
+      body(DeviceLanes<kGroup>{}, i);
     }
     __syncthreads();
   }

@@ -54,6 +54,8 @@ struct SimulatorArrays {
   uint8_t entity_sets = 0;
   // Between phases and steps.
   float* step_m = nullptr;          // [num_slots] driven in the present step
+  uint8_t* began = nullptr;         // [num_worlds] an episode began in the last step: the one after it is to be made
+  uint8_t* prepares = nullptr;      // [num_worlds] it is made in the present step
   int32_t* next_spawned = nullptr;  // [num_worlds] in the next episode
   int32_t* refused_slot = nullptr;  // the lowest one with an action out of range, or kNoSlot
   int64_t* refusal = nullptr;       // the first since the host looked, or -1
@@ -116,7 +118,7 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
         memory.someone_wants_more = 0;
         memory.lowest_changed = count;
       });
-      team.for_each_by_lanes(unsettled, [&](const auto& lanes, int k) {
+      team.template for_each_by_lanes<kLanesPerAgent>(unsettled, [&](const auto& lanes, int k) {
         const int i = settled + k;
         int chosen = -1;
         for (int t = 0; t < known_tries[i] && chosen < 0; ++t) {
@@ -167,9 +169,9 @@ PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const Wo
            is_clear(world, box, world.num_agents, world.num_boxes);
   });
   team.for_each(1, [&](int) { *spawned_out = 0; });
-  team.for_each(world.num_agents, [&](int agent) {
-    put_agent(world, agent, scratch.chosen_try[agent]);
-    if (scratch.chosen_try[agent] >= 0) team.add(spawned_out, 1);
+  team.template for_each_by_lanes<kLanesPerAgent>(world.num_agents, [&](const auto& lanes, int agent) {
+    put_agent(world, agent, scratch.chosen_try[agent], lanes);
+    if (lanes.rank() == 0 && scratch.chosen_try[agent] >= 0) team.add(spawned_out, 1);
   });
 }
 
@@ -182,30 +184,35 @@ struct BeginFirstEpisode {
       arrays.episode_over[w] = 0;
       arrays.episode_step[w] = arrays.episode_index[w] = 0;
       arrays.worlds[w].episode = 0;
+      arrays.next_worlds[w].episode = 1;
+      arrays.began[w] = 1;
     });
     begin_episode(team, arrays.worlds[w], arrays.scratch[w], &arrays.spawned[w]);
   }
 };
 
-/// Makes the next episode of the worlds whose present one is over, beside it: a start depends on nothing that a step
-/// changes. The next step takes it.
+/// Makes a world's next episode, as early as its memory is free and long before it is needed: a start depends on nothing
+/// that steps change.
 struct PrepareEpisode {
   SimulatorArrays arrays;
   template <typename Team>
   PICTURA_HD void operator()(const Team& team, int w) const {
-    if (arrays.is_refused() || !arrays.episode_over[w]) return;
-    team.for_each(1, [&](int) { arrays.next_worlds[w].episode = static_cast<uint32_t>(arrays.episode_index[w] + 1); });
+    if (!arrays.prepares[w]) return;
     begin_episode(team, arrays.next_worlds[w], arrays.scratch[w], &arrays.next_spawned[w]);
   }
 };
 
-/// Finds the lowest slot whose action is out of range.
+/// Finds the lowest slot whose action is out of range, and the worlds whose next episode is to be made.
 struct CheckActions {
   SimulatorArrays arrays;
   const int32_t* actions;
   template <typename Atomics>
   PICTURA_HD void operator()(const Atomics& atomics, int slot) const {
     const WorldView& world = arrays.world_of(slot);
+    if (slot == world.first_slot) {
+      arrays.prepares[world.index] = arrays.began[world.index];
+      arrays.began[world.index] = 0;
+    }
     if (arrays.episode_over[world.index] || is_sound_action(world, slot - world.first_slot, actions[slot])) return;
     atomics.lower(arrays.refused_slot, slot);
   }
@@ -273,8 +280,10 @@ struct FinishStep {
     ++arrays.episode_step[w];
     if (!begins) return;
     arrays.episode_step[w] = 0;
-    arrays.worlds[w].episode = static_cast<uint32_t>(++arrays.episode_index[w]);
     arrays.spawned[w] = arrays.next_spawned[w];
+    arrays.worlds[w].episode = static_cast<uint32_t>(++arrays.episode_index[w]);
+    arrays.next_worlds[w].episode = arrays.worlds[w].episode + 1;
+    arrays.began[w] = 1;
   }
 
  private:
@@ -319,33 +328,44 @@ struct FinishStep {
     const bool ends = episode_ends(world.options, steps, arrays.spawned[w], lanes.sum(active));
     for_each_agent(
         [&](int agent, SimulatorTotals* part) { finish_agent(world, agent, ends, arrays.results, part); });
-    for (int lane = 0; lane < kTotalsLanes; ++lane) {
-      totals_out->add(lanes.from(lane % Lanes::kSize, parts[lane / Lanes::kSize]));
-    }
+    add_up(lanes, parts, totals_out);
     for (int i = lanes.rank(); i < static_cast<int>(world.map.stop_lines.size()); i += lanes.size()) {
       world.lights[i] = light_state(world.light_plans[i], steps);
     }
     return ends;
   }
+
+  /// Counts in any order; the rest in that of the totals' lanes, see simulator/totals.h.
+  template <typename Lanes, int kParts>
+  PICTURA_HD static void add_up(const Lanes& lanes, SimulatorTotals (&parts)[kParts], SimulatorTotals* sum_out) {
+    for (SimulatorTotals& part : parts) {
+      SimulatorTotals::visit_counts(*sum_out, part, [&lanes](int64_t& sum, int64_t count) {
+        sum += lanes.sum(static_cast<int>(count));  // at most a world's agents
+      });
+    }
+    for (int lane = 0; lane < kTotalsLanes; ++lane) {
+      SimulatorTotals::visit_sums(*sum_out, parts[lane / Lanes::kSize], [&lanes, lane](double& sum, double value) {
+        sum += lanes.from(lane % Lanes::kSize, value);
+      });
+    }
+  }
 };
 
-/// What a group of lanes writes of a slot's observation: one of the sets, or the rest and the view.
+/// Writes a slot's view and observation.
 struct ShowAgent {
   SimulatorArrays arrays;
-  /// The sets that are asked for, after the rest.
-  PICTURA_HD int num_parts() const { return 1 + (arrays.entity_sets ? num_observed_sets(arrays.observations) : 0); }
   /// Floats that the rows of any set need.
   static constexpr int kStaging = max_of(max_of(max_of(kMaxLanes, kMaxBoundaries), kMaxWalls) * kLaneFeatures,
                                          max_of(kMaxPartners * kPartnerFeatures, kMaxControls * kControlFeatures));
 
   template <typename Lanes>
-  PICTURA_HD void operator()(const Lanes& lanes, int item) const {
-    const int slot = item / num_parts(), part = item % num_parts();
+  PICTURA_HD void operator()(const Lanes& lanes, int slot) const {
     const WorldView& world = arrays.world_of(slot);
     const int agent = slot - world.first_slot;
-    if (part > 0) return show_set(lanes, world, agent, static_cast<EntitySet>(part - 1));
     observe_own(world, agent, arrays.observations, lanes);
     if (lanes.rank() == lanes.size() - 1) arrays.views[slot] = view_of(world, agent);
+    const int num_sets = arrays.entity_sets ? num_observed_sets(arrays.observations) : 0;
+    for (int set = 0; set < num_sets; ++set) show_set(lanes, world, agent, static_cast<EntitySet>(set));
   }
 
  private:
@@ -370,23 +390,31 @@ struct ShowAgent {
     lanes.wait();
     lanes.write(rows, count * out.features, end * out.features, out.capacity * out.features, out.rows);
     if (lanes.rank() == 0) *out.count = count;
+    lanes.wait();
   }
 
-  /// observe_pieces() by as many pieces at a time as there are lanes.
+  /// observe_pieces() by several pieces a lane at a time, whose loads are under way together.
   template <typename Lanes>
   PICTURA_HD static int gather_pieces(const Lanes& lanes, const PieceList& near, const EgoFrame& frame, int capacity,
                                       float* rows) {
+    constexpr int kAtOnce = 2;
     const int num_items = static_cast<int>(near.items.size());
     int count = 0;
-    for (int first = 0; first < num_items && count < capacity; first += lanes.size()) {
-      const int i = first + lanes.rank();
-      const int32_t item = near.items[static_cast<size_t>(min_of(i, num_items - 1))];
-      float row[kLaneFeatures];
-      const bool in_sight = observe_piece(near.pieces[static_cast<size_t>(item)], frame, row) && i < num_items;
-      const uint32_t seen = lanes.ballot(in_sight);
-      const int at = count + lanes.count_before(seen);
-      for (int f = 0; f < kLaneFeatures && in_sight && at < capacity; ++f) rows[at * kLaneFeatures + f] = row[f];
-      count = min_of(capacity, count + count_bits(seen));
+    for (int first = lanes.rank(); first - lanes.rank() < num_items && count < capacity;
+         first += kAtOnce * lanes.size()) {
+      ObservedPiece pieces[kAtOnce];
+      for (int k = 0; k < kAtOnce; ++k) {
+        const int i = min_of(first + k * lanes.size(), num_items - 1);
+        pieces[k] = near.pieces[static_cast<size_t>(near.items[static_cast<size_t>(i)])];
+      }
+      for (int k = 0; k < kAtOnce; ++k) {
+        float row[kLaneFeatures];
+        const bool in_sight = observe_piece(pieces[k], frame, row) && first + k * lanes.size() < num_items;
+        const uint32_t seen = lanes.ballot(in_sight);
+        const int at = count + lanes.count_before(seen);
+        for (int f = 0; f < kLaneFeatures && in_sight && at < capacity; ++f) rows[at * kLaneFeatures + f] = row[f];
+        count = min_of(capacity, count + count_bits(seen));
+      }
     }
     return count;
   }
@@ -394,8 +422,7 @@ struct ShowAgent {
 
 template <typename Launch>
 void launch_show(const Launch& launch, const SimulatorArrays& arrays) {
-  const ShowAgent show{arrays};
-  launch.template lanes<kWarp>(show.num_parts() * arrays.num_slots, show);
+  launch.template lanes<kWarp>(arrays.num_slots, ShowAgent{arrays});
 }
 
 /// Episode 0 of every world.
@@ -408,7 +435,8 @@ void launch_reset(const Launch& launch, const SimulatorArrays& arrays) {
 /// Shows a state that was put there.
 template <typename Launch>
 void launch_restored(const Launch& launch, const SimulatorArrays& arrays) {
-  launch.fill(arrays.refused_slot, sizeof(int32_t), kNoSlot & 0xFF);
+  launch.fill(arrays.began, static_cast<size_t>(arrays.num_worlds), 0);
+  launch.fill(arrays.prepares, static_cast<size_t>(arrays.num_worlds), 1);
   launch.teams(arrays.num_worlds, PrepareEpisode{arrays});
   launch_show(launch, arrays);
 }
@@ -417,11 +445,13 @@ template <typename Launch>
 void launch_step(const Launch& launch, const SimulatorArrays& arrays, const int32_t* actions) {
   launch.fill(arrays.refused_slot, sizeof(int32_t), kNoSlot & 0xFF);
   launch.threads(arrays.num_slots, CheckActions{arrays, actions});
-  launch.template lanes<kLanesPerAgent>(arrays.num_slots, Advance{arrays, actions});
-  launch.template lanes<kLanesPerAgent>(arrays.num_slots, Settle{arrays});
-  launch.template lanes<kWarp>(arrays.num_worlds, FinishStep{arrays, actions});
   launch.beside([&](const Launch& aside) { aside.teams(arrays.num_worlds, PrepareEpisode{arrays}); },
-                [&] { launch_show(launch, arrays); });
+                [&] {
+                  launch.template lanes<kLanesPerAgent>(arrays.num_slots, Advance{arrays, actions});
+                  launch.template lanes<kLanesPerAgent>(arrays.num_slots, Settle{arrays});
+                  launch.template lanes<kWarp>(arrays.num_worlds, FinishStep{arrays, actions});
+                  launch_show(launch, arrays);
+                });
 }
 
 }  // namespace pictura::cuda

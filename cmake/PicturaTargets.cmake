@@ -25,6 +25,7 @@ configure_file(${PROJECT_SOURCE_DIR}/common/version.h.in ${PICTURA_INCLUDE_DIR}/
 
 include(CheckCXXCompilerFlag)
 check_cxx_compiler_flag(-Wdangling-reference PICTURA_HAS_WDANGLING_REFERENCE)
+check_cxx_compiler_flag(-mno-fma PICTURA_HAS_MNO_FMA)
 
 add_library(pictura_flags INTERFACE)
 target_include_directories(pictura_flags INTERFACE
@@ -38,6 +39,8 @@ target_compile_options(pictura_flags INTERFACE
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_WERROR}>>:-Werror>
   # The arithmetic contract: a product and a sum round twice on every device, and nothing is reordered.
   $<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off -fno-math-errno -fno-trapping-math>
+  # g++ 12 contracts all the same where it vectorises sums beside differences (vfmaddsub): leave it no such instruction.
+  $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_HAS_MNO_FMA}>>:-mno-fma>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_CPU_ARCH}>>:-march=${PICTURA_CPU_ARCH}>)
 set(PICTURA_IS_SANITIZED 0)  # for tests that time something
 if(PICTURA_SANITIZE)

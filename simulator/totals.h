@@ -20,21 +20,32 @@ struct SimulatorTotals {
   int64_t finished_agent_episodes = 0;  // agents whose episode ended
   double finished_return = 0;           // sum of their returns
 
+  /// Calls visit(member of a, member of b) for all counts, and for all sums of floating-point numbers.
+  template <typename Other, typename Visit>
+  PICTURA_HD static void visit_counts(SimulatorTotals& a, Other& b, Visit&& visit) {
+    visit(a.agent_steps, b.agent_steps);
+    visit(a.slot_steps, b.slot_steps);
+    visit(a.episodes, b.episodes);
+    visit(a.goals_reached, b.goals_reached);
+    visit(a.waypoints_reached, b.waypoints_reached);
+    visit(a.collisions, b.collisions);
+    visit(a.at_fault_collisions, b.at_fault_collisions);
+    visit(a.off_road, b.off_road);
+    visit(a.red_light, b.red_light);
+    visit(a.wall_contacts, b.wall_contacts);
+    visit(a.finished_agent_episodes, b.finished_agent_episodes);
+  }
+  template <typename Other, typename Visit>
+  PICTURA_HD static void visit_sums(SimulatorTotals& a, Other& b, Visit&& visit) {
+    visit(a.distance_m, b.distance_m);
+    visit(a.reward, b.reward);
+    visit(a.finished_return, b.finished_return);
+  }
+
   PICTURA_HD void add(const SimulatorTotals& part) {
-    agent_steps += part.agent_steps;
-    slot_steps += part.slot_steps;
-    episodes += part.episodes;
-    goals_reached += part.goals_reached;
-    waypoints_reached += part.waypoints_reached;
-    collisions += part.collisions;
-    at_fault_collisions += part.at_fault_collisions;
-    off_road += part.off_road;
-    red_light += part.red_light;
-    wall_contacts += part.wall_contacts;
-    distance_m += part.distance_m;
-    reward += part.reward;
-    finished_agent_episodes += part.finished_agent_episodes;
-    finished_return += part.finished_return;
+    const auto add_member = [](auto& sum, const auto& value) { sum += value; };
+    visit_counts(*this, part, add_member);
+    visit_sums(*this, part, add_member);
   }
 };
 

@@ -210,6 +210,14 @@ Walkways make_walkways(const RoadMap& map, const MapView& roads) {
   for (size_t i = 0; i < from_node.size(); ++i) {
     out.leaving[static_cast<size_t>(next[static_cast<size_t>(from_node[i])]++)] = static_cast<int32_t>(i);
   }
+  for (size_t i = 0; i < out.pieces.size(); ++i) {
+    WalkPiece& piece = out.pieces[i];
+    const int32_t back = static_cast<int32_t>(i) ^ 1;
+    const int32_t* const leaving = out.leaving.data() + out.leave_begin[static_cast<size_t>(piece.to_node)];
+    const int32_t ways = out.leave_begin[static_cast<size_t>(piece.to_node) + 1] -
+                         out.leave_begin[static_cast<size_t>(piece.to_node)];
+    piece.next = ways == 1 ? back : ways > 2 ? -1 : leaving[0] == back ? leaving[1] : leaving[0];
+  }
   return out;
 }
 

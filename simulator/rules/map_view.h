@@ -55,6 +55,7 @@ struct WalkPiece {
   float slope = 0;  // rise per metre
   float heading_rad = 0;
   int32_t to_node = 0;  // where it ends
+  int32_t next = 0;     // the only piece to go on to, which at a dead end is the way back; -1: several
 };
 /// How far from a walkway a pedestrian still stands at its height.
 constexpr float kWalkReach_m = 5.0f;
@@ -74,8 +75,9 @@ struct ParkingSpot {
   Vec2 outward;  // unit vector away from the road; null on parking lanes and spaces
 };
 
-/// A piece of a lane, boundary or wall as the policy sees it: at most kMaxPiece_m long.
-struct ObservedPiece {
+/// A piece of a lane, boundary or wall as the policy sees it: at most kMaxPiece_m long. Aligned so that a device reads
+/// one in two loads.
+struct alignas(16) ObservedPiece {
   Vec3 middle_m;  // on the ground
   float half_length_m = 0;
   Vec2 direction;

@@ -95,37 +95,44 @@ PICTURA_HD LaneFit fit_agent(const WorldView& world, int agent, Vec2 p, float z_
 }
 
 /// The next waypoint of a pedestrian: the gap, and then on until no parked car stands there.
-PICTURA_HD inline RoutePoint next_walk_waypoint(const WorldView& world, int agent, RoutePoint at,
-                                                RandomStream* random_inout) {
+template <typename Lanes>
+PICTURA_HD RoutePoint next_walk_waypoint(const WorldView& world, int agent, RoutePoint at, RandomStream* random_inout,
+                                         const Lanes& lanes) {
   constexpr float kStride_m = 1.0f;
   constexpr int kMaxStrides = 64;
   at = stroll(world.map, at, random_inout->uniform(kMinWaypointGap_m, kMaxWaypointGap_m), random_inout);
   for (int i = 0; i < kMaxStrides; ++i) {
     const LanePose pose = pose_on_walk(world.map, at.lane, at.s_m);
     const AgentBox box = box_at(world.agents, world.first_slot + agent, pose.position_m, sincos_of(pose.heading_rad));
-    if (is_clear(world, box, world.num_agents, world.num_boxes)) break;
+    if (is_clear(world, box, world.num_agents, world.num_boxes, lanes)) break;
     at = stroll(world.map, at, kStride_m, random_inout);
   }
   return at;
 }
 
 /// Draws a new goal chain that starts where the last one ended.
-PICTURA_HD inline void draw_goal_chain(const WorldView& world, int agent) {
+template <typename Lanes = OneLane>
+PICTURA_HD void draw_goal_chain(const WorldView& world, int agent, const Lanes& lanes = {}) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
-  RandomStream random = agent_stream(world, agent, static_cast<uint32_t>(agents.goal_chains[slot]), Purpose::goals);
+  const int32_t chain = agents.goal_chains[slot];
+  RandomStream random = agent_stream(world, agent, static_cast<uint32_t>(chain), Purpose::goals);
   RoutePoint at{agents.goal_lane[slot], agents.goal_lane_s_m[slot]};
+  lanes.wait();
   for (int i = 0; i < kNumWaypoints; ++i) {
-    at = walks(world, agent) ? next_walk_waypoint(world, agent, at, &random) : next_waypoint(world.map, at, &random);
+    at = walks(world, agent) ? next_walk_waypoint(world, agent, at, &random, lanes)
+                             : next_waypoint(world.map, at, &random);
     const LanePose pose = pose_of(world, agent, at);
+    if (lanes.rank() > 0) continue;
     agents.waypoint_x_m[slot * kNumWaypoints + i] = pose.position_m.x;
     agents.waypoint_y_m[slot * kNumWaypoints + i] = pose.position_m.y;
     agents.waypoint_z_m[slot * kNumWaypoints + i] = pose.position_m.z;
   }
+  if (lanes.rank() > 0) return;
   agents.next_waypoint[slot] = 0;
   agents.goal_lane[slot] = at.lane;
   agents.goal_lane_s_m[slot] = at.s_m;
-  ++agents.goal_chains[slot];
+  agents.goal_chains[slot] = chain + 1;
 }
 
 /// Where parked car `car` of the world is put at its try `i`. There must be spots.
@@ -234,12 +241,21 @@ PICTURA_HD inline bool may_spawn(const MapView& map, const AgentBox& box) {
 }
 
 /// Puts the agent at the place of its try `i`, standing still, and draws its first goals; with -1 it stays absent.
-PICTURA_HD inline void put_agent(const WorldView& world, int agent, int i) {
+template <typename Lanes = OneLane>
+PICTURA_HD void put_agent(const WorldView& world, int agent, int i, const Lanes& lanes = {}) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
-  if (i >= 0) {
-    const RoutePoint at = spawn_point(world, agent, i);
-    const LanePose pose = pose_of(world, agent, at);
+  const bool is_writer = lanes.rank() == 0;
+  if (i < 0) {
+    if (!is_writer) return;
+    world.boxes[agent] = world.boxes_before[agent] = box_of(agents, slot);
+    agents.refusal[slot] = static_cast<uint8_t>(has_places(world, agent) ? Refusal::taken : Refusal::no_place);
+    return;
+  }
+  const RoutePoint at = spawn_point(world, agent, i);
+  const LanePose pose = pose_of(world, agent, at);
+  const LaneFit fit = fit_lane(world.map, pose.position_m.xy(), pose.position_m.z, pose.heading_rad, at.lane, lanes);
+  if (is_writer) {
     Motion motion;
     motion.x_m = pose.position_m.x;
     motion.y_m = pose.position_m.y;
@@ -249,16 +265,11 @@ PICTURA_HD inline void put_agent(const WorldView& world, int agent, int i) {
     agents.status[slot] = static_cast<uint8_t>(AgentStatus::active);
     agents.goal_lane[slot] = at.lane;
     agents.goal_lane_s_m[slot] = at.s_m;
+    world.boxes[agent] = world.boxes_before[agent] = box_of(agents, slot);
+    store_fit(agents, slot, fit);
   }
-  world.boxes[agent] = world.boxes_before[agent] = box_of(agents, slot);
-  if (i < 0) {
-    agents.refusal[slot] = static_cast<uint8_t>(has_places(world, agent) ? Refusal::taken : Refusal::no_place);
-    return;
-  }
-  store_fit(agents, slot,
-            fit_lane(world.map, {agents.x_m[slot], agents.y_m[slot]}, agents.z_m[slot], agents.heading_rad[slot],
-                     agents.goal_lane[slot]));
-  draw_goal_chain(world, agent);
+  lanes.wait();
+  draw_goal_chain(world, agent, lanes);
 }
 
 }  // namespace pictura

@@ -34,28 +34,33 @@ PICTURA_HD inline Vec3 waypoint_of(const AgentStateView& agents, int slot, int i
   return {agents.waypoint_x_m[i], agents.waypoint_y_m[i], agents.waypoint_z_m[i]};
 }
 
-/// Passes waypoints along the way from `from` to where the agent is; returns event bits. The last waypoint becomes the
+/// Passes waypoints along the way from `from` to `to`; returns event bits. The last waypoint becomes the
 /// metric's goal when it becomes the active one, and stays it until it has been passed within kMetricGoalRadius_m or
 /// the next chain's last waypoint replaces it: a wide reward radius does not keep an agent from reaching it.
-PICTURA_HD inline int pass_waypoints(const WorldView& world, int agent, Vec3 from) {
+template <typename Lanes>
+PICTURA_HD int pass_waypoints(const WorldView& world, int agent, Vec3 from, Vec3 to, const Lanes& lanes) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
-  const Vec3 to{agents.x_m[slot], agents.y_m[slot], agents.z_m[slot]};
-  int events = kEventNone;
-  if (agents.goal_open[slot] &&
-      passes(from, to, {agents.goal_x_m[slot], agents.goal_y_m[slot], agents.goal_z_m[slot]}, kMetricGoalRadius_m)) {
-    agents.goal_open[slot] = 0;
-    ++agents.goals_reached[slot];
-    events |= kEventMetricGoal;
-  }
+  const bool is_writer = lanes.rank() == 0;
+  const bool reaches_goal =
+      agents.goal_open[slot] &&
+      passes(from, to, {agents.goal_x_m[slot], agents.goal_y_m[slot], agents.goal_z_m[slot]}, kMetricGoalRadius_m);
   const int index = agents.next_waypoint[slot];
   const float radius_m = agents.conditioning[slot * kNumConditioning + static_cast<int>(Conditioning::delta_goal_m)];
-  if (!passes(from, to, waypoint_of(agents, slot, index), radius_m)) return events;
-  ++agents.waypoints_reached[slot];
+  const bool passes_waypoint = passes(from, to, waypoint_of(agents, slot, index), radius_m);
+  lanes.wait();
+  if (is_writer && reaches_goal) {
+    agents.goal_open[slot] = 0;
+    ++agents.goals_reached[slot];
+  }
+  const int events = reaches_goal ? kEventMetricGoal : kEventNone;
+  if (!passes_waypoint) return events;
+  if (is_writer) ++agents.waypoints_reached[slot];
   if (index + 1 == kNumWaypoints) {
-    draw_goal_chain(world, agent);
+    draw_goal_chain(world, agent, lanes);
     return events | kEventGoal;
   }
+  if (!is_writer) return events | kEventWaypoint;
   agents.next_waypoint[slot] = index + 1;
   if (index + 2 == kNumWaypoints) {
     const Vec3 goal = waypoint_of(agents, slot, index + 1);
@@ -105,14 +110,14 @@ PICTURA_HD void advance(const WorldView& world, int agent, int32_t action, const
     }
     if (runs_red_light(world, before, box, lane_before, fit.lane)) events |= kEventRedLight;
   }
-  lanes.wait();
+  events |= pass_waypoints(world, agent, from, {motion.x_m, motion.y_m, fit.z_m}, lanes);
   if (lanes.rank() > 0) return;
+  agents.distance_m[slot] += driven_m(motion.speed_mps, world.options.dt_s);
   world.boxes_before[agent] = before;
   world.boxes[agent] = box;
   store_motion(agents, slot, motion);
   store_fit(agents, slot, fit);
-  agents.distance_m[slot] += driven_m(motion.speed_mps, world.options.dt_s);
-  agents.events[slot] = static_cast<uint8_t>(events | pass_waypoints(world, agent, from));
+  agents.events[slot] = static_cast<uint8_t>(events);
 }
 
 /// Phase 2: finds the collisions of an active agent with every other box, halted and parked ones included.
@@ -132,8 +137,10 @@ PICTURA_HD void find_collisions(const WorldView& world, int agent, const Lanes& 
     const int32_t end = cells.begin[static_cast<size_t>(y * cells.num_x + x1 + 1)];
     for (int32_t i = begin + lanes.rank(); i < end; i += lanes.size()) {
       const int32_t other = cells.items[static_cast<size_t>(i)];
-      if (other == agent || !world.boxes[other].drawn ||
-          !collide(own_before, own, world.boxes_before[other], world.boxes[other])) {
+      const AgentBox& box = world.boxes[other];
+      const Vec2 apart = (box.center_m - own.center_m).xy();
+      if (dot(apart, apart) > square(own_reach) || other == agent || !box.drawn ||
+          !collide(own_before, own, world.boxes_before[other], box)) {
         continue;
       }
       collides = true;

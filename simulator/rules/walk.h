@@ -14,7 +14,22 @@ PICTURA_HD inline LanePose pose_on_walk(const MapView& map, int32_t piece_index,
   return {{xy.x, xy.y, piece.a_m.z + piece.slope * along}, piece.heading_rad};
 }
 
-/// Walks distance_m on from s_m on a piece. At a node each way but the one back is as likely.
+/// The piece to go on to where a piece ends: each way but the one back is as likely.
+PICTURA_HD inline int32_t choose_way(const MapView& map, int32_t piece_index, RandomStream* random_inout) {
+  const WalkPiece& piece = map.walk_pieces[static_cast<size_t>(piece_index)];
+  if (piece.next >= 0) return piece.next;
+  const int32_t begin = map.walk_leave_begin[static_cast<size_t>(piece.to_node)];
+  const int32_t end = map.walk_leave_begin[static_cast<size_t>(piece.to_node) + 1];
+  const int32_t back = piece_index ^ 1;
+  int32_t choice = random_inout->below(end - begin - 1);
+  for (int32_t i = begin; i < end; ++i) {
+    const int32_t way = map.walk_leaving[static_cast<size_t>(i)];
+    if (way != back && choice-- == 0) return way;
+  }
+  return back;
+}
+
+/// Walks distance_m on from s_m on a piece.
 PICTURA_HD inline RoutePoint stroll(const MapView& map, RoutePoint at, float distance_m, RandomStream* random_inout) {
   constexpr int kMaxPiecesWalked = 1024;  // pieces of a few centimetres in a row: a bound, not a rule
   for (int i = 0; i < kMaxPiecesWalked; ++i) {
@@ -22,15 +37,7 @@ PICTURA_HD inline RoutePoint stroll(const MapView& map, RoutePoint at, float dis
     const float left_m = piece.length_m - at.s_m;
     if (distance_m <= left_m) return {at.lane, at.s_m + distance_m};
     distance_m -= left_m;
-    const int32_t begin = map.walk_leave_begin[static_cast<size_t>(piece.to_node)];
-    const int32_t ways = map.walk_leave_begin[static_cast<size_t>(piece.to_node) + 1] - begin;
-    const int32_t back = at.lane ^ 1;
-    int32_t next = back;
-    for (int32_t k = 0, choice = ways > 1 ? random_inout->below(ways - 1) : -1; k < ways && choice >= 0; ++k) {
-      const int32_t way = map.walk_leaving[static_cast<size_t>(begin + k)];
-      if (way != back && choice-- == 0) next = way;
-    }
-    at = {next, 0.0f};
+    at = {choose_way(map, at.lane, random_inout), 0.0f};
   }
   return {at.lane, 0.0f};
 }

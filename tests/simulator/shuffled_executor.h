@@ -50,7 +50,7 @@ struct ShuffledTeam : HostAtomics {
   void for_each(int count, const Body& body) const {
     shuffled(random, count, body);
   }
-  template <typename Body>
+  template <int kGroup, typename Body>
   void for_each_by_lanes(int count, const Body& body) const {
     shuffled(random, count, [&body](int i) { body(HostLanes{}, i); });
   }
@@ -110,7 +110,9 @@ class ShuffledExecutor {
         known_tries_(batch.boxes.size()),
         chosen_try_(batch.boxes.size()),
         next_try_(batch.boxes.size()),
-        step_m_(static_cast<size_t>(batch.num_slots())) {
+        step_m_(static_cast<size_t>(batch.num_slots())),
+        began_(batch.worlds.size()),
+        prepares_(batch.worlds.size()) {
     std::iota(cell_items_.begin(), cell_items_.end(), 0);
     for (int w = 0; w < batch.num_worlds(); ++w) {
       cell_begin_.insert(cell_begin_.end(), {0, batch.world(w).num_boxes});
@@ -160,6 +162,8 @@ class ShuffledExecutor {
     arrays.observations = results.observation_view();
     arrays.entity_sets = batch.config.vector_observations;
     arrays.step_m = step_m_.data();
+    arrays.began = began_.data();
+    arrays.prepares = prepares_.data();
     arrays.next_spawned = next_spawned_.data();
     arrays.refused_slot = &refused_slot_;
     arrays.refusal = &refusal_;
@@ -179,6 +183,7 @@ class ShuffledExecutor {
   std::vector<uint32_t> free_tries_;
   std::vector<int32_t> known_tries_, chosen_try_, next_try_;
   std::vector<float> step_m_;
+  std::vector<uint8_t> began_, prepares_;
   int32_t refused_slot_ = 0;
   int64_t refusal_ = -1;
 };
