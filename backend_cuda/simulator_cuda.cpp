@@ -67,12 +67,15 @@ class DeviceMap {
           Span<const uint8_t>(reinterpret_cast<const uint8_t*>(span->data()), span->size() * sizeof(Element)));
       *span = {reinterpret_cast<Element*>(buffers_.back().data()), span->size()};
     });
+    in_device_ = DeviceBuffer<MapView>(Span<const MapView>(&view_, 1));
   }
-  const MapView& view() const { return view_; }
+  /// In device memory.
+  const MapView& view() const { return *in_device_.data(); }
 
  private:
   MapView view_;
   std::vector<DeviceBuffer<uint8_t>> buffers_;
+  DeviceBuffer<MapView> in_device_;
 };
 
 struct DeviceResults {
@@ -107,6 +110,7 @@ struct DeviceResults {
 
 /// What the phases need besides state and results.
 struct DeviceScratch {
+  DeviceBuffer<RuleOptions> options;
   DeviceBuffer<WorldView> worlds, next_worlds;
   DeviceBuffer<cuda::WorldScratch> of_worlds;
   DeviceBuffer<int32_t> world_of_slot;
@@ -174,7 +178,7 @@ class SimulatorCuda final : public Simulator {
         agents_(static_cast<size_t>(batch_->num_slots())),
         next_(*batch_),
         results_(static_cast<size_t>(batch_->num_slots()), config) {
-    for (const WorldMap& map : batch_->world_maps) maps_.emplace_back(map.view());
+    for (const MapView& map : batch_->map_views) maps_.emplace_back(map);
     WorldBatch::visit_state(*batch_, state_, [](const auto& host, auto& device) { device = device_copy(host); });
     world_begin_ = device_copy(batch_->box_begin);
     light_begin_ = device_copy(batch_->light_begin);
@@ -298,12 +302,13 @@ class SimulatorCuda final : public Simulator {
     std::vector<int32_t> cell_items(static_cast<size_t>(most_boxes));
     std::iota(cell_items.begin(), cell_items.end(), 0);
     scratch_.world_of_slot = device_copy(world_of_slot);
+    scratch_.options = DeviceBuffer<RuleOptions>(Span<const RuleOptions>(&batch_->options, 1));
     scratch_.worlds = DeviceBuffer<WorldView>(num_worlds);
     scratch_.next_worlds = DeviceBuffer<WorldView>(num_worlds);
     scratch_.of_worlds = DeviceBuffer<cuda::WorldScratch>(num_worlds);
     scratch_.cell_begin = device_copy(cell_begin);
     scratch_.cell_items = device_copy(cell_items);
-    scratch_.try_boxes = DeviceBuffer<AgentBox>(num_boxes * cuda::kTriesAtOnce);
+    scratch_.try_boxes = DeviceBuffer<AgentBox>(num_boxes * kSpawnTries);
     scratch_.free_tries = DeviceBuffer<uint32_t>(num_boxes);
     scratch_.known_tries = DeviceBuffer<int32_t>(num_boxes);
     scratch_.chosen_try = DeviceBuffer<int32_t>(num_boxes);
@@ -322,8 +327,8 @@ class SimulatorCuda final : public Simulator {
     for (int w = 0; w < batch_->num_worlds(); ++w) {
       const auto index = static_cast<size_t>(w);
       const int32_t first_box = batch_->box_begin[index], first_light = batch_->light_begin[index];
-      WorldView view = batch_->world(w);
-      view.map = maps_[static_cast<size_t>(batch_->worlds[index].map)].view();
+      WorldView view =
+          batch_->world(w, maps_[static_cast<size_t>(batch_->worlds[index].map)].view(), *scratch_.options.data());
       view.agents = agents_.view();
       view.boxes = state_.boxes.data() + first_box;
       view.boxes_before = state_.boxes_before.data() + first_box;
@@ -338,7 +343,7 @@ class SimulatorCuda final : public Simulator {
       view.light_plans = next_.light_plans.data() + first_light;
       view.lights = next_.lights.data() + first_light;
       next_worlds.push_back(view);
-      of_worlds.push_back({scratch_.try_boxes.data() + first_box * cuda::kTriesAtOnce,
+      of_worlds.push_back({scratch_.try_boxes.data() + first_box * kSpawnTries,
                            scratch_.free_tries.data() + first_box, scratch_.known_tries.data() + first_box,
                            scratch_.chosen_try.data() + first_box, scratch_.next_try.data() + first_box});
     }
@@ -353,6 +358,8 @@ class SimulatorCuda final : public Simulator {
     arrays.next_worlds = scratch_.next_worlds.data();
     arrays.scratch = scratch_.of_worlds.data();
     arrays.world_of_slot = scratch_.world_of_slot.data();
+    arrays.agents = agents_.view();
+    arrays.next_agents = next_.agents.view();
     arrays.num_worlds = batch_->num_worlds();
     arrays.num_slots = batch_->num_slots();
     arrays.episode_step = state_.episode_step.data();

@@ -8,13 +8,12 @@ namespace pictura::cuda {
 namespace {
 
 constexpr int kThreads = 128;      // per block
-constexpr int kTeamThreads = 512;  // a world's start is one long chain of work: as wide as its loops
+constexpr int kTeamThreads = kTurn * kLanesPerAgent;  // a world's start is one long chain of work: as wide as its loops
 
 struct DeviceAtomics {
   /// Returns the value before.
   __device__ int32_t add(int32_t* value, int32_t change) const { return atomicAdd(value, change); }
   __device__ void lower(int32_t* value, int32_t bound) const { atomicMin(value, bound); }
-  __device__ void set_bits(uint32_t* value, uint32_t bits) const { atomicOr(value, bits); }
 };
 
 /// The nearest of the things offered by a warp's lanes: the lane of rank k holds the k-th, as squared distance and item.

@@ -14,13 +14,13 @@ namespace pictura::cuda {
 
 /// How many lanes share an agent: about as many as there are lane segments, barriers and boxes to look at.
 constexpr int kLanesPerAgent = 8, kWarp = 32;
-/// Tries of a box that are looked at together. Most boxes stand at one of the first; the others of 32 are for crowds.
-constexpr int kTriesAtOnce = 4;
+/// How many boxes of a world look for a place at once.
+constexpr int kTurn = 128;
 
 /// One world's memory for spawning.
 struct WorldScratch {
-  AgentBox* try_boxes = nullptr;   // [boxes, kTriesAtOnce] the first tries
-  uint32_t* free_tries = nullptr;  // [boxes] which of the known tries the map permits, as bits
+  AgentBox* try_boxes = nullptr;   // [boxes, kSpawnTries] of the free ones
+  uint32_t* free_tries = nullptr;  // [boxes] which of the known tries are free of all that stands, as bits
   int32_t* known_tries = nullptr;  // [boxes] how many have been looked at
   int32_t* chosen_try = nullptr;   // [boxes] -1: none
   int32_t* next_try = nullptr;     // [boxes]
@@ -41,6 +41,8 @@ struct SimulatorArrays {
   const WorldScratch* scratch = nullptr;   // [num_worlds]
   const int32_t* world_of_slot = nullptr;  // [num_slots]
   int32_t num_worlds = 0, num_slots = 0;
+  // Of all worlds, as in their views; and here, where no store can change them.
+  AgentStateView agents{}, next_agents{};
   // State, as in WorldBatch.
   int32_t* episode_step = nullptr;
   int32_t* episode_index = nullptr;
@@ -60,7 +62,16 @@ struct SimulatorArrays {
   int32_t* refused_slot = nullptr;  // the lowest one with an action out of range, or kNoSlot
   int64_t* refusal = nullptr;       // the first since the host looked, or -1
 
-  PICTURA_HD const WorldView& world_of(int slot) const { return worlds[world_of_slot[slot]]; }
+  PICTURA_HD WorldView world(int w) const {
+    WorldView world = worlds[w];
+    world.agents = agents;
+    return world;
+  }
+  PICTURA_HD WorldView next_world(int w) const {
+    WorldView world = next_worlds[w];
+    world.agents = next_agents;
+    return world;
+  }
   PICTURA_HD bool is_refused() const { return *refused_slot != kNoSlot; }
 };
 
@@ -73,76 +84,69 @@ PICTURA_HD inline GridView one_cell(Span<const int32_t> begin, Span<const int32_
 /// What a team's threads share.
 struct TeamMemory {
   int32_t lowest_changed;
-  int32_t someone_wants_more;
 };
 
 /// Finds for each of `count` boxes, which are the world's from first_box on, the first of its tries that the map
-/// permits and that is clear of the boxes before it: what placing them one after the other would find. All choose at
-/// once, given what the others chose last, until nobody changes: then everybody's choice agrees with the choices before
-/// it, which only the sequential result does. Every round settles at least the lowest one that changed.
+/// permits and that is clear of the boxes before it: what placing them one after the other would find. As many as the
+/// team has groups for choose at once, given what the others chose last, until nobody changes: then everybody's choice
+/// agrees with the choices before it, which only the sequential result does. Every round settles at least the lowest one
+/// that changed. Those of an earlier turn stand.
+///   box_of_try(i, try), permits(lanes, i, try, box)
 template <typename Team, typename BoxOfTry, typename Permits>
 PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const WorldScratch& scratch, int first_box,
                              int count, const BoxOfTry& box_of_try, const Permits& permits) {
-  static_assert(kSpawnTries <= 32 && kSpawnTries % kTriesAtOnce == 0);
+  static_assert(kSpawnTries <= 32);
   AgentBox* boxes = world.boxes + first_box;
-  AgentBox* try_boxes = scratch.try_boxes + first_box * kTriesAtOnce;
+  AgentBox* try_boxes = scratch.try_boxes + first_box * kSpawnTries;
   uint32_t* free_tries = scratch.free_tries + first_box;
   int32_t* known_tries = scratch.known_tries + first_box;
   int32_t* chosen_try = scratch.chosen_try + first_box;
   int32_t* next_try = scratch.next_try + first_box;
-  const auto box_at_try = [&](int i, int t) {
-    return t < kTriesAtOnce ? try_boxes[i * kTriesAtOnce + t] : box_of_try(i, t);
-  };
-  const auto wants_more = [&](int i) { return next_try[i] < 0 && known_tries[i] < kSpawnTries; };
-  TeamMemory& memory = team.memory();
+  int32_t& lowest_changed = team.memory().lowest_changed;
   team.for_each(count, [&](int i) {
     boxes[i].drawn = 0;
     free_tries[i] = 0;
     known_tries[i] = 0;
-    chosen_try[i] = next_try[i] = -1;
+    chosen_try[i] = -1;
   });
-  for (int settled = 0; settled < count;) {
-    const int unsettled = count - settled;
-    for (bool more = true; more;) {
-      team.for_each(unsettled * kTriesAtOnce, [&](int k) {
-        const int i = settled + k / kTriesAtOnce;
-        if (!wants_more(i)) return;
-        const int t = known_tries[i] + k % kTriesAtOnce;
-        const AgentBox box = box_of_try(i, t);
-        if (t < kTriesAtOnce) try_boxes[i * kTriesAtOnce + t] = box;
-        if (permits(i, t, box)) team.set_bits(&free_tries[i], 1u << t);
-      });
-      team.for_each(unsettled, [&](int k) {
-        if (wants_more(settled + k)) known_tries[settled + k] += kTriesAtOnce;
-        if (k > 0) return;
-        memory.someone_wants_more = 0;
-        memory.lowest_changed = count;
-      });
-      team.template for_each_by_lanes<kLanesPerAgent>(unsettled, [&](const auto& lanes, int k) {
-        const int i = settled + k;
-        int chosen = -1;
-        for (int t = 0; t < known_tries[i] && chosen < 0; ++t) {
-          if ((free_tries[i] >> t & 1u) && is_clear(world, box_at_try(i, t), first_box, first_box + i, lanes)) {
-            chosen = t;
-          }
-        }
-        lanes.wait();
-        if (lanes.rank() > 0) return;
-        next_try[i] = chosen;
-        if (wants_more(i)) memory.someone_wants_more = 1;
-        if (chosen != chosen_try[i]) team.lower(&memory.lowest_changed, i);
-      });
-      more = memory.someone_wants_more != 0;
+  // Looks at a box's tries until one is free of what stands and of what the boxes of this turn chose.
+  const auto choose = [&](const auto& lanes, int turn_begin, int i) {
+    uint32_t free = free_tries[i];
+    int known = known_tries[i], chosen = -1;
+    for (int t = 0; t < kSpawnTries && chosen < 0; ++t) {
+      const bool is_new = t == known;
+      if (!is_new && (free >> t & 1u) == 0) continue;
+      const AgentBox box = is_new ? box_of_try(i, t) : try_boxes[i * kSpawnTries + t];
+      if (is_new) {
+        ++known;
+        if (!permits(lanes, i, t, box) || !is_clear(world, box, first_box, first_box + turn_begin, lanes)) continue;
+        free |= 1u << t;
+        if (lanes.rank() == 0) try_boxes[i * kSpawnTries + t] = box;
+      }
+      if (is_clear(world, box, first_box + turn_begin, first_box + i, lanes)) chosen = t;
     }
-    const int changed = memory.lowest_changed;
+    lanes.wait();
+    if (lanes.rank() > 0) return;
+    free_tries[i] = free;
+    known_tries[i] = known;
+    next_try[i] = chosen;
+    if (chosen != chosen_try[i]) team.lower(&lowest_changed, i);
+  };
+  for (int settled = 0, turn_begin = 0; settled < count;) {
+    if (settled >= turn_begin + kTurn) turn_begin = settled;
+    const int unsettled = min_of(turn_begin + kTurn, count) - settled;
+    team.for_each(1, [&](int) { lowest_changed = settled + unsettled; });
+    team.template for_each_by_lanes<kLanesPerAgent>(
+        unsettled, [&](const auto& lanes, int k) { choose(lanes, turn_begin, settled + k); });
+    const int changed = lowest_changed;
     team.for_each(unsettled, [&](int k) {
       const int i = settled + k;
       if (next_try[i] == chosen_try[i]) return;
       chosen_try[i] = next_try[i];
-      if (chosen_try[i] >= 0) boxes[i] = box_at_try(i, chosen_try[i]);
+      if (chosen_try[i] >= 0) boxes[i] = try_boxes[i * kSpawnTries + chosen_try[i]];
       boxes[i].drawn = chosen_try[i] >= 0;
     });
-    settled = changed + 1;
+    settled = min_of(changed + 1, settled + unsettled);
   }
 }
 
@@ -157,17 +161,19 @@ PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const Wo
     return parked_box(world, car, world.map.parking_spots.empty() ? ParkingSpot{} : parking_spot(world, car, i));
   };
   choose_tries(team, world, scratch, world.num_agents, num_parked, parked_at,
-               [&](int car, int i, const AgentBox& box) {
-                 return !world.map.parking_spots.empty() && may_park(world.map, box, parking_spot(world, car, i));
+               [&](const auto& lanes, int car, int i, const AgentBox& box) {
+                 return !world.map.parking_spots.empty() &&
+                        may_park(world.map, box, parking_spot(world, car, i), lanes);
                });
   team.for_each(num_parked, [&](int car) { put_parked_car(world, car, scratch.chosen_try[world.num_agents + car]); });
   const auto agent_at = [&](int agent, int i) {
     return has_places(world, agent) ? spawn_box(world, agent, i) : AgentBox{};
   };
-  choose_tries(team, world, scratch, 0, world.num_agents, agent_at, [&](int agent, int, const AgentBox& box) {
-    return has_places(world, agent) && may_spawn(world.map, box) &&
-           is_clear(world, box, world.num_agents, world.num_boxes);
-  });
+  choose_tries(team, world, scratch, 0, world.num_agents, agent_at,
+               [&](const auto& lanes, int agent, int, const AgentBox& box) {
+                 return has_places(world, agent) && may_spawn(world.map, box, lanes) &&
+                        is_clear(world, box, world.num_agents, world.num_boxes, lanes);
+               });
   team.for_each(1, [&](int) { *spawned_out = 0; });
   team.template for_each_by_lanes<kLanesPerAgent>(world.num_agents, [&](const auto& lanes, int agent) {
     put_agent(world, agent, scratch.chosen_try[agent], lanes);
@@ -187,7 +193,7 @@ struct BeginFirstEpisode {
       arrays.next_worlds[w].episode = 1;
       arrays.began[w] = 1;
     });
-    begin_episode(team, arrays.worlds[w], arrays.scratch[w], &arrays.spawned[w]);
+    begin_episode(team, arrays.world(w), arrays.scratch[w], &arrays.spawned[w]);
   }
 };
 
@@ -198,7 +204,7 @@ struct PrepareEpisode {
   template <typename Team>
   PICTURA_HD void operator()(const Team& team, int w) const {
     if (!arrays.prepares[w]) return;
-    begin_episode(team, arrays.next_worlds[w], arrays.scratch[w], &arrays.next_spawned[w]);
+    begin_episode(team, arrays.next_world(w), arrays.scratch[w], &arrays.next_spawned[w]);
   }
 };
 
@@ -208,7 +214,7 @@ struct CheckActions {
   const int32_t* actions;
   template <typename Atomics>
   PICTURA_HD void operator()(const Atomics& atomics, int slot) const {
-    const WorldView& world = arrays.world_of(slot);
+    const WorldView world = arrays.world(arrays.world_of_slot[slot]);
     if (slot == world.first_slot) {
       arrays.prepares[world.index] = arrays.began[world.index];
       arrays.began[world.index] = 0;
@@ -226,7 +232,7 @@ struct Advance {
   PICTURA_HD void operator()(const Lanes& lanes, int slot) const {
     if (arrays.is_refused()) return;
     const int w = arrays.world_of_slot[slot];
-    const WorldView& world = arrays.worlds[w];
+    const WorldView world = arrays.world(w);
     const int agent = slot - world.first_slot;
     if (!arrays.episode_over[w]) {
       const bool drives = is_active(world, agent);
@@ -234,7 +240,7 @@ struct Advance {
       return advance(world, agent, actions[slot], lanes);
     }
     if (lanes.rank() > 0) return;
-    const WorldView& next = arrays.next_worlds[w];
+    const WorldView next = arrays.next_world(w);
     clear_result(arrays.results, slot);
     copy_fields(next.agents, world.agents, slot);
     world.boxes[agent] = world.boxes_before[agent] = next.boxes[agent];
@@ -248,7 +254,7 @@ struct Settle {
   PICTURA_HD void operator()(const Lanes& lanes, int slot) const {
     const int w = arrays.world_of_slot[slot];
     if (arrays.is_refused() || arrays.episode_over[w]) return;
-    const WorldView& world = arrays.worlds[w];
+    const WorldView world = arrays.world(w);
     const int agent = slot - world.first_slot;
     find_collisions(world, agent, lanes);
     if (lanes.rank() == 0) arrays.step_m[slot] = settle_agent(world, agent, arrays.results);
@@ -296,7 +302,7 @@ struct FinishStep {
   /// What belongs to no agent.
   template <typename Lanes>
   PICTURA_HD void take_next(const Lanes& lanes, int w) const {
-    const WorldView &world = arrays.worlds[w], &next = arrays.next_worlds[w];
+    const WorldView world = arrays.world(w), next = arrays.next_world(w);
     for (int i = world.num_agents + lanes.rank(); i < world.num_boxes; i += lanes.size()) {
       world.boxes[i] = world.boxes_before[i] = next.boxes[i];
     }
@@ -309,7 +315,7 @@ struct FinishStep {
   /// Returns whether the episode is over.
   template <typename Lanes>
   PICTURA_HD bool count(const Lanes& lanes, int w, SimulatorTotals* totals_out) const {
-    const WorldView& world = arrays.worlds[w];
+    const WorldView world = arrays.world(w);
     const int steps = arrays.episode_step[w] + 1;
     constexpr int kParts = kTotalsLanes / Lanes::kSize;  // of the totals' lanes, that one of these sums up
     SimulatorTotals parts[kParts];
@@ -360,7 +366,7 @@ struct ShowAgent {
 
   template <typename Lanes>
   PICTURA_HD void operator()(const Lanes& lanes, int slot) const {
-    const WorldView& world = arrays.world_of(slot);
+    const WorldView world = arrays.world(arrays.world_of_slot[slot]);
     const int agent = slot - world.first_slot;
     observe_own(world, agent, arrays.observations, lanes);
     if (lanes.rank() == lanes.size() - 1) arrays.views[slot] = view_of(world, agent);

@@ -295,6 +295,7 @@ WorldBatch::WorldBatch(const SimulatorConfig& config_in, std::vector<std::shared
                   "map {}: expected a lane outside junctions from which a route goes on for ever, got none", map->name);
   }
 
+  for (const WorldMap& map : world_maps) map_views.push_back(map.view());
   check_box_cells(world_maps, worlds);
   slot_begin = box_begin = light_begin = {0};
   for (const WorldSpec& world : worlds) {
@@ -325,10 +326,12 @@ WorldBatch::WorldBatch(const SimulatorConfig& config_in, std::vector<std::shared
 }
 
 WorldView WorldBatch::world(int index) {
+  return world(index, map_views[static_cast<size_t>(worlds[static_cast<size_t>(index)].map)], options);
+}
+
+WorldView WorldBatch::world(int index, const MapView& map, const RuleOptions& its_options) {
   const auto w = static_cast<size_t>(index);
-  WorldView view;
-  view.map = world_maps[static_cast<size_t>(worlds[w].map)].view();
-  view.options = options;
+  WorldView view{map, its_options};
   view.index = index;
   view.seed = config.seed;
   view.global_world = worlds[w].global_world;

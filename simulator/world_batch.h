@@ -25,6 +25,8 @@ struct WorldBatch {
   int num_worlds() const { return static_cast<int>(worlds.size()); }
   int num_slots() const { return slot_begin.back(); }
   WorldView world(int index);
+  /// The same over another copy of its map and of `options`.
+  WorldView world(int index, const MapView& map, const RuleOptions& its_options);
   SpawnReport spawn_report() const;
   SimulatorTotals totals() const;
   std::vector<StaticGeometry> geometries() const;
@@ -40,6 +42,7 @@ struct WorldBatch {
   std::vector<WorldSpec> worlds;
   RuleOptions options;
   std::vector<WorldMap> world_maps;                         // [maps]
+  std::vector<MapView> map_views;                           // [maps] of world_maps
   std::vector<int32_t> slot_begin, box_begin, light_begin;  // [worlds + 1]
 
   // State. box_cells are made anew by every step and are not saved.

@@ -70,12 +70,14 @@ PICTURA_HD bool is_clear(const WorldView& world, const AgentBox& box, int begin,
   return !lanes.any(is_taken);
 }
 
-PICTURA_HD inline bool touches_wall(const MapView& map, const AgentBox& box) {
-  return touches_any(footprint(box), box.center_m.z, map.walls, map.wall_cells);
+template <typename Lanes>
+PICTURA_HD bool touches_wall(const MapView& map, const AgentBox& box, const Lanes& lanes) {
+  return touches_any(footprint(box), box.center_m.z, map.walls, map.wall_cells, lanes);
 }
 
-PICTURA_HD inline bool touches_barrier(const MapView& map, const AgentBox& box) {
-  return touches_any(footprint(box), box.center_m.z, map.edges, map.edge_cells) || touches_wall(map, box);
+template <typename Lanes>
+PICTURA_HD bool touches_barrier(const MapView& map, const AgentBox& box, const Lanes& lanes) {
+  return touches_any(footprint(box), box.center_m.z, map.edges, map.edge_cells, lanes) || touches_wall(map, box, lanes);
 }
 
 /// Where pedestrians walk, and everybody else drives.
@@ -163,29 +165,30 @@ PICTURA_HD inline AgentBox parked_box(const WorldView& world, int car, const Par
 }
 
 /// Whether the box reaches into a lane that is driven on, on its level, by more than kSeamTolerance_m.
-PICTURA_HD inline bool covers_driven_lane(const MapView& map, const AgentBox& box) {
+template <typename Lanes>
+PICTURA_HD bool covers_driven_lane(const MapView& map, const AgentBox& box, const Lanes& lanes) {
   const OrientedBox print = footprint(box);
   const Span<const int32_t> items = items_at(map.segment_cells, print.center_m);
-  for (size_t i = 0; i < items.size(); ++i) {
+  bool covers = false;
+  for (size_t i = static_cast<size_t>(lanes.rank()); i < items.size() && !covers;
+       i += static_cast<size_t>(lanes.size())) {
     const LaneSegment& segment = map.segments[static_cast<size_t>(items[i])];
     const float half_m = 0.5f * segment.length_m;
     const OrientedBox surface{segment.a_m.xy() + segment.direction * half_m, segment.direction, half_m,
                               segment.half_width_m - kSeamTolerance_m};
     const float height = segment.a_m.z + segment.slope * half_m;
-    if (segment.is_driven && fabsf(height - box.center_m.z) < kLevel_m &&
-        overlap(print, surface)) {
-      return true;
-    }
+    covers = segment.is_driven && fabsf(height - box.center_m.z) < kLevel_m && overlap(print, surface);
   }
-  return false;
+  return lanes.any(covers);
 }
 
 /// Whether the map permits the box on its spot: clear of barriers and of lanes that are driven on, and off the road
 /// where that is beside a kerb.
-PICTURA_HD inline bool may_park(const MapView& map, const AgentBox& box, const ParkingSpot& spot) {
+template <typename Lanes = OneLane>
+PICTURA_HD bool may_park(const MapView& map, const AgentBox& box, const ParkingSpot& spot, const Lanes& lanes = {}) {
   const bool is_at_kerb = dot(spot.outward, spot.outward) > 0.0f;
-  return !touches_barrier(map, box) && !covers_driven_lane(map, box) &&
-         !(is_at_kerb && is_on_road(map, box.center_m.xy(), box.center_m.z));
+  return !touches_barrier(map, box, lanes) && !covers_driven_lane(map, box, lanes) &&
+         !(is_at_kerb && is_on_road(map, box.center_m.xy(), box.center_m.z, lanes));
 }
 
 /// Parks car `car` at its try `i`; with -1 it found no place, is not drawn, and nobody meets it.
@@ -235,9 +238,10 @@ PICTURA_HD inline AgentBox spawn_box(const WorldView& world, int agent, int i) {
 
 /// Whether the map permits an agent's box there: clear of barriers, its centre on the road. Pedestrians need only keep
 /// clear of walls.
-PICTURA_HD inline bool may_spawn(const MapView& map, const AgentBox& box) {
-  if (box.agent_class == AgentClass::pedestrian) return !touches_wall(map, box);
-  return !touches_barrier(map, box) && is_on_road(map, box.center_m.xy(), box.center_m.z);
+template <typename Lanes = OneLane>
+PICTURA_HD bool may_spawn(const MapView& map, const AgentBox& box, const Lanes& lanes = {}) {
+  if (box.agent_class == AgentClass::pedestrian) return !touches_wall(map, box, lanes);
+  return !touches_barrier(map, box, lanes) && is_on_road(map, box.center_m.xy(), box.center_m.z, lanes);
 }
 
 /// Puts the agent at the place of its try `i`, standing still, and draws its first goals; with -1 it stays absent.

@@ -24,8 +24,8 @@ struct RuleOptions {
 };
 
 struct WorldView {
-  MapView map;
-  RuleOptions options;
+  const MapView& map;
+  const RuleOptions& options;
   int index = 0;  // among the simulator's worlds
   uint64_t seed = 0;
   uint32_t global_world = 0;

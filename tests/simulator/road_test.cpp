@@ -88,6 +88,7 @@ TEST(Road, WallsHaltAndAreCountedApart) {
   testing::Stage stage(map, 2);
   const std::vector<WallFace> walls{{{60, -1, 0}, {60, 1, 0}, 3}, {{160, -1, 8}, {160, 1, 8}, 3}};
   stage.batch.world_maps[0] = make_world_map(*map, walls);
+  stage.batch.map_views[0] = stage.batch.world_maps[0].view();
   stage.set(0, Conditioning::off_road, 2);
   stage.put(0, {56.3f, 0}, 0, 10);   // bumper at 59.5
   stage.put(1, {156.3f, 0}, 0, 10);  // that wall is on a bridge

@@ -17,7 +17,6 @@ namespace pictura::testing {
 struct HostAtomics {
   int32_t add(int32_t* value, int32_t change) const { return std::exchange(*value, *value + change); }
   void lower(int32_t* value, int32_t bound) const { *value = std::min(*value, bound); }
-  void set_bits(uint32_t* value, uint32_t bits) const { *value |= bits; }
 };
 
 /// Calls body(i) for all i in [0, count), in a random order.
@@ -105,7 +104,7 @@ class ShuffledExecutor {
         next_lights_(batch.lights.size()),
         next_spawned_(batch.worlds.size()),
         cell_items_(batch.boxes.size()),
-        try_boxes_(batch.boxes.size() * cuda::kTriesAtOnce),
+        try_boxes_(batch.boxes.size() * kSpawnTries),
         free_tries_(batch.boxes.size()),
         known_tries_(batch.boxes.size()),
         chosen_try_(batch.boxes.size()),
@@ -123,7 +122,7 @@ class ShuffledExecutor {
       const auto first_light = static_cast<size_t>(batch.light_begin[static_cast<size_t>(w)]);
       view.box_cells = cuda::one_cell({cell_begin_.data() + 2 * w, 2},
                                       {cell_items_.data(), static_cast<size_t>(view.num_boxes)});
-      scratch_.push_back({try_boxes_.data() + first_box * cuda::kTriesAtOnce, free_tries_.data() + first_box,
+      scratch_.push_back({try_boxes_.data() + first_box * kSpawnTries, free_tries_.data() + first_box,
                           known_tries_.data() + first_box, chosen_try_.data() + first_box,
                           next_try_.data() + first_box});
       worlds_.push_back(view);
@@ -150,6 +149,8 @@ class ShuffledExecutor {
     arrays.next_worlds = next_worlds_.data();
     arrays.scratch = scratch_.data();
     arrays.world_of_slot = world_of_slot_.data();
+    arrays.agents = batch.agents.view();
+    arrays.next_agents = next_agents_.view();
     arrays.num_worlds = batch.num_worlds();
     arrays.num_slots = batch.num_slots();
     arrays.episode_step = batch.episode_step.data();
