@@ -27,7 +27,10 @@ void sort_into_cells(const WorldView& world, CellLists* cells_inout) {
   int32_t sum = 0;
   for (int32_t& count : begin) count = sum += count;  // the end of each cell, for now
   for (int i = world.num_boxes - 1; i >= 0; --i) {
-    if (world.boxes[i].drawn) cells_inout->items[static_cast<size_t>(--begin[cell_of(world.boxes[i])])] = i;
+    if (!world.boxes[i].drawn) continue;
+    const int32_t at = --begin[cell_of(world.boxes[i])];
+    cells_inout->items[static_cast<size_t>(at)] = i;
+    world.cell_centers[at] = world.boxes[i].center_m.xy();
   }
 }
 

@@ -115,6 +115,7 @@ struct DeviceScratch {
   DeviceBuffer<cuda::WorldScratch> of_worlds;
   DeviceBuffer<int32_t> world_of_slot;
   DeviceBuffer<int32_t> cell_begin, cell_items;  // each world's one cell: {0, boxes}; and 0, 1, 2, ...
+  DeviceBuffer<Vec2> cell_centers;
   DeviceBuffer<AgentBox> try_boxes;
   DeviceBuffer<uint32_t> free_tries;
   DeviceBuffer<int32_t> known_tries, chosen_try, next_try;
@@ -308,6 +309,7 @@ class SimulatorCuda final : public Simulator {
     scratch_.of_worlds = DeviceBuffer<cuda::WorldScratch>(num_worlds);
     scratch_.cell_begin = device_copy(cell_begin);
     scratch_.cell_items = device_copy(cell_items);
+    scratch_.cell_centers = DeviceBuffer<Vec2>(num_boxes);
     scratch_.try_boxes = DeviceBuffer<AgentBox>(num_boxes * kSpawnTries);
     scratch_.free_tries = DeviceBuffer<uint32_t>(num_boxes);
     scratch_.known_tries = DeviceBuffer<int32_t>(num_boxes);
@@ -334,6 +336,7 @@ class SimulatorCuda final : public Simulator {
       view.boxes_before = state_.boxes_before.data() + first_box;
       view.box_cells = cuda::one_cell({scratch_.cell_begin.data() + 2 * w, 2},
                                       {scratch_.cell_items.data(), static_cast<size_t>(view.num_boxes)});
+      view.cell_centers = scratch_.cell_centers.data() + first_box;
       view.light_plans = state_.light_plans.data() + first_light;
       view.lights = state_.lights.data() + first_light;
       worlds.push_back(view);

@@ -13,6 +13,7 @@ constexpr int kTeamThreads = kTurn * kLanesPerAgent;  // a world's start is one 
 struct DeviceAtomics {
   /// Returns the value before.
   __device__ int32_t add(int32_t* value, int32_t change) const { return atomicAdd(value, change); }
+  __device__ void set_bits(uint32_t* value, uint32_t bits) const { atomicOr(value, bits); }
   __device__ void lower(int32_t* value, int32_t bound) const { atomicMin(value, bound); }
 };
 
@@ -78,6 +79,16 @@ struct DeviceLanes {
     const int first_index = __reduce_min_sync(mask(), is_lowest ? index : INT_MAX);
     return from(__ffs(static_cast<int>(ballot(is_lowest && index == first_index))) - 1, value);
   }
+  /// A value that no kernel changes, in loads of 16 bytes.
+  template <typename T>
+  __device__ T read(const T& value) const {
+    static_assert(std::is_trivially_copyable_v<T> && alignof(T) % sizeof(float4) == 0);
+    float4 words[sizeof(T) / sizeof(float4)];
+    for (size_t i = 0; i < sizeof(T) / sizeof(float4); ++i) words[i] = __ldg(reinterpret_cast<const float4*>(&value) + i);
+    T result;
+    memcpy(&result, words, sizeof(T));
+    return result;
+  }
   /// Room for ShowAgent::kStaging floats.
   __device__ float* staging() const { return rows; }
   /// Writes the first `filled` of staging(), then zeros up to `end` or a little beyond, but not beyond `capacity`.
@@ -132,11 +143,12 @@ __global__ void __launch_bounds__(kThreads) run_lanes(int32_t count, Phase phase
   if (item < count) phase(DeviceLanes<kGroup>{}, static_cast<int32_t>(item));
 }
 
-/// Lanes with memory of their own.
-__global__ void __launch_bounds__(kThreads) run_show(int32_t count, ShowAgent phase) {
-  __shared__ float4 staging[kThreads / kWarp][ShowAgent::kStaging / 4];
+/// Lanes with memory of their own. Small blocks, since the last of its warps holds a block's place.
+constexpr int kShowThreads = 64;
+__global__ void __launch_bounds__(kShowThreads) run_show(int32_t count, ShowAgent phase) {
+  __shared__ float4 staging[kShowThreads / kWarp][ShowAgent::kStaging / 4];
   static_assert(ShowAgent::kStaging % 4 == 0);
-  const int64_t item = (int64_t{blockIdx.x} * kThreads + threadIdx.x) / kWarp;
+  const int64_t item = (int64_t{blockIdx.x} * kShowThreads + threadIdx.x) / kWarp;
   DeviceLanes<kWarp> lanes;
   lanes.rows = reinterpret_cast<float*>(staging[threadIdx.x / kWarp]);
   if (item < count) phase(lanes, static_cast<int32_t>(item));
@@ -154,7 +166,9 @@ __global__ void __launch_bounds__(kTeamThreads) run_teams(Phase phase) {
 struct DeviceLaunch {
   StepStreams streams;
 
-  static unsigned blocks_for(int64_t threads) { return static_cast<unsigned>((threads + kThreads - 1) / kThreads); }
+  static unsigned blocks_for(int64_t threads, int block = kThreads) {
+    return static_cast<unsigned>((threads + block - 1) / block);
+  }
   void fill(void* memory, size_t size, int byte) const { cudaMemsetAsync(memory, byte, size, streams.main); }
   template <typename Phase>
   void threads(int32_t count, const Phase& phase) const {
@@ -164,7 +178,7 @@ struct DeviceLaunch {
   void lanes(int32_t count, const Phase& phase) const {
     if constexpr (std::is_same_v<Phase, ShowAgent>) {
       static_assert(kGroup == kWarp);
-      run_show<<<blocks_for(int64_t{count} * kGroup), kThreads, 0, streams.main>>>(count, phase);
+      run_show<<<blocks_for(int64_t{count} * kGroup, kShowThreads), kShowThreads, 0, streams.main>>>(count, phase);
     } else {
       run_lanes<kGroup><<<blocks_for(int64_t{count} * kGroup), kThreads, 0, streams.main>>>(count, phase);
     }

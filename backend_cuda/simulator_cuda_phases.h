@@ -81,6 +81,12 @@ PICTURA_HD inline GridView one_cell(Span<const int32_t> begin, Span<const int32_
   return {{}, kWhole_m, 1, 1, begin, items};
 }
 
+/// Where a box is looked for in that cell: what stands nowhere is far from everything.
+PICTURA_HD inline Vec2 center_of(const AgentBox& box) {
+  constexpr float kNowhere_m = 1e9f;
+  return box.drawn ? box.center_m.xy() : Vec2{kNowhere_m, kNowhere_m};
+}
+
 /// What a team's threads share.
 struct TeamMemory {
   int32_t lowest_changed;
@@ -103,27 +109,34 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
   int32_t* chosen_try = scratch.chosen_try + first_box;
   int32_t* next_try = scratch.next_try + first_box;
   int32_t& lowest_changed = team.memory().lowest_changed;
+  // The first tries of few boxes are looked at together.
+  const int first_tries = clamp(kTurn / max_of(count, 1), 2, kSpawnTries);
   team.for_each(count, [&](int i) {
     boxes[i].drawn = 0;
     free_tries[i] = 0;
     known_tries[i] = 0;
     chosen_try[i] = -1;
   });
+  // Whether the map, and what stands, leave a try free.
+  const auto look_at = [&](const auto& lanes, int turn_begin, int i, int t) {
+    const AgentBox box = box_of_try(i, t);
+    const bool is_free =
+        permits(lanes, i, t, box) && is_clear(world, box, first_box, first_box + turn_begin, lanes);
+    if (is_free && lanes.rank() == 0) try_boxes[i * kSpawnTries + t] = box;
+    return is_free;
+  };
   // Looks at a box's tries until one is free of what stands and of what the boxes of this turn chose.
   const auto choose = [&](const auto& lanes, int turn_begin, int i) {
     uint32_t free = free_tries[i];
     int known = known_tries[i], chosen = -1;
     for (int t = 0; t < kSpawnTries && chosen < 0; ++t) {
-      const bool is_new = t == known;
-      if (!is_new && (free >> t & 1u) == 0) continue;
-      const AgentBox box = is_new ? box_of_try(i, t) : try_boxes[i * kSpawnTries + t];
-      if (is_new) {
+      if (t == known) {
         ++known;
-        if (!permits(lanes, i, t, box) || !is_clear(world, box, first_box, first_box + turn_begin, lanes)) continue;
-        free |= 1u << t;
-        if (lanes.rank() == 0) try_boxes[i * kSpawnTries + t] = box;
+        if (look_at(lanes, turn_begin, i, t)) free |= 1u << t;
+        lanes.wait();
       }
-      if (is_clear(world, box, first_box + turn_begin, first_box + i, lanes)) chosen = t;
+      const AgentBox& box = try_boxes[i * kSpawnTries + t];
+      if ((free >> t & 1u) && is_clear(world, box, first_box + turn_begin, first_box + i, lanes)) chosen = t;
     }
     lanes.wait();
     if (lanes.rank() > 0) return;
@@ -132,8 +145,17 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
     next_try[i] = chosen;
     if (chosen != chosen_try[i]) team.lower(&lowest_changed, i);
   };
-  for (int settled = 0, turn_begin = 0; settled < count;) {
-    if (settled >= turn_begin + kTurn) turn_begin = settled;
+  for (int settled = 0, turn_begin = -kTurn; settled < count;) {
+    if (settled >= turn_begin + kTurn) {
+      turn_begin = settled;
+      const int num_tries = min_of(kTurn, count - turn_begin) * first_tries;
+      team.template for_each_by_lanes<kLanesPerAgent>(num_tries, [&](const auto& lanes, int k) {
+        const int i = turn_begin + k / first_tries, t = k % first_tries;
+        const bool is_free = look_at(lanes, turn_begin, i, t);
+        if (lanes.rank() == 0 && is_free) team.set_bits(&free_tries[i], 1u << t);
+        if (lanes.rank() == 0 && t == 0) known_tries[i] = first_tries;
+      });
+    }
     const int unsettled = min_of(turn_begin + kTurn, count) - settled;
     team.for_each(1, [&](int) { lowest_changed = settled + unsettled; });
     team.template for_each_by_lanes<kLanesPerAgent>(
@@ -197,6 +219,18 @@ struct BeginFirstEpisode {
   }
 };
 
+/// Says where the boxes of a world stand.
+struct PlaceCenters {
+  SimulatorArrays arrays;
+  template <typename Lanes>
+  PICTURA_HD void operator()(const Lanes& lanes, int w) const {
+    const WorldView world = arrays.world(w);
+    for (int i = lanes.rank(); i < world.num_boxes; i += lanes.size()) {
+      world.cell_centers[i] = center_of(world.boxes[i]);
+    }
+  }
+};
+
 /// Makes a world's next episode, as early as its memory is free and long before it is needed: a start depends on nothing
 /// that steps change.
 struct PrepareEpisode {
@@ -237,13 +271,14 @@ struct Advance {
     if (!arrays.episode_over[w]) {
       const bool drives = is_active(world, agent);
       if (lanes.rank() == 0) arrays.results.valid[slot] = drives;
-      return advance(world, agent, actions[slot], lanes);
+      advance(world, agent, actions[slot], lanes);
+    } else if (lanes.rank() == 0) {
+      const WorldView next = arrays.next_world(w);
+      clear_result(arrays.results, slot);
+      copy_fields(next.agents, world.agents, slot);
+      world.boxes[agent] = world.boxes_before[agent] = next.boxes[agent];
     }
-    if (lanes.rank() > 0) return;
-    const WorldView next = arrays.next_world(w);
-    clear_result(arrays.results, slot);
-    copy_fields(next.agents, world.agents, slot);
-    world.boxes[agent] = world.boxes_before[agent] = next.boxes[agent];
+    if (lanes.rank() == 0) world.cell_centers[agent] = center_of(world.boxes[agent]);
   }
 };
 
@@ -305,6 +340,7 @@ struct FinishStep {
     const WorldView world = arrays.world(w), next = arrays.next_world(w);
     for (int i = world.num_agents + lanes.rank(); i < world.num_boxes; i += lanes.size()) {
       world.boxes[i] = world.boxes_before[i] = next.boxes[i];
+      world.cell_centers[i] = center_of(next.boxes[i]);
     }
     for (int i = lanes.rank(); i < static_cast<int>(world.map.stop_lines.size()); i += lanes.size()) {
       world.light_plans[i] = next.light_plans[i];
@@ -411,7 +447,7 @@ struct ShowAgent {
       ObservedPiece pieces[kAtOnce];
       for (int k = 0; k < kAtOnce; ++k) {
         const int i = min_of(first + k * lanes.size(), num_items - 1);
-        pieces[k] = near.pieces[static_cast<size_t>(near.items[static_cast<size_t>(i)])];
+        pieces[k] = lanes.read(near.pieces[static_cast<size_t>(near.items[static_cast<size_t>(i)])]);
       }
       for (int k = 0; k < kAtOnce; ++k) {
         float row[kLaneFeatures];
@@ -435,6 +471,7 @@ void launch_show(const Launch& launch, const SimulatorArrays& arrays) {
 template <typename Launch>
 void launch_reset(const Launch& launch, const SimulatorArrays& arrays) {
   launch.teams(arrays.num_worlds, BeginFirstEpisode{arrays});
+  launch.template lanes<kWarp>(arrays.num_worlds, PlaceCenters{arrays});
   launch_show(launch, arrays);
 }
 
@@ -444,6 +481,7 @@ void launch_restored(const Launch& launch, const SimulatorArrays& arrays) {
   launch.fill(arrays.began, static_cast<size_t>(arrays.num_worlds), 0);
   launch.fill(arrays.prepares, static_cast<size_t>(arrays.num_worlds), 1);
   launch.teams(arrays.num_worlds, PrepareEpisode{arrays});
+  launch.template lanes<kWarp>(arrays.num_worlds, PlaceCenters{arrays});
   launch_show(launch, arrays);
 }
 

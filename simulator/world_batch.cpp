@@ -311,6 +311,7 @@ WorldBatch::WorldBatch(const SimulatorConfig& config_in, std::vector<std::shared
   agents = AgentState(slots);
   boxes.resize(static_cast<size_t>(box_begin.back()));
   boxes_before = boxes;
+  cell_centers.resize(boxes.size());
   light_plans.resize(static_cast<size_t>(light_begin.back()));
   lights.resize(light_plans.size());
   episode_step.resize(worlds.size());
@@ -344,6 +345,7 @@ WorldView WorldBatch::world(int index, const MapView& map, const RuleOptions& it
   view.boxes = boxes.data() + box_begin[w];
   view.boxes_before = boxes_before.data() + box_begin[w];
   view.box_cells = box_cells[w].view();
+  view.cell_centers = cell_centers.data() + box_begin[w];
   view.light_plans = light_plans.data() + light_begin[w];
   view.lights = lights.data() + light_begin[w];
   return view;

@@ -45,7 +45,7 @@ struct WorldBatch {
   std::vector<MapView> map_views;                           // [maps] of world_maps
   std::vector<int32_t> slot_begin, box_begin, light_begin;  // [worlds + 1]
 
-  // State. box_cells are made anew by every step and are not saved.
+  // State. box_cells and cell_centers are made anew by every step and are not saved.
   AgentState agents;
   std::vector<AgentBox> boxes, boxes_before;  // the scene's agents
   std::vector<LightPlan> light_plans;
@@ -56,6 +56,7 @@ struct WorldBatch {
   std::vector<SimulatorTotals> world_totals;         // [worlds]
 
   std::vector<CellLists> box_cells;      // [worlds]
+  std::vector<Vec2> cell_centers;        // as boxes, in the order of each world's box_cells
   std::vector<GeometryHandle> geometry;  // [worlds]
   SceneBatch scene;
 

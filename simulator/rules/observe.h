@@ -13,6 +13,9 @@ constexpr float kScaleLength_m = 6.0f, kScaleWidth_m = 3.0f, kScaleHalfPiece_m =
 constexpr float kScaleWallHeight_m = 12.0f;
 constexpr float kScaleSteer_rad = 0.55f, kScaleAccelLong_mps2 = 5.0f, kScaleAccelLat_mps2 = 4.0f;
 
+/// What to multiply by: every observation scales by a constant, and dividing would take ten times as long.
+PICTURA_HD constexpr float per(float scale) { return 1.0f / scale; }
+
 // What is in sight.
 constexpr float kPartnerRange_m = 100.0f, kControlRange_m = 100.0f;
 constexpr float kRoadAhead_m = 120.0f, kRoadBehind_m = 20.0f, kRoadAside_m = 30.0f;
@@ -35,15 +38,15 @@ PICTURA_HD inline EgoFrame ego_frame(const AgentStateView& agents, int slot) {
 
 PICTURA_HD inline void observe_ego(const WorldView& world, int slot, float* out) {
   const AgentStateView& agents = world.agents;
-  out[0] = agents.speed_mps[slot] / kScaleSpeed_mps;
-  out[1] = agents.length_m[slot] / kScaleLength_m;
-  out[2] = agents.width_m[slot] / kScaleWidth_m;
-  out[3] = agents.steer_rad[slot] / kScaleSteer_rad;
-  out[4] = agents.accel_long_mps2[slot] / kScaleAccelLong_mps2;
-  out[5] = agents.accel_lat_mps2[slot] / kScaleAccelLat_mps2;
-  out[6] = agents.speed_limit_mps[slot] / kScaleSpeed_mps;
+  out[0] = agents.speed_mps[slot] * per(kScaleSpeed_mps);
+  out[1] = agents.length_m[slot] * per(kScaleLength_m);
+  out[2] = agents.width_m[slot] * per(kScaleWidth_m);
+  out[3] = agents.steer_rad[slot] * per(kScaleSteer_rad);
+  out[4] = agents.accel_long_mps2[slot] * per(kScaleAccelLong_mps2);
+  out[5] = agents.accel_lat_mps2[slot] * per(kScaleAccelLat_mps2);
+  out[6] = agents.speed_limit_mps[slot] * per(kScaleSpeed_mps);
   const bool auxiliary = world.options.auxiliary_observations;
-  out[7] = auxiliary ? agents.lane_offset_m[slot] / kNoLaneOffset_m : 0.0f;
+  out[7] = auxiliary ? agents.lane_offset_m[slot] * per(kNoLaneOffset_m) : 0.0f;
   out[8] = auxiliary && agents.lane[slot] >= 0 ? cos_of(agents.lane_angle_rad[slot]) : 0.0f;
 }
 
@@ -66,9 +69,9 @@ PICTURA_HD void observe_waypoints(const WorldView& world, int slot, const EgoFra
   for (int i = lanes.rank(); i < kNumWaypoints; i += lanes.size()) {
     const int index = min_of(world.agents.next_waypoint[slot] + i, kNumWaypoints - 1);
     const Vec3 local = frame.to_local(waypoint_of(world.agents, slot, index));
-    out[kWaypointFeatures * i] = local.x / kScalePosition_m;
-    out[kWaypointFeatures * i + 1] = local.y / kScalePosition_m;
-    out[kWaypointFeatures * i + 2] = local.z / kScaleHeight_m;
+    out[kWaypointFeatures * i] = local.x * per(kScalePosition_m);
+    out[kWaypointFeatures * i + 1] = local.y * per(kScalePosition_m);
+    out[kWaypointFeatures * i + 2] = local.z * per(kScaleHeight_m);
   }
 }
 
@@ -79,27 +82,20 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
   using Nearest = typename Lanes::template Nearest<kMaxPartners>;
   const GridView& cells = world.box_cells;
   for (float reach = cells.cell_m;; reach = kPartnerRange_m) {
-    const int x0 = cells.cell_x(origin.x - reach), x1 = cells.cell_x(origin.x + reach);
-    const int y0 = cells.cell_y(origin.y - reach), y1 = cells.cell_y(origin.y + reach);
+    const CellRange range = cells_around(cells, origin, reach);
     const bool is_near = reach < kPartnerRange_m;
     int found = 0;
-    for (int y = y0; y <= y1 && is_near; ++y) {
-      found += cells.begin[static_cast<size_t>(y * cells.num_x + x1 + 1)] -
-               cells.begin[static_cast<size_t>(y * cells.num_x + x0)];
-    }
+    for (int y = range.y0; y <= range.y1 && is_near; ++y) found += range.end(cells, y) - range.begin(cells, y);
     if (is_near && found <= kMaxPartners) continue;
     Nearest nearest;
-    for (int y = y0; y <= y1; ++y) {
-      const int32_t begin = cells.begin[static_cast<size_t>(y * cells.num_x + x0)];
-      const int32_t end = cells.begin[static_cast<size_t>(y * cells.num_x + x1 + 1)];
+    for (int y = range.y0; y <= range.y1; ++y) {
+      const int32_t begin = range.begin(cells, y), end = range.end(cells, y);
       for (int32_t first = begin; first < end; first += lanes.size()) {
         const int32_t i = min_of(first + lanes.rank(), end - 1);
         const int32_t other = cells.items[static_cast<size_t>(i)];
-        const AgentBox& box = world.boxes[other];
-        const Vec2 apart = box.center_m.xy() - origin;
+        const Vec2 apart = world.cell_centers[i] - origin;
         const float d2 = dot(apart, apart);
-        const bool is_one =
-            first + lanes.rank() < end && other != agent && box.drawn && d2 < square(kPartnerRange_m);
+        const bool is_one = first + lanes.rank() < end && other != agent && d2 < square(kPartnerRange_m);
         nearest.offer(is_one, d2, other);
       }
     }
@@ -119,29 +115,27 @@ PICTURA_HD int observe_partners(const WorldView& world, int agent, const EgoFram
     const Vec3 local = frame.to_local(box.center_m);
     const Vec2 heading = frame.turn({box.cos_heading, box.sin_heading});
     const bool moves = world.options.auxiliary_observations && other < world.num_agents;
-    out[0] = local.x / kScalePosition_m;
-    out[1] = local.y / kScalePosition_m;
-    out[2] = local.z / kScaleHeight_m;
-    out[3] = box.length_m / kScaleLength_m;
-    out[4] = box.width_m / kScaleWidth_m;
+    out[0] = local.x * per(kScalePosition_m);
+    out[1] = local.y * per(kScalePosition_m);
+    out[2] = local.z * per(kScaleHeight_m);
+    out[3] = box.length_m * per(kScaleLength_m);
+    out[4] = box.width_m * per(kScaleWidth_m);
     out[5] = heading.x;
     out[6] = heading.y;
-    out[7] = moves ? world.agents.speed_mps[world.first_slot + other] / kScaleSpeed_mps : 0.0f;
+    out[7] = moves ? world.agents.speed_mps[world.first_slot + other] * per(kScaleSpeed_mps) : 0.0f;
   }
   return count;
 }
 
 /// Writes the row of a piece; returns whether its middle is in sight.
 PICTURA_HD inline bool observe_piece(const ObservedPiece& piece, const EgoFrame& frame, float* row) {
-  constexpr float kPerPosition = 1.0f / kScalePosition_m, kPerHeight = 1.0f / kScaleHeight_m;
-  constexpr float kPerHalfPiece = 1.0f / kScaleHalfPiece_m;
   constexpr float kMiddle_m = 0.5f * (kRoadAhead_m - kRoadBehind_m), kHalf_m = 0.5f * (kRoadAhead_m + kRoadBehind_m);
   const Vec3 local = frame.to_local(piece.middle_m);
   const Vec2 direction = frame.turn(piece.direction);
-  row[0] = local.x * kPerPosition;
-  row[1] = local.y * kPerPosition;
-  row[2] = local.z * kPerHeight;
-  row[3] = piece.half_length_m * kPerHalfPiece;
+  row[0] = local.x * per(kScalePosition_m);
+  row[1] = local.y * per(kScalePosition_m);
+  row[2] = local.z * per(kScaleHeight_m);
+  row[3] = piece.half_length_m * per(kScaleHalfPiece_m);
   row[4] = direction.x;
   row[5] = direction.y;
   row[6] = piece.extent;
@@ -193,11 +187,11 @@ PICTURA_HD int observe_controls(const WorldView& world, int slot, const EgoFrame
     const StopLine& line = world.map.stop_lines[static_cast<size_t>(light)];
     const Vec3 left = frame.to_local(line.left_m);
     const Vec3 right = frame.to_local(line.right_m);
-    out[0] = left.x / kScalePosition_m;
-    out[1] = left.y / kScalePosition_m;
-    out[2] = right.x / kScalePosition_m;
-    out[3] = right.y / kScalePosition_m;
-    out[4] = 0.5f * (left.z + right.z) / kScaleHeight_m;
+    out[0] = left.x * per(kScalePosition_m);
+    out[1] = left.y * per(kScalePosition_m);
+    out[2] = right.x * per(kScalePosition_m);
+    out[3] = right.y * per(kScalePosition_m);
+    out[4] = 0.5f * (left.z + right.z) * per(kScaleHeight_m);
     out[5] = light_code(world.lights[light]);
     out[6] = light == own_light ? 1.0f : 0.0f;
   }

@@ -129,20 +129,15 @@ PICTURA_HD void find_collisions(const WorldView& world, int agent, const Lanes& 
   const GridView& cells = world.box_cells;
   const int slot = world.first_slot + agent;
   const float own_reach = radius(own) + kMaxBoxRadius_m + 2.0f * kMaxSpeed_mps * world.options.dt_s;
-  const int x0 = cells.cell_x(own.center_m.x - own_reach), x1 = cells.cell_x(own.center_m.x + own_reach);
-  const int y0 = cells.cell_y(own.center_m.y - own_reach), y1 = cells.cell_y(own.center_m.y + own_reach);
+  const CellRange range = cells_around(cells, own.center_m.xy(), own_reach);
   bool collides = false, is_at_fault = false;
-  for (int y = y0; y <= y1; ++y) {
-    const int32_t begin = cells.begin[static_cast<size_t>(y * cells.num_x + x0)];
-    const int32_t end = cells.begin[static_cast<size_t>(y * cells.num_x + x1 + 1)];
-    for (int32_t i = begin + lanes.rank(); i < end; i += lanes.size()) {
+  for (int y = range.y0; y <= range.y1; ++y) {
+    const int32_t end = range.end(cells, y);
+    for (int32_t i = range.begin(cells, y) + lanes.rank(); i < end; i += lanes.size()) {
+      const Vec2 apart = world.cell_centers[i] - own.center_m.xy();
+      if (dot(apart, apart) > square(own_reach)) continue;
       const int32_t other = cells.items[static_cast<size_t>(i)];
-      const AgentBox& box = world.boxes[other];
-      const Vec2 apart = (box.center_m - own.center_m).xy();
-      if (dot(apart, apart) > square(own_reach) || other == agent || !box.drawn ||
-          !collide(own_before, own, world.boxes_before[other], box)) {
-        continue;
-      }
+      if (other == agent || !collide(own_before, own, world.boxes_before[other], world.boxes[other])) continue;
       collides = true;
       is_at_fault = is_at_fault || at_fault(own_before, world.agents.speed_mps[slot], world.boxes_before[other]);
     }

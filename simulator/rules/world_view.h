@@ -37,7 +37,8 @@ struct WorldView {
   int num_boxes = 0;                 // controlled and parked
   AgentBox* boxes = nullptr;         // [num_boxes] this world's part of the scene: controlled, then parked
   AgentBox* boxes_before = nullptr;  // [num_boxes] as they stood before the step
-  GridView box_cells;                // box indices by the cell of their centres
+  GridView box_cells;                // indices of boxes that stand anywhere, by the cell of their centres
+  Vec2* cell_centers = nullptr;      // [num_boxes] of box_cells.items: their boxes' centres, in that order
   LightPlan* light_plans = nullptr;  // [stop lines]
   LightState* lights = nullptr;      // [stop lines] as observed before the step, and during it
 };

@@ -15,6 +15,7 @@
 namespace pictura::testing {
 
 struct HostAtomics {
+  void set_bits(uint32_t* value, uint32_t bits) const { *value |= bits; }
   int32_t add(int32_t* value, int32_t change) const { return std::exchange(*value, *value + change); }
   void lower(int32_t* value, int32_t bound) const { *value = std::min(*value, bound); }
 };
@@ -32,6 +33,10 @@ void shuffled(std::mt19937* random, int count, const Body& body) {
 struct HostLanes : OneLane {
   float* rows = nullptr;
   float* staging() const { return rows; }
+  template <typename T>
+  T read(const T& value) const {
+    return value;
+  }
   uint32_t ballot(bool value) const { return value; }
   int count_before(uint32_t) const { return 0; }
   void write(const float* values, int filled, int end, int capacity, float* out) const {

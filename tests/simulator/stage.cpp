@@ -48,6 +48,7 @@ void Stage::sort_boxes() {
     for (size_t i = 0; i < batch.boxes.size(); ++i) {
       const Vec3 at = batch.boxes[i].center_m;
       if (batch.boxes[i].drawn && view.cell_y(at.y) * cells.num_x + view.cell_x(at.x) == cell) {
+        batch.cell_centers[cells.items.size()] = at.xy();
         cells.items.push_back(static_cast<int32_t>(i));
       }
     }
