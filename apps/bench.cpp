@@ -73,66 +73,19 @@ void report_benchmark(bool json, const BenchContext& context, std::vector<BenchR
   }
 }
 
+#ifdef PICTURA_HAS_TORCH
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
-struct Arguments {
-  // Vehicles alone, as the peers that rates are compared with; what a world of all classes costs is an option.
-  WorldOptions world{
-      .agents = 120, .num_threads = 1, .pedestrian_fraction = 0.0f, .cyclist_fraction = 0.0f, .parked_cars = 0};
-  int repeats = 7;
-  double repeat_s = 1.0;
+struct TrainArguments {
   std::string config = "configs/smoke.toml";
   bool json = false;
 };
 
-void advance(Simulator* simulator, Pilot* pilot, int steps, std::vector<int32_t>* actions_inout) {
-  actions_inout->resize(static_cast<size_t>(simulator->num_slots()));
-  for (int step = 0; step < steps; ++step) {
-    pilot->act(*simulator, *actions_inout);
-    simulator->step(*actions_inout);
-  }
-}
-
-void bench_simulate(const Arguments& arguments) {
-  std::vector<BenchResult> results;
-  for (const bool vector_observations : {true, false}) {
-    WorldOptions world = arguments.world;
-    world.vector_observations = vector_observations;
-    const auto pilot = make_pilot("random", world.seed, "cpu", world.num_threads);
-    const auto simulator = make_world(world, pilot.get());
-    std::vector<int32_t> actions;
-    advance(simulator.get(), pilot.get(), 20, &actions);
-    const std::string suffix = vector_observations ? "" : " without entity sets";
-    BenchResult live{"step" + suffix, "agent_steps_per_s", {}},
-        slots{"step" + suffix + ", slots", "slot_steps_per_s", {}};
-    for (int repeat = 0; repeat < arguments.repeats; ++repeat) {
-      const SimulatorTotals before = simulator->totals();
-      const auto begin = Clock::now();
-      double elapsed_s = 0;
-      while (elapsed_s < arguments.repeat_s) {
-        advance(simulator.get(), pilot.get(), 20, &actions);
-        elapsed_s = seconds_since(begin);
-      }
-      live.values.push_back(static_cast<double>(simulator->totals().agent_steps - before.agent_steps) / elapsed_s);
-      slots.values.push_back(static_cast<double>(simulator->totals().slot_steps - before.slot_steps) / elapsed_s);
-      if (interrupted()) throw Interrupted("interrupted");
-    }
-    results.push_back(live);
-    results.push_back(slots);
-  }
-  report_benchmark(arguments.json,
-                   {fmt::format("simulate: {}, {}, random actions with resets, {} threads", arguments.world.map,
-                                population_of(arguments.world), arguments.world.num_threads),
-                    "cpu"},
-                   results);
-}
-
-#ifdef PICTURA_HAS_TORCH
-void bench_train(const Arguments& arguments) {
+void bench_train(const TrainArguments& arguments) {
   const std::string folder = std::filesystem::temp_directory_path() / fmt::format("pictura-bench-{}", getpid());
   BenchResult rate{"train, one update", "agent_steps_per_s", {}};
   TrainOptions options{.config_path = arguments.config, .out_folder = folder};
@@ -151,9 +104,9 @@ void bench_train(const Arguments& arguments) {
   PICTURA_CHECK(!rate.values.empty(), "bench train: {}: expected at least 2 updates", arguments.config);
   report_benchmark(arguments.json, {fmt::format("train: {}, rollout and update", arguments.config), "cpu"}, {rate});
 }
-#endif
 
 }  // namespace
+#endif
 
 void add_bench_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
@@ -162,29 +115,15 @@ void add_bench_command(CLI::App& app) {
   command->require_subcommand(1);
   command->footer(
       "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n  pictura bench render --size 192x108");
-  auto add = [command](const std::string& name, const std::string& help, void (*run)(const Arguments&)) {
-    auto arguments = std::make_shared<Arguments>();
-    CLI::App* sub = command->add_subcommand(name, help);
-    sub->add_flag("--json", arguments->json, "Print one JSON object");
-    sub->callback([arguments, run] {
-      if (arguments->world.map.empty()) arguments->world.map = default_benchmark_map();
-      run(*arguments);
-    });
-    return std::pair{sub, arguments};
-  };
-  const auto [simulate, simulate_arguments] =
-      add("simulate", "Steps of a world, observations included", bench_simulate);
-  simulate->add_option("--map", simulate_arguments->world.map, "Default: Town01 where it is found, else procedural:1");
-  add_world_options(simulate, &simulate_arguments->world);
-  simulate->add_option("--repeats", simulate_arguments->repeats)->check(CLI::PositiveNumber)->capture_default_str();
-  simulate->add_option("--repeat-seconds", simulate_arguments->repeat_s)
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
 #ifdef PICTURA_HAS_TORCH
-  const auto [train_command, train_arguments] = add("train", "Rollouts and updates of a configuration", bench_train);
-  train_command->add_option("--config", train_arguments->config, "TOML file")->capture_default_str();
+  auto arguments = std::make_shared<TrainArguments>();
+  CLI::App* train_command = command->add_subcommand("train", "Rollouts and updates of a configuration");
+  train_command->add_option("--config", arguments->config, "TOML file")->capture_default_str();
+  train_command->add_flag("--json", arguments->json, "Print one JSON object");
+  train_command->callback([arguments] { bench_train(*arguments); });
 #endif
 #ifdef PICTURA_HAS_BENCH
+  add_simulate_benchmark(*command);
   add_quality_benchmark(*command);
   add_render_benchmark(*command);
   add_worlds_benchmark(*command);

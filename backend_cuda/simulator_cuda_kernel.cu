@@ -137,15 +137,18 @@ __global__ void __launch_bounds__(kThreads) run_threads(int32_t count, Phase pha
   if (item < count) phase(DeviceAtomics{}, static_cast<int32_t>(item));
 }
 
+// Blocks that fit a processor at once: fewer registers than the compiler would take hide more of the waiting.
+constexpr int kLanesBlocks = 5, kShowBlocks = 18;
+
 template <int kGroup, typename Phase>
-__global__ void __launch_bounds__(kThreads) run_lanes(int32_t count, Phase phase) {
+__global__ void __launch_bounds__(kThreads, kLanesBlocks) run_lanes(int32_t count, Phase phase) {
   const int64_t item = (int64_t{blockIdx.x} * kThreads + threadIdx.x) / kGroup;
   if (item < count) phase(DeviceLanes<kGroup>{}, static_cast<int32_t>(item));
 }
 
 /// Lanes with memory of their own. Small blocks, since the last of its warps holds a block's place.
 constexpr int kShowThreads = 64;
-__global__ void __launch_bounds__(kShowThreads) run_show(int32_t count, ShowAgent phase) {
+__global__ void __launch_bounds__(kShowThreads, kShowBlocks) run_show(int32_t count, ShowAgent phase) {
   __shared__ float4 staging[kShowThreads / kWarp][ShowAgent::kStaging / 4];
   static_assert(ShowAgent::kStaging % 4 == 0);
   const int64_t item = (int64_t{blockIdx.x} * kShowThreads + threadIdx.x) / kWarp;
@@ -155,11 +158,13 @@ __global__ void __launch_bounds__(kShowThreads) run_show(int32_t count, ShowAgen
 }
 
 template <typename Phase>
-__global__ void __launch_bounds__(kTeamThreads) run_teams(Phase phase) {
+__global__ void __launch_bounds__(kTeamThreads) run_teams(int32_t count, Phase phase) {
   __shared__ TeamMemory memory;
   DeviceTeam team;
   team.shared = &memory;
-  phase(team, static_cast<int32_t>(blockIdx.x));
+  for (int32_t item = static_cast<int32_t>(blockIdx.x); item < count; item += static_cast<int32_t>(gridDim.x)) {
+    phase(team, item);
+  }
 }
 
 /// Errors stay with the runtime until the caller asks for the last one.
@@ -170,6 +175,9 @@ struct DeviceLaunch {
     return static_cast<unsigned>((threads + block - 1) / block);
   }
   void fill(void* memory, size_t size, int byte) const { cudaMemsetAsync(memory, byte, size, streams.main); }
+  void copy(void* to, const void* from, size_t size) const {
+    cudaMemcpyAsync(to, from, size, cudaMemcpyDeviceToDevice, streams.main);
+  }
   template <typename Phase>
   void threads(int32_t count, const Phase& phase) const {
     run_threads<<<blocks_for(count), kThreads, 0, streams.main>>>(count, phase);
@@ -185,7 +193,9 @@ struct DeviceLaunch {
   }
   template <typename Phase>
   void teams(int32_t count, const Phase& phase) const {
-    run_teams<<<static_cast<unsigned>(count), kTeamThreads, 0, streams.main>>>(phase);
+    // Not a block for each world: one of this size waits for a whole processor, even if it has nothing to do.
+    constexpr int32_t kMaxTeams = 128;
+    run_teams<<<static_cast<unsigned>(min(count, kMaxTeams)), kTeamThreads, 0, streams.main>>>(count, phase);
   }
   /// Both at once: what `aside` starts on the launch that it is given, beside what `here` starts on this one. What
   /// follows waits for both.

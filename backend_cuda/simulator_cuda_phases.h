@@ -242,17 +242,14 @@ struct PrepareEpisode {
   }
 };
 
-/// Finds the lowest slot whose action is out of range, and the worlds whose next episode is to be made.
+/// Finds the lowest slot whose action is out of range.
 struct CheckActions {
   SimulatorArrays arrays;
   const int32_t* actions;
   template <typename Atomics>
   PICTURA_HD void operator()(const Atomics& atomics, int slot) const {
     const WorldView world = arrays.world(arrays.world_of_slot[slot]);
-    if (slot == world.first_slot) {
-      arrays.prepares[world.index] = arrays.began[world.index];
-      arrays.began[world.index] = 0;
-    }
+    if (slot == world.first_slot) arrays.began[world.index] = 0;  // arrays.prepares says it now
     if (arrays.episode_over[world.index] || is_sound_action(world, slot - world.first_slot, actions[slot])) return;
     atomics.lower(arrays.refused_slot, slot);
   }
@@ -487,10 +484,11 @@ void launch_restored(const Launch& launch, const SimulatorArrays& arrays) {
 
 template <typename Launch>
 void launch_step(const Launch& launch, const SimulatorArrays& arrays, const int32_t* actions) {
-  launch.fill(arrays.refused_slot, sizeof(int32_t), kNoSlot & 0xFF);
-  launch.threads(arrays.num_slots, CheckActions{arrays, actions});
+  launch.copy(arrays.prepares, arrays.began, static_cast<size_t>(arrays.num_worlds));
   launch.beside([&](const Launch& aside) { aside.teams(arrays.num_worlds, PrepareEpisode{arrays}); },
                 [&] {
+                  launch.fill(arrays.refused_slot, sizeof(int32_t), kNoSlot & 0xFF);
+                  launch.threads(arrays.num_slots, CheckActions{arrays, actions});
                   launch.template lanes<kLanesPerAgent>(arrays.num_slots, Advance{arrays, actions});
                   launch.template lanes<kLanesPerAgent>(arrays.num_slots, Settle{arrays});
                   launch.template lanes<kWarp>(arrays.num_worlds, FinishStep{arrays, actions});

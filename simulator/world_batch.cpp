@@ -7,6 +7,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/hash.h"
+#include "pictura/common/parallel_for.h"
 #include "pictura/simulator/rules/collision.h"
 #include "pictura/simulator/rules/limits.h"
 
@@ -287,13 +288,16 @@ WorldBatch::WorldBatch(const SimulatorConfig& config_in, std::vector<std::shared
   check(config);
   check(config, maps, worlds);
   options = rule_options(config);
-  for (const auto& map : maps) {
+  world_maps.resize(maps.size());
+  parallel_for(config.num_threads, static_cast<int64_t>(maps.size()), [this](int64_t index) {
+    const RoadMap& map = *maps[static_cast<size_t>(index)];
+    WorldMap& world_map = world_maps[static_cast<size_t>(index)];
     const MapGeometryOptions geometry_options{.walls = config.walls, .wall_seed = config.wall_seed};
-    const std::vector<WallFace> walls = config.walls ? make_walls(*map, geometry_options) : std::vector<WallFace>{};
-    world_maps.push_back(make_world_map(*map, walls, config.observes(ObservationPart::walls)));
-    PICTURA_CHECK(!world_maps.back().spawn_lanes.empty(),
-                  "map {}: expected a lane outside junctions from which a route goes on for ever, got none", map->name);
-  }
+    const std::vector<WallFace> walls = config.walls ? make_walls(map, geometry_options) : std::vector<WallFace>{};
+    world_map = make_world_map(map, walls, config.observes(ObservationPart::walls));
+    PICTURA_CHECK(!world_map.spawn_lanes.empty(),
+                  "map {}: expected a lane outside junctions from which a route goes on for ever, got none", map.name);
+  });
 
   for (const WorldMap& map : world_maps) map_views.push_back(map.view());
   check_box_cells(world_maps, worlds);

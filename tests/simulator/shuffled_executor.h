@@ -62,6 +62,7 @@ struct ShuffledTeam : HostAtomics {
 
 struct ShuffledLaunch {
   std::mt19937* random;
+  void copy(void* to, const void* from, size_t size) const { std::memcpy(to, from, size); }
   void fill(void* memory, size_t size, int byte) const { std::memset(memory, byte, size); }
   template <typename Phase>
   void threads(int32_t count, const Phase& phase) const {
