@@ -39,8 +39,6 @@ target_compile_options(pictura_flags INTERFACE
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_WERROR}>>:-Werror>
   # The arithmetic contract: a product and a sum round twice on every device, and nothing is reordered.
   $<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off -fno-math-errno -fno-trapping-math>
-  # g++ 12 contracts all the same where it vectorises sums beside differences (vfmaddsub): leave it no such instruction.
-  $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_HAS_MNO_FMA}>>:-mno-fma>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_CPU_ARCH}>>:-march=${PICTURA_CPU_ARCH}>)
 set(PICTURA_IS_SANITIZED 0)  # for tests that time something
 if(PICTURA_SANITIZE)
@@ -60,6 +58,14 @@ function(pictura_add_library name)
   add_library(pictura::${name} ALIAS pictura_${name})
   set_target_properties(pictura_${name} PROPERTIES EXPORT_NAME ${name})
   target_link_libraries(pictura_${name} PUBLIC pictura_flags ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
+endfunction()
+
+# pictura_forbid_fma(TARGET): g++ 12 contracts, whatever -ffp-contract says, where it vectorises sums beside differences
+# (vfmaddsub). Code that must give a device's bits is left no such instruction.
+function(pictura_forbid_fma target)
+  if(PICTURA_HAS_MNO_FMA)
+    target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-mno-fma>)
+  endif()
 endfunction()
 
 # pictura_test_properties(OUT SECONDS LABELS): ctest properties with a timeout, labels and the tests' environment.

@@ -90,13 +90,22 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
     Nearest nearest;
     for (int y = range.y0; y <= range.y1; ++y) {
       const int32_t begin = range.begin(cells, y), end = range.end(cells, y);
-      for (int32_t first = begin; first < end; first += lanes.size()) {
-        const int32_t i = min_of(first + lanes.rank(), end - 1);
-        const int32_t other = cells.items[static_cast<size_t>(i)];
-        const Vec2 apart = world.cell_centers[i] - origin;
-        const float d2 = dot(apart, apart);
-        const bool is_one = first + lanes.rank() < end && other != agent && d2 < square(kPartnerRange_m);
-        nearest.offer(is_one, d2, other);
+      constexpr int kAtOnce = Lanes::kSize > 1 ? 4 : 1;  // whose loads are under way together
+      for (int32_t first = begin + lanes.rank(); first - lanes.rank() < end; first += kAtOnce * lanes.size()) {
+        int32_t others[kAtOnce];
+        Vec2 centers[kAtOnce];
+        for (int k = 0; k < kAtOnce; ++k) {
+          const int32_t i = min_of(first + k * lanes.size(), end - 1);
+          others[k] = cells.items[static_cast<size_t>(i)];
+          centers[k] = world.cell_centers[i];
+        }
+        for (int k = 0; k < kAtOnce; ++k) {
+          const Vec2 apart = centers[k] - origin;
+          const float d2 = dot(apart, apart);
+          const bool is_one =
+              first + k * lanes.size() < end && others[k] != agent && d2 < square(kPartnerRange_m);
+          nearest.offer(is_one, d2, others[k]);
+        }
       }
     }
     if (!is_near || (nearest.count() == kMaxPartners && nearest.worst() <= square(reach))) return nearest;

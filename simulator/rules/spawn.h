@@ -70,13 +70,13 @@ PICTURA_HD bool is_clear(const WorldView& world, const AgentBox& box, int begin,
   return !lanes.any(is_taken);
 }
 
-template <typename Lanes>
-PICTURA_HD bool touches_wall(const MapView& map, const AgentBox& box, const Lanes& lanes) {
+template <typename Lanes = OneLane>
+PICTURA_HD bool touches_wall(const MapView& map, const AgentBox& box, const Lanes& lanes = {}) {
   return touches_any(footprint(box), box.center_m.z, map.walls, map.wall_cells, lanes);
 }
 
-template <typename Lanes>
-PICTURA_HD bool touches_barrier(const MapView& map, const AgentBox& box, const Lanes& lanes) {
+template <typename Lanes = OneLane>
+PICTURA_HD bool touches_barrier(const MapView& map, const AgentBox& box, const Lanes& lanes = {}) {
   return touches_any(footprint(box), box.center_m.z, map.edges, map.edge_cells, lanes) || touches_wall(map, box, lanes);
 }
 
@@ -97,9 +97,9 @@ PICTURA_HD LaneFit fit_agent(const WorldView& world, int agent, Vec2 p, float z_
 }
 
 /// The next waypoint of a pedestrian: the gap, and then on until no parked car stands there.
-template <typename Lanes>
+template <typename Lanes = OneLane>
 PICTURA_HD RoutePoint next_walk_waypoint(const WorldView& world, int agent, RoutePoint at, RandomStream* random_inout,
-                                         const Lanes& lanes) {
+                                         const Lanes& lanes = {}) {
   constexpr float kStride_m = 1.0f;
   constexpr int kMaxStrides = 64;
   at = stroll(world.map, at, random_inout->uniform(kMinWaypointGap_m, kMaxWaypointGap_m), random_inout);
@@ -165,8 +165,8 @@ PICTURA_HD inline AgentBox parked_box(const WorldView& world, int car, const Par
 }
 
 /// Whether the box reaches into a lane that is driven on, on its level, by more than kSeamTolerance_m.
-template <typename Lanes>
-PICTURA_HD bool covers_driven_lane(const MapView& map, const AgentBox& box, const Lanes& lanes) {
+template <typename Lanes = OneLane>
+PICTURA_HD bool covers_driven_lane(const MapView& map, const AgentBox& box, const Lanes& lanes = {}) {
   const OrientedBox print = footprint(box);
   const Span<const int32_t> items = items_at(map.segment_cells, print.center_m);
   bool covers = false;

@@ -343,6 +343,33 @@ class Benchmarks(CommandCase):
             self.assertAlmostEqual(rate * call / 1e3 / egos, 1, places=6)
             self.assertAlmostEqual(image * 4 * egos / call, 1, places=6)
 
+    def test_steps_are_measured_with_and_without_entity_sets(self):
+        facts = self.json_of("bench", "simulate", *self.QUICK, "--worlds", 3)
+        rows = {row["name"]: row for row in facts["results"]}
+        cases = ["cpu, 3 worlds of 6 agents", "cpu, 3 worlds of 6 agents without entity sets"]
+        self.assertEqual(rows.keys(), {f"{case}{of}" for case in cases for of in ["", ", slots", ", one step"]})
+        for case in cases:
+            live, slots, step = (rows[case + of]["value"] for of in ["", ", slots", ", one step"])
+            self.assertAlmostEqual(slots * step / 1e3, 18, places=6)
+            self.assertTrue(0 < live <= slots)
+        packed = self.json_of("bench", "simulate", *self.QUICK, "--slots", 20)
+        self.assertEqual(packed["results"][0]["name"], "cpu, 20 agents in worlds of 1 to 6")
+
+    def test_the_cost_of_steps_is_drawn_from_results(self):
+        names = ["cpu, 64 worlds of 1 agents", "cpu, 64 worlds of 4 agents", "cpu, 1 worlds of 60 agents"]
+        results = self.folder / "results.json"
+        results.write_text(json.dumps({"results": [{"name": name, "value": 1e6} for name in names]}))
+        figure = self.folder / "cost.png"
+        run("bench", "simulate", "--plot", results, "--figure", figure)
+        self.assertGreater(figure.stat().st_size, 5000)
+        refused = self.assert_refused
+        refused(2, "--plot and --figure", "bench", "simulate", "--plot", results)
+        refused(1, "none.json", "bench", "simulate", "--plot", self.folder / "none.json", "--figure", figure)
+        results.write_text("[]")
+        refused(1, "expected results", "bench", "simulate", "--plot", results, "--figure", figure)
+        refused(2, "--sweep excludes --worlds", "bench", "simulate", "--sweep", "worlds", "--worlds", 3)
+        refused(2, "vulkan", "bench", "simulate", *self.QUICK, "--backend", "vulkan")
+
     def test_bad_arguments_are_refused_by_name(self):
         def refused(status, message, *arguments):
             self.assert_refused(status, message, "bench", "render", *self.QUICK, *arguments)

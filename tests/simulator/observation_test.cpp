@@ -116,6 +116,30 @@ TEST_F(Observation, ControlsAreStopLinesWithStateAndWhetherTheyHoldTheEgo) {
   for (size_t i = kControlFeatures; i < kMaxControls * kControlFeatures; ++i) EXPECT_EQ(out.controls[i], 0);
 }
 
+/// The arithmetic contract: a product is rounded before it is added, on every device.
+float rounded_dot(Vec2 a, Vec2 b) {
+  const volatile float x = a.x * b.x, y = a.y * b.y;
+  return x + y;
+}
+
+TEST_F(Observation, ProductsAreRoundedBeforeTheyAreAdded) {
+  const StopLine& line = stage.batch.world_maps[0].stop_lines[0];
+  const AgentState& agents = stage.batch.agents;
+  for (int i = 0; i < 100; ++i) {
+    const auto k = static_cast<float>(i);
+    stage.put(0, {100 + 0.1f * k, 0.01f * k}, 0.03f * k, 8);
+    look();
+    const Vec2 forward{agents.cos_heading[0], agents.sin_heading[0]}, left_of{-forward.y, forward.x};
+    const ObservationView out = stage.results.observation_view();
+    const Vec2 at{agents.x_m[0], agents.y_m[0]};
+    const Vec2 ends[2] = {line.left_m.xy() - at, line.right_m.xy() - at};
+    for (size_t end = 0; end < 2; ++end) {
+      EXPECT_EQ(out.controls[2 * end], rounded_dot(ends[end], forward) * (1 / 120.0f)) << i;
+      EXPECT_EQ(out.controls[2 * end + 1], rounded_dot(ends[end], left_of) * (1 / 120.0f)) << i;
+    }
+  }
+}
+
 TEST_F(Observation, WaypointsStartWithTheActiveOne) {
   AgentState& agents = stage.batch.agents;
   for (size_t i = 0; i < 3; ++i) {
