@@ -138,7 +138,7 @@ __global__ void __launch_bounds__(kThreads) run_threads(int32_t count, Phase pha
 }
 
 // Blocks that fit a processor at once: fewer registers than the compiler would take hide more of the waiting.
-constexpr int kLanesBlocks = 5, kShowBlocks = 18;
+constexpr int kLanesBlocks = 5, kShowBlocks = 16;
 
 template <int kGroup, typename Phase>
 __global__ void __launch_bounds__(kThreads, kLanesBlocks) run_lanes(int32_t count, Phase phase) {
