@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <map>
 #include <regex>
 
 #include <fmt/format.h>
@@ -62,8 +61,8 @@ std::vector<Case> cases_of(const Arguments& arguments) {
   } else if (arguments.sweep == "worlds") {
     for (int worlds = 1; worlds <= 4096; worlds *= 4) cases.push_back(equal_worlds(worlds, kSweptAgents, num_maps));
   } else {
-    Case both = equal_worlds(arguments.num_worlds > 0 ? arguments.num_worlds : num_maps, arguments.world.agents,
-                             num_maps);
+    Case both =
+        equal_worlds(arguments.num_worlds > 0 ? arguments.num_worlds : num_maps, arguments.world.agents, num_maps);
     if (arguments.slots > 0) {
       both.worlds = draw_worlds(arguments.world.seed, arguments.slots, 1, arguments.world.agents, num_maps);
       both.name = fmt::format("{} agents in worlds of 1 to {}", arguments.slots, arguments.world.agents);
@@ -109,10 +108,10 @@ void measure(const Arguments& arguments, const std::string& backend,
 /// Draws what the sweeps in earlier results say an agent-step costs.
 void draw_cost(const std::vector<std::string>& paths, const std::string& figure) {
   const std::regex swept(R"((\w+), (\d+) worlds of (\d+) agents)");
-  PlotPanel by_agents{fmt::format("{} worlds", kSweptWorlds), "log2 of agents in each world",
-                      "log10 of ns for an agent-step", {}};
-  PlotPanel by_worlds{fmt::format("{} agents in each world", kSweptAgents), "log2 of worlds",
-                      "log10 of ns for an agent-step", {}};
+  PlotPanel by_agents{
+      fmt::format("{} worlds", kSweptWorlds), "log2 of agents in each world", "log10 of ns for an agent-step", {}};
+  PlotPanel by_worlds{
+      fmt::format("{} agents in each world", kSweptAgents), "log2 of worlds", "log10 of ns for an agent-step", {}};
   const auto add = [](PlotPanel* panel, const std::string& backend, double x, double y) {
     auto series = std::find_if(panel->series.begin(), panel->series.end(),
                                [&backend](const PlotSeries& s) { return s.name == backend; });
@@ -131,8 +130,11 @@ void draw_cost(const std::vector<std::string>& paths, const std::string& figure)
       if (!std::regex_match(name, match, swept)) continue;
       const int worlds = std::stoi(match[2]), agents = std::stoi(match[3]);
       const double cost_ns = 1e9 / row.value("value", 0.0);
-      if (worlds == kSweptWorlds) add(&by_agents, match[1], agents, cost_ns);
-      if (agents == kSweptAgents) add(&by_worlds, match[1], worlds, cost_ns);
+      if (agents == kSweptAgents) {
+        add(&by_worlds, match[1], worlds, cost_ns);
+      } else if (worlds == kSweptWorlds) {
+        add(&by_agents, match[1], agents, cost_ns);
+      }
     }
   }
   draw_plots_png({by_agents, by_worlds}, figure, {.title = "What an agent-step costs"});
@@ -162,12 +164,10 @@ void run(Arguments arguments) {
     }
   }
   progress.finish();
-  WorldOptions described = arguments.world;
-  BenchContext context{
-      .workload = fmt::format("simulate: {}, {}, walls {}, random actions with resets, {} threads",
-                              fmt::join(arguments.maps, " "), population_of(described),
-                              arguments.world.walls ? "on" : "off", arguments.world.num_threads),
-      .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
+  BenchContext context{.workload = fmt::format("simulate: {}, {}, walls {}, random actions with resets, {} threads",
+                                               fmt::join(arguments.maps, " "), population_of(arguments.world),
+                                               arguments.world.walls ? "on" : "off", arguments.world.num_threads),
+                       .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
   if (on_device) {
     context.device = cuda_device_name() + "; " + context.device;
     context.driver = cuda_driver_name();
@@ -186,17 +186,17 @@ void add_simulate_benchmark(CLI::App& bench) {
       ->delimiter(',');
   add_world_options(command, &arguments->world);
   command->add_option("--backend", arguments->backends, "cpu, cuda")->delimiter(',')->capture_default_str();
-  auto* worlds = command->add_option("--worlds", arguments->num_worlds, "Default: one for each map")
-                     ->check(CLI::PositiveNumber);
+  auto* worlds =
+      command->add_option("--worlds", arguments->num_worlds, "Default: one for each map")->check(CLI::PositiveNumber);
   auto* slots = command
                     ->add_option("--slots", arguments->slots,
                                  "So many agents in worlds of 1 to --agents, as in training, instead of equal worlds")
                     ->check(CLI::PositiveNumber)
                     ->excludes(worlds);
   command
-      ->add_option("--sweep", arguments->sweep,
-                   fmt::format("agents: {} worlds of 1 to 1,024; worlds: 1 to 4,096 of {} agents", kSweptWorlds,
-                               kSweptAgents))
+      ->add_option(
+          "--sweep", arguments->sweep,
+          fmt::format("agents: {} worlds of 1 to 1,024; worlds: 1 to 4,096 of {} agents", kSweptWorlds, kSweptAgents))
       ->check(CLI::IsMember({"agents", "worlds"}))
       ->excludes(worlds)
       ->excludes(slots);

@@ -346,9 +346,9 @@ class SimulatorCuda final : public Simulator {
       view.light_plans = next_.light_plans.data() + first_light;
       view.lights = next_.lights.data() + first_light;
       next_worlds.push_back(view);
-      of_worlds.push_back({scratch_.try_boxes.data() + first_box * kSpawnTries,
-                           scratch_.free_tries.data() + first_box, scratch_.known_tries.data() + first_box,
-                           scratch_.chosen_try.data() + first_box, scratch_.next_try.data() + first_box});
+      of_worlds.push_back({scratch_.try_boxes.data() + first_box * kSpawnTries, scratch_.free_tries.data() + first_box,
+                           scratch_.known_tries.data() + first_box, scratch_.chosen_try.data() + first_box,
+                           scratch_.next_try.data() + first_box});
     }
     scratch_.worlds.copy_from_host(worlds.data());
     scratch_.next_worlds.copy_from_host(next_worlds.data());

@@ -1,13 +1,13 @@
 // How the simulator's phases are started on a device: a thread or a group of lanes per item, or a block per world.
 // Kernels of a stream follow one another, which is the barrier between phases.
-#include "pictura/backend_cuda/simulator_cuda_kernel.h"
-
 #include <type_traits>
+
+#include "pictura/backend_cuda/simulator_cuda_kernel.h"
 
 namespace pictura::cuda {
 namespace {
 
-constexpr int kThreads = 128;      // per block
+constexpr int kThreads = 128;                         // per block
 constexpr int kTeamThreads = kTurn * kLanesPerAgent;  // a world's start is one long chain of work: as wide as its loops
 
 struct DeviceAtomics {
@@ -17,7 +17,8 @@ struct DeviceAtomics {
   __device__ void lower(int32_t* value, int32_t bound) const { atomicMin(value, bound); }
 };
 
-/// The nearest of the things offered by a warp's lanes: the lane of rank k holds the k-th, as squared distance and item.
+/// The nearest of the things offered by a warp's lanes: the lane of rank k holds the k-th, as squared distance and
+/// item.
 template <int capacity>
 class NearestOfWarp {
   static_assert(capacity <= kWarp);
@@ -30,8 +31,7 @@ class NearestOfWarp {
     return __uint_as_float(static_cast<uint32_t>(__shfl_sync(~0u, key_, capacity - 1) >> 32));
   }
   __device__ void offer(bool is_one, float distance2, int32_t item) {
-    const uint64_t offered =
-        is_one ? uint64_t{__float_as_uint(distance2)} << 32 | static_cast<uint32_t>(item) : kNone;
+    const uint64_t offered = is_one ? uint64_t{__float_as_uint(distance2)} << 32 | static_cast<uint32_t>(item) : kNone;
     const bool is_first = threadIdx.x % kWarp == 0;
     const uint64_t worst = __shfl_sync(~0u, key_, capacity - 1);
     for (uint32_t better = __ballot_sync(~0u, offered < worst); better != 0; better &= better - 1) {
@@ -84,7 +84,8 @@ struct DeviceLanes {
   __device__ T read(const T& value) const {
     static_assert(std::is_trivially_copyable_v<T> && alignof(T) % sizeof(float4) == 0);
     float4 words[sizeof(T) / sizeof(float4)];
-    for (size_t i = 0; i < sizeof(T) / sizeof(float4); ++i) words[i] = __ldg(reinterpret_cast<const float4*>(&value) + i);
+    for (size_t i = 0; i < sizeof(T) / sizeof(float4); ++i)
+      words[i] = __ldg(reinterpret_cast<const float4*>(&value) + i);
     T result;
     memcpy(&result, words, sizeof(T));
     return result;

@@ -95,8 +95,8 @@ struct TeamMemory {
 /// Finds for each of `count` boxes, which are the world's from first_box on, the first of its tries that the map
 /// permits and that is clear of the boxes before it: what placing them one after the other would find. As many as the
 /// team has groups for choose at once, given what the others chose last, until nobody changes: then everybody's choice
-/// agrees with the choices before it, which only the sequential result does. Every round settles at least the lowest one
-/// that changed. Those of an earlier turn stand.
+/// agrees with the choices before it, which only the sequential result does. Every round settles at least the lowest
+/// one that changed. Those of an earlier turn stand.
 ///   box_of_try(i, try), permits(lanes, i, try, box)
 template <typename Team, typename BoxOfTry, typename Permits>
 PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const WorldScratch& scratch, int first_box,
@@ -120,8 +120,7 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
   // Whether the map, and what stands, leave a try free.
   const auto look_at = [&](const auto& lanes, int turn_begin, int i, int t) {
     const AgentBox box = box_of_try(i, t);
-    const bool is_free =
-        permits(lanes, i, t, box) && is_clear(world, box, first_box, first_box + turn_begin, lanes);
+    const bool is_free = permits(lanes, i, t, box) && is_clear(world, box, first_box, first_box + turn_begin, lanes);
     if (is_free && lanes.rank() == 0) try_boxes[i * kSpawnTries + t] = box;
     return is_free;
   };
@@ -231,8 +230,8 @@ struct PlaceCenters {
   }
 };
 
-/// Makes a world's next episode, as early as its memory is free and long before it is needed: a start depends on nothing
-/// that steps change.
+/// Makes a world's next episode, as early as its memory is free and long before it is needed: a start depends on
+/// nothing that steps change.
 struct PrepareEpisode {
   SimulatorArrays arrays;
   template <typename Team>
@@ -365,8 +364,7 @@ struct FinishStep {
       active += is_active(world, agent);
     });
     const bool ends = episode_ends(world.options, steps, arrays.spawned[w], lanes.sum(active));
-    for_each_agent(
-        [&](int agent, SimulatorTotals* part) { finish_agent(world, agent, ends, arrays.results, part); });
+    for_each_agent([&](int agent, SimulatorTotals* part) { finish_agent(world, agent, ends, arrays.results, part); });
     add_up(lanes, parts, totals_out);
     for (int i = lanes.rank(); i < static_cast<int>(world.map.stop_lines.size()); i += lanes.size()) {
       world.lights[i] = light_state(world.light_plans[i], steps);
@@ -395,7 +393,7 @@ struct ShowAgent {
   SimulatorArrays arrays;
   /// Floats that the rows of any set need.
   static constexpr int kStaging = max_of(max_of(max_of(kMaxLanes, kMaxBoundaries), kMaxWalls) * kLaneFeatures,
-                                         max_of(kMaxPartners * kPartnerFeatures, kMaxControls * kControlFeatures));
+                                         max_of(kMaxPartners* kPartnerFeatures, kMaxControls* kControlFeatures));
 
   template <typename Lanes>
   PICTURA_HD void operator()(const Lanes& lanes, int slot) const {

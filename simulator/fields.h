@@ -86,15 +86,15 @@ struct AgentStateView {
 };
 
 /// Copies every field of one agent. All are read before any is written, so that a device need not wait for each.
-PICTURA_HD inline void copy_fields(const AgentStateView& from, const AgentStateView& to, int slot) {
+PICTURA_HD inline void copy_fields(const AgentStateView& from, const AgentStateView& to, int slot){
 #define X(name, type, per_agent, first, comment) \
   type name[per_agent];                          \
   for (int i = 0; i < (per_agent); ++i) name[i] = from.name[slot * (per_agent) + i];
-  PICTURA_AGENT_FIELDS(X)
+    PICTURA_AGENT_FIELDS(X)
 #undef X
 #define X(name, type, per_agent, first, comment) \
   for (int i = 0; i < (per_agent); ++i) to.name[slot * (per_agent) + i] = name[i];
-  PICTURA_AGENT_FIELDS(X)
+        PICTURA_AGENT_FIELDS(X)
 #undef X
 }
 

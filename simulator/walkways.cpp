@@ -214,8 +214,8 @@ Walkways make_walkways(const RoadMap& map, const MapView& roads) {
     WalkPiece& piece = out.pieces[i];
     const int32_t back = static_cast<int32_t>(i) ^ 1;
     const int32_t* const leaving = out.leaving.data() + out.leave_begin[static_cast<size_t>(piece.to_node)];
-    const int32_t ways = out.leave_begin[static_cast<size_t>(piece.to_node) + 1] -
-                         out.leave_begin[static_cast<size_t>(piece.to_node)];
+    const int32_t ways =
+        out.leave_begin[static_cast<size_t>(piece.to_node) + 1] - out.leave_begin[static_cast<size_t>(piece.to_node)];
     piece.next = ways == 1 ? back : ways > 2 ? -1 : leaving[0] == back ? leaving[1] : leaving[0];
   }
   return out;

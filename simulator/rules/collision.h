@@ -117,7 +117,8 @@ PICTURA_HD bool touches_any(const OrientedBox& box, float z_m, Span<const Barrie
   const float reach = box.half_length_m + box.half_width_m;
   const Span<const int32_t> items = items_at(cells, box.center_m);
   bool found = false;
-  for (size_t i = static_cast<size_t>(lanes.rank()); i < items.size() && !found; i += static_cast<size_t>(lanes.size())) {
+  for (size_t i = static_cast<size_t>(lanes.rank()); i < items.size() && !found;
+       i += static_cast<size_t>(lanes.size())) {
     const Barrier& barrier = barriers[static_cast<size_t>(items[i])];
     const Vec2 to_middle = (barrier.a_m + barrier.b_m) * 0.5f - box.center_m;
     const Vec2 half = (barrier.b_m - barrier.a_m) * 0.5f;

@@ -1,7 +1,7 @@
 // How the loops of one agent's rules are shared out: rules that look at many things take `lanes`, threads in lockstep
-// that all call the rule with the same arguments, each take every size()-th thing, and all return the same. A host calls
-// them with OneLane. Only what does not depend on the order of things is shared out: whether any of them is so, and the
-// least of them.
+// that all call the rule with the same arguments, each take every size()-th thing, and all return the same. A host
+// calls them with OneLane. Only what does not depend on the order of things is shared out: whether any of them is so,
+// and the least of them.
 #pragma once
 
 #include "pictura/common/hd.h"

@@ -102,8 +102,7 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
         for (int k = 0; k < kAtOnce; ++k) {
           const Vec2 apart = centers[k] - origin;
           const float d2 = dot(apart, apart);
-          const bool is_one =
-              first + k * lanes.size() < end && others[k] != agent && d2 < square(kPartnerRange_m);
+          const bool is_one = first + k * lanes.size() < end && others[k] != agent && d2 < square(kPartnerRange_m);
           nearest.offer(is_one, d2, others[k]);
         }
       }

@@ -77,7 +77,8 @@ template <typename Lanes = OneLane>
 PICTURA_HD bool is_on_road(const MapView& map, Vec2 p, float z_m, const Lanes& lanes = {}) {
   const Span<const int32_t> items = items_at(map.segment_cells, p);
   bool is_on = false;
-  for (size_t i = static_cast<size_t>(lanes.rank()); i < items.size() && !is_on; i += static_cast<size_t>(lanes.size())) {
+  for (size_t i = static_cast<size_t>(lanes.rank()); i < items.size() && !is_on;
+       i += static_cast<size_t>(lanes.size())) {
     const LaneSegment& segment = map.segments[static_cast<size_t>(items[i])];
     const Foot foot = foot_on(segment, p);
     const float height = segment.a_m.z + segment.slope * foot.along_m;

@@ -72,7 +72,8 @@ PICTURA_HD int pass_waypoints(const WorldView& world, int agent, Vec3 from, Vec3
   return events | kEventWaypoint;
 }
 
-/// Phase 1: moves an active agent and finds what the road says about it. Its first lane alone writes, once all have read.
+/// Phase 1: moves an active agent and finds what the road says about it. Its first lane alone writes, once all have
+/// read.
 template <typename Lanes = OneLane>
 PICTURA_HD void advance(const WorldView& world, int agent, int32_t action, const Lanes& lanes = {}) {
   const AgentStateView& agents = world.agents;
@@ -96,8 +97,7 @@ PICTURA_HD void advance(const WorldView& world, int agent, int32_t action, const
   const Motion motion = move(motion_of(agents, slot), controls_of_action(action), parameters, class_limits(agent_class),
                              world.options.dt_s);
   const int32_t lane_before = agents.lane[slot];
-  const LaneFit fit =
-      fit_agent(world, agent, {motion.x_m, motion.y_m}, from.z, motion.heading_rad, lane_before, lanes);
+  const LaneFit fit = fit_agent(world, agent, {motion.x_m, motion.y_m}, from.z, motion.heading_rad, lane_before, lanes);
   const AgentBox box = box_at(agents, slot, {motion.x_m, motion.y_m, fit.z_m}, sincos_of(motion.heading_rad));
 
   int events = kEventNone;

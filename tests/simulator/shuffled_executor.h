@@ -126,8 +126,8 @@ class ShuffledExecutor {
       const auto first_box = static_cast<size_t>(batch.box_begin[static_cast<size_t>(w)]);
       WorldView view = batch.world(w);
       const auto first_light = static_cast<size_t>(batch.light_begin[static_cast<size_t>(w)]);
-      view.box_cells = cuda::one_cell({cell_begin_.data() + 2 * w, 2},
-                                      {cell_items_.data(), static_cast<size_t>(view.num_boxes)});
+      view.box_cells =
+          cuda::one_cell({cell_begin_.data() + 2 * w, 2}, {cell_items_.data(), static_cast<size_t>(view.num_boxes)});
       scratch_.push_back({try_boxes_.data() + first_box * kSpawnTries, free_tries_.data() + first_box,
                           known_tries_.data() + first_box, chosen_try_.data() + first_box,
                           next_try_.data() + first_box});
