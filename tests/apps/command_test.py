@@ -367,7 +367,7 @@ class Benchmarks(CommandCase):
         refused(1, "none.json", "bench", "simulate", "--plot", self.folder / "none.json", "--figure", figure)
         results.write_text("[]")
         refused(1, "expected results", "bench", "simulate", "--plot", results, "--figure", figure)
-        refused(2, "--sweep excludes --worlds", "bench", "simulate", "--sweep", "worlds", "--worlds", 3)
+        refused(2, "--worlds excludes --sweep", "bench", "simulate", "--sweep", "worlds", "--worlds", 3)
         refused(2, "vulkan", "bench", "simulate", *self.QUICK, "--backend", "vulkan")
 
     def test_bad_arguments_are_refused_by_name(self):
