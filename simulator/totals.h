@@ -43,10 +43,17 @@ struct SimulatorTotals {
   }
 
   PICTURA_HD void add(const SimulatorTotals& part) {
-    const auto add_member = [](auto& sum, const auto& value) { sum += value; };
-    visit_counts(*this, part, add_member);
-    visit_sums(*this, part, add_member);
+    visit_counts(*this, part, Add{});
+    visit_sums(*this, part, Add{});
   }
+
+ private:
+  struct Add {
+    template <typename T>
+    PICTURA_HD void operator()(T& sum, T value) const {
+      sum += value;
+    }
+  };
 };
 
 }  // namespace pictura
