@@ -188,15 +188,37 @@ void ImageDrawer::draw(const ImageTarget& target) {
   if (target.depth_m || target.class_id || target.instance_id) draw_planes(target);
 }
 
+// Puts the gathered fragments of a pixel in an order, front to back: next comes the nearest that nothing left is in
+// front of, in a ring the nearest.
+void ImageDrawer::order_pixel(int x, int y) {
+  const Vec2 corner{static_cast<float>(x), static_cast<float>(y)};
+  auto stands_here = [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); };
+  auto hides = [&](const Fragment& other, const Fragment& fragment) {
+    const uint64_t shared = shared_samples(other.coverage, fragment.coverage);
+    const ScreenFace& face = faces_[static_cast<std::size_t>(fragment.face)];
+    const ScreenFace& other_face = faces_[static_cast<std::size_t>(other.face)];
+    return shared != 0 && face.number != other_face.number &&
+           is_in_front(other_face, face, corner + middle_of(shared), stands_here);
+  };
+  for (auto next = pixel_.begin(); next != pixel_.end(); ++next) {
+    auto is_hidden = [&](const Fragment& fragment) {
+      return std::any_of(next, pixel_.end(), [&](const Fragment& other) { return hides(other, fragment); });
+    };
+    const auto front = std::find_if_not(next, pixel_.end(), is_hidden);
+    if (front != pixel_.end()) std::rotate(next, front, front + 1);
+  }
+}
+
 void ImageDrawer::visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit) {
-  const RowRange rows{0, setting_.camera.height_px};
-  make_fragments({0, static_cast<int32_t>(faces_.size())}, rows);
-  weigh_rows(
-      rows,
-      [&](int pixel, const Fragment& fragment, float) {
-        visit(pixel, fragment.coverage, faces_[static_cast<std::size_t>(fragment.face)].color);
-      },
-      [](int, Rgb) {});
+  const int width = setting_.camera.width_px, height = setting_.camera.height_px;
+  make_fragments({0, static_cast<int32_t>(faces_.size())}, {0, height});
+  for (int pixel = 0; pixel < width * height; ++pixel) {
+    gather_pixel(first_fragment_[static_cast<std::size_t>(pixel)]);
+    order_pixel(pixel % width, pixel / width);
+    for (const Fragment& fragment : pixel_) {
+      visit(pixel, fragment.coverage, faces_[static_cast<std::size_t>(fragment.face)].color);
+    }
+  }
 }
 
 void ImageDrawer::draw_planes(const ImageTarget& target) const {

@@ -43,8 +43,8 @@ class ImageDrawer {
     double seen = 0, alone = 0;
   };
   Coverage coverage_of(int32_t agent);
-  /// Calls visit(y * width + x, coverage, colour) for what each face covers of each pixel of the prepared image, the
-  /// nearer first, down to what hides the rest: for measuring other ways to composite.
+  /// Calls visit(y * width + x, coverage, colour) for what each face covers of each pixel of the prepared image, front
+  /// to back: for measuring other ways to composite.
   void visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit);
 
  private:
@@ -89,6 +89,7 @@ class ImageDrawer {
   void find_full(FaceRange faces, RowRange rows);
   void make_fragments(FaceRange faces, RowRange rows);
   void gather_pixel(int32_t first);
+  void order_pixel(int x, int y);
   void hide_fragments(int x, int y);
   // Weighs the fragments of all pixels of the rows: visit(pixel index, fragment, weight) for each, then
   // finish(pixel index, color).
