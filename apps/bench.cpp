@@ -41,6 +41,13 @@ std::string default_benchmark_map() {
   return std::binary_search(towns.begin(), towns.end(), "Town01") ? "Town01" : "procedural:1";
 }
 
+void add_maps_option(CLI::App* command, std::vector<std::string>* maps) {
+  command
+      ->add_option("--map", *maps,
+                   "Maps, in turn; towns: all of the map folder; default: Town01 where it is found, else procedural:1")
+      ->delimiter(',');
+}
+
 void report_benchmark(bool json, const BenchContext& context, std::vector<BenchResult> results) {
   Json rows = Json::array();
   for (BenchResult& result : results) {

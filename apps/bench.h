@@ -17,6 +17,9 @@ std::string population_of(const WorldOptions& world);
 /// Where no map is named: the town that the numbers of docs/ are about, or the procedural one where it is missing.
 std::string default_benchmark_map();
 
+/// Adds the option --map, which takes several.
+void add_maps_option(CLI::App* command, std::vector<std::string>* maps);
+
 /// What results were measured on.
 struct BenchContext {
   std::string workload, backend;

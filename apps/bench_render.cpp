@@ -174,10 +174,7 @@ void run(Arguments arguments) {
 void add_render_benchmark(CLI::App& bench) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = bench.add_subcommand("render", "Images of the agents of many worlds");
-  command
-      ->add_option("--map", arguments->maps,
-                   "Maps, in turn; towns: all of the map folder; default: Town01 where it is found, else procedural:1")
-      ->delimiter(',');
+  add_maps_option(command, &arguments->maps);
   add_world_options(command, &arguments->world);
   command->add_option("--egos", arguments->egos, "Agents drawn in one call; default: all of one world for each map")
       ->delimiter(',')

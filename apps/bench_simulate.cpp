@@ -180,10 +180,7 @@ void run(Arguments arguments) {
 void add_simulate_benchmark(CLI::App& bench) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = bench.add_subcommand("simulate", "Steps of worlds, observations included");
-  command
-      ->add_option("--map", arguments->maps,
-                   "Maps, in turn; towns: all of the map folder; default: Town01 where it is found, else procedural:1")
-      ->delimiter(',');
+  add_maps_option(command, &arguments->maps);
   add_world_options(command, &arguments->world);
   command->add_option("--backend", arguments->backends, "cpu, cuda")->delimiter(',')->capture_default_str();
   auto* worlds =
