@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 
 #include "pictura/common/rng.h"
 
@@ -58,6 +59,32 @@ void append_road_edges(const RoadMap& map, std::vector<Strip>* strips_out) {
   flush();
 }
 
+/// Leaves one of the strips that are the same: roads of a junction that run over each other bring the same paint.
+void drop_repeated(std::vector<Strip>* strips_inout) {
+  using Key = std::array<float, 15>;
+  std::set<Key> seen;
+  std::erase_if(*strips_inout, [&](const Strip& strip) {
+    const Vec3 a = strip.a_m, b = strip.b_m;
+    const Rgb color = strip.color;
+    const Key key{a.x,
+                  a.y,
+                  a.z,
+                  b.x,
+                  b.y,
+                  b.z,
+                  strip.side_a.x,
+                  strip.side_a.y,
+                  strip.side_b.x,
+                  strip.side_b.y,
+                  strip.width_m,
+                  color.r,
+                  color.g,
+                  color.b,
+                  static_cast<float>(strip.kind)};
+    return !seen.insert(key).second;
+  });
+}
+
 }  // namespace
 
 StaticGeometry make_static_geometry(const RoadMap& map, const MapGeometryOptions& options) {
@@ -85,6 +112,7 @@ StaticGeometry make_static_geometry(const RoadMap& map, const MapGeometryOptions
     geometry.heads.push_back(
         {light.head_m, light.head_facing, cos_of(options.light_half_angle_rad), static_cast<int32_t>(i)});
   }
+  drop_repeated(&geometry.strips);
   if (options.walls) geometry.walls = make_walls(map, options);
   geometry.num_signals = static_cast<int32_t>(map.lights.size());
   geometry.build_grids();

@@ -41,6 +41,19 @@ TEST(MapGeometry, AStraightRoadHasItsMarksAndItsFrame) {
   }
 }
 
+TEST(MapGeometry, WhatIsPaintedTwiceIsDrawnOnce) {
+  test::RoadText road;
+  road.center_mark = R"(<roadMark sOffset="0" type="solid" color="yellow" width="0.12"/>)";
+  road.right = test::lane_of(-1, "driving", 4);
+  RoadMap map = test::parse(road.text());
+  const std::size_t strips = make_static_geometry(map, {.walls = false}).strips.size();
+  ASSERT_FALSE(map.markings.empty());
+  map.markings.push_back(map.markings.front());
+  EXPECT_EQ(make_static_geometry(map, {.walls = false}).strips.size(), strips);
+  map.markings.back().width_m *= 2;
+  EXPECT_GT(make_static_geometry(map, {.walls = false}).strips.size(), strips);
+}
+
 TEST(MapGeometry, MarksHaveTheColourOfTheFile) {
   std::vector<float> reds;
   for (const char* color : {"white", "yellow", "red", "green", "blue", "orange", "violet", "black"}) {
