@@ -291,18 +291,6 @@ class Simulation(CommandCase):
         self.assert_refused(2, "fractions", "simulate", town, "--pedestrians", 0.7, "--cyclists", 0.7)
         self.assert_refused(2, "--parked", "simulate", town, "--parked", -1)
 
-    def test_distributions_over_episodes(self):
-        result = self.json_of("bench", "worlds", "--map", self.town(), "--episodes", 3, "--agents", 30)
-        values = {row["name"].split(": ", 1)[1]: row for row in result["results"]}
-        self.assertEqual({row["repeats"] for row in result["results"]}, {3})
-        classes = sum(values[name]["mean"] for name in ("vehicles", "cyclists", "pedestrians"))
-        refused = sum(values[name]["mean"] for name in ("refused, places taken", "refused, no place"))
-        self.assertAlmostEqual(classes + refused, 30)
-        self.assertEqual(values["of these out of reach"]["max"], 0)
-        self.assertGreater(values["random policy: collisions"]["mean"] + values["random policy: off-road"]["mean"], 0)
-        self.assertGreater(values["lane driver: goals"]["mean"], 0)
-        self.assertEqual(values["lane driver: red lights"]["max"], 0)
-
     @unittest.skipUnless(shutil.which("ffmpeg"), "no ffmpeg on this machine")
     def test_a_video_is_written(self):
         video = self.folder / "drive.mp4"
@@ -354,6 +342,18 @@ class Benchmarks(CommandCase):
             self.assertTrue(0 < live <= slots)
         packed = self.json_of("bench", "simulate", *self.QUICK, "--slots", 20)
         self.assertEqual(packed["results"][0]["name"], "cpu, 20 agents in worlds of 1 to 6")
+
+    def test_distributions_over_episodes(self):
+        result = self.json_of("bench", "worlds", "--map", self.town(), "--episodes", 3, "--agents", 30)
+        values = {row["name"].split(": ", 1)[1]: row for row in result["results"]}
+        self.assertEqual({row["repeats"] for row in result["results"]}, {3})
+        classes = sum(values[name]["mean"] for name in ("vehicles", "cyclists", "pedestrians"))
+        refused = sum(values[name]["mean"] for name in ("refused, places taken", "refused, no place"))
+        self.assertAlmostEqual(classes + refused, 30)
+        self.assertEqual(values["of these out of reach"]["max"], 0)
+        self.assertGreater(values["random policy: collisions"]["mean"] + values["random policy: off-road"]["mean"], 0)
+        self.assertGreater(values["lane driver: goals"]["mean"], 0)
+        self.assertEqual(values["lane driver: red lights"]["max"], 0)
 
     def test_the_cost_of_steps_is_drawn_from_results(self):
         names = ["cpu, 64 worlds of 1 agents", "cpu, 64 worlds of 4 agents", "cpu, 1 worlds of 60 agents"]
