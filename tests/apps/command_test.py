@@ -381,7 +381,8 @@ class Benchmarks(CommandCase):
         refused(2, "vulkan", "--backend", "vulkan")
         refused(1, "no-town", "--map", self.folder / "no-town.xodr")
         if not pathlib.Path("/dev/nvidia0").exists():
-            refused(1, "renderer cuda: no CUDA device" if has_cuda() else "expected one of cpu", "--backend", "cuda")
+            status, message = (1, "renderer cuda: no CUDA device") if has_cuda() else (2, "expected one of cpu")
+            refused(status, message, "--backend", "cuda")
             refused(1, "CUDA", "--memory", "--egos", 3)
 
 
