@@ -34,11 +34,11 @@ Snapshot drive_snapshot(const SnapshotOptions& options);
 
 /// Error against the truth, pooled over the images that are not blank.
 struct Quality {
-  PooledError one_sample;    // a z-buffer's, at the pixel's centre
-  PooledError grid_2x2;      // ... with 2x2 supersampling
-  PooledError area;          // exact areas taken for opacity, nearest first
-  PooledError oracle;        // the CPU renderer
-  PooledError oracle_bytes;  // ... rounded to bytes
+  PooledError one_sample;                                           // a z-buffer's, at the pixel's centre
+  PooledError grid_2x2;                                             // ... with 2x2 supersampling
+  PooledError area;                                                 // exact areas taken for opacity, front to back
+  PooledError oracle;                                               // the CPU renderer
+  PooledError oracle_bytes;                                         // ... rounded to bytes
   double worst_image_db = std::numeric_limits<double>::infinity();  // of the oracle
   int images = 0;
 
