@@ -36,16 +36,20 @@ std::string population_of(const WorldOptions& world) {
   return text;
 }
 
-std::string default_benchmark_map() {
-  const std::vector<std::string> towns = known_towns();
-  return std::binary_search(towns.begin(), towns.end(), "Town01") ? "Town01" : "procedural:1";
-}
-
 void add_maps_option(CLI::App* command, std::vector<std::string>* maps) {
   command
       ->add_option("--map", *maps,
                    "Maps, in turn; towns: all of the map folder; default: Town01 where it is found, else procedural:1")
       ->delimiter(',');
+}
+
+std::vector<std::string> named_maps(const std::vector<std::string>& maps) {
+  const std::vector<std::string> towns = known_towns();
+  // The town that the numbers of docs/ are about.
+  if (maps.empty()) return {std::binary_search(towns.begin(), towns.end(), "Town01") ? "Town01" : "procedural:1"};
+  if (maps != std::vector<std::string>{"towns"}) return maps;
+  PICTURA_CHECK(!towns.empty(), "--map towns: {} has none", map_folder());
+  return towns;
 }
 
 void report_benchmark(bool json, const BenchContext& context, std::vector<BenchResult> results) {

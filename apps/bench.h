@@ -14,11 +14,11 @@ namespace pictura {
 std::string processor_name();
 /// The agents of a world whose options say all of them, in words.
 std::string population_of(const WorldOptions& world);
-/// Where no map is named: the town that the numbers of docs/ are about, or the procedural one where it is missing.
-std::string default_benchmark_map();
 
 /// Adds the option --map, which takes several.
 void add_maps_option(CLI::App* command, std::vector<std::string>* maps);
+/// The maps that it means: `towns` is all of the map folder, which may not be empty then; nothing, the default one.
+std::vector<std::string> named_maps(const std::vector<std::string>& maps);
 
 /// What results were measured on.
 struct BenchContext {

@@ -10,7 +10,6 @@
 #include "pictura/apps/report.h"
 #include "pictura/bench/render.h"
 #include "pictura/common/error.h"
-#include "pictura/map/load_map.h"
 
 namespace pictura {
 
@@ -51,12 +50,7 @@ void apply_defaults(Arguments* arguments) {
   apply_sweep(arguments);
   if (arguments->sizes.empty()) arguments->sizes = {"96x54"};
   if (arguments->egos.empty()) arguments->egos = {0};
-  const std::vector<std::string> towns = known_towns();
-  if (arguments->maps == std::vector<std::string>{"towns"}) {
-    PICTURA_CHECK(!towns.empty(), "--map towns: {} has none", map_folder());
-    arguments->maps = towns;
-  }
-  if (arguments->maps.empty()) arguments->maps = {default_benchmark_map()};
+  arguments->maps = named_maps(arguments->maps);
   const std::size_t cases =
       arguments->backends.size() * arguments->samples.size() * arguments->sizes.size() * arguments->egos.size();
   if (arguments->memory && cases > 1) {

@@ -145,12 +145,7 @@ void run(Arguments arguments) {
     if (arguments.plotted.empty() || arguments.figure.empty()) fail_usage("--plot and --figure: expected both");
     return draw_cost(arguments.plotted, arguments.figure);
   }
-  const std::vector<std::string> towns = known_towns();
-  if (arguments.maps == std::vector<std::string>{"towns"}) {
-    PICTURA_CHECK(!towns.empty(), "--map towns: {} has none", map_folder());
-    arguments.maps = towns;
-  }
-  if (arguments.maps.empty()) arguments.maps = {default_benchmark_map()};
+  arguments.maps = named_maps(arguments.maps);
   std::vector<std::shared_ptr<const RoadMap>> maps;
   for (const std::string& name : arguments.maps) maps.push_back(load_map(name));
   std::vector<BenchResult> results;
