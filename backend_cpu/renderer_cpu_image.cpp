@@ -228,7 +228,7 @@ void ImageDrawer::draw_planes(const ImageTarget& target) const {
     for (const ScreenFace& face : faces_) {
       if (y < face.box.y_begin || y >= face.box.y_end) continue;
       for (int x = face.box.x_begin; x < face.box.x_end; ++x) {
-        const Vec2 center{static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f};
+        const Vec2 center = pixel_middle(x, y);
         if (!covers_point(edges_.at(face.edge_begin), face.edge_count, center.x, center.y)) continue;
         take(fronts[static_cast<std::size_t>(x)], face, center);
       }
@@ -239,7 +239,7 @@ void ImageDrawer::draw_planes(const ImageTarget& target) const {
     offer(y, [](FrontFace& front, const ScreenFace& face, Vec2 at) { front.offer(face, at); });
     offer(y, [](FrontFace& front, const ScreenFace& face, Vec2 at) { front.offer_again(face, at); });
     for (int x = 0; x < width; ++x) {
-      const Vec2 center{static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f};
+      const Vec2 center = pixel_middle(x, y);
       const ScreenFace* face = fronts[static_cast<std::size_t>(x)].front(
           center, [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
       const std::size_t pixel =

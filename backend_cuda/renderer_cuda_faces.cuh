@@ -26,10 +26,7 @@ __device__ inline GroundOutline ground_outline(const PinholeCamera& camera, cons
   GroundOutline outline;
   outline.corner[0] = camera.position_m.xy();
   PICTURA_KEEP_LOOP
-  for (int i = 0; i < 4; ++i) {
-    const float x = (i & 1) ? f.x_high : f.x_low, y = (i & 2) ? f.y_high : f.y_low;
-    outline.corner[i + 1] = (camera.position_m + (camera.right * x + camera.down * y + camera.forward) * far_m).xy();
-  }
+  for (int i = 0; i < 4; ++i) outline.corner[i + 1] = far_corner(camera, f, i, far_m).xy();
   return outline;
 }
 

@@ -69,13 +69,18 @@ PICTURA_HD inline bool ball_in_frustum(const Frustum& f, Vec3 center, float radi
          (f.y_high * center.z - center.y) * f.y_high_scale > -radius_m;
 }
 
+/// One of the four corners (0 to 3) of what is drawn at a depth of far_m, in the world.
+PICTURA_HD inline Vec3 far_corner(const PinholeCamera& camera, const Frustum& f, int corner, float far_m) {
+  const float x = (corner & 1) ? f.x_high : f.x_low;
+  const float y = (corner & 2) ? f.y_high : f.y_low;
+  return camera.position_m + (camera.right * x + camera.down * y + camera.forward) * far_m;
+}
+
 /// Bounding box on the ground of what is drawn up to a depth of far_m.
 PICTURA_HD inline Aabb2 frustum_ground_box(const PinholeCamera& camera, const Frustum& f, float far_m) {
   Aabb2 box{camera.position_m.xy(), camera.position_m.xy()};
   for (int corner = 0; corner < 4; ++corner) {
-    const float x = (corner & 1) ? f.x_high : f.x_low;
-    const float y = (corner & 2) ? f.y_high : f.y_low;
-    const Vec3 p = camera.position_m + (camera.right * x + camera.down * y + camera.forward) * far_m;
+    const Vec3 p = far_corner(camera, f, corner, far_m);
     box.low = {min_of(box.low.x, p.x), min_of(box.low.y, p.y)};
     box.high = {max_of(box.high.x, p.x), max_of(box.high.y, p.y)};
   }

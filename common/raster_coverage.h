@@ -7,10 +7,8 @@
 
 namespace pictura {
 
-/// Corners that a face of so many may have once it is clipped: five planes add at most one each; one more is room for a
-/// cut while it is made.
-PICTURA_HD constexpr int clipped_corners(int corners) { return corners + 6; }
-constexpr int kMaxPolygonCorners = clipped_corners(kMaxFaceCorners);
+/// Clipping by five planes adds at most one corner each; one more is room for a cut while it is made.
+constexpr int kMaxPolygonCorners = kMaxFaceCorners + 6;
 static_assert(kMaxPolygonCorners <= 32);  // pixel_coverage has a bit for each edge
 
 /// How far a point is inside of the five planes of the drawn volume, each by a measure of its own; negative outside.
@@ -43,12 +41,11 @@ PICTURA_HD inline unsigned planes_crossed(const Frustum& f, const Vec3* corners,
 }
 
 /// Clips a convex face to the near plane and the guard band. Writes to polygon_out (camera coordinates, room for
-/// kRoom = clipped_corners(count) at least) and returns the number of corners; below 3 nothing is left.
-template <int kRoom = kMaxPolygonCorners>
+/// kMaxPolygonCorners) and returns the number of corners; below 3 nothing is left.
 PICTURA_HD inline int clip_face(const Frustum& f, const Vec3* corners, int count, Vec3* polygon_out) {
   const unsigned crossed = planes_crossed(f, corners, count);
   if (crossed == kOutside) return 0;
-  Vec3 buffer[kRoom];
+  Vec3 buffer[kMaxPolygonCorners];
   const Vec3* from = corners;
   int remaining_planes = 0;
   for (int plane = 0; plane < kClipPlanes; ++plane) remaining_planes += (crossed >> plane) & 1u;
@@ -67,7 +64,7 @@ PICTURA_HD inline int clip_face(const Frustum& f, const Vec3* corners, int count
     float previous_inside = inside_plane(f, plane, previous);
     // Only a face that is not quite convex could outgrow the room; it loses corners then.
     PICTURA_KEEP_LOOP
-    for (int i = 0; i < count && kept + 2 <= kRoom; ++i) {
+    for (int i = 0; i < count && kept + 2 <= kMaxPolygonCorners; ++i) {
       const Vec3 current = from[i];
       const float current_inside = inside_plane(f, plane, current);
       // A cut is computed from its inner corner, whichever way round: faces that share an edge get the same point.

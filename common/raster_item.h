@@ -41,17 +41,16 @@ PICTURA_HD constexpr uint16_t instance_of(const ScreenFace& face) {
 }
 
 /// Clips and projects a face. Its edges go to a pool: take(count) returns the index of the first, or -1 where there is
-/// no room left, and at(index) its address. kRoom: see clip_face. False where nothing of it is in the image.
-template <int kRoom = kMaxPolygonCorners, typename EdgePool>
+/// no room left, and at(index) its address. False where nothing of it is in the image.
+template <typename EdgePool>
 PICTURA_HD inline bool make_face(const ImageSetting& setting, FaceOwner owner, const Vec3* corners, int count,
                                  const FacePlane& plane, Rgb color, EdgePool& pool, ScreenFace* face_out) {
-  Vec3 polygon[kRoom];
-  const int kept = clip_face<kRoom>(setting.frustum, corners, count, polygon);
+  Vec3 polygon[kMaxPolygonCorners];
+  const int kept = clip_face(setting.frustum, corners, count, polygon);
   if (kept < 3) return false;
   const int32_t edge_begin = pool.take(kept);
   if (edge_begin < 0) return false;
-  if (!make_screen_face<kRoom>(setting.camera, polygon, kept, plane, color, pool.at(edge_begin), face_out))
-    return false;
+  if (!make_screen_face(setting.camera, polygon, kept, plane, color, pool.at(edge_begin), face_out)) return false;
   face_out->edge_begin = edge_begin;
   face_out->number = owner.number;
   face_out->class_id = owner.class_id;
