@@ -128,6 +128,25 @@ __device__ void mark_full(const Memory& memory, int num_faces, const Band& band)
   visit_rows(memory, num_faces, band, mark, [](FaceBatch) {});
 }
 
+// The face that covers a pixel fully and hides what is behind it; kNone where there is none, or where it stands among
+// the pixel's fragments, because another one that covers the pixel fully may intersect it.
+template <typename Memory>
+__device__ typename Memory::Word full_of(const Memory& memory, int pixel) {
+  const bool is_listed = (memory.full_listed[pixel / 32] >> (pixel % 32) & 1u) != 0;
+  return is_listed ? Memory::kNone : memory.pixels[pixel] >> Memory::kHalf;
+}
+// True for one of those who ask to put a pixel's full face among its fragments.
+template <typename Memory>
+__device__ bool list_full(const Memory& memory, int pixel) {
+  const uint32_t bit = 1u << (pixel % 32);
+  return (atomicOr(&memory.full_listed[pixel / 32], bit) & bit) == 0;
+}
+template <typename Memory>
+__device__ void forget_listed(const Memory& memory) {
+  PICTURA_KEEP_LOOP
+  for (int w = static_cast<int>(threadIdx.x); w <= memory.max_pixels / 32; w += kThreads) memory.full_listed[w] = 0;
+}
+
 // Turns the marks of a band into what pixels hold from then on: in the upper half the full face (kNone: none), in the
 // lower half the head of the list of fragments.
 template <typename Memory>
@@ -139,8 +158,7 @@ __device__ void start_lists(const Memory& memory, int count) {
     const Word full = face < 0 ? Memory::kNone : static_cast<Word>(face);
     memory.pixels[p] = full << Memory::kHalf | Memory::kNone;
   }
-  PICTURA_KEEP_LOOP
-  for (int w = static_cast<int>(threadIdx.x); w <= count / 32; w += kThreads) memory.full_hidden[w] = 0;
+  forget_listed(memory);
 }
 
 // Stores the fragments of those lanes that have one, and links them to their pixels. Those that find no room are
@@ -206,17 +224,19 @@ __device__ void make_fragments(const Memory& memory, int num_faces, const Band& 
       if (queue.is_ready()) cover_pixels<Memory>(queue.take(), batch, band);
     });
     share_out(warp, full, [&](int owner, int k) {
-      bool shows = false;
-      int face = 0, pixel = 0;
+      bool shows = false, lists = false;
+      int face = 0, full = 0, pixel = 0;
       if (owner >= 0) {
         const RowJob& row = warp->jobs[owner];
         const int x = row.full_begin + k;
         face = row.face;
         pixel = band.pixel(x, row.y);
-        const ScreenFace* hiding = full_face(pixel);
-        shows = hiding != &memory.faces[face] && may_show_before(memory.faces[face], *hiding, x, row.y, true);
+        full = static_cast<int>(memory.pixels[pixel] >> Memory::kHalf);
+        shows = full != face && may_show_before(memory.faces[face], memory.faces[full], x, row.y, true);
+        lists = shows && list_full(memory, pixel);
       }
       if (__any_sync(kAllLanes, shows)) store_fragment<Memory>(shows, {1.0f, kAllSamples}, face, pixel);
+      if (__any_sync(kAllLanes, lists)) store_fragment<Memory>(lists, {1.0f, kAllSamples}, full, pixel);
     });
   };
   visit_rows(memory, num_faces, band, visit, [&](FaceBatch batch) {
@@ -247,18 +267,14 @@ __device__ __noinline__ void ask_pairs(const DrawTask* task, WarpQueue::Pair pai
   const Memory memory = Memory::current();
   const int pixel = memory.pixel[pair.a];
   const bool with_full = pair.b == Memory::kNone;
-  const size_t face_b = with_full ? memory.pixels[pixel] >> Memory::kHalf : memory.face[pair.b];
+  const size_t face_b = with_full ? full_of(memory, pixel) : memory.face[pair.b];
   const PixelCoverage a = memory.coverage(static_cast<int>(pair.a));
   const PixelCoverage b = with_full ? PixelCoverage{1.0f, kAllSamples} : memory.coverage(static_cast<int>(pair.b));
   const Vec2 corner{static_cast<float>(band.x_of(pixel)), static_cast<float>(band.y_of(pixel))};
   const Hidden hidden = hide_each_other(a, b, memory.faces[memory.face[pair.a]], memory.faces[face_b], corner,
                                         [&](uint32_t solid, uint32_t strip) { return stands(task, solid, strip); });
   lose(memory, pair.a, hidden.of_a);
-  if (!with_full) {
-    lose(memory, pair.b, hidden.of_b);
-  } else if (hidden.of_b != 0) {
-    atomicOr(&memory.full_hidden[pixel / 32], 1u << (pixel % 32));
-  }
+  if (!with_full) lose(memory, pair.b, hidden.of_b);
 }
 
 // Asks every two fragments of a pixel that meet what they hide of each other; a pixel's full face is one of them. Pairs
@@ -274,7 +290,7 @@ __device__ void hide_fragments(const Memory& memory, const DrawTask& task, const
     const bool has_one = fragment < count;
     const PixelCoverage coverage = has_one ? memory.coverage(fragment) : PixelCoverage{};
     uint32_t other = has_one ? static_cast<uint32_t>(memory.next[fragment]) : kNone;
-    bool meets = has_one && memory.pixels[memory.pixel[fragment]] >> Memory::kHalf != kNone;
+    bool meets = has_one && full_of(memory, memory.pixel[fragment]) != kNone;
     uint32_t with = kNone;
     PICTURA_KEEP_LOOP
     for (;;) {
@@ -298,12 +314,8 @@ struct NoVisit {
   __device__ void operator()(const ScreenFace&, float) const {}
 };
 
-// What a pixel's full face weighs.
-template <typename Memory>
-__device__ PixelSum::Weight weight_of_full(const Memory& memory, int pixel) {
-  const bool hidden = (memory.full_hidden[pixel / 32] >> (pixel % 32) & 1u) != 0;
-  return PixelSum::weight_of({1.0f, kAllSamples}, hidden ? 0 : kAllSamples);
-}
+// What a pixel's full face weighs: nothing hides it that is not one itself.
+__device__ inline PixelSum::Weight weight_of_full() { return PixelSum::weight_of({1.0f, kAllSamples}, kAllSamples); }
 
 template <typename Memory>
 __device__ PixelSum::Weight weight_of_fragment(const Memory& memory, size_t fragment) {
@@ -323,7 +335,7 @@ __device__ bool has_short_list(const Memory& memory, typename Memory::Word head)
 template <typename Memory, typename Visit>
 __device__ Rgb weigh_pixel(const Memory& memory, int pixel, const Visit& visit) {
   const typename Memory::Word word = memory.pixels[pixel];
-  const auto full = word >> Memory::kHalf, head = word & Memory::kNone;
+  const auto full = full_of(memory, pixel), head = word & Memory::kNone;
   auto alone = [&](size_t face, float area) {
     visit(memory.faces[face], area);
     return memory.faces[face].color * area;
@@ -331,7 +343,7 @@ __device__ Rgb weigh_pixel(const Memory& memory, int pixel, const Visit& visit) 
   if (head == Memory::kNone) return full == Memory::kNone ? Rgb{} : alone(full, 1.0f);
   if (full == Memory::kNone && memory.next[head] == Memory::kNone) return alone(memory.face[head], memory.area[head]);
 
-  const PixelSum::Weight of_full = weight_of_full(memory, pixel);
+  const PixelSum::Weight of_full = weight_of_full();
   PixelSum sum;
   if (full != Memory::kNone) sum.add(of_full, memory.faces[full].color);
   PICTURA_KEEP_LOOP
@@ -393,8 +405,8 @@ __device__ void weigh_part(const Memory& memory, const Band& part, const Visit& 
     for (int kind = 0; kind < PixelSum::kNumKinds; ++kind) {
       sum.add(static_cast<PixelSum::Kind>(kind), shared.part[kind]);
     }
-    const Word full = memory.pixels[shared.pixel] >> Memory::kHalf;
-    if (full != Memory::kNone) sum.add(weight_of_full(memory, shared.pixel), memory.faces[full].color);
+    const Word full = full_of(memory, shared.pixel);
+    if (full != Memory::kNone) sum.add(weight_of_full(), memory.faces[full].color);
     return sum;
   };
   PICTURA_KEEP_LOOP
@@ -402,8 +414,8 @@ __device__ void weigh_part(const Memory& memory, const Band& part, const Visit& 
     const int pixel = memory.sums[at].pixel;
     const PixelSum sum = sum_of(static_cast<size_t>(at));
     const PixelSum::Shares shares = sum.shares();
-    const Word full = memory.pixels[pixel] >> Memory::kHalf;
-    if (full != Memory::kNone) visit(memory.faces[full], shares.of(weight_of_full(memory, pixel)));
+    const Word full = full_of(memory, pixel);
+    if (full != Memory::kNone) visit(memory.faces[full], shares.of(weight_of_full()));
     finish(part.x_of(pixel), part.y_of(pixel), sum.color(shares));
   }
   if constexpr (Visit::kWanted) {
@@ -474,6 +486,7 @@ __device__ bool draw_faces(const Memory& memory, const DrawTask& task, int num_f
         for (int p = thread; p < (part.y_end - part.y_begin) * width; p += kThreads) {
           memory.pixels[part.offset + p] |= Memory::kNone;
         }
+        forget_listed(memory);
         __syncthreads();
         continue;
       }

@@ -33,7 +33,7 @@ struct BlockMemory {
   uint32_t* lights;   // [max_lights] ... that are lights
   // While pixels are drawn.
   Word* pixels;           // [max_pixels] of a band
-  uint32_t* full_hidden;  // [max_pixels / 32 + 1] a bit for each pixel: something full is in front of its full face
+  uint32_t* full_listed;  // [max_pixels / 32 + 1] a bit for each pixel: its full face stands among its fragments
   // Fragments, each of one pixel and linked to the pixel's others.
   uint32_t *samples_low, *samples_high, *free_low, *free_high;  // [max_fragments]
   float* area;                                                  // [max_fragments]
@@ -75,7 +75,7 @@ __host__ __device__ size_t lay_out(Memory* memory, const Scratch& sizes, int max
   of_faces.place(&memory->visible, memory->max_visible);
   of_faces.place(&memory->lights, memory->max_lights);
   of_pixels.place(&memory->pixels, max_pixels);
-  of_pixels.place(&memory->full_hidden, max_pixels / 32 + 1);
+  of_pixels.place(&memory->full_listed, max_pixels / 32 + 1);
   of_pixels.place(&memory->samples_low, memory->max_fragments);
   of_pixels.place(&memory->samples_high, memory->max_fragments);
   of_pixels.place(&memory->free_low, memory->max_fragments);
