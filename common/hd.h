@@ -43,15 +43,6 @@ using std::uint8_t;
 
 namespace pictura {
 
-/// Number of the lowest bit that is set; `bits` is not 0.
-PICTURA_HD inline int first_bit(uint32_t bits) {
-#if defined(__CUDA_ARCH__)
-  return __ffs(static_cast<int>(bits)) - 1;
-#else
-  return __builtin_ctz(bits);
-#endif
-}
-
 /// Number of bits that are set.
 PICTURA_HD inline int count_bits(uint64_t bits) {
 #if defined(__CUDA_ARCH__)

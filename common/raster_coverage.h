@@ -9,7 +9,6 @@ namespace pictura {
 
 /// Clipping by five planes adds at most one corner each; one more is room for a cut while it is made.
 constexpr int kMaxPolygonCorners = kMaxFaceCorners + 6;
-static_assert(kMaxPolygonCorners <= 32);  // pixel_coverage has a bit for each edge
 
 /// How far a point is inside of the five planes of the drawn volume, each by a measure of its own; negative outside.
 constexpr int kClipPlanes = 5;
@@ -93,7 +92,7 @@ PICTURA_HD inline Vec2 project(const PinholeCamera& camera, Vec3 p) {
 
 /// An edge of a polygon on screen. Its numbers do not depend on the direction in which a face walks it, but for the
 /// signs of a and b: two faces that share an edge split areas and samples between them exactly.
-struct PolygonEdge {
+struct alignas(16) PolygonEdge {
   float x0 = 0, y0 = 0;  // the upper end
   float y1 = 0;          // the lower end's y
   float dx_dy = 0;       // 0 for level edges, which bound no area
@@ -133,7 +132,7 @@ struct PixelBox {
 };
 
 /// A convex polygon on screen, without its edges, which stand in a pool.
-struct ScreenFace {
+struct alignas(16) ScreenFace {
   int32_t edge_begin = 0, edge_count = 0;
   PixelBox box;
   Rgb color;
@@ -215,7 +214,7 @@ PICTURA_HD inline bool covers_point(const PolygonEdge* edges, int count, float x
 
 /// The samples of a pixel: 8 columns of 8 rows, each column shifted down by its own part of a row, so that 64 different
 /// heights occur: road scenes are full of nearly level edges. Sample (column, row) is bit 8 * column + row.
-constexpr int kSampleColumns = 8;
+constexpr int kSampleColumns = 8, kSampleRows = 8;
 constexpr uint64_t kAllSamples = ~uint64_t{0};
 /// Offset of a column's first sample from the pixel's top, in rows.
 PICTURA_HD constexpr float sample_column_offset(int column) {
@@ -242,20 +241,28 @@ constexpr float kFullCoverage = 1e-3f;
 
 /// Samples on the inner side of an edge; left_px and top_px are the pixel's corner relative to the edge's upper end.
 PICTURA_HD inline uint64_t samples_inside(const PolygonEdge& edge, float left_px, float top_px) {
-  uint64_t samples = 0;
   if (edge.dy_dx == 0.0f && fabsf(edge.b) < kUpright_px) {
-    for (int column = 0; column < kSampleColumns; ++column) {
-      const bool right_of = left_px + (static_cast<float>(column) + 0.5f) / 8.0f >= 0.0f;
-      if (right_of) samples |= uint64_t{0xFF} << (8 * column);
-    }
+    const int left_of = static_cast<int>(ceilf(clamp(-8.0f * left_px - 0.5f, 0.0f, 8.0f)));
+    const uint64_t samples = left_of < kSampleColumns ? kAllSamples << (8 * left_of) : 0;
     return edge.a > 0.0f ? samples : ~samples;
   }
-  const float slope = edge.dy_dx * 8.0f, top = top_px * 8.0f;
+  // In rows of samples, which are as far apart as columns: where the edge's line passes the middle of the first column,
+  // and how far it goes down from one column to the next. As fixed point numbers, in which 8 columns do not overflow.
+  constexpr float kOne = 1 << 16, kSteepest = 1024.0f, kFarthest = 16.0f * kSteepest;
+  float step = edge.dy_dx, first = (left_px + 0.5f / 8.0f) * (8.0f * step) - 8.0f * top_px;
+  if (fabsf(step) > kSteepest) {
+    // As good as upright: it crosses the row at the same place.
+    first = first * (kSteepest / fabsf(step));
+    step = step > 0.0f ? kSteepest : -kSteepest;
+  }
+  const auto step_fixed = static_cast<int32_t>(step * kOne);
+  const auto first_fixed = static_cast<int32_t>(clamp(first, -kFarthest, kFarthest) * kOne);
+  uint64_t samples = 0;
   for (int column = 0; column < kSampleColumns; ++column) {
-    const float x_px = left_px + (static_cast<float>(column) + 0.5f) / 8.0f;
-    const float first_row = x_px * slope - top - sample_column_offset(column);
-    const int rows_above = static_cast<int>(ceilf(clamp(first_row, 0.0f, 8.0f)));
-    samples |= ((uint64_t{0xFF} << rows_above) & 0xFF) << (8 * column);
+    constexpr float kRoundUp = 65535.0f / 65536.0f;
+    const auto offset = static_cast<int32_t>((kRoundUp - sample_column_offset(column)) * kOne);
+    const int rows_above = min_of(max_of((first_fixed + column * step_fixed + offset) >> 16, 0), kSampleRows);
+    samples |= static_cast<uint64_t>((0xFFu << rows_above) & 0xFFu) << (8 * column);
   }
   return edge.b > 0.0f ? samples : ~samples;
 }
@@ -271,40 +278,54 @@ PICTURA_HD inline float mean_width_left(float xa, float xb) {
   return (0.5f * (inner_high - inner_low) * (inner_high + inner_low) + beyond) / (high - low);
 }
 
+/// How a pixel lies to an edge's line. A pixel that is outside of one edge has nothing of the polygon.
+enum class PixelSide : uint8_t { outside, crossed, inside };
+PICTURA_HD inline PixelSide side_of(const PolygonEdge& edge, int x, int y) {
+  const float at_corner =
+      edge.a * (static_cast<float>(x) - edge.x0) + edge.b * (static_cast<float>(y) - edge.y0);
+  if (at_corner + max_of(edge.a, 0.0f) + max_of(edge.b, 0.0f) <= 0.0f) return PixelSide::outside;
+  return at_corner + min_of(edge.a, 0.0f) + min_of(edge.b, 0.0f) < 0.0f ? PixelSide::crossed : PixelSide::inside;
+}
+
+/// What an edge adds to the polygon's area in pixel (x, y): right borders the area to their left, and left borders the
+/// same negative. In whole units, so that the sum over edges does not depend on their order.
+constexpr float kAreaUnits = 1 << 24;  // of a pixel
+PICTURA_HD inline int32_t area_left_of(const PolygonEdge& edge, PixelSide side, int x, int y) {
+  const float y_px = static_cast<float>(y);
+  const float from = clamp(edge.y0 - y_px, 0.0f, 1.0f), to = clamp(edge.y1 - y_px, 0.0f, 1.0f);
+  if (from >= to) return 0;
+  // A border that does not cross the pixel is to its right, or has nothing of it to its left.
+  float width = edge.a < 0.0f ? 1.0f : 0.0f;
+  if (side == PixelSide::crossed) {
+    const float left_px = static_cast<float>(x) - edge.x0, top_px = y_px - edge.y0;
+    width = mean_width_left((from + top_px) * edge.dx_dy - left_px, (to + top_px) * edge.dx_dy - left_px);
+  }
+  const auto units = static_cast<int32_t>((to - from) * width * kAreaUnits + 0.5f);
+  return edge.a < 0.0f ? units : -units;
+}
+
+/// ... of the sum over all edges, and the samples on the inner side of those that cross the pixel.
+PICTURA_HD inline PixelCoverage rounded_coverage(int32_t area_units, uint64_t samples) {
+  const float area = static_cast<float>(area_units) * (1.0f / kAreaUnits);
+  if (samples == kAllSamples && area > 1.0f - kFullCoverage) return {1.0f, kAllSamples};
+  if (area < kLeastCoverage) return {0.0f, 0};
+  return {min_of(area, 1.0f), samples};
+}
+
 /// Exact area of a convex polygon in pixel (x, y), and the samples that it covers.
 PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int count, int x, int y) {
-  PixelCoverage coverage{0.0f, kAllSamples};
-  const float x_px = static_cast<float>(x), y_px = static_cast<float>(y);
-  // Which edges cross the pixel, and which reach into its row: few of them, so that threads that look at different
-  // edges still take the same steps.
-  unsigned crossing = 0, beside = 0;
-  PICTURA_KEEP_LOOP
+  int32_t area_units = 0;
+  uint64_t samples = kAllSamples;
   for (int i = 0; i < count; ++i) {
     const PolygonEdge& edge = edges[i];
-    const float at_corner = edge.a * (x_px - edge.x0) + edge.b * (y_px - edge.y0);
-    if (at_corner + max_of(edge.a, 0.0f) + max_of(edge.b, 0.0f) <= 0.0f) return {0.0f, 0};
-    if (at_corner + min_of(edge.a, 0.0f) + min_of(edge.b, 0.0f) < 0.0f) crossing |= 1u << i;
-    if (edge.y0 < y_px + 1.0f && edge.y1 > y_px) beside |= 1u << i;
+    const PixelSide side = side_of(edge, x, y);
+    if (side == PixelSide::outside) return {0.0f, 0};
+    if (side == PixelSide::crossed) {
+      samples &= samples_inside(edge, static_cast<float>(x) - edge.x0, static_cast<float>(y) - edge.y0);
+    }
+    area_units += area_left_of(edge, side, x, y);
   }
-  if (crossing == 0) return {1.0f, kAllSamples};
-  PICTURA_KEEP_LOOP
-  for (; crossing != 0; crossing &= crossing - 1) {
-    const PolygonEdge& edge = edges[first_bit(crossing)];
-    coverage.samples &= samples_inside(edge, x_px - edge.x0, y_px - edge.y0);
-  }
-  // Signed area to the left of the edges within the pixel: what right borders add and left borders take away.
-  PICTURA_KEEP_LOOP
-  for (; beside != 0; beside &= beside - 1) {
-    const PolygonEdge& edge = edges[first_bit(beside)];
-    const float left_px = x_px - edge.x0, top_px = y_px - edge.y0;
-    const float from = clamp(edge.y0 - y_px, 0.0f, 1.0f), to = clamp(edge.y1 - y_px, 0.0f, 1.0f);
-    const float width = mean_width_left((from + top_px) * edge.dx_dy - left_px, (to + top_px) * edge.dx_dy - left_px);
-    coverage.area += edge.a < 0.0f ? (to - from) * width : (from - to) * width;
-  }
-  if (coverage.samples == kAllSamples && coverage.area > 1.0f - kFullCoverage) return {1.0f, kAllSamples};
-  if (coverage.area < kLeastCoverage) return {0.0f, 0};
-  coverage.area = min_of(coverage.area, 1.0f);
-  return coverage;
+  return rounded_coverage(area_units, samples);
 }
 
 /// Range of pixels of row y that the polygon may touch, and within it the range that it covers fully.
