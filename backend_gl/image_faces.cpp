@@ -13,10 +13,6 @@ namespace {
 // them to 24 bits of the whole range), and in all by less than what parts two levels of road.
 constexpr float kPushStep = 1e-4f, kMostPush = 0.02f;
 
-// Bounds on what the compared depth of a strip's corner is divided by: as good as infinitely far, beyond the horizon of
-// its plane, and as near as the oracle lets it come.
-constexpr float kLeastNearness = 1e-4f, kMostNearness = kWidenedDepth;
-
 // A strip's plane, lowered, where it is below the camera, by how far solids that stand on it may dip into it: compared
 // by depth, they are then in front.
 FacePlane lowered(const FacePlane& plane, const PinholeCamera& camera) {
@@ -26,10 +22,9 @@ FacePlane lowered(const FacePlane& plane, const PinholeCamera& camera) {
   return {plane.normal, camera_above ? plane.offset - kStanding_m * above : plane.offset};
 }
 
-// Depth of a corner over the depth of the plane there. The floor on a strip's width moves its corners out of its plane.
-float nearness(const FacePlane& plane, Vec3 corner) {
-  if (plane.offset == 0.0f) return 1.0f;
-  return clamp(dot(plane.normal, corner) / plane.offset, kLeastNearness, kMostNearness);
+ComparedDepth pushed(const FacePlane& plane, float push) {
+  if (plane.offset == 0.0f) return {};
+  return {plane.normal * (1.0f / plane.offset), push};
 }
 
 }  // namespace
@@ -39,15 +34,13 @@ void ImageFaces::gather(const ImageSetting& setting, const RasterGeometry& geome
   faces_.clear();
   strips_.clear();
   // A convex polygon as a fan of quadrilaterals; with an odd number of corners the last one is a triangle.
-  auto add = [&](const Vec3* corners, int count, Rgb color, auto&& nearness_of) {
-    auto corner = [&](int i) { return FaceInstance::Corner{corners[i], nearness_of(corners[i])}; };
+  auto add = [&](const Vec3* corners, int count, const ComparedDepth& compared, Rgb color) {
     for (int i = 1; i + 1 < count; i += 2) {
-      faces_.push_back({{corner(0), corner(i), corner(i + 1), corner(std::min(i + 2, count - 1))}, color, layer});
+      faces_.push_back(
+          {{corners[0], corners[i], corners[i + 1], corners[std::min(i + 2, count - 1)]}, compared, color, layer});
     }
   };
-  auto emit = [&](const Vec3* corners, int count, const FacePlane&, Rgb color) {
-    add(corners, count, color, [](Vec3) { return 1.0f; });
-  };
+  auto emit = [&](const Vec3* corners, int count, const FacePlane&, Rgb color) { add(corners, count, {}, color); };
   visit_agents(setting, scene, view,
                [&](const AgentBox& box, int32_t) { agent_faces(box, setting.camera, setting.debug_palette, emit); });
   visit_walls(setting, geometry, [&](const WallFace& wall, int32_t) { wall_faces(wall, setting.camera, emit); });
@@ -62,8 +55,7 @@ void ImageFaces::gather(const ImageSetting& setting, const RasterGeometry& geome
   for (const RankedStrip& ranked : strips_) {
     push += step;
     auto emit_strip = [&](const Vec3* corners, int count, const FacePlane& plane, Rgb color) {
-      const FacePlane compared = lowered(plane, setting.camera);
-      add(corners, count, color, [&](Vec3 corner) { return nearness(compared, corner) / push; });
+      add(corners, count, pushed(lowered(plane, setting.camera), push), color);
     };
     strip_faces(*ranked.strip, setting.camera, setting.line_floor_px, emit_strip);
   }

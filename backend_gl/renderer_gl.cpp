@@ -101,7 +101,10 @@ class GlRenderer final : public Renderer {
     program_ = gl::make_program(
         *gl_, {{GL_VERTEX_SHADER, gl::kFaceVertexShader}, {GL_FRAGMENT_SHADER, gl::kFaceFragmentShader}});
     projection_ = gl_->GetUniformLocation(program_, "projection");
+    positions_ = gl_->GetUniformLocation(program_, "positions");
     gl_->ProgramUniform1f(program_, gl_->GetUniformLocation(program_, "near_m"), kNear_m);
+    gl_->ProgramUniform2f(program_, gl_->GetUniformLocation(program_, "nearness"), gl::kLeastNearness,
+                          gl::kMostNearness);
     gl_->CreateBuffers(1, &instances_);
     gl_->CreateVertexArrays(1, &vertex_array_);
     gl_->VertexArrayVertexBuffer(vertex_array_, 0, instances_, 0, sizeof(FaceInstance));
@@ -116,10 +119,11 @@ class GlRenderer final : public Renderer {
       }
     };
     for (GLuint corner = 0; corner < 4; ++corner) {
-      attribute(corner, 4, offsetof(FaceInstance, corner) + corner * sizeof(FaceInstance::Corner));
+      attribute(corner, 3, offsetof(FaceInstance, corner) + corner * sizeof(Vec3));
     }
-    attribute(4, 3, offsetof(FaceInstance, color));
-    attribute(5, 0, offsetof(FaceInstance, layer));
+    attribute(4, 4, offsetof(FaceInstance, compared));
+    attribute(5, 3, offsetof(FaceInstance, color));
+    attribute(6, 0, offsetof(FaceInstance, layer));
     // Depth is inverse: 1 at the near plane, 0 infinitely far; single precision is then fine at every range.
     gl_->ClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
     gl_->Enable(GL_DEPTH_TEST);
@@ -227,6 +231,8 @@ class GlRenderer final : public Renderer {
     const float width = static_cast<float>(camera.width_px), height = static_cast<float>(camera.height_px);
     gl_->ProgramUniform4f(program_, projection_, 2.0f * camera.focal_x_px / width, 2.0f * camera.focal_y_px / height,
                           2.0f * camera.center_x_px / width - 1.0f, 2.0f * camera.center_y_px / height - 1.0f);
+    const float positions_px = static_cast<float>(config_.samples.grid << gl_->integer(GL_SUBPIXEL_BITS));
+    gl_->ProgramUniform2f(program_, positions_, 0.5f * positions_px * width, 0.5f * positions_px * height);
   }
 
   RendererConfig config_;
@@ -237,7 +243,7 @@ class GlRenderer final : public Renderer {
   std::unique_ptr<gl::Functions> gl_;
   std::vector<SizeGroup> groups_;
   GLuint program_ = 0, instances_ = 0, vertex_array_ = 0;
-  GLint projection_ = -1;
+  GLint projection_ = -1, positions_ = -1;
   std::deque<StaticGeometry> copies_;  // their addresses stay: geometries_ point into them
   std::vector<RasterGeometry> geometries_;
   gl::HostScene host_scene_;
