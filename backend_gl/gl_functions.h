@@ -20,8 +20,8 @@ namespace pictura::gl {
   X(GetShaderiv) X(GetString) X(GetStringi) X(GetTextureLevelParameteriv) X(GetUniformLocation) X(LinkProgram) \
   X(MapNamedBufferRange) X(MemoryBarrier) X(NamedBufferData) X(NamedBufferStorage) \
   X(NamedFramebufferTexture) X(ProgramUniform1f) X(ProgramUniform1i) X(ProgramUniform2f) X(ProgramUniform2i) \
-  X(ProgramUniform4f) X(ShaderSource) X(TextureStorage3D) X(TextureStorage3DMultisample) X(UnmapNamedBuffer) X(UseProgram) \
-  X(VertexArrayAttribBinding) X(VertexArrayAttribFormat) X(VertexArrayAttribIFormat) \
+  X(ProgramUniform4f) X(ShaderSource) X(TextureStorage3D) X(TextureStorage3DMultisample) X(UnmapNamedBuffer) \
+  X(UseProgram) X(VertexArrayAttribBinding) X(VertexArrayAttribFormat) X(VertexArrayAttribIFormat) \
   X(VertexArrayBindingDivisor) X(VertexArrayVertexBuffer) X(Viewport)
 // clang-format on
 

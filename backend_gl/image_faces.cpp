@@ -8,23 +8,21 @@ namespace pictura::gl {
 
 namespace {
 
-// Strips of one level lie in one plane, where rounding would decide which is in front. Each is therefore pushed away
-// from the camera by its place in the order of ranks: by steps well above the rounding of depths (hardware interpolates
-// them to 24 bits of the whole range), and in all by less than what parts two levels of road.
-constexpr float kPushStep = 1e-4f, kMostPush = 0.02f;
+// Strips of one level lie nearly in one plane, where rank is to decide which is in front. Each is therefore compared as
+// if it lay further from the camera, the more so the later it comes in the order of ranks: seen from above by up to
+// kMostPush_m, which is several times what parts strips of one level, and little to what parts two levels of road. Seen
+// from below, what stands on a strip is just behind it and has to stay there: by this share of its plane's distance.
+constexpr float kMostPush_m = 4 * kSameLevel_m, kMostPushShare = 0.01f;
 
-// A strip's plane, lowered, where it is below the camera, by how far solids that stand on it may dip into it: compared
-// by depth, they are then in front.
-FacePlane lowered(const FacePlane& plane, const PinholeCamera& camera) {
+// The plane whose depth is compared for a strip that has `order`, 0 to 1, among those of the image. Where it is below
+// the camera it is lowered by how far solids that stand on it may dip into it: they are then in front.
+Vec3 compared_plane(const FacePlane& plane, const PinholeCamera& camera, float order) {
   const Vec3 up{camera.right.z, camera.down.z, camera.forward.z};
   const float above = dot(plane.normal, up);  // also the scale of the offset: above * height of the plane
   const bool camera_above = plane.offset * above <= 0.0f;
-  return {plane.normal, camera_above ? plane.offset - kStanding_m * above : plane.offset};
-}
-
-ComparedDepth pushed(const FacePlane& plane, float push) {
-  if (plane.offset == 0.0f) return {};
-  return {plane.normal * (1.0f / plane.offset), push};
+  const float offset = camera_above ? plane.offset - (kStanding_m + order * kMostPush_m) * above
+                                    : plane.offset * (1.0f + order * kMostPushShare);
+  return offset == 0.0f ? Vec3{} : plane.normal * (1.0f / offset);
 }
 
 }  // namespace
@@ -34,7 +32,7 @@ void ImageFaces::gather(const ImageSetting& setting, const RasterGeometry& geome
   faces_.clear();
   strips_.clear();
   // A convex polygon as a fan of quadrilaterals; with an odd number of corners the last one is a triangle.
-  auto add = [&](const Vec3* corners, int count, const ComparedDepth& compared, Rgb color) {
+  auto add = [&](const Vec3* corners, int count, Vec3 compared, Rgb color) {
     for (int i = 1; i + 1 < count; i += 2) {
       faces_.push_back(
           {{corners[0], corners[i], corners[i + 1], corners[std::min(i + 2, count - 1)]}, compared, color, layer});
@@ -50,14 +48,12 @@ void ImageFaces::gather(const ImageSetting& setting, const RasterGeometry& geome
   visit_strips(setting, geometry,
                [&](const Strip& strip, int32_t index) { strips_.push_back({strip_number(strip, index), &strip}); });
   std::sort(strips_.begin(), strips_.end(), [](const RankedStrip& a, const RankedStrip& b) { return a.rank < b.rank; });
-  const float step = std::min(kPushStep, kMostPush / static_cast<float>(strips_.size() + 1));
-  float push = 1.0f;
-  for (const RankedStrip& ranked : strips_) {
-    push += step;
+  for (std::size_t i = 0; i < strips_.size(); ++i) {
+    const float order = static_cast<float>(i) / static_cast<float>(strips_.size());
     auto emit_strip = [&](const Vec3* corners, int count, const FacePlane& plane, Rgb color) {
-      add(corners, count, pushed(lowered(plane, setting.camera), push), color);
+      add(corners, count, compared_plane(plane, setting.camera, order), color);
     };
-    strip_faces(*ranked.strip, setting.camera, setting.line_floor_px, emit_strip);
+    strip_faces(*strips_[i].strip, setting.camera, setting.line_floor_px, emit_strip);
   }
 }
 

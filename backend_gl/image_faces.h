@@ -9,20 +9,15 @@
 
 namespace pictura::gl {
 
-/// Bounds on the depth of a strip's corner over that of its plane there: as good as infinitely far, beyond the horizon of
-/// the plane, and as near as the oracle lets it come.
+/// Bounds on the depth of a strip's corner over that of its compared plane there: as good as infinitely far, beyond the
+/// horizon of the plane, and as near as the oracle lets it come.
 constexpr float kLeastNearness = 1e-4f, kMostNearness = kWidenedDepth;
 
-/// What depth is compared of a face: its own, or that of a plane normal . p = 1 in camera coordinates, pushed away.
-struct ComparedDepth {
-  Vec3 normal;
-  float push = 0;  // factor on the plane's depth; 0: the face's own depth
-};
-
-/// One instance of the draw call: a flat quadrilateral.
+/// One instance of the draw call: a flat quadrilateral, in camera coordinates.
 struct FaceInstance {
-  Vec3 corner[4];  // in order around it, in camera coordinates
-  ComparedDepth compared;
+  Vec3 corner[4];  // in order around it
+  // The plane compared_plane . p = 1, whose depth decides what is in front; 0: the face's own depth does.
+  Vec3 compared_plane;
   Rgb color;
   int32_t layer = 0;  // of the image array
 };

@@ -121,7 +121,7 @@ class GlRenderer final : public Renderer {
     for (GLuint corner = 0; corner < 4; ++corner) {
       attribute(corner, 3, offsetof(FaceInstance, corner) + corner * sizeof(Vec3));
     }
-    attribute(4, 4, offsetof(FaceInstance, compared));
+    attribute(4, 3, offsetof(FaceInstance, compared_plane));
     attribute(5, 3, offsetof(FaceInstance, color));
     attribute(6, 0, offsetof(FaceInstance, layer));
     // Depth is inverse: 1 at the near plane, 0 infinitely far; single precision is then fine at every range.
@@ -231,6 +231,7 @@ class GlRenderer final : public Renderer {
     const float width = static_cast<float>(camera.width_px), height = static_cast<float>(camera.height_px);
     gl_->ProgramUniform4f(program_, projection_, 2.0f * camera.focal_x_px / width, 2.0f * camera.focal_y_px / height,
                           2.0f * camera.center_x_px / width - 1.0f, 2.0f * camera.center_y_px / height - 1.0f);
+    // Corners lie on a grid of so many parts of a texel.
     const float positions_px = static_cast<float>(config_.samples.grid << gl_->integer(GL_SUBPIXEL_BITS));
     gl_->ProgramUniform2f(program_, positions_, 0.5f * positions_px * width, 0.5f * positions_px * height);
   }

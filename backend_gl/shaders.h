@@ -3,36 +3,38 @@
 
 namespace pictura::gl {
 
-/// Hardware moves corners to the nearest 1/n of a texel, but not their depths with them: a face's plane then tilts, near
-/// the horizon by more than what parts strips of one level. So corners are put there first, and their depths asked
-/// there: whatever its corners, every strip of a plane then has the same depths but for rounding.
+/// Hardware moves corners to the nearest 1/n of a texel (GL_SUBPIXEL_BITS), but leaves them their depths: a face's
+/// plane then tilts, towards the horizon by more than what parts strips of one level. So corners are moved here, and
+/// their depths are asked where they then are: strips of one plane have the same depths, whatever their corners, but
+/// for rounding.
 constexpr const char* kFaceVertexShader = R"(#version 450 core
 #extension GL_ARB_shader_viewport_layer_array : require
 layout(location = 0) in vec3 corner0;  // camera coordinates
 layout(location = 1) in vec3 corner1;
 layout(location = 2) in vec3 corner2;
 layout(location = 3) in vec3 corner3;
-layout(location = 4) in vec4 compared;  // see ComparedDepth
+layout(location = 4) in vec3 compared_plane;
 layout(location = 5) in vec3 color;
 layout(location = 6) in int layer;
 uniform vec4 projection;  // scale of x and y, offset of x and y
-uniform vec2 positions;   // that hardware tells apart from 0 to 1, half an image
+uniform vec2 positions;   // of corners that hardware tells apart along half an image
 uniform vec2 nearness;    // bounds on the depth of a corner over that of the plane that is compared
 uniform float near_m;
 flat out vec3 face_color;
 void main() {
   // A strip of two triangles goes across the quadrilateral.
   vec3 p = gl_VertexID == 0 ? corner0 : gl_VertexID == 1 ? corner1 : gl_VertexID == 2 ? corner3 : corner2;
-  // What lies behind the near plane is nowhere on screen: hardware clips it, and moves the corners that this makes so
-  // far below the horizon that it does no harm.
-  vec2 at = projection.xy * p.xy + projection.zw * p.z;  // times depth
+  vec2 at = projection.xy * p.xy + projection.zw * p.z;  // on screen, times depth
+  // Behind the near plane there is no place on screen. The corners that clipping makes instead lie so far below the
+  // horizon that moving them tilts next to nothing.
   if (p.z >= near_m) {
     at = round(at / p.z * positions) / positions * p.z;
     p.xy = (at - projection.zw * p.z) / projection.xy;
   }
-  float over_compared = compared.w == 0.0 ? 1.0 : clamp(dot(compared.xyz, p), nearness.x, nearness.y) / compared.w;
+  // Its depth over the one that is compared.
+  float nearer = compared_plane == vec3(0.0) ? 1.0 : clamp(dot(compared_plane, p), nearness.x, nearness.y);
   // Inverse depth: 1 at the near plane, 0 infinitely far.
-  gl_Position = vec4(at, near_m * over_compared, p.z);
+  gl_Position = vec4(at, near_m * nearer, p.z);
   gl_Layer = layer;
   face_color = color;
 }
