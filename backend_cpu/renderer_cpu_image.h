@@ -55,7 +55,7 @@ class ImageDrawer {
       edges_.resize(edges_.size() + static_cast<std::size_t>(count));
       return static_cast<int32_t>(edges_.size()) - count;
     }
-    PolygonEdge* at(int32_t index) { return edges_.data() + index; }
+    void put(int32_t index, const PolygonEdge& edge) { edges_[static_cast<std::size_t>(index)] = edge; }
     const PolygonEdge* at(int32_t index) const { return edges_.data() + index; }
 
    private:

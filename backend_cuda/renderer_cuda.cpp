@@ -22,8 +22,10 @@ namespace {
 
 constexpr int kMaxWorldAgents = 4096;
 constexpr int kLargeBlocks = 8;
-// Fragments of one row of an image that the second launch has room for.
-constexpr int kLargeFragments = 1 << 18;
+// Room in the pool for the faces and edges of an image, on average. More than the images of CARLA's towns ask for.
+constexpr int kPoolFaces = 512, kPoolEdges = 2304;
+// Views that are drawn at once, at most: many enough to keep the device busy.
+constexpr std::size_t kViewsAtOnce = 512;
 
 // Owns what a launch's blocks work in.
 class ScratchBuffers {
@@ -56,6 +58,27 @@ class ScratchBuffers {
   DeviceBuffer<PolygonEdge> edges_;
   DeviceBuffer<cuda::Quad> quads_;
   DeviceBuffer<unsigned char> bytes_;
+};
+
+// The pool of faces that are gathered before they are drawn.
+class PoolBuffers {
+ public:
+  PoolBuffers() = default;
+  explicit PoolBuffers(std::size_t images)
+      : faces_(images * kPoolFaces), edges_(images * kPoolEdges), images_(images), overflow_images_(images) {}
+  cuda::FacePool view() const {
+    return {faces_.data(), edges_.data(), images_.data(), static_cast<int32_t>(faces_.size()),
+            static_cast<int32_t>(edges_.size())};
+  }
+  int32_t* overflow_images() const { return overflow_images_.data(); }
+  static constexpr std::size_t kImageBytes = kPoolFaces * sizeof(ScreenFace) + kPoolEdges * sizeof(PolygonEdge) +
+                                             sizeof(cuda::GatheredImage) + sizeof(int32_t);
+
+ private:
+  DeviceBuffer<ScreenFace> faces_;
+  DeviceBuffer<PolygonEdge> edges_;
+  DeviceBuffer<cuda::GatheredImage> images_;
+  DeviceBuffer<int32_t> overflow_images_;
 };
 
 // Pieces of one kind, by the cell of their middle.
@@ -135,7 +158,7 @@ class CudaRenderer final : public Renderer {
     PICTURA_CUDA(cuda::prepare_kernels(library_.kernels()));
     *origin_out = library_.origin();
     grow(0, 1);  // what is too little for any scene is told at once
-    counters_ = DeviceBuffer<int32_t>(2);
+    counters_ = DeviceBuffer<cuda::DrawCounters>(1);
     fault_.host()->view = -1;
   }
   std::string_view name() const override { return "cuda"; }
@@ -163,8 +186,9 @@ class CudaRenderer final : public Renderer {
     const auto views_at_once = static_cast<int32_t>(plan_.views);
     for (int32_t left = task.num_views; left > 0; left -= task.num_views, task.first_view += task.num_views) {
       task.num_views = std::min(left, views_at_once);
-      PICTURA_CUDA(cudaMemsetAsync(counters_.data(), 0, counters_.size() * sizeof(int32_t), on_stream));
-      PICTURA_CUDA(cuda::launch_draw(library_.kernels(), task, small_.view(), large_.view(), on_stream));
+      PICTURA_CUDA(cudaMemsetAsync(counters_.data(), 0, sizeof(cuda::DrawCounters), on_stream));
+      PICTURA_CUDA(
+          cuda::launch_draw(library_.kernels(), task, gather_.view(), large_.view(), processors_, on_stream));
     }
   }
 
@@ -213,9 +237,9 @@ class CudaRenderer final : public Renderer {
     task.line_floor_px = config_.line_floor_px;
     task.debug_palette = config_.debug_palette;
     task.fault = fault_.device();
-    task.next_image = counters_.data();
-    task.overflow_count = counters_.data() + 1;
-    task.overflow_images = overflow_images_.data();
+    task.pool = pool_.view();
+    task.counters = counters_.data();
+    task.overflow_images = pool_.overflow_images();
     for (std::size_t i = 0; i < cameras_.size(); ++i) {
       task.cameras[i].camera = cameras_[i];
       if (!images) continue;
@@ -230,7 +254,7 @@ class CudaRenderer final : public Renderer {
     return task;
   }
 
-  // Room for as many views as the bound allows, and in the second launch for all that a world can hold: after this
+  // Room for as many views as the bound allows, and in the last launch for all that a world can hold: after this
   // nothing is cut off. Allocates nothing where an earlier call needed as much.
   void grow(std::size_t agents_total, std::size_t views) {
     const int agents = static_cast<int>(std::min<std::size_t>(agents_total, kMaxWorldAgents));
@@ -241,30 +265,28 @@ class CudaRenderer final : public Renderer {
     large.max_visible = large.max_quads = large.max_faces;
     large.max_lights = std::max(1, most_heads_);
     large.max_edges = 9 * large.max_faces + kMaxPolygonCorners * most_heads_;
-    large.max_fragments = kLargeFragments;
     const cuda::Scratch& had = large_.view();
-    if (views <= most_views_ && large.max_faces == had.max_faces && large.max_edges == had.max_edges) {
-      return;
-    }
-    const std::size_t most_views = std::max(most_views_, views);
-    cuda::Scratch small = cuda::small_scratch(processors_);
-    const cuda::ScratchNeeds needs{.small_blocks = small.blocks,
+    const std::size_t most_views = std::max(most_views_, std::min(views, kViewsAtOnce));
+    if (most_views == most_views_ && large.max_faces == had.max_faces && large.max_edges == had.max_edges) return;
+    cuda::Scratch gather = cuda::gather_scratch(processors_);
+    const std::size_t large_bytes = cuda::large_block_bytes(large);
+    const cuda::ScratchNeeds needs{.small_blocks = gather.blocks,
                                    .large_blocks = kLargeBlocks,
-                                   .small_block_bytes = ScratchBuffers::block_bytes(small, 0),
-                                   .large_block_bytes = ScratchBuffers::block_bytes(large, cuda::block_bytes(large)),
+                                   .small_block_bytes = ScratchBuffers::block_bytes(gather, 0),
+                                   .large_block_bytes = ScratchBuffers::block_bytes(large, large_bytes),
                                    .views = most_views,
-                                   .view_bytes = cameras_.size() * sizeof(int32_t)};
+                                   .view_bytes = cameras_.size() * PoolBuffers::kImageBytes};
     plan_ = cuda::plan_scratch(needs, config_.max_scratch_bytes);
     most_views_ = most_views;
-    small.blocks = plan_.small_blocks;
+    gather.blocks = plan_.small_blocks;
     large.blocks = plan_.large_blocks;
     // Released before it is replaced, or both would count.
-    small_ = ScratchBuffers();
+    gather_ = ScratchBuffers();
     large_ = ScratchBuffers();
-    overflow_images_ = DeviceBuffer<int32_t>();
-    small_ = ScratchBuffers(small, 0);
-    large_ = ScratchBuffers(large, cuda::block_bytes(large));
-    overflow_images_ = DeviceBuffer<int32_t>(plan_.views * cameras_.size());
+    pool_ = PoolBuffers();
+    gather_ = ScratchBuffers(gather, 0);
+    large_ = ScratchBuffers(large, large_bytes);
+    pool_ = PoolBuffers(plan_.views * cameras_.size());
   }
 
   void throw_fault() {
@@ -289,9 +311,9 @@ class CudaRenderer final : public Renderer {
   int processors_ = 0, most_pieces_ = 0, most_heads_ = 0;
   std::size_t most_views_ = 0;
   cuda::ScratchPlan plan_;
-  ScratchBuffers small_, large_;
-  DeviceBuffer<int32_t> counters_;  // the next image of the first launch; those left to the second
-  DeviceBuffer<int32_t> overflow_images_;
+  ScratchBuffers gather_, large_;
+  PoolBuffers pool_;
+  DeviceBuffer<cuda::DrawCounters> counters_;
   MappedValue<cuda::Fault> fault_;
 };
 

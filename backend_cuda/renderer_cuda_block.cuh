@@ -6,61 +6,45 @@
 
 namespace pictura::cuda {
 
-constexpr int kThreads = 128, kWarpSize = 32, kWarps = kThreads / kWarpSize;
+constexpr int kWarpSize = 32, kMaxWarps = 16;
 constexpr unsigned kAllLanes = 0xFFFFFFFFu;
-/// Rows of an image that are drawn at once, at most.
-constexpr int kMaxBandRows = 256;
 
-/// What a view shows.
+/// What a view shows, for gathering its faces.
 struct ViewState {
   View view;
   const DeviceGeometry* geometry;
   int32_t world_begin, world_end, light_begin, light_end;
 };
 
-/// A row of a face: which pixels it touches, and which of those it covers fully.
-struct RowJob {
-  int32_t face;
-  uint16_t slot;  // of the face, among those that the warp works on
-  uint16_t y, begin, end, full_begin, full_end;
+/// Room for what a WarpQueue holds.
+struct WarpQueueRoom {
+  uint32_t a[2 * kWarpSize], b[2 * kWarpSize];
 };
-
-/// What the fragments of one pixel weigh, summed by many threads.
-struct SharedSum {
-  PixelSum::Part part[PixelSum::kNumKinds];
-  int32_t pixel;
-};
-
-/// Edges of a face that a warp keeps at hand; most faces have no more.
-constexpr int kNearEdges = 4;
 
 /// What a warp keeps for its lanes to read of each other.
 struct WarpState {
-  PolygonEdge edges[kWarpSize][kNearEdges];  // of the faces that it works on
-  int32_t edge_begin[kWarpSize], edge_count[kWarpSize];
-  RowJob jobs[kWarpSize];
-  uint32_t queue_a[2 * kWarpSize], queue_b[2 * kWarpSize];
+  WarpQueueRoom pixels, cuts;
   uint8_t owners[kWarpSize];
 };
 
-/// A pixel with fewer fragments besides its full face is one thread's.
-constexpr int kShortList = 3;
-__host__ __device__ constexpr int most_sums(int max_fragments) { return max_fragments / kShortList; }
-
-/// Faces that the mark of a pixel's nearest full face can tell apart in 32 bits.
-constexpr int kMarkedFaceBits = 11, kMostMarkedFaces = (1 << kMarkedFaceBits) - 1;
-
 /// In shared memory, whatever the block's other memory is.
 struct BlockState {
-  Scratch scratch;  // this block's
+  GatheredImage shown;  // what is drawn
+  Scratch scratch;      // this block's
+  // While faces are gathered.
   ViewState view;
   ImageSetting setting;
-  int32_t num_visible, num_quads, num_lights, num_faces, num_edges, num_fragments, num_sums, next_batch, overflow,
-      usable, image;
-  int32_t row_partial[kMaxBandRows];  // pixels of each row that faces cover partly
-  WarpState warps[kWarps];
+  ScreenFace* faces;   // of this image
+  PolygonEdge* edges;  // of all images in the pool
+  int32_t num_visible, num_quads, num_lights, num_faces, max_faces, num_edges, max_edges, overflow, usable;
+  // While pixels are drawn.
+  int32_t num_rows, num_candidates, num_fragments, num_drawn, next_batch, image;
+  int32_t sum_of_warp[2][kMaxWarps];
+  WarpState warps[kMaxWarps];
 };
 
+__device__ inline int num_threads() { return static_cast<int>(blockDim.x); }
+__device__ inline int num_warps() { return num_threads() / kWarpSize; }
 __device__ inline int lane_index() { return static_cast<int>(threadIdx.x) % kWarpSize; }
 __device__ inline int warp_index() { return static_cast<int>(threadIdx.x) / kWarpSize; }
 __device__ inline unsigned lanes_below() { return (1u << lane_index()) - 1; }
@@ -153,13 +137,13 @@ __device__ inline void share_out(WarpState* warp, int count, Visit&& visit, int 
 // push a pair; while is_ready(), take() gives a pair to each lane, or to as many as there are left.
 class WarpQueue {
  public:
-  __device__ explicit WarpQueue(WarpState* warp) : warp_(warp) {}
+  __device__ explicit WarpQueue(WarpQueueRoom* room) : room_(room) {}
   __device__ void push(bool wanted, uint32_t a, uint32_t b) {
     const unsigned pushing = __ballot_sync(kAllLanes, wanted);
     if (wanted) {
       const int place = count_ + __popc(pushing & lanes_below());
-      warp_->queue_a[place] = a;
-      warp_->queue_b[place] = b;
+      room_->a[place] = a;
+      room_->b[place] = b;
     }
     count_ += __popc(pushing);
   }
@@ -174,8 +158,8 @@ class WarpQueue {
     const int first = max_of(count_ - kWarpSize, 0), place = first + lane_index();
     Pair pair{place < count_, 0, 0};
     if (pair.is_one) {
-      pair.a = warp_->queue_a[place];
-      pair.b = warp_->queue_b[place];
+      pair.a = room_->a[place];
+      pair.b = room_->b[place];
     }
     count_ = first;
     __syncwarp();
@@ -183,20 +167,35 @@ class WarpQueue {
   }
 
  private:
-  WarpState* warp_;
+  WarpQueueRoom* room_;
   int count_ = 0;
 };
 
-// Sum over the threads, in their order. All threads of the block.
+// Sum over the threads, in their order. All threads of the block, which are at most kMaxWarps warps.
 __device__ inline double block_sum(double value) {
-  __shared__ double of_thread[kThreads];
+  __shared__ double of_thread[kMaxWarps * kWarpSize];
   __syncthreads();
   of_thread[threadIdx.x] = value;
   __syncthreads();
   double sum = 0;
   PICTURA_KEEP_LOOP
-  for (int i = 0; i < kThreads; ++i) sum += of_thread[i];
+  for (int i = 0; i < num_threads(); ++i) sum += of_thread[i];
   return sum;
+}
+
+// Sum of the values of the threads before this one; *total_out is that of all. All threads of the block.
+__device__ inline int sum_before(int32_t* sum_of_warp, int value, int* total_out) {
+  const int up_to = sum_up_to(value);
+  if (lane_index() == kWarpSize - 1) sum_of_warp[warp_index()] = up_to;
+  __syncthreads();
+  int before = 0, total = 0;
+  PICTURA_KEEP_LOOP
+  for (int warp = 0; warp < num_warps(); ++warp) {
+    if (warp == warp_index()) before = total;
+    total += sum_of_warp[warp];
+  }
+  *total_out = total;
+  return before + up_to - value;
 }
 
 }  // namespace pictura::cuda

@@ -101,7 +101,7 @@ __device__ __noinline__ void append_pieces(uint32_t kind, const PieceGrid& piece
             memory.visible[at] = thing_number(kind, grid.items[static_cast<size_t>(place)]);
           }
         },
-        warp_index() * kWarpSize, kThreads);
+        warp_index() * kWarpSize, num_threads());
   }
 }
 
@@ -117,7 +117,7 @@ __device__ void cull(const Memory& memory, const DrawTask& task) {
   const ImageSetting& setting = state->setting;
   const RasterGeometry& geometry = view.geometry->raster;
   PICTURA_KEEP_LOOP
-  for (int32_t first = view.world_begin + warp_index() * kWarpSize; first < view.world_end; first += kThreads) {
+  for (int32_t first = view.world_begin + warp_index() * kWarpSize; first < view.world_end; first += num_threads()) {
     const int32_t agent = first + lane_index();
     uint32_t faces = 0;
     if (agent < view.world_end) {
@@ -138,7 +138,7 @@ __device__ void cull(const Memory& memory, const DrawTask& task) {
   const Span<const LightHead> heads = geometry.pieces.heads;
   const int num_heads = view.light_end > view.light_begin ? static_cast<int>(heads.size()) : 0;
   PICTURA_KEEP_LOOP
-  for (int first = warp_index() * kWarpSize; first < num_heads; first += kThreads) {
+  for (int first = warp_index() * kWarpSize; first < num_heads; first += num_threads()) {
     const int head = first + lane_index();
     bool shows = false;
     if (head < num_heads) {
@@ -153,25 +153,65 @@ __device__ void cull(const Memory& memory, const DrawTask& task) {
   append_pieces<Memory>(kStripKind, view.geometry->strips, far_of(geometry.longest_strip_m));
 }
 
+// Room for so many more edges. One thread of the block.
 template <typename Memory>
-struct BlockEdges {
-  const Memory& memory;
+__device__ bool take_edge_room(const Memory& memory, const DrawTask& task, int count) {
+  if constexpr (Memory::kUsesPool) {
+    memory.state->num_edges = atomicAdd(&task.counters->edges, count);
+    memory.state->max_edges = memory.state->num_edges + count;
+    return memory.state->max_edges <= task.pool.max_edges;
+  }
+  return true;
+}
+
+// Room for the faces of all that is listed, and for edges of those that need no clipping. False where the pool has too
+// little left. One thread of the block.
+template <typename Memory>
+__device__ bool take_face_room(const Memory& memory, const DrawTask& task) {
+  BlockState* state = memory.state;
+  state->num_faces = state->num_edges = 0;
+  if constexpr (!Memory::kUsesPool) {
+    state->faces = state->scratch.faces;
+    state->edges = state->scratch.edges;
+    state->max_faces = state->scratch.max_faces;
+    state->max_edges = state->scratch.max_edges;
+    return true;
+  } else {
+    const FacePool& pool = task.pool;
+    state->max_faces = state->num_visible + state->num_lights;
+    const int32_t face_begin = atomicAdd(&task.counters->faces, state->max_faces);
+    state->faces = pool.faces + face_begin;
+    state->edges = pool.edges;
+    return face_begin + state->max_faces <= pool.max_faces && take_edge_room(memory, task, 4 * state->num_visible);
+  }
+}
+
+// Stores a value by words of 16 bytes: by words of 4, the lanes of a warp would write a part of memory each.
+template <typename Value>
+__device__ void store_whole(Value* to, const Value& value) {
+  static_assert(sizeof(Value) % sizeof(uint4) == 0 && alignof(Value) >= sizeof(uint4));
+  constexpr int kWords = sizeof(Value) / sizeof(uint4);
+  uint4 words[kWords];
+  memcpy(words, &value, sizeof(Value));
+  for (int i = 0; i < kWords; ++i) reinterpret_cast<uint4*>(to)[i] = words[i];
+}
+
+struct EdgeRoom {
+  BlockState* state;
   __device__ int32_t take(int count) {
-    const int32_t begin = atomicAdd(&memory.state->num_edges, count);
-    if (begin + count <= memory.max_edges) return begin;
-    memory.state->overflow = 1;
+    const int32_t begin = atomicAdd(&state->num_edges, count);
+    if (begin + count <= state->max_edges) return begin;
+    state->overflow = 1;
     return -1;
   }
-  __device__ PolygonEdge* at(int32_t index) { return memory.edges + index; }
+  __device__ void put(int32_t index, const PolygonEdge& edge) { store_whole(state->edges + index, edge); }
 };
 
 // One copy of the code that clips, for quads and lights.
-template <typename Memory>
-__device__ __noinline__ bool clip_and_make(FaceOwner owner, const Vec3* corners, int count, const FacePlane& plane,
-                                           Rgb color, ScreenFace* face_out) {
-  const Memory memory = Memory::current();
-  BlockEdges<Memory> edges{memory};
-  return make_face(memory.state->setting, owner, corners, count, plane, color, edges, face_out);
+__device__ __noinline__ inline bool clip_and_make(FaceOwner owner, const Vec3* corners, int count,
+                                                  const FacePlane& plane, Rgb color, ScreenFace* face_out) {
+  EdgeRoom edges{block_state()};
+  return make_face(edges.state->setting, owner, corners, count, plane, color, edges, face_out);
 }
 
 // The face of an entry; false where it has faded to black.
@@ -182,7 +222,6 @@ __device__ inline bool make_quad(const BlockState& state, const DrawTask& task, 
   const auto index = static_cast<int32_t>(entry & kFaceIndexMask);
   bool shows = false;
   auto emit = [&](const Vec3* corners, int, const FacePlane& plane, Rgb color) {
-    PICTURA_KEEP_LOOP
     for (int i = 0; i < 4; ++i) quad_out->corner[i] = corners[i];
     quad_out->plane = plane;
     quad_out->color = color;
@@ -204,14 +243,13 @@ __device__ inline bool make_quad(const BlockState& state, const DrawTask& task, 
 }
 
 // Keeps the faces of those lanes that have one; notes where there is no room.
-template <typename Memory>
-__device__ void keep_face(const Memory& memory, bool has_one, const ScreenFace& face) {
-  const int32_t at = take_place(&memory.state->num_faces, has_one);
+__device__ inline void keep_face(BlockState* state, bool has_one, const ScreenFace& face) {
+  const int32_t at = take_place(&state->num_faces, has_one);
   if (!has_one) return;
-  if (at < memory.max_faces) {
-    memory.faces[at] = face;
+  if (at < state->max_faces) {
+    store_whole(state->faces + at, face);
   } else {
-    memory.state->overflow = 1;
+    state->overflow = 1;
   }
 }
 
@@ -220,8 +258,9 @@ template <typename Memory>
 __device__ void make_quads(const Memory& memory, const DrawTask& task) {
   BlockState* state = memory.state;
   const int num_visible = state->num_visible;
+  EdgeRoom edges{state};
   PICTURA_KEEP_LOOP
-  for (int first = warp_index() * kWarpSize; first < num_visible; first += kThreads) {
+  for (int first = warp_index() * kWarpSize; first < num_visible; first += num_threads()) {
     const int i = first + lane_index();
     Quad quad;
     bool shows = i < num_visible && make_quad(*state, task, memory.visible[i], &quad);
@@ -229,19 +268,19 @@ __device__ void make_quads(const Memory& memory, const DrawTask& task) {
     const bool put_aside = crossed != 0 && crossed != kOutside;
     shows = crossed == 0;
     const int32_t edge_begin = take_places(&state->num_edges, shows ? 4 : 0);
-    if (shows && edge_begin + 4 > memory.max_edges) {
+    if (shows && edge_begin + 4 > state->max_edges) {
       state->overflow = 1;
       shows = false;
     }
     ScreenFace face;
-    shows = shows && make_screen_face<4>(state->setting.camera, quad.corner, 4, quad.plane, quad.color,
-                                         memory.edges + edge_begin, &face);
+    auto keep_edge = [&](int k, const PolygonEdge& edge) { edges.put(edge_begin + k, edge); };
+    shows = shows && make_screen_face<4>(state->setting.camera, quad.corner, 4, quad.plane, quad.color, keep_edge, &face);
     face.edge_begin = edge_begin;
     face.number = quad.owner.number;
     face.class_id = quad.owner.class_id;
-    keep_face(memory, shows, face);
+    keep_face(state, shows, face);
     const int32_t at = take_place(&state->num_quads, put_aside);
-    if (put_aside && at < memory.max_quads) memory.quads[at] = quad;
+    if (put_aside && at < memory.max_quads) store_whole(memory.quads + at, quad);
   }
 }
 
@@ -255,9 +294,16 @@ __device__ void make_faces(const Memory& memory, const DrawTask& task) {
     state->overflow = 1;
     return;
   }
+  // A face of four corners has at most nine when clipped.
+  if (threadIdx.x == 0 &&
+      !take_edge_room(memory, task, 9 * state->num_quads + kMaxPolygonCorners * state->num_lights)) {
+    state->overflow = 1;
+  }
+  __syncthreads();
+  if (state->overflow != 0) return;
   const int num_quads = state->num_quads, num_rest = num_quads + state->num_lights;
   PICTURA_KEEP_LOOP
-  for (int first = warp_index() * kWarpSize; first < num_rest; first += kThreads) {
+  for (int first = warp_index() * kWarpSize; first < num_rest; first += num_threads()) {
     const int i = first + lane_index();
     Vec3 corners[kMaxFaceCorners];
     int count = 0;
@@ -286,21 +332,20 @@ __device__ void make_faces(const Memory& memory, const DrawTask& task) {
                   });
     }
     ScreenFace face;
-    const bool shows = count > 0 && clip_and_make<Memory>(owner, corners, count, plane, color, &face);
-    keep_face(memory, shows, face);
+    const bool shows = count > 0 && clip_and_make(owner, corners, count, plane, color, &face);
+    keep_face(state, shows, face);
   }
   __syncthreads();
 }
 
-// Gathers what an image shows. False where it has outgrown the block's memory, or its view names something that does
-// not exist (then state->usable is 0). All threads of the block.
+// Gathers what an image shows, into state->shown too. False where it has outgrown the block's memory or the pool, or its
+// view names something that does not exist (then state->usable is 0). All threads of the block.
 template <typename Memory>
-__device__ bool prepare(const Memory& memory, const DrawTask& task, int32_t view, int32_t camera) {
+__device__ bool gather(const Memory& memory, const DrawTask& task, int32_t view, int32_t camera) {
   BlockState* state = memory.state;
   __syncthreads();
   if (threadIdx.x == 0) {
-    state->num_visible = state->num_quads = state->num_lights = state->num_edges = state->num_faces = 0;
-    state->overflow = 0;
+    state->num_visible = state->num_quads = state->num_lights = state->overflow = 0;
     state->usable = set_view(&state->view, task, view) ? 1 : 0;
     if (state->usable) {
       const PinholeCamera placed = place_camera(task.cameras[camera].camera, state->view.view);
@@ -312,7 +357,18 @@ __device__ bool prepare(const Memory& memory, const DrawTask& task, int32_t view
   cull(memory, task);
   __syncthreads();
   if (state->num_visible > memory.max_visible || state->num_lights > memory.max_lights) return false;
+  if (threadIdx.x == 0 && !take_face_room(memory, task)) state->overflow = 1;
+  __syncthreads();
+  if (state->overflow != 0) return false;
   make_faces(memory, task);
+  __syncthreads();
+  if (threadIdx.x == 0) {
+    const PinholeCamera& camera_here = state->setting.camera;
+    const auto face_begin = static_cast<int32_t>(Memory::kUsesPool ? state->faces - task.pool.faces : 0);
+    state->shown = {face_begin, state->num_faces, state->view.world_begin, camera_here.width_px,
+                    camera_here.position_m, state->view.geometry};
+  }
+  __syncthreads();
   return state->overflow == 0;
 }
 

@@ -3,24 +3,23 @@
 #pragma once
 
 #include "pictura/backend_cuda/renderer_cuda_faces.cuh"
-#include "pictura/backend_cuda/renderer_cuda_fragments.cuh"
-#include "pictura/backend_cuda/renderer_cuda_rig.cuh"
+#include "pictura/backend_cuda/renderer_cuda_pixels.cuh"
 
 namespace pictura::cuda {
 
 // Stores a pixel's colour: element `at` of the first channel, and as far behind it as a plane is large for the others.
-__device__ __noinline__ inline void write_color(const DrawTask& task, const CameraSlot& slot, int64_t at, int64_t plane,
-                                                Rgb color) {
-  const float channels[3] = {color.r, color.g, color.b};
-  for (int channel = 0; channel < 3; ++channel) {
-    const int64_t element = at + channel * plane;
-    if (task.format == PixelFormat::u8) {
-      static_cast<uint8_t*>(slot.color)[element] = to_byte(channels[channel]);
-    } else if (task.format == PixelFormat::f16) {
-      static_cast<uint16_t*>(slot.color)[element] = to_half(channels[channel]);
-    } else {
-      static_cast<float*>(slot.color)[element] = clamp(channels[channel], 0.0f, 1.0f);
-    }
+__device__ inline void write_color(PixelFormat format, void* images, int64_t at, int64_t plane, Rgb color) {
+  auto write_as = [&](auto* first, auto&& value_of) {
+    first[at] = value_of(color.r);
+    first[at + plane] = value_of(color.g);
+    first[at + 2 * plane] = value_of(color.b);
+  };
+  if (format == PixelFormat::u8) {
+    write_as(static_cast<uint8_t*>(images), [](float channel) { return to_byte(channel); });
+  } else if (format == PixelFormat::f16) {
+    write_as(static_cast<uint16_t*>(images), [](float channel) { return to_half(channel); });
+  } else {
+    write_as(static_cast<float*>(images), [](float channel) { return clamp(channel, 0.0f, 1.0f); });
   }
 }
 
@@ -31,7 +30,7 @@ __device__ __noinline__ void draw_planes(const DrawTask& task, const CameraSlot&
   const int width = width_px(slot.camera);
   const int64_t plane = static_cast<int64_t>(width) * height_px(slot.camera);
   PICTURA_KEEP_LOOP
-  for (int64_t p = threadIdx.x; p < plane; p += kThreads) {
+  for (int64_t p = threadIdx.x; p < plane; p += num_threads()) {
     const int x = static_cast<int>(p % width), y = static_cast<int>(p / width);
     const Vec2 center = pixel_middle(x, y);
     FrontFace front;
@@ -55,54 +54,97 @@ __device__ __noinline__ void draw_planes(const DrawTask& task, const CameraSlot&
   }
 }
 
-// False where the image has outgrown the block's memory.
+// Draws the image that state->shown tells of. False where it has outgrown the block's memory.
 template <typename Memory>
 __device__ bool draw_image(const Memory& memory, const DrawTask& task, int32_t view, int32_t camera) {
   const CameraSlot& slot = task.cameras[camera];
   const int width = width_px(slot.camera), height = height_px(slot.camera);
   if (width > memory.max_pixels) return false;
-  const bool prepared = prepare(memory, task, view, camera);
-  if (!prepared && memory.state->usable) return false;
-  const int num_faces = prepared ? memory.state->num_faces : 0;
+  const int num_faces = memory.state->shown.face_count;
   const int64_t plane = static_cast<int64_t>(width) * height;
   const int64_t first = view * slot.view_stride;
-  const bool drawn = draw_faces(memory, task, num_faces, width, 0, height, NoVisit{}, [&](int x, int y, Rgb color) {
-    write_color(task, slot, first + static_cast<int64_t>(y) * width + x, plane, color);
+  const bool drawn = draw_faces(memory, task, num_faces, 0, height, NoVisit{}, [&](int x, int y, Rgb color) {
+    write_color(task.format, slot.color, first + y * width + x, plane, color);
   });
   if (drawn && task.wants_planes) draw_planes<Memory>(task, slot, view, num_faces);
   return drawn;
 }
 
-extern "C" __global__ void __launch_bounds__(kThreads, kSmallBlocksPerProcessor)
-    pictura_draw(const __grid_constant__ DrawTask task, const __grid_constant__ Scratch scratch) {
+__device__ inline void leave_to_last(const DrawTask& task, int32_t image) {
+  task.overflow_images[atomicAdd(&task.counters->overflow, 1)] = image;
+}
+
+// The next image of a counter, below num_images; -1: none is left. All threads of the block.
+__device__ inline int32_t next_image(int32_t* counter, int32_t num_images) {
+  BlockState* state = block_state();
+  __syncthreads();
+  if (threadIdx.x == 0) state->image = atomicAdd(counter, 1);
+  __syncthreads();
+  return state->image < num_images ? state->image : -1;
+}
+__device__ inline int32_t num_images(const DrawTask& task) { return task.num_views * num_cameras(task); }
+__device__ inline int32_t view_of(const DrawTask& task, int32_t image) {
+  return task.first_view + image / num_cameras(task);
+}
+__device__ inline int32_t camera_of(const DrawTask& task, int32_t image) { return image % num_cameras(task); }
+
+extern "C" __global__ void __launch_bounds__(kGatherThreads, kGatherBlocksPerProcessor)
+    pictura_gather(const __grid_constant__ DrawTask task, const __grid_constant__ Scratch scratch) {
   take_scratch(scratch);
-  const SmallMemory memory = SmallMemory::current();
+  const SmallGatherMemory memory = SmallGatherMemory::current();
   BlockState* state = memory.state;
-  const int32_t images = task.num_views * num_cameras(task);
   PICTURA_KEEP_LOOP
   for (;;) {
-    __syncthreads();
-    if (threadIdx.x == 0) state->image = atomicAdd(task.next_image, 1);
-    __syncthreads();
-    const int32_t image = state->image;
-    if (image >= images) return;
-    if (!draw_image(memory, task, task.first_view + image / num_cameras(task), image % num_cameras(task)) &&
-        threadIdx.x == 0) {
-      task.overflow_images[atomicAdd(task.overflow_count, 1)] = image;
+    const int32_t image = next_image(&task.counters->next_gathered, num_images(task));
+    if (image < 0) return;
+    const bool gathered = gather(memory, task, view_of(task, image), camera_of(task, image));
+    const bool fits = gathered && state->num_faces <= kMostMarkedFaces;
+    if (threadIdx.x != 0) continue;
+    GatheredImage* out = task.pool.images + image;
+    if (fits) {
+      *out = state->shown;
+    } else if (state->usable) {
+      *out = {.face_count = -1};
+      leave_to_last(task, image);
+    } else {
+      *out = {.width_px = width_px(task.cameras[camera_of(task, image)].camera)};  // black
     }
   }
 }
 
-extern "C" __global__ void __launch_bounds__(kThreads)
+extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcessor)
+    pictura_draw(const __grid_constant__ DrawTask task, const __grid_constant__ Scratch scratch) {
+  static_cast<void>(scratch);
+  BlockState* state = block_state();
+  PICTURA_KEEP_LOOP
+  for (;;) {
+    const int32_t image = next_image(&task.counters->next_drawn, num_images(task));
+    if (image < 0) return;
+    if (threadIdx.x == 0) {
+      state->shown = task.pool.images[image];
+      state->faces = task.pool.faces + state->shown.face_begin;
+      state->edges = task.pool.edges;
+    }
+    __syncthreads();
+    if (state->shown.face_count < 0) continue;
+    if (!draw_image(SmallDrawMemory::current(), task, view_of(task, image), camera_of(task, image)) &&
+        threadIdx.x == 0) {
+      leave_to_last(task, image);
+    }
+  }
+}
+
+extern "C" __global__ void __launch_bounds__(kLargeThreads)
     pictura_draw_overflow(const __grid_constant__ DrawTask task, const __grid_constant__ Scratch scratch) {
   take_scratch(scratch);
-  const LargeMemory memory = LargeMemory::current();
-  const int32_t count = *task.overflow_count;
+  const int32_t count = task.counters->overflow;
   PICTURA_KEEP_LOOP
   for (int32_t i = static_cast<int32_t>(blockIdx.x); i < count; i += static_cast<int32_t>(gridDim.x)) {
-    const int32_t image = task.overflow_images[i];
-    const int32_t view = task.first_view + image / num_cameras(task);
-    if (!draw_image(memory, task, view, image % num_cameras(task)) && threadIdx.x == 0) note_fault(task, view, kNoRoom);
+    const int32_t image = task.overflow_images[i], view = view_of(task, image), camera = camera_of(task, image);
+    if (!gather(LargeGatherMemory::current(), task, view, camera) ||
+        !draw_image(LargeDrawMemory::current(), task, view, camera)) {
+      if (threadIdx.x == 0) note_fault(task, view, kNoRoom);
+    }
   }
 }
 
@@ -116,11 +158,10 @@ struct WeighAgent {
   }
 };
 
-extern "C" __global__ void __launch_bounds__(kThreads)
+extern "C" __global__ void __launch_bounds__(kLargeThreads)
     pictura_visibility(const __grid_constant__ VisibilityTask task, const __grid_constant__ Scratch scratch) {
   take_scratch(scratch);
-  const LargeMemory memory = LargeMemory::current();
-  BlockState* state = memory.state;
+  BlockState* state = block_state();
   PICTURA_KEEP_LOOP
   for (int32_t q = static_cast<int32_t>(blockIdx.x); q < task.num_queries; q += static_cast<int32_t>(gridDim.x)) {
     const int32_t view = task.queries[2 * q], agent = task.queries[2 * q + 1];
@@ -130,26 +171,27 @@ extern "C" __global__ void __launch_bounds__(kThreads)
     if (!in_range && threadIdx.x == 0) note_fault(task.draw, q, kBadQuery);
     PICTURA_KEEP_LOOP
     for (int32_t camera = 0; in_range && camera < num_cameras(task.draw); ++camera) {
-      if (!prepare(memory, task.draw, view, camera)) continue;
+      if (!gather(LargeGatherMemory::current(), task.draw, view, camera)) continue;
       const uint32_t number = thing_number(kAgentKind, agent - state->view.world_begin);
       const int num_faces = state->num_faces;
       int y_begin = state->setting.camera.height_px, y_end = 0;
       PICTURA_KEEP_LOOP
       for (int i = 0; i < num_faces; ++i) {
-        const ScreenFace& face = memory.faces[i];
+        const ScreenFace& face = state->faces[i];
         if (face.number != number || face.box.y_begin >= face.box.y_end) continue;
         y_begin = min_of(y_begin, face.box.y_begin);
         y_end = max_of(y_end, face.box.y_end);
       }
       auto weigh = [&](double* sum) {
-        draw_faces(memory, task.draw, num_faces, state->setting.camera.width_px, y_begin, y_end,
-                   WeighAgent{number, sum}, [](int, int, Rgb) {});
+        draw_faces(LargeDrawMemory::current(), task.draw, num_faces, y_begin, y_end, WeighAgent{number, sum},
+                   [](int, int, Rgb) {});
       };
       weigh(&seen);
       // Once more, without all others.
+      __syncthreads();
       PICTURA_KEEP_LOOP
-      for (int i = static_cast<int>(threadIdx.x); i < num_faces; i += kThreads) {
-        if (memory.faces[i].number != number) memory.faces[i].box = PixelBox{};
+      for (int i = static_cast<int>(threadIdx.x); i < num_faces; i += num_threads()) {
+        if (state->faces[i].number != number) state->faces[i].box = PixelBox{};
       }
       __syncthreads();
       weigh(&alone);

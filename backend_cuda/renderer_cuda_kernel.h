@@ -1,5 +1,6 @@
-// What the host tells the drawing kernels. A block draws one image at a time. Most images fit into its shared memory;
-// those that do not are left to a second launch of fewer blocks, whose memory has room for all that a world can hold.
+// What the host tells the drawing kernels. A first launch gathers the faces of all images in a pool, a second one draws
+// them, a block an image at a time. What finds no room in either is left to a third launch of few blocks, whose memory
+// has room for all that a world can hold.
 #pragma once
 
 #include "pictura/common/raster_item.h"
@@ -46,11 +47,27 @@ struct Fault {
 enum FaultKind : int32_t { kBadWorld = 1, kBadGeometry, kBadPose, kTooManyAgents, kBadQuery, kNoRoom };
 
 /// A face of four corners, in camera coordinates.
-struct Quad {
+struct alignas(16) Quad {
   Vec3 corner[4];
   FacePlane plane;
   Rgb color;
   FaceOwner owner;
+};
+
+/// What an image shows: its faces in a pool, and what tells which of them is in front.
+struct GatheredImage {
+  int32_t face_begin = 0, face_count = 0;  // -1: not gathered
+  int32_t world_begin = 0, width_px = 0;
+  Vec3 eye_m;
+  const DeviceGeometry* geometry = nullptr;
+};
+
+/// Faces of many images.
+struct FacePool {
+  ScreenFace* faces = nullptr;
+  PolygonEdge* edges = nullptr;
+  GatheredImage* images = nullptr;  // [images]
+  int32_t max_faces = 0, max_edges = 0;
 };
 
 /// Memory of the blocks of a launch, and how much each of them has.
@@ -58,8 +75,15 @@ struct Scratch {
   ScreenFace* faces = nullptr;     // [blocks][max_faces]
   PolygonEdge* edges = nullptr;    // [blocks][max_edges]
   Quad* quads = nullptr;           // [blocks][max_quads]
-  unsigned char* bytes = nullptr;  // of the second launch: [blocks][block_bytes()]
-  int32_t blocks = 0, max_visible = 0, max_quads = 0, max_lights = 0, max_faces = 0, max_edges = 0, max_fragments = 0;
+  unsigned char* bytes = nullptr;  // [blocks][large_bytes()]
+  int32_t blocks = 0, max_visible = 0, max_quads = 0, max_lights = 0, max_faces = 0, max_edges = 0;
+};
+
+/// What the blocks of a batch's launches count together; 0 before.
+struct DrawCounters {
+  int32_t next_gathered = 0, next_drawn = 0;  // images
+  int32_t faces = 0, edges = 0;               // of the pool that are taken
+  int32_t overflow = 0;                       // images left to the last launch
 };
 
 struct DrawTask {
@@ -75,8 +99,8 @@ struct DrawTask {
   PixelFormat format = PixelFormat::u8;
   bool wants_planes = false;
   Fault* fault = nullptr;
-  int32_t* next_image = nullptr;       // of the first launch; 0 before it
-  int32_t* overflow_count = nullptr;   // images left to the second launch; 0 before the first
+  FacePool pool;
+  DrawCounters* counters = nullptr;
   int32_t* overflow_images = nullptr;  // [images]
   CameraSlot cameras[kMaxCameras];
 };

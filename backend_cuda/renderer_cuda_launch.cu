@@ -7,44 +7,54 @@ namespace pictura::cuda {
 namespace {
 
 template <typename Task>
-cudaError_t launch(const void* kernel, int blocks, std::size_t shared_bytes, const Task& task, const Scratch& scratch,
-                   cudaStream_t stream) {
+cudaError_t launch(const void* kernel, int blocks, int threads, std::size_t shared_bytes, const Task& task,
+                   const Scratch& scratch, cudaStream_t stream) {
   void* arguments[] = {const_cast<Task*>(&task), const_cast<Scratch*>(&scratch)};
-  return cudaLaunchKernel(kernel, dim3(static_cast<unsigned>(blocks)), dim3(kThreads), arguments, shared_bytes, stream);
+  return cudaLaunchKernel(kernel, dim3(static_cast<unsigned>(blocks)), dim3(static_cast<unsigned>(threads)), arguments,
+                          shared_bytes, stream);
+}
+
+cudaError_t allow_shared(const void* kernel, std::size_t bytes) {
+  return cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(bytes));
 }
 
 }  // namespace
 
 KernelSet ahead_of_time_kernels() {
-  return {reinterpret_cast<const void*>(pictura_draw), reinterpret_cast<const void*>(pictura_draw_overflow),
-          reinterpret_cast<const void*>(pictura_visibility)};
+  return {reinterpret_cast<const void*>(pictura_gather), reinterpret_cast<const void*>(pictura_draw),
+          reinterpret_cast<const void*>(pictura_draw_overflow), reinterpret_cast<const void*>(pictura_visibility)};
 }
 
 cudaError_t prepare_kernels(const KernelSet& kernels) {
-  return cudaFuncSetAttribute(kernels.draw, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                              static_cast<int>(small_bytes()));
+  const cudaError_t status = allow_shared(kernels.gather, gather_bytes());
+  return status == cudaSuccess ? allow_shared(kernels.draw, draw_bytes()) : status;
 }
 
-Scratch small_scratch(int processors) {
-  Scratch scratch = small_sizes();
-  scratch.blocks = kSmallBlocksPerProcessor * processors;
+Scratch gather_scratch(int processors) {
+  Scratch scratch;
+  scratch.max_quads = kGatherQuads;
+  scratch.blocks = kGatherBlocksPerProcessor * processors;
   return scratch;
 }
 
-std::size_t block_bytes(const Scratch& large) { return large_bytes(large); }
+std::size_t large_block_bytes(const Scratch& large) { return large_bytes(large); }
 
-cudaError_t launch_draw(const KernelSet& kernels, const DrawTask& task, const Scratch& small, const Scratch& large,
-                        cudaStream_t stream) {
+cudaError_t launch_draw(const KernelSet& kernels, const DrawTask& task, const Scratch& gather, const Scratch& large,
+                        int processors, cudaStream_t stream) {
   const int images = task.num_views * task.num_cameras;
-  const cudaError_t status = launch(kernels.draw, min_of(images, small.blocks), small_bytes(), task, small, stream);
+  cudaError_t status = launch(kernels.gather, min_of(images, gather.blocks), kGatherThreads, gather_bytes(), task,
+                              gather, stream);
   if (status != cudaSuccess) return status;
-  return launch(kernels.draw_overflow, min_of(images, large.blocks), kStateBytes, task, large, stream);
+  status = launch(kernels.draw, min_of(images, kDrawBlocksPerProcessor * processors), kDrawThreads, draw_bytes(), task,
+                  Scratch{}, stream);
+  if (status != cudaSuccess) return status;
+  return launch(kernels.draw_overflow, min_of(images, large.blocks), kLargeThreads, state_bytes(kLargeThreads), task, large, stream);
 }
 
 cudaError_t launch_visibility(const KernelSet& kernels, const VisibilityTask& task, const Scratch& large,
                               cudaStream_t stream) {
   if (task.num_queries == 0) return cudaSuccess;
-  return launch(kernels.visibility, min_of(task.num_queries, large.blocks), kStateBytes, task, large, stream);
+  return launch(kernels.visibility, min_of(task.num_queries, large.blocks), kLargeThreads, state_bytes(kLargeThreads), task, large, stream);
 }
 
 }  // namespace pictura::cuda

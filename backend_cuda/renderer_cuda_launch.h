@@ -12,10 +12,12 @@ namespace pictura::cuda {
 
 /// The kernels' handles: symbols of this program, or cudaKernel_t of code that was loaded.
 struct KernelSet {
+  const void* gather = nullptr;
   const void* draw = nullptr;
   const void* draw_overflow = nullptr;
   const void* visibility = nullptr;
 };
+constexpr const char* kGatherName = "pictura_gather";
 constexpr const char* kDrawName = "pictura_draw";
 constexpr const char* kDrawOverflowName = "pictura_draw_overflow";
 constexpr const char* kVisibilityName = "pictura_visibility";
@@ -26,13 +28,13 @@ KernelSet ahead_of_time_kernels();
 cudaError_t prepare_kernels(const KernelSet& kernels);
 
 /// What the blocks of the first launch have room for, and how many of them a device of so many processors runs at once.
-Scratch small_scratch(int processors);
-/// Bytes that a block of the second launch needs besides faces and edges.
-std::size_t block_bytes(const Scratch& large);
+Scratch gather_scratch(int processors);
+/// Bytes that a block of the last launch needs besides faces and edges.
+std::size_t large_block_bytes(const Scratch& large);
 
-/// Draws all images; both launches.
-cudaError_t launch_draw(const KernelSet& kernels, const DrawTask& task, const Scratch& small, const Scratch& large,
-                        cudaStream_t stream);
+/// Draws all images, whose faces the pool has room for: three launches.
+cudaError_t launch_draw(const KernelSet& kernels, const DrawTask& task, const Scratch& gather, const Scratch& large,
+                        int processors, cudaStream_t stream);
 cudaError_t launch_visibility(const KernelSet& kernels, const VisibilityTask& task, const Scratch& large,
                               cudaStream_t stream);
 

@@ -6,40 +6,54 @@
 
 namespace pictura::cuda {
 
-// Most images fit into a block of this much.
-constexpr int kSmallBlocksPerProcessor = 5;
-constexpr int kSmallVisible = 3072, kSmallQuads = 384, kSmallLights = 256, kSmallFaces = 1280, kSmallEdges = 5632,
-              kSmallPixels = 96 * 12, kSmallFragments = 640;
-static_assert(most_sums(kSmallFragments) * sizeof(SharedSum) <= sizeof(BlockState::warps));
-static_assert(kSmallFaces <= kMostMarkedFaces && kSmallFragments < 0xFFFF && kSmallPixels < 0xFFFF);
-// Pixels of a band of the second launch: a row of the widest image at least.
-constexpr int kLargePixels = 1 << 14;
+// A block that gathers faces. Nearly all images fit.
+constexpr int kGatherThreads = 64, kGatherBlocksPerProcessor = 12;
+constexpr int kGatherVisible = 2560, kGatherQuads = 256, kGatherLights = 256;
+// A block that draws them. What has more fragments or pixels is drawn in parts.
+constexpr int kDrawThreads = 384, kDrawBlocksPerProcessor = 2;
+constexpr int kDrawPixels = 96 * 54, kDrawFragments = 2496;
+// A block of the last launch. Pixels: a row of the widest image at least.
+constexpr int kLargeThreads = 128, kLargePixels = 1 << 14, kLargeFragments = 1 << 18;
 
-/// A block's arrays. Index: of faces and fragments, 16 bits where they suffice. Word: two of them.
+// Faces that the mark of a pixel's nearest full face can tell apart in 32 bits.
+constexpr int kMarkedFaceBits = 11, kMostMarkedFaces = (1 << kMarkedFaceBits) - 1;
+
+/// What is listed while the faces of an image are gathered.
+struct GatherMemory {
+  BlockState* state;
+  uint32_t* visible;  // [max_visible] what may show
+  uint32_t* lights;   // [max_lights] ... that are lights
+  Quad* quads;        // [max_quads] that are to be clipped
+  int32_t max_visible, max_lights, max_quads;
+};
+
+/// What is kept while pixels are drawn. Index: of faces, pixels and fragments, 16 bits where they suffice. Word: two.
 template <typename Index_, typename Word_>
-struct BlockMemory {
+struct DrawMemory {
   using Index = Index_;
   using Word = Word_;
   static constexpr int kHalf = 4 * sizeof(Word);
-  /// Of the lower half of a word: no face, the end of a list.
+  /// Of the lower half of a word: no face, no pixel.
   static constexpr Word kNone = (Word{1} << kHalf) - 1;
+  /// Of a candidate's pixel: the face covers all of it.
+  static constexpr Word kCoversFully = Word{1} << (kHalf - 1);
 
   BlockState* state;
-  ScreenFace* faces;
-  PolygonEdge* edges;
-  Quad* quads;  // [max_quads] that are to be clipped
-  // While faces are made.
-  uint32_t* visible;  // [max_visible] what may show
-  uint32_t* lights;   // [max_lights] ... that are lights
-  // While pixels are drawn.
-  Word* pixels;           // [max_pixels] of a band
-  uint32_t* full_listed;  // [max_pixels / 32 + 1] a bit for each pixel: its full face stands among its fragments
-  // Fragments, each of one pixel and linked to the pixel's others.
+  const ScreenFace* faces;   // of the image
+  const PolygonEdge* edges;  // that its faces name
+  Word* pixels;              // [max_pixels + 1] of the part of the image that is drawn
+  Word* rows;                // [max_rows] of faces: in the upper half the face, in the lower the row of the part
+  Word* candidates;          // [max_candidates] that may become fragments: face, and pixel
+  // Fragments.
   uint32_t *samples_low, *samples_high, *free_low, *free_high;  // [max_fragments]
   float* area;                                                  // [max_fragments]
-  Index *next, *face, *pixel;                                   // [max_fragments]
-  SharedSum* sums;                                              // [most_sums(max_fragments)] of pixels with many
-  int32_t max_visible, max_quads, max_lights, max_faces, max_edges, max_pixels, max_fragments;
+  int32_t* area_units;                                          // ... before it is known
+  Index *face, *pixel;                                          // [max_fragments]
+  Index* rank;                                                  // [max_fragments] among the fragments of its pixel
+  uint8_t* kind;                                                // ... and in the end what its weight counts as
+  Index* order;                                                 // [max_fragments] pixel by pixel
+  Index* drawn;                                                 // [max_fragments] pixels that have fragments
+  int32_t max_pixels, max_rows, max_candidates, max_fragments;
 
   __device__ PixelCoverage coverage(int fragment) const {
     return {area[fragment], static_cast<uint64_t>(samples_high[fragment]) << 32 | samples_low[fragment]};
@@ -60,88 +74,117 @@ struct Layout {
   }
 };
 
-// Lays out a block's memory besides its faces and edges from `bytes` on, and returns how many bytes that takes. What is
-// used while faces are made lies where pixels and fragments do later.
-template <typename Memory>
-__host__ __device__ size_t lay_out(Memory* memory, const Scratch& sizes, int max_pixels, unsigned char* bytes) {
-  memory->max_visible = sizes.max_visible;
-  memory->max_quads = sizes.max_quads;
-  memory->max_lights = sizes.max_lights;
-  memory->max_faces = sizes.max_faces;
-  memory->max_edges = sizes.max_edges;
-  memory->max_fragments = sizes.max_fragments;
-  memory->max_pixels = max_pixels;
-  Layout of_faces{bytes}, of_pixels{bytes};
-  of_faces.place(&memory->visible, memory->max_visible);
-  of_faces.place(&memory->lights, memory->max_lights);
-  of_pixels.place(&memory->pixels, max_pixels);
-  of_pixels.place(&memory->full_listed, max_pixels / 32 + 1);
-  of_pixels.place(&memory->samples_low, memory->max_fragments);
-  of_pixels.place(&memory->samples_high, memory->max_fragments);
-  of_pixels.place(&memory->free_low, memory->max_fragments);
-  of_pixels.place(&memory->free_high, memory->max_fragments);
-  of_pixels.place(&memory->area, memory->max_fragments);
-  of_pixels.place(&memory->next, memory->max_fragments);
-  of_pixels.place(&memory->face, memory->max_fragments);
-  of_pixels.place(&memory->pixel, memory->max_fragments);
-  if (Memory::kHasOwnSums) of_pixels.place(&memory->sums, most_sums(memory->max_fragments));
-  return of_faces.used > of_pixels.used ? of_faces.used : of_pixels.used;
+// Lays out what gathering lists from `bytes` on, and returns how many bytes that takes.
+__host__ __device__ inline size_t lay_out(GatherMemory* memory, unsigned char* bytes) {
+  Layout layout{bytes};
+  layout.place(&memory->visible, memory->max_visible);
+  layout.place(&memory->lights, memory->max_lights);
+  return layout.used;
 }
 
-constexpr size_t kStateBytes = (sizeof(BlockState) + 15) / 16 * 16;
+// ... what drawing keeps. Rows lie where samples do later, candidates where what is free of fragments and their order do.
+template <typename Memory>
+__host__ __device__ size_t lay_out(Memory* memory, int max_pixels, int max_fragments, unsigned char* bytes) {
+  memory->max_pixels = max_pixels;
+  memory->max_fragments = max_fragments;
+  Layout layout{bytes};
+  layout.place(&memory->pixels, max_pixels + 1);
+  layout.place(&memory->area, max_fragments);
+  layout.place(&memory->face, max_fragments);
+  layout.place(&memory->pixel, max_fragments);
+  layout.place(&memory->rank, max_fragments);
+  const size_t rows_begin = layout.used;
+  layout.place(&memory->samples_low, max_fragments);
+  layout.place(&memory->samples_high, max_fragments);
+  const size_t candidates_begin = layout.used;
+  layout.place(&memory->free_low, max_fragments);
+  layout.place(&memory->free_high, max_fragments);
+  layout.place(&memory->order, max_fragments);
+  layout.place(&memory->drawn, max_fragments);
+  using Word = typename Memory::Word;
+  memory->area_units = reinterpret_cast<int32_t*>(memory->area);
+  memory->kind = reinterpret_cast<uint8_t*>(memory->rank);
+  memory->rows = reinterpret_cast<Word*>(bytes + rows_begin);
+  memory->max_rows = static_cast<int32_t>((candidates_begin - rows_begin) / sizeof(Word));
+  memory->candidates = reinterpret_cast<Word*>(bytes + candidates_begin);
+  memory->max_candidates = static_cast<int32_t>((layout.used - candidates_begin) / sizeof(Word));
+  return layout.used;
+}
 
-__host__ __device__ inline Scratch small_sizes() {
-  Scratch scratch;
-  scratch.max_visible = kSmallVisible;
-  scratch.max_quads = kSmallQuads;
-  scratch.max_lights = kSmallLights;
-  scratch.max_faces = kSmallFaces;
-  scratch.max_edges = kSmallEdges;
-  scratch.max_fragments = kSmallFragments;
-  return scratch;
+// A block's state ends with what its warps keep.
+__host__ __device__ constexpr size_t state_bytes(int threads) {
+  return (sizeof(BlockState) - static_cast<size_t>(kMaxWarps - threads / kWarpSize) * sizeof(WarpState) + 15) / 16 * 16;
 }
 
 extern __shared__ __align__(16) unsigned char block_memory[];
 __device__ inline BlockState* block_state() { return reinterpret_cast<BlockState*>(block_memory); }
 
-template <typename Memory>
-__device__ inline Memory with_global_arrays(Memory memory) {
-  memory.state = block_state();
-  memory.faces = memory.state->scratch.faces;
-  memory.edges = memory.state->scratch.edges;
-  memory.quads = memory.state->scratch.quads;
-  return memory;
-}
-
-/// All in shared memory, at places that are known when the kernel is compiled.
-struct SmallMemory : BlockMemory<uint16_t, uint32_t> {
-  // Sums lie where warps keep their edges and queues until then.
-  static constexpr bool kHasOwnSums = false;
-  __device__ static SmallMemory current() {
-    SmallMemory memory;
-    lay_out(&memory, small_sizes(), kSmallPixels, block_memory + kStateBytes);
-    memory.sums = reinterpret_cast<SharedSum*>(block_state()->warps);
-    return with_global_arrays(memory);
+/// In shared memory; faces go to the pool.
+struct SmallGatherMemory : GatherMemory {
+  static constexpr bool kUsesPool = true;
+  __host__ __device__ size_t place(unsigned char* bytes) {
+    max_visible = kGatherVisible;
+    max_lights = kGatherLights;
+    max_quads = kGatherQuads;
+    return lay_out(this, bytes);
+  }
+  __device__ static SmallGatherMemory current() {
+    SmallGatherMemory memory;
+    memory.place(block_memory + state_bytes(kGatherThreads));
+    memory.state = block_state();
+    memory.quads = memory.state->scratch.quads;
+    return memory;
   }
 };
 
-/// In global memory.
-struct LargeMemory : BlockMemory<uint32_t, unsigned long long> {
-  static constexpr bool kHasOwnSums = true;
-  __device__ static LargeMemory current() {
-    LargeMemory memory;
-    lay_out(&memory, block_state()->scratch, kLargePixels, block_state()->scratch.bytes);
-    return with_global_arrays(memory);
+/// In shared memory, at places that are known when the kernel is compiled.
+struct SmallDrawMemory : DrawMemory<uint16_t, uint32_t> {
+  __host__ __device__ size_t place(unsigned char* bytes) { return lay_out(this, kDrawPixels, kDrawFragments, bytes); }
+  __device__ static SmallDrawMemory current() {
+    SmallDrawMemory memory;
+    memory.place(block_memory + state_bytes(kDrawThreads));
+    memory.state = block_state();
+    memory.faces = memory.state->faces;
+    memory.edges = memory.state->edges;
+    return memory;
+  }
+};
+static_assert(kMostMarkedFaces < 0xFFFF && kDrawFragments < 0xFFFF && kDrawPixels < 0x7FFF);
+
+/// In global memory. What drawing keeps lies where gathering has listed.
+struct LargeGatherMemory : GatherMemory {
+  static constexpr bool kUsesPool = false;
+  __host__ __device__ size_t place(const Scratch& sizes, unsigned char* bytes) {
+    max_visible = sizes.max_visible;
+    max_lights = sizes.max_lights;
+    max_quads = sizes.max_quads;
+    return lay_out(this, bytes);
+  }
+  __device__ static LargeGatherMemory current() {
+    LargeGatherMemory memory;
+    memory.state = block_state();
+    memory.place(memory.state->scratch, memory.state->scratch.bytes);
+    memory.quads = memory.state->scratch.quads;
+    return memory;
+  }
+};
+struct LargeDrawMemory : DrawMemory<uint32_t, unsigned long long> {
+  __host__ __device__ size_t place(unsigned char* bytes) { return lay_out(this, kLargePixels, kLargeFragments, bytes); }
+  __device__ static LargeDrawMemory current() {
+    LargeDrawMemory memory;
+    memory.state = block_state();
+    memory.place(memory.state->scratch.bytes);
+    memory.faces = memory.state->faces;
+    memory.edges = memory.state->edges;
+    return memory;
   }
 };
 
-__host__ __device__ inline size_t small_bytes() {
-  SmallMemory memory;
-  return kStateBytes + lay_out(&memory, small_sizes(), kSmallPixels, nullptr);
-}
+__host__ __device__ inline size_t gather_bytes() { return state_bytes(kGatherThreads) + SmallGatherMemory().place(nullptr); }
+__host__ __device__ inline size_t draw_bytes() { return state_bytes(kDrawThreads) + SmallDrawMemory().place(nullptr); }
 __host__ __device__ inline size_t large_bytes(const Scratch& sizes) {
-  LargeMemory memory;
-  return lay_out(&memory, sizes, kLargePixels, nullptr);
+  const size_t to_gather = LargeGatherMemory().place(sizes, nullptr), to_draw = LargeDrawMemory().place(nullptr);
+  return to_gather > to_draw ? to_gather : to_draw;
 }
 
 // Gives the block its part of a launch's scratch memory. All threads of the block.

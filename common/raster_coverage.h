@@ -27,7 +27,6 @@ PICTURA_HD inline float inside_plane(const Frustum& f, int plane, Vec3 p) {
 constexpr unsigned kOutside = ~0u;
 PICTURA_HD inline unsigned planes_crossed(const Frustum& f, const Vec3* corners, int count) {
   unsigned outside_of_any = 0, outside_of_all = ~0u;
-  PICTURA_KEEP_LOOP
   for (int i = 0; i < count; ++i) {
     unsigned outside = 0;
     for (int plane = 0; plane < kClipPlanes; ++plane) {
@@ -133,27 +132,28 @@ struct PixelBox {
 
 /// A convex polygon on screen, without its edges, which stand in a pool.
 struct alignas(16) ScreenFace {
-  int32_t edge_begin = 0, edge_count = 0;
   PixelBox box;
-  Rgb color;
   // Inverse depth at a point of the screen, and its range over the face's corners.
   float inverse_depth_x = 0, inverse_depth_y = 0, inverse_depth_0 = 0;
-  float inverse_depth_low = 0, inverse_depth_high = 0;
   float plane_distance_m = 0;  // from the camera to the face's plane
-  uint32_t number = 0;         // of the thing that it belongs to, see raster_order.h
-  uint8_t class_id = 0;        // of the class plane
+  float inverse_depth_low = 0, inverse_depth_high = 0;
+  uint32_t number = 0;   // of the thing that it belongs to, see raster_order.h
+  uint8_t class_id = 0;  // of the class plane
+  uint8_t edge_count = 0;
+  Rgb color;
+  int32_t edge_begin = 0;
 };
 
-/// Projects a clipped face (camera coordinates), which lies in `plane`. Writes its edges to edges_out (room for
-/// `count`, which is at most kRoom) and all of face_out but edge_begin. False where it covers nothing.
-template <int kRoom = kMaxPolygonCorners>
+/// Projects a clipped face (camera coordinates) of at most kRoom corners, which lies in `plane`. Calls
+/// keep_edge(0, edge), keep_edge(1, edge), ... for its edges, at most `count`, and sets all of face_out but edge_begin.
+/// False where it covers nothing.
+template <int kRoom, typename KeepEdge>
 PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Vec3* polygon, int count,
-                                        const FacePlane& plane, Rgb color, PolygonEdge* edges_out,
+                                        const FacePlane& plane, Rgb color, KeepEdge&& keep_edge,
                                         ScreenFace* face_out) {
   Vec2 corner[kRoom];
   Vec2 low{1e30f, 1e30f}, high{-1e30f, -1e30f};
   float depth_low = 1e30f, depth_high = 0.0f;
-  PICTURA_KEEP_LOOP
   for (int i = 0; i < count; ++i) {
     corner[i] = project(camera, polygon[i]);
     low = {min_of(low.x, corner[i].x), min_of(low.y, corner[i].y)};
@@ -166,18 +166,16 @@ PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Vec3*
       max_of(static_cast<int>(floorf(low.y)), 0), min_of(static_cast<int>(floorf(high.y)) + 1, camera.height_px)};
   if (box.x_begin >= box.x_end || box.y_begin >= box.y_end) return false;
   float twice_area = 0.0f;
-  PICTURA_KEEP_LOOP
   for (int i = 1; i + 1 < count; ++i) twice_area += cross(corner[i] - corner[0], corner[i + 1] - corner[0]);
   if (fabsf(twice_area) < 1e-6f) return false;
 
   int edges = 0;
-  PICTURA_KEEP_LOOP
   for (int i = 0; i < count; ++i) {
     const Vec2 from = corner[i], to = corner[i + 1 < count ? i + 1 : 0];
     if (from.x == to.x && from.y == to.y) continue;
-    edges_out[edges++] = twice_area > 0.0f ? make_edge(from, to) : make_edge(to, from);
+    keep_edge(edges++, twice_area > 0.0f ? make_edge(from, to) : make_edge(to, from));
   }
-  face_out->edge_count = edges;
+  face_out->edge_count = static_cast<uint8_t>(edges);
   face_out->box = box;
   face_out->color = color;
 

@@ -41,7 +41,7 @@ PICTURA_HD constexpr uint16_t instance_of(const ScreenFace& face) {
 }
 
 /// Clips and projects a face. Its edges go to a pool: take(count) returns the index of the first, or -1 where there is
-/// no room left, and at(index) its address. False where nothing of it is in the image.
+/// no room left, and put(index, edge) keeps one. False where nothing of it is in the image.
 template <typename EdgePool>
 PICTURA_HD inline bool make_face(const ImageSetting& setting, FaceOwner owner, const Vec3* corners, int count,
                                  const FacePlane& plane, Rgb color, EdgePool& pool, ScreenFace* face_out) {
@@ -50,7 +50,10 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, FaceOwner owner, c
   if (kept < 3) return false;
   const int32_t edge_begin = pool.take(kept);
   if (edge_begin < 0) return false;
-  if (!make_screen_face(setting.camera, polygon, kept, plane, color, pool.at(edge_begin), face_out)) return false;
+  auto keep_edge = [&](int i, const PolygonEdge& edge) { pool.put(edge_begin + i, edge); };
+  if (!make_screen_face<kMaxPolygonCorners>(setting.camera, polygon, kept, plane, color, keep_edge, face_out)) {
+    return false;
+  }
   face_out->edge_begin = edge_begin;
   face_out->number = owner.number;
   face_out->class_id = owner.class_id;

@@ -131,8 +131,8 @@ PICTURA_HD inline bool of_one_level(const ScreenFace& a, const ScreenFace& b, Ve
 /// 1 / depth of a face at a point of the screen, for telling which of two is in front there; within the depths of its
 /// corners, which those of a strip may leave by a factor (see kWidenedDepth).
 PICTURA_HD inline float nearness_at(const ScreenFace& face, Vec2 at_px) {
-  const float factor = is_strip(face) ? kWidenedDepth : 1.0f;
-  return clamp(inverse_depth(face, at_px), face.inverse_depth_low * (1.0f / factor), face.inverse_depth_high * factor);
+  const float factor = is_strip(face) ? kWidenedDepth : 1.0f, inverse_factor = is_strip(face) ? 1.0f / kWidenedDepth : 1.0f;
+  return clamp(inverse_depth(face, at_px), face.inverse_depth_low * inverse_factor, face.inverse_depth_high * factor);
 }
 
 /// Whether face a is in front of face b at a point of the screen that both cover. `stands(solid, strip)` says, by their

@@ -23,7 +23,6 @@ struct FacePlane {
 };
 PICTURA_HD inline FacePlane face_plane(const Vec3* corners, int count) {
   Vec3 normal{};
-  PICTURA_KEEP_LOOP
   for (int i = 1; i + 1 < count; ++i) normal = normal + cross(corners[i] - corners[0], corners[i + 1] - corners[0]);
   return {normal, dot(normal, corners[0])};
 }
@@ -32,7 +31,6 @@ PICTURA_HD inline FacePlane face_plane(const Vec3* corners, int count) {
 /// to 0 is not drawn, and so hides nothing.
 PICTURA_HD inline float face_brightness(const Vec3* corners, int count) {
   float sum_m = 0.0f;
-  PICTURA_KEEP_LOOP
   for (int i = 0; i < count; ++i) sum_m += clamp(corners[i].z, 0.0f, kVisibleRange_m);
   return depth_brightness(sum_m / static_cast<float>(count));
 }
@@ -87,7 +85,6 @@ PICTURA_HD inline void cuboid_face_corners(const AgentBox& box, int face, Vec3* 
     case static_cast<int>(BoxFace::top): corners = kTopCorners; break;
     default: break;
   }
-  PICTURA_KEEP_LOOP
   for (int i = 0; i < 4; ++i) corners_out[i] = corner(corners >> (3 * i) & 7);
 }
 
@@ -97,7 +94,6 @@ PICTURA_HD inline void cuboid_face(const AgentBox& box, int face, const PinholeC
                                    Emit&& emit) {
   Vec3 corners[4];
   cuboid_face_corners(box, face, corners);
-  PICTURA_KEEP_LOOP
   for (int i = 0; i < 4; ++i) corners[i] = to_camera(camera, corners[i]);
   const float brightness = face_brightness(corners, 4);
   const BoxFace painted = face == kUnderside ? BoxFace::top : static_cast<BoxFace>(face);
@@ -119,7 +115,6 @@ template <typename Emit>
 PICTURA_HD inline void wall_faces(const WallFace& wall, const PinholeCamera& camera, Emit&& emit) {
   const Vec3 up{0.0f, 0.0f, wall.height_m};
   Vec3 corners[4] = {wall.a_m, wall.b_m, wall.b_m + up, wall.a_m + up};
-  PICTURA_KEEP_LOOP
   for (int i = 0; i < 4; ++i) corners[i] = to_camera(camera, corners[i]);
   const float brightness = face_brightness(corners, 4);
   if (brightness > 0.0f) emit(corners, 4, face_plane(corners, 4), wall.color * brightness);
@@ -225,7 +220,6 @@ template <typename Emit>
 PICTURA_HD inline void strip_faces(const Strip& strip, const PinholeCamera& camera, float floor_px, Emit&& emit) {
   Vec3 corners[4];
   strip_corners(strip, corners);
-  PICTURA_KEEP_LOOP
   for (int i = 0; i < 4; ++i) corners[i] = to_camera(camera, corners[i]);
   const float brightness = face_brightness(corners, 4);
   const FacePlane plane = face_plane(corners, 4);

@@ -86,7 +86,7 @@ class Sight {
       edges->resize(edges->size() + static_cast<std::size_t>(count));
       return static_cast<int32_t>(edges->size()) - count;
     }
-    PolygonEdge* at(int32_t index) { return edges->data() + index; }
+    void put(int32_t index, const PolygonEdge& edge) { (*edges)[static_cast<std::size_t>(index)] = edge; }
   };
   template <typename MakeFaces>
   Thing keep(FaceOwner owner, const Extent& extent, MakeFaces&& make_faces) {

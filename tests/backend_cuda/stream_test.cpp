@@ -190,7 +190,7 @@ std::size_t least_scratch_bytes(int agents, std::size_t num_views, RendererConfi
 // Captures refuse every call that allocates or waits.
 TEST_F(CudaStreamTest, IsCapturedIntoAGraph) {
   RendererConfig config{.rig = paper_rig()};
-  config.max_scratch_bytes = least_scratch_bytes(60, 7, config) + 40;  // three launches
+  config.max_scratch_bytes = least_scratch_bytes(60, 7, config) + 40;  // a view at a time
   Stage stage(60, 7, config);
   const std::vector<uint8_t> first = bytes_of(stage.draw());
   HostImages host = stage.host_images();
@@ -204,7 +204,7 @@ TEST_F(CudaStreamTest, IsCapturedIntoAGraph) {
   PICTURA_CUDA(cudaStreamEndCapture(stream, &graph));
   std::size_t nodes = 0;
   PICTURA_CUDA(cudaGraphGetNodes(graph, nullptr, &nodes));
-  EXPECT_EQ(nodes, 9u);  // for each part: counters, two launches
+  EXPECT_EQ(nodes, 28u);  // for each view: counters, three launches
   PICTURA_CUDA(cudaGraphInstantiate(&executable, graph, 0));
 
   auto replay = [&] {
