@@ -35,9 +35,9 @@ void run(Arguments arguments) {
   }
   progress.finish();
   report_benchmark(arguments.json,
-                   {.workload = fmt::format(
-                        "worlds: {} episodes of each map, {} agents asked for; lane drivers alone, for 1,280 steps",
-                        arguments.options.episodes, arguments.options.agents),
+                   {.workload = fmt::format("worlds: {} episodes of each map, {} agents asked for; lane drivers alone "
+                                            "among parked cars, for 1,280 steps",
+                                            arguments.options.episodes, arguments.options.agents),
                     .backend = "cpu"},
                    results);
 }

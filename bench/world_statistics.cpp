@@ -96,7 +96,9 @@ void drive_randomly(Simulator& simulator, const WorldStatisticsOptions& options,
 
 void drive_lanes(const std::shared_ptr<const RoadMap>& map, const SimulatorConfig& config, int episodes,
                  Counts* counts_inout) {
-  constexpr std::pair<const char*, Event> kReasons[] = {{"lane driver: off-road", kEventOffRoad},
+  static_assert(testing::LaneDriver::kAstray_m == 1);
+  constexpr std::pair<const char*, Event> kReasons[] = {{"lane driver: collisions", kEventCollision},
+                                                        {"lane driver: off-road", kEventOffRoad},
                                                         {"lane driver: wall contacts", kEventWall},
                                                         {"lane driver: red lights", kEventRedLight}};
   const auto driven = testing::drive_lanes(map, config, episodes, config.episode_steps);
@@ -104,6 +106,8 @@ void drive_lanes(const std::shared_ptr<const RoadMap>& map, const SimulatorConfi
     counts_inout->of("lane driver: goals", "goals", w) = driven[w].goals;
     counts_inout->of("lane driver: distance", "m", w) = driven[w].distance_m;
     counts_inout->of("lane driver: wait at red lights", "s", w) = driven[w].stops * static_cast<double>(config.dt_s);
+    counts_inout->of("lane driver: more than 1 m from its path", "s", w) =
+        driven[w].steps_astray * static_cast<double>(config.dt_s);
     for (const auto& [name, event] : kReasons) {
       counts_inout->of(name, "drivers", w) = (driven[w].halt_reason & event) != 0;
     }

@@ -13,7 +13,7 @@ namespace pictura {
 
 struct WorldStatisticsOptions {
   int episodes = 100;  // each the first one of a world of its own
-  int agents = 120;    // in each world of the random policy; the driver is alone
+  int agents = 120;    // in each world of the random policy; the driver is alone among parked cars
   uint64_t seed = 0;
   int num_threads = 0;  // 0: all
   std::function<void(const std::string& phase)> on_progress;

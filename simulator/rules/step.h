@@ -72,6 +72,17 @@ PICTURA_HD int pass_waypoints(const WorldView& world, int agent, Vec3 from, Vec3
   return events | kEventWaypoint;
 }
 
+/// The multipliers of an agent's conditioning, and its body.
+PICTURA_HD inline DynamicsParameters dynamics_of(const AgentStateView& agents, int slot) {
+  const float* conditioning = agents.conditioning + slot * kNumConditioning;
+  DynamicsParameters parameters;
+  parameters.throttle = conditioning[static_cast<int>(Conditioning::throttle)];
+  parameters.steer = conditioning[static_cast<int>(Conditioning::steer)];
+  parameters.acceleration = conditioning[static_cast<int>(Conditioning::acceleration)];
+  parameters.wheelbase_m = kWheelbasePerLength * agents.length_m[slot];
+  return parameters;
+}
+
 /// Phase 1: moves an active agent and finds what the road says about it. Its first lane alone writes, once all have
 /// read.
 template <typename Lanes = OneLane>
@@ -87,15 +98,9 @@ PICTURA_HD void advance(const WorldView& world, int agent, int32_t action, const
   }
 
   const AgentClass agent_class = class_of(agents, slot);
-  const float* conditioning = agents.conditioning + slot * kNumConditioning;
-  DynamicsParameters parameters;
-  parameters.throttle = conditioning[static_cast<int>(Conditioning::throttle)];
-  parameters.steer = conditioning[static_cast<int>(Conditioning::steer)];
-  parameters.acceleration = conditioning[static_cast<int>(Conditioning::acceleration)];
-  parameters.wheelbase_m = kWheelbasePerLength * agents.length_m[slot];
   const Vec3 from{agents.x_m[slot], agents.y_m[slot], agents.z_m[slot]};
-  const Motion motion = move(motion_of(agents, slot), controls_of_action(action), parameters, class_limits(agent_class),
-                             world.options.dt_s);
+  const Motion motion = move(motion_of(agents, slot), controls_of_action(action), dynamics_of(agents, slot),
+                             class_limits(agent_class), world.options.dt_s);
   const int32_t lane_before = agents.lane[slot];
   const LaneFit fit = fit_agent(world, agent, {motion.x_m, motion.y_m}, from.z, motion.heading_rad, lane_before, lanes);
   const AgentBox box = box_at(agents, slot, {motion.x_m, motion.y_m, fit.z_m}, sincos_of(motion.heading_rad));
