@@ -101,7 +101,7 @@ void drive_lanes(const std::shared_ptr<const RoadMap>& map, const SimulatorConfi
                                                         {"lane driver: off-road", kEventOffRoad},
                                                         {"lane driver: wall contacts", kEventWall},
                                                         {"lane driver: red lights", kEventRedLight}};
-  const auto driven = testing::drive_lanes(map, config, episodes, config.episode_steps);
+  const auto driven = testing::drive_lanes(map, config, episodes, 1, config.episode_steps);
   for (size_t w = 0; w < driven.size(); ++w) {
     counts_inout->of("lane driver: goals", "goals", w) = driven[w].goals;
     counts_inout->of("lane driver: distance", "m", w) = driven[w].distance_m;

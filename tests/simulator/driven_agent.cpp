@@ -5,10 +5,11 @@
 
 namespace pictura::testing {
 
-DrivenAgent::DrivenAgent(const WorldView& world)
+DrivenAgent::DrivenAgent(const WorldView& world, int agent)
     : world_(world),
-      parameters_(dynamics_of(world.agents, world.first_slot)),
-      limits_(class_limits(class_of(world.agents, world.first_slot))) {}
+      slot_(world.first_slot + agent),
+      parameters_(dynamics_of(world.agents, slot_)),
+      limits_(class_limits(class_of(world.agents, slot_))) {}
 
 Motion DrivenAgent::after(const Motion& from, int32_t action) const {
   return move(from, controls_of_action(action), parameters_, limits_, world_.options.dt_s);
@@ -18,10 +19,13 @@ int32_t DrivenAgent::speed_action(const Motion& from, float wanted_mps) const {
   constexpr float kSlow_mps = 0.5f, kReaction_s = 0.6f, kBraking_mps2 = 4, kAccelerating_mps2 = 1.5f;
   if (wanted_mps == 0 && std::fabs(from.speed_mps) < kSlow_mps) return halt(from, kStepsToHalt).action;
   const float wanted_mps2 = std::clamp((wanted_mps - from.speed_mps) / kReaction_s, -kBraking_mps2, kAccelerating_mps2);
+  // What rounding leaves of an acceleration would be stopped at zero first, by any jerk against it alike.
+  Motion rounded = from;
+  if (std::fabs(from.accel_long_mps2) < 1e-3f) rounded.accel_long_mps2 = 0;
   int32_t best = kStraight;
   float least = INFINITY;
   for (int32_t action = kStraight; action < kNumActions; action += kNumLatActions) {
-    const float off = std::fabs(after(from, action).accel_long_mps2 - wanted_mps2);
+    const float off = std::fabs(after(rounded, action).accel_long_mps2 - wanted_mps2);
     if (off >= least) continue;
     least = off;
     best = action;
@@ -42,16 +46,20 @@ DrivenAgent::Halt DrivenAgent::halt(const Motion& from, int steps) const {
   return best;
 }
 
-bool DrivenAgent::leaves_road(const Motion& at, float z_m, float margin_m) const {
-  AgentBox box = box_at(world_.agents, world_.first_slot, {at.x_m, at.y_m, z_m}, sincos_of(at.heading_rad));
+AgentBox DrivenAgent::box(Vec3 axle_m, float heading_rad, float margin_m) const {
+  AgentBox box = box_at(world_.agents, slot_, axle_m, sincos_of(heading_rad));
   box.length_m += 2 * margin_m;
   box.width_m += 2 * margin_m;
-  return !may_spawn(world_.map, box);
+  return box;
+}
+
+bool DrivenAgent::leaves_road(const Motion& at, float z_m, float margin_m) const {
+  return !may_spawn(world_.map, box({at.x_m, at.y_m, z_m}, at.heading_rad, margin_m));
 }
 
 float DrivenAgent::to_bumper_m() const {
-  const float length_m = world_.agents.length_m[world_.first_slot];
-  return reference_to_center(class_of(world_.agents, world_.first_slot), length_m) + 0.5f * length_m;
+  const float length_m = world_.agents.length_m[slot_];
+  return reference_to_center(class_of(world_.agents, slot_), length_m) + 0.5f * length_m;
 }
 
 }  // namespace pictura::testing

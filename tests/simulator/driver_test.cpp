@@ -13,7 +13,7 @@ using testing::LanePath;
 using testing::PathPoint;
 
 /// Nothing may halt a driver, who seldom leaves the middle of the lane.
-void drive_everywhere(float cyclist_fraction, int drivers, int steps) {
+void drive_everywhere(float cyclist_fraction, int drivers, int drivers_each, int steps) {
   std::vector<std::string> towns = known_towns();
   for (const char* town : {"procedural:1", "procedural:2"}) towns.emplace_back(town);
   for (const std::string& town : towns) {
@@ -22,7 +22,8 @@ void drive_everywhere(float cyclist_fraction, int drivers, int steps) {
     int stops = 0, goals = 0, steps_astray = 0;
     double distance_m = 0;
     for (const testing::DrivenEpisode& driven :
-         testing::drive_lanes(map, {.num_threads = 1, .cyclist_fraction = cyclist_fraction}, drivers, steps)) {
+         testing::drive_lanes(map, {.num_threads = 1, .cyclist_fraction = cyclist_fraction}, drivers / drivers_each,
+                              drivers_each, steps)) {
       EXPECT_EQ(driven.halt_reason, kEventNone) << "at " << driven.end_m.x << ' ' << driven.end_m.y;
       stops += driven.stops;
       goals += driven.goals;
@@ -38,9 +39,11 @@ void drive_everywhere(float cyclist_fraction, int drivers, int steps) {
   }
 }
 
-TEST(Driver, OfABicycleKeepsItsLaneAndStopsAtRedLightsInEveryTown) { drive_everywhere(1, 16, 600); }
+TEST(Driver, OfABicycleKeepsItsLaneAndStopsAtRedLightsInEveryTown) { drive_everywhere(1, 16, 1, 600); }
 
-TEST(Driver, OfACarKeepsItsLaneAndStopsAtRedLightsInEveryTown) { drive_everywhere(0, 24, 1280); }
+TEST(Driver, OfACarKeepsItsLaneAndStopsAtRedLightsInEveryTown) { drive_everywhere(0, 24, 1, 1280); }
+
+TEST(Driver, OfEightTouchesNoOtherInEveryTown) { drive_everywhere(0.2f, 24, 8, 600); }
 
 /// Paths advance evenly, and in the direction that they say.
 void expect_smooth(const std::vector<PathPoint>& points) {
@@ -130,7 +133,7 @@ struct LongCarOnARing {
 TEST(SteeringSearch, FindsTheWayRoundThatTheMiddleOfTheLaneIsNot) {
   // From 4.5 to 8.5 m: the axle's circle is to be between 5.6 and 6.17 m, where the lane's middle is at 6.5 m.
   LongCarOnARing car(6.5f, 6);
-  const testing::DrivenAgent agent(car.stage.world());
+  const testing::DrivenAgent agent(car.stage.world(), 0);
   Motion middle = agent.now();
   EXPECT_FALSE(agent.leaves_road(middle, 0, 0));
   middle.x_m = 6.5f;
@@ -148,7 +151,7 @@ TEST(SteeringSearch, FindsTheWayRoundThatTheMiddleOfTheLaneIsNot) {
 TEST(SteeringSearch, SaysHowFarItGetsWhereNoCarCan) {
   // From 3.4 to 7.4 m: the front corner of the tightest circle is 7.83 m from the centre.
   LongCarOnARing car(5.4f, 4.6f);
-  const testing::DrivenAgent agent(car.stage.world());
+  const testing::DrivenAgent agent(car.stage.world(), 0);
   const testing::DrivingPlan plan = testing::search_steering(agent, car.path->points(), 0);
   EXPECT_FALSE(plan.is_clear);
   EXPECT_FALSE(plan.actions.empty());

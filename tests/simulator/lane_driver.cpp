@@ -14,10 +14,24 @@ namespace {
 constexpr float kWayOn_m = 80;   // beyond the last waypoint
 constexpr float kMissed_m = 10;  // a waypoint so far behind has been missed
 
+/// The first of `boxes` that touches `other`, or how many there are.
+size_t first_touching(const std::vector<AgentBox>& boxes, const AgentBox& other) {
+  const auto touches = [&other](const AgentBox& box) {
+    const Vec2 apart = (box.center_m - other.center_m).xy();
+    return dot(apart, apart) <= square(radius(box) + radius(other)) && same_level(box, other) &&
+           overlap(footprint(box), footprint(other));
+  };
+  return static_cast<size_t>(std::find_if(boxes.begin(), boxes.end(), touches) - boxes.begin());
+}
+
 }  // namespace
 
-LaneDriver::LaneDriver(const WorldView& world, const LaneGraph& graph)
-    : world_(world), agent_(world_), path_(world_.map, graph, spawn_place(world_, 0)) {
+LaneDriver::LaneDriver(const WorldView& world, int agent, const LaneGraph& graph)
+    : world_(world),
+      self_(agent),
+      slot_(world.first_slot + agent),
+      agent_(world, agent),
+      path_(world.map, graph, spawn_place(world, agent)) {
   waypoints_.back() = points().front().at;  // where the first chain starts
 }
 
@@ -25,15 +39,15 @@ int32_t LaneDriver::act() {
   find_place();
   follow_goals();
   const Motion now = agent_.now();
-  const float light_mps = speed_before_light(now);
-  if (light_mps < kPlannedSpeed_mps) {
+  const float most_mps = std::min(speed_before_light(now), speed_behind_others());
+  if (most_mps < kPlannedSpeed_mps) {
     plan_ = {};
     next_planned_ = 0;
   } else if (next_planned_ % kStrideSteps == 0 || next_planned_ >= plan_.actions.size()) {
     renew_plan(now);
   }
   if (next_planned_ < plan_.actions.size()) return plan_.actions[next_planned_++];
-  return pursuing_action(now, place_, std::min(points()[place_].speed_mps, light_mps));
+  return pursuing_action(now, place_, std::min(points()[place_].speed_mps, most_mps));
 }
 
 /// Nothing is planned while pursuing the path will do. A plan is followed for half of it at least.
@@ -53,16 +67,15 @@ void LaneDriver::renew_plan(const Motion& now) {
 
 /// Goes on to the waypoints of a new chain, or back to one that was missed.
 void LaneDriver::follow_goals() {
-  const int slot = world_.first_slot;
-  const int32_t chain = world_.agents.goal_chains[slot] - 1;
+  const int32_t chain = world_.agents.goal_chains[slot_] - 1;
   PICTURA_CHECK(chain <= chain_ + 1, "lane driver: expected a look at every chain, got {} after {}", chain, chain_);
   if (chain != chain_) {
-    waypoints_ = goal_places(world_, 0, static_cast<uint32_t>(chain), waypoints_.back());
+    waypoints_ = goal_places(world_, self_, static_cast<uint32_t>(chain), waypoints_.back());
     chain_ = chain;
     path_.cut(std::max(goals_.back(), place_));
     plan();
   } else if (place_ + 1 >= points().size() ||
-             place_ > ahead(goals_[static_cast<size_t>(world_.agents.next_waypoint[slot])], kMissed_m)) {
+             place_ > ahead(goals_[static_cast<size_t>(world_.agents.next_waypoint[slot_])], kMissed_m)) {
     path_.cut(place_);
     plan();
   }
@@ -70,7 +83,7 @@ void LaneDriver::follow_goals() {
 
 /// From the end of the path through the waypoints that are left, and on.
 void LaneDriver::plan() {
-  for (auto i = static_cast<size_t>(world_.agents.next_waypoint[world_.first_slot]); i < kNumWaypoints; ++i) {
+  for (auto i = static_cast<size_t>(world_.agents.next_waypoint[slot_]); i < kNumWaypoints; ++i) {
     const bool gets_there = path_.go_to(waypoints_[i]);
     for (size_t goal = i; goal < kNumWaypoints; ++goal) goals_[goal] = points().size() - 1;
     if (!gets_there) break;
@@ -193,8 +206,44 @@ float LaneDriver::to_closed_line(float speed_mps) const {
   return 1000;
 }
 
+/// The speed from which it can stop before it would touch another agent on its path, now or, if that has the right of
+/// way, where that will soon be.
+float LaneDriver::speed_behind_others() const {
+  constexpr float kLook_m = 40, kMargin_m = 0.4f, kGap_m = 2, kBraking_mps2 = 1.5f;
+  constexpr float kForesight_s = 4, kStep_s = 0.5f;
+  float most_mps = INFINITY;
+  std::vector<AgentBox> way;
+  for (int other = 0; other < world_.num_agents; ++other) {
+    const int slot = world_.first_slot + other;
+    const AgentBox box = box_of(world_.agents, slot);
+    const Vec2 apart = box.center_m.xy() - points()[place_].position_m.xy();
+    if (other == self_ || !box.drawn || dot(apart, apart) > square(kLook_m)) continue;
+    for (size_t i = place_ + way.size(); i < ahead(place_, kLook_m); ++i) {
+      way.push_back(agent_.box(points()[i].position_m, points()[i].heading_rad, kMargin_m));
+    }
+    const Vec2 velocity = Vec2{box.cos_heading, box.sin_heading} * world_.agents.speed_mps[slot];
+    for (float soon_s = 0; soon_s <= (has_way(other) ? kForesight_s : 0); soon_s += kStep_s) {
+      AgentBox there = box;
+      there.center_m = box.center_m + Vec3{velocity.x, velocity.y, 0} * soon_s;
+      const size_t first = first_touching(way, there);
+      if (first == way.size()) continue;
+      const float gap_m = std::max(LanePath::kSpacing_m * static_cast<float>(first) - kGap_m, 0.0f);
+      const float along_mps = dot(velocity, {way[first].cos_heading, way[first].sin_heading});
+      const float then_mps = soon_s > 0 ? 0 : std::max(along_mps, 0.0f);
+      most_mps = std::min(most_mps, std::sqrt(square(then_mps) + 2 * kBraking_mps2 * gap_m));
+    }
+  }
+  return most_mps;
+}
+
+/// Those with lower numbers do, unless they go the same way.
+bool LaneDriver::has_way(int other) const {
+  const float turned = wrap_angle(world_.agents.heading_rad[world_.first_slot + other] - agent_.now().heading_rad);
+  return other < self_ && std::fabs(turned) > 0.5f;
+}
+
 std::vector<DrivenEpisode> drive_lanes(const std::shared_ptr<const RoadMap>& map, SimulatorConfig config,
-                                       int num_worlds, int steps) {
+                                       int num_worlds, int drivers_each, int steps) {
   config.pedestrian_fraction = 0;
   config.fixed_lights = true;
   config.vector_observations = false;
@@ -203,7 +252,7 @@ std::vector<DrivenEpisode> drive_lanes(const std::shared_ptr<const RoadMap>& map
   config.conditioning[static_cast<size_t>(Conditioning::delta_goal_m)] = {2, 2, false};
   for (size_t c = kNumRewardConditioning; c < kNumConditioning; ++c) config.conditioning[c] = {1, 1, false};
   std::vector<WorldSpec> specs;
-  for (int w = 0; w < num_worlds; ++w) specs.push_back({0, 1, static_cast<uint32_t>(w)});
+  for (int w = 0; w < num_worlds; ++w) specs.push_back({0, drivers_each, static_cast<uint32_t>(w)});
   const auto simulator = make_simulator("cpu", config, {map}, specs);
   // The drivers' eyes: the same map, over the simulator's agents and lights.
   WorldBatch batch(config, {map}, specs);
@@ -215,7 +264,7 @@ std::vector<DrivenEpisode> drive_lanes(const std::shared_ptr<const RoadMap>& map
     view.agents = simulator->state();
     view.lights = const_cast<LightState*>(simulator->scene().light_states.data()) +
                   simulator->scene().light_begin[static_cast<size_t>(w)];
-    drivers.emplace_back(view, graph);
+    for (int agent = 0; agent < drivers_each; ++agent) drivers.emplace_back(view, agent, graph);
   }
   const AgentStateView state = simulator->state();
   std::vector<int32_t> actions(drivers.size());

@@ -1,4 +1,4 @@
-// A driver that keeps its lane, goes where its waypoints lead, and stops at red lights, alone in its world: what the
+// A driver that keeps its lane, goes where its waypoints lead, and stops at red lights and behind others: what the
 // rules ask for can be driven with the jerk actions. It pursues the path of its lanes, and where that would leave the
 // road, since long cars cut corners, it follows a plan that does not.
 #pragma once
@@ -14,12 +14,12 @@
 
 namespace pictura::testing {
 
-/// Drives agent 0 of a world.
+/// Drives an agent of a world.
 class LaneDriver {
  public:
   /// `world` shows the simulator's agents and lights as they are at every act(), and has not been stepped yet; the
   /// graph is its map's. Its arrays and the graph must outlive the driver.
-  LaneDriver(const WorldView& world, const LaneGraph& graph);
+  LaneDriver(const WorldView& world, int agent, const LaneGraph& graph);
 
   /// The action for what the agent and the lights are now.
   int32_t act();
@@ -41,9 +41,12 @@ class LaneDriver {
   bool stays_on_road(Motion now) const;
   float speed_before_light(const Motion& now);
   float to_closed_line(float speed_mps) const;
+  float speed_behind_others() const;
+  bool has_way(int other) const;
   const std::vector<PathPoint>& points() const { return path_.points(); }
 
   const WorldView world_;
+  const int self_, slot_;
   const DrivenAgent agent_;
   std::array<RoutePoint, kNumWaypoints> waypoints_;
   int32_t chain_ = -1;  // whose waypoints these are
@@ -64,10 +67,10 @@ struct DrivenEpisode {
   Vec2 end_m;
 };
 
-/// Drives for `steps` steps, or until an infraction, in so many worlds on the map, each driver alone among parked cars,
-/// from the first episode of config.seed on. The share of cyclists is config.cyclist_fraction; the rest is as in
+/// Drives for `steps` steps, or until an infraction, in so many worlds on the map, so many drivers in each among parked
+/// cars, from the first episode of config.seed on. The share of cyclists is config.cyclist_fraction; the rest is as in
 /// evaluation: waypoints of 2 m, lights with fixed timing, no multipliers.
 std::vector<DrivenEpisode> drive_lanes(const std::shared_ptr<const RoadMap>& map, SimulatorConfig config,
-                                       int num_worlds, int steps);
+                                       int num_worlds, int drivers_each, int steps);
 
 }  // namespace pictura::testing
