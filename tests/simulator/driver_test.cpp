@@ -43,7 +43,7 @@ TEST(Driver, OfABicycleKeepsItsLaneAndStopsAtRedLightsInEveryTown) { drive_every
 
 TEST(Driver, OfACarKeepsItsLaneAndStopsAtRedLightsInEveryTown) { drive_everywhere(0, 24, 1, 1280); }
 
-TEST(Driver, OfEightTouchesNoOtherInEveryTown) { drive_everywhere(0.2f, 24, 8, 600); }
+TEST(Driver, OfThreeTouchesNoOtherInEveryTown) { drive_everywhere(0.2f, 48, 3, 600); }
 
 /// Paths advance evenly, and in the direction that they say.
 void expect_smooth(const std::vector<PathPoint>& points) {
