@@ -41,8 +41,8 @@ void ImageDrawer::prepare(const ImageRequest& request) {
 
 bool ImageDrawer::stands(uint32_t solid, uint32_t strip) const {
   const StaticGeometryView& pieces = request_.geometry->pieces;
-  return stands_on(extent_of(solid, pieces, *request_.scene, world_begin()),
-                   extent_of(strip, pieces, *request_.scene, world_begin()), setting_.camera.position_m);
+  const AgentBox* agents = request_.scene->agents.data() + world_begin();
+  return stands_on(extent_of(solid, pieces, agents), extent_of(strip, pieces, agents), setting_.camera.position_m);
 }
 
 // Calls visit(y, pixel, span) for each row of a face within some rows; pixel is the index of the row's first.

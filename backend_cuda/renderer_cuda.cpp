@@ -23,9 +23,10 @@ namespace {
 constexpr int kMaxWorldAgents = 4096;
 constexpr int kLargeBlocks = 8;
 // Room in the pool for the faces and edges of an image, on average. More than the images of CARLA's towns ask for.
-constexpr int kPoolFaces = 512, kPoolEdges = 2304;
-// Views that are drawn at once, at most: many enough to keep the device busy.
-constexpr std::size_t kViewsAtOnce = 512;
+constexpr int kPoolFaces = 320, kPoolEdges = 1472;
+// Views that are drawn at once, at most: enough that the last images of a launch, for which few blocks are left to
+// work, do not count.
+constexpr std::size_t kViewsAtOnce = 1024;
 
 // Owns what a launch's blocks work in.
 class ScratchBuffers {
@@ -183,12 +184,13 @@ class CudaRenderer final : public Renderer {
     check_images(name(), config_.rig, space(), views.size(), images_out, /*draws_f16=*/true);
     cuda::DrawTask task = draw_task(scene, views, &images_out);
     const auto on_stream = static_cast<cudaStream_t>(stream.handle);
-    const auto views_at_once = static_cast<int32_t>(plan_.views);
+    // In as few parts as there is room for, of one size.
+    const std::size_t parts = (views.size() + plan_.views - 1) / plan_.views;
+    const auto views_at_once = static_cast<int32_t>((views.size() + parts - 1) / std::max(parts, std::size_t{1}));
     for (int32_t left = task.num_views; left > 0; left -= task.num_views, task.first_view += task.num_views) {
       task.num_views = std::min(left, views_at_once);
       PICTURA_CUDA(cudaMemsetAsync(counters_.data(), 0, sizeof(cuda::DrawCounters), on_stream));
-      PICTURA_CUDA(
-          cuda::launch_draw(library_.kernels(), task, gather_.view(), large_.view(), processors_, on_stream));
+      PICTURA_CUDA(cuda::launch_draw(library_.kernels(), task, gather_.view(), large_.view(), processors_, on_stream));
     }
   }
 

@@ -49,6 +49,19 @@ __device__ inline int lane_index() { return static_cast<int>(threadIdx.x) % kWar
 __device__ inline int warp_index() { return static_cast<int>(threadIdx.x) / kWarpSize; }
 __device__ inline unsigned lanes_below() { return (1u << lane_index()) - 1; }
 
+// Waits for all threads of the block. A warp whose lanes have parted would arrive at the barrier twice.
+__device__ inline void sync_block() {
+  __syncwarp();
+  __syncthreads();
+}
+
+// The next number of a counter in shared memory, for a warp.
+__device__ inline int next_of(int32_t* counter) {
+  int next = 0;
+  if (lane_index() == 0) next = atomicAdd(counter, 1);
+  return __shfl_sync(kAllLanes, next, 0);
+}
+
 __device__ inline bool is_finite(float value) { return fabsf(value) <= 3.4e38f; }
 
 // The first fault stands until the host has thrown it.
@@ -174,9 +187,9 @@ class WarpQueue {
 // Sum over the threads, in their order. All threads of the block, which are at most kMaxWarps warps.
 __device__ inline double block_sum(double value) {
   __shared__ double of_thread[kMaxWarps * kWarpSize];
-  __syncthreads();
+  sync_block();
   of_thread[threadIdx.x] = value;
-  __syncthreads();
+  sync_block();
   double sum = 0;
   PICTURA_KEEP_LOOP
   for (int i = 0; i < num_threads(); ++i) sum += of_thread[i];
@@ -187,7 +200,7 @@ __device__ inline double block_sum(double value) {
 __device__ inline int sum_before(int32_t* sum_of_warp, int value, int* total_out) {
   const int up_to = sum_up_to(value);
   if (lane_index() == kWarpSize - 1) sum_of_warp[warp_index()] = up_to;
-  __syncthreads();
+  sync_block();
   int before = 0, total = 0;
   PICTURA_KEEP_LOOP
   for (int warp = 0; warp < num_warps(); ++warp) {

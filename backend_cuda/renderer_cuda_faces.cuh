@@ -274,7 +274,8 @@ __device__ void make_quads(const Memory& memory, const DrawTask& task) {
     }
     ScreenFace face;
     auto keep_edge = [&](int k, const PolygonEdge& edge) { edges.put(edge_begin + k, edge); };
-    shows = shows && make_screen_face<4>(state->setting.camera, quad.corner, 4, quad.plane, quad.color, keep_edge, &face);
+    shows =
+        shows && make_screen_face<4>(state->setting.camera, quad.corner, 4, quad.plane, quad.color, keep_edge, &face);
     face.edge_begin = edge_begin;
     face.number = quad.owner.number;
     face.class_id = quad.owner.class_id;
@@ -289,7 +290,7 @@ template <typename Memory>
 __device__ void make_faces(const Memory& memory, const DrawTask& task) {
   BlockState* state = memory.state;
   make_quads(memory, task);
-  __syncthreads();
+  sync_block();
   if (state->num_quads > memory.max_quads) {
     state->overflow = 1;
     return;
@@ -299,7 +300,7 @@ __device__ void make_faces(const Memory& memory, const DrawTask& task) {
       !take_edge_room(memory, task, 9 * state->num_quads + kMaxPolygonCorners * state->num_lights)) {
     state->overflow = 1;
   }
-  __syncthreads();
+  sync_block();
   if (state->overflow != 0) return;
   const int num_quads = state->num_quads, num_rest = num_quads + state->num_lights;
   PICTURA_KEEP_LOOP
@@ -335,15 +336,15 @@ __device__ void make_faces(const Memory& memory, const DrawTask& task) {
     const bool shows = count > 0 && clip_and_make(owner, corners, count, plane, color, &face);
     keep_face(state, shows, face);
   }
-  __syncthreads();
+  sync_block();
 }
 
-// Gathers what an image shows, into state->shown too. False where it has outgrown the block's memory or the pool, or its
-// view names something that does not exist (then state->usable is 0). All threads of the block.
+// Gathers what an image shows, into state->shown too. False where it has outgrown the block's memory or the pool, or
+// its view names something that does not exist (then state->usable is 0). All threads of the block.
 template <typename Memory>
 __device__ bool gather(const Memory& memory, const DrawTask& task, int32_t view, int32_t camera) {
   BlockState* state = memory.state;
-  __syncthreads();
+  sync_block();
   if (threadIdx.x == 0) {
     state->num_visible = state->num_quads = state->num_lights = state->overflow = 0;
     state->usable = set_view(&state->view, task, view) ? 1 : 0;
@@ -352,23 +353,24 @@ __device__ bool gather(const Memory& memory, const DrawTask& task, int32_t view,
       state->setting = {placed, make_frustum(placed), task.line_floor_px, task.debug_palette};
     }
   }
-  __syncthreads();
+  sync_block();
   if (!state->usable) return false;
   cull(memory, task);
-  __syncthreads();
+  sync_block();
   if (state->num_visible > memory.max_visible || state->num_lights > memory.max_lights) return false;
   if (threadIdx.x == 0 && !take_face_room(memory, task)) state->overflow = 1;
-  __syncthreads();
+  sync_block();
   if (state->overflow != 0) return false;
   make_faces(memory, task);
-  __syncthreads();
+  sync_block();
   if (threadIdx.x == 0) {
     const PinholeCamera& camera_here = state->setting.camera;
     const auto face_begin = static_cast<int32_t>(Memory::kUsesPool ? state->faces - task.pool.faces : 0);
-    state->shown = {face_begin, state->num_faces, state->view.world_begin, camera_here.width_px,
-                    camera_here.position_m, state->view.geometry};
+    state->shown = {face_begin,           state->num_faces,
+                    camera_here.width_px, camera_here.position_m,
+                    state->view.geometry, task.scene.agents.data() + state->view.world_begin};
   }
-  __syncthreads();
+  sync_block();
   return state->overflow == 0;
 }
 

@@ -55,7 +55,8 @@ __device__ void list_rows(const Memory& memory, int num_faces, const Part& part)
     if (face < num_faces) {
       const PixelBox box = memory.faces[face].box;
       y_begin = max_of(box.y_begin, part.y_begin);
-      if (box.x_begin < part.x_end && box.x_end > part.x_begin) rows = max_of(0, min_of(box.y_end, part.y_end) - y_begin);
+      if (box.x_begin < part.x_end && box.x_end > part.x_begin)
+        rows = max_of(0, min_of(box.y_end, part.y_end) - y_begin);
     }
     const int row = y_begin - part.y_begin;
     const int32_t place = take_places(&memory.state->num_rows, rows);
@@ -69,12 +70,11 @@ __device__ void list_rows(const Memory& memory, int num_faces, const Part& part)
   }
 }
 
-// Lists what may become a fragment. What finds no room is counted. All lanes of a warp.
+// Lists what may become a fragment, where there is room.
 template <typename Memory>
-__device__ void list_candidate(const Memory& memory, bool wanted, int face, int pixel, bool covers_fully) {
+__device__ void list_candidate(const Memory& memory, int at, int face, int pixel, bool covers_fully) {
   using Word = typename Memory::Word;
-  const int32_t at = take_place(&memory.state->num_candidates, wanted);
-  if (!wanted || at >= memory.max_candidates) return;
+  if (at >= memory.max_candidates) return;
   memory.candidates[at] = static_cast<Word>(face) << Memory::kHalf | static_cast<Word>(pixel) |
                           (covers_fully ? Memory::kCoversFully : Word{0});
 }
@@ -102,9 +102,7 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
   const int num_rows = state->num_rows, deals = (num_rows + kWarpSize - 1) / kWarpSize;
   PICTURA_KEEP_LOOP
   for (;;) {
-    int deal = 0;
-    if (lane_index() == 0) deal = atomicAdd(&state->next_batch, 1);
-    deal = __shfl_sync(kAllLanes, deal, 0);
+    const int deal = next_of(&state->next_batch);
     if (deal >= deals) return;
     const int at = lane_index() * deals + deal;
     int face = 0, y = 0;
@@ -124,13 +122,18 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
       const int its_face = of(face, owner), its_y = of(y, owner), x = of(span.full_begin, owner) + k;
       const int pixel = part.pixel(x, its_y);
       const int loser = owner >= 0 ? mark_pixel(memory, its_face, x, its_y, pixel) : -1;
-      if (__any_sync(kAllLanes, loser >= 0)) list_candidate(memory, loser >= 0, loser, pixel, true);
+      if (!__any_sync(kAllLanes, loser >= 0)) return;
+      const int32_t at = take_place(&state->num_candidates, loser >= 0);
+      if (loser >= 0) list_candidate(memory, at, loser, pixel, true);
     });
-    share_out(warp, span.end - span.begin - full, [&](int owner, int k) {
+    const int partial = span.end - span.begin - full;
+    const int32_t place = take_places(&state->num_candidates, partial);
+    share_out(warp, partial, [&](int owner, int k) {
       const int its_face = of(face, owner), its_y = of(y, owner), its_lead = of(lead, owner);
       const int begin = of(span.begin, owner), full_end = of(span.full_end, owner);
       const int x = k < its_lead ? begin + k : full_end + (k - its_lead);
-      list_candidate(memory, owner >= 0, its_face, part.pixel(x, its_y), false);
+      const int at = of(place, owner) + k;
+      if (owner >= 0) list_candidate(memory, at, its_face, part.pixel(x, its_y), false);
     });
   }
 }
@@ -141,6 +144,7 @@ template <typename Memory>
 __device__ void start_counts(const Memory& memory, const Part& part) {
   using Word = typename Memory::Word;
   const int count = part.num_pixels();
+  if (threadIdx.x == 0) memory.state->next_batch = 0;
   PICTURA_KEEP_LOOP
   for (int p = static_cast<int>(threadIdx.x); p < count; p += num_threads()) {
     const int face = marked_face(memory.pixels[p]);
@@ -150,27 +154,25 @@ __device__ void start_counts(const Memory& memory, const Part& part) {
 
 // Lets edges cut fragments: a fragment and an edge that crosses its pixel for each lane.
 template <typename Memory>
-__device__ __noinline__ void cut_fragments(WarpQueue::Pair cut, const Part* part) {
+__device__ void cut_fragments(const Memory& memory, WarpQueue::Pair cut, const Part& part) {
   if (!cut.is_one) return;
-  const Memory memory = Memory::current();
   const PolygonEdge edge = memory.edges[cut.b];
-  const int pixel = memory.pixel[cut.a], x = part->x_of(pixel), y = part->y_of(pixel);
-  const uint64_t samples =
-      samples_inside(edge, static_cast<float>(x) - edge.x0, static_cast<float>(y) - edge.y0);
-  const int32_t area_units = area_left_of(edge, PixelSide::crossed, x, y);
+  const int pixel = memory.pixel[cut.a], x = part.x_of(pixel), y = part.y_of(pixel);
+  const uint64_t samples = samples_inside(edge, static_cast<float>(x) - edge.x0, static_cast<float>(y) - edge.y0);
+  const int32_t area_units = area_cut(edge, x, y);
   atomicAnd(&memory.samples_low[cut.a], static_cast<uint32_t>(samples));
   atomicAnd(&memory.samples_high[cut.a], static_cast<uint32_t>(samples >> 32));
   if (area_units != 0) atomicAdd(&memory.area_units[cut.a], area_units);
 }
 
-// Makes a fragment for each lane's candidate, and puts aside the edges that cut it.
+// Makes a fragment for each lane's candidate, and puts aside the edges that cut it; leaves none aside if is_last.
 template <typename Memory>
-__device__ __noinline__ void start_fragments(WarpQueue::Pair candidate, const Part* part, WarpQueue* cuts) {
-  const Memory memory = Memory::current();
+__device__ void start_fragments(const Memory& memory, WarpQueue::Pair candidate, const Part& part, WarpQueue* cuts,
+                                bool is_last) {
   const int32_t fragment = take_place(&memory.state->num_fragments, candidate.is_one);
   const bool has_room = candidate.is_one && fragment < memory.max_fragments;
   const int pixel = static_cast<int>(candidate.b & ~static_cast<uint32_t>(Memory::kCoversFully));
-  const int x = part->x_of(pixel), y = part->y_of(pixel);
+  const int x = part.x_of(pixel), y = part.y_of(pixel);
   int edge_begin = 0, edge_count = 0;
   int32_t area_units = static_cast<int32_t>(kAreaUnits);
   if (has_room && (candidate.b & Memory::kCoversFully) == 0) {
@@ -191,7 +193,7 @@ __device__ __noinline__ void start_fragments(WarpQueue::Pair candidate, const Pa
     if (side == PixelSide::crossed) {
       crossing |= 1u << e;
     } else {
-      area_units += area_left_of(edge, side, x, y);
+      area_units += area_beside(edge, y);
     }
   }
   if (has_room) {
@@ -202,11 +204,14 @@ __device__ __noinline__ void start_fragments(WarpQueue::Pair candidate, const Pa
   }
   __syncwarp();
   PICTURA_KEEP_LOOP
-  while (__any_sync(kAllLanes, crossing != 0)) {
+  for (;;) {
     cuts->push(crossing != 0, static_cast<uint32_t>(fragment),
                static_cast<uint32_t>(edge_begin + __ffs(static_cast<int>(crossing)) - 1));
     crossing &= crossing - 1;
-    if (cuts->is_ready()) cut_fragments<Memory>(cuts->take(), part);
+    const bool more = __any_sync(kAllLanes, crossing != 0);
+    PICTURA_KEEP_LOOP
+    while (cuts->is_ready() || (is_last && !more && !cuts->is_empty())) cut_fragments(memory, cuts->take(), part);
+    if (!more) return;
   }
 }
 
@@ -218,8 +223,9 @@ __device__ void make_fragments(const Memory& memory, const Part& part) {
   WarpQueue shown(&warp->pixels), cuts(&warp->cuts);
   const int count = memory.state->num_candidates;
   PICTURA_KEEP_LOOP
-  for (int first = warp_index() * kWarpSize; first < count; first += num_threads()) {
-    const int i = first + lane_index();
+  for (;;) {
+    const int i = next_of(&memory.state->next_batch) * kWarpSize + lane_index();
+    const bool more = i - lane_index() < count;
     bool shows = false;
     uint32_t face = 0, place = 0;
     if (i < count) {
@@ -233,11 +239,9 @@ __device__ void make_fragments(const Memory& memory, const Part& part) {
               may_show_before(memory.faces[face], memory.faces[full], part.x_of(pixel), part.y_of(pixel), covers_fully);
     }
     shown.push(shows, face, place);
-    if (shown.is_ready()) start_fragments<Memory>(shown.take(), &part, &cuts);
+    if (shown.is_ready() || !more) start_fragments(memory, shown.take(), part, &cuts, !more);
+    if (!more) return;
   }
-  if (!shown.is_empty()) start_fragments<Memory>(shown.take(), &part, &cuts);
-  __syncwarp();
-  if (!cuts.is_empty()) cut_fragments<Memory>(cuts.take(), &part);
 }
 
 template <typename Memory>

@@ -44,8 +44,7 @@ __device__ __noinline__ void draw_planes(const DrawTask& task, const CameraSlot&
     };
     each([&](const ScreenFace& face) { front.offer(face, center); });
     each([&](const ScreenFace& face) { front.offer_again(face, center); });
-    const ScreenFace* face =
-        front.front(center, [&](uint32_t solid, uint32_t strip) { return stands(&task, solid, strip); });
+    const ScreenFace* face = front.front(center, [](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
     const int64_t at = view * plane + p;
     const float infinity = __uint_as_float(0x7F800000u);
     if (slot.depth_m) slot.depth_m[at] = face ? face_depth_m(*face, center) : infinity;
@@ -63,7 +62,7 @@ __device__ bool draw_image(const Memory& memory, const DrawTask& task, int32_t v
   const int num_faces = memory.state->shown.face_count;
   const int64_t plane = static_cast<int64_t>(width) * height;
   const int64_t first = view * slot.view_stride;
-  const bool drawn = draw_faces(memory, task, num_faces, 0, height, NoVisit{}, [&](int x, int y, Rgb color) {
+  const bool drawn = draw_faces(memory, num_faces, 0, height, NoVisit{}, [&](int x, int y, Rgb color) {
     write_color(task.format, slot.color, first + y * width + x, plane, color);
   });
   if (drawn && task.wants_planes) draw_planes<Memory>(task, slot, view, num_faces);
@@ -77,9 +76,9 @@ __device__ inline void leave_to_last(const DrawTask& task, int32_t image) {
 // The next image of a counter, below num_images; -1: none is left. All threads of the block.
 __device__ inline int32_t next_image(int32_t* counter, int32_t num_images) {
   BlockState* state = block_state();
-  __syncthreads();
+  sync_block();
   if (threadIdx.x == 0) state->image = atomicAdd(counter, 1);
-  __syncthreads();
+  sync_block();
   return state->image < num_images ? state->image : -1;
 }
 __device__ inline int32_t num_images(const DrawTask& task) { return task.num_views * num_cameras(task); }
@@ -113,8 +112,7 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kGatherBlocksPerPro
 }
 
 extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcessor)
-    pictura_draw(const __grid_constant__ DrawTask task, const __grid_constant__ Scratch scratch) {
-  static_cast<void>(scratch);
+    pictura_draw(const __grid_constant__ DrawTask task) {
   BlockState* state = block_state();
   PICTURA_KEEP_LOOP
   for (;;) {
@@ -125,7 +123,7 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
       state->faces = task.pool.faces + state->shown.face_begin;
       state->edges = task.pool.edges;
     }
-    __syncthreads();
+    sync_block();
     if (state->shown.face_count < 0) continue;
     if (!draw_image(SmallDrawMemory::current(), task, view_of(task, image), camera_of(task, image)) &&
         threadIdx.x == 0) {
@@ -183,17 +181,17 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
         y_end = max_of(y_end, face.box.y_end);
       }
       auto weigh = [&](double* sum) {
-        draw_faces(LargeDrawMemory::current(), task.draw, num_faces, y_begin, y_end, WeighAgent{number, sum},
+        draw_faces(LargeDrawMemory::current(), num_faces, y_begin, y_end, WeighAgent{number, sum},
                    [](int, int, Rgb) {});
       };
       weigh(&seen);
       // Once more, without all others.
-      __syncthreads();
+      sync_block();
       PICTURA_KEEP_LOOP
       for (int i = static_cast<int>(threadIdx.x); i < num_faces; i += num_threads()) {
         if (state->faces[i].number != number) state->faces[i].box = PixelBox{};
       }
-      __syncthreads();
+      sync_block();
       weigh(&alone);
     }
     const double all_seen = block_sum(seen), all_alone = block_sum(alone);
@@ -201,7 +199,7 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
       const double share = all_seen / all_alone;  // not a number where the agent is in no frame
       task.visibility[q] = all_alone > 0 ? static_cast<float>(share < 1 ? share : 1.0) : __uint_as_float(0x7FC00000u);
     }
-    __syncthreads();
+    sync_block();
   }
 }
 

@@ -6,12 +6,16 @@ namespace pictura::cuda {
 
 namespace {
 
-template <typename Task>
-cudaError_t launch(const void* kernel, int blocks, int threads, std::size_t shared_bytes, const Task& task,
-                   const Scratch& scratch, cudaStream_t stream) {
-  void* arguments[] = {const_cast<Task*>(&task), const_cast<Scratch*>(&scratch)};
-  return cudaLaunchKernel(kernel, dim3(static_cast<unsigned>(blocks)), dim3(static_cast<unsigned>(threads)), arguments,
-                          shared_bytes, stream);
+struct LaunchShape {
+  int blocks, threads;
+  std::size_t shared_bytes;
+};
+
+template <typename... Arguments>
+cudaError_t launch(const void* kernel, LaunchShape shape, cudaStream_t stream, const Arguments&... arguments) {
+  void* pointers[] = {const_cast<Arguments*>(&arguments)...};
+  return cudaLaunchKernel(kernel, dim3(static_cast<unsigned>(shape.blocks)), dim3(static_cast<unsigned>(shape.threads)),
+                          pointers, shape.shared_bytes, stream);
 }
 
 cudaError_t allow_shared(const void* kernel, std::size_t bytes) {
@@ -42,19 +46,21 @@ std::size_t large_block_bytes(const Scratch& large) { return large_bytes(large);
 cudaError_t launch_draw(const KernelSet& kernels, const DrawTask& task, const Scratch& gather, const Scratch& large,
                         int processors, cudaStream_t stream) {
   const int images = task.num_views * task.num_cameras;
-  cudaError_t status = launch(kernels.gather, min_of(images, gather.blocks), kGatherThreads, gather_bytes(), task,
-                              gather, stream);
+  cudaError_t status =
+      launch(kernels.gather, {min_of(images, gather.blocks), kGatherThreads, gather_bytes()}, stream, task, gather);
   if (status != cudaSuccess) return status;
-  status = launch(kernels.draw, min_of(images, kDrawBlocksPerProcessor * processors), kDrawThreads, draw_bytes(), task,
-                  Scratch{}, stream);
+  const int draw_blocks = min_of(images, kDrawBlocksPerProcessor * processors);
+  status = launch(kernels.draw, {draw_blocks, kDrawThreads, draw_bytes()}, stream, task);
   if (status != cudaSuccess) return status;
-  return launch(kernels.draw_overflow, min_of(images, large.blocks), kLargeThreads, state_bytes(kLargeThreads), task, large, stream);
+  return launch(kernels.draw_overflow, {min_of(images, large.blocks), kLargeThreads, state_bytes(kLargeThreads)},
+                stream, task, large);
 }
 
 cudaError_t launch_visibility(const KernelSet& kernels, const VisibilityTask& task, const Scratch& large,
                               cudaStream_t stream) {
   if (task.num_queries == 0) return cudaSuccess;
-  return launch(kernels.visibility, min_of(task.num_queries, large.blocks), kLargeThreads, state_bytes(kLargeThreads), task, large, stream);
+  return launch(kernels.visibility, {min_of(task.num_queries, large.blocks), kLargeThreads, state_bytes(kLargeThreads)},
+                stream, task, large);
 }
 
 }  // namespace pictura::cuda

@@ -10,10 +10,10 @@ namespace pictura::cuda {
 constexpr int kGatherThreads = 64, kGatherBlocksPerProcessor = 12;
 constexpr int kGatherVisible = 2560, kGatherQuads = 256, kGatherLights = 256;
 // A block that draws them. What has more fragments or pixels is drawn in parts.
-constexpr int kDrawThreads = 384, kDrawBlocksPerProcessor = 2;
-constexpr int kDrawPixels = 96 * 54, kDrawFragments = 2496;
+constexpr int kDrawThreads = 512, kDrawBlocksPerProcessor = 2;
+constexpr int kDrawPixels = 96 * 54, kDrawFragments = 2304;
 // A block of the last launch. Pixels: a row of the widest image at least.
-constexpr int kLargeThreads = 128, kLargePixels = 1 << 14, kLargeFragments = 1 << 18;
+constexpr int kLargeThreads = 128, kLargePixels = 1 << 14, kLargeFragments = 1 << 17;
 
 // Faces that the mark of a pixel's nearest full face can tell apart in 32 bits.
 constexpr int kMarkedFaceBits = 11, kMostMarkedFaces = (1 << kMarkedFaceBits) - 1;
@@ -82,7 +82,8 @@ __host__ __device__ inline size_t lay_out(GatherMemory* memory, unsigned char* b
   return layout.used;
 }
 
-// ... what drawing keeps. Rows lie where samples do later, candidates where what is free of fragments and their order do.
+// ... what drawing keeps. Rows lie where samples do later, candidates where what is free of fragments and their order
+// do.
 template <typename Memory>
 __host__ __device__ size_t lay_out(Memory* memory, int max_pixels, int max_fragments, unsigned char* bytes) {
   memory->max_pixels = max_pixels;
@@ -180,7 +181,9 @@ struct LargeDrawMemory : DrawMemory<uint32_t, unsigned long long> {
   }
 };
 
-__host__ __device__ inline size_t gather_bytes() { return state_bytes(kGatherThreads) + SmallGatherMemory().place(nullptr); }
+__host__ __device__ inline size_t gather_bytes() {
+  return state_bytes(kGatherThreads) + SmallGatherMemory().place(nullptr);
+}
 __host__ __device__ inline size_t draw_bytes() { return state_bytes(kDrawThreads) + SmallDrawMemory().place(nullptr); }
 __host__ __device__ inline size_t large_bytes(const Scratch& sizes) {
   const size_t to_gather = LargeGatherMemory().place(sizes, nullptr), to_draw = LargeDrawMemory().place(nullptr);
@@ -197,7 +200,7 @@ __device__ inline void take_scratch(const Scratch& scratch) {
     if (own.bytes) own.bytes += blockIdx.x * large_bytes(scratch);
     block_state()->scratch = own;
   }
-  __syncthreads();
+  sync_block();
 }
 
 }  // namespace pictura::cuda

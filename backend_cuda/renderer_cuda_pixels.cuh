@@ -58,11 +58,10 @@ __device__ void order_fragments(const Memory& memory, int count) {
 }
 
 // Whether, in the image that the block draws, a solid stands on a strip.
-__device__ __noinline__ inline bool stands(const DrawTask* task, uint32_t solid, uint32_t strip) {
+__device__ __noinline__ inline bool stands(uint32_t solid, uint32_t strip) {
   const GatheredImage& shown = block_state()->shown;
   const StaticGeometryView& pieces = shown.geometry->raster.pieces;
-  return stands_on(extent_of(solid, pieces, task->scene, shown.world_begin),
-                   extent_of(strip, pieces, task->scene, shown.world_begin), shown.eye_m);
+  return stands_on(extent_of(solid, pieces, shown.agents), extent_of(strip, pieces, shown.agents), shown.eye_m);
 }
 
 // Takes samples from a fragment's free ones.
@@ -75,7 +74,7 @@ __device__ void lose(const Memory& memory, uint32_t fragment, uint64_t samples) 
 
 // Asks pairs of fragments what they hide of each other; b may be kNone, for the pixel's full face.
 template <typename Memory>
-__device__ __noinline__ void ask_pairs(const DrawTask* task, WarpQueue::Pair pair, const Part* part) {
+__device__ __noinline__ void ask_pairs(WarpQueue::Pair pair, Part part) {
   if (!pair.is_one) return;
   const Memory memory = Memory::current();
   const int pixel = memory.pixel[pair.a];
@@ -83,9 +82,9 @@ __device__ __noinline__ void ask_pairs(const DrawTask* task, WarpQueue::Pair pai
   const size_t face_b = with_full ? full_of(memory, pixel) : memory.face[pair.b];
   const PixelCoverage a = memory.coverage(static_cast<int>(pair.a));
   const PixelCoverage b = with_full ? PixelCoverage{1.0f, kAllSamples} : memory.coverage(static_cast<int>(pair.b));
-  const Vec2 corner{static_cast<float>(part->x_of(pixel)), static_cast<float>(part->y_of(pixel))};
+  const Vec2 corner{static_cast<float>(part.x_of(pixel)), static_cast<float>(part.y_of(pixel))};
   const Hidden hidden = hide_each_other(a, b, memory.faces[memory.face[pair.a]], memory.faces[face_b], corner,
-                                        [&](uint32_t solid, uint32_t strip) { return stands(task, solid, strip); });
+                                        [](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
   lose(memory, pair.a, hidden.of_a);
   if (!with_full) lose(memory, pair.b, hidden.of_b);
 }
@@ -93,7 +92,7 @@ __device__ __noinline__ void ask_pairs(const DrawTask* task, WarpQueue::Pair pai
 // Asks every two fragments of a pixel that meet what they hide of each other; a pixel's full face is one of them. Pairs
 // that meet are put aside until every lane of the warp has one.
 template <typename Memory>
-__device__ void hide_fragments(const Memory& memory, const DrawTask& task, const Part& part, int count) {
+__device__ void hide_fragments(const Memory& memory, const Part& part, int count) {
   using Index = typename Memory::Index;
   WarpState* warp = &memory.state->warps[warp_index()];
   WarpQueue pairs(&warp->pixels);
@@ -120,10 +119,10 @@ __device__ void hide_fragments(const Memory& memory, const DrawTask& task, const
         }
       }
       pairs.push(meet, static_cast<uint32_t>(first + from), other);
-      if (pairs.is_ready()) ask_pairs<Memory>(&task, pairs.take(), &part);
+      if (pairs.is_ready()) ask_pairs<Memory>(pairs.take(), part);
     });
   }
-  if (!pairs.is_empty()) ask_pairs<Memory>(&task, pairs.take(), &part);
+  if (!pairs.is_empty()) ask_pairs<Memory>(pairs.take(), part);
 }
 
 /// Hears of no fragment's weight.
@@ -149,9 +148,7 @@ __device__ Rgb mix_pixel(const Memory& memory, int pixel, const Visit& visit) {
   const auto full = full_of(memory, pixel);
   const int begin = place_of(memory, pixel), end = place_of(memory, pixel + 1);
   auto face_of = [&](int i) -> const ScreenFace& { return memory.faces[memory.face[i]]; };
-  auto weight_of = [&](int i) {
-    return PixelSum::Weight{memory.area[i], static_cast<PixelSum::Kind>(memory.kind[i])};
-  };
+  auto weight_of = [&](int i) { return PixelSum::Weight{memory.area[i], static_cast<PixelSum::Kind>(memory.kind[i])}; };
   if (end - begin == 1 && full == Memory::kNone) {
     const int i = memory.order[begin];
     visit(face_of(i), memory.area[i]);
@@ -205,40 +202,39 @@ __device__ void finish_pixels(const Memory& memory, const Part& part, const Visi
 
 // Draws the faces into one part. False where it has no room for all that it lists. All threads of the block.
 template <typename Memory, typename Visit, typename Finish>
-__device__ bool draw_part(const Memory& memory, const DrawTask& task, int num_faces, const Part& part,
-                          const Visit& visit, Finish&& finish) {
+__device__ bool draw_part(const Memory& memory, int num_faces, const Part& part, const Visit& visit, Finish&& finish) {
   BlockState* state = memory.state;
   const int pixels = part.num_pixels();
-  __syncthreads();
+  sync_block();
   PICTURA_KEEP_LOOP
   for (int p = static_cast<int>(threadIdx.x); p < pixels; p += num_threads()) memory.pixels[p] = 0;
   if (threadIdx.x == 0) state->num_rows = state->num_candidates = state->num_fragments = state->next_batch = 0;
-  __syncthreads();
+  sync_block();
   list_rows(memory, num_faces, part);
-  __syncthreads();
+  sync_block();
   if (state->num_rows > memory.max_rows) return false;
   mark_and_list(memory, part);
-  __syncthreads();
+  sync_block();
   if (state->num_candidates > memory.max_candidates) return false;
   start_counts(memory, part);
-  __syncthreads();
+  sync_block();
   make_fragments(memory, part);
-  __syncthreads();
+  sync_block();
   const int made = state->num_fragments;
   if (made > memory.max_fragments) return false;
-  __syncthreads();
+  sync_block();
   finish_fragments(memory, made);
-  __syncthreads();
+  sync_block();
   const int count = state->num_fragments;
   if (count > memory.max_fragments) return false;
   place_fragments(memory, part);
-  __syncthreads();
+  sync_block();
   order_fragments(memory, count);
-  __syncthreads();
-  hide_fragments(memory, task, part, count);
-  __syncthreads();
+  sync_block();
+  hide_fragments(memory, part, count);
+  sync_block();
   weigh_fragments(memory, count);
-  __syncthreads();
+  sync_block();
   finish_pixels(memory, part, visit, finish);
   return true;
 }
@@ -247,14 +243,14 @@ __device__ bool draw_part(const Memory& memory, const DrawTask& task, int num_fa
 // fragment, finish(x, y, color) of each pixel. False where there is no room for a single pixel. All threads of the
 // block.
 template <typename Memory, typename Visit, typename Finish>
-__device__ bool draw_faces(const Memory& memory, const DrawTask& task, int num_faces, int y_first, int y_last,
-                           const Visit& visit, Finish&& finish) {
+__device__ bool draw_faces(const Memory& memory, int num_faces, int y_first, int y_last, const Visit& visit,
+                           Finish&& finish) {
   const int width = image_width(), most_rows = memory.max_pixels / width;
   int x = 0, y = y_first, rows = most_rows, columns = width;
   PICTURA_KEEP_LOOP
   while (y < y_last) {
     const Part part{y, min_of(y + rows, y_last), x, min_of(x + columns, width)};
-    if (!draw_part(memory, task, num_faces, part, visit, finish)) {
+    if (!draw_part(memory, num_faces, part, visit, finish)) {
       if (rows == 1 && columns == 1) return false;
       if (rows == 1) columns = (columns + 1) / 2;
       rows = (rows + 1) / 2;

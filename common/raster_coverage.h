@@ -149,8 +149,7 @@ struct alignas(16) ScreenFace {
 /// False where it covers nothing.
 template <int kRoom, typename KeepEdge>
 PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Vec3* polygon, int count,
-                                        const FacePlane& plane, Rgb color, KeepEdge&& keep_edge,
-                                        ScreenFace* face_out) {
+                                        const FacePlane& plane, Rgb color, KeepEdge&& keep_edge, ScreenFace* face_out) {
   Vec2 corner[kRoom];
   Vec2 low{1e30f, 1e30f}, high{-1e30f, -1e30f};
   float depth_low = 1e30f, depth_high = 0.0f;
@@ -279,30 +278,33 @@ PICTURA_HD inline float mean_width_left(float xa, float xb) {
 /// How a pixel lies to an edge's line. A pixel that is outside of one edge has nothing of the polygon.
 enum class PixelSide : uint8_t { outside, crossed, inside };
 PICTURA_HD inline PixelSide side_of(const PolygonEdge& edge, int x, int y) {
-  const float at_corner =
-      edge.a * (static_cast<float>(x) - edge.x0) + edge.b * (static_cast<float>(y) - edge.y0);
+  const float at_corner = edge.a * (static_cast<float>(x) - edge.x0) + edge.b * (static_cast<float>(y) - edge.y0);
   if (at_corner + max_of(edge.a, 0.0f) + max_of(edge.b, 0.0f) <= 0.0f) return PixelSide::outside;
   return at_corner + min_of(edge.a, 0.0f) + min_of(edge.b, 0.0f) < 0.0f ? PixelSide::crossed : PixelSide::inside;
 }
 
-/// What an edge adds to the polygon's area in pixel (x, y): right borders the area to their left, and left borders the
-/// same negative. In whole units, so that the sum over edges does not depend on their order.
+/// Areas in whole units, so that sums over edges do not depend on their order.
 constexpr float kAreaUnits = 1 << 24;  // of a pixel
-PICTURA_HD inline int32_t area_left_of(const PolygonEdge& edge, PixelSide side, int x, int y) {
+PICTURA_HD inline int32_t to_area_units(float area) { return static_cast<int32_t>(area * kAreaUnits + 0.5f); }
+
+/// What an edge that does not cross pixel (x, y), with the polygon on the pixel's side, adds to the area there: a right
+/// border what is to its left, which is all of the pixel in the rows that it spans; a left border nothing.
+PICTURA_HD inline int32_t area_beside(const PolygonEdge& edge, int y) {
   const float y_px = static_cast<float>(y);
   const float from = clamp(edge.y0 - y_px, 0.0f, 1.0f), to = clamp(edge.y1 - y_px, 0.0f, 1.0f);
+  return edge.a < 0.0f ? to_area_units(to - from) : 0;
+}
+/// ... what one that crosses it adds: a right border the area to its left, a left border the same negative.
+PICTURA_HD inline int32_t area_cut(const PolygonEdge& edge, int x, int y) {
+  const float y_px = static_cast<float>(y), left_px = static_cast<float>(x) - edge.x0, top_px = y_px - edge.y0;
+  const float from = clamp(edge.y0 - y_px, 0.0f, 1.0f), to = clamp(edge.y1 - y_px, 0.0f, 1.0f);
   if (from >= to) return 0;
-  // A border that does not cross the pixel is to its right, or has nothing of it to its left.
-  float width = edge.a < 0.0f ? 1.0f : 0.0f;
-  if (side == PixelSide::crossed) {
-    const float left_px = static_cast<float>(x) - edge.x0, top_px = y_px - edge.y0;
-    width = mean_width_left((from + top_px) * edge.dx_dy - left_px, (to + top_px) * edge.dx_dy - left_px);
-  }
-  const auto units = static_cast<int32_t>((to - from) * width * kAreaUnits + 0.5f);
+  const float width = mean_width_left((from + top_px) * edge.dx_dy - left_px, (to + top_px) * edge.dx_dy - left_px);
+  const int32_t units = to_area_units((to - from) * width);
   return edge.a < 0.0f ? units : -units;
 }
 
-/// ... of the sum over all edges, and the samples on the inner side of those that cross the pixel.
+/// What the sum of areas over all edges, and the samples on the inner side of those that cross the pixel, amount to.
 PICTURA_HD inline PixelCoverage rounded_coverage(int32_t area_units, uint64_t samples) {
   const float area = static_cast<float>(area_units) * (1.0f / kAreaUnits);
   if (samples == kAllSamples && area > 1.0f - kFullCoverage) return {1.0f, kAllSamples};
@@ -320,8 +322,10 @@ PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int cou
     if (side == PixelSide::outside) return {0.0f, 0};
     if (side == PixelSide::crossed) {
       samples &= samples_inside(edge, static_cast<float>(x) - edge.x0, static_cast<float>(y) - edge.y0);
+      area_units += area_cut(edge, x, y);
+    } else {
+      area_units += area_beside(edge, y);
     }
-    area_units += area_left_of(edge, side, x, y);
   }
   return rounded_coverage(area_units, samples);
 }

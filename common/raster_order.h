@@ -60,12 +60,11 @@ PICTURA_HD inline Extent extent_of(const Strip& strip) {
   return extent;
 }
 
-/// The extent of a thing of an image, by its number.
-PICTURA_HD inline Extent extent_of(uint32_t number, const StaticGeometryView& pieces, const SceneBatch& scene,
-                                   int32_t world_begin) {
+/// The extent of a thing of an image, by its number; agents: the first of the world.
+PICTURA_HD inline Extent extent_of(uint32_t number, const StaticGeometryView& pieces, const AgentBox* agents) {
   const int32_t index = index_of(number);
   switch (kind_of(number)) {
-    case kAgentKind: return extent_of(scene.agents[static_cast<size_t>(world_begin + index)]);
+    case kAgentKind: return extent_of(agents[index]);
     case kWallKind: return extent_of(pieces.walls[static_cast<size_t>(index)]);
     case kLightKind: return extent_of(pieces.heads[static_cast<size_t>(index)]);
     default: return extent_of(pieces.strips[static_cast<size_t>(index)]);
@@ -131,7 +130,8 @@ PICTURA_HD inline bool of_one_level(const ScreenFace& a, const ScreenFace& b, Ve
 /// 1 / depth of a face at a point of the screen, for telling which of two is in front there; within the depths of its
 /// corners, which those of a strip may leave by a factor (see kWidenedDepth).
 PICTURA_HD inline float nearness_at(const ScreenFace& face, Vec2 at_px) {
-  const float factor = is_strip(face) ? kWidenedDepth : 1.0f, inverse_factor = is_strip(face) ? 1.0f / kWidenedDepth : 1.0f;
+  const float factor = is_strip(face) ? kWidenedDepth : 1.0f,
+              inverse_factor = is_strip(face) ? 1.0f / kWidenedDepth : 1.0f;
   return clamp(inverse_depth(face, at_px), face.inverse_depth_low * inverse_factor, face.inverse_depth_high * factor);
 }
 
@@ -232,9 +232,8 @@ PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFac
   const Vec2 middle = middle_of(shared), at = corner + middle;
   // Of the lower number before the higher, so that both ways round are the same arithmetic.
   const bool swapped = b.number < a.number;
-  const ScreenFace &low = swapped ? b : a, &high = swapped ? a : b;
-  const float lead = inverse_depth(low, at) - inverse_depth(high, at);
-  const Vec2 gradient{low.inverse_depth_x - high.inverse_depth_x, low.inverse_depth_y - high.inverse_depth_y};
+  const float sign = swapped ? -1.0f : 1.0f, lead = sign * (inverse_depth(a, at) - inverse_depth(b, at));
+  const Vec2 gradient{sign * (a.inverse_depth_x - b.inverse_depth_x), sign * (a.inverse_depth_y - b.inverse_depth_y)};
   // No sample is further than a pixel from the middle along either axis.
   const bool intersect = fabsf(lead) < fabsf(gradient.x) + fabsf(gradient.y) && !is_strip(a) && !is_strip(b);
   if (!intersect) return is_in_front(a, b, at, stands) ? shared : 0;
