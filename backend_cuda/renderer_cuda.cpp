@@ -4,13 +4,13 @@
 #include <cmath>
 #include <memory>
 
+#include "pictura/backend_cuda/draw_task.h"
 #include "pictura/backend_cuda/kernel_library.h"
 #include "pictura/backend_cuda/renderer_cuda_launch.h"
 #include "pictura/backend_cuda/scratch_plan.h"
 #include "pictura/common/cuda/check.cuh"
 #include "pictura/common/cuda/device_buffer.cuh"
 #include "pictura/common/error.h"
-#include "pictura/common/grid.h"
 #include "pictura/common/raster_check.h"
 
 namespace pictura {
@@ -20,7 +20,6 @@ std::string cuda_unavailable();
 
 namespace {
 
-constexpr int kMaxWorldAgents = 4096;
 constexpr int kLargeBlocks = 8;
 // Room in the pool for the faces and edges of an image, on average. More than the images of CARLA's towns ask for.
 constexpr int kPoolFaces = 320, kPoolEdges = 1472;
@@ -82,47 +81,19 @@ class PoolBuffers {
   DeviceBuffer<int32_t> overflow_images_;
 };
 
-// Pieces of one kind, by the cell of their middle.
+// Pieces of one kind in device memory.
 struct UploadedPieces {
   DeviceBuffer<int32_t> begin, items;
   DeviceBuffer<cuda::Ball> balls;
   cuda::PieceGrid view;
 
-  explicit UploadedPieces(const std::vector<cuda::Ball>& host) {
-    std::vector<Aabb2> middles;
-    for (const cuda::Ball& ball : host) {
-      middles.push_back({ball.center_m.xy(), ball.center_m.xy()});
-      view.largest_radius_m = std::max(view.largest_radius_m, ball.radius_m);
-    }
-    view.largest_radius_m += kLeeway_m;
-    constexpr float kCell_m = 16.0f;
-    const Grid grid(middles, kCell_m);
-    view.cells = grid.view();
-    std::vector<cuda::Ball> sorted;
-    for (const int32_t item : view.cells.items) sorted.push_back(host[static_cast<std::size_t>(item)]);
-    begin = DeviceBuffer<int32_t>(view.cells.begin);
-    items = DeviceBuffer<int32_t>(view.cells.items);
-    balls = DeviceBuffer<cuda::Ball>(Span<const cuda::Ball>(sorted));
+  explicit UploadedPieces(const cuda::PieceGrid& host)
+      : begin(host.cells.begin), items(host.cells.items), balls(host.balls), view(host) {
     view.cells.begin = begin.span();
     view.cells.items = items.span();
     view.balls = balls.span();
   }
-
- private:
-  // More than rounding moves the borders of what is searched.
-  static constexpr float kLeeway_m = 0.1f;
 };
-
-std::vector<cuda::Ball> balls_of(const std::vector<Strip>& strips) {
-  std::vector<cuda::Ball> balls;
-  for (const Strip& strip : strips) balls.push_back({strip_middle(strip), strip_radius_m(strip)});
-  return balls;
-}
-std::vector<cuda::Ball> balls_of(const std::vector<WallFace>& walls) {
-  std::vector<cuda::Ball> balls;
-  for (const WallFace& wall : walls) balls.push_back({wall_middle(wall), wall_radius_m(wall)});
-  return balls;
-}
 
 // A map's looks in device memory.
 struct UploadedGeometry {
@@ -136,8 +107,8 @@ struct UploadedGeometry {
       : strips(host.view().strips),
         walls(host.view().walls),
         heads(host.view().heads),
-        strip_pieces(balls_of(host.strips)),
-        wall_pieces(balls_of(host.walls)) {
+        strip_pieces(cuda::SortedPieces(host.strips).view()),
+        wall_pieces(cuda::SortedPieces(host.walls).view()) {
     view.raster = raster_geometry(host);
     view.raster.pieces = {};
     view.raster.pieces.strips = strips.span();
@@ -228,45 +199,21 @@ class CudaRenderer final : public Renderer {
     PICTURA_CHECK(images_total < (std::size_t{1} << 31), "renderer cuda: expected fewer than 2^31 images, got {}",
                   images_total);
     grow(scene.agents.size(), views.size());
-    cuda::DrawTask task;
-    task.scene = scene;
-    task.views = views.data();
-    task.num_views = static_cast<int32_t>(views.size());
-    task.num_cameras = static_cast<int32_t>(config_.rig.cameras.size());
+    cuda::DrawTask task = cuda::make_draw_task(config_, cameras_, scene, views, images);
     task.geometries = geometry_views_.data();
     task.num_geometries = static_cast<int32_t>(geometries_.size());
-    task.max_world_agents = kMaxWorldAgents;
-    task.line_floor_px = config_.line_floor_px;
-    task.debug_palette = config_.debug_palette;
     task.fault = fault_.device();
     task.pool = pool_.view();
     task.counters = counters_.data();
     task.overflow_images = pool_.overflow_images();
-    for (std::size_t i = 0; i < cameras_.size(); ++i) {
-      task.cameras[i].camera = cameras_[i];
-      if (!images) continue;
-      const CameraImages& out = images->cameras[i];
-      task.cameras[i] = {cameras_[i], out.data, out.view_stride, out.depth_m, out.class_id, out.instance_id};
-    }
-    if (images) task.format = images->format;
-    task.wants_planes =
-        images && std::any_of(images->cameras.begin(), images->cameras.end(), [](const CameraImages& camera) {
-          return camera.depth_m || camera.class_id || camera.instance_id;
-        });
     return task;
   }
 
   // Room for as many views as the bound allows, and in the last launch for all that a world can hold: after this
   // nothing is cut off. Allocates nothing where an earlier call needed as much.
   void grow(std::size_t agents_total, std::size_t views) {
-    const int agents = static_cast<int>(std::min<std::size_t>(agents_total, kMaxWorldAgents));
-    // Agents turn up to three faces to a camera, everything else one; faces of four corners have at most nine edges
-    // when clipped.
-    cuda::Scratch large;
-    large.max_faces = std::max({1, most_pieces_ + 3 * agents, large_.view().max_faces});
-    large.max_visible = large.max_quads = large.max_faces;
-    large.max_lights = std::max(1, most_heads_);
-    large.max_edges = 9 * large.max_faces + kMaxPolygonCorners * most_heads_;
+    most_agents_ = std::max(most_agents_, static_cast<int>(std::min<std::size_t>(agents_total, cuda::kMaxWorldAgents)));
+    cuda::Scratch large = cuda::large_sizes(most_pieces_, most_heads_, most_agents_);
     const cuda::Scratch& had = large_.view();
     const std::size_t most_views = std::max(most_views_, std::min(views, kViewsAtOnce));
     if (most_views == most_views_ && large.max_faces == had.max_faces && large.max_edges == had.max_edges) return;
@@ -310,7 +257,7 @@ class CudaRenderer final : public Renderer {
   cuda::KernelLibrary library_;         // outlives the buffers, whose release waits for the device
   std::vector<UploadedGeometry> geometries_;
   DeviceBuffer<cuda::DeviceGeometry> geometry_views_;
-  int processors_ = 0, most_pieces_ = 0, most_heads_ = 0;
+  int processors_ = 0, most_pieces_ = 0, most_heads_ = 0, most_agents_ = 0;
   std::size_t most_views_ = 0;
   cuda::ScratchPlan plan_;
   ScratchBuffers gather_, large_;

@@ -184,9 +184,8 @@ class WarpQueue {
   int count_ = 0;
 };
 
-// Sum over the threads, in their order. All threads of the block, which are at most kMaxWarps warps.
-__device__ inline double block_sum(double value) {
-  __shared__ double of_thread[kMaxWarps * kWarpSize];
+// Sum over the threads, in their order, by way of an array of as many. All threads of the block.
+__device__ inline double block_sum(double* of_thread, double value) {
   sync_block();
   of_thread[threadIdx.x] = value;
   sync_block();

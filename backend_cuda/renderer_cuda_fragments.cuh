@@ -72,11 +72,11 @@ __device__ void list_rows(const Memory& memory, int num_faces, const Part& part)
 
 // Lists what may become a fragment, where there is room.
 template <typename Memory>
-__device__ void list_candidate(const Memory& memory, int at, int face, int pixel, bool covers_fully) {
+__device__ void list_candidate(const Memory& memory, int place, int face, int pixel, bool covers_fully) {
   using Word = typename Memory::Word;
-  if (at >= memory.max_candidates) return;
-  memory.candidates[at] = static_cast<Word>(face) << Memory::kHalf | static_cast<Word>(pixel) |
-                          (covers_fully ? Memory::kCoversFully : Word{0});
+  if (place >= memory.max_candidates) return;
+  memory.candidates[place] = static_cast<Word>(face) << Memory::kHalf | static_cast<Word>(pixel) |
+                             (covers_fully ? Memory::kCoversFully : Word{0});
 }
 
 // Marks a pixel that a face covers fully, unless a nearer one has. Returns the face that gives way to the other, and
@@ -123,17 +123,17 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
       const int pixel = part.pixel(x, its_y);
       const int loser = owner >= 0 ? mark_pixel(memory, its_face, x, its_y, pixel) : -1;
       if (!__any_sync(kAllLanes, loser >= 0)) return;
-      const int32_t at = take_place(&state->num_candidates, loser >= 0);
-      if (loser >= 0) list_candidate(memory, at, loser, pixel, true);
+      const int32_t place = take_place(&state->num_candidates, loser >= 0);
+      if (loser >= 0) list_candidate(memory, place, loser, pixel, true);
     });
     const int partial = span.end - span.begin - full;
-    const int32_t place = take_places(&state->num_candidates, partial);
+    const int32_t first_place = take_places(&state->num_candidates, partial);
     share_out(warp, partial, [&](int owner, int k) {
       const int its_face = of(face, owner), its_y = of(y, owner), its_lead = of(lead, owner);
       const int begin = of(span.begin, owner), full_end = of(span.full_end, owner);
       const int x = k < its_lead ? begin + k : full_end + (k - its_lead);
-      const int at = of(place, owner) + k;
-      if (owner >= 0) list_candidate(memory, at, its_face, part.pixel(x, its_y), false);
+      const int place = of(first_place, owner) + k;
+      if (owner >= 0) list_candidate(memory, place, its_face, part.pixel(x, its_y), false);
     });
   }
 }

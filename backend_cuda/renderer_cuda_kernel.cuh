@@ -25,7 +25,7 @@ __device__ inline void write_color(PixelFormat format, void* images, int64_t at,
 
 // Writes the optional planes: the front surface at each pixel's centre.
 template <typename Memory>
-__device__ __noinline__ void draw_planes(const DrawTask& task, const CameraSlot& slot, int32_t view, int num_faces) {
+__device__ __noinline__ void draw_planes(const CameraSlot& slot, int32_t view, int num_faces) {
   const Memory memory = Memory::current();
   const int width = width_px(slot.camera);
   const int64_t plane = static_cast<int64_t>(width) * height_px(slot.camera);
@@ -65,7 +65,7 @@ __device__ bool draw_image(const Memory& memory, const DrawTask& task, int32_t v
   const bool drawn = draw_faces(memory, num_faces, 0, height, NoVisit{}, [&](int x, int y, Rgb color) {
     write_color(task.format, slot.color, first + y * width + x, plane, color);
   });
-  if (drawn && task.wants_planes) draw_planes<Memory>(task, slot, view, num_faces);
+  if (drawn && task.wants_planes) draw_planes<Memory>(slot, view, num_faces);
   return drawn;
 }
 
@@ -194,7 +194,9 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
       sync_block();
       weigh(&alone);
     }
-    const double all_seen = block_sum(seen), all_alone = block_sum(alone);
+    // Nothing is drawn any more where drawing keeps its pixels.
+    auto* of_thread = reinterpret_cast<double*>(state->scratch.bytes);
+    const double all_seen = block_sum(of_thread, seen), all_alone = block_sum(of_thread, alone);
     if (threadIdx.x == 0) {
       const double share = all_seen / all_alone;  // not a number where the agent is in no frame
       task.visibility[q] = all_alone > 0 ? static_cast<float>(share < 1 ? share : 1.0) : __uint_as_float(0x7FC00000u);

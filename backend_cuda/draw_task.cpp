@@ -1,0 +1,65 @@
+#include "pictura/backend_cuda/draw_task.h"
+
+#include <algorithm>
+
+namespace pictura::cuda {
+
+SortedPieces::SortedPieces(const std::vector<Strip>& strips) {
+  std::vector<Ball> balls;
+  for (const Strip& strip : strips) balls.push_back({strip_middle(strip), strip_radius_m(strip)});
+  sort(std::move(balls));
+}
+
+SortedPieces::SortedPieces(const std::vector<WallFace>& walls) {
+  std::vector<Ball> balls;
+  for (const WallFace& wall : walls) balls.push_back({wall_middle(wall), wall_radius_m(wall)});
+  sort(std::move(balls));
+}
+
+void SortedPieces::sort(std::vector<Ball> balls) {
+  constexpr float kCell_m = 16.0f;
+  // More than rounding moves the borders of what is searched.
+  constexpr float kLeeway_m = 0.1f;
+  std::vector<Aabb2> middles;
+  for (const Ball& ball : balls) {
+    middles.push_back({ball.center_m.xy(), ball.center_m.xy()});
+    largest_radius_m_ = std::max(largest_radius_m_, ball.radius_m);
+  }
+  largest_radius_m_ += kLeeway_m;
+  grid_ = Grid(middles, kCell_m);
+  for (const int32_t item : grid_.view().items) balls_.push_back(balls[static_cast<std::size_t>(item)]);
+}
+
+DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeCamera>& cameras,
+                        const SceneBatch& scene, Span<const View> views, const ImageBatch* images) {
+  DrawTask task;
+  task.scene = scene;
+  task.views = views.data();
+  task.num_views = static_cast<int32_t>(views.size());
+  task.num_cameras = static_cast<int32_t>(cameras.size());
+  task.max_world_agents = kMaxWorldAgents;
+  task.line_floor_px = config.line_floor_px;
+  task.debug_palette = config.debug_palette;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    task.cameras[i].camera = cameras[i];
+    if (!images) continue;
+    const CameraImages& out = images->cameras[i];
+    task.cameras[i] = {cameras[i], out.data, out.view_stride, out.depth_m, out.class_id, out.instance_id};
+    task.wants_planes = task.wants_planes || out.depth_m || out.class_id || out.instance_id;
+  }
+  if (images) task.format = images->format;
+  return task;
+}
+
+Scratch large_sizes(int pieces, int heads, int agents) {
+  // Agents turn up to three faces to a camera, everything else one; faces of four corners have at most nine edges when
+  // clipped.
+  Scratch sizes;
+  sizes.max_faces = std::max(1, pieces + 3 * std::min(agents, kMaxWorldAgents));
+  sizes.max_visible = sizes.max_quads = sizes.max_faces;
+  sizes.max_lights = std::max(1, heads);
+  sizes.max_edges = 9 * sizes.max_faces + kMaxPolygonCorners * heads;
+  return sizes;
+}
+
+}  // namespace pictura::cuda

@@ -1,0 +1,246 @@
+// A device on the host, for running the text of kernels where there is no GPU: the vocabulary of CUDA that they use,
+// and blocks whose threads are fibers. Threads of a warp, and warps, take turns in an order that a seed draws, and go
+// on to the next collective step; where lanes of a warp wait for different steps, that is a fault. Races within a step
+// do not show. Include before the kernels, in one source file.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <functional>
+#include <memory>
+#include <random>
+#include <stdexcept>
+#include <vector>
+
+#include <ucontext.h>
+
+namespace pictura::emulation {
+
+struct Dim {
+  unsigned x = 0, y = 0, z = 0;
+};
+inline Dim thread_index, block_index, block_dim, grid_dim;
+
+/// Runs one block at a time.
+class Block {
+ public:
+  enum class Step { none, warp, block, done };
+  static constexpr int kLanes = 32;
+
+  /// Calls kernel() in each of `threads` threads, a whole number of warps.
+  static void run(int threads, uint64_t seed, const std::function<void()>& kernel) {
+    Block block(threads, seed, kernel);
+    current() = &block;
+    block.run_all();
+    current() = nullptr;
+  }
+  static Block*& current() {
+    static Block* block = nullptr;
+    return block;
+  }
+
+  /// Waits for the lanes of the warp; returns what each of them brought. `what`: all must wait for the same.
+  const uint64_t* exchange(const char* what, uint64_t value) {
+    Thread& thread = threads_[running_];
+    thread.what = what;
+    thread.value = value;
+    wait(Step::warp);
+    return warps_[running_ / kLanes].values;
+  }
+  void sync() { wait(Step::block); }
+
+ private:
+  struct Thread {
+    ucontext_t context{};
+    std::unique_ptr<char[]> stack;
+    Step waits_for = Step::none;
+    const char* what = "";
+    uint64_t value = 0;
+  };
+  struct Warp {
+    uint64_t values[kLanes] = {};
+  };
+
+  Block(int threads, uint64_t seed, const std::function<void()>& kernel)
+      : kernel_(kernel), random_(seed), threads_(static_cast<std::size_t>(threads)), warps_(threads_.size() / kLanes) {
+    constexpr std::size_t kStackBytes = 128 << 10;
+    for (Thread& thread : threads_) {
+      thread.stack = std::make_unique<char[]>(kStackBytes);
+      getcontext(&thread.context);
+      thread.context.uc_stack.ss_sp = thread.stack.get();
+      thread.context.uc_stack.ss_size = kStackBytes;
+      thread.context.uc_link = &scheduler_;
+      makecontext(&thread.context, &Block::start, 0);
+    }
+  }
+
+  static void start() {
+    Block* block = current();
+    block->kernel_();
+    block->threads_[block->running_].waits_for = Step::done;
+  }
+
+  void wait(Step step) {
+    Thread& thread = threads_[running_];
+    thread.waits_for = step;
+    swapcontext(&thread.context, &scheduler_);
+  }
+
+  void run_thread(std::size_t thread) {
+    running_ = thread;
+    thread_index = {static_cast<unsigned>(thread), 0, 0};
+    threads_[thread].waits_for = Step::none;
+    swapcontext(&scheduler_, &threads_[thread].context);
+  }
+
+  bool all_wait_for(Step step) const {
+    return std::all_of(threads_.begin(), threads_.end(), [&](const Thread& t) { return t.waits_for == step; });
+  }
+
+  // Lets the lanes of a warp go on to their next step.
+  void run_warp(std::size_t warp) {
+    std::size_t order[kLanes];
+    for (std::size_t lane = 0; lane < kLanes; ++lane) order[lane] = warp * kLanes + lane;
+    std::shuffle(std::begin(order), std::end(order), random_);
+    for (const std::size_t thread : order) run_thread(thread);
+    const Thread& first = threads_[warp * kLanes];
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const Thread& thread = threads_[warp * kLanes + lane];
+      if (thread.waits_for != first.waits_for || std::strcmp(thread.what, first.what) != 0) {
+        throw std::logic_error(std::string("lanes of a warp have parted: ") + first.what + " and " + thread.what);
+      }
+      warps_[warp].values[lane] = thread.value;
+    }
+  }
+
+  void run_all() {
+    std::vector<std::size_t> order(warps_.size());
+    for (std::size_t warp = 0; warp < order.size(); ++warp) order[warp] = warp;
+    for (std::size_t warp = 0; warp < warps_.size(); ++warp) run_warp(warp);
+    while (!all_wait_for(Step::done)) {
+      std::shuffle(order.begin(), order.end(), random_);
+      const bool at_barrier = all_wait_for(Step::block);
+      bool moved = false;
+      for (const std::size_t warp : order) {
+        const Step step = threads_[warp * kLanes].waits_for;
+        if (step != Step::warp && !(step == Step::block && at_barrier)) continue;
+        // Some warps run far ahead of others.
+        for (int steps = 1 << (random_() % 8); steps > 0; --steps) {
+          run_warp(warp);
+          moved = true;
+          if (threads_[warp * kLanes].waits_for != Step::warp) break;
+        }
+      }
+      if (!moved) throw std::logic_error("some threads wait for others that have gone");
+    }
+  }
+
+  const std::function<void()>& kernel_;
+  std::mt19937_64 random_;
+  std::vector<Thread> threads_;
+  std::vector<Warp> warps_;
+  ucontext_t scheduler_{};
+  std::size_t running_ = 0;
+};
+
+template <typename Value>
+uint64_t bits_of(Value value) {
+  uint64_t bits = 0;
+  std::memcpy(&bits, &value, sizeof(Value));
+  return bits;
+}
+template <typename Value>
+Value value_of(uint64_t bits) {
+  Value value;
+  std::memcpy(&value, &bits, sizeof(Value));
+  return value;
+}
+
+}  // namespace pictura::emulation
+
+#define __host__
+#define __device__
+#define __global__
+#define __grid_constant__
+#define __noinline__
+#define __shared__
+#define __align__(bytes) __attribute__((aligned(bytes)))
+#define __launch_bounds__(...)
+#define threadIdx ::pictura::emulation::thread_index
+#define blockIdx ::pictura::emulation::block_index
+#define blockDim ::pictura::emulation::block_dim
+#define gridDim ::pictura::emulation::grid_dim
+
+struct alignas(16) uint4 {
+  unsigned x, y, z, w;
+};
+using std::memcpy;
+
+inline void __syncthreads() { pictura::emulation::Block::current()->sync(); }
+inline void __syncwarp() { pictura::emulation::Block::current()->exchange("syncwarp", 0); }
+
+inline unsigned __ballot_sync(unsigned, bool vote) {
+  const uint64_t* votes = pictura::emulation::Block::current()->exchange("ballot", vote ? 1 : 0);
+  unsigned ballot = 0;
+  for (int lane = 0; lane < 32; ++lane) ballot |= votes[lane] != 0 ? 1u << lane : 0u;
+  return ballot;
+}
+inline bool __any_sync(unsigned lanes, bool vote) { return __ballot_sync(lanes, vote) != 0; }
+inline unsigned __reduce_or_sync(unsigned, unsigned bits) {
+  const uint64_t* values = pictura::emulation::Block::current()->exchange("reduce_or", bits);
+  unsigned all = 0;
+  for (int lane = 0; lane < 32; ++lane) all |= static_cast<unsigned>(values[lane]);
+  return all;
+}
+template <typename Value>
+Value __shfl_sync(unsigned, Value value, int from) {
+  const uint64_t* values = pictura::emulation::Block::current()->exchange("shfl", pictura::emulation::bits_of(value));
+  return pictura::emulation::value_of<Value>(values[from & 31]);
+}
+template <typename Value>
+Value __shfl_up_sync(unsigned, Value value, unsigned step) {
+  const int lane = static_cast<int>(threadIdx.x) & 31;
+  const uint64_t* values =
+      pictura::emulation::Block::current()->exchange("shfl_up", pictura::emulation::bits_of(value));
+  const int from = lane - static_cast<int>(step);
+  return pictura::emulation::value_of<Value>(values[from < 0 ? lane : from]);
+}
+
+inline int __popc(unsigned bits) { return std::popcount(bits); }
+inline int __ffs(int bits) { return bits == 0 ? 0 : std::countr_zero(static_cast<unsigned>(bits)) + 1; }
+inline float __uint_as_float(unsigned bits) { return std::bit_cast<float>(bits); }
+inline unsigned __float_as_uint(float value) { return std::bit_cast<unsigned>(value); }
+
+template <typename Value>
+Value atomicAdd(Value* at, std::type_identity_t<Value> by) {
+  const Value had = *at;
+  *at = had + by;
+  return had;
+}
+template <typename Value>
+Value atomicMax(Value* at, std::type_identity_t<Value> other) {
+  const Value had = *at;
+  *at = std::max(had, other);
+  return had;
+}
+template <typename Value>
+Value atomicAnd(Value* at, std::type_identity_t<Value> other) {
+  const Value had = *at;
+  *at = had & other;
+  return had;
+}
+template <typename Value>
+Value atomicOr(Value* at, std::type_identity_t<Value> other) {
+  const Value had = *at;
+  *at = had | other;
+  return had;
+}
+template <typename Value>
+Value atomicCAS(Value* at, std::type_identity_t<Value> expected, std::type_identity_t<Value> wanted) {
+  const Value had = *at;
+  if (had == expected) *at = wanted;
+  return had;
+}

@@ -1,0 +1,263 @@
+// The drawing kernels, run thread by thread on the host, against the oracle: every value equal, in whatever order
+// threads take turns. So a change that breaks a kernel shows where there is no GPU.
+#include <algorithm>
+#include <memory>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/backend_cuda/draw_task.h"
+#include "pictura/common/make_renderer.h"
+#include "pictura/common/raster_check.h"
+#include "pictura/common/scene_file.h"
+#include "pictura/tests/support/image_scenes.h"
+// After all else, because it gives the compiler's words other meanings.
+#include "pictura/tests/backend_cuda/emulated_device.h"
+// The kernels, under names of their own beside those that were compiled ahead of time.
+#define pictura_gather emulated_gather
+#define pictura_draw emulated_draw
+#define pictura_draw_overflow emulated_draw_overflow
+#define pictura_visibility emulated_visibility
+#include "pictura/backend_cuda/renderer_cuda_kernel.cuh"
+
+namespace pictura {
+
+namespace cuda {
+// The shared memory of the block that runs.
+alignas(16) unsigned char block_memory[232448];
+}  // namespace cuda
+
+namespace {
+
+// Draws with the kernels. Two blocks of each launch, so that each draws several images, one after the other.
+class EmulatedRenderer final : public Renderer {
+ public:
+  EmulatedRenderer(const RendererConfig& config, uint64_t seed)
+      : config_(config), seed_(seed), cameras_(pinhole_cameras(config.rig)) {}
+  std::string_view name() const override { return "emulated"; }
+  MemorySpace space() const override { return MemorySpace::host; }
+  const RendererConfig& config() const override { return config_; }
+
+  GeometryHandle upload(const StaticGeometry& geometry) override {
+    kept_.push_back(std::make_unique<Kept>(geometry));
+    cuda::DeviceGeometry view{raster_geometry(kept_.back()->geometry), kept_.back()->strips.view(),
+                              kept_.back()->walls.view()};
+    geometries_.push_back(view);
+    return static_cast<GeometryHandle>(geometries_.size()) - 1;
+  }
+
+  void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream) override {
+    Setup setup(*this, cuda::make_draw_task(config_, cameras_, scene, views, &images_out), scene);
+    const cuda::DrawTask& task = setup.task;
+    launch(cuda::kGatherThreads, [&] { cuda::emulated_gather(task, setup.gather); });
+    launch(cuda::kDrawThreads, [&] { cuda::emulated_draw(task); });
+    overflow_ = setup.counters.overflow;
+    launch(cuda::kLargeThreads, [&] { cuda::emulated_draw_overflow(task, setup.large); });
+    EXPECT_EQ(setup.fault.view, -1) << "fault " << setup.fault.kind;
+  }
+
+  void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
+                  Span<float> visibility_out, Stream) override {
+    Setup setup(*this, cuda::make_draw_task(config_, cameras_, scene, views, nullptr), scene);
+    const cuda::VisibilityTask task{setup.task, &queries.data()->view, static_cast<int32_t>(queries.size()),
+                                    visibility_out.data()};
+    launch(cuda::kLargeThreads, [&] { cuda::emulated_visibility(task, setup.large); });
+    EXPECT_EQ(setup.fault.view, -1) << "fault " << setup.fault.kind;
+  }
+
+  /// Images that the last call left to the last launch.
+  int overflow() const { return overflow_; }
+
+ private:
+  static constexpr int kBlocks = 2;
+
+  struct Kept {
+    StaticGeometry geometry;
+    cuda::SortedPieces strips, walls;
+    explicit Kept(const StaticGeometry& map) : geometry(map), strips(geometry.strips), walls(geometry.walls) {}
+  };
+
+  // What a renderer keeps in device memory.
+  struct Setup {
+    cuda::DrawTask task;
+    cuda::DrawCounters counters;
+    cuda::Fault fault;
+    cuda::Scratch gather, large;
+    std::vector<ScreenFace> pool_faces, large_faces;
+    std::vector<PolygonEdge> pool_edges, large_edges;
+    std::vector<cuda::GatheredImage> images;
+    std::vector<int32_t> overflow_images;
+    std::vector<cuda::Quad> gather_quads, large_quads;
+    std::vector<uint64_t> large_words;
+
+    Setup(const EmulatedRenderer& renderer, const cuda::DrawTask& draw, const SceneBatch& scene) : task(draw) {
+      int pieces = 0, heads = 0;
+      for (const auto& kept : renderer.kept_) {
+        const StaticGeometry& map = kept->geometry;
+        heads = std::max(heads, static_cast<int>(map.heads.size()));
+        pieces = std::max(pieces, static_cast<int>(map.strips.size() + map.walls.size() + map.heads.size()));
+      }
+      const auto num_images = static_cast<std::size_t>(task.num_views * task.num_cameras);
+      pool_faces.resize(2048 * num_images);
+      pool_edges.resize(8192 * num_images);
+      images.resize(num_images);
+      overflow_images.resize(num_images);
+      task.pool = {pool_faces.data(), pool_edges.data(), images.data(), static_cast<int32_t>(pool_faces.size()),
+                   static_cast<int32_t>(pool_edges.size())};
+      task.geometries = renderer.geometries_.data();
+      task.num_geometries = static_cast<int32_t>(renderer.geometries_.size());
+      task.counters = &counters;
+      task.fault = &fault;
+      task.overflow_images = overflow_images.data();
+
+      gather.blocks = large.blocks = kBlocks;
+      gather.max_quads = cuda::kGatherQuads;
+      gather_quads.resize(static_cast<std::size_t>(kBlocks * gather.max_quads));
+      gather.quads = gather_quads.data();
+      large = cuda::large_sizes(pieces, heads, static_cast<int>(scene.agents.size()));
+      large_faces.resize(static_cast<std::size_t>(kBlocks * large.max_faces));
+      large_edges.resize(static_cast<std::size_t>(kBlocks * large.max_edges));
+      large_quads.resize(static_cast<std::size_t>(kBlocks * large.max_quads));
+      large_words.resize(kBlocks * cuda::large_bytes(large) / sizeof(uint64_t));
+      large.faces = large_faces.data();
+      large.edges = large_edges.data();
+      large.quads = large_quads.data();
+      large.bytes = reinterpret_cast<unsigned char*>(large_words.data());
+    }
+    Setup(const Setup&) = delete;
+  };
+
+  template <typename Kernel>
+  void launch(int threads, Kernel&& kernel) {
+    using namespace emulation;
+    grid_dim = {kBlocks, 1, 1};
+    block_dim = {static_cast<unsigned>(threads), 1, 1};
+    for (unsigned block = 0; block < kBlocks; ++block) {
+      block_index = {block, 0, 0};
+      // Whatever an earlier block has left.
+      std::memset(cuda::block_memory, 0xA5, sizeof(cuda::block_memory));
+      Block::run(threads, seed_ + block, kernel);
+    }
+  }
+
+  RendererConfig config_;
+  uint64_t seed_;
+  std::vector<PinholeCamera> cameras_;
+  std::vector<std::unique_ptr<Kept>> kept_;
+  std::vector<cuda::DeviceGeometry> geometries_;
+  int overflow_ = 0;
+};
+
+// Colours and planes of all images, one camera after the other.
+struct Outputs {
+  std::vector<float> color, depth_m;
+  std::vector<uint8_t> class_id;
+  std::vector<uint16_t> instance_id;
+  bool operator==(const Outputs&) const = default;
+};
+
+Outputs draw(Renderer* renderer, const StaticGeometry& geometry, const SceneOwner& scene,
+             const std::vector<View>& views, Planes planes) {
+  renderer->upload(geometry);
+  const Rig& rig = renderer->config().rig;
+  HostImages images(rig, static_cast<int>(views.size()), PixelFormat::f32, planes);
+  renderer->render(scene.batch(), views, images.batch());
+  Outputs out;
+  for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
+    const CameraImages& camera = images.camera(static_cast<int>(k));
+    const auto pixels = views.size() * static_cast<std::size_t>(camera.width_px * camera.height_px);
+    const auto* color = static_cast<const float*>(camera.data);
+    out.color.insert(out.color.end(), color, color + 3 * pixels);
+    if (planes == Planes::none) continue;
+    out.depth_m.insert(out.depth_m.end(), camera.depth_m, camera.depth_m + pixels);
+    out.class_id.insert(out.class_id.end(), camera.class_id, camera.class_id + pixels);
+    out.instance_id.insert(out.instance_id.end(), camera.instance_id, camera.instance_id + pixels);
+  }
+  return out;
+}
+
+void expect_oracles(EmulatedRenderer* renderer, const StaticGeometry& geometry, const SceneOwner& scene,
+                    const std::vector<View>& views, Planes planes = Planes::none) {
+  const Outputs emulated = draw(renderer, geometry, scene, views, planes);
+  const Outputs oracle = draw(make_renderer("cpu", renderer->config()).get(), geometry, scene, views, planes);
+  ASSERT_EQ(emulated.color.size(), oracle.color.size());
+  std::size_t differ = 0;
+  for (std::size_t i = 0; i < oracle.color.size(); ++i) differ += emulated.color[i] != oracle.color[i];
+  EXPECT_EQ(differ, 0u) << "of " << oracle.color.size() << " values";
+  EXPECT_TRUE(emulated == oracle);
+}
+
+RendererConfig config_of(const Rig& rig) { return {.rig = rig, .num_threads = 1}; }
+
+TEST(EmulatedKernels, DrawTheOraclesTownsInAnyOrderOfThreads) {
+  SyntheticTown town = make_synthetic_town(1, 120);
+  town.views.resize(2);
+  for (const uint64_t seed : {1, 2}) {
+    EmulatedRenderer renderer(config_of(paper_rig()), seed);
+    expect_oracles(&renderer, town.geometry, town.scene, town.views);
+    EXPECT_EQ(renderer.overflow(), 0);
+  }
+}
+
+TEST(EmulatedKernels, DrawOddSizesAndPlanes) {
+  SyntheticTown town = make_synthetic_town(2, 60);
+  town.views.resize(2);
+  Rig rig = paper_rig(97, 55);
+  rig.cameras[1] = paper_rig(1, 1).cameras[1];
+  rig.cameras[2] = paper_rig(40, 130).cameras[2];
+  EmulatedRenderer renderer(config_of(rig), 3);
+  expect_oracles(&renderer, town.geometry, town.scene, town.views, Planes::all);
+}
+
+TEST(EmulatedKernels, DrawCrowdsInPartsAndLeaveNothingOut) {
+  // More than one pass has room for: parts of images, and images that are left to the last launch.
+  SyntheticTown town = make_synthetic_town(3, 0);
+  town.scene = {};
+  for (int i = 0; i < 900; ++i) {
+    const float x = 10 + 1.5f * static_cast<float>(i % 45), y = 1.5f * static_cast<float>(i / 45) - 15;
+    town.scene.agents.push_back(
+        make_box(AgentClass::pedestrian, {x, y, 0}, 0.1f * static_cast<float>(i), {0.6f, 0.6f, 1.2f}));
+  }
+  town.scene.light_states.assign(static_cast<std::size_t>(town.geometry.num_signals), LightState::red);
+  town.scene.end_world(0);
+  Rig rig = paper_rig();
+  rig.cameras.resize(1);
+  EmulatedRenderer renderer(config_of(rig), 4);
+  expect_oracles(&renderer, town.geometry, town.scene, {make_view({0, 0, 6}, 0.05f), make_view({80, 3, 0}, kPi)});
+  EXPECT_GT(renderer.overflow(), 0);
+}
+
+TEST(EmulatedKernels, TellVisibility) {
+  SyntheticTown town = make_synthetic_town(4, 30);
+  town.views.resize(1);
+  std::vector<VisibilityQuery> queries;
+  for (int32_t agent = 0; agent < 12; ++agent) queries.push_back({0, agent});
+  const RendererConfig config = config_of(paper_rig(48, 27));
+  EmulatedRenderer emulated(config, 5);
+  const auto oracle = make_renderer("cpu", config);
+  std::vector<float> told(queries.size()), truth(queries.size());
+  emulated.upload(town.geometry);
+  oracle->upload(town.geometry);
+  emulated.visibility(town.scene.batch(), town.views, queries, told, {});
+  oracle->visibility(town.scene.batch(), town.views, queries, truth);
+  for (std::size_t i = 0; i < queries.size(); ++i) {
+    ASSERT_EQ(std::isnan(told[i]), std::isnan(truth[i])) << i;
+    if (std::isnan(truth[i])) continue;
+    EXPECT_NEAR(told[i], truth[i], 1e-5f) << i;
+  }
+}
+
+// Golden scenes in which solids intersect, and dozens of things share a pixel.
+TEST(EmulatedKernels, DrawTheGoldenScenes) {
+  for (const char* name : {"overlapping_boxes", "bridge", "crossing", "one_pixel", "near_plane", "lights"}) {
+    SCOPED_TRACE(name);
+    const SceneFile scene = load_scene(std::string(PICTURA_GOLDEN_DIR "/") + name + ".toml");
+    RendererConfig config = scene.config;
+    config.num_threads = 1;
+    EmulatedRenderer renderer(config, 6);
+    expect_oracles(&renderer, scene.geometry, scene.scene, scene.views);
+  }
+}
+
+}  // namespace
+}  // namespace pictura
