@@ -90,15 +90,18 @@ __device__ __noinline__ void ask_pairs(WarpQueue::Pair pair, Part part) {
 }
 
 // Asks every two fragments of a pixel that meet what they hide of each other; a pixel's full face is one of them. Pairs
-// that meet are put aside until every lane of the warp has one.
+// that meet are put aside until every lane of the warp has one. Fragments are dealt out to the warps like cards: in a
+// crowded pixel those of one face, which stand side by side, have many others each.
 template <typename Memory>
 __device__ void hide_fragments(const Memory& memory, const Part& part, int count) {
   using Index = typename Memory::Index;
   WarpState* warp = &memory.state->warps[warp_index()];
   WarpQueue pairs(&warp->pixels);
+  const int deals = (count + kWarpSize - 1) / kWarpSize;
   PICTURA_KEEP_LOOP
-  for (int first = warp_index() * kWarpSize; first < count; first += num_threads()) {
-    const int i = first + lane_index();
+  for (int deal = warp_index(); deal < deals; deal += num_warps()) {
+    auto fragment_of = [&](int lane) { return lane * deals + deal; };
+    const int i = fragment_of(lane_index());
     int others = 0, rank = 0, place = 0;
     if (i < count && memory.pixel[i] != static_cast<Index>(Memory::kNone)) {
       const int pixel = memory.pixel[i];
@@ -115,10 +118,11 @@ __device__ void hide_fragments(const Memory& memory, const Part& part, int count
         meet = k == its_rank;
         if (!meet) {
           other = static_cast<uint32_t>(memory.order[its_place + k]);
-          meet = shared_samples(memory.coverage(first + owner), memory.coverage(static_cast<int>(other))) != 0;
+          const PixelCoverage coverage = memory.coverage(fragment_of(owner));
+          meet = shared_samples(coverage, memory.coverage(static_cast<int>(other))) != 0;
         }
       }
-      pairs.push(meet, static_cast<uint32_t>(first + from), other);
+      pairs.push(meet, static_cast<uint32_t>(fragment_of(from)), other);
       if (pairs.is_ready()) ask_pairs<Memory>(pairs.take(), part);
     });
   }
@@ -178,12 +182,11 @@ __device__ Rgb mix_pixel(const Memory& memory, int pixel, const Visit& visit) {
 // Finishes the pixels of a part: those without fragments first, then those that have some.
 template <typename Memory, typename Visit, typename Finish>
 __device__ void finish_pixels(const Memory& memory, const Part& part, const Visit& visit, Finish&& finish) {
-  const int columns = part.x_end - part.x_begin, pixels = (part.y_end - part.y_begin) * columns;
-  const int num_drawn = memory.state->num_drawn;
+  const int pixels = part.num_pixels(), num_drawn = memory.state->num_drawn;
   PICTURA_KEEP_LOOP
-  for (int p = static_cast<int>(threadIdx.x); p < pixels; p += num_threads()) {
-    const int x = part.x_begin + p % columns, y = part.y_begin + p / columns, pixel = part.pixel(x, y);
-    if (place_of(memory, pixel) != place_of(memory, pixel + 1)) continue;
+  for (int pixel = static_cast<int>(threadIdx.x); pixel < pixels; pixel += num_threads()) {
+    const int x = part.x_of(pixel), y = part.y_of(pixel);
+    if (x < part.x_begin || x >= part.x_end || place_of(memory, pixel) != place_of(memory, pixel + 1)) continue;
     const auto full = full_of(memory, pixel);
     Rgb color;
     if (full != Memory::kNone) {
