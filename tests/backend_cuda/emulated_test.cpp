@@ -148,38 +148,9 @@ class EmulatedRenderer final : public Renderer {
   int overflow_ = 0;
 };
 
-// Colours and planes of all images, one camera after the other.
-struct Outputs {
-  std::vector<float> color, depth_m;
-  std::vector<uint8_t> class_id;
-  std::vector<uint16_t> instance_id;
-  bool operator==(const Outputs&) const = default;
-};
-
-Outputs draw(Renderer* renderer, const StaticGeometry& geometry, const SceneOwner& scene,
-             const std::vector<View>& views, Planes planes) {
-  renderer->upload(geometry);
-  const Rig& rig = renderer->config().rig;
-  HostImages images(rig, static_cast<int>(views.size()), PixelFormat::f32, planes);
-  renderer->render(scene.batch(), views, images.batch());
-  Outputs out;
-  for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
-    const CameraImages& camera = images.camera(static_cast<int>(k));
-    const auto pixels = views.size() * static_cast<std::size_t>(camera.width_px * camera.height_px);
-    const auto* color = static_cast<const float*>(camera.data);
-    out.color.insert(out.color.end(), color, color + 3 * pixels);
-    if (planes == Planes::none) continue;
-    out.depth_m.insert(out.depth_m.end(), camera.depth_m, camera.depth_m + pixels);
-    out.class_id.insert(out.class_id.end(), camera.class_id, camera.class_id + pixels);
-    out.instance_id.insert(out.instance_id.end(), camera.instance_id, camera.instance_id + pixels);
-  }
-  return out;
-}
-
-void expect_oracles(EmulatedRenderer* renderer, const StaticGeometry& geometry, const SceneOwner& scene,
-                    const std::vector<View>& views, Planes planes = Planes::none) {
-  const Outputs emulated = draw(renderer, geometry, scene, views, planes);
-  const Outputs oracle = draw(make_renderer("cpu", renderer->config()).get(), geometry, scene, views, planes);
+void expect_oracles(EmulatedRenderer* renderer, const SyntheticTown& town, Planes planes = Planes::none) {
+  const Outputs emulated = draw_outputs(renderer, town, planes);
+  const Outputs oracle = draw_outputs(make_renderer("cpu", renderer->config()).get(), town, planes);
   ASSERT_EQ(emulated.color.size(), oracle.color.size());
   std::size_t differ = 0;
   for (std::size_t i = 0; i < oracle.color.size(); ++i) differ += emulated.color[i] != oracle.color[i];
@@ -194,7 +165,7 @@ TEST(EmulatedKernels, DrawTheOraclesTownsInAnyOrderOfThreads) {
   town.views.resize(2);
   for (const uint64_t seed : {1, 2}) {
     EmulatedRenderer renderer(config_of(paper_rig()), seed);
-    expect_oracles(&renderer, town.geometry, town.scene, town.views);
+    expect_oracles(&renderer, town);
     EXPECT_EQ(renderer.overflow(), 0);
   }
 }
@@ -206,24 +177,15 @@ TEST(EmulatedKernels, DrawOddSizesAndPlanes) {
   rig.cameras[1] = paper_rig(1, 1).cameras[1];
   rig.cameras[2] = paper_rig(40, 130).cameras[2];
   EmulatedRenderer renderer(config_of(rig), 3);
-  expect_oracles(&renderer, town.geometry, town.scene, town.views, Planes::all);
+  expect_oracles(&renderer, town, Planes::all);
 }
 
 TEST(EmulatedKernels, DrawCrowdsInPartsAndLeaveNothingOut) {
   // More than one pass has room for: parts of images, and images that are left to the last launch.
-  SyntheticTown town = make_synthetic_town(3, 0);
-  town.scene = {};
-  for (int i = 0; i < 900; ++i) {
-    const float x = 10 + 1.5f * static_cast<float>(i % 45), y = 1.5f * static_cast<float>(i / 45) - 15;
-    town.scene.agents.push_back(
-        make_box(AgentClass::pedestrian, {x, y, 0}, 0.1f * static_cast<float>(i), {0.6f, 0.6f, 1.2f}));
-  }
-  town.scene.light_states.assign(static_cast<std::size_t>(town.geometry.num_signals), LightState::red);
-  town.scene.end_world(0);
   Rig rig = paper_rig();
   rig.cameras.resize(1);
   EmulatedRenderer renderer(config_of(rig), 4);
-  expect_oracles(&renderer, town.geometry, town.scene, {make_view({0, 0, 6}, 0.05f), make_view({80, 3, 0}, kPi)});
+  expect_oracles(&renderer, make_crowd());
   EXPECT_GT(renderer.overflow(), 0);
 }
 
@@ -255,7 +217,7 @@ TEST(EmulatedKernels, DrawTheGoldenScenes) {
     RendererConfig config = scene.config;
     config.num_threads = 1;
     EmulatedRenderer renderer(config, 6);
-    expect_oracles(&renderer, scene.geometry, scene.scene, scene.views);
+    expect_oracles(&renderer, {scene.geometry, scene.scene, scene.views});
   }
 }
 

@@ -23,33 +23,8 @@ using testing::HasSubstr;
 
 class CudaRendererTest : public test::DeviceTest {};
 
-// All outputs of a batch of images, one camera after the other, on the host.
-struct Outputs {
-  std::vector<float> color;
-  std::vector<float> depth_m;
-  std::vector<uint8_t> class_id;
-  std::vector<uint16_t> instance_id;
-};
-
 Outputs draw(const std::string& backend, const SyntheticTown& town, const RendererConfig& config) {
-  const auto renderer = make_renderer(backend, config);
-  renderer->upload(town.geometry);
-  const int num_views = static_cast<int>(town.views.size());
-  HostImages images(config.rig, num_views, PixelFormat::f32, Planes::all);
-  renderer->render(town.scene.batch(), town.views, images.batch());
-  Outputs out;
-  auto append = [](auto* to, const auto* from, std::size_t count) { to->insert(to->end(), from, from + count); };
-  for (std::size_t k = 0; k < config.rig.cameras.size(); ++k) {
-    const CameraImages& camera = images.camera(static_cast<int>(k));
-    const auto pixels = static_cast<std::size_t>(camera.width_px * camera.height_px);
-    for (int view = 0; view < num_views; ++view) {
-      append(&out.color, static_cast<const float*>(camera.data) + view * camera.view_stride, 3 * pixels);
-    }
-    append(&out.depth_m, camera.depth_m, pixels * town.views.size());
-    append(&out.class_id, camera.class_id, pixels * town.views.size());
-    append(&out.instance_id, camera.instance_id, pixels * town.views.size());
-  }
-  return out;
+  return draw_outputs(make_renderer(backend, config).get(), town, Planes::all);
 }
 
 void expect_parity(const SyntheticTown& town, const RendererConfig& config) {
@@ -88,20 +63,7 @@ TEST_F(CudaRendererTest, OddSizesAndMixedRigsDoToo) {
   expect_parity(town, {.rig = rig, .line_floor_px = 0});
 }
 
-TEST_F(CudaRendererTest, NothingIsCutOffInCrowdedImages) {
-  // A wide view over 900 people and thousands of strips: far more than the first pass has room for.
-  SyntheticTown town = make_synthetic_town(3, 0);
-  town.scene = {};
-  for (int i = 0; i < 900; ++i) {
-    const float x = 10 + 1.5f * static_cast<float>(i % 45), y = 1.5f * static_cast<float>(i / 45) - 15;
-    town.scene.agents.push_back(
-        make_box(AgentClass::pedestrian, {x, y, 0}, 0.1f * static_cast<float>(i), {0.6f, 0.6f, 1.2f}));
-  }
-  town.scene.light_states.assign(static_cast<std::size_t>(town.geometry.num_signals), LightState::red);
-  town.scene.end_world(0);
-  town.views = {make_view({0, 0, 6}, 0.05f), make_view({80, 3, 0}, kPi)};
-  expect_parity(town, {.rig = paper_rig()});
-}
+TEST_F(CudaRendererTest, NothingIsCutOffInCrowdedImages) { expect_parity(make_crowd(), {.rig = paper_rig()}); }
 
 TEST_F(CudaRendererTest, VisibilityAgrees) {
   SyntheticTown town = make_synthetic_town(4, 60);

@@ -123,4 +123,40 @@ SyntheticTown make_synthetic_town(uint64_t seed, int num_agents) {
   return town;
 }
 
+SyntheticTown make_crowd() {
+  SyntheticTown town = make_synthetic_town(3, 0);
+  town.scene = {};
+  for (int i = 0; i < 900; ++i) {
+    const float x = 10 + 1.5f * static_cast<float>(i % 45), y = 1.5f * static_cast<float>(i / 45) - 15;
+    town.scene.agents.push_back(
+        make_box(AgentClass::pedestrian, {x, y, 0}, 0.1f * static_cast<float>(i), {0.6f, 0.6f, 1.2f}));
+  }
+  town.scene.light_states.assign(static_cast<std::size_t>(town.geometry.num_signals), LightState::red);
+  town.scene.end_world(0);
+  town.views = {make_view({0, 0, 6}, 0.05f), make_view({80, 3, 0}, kPi)};
+  return town;
+}
+
+Outputs draw_outputs(Renderer* renderer, const SyntheticTown& town, Planes planes) {
+  renderer->upload(town.geometry);
+  const Rig& rig = renderer->config().rig;
+  const int num_views = static_cast<int>(town.views.size());
+  HostImages images(rig, num_views, PixelFormat::f32, planes);
+  renderer->render(town.scene.batch(), town.views, images.batch());
+  Outputs out;
+  auto append = [](auto* to, const auto* from, std::size_t count) { to->insert(to->end(), from, from + count); };
+  for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
+    const CameraImages& camera = images.camera(static_cast<int>(k));
+    const auto pixels = static_cast<std::size_t>(camera.width_px * camera.height_px);
+    for (int view = 0; view < num_views; ++view) {
+      append(&out.color, static_cast<const float*>(camera.data) + view * camera.view_stride, 3 * pixels);
+    }
+    if (planes == Planes::none) continue;
+    append(&out.depth_m, camera.depth_m, pixels * town.views.size());
+    append(&out.class_id, camera.class_id, pixels * town.views.size());
+    append(&out.instance_id, camera.instance_id, pixels * town.views.size());
+  }
+  return out;
+}
+
 }  // namespace pictura

@@ -20,4 +20,19 @@ struct SyntheticTown {
 };
 SyntheticTown make_synthetic_town(uint64_t seed, int num_agents);
 
+/// A town of strips and walls with 900 people in a crowd, seen from above it and along it: far more than the kernels'
+/// fast memory has room for.
+SyntheticTown make_crowd();
+
+/// All images of a batch, one camera after the other: colours as floats, and planes where they are wanted.
+struct Outputs {
+  std::vector<float> color;
+  std::vector<float> depth_m;
+  std::vector<uint8_t> class_id;
+  std::vector<uint16_t> instance_id;
+  bool operator==(const Outputs&) const = default;
+};
+/// Uploads the town and draws all its views.
+Outputs draw_outputs(Renderer* renderer, const SyntheticTown& town, Planes planes);
+
 }  // namespace pictura
