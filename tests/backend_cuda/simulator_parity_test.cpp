@@ -1,5 +1,6 @@
 // The CUDA simulator against the CPU's, on a device: the same bits. Without a device these tests are skipped, unless
 // PICTURA_REQUIRE_GPU=1 says that there must be one.
+#include <algorithm>
 #include <chrono>
 
 #include <gmock/gmock.h>
@@ -65,19 +66,85 @@ void expect_same_view(Simulator* cpu, Simulator* cuda, int step) {
   ASSERT_TRUE(same(cpu->episode_step(), cuda->episode_step()) && same(cpu->episode_index(), cuda->episode_index()));
 }
 
-/// Steps both with the same actions; results are compared at every step, all that users see every `look_every` steps.
+/// What a device's steps return, kept in device memory so that no step waits for the host.
+class StepLog {
+ public:
+  StepLog(int steps, int num_slots)
+      : num_slots_(static_cast<size_t>(num_slots)),
+        reward_(static_cast<size_t>(steps) * num_slots_),
+        terminated_(reward_.size()),
+        truncated_(reward_.size()),
+        valid_(reward_.size()) {}
+
+  void append(const StepResult& result) {
+    append(result.reward, &reward_);
+    append(result.terminated, &terminated_);
+    append(result.truncated, &truncated_);
+    append(result.valid, &valid_);
+    ++num_steps_;
+  }
+  void copy_to_host() {
+    host_reward_ = on_host(reward_.span());
+    host_terminated_ = on_host(terminated_.span());
+    host_truncated_ = on_host(truncated_.span());
+    host_valid_ = on_host(valid_.span());
+  }
+  /// On the host, but for refusals, which are state.
+  StepResult of_step(int step) const {
+    const auto part = [&](const auto& log) {
+      return Span(log.data() + static_cast<size_t>(step) * num_slots_, num_slots_);
+    };
+    return {part(host_reward_), part(host_terminated_), part(host_truncated_), part(host_valid_), {}};
+  }
+
+ private:
+  template <typename T>
+  void append(Span<const T> result, DeviceBuffer<T>* log) {
+    PICTURA_CUDA(cudaMemcpyAsync(log->data() + num_steps_ * num_slots_, result.data(), result.size() * sizeof(T),
+                                 cudaMemcpyDeviceToDevice, nullptr));
+  }
+
+  size_t num_slots_, num_steps_ = 0;
+  DeviceBuffer<float> reward_;
+  DeviceBuffer<uint8_t> terminated_, truncated_, valid_;
+  std::vector<float> host_reward_;
+  std::vector<uint8_t> host_terminated_, host_truncated_, host_valid_;
+};
+
+/// Steps both with the same actions and compares what every step returns. The device runs ahead: with a wait for each
+/// step, tests that share a device take turns at it thousands of times.
+void step_same(Simulator* cpu, Simulator* cuda, int steps, uint32_t first_step) {
+  const auto slots = static_cast<size_t>(cpu->num_slots());
+  std::vector<int32_t> actions;
+  for (int i = 0; i < steps; ++i) {
+    const std::vector<int32_t> drawn = testing::mixed_actions(cpu->num_slots(), first_step + static_cast<uint32_t>(i));
+    actions.insert(actions.end(), drawn.begin(), drawn.end());
+  }
+  const DeviceBuffer<int32_t> device_actions{Span<const int32_t>(actions)};
+  StepLog log(steps, cpu->num_slots());
+  for (size_t i = 0; i < static_cast<size_t>(steps); ++i) {
+    log.append(cuda->step({device_actions.data() + i * slots, slots}));
+  }
+  log.copy_to_host();
+  for (int i = 0; i < steps; ++i) {
+    const StepResult a = cpu->step({actions.data() + static_cast<size_t>(i) * slots, slots});
+    const StepResult b = log.of_step(i);
+    ASSERT_TRUE(testing::same_bits(a.reward, b.reward)) << "step " << first_step + static_cast<uint32_t>(i);
+    ASSERT_TRUE(testing::same_bits(a.terminated, b.terminated) && testing::same_bits(a.truncated, b.truncated) &&
+                testing::same_bits(a.valid, b.valid))
+        << "step " << first_step + static_cast<uint32_t>(i);
+  }
+}
+
+/// Steps both; results are compared at every step, all that users see every `look_every` steps.
 void run_same(Simulator* cpu, Simulator* cuda, int steps, int look_every, uint32_t first_step = 0) {
   expect_same_view(cpu, cuda, 0);
-  for (int step = 1; step <= steps && !::testing::Test::HasFatalFailure(); ++step) {
-    const std::vector<int32_t> actions =
-        testing::mixed_actions(cpu->num_slots(), first_step + static_cast<uint32_t>(step));
-    const DeviceBuffer<int32_t> device_actions{Span<const int32_t>(actions)};
-    const StepResult a = cpu->step(actions);
-    const StepResult b = cuda->step(device_actions.span());
-    ASSERT_TRUE(same(a.reward, b.reward)) << "step " << step;
-    ASSERT_TRUE(same(a.terminated, b.terminated) && same(a.truncated, b.truncated) && same(a.valid, b.valid))
-        << "step " << step;
-    if (step % look_every == 0 || step == steps) expect_same_view(cpu, cuda, step);
+  for (int done = 0; done < steps && !::testing::Test::HasFatalFailure();) {
+    const int stretch = std::min(look_every, steps - done);
+    step_same(cpu, cuda, stretch, first_step + static_cast<uint32_t>(done) + 1);
+    if (::testing::Test::HasFatalFailure()) return;
+    done += stretch;
+    expect_same_view(cpu, cuda, done);
   }
   ASSERT_EQ(cpu->save(), cuda->save()) << "totals included";
 }

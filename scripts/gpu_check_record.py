@@ -1,0 +1,222 @@
+#!/usr/bin/env python3
+"""Runs the commands of scripts/gpu_check and keeps their results in one JSON file, which is rewritten after each.
+
+gpu_check_record.py FILE start                         begins FILE: source hash, GPU, driver
+gpu_check_record.py FILE run NAME [--limit S] -- COMMAND...    seconds, and what it says in summary or at its end
+gpu_check_record.py FILE bench NAME [--limit S] -- COMMAND...  the JSON object that it prints
+gpu_check_record.py FILE tests -- ctest...             counts, what failed, what was skipped, what took longest
+gpu_check_record.py FILE finish                        says that nothing is missing
+
+Exit status: 0 where the command succeeded, else 1.
+"""
+import argparse
+import hashlib
+import json
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import time
+
+SOURCES = "common map simulator backend_cpu backend_cuda backend_gl training apps tests cmake".split()
+LAST_LINES = 40
+# "  7/353 Test  #12: Suite.Name/4-byte object <00> ....***Failed    0.01 sec"
+TEST = re.compile(r"\s*(\d+)/(\d+) Test\s+#\d+: (.+?) \.*\s*(Passed|\*\*\*.*?)\s+(\d+\.\d+) sec")
+NEXT_TEST = re.compile(r"\s+Start\s+\d+: ")
+# GoogleTest's and compute-sanitizer's.
+SUMMARY = re.compile(r"\[  PASSED  \]|=========.* SUMMARY: ")
+
+
+def source_hash():
+    digest = hashlib.sha256(pathlib.Path("CMakeLists.txt").read_bytes())
+    for path in sorted(path for folder in SOURCES for path in pathlib.Path(folder).rglob("*") if path.is_file()):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def gpu_and_driver():
+    query = ["nvidia-smi", "--query-gpu=name,driver_version", "--format=csv,noheader"]
+    try:
+        answer = subprocess.run(query, capture_output=True, text=True, check=True).stdout
+    except (OSError, subprocess.CalledProcessError) as error:
+        return f"none: {error}", ""
+    name, _, driver = answer.strip().splitlines()[0].partition(", ")
+    return name, driver
+
+
+def write(file, content):
+    """Beside, then renamed: a reader, or whoever cuts the run off, finds a whole file."""
+    beside = file.with_name(f"{file.name}.{os.getpid()}.tmp")
+    beside.write_text(json.dumps(content, indent=2) + "\n")
+    beside.replace(file)
+
+
+def read(file):
+    return json.loads(file.read_text())
+
+
+def start(file):
+    gpu, driver = gpu_and_driver()
+    write(file, {"complete": False, "source_hash": source_hash(), "gpu": gpu, "driver": driver})
+
+
+def finish(file):
+    write(file, read(file) | {"complete": True})
+
+
+def add(file, key, entry):
+    content = read(file)
+    content.setdefault(key, []).append(entry)
+    write(file, content)
+
+
+class Run:
+    """A command that has ended: its outcome in words, empty for success; seconds; what it printed."""
+
+    def __init__(self, command, limit_s, keeps_stdout):
+        begin = time.monotonic()
+        # A process group of its own, so that the limit ends the command's children with it.
+        try:
+            process = subprocess.Popen(command, text=True, errors="replace", process_group=0, stdout=subprocess.PIPE,
+                                       stderr=subprocess.PIPE if keeps_stdout else subprocess.STDOUT)
+        except OSError as error:
+            self.outcome, self.seconds, self.stdout, self.stderr = str(error), 0.0, "", ""
+            return
+        try:
+            self.stdout, self.stderr = process.communicate(timeout=limit_s)
+            self.outcome = "" if process.returncode == 0 else f"exit status {process.returncode}"
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            self.stdout, self.stderr = process.communicate()
+            self.outcome = f"took more than {limit_s:g} s"
+        except BaseException:
+            os.killpg(process.pid, signal.SIGKILL)
+            raise
+        self.seconds = round(time.monotonic() - begin, 1)
+
+    def entry(self, name):
+        return {"name": name, "seconds": self.seconds}
+
+    def failure(self, name):
+        return self.entry(name) | {"outcome": self.outcome, "last_lines": last_lines(self.stderr or self.stdout)}
+
+
+def last_lines(text):
+    return text.splitlines()[-LAST_LINES:]
+
+
+def say(name, run):
+    print(f"{name}: {run.outcome or 'done'}, {run.seconds} s", flush=True)
+    if run.outcome:
+        print("\n".join(last_lines(run.stderr or run.stdout)), flush=True)
+
+
+def run_command(file, name, command, limit_s):
+    run = Run(command, limit_s, keeps_stdout=False)
+    say(name, run)
+    if run.outcome:
+        add(file, "failed", run.failure(name))
+    else:
+        add(file, "runs", run.entry(name) | {"summary": [line for line in run.stdout.splitlines() if SUMMARY.match(line)]})
+    return run.outcome == ""
+
+
+def run_bench(file, name, command, limit_s):
+    run = Run(command, limit_s, keeps_stdout=True)
+    if not run.outcome:
+        try:
+            measured = json.loads(run.stdout)
+        except json.JSONDecodeError as error:
+            run.outcome = f"expected a JSON object, got something else: {error}"
+    say(name, run)
+    if run.outcome:
+        add(file, "failed", run.failure(name))
+    else:
+        add(file, "bench", run.entry(name) | measured)
+    return run.outcome == ""
+
+
+class Tests:
+    """What ctest's lines say so far."""
+
+    def __init__(self):
+        self.passed = self.total = 0
+        self.failed, self.skipped, self.times = [], [], []
+        self.output_of = None  # the failed test whose output follows
+
+    def take(self, line):
+        """True where the line is a test's result."""
+        match = TEST.match(line)
+        if not match:
+            if NEXT_TEST.match(line):
+                self.output_of = None
+            elif self.output_of is not None and line.strip():
+                output = self.output_of["last_lines"]
+                output.append(line.rstrip("\n"))
+                del output[:-LAST_LINES]
+            return False
+        _, total, name, outcome, seconds = match.groups()
+        self.total, self.output_of = int(total), None
+        self.times.append({"name": name, "seconds": float(seconds)})
+        if outcome == "Passed":
+            self.passed += 1
+        elif outcome.startswith(("***Skipped", "***Not Run (Disabled)")):
+            self.skipped.append(name)
+        else:
+            self.output_of = self.times[-1] | {"outcome": outcome.strip("* "), "last_lines": []}
+            self.failed.append(self.output_of)
+        return True
+
+    def summary(self, seconds):
+        slowest = sorted(self.times, key=lambda test: -test["seconds"])[:20]
+        return {"summary": f"{self.passed} passed, {len(self.failed)} failed, {len(self.skipped)} skipped of "
+                           f"{self.total} tests",
+                "seconds": round(seconds, 1), "failed": self.failed, "skipped": self.skipped, "slowest": slowest}
+
+
+def run_tests(file, command):
+    begin = time.monotonic()
+    header, tests, written = read(file), Tests(), 0.0
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace")
+    for line in process.stdout:
+        print(line, end="", flush=True)
+        if tests.take(line) and time.monotonic() - written > 1:
+            written = time.monotonic()
+            write(file, header | tests.summary(written - begin))
+    status = process.wait()
+    content = header | tests.summary(time.monotonic() - begin)
+    if not tests.times or (status != 0 and not tests.failed):
+        content["error"] = f"ctest: exit status {status}, {len(tests.times)} results"
+    write(file, content)
+    return status == 0 and "error" not in content
+
+
+def end_with_command(*_):
+    """What a signal ends, ends its command too."""
+    sys.exit(1)
+
+
+def main():
+    signal.signal(signal.SIGTERM, end_with_command)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("file", type=pathlib.Path)
+    parser.add_argument("verb", choices=["start", "run", "bench", "tests", "finish"])
+    parser.add_argument("name", nargs="?")
+    parser.add_argument("--limit", type=float, metavar="S")
+    words = sys.argv[1:]
+    at = words.index("--") if "--" in words else len(words)
+    arguments, command = parser.parse_args(words[:at]), words[at + 1:]
+    if arguments.verb == "start":
+        return start(arguments.file)
+    if arguments.verb == "finish":
+        return finish(arguments.file)
+    if arguments.verb == "tests":
+        return not run_tests(arguments.file, command)
+    run = run_bench if arguments.verb == "bench" else run_command
+    return not run(arguments.file, arguments.name, command, arguments.limit)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
