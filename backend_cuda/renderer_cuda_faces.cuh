@@ -220,25 +220,30 @@ __device__ inline bool make_quad(const BlockState& state, const DrawTask& task, 
   const StaticGeometryView& pieces = state.view.geometry->raster.pieces;
   const uint32_t kind = kind_of(entry);
   const auto index = static_cast<int32_t>(entry & kFaceIndexMask);
-  bool shows = false;
-  auto emit = [&](const Vec3* corners, int, const FacePlane& plane, Rgb color) {
-    for (int i = 0; i < 4; ++i) quad_out->corner[i] = corners[i];
-    quad_out->plane = plane;
-    quad_out->color = color;
-    shows = true;
-  };
+  // One body for all kinds but for their corners: lanes of a warp have different ones.
+  WorldQuad world;
   if (kind == kStripKind) {
     const Strip strip = pieces.strips[static_cast<size_t>(index)];
     quad_out->owner = strip_owner(strip, index);
-    strip_faces(strip, setting.camera, setting.line_floor_px, emit);
+    world = strip_quad(strip);
   } else if (kind == kAgentKind) {
     const AgentBox box = task.scene.agents[static_cast<size_t>(state.view.world_begin + index)];
     quad_out->owner = agent_owner(box, index);
-    cuboid_face(box, static_cast<int>(entry >> kFaceShift) & 7, setting.camera, setting.debug_palette, emit);
+    world = cuboid_quad(box, static_cast<int>(entry >> kFaceShift) & 7, setting.debug_palette);
   } else {
     quad_out->owner = wall_owner(index);
-    wall_faces(pieces.walls[static_cast<size_t>(index)], setting.camera, emit);
+    world = wall_quad(pieces.walls[static_cast<size_t>(index)]);
   }
+  bool shows = false;
+  emit_quad(
+      world, setting.camera,
+      [&](Vec3* corners) { return kind != kStripKind || widen_strip(setting.camera, setting.line_floor_px, corners); },
+      [&](const Vec3* corners, int, const FacePlane& plane, Rgb color) {
+        for (int i = 0; i < 4; ++i) quad_out->corner[i] = corners[i];
+        quad_out->plane = plane;
+        quad_out->color = color;
+        shows = true;
+      });
   return shows;
 }
 

@@ -15,6 +15,12 @@
 #else
 #define PICTURA_KEEP_LOOP
 #endif
+// Before a loop over the corners of a face, of which nearly all have four: those stay in registers then.
+#if defined(__CUDA_ARCH__)
+#define PICTURA_UNROLL_FOUR _Pragma("unroll 4")
+#else
+#define PICTURA_UNROLL_FOUR
+#endif
 
 #if defined(__CUDACC_RTC__)
 namespace pictura {

@@ -27,6 +27,7 @@ PICTURA_HD inline float inside_plane(const Frustum& f, int plane, Vec3 p) {
 constexpr unsigned kOutside = ~0u;
 PICTURA_HD inline unsigned planes_crossed(const Frustum& f, const Vec3* corners, int count) {
   unsigned outside_of_any = 0, outside_of_all = ~0u;
+  PICTURA_UNROLL_FOUR
   for (int i = 0; i < count; ++i) {
     unsigned outside = 0;
     for (int plane = 0; plane < kClipPlanes; ++plane) {
@@ -153,6 +154,7 @@ PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Vec3*
   Vec2 corner[kRoom];
   Vec2 low{1e30f, 1e30f}, high{-1e30f, -1e30f};
   float depth_low = 1e30f, depth_high = 0.0f;
+  PICTURA_UNROLL_FOUR
   for (int i = 0; i < count; ++i) {
     corner[i] = project(camera, polygon[i]);
     low = {min_of(low.x, corner[i].x), min_of(low.y, corner[i].y)};
@@ -165,14 +167,17 @@ PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Vec3*
       max_of(static_cast<int>(floorf(low.y)), 0), min_of(static_cast<int>(floorf(high.y)) + 1, camera.height_px)};
   if (box.x_begin >= box.x_end || box.y_begin >= box.y_end) return false;
   float twice_area = 0.0f;
+  PICTURA_UNROLL_FOUR
   for (int i = 1; i + 1 < count; ++i) twice_area += cross(corner[i] - corner[0], corner[i + 1] - corner[0]);
   if (fabsf(twice_area) < 1e-6f) return false;
 
+  const bool turns_right = twice_area > 0.0f;
   int edges = 0;
+  PICTURA_UNROLL_FOUR
   for (int i = 0; i < count; ++i) {
     const Vec2 from = corner[i], to = corner[i + 1 < count ? i + 1 : 0];
     if (from.x == to.x && from.y == to.y) continue;
-    keep_edge(edges++, twice_area > 0.0f ? make_edge(from, to) : make_edge(to, from));
+    keep_edge(edges++, make_edge(turns_right ? from : to, turns_right ? to : from));
   }
   face_out->edge_count = static_cast<uint8_t>(edges);
   face_out->box = box;

@@ -23,6 +23,7 @@ struct FacePlane {
 };
 PICTURA_HD inline FacePlane face_plane(const Vec3* corners, int count) {
   Vec3 normal{};
+  PICTURA_UNROLL_FOUR
   for (int i = 1; i + 1 < count; ++i) normal = normal + cross(corners[i] - corners[0], corners[i + 1] - corners[0]);
   return {normal, dot(normal, corners[0])};
 }
@@ -31,6 +32,7 @@ PICTURA_HD inline FacePlane face_plane(const Vec3* corners, int count) {
 /// to 0 is not drawn, and so hides nothing.
 PICTURA_HD inline float face_brightness(const Vec3* corners, int count) {
   float sum_m = 0.0f;
+  PICTURA_UNROLL_FOUR
   for (int i = 0; i < count; ++i) sum_m += clamp(corners[i].z, 0.0f, kVisibleRange_m);
   return depth_brightness(sum_m / static_cast<float>(count));
 }
@@ -88,36 +90,49 @@ PICTURA_HD inline void cuboid_face_corners(const AgentBox& box, int face, Vec3* 
   for (int i = 0; i < 4; ++i) corners_out[i] = corner(corners >> (3 * i) & 7);
 }
 
-/// Calls emit(corners, count, plane, color) for one face of a box, in camera coordinates.
-template <typename Emit>
-PICTURA_HD inline void cuboid_face(const AgentBox& box, int face, const PinholeCamera& camera, bool debug_palette,
-                                   Emit&& emit) {
-  Vec3 corners[4];
-  cuboid_face_corners(box, face, corners);
-  for (int i = 0; i < 4; ++i) corners[i] = to_camera(camera, corners[i]);
-  const float brightness = face_brightness(corners, 4);
+/// A face of four corners in the world, with its colour before it fades.
+struct WorldQuad {
+  Vec3 corner[4];
+  Rgb color;
+};
+
+PICTURA_HD inline WorldQuad cuboid_quad(const AgentBox& box, int face, bool debug_palette) {
   const BoxFace painted = face == kUnderside ? BoxFace::top : static_cast<BoxFace>(face);
-  if (brightness > 0.0f) {
-    emit(corners, 4, face_plane(corners, 4), agent_face_color(box, painted, debug_palette) * brightness);
-  }
+  WorldQuad quad;
+  cuboid_face_corners(box, face, quad.corner);
+  quad.color = agent_face_color(box, painted, debug_palette);
+  return quad;
 }
 
-/// ... for each face that is turned to the camera.
+/// A wall's face; seen from both sides.
+PICTURA_HD inline WorldQuad wall_quad(const WallFace& wall) {
+  const Vec3 up{0.0f, 0.0f, wall.height_m};
+  return {{wall.a_m, wall.b_m, wall.b_m + up, wall.a_m + up}, wall.color};
+}
+
+/// Calls emit(corners, count, plane, color) for a quad, in camera coordinates, unless it has faded to black.
+/// widen(corners) may move its corners when its plane is known; false: nothing is left.
+template <typename Widen, typename Emit>
+PICTURA_HD inline void emit_quad(const WorldQuad& quad, const PinholeCamera& camera, Widen&& widen, Emit&& emit) {
+  Vec3 corners[4];
+  for (int i = 0; i < 4; ++i) corners[i] = to_camera(camera, quad.corner[i]);
+  const float brightness = face_brightness(corners, 4);
+  const FacePlane plane = face_plane(corners, 4);
+  if (brightness > 0.0f && widen(corners)) emit(corners, 4, plane, quad.color * brightness);
+}
+
+/// ... for each face of a box that is turned to the camera.
 template <typename Emit>
 PICTURA_HD inline void agent_faces(const AgentBox& box, const PinholeCamera& camera, bool debug_palette, Emit&& emit) {
   for (int face = 0; face < kNumCuboidFaces; ++face) {
-    if (faces_eye(box, face, camera.position_m)) cuboid_face(box, face, camera, debug_palette, emit);
+    if (!faces_eye(box, face, camera.position_m)) continue;
+    emit_quad(cuboid_quad(box, face, debug_palette), camera, [](Vec3*) { return true; }, emit);
   }
 }
 
-/// The wall's face; seen from both sides.
 template <typename Emit>
 PICTURA_HD inline void wall_faces(const WallFace& wall, const PinholeCamera& camera, Emit&& emit) {
-  const Vec3 up{0.0f, 0.0f, wall.height_m};
-  Vec3 corners[4] = {wall.a_m, wall.b_m, wall.b_m + up, wall.a_m + up};
-  for (int i = 0; i < 4; ++i) corners[i] = to_camera(camera, corners[i]);
-  const float brightness = face_brightness(corners, 4);
-  if (brightness > 0.0f) emit(corners, 4, face_plane(corners, 4), wall.color * brightness);
+  emit_quad(wall_quad(wall), camera, [](Vec3*) { return true; }, emit);
 }
 
 /// Whether a camera at position_m is in front of the head and within its half-angle, seen on the ground plane.
@@ -215,15 +230,17 @@ PICTURA_HD inline bool widen_strip(const PinholeCamera& camera, float floor_px, 
   return true;
 }
 
+PICTURA_HD inline WorldQuad strip_quad(const Strip& strip) {
+  WorldQuad quad;
+  strip_corners(strip, quad.corner);
+  quad.color = strip.color;
+  return quad;
+}
+
 /// The strip's face, at least floor_px wide on screen, in the plane of the strip itself.
 template <typename Emit>
 PICTURA_HD inline void strip_faces(const Strip& strip, const PinholeCamera& camera, float floor_px, Emit&& emit) {
-  Vec3 corners[4];
-  strip_corners(strip, corners);
-  for (int i = 0; i < 4; ++i) corners[i] = to_camera(camera, corners[i]);
-  const float brightness = face_brightness(corners, 4);
-  const FacePlane plane = face_plane(corners, 4);
-  if (brightness > 0.0f && widen_strip(camera, floor_px, corners)) emit(corners, 4, plane, strip.color * brightness);
+  emit_quad(strip_quad(strip), camera, [&](Vec3* corners) { return widen_strip(camera, floor_px, corners); }, emit);
 }
 
 /// Strips that are closer than this are of one level: there rank decides, and not depth.
