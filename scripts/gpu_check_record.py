@@ -119,7 +119,8 @@ def run_command(file, name, command, limit_s):
     if run.outcome:
         add(file, "failed", run.failure(name))
     else:
-        add(file, "runs", run.entry(name) | {"summary": [line for line in run.stdout.splitlines() if SUMMARY.match(line)]})
+        summary = [line for line in run.stdout.splitlines() if SUMMARY.match(line)]
+        add(file, "runs", run.entry(name) | ({"summary": summary} if summary else {}))
     return run.outcome == ""
 
 
