@@ -122,7 +122,8 @@ void bench_train(const TrainArguments& arguments) {
 void add_bench_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "bench",
-      "Measure rates, quality and worlds: bench render, bench simulate, bench train, bench quality, bench worlds");
+      "Measure rates, quality and worlds: bench render, bench simulate, bench train, bench quality, bench worlds, "
+      "bench soak");
   command->require_subcommand(1);
   command->footer(
       "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n  pictura bench render --size 192x108");
@@ -138,6 +139,7 @@ void add_bench_command(CLI::App& app) {
   add_quality_benchmark(*command);
   add_render_benchmark(*command);
   add_worlds_benchmark(*command);
+  add_soak_benchmark(*command);
 #endif
 }
 

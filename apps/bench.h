@@ -35,10 +35,11 @@ struct BenchResult {
 /// Prints medians and means with their least and greatest values.
 void report_benchmark(bool json, const BenchContext& context, std::vector<BenchResult> results);
 
-/// Add `bench simulate`, `bench quality`, `bench render` and `bench worlds`.
+/// Add `bench simulate`, `bench quality`, `bench render`, `bench worlds` and `bench soak`.
 void add_simulate_benchmark(CLI::App& bench);
 void add_quality_benchmark(CLI::App& bench);
 void add_render_benchmark(CLI::App& bench);
 void add_worlds_benchmark(CLI::App& bench);
+void add_soak_benchmark(CLI::App& bench);
 
 }  // namespace pictura

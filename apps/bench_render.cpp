@@ -96,11 +96,11 @@ void append_results(const std::string& name, const RenderCase& measured, const R
     image.values.push_back(ms / (egos * cameras));
   }
   if (!measurement.call_ms.empty()) results_out->insert(results_out->end(), {rate, call, image});
-  if (measurement.checked_values > 0) {
+  if (measurement.error.values > 0) {
     const double share =
-        static_cast<double>(measurement.differing_values) / static_cast<double>(measurement.checked_values);
+        static_cast<double>(measurement.error.differing) / static_cast<double>(measurement.error.values);
     results_out->push_back({name + ", values unlike the oracle's", "%", {100 * share}});
-    results_out->push_back({name + ", most unlike", "1/255", {255 * measurement.worst_value}});
+    results_out->push_back({name + ", most unlike", "1/255", {255 * measurement.error.worst}});
   }
   if (measured.watches_memory) {
     constexpr double kGiB = 1 << 30;

@@ -1,13 +1,10 @@
 #include "pictura/bench/render.h"
 
 #include <chrono>
-#include <cmath>
-#include <cstring>
 
 #include "pictura/common/error.h"
 #include "pictura/common/interrupt.h"
 #include "pictura/common/make_renderer.h"
-#include "pictura/tests/support/tolerances.h"
 #ifdef PICTURA_HAS_CUDA
 #include "pictura/bench/render_device.h"
 #endif
@@ -35,19 +32,6 @@ class HostTarget final : public RenderTarget {
   HostImages images_;
 };
 
-double half_to_number(uint16_t half) {
-  const int exponent = half >> 10, mantissa = half & 1023;
-  return exponent > 0 ? std::ldexp(1024 + mantissa, exponent - 25) : std::ldexp(mantissa, -24);
-}
-
-double channel_at(const CameraImages& images, PixelFormat format, int64_t element) {
-  switch (format) {
-    case PixelFormat::u8: return static_cast<const uint8_t*>(images.data)[element] / 255.0;
-    case PixelFormat::f16: return half_to_number(static_cast<const uint16_t*>(images.data)[element]);
-    default: return static_cast<double>(static_cast<const float*>(images.data)[element]);
-  }
-}
-
 void compare_with_oracle(const DrivenWorlds& worlds, const RenderCase& render_case, RenderTarget* target,
                          RenderMeasurement* result_out) {
   RendererConfig config{.rig = render_case.config.rig, .line_floor_px = render_case.config.line_floor_px};
@@ -57,26 +41,18 @@ void compare_with_oracle(const DrivenWorlds& worlds, const RenderCase& render_ca
   HostImages expected(config.rig, checked, render_case.format);
   oracle->render(worlds.simulator->scene(), {worlds.views.data(), static_cast<std::size_t>(checked)}, expected.batch());
   const HostImages& actual = target->images(checked);
-  int64_t far_off = 0;
+  ImageError error;
   for (int k = 0; k < static_cast<int>(config.rig.cameras.size()); ++k) {
-    const CameraImages &wanted = expected.camera(k), &drawn = actual.camera(k);
-    const int64_t values = int64_t{3} * wanted.width_px * wanted.height_px;
-    for (int64_t i = 0; i < checked * values; ++i) {
-      const int64_t view = i / values, value = i % values;
-      const double error = std::abs(channel_at(wanted, render_case.format, view * wanted.view_stride + value) -
-                                    channel_at(drawn, render_case.format, view * drawn.view_stride + value));
-      result_out->worst_value = std::max(result_out->worst_value, error);
-      result_out->differing_values += error > 0;
-      far_off += error > kKernelError + 1e-6;
+    for (int view = 0; view < checked; ++view) {
+      error.add(compare_image(actual.camera(k), expected.camera(k), render_case.format, view));
     }
-    result_out->checked_values += checked * values;
   }
+  result_out->error = error;
   if (render_case.backend != "cuda") return;
-  PICTURA_CHECK(result_out->worst_value <= kKernelWorstError + 1e-6 &&
-                    static_cast<double>(far_off) <= (1 - kKernelShareWithin) * result_out->checked_values,
+  PICTURA_CHECK(error.is_within_tolerance(),
                 "bench render: cuda: expected the oracle's images, got {} of {} values off by more than 1/255, and {} "
                 "at worst",
-                far_off, result_out->checked_values, result_out->worst_value);
+                error.beyond, error.values, error.worst);
 }
 
 std::unique_ptr<RenderTarget> make_target(const DrivenWorlds& worlds, const RenderCase& render_case) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pictura/bench/driving.h"
+#include "pictura/bench/image_error.h"
 #include "pictura/common/renderer.h"
 
 namespace pictura {
@@ -25,8 +26,7 @@ struct RenderCase {
 struct RenderMeasurement {
   std::string choice;           // what make_renderer() says
   std::vector<double> call_ms;  // one per repeat: the mean of its calls
-  int64_t checked_values = 0, differing_values = 0;
-  double worst_value = 0;  // largest difference from the oracle, in [0, 1]
+  ImageError error;             // against the oracle, of the views that are checked
   // Where memory is watched, of the device: once the maps are uploaded, and the most that was ever taken, both without
   // scene, views and images.
   double up_front_bytes = 0, most_bytes = 0, image_bytes = 0;

@@ -41,6 +41,7 @@ enum class Purpose : uint8_t {
   minibatch,
   parameters,
   town,
+  soak,
 };
 
 /// A stream of draws for one (seed, world, agent, episode, step, purpose). Ids are global across ranks.

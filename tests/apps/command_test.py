@@ -355,6 +355,22 @@ class Benchmarks(CommandCase):
         self.assertGreater(values["lane driver: goals"]["mean"], 0)
         self.assertEqual(values["lane driver: red lights"]["max"], 0)
 
+    def test_a_soak_names_the_images_that_are_out_of_tolerance(self):
+        soak = ["bench", "soak", "--map", "procedural:1", "--agents", 20, "--views", 2]
+        oracle = self.json_of(*soak, "--backend", "cpu", "--scenes", 3)
+        self.assertEqual((oracle["scenes"], oracle["images_out_of_tolerance"], oracle["worst"]), (3, 0, 0))
+        self.assertGreater(oracle["images"], 6)
+        # Black images are out of tolerance. A scene is the same whichever came before it.
+        result = run(*soak, "--backend", "null", "--first", 2, "--scenes", 1, "--json")
+        self.assertEqual(result.returncode, 1)
+        black = json.loads(result.stdout)
+        self.assertGreater(black["images_out_of_tolerance"], 0)
+        self.assertEqual({fault["scene"] for fault in black["faults"]}, {2})
+        self.assertIn("--first 2 --scenes 1", result.stderr)
+        again = json.loads(run(*soak, "--backend", "null", "--first", 1, "--scenes", 2, "--json").stdout)
+        of_scene_2 = [fault for fault in again["faults"] if fault["scene"] == 2]
+        self.assertEqual(of_scene_2, black["faults"])
+
     def test_the_cost_of_steps_is_drawn_from_results(self):
         names = ["cpu, 64 worlds of 1 agents", "cpu, 64 worlds of 4 agents", "cpu, 1 worlds of 60 agents"]
         results = self.folder / "results.json"

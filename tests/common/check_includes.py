@@ -25,7 +25,7 @@ MAY_INCLUDE = {
 # A backend's simulator executor is a target of its own and may know the simulator.
 EXECUTOR = re.compile(r"^backend_(cpu|cuda)/simulator_(cpu|cuda)[^/]*$")
 # Benchmarks of the command measure with bench/.
-BENCHMARKS = {"apps/bench_quality.cpp", "apps/bench_render.cpp", "apps/bench_simulate.cpp", "apps/bench_worlds.cpp"}
+BENCHMARKS = {"apps/bench_quality.cpp", "apps/bench_render.cpp", "apps/bench_simulate.cpp", "apps/bench_soak.cpp", "apps/bench_worlds.cpp"}
 # Libraries that stay in their folders: pattern of the include -> where it may stand.
 STAYS_IN = [
     (re.compile(r"^(torch|ATen|c10)/"), re.compile(r"^(training|tests/training)/")),

@@ -1,0 +1,104 @@
+// `pictura bench soak`: a renderer held against the oracle for a long time, on scenes that a seed draws.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "pictura/apps/bench.h"
+#include "pictura/apps/report.h"
+#include "pictura/bench/render.h"
+#include "pictura/bench/soak.h"
+#include "pictura/common/error.h"
+
+namespace pictura {
+
+namespace {
+
+struct Arguments {
+  SoakOptions soak;
+  double minutes = 8;
+  bool json = false;
+};
+
+void print_result(const Arguments& arguments, const SoakResult& result) {
+  if (arguments.json) {
+    Json faults = Json::array();
+    for (const SoakFault& fault : result.faults) {
+      faults.push_back({{"scene", fault.scene},
+                        {"view", fault.view},
+                        {"camera", fault.camera},
+                        {"worst", fault.error.worst},
+                        {"values_beyond_1_255", fault.error.beyond}});
+    }
+    return print_json({{"backend", arguments.soak.backend},
+                       {"choice", result.choice},
+                       {"device", cuda_device_name().empty() ? processor_name() : cuda_device_name()},
+                       {"driver", cuda_driver_name()},
+                       {"maps", arguments.soak.maps},
+                       {"seed", arguments.soak.seed},
+                       {"seconds", result.seconds},
+                       {"scenes", result.scenes},
+                       {"images", result.images},
+                       {"values", result.error.values},
+                       {"differing_values", result.error.differing},
+                       {"worst", result.error.worst},
+                       {"images_out_of_tolerance", result.images_out_of_tolerance},
+                       {"faults", faults}});
+  }
+  fmt::print("{}: {} images of {} scenes in {:.0f} s, {} of {} values unlike the oracle's, worst {:.2f}/255\n{}\n",
+             arguments.soak.backend, result.images, result.scenes, result.seconds, result.error.differing,
+             result.error.values, 255 * result.error.worst, result.choice);
+  for (const SoakFault& fault : result.faults) {
+    fmt::print("scene {} view {} camera {}: {} of {} values off by more than 1/255, worst {:.2f}/255\n", fault.scene,
+               fault.view, fault.camera, fault.error.beyond, fault.error.values, 255 * fault.error.worst);
+  }
+}
+
+void run(Arguments arguments) {
+  SoakOptions& options = arguments.soak;
+  options.maps = named_maps(options.maps);
+  options.most_seconds = 60 * arguments.minutes;
+  ProgressLine progress;
+  const SoakResult result = soak(options, [&](const SoakResult& so_far) {
+    const double of_time = so_far.seconds / options.most_seconds;
+    const double of_scenes =
+        options.most_scenes > 0 ? static_cast<double>(so_far.scenes) / static_cast<double>(options.most_scenes) : 0.0;
+    progress.update(fmt::format("{} images, {} out of tolerance", so_far.images, so_far.images_out_of_tolerance),
+                    std::min(1.0, std::max(of_time, of_scenes)));
+  });
+  progress.finish();
+  print_result(arguments, result);
+  PICTURA_CHECK(result.images_out_of_tolerance == 0,
+                "bench soak: {} of {} images are out of tolerance; draw the first again with --first {} --scenes 1",
+                result.images_out_of_tolerance, result.images, result.faults.front().scene);
+}
+
+}  // namespace
+
+void add_soak_benchmark(CLI::App& bench) {
+  auto arguments = std::make_shared<Arguments>();
+  SoakOptions& soak = arguments->soak;
+  CLI::App* command = bench.add_subcommand("soak", "Hold a renderer against the oracle on random scenes, for long");
+  command->add_option("--backend", soak.backend, "The renderer")->capture_default_str();
+  add_maps_option(command, &soak.maps);
+  command->add_option("--minutes", arguments->minutes, "At most")->check(CLI::PositiveNumber)->capture_default_str();
+  command->add_option("--scenes", soak.most_scenes, "At most; 0: as many as there is time for")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--first", soak.first_scene, "Number of the first scene, which is the same in every run")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--agents", soak.agents, "Agents of a world, at most")
+      ->check(CLI::Range(1, 4096))
+      ->capture_default_str();
+  command->add_option("--views", soak.views, "Views of a scene")->check(CLI::PositiveNumber)->capture_default_str();
+  command->add_option("--seed", soak.seed)->capture_default_str();
+  command->add_option("--threads", soak.num_threads, "Host threads; 0: all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_flag("--json", arguments->json, "Print one JSON object");
+  command->footer(
+      "Ends with status 1 where an image is further from the oracle's than kernels may be: by more than 1/255 on one\n"
+      "value in 10,000, or by more than 4/255 anywhere.\nExample:\n  pictura bench soak --map towns --minutes 8");
+  command->callback([arguments] { run(*arguments); });
+}
+
+}  // namespace pictura

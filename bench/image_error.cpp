@@ -1,0 +1,54 @@
+#include "pictura/bench/image_error.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pictura/tests/support/tolerances.h"
+
+namespace pictura {
+
+namespace {
+
+constexpr double kRounding = 1e-6;
+
+double half_to_number(uint16_t half) {
+  const int exponent = half >> 10, mantissa = half & 1023;
+  return exponent > 0 ? std::ldexp(1024 + mantissa, exponent - 25) : std::ldexp(mantissa, -24);
+}
+
+double channel_at(const CameraImages& images, PixelFormat format, int64_t element) {
+  switch (format) {
+    case PixelFormat::u8: return static_cast<const uint8_t*>(images.data)[element] / 255.0;
+    case PixelFormat::f16: return half_to_number(static_cast<const uint16_t*>(images.data)[element]);
+    default: return static_cast<double>(static_cast<const float*>(images.data)[element]);
+  }
+}
+
+}  // namespace
+
+void ImageError::add(const ImageError& other) {
+  values += other.values;
+  differing += other.differing;
+  beyond += other.beyond;
+  worst = std::max(worst, other.worst);
+}
+
+bool ImageError::is_within_tolerance() const {
+  return worst <= kKernelWorstError + kRounding &&
+         static_cast<double>(beyond) <= (1 - kKernelShareWithin) * static_cast<double>(values);
+}
+
+ImageError compare_image(const CameraImages& actual, const CameraImages& expected, PixelFormat format, int view) {
+  ImageError error;
+  error.values = int64_t{3} * expected.width_px * expected.height_px;
+  for (int64_t i = 0; i < error.values; ++i) {
+    const double off = std::abs(channel_at(actual, format, view * actual.view_stride + i) -
+                                channel_at(expected, format, view * expected.view_stride + i));
+    error.worst = std::max(error.worst, off);
+    error.differing += off > 0 ? 1 : 0;
+    error.beyond += off > kKernelError + kRounding ? 1 : 0;
+  }
+  return error;
+}
+
+}  // namespace pictura

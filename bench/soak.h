@@ -1,0 +1,43 @@
+// A long comparison of a renderer with the oracle, over scenes, views and rigs that a seed draws.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "pictura/bench/image_error.h"
+
+namespace pictura {
+
+struct SoakOptions {
+  std::string backend = "cuda";
+  std::vector<std::string> maps;
+  int agents = 120, parked_cars = 32;  // of a scene's world, at most
+  int views = 16;                      // of each scene
+  int64_t first_scene = 0;             // scenes are numbered from 0; each is drawn by its number and the seed alone
+  int64_t most_scenes = 0;             // 0: as many as there is time for
+  double most_seconds = 480;
+  uint64_t seed = 0;
+  int num_threads = 0;  // 0: all
+};
+
+/// An image out of tolerance.
+struct SoakFault {
+  int64_t scene = 0;
+  int view = 0, camera = 0;
+  ImageError error;
+};
+
+struct SoakResult {
+  std::string choice;  // what make_renderer() says
+  int64_t scenes = 0, images = 0;
+  double seconds = 0;
+  ImageError error;               // over all images
+  std::vector<SoakFault> faults;  // the first hundred
+  int64_t images_out_of_tolerance = 0;
+};
+
+/// Calls on_scene(result so far) after each scene. Throws Error when the backend cannot run here.
+SoakResult soak(const SoakOptions& options, const std::function<void(const SoakResult&)>& on_scene);
+
+}  // namespace pictura
