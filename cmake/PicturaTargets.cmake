@@ -99,8 +99,9 @@ function(pictura_add_test name)
   gtest_discover_tests(${name}_test DISCOVERY_TIMEOUT 120 PROPERTIES ${properties})
 endfunction()
 
-# What tests find in their environment. Maps are imported anew: tests are about the importer that was just built.
-set(PICTURA_TEST_ENVIRONMENT PICTURA_CACHE=off)
+# What tests find in their environment. Maps are imported anew: tests are about the importer that was just built. Threads
+# that have nothing to do sleep: side by side, the tests' spinning threads would take the processor from each other.
+set(PICTURA_TEST_ENVIRONMENT PICTURA_CACHE=off OMP_WAIT_POLICY=passive)
 if(NOT DEFINED ENV{PICTURA_DATA} AND EXISTS ${PROJECT_SOURCE_DIR}/../shared/data)
   get_filename_component(data_folder ${PROJECT_SOURCE_DIR}/../shared/data REALPATH)
   list(APPEND PICTURA_TEST_ENVIRONMENT PICTURA_DATA=${data_folder})
