@@ -94,12 +94,12 @@ __device__ int mark_pixel(const Memory& memory, int face, int x, int y, int pixe
 }
 
 // Marks, in a part, the nearest face that covers each pixel fully, and lists the pixels that faces cover partly. Rows
-// are dealt out to the warps like cards, because those of a large face stand side by side. All threads of the block.
+// of a large face stand side by side, so they are dealt out. All threads of the block.
 template <typename Memory>
 __device__ void mark_and_list(const Memory& memory, const Part& part) {
   BlockState* state = memory.state;
   WarpState* warp = &state->warps[warp_index()];
-  const int num_rows = state->num_rows, deals = (num_rows + kWarpSize - 1) / kWarpSize;
+  const int num_rows = state->num_rows, deals = deals_of(num_rows);
   PICTURA_KEEP_LOOP
   for (;;) {
     const int deal = next_of(&state->next_batch);

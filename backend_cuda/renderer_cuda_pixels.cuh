@@ -90,14 +90,14 @@ __device__ __noinline__ void ask_pairs(WarpQueue::Pair pair, Part part) {
 }
 
 // Asks every two fragments of a pixel that meet what they hide of each other; a pixel's full face is one of them. Pairs
-// that meet are put aside until every lane of the warp has one. Fragments are dealt out to the warps like cards: in a
-// crowded pixel those of one face, which stand side by side, have many others each.
+// that meet are put aside until every lane of the warp has one. Fragments are dealt out: in a crowded pixel those of
+// one face, which stand side by side, have many others each.
 template <typename Memory>
 __device__ void hide_fragments(const Memory& memory, const Part& part, int count) {
   using Index = typename Memory::Index;
   WarpState* warp = &memory.state->warps[warp_index()];
   WarpQueue pairs(&warp->pixels);
-  const int deals = (count + kWarpSize - 1) / kWarpSize;
+  const int deals = deals_of(count);
   PICTURA_KEEP_LOOP
   for (int deal = warp_index(); deal < deals; deal += num_warps()) {
     auto fragment_of = [&](int lane) { return lane * deals + deal; };
