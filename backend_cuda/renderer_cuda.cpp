@@ -21,7 +21,8 @@ std::string cuda_unavailable();
 namespace {
 
 constexpr int kLargeBlocks = 8;
-// Room in the pool for the faces and edges of an image, on average. More than the images of CARLA's towns ask for.
+// Room in the pool for the faces and edges of an image: what CARLA's towns ask for on average. Those with more take
+// another round.
 constexpr int kPoolFaces = 320, kPoolEdges = 1472;
 // Views that are drawn at once, at most: enough that the last images of a launch, for which few blocks are left to
 // work, do not count.
@@ -65,20 +66,22 @@ class PoolBuffers {
  public:
   PoolBuffers() = default;
   explicit PoolBuffers(std::size_t images)
-      : faces_(images * kPoolFaces), edges_(images * kPoolEdges), images_(images), overflow_images_(images) {}
-  cuda::FacePool view() const {
-    return {faces_.data(), edges_.data(), images_.data(), static_cast<int32_t>(faces_.size()),
-            static_cast<int32_t>(edges_.size())};
+      : faces_(images * kPoolFaces), edges_(images * kPoolEdges), images_(images), lists_(3 * images) {}
+  /// Sets where a task finds the pool and lists images.
+  void serve(cuda::DrawTask* task_out) const {
+    task_out->pool = {faces_.data(), edges_.data(), images_.data(), static_cast<int32_t>(faces_.size()),
+                      static_cast<int32_t>(edges_.size())};
+    for (std::size_t i = 0; i < 2; ++i) task_out->postponed_images[i] = lists_.data() + i * images_.size();
+    task_out->overflow_images = lists_.data() + 2 * images_.size();
   }
-  int32_t* overflow_images() const { return overflow_images_.data(); }
   static constexpr std::size_t kImageBytes = kPoolFaces * sizeof(ScreenFace) + kPoolEdges * sizeof(PolygonEdge) +
-                                             sizeof(cuda::GatheredImage) + sizeof(int32_t);
+                                             sizeof(cuda::GatheredImage) + 3 * sizeof(int32_t);
 
  private:
   DeviceBuffer<ScreenFace> faces_;
   DeviceBuffer<PolygonEdge> edges_;
   DeviceBuffer<cuda::GatheredImage> images_;
-  DeviceBuffer<int32_t> overflow_images_;
+  DeviceBuffer<int32_t> lists_;
 };
 
 // Pieces of one kind in device memory.
@@ -203,9 +206,8 @@ class CudaRenderer final : public Renderer {
     task.geometries = geometry_views_.data();
     task.num_geometries = static_cast<int32_t>(geometries_.size());
     task.fault = fault_.device();
-    task.pool = pool_.view();
+    pool_.serve(&task);
     task.counters = counters_.data();
-    task.overflow_images = pool_.overflow_images();
     return task;
   }
 

@@ -36,7 +36,8 @@ struct BlockState {
   ImageSetting setting;
   ScreenFace* faces;   // of this image
   PolygonEdge* edges;  // of all images in the pool
-  int32_t num_visible, num_quads, num_lights, num_faces, max_faces, num_edges, max_edges, overflow, usable;
+  int32_t num_visible, num_quads, num_lights, num_faces, max_faces, num_edges, max_edges, overflow, pool_is_full,
+      usable;
   // While pixels are drawn.
   int32_t num_rows, num_candidates, num_fragments, num_drawn, next_batch, image;
   int32_t sum_of_warp[2][kMaxWarps];

@@ -157,9 +157,10 @@ __device__ void cull(const Memory& memory, const DrawTask& task) {
 template <typename Memory>
 __device__ bool take_edge_room(const Memory& memory, const DrawTask& task, int count) {
   if constexpr (Memory::kUsesPool) {
-    memory.state->num_edges = atomicAdd(&task.counters->edges, count);
+    memory.state->num_edges = atomicAdd(&task.counters->rounds[task.round_index].edges, count);
     memory.state->max_edges = memory.state->num_edges + count;
-    return memory.state->max_edges <= task.pool.max_edges;
+    memory.state->pool_is_full = memory.state->max_edges > task.pool.max_edges ? 1 : 0;
+    return memory.state->pool_is_full == 0;
   }
   return true;
 }
@@ -179,10 +180,11 @@ __device__ bool take_face_room(const Memory& memory, const DrawTask& task) {
   } else {
     const FacePool& pool = task.pool;
     state->max_faces = state->num_visible + state->num_lights;
-    const int32_t face_begin = atomicAdd(&task.counters->faces, state->max_faces);
+    const int32_t face_begin = atomicAdd(&task.counters->rounds[task.round_index].faces, state->max_faces);
     state->faces = pool.faces + face_begin;
     state->edges = pool.edges;
-    return face_begin + state->max_faces <= pool.max_faces && take_edge_room(memory, task, 4 * state->num_visible);
+    state->pool_is_full = face_begin + state->max_faces > pool.max_faces ? 1 : 0;
+    return state->pool_is_full == 0 && take_edge_room(memory, task, 4 * state->num_visible);
   }
 }
 
@@ -351,7 +353,7 @@ __device__ bool gather(const Memory& memory, const DrawTask& task, int32_t view,
   BlockState* state = memory.state;
   sync_block();
   if (threadIdx.x == 0) {
-    state->num_visible = state->num_quads = state->num_lights = state->overflow = 0;
+    state->num_visible = state->num_quads = state->num_lights = state->overflow = state->pool_is_full = 0;
     state->usable = set_view(&state->view, task, view) ? 1 : 0;
     if (state->usable) {
       const PinholeCamera placed = place_camera(task.cameras[camera].camera, state->view.view);

@@ -73,19 +73,31 @@ __device__ inline void leave_to_last(const DrawTask& task, int32_t image) {
   task.overflow_images[atomicAdd(&task.counters->overflow, 1)] = image;
 }
 
-// The next image of a counter, below num_images; -1: none is left. All threads of the block.
-__device__ inline int32_t next_image(int32_t* counter, int32_t num_images) {
+// The next number of a counter, below `count`; -1: none is left. All threads of the block.
+__device__ inline int32_t next_of_round(int32_t* counter, int32_t count) {
   BlockState* state = block_state();
   sync_block();
   if (threadIdx.x == 0) state->image = atomicAdd(counter, 1);
   sync_block();
-  return state->image < num_images ? state->image : -1;
+  return state->image < count ? state->image : -1;
 }
-__device__ inline int32_t num_images(const DrawTask& task) { return task.num_views * num_cameras(task); }
 __device__ inline int32_t view_of(const DrawTask& task, int32_t image) {
   return task.first_view + image / num_cameras(task);
 }
 __device__ inline int32_t camera_of(const DrawTask& task, int32_t image) { return image % num_cameras(task); }
+
+// The images of a round: all of them, then those that the round before has postponed.
+__device__ inline int32_t images_of_round(const DrawTask& task) {
+  return task.round_index == 0 ? task.num_views * num_cameras(task)
+                               : task.counters->rounds[task.round_index - 1].postponed;
+}
+__device__ inline int32_t image_of_round(const DrawTask& task, int32_t i) {
+  return task.round_index == 0 ? i : task.postponed_images[(task.round_index - 1) % 2][i];
+}
+__device__ inline void postpone(const DrawTask& task, int32_t image) {
+  const int32_t place = atomicAdd(&task.counters->rounds[task.round_index].postponed, 1);
+  task.postponed_images[task.round_index % 2][place] = image;
+}
 
 extern "C" __global__ void __launch_bounds__(kGatherThreads, kGatherBlocksPerProcessor)
     pictura_gather(const __grid_constant__ DrawTask task, const __grid_constant__ Scratch scratch) {
@@ -94,19 +106,23 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kGatherBlocksPerPro
   BlockState* state = memory.state;
   PICTURA_KEEP_LOOP
   for (;;) {
-    const int32_t image = next_image(&task.counters->next_gathered, num_images(task));
-    if (image < 0) return;
-    const bool gathered = gather(memory, task, view_of(task, image), camera_of(task, image));
-    const bool fits = gathered && state->num_faces <= kMostMarkedFaces;
+    const int32_t i = next_of_round(&task.counters->rounds[task.round_index].next_gathered, images_of_round(task));
+    if (i < 0) return;
+    const int32_t image = image_of_round(task, i), camera = camera_of(task, image);
+    const bool gathered = gather(memory, task, view_of(task, image), camera);
     if (threadIdx.x != 0) continue;
     GatheredImage* out = task.pool.images + image;
-    if (fits) {
+    if (gathered && state->num_faces <= kMostMarkedFaces) {
       *out = state->shown;
-    } else if (state->usable) {
-      *out = {.face_count = -1};
-      leave_to_last(task, image);
+    } else if (!state->usable) {
+      *out = {.width_px = width_px(task.cameras[camera].camera)};  // black
     } else {
-      *out = {.width_px = width_px(task.cameras[camera_of(task, image)].camera)};  // black
+      *out = {.face_count = -1};
+      if (state->pool_is_full != 0 && task.round_index + 1 < kRounds) {
+        postpone(task, image);
+      } else {
+        leave_to_last(task, image);
+      }
     }
   }
 }
@@ -116,8 +132,9 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
   BlockState* state = block_state();
   PICTURA_KEEP_LOOP
   for (;;) {
-    const int32_t image = next_image(&task.counters->next_drawn, num_images(task));
-    if (image < 0) return;
+    const int32_t i = next_of_round(&task.counters->rounds[task.round_index].next_drawn, images_of_round(task));
+    if (i < 0) return;
+    const int32_t image = image_of_round(task, i);
     if (threadIdx.x == 0) {
       state->shown = task.pool.images[image];
       state->faces = task.pool.faces + state->shown.face_begin;

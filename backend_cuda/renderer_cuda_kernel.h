@@ -1,6 +1,7 @@
-// What the host tells the drawing kernels. A first launch gathers the faces of all images in a pool, a second one draws
-// them, a block an image at a time. What finds no room in either is left to a third launch of few blocks, whose memory
-// has room for all that a world can hold.
+// What the host tells the drawing kernels. One launch gathers the faces of images in a pool, the next draws them, a
+// block an image at a time; two more launches do the same with what the pool had no room for, and so on. What has
+// outgrown a block's memory is left to a last launch of few blocks, whose memory has room for all that a world can
+// hold.
 #pragma once
 
 #include "pictura/common/raster_item.h"
@@ -80,11 +81,17 @@ struct Scratch {
   int32_t blocks = 0, max_visible = 0, max_quads = 0, max_lights = 0, max_faces = 0, max_edges = 0;
 };
 
+/// Images are gathered and drawn in rounds: those for which the pool had no room left are postponed to the next one.
+constexpr int kRounds = 3;
+
 /// What the blocks of a batch's launches count together; 0 before.
 struct DrawCounters {
-  int32_t next_gathered = 0, next_drawn = 0;  // images
-  int32_t faces = 0, edges = 0;               // of the pool that are taken
-  int32_t overflow = 0;                       // images left to the last launch
+  struct Round {
+    int32_t next_gathered = 0, next_drawn = 0;  // images
+    int32_t faces = 0, edges = 0;               // of the pool that are taken
+    int32_t postponed = 0;                      // images
+  } rounds[kRounds];
+  int32_t overflow = 0;  // images left to the last launch
 };
 
 struct DrawTask {
@@ -102,6 +109,8 @@ struct DrawTask {
   Fault* fault = nullptr;
   FacePool pool;
   DrawCounters* counters = nullptr;
+  int32_t round_index = 0;
+  int32_t* postponed_images[2] = {};   // [images] of each round, in turn
   int32_t* overflow_images = nullptr;  // [images]
   CameraSlot cameras[kMaxCameras];
 };

@@ -43,15 +43,17 @@ Scratch gather_scratch(int processors) {
 
 std::size_t large_block_bytes(const Scratch& large) { return large_bytes(large); }
 
-cudaError_t launch_draw(const KernelSet& kernels, const DrawTask& task, const Scratch& gather, const Scratch& large,
+cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& gather, const Scratch& large,
                         int processors, cudaStream_t stream) {
   const int images = task.num_views * task.num_cameras;
-  cudaError_t status =
-      launch(kernels.gather, {min_of(images, gather.blocks), kGatherThreads, gather_bytes()}, stream, task, gather);
-  if (status != cudaSuccess) return status;
-  const int draw_blocks = min_of(images, kDrawBlocksPerProcessor * processors);
-  status = launch(kernels.draw, {draw_blocks, kDrawThreads, draw_bytes()}, stream, task);
-  if (status != cudaSuccess) return status;
+  const LaunchShape to_gather{min_of(images, gather.blocks), kGatherThreads, gather_bytes()};
+  const LaunchShape to_draw{min_of(images, kDrawBlocksPerProcessor * processors), kDrawThreads, draw_bytes()};
+  for (task.round_index = 0; task.round_index < kRounds; ++task.round_index) {
+    cudaError_t status = launch(kernels.gather, to_gather, stream, task, gather);
+    if (status != cudaSuccess) return status;
+    status = launch(kernels.draw, to_draw, stream, task);
+    if (status != cudaSuccess) return status;
+  }
   return launch(kernels.draw_overflow, {min_of(images, large.blocks), kLargeThreads, state_bytes(kLargeThreads)},
                 stream, task, large);
 }

@@ -32,8 +32,8 @@ Scratch gather_scratch(int processors);
 /// Bytes that a block of the last launch needs besides faces and edges.
 std::size_t large_block_bytes(const Scratch& large);
 
-/// Draws all images, whose faces the pool has room for: three launches.
-cudaError_t launch_draw(const KernelSet& kernels, const DrawTask& task, const Scratch& gather, const Scratch& large,
+/// Draws all images: two launches for each round, and one more.
+cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& gather, const Scratch& large,
                         int processors, cudaStream_t stream);
 cudaError_t launch_visibility(const KernelSet& kernels, const VisibilityTask& task, const Scratch& large,
                               cudaStream_t stream);

@@ -32,8 +32,9 @@ namespace {
 // Draws with the kernels. Two blocks of each launch, so that each draws several images, one after the other.
 class EmulatedRenderer final : public Renderer {
  public:
-  EmulatedRenderer(const RendererConfig& config, uint64_t seed)
-      : config_(config), seed_(seed), cameras_(pinhole_cameras(config.rig)) {}
+  /// Room in the pool for so many faces an image, and for eight times as many edges.
+  EmulatedRenderer(const RendererConfig& config, uint64_t seed, int pool_faces = 2048)
+      : config_(config), seed_(seed), pool_faces_(pool_faces), cameras_(pinhole_cameras(config.rig)) {}
   std::string_view name() const override { return "emulated"; }
   MemorySpace space() const override { return MemorySpace::host; }
   const RendererConfig& config() const override { return config_; }
@@ -48,10 +49,13 @@ class EmulatedRenderer final : public Renderer {
 
   void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream) override {
     Setup setup(*this, cuda::make_draw_task(config_, cameras_, scene, views, &images_out), scene);
-    const cuda::DrawTask& task = setup.task;
-    launch(cuda::kGatherThreads, [&] { cuda::emulated_gather(task, setup.gather); });
-    launch(cuda::kDrawThreads, [&] { cuda::emulated_draw(task); });
+    cuda::DrawTask& task = setup.task;
+    for (task.round_index = 0; task.round_index < cuda::kRounds; ++task.round_index) {
+      launch(cuda::kGatherThreads, [&] { cuda::emulated_gather(task, setup.gather); });
+      launch(cuda::kDrawThreads, [&] { cuda::emulated_draw(task); });
+    }
     overflow_ = setup.counters.overflow;
+    postponed_ = setup.counters.rounds[0].postponed;
     launch(cuda::kLargeThreads, [&] { cuda::emulated_draw_overflow(task, setup.large); });
     EXPECT_EQ(setup.fault.view, -1) << "fault " << setup.fault.kind;
   }
@@ -65,8 +69,9 @@ class EmulatedRenderer final : public Renderer {
     EXPECT_EQ(setup.fault.view, -1) << "fault " << setup.fault.kind;
   }
 
-  /// Images that the last call left to the last launch.
+  /// Images that the last call left to the last launch, and to the second round.
   int overflow() const { return overflow_; }
+  int postponed() const { return postponed_; }
 
  private:
   static constexpr int kBlocks = 2;
@@ -86,7 +91,7 @@ class EmulatedRenderer final : public Renderer {
     std::vector<ScreenFace> pool_faces, large_faces;
     std::vector<PolygonEdge> pool_edges, large_edges;
     std::vector<cuda::GatheredImage> images;
-    std::vector<int32_t> overflow_images;
+    std::vector<int32_t> overflow_images, postponed_images[2];
     std::vector<cuda::Quad> gather_quads, large_quads;
     std::vector<uint64_t> large_words;
 
@@ -98,8 +103,8 @@ class EmulatedRenderer final : public Renderer {
         pieces = std::max(pieces, static_cast<int>(map.strips.size() + map.walls.size() + map.heads.size()));
       }
       const auto num_images = static_cast<std::size_t>(task.num_views * task.num_cameras);
-      pool_faces.resize(2048 * num_images);
-      pool_edges.resize(8192 * num_images);
+      pool_faces.resize(static_cast<std::size_t>(renderer.pool_faces_) * num_images);
+      pool_edges.resize(8 * pool_faces.size());
       images.resize(num_images);
       overflow_images.resize(num_images);
       task.pool = {pool_faces.data(), pool_edges.data(), images.data(), static_cast<int32_t>(pool_faces.size()),
@@ -109,6 +114,10 @@ class EmulatedRenderer final : public Renderer {
       task.counters = &counters;
       task.fault = &fault;
       task.overflow_images = overflow_images.data();
+      for (std::size_t i = 0; i < 2; ++i) {
+        postponed_images[i].resize(num_images);
+        task.postponed_images[i] = postponed_images[i].data();
+      }
 
       gather.blocks = large.blocks = kBlocks;
       gather.max_quads = cuda::kGatherQuads;
@@ -142,10 +151,11 @@ class EmulatedRenderer final : public Renderer {
 
   RendererConfig config_;
   uint64_t seed_;
+  int pool_faces_;
   std::vector<PinholeCamera> cameras_;
   std::vector<std::unique_ptr<Kept>> kept_;
   std::vector<cuda::DeviceGeometry> geometries_;
-  int overflow_ = 0;
+  int overflow_ = 0, postponed_ = 0;
 };
 
 void expect_oracles(EmulatedRenderer* renderer, const SyntheticTown& town, Planes planes = Planes::none) {
@@ -168,6 +178,16 @@ TEST(EmulatedKernels, DrawTheOraclesTownsInAnyOrderOfThreads) {
     expect_oracles(&renderer, town);
     EXPECT_EQ(renderer.overflow(), 0);
   }
+}
+
+TEST(EmulatedKernels, PostponeWhatThePoolHasNoRoomFor) {
+  SyntheticTown town = make_synthetic_town(1, 120);
+  town.views.resize(2);
+  EmulatedRenderer renderer(config_of(paper_rig()), 7, 130);
+  expect_oracles(&renderer, town);
+  EXPECT_GT(renderer.postponed(), 0);
+  EXPECT_LT(renderer.postponed(), 8);
+  EXPECT_EQ(renderer.overflow(), 0);
 }
 
 TEST(EmulatedKernels, DrawOddSizesAndPlanes) {
