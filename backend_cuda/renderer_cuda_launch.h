@@ -27,7 +27,7 @@ KernelSet ahead_of_time_kernels();
 /// What is to be done once before the first launch.
 cudaError_t prepare_kernels(const KernelSet& kernels);
 
-/// What the blocks of the first launch have room for, and how many of them a device of so many processors runs at once.
+/// What the blocks that gather have room for, and how many of them a device of so many processors runs at once.
 Scratch gather_scratch(int processors);
 /// Bytes that a block of the last launch needs besides faces and edges.
 std::size_t large_block_bytes(const Scratch& large);

@@ -27,7 +27,7 @@ ScratchPlan plan_scratch(const ScratchNeeds& needs, std::size_t max_bytes) {
   const std::size_t least = bytes_of(plan, needs);
   PICTURA_CHECK(least <= max_bytes, "renderer cuda: max_scratch_bytes: expected at least {}, got {}", least, max_bytes);
   std::size_t left = max_bytes - least;
-  // The first launch draws nearly all images, so it comes first, but leaves a quarter to the others.
+  // Nothing is drawn that is not gathered, so that comes first, but leaves a quarter to the others.
   plan.small_blocks += static_cast<int>(
       take(static_cast<std::size_t>(needs.small_blocks - 1), needs.small_block_bytes, left / 4 * 3, &left));
   plan.large_blocks += static_cast<int>(

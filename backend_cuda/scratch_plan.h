@@ -7,7 +7,7 @@ namespace pictura::cuda {
 
 /// What would serve best.
 struct ScratchNeeds {
-  int small_blocks = 1, large_blocks = 1;  // of the first and the second launch
+  int small_blocks = 1, large_blocks = 1;  // that gather, and of the last launch
   std::size_t small_block_bytes = 0, large_block_bytes = 0;
   std::size_t views = 1, view_bytes = 0;  // of the batch, and what each of them takes
 };
@@ -20,7 +20,7 @@ struct ScratchPlan {
 
 std::size_t bytes_of(const ScratchPlan& plan, const ScratchNeeds& needs);
 
-/// As much of the needs as max_bytes hold, at least one of each: blocks of the first launch before those of the second,
+/// As much of the needs as max_bytes hold, at least one of each: blocks that gather before those of the last launch,
 /// and before the rest of the views. Throws Error saying how many bytes one of each takes, where they do not fit.
 ScratchPlan plan_scratch(const ScratchNeeds& needs, std::size_t max_bytes);
 
