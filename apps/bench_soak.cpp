@@ -1,6 +1,7 @@
 // `pictura bench soak`: a renderer held against the oracle for a long time, on scenes that a seed draws.
+#include <algorithm>
+
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "pictura/apps/bench.h"
 #include "pictura/apps/report.h"

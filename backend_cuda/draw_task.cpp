@@ -51,11 +51,11 @@ DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeC
   return task;
 }
 
-Scratch large_sizes(int pieces, int heads, int agents) {
+Scratch large_sizes(int pieces, int heads, std::size_t agents) {
   // Agents turn up to three faces to a camera, everything else one; faces of four corners have at most nine edges when
   // clipped.
   Scratch sizes;
-  sizes.max_faces = std::max(1, pieces + 3 * std::min(agents, kMaxWorldAgents));
+  sizes.max_faces = std::max(1, pieces + 3 * static_cast<int>(std::min<std::size_t>(agents, kMaxWorldAgents)));
   sizes.max_visible = sizes.max_quads = sizes.max_faces;
   sizes.max_lights = std::max(1, heads);
   sizes.max_edges = 9 * sizes.max_faces + kMaxPolygonCorners * heads;

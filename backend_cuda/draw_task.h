@@ -26,12 +26,13 @@ class SortedPieces {
   float largest_radius_m_ = 0;
 };
 
-/// Everything of a task but geometries, pool, counters, overflow images and fault. images may be null.
+/// Everything of a task but what lies in the renderer's own memory: geometries, pool, counters, lists of images and
+/// fault. images may be null.
 DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeCamera>& cameras,
                         const SceneBatch& scene, Span<const View> views, const ImageBatch* images);
 
 /// Room, for a block of the last launch, for all that a world can hold of a map with so many pieces, heads among them,
 /// and so many agents.
-Scratch large_sizes(int pieces, int heads, int agents);
+Scratch large_sizes(int pieces, int heads, std::size_t agents);
 
 }  // namespace pictura::cuda

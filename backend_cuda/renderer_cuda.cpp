@@ -214,7 +214,7 @@ class CudaRenderer final : public Renderer {
   // Room for as many views as the bound allows, and in the last launch for all that a world can hold: after this
   // nothing is cut off. Allocates nothing where an earlier call needed as much.
   void grow(std::size_t agents_total, std::size_t views) {
-    most_agents_ = std::max(most_agents_, static_cast<int>(std::min<std::size_t>(agents_total, cuda::kMaxWorldAgents)));
+    most_agents_ = std::max(most_agents_, agents_total);
     cuda::Scratch large = cuda::large_sizes(most_pieces_, most_heads_, most_agents_);
     const cuda::Scratch& had = large_.view();
     const std::size_t most_views = std::max(most_views_, std::min(views, kViewsAtOnce));
@@ -259,8 +259,8 @@ class CudaRenderer final : public Renderer {
   cuda::KernelLibrary library_;         // outlives the buffers, whose release waits for the device
   std::vector<UploadedGeometry> geometries_;
   DeviceBuffer<cuda::DeviceGeometry> geometry_views_;
-  int processors_ = 0, most_pieces_ = 0, most_heads_ = 0, most_agents_ = 0;
-  std::size_t most_views_ = 0;
+  int processors_ = 0, most_pieces_ = 0, most_heads_ = 0;
+  std::size_t most_agents_ = 0, most_views_ = 0;
   cuda::ScratchPlan plan_;
   ScratchBuffers gather_, large_;
   PoolBuffers pool_;

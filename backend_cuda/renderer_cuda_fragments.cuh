@@ -55,8 +55,8 @@ __device__ void list_rows(const Memory& memory, int num_faces, const Part& part)
     if (face < num_faces) {
       const PixelBox box = memory.faces[face].box;
       y_begin = max_of(box.y_begin, part.y_begin);
-      if (box.x_begin < part.x_end && box.x_end > part.x_begin)
-        rows = max_of(0, min_of(box.y_end, part.y_end) - y_begin);
+      const bool is_beside = box.x_begin >= part.x_end || box.x_end <= part.x_begin;
+      rows = is_beside ? 0 : max_of(0, min_of(box.y_end, part.y_end) - y_begin);
     }
     const int row = y_begin - part.y_begin;
     const int32_t place = take_places(&memory.state->num_rows, rows);
@@ -158,7 +158,7 @@ __device__ void cut_fragments(const Memory& memory, WarpQueue::Pair cut, const P
   if (!cut.is_one) return;
   const PolygonEdge edge = memory.edges[cut.b];
   const int pixel = memory.pixel[cut.a], x = part.x_of(pixel), y = part.y_of(pixel);
-  const uint64_t samples = samples_inside(edge, static_cast<float>(x) - edge.x0, static_cast<float>(y) - edge.y0);
+  const uint64_t samples = samples_cut(edge, x, y);
   const int32_t area_units = area_cut(edge, x, y);
   atomicAnd(&memory.samples_low[cut.a], static_cast<uint32_t>(samples));
   atomicAnd(&memory.samples_high[cut.a], static_cast<uint32_t>(samples >> 32));
@@ -264,8 +264,7 @@ __device__ void finish_fragments(const Memory& memory, int count) {
   constexpr Word kUpperHalf = ~Memory::kNone;
   PICTURA_KEEP_LOOP
   for (int i = static_cast<int>(threadIdx.x); i < count; i += num_threads()) {
-    const uint64_t samples = static_cast<uint64_t>(memory.samples_high[i]) << 32 | memory.samples_low[i];
-    const PixelCoverage coverage = rounded_coverage(memory.area_units[i], samples);
+    const PixelCoverage coverage = rounded_coverage(memory.area_units[i], memory.samples(i));
     const int pixel = memory.pixel[i];
     if (coverage.area <= 0.0f) {
       memory.pixel[i] = static_cast<Index>(Memory::kNone);

@@ -55,9 +55,10 @@ struct DrawMemory {
   Index* drawn;                                                 // [max_fragments] pixels that have fragments
   int32_t max_pixels, max_rows, max_candidates, max_fragments;
 
-  __device__ PixelCoverage coverage(int fragment) const {
-    return {area[fragment], static_cast<uint64_t>(samples_high[fragment]) << 32 | samples_low[fragment]};
+  __device__ uint64_t samples(int fragment) const {
+    return static_cast<uint64_t>(samples_high[fragment]) << 32 | samples_low[fragment];
   }
+  __device__ PixelCoverage coverage(int fragment) const { return {area[fragment], samples(fragment)}; }
   __device__ uint64_t free(int fragment) const {
     return static_cast<uint64_t>(free_high[fragment]) << 32 | free_low[fragment];
   }

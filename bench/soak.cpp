@@ -35,11 +35,6 @@ std::vector<Rig> draw_rigs(const SoakOptions& options) {
   return rigs;
 }
 
-// A renderer and the oracle for one rig.
-struct Pair {
-  std::unique_ptr<Renderer> drawn, oracle;
-};
-
 // A world of one of the maps, driven anew for each scene: its number says which and for how long, so that a scene can
 // be drawn again without those before it.
 class Scenes {
@@ -102,15 +97,15 @@ SoakResult soak(const SoakOptions& options, const std::function<void(const SoakR
     scenes.drive(scene);
     const RendererConfig config{.rig = rigs[static_cast<std::size_t>(scene) % rigs.size()],
                                 .num_threads = options.num_threads};
-    const Pair pair{make_renderer(options.backend, config, &result.choice), make_renderer("cpu", config)};
+    const auto renderer = make_renderer(options.backend, config, &result.choice), oracle = make_renderer("cpu", config);
     for (const StaticGeometry& geometry : scenes.simulator().geometries()) {
-      pair.drawn->upload(geometry);
-      pair.oracle->upload(geometry);
+      renderer->upload(geometry);
+      oracle->upload(geometry);
     }
     const std::vector<View> views = scenes.views(scene);
     HostImages drawn(config.rig, options.views), expected(config.rig, options.views);
-    pair.drawn->render(scenes.simulator().scene(), views, drawn.batch());
-    pair.oracle->render(scenes.simulator().scene(), views, expected.batch());
+    renderer->render(scenes.simulator().scene(), views, drawn.batch());
+    oracle->render(scenes.simulator().scene(), views, expected.batch());
     for (int camera = 0; camera < static_cast<int>(config.rig.cameras.size()); ++camera) {
       for (int view = 0; view < options.views; ++view) {
         const ImageError error = compare_image(drawn.camera(camera), expected.camera(camera), PixelFormat::u8, view);

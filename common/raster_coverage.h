@@ -309,6 +309,11 @@ PICTURA_HD inline int32_t area_cut(const PolygonEdge& edge, int x, int y) {
   return edge.a < 0.0f ? units : -units;
 }
 
+/// ... the samples of the pixel on its inner side.
+PICTURA_HD inline uint64_t samples_cut(const PolygonEdge& edge, int x, int y) {
+  return samples_inside(edge, static_cast<float>(x) - edge.x0, static_cast<float>(y) - edge.y0);
+}
+
 /// What the sum of areas over all edges, and the samples on the inner side of those that cross the pixel, amount to.
 PICTURA_HD inline PixelCoverage rounded_coverage(int32_t area_units, uint64_t samples) {
   const float area = static_cast<float>(area_units) * (1.0f / kAreaUnits);
@@ -326,7 +331,7 @@ PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int cou
     const PixelSide side = side_of(edge, x, y);
     if (side == PixelSide::outside) return {0.0f, 0};
     if (side == PixelSide::crossed) {
-      samples &= samples_inside(edge, static_cast<float>(x) - edge.x0, static_cast<float>(y) - edge.y0);
+      samples &= samples_cut(edge, x, y);
       area_units += area_cut(edge, x, y);
     } else {
       area_units += area_beside(edge, y);

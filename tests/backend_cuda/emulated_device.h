@@ -13,6 +13,9 @@
 #include <memory>
 #include <random>
 #include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <ucontext.h>
@@ -215,32 +218,26 @@ inline float __uint_as_float(unsigned bits) { return std::bit_cast<float>(bits);
 inline unsigned __float_as_uint(float value) { return std::bit_cast<unsigned>(value); }
 
 template <typename Value>
+Value atomicExch(Value* at, std::type_identity_t<Value> value) {
+  return std::exchange(*at, value);
+}
+template <typename Value>
 Value atomicAdd(Value* at, std::type_identity_t<Value> by) {
-  const Value had = *at;
-  *at = had + by;
-  return had;
+  return atomicExch(at, *at + by);
 }
 template <typename Value>
 Value atomicMax(Value* at, std::type_identity_t<Value> other) {
-  const Value had = *at;
-  *at = std::max(had, other);
-  return had;
+  return atomicExch(at, std::max(*at, other));
 }
 template <typename Value>
 Value atomicAnd(Value* at, std::type_identity_t<Value> other) {
-  const Value had = *at;
-  *at = had & other;
-  return had;
+  return atomicExch(at, *at & other);
 }
 template <typename Value>
 Value atomicOr(Value* at, std::type_identity_t<Value> other) {
-  const Value had = *at;
-  *at = had | other;
-  return had;
+  return atomicExch(at, *at | other);
 }
 template <typename Value>
 Value atomicCAS(Value* at, std::type_identity_t<Value> expected, std::type_identity_t<Value> wanted) {
-  const Value had = *at;
-  if (had == expected) *at = wanted;
-  return had;
+  return atomicExch(at, *at == expected ? wanted : *at);
 }

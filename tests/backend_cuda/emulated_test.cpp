@@ -123,7 +123,7 @@ class EmulatedRenderer final : public Renderer {
       gather.max_quads = cuda::kGatherQuads;
       gather_quads.resize(static_cast<std::size_t>(kBlocks * gather.max_quads));
       gather.quads = gather_quads.data();
-      large = cuda::large_sizes(pieces, heads, static_cast<int>(scene.agents.size()));
+      large = cuda::large_sizes(pieces, heads, scene.agents.size());
       large_faces.resize(static_cast<std::size_t>(kBlocks * large.max_faces));
       large_edges.resize(static_cast<std::size_t>(kBlocks * large.max_edges));
       large_quads.resize(static_cast<std::size_t>(kBlocks * large.max_quads));
@@ -193,10 +193,7 @@ TEST(EmulatedKernels, PostponeWhatThePoolHasNoRoomFor) {
 TEST(EmulatedKernels, DrawOddSizesAndPlanes) {
   SyntheticTown town = make_synthetic_town(2, 60);
   town.views.resize(2);
-  Rig rig = paper_rig(97, 55);
-  rig.cameras[1] = paper_rig(1, 1).cameras[1];
-  rig.cameras[2] = paper_rig(40, 130).cameras[2];
-  EmulatedRenderer renderer(config_of(rig), 3);
+  EmulatedRenderer renderer(config_of(mixed_rig()), 3);
   expect_oracles(&renderer, town, Planes::all);
 }
 

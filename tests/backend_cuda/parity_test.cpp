@@ -57,10 +57,7 @@ TEST_F(CudaRendererTest, TownsLookLikeTheOracle) { expect_parity(make_synthetic_
 TEST_F(CudaRendererTest, OddSizesAndMixedRigsDoToo) {
   SyntheticTown town = make_synthetic_town(2, 60);
   town.views.resize(5);
-  Rig rig = paper_rig(97, 55);
-  rig.cameras[1] = paper_rig(1, 1).cameras[1];
-  rig.cameras[2] = paper_rig(40, 130).cameras[2];
-  expect_parity(town, {.rig = rig, .line_floor_px = 0});
+  expect_parity(town, {.rig = mixed_rig(), .line_floor_px = 0});
 }
 
 TEST_F(CudaRendererTest, NothingIsCutOffInCrowdedImages) { expect_parity(make_crowd(), {.rig = paper_rig()}); }

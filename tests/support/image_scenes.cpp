@@ -137,6 +137,13 @@ SyntheticTown make_crowd() {
   return town;
 }
 
+Rig mixed_rig() {
+  Rig rig = paper_rig(97, 55);
+  rig.cameras[1] = paper_rig(1, 1).cameras[1];
+  rig.cameras[2] = paper_rig(40, 130).cameras[2];
+  return rig;
+}
+
 Outputs draw_outputs(Renderer* renderer, const SyntheticTown& town, Planes planes) {
   renderer->upload(town.geometry);
   const Rig& rig = renderer->config().rig;

@@ -24,6 +24,9 @@ SyntheticTown make_synthetic_town(uint64_t seed, int num_agents);
 /// fast memory has room for.
 SyntheticTown make_crowd();
 
+/// Four cameras of 97x55, 1x1 and 40x130 pixels.
+Rig mixed_rig();
+
 /// All images of a batch, one camera after the other: colours as floats, and planes where they are wanted.
 struct Outputs {
   std::vector<float> color;
