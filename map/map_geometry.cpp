@@ -6,6 +6,7 @@
 #include <set>
 
 #include "pictura/common/rng.h"
+#include "pictura/map/painted_lines.h"
 
 namespace pictura {
 
@@ -89,9 +90,8 @@ void drop_repeated(std::vector<Strip>* strips_inout) {
 
 StaticGeometry make_static_geometry(const RoadMap& map, const MapGeometryOptions& options) {
   StaticGeometry geometry;
-  for (const Marking& marking : map.markings) {
-    append_strips({map.marking_points.data() + marking.points.begin, static_cast<std::size_t>(marking.points.size())},
-                  marking.width_m, mark_color(marking.color), StripKind::lane_mark, &geometry.strips);
+  for (const PaintedLine& line : painted_lines(map)) {
+    append_strips(line.points_m, line.width_m, mark_color(line.color), StripKind::lane_mark, &geometry.strips);
   }
   append_road_edges(map, &geometry.strips);
   for (const Crosswalk& crosswalk : map.crosswalks) {
