@@ -195,11 +195,10 @@ class LineJoiner {
       const Vec2 here = place(a).xy(), out = outward(a);
       visit_near(grid.view(), {here, here}, [&](std::size_t b) {
         if (b <= a || !is_same_paint(lines_[a / 2], lines_[b / 2])) return;
-        const float gap_m = length(place(a) - place(b));
-        if (gap_m > kSame_m || (a / 2 == b / 2 && lines_[a / 2].points_m.size() < kRingPoints)) return;
         const Vec2 other_out = outward(b);
-        const float bend = std::abs(cross(out, other_out));
-        if (bend <= kMaxBend && dot(out, other_out) < 0) pairs.push_back({bend, gap_m, a, b});
+        const float gap_m = length(place(a) - place(b)), bend = std::abs(cross(out, other_out));
+        if (gap_m > kSame_m || bend > kMaxBend || dot(out, other_out) > 0) return;
+        pairs.push_back({bend, gap_m, a, b});
       });
     }
     std::sort(pairs.begin(), pairs.end(), [](const Pair& p, const Pair& q) {
@@ -227,8 +226,6 @@ class LineJoiner {
     if (end == begin) joined.points_m.back() = joined.points_m.front();
     return joined;
   }
-
-  static constexpr std::size_t kRingPoints = 4;  // the fewest that append_strips() mitres at the seam
 
   std::vector<PaintedLine> lines_;
   std::vector<std::size_t> partner_;
