@@ -13,8 +13,8 @@ namespace pictura {
 
 namespace {
 
-// What is nearer than this is at one place: ends that meet, and paint that is there twice. In CARLA's towns ends that
-// continue each other meet within 1 mm or lie more than 1 cm apart.
+// What is nearer than this is at one place: ends that meet, and paint that is there twice. Of the ends in CARLA's towns
+// that another continues within 1 cm, it does so within 1 mm for 99 %.
 constexpr float kSame_m = 1e-3f;
 // A repeated line may lie aside of the one that is drawn, end before it does, and the drawn one's pieces may each move
 // where they were joined; thinning has what is left of the tolerance.
@@ -153,13 +153,11 @@ class LineJoiner {
     match();
   }
 
+  /// In the order of their first lines: where lane marks overlap, the lower index is in front.
   std::vector<PaintedLine> join() {
     std::vector<PaintedLine> joined;
-    // From ends that nothing continues first, then what is left: rings.
-    for (const bool rings : {false, true}) {
-      for (std::size_t end = 0; end < partner_.size(); ++end) {
-        if (!used_[end / 2] && (rings || partner_[end] == kNone)) joined.push_back(follow(end));
-      }
+    for (std::size_t line = 0; line < lines_.size(); ++line) {
+      if (!used_[line]) joined.push_back(follow(begin_of(line)));
     }
     return joined;
   }
@@ -209,6 +207,16 @@ class LineJoiner {
       partner_[pair.a] = pair.b;
       partner_[pair.b] = pair.a;
     }
+  }
+
+  /// Where what the line is a part of begins; rings begin with the line.
+  std::size_t begin_of(std::size_t line) const {
+    std::size_t end = 2 * line;
+    while (partner_[end] != kNone) {
+      end = partner_[end] ^ 1;
+      if (end == 2 * line) break;
+    }
+    return end;
   }
 
   /// The line that begins with this end.

@@ -129,6 +129,20 @@ TEST(PaintedLines, WhereLinesForkTheStraightestGoesOn) {
   } while (std::next_permutation(order.begin(), order.end()));
 }
 
+/// Of lane marks that overlap, the one of the lower index is in front.
+TEST(PaintedLines, StandWhereTheFirstOfTheirMarkingsStood) {
+  const PaintedLine across{{{15, -5, 0}, {15, 5, 0}}, 0.12f, MarkColor::yellow};
+  const PaintedLine along{{{0, 0.05f, 0}, {10, 0.05f, 0}}, 0.12f, MarkColor::blue};
+  const std::vector<PaintedLine> lines =
+      painted({white({{10, 0, 0}, {20, 0, 0}}), across, white({{0, 0, 0}, {10, 0, 0}}), white({{20, 0, 0}, {30, 0, 0}}),
+               along});
+  ASSERT_EQ(lines.size(), 3u);
+  EXPECT_EQ(lines[0].color, MarkColor::white);
+  EXPECT_TRUE(is_at(lines[0].points_m.front(), {0, 0, 0}));
+  EXPECT_EQ(lines[1].color, MarkColor::yellow);
+  EXPECT_EQ(lines[2].color, MarkColor::blue);
+}
+
 /// A ring of three arcs, one of them the other way round, that end beside each other; and one of a single marking.
 TEST(PaintedLines, ARingIsMitredAllRound) {
   constexpr int kCorners = 30;
