@@ -60,7 +60,8 @@ void append_road_edges(const RoadMap& map, std::vector<Strip>* strips_out) {
   flush();
 }
 
-/// Leaves one of the strips that are the same: roads of a junction that run over each other bring the same paint.
+/// Leaves one of the strips that are the same: roads of a junction that run over each other may bring one crosswalk
+/// each. Of lane marks, painted_lines() has left one.
 void drop_repeated(std::vector<Strip>* strips_inout) {
   using Key = std::array<float, 15>;
   std::set<Key> seen;

@@ -54,6 +54,16 @@ TEST(MapGeometry, WhatIsPaintedTwiceIsDrawnOnce) {
   EXPECT_GT(make_static_geometry(map, {.walls = false}).strips.size(), strips);
 }
 
+TEST(MapGeometry, ACrosswalkThatTwoRoadsBringIsDrawnOnce) {
+  test::RoadText road;
+  road.right = test::lane_of(-1, "driving", 4);
+  road.rest = R"(<objects><object id="2" type="crosswalk" s="50" t="0" length="4" width="3"/></objects>)";
+  RoadMap map = test::parse(road.text());
+  ASSERT_EQ(map.crosswalks.size(), 1u);
+  map.crosswalks.push_back(map.crosswalks.front());
+  EXPECT_EQ(count_of(make_static_geometry(map, {.walls = false}), StripKind::crosswalk), 4);
+}
+
 TEST(MapGeometry, MarksHaveTheColourOfTheFile) {
   std::vector<float> reds;
   for (const char* color : {"white", "yellow", "red", "green", "blue", "orange", "violet", "black"}) {
