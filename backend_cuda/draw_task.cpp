@@ -56,8 +56,6 @@ Scratch large_sizes(int pieces, int heads, std::size_t agents) {
   // clipped.
   Scratch sizes;
   sizes.max_faces = std::max(1, pieces + 3 * static_cast<int>(std::min<std::size_t>(agents, kMaxWorldAgents)));
-  sizes.max_visible = sizes.max_quads = sizes.max_faces;
-  sizes.max_lights = std::max(1, heads);
   sizes.max_edges = 9 * sizes.max_faces + kMaxPolygonCorners * heads;
   return sizes;
 }

@@ -28,7 +28,7 @@ constexpr int kPoolFaces = 320, kPoolEdges = 1472;
 // work, do not count.
 constexpr std::size_t kViewsAtOnce = 1024;
 
-// Owns what a launch's blocks work in.
+// Owns what the blocks of the last launch work in.
 class ScratchBuffers {
  public:
   ScratchBuffers() = default;
@@ -37,17 +37,15 @@ class ScratchBuffers {
       : scratch_(sizes),
         faces_(count(sizes.blocks, sizes.max_faces)),
         edges_(count(sizes.blocks, sizes.max_edges)),
-        quads_(count(sizes.blocks, sizes.max_quads)),
         bytes_(static_cast<std::size_t>(sizes.blocks) * bytes_per_block) {
     scratch_.faces = faces_.data();
     scratch_.edges = edges_.data();
-    scratch_.quads = quads_.data();
     scratch_.bytes = bytes_.data();
   }
   const cuda::Scratch& view() const { return scratch_; }
   static std::size_t block_bytes(const cuda::Scratch& sizes, std::size_t bytes_per_block) {
     return count(1, sizes.max_faces) * sizeof(ScreenFace) + count(1, sizes.max_edges) * sizeof(PolygonEdge) +
-           count(1, sizes.max_quads) * sizeof(cuda::Quad) + bytes_per_block;
+           bytes_per_block;
   }
 
  private:
@@ -57,7 +55,6 @@ class ScratchBuffers {
   cuda::Scratch scratch_;
   DeviceBuffer<ScreenFace> faces_;
   DeviceBuffer<PolygonEdge> edges_;
-  DeviceBuffer<cuda::Quad> quads_;
   DeviceBuffer<unsigned char> bytes_;
 };
 
@@ -66,21 +63,37 @@ class PoolBuffers {
  public:
   PoolBuffers() = default;
   explicit PoolBuffers(std::size_t images)
-      : faces_(images * kPoolFaces), edges_(images * kPoolEdges), images_(images), lists_(3 * images) {}
+      : faces_(images * kPoolFaces),
+        edges_(images * kPoolEdges),
+        images_(images),
+        makings_(images),
+        batches_(images * kBatches),
+        lists_(3 * images) {}
   /// Sets where a task finds the pool and lists images.
   void serve(cuda::DrawTask* task_out) const {
-    task_out->pool = {faces_.data(), edges_.data(), images_.data(), static_cast<int32_t>(faces_.size()),
-                      static_cast<int32_t>(edges_.size())};
+    task_out->pool = {faces_.data(),
+                      edges_.data(),
+                      images_.data(),
+                      makings_.data(),
+                      batches_.data(),
+                      static_cast<int32_t>(faces_.size()),
+                      static_cast<int32_t>(edges_.size()),
+                      static_cast<int32_t>(batches_.size())};
     for (std::size_t i = 0; i < 2; ++i) task_out->postponed_images[i] = lists_.data() + i * images_.size();
     task_out->overflow_images = lists_.data() + 2 * images_.size();
   }
+  // As many as there is room for faces of; of each image the last one may not be full.
+  static constexpr int kBatches = kPoolFaces / cuda::FaceBatch::kEntries + 1;
   static constexpr std::size_t kImageBytes = kPoolFaces * sizeof(ScreenFace) + kPoolEdges * sizeof(PolygonEdge) +
-                                             sizeof(cuda::GatheredImage) + 3 * sizeof(int32_t);
+                                             sizeof(cuda::GatheredImage) + sizeof(cuda::FaceMaking) +
+                                             kBatches * sizeof(cuda::FaceBatch) + 3 * sizeof(int32_t);
 
  private:
   DeviceBuffer<ScreenFace> faces_;
   DeviceBuffer<PolygonEdge> edges_;
   DeviceBuffer<cuda::GatheredImage> images_;
+  DeviceBuffer<cuda::FaceMaking> makings_;
+  DeviceBuffer<cuda::FaceBatch> batches_;
   DeviceBuffer<int32_t> lists_;
 };
 
@@ -164,7 +177,7 @@ class CudaRenderer final : public Renderer {
     for (int32_t left = task.num_views; left > 0; left -= task.num_views, task.first_view += task.num_views) {
       task.num_views = std::min(left, views_at_once);
       PICTURA_CUDA(cudaMemsetAsync(counters_.data(), 0, sizeof(cuda::DrawCounters), on_stream));
-      PICTURA_CUDA(cuda::launch_draw(library_.kernels(), task, gather_.view(), large_.view(), processors_, on_stream));
+      PICTURA_CUDA(cuda::launch_draw(library_.kernels(), task, large_.view(), processors_, on_stream));
     }
   }
 
@@ -219,23 +232,17 @@ class CudaRenderer final : public Renderer {
     const cuda::Scratch& had = large_.view();
     const std::size_t most_views = std::max(most_views_, std::min(views, kViewsAtOnce));
     if (most_views == most_views_ && large.max_faces == had.max_faces && large.max_edges == had.max_edges) return;
-    cuda::Scratch gather = cuda::gather_scratch(processors_);
     const std::size_t large_bytes = cuda::large_block_bytes(large);
-    const cuda::ScratchNeeds needs{.small_blocks = gather.blocks,
-                                   .large_blocks = kLargeBlocks,
-                                   .small_block_bytes = ScratchBuffers::block_bytes(gather, 0),
+    const cuda::ScratchNeeds needs{.large_blocks = kLargeBlocks,
                                    .large_block_bytes = ScratchBuffers::block_bytes(large, large_bytes),
                                    .views = most_views,
                                    .view_bytes = cameras_.size() * PoolBuffers::kImageBytes};
     plan_ = cuda::plan_scratch(needs, config_.max_scratch_bytes);
     most_views_ = most_views;
-    gather.blocks = plan_.small_blocks;
     large.blocks = plan_.large_blocks;
     // Released before it is replaced, or both would count.
-    gather_ = ScratchBuffers();
     large_ = ScratchBuffers();
     pool_ = PoolBuffers();
-    gather_ = ScratchBuffers(gather, 0);
     large_ = ScratchBuffers(large, large_bytes);
     pool_ = PoolBuffers(plan_.views * cameras_.size());
   }
@@ -262,7 +269,7 @@ class CudaRenderer final : public Renderer {
   int processors_ = 0, most_pieces_ = 0, most_heads_ = 0;
   std::size_t most_agents_ = 0, most_views_ = 0;
   cuda::ScratchPlan plan_;
-  ScratchBuffers gather_, large_;
+  ScratchBuffers large_;
   PoolBuffers pool_;
   DeviceBuffer<cuda::DrawCounters> counters_;
   MappedValue<cuda::Fault> fault_;

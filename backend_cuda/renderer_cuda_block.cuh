@@ -31,13 +31,12 @@ struct WarpState {
 struct BlockState {
   GatheredImage shown;  // what is drawn
   Scratch scratch;      // this block's
+  ScreenFace* faces;    // of this image
+  PolygonEdge* edges;   // of all images in the pool
   // While faces are gathered.
   ViewState view;
-  ImageSetting setting;
-  ScreenFace* faces;   // of this image
-  PolygonEdge* edges;  // of all images in the pool
-  int32_t num_visible, num_quads, num_lights, num_faces, max_faces, num_edges, max_edges, overflow, pool_is_full,
-      usable;
+  FaceMaking making;
+  int32_t num_batches, num_faces, num_edges, overflow, usable;
   // While pixels are drawn.
   int32_t num_rows, num_candidates, num_fragments, num_drawn, next_batch, image;
   int32_t sum_of_warp[2][kMaxWarps];
@@ -56,7 +55,7 @@ __device__ inline void sync_block() {
   __syncthreads();
 }
 
-// The next number of a counter in shared memory, for a warp.
+// The next number of a counter, for a warp.
 __device__ inline int next_of(int32_t* counter) {
   int next = 0;
   if (lane_index() == 0) next = atomicAdd(counter, 1);

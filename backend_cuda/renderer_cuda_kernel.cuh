@@ -94,36 +94,90 @@ __device__ inline int32_t images_of_round(const DrawTask& task) {
 __device__ inline int32_t image_of_round(const DrawTask& task, int32_t i) {
   return task.round_index == 0 ? i : task.postponed_images[(task.round_index - 1) % 2][i];
 }
+
+// Leaves an image for which the pool has no room to the next round.
 __device__ inline void postpone(const DrawTask& task, int32_t image) {
+  if (task.round_index + 1 == kRounds) {
+    leave_to_last(task, image);
+    return;
+  }
   const int32_t place = atomicAdd(&task.counters->rounds[task.round_index].postponed, 1);
   task.postponed_images[task.round_index % 2][place] = image;
 }
 
+// Takes room for the faces of an image of which so many things may show, and tells the later launches of it. One thread.
+__device__ inline void take_face_room(const DrawTask& task, int32_t image, int32_t listed, bool is_whole) {
+  BlockState* state = block_state();
+  FaceMaking* making = &state->making;
+  GatheredImage* out = task.pool.images + image;
+  *out = {.face_count = kNotGathered};
+  if (listed > kMostMarkedFaces) {
+    leave_to_last(task, image);
+    return;
+  }
+  DrawCounters::Round* round = &task.counters->rounds[task.round_index];
+  const int32_t face_begin = is_whole ? atomicAdd(&round->faces, listed) : task.pool.max_faces;
+  if (face_begin + listed > task.pool.max_faces || !is_whole) {
+    postpone(task, image);
+    return;
+  }
+  making->faces = task.pool.faces + face_begin;
+  making->edges = task.pool.edges;
+  making->num_faces = &out->face_count;
+  making->num_edges = &round->edges;
+  making->max_faces = listed;
+  making->max_edges = task.pool.max_edges;
+  *out = image_of(*state, face_begin, 0);
+}
+
 extern "C" __global__ void __launch_bounds__(kGatherThreads, kGatherBlocksPerProcessor)
-    pictura_gather(const __grid_constant__ DrawTask task, const __grid_constant__ Scratch scratch) {
-  take_scratch(scratch);
-  const SmallGatherMemory memory = SmallGatherMemory::current();
-  BlockState* state = memory.state;
+    pictura_cull(const __grid_constant__ DrawTask task) {
+  BlockState* state = block_state();
+  GatherRoom* room = gather_room();
+  DrawCounters::Round* round = &task.counters->rounds[task.round_index];
+  const int32_t num_images = images_of_round(task);
   PICTURA_KEEP_LOOP
   for (;;) {
-    const int32_t i = next_of_round(&task.counters->rounds[task.round_index].next_gathered, images_of_round(task));
-    if (i < 0) return;
+    const int32_t i = next_of(&round->next_culled);
+    if (i >= num_images) return;
     const int32_t image = image_of_round(task, i), camera = camera_of(task, image);
-    const bool gathered = gather(memory, task, view_of(task, image), camera);
-    if (threadIdx.x != 0) continue;
-    GatheredImage* out = task.pool.images + image;
-    if (gathered && state->num_faces <= kMostMarkedFaces) {
-      *out = state->shown;
-    } else if (!state->usable) {
-      *out = {.width_px = width_px(task.cameras[camera].camera)};  // black
-    } else {
-      *out = {.face_count = -1};
-      if (state->pool_is_full != 0 && task.round_index + 1 < kRounds) {
-        postpone(task, image);
-      } else {
-        leave_to_last(task, image);
-      }
+    if (lane_index() == 0) state->usable = set_image(state, task, view_of(task, image), camera) ? 1 : 0;
+    __syncwarp();
+    if (state->usable == 0) {
+      if (lane_index() == 0) task.pool.images[image] = {.width_px = width_px(task.cameras[camera].camera)};  // black
+      continue;
     }
+    EntryList list(room->entries, {task.pool.batches, &round->batches, task.pool.max_batches}, image);
+    cull(state, task, room, &list);
+    if (lane_index() == 0) take_face_room(task, image, list.total(), list.is_whole());
+    __syncwarp();
+    copy_whole(task.pool.makings + image, state->making);
+    __syncwarp();
+  }
+}
+
+extern "C" __global__ void __launch_bounds__(kGatherThreads, kGatherBlocksPerProcessor)
+    pictura_gather(const __grid_constant__ DrawTask task) {
+  BlockState* state = block_state();
+  ClipRoom* room = &gather_room()->clip;
+  set_light_corners(room);
+  DrawCounters::Round* round = &task.counters->rounds[task.round_index];
+  const int32_t num_batches = min_of(round->batches, task.pool.max_batches);
+  PICTURA_KEEP_LOOP
+  for (;;) {
+    const int32_t i = next_of(&round->next_batch);
+    if (i >= num_batches) return;
+    const int32_t image = task.pool.batches[i].image;
+    int32_t* face_count = &task.pool.images[image].face_count;
+    // Others may give the image up meanwhile.
+    if (__shfl_sync(kAllLanes, *face_count, 0) < 0) continue;
+    copy_whole(&state->making, task.pool.makings[image]);
+    __syncwarp();
+    if (!make_faces(state->making, room, task.pool.batches[i].entries[lane_index()]) && lane_index() == 0 &&
+        atomicMin(face_count, kNotGathered) >= 0) {
+      postpone(task, image);
+    }
+    __syncwarp();
   }
 }
 
@@ -156,7 +210,7 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
   PICTURA_KEEP_LOOP
   for (int32_t i = static_cast<int32_t>(blockIdx.x); i < count; i += static_cast<int32_t>(gridDim.x)) {
     const int32_t image = task.overflow_images[i], view = view_of(task, image), camera = camera_of(task, image);
-    if (!gather(LargeGatherMemory::current(), task, view, camera) ||
+    if (!gather(task, view, camera) ||
         !draw_image(LargeDrawMemory::current(), task, view, camera)) {
       if (threadIdx.x == 0) note_fault(task, view, kNoRoom);
     }
@@ -186,10 +240,10 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
     if (!in_range && threadIdx.x == 0) note_fault(task.draw, q, kBadQuery);
     PICTURA_KEEP_LOOP
     for (int32_t camera = 0; in_range && camera < num_cameras(task.draw); ++camera) {
-      if (!gather(LargeGatherMemory::current(), task.draw, view, camera)) continue;
+      if (!gather(task.draw, view, camera)) continue;
       const uint32_t number = thing_number(kAgentKind, agent - state->view.world_begin);
       const int num_faces = state->num_faces;
-      int y_begin = state->setting.camera.height_px, y_end = 0;
+      int y_begin = state->making.setting.camera.height_px, y_end = 0;
       PICTURA_KEEP_LOOP
       for (int i = 0; i < num_faces; ++i) {
         const ScreenFace& face = state->faces[i];

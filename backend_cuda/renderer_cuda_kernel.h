@@ -21,7 +21,7 @@ struct CameraSlot {
 };
 
 /// A piece's surroundings, for culling without a look at the piece itself.
-struct Ball {
+struct alignas(16) Ball {
   Vec3 center_m;
   float radius_m = 0;
 };
@@ -47,14 +47,6 @@ struct Fault {
 };
 enum FaultKind : int32_t { kBadWorld = 1, kBadGeometry, kBadPose, kTooManyAgents, kBadQuery, kNoRoom };
 
-/// A face of four corners, in camera coordinates.
-struct alignas(16) Quad {
-  Vec3 corner[4];
-  FacePlane plane;
-  Rgb color;
-  FaceOwner owner;
-};
-
 /// What an image shows: its faces in a pool, and what tells which of them is in front.
 struct GatheredImage {
   int32_t face_begin = 0, face_count = 0;  // -1: not gathered
@@ -64,21 +56,44 @@ struct GatheredImage {
   const AgentBox* agents = nullptr;  // the first of its world
 };
 
-/// Faces of many images.
+/// From what the faces of an image are made, and where they go. Of lights: the states of its world.
+struct alignas(16) FaceMaking {
+  ImageSetting setting;
+  const Strip* strips = nullptr;
+  const WallFace* walls = nullptr;
+  const LightHead* heads = nullptr;
+  const AgentBox* agents = nullptr;
+  const LightState* lights = nullptr;
+  ScreenFace* faces = nullptr;  // [max_faces] of this image
+  PolygonEdge* edges = nullptr;  // [max_edges]
+  int32_t* num_faces = nullptr;  // that there are
+  int32_t* num_edges = nullptr;  // that are taken; may outgrow max_edges
+  int32_t max_faces = 0, max_edges = 0;
+};
+
+/// Things of an image whose faces are to be made: entries of renderer_cuda_cull.cuh.
+struct FaceBatch {
+  static constexpr int kEntries = 32;
+  uint32_t entries[kEntries];
+  int32_t image;
+};
+
+/// Faces of many images, and what is known of those images before.
 struct FacePool {
   ScreenFace* faces = nullptr;
   PolygonEdge* edges = nullptr;
   GatheredImage* images = nullptr;  // [images]
-  int32_t max_faces = 0, max_edges = 0;
+  FaceMaking* makings = nullptr;    // [images]
+  FaceBatch* batches = nullptr;
+  int32_t max_faces = 0, max_edges = 0, max_batches = 0;
 };
 
-/// Memory of the blocks of a launch, and how much each of them has.
+/// Memory of the blocks of the last launch, and how much each of them has.
 struct Scratch {
   ScreenFace* faces = nullptr;     // [blocks][max_faces]
   PolygonEdge* edges = nullptr;    // [blocks][max_edges]
-  Quad* quads = nullptr;           // [blocks][max_quads]
   unsigned char* bytes = nullptr;  // [blocks][large_bytes()]
-  int32_t blocks = 0, max_visible = 0, max_quads = 0, max_lights = 0, max_faces = 0, max_edges = 0;
+  int32_t blocks = 0, max_faces = 0, max_edges = 0;
 };
 
 /// Images are gathered and drawn in rounds: those for which the pool had no room left are postponed to the next one.
@@ -87,8 +102,8 @@ constexpr int kRounds = 3;
 /// What the blocks of a batch's launches count together; 0 before.
 struct DrawCounters {
   struct Round {
-    int32_t next_gathered = 0, next_drawn = 0;  // images
-    int32_t faces = 0, edges = 0;               // of the pool that are taken
+    int32_t next_culled = 0, next_batch = 0, next_drawn = 0;
+    int32_t batches = 0, faces = 0, edges = 0;  // of the pool that are taken
     int32_t postponed = 0;                      // images
   } rounds[kRounds];
   int32_t overflow = 0;  // images left to the last launch

@@ -25,44 +25,41 @@ cudaError_t allow_shared(const void* kernel, std::size_t bytes) {
 }  // namespace
 
 KernelSet ahead_of_time_kernels() {
-  return {reinterpret_cast<const void*>(pictura_gather), reinterpret_cast<const void*>(pictura_draw),
-          reinterpret_cast<const void*>(pictura_draw_overflow), reinterpret_cast<const void*>(pictura_visibility)};
+  return {reinterpret_cast<const void*>(pictura_cull), reinterpret_cast<const void*>(pictura_gather),
+          reinterpret_cast<const void*>(pictura_draw), reinterpret_cast<const void*>(pictura_draw_overflow),
+          reinterpret_cast<const void*>(pictura_visibility)};
 }
 
 cudaError_t prepare_kernels(const KernelSet& kernels) {
-  const cudaError_t status = allow_shared(kernels.gather, gather_bytes());
-  return status == cudaSuccess ? allow_shared(kernels.draw, draw_bytes()) : status;
-}
-
-Scratch gather_scratch(int processors) {
-  Scratch scratch;
-  scratch.max_quads = kGatherQuads;
-  scratch.blocks = kGatherBlocksPerProcessor * processors;
-  return scratch;
+  return allow_shared(kernels.draw, draw_bytes());
 }
 
 std::size_t large_block_bytes(const Scratch& large) { return large_bytes(large); }
 
-cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& gather, const Scratch& large,
-                        int processors, cudaStream_t stream) {
-  const int images = task.num_views * task.num_cameras;
-  const LaunchShape to_gather{min_of(images, gather.blocks), kGatherThreads, gather_bytes()};
+cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& large, int processors,
+                        cudaStream_t stream) {
+  const int images = task.num_views * task.num_cameras, gather_blocks = kGatherBlocksPerProcessor * processors;
+  const LaunchShape to_cull{min_of(images, gather_blocks), kGatherThreads, gather_bytes(kGatherThreads)};
+  const LaunchShape to_gather{min_of(task.pool.max_batches, gather_blocks), kGatherThreads, to_cull.shared_bytes};
   const LaunchShape to_draw{min_of(images, kDrawBlocksPerProcessor * processors), kDrawThreads, draw_bytes()};
   for (task.round_index = 0; task.round_index < kRounds; ++task.round_index) {
-    cudaError_t status = launch(kernels.gather, to_gather, stream, task, gather);
+    cudaError_t status = launch(kernels.cull, to_cull, stream, task);
+    if (status != cudaSuccess) return status;
+    status = launch(kernels.gather, to_gather, stream, task);
     if (status != cudaSuccess) return status;
     status = launch(kernels.draw, to_draw, stream, task);
     if (status != cudaSuccess) return status;
   }
-  return launch(kernels.draw_overflow, {min_of(images, large.blocks), kLargeThreads, state_bytes(kLargeThreads)},
+  return launch(kernels.draw_overflow, {min_of(images, large.blocks), kLargeThreads, gather_bytes(kLargeThreads)},
                 stream, task, large);
 }
 
 cudaError_t launch_visibility(const KernelSet& kernels, const VisibilityTask& task, const Scratch& large,
                               cudaStream_t stream) {
   if (task.num_queries == 0) return cudaSuccess;
-  return launch(kernels.visibility, {min_of(task.num_queries, large.blocks), kLargeThreads, state_bytes(kLargeThreads)},
-                stream, task, large);
+  return launch(kernels.visibility,
+                {min_of(task.num_queries, large.blocks), kLargeThreads, gather_bytes(kLargeThreads)}, stream, task,
+                large);
 }
 
 }  // namespace pictura::cuda

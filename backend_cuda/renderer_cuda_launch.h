@@ -12,11 +12,13 @@ namespace pictura::cuda {
 
 /// The kernels' handles: symbols of this program, or cudaKernel_t of code that was loaded.
 struct KernelSet {
+  const void* cull = nullptr;
   const void* gather = nullptr;
   const void* draw = nullptr;
   const void* draw_overflow = nullptr;
   const void* visibility = nullptr;
 };
+constexpr const char* kCullName = "pictura_cull";
 constexpr const char* kGatherName = "pictura_gather";
 constexpr const char* kDrawName = "pictura_draw";
 constexpr const char* kDrawOverflowName = "pictura_draw_overflow";
@@ -27,14 +29,12 @@ KernelSet ahead_of_time_kernels();
 /// What is to be done once before the first launch.
 cudaError_t prepare_kernels(const KernelSet& kernels);
 
-/// What the blocks that gather have room for, and how many of them a device of so many processors runs at once.
-Scratch gather_scratch(int processors);
 /// Bytes that a block of the last launch needs besides faces and edges.
 std::size_t large_block_bytes(const Scratch& large);
 
-/// Draws all images: two launches for each round, and one more.
-cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& gather, const Scratch& large,
-                        int processors, cudaStream_t stream);
+/// Draws all images: three launches for each round, and one more.
+cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& large, int processors,
+                        cudaStream_t stream);
 cudaError_t launch_visibility(const KernelSet& kernels, const VisibilityTask& task, const Scratch& large,
                               cudaStream_t stream);
 

@@ -6,9 +6,8 @@
 
 namespace pictura::cuda {
 
-// A block that gathers faces. Nearly all images fit.
-constexpr int kGatherThreads = 64, kGatherBlocksPerProcessor = 12;
-constexpr int kGatherVisible = 2560, kGatherQuads = 256, kGatherLights = 256;
+// A block that gathers faces: a warp, as many of them as a processor takes.
+constexpr int kGatherThreads = 32, kGatherBlocksPerProcessor = 32;
 // A block that draws them. What has more fragments or pixels is drawn in parts.
 constexpr int kDrawThreads = 512, kDrawBlocksPerProcessor = 2;
 constexpr int kDrawPixels = 96 * 54, kDrawFragments = 2304;
@@ -17,15 +16,6 @@ constexpr int kLargeThreads = 128, kLargePixels = 1 << 14, kLargeFragments = 1 <
 
 // Faces that the mark of a pixel's nearest full face can tell apart in 32 bits.
 constexpr int kMarkedFaceBits = 11, kMostMarkedFaces = (1 << kMarkedFaceBits) - 1;
-
-/// What is listed while the faces of an image are gathered.
-struct GatherMemory {
-  BlockState* state;
-  uint32_t* visible;  // [max_visible] what may show
-  uint32_t* lights;   // [max_lights] ... that are lights
-  Quad* quads;        // [max_quads] that are to be clipped
-  int32_t max_visible, max_lights, max_quads;
-};
 
 /// What is kept while pixels are drawn. Index: of faces, pixels and fragments, 16 bits where they suffice. Word: two.
 template <typename Index_, typename Word_>
@@ -75,15 +65,7 @@ struct Layout {
   }
 };
 
-// Lays out what gathering lists from `bytes` on, and returns how many bytes that takes.
-__host__ __device__ inline size_t lay_out(GatherMemory* memory, unsigned char* bytes) {
-  Layout layout{bytes};
-  layout.place(&memory->visible, memory->max_visible);
-  layout.place(&memory->lights, memory->max_lights);
-  return layout.used;
-}
-
-// ... what drawing keeps. Rows lie where samples do later, candidates where what is free of fragments and their order
+// Lays out what drawing keeps from `bytes` on, and returns how many bytes that takes. Rows lie where samples do later, candidates where what is free of fragments and their order
 // do.
 template <typename Memory>
 __host__ __device__ size_t lay_out(Memory* memory, int max_pixels, int max_fragments, unsigned char* bytes) {
@@ -121,24 +103,6 @@ __host__ __device__ constexpr size_t state_bytes(int threads) {
 extern __shared__ __align__(16) unsigned char block_memory[];
 __device__ inline BlockState* block_state() { return reinterpret_cast<BlockState*>(block_memory); }
 
-/// In shared memory; faces go to the pool.
-struct SmallGatherMemory : GatherMemory {
-  static constexpr bool kUsesPool = true;
-  __host__ __device__ size_t place(unsigned char* bytes) {
-    max_visible = kGatherVisible;
-    max_lights = kGatherLights;
-    max_quads = kGatherQuads;
-    return lay_out(this, bytes);
-  }
-  __device__ static SmallGatherMemory current() {
-    SmallGatherMemory memory;
-    memory.place(block_memory + state_bytes(kGatherThreads));
-    memory.state = block_state();
-    memory.quads = memory.state->scratch.quads;
-    return memory;
-  }
-};
-
 /// In shared memory, at places that are known when the kernel is compiled.
 struct SmallDrawMemory : DrawMemory<uint16_t, uint32_t> {
   __host__ __device__ size_t place(unsigned char* bytes) { return lay_out(this, kDrawPixels, kDrawFragments, bytes); }
@@ -153,23 +117,11 @@ struct SmallDrawMemory : DrawMemory<uint16_t, uint32_t> {
 };
 static_assert(kMostMarkedFaces < 0xFFFF && kDrawFragments < 0xFFFF && kDrawPixels < 0x7FFF);
 
-/// In global memory. What drawing keeps lies where gathering has listed.
-struct LargeGatherMemory : GatherMemory {
-  static constexpr bool kUsesPool = false;
-  __host__ __device__ size_t place(const Scratch& sizes, unsigned char* bytes) {
-    max_visible = sizes.max_visible;
-    max_lights = sizes.max_lights;
-    max_quads = sizes.max_quads;
-    return lay_out(this, bytes);
-  }
-  __device__ static LargeGatherMemory current() {
-    LargeGatherMemory memory;
-    memory.state = block_state();
-    memory.place(memory.state->scratch, memory.state->scratch.bytes);
-    memory.quads = memory.state->scratch.quads;
-    return memory;
-  }
-};
+/// In global memory. What drawing keeps lies where gathering has left its batches, of which each warp may have one that
+/// is not full.
+__host__ __device__ inline int32_t max_large_batches(const Scratch& sizes) {
+  return sizes.max_faces / FaceBatch::kEntries + kLargeThreads / kWarpSize;
+}
 struct LargeDrawMemory : DrawMemory<uint32_t, unsigned long long> {
   __host__ __device__ size_t place(unsigned char* bytes) { return lay_out(this, kLargePixels, kLargeFragments, bytes); }
   __device__ static LargeDrawMemory current() {
@@ -182,12 +134,10 @@ struct LargeDrawMemory : DrawMemory<uint32_t, unsigned long long> {
   }
 };
 
-__host__ __device__ inline size_t gather_bytes() {
-  return state_bytes(kGatherThreads) + SmallGatherMemory().place(nullptr);
-}
 __host__ __device__ inline size_t draw_bytes() { return state_bytes(kDrawThreads) + SmallDrawMemory().place(nullptr); }
 __host__ __device__ inline size_t large_bytes(const Scratch& sizes) {
-  const size_t to_gather = LargeGatherMemory().place(sizes, nullptr), to_draw = LargeDrawMemory().place(nullptr);
+  const size_t to_gather = (static_cast<size_t>(max_large_batches(sizes)) * sizeof(FaceBatch) + 15) / 16 * 16;
+  const size_t to_draw = LargeDrawMemory().place(nullptr);
   return to_gather > to_draw ? to_gather : to_draw;
 }
 
@@ -197,8 +147,7 @@ __device__ inline void take_scratch(const Scratch& scratch) {
     Scratch own = scratch;
     own.faces += static_cast<size_t>(blockIdx.x) * static_cast<size_t>(scratch.max_faces);
     own.edges += static_cast<size_t>(blockIdx.x) * static_cast<size_t>(scratch.max_edges);
-    own.quads += static_cast<size_t>(blockIdx.x) * static_cast<size_t>(scratch.max_quads);
-    if (own.bytes) own.bytes += blockIdx.x * large_bytes(scratch);
+    own.bytes += blockIdx.x * large_bytes(scratch);
     block_state()->scratch = own;
   }
   sync_block();

@@ -18,18 +18,14 @@ std::size_t take(std::size_t wanted, std::size_t bytes_each, std::size_t share_b
 }  // namespace
 
 std::size_t bytes_of(const ScratchPlan& plan, const ScratchNeeds& needs) {
-  return static_cast<std::size_t>(plan.small_blocks) * needs.small_block_bytes +
-         static_cast<std::size_t>(plan.large_blocks) * needs.large_block_bytes + plan.views * needs.view_bytes;
+  return static_cast<std::size_t>(plan.large_blocks) * needs.large_block_bytes + plan.views * needs.view_bytes;
 }
 
 ScratchPlan plan_scratch(const ScratchNeeds& needs, std::size_t max_bytes) {
-  ScratchPlan plan{1, 1, 1};
+  ScratchPlan plan{1, 1};
   const std::size_t least = bytes_of(plan, needs);
   PICTURA_CHECK(least <= max_bytes, "renderer cuda: max_scratch_bytes: expected at least {}, got {}", least, max_bytes);
   std::size_t left = max_bytes - least;
-  // Nothing is drawn that is not gathered, so that comes first, but leaves a quarter to the others.
-  plan.small_blocks += static_cast<int>(
-      take(static_cast<std::size_t>(needs.small_blocks - 1), needs.small_block_bytes, left / 4 * 3, &left));
   plan.large_blocks += static_cast<int>(
       take(static_cast<std::size_t>(needs.large_blocks - 1), needs.large_block_bytes, left / 2, &left));
   plan.views += take(needs.views - 1, needs.view_bytes, left, &left);

@@ -7,21 +7,21 @@ namespace pictura::cuda {
 
 /// What would serve best.
 struct ScratchNeeds {
-  int small_blocks = 1, large_blocks = 1;  // that gather, and of the last launch
-  std::size_t small_block_bytes = 0, large_block_bytes = 0;
+  int large_blocks = 1;  // of the last launch
+  std::size_t large_block_bytes = 0;
   std::size_t views = 1, view_bytes = 0;  // of the batch, and what each of them takes
 };
 
 /// What there is room for.
 struct ScratchPlan {
-  int small_blocks = 0, large_blocks = 0;
+  int large_blocks = 0;
   std::size_t views = 0;  // drawn at once; batches of more are drawn in parts
 };
 
 std::size_t bytes_of(const ScratchPlan& plan, const ScratchNeeds& needs);
 
-/// As much of the needs as max_bytes hold, at least one of each: blocks that gather before those of the last launch,
-/// and before the rest of the views. Throws Error saying how many bytes one of each takes, where they do not fit.
+/// As much of the needs as max_bytes hold, at least one of each: blocks of the last launch for at most half of them, then
+/// views. Throws Error saying how many bytes one of each takes, where they do not fit.
 ScratchPlan plan_scratch(const ScratchNeeds& needs, std::size_t max_bytes);
 
 }  // namespace pictura::cuda

@@ -22,6 +22,15 @@ PICTURA_HD inline float inside_plane(const Frustum& f, int plane, Vec3 p) {
   }
 }
 
+/// ... those that it is outside of, a bit for each.
+PICTURA_HD inline unsigned planes_outside(const Frustum& f, Vec3 p) {
+  unsigned outside = 0;
+  for (int plane = 0; plane < kClipPlanes; ++plane) {
+    if (inside_plane(f, plane, p) < 0.0f) outside |= 1u << plane;
+  }
+  return outside;
+}
+
 /// The planes of the drawn volume that a face (camera coordinates) crosses, a bit for each; kOutside where all of it is
 /// outside of one.
 constexpr unsigned kOutside = ~0u;
@@ -29,14 +38,18 @@ PICTURA_HD inline unsigned planes_crossed(const Frustum& f, const Vec3* corners,
   unsigned outside_of_any = 0, outside_of_all = ~0u;
   PICTURA_UNROLL_FOUR
   for (int i = 0; i < count; ++i) {
-    unsigned outside = 0;
-    for (int plane = 0; plane < kClipPlanes; ++plane) {
-      if (inside_plane(f, plane, corners[i]) < 0.0f) outside |= 1u << plane;
-    }
+    const unsigned outside = planes_outside(f, corners[i]);
     outside_of_any |= outside;
     outside_of_all &= outside;
   }
   return outside_of_all != 0 ? kOutside : outside_of_any;
+}
+
+/// Where the side from one corner to the next crosses a plane, of which they are that far inside. Computed from the inner
+/// corner, whichever way round: faces that share an edge get the same point.
+PICTURA_HD inline Vec3 cut_between(Vec3 a, float a_inside, Vec3 b, float b_inside) {
+  return a_inside >= 0.0f ? a + (b - a) * (a_inside / (a_inside - b_inside))
+                          : b + (a - b) * (b_inside / (b_inside - a_inside));
 }
 
 /// Clips a convex face to the near plane and the guard band. Writes to polygon_out (camera coordinates, room for
@@ -66,11 +79,8 @@ PICTURA_HD inline int clip_face(const Frustum& f, const Vec3* corners, int count
     for (int i = 0; i < count && kept + 2 <= kMaxPolygonCorners; ++i) {
       const Vec3 current = from[i];
       const float current_inside = inside_plane(f, plane, current);
-      // A cut is computed from its inner corner, whichever way round: faces that share an edge get the same point.
-      if (previous_inside >= 0.0f && current_inside < 0.0f) {
-        to[kept++] = previous + (current - previous) * (previous_inside / (previous_inside - current_inside));
-      } else if (previous_inside < 0.0f && current_inside >= 0.0f) {
-        to[kept++] = current + (previous - current) * (current_inside / (current_inside - previous_inside));
+      if ((previous_inside >= 0.0f) != (current_inside >= 0.0f)) {
+        to[kept++] = cut_between(previous, previous_inside, current, current_inside);
       }
       if (current_inside >= 0.0f) to[kept++] = current;
       previous = current;
@@ -145,6 +155,31 @@ struct alignas(16) ScreenFace {
   int32_t edge_begin = 0;
 };
 
+/// The pixels of an image that a polygon may touch whose corners lie between low and high on screen.
+PICTURA_HD inline PixelBox pixel_box(const PinholeCamera& camera, Vec2 low, Vec2 high) {
+  return {max_of(static_cast<int>(floorf(low.x)), 0), min_of(static_cast<int>(floorf(high.x)) + 1, camera.width_px),
+          max_of(static_cast<int>(floorf(low.y)), 0), min_of(static_cast<int>(floorf(high.y)) + 1, camera.height_px)};
+}
+PICTURA_HD inline bool is_empty(const PixelBox& box) { return box.x_begin >= box.x_end || box.y_begin >= box.y_end; }
+
+/// Polygons of less than half of this are nothing.
+constexpr float kLeastTwiceArea_px2 = 1e-6f;
+
+/// Sets what the plane of a face and the range of its corners' depths say of its depth.
+PICTURA_HD inline void set_depth(const PinholeCamera& camera, const FacePlane& plane, float depth_low, float depth_high,
+                                 ScreenFace* face_out) {
+  // normal . p = offset on the face's plane, and p = depth * ray: inverse depth is linear in the ray.
+  const float scale = plane.offset != 0.0f ? 1.0f / plane.offset : 0.0f;
+  face_out->inverse_depth_x = plane.normal.x * scale / camera.focal_x_px;
+  face_out->inverse_depth_y = plane.normal.y * scale / camera.focal_y_px;
+  face_out->inverse_depth_0 = plane.normal.z * scale - face_out->inverse_depth_x * camera.center_x_px -
+                              face_out->inverse_depth_y * camera.center_y_px;
+  const float norm = length(plane.normal);
+  face_out->plane_distance_m = norm > 0.0f ? fabsf(plane.offset) / norm : 0.0f;
+  face_out->inverse_depth_low = 1.0f / depth_high;
+  face_out->inverse_depth_high = 1.0f / depth_low;
+}
+
 /// Projects a clipped face (camera coordinates) of at most kRoom corners, which lies in `plane`. Calls
 /// keep_edge(0, edge), keep_edge(1, edge), ... for its edges, at most `count`, and sets all of face_out but edge_begin.
 /// False where it covers nothing.
@@ -162,14 +197,12 @@ PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Vec3*
     depth_low = min_of(depth_low, polygon[i].z);
     depth_high = max_of(depth_high, polygon[i].z);
   }
-  const PixelBox box{
-      max_of(static_cast<int>(floorf(low.x)), 0), min_of(static_cast<int>(floorf(high.x)) + 1, camera.width_px),
-      max_of(static_cast<int>(floorf(low.y)), 0), min_of(static_cast<int>(floorf(high.y)) + 1, camera.height_px)};
-  if (box.x_begin >= box.x_end || box.y_begin >= box.y_end) return false;
+  const PixelBox box = pixel_box(camera, low, high);
+  if (is_empty(box)) return false;
   float twice_area = 0.0f;
   PICTURA_UNROLL_FOUR
   for (int i = 1; i + 1 < count; ++i) twice_area += cross(corner[i] - corner[0], corner[i + 1] - corner[0]);
-  if (fabsf(twice_area) < 1e-6f) return false;
+  if (fabsf(twice_area) < kLeastTwiceArea_px2) return false;
 
   const bool turns_right = twice_area > 0.0f;
   int edges = 0;
@@ -182,17 +215,7 @@ PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Vec3*
   face_out->edge_count = static_cast<uint8_t>(edges);
   face_out->box = box;
   face_out->color = color;
-
-  // normal . p = offset on the face's plane, and p = depth * ray: inverse depth is linear in the ray.
-  const float scale = plane.offset != 0.0f ? 1.0f / plane.offset : 0.0f;
-  face_out->inverse_depth_x = plane.normal.x * scale / camera.focal_x_px;
-  face_out->inverse_depth_y = plane.normal.y * scale / camera.focal_y_px;
-  face_out->inverse_depth_0 = plane.normal.z * scale - face_out->inverse_depth_x * camera.center_x_px -
-                              face_out->inverse_depth_y * camera.center_y_px;
-  const float norm = length(plane.normal);
-  face_out->plane_distance_m = norm > 0.0f ? fabsf(plane.offset) / norm : 0.0f;
-  face_out->inverse_depth_low = 1.0f / depth_high;
-  face_out->inverse_depth_high = 1.0f / depth_low;
+  set_depth(camera, plane, depth_low, depth_high, face_out);
   return true;
 }
 

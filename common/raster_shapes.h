@@ -30,11 +30,15 @@ PICTURA_HD inline FacePlane face_plane(const Vec3* corners, int count) {
 
 /// Brightness of a face: the mean over its corners of their depth clamped to the visible range. A face that has faded
 /// to 0 is not drawn, and so hides nothing.
+PICTURA_HD inline float fading_depth_m(Vec3 corner) { return clamp(corner.z, 0.0f, kVisibleRange_m); }
+PICTURA_HD inline float brightness_of_sum(float depths_m, int count) {
+  return depth_brightness(depths_m / static_cast<float>(count));
+}
 PICTURA_HD inline float face_brightness(const Vec3* corners, int count) {
   float sum_m = 0.0f;
   PICTURA_UNROLL_FOUR
-  for (int i = 0; i < count; ++i) sum_m += clamp(corners[i].z, 0.0f, kVisibleRange_m);
-  return depth_brightness(sum_m / static_cast<float>(count));
+  for (int i = 0; i < count; ++i) sum_m += fading_depth_m(corners[i]);
+  return brightness_of_sum(sum_m, count);
 }
 
 /// Colour of an agent's face before it fades; the debug palette pales halted agents and greys parked ones.
@@ -143,24 +147,37 @@ PICTURA_HD inline bool light_is_visible(const LightHead& head, LightState state,
   return ahead_m > 0.0f && ahead_m >= head.cos_half_angle * length(to_eye);
 }
 
+/// The polygon that lights are drawn as: walk.next() is the next corner, from the disk's middle to the left and up.
+class LightCorners {
+ public:
+  PICTURA_HD LightCorners()
+      : step_(sincos_of(kTwoPi / kLightSides)),
+        // That of the regular polygon with the disk's area.
+        radius_m_(kLightRadius_m * sqrtf(kTwoPi / (kLightSides * step_.sin))) {}
+  PICTURA_HD Vec2 next() {
+    const Vec2 corner_m{radius_m_ * at_.x, radius_m_ * at_.y};
+    at_ = {at_.x * step_.cos - at_.y * step_.sin, at_.y * step_.cos + at_.x * step_.sin};
+    return corner_m;
+  }
+
+ private:
+  SinCos step_;
+  float radius_m_;
+  Vec2 at_{1.0f, 0.0f};
+};
+/// ... of a head, in the world.
+PICTURA_HD inline Vec3 light_corner(const LightHead& head, Vec2 corner_m) {
+  const Vec2 ground = head.position_m.xy() + left_normal(head.facing) * corner_m.x;
+  return {ground.x, ground.y, head.position_m.z + corner_m.y};
+}
+
 /// The disk of a lit head.
 template <typename Emit>
 PICTURA_HD inline void light_faces(const LightHead& head, LightState state, const PinholeCamera& camera, Emit&& emit) {
   if (!light_is_visible(head, state, camera.position_m)) return;
-  // Radius of the regular polygon with the disk's area.
-  const SinCos step = sincos_of(kTwoPi / kLightSides);
-  const float radius_m = kLightRadius_m * sqrtf(kTwoPi / (kLightSides * step.sin));
-  const Vec2 left = left_normal(head.facing);
   Vec3 corners[kLightSides];
-  float c = 1.0f, s = 0.0f;
-  PICTURA_KEEP_LOOP
-  for (int i = 0; i < kLightSides; ++i) {
-    const Vec2 ground = head.position_m.xy() + left * (radius_m * c);
-    corners[i] = to_camera(camera, {ground.x, ground.y, head.position_m.z + radius_m * s});
-    const float next_c = c * step.cos - s * step.sin;
-    s = s * step.cos + c * step.sin;
-    c = next_c;
-  }
+  LightCorners walk;
+  for (Vec3& corner : corners) corner = to_camera(camera, light_corner(head, walk.next()));
   const float brightness = face_brightness(corners, kLightSides);
   if (brightness > 0.0f) {
     emit(corners, kLightSides, face_plane(corners, kLightSides), light_color(state) * brightness);

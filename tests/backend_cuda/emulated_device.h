@@ -198,6 +198,13 @@ inline unsigned __reduce_or_sync(unsigned, unsigned bits) {
   for (int lane = 0; lane < 32; ++lane) all |= static_cast<unsigned>(values[lane]);
   return all;
 }
+inline int __reduce_min_sync(unsigned, int value) {
+  const uint64_t* values =
+      pictura::emulation::Block::current()->exchange("reduce_min", pictura::emulation::bits_of(value));
+  for (int lane = 0; lane < 32; ++lane) value = std::min(value, pictura::emulation::value_of<int>(values[lane]));
+  return value;
+}
+inline int __reduce_max_sync(unsigned lanes, int value) { return ~__reduce_min_sync(lanes, ~value); }
 template <typename Value>
 Value __shfl_sync(unsigned, Value value, int from) {
   const uint64_t* values = pictura::emulation::Block::current()->exchange("shfl", pictura::emulation::bits_of(value));
@@ -214,6 +221,8 @@ Value __shfl_up_sync(unsigned, Value value, unsigned step) {
 
 inline int __popc(unsigned bits) { return std::popcount(bits); }
 inline int __ffs(int bits) { return bits == 0 ? 0 : std::countr_zero(static_cast<unsigned>(bits)) + 1; }
+inline int __float_as_int(float value) { return std::bit_cast<int>(value); }
+inline float __int_as_float(int bits) { return std::bit_cast<float>(bits); }
 inline float __uint_as_float(unsigned bits) { return std::bit_cast<float>(bits); }
 inline unsigned __float_as_uint(float value) { return std::bit_cast<unsigned>(value); }
 
@@ -224,6 +233,10 @@ Value atomicExch(Value* at, std::type_identity_t<Value> value) {
 template <typename Value>
 Value atomicAdd(Value* at, std::type_identity_t<Value> by) {
   return atomicExch(at, *at + by);
+}
+template <typename Value>
+Value atomicMin(Value* at, std::type_identity_t<Value> other) {
+  return atomicExch(at, std::min(*at, other));
 }
 template <typename Value>
 Value atomicMax(Value* at, std::type_identity_t<Value> other) {

@@ -14,6 +14,7 @@
 // After all else, because it gives the compiler's words other meanings.
 #include "pictura/tests/backend_cuda/emulated_device.h"
 // The kernels, under names of their own beside those that were compiled ahead of time.
+#define pictura_cull emulated_cull
 #define pictura_gather emulated_gather
 #define pictura_draw emulated_draw
 #define pictura_draw_overflow emulated_draw_overflow
@@ -51,7 +52,8 @@ class EmulatedRenderer final : public Renderer {
     Setup setup(*this, cuda::make_draw_task(config_, cameras_, scene, views, &images_out), scene);
     cuda::DrawTask& task = setup.task;
     for (task.round_index = 0; task.round_index < cuda::kRounds; ++task.round_index) {
-      launch(cuda::kGatherThreads, [&] { cuda::emulated_gather(task, setup.gather); });
+      launch(cuda::kGatherThreads, [&] { cuda::emulated_cull(task); });
+      launch(cuda::kGatherThreads, [&] { cuda::emulated_gather(task); });
       launch(cuda::kDrawThreads, [&] { cuda::emulated_draw(task); });
     }
     overflow_ = setup.counters.overflow;
@@ -87,12 +89,13 @@ class EmulatedRenderer final : public Renderer {
     cuda::DrawTask task;
     cuda::DrawCounters counters;
     cuda::Fault fault;
-    cuda::Scratch gather, large;
+    cuda::Scratch large;
     std::vector<ScreenFace> pool_faces, large_faces;
     std::vector<PolygonEdge> pool_edges, large_edges;
     std::vector<cuda::GatheredImage> images;
+    std::vector<cuda::FaceMaking> makings;
+    std::vector<cuda::FaceBatch> batches;
     std::vector<int32_t> overflow_images, postponed_images[2];
-    std::vector<cuda::Quad> gather_quads, large_quads;
     std::vector<uint64_t> large_words;
 
     Setup(const EmulatedRenderer& renderer, const cuda::DrawTask& draw, const SceneBatch& scene) : task(draw) {
@@ -106,9 +109,17 @@ class EmulatedRenderer final : public Renderer {
       pool_faces.resize(static_cast<std::size_t>(renderer.pool_faces_) * num_images);
       pool_edges.resize(8 * pool_faces.size());
       images.resize(num_images);
+      makings.resize(num_images);
+      batches.resize(pool_faces.size() / cuda::FaceBatch::kEntries + num_images);
       overflow_images.resize(num_images);
-      task.pool = {pool_faces.data(), pool_edges.data(), images.data(), static_cast<int32_t>(pool_faces.size()),
-                   static_cast<int32_t>(pool_edges.size())};
+      task.pool = {pool_faces.data(),
+                   pool_edges.data(),
+                   images.data(),
+                   makings.data(),
+                   batches.data(),
+                   static_cast<int32_t>(pool_faces.size()),
+                   static_cast<int32_t>(pool_edges.size()),
+                   static_cast<int32_t>(batches.size())};
       task.geometries = renderer.geometries_.data();
       task.num_geometries = static_cast<int32_t>(renderer.geometries_.size());
       task.counters = &counters;
@@ -119,18 +130,12 @@ class EmulatedRenderer final : public Renderer {
         task.postponed_images[i] = postponed_images[i].data();
       }
 
-      gather.blocks = large.blocks = kBlocks;
-      gather.max_quads = cuda::kGatherQuads;
-      gather_quads.resize(static_cast<std::size_t>(kBlocks * gather.max_quads));
-      gather.quads = gather_quads.data();
       large = cuda::large_sizes(pieces, heads, scene.agents.size());
       large_faces.resize(static_cast<std::size_t>(kBlocks * large.max_faces));
       large_edges.resize(static_cast<std::size_t>(kBlocks * large.max_edges));
-      large_quads.resize(static_cast<std::size_t>(kBlocks * large.max_quads));
       large_words.resize(kBlocks * cuda::large_bytes(large) / sizeof(uint64_t));
       large.faces = large_faces.data();
       large.edges = large_edges.data();
-      large.quads = large_quads.data();
       large.bytes = reinterpret_cast<unsigned char*>(large_words.data());
     }
     Setup(const Setup&) = delete;

@@ -1,0 +1,185 @@
+// Faces that cross the border of what is drawn, and lights, which have many corners: a warp makes one at a time, a lane
+// a corner, so that corners stay in registers. Values are those of clip_face and make_screen_face, sums in their order.
+#pragma once
+
+#include "pictura/backend_cuda/renderer_cuda_memory.cuh"
+
+namespace pictura::cuda {
+
+static_assert(kMaxPolygonCorners <= kWarpSize);
+
+/// A face of four corners, in camera coordinates.
+struct alignas(16) Quad {
+  Vec3 corner[4];
+  FacePlane plane;
+  Rgb color;
+  FaceOwner owner;
+};
+
+/// What the lanes of a warp hand each other, in shared memory.
+struct ClipRoom {
+  Quad quad;                         // of one lane, for all
+  float x[kWarpSize], y[kWarpSize], z[kWarpSize];
+  Vec2 light_corner_m[kLightSides];  // see LightCorners
+};
+
+// Stores a value by words of 16 bytes: by words of 4, the lanes of a warp would write a part of memory each.
+template <typename Value>
+__device__ void store_whole(Value* to, const Value& value) {
+  static_assert(sizeof(Value) % sizeof(uint4) == 0 && alignof(Value) >= sizeof(uint4));
+  constexpr int kWords = sizeof(Value) / sizeof(uint4);
+  uint4 words[kWords];
+  memcpy(words, &value, sizeof(Value));
+  for (int i = 0; i < kWords; ++i) reinterpret_cast<uint4*>(to)[i] = words[i];
+}
+
+// Copies a value, a lane each word of 16 bytes.
+template <typename Value>
+__device__ void copy_whole(Value* to, const Value& from) {
+  constexpr int kWords = sizeof(Value) / sizeof(uint4);
+  static_assert(sizeof(Value) % sizeof(uint4) == 0 && kWords <= kWarpSize);
+  if (lane_index() < kWords) reinterpret_cast<uint4*>(to)[lane_index()] = reinterpret_cast<const uint4*>(&from)[lane_index()];
+}
+
+/// A face whose corners the lanes hold, one each; the rest is the same in all lanes.
+struct SharedFace {
+  Vec3 corner;  // of lanes below count
+  int count = 0;
+  FacePlane plane;
+  Rgb color;
+  FaceOwner owner;
+};
+
+__device__ inline Vec3 corner_of(Vec3 corner, int lane) {
+  return {__shfl_sync(kAllLanes, corner.x, lane), __shfl_sync(kAllLanes, corner.y, lane),
+          __shfl_sync(kAllLanes, corner.z, lane)};
+}
+
+// Sum of the values of lanes [begin, end), one after the other.
+__device__ inline float sum_in_order(float value, int begin, int end) {
+  float sum = 0.0f;
+  PICTURA_KEEP_LOOP
+  for (int lane = begin; lane < end; ++lane) sum += __shfl_sync(kAllLanes, value, lane);
+  return sum;
+}
+
+// The least and the greatest of the lanes' values, by integers of the same order.
+__device__ inline int32_t in_order(int32_t bits) { return bits ^ (bits >> 31 & 0x7FFFFFFF); }
+__device__ inline float least_of(float value) {
+  return __int_as_float(in_order(__reduce_min_sync(kAllLanes, in_order(__float_as_int(value)))));
+}
+__device__ inline float greatest_of(float value) {
+  return __int_as_float(in_order(__reduce_max_sync(kAllLanes, in_order(__float_as_int(value)))));
+}
+
+// Hands the quad of a lane to all.
+__device__ inline SharedFace share_quad(ClipRoom* room, int owner, const Quad& quad) {
+  __syncwarp();
+  if (lane_index() == owner) room->quad = quad;
+  __syncwarp();
+  return {room->quad.corner[lane_index() & 3], 4, room->quad.plane, room->quad.color, room->quad.owner};
+}
+
+// The disk of a lit head; of no corners where it has faded to black.
+__device__ inline SharedFace make_light(const FaceMaking& making, const ClipRoom& room, int32_t index) {
+  const LightHead head = making.heads[index];
+  const int lane = lane_index();
+  SharedFace face;
+  face.corner = to_camera(making.setting.camera, light_corner(head, room.light_corner_m[min_of(lane, kLightSides - 1)]));
+  const float brightness = brightness_of_sum(sum_in_order(fading_depth_m(face.corner), 0, kLightSides), kLightSides);
+  const Vec3 first = corner_of(face.corner, 0), next = corner_of(face.corner, (lane + 1) % kWarpSize);
+  const Vec3 normal = cross(face.corner - first, next - first);
+  face.plane.normal = {sum_in_order(normal.x, 1, kLightSides - 1), sum_in_order(normal.y, 1, kLightSides - 1),
+                       sum_in_order(normal.z, 1, kLightSides - 1)};
+  face.plane.offset = dot(face.plane.normal, first);
+  face.color = light_color(making.lights[head.signal]) * brightness;
+  face.owner = light_owner(index);
+  face.count = brightness > 0.0f ? kLightSides : 0;
+  return face;
+}
+
+// clip_face of a face whose corners the lanes hold.
+__device__ inline void clip(const Frustum& f, ClipRoom* room, SharedFace* face_inout) {
+  const int lane = lane_index();
+  Vec3 corner = face_inout->corner;
+  int count = face_inout->count;
+  const unsigned outside = lane < count ? planes_outside(f, corner) : 0;
+  const bool is_outside = __reduce_or_sync(kAllLanes, lane < count ? ~outside : 0u) != ~0u;
+  unsigned crossed = is_outside ? 0u : __reduce_or_sync(kAllLanes, outside);
+  if (is_outside) count = 0;
+  PICTURA_KEEP_LOOP
+  for (; crossed != 0 && count > 0; crossed &= crossed - 1) {
+    const int plane = __ffs(static_cast<int>(crossed)) - 1, before = lane > 0 ? lane - 1 : count - 1;
+    const Vec3 previous = corner_of(corner, before);
+    const float inside = inside_plane(f, plane, corner), previous_inside = __shfl_sync(kAllLanes, inside, before);
+    const bool stays = lane < count && inside >= 0.0f;
+    const bool is_cut = lane < count && (previous_inside >= 0.0f) != (inside >= 0.0f);
+    const unsigned cuts = __ballot_sync(kAllLanes, is_cut), staying = __ballot_sync(kAllLanes, stays);
+    const int place = __popc(cuts & lanes_below()) + __popc(staying & lanes_below());
+    // Only a face that is not quite convex could outgrow the room; it loses corners then.
+    const bool fits = place + 2 <= kMaxPolygonCorners;
+    auto keep = [&](int at, Vec3 p) {
+      room->x[at] = p.x;
+      room->y[at] = p.y;
+      room->z[at] = p.z;
+    };
+    if (is_cut && fits) keep(place, cut_between(previous, previous_inside, corner, inside));
+    if (stays && fits) keep(place + (is_cut ? 1 : 0), corner);
+    const unsigned fitting = __ballot_sync(kAllLanes, fits);
+    count = __popc(cuts & fitting) + __popc(staying & fitting);
+    if (count < 3) count = 0;
+    __syncwarp();
+    corner = {room->x[lane], room->y[lane], room->z[lane]};
+    __syncwarp();
+  }
+  face_inout->corner = corner;
+  face_inout->count = count;
+}
+
+// make_screen_face of a clipped face whose corners the lanes hold, with edges from edge_begin on.
+__device__ inline bool make_screen_face(const FaceMaking& making, const SharedFace& face, int32_t edge_begin,
+                                        ScreenFace* face_out) {
+  const PinholeCamera& camera = making.setting.camera;
+  const int lane = lane_index(), count = face.count;
+  const bool is_corner = lane < count;
+  const Vec2 corner = is_corner ? project(camera, face.corner) : Vec2{};
+  const Vec2 low{least_of(is_corner ? corner.x : 1e30f), least_of(is_corner ? corner.y : 1e30f)};
+  const Vec2 high{greatest_of(is_corner ? corner.x : -1e30f), greatest_of(is_corner ? corner.y : -1e30f)};
+  const float depth_low = least_of(is_corner ? face.corner.z : 1e30f);
+  const float depth_high = greatest_of(is_corner ? face.corner.z : 0.0f);
+  const PixelBox box = pixel_box(camera, low, high);
+  if (is_empty(box)) return false;
+  const int next_lane = lane + 1 < count ? lane + 1 : 0;
+  const Vec2 next{__shfl_sync(kAllLanes, corner.x, next_lane), __shfl_sync(kAllLanes, corner.y, next_lane)};
+  const Vec2 first{__shfl_sync(kAllLanes, corner.x, 0), __shfl_sync(kAllLanes, corner.y, 0)};
+  const float twice_area = sum_in_order(cross(corner - first, next - first), 1, count - 1);
+  if (fabsf(twice_area) < kLeastTwiceArea_px2) return false;
+  const bool turns_right = twice_area > 0.0f;
+  const bool is_edge = is_corner && (corner.x != next.x || corner.y != next.y);
+  const unsigned edges = __ballot_sync(kAllLanes, is_edge);
+  if (is_edge) {
+    store_whole(making.edges + edge_begin + __popc(edges & lanes_below()),
+                make_edge(turns_right ? corner : next, turns_right ? next : corner));
+  }
+  face_out->edge_begin = edge_begin;
+  face_out->edge_count = static_cast<uint8_t>(__popc(edges));
+  face_out->box = box;
+  face_out->color = face.color;
+  face_out->number = face.owner.number;
+  face_out->class_id = face.owner.class_id;
+  set_depth(camera, face.plane, depth_low, depth_high, face_out);
+  return true;
+}
+
+// Sets the corners of lights. All lanes of the warp.
+__device__ inline void set_light_corners(ClipRoom* room) {
+  LightCorners walk;
+  PICTURA_KEEP_LOOP
+  for (int i = 0; i < kLightSides; ++i) {
+    const Vec2 corner_m = walk.next();
+    if (lane_index() == 0) room->light_corner_m[i] = corner_m;
+  }
+  __syncwarp();
+}
+
+}  // namespace pictura::cuda
