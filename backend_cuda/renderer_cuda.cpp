@@ -22,7 +22,7 @@ namespace {
 
 constexpr int kLargeBlocks = 8;
 // Room in the pool for the faces and edges of an image: what CARLA's towns ask for on average. Those with more take
-// another round.
+// another round. Clipped faces, for which four edges each are left over, ask for a quarter of what is.
 constexpr int kPoolFaces = 320, kPoolEdges = 1472;
 // Views that are drawn at once, at most: enough that the last images of a launch, for which few blocks are left to
 // work, do not count.
@@ -68,6 +68,7 @@ class PoolBuffers {
         images_(images),
         makings_(images),
         batches_(images * kBatches),
+        clipped_(images * kPoolFaces),
         lists_(3 * images) {}
   /// Sets where a task finds the pool and lists images.
   void serve(cuda::DrawTask* task_out) const {
@@ -75,18 +76,20 @@ class PoolBuffers {
                       edges_.data(),
                       images_.data(),
                       makings_.data(),
-                      batches_.data(),
+                      {batches_.data(), clipped_.data(), static_cast<int32_t>(batches_.size()),
+                       static_cast<int32_t>(clipped_.size())},
                       static_cast<int32_t>(faces_.size()),
-                      static_cast<int32_t>(edges_.size()),
-                      static_cast<int32_t>(batches_.size())};
+                      static_cast<int32_t>(edges_.size())};
     for (std::size_t i = 0; i < 2; ++i) task_out->postponed_images[i] = lists_.data() + i * images_.size();
     task_out->overflow_images = lists_.data() + 2 * images_.size();
   }
-  // As many as there is room for faces of; of each image the last one may not be full.
-  static constexpr int kBatches = kPoolFaces / cuda::FaceBatch::kEntries + 1;
+  // For what all rounds draw, or images would not know that they are too many until each has taken a part of the room.
+  // Of each image the last one may not be full.
+  static constexpr int kBatches = cuda::kRounds * kPoolFaces / cuda::FaceBatch::kEntries + 1;
   static constexpr std::size_t kImageBytes = kPoolFaces * sizeof(ScreenFace) + kPoolEdges * sizeof(PolygonEdge) +
                                              sizeof(cuda::GatheredImage) + sizeof(cuda::FaceMaking) +
-                                             kBatches * sizeof(cuda::FaceBatch) + 3 * sizeof(int32_t);
+                                             kBatches * sizeof(cuda::FaceBatch) +
+                                             kPoolFaces * sizeof(cuda::ClippedThing) + 3 * sizeof(int32_t);
 
  private:
   DeviceBuffer<ScreenFace> faces_;
@@ -94,6 +97,7 @@ class PoolBuffers {
   DeviceBuffer<cuda::GatheredImage> images_;
   DeviceBuffer<cuda::FaceMaking> makings_;
   DeviceBuffer<cuda::FaceBatch> batches_;
+  DeviceBuffer<cuda::ClippedThing> clipped_;
   DeviceBuffer<int32_t> lists_;
 };
 

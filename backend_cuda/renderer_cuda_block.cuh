@@ -36,7 +36,8 @@ struct BlockState {
   // While faces are gathered.
   ViewState view;
   FaceMaking making;
-  int32_t num_batches, num_faces, num_edges, overflow, usable;
+  GatherCounts listed;
+  int32_t num_faces, num_clipped, overflow, usable;
   // While pixels are drawn.
   int32_t num_rows, num_candidates, num_fragments, num_drawn, next_batch, image;
   int32_t sum_of_warp[2][kMaxWarps];

@@ -1,5 +1,6 @@
-// Faces that cross the border of what is drawn, and lights, which have many corners: a warp makes one at a time, a lane
-// a corner, so that corners stay in registers. Values are those of clip_face and make_screen_face, sums in their order.
+// Faces that cross the border of what is drawn, and lights, which have many corners. A lane clips a face of four
+// corners; lights, and what has more corners than a lane has room for, a warp makes one at a time, a lane a corner.
+// Values are those of clip_face and make_screen_face, sums in their order.
 #pragma once
 
 #include "pictura/backend_cuda/renderer_cuda_memory.cuh"
@@ -8,19 +9,33 @@ namespace pictura::cuda {
 
 static_assert(kMaxPolygonCorners <= kWarpSize);
 
-/// A face of four corners, in camera coordinates.
-struct alignas(16) Quad {
-  Vec3 corner[4];
-  FacePlane plane;
-  Rgb color;
-  FaceOwner owner;
+/// Corners that a lane has room for; what is cut by all five planes may have nine.
+constexpr int kLaneCorners = 8;
+
+/// What a warp that clips keeps in shared memory.
+struct ClipRoom {
+  Quad quad;  // of one lane, for all
+  // Of corners: a column for each lane, or the first row for all. A corner may be cut and stay beyond the last.
+  static constexpr int kRows = kLaneCorners + 2;
+  float x[kRows][kWarpSize], y[kRows][kWarpSize], z[kRows][kWarpSize];
+  Vec2 light_corner_m[kLightSides];  // see LightCorners
 };
 
-/// What the lanes of a warp hand each other, in shared memory.
-struct ClipRoom {
-  Quad quad;                         // of one lane, for all
-  float x[kWarpSize], y[kWarpSize], z[kWarpSize];
-  Vec2 light_corner_m[kLightSides];  // see LightCorners
+/// The corners of one lane's face.
+class LaneCorners {
+ public:
+  __device__ explicit LaneCorners(ClipRoom* room) : room_(room) {}
+  __device__ Vec3 operator[](int i) const {
+    return {room_->x[i][lane_index()], room_->y[i][lane_index()], room_->z[i][lane_index()]};
+  }
+  __device__ void set(int i, Vec3 p) const {
+    room_->x[i][lane_index()] = p.x;
+    room_->y[i][lane_index()] = p.y;
+    room_->z[i][lane_index()] = p.z;
+  }
+
+ private:
+  ClipRoom* room_;
 };
 
 // Stores a value by words of 16 bytes: by words of 4, the lanes of a warp would write a part of memory each.
@@ -38,7 +53,8 @@ template <typename Value>
 __device__ void copy_whole(Value* to, const Value& from) {
   constexpr int kWords = sizeof(Value) / sizeof(uint4);
   static_assert(sizeof(Value) % sizeof(uint4) == 0 && kWords <= kWarpSize);
-  if (lane_index() < kWords) reinterpret_cast<uint4*>(to)[lane_index()] = reinterpret_cast<const uint4*>(&from)[lane_index()];
+  if (lane_index() < kWords)
+    reinterpret_cast<uint4*>(to)[lane_index()] = reinterpret_cast<const uint4*>(&from)[lane_index()];
 }
 
 /// A face whose corners the lanes hold, one each; the rest is the same in all lanes.
@@ -85,7 +101,8 @@ __device__ inline SharedFace make_light(const FaceMaking& making, const ClipRoom
   const LightHead head = making.heads[index];
   const int lane = lane_index();
   SharedFace face;
-  face.corner = to_camera(making.setting.camera, light_corner(head, room.light_corner_m[min_of(lane, kLightSides - 1)]));
+  face.corner =
+      to_camera(making.setting.camera, light_corner(head, room.light_corner_m[min_of(lane, kLightSides - 1)]));
   const float brightness = brightness_of_sum(sum_in_order(fading_depth_m(face.corner), 0, kLightSides), kLightSides);
   const Vec3 first = corner_of(face.corner, 0), next = corner_of(face.corner, (lane + 1) % kWarpSize);
   const Vec3 normal = cross(face.corner - first, next - first);
@@ -98,7 +115,37 @@ __device__ inline SharedFace make_light(const FaceMaking& making, const ClipRoom
   return face;
 }
 
-// clip_face of a face whose corners the lanes hold.
+// clip_face of a lane's face, in place: corners are written no further than one behind the last that was read. The
+// number of corners, or kOutgrown where a lane has no room for them or the face is not quite convex.
+constexpr int kOutgrown = -1;
+__device__ inline int clip(const Frustum& f, unsigned crossed, LaneCorners corners) {
+  int count = 4;
+  PICTURA_KEEP_LOOP
+  for (int plane = 0; plane < kClipPlanes && count > 0; ++plane) {
+    if ((crossed >> plane & 1) == 0) continue;
+    Vec3 previous = corners[count - 1], current = corners[0];
+    float previous_inside = inside_plane(f, plane, previous);
+    int kept = 0;
+    PICTURA_KEEP_LOOP
+    for (int i = 0; i < count; ++i) {
+      const Vec3 next = corners[min_of(i + 1, count - 1)];
+      const float inside = inside_plane(f, plane, current);
+      const bool is_cut = (previous_inside >= 0.0f) != (inside >= 0.0f), stays = inside >= 0.0f;
+      if (is_cut) corners.set(kept, cut_between(previous, previous_inside, current, inside));
+      kept += is_cut ? 1 : 0;
+      if (stays) corners.set(kept, current);
+      kept += stays ? 1 : 0;
+      if (kept > min_of(i + 2, kLaneCorners)) return kOutgrown;
+      previous = current;
+      previous_inside = inside;
+      current = next;
+    }
+    count = kept < 3 ? 0 : kept;
+  }
+  return count;
+}
+
+// ... of a face whose corners the lanes hold.
 __device__ inline void clip(const Frustum& f, ClipRoom* room, SharedFace* face_inout) {
   const int lane = lane_index();
   Vec3 corner = face_inout->corner;
@@ -119,9 +166,9 @@ __device__ inline void clip(const Frustum& f, ClipRoom* room, SharedFace* face_i
     // Only a face that is not quite convex could outgrow the room; it loses corners then.
     const bool fits = place + 2 <= kMaxPolygonCorners;
     auto keep = [&](int at, Vec3 p) {
-      room->x[at] = p.x;
-      room->y[at] = p.y;
-      room->z[at] = p.z;
+      room->x[0][at] = p.x;
+      room->y[0][at] = p.y;
+      room->z[0][at] = p.z;
     };
     if (is_cut && fits) keep(place, cut_between(previous, previous_inside, corner, inside));
     if (stays && fits) keep(place + (is_cut ? 1 : 0), corner);
@@ -129,7 +176,7 @@ __device__ inline void clip(const Frustum& f, ClipRoom* room, SharedFace* face_i
     count = __popc(cuts & fitting) + __popc(staying & fitting);
     if (count < 3) count = 0;
     __syncwarp();
-    corner = {room->x[lane], room->y[lane], room->z[lane]};
+    corner = {room->x[0][lane], room->y[0][lane], room->z[0][lane]};
     __syncwarp();
   }
   face_inout->corner = corner;

@@ -2,7 +2,7 @@
 // them, a lane a piece. What is found is left in batches of as many entries as a warp has lanes.
 #pragma once
 
-#include "pictura/backend_cuda/renderer_cuda_clip.cuh"
+#include "pictura/backend_cuda/renderer_cuda_memory.cuh"
 
 namespace pictura::cuda {
 
@@ -17,34 +17,18 @@ struct OutlineSide {
 };
 constexpr int kOutlineSides = 8;
 
-/// What a warp that gathers keeps in shared memory.
-struct GatherRoom {
+/// What a warp that culls keeps in shared memory.
+struct CullRoom {
   uint32_t entries[2 * kWarpSize];
   OutlineSide strips[kOutlineSides], walls[kOutlineSides];
-  ClipRoom clip;
 };
 static_assert(FaceBatch::kEntries == kWarpSize);
-
-// Bytes of shared memory of a block that gathers, and where a warp's part of it is.
-__host__ __device__ constexpr size_t gather_bytes(int threads) {
-  return state_bytes(threads) + static_cast<size_t>(threads / kWarpSize) * sizeof(GatherRoom);
-}
-__device__ inline GatherRoom* gather_room() {
-  return reinterpret_cast<GatherRoom*>(block_memory + state_bytes(num_threads())) + warp_index();
-}
-
-/// Where batches are left, and how many there are; the count may outgrow the room.
-struct BatchRoom {
-  FaceBatch* batches;
-  int32_t* count;
-  int32_t max_batches;
-};
 
 /// Entries that a warp finds, of one image. All its lanes call what follows.
 class EntryList {
  public:
-  __device__ EntryList(uint32_t* entries, const BatchRoom& room, int32_t image)
-      : entries_(entries), room_(room), image_(image) {}
+  __device__ EntryList(CullRoom* room, const GatherLists& lists, GatherCounts* counts, int32_t image)
+      : entries_(room->entries), lists_(lists), counts_(counts), image_(image) {}
   __device__ void push(bool wanted, uint32_t entry) {
     const unsigned pushing = __ballot_sync(kAllLanes, wanted);
     if (wanted) entries_[waiting_ + __popc(pushing & lanes_below())] = entry;
@@ -63,20 +47,24 @@ class EntryList {
   __device__ void leave_batch(int count) {
     __syncwarp();
     waiting_ -= count;
-    total_ += count;
-    const int32_t place = next_of(room_.count);
-    if (place < room_.max_batches) {
-      FaceBatch* batch = room_.batches + place;
+    const int32_t place = next_of(&counts_->batches);
+    if (place < lists_.max_batches) {
+      FaceBatch* batch = lists_.batches + place;
       batch->entries[lane_index()] = lane_index() < count ? entries_[waiting_ + lane_index()] : kNoEntry;
-      if (lane_index() == 0) batch->image = image_;
+      if (lane_index() == 0) {
+        batch->image = image_;
+        batch->first = total_;
+      }
     } else {
       is_whole_ = false;
     }
+    total_ += count;
     __syncwarp();
   }
 
   uint32_t* entries_;
-  BatchRoom room_;
+  const GatherLists& lists_;
+  GatherCounts* counts_;
   int32_t image_;
   int waiting_ = 0, total_ = 0;
   bool is_whole_ = true;
@@ -85,7 +73,7 @@ class EntryList {
 // Sets the outlines for strips and walls, which are seen from differently far away. The hull of the eye and the far
 // corners on the ground has no other sides than those of the pyramid: from the eye to the corners, and around them. All
 // lanes of the warp, one a side.
-__device__ inline void set_outlines(GatherRoom* room, const ImageSetting& setting, const RasterGeometry& geometry) {
+__device__ inline void set_outlines(CullRoom* room, const ImageSetting& setting, const RasterGeometry& geometry) {
   const int side = lane_index() % kOutlineSides;
   const bool of_strips = lane_index() < kOutlineSides;
   if (lane_index() < 2 * kOutlineSides) {
@@ -136,7 +124,8 @@ __device__ inline GridRows rows_of(const PieceGrid& pieces, const OutlineSide* s
   }
   y_low = min_of(y_low, sides[0].a.y);
   y_high = max_of(y_high, sides[0].a.y);
-  return {pieces.cells.cell_y(y_low - pieces.largest_radius_m), pieces.cells.cell_y(y_high + pieces.largest_radius_m) + 1};
+  return {pieces.cells.cell_y(y_low - pieces.largest_radius_m),
+          pieces.cells.cell_y(y_high + pieces.largest_radius_m) + 1};
 }
 
 // The pieces of a row that an outline may touch, which stand side by side.
@@ -155,11 +144,12 @@ __device__ inline PieceRange pieces_of_row(const PieceGrid& pieces, const Outlin
 }
 
 // Lists the strips and walls that may show. Each warp of the block, for its part of the candidates.
-__device__ inline void cull_pieces(BlockState* state, GatherRoom* room, EntryList* list) {
+__device__ inline void cull_pieces(BlockState* state, CullRoom* room, EntryList* list) {
   const ImageSetting& setting = state->making.setting;
   const DeviceGeometry& geometry = *state->view.geometry;
   set_outlines(room, setting, geometry.raster);
-  const float strip_far_m = far_of(geometry.raster.longest_strip_m), wall_far_m = far_of(geometry.raster.longest_wall_m);
+  const float strip_far_m = far_of(geometry.raster.longest_strip_m),
+              wall_far_m = far_of(geometry.raster.longest_wall_m);
   const GridRows strip_rows = rows_of(geometry.strips, room->strips), wall_rows = rows_of(geometry.walls, room->walls);
   const int num_strip_rows = strip_rows.end - strip_rows.begin;
   const int num_rows = num_strip_rows + wall_rows.end - wall_rows.begin;
@@ -169,8 +159,8 @@ __device__ inline void cull_pieces(BlockState* state, GatherRoom* room, EntryLis
     const int is_wall_row = row >= num_strip_rows;
     PieceRange range;
     if (row < num_rows) {
-      range = is_wall_row ? pieces_of_row(geometry.walls, room->walls, wall_rows.begin + row - num_strip_rows)
-                          : pieces_of_row(geometry.strips, room->strips, strip_rows.begin + row);
+      range = pieces_of_row(is_wall_row ? geometry.walls : geometry.strips, is_wall_row ? room->walls : room->strips,
+                            row + (is_wall_row ? wall_rows.begin - num_strip_rows : strip_rows.begin));
     }
     share_out(
         &state->warps[warp_index()], range.count,
@@ -238,7 +228,7 @@ __device__ inline void cull_lights(const BlockState& state, EntryList* list) {
 }
 
 // Lists all faces that an image may show. Each warp of the block, for its part.
-__device__ inline void cull(BlockState* state, const DrawTask& task, GatherRoom* room, EntryList* list) {
+__device__ inline void cull(BlockState* state, const DrawTask& task, CullRoom* room, EntryList* list) {
   cull_agents(*state, task, list);
   cull_lights(*state, list);
   cull_pieces(state, room, list);

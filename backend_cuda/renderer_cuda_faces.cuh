@@ -1,15 +1,30 @@
 // From entries that may show to faces. Nearly all have four corners and need no clipping: a lane makes one of those.
-// Edges and faces take room by counters, so that nobody waits for others.
+// The others are listed, and clipped when many have come together. Edges and faces take room by counters, so that
+// nobody waits for others.
 #pragma once
 
+#include "pictura/backend_cuda/renderer_cuda_clip.cuh"
 #include "pictura/backend_cuda/renderer_cuda_cull.cuh"
 
 namespace pictura::cuda {
 
 /// Count of faces of an image that is not gathered; faces that are added meanwhile leave it negative.
 constexpr int32_t kNotGathered = -(1 << 30);
-/// A face of four corners has at most nine when clipped, if it is convex.
-constexpr int kClippedQuadCorners = 9;
+
+/// What a warp that gathers keeps in shared memory, one step after the other.
+union GatherRoom {
+  CullRoom cull;
+  ClipRoom clip;
+};
+
+// Bytes of shared memory of a block that culls and of one that takes all steps, and where a warp's part of it is.
+__host__ __device__ constexpr size_t cull_bytes() { return state_bytes(kGatherThreads) + sizeof(CullRoom); }
+__host__ __device__ constexpr size_t gather_bytes(int threads) {
+  return state_bytes(threads) + static_cast<size_t>(threads / kWarpSize) * sizeof(GatherRoom);
+}
+__device__ inline GatherRoom* gather_room() {
+  return reinterpret_cast<GatherRoom*>(block_memory + state_bytes(num_threads())) + warp_index();
+}
 
 // The face of an entry that is no light; false where it has faded to black.
 __device__ inline bool make_quad(const FaceMaking& making, uint32_t entry, Quad* quad_out) {
@@ -43,69 +58,87 @@ __device__ inline bool make_quad(const FaceMaking& making, uint32_t entry, Quad*
   return shows;
 }
 
-// Keeps the faces of those lanes that have one.
-__device__ inline void keep_face(const FaceMaking& making, bool has_one, const ScreenFace& face) {
-  const int32_t at = take_place(making.num_faces, has_one);
-  if (has_one && at >= 0 && at < making.max_faces) store_whole(making.faces + at, face);
+// Keeps the faces of those lanes that have one. Each image has room for all of its own.
+__device__ inline void keep_face(const FaceMaking& making, const ScreenFace& face, FaceOwner owner, int32_t edge_begin,
+                                 int32_t at) {
+  ScreenFace whole = face;
+  whole.edge_begin = edge_begin;
+  whole.number = owner.number;
+  whole.class_id = owner.class_id;
+  if (at >= 0) store_whole(making.faces + at, whole);
 }
 
-/// Edges that a warp has taken room for.
-class EdgeRun {
- public:
-  __device__ EdgeRun(const FaceMaking& making, int32_t count) : making_(making) { take_room(count); }
-  /// The place of so many edges, or -1: there is no room left.
-  __device__ int32_t take(int32_t count) {
-    if (next_ + count > end_) take_room(count);
-    const int32_t begin = next_;
-    next_ += count;
-    return next_ <= making_.max_edges ? begin : -1;
-  }
-
- private:
-  __device__ void take_room(int32_t count) {
-    if (lane_index() == 0) next_ = atomicAdd(making_.num_edges, count);
-    next_ = __shfl_sync(kAllLanes, next_, 0);
-    end_ = next_ + count;
-  }
-  const FaceMaking& making_;
-  int32_t next_ = 0, end_ = 0;
-};
-
-// Makes the faces of a batch, an entry each lane. False where there is no room for all of them. All lanes of the warp.
-__device__ inline bool make_faces(const FaceMaking& making, ClipRoom* room, uint32_t entry) {
+// Makes the faces of a batch, an entry each lane, and lists what is to be clipped; `first` of the image's places. All
+// lanes of the warp.
+__device__ inline void make_faces(const FaceMaking& making, const GatherLists& lists, GatherCounts* counts,
+                                  const FaceBatch& batch, int32_t first) {
+  const uint32_t entry = batch.entries[lane_index()];
   const bool is_light = entry != kNoEntry && kind_of(entry) == kLightKind;
   Quad quad;
   const bool is_quad = entry != kNoEntry && !is_light && make_quad(making, entry, &quad);
   const unsigned crossed = is_quad ? planes_crossed(making.setting.frustum, quad.corner, 4) : kOutside;
-  const unsigned whole = __ballot_sync(kAllLanes, crossed == 0), lights = __ballot_sync(kAllLanes, is_light);
-  const unsigned cut = __ballot_sync(kAllLanes, crossed != 0 && crossed != kOutside);
-  if ((whole | lights | cut) == 0) return true;
-  EdgeRun edges(making, 4 * __popc(whole) + kClippedQuadCorners * __popc(cut) + kMaxPolygonCorners * __popc(lights));
-  const int32_t whole_begin = edges.take(4 * __popc(whole));
-  if (whole_begin < 0) return false;
-  PICTURA_KEEP_LOOP
-  for (unsigned left = cut | lights; left != 0; left &= left - 1) {
-    const int owner = __ffs(static_cast<int>(left)) - 1;
-    SharedFace shared = (lights >> owner & 1) != 0
-                            ? make_light(making, *room, index_of(__shfl_sync(kAllLanes, entry, owner)))
-                            : share_quad(room, owner, quad);
-    clip(making.setting.frustum, room, &shared);
-    if (shared.count == 0) continue;
-    const int32_t edge_begin = edges.take(shared.count);
-    if (edge_begin < 0) return false;
-    ScreenFace face;
-    const bool shows = make_screen_face(making, shared, edge_begin, &face);
-    keep_face(making, shows && lane_index() == 0, face);
-  }
+  const bool is_clipped = is_light || (crossed != 0 && crossed != kOutside);
+  const int32_t clipped_at = take_place(&counts->clipped, is_clipped);
+  if (is_clipped && clipped_at < lists.max_clipped) lists.clipped[clipped_at] = {entry, batch.image};
+  const int32_t edge_begin = making.edge_begin + 4 * (first + lane_index());
   ScreenFace face;
-  face.edge_begin = whole_begin + 4 * __popc(whole & lanes_below());
-  auto keep_edge = [&](int k, const PolygonEdge& edge) { store_whole(making.edges + face.edge_begin + k, edge); };
+  auto keep_edge = [&](int k, const PolygonEdge& edge) { store_whole(making.edges + edge_begin + k, edge); };
   const bool shows = crossed == 0 && make_screen_face<4>(making.setting.camera, quad.corner, 4, quad.plane, quad.color,
                                                          keep_edge, &face);
-  face.number = quad.owner.number;
-  face.class_id = quad.owner.class_id;
-  keep_face(making, shows, face);
+  const int32_t at = take_place(making.num_faces, shows);
+  if (shows) keep_face(making, face, quad.owner, edge_begin, at);
+}
+
+// Makes a face whose corners the lanes hold. False where there is no room for its edges. All lanes of the warp.
+__device__ inline bool make_shared_face(const FaceMaking& making, ClipRoom* room, SharedFace shared) {
+  clip(making.setting.frustum, room, &shared);
+  if (shared.count == 0) return true;
+  int32_t edge_begin = 0;
+  if (lane_index() == 0) edge_begin = making.clipped_begin + atomicAdd(making.num_clipped, shared.count);
+  edge_begin = __shfl_sync(kAllLanes, edge_begin, 0);
+  if (edge_begin + shared.count > making.clipped_end) return false;
+  ScreenFace face;
+  const bool shows = make_screen_face(making, shared, edge_begin, &face);
+  if (shows && lane_index() == 0) keep_face(making, face, shared.owner, edge_begin, atomicAdd(making.num_faces, 1));
   return true;
+}
+
+// Clips things of a list, the lanes' `thing` where is_one, and makes their faces; thing.image is that of makings. False
+// in those lanes for whose face there is no room. All lanes of the warp.
+__device__ inline bool clip_things(const FaceMaking* makings, ClipRoom* room, bool is_one, ClippedThing thing) {
+  const FaceMaking& making = makings[thing.image];
+  const LaneCorners corners(room);
+  const bool is_light = is_one && kind_of(thing.entry) == kLightKind;
+  Quad quad;
+  int kept = 0;
+  if (is_one && !is_light && make_quad(making, thing.entry, &quad)) {
+    const Frustum frustum = making.setting.frustum;
+    for (int i = 0; i < 4; ++i) corners.set(i, quad.corner[i]);
+    kept = clip(frustum, planes_crossed(frustum, quad.corner, 4), corners);
+  }
+  const unsigned lights = __ballot_sync(kAllLanes, is_light);
+  unsigned shared = lights | __ballot_sync(kAllLanes, kept == kOutgrown);
+  const int32_t edge_begin = making.clipped_begin + take_places(making.num_clipped, max_of(kept, 0));
+  bool has_room = kept <= 0 || edge_begin + kept <= making.clipped_end;
+  if (kept > 0 && has_room) {
+    ScreenFace face;
+    auto keep_edge = [&](int k, const PolygonEdge& edge) { store_whole(making.edges + edge_begin + k, edge); };
+    if (make_screen_face<kLaneCorners>(making.setting.camera, corners, kept, quad.plane, quad.color, keep_edge,
+                                       &face)) {
+      keep_face(making, face, quad.owner, edge_begin, atomicAdd(making.num_faces, 1));
+    }
+  }
+  PICTURA_KEEP_LOOP
+  for (; shared != 0; shared &= shared - 1) {
+    const int owner = __ffs(static_cast<int>(shared)) - 1;
+    const FaceMaking& its_making = makings[__shfl_sync(kAllLanes, thing.image, owner)];
+    const int32_t index = index_of(__shfl_sync(kAllLanes, thing.entry, owner));
+    const SharedFace face =
+        (lights >> owner & 1) != 0 ? make_light(its_making, *room, index) : share_quad(room, owner, quad);
+    const bool is_made = make_shared_face(its_making, room, face);
+    if (lane_index() == owner) has_room = is_made;
+  }
+  return has_room;
 }
 
 // Sets what an image shows, but for where its faces go; false, with a fault noted, where its view names something that
@@ -136,35 +169,45 @@ __device__ inline bool gather(const DrawTask& task, int32_t view, int32_t camera
   BlockState* state = block_state();
   GatherRoom* room = gather_room();
   const Scratch& scratch = state->scratch;
+  GatherLists lists;
+  lay_out(&lists, scratch, scratch.bytes);
   sync_block();
   if (threadIdx.x == 0) {
-    state->num_batches = state->num_faces = state->num_edges = state->overflow = 0;
+    state->listed = {};
+    state->num_faces = state->num_clipped = state->overflow = 0;
     state->usable = set_image(state, task, view, camera) ? 1 : 0;
     FaceMaking* making = &state->making;
     making->faces = state->faces = scratch.faces;
     making->edges = state->edges = scratch.edges;
     making->num_faces = &state->num_faces;
-    making->num_edges = &state->num_edges;
-    making->max_faces = scratch.max_faces;
-    making->max_edges = scratch.max_edges;
+    making->num_clipped = &state->num_clipped;
+    making->edge_begin = 0;
+    making->clipped_begin = 4 * FaceBatch::kEntries * scratch.max_batches;
+    making->clipped_end = scratch.max_edges;
   }
-  set_light_corners(&room->clip);
   sync_block();
   if (state->usable == 0) return false;
-  auto* batches = reinterpret_cast<FaceBatch*>(scratch.bytes);
-  EntryList list(room->entries, {batches, &state->num_batches, max_large_batches(scratch)}, 0);
-  cull(state, task, room, &list);
-  if (!list.is_whole()) state->overflow = 1;
+  EntryList list(&room->cull, lists, &state->listed, 0);
+  cull(state, task, &room->cull, &list);
   sync_block();
-  if (state->overflow != 0) return false;
+  // Nobody has found more than there is room for: the lists hold all that a world does.
   PICTURA_KEEP_LOOP
-  for (int i = warp_index(); i < state->num_batches; i += num_warps()) {
-    if (!make_faces(state->making, &room->clip, batches[i].entries[lane_index()])) state->overflow = 1;
+  for (int i = warp_index(); i < state->listed.batches; i += num_warps()) {
+    make_faces(state->making, lists, &state->listed, lists.batches[i], FaceBatch::kEntries * i);
+  }
+  sync_block();
+  set_light_corners(&room->clip);
+  const int num_clipped = state->listed.clipped;
+  PICTURA_KEEP_LOOP
+  for (int first = warp_index() * kWarpSize; first < num_clipped; first += num_threads()) {
+    const int i = first + lane_index();
+    const ClippedThing thing = lists.clipped[min_of(i, num_clipped - 1)];
+    if (!clip_things(&state->making, &room->clip, i < num_clipped, thing)) state->overflow = 1;
   }
   sync_block();
   if (threadIdx.x == 0) state->shown = image_of(*state, 0, state->num_faces);
   sync_block();
-  return state->overflow == 0 && state->num_faces <= scratch.max_faces;
+  return state->overflow == 0;
 }
 
 }  // namespace pictura::cuda

@@ -105,8 +105,9 @@ __device__ inline void postpone(const DrawTask& task, int32_t image) {
   task.postponed_images[task.round_index % 2][place] = image;
 }
 
-// Takes room for the faces of an image of which so many things may show, and tells the later launches of it. One thread.
-__device__ inline void take_face_room(const DrawTask& task, int32_t image, int32_t listed, bool is_whole) {
+// Takes room for the faces of an image of which so many things may show, and tells the later launches of it. One
+// thread.
+__device__ inline void take_face_room(const DrawTask& task, int32_t image, int32_t listed, bool all_are_listed) {
   BlockState* state = block_state();
   FaceMaking* making = &state->making;
   GatheredImage* out = task.pool.images + image;
@@ -116,24 +117,26 @@ __device__ inline void take_face_room(const DrawTask& task, int32_t image, int32
     return;
   }
   DrawCounters::Round* round = &task.counters->rounds[task.round_index];
-  const int32_t face_begin = is_whole ? atomicAdd(&round->faces, listed) : task.pool.max_faces;
-  if (face_begin + listed > task.pool.max_faces || !is_whole) {
+  const int32_t face_begin = all_are_listed ? atomicAdd(&round->faces, listed) : task.pool.max_faces;
+  if (!all_are_listed || face_begin + listed > task.pool.max_faces) {
     postpone(task, image);
     return;
   }
   making->faces = task.pool.faces + face_begin;
   making->edges = task.pool.edges;
   making->num_faces = &out->face_count;
-  making->num_edges = &round->edges;
-  making->max_faces = listed;
-  making->max_edges = task.pool.max_edges;
+  making->num_clipped = &round->clipped_edges;
+  making->edge_begin = 4 * face_begin;
+  making->clipped_begin = 4 * task.pool.max_faces;
+  making->clipped_end = task.pool.max_edges;
   *out = image_of(*state, face_begin, 0);
 }
 
+// Lists what images may show.
 extern "C" __global__ void __launch_bounds__(kGatherThreads, kGatherBlocksPerProcessor)
     pictura_cull(const __grid_constant__ DrawTask task) {
   BlockState* state = block_state();
-  GatherRoom* room = gather_room();
+  CullRoom* room = &gather_room()->cull;
   DrawCounters::Round* round = &task.counters->rounds[task.round_index];
   const int32_t num_images = images_of_round(task);
   PICTURA_KEEP_LOOP
@@ -147,7 +150,7 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kGatherBlocksPerPro
       if (lane_index() == 0) task.pool.images[image] = {.width_px = width_px(task.cameras[camera].camera)};  // black
       continue;
     }
-    EntryList list(room->entries, {task.pool.batches, &round->batches, task.pool.max_batches}, image);
+    EntryList list(room, task.pool.lists, &round->listed, image);
     cull(state, task, room, &list);
     if (lane_index() == 0) take_face_room(task, image, list.total(), list.is_whole());
     __syncwarp();
@@ -156,28 +159,41 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kGatherBlocksPerPro
   }
 }
 
+// Makes the faces that need no clipping, and lists the others.
 extern "C" __global__ void __launch_bounds__(kGatherThreads, kGatherBlocksPerProcessor)
     pictura_gather(const __grid_constant__ DrawTask task) {
   BlockState* state = block_state();
-  ClipRoom* room = &gather_room()->clip;
-  set_light_corners(room);
   DrawCounters::Round* round = &task.counters->rounds[task.round_index];
-  const int32_t num_batches = min_of(round->batches, task.pool.max_batches);
+  const int32_t num_batches = min_of(round->listed.batches, task.pool.lists.max_batches);
   PICTURA_KEEP_LOOP
   for (;;) {
     const int32_t i = next_of(&round->next_batch);
     if (i >= num_batches) return;
-    const int32_t image = task.pool.batches[i].image;
-    int32_t* face_count = &task.pool.images[image].face_count;
-    // Others may give the image up meanwhile.
-    if (__shfl_sync(kAllLanes, *face_count, 0) < 0) continue;
-    copy_whole(&state->making, task.pool.makings[image]);
+    const FaceBatch& batch = task.pool.lists.batches[i];
+    if (__shfl_sync(kAllLanes, task.pool.images[batch.image].face_count, 0) < 0) continue;
+    copy_whole(&state->making, task.pool.makings[batch.image]);
     __syncwarp();
-    if (!make_faces(state->making, room, task.pool.batches[i].entries[lane_index()]) && lane_index() == 0 &&
-        atomicMin(face_count, kNotGathered) >= 0) {
-      postpone(task, image);
+    make_faces(state->making, task.pool.lists, &round->listed, batch, batch.first);
+    __syncwarp();
+  }
+}
+
+// Clips those, and makes lights.
+extern "C" __global__ void __launch_bounds__(kGatherThreads, kClipBlocksPerProcessor)
+    pictura_clip(const __grid_constant__ DrawTask task) {
+  ClipRoom* room = &gather_room()->clip;
+  set_light_corners(room);
+  DrawCounters::Round* round = &task.counters->rounds[task.round_index];
+  const int32_t count = min_of(round->listed.clipped, task.pool.lists.max_clipped);
+  PICTURA_KEEP_LOOP
+  for (;;) {
+    const int32_t first = next_of(&round->next_clipped) * kWarpSize, i = first + lane_index();
+    if (first >= count) return;
+    const ClippedThing thing = task.pool.lists.clipped[min_of(i, count - 1)];
+    if (!clip_things(task.pool.makings, room, i < count, thing) &&
+        atomicMin(&task.pool.images[thing.image].face_count, kNotGathered) >= 0) {
+      postpone(task, thing.image);
     }
-    __syncwarp();
   }
 }
 
@@ -210,8 +226,7 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
   PICTURA_KEEP_LOOP
   for (int32_t i = static_cast<int32_t>(blockIdx.x); i < count; i += static_cast<int32_t>(gridDim.x)) {
     const int32_t image = task.overflow_images[i], view = view_of(task, image), camera = camera_of(task, image);
-    if (!gather(task, view, camera) ||
-        !draw_image(LargeDrawMemory::current(), task, view, camera)) {
+    if (!gather(task, view, camera) || !draw_image(LargeDrawMemory::current(), task, view, camera)) {
       if (threadIdx.x == 0) note_fault(task, view, kNoRoom);
     }
   }

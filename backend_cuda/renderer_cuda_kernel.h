@@ -56,26 +56,52 @@ struct GatheredImage {
   const AgentBox* agents = nullptr;  // the first of its world
 };
 
-/// From what the faces of an image are made, and where they go. Of lights: the states of its world.
+/// A face of four corners, in camera coordinates.
+struct alignas(16) Quad {
+  Vec3 corner[4];
+  FacePlane plane;
+  Rgb color;
+  FaceOwner owner;
+};
+
+/// From what the faces of an image are made, and where they go. Each thing that may show has a place for a face, and
+/// for four edges if it needs no clipping; edges of what is clipped go to a part that many images may share.
 struct alignas(16) FaceMaking {
   ImageSetting setting;
   const Strip* strips = nullptr;
   const WallFace* walls = nullptr;
   const LightHead* heads = nullptr;
-  const AgentBox* agents = nullptr;
+  const AgentBox* agents = nullptr;  // of its world, like lights
   const LightState* lights = nullptr;
-  ScreenFace* faces = nullptr;  // [max_faces] of this image
-  PolygonEdge* edges = nullptr;  // [max_edges]
-  int32_t* num_faces = nullptr;  // that there are
-  int32_t* num_edges = nullptr;  // that are taken; may outgrow max_edges
-  int32_t max_faces = 0, max_edges = 0;
+  ScreenFace* faces = nullptr;
+  PolygonEdge* edges = nullptr;
+  int32_t* num_faces = nullptr;    // that there are
+  int32_t* num_clipped = nullptr;  // edges of clipped faces; may outgrow their part
+  int32_t edge_begin = 0;          // four for each thing
+  int32_t clipped_begin = 0, clipped_end = 0;
 };
 
-/// Things of an image whose faces are to be made: entries of renderer_cuda_cull.cuh.
+/// Things that an image may show: entries of renderer_cuda_cull.cuh, all of one image or, of those that are to be
+/// clipped, each with its own.
 struct FaceBatch {
   static constexpr int kEntries = 32;
   uint32_t entries[kEntries];
+  int32_t image, first;  // first: how many of the image's things are in batches before
+};
+struct ClippedThing {
+  uint32_t entry;
   int32_t image;
+};
+
+/// What each step of gathering leaves to the next one.
+struct GatherLists {
+  FaceBatch* batches = nullptr;
+  ClippedThing* clipped = nullptr;
+  int32_t max_batches = 0, max_clipped = 0;
+};
+/// How much of it there is; batches may outgrow their list.
+struct GatherCounts {
+  int32_t batches = 0, clipped = 0;
 };
 
 /// Faces of many images, and what is known of those images before.
@@ -84,8 +110,8 @@ struct FacePool {
   PolygonEdge* edges = nullptr;
   GatheredImage* images = nullptr;  // [images]
   FaceMaking* makings = nullptr;    // [images]
-  FaceBatch* batches = nullptr;
-  int32_t max_faces = 0, max_edges = 0, max_batches = 0;
+  GatherLists lists;
+  int32_t max_faces = 0, max_edges = 0;  // of edges, four for each face, the rest for those that are clipped
 };
 
 /// Memory of the blocks of the last launch, and how much each of them has.
@@ -93,8 +119,10 @@ struct Scratch {
   ScreenFace* faces = nullptr;     // [blocks][max_faces]
   PolygonEdge* edges = nullptr;    // [blocks][max_edges]
   unsigned char* bytes = nullptr;  // [blocks][large_bytes()]
-  int32_t blocks = 0, max_faces = 0, max_edges = 0;
+  int32_t blocks = 0, max_batches = 0, max_faces = 0, max_edges = 0;
 };
+/// Warps of such a block, each of which may leave a batch that is not full.
+constexpr int kLargeWarps = 4;
 
 /// Images are gathered and drawn in rounds: those for which the pool had no room left are postponed to the next one.
 constexpr int kRounds = 3;
@@ -102,9 +130,10 @@ constexpr int kRounds = 3;
 /// What the blocks of a batch's launches count together; 0 before.
 struct DrawCounters {
   struct Round {
-    int32_t next_culled = 0, next_batch = 0, next_drawn = 0;
-    int32_t batches = 0, faces = 0, edges = 0;  // of the pool that are taken
-    int32_t postponed = 0;                      // images
+    int32_t next_culled = 0, next_batch = 0, next_clipped = 0, next_drawn = 0;
+    GatherCounts listed;
+    int32_t faces = 0, clipped_edges = 0;  // of the pool that are taken
+    int32_t postponed = 0;                 // images
   } rounds[kRounds];
   int32_t overflow = 0;  // images left to the last launch
 };

@@ -25,27 +25,28 @@ cudaError_t allow_shared(const void* kernel, std::size_t bytes) {
 }  // namespace
 
 KernelSet ahead_of_time_kernels() {
-  return {reinterpret_cast<const void*>(pictura_cull), reinterpret_cast<const void*>(pictura_gather),
-          reinterpret_cast<const void*>(pictura_draw), reinterpret_cast<const void*>(pictura_draw_overflow),
-          reinterpret_cast<const void*>(pictura_visibility)};
+  return {reinterpret_cast<const void*>(pictura_cull),          reinterpret_cast<const void*>(pictura_gather),
+          reinterpret_cast<const void*>(pictura_clip),          reinterpret_cast<const void*>(pictura_draw),
+          reinterpret_cast<const void*>(pictura_draw_overflow), reinterpret_cast<const void*>(pictura_visibility)};
 }
 
-cudaError_t prepare_kernels(const KernelSet& kernels) {
-  return allow_shared(kernels.draw, draw_bytes());
-}
+cudaError_t prepare_kernels(const KernelSet& kernels) { return allow_shared(kernels.draw, draw_bytes()); }
 
 std::size_t large_block_bytes(const Scratch& large) { return large_bytes(large); }
 
 cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& large, int processors,
                         cudaStream_t stream) {
   const int images = task.num_views * task.num_cameras, gather_blocks = kGatherBlocksPerProcessor * processors;
-  const LaunchShape to_cull{min_of(images, gather_blocks), kGatherThreads, gather_bytes(kGatherThreads)};
-  const LaunchShape to_gather{min_of(task.pool.max_batches, gather_blocks), kGatherThreads, to_cull.shared_bytes};
+  const LaunchShape to_cull{min_of(images, gather_blocks), kGatherThreads, cull_bytes()};
+  const LaunchShape to_gather{gather_blocks, kGatherThreads, state_bytes(kGatherThreads)};
+  const LaunchShape to_clip{kClipBlocksPerProcessor * processors, kGatherThreads, gather_bytes(kGatherThreads)};
   const LaunchShape to_draw{min_of(images, kDrawBlocksPerProcessor * processors), kDrawThreads, draw_bytes()};
   for (task.round_index = 0; task.round_index < kRounds; ++task.round_index) {
     cudaError_t status = launch(kernels.cull, to_cull, stream, task);
     if (status != cudaSuccess) return status;
     status = launch(kernels.gather, to_gather, stream, task);
+    if (status != cudaSuccess) return status;
+    status = launch(kernels.clip, to_clip, stream, task);
     if (status != cudaSuccess) return status;
     status = launch(kernels.draw, to_draw, stream, task);
     if (status != cudaSuccess) return status;

@@ -14,12 +14,14 @@ namespace pictura::cuda {
 struct KernelSet {
   const void* cull = nullptr;
   const void* gather = nullptr;
+  const void* clip = nullptr;
   const void* draw = nullptr;
   const void* draw_overflow = nullptr;
   const void* visibility = nullptr;
 };
 constexpr const char* kCullName = "pictura_cull";
 constexpr const char* kGatherName = "pictura_gather";
+constexpr const char* kClipName = "pictura_clip";
 constexpr const char* kDrawName = "pictura_draw";
 constexpr const char* kDrawOverflowName = "pictura_draw_overflow";
 constexpr const char* kVisibilityName = "pictura_visibility";
@@ -32,7 +34,7 @@ cudaError_t prepare_kernels(const KernelSet& kernels);
 /// Bytes that a block of the last launch needs besides faces and edges.
 std::size_t large_block_bytes(const Scratch& large);
 
-/// Draws all images: three launches for each round, and one more.
+/// Draws all images: four launches for each round, and one more.
 cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& large, int processors,
                         cudaStream_t stream);
 cudaError_t launch_visibility(const KernelSet& kernels, const VisibilityTask& task, const Scratch& large,

@@ -7,7 +7,7 @@
 namespace pictura::cuda {
 
 // A block that gathers faces: a warp, as many of them as a processor takes.
-constexpr int kGatherThreads = 32, kGatherBlocksPerProcessor = 32;
+constexpr int kGatherThreads = 32, kGatherBlocksPerProcessor = 32, kClipBlocksPerProcessor = 16;
 // A block that draws them. What has more fragments or pixels is drawn in parts.
 constexpr int kDrawThreads = 512, kDrawBlocksPerProcessor = 2;
 constexpr int kDrawPixels = 96 * 54, kDrawFragments = 2304;
@@ -65,8 +65,8 @@ struct Layout {
   }
 };
 
-// Lays out what drawing keeps from `bytes` on, and returns how many bytes that takes. Rows lie where samples do later, candidates where what is free of fragments and their order
-// do.
+// Lays out what drawing keeps from `bytes` on, and returns how many bytes that takes. Rows lie where samples do later,
+// candidates where what is free of fragments and their order do.
 template <typename Memory>
 __host__ __device__ size_t lay_out(Memory* memory, int max_pixels, int max_fragments, unsigned char* bytes) {
   memory->max_pixels = max_pixels;
@@ -117,11 +117,16 @@ struct SmallDrawMemory : DrawMemory<uint16_t, uint32_t> {
 };
 static_assert(kMostMarkedFaces < 0xFFFF && kDrawFragments < 0xFFFF && kDrawPixels < 0x7FFF);
 
-/// In global memory. What drawing keeps lies where gathering has left its batches, of which each warp may have one that
-/// is not full.
-__host__ __device__ inline int32_t max_large_batches(const Scratch& sizes) {
-  return sizes.max_faces / FaceBatch::kEntries + kLargeThreads / kWarpSize;
+// In global memory. What drawing keeps lies where gathering has left its lists.
+__host__ __device__ inline size_t lay_out(GatherLists* lists, const Scratch& sizes, unsigned char* bytes) {
+  lists->max_batches = sizes.max_batches;
+  lists->max_clipped = sizes.max_faces;
+  Layout layout{bytes};
+  layout.place(&lists->clipped, lists->max_clipped);
+  layout.place(&lists->batches, lists->max_batches);
+  return layout.used;
 }
+static_assert(kLargeThreads == kLargeWarps * kWarpSize);
 struct LargeDrawMemory : DrawMemory<uint32_t, unsigned long long> {
   __host__ __device__ size_t place(unsigned char* bytes) { return lay_out(this, kLargePixels, kLargeFragments, bytes); }
   __device__ static LargeDrawMemory current() {
@@ -136,9 +141,9 @@ struct LargeDrawMemory : DrawMemory<uint32_t, unsigned long long> {
 
 __host__ __device__ inline size_t draw_bytes() { return state_bytes(kDrawThreads) + SmallDrawMemory().place(nullptr); }
 __host__ __device__ inline size_t large_bytes(const Scratch& sizes) {
-  const size_t to_gather = (static_cast<size_t>(max_large_batches(sizes)) * sizeof(FaceBatch) + 15) / 16 * 16;
-  const size_t to_draw = LargeDrawMemory().place(nullptr);
-  return to_gather > to_draw ? to_gather : to_draw;
+  GatherLists lists;
+  const size_t to_gather = lay_out(&lists, sizes, nullptr), to_draw = LargeDrawMemory().place(nullptr);
+  return ((to_gather > to_draw ? to_gather : to_draw) + 15) / 16 * 16;
 }
 
 // Gives the block its part of a launch's scratch memory. All threads of the block.

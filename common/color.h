@@ -31,12 +31,19 @@ constexpr int kNumBoxFaces = 5;
 constexpr float kVisibleRange_m = 120.0f;
 
 PICTURA_HD constexpr Rgb agent_color(AgentClass agent_class, BoxFace face) {
-  const Rgb colors[kNumAgentClasses][kNumBoxFaces] = {
-      {rgb8(247, 37, 133), rgb8(76, 201, 240), rgb8(114, 9, 183), rgb8(67, 97, 238), rgb8(58, 12, 163)},
-      {rgb8(255, 190, 11), rgb8(251, 133, 0), rgb8(214, 96, 10), rgb8(255, 214, 92), rgb8(150, 75, 0)},
-      {rgb8(128, 237, 153), rgb8(34, 139, 84), rgb8(87, 204, 120), rgb8(56, 163, 165), rgb8(22, 96, 66)},
+  // A choice and no table, which each thread of a kernel would have to write down first.
+  auto chosen = [face](Rgb front, Rgb back, Rgb left, Rgb right, Rgb top) {
+    const Rgb of_sides = face == BoxFace::left ? left : face == BoxFace::right ? right : top;
+    return face == BoxFace::front ? front : face == BoxFace::back ? back : of_sides;
   };
-  return colors[static_cast<int>(agent_class)][static_cast<int>(face)];
+  switch (agent_class) {
+    case AgentClass::vehicle:
+      return chosen(rgb8(247, 37, 133), rgb8(76, 201, 240), rgb8(114, 9, 183), rgb8(67, 97, 238), rgb8(58, 12, 163));
+    case AgentClass::cyclist:
+      return chosen(rgb8(255, 190, 11), rgb8(251, 133, 0), rgb8(214, 96, 10), rgb8(255, 214, 92), rgb8(150, 75, 0));
+    default:
+      return chosen(rgb8(128, 237, 153), rgb8(34, 139, 84), rgb8(87, 204, 120), rgb8(56, 163, 165), rgb8(22, 96, 66));
+  }
 }
 
 /// State of a traffic light; `off` (or no state) draws nothing.

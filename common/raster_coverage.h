@@ -45,8 +45,8 @@ PICTURA_HD inline unsigned planes_crossed(const Frustum& f, const Vec3* corners,
   return outside_of_all != 0 ? kOutside : outside_of_any;
 }
 
-/// Where the side from one corner to the next crosses a plane, of which they are that far inside. Computed from the inner
-/// corner, whichever way round: faces that share an edge get the same point.
+/// Where the side from one corner to the next crosses a plane, of which they are that far inside. Computed from the
+/// inner corner, whichever way round: faces that share an edge get the same point.
 PICTURA_HD inline Vec3 cut_between(Vec3 a, float a_inside, Vec3 b, float b_inside) {
   return a_inside >= 0.0f ? a + (b - a) * (a_inside / (a_inside - b_inside))
                           : b + (a - b) * (b_inside / (b_inside - a_inside));
@@ -183,19 +183,20 @@ PICTURA_HD inline void set_depth(const PinholeCamera& camera, const FacePlane& p
 /// Projects a clipped face (camera coordinates) of at most kRoom corners, which lies in `plane`. Calls
 /// keep_edge(0, edge), keep_edge(1, edge), ... for its edges, at most `count`, and sets all of face_out but edge_begin.
 /// False where it covers nothing.
-template <int kRoom, typename KeepEdge>
-PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Vec3* polygon, int count,
+template <int kRoom, typename Corners, typename KeepEdge>
+PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Corners& polygon, int count,
                                         const FacePlane& plane, Rgb color, KeepEdge&& keep_edge, ScreenFace* face_out) {
   Vec2 corner[kRoom];
   Vec2 low{1e30f, 1e30f}, high{-1e30f, -1e30f};
   float depth_low = 1e30f, depth_high = 0.0f;
   PICTURA_UNROLL_FOUR
   for (int i = 0; i < count; ++i) {
-    corner[i] = project(camera, polygon[i]);
+    const Vec3 p = polygon[i];
+    corner[i] = project(camera, p);
     low = {min_of(low.x, corner[i].x), min_of(low.y, corner[i].y)};
     high = {max_of(high.x, corner[i].x), max_of(high.y, corner[i].y)};
-    depth_low = min_of(depth_low, polygon[i].z);
-    depth_high = max_of(depth_high, polygon[i].z);
+    depth_low = min_of(depth_low, p.z);
+    depth_high = max_of(depth_high, p.z);
   }
   const PixelBox box = pixel_box(camera, low, high);
   if (is_empty(box)) return false;

@@ -198,6 +198,7 @@ inline unsigned __reduce_or_sync(unsigned, unsigned bits) {
   for (int lane = 0; lane < 32; ++lane) all |= static_cast<unsigned>(values[lane]);
   return all;
 }
+inline bool __all_sync(unsigned lanes, bool vote) { return __ballot_sync(lanes, vote) == ~0u; }
 inline int __reduce_min_sync(unsigned, int value) {
   const uint64_t* values =
       pictura::emulation::Block::current()->exchange("reduce_min", pictura::emulation::bits_of(value));

@@ -16,6 +16,7 @@
 // The kernels, under names of their own beside those that were compiled ahead of time.
 #define pictura_cull emulated_cull
 #define pictura_gather emulated_gather
+#define pictura_clip emulated_clip
 #define pictura_draw emulated_draw
 #define pictura_draw_overflow emulated_draw_overflow
 #define pictura_visibility emulated_visibility
@@ -33,9 +34,12 @@ namespace {
 // Draws with the kernels. Two blocks of each launch, so that each draws several images, one after the other.
 class EmulatedRenderer final : public Renderer {
  public:
-  /// Room in the pool for so many faces an image, and for eight times as many edges.
-  EmulatedRenderer(const RendererConfig& config, uint64_t seed, int pool_faces = 2048)
-      : config_(config), seed_(seed), pool_faces_(pool_faces), cameras_(pinhole_cameras(config.rig)) {}
+  /// Room in the pool, for an image.
+  struct Pool {
+    std::size_t faces = 2048, clipped_edges = 4096, batches = 65;
+  };
+  EmulatedRenderer(const RendererConfig& config, uint64_t seed, const Pool& pool = {2048, 4096, 65})
+      : config_(config), seed_(seed), pool_(pool), cameras_(pinhole_cameras(config.rig)) {}
   std::string_view name() const override { return "emulated"; }
   MemorySpace space() const override { return MemorySpace::host; }
   const RendererConfig& config() const override { return config_; }
@@ -54,6 +58,7 @@ class EmulatedRenderer final : public Renderer {
     for (task.round_index = 0; task.round_index < cuda::kRounds; ++task.round_index) {
       launch(cuda::kGatherThreads, [&] { cuda::emulated_cull(task); });
       launch(cuda::kGatherThreads, [&] { cuda::emulated_gather(task); });
+      launch(cuda::kGatherThreads, [&] { cuda::emulated_clip(task); });
       launch(cuda::kDrawThreads, [&] { cuda::emulated_draw(task); });
     }
     overflow_ = setup.counters.overflow;
@@ -95,6 +100,7 @@ class EmulatedRenderer final : public Renderer {
     std::vector<cuda::GatheredImage> images;
     std::vector<cuda::FaceMaking> makings;
     std::vector<cuda::FaceBatch> batches;
+    std::vector<cuda::ClippedThing> clipped;
     std::vector<int32_t> overflow_images, postponed_images[2];
     std::vector<uint64_t> large_words;
 
@@ -106,20 +112,21 @@ class EmulatedRenderer final : public Renderer {
         pieces = std::max(pieces, static_cast<int>(map.strips.size() + map.walls.size() + map.heads.size()));
       }
       const auto num_images = static_cast<std::size_t>(task.num_views * task.num_cameras);
-      pool_faces.resize(static_cast<std::size_t>(renderer.pool_faces_) * num_images);
-      pool_edges.resize(8 * pool_faces.size());
+      pool_faces.resize(renderer.pool_.faces * num_images);
+      pool_edges.resize(4 * pool_faces.size() + renderer.pool_.clipped_edges * num_images);
       images.resize(num_images);
       makings.resize(num_images);
-      batches.resize(pool_faces.size() / cuda::FaceBatch::kEntries + num_images);
+      batches.resize(renderer.pool_.batches * num_images);
+      clipped.resize(pool_faces.size());
       overflow_images.resize(num_images);
-      task.pool = {pool_faces.data(),
-                   pool_edges.data(),
-                   images.data(),
-                   makings.data(),
-                   batches.data(),
-                   static_cast<int32_t>(pool_faces.size()),
-                   static_cast<int32_t>(pool_edges.size()),
-                   static_cast<int32_t>(batches.size())};
+      task.pool = {
+          pool_faces.data(),
+          pool_edges.data(),
+          images.data(),
+          makings.data(),
+          {batches.data(), clipped.data(), static_cast<int32_t>(batches.size()), static_cast<int32_t>(clipped.size())},
+          static_cast<int32_t>(pool_faces.size()),
+          static_cast<int32_t>(pool_edges.size())};
       task.geometries = renderer.geometries_.data();
       task.num_geometries = static_cast<int32_t>(renderer.geometries_.size());
       task.counters = &counters;
@@ -156,7 +163,7 @@ class EmulatedRenderer final : public Renderer {
 
   RendererConfig config_;
   uint64_t seed_;
-  int pool_faces_;
+  Pool pool_;
   std::vector<PinholeCamera> cameras_;
   std::vector<std::unique_ptr<Kept>> kept_;
   std::vector<cuda::DeviceGeometry> geometries_;
@@ -188,10 +195,54 @@ TEST(EmulatedKernels, DrawTheOraclesTownsInAnyOrderOfThreads) {
 TEST(EmulatedKernels, PostponeWhatThePoolHasNoRoomFor) {
   SyntheticTown town = make_synthetic_town(1, 120);
   town.views.resize(2);
-  EmulatedRenderer renderer(config_of(paper_rig()), 7, 130);
+  EmulatedRenderer renderer(config_of(paper_rig()), 7, {.faces = 130});
   expect_oracles(&renderer, town);
   EXPECT_GT(renderer.postponed(), 0);
   EXPECT_LT(renderer.postponed(), 8);
+  EXPECT_EQ(renderer.overflow(), 0);
+}
+
+// Noticed when some of an image's faces are made already.
+TEST(EmulatedKernels, PostponeWhatHasNoRoomForItsClippedEdges) {
+  SyntheticTown town = make_synthetic_town(1, 120);
+  town.views.resize(2);
+  EmulatedRenderer renderer(config_of(paper_rig()), 8, {.clipped_edges = 80});
+  expect_oracles(&renderer, town);
+  EXPECT_GT(renderer.postponed(), 0);
+  EXPECT_LT(renderer.postponed(), 8);
+  EXPECT_EQ(renderer.overflow(), 0);
+}
+
+TEST(EmulatedKernels, PostponeWhatThereAreNoBatchesFor) {
+  SyntheticTown town = make_synthetic_town(1, 120);
+  town.views.resize(2);
+  EmulatedRenderer renderer(config_of(paper_rig()), 10, {.batches = 4});
+  expect_oracles(&renderer, town);
+  EXPECT_GT(renderer.postponed(), 0);
+  EXPECT_LT(renderer.postponed(), 8);
+  EXPECT_EQ(renderer.overflow(), 0);
+}
+
+TEST(EmulatedKernels, ClipLightsOnAllSides) {
+  // A spiral of heads around a camera, from before its near plane on, that turn to it and cross each other's disks and
+  // all borders of the image; a batch holds nothing else.
+  SyntheticTown town;
+  for (int i = 0; i < 300; ++i) {
+    const float angle = 0.4f * static_cast<float>(i), range_m = 0.05f + 0.02f * static_cast<float>(i);
+    const SinCos at = sincos_of(angle);
+    LightHead head;
+    head.position_m = {range_m * at.cos, range_m * at.sin, 1.5f + 0.004f * static_cast<float>(i % 7 - 3) * range_m};
+    head.facing = {-at.cos, -at.sin};
+    head.signal = i;
+    town.geometry.heads.push_back(head);
+    town.scene.light_states.push_back(static_cast<LightState>(1 + i % 3));
+  }
+  town.geometry.num_signals = 300;
+  town.geometry.build_grids();
+  town.scene.end_world(0);
+  town.views = {make_view({0, 0, 0}, 0)};
+  EmulatedRenderer renderer(config_of(mixed_rig()), 9);
+  expect_oracles(&renderer, town, Planes::all);
   EXPECT_EQ(renderer.overflow(), 0);
 }
 
