@@ -22,7 +22,7 @@ namespace {
 
 constexpr int kLargeBlocks = 8;
 // Room in the pool for the faces and edges of an image: what CARLA's towns ask for on average. Those with more take
-// another round. Clipped faces, for which four edges each are left over, ask for a quarter of what is.
+// another round. Four edges are for each face, the rest, of which half is asked for, for those that are clipped.
 constexpr int kPoolFaces = 320, kPoolEdges = 1472;
 // Views that are drawn at once, at most: enough that the last images of a launch, for which few blocks are left to
 // work, do not count.
