@@ -204,7 +204,7 @@ TEST_F(CudaStreamTest, IsCapturedIntoAGraph) {
   PICTURA_CUDA(cudaStreamEndCapture(stream, &graph));
   std::size_t nodes = 0;
   PICTURA_CUDA(cudaGraphGetNodes(graph, nullptr, &nodes));
-  EXPECT_EQ(nodes, 56u);  // for each view: counters, seven launches
+  EXPECT_EQ(nodes, 98u);  // for each view: counters, thirteen launches
   PICTURA_CUDA(cudaGraphInstantiate(&executable, graph, 0));
 
   auto replay = [&] {
