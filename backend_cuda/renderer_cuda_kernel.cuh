@@ -182,9 +182,10 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kGatherBlocksPerPro
 extern "C" __global__ void __launch_bounds__(kGatherThreads, kClipBlocksPerProcessor)
     pictura_clip(const __grid_constant__ DrawTask task) {
   ClipRoom* room = &gather_room()->clip;
-  set_light_corners(room);
   DrawCounters::Round* round = &task.counters->rounds[task.round_index];
   const int32_t count = min_of(round->listed.clipped, task.pool.lists.max_clipped);
+  if (count == 0) return;
+  set_light_corners(room);
   PICTURA_KEEP_LOOP
   for (;;) {
     const int32_t first = next_of(&round->next_clipped) * kWarpSize, i = first + lane_index();

@@ -1,5 +1,5 @@
-// What the host tells the drawing kernels. One launch gathers the faces of images in a pool, the next draws them, a
-// block an image at a time; two more launches do the same with what the pool had no room for, and so on. What has
+// What the host tells the drawing kernels. Three launches gather the faces of images in a pool, the next draws them, a
+// block an image at a time; four more launches do the same with what the pool had no room for, and so on. What has
 // outgrown a block's memory is left to a last launch of few blocks, whose memory has room for all that a world can
 // hold.
 #pragma once

@@ -7,7 +7,7 @@
 namespace pictura::cuda {
 
 // A block that gathers faces: a warp, as many of them as a processor takes.
-constexpr int kGatherThreads = 32, kGatherBlocksPerProcessor = 32, kClipBlocksPerProcessor = 16;
+constexpr int kGatherThreads = 32, kGatherBlocksPerProcessor = 32, kClipBlocksPerProcessor = 24;
 // A block that draws them. What has more fragments or pixels is drawn in parts.
 constexpr int kDrawThreads = 512, kDrawBlocksPerProcessor = 2;
 constexpr int kDrawPixels = 96 * 54, kDrawFragments = 2304;
