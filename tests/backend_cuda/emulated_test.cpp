@@ -246,6 +246,30 @@ TEST(EmulatedKernels, ClipLightsOnAllSides) {
   EXPECT_EQ(renderer.overflow(), 0);
 }
 
+// What crosses itself along a border enters the frame twice, and outgrows the room of the lane that clips it.
+TEST(EmulatedKernels, ClipStripsThatCrossThemselves) {
+  SyntheticTown town;
+  for (int i = 0; i < 60; ++i) {
+    const SinCos at = sincos_of(0.1f * static_cast<float>(i));
+    const Vec2 ahead{at.cos, at.sin}, left = left_normal(ahead);
+    const float near_m = 3.0f + 0.05f * static_cast<float>(i), far_m = near_m + 6.0f;
+    Strip strip;
+    strip.a_m = {near_m * ahead.x, near_m * ahead.y, 0};
+    strip.b_m = {far_m * ahead.x, far_m * ahead.y, 0};
+    strip.side_a = left;
+    strip.side_b = left * -1.0f;
+    strip.width_m = 4.0f;
+    strip.color = kWhiteMarkColor;
+    town.geometry.strips.push_back(strip);
+  }
+  town.geometry.build_grids();
+  town.scene.end_world(0);
+  for (int i = 0; i < 4; ++i) town.views.push_back(make_view({0.2f, 0.1f, 0}, 0.3f + 0.02f * static_cast<float>(i)));
+  EmulatedRenderer renderer(config_of(mixed_rig()), 11);
+  expect_oracles(&renderer, town, Planes::all);
+  EXPECT_EQ(renderer.overflow(), 0);
+}
+
 TEST(EmulatedKernels, DrawOddSizesAndPlanes) {
   SyntheticTown town = make_synthetic_town(2, 60);
   town.views.resize(2);
