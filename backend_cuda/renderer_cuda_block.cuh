@@ -6,7 +6,7 @@
 
 namespace pictura::cuda {
 
-constexpr int kWarpSize = 32, kMaxWarps = 16;
+constexpr int kWarpSize = 32, kMaxWarps = 8;
 constexpr unsigned kAllLanes = 0xFFFFFFFFu;
 
 /// What a view shows, for gathering its faces.
@@ -23,7 +23,7 @@ struct WarpQueueRoom {
 
 /// What a warp keeps for its lanes to read of each other.
 struct WarpState {
-  WarpQueueRoom pixels, cuts;
+  WarpQueueRoom queue;
   uint8_t owners[kWarpSize];
 };
 
@@ -39,8 +39,7 @@ struct BlockState {
   GatherCounts listed;
   int32_t num_faces, num_clipped, overflow, usable;
   // While pixels are drawn.
-  int32_t num_rows, num_candidates, num_fragments, num_drawn, next_batch, image;
-  int32_t sum_of_warp[2][kMaxWarps];
+  int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, next_batch, image;
   WarpState warps[kMaxWarps];
 };
 
@@ -201,21 +200,6 @@ __device__ inline double block_sum(double* of_thread, double value) {
   PICTURA_KEEP_LOOP
   for (int i = 0; i < num_threads(); ++i) sum += of_thread[i];
   return sum;
-}
-
-// Sum of the values of the threads before this one; *total_out is that of all. All threads of the block.
-__device__ inline int sum_before(int32_t* sum_of_warp, int value, int* total_out) {
-  const int up_to = sum_up_to(value);
-  if (lane_index() == kWarpSize - 1) sum_of_warp[warp_index()] = up_to;
-  sync_block();
-  int before = 0, total = 0;
-  PICTURA_KEEP_LOOP
-  for (int warp = 0; warp < num_warps(); ++warp) {
-    if (warp == warp_index()) before = total;
-    total += sum_of_warp[warp];
-  }
-  *total_out = total;
-  return before + up_to - value;
 }
 
 }  // namespace pictura::cuda

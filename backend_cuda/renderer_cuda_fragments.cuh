@@ -1,6 +1,6 @@
 // From the faces of an image to fragments: what a face covers of a pixel. Rows of faces find, for each pixel, the
 // nearest face that covers it fully, behind which nothing can be seen, and list the pixels that faces cover partly;
-// those that may show become fragments, one thread for each, and one for each edge that cuts a pixel.
+// those that may show become fragments, one thread for each, in a chain for each pixel.
 #pragma once
 
 #include "pictura/backend_cuda/renderer_cuda_memory.cuh"
@@ -8,17 +8,17 @@
 
 namespace pictura::cuda {
 
-__device__ inline int image_width() {
-  return PICTURA_RIG_WIDTH_PX > 0 ? PICTURA_RIG_WIDTH_PX : block_state()->shown.width_px;
-}
-
-/// Rows [y_begin, y_end) of an image, or columns [x_begin, x_end) of one row. Pixels count from the first row's first.
+/// A part of an image, at most as wide as a tile. Its pixels count row by row.
 struct Part {
-  int y_begin, y_end, x_begin, x_end;
-  __device__ int num_pixels() const { return (y_end - y_begin) * image_width(); }
-  __device__ int pixel(int x, int y) const { return (y - y_begin) * image_width() + x; }
-  __device__ int x_of(int pixel) const { return pixel % image_width(); }
-  __device__ int y_of(int pixel) const { return y_begin + pixel / image_width(); }
+  int x_begin, x_end, y_begin, y_end;
+  __device__ int num_pixels() const { return (y_end - y_begin) * kTileWidth_px; }
+  __device__ int pixel(int x, int y) const { return (y - y_begin) * kTileWidth_px + (x - x_begin); }
+  __device__ int x_of(int pixel) const {
+    return x_begin + static_cast<int>(static_cast<unsigned>(pixel) % kTileWidth_px);
+  }
+  __device__ int y_of(int pixel) const {
+    return y_begin + static_cast<int>(static_cast<unsigned>(pixel) / kTileWidth_px);
+  }
 };
 
 // A pixel's word while the nearest full faces are found: the larger is the nearer; 0 for none. The bits of a nearness
@@ -41,6 +41,11 @@ __device__ int marked_face(Word mark) {
 template <typename Memory>
 __device__ typename Memory::Word full_of(const Memory& memory, int pixel) {
   return memory.pixels[pixel] >> Memory::kHalf;
+}
+// The first fragment of a pixel's chain; kNone where there is none.
+template <typename Memory>
+__device__ typename Memory::Word first_of(const Memory& memory, int pixel) {
+  return memory.pixels[pixel] & Memory::kNone;
 }
 
 // Lists the rows that faces have in a part. Those that find no room are counted. All threads of the block.
@@ -116,7 +121,7 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
       auto within = [&](int32_t x) { return min_of(max_of(x, part.x_begin), part.x_end); };
       span = {within(span.begin), within(span.end), within(span.full_begin), within(span.full_end)};
     }
-    const int full = span.full_end - span.full_begin, lead = span.full_begin - span.begin;
+    const int full = span.full_end - span.full_begin;
     auto of = [](int value, int lane) { return __shfl_sync(kAllLanes, value, max_of(lane, 0)); };
     share_out(warp, full, [&](int owner, int k) {
       const int its_face = of(face, owner), its_y = of(y, owner), x = of(span.full_begin, owner) + k;
@@ -126,101 +131,75 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
       const int32_t place = take_place(&state->num_candidates, loser >= 0);
       if (loser >= 0) list_candidate(memory, place, loser, pixel, true);
     });
-    const int partial = span.end - span.begin - full;
-    const int32_t first_place = take_places(&state->num_candidates, partial);
-    share_out(warp, partial, [&](int owner, int k) {
-      const int its_face = of(face, owner), its_y = of(y, owner), its_lead = of(lead, owner);
-      const int begin = of(span.begin, owner), full_end = of(span.full_end, owner);
-      const int x = k < its_lead ? begin + k : full_end + (k - its_lead);
-      const int place = of(first_place, owner) + k;
-      if (owner >= 0) list_candidate(memory, place, its_face, part.pixel(x, its_y), false);
-    });
+    const int partial = span.end - span.begin - full, row_begin = part.pixel(0, y);
+    int32_t place = take_places(&state->num_candidates, partial);
+    PICTURA_KEEP_LOOP
+    for (int x = span.begin; x < span.end; ++x) {
+      if (x == span.full_begin) x = span.full_end;
+      if (x < span.end) list_candidate(memory, place++, face, row_begin + x, false);
+    }
   }
 }
 
-// Turns the marks of a part into what pixels hold from then on: in the upper half the full face (kNone: none), in the
-// lower half the number of fragments.
+// Whether a fragment is all that a pixel has.
 template <typename Memory>
-__device__ void start_counts(const Memory& memory, const Part& part) {
+__device__ bool is_alone(const Memory& memory, int fragment, int pixel) {
+  using Word = typename Memory::Word;
+  return memory.pixels[pixel] == (Word{Memory::kNone} << Memory::kHalf | static_cast<Word>(fragment)) &&
+         memory.next[fragment] == static_cast<typename Memory::Index>(Memory::kNone);
+}
+
+// Turns the marks of a part into the full faces, and begins a chain of fragments for each pixel.
+template <typename Memory>
+__device__ void start_chains(const Memory& memory, const Part& part) {
   using Word = typename Memory::Word;
   const int count = part.num_pixels();
   if (threadIdx.x == 0) memory.state->next_batch = 0;
   PICTURA_KEEP_LOOP
   for (int p = static_cast<int>(threadIdx.x); p < count; p += num_threads()) {
     const int face = marked_face(memory.pixels[p]);
-    memory.pixels[p] = (face < 0 ? Memory::kNone : static_cast<Word>(face)) << Memory::kHalf;
+    memory.pixels[p] = (face < 0 ? Memory::kNone : static_cast<Word>(face)) << Memory::kHalf | Memory::kNone;
   }
 }
 
-// Lets edges cut fragments: a fragment and an edge that crosses its pixel for each lane.
+// Keeps a fragment, as the first of its pixel's chain; full: what the upper half of the pixel's word is to hold.
 template <typename Memory>
-__device__ void cut_fragments(const Memory& memory, WarpQueue::Pair cut, const Part& part) {
-  if (!cut.is_one) return;
-  const PolygonEdge edge = memory.edges[cut.b];
-  const int pixel = memory.pixel[cut.a], x = part.x_of(pixel), y = part.y_of(pixel);
-  const uint64_t samples = samples_cut(edge, x, y);
-  const int32_t area_units = area_cut(edge, x, y);
-  atomicAnd(&memory.samples_low[cut.a], static_cast<uint32_t>(samples));
-  atomicAnd(&memory.samples_high[cut.a], static_cast<uint32_t>(samples >> 32));
-  if (area_units != 0) atomicAdd(&memory.area_units[cut.a], area_units);
+__device__ void keep_fragment(const Memory& memory, int fragment, uint32_t face, int pixel, uint64_t samples,
+                              float area, typename Memory::Word full) {
+  using Index = typename Memory::Index;
+  using Word = typename Memory::Word;
+  memory.samples_low[fragment] = static_cast<uint32_t>(samples);
+  memory.samples_high[fragment] = static_cast<uint32_t>(samples >> 32);
+  memory.area[fragment] = area;
+  memory.face[fragment] = static_cast<Index>(face);
+  memory.pixel[fragment] = static_cast<Index>(pixel);
+  const Word before = atomicExch(&memory.pixels[pixel], full << Memory::kHalf | static_cast<Word>(fragment));
+  memory.next[fragment] = static_cast<Index>(before & Memory::kNone);
 }
 
-// Makes a fragment for each lane's candidate, and puts aside the edges that cut it; leaves none aside if is_last.
+// Makes a fragment of each lane's candidate, unless its face leaves nothing in the pixel.
 template <typename Memory>
-__device__ void start_fragments(const Memory& memory, WarpQueue::Pair candidate, const Part& part, WarpQueue* cuts,
-                                bool is_last) {
-  const int32_t fragment = take_place(&memory.state->num_fragments, candidate.is_one);
-  const bool has_room = candidate.is_one && fragment < memory.max_fragments;
+__device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, const Part& part) {
   const int pixel = static_cast<int>(candidate.b & ~static_cast<uint32_t>(Memory::kCoversFully));
-  const int x = part.x_of(pixel), y = part.y_of(pixel);
-  int edge_begin = 0, edge_count = 0;
-  int32_t area_units = static_cast<int32_t>(kAreaUnits);
-  if (has_room && (candidate.b & Memory::kCoversFully) == 0) {
+  PixelCoverage coverage;
+  if (candidate.is_one) {
     const ScreenFace& face = memory.faces[candidate.a];
-    edge_begin = face.edge_begin;
-    edge_count = face.edge_count;
-    area_units = 0;
+    coverage =
+        (candidate.b & Memory::kCoversFully) != 0
+            ? PixelCoverage{1.0f, kAllSamples}
+            : pixel_coverage(memory.edges + face.edge_begin, face.edge_count, part.x_of(pixel), part.y_of(pixel));
   }
-  uint32_t crossing = 0;
-  PICTURA_KEEP_LOOP
-  for (int e = 0; e < edge_count; ++e) {
-    const PolygonEdge edge = memory.edges[edge_begin + e];
-    const PixelSide side = side_of(edge, x, y);
-    if (side == PixelSide::outside) {
-      area_units = crossing = 0;
-      break;
-    }
-    if (side == PixelSide::crossed) {
-      crossing |= 1u << e;
-    } else {
-      area_units += area_beside(edge, y);
-    }
-  }
-  if (has_room) {
-    memory.samples_low[fragment] = memory.samples_high[fragment] = ~0u;
-    memory.area_units[fragment] = area_units;
-    memory.face[fragment] = static_cast<typename Memory::Index>(candidate.a);
-    memory.pixel[fragment] = static_cast<typename Memory::Index>(pixel);
-  }
-  __syncwarp();
-  PICTURA_KEEP_LOOP
-  for (;;) {
-    cuts->push(crossing != 0, static_cast<uint32_t>(fragment),
-               static_cast<uint32_t>(edge_begin + __ffs(static_cast<int>(crossing)) - 1));
-    crossing &= crossing - 1;
-    const bool more = __any_sync(kAllLanes, crossing != 0);
-    PICTURA_KEEP_LOOP
-    while (cuts->is_ready() || (is_last && !more && !cuts->is_empty())) cut_fragments(memory, cuts->take(), part);
-    if (!more) return;
-  }
+  const bool is_left = coverage.area > 0.0f;
+  const int32_t fragment = take_place(&memory.state->num_fragments, is_left);
+  if (!is_left || fragment >= memory.max_fragments) return;
+  keep_fragment(memory, fragment, candidate.a, pixel, coverage.samples, coverage.area, full_of(memory, pixel));
 }
 
 // Makes fragments of those candidates that may show before what covers their pixel fully. Threads put them aside until
 // every lane of a warp has one. All threads of the block.
 template <typename Memory>
 __device__ void make_fragments(const Memory& memory, const Part& part) {
-  WarpState* warp = &memory.state->warps[warp_index()];
-  WarpQueue shown(&warp->pixels), cuts(&warp->cuts);
+  WarpQueue shown(&memory.state->warps[warp_index()].queue);
   const int count = memory.state->num_candidates;
   PICTURA_KEEP_LOOP
   for (;;) {
@@ -239,48 +218,43 @@ __device__ void make_fragments(const Memory& memory, const Part& part) {
               may_show_before(memory.faces[face], memory.faces[full], part.x_of(pixel), part.y_of(pixel), covers_fully);
     }
     shown.push(shows, face, place);
-    if (shown.is_ready() || !more) start_fragments(memory, shown.take(), part, &cuts, !more);
+    if (shown.is_ready() || (!more && !shown.is_empty())) make_fragment(memory, shown.take(), part);
     if (!more) return;
   }
 }
 
-template <typename Memory>
-__device__ void keep_fragment(const Memory& memory, int fragment, int pixel, const PixelCoverage& coverage) {
-  using Index = typename Memory::Index;
-  using Word = typename Memory::Word;
-  const uint64_t reach = reach_of(coverage);
-  memory.area[fragment] = coverage.area;
-  memory.free_low[fragment] = static_cast<uint32_t>(reach);
-  memory.free_high[fragment] = static_cast<uint32_t>(reach >> 32);
-  memory.rank[fragment] = static_cast<Index>(atomicAdd(&memory.pixels[pixel], Word{1}) & Memory::kNone);
-}
-
-// Finishes fragments when all edges have cut them: those that are left get a rank among the fragments of their pixel.
-// Where one covers its pixel, it may intersect the pixel's full face, which then becomes a fragment too.
+// What is free of each fragment is all that it reaches, before others hide some. Where one covers its pixel, it may
+// intersect the pixel's full face, which then becomes a fragment too. Lists the pixels of whose fragments none is
+// alone.
 template <typename Memory>
 __device__ void finish_fragments(const Memory& memory, int count) {
   using Index = typename Memory::Index;
   using Word = typename Memory::Word;
-  constexpr Word kUpperHalf = ~Memory::kNone;
+  auto free_all = [&](int fragment) {
+    const uint64_t reach = reach_of(memory.coverage(fragment));
+    memory.free_low[fragment] = static_cast<uint32_t>(reach);
+    memory.free_high[fragment] = static_cast<uint32_t>(reach >> 32);
+  };
   PICTURA_KEEP_LOOP
-  for (int i = static_cast<int>(threadIdx.x); i < count; i += num_threads()) {
-    const PixelCoverage coverage = rounded_coverage(memory.area_units[i], memory.samples(i));
+  for (int first = warp_index() * kWarpSize; first < count; first += num_threads()) {
+    const int i = first + lane_index();
+    // The last of a chain stands for its pixel.
+    const bool is_listed =
+        i < count && memory.next[i] == static_cast<Index>(Memory::kNone) && !is_alone(memory, i, memory.pixel[i]);
+    const int32_t place = take_place(&memory.state->num_drawn, is_listed);
+    if (is_listed) memory.drawn[place] = memory.pixel[i];
+    if (i >= count) continue;
+    free_all(i);
+    if (!memory.coverage(i).is_full()) continue;
     const int pixel = memory.pixel[i];
-    if (coverage.area <= 0.0f) {
-      memory.pixel[i] = static_cast<Index>(Memory::kNone);
-      continue;
-    }
-    keep_fragment(memory, i, pixel, coverage);
-    if (!coverage.is_full()) continue;
-    const Word full = atomicOr(&memory.pixels[pixel], kUpperHalf) >> Memory::kHalf;
+    const Word full = atomicOr(&memory.pixels[pixel], Memory::kNone << Memory::kHalf) >> Memory::kHalf;
     if (full == Memory::kNone) continue;
-    const int32_t added = atomicAdd(&memory.state->num_fragments, 1);
+    const int32_t added = count + atomicAdd(&memory.state->num_added, 1);
     if (added >= memory.max_fragments) continue;
-    memory.face[added] = static_cast<Index>(full);
-    memory.pixel[added] = static_cast<Index>(pixel);
-    memory.samples_low[added] = memory.samples_high[added] = ~0u;
-    keep_fragment(memory, added, pixel, {1.0f, kAllSamples});
+    keep_fragment(memory, added, static_cast<uint32_t>(full), pixel, kAllSamples, 1.0f, Word{Memory::kNone});
+    free_all(added);
   }
+  if (threadIdx.x == 0) memory.state->next_batch = 0;
 }
 
 }  // namespace pictura::cuda

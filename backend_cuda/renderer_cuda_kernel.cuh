@@ -7,31 +7,77 @@
 
 namespace pictura::cuda {
 
-// Stores a pixel's colour: element `at` of the first channel, and as far behind it as a plane is large for the others.
-__device__ inline void write_color(PixelFormat format, void* images, int64_t at, int64_t plane, Rgb color) {
-  auto write_as = [&](auto* first, auto&& value_of) {
-    first[at] = value_of(color.r);
-    first[at + plane] = value_of(color.g);
-    first[at + 2 * plane] = value_of(color.b);
-  };
-  if (format == PixelFormat::u8) {
-    write_as(static_cast<uint8_t*>(images), [](float channel) { return to_byte(channel); });
-  } else if (format == PixelFormat::f16) {
-    write_as(static_cast<uint16_t*>(images), [](float channel) { return to_half(channel); });
-  } else {
-    write_as(static_cast<float*>(images), [](float channel) { return clamp(channel, 0.0f, 1.0f); });
-  }
-}
+/// Writes pixels of an image, a plane for each channel.
+struct ImageWriter {
+  PixelFormat format;
+  void* images;
+  int64_t first, plane;  // elements: of this image, and from a plane to the next
+  int width_px;
 
-// Writes the optional planes: the front surface at each pixel's centre.
+  __device__ void colors(int x, int y, int count, const Rgb* colors) const {
+    each_channel(x, y, [&](int channel, auto* to, auto&& value_of) {
+      Together<decltype(value_of(0.0f))> values;
+      for (int i = 0; i < kWrittenAtOnce; ++i) {
+        values.value[i] = value_of(channel == 0 ? colors[i].r : channel == 1 ? colors[i].g : colors[i].b);
+      }
+      store(to, count, values);
+    });
+  }
+  __device__ void black(int x, int y, int count) const {
+    each_channel(x, y, [&](int, auto* to, auto&& value_of) { store(to, count, Together<decltype(value_of(0.0f))>{}); });
+  }
+
+ private:
+  template <typename Value>
+  struct alignas(kWrittenAtOnce * sizeof(Value)) Together {
+    Value value[kWrittenAtOnce];
+  };
+
+  // Calls visit(channel, to, value_of): where pixel (x, y) stands, and how channels are written.
+  template <typename Visit>
+  __device__ void each_channel(int x, int y, Visit&& visit) const {
+    int64_t at = first + static_cast<int64_t>(y) * width_px + x;
+    PICTURA_KEEP_LOOP
+    for (int channel = 0; channel < 3; ++channel, at += plane) {
+      if (format == PixelFormat::u8) {
+        visit(channel, static_cast<uint8_t*>(images) + at, [](float value) { return to_byte(value); });
+      } else if (format == PixelFormat::f16) {
+        visit(channel, static_cast<uint16_t*>(images) + at, [](float value) { return to_half(value); });
+      } else {
+        visit(channel, static_cast<float*>(images) + at, [](float value) { return saturate(value); });
+      }
+    }
+  }
+
+  // At once where all are written and lie where such a store may go.
+  template <typename Value>
+  __device__ static void store(Value* to, int count, const Together<Value>& values) {
+    if (count == kWrittenAtOnce && reinterpret_cast<uintptr_t>(to) % sizeof(values) == 0) {
+      *reinterpret_cast<Together<Value>*>(to) = values;
+      return;
+    }
+    for (int i = 0; i < kWrittenAtOnce; ++i) {
+      if (i < count) to[i] = values.value[i];
+    }
+  }
+};
+
+/// Writes nothing.
+struct NoImage {
+  __device__ void colors(int, int, int, const Rgb*) const {}
+  __device__ void black(int, int, int) const {}
+};
+
+// Writes the optional planes of a part: the front surface at each pixel's centre.
 template <typename Memory>
-__device__ __noinline__ void draw_planes(const CameraSlot& slot, int32_t view, int num_faces) {
+__device__ __noinline__ void draw_planes(const CameraSlot& slot, int32_t view, int num_faces, Part part) {
   const Memory memory = Memory::current();
   const int width = width_px(slot.camera);
   const int64_t plane = static_cast<int64_t>(width) * height_px(slot.camera);
   PICTURA_KEEP_LOOP
-  for (int64_t p = threadIdx.x; p < plane; p += num_threads()) {
-    const int x = static_cast<int>(p % width), y = static_cast<int>(p / width);
+  for (int p = static_cast<int>(threadIdx.x); p < part.num_pixels(); p += num_threads()) {
+    const int x = part.x_of(p), y = part.y_of(p);
+    if (x >= part.x_end) continue;
     const Vec2 center = pixel_middle(x, y);
     FrontFace front;
     auto each = [&](auto&& take) {
@@ -45,7 +91,7 @@ __device__ __noinline__ void draw_planes(const CameraSlot& slot, int32_t view, i
     each([&](const ScreenFace& face) { front.offer(face, center); });
     each([&](const ScreenFace& face) { front.offer_again(face, center); });
     const ScreenFace* face = front.front(center, [](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
-    const int64_t at = view * plane + p;
+    const int64_t at = view * plane + static_cast<int64_t>(y) * width + x;
     const float infinity = __uint_as_float(0x7F800000u);
     if (slot.depth_m) slot.depth_m[at] = face ? face_depth_m(*face, center) : infinity;
     if (slot.class_id) slot.class_id[at] = face ? face->class_id : uint8_t{0};
@@ -53,34 +99,23 @@ __device__ __noinline__ void draw_planes(const CameraSlot& slot, int32_t view, i
   }
 }
 
-// Draws the image that state->shown tells of. False where it has outgrown the block's memory.
+// Draws a part of the image that state->shown tells of. False where it has outgrown the block's memory.
 template <typename Memory>
-__device__ bool draw_image(const Memory& memory, const DrawTask& task, int32_t view, int32_t camera) {
+__device__ bool draw_image_part(const Memory& memory, const DrawTask& task, int32_t view, int32_t camera,
+                                const Part& part) {
   const CameraSlot& slot = task.cameras[camera];
-  const int width = width_px(slot.camera), height = height_px(slot.camera);
-  if (width > memory.max_pixels) return false;
-  const int num_faces = memory.state->shown.face_count;
-  const int64_t plane = static_cast<int64_t>(width) * height;
-  const int64_t first = view * slot.view_stride;
-  const bool drawn = draw_faces(memory, num_faces, 0, height, NoVisit{}, [&](int x, int y, Rgb color) {
-    write_color(task.format, slot.color, first + y * width + x, plane, color);
-  });
-  if (drawn && task.wants_planes) draw_planes<Memory>(slot, view, num_faces);
-  return drawn;
+  const int width = width_px(slot.camera), num_faces = memory.state->shown.face_count;
+  const ImageWriter writer{task.format, slot.color, view * slot.view_stride,
+                           static_cast<int64_t>(width) * height_px(slot.camera), width};
+  if (!draw_faces(memory, num_faces, part, NoVisit{}, writer)) return false;
+  if (task.wants_planes) draw_planes<Memory>(slot, view, num_faces, part);
+  return true;
 }
 
 __device__ inline void leave_to_last(const DrawTask& task, int32_t image) {
   task.overflow_images[atomicAdd(&task.counters->overflow, 1)] = image;
 }
 
-// The next number of a counter, below `count`; -1: none is left. All threads of the block.
-__device__ inline int32_t next_of_round(int32_t* counter, int32_t count) {
-  BlockState* state = block_state();
-  sync_block();
-  if (threadIdx.x == 0) state->image = atomicAdd(counter, 1);
-  sync_block();
-  return state->image < count ? state->image : -1;
-}
 __device__ inline int32_t view_of(const DrawTask& task, int32_t image) {
   return task.first_view + image / num_cameras(task);
 }
@@ -201,22 +236,38 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kClipBlocksPerProce
 extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcessor)
     pictura_draw(const __grid_constant__ DrawTask task) {
   BlockState* state = block_state();
+  const int tiles = most_tiles(task);
+  const int32_t count = images_of_round(task) * tiles;
+  int32_t* const counter = &task.counters->rounds[task.round_index].next_drawn;
+  // The first thread asks for the next tile while the block draws one.
+  int32_t next = threadIdx.x == 0 ? atomicAdd(counter, 1) : 0;
+  reset_part(SmallDrawMemory::current());
   PICTURA_KEEP_LOOP
   for (;;) {
-    const int32_t i = next_of_round(&task.counters->rounds[task.round_index].next_drawn, images_of_round(task));
-    if (i < 0) return;
-    const int32_t image = image_of_round(task, i);
     if (threadIdx.x == 0) {
-      state->shown = task.pool.images[image];
-      state->faces = task.pool.faces + state->shown.face_begin;
-      state->edges = task.pool.edges;
+      state->image = next;
+      if (next < count) {
+        state->shown = task.pool.images[image_of_round(task, next / tiles)];
+        state->faces = task.pool.faces + state->shown.face_begin;
+        state->edges = task.pool.edges;
+      }
     }
     sync_block();
-    if (state->shown.face_count < 0) continue;
-    if (!draw_image(SmallDrawMemory::current(), task, view_of(task, image), camera_of(task, image)) &&
-        threadIdx.x == 0) {
-      leave_to_last(task, image);
+    if (state->image >= count) return;
+    const int32_t image = image_of_round(task, state->image / tiles), tile = state->image % tiles;
+    if (threadIdx.x == 0) next = atomicAdd(counter, 1);
+    const int32_t camera = camera_of(task, image);
+    const PinholeCamera& shows = task.cameras[camera].camera;
+    const int width = width_px(shows), height = height_px(shows), across = tiles_across(width);
+    if (tile < tiles_of(width, height) && state->shown.face_count >= 0) {
+      const int x = tile % across * kTileWidth_px, y = tile / across * kTileHeight_px;
+      const Part part{x, min_of(x + kTileWidth_px, width), y, min_of(y + kTileHeight_px, height)};
+      if (!draw_image_part(SmallDrawMemory::current(), task, view_of(task, image), camera, part) && threadIdx.x == 0 &&
+          atomicExch(&task.pool.images[image].is_left_to_last, 1) == 0) {
+        leave_to_last(task, image);
+      }
     }
+    sync_block();
   }
 }
 
@@ -227,9 +278,13 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
   PICTURA_KEEP_LOOP
   for (int32_t i = static_cast<int32_t>(blockIdx.x); i < count; i += static_cast<int32_t>(gridDim.x)) {
     const int32_t image = task.overflow_images[i], view = view_of(task, image), camera = camera_of(task, image);
-    if (!gather(task, view, camera) || !draw_image(LargeDrawMemory::current(), task, view, camera)) {
-      if (threadIdx.x == 0) note_fault(task, view, kNoRoom);
-    }
+    const PinholeCamera& shows = task.cameras[camera].camera;
+    const bool is_drawn =
+        gather(task, view, camera) && each_tile(LargeDrawMemory::current(), width_px(shows), 0, height_px(shows),
+                                                [&](const LargeDrawMemory& memory, const Part& part) {
+                                                  return draw_image_part(memory, task, view, camera, part);
+                                                });
+    if (!is_drawn && threadIdx.x == 0) note_fault(task, view, kNoRoom);
   }
 }
 
@@ -264,12 +319,14 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
       for (int i = 0; i < num_faces; ++i) {
         const ScreenFace& face = state->faces[i];
         if (face.number != number || face.box.y_begin >= face.box.y_end) continue;
-        y_begin = min_of(y_begin, face.box.y_begin);
-        y_end = max_of(y_end, face.box.y_end);
+        y_begin = min_of(y_begin, int{face.box.y_begin});
+        y_end = max_of(y_end, int{face.box.y_end});
       }
       auto weigh = [&](double* sum) {
-        draw_faces(LargeDrawMemory::current(), num_faces, y_begin, y_end, WeighAgent{number, sum},
-                   [](int, int, Rgb) {});
+        each_tile(LargeDrawMemory::current(), state->making.setting.camera.width_px, y_begin, y_end,
+                  [&](const LargeDrawMemory& memory, const Part& part) {
+                    return draw_faces(memory, num_faces, part, WeighAgent{number, sum}, NoImage{});
+                  });
       };
       weigh(&seen);
       // Once more, without all others.

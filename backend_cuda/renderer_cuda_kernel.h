@@ -1,5 +1,5 @@
 // What the host tells the drawing kernels. Three launches gather the faces of images in a pool, the next draws them, a
-// block an image at a time; four more launches do the same with what the pool had no room for, and so on. What has
+// block a tile at a time; four more launches do the same with what the pool had no room for, and so on. What has
 // outgrown a block's memory is left to a last launch of few blocks, whose memory has room for all that a world can
 // hold.
 #pragma once
@@ -9,6 +9,13 @@
 namespace pictura::cuda {
 
 constexpr int kMaxCameras = 64;
+
+/// Images are drawn tile by tile, upright ones, because what is far away crowds along the horizon.
+constexpr int kTileWidth_px = 32, kTileHeight_px = 54;
+PICTURA_HD constexpr int tiles_across(int width_px) { return (width_px + kTileWidth_px - 1) / kTileWidth_px; }
+PICTURA_HD constexpr int tiles_of(int width_px, int height_px) {
+  return tiles_across(width_px) * ((height_px + kTileHeight_px - 1) / kTileHeight_px);
+}
 
 /// Where one camera's images go; strides as in CameraImages.
 struct CameraSlot {
@@ -54,6 +61,7 @@ struct GatheredImage {
   Vec3 eye_m;
   const DeviceGeometry* geometry = nullptr;
   const AgentBox* agents = nullptr;  // the first of its world
+  int32_t is_left_to_last = 0;       // 1: to the last launch, when it was found too crowded
 };
 
 /// A face of four corners, in camera coordinates.
@@ -130,7 +138,7 @@ constexpr int kRounds = 3;
 /// What the blocks of a batch's launches count together; 0 before.
 struct DrawCounters {
   struct Round {
-    int32_t next_culled = 0, next_batch = 0, next_clipped = 0, next_drawn = 0;
+    int32_t next_culled = 0, next_batch = 0, next_clipped = 0, next_drawn = 0;  // the last counts tiles
     GatherCounts listed;
     int32_t faces = 0, clipped_edges = 0;  // of the pool that are taken
     int32_t postponed = 0;                 // images
@@ -141,8 +149,8 @@ struct DrawCounters {
 struct DrawTask {
   SceneBatch scene;  // in device memory, like all that follows
   const View* views = nullptr;
-  int32_t first_view = 0;  // views [first_view, first_view + num_views) are drawn
-  int32_t num_views = 0, num_cameras = 0;
+  int32_t first_view = 0;                                  // views [first_view, first_view + num_views) are drawn
+  int32_t num_views = 0, num_cameras = 0, most_tiles = 0;  // most_tiles: of an image
   const DeviceGeometry* geometries = nullptr;
   int32_t num_geometries = 0;
   int32_t max_world_agents = 0;

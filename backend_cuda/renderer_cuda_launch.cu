@@ -40,7 +40,8 @@ cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& 
   const LaunchShape to_cull{min_of(images, gather_blocks), kGatherThreads, cull_bytes()};
   const LaunchShape to_gather{gather_blocks, kGatherThreads, state_bytes(kGatherThreads)};
   const LaunchShape to_clip{kClipBlocksPerProcessor * processors, kGatherThreads, gather_bytes(kGatherThreads)};
-  const LaunchShape to_draw{min_of(images, kDrawBlocksPerProcessor * processors), kDrawThreads, draw_bytes()};
+  const LaunchShape to_draw{min_of(images * task.most_tiles, kDrawBlocksPerProcessor * processors), kDrawThreads,
+                            draw_bytes()};
   for (task.round_index = 0; task.round_index < kRounds; ++task.round_index) {
     cudaError_t status = launch(kernels.cull, to_cull, stream, task);
     if (status != cudaSuccess) return status;

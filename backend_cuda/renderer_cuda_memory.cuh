@@ -3,16 +3,17 @@
 #pragma once
 
 #include "pictura/backend_cuda/renderer_cuda_block.cuh"
+#include "pictura/common/raster_pixel.h"
 
 namespace pictura::cuda {
 
 // A block that gathers faces: a warp, as many of them as a processor takes.
 constexpr int kGatherThreads = 32, kGatherBlocksPerProcessor = 32, kClipBlocksPerProcessor = 24;
-// A block that draws them. What has more fragments or pixels is drawn in parts.
-constexpr int kDrawThreads = 512, kDrawBlocksPerProcessor = 2;
-constexpr int kDrawPixels = 96 * 54, kDrawFragments = 2304;
-// A block of the last launch. Pixels: a row of the widest image at least.
-constexpr int kLargeThreads = 128, kLargePixels = 1 << 14, kLargeFragments = 1 << 17;
+// A block that draws them, a tile of an image at a time. What has more fragments is drawn in parts.
+constexpr int kDrawThreads = 256, kDrawBlocksPerProcessor = 4;
+constexpr int kDrawPixels = kTileWidth_px * kTileHeight_px, kDrawFragments = 1152;
+// A block of the last launch.
+constexpr int kLargeThreads = 128, kLargePixels = kTileWidth_px * 512, kLargeFragments = 1 << 17;
 
 // Faces that the mark of a pixel's nearest full face can tell apart in 32 bits.
 constexpr int kMarkedFaceBits = 11, kMostMarkedFaces = (1 << kMarkedFaceBits) - 1;
@@ -31,17 +32,16 @@ struct DrawMemory {
   BlockState* state;
   const ScreenFace* faces;   // of the image
   const PolygonEdge* edges;  // that its faces name
-  Word* pixels;              // [max_pixels + 1] of the part of the image that is drawn
-  Word* rows;                // [max_rows] of faces: in the upper half the face, in the lower the row of the part
-  Word* candidates;          // [max_candidates] that may become fragments: face, and pixel
+  // [max_pixels] of the part of the image that is drawn. First the mark of the nearest face that covers a pixel fully;
+  // then in the upper half that face, in the lower the first fragment of the pixel's chain, kNone for none of either.
+  Word* pixels;
+  Word* rows;        // [max_rows] of faces: in the upper half the face, in the lower the row of the part
+  Word* candidates;  // [max_candidates] that may become fragments: face, and pixel
   // Fragments.
   uint32_t *samples_low, *samples_high, *free_low, *free_high;  // [max_fragments]
   float* area;                                                  // [max_fragments]
-  int32_t* area_units;                                          // ... before it is known
-  Index *face, *pixel;                                          // [max_fragments]
-  Index* rank;                                                  // [max_fragments] among the fragments of its pixel
-  uint8_t* kind;                                                // ... and in the end what its weight counts as
-  Index* order;                                                 // [max_fragments] pixel by pixel
+  Index *face, *pixel, *next;                                   // [max_fragments] next: of the pixel's chain, or kNone
+  Index* kind;                                                  // ... in the end, where `pixel` stood: of its weight
   Index* drawn;                                                 // [max_fragments] pixels that have fragments
   int32_t max_pixels, max_rows, max_candidates, max_fragments;
 
@@ -52,6 +52,27 @@ struct DrawMemory {
   __device__ uint64_t free(int fragment) const {
     return static_cast<uint64_t>(free_high[fragment]) << 32 | free_low[fragment];
   }
+  // Once a fragment is weighed, there stands where its samples did what it adds to its pixel's sum; in the end, of the
+  // first of a pixel's chain, the pixel's colour.
+  __device__ void set_part(int fragment, const PixelSum::Part& part) const {
+    samples_low[fragment] = static_cast<uint32_t>(part.area);
+    samples_high[fragment] = static_cast<uint32_t>(part.r);
+    free_low[fragment] = static_cast<uint32_t>(part.g);
+    free_high[fragment] = static_cast<uint32_t>(part.b);
+  }
+  __device__ PixelSum::Part part(int fragment) const {
+    return {static_cast<int32_t>(samples_low[fragment]), static_cast<int32_t>(samples_high[fragment]),
+            static_cast<int32_t>(free_low[fragment]), static_cast<int32_t>(free_high[fragment])};
+  }
+  __device__ void set_color(int fragment, Rgb color) const {
+    samples_low[fragment] = __float_as_uint(color.r);
+    samples_high[fragment] = __float_as_uint(color.g);
+    free_low[fragment] = __float_as_uint(color.b);
+  }
+  __device__ Rgb color(int fragment) const {
+    return {__uint_as_float(samples_low[fragment]), __uint_as_float(samples_high[fragment]),
+            __uint_as_float(free_low[fragment])};
+  }
 };
 
 // Puts arrays side by side.
@@ -61,33 +82,31 @@ struct Layout {
   template <typename Value>
   __host__ __device__ void place(Value** array, int count) {
     *array = reinterpret_cast<Value*>(bytes + used);
-    used += (static_cast<size_t>(count) * sizeof(Value) + 7) / 8 * 8;
+    used += (static_cast<size_t>(count) * sizeof(Value) + 15) / 16 * 16;
   }
 };
 
 // Lays out what drawing keeps from `bytes` on, and returns how many bytes that takes. Rows lie where samples do later,
-// candidates where what is free of fragments and their order do.
+// candidates where what is free of fragments does, and pixels that have some.
 template <typename Memory>
 __host__ __device__ size_t lay_out(Memory* memory, int max_pixels, int max_fragments, unsigned char* bytes) {
   memory->max_pixels = max_pixels;
   memory->max_fragments = max_fragments;
   Layout layout{bytes};
-  layout.place(&memory->pixels, max_pixels + 1);
+  layout.place(&memory->pixels, max_pixels);
   layout.place(&memory->area, max_fragments);
   layout.place(&memory->face, max_fragments);
   layout.place(&memory->pixel, max_fragments);
-  layout.place(&memory->rank, max_fragments);
+  layout.place(&memory->next, max_fragments);
   const size_t rows_begin = layout.used;
   layout.place(&memory->samples_low, max_fragments);
   layout.place(&memory->samples_high, max_fragments);
   const size_t candidates_begin = layout.used;
   layout.place(&memory->free_low, max_fragments);
   layout.place(&memory->free_high, max_fragments);
-  layout.place(&memory->order, max_fragments);
   layout.place(&memory->drawn, max_fragments);
+  memory->kind = memory->pixel;
   using Word = typename Memory::Word;
-  memory->area_units = reinterpret_cast<int32_t*>(memory->area);
-  memory->kind = reinterpret_cast<uint8_t*>(memory->rank);
   memory->rows = reinterpret_cast<Word*>(bytes + rows_begin);
   memory->max_rows = static_cast<int32_t>((candidates_begin - rows_begin) / sizeof(Word));
   memory->candidates = reinterpret_cast<Word*>(bytes + candidates_begin);

@@ -6,57 +6,6 @@
 
 namespace pictura::cuda {
 
-// Turns the number of fragments of each pixel of a part into the place of its first among them all, and lists the
-// pixels that have some. The pixel beyond the last has the place beyond the last. All threads of the block.
-template <typename Memory>
-__device__ void place_fragments(const Memory& memory, const Part& part) {
-  using Index = typename Memory::Index;
-  using Word = typename Memory::Word;
-  BlockState* state = memory.state;
-  const int pixels = part.num_pixels();
-  // An odd number for each thread, so that threads read different banks.
-  const int each = (pixels + num_threads() - 1) / num_threads() | 1;
-  const int begin = min_of(static_cast<int>(threadIdx.x) * each, pixels), end = min_of(begin + each, pixels);
-  int fragments = 0, drawn = 0;
-  PICTURA_KEEP_LOOP
-  for (int p = begin; p < end; ++p) {
-    const int count = static_cast<int>(memory.pixels[p] & Memory::kNone);
-    fragments += count;
-    drawn += count > 0 ? 1 : 0;
-  }
-  int all_fragments = 0, all_drawn = 0;
-  int place = sum_before(state->sum_of_warp[0], fragments, &all_fragments);
-  int drawn_place = sum_before(state->sum_of_warp[1], drawn, &all_drawn);
-  PICTURA_KEEP_LOOP
-  for (int p = begin; p < end; ++p) {
-    const Word word = memory.pixels[p];
-    memory.pixels[p] = (word & ~Memory::kNone) | static_cast<Word>(place);
-    place += static_cast<int>(word & Memory::kNone);
-    if ((word & Memory::kNone) != 0) memory.drawn[drawn_place++] = static_cast<Index>(p);
-  }
-  if (threadIdx.x == 0) {
-    memory.pixels[pixels] = static_cast<Word>(all_fragments);
-    state->num_drawn = all_drawn;
-  }
-}
-
-template <typename Memory>
-__device__ int place_of(const Memory& memory, int pixel) {
-  return static_cast<int>(memory.pixels[pixel] & Memory::kNone);
-}
-
-// Lists the fragments pixel by pixel.
-template <typename Memory>
-__device__ void order_fragments(const Memory& memory, int count) {
-  using Index = typename Memory::Index;
-  PICTURA_KEEP_LOOP
-  for (int i = static_cast<int>(threadIdx.x); i < count; i += num_threads()) {
-    const Index pixel = memory.pixel[i];
-    if (pixel == static_cast<Index>(Memory::kNone)) continue;
-    memory.order[place_of(memory, pixel) + memory.rank[i]] = static_cast<Index>(i);
-  }
-}
-
 // Whether, in the image that the block draws, a solid stands on a strip.
 __device__ __noinline__ inline bool stands(uint32_t solid, uint32_t strip) {
   const GatheredImage& shown = block_state()->shown;
@@ -89,42 +38,45 @@ __device__ __noinline__ void ask_pairs(WarpQueue::Pair pair, Part part) {
   if (!with_full) lose(memory, pair.b, hidden.of_b);
 }
 
-// Asks every two fragments of a pixel that meet what they hide of each other; a pixel's full face is one of them. Pairs
-// that meet are put aside until every lane of the warp has one. Fragments are dealt out: in a crowded pixel those of
-// one face, which stand side by side, have many others each.
+// Asks every two fragments of a pixel that meet what they hide of each other; a pixel's full face is one of them. A
+// lane walks the rest of the chain behind a fragment, one step at a time, and takes the next fragment at its end; the
+// last made first, because theirs are the longest ways. Pairs that meet are put aside until every lane of the warp has
+// one.
 template <typename Memory>
 __device__ void hide_fragments(const Memory& memory, const Part& part, int count) {
-  using Index = typename Memory::Index;
-  WarpState* warp = &memory.state->warps[warp_index()];
-  WarpQueue pairs(&warp->pixels);
-  const int deals = deals_of(count);
+  WarpQueue pairs(&memory.state->warps[warp_index()].queue);
+  int begin = 0, used = kWarpSize;  // the warp's fragments of the list, and how many of them lanes have taken
+  int fragment = 0;
+  uint32_t other = Memory::kNone;  // of the chain
+  bool is_before_full = false;     // the full face comes first
+  PixelCoverage coverage;
   PICTURA_KEEP_LOOP
-  for (int deal = warp_index(); deal < deals; deal += num_warps()) {
-    auto fragment_of = [&](int lane) { return lane * deals + deal; };
-    const int i = fragment_of(lane_index());
-    int others = 0, rank = 0, place = 0;
-    if (i < count && memory.pixel[i] != static_cast<Index>(Memory::kNone)) {
-      const int pixel = memory.pixel[i];
-      place = place_of(memory, pixel);
-      rank = memory.rank[i];
-      others = rank + (full_of(memory, pixel) != Memory::kNone ? 1 : 0);
+  for (;;) {
+    const bool is_idle = !is_before_full && other == Memory::kNone;
+    const unsigned idle = __ballot_sync(kAllLanes, is_idle);
+    if (idle == kAllLanes && begin >= count) break;
+    if (used >= kWarpSize && begin < count) {
+      begin = next_of(&memory.state->next_batch) * kWarpSize;
+      used = 0;
     }
-    share_out(warp, others, [&](int owner, int k) {
-      const int from = max_of(owner, 0);
-      const int its_rank = __shfl_sync(kAllLanes, rank, from), its_place = __shfl_sync(kAllLanes, place, from);
-      bool meet = false;
-      uint32_t other = static_cast<uint32_t>(Memory::kNone);
-      if (owner >= 0) {
-        meet = k == its_rank;
-        if (!meet) {
-          other = static_cast<uint32_t>(memory.order[its_place + k]);
-          const PixelCoverage coverage = memory.coverage(fragment_of(owner));
-          meet = shared_samples(coverage, memory.coverage(static_cast<int>(other))) != 0;
-        }
-      }
-      pairs.push(meet, static_cast<uint32_t>(fragment_of(from)), other);
-      if (pairs.is_ready()) ask_pairs<Memory>(pairs.take(), part);
-    });
+    const int place = used + __popc(idle & lanes_below());
+    used += __popc(idle);
+    if (is_idle && place < kWarpSize && begin + place < count) {
+      fragment = count - 1 - (begin + place);
+      coverage = memory.coverage(fragment);
+      other = memory.next[fragment];
+      is_before_full = full_of(memory, memory.pixel[fragment]) != Memory::kNone;
+    }
+    uint32_t with = Memory::kNone;
+    bool meet = is_before_full;
+    if (!is_before_full && other != Memory::kNone) {
+      with = other;
+      meet = shared_samples(coverage, memory.coverage(static_cast<int>(with))) != 0;
+      other = memory.next[with];
+    }
+    is_before_full = false;
+    pairs.push(meet, static_cast<uint32_t>(fragment), with);
+    if (pairs.is_ready()) ask_pairs<Memory>(pairs.take(), part);
   }
   if (!pairs.is_empty()) ask_pairs<Memory>(pairs.take(), part);
 }
@@ -135,135 +87,185 @@ struct NoVisit {
   __device__ void operator()(const ScreenFace&, float) const {}
 };
 
-// Weighs fragments: what is free of them is not needed from then on.
-template <typename Memory>
-__device__ void weigh_fragments(const Memory& memory, int count) {
+// Weighs fragments. What is alone in its pixel gives that its colour; what the others add to the sums of theirs, and
+// what kind of weight that is, stands from then on where their samples and pixels did.
+template <typename Memory, typename Visit>
+__device__ void weigh_fragments(const Memory& memory, int count, const Visit& visit) {
   PICTURA_KEEP_LOOP
   for (int i = static_cast<int>(threadIdx.x); i < count; i += num_threads()) {
+    const ScreenFace& face = memory.faces[memory.face[i]];
+    const Rgb color = face.color;
+    if (is_alone(memory, i, memory.pixel[i])) {
+      visit(face, memory.area[i]);
+      memory.set_color(i, color * memory.area[i]);
+      continue;
+    }
     const PixelSum::Weight weight = PixelSum::weight_of(memory.coverage(i), memory.free(i));
+    memory.set_part(i, PixelSum::part_of(weight, color));
     memory.area[i] = weight.area;
     memory.kind[i] = weight.kind;
   }
 }
 
-// The colour of a pixel that has fragments: visit(face, weight) hears of each.
+// Mixes the colours of those pixels of a part that have more than one fragment: visit(face, weight) hears of each.
 template <typename Memory, typename Visit>
-__device__ Rgb mix_pixel(const Memory& memory, int pixel, const Visit& visit) {
-  const auto full = full_of(memory, pixel);
-  const int begin = place_of(memory, pixel), end = place_of(memory, pixel + 1);
-  auto face_of = [&](int i) -> const ScreenFace& { return memory.faces[memory.face[i]]; };
-  auto weight_of = [&](int i) { return PixelSum::Weight{memory.area[i], static_cast<PixelSum::Kind>(memory.kind[i])}; };
-  if (end - begin == 1 && full == Memory::kNone) {
-    const int i = memory.order[begin];
-    visit(face_of(i), memory.area[i]);
-    return face_of(i).color * memory.area[i];
-  }
-  // Nothing hides the full face but what covers the pixel too, and then it is a fragment.
-  const PixelSum::Weight of_full = PixelSum::weight_of({1.0f, kAllSamples}, kAllSamples);
-  PixelSum sum;
-  if (full != Memory::kNone) sum.add(of_full, memory.faces[full].color);
+__device__ void mix_pixels(const Memory& memory, const Visit& visit) {
+  const int num_drawn = memory.state->num_drawn;
   PICTURA_KEEP_LOOP
-  for (int at = begin; at < end; ++at) {
-    const int i = memory.order[at];
-    sum.add(weight_of(i), face_of(i).color);
-  }
-  const PixelSum::Shares shares = sum.shares();
-  if constexpr (Visit::kWanted) {
-    if (full != Memory::kNone) visit(memory.faces[full], shares.of(of_full));
-    PICTURA_KEEP_LOOP
-    for (int at = begin; at < end; ++at) {
-      const int i = memory.order[at];
-      visit(face_of(i), shares.of(weight_of(i)));
-    }
-  }
-  return sum.color(shares);
-}
-
-// Finishes the pixels of a part: those without fragments first, then those that have some.
-template <typename Memory, typename Visit, typename Finish>
-__device__ void finish_pixels(const Memory& memory, const Part& part, const Visit& visit, Finish&& finish) {
-  const int pixels = part.num_pixels(), num_drawn = memory.state->num_drawn;
-  PICTURA_KEEP_LOOP
-  for (int pixel = static_cast<int>(threadIdx.x); pixel < pixels; pixel += num_threads()) {
-    const int x = part.x_of(pixel), y = part.y_of(pixel);
-    if (x < part.x_begin || x >= part.x_end || place_of(memory, pixel) != place_of(memory, pixel + 1)) continue;
+  for (int d = static_cast<int>(threadIdx.x); d < num_drawn; d += num_threads()) {
+    const int pixel = memory.drawn[d];
     const auto full = full_of(memory, pixel);
-    Rgb color;
-    if (full != Memory::kNone) {
-      const ScreenFace& face = memory.faces[full];
-      visit(face, 1.0f);
-      color = face.color;
+    const auto head = static_cast<int>(first_of(memory, pixel));
+    auto each_fragment = [&](auto&& take) {
+      PICTURA_KEEP_LOOP
+      for (auto i = first_of(memory, pixel); i != Memory::kNone; i = memory.next[i]) {
+        take(static_cast<int>(i), static_cast<PixelSum::Kind>(memory.kind[i]));
+      }
+    };
+    // Nothing hides the full face but what covers the pixel too, and then it is a fragment.
+    const PixelSum::Weight of_full = PixelSum::weight_of({1.0f, kAllSamples}, kAllSamples);
+    PixelSum sum;
+    if (full != Memory::kNone) sum.add(of_full, memory.faces[full].color);
+    each_fragment([&](int i, PixelSum::Kind kind) { sum.add(kind, memory.part(i)); });
+    const PixelSum::Shares shares = sum.shares();
+    if constexpr (Visit::kWanted) {
+      if (full != Memory::kNone) visit(memory.faces[full], shares.of(of_full));
+      each_fragment(
+          [&](int i, PixelSum::Kind kind) { visit(memory.faces[memory.face[i]], shares.of({memory.area[i], kind})); });
     }
-    finish(x, y, color);
-  }
-  PICTURA_KEEP_LOOP
-  for (int i = static_cast<int>(threadIdx.x); i < num_drawn; i += num_threads()) {
-    const int pixel = memory.drawn[i];
-    finish(part.x_of(pixel), part.y_of(pixel), mix_pixel(memory, pixel, visit));
+    memory.set_color(head, sum.color(shares));
   }
 }
 
-// Draws the faces into one part. False where it has no room for all that it lists. All threads of the block.
-template <typename Memory, typename Visit, typename Finish>
-__device__ bool draw_part(const Memory& memory, int num_faces, const Part& part, const Visit& visit, Finish&& finish) {
-  BlockState* state = memory.state;
+// Pixels side by side that a thread writes together.
+constexpr int kWrittenAtOnce = 4;
+
+// Hands on the pixels of a part, a few side by side for each thread, and marks none from then on.
+template <typename Memory, typename Visit, typename Write>
+__device__ void write_pixels(const Memory& memory, const Part& part, const Visit& visit, const Write& write) {
+  using Word = typename Memory::Word;
   const int pixels = part.num_pixels();
+  PICTURA_KEEP_LOOP
+  for (int first = kWrittenAtOnce * static_cast<int>(threadIdx.x); first < pixels;
+       first += kWrittenAtOnce * num_threads()) {
+    const int x = part.x_of(first), y = part.y_of(first), count = min_of(part.x_end - x, kWrittenAtOnce);
+    Word word[kWrittenAtOnce], all = ~Word{0};
+    for (int i = 0; i < kWrittenAtOnce; ++i) {
+      all &= word[i] = memory.pixels[first + i];
+      memory.pixels[first + i] = 0;
+    }
+    if (count <= 0) continue;
+    if (all == ~Word{0}) {
+      write.black(x, y, count);
+      continue;
+    }
+    Rgb color[kWrittenAtOnce];
+    for (int i = 0; i < kWrittenAtOnce; ++i) {
+      const Word full = word[i] >> Memory::kHalf, head = word[i] & Memory::kNone;
+      if (i >= count || word[i] == ~Word{0}) continue;
+      if (head != Memory::kNone) {
+        color[i] = memory.color(static_cast<int>(head));
+      } else {
+        visit(memory.faces[full], 1.0f);
+        color[i] = memory.faces[full].color;
+      }
+    }
+    write.colors(x, y, count, color);
+  }
+}
+
+// What a part finds when it begins: nothing is marked, listed or counted. Once for a block's first part, and after one
+// that was given up. All threads of the block.
+template <typename Memory>
+__device__ void reset_counts(const Memory& memory) {
+  BlockState* state = memory.state;
+  if (threadIdx.x != 0) return;
+  state->num_rows = state->num_candidates = state->num_fragments = state->num_added = state->num_drawn =
+      state->next_batch = 0;
+}
+template <typename Memory>
+__device__ void reset_part(const Memory& memory) {
   sync_block();
   PICTURA_KEEP_LOOP
-  for (int p = static_cast<int>(threadIdx.x); p < pixels; p += num_threads()) memory.pixels[p] = 0;
-  if (threadIdx.x == 0) state->num_rows = state->num_candidates = state->num_fragments = state->next_batch = 0;
+  for (int p = static_cast<int>(threadIdx.x); p < memory.max_pixels; p += num_threads()) memory.pixels[p] = 0;
+  reset_counts(memory);
   sync_block();
+}
+
+// Draws the faces into one part, and leaves all as a next one is to find it. False, and nothing left so, where it has
+// no room for all that it lists. All threads of the block.
+template <typename Memory, typename Visit, typename Write>
+__device__ bool draw_part(const Memory& memory, int num_faces, const Part& part, const Visit& visit,
+                          const Write& write) {
+  BlockState* state = memory.state;
   list_rows(memory, num_faces, part);
   sync_block();
   if (state->num_rows > memory.max_rows) return false;
   mark_and_list(memory, part);
   sync_block();
   if (state->num_candidates > memory.max_candidates) return false;
-  start_counts(memory, part);
+  start_chains(memory, part);
   sync_block();
   make_fragments(memory, part);
   sync_block();
   const int made = state->num_fragments;
   if (made > memory.max_fragments) return false;
-  sync_block();
   finish_fragments(memory, made);
   sync_block();
-  const int count = state->num_fragments;
+  const int count = made + state->num_added;
   if (count > memory.max_fragments) return false;
-  place_fragments(memory, part);
-  sync_block();
-  order_fragments(memory, count);
-  sync_block();
   hide_fragments(memory, part, count);
   sync_block();
-  weigh_fragments(memory, count);
+  weigh_fragments(memory, count, visit);
   sync_block();
-  finish_pixels(memory, part, visit, finish);
+  mix_pixels(memory, visit);
+  sync_block();
+  reset_counts(memory);
+  write_pixels(memory, part, visit, write);
+  sync_block();
   return true;
 }
 
-// Draws the faces into rows [y_first, y_last), in parts for which there is room. visit(face, weight) hears of each
-// fragment, finish(x, y, color) of each pixel. False where there is no room for a single pixel. All threads of the
-// block.
-template <typename Memory, typename Visit, typename Finish>
-__device__ bool draw_faces(const Memory& memory, int num_faces, int y_first, int y_last, const Visit& visit,
-                           Finish&& finish) {
-  const int width = image_width(), most_rows = memory.max_pixels / width;
-  int x = 0, y = y_first, rows = most_rows, columns = width;
+// Draws the faces into a part of an image, in smaller ones where there is no room for all of it. visit(face, weight)
+// hears of each fragment, write.colors(x, y, count, colors) and write.black(x, y, count) of pixels side by
+// side. False where there is no room for a single pixel. All threads of the block.
+template <typename Memory, typename Visit, typename Write>
+__device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whole, const Visit& visit,
+                           const Write& write) {
+  int x = whole.x_begin, y = whole.y_begin;
+  int rows = whole.y_end - whole.y_begin, columns = whole.x_end - whole.x_begin;
+  const int most_rows = rows, most_columns = columns;
   PICTURA_KEEP_LOOP
-  while (y < y_last) {
-    const Part part{y, min_of(y + rows, y_last), x, min_of(x + columns, width)};
-    if (!draw_part(memory, num_faces, part, visit, finish)) {
+  while (y < whole.y_end) {
+    const Part part{x, min_of(x + columns, whole.x_end), y, min_of(y + rows, whole.y_end)};
+    if (!draw_part(memory, num_faces, part, visit, write)) {
+      reset_part(memory);
       if (rows == 1 && columns == 1) return false;
       if (rows == 1) columns = (columns + 1) / 2;
       rows = (rows + 1) / 2;
       continue;
     }
-    x = part.x_end % width;
-    if (x != 0) continue;
+    x = part.x_end;
+    if (x < whole.x_end) continue;
+    x = whole.x_begin;
     y = part.y_end;
-    columns = width;
+    columns = most_columns;
     rows = min_of(2 * rows, most_rows);
+  }
+  return true;
+}
+
+// Tiles of an image as high as there is room for, one after the other: draw(memory, tile) for each, until one is false.
+template <typename Memory, typename Draw>
+__device__ bool each_tile(const Memory& memory, int width_px, int y_begin, int y_end, const Draw& draw) {
+  const int most_rows = memory.max_pixels / kTileWidth_px;
+  reset_part(memory);
+  PICTURA_KEEP_LOOP
+  for (int y = y_begin; y < y_end; y += most_rows) {
+    PICTURA_KEEP_LOOP
+    for (int x = 0; x < width_px; x += kTileWidth_px) {
+      if (!draw(memory, Part{x, min_of(x + kTileWidth_px, width_px), y, min_of(y + most_rows, y_end)})) return false;
+    }
   }
   return true;
 }

@@ -25,18 +25,21 @@
 #if defined(__CUDACC_RTC__)
 namespace pictura {
 using uint8_t = unsigned char;
+using int16_t = short;
 using int32_t = int;
 using uint16_t = unsigned short;
 using uint32_t = unsigned int;
 using int64_t = long long;
 using uint64_t = unsigned long long;
 using size_t = unsigned long;
+using uintptr_t = unsigned long;
 }  // namespace pictura
 #else
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 namespace pictura {
+using std::int16_t;
 using std::int32_t;
 using std::int64_t;
 using std::size_t;
@@ -44,10 +47,30 @@ using std::uint16_t;
 using std::uint32_t;
 using std::uint64_t;
 using std::uint8_t;
+using std::uintptr_t;
 }  // namespace pictura
 #endif
 
 namespace pictura {
+
+/// x within [0, 1]; one instruction of a device.
+PICTURA_HD inline float saturate(float x) {
+#if defined(__CUDA_ARCH__)
+  return __saturatef(x);
+#else
+  return x < 0.0f ? 0.0f : (1.0f < x ? 1.0f : x);
+#endif
+}
+
+/// a + b within [0, high]; one instruction of a device.
+PICTURA_HD inline int32_t sum_within(int32_t a, int32_t b, int32_t high) {
+#if defined(__CUDA_ARCH__)
+  return __viaddmin_s32_relu(a, b, high);
+#else
+  const int32_t sum = high < a + b ? high : a + b;
+  return sum < 0 ? 0 : sum;
+#endif
+}
 
 /// Number of bits that are set.
 PICTURA_HD inline int count_bits(uint64_t bits) {

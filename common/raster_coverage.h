@@ -104,20 +104,39 @@ PICTURA_HD inline Vec2 project(const PinholeCamera& camera, Vec3 p) {
 /// signs of a and b: two faces that share an edge split areas and samples between them exactly.
 struct alignas(16) PolygonEdge {
   float x0 = 0, y0 = 0;  // the upper end
-  float y1 = 0;          // the lower end's y
   float dx_dy = 0;       // 0 for level edges, which bound no area
-  float dy_dx = 0;       // 0 for upright edges
   float a = 0, b = 0;    // inside: a * (x - x0) + b * (y - y0) >= 0
+  float y1 = 0;          // the lower end's y
+  // Where the edge's line passes a column of samples, in rows of samples: what a pixel to the right adds, and what one
+  // further down takes off.
+  float rows_right = 0, rows_down = 0;
 };
 
-/// Edges whose ends are closer in x than this are upright: samples lie to one side of them or the other. Those whose
-/// ends are closer in y are level, and bound no area.
-constexpr float kUpright_px = 1e-6f, kLevel_px = 1e-6f;
+/// Visits the edges of a polygon; each is asked for while the one before it is visited.
+template <typename Visit>
+PICTURA_HD inline void each_edge(const PolygonEdge* edges, int count, Visit&& visit) {
+  PolygonEdge next = edges[0];
+  PICTURA_KEEP_LOOP
+  for (int i = 1; i <= count; ++i) {
+    const PolygonEdge edge = next;
+    if (i < count) next = edges[i];
+    visit(edge);
+  }
+}
+
+/// Edges whose ends are closer in y than this are level, and bound no area. Those whose ends are closer in x are
+/// upright; to samples they lean by as much to the right.
+constexpr float kLevel_px = 1e-6f, kUpright_px = 1e-6f;
+/// To samples, an edge that goes down by more than this from one column of samples to the next, in their rows, is as
+/// good as upright.
+constexpr float kSteepest = 1024.0f;
+/// Columns and rows of a pixel's samples.
+constexpr int kSampleColumns = 8, kSampleRows = 8;
 
 PICTURA_HD inline PolygonEdge make_edge(Vec2 from, Vec2 to) {
   const bool downward = from.y < to.y || (from.y == to.y && from.x < to.x);
   const Vec2 upper = downward ? from : to, lower = downward ? to : from;
-  const float dx = lower.x - upper.x;
+  const float dx = lower.x - upper.x, leaning_dx = fabsf(dx) < kUpright_px ? kUpright_px : dx;
   const bool is_level = lower.y - upper.y < kLevel_px;
   const float dy = is_level ? 0.0f : lower.y - upper.y;
   PolygonEdge edge;
@@ -125,9 +144,11 @@ PICTURA_HD inline PolygonEdge make_edge(Vec2 from, Vec2 to) {
   edge.y0 = upper.y;
   edge.y1 = is_level ? upper.y : lower.y;
   edge.dx_dy = dy > 0.0f ? dx / dy : 0.0f;
-  edge.dy_dx = fabsf(dx) >= kUpright_px ? dy / dx : 0.0f;
   edge.a = downward ? -dy : dy;
-  edge.b = downward ? dx : -dx;
+  edge.b = downward ? leaning_dx : -leaning_dx;
+  // Of what is steeper, all numbers are lessened alike: it crosses the row at the same place.
+  edge.rows_right = kSampleRows * clamp(dy / leaning_dx, -kSteepest, kSteepest);
+  edge.rows_down = kSampleRows * (dy > 0.0f ? min_of(kSteepest * fabsf(edge.dx_dy), 1.0f) : 1.0f);
   return edge;
 }
 
@@ -138,27 +159,30 @@ PICTURA_HD inline float inner_distance(const PolygonEdge& edge, Vec2 p) {
 
 /// Pixels that a polygon may touch: half-open ranges within the image.
 struct PixelBox {
-  int32_t x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;
+  int16_t x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;
 };
 
-/// A convex polygon on screen, without its edges, which stand in a pool.
+/// A convex polygon on screen, without its edges, which stand in a pool. In the order in which it is asked for.
 struct alignas(16) ScreenFace {
   PixelBox box;
-  // Inverse depth at a point of the screen, and its range over the face's corners.
-  float inverse_depth_x = 0, inverse_depth_y = 0, inverse_depth_0 = 0;
-  float plane_distance_m = 0;  // from the camera to the face's plane
-  float inverse_depth_low = 0, inverse_depth_high = 0;
-  uint32_t number = 0;   // of the thing that it belongs to, see raster_order.h
-  uint8_t class_id = 0;  // of the class plane
-  uint8_t edge_count = 0;
-  Rgb color;
   int32_t edge_begin = 0;
+  uint8_t edge_count = 0;
+  uint8_t class_id = 0;  // of the class plane
+  // Inverse depth at a point of the screen.
+  float inverse_depth_x = 0, inverse_depth_y = 0, inverse_depth_0 = 0;
+  uint32_t number = 0;  // of the thing that it belongs to, see raster_order.h
+  // Range of the inverse depth over the face's corners.
+  float inverse_depth_low = 0, inverse_depth_high = 0;
+  float plane_distance_m = 0;  // from the camera to the face's plane
+  Rgb color;
 };
 
 /// The pixels of an image that a polygon may touch whose corners lie between low and high on screen.
 PICTURA_HD inline PixelBox pixel_box(const PinholeCamera& camera, Vec2 low, Vec2 high) {
-  return {max_of(static_cast<int>(floorf(low.x)), 0), min_of(static_cast<int>(floorf(high.x)) + 1, camera.width_px),
-          max_of(static_cast<int>(floorf(low.y)), 0), min_of(static_cast<int>(floorf(high.y)) + 1, camera.height_px)};
+  auto within = [](int pixel, int32_t end) { return static_cast<int16_t>(clamp(pixel, 0, end)); };
+  auto pixel_of = [](float at) { return static_cast<int>(floorf(at)); };
+  return {within(pixel_of(low.x), camera.width_px), within(pixel_of(high.x) + 1, camera.width_px),
+          within(pixel_of(low.y), camera.height_px), within(pixel_of(high.y) + 1, camera.height_px)};
 }
 PICTURA_HD inline bool is_empty(const PixelBox& box) { return box.x_begin >= box.x_end || box.y_begin >= box.y_end; }
 
@@ -240,7 +264,6 @@ PICTURA_HD inline bool covers_point(const PolygonEdge* edges, int count, float x
 
 /// The samples of a pixel: 8 columns of 8 rows, each column shifted down by its own part of a row, so that 64 different
 /// heights occur: road scenes are full of nearly level edges. Sample (column, row) is bit 8 * column + row.
-constexpr int kSampleColumns = 8, kSampleRows = 8;
 constexpr uint64_t kAllSamples = ~uint64_t{0};
 /// Offset of a column's first sample from the pixel's top, in rows.
 PICTURA_HD constexpr float sample_column_offset(int column) {
@@ -267,101 +290,61 @@ constexpr float kFullCoverage = 1e-3f;
 
 /// Samples on the inner side of an edge; left_px and top_px are the pixel's corner relative to the edge's upper end.
 PICTURA_HD inline uint64_t samples_inside(const PolygonEdge& edge, float left_px, float top_px) {
-  if (edge.dy_dx == 0.0f && fabsf(edge.b) < kUpright_px) {
-    const int left_of = static_cast<int>(ceilf(clamp(-8.0f * left_px - 0.5f, 0.0f, 8.0f)));
-    const uint64_t samples = left_of < kSampleColumns ? kAllSamples << (8 * left_of) : 0;
-    return edge.a > 0.0f ? samples : ~samples;
-  }
-  // In rows of samples, which are as far apart as columns: where the edge's line passes the middle of the first column,
-  // and how far it goes down from one column to the next. As fixed point numbers, in which 8 columns do not overflow.
-  constexpr float kOne = 1 << 16, kSteepest = 1024.0f, kFarthest = 16.0f * kSteepest;
-  float step = edge.dy_dx, first = (left_px + 0.5f / 8.0f) * (8.0f * step) - 8.0f * top_px;
-  if (fabsf(step) > kSteepest) {
-    // As good as upright: it crosses the row at the same place.
-    first = first * (kSteepest / fabsf(step));
-    step = step > 0.0f ? kSteepest : -kSteepest;
-  }
-  const auto step_fixed = static_cast<int32_t>(step * kOne);
+  // Where the edge's line passes the middle of the first column, in rows, and how far it goes down from one column to
+  // the next. As fixed point numbers, in which 8 columns do not overflow.
+  constexpr float kOne = 1 << 16, kFarthest = 16.0f * kSteepest;
+  const float first = (left_px + 0.5f / kSampleColumns) * edge.rows_right - top_px * edge.rows_down;
+  const auto step_fixed = static_cast<int32_t>(edge.rows_right * (kOne / kSampleColumns));
   const auto first_fixed = static_cast<int32_t>(clamp(first, -kFarthest, kFarthest) * kOne);
-  uint64_t samples = 0;
+  // In each byte of a word, for its column, what a column has but 2 to the power of the rows above the line.
+  uint32_t word[2] = {0x01010100u, 0x01010100u};
   for (int column = 0; column < kSampleColumns; ++column) {
     constexpr float kRoundUp = 65535.0f / 65536.0f;
     const auto offset = static_cast<int32_t>((kRoundUp - sample_column_offset(column)) * kOne);
-    const int rows_above = min_of(max_of((first_fixed + column * step_fixed + offset) >> 16, 0), kSampleRows);
-    samples |= static_cast<uint64_t>((0xFFu << rows_above) & 0xFFu) << (8 * column);
+    const int rows_above = sum_within(first_fixed + column * step_fixed, offset, kSampleRows << 16) >> 16;
+    word[column / 4] -= (1u << rows_above) << (8 * (column % 4));
   }
+  const uint64_t samples = static_cast<uint64_t>(word[1]) << 32 | word[0];
   return edge.b > 0.0f ? samples : ~samples;
 }
 
 /// Mean over a segment, whose x runs from xa to xb relative to a pixel of width 1, of the pixel's width to its left.
 PICTURA_HD inline float mean_width_left(float xa, float xb) {
-  const float low = min_of(xa, xb), high = max_of(xa, xb);
-  if (high <= 0.0f) return 0.0f;
-  if (low >= 1.0f) return 1.0f;
-  if (low >= 0.0f && high <= 1.0f) return 0.5f * (low + high);
-  const float inner_low = max_of(low, 0.0f), inner_high = min_of(high, 1.0f);
-  const float beyond = high - inner_high;
-  return (0.5f * (inner_high - inner_low) * (inner_high + inner_low) + beyond) / (high - low);
-}
-
-/// How a pixel lies to an edge's line. A pixel that is outside of one edge has nothing of the polygon.
-enum class PixelSide : uint8_t { outside, crossed, inside };
-PICTURA_HD inline PixelSide side_of(const PolygonEdge& edge, int x, int y) {
-  const float at_corner = edge.a * (static_cast<float>(x) - edge.x0) + edge.b * (static_cast<float>(y) - edge.y0);
-  if (at_corner + max_of(edge.a, 0.0f) + max_of(edge.b, 0.0f) <= 0.0f) return PixelSide::outside;
-  return at_corner + min_of(edge.a, 0.0f) + min_of(edge.b, 0.0f) < 0.0f ? PixelSide::crossed : PixelSide::inside;
+  constexpr float kUpright = 1e-6f;
+  const float low = min_of(xa, xb), high = max_of(xa, xb), run = high - low;
+  const float inner_low = saturate(low), inner_high = saturate(high);
+  const float within = 0.5f * (inner_high - inner_low) * (inner_high + inner_low);
+  const float beyond = max_of(high - 1.0f, 0.0f) - max_of(low - 1.0f, 0.0f);
+  return run > kUpright ? (within + beyond) * (1.0f / max_of(run, kUpright)) : inner_low;
 }
 
 /// Areas in whole units, so that sums over edges do not depend on their order.
 constexpr float kAreaUnits = 1 << 24;  // of a pixel
 PICTURA_HD inline int32_t to_area_units(float area) { return static_cast<int32_t>(area * kAreaUnits + 0.5f); }
 
-/// What an edge that does not cross pixel (x, y), with the polygon on the pixel's side, adds to the area there: a right
-/// border what is to its left, which is all of the pixel in the rows that it spans; a left border nothing.
-PICTURA_HD inline int32_t area_beside(const PolygonEdge& edge, int y) {
-  const float y_px = static_cast<float>(y);
-  const float from = clamp(edge.y0 - y_px, 0.0f, 1.0f), to = clamp(edge.y1 - y_px, 0.0f, 1.0f);
-  return edge.a < 0.0f ? to_area_units(to - from) : 0;
-}
-/// ... what one that crosses it adds: a right border the area to its left, a left border the same negative.
-PICTURA_HD inline int32_t area_cut(const PolygonEdge& edge, int x, int y) {
+/// What an edge adds to a polygon's area in pixel (x, y), in the rows that it spans: a right border the area to its
+/// left, a left border the same negative.
+PICTURA_HD inline int32_t area_units_of(const PolygonEdge& edge, int x, int y) {
   const float y_px = static_cast<float>(y), left_px = static_cast<float>(x) - edge.x0, top_px = y_px - edge.y0;
-  const float from = clamp(edge.y0 - y_px, 0.0f, 1.0f), to = clamp(edge.y1 - y_px, 0.0f, 1.0f);
-  if (from >= to) return 0;
+  const float from = saturate(edge.y0 - y_px), to = saturate(edge.y1 - y_px);
   const float width = mean_width_left((from + top_px) * edge.dx_dy - left_px, (to + top_px) * edge.dx_dy - left_px);
   const int32_t units = to_area_units((to - from) * width);
   return edge.a < 0.0f ? units : -units;
 }
 
-/// ... the samples of the pixel on its inner side.
-PICTURA_HD inline uint64_t samples_cut(const PolygonEdge& edge, int x, int y) {
-  return samples_inside(edge, static_cast<float>(x) - edge.x0, static_cast<float>(y) - edge.y0);
-}
-
-/// What the sum of areas over all edges, and the samples on the inner side of those that cross the pixel, amount to.
-PICTURA_HD inline PixelCoverage rounded_coverage(int32_t area_units, uint64_t samples) {
+/// Exact area of a convex polygon in pixel (x, y), and the samples that it covers. Edges that do not cross the pixel
+/// keep all samples and add their part to the area, so none is asked where it lies.
+PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int count, int x, int y) {
+  int32_t area_units = 0;
+  uint64_t samples = kAllSamples;
+  each_edge(edges, count, [&](const PolygonEdge& edge) {
+    samples &= samples_inside(edge, static_cast<float>(x) - edge.x0, static_cast<float>(y) - edge.y0);
+    area_units += area_units_of(edge, x, y);
+  });
   const float area = static_cast<float>(area_units) * (1.0f / kAreaUnits);
   if (samples == kAllSamples && area > 1.0f - kFullCoverage) return {1.0f, kAllSamples};
   if (area < kLeastCoverage) return {0.0f, 0};
   return {min_of(area, 1.0f), samples};
-}
-
-/// Exact area of a convex polygon in pixel (x, y), and the samples that it covers.
-PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int count, int x, int y) {
-  int32_t area_units = 0;
-  uint64_t samples = kAllSamples;
-  for (int i = 0; i < count; ++i) {
-    const PolygonEdge& edge = edges[i];
-    const PixelSide side = side_of(edge, x, y);
-    if (side == PixelSide::outside) return {0.0f, 0};
-    if (side == PixelSide::crossed) {
-      samples &= samples_cut(edge, x, y);
-      area_units += area_cut(edge, x, y);
-    } else {
-      area_units += area_beside(edge, y);
-    }
-  }
-  return rounded_coverage(area_units, samples);
 }
 
 /// Range of pixels of row y that the polygon may touch, and within it the range that it covers fully.
@@ -373,16 +356,15 @@ PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const Pi
   const float y_px = static_cast<float>(y);
   float touch_low = static_cast<float>(box.x_begin), touch_high = static_cast<float>(box.x_end);
   float full_low = touch_low, full_high = touch_high;
-  PICTURA_KEEP_LOOP
-  for (int i = 0; i < count; ++i) {
-    const PolygonEdge& edge = edges[i];
+  bool is_beside = false;
+  each_edge(edges, count, [&](const PolygonEdge& edge) {
     const float above_px = y_px - edge.y0;
     if (edge.a == 0.0f) {
       // Level: the row is on one side of it, or it runs through the row.
       const float at_row = edge.b * above_px;
-      if (at_row + max_of(edge.b, 0.0f) <= 0.0f) return {};
+      if (at_row + max_of(edge.b, 0.0f) <= 0.0f) is_beside = true;
       if (at_row + min_of(edge.b, 0.0f) < 0.0f) full_high = -1.0f;
-      continue;
+      return;
     }
     // Where the edge's line enters the row, and where it leaves it.
     const float enter = edge.x0 + above_px * edge.dx_dy, leave = edge.x0 + (above_px + 1.0f) * edge.dx_dy;
@@ -394,7 +376,8 @@ PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const Pi
       touch_high = min_of(touch_high, high);
       full_high = min_of(full_high, low - 1.0f);
     }
-  }
+  });
+  if (is_beside) return {};
   // A little leeway: the exact tests of pixel_coverage decide at the borders.
   constexpr float kLeeway_px = 1e-3f;
   const float begin = static_cast<float>(box.x_begin), end = static_cast<float>(box.x_end);

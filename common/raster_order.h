@@ -224,18 +224,19 @@ PICTURA_HD inline uint64_t samples_where_positive(float value, Vec2 gradient, Ve
 }
 
 /// Of the samples of a pixel that faces a and b of two things share, those at which a is in front: all or none, as in
-/// their middle, but where the planes of two solids intersect near by, those at which that of a is nearer. The others
-/// are those at which b is in front of a.
+/// their middle, but where the planes of two solids intersect near by, those at which that of a is nearer, unless only
+/// all or none is asked for. The others are those at which b is in front of a.
 template <typename Stands>
 PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFace& b, uint64_t shared, Vec2 corner,
-                                            Stands&& stands) {
+                                            bool all_or_none, Stands&& stands) {
   const Vec2 middle = middle_of(shared), at = corner + middle;
   // Of the lower number before the higher, so that both ways round are the same arithmetic.
   const bool swapped = b.number < a.number;
   const float sign = swapped ? -1.0f : 1.0f, lead = sign * (inverse_depth(a, at) - inverse_depth(b, at));
   const Vec2 gradient{sign * (a.inverse_depth_x - b.inverse_depth_x), sign * (a.inverse_depth_y - b.inverse_depth_y)};
   // No sample is further than a pixel from the middle along either axis.
-  const bool intersect = fabsf(lead) < fabsf(gradient.x) + fabsf(gradient.y) && !is_strip(a) && !is_strip(b);
+  const bool intersect =
+      fabsf(lead) < fabsf(gradient.x) + fabsf(gradient.y) && !is_strip(a) && !is_strip(b) && !all_or_none;
   if (!intersect) return is_in_front(a, b, at, stands) ? shared : 0;
   const uint64_t low_first = samples_where_positive(lead, gradient, middle);
   return shared & (swapped ? ~low_first : low_first);
@@ -258,11 +259,11 @@ PICTURA_HD inline Hidden hide_each_other(const PixelCoverage& a, const PixelCove
                                          const ScreenFace& face_b, Vec2 corner, Stands&& stands) {
   const uint64_t shared = shared_samples(a, b);
   if (shared == 0 || face_a.number == face_b.number || fit_together(a, b)) return {};
-  if (a.samples == 0 || b.samples == 0) {
-    const bool a_first = is_in_front(face_a, face_b, corner + middle_of(shared), stands);
-    return {a.samples == 0 && !a_first ? kAllSamples : 0, b.samples == 0 && a_first ? kAllSamples : 0};
+  const bool has_sliver = a.samples == 0 || b.samples == 0;
+  const uint64_t a_first = samples_in_front(face_a, face_b, shared, corner, has_sliver, stands);
+  if (has_sliver) {
+    return {a.samples == 0 && a_first == 0 ? kAllSamples : 0, b.samples == 0 && a_first != 0 ? kAllSamples : 0};
   }
-  const uint64_t a_first = samples_in_front(face_a, face_b, shared, corner, stands);
   return {a.is_full() && !b.is_full() ? 0 : shared & ~a_first, b.is_full() && !a.is_full() ? 0 : a_first};
 }
 

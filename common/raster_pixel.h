@@ -84,7 +84,7 @@ class PixelSum {
 
 /// A channel as an IEEE half, rounded to nearest, ties to even.
 PICTURA_HD inline uint16_t to_half(float channel) {
-  float mantissa = clamp(channel, 0.0f, 1.0f);
+  float mantissa = saturate(channel);
   // Below 2^-14 halves are multiples of 2^-24.
   if (mantissa < 6.103515625e-5f) return static_cast<uint16_t>(rintf(mantissa * 16777216.0f));
   int exponent = 15;
@@ -94,8 +94,6 @@ PICTURA_HD inline uint16_t to_half(float channel) {
 }
 
 /// A channel as an unsigned byte.
-PICTURA_HD inline uint8_t to_byte(float channel) {
-  return static_cast<uint8_t>(clamp(channel, 0.0f, 1.0f) * 255.0f + 0.5f);
-}
+PICTURA_HD inline uint8_t to_byte(float channel) { return static_cast<uint8_t>(saturate(channel) * 255.0f + 0.5f); }
 
 }  // namespace pictura

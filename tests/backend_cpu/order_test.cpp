@@ -288,8 +288,8 @@ TEST(Order, SolidsThatIntersectShareSamplesByWhichIsNearer) {
     const ScreenFace a = plane(thing_number(kWallKind, 5)), b = plane(thing_number(kAgentKind, 3));
     const uint64_t shared = random() | random();
     const Vec2 corner{static_cast<float>(round % 3), static_cast<float>(round % 5)};
-    const uint64_t a_first = samples_in_front(a, b, shared, corner, never);
-    ASSERT_EQ(samples_in_front(b, a, shared, corner, never), shared & ~a_first) << round;
+    const uint64_t a_first = samples_in_front(a, b, shared, corner, false, never);
+    ASSERT_EQ(samples_in_front(b, a, shared, corner, false, never), shared & ~a_first) << round;
     split += a_first != 0 && a_first != shared;
     for (int sample = 0; sample < 64; ++sample) {
       if (!(shared >> sample & 1)) continue;
