@@ -1,12 +1,15 @@
 // `pictura bench render`: how fast backends draw what the agents of many worlds see, by backend, size and number of
 // egos, and how much device memory that takes.
 #include <algorithm>
+#include <cmath>
+#include <regex>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "pictura/apps/bench.h"
 #include "pictura/apps/drive.h"
+#include "pictura/apps/plot_results.h"
 #include "pictura/apps/report.h"
 #include "pictura/bench/render.h"
 #include "pictura/common/error.h"
@@ -24,7 +27,12 @@ struct Arguments {
   int repeats = 7, checked_views = 8;
   double repeat_s = 1.0;
   bool planes = false, host_memory = false, memory = false, json = false;
+  PlotArguments plot;
 };
+
+// What the sweeps hold fixed.
+constexpr int kSweptEgos = 2048;
+constexpr const char* kSweptSize = "96x54";
 
 // What the paper measures, and what lies beyond: see bench/README.md.
 void apply_sweep(Arguments* arguments) {
@@ -43,12 +51,12 @@ void apply_sweep(Arguments* arguments) {
   } else {
     arguments->sizes = {"32x18", "64x36", "96x54", "192x108", "384x216", "768x432"};
   }
-  if (arguments->egos.empty()) arguments->egos = {2048};
+  if (arguments->egos.empty()) arguments->egos = {kSweptEgos};
 }
 
 void apply_defaults(Arguments* arguments) {
   apply_sweep(arguments);
-  if (arguments->sizes.empty()) arguments->sizes = {"96x54"};
+  if (arguments->sizes.empty()) arguments->sizes = {kSweptSize};
   if (arguments->egos.empty()) arguments->egos = {0};
   arguments->maps = named_maps(arguments->maps);
   const std::size_t cases =
@@ -110,7 +118,28 @@ void append_results(const std::string& name, const RenderCase& measured, const R
   }
 }
 
+/// Draws the rates that the sweeps in earlier results have found.
+void draw_rates(const PlotArguments& plot) {
+  const std::regex swept(R"((.+) ((\d+)x(\d+)) (\d+) egos)");
+  const char* rate = "log10 of agent-steps/s";
+  PlotPanel by_size{fmt::format("{} egos", kSweptEgos), "log2 of the width in pixels, 16:9", rate, {}};
+  PlotPanel by_egos{fmt::format("{} pixels", kSweptSize), "log2 of egos in one call", rate, {}};
+  PlotPanel by_square{fmt::format("{} egos, walls off", kSweptEgos), "log2 of the width in pixels, square", rate, {}};
+  for (const PlottedResult& result : read_results(plot.results)) {
+    std::smatch match;
+    if (!std::regex_match(result.name, match, swept)) continue;
+    const double width = std::stod(match[3]), y = std::log10(result.value);
+    const int egos = std::stoi(match[5]);
+    if (egos == kSweptEgos) {
+      add_point(match[3] == match[4] ? &by_square : &by_size, match[1], std::log2(width), y);
+    }
+    if (match[2] == kSweptSize) add_point(&by_egos, match[1], std::log2(egos), y);
+  }
+  draw_plots_png({by_size, by_egos, by_square}, plot.figure, {.columns = 3, .title = "Rates of rendering"});
+}
+
 void run(Arguments arguments) {
+  if (wants_plot(arguments.plot)) return draw_rates(arguments.plot);
   apply_defaults(&arguments);
   ProgressLine progress;
   progress.update("driving");
@@ -194,6 +223,7 @@ void add_render_benchmark(CLI::App& bench) {
       ->capture_default_str();
   command->add_option("--repeats", arguments->repeats)->check(CLI::PositiveNumber)->capture_default_str();
   command->add_option("--repeat-seconds", arguments->repeat_s)->check(CLI::PositiveNumber)->capture_default_str();
+  add_plot_options(command, &arguments->plot);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Examples:\n  pictura bench render --size 192x108 --threads 0\n"

@@ -2,14 +2,13 @@
 // without entity sets; and what an agent-step costs, as a figure.
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <regex>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "pictura/apps/bench.h"
-#include "pictura/apps/draw_plot.h"
+#include "pictura/apps/plot_results.h"
 #include "pictura/apps/report.h"
 #include "pictura/bench/render.h"
 #include "pictura/bench/step_rate.h"
@@ -27,8 +26,8 @@ struct Arguments {
       .agents = 120, .num_threads = 1, .pedestrian_fraction = 0.0f, .cyclist_fraction = 0.0f, .parked_cars = 0};
   std::vector<std::string> maps, backends = {"cpu"};
   int num_worlds = 0, slots = 0;
-  std::string sweep, figure;
-  std::vector<std::string> plotted;
+  std::string sweep;
+  PlotArguments plot;
   int repeats = 7, warm_up_steps = 60;
   double repeat_s = 1.0;
   bool json = false;
@@ -106,45 +105,28 @@ void measure(const Arguments& arguments, const std::string& backend,
 }
 
 /// Draws what the sweeps in earlier results say an agent-step costs.
-void draw_cost(const std::vector<std::string>& paths, const std::string& figure) {
+void draw_cost(const PlotArguments& plot) {
   const std::regex swept(R"((\w+), (\d+) worlds of (\d+) agents)");
   PlotPanel by_agents{
       fmt::format("{} worlds", kSweptWorlds), "log2 of agents in each world", "log10 of ns for an agent-step", {}};
   PlotPanel by_worlds{
       fmt::format("{} agents in each world", kSweptAgents), "log2 of worlds", "log10 of ns for an agent-step", {}};
-  const auto add = [](PlotPanel* panel, const std::string& backend, double x, double y) {
-    auto series = std::find_if(panel->series.begin(), panel->series.end(),
-                               [&backend](const PlotSeries& s) { return s.name == backend; });
-    if (series == panel->series.end()) series = panel->series.insert(series, PlotSeries{backend, {}, {}});
-    series->x.push_back(std::log2(x));
-    series->y.push_back(std::log10(y));
-  };
-  for (const std::string& path : paths) {
-    std::ifstream in(path);
-    PICTURA_CHECK(in.good(), "{}: cannot be read", path);
-    const Json object = Json::parse(in, nullptr, /*allow_exceptions=*/false);
-    PICTURA_CHECK(object.is_object() && object.contains("results"), "{}: expected results of bench simulate", path);
-    for (const Json& row : object["results"]) {
-      std::smatch match;
-      const std::string name = row.value("name", "");
-      if (!std::regex_match(name, match, swept)) continue;
-      const int worlds = std::stoi(match[2]), agents = std::stoi(match[3]);
-      const double cost_ns = 1e9 / row.value("value", 0.0);
-      if (agents == kSweptAgents) {
-        add(&by_worlds, match[1], worlds, cost_ns);
-      } else if (worlds == kSweptWorlds) {
-        add(&by_agents, match[1], agents, cost_ns);
-      }
+  for (const PlottedResult& result : read_results(plot.results)) {
+    std::smatch match;
+    if (!std::regex_match(result.name, match, swept)) continue;
+    const int worlds = std::stoi(match[2]), agents = std::stoi(match[3]);
+    const double cost = std::log10(1e9 / result.value);
+    if (agents == kSweptAgents) {
+      add_point(&by_worlds, match[1], std::log2(worlds), cost);
+    } else if (worlds == kSweptWorlds) {
+      add_point(&by_agents, match[1], std::log2(agents), cost);
     }
   }
-  draw_plots_png({by_agents, by_worlds}, figure, {.title = "What an agent-step costs"});
+  draw_plots_png({by_agents, by_worlds}, plot.figure, {.title = "What an agent-step costs"});
 }
 
 void run(Arguments arguments) {
-  if (!arguments.plotted.empty() || !arguments.figure.empty()) {
-    if (arguments.plotted.empty() || arguments.figure.empty()) fail_usage("--plot and --figure: expected both");
-    return draw_cost(arguments.plotted, arguments.figure);
-  }
+  if (wants_plot(arguments.plot)) return draw_cost(arguments.plot);
   arguments.maps = named_maps(arguments.maps);
   std::vector<std::shared_ptr<const RoadMap>> maps;
   for (const std::string& name : arguments.maps) maps.push_back(load_map(name));
@@ -197,9 +179,7 @@ void add_simulate_benchmark(CLI::App& bench) {
       ->capture_default_str();
   command->add_option("--repeats", arguments->repeats)->check(CLI::PositiveNumber)->capture_default_str();
   command->add_option("--repeat-seconds", arguments->repeat_s)->check(CLI::PositiveNumber)->capture_default_str();
-  command->add_option("--plot", arguments->plotted, "Measure nothing: draw the sweeps of these results")
-      ->delimiter(',');
-  command->add_option("--figure", arguments->figure, "What --plot draws, a PNG file");
+  add_plot_options(command, &arguments->plot);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n"

@@ -371,6 +371,22 @@ class Benchmarks(CommandCase):
         of_scene_2 = [fault for fault in again["faults"] if fault["scene"] == 2]
         self.assertEqual(of_scene_2, black["faults"])
 
+    def test_rates_of_rendering_are_drawn_from_results_of_one_benchmark_or_of_several(self):
+        names = ["cuda 32x18 2048 egos", "cuda 96x54 2048 egos", "cuda 96x54 64 egos", "cpu 64x64 2048 egos"]
+        one = {"results": [{"name": name, "value": 1e5 + 1e5 * i} for i, name in enumerate(names)]}
+        results, figure, again = (self.folder / name for name in ("results.json", "rates.png", "again.png"))
+        results.write_text(json.dumps(one))
+        run("bench", "render", "--plot", results, "--figure", figure)
+        self.assertGreater(figure.stat().st_size, 5000)
+        results.write_text(json.dumps({"bench": [{"results": [row]} for row in one["results"]]}))
+        run("bench", "render", "--plot", results, "--figure", again)
+        self.assertEqual(figure.read_bytes(), again.read_bytes())
+        one["results"][0]["value"] = 1e4
+        results.write_text(json.dumps(one))
+        run("bench", "render", "--plot", results, "--figure", again)
+        self.assertNotEqual(figure.read_bytes(), again.read_bytes())
+        self.assert_refused(2, "--plot and --figure", "bench", "render", "--figure", figure)
+
     def test_the_cost_of_steps_is_drawn_from_results(self):
         names = ["cpu, 64 worlds of 1 agents", "cpu, 64 worlds of 4 agents", "cpu, 1 worlds of 60 agents"]
         results = self.folder / "results.json"

@@ -1,0 +1,52 @@
+#include "pictura/apps/plot_results.h"
+
+#include <algorithm>
+#include <fstream>
+
+#include "pictura/apps/report.h"
+#include "pictura/common/error.h"
+
+namespace pictura {
+
+void add_plot_options(CLI::App* command, PlotArguments* arguments) {
+  command->add_option("--plot", arguments->results, "Measure nothing: draw the sweeps of these results")
+      ->delimiter(',');
+  command->add_option("--figure", arguments->figure, "What --plot draws, a PNG file");
+}
+
+bool wants_plot(const PlotArguments& arguments) {
+  if (arguments.results.empty() != arguments.figure.empty()) fail_usage("--plot and --figure: expected both");
+  return !arguments.results.empty();
+}
+
+std::vector<PlottedResult> read_results(const std::vector<std::string>& paths) {
+  std::vector<PlottedResult> results;
+  for (const std::string& path : paths) {
+    std::ifstream in(path);
+    PICTURA_CHECK(in.good(), "{}: cannot be read", path);
+    const Json object = Json::parse(in, nullptr, /*allow_exceptions=*/false);
+    const std::size_t before = results.size();
+    auto add = [&](const Json& benchmark) {
+      if (!benchmark.is_object() || !benchmark.contains("results")) return;
+      for (const Json& row : benchmark["results"]) results.push_back({row.value("name", ""), row.value("value", 0.0)});
+    };
+    add(object);
+    if (object.is_object() && object.contains("bench")) {
+      for (const Json& benchmark : object["bench"]) add(benchmark);
+    }
+    PICTURA_CHECK(results.size() > before, "{}: expected results of a benchmark", path);
+  }
+  return results;
+}
+
+void add_point(PlotPanel* panel, const std::string& series, double x, double y) {
+  auto& all = panel->series;
+  auto found = std::find_if(all.begin(), all.end(), [&](const PlotSeries& s) { return s.name == series; });
+  if (found == all.end()) found = all.insert(found, PlotSeries{series, {}, {}});
+  const auto at = std::lower_bound(found->x.begin(), found->x.end(), x);
+  if (at != found->x.end() && *at == x) return;
+  found->y.insert(found->y.begin() + (at - found->x.begin()), y);
+  found->x.insert(at, x);
+}
+
+}  // namespace pictura
