@@ -182,7 +182,7 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kGatherBlocksPerPro
     if (lane_index() == 0) state->usable = set_image(state, task, view_of(task, image), camera) ? 1 : 0;
     __syncwarp();
     if (state->usable == 0) {
-      if (lane_index() == 0) task.pool.images[image] = {.width_px = width_px(task.cameras[camera].camera)};  // black
+      if (lane_index() == 0) task.pool.images[image] = {};  // black
       continue;
     }
     EntryList list(room, task.pool.lists, &round->listed, image);

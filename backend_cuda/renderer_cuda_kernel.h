@@ -57,7 +57,6 @@ enum FaultKind : int32_t { kBadWorld = 1, kBadGeometry, kBadPose, kTooManyAgents
 /// What an image shows: its faces in a pool, and what tells which of them is in front.
 struct GatheredImage {
   int32_t face_begin = 0, face_count = 0;  // -1: not gathered
-  int32_t width_px = 0;
   Vec3 eye_m;
   const DeviceGeometry* geometry = nullptr;
   const AgentBox* agents = nullptr;  // the first of its world

@@ -174,8 +174,7 @@ __device__ void write_pixels(const Memory& memory, const Part& part, const Visit
   }
 }
 
-// What a part finds when it begins: nothing is marked, listed or counted. Once for a block's first part, and after one
-// that was given up. All threads of the block.
+// Nothing is listed.
 template <typename Memory>
 __device__ void reset_counts(const Memory& memory) {
   BlockState* state = memory.state;
@@ -183,6 +182,8 @@ __device__ void reset_counts(const Memory& memory) {
   state->num_rows = state->num_candidates = state->num_fragments = state->num_added = state->num_drawn =
       state->next_batch = 0;
 }
+// What a part finds when it begins: nothing is marked, nothing listed. For a block's first part, and after one that was
+// given up. All threads of the block.
 template <typename Memory>
 __device__ void reset_part(const Memory& memory) {
   sync_block();
@@ -227,8 +228,8 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
 }
 
 // Draws the faces into a part of an image, in smaller ones where there is no room for all of it. visit(face, weight)
-// hears of each fragment, write.colors(x, y, count, colors) and write.black(x, y, count) of pixels side by
-// side. False where there is no room for a single pixel. All threads of the block.
+// hears of each fragment, write.colors(x, y, count, colors) and write.black(x, y, count) of pixels side by side. False
+// where there is no room for a single pixel. All threads of the block.
 template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whole, const Visit& visit,
                            const Write& write) {

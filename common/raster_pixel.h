@@ -74,9 +74,6 @@ class PixelSum {
  private:
   static constexpr float kUnits = 1 << 20;  // of a pixel and a channel of 1; a thousand fragments do not overflow
   PICTURA_HD static int32_t to_units(float value) { return static_cast<int32_t>(value * kUnits + 0.5f); }
-  PICTURA_HD static float share_of(uint64_t samples, uint64_t of) {
-    return static_cast<float>(count_bits(samples)) / static_cast<float>(count_bits(of));
-  }
   PICTURA_HD float area_of(Kind kind) const { return static_cast<float>(part_[kind].area) * (1.0f / kUnits); }
 
   Part part_[kNumKinds];
