@@ -180,14 +180,13 @@ __device__ void keep_fragment(const Memory& memory, int fragment, uint32_t face,
 // Makes a fragment of each lane's candidate, unless its face leaves nothing in the pixel.
 template <typename Memory>
 __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, const Part& part) {
-  const int pixel = static_cast<int>(candidate.b & ~static_cast<uint32_t>(Memory::kCoversFully));
+  const int pixel = Memory::pixel_of(candidate.b);
   PixelCoverage coverage;
   if (candidate.is_one) {
     const ScreenFace& face = memory.faces[candidate.a];
-    coverage =
-        (candidate.b & Memory::kCoversFully) != 0
-            ? PixelCoverage{1.0f, kAllSamples}
-            : pixel_coverage(memory.edges + face.edge_begin, face.edge_count, part.x_of(pixel), part.y_of(pixel));
+    coverage = Memory::covers_fully(candidate.b) ? PixelCoverage{1.0f, kAllSamples}
+                                                 : pixel_coverage(memory.edges + face.edge_begin, face.edge_count,
+                                                                  part.x_of(pixel), part.y_of(pixel));
   }
   const bool is_left = coverage.area > 0.0f;
   const int32_t fragment = take_place(&memory.state->num_fragments, is_left);
@@ -211,11 +210,10 @@ __device__ void make_fragments(const Memory& memory, const Part& part) {
       const auto candidate = memory.candidates[i];
       face = static_cast<uint32_t>(candidate >> Memory::kHalf);
       place = static_cast<uint32_t>(candidate & Memory::kNone);
-      const bool covers_fully = (place & Memory::kCoversFully) != 0;
-      const int pixel = static_cast<int>(place & ~static_cast<uint32_t>(Memory::kCoversFully));
+      const int pixel = Memory::pixel_of(place);
       const auto full = full_of(memory, pixel);
-      shows = full == Memory::kNone ||
-              may_show_before(memory.faces[face], memory.faces[full], part.x_of(pixel), part.y_of(pixel), covers_fully);
+      shows = full == Memory::kNone || may_show_before(memory.faces[face], memory.faces[full], part.x_of(pixel),
+                                                       part.y_of(pixel), Memory::covers_fully(place));
     }
     shown.push(shows, face, place);
     if (shown.is_ready() || (!more && !shown.is_empty())) make_fragment(memory, shown.take(), part);

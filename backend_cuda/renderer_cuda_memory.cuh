@@ -28,6 +28,11 @@ struct DrawMemory {
   static constexpr Word kNone = (Word{1} << kHalf) - 1;
   /// Of a candidate's pixel: the face covers all of it.
   static constexpr Word kCoversFully = Word{1} << (kHalf - 1);
+  /// Of the lower half of a candidate.
+  __device__ static int pixel_of(uint32_t place) {
+    return static_cast<int>(place & ~static_cast<uint32_t>(kCoversFully));
+  }
+  __device__ static bool covers_fully(uint32_t place) { return (place & kCoversFully) != 0; }
 
   BlockState* state;
   const ScreenFace* faces;   // of the image

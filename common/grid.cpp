@@ -27,21 +27,14 @@ Grid::Grid(Span<const Aabb2> boxes, float cell_m) : cell_m_(cell_m) {
 
   // Counting sort: how many items a cell has, where its range begins, then the items themselves in order.
   const GridView grid = view();
-  auto for_each_cell = [&](const Aabb2& box, auto&& visit) {
-    for (int y = grid.cell_y(box.low.y); y <= grid.cell_y(box.high.y); ++y) {
-      for (int x = grid.cell_x(box.low.x); x <= grid.cell_x(box.high.x); ++x) {
-        visit(static_cast<std::size_t>(y) * static_cast<std::size_t>(num_x_) + static_cast<std::size_t>(x));
-      }
-    }
-  };
   begin_.assign(static_cast<std::size_t>(num_x_) * static_cast<std::size_t>(num_y_) + 1, 0);
-  for (const Aabb2& box : boxes) for_each_cell(box, [&](std::size_t cell) { ++begin_[cell + 1]; });
+  for (const Aabb2& box : boxes) visit_cells(grid, box, [&](std::size_t cell) { ++begin_[cell + 1]; });
   for (std::size_t cell = 1; cell < begin_.size(); ++cell) begin_[cell] += begin_[cell - 1];
   items_.resize(static_cast<std::size_t>(begin_.back()));
   std::vector<int32_t> next(begin_.begin(), begin_.end() - 1);
   for (std::size_t i = 0; i < boxes.size(); ++i) {
-    for_each_cell(boxes[i],
-                  [&](std::size_t cell) { items_[static_cast<std::size_t>(next[cell]++)] = static_cast<int32_t>(i); });
+    visit_cells(grid, boxes[i],
+                [&](std::size_t cell) { items_[static_cast<std::size_t>(next[cell]++)] = static_cast<int32_t>(i); });
   }
 }
 

@@ -24,4 +24,23 @@ class Grid {
   std::vector<int32_t> items_;
 };
 
+/// Calls visit(cell) for the number of each cell that a box touches.
+template <typename Visit>
+void visit_cells(const GridView& grid, const Aabb2& box, Visit&& visit) {
+  for (int y = grid.cell_y(box.low.y); y <= grid.cell_y(box.high.y); ++y) {
+    for (int x = grid.cell_x(box.low.x); x <= grid.cell_x(box.high.x); ++x) {
+      visit(static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.num_x) + static_cast<std::size_t>(x));
+    }
+  }
+}
+/// ... visit(item) for each item in those cells, as often as it stands in one.
+template <typename Visit>
+void visit_items(const GridView& grid, const Aabb2& box, Visit&& visit) {
+  visit_cells(grid, box, [&](std::size_t cell) {
+    for (int32_t i = grid.begin[cell]; i < grid.begin[cell + 1]; ++i) {
+      visit(static_cast<std::size_t>(grid.items[static_cast<std::size_t>(i)]));
+    }
+  });
+}
+
 }  // namespace pictura

@@ -310,12 +310,11 @@ PICTURA_HD inline uint64_t samples_inside(const PolygonEdge& edge, float left_px
 
 /// Mean over a segment, whose x runs from xa to xb relative to a pixel of width 1, of the pixel's width to its left.
 PICTURA_HD inline float mean_width_left(float xa, float xb) {
-  constexpr float kUpright = 1e-6f;
   const float low = min_of(xa, xb), high = max_of(xa, xb), run = high - low;
   const float inner_low = saturate(low), inner_high = saturate(high);
   const float within = 0.5f * (inner_high - inner_low) * (inner_high + inner_low);
   const float beyond = max_of(high - 1.0f, 0.0f) - max_of(low - 1.0f, 0.0f);
-  return run > kUpright ? (within + beyond) * (1.0f / max_of(run, kUpright)) : inner_low;
+  return run > kUpright_px ? (within + beyond) * (1.0f / max_of(run, kUpright_px)) : inner_low;
 }
 
 /// Areas in whole units, so that sums over edges do not depend on their order.

@@ -56,7 +56,7 @@ void append_strips(Span<const Vec3> points_m, float width_m, Rgb color, StripKin
   for (std::size_t i = 1; i < points_m.size(); ++i) {
     const Vec3 a = points.back(), b = points_m[i];
     const float piece_m = length(b.xy() - a.xy());
-    if (piece_m < 1e-4f) continue;
+    if (piece_m < kRepeatedPoint_m) continue;
     const int pieces = static_cast<int>(std::ceil(piece_m / kMaxPiece_m));
     for (int k = 1; k <= pieces; ++k) {
       points.push_back(k == pieces ? b : a + (b - a) * (static_cast<float>(k) / static_cast<float>(pieces)));
@@ -67,7 +67,7 @@ void append_strips(Span<const Vec3> points_m, float width_m, Rgb color, StripKin
   // The side vector of a point: left normal at the ends, mitre between its two pieces inside; a closed polyline is
   // mitred at its seam too.
   const std::size_t last = points.size() - 1;
-  const bool closed = last >= 3 && length(points[last] - points[0]) < 1e-4f;
+  const bool closed = last >= 3 && length(points[last] - points[0]) < kRepeatedPoint_m;
   auto piece_left = [&](std::size_t i) { return left_normal(unit(points[i + 1].xy() - points[i].xy())); };
   auto mitre = [&](Vec2 before, Vec2 after) {
     const Vec2 sum = before + after;

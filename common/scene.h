@@ -49,6 +49,8 @@ AgentBox make_box(AgentClass agent_class, Vec3 center_m, float heading_rad, Vec3
 /// A view at a pose, with nobody left out.
 View make_view(Vec3 origin_m, float heading_rad);
 
+/// Points of a polyline that are closer to the one before than this, in plan, count as that.
+constexpr float kRepeatedPoint_m = 1e-4f;
 /// Cuts polylines (at least two points each) into mitred strips of at most kMaxPiece_m and appends them.
 void append_strips(Span<const Vec3> points_m, float width_m, Rgb color, StripKind kind, std::vector<Strip>* strips_out);
 

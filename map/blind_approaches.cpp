@@ -143,21 +143,16 @@ class Sight {
 
   bool is_blocked(Vec3 from, Vec3 to) const {
     if (walls_.empty()) return false;
-    const GridView cells = grid_.view();
-    const Aabb2 box = box_of(from.xy(), to.xy());
-    for (int y = cells.cell_y(box.low.y); y <= cells.cell_y(box.high.y); ++y) {
-      for (int x = cells.cell_x(box.low.x); x <= cells.cell_x(box.high.x); ++x) {
-        const auto cell = static_cast<size_t>(y * cells.num_x + x);
-        for (int32_t i = cells.begin[cell]; i < cells.begin[cell + 1]; ++i) {
-          const WallFace& wall = walls_[static_cast<size_t>(cells.items[static_cast<size_t>(i)])];
-          const auto share = crossing_share(from.xy(), to.xy(), wall.a_m.xy(), wall.b_m.xy());
-          if (!share) continue;
-          const float above_m = from.z + (to.z - from.z) * *share - 0.5f * (wall.a_m.z + wall.b_m.z);
-          if (above_m >= 0 && above_m <= wall.height_m) return true;
-        }
-      }
-    }
-    return false;
+    bool blocked = false;
+    visit_items(grid_.view(), box_of(from.xy(), to.xy()), [&](std::size_t i) {
+      if (blocked) return;
+      const WallFace& wall = walls_[i];
+      const auto share = crossing_share(from.xy(), to.xy(), wall.a_m.xy(), wall.b_m.xy());
+      if (!share) return;
+      const float above_m = from.z + (to.z - from.z) * *share - 0.5f * (wall.a_m.z + wall.b_m.z);
+      blocked = above_m >= 0 && above_m <= wall.height_m;
+    });
+    return blocked;
   }
 
   Span<const WallFace> walls_;

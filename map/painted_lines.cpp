@@ -6,6 +6,7 @@
 #include <tuple>
 #include <utility>
 
+#include "pictura/common/grid.h"
 #include "pictura/common/scene.h"
 #include "pictura/map/polyline.h"
 
@@ -21,7 +22,6 @@ constexpr float kSame_m = 1e-3f;
 constexpr float kThinning_m = kPaintTolerance_m - 3 * kSame_m;
 constexpr float kMaxBend = 0.25f;                    // sine of the angle between lines that continue each other
 constexpr float kLongestChord_m = 10 * kMaxPiece_m;  // bounds the time of thinning; chords are drawn in even pieces
-constexpr float kSamePoint_m = 1e-4f;                // as in append_strips()
 constexpr float kCell_m = 20.0f;
 
 bool is_same_paint(const PaintedLine& a, const PaintedLine& b) { return a.width_m == b.width_m && a.color == b.color; }
@@ -31,27 +31,13 @@ Aabb2 box_around(Vec2 a, Vec2 b) {
           {max_of(a.x, b.x) + kSame_m, max_of(a.y, b.y) + kSame_m}};
 }
 
-/// Calls visit(item) for all items that share a cell with the box; for some of them more than once.
-template <typename Visit>
-void visit_near(const GridView& grid, const Aabb2& box, Visit&& visit) {
-  for (int y = grid.cell_y(box.low.y); y <= grid.cell_y(box.high.y); ++y) {
-    for (int x = grid.cell_x(box.low.x); x <= grid.cell_x(box.high.x); ++x) {
-      const std::size_t cell =
-          static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.num_x) + static_cast<std::size_t>(x);
-      for (int32_t i = grid.begin[cell]; i < grid.begin[cell + 1]; ++i) {
-        visit(static_cast<std::size_t>(grid.items[static_cast<std::size_t>(i)]));
-      }
-    }
-  }
-}
-
 std::vector<PaintedLine> lines_of(const RoadMap& map) {
   std::vector<PaintedLine> lines;
   for (const Marking& marking : map.markings) {
     PaintedLine line{.width_m = marking.width_m, .color = marking.color};
     for (int32_t i = marking.points.begin; i < marking.points.end; ++i) {
       const Vec3 point = map.marking_points[static_cast<std::size_t>(i)];
-      if (line.points_m.empty() || length((point - line.points_m.back()).xy()) >= kSamePoint_m) {
+      if (line.points_m.empty() || length((point - line.points_m.back()).xy()) >= kRepeatedPoint_m) {
         line.points_m.push_back(point);
       }
     }
@@ -109,7 +95,7 @@ class RepeatedPaint {
   /// Whether lines that are kept paint the whole piece.
   bool is_painted(const Piece& piece) const {
     std::vector<Stretch> painted;
-    visit_near(grid_.view(), box_around(piece.a_m.xy(), piece.b_m.xy()), [&](std::size_t i) {
+    visit_items(grid_.view(), box_around(piece.a_m.xy(), piece.b_m.xy()), [&](std::size_t i) {
       const Piece& other = pieces_[i];
       if (!kept_[other.line] || !is_same_paint(lines_[other.line], lines_[piece.line])) return;
       const Stretch shared = shared_stretch(piece, other);
@@ -191,7 +177,7 @@ class LineJoiner {
     std::vector<Pair> pairs;
     for (std::size_t a = 0; a < partner_.size(); ++a) {
       const Vec2 here = place(a).xy(), out = outward(a);
-      visit_near(grid.view(), {here, here}, [&](std::size_t b) {
+      visit_items(grid.view(), {here, here}, [&](std::size_t b) {
         if (b <= a || !is_same_paint(lines_[a / 2], lines_[b / 2])) return;
         const Vec2 other_out = outward(b);
         const float gap_m = length(place(a) - place(b)), bend = std::abs(cross(out, other_out));

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "pictura/common/error.h"
+#include "pictura/common/grid.h"
 #include "pictura/simulator/rules/collision.h"
 #include "pictura/simulator/rules/observe.h"
 #include "pictura/simulator/rules/road.h"
@@ -239,11 +240,7 @@ CellLists lists_by_distance(const WorldMap& map, const std::string& map_name, co
   for (const LaneSegment& segment : map.segments) {
     const Vec2 a = segment.a_m.xy();
     const Aabb2 box = box_of_segment(a, a + segment.direction * segment.length_m, kObserverReach_m);
-    for (int y = cells.cell_y(box.low.y); y <= cells.cell_y(box.high.y); ++y) {
-      for (int x = cells.cell_x(box.low.x); x <= cells.cell_x(box.high.x); ++x) {
-        is_occupied[static_cast<size_t>(y) * static_cast<size_t>(lists.num_x) + static_cast<size_t>(x)] = 1;
-      }
-    }
+    visit_cells(cells, box, [&](size_t cell) { is_occupied[cell] = 1; });
   }
 
   std::vector<Aabb2> boxes;
@@ -258,16 +255,11 @@ CellLists lists_by_distance(const WorldMap& map, const std::string& map_name, co
                                                 static_cast<float>(cell / static_cast<size_t>(lists.num_x)) + 0.5f} *
                                                kNearCell_m;
       found.clear();
-      for (int y = point_cells.cell_y(center.y - range_m); y <= point_cells.cell_y(center.y + range_m); ++y) {
-        for (int x = point_cells.cell_x(center.x - range_m); x <= point_cells.cell_x(center.x + range_m); ++x) {
-          const size_t c = static_cast<size_t>(y * point_cells.num_x + x);
-          for (int32_t i = point_cells.begin[c]; i < point_cells.begin[c + 1]; ++i) {
-            const int32_t item = point_cells.items[static_cast<size_t>(i)];
-            const float distance = length(points[static_cast<size_t>(item)] - center);
-            if (distance <= range_m) found.push_back({distance, item});
-          }
-        }
-      }
+      const Vec2 reach{range_m, range_m};
+      visit_items(point_cells, {center - reach, center + reach}, [&](size_t item) {
+        const float distance = length(points[item] - center);
+        if (distance <= range_m) found.push_back({distance, static_cast<int32_t>(item)});
+      });
       std::sort(found.begin(), found.end(), [](const Neighbor& a, const Neighbor& b) {
         return a.distance_m < b.distance_m || (a.distance_m == b.distance_m && a.item < b.item);
       });

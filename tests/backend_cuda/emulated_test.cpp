@@ -192,36 +192,21 @@ TEST(EmulatedKernels, DrawTheOraclesTownsInAnyOrderOfThreads) {
   }
 }
 
-TEST(EmulatedKernels, PostponeWhatThePoolHasNoRoomFor) {
+// Draws a town from a pool that has room for some of its images alone.
+void expect_some_postponed(uint64_t seed, const EmulatedRenderer::Pool& pool) {
   SyntheticTown town = make_synthetic_town(1, 120);
   town.views.resize(2);
-  EmulatedRenderer renderer(config_of(paper_rig()), 7, {.faces = 130});
+  EmulatedRenderer renderer(config_of(paper_rig()), seed, pool);
   expect_oracles(&renderer, town);
   EXPECT_GT(renderer.postponed(), 0);
   EXPECT_LT(renderer.postponed(), 8);
   EXPECT_EQ(renderer.overflow(), 0);
 }
 
+TEST(EmulatedKernels, PostponeWhatThePoolHasNoRoomFor) { expect_some_postponed(7, {.faces = 130}); }
 // Noticed when some of an image's faces are made already.
-TEST(EmulatedKernels, PostponeWhatHasNoRoomForItsClippedEdges) {
-  SyntheticTown town = make_synthetic_town(1, 120);
-  town.views.resize(2);
-  EmulatedRenderer renderer(config_of(paper_rig()), 8, {.clipped_edges = 80});
-  expect_oracles(&renderer, town);
-  EXPECT_GT(renderer.postponed(), 0);
-  EXPECT_LT(renderer.postponed(), 8);
-  EXPECT_EQ(renderer.overflow(), 0);
-}
-
-TEST(EmulatedKernels, PostponeWhatThereAreNoBatchesFor) {
-  SyntheticTown town = make_synthetic_town(1, 120);
-  town.views.resize(2);
-  EmulatedRenderer renderer(config_of(paper_rig()), 10, {.batches = 4});
-  expect_oracles(&renderer, town);
-  EXPECT_GT(renderer.postponed(), 0);
-  EXPECT_LT(renderer.postponed(), 8);
-  EXPECT_EQ(renderer.overflow(), 0);
-}
+TEST(EmulatedKernels, PostponeWhatHasNoRoomForItsClippedEdges) { expect_some_postponed(8, {.clipped_edges = 80}); }
+TEST(EmulatedKernels, PostponeWhatThereAreNoBatchesFor) { expect_some_postponed(10, {.batches = 4}); }
 
 TEST(EmulatedKernels, ClipLightsOnAllSides) {
   // A spiral of heads around a camera, from before its near plane on, that turn to it and cross each other's disks and
