@@ -62,13 +62,160 @@ PICTURA_HD inline float saturate(float x) {
 #endif
 }
 
-/// a + b within [0, high]; one instruction of a device.
-PICTURA_HD inline int32_t sum_within(int32_t a, int32_t b, int32_t high) {
+/// The lesser and the greater of two numbers that are numbers; one instruction of a device. Of two zeros it is either.
+PICTURA_HD inline float lesser_of(float a, float b) {
 #if defined(__CUDA_ARCH__)
-  return __viaddmin_s32_relu(a, b, high);
+  return fminf(a, b);
 #else
-  const int32_t sum = high < a + b ? high : a + b;
-  return sum < 0 ? 0 : sum;
+  return a < b ? a : b;
+#endif
+}
+PICTURA_HD inline float greater_of(float a, float b) {
+#if defined(__CUDA_ARCH__)
+  return fmaxf(a, b);
+#else
+  return a > b ? a : b;
+#endif
+}
+
+/// The bits of a number.
+PICTURA_HD inline uint32_t bits_of(float x) {
+#if defined(__CUDA_ARCH__)
+  return __float_as_uint(x);
+#else
+  return __builtin_bit_cast(uint32_t, x);
+#endif
+}
+
+/// Eight numbers of 16 bits. A device holds number k and number k + 4 as the halves of a word, on which one instruction
+/// does the same; a host holds them one after the other, in one register of eight.
+struct Eight {
+#if defined(__CUDA_ARCH__)
+  uint32_t halves[4];
+#else
+  int16_t number[8];
+#endif
+};
+constexpr int kEight = 8, kHalfOfEight = 4;
+
+/// Numbers of(0) to of(7).
+template <typename Of>
+PICTURA_HD inline Eight eight_of(Of&& of) {
+  Eight eight;
+#if defined(__CUDA_ARCH__)
+  for (int k = 0; k < kHalfOfEight; ++k) {
+    eight.halves[k] = static_cast<uint32_t>(of(k)) & 0xFFFFu | static_cast<uint32_t>(of(k + kHalfOfEight)) << 16;
+  }
+#else
+  for (int k = 0; k < kEight; ++k) eight.number[k] = static_cast<int16_t>(of(k));
+#endif
+  return eight;
+}
+
+/// base + (k - 4) * step, which lie in [0, 65,536), of which numbers keep the bits.
+PICTURA_HD inline Eight multiples_of(int32_t step, int32_t base) {
+#if defined(__CUDA_ARCH__)
+  Eight eight;
+  for (int k = 0; k < kHalfOfEight; ++k) {
+    eight.halves[k] = static_cast<uint32_t>(step * ((k << 16) + k - kHalfOfEight) + base * 0x10001);
+  }
+  return eight;
+#else
+  return eight_of([=](int k) { return base + (k - kHalfOfEight) * step; });
+#endif
+}
+
+/// The lower half of a word, in both of its halves.
+PICTURA_HD inline uint32_t in_both_halves(uint32_t word) {
+#if defined(__CUDA_ARCH__)
+  return __byte_perm(word, 0, 0x1010);
+#else
+  return (word & 0xFFFFu) * 0x10001u;
+#endif
+}
+
+/// Of each number the greater, or the lesser, of a + b and c, where both halves of b hold the same, and what is carried
+/// out of a sum's 16 bits is lost.
+PICTURA_HD inline Eight greater_of_sum(const Eight& a, uint32_t b, const Eight& c) {
+  Eight eight;
+#if defined(__CUDA_ARCH__)
+  for (int k = 0; k < kHalfOfEight; ++k) eight.halves[k] = __viaddmax_s16x2(a.halves[k], b, c.halves[k]);
+#else
+  for (int k = 0; k < kEight; ++k) {
+    const auto sum = static_cast<int16_t>(static_cast<uint16_t>(a.number[k]) + b);
+    eight.number[k] = sum > c.number[k] ? sum : c.number[k];
+  }
+#endif
+  return eight;
+}
+PICTURA_HD inline Eight lesser_of_sum(const Eight& a, uint32_t b, const Eight& c) {
+  Eight eight;
+#if defined(__CUDA_ARCH__)
+  for (int k = 0; k < kHalfOfEight; ++k) eight.halves[k] = __viaddmin_s16x2(a.halves[k], b, c.halves[k]);
+#else
+  for (int k = 0; k < kEight; ++k) {
+    const auto sum = static_cast<int16_t>(static_cast<uint16_t>(a.number[k]) + b);
+    eight.number[k] = sum < c.number[k] ? sum : c.number[k];
+  }
+#endif
+  return eight;
+}
+
+/// a + b within [0, high], where no sum leaves its 16 bits.
+PICTURA_HD inline Eight sum_within(const Eight& a, const Eight& b, const Eight& high) {
+  Eight eight;
+#if defined(__CUDA_ARCH__)
+  for (int k = 0; k < kHalfOfEight; ++k) {
+    eight.halves[k] = __viaddmin_s16x2_relu(a.halves[k], b.halves[k], high.halves[k]);
+  }
+#else
+  for (int k = 0; k < kEight; ++k) {
+    const auto sum = static_cast<int16_t>(a.number[k] + b.number[k]);
+    const int16_t bounded = sum < high.number[k] ? sum : high.number[k];
+    eight.number[k] = bounded > 0 ? bounded : int16_t{0};
+  }
+#endif
+  return eight;
+}
+
+#if defined(__CUDA_ARCH__)
+/// The bytes of `table` that four selectors of four bits name; one above 7 takes the sign of the byte that is 8 less,
+/// eight times (__byte_perm does not).
+__device__ inline uint32_t bytes_of(uint64_t table, uint32_t selectors) {
+  uint32_t bytes;
+  asm("prmt.b32 %0, %1, %2, %3;"
+      : "=r"(bytes)
+      : "r"(static_cast<uint32_t>(table)), "r"(static_cast<uint32_t>(table >> 32)), "r"(selectors));
+  return bytes;
+}
+/// The bits 7 to 10 of the numbers as selectors, those of the first four in the lower half.
+__device__ inline uint32_t selectors_of(const Eight& a) {
+  const uint32_t low = (a.halves[0] >> 7 & 0x000F000Fu) | (a.halves[1] >> 3 & ~0x000F000Fu),
+                 high = (a.halves[2] << 1 & 0x0F000F00u) | (a.halves[3] << 5 & ~0x0F000F00u);
+  return (low & 0x00FF00FFu) | (high & ~0x00FF00FFu);
+}
+#endif
+
+/// Byte k has those bits that begin at a 128th of number k of `from` and end before that of `to`. None of `from` is
+/// less than 0, more than that of `to`, or more than 8 of 128.
+PICTURA_HD inline uint64_t bits_between(const Eight& from, const Eight& to) {
+#if defined(__CUDA_ARCH__)
+  // Looked up, for 0 to 8: the bits from there on, but that of the upper four those stand there in which they differ
+  // from the lower four. So byte 0 has no sign, and 8 finds none.
+  constexpr uint64_t kTable = 0x80C0E0F0783C1E0Full;
+  constexpr uint32_t kUpperFour = 0xF0F0F0F0u;
+  const uint32_t begin = selectors_of(from), end = selectors_of(to);
+  const uint32_t low = bytes_of(kTable, begin) ^ bytes_of(kTable, end),
+                 high = bytes_of(kTable, begin >> 16) ^ bytes_of(kTable, end >> 16);
+  return static_cast<uint64_t>(high ^ (high << 4 & kUpperFour)) << 32 | (low ^ (low << 4 & kUpperFour));
+#else
+  struct Bytes {
+    uint8_t byte[kEight];
+  } bytes;
+  for (int k = 0; k < kEight; ++k) {
+    bytes.byte[k] = static_cast<uint8_t>((1u << (to.number[k] >> 7)) - (1u << (from.number[k] >> 7)));
+  }
+  return __builtin_bit_cast(uint64_t, bytes);
 #endif
 }
 

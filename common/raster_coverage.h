@@ -101,60 +101,73 @@ PICTURA_HD inline Vec2 project(const PinholeCamera& camera, Vec3 p) {
 }
 
 /// An edge of a polygon on screen. Its numbers do not depend on the direction in which a face walks it, but for the
-/// signs of a and b: two faces that share an edge split areas and samples between them exactly.
+/// signs of two: faces that share an edge split areas and samples between them exactly.
 struct alignas(16) PolygonEdge {
-  float x0 = 0, y0 = 0;  // the upper end
-  float dx_dy = 0;       // 0 for level edges, which bound no area
-  float a = 0, b = 0;    // inside: a * (x - x0) + b * (y - y0) >= 0
-  float y1 = 0;          // the lower end's y
-  // Where the edge's line passes a column of samples, in rows of samples: what a pixel to the right adds, and what one
-  // further down takes off.
-  float rows_right = 0, rows_down = 0;
+  float x0 = 0, y0 = 0;             // the upper end
+  float y1 = 0;                     // the lower end's y; y0 for level edges, which bound no area
+  float dy_dx = 0, half_dx_dy = 0;  // of its line; 0 for level edges
+  // Where its line passes the samples, see make_edge; rows_scale is negative where the face is above the edge.
+  float rows_scale = 0, rows_offset = 0;
+  int32_t rows_step = 0;
 };
 
-/// Visits the edges of a polygon; each is asked for while the one before it is visited.
+/// Visits the edges of a polygon; each is asked for while the one before it is visited. By turns they stand in two
+/// places, so that none is moved.
 template <typename Visit>
 PICTURA_HD inline void each_edge(const PolygonEdge* edges, int count, Visit&& visit) {
-  PolygonEdge next = edges[0];
+  PolygonEdge even = edges[0], odd;
   PICTURA_KEEP_LOOP
-  for (int i = 1; i <= count; ++i) {
-    const PolygonEdge edge = next;
-    if (i < count) next = edges[i];
-    visit(edge);
+  for (int i = 1;; i += 2) {
+    if (i < count) odd = edges[i];
+    visit(even);
+    if (i >= count) return;
+    if (i + 1 < count) even = edges[i + 1];
+    visit(odd);
+    if (i + 1 >= count) return;
   }
 }
 
-/// Edges whose ends are closer in y than this are level, and bound no area. Those whose ends are closer in x are
-/// upright; to samples they lean by as much to the right.
+/// Edges whose ends are closer in y than this are level, and bound no area. Those whose ends are closer in x lean by as
+/// much to the right.
 constexpr float kLevel_px = 1e-6f, kUpright_px = 1e-6f;
-/// To samples, an edge that goes down by more than this from one column of samples to the next, in their rows, is as
-/// good as upright.
-constexpr float kSteepest = 1024.0f;
 /// Columns and rows of a pixel's samples.
-constexpr int kSampleColumns = 8, kSampleRows = 8;
+constexpr int kSampleColumns = kEight, kSampleRows = 8;
+/// To samples, heights are whole numbers of 16 bits, so many of them a row, from the pixel's middle. There a line is
+/// cut off at half of kLines_rows from it in the first column right of the middle, and goes down by at most kSteepest
+/// rows from one column to the next: so it leaves the pixel before it is cut off, and nothing leaves the 16 bits.
+constexpr int kRowUnits = 128;
+constexpr float kLines_rows = 256.0f, kSteepest = 30.0f;
 
 PICTURA_HD inline PolygonEdge make_edge(Vec2 from, Vec2 to) {
   const bool downward = from.y < to.y || (from.y == to.y && from.x < to.x);
   const Vec2 upper = downward ? from : to, lower = downward ? to : from;
-  const float dx = lower.x - upper.x, leaning_dx = fabsf(dx) < kUpright_px ? kUpright_px : dx;
-  const bool is_level = lower.y - upper.y < kLevel_px;
-  const float dy = is_level ? 0.0f : lower.y - upper.y;
+  const bool is_upright = fabsf(lower.x - upper.x) < kUpright_px, is_level = lower.y - upper.y < kLevel_px;
+  const float dx = is_upright ? kUpright_px : lower.x - upper.x, dy = is_level ? 0.0f : lower.y - upper.y;
+  const float dx_dy = is_level ? 0.0f : dx / dy;
   PolygonEdge edge;
   edge.x0 = upper.x;
   edge.y0 = upper.y;
   edge.y1 = is_level ? upper.y : lower.y;
-  edge.dx_dy = dy > 0.0f ? dx / dy : 0.0f;
-  edge.a = downward ? -dy : dy;
-  edge.b = downward ? leaning_dx : -leaning_dx;
-  // Of what is steeper, all numbers are lessened alike: it crosses the row at the same place.
-  edge.rows_right = kSampleRows * clamp(dy / leaning_dx, -kSteepest, kSteepest);
-  edge.rows_down = kSampleRows * (dy > 0.0f ? min_of(kSteepest * fabsf(edge.dx_dy), 1.0f) : 1.0f);
+  edge.dy_dx = dy / dx;
+  edge.half_dx_dy = 0.5f * dx_dy;
+  // Of what is steeper, all heights from the pixel's middle are lessened alike: it crosses that at the same place.
+  const float lessened = is_level ? 1.0f : min_of(kSteepest * fabsf(dx_dy), 1.0f);
+  const float scale = lessened * (0.5f * kSampleRows / kLines_rows), step_rows = lessened * edge.dy_dx;
+  // The sum of the heights at which the line passes the pixel's left and right side, in pixels from its top, to that at
+  // which it passes the first column right of the middle, in parts of kLines_rows, of which a half is the middle.
+  edge.rows_scale = (dx > 0.0f) == downward ? scale : -scale;
+  edge.rows_offset = 0.5f - scale + step_rows * (0.5f / kLines_rows);
+  edge.rows_step = static_cast<int32_t>(floorf(step_rows * kRowUnits + 0.5f));
   return edge;
 }
 
-/// Distance of a point from an edge, positive inside, in multiples of the edge's length.
-PICTURA_HD inline float inner_distance(const PolygonEdge& edge, Vec2 p) {
-  return edge.a * (p.x - edge.x0) + edge.b * (p.y - edge.y0);
+/// Positive where the face is to the left of an edge, negative where it is to the right of it, 0 for level edges.
+PICTURA_HD inline float side_of(const PolygonEdge& edge) { return edge.rows_scale * edge.half_dx_dy; }
+
+/// Whether a point is on the inner side of an edge's line, or on the line.
+PICTURA_HD inline bool is_inside(const PolygonEdge& edge, Vec2 p) {
+  const float below_px = (p.y - edge.y0) - (p.x - edge.x0) * edge.dy_dx;
+  return (edge.rows_scale > 0.0f ? below_px : -below_px) >= 0.0f;
 }
 
 /// Pixels that a polygon may touch: half-open ranges within the image.
@@ -257,7 +270,7 @@ PICTURA_HD inline float face_depth_m(const ScreenFace& face, Vec2 at_px) {
 PICTURA_HD inline bool covers_point(const PolygonEdge* edges, int count, float x_px, float y_px) {
   PICTURA_KEEP_LOOP
   for (int i = 0; i < count; ++i) {
-    if (inner_distance(edges[i], {x_px, y_px}) < 0.0f) return false;
+    if (!is_inside(edges[i], {x_px, y_px})) return false;
   }
   return true;
 }
@@ -288,61 +301,84 @@ PICTURA_HD inline uint64_t reach_of(const PixelCoverage& coverage) {
 constexpr float kLeastCoverage = 1e-4f;
 constexpr float kFullCoverage = 1e-3f;
 
+/// Heights at which an edge's line passes the left and the right side of a pixel, in pixels from its top.
+struct Passage {
+  float left = 0, right = 0;
+};
+/// left_px and top_px are the pixel's corner relative to the edge's upper end.
+PICTURA_HD inline Passage passage_of(const PolygonEdge& edge, float left_px, float top_px) {
+  const float left = left_px * edge.dy_dx - top_px;
+  return {left, left + edge.dy_dx};
+}
+
+/// For each column of a pixel's samples, the heights (see kRowUnits) between which it is inside of the edges so far.
+struct SampleRange {
+  Eight low, high;
+};
+PICTURA_HD inline SampleRange whole_range() {
+  constexpr int kFar = 64 * kRowUnits;
+  return {eight_of([](int) { return -kFar; }), eight_of([](int) { return kFar; })};
+}
+
+/// Narrows a range to the inner side of an edge.
+PICTURA_HD inline void narrow(const PolygonEdge& edge, const Passage& passage, SampleRange* range_inout) {
+  constexpr float kWhole = 1 << 8;  // the lowest bit of what is added to it is one of kLines_rows * kRowUnits
+  constexpr uint32_t kLowest = 0, kHighest = 0x80008000u;
+  const float at = saturate((passage.left + passage.right) * fabsf(edge.rows_scale) + edge.rows_offset);
+  const uint32_t height = in_both_halves(bits_of(at + kWhole));
+  // Of the sums, one half of 2^15 is the middle, which is 0.
+  const Eight columns = multiples_of(edge.rows_step, (1 << 16) - (1 << 14));
+  const bool is_below = edge.rows_scale > 0.0f;
+  range_inout->low = greater_of_sum(columns, is_below ? height : kLowest, range_inout->low);
+  range_inout->high = lesser_of_sum(columns, is_below ? kHighest : height, range_inout->high);
+}
+
+/// The samples within a range.
+PICTURA_HD inline uint64_t samples_within(const SampleRange& range) {
+  // What is to be added so that whole rows are those whose samples are above.
+  const Eight from_top = eight_of([](int column) {
+    return kSampleRows / 2 * kRowUnits + kRowUnits - 1 -
+           static_cast<int>(sample_column_offset(column) * static_cast<float>(kRowUnits));
+  });
+  const Eight to = sum_within(range.high, from_top, eight_of([](int) { return kSampleRows * kRowUnits; }));
+  return bits_between(sum_within(range.low, from_top, to), to);
+}
+
 /// Samples on the inner side of an edge; left_px and top_px are the pixel's corner relative to the edge's upper end.
 PICTURA_HD inline uint64_t samples_inside(const PolygonEdge& edge, float left_px, float top_px) {
-  // Where the edge's line passes the middle of the first column, in rows, and how far it goes down from one column to
-  // the next. As fixed point numbers, in which 8 columns do not overflow.
-  constexpr float kOne = 1 << 16, kFarthest = 16.0f * kSteepest;
-  const float first = (left_px + 0.5f / kSampleColumns) * edge.rows_right - top_px * edge.rows_down;
-  const auto step_fixed = static_cast<int32_t>(edge.rows_right * (kOne / kSampleColumns));
-  const auto first_fixed = static_cast<int32_t>(clamp(first, -kFarthest, kFarthest) * kOne);
-  // In each byte of a word, for its column, what a column has but 2 to the power of the rows above the line.
-  uint32_t word[2] = {0x01010100u, 0x01010100u};
-  for (int column = 0; column < kSampleColumns; ++column) {
-    constexpr float kRoundUp = 65535.0f / 65536.0f;
-    const auto offset = static_cast<int32_t>((kRoundUp - sample_column_offset(column)) * kOne);
-    const int rows_above = sum_within(first_fixed + column * step_fixed, offset, kSampleRows << 16) >> 16;
-    word[column / 4] -= (1u << rows_above) << (8 * (column % 4));
-  }
-  const uint64_t samples = static_cast<uint64_t>(word[1]) << 32 | word[0];
-  return edge.b > 0.0f ? samples : ~samples;
+  SampleRange range = whole_range();
+  narrow(edge, passage_of(edge, left_px, top_px), &range);
+  return samples_within(range);
 }
 
-/// Mean over a segment, whose x runs from xa to xb relative to a pixel of width 1, of the pixel's width to its left.
-PICTURA_HD inline float mean_width_left(float xa, float xb) {
-  const float low = min_of(xa, xb), high = max_of(xa, xb), run = high - low;
-  const float inner_low = saturate(low), inner_high = saturate(high);
-  const float within = 0.5f * (inner_high - inner_low) * (inner_high + inner_low);
-  const float beyond = max_of(high - 1.0f, 0.0f) - max_of(low - 1.0f, 0.0f);
-  return run > kUpright_px ? (within + beyond) * (1.0f / max_of(run, kUpright_px)) : inner_low;
-}
-
-/// Areas in whole units, so that sums over edges do not depend on their order.
-constexpr float kAreaUnits = 1 << 24;  // of a pixel
-PICTURA_HD inline int32_t to_area_units(float area) { return static_cast<int32_t>(area * kAreaUnits + 0.5f); }
-
-/// What an edge adds to a polygon's area in pixel (x, y), in the rows that it spans: a right border the area to its
-/// left, a left border the same negative.
-PICTURA_HD inline int32_t area_units_of(const PolygonEdge& edge, int x, int y) {
-  const float y_px = static_cast<float>(y), left_px = static_cast<float>(x) - edge.x0, top_px = y_px - edge.y0;
+/// What an edge adds to a polygon's area in a pixel, in the rows that it spans: a right border the area to its left, a
+/// left border the same negative, both less what is the same for all edges that end there: the sum over a polygon is
+/// its area.
+PICTURA_HD inline float area_of(const PolygonEdge& edge, const Passage& passage, float y_px) {
   const float from = saturate(edge.y0 - y_px), to = saturate(edge.y1 - y_px);
-  const float width = mean_width_left((from + top_px) * edge.dx_dy - left_px, (to + top_px) * edge.dx_dy - left_px);
-  const int32_t units = to_area_units((to - from) * width);
-  return edge.a < 0.0f ? units : -units;
+  // Between these the edge is within the pixel's width; from the second on, the pixel's whole width is to its left.
+  const float left = greater_of(lesser_of(passage.left, to), from);
+  const float right = greater_of(lesser_of(passage.right, to), from);
+  // Half of the width is where the line has gone half of its way.
+  const float width = saturate(((left + right) - (passage.left + passage.right)) * edge.half_dx_dy + 0.5f);
+  const float area = (right - left) * width + ((edge.dy_dx > 0.0f ? to : from) - right);
+  return edge.rows_scale > 0.0f ? area : -area;
 }
 
-/// Exact area of a convex polygon in pixel (x, y), and the samples that it covers. Edges that do not cross the pixel
-/// keep all samples and add their part to the area, so none is asked where it lies.
+/// Area of a convex polygon in pixel (x, y), and the samples that it covers. Edges that do not cross the pixel keep all
+/// samples and add their part to the area, so none is asked where it lies.
 PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int count, int x, int y) {
-  int32_t area_units = 0;
-  uint64_t samples = kAllSamples;
+  const float x_px = static_cast<float>(x), y_px = static_cast<float>(y);
+  float area = 0.0f;
+  SampleRange range = whole_range();
   each_edge(edges, count, [&](const PolygonEdge& edge) {
-    samples &= samples_inside(edge, static_cast<float>(x) - edge.x0, static_cast<float>(y) - edge.y0);
-    area_units += area_units_of(edge, x, y);
+    const Passage passage = passage_of(edge, x_px - edge.x0, y_px - edge.y0);
+    area += area_of(edge, passage, y_px);
+    narrow(edge, passage, &range);
   });
-  const float area = static_cast<float>(area_units) * (1.0f / kAreaUnits);
-  if (samples == kAllSamples && area > 1.0f - kFullCoverage) return {1.0f, kAllSamples};
   if (area < kLeastCoverage) return {0.0f, 0};
+  const uint64_t samples = samples_within(range);
+  if (samples == kAllSamples && area > 1.0f - kFullCoverage) return {1.0f, kAllSamples};
   return {min_of(area, 1.0f), samples};
 }
 
@@ -352,23 +388,24 @@ struct RowSpan {
 };
 
 PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const PixelBox& box, int y) {
-  const float y_px = static_cast<float>(y);
+  const float y_px = static_cast<float>(y), middle_px = y_px + 0.5f;
   float touch_low = static_cast<float>(box.x_begin), touch_high = static_cast<float>(box.x_end);
   float full_low = touch_low, full_high = touch_high;
   bool is_beside = false;
   each_edge(edges, count, [&](const PolygonEdge& edge) {
-    const float above_px = y_px - edge.y0;
-    if (edge.a == 0.0f) {
+    const float side = side_of(edge);
+    if (side == 0.0f) {
       // Level: the row is on one side of it, or it runs through the row.
-      const float at_row = edge.b * above_px;
-      if (at_row + max_of(edge.b, 0.0f) <= 0.0f) is_beside = true;
-      if (at_row + min_of(edge.b, 0.0f) < 0.0f) full_high = -1.0f;
+      const float above_px = y_px - edge.y0;
+      const bool is_below = edge.rows_scale > 0.0f;
+      if (is_below ? above_px <= -1.0f : above_px >= 0.0f) is_beside = true;
+      if (is_below ? above_px < 0.0f : above_px > -1.0f) full_high = -1.0f;
       return;
     }
-    // Where the edge's line enters the row, and where it leaves it.
-    const float enter = edge.x0 + above_px * edge.dx_dy, leave = edge.x0 + (above_px + 1.0f) * edge.dx_dy;
-    const float low = min_of(enter, leave), high = max_of(enter, leave);
-    if (edge.a > 0.0f) {
+    // Where the edge's line passes the row's middle, and how far it goes to both sides from there.
+    const float twice_above_px = 2.0f * (middle_px - edge.y0), middle = edge.x0 + twice_above_px * edge.half_dx_dy;
+    const float reach = fabsf(edge.half_dx_dy), low = middle - reach, high = middle + reach;
+    if (side < 0.0f) {
       touch_low = max_of(touch_low, low - 1.0f);
       full_low = max_of(full_low, high);
     } else {

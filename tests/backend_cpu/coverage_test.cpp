@@ -65,38 +65,97 @@ double clipped_area(const std::vector<Vec2>& polygon, int x, int y) {
   return area;
 }
 
+// How far a sample may be from an edge's line and still be taken for one on its other side, in px: two rounded numbers
+// of kRowUnits, and what a line that is steeper than kSteepest is turned.
+double sample_leeway_px(Vec2 side) {
+  const double dx_dy = std::abs(double{side.x} / double{side.y});
+  return 2.6 / (kRowUnits * kSampleRows) + std::max(0.0, 0.5 * (1.0 / kSteepest - dx_dy));
+}
+
+// Holds what pixel_coverage finds of a polygon in pixel (x, y) against its exact area and the samples within.
+void expect_covered(const std::vector<Vec2>& polygon, const std::vector<PolygonEdge>& edges, int x, int y) {
+  const PixelCoverage coverage = pixel_coverage(edges.data(), static_cast<int>(edges.size()), x, y);
+  const double area = clipped_area(polygon, x, y);
+  constexpr double kLeeway = 1e-4;
+  if (coverage.area == 1.0f) {
+    ASSERT_GT(area, 1 - kFullCoverage - kLeeway);
+  } else if (coverage.area == 0.0f) {
+    ASSERT_LT(area, kLeastCoverage + kLeeway);
+  } else {
+    ASSERT_NEAR(coverage.area, area, kLeeway);
+  }
+  if (area <= 2 * kLeastCoverage) return;
+  for (int sample = 0; sample < 64; ++sample) {
+    const int column = sample / 8, row = sample % 8;
+    const double sample_x = x + (column + 0.5) / 8, sample_y = y + (row + double{sample_column_offset(column)}) / 8;
+    bool is_in = true, is_near = false;
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const Vec2 a = polygon[i], b = polygon[(i + 1) % polygon.size()];
+      const double ab_x = double{b.x} - double{a.x}, ab_y = double{b.y} - double{a.y};
+      const double inner = (ab_x * (sample_y - double{a.y}) - ab_y * (sample_x - double{a.x})) / std::hypot(ab_x, ab_y);
+      is_near = is_near || std::abs(inner) < sample_leeway_px(b - a);
+      is_in = is_in && inner > 0;
+    }
+    if (is_near) continue;
+    ASSERT_EQ((coverage.samples >> sample) & 1, is_in ? 1u : 0u) << "sample " << sample;
+  }
+}
+
+void expect_covered(const std::vector<Vec2>& polygon) {
+  const std::vector<PolygonEdge> edges = edges_of(polygon);
+  for (int y = 0; y < 10; ++y) {
+    for (int x = 0; x < 10; ++x) {
+      SCOPED_TRACE(testing::Message() << "pixel " << x << ", " << y);
+      ASSERT_NO_FATAL_FAILURE(expect_covered(polygon, edges, x, y));
+    }
+  }
+}
+
 TEST(Coverage, AreaIsExactAndSamplesAreThoseInside) {
   std::mt19937 random(1);
   for (int round = 0; round < 400; ++round) {
-    const std::vector<Vec2> polygon = random_polygon(random, 3 + round % 5);
-    const std::vector<PolygonEdge> edges = edges_of(polygon);
-    const int count = static_cast<int>(edges.size());
-    for (int y = 0; y < 10; ++y) {
-      for (int x = 0; x < 10; ++x) {
-        const PixelCoverage coverage = pixel_coverage(edges.data(), count, x, y);
-        const double area = clipped_area(polygon, x, y);
-        ASSERT_NEAR(coverage.area, area, kFullCoverage + 1e-5) << round;
-        if (area > 2 * kLeastCoverage && area < 0.998) {
-          ASSERT_NEAR(coverage.area, area, 2e-5) << round;
-        }
-        for (int column = 0; column < 8; ++column) {
-          for (int row = 0; row < 8; ++row) {
-            const float sample_x = static_cast<float>(x) + (static_cast<float>(column) + 0.5f) / 8;
-            const float sample_y = static_cast<float>(y) + (static_cast<float>(row) + sample_column_offset(column)) / 8;
-            const bool in = (coverage.samples >> (8 * column + row)) & 1;
-            // Distance to the nearest edge, negative outside.
-            double inner = 1e9;
-            for (std::size_t i = 0; i < polygon.size(); ++i) {
-              const Vec2 a = polygon[i], ab = polygon[(i + 1) % polygon.size()] - a;
-              inner = std::min<double>(inner, cross(ab, Vec2{sample_x, sample_y} - a) / length(ab));
-            }
-            if (std::abs(inner) > 1e-4 && area > 2 * kLeastCoverage) {
-              ASSERT_EQ(in, inner > 0) << round;
-            }
-          }
-        }
-      }
-    }
+    SCOPED_TRACE(round);
+    ASSERT_NO_FATAL_FAILURE(expect_covered(random_polygon(random, 3 + round % 5)));
+  }
+}
+
+TEST(Coverage, HoldsForTinyPolygonsAndForFarEndsOfEdges) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> unit(0, 1);
+  for (int round = 0; round < 4000; ++round) {
+    SCOPED_TRACE(round);
+    // Corners on an ellipse, of which one point is among the pixels; thin ones lie in all directions.
+    const float rx = std::pow(10.0f, 5.5f * unit(random) - 2.6f), ry = std::pow(10.0f, 5.3f * unit(random) - 2.6f);
+    const SinCos at = sincos_of(kTwoPi * unit(random));
+    const SinCos turn = round % 2 ? sincos_of(kTwoPi * unit(random)) : SinCos{0, 1};
+    auto on_ellipse = [&](SinCos sc) {
+      const Vec2 p{rx * sc.cos, ry * sc.sin};
+      return Vec2{p.x * turn.cos - p.y * turn.sin, p.x * turn.sin + p.y * turn.cos};
+    };
+    const Vec2 center = Vec2{10 * unit(random), 10 * unit(random)} - on_ellipse(at);
+    std::vector<float> angles;
+    for (int i = 0; i < 3 + round % 6; ++i) angles.push_back(kTwoPi * unit(random));
+    std::sort(angles.begin(), angles.end());
+    std::vector<Vec2> polygon;
+    for (const float angle : angles) polygon.push_back(center + on_ellipse(sincos_of(angle)));
+    ASSERT_NO_FATAL_FAILURE(expect_covered(polygon));
+  }
+}
+
+TEST(Coverage, HoldsForSteepAndLevelEdges) {
+  std::mt19937 random(6);
+  std::uniform_real_distribution<float> unit(0, 1);
+  for (int round = 0; round < 4000; ++round) {
+    SCOPED_TRACE(round);
+    const float slant = round % 3 == 0 ? 0.0f : std::pow(10.0f, 7 * unit(random) - 7);
+    const float width = round % 5 == 0 ? 700 * unit(random) : 4 * unit(random);
+    const float height = round % 7 == 0 ? 700 * unit(random) : 4 * unit(random);
+    const float x = 10 * unit(random) - (round % 2 ? width : 0), y = 10 * unit(random) - (round % 4 < 2 ? height : 0);
+    auto slanting = [&] { return slant * (2 * unit(random) - 1); };
+    ASSERT_NO_FATAL_FAILURE(expect_covered({{x + slanting(), y + slanting()},
+                                            {x + width + slanting(), y + slanting()},
+                                            {x + width + slanting(), y + height + slanting()},
+                                            {x + slanting(), y + height + slanting()}}));
   }
 }
 
@@ -123,10 +182,30 @@ TEST(Coverage, ASharedEdgeSplitsAreaAndSamplesWithoutGapOrOverlap) {
         ASSERT_EQ(c.samples | d.samples, kAllSamples);
         // A pixel that lacks less than kFullCoverage counts as full.
         const bool rounded = c.area == 1.0f || d.area == 1.0f;
-        ASSERT_NEAR(c.area + d.area, 1, rounded ? kFullCoverage : 1e-5);
+        ASSERT_NEAR(c.area + d.area, 1, rounded ? kFullCoverage : 1e-6);
       }
     }
   }
+}
+
+TEST(Coverage, BothDirectionsOfAnEdgeAreOppositesWhereverItLies) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> unit(0, 1);
+  int split = 0;
+  for (int round = 0; round < 20000; ++round) {
+    // Through the pixel, or past it, in any direction; every other one almost level or upright.
+    const float exponent = round % 4 < 2 ? 0.0f : -9 * unit(random);
+    const Vec2 lean = Vec2{std::pow(10.0f, exponent), 1} * (800 * unit(random)),
+               way = round % 2 ? lean : Vec2{lean.y, -lean.x};
+    const Vec2 a = Vec2{3 * unit(random) - 1, 3 * unit(random) - 1} - way * unit(random), b = a + way;
+    const PolygonEdge one = make_edge(a, b), other = make_edge(b, a);
+    const uint64_t samples = samples_inside(one, -one.x0, -one.y0);
+    ASSERT_EQ(samples, ~samples_inside(other, -other.x0, -other.y0)) << round;
+    split += samples != 0 && samples != kAllSamples;
+    const Passage passage = passage_of(one, -one.x0, -one.y0);
+    ASSERT_EQ(area_of(one, passage, 0), -area_of(other, passage_of(other, -other.x0, -other.y0), 0)) << round;
+  }
+  EXPECT_GT(split, 4000);
 }
 
 TEST(Coverage, RowSpansAgreeWithPixels) {
