@@ -117,7 +117,8 @@ PICTURA_HD inline Eight multiples_of(int32_t step, int32_t base) {
 #if defined(__CUDA_ARCH__)
   Eight eight;
   for (int k = 0; k < kHalfOfEight; ++k) {
-    eight.halves[k] = static_cast<uint32_t>(step * ((k << 16) + k - kHalfOfEight) + base * 0x10001);
+    eight.halves[k] =
+        static_cast<uint32_t>(step * ((k << 16) + k - kHalfOfEight)) + static_cast<uint32_t>(base) * 0x10001u;
   }
   return eight;
 #else

@@ -103,11 +103,14 @@ PICTURA_HD inline Vec2 project(const PinholeCamera& camera, Vec3 p) {
 /// An edge of a polygon on screen. Its numbers do not depend on the direction in which a face walks it, but for the
 /// signs of two: faces that share an edge split areas and samples between them exactly.
 struct alignas(16) PolygonEdge {
-  float x0 = 0, y0 = 0;             // the upper end
-  float y1 = 0;                     // the lower end's y; y0 for level edges, which bound no area
-  float dy_dx = 0, half_dx_dy = 0;  // of its line; 0 for level edges
-  // Where its line passes the samples, see make_edge; rows_scale is negative where the face is above the edge.
-  float rows_scale = 0, rows_offset = 0;
+  float x0 = 0, y0 = 0;  // the upper end
+  float half_dx_dy = 0;  // of its line; 0 for level edges
+  // Where its line passes the samples, with rows_offset and rows_step, see make_edge; negative where the face is above.
+  // What row_span asks for ends here.
+  float rows_scale = 0;
+  float y1 = 0;     // the lower end's y; y0 for level edges, which bound no area
+  float dy_dx = 0;  // of its line; 0 for level edges
+  float rows_offset = 0;
   int32_t rows_step = 0;
 };
 
@@ -396,21 +399,20 @@ PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const Pi
     const float side = side_of(edge);
     if (side == 0.0f) {
       // Level: the row is on one side of it, or it runs through the row.
-      const float above_px = y_px - edge.y0;
-      const bool is_below = edge.rows_scale > 0.0f;
-      if (is_below ? above_px <= -1.0f : above_px >= 0.0f) is_beside = true;
-      if (is_below ? above_px < 0.0f : above_px > -1.0f) full_high = -1.0f;
+      const float inner_px = edge.rows_scale > 0.0f ? y_px - edge.y0 : edge.y0 - (y_px + 1.0f);
+      if (inner_px <= -1.0f) is_beside = true;
+      if (inner_px < 0.0f) full_high = -1.0f;
       return;
     }
     // Where the edge's line passes the row's middle, and how far it goes to both sides from there.
     const float twice_above_px = 2.0f * (middle_px - edge.y0), middle = edge.x0 + twice_above_px * edge.half_dx_dy;
     const float reach = fabsf(edge.half_dx_dy), low = middle - reach, high = middle + reach;
     if (side < 0.0f) {
-      touch_low = max_of(touch_low, low - 1.0f);
-      full_low = max_of(full_low, high);
+      touch_low = greater_of(touch_low, low - 1.0f);
+      full_low = greater_of(full_low, high);
     } else {
-      touch_high = min_of(touch_high, high);
-      full_high = min_of(full_high, low - 1.0f);
+      touch_high = lesser_of(touch_high, high);
+      full_high = lesser_of(full_high, low - 1.0f);
     }
   });
   if (is_beside) return {};
