@@ -87,6 +87,14 @@ PICTURA_HD inline uint32_t bits_of(float x) {
 #endif
 }
 
+/// x itself, computed before and not anew at each use: a device's compiler moves what seems cheap into loops.
+PICTURA_HD inline float computed_once(float x) {
+#if defined(__CUDA_ARCH__)
+  asm volatile("" : "+f"(x));
+#endif
+  return x;
+}
+
 /// Eight numbers of 16 bits. A device holds number k and number k + 4 as the halves of a word, on which one instruction
 /// does the same; a host holds them one after the other, in one register of eight.
 struct Eight {

@@ -371,7 +371,7 @@ PICTURA_HD inline float area_of(const PolygonEdge& edge, const Passage& passage,
 /// Area of a convex polygon in pixel (x, y), and the samples that it covers. Edges that do not cross the pixel keep all
 /// samples and add their part to the area, so none is asked where it lies.
 PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int count, int x, int y) {
-  const float x_px = static_cast<float>(x), y_px = static_cast<float>(y);
+  const float x_px = computed_once(static_cast<float>(x)), y_px = computed_once(static_cast<float>(y));
   float area = 0.0f;
   SampleRange range = whole_range();
   each_edge(edges, count, [&](const PolygonEdge& edge) {
