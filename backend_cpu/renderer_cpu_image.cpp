@@ -13,9 +13,9 @@ constexpr int kBandPixels = 1 << 14;
 }  // namespace
 
 auto ImageDrawer::face_maker(FaceOwner owner) {
-  return [this, owner](const Vec3* corners, int count, const FacePlane& plane, Rgb color) {
+  return [this, owner](const CameraFace& seen) {
     ScreenFace face;
-    if (make_face(setting_, owner, corners, count, plane, color, edges_, &face)) faces_.push_back(face);
+    if (make_face(setting_, owner, seen, edges_, &face)) faces_.push_back(face);
   };
 }
 

@@ -93,22 +93,19 @@ __device__ inline SharedFace share_quad(ClipRoom* room, int owner, const Quad& q
   __syncwarp();
   if (lane_index() == owner) room->quad = quad;
   __syncwarp();
-  return {room->quad.corner[lane_index() & 3], 4, room->quad.plane, room->quad.color, room->quad.owner};
+  const CameraQuad& seen = room->quad.seen;
+  return {seen.corner[lane_index() & 3], 4, seen.plane, seen.color, room->quad.owner};
 }
 
 // The disk of a lit head; of no corners where it has faded to black.
 __device__ inline SharedFace make_light(const FaceMaking& making, const ClipRoom& room, int32_t index) {
   const LightHead head = making.heads[index];
-  const int lane = lane_index();
+  const PinholeCamera& camera = making.setting.camera;
+  const Vec3 middle = to_camera(camera, head.position_m);
+  const float brightness = face_brightness(&middle, 1);
   SharedFace face;
-  face.corner =
-      to_camera(making.setting.camera, light_corner(head, room.light_corner_m[min_of(lane, kLightSides - 1)]));
-  const float brightness = brightness_of_sum(sum_in_order(fading_depth_m(face.corner), 0, kLightSides), kLightSides);
-  const Vec3 first = corner_of(face.corner, 0), next = corner_of(face.corner, (lane + 1) % kWarpSize);
-  const Vec3 normal = cross(face.corner - first, next - first);
-  face.plane.normal = {sum_in_order(normal.x, 1, kLightSides - 1), sum_in_order(normal.y, 1, kLightSides - 1),
-                       sum_in_order(normal.z, 1, kLightSides - 1)};
-  face.plane.offset = dot(face.plane.normal, first);
+  face.corner = to_camera(camera, light_corner(head, room.light_corner_m[min_of(lane_index(), kLightSides - 1)]));
+  face.plane = light_plane(head, camera, middle);
   face.color = light_color(making.lights[head.signal]) * brightness;
   face.owner = light_owner(index);
   face.count = brightness > 0.0f ? kLightSides : 0;
@@ -189,13 +186,14 @@ __device__ inline bool make_screen_face(const FaceMaking& making, const SharedFa
   const PinholeCamera& camera = making.setting.camera;
   const int lane = lane_index(), count = face.count;
   const bool is_corner = lane < count;
-  const Vec2 corner = is_corner ? project(camera, face.corner) : Vec2{};
-  const Vec2 low{least_of(is_corner ? corner.x : 1e30f), least_of(is_corner ? corner.y : 1e30f)};
-  const Vec2 high{greatest_of(is_corner ? corner.x : -1e30f), greatest_of(is_corner ? corner.y : -1e30f)};
-  const float depth_low = least_of(is_corner ? face.corner.z : 1e30f);
-  const float depth_high = greatest_of(is_corner ? face.corner.z : 0.0f);
-  const PixelBox box = pixel_box(camera, low, high);
-  if (is_empty(box)) return false;
+  const float inverse_depth = is_corner ? 1.0f / face.corner.z : 0.0f;
+  const Vec2 corner = project(camera, face.corner, inverse_depth);
+  ScreenBounds bounds;
+  bounds.low = {least_of(is_corner ? corner.x : 1e30f), least_of(is_corner ? corner.y : 1e30f)};
+  bounds.high = {greatest_of(is_corner ? corner.x : -1e30f), greatest_of(is_corner ? corner.y : -1e30f)};
+  bounds.inverse_depth_low = least_of(is_corner ? inverse_depth : 1e30f);
+  bounds.inverse_depth_high = greatest_of(inverse_depth);
+  if (!bounds.meet_image(camera)) return false;
   const int next_lane = lane + 1 < count ? lane + 1 : 0;
   const Vec2 next{__shfl_sync(kAllLanes, corner.x, next_lane), __shfl_sync(kAllLanes, corner.y, next_lane)};
   const Vec2 first{__shfl_sync(kAllLanes, corner.x, 0), __shfl_sync(kAllLanes, corner.y, 0)};
@@ -210,11 +208,10 @@ __device__ inline bool make_screen_face(const FaceMaking& making, const SharedFa
   }
   face_out->edge_begin = edge_begin;
   face_out->edge_count = static_cast<uint8_t>(__popc(edges));
-  face_out->box = box;
   face_out->color = face.color;
   face_out->number = face.owner.number;
   face_out->class_id = face.owner.class_id;
-  set_depth(camera, face.plane, depth_low, depth_high, face_out);
+  set_bounds(camera, making.setting.frustum, bounds, face.plane, face_out);
   return true;
 }
 

@@ -195,10 +195,7 @@ __device__ inline void cull_agents(const BlockState& state, const DrawTask& task
     if (agent < view.world_end) {
       const AgentBox box = task.scene.agents[static_cast<size_t>(agent)];
       if (may_show(box, setting.camera, setting.frustum) && !is_left_out(view.view, task.scene.hidden_agents, agent)) {
-        PICTURA_KEEP_LOOP
-        for (int face = 0; face < kNumCuboidFaces; ++face) {
-          if (faces_eye(box, face, setting.camera.position_m)) faces |= 1u << face;
-        }
+        faces = faces_to_eye(box, setting.camera.position_m);
       }
     }
     PICTURA_KEEP_LOOP

@@ -33,9 +33,11 @@ __device__ inline bool make_quad(const FaceMaking& making, uint32_t entry, Quad*
   const auto index = static_cast<int32_t>(entry & kFaceIndexMask);
   // One body for all kinds but for their corners: lanes of a warp have different ones.
   WorldQuad world;
+  quad_out->floor_px = 0.0f;
   if (kind == kStripKind) {
     const Strip strip = making.strips[index];
     quad_out->owner = strip_owner(strip, index);
+    quad_out->floor_px = setting.line_floor_px;
     world = strip_quad(strip);
   } else if (kind == kAgentKind) {
     const AgentBox box = making.agents[index];
@@ -45,17 +47,7 @@ __device__ inline bool make_quad(const FaceMaking& making, uint32_t entry, Quad*
     quad_out->owner = wall_owner(index);
     world = wall_quad(making.walls[index]);
   }
-  bool shows = false;
-  emit_quad(
-      world, setting.camera,
-      [&](Vec3* corners) { return kind != kStripKind || widen_strip(setting.camera, setting.line_floor_px, corners); },
-      [&](const Vec3* corners, int, const FacePlane& plane, Rgb color) {
-        for (int i = 0; i < 4; ++i) quad_out->corner[i] = corners[i];
-        quad_out->plane = plane;
-        quad_out->color = color;
-        shows = true;
-      });
-  return shows;
+  return see_quad(world, setting.camera, &quad_out->seen);
 }
 
 // Keeps the faces of those lanes that have one. Each image has room for all of its own.
@@ -75,16 +67,21 @@ __device__ inline void make_faces(const FaceMaking& making, const GatherLists& l
   const uint32_t entry = batch.entries[lane_index()];
   const bool is_light = entry != kNoEntry && kind_of(entry) == kLightKind;
   Quad quad;
-  const bool is_quad = entry != kNoEntry && !is_light && make_quad(making, entry, &quad);
-  const unsigned crossed = is_quad ? planes_crossed(making.setting.frustum, quad.corner, 4) : kOutside;
-  const bool is_clipped = is_light || (crossed != 0 && crossed != kOutside);
+  ScreenQuad on_screen;
+  const CameraQuad& seen = quad.seen;
+  const PinholeCamera& camera = making.setting.camera;
+  QuadSight sight = is_light ? QuadSight::cut : QuadSight::none;
+  if (entry != kNoEntry && !is_light && make_quad(making, entry, &quad)) {
+    sight = project_quad(camera, seen.corner, quad.floor_px, &on_screen);
+  }
+  const bool is_clipped = sight == QuadSight::cut;
   const int32_t clipped_at = take_place(&counts->clipped, is_clipped);
   if (is_clipped && clipped_at < lists.max_clipped) lists.clipped[clipped_at] = {entry, batch.image};
   const int32_t edge_begin = making.edge_begin + 4 * (first + lane_index());
   ScreenFace face;
   auto keep_edge = [&](int k, const PolygonEdge& edge) { store_whole(making.edges + edge_begin + k, edge); };
-  const bool shows = crossed == 0 && make_screen_face<4>(making.setting.camera, quad.corner, 4, quad.plane, quad.color,
-                                                         keep_edge, &face);
+  const bool shows = sight == QuadSight::whole && make_quad_face(camera, making.setting.frustum, on_screen, seen.plane,
+                                                                 seen.color, keep_edge, &face);
   const int32_t at = take_place(making.num_faces, shows);
   if (shows) keep_face(making, face, quad.owner, edge_begin, at);
 }
@@ -111,10 +108,11 @@ __device__ inline bool clip_things(const FaceMaking* makings, ClipRoom* room, bo
   const bool is_light = is_one && kind_of(thing.entry) == kLightKind;
   Quad quad;
   int kept = 0;
-  if (is_one && !is_light && make_quad(making, thing.entry, &quad)) {
+  if (is_one && !is_light && make_quad(making, thing.entry, &quad) &&
+      (quad.floor_px <= 0.0f || widen_strip(making.setting.camera, quad.floor_px, quad.seen.corner))) {
     const Frustum frustum = making.setting.frustum;
-    for (int i = 0; i < 4; ++i) corners.set(i, quad.corner[i]);
-    kept = clip(frustum, planes_crossed(frustum, quad.corner, 4), corners);
+    for (int i = 0; i < 4; ++i) corners.set(i, quad.seen.corner[i]);
+    kept = clip(frustum, planes_crossed(frustum, quad.seen.corner, 4), corners);
   }
   const unsigned lights = __ballot_sync(kAllLanes, is_light);
   unsigned shared = lights | __ballot_sync(kAllLanes, kept == kOutgrown);
@@ -123,8 +121,8 @@ __device__ inline bool clip_things(const FaceMaking* makings, ClipRoom* room, bo
   if (kept > 0 && has_room) {
     ScreenFace face;
     auto keep_edge = [&](int k, const PolygonEdge& edge) { store_whole(making.edges + edge_begin + k, edge); };
-    if (make_screen_face<kLaneCorners>(making.setting.camera, corners, kept, quad.plane, quad.color, keep_edge,
-                                       &face)) {
+    if (make_screen_face<kLaneCorners>(making.setting.camera, making.setting.frustum, corners, kept, quad.seen.plane,
+                                       quad.seen.color, keep_edge, &face)) {
       keep_face(making, face, quad.owner, edge_begin, atomicAdd(making.num_faces, 1));
     }
   }

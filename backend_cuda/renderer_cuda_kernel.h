@@ -63,12 +63,11 @@ struct GatheredImage {
   int32_t is_left_to_last = 0;       // 1: to the last launch, when it was found too crowded
 };
 
-/// A face of four corners, in camera coordinates.
+/// A face of four corners, and what it belongs to.
 struct alignas(16) Quad {
-  Vec3 corner[4];
-  FacePlane plane;
-  Rgb color;
+  CameraQuad seen;
   FaceOwner owner;
+  float floor_px;  // see CameraFace
 };
 
 /// From what the faces of an image are made, and where they go. Each thing that may show has a place for a face, and

@@ -38,7 +38,7 @@ void ImageFaces::gather(const ImageSetting& setting, const RasterGeometry& geome
           {{corners[0], corners[i], corners[i + 1], corners[std::min(i + 2, count - 1)]}, compared, color, layer});
     }
   };
-  auto emit = [&](const Vec3* corners, int count, const FacePlane&, Rgb color) { add(corners, count, {}, color); };
+  auto emit = [&](const CameraFace& face) { add(face.corners, face.count, {}, face.color); };
   visit_agents(setting, scene, view,
                [&](const AgentBox& box, int32_t) { agent_faces(box, setting.camera, setting.debug_palette, emit); });
   visit_walls(setting, geometry, [&](const WallFace& wall, int32_t) { wall_faces(wall, setting.camera, emit); });
@@ -50,8 +50,11 @@ void ImageFaces::gather(const ImageSetting& setting, const RasterGeometry& geome
   std::sort(strips_.begin(), strips_.end(), [](const RankedStrip& a, const RankedStrip& b) { return a.rank < b.rank; });
   for (std::size_t i = 0; i < strips_.size(); ++i) {
     const float order = static_cast<float>(i) / static_cast<float>(strips_.size());
-    auto emit_strip = [&](const Vec3* corners, int count, const FacePlane& plane, Rgb color) {
-      add(corners, count, compared_plane(plane, setting.camera, order), color);
+    auto emit_strip = [&](const CameraFace& face) {
+      Vec3 corners[4];
+      std::copy_n(face.corners, 4, corners);
+      if (!widen_strip(setting.camera, face.floor_px, corners)) return;
+      add(corners, 4, compared_plane(face.plane, setting.camera, order), face.color);
     };
     strip_faces(*strips_[i].strip, setting.camera, setting.line_floor_px, emit_strip);
   }

@@ -62,6 +62,28 @@ PICTURA_HD inline float saturate(float x) {
 #endif
 }
 
+/// 1 / x and the square root of x, for a magnitude of x between 2^-100 and 2^100, rounded to nearest as IEEE demands. A
+/// device takes the steps that its compiler takes for numbers of that range, without asking first whether x is one.
+PICTURA_HD inline float inverse_of(float x) {
+#if defined(__CUDA_ARCH__)
+  float guess;
+  asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(guess) : "f"(x));
+  return __fmaf_rn(guess, __fmaf_rn(-x, guess, 1.0f), guess);
+#else
+  return 1.0f / x;
+#endif
+}
+PICTURA_HD inline float root_of(float x) {
+#if defined(__CUDA_ARCH__)
+  float inverse_guess;
+  asm("rsqrt.approx.ftz.f32 %0, %1;" : "=f"(inverse_guess) : "f"(x));
+  const float guess = x * inverse_guess;
+  return __fmaf_rn(__fmaf_rn(-guess, guess, x), 0.5f * inverse_guess, guess);
+#else
+  return sqrtf(x);
+#endif
+}
+
 /// The lesser and the greater of two numbers that are numbers; one instruction of a device. Of two zeros it is either.
 PICTURA_HD inline float lesser_of(float a, float b) {
 #if defined(__CUDA_ARCH__)

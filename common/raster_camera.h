@@ -39,11 +39,12 @@ PICTURA_HD inline Vec3 to_camera(const PinholeCamera& camera, Vec3 world_m) {
   return {dot(camera.right, d), dot(camera.down, d), dot(camera.forward, d)};
 }
 
-/// Slopes x/depth and y/depth of the four sides of the drawn volume, guard band included, and the lengths that
-/// normalise distances to those sides.
+/// Slopes x/depth and y/depth of the four sides of the drawn volume, guard band included, the lengths that normalise
+/// distances to those sides, and slopes per pixel. They depend on the camera's projection alone.
 struct Frustum {
   float x_low = 0, x_high = 0, y_low = 0, y_high = 0;
   float x_low_scale = 0, x_high_scale = 0, y_low_scale = 0, y_high_scale = 0;
+  float x_per_px = 0, y_per_px = 0;
 };
 
 PICTURA_HD inline Frustum make_frustum(const PinholeCamera& camera) {
@@ -57,6 +58,8 @@ PICTURA_HD inline Frustum make_frustum(const PinholeCamera& camera) {
   f.x_high_scale = scale(f.x_high);
   f.y_low_scale = scale(f.y_low);
   f.y_high_scale = scale(f.y_high);
+  f.x_per_px = 1.0f / camera.focal_x_px;
+  f.y_per_px = 1.0f / camera.focal_y_px;
   return f;
 }
 

@@ -94,8 +94,8 @@ PICTURA_HD inline int clip_face(const Frustum& f, const Vec3* corners, int count
   return count;
 }
 
-PICTURA_HD inline Vec2 project(const PinholeCamera& camera, Vec3 p) {
-  const float inverse_depth = 1.0f / p.z;
+/// Where a point in front of the near plane is on screen.
+PICTURA_HD inline Vec2 project(const PinholeCamera& camera, Vec3 p, float inverse_depth) {
   return {camera.center_x_px + camera.focal_x_px * (p.x * inverse_depth),
           camera.center_y_px + camera.focal_y_px * (p.y * inverse_depth)};
 }
@@ -193,59 +193,55 @@ struct alignas(16) ScreenFace {
   Rgb color;
 };
 
-/// The pixels of an image that a polygon may touch whose corners lie between low and high on screen.
-PICTURA_HD inline PixelBox pixel_box(const PinholeCamera& camera, Vec2 low, Vec2 high) {
-  auto within = [](int pixel, int32_t end) { return static_cast<int16_t>(clamp(pixel, 0, end)); };
+/// What bounds the corners of a polygon on screen.
+struct ScreenBounds {
+  Vec2 low{1e30f, 1e30f}, high{-1e30f, -1e30f};
+  float inverse_depth_low = 1e30f, inverse_depth_high = 0.0f;
+  PICTURA_HD void add(Vec2 corner, float inverse_depth) {
+    low = {lesser_of(low.x, corner.x), lesser_of(low.y, corner.y)};
+    high = {greater_of(high.x, corner.x), greater_of(high.y, corner.y)};
+    inverse_depth_low = lesser_of(inverse_depth_low, inverse_depth);
+    inverse_depth_high = greater_of(inverse_depth_high, inverse_depth);
+  }
+  /// Whether the polygon may touch pixels of an image.
+  PICTURA_HD bool meet_image(const PinholeCamera& camera) const {
+    return high.x >= 0.0f && high.y >= 0.0f && low.x < static_cast<float>(camera.width_px) &&
+           low.y < static_cast<float>(camera.height_px);
+  }
+};
+
+/// The pixels of an image that a polygon may touch whose bounds meet the image and are within the guard band.
+PICTURA_HD inline PixelBox pixel_box(const PinholeCamera& camera, const ScreenBounds& bounds) {
   auto pixel_of = [](float at) { return static_cast<int>(floorf(at)); };
-  return {within(pixel_of(low.x), camera.width_px), within(pixel_of(high.x) + 1, camera.width_px),
-          within(pixel_of(low.y), camera.height_px), within(pixel_of(high.y) + 1, camera.height_px)};
+  return {static_cast<int16_t>(max_of(pixel_of(bounds.low.x), 0)),
+          static_cast<int16_t>(min_of(pixel_of(bounds.high.x) + 1, camera.width_px)),
+          static_cast<int16_t>(max_of(pixel_of(bounds.low.y), 0)),
+          static_cast<int16_t>(min_of(pixel_of(bounds.high.y) + 1, camera.height_px))};
 }
-PICTURA_HD inline bool is_empty(const PixelBox& box) { return box.x_begin >= box.x_end || box.y_begin >= box.y_end; }
 
 /// Polygons of less than half of this are nothing.
 constexpr float kLeastTwiceArea_px2 = 1e-6f;
 
-/// Sets what the plane of a face and the range of its corners' depths say of its depth.
-PICTURA_HD inline void set_depth(const PinholeCamera& camera, const FacePlane& plane, float depth_low, float depth_high,
-                                 ScreenFace* face_out) {
+/// Sets what the bounds of a face, which meet the image, and its plane say of it.
+PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f, const ScreenBounds& bounds,
+                                  const FacePlane& plane, ScreenFace* face_out) {
+  face_out->box = pixel_box(camera, bounds);
+  face_out->inverse_depth_low = bounds.inverse_depth_low;
+  face_out->inverse_depth_high = bounds.inverse_depth_high;
   // normal . p = offset on the face's plane, and p = depth * ray: inverse depth is linear in the ray.
-  const float scale = plane.offset != 0.0f ? 1.0f / plane.offset : 0.0f;
-  face_out->inverse_depth_x = plane.normal.x * scale / camera.focal_x_px;
-  face_out->inverse_depth_y = plane.normal.y * scale / camera.focal_y_px;
-  face_out->inverse_depth_0 = plane.normal.z * scale - face_out->inverse_depth_x * camera.center_x_px -
-                              face_out->inverse_depth_y * camera.center_y_px;
-  const float norm = length(plane.normal);
-  face_out->plane_distance_m = norm > 0.0f ? fabsf(plane.offset) / norm : 0.0f;
-  face_out->inverse_depth_low = 1.0f / depth_high;
-  face_out->inverse_depth_high = 1.0f / depth_low;
+  const Vec3 inverse = plane.normal * (plane.offset != 0.0f ? 1.0f / plane.offset : 0.0f);
+  face_out->inverse_depth_x = inverse.x * f.x_per_px;
+  face_out->inverse_depth_y = inverse.y * f.y_per_px;
+  face_out->inverse_depth_0 =
+      inverse.z - face_out->inverse_depth_x * camera.center_x_px - face_out->inverse_depth_y * camera.center_y_px;
+  const float inverse2 = dot(inverse, inverse);
+  face_out->plane_distance_m = inverse2 > 0.0f ? 1.0f / sqrtf(inverse2) : 0.0f;
 }
 
-/// Projects a clipped face (camera coordinates) of at most kRoom corners, which lies in `plane`. Calls
-/// keep_edge(0, edge), keep_edge(1, edge), ... for its edges, at most `count`, and sets all of face_out but edge_begin.
-/// False where it covers nothing.
-template <int kRoom, typename Corners, typename KeepEdge>
-PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Corners& polygon, int count,
-                                        const FacePlane& plane, Rgb color, KeepEdge&& keep_edge, ScreenFace* face_out) {
-  Vec2 corner[kRoom];
-  Vec2 low{1e30f, 1e30f}, high{-1e30f, -1e30f};
-  float depth_low = 1e30f, depth_high = 0.0f;
-  PICTURA_UNROLL_FOUR
-  for (int i = 0; i < count; ++i) {
-    const Vec3 p = polygon[i];
-    corner[i] = project(camera, p);
-    low = {min_of(low.x, corner[i].x), min_of(low.y, corner[i].y)};
-    high = {max_of(high.x, corner[i].x), max_of(high.y, corner[i].y)};
-    depth_low = min_of(depth_low, p.z);
-    depth_high = max_of(depth_high, p.z);
-  }
-  const PixelBox box = pixel_box(camera, low, high);
-  if (is_empty(box)) return false;
-  float twice_area = 0.0f;
-  PICTURA_UNROLL_FOUR
-  for (int i = 1; i + 1 < count; ++i) twice_area += cross(corner[i] - corner[0], corner[i + 1] - corner[0]);
-  if (fabsf(twice_area) < kLeastTwiceArea_px2) return false;
-
-  const bool turns_right = twice_area > 0.0f;
+/// Calls keep_edge(0, edge), keep_edge(1, edge), ... for the edges of a polygon on screen, at most `count`, and returns
+/// how many there are.
+template <typename KeepEdge>
+PICTURA_HD inline int make_edges(const Vec2* corner, int count, bool turns_right, KeepEdge&& keep_edge) {
   int edges = 0;
   PICTURA_UNROLL_FOUR
   for (int i = 0; i < count; ++i) {
@@ -253,10 +249,83 @@ PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Corne
     if (from.x == to.x && from.y == to.y) continue;
     keep_edge(edges++, make_edge(turns_right ? from : to, turns_right ? to : from));
   }
-  face_out->edge_count = static_cast<uint8_t>(edges);
-  face_out->box = box;
+  return edges;
+}
+
+/// Projects a clipped face (camera coordinates) of at most kRoom corners, which lies in `plane`. Calls keep_edge as
+/// make_edges does, and sets all of face_out but edge_begin and what it belongs to. False where it covers nothing.
+template <int kRoom, typename Corners, typename KeepEdge>
+PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Frustum& f, const Corners& polygon,
+                                        int count, const FacePlane& plane, Rgb color, KeepEdge&& keep_edge,
+                                        ScreenFace* face_out) {
+  Vec2 corner[kRoom];
+  ScreenBounds bounds;
+  PICTURA_UNROLL_FOUR
+  for (int i = 0; i < count; ++i) {
+    const Vec3 p = polygon[i];
+    const float inverse_depth = 1.0f / p.z;
+    corner[i] = project(camera, p, inverse_depth);
+    bounds.add(corner[i], inverse_depth);
+  }
+  if (!bounds.meet_image(camera)) return false;
+  float twice_area = 0.0f;
+  PICTURA_UNROLL_FOUR
+  for (int i = 1; i + 1 < count; ++i) twice_area += cross(corner[i] - corner[0], corner[i + 1] - corner[0]);
+  if (fabsf(twice_area) < kLeastTwiceArea_px2) return false;
+  face_out->edge_count = static_cast<uint8_t>(make_edges(corner, count, twice_area > 0.0f, keep_edge));
   face_out->color = color;
-  set_depth(camera, plane, depth_low, depth_high, face_out);
+  set_bounds(camera, f, bounds, plane, face_out);
+  return true;
+}
+
+/// A face of four corners on screen.
+struct ScreenQuad {
+  Vec2 corner[4];
+  ScreenBounds bounds;
+};
+
+/// What is to be done with a face of four corners: nothing, where it is out of the image; draw it; or clip it first.
+enum class QuadSight : uint8_t { none, whole, cut };
+
+/// Projects a face of four corners, a strip with its corners pushed apart where it is less than floor_px wide. What
+/// needs no clipping, nearly all, is thus never widened in camera coordinates.
+PICTURA_HD inline QuadSight project_quad(const PinholeCamera& camera, const Vec3* corners, float floor_px,
+                                         ScreenQuad* quad_out) {
+  const float nearest_m = lesser_of(lesser_of(corners[0].z, corners[1].z), lesser_of(corners[2].z, corners[3].z));
+  if (nearest_m < kNear_m) return QuadSight::cut;
+  Vec2* const corner = quad_out->corner;
+  float inverse_depth[4];
+  for (int i = 0; i < 4; ++i) {
+    inverse_depth[i] = 1.0f / corners[i].z;
+    corner[i] = project(camera, corners[i], inverse_depth[i]);
+  }
+  if (floor_px > 0.0f) {
+    const Widening widening = widening_of(camera, floor_px, corners[0] + corners[1], corners[3] + corners[2]);
+    const Vec2 at_a = widening.push_px(corner[0] - corner[1]), at_b = widening.push_px(corner[3] - corner[2]);
+    corner[0] = corner[0] + at_a;
+    corner[1] = corner[1] - at_a;
+    corner[2] = corner[2] - at_b;
+    corner[3] = corner[3] + at_b;
+  }
+  ScreenBounds* const bounds = &quad_out->bounds;
+  *bounds = {};
+  for (int i = 0; i < 4; ++i) bounds->add(corner[i], inverse_depth[i]);
+  if (!bounds->meet_image(camera)) return QuadSight::none;
+  const bool is_whole = bounds->low.x >= -kGuardBand_px && bounds->low.y >= -kGuardBand_px &&
+                        bounds->high.x <= static_cast<float>(camera.width_px) + kGuardBand_px &&
+                        bounds->high.y <= static_cast<float>(camera.height_px) + kGuardBand_px;
+  return is_whole ? QuadSight::whole : QuadSight::cut;
+}
+
+/// make_screen_face of what project_quad found to be whole.
+template <typename KeepEdge>
+PICTURA_HD inline bool make_quad_face(const PinholeCamera& camera, const Frustum& f, const ScreenQuad& quad,
+                                      const FacePlane& plane, Rgb color, KeepEdge&& keep_edge, ScreenFace* face_out) {
+  const float twice_area = cross(quad.corner[2] - quad.corner[0], quad.corner[3] - quad.corner[1]);
+  if (!(fabsf(twice_area) >= kLeastTwiceArea_px2)) return false;
+  face_out->edge_count = static_cast<uint8_t>(make_edges(quad.corner, 4, twice_area > 0.0f, keep_edge));
+  face_out->color = color;
+  set_bounds(camera, f, quad.bounds, plane, face_out);
   return true;
 }
 

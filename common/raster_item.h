@@ -43,16 +43,31 @@ PICTURA_HD constexpr uint16_t instance_of(const ScreenFace& face) {
 /// Clips and projects a face. Its edges go to a pool: take(count) returns the index of the first, or -1 where there is
 /// no room left, and put(index, edge) keeps one. False where nothing of it is in the image.
 template <typename EdgePool>
-PICTURA_HD inline bool make_face(const ImageSetting& setting, FaceOwner owner, const Vec3* corners, int count,
-                                 const FacePlane& plane, Rgb color, EdgePool& pool, ScreenFace* face_out) {
-  Vec3 polygon[kMaxPolygonCorners];
-  const int kept = clip_face(setting.frustum, corners, count, polygon);
-  if (kept < 3) return false;
-  const int32_t edge_begin = pool.take(kept);
-  if (edge_begin < 0) return false;
+PICTURA_HD inline bool make_face(const ImageSetting& setting, FaceOwner owner, const CameraFace& face, EdgePool& pool,
+                                 ScreenFace* face_out) {
+  int32_t edge_begin = 0;
   auto keep_edge = [&](int i, const PolygonEdge& edge) { pool.put(edge_begin + i, edge); };
-  if (!make_screen_face<kMaxPolygonCorners>(setting.camera, polygon, kept, plane, color, keep_edge, face_out)) {
-    return false;
+  ScreenQuad quad;
+  const QuadSight sight =
+      face.count == 4 ? project_quad(setting.camera, face.corners, face.floor_px, &quad) : QuadSight::cut;
+  if (sight == QuadSight::none) return false;
+  if (sight == QuadSight::whole) {
+    edge_begin = pool.take(4);
+    if (edge_begin < 0 ||
+        !make_quad_face(setting.camera, setting.frustum, quad, face.plane, face.color, keep_edge, face_out)) {
+      return false;
+    }
+  } else {
+    Vec3 corners[kMaxFaceCorners], polygon[kMaxPolygonCorners];
+    for (int i = 0; i < face.count; ++i) corners[i] = face.corners[i];
+    if (face.floor_px > 0.0f && !widen_strip(setting.camera, face.floor_px, corners)) return false;
+    const int kept = clip_face(setting.frustum, corners, face.count, polygon);
+    if (kept < 3) return false;
+    edge_begin = pool.take(kept);
+    if (edge_begin < 0 || !make_screen_face<kMaxPolygonCorners>(setting.camera, setting.frustum, polygon, kept,
+                                                                face.plane, face.color, keep_edge, face_out)) {
+      return false;
+    }
   }
   face_out->edge_begin = edge_begin;
   face_out->number = owner.number;

@@ -21,25 +21,28 @@ struct FacePlane {
   Vec3 normal;
   float offset = 0;
 };
-PICTURA_HD inline FacePlane face_plane(const Vec3* corners, int count) {
-  Vec3 normal{};
-  PICTURA_UNROLL_FOUR
-  for (int i = 1; i + 1 < count; ++i) normal = normal + cross(corners[i] - corners[0], corners[i + 1] - corners[0]);
+PICTURA_HD inline FacePlane quad_plane(const Vec3* corners) {
+  const Vec3 normal = cross(corners[2] - corners[0], corners[3] - corners[1]);
   return {normal, dot(normal, corners[0])};
 }
 
-/// Brightness of a face: the mean over its corners of their depth clamped to the visible range. A face that has faded
+/// Brightness of a face: 1 less the mean over its corners of their share of the visible range. A face that has faded
 /// to 0 is not drawn, and so hides nothing.
-PICTURA_HD inline float fading_depth_m(Vec3 corner) { return clamp(corner.z, 0.0f, kVisibleRange_m); }
-PICTURA_HD inline float brightness_of_sum(float depths_m, int count) {
-  return depth_brightness(depths_m / static_cast<float>(count));
-}
 PICTURA_HD inline float face_brightness(const Vec3* corners, int count) {
-  float sum_m = 0.0f;
+  float faded = 0.0f;
   PICTURA_UNROLL_FOUR
-  for (int i = 0; i < count; ++i) sum_m += fading_depth_m(corners[i]);
-  return brightness_of_sum(sum_m, count);
+  for (int i = 0; i < count; ++i) faded += saturate(corners[i].z * (1.0f / kVisibleRange_m));
+  return 1.0f - faded / static_cast<float>(count);
 }
+
+/// A face in camera coordinates, as it is handed on.
+struct CameraFace {
+  const Vec3* corners = nullptr;
+  int count = 0;
+  FacePlane plane;
+  Rgb color;
+  float floor_px = 0;  // of a strip, which is still to be widened to that; 0: of no strip
+};
 
 /// Colour of an agent's face before it fades; the debug palette pales halted agents and greys parked ones.
 PICTURA_HD inline Rgb agent_face_color(const AgentBox& box, BoxFace face, bool debug_palette) {
@@ -53,19 +56,16 @@ PICTURA_HD inline Rgb agent_face_color(const AgentBox& box, BoxFace face, bool d
 /// which has the top's colour.
 constexpr int kUnderside = kNumBoxFaces, kNumCuboidFaces = kNumBoxFaces + 1;
 
-/// Whether a camera at eye_m is on the outer side of a face of a box.
-PICTURA_HD inline bool faces_eye(const AgentBox& box, int face, Vec3 eye_m) {
+/// The faces of a box on whose outer side a camera at eye_m is, a bit for each.
+PICTURA_HD inline unsigned faces_to_eye(const AgentBox& box, Vec3 eye_m) {
   const Vec2 ahead{box.cos_heading, box.sin_heading};
   const Vec2 from_center = eye_m.xy() - box.center_m.xy();
   const float ahead_m = dot(from_center, ahead), left_m = cross(ahead, from_center);
-  switch (face) {
-    case static_cast<int>(BoxFace::front): return ahead_m > 0.5f * box.length_m;
-    case static_cast<int>(BoxFace::back): return ahead_m < -0.5f * box.length_m;
-    case static_cast<int>(BoxFace::left): return left_m > 0.5f * box.width_m;
-    case static_cast<int>(BoxFace::right): return left_m < -0.5f * box.width_m;
-    case static_cast<int>(BoxFace::top): return eye_m.z > box.center_m.z + box.height_m;
-    default: return eye_m.z < box.center_m.z;
-  }
+  auto bit_of = [](bool is_turned, BoxFace face) { return is_turned ? 1u << static_cast<int>(face) : 0u; };
+  return bit_of(ahead_m > 0.5f * box.length_m, BoxFace::front) | bit_of(ahead_m < -0.5f * box.length_m, BoxFace::back) |
+         bit_of(left_m > 0.5f * box.width_m, BoxFace::left) | bit_of(left_m < -0.5f * box.width_m, BoxFace::right) |
+         bit_of(eye_m.z > box.center_m.z + box.height_m, BoxFace::top) |
+         (eye_m.z < box.center_m.z ? 1u << kUnderside : 0u);
 }
 
 /// The four corners of a face of a box, in the world. Corners 0 to 3 of the box are front left, rear left, rear right
@@ -114,29 +114,41 @@ PICTURA_HD inline WorldQuad wall_quad(const WallFace& wall) {
   return {{wall.a_m, wall.b_m, wall.b_m + up, wall.a_m + up}, wall.color};
 }
 
-/// Calls emit(corners, count, plane, color) for a quad, in camera coordinates, unless it has faded to black.
-/// widen(corners) may move its corners when its plane is known; false: nothing is left.
-template <typename Widen, typename Emit>
-PICTURA_HD inline void emit_quad(const WorldQuad& quad, const PinholeCamera& camera, Widen&& widen, Emit&& emit) {
-  Vec3 corners[4];
-  for (int i = 0; i < 4; ++i) corners[i] = to_camera(camera, quad.corner[i]);
-  const float brightness = face_brightness(corners, 4);
-  const FacePlane plane = face_plane(corners, 4);
-  if (brightness > 0.0f && widen(corners)) emit(corners, 4, plane, quad.color * brightness);
+/// A face of four corners in camera coordinates, with its colour faded; strips are not yet widened.
+struct CameraQuad {
+  Vec3 corner[4];
+  FacePlane plane;
+  Rgb color;
+};
+
+/// Where a quad is to a camera; false where it has faded to black.
+PICTURA_HD inline bool see_quad(const WorldQuad& quad, const PinholeCamera& camera, CameraQuad* quad_out) {
+  for (int i = 0; i < 4; ++i) quad_out->corner[i] = to_camera(camera, quad.corner[i]);
+  const float brightness = face_brightness(quad_out->corner, 4);
+  quad_out->plane = quad_plane(quad_out->corner);
+  quad_out->color = quad.color * brightness;
+  return brightness > 0.0f;
+}
+
+/// Calls emit(face) for a quad, unless it has faded to black; floor_px is that of strips, 0 of others.
+template <typename Emit>
+PICTURA_HD inline void emit_quad(const WorldQuad& quad, const PinholeCamera& camera, float floor_px, Emit&& emit) {
+  CameraQuad seen;
+  if (see_quad(quad, camera, &seen)) emit(CameraFace{seen.corner, 4, seen.plane, seen.color, floor_px});
 }
 
 /// ... for each face of a box that is turned to the camera.
 template <typename Emit>
 PICTURA_HD inline void agent_faces(const AgentBox& box, const PinholeCamera& camera, bool debug_palette, Emit&& emit) {
+  const unsigned faces = faces_to_eye(box, camera.position_m);
   for (int face = 0; face < kNumCuboidFaces; ++face) {
-    if (!faces_eye(box, face, camera.position_m)) continue;
-    emit_quad(cuboid_quad(box, face, debug_palette), camera, [](Vec3*) { return true; }, emit);
+    if ((faces >> face & 1u) != 0) emit_quad(cuboid_quad(box, face, debug_palette), camera, 0.0f, emit);
   }
 }
 
 template <typename Emit>
 PICTURA_HD inline void wall_faces(const WallFace& wall, const PinholeCamera& camera, Emit&& emit) {
-  emit_quad(wall_quad(wall), camera, [](Vec3*) { return true; }, emit);
+  emit_quad(wall_quad(wall), camera, 0.0f, emit);
 }
 
 /// Whether a camera at position_m is in front of the head and within its half-angle, seen on the ground plane.
@@ -171,17 +183,24 @@ PICTURA_HD inline Vec3 light_corner(const LightHead& head, Vec2 corner_m) {
   return {ground.x, ground.y, head.position_m.z + corner_m.y};
 }
 
-/// The disk of a lit head.
+/// The plane of a head's disk, in camera coordinates.
+PICTURA_HD inline FacePlane light_plane(const LightHead& head, const PinholeCamera& camera, Vec3 middle) {
+  const Vec3 facing{head.facing.x, head.facing.y, 0.0f};
+  const Vec3 normal{dot(camera.right, facing), dot(camera.down, facing), dot(camera.forward, facing)};
+  return {normal, dot(normal, middle)};
+}
+
+/// The disk of a lit head, as bright as its middle.
 template <typename Emit>
 PICTURA_HD inline void light_faces(const LightHead& head, LightState state, const PinholeCamera& camera, Emit&& emit) {
   if (!light_is_visible(head, state, camera.position_m)) return;
+  const Vec3 middle = to_camera(camera, head.position_m);
+  const float brightness = face_brightness(&middle, 1);
+  if (brightness <= 0.0f) return;
   Vec3 corners[kLightSides];
   LightCorners walk;
   for (Vec3& corner : corners) corner = to_camera(camera, light_corner(head, walk.next()));
-  const float brightness = face_brightness(corners, kLightSides);
-  if (brightness > 0.0f) {
-    emit(corners, kLightSides, face_plane(corners, kLightSides), light_color(state) * brightness);
-  }
+  emit(CameraFace{corners, kLightSides, light_plane(head, camera, middle), light_color(state) * brightness});
 }
 
 /// The strip's four corners in the world: left of a, right of a, right of b, left of b.
@@ -194,22 +213,39 @@ PICTURA_HD inline void strip_corners(const Strip& strip, Vec3* corners_out) {
   corners_out[3] = {b.x + at_b.x, b.y + at_b.y, b.z};
 }
 
-/// Pushes the two corners of one end of a strip apart, along the normal of the strip on screen, until they are floor_px
-/// apart in that direction. Depths stay. `ahead` is the strip's direction on screen.
-PICTURA_HD inline void widen_strip_end(const PinholeCamera& camera, Vec2 ahead, float floor_px, Vec3* left,
-                                       Vec3* right) {
+/// The direction in which a strip is widened: across it on screen.
+struct Widening {
+  Vec2 across;  // unit vector, from the right side of the strip to its left; 0 where the strip is a point on screen
+  float floor_px = 0;
+  /// How far the left end of a gap between the sides is to go, on screen, and the right end the other way.
+  PICTURA_HD Vec2 push_px(Vec2 gap_px) const {
+    const float width_px = dot(gap_px, across);
+    const float missing_px = 0.5f * greater_of(floor_px - fabsf(width_px), 0.0f);
+    return across * (width_px < 0.0f ? -missing_px : missing_px);
+  }
+};
+
+/// ... of a strip whose centre line runs from a to b, in camera coordinates and in front of the near plane; both may be
+/// multiples by the same factor.
+PICTURA_HD inline Widening widening_of(const PinholeCamera& camera, float floor_px, Vec3 a, Vec3 b) {
+  // The direction on screen times both depths.
+  const Vec2 ahead{camera.focal_x_px * (b.x * a.z - a.x * b.z), camera.focal_y_px * (b.y * a.z - a.y * b.z)};
+  const float length2 = dot(ahead, ahead), least = 1e-6f * (a.z * b.z);
+  if (!(length2 > least * least)) return {};
+  return {left_normal(ahead) * sqrtf(1.0f / length2), floor_px};
+}
+
+/// Pushes the two corners of one end of a strip apart until they are wide enough on screen. Depths stay.
+PICTURA_HD inline void widen_strip_end(const PinholeCamera& camera, const Widening& widening, Vec3* left, Vec3* right) {
   if (left->z < kNear_m || right->z < kNear_m) return;
-  const Vec2 normal = left_normal(ahead);
-  const Vec2 gap{camera.focal_x_px * (left->x / left->z - right->x / right->z),
-                 camera.focal_y_px * (left->y / left->z - right->y / right->z)};
-  const float width_px = dot(gap, normal);
-  if (fabsf(width_px) >= floor_px) return;
-  const float missing_px = 0.5f * (floor_px - fabsf(width_px));
-  const Vec2 push = normal * (width_px < 0.0f ? -missing_px : missing_px);
-  left->x += push.x * left->z / camera.focal_x_px;
-  left->y += push.y * left->z / camera.focal_y_px;
-  right->x -= push.x * right->z / camera.focal_x_px;
-  right->y -= push.y * right->z / camera.focal_y_px;
+  const float of_left = 1.0f / left->z, of_right = 1.0f / right->z;
+  const Vec2 push_px = widening.push_px({camera.focal_x_px * (left->x * of_left - right->x * of_right),
+                                         camera.focal_y_px * (left->y * of_left - right->y * of_right)});
+  const Vec2 push{push_px.x / camera.focal_x_px, push_px.y / camera.focal_y_px};
+  left->x += push.x * left->z;
+  left->y += push.y * left->z;
+  right->x -= push.x * right->z;
+  right->y -= push.y * right->z;
 }
 
 /// A strip's corners as drawn, in camera coordinates, after the floor on its width on screen; `corners` are its own
@@ -224,26 +260,21 @@ PICTURA_HD inline bool widen_strip(const PinholeCamera& camera, float floor_px, 
   if (floor_px <= 0.0f) return true;
   // Centre line in front of the near plane, and its direction on screen.
   const float a_in = a.z - kNear_m, b_in = b.z - kNear_m;
-  bool cut_a = false, cut_b = false;
-  if (a_in < 0.0f) {
+  const bool cut_a = a_in < 0.0f, cut_b = b_in < 0.0f;
+  if (cut_a) {
     const float t = a_in / (a_in - b_in);
     corners[0] = corners[0] + (corners[3] - corners[0]) * t;
     corners[1] = corners[1] + (corners[2] - corners[1]) * t;
     a = a + (b - a) * t;
-    cut_a = true;
-  } else if (b_in < 0.0f) {
+  } else if (cut_b) {
     const float t = b_in / (b_in - a_in);
     corners[3] = corners[3] + (corners[0] - corners[3]) * t;
     corners[2] = corners[2] + (corners[1] - corners[2]) * t;
     b = b + (a - b) * t;
-    cut_b = true;
   }
-  const Vec2 on_screen{camera.focal_x_px * (b.x / b.z - a.x / a.z), camera.focal_y_px * (b.y / b.z - a.y / a.z)};
-  const float length_px = length(on_screen);
-  if (length_px < 1e-6f) return true;
-  const Vec2 ahead = on_screen * (1.0f / length_px);
-  if (!cut_a) widen_strip_end(camera, ahead, floor_px, &corners[0], &corners[1]);
-  if (!cut_b) widen_strip_end(camera, ahead, floor_px, &corners[3], &corners[2]);
+  const Widening widening = widening_of(camera, floor_px, a, b);
+  if (!cut_a) widen_strip_end(camera, widening, &corners[0], &corners[1]);
+  if (!cut_b) widen_strip_end(camera, widening, &corners[3], &corners[2]);
   return true;
 }
 
@@ -254,10 +285,10 @@ PICTURA_HD inline WorldQuad strip_quad(const Strip& strip) {
   return quad;
 }
 
-/// The strip's face, at least floor_px wide on screen, in the plane of the strip itself.
+/// The strip's face, to be widened to floor_px on screen, in the plane of the strip itself.
 template <typename Emit>
 PICTURA_HD inline void strip_faces(const Strip& strip, const PinholeCamera& camera, float floor_px, Emit&& emit) {
-  emit_quad(strip_quad(strip), camera, [&](Vec3* corners) { return widen_strip(camera, floor_px, corners); }, emit);
+  emit_quad(strip_quad(strip), camera, floor_px, emit);
 }
 
 /// Strips that are closer than this are of one level: there rank decides, and not depth.

@@ -92,9 +92,9 @@ class Sight {
   Thing keep(FaceOwner owner, const Extent& extent, MakeFaces&& make_faces) {
     Thing thing;
     Pool pool{&edges_};
-    make_faces([&](const Vec3* corners, int count, const FacePlane& plane, Rgb color) {
+    make_faces([&](const CameraFace& seen) {
       ScreenFace face;
-      if (make_face(setting_, owner, corners, count, plane, color, pool, &face)) thing.push_back(face);
+      if (make_face(setting_, owner, seen, pool, &face)) thing.push_back(face);
     });
     extents_.emplace_back(owner.number, extent);
     return thing;

@@ -205,7 +205,7 @@ void expect_some_postponed(uint64_t seed, const EmulatedRenderer::Pool& pool) {
 
 TEST(EmulatedKernels, PostponeWhatThePoolHasNoRoomFor) { expect_some_postponed(7, {.faces = 130}); }
 // Noticed when some of an image's faces are made already.
-TEST(EmulatedKernels, PostponeWhatHasNoRoomForItsClippedEdges) { expect_some_postponed(8, {.clipped_edges = 80}); }
+TEST(EmulatedKernels, PostponeWhatHasNoRoomForItsClippedEdges) { expect_some_postponed(8, {.clipped_edges = 60}); }
 TEST(EmulatedKernels, PostponeWhatThereAreNoBatchesFor) { expect_some_postponed(10, {.batches = 4}); }
 
 TEST(EmulatedKernels, ClipLightsOnAllSides) {
