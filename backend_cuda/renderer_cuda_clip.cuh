@@ -186,7 +186,7 @@ __device__ inline bool make_screen_face(const FaceMaking& making, const SharedFa
   const PinholeCamera& camera = making.setting.camera;
   const int lane = lane_index(), count = face.count;
   const bool is_corner = lane < count;
-  const float inverse_depth = is_corner ? 1.0f / face.corner.z : 0.0f;
+  const float inverse_depth = is_corner ? inverse_of(face.corner.z) : 0.0f;
   const Vec2 corner = project(camera, face.corner, inverse_depth);
   ScreenBounds bounds;
   bounds.low = {least_of(is_corner ? corner.x : 1e30f), least_of(is_corner ? corner.y : 1e30f)};

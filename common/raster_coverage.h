@@ -228,14 +228,17 @@ PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f,
   face_out->box = pixel_box(camera, bounds);
   face_out->inverse_depth_low = bounds.inverse_depth_low;
   face_out->inverse_depth_high = bounds.inverse_depth_high;
-  // normal . p = offset on the face's plane, and p = depth * ray: inverse depth is linear in the ray.
-  const Vec3 inverse = plane.normal * (plane.offset != 0.0f ? 1.0f / plane.offset : 0.0f);
+  // normal . p = offset on the face's plane, and p = depth * ray: inverse depth is linear in the ray. Faces without an
+  // area and planes through the camera have none.
+  constexpr float kLeast = 1e-30f;
+  const float norm2 = dot(plane.normal, plane.normal), offset = fabsf(plane.offset);
+  const bool is_plane = norm2 > kLeast && offset > kLeast;
+  const Vec3 inverse = plane.normal * (is_plane ? inverse_of(plane.offset) : 0.0f);
   face_out->inverse_depth_x = inverse.x * f.x_per_px;
   face_out->inverse_depth_y = inverse.y * f.y_per_px;
   face_out->inverse_depth_0 =
       inverse.z - face_out->inverse_depth_x * camera.center_x_px - face_out->inverse_depth_y * camera.center_y_px;
-  const float inverse2 = dot(inverse, inverse);
-  face_out->plane_distance_m = inverse2 > 0.0f ? 1.0f / sqrtf(inverse2) : 0.0f;
+  face_out->plane_distance_m = is_plane ? offset * inverse_of(root_of(norm2)) : 0.0f;
 }
 
 /// Calls keep_edge(0, edge), keep_edge(1, edge), ... for the edges of a polygon on screen, at most `count`, and returns
@@ -263,7 +266,7 @@ PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Frust
   PICTURA_UNROLL_FOUR
   for (int i = 0; i < count; ++i) {
     const Vec3 p = polygon[i];
-    const float inverse_depth = 1.0f / p.z;
+    const float inverse_depth = inverse_of(p.z);
     corner[i] = project(camera, p, inverse_depth);
     bounds.add(corner[i], inverse_depth);
   }
@@ -296,7 +299,7 @@ PICTURA_HD inline QuadSight project_quad(const PinholeCamera& camera, const Vec3
   Vec2* const corner = quad_out->corner;
   float inverse_depth[4];
   for (int i = 0; i < 4; ++i) {
-    inverse_depth[i] = 1.0f / corners[i].z;
+    inverse_depth[i] = inverse_of(corners[i].z);
     corner[i] = project(camera, corners[i], inverse_depth[i]);
   }
   if (floor_px > 0.0f) {

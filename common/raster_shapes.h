@@ -232,7 +232,7 @@ PICTURA_HD inline Widening widening_of(const PinholeCamera& camera, float floor_
   const Vec2 ahead{camera.focal_x_px * (b.x * a.z - a.x * b.z), camera.focal_y_px * (b.y * a.z - a.y * b.z)};
   const float length2 = dot(ahead, ahead), least = 1e-6f * (a.z * b.z);
   if (!(length2 > least * least)) return {};
-  return {left_normal(ahead) * sqrtf(1.0f / length2), floor_px};
+  return {left_normal(ahead) * root_of(inverse_of(length2)), floor_px};
 }
 
 /// Pushes the two corners of one end of a strip apart until they are wide enough on screen. Depths stay.
