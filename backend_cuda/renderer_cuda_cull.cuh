@@ -10,17 +10,19 @@ namespace pictura::cuda {
 constexpr int kFaceShift = 27;
 constexpr uint32_t kFaceIndexMask = (1u << kFaceShift) - 1, kNoEntry = ~0u;
 
-/// The outline on the ground of what a camera sees, by its sides: dx_dy is 0 for level ones.
-struct OutlineSide {
+/// The outline on the ground of what a camera sees, by its sides, each from its end of lower y.
+struct alignas(16) OutlineSide {
   Vec2 a, b;
-  float dx_dy;
+  float dx_dy;  // 0 for level ones
+  float x_low, x_high;
 };
 constexpr int kOutlineSides = 8;
 
 /// What a warp that culls keeps in shared memory.
 struct CullRoom {
   uint32_t entries[2 * kWarpSize];
-  OutlineSide strips[kOutlineSides], walls[kOutlineSides];
+  OutlineSide sides[2][kOutlineSides];  // of the outlines for strips and for walls
+  int32_t offsets[kWarpSize];           // of rows that have pieces, see cull_pieces
 };
 static_assert(FaceBatch::kEntries == kWarpSize);
 
@@ -70,62 +72,53 @@ class EntryList {
   bool is_whole_ = true;
 };
 
+// Strips and walls, in this order.
+__device__ inline const PieceGrid& pieces_of(const DeviceGeometry& geometry, int of_walls) {
+  return of_walls != 0 ? geometry.walls : geometry.strips;
+}
+
+// The cell of a row or column at a distance from the grid's first; pieces have more leeway than rounding takes.
+__device__ inline int cell_at(float distance_m, float cells_per_m, int count) {
+  return clamp(static_cast<int>(floorf(distance_m * cells_per_m)), 0, count - 1);
+}
+
+// The rows of the grids that the outlines may touch.
+struct GridRows {
+  int begin[2], count[2];
+};
+
 // Sets the outlines for strips and walls, which are seen from differently far away. The hull of the eye and the far
 // corners on the ground has no other sides than those of the pyramid: from the eye to the corners, and around them. All
 // lanes of the warp, one a side.
-__device__ inline void set_outlines(CullRoom* room, const ImageSetting& setting, const RasterGeometry& geometry) {
-  const int side = lane_index() % kOutlineSides;
-  const bool of_strips = lane_index() < kOutlineSides;
-  if (lane_index() < 2 * kOutlineSides) {
-    const float far_m = far_of(of_strips ? geometry.longest_strip_m : geometry.longest_wall_m);
-    auto corner = [&](int i) { return far_corner(setting.camera, setting.frustum, i, far_m).xy(); };
-    // Corners differ in their first bit along x, and in their second along y.
-    const int along = side & 3, from = along < 2 ? 2 * along : along - 2, to = along < 2 ? from + 1 : from + 2;
-    OutlineSide* out = (of_strips ? room->strips : room->walls) + side;
-    out->a = side < 4 ? setting.camera.position_m.xy() : corner(from);
-    out->b = corner(side < 4 ? side : to);
-    out->dx_dy = out->a.y != out->b.y ? (out->b.x - out->a.x) / (out->b.y - out->a.y) : 0.0f;
+__device__ inline GridRows set_outlines(CullRoom* room, const ImageSetting& setting, const DeviceGeometry& geometry) {
+  const int side = lane_index() % kOutlineSides, of_walls = lane_index() / kOutlineSides & 1;
+  const PieceGrid& pieces = pieces_of(geometry, of_walls);
+  const float far_m = far_of(of_walls != 0 ? geometry.raster.longest_wall_m : geometry.raster.longest_strip_m);
+  auto corner = [&](int i) { return far_corner(setting.camera, setting.frustum, i, far_m).xy(); };
+  // Corners differ in their first bit along x, and in their second along y.
+  const int along = side & 3, from = along < 2 ? 2 * along : along - 2, to = along < 2 ? from + 1 : from + 2;
+  const Vec2 first = side < 4 ? setting.camera.position_m.xy() : corner(from), second = corner(side < 4 ? side : to);
+  const bool rises = first.y <= second.y;
+  OutlineSide out;
+  out.a = rises ? first : second;
+  out.b = rises ? second : first;
+  out.dx_dy = out.a.y != out.b.y ? (out.b.x - out.a.x) / (out.b.y - out.a.y) : 0.0f;
+  out.x_low = lesser_of(out.a.x, out.b.x);
+  out.x_high = greater_of(out.a.x, out.b.x);
+  if (lane_index() < 2 * kOutlineSides) room->sides[of_walls][side] = out;
+  const GridView& grid = pieces.cells;
+  const float cells_per_m = inverse_of(grid.cell_m), radius_m = pieces.largest_radius_m;
+  const int low = cell_at(out.a.y - radius_m - grid.origin_m.y, cells_per_m, grid.num_y);
+  const int high = cell_at(out.b.y + radius_m - grid.origin_m.y, cells_per_m, grid.num_y);
+  const bool has_pieces = !grid.items.empty();
+  GridRows rows;
+  for (int i = 0; i < 2; ++i) {
+    const bool is_one = has_pieces && of_walls == i;
+    rows.begin[i] = __reduce_min_sync(kAllLanes, is_one ? low : 0x7FFFFFFF);
+    rows.count[i] = max_of(__reduce_max_sync(kAllLanes, is_one ? high + 1 : 0) - rows.begin[i], 0);
   }
   __syncwarp();
-}
-
-// The range in x of an outline's hull between two y; low > high where it does not reach there.
-struct RangeX {
-  float low = 1e30f, high = -1e30f;
-  __device__ void add(float x) {
-    low = min_of(low, x);
-    high = max_of(high, x);
-  }
-};
-__device__ inline RangeX range_between(const OutlineSide* sides, float y_low, float y_high) {
-  RangeX range;
-  PICTURA_KEEP_LOOP
-  for (int i = 0; i < kOutlineSides; ++i) {
-    const OutlineSide side = sides[i];
-    if (max_of(side.a.y, side.b.y) < y_low || min_of(side.a.y, side.b.y) > y_high) continue;
-    const float low = min_of(side.a.x, side.b.x), high = max_of(side.a.x, side.b.x);
-    range.add(clamp(side.a.x + (clamp(side.a.y, y_low, y_high) - side.a.y) * side.dx_dy, low, high));
-    range.add(clamp(side.b.x + (clamp(side.b.y, y_low, y_high) - side.b.y) * side.dx_dy, low, high));
-  }
-  return range;
-}
-
-// The rows of a grid that an outline may touch.
-struct GridRows {
-  int begin = 0, end = 0;
-};
-__device__ inline GridRows rows_of(const PieceGrid& pieces, const OutlineSide* sides) {
-  if (pieces.cells.items.empty()) return {};
-  float y_low = 1e30f, y_high = -1e30f;
-  PICTURA_KEEP_LOOP
-  for (int i = 0; i < kOutlineSides; ++i) {
-    y_low = min_of(y_low, sides[i].b.y);
-    y_high = max_of(y_high, sides[i].b.y);
-  }
-  y_low = min_of(y_low, sides[0].a.y);
-  y_high = max_of(y_high, sides[0].a.y);
-  return {pieces.cells.cell_y(y_low - pieces.largest_radius_m),
-          pieces.cells.cell_y(y_high + pieces.largest_radius_m) + 1};
+  return rows;
 }
 
 // The pieces of a row that an outline may touch, which stand side by side.
@@ -135,52 +128,73 @@ struct PieceRange {
 __device__ inline PieceRange pieces_of_row(const PieceGrid& pieces, const OutlineSide* sides, int row) {
   const GridView& grid = pieces.cells;
   const float radius_m = pieces.largest_radius_m;
-  const float row_low = grid.origin_m.y + grid.cell_m * static_cast<float>(row) - radius_m;
-  const RangeX range = range_between(sides, row_low, row_low + grid.cell_m + 2.0f * radius_m);
-  if (range.low > range.high) return {};
+  const float y_low = grid.origin_m.y + grid.cell_m * static_cast<float>(row) - radius_m;
+  const float y_high = y_low + grid.cell_m + 2.0f * radius_m;
+  // The range in x of the outline's hull between them.
+  float x_low = 1e30f, x_high = -1e30f;
+  PICTURA_KEEP_LOOP
+  for (int i = 0; i < kOutlineSides; ++i) {
+    const OutlineSide side = sides[i];
+    const float enter = greater_of(side.a.y, y_low), leave = lesser_of(side.b.y, y_high);
+    auto within = [&](float x) { return lesser_of(greater_of(x, side.x_low), side.x_high); };
+    const float x_in = within(side.a.x + (enter - side.a.y) * side.dx_dy);
+    const float x_out = within(side.b.x + (leave - side.b.y) * side.dx_dy);
+    const bool is_between = enter <= leave;
+    x_low = lesser_of(x_low, is_between ? lesser_of(x_in, x_out) : x_low);
+    x_high = greater_of(x_high, is_between ? greater_of(x_in, x_out) : x_high);
+  }
+  if (x_low > x_high) return {};
+  const float cells_per_m = inverse_of(grid.cell_m);
   const int32_t* row_cells = grid.begin.data() + static_cast<ptrdiff_t>(row) * grid.num_x;
-  const int begin = row_cells[grid.cell_x(range.low - radius_m)];
-  return {begin, row_cells[grid.cell_x(range.high + radius_m) + 1] - begin};
+  const int begin = row_cells[cell_at(x_low - radius_m - grid.origin_m.x, cells_per_m, grid.num_x)];
+  return {begin, row_cells[cell_at(x_high + radius_m - grid.origin_m.x, cells_per_m, grid.num_x) + 1] - begin};
 }
 
 // Lists the strips and walls that may show. Each warp of the block, for its part of the candidates.
 __device__ inline void cull_pieces(BlockState* state, CullRoom* room, EntryList* list) {
-  const ImageSetting& setting = state->making.setting;
+  const PinholeCamera camera = state->making.setting.camera;
+  const Frustum frustum = state->making.setting.frustum;
   const DeviceGeometry& geometry = *state->view.geometry;
-  set_outlines(room, setting, geometry.raster);
+  const GridRows rows = set_outlines(room, state->making.setting, geometry);
   const float strip_far_m = far_of(geometry.raster.longest_strip_m),
               wall_far_m = far_of(geometry.raster.longest_wall_m);
-  const GridRows strip_rows = rows_of(geometry.strips, room->strips), wall_rows = rows_of(geometry.walls, room->walls);
-  const int num_strip_rows = strip_rows.end - strip_rows.begin;
-  const int num_rows = num_strip_rows + wall_rows.end - wall_rows.begin;
+  const Ball *const strip_balls = geometry.strips.balls.data(), *const wall_balls = geometry.walls.balls.data();
+  const int32_t *const strip_items = geometry.strips.cells.items.data(),
+                *const wall_items = geometry.walls.cells.items.data();
+  const int num_rows = rows.count[0] + rows.count[1], lane = lane_index();
   PICTURA_KEEP_LOOP
   for (int first_row = 0; first_row < num_rows; first_row += kWarpSize) {
-    const int row = first_row + lane_index();
-    const int is_wall_row = row >= num_strip_rows;
+    const int row = first_row + lane;
+    const int of_walls = row >= rows.count[0] ? 1 : 0;
     PieceRange range;
     if (row < num_rows) {
-      range = pieces_of_row(is_wall_row ? geometry.walls : geometry.strips, is_wall_row ? room->walls : room->strips,
-                            row + (is_wall_row ? wall_rows.begin - num_strip_rows : strip_rows.begin));
+      range = pieces_of_row(pieces_of(geometry, of_walls), room->sides[of_walls],
+                            of_walls != 0 ? row - rows.count[0] + rows.begin[1] : row + rows.begin[0]);
     }
-    share_out(
-        &state->warps[warp_index()], range.count,
-        [&](int owner, int k) {
-          const int place = __shfl_sync(kAllLanes, range.begin, max_of(owner, 0)) + k;
-          const bool is_wall = __shfl_sync(kAllLanes, is_wall_row, max_of(owner, 0)) != 0;
-          const PieceGrid& pieces = is_wall ? geometry.walls : geometry.strips;
-          bool shows = false;
-          uint32_t entry = kNoEntry;
-          if (owner >= 0) {
-            const Ball ball = pieces.balls[static_cast<size_t>(place)];
-            shows = ball_in_frustum(setting.frustum, to_camera(setting.camera, ball.center_m), ball.radius_m,
-                                    is_wall ? wall_far_m : strip_far_m);
-            if (shows) {
-              entry = thing_number(is_wall ? kWallKind : kStripKind, pieces.cells.items[static_cast<size_t>(place)]);
-            }
-          }
-          list->push(shows, entry);
-        },
-        warp_index() * kWarpSize, num_threads());
+    // The rows' pieces one behind the other, those of strips first. Of each row that has some, how far its pieces in
+    // the grid's list are from there.
+    const bool has_some = range.count > 0;
+    const int end = sum_up_to(range.count), begin = end - range.count;
+    const int total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
+    const unsigned owning = __ballot_sync(kAllLanes, has_some);
+    const int num_of_strips = __popc(__ballot_sync(kAllLanes, has_some && of_walls == 0));
+    if (has_some) room->offsets[__popc(owning & lanes_below())] = range.begin - begin;
+    __syncwarp();
+    PICTURA_KEEP_LOOP
+    for (int item = warp_index() * kWarpSize; item < total; item += num_threads()) {
+      const auto starts_at = static_cast<unsigned>(begin - item);
+      const unsigned starts = __reduce_or_sync(kAllLanes, has_some && starts_at < kWarpSize ? 1u << starts_at : 0u);
+      const int before = __popc(__ballot_sync(kAllLanes, has_some && begin < item));
+      const int rank = before + __popc(starts & (lanes_below() << 1 | 1u)) - 1;
+      const bool is_wall = rank >= num_of_strips;
+      const int place = min_of(item + lane, total - 1) + room->offsets[rank];
+      const Ball ball = (is_wall ? wall_balls : strip_balls)[place];
+      const int32_t index = (is_wall ? wall_items : strip_items)[place];
+      const bool shows = ball_in_frustum(frustum, to_camera(camera, ball.center_m), ball.radius_m,
+                                         is_wall ? wall_far_m : strip_far_m);
+      list->push(shows && item + lane < total, thing_number(is_wall ? kWallKind : kStripKind, index));
+    }
+    __syncwarp();
   }
 }
 

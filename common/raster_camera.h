@@ -49,27 +49,29 @@ struct Frustum {
 
 PICTURA_HD inline Frustum make_frustum(const PinholeCamera& camera) {
   Frustum f;
-  f.x_low = (-kGuardBand_px - camera.center_x_px) / camera.focal_x_px;
-  f.x_high = (static_cast<float>(camera.width_px) + kGuardBand_px - camera.center_x_px) / camera.focal_x_px;
-  f.y_low = (-kGuardBand_px - camera.center_y_px) / camera.focal_y_px;
-  f.y_high = (static_cast<float>(camera.height_px) + kGuardBand_px - camera.center_y_px) / camera.focal_y_px;
-  auto scale = [](float slope) { return 1.0f / sqrtf(1.0f + slope * slope); };
+  f.x_per_px = inverse_of(camera.focal_x_px);
+  f.y_per_px = inverse_of(camera.focal_y_px);
+  f.x_low = (-kGuardBand_px - camera.center_x_px) * f.x_per_px;
+  f.x_high = (static_cast<float>(camera.width_px) + kGuardBand_px - camera.center_x_px) * f.x_per_px;
+  f.y_low = (-kGuardBand_px - camera.center_y_px) * f.y_per_px;
+  f.y_high = (static_cast<float>(camera.height_px) + kGuardBand_px - camera.center_y_px) * f.y_per_px;
+  auto scale = [](float slope) { return inverse_of(root_of(1.0f + slope * slope)); };
   f.x_low_scale = scale(f.x_low);
   f.x_high_scale = scale(f.x_high);
   f.y_low_scale = scale(f.y_low);
   f.y_high_scale = scale(f.y_high);
-  f.x_per_px = 1.0f / camera.focal_x_px;
-  f.y_per_px = 1.0f / camera.focal_y_px;
   return f;
 }
 
 /// Whether a ball (camera coordinates) may touch what is drawn, up to a depth of far_m.
 PICTURA_HD inline bool ball_in_frustum(const Frustum& f, Vec3 center, float radius_m, float far_m) {
-  return center.z + radius_m > kNear_m && center.z - radius_m < far_m &&
-         (center.x - f.x_low * center.z) * f.x_low_scale > -radius_m &&
-         (f.x_high * center.z - center.x) * f.x_high_scale > -radius_m &&
-         (center.y - f.y_low * center.z) * f.y_low_scale > -radius_m &&
-         (f.y_high * center.z - center.y) * f.y_high_scale > -radius_m;
+  // All at once: lanes of a warp differ in what fails first.
+  const bool in_range = (center.z + radius_m > kNear_m) & (center.z - radius_m < far_m);
+  const bool in_width = ((center.x - f.x_low * center.z) * f.x_low_scale > -radius_m) &
+                        ((f.x_high * center.z - center.x) * f.x_high_scale > -radius_m);
+  const bool in_height = ((center.y - f.y_low * center.z) * f.y_low_scale > -radius_m) &
+                         ((f.y_high * center.z - center.y) * f.y_high_scale > -radius_m);
+  return in_range & in_width & in_height;
 }
 
 /// One of the four corners (0 to 3) of what is drawn at a depth of far_m, in the world.

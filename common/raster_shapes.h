@@ -156,7 +156,9 @@ PICTURA_HD inline bool light_is_visible(const LightHead& head, LightState state,
   if (state == LightState::off) return false;
   const Vec2 to_eye = position_m.xy() - head.position_m.xy();
   const float ahead_m = dot(to_eye, head.facing);
-  return ahead_m > 0.0f && ahead_m >= head.cos_half_angle * length(to_eye);
+  // Of the half-angle's cosine, by squares.
+  const float cosine = greater_of(head.cos_half_angle, 0.0f);
+  return ahead_m > 0.0f && ahead_m * ahead_m >= cosine * cosine * dot(to_eye, to_eye);
 }
 
 /// The polygon that lights are drawn as: walk.next() is the next corner, from the disk's middle to the left and up.
