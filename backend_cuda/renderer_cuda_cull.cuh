@@ -152,8 +152,8 @@ __device__ inline PieceRange pieces_of_row(const PieceGrid& pieces, const Outlin
 
 // Lists the strips and walls that may show. Each warp of the block, for its part of the candidates.
 __device__ inline void cull_pieces(BlockState* state, CullRoom* room, EntryList* list) {
-  const PinholeCamera camera = state->making.setting.camera;
-  const Frustum frustum = state->making.setting.frustum;
+  const PinholeCamera& camera = state->making.setting.camera;
+  const Frustum& frustum = state->making.setting.frustum;
   const DeviceGeometry& geometry = *state->view.geometry;
   const GridRows rows = set_outlines(room, state->making.setting, geometry);
   const float strip_far_m = far_of(geometry.raster.longest_strip_m),
