@@ -1,5 +1,5 @@
 // Faces that cross the border of what is drawn, and lights, which have many corners. A lane clips a face of four
-// corners; lights, and what has more corners than a lane has room for, a warp makes one at a time, a lane a corner.
+// corners, and all lanes make the edges; a light, or what outgrows a lane's room, a whole warp makes, a lane a corner.
 // Values are those of clip_face and make_screen_face, sums in their order.
 #pragma once
 
@@ -18,8 +18,22 @@ struct ClipRoom {
   // Of corners: a column for each lane, or the first row for all. A corner may be cut and stay beyond the last.
   static constexpr int kRows = kLaneCorners + 2;
   float x[kRows][kWarpSize], y[kRows][kWarpSize], z[kRows][kWarpSize];
-  Vec2 light_corner_m[kLightSides];  // see LightCorners
+  uint16_t edges[kLaneCorners * kWarpSize];  // see LaneEdge
 };
+
+/// An edge of a lane's face, in 16 bits.
+struct LaneEdge {
+  int lane, from, to;  // the face's, and rows of its corners
+  bool turns_right;    // the face
+  __device__ uint16_t packed() const {
+    return static_cast<uint16_t>(lane | from << 5 | to << 9 | (turns_right ? 1 << 13 : 0));
+  }
+  __device__ static LaneEdge unpacked(unsigned word) {
+    return {static_cast<int>(word & 31), static_cast<int>(word >> 5 & 15), static_cast<int>(word >> 9 & 15),
+            (word >> 13 & 1) != 0};
+  }
+};
+static_assert(kWarpSize <= 32 && kLaneCorners <= 16);
 
 /// The corners of one lane's face.
 class LaneCorners {
@@ -71,11 +85,10 @@ __device__ inline Vec3 corner_of(Vec3 corner, int lane) {
           __shfl_sync(kAllLanes, corner.z, lane)};
 }
 
-// Sum of the values of lanes [begin, end), one after the other.
-__device__ inline float sum_in_order(float value, int begin, int end) {
+// Sum of the values of the first lanes, as many as a face may have corners, one after the other.
+__device__ inline float sum_in_order(float value) {
   float sum = 0.0f;
-  PICTURA_KEEP_LOOP
-  for (int lane = begin; lane < end; ++lane) sum += __shfl_sync(kAllLanes, value, lane);
+  for (int lane = 0; lane < kMaxPolygonCorners; ++lane) sum += __shfl_sync(kAllLanes, value, lane);
   return sum;
 }
 
@@ -98,13 +111,13 @@ __device__ inline SharedFace share_quad(ClipRoom* room, int owner, const Quad& q
 }
 
 // The disk of a lit head; of no corners where it has faded to black.
-__device__ inline SharedFace make_light(const FaceMaking& making, const ClipRoom& room, int32_t index) {
+__device__ inline SharedFace make_light(const FaceMaking& making, int32_t index) {
   const LightHead head = making.heads[index];
   const PinholeCamera& camera = making.setting.camera;
   const Vec3 middle = to_camera(camera, head.position_m);
   const float brightness = face_brightness(&middle, 1);
   SharedFace face;
-  face.corner = to_camera(camera, light_corner(head, room.light_corner_m[min_of(lane_index(), kLightSides - 1)]));
+  face.corner = to_camera(camera, light_corner(head, lane_index()));
   face.plane = light_plane(head, camera, middle);
   face.color = light_color(making.lights[head.signal]) * brightness;
   face.owner = light_owner(index);
@@ -112,21 +125,40 @@ __device__ inline SharedFace make_light(const FaceMaking& making, const ClipRoom
   return face;
 }
 
+// inside_plane by weights, so that lanes may ask for different planes: what is added is 0, and changes nothing.
+class ClipPlane {
+ public:
+  __device__ ClipPlane(const Frustum& f, int plane)
+      : x_(plane == 1 ? 1.0f : (plane == 2 ? -1.0f : 0.0f)),
+        y_(plane == 3 ? 1.0f : (plane == 4 ? -1.0f : 0.0f)),
+        z_(plane == 0   ? 1.0f
+           : plane == 1 ? -f.x_low
+           : plane == 2 ? f.x_high
+           : plane == 3 ? -f.y_low
+                        : f.y_high),
+        offset_(plane == 0 ? kNear_m : 0.0f) {}
+  __device__ float inside(Vec3 p) const { return x_ * p.x + y_ * p.y + z_ * p.z - offset_; }
+
+ private:
+  float x_, y_, z_, offset_;
+};
+
 // clip_face of a lane's face, in place: corners are written no further than one behind the last that was read. The
 // number of corners, or kOutgrown where a lane has no room for them or the face is not quite convex.
 constexpr int kOutgrown = -1;
 __device__ inline int clip(const Frustum& f, unsigned crossed, LaneCorners corners) {
-  int count = 4;
+  int count = crossed == kOutside ? 0 : 4;
+  // Each lane goes through its own planes.
   PICTURA_KEEP_LOOP
-  for (int plane = 0; plane < kClipPlanes && count > 0; ++plane) {
-    if ((crossed >> plane & 1) == 0) continue;
+  for (; crossed != 0 && count > 0; crossed &= crossed - 1) {
+    const ClipPlane plane(f, __ffs(static_cast<int>(crossed)) - 1);
     Vec3 previous = corners[count - 1], current = corners[0];
-    float previous_inside = inside_plane(f, plane, previous);
+    float previous_inside = plane.inside(previous);
     int kept = 0;
     PICTURA_KEEP_LOOP
     for (int i = 0; i < count; ++i) {
       const Vec3 next = corners[min_of(i + 1, count - 1)];
-      const float inside = inside_plane(f, plane, current);
+      const float inside = plane.inside(current);
       const bool is_cut = (previous_inside >= 0.0f) != (inside >= 0.0f), stays = inside >= 0.0f;
       if (is_cut) corners.set(kept, cut_between(previous, previous_inside, current, inside));
       kept += is_cut ? 1 : 0;
@@ -140,6 +172,34 @@ __device__ inline int clip(const Frustum& f, unsigned crossed, LaneCorners corne
     count = kept < 3 ? 0 : kept;
   }
   return count;
+}
+
+// Projects a lane's clipped face in place, as make_screen_face does. Sets its bounds and whether it turns right, and
+// returns which of its corners begin an edge, a bit for each; none where it covers nothing.
+__device__ inline unsigned project_in_place(const PinholeCamera& camera, LaneCorners corners, int count,
+                                            ScreenBounds* bounds, bool* turns_right) {
+  PICTURA_KEEP_LOOP
+  for (int i = 0; i < count; ++i) {
+    const Vec3 p = corners[i];
+    const float inverse_depth = inverse_of(p.z);
+    const Vec2 corner = project(camera, p, inverse_depth);
+    bounds->add(corner, inverse_depth);
+    corners.set(i, {corner.x, corner.y, 0.0f});
+  }
+  if (!bounds->meet_image(camera)) return 0;
+  const Vec2 first = corners[0].xy();
+  Vec2 corner = first;
+  float twice_area = 0.0f;
+  unsigned edges = 0;
+  PICTURA_KEEP_LOOP
+  for (int i = 0; i < count; ++i) {
+    const Vec2 next = i + 1 < count ? corners[i + 1].xy() : first;
+    if (i > 0 && i + 1 < count) twice_area += cross(corner - first, next - first);
+    if (corner.x != next.x || corner.y != next.y) edges |= 1u << i;
+    corner = next;
+  }
+  *turns_right = twice_area > 0.0f;
+  return fabsf(twice_area) < kLeastTwiceArea_px2 ? 0 : edges;
 }
 
 // ... of a face whose corners the lanes hold.
@@ -197,7 +257,9 @@ __device__ inline bool make_screen_face(const FaceMaking& making, const SharedFa
   const int next_lane = lane + 1 < count ? lane + 1 : 0;
   const Vec2 next{__shfl_sync(kAllLanes, corner.x, next_lane), __shfl_sync(kAllLanes, corner.y, next_lane)};
   const Vec2 first{__shfl_sync(kAllLanes, corner.x, 0), __shfl_sync(kAllLanes, corner.y, 0)};
-  const float twice_area = sum_in_order(cross(corner - first, next - first), 1, count - 1);
+  // To add 0 changes nothing.
+  const bool is_between = lane > 0 && lane + 1 < count;
+  const float twice_area = sum_in_order(is_between ? cross(corner - first, next - first) : 0.0f);
   if (fabsf(twice_area) < kLeastTwiceArea_px2) return false;
   const bool turns_right = twice_area > 0.0f;
   const bool is_edge = is_corner && (corner.x != next.x || corner.y != next.y);
@@ -213,17 +275,6 @@ __device__ inline bool make_screen_face(const FaceMaking& making, const SharedFa
   face_out->class_id = face.owner.class_id;
   set_bounds(camera, making.setting.frustum, bounds, face.plane, face_out);
   return true;
-}
-
-// Sets the corners of lights. All lanes of the warp.
-__device__ inline void set_light_corners(ClipRoom* room) {
-  LightCorners walk;
-  PICTURA_KEEP_LOOP
-  for (int i = 0; i < kLightSides; ++i) {
-    const Vec2 corner_m = walk.next();
-    if (lane_index() == 0) room->light_corner_m[i] = corner_m;
-  }
-  __syncwarp();
 }
 
 }  // namespace pictura::cuda

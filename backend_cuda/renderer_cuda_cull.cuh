@@ -159,8 +159,8 @@ __device__ inline void cull_pieces(BlockState* state, CullRoom* room, EntryList*
   const float strip_far_m = far_of(geometry.raster.longest_strip_m),
               wall_far_m = far_of(geometry.raster.longest_wall_m);
   const Ball *const strip_balls = geometry.strips.balls.data(), *const wall_balls = geometry.walls.balls.data();
-  const int32_t *const strip_items = geometry.strips.cells.items.data(),
-                *const wall_items = geometry.walls.cells.items.data();
+  const int32_t *const strip_items = geometry.strips.cells.items.data(), *const wall_items =
+                                                                             geometry.walls.cells.items.data();
   const int num_rows = rows.count[0] + rows.count[1], lane = lane_index();
   PICTURA_KEEP_LOOP
   for (int first_row = 0; first_row < num_rows; first_row += kWarpSize) {
@@ -190,8 +190,8 @@ __device__ inline void cull_pieces(BlockState* state, CullRoom* room, EntryList*
       const int place = min_of(item + lane, total - 1) + room->offsets[rank];
       const Ball ball = (is_wall ? wall_balls : strip_balls)[place];
       const int32_t index = (is_wall ? wall_items : strip_items)[place];
-      const bool shows = ball_in_frustum(frustum, to_camera(camera, ball.center_m), ball.radius_m,
-                                         is_wall ? wall_far_m : strip_far_m);
+      const bool shows =
+          ball_in_frustum(frustum, to_camera(camera, ball.center_m), ball.radius_m, is_wall ? wall_far_m : strip_far_m);
       list->push(shows && item + lane < total, thing_number(is_wall ? kWallKind : kStripKind, index));
     }
     __syncwarp();

@@ -70,13 +70,17 @@ __device__ inline void make_faces(const FaceMaking& making, const GatherLists& l
   ScreenQuad on_screen;
   const CameraQuad& seen = quad.seen;
   const PinholeCamera& camera = making.setting.camera;
-  QuadSight sight = is_light ? QuadSight::cut : QuadSight::none;
+  QuadSight sight = QuadSight::none;
   if (entry != kNoEntry && !is_light && make_quad(making, entry, &quad)) {
     sight = project_quad(camera, seen.corner, quad.floor_px, &on_screen);
   }
   const bool is_clipped = sight == QuadSight::cut;
   const int32_t clipped_at = take_place(&counts->clipped, is_clipped);
-  if (is_clipped && clipped_at < lists.max_clipped) lists.clipped[clipped_at] = {entry, batch.image};
+  if (is_clipped) lists.clipped[clipped_at] = {entry, batch.image};
+  if (__any_sync(kAllLanes, is_light)) {
+    const int32_t light_at = take_place(&counts->lights, is_light);
+    if (is_light) lists.clipped[lists.max_clipped - 1 - light_at] = {entry, batch.image};
+  }
   const int32_t edge_begin = making.edge_begin + 4 * (first + lane_index());
   ScreenFace face;
   auto keep_edge = [&](int k, const PolygonEdge& edge) { store_whole(making.edges + edge_begin + k, edge); };
@@ -100,43 +104,88 @@ __device__ inline bool make_shared_face(const FaceMaking& making, ClipRoom* room
   return true;
 }
 
-// Clips things of a list, the lanes' `thing` where is_one, and makes their faces; thing.image is that of makings. False
-// in those lanes for whose face there is no room. All lanes of the warp.
-__device__ inline bool clip_things(const FaceMaking* makings, ClipRoom* room, bool is_one, ClippedThing thing) {
+// Clips faces of four corners, the lanes' `thing` where is_one, and makes theirs but for what outgrows a lane's room:
+// of that *quad_out is kept. False in those lanes for whose face there is no room. All lanes of the warp.
+__device__ inline bool clip_quads(const FaceMaking* makings, ClipRoom* room, bool is_one, ClippedThing thing,
+                                  Quad* quad_out, bool* has_outgrown_out) {
   const FaceMaking& making = makings[thing.image];
+  const PinholeCamera& camera = making.setting.camera;
   const LaneCorners corners(room);
-  const bool is_light = is_one && kind_of(thing.entry) == kLightKind;
-  Quad quad;
+  Quad& quad = *quad_out;
   int kept = 0;
-  if (is_one && !is_light && make_quad(making, thing.entry, &quad) &&
-      (quad.floor_px <= 0.0f || widen_strip(making.setting.camera, quad.floor_px, quad.seen.corner))) {
+  if (is_one && make_quad(making, thing.entry, &quad) &&
+      (quad.floor_px <= 0.0f || widen_strip(camera, quad.floor_px, quad.seen.corner))) {
     const Frustum frustum = making.setting.frustum;
     for (int i = 0; i < 4; ++i) corners.set(i, quad.seen.corner[i]);
     kept = clip(frustum, planes_crossed(frustum, quad.seen.corner, 4), corners);
   }
-  const unsigned lights = __ballot_sync(kAllLanes, is_light);
-  unsigned shared = lights | __ballot_sync(kAllLanes, kept == kOutgrown);
-  const int32_t edge_begin = making.clipped_begin + take_places(making.num_clipped, max_of(kept, 0));
-  bool has_room = kept <= 0 || edge_begin + kept <= making.clipped_end;
-  if (kept > 0 && has_room) {
+  ScreenBounds bounds;
+  bool turns_right = false;
+  const unsigned edges = kept > 0 ? project_in_place(camera, corners, kept, &bounds, &turns_right) : 0;
+  // The edges of all lanes, one face's behind the other's.
+  const int count = __popc(edges), end = sum_up_to(count), total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
+  int32_t edge_begin = 0;
+  if (lane_index() == 0 && total > 0) edge_begin = making.clipped_begin + atomicAdd(making.num_clipped, total);
+  edge_begin = __shfl_sync(kAllLanes, edge_begin, 0);
+  int at = end - count;
+  const bool has_room = edges == 0 || edge_begin + end <= making.clipped_end;
+  if (edges != 0 && has_room) {
     ScreenFace face;
-    auto keep_edge = [&](int k, const PolygonEdge& edge) { store_whole(making.edges + edge_begin + k, edge); };
-    if (make_screen_face<kLaneCorners>(making.setting.camera, making.setting.frustum, corners, kept, quad.seen.plane,
-                                       quad.seen.color, keep_edge, &face)) {
-      keep_face(making, face, quad.owner, edge_begin, atomicAdd(making.num_faces, 1));
-    }
+    face.edge_count = static_cast<uint8_t>(count);
+    face.color = quad.seen.color;
+    set_bounds(camera, making.setting.frustum, bounds, quad.seen.plane, &face);
+    keep_face(making, face, quad.owner, edge_begin + at, atomicAdd(making.num_faces, 1));
   }
   PICTURA_KEEP_LOOP
-  for (; shared != 0; shared &= shared - 1) {
+  for (unsigned left = edges; left != 0; left &= left - 1, ++at) {
+    const int from = __ffs(static_cast<int>(left)) - 1;
+    room->edges[at] = LaneEdge{lane_index(), from, from + 1 < kept ? from + 1 : 0, turns_right}.packed();
+  }
+  __syncwarp();
+  PICTURA_KEEP_LOOP
+  for (int i = lane_index(); i < min_of(total, making.clipped_end - edge_begin); i += kWarpSize) {
+    const LaneEdge edge = LaneEdge::unpacked(room->edges[i]);
+    const Vec2 from{room->x[edge.from][edge.lane], room->y[edge.from][edge.lane]};
+    const Vec2 to{room->x[edge.to][edge.lane], room->y[edge.to][edge.lane]};
+    store_whole(making.edges + edge_begin + i, make_edge(edge.turns_right ? from : to, edge.turns_right ? to : from));
+  }
+  __syncwarp();
+  *has_outgrown_out = kept == kOutgrown;
+  return has_room;
+}
+
+// Clips things of a list, the lanes' `thing` where is_one, and makes their faces; thing.image is that of makings. All
+// are lights or none. False in those lanes for whose face there is no room. All lanes of the warp.
+__device__ inline bool clip_things(const FaceMaking* makings, ClipRoom* room, bool is_one, bool are_lights,
+                                   ClippedThing thing) {
+  Quad quad;
+  bool has_room = true, is_shared = is_one;
+  if (!are_lights) has_room = clip_quads(makings, room, is_one, thing, &quad, &is_shared);
+  PICTURA_KEEP_LOOP
+  for (unsigned shared = __ballot_sync(kAllLanes, is_shared); shared != 0; shared &= shared - 1) {
     const int owner = __ffs(static_cast<int>(shared)) - 1;
     const FaceMaking& its_making = makings[__shfl_sync(kAllLanes, thing.image, owner)];
     const int32_t index = index_of(__shfl_sync(kAllLanes, thing.entry, owner));
-    const SharedFace face =
-        (lights >> owner & 1) != 0 ? make_light(its_making, *room, index) : share_quad(room, owner, quad);
-    const bool is_made = make_shared_face(its_making, room, face);
+    const bool is_made =
+        make_shared_face(its_making, room, are_lights ? make_light(its_making, index) : share_quad(room, owner, quad));
     if (lane_index() == owner) has_room = is_made;
   }
   return has_room;
+}
+
+// What a warp is to clip at once: a light, which all of its lanes make, or `batch` faces of four corners, a lane each.
+// Lights come first: they take longest.
+struct ClippedItem {
+  bool is_any, are_lights;
+  bool is_one;  // of the lane
+  ClippedThing thing;
+};
+__device__ inline ClippedItem clipped_item(const GatherLists& lists, const GatherCounts& listed, int item, int batch) {
+  const bool are_lights = item < listed.lights;
+  const int first = (item - listed.lights) * batch, quad = first + lane_index();
+  if (!are_lights && first >= listed.clipped) return {};
+  return {true, are_lights, are_lights ? lane_index() == 0 : lane_index() < batch && quad < listed.clipped,
+          lists.clipped[are_lights ? lists.max_clipped - 1 - item : min_of(quad, listed.clipped - 1)]};
 }
 
 // Sets what an image shows, but for where its faces go; false, with a fault noted, where its view names something that
@@ -193,13 +242,11 @@ __device__ inline bool gather(const DrawTask& task, int32_t view, int32_t camera
     make_faces(state->making, lists, &state->listed, lists.batches[i], FaceBatch::kEntries * i);
   }
   sync_block();
-  set_light_corners(&room->clip);
-  const int num_clipped = state->listed.clipped;
   PICTURA_KEEP_LOOP
-  for (int first = warp_index() * kWarpSize; first < num_clipped; first += num_threads()) {
-    const int i = first + lane_index();
-    const ClippedThing thing = lists.clipped[min_of(i, num_clipped - 1)];
-    if (!clip_things(&state->making, &room->clip, i < num_clipped, thing)) state->overflow = 1;
+  for (int i = warp_index();; i += num_warps()) {
+    const ClippedItem item = clipped_item(lists, state->listed, i, kWarpSize);
+    if (!item.is_any) break;
+    if (!clip_things(&state->making, &room->clip, item.is_one, item.are_lights, item.thing)) state->overflow = 1;
   }
   sync_block();
   if (threadIdx.x == 0) state->shown = image_of(*state, 0, state->num_faces);

@@ -218,18 +218,19 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kClipBlocksPerProce
     pictura_clip(const __grid_constant__ DrawTask task) {
   ClipRoom* room = &gather_room()->clip;
   DrawCounters::Round* round = &task.counters->rounds[task.round_index];
-  const int32_t count = min_of(round->listed.clipped, task.pool.lists.max_clipped);
-  if (count == 0) return;
-  set_light_corners(room);
+  const GatherCounts listed = round->listed;
+  // No more faces for a warp than it takes for all warps to have some: each is one long chain of instructions.
+  const auto num_blocks = static_cast<int32_t>(gridDim.x);
+  const int batch = clamp((listed.clipped + num_blocks - 1) / num_blocks, 1, kWarpSize);
   PICTURA_KEEP_LOOP
-  for (;;) {
-    const int32_t first = next_of(&round->next_clipped) * kWarpSize, i = first + lane_index();
-    if (first >= count) return;
-    const ClippedThing thing = task.pool.lists.clipped[min_of(i, count - 1)];
-    if (!clip_things(task.pool.makings, room, i < count, thing) &&
-        atomicMin(&task.pool.images[thing.image].face_count, kNotGathered) >= 0) {
-      postpone(task, thing.image);
+  for (auto i = static_cast<int32_t>(blockIdx.x);; i = num_blocks + next_of(&round->next_clipped)) {
+    const ClippedItem item = clipped_item(task.pool.lists, listed, i, batch);
+    if (!item.is_any) return;
+    if (!clip_things(task.pool.makings, room, item.is_one, item.are_lights, item.thing) &&
+        atomicMin(&task.pool.images[item.thing.image].face_count, kNotGathered) >= 0) {
+      postpone(task, item.thing.image);
     }
+    __syncwarp();
   }
 }
 

@@ -99,15 +99,15 @@ struct ClippedThing {
   int32_t image;
 };
 
-/// What each step of gathering leaves to the next one.
+/// What each step of gathering leaves to the next one. There is room to clip whatever may show.
 struct GatherLists {
   FaceBatch* batches = nullptr;
-  ClippedThing* clipped = nullptr;
+  ClippedThing* clipped = nullptr;  // faces of four corners from the front, lights from the back
   int32_t max_batches = 0, max_clipped = 0;
 };
 /// How much of it there is; batches may outgrow their list.
 struct GatherCounts {
-  int32_t batches = 0, clipped = 0;
+  int32_t batches = 0, clipped = 0, lights = 0;
 };
 
 /// Faces of many images, and what is known of those images before.

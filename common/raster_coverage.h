@@ -48,8 +48,10 @@ PICTURA_HD inline unsigned planes_crossed(const Frustum& f, const Vec3* corners,
 /// Where the side from one corner to the next crosses a plane, of which they are that far inside. Computed from the
 /// inner corner, whichever way round: faces that share an edge get the same point.
 PICTURA_HD inline Vec3 cut_between(Vec3 a, float a_inside, Vec3 b, float b_inside) {
-  return a_inside >= 0.0f ? a + (b - a) * (a_inside / (a_inside - b_inside))
-                          : b + (a - b) * (b_inside / (b_inside - a_inside));
+  const bool a_is_inner = a_inside >= 0.0f;
+  const Vec3 inner = a_is_inner ? a : b, outer = a_is_inner ? b : a;
+  const float inside = a_is_inner ? a_inside : b_inside, outside = a_is_inner ? b_inside : a_inside;
+  return inner + (outer - inner) * (inside * inverse_of(inside - outside));
 }
 
 /// Clips a convex face to the near plane and the guard band. Writes to polygon_out (camera coordinates, room for

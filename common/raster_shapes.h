@@ -161,28 +161,13 @@ PICTURA_HD inline bool light_is_visible(const LightHead& head, LightState state,
   return ahead_m > 0.0f && ahead_m * ahead_m >= cosine * cosine * dot(to_eye, to_eye);
 }
 
-/// The polygon that lights are drawn as: walk.next() is the next corner, from the disk's middle to the left and up.
-class LightCorners {
- public:
-  PICTURA_HD LightCorners()
-      : step_(sincos_of(kTwoPi / kLightSides)),
-        // That of the regular polygon with the disk's area.
-        radius_m_(kLightRadius_m * sqrtf(kTwoPi / (kLightSides * step_.sin))) {}
-  PICTURA_HD Vec2 next() {
-    const Vec2 corner_m{radius_m_ * at_.x, radius_m_ * at_.y};
-    at_ = {at_.x * step_.cos - at_.y * step_.sin, at_.y * step_.cos + at_.x * step_.sin};
-    return corner_m;
-  }
-
- private:
-  SinCos step_;
-  float radius_m_;
-  Vec2 at_{1.0f, 0.0f};
-};
-/// ... of a head, in the world.
-PICTURA_HD inline Vec3 light_corner(const LightHead& head, Vec2 corner_m) {
-  const Vec2 ground = head.position_m.xy() + left_normal(head.facing) * corner_m.x;
-  return {ground.x, ground.y, head.position_m.z + corner_m.y};
+/// A corner of the polygon that a head is drawn as, which has the disk's area, in the world: 0 is left of the disk's
+/// middle, those that follow go on upwards.
+PICTURA_HD inline Vec3 light_corner(const LightHead& head, int corner) {
+  constexpr float kRadius_m = kLightRadius_m * 1.00574110f;  // square root of the turn of a side over its sine
+  const SinCos at = sincos_of(static_cast<float>(corner) * (kTwoPi / kLightSides));
+  const Vec2 ground = head.position_m.xy() + left_normal(head.facing) * (kRadius_m * at.cos);
+  return {ground.x, ground.y, head.position_m.z + kRadius_m * at.sin};
 }
 
 /// The plane of a head's disk, in camera coordinates.
@@ -200,8 +185,7 @@ PICTURA_HD inline void light_faces(const LightHead& head, LightState state, cons
   const float brightness = face_brightness(&middle, 1);
   if (brightness <= 0.0f) return;
   Vec3 corners[kLightSides];
-  LightCorners walk;
-  for (Vec3& corner : corners) corner = to_camera(camera, light_corner(head, walk.next()));
+  for (int i = 0; i < kLightSides; ++i) corners[i] = to_camera(camera, light_corner(head, i));
   emit(CameraFace{corners, kLightSides, light_plane(head, camera, middle), light_color(state) * brightness});
 }
 
@@ -240,10 +224,10 @@ PICTURA_HD inline Widening widening_of(const PinholeCamera& camera, float floor_
 /// Pushes the two corners of one end of a strip apart until they are wide enough on screen. Depths stay.
 PICTURA_HD inline void widen_strip_end(const PinholeCamera& camera, const Widening& widening, Vec3* left, Vec3* right) {
   if (left->z < kNear_m || right->z < kNear_m) return;
-  const float of_left = 1.0f / left->z, of_right = 1.0f / right->z;
+  const float of_left = inverse_of(left->z), of_right = inverse_of(right->z);
   const Vec2 push_px = widening.push_px({camera.focal_x_px * (left->x * of_left - right->x * of_right),
                                          camera.focal_y_px * (left->y * of_left - right->y * of_right)});
-  const Vec2 push{push_px.x / camera.focal_x_px, push_px.y / camera.focal_y_px};
+  const Vec2 push{push_px.x * inverse_of(camera.focal_x_px), push_px.y * inverse_of(camera.focal_y_px)};
   left->x += push.x * left->z;
   left->y += push.y * left->z;
   right->x -= push.x * right->z;
@@ -263,16 +247,18 @@ PICTURA_HD inline bool widen_strip(const PinholeCamera& camera, float floor_px, 
   // Centre line in front of the near plane, and its direction on screen.
   const float a_in = a.z - kNear_m, b_in = b.z - kNear_m;
   const bool cut_a = a_in < 0.0f, cut_b = b_in < 0.0f;
-  if (cut_a) {
-    const float t = a_in / (a_in - b_in);
-    corners[0] = corners[0] + (corners[3] - corners[0]) * t;
-    corners[1] = corners[1] + (corners[2] - corners[1]) * t;
-    a = a + (b - a) * t;
-  } else if (cut_b) {
-    const float t = b_in / (b_in - a_in);
-    corners[3] = corners[3] + (corners[0] - corners[3]) * t;
-    corners[2] = corners[2] + (corners[1] - corners[2]) * t;
-    b = b + (a - b) * t;
+  if (cut_a || cut_b) {
+    const float t = (cut_a ? a_in : b_in) * inverse_of(cut_a ? a_in - b_in : b_in - a_in);
+    const Vec3 left = (corners[3] - corners[0]) * t, right = (corners[2] - corners[1]) * t, middle = (b - a) * t;
+    if (cut_a) {
+      corners[0] = corners[0] + left;
+      corners[1] = corners[1] + right;
+      a = a + middle;
+    } else {
+      corners[3] = corners[3] - left;
+      corners[2] = corners[2] - right;
+      b = b - middle;
+    }
   }
   const Widening widening = widening_of(camera, floor_px, a, b);
   if (!cut_a) widen_strip_end(camera, widening, &corners[0], &corners[1]);
