@@ -180,19 +180,34 @@ __device__ inline void cull_pieces(BlockState* state, CullRoom* room, EntryList*
     const int num_of_strips = __popc(__ballot_sync(kAllLanes, has_some && of_walls == 0));
     if (has_some) room->offsets[__popc(owning & lanes_below())] = range.begin - begin;
     __syncwarp();
-    PICTURA_KEEP_LOOP
-    for (int item = warp_index() * kWarpSize; item < total; item += num_threads()) {
+    struct Candidate {
+      Ball ball;
+      int32_t index;
+      bool is_wall;
+    };
+    auto candidate_of = [&](int item) {
       const auto starts_at = static_cast<unsigned>(begin - item);
       const unsigned starts = __reduce_or_sync(kAllLanes, has_some && starts_at < kWarpSize ? 1u << starts_at : 0u);
       const int before = __popc(__ballot_sync(kAllLanes, has_some && begin < item));
       const int rank = before + __popc(starts & (lanes_below() << 1 | 1u)) - 1;
       const bool is_wall = rank >= num_of_strips;
       const int place = min_of(item + lane, total - 1) + room->offsets[rank];
-      const Ball ball = (is_wall ? wall_balls : strip_balls)[place];
-      const int32_t index = (is_wall ? wall_items : strip_items)[place];
-      const bool shows =
-          ball_in_frustum(frustum, to_camera(camera, ball.center_m), ball.radius_m, is_wall ? wall_far_m : strip_far_m);
-      list->push(shows && item + lane < total, thing_number(is_wall ? kWallKind : kStripKind, index));
+      return Candidate{(is_wall ? wall_balls : strip_balls)[place], (is_wall ? wall_items : strip_items)[place],
+                       is_wall};
+    };
+    int item = warp_index() * kWarpSize;
+    Candidate next;
+    if (item < total) next = candidate_of(item);
+    // The next ones are asked for before these are looked at.
+    PICTURA_KEEP_LOOP
+    while (item < total) {
+      const Candidate candidate = next;
+      const bool is_one = item + lane < total;
+      item += num_threads();
+      if (item < total) next = candidate_of(item);
+      const bool shows = ball_in_frustum(frustum, to_camera(camera, candidate.ball.center_m), candidate.ball.radius_m,
+                                         candidate.is_wall ? wall_far_m : strip_far_m);
+      list->push(shows && is_one, thing_number(candidate.is_wall ? kWallKind : kStripKind, candidate.index));
     }
     __syncwarp();
   }

@@ -60,34 +60,44 @@ __device__ inline void keep_face(const FaceMaking& making, const ScreenFace& fac
   if (at >= 0) store_whole(making.faces + at, whole);
 }
 
-// Makes the faces of a batch, an entry each lane, and lists what is to be clipped; `first` of the image's places. All
-// lanes of the warp.
+// Makes the faces of a batch of the image, an entry each lane, and lists what is to be clipped; `first` of the image's
+// places. All lanes of the warp.
 __device__ inline void make_faces(const FaceMaking& making, const GatherLists& lists, GatherCounts* counts,
-                                  const FaceBatch& batch, int32_t first) {
-  const uint32_t entry = batch.entries[lane_index()];
+                                  uint32_t entry, int32_t image, int32_t first) {
   const bool is_light = entry != kNoEntry && kind_of(entry) == kLightKind;
+  const PinholeCamera& camera = making.setting.camera;
   Quad quad;
   ScreenQuad on_screen;
-  const CameraQuad& seen = quad.seen;
-  const PinholeCamera& camera = making.setting.camera;
   QuadSight sight = QuadSight::none;
+  bool turns_right = false;
   if (entry != kNoEntry && !is_light && make_quad(making, entry, &quad)) {
-    sight = project_quad(camera, seen.corner, quad.floor_px, &on_screen);
+    sight = project_quad(camera, quad.seen.corner, quad.floor_px, &on_screen);
+    if (sight == QuadSight::whole && !find_turn(on_screen, &turns_right)) sight = QuadSight::none;
   }
-  const bool is_clipped = sight == QuadSight::cut;
-  const int32_t clipped_at = take_place(&counts->clipped, is_clipped);
-  if (is_clipped) lists.clipped[clipped_at] = {entry, batch.image};
-  if (__any_sync(kAllLanes, is_light)) {
-    const int32_t light_at = take_place(&counts->lights, is_light);
-    if (is_light) lists.clipped[lists.max_clipped - 1 - light_at] = {entry, batch.image};
+  // Three lanes ask for the places of all at once, and wait for them when edges are made.
+  const unsigned showing = __ballot_sync(kAllLanes, sight == QuadSight::whole),
+                 clipped = __ballot_sync(kAllLanes, sight == QuadSight::cut),
+                 lights = __ballot_sync(kAllLanes, is_light);
+  const int lane = lane_index();
+  const int wanted = __popc(lane == 0 ? showing : (lane == 1 ? clipped : (lane == 2 ? lights : 0u)));
+  int32_t taken = 0;
+  if (wanted > 0) {
+    taken = atomicAdd(lane == 0 ? making.num_faces : (lane == 1 ? &counts->clipped : &counts->lights), wanted);
   }
-  const int32_t edge_begin = making.edge_begin + 4 * (first + lane_index());
+  const int32_t edge_begin = making.edge_begin + 4 * (first + lane);
   ScreenFace face;
-  auto keep_edge = [&](int k, const PolygonEdge& edge) { store_whole(making.edges + edge_begin + k, edge); };
-  const bool shows = sight == QuadSight::whole && make_quad_face(camera, making.setting.frustum, on_screen, seen.plane,
-                                                                 seen.color, keep_edge, &face);
-  const int32_t at = take_place(making.num_faces, shows);
-  if (shows) keep_face(making, face, quad.owner, edge_begin, at);
+  if (sight == QuadSight::whole) {
+    auto keep_edge = [&](int k, const PolygonEdge& edge) { store_whole(making.edges + edge_begin + k, edge); };
+    make_quad_face(camera, making.setting.frustum, on_screen, turns_right, quad.seen.plane, quad.seen.color, keep_edge,
+                   &face);
+  }
+  auto place_of = [&](int of_lane, unsigned lanes) {
+    return __shfl_sync(kAllLanes, taken, of_lane) + __popc(lanes & lanes_below());
+  };
+  const int32_t at = place_of(0, showing), clipped_at = place_of(1, clipped), light_at = place_of(2, lights);
+  if (sight == QuadSight::whole) keep_face(making, face, quad.owner, edge_begin, at);
+  if (sight == QuadSight::cut) lists.clipped[clipped_at] = {entry, image};
+  if (is_light) lists.clipped[lists.max_clipped - 1 - light_at] = {entry, image};
 }
 
 // Makes a face whose corners the lanes hold. False where there is no room for its edges. All lanes of the warp.
@@ -239,7 +249,8 @@ __device__ inline bool gather(const DrawTask& task, int32_t view, int32_t camera
   // Nobody has found more than there is room for: the lists hold all that a world does.
   PICTURA_KEEP_LOOP
   for (int i = warp_index(); i < state->listed.batches; i += num_warps()) {
-    make_faces(state->making, lists, &state->listed, lists.batches[i], FaceBatch::kEntries * i);
+    make_faces(state->making, lists, &state->listed, lists.batches[i].entries[lane_index()], 0,
+               FaceBatch::kEntries * i);
   }
   sync_block();
   PICTURA_KEEP_LOOP

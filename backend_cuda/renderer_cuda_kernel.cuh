@@ -173,11 +173,9 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kGatherBlocksPerPro
   BlockState* state = block_state();
   CullRoom* room = &gather_room()->cull;
   DrawCounters::Round* round = &task.counters->rounds[task.round_index];
-  const int32_t num_images = images_of_round(task);
+  const int32_t num_images = images_of_round(task), num_blocks = static_cast<int32_t>(gridDim.x);
   PICTURA_KEEP_LOOP
-  for (;;) {
-    const int32_t i = next_of(&round->next_culled);
-    if (i >= num_images) return;
+  for (auto i = static_cast<int32_t>(blockIdx.x); i < num_images; i = num_blocks + next_of(&round->next_culled)) {
     const int32_t image = image_of_round(task, i), camera = camera_of(task, image);
     if (lane_index() == 0) state->usable = set_image(state, task, view_of(task, image), camera) ? 1 : 0;
     __syncwarp();
@@ -200,16 +198,23 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kGatherBlocksPerPro
   BlockState* state = block_state();
   DrawCounters::Round* round = &task.counters->rounds[task.round_index];
   const int32_t num_batches = min_of(round->listed.batches, task.pool.lists.max_batches);
+  // The first lane asks for the next batch while the warp makes the faces of one.
+  auto i = static_cast<int32_t>(blockIdx.x);
   PICTURA_KEEP_LOOP
-  for (;;) {
-    const int32_t i = next_of(&round->next_batch);
-    if (i >= num_batches) return;
+  while (i < num_batches) {
+    const int32_t next = lane_index() == 0 ? static_cast<int32_t>(gridDim.x) + atomicAdd(&round->next_batch, 1) : 0;
     const FaceBatch& batch = task.pool.lists.batches[i];
-    if (__shfl_sync(kAllLanes, task.pool.images[batch.image].face_count, 0) < 0) continue;
-    copy_whole(&state->making, task.pool.makings[batch.image]);
+    const int32_t image = batch.image, first = batch.first;
+    const uint32_t entry = batch.entries[lane_index()];
+    const int32_t face_count = task.pool.images[image].face_count;
+    copy_whole(&state->making, task.pool.makings[image]);
     __syncwarp();
-    make_faces(state->making, task.pool.lists, &round->listed, batch, batch.first);
+    // Other warps add to it meanwhile, so that all lanes take the first one's word.
+    if (__shfl_sync(kAllLanes, face_count, 0) >= 0) {
+      make_faces(state->making, task.pool.lists, &round->listed, entry, image, first);
+    }
     __syncwarp();
+    i = __shfl_sync(kAllLanes, next, 0);
   }
 }
 

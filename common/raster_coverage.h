@@ -322,16 +322,21 @@ PICTURA_HD inline QuadSight project_quad(const PinholeCamera& camera, const Vec3
   return is_whole ? QuadSight::whole : QuadSight::cut;
 }
 
-/// make_screen_face of what project_quad found to be whole.
-template <typename KeepEdge>
-PICTURA_HD inline bool make_quad_face(const PinholeCamera& camera, const Frustum& f, const ScreenQuad& quad,
-                                      const FacePlane& plane, Rgb color, KeepEdge&& keep_edge, ScreenFace* face_out) {
+/// Sets whether a face turns right on screen; false where it covers nothing.
+PICTURA_HD inline bool find_turn(const ScreenQuad& quad, bool* turns_right_out) {
   const float twice_area = cross(quad.corner[2] - quad.corner[0], quad.corner[3] - quad.corner[1]);
-  if (!(fabsf(twice_area) >= kLeastTwiceArea_px2)) return false;
-  face_out->edge_count = static_cast<uint8_t>(make_edges(quad.corner, 4, twice_area > 0.0f, keep_edge));
+  *turns_right_out = twice_area > 0.0f;
+  return fabsf(twice_area) >= kLeastTwiceArea_px2;
+}
+
+/// make_screen_face of what project_quad found to be whole and find_turn to cover something.
+template <typename KeepEdge>
+PICTURA_HD inline void make_quad_face(const PinholeCamera& camera, const Frustum& f, const ScreenQuad& quad,
+                                      bool turns_right, const FacePlane& plane, Rgb color, KeepEdge&& keep_edge,
+                                      ScreenFace* face_out) {
+  face_out->edge_count = static_cast<uint8_t>(make_edges(quad.corner, 4, turns_right, keep_edge));
   face_out->color = color;
   set_bounds(camera, f, quad.bounds, plane, face_out);
-  return true;
 }
 
 /// 1 / depth of a face's plane at a point of the screen; negative where the plane is behind the camera.

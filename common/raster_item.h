@@ -52,11 +52,11 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, FaceOwner owner, c
       face.count == 4 ? project_quad(setting.camera, face.corners, face.floor_px, &quad) : QuadSight::cut;
   if (sight == QuadSight::none) return false;
   if (sight == QuadSight::whole) {
+    bool turns_right = false;
+    if (!find_turn(quad, &turns_right)) return false;
     edge_begin = pool.take(4);
-    if (edge_begin < 0 ||
-        !make_quad_face(setting.camera, setting.frustum, quad, face.plane, face.color, keep_edge, face_out)) {
-      return false;
-    }
+    if (edge_begin < 0) return false;
+    make_quad_face(setting.camera, setting.frustum, quad, turns_right, face.plane, face.color, keep_edge, face_out);
   } else {
     Vec3 corners[kMaxFaceCorners], polygon[kMaxPolygonCorners];
     for (int i = 0; i < face.count; ++i) corners[i] = face.corners[i];
