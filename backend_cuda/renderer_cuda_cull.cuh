@@ -21,8 +21,12 @@ constexpr int kOutlineSides = 8;
 /// What a warp that culls keeps in shared memory.
 struct CullRoom {
   uint32_t entries[2 * kWarpSize];
-  OutlineSide sides[2][kOutlineSides];  // of the outlines for strips and for walls
-  int32_t offsets[kWarpSize];           // of rows that have pieces, see cull_pieces
+  // Of strips and of walls: the sides of the outline, and what pieces_of and far_of say.
+  OutlineSide sides[2][kOutlineSides];
+  const Ball* balls[2];
+  const int32_t* items[2];
+  float far_m[2];
+  int32_t offsets[kWarpSize];  // of rows that have pieces, see cull_pieces
 };
 static_assert(FaceBatch::kEntries == kWarpSize);
 
@@ -106,6 +110,11 @@ __device__ inline GridRows set_outlines(CullRoom* room, const ImageSetting& sett
   out.x_low = lesser_of(out.a.x, out.b.x);
   out.x_high = greater_of(out.a.x, out.b.x);
   if (lane_index() < 2 * kOutlineSides) room->sides[of_walls][side] = out;
+  if (side == 0) {
+    room->balls[of_walls] = pieces.balls.data();
+    room->items[of_walls] = pieces.cells.items.data();
+    room->far_m[of_walls] = far_m;
+  }
   const GridView& grid = pieces.cells;
   const float cells_per_m = inverse_of(grid.cell_m), radius_m = pieces.largest_radius_m;
   const int low = cell_at(out.a.y - radius_m - grid.origin_m.y, cells_per_m, grid.num_y);
@@ -156,11 +165,6 @@ __device__ inline void cull_pieces(BlockState* state, CullRoom* room, EntryList*
   const Frustum& frustum = state->making.setting.frustum;
   const DeviceGeometry& geometry = *state->view.geometry;
   const GridRows rows = set_outlines(room, state->making.setting, geometry);
-  const float strip_far_m = far_of(geometry.raster.longest_strip_m),
-              wall_far_m = far_of(geometry.raster.longest_wall_m);
-  const Ball *const strip_balls = geometry.strips.balls.data(), *const wall_balls = geometry.walls.balls.data();
-  const int32_t *const strip_items = geometry.strips.cells.items.data(), *const wall_items =
-                                                                             geometry.walls.cells.items.data();
   const int num_rows = rows.count[0] + rows.count[1], lane = lane_index();
   PICTURA_KEEP_LOOP
   for (int first_row = 0; first_row < num_rows; first_row += kWarpSize) {
@@ -183,31 +187,30 @@ __device__ inline void cull_pieces(BlockState* state, CullRoom* room, EntryList*
     struct Candidate {
       Ball ball;
       int32_t index;
-      bool is_wall;
+      int kind;  // as in the room
     };
     auto candidate_of = [&](int item) {
       const auto starts_at = static_cast<unsigned>(begin - item);
       const unsigned starts = __reduce_or_sync(kAllLanes, has_some && starts_at < kWarpSize ? 1u << starts_at : 0u);
       const int before = __popc(__ballot_sync(kAllLanes, has_some && begin < item));
       const int rank = before + __popc(starts & (lanes_below() << 1 | 1u)) - 1;
-      const bool is_wall = rank >= num_of_strips;
+      const int kind = rank >= num_of_strips ? 1 : 0;
       const int place = min_of(item + lane, total - 1) + room->offsets[rank];
-      return Candidate{(is_wall ? wall_balls : strip_balls)[place], (is_wall ? wall_items : strip_items)[place],
-                       is_wall};
+      return Candidate{room->balls[kind][place], room->items[kind][place], kind};
     };
     int item = warp_index() * kWarpSize;
     Candidate next;
     if (item < total) next = candidate_of(item);
-    // The next ones are asked for before these are looked at.
+    // The next ones are asked for before these are looked at; beyond the last there stands the last one.
     PICTURA_KEEP_LOOP
     while (item < total) {
       const Candidate candidate = next;
       const bool is_one = item + lane < total;
       item += num_threads();
-      if (item < total) next = candidate_of(item);
+      next = candidate_of(item);
       const bool shows = ball_in_frustum(frustum, to_camera(camera, candidate.ball.center_m), candidate.ball.radius_m,
-                                         candidate.is_wall ? wall_far_m : strip_far_m);
-      list->push(shows && is_one, thing_number(candidate.is_wall ? kWallKind : kStripKind, candidate.index));
+                                         room->far_m[candidate.kind]);
+      list->push(shows && is_one, thing_number(candidate.kind != 0 ? kWallKind : kStripKind, candidate.index));
     }
     __syncwarp();
   }
