@@ -87,7 +87,8 @@ __device__ inline void make_faces(const FaceMaking& making, const GatherLists& l
   const int32_t edge_begin = making.edge_begin + 4 * (first + lane);
   ScreenFace face;
   if (sight == QuadSight::whole) {
-    auto keep_edge = [&](int k, const PolygonEdge& edge) { store_whole(making.edges + edge_begin + k, edge); };
+    PolygonEdge* const edges = making.edges + edge_begin;
+    auto keep_edge = [edges](int k, const PolygonEdge& edge) { store_whole(edges + k, edge); };
     make_quad_face(camera, making.setting.frustum, on_screen, turns_right, quad.seen.plane, quad.seen.color, keep_edge,
                    &face);
   }

@@ -14,7 +14,8 @@ enum class StripKind : uint8_t { lane_mark, road_edge, crosswalk, stop_line };
 
 /// One straight piece, at most kMaxPiece_m long, of a polyline painted on the road. Its corners are a -+ side_a * w/2
 /// and b -+ side_b * w/2: the sides are mitred, so that consecutive pieces share an edge and neither overlap nor gape.
-struct Strip {
+/// Aligned for devices, which read 16 bytes at once.
+struct alignas(16) Strip {
   Vec3 a_m, b_m;        // the two ends of the centre line
   Vec2 side_a, side_b;  // horizontal offset to the left per metre of half-width, at a and at b
   float width_m = 0;
@@ -24,7 +25,7 @@ struct Strip {
 constexpr float kMaxPiece_m = 10.0f;
 
 /// An opaque vertical face from the ground up, seen from both sides.
-struct WallFace {
+struct alignas(8) WallFace {
   Vec3 a_m, b_m;  // the two ends of its foot
   float height_m = 0;
   Rgb color = kWallColor;
