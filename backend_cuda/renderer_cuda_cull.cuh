@@ -18,9 +18,12 @@ struct alignas(16) OutlineSide {
 };
 constexpr int kOutlineSides = 8;
 
+/// Entries that wait for their batch to be full: fewer than a batch, and those that each lane adds.
+constexpr int kMostWaiting = (1 + kNumCuboidFaces) * kWarpSize;
+
 /// What a warp that culls keeps in shared memory.
 struct CullRoom {
-  uint32_t entries[2 * kWarpSize];
+  uint32_t entries[kMostWaiting];
   // Of strips and of walls: the sides of the outline, and what pieces_of and far_of say.
   OutlineSide sides[2][kOutlineSides];
   const Ball* balls[2];
@@ -40,6 +43,25 @@ class EntryList {
     if (wanted) entries_[waiting_ + __popc(pushing & lanes_below())] = entry;
     waiting_ += __popc(pushing);
     if (waiting_ >= kWarpSize) leave_batch(kWarpSize);
+  }
+  /// An entry for each of an agent's faces.
+  __device__ void push_faces(unsigned faces, uint32_t entry) {
+    // Places by the bits of the numbers of faces.
+    static_assert(kNumCuboidFaces < 8);
+    int before = 0, total = 0;
+    for (int bit = 1; bit < 8; bit *= 2) {
+      const unsigned pushing = __ballot_sync(kAllLanes, (__popc(faces) & bit) != 0);
+      before += bit * __popc(pushing & lanes_below());
+      total += bit * __popc(pushing);
+    }
+    int place = waiting_ + before;
+    PICTURA_KEEP_LOOP
+    for (; faces != 0; faces &= faces - 1) {
+      entries_[place++] = entry | (static_cast<uint32_t>(__ffs(static_cast<int>(faces))) - 1) << kFaceShift;
+    }
+    waiting_ += total;
+    PICTURA_KEEP_LOOP
+    while (waiting_ >= kWarpSize) leave_batch(kWarpSize);
   }
   __device__ void finish() {
     if (waiting_ > 0) leave_batch(waiting_);
@@ -230,11 +252,7 @@ __device__ inline void cull_agents(const BlockState& state, const DrawTask& task
         faces = faces_to_eye(box, setting.camera.position_m);
       }
     }
-    PICTURA_KEEP_LOOP
-    for (; __any_sync(kAllLanes, faces != 0); faces &= faces - 1) {
-      const uint32_t face = static_cast<uint32_t>(__ffs(static_cast<int>(faces))) - 1;
-      list->push(faces != 0, thing_number(kAgentKind, agent - view.world_begin) | face << kFaceShift);
-    }
+    list->push_faces(faces, thing_number(kAgentKind, agent - view.world_begin));
   }
 }
 
