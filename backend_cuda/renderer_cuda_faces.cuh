@@ -64,29 +64,32 @@ __device__ inline void keep_face(const FaceMaking& making, const ScreenFace& fac
 // places. All lanes of the warp.
 __device__ inline void make_faces(const FaceMaking& making, const GatherLists& lists, GatherCounts* counts,
                                   uint32_t entry, int32_t image, int32_t first) {
-  const bool is_light = entry != kNoEntry && kind_of(entry) == kLightKind;
+  const bool is_light = entry != kNoEntry && kind_of(entry) == kLightKind, is_quad = entry != kNoEntry && !is_light;
+  if (__any_sync(kAllLanes, is_light)) {
+    const int32_t at = take_place(&counts->lights, is_light);
+    if (is_light) lists.clipped[lists.max_clipped - 1 - at] = {entry, image};
+  }
+  const unsigned quads = __ballot_sync(kAllLanes, is_quad);
+  if (quads == 0) return;
+  // Lanes that have no face make another lane's, which is not kept: so none waits for what lanes do differently.
+  const uint32_t of_another = __shfl_sync(kAllLanes, entry, __ffs(static_cast<int>(quads)) - 1);
   const PinholeCamera& camera = making.setting.camera;
   Quad quad;
+  const bool is_seen = make_quad(making, is_quad ? entry : of_another, &quad);
   ScreenQuad on_screen;
-  QuadSight sight = QuadSight::none;
   bool turns_right = false;
-  if (entry != kNoEntry && !is_light && make_quad(making, entry, &quad)) {
-    sight = project_quad(camera, quad.seen.corner, quad.floor_px, &on_screen);
-    if (sight == QuadSight::whole && !find_turn(on_screen, &turns_right)) sight = QuadSight::none;
-  }
-  // Three lanes ask for the places of all at once, and wait for them when edges are made.
-  const unsigned showing = __ballot_sync(kAllLanes, sight == QuadSight::whole),
-                 clipped = __ballot_sync(kAllLanes, sight == QuadSight::cut),
-                 lights = __ballot_sync(kAllLanes, is_light);
-  const int lane = lane_index();
-  const int wanted = __popc(lane == 0 ? showing : (lane == 1 ? clipped : (lane == 2 ? lights : 0u)));
+  const QuadSight sight = project_quad(camera, quad.seen.corner, quad.floor_px, &on_screen);
+  const bool covers = find_turn(on_screen, &turns_right), is_wanted = is_quad && is_seen;
+  const bool shows = is_wanted && sight == QuadSight::whole && covers,
+             is_clipped = is_wanted && sight == QuadSight::cut;
+  // Two lanes ask for the places of all at once, and wait for them when edges are made.
+  const unsigned showing = __ballot_sync(kAllLanes, shows), clipped = __ballot_sync(kAllLanes, is_clipped);
+  const int lane = lane_index(), wanted = __popc(lane == 0 ? showing : (lane == 1 ? clipped : 0u));
   int32_t taken = 0;
-  if (wanted > 0) {
-    taken = atomicAdd(lane == 0 ? making.num_faces : (lane == 1 ? &counts->clipped : &counts->lights), wanted);
-  }
+  if (wanted > 0) taken = atomicAdd(lane == 0 ? making.num_faces : &counts->clipped, wanted);
   const int32_t edge_begin = making.edge_begin + 4 * (first + lane);
   ScreenFace face;
-  if (sight == QuadSight::whole) {
+  if (shows) {
     PolygonEdge* const edges = making.edges + edge_begin;
     auto keep_edge = [edges](int k, const PolygonEdge& edge) { store_whole(edges + k, edge); };
     make_quad_face(camera, making.setting.frustum, on_screen, turns_right, quad.seen.plane, quad.seen.color, keep_edge,
@@ -95,10 +98,9 @@ __device__ inline void make_faces(const FaceMaking& making, const GatherLists& l
   auto place_of = [&](int of_lane, unsigned lanes) {
     return __shfl_sync(kAllLanes, taken, of_lane) + __popc(lanes & lanes_below());
   };
-  const int32_t at = place_of(0, showing), clipped_at = place_of(1, clipped), light_at = place_of(2, lights);
-  if (sight == QuadSight::whole) keep_face(making, face, quad.owner, edge_begin, at);
-  if (sight == QuadSight::cut) lists.clipped[clipped_at] = {entry, image};
-  if (is_light) lists.clipped[lists.max_clipped - 1 - light_at] = {entry, image};
+  const int32_t at = place_of(0, showing), clipped_at = place_of(1, clipped);
+  if (shows) keep_face(making, face, quad.owner, edge_begin, at);
+  if (is_clipped) lists.clipped[clipped_at] = {entry, image};
 }
 
 // Makes a face whose corners the lanes hold. False where there is no room for its edges. All lanes of the warp.

@@ -297,7 +297,6 @@ enum class QuadSight : uint8_t { none, whole, cut };
 PICTURA_HD inline QuadSight project_quad(const PinholeCamera& camera, const Vec3* corners, float floor_px,
                                          ScreenQuad* quad_out) {
   const float nearest_m = lesser_of(lesser_of(corners[0].z, corners[1].z), lesser_of(corners[2].z, corners[3].z));
-  if (nearest_m < kNear_m) return QuadSight::cut;
   Vec2* const corner = quad_out->corner;
   float inverse_depth[4];
   for (int i = 0; i < 4; ++i) {
@@ -315,11 +314,12 @@ PICTURA_HD inline QuadSight project_quad(const PinholeCamera& camera, const Vec3
   ScreenBounds* const bounds = &quad_out->bounds;
   *bounds = {};
   for (int i = 0; i < 4; ++i) bounds->add(corner[i], inverse_depth[i]);
-  if (!bounds->meet_image(camera)) return QuadSight::none;
   const bool is_whole = bounds->low.x >= -kGuardBand_px && bounds->low.y >= -kGuardBand_px &&
                         bounds->high.x <= static_cast<float>(camera.width_px) + kGuardBand_px &&
                         bounds->high.y <= static_cast<float>(camera.height_px) + kGuardBand_px;
-  return is_whole ? QuadSight::whole : QuadSight::cut;
+  // Of what reaches behind the near plane all that was computed means nothing.
+  if (nearest_m < kNear_m) return QuadSight::cut;
+  return !bounds->meet_image(camera) ? QuadSight::none : (is_whole ? QuadSight::whole : QuadSight::cut);
 }
 
 /// Sets whether a face turns right on screen; false where it covers nothing.
