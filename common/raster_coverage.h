@@ -148,12 +148,12 @@ PICTURA_HD inline PolygonEdge make_edge(Vec2 from, Vec2 to) {
   const Vec2 upper = downward ? from : to, lower = downward ? to : from;
   const bool is_upright = fabsf(lower.x - upper.x) < kUpright_px, is_level = lower.y - upper.y < kLevel_px;
   const float dx = is_upright ? kUpright_px : lower.x - upper.x, dy = is_level ? 0.0f : lower.y - upper.y;
-  const float dx_dy = is_level ? 0.0f : dx / dy;
+  const float dx_dy = is_level ? 0.0f : dx * inverse_of(dy);
   PolygonEdge edge;
   edge.x0 = upper.x;
   edge.y0 = upper.y;
   edge.y1 = is_level ? upper.y : lower.y;
-  edge.dy_dx = dy / dx;
+  edge.dy_dx = dy * inverse_of(dx);
   edge.half_dx_dy = 0.5f * dx_dy;
   // Of what is steeper, all heights from the pixel's middle are lessened alike: it crosses that at the same place.
   const float lessened = is_level ? 1.0f : min_of(kSteepest * fabsf(dx_dy), 1.0f);
@@ -193,6 +193,7 @@ struct alignas(16) ScreenFace {
   float inverse_depth_low = 0, inverse_depth_high = 0;
   float plane_distance_m = 0;  // from the camera to the face's plane
   Rgb color;
+  uint32_t color_bytes = 0;  // to_bytes(color), for devices
 };
 
 /// What bounds the corners of a polygon on screen.
