@@ -57,6 +57,7 @@ __device__ inline void keep_face(const FaceMaking& making, const ScreenFace& fac
   whole.edge_begin = edge_begin;
   whole.number = owner.number;
   whole.class_id = owner.class_id;
+  whole.color_bytes = to_bytes(face.color);
   if (at >= 0) store_whole(making.faces + at, whole);
 }
 

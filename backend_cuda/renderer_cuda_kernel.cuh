@@ -14,17 +14,27 @@ struct ImageWriter {
   int64_t first, plane;  // elements: of this image, and from a plane to the next
   int width_px;
 
-  __device__ void colors(int x, int y, int count, const Rgb* colors) const {
-    each_channel(x, y, [&](int channel, auto* to, auto&& value_of) {
-      Together<decltype(value_of(0.0f))> values;
-      for (int i = 0; i < kWrittenAtOnce; ++i) {
-        values.value[i] = value_of(channel == 0 ? colors[i].r : channel == 1 ? colors[i].g : colors[i].b);
-      }
-      store(to, count, values);
-    });
+  /// Keeps the colour that a fragment gives its pixel.
+  template <typename Memory>
+  __device__ void keep(const Memory& memory, int fragment, Rgb color) const {
+    if (format == PixelFormat::u8) {
+      memory.set_color_bytes(fragment, to_bytes(color));
+    } else {
+      memory.set_color(fragment, color);
+    }
   }
-  __device__ void black(int x, int y, int count) const {
-    each_channel(x, y, [&](int, auto* to, auto&& value_of) { store(to, count, Together<decltype(value_of(0.0f))>{}); });
+
+  /// Writes at most kWrittenAtOnce pixels side by side, given their words.
+  template <typename Memory>
+  __device__ void pixels(const Memory& memory, int x, int y, int count, const typename Memory::Word* words) const {
+    const int64_t at = first + static_cast<int64_t>(y) * width_px + x;
+    if (format == PixelFormat::u8) {
+      write_bytes(memory, static_cast<uint8_t*>(images) + at, count, words);
+    } else if (format == PixelFormat::f16) {
+      write_numbers(memory, static_cast<uint16_t*>(images) + at, count, words, [](float v) { return to_half(v); });
+    } else {
+      write_numbers(memory, static_cast<float*>(images) + at, count, words, [](float v) { return saturate(v); });
+    }
   }
 
  private:
@@ -33,19 +43,45 @@ struct ImageWriter {
     Value value[kWrittenAtOnce];
   };
 
-  // Calls visit(channel, to, value_of): where pixel (x, y) stands, and how channels are written.
-  template <typename Visit>
-  __device__ void each_channel(int x, int y, Visit&& visit) const {
-    int64_t at = first + static_cast<int64_t>(y) * width_px + x;
+  template <typename Memory>
+  __device__ void write_bytes(const Memory& memory, uint8_t* to, int count, const typename Memory::Word* words) const {
+    uint32_t bytes[kWrittenAtOnce];
+    for (int i = 0; i < kWrittenAtOnce; ++i) {
+      const auto full = words[i] >> Memory::kHalf, head = words[i] & Memory::kNone;
+      bytes[i] = head != Memory::kNone   ? memory.color_bytes(static_cast<int>(head))
+                 : full != Memory::kNone ? memory.faces[full].color_bytes
+                                         : 0u;
+    }
     PICTURA_KEEP_LOOP
-    for (int channel = 0; channel < 3; ++channel, at += plane) {
-      if (format == PixelFormat::u8) {
-        visit(channel, static_cast<uint8_t*>(images) + at, [](float value) { return to_byte(value); });
-      } else if (format == PixelFormat::f16) {
-        visit(channel, static_cast<uint16_t*>(images) + at, [](float value) { return to_half(value); });
-      } else {
-        visit(channel, static_cast<float*>(images) + at, [](float value) { return saturate(value); });
+    for (int channel = 0; channel < 3; ++channel, to += plane) {
+      Together<uint8_t> values;
+      for (int i = 0; i < kWrittenAtOnce; ++i) {
+        values.value[i] = static_cast<uint8_t>(bytes[i]);
+        bytes[i] >>= 8;
       }
+      store(to, count, values);
+    }
+  }
+
+  template <typename Memory, typename Value, typename ValueOf>
+  __device__ void write_numbers(const Memory& memory, Value* to, int count, const typename Memory::Word* words,
+                                ValueOf&& value_of) const {
+    Rgb colors[kWrittenAtOnce];
+    for (int i = 0; i < kWrittenAtOnce; ++i) {
+      const auto full = words[i] >> Memory::kHalf, head = words[i] & Memory::kNone;
+      if (head != Memory::kNone) {
+        colors[i] = memory.color(static_cast<int>(head));
+      } else if (full != Memory::kNone) {
+        colors[i] = memory.faces[full].color;
+      }
+    }
+    PICTURA_KEEP_LOOP
+    for (int channel = 0; channel < 3; ++channel, to += plane) {
+      Together<Value> values;
+      for (int i = 0; i < kWrittenAtOnce; ++i) {
+        values.value[i] = value_of(channel == 0 ? colors[i].r : channel == 1 ? colors[i].g : colors[i].b);
+      }
+      store(to, count, values);
     }
   }
 
@@ -64,8 +100,10 @@ struct ImageWriter {
 
 /// Writes nothing.
 struct NoImage {
-  __device__ void colors(int, int, int, const Rgb*) const {}
-  __device__ void black(int, int, int) const {}
+  template <typename Memory>
+  __device__ void keep(const Memory&, int, Rgb) const {}
+  template <typename Memory>
+  __device__ void pixels(const Memory&, int, int, int, const typename Memory::Word*) const {}
 };
 
 // Writes the optional planes of a part: the front surface at each pixel's centre.

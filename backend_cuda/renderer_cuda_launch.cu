@@ -36,13 +36,17 @@ std::size_t large_block_bytes(const Scratch& large) { return large_bytes(large);
 
 cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& large, int processors,
                         cudaStream_t stream) {
-  const int images = task.num_views * task.num_cameras, gather_blocks = kGatherBlocksPerProcessor * processors;
-  const LaunchShape to_cull{min_of(images, gather_blocks), kGatherThreads, cull_bytes()};
-  const LaunchShape to_gather{gather_blocks, kGatherThreads, state_bytes(kGatherThreads)};
-  const LaunchShape to_clip{kClipBlocksPerProcessor * processors, kGatherThreads, gather_bytes(kGatherThreads)};
+  const int images = task.num_views * task.num_cameras;
   const LaunchShape to_draw{min_of(images * task.most_tiles, kDrawBlocksPerProcessor * processors), kDrawThreads,
                             draw_bytes()};
   for (task.round_index = 0; task.round_index < kRounds; ++task.round_index) {
+    // Few images are postponed, mostly none; then a launch takes as long as its blocks take to start.
+    const int share = task.round_index == 0 ? 1 : 8;
+    const int gather_blocks = kGatherBlocksPerProcessor / share * processors;
+    const LaunchShape to_cull{min_of(images, gather_blocks), kGatherThreads, cull_bytes()};
+    const LaunchShape to_gather{gather_blocks, kGatherThreads, state_bytes(kGatherThreads)};
+    const LaunchShape to_clip{kClipBlocksPerProcessor / share * processors, kGatherThreads,
+                              gather_bytes(kGatherThreads)};
     cudaError_t status = launch(kernels.cull, to_cull, stream, task);
     if (status != cudaSuccess) return status;
     status = launch(kernels.gather, to_gather, stream, task);

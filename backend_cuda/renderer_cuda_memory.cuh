@@ -45,8 +45,8 @@ struct DrawMemory {
   // Fragments.
   uint32_t *samples_low, *samples_high, *free_low, *free_high;  // [max_fragments]
   float* area;                                                  // [max_fragments]
-  Index *face, *pixel, *next;                                   // [max_fragments] next: of the pixel's chain, or kNone
-  Index* kind;                                                  // ... in the end, where `pixel` stood: of its weight
+  Index *face, *pixel, *next;  // [max_fragments] next: of the pixel's chain, or kNone
+  Index* kind;                 // ... in the end, where `pixel` stood: of its weight
   Index* drawn;                                                 // [max_fragments] pixels that have fragments
   int32_t max_pixels, max_rows, max_candidates, max_fragments;
 
@@ -58,7 +58,7 @@ struct DrawMemory {
     return static_cast<uint64_t>(free_high[fragment]) << 32 | free_low[fragment];
   }
   // Once a fragment is weighed, there stands where its samples did what it adds to its pixel's sum; in the end, of the
-  // first of a pixel's chain, the pixel's colour.
+  // first of a pixel's chain, the pixel's colour, as numbers or as bytes.
   __device__ void set_part(int fragment, const PixelSum::Part& part) const {
     samples_low[fragment] = static_cast<uint32_t>(part.area);
     samples_high[fragment] = static_cast<uint32_t>(part.r);
@@ -74,6 +74,8 @@ struct DrawMemory {
     samples_high[fragment] = __float_as_uint(color.g);
     free_low[fragment] = __float_as_uint(color.b);
   }
+  __device__ void set_color_bytes(int fragment, uint32_t bytes) const { samples_low[fragment] = bytes; }
+  __device__ uint32_t color_bytes(int fragment) const { return samples_low[fragment]; }
   __device__ Rgb color(int fragment) const {
     return {__uint_as_float(samples_low[fragment]), __uint_as_float(samples_high[fragment]),
             __uint_as_float(free_low[fragment])};

@@ -21,30 +21,45 @@ __device__ void lose(const Memory& memory, uint32_t fragment, uint64_t samples) 
   if (high != 0) atomicAnd(&memory.free_high[fragment], ~high);
 }
 
-// Asks pairs of fragments what they hide of each other; b may be kNone, for the pixel's full face.
+// Asks a pair of fragments what they hide of each other; b may be kNone, for the pixel's full face.
 template <typename Memory>
-__device__ __noinline__ void ask_pairs(WarpQueue::Pair pair, Part part) {
-  if (!pair.is_one) return;
+__device__ __noinline__ void ask_pair(uint32_t a, uint32_t b, Part part) {
   const Memory memory = Memory::current();
-  const int pixel = memory.pixel[pair.a];
-  const bool with_full = pair.b == Memory::kNone;
-  const size_t face_b = with_full ? full_of(memory, pixel) : memory.face[pair.b];
-  const PixelCoverage a = memory.coverage(static_cast<int>(pair.a));
-  const PixelCoverage b = with_full ? PixelCoverage{1.0f, kAllSamples} : memory.coverage(static_cast<int>(pair.b));
+  const int pixel = memory.pixel[a];
+  const bool with_full = b == Memory::kNone;
+  const size_t face_b = with_full ? full_of(memory, pixel) : memory.face[b];
+  const PixelCoverage of_a = memory.coverage(static_cast<int>(a));
+  const PixelCoverage of_b = with_full ? PixelCoverage{1.0f, kAllSamples} : memory.coverage(static_cast<int>(b));
   const Vec2 corner{static_cast<float>(part.x_of(pixel)), static_cast<float>(part.y_of(pixel))};
-  const Hidden hidden = hide_each_other(a, b, memory.faces[memory.face[pair.a]], memory.faces[face_b], corner,
+  const Hidden hidden = hide_each_other(of_a, of_b, memory.faces[memory.face[a]], memory.faces[face_b], corner,
                                         [](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
-  lose(memory, pair.a, hidden.of_a);
-  if (!with_full) lose(memory, pair.b, hidden.of_b);
+  lose(memory, a, hidden.of_a);
+  if (!with_full) lose(memory, b, hidden.of_b);
 }
 
-// Asks every two fragments of a pixel that meet what they hide of each other; a pixel's full face is one of them. A
-// lane walks the rest of the chain behind a fragment, one step at a time, and takes the next fragment at its end; the
-// last made first, because theirs are the longest ways. Pairs that meet are put aside until every lane of the warp has
-// one.
+// Where a pair is listed: from the end of the list of pixels on, while that is filled from its beginning.
 template <typename Memory>
-__device__ void hide_fragments(const Memory& memory, const Part& part, int count) {
-  WarpQueue pairs(&memory.state->warps[warp_index()].queue);
+__device__ int max_pairs(const Memory& memory) {
+  using Index = typename Memory::Index;
+  constexpr int kIndices = sizeof(typename Memory::Word) / sizeof(Index);
+  return (memory.max_fragments - memory.state->num_drawn) / kIndices;
+}
+template <typename Memory>
+__device__ typename Memory::Word& pair_at(const Memory& memory, int i) {
+  using Index = typename Memory::Index;
+  using Word = typename Memory::Word;
+  constexpr int kIndices = sizeof(Word) / sizeof(Index);
+  return reinterpret_cast<Word*>(memory.drawn)[memory.max_fragments / kIndices - 1 - i];
+}
+
+// Lists every two fragments of a pixel that meet; a pixel's full face is one of them. A lane walks the rest of the chain
+// behind a fragment, one step at a time, and takes the next fragment at its end; the last made first, because theirs are
+// the longest ways. What finds no room is asked at once.
+template <typename Memory>
+__device__ void list_pairs(const Memory& memory, const Part& part, int count) {
+  using Word = typename Memory::Word;
+  int32_t* const num_pairs = &memory.state->num_pairs;
+  const int most_pairs = max_pairs(memory);
   int begin = 0, used = kWarpSize;  // the warp's fragments of the list, and how many of them lanes have taken
   int fragment = 0;
   uint32_t other = Memory::kNone;  // of the chain
@@ -54,7 +69,7 @@ __device__ void hide_fragments(const Memory& memory, const Part& part, int count
   for (;;) {
     const bool is_idle = !is_before_full && other == Memory::kNone;
     const unsigned idle = __ballot_sync(kAllLanes, is_idle);
-    if (idle == kAllLanes && begin >= count) break;
+    if (idle == kAllLanes && begin >= count) return;
     if (used >= kWarpSize && begin < count) {
       begin = next_of(&memory.state->next_batch) * kWarpSize;
       used = 0;
@@ -75,10 +90,25 @@ __device__ void hide_fragments(const Memory& memory, const Part& part, int count
       other = memory.next[with];
     }
     is_before_full = false;
-    pairs.push(meet, static_cast<uint32_t>(fragment), with);
-    if (pairs.is_ready()) ask_pairs<Memory>(pairs.take(), part);
+    if (!meet) continue;
+    const int32_t at = atomicAdd(num_pairs, 1);
+    if (at < most_pairs) {
+      pair_at(memory, at) = static_cast<Word>(fragment) << Memory::kHalf | static_cast<Word>(with);
+    } else {
+      ask_pair<Memory>(static_cast<uint32_t>(fragment), with, part);
+    }
   }
-  if (!pairs.is_empty()) ask_pairs<Memory>(pairs.take(), part);
+}
+
+// Asks those that are listed what they hide of each other; both lose samples, in whatever order.
+template <typename Memory>
+__device__ void hide_fragments(const Memory& memory, const Part& part) {
+  const int count = min_of(memory.state->num_pairs, max_pairs(memory));
+  PICTURA_KEEP_LOOP
+  for (int i = static_cast<int>(threadIdx.x); i < count; i += num_threads()) {
+    const auto pair = pair_at(memory, i);
+    ask_pair<Memory>(static_cast<uint32_t>(pair >> Memory::kHalf), static_cast<uint32_t>(pair & Memory::kNone), part);
+  }
 }
 
 /// Hears of no fragment's weight.
@@ -89,15 +119,15 @@ struct NoVisit {
 
 // Weighs fragments. What is alone in its pixel gives that its colour; what the others add to the sums of theirs, and
 // what kind of weight that is, stands from then on where their samples and pixels did.
-template <typename Memory, typename Visit>
-__device__ void weigh_fragments(const Memory& memory, int count, const Visit& visit) {
+template <typename Memory, typename Visit, typename Write>
+__device__ void weigh_fragments(const Memory& memory, int count, const Visit& visit, const Write& write) {
   PICTURA_KEEP_LOOP
   for (int i = static_cast<int>(threadIdx.x); i < count; i += num_threads()) {
     const ScreenFace& face = memory.faces[memory.face[i]];
     const Rgb color = face.color;
     if (is_alone(memory, i, memory.pixel[i])) {
       visit(face, memory.area[i]);
-      memory.set_color(i, color * memory.area[i]);
+      write.keep(memory, i, color * memory.area[i]);
       continue;
     }
     const PixelSum::Weight weight = PixelSum::weight_of(memory.coverage(i), memory.free(i));
@@ -108,8 +138,8 @@ __device__ void weigh_fragments(const Memory& memory, int count, const Visit& vi
 }
 
 // Mixes the colours of those pixels of a part that have more than one fragment: visit(face, weight) hears of each.
-template <typename Memory, typename Visit>
-__device__ void mix_pixels(const Memory& memory, const Visit& visit) {
+template <typename Memory, typename Visit, typename Write>
+__device__ void mix_pixels(const Memory& memory, const Visit& visit, const Write& write) {
   const int num_drawn = memory.state->num_drawn;
   PICTURA_KEEP_LOOP
   for (int d = static_cast<int>(threadIdx.x); d < num_drawn; d += num_threads()) {
@@ -133,7 +163,7 @@ __device__ void mix_pixels(const Memory& memory, const Visit& visit) {
       each_fragment(
           [&](int i, PixelSum::Kind kind) { visit(memory.faces[memory.face[i]], shares.of({memory.area[i], kind})); });
     }
-    memory.set_color(head, sum.color(shares));
+    write.keep(memory, head, sum.color(shares));
   }
 }
 
@@ -149,28 +179,18 @@ __device__ void write_pixels(const Memory& memory, const Part& part, const Visit
   for (int first = kWrittenAtOnce * static_cast<int>(threadIdx.x); first < pixels;
        first += kWrittenAtOnce * num_threads()) {
     const int x = part.x_of(first), y = part.y_of(first), count = min_of(part.x_end - x, kWrittenAtOnce);
-    Word word[kWrittenAtOnce], all = ~Word{0};
+    Word word[kWrittenAtOnce];
     for (int i = 0; i < kWrittenAtOnce; ++i) {
-      all &= word[i] = memory.pixels[first + i];
+      word[i] = memory.pixels[first + i];
       memory.pixels[first + i] = 0;
-    }
-    if (count <= 0) continue;
-    if (all == ~Word{0}) {
-      write.black(x, y, count);
-      continue;
-    }
-    Rgb color[kWrittenAtOnce];
-    for (int i = 0; i < kWrittenAtOnce; ++i) {
-      const Word full = word[i] >> Memory::kHalf, head = word[i] & Memory::kNone;
-      if (i >= count || word[i] == ~Word{0}) continue;
-      if (head != Memory::kNone) {
-        color[i] = memory.color(static_cast<int>(head));
-      } else {
-        visit(memory.faces[full], 1.0f);
-        color[i] = memory.faces[full].color;
+      const Word full = word[i] >> Memory::kHalf;
+      if constexpr (Visit::kWanted) {
+        if (i < count && full != Memory::kNone && (word[i] & Memory::kNone) == Memory::kNone) {
+          visit(memory.faces[full], 1.0f);
+        }
       }
     }
-    write.colors(x, y, count, color);
+    if (count > 0) write.pixels(memory, x, y, count, word);
   }
 }
 
@@ -180,7 +200,7 @@ __device__ void reset_counts(const Memory& memory) {
   BlockState* state = memory.state;
   if (threadIdx.x != 0) return;
   state->num_rows = state->num_candidates = state->num_fragments = state->num_added = state->num_drawn =
-      state->next_batch = 0;
+      state->num_pairs = state->next_batch = 0;
 }
 // What a part finds when it begins: nothing is marked, nothing listed. For a block's first part, and after one that was
 // given up. All threads of the block.
@@ -215,11 +235,13 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
   sync_block();
   const int count = made + state->num_added;
   if (count > memory.max_fragments) return false;
-  hide_fragments(memory, part, count);
+  list_pairs(memory, part, count);
   sync_block();
-  weigh_fragments(memory, count, visit);
+  hide_fragments(memory, part);
   sync_block();
-  mix_pixels(memory, visit);
+  weigh_fragments(memory, count, visit, write);
+  sync_block();
+  mix_pixels(memory, visit, write);
   sync_block();
   reset_counts(memory);
   write_pixels(memory, part, visit, write);
@@ -228,7 +250,8 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
 }
 
 // Draws the faces into a part of an image, in smaller ones where there is no room for all of it. visit(face, weight)
-// hears of each fragment, write.colors(x, y, count, colors) and write.black(x, y, count) of pixels side by side. False
+// hears of each fragment, write.keep(memory, fragment, colour) of what fragments give their pixels, and
+// write.pixels(memory, x, y, count, words) of pixels side by side. False
 // where there is no room for a single pixel. All threads of the block.
 template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whole, const Visit& visit,

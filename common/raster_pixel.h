@@ -41,10 +41,14 @@ class PixelSum {
             to_units(weight.area * color.b)};
   }
   PICTURA_HD void add(Kind kind, const Part& part) {
-    part_[kind].area += part.area;
-    part_[kind].r += part.r;
-    part_[kind].g += part.g;
-    part_[kind].b += part.b;
+    // A choice for each kind, and no index, for which a device would keep the sums in memory.
+    for (int k = 0; k < kNumKinds; ++k) {
+      const bool is_its = k == kind;
+      part_[k].area += is_its ? part.area : 0;
+      part_[k].r += is_its ? part.r : 0;
+      part_[k].g += is_its ? part.g : 0;
+      part_[k].b += is_its ? part.b : 0;
+    }
   }
   PICTURA_HD void add(Weight weight, Rgb color) { add(weight.kind, part_of(weight, color)); }
 
@@ -92,5 +96,9 @@ PICTURA_HD inline uint16_t to_half(float channel) {
 
 /// A channel as an unsigned byte.
 PICTURA_HD inline uint8_t to_byte(float channel) { return static_cast<uint8_t>(saturate(channel) * 255.0f + 0.5f); }
+/// ... all of a colour, red lowest.
+PICTURA_HD inline uint32_t to_bytes(Rgb color) {
+  return uint32_t{to_byte(color.r)} | uint32_t{to_byte(color.g)} << 8 | uint32_t{to_byte(color.b)} << 16;
+}
 
 }  // namespace pictura

@@ -262,6 +262,22 @@ TEST(EmulatedKernels, DrawOddSizesAndPlanes) {
   expect_oracles(&renderer, town, Planes::all);
 }
 
+TEST(EmulatedKernels, WriteTheOraclesBytesAndHalves) {
+  SyntheticTown town = make_synthetic_town(3, 60);
+  town.views.resize(1);
+  const RendererConfig config = config_of(mixed_rig());
+  EmulatedRenderer emulated(config, 12);
+  const auto oracle = make_renderer("cpu", config);
+  emulated.upload(town.geometry);
+  oracle->upload(town.geometry);
+  for (const PixelFormat format : {PixelFormat::u8, PixelFormat::f16}) {
+    HostImages told(config.rig, 1, format), truth(config.rig, 1, format);
+    emulated.render(town.scene.batch(), town.views, told.batch(), {});
+    oracle->render(town.scene.batch(), town.views, truth.batch(), {});
+    EXPECT_TRUE(std::ranges::equal(told.bytes(), truth.bytes())) << static_cast<int>(format);
+  }
+}
+
 TEST(EmulatedKernels, DrawCrowdsInPartsAndLeaveNothingOut) {
   // More than one pass has room for: parts of images, and images that are left to the last launch.
   Rig rig = paper_rig();
