@@ -21,31 +21,44 @@ struct Part {
   }
 };
 
-// A pixel's word while the nearest full faces are found: the larger is the nearer; 0 for none. The bits of a nearness
-// sort like the nearness; those that have no room are left off.
+/// A pixel's word. While the nearest full faces are found it is a mark, the larger the nearer: the upper bits of the
+/// face's nearness, which sort like the nearness, and the face's number plus 1. From the pixel's first fragment on,
+/// that stands where the nearness did, and the sign bit tells so. 0: neither.
 template <typename Word>
-constexpr int kFaceBits = sizeof(Word) == 4 ? kMarkedFaceBits : 32;
+struct PixelWord {
+  static constexpr int kFaceBits = sizeof(Word) == 4 ? kMarkedFaceBits : 32;
+  static constexpr Word kFace = (Word{1} << kFaceBits) - 1, kHasChain = Word{1} << (8 * sizeof(Word) - 1);
 
-template <typename Word>
-__device__ Word full_mark(float nearness, int face) {
-  return static_cast<Word>(__float_as_uint(nearness) >> (sizeof(Word) == 4 ? kMarkedFaceBits : 0)) << kFaceBits<Word> |
-         static_cast<Word>(face + 1);
-}
-template <typename Word>
-__device__ int marked_face(Word mark) {
-  return static_cast<int>(mark & ((Word{1} << kFaceBits<Word>)-1)) - 1;
-}
+  __device__ static Word mark(float nearness, int face) {
+    const Word bits = __float_as_uint(nearness);
+    return (sizeof(Word) == 4 ? bits & ~kFace : bits << (kFaceBits % (8 * sizeof(Word)))) | static_cast<Word>(face + 1);
+  }
+  __device__ static int marked_face(Word mark) { return static_cast<int>(mark & kFace) - 1; }
+  /// With a fragment as the first of the chain, and the face as it is.
+  __device__ static Word with_first(Word word, Word fragment) {
+    return kHasChain | fragment << kFaceBits | (word & kFace);
+  }
+};
 
-// The face that covers a pixel fully and hides what is behind it; kNone where there is none, or where it stands among
-// the pixel's fragments.
+// The face of a word that covers its pixel fully and hides what is behind it; kNone where there is none, or where it
+// stands among the pixel's fragments.
+template <typename Memory>
+__device__ typename Memory::Word full_of_word(typename Memory::Word word) {
+  return ((word & PixelWord<typename Memory::Word>::kFace) - 1) & Memory::kNone;
+}
+// The first fragment of its chain; kNone where there is none.
+template <typename Memory>
+__device__ typename Memory::Word first_of_word(typename Memory::Word word) {
+  using Pixel = PixelWord<typename Memory::Word>;
+  return (word & Pixel::kHasChain) != 0 ? (word & ~Pixel::kHasChain) >> Pixel::kFaceBits : Memory::kNone;
+}
 template <typename Memory>
 __device__ typename Memory::Word full_of(const Memory& memory, int pixel) {
-  return memory.pixels[pixel] >> Memory::kHalf;
+  return full_of_word<Memory>(memory.pixels[pixel]);
 }
-// The first fragment of a pixel's chain; kNone where there is none.
 template <typename Memory>
 __device__ typename Memory::Word first_of(const Memory& memory, int pixel) {
-  return memory.pixels[pixel] & Memory::kNone;
+  return first_of_word<Memory>(memory.pixels[pixel]);
 }
 
 // Lists the rows that faces have in a part. Those that find no room are counted. All threads of the block.
@@ -89,10 +102,10 @@ __device__ void list_candidate(const Memory& memory, int place, int face, int pi
 template <typename Memory>
 __device__ int mark_pixel(const Memory& memory, int face, int x, int y, int pixel) {
   using Word = typename Memory::Word;
-  const Word mark = full_mark<Word>(middle_nearness(memory.faces[face], x, y), face);
+  const Word mark = PixelWord<Word>::mark(middle_nearness(memory.faces[face], x, y), face);
   Word had = memory.pixels[pixel];
   if (had < mark) had = atomicMax(&memory.pixels[pixel], mark);
-  const int other = marked_face(had);
+  const int other = PixelWord<Word>::marked_face(had);
   if (other < 0) return -1;
   const int loser = had < mark ? other : face, winner = had < mark ? face : other;
   return may_show_before(memory.faces[loser], memory.faces[winner], x, y, true) ? loser : -1;
@@ -107,7 +120,7 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
   const int num_rows = state->num_rows, deals = deals_of(num_rows);
   PICTURA_KEEP_LOOP
   for (;;) {
-    const int deal = next_of(&state->next_batch);
+    const int deal = next_of(&state->next_rows);
     if (deal >= deals) return;
     const int at = lane_index() * deals + deal;
     int face = 0, y = 0;
@@ -145,27 +158,14 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
 template <typename Memory>
 __device__ bool is_alone(const Memory& memory, int fragment, int pixel) {
   using Word = typename Memory::Word;
-  return memory.pixels[pixel] == (Word{Memory::kNone} << Memory::kHalf | static_cast<Word>(fragment)) &&
+  return memory.pixels[pixel] == PixelWord<Word>::with_first(0, static_cast<Word>(fragment)) &&
          memory.next[fragment] == static_cast<typename Memory::Index>(Memory::kNone);
 }
 
-// Turns the marks of a part into the full faces, and begins a chain of fragments for each pixel.
-template <typename Memory>
-__device__ void start_chains(const Memory& memory, const Part& part) {
-  using Word = typename Memory::Word;
-  const int count = part.num_pixels();
-  if (threadIdx.x == 0) memory.state->next_batch = 0;
-  PICTURA_KEEP_LOOP
-  for (int p = static_cast<int>(threadIdx.x); p < count; p += num_threads()) {
-    const int face = marked_face(memory.pixels[p]);
-    memory.pixels[p] = (face < 0 ? Memory::kNone : static_cast<Word>(face)) << Memory::kHalf | Memory::kNone;
-  }
-}
-
-// Keeps a fragment, as the first of its pixel's chain; full: what the upper half of the pixel's word is to hold.
+// Keeps a fragment, as the first of its pixel's chain. Nobody changes the pixel's full face meanwhile.
 template <typename Memory>
 __device__ void keep_fragment(const Memory& memory, int fragment, uint32_t face, int pixel, uint64_t samples,
-                              float area, typename Memory::Word full) {
+                              float area) {
   using Index = typename Memory::Index;
   using Word = typename Memory::Word;
   memory.samples_low[fragment] = static_cast<uint32_t>(samples);
@@ -173,8 +173,9 @@ __device__ void keep_fragment(const Memory& memory, int fragment, uint32_t face,
   memory.area[fragment] = area;
   memory.face[fragment] = static_cast<Index>(face);
   memory.pixel[fragment] = static_cast<Index>(pixel);
-  const Word before = atomicExch(&memory.pixels[pixel], full << Memory::kHalf | static_cast<Word>(fragment));
-  memory.next[fragment] = static_cast<Index>(before & Memory::kNone);
+  Word* const word = &memory.pixels[pixel];
+  const Word before = atomicExch(word, PixelWord<Word>::with_first(*word, static_cast<Word>(fragment)));
+  memory.next[fragment] = static_cast<Index>(first_of_word<Memory>(before));
 }
 
 // Makes a fragment of each lane's candidate, unless its face leaves nothing in the pixel.
@@ -191,7 +192,7 @@ __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, c
   const bool is_left = coverage.area > 0.0f;
   const int32_t fragment = take_place(&memory.state->num_fragments, is_left);
   if (!is_left || fragment >= memory.max_fragments) return;
-  keep_fragment(memory, fragment, candidate.a, pixel, coverage.samples, coverage.area, full_of(memory, pixel));
+  keep_fragment(memory, fragment, candidate.a, pixel, coverage.samples, coverage.area);
 }
 
 // Makes fragments of those candidates that may show before what covers their pixel fully. Threads put them aside until
@@ -202,7 +203,7 @@ __device__ void make_fragments(const Memory& memory, const Part& part) {
   const int count = memory.state->num_candidates;
   PICTURA_KEEP_LOOP
   for (;;) {
-    const int i = next_of(&memory.state->next_batch) * kWarpSize + lane_index();
+    const int i = next_of(&memory.state->next_candidates) * kWarpSize + lane_index();
     const bool more = i - lane_index() < count;
     bool shows = false;
     uint32_t face = 0, place = 0;
@@ -245,14 +246,13 @@ __device__ void finish_fragments(const Memory& memory, int count) {
     free_all(i);
     if (!memory.coverage(i).is_full()) continue;
     const int pixel = memory.pixel[i];
-    const Word full = atomicOr(&memory.pixels[pixel], Memory::kNone << Memory::kHalf) >> Memory::kHalf;
+    const Word full = full_of_word<Memory>(atomicAnd(&memory.pixels[pixel], ~PixelWord<Word>::kFace));
     if (full == Memory::kNone) continue;
     const int32_t added = count + atomicAdd(&memory.state->num_added, 1);
     if (added >= memory.max_fragments) continue;
-    keep_fragment(memory, added, static_cast<uint32_t>(full), pixel, kAllSamples, 1.0f, Word{Memory::kNone});
+    keep_fragment(memory, added, static_cast<uint32_t>(full), pixel, kAllSamples, 1.0f);
     free_all(added);
   }
-  if (threadIdx.x == 0) memory.state->next_batch = 0;
 }
 
 }  // namespace pictura::cuda

@@ -47,7 +47,7 @@ struct ImageWriter {
   __device__ void write_bytes(const Memory& memory, uint8_t* to, int count, const typename Memory::Word* words) const {
     uint32_t bytes[kWrittenAtOnce];
     for (int i = 0; i < kWrittenAtOnce; ++i) {
-      const auto full = words[i] >> Memory::kHalf, head = words[i] & Memory::kNone;
+      const auto full = full_of_word<Memory>(words[i]), head = first_of_word<Memory>(words[i]);
       bytes[i] = head != Memory::kNone   ? memory.color_bytes(static_cast<int>(head))
                  : full != Memory::kNone ? memory.faces[full].color_bytes
                                          : 0u;
@@ -68,7 +68,7 @@ struct ImageWriter {
                                 ValueOf&& value_of) const {
     Rgb colors[kWrittenAtOnce];
     for (int i = 0; i < kWrittenAtOnce; ++i) {
-      const auto full = words[i] >> Memory::kHalf, head = words[i] & Memory::kNone;
+      const auto full = full_of_word<Memory>(words[i]), head = first_of_word<Memory>(words[i]);
       if (head != Memory::kNone) {
         colors[i] = memory.color(static_cast<int>(head));
       } else if (full != Memory::kNone) {

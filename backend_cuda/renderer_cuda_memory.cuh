@@ -37,9 +37,7 @@ struct DrawMemory {
   BlockState* state;
   const ScreenFace* faces;   // of the image
   const PolygonEdge* edges;  // that its faces name
-  // [max_pixels] of the part of the image that is drawn. First the mark of the nearest face that covers a pixel fully;
-  // then in the upper half that face, in the lower the first fragment of the pixel's chain, kNone for none of either.
-  Word* pixels;
+  Word* pixels;      // [max_pixels] of the part of the image that is drawn, see PixelWord
   Word* rows;        // [max_rows] of faces: in the upper half the face, in the lower the row of the part
   Word* candidates;  // [max_candidates] that may become fragments: face, and pixel
   // Fragments.

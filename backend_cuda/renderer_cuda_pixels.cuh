@@ -71,7 +71,7 @@ __device__ void list_pairs(const Memory& memory, const Part& part, int count) {
     const unsigned idle = __ballot_sync(kAllLanes, is_idle);
     if (idle == kAllLanes && begin >= count) return;
     if (used >= kWarpSize && begin < count) {
-      begin = next_of(&memory.state->next_batch) * kWarpSize;
+      begin = next_of(&memory.state->next_fragments) * kWarpSize;
       used = 0;
     }
     const int place = used + __popc(idle & lanes_below());
@@ -183,9 +183,9 @@ __device__ void write_pixels(const Memory& memory, const Part& part, const Visit
     for (int i = 0; i < kWrittenAtOnce; ++i) {
       word[i] = memory.pixels[first + i];
       memory.pixels[first + i] = 0;
-      const Word full = word[i] >> Memory::kHalf;
       if constexpr (Visit::kWanted) {
-        if (i < count && full != Memory::kNone && (word[i] & Memory::kNone) == Memory::kNone) {
+        const Word full = full_of_word<Memory>(word[i]);
+        if (i < count && full != Memory::kNone && first_of_word<Memory>(word[i]) == Memory::kNone) {
           visit(memory.faces[full], 1.0f);
         }
       }
@@ -200,7 +200,8 @@ __device__ void reset_counts(const Memory& memory) {
   BlockState* state = memory.state;
   if (threadIdx.x != 0) return;
   state->num_rows = state->num_candidates = state->num_fragments = state->num_added = state->num_drawn =
-      state->num_pairs = state->next_batch = 0;
+      state->num_pairs = 0;
+  state->next_rows = state->next_candidates = state->next_fragments = 0;
 }
 // What a part finds when it begins: nothing is marked, nothing listed. For a block's first part, and after one that was
 // given up. All threads of the block.
@@ -225,8 +226,6 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
   mark_and_list(memory, part);
   sync_block();
   if (state->num_candidates > memory.max_candidates) return false;
-  start_chains(memory, part);
-  sync_block();
   make_fragments(memory, part);
   sync_block();
   const int made = state->num_fragments;
