@@ -25,37 +25,25 @@ PICTURA_HD constexpr uint32_t kind_of(uint32_t number) { return number >> kKindS
 PICTURA_HD constexpr int32_t index_of(uint32_t number) { return static_cast<int32_t>(number & kIndexMask); }
 PICTURA_HD constexpr bool is_strip(const ScreenFace& face) { return kind_of(face.number) == kStripKind; }
 
-/// What a thing covers of the ground: corners with the heights of its lower end.
+/// What a thing covers of the ground: corners with the heights of its lower end. Of what has two ends, each stands twice.
 struct Extent {
   Vec3 corner[4];
-  int32_t corners = 0;
 };
+PICTURA_HD inline Extent extent_between(Vec3 a, Vec3 b) { return {{a, b, b, a}}; }
 
 PICTURA_HD inline Extent extent_of(const AgentBox& box) {
   Extent extent;
-  extent.corners = 4;
   cuboid_face_corners(box, kUnderside, extent.corner);
   return extent;
 }
-PICTURA_HD inline Extent extent_of(const WallFace& wall) {
-  Extent extent;
-  extent.corners = 2;
-  extent.corner[0] = wall.a_m;
-  extent.corner[1] = wall.b_m;
-  return extent;
-}
+PICTURA_HD inline Extent extent_of(const WallFace& wall) { return extent_between(wall.a_m, wall.b_m); }
 PICTURA_HD inline Extent extent_of(const LightHead& head) {
   const Vec2 left = left_normal(head.facing) * kLightRadius_m;
   const Vec3 lowest = head.position_m - Vec3{0.0f, 0.0f, kLightRadius_m};
-  Extent extent;
-  extent.corners = 2;
-  extent.corner[0] = lowest + Vec3{left.x, left.y, 0.0f};
-  extent.corner[1] = lowest - Vec3{left.x, left.y, 0.0f};
-  return extent;
+  return extent_between(lowest + Vec3{left.x, left.y, 0.0f}, lowest - Vec3{left.x, left.y, 0.0f});
 }
 PICTURA_HD inline Extent extent_of(const Strip& strip) {
   Extent extent;
-  extent.corners = 4;
   strip_corners(strip, extent.corner);
   return extent;
 }
@@ -71,40 +59,57 @@ PICTURA_HD inline Extent extent_of(uint32_t number, const StaticGeometryView& pi
   }
 }
 
-/// Whether two extents overlap on the ground plane: no side of either separates them. Touching is no overlap.
-PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
+/// Corners on the ground. Whoever asks for all sides turns them on: an index would keep a device's corners in memory.
+struct GroundQuad {
+  Vec2 corner[4];
+  PICTURA_HD void turn() {
+    const Vec2 first = corner[0];
+    for (int i = 0; i < 3; ++i) corner[i] = corner[i + 1];
+    corner[3] = first;
+  }
+};
+PICTURA_HD inline GroundQuad ground_quad(const Extent& extent, Vec2 origin) {
+  GroundQuad quad;
+  for (int i = 0; i < 4; ++i) quad.corner[i] = extent.corner[i].xy() - origin;
+  return quad;
+}
+
+/// Whether the first side of a separates a from b. Touching is no overlap.
+PICTURA_HD inline bool first_side_separates(const GroundQuad& a, const GroundQuad& b) {
   constexpr float kTouching_m = 1e-3f;
   struct Interval {
     float low = 1e30f, high = -1e30f;
   };
-  // Relative to a point near by, for precision.
-  const Vec2 origin = a.corner[0].xy();
-  auto project = [&](const Extent& e, Vec2 axis) {
+  const Vec2 side = a.corner[1] - a.corner[0], axis = left_normal(side);
+  auto project = [axis](const GroundQuad& quad) {
     Interval interval;
-    PICTURA_KEEP_LOOP
-    for (int i = 0; i < e.corners; ++i) {
-      const float at = dot(axis, e.corner[i].xy() - origin);
-      interval.low = min_of(interval.low, at);
-      interval.high = max_of(interval.high, at);
+    for (const Vec2 corner : quad.corner) {
+      const float at = dot(axis, corner);
+      interval.low = lesser_of(interval.low, at);
+      interval.high = greater_of(interval.high, at);
     }
     return interval;
   };
-  auto separated_by_side_of = [&](const Extent& e) {
-    PICTURA_KEEP_LOOP
-    for (int i = 0; i < e.corners; ++i) {
-      const Vec2 side = e.corner[i + 1 < e.corners ? i + 1 : 0].xy() - e.corner[i].xy();
-      const float norm = length(side);
-      if (norm < 1e-6f) continue;
-      const Vec2 axis = left_normal(side) * (1.0f / norm);
-      const Interval of_a = project(a, axis), of_b = project(b, axis);
-      if (min_of(of_a.high, of_b.high) - max_of(of_a.low, of_b.low) <= kTouching_m) return true;
-    }
-    return false;
-  };
-  const Extent* extents[2] = {&a, &b};
+  const Interval of_a = project(a), of_b = project(b);
+  // By how much they overlap, in multiples of the side's length.
+  const float overlap = lesser_of(of_a.high, of_b.high) - greater_of(of_a.low, of_b.low);
+  const float length2_m2 = dot(side, side);
+  return length2_m2 > 1e-12f && (overlap <= 0.0f || overlap * overlap <= kTouching_m * kTouching_m * length2_m2);
+}
+
+/// Whether two extents overlap on the ground plane: no side of either separates them.
+PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
+  // Relative to a point near by, for precision.
+  const Vec2 origin = a.corner[0].xy();
+  GroundQuad one = ground_quad(a, origin), other = ground_quad(b, origin);
   PICTURA_KEEP_LOOP
-  for (const Extent* extent : extents) {
-    if (separated_by_side_of(*extent)) return false;
+  for (int side = 0; side < 8; ++side) {
+    if (first_side_separates(one, other)) return false;
+    one.turn();
+    if (side != 3) continue;
+    const GroundQuad first = one;
+    one = other;
+    other = first;
   }
   return true;
 }
@@ -112,9 +117,8 @@ PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
 /// Whether a solid stands on a strip that is seen from above, which then lies behind it (see kStanding_m).
 PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip, Vec3 eye_m) {
   Vec3 sum{};
-  PICTURA_KEEP_LOOP
-  for (int i = 0; i < solid.corners; ++i) sum = sum + (solid.corner[i] - strip.corner[0]);
-  const Vec3 middle = sum * (1.0f / static_cast<float>(solid.corners));
+  for (const Vec3 corner : solid.corner) sum = sum + (corner - strip.corner[0]);
+  const Vec3 middle = sum * 0.25f;
   const Vec3 normal = cross(strip.corner[2] - strip.corner[0], strip.corner[3] - strip.corner[1]);
   if (dot(normal, eye_m - strip.corner[0]) * normal.z <= 0.0f) return false;
   return fabsf(dot(normal, middle)) <= kStanding_m * fabsf(normal.z) && overlap_on_ground(solid, strip);
