@@ -39,7 +39,7 @@ struct BlockState {
   GatherCounts listed;
   int32_t num_faces, num_clipped, overflow, usable;
   // While pixels are drawn.
-  int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, num_pairs, image;
+  int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, image;
   int32_t next_rows, next_candidates, next_fragments;
   WarpState warps[kMaxWarps];
 };

@@ -21,45 +21,30 @@ __device__ void lose(const Memory& memory, uint32_t fragment, uint64_t samples) 
   if (high != 0) atomicAnd(&memory.free_high[fragment], ~high);
 }
 
-// Asks a pair of fragments what they hide of each other; b may be kNone, for the pixel's full face.
+// Asks pairs of fragments what they hide of each other; b may be kNone, for the pixel's full face.
 template <typename Memory>
-__device__ __noinline__ void ask_pair(uint32_t a, uint32_t b, Part part) {
+__device__ __noinline__ void ask_pairs(WarpQueue::Pair pair, Part part) {
+  if (!pair.is_one) return;
   const Memory memory = Memory::current();
-  const int pixel = memory.pixel[a];
-  const bool with_full = b == Memory::kNone;
-  const size_t face_b = with_full ? full_of(memory, pixel) : memory.face[b];
-  const PixelCoverage of_a = memory.coverage(static_cast<int>(a));
-  const PixelCoverage of_b = with_full ? PixelCoverage{1.0f, kAllSamples} : memory.coverage(static_cast<int>(b));
+  const int pixel = memory.pixel[pair.a];
+  const bool with_full = pair.b == Memory::kNone;
+  const size_t face_b = with_full ? full_of(memory, pixel) : memory.face[pair.b];
+  const PixelCoverage a = memory.coverage(static_cast<int>(pair.a));
+  const PixelCoverage b = with_full ? PixelCoverage{1.0f, kAllSamples} : memory.coverage(static_cast<int>(pair.b));
   const Vec2 corner{static_cast<float>(part.x_of(pixel)), static_cast<float>(part.y_of(pixel))};
-  const Hidden hidden = hide_each_other(of_a, of_b, memory.faces[memory.face[a]], memory.faces[face_b], corner,
+  const Hidden hidden = hide_each_other(a, b, memory.faces[memory.face[pair.a]], memory.faces[face_b], corner,
                                         [](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
-  lose(memory, a, hidden.of_a);
-  if (!with_full) lose(memory, b, hidden.of_b);
+  lose(memory, pair.a, hidden.of_a);
+  if (!with_full) lose(memory, pair.b, hidden.of_b);
 }
 
-// Where a pair is listed: from the end of the list of pixels on, while that is filled from its beginning.
+// Asks every two fragments of a pixel that meet what they hide of each other; a pixel's full face is one of them. A
+// lane walks the rest of the chain behind a fragment, one step at a time, and takes the next fragment at its end; the
+// last made first, because theirs are the longest ways. Pairs that meet are put aside until every lane of the warp has
+// one.
 template <typename Memory>
-__device__ int max_pairs(const Memory& memory) {
-  using Index = typename Memory::Index;
-  constexpr int kIndices = sizeof(typename Memory::Word) / sizeof(Index);
-  return (memory.max_fragments - memory.state->num_drawn) / kIndices;
-}
-template <typename Memory>
-__device__ typename Memory::Word& pair_at(const Memory& memory, int i) {
-  using Index = typename Memory::Index;
-  using Word = typename Memory::Word;
-  constexpr int kIndices = sizeof(Word) / sizeof(Index);
-  return reinterpret_cast<Word*>(memory.drawn)[memory.max_fragments / kIndices - 1 - i];
-}
-
-// Lists every two fragments of a pixel that meet; a pixel's full face is one of them. A lane walks the rest of the chain
-// behind a fragment, one step at a time, and takes the next fragment at its end; the last made first, because theirs are
-// the longest ways. What finds no room is asked at once.
-template <typename Memory>
-__device__ void list_pairs(const Memory& memory, const Part& part, int count) {
-  using Word = typename Memory::Word;
-  int32_t* const num_pairs = &memory.state->num_pairs;
-  const int most_pairs = max_pairs(memory);
+__device__ void hide_fragments(const Memory& memory, const Part& part, int count) {
+  WarpQueue pairs(&memory.state->warps[warp_index()].queue);
   int begin = 0, used = kWarpSize;  // the warp's fragments of the list, and how many of them lanes have taken
   int fragment = 0;
   uint32_t other = Memory::kNone;  // of the chain
@@ -69,7 +54,7 @@ __device__ void list_pairs(const Memory& memory, const Part& part, int count) {
   for (;;) {
     const bool is_idle = !is_before_full && other == Memory::kNone;
     const unsigned idle = __ballot_sync(kAllLanes, is_idle);
-    if (idle == kAllLanes && begin >= count) return;
+    if (idle == kAllLanes && begin >= count) break;
     if (used >= kWarpSize && begin < count) {
       begin = next_of(&memory.state->next_fragments) * kWarpSize;
       used = 0;
@@ -90,25 +75,10 @@ __device__ void list_pairs(const Memory& memory, const Part& part, int count) {
       other = memory.next[with];
     }
     is_before_full = false;
-    if (!meet) continue;
-    const int32_t at = atomicAdd(num_pairs, 1);
-    if (at < most_pairs) {
-      pair_at(memory, at) = static_cast<Word>(fragment) << Memory::kHalf | static_cast<Word>(with);
-    } else {
-      ask_pair<Memory>(static_cast<uint32_t>(fragment), with, part);
-    }
+    pairs.push(meet, static_cast<uint32_t>(fragment), with);
+    if (pairs.is_ready()) ask_pairs<Memory>(pairs.take(), part);
   }
-}
-
-// Asks those that are listed what they hide of each other; both lose samples, in whatever order.
-template <typename Memory>
-__device__ void hide_fragments(const Memory& memory, const Part& part) {
-  const int count = min_of(memory.state->num_pairs, max_pairs(memory));
-  PICTURA_KEEP_LOOP
-  for (int i = static_cast<int>(threadIdx.x); i < count; i += num_threads()) {
-    const auto pair = pair_at(memory, i);
-    ask_pair<Memory>(static_cast<uint32_t>(pair >> Memory::kHalf), static_cast<uint32_t>(pair & Memory::kNone), part);
-  }
+  if (!pairs.is_empty()) ask_pairs<Memory>(pairs.take(), part);
 }
 
 /// Hears of no fragment's weight.
@@ -199,8 +169,7 @@ template <typename Memory>
 __device__ void reset_counts(const Memory& memory) {
   BlockState* state = memory.state;
   if (threadIdx.x != 0) return;
-  state->num_rows = state->num_candidates = state->num_fragments = state->num_added = state->num_drawn =
-      state->num_pairs = 0;
+  state->num_rows = state->num_candidates = state->num_fragments = state->num_added = state->num_drawn = 0;
   state->next_rows = state->next_candidates = state->next_fragments = 0;
 }
 // What a part finds when it begins: nothing is marked, nothing listed. For a block's first part, and after one that was
@@ -234,9 +203,7 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
   sync_block();
   const int count = made + state->num_added;
   if (count > memory.max_fragments) return false;
-  list_pairs(memory, part, count);
-  sync_block();
-  hide_fragments(memory, part);
+  hide_fragments(memory, part, count);
   sync_block();
   weigh_fragments(memory, count, visit, write);
   sync_block();
