@@ -79,10 +79,7 @@ class EntryList {
     if (place < lists_.max_batches) {
       FaceBatch* batch = lists_.batches + place;
       batch->entries[lane_index()] = lane_index() < count ? entries_[waiting_ + lane_index()] : kNoEntry;
-      if (lane_index() == 0) {
-        batch->image = image_;
-        batch->first = total_;
-      }
+      if (lane_index() == 0) batch->image = image_;
     } else {
       is_whole_ = false;
     }

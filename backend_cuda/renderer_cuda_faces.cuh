@@ -11,11 +11,35 @@ namespace pictura::cuda {
 /// Count of faces of an image that is not gathered; faces that are added meanwhile leave it negative.
 constexpr int32_t kNotGathered = -(1 << 30);
 
+/// What a lane is to store, by words of 16 bytes. One more keeps rows apart: lanes that write a word of their own meet
+/// in no bank, those that read rows together in no more than two.
+template <int kWords>
+struct LaneRow {
+  uint4 words[kWords + 1];
+};
+using EdgeRow = LaneRow<4 * sizeof(PolygonEdge) / sizeof(uint4)>;
+using FaceRow = LaneRow<sizeof(ScreenFace) / sizeof(uint4)>;
+
+/// What a warp that makes faces keeps in shared memory: their edges, then the faces themselves.
+union FaceRoom {
+  EdgeRow edges[kWarpSize];
+  FaceRow faces[kWarpSize];
+};
+
 /// What a warp that gathers keeps in shared memory, one step after the other.
 union GatherRoom {
   CullRoom cull;
+  FaceRoom faces;
   ClipRoom clip;
 };
+
+/// The shared memory of a block that makes faces and does nothing else. There is not much for a block where a processor
+/// is to hold 32 of them and keep a cache.
+struct MakingState {
+  FaceMaking making;
+  FaceRoom room;
+};
+__device__ inline MakingState* making_state() { return reinterpret_cast<MakingState*>(block_memory); }
 
 // Bytes of shared memory of a block that culls and of one that takes all steps, and where a warp's part of it is.
 __host__ __device__ constexpr size_t cull_bytes() { return state_bytes(kGatherThreads) + sizeof(CullRoom); }
@@ -50,21 +74,42 @@ __device__ inline bool make_quad(const FaceMaking& making, uint32_t entry, Quad*
   return see_quad(world, setting.camera, &quad_out->seen);
 }
 
-// Keeps the faces of those lanes that have one. Each image has room for all of its own.
-__device__ inline void keep_face(const FaceMaking& making, const ScreenFace& face, FaceOwner owner, int32_t edge_begin,
-                                 int32_t at) {
+// Completes a face.
+__device__ inline ScreenFace whole_face(const ScreenFace& face, FaceOwner owner, int32_t edge_begin) {
   ScreenFace whole = face;
   whole.edge_begin = edge_begin;
   whole.number = owner.number;
   whole.class_id = owner.class_id;
   whole.color_bytes = to_bytes(face.color);
-  if (at >= 0) store_whole(making.faces + at, whole);
+  return whole;
 }
 
-// Makes the faces of a batch of the image, an entry each lane, and lists what is to be clipped; `first` of the image's
-// places. All lanes of the warp.
-__device__ inline void make_faces(const FaceMaking& making, const GatherLists& lists, GatherCounts* counts,
-                                  uint32_t entry, int32_t image, int32_t first) {
+// Keeps the faces of those lanes that have one. Each image has room for all of its own.
+__device__ inline void keep_face(const FaceMaking& making, const ScreenFace& face, FaceOwner owner, int32_t edge_begin,
+                                 int32_t at) {
+  if (at >= 0) store_whole(making.faces + at, whole_face(face, owner, edge_begin));
+}
+
+// Stores the first rows side by side, all lanes 512 bytes at once: lanes that store a row each would fill halves of
+// what memory takes.
+template <int kWords>
+__device__ void store_rows(uint4* to, const LaneRow<kWords>* rows, int count) {
+  constexpr int kRowsAtOnce = kWarpSize / kWords;
+  const int row = lane_index() / kWords, word = lane_index() % kWords;
+  // Four are read before any is stored, or each would wait for its own.
+  constexpr int kAtOnce = 4;
+  for (int first = 0; first < kWords; first += kAtOnce) {
+    uint4 words[kAtOnce];
+    for (int i = 0; i < kAtOnce; ++i) words[i] = rows[kRowsAtOnce * (first + i) + row].words[word];
+    for (int i = 0; i < kAtOnce; ++i) {
+      if (kRowsAtOnce * (first + i) + row < count) to[kWarpSize * (first + i) + lane_index()] = words[i];
+    }
+  }
+}
+
+// Makes the faces of a batch of the image, an entry each lane, and lists what is to be clipped. All lanes of the warp.
+__device__ inline void make_faces(const FaceMaking& making, FaceRoom* room, const GatherLists& lists,
+                                  GatherCounts* counts, uint32_t entry, int32_t image) {
   const bool is_light = entry != kNoEntry && kind_of(entry) == kLightKind, is_quad = entry != kNoEntry && !is_light;
   if (__any_sync(kAllLanes, is_light)) {
     const int32_t at = take_place(&counts->lights, is_light);
@@ -88,20 +133,27 @@ __device__ inline void make_faces(const FaceMaking& making, const GatherLists& l
   const int lane = lane_index(), wanted = __popc(lane == 0 ? showing : (lane == 1 ? clipped : 0u));
   int32_t taken = 0;
   if (wanted > 0) taken = atomicAdd(lane == 0 ? making.num_faces : &counts->clipped, wanted);
-  const int32_t edge_begin = making.edge_begin + 4 * (first + lane);
+  const int rank = __popc(showing & lanes_below()), count = __popc(showing);
   ScreenFace face;
   if (shows) {
-    PolygonEdge* const edges = making.edges + edge_begin;
+    auto* const edges = reinterpret_cast<PolygonEdge*>(room->edges[rank].words);
     auto keep_edge = [edges](int k, const PolygonEdge& edge) { store_whole(edges + k, edge); };
     make_quad_face(camera, making.setting.frustum, on_screen, turns_right, quad.seen.plane, quad.seen.color, keep_edge,
                    &face);
   }
-  auto place_of = [&](int of_lane, unsigned lanes) {
-    return __shfl_sync(kAllLanes, taken, of_lane) + __popc(lanes & lanes_below());
-  };
-  const int32_t at = place_of(0, showing), clipped_at = place_of(1, clipped);
-  if (shows) keep_face(making, face, quad.owner, edge_begin, at);
-  if (is_clipped) lists.clipped[clipped_at] = {entry, image};
+  __syncwarp();
+  const int32_t at = __shfl_sync(kAllLanes, taken, 0), clipped_at = __shfl_sync(kAllLanes, taken, 1);
+  if (is_clipped) lists.clipped[clipped_at + __popc(clipped & lanes_below())] = {entry, image};
+  // The place of a face's edges follows from its own.
+  const int32_t edge_begin = making.edge_begin + 4 * at;
+  store_rows(reinterpret_cast<uint4*>(making.edges + edge_begin), room->edges, count);
+  __syncwarp();
+  if (shows) {
+    store_whole(reinterpret_cast<ScreenFace*>(room->faces[rank].words),
+                whole_face(face, quad.owner, edge_begin + 4 * rank));
+  }
+  __syncwarp();
+  store_rows(reinterpret_cast<uint4*>(making.faces + at), room->faces, count);
 }
 
 // Makes a face whose corners the lanes hold. False where there is no room for its edges. All lanes of the warp.
@@ -242,7 +294,7 @@ __device__ inline bool gather(const DrawTask& task, int32_t view, int32_t camera
     making->num_faces = &state->num_faces;
     making->num_clipped = &state->num_clipped;
     making->edge_begin = 0;
-    making->clipped_begin = 4 * FaceBatch::kEntries * scratch.max_batches;
+    making->clipped_begin = 4 * scratch.max_faces;
     making->clipped_end = scratch.max_edges;
   }
   sync_block();
@@ -253,8 +305,8 @@ __device__ inline bool gather(const DrawTask& task, int32_t view, int32_t camera
   // Nobody has found more than there is room for: the lists hold all that a world does.
   PICTURA_KEEP_LOOP
   for (int i = warp_index(); i < state->listed.batches; i += num_warps()) {
-    make_faces(state->making, lists, &state->listed, lists.batches[i].entries[lane_index()], 0,
-               FaceBatch::kEntries * i);
+    make_faces(state->making, &room->faces, lists, &state->listed, lists.batches[i].entries[lane_index()], 0);
+    __syncwarp();
   }
   sync_block();
   PICTURA_KEEP_LOOP

@@ -206,7 +206,7 @@ __device__ inline void take_face_room(const DrawTask& task, int32_t image, int32
 }
 
 // Lists what images may show.
-extern "C" __global__ void __launch_bounds__(kGatherThreads, kGatherBlocksPerProcessor)
+extern "C" __global__ void __launch_bounds__(kGatherThreads, kCullBlocksPerProcessor)
     pictura_cull(const __grid_constant__ DrawTask task) {
   BlockState* state = block_state();
   CullRoom* room = &gather_room()->cull;
@@ -231,9 +231,9 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kGatherBlocksPerPro
 }
 
 // Makes the faces that need no clipping, and lists the others.
-extern "C" __global__ void __launch_bounds__(kGatherThreads, kGatherBlocksPerProcessor)
+extern "C" __global__ void __launch_bounds__(kGatherThreads, kMakingBlocksPerProcessor)
     pictura_gather(const __grid_constant__ DrawTask task) {
-  BlockState* state = block_state();
+  MakingState* state = making_state();
   DrawCounters::Round* round = &task.counters->rounds[task.round_index];
   const int32_t num_batches = min_of(round->listed.batches, task.pool.lists.max_batches);
   // The first lane asks for the next batch while the warp makes the faces of one.
@@ -242,14 +242,14 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kGatherBlocksPerPro
   while (i < num_batches) {
     const int32_t next = lane_index() == 0 ? static_cast<int32_t>(gridDim.x) + atomicAdd(&round->next_batch, 1) : 0;
     const FaceBatch& batch = task.pool.lists.batches[i];
-    const int32_t image = batch.image, first = batch.first;
+    const int32_t image = batch.image;
     const uint32_t entry = batch.entries[lane_index()];
     const int32_t face_count = task.pool.images[image].face_count;
     copy_whole(&state->making, task.pool.makings[image]);
     __syncwarp();
     // Other warps add to it meanwhile, so that all lanes take the first one's word.
     if (__shfl_sync(kAllLanes, face_count, 0) >= 0) {
-      make_faces(state->making, task.pool.lists, &round->listed, entry, image, first);
+      make_faces(state->making, &state->room, task.pool.lists, &round->listed, entry, image);
     }
     __syncwarp();
     i = __shfl_sync(kAllLanes, next, 0);

@@ -70,8 +70,8 @@ struct alignas(16) Quad {
   float floor_px;  // see CameraFace
 };
 
-/// From what the faces of an image are made, and where they go. Each thing that may show has a place for a face, and
-/// for four edges if it needs no clipping; edges of what is clipped go to a part that many images may share.
+/// From what the faces of an image are made, and where they go. Each thing that may show has a place for a face and for
+/// four edges, which stand where the face does; edges of what is clipped go to a part that many images may share.
 struct alignas(16) FaceMaking {
   ImageSetting setting;
   const Strip* strips = nullptr;
@@ -83,7 +83,7 @@ struct alignas(16) FaceMaking {
   PolygonEdge* edges = nullptr;
   int32_t* num_faces = nullptr;    // that there are
   int32_t* num_clipped = nullptr;  // edges of clipped faces; may outgrow their part
-  int32_t edge_begin = 0;          // four for each thing
+  int32_t edge_begin = 0;          // four for each face
   int32_t clipped_begin = 0, clipped_end = 0;
 };
 
@@ -92,7 +92,7 @@ struct alignas(16) FaceMaking {
 struct FaceBatch {
   static constexpr int kEntries = 32;
   uint32_t entries[kEntries];
-  int32_t image, first;  // first: how many of the image's things are in batches before
+  int32_t image;
 };
 struct ClippedThing {
   uint32_t entry;

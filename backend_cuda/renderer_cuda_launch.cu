@@ -42,9 +42,9 @@ cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& 
   for (task.round_index = 0; task.round_index < kRounds; ++task.round_index) {
     // Few images are postponed, mostly none; then a launch takes as long as its blocks take to start.
     const int share = task.round_index == 0 ? 1 : 8;
-    const int gather_blocks = kGatherBlocksPerProcessor / share * processors;
-    const LaunchShape to_cull{min_of(images, gather_blocks), kGatherThreads, cull_bytes()};
-    const LaunchShape to_gather{gather_blocks, kGatherThreads, state_bytes(kGatherThreads)};
+    const LaunchShape to_cull{min_of(images, kCullBlocksPerProcessor / share * processors), kGatherThreads,
+                              cull_bytes()};
+    const LaunchShape to_gather{kMakingBlocksPerProcessor / share * processors, kGatherThreads, sizeof(MakingState)};
     const LaunchShape to_clip{kClipBlocksPerProcessor / share * processors, kGatherThreads,
                               gather_bytes(kGatherThreads)};
     cudaError_t status = launch(kernels.cull, to_cull, stream, task);

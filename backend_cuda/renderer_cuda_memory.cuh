@@ -8,7 +8,8 @@
 namespace pictura::cuda {
 
 // A block that gathers faces: a warp, as many of them as a processor takes.
-constexpr int kGatherThreads = 32, kGatherBlocksPerProcessor = 32, kClipBlocksPerProcessor = 24;
+constexpr int kGatherThreads = 32, kCullBlocksPerProcessor = 32, kMakingBlocksPerProcessor = 32,
+              kClipBlocksPerProcessor = 24;
 // A block that draws them, a tile of an image at a time. What has more fragments is drawn in parts.
 constexpr int kDrawThreads = 256, kDrawBlocksPerProcessor = 4;
 constexpr int kDrawPixels = kTileWidth_px * kTileHeight_px, kDrawFragments = 1152;
@@ -43,8 +44,8 @@ struct DrawMemory {
   // Fragments.
   uint32_t *samples_low, *samples_high, *free_low, *free_high;  // [max_fragments]
   float* area;                                                  // [max_fragments]
-  Index *face, *pixel, *next;  // [max_fragments] next: of the pixel's chain, or kNone
-  Index* kind;                 // ... in the end, where `pixel` stood: of its weight
+  Index *face, *pixel, *next;                                   // [max_fragments] next: of the pixel's chain, or kNone
+  Index* kind;                                                  // ... in the end, where `pixel` stood: of its weight
   Index* drawn;                                                 // [max_fragments] pixels that have fragments
   int32_t max_pixels, max_rows, max_candidates, max_fragments;
 
