@@ -11,17 +11,22 @@ namespace pictura::cuda {
 /// Count of faces of an image that is not gathered; faces that are added meanwhile leave it negative.
 constexpr int32_t kNotGathered = -(1 << 30);
 
-/// What a lane is to store, by words of 16 bytes. One more keeps rows apart: lanes that write a word of their own meet
-/// in no bank, those that read rows together in no more than two.
-template <int kWords>
+/// What a lane is to load or store, by words of 16 bytes. One more keeps rows apart: lanes that write a word of their
+/// own meet in no bank, those that read rows together in no more than two.
+template <typename Value, int kValues = 1>
 struct LaneRow {
-  uint4 words[kWords + 1];
+  static constexpr int kWords = kValues * sizeof(Value) / sizeof(uint4), kRowsAtOnce = kWarpSize / kWords;
+  Value values[kValues];
+  uint4 gap;
+  __device__ uint4* words() { return reinterpret_cast<uint4*>(values); }
 };
-using EdgeRow = LaneRow<4 * sizeof(PolygonEdge) / sizeof(uint4)>;
-using FaceRow = LaneRow<sizeof(ScreenFace) / sizeof(uint4)>;
+using StripRow = LaneRow<Strip>;
+using EdgeRow = LaneRow<PolygonEdge, 4>;
+using FaceRow = LaneRow<ScreenFace>;
 
-/// What a warp that makes faces keeps in shared memory: their edges, then the faces themselves.
+/// What a warp that makes faces keeps in shared memory: strips, then the edges of faces, then the faces themselves.
 union FaceRoom {
+  StripRow strips[kWarpSize];
   EdgeRow edges[kWarpSize];
   FaceRow faces[kWarpSize];
 };
@@ -50,8 +55,29 @@ __device__ inline GatherRoom* gather_room() {
   return reinterpret_cast<GatherRoom*>(block_memory + state_bytes(num_threads())) + warp_index();
 }
 
-// The face of an entry that is no light; false where it has faded to black.
-__device__ inline bool make_quad(const FaceMaking& making, uint32_t entry, Quad* quad_out) {
+// Loads the strips among the lanes' entries, four lanes a strip and all of them eight at once, because lanes that load
+// a strip each ask for every sector several times. All lanes of the warp.
+__device__ inline void load_strips(const FaceMaking& making, uint32_t entry, StripRow* rows_out) {
+  const bool is_strip = kind_of(entry) == kStripKind;
+  const unsigned strips = __ballot_sync(kAllLanes, is_strip);
+  if (strips == 0) return;
+  // Lanes that have none take another lane's.
+  const uint32_t of_another = __shfl_sync(kAllLanes, entry, __ffs(static_cast<int>(strips)) - 1);
+  const uint32_t index = (is_strip ? entry : of_another) & kFaceIndexMask;
+  constexpr int kWords = StripRow::kWords, kRowsAtOnce = StripRow::kRowsAtOnce;
+  const int row = lane_index() / kWords, word = lane_index() % kWords;
+  uint4 words[kWords];
+  for (int i = 0; i < kWords; ++i) {
+    words[i] =
+        reinterpret_cast<const uint4*>(making.strips + __shfl_sync(kAllLanes, index, kRowsAtOnce * i + row))[word];
+  }
+  for (int i = 0; i < kWords; ++i) rows_out[kRowsAtOnce * i + row].words()[word] = words[i];
+  __syncwarp();
+}
+
+// The face of an entry that is no light; false where it has faded to black. strip_of(index) is a strip.
+template <typename StripOf>
+__device__ bool make_quad(const FaceMaking& making, uint32_t entry, Quad* quad_out, StripOf&& strip_of) {
   const ImageSetting& setting = making.setting;
   const uint32_t kind = kind_of(entry);
   const auto index = static_cast<int32_t>(entry & kFaceIndexMask);
@@ -59,7 +85,7 @@ __device__ inline bool make_quad(const FaceMaking& making, uint32_t entry, Quad*
   WorldQuad world;
   quad_out->floor_px = 0.0f;
   if (kind == kStripKind) {
-    const Strip strip = making.strips[index];
+    const Strip strip = strip_of(index);
     quad_out->owner = strip_owner(strip, index);
     quad_out->floor_px = setting.line_floor_px;
     world = strip_quad(strip);
@@ -92,15 +118,15 @@ __device__ inline void keep_face(const FaceMaking& making, const ScreenFace& fac
 
 // Stores the first rows side by side, all lanes 512 bytes at once: lanes that store a row each would fill halves of
 // what memory takes.
-template <int kWords>
-__device__ void store_rows(uint4* to, const LaneRow<kWords>* rows, int count) {
-  constexpr int kRowsAtOnce = kWarpSize / kWords;
+template <typename Row>
+__device__ void store_rows(uint4* to, Row* rows, int count) {
+  constexpr int kWords = Row::kWords, kRowsAtOnce = Row::kRowsAtOnce;
   const int row = lane_index() / kWords, word = lane_index() % kWords;
   // Four are read before any is stored, or each would wait for its own.
   constexpr int kAtOnce = 4;
   for (int first = 0; first < kWords; first += kAtOnce) {
     uint4 words[kAtOnce];
-    for (int i = 0; i < kAtOnce; ++i) words[i] = rows[kRowsAtOnce * (first + i) + row].words[word];
+    for (int i = 0; i < kAtOnce; ++i) words[i] = rows[kRowsAtOnce * (first + i) + row].words()[word];
     for (int i = 0; i < kAtOnce; ++i) {
       if (kRowsAtOnce * (first + i) + row < count) to[kWarpSize * (first + i) + lane_index()] = words[i];
     }
@@ -121,7 +147,9 @@ __device__ inline void make_faces(const FaceMaking& making, FaceRoom* room, cons
   const uint32_t of_another = __shfl_sync(kAllLanes, entry, __ffs(static_cast<int>(quads)) - 1);
   const PinholeCamera& camera = making.setting.camera;
   Quad quad;
-  const bool is_seen = make_quad(making, is_quad ? entry : of_another, &quad);
+  const uint32_t made = is_quad ? entry : of_another;
+  load_strips(making, made, room->strips);
+  const bool is_seen = make_quad(making, made, &quad, [&](int32_t) { return room->strips[lane_index()].values[0]; });
   ScreenQuad on_screen;
   bool turns_right = false;
   const QuadSight sight = project_quad(camera, quad.seen.corner, quad.floor_px, &on_screen);
@@ -134,9 +162,10 @@ __device__ inline void make_faces(const FaceMaking& making, FaceRoom* room, cons
   int32_t taken = 0;
   if (wanted > 0) taken = atomicAdd(lane == 0 ? making.num_faces : &counts->clipped, wanted);
   const int rank = __popc(showing & lanes_below()), count = __popc(showing);
+  __syncwarp();  // edges go where strips were
   ScreenFace face;
   if (shows) {
-    auto* const edges = reinterpret_cast<PolygonEdge*>(room->edges[rank].words);
+    PolygonEdge* const edges = room->edges[rank].values;
     auto keep_edge = [edges](int k, const PolygonEdge& edge) { store_whole(edges + k, edge); };
     make_quad_face(camera, making.setting.frustum, on_screen, turns_right, quad.seen.plane, quad.seen.color, keep_edge,
                    &face);
@@ -149,8 +178,7 @@ __device__ inline void make_faces(const FaceMaking& making, FaceRoom* room, cons
   store_rows(reinterpret_cast<uint4*>(making.edges + edge_begin), room->edges, count);
   __syncwarp();
   if (shows) {
-    store_whole(reinterpret_cast<ScreenFace*>(room->faces[rank].words),
-                whole_face(face, quad.owner, edge_begin + 4 * rank));
+    store_whole(room->faces[rank].values, whole_face(face, quad.owner, edge_begin + 4 * rank));
   }
   __syncwarp();
   store_rows(reinterpret_cast<uint4*>(making.faces + at), room->faces, count);
@@ -179,7 +207,8 @@ __device__ inline bool clip_quads(const FaceMaking* makings, ClipRoom* room, boo
   const LaneCorners corners(room);
   Quad& quad = *quad_out;
   int kept = 0;
-  if (is_one && make_quad(making, thing.entry, &quad) &&
+  auto strip_of = [&](int32_t index) { return making.strips[index]; };
+  if (is_one && make_quad(making, thing.entry, &quad, strip_of) &&
       (quad.floor_px <= 0.0f || widen_strip(camera, quad.floor_px, quad.seen.corner))) {
     const Frustum frustum = making.setting.frustum;
     for (int i = 0; i < 4; ++i) corners.set(i, quad.seen.corner[i]);
