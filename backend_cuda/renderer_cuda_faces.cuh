@@ -68,8 +68,8 @@ __device__ inline void load_strips(const FaceMaking& making, uint32_t entry, Str
   const int row = lane_index() / kWords, word = lane_index() % kWords;
   uint4 words[kWords];
   for (int i = 0; i < kWords; ++i) {
-    words[i] =
-        reinterpret_cast<const uint4*>(making.strips + __shfl_sync(kAllLanes, index, kRowsAtOnce * i + row))[word];
+    const uint32_t its_index = __shfl_sync(kAllLanes, index, kRowsAtOnce * i + row);
+    words[i] = reinterpret_cast<const uint4*>(making.strips)[kWords * its_index + static_cast<uint32_t>(word)];
   }
   for (int i = 0; i < kWords; ++i) rows_out[kRowsAtOnce * i + row].words()[word] = words[i];
   __syncwarp();
@@ -121,14 +121,15 @@ __device__ inline void keep_face(const FaceMaking& making, const ScreenFace& fac
 template <typename Row>
 __device__ void store_rows(uint4* to, Row* rows, int count) {
   constexpr int kWords = Row::kWords, kRowsAtOnce = Row::kRowsAtOnce;
-  const int row = lane_index() / kWords, word = lane_index() % kWords;
+  const int row = lane_index() / kWords, word = lane_index() % kWords, left = count - row;
+  uint4* const own = to + lane_index();
   // Four are read before any is stored, or each would wait for its own.
   constexpr int kAtOnce = 4;
   for (int first = 0; first < kWords; first += kAtOnce) {
     uint4 words[kAtOnce];
-    for (int i = 0; i < kAtOnce; ++i) words[i] = rows[kRowsAtOnce * (first + i) + row].words()[word];
+    for (int i = 0; i < kAtOnce; ++i) words[i] = rows[row + kRowsAtOnce * (first + i)].words()[word];
     for (int i = 0; i < kAtOnce; ++i) {
-      if (kRowsAtOnce * (first + i) + row < count) to[kWarpSize * (first + i) + lane_index()] = words[i];
+      if (kRowsAtOnce * (first + i) < left) own[kWarpSize * (first + i)] = words[i];
     }
   }
 }
