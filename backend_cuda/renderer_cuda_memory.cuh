@@ -38,9 +38,9 @@ struct DrawMemory {
   BlockState* state;
   const ScreenFace* faces;   // of the image
   const PolygonEdge* edges;  // that its faces name
-  Word* pixels;      // [max_pixels] of the part of the image that is drawn, see PixelWord
-  Word* rows;        // [max_rows] of faces: in the upper half the face, in the lower the row of the part
-  Word* candidates;  // [max_candidates] that may become fragments: face, and pixel
+  Word* pixels;              // [max_pixels] of the part of the image that is drawn, see PixelWord
+  Word* rows;                // [max_rows] of faces: in the upper half the face, in the lower the row of the part
+  Word* candidates;          // [max_candidates] that may become fragments: face, and pixel
   // Fragments.
   uint32_t *samples_low, *samples_high, *free_low, *free_high;  // [max_fragments]
   float* area;                                                  // [max_fragments]

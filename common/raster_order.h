@@ -25,7 +25,8 @@ PICTURA_HD constexpr uint32_t kind_of(uint32_t number) { return number >> kKindS
 PICTURA_HD constexpr int32_t index_of(uint32_t number) { return static_cast<int32_t>(number & kIndexMask); }
 PICTURA_HD constexpr bool is_strip(const ScreenFace& face) { return kind_of(face.number) == kStripKind; }
 
-/// What a thing covers of the ground: corners with the heights of its lower end. Of what has two ends, each stands twice.
+/// What a thing covers of the ground: corners with the heights of its lower end. Of what has two ends, each stands
+/// twice.
 struct Extent {
   Vec3 corner[4];
 };
