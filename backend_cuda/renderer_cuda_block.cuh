@@ -29,7 +29,8 @@ struct WarpState {
 
 /// In shared memory, whatever the block's other memory is.
 struct BlockState {
-  GatheredImage shown;  // what is drawn
+  GatheredImage shown;     // what is drawn
+  GatheredImage upcoming;  // what is drawn next
   Scratch scratch;      // this block's
   ScreenFace* faces;    // of this image
   PolygonEdge* edges;   // of all images in the pool

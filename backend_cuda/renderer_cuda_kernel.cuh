@@ -146,7 +146,10 @@ __device__ bool draw_image_part(const Memory& memory, const DrawTask& task, int3
   const ImageWriter writer{task.format, slot.color, view * slot.view_stride,
                            static_cast<int64_t>(width) * height_px(slot.camera), width};
   if (!draw_faces(memory, num_faces, part, NoVisit{}, writer)) return false;
-  if (task.wants_planes) draw_planes<Memory>(slot, view, num_faces, part);
+  if (task.wants_planes) {
+    draw_planes<Memory>(slot, view, num_faces, part);
+    sync_block();
+  }
   return true;
 }
 
@@ -283,23 +286,35 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
   const int tiles = most_tiles(task);
   const int32_t count = images_of_round(task) * tiles;
   int32_t* const counter = &task.counters->rounds[task.round_index].next_drawn;
-  // The first thread asks for the next tile while the block draws one.
-  int32_t next = threadIdx.x == 0 ? atomicAdd(counter, 1) : 0;
+  // While the block draws a tile, the first thread asks for the number of the next but one, and what the next one shows.
+  int32_t next = 0, after = 0;
+  auto take_next = [&] {
+    next = after;
+    after = atomicAdd(counter, 1);
+    if (next >= count) return;
+    const GatheredImage* image = task.pool.images + image_of_round(task, next / tiles);
+    for (size_t at = 0; at < sizeof(GatheredImage); at += 16) {
+      copy_into_shared(reinterpret_cast<char*>(&state->upcoming) + at, reinterpret_cast<const char*>(image) + at);
+    }
+  };
+  if (threadIdx.x == 0) {
+    after = atomicAdd(counter, 1);
+    take_next();
+  }
   reset_part(SmallDrawMemory::current());
   PICTURA_KEEP_LOOP
   for (;;) {
     if (threadIdx.x == 0) {
+      wait_for_copies();
       state->image = next;
-      if (next < count) {
-        state->shown = task.pool.images[image_of_round(task, next / tiles)];
-        state->faces = task.pool.faces + state->shown.face_begin;
-        state->edges = task.pool.edges;
-      }
+      state->shown = state->upcoming;
+      state->faces = task.pool.faces + state->shown.face_begin;
+      state->edges = task.pool.edges;
     }
     sync_block();
     if (state->image >= count) return;
     const int32_t image = image_of_round(task, state->image / tiles), tile = state->image % tiles;
-    if (threadIdx.x == 0) next = atomicAdd(counter, 1);
+    if (threadIdx.x == 0) take_next();
     const int32_t camera = camera_of(task, image);
     const PinholeCamera& shows = task.cameras[camera].camera;
     const int width = width_px(shows), height = height_px(shows), across = tiles_across(width);
@@ -310,8 +325,9 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
           atomicExch(&task.pool.images[image].is_left_to_last, 1) == 0) {
         leave_to_last(task, image);
       }
+    } else {
+      sync_block();
     }
-    sync_block();
   }
 }
 

@@ -55,7 +55,7 @@ struct Fault {
 enum FaultKind : int32_t { kBadWorld = 1, kBadGeometry, kBadPose, kTooManyAgents, kBadQuery, kNoRoom };
 
 /// What an image shows: its faces in a pool, and what tells which of them is in front.
-struct GatheredImage {
+struct alignas(16) GatheredImage {
   int32_t face_begin = 0, face_count = 0;  // -1: not gathered
   Vec3 eye_m;
   const DeviceGeometry* geometry = nullptr;

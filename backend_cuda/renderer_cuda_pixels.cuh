@@ -183,8 +183,8 @@ __device__ void reset_part(const Memory& memory) {
   sync_block();
 }
 
-// Draws the faces into one part, and leaves all as a next one is to find it. False, and nothing left so, where it has
-// no room for all that it lists. All threads of the block.
+// Draws the faces into one part, and leaves all as a next one is to find it, once all threads have come so far. False, and
+// nothing left so, where it has no room for all that it lists. All threads of the block.
 template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part, const Visit& visit,
                           const Write& write) {
@@ -211,14 +211,13 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
   sync_block();
   reset_counts(memory);
   write_pixels(memory, part, visit, write);
-  sync_block();
   return true;
 }
 
 // Draws the faces into a part of an image, in smaller ones where there is no room for all of it. visit(face, weight)
 // hears of each fragment, write.keep(memory, fragment, colour) of what fragments give their pixels, and
 // write.pixels(memory, x, y, count, words) of pixels side by side. False
-// where there is no room for a single pixel. All threads of the block.
+// where there is no room for a single pixel. All threads of the block, which then wait for each other before the next.
 template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whole, const Visit& visit,
                            const Write& write) {
@@ -236,11 +235,13 @@ __device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whol
       continue;
     }
     x = part.x_end;
-    if (x < whole.x_end) continue;
-    x = whole.x_begin;
-    y = part.y_end;
-    columns = most_columns;
-    rows = min_of(2 * rows, most_rows);
+    if (x >= whole.x_end) {
+      x = whole.x_begin;
+      y = part.y_end;
+      columns = most_columns;
+      rows = min_of(2 * rows, most_rows);
+    }
+    if (y < whole.y_end) sync_block();
   }
   return true;
 }
@@ -255,6 +256,7 @@ __device__ bool each_tile(const Memory& memory, int width_px, int y_begin, int y
     PICTURA_KEEP_LOOP
     for (int x = 0; x < width_px; x += kTileWidth_px) {
       if (!draw(memory, Part{x, min_of(x + kTileWidth_px, width_px), y, min_of(y + most_rows, y_end)})) return false;
+      sync_block();
     }
   }
   return true;
