@@ -31,9 +31,9 @@ struct WarpState {
 struct BlockState {
   GatheredImage shown;     // what is drawn
   GatheredImage upcoming;  // what is drawn next
-  Scratch scratch;      // this block's
-  ScreenFace* faces;    // of this image
-  PolygonEdge* edges;   // of all images in the pool
+  Scratch scratch;         // this block's
+  ScreenFace* faces;       // of this image
+  PolygonEdge* edges;      // of all images in the pool
   // While faces are gathered.
   ViewState view;
   FaceMaking making;

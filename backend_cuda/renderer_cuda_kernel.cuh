@@ -286,7 +286,8 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
   const int tiles = most_tiles(task);
   const int32_t count = images_of_round(task) * tiles;
   int32_t* const counter = &task.counters->rounds[task.round_index].next_drawn;
-  // While the block draws a tile, the first thread asks for the number of the next but one, and what the next one shows.
+  // While the block draws a tile, the first thread asks for the number of the next but one, and what the next one
+  // shows.
   int32_t next = 0, after = 0;
   auto take_next = [&] {
     next = after;

@@ -183,8 +183,8 @@ __device__ void reset_part(const Memory& memory) {
   sync_block();
 }
 
-// Draws the faces into one part, and leaves all as a next one is to find it, once all threads have come so far. False, and
-// nothing left so, where it has no room for all that it lists. All threads of the block.
+// Draws the faces into one part, and leaves all as a next one is to find it, once all threads have come so far. False,
+// and nothing left so, where it has no room for all that it lists. All threads of the block.
 template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part, const Visit& visit,
                           const Write& write) {

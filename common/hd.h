@@ -84,8 +84,8 @@ PICTURA_HD inline float root_of(float x) {
 #endif
 }
 
-/// Copies 16 bytes, aligned to as many, into a block's shared memory. A device goes on meanwhile: they are there once the
-/// same thread has waited for its copies.
+/// Copies 16 bytes, aligned to as many, into a block's shared memory. A device goes on meanwhile: they are there once
+/// the same thread has waited for its copies.
 PICTURA_HD inline void copy_into_shared(void* to, const void* from) {
 #if defined(__CUDA_ARCH__)
   asm volatile("cp.async.ca.shared.global [%0], [%1], 16;"
