@@ -302,7 +302,7 @@ __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_
 
 // What drawing is told of an image.
 __device__ inline GatheredImage image_of(const BlockState& state, int32_t face_begin, int32_t face_count) {
-  return {face_begin, face_count, state.making.setting.camera.position_m, state.view.geometry, state.making.agents};
+  return {state.view.geometry, state.making.agents, state.making.setting.camera.position_m, face_begin, face_count};
 }
 
 // Gathers an image into the block's own memory, all of it in one launch. False where there is no room for all, or where

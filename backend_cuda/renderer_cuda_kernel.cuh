@@ -294,7 +294,7 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
     after = atomicAdd(counter, 1);
     if (next >= count) return;
     const GatheredImage* image = task.pool.images + image_of_round(task, next / tiles);
-    for (size_t at = 0; at < sizeof(GatheredImage); at += 16) {
+    for (size_t at = 0; at < sizeof(GatheredImage); at += sizeof(uint64_t)) {
       copy_into_shared(reinterpret_cast<char*>(&state->upcoming) + at, reinterpret_cast<const char*>(image) + at);
     }
   };

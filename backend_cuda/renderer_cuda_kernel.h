@@ -54,14 +54,15 @@ struct Fault {
 };
 enum FaultKind : int32_t { kBadWorld = 1, kBadGeometry, kBadPose, kTooManyAgents, kBadQuery, kNoRoom };
 
-/// What an image shows: its faces in a pool, and what tells which of them is in front.
-struct alignas(16) GatheredImage {
-  int32_t face_begin = 0, face_count = 0;  // -1: not gathered
-  Vec3 eye_m;
+/// What an image shows: its faces in a pool, and what tells which of them is in front. Copied whole, so it has no gaps.
+struct GatheredImage {
   const DeviceGeometry* geometry = nullptr;
   const AgentBox* agents = nullptr;  // the first of its world
-  int32_t is_left_to_last = 0;       // 1: to the last launch, when it was found too crowded
+  Vec3 eye_m;
+  int32_t face_begin = 0, face_count = 0;  // -1: not gathered
+  int32_t is_left_to_last = 0;             // 1: to the last launch, when it was found too crowded
 };
+static_assert(sizeof(GatheredImage) == 2 * sizeof(void*) + 6 * sizeof(int32_t));
 
 /// A face of four corners, and what it belongs to.
 struct alignas(16) Quad {

@@ -84,16 +84,16 @@ PICTURA_HD inline float root_of(float x) {
 #endif
 }
 
-/// Copies 16 bytes, aligned to as many, into a block's shared memory. A device goes on meanwhile: they are there once
+/// Copies 8 bytes, aligned to as many, into a block's shared memory. A device goes on meanwhile: they are there once
 /// the same thread has waited for its copies.
 PICTURA_HD inline void copy_into_shared(void* to, const void* from) {
 #if defined(__CUDA_ARCH__)
-  asm volatile("cp.async.ca.shared.global [%0], [%1], 16;"
+  asm volatile("cp.async.ca.shared.global [%0], [%1], 8;"
                :
                : "r"(static_cast<uint32_t>(__cvta_generic_to_shared(to))), "l"(from)
                : "memory");
 #else
-  __builtin_memcpy(to, from, 16);
+  __builtin_memcpy(to, from, 8);
 #endif
 }
 PICTURA_HD inline void wait_for_copies() {
