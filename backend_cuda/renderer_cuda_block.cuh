@@ -122,11 +122,19 @@ __device__ inline int32_t take_place(int32_t* counter, bool wanted) {
   return __shfl_sync(kAllLanes, first, 0) + __popc(wanting & lanes_below());
 }
 
+// Lanes of a warp bring items that stand one behind the other, those of a lane from `begin` on. Of the item that stands
+// as far behind `first` as the lane is: the number, among lanes that have some, of the lane whose item it is.
+__device__ inline int owners_rank(int first, int begin, bool has_some) {
+  const bool starts_here = has_some && begin >= first && begin < first + kWarpSize;
+  const unsigned starts = __reduce_or_sync(kAllLanes, starts_here ? 1u << (begin - first) : 0u);
+  const int before = __popc(__ballot_sync(kAllLanes, has_some && begin < first));
+  return before + __popc(starts & (lanes_below() << 1 | 1u)) - 1;
+}
+
 // Shares out what the lanes of a warp bring, `count` items each: visit(owner, k) is called by all lanes, for 32 items
-// at a time, with the lane whose item it is (-1: none is left) and the item's number among that lane's. The items from
-// `first` on, 32 of every `stride`.
+// at a time, with the lane whose item it is (-1: none is left) and the item's number among that lane's.
 template <typename Visit>
-__device__ inline void share_out(WarpState* warp, int count, Visit&& visit, int first = 0, int stride = kWarpSize) {
+__device__ inline void share_out(WarpState* warp, int count, Visit&& visit) {
   const int lane = lane_index();
   const int end = sum_up_to(count), begin = end - count;
   const int total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
@@ -137,12 +145,8 @@ __device__ inline void share_out(WarpState* warp, int count, Visit&& visit, int 
   const int owner_of_rank = warp->owners[lane];
   __syncwarp();
   PICTURA_KEEP_LOOP
-  for (int item = first; item < total; item += stride) {
-    const bool starts_here = count > 0 && begin >= item && begin < item + kWarpSize;
-    const unsigned starts = __reduce_or_sync(kAllLanes, starts_here ? 1u << (begin - item) : 0u);
-    const int before = __popc(__ballot_sync(kAllLanes, count > 0 && begin < item));
-    const int rank = before + __popc(starts & (lanes_below() << 1 | 1u)) - 1;
-    const int owner = __shfl_sync(kAllLanes, owner_of_rank, rank) % kWarpSize;
+  for (int item = 0; item < total; item += kWarpSize) {
+    const int owner = __shfl_sync(kAllLanes, owner_of_rank, owners_rank(item, begin, count > 0)) % kWarpSize;
     const int k = item + lane - __shfl_sync(kAllLanes, begin, owner);
     visit(item + lane < total ? owner : -1, k);
   }

@@ -125,24 +125,6 @@ __device__ inline SharedFace make_light(const FaceMaking& making, int32_t index)
   return face;
 }
 
-// inside_plane by weights, so that lanes may ask for different planes: what is added is 0, and changes nothing.
-class ClipPlane {
- public:
-  __device__ ClipPlane(const Frustum& f, int plane)
-      : x_(plane == 1 ? 1.0f : (plane == 2 ? -1.0f : 0.0f)),
-        y_(plane == 3 ? 1.0f : (plane == 4 ? -1.0f : 0.0f)),
-        z_(plane == 0   ? 1.0f
-           : plane == 1 ? -f.x_low
-           : plane == 2 ? f.x_high
-           : plane == 3 ? -f.y_low
-                        : f.y_high),
-        offset_(plane == 0 ? kNear_m : 0.0f) {}
-  __device__ float inside(Vec3 p) const { return x_ * p.x + y_ * p.y + z_ * p.z - offset_; }
-
- private:
-  float x_, y_, z_, offset_;
-};
-
 // clip_face of a lane's face, in place: corners are written no further than one behind the last that was read. The
 // number of corners, or kOutgrown where a lane has no room for them or the face is not quite convex.
 constexpr int kOutgrown = -1;
@@ -213,9 +195,10 @@ __device__ inline void clip(const Frustum& f, ClipRoom* room, SharedFace* face_i
   if (is_outside) count = 0;
   PICTURA_KEEP_LOOP
   for (; crossed != 0 && count > 0; crossed &= crossed - 1) {
-    const int plane = __ffs(static_cast<int>(crossed)) - 1, before = lane > 0 ? lane - 1 : count - 1;
+    const ClipPlane plane(f, __ffs(static_cast<int>(crossed)) - 1);
+    const int before = lane > 0 ? lane - 1 : count - 1;
     const Vec3 previous = corner_of(corner, before);
-    const float inside = inside_plane(f, plane, corner), previous_inside = __shfl_sync(kAllLanes, inside, before);
+    const float inside = plane.inside(corner), previous_inside = __shfl_sync(kAllLanes, inside, before);
     const bool stays = lane < count && inside >= 0.0f;
     const bool is_cut = lane < count && (previous_inside >= 0.0f) != (inside >= 0.0f);
     const unsigned cuts = __ballot_sync(kAllLanes, is_cut), staying = __ballot_sync(kAllLanes, stays);

@@ -209,10 +209,7 @@ __device__ inline void cull_pieces(BlockState* state, CullRoom* room, EntryList*
       int kind;  // as in the room
     };
     auto candidate_of = [&](int item) {
-      const auto starts_at = static_cast<unsigned>(begin - item);
-      const unsigned starts = __reduce_or_sync(kAllLanes, has_some && starts_at < kWarpSize ? 1u << starts_at : 0u);
-      const int before = __popc(__ballot_sync(kAllLanes, has_some && begin < item));
-      const int rank = before + __popc(starts & (lanes_below() << 1 | 1u)) - 1;
+      const int rank = owners_rank(item, begin, has_some);
       const int kind = rank >= num_of_strips ? 1 : 0;
       const int place = min_of(item + lane, total - 1) + room->offsets[rank];
       return Candidate{room->balls[kind][place], room->items[kind][place], kind};

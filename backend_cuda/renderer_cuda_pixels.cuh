@@ -216,8 +216,8 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
 
 // Draws the faces into a part of an image, in smaller ones where there is no room for all of it. visit(face, weight)
 // hears of each fragment, write.keep(memory, fragment, colour) of what fragments give their pixels, and
-// write.pixels(memory, x, y, count, words) of pixels side by side. False
-// where there is no room for a single pixel. All threads of the block, which then wait for each other before the next.
+// write.pixels(memory, x, y, count, words) of pixels side by side. False where there is no room for a single pixel. All
+// threads of the block, which then wait for each other before the next.
 template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whole, const Visit& visit,
                            const Write& write) {

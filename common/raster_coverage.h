@@ -10,23 +10,31 @@ namespace pictura {
 /// Clipping by five planes adds at most one corner each; one more is room for a cut while it is made.
 constexpr int kMaxPolygonCorners = kMaxFaceCorners + 6;
 
-/// How far a point is inside of the five planes of the drawn volume, each by a measure of its own; negative outside.
+/// One of the five planes of the drawn volume: how far a point is inside, by a measure of each plane's own; negative
+/// outside. By weights, so that lanes of a warp may ask for different planes: what is added for one is 0.
 constexpr int kClipPlanes = 5;
-PICTURA_HD inline float inside_plane(const Frustum& f, int plane, Vec3 p) {
-  switch (plane) {
-    case 0: return p.z - kNear_m;
-    case 1: return p.x - f.x_low * p.z;
-    case 2: return f.x_high * p.z - p.x;
-    case 3: return p.y - f.y_low * p.z;
-    default: return f.y_high * p.z - p.y;
-  }
-}
+class ClipPlane {
+ public:
+  PICTURA_HD ClipPlane(const Frustum& f, int plane)
+      : x_(plane == 1 ? 1.0f : (plane == 2 ? -1.0f : 0.0f)),
+        y_(plane == 3 ? 1.0f : (plane == 4 ? -1.0f : 0.0f)),
+        z_(plane == 0   ? 1.0f
+           : plane == 1 ? -f.x_low
+           : plane == 2 ? f.x_high
+           : plane == 3 ? -f.y_low
+                        : f.y_high),
+        offset_(plane == 0 ? kNear_m : 0.0f) {}
+  PICTURA_HD float inside(Vec3 p) const { return x_ * p.x + y_ * p.y + z_ * p.z - offset_; }
 
-/// ... those that it is outside of, a bit for each.
+ private:
+  float x_, y_, z_, offset_;
+};
+
+/// The planes that a point is outside of, a bit for each.
 PICTURA_HD inline unsigned planes_outside(const Frustum& f, Vec3 p) {
   unsigned outside = 0;
   for (int plane = 0; plane < kClipPlanes; ++plane) {
-    if (inside_plane(f, plane, p) < 0.0f) outside |= 1u << plane;
+    if (ClipPlane(f, plane).inside(p) < 0.0f) outside |= 1u << plane;
   }
   return outside;
 }
@@ -70,17 +78,18 @@ PICTURA_HD inline int clip_face(const Frustum& f, const Vec3* corners, int count
   }
   // The buffers alternate so that the last plane writes to polygon_out.
   PICTURA_KEEP_LOOP
-  for (int plane = 0; plane < kClipPlanes; ++plane) {
-    if (!((crossed >> plane) & 1u)) continue;
+  for (int number = 0; number < kClipPlanes; ++number) {
+    if (!((crossed >> number) & 1u)) continue;
+    const ClipPlane plane(f, number);
     Vec3* to = (remaining_planes & 1) ? polygon_out : buffer;
     int kept = 0;
     Vec3 previous = from[count - 1];
-    float previous_inside = inside_plane(f, plane, previous);
+    float previous_inside = plane.inside(previous);
     // Only a face that is not quite convex could outgrow the room; it loses corners then.
     PICTURA_KEEP_LOOP
     for (int i = 0; i < count && kept + 2 <= kMaxPolygonCorners; ++i) {
       const Vec3 current = from[i];
-      const float current_inside = inside_plane(f, plane, current);
+      const float current_inside = plane.inside(current);
       if ((previous_inside >= 0.0f) != (current_inside >= 0.0f)) {
         to[kept++] = cut_between(previous, previous_inside, current, current_inside);
       }
