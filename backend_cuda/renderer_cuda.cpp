@@ -69,7 +69,7 @@ class PoolBuffers {
         makings_(images),
         batches_(images * kBatches),
         clipped_(images * kPoolFaces),
-        lists_(3 * images) {}
+        lists_((3 + cuda::kCrowds) * images) {}
   /// Sets where a task finds the pool and lists images.
   void serve(cuda::DrawTask* task_out) const {
     task_out->pool = {faces_.data(),
@@ -82,6 +82,7 @@ class PoolBuffers {
                       static_cast<int32_t>(edges_.size())};
     for (std::size_t i = 0; i < 2; ++i) task_out->postponed_images[i] = lists_.data() + i * images_.size();
     task_out->overflow_images = lists_.data() + 2 * images_.size();
+    task_out->drawn_images = lists_.data() + 3 * images_.size();
   }
   // For what all rounds draw, or images would not know that they are too many until each has taken a part of the room.
   // Of each image the last one may not be full.
@@ -89,7 +90,8 @@ class PoolBuffers {
   static constexpr std::size_t kImageBytes = kPoolFaces * sizeof(ScreenFace) + kPoolEdges * sizeof(PolygonEdge) +
                                              sizeof(cuda::GatheredImage) + sizeof(cuda::FaceMaking) +
                                              kBatches * sizeof(cuda::FaceBatch) +
-                                             kPoolFaces * sizeof(cuda::ClippedThing) + 3 * sizeof(int32_t);
+                                             kPoolFaces * sizeof(cuda::ClippedThing) +
+                                             (3 + cuda::kCrowds) * sizeof(int32_t);
 
  private:
   DeviceBuffer<ScreenFace> faces_;

@@ -40,7 +40,7 @@ struct BlockState {
   GatherCounts listed;
   int32_t num_faces, num_clipped, overflow, usable;
   // While pixels are drawn.
-  int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, image;
+  int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, image, tile;
   int32_t next_rows, next_candidates, next_fragments;
   WarpState warps[kMaxWarps];
 };
@@ -107,12 +107,12 @@ __device__ inline int sum_up_to(int value) {
   return value;
 }
 
-// Adds what the lanes of a warp want to a counter; each gets its place.
-__device__ inline int32_t take_places(int32_t* counter, int count) {
-  const int end = sum_up_to(count);
+// Adds what the lanes of a warp want together to a counter, whose value before that all get. end: of each lane, what it
+// and those before it want.
+__device__ inline int32_t take_places(int32_t* counter, int end) {
   int32_t first = 0;
   if (lane_index() == kWarpSize - 1) first = atomicAdd(counter, end);
-  return __shfl_sync(kAllLanes, first, kWarpSize - 1) + end - count;
+  return __shfl_sync(kAllLanes, first, kWarpSize - 1);
 }
 // ... of those that want one.
 __device__ inline int32_t take_place(int32_t* counter, bool wanted) {
@@ -131,12 +131,12 @@ __device__ inline int owners_rank(int first, int begin, bool has_some) {
   return before + __popc(starts & (lanes_below() << 1 | 1u)) - 1;
 }
 
-// Shares out what the lanes of a warp bring, `count` items each: visit(owner, k) is called by all lanes, for 32 items
-// at a time, with the lane whose item it is (-1: none is left) and the item's number among that lane's.
+// Shares out what the lanes of a warp bring, `count` items each, with those of the lanes before it `end`: visit(item,
+// owner, k) is called by all lanes, for 32 items at a time, with the item's number, the lane whose item it is (-1: none
+// is left), and its number among that lane's.
 template <typename Visit>
-__device__ inline void share_out(WarpState* warp, int count, Visit&& visit) {
-  const int lane = lane_index();
-  const int end = sum_up_to(count), begin = end - count;
+__device__ inline void share_out(WarpState* warp, int count, int end, Visit&& visit) {
+  const int lane = lane_index(), begin = end - count;
   const int total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
   // Those that have items, without gaps.
   const unsigned owning = __ballot_sync(kAllLanes, count > 0);
@@ -148,7 +148,7 @@ __device__ inline void share_out(WarpState* warp, int count, Visit&& visit) {
   for (int item = 0; item < total; item += kWarpSize) {
     const int owner = __shfl_sync(kAllLanes, owner_of_rank, owners_rank(item, begin, count > 0)) % kWarpSize;
     const int k = item + lane - __shfl_sync(kAllLanes, begin, owner);
-    visit(item + lane < total ? owner : -1, k);
+    visit(item + lane, item + lane < total ? owner : -1, k);
   }
 }
 

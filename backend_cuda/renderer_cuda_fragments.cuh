@@ -76,13 +76,13 @@ __device__ void list_rows(const Memory& memory, int num_faces, const Part& part)
       const bool is_beside = box.x_begin >= part.x_end || box.x_end <= part.x_begin;
       rows = is_beside ? 0 : max_of(0, min_of(box.y_end, part.y_end) - y_begin);
     }
-    const int row = y_begin - part.y_begin;
-    const int32_t place = take_places(&memory.state->num_rows, rows);
-    share_out(warp, rows, [&](int owner, int k) {
-      const int from = max_of(owner, 0);
-      const int at = __shfl_sync(kAllLanes, place, from) + k, its_row = __shfl_sync(kAllLanes, row, from) + k;
-      if (owner >= 0 && at < memory.max_rows) {
-        memory.rows[at] = static_cast<Word>(first + owner) << Memory::kHalf | static_cast<Word>(its_row);
+    if (rows > 0) ask_for(memory.edges + memory.faces[face].edge_begin);
+    const int end = sum_up_to(rows), row = y_begin - part.y_begin;
+    const int32_t place = take_places(&memory.state->num_rows, end);
+    share_out(warp, rows, end, [&](int item, int owner, int k) {
+      const int its_row = __shfl_sync(kAllLanes, row, max_of(owner, 0)) + k;
+      if (owner >= 0 && place + item < memory.max_rows) {
+        memory.rows[place + item] = static_cast<Word>(first + owner) << Memory::kHalf | static_cast<Word>(its_row);
       }
     });
   }
@@ -111,46 +111,67 @@ __device__ int mark_pixel(const Memory& memory, int face, int x, int y, int pixe
   return may_show_before(memory.faces[loser], memory.faces[winner], x, y, true) ? loser : -1;
 }
 
+// A row of a face within a tile: columns from the tile's first on, a byte each.
+struct TileSpan {
+  uint32_t bytes = 0;
+  TileSpan() = default;
+  __device__ explicit TileSpan(uint32_t all) : bytes(all) {}
+  __device__ TileSpan(const RowSpan& span, const Part& part) {
+    auto within = [&](int32_t x) {
+      return static_cast<uint32_t>(min_of(max_of(x, part.x_begin), part.x_end) - part.x_begin);
+    };
+    bytes = within(span.begin) | within(span.full_begin) << 8 | within(span.full_end) << 16 | within(span.end) << 24;
+  }
+  __device__ int begin() const { return static_cast<int>(bytes & 0xFF); }
+  __device__ int full_begin() const { return static_cast<int>(bytes >> 8 & 0xFF); }
+  __device__ int full_end() const { return static_cast<int>(bytes >> 16 & 0xFF); }
+  __device__ int end() const { return static_cast<int>(bytes >> 24); }
+  /// Of the pixels that are covered partly, a few before those that are covered fully and a few behind.
+  __device__ int partial(int k) const { return begin() + k < full_begin() ? begin() + k : full_end() - full_begin() + begin() + k; }
+};
+
 // Marks, in a part, the nearest face that covers each pixel fully, and lists the pixels that faces cover partly. Rows
 // of a large face stand side by side, so they are dealt out. All threads of the block.
 template <typename Memory>
 __device__ void mark_and_list(const Memory& memory, const Part& part) {
+  using Word = typename Memory::Word;
   BlockState* state = memory.state;
   WarpState* warp = &state->warps[warp_index()];
   const int num_rows = state->num_rows, deals = deals_of(num_rows);
   PICTURA_KEEP_LOOP
-  for (;;) {
-    const int deal = next_of(&state->next_rows);
-    if (deal >= deals) return;
+  for (int deal = warp_index(); deal < deals; deal += num_warps()) {
     const int at = lane_index() * deals + deal;
-    int face = 0, y = 0;
-    RowSpan span;
+    Word row = 0;
+    TileSpan span;
     if (at < num_rows) {
-      const auto row = memory.rows[at];
-      face = static_cast<int>(row >> Memory::kHalf);
-      y = part.y_begin + static_cast<int>(row & Memory::kNone);
-      const ScreenFace& its = memory.faces[face];
-      span = row_span(memory.edges + its.edge_begin, its.edge_count, its.box, y);
-      auto within = [&](int32_t x) { return min_of(max_of(x, part.x_begin), part.x_end); };
-      span = {within(span.begin), within(span.end), within(span.full_begin), within(span.full_end)};
+      row = memory.rows[at];
+      const ScreenFace& face = memory.faces[row >> Memory::kHalf];
+      const int y = part.y_begin + static_cast<int>(row & Memory::kNone);
+      span = TileSpan(row_span(memory.edges + face.edge_begin, face.edge_count, face.box, y), part);
     }
-    const int full = span.full_end - span.full_begin;
-    auto of = [](int value, int lane) { return __shfl_sync(kAllLanes, value, max_of(lane, 0)); };
-    share_out(warp, full, [&](int owner, int k) {
-      const int its_face = of(face, owner), its_y = of(y, owner), x = of(span.full_begin, owner) + k;
-      const int pixel = part.pixel(x, its_y);
-      const int loser = owner >= 0 ? mark_pixel(memory, its_face, x, its_y, pixel) : -1;
+    const int full = span.full_end() - span.full_begin(), partial = span.end() - span.begin() - full;
+    // Both sums at once.
+    const int ends = sum_up_to(full | partial << 16), full_end = ends & 0xFFFF, partial_end = ends >> 16;
+    auto of = [](auto value, int lane) { return __shfl_sync(kAllLanes, value, max_of(lane, 0)); };
+    share_out(warp, full, full_end, [&](int, int owner, int k) {
+      const Word its_row = of(row, owner);
+      const TileSpan its_span(of(span.bytes, owner));
+      const int face = static_cast<int>(its_row >> Memory::kHalf), y = static_cast<int>(its_row & Memory::kNone);
+      const int x = its_span.full_begin() + k, pixel = y * kTileWidth_px + x;
+      const int loser = owner >= 0 ? mark_pixel(memory, face, part.x_begin + x, part.y_begin + y, pixel) : -1;
       if (!__any_sync(kAllLanes, loser >= 0)) return;
       const int32_t place = take_place(&state->num_candidates, loser >= 0);
       if (loser >= 0) list_candidate(memory, place, loser, pixel, true);
     });
-    const int partial = span.end - span.begin - full, row_begin = part.pixel(0, y);
-    int32_t place = take_places(&state->num_candidates, partial);
-    PICTURA_KEEP_LOOP
-    for (int x = span.begin; x < span.end; ++x) {
-      if (x == span.full_begin) x = span.full_end;
-      if (x < span.end) list_candidate(memory, place++, face, row_begin + x, false);
-    }
+    const int32_t place = take_places(&state->num_candidates, partial_end);
+    share_out(warp, partial, partial_end, [&](int item, int owner, int k) {
+      const Word its_row = of(row, owner);
+      const TileSpan its_span(of(span.bytes, owner));
+      const int face = static_cast<int>(its_row >> Memory::kHalf), y = static_cast<int>(its_row & Memory::kNone);
+      if (owner >= 0) {
+        list_candidate(memory, place + item, face, y * kTileWidth_px + its_span.partial(k), false);
+      }
+    });
   }
 }
 
@@ -202,8 +223,8 @@ __device__ void make_fragments(const Memory& memory, const Part& part) {
   WarpQueue shown(&memory.state->warps[warp_index()].queue);
   const int count = memory.state->num_candidates;
   PICTURA_KEEP_LOOP
-  for (;;) {
-    const int i = next_of(&memory.state->next_candidates) * kWarpSize + lane_index();
+  for (int first = warp_index() * kWarpSize;; first += num_threads()) {
+    const int i = first + lane_index();
     const bool more = i - lane_index() < count;
     bool shows = false;
     uint32_t face = 0, place = 0;

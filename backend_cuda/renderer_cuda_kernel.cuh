@@ -45,14 +45,13 @@ struct ImageWriter {
 
   template <typename Memory>
   __device__ void write_bytes(const Memory& memory, uint8_t* to, int count, const typename Memory::Word* words) const {
-    uint32_t bytes[kWrittenAtOnce];
-    for (int i = 0; i < kWrittenAtOnce; ++i) {
+    uint32_t bytes[kWrittenAtOnce] = {};
+    for (int i = 0; i < kWrittenAtOnce && (words[0] | words[1] | words[2] | words[3]) != 0; ++i) {
       const auto full = full_of_word<Memory>(words[i]), head = first_of_word<Memory>(words[i]);
       bytes[i] = head != Memory::kNone   ? memory.color_bytes(static_cast<int>(head))
                  : full != Memory::kNone ? memory.faces[full].color_bytes
                                          : 0u;
     }
-    PICTURA_KEEP_LOOP
     for (int channel = 0; channel < 3; ++channel, to += plane) {
       Together<uint8_t> values;
       for (int i = 0; i < kWrittenAtOnce; ++i) {
@@ -181,6 +180,36 @@ __device__ inline void postpone(const DrawTask& task, int32_t image) {
   task.postponed_images[task.round_index % 2][place] = image;
 }
 
+// The images of a round that are drawn, by classes of how much they list.
+__device__ inline int32_t* crowd_of(const DrawTask& task, int crowd) {
+  return task.drawn_images + static_cast<int64_t>(crowd) * task.num_views * num_cameras(task);
+}
+__device__ inline void list_drawn(const DrawTask& task, int32_t image, int32_t listed) {
+  const int crowd = min_of(listed / kCrowdFaces, kCrowds - 1);
+  crowd_of(task, crowd)[atomicAdd(&task.counters->rounds[task.round_index].crowds[crowd], 1)] = image;
+}
+// Goes through them, the most crowded first.
+class DrawOrder {
+ public:
+  __device__ explicit DrawOrder(const DrawTask& task) : task_(task) {}
+  /// The image whose turn it is, no earlier than that of the call before; -1 after the last.
+  __device__ int32_t image_of(int32_t turn) {
+    const int32_t* crowds = task_.counters->rounds[task_.round_index].crowds;
+    PICTURA_KEEP_LOOP
+    for (; crowd_ >= 0; --crowd_) {
+      const int32_t count = crowds[crowd_];
+      if (turn - begin_ < count) return crowd_of(task_, crowd_)[turn - begin_];
+      begin_ += count;
+    }
+    return -1;
+  }
+
+ private:
+  const DrawTask& task_;
+  int crowd_ = kCrowds - 1;
+  int32_t begin_ = 0;  // the first turn of the crowd
+};
+
 // Takes room for the faces of an image of which so many things may show, and tells the later launches of it. One
 // thread.
 __device__ inline void take_face_room(const DrawTask& task, int32_t image, int32_t listed, bool all_are_listed) {
@@ -206,11 +235,13 @@ __device__ inline void take_face_room(const DrawTask& task, int32_t image, int32
   making->clipped_begin = 4 * task.pool.max_faces;
   making->clipped_end = task.pool.max_edges;
   *out = image_of(*state, face_begin, 0);
+  list_drawn(task, image, listed);
 }
 
 // Lists what images may show.
 extern "C" __global__ void __launch_bounds__(kGatherThreads, kCullBlocksPerProcessor)
     pictura_cull(const __grid_constant__ DrawTask task) {
+  wait_for_earlier_launch();
   BlockState* state = block_state();
   CullRoom* room = &gather_room()->cull;
   DrawCounters::Round* round = &task.counters->rounds[task.round_index];
@@ -221,7 +252,10 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kCullBlocksPerProce
     if (lane_index() == 0) state->usable = set_image(state, task, view_of(task, image), camera) ? 1 : 0;
     __syncwarp();
     if (state->usable == 0) {
-      if (lane_index() == 0) task.pool.images[image] = {};  // black
+      if (lane_index() == 0) {
+        task.pool.images[image] = {};  // black
+        list_drawn(task, image, 0);
+      }
       continue;
     }
     EntryList list(room, task.pool.lists, &round->listed, image);
@@ -236,6 +270,7 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kCullBlocksPerProce
 // Makes the faces that need no clipping, and lists the others.
 extern "C" __global__ void __launch_bounds__(kGatherThreads, kMakingBlocksPerProcessor)
     pictura_gather(const __grid_constant__ DrawTask task) {
+  wait_for_earlier_launch();
   MakingState* state = making_state();
   DrawCounters::Round* round = &task.counters->rounds[task.round_index];
   const int32_t num_batches = min_of(round->listed.batches, task.pool.lists.max_batches);
@@ -262,6 +297,7 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kMakingBlocksPerPro
 // Clips those, and makes lights.
 extern "C" __global__ void __launch_bounds__(kGatherThreads, kClipBlocksPerProcessor)
     pictura_clip(const __grid_constant__ DrawTask task) {
+  wait_for_earlier_launch();
   ClipRoom* room = &gather_room()->clip;
   DrawCounters::Round* round = &task.counters->rounds[task.round_index];
   const GatherCounts listed = round->listed;
@@ -282,18 +318,19 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kClipBlocksPerProce
 
 extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcessor)
     pictura_draw(const __grid_constant__ DrawTask task) {
+  wait_for_earlier_launch();
   BlockState* state = block_state();
-  const int tiles = most_tiles(task);
-  const int32_t count = images_of_round(task) * tiles;
   int32_t* const counter = &task.counters->rounds[task.round_index].next_drawn;
   // While the block draws a tile, the first thread asks for the number of the next but one, and what the next one
   // shows.
-  int32_t next = 0, after = 0;
+  DrawOrder order(task);
+  int32_t next_image = -1, next_tile = 0, after = 0;
   auto take_next = [&] {
-    next = after;
+    next_image = order.image_of(after / most_tiles(task));
+    next_tile = after % most_tiles(task);
+    if (next_image < 0) return;
     after = atomicAdd(counter, 1);
-    if (next >= count) return;
-    const GatheredImage* image = task.pool.images + image_of_round(task, next / tiles);
+    const GatheredImage* image = task.pool.images + next_image;
     for (size_t at = 0; at < sizeof(GatheredImage); at += sizeof(uint64_t)) {
       copy_into_shared(reinterpret_cast<char*>(&state->upcoming) + at, reinterpret_cast<const char*>(image) + at);
     }
@@ -307,14 +344,15 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
   for (;;) {
     if (threadIdx.x == 0) {
       wait_for_copies();
-      state->image = next;
+      state->image = next_image;
+      state->tile = next_tile;
       state->shown = state->upcoming;
       state->faces = task.pool.faces + state->shown.face_begin;
       state->edges = task.pool.edges;
     }
     sync_block();
-    if (state->image >= count) return;
-    const int32_t image = image_of_round(task, state->image / tiles), tile = state->image % tiles;
+    const int32_t image = state->image, tile = state->tile;
+    if (image < 0) return;
     if (threadIdx.x == 0) take_next();
     const int32_t camera = camera_of(task, image);
     const PinholeCamera& shows = task.cameras[camera].camera;
@@ -334,6 +372,7 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
 
 extern "C" __global__ void __launch_bounds__(kLargeThreads)
     pictura_draw_overflow(const __grid_constant__ DrawTask task, const __grid_constant__ Scratch scratch) {
+  wait_for_earlier_launch();
   take_scratch(scratch);
   const int32_t count = task.counters->overflow;
   PICTURA_KEEP_LOOP

@@ -134,6 +134,10 @@ constexpr int kLargeWarps = 4;
 /// Images are gathered and drawn in rounds: those for which the pool had no room left are postponed to the next one.
 constexpr int kRounds = 3;
 
+/// Images are drawn in the order of how many faces they list, in classes of so many, the most crowded first: blocks
+/// that come late to their last tile have a light one.
+constexpr int kCrowds = 16, kCrowdFaces = 64;
+
 /// What the blocks of a batch's launches count together; 0 before.
 struct DrawCounters {
   struct Round {
@@ -141,6 +145,7 @@ struct DrawCounters {
     GatherCounts listed;
     int32_t faces = 0, clipped_edges = 0;  // of the pool that are taken
     int32_t postponed = 0;                 // images
+    int32_t crowds[kCrowds] = {};          // images that are drawn, by how much they list
   } rounds[kRounds];
   int32_t overflow = 0;  // images left to the last launch
 };
@@ -163,6 +168,7 @@ struct DrawTask {
   int32_t round_index = 0;
   int32_t* postponed_images[2] = {};   // [images] of each round, in turn
   int32_t* overflow_images = nullptr;  // [images]
+  int32_t* drawn_images = nullptr;     // [kCrowds][images]
   CameraSlot cameras[kMaxCameras];
 };
 

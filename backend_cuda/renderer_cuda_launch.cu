@@ -14,8 +14,17 @@ struct LaunchShape {
 template <typename... Arguments>
 cudaError_t launch(const void* kernel, LaunchShape shape, cudaStream_t stream, const Arguments&... arguments) {
   void* pointers[] = {const_cast<Arguments*>(&arguments)...};
-  return cudaLaunchKernel(kernel, dim3(static_cast<unsigned>(shape.blocks)), dim3(static_cast<unsigned>(shape.threads)),
-                          pointers, shape.shared_bytes, stream);
+  cudaLaunchAttribute attribute{};
+  attribute.id = cudaLaunchAttributeProgrammaticStreamSerialization;
+  attribute.val.programmaticStreamSerializationAllowed = 1;
+  cudaLaunchConfig_t config{};
+  config.gridDim = dim3(static_cast<unsigned>(shape.blocks));
+  config.blockDim = dim3(static_cast<unsigned>(shape.threads));
+  config.dynamicSmemBytes = shape.shared_bytes;
+  config.stream = stream;
+  config.attrs = &attribute;
+  config.numAttrs = 1;
+  return cudaLaunchKernelExC(&config, kernel, pointers);
 }
 
 cudaError_t allow_shared(const void* kernel, std::size_t bytes) {

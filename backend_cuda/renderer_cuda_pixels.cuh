@@ -68,10 +68,11 @@ __device__ void hide_fragments(const Memory& memory, const Part& part, int count
       is_before_full = full_of(memory, memory.pixel[fragment]) != Memory::kNone;
     }
     uint32_t with = Memory::kNone;
-    bool meet = is_before_full;
+    bool meet = is_before_full && memory.free(fragment) != 0;
     if (!is_before_full && other != Memory::kNone) {
       with = other;
-      meet = shared_samples(coverage, memory.coverage(static_cast<int>(with))) != 0;
+      meet = ((memory.free(fragment) & memory.samples(static_cast<int>(with))) |
+              (memory.free(static_cast<int>(with)) & coverage.samples)) != 0;
       other = memory.next[with];
     }
     is_before_full = false;

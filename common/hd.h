@@ -102,6 +102,20 @@ PICTURA_HD inline void wait_for_copies() {
 #endif
 }
 
+/// Asks for the memory around an address, which is read soon.
+PICTURA_HD inline void ask_for([[maybe_unused]] const void* address) {
+#if defined(__CUDA_ARCH__)
+  asm volatile("prefetch.global.L2 [%0];" : : "l"(address));
+#endif
+}
+
+/// A launch may begin before the one before it on its stream has ended. Waits for that, and for all that it wrote.
+PICTURA_HD inline void wait_for_earlier_launch() {
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
+  asm volatile("griddepcontrol.wait;" : : : "memory");
+#endif
+}
+
 /// The lesser and the greater of two numbers that are numbers; one instruction of a device. Of two zeros it is either.
 PICTURA_HD inline float lesser_of(float a, float b) {
 #if defined(__CUDA_ARCH__)

@@ -101,7 +101,7 @@ class EmulatedRenderer final : public Renderer {
     std::vector<cuda::FaceMaking> makings;
     std::vector<cuda::FaceBatch> batches;
     std::vector<cuda::ClippedThing> clipped;
-    std::vector<int32_t> overflow_images, postponed_images[2];
+    std::vector<int32_t> overflow_images, postponed_images[2], drawn_images;
     std::vector<uint64_t> large_words;
 
     Setup(const EmulatedRenderer& renderer, const cuda::DrawTask& draw, const SceneBatch& scene) : task(draw) {
@@ -132,6 +132,8 @@ class EmulatedRenderer final : public Renderer {
       task.counters = &counters;
       task.fault = &fault;
       task.overflow_images = overflow_images.data();
+      drawn_images.resize(cuda::kCrowds * overflow_images.size());
+      task.drawn_images = drawn_images.data();
       for (std::size_t i = 0; i < 2; ++i) {
         postponed_images[i].resize(num_images);
         task.postponed_images[i] = postponed_images[i].data();
