@@ -57,7 +57,6 @@ Scratch large_sizes(int pieces, int heads, std::size_t agents) {
   // clipped.
   Scratch sizes;
   sizes.max_faces = std::max(1, pieces + 3 * static_cast<int>(std::min<std::size_t>(agents, kMaxWorldAgents)));
-  sizes.max_batches = sizes.max_faces / FaceBatch::kEntries + kLargeWarps;
   sizes.max_edges = (4 + 9) * sizes.max_faces + kMaxPolygonCorners * heads;
   return sizes;
 }

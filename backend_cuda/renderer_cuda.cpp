@@ -68,6 +68,7 @@ class PoolBuffers {
         images_(images),
         makings_(images),
         batches_(images * kBatches),
+        entries_(images * cuda::kMostEntries),
         clipped_(images * kPoolFaces),
         lists_((3 + cuda::kCrowds) * images) {}
   /// Sets where a task finds the pool and lists images.
@@ -76,20 +77,19 @@ class PoolBuffers {
                       edges_.data(),
                       images_.data(),
                       makings_.data(),
-                      {batches_.data(), clipped_.data(), static_cast<int32_t>(batches_.size()),
-                       static_cast<int32_t>(clipped_.size())},
+                      batches_.data(),
+                      {entries_.data(), clipped_.data(), cuda::kMostEntries, static_cast<int32_t>(clipped_.size())},
                       static_cast<int32_t>(faces_.size()),
                       static_cast<int32_t>(edges_.size())};
     for (std::size_t i = 0; i < 2; ++i) task_out->postponed_images[i] = lists_.data() + i * images_.size();
     task_out->overflow_images = lists_.data() + 2 * images_.size();
     task_out->drawn_images = lists_.data() + 3 * images_.size();
   }
-  // For what all rounds draw, or images would not know that they are too many until each has taken a part of the room.
   // Of each image the last one may not be full.
-  static constexpr int kBatches = cuda::kRounds * kPoolFaces / cuda::FaceBatch::kEntries + 1;
+  static constexpr int kBatches = kPoolFaces / cuda::FaceBatch::kEntries + 1;
   static constexpr std::size_t kImageBytes = kPoolFaces * sizeof(ScreenFace) + kPoolEdges * sizeof(PolygonEdge) +
                                              sizeof(cuda::GatheredImage) + sizeof(cuda::FaceMaking) +
-                                             kBatches * sizeof(cuda::FaceBatch) +
+                                             kBatches * sizeof(cuda::FaceBatch) + cuda::kMostEntries * sizeof(uint32_t) +
                                              kPoolFaces * sizeof(cuda::ClippedThing) +
                                              (3 + cuda::kCrowds) * sizeof(int32_t);
 
@@ -99,6 +99,7 @@ class PoolBuffers {
   DeviceBuffer<cuda::GatheredImage> images_;
   DeviceBuffer<cuda::FaceMaking> makings_;
   DeviceBuffer<cuda::FaceBatch> batches_;
+  DeviceBuffer<uint32_t> entries_;
   DeviceBuffer<cuda::ClippedThing> clipped_;
   DeviceBuffer<int32_t> lists_;
 };

@@ -18,12 +18,8 @@ struct alignas(16) OutlineSide {
 };
 constexpr int kOutlineSides = 8;
 
-/// Entries that wait for their batch to be full: fewer than a batch, and those that each lane adds.
-constexpr int kMostWaiting = (1 + kNumCuboidFaces) * kWarpSize;
-
 /// What a warp that culls keeps in shared memory.
 struct CullRoom {
-  uint32_t entries[kMostWaiting];
   // Of strips and of walls: the sides of the outline, and what pieces_of and far_of say.
   OutlineSide sides[2][kOutlineSides];
   const Ball* balls[2];
@@ -33,66 +29,41 @@ struct CullRoom {
 };
 static_assert(FaceBatch::kEntries == kWarpSize);
 
-/// Entries that a warp finds, of one image. All its lanes call what follows.
+/// The entries of an image. All lanes of a warp call what follows, of one warp or more.
 class EntryList {
  public:
-  __device__ EntryList(CullRoom* room, const GatherLists& lists, GatherCounts* counts, int32_t image)
-      : entries_(room->entries), lists_(lists), counts_(counts), image_(image) {}
+  /// count: in shared memory, of the entries that were wanted; those for which there is no room are not kept.
+  __device__ EntryList(uint32_t* entries, int32_t max_entries, int32_t* count)
+      : entries_(entries), max_entries_(max_entries), count_(count) {}
   __device__ void push(bool wanted, uint32_t entry) {
-    const unsigned pushing = __ballot_sync(kAllLanes, wanted);
-    if (wanted) entries_[waiting_ + __popc(pushing & lanes_below())] = entry;
-    waiting_ += __popc(pushing);
-    if (waiting_ >= kWarpSize) leave_batch(kWarpSize);
+    const int32_t place = take_place(count_, wanted);
+    if (wanted) set(place, entry);
   }
   /// An entry for each of an agent's faces.
   __device__ void push_faces(unsigned faces, uint32_t entry) {
-    // Places by the bits of the numbers of faces.
-    static_assert(kNumCuboidFaces < 8);
-    int before = 0, total = 0;
-    for (int bit = 1; bit < 8; bit *= 2) {
-      const unsigned pushing = __ballot_sync(kAllLanes, (__popc(faces) & bit) != 0);
-      before += bit * __popc(pushing & lanes_below());
-      total += bit * __popc(pushing);
-    }
-    int place = waiting_ + before;
+    const int count = __popc(faces), end = sum_up_to(count);
+    int32_t place = take_places(count_, end) + end - count;
     PICTURA_KEEP_LOOP
     for (; faces != 0; faces &= faces - 1) {
-      entries_[place++] = entry | (static_cast<uint32_t>(__ffs(static_cast<int>(faces))) - 1) << kFaceShift;
+      set(place++, entry | (static_cast<uint32_t>(__ffs(static_cast<int>(faces))) - 1) << kFaceShift);
     }
-    waiting_ += total;
-    PICTURA_KEEP_LOOP
-    while (waiting_ >= kWarpSize) leave_batch(kWarpSize);
   }
+  /// Fills the last batch, once all warps have found theirs.
   __device__ void finish() {
-    if (waiting_ > 0) leave_batch(waiting_);
+    const int32_t count = *count_, end = batches_of(count) * FaceBatch::kEntries;
+    if (count + lane_index() < end) set(count + lane_index(), kNoEntry);
   }
-  __device__ int total() const { return total_; }
-  /// False where there was not room for all batches.
-  __device__ bool is_whole() const { return is_whole_; }
+  __device__ static int32_t batches_of(int32_t count) {
+    return (count + FaceBatch::kEntries - 1) / FaceBatch::kEntries;
+  }
 
  private:
-  // The last `count` of those that wait.
-  __device__ void leave_batch(int count) {
-    __syncwarp();
-    waiting_ -= count;
-    const int32_t place = next_of(&counts_->batches);
-    if (place < lists_.max_batches) {
-      FaceBatch* batch = lists_.batches + place;
-      batch->entries[lane_index()] = lane_index() < count ? entries_[waiting_ + lane_index()] : kNoEntry;
-      if (lane_index() == 0) batch->image = image_;
-    } else {
-      is_whole_ = false;
-    }
-    total_ += count;
-    __syncwarp();
+  __device__ void set(int32_t place, uint32_t entry) {
+    if (place < max_entries_) entries_[place] = entry;
   }
-
   uint32_t* entries_;
-  const GatherLists& lists_;
-  GatherCounts* counts_;
-  int32_t image_;
-  int waiting_ = 0, total_ = 0;
-  bool is_whole_ = true;
+  int32_t max_entries_;
+  int32_t* count_;
 };
 
 // Strips and walls, in this order.
@@ -273,7 +244,6 @@ __device__ inline void cull(BlockState* state, const DrawTask& task, CullRoom* r
   cull_agents(*state, task, list);
   cull_lights(*state, list);
   cull_pieces(state, room, list);
-  list->finish();
 }
 
 }  // namespace pictura::cuda

@@ -316,7 +316,7 @@ __device__ inline bool gather(const DrawTask& task, int32_t view, int32_t camera
   sync_block();
   if (threadIdx.x == 0) {
     state->listed = {};
-    state->num_faces = state->num_clipped = state->overflow = 0;
+    state->num_entries = state->num_faces = state->num_clipped = state->overflow = 0;
     state->usable = set_image(state, task, view, camera) ? 1 : 0;
     FaceMaking* making = &state->making;
     making->faces = state->faces = scratch.faces;
@@ -329,13 +329,16 @@ __device__ inline bool gather(const DrawTask& task, int32_t view, int32_t camera
   }
   sync_block();
   if (state->usable == 0) return false;
-  EntryList list(&room->cull, lists, &state->listed, 0);
+  // The list holds all that a world does.
+  EntryList list(lists.entries, lists.max_entries, &state->num_entries);
   cull(state, task, &room->cull, &list);
   sync_block();
-  // Nobody has found more than there is room for: the lists hold all that a world does.
+  if (warp_index() == 0) list.finish();
+  sync_block();
   PICTURA_KEEP_LOOP
-  for (int i = warp_index(); i < state->listed.batches; i += num_warps()) {
-    make_faces(state->making, &room->faces, lists, &state->listed, lists.batches[i].entries[lane_index()], 0);
+  for (int i = warp_index(); i < EntryList::batches_of(state->num_entries); i += num_warps()) {
+    make_faces(state->making, &room->faces, lists, &state->listed,
+               lists.entries[i * FaceBatch::kEntries + lane_index()], 0);
     __syncwarp();
   }
   sync_block();

@@ -127,7 +127,9 @@ struct TileSpan {
   __device__ int full_end() const { return static_cast<int>(bytes >> 16 & 0xFF); }
   __device__ int end() const { return static_cast<int>(bytes >> 24); }
   /// Of the pixels that are covered partly, a few before those that are covered fully and a few behind.
-  __device__ int partial(int k) const { return begin() + k < full_begin() ? begin() + k : full_end() - full_begin() + begin() + k; }
+  __device__ int partial(int k) const {
+    return begin() + k < full_begin() ? begin() + k : full_end() - full_begin() + begin() + k;
+  }
 };
 
 // Marks, in a part, the nearest face that covers each pixel fully, and lists the pixels that faces cover partly. Rows

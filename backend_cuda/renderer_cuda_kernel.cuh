@@ -210,23 +210,25 @@ class DrawOrder {
   int32_t begin_ = 0;  // the first turn of the crowd
 };
 
-// Takes room for the faces of an image of which so many things may show, and tells the later launches of it. One
-// thread.
-__device__ inline void take_face_room(const DrawTask& task, int32_t image, int32_t listed, bool all_are_listed) {
+// Takes room for the faces of an image of which so many things may show, and lists it to be drawn. False where that has
+// to wait. One thread.
+__device__ inline bool take_face_room(const DrawTask& task, int32_t image, int32_t listed, int32_t* first_batch_out) {
   BlockState* state = block_state();
   FaceMaking* making = &state->making;
   GatheredImage* out = task.pool.images + image;
   *out = {.face_count = kNotGathered};
   if (listed > kMostMarkedFaces) {
     leave_to_last(task, image);
-    return;
+    return false;
   }
   DrawCounters::Round* round = &task.counters->rounds[task.round_index];
-  const int32_t face_begin = all_are_listed ? atomicAdd(&round->faces, listed) : task.pool.max_faces;
-  if (!all_are_listed || face_begin + listed > task.pool.max_faces) {
+  const int32_t face_begin = atomicAdd(&round->faces, listed);
+  if (face_begin + listed > task.pool.max_faces) {
     postpone(task, image);
-    return;
+    return false;
   }
+  *first_batch_out = atomicAdd(&round->batches, EntryList::batches_of(listed));
+  list_drawn(task, image, listed);
   making->faces = task.pool.faces + face_begin;
   making->edges = task.pool.edges;
   making->num_faces = &out->face_count;
@@ -235,7 +237,12 @@ __device__ inline void take_face_room(const DrawTask& task, int32_t image, int32
   making->clipped_begin = 4 * task.pool.max_faces;
   making->clipped_end = task.pool.max_edges;
   *out = image_of(*state, face_begin, 0);
-  list_drawn(task, image, listed);
+  return true;
+}
+
+// The entries of an image.
+__device__ inline uint32_t* entries_of(const GatherLists& lists, int32_t image) {
+  return lists.entries + static_cast<int64_t>(image) * lists.max_entries;
 }
 
 // Lists what images may show.
@@ -249,7 +256,10 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kCullBlocksPerProce
   PICTURA_KEEP_LOOP
   for (auto i = static_cast<int32_t>(blockIdx.x); i < num_images; i = num_blocks + next_of(&round->next_culled)) {
     const int32_t image = image_of_round(task, i), camera = camera_of(task, image);
-    if (lane_index() == 0) state->usable = set_image(state, task, view_of(task, image), camera) ? 1 : 0;
+    if (lane_index() == 0) {
+      state->num_entries = 0;
+      state->usable = set_image(state, task, view_of(task, image), camera) ? 1 : 0;
+    }
     __syncwarp();
     if (state->usable == 0) {
       if (lane_index() == 0) {
@@ -258,11 +268,22 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kCullBlocksPerProce
       }
       continue;
     }
-    EntryList list(room, task.pool.lists, &round->listed, image);
+    EntryList list(entries_of(task.pool.lists, image), task.pool.lists.max_entries, &state->num_entries);
     cull(state, task, room, &list);
-    if (lane_index() == 0) take_face_room(task, image, list.total(), list.is_whole());
+    __syncwarp();
+    list.finish();
+    const int32_t listed = state->num_entries;
+    int32_t first_batch = 0;
+    bool has_room = lane_index() == 0 && take_face_room(task, image, listed, &first_batch);
     __syncwarp();
     copy_whole(task.pool.makings + image, state->making);
+    has_room = __any_sync(kAllLanes, has_room);
+    first_batch = __shfl_sync(kAllLanes, first_batch, 0);
+    const int32_t batches = has_room ? EntryList::batches_of(listed) : 0;
+    PICTURA_KEEP_LOOP
+    for (int32_t batch = lane_index(); batch < batches; batch += kWarpSize) {
+      task.pool.batches[first_batch + batch] = {image, batch * FaceBatch::kEntries};
+    }
     __syncwarp();
   }
 }
@@ -273,15 +294,15 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kMakingBlocksPerPro
   wait_for_earlier_launch();
   MakingState* state = making_state();
   DrawCounters::Round* round = &task.counters->rounds[task.round_index];
-  const int32_t num_batches = min_of(round->listed.batches, task.pool.lists.max_batches);
+  const int32_t num_batches = round->batches;
   // The first lane asks for the next batch while the warp makes the faces of one.
   auto i = static_cast<int32_t>(blockIdx.x);
   PICTURA_KEEP_LOOP
   while (i < num_batches) {
     const int32_t next = lane_index() == 0 ? static_cast<int32_t>(gridDim.x) + atomicAdd(&round->next_batch, 1) : 0;
-    const FaceBatch& batch = task.pool.lists.batches[i];
+    const FaceBatch batch = task.pool.batches[i];
     const int32_t image = batch.image;
-    const uint32_t entry = batch.entries[lane_index()];
+    const uint32_t entry = entries_of(task.pool.lists, image)[batch.first_entry + lane_index()];
     const int32_t face_count = task.pool.images[image].face_count;
     copy_whole(&state->making, task.pool.makings[image]);
     __syncwarp();
@@ -319,6 +340,7 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kClipBlocksPerProce
 extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcessor)
     pictura_draw(const __grid_constant__ DrawTask task) {
   wait_for_earlier_launch();
+  if (images_of_round(task) == 0) return;
   BlockState* state = block_state();
   int32_t* const counter = &task.counters->rounds[task.round_index].next_drawn;
   // While the block draws a tile, the first thread asks for the number of the next but one, and what the next one

@@ -88,13 +88,15 @@ struct alignas(16) FaceMaking {
   int32_t clipped_begin = 0, clipped_end = 0;
 };
 
-/// Things that an image may show: entries of renderer_cuda_cull.cuh, all of one image or, of those that are to be
-/// clipped, each with its own.
+/// Entries of an image that there is room for, if it is drawn from the pool.
+constexpr int kMostEntries = 2048;
+
+/// Of the entries of an image (renderer_cuda_cull.cuh) those that a warp makes faces of at once, one for each lane.
 struct FaceBatch {
   static constexpr int kEntries = 32;
-  uint32_t entries[kEntries];
-  int32_t image;
+  int32_t image, first_entry;
 };
+/// An entry that is to be clipped.
 struct ClippedThing {
   uint32_t entry;
   int32_t image;
@@ -102,13 +104,13 @@ struct ClippedThing {
 
 /// What each step of gathering leaves to the next one. There is room to clip whatever may show.
 struct GatherLists {
-  FaceBatch* batches = nullptr;
+  uint32_t* entries = nullptr;      // [max_entries] for each image, whole batches of those that it has
   ClippedThing* clipped = nullptr;  // faces of four corners from the front, lights from the back
-  int32_t max_batches = 0, max_clipped = 0;
+  int32_t max_entries = 0, max_clipped = 0;
 };
-/// How much of it there is; batches may outgrow their list.
+/// How much of what is to be clipped there is.
 struct GatherCounts {
-  int32_t batches = 0, clipped = 0, lights = 0;
+  int32_t clipped = 0, lights = 0;
 };
 
 /// Faces of many images, and what is known of those images before.
@@ -117,6 +119,7 @@ struct FacePool {
   PolygonEdge* edges = nullptr;
   GatheredImage* images = nullptr;  // [images]
   FaceMaking* makings = nullptr;    // [images]
+  FaceBatch* batches = nullptr;     // as many as there may be for max_faces in so many images
   GatherLists lists;
   int32_t max_faces = 0, max_edges = 0;  // of edges, four for each face, the rest for those that are clipped
 };
@@ -126,10 +129,8 @@ struct Scratch {
   ScreenFace* faces = nullptr;     // [blocks][max_faces]
   PolygonEdge* edges = nullptr;    // [blocks][max_edges]
   unsigned char* bytes = nullptr;  // [blocks][large_bytes()]
-  int32_t blocks = 0, max_batches = 0, max_faces = 0, max_edges = 0;
+  int32_t blocks = 0, max_faces = 0, max_edges = 0;
 };
-/// Warps of such a block, each of which may leave a batch that is not full.
-constexpr int kLargeWarps = 4;
 
 /// Images are gathered and drawn in rounds: those for which the pool had no room left are postponed to the next one.
 constexpr int kRounds = 3;
@@ -143,6 +144,7 @@ struct DrawCounters {
   struct Round {
     int32_t next_culled = 0, next_batch = 0, next_clipped = 0, next_drawn = 0;  // the last counts tiles
     GatherCounts listed;
+    int32_t batches = 0;
     int32_t faces = 0, clipped_edges = 0;  // of the pool that are taken
     int32_t postponed = 0;                 // images
     int32_t crowds[kCrowds] = {};          // images that are drawn, by how much they list

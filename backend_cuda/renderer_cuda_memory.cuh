@@ -140,18 +140,18 @@ struct SmallDrawMemory : DrawMemory<uint16_t, uint32_t> {
     return memory;
   }
 };
+static_assert(kMostMarkedFaces <= kMostEntries);
 static_assert(kMostMarkedFaces < 0xFFFF && kDrawFragments < 0xFFFF && kDrawPixels < 0x7FFF);
 
 // In global memory. What drawing keeps lies where gathering has left its lists.
 __host__ __device__ inline size_t lay_out(GatherLists* lists, const Scratch& sizes, unsigned char* bytes) {
-  lists->max_batches = sizes.max_batches;
+  lists->max_entries = (sizes.max_faces + FaceBatch::kEntries - 1) / FaceBatch::kEntries * FaceBatch::kEntries;
   lists->max_clipped = sizes.max_faces;
   Layout layout{bytes};
   layout.place(&lists->clipped, lists->max_clipped);
-  layout.place(&lists->batches, lists->max_batches);
+  layout.place(&lists->entries, lists->max_entries);
   return layout.used;
 }
-static_assert(kLargeThreads == kLargeWarps * kWarpSize);
 struct LargeDrawMemory : DrawMemory<uint32_t, unsigned long long> {
   __host__ __device__ size_t place(unsigned char* bytes) { return lay_out(this, kLargePixels, kLargeFragments, bytes); }
   __device__ static LargeDrawMemory current() {

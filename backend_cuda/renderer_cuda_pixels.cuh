@@ -131,8 +131,9 @@ __device__ void mix_pixels(const Memory& memory, const Visit& visit, const Write
     const PixelSum::Shares shares = sum.shares();
     if constexpr (Visit::kWanted) {
       if (full != Memory::kNone) visit(memory.faces[full], shares.of(of_full));
-      each_fragment(
-          [&](int i, PixelSum::Kind kind) { visit(memory.faces[memory.face[i]], shares.of({memory.area[i], kind})); });
+      each_fragment([&](int i, PixelSum::Kind kind) {
+        visit(memory.faces[memory.face[i]], shares.of({memory.area[i], kind}));
+      });
     }
     write.keep(memory, head, sum.color(shares));
   }

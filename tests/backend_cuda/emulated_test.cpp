@@ -36,9 +36,9 @@ class EmulatedRenderer final : public Renderer {
  public:
   /// Room in the pool, for an image.
   struct Pool {
-    std::size_t faces = 2048, clipped_edges = 4096, batches = 65;
+    std::size_t faces = 2048, clipped_edges = 4096;
   };
-  EmulatedRenderer(const RendererConfig& config, uint64_t seed, const Pool& pool = {2048, 4096, 65})
+  EmulatedRenderer(const RendererConfig& config, uint64_t seed, const Pool& pool = {2048, 4096})
       : config_(config), seed_(seed), pool_(pool), cameras_(pinhole_cameras(config.rig)) {}
   std::string_view name() const override { return "emulated"; }
   MemorySpace space() const override { return MemorySpace::host; }
@@ -100,6 +100,7 @@ class EmulatedRenderer final : public Renderer {
     std::vector<cuda::GatheredImage> images;
     std::vector<cuda::FaceMaking> makings;
     std::vector<cuda::FaceBatch> batches;
+    std::vector<uint32_t> entries;
     std::vector<cuda::ClippedThing> clipped;
     std::vector<int32_t> overflow_images, postponed_images[2], drawn_images;
     std::vector<uint64_t> large_words;
@@ -116,7 +117,8 @@ class EmulatedRenderer final : public Renderer {
       pool_edges.resize(4 * pool_faces.size() + renderer.pool_.clipped_edges * num_images);
       images.resize(num_images);
       makings.resize(num_images);
-      batches.resize(renderer.pool_.batches * num_images);
+      batches.resize(pool_faces.size() / cuda::FaceBatch::kEntries + num_images);
+      entries.resize(cuda::kMostEntries * num_images);
       clipped.resize(pool_faces.size());
       overflow_images.resize(num_images);
       task.pool = {
@@ -124,7 +126,8 @@ class EmulatedRenderer final : public Renderer {
           pool_edges.data(),
           images.data(),
           makings.data(),
-          {batches.data(), clipped.data(), static_cast<int32_t>(batches.size()), static_cast<int32_t>(clipped.size())},
+          batches.data(),
+          {entries.data(), clipped.data(), cuda::kMostEntries, static_cast<int32_t>(clipped.size())},
           static_cast<int32_t>(pool_faces.size()),
           static_cast<int32_t>(pool_edges.size())};
       task.geometries = renderer.geometries_.data();
@@ -208,7 +211,6 @@ void expect_some_postponed(uint64_t seed, const EmulatedRenderer::Pool& pool) {
 TEST(EmulatedKernels, PostponeWhatThePoolHasNoRoomFor) { expect_some_postponed(7, {.faces = 130}); }
 // Noticed when some of an image's faces are made already.
 TEST(EmulatedKernels, PostponeWhatHasNoRoomForItsClippedEdges) { expect_some_postponed(8, {.clipped_edges = 60}); }
-TEST(EmulatedKernels, PostponeWhatThereAreNoBatchesFor) { expect_some_postponed(10, {.batches = 4}); }
 
 TEST(EmulatedKernels, ClipLightsOnAllSides) {
   // A spiral of heads around a camera, from before its near plane on, that turn to it and cross each other's disks and
