@@ -116,8 +116,7 @@ void ImageDrawer::hide_fragments(int x, int y) {
     const PixelCoverage& a = pixel_[i].coverage;
     for (std::size_t j = i + 1; j < pixel_.size(); ++j) {
       const PixelCoverage& b = pixel_[j].coverage;
-      // Nothing is left that they could hide of each other.
-      if ((free_[i] & b.samples) == 0 && (free_[j] & a.samples) == 0) continue;
+      if (!may_hide_more(free_[i], a.samples, free_[j], b.samples)) continue;
       const Hidden hidden = hide_each_other(a, b, faces_[static_cast<std::size_t>(pixel_[i].face)],
                                             faces_[static_cast<std::size_t>(pixel_[j].face)], corner,
                                             [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); });

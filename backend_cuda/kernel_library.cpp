@@ -37,6 +37,7 @@ KernelLibrary::KernelLibrary(const Rig& rig) {
     const cudaError_t status = cudaFuncGetAttributes(&unused, kernels_.draw);
     PICTURA_CHECK(status == cudaSuccess, "renderer cuda: {} do not run on a device of compute capability {}: {}",
                   origin_, compute_capability(), cudaGetErrorString(status));
+    PICTURA_CUDA(prepare_kernels(&kernels_));
     return;
   }
   const KernelCode code = build_kernels(renderer_program(), target_of(rig));
@@ -48,6 +49,7 @@ KernelLibrary::KernelLibrary(const Rig& rig) {
   };
   kernels_ = {kernel(kCullName), kernel(kGatherName),       kernel(kClipName),
               kernel(kDrawName), kernel(kDrawOverflowName), kernel(kVisibilityName)};
+  PICTURA_CUDA(prepare_kernels(&kernels_));
   origin_ = fmt::format("kernels {} for {} and this rig", code.cached ? "built earlier" : "built", code.architecture);
 }
 

@@ -85,13 +85,12 @@ class PoolBuffers {
     task_out->overflow_images = lists_.data() + 2 * images_.size();
     task_out->drawn_images = lists_.data() + 3 * images_.size();
   }
-  // Of each image the last one may not be full.
+  // There is room for as many as the faces in the pool make, of each image with a last one that may not be full.
   static constexpr int kBatches = kPoolFaces / cuda::FaceBatch::kEntries + 1;
-  static constexpr std::size_t kImageBytes = kPoolFaces * sizeof(ScreenFace) + kPoolEdges * sizeof(PolygonEdge) +
-                                             sizeof(cuda::GatheredImage) + sizeof(cuda::FaceMaking) +
-                                             kBatches * sizeof(cuda::FaceBatch) + cuda::kMostEntries * sizeof(uint32_t) +
-                                             kPoolFaces * sizeof(cuda::ClippedThing) +
-                                             (3 + cuda::kCrowds) * sizeof(int32_t);
+  static constexpr std::size_t kImageBytes =
+      kPoolFaces * sizeof(ScreenFace) + kPoolEdges * sizeof(PolygonEdge) + sizeof(cuda::GatheredImage) +
+      sizeof(cuda::FaceMaking) + kBatches * sizeof(cuda::FaceBatch) + cuda::kMostEntries * sizeof(uint32_t) +
+      kPoolFaces * sizeof(cuda::ClippedThing) + (3 + cuda::kCrowds) * sizeof(int32_t);
 
  private:
   DeviceBuffer<ScreenFace> faces_;
@@ -150,7 +149,6 @@ class CudaRenderer final : public Renderer {
     int device = 0;
     PICTURA_CUDA(cudaGetDevice(&device));
     PICTURA_CUDA(cudaDeviceGetAttribute(&processors_, cudaDevAttrMultiProcessorCount, device));
-    PICTURA_CUDA(cuda::prepare_kernels(library_.kernels()));
     *origin_out = library_.origin();
     grow(0, 1);  // what is too little for any scene is told at once
     counters_ = DeviceBuffer<cuda::DrawCounters>(1);

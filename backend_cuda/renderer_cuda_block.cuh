@@ -40,8 +40,7 @@ struct BlockState {
   GatherCounts listed;
   int32_t num_entries, num_faces, num_clipped, overflow, usable;
   // While pixels are drawn.
-  int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, image, tile;
-  int32_t next_rows, next_candidates, next_fragments;
+  int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, next_fragments, image, tile;
   WarpState warps[kMaxWarps];
 };
 

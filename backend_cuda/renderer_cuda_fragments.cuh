@@ -111,7 +111,8 @@ __device__ int mark_pixel(const Memory& memory, int face, int x, int y, int pixe
   return may_show_before(memory.faces[loser], memory.faces[winner], x, y, true) ? loser : -1;
 }
 
-// A row of a face within a tile: columns from the tile's first on, a byte each.
+// A row of a face within a tile: columns from the tile's first on, a byte each, so that lanes hand them on at once.
+static_assert(kTileWidth_px <= 255);
 struct TileSpan {
   uint32_t bytes = 0;
   TileSpan() = default;
@@ -126,10 +127,9 @@ struct TileSpan {
   __device__ int full_begin() const { return static_cast<int>(bytes >> 8 & 0xFF); }
   __device__ int full_end() const { return static_cast<int>(bytes >> 16 & 0xFF); }
   __device__ int end() const { return static_cast<int>(bytes >> 24); }
-  /// Of the pixels that are covered partly, a few before those that are covered fully and a few behind.
-  __device__ int partial(int k) const {
-    return begin() + k < full_begin() ? begin() + k : full_end() - full_begin() + begin() + k;
-  }
+  __device__ int num_full() const { return full_end() - full_begin(); }
+  /// Column k of those that are covered partly: some before those that are covered fully, and some behind.
+  __device__ int partial(int k) const { return begin() + k + (begin() + k < full_begin() ? 0 : num_full()); }
 };
 
 // Marks, in a part, the nearest face that covers each pixel fully, and lists the pixels that faces cover partly. Rows
@@ -151,8 +151,8 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
       const int y = part.y_begin + static_cast<int>(row & Memory::kNone);
       span = TileSpan(row_span(memory.edges + face.edge_begin, face.edge_count, face.box, y), part);
     }
-    const int full = span.full_end() - span.full_begin(), partial = span.end() - span.begin() - full;
-    // Both sums at once.
+    const int full = span.num_full(), partial = span.end() - span.begin() - full;
+    // Both sums at once: neither reaches 2^16.
     const int ends = sum_up_to(full | partial << 16), full_end = ends & 0xFFFF, partial_end = ends >> 16;
     auto of = [](auto value, int lane) { return __shfl_sync(kAllLanes, value, max_of(lane, 0)); };
     share_out(warp, full, full_end, [&](int, int owner, int k) {

@@ -45,8 +45,11 @@ struct ImageWriter {
 
   template <typename Memory>
   __device__ void write_bytes(const Memory& memory, uint8_t* to, int count, const typename Memory::Word* words) const {
+    // Many warps write nothing but black.
     uint32_t bytes[kWrittenAtOnce] = {};
-    for (int i = 0; i < kWrittenAtOnce && (words[0] | words[1] | words[2] | words[3]) != 0; ++i) {
+    typename Memory::Word some = 0;
+    for (int i = 0; i < kWrittenAtOnce; ++i) some |= words[i];
+    for (int i = 0; i < kWrittenAtOnce && some != 0; ++i) {
       const auto full = full_of_word<Memory>(words[i]), head = first_of_word<Memory>(words[i]);
       bytes[i] = head != Memory::kNone   ? memory.color_bytes(static_cast<int>(head))
                  : full != Memory::kNone ? memory.faces[full].color_bytes
@@ -105,10 +108,28 @@ struct NoImage {
   __device__ void pixels(const Memory&, int, int, int, const typename Memory::Word*) const {}
 };
 
-// Writes the optional planes of a part: the front surface at each pixel's centre.
+// Writes the optional planes of a part: the front surface at each pixel's centre, of the faces that touch the part. All
+// threads of the block.
 template <typename Memory>
 __device__ __noinline__ void draw_planes(const CameraSlot& slot, int32_t view, int num_faces, Part part) {
   const Memory memory = Memory::current();
+  BlockState* state = memory.state;
+  sync_block();
+  PICTURA_KEEP_LOOP
+  for (int first = warp_index() * kWarpSize; first < num_faces; first += num_threads()) {
+    const int i = first + lane_index();
+    bool touches = false;
+    if (i < num_faces) {
+      const PixelBox box = memory.faces[i].box;
+      touches =
+          box.x_begin < part.x_end && box.x_end > part.x_begin && box.y_begin < part.y_end && box.y_end > part.y_begin;
+    }
+    const int32_t place = take_place(&state->num_rows, touches);
+    if (touches && place < memory.max_rows) memory.rows[place] = static_cast<typename Memory::Word>(i);
+  }
+  sync_block();
+  const bool are_listed = state->num_rows <= memory.max_rows;
+  const int candidates = are_listed ? state->num_rows : num_faces;
   const int width = width_px(slot.camera);
   const int64_t plane = static_cast<int64_t>(width) * height_px(slot.camera);
   PICTURA_KEEP_LOOP
@@ -119,8 +140,8 @@ __device__ __noinline__ void draw_planes(const CameraSlot& slot, int32_t view, i
     FrontFace front;
     auto each = [&](auto&& take) {
       PICTURA_KEEP_LOOP
-      for (int i = 0; i < num_faces; ++i) {
-        const ScreenFace& face = memory.faces[i];
+      for (int i = 0; i < candidates; ++i) {
+        const ScreenFace& face = memory.faces[are_listed ? memory.rows[i] : static_cast<typename Memory::Word>(i)];
         if (x < face.box.x_begin || x >= face.box.x_end || y < face.box.y_begin || y >= face.box.y_end) continue;
         if (covers_point(memory.edges + face.edge_begin, face.edge_count, center.x, center.y)) take(face);
       }
@@ -148,6 +169,7 @@ __device__ bool draw_image_part(const Memory& memory, const DrawTask& task, int3
   if (task.wants_planes) {
     draw_planes<Memory>(slot, view, num_faces, part);
     sync_block();
+    reset_counts(memory);
   }
   return true;
 }

@@ -119,7 +119,7 @@ struct FacePool {
   PolygonEdge* edges = nullptr;
   GatheredImage* images = nullptr;  // [images]
   FaceMaking* makings = nullptr;    // [images]
-  FaceBatch* batches = nullptr;     // as many as there may be for max_faces in so many images
+  FaceBatch* batches = nullptr;     // as many as max_faces in so many images may make
   GatherLists lists;
   int32_t max_faces = 0, max_edges = 0;  // of edges, four for each face, the rest for those that are clipped
 };
@@ -144,10 +144,9 @@ struct DrawCounters {
   struct Round {
     int32_t next_culled = 0, next_batch = 0, next_clipped = 0, next_drawn = 0;  // the last counts tiles
     GatherCounts listed;
-    int32_t batches = 0;
-    int32_t faces = 0, clipped_edges = 0;  // of the pool that are taken
-    int32_t postponed = 0;                 // images
-    int32_t crowds[kCrowds] = {};          // images that are drawn, by how much they list
+    int32_t faces = 0, batches = 0, clipped_edges = 0;  // of the pool that are taken
+    int32_t postponed = 0;                              // images
+    int32_t crowds[kCrowds] = {};                       // images that are drawn, by how much they list
   } rounds[kRounds];
   int32_t overflow = 0;  // images left to the last launch
 };

@@ -11,8 +11,14 @@ struct LaunchShape {
   std::size_t shared_bytes;
 };
 
+// Where launches go, and whether one may begin while the one before it ends.
+struct LaunchPlace {
+  cudaStream_t stream;
+  bool may_begin_early;
+};
+
 template <typename... Arguments>
-cudaError_t launch(const void* kernel, LaunchShape shape, cudaStream_t stream, const Arguments&... arguments) {
+cudaError_t launch(const void* kernel, LaunchShape shape, LaunchPlace place, const Arguments&... arguments) {
   void* pointers[] = {const_cast<Arguments*>(&arguments)...};
   cudaLaunchAttribute attribute{};
   attribute.id = cudaLaunchAttributeProgrammaticStreamSerialization;
@@ -21,9 +27,9 @@ cudaError_t launch(const void* kernel, LaunchShape shape, cudaStream_t stream, c
   config.gridDim = dim3(static_cast<unsigned>(shape.blocks));
   config.blockDim = dim3(static_cast<unsigned>(shape.threads));
   config.dynamicSmemBytes = shape.shared_bytes;
-  config.stream = stream;
+  config.stream = place.stream;
   config.attrs = &attribute;
-  config.numAttrs = 1;
+  config.numAttrs = place.may_begin_early ? 1 : 0;
   return cudaLaunchKernelExC(&config, kernel, pointers);
 }
 
@@ -39,12 +45,20 @@ KernelSet ahead_of_time_kernels() {
           reinterpret_cast<const void*>(pictura_draw_overflow), reinterpret_cast<const void*>(pictura_visibility)};
 }
 
-cudaError_t prepare_kernels(const KernelSet& kernels) { return allow_shared(kernels.draw, draw_bytes()); }
+cudaError_t prepare_kernels(KernelSet* kernels) {
+  cudaFuncAttributes attributes{};
+  const cudaError_t status = cudaFuncGetAttributes(&attributes, kernels->draw);
+  if (status != cudaSuccess) return status;
+  // From there on kernels wait for the launch before theirs, see wait_for_earlier_launch.
+  kernels->may_begin_early = attributes.ptxVersion >= 90;
+  return allow_shared(kernels->draw, draw_bytes());
+}
 
 std::size_t large_block_bytes(const Scratch& large) { return large_bytes(large); }
 
 cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& large, int processors,
                         cudaStream_t stream) {
+  const LaunchPlace place{stream, kernels.may_begin_early};
   const int images = task.num_views * task.num_cameras;
   const LaunchShape to_draw{min_of(images * task.most_tiles, kDrawBlocksPerProcessor * processors), kDrawThreads,
                             draw_bytes()};
@@ -56,25 +70,25 @@ cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& 
     const LaunchShape to_gather{kMakingBlocksPerProcessor / share * processors, kGatherThreads, sizeof(MakingState)};
     const LaunchShape to_clip{kClipBlocksPerProcessor / share * processors, kGatherThreads,
                               gather_bytes(kGatherThreads)};
-    cudaError_t status = launch(kernels.cull, to_cull, stream, task);
+    cudaError_t status = launch(kernels.cull, to_cull, place, task);
     if (status != cudaSuccess) return status;
-    status = launch(kernels.gather, to_gather, stream, task);
+    status = launch(kernels.gather, to_gather, place, task);
     if (status != cudaSuccess) return status;
-    status = launch(kernels.clip, to_clip, stream, task);
+    status = launch(kernels.clip, to_clip, place, task);
     if (status != cudaSuccess) return status;
-    status = launch(kernels.draw, to_draw, stream, task);
+    status = launch(kernels.draw, to_draw, place, task);
     if (status != cudaSuccess) return status;
   }
   return launch(kernels.draw_overflow, {min_of(images, large.blocks), kLargeThreads, gather_bytes(kLargeThreads)},
-                stream, task, large);
+                place, task, large);
 }
 
 cudaError_t launch_visibility(const KernelSet& kernels, const VisibilityTask& task, const Scratch& large,
                               cudaStream_t stream) {
   if (task.num_queries == 0) return cudaSuccess;
   return launch(kernels.visibility,
-                {min_of(task.num_queries, large.blocks), kLargeThreads, gather_bytes(kLargeThreads)}, stream, task,
-                large);
+                {min_of(task.num_queries, large.blocks), kLargeThreads, gather_bytes(kLargeThreads)},
+                LaunchPlace{stream, false}, task, large);
 }
 
 }  // namespace pictura::cuda

@@ -18,6 +18,7 @@ struct KernelSet {
   const void* draw = nullptr;
   const void* draw_overflow = nullptr;
   const void* visibility = nullptr;
+  bool may_begin_early = false;  // a launch of theirs, while the one before it ends
 };
 constexpr const char* kCullName = "pictura_cull";
 constexpr const char* kGatherName = "pictura_gather";
@@ -29,7 +30,7 @@ constexpr const char* kVisibilityName = "pictura_visibility";
 /// Those that were compiled with this program, for any rig.
 KernelSet ahead_of_time_kernels();
 /// What is to be done once before the first launch.
-cudaError_t prepare_kernels(const KernelSet& kernels);
+cudaError_t prepare_kernels(KernelSet* kernels);
 
 /// Bytes that a block of the last launch needs besides faces and edges.
 std::size_t large_block_bytes(const Scratch& large);

@@ -38,10 +38,10 @@ __device__ __noinline__ void ask_pairs(WarpQueue::Pair pair, Part part) {
   if (!with_full) lose(memory, pair.b, hidden.of_b);
 }
 
-// Asks every two fragments of a pixel that meet what they hide of each other; a pixel's full face is one of them. A
-// lane walks the rest of the chain behind a fragment, one step at a time, and takes the next fragment at its end; the
-// last made first, because theirs are the longest ways. Pairs that meet are put aside until every lane of the warp has
-// one.
+// Asks every two fragments of a pixel what they hide of each other, unless nothing is left that they might; a pixel's
+// full face is one of them. A lane walks the rest of the chain behind a fragment, one step at a time, and takes the
+// next fragment at its end; the last made first, because theirs are the longest ways. Pairs that meet are put aside
+// until every lane of the warp has one.
 template <typename Memory>
 __device__ void hide_fragments(const Memory& memory, const Part& part, int count) {
   WarpQueue pairs(&memory.state->warps[warp_index()].queue);
@@ -49,7 +49,7 @@ __device__ void hide_fragments(const Memory& memory, const Part& part, int count
   int fragment = 0;
   uint32_t other = Memory::kNone;  // of the chain
   bool is_before_full = false;     // the full face comes first
-  PixelCoverage coverage;
+  uint64_t samples = 0;
   PICTURA_KEEP_LOOP
   for (;;) {
     const bool is_idle = !is_before_full && other == Memory::kNone;
@@ -63,7 +63,7 @@ __device__ void hide_fragments(const Memory& memory, const Part& part, int count
     used += __popc(idle);
     if (is_idle && place < kWarpSize && begin + place < count) {
       fragment = count - 1 - (begin + place);
-      coverage = memory.coverage(fragment);
+      samples = memory.samples(fragment);
       other = memory.next[fragment];
       is_before_full = full_of(memory, memory.pixel[fragment]) != Memory::kNone;
     }
@@ -71,8 +71,8 @@ __device__ void hide_fragments(const Memory& memory, const Part& part, int count
     bool meet = is_before_full && memory.free(fragment) != 0;
     if (!is_before_full && other != Memory::kNone) {
       with = other;
-      meet = ((memory.free(fragment) & memory.samples(static_cast<int>(with))) |
-              (memory.free(static_cast<int>(with)) & coverage.samples)) != 0;
+      const auto its = static_cast<int>(with);
+      meet = may_hide_more(memory.free(fragment), samples, memory.free(its), memory.samples(its));
       other = memory.next[with];
     }
     is_before_full = false;
@@ -131,9 +131,8 @@ __device__ void mix_pixels(const Memory& memory, const Visit& visit, const Write
     const PixelSum::Shares shares = sum.shares();
     if constexpr (Visit::kWanted) {
       if (full != Memory::kNone) visit(memory.faces[full], shares.of(of_full));
-      each_fragment([&](int i, PixelSum::Kind kind) {
-        visit(memory.faces[memory.face[i]], shares.of({memory.area[i], kind}));
-      });
+      each_fragment(
+          [&](int i, PixelSum::Kind kind) { visit(memory.faces[memory.face[i]], shares.of({memory.area[i], kind})); });
     }
     write.keep(memory, head, sum.color(shares));
   }
@@ -172,7 +171,7 @@ __device__ void reset_counts(const Memory& memory) {
   BlockState* state = memory.state;
   if (threadIdx.x != 0) return;
   state->num_rows = state->num_candidates = state->num_fragments = state->num_added = state->num_drawn = 0;
-  state->next_rows = state->next_candidates = state->next_fragments = 0;
+  state->next_fragments = 0;
 }
 // What a part finds when it begins: nothing is marked, nothing listed. For a block's first part, and after one that was
 // given up. All threads of the block.

@@ -252,6 +252,12 @@ PICTURA_HD inline bool fit_together(const PixelCoverage& a, const PixelCoverage&
   return (a.samples == 0 || b.samples == 0) && fabsf(a.area + b.area - 1.0f) < kFullCoverage;
 }
 
+/// Whether two fragments of a pixel may still hide something of each other, given what is free of each of them. That
+/// only becomes less, so nothing is lost where they are not asked any more, whenever others take what.
+PICTURA_HD inline bool may_hide_more(uint64_t free_a, uint64_t samples_a, uint64_t free_b, uint64_t samples_b) {
+  return ((free_a & samples_b) | (free_b & samples_a)) != 0;
+}
+
 /// What two fragments of a pixel hide of each other.
 struct Hidden {
   uint64_t of_a = 0, of_b = 0;

@@ -121,15 +121,14 @@ class EmulatedRenderer final : public Renderer {
       entries.resize(cuda::kMostEntries * num_images);
       clipped.resize(pool_faces.size());
       overflow_images.resize(num_images);
-      task.pool = {
-          pool_faces.data(),
-          pool_edges.data(),
-          images.data(),
-          makings.data(),
-          batches.data(),
-          {entries.data(), clipped.data(), cuda::kMostEntries, static_cast<int32_t>(clipped.size())},
-          static_cast<int32_t>(pool_faces.size()),
-          static_cast<int32_t>(pool_edges.size())};
+      task.pool = {pool_faces.data(),
+                   pool_edges.data(),
+                   images.data(),
+                   makings.data(),
+                   batches.data(),
+                   {entries.data(), clipped.data(), cuda::kMostEntries, static_cast<int32_t>(clipped.size())},
+                   static_cast<int32_t>(pool_faces.size()),
+                   static_cast<int32_t>(pool_edges.size())};
       task.geometries = renderer.geometries_.data();
       task.num_geometries = static_cast<int32_t>(renderer.geometries_.size());
       task.counters = &counters;
