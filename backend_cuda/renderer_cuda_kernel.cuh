@@ -108,28 +108,23 @@ struct NoImage {
   __device__ void pixels(const Memory&, int, int, int, const typename Memory::Word*) const {}
 };
 
-// Writes the optional planes of a part: the front surface at each pixel's centre, of the faces that touch the part. All
+// Writes the optional planes of a part: the front surface at each pixel's centre, of the faces that have its row. All
 // threads of the block.
 template <typename Memory>
 __device__ __noinline__ void draw_planes(const CameraSlot& slot, int32_t view, int num_faces, Part part) {
+  using Word = typename Memory::Word;
   const Memory memory = Memory::current();
-  BlockState* state = memory.state;
   sync_block();
+  list_rows(memory, num_faces, part);
+  sync_block();
+  // Those of a row in a chain, which begins where its first pixel was and goes on where candidates were; 0 ends it.
+  const int num_rows = memory.state->num_rows;
+  const bool has_room = num_rows <= memory.max_rows;
   PICTURA_KEEP_LOOP
-  for (int first = warp_index() * kWarpSize; first < num_faces; first += num_threads()) {
-    const int i = first + lane_index();
-    bool touches = false;
-    if (i < num_faces) {
-      const PixelBox box = memory.faces[i].box;
-      touches =
-          box.x_begin < part.x_end && box.x_end > part.x_begin && box.y_begin < part.y_end && box.y_end > part.y_begin;
-    }
-    const int32_t place = take_place(&state->num_rows, touches);
-    if (touches && place < memory.max_rows) memory.rows[place] = static_cast<typename Memory::Word>(i);
+  for (int i = static_cast<int>(threadIdx.x); has_room && i < num_rows; i += num_threads()) {
+    memory.candidates[i] = atomicExch(&memory.pixels[memory.rows[i] & Memory::kNone], static_cast<Word>(i + 1));
   }
   sync_block();
-  const bool are_listed = state->num_rows <= memory.max_rows;
-  const int candidates = are_listed ? state->num_rows : num_faces;
   const int width = width_px(slot.camera);
   const int64_t plane = static_cast<int64_t>(width) * height_px(slot.camera);
   PICTURA_KEEP_LOOP
@@ -139,11 +134,18 @@ __device__ __noinline__ void draw_planes(const CameraSlot& slot, int32_t view, i
     const Vec2 center = pixel_middle(x, y);
     FrontFace front;
     auto each = [&](auto&& take) {
-      PICTURA_KEEP_LOOP
-      for (int i = 0; i < candidates; ++i) {
-        const ScreenFace& face = memory.faces[are_listed ? memory.rows[i] : static_cast<typename Memory::Word>(i)];
-        if (x < face.box.x_begin || x >= face.box.x_end || y < face.box.y_begin || y >= face.box.y_end) continue;
+      auto ask = [&](const ScreenFace& face) {
+        if (x < face.box.x_begin || x >= face.box.x_end || y < face.box.y_begin || y >= face.box.y_end) return;
         if (covers_point(memory.edges + face.edge_begin, face.edge_count, center.x, center.y)) take(face);
+      };
+      if (has_room) {
+        PICTURA_KEEP_LOOP
+        for (Word at = memory.pixels[y - part.y_begin]; at != 0; at = memory.candidates[at - 1]) {
+          ask(memory.faces[memory.rows[at - 1] >> Memory::kHalf]);
+        }
+      } else {
+        PICTURA_KEEP_LOOP
+        for (int i = 0; i < num_faces; ++i) ask(memory.faces[i]);
       }
     };
     each([&](const ScreenFace& face) { front.offer(face, center); });
@@ -155,6 +157,7 @@ __device__ __noinline__ void draw_planes(const CameraSlot& slot, int32_t view, i
     if (slot.class_id) slot.class_id[at] = face ? face->class_id : uint8_t{0};
     if (slot.instance_id) slot.instance_id[at] = face ? instance_of(*face) : uint16_t{0};
   }
+  reset_part(memory);
 }
 
 // Draws a part of the image that state->shown tells of. False where it has outgrown the block's memory.
@@ -166,11 +169,7 @@ __device__ bool draw_image_part(const Memory& memory, const DrawTask& task, int3
   const ImageWriter writer{task.format, slot.color, view * slot.view_stride,
                            static_cast<int64_t>(width) * height_px(slot.camera), width};
   if (!draw_faces(memory, num_faces, part, NoVisit{}, writer)) return false;
-  if (task.wants_planes) {
-    draw_planes<Memory>(slot, view, num_faces, part);
-    sync_block();
-    reset_counts(memory);
-  }
+  if (task.wants_planes) draw_planes<Memory>(slot, view, num_faces, part);
   return true;
 }
 

@@ -286,8 +286,25 @@ TEST(EmulatedKernels, DrawCrowdsInPartsAndLeaveNothingOut) {
   Rig rig = paper_rig();
   rig.cameras.resize(1);
   EmulatedRenderer renderer(config_of(rig), 4);
-  expect_oracles(&renderer, make_crowd());
+  expect_oracles(&renderer, make_crowd(), Planes::all);
   EXPECT_GT(renderer.overflow(), 0);
+}
+
+TEST(EmulatedKernels, DrawPlanesOfMoreRowsThanThereIsRoomFor) {
+  // Walls one behind the other, each of which has all rows of a tile.
+  SyntheticTown town;
+  for (int i = 0; i < 100; ++i) {
+    const float x = 4.0f + 0.25f * static_cast<float>(i);
+    town.geometry.walls.push_back({{x, -x, 0}, {x + 0.1f, x, 0}, 12.0f + static_cast<float>(i)});
+  }
+  town.geometry.build_grids();
+  town.scene.end_world(0);
+  town.views = {make_view({0, 0, 0}, 0)};
+  Rig rig = paper_rig();
+  rig.cameras.resize(1);
+  EmulatedRenderer renderer(config_of(rig), 12);
+  expect_oracles(&renderer, town, Planes::all);
+  EXPECT_EQ(renderer.overflow(), 0);
 }
 
 TEST(EmulatedKernels, TellVisibility) {
