@@ -52,6 +52,19 @@ std::vector<std::string> named_maps(const std::vector<std::string>& maps) {
   return towns;
 }
 
+void BenchContext::add_gpu(const std::string& name, const std::string& driver_name) {
+  if (name.empty()) return;
+  device = name + "; " + device;
+  driver = driver_name;
+}
+
+Json BenchContext::json() const {
+  Json object{{"workload", workload}, {"backend", backend}, {"device", device}};
+  if (!driver.empty()) object["driver"] = driver;
+  object["commit"] = PICTURA_COMMIT;
+  return object;
+}
+
 void report_benchmark(bool json, const BenchContext& context, std::vector<BenchResult> results) {
   Json rows = Json::array();
   for (BenchResult& result : results) {
@@ -68,9 +81,7 @@ void report_benchmark(bool json, const BenchContext& context, std::vector<BenchR
                     {"repeats", n}});
   }
   if (json) {
-    Json object{{"workload", context.workload}, {"backend", context.backend}, {"device", context.device}};
-    if (!context.driver.empty()) object["driver"] = context.driver;
-    object["commit"] = PICTURA_COMMIT;
+    Json object = context.json();
     object["results"] = rows;
     return print_json(object);
   }

@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "pictura/apps/drive.h"
+#include "pictura/apps/report.h"
 
 namespace pictura {
 
@@ -25,6 +26,11 @@ struct BenchContext {
   std::string workload, backend;
   std::string device = processor_name();
   std::string driver;  // of a GPU
+
+  /// Names a GPU and its driver beside the processor; nobody where there is none, whose name is empty.
+  void add_gpu(const std::string& name, const std::string& driver_name);
+  /// With the commit of this program.
+  Json json() const;
 };
 
 struct BenchResult {

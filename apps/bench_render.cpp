@@ -185,10 +185,7 @@ void run(Arguments arguments) {
                               world.walls ? "on" : "off", paper_rig().cameras.size(), arguments.format,
                               arguments.planes ? " and planes" : "", world.num_threads, fmt::join(choices, "; ")),
       .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
-  if (on_device) {
-    context.device = cuda_device_name() + "; " + context.device;
-    context.driver = cuda_driver_name();
-  }
+  if (on_device) context.add_gpu(cuda_device_name(), cuda_driver_name());
   report_benchmark(arguments.json, context, results);
 }
 

@@ -145,10 +145,7 @@ void run(Arguments arguments) {
                                                fmt::join(arguments.maps, " "), population_of(arguments.world),
                                                arguments.world.walls ? "on" : "off", arguments.world.num_threads),
                        .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
-  if (on_device) {
-    context.device = cuda_device_name() + "; " + context.device;
-    context.driver = cuda_driver_name();
-  }
+  if (on_device) context.add_gpu(cuda_device_name(), cuda_driver_name());
   report_benchmark(arguments.json, context, results);
 }
 

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "pictura/apps/bench.h"
 #include "pictura/apps/report.h"
@@ -29,20 +30,21 @@ void print_result(const Arguments& arguments, const SoakResult& result) {
                         {"worst", fault.error.worst},
                         {"values_beyond_1_255", fault.error.beyond}});
     }
-    return print_json({{"backend", arguments.soak.backend},
-                       {"choice", result.choice},
-                       {"device", cuda_device_name().empty() ? processor_name() : cuda_device_name()},
-                       {"driver", cuda_driver_name()},
-                       {"maps", arguments.soak.maps},
-                       {"seed", arguments.soak.seed},
-                       {"seconds", result.seconds},
-                       {"scenes", result.scenes},
-                       {"images", result.images},
-                       {"values", result.error.values},
-                       {"differing_values", result.error.differing},
-                       {"worst", result.error.worst},
-                       {"images_out_of_tolerance", result.images_out_of_tolerance},
-                       {"faults", faults}});
+    BenchContext context{.workload = fmt::format("soak: {}, at most {} agents, {} views a scene, seed {}; {}",
+                                                 fmt::join(arguments.soak.maps, " "), arguments.soak.agents,
+                                                 arguments.soak.views, arguments.soak.seed, result.choice),
+                         .backend = arguments.soak.backend};
+    context.add_gpu(cuda_device_name(), cuda_driver_name());
+    Json object = context.json();
+    object.update({{"seconds", result.seconds},
+                   {"scenes", result.scenes},
+                   {"images", result.images},
+                   {"values", result.error.values},
+                   {"differing_values", result.error.differing},
+                   {"worst", result.error.worst},
+                   {"images_out_of_tolerance", result.images_out_of_tolerance},
+                   {"faults", faults}});
+    return print_json(object);
   }
   fmt::print("{}: {} images of {} scenes in {:.0f} s, {} of {} values unlike the oracle's, worst {:.2f}/255\n{}\n",
              arguments.soak.backend, result.images, result.scenes, result.seconds, result.error.differing,
