@@ -33,11 +33,9 @@ KernelLibrary::KernelLibrary(const Rig& rig) {
   if (!why_not.empty()) {
     kernels_ = ahead_of_time_kernels();
     origin_ = fmt::format("kernels built ahead of time, for {} ({})", PICTURA_CUDA_ARCHITECTURES, why_not);
-    cudaFuncAttributes unused;
-    const cudaError_t status = cudaFuncGetAttributes(&unused, kernels_.draw);
+    const cudaError_t status = prepare_kernels(&kernels_);
     PICTURA_CHECK(status == cudaSuccess, "renderer cuda: {} do not run on a device of compute capability {}: {}",
                   origin_, compute_capability(), cudaGetErrorString(status));
-    PICTURA_CUDA(prepare_kernels(&kernels_));
     return;
   }
   const KernelCode code = build_kernels(renderer_program(), target_of(rig));

@@ -50,11 +50,8 @@ class EntryList {
   }
   /// Fills the last batch, once all warps have found theirs.
   __device__ void finish() {
-    const int32_t count = *count_, end = batches_of(count) * FaceBatch::kEntries;
+    const int32_t count = *count_, end = FaceBatch::count_of(count) * FaceBatch::kEntries;
     if (count + lane_index() < end) set(count + lane_index(), kNoEntry);
-  }
-  __device__ static int32_t batches_of(int32_t count) {
-    return (count + FaceBatch::kEntries - 1) / FaceBatch::kEntries;
   }
 
  private:

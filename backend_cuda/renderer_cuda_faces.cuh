@@ -336,7 +336,7 @@ __device__ inline bool gather(const DrawTask& task, int32_t view, int32_t camera
   if (warp_index() == 0) list.finish();
   sync_block();
   PICTURA_KEEP_LOOP
-  for (int i = warp_index(); i < EntryList::batches_of(state->num_entries); i += num_warps()) {
+  for (int i = warp_index(); i < FaceBatch::count_of(state->num_entries); i += num_warps()) {
     make_faces(state->making, &room->faces, lists, &state->listed,
                lists.entries[i * FaceBatch::kEntries + lane_index()], 0);
     __syncwarp();

@@ -154,25 +154,30 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
     const int full = span.num_full(), partial = span.end() - span.begin() - full;
     // Both sums at once: neither reaches 2^16.
     const int ends = sum_up_to(full | partial << 16), full_end = ends & 0xFFFF, partial_end = ends >> 16;
-    auto of = [](auto value, int lane) { return __shfl_sync(kAllLanes, value, max_of(lane, 0)); };
+    struct SharedRow {
+      int face, y;
+      TileSpan span;
+    };
+    auto row_of = [&](int owner) {
+      const int from = max_of(owner, 0);
+      const Word its_row = __shfl_sync(kAllLanes, row, from);
+      return SharedRow{static_cast<int>(its_row >> Memory::kHalf),
+                       part.y_begin + static_cast<int>(its_row & Memory::kNone),
+                       TileSpan(__shfl_sync(kAllLanes, span.bytes, from))};
+    };
     share_out(warp, full, full_end, [&](int, int owner, int k) {
-      const Word its_row = of(row, owner);
-      const TileSpan its_span(of(span.bytes, owner));
-      const int face = static_cast<int>(its_row >> Memory::kHalf), y = static_cast<int>(its_row & Memory::kNone);
-      const int x = its_span.full_begin() + k, pixel = y * kTileWidth_px + x;
-      const int loser = owner >= 0 ? mark_pixel(memory, face, part.x_begin + x, part.y_begin + y, pixel) : -1;
+      const SharedRow its = row_of(owner);
+      const int x = part.x_begin + its.span.full_begin() + k, pixel = part.pixel(x, its.y);
+      const int loser = owner >= 0 ? mark_pixel(memory, its.face, x, its.y, pixel) : -1;
       if (!__any_sync(kAllLanes, loser >= 0)) return;
       const int32_t place = take_place(&state->num_candidates, loser >= 0);
       if (loser >= 0) list_candidate(memory, place, loser, pixel, true);
     });
     const int32_t place = take_places(&state->num_candidates, partial_end);
     share_out(warp, partial, partial_end, [&](int item, int owner, int k) {
-      const Word its_row = of(row, owner);
-      const TileSpan its_span(of(span.bytes, owner));
-      const int face = static_cast<int>(its_row >> Memory::kHalf), y = static_cast<int>(its_row & Memory::kNone);
-      if (owner >= 0) {
-        list_candidate(memory, place + item, face, y * kTileWidth_px + its_span.partial(k), false);
-      }
+      const SharedRow its = row_of(owner);
+      const int pixel = part.pixel(part.x_begin + its.span.partial(k), its.y);
+      if (owner >= 0) list_candidate(memory, place + item, its.face, pixel, false);
     });
   }
 }

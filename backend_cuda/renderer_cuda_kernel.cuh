@@ -231,24 +231,24 @@ class DrawOrder {
   int32_t begin_ = 0;  // the first turn of the crowd
 };
 
-// Takes room for the faces of an image of which so many things may show, and lists it to be drawn. False where that has
-// to wait. One thread.
-__device__ inline bool take_face_room(const DrawTask& task, int32_t image, int32_t listed, int32_t* first_batch_out) {
+// Takes room for the faces of an image of which so many things may show, and lists it to be drawn. Its first batch, or
+// -1 where it has to wait. One thread.
+__device__ inline int32_t take_face_room(const DrawTask& task, int32_t image, int32_t listed) {
   BlockState* state = block_state();
   FaceMaking* making = &state->making;
   GatheredImage* out = task.pool.images + image;
   *out = {.face_count = kNotGathered};
   if (listed > kMostMarkedFaces) {
     leave_to_last(task, image);
-    return false;
+    return -1;
   }
   DrawCounters::Round* round = &task.counters->rounds[task.round_index];
   const int32_t face_begin = atomicAdd(&round->faces, listed);
   if (face_begin + listed > task.pool.max_faces) {
     postpone(task, image);
-    return false;
+    return -1;
   }
-  *first_batch_out = atomicAdd(&round->batches, EntryList::batches_of(listed));
+  const int32_t first_batch = atomicAdd(&round->batches, FaceBatch::count_of(listed));
   list_drawn(task, image, listed);
   making->faces = task.pool.faces + face_begin;
   making->edges = task.pool.edges;
@@ -258,7 +258,7 @@ __device__ inline bool take_face_room(const DrawTask& task, int32_t image, int32
   making->clipped_begin = 4 * task.pool.max_faces;
   making->clipped_end = task.pool.max_edges;
   *out = image_of(*state, face_begin, 0);
-  return true;
+  return first_batch;
 }
 
 // The entries of an image.
@@ -294,13 +294,12 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kCullBlocksPerProce
     __syncwarp();
     list.finish();
     const int32_t listed = state->num_entries;
-    int32_t first_batch = 0;
-    bool has_room = lane_index() == 0 && take_face_room(task, image, listed, &first_batch);
+    int32_t first_batch = -1;
+    if (lane_index() == 0) first_batch = take_face_room(task, image, listed);
     __syncwarp();
     copy_whole(task.pool.makings + image, state->making);
-    has_room = __any_sync(kAllLanes, has_room);
     first_batch = __shfl_sync(kAllLanes, first_batch, 0);
-    const int32_t batches = has_room ? EntryList::batches_of(listed) : 0;
+    const int32_t batches = first_batch >= 0 ? FaceBatch::count_of(listed) : 0;
     PICTURA_KEEP_LOOP
     for (int32_t batch = lane_index(); batch < batches; batch += kWarpSize) {
       task.pool.batches[first_batch + batch] = {image, batch * FaceBatch::kEntries};

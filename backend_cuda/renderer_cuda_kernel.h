@@ -94,6 +94,8 @@ constexpr int kMostEntries = 2048;
 /// Of the entries of an image (renderer_cuda_cull.cuh) those that a warp makes faces of at once, one for each lane.
 struct FaceBatch {
   static constexpr int kEntries = 32;
+  /// Of so many entries; the last one may not be full.
+  PICTURA_HD static constexpr int32_t count_of(int32_t entries) { return (entries + kEntries - 1) / kEntries; }
   int32_t image, first_entry;
 };
 /// An entry that is to be clipped.

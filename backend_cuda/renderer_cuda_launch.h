@@ -29,7 +29,7 @@ constexpr const char* kVisibilityName = "pictura_visibility";
 
 /// Those that were compiled with this program, for any rig.
 KernelSet ahead_of_time_kernels();
-/// What is to be done once before the first launch.
+/// What is to be done once before the first launch; fails where the kernels do not run on the device.
 cudaError_t prepare_kernels(KernelSet* kernels);
 
 /// Bytes that a block of the last launch needs besides faces and edges.

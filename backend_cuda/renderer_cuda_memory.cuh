@@ -145,7 +145,7 @@ static_assert(kMostMarkedFaces < 0xFFFF && kDrawFragments < 0xFFFF && kDrawPixel
 
 // In global memory. What drawing keeps lies where gathering has left its lists.
 __host__ __device__ inline size_t lay_out(GatherLists* lists, const Scratch& sizes, unsigned char* bytes) {
-  lists->max_entries = (sizes.max_faces + FaceBatch::kEntries - 1) / FaceBatch::kEntries * FaceBatch::kEntries;
+  lists->max_entries = FaceBatch::count_of(sizes.max_faces) * FaceBatch::kEntries;
   lists->max_clipped = sizes.max_faces;
   Layout layout{bytes};
   layout.place(&lists->clipped, lists->max_clipped);

@@ -38,7 +38,8 @@ class EmulatedRenderer final : public Renderer {
   struct Pool {
     std::size_t faces = 2048, clipped_edges = 4096;
   };
-  EmulatedRenderer(const RendererConfig& config, uint64_t seed, const Pool& pool = {2048, 4096})
+  EmulatedRenderer(const RendererConfig& config, uint64_t seed) : EmulatedRenderer(config, seed, Pool{}) {}
+  EmulatedRenderer(const RendererConfig& config, uint64_t seed, const Pool& pool)
       : config_(config), seed_(seed), pool_(pool), cameras_(pinhole_cameras(config.rig)) {}
   std::string_view name() const override { return "emulated"; }
   MemorySpace space() const override { return MemorySpace::host; }
