@@ -100,16 +100,6 @@ __device__ bool make_quad(const FaceMaking& making, uint32_t entry, Quad* quad_o
   return see_quad(world, setting.camera, &quad_out->seen);
 }
 
-// Completes a face.
-__device__ inline ScreenFace whole_face(const ScreenFace& face, FaceOwner owner, int32_t edge_begin) {
-  ScreenFace whole = face;
-  whole.edge_begin = edge_begin;
-  whole.number = owner.number;
-  whole.class_id = owner.class_id;
-  whole.color_bytes = to_bytes(face.color);
-  return whole;
-}
-
 // Keeps the faces of those lanes that have one. Each image has room for all of its own.
 __device__ inline void keep_face(const FaceMaking& making, const ScreenFace& face, FaceOwner owner, int32_t edge_begin,
                                  int32_t at) {

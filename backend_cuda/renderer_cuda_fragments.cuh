@@ -214,7 +214,7 @@ __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, c
   if (candidate.is_one) {
     const ScreenFace& face = memory.faces[candidate.a];
     coverage = Memory::covers_fully(candidate.b) ? PixelCoverage{1.0f, kAllSamples}
-                                                 : pixel_coverage(memory.edges + face.edge_begin, face.edge_count,
+                                                 : pixel_coverage(memory.edges + face.edge_begin, face.edge_count, face.least_area,
                                                                   part.x_of(pixel), part.y_of(pixel));
   }
   const bool is_left = coverage.area > 0.0f;

@@ -377,14 +377,15 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
       copy_into_shared(reinterpret_cast<char*>(&state->upcoming) + at, reinterpret_cast<const char*>(image) + at);
     }
   };
-  if (threadIdx.x == 0) {
+  const bool is_taker = static_cast<int>(threadIdx.x) == num_threads() - kWarpSize;
+  if (is_taker) {
     after = atomicAdd(counter, 1);
     take_next();
   }
   reset_part(SmallDrawMemory::current());
   PICTURA_KEEP_LOOP
   for (;;) {
-    if (threadIdx.x == 0) {
+    if (is_taker) {
       wait_for_copies();
       state->image = next_image;
       state->tile = next_tile;
@@ -395,7 +396,7 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
     sync_block();
     const int32_t image = state->image, tile = state->tile;
     if (image < 0) return;
-    if (threadIdx.x == 0) take_next();
+    if (is_taker) take_next();
     const int32_t camera = camera_of(task, image);
     const PinholeCamera& shows = task.cameras[camera].camera;
     const int width = width_px(shows), height = height_px(shows), across = tiles_across(width);

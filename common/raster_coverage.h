@@ -203,6 +203,7 @@ struct alignas(16) ScreenFace {
   float plane_distance_m = 0;  // from the camera to the face's plane
   Rgb color;
   uint32_t color_bytes = 0;  // to_bytes(color), for devices
+  float least_area = 0;      // see least_area_of
 };
 
 /// What bounds the corners of a polygon on screen.
@@ -389,8 +390,7 @@ PICTURA_HD inline uint64_t reach_of(const PixelCoverage& coverage) {
   return coverage.samples != 0 ? coverage.samples : kAllSamples;
 }
 
-/// Less than this of a pixel is nothing; more than one minus kFullCoverage with every sample is all of it.
-constexpr float kLeastCoverage = 1e-4f;
+/// More than one minus this of a pixel with every sample is all of it.
 constexpr float kFullCoverage = 1e-3f;
 
 /// Heights at which an edge's line passes the left and the right side of a pixel, in pixels from its top.
@@ -459,7 +459,7 @@ PICTURA_HD inline float area_of(const PolygonEdge& edge, const Passage& passage,
 
 /// Area of a convex polygon in pixel (x, y), and the samples that it covers. Edges that do not cross the pixel keep all
 /// samples and add their part to the area, so none is asked where it lies.
-PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int count, int x, int y) {
+PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int count, float least_area, int x, int y) {
   const float x_px = computed_once(static_cast<float>(x)), y_px = computed_once(static_cast<float>(y));
   float area = 0.0f;
   SampleRange range = whole_range();
@@ -468,7 +468,7 @@ PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int cou
     area += area_of(edge, passage, y_px);
     narrow(edge, passage, &range);
   });
-  if (area < kLeastCoverage) return {0.0f, 0};
+  if (area < least_area) return {0.0f, 0};
   const uint64_t samples = samples_within(range);
   if (samples == kAllSamples && area > 1.0f - kFullCoverage) return {1.0f, kAllSamples};
   return {min_of(area, 1.0f), samples};

@@ -40,6 +40,25 @@ PICTURA_HD constexpr uint16_t instance_of(const ScreenFace& face) {
   return static_cast<uint16_t>(kind_of(face.number) == kAgentKind ? 1 + index_of(face.number) : 0);
 }
 
+/// What a face covers less of a pixel than this is nothing. Strips hide little but each other, so of theirs more can be
+/// spared: what adds less than kLeastWeight to any channel.
+constexpr float kLeastArea = 1e-4f, kLeastWeight = 2.0f / 255.0f;
+PICTURA_HD inline float least_area_of(Rgb color, FaceOwner owner) {
+  if (kind_of(owner.number) != kStripKind) return kLeastArea;
+  return kLeastWeight * inverse_of(max_of(max_of(color.r, max_of(color.g, color.b)), kLeastWeight));
+}
+
+/// A face with all that its making did not set.
+PICTURA_HD inline ScreenFace whole_face(const ScreenFace& face, FaceOwner owner, int32_t edge_begin) {
+  ScreenFace whole = face;
+  whole.edge_begin = edge_begin;
+  whole.number = owner.number;
+  whole.class_id = owner.class_id;
+  whole.color_bytes = to_bytes(face.color);
+  whole.least_area = least_area_of(face.color, owner);
+  return whole;
+}
+
 /// Clips and projects a face. Its edges go to a pool: take(count) returns the index of the first, or -1 where there is
 /// no room left, and put(index, edge) keeps one. False where nothing of it is in the image.
 template <typename EdgePool>
@@ -69,9 +88,7 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, FaceOwner owner, c
       return false;
     }
   }
-  face_out->edge_begin = edge_begin;
-  face_out->number = owner.number;
-  face_out->class_id = owner.class_id;
+  *face_out = whole_face(*face_out, owner, edge_begin);
   return true;
 }
 

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "pictura/common/camera.h"
-#include "pictura/common/raster_coverage.h"
+#include "pictura/common/raster_item.h"
 #include "pictura/common/raster_pixel.h"
 
 namespace pictura {
@@ -74,17 +74,17 @@ double sample_leeway_px(Vec2 side) {
 
 // Holds what pixel_coverage finds of a polygon in pixel (x, y) against its exact area and the samples within.
 void expect_covered(const std::vector<Vec2>& polygon, const std::vector<PolygonEdge>& edges, int x, int y) {
-  const PixelCoverage coverage = pixel_coverage(edges.data(), static_cast<int>(edges.size()), x, y);
+  const PixelCoverage coverage = pixel_coverage(edges.data(), static_cast<int>(edges.size()), kLeastArea, x, y);
   const double area = clipped_area(polygon, x, y);
   constexpr double kLeeway = 1e-4;
   if (coverage.area == 1.0f) {
     ASSERT_GT(area, 1 - kFullCoverage - kLeeway);
   } else if (coverage.area == 0.0f) {
-    ASSERT_LT(area, kLeastCoverage + kLeeway);
+    ASSERT_LT(area, kLeastArea + kLeeway);
   } else {
     ASSERT_NEAR(coverage.area, area, kLeeway);
   }
-  if (area <= 2 * kLeastCoverage) return;
+  if (area <= 2 * kLeastArea) return;
   for (int sample = 0; sample < 64; ++sample) {
     const int column = sample / 8, row = sample % 8;
     const double sample_x = x + (column + 0.5) / 8, sample_y = y + (row + double{sample_column_offset(column)}) / 8;
@@ -176,7 +176,7 @@ TEST(Coverage, ASharedEdgeSplitsAreaAndSamplesWithoutGapOrOverlap) {
     const auto one = oriented(right), other = oriented(left);
     for (int i = 0; i < 8; ++i) {
       const int x = level ? 4 : i, y = level ? i : 4;
-      const PixelCoverage c = pixel_coverage(one.data(), 3, x, y), d = pixel_coverage(other.data(), 3, x, y);
+      const PixelCoverage c = pixel_coverage(one.data(), 3, kLeastArea, x, y), d = pixel_coverage(other.data(), 3, kLeastArea, x, y);
       ASSERT_EQ(c.samples & d.samples, 0u);
       if (c.area > 0 && d.area > 0) {
         ASSERT_EQ(c.samples | d.samples, kAllSamples);
@@ -217,7 +217,7 @@ TEST(Coverage, RowSpansAgreeWithPixels) {
     for (int y = 0; y < 12; ++y) {
       const RowSpan span = row_span(edges.data(), count, box, y);
       for (int x = 0; x < 12; ++x) {
-        const PixelCoverage coverage = pixel_coverage(edges.data(), count, x, y);
+        const PixelCoverage coverage = pixel_coverage(edges.data(), count, kLeastArea, x, y);
         if (x < span.begin || x >= span.end) {
           ASSERT_EQ(coverage.area, 0.0f);
         }
