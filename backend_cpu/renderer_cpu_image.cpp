@@ -87,8 +87,8 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
             !may_show_before(face, faces_[static_cast<std::size_t>(full)], x, y, covers_fully)) {
           continue;
         }
-        const PixelCoverage coverage =
-            covers_fully ? PixelCoverage{1.0f, kAllSamples} : pixel_coverage(edges, face.edge_count, face.least_area, x, y);
+        const PixelCoverage coverage = covers_fully ? PixelCoverage{1.0f, kAllSamples}
+                                                    : pixel_coverage(edges, face.edge_count, face.least_area, x, y);
         if (coverage.area <= 0.0f) continue;
         fragments_.push_back({make_fragment(face, f, coverage, x, y), first_fragment_[pixel]});
         first_fragment_[pixel] = static_cast<int32_t>(fragments_.size()) - 1;

@@ -21,6 +21,11 @@ struct Part {
   }
 };
 
+// The tile from (x, y) on, so many rows high, of an image of that width whose rows end at y_end.
+__device__ inline Part tile_at(int x, int y, int rows, int width_px, int y_end) {
+  return {x, min_of(x + kTileWidth_px, width_px), y, min_of(y + rows, y_end)};
+}
+
 /// A pixel's word. While the nearest full faces are found it is a mark, the larger the nearer: the upper bits of the
 /// face's nearness, which sort like the nearness, and the face's number plus 1. From the pixel's first fragment on,
 /// that stands where the nearness did, and the sign bit tells so. 0: neither.
@@ -214,8 +219,8 @@ __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, c
   if (candidate.is_one) {
     const ScreenFace& face = memory.faces[candidate.a];
     coverage = Memory::covers_fully(candidate.b) ? PixelCoverage{1.0f, kAllSamples}
-                                                 : pixel_coverage(memory.edges + face.edge_begin, face.edge_count, face.least_area,
-                                                                  part.x_of(pixel), part.y_of(pixel));
+                                                 : pixel_coverage(memory.edges + face.edge_begin, face.edge_count,
+                                                                  face.least_area, part.x_of(pixel), part.y_of(pixel));
   }
   const bool is_left = coverage.area > 0.0f;
   const int32_t fragment = take_place(&memory.state->num_fragments, is_left);

@@ -55,14 +55,7 @@ struct ImageWriter {
                  : full != Memory::kNone ? memory.faces[full].color_bytes
                                          : 0u;
     }
-    for (int channel = 0; channel < 3; ++channel, to += plane) {
-      Together<uint8_t> values;
-      for (int i = 0; i < kWrittenAtOnce; ++i) {
-        values.value[i] = static_cast<uint8_t>(bytes[i]);
-        bytes[i] >>= 8;
-      }
-      store(to, count, values);
-    }
+    store_channels(to, count, [&](int i, int channel) { return static_cast<uint8_t>(bytes[i] >> (8 * channel)); });
   }
 
   template <typename Memory, typename Value, typename ValueOf>
@@ -77,12 +70,18 @@ struct ImageWriter {
         colors[i] = memory.faces[full].color;
       }
     }
+    store_channels(to, count, [&](int i, int channel) {
+      return value_of(channel == 0 ? colors[i].r : channel == 1 ? colors[i].g : colors[i].b);
+    });
+  }
+
+  // value_of(i, channel): of the i-th pixel.
+  template <typename Value, typename ValueOf>
+  __device__ void store_channels(Value* to, int count, ValueOf&& value_of) const {
     PICTURA_KEEP_LOOP
     for (int channel = 0; channel < 3; ++channel, to += plane) {
       Together<Value> values;
-      for (int i = 0; i < kWrittenAtOnce; ++i) {
-        values.value[i] = value_of(channel == 0 ? colors[i].r : channel == 1 ? colors[i].g : colors[i].b);
-      }
+      for (int i = 0; i < kWrittenAtOnce; ++i) values.value[i] = value_of(i, channel);
       store(to, count, values);
     }
   }
@@ -363,8 +362,8 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
   if (images_of_round(task) == 0) return;
   BlockState* state = block_state();
   int32_t* const counter = &task.counters->rounds[task.round_index].next_drawn;
-  // While the block draws a tile, the first thread asks for the number of the next but one, and what the next one
-  // shows.
+  // While the block draws a tile, a thread of the last warp, which has the fewest faces to look at, asks for the number
+  // of the next but one, and what the next one shows.
   DrawOrder order(task);
   int32_t next_image = -1, next_tile = 0, after = 0;
   auto take_next = [&] {
@@ -401,8 +400,8 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
     const PinholeCamera& shows = task.cameras[camera].camera;
     const int width = width_px(shows), height = height_px(shows), across = tiles_across(width);
     if (tile < tiles_of(width, height) && state->shown.face_count >= 0) {
-      const int x = tile % across * kTileWidth_px, y = tile / across * kTileHeight_px;
-      const Part part{x, min_of(x + kTileWidth_px, width), y, min_of(y + kTileHeight_px, height)};
+      const Part part =
+          tile_at(tile % across * kTileWidth_px, tile / across * kTileHeight_px, kTileHeight_px, width, height);
       if (!draw_image_part(SmallDrawMemory::current(), task, view_of(task, image), camera, part) && threadIdx.x == 0 &&
           atomicExch(&task.pool.images[image].is_left_to_last, 1) == 0) {
         leave_to_last(task, image);
@@ -443,6 +442,7 @@ struct WeighAgent {
 
 extern "C" __global__ void __launch_bounds__(kLargeThreads)
     pictura_visibility(const __grid_constant__ VisibilityTask task, const __grid_constant__ Scratch scratch) {
+  wait_for_earlier_launch();
   take_scratch(scratch);
   BlockState* state = block_state();
   PICTURA_KEEP_LOOP

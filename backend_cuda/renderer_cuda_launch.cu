@@ -88,7 +88,7 @@ cudaError_t launch_visibility(const KernelSet& kernels, const VisibilityTask& ta
   if (task.num_queries == 0) return cudaSuccess;
   return launch(kernels.visibility,
                 {min_of(task.num_queries, large.blocks), kLargeThreads, gather_bytes(kLargeThreads)},
-                LaunchPlace{stream, false}, task, large);
+                LaunchPlace{stream, kernels.may_begin_early}, task, large);
 }
 
 }  // namespace pictura::cuda

@@ -256,7 +256,7 @@ __device__ bool each_tile(const Memory& memory, int width_px, int y_begin, int y
   for (int y = y_begin; y < y_end; y += most_rows) {
     PICTURA_KEEP_LOOP
     for (int x = 0; x < width_px; x += kTileWidth_px) {
-      if (!draw(memory, Part{x, min_of(x + kTileWidth_px, width_px), y, min_of(y + most_rows, y_end)})) return false;
+      if (!draw(memory, tile_at(x, y, most_rows, width_px, y_end))) return false;
       sync_block();
     }
   }

@@ -176,7 +176,8 @@ TEST(Coverage, ASharedEdgeSplitsAreaAndSamplesWithoutGapOrOverlap) {
     const auto one = oriented(right), other = oriented(left);
     for (int i = 0; i < 8; ++i) {
       const int x = level ? 4 : i, y = level ? i : 4;
-      const PixelCoverage c = pixel_coverage(one.data(), 3, kLeastArea, x, y), d = pixel_coverage(other.data(), 3, kLeastArea, x, y);
+      const PixelCoverage c = pixel_coverage(one.data(), 3, kLeastArea, x, y),
+                          d = pixel_coverage(other.data(), 3, kLeastArea, x, y);
       ASSERT_EQ(c.samples & d.samples, 0u);
       if (c.area > 0 && d.area > 0) {
         ASSERT_EQ(c.samples | d.samples, kAllSamples);
