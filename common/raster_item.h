@@ -41,11 +41,13 @@ PICTURA_HD constexpr uint16_t instance_of(const ScreenFace& face) {
 }
 
 /// What a face covers less of a pixel than this is nothing. Strips hide little but each other, so of theirs more can be
-/// spared: what adds less than kLeastWeight to any channel.
-constexpr float kLeastArea = 1e-4f, kLeastWeight = 2.0f / 255.0f;
+/// spared: what adds less than kLeastWeight to any channel, and an eighth of a pixel at most, for dark ones may hide
+/// bright ones.
+constexpr float kLeastArea = 1e-4f, kLeastWeight = 2.0f / 255.0f, kMostSparedArea = 0.125f;
 PICTURA_HD inline float least_area_of(Rgb color, FaceOwner owner) {
   if (kind_of(owner.number) != kStripKind) return kLeastArea;
-  return kLeastWeight * inverse_of(max_of(max_of(color.r, max_of(color.g, color.b)), kLeastWeight));
+  const float brightest = max_of(color.r, max_of(color.g, color.b));
+  return kLeastWeight * inverse_of(max_of(brightest, kLeastWeight / kMostSparedArea));
 }
 
 /// A face with all that its making did not set.
