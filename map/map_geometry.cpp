@@ -44,13 +44,13 @@ bool has_light(const RoadMap& map, const PaintedStopLine& line) {
 }
 
 /// Consecutive edges that meet end to end, as one polyline each, so that their strips are mitred.
-void append_road_edges(const RoadMap& map, std::vector<Strip>* strips_out) {
+void append_road_edges(const std::vector<RoadEdge>& edges, std::vector<Strip>* strips_out) {
   std::vector<Vec3> points;
   auto flush = [&] {
     if (points.size() >= 2) append_strips(points, kRoadEdgeWidth_m, kRoadEdgeColor, StripKind::road_edge, strips_out);
     points.clear();
   };
-  for (const RoadEdge& edge : map.road_edges) {
+  for (const RoadEdge& edge : edges) {
     if (points.empty() || length(points.back() - edge.a_m) > 0) {
       flush();
       points.push_back(edge.a_m);
@@ -91,10 +91,11 @@ void drop_repeated(std::vector<Strip>* strips_inout) {
 
 StaticGeometry make_static_geometry(const RoadMap& map, const MapGeometryOptions& options) {
   StaticGeometry geometry;
-  for (const PaintedLine& line : painted_lines(map)) {
+  const std::vector<PaintedLine> lines = painted_lines(map);
+  for (const PaintedLine& line : lines) {
     append_strips(line.points_m, line.width_m, mark_color(line.color), StripKind::lane_mark, &geometry.strips);
   }
-  append_road_edges(map, &geometry.strips);
+  append_road_edges(edges_beside(map, lines, kRoadEdgeWidth_m), &geometry.strips);
   for (const Crosswalk& crosswalk : map.crosswalks) {
     std::vector<Vec3> ring(map.outline_points.begin() + crosswalk.outline.begin,
                            map.outline_points.begin() + crosswalk.outline.end);

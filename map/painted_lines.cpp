@@ -26,9 +26,9 @@ constexpr float kCell_m = 20.0f;
 
 bool is_same_paint(const PaintedLine& a, const PaintedLine& b) { return a.width_m == b.width_m && a.color == b.color; }
 
-Aabb2 box_around(Vec2 a, Vec2 b) {
-  return {{min_of(a.x, b.x) - kSame_m, min_of(a.y, b.y) - kSame_m},
-          {max_of(a.x, b.x) + kSame_m, max_of(a.y, b.y) + kSame_m}};
+Aabb2 box_around(Vec2 a, Vec2 b, float margin_m) {
+  return {{min_of(a.x, b.x) - margin_m, min_of(a.y, b.y) - margin_m},
+          {max_of(a.x, b.x) + margin_m, max_of(a.y, b.y) + margin_m}};
 }
 
 std::vector<PaintedLine> lines_of(const RoadMap& map) {
@@ -46,25 +46,80 @@ std::vector<PaintedLine> lines_of(const RoadMap& map) {
   return lines;
 }
 
-/// Leaves out lines all of whose length others paint too: roads of a junction that run over each other bring the same
-/// paint, cut in other places. Longer lines are kept first, so that what a line is left out for is never left out.
-class RepeatedPaint {
+/// Pieces of lines, to be asked whether they run along another.
+class PieceIndex {
  public:
-  explicit RepeatedPaint(std::vector<PaintedLine> lines) : lines_(std::move(lines)), kept_(lines_.size(), false) {
+  struct Piece {
+    Vec3 a_m, b_m;
+    std::size_t line = 0;
+  };
+  PieceIndex() = default;
+  explicit PieceIndex(const std::vector<PaintedLine>& lines) {
     std::vector<Aabb2> boxes;
-    for (std::size_t line = 0; line < lines_.size(); ++line) {
-      const std::vector<Vec3>& points = lines_[line].points_m;
+    for (std::size_t line = 0; line < lines.size(); ++line) {
+      const std::vector<Vec3>& points = lines[line].points_m;
       for (std::size_t i = 1; i < points.size(); ++i) {
         pieces_.push_back({points[i - 1], points[i], line});
-        boxes.push_back(box_around(points[i - 1].xy(), points[i].xy()));
+        boxes.push_back(box_around(points[i - 1].xy(), points[i].xy(), kSame_m));
       }
     }
     grid_ = Grid(boxes, kCell_m);
   }
 
+  const std::vector<Piece>& pieces() const { return pieces_; }
+
+  /// Whether there is, beside all of a piece, some other within tolerance_m(line), negative for lines that do not
+  /// count. It is at most most_m; gaps so short do not matter.
+  template <typename Tolerance>
+  bool run_along(const Piece& piece, float most_m, const Tolerance& tolerance_m) const {
+    std::vector<Stretch> accompanied;
+    visit_items(grid_.view(), box_around(piece.a_m.xy(), piece.b_m.xy(), most_m), [&](std::size_t i) {
+      const Stretch shared = shared_stretch(piece, pieces_[i], tolerance_m(pieces_[i].line));
+      if (shared.end_m > shared.begin_m) accompanied.push_back(shared);
+    });
+    std::sort(accompanied.begin(), accompanied.end(), [](Stretch a, Stretch b) { return a.begin_m < b.begin_m; });
+    float reached_m = 0;
+    for (const Stretch& stretch : accompanied) {
+      if (stretch.begin_m > reached_m + most_m) return false;
+      reached_m = max_of(reached_m, stretch.end_m);
+    }
+    return !accompanied.empty() && reached_m >= length(piece.b_m - piece.a_m) - most_m;
+  }
+
+ private:
+  /// A part of a piece, in metres from its a.
+  struct Stretch {
+    float begin_m = 0, end_m = 0;
+  };
+
+  /// The part of `piece` that has `other` beside it, if all that `other` has there is that near; else none.
+  static Stretch shared_stretch(const Piece& piece, const Piece& other, float tolerance_m) {
+    const float length_m = length(piece.b_m - piece.a_m);
+    const Vec3 along = (piece.b_m - piece.a_m) * (1.0f / length_m);
+    const float a_m = dot(other.a_m - piece.a_m, along), b_m = dot(other.b_m - piece.a_m, along);
+    const Stretch beside{max_of(min_of(a_m, b_m), 0.0f), min_of(max_of(a_m, b_m), length_m)};
+    if (beside.end_m <= beside.begin_m) return {};
+    for (const float at_m : {beside.begin_m, beside.end_m}) {
+      const Vec3 place_m = other.a_m + (other.b_m - other.a_m) * ((at_m - a_m) / (b_m - a_m));
+      if (length(place_m - (piece.a_m + along * at_m)) > tolerance_m) return {};
+    }
+    return beside;
+  }
+
+  std::vector<Piece> pieces_;
+  Grid grid_;
+};
+
+/// Leaves out lines all of whose length others paint too: roads of a junction that run over each other bring the same
+/// paint, cut in other places. Longer lines are kept first, so that what a line is left out for is never left out.
+class RepeatedPaint {
+ public:
+  explicit RepeatedPaint(std::vector<PaintedLine> lines)
+      : lines_(std::move(lines)), kept_(lines_.size(), false), pieces_(lines_) {}
+
   std::vector<PaintedLine> leave_out() {
     std::vector<float> lengths_m(lines_.size(), 0.0f);
-    for (const Piece& piece : pieces_) lengths_m[piece.line] += length(piece.b_m - piece.a_m);
+    for (const PieceIndex::Piece& piece : pieces_.pieces()) lengths_m[piece.line] += length(piece.b_m - piece.a_m);
     std::vector<std::size_t> order(lines_.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::stable_sort(order.begin(), order.end(),
@@ -83,51 +138,16 @@ class RepeatedPaint {
   }
 
  private:
-  struct Piece {
-    Vec3 a_m, b_m;
-    std::size_t line = 0;
-  };
-  /// A part of a piece, in metres from its a.
-  struct Stretch {
-    float begin_m = 0, end_m = 0;
-  };
-
   /// Whether lines that are kept paint the whole piece.
-  bool is_painted(const Piece& piece) const {
-    std::vector<Stretch> painted;
-    visit_items(grid_.view(), box_around(piece.a_m.xy(), piece.b_m.xy()), [&](std::size_t i) {
-      const Piece& other = pieces_[i];
-      if (!kept_[other.line] || !is_same_paint(lines_[other.line], lines_[piece.line])) return;
-      const Stretch shared = shared_stretch(piece, other);
-      if (shared.end_m > shared.begin_m) painted.push_back(shared);
+  bool is_painted(const PieceIndex::Piece& piece) const {
+    return pieces_.run_along(piece, kSame_m, [&](std::size_t other) {
+      return kept_[other] && is_same_paint(lines_[other], lines_[piece.line]) ? kSame_m : -1.0f;
     });
-    std::sort(painted.begin(), painted.end(), [](Stretch a, Stretch b) { return a.begin_m < b.begin_m; });
-    float reached_m = 0;
-    for (const Stretch& stretch : painted) {
-      if (stretch.begin_m > reached_m + kSame_m) return false;
-      reached_m = max_of(reached_m, stretch.end_m);
-    }
-    return reached_m >= length(piece.b_m - piece.a_m) - kSame_m;
-  }
-
-  /// The part of `piece` that has `other` beside it, if all that `other` has there is at the same place; else none.
-  static Stretch shared_stretch(const Piece& piece, const Piece& other) {
-    const float length_m = length(piece.b_m - piece.a_m);
-    const Vec3 along = (piece.b_m - piece.a_m) * (1.0f / length_m);
-    const float a_m = dot(other.a_m - piece.a_m, along), b_m = dot(other.b_m - piece.a_m, along);
-    const Stretch beside{max_of(min_of(a_m, b_m), 0.0f), min_of(max_of(a_m, b_m), length_m)};
-    if (beside.end_m <= beside.begin_m) return {};
-    for (const float at_m : {beside.begin_m, beside.end_m}) {
-      const Vec3 place_m = other.a_m + (other.b_m - other.a_m) * ((at_m - a_m) / (b_m - a_m));
-      if (length(place_m - (piece.a_m + along * at_m)) > kSame_m) return {};
-    }
-    return beside;
   }
 
   std::vector<PaintedLine> lines_;
   std::vector<bool> kept_;
-  std::vector<Piece> pieces_;
-  Grid grid_;
+  PieceIndex pieces_;
 };
 
 /// Joins lines end to end, whichever way round they are. End 2 * i is the first point of line i, end 2 * i + 1 its
@@ -172,7 +192,7 @@ class LineJoiner {
     };
     std::vector<Aabb2> boxes;
     for (std::size_t end = 0; end < partner_.size(); ++end)
-      boxes.push_back(box_around(place(end).xy(), place(end).xy()));
+      boxes.push_back(box_around(place(end).xy(), place(end).xy(), kSame_m));
     const Grid grid(boxes, kCell_m);
     std::vector<Pair> pairs;
     for (std::size_t a = 0; a < partner_.size(); ++a) {
@@ -241,6 +261,18 @@ std::vector<PaintedLine> painted_lines(const RoadMap& map) {
   std::vector<PaintedLine> lines = LineJoiner(RepeatedPaint(lines_of(map)).leave_out()).join();
   for (PaintedLine& line : lines) thin(&line);
   return lines;
+}
+
+std::vector<RoadEdge> edges_beside(const RoadMap& map, const std::vector<PaintedLine>& lines, float width_m) {
+  const PieceIndex pieces(lines);
+  std::vector<RoadEdge> seen;
+  for (const RoadEdge& edge : map.road_edges) {
+    const bool is_hidden = pieces.run_along({edge.a_m, edge.b_m, 0}, kHiddenEdge_m, [&](std::size_t line) {
+      return kHiddenEdge_m - 0.5f * (width_m - lines[line].width_m);
+    });
+    if (!is_hidden) seen.push_back(edge);
+  }
+  return seen;
 }
 
 }  // namespace pictura

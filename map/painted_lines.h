@@ -1,5 +1,6 @@
-// Painted lines as they are drawn: what the importer cut at lane sections, mark records and roads is one line again,
-// and paint that several roads bring is there once. The RoadMap keeps every marking and where it came from.
+// Painted lines and road edges as they are drawn: what the importer cut at lane sections, mark records and roads is one
+// line again, paint that several roads bring is there once, and so is what paint lies over. The RoadMap keeps every
+// marking and where it came from.
 #pragma once
 
 #include <vector>
@@ -21,5 +22,12 @@ struct PaintedLine {
 /// The map's markings with every line that others paint too left out, lines of one width and colour that continue each
 /// other joined, and points left out that kPaintTolerance_m can spare. Ends of lines and dashes stay where they are.
 std::vector<PaintedLine> painted_lines(const RoadMap& map);
+
+/// A road edge that nowhere sticks out by more than this from beneath the lines is not seen: maps paint a line along
+/// the border of a road, and the chords of both may stray from it.
+constexpr float kHiddenEdge_m = 2 * kPaintTolerance_m;
+
+/// The map's road edges, of that width, without those that painted lines lie over.
+std::vector<RoadEdge> edges_beside(const RoadMap& map, const std::vector<PaintedLine>& lines, float width_m);
 
 }  // namespace pictura

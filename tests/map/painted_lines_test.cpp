@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <set>
+#include <utility>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -200,6 +201,29 @@ TEST(PaintedLines, WhatOthersPaintOnlyInPartStays) {
   EXPECT_EQ(painted(dashes).size(), 1u);
 }
 
+TEST(PaintedLines, EdgesBeneathThemAreNotDrawn) {
+  constexpr float kWidth_m = 0.15f;
+  const auto is_drawn = [&](const std::vector<PaintedLine>& lines) {
+    RoadMap map;
+    map.road_edges = {{{2, 0, 1}, {10, 0, 1}}};
+    return !edges_beside(map, lines, kWidth_m).empty();
+  };
+  EXPECT_TRUE(is_drawn({}));
+  EXPECT_FALSE(is_drawn({white({{0, 0, 1}, {30, 0, 1}})}));
+  EXPECT_FALSE(is_drawn({white({{30, 0.02f, 1}, {0, 0.02f, 1}})})) << "it sticks out by 3.5 cm";
+  EXPECT_TRUE(is_drawn({white({{0, 0.03f, 1}, {30, 0.03f, 1}})})) << "by 4.5 cm";
+  EXPECT_TRUE(is_drawn({white({{0, 0, 1}, {30, 0.3f, 1}})})) << "at an angle";
+  EXPECT_TRUE(is_drawn({white({{0, 0, 2}, {30, 0, 2}})})) << "below a bridge";
+  EXPECT_TRUE(is_drawn({{{{0, 0, 1}, {30, 0, 1}}, 0.05f, MarkColor::white}})) << "wider than the line";
+  EXPECT_FALSE(is_drawn({{{{0, 0.1f, 1}, {30, 0.1f, 1}}, 0.35f, MarkColor::yellow}})) << "beneath a wide one's side";
+  EXPECT_TRUE(is_drawn({white({{0, 0, 1}, {9, 0, 1}})})) << "not all of it";
+  EXPECT_FALSE(is_drawn({white({{0, 0, 1}, {9, 0, 1}}), white({{9, 0, 1}, {12, 0.01f, 1}})})) << "beneath two";
+  EXPECT_TRUE(is_drawn({white({{0, 0, 1}, {5, 0, 1}}), white({{6, 0, 1}, {12, 0, 1}})})) << "beneath dashes";
+  RoadMap map;
+  map.road_edges = {{{2, 0, 1}, {2.01f, 0, 1}}};
+  EXPECT_EQ(edges_beside(map, {white({{0, 1, 1}, {30, 1, 1}})}, kWidth_m).size(), 1u) << "shorter than a gap";
+}
+
 /// Paint to be asked how far a place is from it.
 class Paint {
  public:
@@ -301,6 +325,28 @@ TEST_P(PaintOfTowns, EndsWhereMarkingsEnd) {
       EXPECT_TRUE(ends.contains({end.x, end.y, end.z})) << "at " << end.x << ", " << end.y;
     }
   }
+}
+
+TEST_P(PaintOfTowns, HidesNoEdgeButThoseBeneathIt) {
+  constexpr float kWidth_m = 0.15f;
+  std::vector<PaintedLine> lines = drawn_, hidden;
+  float widest_m = 0;
+  for (PaintedLine& line : lines) widest_m = std::max(widest_m, std::exchange(line.width_m, 0.0f));
+  for (PaintedLine& line : lines) line.color = MarkColor::white;
+  const std::vector<RoadEdge> seen = edges_beside(*map_, drawn_, kWidth_m);
+  std::size_t next = 0;
+  for (const RoadEdge& edge : map_->road_edges) {
+    if (next < seen.size() && is_at(seen[next].a_m, edge.a_m) && is_at(seen[next].b_m, edge.b_m)) {
+      ++next;
+    } else {
+      hidden.push_back({{edge.a_m, edge.b_m}, 0.0f, MarkColor::white});
+    }
+  }
+  EXPECT_EQ(next, seen.size());
+  // Beside a line, and beyond its end.
+  const float aside_m = kHiddenEdge_m + 0.5f * (widest_m - kWidth_m), beyond_m = kHiddenEdge_m;
+  EXPECT_LE(furthest_from(Paint(lines), hidden), std::hypot(aside_m, beyond_m) + 1e-3f);
+  fmt::print("{}: {} edges of {}\n", GetParam(), seen.size(), map_->road_edges.size());
 }
 
 /// Against the markings cut into strips as they are, without those that are there twice.
