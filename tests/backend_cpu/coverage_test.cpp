@@ -289,7 +289,7 @@ TEST(Coverage, WeightsNeverExceedThePixel) {
 TEST(Coverage, LeavesOutWhatAStripHardlyAdds) {
   const FaceOwner strip{kStripKind << kKindShift, 0}, wall = wall_owner(0);
   const Rgb white{0.9f, 0.88f, 0.85f};
-  for (const float brightness : {1.0f, 0.5f, 0.08f}) {
+  for (const float brightness : {1.0f, 0.5f, 0.15f}) {
     const Rgb color = white * brightness;
     EXPECT_NEAR(least_area_of(color, strip) * color.r, kLeastWeight, 1e-7f) << brightness;
     EXPECT_EQ(least_area_of(color, wall), kLeastArea);
@@ -297,10 +297,11 @@ TEST(Coverage, LeavesOutWhatAStripHardlyAdds) {
   // What is dark may hide what is bright.
   EXPECT_FLOAT_EQ(least_area_of(white * 0.01f, strip), kMostSparedArea);
   EXPECT_FLOAT_EQ(least_area_of({}, strip), kMostSparedArea);
-  for (const float area : {0.0078f, 0.0098f}) {
+  const float least = kLeastWeight / white.r;
+  for (const float area : {0.9f * least, 1.1f * least}) {
     const std::vector<PolygonEdge> edges = edges_of({{2, 1}, {3, 1}, {3, 1 + area}, {2, 1 + area}});
     const PixelCoverage coverage = pixel_coverage(edges.data(), 4, least_area_of(white, strip), 2, 1);
-    if (area < kLeastWeight / white.r) {
+    if (area < least) {
       EXPECT_EQ(coverage.area, 0.0f);
     } else {
       EXPECT_NEAR(coverage.area, area, 1e-6f);
