@@ -251,11 +251,8 @@ __device__ inline bool make_screen_face(const FaceMaking& making, const SharedFa
     store_whole(making.edges + edge_begin + __popc(edges & lanes_below()),
                 make_edge(turns_right ? corner : next, turns_right ? next : corner));
   }
-  face_out->edge_begin = edge_begin;
   face_out->edge_count = static_cast<uint8_t>(__popc(edges));
   face_out->color = face.color;
-  face_out->number = face.owner.number;
-  face_out->class_id = face.owner.class_id;
   set_bounds(camera, making.setting.frustum, bounds, face.plane, face_out);
   return true;
 }

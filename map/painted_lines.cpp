@@ -46,14 +46,13 @@ std::vector<PaintedLine> lines_of(const RoadMap& map) {
   return lines;
 }
 
-/// Pieces of lines, to be asked whether they run along another.
+/// Pieces of lines, to be asked whether they run along a way.
 class PieceIndex {
  public:
   struct Piece {
     Vec3 a_m, b_m;
     std::size_t line = 0;
   };
-  PieceIndex() = default;
   explicit PieceIndex(const std::vector<PaintedLine>& lines) {
     std::vector<Aabb2> boxes;
     for (std::size_t line = 0; line < lines.size(); ++line) {
@@ -68,13 +67,17 @@ class PieceIndex {
 
   const std::vector<Piece>& pieces() const { return pieces_; }
 
-  /// Whether there is, beside all of a piece, some other within tolerance_m(line), negative for lines that do not
-  /// count. It is at most most_m; gaps so short do not matter.
+  /// Whether there is, beside all of the straight way from a to b, some piece within tolerance_m(line), negative for
+  /// lines that do not count. It is at most most_m; gaps so short do not matter.
   template <typename Tolerance>
-  bool run_along(const Piece& piece, float most_m, const Tolerance& tolerance_m) const {
+  bool run_along(Vec3 a_m, Vec3 b_m, float most_m, const Tolerance& tolerance_m) const {
+    const float length_m = length(b_m - a_m);
+    const Way way{a_m, (b_m - a_m) * (1.0f / length_m), length_m};
     std::vector<Stretch> accompanied;
-    visit_items(grid_.view(), box_around(piece.a_m.xy(), piece.b_m.xy(), most_m), [&](std::size_t i) {
-      const Stretch shared = shared_stretch(piece, pieces_[i], tolerance_m(pieces_[i].line));
+    visit_items(grid_.view(), box_around(a_m.xy(), b_m.xy(), most_m), [&](std::size_t i) {
+      const float its_tolerance_m = tolerance_m(pieces_[i].line);
+      if (its_tolerance_m < 0) return;
+      const Stretch shared = shared_stretch(way, pieces_[i], its_tolerance_m);
       if (shared.end_m > shared.begin_m) accompanied.push_back(shared);
     });
     std::sort(accompanied.begin(), accompanied.end(), [](Stretch a, Stretch b) { return a.begin_m < b.begin_m; });
@@ -83,25 +86,27 @@ class PieceIndex {
       if (stretch.begin_m > reached_m + most_m) return false;
       reached_m = max_of(reached_m, stretch.end_m);
     }
-    return !accompanied.empty() && reached_m >= length(piece.b_m - piece.a_m) - most_m;
+    return !accompanied.empty() && reached_m >= length_m - most_m;
   }
 
  private:
-  /// A part of a piece, in metres from its a.
+  struct Way {
+    Vec3 begin_m, along;  // along: a unit vector
+    float length_m = 0;
+  };
+  /// A part of a way, in metres from its beginning.
   struct Stretch {
     float begin_m = 0, end_m = 0;
   };
 
-  /// The part of `piece` that has `other` beside it, if all that `other` has there is that near; else none.
-  static Stretch shared_stretch(const Piece& piece, const Piece& other, float tolerance_m) {
-    const float length_m = length(piece.b_m - piece.a_m);
-    const Vec3 along = (piece.b_m - piece.a_m) * (1.0f / length_m);
-    const float a_m = dot(other.a_m - piece.a_m, along), b_m = dot(other.b_m - piece.a_m, along);
-    const Stretch beside{max_of(min_of(a_m, b_m), 0.0f), min_of(max_of(a_m, b_m), length_m)};
+  /// The part of a way that has a piece beside it, if all that the piece has there is that near; else none.
+  static Stretch shared_stretch(const Way& way, const Piece& piece, float tolerance_m) {
+    const float a_m = dot(piece.a_m - way.begin_m, way.along), b_m = dot(piece.b_m - way.begin_m, way.along);
+    const Stretch beside{max_of(min_of(a_m, b_m), 0.0f), min_of(max_of(a_m, b_m), way.length_m)};
     if (beside.end_m <= beside.begin_m) return {};
     for (const float at_m : {beside.begin_m, beside.end_m}) {
-      const Vec3 place_m = other.a_m + (other.b_m - other.a_m) * ((at_m - a_m) / (b_m - a_m));
-      if (length(place_m - (piece.a_m + along * at_m)) > tolerance_m) return {};
+      const Vec3 place_m = piece.a_m + (piece.b_m - piece.a_m) * ((at_m - a_m) / (b_m - a_m));
+      if (length(place_m - (way.begin_m + way.along * at_m)) > tolerance_m) return {};
     }
     return beside;
   }
@@ -127,7 +132,7 @@ class RepeatedPaint {
     for (const std::size_t line : order) {
       const std::vector<Vec3>& points = lines_[line].points_m;
       for (std::size_t i = 1; i < points.size() && !kept_[line]; ++i) {
-        kept_[line] = !is_painted({points[i - 1], points[i], line});
+        kept_[line] = !is_painted(line, points[i - 1], points[i]);
       }
     }
     std::vector<PaintedLine> once;
@@ -138,10 +143,10 @@ class RepeatedPaint {
   }
 
  private:
-  /// Whether lines that are kept paint the whole piece.
-  bool is_painted(const PieceIndex::Piece& piece) const {
-    return pieces_.run_along(piece, kSame_m, [&](std::size_t other) {
-      return kept_[other] && is_same_paint(lines_[other], lines_[piece.line]) ? kSame_m : -1.0f;
+  /// Whether lines that are kept paint all of a piece of a line.
+  bool is_painted(std::size_t line, Vec3 a_m, Vec3 b_m) const {
+    return pieces_.run_along(a_m, b_m, kSame_m, [&](std::size_t other) {
+      return kept_[other] && is_same_paint(lines_[other], lines_[line]) ? kSame_m : -1.0f;
     });
   }
 
@@ -267,7 +272,7 @@ std::vector<RoadEdge> edges_beside(const RoadMap& map, const std::vector<Painted
   const PieceIndex pieces(lines);
   std::vector<RoadEdge> seen;
   for (const RoadEdge& edge : map.road_edges) {
-    const bool is_hidden = pieces.run_along({edge.a_m, edge.b_m, 0}, kHiddenEdge_m, [&](std::size_t line) {
+    const bool is_hidden = pieces.run_along(edge.a_m, edge.b_m, kHiddenEdge_m, [&](std::size_t line) {
       return kHiddenEdge_m - 0.5f * (width_m - lines[line].width_m);
     });
     if (!is_hidden) seen.push_back(edge);

@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <set>
-#include <utility>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -201,12 +200,13 @@ TEST(PaintedLines, WhatOthersPaintOnlyInPartStays) {
   EXPECT_EQ(painted(dashes).size(), 1u);
 }
 
+constexpr float kEdgeWidth_m = 0.15f;
+
 TEST(PaintedLines, EdgesBeneathThemAreNotDrawn) {
-  constexpr float kWidth_m = 0.15f;
   const auto is_drawn = [&](const std::vector<PaintedLine>& lines) {
     RoadMap map;
     map.road_edges = {{{2, 0, 1}, {10, 0, 1}}};
-    return !edges_beside(map, lines, kWidth_m).empty();
+    return !edges_beside(map, lines, kEdgeWidth_m).empty();
   };
   EXPECT_TRUE(is_drawn({}));
   EXPECT_FALSE(is_drawn({white({{0, 0, 1}, {30, 0, 1}})}));
@@ -221,7 +221,7 @@ TEST(PaintedLines, EdgesBeneathThemAreNotDrawn) {
   EXPECT_TRUE(is_drawn({white({{0, 0, 1}, {5, 0, 1}}), white({{6, 0, 1}, {12, 0, 1}})})) << "beneath dashes";
   RoadMap map;
   map.road_edges = {{{2, 0, 1}, {2.01f, 0, 1}}};
-  EXPECT_EQ(edges_beside(map, {white({{0, 1, 1}, {30, 1, 1}})}, kWidth_m).size(), 1u) << "shorter than a gap";
+  EXPECT_EQ(edges_beside(map, {white({{0, 1, 1}, {30, 1, 1}})}, kEdgeWidth_m).size(), 1u) << "shorter than a gap";
 }
 
 /// Paint to be asked how far a place is from it.
@@ -328,12 +328,14 @@ TEST_P(PaintOfTowns, EndsWhereMarkingsEnd) {
 }
 
 TEST_P(PaintOfTowns, HidesNoEdgeButThoseBeneathIt) {
-  constexpr float kWidth_m = 0.15f;
-  std::vector<PaintedLine> lines = drawn_, hidden;
+  // Of one width and colour, which Paint tells apart.
+  std::vector<PaintedLine> lines, hidden;
   float widest_m = 0;
-  for (PaintedLine& line : lines) widest_m = std::max(widest_m, std::exchange(line.width_m, 0.0f));
-  for (PaintedLine& line : lines) line.color = MarkColor::white;
-  const std::vector<RoadEdge> seen = edges_beside(*map_, drawn_, kWidth_m);
+  for (const PaintedLine& line : drawn_) {
+    widest_m = std::max(widest_m, line.width_m);
+    lines.push_back({line.points_m, 0.0f, MarkColor::white});
+  }
+  const std::vector<RoadEdge> seen = edges_beside(*map_, drawn_, kEdgeWidth_m);
   std::size_t next = 0;
   for (const RoadEdge& edge : map_->road_edges) {
     if (next < seen.size() && is_at(seen[next].a_m, edge.a_m) && is_at(seen[next].b_m, edge.b_m)) {
@@ -344,7 +346,7 @@ TEST_P(PaintOfTowns, HidesNoEdgeButThoseBeneathIt) {
   }
   EXPECT_EQ(next, seen.size());
   // Beside a line, and beyond its end.
-  const float aside_m = kHiddenEdge_m + 0.5f * (widest_m - kWidth_m), beyond_m = kHiddenEdge_m;
+  const float aside_m = kHiddenEdge_m + 0.5f * (widest_m - kEdgeWidth_m), beyond_m = kHiddenEdge_m;
   EXPECT_LE(furthest_from(Paint(lines), hidden), std::hypot(aside_m, beyond_m) + 1e-3f);
   fmt::print("{}: {} edges of {}\n", GetParam(), seen.size(), map_->road_edges.size());
 }
