@@ -62,7 +62,9 @@ class CpuRenderer final : public Renderer {
       ImageDrawer& drawer = drawers_[static_cast<std::size_t>(omp_get_thread_num())];
       double seen = 0, alone = 0;
       for (std::size_t camera = 0; camera < cameras_.size(); ++camera) {
-        drawer.prepare(request(scene, views[static_cast<std::size_t>(query.view)], camera));
+        ImageRequest asked = request(scene, views[static_cast<std::size_t>(query.view)], camera);
+        asked.leaves_out_hidden = false;  // what is hidden counts where the agent is alone
+        drawer.prepare(asked);
         const ImageDrawer::Coverage coverage = drawer.coverage_of(query.agent);
         seen += coverage.seen;
         alone += coverage.alone;
@@ -82,7 +84,8 @@ class CpuRenderer final : public Renderer {
             &view,
             place_camera(cameras_[camera], view),
             config_.line_floor_px,
-            config_.debug_palette};
+            config_.debug_palette,
+            true};
   }
 
   static ImageTarget target(const ImageBatch& images, std::size_t view, std::size_t camera) {

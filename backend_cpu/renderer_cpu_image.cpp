@@ -21,7 +21,8 @@ auto ImageDrawer::face_maker(FaceOwner owner) {
 
 void ImageDrawer::prepare(const ImageRequest& request) {
   request_ = request;
-  setting_ = {request.camera, make_frustum(request.camera), request.line_floor_px, request.debug_palette};
+  setting_ = {request.camera, make_frustum(request.camera), request.line_floor_px, request.debug_palette, {}};
+  if (request.leaves_out_hidden) find_occluders();
   edges_.clear();
   faces_.clear();
   visit_agents(setting_, *request.scene, *request.view, [&](const AgentBox& box, int32_t agent) {
@@ -36,6 +37,17 @@ void ImageDrawer::prepare(const ImageRequest& request) {
                });
   visit_strips(setting_, *request.geometry, [&](const Strip& strip, int32_t index) {
     strip_faces(strip, setting_.camera, setting_.line_floor_px, face_maker(strip_owner(strip, index)));
+  });
+}
+
+void ImageDrawer::find_occluders() {
+  visit_walls(setting_, *request_.geometry, [&](const WallFace& wall, int32_t index) {
+    CameraQuad seen;
+    Occluder occluder;
+    if (see_quad(wall_quad(wall), setting_.camera, &seen) &&
+        make_occluder(setting_.camera, setting_.frustum, seen, &occluder)) {
+      setting_.occluders.offer(occluder, index);
+    }
   });
 }
 

@@ -19,6 +19,7 @@ struct ImageRequest {
   PinholeCamera camera;  // in the world
   float line_floor_px = 0;
   bool debug_palette = false;
+  bool leaves_out_hidden = true;  // faces behind the walls that cover most of it
 };
 
 /// Where one image goes.
@@ -82,6 +83,7 @@ class ImageDrawer {
     int y_begin, y_end;
   };
 
+  void find_occluders();
   // Takes the faces that a thing emits.
   auto face_maker(FaceOwner owner);
   template <typename Visit>

@@ -144,7 +144,8 @@ __device__ inline void make_faces(const FaceMaking& making, FaceRoom* room, cons
   ScreenQuad on_screen;
   bool turns_right = false;
   const QuadSight sight = project_quad(camera, quad.seen.corner, quad.floor_px, &on_screen);
-  const bool covers = find_turn(on_screen, &turns_right), is_wanted = is_quad && is_seen;
+  const bool covers = find_turn(on_screen, &turns_right) && !making.setting.occluders.hide(camera, on_screen.bounds),
+             is_wanted = is_quad && is_seen;
   const bool shows = is_wanted && sight == QuadSight::whole && covers,
              is_clipped = is_wanted && sight == QuadSight::cut;
   // Two lanes ask for the places of all at once, and wait for them when edges are made.
@@ -280,7 +281,11 @@ __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_
   if (!set_view(&state->view, task, view)) return false;
   FaceMaking* making = &state->making;
   const PinholeCamera placed = place_camera(task.cameras[camera].camera, state->view.view);
-  making->setting = {placed, make_frustum(placed), task.line_floor_px, task.debug_palette};
+  making->setting.camera = placed;
+  making->setting.frustum = make_frustum(placed);
+  making->setting.line_floor_px = task.line_floor_px;
+  making->setting.debug_palette = task.debug_palette;
+  making->setting.occluders.clear();
   const StaticGeometryView& pieces = state->view.geometry->raster.pieces;
   making->strips = pieces.strips.data();
   making->walls = pieces.walls.data();
@@ -290,6 +295,38 @@ __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_
   return true;
 }
 
+// Finds what hides whole faces among the walls of a list. All lanes of one warp.
+__device__ inline void find_occluders(FaceMaking* making, const uint32_t* entries, int32_t count) {
+  ImageSetting* setting = &making->setting;
+  PICTURA_KEEP_LOOP
+  for (int32_t first = 0; first < count; first += kWarpSize) {
+    const uint32_t entry = first + lane_index() < count ? entries[first + lane_index()] : kNoEntry;
+    bool is_one = entry != kNoEntry && kind_of(entry) == kWallKind;
+    if (!__any_sync(kAllLanes, is_one)) continue;
+    const int32_t index = index_of(entry);
+    Occluder occluder;
+    if (is_one) {
+      CameraQuad seen;
+      is_one = see_quad(wall_quad(making->walls[index]), setting->camera, &seen) &&
+               make_occluder(setting->camera, setting->frustum, seen, &occluder);
+    }
+    // The lanes offer theirs in the order in which they would be kept, as long as one would be.
+    PICTURA_KEEP_LOOP
+    for (;;) {
+      is_one = is_one && setting->occluders.wants(occluder.covered_px2, index);
+      const unsigned covered = is_one ? __float_as_uint(occluder.covered_px2) : 0u;
+      const unsigned most = __reduce_max_sync(kAllLanes, covered);
+      if (most == 0) break;
+      const int32_t lowest = __reduce_min_sync(kAllLanes, covered == most ? index : 0x7FFFFFFF);
+      if (covered == most && index == lowest) {
+        setting->occluders.offer(occluder, index);
+        is_one = false;
+      }
+      __syncwarp();
+    }
+  }
+}
+
 // What drawing is told of an image.
 __device__ inline GatheredImage image_of(const BlockState& state, int32_t face_begin, int32_t face_count) {
   return {state.view.geometry, state.making.agents, state.making.setting.camera.position_m, face_begin, face_count};
@@ -297,7 +334,7 @@ __device__ inline GatheredImage image_of(const BlockState& state, int32_t face_b
 
 // Gathers an image into the block's own memory, all of it in one launch. False where there is no room for all, or where
 // its view names something that does not exist. All threads of the block.
-__device__ inline bool gather(const DrawTask& task, int32_t view, int32_t camera) {
+__device__ inline bool gather(const DrawTask& task, int32_t view, int32_t camera, bool leaves_out_hidden) {
   BlockState* state = block_state();
   GatherRoom* room = gather_room();
   const Scratch& scratch = state->scratch;
@@ -323,7 +360,10 @@ __device__ inline bool gather(const DrawTask& task, int32_t view, int32_t camera
   EntryList list(lists.entries, lists.max_entries, &state->num_entries);
   cull(state, task, &room->cull, &list);
   sync_block();
-  if (warp_index() == 0) list.finish();
+  if (warp_index() == 0) {
+    list.finish();
+    if (leaves_out_hidden) find_occluders(&state->making, lists.entries, state->num_entries);
+  }
   sync_block();
   PICTURA_KEEP_LOOP
   for (int i = warp_index(); i < FaceBatch::count_of(state->num_entries); i += num_warps()) {

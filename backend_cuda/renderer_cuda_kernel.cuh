@@ -293,6 +293,7 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kCullBlocksPerProce
     __syncwarp();
     list.finish();
     const int32_t listed = state->num_entries;
+    find_occluders(&state->making, entries_of(task.pool.lists, image), min_of(listed, task.pool.lists.max_entries));
     int32_t first_batch = -1;
     if (lane_index() == 0) first_batch = take_face_room(task, image, listed);
     __syncwarp();
@@ -422,10 +423,10 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
     const int32_t image = task.overflow_images[i], view = view_of(task, image), camera = camera_of(task, image);
     const PinholeCamera& shows = task.cameras[camera].camera;
     const bool is_drawn =
-        gather(task, view, camera) && each_tile(LargeDrawMemory::current(), width_px(shows), 0, height_px(shows),
-                                                [&](const LargeDrawMemory& memory, const Part& part) {
-                                                  return draw_image_part(memory, task, view, camera, part);
-                                                });
+        gather(task, view, camera, true) && each_tile(LargeDrawMemory::current(), width_px(shows), 0, height_px(shows),
+                                                      [&](const LargeDrawMemory& memory, const Part& part) {
+                                                        return draw_image_part(memory, task, view, camera, part);
+                                                      });
     if (!is_drawn && threadIdx.x == 0) note_fault(task, view, kNoRoom);
   }
 }
@@ -454,7 +455,8 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
     if (!in_range && threadIdx.x == 0) note_fault(task.draw, q, kBadQuery);
     PICTURA_KEEP_LOOP
     for (int32_t camera = 0; in_range && camera < num_cameras(task.draw); ++camera) {
-      if (!gather(task.draw, view, camera)) continue;
+      // What is hidden counts where the agent is alone.
+      if (!gather(task.draw, view, camera, false)) continue;
       const uint32_t number = thing_number(kAgentKind, agent - state->view.world_begin);
       const int num_faces = state->num_faces;
       int y_begin = state->making.setting.camera.height_px, y_end = 0;

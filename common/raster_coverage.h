@@ -235,23 +235,31 @@ PICTURA_HD inline PixelBox pixel_box(const PinholeCamera& camera, const ScreenBo
 /// Polygons of less than half of this are nothing.
 constexpr float kLeastTwiceArea_px2 = 1e-6f;
 
+/// Whether a plane has an inverse depth: faces without an area and planes through the camera have none.
+PICTURA_HD inline bool has_inverse_depth(const FacePlane& plane) {
+  constexpr float kLeast = 1e-30f;
+  return dot(plane.normal, plane.normal) > kLeast && fabsf(plane.offset) > kLeast;
+}
+/// Inverse depth of a plane as a linear function of the screen: of x, of y, and at (0, 0). normal . p = offset on the
+/// plane, and p = depth * ray: inverse depth is linear in the ray.
+PICTURA_HD inline Vec3 inverse_depth_plane(const PinholeCamera& camera, const Frustum& f, const FacePlane& plane) {
+  const Vec3 inverse = plane.normal * (has_inverse_depth(plane) ? inverse_of(plane.offset) : 0.0f);
+  const float x = inverse.x * f.x_per_px, y = inverse.y * f.y_per_px;
+  return {x, y, inverse.z - x * camera.center_x_px - y * camera.center_y_px};
+}
+
 /// Sets what the bounds of a face, which meet the image, and its plane say of it.
 PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f, const ScreenBounds& bounds,
                                   const FacePlane& plane, ScreenFace* face_out) {
   face_out->box = pixel_box(camera, bounds);
   face_out->inverse_depth_low = bounds.inverse_depth_low;
   face_out->inverse_depth_high = bounds.inverse_depth_high;
-  // normal . p = offset on the face's plane, and p = depth * ray: inverse depth is linear in the ray. Faces without an
-  // area and planes through the camera have none.
-  constexpr float kLeast = 1e-30f;
-  const float norm2 = dot(plane.normal, plane.normal), offset = fabsf(plane.offset);
-  const bool is_plane = norm2 > kLeast && offset > kLeast;
-  const Vec3 inverse = plane.normal * (is_plane ? inverse_of(plane.offset) : 0.0f);
-  face_out->inverse_depth_x = inverse.x * f.x_per_px;
-  face_out->inverse_depth_y = inverse.y * f.y_per_px;
-  face_out->inverse_depth_0 =
-      inverse.z - face_out->inverse_depth_x * camera.center_x_px - face_out->inverse_depth_y * camera.center_y_px;
-  face_out->plane_distance_m = is_plane ? offset * inverse_of(root_of(norm2)) : 0.0f;
+  const Vec3 inverse_depth = inverse_depth_plane(camera, f, plane);
+  face_out->inverse_depth_x = inverse_depth.x;
+  face_out->inverse_depth_y = inverse_depth.y;
+  face_out->inverse_depth_0 = inverse_depth.z;
+  face_out->plane_distance_m =
+      has_inverse_depth(plane) ? fabsf(plane.offset) * inverse_of(root_of(dot(plane.normal, plane.normal))) : 0.0f;
 }
 
 /// Calls keep_edge(0, edge), keep_edge(1, edge), ... for the edges of a polygon on screen, at most `count`, and returns

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "pictura/common/raster_cull.h"
+#include "pictura/common/raster_occlude.h"
 #include "pictura/common/raster_order.h"
 #include "pictura/common/raster_pixel.h"
 
@@ -14,6 +15,7 @@ struct ImageSetting {
   Frustum frustum;
   float line_floor_px = 0;
   bool debug_palette = false;
+  Occluders occluders;
 };
 
 /// What a face belongs to: the thing's number, and what the class plane says of it.
@@ -73,6 +75,7 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, FaceOwner owner, c
       face.count == 4 ? project_quad(setting.camera, face.corners, face.floor_px, &quad) : QuadSight::cut;
   if (sight == QuadSight::none) return false;
   if (sight == QuadSight::whole) {
+    if (setting.occluders.hide(setting.camera, quad.bounds)) return false;
     bool turns_right = false;
     if (!find_turn(quad, &turns_right)) return false;
     edge_begin = pool.take(4);
