@@ -34,7 +34,7 @@ class CpuRenderer final : public Renderer {
   GeometryHandle upload(const StaticGeometry& geometry) override {
     check_geometry(name(), geometry);
     copies_.push_back(geometry);
-    geometries_.push_back(raster_geometry(copies_.back()));
+    geometries_.push_back(copies_.back().view());
     return static_cast<GeometryHandle>(geometries_.size()) - 1;
   }
 
@@ -103,7 +103,7 @@ class CpuRenderer final : public Renderer {
   RendererConfig config_;
   std::vector<PinholeCamera> cameras_;  // in the ego frame
   std::deque<StaticGeometry> copies_;   // their addresses stay: geometries_ point into them
-  std::vector<RasterGeometry> geometries_;
+  std::vector<StaticGeometryView> geometries_;
   std::vector<ImageDrawer> drawers_;  // one per thread
 };
 

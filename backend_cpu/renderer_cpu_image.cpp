@@ -52,7 +52,7 @@ void ImageDrawer::find_occluders() {
 }
 
 bool ImageDrawer::stands(uint32_t solid, uint32_t strip) const {
-  const StaticGeometryView& pieces = request_.geometry->pieces;
+  const StaticGeometryView& pieces = *request_.geometry;
   const AgentBox* agents = request_.scene->agents.data() + world_begin();
   return stands_on(extent_of(solid, pieces, agents), extent_of(strip, pieces, agents), setting_.camera.position_m);
 }

@@ -13,7 +13,7 @@ namespace pictura {
 
 /// What one image shows.
 struct ImageRequest {
-  const RasterGeometry* geometry = nullptr;
+  const StaticGeometryView* geometry = nullptr;
   const SceneBatch* scene = nullptr;
   const View* view = nullptr;
   PinholeCamera camera;  // in the world

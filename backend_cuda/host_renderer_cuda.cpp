@@ -25,7 +25,7 @@ class HostRendererCuda final : public Renderer {
   GeometryHandle upload(const StaticGeometry& geometry) override {
     const GeometryHandle handle = renderer_->upload(geometry);
     copies_.push_back(geometry);
-    geometries_.push_back(raster_geometry(copies_.back()));
+    geometries_.push_back(copies_.back().view());
     return handle;
   }
 
@@ -61,7 +61,7 @@ class HostRendererCuda final : public Renderer {
 
   std::unique_ptr<Renderer> renderer_;
   std::deque<StaticGeometry> copies_;  // their addresses stay: geometries_ point into them
-  std::vector<RasterGeometry> geometries_;
+  std::vector<StaticGeometryView> geometries_;
   DeviceScene scene_;
   DeviceImages images_;
   DeviceCopy<View> views_;

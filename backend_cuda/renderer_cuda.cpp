@@ -131,11 +131,9 @@ struct UploadedGeometry {
         heads(host.view().heads),
         strip_pieces(cuda::SortedPieces(host.strips).view()),
         wall_pieces(cuda::SortedPieces(host.walls).view()) {
-    view.raster = raster_geometry(host);
-    view.raster.pieces = {};
-    view.raster.pieces.strips = strips.span();
-    view.raster.pieces.walls = walls.span();
-    view.raster.pieces.heads = heads.span();
+    view.pieces.strips = strips.span();
+    view.pieces.walls = walls.span();
+    view.pieces.heads = heads.span();
     view.strips = strip_pieces.view;
     view.walls = wall_pieces.view;
   }

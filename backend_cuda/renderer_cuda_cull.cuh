@@ -20,11 +20,10 @@ constexpr int kOutlineSides = 8;
 
 /// What a warp that culls keeps in shared memory.
 struct CullRoom {
-  // Of strips and of walls: the sides of the outline, and what pieces_of and far_of say.
-  OutlineSide sides[2][kOutlineSides];
+  OutlineSide sides[kOutlineSides];
+  // Of strips and of walls, as pieces_of says.
   const Ball* balls[2];
   const int32_t* items[2];
-  float far_m[2];
   int32_t offsets[kWarpSize];  // of rows that have pieces, see cull_pieces
 };
 static_assert(FaceBatch::kEntries == kWarpSize);
@@ -73,19 +72,17 @@ __device__ inline int cell_at(float distance_m, float cells_per_m, int count) {
   return clamp(static_cast<int>(floorf(distance_m * cells_per_m)), 0, count - 1);
 }
 
-// The rows of the grids that the outlines may touch.
+// The rows of the grids that the outline may touch.
 struct GridRows {
   int begin[2], count[2];
 };
 
-// Sets the outlines for strips and walls, which are seen from differently far away. The hull of the eye and the far
-// corners on the ground has no other sides than those of the pyramid: from the eye to the corners, and around them. All
-// lanes of the warp, one a side.
-__device__ inline GridRows set_outlines(CullRoom* room, const ImageSetting& setting, const DeviceGeometry& geometry) {
+// Sets the outline. The hull of the eye and the far corners on the ground has no other sides than those of the pyramid:
+// from the eye to the corners, and around them. All lanes of the warp, one a side, for the rows of strips and of walls.
+__device__ inline GridRows set_outline(CullRoom* room, const ImageSetting& setting, const DeviceGeometry& geometry) {
   const int side = lane_index() % kOutlineSides, of_walls = lane_index() / kOutlineSides & 1;
   const PieceGrid& pieces = pieces_of(geometry, of_walls);
-  const float far_m = far_of(of_walls != 0 ? geometry.raster.longest_wall_m : geometry.raster.longest_strip_m);
-  auto corner = [&](int i) { return far_corner(setting.camera, setting.frustum, i, far_m).xy(); };
+  auto corner = [&](int i) { return far_corner(setting.camera, setting.frustum, i).xy(); };
   // Corners differ in their first bit along x, and in their second along y.
   const int along = side & 3, from = along < 2 ? 2 * along : along - 2, to = along < 2 ? from + 1 : from + 2;
   const Vec2 first = side < 4 ? setting.camera.position_m.xy() : corner(from), second = corner(side < 4 ? side : to);
@@ -96,11 +93,10 @@ __device__ inline GridRows set_outlines(CullRoom* room, const ImageSetting& sett
   out.dx_dy = out.a.y != out.b.y ? (out.b.x - out.a.x) / (out.b.y - out.a.y) : 0.0f;
   out.x_low = lesser_of(out.a.x, out.b.x);
   out.x_high = greater_of(out.a.x, out.b.x);
-  if (lane_index() < 2 * kOutlineSides) room->sides[of_walls][side] = out;
+  if (lane_index() < kOutlineSides) room->sides[side] = out;
   if (side == 0) {
     room->balls[of_walls] = pieces.balls.data();
     room->items[of_walls] = pieces.cells.items.data();
-    room->far_m[of_walls] = far_m;
   }
   const GridView& grid = pieces.cells;
   const float cells_per_m = inverse_of(grid.cell_m), radius_m = pieces.largest_radius_m;
@@ -117,7 +113,7 @@ __device__ inline GridRows set_outlines(CullRoom* room, const ImageSetting& sett
   return rows;
 }
 
-// The pieces of a row that an outline may touch, which stand side by side.
+// The pieces of a row that the outline may touch, which stand side by side.
 struct PieceRange {
   int begin = 0, count = 0;
 };
@@ -151,7 +147,7 @@ __device__ inline void cull_pieces(BlockState* state, CullRoom* room, EntryList*
   const PinholeCamera& camera = state->making.setting.camera;
   const Frustum& frustum = state->making.setting.frustum;
   const DeviceGeometry& geometry = *state->view.geometry;
-  const GridRows rows = set_outlines(room, state->making.setting, geometry);
+  const GridRows rows = set_outline(room, state->making.setting, geometry);
   const int num_rows = rows.count[0] + rows.count[1], lane = lane_index();
   PICTURA_KEEP_LOOP
   for (int first_row = 0; first_row < num_rows; first_row += kWarpSize) {
@@ -159,7 +155,7 @@ __device__ inline void cull_pieces(BlockState* state, CullRoom* room, EntryList*
     const int of_walls = row >= rows.count[0] ? 1 : 0;
     PieceRange range;
     if (row < num_rows) {
-      range = pieces_of_row(pieces_of(geometry, of_walls), room->sides[of_walls],
+      range = pieces_of_row(pieces_of(geometry, of_walls), room->sides,
                             of_walls != 0 ? row - rows.count[0] + rows.begin[1] : row + rows.begin[0]);
     }
     // The rows' pieces one behind the other, those of strips first. Of each row that has some, how far its pieces in
@@ -192,8 +188,7 @@ __device__ inline void cull_pieces(BlockState* state, CullRoom* room, EntryList*
       const bool is_one = item + lane < total;
       item += num_threads();
       next = candidate_of(item);
-      const bool shows = ball_in_frustum(frustum, to_camera(camera, candidate.ball.center_m), candidate.ball.radius_m,
-                                         room->far_m[candidate.kind]);
+      const bool shows = ball_in_frustum(frustum, to_camera(camera, candidate.ball.center_m), candidate.ball.radius_m);
       list->push(shows && is_one, thing_number(candidate.kind != 0 ? kWallKind : kStripKind, candidate.index));
     }
     __syncwarp();
@@ -221,7 +216,7 @@ __device__ inline void cull_agents(const BlockState& state, const DrawTask& task
 // ... the lit heads that are turned to the camera.
 __device__ inline void cull_lights(const BlockState& state, EntryList* list) {
   const ImageSetting& setting = state.making.setting;
-  const Span<const LightHead> heads = state.view.geometry->raster.pieces.heads;
+  const Span<const LightHead> heads = state.view.geometry->pieces.heads;
   const int num_heads = state.view.light_end > state.view.light_begin ? static_cast<int>(heads.size()) : 0;
   PICTURA_KEEP_LOOP
   for (int first = warp_index() * kWarpSize; first < num_heads; first += num_threads()) {

@@ -286,7 +286,7 @@ __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_
   making->setting.line_floor_px = task.line_floor_px;
   making->setting.debug_palette = task.debug_palette;
   making->setting.occluders.clear();
-  const StaticGeometryView& pieces = state->view.geometry->raster.pieces;
+  const StaticGeometryView& pieces = state->view.geometry->pieces;
   making->strips = pieces.strips.data();
   making->walls = pieces.walls.data();
   making->heads = pieces.heads.data();

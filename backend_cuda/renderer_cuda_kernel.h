@@ -43,7 +43,7 @@ struct PieceGrid {
 
 /// A map's looks in device memory.
 struct DeviceGeometry {
-  RasterGeometry raster;
+  StaticGeometryView pieces;  // without grids, which follow
   PieceGrid strips, walls;
 };
 

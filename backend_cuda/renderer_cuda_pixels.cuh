@@ -9,7 +9,7 @@ namespace pictura::cuda {
 // Whether, in the image that the block draws, a solid stands on a strip.
 __device__ __noinline__ inline bool stands(uint32_t solid, uint32_t strip) {
   const GatheredImage& shown = block_state()->shown;
-  const StaticGeometryView& pieces = shown.geometry->raster.pieces;
+  const StaticGeometryView& pieces = shown.geometry->pieces;
   return stands_on(extent_of(solid, pieces, shown.agents), extent_of(strip, pieces, shown.agents), shown.eye_m);
 }
 

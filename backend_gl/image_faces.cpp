@@ -27,7 +27,7 @@ Vec3 compared_plane(const FacePlane& plane, const PinholeCamera& camera, float o
 
 }  // namespace
 
-void ImageFaces::gather(const ImageSetting& setting, const RasterGeometry& geometry, const SceneBatch& scene,
+void ImageFaces::gather(const ImageSetting& setting, const StaticGeometryView& geometry, const SceneBatch& scene,
                         const View& view, int32_t layer) {
   faces_.clear();
   strips_.clear();

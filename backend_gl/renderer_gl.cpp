@@ -72,7 +72,7 @@ class GlRenderer final : public Renderer {
   GeometryHandle upload(const StaticGeometry& geometry) override {
     check_geometry(name_, geometry);
     copies_.push_back(geometry);
-    geometries_.push_back(raster_geometry(copies_.back()));
+    geometries_.push_back(copies_.back().view());
     return static_cast<GeometryHandle>(geometries_.size()) - 1;
   }
 
@@ -246,7 +246,7 @@ class GlRenderer final : public Renderer {
   GLuint program_ = 0, instances_ = 0, vertex_array_ = 0;
   GLint projection_ = -1, positions_ = -1;
   std::deque<StaticGeometry> copies_;  // their addresses stay: geometries_ point into them
-  std::vector<RasterGeometry> geometries_;
+  std::vector<StaticGeometryView> geometries_;
   gl::HostScene host_scene_;
   std::vector<gl::ImageFaces> faces_;    // one per layer
   std::vector<std::size_t> first_face_;  // [layers + 1] in the buffer

@@ -74,12 +74,12 @@ Ways draw_all_ways(const StaticGeometry& geometry, const SceneBatch& scene, cons
             trace(TruthSamples::grid_2x2).rgb,
             {},
             {}};
-  const RasterGeometry raster = raster_geometry(geometry);
+  const StaticGeometryView pieces = geometry.view();
   const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
   Rig rig;
   rig.cameras = {camera};
   ImageDrawer drawer;
-  drawer.prepare({&raster, &scene, &view, place_camera(pinhole_cameras(rig)[0], view), line_floor_px, false, true});
+  drawer.prepare({&pieces, &scene, &view, place_camera(pinhole_cameras(rig)[0], view), line_floor_px, false, true});
   ways.oracle.resize(3 * pixels);
   drawer.draw({PixelFormat::f32, ways.oracle.data()});
   ways.area = draw_areas(&drawer, pixels);

@@ -2,6 +2,7 @@
 // (right, down, forward) in metres; the third is the depth. Shared by both devices.
 #pragma once
 
+#include "pictura/common/color.h"
 #include "pictura/common/scene_types.h"
 
 namespace pictura {
@@ -63,10 +64,10 @@ PICTURA_HD inline Frustum make_frustum(const PinholeCamera& camera) {
   return f;
 }
 
-/// Whether a ball (camera coordinates) may touch what is drawn, up to a depth of far_m.
-PICTURA_HD inline bool ball_in_frustum(const Frustum& f, Vec3 center, float radius_m, float far_m) {
+/// Whether a ball (camera coordinates) may touch what is drawn. Faces whose corners are all out of range are black.
+PICTURA_HD inline bool ball_in_frustum(const Frustum& f, Vec3 center, float radius_m) {
   // All at once: lanes of a warp differ in what fails first.
-  const bool in_range = (center.z + radius_m > kNear_m) & (center.z - radius_m < far_m);
+  const bool in_range = (center.z + radius_m > kNear_m) & (center.z - radius_m < kVisibleRange_m);
   const bool in_width = ((center.x - f.x_low * center.z) * f.x_low_scale > -radius_m) &
                         ((f.x_high * center.z - center.x) * f.x_high_scale > -radius_m);
   const bool in_height = ((center.y - f.y_low * center.z) * f.y_low_scale > -radius_m) &
@@ -74,18 +75,18 @@ PICTURA_HD inline bool ball_in_frustum(const Frustum& f, Vec3 center, float radi
   return in_range & in_width & in_height;
 }
 
-/// One of the four corners (0 to 3) of what is drawn at a depth of far_m, in the world.
-PICTURA_HD inline Vec3 far_corner(const PinholeCamera& camera, const Frustum& f, int corner, float far_m) {
+/// One of the four corners (0 to 3) of what is in range, in the world.
+PICTURA_HD inline Vec3 far_corner(const PinholeCamera& camera, const Frustum& f, int corner) {
   const float x = (corner & 1) ? f.x_high : f.x_low;
   const float y = (corner & 2) ? f.y_high : f.y_low;
-  return camera.position_m + (camera.right * x + camera.down * y + camera.forward) * far_m;
+  return camera.position_m + (camera.right * x + camera.down * y + camera.forward) * kVisibleRange_m;
 }
 
-/// Bounding box on the ground of what is drawn up to a depth of far_m.
-PICTURA_HD inline Aabb2 frustum_ground_box(const PinholeCamera& camera, const Frustum& f, float far_m) {
+/// Bounding box on the ground of what is in range.
+PICTURA_HD inline Aabb2 frustum_ground_box(const PinholeCamera& camera, const Frustum& f) {
   Aabb2 box{camera.position_m.xy(), camera.position_m.xy()};
   for (int corner = 0; corner < 4; ++corner) {
-    const Vec3 p = far_corner(camera, f, corner, far_m);
+    const Vec3 p = far_corner(camera, f, corner);
     box.low = {min_of(box.low.x, p.x), min_of(box.low.y, p.y)};
     box.high = {max_of(box.high.x, p.x), max_of(box.high.y, p.y)};
   }

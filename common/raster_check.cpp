@@ -52,7 +52,7 @@ void check_images(std::string_view renderer, const Rig& rig, MemorySpace space, 
   }
 }
 
-void check_scene(std::string_view renderer, const SceneBatch& scene, Span<const RasterGeometry> geometries) {
+void check_scene(std::string_view renderer, const SceneBatch& scene, Span<const StaticGeometryView> geometries) {
   PICTURA_CHECK(scene.space == MemorySpace::host, "renderer {}: scene: expected host memory, got {}", renderer,
                 name_of(scene.space));
   if (scene.world_begin.empty()) {
@@ -164,17 +164,6 @@ std::vector<PinholeCamera> pinhole_cameras(const Rig& rig) {
                        camera.center_x_px, camera.center_y_px, camera.width_px, camera.height_px});
   }
   return cameras;
-}
-
-RasterGeometry raster_geometry(const StaticGeometry& geometry) {
-  RasterGeometry raster{geometry.view()};
-  for (const Strip& strip : geometry.strips) {
-    raster.longest_strip_m = max_of(raster.longest_strip_m, 2.0f * strip_radius_m(strip));
-  }
-  for (const WallFace& wall : geometry.walls) {
-    raster.longest_wall_m = max_of(raster.longest_wall_m, 2.0f * wall_radius_m(wall));
-  }
-  return raster;
 }
 
 }  // namespace pictura

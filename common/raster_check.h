@@ -15,7 +15,7 @@ void check_images(std::string_view renderer, const Rig& rig, MemorySpace space, 
 
 /// Throws Error unless all spans of a host scene fit together, handles are below num_geometries, lights suffice for the
 /// geometries' signals, and every agent's box is finite.
-void check_scene(std::string_view renderer, const SceneBatch& scene, Span<const RasterGeometry> geometries);
+void check_scene(std::string_view renderer, const SceneBatch& scene, Span<const StaticGeometryView> geometries);
 
 /// Throws Error unless each view's world, ego and hidden agents exist in the (host) scene and its pose is finite.
 void check_views(std::string_view renderer, const SceneBatch& scene, Span<const View> views);
@@ -29,8 +29,5 @@ void check_geometry(std::string_view renderer, const StaticGeometry& geometry);
 
 /// The rig's cameras as the rasterizers use them, in the ego frame.
 std::vector<PinholeCamera> pinhole_cameras(const Rig& rig);
-
-/// A geometry's view, with its longest pieces found.
-RasterGeometry raster_geometry(const StaticGeometry& geometry);
 
 }  // namespace pictura

@@ -7,15 +7,6 @@
 
 namespace pictura {
 
-/// A map's looks with what culling needs to know of them: how long the longest pieces are, because a piece is drawn as
-/// long as the mean depth of its corners is within range.
-struct RasterGeometry {
-  StaticGeometryView pieces;
-  float longest_strip_m = 0, longest_wall_m = 0;
-};
-
-PICTURA_HD inline float far_of(float longest_piece_m) { return kVisibleRange_m + longest_piece_m; }
-
 PICTURA_HD inline Vec3 strip_middle(const Strip& strip) { return (strip.a_m + strip.b_m) * 0.5f; }
 
 /// Half of a strip's greatest extent: length, mitres and width.
@@ -32,26 +23,26 @@ PICTURA_HD inline float wall_radius_m(const WallFace& wall) {
   return 0.5f * (length(wall.b_m - wall.a_m) + wall.height_m);
 }
 
-PICTURA_HD inline bool may_show(const Strip& strip, const PinholeCamera& camera, const Frustum& f, float far_m) {
+PICTURA_HD inline bool may_show(const Strip& strip, const PinholeCamera& camera, const Frustum& f) {
   // The floor on its width may widen a strip by less than the guard band, which the frustum includes.
-  return ball_in_frustum(f, to_camera(camera, strip_middle(strip)), strip_radius_m(strip), far_m);
+  return ball_in_frustum(f, to_camera(camera, strip_middle(strip)), strip_radius_m(strip));
 }
 
-PICTURA_HD inline bool may_show(const WallFace& wall, const PinholeCamera& camera, const Frustum& f, float far_m) {
-  return ball_in_frustum(f, to_camera(camera, wall_middle(wall)), wall_radius_m(wall), far_m);
+PICTURA_HD inline bool may_show(const WallFace& wall, const PinholeCamera& camera, const Frustum& f) {
+  return ball_in_frustum(f, to_camera(camera, wall_middle(wall)), wall_radius_m(wall));
 }
 
 PICTURA_HD inline bool may_show(const LightHead& head, const PinholeCamera& camera, const Frustum& f) {
   // A little more than the disk: the polygon that it is drawn as has the disk's area.
   const float radius_m = 1.1f * kLightRadius_m;
-  return ball_in_frustum(f, to_camera(camera, head.position_m), radius_m, far_of(2.0f * radius_m));
+  return ball_in_frustum(f, to_camera(camera, head.position_m), radius_m);
 }
 
 PICTURA_HD inline bool may_show(const AgentBox& box, const PinholeCamera& camera, const Frustum& f) {
   const Vec3 center = box.center_m + Vec3{0.0f, 0.0f, 0.5f * box.height_m};
   const Vec3 size{box.length_m, box.width_m, box.height_m};
   const float radius_m = 0.5f * root_of(greater_of(dot(size, size), 1e-12f));
-  return box.drawn != 0 && ball_in_frustum(f, to_camera(camera, center), radius_m, far_of(2.0f * radius_m));
+  return box.drawn != 0 && ball_in_frustum(f, to_camera(camera, center), radius_m);
 }
 
 /// Whether a view leaves an agent out: its own ego and those it hides.

@@ -20,25 +20,24 @@ PICTURA_HD inline void visit_agents(const ImageSetting& setting, const SceneBatc
 
 /// Calls visit(wall, index) for each wall that the image may show.
 template <typename Visit>
-PICTURA_HD inline void visit_walls(const ImageSetting& setting, const RasterGeometry& geometry, Visit&& visit) {
-  const float far_m = far_of(geometry.longest_wall_m);
-  const Span<const WallFace> walls = geometry.pieces.walls;
+PICTURA_HD inline void visit_walls(const ImageSetting& setting, const StaticGeometryView& geometry, Visit&& visit) {
+  const Span<const WallFace> walls = geometry.walls;
   for_each_item(
-      geometry.pieces.wall_grid, frustum_ground_box(setting.camera, setting.frustum, far_m),
+      geometry.wall_grid, frustum_ground_box(setting.camera, setting.frustum),
       [&](int32_t i) { return ground_box(walls[static_cast<size_t>(i)]); },
       [&](int32_t i) {
         const WallFace& wall = walls[static_cast<size_t>(i)];
-        if (may_show(wall, setting.camera, setting.frustum, far_m)) visit(wall, i);
+        if (may_show(wall, setting.camera, setting.frustum)) visit(wall, i);
       });
 }
 
 /// Calls visit(head, state, index) for each light head that the image may show.
 template <typename Visit>
-PICTURA_HD inline void visit_lights(const ImageSetting& setting, const RasterGeometry& geometry,
+PICTURA_HD inline void visit_lights(const ImageSetting& setting, const StaticGeometryView& geometry,
                                     const SceneBatch& scene, const View& view, Visit&& visit) {
   const int32_t begin = scene.light_begin[static_cast<size_t>(view.world)];
   if (begin == scene.light_begin[static_cast<size_t>(view.world) + 1]) return;
-  const Span<const LightHead> heads = geometry.pieces.heads;
+  const Span<const LightHead> heads = geometry.heads;
   for (int32_t i = 0; i < static_cast<int32_t>(heads.size()); ++i) {
     const LightHead& head = heads[static_cast<size_t>(i)];
     if (!may_show(head, setting.camera, setting.frustum)) continue;
@@ -48,15 +47,14 @@ PICTURA_HD inline void visit_lights(const ImageSetting& setting, const RasterGeo
 
 /// Calls visit(strip, index) for each strip that the image may show.
 template <typename Visit>
-PICTURA_HD inline void visit_strips(const ImageSetting& setting, const RasterGeometry& geometry, Visit&& visit) {
-  const float far_m = far_of(geometry.longest_strip_m);
-  const Span<const Strip> strips = geometry.pieces.strips;
+PICTURA_HD inline void visit_strips(const ImageSetting& setting, const StaticGeometryView& geometry, Visit&& visit) {
+  const Span<const Strip> strips = geometry.strips;
   for_each_item(
-      geometry.pieces.strip_grid, frustum_ground_box(setting.camera, setting.frustum, far_m),
+      geometry.strip_grid, frustum_ground_box(setting.camera, setting.frustum),
       [&](int32_t i) { return ground_box(strips[static_cast<size_t>(i)]); },
       [&](int32_t i) {
         const Strip& strip = strips[static_cast<size_t>(i)];
-        if (may_show(strip, setting.camera, setting.frustum, far_m)) visit(strip, i);
+        if (may_show(strip, setting.camera, setting.frustum)) visit(strip, i);
       });
 }
 

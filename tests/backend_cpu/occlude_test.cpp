@@ -89,7 +89,7 @@ TEST_P(OccludersOfTowns, ChangeNothingThatIsSeen) {
     GTEST_SKIP() << "needs " << map << ".xodr; set PICTURA_DATA";
   }
   const Snapshot snapshot = drive_snapshot({.map = map, .views = 24});
-  const RasterGeometry raster = raster_geometry(snapshot.geometry);
+  const StaticGeometryView pieces = snapshot.geometry.view();
   const SceneBatch scene = snapshot.scene.batch();
   const std::vector<PinholeCamera> cameras = pinhole_cameras(paper_rig());
   ImageDrawer drawer;
@@ -104,7 +104,7 @@ TEST_P(OccludersOfTowns, ChangeNothingThatIsSeen) {
       for (const bool leaves_out : {false, true}) {
         std::vector<float>& image = images[leaves_out ? 1 : 0];
         image.resize(3 * static_cast<std::size_t>(camera.width_px * camera.height_px));
-        drawer.prepare({&raster, &scene, &view, place_camera(camera, view), 0.35f, false, leaves_out});
+        drawer.prepare({&pieces, &scene, &view, place_camera(camera, view), 0.35f, false, leaves_out});
         drawer.draw({PixelFormat::f32, image.data()});
       }
       values += images[0].size();

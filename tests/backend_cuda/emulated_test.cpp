@@ -47,7 +47,7 @@ class EmulatedRenderer final : public Renderer {
 
   GeometryHandle upload(const StaticGeometry& geometry) override {
     kept_.push_back(std::make_unique<Kept>(geometry));
-    cuda::DeviceGeometry view{raster_geometry(kept_.back()->geometry), kept_.back()->strips.view(),
+    cuda::DeviceGeometry view{kept_.back()->geometry.view(), kept_.back()->strips.view(),
                               kept_.back()->walls.view()};
     geometries_.push_back(view);
     return static_cast<GeometryHandle>(geometries_.size()) - 1;
