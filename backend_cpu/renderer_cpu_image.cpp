@@ -41,14 +41,21 @@ void ImageDrawer::prepare(const ImageRequest& request) {
 }
 
 void ImageDrawer::find_occluders() {
-  visit_walls(setting_, *request_.geometry, [&](const WallFace& wall, int32_t index) {
+  auto offer = [&](const WorldQuad& quad, uint32_t entry) {
     CameraQuad seen;
     Occluder occluder;
-    if (see_quad(wall_quad(wall), setting_.camera, &seen) &&
-        make_occluder(setting_.camera, setting_.frustum, seen, &occluder)) {
-      setting_.occluders.offer(occluder, index);
+    if (see_quad(quad, setting_.camera, &seen) && make_occluder(setting_.camera, setting_.frustum, seen, &occluder)) {
+      setting_.occluders.offer(occluder, entry);
     }
+  };
+  visit_agents(setting_, *request_.scene, *request_.view, [&](const AgentBox& box, int32_t agent) {
+    const uint32_t number = thing_number(kAgentKind, agent - world_begin());
+    visit_faces_to_eye(box, setting_.camera, [&](int face) {
+      offer(cuboid_quad(box, face, setting_.debug_palette), face_entry(number, face));
+    });
   });
+  visit_walls(setting_, *request_.geometry,
+              [&](const WallFace& wall, int32_t index) { offer(wall_quad(wall), thing_number(kWallKind, index)); });
 }
 
 bool ImageDrawer::stands(uint32_t solid, uint32_t strip) const {

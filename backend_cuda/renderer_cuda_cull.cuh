@@ -6,9 +6,7 @@
 
 namespace pictura::cuda {
 
-// An entry is a face that may show: a kind, of agents which face, and an index.
-constexpr int kFaceShift = 27;
-constexpr uint32_t kFaceIndexMask = (1u << kFaceShift) - 1, kNoEntry = ~0u;
+constexpr uint32_t kNoEntry = ~0u;
 
 /// The outline on the ground of what a camera sees, by its sides, each from its end of lower y.
 struct alignas(16) OutlineSide {
@@ -39,12 +37,12 @@ class EntryList {
     if (wanted) set(place, entry);
   }
   /// An entry for each of an agent's faces.
-  __device__ void push_faces(unsigned faces, uint32_t entry) {
+  __device__ void push_faces(unsigned faces, uint32_t number) {
     const int count = __popc(faces), end = sum_up_to(count);
     int32_t place = take_places(count_, end) + end - count;
     PICTURA_KEEP_LOOP
     for (; faces != 0; faces &= faces - 1) {
-      set(place++, entry | (static_cast<uint32_t>(__ffs(static_cast<int>(faces))) - 1) << kFaceShift);
+      set(place++, face_entry(number, __ffs(static_cast<int>(faces)) - 1));
     }
   }
   /// Fills the last batch, once all warps have found theirs.

@@ -144,7 +144,9 @@ __device__ inline void make_faces(const FaceMaking& making, FaceRoom* room, cons
   ScreenQuad on_screen;
   bool turns_right = false;
   const QuadSight sight = project_quad(camera, quad.seen.corner, quad.floor_px, &on_screen);
-  const bool covers = find_turn(on_screen, &turns_right) && !making.setting.occluders.hide(camera, on_screen.bounds),
+  const float least_area = least_area_of(quad.seen.color, quad.owner);
+  const bool covers = find_turn(on_screen, 2.0f * least_area, &turns_right) &&
+                      !making.setting.occluders.hide(camera, on_screen.bounds),
              is_wanted = is_quad && is_seen;
   const bool shows = is_wanted && sight == QuadSight::whole && covers,
              is_clipped = is_wanted && sight == QuadSight::cut;
@@ -295,31 +297,30 @@ __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_
   return true;
 }
 
-// Finds what hides whole faces among the walls of a list. All lanes of one warp.
+// Finds what hides whole faces among the solids of a list. All lanes of one warp.
 __device__ inline void find_occluders(FaceMaking* making, const uint32_t* entries, int32_t count) {
   ImageSetting* setting = &making->setting;
   PICTURA_KEEP_LOOP
   for (int32_t first = 0; first < count; first += kWarpSize) {
     const uint32_t entry = first + lane_index() < count ? entries[first + lane_index()] : kNoEntry;
-    bool is_one = entry != kNoEntry && kind_of(entry) == kWallKind;
+    bool is_one = entry != kNoEntry && (kind_of(entry) == kAgentKind || kind_of(entry) == kWallKind);
     if (!__any_sync(kAllLanes, is_one)) continue;
-    const int32_t index = index_of(entry);
     Occluder occluder;
     if (is_one) {
-      CameraQuad seen;
-      is_one = see_quad(wall_quad(making->walls[index]), setting->camera, &seen) &&
-               make_occluder(setting->camera, setting->frustum, seen, &occluder);
+      Quad quad;
+      is_one = make_quad(*making, entry, &quad, [making](int32_t index) { return making->strips[index]; }) &&
+               make_occluder(setting->camera, setting->frustum, quad.seen, &occluder);
     }
     // The lanes offer theirs in the order in which they would be kept, as long as one would be.
     PICTURA_KEEP_LOOP
     for (;;) {
-      is_one = is_one && setting->occluders.wants(occluder.covered_px2, index);
+      is_one = is_one && setting->occluders.wants(occluder.covered_px2, entry);
       const unsigned covered = is_one ? __float_as_uint(occluder.covered_px2) : 0u;
       const unsigned most = __reduce_max_sync(kAllLanes, covered);
       if (most == 0) break;
-      const int32_t lowest = __reduce_min_sync(kAllLanes, covered == most ? index : 0x7FFFFFFF);
-      if (covered == most && index == lowest) {
-        setting->occluders.offer(occluder, index);
+      const uint32_t lowest = __reduce_min_sync(kAllLanes, covered == most ? entry : kNoEntry);
+      if (entry == lowest) {
+        setting->occluders.offer(occluder, entry);
         is_one = false;
       }
       __syncwarp();

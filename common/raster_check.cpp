@@ -74,7 +74,7 @@ void check_scene(std::string_view renderer, const SceneBatch& scene, Span<const 
                   "renderer {}: scene: world {}: expected a geometry handle below {}, got {}", renderer, world,
                   geometries.size(), handle);
     const int32_t lights = scene.light_begin[world + 1] - scene.light_begin[world];
-    const int32_t signals = geometries[static_cast<std::size_t>(handle)].pieces.num_signals;
+    const int32_t signals = geometries[static_cast<std::size_t>(handle)].num_signals;
     PICTURA_CHECK(lights >= signals || lights == 0,
                   "renderer {}: scene: world {}: expected a light state for each of {} signals, or none, got {}",
                   renderer, world, signals, lights);

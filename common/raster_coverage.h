@@ -341,11 +341,11 @@ PICTURA_HD inline QuadSight project_quad(const PinholeCamera& camera, const Vec3
   return !bounds->meet_image(camera) ? QuadSight::none : (is_whole ? QuadSight::whole : QuadSight::cut);
 }
 
-/// Sets whether a face turns right on screen; false where it covers nothing.
-PICTURA_HD inline bool find_turn(const ScreenQuad& quad, bool* turns_right_out) {
+/// Sets whether a face turns right on screen; false where it covers less than that.
+PICTURA_HD inline bool find_turn(const ScreenQuad& quad, float least_twice_area_px2, bool* turns_right_out) {
   const float twice_area = cross(quad.corner[2] - quad.corner[0], quad.corner[3] - quad.corner[1]);
   *turns_right_out = twice_area > 0.0f;
-  return fabsf(twice_area) >= kLeastTwiceArea_px2;
+  return fabsf(twice_area) >= least_twice_area_px2;
 }
 
 /// make_screen_face of what project_quad found to be whole and find_turn to cover something.

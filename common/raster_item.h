@@ -42,9 +42,9 @@ PICTURA_HD constexpr uint16_t instance_of(const ScreenFace& face) {
   return static_cast<uint16_t>(kind_of(face.number) == kAgentKind ? 1 + index_of(face.number) : 0);
 }
 
-/// What a face covers less of a pixel than this is nothing. Strips hide little but each other, so of theirs more can be
-/// spared: what adds less than kLeastWeight to any channel, and an eighth of a pixel at most, for dark ones may hide
-/// bright ones.
+/// What a face covers less of a pixel than this is nothing, and so is a face that is smaller. Strips hide little but
+/// each other, so of theirs more can be spared: what adds less than kLeastWeight to any channel, and an eighth of a
+/// pixel at most, for dark ones may hide bright ones.
 constexpr float kLeastArea = 1e-4f, kLeastWeight = 2.0f / 255.0f, kMostSparedArea = 0.125f;
 PICTURA_HD inline float least_area_of(Rgb color, FaceOwner owner) {
   if (kind_of(owner.number) != kStripKind) return kLeastArea;
@@ -77,7 +77,7 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, FaceOwner owner, c
   if (sight == QuadSight::whole) {
     if (setting.occluders.hide(setting.camera, quad.bounds)) return false;
     bool turns_right = false;
-    if (!find_turn(quad, &turns_right)) return false;
+    if (!find_turn(quad, 2.0f * least_area_of(face.color, owner), &turns_right)) return false;
     edge_begin = pool.take(4);
     if (edge_begin < 0) return false;
     make_quad_face(setting.camera, setting.frustum, quad, turns_right, face.plane, face.color, keep_edge, face_out);

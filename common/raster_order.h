@@ -21,6 +21,12 @@ PICTURA_HD inline uint32_t strip_number(const Strip& strip, int32_t index) {
   return (kStripKind << kKindShift) | (static_cast<uint32_t>(strip_rank(strip.kind)) << kRankShift) |
          static_cast<uint32_t>(index);
 }
+/// A face that may show: the number of its thing, and of agents which face.
+constexpr int kFaceShift = 27;
+constexpr uint32_t kFaceIndexMask = (1u << kFaceShift) - 1;
+PICTURA_HD constexpr uint32_t face_entry(uint32_t number, int face) {
+  return number | static_cast<uint32_t>(face) << kFaceShift;
+}
 PICTURA_HD constexpr uint32_t kind_of(uint32_t number) { return number >> kKindShift; }
 PICTURA_HD constexpr int32_t index_of(uint32_t number) { return static_cast<int32_t>(number & kIndexMask); }
 PICTURA_HD constexpr bool is_strip(const ScreenFace& face) { return kind_of(face.number) == kStripKind; }

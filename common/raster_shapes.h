@@ -137,13 +137,20 @@ PICTURA_HD inline void emit_quad(const WorldQuad& quad, const PinholeCamera& cam
   if (see_quad(quad, camera, &seen)) emit(CameraFace{seen.corner, 4, seen.plane, seen.color, floor_px});
 }
 
-/// ... for each face of a box that is turned to the camera.
-template <typename Emit>
-PICTURA_HD inline void agent_faces(const AgentBox& box, const PinholeCamera& camera, bool debug_palette, Emit&& emit) {
+/// Calls visit(face) for each face of a box that is turned to the camera.
+template <typename Visit>
+PICTURA_HD inline void visit_faces_to_eye(const AgentBox& box, const PinholeCamera& camera, Visit&& visit) {
   const unsigned faces = faces_to_eye(box, camera.position_m);
   for (int face = 0; face < kNumCuboidFaces; ++face) {
-    if ((faces >> face & 1u) != 0) emit_quad(cuboid_quad(box, face, debug_palette), camera, 0.0f, emit);
+    if ((faces >> face & 1u) != 0) visit(face);
   }
+}
+
+/// emit_quad for each of those.
+template <typename Emit>
+PICTURA_HD inline void agent_faces(const AgentBox& box, const PinholeCamera& camera, bool debug_palette, Emit&& emit) {
+  visit_faces_to_eye(box, camera,
+                     [&](int face) { emit_quad(cuboid_quad(box, face, debug_palette), camera, 0.0f, emit); });
 }
 
 template <typename Emit>

@@ -199,13 +199,17 @@ inline unsigned __reduce_or_sync(unsigned, unsigned bits) {
   return all;
 }
 inline bool __all_sync(unsigned lanes, bool vote) { return __ballot_sync(lanes, vote) == ~0u; }
-inline int __reduce_min_sync(unsigned, int value) {
+template <typename Value>
+Value __reduce_min_sync(unsigned, Value value) {
   const uint64_t* values =
       pictura::emulation::Block::current()->exchange("reduce_min", pictura::emulation::bits_of(value));
-  for (int lane = 0; lane < 32; ++lane) value = std::min(value, pictura::emulation::value_of<int>(values[lane]));
+  for (int lane = 0; lane < 32; ++lane) value = std::min(value, pictura::emulation::value_of<Value>(values[lane]));
   return value;
 }
-inline int __reduce_max_sync(unsigned lanes, int value) { return ~__reduce_min_sync(lanes, ~value); }
+template <typename Value>
+Value __reduce_max_sync(unsigned lanes, Value value) {
+  return ~__reduce_min_sync(lanes, ~value);
+}
 template <typename Value>
 Value __shfl_sync(unsigned, Value value, int from) {
   const uint64_t* values = pictura::emulation::Block::current()->exchange("shfl", pictura::emulation::bits_of(value));
