@@ -16,6 +16,11 @@ struct ViewState {
   int32_t world_begin, world_end, light_begin, light_end;
 };
 
+/// A tile of an image of a class of crowded ones; image -1: none.
+struct DrawTurn {
+  int32_t image = -1, tile = 0, crowd = 0;
+};
+
 /// Room for what a WarpQueue holds.
 struct WarpQueueRoom {
   uint32_t a[2 * kWarpSize], b[2 * kWarpSize];
@@ -40,7 +45,8 @@ struct BlockState {
   GatherCounts listed;
   int32_t num_entries, num_faces, num_clipped, overflow, usable;
   // While pixels are drawn.
-  int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, next_fragments, image, tile;
+  int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, next_fragments;
+  DrawTurn turn;
   WarpState warps[kMaxWarps];
 };
 

@@ -21,9 +21,9 @@ struct Part {
   }
 };
 
-// The tile from (x, y) on, so many rows high, of an image of that width whose rows end at y_end.
-__device__ inline Part tile_at(int x, int y, int rows, int width_px, int y_end) {
-  return {x, min_of(x + kTileWidth_px, width_px), y, min_of(y + rows, y_end)};
+// The tile from (x, y) on, so many columns and rows large, of an image of that width whose rows end at y_end.
+__device__ inline Part tile_at(int x, int y, int columns, int rows, int width_px, int y_end) {
+  return {x, min_of(x + columns, width_px), y, min_of(y + rows, y_end)};
 }
 
 /// A pixel's word. While the nearest full faces are found it is a mark, the larger the nearer: the upper bits of the

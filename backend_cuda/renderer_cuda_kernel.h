@@ -10,11 +10,31 @@ namespace pictura::cuda {
 
 constexpr int kMaxCameras = 64;
 
-/// Images are drawn tile by tile, upright ones, because what is far away crowds along the horizon.
-constexpr int kTileWidth_px = 32, kTileHeight_px = 54;
-PICTURA_HD constexpr int tiles_across(int width_px) { return (width_px + kTileWidth_px - 1) / kTileWidth_px; }
-PICTURA_HD constexpr int tiles_of(int width_px, int height_px) {
-  return tiles_across(width_px) * ((height_px + kTileHeight_px - 1) / kTileHeight_px);
+/// Images are drawn in the order of how many faces they list, in classes of so many, the most crowded first: blocks
+/// that come late to their last tile have a light one.
+constexpr int kCrowds = 16, kCrowdFaces = 64;
+
+/// Pixels side by side that a thread writes together.
+constexpr int kWrittenAtOnce = 4;
+
+/// Images are drawn tile by tile, upright ones, because what is far away crowds along the horizon. Tiles are at most so
+/// wide and high; those of images that list so many faces for each are narrower, for there would be no room for the
+/// fragments of the widest, which would be drawn in parts.
+constexpr int kTileWidth_px = 48, kNarrowTile_px = 32, kTileHeight_px = 54, kNarrowFaces = 224;
+/// The tiles of an image: as wide as each other, but for the last.
+struct TileGrid {
+  int tile_width_px, across, down;
+  PICTURA_HD constexpr int count() const { return across * down; }
+};
+PICTURA_HD constexpr TileGrid tiles_at_most(int most_px, int width_px, int height_px) {
+  auto parts_of = [](int whole, int most) { return (whole + most - 1) / most; };
+  const int together = kWrittenAtOnce * parts_of(parts_of(width_px, parts_of(width_px, most_px)), kWrittenAtOnce);
+  return {together, parts_of(width_px, together), parts_of(height_px, kTileHeight_px)};
+}
+PICTURA_HD constexpr TileGrid tiles_of(int width_px, int height_px, int crowd) {
+  const TileGrid widest = tiles_at_most(kTileWidth_px, width_px, height_px);
+  return crowd * kCrowdFaces < kNarrowFaces * widest.count() ? widest
+                                                             : tiles_at_most(kNarrowTile_px, width_px, height_px);
 }
 
 /// Where one camera's images go; strides as in CameraImages.
@@ -137,10 +157,6 @@ struct Scratch {
 /// Images are gathered and drawn in rounds: those for which the pool had no room left are postponed to the next one.
 constexpr int kRounds = 3;
 
-/// Images are drawn in the order of how many faces they list, in classes of so many, the most crowded first: blocks
-/// that come late to their last tile have a light one.
-constexpr int kCrowds = 16, kCrowdFaces = 64;
-
 /// What the blocks of a batch's launches count together; 0 before.
 struct DrawCounters {
   struct Round {
@@ -156,8 +172,9 @@ struct DrawCounters {
 struct DrawTask {
   SceneBatch scene;  // in device memory, like all that follows
   const View* views = nullptr;
-  int32_t first_view = 0;                                  // views [first_view, first_view + num_views) are drawn
-  int32_t num_views = 0, num_cameras = 0, most_tiles = 0;  // most_tiles: of an image
+  int32_t first_view = 0;  // views [first_view, first_view + num_views) are drawn
+  int32_t num_views = 0, num_cameras = 0;
+  int32_t most_tiles[kCrowds] = {};  // of an image of each class
   const DeviceGeometry* geometries = nullptr;
   int32_t num_geometries = 0;
   int32_t max_world_agents = 0;

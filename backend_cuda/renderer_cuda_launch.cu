@@ -60,7 +60,7 @@ cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& 
                         cudaStream_t stream) {
   const LaunchPlace place{stream, kernels.may_begin_early};
   const int images = task.num_views * task.num_cameras;
-  const LaunchShape to_draw{min_of(images * task.most_tiles, kDrawBlocksPerProcessor * processors), kDrawThreads,
+  const LaunchShape to_draw{min_of(images * task.most_tiles[kCrowds - 1], kDrawBlocksPerProcessor * processors), kDrawThreads,
                             draw_bytes()};
   for (task.round_index = 0; task.round_index < kRounds; ++task.round_index) {
     // Few images are postponed, mostly none; then a launch takes as long as its blocks take to start.

@@ -138,9 +138,6 @@ __device__ void mix_pixels(const Memory& memory, const Visit& visit, const Write
   }
 }
 
-// Pixels side by side that a thread writes together.
-constexpr int kWrittenAtOnce = 4;
-
 // Hands on the pixels of a part, a few side by side for each thread, and marks none from then on.
 template <typename Memory, typename Visit, typename Write>
 __device__ void write_pixels(const Memory& memory, const Part& part, const Visit& visit, const Write& write) {
@@ -256,7 +253,7 @@ __device__ bool each_tile(const Memory& memory, int width_px, int y_begin, int y
   for (int y = y_begin; y < y_end; y += most_rows) {
     PICTURA_KEEP_LOOP
     for (int x = 0; x < width_px; x += kTileWidth_px) {
-      if (!draw(memory, tile_at(x, y, most_rows, width_px, y_end))) return false;
+      if (!draw(memory, tile_at(x, y, kTileWidth_px, most_rows, width_px, y_end))) return false;
       sync_block();
     }
   }
