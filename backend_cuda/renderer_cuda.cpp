@@ -23,10 +23,10 @@ namespace {
 constexpr int kLargeBlocks = 8;
 // Room in the pool for the faces and edges of an image: what CARLA's towns ask for on average. Those with more take
 // another round. Four edges are for each face, the rest, of which half is asked for, for those that are clipped.
-constexpr int kPoolFaces = 320, kPoolEdges = 1472;
+constexpr int kPoolFaces = 200, kPoolEdges = 928;
 // Views that are drawn at once, at most: enough that the last images of a launch, for which few blocks are left to
 // work, do not count.
-constexpr std::size_t kViewsAtOnce = 1024;
+constexpr std::size_t kViewsAtOnce = 2048;
 
 // Owns what the blocks of the last launch work in.
 class ScratchBuffers {

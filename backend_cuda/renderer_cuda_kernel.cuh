@@ -237,7 +237,7 @@ __device__ inline int32_t take_face_room(const DrawTask& task, int32_t image, in
   FaceMaking* making = &state->making;
   GatheredImage* out = task.pool.images + image;
   *out = {.face_count = kNotGathered};
-  if (listed > kMostMarkedFaces) {
+  if (listed > kMostEntries) {
     leave_to_last(task, image);
     return -1;
   }

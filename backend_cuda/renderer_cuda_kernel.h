@@ -109,7 +109,7 @@ struct alignas(16) FaceMaking {
 };
 
 /// Entries of an image that there is room for, if it is drawn from the pool.
-constexpr int kMostEntries = 2048;
+constexpr int kMostEntries = 1536;
 
 /// Of the entries of an image (renderer_cuda_cull.cuh) those that a warp makes faces of at once, one for each lane.
 struct FaceBatch {

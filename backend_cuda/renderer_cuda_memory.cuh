@@ -14,7 +14,7 @@ constexpr int kGatherThreads = 32, kCullBlocksPerProcessor = 32, kMakingBlocksPe
 constexpr int kDrawThreads = 256, kDrawBlocksPerProcessor = 4;
 constexpr int kDrawPixels = kTileWidth_px * kTileHeight_px, kDrawFragments = 1152;
 // A block of the last launch.
-constexpr int kLargeThreads = 128, kLargePixels = kTileWidth_px * 512, kLargeFragments = 1 << 17;
+constexpr int kLargeThreads = 128, kLargePixels = kTileWidth_px * 512, kLargeFragments = 1 << 16;
 
 // Faces that the mark of a pixel's nearest full face can tell apart in 32 bits.
 constexpr int kMarkedFaceBits = 11, kMostMarkedFaces = (1 << kMarkedFaceBits) - 1;
@@ -140,7 +140,7 @@ struct SmallDrawMemory : DrawMemory<uint16_t, uint32_t> {
     return memory;
   }
 };
-static_assert(kMostMarkedFaces <= kMostEntries);
+static_assert(kMostEntries <= kMostMarkedFaces);
 static_assert(kMostMarkedFaces < 0xFFFF && kDrawFragments < 0xFFFF && kDrawPixels < 0x7FFF);
 
 // In global memory. What drawing keeps lies where gathering has left its lists.
