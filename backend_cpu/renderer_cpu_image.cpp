@@ -41,12 +41,15 @@ void ImageDrawer::prepare(const ImageRequest& request) {
 }
 
 void ImageDrawer::find_occluders() {
+  setting_.occluders.count = 0;
+  solids_.clear();
   auto offer = [&](const WorldQuad& quad, uint32_t entry) {
+    Solid solid{.entry = entry};
     CameraQuad seen;
-    Occluder occluder;
-    if (see_quad(quad, setting_.camera, &seen) && make_occluder(setting_.camera, setting_.frustum, seen, &occluder)) {
-      setting_.occluders.offer(occluder, entry);
-    }
+    if (!see_quad(quad, setting_.camera, &seen)) return;
+    solid.covered_px2 = occluded_px2(setting_.camera, seen, &solid.quad, &solid.turns_right);
+    solid.plane = seen.plane;
+    if (solid.covered_px2 > 0.0f) solids_.push_back(solid);
   };
   visit_agents(setting_, *request_.scene, *request_.view, [&](const AgentBox& box, int32_t agent) {
     const uint32_t number = thing_number(kAgentKind, agent - world_begin());
@@ -56,6 +59,16 @@ void ImageDrawer::find_occluders() {
   });
   visit_walls(setting_, *request_.geometry,
               [&](const WallFace& wall, int32_t index) { offer(wall_quad(wall), thing_number(kWallKind, index)); });
+  const auto count = std::min(solids_.size(), static_cast<std::size_t>(Occluders::kMost));
+  std::partial_sort(solids_.begin(), solids_.begin() + static_cast<std::ptrdiff_t>(count), solids_.end(),
+                    [](const Solid& a, const Solid& b) {
+                      return a.covered_px2 != b.covered_px2 ? a.covered_px2 > b.covered_px2 : a.entry < b.entry;
+                    });
+  for (std::size_t i = 0; i < count; ++i) {
+    setting_.occluders.occluder[i] =
+        make_occluder(setting_.camera, setting_.frustum, solids_[i].plane, solids_[i].quad, solids_[i].turns_right);
+  }
+  setting_.occluders.count = static_cast<int32_t>(count);
 }
 
 bool ImageDrawer::stands(uint32_t solid, uint32_t strip) const {

@@ -19,7 +19,7 @@ struct ImageRequest {
   PinholeCamera camera;  // in the world
   float line_floor_px = 0;
   bool debug_palette = false;
-  bool leaves_out_hidden = true;  // faces behind the walls that cover most of it
+  bool leaves_out_hidden = true;  // faces behind the solids that cover most of it
 };
 
 /// Where one image goes.
@@ -36,6 +36,8 @@ class ImageDrawer {
  public:
   /// Makes the faces of what the image shows.
   void prepare(const ImageRequest& request);
+  /// What hides whole faces of the prepared image.
+  const Occluders& occluders() const { return setting_.occluders; }
   /// Draws what was prepared.
   void draw(const ImageTarget& target);
   /// Sum over pixels of what an agent weighs in the prepared image and, in `alone`, of what it would weigh without all
@@ -75,6 +77,15 @@ class ImageDrawer {
     int32_t face = -1;
   };
 
+  // A solid's face on screen, which may hide others.
+  struct Solid {
+    uint32_t entry = 0;
+    float covered_px2 = 0;
+    ScreenQuad quad;
+    bool turns_right = false;
+    FacePlane plane;
+  };
+
   // The faces [begin, end), and rows [y_begin, y_end) of the image.
   struct FaceRange {
     int32_t begin, end;
@@ -103,6 +114,7 @@ class ImageDrawer {
 
   ImageRequest request_;
   ImageSetting setting_;
+  std::vector<Solid> solids_;
   EdgePool edges_;
   std::vector<ScreenFace> faces_;
   std::vector<FullFace> full_;           // [pixels of some rows]

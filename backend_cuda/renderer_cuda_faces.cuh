@@ -287,7 +287,7 @@ __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_
   making->setting.frustum = make_frustum(placed);
   making->setting.line_floor_px = task.line_floor_px;
   making->setting.debug_palette = task.debug_palette;
-  making->setting.occluders.clear();
+  making->setting.occluders.count = 0;
   const StaticGeometryView& pieces = state->view.geometry->pieces;
   making->strips = pieces.strips.data();
   making->walls = pieces.walls.data();
@@ -300,32 +300,50 @@ __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_
 // Finds what hides whole faces among the solids of a list. All lanes of one warp.
 __device__ inline void find_occluders(FaceMaking* making, const uint32_t* entries, int32_t count) {
   ImageSetting* setting = &making->setting;
+  const PinholeCamera& camera = setting->camera;
+  ScreenQuad on_screen;
+  bool turns_right = false;
+  Quad quad;
+  // What the face of an entry covers, as bits, which sort alike.
+  auto occluded_by = [&](uint32_t entry) {
+    const bool is_seen = make_quad(*making, entry, &quad, [making](int32_t index) { return making->strips[index]; });
+    return is_seen ? __float_as_int(occluded_px2(camera, quad.seen, &on_screen, &turns_right)) : 0;
+  };
+  // Those of the lists that cover most so far, in the first lanes.
+  uint32_t best = kNoEntry;
+  int best_covers = 0;
   PICTURA_KEEP_LOOP
   for (int32_t first = 0; first < count; first += kWarpSize) {
     const uint32_t entry = first + lane_index() < count ? entries[first + lane_index()] : kNoEntry;
-    bool is_one = entry != kNoEntry && (kind_of(entry) == kAgentKind || kind_of(entry) == kWallKind);
-    if (!__any_sync(kAllLanes, is_one)) continue;
-    Occluder occluder;
-    if (is_one) {
-      Quad quad;
-      is_one = make_quad(*making, entry, &quad, [making](int32_t index) { return making->strips[index]; }) &&
-               make_occluder(setting->camera, setting->frustum, quad.seen, &occluder);
-    }
-    // The lanes offer theirs in the order in which they would be kept, as long as one would be.
+    const bool is_solid = entry != kNoEntry && (kind_of(entry) == kAgentKind || kind_of(entry) == kWallKind);
+    if (!__any_sync(kAllLanes, is_solid)) continue;
+    int covers = is_solid ? occluded_by(entry) : 0;
+    const uint32_t had = best;
+    int had_covers = best_covers;
+    best_covers = 0;
     PICTURA_KEEP_LOOP
-    for (;;) {
-      is_one = is_one && setting->occluders.wants(occluder.covered_px2, entry);
-      const unsigned covered = is_one ? __float_as_uint(occluder.covered_px2) : 0u;
-      const unsigned most = __reduce_max_sync(kAllLanes, covered);
+    for (int k = 0; k < Occluders::kMost; ++k) {
+      const int most = __reduce_max_sync(kAllLanes, max_of(covers, had_covers));
       if (most == 0) break;
-      const uint32_t lowest = __reduce_min_sync(kAllLanes, covered == most ? entry : kNoEntry);
-      if (entry == lowest) {
-        setting->occluders.offer(occluder, entry);
-        is_one = false;
+      const uint32_t its = covers == most ? entry : kNoEntry, other = had_covers == most ? had : kNoEntry;
+      const uint32_t lowest = __reduce_min_sync(kAllLanes, its < other ? its : other);
+      if (lane_index() == k) {
+        best = lowest;
+        best_covers = most;
       }
-      __syncwarp();
+      if (entry == lowest) covers = 0;
+      if (had == lowest) had_covers = 0;
     }
   }
+  const bool is_one = best_covers != 0;
+  const unsigned found = __ballot_sync(kAllLanes, is_one);
+  if (is_one) {
+    occluded_by(best);
+    setting->occluders.occluder[lane_index()] =
+        make_occluder(camera, setting->frustum, quad.seen.plane, on_screen, turns_right);
+  }
+  if (lane_index() == 0) setting->occluders.count = __popc(found);
+  __syncwarp();
 }
 
 // What drawing is told of an image.

@@ -11,6 +11,7 @@
 #include "pictura/common/camera.h"
 #include "pictura/common/raster_check.h"
 #include "pictura/map/load_map.h"
+#include "pictura/tests/support/image_drawing.h"
 
 namespace pictura {
 namespace {
@@ -28,18 +29,18 @@ ImageSetting setting_ahead() {
   return setting;
 }
 
-bool occlude(const ImageSetting& setting, const WallFace& wall, Occluder* out) {
-  CameraQuad seen;
-  return see_quad(wall_quad(wall), setting.camera, &seen) && make_occluder(setting.camera, setting.frustum, seen, out);
-}
-
 WallFace wall_between(Vec3 a_m, Vec3 b_m, float height_m = 6) { return {a_m, b_m, height_m}; }
 
 /// Whether a wall hides a strip's face.
 bool hides(const WallFace& wall, Vec3 a_m, Vec3 b_m) {
   ImageSetting setting = setting_ahead();
-  Occluder occluder;
-  if (occlude(setting, wall, &occluder)) setting.occluders.offer(occluder, 0);
+  CameraQuad seen;
+  ScreenQuad quad;
+  bool turns_right = false;
+  if (see_quad(wall_quad(wall), setting.camera, &seen) && occluded_px2(setting.camera, seen, &quad, &turns_right) > 0) {
+    setting.occluders.occluder[0] = make_occluder(setting.camera, setting.frustum, seen.plane, quad, turns_right);
+    setting.occluders.count = 1;
+  }
   ScreenBounds bounds;
   for (const Vec3 corner_m : {a_m, b_m}) {
     const Vec3 corner = to_camera(setting.camera, corner_m);
@@ -63,21 +64,26 @@ TEST(Occluders, HideWhatIsBehindThemInDepthAndOnScreen) {
 }
 
 TEST(Occluders, AreThoseThatCoverMost) {
-  const ImageSetting setting = setting_ahead();
-  std::vector<Occluder> walls(4);
-  const float distances_m[] = {30, 10, 40, 20};
-  for (std::size_t i = 0; i < walls.size(); ++i) {
-    ASSERT_TRUE(occlude(setting, wall_between({distances_m[i], -3, 0}, {distances_m[i], 3, 0}), &walls[i]));
+  // Walls of one size at different distances, the nearest of which one covers as much as a box's side; walls that
+  // are out of the frame, behind the camera or black.
+  StaticGeometry geometry;
+  for (const float distance_m : {60.0f, 20.0f, 50.0f, 40.0f, 30.0f, -20.0f, 130.0f}) {
+    geometry.walls.push_back(wall_between({distance_m, -3, 0}, {distance_m, 3, 0}));
   }
-  Occluders occluders;
-  for (int32_t i = 0; i < 4; ++i) {
-    const Occluder& wall = walls[static_cast<std::size_t>(i)];
-    EXPECT_EQ(occluders.wants(wall.covered_px2, i), i != 2) << i;
-    occluders.offer(wall, i);
+  geometry.walls.push_back(wall_between({20, 60, 0}, {20, 66, 0}));
+  geometry.build_grids();
+  const auto scene = scene_of({make_box(AgentClass::vehicle, {12.25f, 0, 0}, 0, {4.5f, 2, 1.6f})});
+  const View view = make_view({}, 0);
+  const SceneBatch batch = scene.batch();
+  const StaticGeometryView pieces = geometry.view();
+  ImageDrawer drawer;
+  drawer.prepare({&pieces, &batch, &view, setting_ahead().camera});
+  const Occluders& occluders = drawer.occluders();
+  ASSERT_EQ(occluders.count, Occluders::kMost);
+  const float distances_m[] = {20, 30, 10, 40};
+  for (int i = 0; i < occluders.count; ++i) {
+    EXPECT_NEAR(1 / occluders.occluder[i].inverse_depth.z, distances_m[i], 1e-3f) << i;
   }
-  // Those at 10 and 20 m: of two that cover as much, the lower index.
-  EXPECT_FALSE(occluders.wants(walls[3].covered_px2, 4));
-  EXPECT_TRUE(occluders.wants(walls[3].covered_px2, 2));
 }
 
 class OccludersOfTowns : public testing::TestWithParam<const char*> {};
