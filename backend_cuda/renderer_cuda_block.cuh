@@ -45,7 +45,7 @@ struct BlockState {
   GatherCounts listed;
   int32_t num_entries, num_faces, num_clipped, overflow, usable;
   // While pixels are drawn.
-  int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, next_fragments, has_full;
+  int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, next_fragments;
   DrawTurn turn;
   WarpState warps[kMaxWarps];
 };

@@ -98,8 +98,8 @@ template <typename Memory>
 __device__ void list_candidate(const Memory& memory, int place, int face, int pixel, bool covers_fully) {
   using Word = typename Memory::Word;
   if (place >= memory.max_candidates) return;
-  memory.candidate(place) = static_cast<Word>(face) << Memory::kHalf | static_cast<Word>(pixel) |
-                            (covers_fully ? Memory::kCoversFully : Word{0});
+  memory.candidates[place] = static_cast<Word>(face) << Memory::kHalf | static_cast<Word>(pixel) |
+                             (covers_fully ? Memory::kCoversFully : Word{0});
 }
 
 // Marks a pixel that a face covers fully, unless a nearer one has. Returns the face that gives way to the other, and
@@ -195,16 +195,15 @@ __device__ bool is_alone(const Memory& memory, int fragment, int pixel) {
          memory.next[fragment] == static_cast<typename Memory::Index>(Memory::kNone);
 }
 
-// Keeps a fragment, as the first of its pixel's chain; free of it is all that it reaches, until others hide some.
-// Nobody changes the pixel's full face meanwhile.
+// Keeps a fragment, as the first of its pixel's chain. Nobody changes the pixel's full face meanwhile.
 template <typename Memory>
-__device__ void keep_fragment(const Memory& memory, int fragment, uint32_t face, int pixel,
-                              const PixelCoverage& coverage) {
+__device__ void keep_fragment(const Memory& memory, int fragment, uint32_t face, int pixel, uint64_t samples,
+                              float area) {
   using Index = typename Memory::Index;
   using Word = typename Memory::Word;
-  memory.samples[fragment] = SampleWords::of(coverage.samples);
-  memory.free[fragment] = SampleWords::of(reach_of(coverage));
-  memory.area[fragment] = coverage.area;
+  memory.samples_low[fragment] = static_cast<uint32_t>(samples);
+  memory.samples_high[fragment] = static_cast<uint32_t>(samples >> 32);
+  memory.area[fragment] = area;
   memory.face[fragment] = static_cast<Index>(face);
   memory.pixel[fragment] = static_cast<Index>(pixel);
   Word* const word = &memory.pixels[pixel];
@@ -212,9 +211,9 @@ __device__ void keep_fragment(const Memory& memory, int fragment, uint32_t face,
   memory.next[fragment] = static_cast<Index>(first_of_word<Memory>(before));
 }
 
-// Makes a fragment of each lane's candidate, unless its face leaves nothing in the pixel; keeps it where there is room.
+// Makes a fragment of each lane's candidate, unless its face leaves nothing in the pixel.
 template <typename Memory>
-__device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, const Part& part, int room) {
+__device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, const Part& part) {
   const int pixel = Memory::pixel_of(candidate.b);
   PixelCoverage coverage;
   if (candidate.is_one) {
@@ -225,9 +224,8 @@ __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, c
   }
   const bool is_left = coverage.area > 0.0f;
   const int32_t fragment = take_place(&memory.state->num_fragments, is_left);
-  if (!is_left || fragment >= room) return;
-  if (coverage.is_full()) memory.state->has_full = 1;
-  keep_fragment(memory, fragment, candidate.a, pixel, coverage);
+  if (!is_left || fragment >= memory.max_fragments) return;
+  keep_fragment(memory, fragment, candidate.a, pixel, coverage.samples, coverage.area);
 }
 
 // Makes fragments of those candidates that may show before what covers their pixel fully. Threads put them aside until
@@ -235,7 +233,7 @@ __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, c
 template <typename Memory>
 __device__ void make_fragments(const Memory& memory, const Part& part) {
   WarpQueue shown(&memory.state->warps[warp_index()].queue);
-  const int count = memory.state->num_candidates, room = memory.most_made(count);
+  const int count = memory.state->num_candidates;
   PICTURA_KEEP_LOOP
   for (int first = warp_index() * kWarpSize;; first += num_threads()) {
     const int i = first + lane_index();
@@ -243,7 +241,7 @@ __device__ void make_fragments(const Memory& memory, const Part& part) {
     bool shows = false;
     uint32_t face = 0, place = 0;
     if (i < count) {
-      const auto candidate = memory.candidate(i);
+      const auto candidate = memory.candidates[i];
       face = static_cast<uint32_t>(candidate >> Memory::kHalf);
       place = static_cast<uint32_t>(candidate & Memory::kNone);
       const int pixel = Memory::pixel_of(place);
@@ -252,25 +250,41 @@ __device__ void make_fragments(const Memory& memory, const Part& part) {
                                                        part.y_of(pixel), Memory::covers_fully(place));
     }
     shown.push(shows, face, place);
-    if (shown.is_ready() || (!more && !shown.is_empty())) make_fragment(memory, shown.take(), part, room);
+    if (shown.is_ready() || (!more && !shown.is_empty())) make_fragment(memory, shown.take(), part);
     if (!more) return;
   }
 }
 
-// Where a fragment covers its pixel, it may intersect the pixel's full face, which then becomes a fragment too. All
-// threads of the block.
+// What is free of each fragment is all that it reaches, before others hide some. Where one covers its pixel, it may
+// intersect the pixel's full face, which then becomes a fragment too. Lists the pixels of whose fragments none is
+// alone.
 template <typename Memory>
-__device__ void free_full_faces(const Memory& memory, int count) {
+__device__ void finish_fragments(const Memory& memory, int count) {
+  using Index = typename Memory::Index;
   using Word = typename Memory::Word;
+  auto free_all = [&](int fragment) {
+    const uint64_t reach = reach_of(memory.coverage(fragment));
+    memory.free_low[fragment] = static_cast<uint32_t>(reach);
+    memory.free_high[fragment] = static_cast<uint32_t>(reach >> 32);
+  };
   PICTURA_KEEP_LOOP
-  for (int i = static_cast<int>(threadIdx.x); i < count; i += num_threads()) {
+  for (int first = warp_index() * kWarpSize; first < count; first += num_threads()) {
+    const int i = first + lane_index();
+    // The last of a chain stands for its pixel.
+    const bool is_listed =
+        i < count && memory.next[i] == static_cast<Index>(Memory::kNone) && !is_alone(memory, i, memory.pixel[i]);
+    const int32_t place = take_place(&memory.state->num_drawn, is_listed);
+    if (is_listed) memory.drawn[place] = memory.pixel[i];
+    if (i >= count) continue;
+    free_all(i);
     if (!memory.coverage(i).is_full()) continue;
     const int pixel = memory.pixel[i];
     const Word full = full_of_word<Memory>(atomicAnd(&memory.pixels[pixel], ~PixelWord<Word>::kFace));
     if (full == Memory::kNone) continue;
     const int32_t added = count + atomicAdd(&memory.state->num_added, 1);
-    if (added < memory.max_fragments)
-      keep_fragment(memory, added, static_cast<uint32_t>(full), pixel, {1.0f, kAllSamples});
+    if (added >= memory.max_fragments) continue;
+    keep_fragment(memory, added, static_cast<uint32_t>(full), pixel, kAllSamples, 1.0f);
+    free_all(added);
   }
 }
 

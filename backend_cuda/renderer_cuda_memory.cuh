@@ -19,15 +19,6 @@ constexpr int kLargeThreads = 128, kLargePixels = kTileWidth_px * 512, kLargeFra
 // Faces that the mark of a pixel's nearest full face can tell apart in 32 bits.
 constexpr int kMarkedFaceBits = 11, kMostMarkedFaces = (1 << kMarkedFaceBits) - 1;
 
-/// Samples of a pixel, or what else is kept where they were.
-struct alignas(8) SampleWords {
-  uint32_t low, high;
-  __device__ uint64_t both() const { return static_cast<uint64_t>(high) << 32 | low; }
-  __device__ static SampleWords of(uint64_t samples) {
-    return {static_cast<uint32_t>(samples), static_cast<uint32_t>(samples >> 32)};
-  }
-};
-
 /// What is kept while pixels are drawn. Index: of faces, pixels and fragments, 16 bits where they suffice. Word: two.
 template <typename Index_, typename Word_>
 struct DrawMemory {
@@ -49,43 +40,44 @@ struct DrawMemory {
   const PolygonEdge* edges;  // that its faces name
   Word* pixels;              // [max_pixels] of the part of the image that is drawn, see PixelWord
   Word* rows;                // [max_rows] of faces: in the upper half the face, in the lower the row of the part
-  Word* candidates;          // [max_candidates] that may become fragments: face, and pixel; see candidate()
+  Word* candidates;          // [max_candidates] that may become fragments: face, and pixel
   // Fragments.
-  SampleWords *samples, *free;  // [max_fragments] what it covers; what others have left of that
-  float* area;                  // [max_fragments]
-  Index *face, *pixel, *next;   // [max_fragments] next: of the pixel's chain, or kNone
-  Index* kind;                  // ... in the end, where `pixel` stood: of its weight
-  Index* drawn;                 // [max_fragments] pixels that have more than one fragment
+  uint32_t *samples_low, *samples_high, *free_low, *free_high;  // [max_fragments]
+  float* area;                                                  // [max_fragments]
+  Index *face, *pixel, *next;                                   // [max_fragments] next: of the pixel's chain, or kNone
+  Index* kind;                                                  // ... in the end, where `pixel` stood: of its weight
+  Index* drawn;                                                 // [max_fragments] pixels that have fragments
   int32_t max_pixels, max_rows, max_candidates, max_fragments;
 
-  /// Candidates fill their memory from its end, fragments what is free of them from its beginning.
-  __device__ Word& candidate(int i) const { return candidates[max_candidates - 1 - i]; }
-  /// How many fragments may be made of so many candidates.
-  __device__ int most_made(int num_candidates) const {
-    const auto left_bytes = static_cast<unsigned>(max_candidates - num_candidates) * sizeof(Word);
-    return min_of(max_fragments, static_cast<int>(left_bytes / sizeof(SampleWords)));
+  __device__ uint64_t samples(int fragment) const {
+    return static_cast<uint64_t>(samples_high[fragment]) << 32 | samples_low[fragment];
   }
-  __device__ PixelCoverage coverage(int fragment) const { return {area[fragment], samples[fragment].both()}; }
+  __device__ PixelCoverage coverage(int fragment) const { return {area[fragment], samples(fragment)}; }
+  __device__ uint64_t free(int fragment) const {
+    return static_cast<uint64_t>(free_high[fragment]) << 32 | free_low[fragment];
+  }
   // Once a fragment is weighed, there stands where its samples did what it adds to its pixel's sum; in the end, of the
   // first of a pixel's chain, the pixel's colour, as numbers or as bytes.
   __device__ void set_part(int fragment, const PixelSum::Part& part) const {
-    samples[fragment] = {static_cast<uint32_t>(part.area), static_cast<uint32_t>(part.r)};
-    free[fragment] = {static_cast<uint32_t>(part.g), static_cast<uint32_t>(part.b)};
+    samples_low[fragment] = static_cast<uint32_t>(part.area);
+    samples_high[fragment] = static_cast<uint32_t>(part.r);
+    free_low[fragment] = static_cast<uint32_t>(part.g);
+    free_high[fragment] = static_cast<uint32_t>(part.b);
   }
   __device__ PixelSum::Part part(int fragment) const {
-    const SampleWords first = samples[fragment], second = free[fragment];
-    return {static_cast<int32_t>(first.low), static_cast<int32_t>(first.high), static_cast<int32_t>(second.low),
-            static_cast<int32_t>(second.high)};
+    return {static_cast<int32_t>(samples_low[fragment]), static_cast<int32_t>(samples_high[fragment]),
+            static_cast<int32_t>(free_low[fragment]), static_cast<int32_t>(free_high[fragment])};
   }
   __device__ void set_color(int fragment, Rgb color) const {
-    samples[fragment] = {__float_as_uint(color.r), __float_as_uint(color.g)};
-    free[fragment].low = __float_as_uint(color.b);
+    samples_low[fragment] = __float_as_uint(color.r);
+    samples_high[fragment] = __float_as_uint(color.g);
+    free_low[fragment] = __float_as_uint(color.b);
   }
-  __device__ void set_color_bytes(int fragment, uint32_t bytes) const { samples[fragment].low = bytes; }
-  __device__ uint32_t color_bytes(int fragment) const { return samples[fragment].low; }
+  __device__ void set_color_bytes(int fragment, uint32_t bytes) const { samples_low[fragment] = bytes; }
+  __device__ uint32_t color_bytes(int fragment) const { return samples_low[fragment]; }
   __device__ Rgb color(int fragment) const {
-    const SampleWords first = samples[fragment];
-    return {__uint_as_float(first.low), __uint_as_float(first.high), __uint_as_float(free[fragment].low)};
+    return {__uint_as_float(samples_low[fragment]), __uint_as_float(samples_high[fragment]),
+            __uint_as_float(free_low[fragment])};
   }
 };
 
@@ -113,9 +105,11 @@ __host__ __device__ size_t lay_out(Memory* memory, int max_pixels, int max_fragm
   layout.place(&memory->pixel, max_fragments);
   layout.place(&memory->next, max_fragments);
   const size_t rows_begin = layout.used;
-  layout.place(&memory->samples, max_fragments);
+  layout.place(&memory->samples_low, max_fragments);
+  layout.place(&memory->samples_high, max_fragments);
   const size_t candidates_begin = layout.used;
-  layout.place(&memory->free, max_fragments);
+  layout.place(&memory->free_low, max_fragments);
+  layout.place(&memory->free_high, max_fragments);
   layout.place(&memory->drawn, max_fragments);
   memory->kind = memory->pixel;
   using Word = typename Memory::Word;

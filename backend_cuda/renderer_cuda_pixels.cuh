@@ -17,8 +17,8 @@ __device__ __noinline__ inline bool stands(uint32_t solid, uint32_t strip) {
 template <typename Memory>
 __device__ void lose(const Memory& memory, uint32_t fragment, uint64_t samples) {
   const auto low = static_cast<uint32_t>(samples), high = static_cast<uint32_t>(samples >> 32);
-  if (low != 0) atomicAnd(&memory.free[fragment].low, ~low);
-  if (high != 0) atomicAnd(&memory.free[fragment].high, ~high);
+  if (low != 0) atomicAnd(&memory.free_low[fragment], ~low);
+  if (high != 0) atomicAnd(&memory.free_high[fragment], ~high);
 }
 
 // Asks pairs of fragments what they hide of each other; b may be kNone, for the pixel's full face.
@@ -63,16 +63,16 @@ __device__ void hide_fragments(const Memory& memory, const Part& part, int count
     used += __popc(idle);
     if (is_idle && place < kWarpSize && begin + place < count) {
       fragment = count - 1 - (begin + place);
-      samples = memory.samples[fragment].both();
+      samples = memory.samples(fragment);
       other = memory.next[fragment];
       is_before_full = full_of(memory, memory.pixel[fragment]) != Memory::kNone;
     }
     uint32_t with = Memory::kNone;
-    bool meet = is_before_full && memory.free[fragment].both() != 0;
+    bool meet = is_before_full && memory.free(fragment) != 0;
     if (!is_before_full && other != Memory::kNone) {
       with = other;
       const auto its = static_cast<int>(with);
-      meet = may_hide_more(memory.free[fragment].both(), samples, memory.free[its].both(), memory.samples[its].both());
+      meet = may_hide_more(memory.free(fragment), samples, memory.free(its), memory.samples(its));
       other = memory.next[with];
     }
     is_before_full = false;
@@ -89,26 +89,19 @@ struct NoVisit {
 };
 
 // Weighs fragments. What is alone in its pixel gives that its colour; what the others add to the sums of theirs, and
-// what kind of weight that is, stands from then on where their samples and pixels did. Lists the pixels of those.
+// what kind of weight that is, stands from then on where their samples and pixels did.
 template <typename Memory, typename Visit, typename Write>
 __device__ void weigh_fragments(const Memory& memory, int count, const Visit& visit, const Write& write) {
   PICTURA_KEEP_LOOP
-  for (int first = warp_index() * kWarpSize; first < count; first += num_threads()) {
-    const int i = first + lane_index();
-    const bool is_one = i < count, alone = is_one && is_alone(memory, i, memory.pixel[i]);
-    // The last of a chain stands for its pixel.
-    const bool is_listed = is_one && !alone && memory.next[i] == static_cast<typename Memory::Index>(Memory::kNone);
-    const int32_t place = take_place(&memory.state->num_drawn, is_listed);
-    if (is_listed) memory.drawn[place] = memory.pixel[i];
-    if (!is_one) continue;
+  for (int i = static_cast<int>(threadIdx.x); i < count; i += num_threads()) {
     const ScreenFace& face = memory.faces[memory.face[i]];
     const Rgb color = face.color;
-    if (alone) {
+    if (is_alone(memory, i, memory.pixel[i])) {
       visit(face, memory.area[i]);
       write.keep(memory, i, color * memory.area[i]);
       continue;
     }
-    const PixelSum::Weight weight = PixelSum::weight_of(memory.coverage(i), memory.free[i].both());
+    const PixelSum::Weight weight = PixelSum::weight_of(memory.coverage(i), memory.free(i));
     memory.set_part(i, PixelSum::part_of(weight, color));
     memory.area[i] = weight.area;
     memory.kind[i] = weight.kind;
@@ -175,7 +168,7 @@ __device__ void reset_counts(const Memory& memory) {
   BlockState* state = memory.state;
   if (threadIdx.x != 0) return;
   state->num_rows = state->num_candidates = state->num_fragments = state->num_added = state->num_drawn = 0;
-  state->next_fragments = state->has_full = 0;
+  state->next_fragments = 0;
 }
 // What a part finds when it begins: nothing is marked, nothing listed. For a block's first part, and after one that was
 // given up. All threads of the block.
@@ -203,14 +196,11 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
   make_fragments(memory, part);
   sync_block();
   const int made = state->num_fragments;
-  if (made > memory.most_made(state->num_candidates)) return false;
-  int count = made;
-  if (state->has_full != 0) {
-    free_full_faces(memory, made);
-    sync_block();
-    count += state->num_added;
-    if (count > memory.max_fragments) return false;
-  }
+  if (made > memory.max_fragments) return false;
+  finish_fragments(memory, made);
+  sync_block();
+  const int count = made + state->num_added;
+  if (count > memory.max_fragments) return false;
   hide_fragments(memory, part, count);
   sync_block();
   weigh_fragments(memory, count, visit, write);
