@@ -21,6 +21,28 @@ struct DrawTurn {
   int32_t image = -1, tile = 0, crowd = 0;
 };
 
+/// A part of an image, at most as wide as a tile. Its pixels count row by row.
+struct Part {
+  int x_begin, x_end, y_begin, y_end;
+  __device__ int num_columns() const { return x_end - x_begin; }
+  __device__ int num_rows() const { return y_end - y_begin; }
+  __device__ int num_pixels() const { return (y_end - y_begin) * kTileWidth_px; }
+  __device__ int pixel(int x, int y) const { return (y - y_begin) * kTileWidth_px + (x - x_begin); }
+  __device__ int x_of(int pixel) const {
+    return x_begin + static_cast<int>(static_cast<unsigned>(pixel) % kTileWidth_px);
+  }
+  __device__ int y_of(int pixel) const {
+    return y_begin + static_cast<int>(static_cast<unsigned>(pixel) / kTileWidth_px);
+  }
+};
+
+/// How a tile is drawn for whose fragments there is no room at once: in strips from top to bottom, and those in parts.
+struct PartPlan {
+  int strip_begin, strip_px;  // the strip, and how wide it is
+  int wide_px, rows;          // at most, of a part
+  Part part;                  // the next one
+};
+
 /// Room for what a WarpQueue holds.
 struct WarpQueueRoom {
   uint32_t a[2 * kWarpSize], b[2 * kWarpSize];
@@ -47,6 +69,7 @@ struct BlockState {
   // While pixels are drawn.
   int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, next_fragments;
   DrawTurn turn;
+  PartPlan plan;
   WarpState warps[kMaxWarps];
 };
 

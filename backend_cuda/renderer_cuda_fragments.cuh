@@ -8,19 +8,6 @@
 
 namespace pictura::cuda {
 
-/// A part of an image, at most as wide as a tile. Its pixels count row by row.
-struct Part {
-  int x_begin, x_end, y_begin, y_end;
-  __device__ int num_pixels() const { return (y_end - y_begin) * kTileWidth_px; }
-  __device__ int pixel(int x, int y) const { return (y - y_begin) * kTileWidth_px + (x - x_begin); }
-  __device__ int x_of(int pixel) const {
-    return x_begin + static_cast<int>(static_cast<unsigned>(pixel) % kTileWidth_px);
-  }
-  __device__ int y_of(int pixel) const {
-    return y_begin + static_cast<int>(static_cast<unsigned>(pixel) / kTileWidth_px);
-  }
-};
-
 // The tile from (x, y) on, so many columns and rows large, of an image of that width whose rows end at y_end.
 __device__ inline Part tile_at(int x, int y, int columns, int rows, int width_px, int y_end) {
   return {x, min_of(x + columns, width_px), y, min_of(y + rows, y_end)};

@@ -212,6 +212,53 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
   return true;
 }
 
+// Plans the part of a tile to draw after one that was drawn, or for which there was no room: narrower ones first,
+// because what is far away crowds along the horizon, then lower ones. False where there is no room for a single pixel.
+// All threads of the block.
+template <typename Memory>
+__device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn) {
+  constexpr int kNarrowPart_px = 2 * kWrittenAtOnce;
+  const Memory memory = Memory::current();
+  auto half_of = [](int size) { return (size + 1) / 2; };
+  sync_block();
+  if (threadIdx.x == 0) {
+    PartPlan& plan = memory.state->plan;
+    const int columns = part.num_columns(), rows = part.num_rows();
+    if (columns == whole.num_columns() && rows == whole.num_rows()) plan = {whole.x_begin, columns, columns, rows};
+    int x = part.x_begin, y = part.y_begin;
+    if (is_drawn) {
+      // Along the rows, then down the strip, then to the next one.
+      const int strip_end = min_of(plan.strip_begin + plan.strip_px, whole.x_end);
+      x = part.x_end;
+      if (x == strip_end) {
+        plan.wide_px = plan.strip_px;
+        plan.rows = min_of(2 * plan.rows, whole.num_rows());
+        y = part.y_end;
+        if (y == whole.y_end) {
+          plan.strip_begin = strip_end;
+          plan.rows = whole.num_rows();
+          y = whole.y_begin;
+        }
+        x = plan.strip_begin;
+      }
+    } else if (rows == whole.num_rows() && columns > kNarrowPart_px) {
+      plan.strip_px = plan.wide_px = (half_of(columns) + kWrittenAtOnce - 1) / kWrittenAtOnce * kWrittenAtOnce;
+    } else if (rows > 1) {
+      plan.rows = half_of(rows);
+    } else {
+      plan.wide_px = half_of(columns);
+    }
+    plan.part = {x, min_of(x + plan.wide_px, min_of(plan.strip_begin + plan.strip_px, whole.x_end)), y,
+                 min_of(y + plan.rows, whole.y_end)};
+  }
+  if (is_drawn) {
+    sync_block();
+  } else {
+    reset_part(memory);
+  }
+  return is_drawn || part.num_columns() > 1 || part.num_rows() > 1;
+}
+
 // Draws the faces into a part of an image, in smaller ones where there is no room for all of it. visit(face, weight)
 // hears of each fragment, write.keep(memory, fragment, colour) of what fragments give their pixels, and
 // write.pixels(memory, x, y, count, words) of pixels side by side. False where there is no room for a single pixel. All
@@ -219,29 +266,14 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
 template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whole, const Visit& visit,
                            const Write& write) {
-  int x = whole.x_begin, y = whole.y_begin;
-  int rows = whole.y_end - whole.y_begin, columns = whole.x_end - whole.x_begin;
-  const int most_rows = rows, most_columns = columns;
+  Part part = whole;
   PICTURA_KEEP_LOOP
-  while (y < whole.y_end) {
-    const Part part{x, min_of(x + columns, whole.x_end), y, min_of(y + rows, whole.y_end)};
-    if (!draw_part(memory, num_faces, part, visit, write)) {
-      reset_part(memory);
-      if (rows == 1 && columns == 1) return false;
-      if (rows == 1) columns = (columns + 1) / 2;
-      rows = (rows + 1) / 2;
-      continue;
-    }
-    x = part.x_end;
-    if (x >= whole.x_end) {
-      x = whole.x_begin;
-      y = part.y_end;
-      columns = most_columns;
-      rows = min_of(2 * rows, most_rows);
-    }
-    if (y < whole.y_end) sync_block();
+  for (;;) {
+    const bool is_drawn = draw_part(memory, num_faces, part, visit, write);
+    if (is_drawn && part.x_end == whole.x_end && part.y_end == whole.y_end) return true;
+    if (!plan_next_part<Memory>(whole, part, is_drawn)) return false;
+    part = memory.state->plan.part;
   }
-  return true;
 }
 
 // Tiles of an image as high as there is room for, one after the other: draw(memory, tile) for each, until one is false.
