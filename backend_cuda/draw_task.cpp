@@ -42,10 +42,6 @@ DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeC
   task.debug_palette = config.debug_palette;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     task.cameras[i].camera = cameras[i];
-    for (int crowd = 0; crowd < kCrowds; ++crowd) {
-      task.most_tiles[crowd] =
-          std::max(task.most_tiles[crowd], tiles_of(cameras[i].width_px, cameras[i].height_px, crowd).count());
-    }
     if (!images) continue;
     const CameraImages& out = images->cameras[i];
     task.cameras[i] = {cameras[i], out.data, out.view_stride, out.depth_m, out.class_id, out.instance_id};

@@ -16,11 +16,6 @@ struct ViewState {
   int32_t world_begin, world_end, light_begin, light_end;
 };
 
-/// A tile of an image of a class of crowded ones; image -1: none.
-struct DrawTurn {
-  int32_t image = -1, tile = 0, crowd = 0;
-};
-
 /// A part of an image, at most as wide as a tile. Its pixels count row by row.
 struct Part {
   int x_begin, x_end, y_begin, y_end;
@@ -67,8 +62,7 @@ struct BlockState {
   GatherCounts listed;
   int32_t num_entries, num_faces, num_clipped, overflow, usable;
   // While pixels are drawn.
-  int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, next_fragments;
-  DrawTurn turn;
+  int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, next_fragments, image, tile;
   PartPlan plan;
   WarpState warps[kMaxWarps];
 };

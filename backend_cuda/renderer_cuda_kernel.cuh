@@ -208,20 +208,20 @@ __device__ inline void list_drawn(const DrawTask& task, int32_t image, int32_t l
   const int crowd = min_of(listed / kCrowdFaces, kCrowds - 1);
   crowd_of(task, crowd)[atomicAdd(&task.counters->rounds[task.round_index].crowds[crowd], 1)] = image;
 }
-// Goes through their tiles, those of the most crowded first.
+// Goes through them, the most crowded first.
 class DrawOrder {
  public:
   __device__ explicit DrawOrder(const DrawTask& task) : task_(task) {}
-  /// The tile whose turn it is, no earlier than that of the call before; after the last, none.
-  __device__ DrawTurn at(int32_t turn) {
+  /// The image whose turn it is, no earlier than that of the call before; -1 after the last.
+  __device__ int32_t image_of(int32_t turn) {
     const int32_t* crowds = task_.counters->rounds[task_.round_index].crowds;
     PICTURA_KEEP_LOOP
     for (; crowd_ >= 0; --crowd_) {
-      const int32_t tiles = most_tiles(task_, crowd_), turns = crowds[crowd_] * tiles, behind = turn - begin_;
-      if (behind < turns) return {crowd_of(task_, crowd_)[behind / tiles], behind % tiles, crowd_};
-      begin_ += turns;
+      const int32_t count = crowds[crowd_];
+      if (turn - begin_ < count) return crowd_of(task_, crowd_)[turn - begin_];
+      begin_ += count;
     }
-    return {};
+    return -1;
   }
 
  private:
@@ -366,13 +366,13 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
   // While the block draws a tile, a thread of the last warp, which has the fewest faces to look at, asks for the number
   // of the next but one, and what the next one shows.
   DrawOrder order(task);
-  DrawTurn next;
-  int32_t after = 0;
+  int32_t next_image = -1, next_tile = 0, after = 0;
   auto take_next = [&] {
-    next = order.at(after);
-    if (next.image < 0) return;
+    next_image = order.image_of(after / task.most_tiles);
+    next_tile = after % task.most_tiles;
+    if (next_image < 0) return;
     after = atomicAdd(counter, 1);
-    const GatheredImage* image = task.pool.images + next.image;
+    const GatheredImage* image = task.pool.images + next_image;
     for (size_t at = 0; at < sizeof(GatheredImage); at += sizeof(uint64_t)) {
       copy_into_shared(reinterpret_cast<char*>(&state->upcoming) + at, reinterpret_cast<const char*>(image) + at);
     }
@@ -387,19 +387,20 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
   for (;;) {
     if (is_taker) {
       wait_for_copies();
-      state->turn = next;
+      state->image = next_image;
+      state->tile = next_tile;
       state->shown = state->upcoming;
       state->faces = task.pool.faces + state->shown.face_begin;
       state->edges = task.pool.edges;
     }
     sync_block();
-    const int32_t image = state->turn.image, tile = state->turn.tile;
+    const int32_t image = state->image, tile = state->tile;
     if (image < 0) return;
     if (is_taker) take_next();
     const int32_t camera = camera_of(task, image);
     const PinholeCamera& shows = task.cameras[camera].camera;
     const int width = width_px(shows), height = height_px(shows);
-    const TileGrid tiles = tiles_of(width, height, state->turn.crowd);
+    const TileGrid tiles = tiles_of(task.tile_width_px, width, height);
     if (tile < tiles.count() && state->shown.face_count >= 0) {
       const Part part = tile_at(tile % tiles.across * tiles.tile_width_px, tile / tiles.across * kTileHeight_px,
                                 tiles.tile_width_px, kTileHeight_px, width, height);

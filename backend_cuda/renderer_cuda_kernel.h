@@ -18,23 +18,17 @@ constexpr int kCrowds = 16, kCrowdFaces = 64;
 constexpr int kWrittenAtOnce = 4;
 
 /// Images are drawn tile by tile, upright ones, because what is far away crowds along the horizon. Tiles are at most so
-/// wide and high; those of images that list so many faces for each are narrower, for there would be no room for the
-/// fragments of the widest, which would be drawn in parts.
-constexpr int kTileWidth_px = 48, kNarrowTile_px = 32, kTileHeight_px = 54, kNarrowFaces = 224;
-/// The tiles of an image: as wide as each other, but for the last.
+/// wide and high; narrower where there are few images, for blocks to end at about the same time.
+constexpr int kTileWidth_px = 48, kNarrowTile_px = 32, kTileHeight_px = 54;
+/// The tiles of an image that are at most so wide: as wide as each other, but for the last.
 struct TileGrid {
   int tile_width_px, across, down;
   PICTURA_HD constexpr int count() const { return across * down; }
 };
-PICTURA_HD constexpr TileGrid tiles_at_most(int most_px, int width_px, int height_px) {
+PICTURA_HD constexpr TileGrid tiles_of(int most_px, int width_px, int height_px) {
   auto parts_of = [](int whole, int most) { return (whole + most - 1) / most; };
   const int together = kWrittenAtOnce * parts_of(parts_of(width_px, parts_of(width_px, most_px)), kWrittenAtOnce);
   return {together, parts_of(width_px, together), parts_of(height_px, kTileHeight_px)};
-}
-PICTURA_HD constexpr TileGrid tiles_of(int width_px, int height_px, int crowd) {
-  const TileGrid widest = tiles_at_most(kTileWidth_px, width_px, height_px);
-  return crowd * kCrowdFaces < kNarrowFaces * widest.count() ? widest
-                                                             : tiles_at_most(kNarrowTile_px, width_px, height_px);
 }
 
 /// Where one camera's images go; strides as in CameraImages.
@@ -174,7 +168,7 @@ struct DrawTask {
   const View* views = nullptr;
   int32_t first_view = 0;  // views [first_view, first_view + num_views) are drawn
   int32_t num_views = 0, num_cameras = 0;
-  int32_t most_tiles[kCrowds] = {};  // of an image of each class
+  int32_t tile_width_px = kTileWidth_px, most_tiles = 0;  // at most, of a tile; of an image
   const DeviceGeometry* geometries = nullptr;
   int32_t num_geometries = 0;
   int32_t max_world_agents = 0;
@@ -191,6 +185,23 @@ struct DrawTask {
   int32_t* drawn_images = nullptr;     // [kCrowds][images]
   CameraSlot cameras[kMaxCameras];
 };
+
+/// Sets how wide the tiles are that so many blocks draw, and how many an image has at most.
+PICTURA_HD inline void choose_tiles(DrawTask* task, int blocks) {
+  // Wide tiles keep all threads busy; of few, blocks that end early would wait for the others.
+  constexpr int kTilesOfBlock = 12;
+  const int images = task->num_views * task->num_cameras;
+  constexpr int kWidths_px[] = {kTileWidth_px, kNarrowTile_px};
+  for (const int most_px : kWidths_px) {
+    task->tile_width_px = most_px;
+    task->most_tiles = 0;
+    for (int i = 0; i < task->num_cameras; ++i) {
+      const PinholeCamera& camera = task->cameras[i].camera;
+      task->most_tiles = max_of(task->most_tiles, tiles_of(most_px, camera.width_px, camera.height_px).count());
+    }
+    if (images * task->most_tiles >= kTilesOfBlock * blocks) return;
+  }
+}
 
 struct VisibilityTask {
   DrawTask draw;

@@ -59,9 +59,9 @@ std::size_t large_block_bytes(const Scratch& large) { return large_bytes(large);
 cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& large, int processors,
                         cudaStream_t stream) {
   const LaunchPlace place{stream, kernels.may_begin_early};
-  const int images = task.num_views * task.num_cameras;
-  const LaunchShape to_draw{min_of(images * task.most_tiles[kCrowds - 1], kDrawBlocksPerProcessor * processors), kDrawThreads,
-                            draw_bytes()};
+  const int images = task.num_views * task.num_cameras, draw_blocks = kDrawBlocksPerProcessor * processors;
+  choose_tiles(&task, draw_blocks);
+  const LaunchShape to_draw{min_of(images * task.most_tiles, draw_blocks), kDrawThreads, draw_bytes()};
   for (task.round_index = 0; task.round_index < kRounds; ++task.round_index) {
     // Few images are postponed, mostly none; then a launch takes as long as its blocks take to start.
     const int share = task.round_index == 0 ? 1 : 8;

@@ -116,7 +116,8 @@ __host__ __device__ size_t lay_out(Memory* memory, int max_pixels, int max_fragm
   memory->rows = reinterpret_cast<Word*>(bytes + rows_begin);
   memory->max_rows = static_cast<int32_t>((candidates_begin - rows_begin) / sizeof(Word));
   memory->candidates = reinterpret_cast<Word*>(bytes + candidates_begin);
-  memory->max_candidates = static_cast<int32_t>((layout.used - candidates_begin) / sizeof(Word));
+  // Few become no fragments: of more there would be no room for those that do.
+  memory->max_candidates = max_fragments + max_fragments / 2;
   return layout.used;
 }
 

@@ -21,9 +21,5 @@ __device__ inline int width_px(const PinholeCamera& camera) {
 __device__ inline int height_px(const PinholeCamera& camera) {
   return PICTURA_RIG_HEIGHT_PX > 0 ? PICTURA_RIG_HEIGHT_PX : camera.height_px;
 }
-__device__ inline int most_tiles(const DrawTask& task, int crowd) {
-  return PICTURA_RIG_WIDTH_PX > 0 ? tiles_of(PICTURA_RIG_WIDTH_PX, PICTURA_RIG_HEIGHT_PX, crowd).count()
-                                  : task.most_tiles[crowd];
-}
 
 }  // namespace pictura::cuda

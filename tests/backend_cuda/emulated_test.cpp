@@ -133,6 +133,7 @@ class EmulatedRenderer final : public Renderer {
       task.geometries = renderer.geometries_.data();
       task.num_geometries = static_cast<int32_t>(renderer.geometries_.size());
       task.counters = &counters;
+      cuda::choose_tiles(&task, kBlocks);
       task.fault = &fault;
       task.overflow_images = overflow_images.data();
       drawn_images.resize(cuda::kCrowds * overflow_images.size());
