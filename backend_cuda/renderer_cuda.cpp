@@ -149,7 +149,8 @@ class CudaRenderer final : public Renderer {
     PICTURA_CUDA(cudaDeviceGetAttribute(&processors_, cudaDevAttrMultiProcessorCount, device));
     *origin_out = library_.origin();
     grow(0, 1);  // what is too little for any scene is told at once
-    counters_ = DeviceBuffer<cuda::DrawCounters>(1);
+    const cuda::DrawCounters none;
+    counters_ = DeviceBuffer<cuda::DrawCounters>(Span<const cuda::DrawCounters>(&none, 1));
     fault_.host()->view = -1;
   }
   std::string_view name() const override { return "cuda"; }
@@ -179,7 +180,6 @@ class CudaRenderer final : public Renderer {
     const auto views_at_once = static_cast<int32_t>((views.size() + parts - 1) / std::max(parts, std::size_t{1}));
     for (int32_t left = task.num_views; left > 0; left -= task.num_views, task.first_view += task.num_views) {
       task.num_views = std::min(left, views_at_once);
-      PICTURA_CUDA(cudaMemsetAsync(counters_.data(), 0, sizeof(cuda::DrawCounters), on_stream));
       PICTURA_CUDA(cuda::launch_draw(library_.kernels(), task, large_.view(), processors_, on_stream));
     }
   }

@@ -430,6 +430,10 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
                                                       });
     if (!is_drawn && threadIdx.x == 0) note_fault(task, view, kNoRoom);
   }
+  sync_block();
+  if (threadIdx.x == 0 && atomicAdd(&task.counters->ended, 1) + 1 == static_cast<int32_t>(gridDim.x)) {
+    *task.counters = {};
+  }
 }
 
 /// Adds up what the faces of an agent weigh.

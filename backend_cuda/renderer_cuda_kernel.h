@@ -151,7 +151,7 @@ struct Scratch {
 /// Images are gathered and drawn in rounds: those for which the pool had no room left are postponed to the next one.
 constexpr int kRounds = 3;
 
-/// What the blocks of a batch's launches count together; 0 before.
+/// What the blocks of a batch's launches count together; 0 before, and again when the last block has ended.
 struct DrawCounters {
   struct Round {
     int32_t next_culled = 0, next_batch = 0, next_clipped = 0, next_drawn = 0;  // the last counts tiles
@@ -161,6 +161,7 @@ struct DrawCounters {
     int32_t crowds[kCrowds] = {};                       // images that are drawn, by how much they list
   } rounds[kRounds];
   int32_t overflow = 0;  // images left to the last launch
+  int32_t ended = 0;     // blocks of the last launch
 };
 
 struct DrawTask {
