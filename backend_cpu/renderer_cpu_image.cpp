@@ -52,13 +52,15 @@ void ImageDrawer::find_occluders() {
     if (solid.covered_px2 > 0.0f) solids_.push_back(solid);
   };
   visit_agents(setting_, *request_.scene, *request_.view, [&](const AgentBox& box, int32_t agent) {
+    if (!may_occlude(box, setting_.camera)) return;
     const uint32_t number = thing_number(kAgentKind, agent - world_begin());
     visit_faces_to_eye(box, setting_.camera, [&](int face) {
       offer(cuboid_quad(box, face, setting_.debug_palette), face_entry(number, face));
     });
   });
-  visit_walls(setting_, *request_.geometry,
-              [&](const WallFace& wall, int32_t index) { offer(wall_quad(wall), thing_number(kWallKind, index)); });
+  visit_walls(setting_, *request_.geometry, [&](const WallFace& wall, int32_t index) {
+    if (may_occlude(wall, setting_.camera)) offer(wall_quad(wall), thing_number(kWallKind, index));
+  });
   const auto count = std::min(solids_.size(), static_cast<std::size_t>(Occluders::kMost));
   std::partial_sort(solids_.begin(), solids_.begin() + static_cast<std::ptrdiff_t>(count), solids_.end(),
                     [](const Solid& a, const Solid& b) {

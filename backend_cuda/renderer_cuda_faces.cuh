@@ -309,17 +309,19 @@ __device__ inline void find_occluders(FaceMaking* making, const uint32_t* entrie
     const bool is_seen = make_quad(*making, entry, &quad, [making](int32_t index) { return making->strips[index]; });
     return is_seen ? __float_as_int(occluded_px2(camera, quad.seen, &on_screen, &turns_right)) : 0;
   };
-  // Those of the lists that cover most so far, in the first lanes.
+  auto may_hide = [&](uint32_t entry) {
+    const uint32_t index = entry & kFaceIndexMask;
+    if (entry == kNoEntry) return false;
+    if (kind_of(entry) == kAgentKind) return may_occlude(making->agents[index], camera);
+    return kind_of(entry) == kWallKind && may_occlude(making->walls[index], camera);
+  };
+  // Those that cover most so far, in the first lanes. Near ones are put aside until every lane has one.
   uint32_t best = kNoEntry;
   int best_covers = 0;
-  PICTURA_KEEP_LOOP
-  for (int32_t first = 0; first < count; first += kWarpSize) {
-    const uint32_t entry = first + lane_index() < count ? entries[first + lane_index()] : kNoEntry;
-    const bool is_solid = entry != kNoEntry && (kind_of(entry) == kAgentKind || kind_of(entry) == kWallKind);
-    if (!__any_sync(kAllLanes, is_solid)) continue;
-    int covers = is_solid ? occluded_by(entry) : 0;
-    const uint32_t had = best;
-    int had_covers = best_covers;
+  WarpQueue near_ones(&block_state()->warps[warp_index()].queue);
+  auto compare = [&](const WarpQueue::Pair& near_one) {
+    const uint32_t entry = near_one.is_one ? near_one.a : kNoEntry, had = best;
+    int covers = near_one.is_one ? occluded_by(entry) : 0, had_covers = best_covers;
     best_covers = 0;
     PICTURA_KEEP_LOOP
     for (int k = 0; k < Occluders::kMost; ++k) {
@@ -334,6 +336,14 @@ __device__ inline void find_occluders(FaceMaking* making, const uint32_t* entrie
       if (entry == lowest) covers = 0;
       if (had == lowest) had_covers = 0;
     }
+  };
+  PICTURA_KEEP_LOOP
+  for (int32_t first = 0;; first += kWarpSize) {
+    const bool is_more = first < count;
+    const uint32_t entry = first + lane_index() < count ? entries[first + lane_index()] : kNoEntry;
+    near_ones.push(may_hide(entry), entry, 0);
+    if (near_ones.is_ready() || (!is_more && !near_ones.is_empty())) compare(near_ones.take());
+    if (!is_more) break;
   }
   const bool is_one = best_covers != 0;
   const unsigned found = __ballot_sync(kAllLanes, is_one);

@@ -3,15 +3,24 @@
 #pragma once
 
 #include "pictura/common/raster_coverage.h"
-#include "pictura/common/raster_shapes.h"
+#include "pictura/common/raster_cull.h"
 
 namespace pictura {
 
-/// The face of a solid on screen, all of it before the near plane.
-struct Occluder {
+/// The face of a solid on screen, all of it before the near plane. Aligned for devices.
+struct alignas(16) Occluder {
   Vec3 side[4];        // how far inside of a side a point of the screen is, in px: x, y, and what is added
   Vec3 inverse_depth;  // likewise, of its plane
 };
+
+/// Whether a solid is near enough to hide much.
+constexpr float kOccluderRange_m = 45.0f;
+PICTURA_HD inline bool may_occlude(const AgentBox& box, const PinholeCamera& camera) {
+  return to_camera(camera, box.center_m).z - 0.5f * box.length_m < kOccluderRange_m;
+}
+PICTURA_HD inline bool may_occlude(const WallFace& wall, const PinholeCamera& camera) {
+  return to_camera(camera, wall_middle(wall)).z - wall_radius_m(wall) < kOccluderRange_m;
+}
 
 /// A face of less than half of this hides nothing, and a side shorter than this borders nothing.
 constexpr float kLeastOccluder_px2 = 1.0f, kLeastSide_px = 1e-3f;
@@ -69,9 +78,10 @@ struct Occluders {
     bool is_hidden = false;
     PICTURA_KEEP_LOOP
     for (int k = 0; k < count; ++k) {
-      float inside_px = least(occluder[k].side[0]);
-      for (int i = 1; i < 4; ++i) inside_px = lesser_of(inside_px, least(occluder[k].side[i]));
-      is_hidden = is_hidden || (inside_px >= kOccluderMargin_px && least(occluder[k].inverse_depth) >= nearness);
+      const Occluder one = occluder[k];
+      float inside_px = least(one.side[0]);
+      for (int i = 1; i < 4; ++i) inside_px = lesser_of(inside_px, least(one.side[i]));
+      is_hidden = is_hidden || (inside_px >= kOccluderMargin_px && least(one.inverse_depth) >= nearness);
     }
     return is_hidden;
   }
