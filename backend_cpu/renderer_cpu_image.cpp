@@ -122,7 +122,7 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
           continue;
         }
         const PixelCoverage coverage = covers_fully ? PixelCoverage{1.0f, kAllSamples}
-                                                    : pixel_coverage(edges, face.edge_count, face.least_area, x, y);
+                                                    : pixel_coverage(edges, face.edge_count, face.least_area(), x, y);
         if (coverage.area <= 0.0f) continue;
         fragments_.push_back({make_fragment(face, f, coverage, x, y), first_fragment_[pixel]});
         first_fragment_[pixel] = static_cast<int32_t>(fragments_.size()) - 1;

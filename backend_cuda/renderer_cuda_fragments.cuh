@@ -205,9 +205,10 @@ __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, c
   PixelCoverage coverage;
   if (candidate.is_one) {
     const ScreenFace& face = memory.faces[candidate.a];
-    coverage = Memory::covers_fully(candidate.b) ? PixelCoverage{1.0f, kAllSamples}
-                                                 : pixel_coverage(memory.edges + face.edge_begin, face.edge_count,
-                                                                  face.least_area, part.x_of(pixel), part.y_of(pixel));
+    coverage = Memory::covers_fully(candidate.b)
+                   ? PixelCoverage{1.0f, kAllSamples}
+                   : pixel_coverage(memory.edges + face.edge_begin, face.edge_count, face.least_area(),
+                                    part.x_of(pixel), part.y_of(pixel));
   }
   const bool is_left = coverage.area > 0.0f;
   const int32_t fragment = take_place(&memory.state->num_fragments, is_left);

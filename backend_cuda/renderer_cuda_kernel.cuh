@@ -314,24 +314,21 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kMakingBlocksPerPro
   wait_for_earlier_launch();
   MakingState* state = making_state();
   DrawCounters::Round* round = &task.counters->rounds[task.round_index];
-  const int32_t num_batches = round->batches;
-  // The first lane asks for the next batch while the warp makes the faces of one.
+  const int32_t num_batches = round->batches, num_blocks = static_cast<int32_t>(gridDim.x);
+  // They are much of a size, so they are dealt out; the next one is known while the warp makes the faces of one.
   auto i = static_cast<int32_t>(blockIdx.x);
+  FaceBatch next{};
+  if (i < num_batches) next = task.pool.batches[i];
   PICTURA_KEEP_LOOP
   while (i < num_batches) {
-    const int32_t next = lane_index() == 0 ? static_cast<int32_t>(gridDim.x) + atomicAdd(&round->next_batch, 1) : 0;
-    const FaceBatch batch = task.pool.batches[i];
-    const int32_t image = batch.image;
-    const uint32_t entry = entries_of(task.pool.lists, image)[batch.first_entry + lane_index()];
-    const int32_t face_count = task.pool.images[image].face_count;
-    copy_whole(&state->making, task.pool.makings[image]);
+    const FaceBatch batch = next;
+    const uint32_t entry = entries_of(task.pool.lists, batch.image)[batch.first_entry + lane_index()];
+    copy_whole(&state->making, task.pool.makings[batch.image]);
+    i += num_blocks;
+    if (i < num_batches) next = task.pool.batches[i];
     __syncwarp();
-    // Other warps add to it meanwhile, so that all lanes take the first one's word.
-    if (__shfl_sync(kAllLanes, face_count, 0) >= 0) {
-      make_faces(state->making, &state->room, task.pool.lists, &round->listed, entry, image);
-    }
+    make_faces(state->making, &state->room, task.pool.lists, &round->listed, entry, batch.image);
     __syncwarp();
-    i = __shfl_sync(kAllLanes, next, 0);
   }
 }
 

@@ -154,7 +154,7 @@ constexpr int kRounds = 3;
 /// What the blocks of a batch's launches count together; 0 before, and again when the last block has ended.
 struct DrawCounters {
   struct Round {
-    int32_t next_culled = 0, next_batch = 0, next_clipped = 0, next_drawn = 0;  // the last counts tiles
+    int32_t next_culled = 0, next_clipped = 0, next_drawn = 0;  // the last counts tiles
     GatherCounts listed;
     int32_t faces = 0, batches = 0, clipped_edges = 0;  // of the pool that are taken
     int32_t postponed = 0;                              // images

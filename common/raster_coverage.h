@@ -194,17 +194,25 @@ struct alignas(16) ScreenFace {
   PixelBox box;
   int32_t edge_begin = 0;
   uint8_t edge_count = 0;
-  uint8_t class_id = 0;  // of the class plane
+  uint8_t class_id = 0;           // of the class plane
+  uint16_t least_area_units = 0;  // see least_area()
   // Inverse depth at a point of the screen.
   float inverse_depth_x = 0, inverse_depth_y = 0, inverse_depth_0 = 0;
   uint32_t number = 0;  // of the thing that it belongs to, see raster_order.h
   // Range of the inverse depth over the face's corners.
   float inverse_depth_low = 0, inverse_depth_high = 0;
   float plane_distance_m = 0;  // from the camera to the face's plane
+  uint32_t color_bytes = 0;    // to_bytes(color), for devices
   Rgb color;
-  uint32_t color_bytes = 0;  // to_bytes(color), for devices
-  float least_area = 0;      // see least_area_of
+
+  /// What it covers less of a pixel than this is nothing, see least_area_of.
+  PICTURA_HD float least_area() const { return static_cast<float>(least_area_units) * (1.0f / kAreaUnits); }
+  PICTURA_HD void set_least_area(float area) { least_area_units = static_cast<uint16_t>(area * kAreaUnits + 0.5f); }
+
+ private:
+  static constexpr float kAreaUnits = 1 << 16;
 };
+static_assert(sizeof(ScreenFace) == 4 * 16);
 
 /// What bounds the corners of a polygon on screen.
 struct ScreenBounds {

@@ -59,7 +59,7 @@ PICTURA_HD inline ScreenFace whole_face(const ScreenFace& face, FaceOwner owner,
   whole.number = owner.number;
   whole.class_id = owner.class_id;
   whole.color_bytes = to_bytes(face.color);
-  whole.least_area = least_area_of(face.color, owner);
+  whole.set_least_area(least_area_of(face.color, owner));
   return whole;
 }
 

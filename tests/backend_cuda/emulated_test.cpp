@@ -211,7 +211,7 @@ void expect_some_postponed(uint64_t seed, const EmulatedRenderer::Pool& pool) {
 
 TEST(EmulatedKernels, PostponeWhatThePoolHasNoRoomFor) { expect_some_postponed(7, {.faces = 130}); }
 // Noticed when some of an image's faces are made already.
-TEST(EmulatedKernels, PostponeWhatHasNoRoomForItsClippedEdges) { expect_some_postponed(8, {.clipped_edges = 60}); }
+TEST(EmulatedKernels, PostponeWhatHasNoRoomForItsClippedEdges) { expect_some_postponed(8, {.clipped_edges = 70}); }
 
 TEST(EmulatedKernels, ClipLightsOnAllSides) {
   // A spiral of heads around a camera, from before its near plane on, that turn to it and cross each other's disks and
