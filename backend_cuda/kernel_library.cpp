@@ -45,8 +45,8 @@ KernelLibrary::KernelLibrary(const Rig& rig) {
     PICTURA_CUDA(cudaLibraryGetKernel(&handle, library_, name));
     return reinterpret_cast<const void*>(handle);
   };
-  kernels_ = {kernel(kCullName), kernel(kGatherName),       kernel(kClipName),
-              kernel(kDrawName), kernel(kDrawOverflowName), kernel(kVisibilityName)};
+  kernels_ = {kernel(kCullName),          kernel(kGatherName),       kernel(kClipName),      kernel(kDrawName),
+              kernel(kDrawPostponedName), kernel(kDrawOverflowName), kernel(kVisibilityName)};
   PICTURA_CUDA(prepare_kernels(&kernels_));
   origin_ = fmt::format("kernels {} for {} and this rig", code.cached ? "built earlier" : "built", code.architecture);
 }

@@ -21,9 +21,12 @@ std::string cuda_unavailable();
 namespace {
 
 constexpr int kLargeBlocks = 8;
-// Room in the pool for the faces and edges of an image: what CARLA's towns ask for on average. Those with more take
-// another round. Four edges are for each face, the rest, of which half is asked for, for those that are clipped.
+// Room in the pool for the faces and edges of an image: what CARLA's towns ask for on average. Those with more are
+// drawn when it is free again. Four edges are for each face, the rest, of which a third is asked for, for those that
+// are clipped.
 constexpr int kPoolFaces = 200, kPoolEdges = 928;
+// ... and of few images, which may all be crowded.
+constexpr int kLeastPoolImages = 4 * cuda::kMostEntries / kPoolFaces + 1;
 // Views that are drawn at once, at most: enough that the last images of a launch, for which few blocks are left to
 // work, do not count.
 constexpr std::size_t kViewsAtOnce = 2048;
@@ -63,14 +66,14 @@ class PoolBuffers {
  public:
   PoolBuffers() = default;
   explicit PoolBuffers(std::size_t images)
-      : faces_(images * kPoolFaces),
-        edges_(images * kPoolEdges),
+      : faces_((images + kLeastPoolImages) * kPoolFaces),
+        edges_((images + kLeastPoolImages) * kPoolEdges),
         images_(images),
         makings_(images),
-        batches_(images * kBatches),
+        batches_((images + kLeastPoolImages) * kBatches),
         entries_(images * cuda::kMostEntries),
-        clipped_(images * kPoolFaces),
-        lists_((3 + cuda::kCrowds) * images) {}
+        clipped_((images + kLeastPoolImages) * kPoolFaces),
+        lists_((2 + cuda::kCrowds) * images) {}
   /// Sets where a task finds the pool and lists images.
   void serve(cuda::DrawTask* task_out) const {
     task_out->pool = {faces_.data(),
@@ -81,16 +84,19 @@ class PoolBuffers {
                       {entries_.data(), clipped_.data(), cuda::kMostEntries, static_cast<int32_t>(clipped_.size())},
                       static_cast<int32_t>(faces_.size()),
                       static_cast<int32_t>(edges_.size())};
-    for (std::size_t i = 0; i < 2; ++i) task_out->postponed_images[i] = lists_.data() + i * images_.size();
-    task_out->overflow_images = lists_.data() + 2 * images_.size();
-    task_out->drawn_images = lists_.data() + 3 * images_.size();
+    task_out->postponed_images = lists_.data();
+    task_out->overflow_images = lists_.data() + images_.size();
+    task_out->drawn_images = lists_.data() + 2 * images_.size();
   }
   // There is room for as many as the faces in the pool make, of each image with a last one that may not be full.
   static constexpr int kBatches = kPoolFaces / cuda::FaceBatch::kEntries + 1;
-  static constexpr std::size_t kImageBytes =
-      kPoolFaces * sizeof(ScreenFace) + kPoolEdges * sizeof(PolygonEdge) + sizeof(cuda::GatheredImage) +
-      sizeof(cuda::FaceMaking) + kBatches * sizeof(cuda::FaceBatch) + cuda::kMostEntries * sizeof(uint32_t) +
-      kPoolFaces * sizeof(cuda::ClippedThing) + (3 + cuda::kCrowds) * sizeof(int32_t);
+  static constexpr std::size_t kRoomBytes = kPoolFaces * sizeof(ScreenFace) + kPoolEdges * sizeof(PolygonEdge) +
+                                            kBatches * sizeof(cuda::FaceBatch) +
+                                            kPoolFaces * sizeof(cuda::ClippedThing);
+  static constexpr std::size_t kLeastBytes = kLeastPoolImages * kRoomBytes;
+  static constexpr std::size_t kImageBytes = kRoomBytes + sizeof(cuda::GatheredImage) + sizeof(cuda::FaceMaking) +
+                                             cuda::kMostEntries * sizeof(uint32_t) +
+                                             (2 + cuda::kCrowds) * sizeof(int32_t);
 
  private:
   DeviceBuffer<ScreenFace> faces_;
@@ -239,7 +245,8 @@ class CudaRenderer final : public Renderer {
     const cuda::ScratchNeeds needs{.large_blocks = kLargeBlocks,
                                    .large_block_bytes = ScratchBuffers::block_bytes(large, large_bytes),
                                    .views = most_views,
-                                   .view_bytes = cameras_.size() * PoolBuffers::kImageBytes};
+                                   .view_bytes = cameras_.size() * PoolBuffers::kImageBytes,
+                                   .pool_bytes = PoolBuffers::kLeastBytes};
     plan_ = cuda::plan_scratch(needs, config_.max_scratch_bytes);
     most_views_ = most_views;
     large.blocks = plan_.large_blocks;

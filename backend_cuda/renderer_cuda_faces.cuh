@@ -361,34 +361,48 @@ __device__ inline GatheredImage image_of(const BlockState& state, int32_t face_b
   return {state.view.geometry, state.making.agents, state.making.setting.camera.position_m, face_begin, face_count};
 }
 
+/// Where a block gathers an image of its own.
+struct GatherPlace {
+  ScreenFace* faces;
+  PolygonEdge* edges;
+  int32_t edge_begin, clipped_begin, clipped_end;
+  GatherLists lists;
+};
+
+// There the lists hold all that a world does.
+__device__ inline GatherPlace place_of(const Scratch& scratch) {
+  GatherPlace place{scratch.faces, scratch.edges, 0, 4 * scratch.max_faces, scratch.max_edges, {}};
+  lay_out(&place.lists, scratch, scratch.bytes);
+  return place;
+}
+
 // Gathers an image into the block's own memory, all of it in one launch. False where there is no room for all, or where
 // its view names something that does not exist. All threads of the block.
-__device__ inline bool gather(const DrawTask& task, int32_t view, int32_t camera, bool leaves_out_hidden) {
+__device__ inline bool gather(const DrawTask& task, int32_t view, int32_t camera, const GatherPlace& place,
+                              bool leaves_out_hidden) {
   BlockState* state = block_state();
   GatherRoom* room = gather_room();
-  const Scratch& scratch = state->scratch;
-  GatherLists lists;
-  lay_out(&lists, scratch, scratch.bytes);
+  const GatherLists& lists = place.lists;
   sync_block();
   if (threadIdx.x == 0) {
     state->listed = {};
     state->num_entries = state->num_faces = state->num_clipped = state->overflow = 0;
     state->usable = set_image(state, task, view, camera) ? 1 : 0;
     FaceMaking* making = &state->making;
-    making->faces = state->faces = scratch.faces;
-    making->edges = state->edges = scratch.edges;
+    making->faces = state->faces = place.faces;
+    making->edges = state->edges = place.edges;
     making->num_faces = &state->num_faces;
     making->num_clipped = &state->num_clipped;
-    making->edge_begin = 0;
-    making->clipped_begin = 4 * scratch.max_faces;
-    making->clipped_end = scratch.max_edges;
+    making->edge_begin = place.edge_begin;
+    making->clipped_begin = place.clipped_begin;
+    making->clipped_end = place.clipped_end;
   }
   sync_block();
   if (state->usable == 0) return false;
-  // The list holds all that a world does.
   EntryList list(lists.entries, lists.max_entries, &state->num_entries);
   cull(state, task, &room->cull, &list);
   sync_block();
+  if (state->num_entries > lists.max_entries) return false;
   if (warp_index() == 0) {
     list.finish();
     if (leaves_out_hidden) find_occluders(&state->making, lists.entries, state->num_entries);

@@ -181,32 +181,22 @@ __device__ inline int32_t view_of(const DrawTask& task, int32_t image) {
 }
 __device__ inline int32_t camera_of(const DrawTask& task, int32_t image) { return image % num_cameras(task); }
 
-// The images of a round: all of them, then those that the round before has postponed.
-__device__ inline int32_t images_of_round(const DrawTask& task) {
-  return task.round_index == 0 ? task.num_views * num_cameras(task)
-                               : task.counters->rounds[task.round_index - 1].postponed;
-}
-__device__ inline int32_t image_of_round(const DrawTask& task, int32_t i) {
-  return task.round_index == 0 ? i : task.postponed_images[(task.round_index - 1) % 2][i];
-}
-
-// Leaves an image for which the pool has no room to the next round.
+// Leaves an image for which the pool has no room until it is free again.
 __device__ inline void postpone(const DrawTask& task, int32_t image) {
-  if (task.round_index + 1 == kRounds) {
+  if (task.pool.max_faces < kMostEntries) {
     leave_to_last(task, image);
     return;
   }
-  const int32_t place = atomicAdd(&task.counters->rounds[task.round_index].postponed, 1);
-  task.postponed_images[task.round_index % 2][place] = image;
+  task.postponed_images[atomicAdd(&task.counters->postponed, 1)] = image;
 }
 
-// The images of a round that are drawn, by classes of how much they list.
+// The images that are drawn from the pool, by classes of how much they list.
 __device__ inline int32_t* crowd_of(const DrawTask& task, int crowd) {
   return task.drawn_images + static_cast<int64_t>(crowd) * task.num_views * num_cameras(task);
 }
 __device__ inline void list_drawn(const DrawTask& task, int32_t image, int32_t listed) {
   const int crowd = min_of(listed / kCrowdFaces, kCrowds - 1);
-  crowd_of(task, crowd)[atomicAdd(&task.counters->rounds[task.round_index].crowds[crowd], 1)] = image;
+  crowd_of(task, crowd)[atomicAdd(&task.counters->crowds[crowd], 1)] = image;
 }
 // Goes through them, the most crowded first.
 class DrawOrder {
@@ -214,7 +204,7 @@ class DrawOrder {
   __device__ explicit DrawOrder(const DrawTask& task) : task_(task) {}
   /// The image whose turn it is, no earlier than that of the call before; -1 after the last.
   __device__ int32_t image_of(int32_t turn) {
-    const int32_t* crowds = task_.counters->rounds[task_.round_index].crowds;
+    const int32_t* crowds = task_.counters->crowds;
     PICTURA_KEEP_LOOP
     for (; crowd_ >= 0; --crowd_) {
       const int32_t count = crowds[crowd_];
@@ -241,18 +231,18 @@ __device__ inline int32_t take_face_room(const DrawTask& task, int32_t image, in
     leave_to_last(task, image);
     return -1;
   }
-  DrawCounters::Round* round = &task.counters->rounds[task.round_index];
-  const int32_t face_begin = atomicAdd(&round->faces, listed);
+  DrawCounters* counters = task.counters;
+  const int32_t face_begin = atomicAdd(&counters->faces, listed);
   if (face_begin + listed > task.pool.max_faces) {
     postpone(task, image);
     return -1;
   }
-  const int32_t first_batch = atomicAdd(&round->batches, FaceBatch::count_of(listed));
+  const int32_t first_batch = atomicAdd(&counters->batches, FaceBatch::count_of(listed));
   list_drawn(task, image, listed);
   making->faces = task.pool.faces + face_begin;
   making->edges = task.pool.edges;
   making->num_faces = &out->face_count;
-  making->num_clipped = &round->clipped_edges;
+  making->num_clipped = &counters->clipped_edges;
   making->edge_begin = 4 * face_begin;
   making->clipped_begin = 4 * task.pool.max_faces;
   making->clipped_end = task.pool.max_edges;
@@ -271,11 +261,12 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kCullBlocksPerProce
   wait_for_earlier_launch();
   BlockState* state = block_state();
   CullRoom* room = &gather_room()->cull;
-  DrawCounters::Round* round = &task.counters->rounds[task.round_index];
-  const int32_t num_images = images_of_round(task), num_blocks = static_cast<int32_t>(gridDim.x);
+  DrawCounters* counters = task.counters;
+  const int32_t num_images = task.num_views * num_cameras(task), num_blocks = static_cast<int32_t>(gridDim.x);
   PICTURA_KEEP_LOOP
-  for (auto i = static_cast<int32_t>(blockIdx.x); i < num_images; i = num_blocks + next_of(&round->next_culled)) {
-    const int32_t image = image_of_round(task, i), camera = camera_of(task, image);
+  for (auto image = static_cast<int32_t>(blockIdx.x); image < num_images;
+       image = num_blocks + next_of(&counters->next_culled)) {
+    const int32_t camera = camera_of(task, image);
     if (lane_index() == 0) {
       state->num_entries = 0;
       state->usable = set_image(state, task, view_of(task, image), camera) ? 1 : 0;
@@ -313,8 +304,8 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kMakingBlocksPerPro
     pictura_gather(const __grid_constant__ DrawTask task) {
   wait_for_earlier_launch();
   MakingState* state = making_state();
-  DrawCounters::Round* round = &task.counters->rounds[task.round_index];
-  const int32_t num_batches = round->batches, num_blocks = static_cast<int32_t>(gridDim.x);
+  DrawCounters* counters = task.counters;
+  const int32_t num_batches = counters->batches, num_blocks = static_cast<int32_t>(gridDim.x);
   // They are much of a size, so they are dealt out; the next one is known while the warp makes the faces of one.
   auto i = static_cast<int32_t>(blockIdx.x);
   FaceBatch next{};
@@ -327,7 +318,7 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kMakingBlocksPerPro
     i += num_blocks;
     if (i < num_batches) next = task.pool.batches[i];
     __syncwarp();
-    make_faces(state->making, &state->room, task.pool.lists, &round->listed, entry, batch.image);
+    make_faces(state->making, &state->room, task.pool.lists, &counters->listed, entry, batch.image);
     __syncwarp();
   }
 }
@@ -337,13 +328,13 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kClipBlocksPerProce
     pictura_clip(const __grid_constant__ DrawTask task) {
   wait_for_earlier_launch();
   ClipRoom* room = &gather_room()->clip;
-  DrawCounters::Round* round = &task.counters->rounds[task.round_index];
-  const GatherCounts listed = round->listed;
+  DrawCounters* counters = task.counters;
+  const GatherCounts listed = counters->listed;
   // No more faces for a warp than it takes for all warps to have some: each is one long chain of instructions.
   const auto num_blocks = static_cast<int32_t>(gridDim.x);
   const int batch = clamp((listed.clipped + num_blocks - 1) / num_blocks, 1, kWarpSize);
   PICTURA_KEEP_LOOP
-  for (auto i = static_cast<int32_t>(blockIdx.x);; i = num_blocks + next_of(&round->next_clipped)) {
+  for (auto i = static_cast<int32_t>(blockIdx.x);; i = num_blocks + next_of(&counters->next_clipped)) {
     const ClippedItem item = clipped_item(task.pool.lists, listed, i, batch);
     if (!item.is_any) return;
     if (!clip_things(task.pool.makings, room, item.is_one, item.are_lights, item.thing) &&
@@ -357,9 +348,8 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kClipBlocksPerProce
 extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcessor)
     pictura_draw(const __grid_constant__ DrawTask task) {
   wait_for_earlier_launch();
-  if (images_of_round(task) == 0) return;
   BlockState* state = block_state();
-  int32_t* const counter = &task.counters->rounds[task.round_index].next_drawn;
+  int32_t* const counter = &task.counters->next_drawn;
   // While the block draws a tile, a thread of the last warp, which has the fewest faces to look at, asks for the number
   // of the next but one, and what the next one shows.
   DrawOrder order(task);
@@ -411,20 +401,56 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
   }
 }
 
+// Shared memory of a block that draws what was postponed.
+__host__ __device__ inline size_t postponed_bytes() {
+  const size_t to_gather = gather_bytes(kDrawThreads), to_draw = draw_bytes();
+  return to_gather > to_draw ? to_gather : to_draw;
+}
+
+// Draws the images for which the pool had no room: a block gathers one at a time where faces of others were.
+extern "C" __global__ void __launch_bounds__(kDrawThreads, kPostponedBlocksPerProcessor)
+    pictura_draw_postponed(const __grid_constant__ DrawTask task) {
+  wait_for_earlier_launch();
+  const int32_t count = task.counters->postponed;
+  const auto block = static_cast<int32_t>(blockIdx.x), num_blocks = static_cast<int32_t>(gridDim.x);
+  const FacePool& pool = task.pool;
+  const int32_t clipped_edges = (pool.max_edges - 4 * pool.max_faces) / num_blocks;
+  const int32_t clipped_begin = 4 * pool.max_faces + block * clipped_edges;
+  const GatherPlace place{
+      pool.faces + block * kMostEntries,
+      pool.edges,
+      4 * block * kMostEntries,
+      clipped_begin,
+      clipped_begin + clipped_edges,
+      {entries_of(pool.lists, block), pool.lists.clipped + block * kMostEntries, kMostEntries, kMostEntries}};
+  PICTURA_KEEP_LOOP
+  for (int32_t i = block; i < count; i += num_blocks) {
+    const int32_t image = task.postponed_images[i], view = view_of(task, image), camera = camera_of(task, image);
+    const PinholeCamera& shows = task.cameras[camera].camera;
+    const bool is_drawn = gather(task, view, camera, place, true) &&
+                          each_tile(SmallDrawMemory::current(), width_px(shows), 0, height_px(shows),
+                                    [&](const SmallDrawMemory& memory, const Part& part) {
+                                      return draw_image_part(memory, task, view, camera, part);
+                                    });
+    if (!is_drawn && threadIdx.x == 0) leave_to_last(task, image);
+  }
+}
+
 extern "C" __global__ void __launch_bounds__(kLargeThreads)
     pictura_draw_overflow(const __grid_constant__ DrawTask task, const __grid_constant__ Scratch scratch) {
   wait_for_earlier_launch();
   take_scratch(scratch);
+  const BlockState* state = block_state();
   const int32_t count = task.counters->overflow;
   PICTURA_KEEP_LOOP
   for (int32_t i = static_cast<int32_t>(blockIdx.x); i < count; i += static_cast<int32_t>(gridDim.x)) {
     const int32_t image = task.overflow_images[i], view = view_of(task, image), camera = camera_of(task, image);
     const PinholeCamera& shows = task.cameras[camera].camera;
-    const bool is_drawn =
-        gather(task, view, camera, true) && each_tile(LargeDrawMemory::current(), width_px(shows), 0, height_px(shows),
-                                                      [&](const LargeDrawMemory& memory, const Part& part) {
-                                                        return draw_image_part(memory, task, view, camera, part);
-                                                      });
+    const bool is_drawn = gather(task, view, camera, place_of(state->scratch), true) &&
+                          each_tile(LargeDrawMemory::current(), width_px(shows), 0, height_px(shows),
+                                    [&](const LargeDrawMemory& memory, const Part& part) {
+                                      return draw_image_part(memory, task, view, camera, part);
+                                    });
     if (!is_drawn && threadIdx.x == 0) note_fault(task, view, kNoRoom);
   }
   sync_block();
@@ -458,7 +484,7 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
     PICTURA_KEEP_LOOP
     for (int32_t camera = 0; in_range && camera < num_cameras(task.draw); ++camera) {
       // What is hidden counts where the agent is alone.
-      if (!gather(task.draw, view, camera, false)) continue;
+      if (!gather(task.draw, view, camera, place_of(state->scratch), false)) continue;
       const uint32_t number = thing_number(kAgentKind, agent - state->view.world_begin);
       const int num_faces = state->num_faces;
       int y_begin = state->making.setting.camera.height_px, y_end = 0;

@@ -1,6 +1,6 @@
 // What the host tells the drawing kernels. Three launches gather the faces of images in a pool, the next draws them, a
-// block a tile at a time; four more launches do the same with what the pool had no room for, and so on. What has
-// outgrown a block's memory is left to a last launch of few blocks, whose memory has room for all that a world can
+// block a tile at a time; one more draws the images for which the pool had no room, a block an image at a time. What
+// has outgrown a block's memory is left to a last launch of few blocks, whose memory has room for all that a world can
 // hold.
 #pragma once
 
@@ -148,20 +148,15 @@ struct Scratch {
   int32_t blocks = 0, max_faces = 0, max_edges = 0;
 };
 
-/// Images are gathered and drawn in rounds: those for which the pool had no room left are postponed to the next one.
-constexpr int kRounds = 3;
-
 /// What the blocks of a batch's launches count together; 0 before, and again when the last block has ended.
 struct DrawCounters {
-  struct Round {
-    int32_t next_culled = 0, next_clipped = 0, next_drawn = 0;  // the last counts tiles
-    GatherCounts listed;
-    int32_t faces = 0, batches = 0, clipped_edges = 0;  // of the pool that are taken
-    int32_t postponed = 0;                              // images
-    int32_t crowds[kCrowds] = {};                       // images that are drawn, by how much they list
-  } rounds[kRounds];
-  int32_t overflow = 0;  // images left to the last launch
-  int32_t ended = 0;     // blocks of the last launch
+  int32_t next_culled = 0, next_clipped = 0, next_drawn = 0;  // the last counts tiles
+  GatherCounts listed;
+  int32_t faces = 0, batches = 0, clipped_edges = 0;  // of the pool that are taken
+  int32_t crowds[kCrowds] = {};                       // images that are drawn from it, by how much they list
+  int32_t postponed = 0;                              // images for which it has no room
+  int32_t overflow = 0;                               // ... that are left to the last launch
+  int32_t ended = 0;                                  // blocks of that
 };
 
 struct DrawTask {
@@ -180,10 +175,9 @@ struct DrawTask {
   Fault* fault = nullptr;
   FacePool pool;
   DrawCounters* counters = nullptr;
-  int32_t round_index = 0;
-  int32_t* postponed_images[2] = {};   // [images] of each round, in turn
-  int32_t* overflow_images = nullptr;  // [images]
-  int32_t* drawn_images = nullptr;     // [kCrowds][images]
+  int32_t* postponed_images = nullptr;  // [images]
+  int32_t* overflow_images = nullptr;   // [images]
+  int32_t* drawn_images = nullptr;      // [kCrowds][images]
   CameraSlot cameras[kMaxCameras];
 };
 

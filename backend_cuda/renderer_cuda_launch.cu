@@ -1,4 +1,6 @@
 // The drawing kernels compiled ahead of time, and the launches of whatever kernels the renderer has.
+#include <utility>
+
 #include "pictura/backend_cuda/renderer_cuda_kernel.cuh"
 #include "pictura/backend_cuda/renderer_cuda_launch.h"
 
@@ -40,9 +42,10 @@ cudaError_t allow_shared(const void* kernel, std::size_t bytes) {
 }  // namespace
 
 KernelSet ahead_of_time_kernels() {
-  return {reinterpret_cast<const void*>(pictura_cull),          reinterpret_cast<const void*>(pictura_gather),
-          reinterpret_cast<const void*>(pictura_clip),          reinterpret_cast<const void*>(pictura_draw),
-          reinterpret_cast<const void*>(pictura_draw_overflow), reinterpret_cast<const void*>(pictura_visibility)};
+  return {reinterpret_cast<const void*>(pictura_cull),           reinterpret_cast<const void*>(pictura_gather),
+          reinterpret_cast<const void*>(pictura_clip),           reinterpret_cast<const void*>(pictura_draw),
+          reinterpret_cast<const void*>(pictura_draw_postponed), reinterpret_cast<const void*>(pictura_draw_overflow),
+          reinterpret_cast<const void*>(pictura_visibility)};
 }
 
 cudaError_t prepare_kernels(KernelSet* kernels) {
@@ -51,7 +54,8 @@ cudaError_t prepare_kernels(KernelSet* kernels) {
   if (status != cudaSuccess) return status;
   // From there on kernels wait for the launch before theirs, see wait_for_earlier_launch.
   kernels->may_begin_early = attributes.ptxVersion >= 90;
-  return allow_shared(kernels->draw, draw_bytes());
+  const cudaError_t allowed = allow_shared(kernels->draw, draw_bytes());
+  return allowed != cudaSuccess ? allowed : allow_shared(kernels->draw_postponed, postponed_bytes());
 }
 
 std::size_t large_block_bytes(const Scratch& large) { return large_bytes(large); }
@@ -61,22 +65,17 @@ cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& 
   const LaunchPlace place{stream, kernels.may_begin_early};
   const int images = task.num_views * task.num_cameras, draw_blocks = kDrawBlocksPerProcessor * processors;
   choose_tiles(&task, draw_blocks);
-  const LaunchShape to_draw{min_of(images * task.most_tiles, draw_blocks), kDrawThreads, draw_bytes()};
-  for (task.round_index = 0; task.round_index < kRounds; ++task.round_index) {
-    // Few images are postponed, mostly none; then a launch takes as long as its blocks take to start.
-    const int share = task.round_index == 0 ? 1 : 8;
-    const LaunchShape to_cull{min_of(images, kCullBlocksPerProcessor / share * processors), kGatherThreads,
-                              cull_bytes()};
-    const LaunchShape to_gather{kMakingBlocksPerProcessor / share * processors, kGatherThreads, sizeof(MakingState)};
-    const LaunchShape to_clip{kClipBlocksPerProcessor / share * processors, kGatherThreads,
-                              gather_bytes(kGatherThreads)};
-    cudaError_t status = launch(kernels.cull, to_cull, place, task);
-    if (status != cudaSuccess) return status;
-    status = launch(kernels.gather, to_gather, place, task);
-    if (status != cudaSuccess) return status;
-    status = launch(kernels.clip, to_clip, place, task);
-    if (status != cudaSuccess) return status;
-    status = launch(kernels.draw, to_draw, place, task);
+  // As many as the pool has room for to gather an image each.
+  const int postponed_blocks =
+      max_of(1, min_of(min_of(images, kPostponedBlocksPerProcessor * processors), task.pool.max_faces / kMostEntries));
+  const std::pair<const void*, LaunchShape> launches[] = {
+      {kernels.cull, {min_of(images, kCullBlocksPerProcessor * processors), kGatherThreads, cull_bytes()}},
+      {kernels.gather, {kMakingBlocksPerProcessor * processors, kGatherThreads, sizeof(MakingState)}},
+      {kernels.clip, {kClipBlocksPerProcessor * processors, kGatherThreads, gather_bytes(kGatherThreads)}},
+      {kernels.draw, {min_of(images * task.most_tiles, draw_blocks), kDrawThreads, draw_bytes()}},
+      {kernels.draw_postponed, {postponed_blocks, kDrawThreads, postponed_bytes()}}};
+  for (const auto& [kernel, shape] : launches) {
+    const cudaError_t status = launch(kernel, shape, place, task);
     if (status != cudaSuccess) return status;
   }
   return launch(kernels.draw_overflow, {min_of(images, large.blocks), kLargeThreads, gather_bytes(kLargeThreads)},

@@ -16,6 +16,7 @@ struct KernelSet {
   const void* gather = nullptr;
   const void* clip = nullptr;
   const void* draw = nullptr;
+  const void* draw_postponed = nullptr;
   const void* draw_overflow = nullptr;
   const void* visibility = nullptr;
   bool may_begin_early = false;  // a launch of theirs, while the one before it ends
@@ -24,6 +25,7 @@ constexpr const char* kCullName = "pictura_cull";
 constexpr const char* kGatherName = "pictura_gather";
 constexpr const char* kClipName = "pictura_clip";
 constexpr const char* kDrawName = "pictura_draw";
+constexpr const char* kDrawPostponedName = "pictura_draw_postponed";
 constexpr const char* kDrawOverflowName = "pictura_draw_overflow";
 constexpr const char* kVisibilityName = "pictura_visibility";
 
@@ -35,7 +37,7 @@ cudaError_t prepare_kernels(KernelSet* kernels);
 /// Bytes that a block of the last launch needs besides faces and edges.
 std::size_t large_block_bytes(const Scratch& large);
 
-/// Draws all images: four launches for each round, and one more.
+/// Draws all images, in six launches.
 cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& large, int processors,
                         cudaStream_t stream);
 cudaError_t launch_visibility(const KernelSet& kernels, const VisibilityTask& task, const Scratch& large,

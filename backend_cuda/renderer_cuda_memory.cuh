@@ -13,6 +13,8 @@ constexpr int kGatherThreads = 32, kCullBlocksPerProcessor = 32, kMakingBlocksPe
 // A block that draws them, a tile of an image at a time. What has more fragments is drawn in parts.
 constexpr int kDrawThreads = 256, kDrawBlocksPerProcessor = 4;
 constexpr int kDrawPixels = kTileWidth_px * kTileHeight_px, kDrawFragments = 1152;
+// Few images are postponed, mostly none.
+constexpr int kPostponedBlocksPerProcessor = 2;
 // A block of the last launch.
 constexpr int kLargeThreads = 128, kLargePixels = kTileWidth_px * 512, kLargeFragments = 1 << 16;
 

@@ -18,7 +18,8 @@ std::size_t take(std::size_t wanted, std::size_t bytes_each, std::size_t share_b
 }  // namespace
 
 std::size_t bytes_of(const ScratchPlan& plan, const ScratchNeeds& needs) {
-  return static_cast<std::size_t>(plan.large_blocks) * needs.large_block_bytes + plan.views * needs.view_bytes;
+  return static_cast<std::size_t>(plan.large_blocks) * needs.large_block_bytes + plan.views * needs.view_bytes +
+         needs.pool_bytes;
 }
 
 ScratchPlan plan_scratch(const ScratchNeeds& needs, std::size_t max_bytes) {

@@ -10,6 +10,7 @@ struct ScratchNeeds {
   int large_blocks = 1;  // of the last launch
   std::size_t large_block_bytes = 0;
   std::size_t views = 1, view_bytes = 0;  // of the batch, and what each of them takes
+  std::size_t pool_bytes = 0;             // of the pool, however few they are
 };
 
 /// What there is room for.

@@ -18,6 +18,7 @@
 #define pictura_gather emulated_gather
 #define pictura_clip emulated_clip
 #define pictura_draw emulated_draw
+#define pictura_draw_postponed emulated_draw_postponed
 #define pictura_draw_overflow emulated_draw_overflow
 #define pictura_visibility emulated_visibility
 #include "pictura/backend_cuda/renderer_cuda_kernel.cuh"
@@ -47,8 +48,7 @@ class EmulatedRenderer final : public Renderer {
 
   GeometryHandle upload(const StaticGeometry& geometry) override {
     kept_.push_back(std::make_unique<Kept>(geometry));
-    cuda::DeviceGeometry view{kept_.back()->geometry.view(), kept_.back()->strips.view(),
-                              kept_.back()->walls.view()};
+    cuda::DeviceGeometry view{kept_.back()->geometry.view(), kept_.back()->strips.view(), kept_.back()->walls.view()};
     geometries_.push_back(view);
     return static_cast<GeometryHandle>(geometries_.size()) - 1;
   }
@@ -56,14 +56,14 @@ class EmulatedRenderer final : public Renderer {
   void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream) override {
     Setup setup(*this, cuda::make_draw_task(config_, cameras_, scene, views, &images_out), scene);
     cuda::DrawTask& task = setup.task;
-    for (task.round_index = 0; task.round_index < cuda::kRounds; ++task.round_index) {
-      launch(cuda::kGatherThreads, [&] { cuda::emulated_cull(task); });
-      launch(cuda::kGatherThreads, [&] { cuda::emulated_gather(task); });
-      launch(cuda::kGatherThreads, [&] { cuda::emulated_clip(task); });
-      launch(cuda::kDrawThreads, [&] { cuda::emulated_draw(task); });
-    }
+    launch(cuda::kGatherThreads, [&] { cuda::emulated_cull(task); });
+    launch(cuda::kGatherThreads, [&] { cuda::emulated_gather(task); });
+    launch(cuda::kGatherThreads, [&] { cuda::emulated_clip(task); });
+    launch(cuda::kDrawThreads, [&] { cuda::emulated_draw(task); });
+    postponed_ = setup.counters.postponed;
+    const int gathering = std::clamp(task.pool.max_faces / cuda::kMostEntries, 1, kBlocks);
+    launch(cuda::kDrawThreads, [&] { cuda::emulated_draw_postponed(task); }, static_cast<unsigned>(gathering));
     overflow_ = setup.counters.overflow;
-    postponed_ = setup.counters.rounds[0].postponed;
     launch(cuda::kLargeThreads, [&] { cuda::emulated_draw_overflow(task, setup.large); });
     EXPECT_EQ(setup.fault.view, -1) << "fault " << setup.fault.kind;
   }
@@ -77,7 +77,7 @@ class EmulatedRenderer final : public Renderer {
     EXPECT_EQ(setup.fault.view, -1) << "fault " << setup.fault.kind;
   }
 
-  /// Images that the last call left to the last launch, and to the second round.
+  /// Images that the last call left to the last launch, and for which the pool had no room.
   int overflow() const { return overflow_; }
   int postponed() const { return postponed_; }
 
@@ -103,7 +103,7 @@ class EmulatedRenderer final : public Renderer {
     std::vector<cuda::FaceBatch> batches;
     std::vector<uint32_t> entries;
     std::vector<cuda::ClippedThing> clipped;
-    std::vector<int32_t> overflow_images, postponed_images[2], drawn_images;
+    std::vector<int32_t> overflow_images, postponed_images, drawn_images;
     std::vector<uint64_t> large_words;
 
     Setup(const EmulatedRenderer& renderer, const cuda::DrawTask& draw, const SceneBatch& scene) : task(draw) {
@@ -138,10 +138,8 @@ class EmulatedRenderer final : public Renderer {
       task.overflow_images = overflow_images.data();
       drawn_images.resize(cuda::kCrowds * overflow_images.size());
       task.drawn_images = drawn_images.data();
-      for (std::size_t i = 0; i < 2; ++i) {
-        postponed_images[i].resize(num_images);
-        task.postponed_images[i] = postponed_images[i].data();
-      }
+      postponed_images.resize(num_images);
+      task.postponed_images = postponed_images.data();
 
       large = cuda::large_sizes(pieces, heads, scene.agents.size());
       large_faces.resize(static_cast<std::size_t>(kBlocks * large.max_faces));
@@ -155,11 +153,11 @@ class EmulatedRenderer final : public Renderer {
   };
 
   template <typename Kernel>
-  void launch(int threads, Kernel&& kernel) {
+  void launch(int threads, Kernel&& kernel, unsigned blocks = kBlocks) {
     using namespace emulation;
-    grid_dim = {kBlocks, 1, 1};
+    grid_dim = {blocks, 1, 1};
     block_dim = {static_cast<unsigned>(threads), 1, 1};
-    for (unsigned block = 0; block < kBlocks; ++block) {
+    for (unsigned block = 0; block < blocks; ++block) {
       block_index = {block, 0, 0};
       // Whatever an earlier block has left.
       std::memset(cuda::block_memory, 0xA5, sizeof(cuda::block_memory));
@@ -209,7 +207,7 @@ void expect_some_postponed(uint64_t seed, const EmulatedRenderer::Pool& pool) {
   EXPECT_EQ(renderer.overflow(), 0);
 }
 
-TEST(EmulatedKernels, PostponeWhatThePoolHasNoRoomFor) { expect_some_postponed(7, {.faces = 130}); }
+TEST(EmulatedKernels, PostponeWhatThePoolHasNoRoomFor) { expect_some_postponed(7, {.faces = 192}); }
 // Noticed when some of an image's faces are made already.
 TEST(EmulatedKernels, PostponeWhatHasNoRoomForItsClippedEdges) { expect_some_postponed(8, {.clipped_edges = 70}); }
 
