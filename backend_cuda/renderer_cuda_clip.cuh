@@ -71,6 +71,18 @@ __device__ void copy_whole(Value* to, const Value& from) {
     reinterpret_cast<uint4*>(to)[lane_index()] = reinterpret_cast<const uint4*>(&from)[lane_index()];
 }
 
+// ... from global into shared memory; it is there once all lanes have waited for their copies.
+template <typename Value>
+__device__ void copy_whole_later(Value* to, const Value& from) {
+  constexpr int kWords = sizeof(Value) / sizeof(uint4);
+  static_assert(sizeof(Value) % sizeof(uint4) == 0 && kWords <= kWarpSize);
+  if (lane_index() >= kWords) return;
+  for (size_t half = 0; half < sizeof(uint4); half += sizeof(uint64_t)) {
+    const size_t at = static_cast<size_t>(lane_index()) * sizeof(uint4) + half;
+    copy_into_shared(reinterpret_cast<char*>(to) + at, reinterpret_cast<const char*>(&from) + at);
+  }
+}
+
 /// A face whose corners the lanes hold, one each; the rest is the same in all lanes.
 struct SharedFace {
   Vec3 corner;  // of lanes below count

@@ -41,7 +41,7 @@ union GatherRoom {
 /// The shared memory of a block that makes faces and does nothing else. No more than it needs: with the 1 KiB that each
 /// block takes, 32 of them leave 60 KiB of cache to a processor that has 256 KiB for both.
 struct MakingState {
-  FaceMaking making;
+  FaceMaking makings[2];  // of this batch and the next, by turns
   FaceRoom room;
 };
 __device__ inline MakingState* making_state() { return reinterpret_cast<MakingState*>(block_memory); }
@@ -301,57 +301,72 @@ __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_
 __device__ inline void find_occluders(FaceMaking* making, const uint32_t* entries, int32_t count) {
   ImageSetting* setting = &making->setting;
   const PinholeCamera& camera = setting->camera;
-  ScreenQuad on_screen;
-  bool turns_right = false;
-  Quad quad;
-  // What the face of an entry covers, as bits, which sort alike.
-  auto occluded_by = [&](uint32_t entry) {
-    const bool is_seen = make_quad(*making, entry, &quad, [making](int32_t index) { return making->strips[index]; });
-    return is_seen ? __float_as_int(occluded_px2(camera, quad.seen, &on_screen, &turns_right)) : 0;
-  };
   auto may_hide = [&](uint32_t entry) {
     const uint32_t index = entry & kFaceIndexMask;
     if (entry == kNoEntry) return false;
     if (kind_of(entry) == kAgentKind) return may_occlude(making->agents[index], camera);
     return kind_of(entry) == kWallKind && may_occlude(making->walls[index], camera);
   };
-  // Those that cover most so far, in the first lanes. Near ones are put aside until every lane has one.
-  uint32_t best = kNoEntry;
-  int best_covers = 0;
-  WarpQueue near_ones(&block_state()->warps[warp_index()].queue);
-  auto compare = [&](const WarpQueue::Pair& near_one) {
-    const uint32_t entry = near_one.is_one ? near_one.a : kNoEntry, had = best;
-    int covers = near_one.is_one ? occluded_by(entry) : 0, had_covers = best_covers;
-    best_covers = 0;
+  // Of the occluders so far, a lane each: the entry, and what it covers as bits, which sort alike; 0: none.
+  uint32_t kept = kNoEntry;
+  int kept_covers = 0;
+  // Keeps those that cover most among the kept and the lanes' own.
+  auto keep_best = [&](const WarpQueue::Pair& near_one) {
+    const uint32_t own = near_one.is_one ? near_one.a : kNoEntry;
+    Quad quad;
+    ScreenQuad on_screen;
+    bool turns_right = false;
+    int covers = 0;
+    if (near_one.is_one && make_quad(*making, own, &quad, [making](int32_t i) { return making->strips[i]; })) {
+      covers = __float_as_int(occluded_px2(camera, quad.seen, &on_screen, &turns_right));
+    }
+    bool is_best = false, stays = false;
+    int left = covers, kept_left = kept_covers;
     PICTURA_KEEP_LOOP
     for (int k = 0; k < Occluders::kMost; ++k) {
-      const int most = __reduce_max_sync(kAllLanes, max_of(covers, had_covers));
+      const int most = __reduce_max_sync(kAllLanes, max_of(left, kept_left));
       if (most == 0) break;
-      const uint32_t its = covers == most ? entry : kNoEntry, other = had_covers == most ? had : kNoEntry;
+      const uint32_t its = left == most ? own : kNoEntry, other = kept_left == most ? kept : kNoEntry;
       const uint32_t lowest = __reduce_min_sync(kAllLanes, its < other ? its : other);
-      if (lane_index() == k) {
-        best = lowest;
-        best_covers = most;
+      if (own == lowest) {
+        is_best = true;
+        left = 0;
       }
-      if (entry == lowest) covers = 0;
-      if (had == lowest) had_covers = 0;
+      if (kept == lowest) {
+        stays = true;
+        kept_left = 0;
+      }
+    }
+    // The new ones take the places of those that go.
+    unsigned places = ~__ballot_sync(kAllLanes, stays) & ((1u << Occluders::kMost) - 1);
+    int place = 0;
+    PICTURA_KEEP_LOOP
+    for (unsigned added = __ballot_sync(kAllLanes, is_best); added != 0; added &= added - 1, places &= places - 1) {
+      const int from = __ffs(static_cast<int>(added)) - 1, to = __ffs(static_cast<int>(places)) - 1;
+      const uint32_t entry = __shfl_sync(kAllLanes, own, from);
+      const int its_covers = __shfl_sync(kAllLanes, covers, from);
+      if (lane_index() == from) place = to;
+      if (lane_index() == to) {
+        kept = entry;
+        kept_covers = its_covers;
+      }
+    }
+    if (is_best) {
+      setting->occluders.occluder[place] =
+          make_occluder(camera, setting->frustum, quad.seen.plane, on_screen, turns_right);
     }
   };
+  // Near ones are put aside until every lane has one.
+  WarpQueue near_ones(&block_state()->warps[warp_index()].queue);
   PICTURA_KEEP_LOOP
   for (int32_t first = 0;; first += kWarpSize) {
     const bool is_more = first < count;
     const uint32_t entry = first + lane_index() < count ? entries[first + lane_index()] : kNoEntry;
     near_ones.push(may_hide(entry), entry, 0);
-    if (near_ones.is_ready() || (!is_more && !near_ones.is_empty())) compare(near_ones.take());
+    if (near_ones.is_ready() || (!is_more && !near_ones.is_empty())) keep_best(near_ones.take());
     if (!is_more) break;
   }
-  const bool is_one = best_covers != 0;
-  const unsigned found = __ballot_sync(kAllLanes, is_one);
-  if (is_one) {
-    occluded_by(best);
-    setting->occluders.occluder[lane_index()] =
-        make_occluder(camera, setting->frustum, quad.seen.plane, on_screen, turns_right);
-  }
+  const unsigned found = __ballot_sync(kAllLanes, kept_covers != 0);
   if (lane_index() == 0) setting->occluders.count = __popc(found);
   __syncwarp();
 }

@@ -306,19 +306,30 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kMakingBlocksPerPro
   MakingState* state = making_state();
   DrawCounters* counters = task.counters;
   const int32_t num_batches = counters->batches, num_blocks = static_cast<int32_t>(gridDim.x);
-  // They are much of a size, so they are dealt out; the next one is known while the warp makes the faces of one.
+  // They are much of a size, so they are dealt out. While the warp makes the faces of one, what the next one needs is
+  // on its way, and where the next but one begins.
   auto i = static_cast<int32_t>(blockIdx.x);
-  FaceBatch next{};
-  if (i < num_batches) next = task.pool.batches[i];
+  auto batch_at = [&](int32_t at) { return at < num_batches ? task.pool.batches[at] : FaceBatch{}; };
+  FaceBatch next = batch_at(i), after = batch_at(i + num_blocks);
+  int32_t turn = 0;
+  uint32_t entry = kNoEntry;
+  auto ask_for_next = [&] {
+    entry = entries_of(task.pool.lists, next.image)[next.first_entry + lane_index()];
+    copy_whole_later(&state->makings[turn], task.pool.makings[next.image]);
+  };
+  if (i < num_batches) ask_for_next();
   PICTURA_KEEP_LOOP
-  while (i < num_batches) {
-    const FaceBatch batch = next;
-    const uint32_t entry = entries_of(task.pool.lists, batch.image)[batch.first_entry + lane_index()];
-    copy_whole(&state->making, task.pool.makings[batch.image]);
-    i += num_blocks;
-    if (i < num_batches) next = task.pool.batches[i];
+  for (; i < num_batches; i += num_blocks) {
+    const FaceMaking& making = state->makings[turn];
+    const int32_t image = next.image;
+    const uint32_t its_entry = entry;
+    wait_for_copies();
     __syncwarp();
-    make_faces(state->making, &state->room, task.pool.lists, &counters->listed, entry, batch.image);
+    turn = 1 - turn;
+    next = after;
+    if (i + num_blocks < num_batches) ask_for_next();
+    after = batch_at(i + 2 * num_blocks);
+    make_faces(making, &state->room, task.pool.lists, &counters->listed, its_entry, image);
     __syncwarp();
   }
 }

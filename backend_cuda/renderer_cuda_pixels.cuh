@@ -181,14 +181,11 @@ __device__ void reset_part(const Memory& memory) {
   sync_block();
 }
 
-// Draws the faces into one part, and leaves all as a next one is to find it, once all threads have come so far. False,
-// and nothing left so, where it has no room for all that it lists. All threads of the block.
+// Makes the fragments of the listed rows and mixes the colours of their pixels. False where there is no room for all
+// that is listed. All threads of the block.
 template <typename Memory, typename Visit, typename Write>
-__device__ bool draw_part(const Memory& memory, int num_faces, const Part& part, const Visit& visit,
-                          const Write& write) {
+__device__ bool mix_rows(const Memory& memory, const Part& part, const Visit& visit, const Write& write) {
   BlockState* state = memory.state;
-  list_rows(memory, num_faces, part);
-  sync_block();
   if (state->num_rows > memory.max_rows) return false;
   mark_and_list(memory, part);
   sync_block();
@@ -207,6 +204,17 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
   sync_block();
   mix_pixels(memory, visit, write);
   sync_block();
+  return true;
+}
+
+// Draws the faces into one part, and leaves all as a next one is to find it, once all threads have come so far. False,
+// and nothing left so, where it has no room for all that it lists. All threads of the block.
+template <typename Memory, typename Visit, typename Write>
+__device__ bool draw_part(const Memory& memory, int num_faces, const Part& part, const Visit& visit,
+                          const Write& write) {
+  list_rows(memory, num_faces, part);
+  sync_block();
+  if (memory.state->num_rows != 0 && !mix_rows(memory, part, visit, write)) return false;
   reset_counts(memory);
   write_pixels(memory, part, visit, write);
   return true;
