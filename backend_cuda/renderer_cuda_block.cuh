@@ -21,7 +21,7 @@ struct Part {
   int x_begin, x_end, y_begin, y_end;
   __device__ int num_columns() const { return x_end - x_begin; }
   __device__ int num_rows() const { return y_end - y_begin; }
-  __device__ int num_pixels() const { return (y_end - y_begin) * kTileWidth_px; }
+  __device__ int num_pixels() const { return num_rows() * kTileWidth_px; }
   __device__ int pixel(int x, int y) const { return (y - y_begin) * kTileWidth_px + (x - x_begin); }
   __device__ int x_of(int pixel) const {
     return x_begin + static_cast<int>(static_cast<unsigned>(pixel) % kTileWidth_px);
