@@ -10,8 +10,8 @@
 #include "pictura/bench/quality.h"
 #include "pictura/common/camera.h"
 #include "pictura/common/raster_check.h"
-#include "pictura/map/load_map.h"
 #include "pictura/tests/support/image_drawing.h"
+#include "pictura/tests/support/named_maps.h"
 
 namespace pictura {
 namespace {
@@ -90,10 +90,7 @@ class OccludersOfTowns : public testing::TestWithParam<const char*> {};
 
 TEST_P(OccludersOfTowns, ChangeNothingThatIsSeen) {
   const std::string map = GetParam();
-  const std::vector<std::string> towns = known_towns();
-  if (map.starts_with("Town") && !std::binary_search(towns.begin(), towns.end(), map)) {
-    GTEST_SKIP() << "needs " << map << ".xodr; set PICTURA_DATA";
-  }
+  if (const std::string why = test::missing(map); !why.empty()) GTEST_SKIP() << why;
   const Snapshot snapshot = drive_snapshot({.map = map, .views = 24});
   const StaticGeometryView pieces = snapshot.geometry.view();
   const SceneBatch scene = snapshot.scene.batch();
@@ -128,11 +125,7 @@ TEST_P(OccludersOfTowns, ChangeNothingThatIsSeen) {
 
 INSTANTIATE_TEST_SUITE_P(Maps, OccludersOfTowns,
                          testing::Values("Town01", "Town03", "Town05", "Town07", "Town10HD", "procedural:1"),
-                         [](const auto& map) {
-                           std::string name = map.param;
-                           std::replace(name.begin(), name.end(), ':', '_');
-                           return name;
-                         });
+                         test::map_name);
 
 }  // namespace
 }  // namespace pictura

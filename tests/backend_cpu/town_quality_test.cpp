@@ -1,12 +1,10 @@
 // The oracle against the truth on whole maps: CARLA's towns, with their hills and bridges, and procedural ones; agents
 // of all kinds on the move, walls and lights on.
-#include <algorithm>
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "pictura/bench/quality.h"
-#include "pictura/map/load_map.h"
+#include "pictura/tests/support/named_maps.h"
 #include "pictura/tests/support/tolerances.h"
 
 namespace pictura {
@@ -16,10 +14,7 @@ class TownQuality : public testing::TestWithParam<const char*> {};
 
 TEST_P(TownQuality, IsWithinThePromisedError) {
   const std::string map = GetParam();
-  const std::vector<std::string> towns = known_towns();
-  if (map.starts_with("Town") && !std::binary_search(towns.begin(), towns.end(), map)) {
-    GTEST_SKIP() << "needs " << map << ".xodr; set PICTURA_DATA";
-  }
+  if (const std::string why = test::missing(map); !why.empty()) GTEST_SKIP() << why;
   const Snapshot snapshot = drive_snapshot({.map = map, .views = 8});
   const Quality quality =
       measure_quality(snapshot.geometry, snapshot.scene.batch(), snapshot.views, {.rig = paper_rig()});
@@ -35,11 +30,7 @@ TEST_P(TownQuality, IsWithinThePromisedError) {
 INSTANTIATE_TEST_SUITE_P(Maps, TownQuality,
                          testing::Values("Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07",
                                          "Town10HD", "procedural:1", "procedural:2"),
-                         [](const auto& map) {
-                           std::string name = map.param;
-                           std::replace(name.begin(), name.end(), ':', '_');
-                           return name;
-                         });
+                         test::map_name);
 
 }  // namespace
 }  // namespace pictura

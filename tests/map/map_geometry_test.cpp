@@ -2,13 +2,13 @@
 #include "pictura/map/map_geometry.h"
 
 #include <cmath>
-#include <filesystem>
 
 #include <gtest/gtest.h>
 
 #include "pictura/map/load_map.h"
 #include "pictura/map/opendrive/opendrive.h"
 #include "pictura/tests/map/small_roads.h"
+#include "pictura/tests/support/named_maps.h"
 
 namespace pictura {
 namespace {
@@ -116,9 +116,7 @@ class Walls : public ::testing::TestWithParam<const char*> {
  protected:
   void SetUp() override {
     const std::string name = GetParam();
-    if (name.starts_with("Town") && !std::filesystem::exists(map_folder() + "/carla/" + name + ".xodr")) {
-      GTEST_SKIP() << "needs " << name << ".xodr; set PICTURA_DATA";
-    }
+    if (const std::string why = test::missing(name); !why.empty()) GTEST_SKIP() << why;
     map_ = load_map(name);
   }
   std::shared_ptr<const RoadMap> map_;

@@ -13,6 +13,7 @@
 #include "pictura/common/scene.h"
 #include "pictura/map/load_map.h"
 #include "pictura/map/map_geometry.h"
+#include "pictura/tests/support/named_maps.h"
 
 namespace pictura {
 namespace {
@@ -288,10 +289,7 @@ class PaintOfTowns : public ::testing::TestWithParam<const char*> {
  protected:
   void SetUp() override {
     const std::string name = GetParam();
-    const std::vector<std::string> towns = known_towns();
-    if (name.starts_with("Town") && !std::binary_search(towns.begin(), towns.end(), name)) {
-      GTEST_SKIP() << "needs " << name << ".xodr; set PICTURA_DATA";
-    }
+    if (const std::string why = test::missing(name); !why.empty()) GTEST_SKIP() << why;
     map_ = load_map(name);
     drawn_ = painted_lines(*map_);
     for (const Marking& marking : map_->markings) {
