@@ -84,8 +84,7 @@ class CpuRenderer final : public Renderer {
             &view,
             place_camera(cameras_[camera], view),
             config_.line_floor_px,
-            config_.debug_palette,
-            true};
+            config_.debug_palette};
   }
 
   static ImageTarget target(const ImageBatch& images, std::size_t view, std::size_t camera) {

@@ -21,7 +21,7 @@ auto ImageDrawer::face_maker(FaceOwner owner) {
 
 void ImageDrawer::prepare(const ImageRequest& request) {
   request_ = request;
-  setting_ = {request.camera, make_frustum(request.camera), request.line_floor_px, request.debug_palette, {}};
+  setting_ = {request.camera, make_frustum(request.camera), request.line_floor_px, request.debug_palette};
   if (request.leaves_out_hidden) find_occluders();
   edges_.clear();
   faces_.clear();
@@ -41,7 +41,6 @@ void ImageDrawer::prepare(const ImageRequest& request) {
 }
 
 void ImageDrawer::find_occluders() {
-  setting_.occluders.count = 0;
   solids_.clear();
   auto offer = [&](const WorldQuad& quad, uint32_t entry) {
     Solid solid{.entry = entry};

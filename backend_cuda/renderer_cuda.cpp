@@ -65,15 +65,7 @@ class ScratchBuffers {
 class PoolBuffers {
  public:
   PoolBuffers() = default;
-  explicit PoolBuffers(std::size_t images)
-      : faces_((images + kLeastPoolImages) * kPoolFaces),
-        edges_((images + kLeastPoolImages) * kPoolEdges),
-        images_(images),
-        makings_(images),
-        batches_((images + kLeastPoolImages) * kBatches),
-        entries_(images * cuda::kMostEntries),
-        clipped_((images + kLeastPoolImages) * kPoolFaces),
-        lists_((2 + cuda::kCrowds) * images) {}
+  explicit PoolBuffers(std::size_t images) : PoolBuffers(images, images + kLeastPoolImages) {}
   /// Sets where a task finds the pool and lists images.
   void serve(cuda::DrawTask* task_out) const {
     task_out->pool = {faces_.data(),
@@ -99,6 +91,16 @@ class PoolBuffers {
                                              (2 + cuda::kCrowds) * sizeof(int32_t);
 
  private:
+  // rooms: of kRoomBytes, for the faces of as many images.
+  PoolBuffers(std::size_t images, std::size_t rooms)
+      : faces_(rooms * kPoolFaces),
+        edges_(rooms * kPoolEdges),
+        images_(images),
+        makings_(images),
+        batches_(rooms * kBatches),
+        entries_(images * cuda::kMostEntries),
+        clipped_(rooms * kPoolFaces),
+        lists_((2 + cuda::kCrowds) * images) {}
   DeviceBuffer<ScreenFace> faces_;
   DeviceBuffer<PolygonEdge> edges_;
   DeviceBuffer<cuda::GatheredImage> images_;

@@ -38,8 +38,8 @@ union GatherRoom {
   ClipRoom clip;
 };
 
-/// The shared memory of a block that makes faces and does nothing else. No more than it needs: with the 1 KiB that each
-/// block takes, 32 of them leave 60 KiB of cache to a processor that has 256 KiB for both.
+/// The shared memory of a block that makes faces and does nothing else. With the 1 KiB that each block takes, 32 of
+/// them leave 28 KiB of cache to a processor that has 256 KiB for both: little of what they read is read again.
 struct MakingState {
   FaceMaking makings[2];  // of this batch and the next, by turns
   FaceRoom room;

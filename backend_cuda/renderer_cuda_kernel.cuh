@@ -412,6 +412,18 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
   }
 }
 
+// Draws an image whose faces the block gathers itself. False where there is no room for all of it, or where its view
+// names something that does not exist. All threads of the block.
+template <typename Memory>
+__device__ bool gather_and_draw(const DrawTask& task, int32_t image, const GatherPlace& place) {
+  const int32_t view = view_of(task, image), camera = camera_of(task, image);
+  const PinholeCamera& shows = task.cameras[camera].camera;
+  return gather(task, view, camera, place, true) &&
+         each_tile(Memory::current(), width_px(shows), 0, height_px(shows), [&](const auto& memory, const Part& part) {
+           return draw_image_part(memory, task, view, camera, part);
+         });
+}
+
 // Shared memory of a block that draws what was postponed.
 __host__ __device__ inline size_t postponed_bytes() {
   const size_t to_gather = gather_bytes(kDrawThreads), to_draw = draw_bytes();
@@ -436,14 +448,8 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kPostponedBlocksPerPr
       {entries_of(pool.lists, block), pool.lists.clipped + block * kMostEntries, kMostEntries, kMostEntries}};
   PICTURA_KEEP_LOOP
   for (int32_t i = block; i < count; i += num_blocks) {
-    const int32_t image = task.postponed_images[i], view = view_of(task, image), camera = camera_of(task, image);
-    const PinholeCamera& shows = task.cameras[camera].camera;
-    const bool is_drawn = gather(task, view, camera, place, true) &&
-                          each_tile(SmallDrawMemory::current(), width_px(shows), 0, height_px(shows),
-                                    [&](const SmallDrawMemory& memory, const Part& part) {
-                                      return draw_image_part(memory, task, view, camera, part);
-                                    });
-    if (!is_drawn && threadIdx.x == 0) leave_to_last(task, image);
+    const int32_t image = task.postponed_images[i];
+    if (!gather_and_draw<SmallDrawMemory>(task, image, place) && threadIdx.x == 0) leave_to_last(task, image);
   }
 }
 
@@ -455,14 +461,9 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
   const int32_t count = task.counters->overflow;
   PICTURA_KEEP_LOOP
   for (int32_t i = static_cast<int32_t>(blockIdx.x); i < count; i += static_cast<int32_t>(gridDim.x)) {
-    const int32_t image = task.overflow_images[i], view = view_of(task, image), camera = camera_of(task, image);
-    const PinholeCamera& shows = task.cameras[camera].camera;
-    const bool is_drawn = gather(task, view, camera, place_of(state->scratch), true) &&
-                          each_tile(LargeDrawMemory::current(), width_px(shows), 0, height_px(shows),
-                                    [&](const LargeDrawMemory& memory, const Part& part) {
-                                      return draw_image_part(memory, task, view, camera, part);
-                                    });
-    if (!is_drawn && threadIdx.x == 0) note_fault(task, view, kNoRoom);
+    const int32_t image = task.overflow_images[i];
+    const bool is_drawn = gather_and_draw<LargeDrawMemory>(task, image, place_of(state->scratch));
+    if (!is_drawn && threadIdx.x == 0) note_fault(task, view_of(task, image), kNoRoom);
   }
   sync_block();
   if (threadIdx.x == 0 && atomicAdd(&task.counters->ended, 1) + 1 == static_cast<int32_t>(gridDim.x)) {

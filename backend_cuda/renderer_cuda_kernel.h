@@ -140,6 +140,11 @@ struct FacePool {
   int32_t max_faces = 0, max_edges = 0;  // of edges, four for each face, the rest for those that are clipped
 };
 
+/// Of at most so many blocks, those that find room in a pool to gather an image each: one tries where there is none.
+PICTURA_HD inline int gathering_blocks(const FacePool& pool, int most) {
+  return clamp(pool.max_faces / kMostEntries, 1, most);
+}
+
 /// Memory of the blocks of the last launch, and how much each of them has.
 struct Scratch {
   ScreenFace* faces = nullptr;     // [blocks][max_faces]

@@ -65,9 +65,7 @@ cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& 
   const LaunchPlace place{stream, kernels.may_begin_early};
   const int images = task.num_views * task.num_cameras, draw_blocks = kDrawBlocksPerProcessor * processors;
   choose_tiles(&task, draw_blocks);
-  // As many as the pool has room for to gather an image each.
-  const int postponed_blocks =
-      max_of(1, min_of(min_of(images, kPostponedBlocksPerProcessor * processors), task.pool.max_faces / kMostEntries));
+  const int postponed_blocks = gathering_blocks(task.pool, min_of(images, kPostponedBlocksPerProcessor * processors));
   const std::pair<const void*, LaunchShape> launches[] = {
       {kernels.cull, {min_of(images, kCullBlocksPerProcessor * processors), kGatherThreads, cull_bytes()}},
       {kernels.gather, {kMakingBlocksPerProcessor * processors, kGatherThreads, sizeof(MakingState)}},

@@ -79,7 +79,7 @@ Ways draw_all_ways(const StaticGeometry& geometry, const SceneBatch& scene, cons
   Rig rig;
   rig.cameras = {camera};
   ImageDrawer drawer;
-  drawer.prepare({&pieces, &scene, &view, place_camera(pinhole_cameras(rig)[0], view), line_floor_px, false, true});
+  drawer.prepare({&pieces, &scene, &view, place_camera(pinhole_cameras(rig)[0], view), line_floor_px, false});
   ways.oracle.resize(3 * pixels);
   drawer.draw({PixelFormat::f32, ways.oracle.data()});
   ways.area = draw_areas(&drawer, pixels);

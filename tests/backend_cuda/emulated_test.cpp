@@ -61,7 +61,7 @@ class EmulatedRenderer final : public Renderer {
     launch(cuda::kGatherThreads, [&] { cuda::emulated_clip(task); });
     launch(cuda::kDrawThreads, [&] { cuda::emulated_draw(task); });
     postponed_ = setup.counters.postponed;
-    const int gathering = std::clamp(task.pool.max_faces / cuda::kMostEntries, 1, kBlocks);
+    const int gathering = cuda::gathering_blocks(task.pool, kBlocks);
     launch(cuda::kDrawThreads, [&] { cuda::emulated_draw_postponed(task); }, static_cast<unsigned>(gathering));
     overflow_ = setup.counters.overflow;
     launch(cuda::kLargeThreads, [&] { cuda::emulated_draw_overflow(task, setup.large); });
