@@ -25,8 +25,8 @@ struct FaceInstance {
 class ImageFaces {
  public:
   /// Replaces the faces by those that the view shows. `scene` lies on the host.
-  void gather(const ImageSetting& setting, const StaticGeometryView& geometry, const SceneBatch& scene, const View& view,
-              int32_t layer);
+  void gather(const ImageSetting& setting, const StaticGeometryView& geometry, const SceneBatch& scene,
+              const View& view, int32_t layer);
   Span<const FaceInstance> faces() const { return faces_; }
 
  private:
