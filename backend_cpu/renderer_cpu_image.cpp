@@ -22,15 +22,11 @@ auto ImageDrawer::face_maker(FaceOwner owner) {
 void ImageDrawer::prepare(const ImageRequest& request) {
   request_ = request;
   setting_ = {request.camera, make_frustum(request.camera), request.line_floor_px, request.debug_palette};
+  find_solids();
   if (request.leaves_out_hidden) find_occluders();
   edges_.clear();
   faces_.clear();
-  visit_agents(setting_, *request.scene, *request.view, [&](const AgentBox& box, int32_t agent) {
-    agent_faces(box, setting_.camera, setting_.debug_palette, face_maker(agent_owner(box, agent - world_begin())));
-  });
-  visit_walls(setting_, *request.geometry, [&](const WallFace& wall, int32_t index) {
-    wall_faces(wall, setting_.camera, face_maker(wall_owner(index)));
-  });
+  for (const Solid& solid : solids_) face_maker(solid.owner)(whole_quad(solid.seen, 0.0f));
   visit_lights(setting_, *request.geometry, *request.scene, *request.view,
                [&](const LightHead& head, LightState state, int32_t index) {
                  light_faces(head, state, setting_.camera, face_maker(light_owner(index)));
@@ -40,34 +36,41 @@ void ImageDrawer::prepare(const ImageRequest& request) {
   });
 }
 
-void ImageDrawer::find_occluders() {
+void ImageDrawer::find_solids() {
   solids_.clear();
-  auto offer = [&](const WorldQuad& quad, uint32_t entry) {
-    Solid solid{.entry = entry};
-    CameraQuad seen;
-    if (!see_quad(quad, setting_.camera, &seen)) return;
-    solid.covered_px2 = occluded_px2(setting_.camera, seen, &solid.quad, &solid.turns_right);
-    solid.plane = seen.plane;
-    if (solid.covered_px2 > 0.0f) solids_.push_back(solid);
+  auto keep = [this](const WorldQuad& quad, Solid solid) {
+    if (see_quad(quad, setting_.camera, &solid.seen)) solids_.push_back(solid);
   };
   visit_agents(setting_, *request_.scene, *request_.view, [&](const AgentBox& box, int32_t agent) {
-    if (!may_occlude(box, setting_.camera)) return;
-    const uint32_t number = thing_number(kAgentKind, agent - world_begin());
+    const FaceOwner owner = agent_owner(box, agent - world_begin());
+    const bool may_hide = may_occlude(box, setting_.camera);
     visit_faces_to_eye(box, setting_.camera, [&](int face) {
-      offer(cuboid_quad(box, face, setting_.debug_palette), face_entry(number, face));
+      keep(cuboid_quad(box, face, setting_.debug_palette), {owner, face_entry(owner.number, face), may_hide, {}});
     });
   });
   visit_walls(setting_, *request_.geometry, [&](const WallFace& wall, int32_t index) {
-    if (may_occlude(wall, setting_.camera)) offer(wall_quad(wall), thing_number(kWallKind, index));
+    const FaceOwner owner = wall_owner(index);
+    keep(wall_quad(wall), {owner, owner.number, may_occlude(wall, setting_.camera), {}});
   });
-  const auto count = std::min(solids_.size(), static_cast<std::size_t>(Occluders::kMost));
-  std::partial_sort(solids_.begin(), solids_.begin() + static_cast<std::ptrdiff_t>(count), solids_.end(),
-                    [](const Solid& a, const Solid& b) {
+}
+
+void ImageDrawer::find_occluders() {
+  occluding_.clear();
+  for (const Solid& solid : solids_) {
+    if (!solid.may_occlude) continue;
+    OccludingFace face{.entry = solid.entry};
+    face.covered_px2 = occluded_px2(setting_.camera, solid.seen, &face.quad, &face.turns_right);
+    face.plane = solid.seen.plane;
+    if (face.covered_px2 > 0.0f) occluding_.push_back(face);
+  }
+  const auto count = std::min(occluding_.size(), static_cast<std::size_t>(Occluders::kMost));
+  std::partial_sort(occluding_.begin(), occluding_.begin() + static_cast<std::ptrdiff_t>(count), occluding_.end(),
+                    [](const OccludingFace& a, const OccludingFace& b) {
                       return a.covered_px2 != b.covered_px2 ? a.covered_px2 > b.covered_px2 : a.entry < b.entry;
                     });
   for (std::size_t i = 0; i < count; ++i) {
-    setting_.occluders.occluder[i] =
-        make_occluder(setting_.camera, setting_.frustum, solids_[i].plane, solids_[i].quad, solids_[i].turns_right);
+    setting_.occluders.occluder[i] = make_occluder(setting_.camera, setting_.frustum, occluding_[i].plane,
+                                                   occluding_[i].quad, occluding_[i].turns_right);
   }
   setting_.occluders.count = static_cast<int32_t>(count);
 }

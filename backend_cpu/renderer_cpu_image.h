@@ -77,8 +77,16 @@ class ImageDrawer {
     int32_t face = -1;
   };
 
-  // A solid's face on screen, which may hide others.
+  // A face of an agent's box, or a wall.
   struct Solid {
+    FaceOwner owner;
+    uint32_t entry = 0;
+    bool may_occlude = false;
+    CameraQuad seen;
+  };
+
+  // A solid's face on screen, which may hide others.
+  struct OccludingFace {
     uint32_t entry = 0;
     float covered_px2 = 0;
     ScreenQuad quad;
@@ -94,6 +102,7 @@ class ImageDrawer {
     int y_begin, y_end;
   };
 
+  void find_solids();
   void find_occluders();
   // Takes the faces that a thing emits.
   auto face_maker(FaceOwner owner);
@@ -115,6 +124,7 @@ class ImageDrawer {
   ImageRequest request_;
   ImageSetting setting_;
   std::vector<Solid> solids_;
+  std::vector<OccludingFace> occluding_;
   EdgePool edges_;
   std::vector<ScreenFace> faces_;
   std::vector<FullFace> full_;           // [pixels of some rows]

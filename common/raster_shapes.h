@@ -130,11 +130,16 @@ PICTURA_HD inline bool see_quad(const WorldQuad& quad, const PinholeCamera& came
   return brightness > 0.0f;
 }
 
-/// Calls emit(face) for a quad, unless it has faded to black; floor_px is that of strips, 0 of others.
+/// All of a quad, to be clipped and widened; floor_px is that of strips, 0 of others. It points into the quad.
+PICTURA_HD inline CameraFace whole_quad(const CameraQuad& quad, float floor_px) {
+  return {quad.corner, 4, quad.plane, quad.color, floor_px};
+}
+
+/// Calls emit(face) for a quad, unless it has faded to black; floor_px as of whole_quad.
 template <typename Emit>
 PICTURA_HD inline void emit_quad(const WorldQuad& quad, const PinholeCamera& camera, float floor_px, Emit&& emit) {
   CameraQuad seen;
-  if (see_quad(quad, camera, &seen)) emit(CameraFace{seen.corner, 4, seen.plane, seen.color, floor_px});
+  if (see_quad(quad, camera, &seen)) emit(whole_quad(seen, floor_px));
 }
 
 /// Calls visit(face) for each face of a box that is turned to the camera.
