@@ -1,8 +1,12 @@
-# Run at every build: writes OUTPUT with the commit of the sources, and touches it only when the commit changes.
-execute_process(COMMAND git -C ${SOURCE} describe --always --dirty --abbrev=12
-  OUTPUT_VARIABLE commit ERROR_QUIET OUTPUT_STRIP_TRAILING_WHITESPACE RESULT_VARIABLE failed)
-if(NOT failed EQUAL 0)
-  set(commit unknown)
+# Run at every build: writes OUTPUT with the commit of the sources (COMMIT, or what git says where that is empty), and
+# touches it only when the commit changes.
+set(commit "${COMMIT}")
+if(commit STREQUAL "")
+  execute_process(COMMAND git -C ${SOURCE} describe --always --dirty --abbrev=12
+    OUTPUT_VARIABLE commit ERROR_QUIET OUTPUT_STRIP_TRAILING_WHITESPACE RESULT_VARIABLE failed)
+  if(NOT failed EQUAL 0)
+    set(commit unknown)
+  endif()
 endif()
 set(text "// The commit that this build was made from.\n#pragma once\n\n#define PICTURA_COMMIT \"${commit}\"\n")
 if(EXISTS ${OUTPUT})

@@ -20,7 +20,8 @@ import subprocess
 import sys
 import time
 
-SOURCES = "common map simulator backend_cpu backend_cuda backend_gl training apps tests cmake".split()
+SOURCES = "common map simulator backend_cpu backend_cuda backend_gl training apps bench tests cmake".split()
+RESULTS = pathlib.Path("bench/results")
 LAST_LINES = 40
 # "  7/353 Test  #12: Suite.Name/4-byte object <00> ....***Failed    0.01 sec"
 TEST = re.compile(r"\s*(\d+)/(\d+) Test\s+#\d+: (.+?) \.*\s*(Passed|\*\*\*.*?)\s+(\d+\.\d+) sec")
@@ -32,7 +33,8 @@ SUMMARY = re.compile(r"\[  PASSED  \]|=========.* SUMMARY: ")
 def source_hash():
     digest = hashlib.sha256(pathlib.Path("CMakeLists.txt").read_bytes())
     for path in sorted(path for folder in SOURCES for path in pathlib.Path(folder).rglob("*") if path.is_file()):
-        digest.update(path.read_bytes())
+        if RESULTS not in path.parents:
+            digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
 
