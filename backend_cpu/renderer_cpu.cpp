@@ -19,14 +19,9 @@ namespace {
 class CpuRenderer final : public Renderer {
  public:
   explicit CpuRenderer(const RendererConfig& config)
-      : config_(config),
+      : config_(check_config("cpu", config)),
         cameras_(pinhole_cameras(config.rig)),
-        drawers_(static_cast<std::size_t>(resolve_num_threads(config.num_threads))) {
-    validate(config_.rig);
-    PICTURA_CHECK(config_.line_floor_px >= 0 && config_.line_floor_px <= kGuardBand_px,
-                  "renderer cpu: expected a line floor of 0 to {} pixels, got {}", kGuardBand_px,
-                  config_.line_floor_px);
-  }
+        drawers_(static_cast<std::size_t>(resolve_num_threads(config.num_threads))) {}
   std::string_view name() const override { return "cpu"; }
   MemorySpace space() const override { return MemorySpace::host; }
   const RendererConfig& config() const override { return config_; }
@@ -56,21 +51,18 @@ class CpuRenderer final : public Renderer {
                   Span<float> visibility_out, Stream) override {
     check_scene(name(), scene, geometries_);
     check_views(name(), scene, views);
-    check_queries(name(), scene, views.size(), queries, visibility_out.size());
+    check_queries(name(), scene, views, queries, visibility_out.size());
     parallel_for(num_threads(), static_cast<int64_t>(queries.size()), [&](int64_t i) {
       const VisibilityQuery& query = queries[static_cast<std::size_t>(i)];
       ImageDrawer& drawer = drawers_[static_cast<std::size_t>(omp_get_thread_num())];
-      double seen = 0, alone = 0;
+      SeenWeight seen;
       for (std::size_t camera = 0; camera < cameras_.size(); ++camera) {
         ImageRequest asked = request(scene, views[static_cast<std::size_t>(query.view)], camera);
         asked.leaves_out_hidden = false;  // what is hidden counts where the agent is alone
         drawer.prepare(asked);
-        const ImageDrawer::Coverage coverage = drawer.coverage_of(query.agent);
-        seen += coverage.seen;
-        alone += coverage.alone;
+        drawer.weigh_agent(query.agent, &seen);
       }
-      visibility_out[static_cast<std::size_t>(i)] =
-          alone > 0 ? static_cast<float>(std::min(1.0, seen / alone)) : std::numeric_limits<float>::quiet_NaN();
+      visibility_out[static_cast<std::size_t>(i)] = seen.share();
     });
   }
 

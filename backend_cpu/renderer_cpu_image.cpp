@@ -288,7 +288,7 @@ void ImageDrawer::draw_planes(const ImageTarget& target) const {
   }
 }
 
-ImageDrawer::Coverage ImageDrawer::coverage_of(int32_t agent) {
+void ImageDrawer::weigh_agent(int32_t agent, SeenWeight* sum_inout) {
   const uint32_t number = thing_number(kAgentKind, agent - world_begin());
   auto is_wanted = [number](const ScreenFace& face) { return face.number == number; };
   const auto begin = std::find_if(faces_.begin(), faces_.end(), is_wanted);
@@ -300,24 +300,22 @@ ImageDrawer::Coverage ImageDrawer::coverage_of(int32_t agent) {
     y_end = max_of(y_end, face->box.y_end);
   }
   const int band_rows = max_of(1, kBandPixels / setting_.camera.width_px);
-  Coverage sum;
   for (; y_begin < y_end; y_begin += band_rows) {
     const RowRange rows{y_begin, min_of(y_end, y_begin + band_rows)};
     auto weigh = [&](FaceRange faces) {
-      double weight = 0;
+      int64_t weight = 0;
       make_fragments(faces, rows);
       weigh_rows(
           rows,
           [&](int, const Fragment& fragment, float weighs) {
-            if (fragment.face >= wanted.begin && fragment.face < wanted.end) weight += static_cast<double>(weighs);
+            if (fragment.face >= wanted.begin && fragment.face < wanted.end) weight += SeenWeight::units_of(weighs);
           },
           [](int, Rgb) {});
       return weight;
     };
-    sum.seen += weigh({0, static_cast<int32_t>(faces_.size())});
-    sum.alone += weigh(wanted);
+    sum_inout->among_all += weigh({0, static_cast<int32_t>(faces_.size())});
+    sum_inout->alone += weigh(wanted);
   }
-  return sum;
 }
 
 }  // namespace pictura

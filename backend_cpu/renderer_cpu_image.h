@@ -40,12 +40,8 @@ class ImageDrawer {
   const Occluders& occluders() const { return setting_.occluders; }
   /// Draws what was prepared.
   void draw(const ImageTarget& target);
-  /// Sum over pixels of what an agent weighs in the prepared image and, in `alone`, of what it would weigh without all
-  /// others.
-  struct Coverage {
-    double seen = 0, alone = 0;
-  };
-  Coverage coverage_of(int32_t agent);
+  /// Adds what an agent weighs in the prepared image, among all others and without them.
+  void weigh_agent(int32_t agent, SeenWeight* sum_inout);
   /// Calls visit(y * width + x, coverage, colour) for what each face covers of each pixel of the prepared image, front
   /// to back: for measuring other ways to composite.
   void visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
+
 namespace pictura::cuda {
 
 SortedPieces::SortedPieces(const std::vector<Strip>& strips) {
@@ -37,7 +39,6 @@ DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeC
   task.views = views.data();
   task.num_views = static_cast<int32_t>(views.size());
   task.num_cameras = static_cast<int32_t>(cameras.size());
-  task.max_world_agents = kMaxWorldAgents;
   task.line_floor_px = config.line_floor_px;
   task.debug_palette = config.debug_palette;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -51,11 +52,29 @@ DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeC
   return task;
 }
 
+std::string message_of(const Fault& fault) {
+  auto what = [&]() -> std::string {
+    switch (fault.kind) {
+      case FaultKind::bad_world: return "no such world";
+      case FaultKind::bad_geometry: return "its world has no such geometry";
+      case FaultKind::bad_pose: return "expected a finite pose and hidden agents within the list";
+      case FaultKind::too_few_lights: return "its world has fewer light states than its map signals";
+      case FaultKind::too_many_agents: return fmt::format("its world has more than {} agents", kMaxBoxesPerWorld);
+      case FaultKind::bad_query: return "no such view, or no such agent in its world";
+      case FaultKind::no_room: return "shows more than a world can hold";
+      case FaultKind::none: break;
+    }
+    return "";
+  };
+  const bool is_query = fault.kind == FaultKind::bad_query;
+  return fmt::format("{} {}: {}", is_query ? "visibility query" : "view", fault.index, what());
+}
+
 Scratch large_sizes(int pieces, int heads, std::size_t agents) {
   // Agents turn up to three faces to a camera, everything else one; faces of four corners have at most nine edges when
   // clipped.
   Scratch sizes;
-  sizes.max_faces = std::max(1, pieces + 3 * static_cast<int>(std::min<std::size_t>(agents, kMaxWorldAgents)));
+  sizes.max_faces = std::max(1, pieces + 3 * static_cast<int>(std::min<std::size_t>(agents, kMaxBoxesPerWorld)));
   sizes.max_edges = (4 + 9) * sizes.max_faces + kMaxPolygonCorners * heads;
   return sizes;
 }

@@ -1,6 +1,7 @@
 // What the kernels are told, from what a renderer is asked for: what does not depend on where memory lies.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "pictura/backend_cuda/renderer_cuda_kernel.h"
@@ -8,8 +9,6 @@
 #include "pictura/common/renderer.h"
 
 namespace pictura::cuda {
-
-constexpr int kMaxWorldAgents = 4096;
 
 /// Pieces of one kind by the cell of their middle, in host memory.
 class SortedPieces {
@@ -34,5 +33,8 @@ DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeC
 /// Room, for a block of the last launch, for all that a world can hold of a map with so many pieces, heads among them,
 /// and so many agents.
 Scratch large_sizes(int pieces, int heads, std::size_t agents);
+
+/// What was wrong, for people. Of a fault that is one.
+std::string message_of(const Fault& fault);
 
 }  // namespace pictura::cuda

@@ -35,13 +35,13 @@ class HostRendererCuda final : public Renderer {
     const auto queue = static_cast<cudaStream_t>(stream.handle);
     renderer_->render(scene_.assign(scene, queue), views_.assign(views, queue), images_.like(images_out), stream);
     images_.copy_to_host(images_out, queue);
-    PICTURA_CUDA(cudaStreamSynchronize(queue));
+    renderer_->check();
   }
 
   void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
                   Span<float> visibility_out, Stream stream) override {
     check_input(scene, views);
-    check_queries(name(), scene, views.size(), queries, visibility_out.size());
+    check_queries(name(), scene, views, queries, visibility_out.size());
     const auto queue = static_cast<cudaStream_t>(stream.handle);
     const Span<float> result = visibility_.resize(queries.size());
     renderer_->visibility(scene_.assign(scene, queue), views_.assign(views, queue), queries_.assign(queries, queue),
@@ -50,7 +50,7 @@ class HostRendererCuda final : public Renderer {
       PICTURA_CUDA(cudaMemcpyAsync(visibility_out.data(), result.data(), result.size() * sizeof(float),
                                    cudaMemcpyDeviceToHost, queue));
     }
-    PICTURA_CUDA(cudaStreamSynchronize(queue));
+    renderer_->check();
   }
 
  private:

@@ -39,20 +39,16 @@ KernelLibrary::KernelLibrary(const Rig& rig) {
     return;
   }
   const KernelCode code = build_kernels(renderer_program(), target_of(rig));
-  PICTURA_CUDA(cudaLibraryLoadData(&library_, code.bytes.data(), nullptr, nullptr, 0, nullptr, nullptr, 0));
-  auto kernel = [&](const char* name) {
+  cudaLibrary_t library = nullptr;
+  PICTURA_CUDA(cudaLibraryLoadData(&library, code.bytes.data(), nullptr, nullptr, 0, nullptr, nullptr, 0));
+  library_.reset(library);
+  for (std::size_t i = 0; i < kKernelNames.size(); ++i) {
     cudaKernel_t handle = nullptr;
-    PICTURA_CUDA(cudaLibraryGetKernel(&handle, library_, name));
-    return reinterpret_cast<const void*>(handle);
-  };
-  kernels_ = {kernel(kCullName),          kernel(kGatherName),       kernel(kClipName),      kernel(kDrawName),
-              kernel(kDrawPostponedName), kernel(kDrawOverflowName), kernel(kVisibilityName)};
+    PICTURA_CUDA(cudaLibraryGetKernel(&handle, library, kKernelNames[i]));
+    kernels_.handle[i] = reinterpret_cast<const void*>(handle);
+  }
   PICTURA_CUDA(prepare_kernels(&kernels_));
   origin_ = fmt::format("kernels {} for {} and this rig", code.cached ? "built earlier" : "built", code.architecture);
-}
-
-KernelLibrary::~KernelLibrary() {
-  if (library_) cudaLibraryUnload(library_);
 }
 
 }  // namespace pictura::cuda

@@ -1,7 +1,9 @@
 // The renderer's kernels on a device: those built for its rig by NVRTC, or those built ahead of time.
 #pragma once
 
+#include <memory>
 #include <string>
+#include <type_traits>
 
 #include "pictura/backend_cuda/renderer_cuda_launch.h"
 #include "pictura/common/camera.h"
@@ -14,16 +16,16 @@ class KernelLibrary {
   /// Builds the kernels for the current device and the rig; where NVRTC is missing, takes those of this program. Throws
   /// Error where those do not run on the device.
   explicit KernelLibrary(const Rig& rig);
-  ~KernelLibrary();
-  KernelLibrary(const KernelLibrary&) = delete;
-  KernelLibrary& operator=(const KernelLibrary&) = delete;
 
   const KernelSet& kernels() const { return kernels_; }
   /// Where they come from, for people.
   const std::string& origin() const { return origin_; }
 
  private:
-  cudaLibrary_t library_ = nullptr;
+  struct Unload {
+    void operator()(cudaLibrary_t library) const { cudaLibraryUnload(library); }
+  };
+  std::unique_ptr<std::remove_pointer_t<cudaLibrary_t>, Unload> library_;
   KernelSet kernels_;
   std::string origin_;
 };

@@ -2,6 +2,8 @@
 // tree. cmake/EmbedSources.cmake writes their definitions.
 #pragma once
 
+#include <array>
+
 #include "pictura/common/span.h"
 
 namespace pictura::cuda {
@@ -18,5 +20,11 @@ struct KernelProgram {
 
 /// The renderer's kernels.
 KernelProgram renderer_program();
+
+/// The kernels, in the order in which they are launched.
+enum Kernel { kCull, kGather, kClip, kDraw, kDrawPostponed, kDrawOverflow, kVisibility, kNumKernels };
+constexpr std::array<const char*, kNumKernels> kKernelNames{
+    "pictura_cull",           "pictura_gather",        "pictura_clip",      "pictura_draw",
+    "pictura_draw_postponed", "pictura_draw_overflow", "pictura_visibility"};
 
 }  // namespace pictura::cuda

@@ -31,11 +31,12 @@ struct Part {
   }
 };
 
-/// How a tile is drawn for whose fragments there is no room at once: in strips from top to bottom, and those in parts.
+/// How a tile is drawn for whose fragments there is no room at once: in upright bands from left to right, and those in
+/// parts from top to bottom.
 struct PartPlan {
-  int strip_begin, strip_px;  // the strip, and how wide it is
-  int wide_px, rows;          // at most, of a part
-  Part part;                  // the next one
+  int band_begin, band_px;  // the band, and how wide it is
+  int wide_px, rows;        // at most, of a part
+  Part part;                // the next one
 };
 
 /// Room for what a WarpQueue holds.
@@ -86,11 +87,9 @@ __device__ inline int next_of(int32_t* counter) {
   return __shfl_sync(kAllLanes, next, 0);
 }
 
-__device__ inline bool is_finite(float value) { return fabsf(value) <= 3.4e38f; }
-
 // The first fault stands until the host has thrown it.
-__device__ inline void note_fault(const DrawTask& task, int32_t view, FaultKind kind) {
-  if (atomicCAS(&task.fault->view, -1, view) == -1) task.fault->kind = kind;
+__device__ inline void note_fault(const DrawTask& task, int32_t index, FaultKind kind) {
+  atomicCAS(task.fault, kNoFault, word_of({kind, index}));
 }
 
 // Sets what a view shows; false, with a fault noted, where it names something that does not exist.
@@ -101,22 +100,22 @@ __device__ inline bool set_view(ViewState* state, const DrawTask& task, int32_t 
   };
   state->view = task.views[view_index];
   const View& view = state->view;
-  if (view.world < 0 || static_cast<size_t>(view.world) + 1 >= task.scene.world_begin.size()) return fault(kBadWorld);
-  const GeometryHandle handle = task.scene.geometry[static_cast<size_t>(view.world)];
-  if (handle < 0 || handle >= task.num_geometries) return fault(kBadGeometry);
-  const float direction = view.cos_heading * view.cos_heading + view.sin_heading * view.sin_heading;
-  if (!is_finite(view.origin_m.x) || !is_finite(view.origin_m.y) || !is_finite(view.origin_m.z) ||
-      !(fabsf(direction - 1.0f) < 1e-2f) || !(view.body_length_m >= 0.0f) || view.hidden_begin < 0 ||
-      static_cast<size_t>(max_of(view.hidden_end, 0)) > task.scene.hidden_agents.size()) {
-    return fault(kBadPose);
+  if (view.world < 0 || static_cast<size_t>(view.world) + 1 >= task.scene.world_begin.size()) {
+    return fault(FaultKind::bad_world);
   }
+  const GeometryHandle handle = task.scene.geometry[static_cast<size_t>(view.world)];
+  if (handle < 0 || handle >= task.num_geometries) return fault(FaultKind::bad_geometry);
+  if (!has_finite_pose(view) || !hides_within(view, task.scene.hidden_agents.size())) return fault(FaultKind::bad_pose);
   const size_t world = static_cast<size_t>(view.world);
   state->geometry = task.geometries + handle;
   state->world_begin = task.scene.world_begin[world];
   state->world_end = task.scene.world_begin[world + 1];
   state->light_begin = task.scene.light_begin[world];
   state->light_end = task.scene.light_begin[world + 1];
-  if (state->world_end - state->world_begin > task.max_world_agents) return fault(kTooManyAgents);
+  if (state->world_end - state->world_begin > kMaxBoxesPerWorld) return fault(FaultKind::too_many_agents);
+  if (!has_enough_lights(state->light_end - state->light_begin, state->geometry->pieces.num_signals)) {
+    return fault(FaultKind::too_few_lights);
+  }
   return true;
 }
 
@@ -219,12 +218,12 @@ class WarpQueue {
   int count_ = 0;
 };
 
-// Sum over the threads, in their order, by way of an array of as many. All threads of the block.
-__device__ inline double block_sum(double* of_thread, double value) {
+// Sum over the threads by way of an array of as many. All threads of the block.
+__device__ inline int64_t block_sum(int64_t* of_thread, int64_t value) {
   sync_block();
   of_thread[threadIdx.x] = value;
   sync_block();
-  double sum = 0;
+  int64_t sum = 0;
   PICTURA_KEEP_LOOP
   for (int i = 0; i < num_threads(); ++i) sum += of_thread[i];
   return sum;

@@ -8,9 +8,6 @@
 
 namespace pictura::cuda {
 
-/// Count of faces of an image that is not gathered; faces that are added meanwhile leave it negative.
-constexpr int32_t kNotGathered = -(1 << 30);
-
 /// What a lane is to load or store, by words of 16 bytes. One more keeps rows apart: lanes that write a word of their
 /// own meet in no bank, those that read rows together in no more than two.
 template <typename Value, int kValues = 1>

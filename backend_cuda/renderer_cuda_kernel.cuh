@@ -110,7 +110,7 @@ struct NoImage {
 // Writes the optional planes of a part: the front surface at each pixel's centre, of the faces that have its row. All
 // threads of the block.
 template <typename Memory>
-__device__ __noinline__ void draw_planes(const CameraSlot& slot, int32_t view, int num_faces, Part part) {
+__device__ __noinline__ void draw_planes(CameraSlot slot, int32_t view, int num_faces, Part part) {
   using Word = typename Memory::Word;
   const Memory memory = Memory::current();
   sync_block();
@@ -183,10 +183,6 @@ __device__ inline int32_t camera_of(const DrawTask& task, int32_t image) { retur
 
 // Leaves an image for which the pool has no room until it is free again.
 __device__ inline void postpone(const DrawTask& task, int32_t image) {
-  if (task.pool.max_faces < kMostEntries) {
-    leave_to_last(task, image);
-    return;
-  }
   task.postponed_images[atomicAdd(&task.counters->postponed, 1)] = image;
 }
 
@@ -463,7 +459,7 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
   for (int32_t i = static_cast<int32_t>(blockIdx.x); i < count; i += static_cast<int32_t>(gridDim.x)) {
     const int32_t image = task.overflow_images[i];
     const bool is_drawn = gather_and_draw<LargeDrawMemory>(task, image, place_of(state->scratch));
-    if (!is_drawn && threadIdx.x == 0) note_fault(task, view_of(task, image), kNoRoom);
+    if (!is_drawn && threadIdx.x == 0) note_fault(task, view_of(task, image), FaultKind::no_room);
   }
   sync_block();
   if (threadIdx.x == 0 && atomicAdd(&task.counters->ended, 1) + 1 == static_cast<int32_t>(gridDim.x)) {
@@ -475,11 +471,50 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
 struct WeighAgent {
   static constexpr bool kWanted = true;
   uint32_t number;
-  double* sum;
+  int64_t* sum;
   __device__ void operator()(const ScreenFace& face, float weight) const {
-    if (face.number == number) *sum += static_cast<double>(weight);
+    if (face.number == number) *sum += SeenWeight::units_of(weight);
   }
 };
+
+/// Rows of an image.
+struct RowRange {
+  int y_begin, y_end;
+};
+
+// The rows in which a thing of the gathered image may show. Every thread finds them by itself.
+__device__ inline RowRange rows_of(const BlockState& state, uint32_t number) {
+  RowRange rows{state.making.setting.camera.height_px, 0};
+  PICTURA_KEEP_LOOP
+  for (int i = 0; i < state.num_faces; ++i) {
+    const ScreenFace& face = state.faces[i];
+    if (face.number != number || face.box.y_begin >= face.box.y_end) continue;
+    rows.y_begin = min_of(rows.y_begin, int{face.box.y_begin});
+    rows.y_end = max_of(rows.y_end, int{face.box.y_end});
+  }
+  return rows;
+}
+
+// Adds what a thing of the gathered image weighs, among all others and then without them, to each thread's sum of its
+// own. False where there is no room for all of it. All threads of the block.
+__device__ inline bool weigh(BlockState* state, uint32_t number, SeenWeight* sum_inout) {
+  const RowRange rows = rows_of(*state, number);
+  const int num_faces = state->num_faces;
+  auto add_to = [&](int64_t* sum) {
+    return each_tile(LargeDrawMemory::current(), state->making.setting.camera.width_px, rows.y_begin, rows.y_end,
+                     [&](const LargeDrawMemory& memory, const Part& part) {
+                       return draw_faces(memory, num_faces, part, WeighAgent{number, sum}, NoImage{});
+                     });
+  };
+  if (!add_to(&sum_inout->among_all)) return false;
+  sync_block();
+  PICTURA_KEEP_LOOP
+  for (int i = static_cast<int>(threadIdx.x); i < num_faces; i += num_threads()) {
+    if (state->faces[i].number != number) state->faces[i].box = PixelBox{};
+  }
+  sync_block();
+  return add_to(&sum_inout->alone);
+}
 
 extern "C" __global__ void __launch_bounds__(kLargeThreads)
     pictura_visibility(const __grid_constant__ VisibilityTask task, const __grid_constant__ Scratch scratch) {
@@ -488,48 +523,32 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
   BlockState* state = block_state();
   PICTURA_KEEP_LOOP
   for (int32_t q = static_cast<int32_t>(blockIdx.x); q < task.num_queries; q += static_cast<int32_t>(gridDim.x)) {
-    const int32_t view = task.queries[2 * q], agent = task.queries[2 * q + 1];
-    double seen = 0, alone = 0;
-    const bool in_range = view >= 0 && view < task.draw.num_views && agent >= 0 &&
-                          agent < static_cast<int32_t>(task.draw.scene.agents.size());
-    if (!in_range && threadIdx.x == 0) note_fault(task.draw, q, kBadQuery);
+    const auto [view, agent] = task.queries[q];
+    auto fault = [&](int32_t index, FaultKind kind) {
+      if (threadIdx.x == 0) note_fault(task.draw, index, kind);
+    };
+    SeenWeight seen;
+    const bool is_view = view >= 0 && view < task.draw.num_views;
+    if (!is_view) fault(q, FaultKind::bad_query);
     PICTURA_KEEP_LOOP
-    for (int32_t camera = 0; in_range && camera < num_cameras(task.draw); ++camera) {
-      // What is hidden counts where the agent is alone.
-      if (!gather(task.draw, view, camera, place_of(state->scratch), false)) continue;
-      const uint32_t number = thing_number(kAgentKind, agent - state->view.world_begin);
-      const int num_faces = state->num_faces;
-      int y_begin = state->making.setting.camera.height_px, y_end = 0;
-      PICTURA_KEEP_LOOP
-      for (int i = 0; i < num_faces; ++i) {
-        const ScreenFace& face = state->faces[i];
-        if (face.number != number || face.box.y_begin >= face.box.y_end) continue;
-        y_begin = min_of(y_begin, int{face.box.y_begin});
-        y_end = max_of(y_end, int{face.box.y_end});
+    for (int32_t camera = 0; is_view && camera < num_cameras(task.draw); ++camera) {
+      // What is hidden counts where the agent is alone. What is wrong with the view, set_view notes.
+      if (!gather(task.draw, view, camera, place_of(state->scratch), false)) {
+        if (state->usable != 0) fault(view, FaultKind::no_room);
+        continue;
       }
-      auto weigh = [&](double* sum) {
-        each_tile(LargeDrawMemory::current(), state->making.setting.camera.width_px, y_begin, y_end,
-                  [&](const LargeDrawMemory& memory, const Part& part) {
-                    return draw_faces(memory, num_faces, part, WeighAgent{number, sum}, NoImage{});
-                  });
-      };
-      weigh(&seen);
-      // Once more, without all others.
-      sync_block();
-      PICTURA_KEEP_LOOP
-      for (int i = static_cast<int>(threadIdx.x); i < num_faces; i += num_threads()) {
-        if (state->faces[i].number != number) state->faces[i].box = PixelBox{};
+      if (agent < state->view.world_begin || agent >= state->view.world_end) {
+        fault(q, FaultKind::bad_query);
+        break;
       }
-      sync_block();
-      weigh(&alone);
+      if (!weigh(state, thing_number(kAgentKind, agent - state->view.world_begin), &seen)) {
+        fault(view, FaultKind::no_room);
+      }
     }
     // Nothing is drawn any more where drawing keeps its pixels.
-    auto* of_thread = reinterpret_cast<double*>(state->scratch.bytes);
-    const double all_seen = block_sum(of_thread, seen), all_alone = block_sum(of_thread, alone);
-    if (threadIdx.x == 0) {
-      const double share = all_seen / all_alone;  // not a number where the agent is in no frame
-      task.visibility[q] = all_alone > 0 ? static_cast<float>(share < 1 ? share : 1.0) : __uint_as_float(0x7FC00000u);
-    }
+    auto* of_thread = reinterpret_cast<int64_t*>(state->scratch.bytes);
+    const SeenWeight all{block_sum(of_thread, seen.among_all), block_sum(of_thread, seen.alone)};
+    if (threadIdx.x == 0) task.visibility[q] = all.share();
     sync_block();
   }
 }

@@ -8,8 +8,6 @@
 
 namespace pictura::cuda {
 
-constexpr int kMaxCameras = 64;
-
 /// Images are drawn in the order of how many faces they list, in classes of so many, the most crowded first: blocks
 /// that come late to their last tile have a light one.
 constexpr int kCrowds = 16, kCrowdFaces = 64;
@@ -61,19 +59,40 @@ struct DeviceGeometry {
   PieceGrid strips, walls;
 };
 
-/// What was wrong with a view: written by the kernels, thrown by the next call.
-struct Fault {
-  int32_t view = -1;  // -1: none
-  int32_t kind = 0;
+/// What was wrong with a view or a query: written by the kernels, thrown by the next call. One word, so that the host
+/// reads all of it or nothing.
+enum class FaultKind : uint32_t {
+  none,
+  bad_world,
+  bad_geometry,
+  bad_pose,
+  too_few_lights,
+  too_many_agents,
+  bad_query,
+  no_room
 };
-enum FaultKind : int32_t { kBadWorld = 1, kBadGeometry, kBadPose, kTooManyAgents, kBadQuery, kNoRoom };
+struct Fault {
+  FaultKind kind = FaultKind::none;
+  int32_t index = 0;  // of the view or the query
+};
+using FaultWord = unsigned long long;
+constexpr FaultWord kNoFault = 0;
+PICTURA_HD constexpr FaultWord word_of(Fault fault) {
+  return FaultWord{static_cast<uint32_t>(fault.kind)} << 32 | static_cast<uint32_t>(fault.index);
+}
+PICTURA_HD constexpr Fault fault_of(FaultWord word) {
+  return {static_cast<FaultKind>(word >> 32), static_cast<int32_t>(static_cast<uint32_t>(word))};
+}
+
+/// Count of faces of an image that is not gathered; faces that are added meanwhile leave it negative.
+constexpr int32_t kNotGathered = -(1 << 30);
 
 /// What an image shows: its faces in a pool, and what tells which of them is in front. Copied whole, so it has no gaps.
 struct GatheredImage {
   const DeviceGeometry* geometry = nullptr;
   const AgentBox* agents = nullptr;  // the first of its world
   Vec3 eye_m;
-  int32_t face_begin = 0, face_count = 0;  // -1: not gathered
+  int32_t face_begin = 0, face_count = 0;  // ... or kNotGathered
   int32_t is_left_to_last = 0;             // 1: to the last launch, when it was found too crowded
 };
 static_assert(sizeof(GatheredImage) == 2 * sizeof(void*) + 6 * sizeof(int32_t));
@@ -140,9 +159,9 @@ struct FacePool {
   int32_t max_faces = 0, max_edges = 0;  // of edges, four for each face, the rest for those that are clipped
 };
 
-/// Of at most so many blocks, those that find room in a pool to gather an image each: one tries where there is none.
+/// Of at most so many blocks, those that find room in a pool to gather an image each. A pool has room for one.
 PICTURA_HD inline int gathering_blocks(const FacePool& pool, int most) {
-  return clamp(pool.max_faces / kMostEntries, 1, most);
+  return min_of(pool.max_faces / kMostEntries, most);
 }
 
 /// Memory of the blocks of the last launch, and how much each of them has.
@@ -172,12 +191,11 @@ struct DrawTask {
   int32_t tile_width_px = kTileWidth_px, most_tiles = 0;  // at most, of a tile; of an image
   const DeviceGeometry* geometries = nullptr;
   int32_t num_geometries = 0;
-  int32_t max_world_agents = 0;
   float line_floor_px = 0;
   bool debug_palette = false;
   PixelFormat format = PixelFormat::u8;
   bool wants_planes = false;
-  Fault* fault = nullptr;
+  FaultWord* fault = nullptr;
   FacePool pool;
   DrawCounters* counters = nullptr;
   int32_t* postponed_images = nullptr;  // [images]
@@ -205,7 +223,7 @@ PICTURA_HD inline void choose_tiles(DrawTask* task, int blocks) {
 
 struct VisibilityTask {
   DrawTask draw;
-  const int32_t* queries = nullptr;  // [2 * num_queries] view, agent
+  const VisibilityQuery* queries = nullptr;
   int32_t num_queries = 0;
   float* visibility = nullptr;
 };

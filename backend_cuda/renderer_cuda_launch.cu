@@ -42,20 +42,20 @@ cudaError_t allow_shared(const void* kernel, std::size_t bytes) {
 }  // namespace
 
 KernelSet ahead_of_time_kernels() {
-  return {reinterpret_cast<const void*>(pictura_cull),           reinterpret_cast<const void*>(pictura_gather),
-          reinterpret_cast<const void*>(pictura_clip),           reinterpret_cast<const void*>(pictura_draw),
-          reinterpret_cast<const void*>(pictura_draw_postponed), reinterpret_cast<const void*>(pictura_draw_overflow),
-          reinterpret_cast<const void*>(pictura_visibility)};
+  return {{reinterpret_cast<const void*>(pictura_cull), reinterpret_cast<const void*>(pictura_gather),
+           reinterpret_cast<const void*>(pictura_clip), reinterpret_cast<const void*>(pictura_draw),
+           reinterpret_cast<const void*>(pictura_draw_postponed), reinterpret_cast<const void*>(pictura_draw_overflow),
+           reinterpret_cast<const void*>(pictura_visibility)}};
 }
 
 cudaError_t prepare_kernels(KernelSet* kernels) {
   cudaFuncAttributes attributes{};
-  const cudaError_t status = cudaFuncGetAttributes(&attributes, kernels->draw);
+  const cudaError_t status = cudaFuncGetAttributes(&attributes, kernels->handle[kDraw]);
   if (status != cudaSuccess) return status;
   // From there on kernels wait for the launch before theirs, see wait_for_earlier_launch.
   kernels->may_begin_early = attributes.ptxVersion >= 90;
-  const cudaError_t allowed = allow_shared(kernels->draw, draw_bytes());
-  return allowed != cudaSuccess ? allowed : allow_shared(kernels->draw_postponed, postponed_bytes());
+  const cudaError_t allowed = allow_shared(kernels->handle[kDraw], draw_bytes());
+  return allowed != cudaSuccess ? allowed : allow_shared(kernels->handle[kDrawPostponed], postponed_bytes());
 }
 
 std::size_t large_block_bytes(const Scratch& large) { return large_bytes(large); }
@@ -66,24 +66,24 @@ cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& 
   const int images = task.num_views * task.num_cameras, draw_blocks = kDrawBlocksPerProcessor * processors;
   choose_tiles(&task, draw_blocks);
   const int postponed_blocks = gathering_blocks(task.pool, min_of(images, kPostponedBlocksPerProcessor * processors));
-  const std::pair<const void*, LaunchShape> launches[] = {
-      {kernels.cull, {min_of(images, kCullBlocksPerProcessor * processors), kGatherThreads, cull_bytes()}},
-      {kernels.gather, {kMakingBlocksPerProcessor * processors, kGatherThreads, sizeof(MakingState)}},
-      {kernels.clip, {kClipBlocksPerProcessor * processors, kGatherThreads, gather_bytes(kGatherThreads)}},
-      {kernels.draw, {min_of(images * task.most_tiles, draw_blocks), kDrawThreads, draw_bytes()}},
-      {kernels.draw_postponed, {postponed_blocks, kDrawThreads, postponed_bytes()}}};
+  const std::pair<Kernel, LaunchShape> launches[] = {
+      {kCull, {min_of(images, kCullBlocksPerProcessor * processors), kGatherThreads, cull_bytes()}},
+      {kGather, {kMakingBlocksPerProcessor * processors, kGatherThreads, sizeof(MakingState)}},
+      {kClip, {kClipBlocksPerProcessor * processors, kGatherThreads, gather_bytes(kGatherThreads)}},
+      {kDraw, {min_of(images * task.most_tiles, draw_blocks), kDrawThreads, draw_bytes()}},
+      {kDrawPostponed, {postponed_blocks, kDrawThreads, postponed_bytes()}}};
   for (const auto& [kernel, shape] : launches) {
-    const cudaError_t status = launch(kernel, shape, place, task);
+    const cudaError_t status = launch(kernels.handle[kernel], shape, place, task);
     if (status != cudaSuccess) return status;
   }
-  return launch(kernels.draw_overflow, {min_of(images, large.blocks), kLargeThreads, gather_bytes(kLargeThreads)},
-                place, task, large);
+  return launch(kernels.handle[kDrawOverflow],
+                {min_of(images, large.blocks), kLargeThreads, gather_bytes(kLargeThreads)}, place, task, large);
 }
 
 cudaError_t launch_visibility(const KernelSet& kernels, const VisibilityTask& task, const Scratch& large,
                               cudaStream_t stream) {
   if (task.num_queries == 0) return cudaSuccess;
-  return launch(kernels.visibility,
+  return launch(kernels.handle[kVisibility],
                 {min_of(task.num_queries, large.blocks), kLargeThreads, gather_bytes(kLargeThreads)},
                 LaunchPlace{stream, kernels.may_begin_early}, task, large);
 }

@@ -2,32 +2,21 @@
 // launches are put on a stream and wait for nothing.
 #pragma once
 
+#include <array>
 #include <cstddef>
 
 #include <cuda_runtime_api.h>
 
+#include "pictura/backend_cuda/kernel_sources.h"
 #include "pictura/backend_cuda/renderer_cuda_kernel.h"
 
 namespace pictura::cuda {
 
 /// The kernels' handles: symbols of this program, or cudaKernel_t of code that was loaded.
 struct KernelSet {
-  const void* cull = nullptr;
-  const void* gather = nullptr;
-  const void* clip = nullptr;
-  const void* draw = nullptr;
-  const void* draw_postponed = nullptr;
-  const void* draw_overflow = nullptr;
-  const void* visibility = nullptr;
+  std::array<const void*, kNumKernels> handle{};
   bool may_begin_early = false;  // a launch of theirs, while the one before it ends
 };
-constexpr const char* kCullName = "pictura_cull";
-constexpr const char* kGatherName = "pictura_gather";
-constexpr const char* kClipName = "pictura_clip";
-constexpr const char* kDrawName = "pictura_draw";
-constexpr const char* kDrawPostponedName = "pictura_draw_postponed";
-constexpr const char* kDrawOverflowName = "pictura_draw_overflow";
-constexpr const char* kVisibilityName = "pictura_visibility";
 
 /// Those that were compiled with this program, for any rig.
 KernelSet ahead_of_time_kernels();

@@ -235,28 +235,28 @@ __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn
     if (columns == whole.num_columns() && rows == whole.num_rows()) plan = {whole.x_begin, columns, columns, rows};
     int x = part.x_begin, y = part.y_begin;
     if (is_drawn) {
-      // Along the rows, then down the strip, then to the next one.
-      const int strip_end = min_of(plan.strip_begin + plan.strip_px, whole.x_end);
+      // Along the rows, then down the band, then to the next one.
+      const int band_end = min_of(plan.band_begin + plan.band_px, whole.x_end);
       x = part.x_end;
-      if (x == strip_end) {
-        plan.wide_px = plan.strip_px;
+      if (x == band_end) {
+        plan.wide_px = plan.band_px;
         plan.rows = min_of(2 * plan.rows, whole.num_rows());
         y = part.y_end;
         if (y == whole.y_end) {
-          plan.strip_begin = strip_end;
+          plan.band_begin = band_end;
           plan.rows = whole.num_rows();
           y = whole.y_begin;
         }
-        x = plan.strip_begin;
+        x = plan.band_begin;
       }
     } else if (rows == whole.num_rows() && columns > kNarrowPart_px) {
-      plan.strip_px = plan.wide_px = (half_of(columns) + kWrittenAtOnce - 1) / kWrittenAtOnce * kWrittenAtOnce;
+      plan.band_px = plan.wide_px = (half_of(columns) + kWrittenAtOnce - 1) / kWrittenAtOnce * kWrittenAtOnce;
     } else if (rows > 1) {
       plan.rows = half_of(rows);
     } else {
       plan.wide_px = half_of(columns);
     }
-    plan.part = {x, min_of(x + plan.wide_px, min_of(plan.strip_begin + plan.strip_px, whole.x_end)), y,
+    plan.part = {x, min_of(x + plan.wide_px, min_of(plan.band_begin + plan.band_px, whole.x_end)), y,
                  min_of(y + plan.rows, whole.y_end)};
   }
   if (is_drawn) {

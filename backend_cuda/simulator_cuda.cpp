@@ -148,27 +148,27 @@ class SideStream {
     // Of a higher priority: what is put there is little, and everybody waits for its end.
     int lowest = 0, highest = 0;
     PICTURA_CUDA(cudaDeviceGetStreamPriorityRange(&lowest, &highest));
-    PICTURA_CUDA(cudaStreamCreateWithPriority(&streams_.side, cudaStreamNonBlocking, highest));
-    for (cudaEvent_t* event : {&streams_.forked, &streams_.joined}) {
-      PICTURA_CUDA(cudaEventCreateWithFlags(event, cudaEventDisableTiming));
+    cudaStream_t side = nullptr;
+    PICTURA_CUDA(cudaStreamCreateWithPriority(&side, cudaStreamNonBlocking, highest));
+    side_.reset(side);
+    for (Event* event : {&forked_, &joined_}) {
+      cudaEvent_t made = nullptr;
+      PICTURA_CUDA(cudaEventCreateWithFlags(&made, cudaEventDisableTiming));
+      event->reset(made);
     }
-  }
-  SideStream(const SideStream&) = delete;
-  SideStream& operator=(const SideStream&) = delete;
-  ~SideStream() {
-    for (cudaEvent_t event : {streams_.forked, streams_.joined}) {
-      if (event) cudaEventDestroy(event);
-    }
-    if (streams_.side) cudaStreamDestroy(streams_.side);
   }
   cuda::StepStreams beside(Stream stream) const {
-    cuda::StepStreams streams = streams_;
-    streams.main = static_cast<cudaStream_t>(stream.handle);
-    return streams;
+    return {static_cast<cudaStream_t>(stream.handle), side_.get(), forked_.get(), joined_.get()};
   }
 
  private:
-  cuda::StepStreams streams_;
+  struct Destroy {
+    void operator()(cudaStream_t stream) const { cudaStreamDestroy(stream); }
+    void operator()(cudaEvent_t event) const { cudaEventDestroy(event); }
+  };
+  using Event = std::unique_ptr<std::remove_pointer_t<cudaEvent_t>, Destroy>;
+  std::unique_ptr<std::remove_pointer_t<cudaStream_t>, Destroy> side_;
+  Event forked_, joined_;
 };
 
 class SimulatorCuda final : public Simulator {
@@ -204,12 +204,14 @@ class SimulatorCuda final : public Simulator {
   int num_slots() const override { return batch_->num_slots(); }
 
   void reset(Stream stream) override {
+    device_.check_current("simulator cuda");
     throw_refused();
     cuda::launch_reset(arrays(), side_.beside(stream));
     PICTURA_CUDA(cudaGetLastError());
   }
 
   StepResult step(Span<const int32_t> actions, Stream stream) override {
+    device_.check_current("simulator cuda");
     throw_refused();
     PICTURA_CHECK(actions.size() == static_cast<size_t>(num_slots()), "step: expected {} actions, got {}", num_slots(),
                   actions.size());
@@ -383,6 +385,7 @@ class SimulatorCuda final : public Simulator {
     return arrays;
   }
 
+  CurrentDevice device_;
   // Checks and describes; its state is the device's only once download() has copied it.
   std::unique_ptr<WorldBatch> batch_;
   std::vector<DeviceMap> maps_;

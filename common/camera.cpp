@@ -5,6 +5,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/file.h"
+#include "pictura/common/raster_camera.h"
 #include "pictura/common/toml_fields.h"
 
 namespace pictura {
@@ -12,7 +13,6 @@ namespace pictura {
 namespace {
 
 constexpr int kMaxSize_px = 8192;
-constexpr std::size_t kMaxCameras = 64;
 
 }  // namespace
 

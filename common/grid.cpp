@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-Grid::Grid(Span<const Aabb2> boxes, float cell_m) : cell_m_(cell_m) {
+Grid::Grid(Span<const Aabb2> boxes, float cell_m) : cell_m_(cell_m), num_boxes_(boxes.size()) {
   PICTURA_CHECK(cell_m > 0, "grid: expected a positive cell size, got {}", cell_m);
   Vec2 low{0, 0}, high{0, 0};
   for (std::size_t i = 0; i < boxes.size(); ++i) {

@@ -15,11 +15,14 @@ class Grid {
   /// would need more than 2^26 cells.
   Grid(Span<const Aabb2> boxes, float cell_m);
   GridView view() const { return {origin_m_, cell_m_, num_x_, num_y_, begin_, items_}; }
+  /// How many it was built from.
+  std::size_t num_boxes() const { return num_boxes_; }
 
  private:
   Vec2 origin_m_;
   float cell_m_ = 1;
   int num_x_ = 0, num_y_ = 0;
+  std::size_t num_boxes_ = 0;
   std::vector<int32_t> begin_;
   std::vector<int32_t> items_;
 };

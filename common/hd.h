@@ -84,6 +84,17 @@ PICTURA_HD inline float root_of(float x) {
 #endif
 }
 
+/// The number that a word is.
+PICTURA_HD inline float number_of_bits(uint32_t bits) {
+#if defined(__CUDA_ARCH__)
+  return __uint_as_float(bits);
+#else
+  float number;
+  __builtin_memcpy(&number, &bits, sizeof(number));
+  return number;
+#endif
+}
+
 /// Copies 8 bytes, aligned to as many, into a block's shared memory. A device goes on meanwhile: they are there once
 /// the same thread has waited for its copies.
 PICTURA_HD inline void copy_into_shared(void* to, const void* from) {

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "pictura/common/error.h"
+#include "pictura/common/raster_check.h"
 
 namespace pictura {
 
@@ -27,14 +28,14 @@ namespace {
 // Draws black, so that everything around a renderer can run without one.
 class NullRenderer final : public Renderer {
  public:
-  explicit NullRenderer(const RendererConfig& config) : config_(config) { validate(config_.rig); }
+  explicit NullRenderer(const RendererConfig& config) : config_(check_config("null", config)) {}
   std::string_view name() const override { return "null"; }
   MemorySpace space() const override { return MemorySpace::host; }
   const RendererConfig& config() const override { return config_; }
   GeometryHandle upload(const StaticGeometry&) override { return next_handle_++; }
 
   void render(const SceneBatch&, Span<const View> views, const ImageBatch& images_out, Stream) override {
-    PICTURA_CHECK(images_out.space == MemorySpace::host, "renderer null: expected images in host memory");
+    check_images(name(), config_.rig, space(), views.size(), images_out, /*draws_f16=*/true);
     const std::size_t value_bytes = bytes_per_value(images_out.format);
     for (const CameraImages& camera : images_out.cameras) {
       const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
@@ -53,6 +54,9 @@ class NullRenderer final : public Renderer {
 
   void visibility(const SceneBatch&, Span<const View>, Span<const VisibilityQuery> queries, Span<float> visibility_out,
                   Stream) override {
+    PICTURA_CHECK(visibility_out.size() == queries.size(),
+                  "renderer null: visibility: expected room for {} values, got {}", queries.size(),
+                  visibility_out.size());
     for (std::size_t i = 0; i < queries.size(); ++i) visibility_out[i] = std::numeric_limits<float>::quiet_NaN();
   }
 

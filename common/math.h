@@ -41,6 +41,11 @@ PICTURA_HD constexpr Vec3 cross(Vec3 a, Vec3 b) {
 }
 PICTURA_HD inline float length(Vec3 a) { return sqrtf(dot(a, a)); }
 
+/// Whether a number is neither infinite nor none.
+PICTURA_HD inline bool is_finite(float value) { return fabsf(value) <= 3.4e38f; }
+PICTURA_HD inline bool is_finite(Vec2 v) { return is_finite(v.x) && is_finite(v.y); }
+PICTURA_HD inline bool is_finite(Vec3 v) { return is_finite(v.xy()) && is_finite(v.z); }
+
 PICTURA_HD constexpr float min_of(float a, float b) { return b < a ? b : a; }
 PICTURA_HD constexpr float max_of(float a, float b) { return a < b ? b : a; }
 PICTURA_HD constexpr int min_of(int a, int b) { return b < a ? b : a; }

@@ -13,6 +13,9 @@ constexpr float kNear_m = 0.1f;
 /// coordinates keep their precision.
 constexpr float kGuardBand_px = 8.0f;
 
+/// Of a rig, at most.
+constexpr int kMaxCameras = 64;
+
 /// A camera of a rig (pose in the ego frame) or of a view (pose in the world).
 struct PinholeCamera {
   Vec3 position_m;

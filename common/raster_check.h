@@ -13,18 +13,24 @@ namespace pictura {
 void check_images(std::string_view renderer, const Rig& rig, MemorySpace space, std::size_t num_views,
                   const ImageBatch& images, bool draws_f16 = false);
 
-/// Throws Error unless all spans of a host scene fit together, handles are below num_geometries, lights suffice for the
-/// geometries' signals, and every agent's box is finite.
+/// Throws Error unless the rig is valid and the line floor within the guard band; returns the configuration.
+const RendererConfig& check_config(std::string_view renderer, const RendererConfig& config);
+
+/// Throws Error unless all spans of a host scene fit together, handles name geometries, lights suffice for their
+/// signals, worlds are not too large, hidden agents exist, and every agent's box is finite.
 void check_scene(std::string_view renderer, const SceneBatch& scene, Span<const StaticGeometryView> geometries);
 
-/// Throws Error unless each view's world, ego and hidden agents exist in the (host) scene and its pose is finite.
+/// Throws Error unless each view's world, ego and range of hidden agents exist in the (host) scene that check_scene
+/// passed, and its pose is finite.
 void check_views(std::string_view renderer, const SceneBatch& scene, Span<const View> views);
 
-/// Throws Error unless each query's view and agent exist and there is room for as many answers.
-void check_queries(std::string_view renderer, const SceneBatch& scene, std::size_t num_views,
+/// Throws Error unless each query's view, one of those that check_views passed, and its agent, of that view's world,
+/// exist, and there is room for as many answers.
+void check_queries(std::string_view renderer, const SceneBatch& scene, Span<const View> views,
                    Span<const VisibilityQuery> queries, std::size_t num_answers);
 
-/// Throws Error unless each piece is finite, has sizes of 0 or more, and names a signal that exists.
+/// Throws Error unless each piece is finite, has sizes of 0 or more, colours of 0 to 1, and names a signal that exists,
+/// and the grids hold all pieces.
 void check_geometry(std::string_view renderer, const StaticGeometry& geometry);
 
 /// The rig's cameras as the rasterizers use them, in the ego frame.

@@ -114,8 +114,10 @@ class FrontFace {
   }
   template <typename Stands>
   PICTURA_HD const ScreenFace* front(Vec2 at_px, Stands&& stands) const {
-    if (!solid_ || !painted_) return solid_ ? solid_ : painted_;
-    return is_in_front(*solid_, *painted_, at_px, stands) ? solid_ : painted_;
+    // A strip that is widened may show where its plane is behind the camera: no strip is of one level with it there.
+    const ScreenFace* const strip = painted_ ? painted_ : strip_;
+    if (!solid_ || !strip) return solid_ ? solid_ : strip;
+    return is_in_front(*solid_, *strip, at_px, stands) ? solid_ : strip;
   }
 
  private:

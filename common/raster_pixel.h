@@ -101,4 +101,21 @@ PICTURA_HD inline uint32_t to_bytes(Rgb color) {
   return uint32_t{to_byte(color.r)} | uint32_t{to_byte(color.g)} << 8 | uint32_t{to_byte(color.b)} << 16;
 }
 
+/// How much of an agent an image shows: what its fragments weigh, in whole units, so that sums do not depend on the
+/// order in which fragments are added.
+struct SeenWeight {
+  int64_t among_all = 0, alone = 0;
+
+  PICTURA_HD static int64_t units_of(float weight) {
+    constexpr float kUnits = 1099511627776.0f;  // 2^40
+    return static_cast<int64_t>(weight * kUnits);
+  }
+  /// Of all that is to be seen of it alone, what is seen among all others; not a number where that is nothing.
+  PICTURA_HD float share() const {
+    if (alone <= 0) return number_of_bits(0x7FC00000u);
+    const double share = static_cast<double>(among_all) / static_cast<double>(alone);
+    return static_cast<float>(share < 1.0 ? share : 1.0);
+  }
+};
+
 }  // namespace pictura

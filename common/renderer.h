@@ -28,13 +28,10 @@ struct RendererConfig {
   std::size_t max_scratch_bytes = std::size_t{512} << 20;
 };
 
-/// Asks how much of an agent a view sees.
-struct VisibilityQuery {
-  int32_t view = 0;
-  int32_t agent = 0;  // index into SceneBatch::agents
-};
-
-/// An object serves one thread at a time; distinct objects are independent.
+/// An object serves one thread at a time; distinct objects are independent. A renderer on a device works on the device
+/// that was current when it was made, and shares its memory among its calls: put them on one stream, or let each wait
+/// for the one before. A captured CUDA graph holds for as long as no call is for more than was seen before (views,
+/// agents, maps): then capture anew.
 class Renderer {
  public:
   virtual ~Renderer() = default;
@@ -51,9 +48,14 @@ class Renderer {
   virtual GeometryHandle upload(const StaticGeometry& geometry) = 0;
 
   /// Draws every camera of the rig for every view: each pixel of `images_out` is written. Throws Error when a span lies
-  /// in the wrong memory space, a handle or index is out of range, or the images do not fit the rig and views.
+  /// in the wrong memory space, a handle or index is out of range, or the images do not fit the rig and views. What
+  /// only a device can see is wrong with a scene there, the next call throws, or check(); such views are black.
   virtual void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out,
                       Stream stream = {}) = 0;
+
+  /// Waits until everything asked for is done; throws Error where a device found a fault since the last call that
+  /// threw.
+  virtual void check() {}
 
   /// For each query: coverage of the agent in the view's images over its coverage when drawn alone, summed over the
   /// cameras, in [0, 1]; NaN where it is in no camera's frame. `visibility_out` has the queries' length.

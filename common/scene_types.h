@@ -11,6 +11,7 @@ namespace pictura {
 
 /// What a strip on the road is; its class in the optional class plane is kClassOfStrip + kind.
 enum class StripKind : uint8_t { lane_mark, road_edge, crosswalk, stop_line };
+constexpr int kNumStripKinds = 4;
 
 /// One straight piece, at most kMaxPiece_m long, of a polyline painted on the road. Its corners are a -+ side_a * w/2
 /// and b -+ side_b * w/2: the sides are mitred, so that consecutive pieces share an edge and neither overlap nor gape.
@@ -74,6 +75,9 @@ struct AgentBox {
 /// Index of a StaticGeometry in the renderer that it was uploaded to.
 using GeometryHandle = int32_t;
 
+/// Agents of one world that a scene may hold: as many as a simulator steps, and as many parked cars.
+constexpr int kMaxBoxesPerWorld = 8192;
+
 /// Everything that moves, for all worlds, of one step. Spans lie in `space`.
 struct SceneBatch {
   MemorySpace space = MemorySpace::host;
@@ -85,6 +89,11 @@ struct SceneBatch {
   Span<const int32_t> hidden_agents;    // lists that views point into; usually empty
 };
 
+/// Whether as many of a world's lights have states as the map's signals want: all, or none, which leaves them out.
+PICTURA_HD constexpr bool has_enough_lights(int32_t lights, int32_t signals) {
+  return lights == 0 || lights >= signals;
+}
+
 /// Where a rig stands. The ego's own box is left out of its images.
 struct View {
   int32_t world = 0;
@@ -95,6 +104,26 @@ struct View {
   int32_t hidden_begin = 0, hidden_end = 0;  // further agents left out: a range of SceneBatch::hidden_agents
 
   static constexpr float kRigBodyLength_m = 4.5f;
+};
+
+/// A direction given by its cosine and sine; headings are computed in float, so a little drift is no fault.
+PICTURA_HD inline bool is_direction(float cosine, float sine) {
+  return fabsf(cosine * cosine + sine * sine - 1.0f) < 1e-2f;
+}
+/// Whether a view has a pose, and a range of a list of so many hidden agents.
+PICTURA_HD inline bool has_finite_pose(const View& view) {
+  return is_finite(view.origin_m) && is_direction(view.cos_heading, view.sin_heading) && view.body_length_m >= 0.0f &&
+         is_finite(view.body_length_m);
+}
+PICTURA_HD inline bool hides_within(const View& view, size_t hidden_agents) {
+  return view.hidden_begin >= 0 && view.hidden_begin <= view.hidden_end &&
+         static_cast<size_t>(view.hidden_end) <= hidden_agents;
+}
+
+/// Asks how much of an agent a view sees.
+struct VisibilityQuery {
+  int32_t view = 0;
+  int32_t agent = 0;  // index into SceneBatch::agents
 };
 
 }  // namespace pictura

@@ -20,7 +20,8 @@
 
 namespace pictura {
 
-constexpr int kMaxAgentsPerWorld = 4096;
+constexpr int kMaxAgentsPerWorld = 4096;  // controlled, and as many parked cars
+static_assert(2 * kMaxAgentsPerWorld <= kMaxBoxesPerWorld, "scenes hold whole worlds");
 constexpr int kMaxSlots = 1 << 22;  // controlled agents of one simulator
 constexpr int kMaxBoxes = 1 << 24;  // controlled agents and parked cars of one simulator; as many lights
 

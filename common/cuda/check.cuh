@@ -8,10 +8,31 @@
 namespace pictura {
 
 inline void check_cuda(cudaError_t status, const char* what) {
-  PICTURA_CHECK(status == cudaSuccess, "cuda: {}: {}", what, cudaGetErrorString(status));
+  if (status == cudaSuccess) return;
+  cudaGetLastError();  // the error is told here, and not again to whoever asks next
+  fail("cuda: {}: {}", what, cudaGetErrorString(status));
 }
 
 }  // namespace pictura
 
 /// Throws Error naming the call when it fails.
 #define PICTURA_CUDA(call) ::pictura::check_cuda((call), #call)
+
+namespace pictura {
+
+/// The device that was current when it was made: what works there works nowhere else.
+class CurrentDevice {
+ public:
+  CurrentDevice() { PICTURA_CUDA(cudaGetDevice(&number_)); }
+  int number() const { return number_; }
+  /// Throws Error where another device is current now.
+  void check_current(const char* who) const {
+    const int current = CurrentDevice().number_;
+    PICTURA_CHECK(current == number_, "{}: made for device {}, called with device {} current", who, number_, current);
+  }
+
+ private:
+  int number_ = 0;
+};
+
+}  // namespace pictura

@@ -1,6 +1,7 @@
 // An owner of device memory, and of host memory that the device can write.
 #pragma once
 
+#include <memory>
 #include <type_traits>
 #include <utility>
 
@@ -62,19 +63,21 @@ template <typename T>
 class MappedValue {
  public:
   MappedValue() {
-    PICTURA_CUDA(cudaHostAlloc(reinterpret_cast<void**>(&host_), sizeof(T), cudaHostAllocMapped));
-    *host_ = T{};
-    PICTURA_CUDA(cudaHostGetDevicePointer(reinterpret_cast<void**>(&device_), host_, 0));
+    T* host = nullptr;
+    PICTURA_CUDA(cudaHostAlloc(reinterpret_cast<void**>(&host), sizeof(T), cudaHostAllocMapped));
+    host_.reset(host);
+    *host = T{};
+    PICTURA_CUDA(cudaHostGetDevicePointer(reinterpret_cast<void**>(&device_), host, 0));
   }
-  MappedValue(const MappedValue&) = delete;
-  MappedValue& operator=(const MappedValue&) = delete;
-  ~MappedValue() { cudaFreeHost(host_); }
 
-  volatile T* host() { return host_; }
+  volatile T* host() { return host_.get(); }
   T* device() { return device_; }
 
  private:
-  T* host_ = nullptr;
+  struct Free {
+    void operator()(T* host) const { cudaFreeHost(host); }
+  };
+  std::unique_ptr<T, Free> host_;
   T* device_ = nullptr;
 };
 

@@ -11,6 +11,7 @@
 #include "pictura/common/make_renderer.h"
 #include "pictura/common/raster_pixel.h"
 #include "pictura/common/raster_shapes.h"
+#include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/image_drawing.h"
 #include "pictura/tests/support/tolerances.h"
 
@@ -392,6 +393,13 @@ TEST_F(CpuRendererErrors, HandlesAndIndicesOutOfRange) {
   scene_.geometry[0] = 0;
   scene_.world_begin = {0, 2};
   expect_error("world_begin");
+  scene_.world_begin = {0, 1};
+  scene_.hidden_agents = {0, 1};
+  expect_error("hidden agent 1: expected an index below 1, got 1");
+  scene_.hidden_agents.clear();
+  scene_.agents.resize(kMaxBoxesPerWorld + 1, scene_.agents[0]);
+  scene_.world_begin = {0, kMaxBoxesPerWorld + 1};
+  expect_error("world 0: expected at most 8192 agents, got 8193");
 }
 TEST_F(CpuRendererErrors, PosesThatAreNotNumbers) {
   views_[0].origin_m.y = std::numeric_limits<float>::quiet_NaN();
@@ -409,15 +417,70 @@ TEST_F(CpuRendererErrors, QueriesAndGeometryAndConfig) {
   const std::vector<VisibilityQuery> queries{{0, 7}};
   std::vector<float> visibility(1);
   EXPECT_THROW(renderer_->visibility(scene_.batch(), views_, queries, visibility), Error);
-  StaticGeometry geometry = no_geometry();
-  geometry.heads.push_back({});
-  EXPECT_THROW(renderer_->upload(geometry), Error);
-  geometry = no_geometry();
-  geometry.strips.push_back({});
-  geometry.strips[0].a_m.z = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_THROW(renderer_->upload(geometry), Error);
+  // An agent of another world.
+  scene_.agents.push_back(scene_.agents[0]);
+  scene_.end_world(0);
+  const std::vector<VisibilityQuery> of_another{{0, 1}};
+  EXPECT_THROW(renderer_->visibility(scene_.batch(), views_, of_another, visibility), Error);
   EXPECT_THROW(make_renderer("cpu", {.rig = paper_rig(8, 8), .line_floor_px = -1}), Error);
   EXPECT_THROW(make_renderer("cpu", {.rig = {}}), Error);
+}
+TEST_F(CpuRendererErrors, GeometryThatIsFaulty) {
+  StaticGeometry sound = no_geometry();
+  sound.strips.push_back({{0, 0, 0}, {1, 0, 0}, {0, 1}, {0, 1}, 0.2f, kWhiteMarkColor});
+  sound.walls.push_back({{0, 0, 0}, {1, 0, 0}, 2.0f});
+  sound.heads.push_back({{0, 0, 5}, {1, 0}});
+  sound.num_signals = 1;
+  sound.build_grids();
+  EXPECT_NO_THROW(renderer_->upload(sound));
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  struct Case {
+    const char* told;
+    void (*spoil)(StaticGeometry*);
+  };
+  const Case cases[] = {
+      {"strip 0: expected finite ends", [](StaticGeometry* g) { g->strips[0].a_m.z = kNone; }},
+      {"strip 0: expected a colour of 0 to 1", [](StaticGeometry* g) { g->strips[0].color.g = kNone; }},
+      {"strip 0: expected a colour of 0 to 1", [](StaticGeometry* g) { g->strips[0].color.r = 1.5f; }},
+      {"strip 0: expected a kind below 4", [](StaticGeometry* g) { g->strips[0].kind = static_cast<StripKind>(4); }},
+      {"wall 0: expected finite ends", [](StaticGeometry* g) { g->walls[0].height_m = -1; }},
+      {"wall 0: expected a colour of 0 to 1", [](StaticGeometry* g) { g->walls[0].color.b = -0.1f; }},
+      {"light head 0: expected a finite position", [](StaticGeometry* g) { g->heads[0].facing = {}; }},
+      {"light head 0: expected the cosine", [](StaticGeometry* g) { g->heads[0].cos_half_angle = kNone; }},
+      {"light head 0: expected a signal below 1, got 1", [](StaticGeometry* g) { g->heads[0].signal = 1; }},
+      {"built with all 2 strips, got one of 1", [](StaticGeometry* g) { g->strips.push_back(g->strips[0]); }},
+      {"built with all 0 walls, got one of 1", [](StaticGeometry* g) { g->walls.clear(); }},
+  };
+  for (const Case& each : cases) {
+    StaticGeometry geometry = sound;
+    each.spoil(&geometry);
+    EXPECT_THAT(test::message_of([&] { renderer_->upload(geometry); }), HasSubstr(each.told));
+  }
+}
+
+// What is pushed wider on screen may show where the strip's own plane has passed behind the camera.
+TEST(CpuRenderer, AWidenedStripIsInThePlanesWhereItsColourIs) {
+  SyntheticTown town;
+  Strip strip = {{60, -6, 1.4999f}, {62, 6, 1.49f}, {0.98f, -0.16f}, {0.98f, -0.16f}, 0.15f, kWhiteMarkColor};
+  town.geometry.strips.push_back(strip);
+  town.geometry.build_grids();
+  town.scene.end_world(0);
+  Rig rig = paper_rig();
+  rig.cameras.resize(1);
+  int drawn = 0;
+  for (int i = -40; i <= 40; ++i) {
+    town.views = {make_view({0, 0, 0.0005f * static_cast<float>(i)}, 0)};
+    const auto renderer = make_renderer("cpu", {.rig = rig, .num_threads = 1, .line_floor_px = 8});
+    const Outputs out = draw_outputs(renderer.get(), town, Planes::all);
+    const std::size_t pixels = out.class_id.size();
+    for (std::size_t at = 0; at < pixels; ++at) {
+      if (out.color[at] < 0.45f * strip.color.r) continue;  // not nearly all of a pixel, faded by half
+      ++drawn;
+      EXPECT_NE(out.class_id[at], 0) << "height " << i << ", pixel " << at;
+      EXPECT_TRUE(std::isfinite(out.depth_m[at])) << "height " << i << ", pixel " << at;
+    }
+  }
+  EXPECT_GT(drawn, 0);
 }
 
 }  // namespace

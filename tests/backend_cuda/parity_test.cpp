@@ -23,11 +23,13 @@ using testing::HasSubstr;
 
 class CudaRendererTest : public test::DeviceTest {};
 
-Outputs draw(const std::string& backend, const SyntheticTown& town, const RendererConfig& config) {
+template <typename Scene>  // SyntheticTown or SyntheticWorlds
+Outputs draw(const std::string& backend, const Scene& town, const RendererConfig& config) {
   return draw_outputs(make_renderer(backend, config).get(), town, Planes::all);
 }
 
-void expect_parity(const SyntheticTown& town, const RendererConfig& config) {
+template <typename Scene>
+void expect_parity(const Scene& town, const RendererConfig& config) {
   const Outputs host = draw("cpu", town, config), device = draw("cuda", town, config);
   ASSERT_EQ(host.color.size(), device.color.size());
   std::size_t within = 0, equal = 0;
@@ -60,6 +62,21 @@ TEST_F(CudaRendererTest, OddSizesAndMixedRigsDoToo) {
   expect_parity(town, {.rig = mixed_rig(), .line_floor_px = 0});
 }
 
+TEST_F(CudaRendererTest, WorldsOfSeveralMapsDoToo) { expect_parity(make_synthetic_worlds(), {.rig = paper_rig()}); }
+
+// The paper's sizes, and one that a screen shows.
+TEST_F(CudaRendererTest, AllSizesDoToo) {
+  SyntheticTown town = make_synthetic_town(6, 80);
+  town.views.resize(3);
+  constexpr int kWidths_px[] = {32, 64, 96, 192, 384, 768};
+  for (const int width_px : kWidths_px) {
+    SCOPED_TRACE(width_px);
+    expect_parity(town, {.rig = paper_rig(width_px, width_px * 9 / 16)});
+  }
+}
+
+TEST_F(CudaRendererTest, CrowdsInImagesOfManyRowsDoToo) { expect_parity(make_crowd(), {.rig = paper_rig(64, 1100)}); }
+
 TEST_F(CudaRendererTest, NothingIsCutOffInCrowdedImages) { expect_parity(make_crowd(), {.rig = paper_rig()}); }
 
 TEST_F(CudaRendererTest, VisibilityAgrees) {
@@ -80,7 +97,7 @@ TEST_F(CudaRendererTest, VisibilityAgrees) {
     if (std::isnan(expected[i])) {
       EXPECT_TRUE(std::isnan(actual[i])) << i;
     } else {
-      EXPECT_NEAR(actual[i], expected[i], 1e-5) << i;
+      EXPECT_EQ(actual[i], expected[i]) << i;  // sums are of whole units
     }
   }
 }
@@ -112,6 +129,11 @@ TEST_F(CudaRendererTest, FaultsOfTheDeviceAreThrownByTheNextCall) {
     EXPECT_THAT(error.what(), HasSubstr("no such world"));
   }
   EXPECT_NO_THROW(renderer->render(scene.batch(), good.span(), images));
+  EXPECT_NO_THROW(renderer->check());
+  // ... or when it is asked for.
+  EXPECT_NO_THROW(renderer->render(scene.batch(), views.span(), images));
+  EXPECT_THROW(renderer->check(), Error);
+  EXPECT_NO_THROW(renderer->check());
   // What the host can see is refused at once.
   EXPECT_THROW(renderer->render(town.scene.batch(), good.span(), images), Error);
   EXPECT_THROW(renderer->render(scene.batch(), good.span(), shape.batch()), Error);

@@ -1,16 +1,20 @@
 // How the CUDA renderer divides a bound on its memory.
 #include "pictura/backend_cuda/scratch_plan.h"
 
+#include <algorithm>
+#include <vector>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "pictura/backend_cuda/scratch_buffers.h"
 #include "pictura/tests/support/error_message.h"
 
 namespace pictura::cuda {
 namespace {
 
 constexpr ScratchNeeds kNeeds{
-    .large_blocks = 8, .large_block_bytes = 20'000'000, .views = 1'024, .view_bytes = 280'000};
+    .large_blocks = 8, .large_block_bytes = 20'000'000, .views = 1'024, .view_bytes = 280'000, .pool_bytes = 300'000};
 
 TEST(ScratchPlan, GivesAllThatIsNeededWhereThereIsRoom) {
   const ScratchPlan plan = plan_scratch(kNeeds, std::size_t{1} << 30);
@@ -41,7 +45,36 @@ TEST(ScratchPlan, ABatchIsCutWhereItsViewsDoNotFit) {
 
 TEST(ScratchPlan, SaysHowMuchItNeedsAtLeast) {
   EXPECT_EQ(test::message_of([] { plan_scratch(kNeeds, 1000); }),
-            "renderer cuda: max_scratch_bytes: expected at least 20280000, got 1000");
+            "renderer cuda: max_scratch_bytes: expected at least 20580000, got 1000");
+}
+
+template <typename Value>
+using HostBuffer = std::vector<Value>;
+
+TEST(Pool, TakesWhatItIsReckonedToTake) {
+  for (const std::size_t images : {1, 2, 3, 4, 5, 28, 1'000}) {
+    const PoolSizes sizes = pool_sizes(images);
+    EXPECT_EQ(PoolBuffers<HostBuffer>(sizes).bytes(), sizes.bytes());
+    EXPECT_LE(sizes.bytes(), kLeastPoolBytes + images * kPoolImageBytes);
+    EXPECT_GE(sizes.bytes() + sizeof(FaceBatch), kLeastPoolBytes + images * kPoolImageBytes);
+  }
+}
+
+TEST(Pool, HasRoomForEveryBatch) {
+  for (const std::size_t images : {1, 2, 7, 100}) {
+    const PoolSizes sizes = pool_sizes(images);
+    // Whatever each image lists, if it is the same for all: as many of them as find room.
+    for (std::size_t listed = 1; listed <= kMostEntries; ++listed) {
+      const std::size_t drawn = std::min(images, sizes.faces / listed);
+      const auto batches = static_cast<std::size_t>(FaceBatch::count_of(static_cast<int32_t>(listed)));
+      ASSERT_LE(drawn * batches, sizes.batches()) << images << " images that list " << listed;
+    }
+  }
+}
+
+TEST(LargeBlocks, TakeWhatTheyAreReckonedToTake) {
+  Scratch sizes{.blocks = 3, .max_faces = 7, .max_edges = 11};
+  EXPECT_EQ(LargeBuffers<HostBuffer>(sizes, 160).bytes(), 3 * LargeBuffers<HostBuffer>::block_bytes(sizes, 160));
 }
 
 }  // namespace

@@ -137,6 +137,43 @@ SyntheticTown make_crowd() {
   return town;
 }
 
+SyntheticWorlds make_synthetic_worlds() {
+  SyntheticTown towns[] = {make_synthetic_town(11, 50), make_synthetic_town(12, 30)};
+  SyntheticWorlds worlds;
+  for (SyntheticTown& town : towns) worlds.maps.push_back(town.geometry);
+  SceneOwner& scene = worlds.scene;
+  auto add_world = [&](int map, bool has_lights) {
+    const SyntheticTown& town = towns[map];
+    const auto world = static_cast<int32_t>(scene.geometry.size()), first = static_cast<int32_t>(scene.agents.size());
+    scene.agents.insert(scene.agents.end(), town.scene.agents.begin(), town.scene.agents.end());
+    if (has_lights) {
+      const std::vector<LightState>& states = town.scene.light_states;
+      scene.light_states.insert(scene.light_states.end(), states.begin(), states.end());
+    }
+    scene.end_world(map);
+    for (std::size_t i = 0; i < 3; ++i) {
+      View view = town.views[i];
+      view.world = world;
+      view.ego_agent += first;
+      view.hidden_begin = static_cast<int32_t>(scene.hidden_agents.size());
+      for (std::size_t other = 0; other < town.views.size(); ++other) {
+        if (other % 3 == i) scene.hidden_agents.push_back(first + town.views[other].ego_agent);
+      }
+      view.hidden_end = static_cast<int32_t>(scene.hidden_agents.size());
+      worlds.views.push_back(view);
+    }
+  };
+  add_world(1, true);
+  scene.light_states.resize(scene.light_states.size() + towns[0].scene.light_states.size(), LightState::green);
+  scene.end_world(0);
+  worlds.views.push_back(towns[0].views[0]);
+  worlds.views.back().world = 1;
+  worlds.views.back().ego_agent = -1;
+  add_world(0, true);
+  add_world(1, false);
+  return worlds;
+}
+
 Rig mixed_rig() {
   Rig rig = paper_rig(97, 55);
   rig.cameras[1] = paper_rig(1, 1).cameras[1];
@@ -144,12 +181,12 @@ Rig mixed_rig() {
   return rig;
 }
 
-Outputs draw_outputs(Renderer* renderer, const SyntheticTown& town, Planes planes) {
-  renderer->upload(town.geometry);
+namespace {
+Outputs draw_outputs(Renderer* renderer, const SceneOwner& scene, const std::vector<View>& views, Planes planes) {
   const Rig& rig = renderer->config().rig;
-  const int num_views = static_cast<int>(town.views.size());
+  const int num_views = static_cast<int>(views.size());
   HostImages images(rig, num_views, PixelFormat::f32, planes);
-  renderer->render(town.scene.batch(), town.views, images.batch());
+  renderer->render(scene.batch(), views, images.batch());
   Outputs out;
   auto append = [](auto* to, const auto* from, std::size_t count) { to->insert(to->end(), from, from + count); };
   for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
@@ -159,11 +196,22 @@ Outputs draw_outputs(Renderer* renderer, const SyntheticTown& town, Planes plane
       append(&out.color, static_cast<const float*>(camera.data) + view * camera.view_stride, 3 * pixels);
     }
     if (planes == Planes::none) continue;
-    append(&out.depth_m, camera.depth_m, pixels * town.views.size());
-    append(&out.class_id, camera.class_id, pixels * town.views.size());
-    append(&out.instance_id, camera.instance_id, pixels * town.views.size());
+    append(&out.depth_m, camera.depth_m, pixels * views.size());
+    append(&out.class_id, camera.class_id, pixels * views.size());
+    append(&out.instance_id, camera.instance_id, pixels * views.size());
   }
   return out;
+}
+}  // namespace
+
+Outputs draw_outputs(Renderer* renderer, const SyntheticTown& town, Planes planes) {
+  renderer->upload(town.geometry);
+  return draw_outputs(renderer, town.scene, town.views, planes);
+}
+
+Outputs draw_outputs(Renderer* renderer, const SyntheticWorlds& worlds, Planes planes) {
+  for (const StaticGeometry& map : worlds.maps) renderer->upload(map);
+  return draw_outputs(renderer, worlds.scene, worlds.views, planes);
 }
 
 }  // namespace pictura

@@ -24,6 +24,15 @@ SyntheticTown make_synthetic_town(uint64_t seed, int num_agents);
 /// fast memory has room for.
 SyntheticTown make_crowd();
 
+/// Four worlds on two towns: the second town, nobody on the first one, the first and, without lights, the second again.
+/// Of each but the empty one some views, which hide each other's vehicles by turns.
+struct SyntheticWorlds {
+  std::vector<StaticGeometry> maps;
+  SceneOwner scene;
+  std::vector<View> views;
+};
+SyntheticWorlds make_synthetic_worlds();
+
 /// Four cameras of 97x55, 1x1 and 40x130 pixels.
 Rig mixed_rig();
 
@@ -35,7 +44,8 @@ struct Outputs {
   std::vector<uint16_t> instance_id;
   bool operator==(const Outputs&) const = default;
 };
-/// Uploads the town and draws all its views.
+/// Uploads the maps and draws all views.
 Outputs draw_outputs(Renderer* renderer, const SyntheticTown& town, Planes planes);
+Outputs draw_outputs(Renderer* renderer, const SyntheticWorlds& worlds, Planes planes);
 
 }  // namespace pictura
