@@ -1,12 +1,12 @@
 // The oracle: the CPU renderer. It checks its input, places the cameras, and spreads images over OpenMP threads.
 #include <cstddef>
-#include <deque>
 #include <memory>
 
 #include <omp.h>
 
 #include "pictura/backend_cpu/renderer_cpu_image.h"
 #include "pictura/common/error.h"
+#include "pictura/common/host_geometries.h"
 #include "pictura/common/parallel_for.h"
 #include "pictura/common/raster_check.h"
 
@@ -28,14 +28,12 @@ class CpuRenderer final : public Renderer {
 
   GeometryHandle upload(const StaticGeometry& geometry) override {
     check_geometry(name(), geometry);
-    copies_.push_back(geometry);
-    geometries_.push_back(copies_.back().view());
-    return static_cast<GeometryHandle>(geometries_.size()) - 1;
+    return geometries_.add(geometry);
   }
 
   void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream) override {
     check_images(name(), config_.rig, space(), views.size(), images_out, /*draws_f16=*/true);
-    check_scene(name(), scene, geometries_);
+    check_scene(name(), scene, geometries_.views());
     check_views(name(), scene, views);
     const std::size_t num_cameras = cameras_.size();
     parallel_for(num_threads(), static_cast<int64_t>(views.size() * num_cameras), [&](int64_t image) {
@@ -49,7 +47,7 @@ class CpuRenderer final : public Renderer {
 
   void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
                   Span<float> visibility_out, Stream) override {
-    check_scene(name(), scene, geometries_);
+    check_scene(name(), scene, geometries_.views());
     check_views(name(), scene, views);
     check_queries(name(), scene, views, queries, visibility_out.size());
     parallel_for(num_threads(), static_cast<int64_t>(queries.size()), [&](int64_t i) {
@@ -71,11 +69,7 @@ class CpuRenderer final : public Renderer {
 
   ImageRequest request(const SceneBatch& scene, const View& view, std::size_t camera) const {
     const GeometryHandle handle = scene.geometry[static_cast<std::size_t>(view.world)];
-    return {&geometries_[static_cast<std::size_t>(handle)],
-            &scene,
-            &view,
-            place_camera(cameras_[camera], view),
-            config_.line_floor_px,
+    return {&geometries_[handle], &scene, &view, place_camera(cameras_[camera], view), config_.line_floor_px,
             config_.debug_palette};
   }
 
@@ -93,8 +87,7 @@ class CpuRenderer final : public Renderer {
 
   RendererConfig config_;
   std::vector<PinholeCamera> cameras_;  // in the ego frame
-  std::deque<StaticGeometry> copies_;   // their addresses stay: geometries_ point into them
-  std::vector<StaticGeometryView> geometries_;
+  HostGeometries geometries_;
   std::vector<ImageDrawer> drawers_;  // one per thread
 };
 

@@ -1,10 +1,10 @@
 // The CUDA renderer for callers whose scenes and images lie in host memory: it stages them through the device and
 // waits. What the device would only notice later is checked on the host, with the oracle's checks.
-#include <deque>
 #include <memory>
 
 #include "pictura/common/cuda/device_scene.cuh"
 #include "pictura/common/error.h"
+#include "pictura/common/host_geometries.h"
 #include "pictura/common/raster_check.h"
 
 namespace pictura {
@@ -23,10 +23,8 @@ class HostRendererCuda final : public Renderer {
   const RendererConfig& config() const override { return renderer_->config(); }
 
   GeometryHandle upload(const StaticGeometry& geometry) override {
-    const GeometryHandle handle = renderer_->upload(geometry);
-    copies_.push_back(geometry);
-    geometries_.push_back(copies_.back().view());
-    return handle;
+    renderer_->upload(geometry);
+    return geometries_.add(geometry);
   }
 
   void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override {
@@ -55,13 +53,12 @@ class HostRendererCuda final : public Renderer {
 
  private:
   void check_input(const SceneBatch& scene, Span<const View> views) const {
-    check_scene(name(), scene, geometries_);
+    check_scene(name(), scene, geometries_.views());
     check_views(name(), scene, views);
   }
 
   std::unique_ptr<Renderer> renderer_;
-  std::deque<StaticGeometry> copies_;  // their addresses stay: geometries_ point into them
-  std::vector<StaticGeometryView> geometries_;
+  HostGeometries geometries_;  // for checks, with the device's handles
   DeviceScene scene_;
   DeviceImages images_;
   DeviceCopy<View> views_;

@@ -126,15 +126,10 @@ __device__ inline SharedFace share_quad(ClipRoom* room, int owner, const Quad& q
 __device__ inline SharedFace make_light(const FaceMaking& making, int32_t index) {
   const LightHead head = making.heads[index];
   const PinholeCamera& camera = making.setting.camera;
-  const Vec3 middle = to_camera(camera, head.position_m);
-  const float brightness = face_brightness(&middle, 1);
-  SharedFace face;
-  face.corner = to_camera(camera, light_corner(head, lane_index()));
-  face.plane = light_plane(head, camera, middle);
-  face.color = light_color(making.lights[head.signal]) * brightness;
-  face.owner = light_owner(index);
-  face.count = brightness > 0.0f ? kLightSides : 0;
-  return face;
+  LightDisk disk;
+  const bool is_seen = see_light(head, making.lights[head.signal], camera, &disk);
+  return {to_camera(camera, light_corner(head, lane_index())), is_seen ? kLightSides : 0, disk.plane, disk.color,
+          light_owner(index)};
 }
 
 // clip_face of a lane's face, in place: corners are written no further than one behind the last that was read. The

@@ -141,9 +141,7 @@ __device__ inline void make_faces(const FaceMaking& making, FaceRoom* room, cons
   ScreenQuad on_screen;
   bool turns_right = false;
   const QuadSight sight = project_quad(camera, quad.seen.corner, quad.floor_px, &on_screen);
-  const float least_area = least_area_of(quad.seen.color, quad.owner);
-  const bool covers = find_turn(on_screen, 2.0f * least_area, &turns_right) &&
-                      !making.setting.occluders.hide(camera, on_screen.bounds),
+  const bool covers = shows_whole(making.setting, on_screen, quad.seen.color, quad.owner, &turns_right),
              is_wanted = is_quad && is_seen;
   const bool shows = is_wanted && sight == QuadSight::whole && covers,
              is_clipped = is_wanted && sight == QuadSight::cut;

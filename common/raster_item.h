@@ -52,6 +52,14 @@ PICTURA_HD inline float least_area_of(Rgb color, FaceOwner owner) {
   return kLeastWeight * inverse_of(max_of(brightest, kLeastWeight / kMostSparedArea));
 }
 
+/// Whether a face that needs no clipping shows: whether it is large enough, and not behind an occluder. Sets whether it
+/// turns right.
+PICTURA_HD inline bool shows_whole(const ImageSetting& setting, const ScreenQuad& quad, Rgb color, FaceOwner owner,
+                                   bool* turns_right_out) {
+  return find_turn(quad, 2.0f * least_area_of(color, owner), turns_right_out) &&
+         !setting.occluders.hide(setting.camera, quad.bounds);
+}
+
 /// A face with all that its making did not set.
 PICTURA_HD inline ScreenFace whole_face(const ScreenFace& face, FaceOwner owner, int32_t edge_begin) {
   ScreenFace whole = face;
@@ -75,9 +83,8 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, FaceOwner owner, c
       face.count == 4 ? project_quad(setting.camera, face.corners, face.floor_px, &quad) : QuadSight::cut;
   if (sight == QuadSight::none) return false;
   if (sight == QuadSight::whole) {
-    if (setting.occluders.hide(setting.camera, quad.bounds)) return false;
     bool turns_right = false;
-    if (!find_turn(quad, 2.0f * least_area_of(face.color, owner), &turns_right)) return false;
+    if (!shows_whole(setting, quad, face.color, owner, &turns_right)) return false;
     edge_begin = pool.take(4);
     if (edge_begin < 0) return false;
     make_quad_face(setting.camera, setting.frustum, quad, turns_right, face.plane, face.color, keep_edge, face_out);

@@ -182,23 +182,30 @@ PICTURA_HD inline Vec3 light_corner(const LightHead& head, int corner) {
   return {ground.x, ground.y, head.position_m.z + kRadius_m * at.sin};
 }
 
-/// The plane of a head's disk, in camera coordinates.
-PICTURA_HD inline FacePlane light_plane(const LightHead& head, const PinholeCamera& camera, Vec3 middle) {
-  const Vec3 facing{head.facing.x, head.facing.y, 0.0f};
+/// The disk of a lit head, as bright as its middle: its plane in camera coordinates, and its colour.
+struct LightDisk {
+  FacePlane plane;
+  Rgb color;
+};
+/// False where it has faded to black.
+PICTURA_HD inline bool see_light(const LightHead& head, LightState state, const PinholeCamera& camera,
+                                 LightDisk* disk_out) {
+  const Vec3 middle = to_camera(camera, head.position_m), facing{head.facing.x, head.facing.y, 0.0f};
   const Vec3 normal{dot(camera.right, facing), dot(camera.down, facing), dot(camera.forward, facing)};
-  return {normal, dot(normal, middle)};
+  const float brightness = face_brightness(&middle, 1);
+  *disk_out = {{normal, dot(normal, middle)}, light_color(state) * brightness};
+  return brightness > 0.0f;
 }
 
-/// The disk of a lit head, as bright as its middle.
+/// The disk of a head, where it is turned to the camera and lit.
 template <typename Emit>
 PICTURA_HD inline void light_faces(const LightHead& head, LightState state, const PinholeCamera& camera, Emit&& emit) {
   if (!light_is_visible(head, state, camera.position_m)) return;
-  const Vec3 middle = to_camera(camera, head.position_m);
-  const float brightness = face_brightness(&middle, 1);
-  if (brightness <= 0.0f) return;
+  LightDisk disk;
+  if (!see_light(head, state, camera, &disk)) return;
   Vec3 corners[kLightSides];
   for (int i = 0; i < kLightSides; ++i) corners[i] = to_camera(camera, light_corner(head, i));
-  emit(CameraFace{corners, kLightSides, light_plane(head, camera, middle), light_color(state) * brightness});
+  emit(CameraFace{corners, kLightSides, disk.plane, disk.color});
 }
 
 /// The strip's four corners in the world: left of a, right of a, right of b, left of b.

@@ -91,13 +91,21 @@ TEST_F(CudaStreamTest, WritesEveryValueOfItsImagesAndNothingElse) {
     Stage stage(60, kViews, {.rig = rig});
     std::vector<std::vector<uint8_t>> drawn;
     for (const int poison : {0xA5, 0x5A}) {
-      std::vector<DeviceBuffer<uint8_t>> memory;
+      std::vector<DeviceBuffer<uint8_t>> memory, planes;
       std::vector<CameraImages> cameras;
+      auto poisoned = [&](std::size_t bytes) {
+        planes.emplace_back(bytes);
+        planes.back().fill(poison);
+        return planes.back().data();
+      };
       for (const Camera& camera : rig.cameras) {
         const std::size_t stride = static_cast<std::size_t>(3 * camera.width_px * camera.height_px) + kGap;
         memory.emplace_back(kViews * stride * bytes_per_value(format));
         memory.back().fill(poison);
-        cameras.push_back({camera.width_px, camera.height_px, memory.back().data(), static_cast<int64_t>(stride)});
+        const std::size_t pixels = kViews * static_cast<std::size_t>(camera.width_px * camera.height_px);
+        cameras.push_back({camera.width_px, camera.height_px, memory.back().data(), static_cast<int64_t>(stride),
+                           reinterpret_cast<float*>(poisoned(pixels * sizeof(float))), poisoned(pixels),
+                           reinterpret_cast<uint16_t*>(poisoned(pixels * sizeof(uint16_t)))});
       }
       stage.renderer->render(stage.scene.batch(), stage.views,
                              {MemorySpace::cuda, format, static_cast<int>(kViews), cameras});
@@ -114,6 +122,11 @@ TEST_F(CudaStreamTest, WritesEveryValueOfItsImagesAndNothingElse) {
                                   [&](uint8_t byte) { return byte == poison; }))
               << "camera " << k << ", view " << view;
         }
+      }
+      for (const DeviceBuffer<uint8_t>& plane : planes) {
+        const std::size_t begin = all.size();
+        all.resize(begin + plane.size());
+        plane.copy_to_host(all.data() + begin);
       }
       drawn.push_back(all);
     }
