@@ -292,65 +292,98 @@ __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_
   return true;
 }
 
+// The faces of solids that cover most of an image, of those that were offered. A lane each keeps, for as many as there
+// may be, the entry and what it covers; the occluder stands at the lane's place in the setting.
+class BestOccluders {
+ public:
+  __device__ explicit BestOccluders(FaceMaking* making) : making_(making) {}
+
+  /// Each lane offers the face of an entry, or none. All lanes of the warp.
+  __device__ void offer(bool is_one, uint32_t entry) {
+    const ImageSetting& setting = making_->setting;
+    const FaceMaking* making = making_;
+    Quad quad;
+    Offered own{is_one ? entry : kNoEntry};
+    if (is_one && make_quad(*making, entry, &quad, [making](int32_t i) { return making->strips[i]; })) {
+      own.covers = __float_as_int(occluded_px2(setting.camera, quad.seen, &own.on_screen, &own.turns_right));
+    }
+    const Chosen chosen = choose(own);
+    const int place = move_in(own, chosen);
+    if (chosen.own) {
+      making_->setting.occluders.occluder[place] =
+          make_occluder(setting.camera, setting.frustum, quad.seen.plane, own.on_screen, own.turns_right);
+    }
+  }
+
+  /// How many there are. All lanes of the warp.
+  __device__ int count() const { return __popc(__ballot_sync(kAllLanes, kept_covers_ != 0)); }
+
+ private:
+  struct Offered {
+    uint32_t entry;
+    int covers = 0;  // the area's bits, which sort as it does; 0: hides nothing
+    ScreenQuad on_screen;
+    bool turns_right = false;
+  };
+  // Whether what the lane offers, and what it has kept so far, is among the best.
+  struct Chosen {
+    bool own = false, kept = false;
+  };
+
+  __device__ Chosen choose(const Offered& own) const {
+    Chosen chosen;
+    int left = own.covers, kept_left = kept_covers_;
+    PICTURA_KEEP_LOOP
+    for (int k = 0; k < Occluders::kMost; ++k) {
+      const int most = __reduce_max_sync(kAllLanes, max_of(left, kept_left));
+      if (most == 0) break;
+      const uint32_t its = left == most ? own.entry : kNoEntry, other = kept_left == most ? kept_ : kNoEntry;
+      const uint32_t lowest = __reduce_min_sync(kAllLanes, its < other ? its : other);
+      if (own.entry == lowest) {
+        chosen.own = true;
+        left = 0;
+      }
+      if (kept_ == lowest) {
+        chosen.kept = true;
+        kept_left = 0;
+      }
+    }
+    return chosen;
+  }
+
+  // The chosen offers take the places of those that go. The place of the lane's own.
+  __device__ int move_in(const Offered& own, Chosen chosen) {
+    unsigned places = ~__ballot_sync(kAllLanes, chosen.kept) & ((1u << Occluders::kMost) - 1);
+    int place = 0;
+    PICTURA_KEEP_LOOP
+    for (unsigned added = __ballot_sync(kAllLanes, chosen.own); added != 0; added &= added - 1, places &= places - 1) {
+      const int from = __ffs(static_cast<int>(added)) - 1, to = __ffs(static_cast<int>(places)) - 1;
+      const uint32_t entry = __shfl_sync(kAllLanes, own.entry, from);
+      const int covers = __shfl_sync(kAllLanes, own.covers, from);
+      if (lane_index() == from) place = to;
+      if (lane_index() == to) {
+        kept_ = entry;
+        kept_covers_ = covers;
+      }
+    }
+    return place;
+  }
+
+  FaceMaking* making_;
+  uint32_t kept_ = kNoEntry;
+  int kept_covers_ = 0;
+};
+
 // Finds what hides whole faces among the solids of a list. All lanes of one warp.
 __device__ inline void find_occluders(FaceMaking* making, const uint32_t* entries, int32_t count) {
-  ImageSetting* setting = &making->setting;
-  const PinholeCamera& camera = setting->camera;
   auto may_hide = [&](uint32_t entry) {
+    const PinholeCamera& camera = making->setting.camera;
     const uint32_t index = entry & kFaceIndexMask;
     if (entry == kNoEntry) return false;
     if (kind_of(entry) == kAgentKind) return may_occlude(making->agents[index], camera);
     return kind_of(entry) == kWallKind && may_occlude(making->walls[index], camera);
   };
-  // Of the occluders so far, a lane each: the entry, and what it covers as bits, which sort alike; 0: none.
-  uint32_t kept = kNoEntry;
-  int kept_covers = 0;
-  // Keeps those that cover most among the kept and the lanes' own.
-  auto keep_best = [&](const WarpQueue::Pair& near_one) {
-    const uint32_t own = near_one.is_one ? near_one.a : kNoEntry;
-    Quad quad;
-    ScreenQuad on_screen;
-    bool turns_right = false;
-    int covers = 0;
-    if (near_one.is_one && make_quad(*making, own, &quad, [making](int32_t i) { return making->strips[i]; })) {
-      covers = __float_as_int(occluded_px2(camera, quad.seen, &on_screen, &turns_right));
-    }
-    bool is_best = false, stays = false;
-    int left = covers, kept_left = kept_covers;
-    PICTURA_KEEP_LOOP
-    for (int k = 0; k < Occluders::kMost; ++k) {
-      const int most = __reduce_max_sync(kAllLanes, max_of(left, kept_left));
-      if (most == 0) break;
-      const uint32_t its = left == most ? own : kNoEntry, other = kept_left == most ? kept : kNoEntry;
-      const uint32_t lowest = __reduce_min_sync(kAllLanes, its < other ? its : other);
-      if (own == lowest) {
-        is_best = true;
-        left = 0;
-      }
-      if (kept == lowest) {
-        stays = true;
-        kept_left = 0;
-      }
-    }
-    // The new ones take the places of those that go.
-    unsigned places = ~__ballot_sync(kAllLanes, stays) & ((1u << Occluders::kMost) - 1);
-    int place = 0;
-    PICTURA_KEEP_LOOP
-    for (unsigned added = __ballot_sync(kAllLanes, is_best); added != 0; added &= added - 1, places &= places - 1) {
-      const int from = __ffs(static_cast<int>(added)) - 1, to = __ffs(static_cast<int>(places)) - 1;
-      const uint32_t entry = __shfl_sync(kAllLanes, own, from);
-      const int its_covers = __shfl_sync(kAllLanes, covers, from);
-      if (lane_index() == from) place = to;
-      if (lane_index() == to) {
-        kept = entry;
-        kept_covers = its_covers;
-      }
-    }
-    if (is_best) {
-      setting->occluders.occluder[place] =
-          make_occluder(camera, setting->frustum, quad.seen.plane, on_screen, turns_right);
-    }
-  };
+  BestOccluders best(making);
   // Near ones are put aside until every lane has one.
   WarpQueue near_ones(&block_state()->warps[warp_index()].queue);
   PICTURA_KEEP_LOOP
@@ -358,11 +391,14 @@ __device__ inline void find_occluders(FaceMaking* making, const uint32_t* entrie
     const bool is_more = first < count;
     const uint32_t entry = first + lane_index() < count ? entries[first + lane_index()] : kNoEntry;
     near_ones.push(may_hide(entry), entry, 0);
-    if (near_ones.is_ready() || (!is_more && !near_ones.is_empty())) keep_best(near_ones.take());
+    if (near_ones.is_ready() || (!is_more && !near_ones.is_empty())) {
+      const WarpQueue::Pair near_one = near_ones.take();
+      best.offer(near_one.is_one, near_one.a);
+    }
     if (!is_more) break;
   }
-  const unsigned found = __ballot_sync(kAllLanes, kept_covers != 0);
-  if (lane_index() == 0) setting->occluders.count = __popc(found);
+  const int found = best.count();
+  if (lane_index() == 0) making->setting.occluders.count = found;
   __syncwarp();
 }
 
