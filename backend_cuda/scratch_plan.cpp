@@ -8,9 +8,9 @@ namespace pictura::cuda {
 
 namespace {
 
-// How many more of `wanted` fit into a share of *left_inout, which is lessened by them.
-std::size_t take(std::size_t wanted, std::size_t bytes_each, std::size_t share_bytes, std::size_t* left_inout) {
-  const std::size_t taken = bytes_each == 0 ? wanted : std::min(wanted, share_bytes / bytes_each);
+// How many more of `wanted` fit into *left_inout, which is lessened by them.
+std::size_t take(std::size_t wanted, std::size_t bytes_each, std::size_t* left_inout) {
+  const std::size_t taken = bytes_each == 0 ? wanted : std::min(wanted, *left_inout / bytes_each);
   *left_inout -= taken * bytes_each;
   return taken;
 }
@@ -27,9 +27,9 @@ ScratchPlan plan_scratch(const ScratchNeeds& needs, std::size_t max_bytes) {
   const std::size_t least = bytes_of(plan, needs);
   PICTURA_CHECK(least <= max_bytes, "renderer cuda: max_scratch_bytes: expected at least {}, got {}", least, max_bytes);
   std::size_t left = max_bytes - least;
-  plan.large_blocks += static_cast<int>(
-      take(static_cast<std::size_t>(needs.large_blocks - 1), needs.large_block_bytes, left / 2, &left));
-  plan.views += take(needs.views - 1, needs.view_bytes, left, &left);
+  plan.views += take(needs.views - 1, needs.view_bytes, &left);
+  plan.large_blocks +=
+      static_cast<int>(take(static_cast<std::size_t>(needs.large_blocks - 1), needs.large_block_bytes, &left));
   return plan;
 }
 

@@ -21,8 +21,8 @@ struct ScratchPlan {
 
 std::size_t bytes_of(const ScratchPlan& plan, const ScratchNeeds& needs);
 
-/// As much of the needs as max_bytes hold, at least one of each: blocks of the last launch for at most half of them,
-/// then views. Throws Error saying how many bytes one of each takes, where they do not fit.
+/// As much of the needs as max_bytes hold, at least one of each: views, then blocks of the last launch, which has
+/// little to do. Throws Error saying how many bytes one of each takes, where they do not fit.
 ScratchPlan plan_scratch(const ScratchNeeds& needs, std::size_t max_bytes);
 
 }  // namespace pictura::cuda

@@ -43,6 +43,12 @@ TEST(ScratchPlan, ABatchIsCutWhereItsViewsDoNotFit) {
   EXPECT_EQ(plan_scratch(kNeeds, least + 700'000).views, 3u);
 }
 
+TEST(ScratchPlan, ViewsComeBeforeBlocksOfTheLastLaunch) {
+  const std::size_t all_views = bytes_of({1, 1'024}, kNeeds);
+  EXPECT_EQ(plan_scratch(kNeeds, all_views - 1).large_blocks, 1);
+  EXPECT_EQ(plan_scratch(kNeeds, all_views + 3 * kNeeds.large_block_bytes).large_blocks, 4);
+}
+
 TEST(ScratchPlan, SaysHowMuchItNeedsAtLeast) {
   EXPECT_EQ(test::message_of([] { plan_scratch(kNeeds, 1000); }),
             "renderer cuda: max_scratch_bytes: expected at least 20580000, got 1000");

@@ -260,6 +260,19 @@ TEST_F(CudaStreamTest, DrawsTheSameInPartsUnderATightBound) {
   EXPECT_THAT(test::message_of([&] { parts.draw(); }), HasSubstr("view 5: no such world"));
 }
 
+TEST_F(CudaStreamTest, ACallThatFindsNoRoomHarmsNoOther) {
+  RendererConfig config{.rig = paper_rig()};
+  config.max_scratch_bytes = least_scratch_bytes(5, 1, config);
+  Stage stage(5, 1, config);
+  const std::vector<uint8_t> first = bytes_of(stage.draw());
+  const DeviceScene crowded(make_synthetic_town(7, 120).scene.batch());
+  HostImages host = stage.host_images();
+  EXPECT_THAT(
+      test::message_of([&] { stage.renderer->render(crowded.batch(), stage.views, stage.images.like(host.batch())); }),
+      HasSubstr("max_scratch_bytes"));
+  EXPECT_EQ(bytes_of(stage.draw()), first);
+}
+
 TEST_F(CudaStreamTest, KernelsBuiltAheadOfTimeDrawTheSame) {
   Rig mixed = paper_rig(50, 30);
   mixed.cameras[1] = paper_rig(31, 17).cameras[1];
