@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "pictura/tests/support/image_truth.h"
 #include "pictura/tests/support/tolerances.h"
 
 namespace pictura {
@@ -12,8 +14,10 @@ namespace {
 constexpr double kRounding = 1e-6;
 
 double half_to_number(uint16_t half) {
-  const int exponent = half >> 10, mantissa = half & 1023;
-  return exponent > 0 ? std::ldexp(1024 + mantissa, exponent - 25) : std::ldexp(mantissa, -24);
+  const int exponent = half >> 10 & 31, mantissa = half & 1023;
+  if (exponent == 31) return std::numeric_limits<double>::quiet_NaN();  // or infinite, which is as far off
+  const double size = exponent > 0 ? std::ldexp(1024 + mantissa, exponent - 25) : std::ldexp(mantissa, -24);
+  return half >> 15 ? -size : size;
 }
 
 double channel_at(const CameraImages& images, PixelFormat format, int64_t element) {
@@ -42,8 +46,8 @@ ImageError compare_image(const CameraImages& actual, const CameraImages& expecte
   ImageError error;
   error.values = int64_t{3} * expected.width_px * expected.height_px;
   for (int64_t i = 0; i < error.values; ++i) {
-    const double off = std::abs(channel_at(actual, format, view * actual.view_stride + i) -
-                                channel_at(expected, format, view * expected.view_stride + i));
+    const double off = value_error(channel_at(actual, format, view * actual.view_stride + i),
+                                   channel_at(expected, format, view * expected.view_stride + i));
     error.worst = std::max(error.worst, off);
     error.differing += off > 0 ? 1 : 0;
     error.beyond += off > kKernelError + kRounding ? 1 : 0;

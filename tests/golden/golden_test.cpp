@@ -4,6 +4,7 @@
 //   golden_test --update     draws the pictures anew, with the oracle
 // A failure writes DIR/SCENE_{expected,actual,difference}.png, enlarged, the difference with eightfold contrast.
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
@@ -226,6 +227,10 @@ TEST(GoldenTolerances, EachPartOfThemFails) {
   EXPECT_THAT(complaint_of(11, 2.0 / 255, kGoldenKernel), HasSubstr("%"));
   EXPECT_EQ(complaint_of(100000, 0.4 / 255, kGoldenTruth), "");
   EXPECT_THAT(complaint_of(100000, 0.5 / 255, kGoldenTruth), HasSubstr("dB"));
+  // What is no number is within none.
+  for (const ImageTolerance& tolerance : {kGoldenOracle, kGoldenKernel, kGoldenTruth, kGoldenGl}) {
+    EXPECT_THAT(complaint_of(1, std::nan(""), tolerance), HasSubstr("worst")) << tolerance.name;
+  }
 }
 
 }  // namespace

@@ -484,9 +484,14 @@ TruthVisibility trace_visibility(const StaticGeometry& geometry, const SceneBatc
   return {seen / alone, alone / static_cast<double>(offsets.size())};
 }
 
+double value_error(double actual, double expected) {
+  const double error = std::abs(actual - expected);
+  return std::isfinite(error) ? error : std::numeric_limits<double>::infinity();
+}
+
 void PooledError::add(const std::vector<float>& image, const std::vector<float>& truth) {
   for (std::size_t i = 0; i < image.size(); ++i) {
-    const double error = std::abs(static_cast<double>(image[i]) - truth[i]);
+    const double error = value_error(image[i], truth[i]);
     squared_ += error * error;
     max_error_ = std::max(max_error_, error);
     ++histogram_[static_cast<std::size_t>(std::min(1024.0, error * 1024))];

@@ -38,6 +38,10 @@ struct TruthVisibility {
 TruthVisibility trace_visibility(const StaticGeometry& geometry, const SceneBatch& scene, const View& view,
                                  const Rig& rig, float line_floor_px, int32_t agent);
 
+/// How far a channel value is from the one that was expected; infinitely where one of them is no finite number, so that
+/// no tolerance takes it.
+double value_error(double actual, double expected);
+
 /// Pools the squared error of many images; channels in [0, 1].
 class PooledError {
  public:

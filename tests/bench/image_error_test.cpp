@@ -1,0 +1,52 @@
+// What the comparison with the oracle sees, and what it lets pass.
+#include "pictura/bench/image_error.h"
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+namespace pictura {
+namespace {
+
+// A camera of 8x8 pixels.
+Rig small_rig() {
+  Rig rig = paper_rig(8, 8);
+  rig.cameras.resize(1);
+  return rig;
+}
+
+// The error of images that are black but for the first bytes of one of them.
+template <typename Value>
+ImageError error_with(PixelFormat format, Value first_value) {
+  HostImages actual(small_rig(), 1, format);
+  HostImages expected(small_rig(), 1, format);
+  std::memcpy(actual.bytes().data(), &first_value, sizeof first_value);
+  return compare_image(actual.camera(0), expected.camera(0), format, 0);
+}
+
+TEST(ImageError, WhatIsNoFiniteNumberIsInfinitelyOff) {
+  const float infinite = std::numeric_limits<float>::infinity();
+  for (const ImageError& error : {error_with(PixelFormat::f32, std::nanf("")), error_with(PixelFormat::f32, infinite),
+                                  error_with(PixelFormat::f16, uint16_t{0x7E00}),    // NaN
+                                  error_with(PixelFormat::f16, uint16_t{0xFC00})}) {  // -infinite
+    EXPECT_EQ(error.values, 3 * 8 * 8);
+    EXPECT_EQ(error.differing, 1);
+    EXPECT_EQ(error.beyond, 1);
+    EXPECT_TRUE(std::isinf(error.worst)) << error.worst;
+    EXPECT_FALSE(error.is_within_tolerance());
+  }
+}
+
+TEST(ImageError, EachFormatIsReadInItsOwnUnits) {
+  EXPECT_DOUBLE_EQ(error_with(PixelFormat::u8, uint8_t{255}).worst, 1);
+  EXPECT_DOUBLE_EQ(error_with(PixelFormat::f32, 0.25f).worst, 0.25);
+  EXPECT_DOUBLE_EQ(error_with(PixelFormat::f16, uint16_t{0x3800}).worst, 0.5);
+  EXPECT_DOUBLE_EQ(error_with(PixelFormat::f16, uint16_t{0xB800}).worst, 0.5);      // -0.5
+  EXPECT_DOUBLE_EQ(error_with(PixelFormat::f16, uint16_t{0x0001}).worst, 0x1p-24);  // subnormal
+  EXPECT_EQ(error_with(PixelFormat::f16, uint16_t{0x8000}).differing, 0);           // -0
+}
+
+}  // namespace
+}  // namespace pictura
