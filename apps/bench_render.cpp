@@ -109,6 +109,11 @@ void append_results(const std::string& name, const RenderCase& measured, const R
         static_cast<double>(measurement.error.differing) / static_cast<double>(measurement.error.values);
     results_out->push_back({name + ", values unlike the oracle's", "%", {100 * share}});
     results_out->push_back({name + ", most unlike", "1/255", {255 * measurement.error.worst}});
+    if (measured.planes == Planes::all) {
+      results_out->push_back({name + ", planes unlike the oracle's",
+                              "pixels",
+                              {static_cast<double>(measurement.error.differing_plane_pixels)}});
+    }
   }
   if (measured.watches_memory) {
     constexpr double kGiB = 1 << 30;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "pictura/tests/support/image_truth.h"
@@ -28,6 +29,12 @@ double channel_at(const CameraImages& images, PixelFormat format, int64_t elemen
   }
 }
 
+// A depth of infinity is nothing's, and equal to itself alone.
+bool is_same_depth(double actual_m, double expected_m) {
+  return actual_m == expected_m ||
+         value_error(actual_m, expected_m) <= kKernelDepthError * std::min(actual_m, expected_m);
+}
+
 }  // namespace
 
 void ImageError::add(const ImageError& other) {
@@ -35,11 +42,15 @@ void ImageError::add(const ImageError& other) {
   differing += other.differing;
   beyond += other.beyond;
   worst = std::max(worst, other.worst);
+  plane_pixels += other.plane_pixels;
+  differing_plane_pixels += other.differing_plane_pixels;
 }
 
 bool ImageError::is_within_tolerance() const {
+  constexpr double kShareBeyond = 1 - kKernelShareWithin;
   return worst <= kKernelWorstError + kRounding &&
-         static_cast<double>(beyond) <= (1 - kKernelShareWithin) * static_cast<double>(values);
+         static_cast<double>(beyond) <= kShareBeyond * static_cast<double>(values) &&
+         static_cast<double>(differing_plane_pixels) <= kShareBeyond * static_cast<double>(plane_pixels);
 }
 
 ImageError compare_image(const CameraImages& actual, const CameraImages& expected, PixelFormat format, int view) {
@@ -52,7 +63,23 @@ ImageError compare_image(const CameraImages& actual, const CameraImages& expecte
     error.differing += off > 0 ? 1 : 0;
     error.beyond += off > kKernelError + kRounding ? 1 : 0;
   }
+  if (!expected.depth_m) return error;
+  error.plane_pixels = error.values / 3;
+  for (int64_t i = view * error.plane_pixels; i < (view + 1) * error.plane_pixels; ++i) {
+    const bool is_same = actual.class_id[i] == expected.class_id[i] &&
+                         actual.instance_id[i] == expected.instance_id[i] &&
+                         is_same_depth(actual.depth_m[i], expected.depth_m[i]);
+    error.differing_plane_pixels += is_same ? 0 : 1;
+  }
   return error;
+}
+
+void spoil(const ImageBatch& images) {
+  visit_memory(images, [](void* first, std::size_t stride_bytes, std::size_t row_bytes, std::size_t rows) {
+    for (std::size_t row = 0; row < rows; ++row) {
+      std::memset(static_cast<uint8_t*>(first) + row * stride_bytes, kUnwrittenByte, row_bytes);
+    }
+  });
 }
 
 }  // namespace pictura

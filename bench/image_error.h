@@ -1,6 +1,8 @@
 // How far drawn images are from the oracle's, value by value, and whether that is within what kernels may err.
 #pragma once
 
+#include <cstddef>
+
 #include "pictura/common/image.h"
 
 namespace pictura {
@@ -10,13 +12,39 @@ struct ImageError {
   int64_t values = 0, differing = 0;
   int64_t beyond = 0;  // off by more than kKernelError
   double worst = 0;
+  // Pixels that have planes, and those whose planes tell of another surface.
+  int64_t plane_pixels = 0, differing_plane_pixels = 0;
 
   void add(const ImageError& other);
   /// The tolerance of the CUDA renderer (tests/support/tolerances.h).
   bool is_within_tolerance() const;
 };
 
-/// Of one view's image of one camera; both of one format and size.
+/// Of one view's image of one camera and its planes, where it has them; both of one format and size.
 ImageError compare_image(const CameraImages& actual, const CameraImages& expected, PixelFormat format, int view);
+
+/// What images hold before they are drawn, so that a value that is not written shows: far from any colour as a float or
+/// a half, and no depth, class or instance.
+constexpr int kUnwrittenByte = 0x7F;
+
+/// Calls visit(first byte, bytes from one row to the next, bytes of a row, rows) for all memory of colours and planes.
+template <typename Visit>
+void visit_memory(const ImageBatch& images, Visit&& visit) {
+  const auto views = static_cast<std::size_t>(images.num_views);
+  for (const CameraImages& camera : images.cameras) {
+    const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
+    const std::size_t value_bytes = bytes_per_value(images.format);
+    visit(camera.data, static_cast<std::size_t>(camera.view_stride) * value_bytes, 3 * pixels * value_bytes, views);
+    auto visit_plane = [&](auto* plane) {
+      if (plane) visit(static_cast<void*>(plane), pixels * sizeof *plane, pixels * sizeof *plane, views);
+    };
+    visit_plane(camera.depth_m);
+    visit_plane(camera.class_id);
+    visit_plane(camera.instance_id);
+  }
+}
+
+/// Fills images on the host with kUnwrittenByte.
+void spoil(const ImageBatch& images);
 
 }  // namespace pictura

@@ -1,6 +1,8 @@
 #include "pictura/bench/render.h"
 
+#include <algorithm>
 #include <chrono>
+#include <optional>
 
 #include "pictura/common/error.h"
 #include "pictura/common/interrupt.h"
@@ -19,6 +21,7 @@ class HostTarget final : public RenderTarget {
       : scene_(worlds.simulator->scene()),
         views_(worlds.views.data(), static_cast<std::size_t>(render_case.num_views)),
         images_(render_case.config.rig, render_case.num_views, render_case.format, render_case.planes) {}
+  void spoil() override { pictura::spoil(images_.batch()); }
   double draw(Renderer* renderer, int calls) override {
     const auto begin = std::chrono::steady_clock::now();
     for (int call = 0; call < calls; ++call) renderer->render(scene_, views_, images_.batch());
@@ -32,28 +35,42 @@ class HostTarget final : public RenderTarget {
   HostImages images_;
 };
 
-void compare_with_oracle(const DrivenWorlds& worlds, const RenderCase& render_case, RenderTarget* target,
-                         RenderMeasurement* result_out) {
-  RendererConfig config{.rig = render_case.config.rig, .line_floor_px = render_case.config.line_floor_px};
-  const auto oracle = make_renderer("cpu", config);
-  for (const StaticGeometry& geometry : worlds.geometries) oracle->upload(geometry);
-  const int checked = std::min(render_case.checked_views, render_case.num_views);
-  HostImages expected(config.rig, checked, render_case.format);
-  oracle->render(worlds.simulator->scene(), {worlds.views.data(), static_cast<std::size_t>(checked)}, expected.batch());
-  const HostImages& actual = target->images(checked);
-  ImageError error;
-  for (int k = 0; k < static_cast<int>(config.rig.cameras.size()); ++k) {
-    for (int view = 0; view < checked; ++view) {
-      error.add(compare_image(actual.camera(k), expected.camera(k), render_case.format, view));
-    }
+// The oracle's images of the first views, and how far others are from them.
+class OracleCheck {
+ public:
+  OracleCheck(const DrivenWorlds& worlds, const RenderCase& render_case)
+      : render_case_(render_case),
+        num_views_(std::min(render_case.checked_views, render_case.num_views)),
+        expected_(render_case.config.rig, num_views_, render_case.format, render_case.planes) {
+    const RendererConfig config{.rig = render_case.config.rig, .line_floor_px = render_case.config.line_floor_px};
+    const auto oracle = make_renderer("cpu", config);
+    for (const StaticGeometry& geometry : worlds.geometries) oracle->upload(geometry);
+    oracle->render(worlds.simulator->scene(), {worlds.views.data(), static_cast<std::size_t>(num_views_)},
+                   expected_.batch());
   }
-  result_out->error = error;
-  if (render_case.backend != "cuda") return;
-  PICTURA_CHECK(error.is_within_tolerance(),
-                "bench render: cuda: expected the oracle's images, got {} of {} values off by more than 1/255, and {} "
-                "at worst",
-                error.beyond, error.values, error.worst);
-}
+
+  /// Adds to the error; throws when `cuda` is out of tolerance.
+  void compare(RenderTarget* target, ImageError* error_inout) const {
+    const HostImages& actual = target->images(num_views_);
+    ImageError error;
+    for (int k = 0; k < static_cast<int>(render_case_.config.rig.cameras.size()); ++k) {
+      for (int view = 0; view < num_views_; ++view) {
+        error.add(compare_image(actual.camera(k), expected_.camera(k), render_case_.format, view));
+      }
+    }
+    error_inout->add(error);
+    if (render_case_.backend != "cuda") return;
+    PICTURA_CHECK(error.is_within_tolerance(),
+                  "bench render: cuda: expected the oracle's images, got {} of {} values off by more than 1/255, {} at "
+                  "worst, and planes of another surface at {} of {} pixels",
+                  error.beyond, error.values, error.worst, error.differing_plane_pixels, error.plane_pixels);
+  }
+
+ private:
+  const RenderCase& render_case_;
+  int num_views_;
+  HostImages expected_;
+};
 
 std::unique_ptr<RenderTarget> make_target(const DrivenWorlds& worlds, const RenderCase& render_case) {
   if (render_case.config.space == MemorySpace::host) return make_host_target(worlds, render_case);
@@ -93,15 +110,22 @@ RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& r
 #ifdef PICTURA_HAS_CUDA
   if (watch) result.up_front_bytes = watch->taken_bytes();
 #endif
-  const double first_ms = target->draw(renderer.get(), 1);  // warms up
+  target->spoil();
+  target->draw(renderer.get(), 1);  // warms up
+  std::optional<OracleCheck> check;
   if (render_case.checked_views > 0 && render_case.backend != "cpu" && render_case.backend != "null") {
-    compare_with_oracle(worlds, render_case, target.get(), &result);
+    check.emplace(worlds, render_case);
+    check->compare(target.get(), &result.error);
   }
-  const double one_ms = render_case.repeats > 0 ? target->draw(renderer.get(), 1) : first_ms;
-  const int calls = std::max(1, static_cast<int>(1e3 * render_case.repeat_s / one_ms));
-  for (int repeat = 0; repeat < render_case.repeats; ++repeat) {
-    result.call_ms.push_back(target->draw(renderer.get(), calls));
-    if (interrupted()) throw Interrupted("interrupted");
+  if (render_case.repeats > 0) {
+    target->spoil();
+    const double one_ms = target->draw(renderer.get(), 1);
+    const int calls = std::max(1, static_cast<int>(1e3 * render_case.repeat_s / one_ms));
+    for (int repeat = 0; repeat < render_case.repeats; ++repeat) {
+      result.call_ms.push_back(target->draw(renderer.get(), calls));
+      if (interrupted()) throw Interrupted("interrupted");
+    }
+    if (check) check->compare(target.get(), &result.error);
   }
 #ifdef PICTURA_HAS_CUDA
   if (watch) result.most_bytes = watch->most_bytes();

@@ -1,4 +1,5 @@
-// Times renderers on scenes in the memory that they draw from, after comparing what they drew with the oracle.
+// Times renderers on scenes in the memory that they draw from, and compares what they drew with the oracle, before and
+// after.
 #pragma once
 
 #include <memory>
@@ -17,7 +18,7 @@ struct RenderCase {
   int num_views = 0;      // the first so many of the driven worlds
   PixelFormat format = PixelFormat::u8;
   Planes planes = Planes::none;
-  int checked_views = 8;  // compared with the oracle; 0: none
+  int checked_views = 8;  // compared with the oracle, before anything is timed and after; 0: none
   int repeats = 7;        // 0: nothing is timed
   double repeat_s = 1.0;  // calls of a repeat follow each other for about as long
   bool watches_memory = false;
@@ -26,7 +27,7 @@ struct RenderCase {
 struct RenderMeasurement {
   std::string choice;           // what make_renderer() says
   std::vector<double> call_ms;  // one per repeat: the mean of its calls
-  ImageError error;             // against the oracle, of the views that are checked
+  ImageError error;             // against the oracle, of the views that are checked, both times
   // Where memory is watched, of the device: once the maps are uploaded, and the most that was ever taken, both without
   // scene, views and images.
   double up_front_bytes = 0, most_bytes = 0, image_bytes = 0;
@@ -39,6 +40,8 @@ RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& r
 class RenderTarget {
  public:
   virtual ~RenderTarget() = default;
+  /// Overwrites all images with what nobody draws.
+  virtual void spoil() = 0;
   /// Milliseconds of one of so many calls in a row; returns when all is drawn.
   virtual double draw(Renderer* renderer, int calls) = 0;
   /// What was drawn, of at least so many views.

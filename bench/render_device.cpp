@@ -37,6 +37,12 @@ class DeviceTarget final : public RenderTarget {
   DeviceTarget(const DeviceTarget&) = delete;
   DeviceTarget& operator=(const DeviceTarget&) = delete;
 
+  void spoil() override {
+    visit_memory(batch_, [](void* first, std::size_t stride_bytes, std::size_t row_bytes, std::size_t rows) {
+      PICTURA_CUDA(cudaMemset2D(first, stride_bytes, kUnwrittenByte, row_bytes, rows));
+    });
+    PICTURA_CUDA(cudaDeviceSynchronize());
+  }
   double draw(Renderer* renderer, int calls) override {
     PICTURA_CUDA(cudaEventRecord(begin_));
     for (int call = 0; call < calls; ++call) renderer->render(scene_.batch(), views_, batch_);

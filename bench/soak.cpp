@@ -1,28 +1,39 @@
 #include "pictura/bench/soak.h"
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "pictura/bench/driving.h"
 #include "pictura/common/error.h"
 #include "pictura/common/interrupt.h"
 #include "pictura/common/make_renderer.h"
+#include "pictura/common/raster_camera.h"
 #include "pictura/common/rng.h"
 #include "pictura/map/load_map.h"
+#include "pictura/tests/support/image_truth.h"
+#include "pictura/tests/support/tolerances.h"
 
 namespace pictura {
 
 namespace {
 
 constexpr std::size_t kMostFaults = 100;
+constexpr int kQueries = 32;           // of visibility, in each scene
+constexpr int kMostHiddenAgents = 64;  // in a view's list
 
-RandomStream random_of(const SoakOptions& options, int64_t scene, uint32_t what) {
-  return {options.seed, what, 0, static_cast<uint32_t>(scene >> 32), static_cast<uint32_t>(scene), Purpose::soak};
+// What is drawn of a scene, each from a stream of its own.
+enum class Draw : uint32_t { rigs, world, views, settings, hidden_agents, queries };
+
+RandomStream random_of(const SoakOptions& options, int64_t scene, Draw what) {
+  const auto high = static_cast<uint32_t>(scene >> 32), low = static_cast<uint32_t>(scene);
+  return {options.seed, static_cast<uint32_t>(what), 0, high, low, Purpose::soak};
 }
 
 // Rigs are few, because kernels are built for each: the paper's, and three of cameras of odd sizes.
 std::vector<Rig> draw_rigs(const SoakOptions& options) {
   std::vector<Rig> rigs{paper_rig()};
-  RandomStream random = random_of(options, 0, 0);
+  RandomStream random = random_of(options, 0, Draw::rigs);
   while (rigs.size() < 4) {
     Rig rig = paper_rig();
     rig.cameras.resize(static_cast<std::size_t>(1 + random.below(4)));
@@ -35,6 +46,26 @@ std::vector<Rig> draw_rigs(const SoakOptions& options) {
   return rigs;
 }
 
+// How a scene is drawn: settings of the renderer and of the call. None of them asks for other kernels.
+struct Settings {
+  RendererConfig config;
+  PixelFormat format = PixelFormat::u8;
+  Planes planes = Planes::none;
+};
+
+Settings draw_settings(const SoakOptions& options, int64_t scene, const std::vector<Rig>& rigs) {
+  RandomStream random = random_of(options, scene, Draw::settings);
+  Settings settings{
+      .config = {.rig = rigs[static_cast<std::size_t>(scene) % rigs.size()], .num_threads = options.num_threads}};
+  const float floors_px[] = {0, settings.config.line_floor_px, random.uniform(0, kGuardBand_px)};
+  settings.config.line_floor_px = floors_px[random.below(3)];
+  settings.config.debug_palette = random.below(2) > 0;
+  const PixelFormat formats[] = {PixelFormat::u8, PixelFormat::f16, PixelFormat::f32};
+  settings.format = formats[random.below(3)];
+  settings.planes = random.below(2) > 0 ? Planes::all : Planes::none;
+  return settings;
+}
+
 // A world of one of the maps, driven anew for each scene: its number says which and for how long, so that a scene can
 // be drawn again without those before it.
 class Scenes {
@@ -44,7 +75,7 @@ class Scenes {
   }
 
   void drive(int64_t scene) {
-    RandomStream random = random_of(options_, scene, 1);
+    RandomStream random = random_of(options_, scene, Draw::world);
     SimulatorConfig config;
     config.seed = random.bits();
     config.num_threads = options_.num_threads;
@@ -57,9 +88,9 @@ class Scenes {
     drive_randomly(simulator_.get(), config.seed, 1 + random.below(30));
   }
 
-  // Of agents, as they are or from somewhere near them.
-  std::vector<View> views(int64_t scene) const {
-    RandomStream random = random_of(options_, scene, 2);
+  // Of agents, as they are or from somewhere near them; some leave more agents out than their own.
+  std::vector<View> views(int64_t scene) {
+    RandomStream random = random_of(options_, scene, Draw::views);
     const Span<const View> of_agents = simulator_->views();
     std::vector<View> views;
     for (int i = 0; i < options_.views; ++i) {
@@ -74,16 +105,90 @@ class Scenes {
       }
       views.push_back(view);
     }
+    hide_agents(scene, &views);
     return views;
   }
 
-  Simulator& simulator() { return *simulator_; }
+  // As the views that were drawn last need it.
+  SceneBatch batch() const {
+    SceneBatch batch = simulator_->scene();
+    batch.hidden_agents = hidden_agents_;
+    return batch;
+  }
+
+  std::vector<VisibilityQuery> queries(int64_t scene) const {
+    RandomStream random = random_of(options_, scene, Draw::queries);
+    std::vector<VisibilityQuery> queries(kQueries);
+    for (VisibilityQuery& query : queries) query = {random.below(options_.views), random.below(num_agents())};
+    return queries;
+  }
+
+  std::vector<StaticGeometry> geometries() const { return simulator_->geometries(); }
 
  private:
+  int num_agents() const { return static_cast<int>(simulator_->scene().agents.size()); }
+
+  void hide_agents(int64_t scene, std::vector<View>* views_inout) {
+    RandomStream random = random_of(options_, scene, Draw::hidden_agents);
+    hidden_agents_.clear();
+    for (View& view : *views_inout) {
+      view.hidden_begin = static_cast<int32_t>(hidden_agents_.size());
+      const int count = random.below(2) > 0 ? 1 + random.below(std::min(num_agents(), kMostHiddenAgents)) : 0;
+      for (int i = 0; i < count; ++i) hidden_agents_.push_back(random.below(num_agents()));
+      view.hidden_end = static_cast<int32_t>(hidden_agents_.size());
+    }
+  }
+
   SoakOptions options_;
   std::vector<std::shared_ptr<const RoadMap>> maps_;
   std::unique_ptr<Simulator> simulator_;
+  std::vector<int32_t> hidden_agents_;
 };
+
+// Keeps a fault, unless there are many already.
+template <typename Fault>
+void note(const Fault& fault, std::vector<Fault>* faults_out, SoakResult* result_out) {
+  if (result_out->first_faulty_scene < 0) result_out->first_faulty_scene = fault.scene;
+  if (faults_out->size() < kMostFaults) faults_out->push_back(fault);
+}
+
+// Draws a scene with both and adds how far they are apart.
+void compare_images(int64_t scene, const SceneBatch& batch, const std::vector<View>& views, const Settings& settings,
+                    Renderer* renderer, Renderer* oracle, SoakResult* result_out) {
+  const Rig& rig = settings.config.rig;
+  const int num_views = static_cast<int>(views.size());
+  HostImages drawn(rig, num_views, settings.format, settings.planes);
+  HostImages expected(rig, num_views, settings.format, settings.planes);
+  spoil(drawn.batch());
+  renderer->render(batch, views, drawn.batch());
+  oracle->render(batch, views, expected.batch());
+  for (int camera = 0; camera < static_cast<int>(rig.cameras.size()); ++camera) {
+    for (int view = 0; view < num_views; ++view) {
+      const ImageError error = compare_image(drawn.camera(camera), expected.camera(camera), settings.format, view);
+      result_out->error.add(error);
+      ++result_out->images;
+      if (error.is_within_tolerance()) continue;
+      ++result_out->images_out_of_tolerance;
+      note({scene, view, camera, error}, &result_out->faults, result_out);
+    }
+  }
+}
+
+// Asks both of the same agents and adds how far their answers are apart.
+void compare_visibility(int64_t scene, const SceneBatch& batch, const std::vector<View>& views,
+                        const std::vector<VisibilityQuery>& queries, Renderer* renderer, Renderer* oracle,
+                        SoakResult* result_out) {
+  std::vector<float> answers(queries.size(), -1.0f), expected(queries.size());
+  renderer->visibility(batch, views, queries, answers);
+  oracle->visibility(batch, views, queries, expected);
+  result_out->queries += static_cast<int64_t>(queries.size());
+  for (std::size_t i = 0; i < queries.size(); ++i) {
+    const bool in_no_frame = std::isnan(expected[i]) && std::isnan(answers[i]);
+    if (in_no_frame || value_error(answers[i], expected[i]) <= kKernelVisibilityError) continue;
+    ++result_out->answers_out_of_tolerance;
+    note({scene, queries[i], answers[i], expected[i]}, &result_out->visibility_faults, result_out);
+  }
+}
 
 }  // namespace
 
@@ -95,27 +200,17 @@ SoakResult soak(const SoakOptions& options, const std::function<void(const SoakR
   for (int64_t scene = options.first_scene;; ++scene) {
     if (interrupted()) throw Interrupted("interrupted");
     scenes.drive(scene);
-    const RendererConfig config{.rig = rigs[static_cast<std::size_t>(scene) % rigs.size()],
-                                .num_threads = options.num_threads};
-    const auto renderer = make_renderer(options.backend, config, &result.choice), oracle = make_renderer("cpu", config);
-    for (const StaticGeometry& geometry : scenes.simulator().geometries()) {
+    const Settings settings = draw_settings(options, scene, rigs);
+    const auto renderer = make_renderer(options.backend, settings.config, &result.choice);
+    const auto oracle = make_renderer("cpu", settings.config);
+    for (const StaticGeometry& geometry : scenes.geometries()) {
       renderer->upload(geometry);
       oracle->upload(geometry);
     }
     const std::vector<View> views = scenes.views(scene);
-    HostImages drawn(config.rig, options.views), expected(config.rig, options.views);
-    renderer->render(scenes.simulator().scene(), views, drawn.batch());
-    oracle->render(scenes.simulator().scene(), views, expected.batch());
-    for (int camera = 0; camera < static_cast<int>(config.rig.cameras.size()); ++camera) {
-      for (int view = 0; view < options.views; ++view) {
-        const ImageError error = compare_image(drawn.camera(camera), expected.camera(camera), PixelFormat::u8, view);
-        result.error.add(error);
-        ++result.images;
-        if (error.is_within_tolerance()) continue;
-        ++result.images_out_of_tolerance;
-        if (result.faults.size() < kMostFaults) result.faults.push_back({scene, view, camera, error});
-      }
-    }
+    const SceneBatch batch = scenes.batch();
+    compare_images(scene, batch, views, settings, renderer.get(), oracle.get(), &result);
+    compare_visibility(scene, batch, views, scenes.queries(scene), renderer.get(), oracle.get(), &result);
     ++result.scenes;
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     on_scene(result);

@@ -1,4 +1,5 @@
-// A long comparison of a renderer with the oracle, over scenes, views and rigs that a seed draws.
+// A long comparison of a renderer with the oracle, over scenes, views, rigs and settings that a seed draws: of colours
+// in every format, planes and visibility.
 #pragma once
 
 #include <functional>
@@ -6,6 +7,7 @@
 #include <vector>
 
 #include "pictura/bench/image_error.h"
+#include "pictura/common/renderer.h"
 
 namespace pictura {
 
@@ -28,16 +30,27 @@ struct SoakFault {
   ImageError error;
 };
 
-struct SoakResult {
-  std::string choice;  // what make_renderer() says
-  int64_t scenes = 0, images = 0;
-  double seconds = 0;
-  ImageError error;               // over all images
-  std::vector<SoakFault> faults;  // the first hundred
-  int64_t images_out_of_tolerance = 0;
+/// An answer out of tolerance.
+struct VisibilityFault {
+  int64_t scene = 0;
+  VisibilityQuery query;
+  float answer = 0, expected = 0;
 };
 
-/// Calls on_scene(result so far) after each scene. Throws Error when the backend cannot run here.
+struct SoakResult {
+  std::string choice;  // what make_renderer() says
+  int64_t scenes = 0, images = 0, queries = 0;
+  double seconds = 0;
+  ImageError error;  // over all images
+  int64_t images_out_of_tolerance = 0, answers_out_of_tolerance = 0;
+  // The first hundred of each.
+  std::vector<SoakFault> faults;
+  std::vector<VisibilityFault> visibility_faults;
+  int64_t first_faulty_scene = -1;
+};
+
+/// Calls on_scene(result so far) after each scene. Throws Error when the backend cannot run here or draws no planes,
+/// halves or visibility, as gl.
 SoakResult soak(const SoakOptions& options, const std::function<void(const SoakResult&)>& on_scene);
 
 }  // namespace pictura

@@ -359,17 +359,20 @@ class Benchmarks(CommandCase):
         soak = ["bench", "soak", "--map", "procedural:1", "--agents", 20, "--views", 2]
         oracle = self.json_of(*soak, "--backend", "cpu", "--scenes", 3)
         self.assertEqual((oracle["scenes"], oracle["images_out_of_tolerance"], oracle["worst"]), (3, 0, 0))
-        self.assertGreater(oracle["images"], 6)
+        self.assertEqual((oracle["differing_plane_pixels"], oracle["answers_out_of_tolerance"]), (0, 0))
+        for key in ("images", "plane_pixels", "visibility_queries"):
+            self.assertGreater(oracle[key], 6, key)
         # Black images are out of tolerance. A scene is the same whichever came before it.
         result = run(*soak, "--backend", "null", "--first", 2, "--scenes", 1, "--json")
         self.assertEqual(result.returncode, 1)
         black = json.loads(result.stdout)
         self.assertGreater(black["images_out_of_tolerance"], 0)
-        self.assertEqual({fault["scene"] for fault in black["faults"]}, {2})
+        self.assertGreater(black["answers_out_of_tolerance"], 0)
+        self.assertEqual({fault["scene"] for fault in black["faults"] + black["visibility_faults"]}, {2})
         self.assertIn("--first 2 --scenes 1", result.stderr)
         again = json.loads(run(*soak, "--backend", "null", "--first", 1, "--scenes", 2, "--json").stdout)
-        of_scene_2 = [fault for fault in again["faults"] if fault["scene"] == 2]
-        self.assertEqual(of_scene_2, black["faults"])
+        for key in ("faults", "visibility_faults"):
+            self.assertEqual([fault for fault in again[key] if fault["scene"] == 2], black[key])
 
     def test_rates_of_rendering_are_drawn_from_results_of_one_benchmark_or_of_several(self):
         names = ["cuda 32x18 2048 egos", "cuda 96x54 2048 egos", "cuda 96x54 64 egos", "cpu 64x64 2048 egos"]

@@ -29,7 +29,7 @@ ImageError error_with(PixelFormat format, Value first_value) {
 TEST(ImageError, WhatIsNoFiniteNumberIsInfinitelyOff) {
   const float infinite = std::numeric_limits<float>::infinity();
   for (const ImageError& error : {error_with(PixelFormat::f32, std::nanf("")), error_with(PixelFormat::f32, infinite),
-                                  error_with(PixelFormat::f16, uint16_t{0x7E00}),    // NaN
+                                  error_with(PixelFormat::f16, uint16_t{0x7E00}),     // NaN
                                   error_with(PixelFormat::f16, uint16_t{0xFC00})}) {  // -infinite
     EXPECT_EQ(error.values, 3 * 8 * 8);
     EXPECT_EQ(error.differing, 1);
@@ -46,6 +46,45 @@ TEST(ImageError, EachFormatIsReadInItsOwnUnits) {
   EXPECT_DOUBLE_EQ(error_with(PixelFormat::f16, uint16_t{0xB800}).worst, 0.5);      // -0.5
   EXPECT_DOUBLE_EQ(error_with(PixelFormat::f16, uint16_t{0x0001}).worst, 0x1p-24);  // subnormal
   EXPECT_EQ(error_with(PixelFormat::f16, uint16_t{0x8000}).differing, 0);           // -0
+}
+
+TEST(ImageError, WhatIsNotDrawnShowsInEveryFormatAndPlane) {
+  for (const PixelFormat format : {PixelFormat::u8, PixelFormat::f16, PixelFormat::f32}) {
+    HostImages actual(small_rig(), 2, format, Planes::all), expected(small_rig(), 2, format, Planes::all);
+    spoil(actual.batch());
+    for (int view = 0; view < 2; ++view) {
+      const ImageError error = compare_image(actual.camera(0), expected.camera(0), format, view);
+      EXPECT_EQ(error.beyond, error.values);
+      EXPECT_EQ(error.plane_pixels, 8 * 8);
+      EXPECT_EQ(error.differing_plane_pixels, error.plane_pixels);
+    }
+  }
+}
+
+TEST(ImageError, PlanesTellOfTheSameSurfaceOrNot) {
+  const float infinite = std::numeric_limits<float>::infinity();
+  HostImages actual(small_rig(), 2, PixelFormat::u8, Planes::all),
+      expected(small_rig(), 2, PixelFormat::u8, Planes::all);
+  const CameraImages &drawn = actual.camera(0), &wanted = expected.camera(0);
+  auto differing = [&] { return compare_image(drawn, wanted, PixelFormat::u8, 1).differing_plane_pixels; };
+  auto depths_differ = [&](float depth_m, float expected_m) {
+    drawn.depth_m[64] = depth_m;
+    wanted.depth_m[64] = expected_m;
+    return differing() == 1;
+  };
+  EXPECT_FALSE(depths_differ(infinite, infinite));
+  EXPECT_FALSE(depths_differ(50.001f, 50.0f));
+  EXPECT_TRUE(depths_differ(50.01f, 50.0f));
+  EXPECT_TRUE(depths_differ(50.0f, infinite));
+  EXPECT_TRUE(depths_differ(infinite, 50.0f));
+  EXPECT_TRUE(depths_differ(std::nanf(""), 50.0f));
+  EXPECT_FALSE(depths_differ(50.0f, 50.0f));
+  drawn.class_id[65] = 1;
+  EXPECT_EQ(differing(), 1);
+  drawn.instance_id[66] = 300;
+  EXPECT_EQ(differing(), 2);
+  EXPECT_FALSE(compare_image(drawn, wanted, PixelFormat::u8, 1).is_within_tolerance());
+  EXPECT_TRUE(compare_image(drawn, wanted, PixelFormat::u8, 0).is_within_tolerance());
 }
 
 }  // namespace
