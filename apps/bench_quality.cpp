@@ -4,10 +4,12 @@
 #include <fmt/ranges.h>
 
 #include "pictura/apps/bench.h"
+#include "pictura/apps/finite_range.h"
 #include "pictura/apps/report.h"
 #include "pictura/bench/quality.h"
 #include "pictura/common/error.h"
 #include "pictura/common/interrupt.h"
+#include "pictura/common/raster_camera.h"
 #include "pictura/map/load_map.h"
 
 namespace pictura {
@@ -104,7 +106,7 @@ void add_quality_benchmark(CLI::App& bench) {
       ->capture_default_str();
   command->add_flag("!--no-walls", arguments->world.walls, "Leave out the walls along the building lines");
   command->add_option("--line-floor", arguments->line_floor_px, "Least width of a line on screen in pixels")
-      ->check(CLI::NonNegativeNumber)
+      ->check(finite_range(0, kGuardBand_px))
       ->capture_default_str();
   command->add_option("--figure", arguments->figure, "Write crops side by side as PNG");
   command->add_flag("--json", arguments->json, "Print one JSON object");

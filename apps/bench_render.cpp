@@ -9,6 +9,7 @@
 
 #include "pictura/apps/bench.h"
 #include "pictura/apps/drive.h"
+#include "pictura/apps/finite_range.h"
 #include "pictura/apps/plot_results.h"
 #include "pictura/apps/report.h"
 #include "pictura/bench/render.h"
@@ -203,7 +204,7 @@ void add_render_benchmark(CLI::App& bench) {
   add_world_options(command, &arguments->world);
   command->add_option("--egos", arguments->egos, "Agents drawn in one call; default: all of one world for each map")
       ->delimiter(',')
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1, kMaxSlots));
   command->add_option("--backend", arguments->backends, "cpu, cuda, gl, gl:egl, gl:osmesa")
       ->delimiter(',')
       ->capture_default_str();
@@ -224,7 +225,7 @@ void add_render_benchmark(CLI::App& bench) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_option("--repeats", arguments->repeats)->check(CLI::PositiveNumber)->capture_default_str();
-  command->add_option("--repeat-seconds", arguments->repeat_s)->check(CLI::PositiveNumber)->capture_default_str();
+  command->add_option("--repeat-seconds", arguments->repeat_s)->check(finite_range(1e-3, 3600))->capture_default_str();
   add_plot_options(command, &arguments->plot);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(

@@ -8,6 +8,7 @@
 #include <fmt/ranges.h>
 
 #include "pictura/apps/bench.h"
+#include "pictura/apps/finite_range.h"
 #include "pictura/apps/plot_results.h"
 #include "pictura/apps/report.h"
 #include "pictura/bench/render.h"
@@ -157,12 +158,12 @@ void add_simulate_benchmark(CLI::App& bench) {
   add_maps_option(command, &arguments->maps);
   add_world_options(command, &arguments->world);
   command->add_option("--backend", arguments->backends, "cpu, cuda")->delimiter(',')->capture_default_str();
-  auto* worlds =
-      command->add_option("--worlds", arguments->num_worlds, "Default: one for each map")->check(CLI::PositiveNumber);
+  auto* worlds = command->add_option("--worlds", arguments->num_worlds, "Default: one for each map")
+                     ->check(CLI::Range(1, kMaxSlots));
   auto* slots = command
                     ->add_option("--slots", arguments->slots,
                                  "So many agents in worlds of 1 to --agents, as in training, instead of equal worlds")
-                    ->check(CLI::PositiveNumber)
+                    ->check(CLI::Range(1, kMaxSlots))
                     ->excludes(worlds);
   command
       ->add_option(
@@ -175,7 +176,7 @@ void add_simulate_benchmark(CLI::App& bench) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command->add_option("--repeats", arguments->repeats)->check(CLI::PositiveNumber)->capture_default_str();
-  command->add_option("--repeat-seconds", arguments->repeat_s)->check(CLI::PositiveNumber)->capture_default_str();
+  command->add_option("--repeat-seconds", arguments->repeat_s)->check(finite_range(1e-3, 3600))->capture_default_str();
   add_plot_options(command, &arguments->plot);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(

@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include "pictura/apps/bench.h"
+#include "pictura/apps/finite_range.h"
 #include "pictura/apps/report.h"
 #include "pictura/bench/render.h"
 #include "pictura/bench/soak.h"
@@ -111,7 +112,9 @@ void add_soak_benchmark(CLI::App& bench) {
   CLI::App* command = bench.add_subcommand("soak", "Hold a renderer against the oracle on random scenes, for long");
   command->add_option("--backend", soak.backend, "The renderer")->capture_default_str();
   add_maps_option(command, &soak.maps);
-  command->add_option("--minutes", arguments->minutes, "At most")->check(CLI::PositiveNumber)->capture_default_str();
+  command->add_option("--minutes", arguments->minutes, "At most")
+      ->check(finite_range(1e-3, 1e5))
+      ->capture_default_str();
   command->add_option("--scenes", soak.most_scenes, "At most; 0: as many as there is time for")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
@@ -119,9 +122,9 @@ void add_soak_benchmark(CLI::App& bench) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_option("--agents", soak.agents, "Agents of a world, at most")
-      ->check(CLI::Range(1, 4096))
+      ->check(CLI::Range(1, kMaxAgentsPerWorld))
       ->capture_default_str();
-  command->add_option("--views", soak.views, "Views of a scene")->check(CLI::PositiveNumber)->capture_default_str();
+  command->add_option("--views", soak.views, "Views of a scene")->check(CLI::Range(1, 4096))->capture_default_str();
   command->add_option("--seed", soak.seed)->capture_default_str();
   command->add_option("--threads", soak.num_threads, "Host threads; 0: all")
       ->check(CLI::NonNegativeNumber)

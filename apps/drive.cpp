@@ -1,5 +1,6 @@
 #include "pictura/apps/drive.h"
 
+#include "pictura/apps/finite_range.h"
 #include "pictura/common/error.h"
 #include "pictura/common/make_renderer.h"
 #include "pictura/common/rng.h"
@@ -17,9 +18,9 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
   command
       ->add_option("--pedestrians", options_out->pedestrian_fraction,
                    "Share of the agents; default: as the policy was trained, else 0.1")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(finite_range(0, 1));
   command->add_option("--cyclists", options_out->cyclist_fraction, "Share of the agents; default: likewise")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(finite_range(0, 1));
   command->add_option("--parked", options_out->parked_cars, "Parked cars; default: likewise, else 32")
       ->check(CLI::Range(0, kMaxAgentsPerWorld));
   command->add_option("--seed", options_out->seed, "Places, sizes, goals and actions")->capture_default_str();

@@ -6,12 +6,14 @@
 #include "pictura/apps/draw_planes.h"
 #include "pictura/apps/drawing.h"
 #include "pictura/apps/drive.h"
+#include "pictura/apps/finite_range.h"
 #include "pictura/apps/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/file.h"
 #include "pictura/common/hash.h"
 #include "pictura/common/interrupt.h"
 #include "pictura/common/make_renderer.h"
+#include "pictura/common/raster_camera.h"
 #include "pictura/common/scene_file.h"
 
 namespace pictura {
@@ -187,7 +189,7 @@ void add_render_command(CLI::App& app) {
   command
       ->add_option("--line-floor", arguments->line_floor_px,
                    "Least width of a line on screen in pixels; 0 turns it off")
-      ->check(CLI::NonNegativeNumber)
+      ->check(finite_range(0, kGuardBand_px))
       ->capture_default_str();
   command->add_option("--planes", arguments->planes, "Also write these planes as pictures: depth, class, instance")
       ->delimiter(',')

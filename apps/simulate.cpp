@@ -7,6 +7,7 @@
 #include "pictura/apps/drawing.h"
 #include "pictura/apps/drive.h"
 #include "pictura/apps/film.h"
+#include "pictura/apps/finite_range.h"
 #include "pictura/apps/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/interrupt.h"
@@ -114,7 +115,7 @@ void add_simulate_command(CLI::App& app) {
       "Film it into this .mp4 or .gif: from above, with goals, lights and why agents halted, and from one "
       "agent's cameras");
   command->add_option("--film-width", arguments->film_width_m, "Metres that it shows from above; 0: the whole map")
-      ->check(CLI::Range(0.0, 1e5))
+      ->check(finite_range(0, 1e5))
       ->capture_default_str();
   command->add_option("--film-agent", arguments->film_agent, "The agent that the film follows")
       ->check(CLI::NonNegativeNumber)

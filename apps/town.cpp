@@ -1,5 +1,6 @@
 // `pictura town`: writes a procedural town as OpenDRIVE.
 #include "pictura/apps/commands.h"
+#include "pictura/apps/finite_range.h"
 #include "pictura/apps/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/file.h"
@@ -19,7 +20,7 @@ void add_town_command(CLI::App& app) {
   command->add_option("--blocks", arguments->blocks, "Blocks of houses along x and y, as AxB")->capture_default_str();
   for (const TownFeature& feature : town_features()) {
     command->add_option(fmt::format("--{}", feature.name), arguments->town.*feature.value, feature.help)
-        ->check(CLI::Range(feature.low, feature.high))
+        ->check(finite_range(feature.low, feature.high))
         ->capture_default_str();
   }
   command->add_option("--out", arguments->out, "The .xodr file to write")->required();

@@ -15,6 +15,9 @@ namespace pictura {
 
 namespace {
 
+// In a row: more than any repeat needs, and fewer than an int has room for.
+constexpr double kMostCalls = 1e9;
+
 class HostTarget final : public RenderTarget {
  public:
   HostTarget(const DrivenWorlds& worlds, const RenderCase& render_case)
@@ -120,7 +123,7 @@ RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& r
   if (render_case.repeats > 0) {
     target->spoil();
     const double one_ms = target->draw(renderer.get(), 1);
-    const int calls = std::max(1, static_cast<int>(1e3 * render_case.repeat_s / one_ms));
+    const int calls = static_cast<int>(std::clamp(1e3 * render_case.repeat_s / one_ms, 1.0, kMostCalls));
     for (int repeat = 0; repeat < render_case.repeats; ++repeat) {
       result.call_ms.push_back(target->draw(renderer.get(), calls));
       if (interrupted()) throw Interrupted("interrupted");

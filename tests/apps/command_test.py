@@ -79,6 +79,29 @@ class Usage(CommandCase):
             self.assertEqual(result.returncode, 0, result.stderr)
             self.assertIn(f"pictura {command}", result.stdout)
 
+    def test_numbers_that_are_not_finite_or_out_of_range_are_refused(self):
+        cases = [
+            ("town", "--out", self.folder / "town.xodr", "--hills-m"),
+            ("render", "procedural:1", "--out", self.folder, "--line-floor"),
+            ("render", "procedural:1", "--out", self.folder, "--pedestrians"),
+            ("simulate", "procedural:1", "--cyclists"),
+            ("simulate", "procedural:1", "--film-width"),
+        ]
+        if "quality" in run("bench", "--help").stdout:
+            cases += [
+                ("bench", "soak", "--minutes"),
+                ("bench", "quality", "--line-floor"),
+                ("bench", "render", "--repeat-seconds"),
+                ("bench", "render", "--egos"),
+                ("bench", "simulate", "--repeat-seconds"),
+                ("bench", "simulate", "--slots"),
+            ]
+        for arguments in cases:
+            for number in ("nan", "inf", "-1", "2000000000"):
+                with self.subTest(" ".join(map(str, arguments)), number=number):
+                    self.assert_refused(2, arguments[-1], *arguments, number)
+        self.assert_refused(2, "--line-floor: expected a number of 0 to 8, got '8.5'", *cases[1], "8.5")
+
     def test_wrong_usage_exits_with_2(self):
         self.assert_refused(2, "--out", "town", "--seed", 1)
         self.assert_refused(2, "--blocks", "town", "--blocks", "3", "--out", self.folder / "t.xodr")
