@@ -7,6 +7,8 @@
 #include <fstream>
 #include <numeric>
 
+#include <fmt/ranges.h>
+
 #include "pictura/apps/commands.h"
 #include "pictura/apps/drive.h"
 #include "pictura/apps/report.h"
@@ -36,10 +38,8 @@ std::string population_of(const WorldOptions& world) {
   return text;
 }
 
-void add_maps_option(CLI::App* command, std::vector<std::string>* maps) {
-  command
-      ->add_option("--map", *maps,
-                   "Maps, in turn; towns: all of the map folder; default: Town01 where it is found, else procedural:1")
+void add_maps_option(CLI::App* command, std::vector<std::string>* maps, const std::string& default_maps) {
+  command->add_option("--map", *maps, "Maps, in turn; towns: all of the map folder; default: " + default_maps)
       ->delimiter(',');
 }
 
@@ -50,6 +50,13 @@ std::vector<std::string> named_maps(const std::vector<std::string>& maps) {
   if (maps != std::vector<std::string>{"towns"}) return maps;
   PICTURA_CHECK(!towns.empty(), "--map towns: {} has none", map_folder());
   return towns;
+}
+
+void check_backends(const std::vector<std::string>& backends, const std::vector<std::string>& known) {
+  for (const std::string& backend : backends) {
+    if (std::find(known.begin(), known.end(), backend) != known.end()) continue;
+    fail_usage("--backend: expected one of {}; got '{}'", fmt::join(known, ", "), backend);
+  }
 }
 
 void BenchContext::add_gpu(const std::string& name, const std::string& driver_name) {

@@ -16,10 +16,14 @@ std::string processor_name();
 /// The agents of a world whose options say all of them, in words.
 std::string population_of(const WorldOptions& world);
 
-/// Adds the option --map, which takes several.
-void add_maps_option(CLI::App* command, std::vector<std::string>* maps);
+/// Adds the option --map, which takes several; the help says what the default is.
+void add_maps_option(CLI::App* command, std::vector<std::string>* maps,
+                     const std::string& default_maps = "Town01 where it is found, else procedural:1");
 /// The maps that it means: `towns` is all of the map folder, which may not be empty then; nothing, the default one.
 std::vector<std::string> named_maps(const std::vector<std::string>& maps);
+
+/// Throws UsageError unless each of the option's backends is among those that this build knows.
+void check_backends(const std::vector<std::string>& backends, const std::vector<std::string>& known);
 
 /// What results were measured on.
 struct BenchContext {

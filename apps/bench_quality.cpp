@@ -42,12 +42,15 @@ void run(Arguments arguments) {
     arguments.maps = known_towns();
     arguments.maps.insert(arguments.maps.end(), {"procedural:1", "procedural:2"});
   }
+  arguments.maps = named_maps(arguments.maps);
+  std::vector<Pair> sizes;
+  for (const std::string& size : arguments.sizes) sizes.push_back(parse_pair("--size", size, 8192));
   ProgressLine progress;
   const std::vector<Snapshot> snapshots = drive_all(arguments, &progress);
   std::vector<BenchResult> results;
   int images = 0;
-  for (const std::string& text : arguments.sizes) {
-    const Pair size = parse_pair("--size", text, 8192);
+  for (const Pair& size : sizes) {
+    const std::string text = fmt::format("{}x{}", size.first, size.second);
     RendererConfig config{.rig = paper_rig(size.first, size.second), .num_threads = arguments.world.num_threads};
     config.line_floor_px = arguments.line_floor_px;
     Quality quality;
@@ -89,8 +92,8 @@ void run(Arguments arguments) {
 void add_quality_benchmark(CLI::App& bench) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = bench.add_subcommand("quality", "PSNR of images against a ray caster");
-  command->add_option("--map", arguments->maps, "Maps; default: all towns of the map folder and two procedural ones");
-  command->add_option("--size", arguments->sizes, "Sizes, WxH; default: the paper's five");
+  add_maps_option(command, &arguments->maps, "all towns of the map folder and two procedural ones");
+  command->add_option("--size", arguments->sizes, "Sizes, WxH; default: the paper's five")->delimiter(',');
   command->add_option("--agents", arguments->world.agents, "Agents in each world")
       ->check(CLI::Range(1, 4096))
       ->capture_default_str();

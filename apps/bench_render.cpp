@@ -9,11 +9,11 @@
 
 #include "pictura/apps/bench.h"
 #include "pictura/apps/drive.h"
-#include "pictura/apps/finite_range.h"
 #include "pictura/apps/plot_results.h"
 #include "pictura/apps/report.h"
 #include "pictura/bench/render.h"
 #include "pictura/common/error.h"
+#include "pictura/common/make_renderer.h"
 
 namespace pictura {
 
@@ -25,10 +25,9 @@ struct Arguments {
   std::vector<std::string> maps, backends = {"cpu"}, sizes, samples = {"1"};
   std::vector<int> egos;
   std::string sweep, format = "u8";
-  int repeats = 7, checked_views = 8;
-  double repeat_s = 1.0;
-  bool planes = false, host_memory = false, memory = false, json = false;
-  PlotArguments plot;
+  int checked_views = 8;
+  bool planes = false, host_memory = false, memory = false;
+  RateArguments rate;
 };
 
 // What the sweeps hold fixed.
@@ -60,27 +59,18 @@ void apply_defaults(Arguments* arguments) {
   if (arguments->sizes.empty()) arguments->sizes = {kSweptSize};
   if (arguments->egos.empty()) arguments->egos = {0};
   arguments->maps = named_maps(arguments->maps);
-  const std::size_t cases =
-      arguments->backends.size() * arguments->samples.size() * arguments->sizes.size() * arguments->egos.size();
-  if (arguments->memory && cases > 1) {
-    fail_usage(
-        "--memory: expected one backend, size and number of egos and samples, since drivers keep what an "
-        "earlier case has released; got {} cases",
-        cases);
-  }
 }
 
-bool draws_on_device(const Arguments& arguments, const std::string& backend) {
-  if (arguments.host_memory || cuda_device_name().empty()) return false;
-  return backend == "cuda" || backend == "gl:egl";
-}
+// Whatever memory the scenes and images lie in.
+bool draws_on_gpu(const std::string& backend) { return backend == "cuda" || backend == "gl:egl"; }
 
 RenderCase case_of(const Arguments& arguments, const std::string& backend, const std::string& size,
                    const std::string& samples, int egos) {
   const Pair pixels = parse_pair("--size", size, 8192);
   RenderCase result{.backend = backend, .num_views = egos};
   result.config.rig = paper_rig(pixels.first, pixels.second);
-  result.config.space = draws_on_device(arguments, backend) ? MemorySpace::cuda : MemorySpace::host;
+  const bool in_device_memory = draws_on_gpu(backend) && !arguments.host_memory && !cuda_device_name().empty();
+  result.config.space = in_device_memory ? MemorySpace::cuda : MemorySpace::host;
   result.config.num_threads = arguments.world.num_threads;
   result.config.samples = parse_samples("--samples", samples);
   result.format = arguments.format == "u8"    ? PixelFormat::u8
@@ -88,10 +78,42 @@ RenderCase case_of(const Arguments& arguments, const std::string& backend, const
                                               : PixelFormat::f32;
   result.planes = arguments.planes ? Planes::all : Planes::none;
   result.checked_views = arguments.checked_views;
-  result.repeats = arguments.memory ? 0 : arguments.repeats;
-  result.repeat_s = arguments.repeat_s;
+  result.repeats = arguments.memory ? 0 : arguments.rate.repeats;
+  result.repeat_s = arguments.rate.repeat_s;
   result.watches_memory = arguments.memory;
   return result;
+}
+
+struct NamedCase {
+  std::string renderer, size;  // the backend, with its samples where it takes them
+  RenderCase measured;         // of 0 views: of all agents that will have found a place
+  std::string name() const { return fmt::format("{} {} {} egos", renderer, size, measured.num_views); }
+};
+
+// All of them, so that what is wrong in the arguments of the last shows before the first is measured.
+std::vector<NamedCase> cases_of(const Arguments& arguments) {
+  check_backends(arguments.backends, renderer_names());
+  std::vector<NamedCase> cases;
+  for (const std::string& backend : arguments.backends) {
+    for (const std::string& samples : arguments.samples) {
+      // The others compute exact coverage, once for all numbers of samples.
+      const bool takes_samples = backend.starts_with("gl");
+      if (!takes_samples && samples != arguments.samples.front()) continue;
+      for (const std::string& size : arguments.sizes) {
+        for (const int egos : arguments.egos) {
+          cases.push_back({takes_samples ? backend + " " + samples : backend, size,
+                           case_of(arguments, backend, size, takes_samples ? samples : "1", egos)});
+        }
+      }
+    }
+  }
+  if (arguments.memory && cases.size() > 1) {
+    fail_usage(
+        "--memory: expected one backend, size and number of egos and samples, since drivers keep what an "
+        "earlier case has released; got {} cases",
+        cases.size());
+  }
+  return cases;
 }
 
 void append_results(const std::string& name, const RenderCase& measured, const RenderMeasurement& measurement,
@@ -145,8 +167,9 @@ void draw_rates(const PlotArguments& plot) {
 }
 
 void run(Arguments arguments) {
-  if (wants_plot(arguments.plot)) return draw_rates(arguments.plot);
+  if (wants_plot(arguments.rate.plot)) return draw_rates(arguments.rate.plot);
   apply_defaults(&arguments);
+  std::vector<NamedCase> cases = cases_of(arguments);
   ProgressLine progress;
   progress.update("driving");
   const WorldOptions& world = arguments.world;
@@ -160,29 +183,15 @@ void run(Arguments arguments) {
                     .walls = world.walls,
                     .seed = world.seed});
   std::vector<BenchResult> results;
-  std::vector<std::string> choices;
-  bool on_device = false;
-  for (const std::string& backend : arguments.backends) {
-    for (const std::string& samples : arguments.samples) {
-      // The others compute exact coverage, once for all numbers of samples.
-      const bool takes_samples = backend.starts_with("gl");
-      if (!takes_samples && samples != arguments.samples.front()) continue;
-      std::string choice;
-      for (const std::string& size : arguments.sizes) {
-        for (const int asked : arguments.egos) {
-          const int egos = asked > 0 ? asked : static_cast<int>(worlds.views.size());
-          const std::string name =
-              fmt::format("{}{} {} {} egos", backend, takes_samples ? " " + samples : "", size, egos);
-          progress.update(name);
-          const RenderCase measured = case_of(arguments, backend, size, takes_samples ? samples : "1", egos);
-          on_device = on_device || measured.config.space == MemorySpace::cuda;
-          const RenderMeasurement measurement = measure_render(worlds, measured);
-          choice = measurement.choice;
-          append_results(name, measured, measurement, &results);
-        }
-      }
-      choices.push_back(choice);
-    }
+  std::vector<std::string> choices;  // of each renderer, the last
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    RenderCase& measured = cases[i].measured;
+    if (measured.num_views == 0) measured.num_views = static_cast<int>(worlds.views.size());
+    progress.update(cases[i].name());
+    const RenderMeasurement measurement = measure_render(worlds, measured);
+    append_results(cases[i].name(), measured, measurement, &results);
+    const bool is_last_of_renderer = i + 1 == cases.size() || cases[i + 1].renderer != cases[i].renderer;
+    if (is_last_of_renderer) choices.push_back(measurement.choice);
   }
   progress.finish();
   BenchContext context{
@@ -191,8 +200,10 @@ void run(Arguments arguments) {
                               world.walls ? "on" : "off", paper_rig().cameras.size(), arguments.format,
                               arguments.planes ? " and planes" : "", world.num_threads, fmt::join(choices, "; ")),
       .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
-  if (on_device) context.add_gpu(cuda_device_name(), cuda_driver_name());
-  report_benchmark(arguments.json, context, results);
+  if (std::any_of(arguments.backends.begin(), arguments.backends.end(), draws_on_gpu)) {
+    context.add_gpu(cuda_device_name(), cuda_driver_name());
+  }
+  report_benchmark(arguments.rate.json, context, results);
 }
 
 }  // namespace
@@ -221,13 +232,11 @@ void add_render_benchmark(CLI::App& bench) {
                    "sizes: the paper's five and 768x432; squares: without walls; egos: 64 to 20,480")
       ->check(CLI::IsMember({"sizes", "squares", "egos"}));
   command->add_flag("--memory", arguments->memory, "Watch device memory in a single case, and time nothing");
-  command->add_option("--check", arguments->checked_views, "Compare so many egos with the oracle before timing")
+  command
+      ->add_option("--check", arguments->checked_views, "Compare so many egos with the oracle, before timing and after")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command->add_option("--repeats", arguments->repeats)->check(CLI::PositiveNumber)->capture_default_str();
-  command->add_option("--repeat-seconds", arguments->repeat_s)->check(finite_range(1e-3, 3600))->capture_default_str();
-  add_plot_options(command, &arguments->plot);
-  command->add_flag("--json", arguments->json, "Print one JSON object");
+  add_rate_options(command, &arguments->rate);
   command->footer(
       "Examples:\n  pictura bench render --size 192x108 --threads 0\n"
       "  pictura bench render --backend cuda,gl:egl --samples 1,4,2x2 --map towns --parked 32 --egos 2048,256 --json");

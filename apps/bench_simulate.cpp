@@ -8,7 +8,6 @@
 #include <fmt/ranges.h>
 
 #include "pictura/apps/bench.h"
-#include "pictura/apps/finite_range.h"
 #include "pictura/apps/plot_results.h"
 #include "pictura/apps/report.h"
 #include "pictura/bench/render.h"
@@ -28,10 +27,8 @@ struct Arguments {
   std::vector<std::string> maps, backends = {"cpu"};
   int num_worlds = 0, slots = 0;
   std::string sweep;
-  PlotArguments plot;
-  int repeats = 7, warm_up_steps = 60;
-  double repeat_s = 1.0;
-  bool json = false;
+  int warm_up_steps = 60;
+  RateArguments rate;
 };
 
 /// Worlds that are measured together.
@@ -91,11 +88,11 @@ void measure(const Arguments& arguments, const std::string& backend,
   StepBench bench(simulator.get(), world.seed);
   const StepTiming warm_up = bench.run(arguments.warm_up_steps);
   const double steps_per_s = static_cast<double>(warm_up.steps) / warm_up.elapsed_s;
-  const int64_t steps = std::max<int64_t>(1, static_cast<int64_t>(arguments.repeat_s * steps_per_s));
+  const int64_t steps = std::max<int64_t>(1, static_cast<int64_t>(arguments.rate.repeat_s * steps_per_s));
   const std::string name = fmt::format("{}, {}", backend, measured.name);
   BenchResult live{name, "agent_steps_per_s", {}}, slots{name + ", slots", "slot_steps_per_s", {}},
       step{name + ", one step", "ms", {}};
-  for (int repeat = 0; repeat < arguments.repeats; ++repeat) {
+  for (int repeat = 0; repeat < arguments.rate.repeats; ++repeat) {
     if (interrupted()) throw Interrupted("interrupted");
     const StepTiming timing = bench.run(steps);
     live.values.push_back(static_cast<double>(timing.agent_steps) / timing.elapsed_s);
@@ -127,7 +124,8 @@ void draw_cost(const PlotArguments& plot) {
 }
 
 void run(Arguments arguments) {
-  if (wants_plot(arguments.plot)) return draw_cost(arguments.plot);
+  if (wants_plot(arguments.rate.plot)) return draw_cost(arguments.rate.plot);
+  check_backends(arguments.backends, simulator_names());
   arguments.maps = named_maps(arguments.maps);
   std::vector<std::shared_ptr<const RoadMap>> maps;
   for (const std::string& name : arguments.maps) maps.push_back(load_map(name));
@@ -147,7 +145,7 @@ void run(Arguments arguments) {
                                                arguments.world.walls ? "on" : "off", arguments.world.num_threads),
                        .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
   if (on_device) context.add_gpu(cuda_device_name(), cuda_driver_name());
-  report_benchmark(arguments.json, context, results);
+  report_benchmark(arguments.rate.json, context, results);
 }
 
 }  // namespace
@@ -175,10 +173,7 @@ void add_simulate_benchmark(CLI::App& bench) {
   command->add_option("--warm-up", arguments->warm_up_steps, "Steps before timing")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  command->add_option("--repeats", arguments->repeats)->check(CLI::PositiveNumber)->capture_default_str();
-  command->add_option("--repeat-seconds", arguments->repeat_s)->check(finite_range(1e-3, 3600))->capture_default_str();
-  add_plot_options(command, &arguments->plot);
-  command->add_flag("--json", arguments->json, "Print one JSON object");
+  add_rate_options(command, &arguments->rate);
   command->footer(
       "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n"
       "  pictura bench simulate --backend cuda --map towns --slots 20480 --pedestrians 0.1 --cyclists 0.1 --parked 32");

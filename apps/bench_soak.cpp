@@ -10,6 +10,7 @@
 #include "pictura/bench/render.h"
 #include "pictura/bench/soak.h"
 #include "pictura/common/error.h"
+#include "pictura/common/make_renderer.h"
 
 namespace pictura {
 
@@ -83,6 +84,7 @@ void print_result(const Arguments& arguments, const SoakResult& result) {
 
 void run(Arguments arguments) {
   SoakOptions& options = arguments.soak;
+  check_backends({options.backend}, renderer_names());
   options.maps = named_maps(options.maps);
   options.most_seconds = 60 * arguments.minutes;
   ProgressLine progress;

@@ -20,7 +20,7 @@ struct Arguments {
 
 void run(Arguments arguments) {
   if (arguments.maps.empty()) arguments.maps = known_towns();
-  if (arguments.maps.empty()) arguments.maps = {"procedural:1"};
+  arguments.maps = named_maps(arguments.maps);
   ProgressLine progress;
   std::vector<BenchResult> results;
   for (size_t i = 0; i < arguments.maps.size(); ++i) {
@@ -48,7 +48,7 @@ void add_worlds_benchmark(CLI::App& bench) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
       bench.add_subcommand("worlds", "Distributions over many episodes: who is there, what befalls them");
-  command->add_option("--map", arguments->maps, "Maps; default: all towns of the map folder");
+  add_maps_option(command, &arguments->maps, "all towns of the map folder, else procedural:1");
   command->add_option("--episodes", arguments->options.episodes)->check(CLI::Range(1, 10'000))->capture_default_str();
   command->add_option("--agents", arguments->options.agents, "Asked for in each world")
       ->check(CLI::Range(1, kMaxAgentsPerWorld))

@@ -3,20 +3,24 @@
 #include <algorithm>
 #include <fstream>
 
+#include "pictura/apps/finite_range.h"
 #include "pictura/apps/report.h"
 #include "pictura/common/error.h"
 
 namespace pictura {
 
-void add_plot_options(CLI::App* command, PlotArguments* arguments) {
-  command->add_option("--plot", arguments->results, "Measure nothing: draw the sweeps of these results")
-      ->delimiter(',');
-  command->add_option("--figure", arguments->figure, "What --plot draws, a PNG file");
-}
-
 bool wants_plot(const PlotArguments& arguments) {
   if (arguments.results.empty() != arguments.figure.empty()) fail_usage("--plot and --figure: expected both");
   return !arguments.results.empty();
+}
+
+void add_rate_options(CLI::App* command, RateArguments* arguments) {
+  command->add_option("--repeats", arguments->repeats)->check(CLI::PositiveNumber)->capture_default_str();
+  command->add_option("--repeat-seconds", arguments->repeat_s)->check(finite_range(1e-3, 3600))->capture_default_str();
+  command->add_option("--plot", arguments->plot.results, "Measure nothing: draw the sweeps of these results")
+      ->delimiter(',');
+  command->add_option("--figure", arguments->plot.figure, "What --plot draws, a PNG file");
+  command->add_flag("--json", arguments->json, "Print one JSON object");
 }
 
 std::vector<PlottedResult> read_results(const std::vector<std::string>& paths) {

@@ -1,5 +1,5 @@
-// Figures from earlier results of benchmarks: of the JSON that they print, and of the files of scripts/gpu_check, which
-// hold several of those.
+// What benchmarks of rates share: the options of how they are measured and reported, and figures from earlier results:
+// of the JSON that they print, and of the files of scripts/gpu_check, which hold several of those.
 #pragma once
 
 #include <string>
@@ -16,10 +16,17 @@ struct PlotArguments {
   std::vector<std::string> results;
   std::string figure;
 };
-/// Adds the options --plot and --figure.
-void add_plot_options(CLI::App* command, PlotArguments* arguments);
-/// Whether they were given; ends the program with wrong usage where only one of them was.
+/// Whether they were given; throws UsageError where only one of them was.
 bool wants_plot(const PlotArguments& arguments);
+
+struct RateArguments {
+  int repeats = 7;
+  double repeat_s = 1.0;  // of each repeat, about
+  PlotArguments plot;
+  bool json = false;
+};
+/// Adds the options --repeats, --repeat-seconds, --plot, --figure and --json.
+void add_rate_options(CLI::App* command, RateArguments* arguments);
 
 struct PlottedResult {
   std::string name;

@@ -366,6 +366,14 @@ class Benchmarks(CommandCase):
         packed = self.json_of("bench", "simulate", *self.QUICK, "--slots", 20)
         self.assertEqual(packed["results"][0]["name"], "cpu, 20 agents in worlds of 1 to 6")
 
+    def test_quality_is_measured_on_each_map_and_size(self):
+        maps = ["--map", "procedural:1,procedural:2", "--agents", 4, "--steps", 1, "--views", 1]
+        facts = self.json_of("bench", "quality", *maps, "--size", "8x8,9x5")
+        self.assertIn("maps procedural:1 procedural:2,", facts["workload"])
+        ways = ["1 sample", "2x2 samples", "area coverage", "oracle", "oracle in bytes", "oracle, worst image"]
+        self.assertEqual([row["name"] for row in facts["results"]], [f"{way} {size}" for size in ["8x8", "9x5"] for way in ways])
+        self.assert_refused(2, "'8'", "bench", "quality", "--map", "no-town.xodr", "--size", "9x5,8")
+
     def test_distributions_over_episodes(self):
         result = self.json_of("bench", "worlds", "--map", self.town(), "--episodes", 3, "--agents", 30)
         values = {row["name"].split(": ", 1)[1]: row for row in result["results"]}
@@ -426,7 +434,7 @@ class Benchmarks(CommandCase):
         results.write_text("[]")
         refused(1, "expected results", "bench", "simulate", "--plot", results, "--figure", figure)
         refused(2, "--worlds excludes --sweep", "bench", "simulate", "--sweep", "worlds", "--worlds", 3)
-        refused(2, "vulkan", "bench", "simulate", *self.QUICK, "--backend", "vulkan")
+        refused(2, "vulkan", "bench", "simulate", *self.QUICK, "--backend", "cpu,vulkan", "--map", "no-town.xodr")
 
     def test_bad_arguments_are_refused_by_name(self):
         def refused(status, message, *arguments):
@@ -436,8 +444,11 @@ class Benchmarks(CommandCase):
         refused(2, "--sweep sizes", "--sweep", "sizes", "--size", "8x8")
         refused(2, "--memory: expected one", "--memory", "--egos", "3,4")
         refused(2, "--size", "--size", "8")
-        refused(2, "vulkan", "--backend", "vulkan")
-        refused(1, "no-town", "--map", self.folder / "no-town.xodr")
+        # What is wrong in the last case is said before a map is read.
+        no_town = ["--map", self.folder / "no-town.xodr"]
+        refused(2, "'8'", "--size", "9x5,8", *no_town)
+        refused(2, "vulkan", "--backend", "cpu,vulkan", *no_town)
+        refused(1, "no-town", *no_town)
         if not pathlib.Path("/dev/nvidia0").exists():
             status, message = (1, "renderer cuda: no CUDA device") if has_cuda() else (2, "expected one of cpu")
             refused(status, message, "--backend", "cuda")
