@@ -1,5 +1,6 @@
 #include "pictura/bench/render_device.h"
 
+#include <algorithm>
 #include <chrono>
 #include <fstream>
 #include <sstream>
@@ -79,8 +80,10 @@ std::unique_ptr<RenderTarget> make_device_target(const DrivenWorlds& worlds, con
 
 DeviceMemoryWatch::DeviceMemoryWatch() : free_before_(free_bytes()) {
   poller_ = std::thread([this] {
-    std::size_t free = 0, total = 0;
-    while (!ends_ && cudaMemGetInfo(&free, &total) == cudaSuccess) {
+    while (!ends_) {
+      std::size_t free = 0, total = 0;
+      status_ = cudaMemGetInfo(&free, &total);
+      if (status_ != cudaSuccess) return;
       most_bytes_ = std::max(most_bytes_.load(), static_cast<double>(free_before_) - static_cast<double>(free));
       std::this_thread::sleep_for(std::chrono::microseconds(200));
     }
@@ -94,6 +97,11 @@ DeviceMemoryWatch::~DeviceMemoryWatch() {
 
 double DeviceMemoryWatch::taken_bytes() const {
   return static_cast<double>(free_before_) - static_cast<double>(free_bytes());
+}
+
+double DeviceMemoryWatch::most_bytes() const {
+  check_cuda(status_, "cudaMemGetInfo of the watch");
+  return std::max(most_bytes_.load(), taken_bytes());
 }
 
 std::string cuda_device_name() {

@@ -4,6 +4,8 @@
 #include <atomic>
 #include <thread>
 
+#include <cuda_runtime_api.h>
+
 #include "pictura/bench/render.h"
 
 namespace pictura {
@@ -20,11 +22,13 @@ class DeviceMemoryWatch {
   DeviceMemoryWatch& operator=(const DeviceMemoryWatch&) = delete;
 
   double taken_bytes() const;
-  double most_bytes() const { return most_bytes_; }
+  /// What is taken now included. Throws Error when the thread could not ask.
+  double most_bytes() const;
 
  private:
   std::size_t free_before_ = 0;
   std::atomic<double> most_bytes_ = 0;
+  std::atomic<cudaError_t> status_ = cudaSuccess;
   std::atomic<bool> ends_ = false;
   std::thread poller_;
 };
