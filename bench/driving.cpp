@@ -1,5 +1,7 @@
 #include "pictura/bench/driving.h"
 
+#include <algorithm>
+
 #include "pictura/common/error.h"
 #include "pictura/common/interrupt.h"
 #include "pictura/common/rng.h"
@@ -7,18 +9,16 @@
 
 namespace pictura {
 
-StepResult drive_randomly(Simulator* simulator, uint64_t seed, int steps) {
+void drive_randomly(Simulator* simulator, uint64_t seed, int steps) {
   std::vector<int32_t> actions(static_cast<std::size_t>(simulator->num_slots()));
-  StepResult result;
   for (int step = 0; step < steps; ++step) {
     if (interrupted()) throw Interrupted("interrupted");
     for (std::size_t slot = 0; slot < actions.size(); ++slot) {
       RandomStream random(seed, 0, static_cast<uint32_t>(slot), 0, static_cast<uint32_t>(step), Purpose::action);
       actions[slot] = random.below(kNumActions);
     }
-    result = simulator->step(actions);
+    simulator->step(actions);
   }
-  return result;
 }
 
 DrivenWorlds drive_worlds(const DrivenOptions& options) {
@@ -43,16 +43,18 @@ DrivenWorlds drive_worlds(const DrivenOptions& options) {
   DrivenWorlds worlds;
   worlds.simulator = make_simulator("cpu", config, maps, specs);
   worlds.geometries = worlds.simulator->geometries();
-  const StepResult last = drive_randomly(worlds.simulator.get(), options.seed, options.steps);
+  drive_randomly(worlds.simulator.get(), options.seed, options.steps);
+  const uint8_t* refusal = worlds.simulator->state().refusal;
   const Span<const View> views = worlds.simulator->views();
   for (int agent = 0; agent < options.agents; ++agent) {
     for (int world = 0; world < num_worlds; ++world) {
       const auto slot = static_cast<std::size_t>(world * options.agents + agent);
-      if (last.refusal[slot] == 0) worlds.views.push_back(views[slot]);
+      if (refusal[slot] == 0) worlds.views.push_back(views[slot]);
     }
   }
-  PICTURA_CHECK(static_cast<int>(worlds.views.size()) >= options.num_views,
-                "bench: expected {} agents, but only {} of {} found a place", options.num_views, worlds.views.size(),
+  const int expected = std::max(1, options.num_views);
+  PICTURA_CHECK(static_cast<int>(worlds.views.size()) >= expected,
+                "bench: expected {} agents, but only {} of {} found a place", expected, worlds.views.size(),
                 views.size());
   if (options.num_views > 0) worlds.views.resize(static_cast<std::size_t>(options.num_views));
   return worlds;

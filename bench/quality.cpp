@@ -2,33 +2,32 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "pictura/backend_cpu/renderer_cpu_image.h"
 #include "pictura/bench/driving.h"
 #include "pictura/common/parallel_for.h"
 #include "pictura/common/raster_check.h"
-#include "pictura/map/load_map.h"
-#include "pictura/simulator/simulator.h"
 
 namespace pictura {
 
 Snapshot drive_snapshot(const SnapshotOptions& options) {
-  SimulatorConfig config;
-  config.seed = options.seed;
-  config.num_threads = options.num_threads;
-  config.walls = options.walls;
-  config.fixed_lights = true;
-  config.vector_observations = false;
-  config.cyclist_fraction = config.pedestrian_fraction = 0.1f;
-  const auto simulator = make_simulator("cpu", config, {load_map(options.map)}, {{0, options.agents, 0}});
-  drive_randomly(simulator.get(), options.seed, options.steps);
-  const SceneBatch scene = simulator->scene();
+  DrivenWorlds worlds = drive_worlds({.maps = {options.map},
+                                      .agents = options.agents,
+                                      .pedestrian_fraction = 0.1f,
+                                      .cyclist_fraction = 0.1f,
+                                      .parked_cars = SimulatorConfig{}.parked_cars,
+                                      .walls = options.walls,
+                                      .seed = options.seed,
+                                      .steps = options.steps,
+                                      .num_threads = options.num_threads});
+  const SceneBatch scene = worlds.simulator->scene();
   Snapshot snapshot;
-  snapshot.geometry = simulator->geometries()[0];
+  snapshot.geometry = std::move(worlds.geometries[0]);
   snapshot.scene.agents.assign(scene.agents.begin(), scene.agents.end());
   snapshot.scene.light_states.assign(scene.light_states.begin(), scene.light_states.end());
   snapshot.scene.end_world(0);
-  const Span<const View> views = simulator->views();
+  const std::vector<View>& views = worlds.views;
   const auto wanted = std::min(static_cast<std::size_t>(options.views), views.size());
   for (std::size_t i = 0; i < wanted; ++i) snapshot.views.push_back(views[i * views.size() / wanted]);
   return snapshot;

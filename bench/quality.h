@@ -15,7 +15,7 @@ namespace pictura {
 struct Snapshot {
   StaticGeometry geometry;
   SceneOwner scene;         // one world with handle 0
-  std::vector<View> views;  // a choice of the agents, spread over them all
+  std::vector<View> views;  // a choice of the agents that found a place, spread over them all
 };
 
 struct SnapshotOptions {
@@ -29,7 +29,7 @@ struct SnapshotOptions {
 };
 
 /// Drives a world with random actions; one agent in ten is a cyclist, one a pedestrian. Throws Error when the map
-/// cannot be read.
+/// cannot be read or nobody finds a place.
 Snapshot drive_snapshot(const SnapshotOptions& options);
 
 /// Error against the truth, pooled over the images that are not blank.

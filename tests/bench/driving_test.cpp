@@ -1,0 +1,30 @@
+// Worlds that benchmarks draw, where not everybody who was asked for finds a place.
+#include <gtest/gtest.h>
+
+#include "pictura/bench/driving.h"
+#include "pictura/bench/quality.h"
+#include "pictura/common/error.h"
+
+namespace pictura {
+namespace {
+
+constexpr const char* kHamlet = "procedural:1:blocks=1x1";
+constexpr int kMany = 600;
+
+TEST(Driving, NobodyIsDrawnWhoFoundNoPlace) {
+  const Snapshot snapshot = drive_snapshot({.map = kHamlet, .agents = kMany, .steps = 0, .views = kMany});
+  EXPECT_GT(snapshot.views.size(), 0u);
+  EXPECT_LT(snapshot.views.size(), static_cast<std::size_t>(kMany));
+  for (const View& view : snapshot.views) {
+    ASSERT_GE(view.ego_agent, 0);
+    EXPECT_TRUE(snapshot.scene.agents[static_cast<std::size_t>(view.ego_agent)].drawn);
+  }
+}
+
+TEST(Driving, TooFewPlacesAreAnError) {
+  EXPECT_NO_THROW(drive_worlds({.maps = {kHamlet}, .num_views = 8, .agents = 8, .steps = 1}));
+  EXPECT_THROW(drive_worlds({.maps = {kHamlet}, .num_views = kMany, .agents = kMany, .steps = 1}), Error);
+}
+
+}  // namespace
+}  // namespace pictura
