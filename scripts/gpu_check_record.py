@@ -3,13 +3,14 @@
 
 gpu_check_record.py FILE start                         begins FILE: source hash, GPU, driver
 gpu_check_record.py FILE run NAME [--limit S] -- COMMAND...    seconds, and what it says in summary or at its end
-gpu_check_record.py FILE bench NAME [--limit S] -- COMMAND...  the JSON object that it prints
+gpu_check_record.py FILE bench NAME [--limit S] -- COMMAND...  the JSON object that it prints, where it fails too
 gpu_check_record.py FILE tests -- ctest...             counts, what failed, what was skipped, what took longest
 gpu_check_record.py FILE finish                        says that nothing is missing
 
 Exit status: 0 where the command succeeded, else 1.
 """
 import argparse
+import contextlib
 import hashlib
 import json
 import os
@@ -31,10 +32,13 @@ SUMMARY = re.compile(r"\[  PASSED  \]|=========.* SUMMARY: ")
 
 
 def source_hash():
-    digest = hashlib.sha256(pathlib.Path("CMakeLists.txt").read_bytes())
-    for path in sorted(path for folder in SOURCES for path in pathlib.Path(folder).rglob("*") if path.is_file()):
-        if RESULTS not in path.parents:
-            digest.update(path.read_bytes())
+    """Of each file its place, its length and its bytes."""
+    files = {path for folder in SOURCES for path in pathlib.Path(folder).rglob("*") if path.is_file()}
+    digest = hashlib.sha256()
+    for path in sorted(files | {pathlib.Path("CMakeLists.txt")}):
+        if RESULTS not in path.parents and "__pycache__" not in path.parts:
+            content = path.read_bytes()
+            digest.update(f"{path.as_posix()} {len(content)}\n".encode() + content)
     return digest.hexdigest()[:16]
 
 
@@ -74,28 +78,41 @@ def add(file, key, entry):
     write(file, content)
 
 
+def kill_group(process):
+    """The command and its children."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+
+
+@contextlib.contextmanager
+def started(command, stderr):
+    """A command in a process group of its own: whatever ends the block early ends the command's children with it."""
+    process = subprocess.Popen(command, text=True, errors="replace", process_group=0, stdout=subprocess.PIPE, stderr=stderr)
+    try:
+        yield process
+    except BaseException:
+        kill_group(process)
+        raise
+
+
 class Run:
     """A command that has ended: its outcome in words, empty for success; seconds; what it printed."""
 
     def __init__(self, command, limit_s, keeps_stdout):
         begin = time.monotonic()
-        # A process group of its own, so that the limit ends the command's children with it.
+        self.seconds, self.stdout, self.stderr = 0.0, "", ""
         try:
-            process = subprocess.Popen(command, text=True, errors="replace", process_group=0, stdout=subprocess.PIPE,
-                                       stderr=subprocess.PIPE if keeps_stdout else subprocess.STDOUT)
+            with started(command, subprocess.PIPE if keeps_stdout else subprocess.STDOUT) as process:
+                try:
+                    self.stdout, self.stderr = process.communicate(timeout=limit_s)
+                    self.outcome = "" if process.returncode == 0 else f"exit status {process.returncode}"
+                except subprocess.TimeoutExpired:
+                    kill_group(process)
+                    self.stdout, self.stderr = process.communicate()
+                    self.outcome = f"took more than {limit_s:g} s"
         except OSError as error:
-            self.outcome, self.seconds, self.stdout, self.stderr = str(error), 0.0, "", ""
+            self.outcome = str(error)
             return
-        try:
-            self.stdout, self.stderr = process.communicate(timeout=limit_s)
-            self.outcome = "" if process.returncode == 0 else f"exit status {process.returncode}"
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            self.stdout, self.stderr = process.communicate()
-            self.outcome = f"took more than {limit_s:g} s"
-        except BaseException:
-            os.killpg(process.pid, signal.SIGKILL)
-            raise
         self.seconds = round(time.monotonic() - begin, 1)
 
     def entry(self, name):
@@ -126,16 +143,24 @@ def run_command(file, name, command, limit_s):
     return run.outcome == ""
 
 
+def json_object(text):
+    """The object that a text is, or None."""
+    try:
+        value = json.loads(text)
+    except json.JSONDecodeError:
+        return None
+    return value if isinstance(value, dict) else None
+
+
 def run_bench(file, name, command, limit_s):
     run = Run(command, limit_s, keeps_stdout=True)
-    if not run.outcome:
-        try:
-            measured = json.loads(run.stdout)
-        except json.JSONDecodeError as error:
-            run.outcome = f"expected a JSON object, got something else: {error}"
+    measured = json_object(run.stdout)
+    if measured is None and not run.outcome:
+        run.outcome = f"expected a JSON object, got '{run.stdout[:80]}'"
     say(name, run)
     if run.outcome:
-        add(file, "failed", run.failure(name))
+        # A bench may fail because of what it has measured: a soak, for one.
+        add(file, "failed", run.failure(name) | ({} if measured is None else {"measured": measured}))
     else:
         add(file, "bench", run.entry(name) | measured)
     return run.outcome == ""
@@ -182,13 +207,13 @@ class Tests:
 def run_tests(file, command):
     begin = time.monotonic()
     header, tests, written = read(file), Tests(), 0.0
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace")
-    for line in process.stdout:
-        print(line, end="", flush=True)
-        if tests.take(line) and time.monotonic() - written > 1:
-            written = time.monotonic()
-            write(file, header | tests.summary(written - begin))
-    status = process.wait()
+    with started(command, subprocess.STDOUT) as process:
+        for line in process.stdout:
+            print(line, end="", flush=True)
+            if tests.take(line) and time.monotonic() - written > 1:
+                written = time.monotonic()
+                write(file, header | tests.summary(written - begin))
+        status = process.wait()
     content = header | tests.summary(time.monotonic() - begin)
     if not tests.times or (status != 0 and not tests.failed):
         content["error"] = f"ctest: exit status {status}, {len(tests.times)} results"

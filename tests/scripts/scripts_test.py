@@ -1,0 +1,110 @@
+"""The scripts from outside: their help from any folder, and what scripts/gpu_check_record.py keeps of what it runs.
+
+Run by ctest: python3 scripts_test.py [unittest arguments].
+"""
+
+import json
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+SCRIPTS = pathlib.Path(__file__).resolve().parents[2] / "scripts"
+
+
+class Help(unittest.TestCase):
+    def test_it_is_found_from_any_folder(self):
+        for name in ("setup", "format", "test", "demo", "gpu_check"):
+            with self.subTest(name):
+                result = subprocess.run([f"./{name}", "--help"], cwd=SCRIPTS, capture_output=True, text=True, timeout=60)
+                self.assertEqual((result.returncode, result.stderr), (0, ""))
+                self.assertGreater(len(result.stdout.splitlines()), 1)
+
+
+class Record(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="pictura-test-")
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        (self.folder / "CMakeLists.txt").write_text("project(nothing)")
+        self.file = self.folder / "record.json"
+
+    def recorder(self, *arguments):
+        return [sys.executable, str(SCRIPTS / "gpu_check_record.py"), str(self.file), *arguments]
+
+    def record(self, *arguments):
+        result = subprocess.run(self.recorder(*arguments), cwd=self.folder, capture_output=True, text=True, timeout=60)
+        return result.returncode, json.loads(self.file.read_text())
+
+    def source_hash(self):
+        return self.record("start")[1]["source_hash"]
+
+    def bench(self, script):
+        self.record("start")
+        return self.record("bench", "soak", "--", "sh", "-c", script)
+
+    def test_a_bench_leaves_what_it_measured_where_it_failed_too(self):
+        status, content = self.bench("""echo '{"faults": [3]}'""")
+        self.assertEqual((status, content["bench"][0]["faults"]), (0, [3]))
+        status, content = self.bench("""echo '{"faults": [3]}'; echo broken >&2; exit 1""")
+        self.assertEqual((status, "bench" in content), (1, False))
+        failed = content["failed"][0]
+        self.assertEqual((failed["measured"], failed["outcome"]), ({"faults": [3]}, "exit status 1"))
+        self.assertEqual(failed["last_lines"], ["broken"])
+
+    def test_what_prints_no_object_has_failed(self):
+        for script in ("echo '[1]'", "echo fast", "true", "exit 1"):
+            with self.subTest(script):
+                status, content = self.bench(script)
+                self.assertEqual((status, "measured" in content["failed"][0]), (1, False))
+
+    def test_the_hash_of_the_sources_knows_where_they_lie_and_leaves_out_what_is_made_of_them(self):
+        for name in ("common/a.h", "bench/b.h"):
+            (self.folder / name).parent.mkdir()
+            (self.folder / name).write_text(name)
+        before = self.source_hash()
+        for name in ("tests/__pycache__/a.pyc", "bench/results/a.json"):
+            (self.folder / name).parent.mkdir(parents=True)
+            (self.folder / name).write_text("made")
+        self.assertEqual(self.source_hash(), before)
+        (self.folder / "common/a.h").rename(self.folder / "common/aa.h")
+        moved = self.source_hash()
+        self.assertNotEqual(moved, before)
+        shutil.move(self.folder / "common/aa.h", self.folder / "common/a.h")
+        self.assertEqual(self.source_hash(), before)
+
+    def test_a_signal_ends_the_command_and_its_children(self):
+        for verb in (["run", "build"], ["bench", "rate"], ["tests"]):
+            with self.subTest(verb[0]):
+                self.record("start")
+                child = self.folder / f"{verb[0]}.pid"
+                script = f"sleep 300 & echo $! > {child}.tmp; mv {child}.tmp {child}; wait"
+                recorder = subprocess.Popen(self.recorder(*verb, "--", "sh", "-c", script), cwd=self.folder)
+                while not child.exists():
+                    time.sleep(0.02)
+                recorder.send_signal(signal.SIGTERM)
+                self.assertEqual(recorder.wait(timeout=60), 1)
+                self.assertTrue(self.ends(int(child.read_text())))
+
+    def ends(self, process, within_s=10):
+        """Whether it does; killed, it may stay as a zombie where nobody waits for orphans."""
+        deadline = time.monotonic() + within_s
+        while time.monotonic() < deadline:
+            try:
+                state = pathlib.Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+            except OSError:
+                return True
+            if state == "Z":
+                return True
+            time.sleep(0.02)
+        os.kill(process, signal.SIGKILL)
+        return False
+
+
+if __name__ == "__main__":
+    unittest.main()
