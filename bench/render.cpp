@@ -101,6 +101,7 @@ std::unique_ptr<RenderTarget> make_host_target(const DrivenWorlds& worlds, const
 RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& render_case) {
   RenderMeasurement result;
   const auto target = make_target(worlds, render_case);
+  target->spoil();  // before the memory is watched: what that may take is not the renderer's
   result.image_bytes = static_cast<double>(image_bytes_of(render_case));
   PICTURA_CHECK(!render_case.watches_memory || !cuda_device_name().empty(),
                 "bench render: expected a CUDA device whose memory could be watched, found none");
@@ -113,7 +114,6 @@ RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& r
 #ifdef PICTURA_HAS_CUDA
   if (watch) result.up_front_bytes = watch->taken_bytes();
 #endif
-  target->spoil();
   target->draw(renderer.get(), 1);  // warms up
   std::optional<OracleCheck> check;
   if (render_case.checked_views > 0 && render_case.backend != "cpu" && render_case.backend != "null") {

@@ -1,7 +1,8 @@
 // Worlds that benchmarks draw, where not everybody who was asked for finds a place.
+#include "pictura/bench/driving.h"
+
 #include <gtest/gtest.h>
 
-#include "pictura/bench/driving.h"
 #include "pictura/bench/quality.h"
 #include "pictura/common/error.h"
 
