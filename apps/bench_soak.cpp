@@ -57,17 +57,17 @@ void print_result(const Arguments& arguments, const SoakResult& result) {
                    {"differing_plane_pixels", result.error.differing_plane_pixels},
                    {"images_out_of_tolerance", result.images_out_of_tolerance},
                    {"visibility_queries", result.queries},
-                   {"answers_out_of_tolerance", result.answers_out_of_tolerance},
+                   {"differing_answers", result.differing_answers},
                    {"faults", faults},
                    {"visibility_faults", visibility_faults}});
     return print_json(object);
   }
   fmt::print(
       "{}: {} images of {} scenes in {:.0f} s, {} of {} values unlike the oracle's, worst {:.2f}/255; planes unlike at "
-      "{} of {} pixels; {} of {} answers about visibility out of tolerance\n{}\n",
+      "{} of {} pixels; {} of {} answers about visibility unlike\n{}\n",
       arguments.soak.backend, result.images, result.scenes, result.seconds, result.error.differing, result.error.values,
       255 * result.error.worst, result.error.differing_plane_pixels, result.error.plane_pixels,
-      result.answers_out_of_tolerance, result.queries, result.choice);
+      result.differing_answers, result.queries, result.choice);
   for (const SoakFault& fault : result.faults) {
     fmt::print(
         "scene {} view {} camera {}: {} of {} values off by more than 1/255, worst {:.2f}/255; planes unlike at {} of "
@@ -93,16 +93,16 @@ void run(Arguments arguments) {
     const double of_scenes =
         options.most_scenes > 0 ? static_cast<double>(so_far.scenes) / static_cast<double>(options.most_scenes) : 0.0;
     progress.update(fmt::format("{} images, {} out of tolerance", so_far.images,
-                                so_far.images_out_of_tolerance + so_far.answers_out_of_tolerance),
+                                so_far.images_out_of_tolerance + so_far.differing_answers),
                     std::min(1.0, std::max(of_time, of_scenes)));
   });
   progress.finish();
   print_result(arguments, result);
   PICTURA_CHECK(
       result.first_faulty_scene < 0,
-      "bench soak: {} of {} images and {} of {} answers about visibility are out of tolerance; draw the first "
+      "bench soak: {} of {} images are out of tolerance and {} of {} answers about visibility differ; draw the first "
       "again with --first {} --scenes 1",
-      result.images_out_of_tolerance, result.images, result.answers_out_of_tolerance, result.queries,
+      result.images_out_of_tolerance, result.images, result.differing_answers, result.queries,
       result.first_faulty_scene);
 }
 
@@ -134,8 +134,8 @@ void add_soak_benchmark(CLI::App& bench) {
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Ends with status 1 where an image is further from the oracle's than kernels may be: by more than 1/255 on one\n"
-      "value in 10,000, by more than 4/255 anywhere, or in the planes of one pixel in 10,000; or an agent's "
-      "visibility.\n"
+      "value in 10,000, by more than 4/255 anywhere, or in the planes of one pixel in 10,000; or an answer about an\n"
+      "agent's visibility differs.\n"
       "Example:\n  pictura bench soak --map towns --minutes 8");
   command->callback([arguments] { run(*arguments); });
 }

@@ -115,6 +115,7 @@ RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& r
   if (watch) result.up_front_bytes = watch->taken_bytes();
 #endif
   target->draw(renderer.get(), 1);  // warms up
+  renderer->check();
   std::optional<OracleCheck> check;
   if (render_case.checked_views > 0 && render_case.backend != "cpu" && render_case.backend != "null") {
     check.emplace(worlds, render_case);
@@ -128,6 +129,7 @@ RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& r
       result.call_ms.push_back(target->draw(renderer.get(), calls));
       if (interrupted()) throw Interrupted("interrupted");
     }
+    renderer->check();
     if (check) check->compare(target.get(), &result.error);
   }
 #ifdef PICTURA_HAS_CUDA

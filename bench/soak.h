@@ -30,7 +30,7 @@ struct SoakFault {
   ImageError error;
 };
 
-/// An answer out of tolerance.
+/// An answer unlike the oracle's.
 struct VisibilityFault {
   int64_t scene = 0;
   VisibilityQuery query;
@@ -42,7 +42,7 @@ struct SoakResult {
   int64_t scenes = 0, images = 0, queries = 0;
   double seconds = 0;
   ImageError error;  // over all images
-  int64_t images_out_of_tolerance = 0, answers_out_of_tolerance = 0;
+  int64_t images_out_of_tolerance = 0, differing_answers = 0;
   // The first hundred of each.
   std::vector<SoakFault> faults;
   std::vector<VisibilityFault> visibility_faults;

@@ -38,9 +38,8 @@ constexpr double kSplitLineError = 1e-4;
 constexpr double kKernelError = 1.0 / 255;
 constexpr double kKernelShareWithin = 0.9999;
 constexpr double kKernelWorstError = 4.0 / 255;
-/// ... and in relative depth and in visibility, where both tell of the same surface: rounding alone.
+/// ... and in relative depth, where both tell of the same surface: rounding alone.
 constexpr double kKernelDepthError = 1e-4;
-constexpr double kKernelVisibilityError = 1e-5;
 /// Least pooled PSNR of the OpenGL baseline against the oracle on towns, by its samples: what point samples miss of the
 /// coverage. About half a decibel below what the towns of the tests measure with Mesa's rasterizer, because drivers
 /// place samples and round corners to parts of a pixel (1/256 at least) as they like.
