@@ -13,6 +13,7 @@
 #include "pictura/common/make_renderer.h"
 #include "pictura/tests/backend_cuda/device_test.h"
 #include "pictura/tests/support/image_scenes.h"
+#include "pictura/tests/support/image_truth.h"
 #include "pictura/tests/support/tolerances.h"
 
 namespace pictura {
@@ -35,7 +36,7 @@ void expect_parity(const Scene& town, const RendererConfig& config) {
   std::size_t within = 0, equal = 0;
   double worst = 0;
   for (std::size_t i = 0; i < host.color.size(); ++i) {
-    const double error = std::abs(static_cast<double>(host.color[i]) - device.color[i]);
+    const double error = value_error(static_cast<double>(device.color[i]), static_cast<double>(host.color[i]));
     within += error <= kKernelError;
     equal += error == 0;
     worst = std::max(worst, error);
@@ -48,8 +49,10 @@ void expect_parity(const Scene& town, const RendererConfig& config) {
   // Planes are of one surface or another at a pixel's centre: no rounding shows but at edges.
   std::size_t differ = 0;
   for (std::size_t i = 0; i < host.depth_m.size(); ++i) {
+    const double depth_m = static_cast<double>(host.depth_m[i]);
+    const double depth_error = value_error(static_cast<double>(device.depth_m[i]), depth_m) / depth_m;
     differ += host.class_id[i] != device.class_id[i] || host.instance_id[i] != device.instance_id[i] ||
-              !(host.depth_m[i] == device.depth_m[i] || std::abs(host.depth_m[i] - device.depth_m[i]) < 1e-3f);
+              !(host.depth_m[i] == device.depth_m[i] || depth_error < kKernelDepthError);
   }
   EXPECT_LE(static_cast<double>(differ), (1 - kKernelShareWithin) * static_cast<double>(host.depth_m.size()));
 }
