@@ -139,16 +139,21 @@ void try_to_cache(const std::string& path, std::string_view bytes) {
 }
 
 void make_output_folder(const std::string& path) {
-  std::error_code code;
-  fs::create_directories(path, code);
-  PICTURA_CHECK(fs::is_directory(path), "{}: cannot be made: {}", path, code ? code.message() : "it is a file");
+  std::error_code making, asking;
+  fs::create_directories(path, making);
+  const bool is_folder = fs::is_directory(path, asking);
+  PICTURA_CHECK(is_folder, "{}: cannot be made: {}", path,
+                making   ? making.message()
+                : asking ? asking.message()
+                         : "it is a file");
   // Ask by trying: permission bits say nothing of read-only mounts, and a superuser passes access().
   const std::string probe = (fs::path(path) / fmt::format(".probe.{}", getpid())).string();
   {
     std::ofstream out(probe);
     PICTURA_CHECK(out, "{}: cannot be written to: {}", path, std::strerror(errno));
   }
-  fs::remove(probe, code);
+  std::error_code ignored;
+  fs::remove(probe, ignored);
 }
 
 }  // namespace pictura

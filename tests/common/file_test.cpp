@@ -50,6 +50,18 @@ TEST_F(FileTest, ErrorsNameThePath) {
   }
 }
 
+TEST_F(FileTest, AFolderThatCannotBeReachedIsAnErrorAndNoneForACache) {
+  const std::string unreachable = folder_ / (std::string(300, 'x') + "/deeper");  // file systems end at 255
+  try {
+    make_output_folder(unreachable);
+    FAIL() << "expected an Error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.what(), unreachable + ": cannot be made: File name too long");
+  }
+  EXPECT_NO_THROW(try_to_cache(unreachable + "/a.map", "x"));
+  EXPECT_EQ(folder_.num_entries(), 0u);
+}
+
 TEST_F(FileTest, AFileThatChangesWhileItIsReadIsRefused) {
   const std::string path = folder_ / "growing";
   write_file(path, std::string(std::size_t{64} << 20, 'x'));
