@@ -41,6 +41,11 @@ enum class Planes : uint8_t { none, all };  // depth, class and instance
 class HostImages {
  public:
   HostImages(const Rig& rig, int num_views, PixelFormat format = PixelFormat::u8, Planes planes = Planes::none);
+  // A copy's cameras would point into the original's memory.
+  HostImages(const HostImages&) = delete;
+  HostImages& operator=(const HostImages&) = delete;
+  HostImages(HostImages&&) = default;
+  HostImages& operator=(HostImages&&) = default;
   ImageBatch batch();
   /// The bytes of all blocks of colour in order: what image_hash is taken over.
   Span<const uint8_t> bytes() const { return bytes_; }
