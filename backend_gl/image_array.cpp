@@ -177,11 +177,12 @@ void ImageArray::begin() {
 }
 
 void ImageArray::resolve(int images) {
-  constexpr std::size_t kGroup = 64;  // local_size_x
+  constexpr std::size_t kGroup = 64;          // local_size_x
+  constexpr std::size_t kMostGroups = 65535;  // every OpenGL takes so many along an axis
   gl_.BindTextureUnit(0, color_);
   gl_.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, output_);
   gl_.UseProgram(resolve_program_);
-  const std::size_t groups = (plane_bytes() / 4 + kGroup - 1) / kGroup;
+  const std::size_t groups = std::min((plane_bytes() / 4 + kGroup - 1) / kGroup, kMostGroups);
   gl_.DispatchCompute(static_cast<GLuint>(groups), static_cast<GLuint>(images), 1);
   gl_.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
 }

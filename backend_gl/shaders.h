@@ -46,8 +46,8 @@ out vec4 color;
 void main() { color = vec4(face_color, 1.0); }
 )";
 
-/// Needs, defined before it: MULTISAMPLE and PACKED as 0 or 1. An invocation makes what one word of each colour plane
-/// holds: four bytes (PACKED), or one float.
+/// Needs, defined before it: MULTISAMPLE and PACKED as 0 or 1. An invocation makes what words of each colour plane
+/// hold, four bytes (PACKED) or one float each.
 constexpr const char* kResolveShader = R"(
 #if MULTISAMPLE
 uniform sampler2DMSArray drawn;
@@ -82,9 +82,7 @@ vec3 mean_of(ivec2 pixel, int layer) {
   return clamp(sum / float(grid * grid * samples), 0.0, 1.0);
 }
 
-void main() {
-  int word = int(gl_GlobalInvocationID.x), layer = int(gl_GlobalInvocationID.y);
-  if (word >= plane_words) return;
+void resolve(int word, int layer) {
 #if PACKED
   uvec3 value = uvec3(0);
   for (int i = 0; i < 4; ++i) {
@@ -101,6 +99,12 @@ void main() {
   words[first] = value.r;
   words[first + plane_words] = value.g;
   words[first + 2 * plane_words] = value.b;
+}
+
+void main() {
+  // Large images have more words than there may be invocations.
+  int invocations = int(gl_NumWorkGroups.x * gl_WorkGroupSize.x), layer = int(gl_GlobalInvocationID.y);
+  for (int word = int(gl_GlobalInvocationID.x); word < plane_words; word += invocations) resolve(word, layer);
 }
 )";
 

@@ -222,6 +222,29 @@ TEST_P(GlRenderer, BatchesLargerThanAnArrayAreTheSameImages) {
   }
 }
 
+TEST_P(GlRenderer, ImagesOfMoreWordsThanOpenGlPromisesInvocationsAreWhole) {
+  StaticGeometry geometry;
+  WallFace wall;
+  wall.a_m = {20, -60, -30};
+  wall.b_m = {20, 60, -30};
+  wall.height_m = 60;
+  geometry.walls.push_back(wall);
+  geometry.build_grids();
+  RendererConfig config{.rig = paper_rig(2049, 2048), .num_threads = 1};
+  config.rig.cameras.resize(1);
+  ASSERT_GT(2049 * 2048, 65535 * 64);
+  SceneOwner scene;
+  scene.end_world(0);
+  const std::vector<float> image = draw(GetParam(), geometry, scene, {make_view({}, 0)}, config);
+  const std::size_t pixels = image.size() / 3;
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    const auto first = image.begin() + static_cast<std::ptrdiff_t>(channel * pixels);
+    EXPECT_GT(*first, 0.2f);
+    EXPECT_EQ(std::count(first, first + static_cast<std::ptrdiff_t>(pixels), *first),
+              static_cast<std::ptrdiff_t>(pixels));
+  }
+}
+
 std::vector<uint8_t> draw_bytes(Renderer* renderer, const SyntheticTown& town, const std::vector<View>& views) {
   HostImages images(renderer->config().rig, static_cast<int>(views.size()));
   renderer->render(town.scene.batch(), views, images.batch());
