@@ -102,6 +102,7 @@ class GlRenderer final : public Renderer {
         *gl_, {{GL_VERTEX_SHADER, gl::kFaceVertexShader}, {GL_FRAGMENT_SHADER, gl::kFaceFragmentShader}});
     projection_ = gl_->GetUniformLocation(program_, "projection");
     positions_ = gl_->GetUniformLocation(program_, "positions");
+    positions_per_px_ = static_cast<float>(config_.samples.grid << gl_->integer(GL_SUBPIXEL_BITS));
     gl_->ProgramUniform1f(program_, gl_->GetUniformLocation(program_, "near_m"), kNear_m);
     gl_->ProgramUniform2f(program_, gl_->GetUniformLocation(program_, "nearness"), gl::kLeastNearness,
                           gl::kMostNearness);
@@ -231,9 +232,7 @@ class GlRenderer final : public Renderer {
     const float width = static_cast<float>(camera.width_px), height = static_cast<float>(camera.height_px);
     gl_->ProgramUniform4f(program_, projection_, 2.0f * camera.focal_x_px / width, 2.0f * camera.focal_y_px / height,
                           2.0f * camera.center_x_px / width - 1.0f, 2.0f * camera.center_y_px / height - 1.0f);
-    // Corners lie on a grid of so many parts of a texel.
-    const float positions_px = static_cast<float>(config_.samples.grid << gl_->integer(GL_SUBPIXEL_BITS));
-    gl_->ProgramUniform2f(program_, positions_, 0.5f * positions_px * width, 0.5f * positions_px * height);
+    gl_->ProgramUniform2f(program_, positions_, 0.5f * positions_per_px_ * width, 0.5f * positions_per_px_ * height);
   }
 
   RendererConfig config_;
@@ -245,6 +244,7 @@ class GlRenderer final : public Renderer {
   std::vector<SizeGroup> groups_;
   GLuint program_ = 0, instances_ = 0, vertex_array_ = 0;
   GLint projection_ = -1, positions_ = -1;
+  float positions_per_px_ = 0;         // of the grid that the driver rounds corners to, along each axis
   std::deque<StaticGeometry> copies_;  // their addresses stay: geometries_ point into them
   std::vector<StaticGeometryView> geometries_;
   gl::HostScene host_scene_;
