@@ -191,10 +191,11 @@ void ImageArray::plan_copy(int first, int images, void* out, int64_t stride, std
   const std::size_t value_bytes = bytes_per_value(format_);
   const std::size_t row_bytes =
       static_cast<std::size_t>(width_px_) * static_cast<std::size_t>(height_px_) * value_bytes;
+  // A single image may have any stride; CUDA takes no pitch below a row.
+  const std::size_t pitch = images > 1 ? static_cast<std::size_t>(stride) * value_bytes : row_bytes;
   for (std::size_t plane = 0; plane < 3; ++plane) {
     copies_out->push_back({(3 * static_cast<std::size_t>(first) + plane) * plane_bytes(), 3 * plane_bytes(),
-                           static_cast<std::byte*>(out) + plane * row_bytes,
-                           static_cast<std::size_t>(stride) * value_bytes, row_bytes,
+                           static_cast<std::byte*>(out) + plane * row_bytes, pitch, row_bytes,
                            static_cast<std::size_t>(images)});
   }
 }

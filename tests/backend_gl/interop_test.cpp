@@ -79,6 +79,29 @@ TEST_F(GlInterop, WritesTheSameBytesToDeviceMemoryAsToTheHost) {
   }
 }
 
+TEST_F(GlInterop, ASingleViewMayHaveAnyStride) {
+  SyntheticTown town = make_synthetic_town(1, 60);
+  town.views.resize(1);
+  RendererConfig config{.rig = paper_rig(97, 55)};
+  config.rig.cameras.resize(1);
+  const auto on_host = make_renderer("gl:egl", config);
+  config.space = MemorySpace::cuda;
+  const auto on_device = make_renderer("gl:egl", config);
+  on_host->upload(town.geometry);
+  on_device->upload(town.geometry);
+  HostImages host_images(config.rig, 1);
+  on_host->render(town.scene.batch(), town.views, host_images.batch());
+  const DeviceScene scene(town.scene.batch());
+  const DeviceBuffer<View> views{Span<const View>(town.views)};
+  for (const int64_t stride : {int64_t{0}, int64_t{-1}, int64_t{1} << 40}) {
+    DeviceImages device_images(config.rig.cameras[0], 1, 3 * 97 * 55);
+    device_images.camera.view_stride = stride;
+    on_device->render(scene.batch(), views.span(),
+                      {MemorySpace::cuda, PixelFormat::u8, 1, Span<const CameraImages>(&device_images.camera, 1)});
+    EXPECT_THAT(device_images.on_host(), testing::ElementsAreArray(host_images.bytes())) << stride;
+  }
+}
+
 TEST_F(GlInterop, RefusesAHostScene) {
   SyntheticTown town = make_synthetic_town(1, 10);
   town.views.resize(1);
