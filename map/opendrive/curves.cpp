@@ -100,7 +100,7 @@ double banked_part(const FileRoad& road, double s, double t) {
   const FileSection& section = item_at(road.sections, s);
   for (const FileLane& lane : t > 0 ? section.left : section.right) {
     if (!lane.is_level) continue;
-    const double border = border_t(road, section, inner_border(lane.id), s);
+    const double border = border_at(road, section, inner_border(lane.id), s).t;
     return t > 0 ? std::min(t, border) : std::max(t, border);
   }
   return t;
@@ -201,9 +201,9 @@ Point3 point_at(const FileRoad& road, double s, double t) {
 
 Point3 point_on_lane(const FileRoad& road, const FileSection& section, const FileLane& lane, double s,
                      double outer_share) {
-  const double outer = border_t(road, section, lane.id, s);
+  const double outer = border_at(road, section, lane.id, s).t;
   double t = outer;
-  if (lane.id != 0) t -= (1 - outer_share) * (outer - border_t(road, section, inner_border(lane.id), s));
+  if (lane.id != 0) t -= (1 - outer_share) * (outer - border_at(road, section, inner_border(lane.id), s).t);
   Point3 point = point_at(road, s, t);
   if (!lane.inner_height.cubics.empty()) {
     const double ds = inside(section, s) - section.s;
@@ -213,8 +213,8 @@ Point3 point_on_lane(const FileRoad& road, const FileSection& section, const Fil
 }
 
 double heading_between(const FileRoad& road, const FileSection& section, int inner, int outer, double s) {
-  const double t = 0.5 * (border_t(road, section, inner, s) + border_t(road, section, outer, s));
-  const double slope = 0.5 * (border_slope(road, section, inner, s) + border_slope(road, section, outer, s));
+  const Border in = border_at(road, section, inner, s), out = border_at(road, section, outer, s);
+  const double t = 0.5 * (in.t + out.t), slope = 0.5 * (in.slope + out.slope);
   const double roll = road.superelevation.value(s);
   const double lateral = t * std::cos(roll);
   const double lateral_slope = slope * std::cos(roll) - t * std::sin(roll) * road.superelevation.slope(s);
@@ -226,37 +226,28 @@ double heading_between(const FileRoad& road, const FileSection& section, int inn
 
 double lane_width(const FileRoad& road, const FileSection& section, const FileLane& lane, double s) {
   if (lane.border.cubics.empty()) return std::max(lane.width.value(inside(section, s) - section.s), 0.0);
-  return std::abs(border_t(road, section, lane.id, s) - border_t(road, section, inner_border(lane.id), s));
+  return std::abs(border_at(road, section, lane.id, s).t - border_at(road, section, inner_border(lane.id), s).t);
 }
 
-double border_t(const FileRoad& road, const FileSection& section, int border, double s) {
+Border border_at(const FileRoad& road, const FileSection& section, int border, double s) {
   const double here = inside(section, s);
   const double sign = border > 0 ? 1 : -1;
   const std::vector<FileLane>& side = border > 0 ? section.left : section.right;
-  double t = road.lane_offset.value(here);
+  Border result{road.lane_offset.value(here), road.lane_offset.slope(here)};
+  const double ds = here - section.s;
   for (std::size_t i = 0; i < static_cast<std::size_t>(std::abs(border)); ++i) {
     if (side[i].border.cubics.empty()) {
-      t += sign * std::max(side[i].width.value(here - section.s), 0.0);
+      const double width = side[i].width.value(ds);
+      if (width < 0) continue;
+      result.t += sign * width;
+      result.slope += sign * side[i].width.slope(ds);
     } else {
-      t = sign * std::max(sign * side[i].border.value(here - section.s), sign * t);
+      const double t = side[i].border.value(ds);
+      if (sign * t < sign * result.t) continue;
+      result = {t, side[i].border.slope(ds)};
     }
   }
-  return t;
-}
-
-double border_slope(const FileRoad& road, const FileSection& section, int border, double s) {
-  const double here = inside(section, s);
-  const double sign = border > 0 ? 1 : -1;
-  const std::vector<FileLane>& side = border > 0 ? section.left : section.right;
-  double slope = road.lane_offset.slope(here);
-  for (std::size_t i = 0; i < static_cast<std::size_t>(std::abs(border)); ++i) {
-    if (side[i].border.cubics.empty()) {
-      slope += sign * side[i].width.slope(here - section.s);
-    } else {
-      slope = side[i].border.slope(here - section.s);
-    }
-  }
-  return slope;
+  return result;
 }
 
 std::vector<double> formula_changes(const FileRoad& road, const FileSection& section, int border, double begin,

@@ -35,12 +35,14 @@ Point3 point_on_lane(const FileRoad& road, const FileSection& section, const Fil
 /// Heading of the line in the middle between two borders, towards growing s.
 double heading_between(const FileRoad& road, const FileSection& section, int inner, int outer, double s);
 
-/// Lateral position t of a lane's border at s. Border 0 is the center line, border k (-k) the outer border of lane k
-/// (-k). Widths below 0 count as 0.
-double border_t(const FileRoad& road, const FileSection& section, int border, double s);
+/// A lane's border at one s: its lateral position, and how fast that grows with s.
+struct Border {
+  double t = 0, slope = 0;
+};
 
-/// How fast that t grows with s.
-double border_slope(const FileRoad& road, const FileSection& section, int border, double s);
+/// Border 0 is the center line, border k (-k) the outer border of lane k (-k). Widths below 0 count as 0, and borders
+/// that would lie inside the one before lie on it.
+Border border_at(const FileRoad& road, const FileSection& section, int border, double s);
 
 /// Width of a lane at s, along the banked road.
 double lane_width(const FileRoad& road, const FileSection& section, const FileLane& lane, double s);

@@ -29,7 +29,7 @@ void check_widths(const FileRoad& road, const FileSection& section, const FileLa
     const double width =
         lane.border.cubics.empty()
             ? lane.width.value(ds)
-            : (lane.id > 0 ? 1 : -1) * (lane.border.value(ds) - border_t(road, section, inner_border(lane.id), s));
+            : (lane.id > 0 ? 1 : -1) * (lane.border.value(ds) - border_at(road, section, inner_border(lane.id), s).t);
     if (!(width >= -kWidthTolerance_m)) {
       lane.where.fail("its width at s {:.3f} is {:.3f} m; expected at least 0", s, width);
     }
@@ -40,7 +40,7 @@ void check_widths(const FileRoad& road, const FileSection& section, const FileLa
 }
 
 void check_place(const FileRoad& road, const FileSection& section, int border, double s) {
-  const double t = border_t(road, section, border, s);
+  const double t = border_at(road, section, border, s).t;
   const double roll = road.superelevation.value(s);
   const double fall = std::max(std::abs(road.left_crossfall.value(s)), std::abs(road.right_crossfall.value(s)));
   if (!(std::abs(roll) <= kMaxBanking_rad && fall <= kMaxBanking_rad)) {

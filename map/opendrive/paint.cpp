@@ -108,7 +108,7 @@ class MarkPainter {
     std::sort(breaks.begin(), breaks.end());
     const std::vector<CurvePoint> points =
         sample_curve(breaks, build_.options.chord_error_m, kMaxPiece_m, &build_.budget, [&](double s) {
-          const double t = border_t(road_, section_, lane_.id, s) + stripe.left + mark.sway.value(s - mark_begin);
+          const double t = border_at(road_, section_, lane_.id, s).t + stripe.left + mark.sway.value(s - mark_begin);
           const Point3 p = point_at(road_, s, t);
           // On a raised lane the mark lies at the height of its border.
           const bool is_raised = !lane_.inner_height.cubics.empty();

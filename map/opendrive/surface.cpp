@@ -117,7 +117,7 @@ void build_building_lines(Build* build) {
         const int outermost = outermost_lane(sign > 0 ? section.left : section.right);
         if (outermost == 0) continue;
         auto at = [&](double s) {
-          const Point3 p = point_at(road, s, border_t(road, section, outermost, s) + sign * kSetback_m);
+          const Point3 p = point_at(road, s, border_at(road, section, outermost, s).t + sign * kSetback_m);
           return Point3{p.x - build->map->origin_m[0], p.y - build->map->origin_m[1], p.z - build->map->origin_m[2]};
         };
         const int pieces = std::max(1, static_cast<int>(std::round((section.end - section.s) / kBuildingPiece_m)));

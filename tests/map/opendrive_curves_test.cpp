@@ -8,6 +8,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/scene.h"
+#include "pictura/map/opendrive/curves.h"
 #include "pictura/map/opendrive/opendrive.h"
 #include "pictura/tests/map/small_roads.h"
 
@@ -75,6 +76,37 @@ TEST(OpenDriveCurves, ACurveOfAnotherLengthThanItsGeometryIsRefused) {
       parse(parabola(R"(<paramPoly3 pRange="metres" aU="0" bU="60" cU="0" dU="0" aV="0" bV="0" cV="36" dV="0"/>)")
                 .text()),
       Error);
+}
+
+opendrive::Profile falling(double at_start, double per_metre) { return {{{0, at_start, per_metre, 0, 0}}}; }
+
+void expect_border(const opendrive::Border& border, double t, double slope) {
+  EXPECT_NEAR(border.t, t, 1e-12);
+  EXPECT_NEAR(border.slope, slope, 1e-12);
+}
+
+TEST(OpenDriveCurves, ALaneOfNegativeWidthNeitherMovesNorTurnsItsBorder) {
+  opendrive::FileRoad road;
+  road.lane_offset = falling(0.5, 0.01);
+  opendrive::FileSection section;
+  section.end = 20;
+  section.left.resize(2);
+  section.left[0].width = falling(1, -0.1);  // 0 at s = 10
+  section.left[1].width = falling(3, 0.02);
+  expect_border(border_at(road, section, 1, 5), 0.55 + 0.5, 0.01 - 0.1);
+  expect_border(border_at(road, section, 1, 15), 0.65, 0.01);
+  expect_border(border_at(road, section, 2, 15), 0.65 + 3.3, 0.01 + 0.02);
+}
+
+TEST(OpenDriveCurves, ABorderInsideTheOneBeforeLiesOnItAndRunsAsItDoes) {
+  const opendrive::FileRoad road;
+  opendrive::FileSection section;
+  section.end = 20;
+  section.right.resize(2);
+  section.right[0].border = falling(-3, -0.1);
+  section.right[1].border = falling(-4, 0.02);  // crosses the first one at s = 8.33
+  expect_border(border_at(road, section, -2, 5), -3.9, 0.02);
+  expect_border(border_at(road, section, -2, 15), -4.5, -0.1);
 }
 
 /// A straight road with lanes of 4 m on both sides and a pavement of 2 m on the right, banked as `lateral` says.
