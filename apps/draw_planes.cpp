@@ -4,6 +4,7 @@
 
 #include "pictura/common/color.h"
 #include "pictura/common/error.h"
+#include "pictura/common/math.h"
 
 namespace pictura {
 
@@ -31,7 +32,11 @@ Rgb hue_of(int instance) {
   return {channel(0), channel(4), channel(2)};
 }
 
-Rgb grey(float value) { return {value, value, value}; }
+// Darker with range, and never the black of nothing.
+Rgb grey_of(float depth_m) {
+  const float value = clamp(1.0f - depth_m / kVisibleRange_m, 1.0f / 255, 1.0f);
+  return {value, value, value};
+}
 
 }  // namespace
 
@@ -51,7 +56,7 @@ RgbImage plane_picture(const HostImages& images, int view, int camera, Plane pla
     const std::size_t at = static_cast<std::size_t>(view) * pixels + i;
     Rgb color;
     if (plane == Plane::depth && std::isfinite(image.depth_m[at])) {
-      color = grey(max_of(depth_brightness(image.depth_m[at]), 1.0f / 255));
+      color = grey_of(image.depth_m[at]);
     } else if (plane == Plane::class_id) {
       PICTURA_CHECK(image.class_id[at] < std::size(kClassColors), "picture of a plane: unknown class {}",
                     image.class_id[at]);

@@ -27,10 +27,6 @@ struct Rig {
   std::vector<Camera> cameras;
 };
 
-/// Bodies shorter than this have the x offsets of their cameras shrunk in proportion (DESIGN: every camera is over its
-/// own body).
-constexpr float kRigReferenceLength_m = 4.5f;
-
 /// The paper's four cameras (appendix, table of the camera rig): front, front-left, front-right and back, focal length
 /// 1545 px at 1920x1080, scaled to the size asked for. Throws unless both sizes are in [1, 8192].
 Rig paper_rig(int width_px = 96, int height_px = 54);

@@ -1,9 +1,8 @@
-// The palette: one base colour per kind of thing (per face for agents), and the brightness that fades it to black with
-// range. Vehicles take RAP's colours (vita-epfl/RAP, renderer.py); the other hues are ours, see docs/image.md.
+// The palette: one base colour per kind of thing (per face for agents), and the range at which all have faded to black.
+// Vehicles take RAP's colours (vita-epfl/RAP, renderer.py); the other hues are ours, see docs/image.md.
 #pragma once
 
 #include "pictura/common/hd.h"
-#include "pictura/common/math.h"
 
 namespace pictura {
 
@@ -64,10 +63,5 @@ constexpr Rgb kYellowMarkColor = rgb8(240, 200, 60);
 constexpr Rgb kRoadEdgeColor = rgb8(200, 36, 35);
 constexpr Rgb kCrosswalkColor = rgb8(206, 131, 63);
 constexpr Rgb kStopLineColor = rgb8(98, 183, 249);
-
-/// Linear fade to black at 120 m; mean_depth_m is the mean over a primitive's vertices of camera z in [0, 120].
-PICTURA_HD constexpr float depth_brightness(float mean_depth_m) {
-  return clamp(1.0f - mean_depth_m / kVisibleRange_m, 0.0f, 1.0f);
-}
 
 }  // namespace pictura
