@@ -41,11 +41,13 @@ struct LightHead {
 };
 constexpr float kLightRadius_m = 0.5f;
 
-/// What the uniform grids file a piece under.
+/// What the uniform grids file a piece under. Of a strip, the box around its four corners: where it is mitred they lie
+/// up to four half-widths from its centre line.
 PICTURA_HD inline Aabb2 ground_box(const Strip& strip) {
   const Vec2 a = strip.a_m.xy(), b = strip.b_m.xy();
-  return {{min_of(a.x, b.x) - strip.width_m, min_of(a.y, b.y) - strip.width_m},
-          {max_of(a.x, b.x) + strip.width_m, max_of(a.y, b.y) + strip.width_m}};
+  const Vec2 at_a = strip.side_a * (0.5f * strip.width_m), at_b = strip.side_b * (0.5f * strip.width_m);
+  return {{min_of(a.x - fabsf(at_a.x), b.x - fabsf(at_b.x)), min_of(a.y - fabsf(at_a.y), b.y - fabsf(at_b.y))},
+          {max_of(a.x + fabsf(at_a.x), b.x + fabsf(at_b.x)), max_of(a.y + fabsf(at_a.y), b.y + fabsf(at_b.y))}};
 }
 PICTURA_HD inline Aabb2 ground_box(const WallFace& wall) {
   return {{min_of(wall.a_m.x, wall.b_m.x), min_of(wall.a_m.y, wall.b_m.y)},

@@ -6,6 +6,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/make_renderer.h"
+#include "pictura/common/raster_shapes.h"
 
 namespace pictura {
 namespace {
@@ -34,6 +35,29 @@ TEST(Strips, RepeatedPointsAreSkippedAndSharpTurnsBounded) {
   EXPECT_LT(length(strips[0].side_b), 4.01f);
   const std::vector<Vec3> single{{1, 2, 3}};
   EXPECT_THROW(append_strips(single, 0.2f, kWhiteMarkColor, StripKind::lane_mark, &strips), Error);
+}
+
+TEST(Strips, AreFiledUnderTheBoxAroundTheirCorners) {
+  // A straight end, a right angle, and a turn by 150 degrees.
+  const std::vector<Vec3> points{{0, 0, 0}, {8, 0, 0}, {8, 6, 0}, {5.5f, 1.67f, 0}};
+  std::vector<Strip> strips;
+  append_strips(points, 0.4f, kWhiteMarkColor, StripKind::lane_mark, &strips);
+  ASSERT_EQ(strips.size(), 3u);
+  EXPECT_GT(length(strips[1].side_b), 3.8f);
+  for (const Strip& strip : strips) {
+    Vec3 corners[4];
+    strip_corners(strip, corners);
+    Aabb2 around{corners[0].xy(), corners[0].xy()};
+    for (const Vec3& corner : corners) {
+      around.low = {min_of(around.low.x, corner.x), min_of(around.low.y, corner.y)};
+      around.high = {max_of(around.high.x, corner.x), max_of(around.high.y, corner.y)};
+    }
+    const Aabb2 box = ground_box(strip);
+    EXPECT_EQ(box.low.x, around.low.x);
+    EXPECT_EQ(box.low.y, around.low.y);
+    EXPECT_EQ(box.high.x, around.high.x);
+    EXPECT_EQ(box.high.y, around.high.y);
+  }
 }
 
 TEST(Renderers, AnUnknownNameListsTheKnownOnes) {
