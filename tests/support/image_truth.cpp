@@ -489,12 +489,24 @@ double value_error(double actual, double expected) {
   return std::isfinite(error) ? error : std::numeric_limits<double>::infinity();
 }
 
+namespace {
+
+// Bin k holds errors of more than k - 1 and at most k steps, but for the rounding of floats that stand for bytes.
+constexpr double kStepsOfOne = 8 * 255, kRounding_steps = 1e-3;
+
+std::size_t bin_of(double error) {
+  return static_cast<std::size_t>(
+      std::ceil(std::max(0.0, std::min(kStepsOfOne, error * kStepsOfOne - kRounding_steps))));
+}
+
+}  // namespace
+
 void PooledError::add(const std::vector<float>& image, const std::vector<float>& truth) {
   for (std::size_t i = 0; i < image.size(); ++i) {
     const double error = value_error(image[i], truth[i]);
     squared_ += error * error;
     max_error_ = std::max(max_error_, error);
-    ++histogram_[static_cast<std::size_t>(std::min(1024.0, error * 1024))];
+    ++histogram_[bin_of(error)];
   }
   count_ += image.size();
 }
@@ -510,7 +522,7 @@ double PooledError::psnr_db() const { return 10 * std::log10(static_cast<double>
 
 double PooledError::share_above(double error) const {
   std::size_t above = 0;
-  for (auto i = static_cast<std::size_t>(std::ceil(error * 1024)); i < histogram_.size(); ++i) above += histogram_[i];
+  for (std::size_t i = bin_of(error) + 1; i < histogram_.size(); ++i) above += histogram_[i];
   return static_cast<double>(above) / static_cast<double>(count_);
 }
 

@@ -49,13 +49,13 @@ class PooledError {
   void add(const PooledError& other);
   double psnr_db() const;
   double max_error() const { return max_error_; }
-  /// Share of channel values that are further than this from the truth.
+  /// Share of channel values that are further than this from the truth; in steps of 1/8 of 1/255, rounded up.
   double share_above(double error) const;
 
  private:
   double squared_ = 0, max_error_ = 0;
   std::size_t count_ = 0;
-  std::vector<std::size_t> histogram_ = std::vector<std::size_t>(1025);  // of |error| in steps of 1/1024
+  std::vector<std::size_t> histogram_ = std::vector<std::size_t>(8 * 255 + 1);  // of |error|
 };
 
 }  // namespace pictura
