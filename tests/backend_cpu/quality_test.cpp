@@ -97,26 +97,9 @@ TEST(Quality, AWallThroughTheImageAndCarsOnBothSides) {
 }
 
 TEST(Quality, RoadsOnTwoLevels) {
-  // A bridge across the view, with marks and cars on it, above a road with marks and cars.
-  StaticGeometry geometry;
-  for (const float y : {-3.5f, 0.0f, 3.5f})
-    add_polyline(&geometry, {{-20, y, 0}, {110, y, 0}}, 0.15f, StripKind::lane_mark);
-  for (const float x : {30.0f, 33.5f, 37.0f})
-    add_polyline(&geometry, {{x, -60, 6}, {x, 60, 6}}, 0.2f, StripKind::road_edge);
-  geometry.build_grids();
-  std::vector<AgentBox> boxes;
-  for (int i = 0; i < 5; ++i) {
-    const float at = static_cast<float>(i);
-    boxes.push_back(make_box(AgentClass::vehicle, {12 + 14 * at, 1.8f, 0}, 0.02f, {4.2f, 1.8f, 1.5f}));
-    boxes.push_back(make_box(AgentClass::vehicle, {31.7f, -20 + 9 * at, 6}, kHalfPi, {4.2f, 1.8f, 1.5f}));
-  }
-  // From the lower road, and from the bridge.
-  SceneOwner scene;
-  scene.agents = boxes;
-  scene.end_world(0);
-  const std::vector<View> views{make_view({-2, -1.8f, 0}, 0), make_view({35.2f, -12, 6}, 1.2f),
-                                make_view({5, 0, 14}, 0.1f)};
-  EXPECT_GE(measure_quality(geometry, scene.batch(), views, {.rig = paper_rig(), .num_threads = 1}).oracle.psnr_db(),
+  const SyntheticTown bridge = make_bridge();
+  EXPECT_GE(measure_quality(bridge.geometry, bridge.scene.batch(), bridge.views, {.rig = paper_rig(), .num_threads = 1})
+                .oracle.psnr_db(),
             kLeastOraclePsnr_db);
 }
 

@@ -244,18 +244,13 @@ TEST(Truth, WithoutAFloorALargerImageAveragedDownIsTheSmallOne) {
   Snapshot snapshot = hill();
   snapshot.views.resize(1);
   const Camera camera = paper_rig().cameras[0];
-  auto psnr_db = [](const std::vector<float>& image, const std::vector<float>& truth) {
-    PooledError error;
-    error.add(image, truth);
-    return error.psnr_db();
-  };
   const TruthImage bare = trace_image(snapshot.geometry, snapshot.scene.batch(), snapshot.views[0], camera, 0);
   const std::vector<float> small = drawn_down(snapshot, camera, 1, 0), large = drawn_down(snapshot, camera, 16, 0);
-  EXPECT_GE(psnr_db(small, bare.rgb), kLeastOraclePsnr_db);
-  EXPECT_GE(psnr_db(large, bare.rgb), kLeastOraclePsnr_db);
-  EXPECT_GE(psnr_db(large, small), kLeastOraclePsnr_db);
+  EXPECT_GE(PooledError(small, bare.rgb).psnr_db(), kLeastOraclePsnr_db);
+  EXPECT_GE(PooledError(large, bare.rgb).psnr_db(), kLeastOraclePsnr_db);
+  EXPECT_GE(PooledError(large, small).psnr_db(), kLeastOraclePsnr_db);
   // The floor is of pixels of the image, so it is another one at another size.
-  EXPECT_LT(psnr_db(drawn_down(snapshot, camera, 16, 0.35f), drawn_down(snapshot, camera, 1, 0.35f)), 45);
+  EXPECT_LT(PooledError(drawn_down(snapshot, camera, 16, 0.35f), drawn_down(snapshot, camera, 1, 0.35f)).psnr_db(), 45);
 }
 
 }  // namespace

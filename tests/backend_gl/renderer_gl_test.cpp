@@ -42,12 +42,6 @@ SyntheticTown town_of(uint64_t seed, int num_views) {
   return town;
 }
 
-double psnr_db(const std::vector<float>& image, const std::vector<float>& truth) {
-  PooledError error;
-  error.add(image, truth);
-  return error.psnr_db();
-}
-
 TEST_P(GlRenderer, DrawsWhatTheOracleDraws) {
   for (const uint64_t seed : {1, 2, 3}) {
     const SyntheticTown town = town_of(seed, 8);
@@ -55,7 +49,8 @@ TEST_P(GlRenderer, DrawsWhatTheOracleDraws) {
     const std::vector<float> oracle = draw("cpu", town.geometry, town.scene, town.views, config);
     for (const SampledQuality& quality : kQualities) {
       config.samples = quality.samples;
-      const double measured_db = psnr_db(draw(GetParam(), town.geometry, town.scene, town.views, config), oracle);
+      const double measured_db =
+          PooledError(draw(GetParam(), town.geometry, town.scene, town.views, config), oracle).psnr_db();
       fmt::print("seed {}, {}x{} grid, {} samples: {:.2f} dB\n", seed, quality.samples.grid, quality.samples.grid,
                  quality.samples.multisample, measured_db);
       EXPECT_GE(measured_db, quality.least_psnr_db);
@@ -80,7 +75,7 @@ TEST_P(GlRenderer, TheTolerancesSeeFaults) {
   for (const SampledQuality& quality : kQualities) {
     auto sampled_db = [&](const StaticGeometry& geometry, const SceneOwner& scene, RendererConfig with_fault) {
       with_fault.samples = quality.samples;
-      return psnr_db(draw(GetParam(), geometry, scene, town.views, with_fault), oracle);
+      return PooledError(draw(GetParam(), geometry, scene, town.views, with_fault), oracle).psnr_db();
     };
     EXPECT_LT(sampled_db(town.geometry, town.scene, shifted), quality.least_psnr_db);
     EXPECT_LT(sampled_db(town.geometry, halted, tinted), quality.least_psnr_db);
@@ -104,46 +99,19 @@ TEST_P(GlRenderer, AnySizeAndMixedRigs) {
   config.samples.grid = 8;
   RendererConfig exact = config;
   exact.samples = {};
-  EXPECT_GE(psnr_db(draw(GetParam(), town.geometry, town.scene, town.views, config),
-                    draw("cpu", town.geometry, town.scene, town.views, exact)),
+  EXPECT_GE(PooledError(draw(GetParam(), town.geometry, town.scene, town.views, config),
+                        draw("cpu", town.geometry, town.scene, town.views, exact))
+                .psnr_db(),
             kLeastGlPsnr8x8_db);
 }
 
 TEST_P(GlRenderer, RoadsOnTwoLevels) {
-  // A bridge across the view, with marks and cars on it, above a road with marks and cars.
-  StaticGeometry geometry;
-  for (const float y : {-3.5f, 0.0f, 3.5f}) {
-    add_polyline(&geometry, {{-20, y, 0}, {110, y, 0}}, 0.15f, StripKind::lane_mark);
-  }
-  for (const float x : {30.0f, 33.5f, 37.0f}) {
-    add_polyline(&geometry, {{x, -60, 6}, {x, 60, 6}}, 0.2f, StripKind::road_edge);
-  }
-  geometry.build_grids();
-  SceneOwner scene;
-  for (int i = 0; i < 5; ++i) {
-    const float at = static_cast<float>(i);
-    scene.agents.push_back(make_box(AgentClass::vehicle, {12 + 14 * at, 1.8f, 0}, 0.02f, {4.2f, 1.8f, 1.5f}));
-    scene.agents.push_back(make_box(AgentClass::vehicle, {31.7f, -20 + 9 * at, 6}, kHalfPi, {4.2f, 1.8f, 1.5f}));
-  }
-  scene.end_world(0);
-  // From the lower road, from the bridge, and from above both.
-  const std::vector<View> views{make_view({-2, -1.8f, 0}, 0), make_view({35.2f, -12, 6}, 1.2f),
-                                make_view({5, 0, 14}, 0.1f)};
+  const SyntheticTown bridge = make_bridge();
   RendererConfig config{.num_threads = 1};
-  const std::vector<float> oracle = draw("cpu", geometry, scene, views, config);
+  const std::vector<float> oracle = draw("cpu", bridge.geometry, bridge.scene, bridge.views, config);
   config.samples.grid = 8;
-  EXPECT_GE(psnr_db(draw(GetParam(), geometry, scene, views, config), oracle), kLeastGlPsnr8x8_db);
-}
-
-// One camera, 1.5 m up, looking straight ahead.
-Rig simple_rig() {
-  Camera camera;
-  camera.name = "simple";
-  camera.width_px = camera.height_px = 100;
-  camera.focal_x_px = camera.focal_y_px = 50;
-  camera.center_x_px = camera.center_y_px = 50;
-  camera.position_m = {0, 0, 1.5f};
-  return {{camera}};
+  EXPECT_GE(PooledError(draw(GetParam(), bridge.geometry, bridge.scene, bridge.views, config), oracle).psnr_db(),
+            kLeastGlPsnr8x8_db);
 }
 
 TEST_P(GlRenderer, BoxesThatDipIntoARoadLieOverItsStrips) {
@@ -157,7 +125,8 @@ TEST_P(GlRenderer, BoxesThatDipIntoARoadLieOverItsStrips) {
   RendererConfig config{.rig = simple_rig(), .num_threads = 1};
   const std::vector<float> oracle = draw("cpu", geometry, scene, {make_view({}, 0)}, config);
   config.samples.grid = 8;
-  EXPECT_GE(psnr_db(draw(GetParam(), geometry, scene, {make_view({}, 0)}, config), oracle), kLeastGlPsnr8x8_db);
+  EXPECT_GE(PooledError(draw(GetParam(), geometry, scene, {make_view({}, 0)}, config), oracle).psnr_db(),
+            kLeastGlPsnr8x8_db);
 }
 
 // How many pixels of a patch of road are not of the strip that lies on top of all, where the first `count` of five

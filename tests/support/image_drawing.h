@@ -12,19 +12,6 @@
 
 namespace pictura {
 
-// One camera at the origin of the ego frame, 1.5 m up, looking ahead, with round numbers.
-inline Rig simple_rig(int width_px = 100, int height_px = 100, float focal_px = 50) {
-  Camera camera;
-  camera.name = "simple";
-  camera.width_px = width_px;
-  camera.height_px = height_px;
-  camera.focal_x_px = camera.focal_y_px = focal_px;
-  camera.center_x_px = 0.5f * static_cast<float>(width_px);
-  camera.center_y_px = 0.5f * static_cast<float>(height_px);
-  camera.position_m = {0, 0, 1.5f};
-  return {{camera}};
-}
-
 struct Drawn {
   std::vector<float> rgb;
   int width_px, height_px;

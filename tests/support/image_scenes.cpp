@@ -174,6 +174,37 @@ SyntheticWorlds make_synthetic_worlds() {
   return worlds;
 }
 
+SyntheticTown make_bridge() {
+  SyntheticTown bridge;
+  for (const float y : {-3.5f, 0.0f, 3.5f}) {
+    add_polyline(&bridge.geometry, {{-20, y, 0}, {110, y, 0}}, 0.15f, StripKind::lane_mark);
+  }
+  for (const float x : {30.0f, 33.5f, 37.0f}) {
+    add_polyline(&bridge.geometry, {{x, -60, 6}, {x, 60, 6}}, 0.2f, StripKind::road_edge);
+  }
+  bridge.geometry.build_grids();
+  for (int i = 0; i < 5; ++i) {
+    const float at = static_cast<float>(i);
+    bridge.scene.agents.push_back(make_box(AgentClass::vehicle, {12 + 14 * at, 1.8f, 0}, 0.02f, {4.2f, 1.8f, 1.5f}));
+    bridge.scene.agents.push_back(make_box(AgentClass::vehicle, {31.7f, -20 + 9 * at, 6}, kHalfPi, {4.2f, 1.8f, 1.5f}));
+  }
+  bridge.scene.end_world(0);
+  bridge.views = {make_view({-2, -1.8f, 0}, 0), make_view({35.2f, -12, 6}, 1.2f), make_view({5, 0, 14}, 0.1f)};
+  return bridge;
+}
+
+Rig simple_rig(int width_px, int height_px, float focal_px) {
+  Camera camera;
+  camera.name = "simple";
+  camera.width_px = width_px;
+  camera.height_px = height_px;
+  camera.focal_x_px = camera.focal_y_px = focal_px;
+  camera.center_x_px = 0.5f * static_cast<float>(width_px);
+  camera.center_y_px = 0.5f * static_cast<float>(height_px);
+  camera.position_m = {0, 0, 1.5f};
+  return {{camera}};
+}
+
 Rig mixed_rig() {
   Rig rig = paper_rig(97, 55);
   rig.cameras[1] = paper_rig(1, 1).cameras[1];

@@ -33,6 +33,13 @@ struct SyntheticWorlds {
 };
 SyntheticWorlds make_synthetic_worlds();
 
+/// A bridge across the view, with marks and cars on it, above a road with marks and cars: seen from the road, from the
+/// bridge, and from above both.
+SyntheticTown make_bridge();
+
+/// One camera at the origin of the ego frame, 1.5 m up, looking ahead, with round numbers.
+Rig simple_rig(int width_px = 100, int height_px = 100, float focal_px = 50);
+
 /// Four cameras of 97x55, 1x1 and 40x130 pixels.
 Rig mixed_rig();
 

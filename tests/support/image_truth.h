@@ -45,6 +45,8 @@ double value_error(double actual, double expected);
 /// Pools the squared error of many images; channels in [0, 1].
 class PooledError {
  public:
+  PooledError() = default;
+  PooledError(const std::vector<float>& image, const std::vector<float>& truth) { add(image, truth); }
   void add(const std::vector<float>& image, const std::vector<float>& truth);
   void add(const PooledError& other);
   double psnr_db() const;
