@@ -2,12 +2,12 @@
 // instances into array textures, one layer an image; OpenGL projects, clips, and decides what is visible by depth.
 #include <algorithm>
 #include <cstring>
-#include <deque>
 
 #include "pictura/backend_gl/image_array.h"
 #include "pictura/backend_gl/image_faces.h"
 #include "pictura/backend_gl/shaders.h"
 #include "pictura/common/error.h"
+#include "pictura/common/host_geometries.h"
 #include "pictura/common/parallel_for.h"
 #include "pictura/common/raster_check.h"
 
@@ -46,9 +46,7 @@ class GlRenderer final : public Renderer {
         context_(std::move(context)),
         interop_(std::move(interop)),
         name_(context_->name()) {
-    PICTURA_CHECK(config_.line_floor_px >= 0 && config_.line_floor_px <= kGuardBand_px,
-                  "renderer {}: expected a line floor of 0 to {} pixels, got {}", name_, kGuardBand_px,
-                  config_.line_floor_px);
+    check_config(name_, config_);
     PICTURA_CHECK(config_.samples.grid >= 1 && config_.samples.multisample >= 1,
                   "renderer {}: expected 1 sample or more, got a grid of {} and {} samples", name_,
                   config_.samples.grid, config_.samples.multisample);
@@ -71,9 +69,7 @@ class GlRenderer final : public Renderer {
 
   GeometryHandle upload(const StaticGeometry& geometry) override {
     check_geometry(name_, geometry);
-    copies_.push_back(geometry);
-    geometries_.push_back(copies_.back().view());
-    return static_cast<GeometryHandle>(geometries_.size()) - 1;
+    return geometries_.add(geometry);
   }
 
   void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override {
@@ -152,7 +148,7 @@ class GlRenderer final : public Renderer {
   }
 
   void draw(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) {
-    check_scene(name_, scene, geometries_);
+    check_scene(name_, scene, geometries_.views());
     check_views(name_, scene, views);
     if (views.empty()) return;
     const gl::CurrentContext current(context_.get());
@@ -206,8 +202,8 @@ class GlRenderer final : public Renderer {
     const PinholeCamera camera = place_camera(in_ego, view);
     const GeometryHandle handle = scene.geometry[static_cast<std::size_t>(view.world)];
     faces_[static_cast<std::size_t>(layer)].gather(
-        {camera, make_frustum(camera), config_.line_floor_px, config_.debug_palette},
-        geometries_[static_cast<std::size_t>(handle)], scene, view, layer);
+        {camera, make_frustum(camera), config_.line_floor_px, config_.debug_palette}, geometries_[handle], scene, view,
+        layer);
   }
 
   // Puts the faces of the first `count` images one after the other into the buffer that is drawn from.
@@ -244,9 +240,8 @@ class GlRenderer final : public Renderer {
   std::vector<SizeGroup> groups_;
   GLuint program_ = 0, instances_ = 0, vertex_array_ = 0;
   GLint projection_ = -1, positions_ = -1;
-  float positions_per_px_ = 0;         // of the grid that the driver rounds corners to, along each axis
-  std::deque<StaticGeometry> copies_;  // their addresses stay: geometries_ point into them
-  std::vector<StaticGeometryView> geometries_;
+  float positions_per_px_ = 0;  // of the grid that the driver rounds corners to, along each axis
+  HostGeometries geometries_;
   gl::HostScene host_scene_;
   std::vector<gl::ImageFaces> faces_;    // one per layer
   std::vector<std::size_t> first_face_;  // [layers + 1] in the buffer

@@ -85,12 +85,6 @@ Ways draw_all_ways(const StaticGeometry& geometry, const SceneBatch& scene, cons
   return ways;
 }
 
-double psnr_db(const std::vector<float>& image, const std::vector<float>& truth) {
-  PooledError error;
-  error.add(image, truth);
-  return error.psnr_db();
-}
-
 }  // namespace
 
 Quality measure_quality(const StaticGeometry& geometry, const SceneBatch& scene, Span<const View> views,
@@ -113,7 +107,7 @@ Quality measure_quality(const StaticGeometry& geometry, const SceneBatch& scene,
     quality.area.add(image.area, truth);
     quality.oracle.add(image.oracle, truth);
     quality.oracle_bytes.add(bytes, truth);
-    quality.worst_image_db = std::min(quality.worst_image_db, psnr_db(image.oracle, truth));
+    quality.worst_image_db = std::min(quality.worst_image_db, PooledError(image.oracle, truth).psnr_db());
     ++quality.images;
   }
   return quality;

@@ -135,7 +135,7 @@ PooledError error_of(const Drawing& actual, const Drawing& expected) {
 }
 
 std::string complaint(const PooledError& error, const ImageTolerance& tolerance) {
-  // Half a step of 8 bits for the rounding of floats that stand for bytes.
+  // Of floats that stand for bytes.
   const double rounding = 1e-4 / 255;
   if (error.max_error() > tolerance.worst + rounding) {
     return fmt::format("worst value {:.2f}/255 off, expected at most {:.2f}/255", 255 * error.max_error(),
