@@ -66,6 +66,13 @@ class CommandCase(unittest.TestCase):
         self.assertEqual(len(lines), 1, result.stderr)
         self.assertIn(message, result.stderr)
 
+    def assert_bad_numbers_are_refused(self, *commands):
+        """By each command, whose last word is the option that takes the number."""
+        for arguments in commands:
+            for number in ("nan", "inf", "-1", "2000000000"):
+                with self.subTest(" ".join(map(str, arguments)), number=number):
+                    self.assert_refused(2, arguments[-1], *arguments, number)
+
     def town(self, seed=3, blocks="2x2"):
         path = self.folder / f"town{seed}.xodr"
         self.json_of("town", "--seed", seed, "--blocks", blocks, "--out", path)
@@ -80,27 +87,15 @@ class Usage(CommandCase):
             self.assertIn(f"pictura {command}", result.stdout)
 
     def test_numbers_that_are_not_finite_or_out_of_range_are_refused(self):
-        cases = [
+        line_floor = ("render", "procedural:1", "--out", self.folder, "--line-floor")
+        self.assert_bad_numbers_are_refused(
+            line_floor,
             ("town", "--out", self.folder / "town.xodr", "--hills-m"),
-            ("render", "procedural:1", "--out", self.folder, "--line-floor"),
             ("render", "procedural:1", "--out", self.folder, "--pedestrians"),
             ("simulate", "procedural:1", "--cyclists"),
             ("simulate", "procedural:1", "--film-width"),
-        ]
-        if "quality" in run("bench", "--help").stdout:
-            cases += [
-                ("bench", "soak", "--minutes"),
-                ("bench", "quality", "--line-floor"),
-                ("bench", "render", "--repeat-seconds"),
-                ("bench", "render", "--egos"),
-                ("bench", "simulate", "--repeat-seconds"),
-                ("bench", "simulate", "--slots"),
-            ]
-        for arguments in cases:
-            for number in ("nan", "inf", "-1", "2000000000"):
-                with self.subTest(" ".join(map(str, arguments)), number=number):
-                    self.assert_refused(2, arguments[-1], *arguments, number)
-        self.assert_refused(2, "--line-floor: expected a number of 0 to 8, got '8.5'", *cases[1], "8.5")
+        )
+        self.assert_refused(2, "--line-floor: expected a number of 0 to 8, got '8.5'", *line_floor, "8.5")
 
     def test_wrong_usage_exits_with_2(self):
         self.assert_refused(2, "--out", "town", "--seed", 1)
@@ -336,6 +331,16 @@ class Simulation(CommandCase):
 
 class Benchmarks(CommandCase):
     QUICK = ["--map", "procedural:1", "--agents", 6, "--repeats", 3, "--repeat-seconds", 0.01]
+
+    def test_numbers_that_are_not_finite_or_out_of_range_are_refused(self):
+        self.assert_bad_numbers_are_refused(
+            ("bench", "soak", "--minutes"),
+            ("bench", "quality", "--line-floor"),
+            ("bench", "render", "--repeat-seconds"),
+            ("bench", "render", "--egos"),
+            ("bench", "simulate", "--repeat-seconds"),
+            ("bench", "simulate", "--slots"),
+        )
 
     def test_rendering_is_measured_for_each_backend_size_and_number_of_egos(self):
         facts = self.json_of("bench", "render", *self.QUICK, "--backend", "cpu,null", "--size", "8x8,9x5", "--egos", "3,5")
