@@ -61,15 +61,14 @@ void apply_defaults(Arguments* arguments) {
   arguments->maps = named_maps(arguments->maps);
 }
 
-// Whatever memory the scenes and images lie in.
-bool draws_on_gpu(const std::string& backend) { return backend == "cuda" || backend == "gl:egl"; }
+bool reaches_device_memory(const std::string& backend) { return backend == "cuda" || backend == "gl:egl"; }
 
 RenderCase case_of(const Arguments& arguments, const std::string& backend, const std::string& size,
                    const std::string& samples, int egos) {
   const Pair pixels = parse_pair("--size", size, 8192);
   RenderCase result{.backend = backend, .num_views = egos};
   result.config.rig = paper_rig(pixels.first, pixels.second);
-  const bool in_device_memory = draws_on_gpu(backend) && !arguments.host_memory && !cuda_device_name().empty();
+  const bool in_device_memory = reaches_device_memory(backend) && !arguments.host_memory && !cuda_device_name().empty();
   result.config.space = in_device_memory ? MemorySpace::cuda : MemorySpace::host;
   result.config.num_threads = arguments.world.num_threads;
   result.config.samples = parse_samples("--samples", samples);
@@ -200,7 +199,11 @@ void run(Arguments arguments) {
                               world.walls ? "on" : "off", paper_rig().cameras.size(), arguments.format,
                               arguments.planes ? " and planes" : "", world.num_threads, fmt::join(choices, "; ")),
       .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
-  if (std::any_of(arguments.backends.begin(), arguments.backends.end(), draws_on_gpu)) {
+  // In host memory gl:egl may be drawn by anybody; its choice says by whom.
+  auto is_of_cuda_device = [](const NamedCase& each) {
+    return each.measured.backend == "cuda" || each.measured.config.space == MemorySpace::cuda;
+  };
+  if (std::any_of(cases.begin(), cases.end(), is_of_cuda_device)) {
     context.add_gpu(cuda_device_name(), cuda_driver_name());
   }
   report_benchmark(arguments.rate.json, context, results);

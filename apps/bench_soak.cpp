@@ -71,8 +71,7 @@ void print_result(const Arguments& arguments, const SoakResult& result) {
   for (const SoakFault& fault : result.faults) {
     fmt::print(
         "scene {} view {} camera {}: {} of {} values off by more than 1/255, worst {:.2f}/255; planes unlike at {} of "
-        "{} "
-        "pixels\n",
+        "{} pixels\n",
         fault.scene, fault.view, fault.camera, fault.error.beyond, fault.error.values, 255 * fault.error.worst,
         fault.error.differing_plane_pixels, fault.error.plane_pixels);
   }

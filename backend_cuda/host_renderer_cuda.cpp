@@ -33,8 +33,10 @@ class HostRendererCuda final : public Renderer {
     const auto queue = static_cast<cudaStream_t>(stream.handle);
     renderer_->render(scene_.assign(scene, queue), views_.assign(views, queue), images_.like(images_out), stream);
     images_.copy_to_host(images_out, queue);
-    renderer_->check();
+    check();
   }
+
+  void check() override { renderer_->check(); }
 
   void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
                   Span<float> visibility_out, Stream stream) override {
@@ -48,15 +50,17 @@ class HostRendererCuda final : public Renderer {
       PICTURA_CUDA(cudaMemcpyAsync(visibility_out.data(), result.data(), result.size() * sizeof(float),
                                    cudaMemcpyDeviceToHost, queue));
     }
-    renderer_->check();
+    check();
   }
 
  private:
   void check_input(const SceneBatch& scene, Span<const View> views) const {
+    device_.check_current("renderer cuda");
     check_scene(name(), scene, geometries_.views());
     check_views(name(), scene, views);
   }
 
+  CurrentDevice device_;
   std::unique_ptr<Renderer> renderer_;
   HostGeometries geometries_;  // for checks, with the device's handles
   DeviceScene scene_;

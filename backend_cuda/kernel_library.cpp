@@ -8,8 +8,8 @@ namespace pictura::cuda {
 namespace {
 
 int compute_capability() {
-  int device = 0, major = 0, minor = 0;
-  PICTURA_CUDA(cudaGetDevice(&device));
+  const int device = CurrentDevice().number();
+  int major = 0, minor = 0;
   PICTURA_CUDA(cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, device));
   PICTURA_CUDA(cudaDeviceGetAttribute(&minor, cudaDevAttrComputeCapabilityMinor, device));
   return 10 * major + minor;

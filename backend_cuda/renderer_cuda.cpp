@@ -1,5 +1,5 @@
 // The CUDA renderer's host side: checks, uploads, scratch memory and launches. Scenes, views, queries and images lie in
-// device memory; nothing here waits for the device but upload().
+// device memory; calls that draw wait for nothing once there is room for them.
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -82,6 +82,8 @@ class CudaRenderer final : public Renderer {
     *origin_out = library_.origin();
     make_room(0, 1);  // what is too little for any scene is told at once
     *fault_.host() = cuda::kNoFault;
+    counters_.fill(0);
+    PICTURA_CUDA(cudaDeviceSynchronize());  // for whatever stream the first call is on
   }
   std::string_view name() const override { return "cuda"; }
   MemorySpace space() const override { return MemorySpace::cuda; }
@@ -121,6 +123,7 @@ class CudaRenderer final : public Renderer {
   }
 
   void check() override {
+    device_.check_current("renderer cuda");
     PICTURA_CUDA(cudaDeviceSynchronize());
     throw_fault();
   }
@@ -163,7 +166,7 @@ class CudaRenderer final : public Renderer {
     return task;
   }
 
-  // Counters are 0 before each call; the last launch leaves them so.
+  // Counters are 0 before each call; the last launch leaves them so, unless one before it failed.
   void clear_counters(cudaStream_t stream) {
     if (counters_are_clear_) return;
     static_assert(std::is_trivially_copyable_v<cuda::DrawCounters>);
@@ -176,7 +179,7 @@ class CudaRenderer final : public Renderer {
   // room anew.
   void make_room(std::size_t agents, std::size_t views) {
     agents = std::max(room_.agents, std::min(agents, static_cast<std::size_t>(kMaxBoxesPerWorld)));
-    views = std::max(room_.views, std::min(views, kViewsAtOnce));
+    views = std::max({room_.views, std::size_t{1}, std::min(views, kViewsAtOnce)});
     int pieces = 0, heads = 0;
     for (const UploadedGeometry& each : geometries_) {
       pieces = std::max(pieces, each.pieces());
@@ -217,7 +220,7 @@ class CudaRenderer final : public Renderer {
   int processors_ = 0;
   Room room_;
   DeviceBuffer<cuda::DrawCounters> counters_{1};
-  bool counters_are_clear_ = false;
+  bool counters_are_clear_ = true;
   MappedValue<cuda::FaultWord> fault_;
 };
 

@@ -64,11 +64,6 @@ class PoolBuffers {
     task_out->overflow_images = lists_.data() + images_.size();
     task_out->drawn_images = lists_.data() + 2 * images_.size();
   }
-  std::size_t bytes() const {
-    auto of = [](const auto& buffer) { return buffer.size() * sizeof(*buffer.data()); };
-    return of(faces_) + of(edges_) + of(images_) + of(makings_) + of(batches_) + of(entries_) + of(clipped_) +
-           of(lists_);
-  }
 
  private:
   Buffer<ScreenFace> faces_;
@@ -100,9 +95,6 @@ class LargeBuffers {
   static std::size_t block_bytes(const Scratch& sizes, std::size_t bytes_per_block) {
     return count(1, sizes.max_faces) * sizeof(ScreenFace) + count(1, sizes.max_edges) * sizeof(PolygonEdge) +
            bytes_per_block;
-  }
-  std::size_t bytes() const {
-    return faces_.size() * sizeof(ScreenFace) + edges_.size() * sizeof(PolygonEdge) + bytes_.size();
   }
 
  private:

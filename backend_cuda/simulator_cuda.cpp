@@ -269,7 +269,10 @@ class SimulatorCuda final : public Simulator {
   }
 
  private:
-  static void synchronize() { PICTURA_CUDA(cudaDeviceSynchronize()); }
+  void synchronize() const {
+    device_.check_current("simulator cuda");
+    PICTURA_CUDA(cudaDeviceSynchronize());
+  }
   template <typename T>
   static DeviceBuffer<T> device_copy(const std::vector<T>& host) {
     return DeviceBuffer<T>(Span<const T>(host));

@@ -45,11 +45,8 @@ void download(Span<const T> device, std::vector<T>* host_out, cudaStream_t queue
 
 class RuntimeInterop final : public CudaInterop {
  public:
-  int device() const override {
-    int device = -1;
-    PICTURA_CUDA(cudaGetDevice(&device));
-    return device;
-  }
+  int device() const override { return CurrentDevice().number(); }
+  void synchronize() const override { PICTURA_CUDA(cudaDeviceSynchronize()); }
   std::unique_ptr<CudaBuffer> share(unsigned int buffer) const override {
     return std::make_unique<RegisteredBuffer>(buffer);
   }

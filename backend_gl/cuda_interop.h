@@ -43,6 +43,8 @@ class CudaInterop {
   virtual ~CudaInterop() = default;
   /// CUDA's number of the device that is the calling thread's.
   virtual int device() const = 0;
+  /// Waits for all of its work.
+  virtual void synchronize() const = 0;
   /// Registers a buffer object of the current context.
   virtual std::unique_ptr<CudaBuffer> share(unsigned int buffer) const = 0;
   /// Waits for the stream and copies what lies in device memory.

@@ -46,7 +46,6 @@ class GlRenderer final : public Renderer {
         context_(std::move(context)),
         interop_(std::move(interop)),
         name_(context_->name()) {
-    check_config(name_, config_);
     PICTURA_CHECK(config_.samples.grid >= 1 && config_.samples.multisample >= 1,
                   "renderer {}: expected 1 sample or more, got a grid of {} and {} samples", name_,
                   config_.samples.grid, config_.samples.multisample);
@@ -86,6 +85,10 @@ class GlRenderer final : public Renderer {
     } else {
       draw(scene, views, images_out, stream);
     }
+  }
+
+  void check() override {
+    if (interop_) interop_->synchronize();
   }
 
   void visibility(const SceneBatch&, Span<const View>, Span<const VisibilityQuery>, Span<float>, Stream) override {
@@ -262,7 +265,7 @@ std::unique_ptr<gl::CudaInterop> interop_for(const std::string& name, MemorySpac
 
 std::unique_ptr<Renderer> make_gl_renderer(const std::string& name, const RendererConfig& config,
                                            std::string* choice_out) {
-  validate(config.rig);
+  check_config(name, config);
   auto interop = interop_for(name, config.space);
   const int cuda_device = interop ? interop->device() : -1;
   std::unique_ptr<gl::Context> context;

@@ -189,6 +189,24 @@ void compare_visibility(int64_t scene, const SceneBatch& batch, const std::vecto
   }
 }
 
+// Drives a scene, draws it with both and adds how far they are apart.
+void compare_scene(const SoakOptions& options, int64_t scene, const std::vector<Rig>& rigs, Scenes* scenes,
+                   SoakResult* result_out) {
+  scenes->drive(scene);
+  const Settings settings = draw_settings(options, scene, rigs);
+  const auto renderer = make_renderer(options.backend, settings.config, &result_out->choice);
+  const auto oracle = make_renderer("cpu", settings.config);
+  for (const StaticGeometry& geometry : scenes->geometries()) {
+    renderer->upload(geometry);
+    oracle->upload(geometry);
+  }
+  const std::vector<View> views = scenes->views(scene);
+  const SceneBatch batch = scenes->batch();
+  compare_images(scene, batch, views, settings, renderer.get(), oracle.get(), result_out);
+  compare_visibility(scene, batch, views, scenes->queries(scene), renderer.get(), oracle.get(), result_out);
+  ++result_out->scenes;
+}
+
 }  // namespace
 
 SoakResult soak(const SoakOptions& options, const std::function<void(const SoakResult&)>& on_scene) {
@@ -198,19 +216,13 @@ SoakResult soak(const SoakOptions& options, const std::function<void(const SoakR
   const std::vector<Rig> rigs = draw_rigs(options);
   for (int64_t scene = options.first_scene;; ++scene) {
     if (interrupted()) throw Interrupted("interrupted");
-    scenes.drive(scene);
-    const Settings settings = draw_settings(options, scene, rigs);
-    const auto renderer = make_renderer(options.backend, settings.config, &result.choice);
-    const auto oracle = make_renderer("cpu", settings.config);
-    for (const StaticGeometry& geometry : scenes.geometries()) {
-      renderer->upload(geometry);
-      oracle->upload(geometry);
+    try {
+      compare_scene(options, scene, rigs, &scenes, &result);
+    } catch (const UsageError&) {
+      throw;
+    } catch (const Error& error) {
+      fail("scene {}: {}", scene, error.what());
     }
-    const std::vector<View> views = scenes.views(scene);
-    const SceneBatch batch = scenes.batch();
-    compare_images(scene, batch, views, settings, renderer.get(), oracle.get(), &result);
-    compare_visibility(scene, batch, views, scenes.queries(scene), renderer.get(), oracle.get(), &result);
-    ++result.scenes;
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     on_scene(result);
     if (result.scenes == options.most_scenes || result.seconds >= options.most_seconds) return result;

@@ -107,7 +107,8 @@ struct SeenWeight {
   int64_t among_all = 0, alone = 0;
 
   PICTURA_HD static int64_t units_of(float weight) {
-    constexpr float kUnits = 1099511627776.0f;  // 2^40
+    // As many as leave room for the pixels of the largest rig, 64 images of 8192 x 8192.
+    constexpr float kUnits = 1 << 30;
     return static_cast<int64_t>(weight * kUnits);
   }
   /// Of all that is to be seen of it alone, what is seen among all others; not a number where that is nothing.

@@ -67,16 +67,14 @@ TEST_F(CudaRendererTest, OddSizesAndMixedRigsDoToo) {
 
 TEST_F(CudaRendererTest, WorldsOfSeveralMapsDoToo) { expect_parity(make_synthetic_worlds(), {.rig = paper_rig()}); }
 
-// The paper's sizes, and one that a screen shows.
-TEST_F(CudaRendererTest, AllSizesDoToo) {
+// The paper's sizes, and one that a screen shows; each has kernels of its own to build.
+class CudaRendererSizes : public CudaRendererTest, public testing::WithParamInterface<int> {};
+TEST_P(CudaRendererSizes, DoToo) {
   SyntheticTown town = make_synthetic_town(6, 80);
   town.views.resize(3);
-  constexpr int kWidths_px[] = {32, 64, 96, 192, 384, 768};
-  for (const int width_px : kWidths_px) {
-    SCOPED_TRACE(width_px);
-    expect_parity(town, {.rig = paper_rig(width_px, width_px * 9 / 16)});
-  }
+  expect_parity(town, {.rig = paper_rig(GetParam(), GetParam() * 9 / 16)});
 }
+INSTANTIATE_TEST_SUITE_P(Widths, CudaRendererSizes, testing::Values(32, 64, 96, 192, 384, 768));
 
 TEST_F(CudaRendererTest, CrowdsInImagesOfManyRowsDoToo) { expect_parity(make_crowd(), {.rig = paper_rig(64, 1100)}); }
 
