@@ -95,7 +95,7 @@ void add_quality_benchmark(CLI::App& bench) {
   add_maps_option(command, &arguments->maps, "all towns of the map folder and two procedural ones");
   command->add_option("--size", arguments->sizes, "Sizes, WxH; default: the paper's five")->delimiter(',');
   command->add_option("--agents", arguments->world.agents, "Agents in each world")
-      ->check(CLI::Range(1, 4096))
+      ->check(CLI::Range(1, kMaxAgentsPerWorld))
       ->capture_default_str();
   command->add_option("--views", arguments->world.views, "Agents whose cameras are drawn, of each world")
       ->check(CLI::PositiveNumber)

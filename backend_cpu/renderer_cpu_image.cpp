@@ -58,19 +58,20 @@ void ImageDrawer::find_occluders() {
   occluding_.clear();
   for (const Solid& solid : solids_) {
     if (!solid.may_occlude) continue;
-    OccludingFace face{.entry = solid.entry};
+    OccludingFace face{.solid = &solid};
     face.covered_px2 = occluded_px2(setting_.camera, solid.seen, &face.quad, &face.turns_right);
-    face.plane = solid.seen.plane;
     if (face.covered_px2 > 0.0f) occluding_.push_back(face);
   }
   const auto count = std::min(occluding_.size(), static_cast<std::size_t>(Occluders::kMost));
   std::partial_sort(occluding_.begin(), occluding_.begin() + static_cast<std::ptrdiff_t>(count), occluding_.end(),
                     [](const OccludingFace& a, const OccludingFace& b) {
-                      return a.covered_px2 != b.covered_px2 ? a.covered_px2 > b.covered_px2 : a.entry < b.entry;
+                      return a.covered_px2 != b.covered_px2 ? a.covered_px2 > b.covered_px2
+                                                            : a.solid->entry < b.solid->entry;
                     });
   for (std::size_t i = 0; i < count; ++i) {
-    setting_.occluders.occluder[i] = make_occluder(setting_.camera, setting_.frustum, occluding_[i].plane,
-                                                   occluding_[i].quad, occluding_[i].turns_right);
+    const OccludingFace& face = occluding_[i];
+    setting_.occluders.occluder[i] =
+        make_occluder(setting_.camera, setting_.frustum, face.solid->seen.plane, face.quad, face.turns_right);
   }
   setting_.occluders.count = static_cast<int32_t>(count);
 }

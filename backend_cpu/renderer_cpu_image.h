@@ -83,11 +83,10 @@ class ImageDrawer {
 
   // A solid's face on screen, which may hide others.
   struct OccludingFace {
-    uint32_t entry = 0;
+    const Solid* solid = nullptr;
     float covered_px2 = 0;
     ScreenQuad quad;
     bool turns_right = false;
-    FacePlane plane;
   };
 
   // The faces [begin, end), and rows [y_begin, y_end) of the image.

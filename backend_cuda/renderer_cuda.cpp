@@ -131,9 +131,7 @@ class CudaRenderer final : public Renderer {
   void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
                   Span<float> visibility_out, Stream stream) override {
     check_call(scene);
-    PICTURA_CHECK(visibility_out.size() == queries.size(),
-                  "renderer cuda: visibility: expected room for {} values, got {}", queries.size(),
-                  visibility_out.size());
+    check_answers(name(), queries.size(), visibility_out.size());
     const cuda::VisibilityTask task{draw_task(scene, views, nullptr), queries.data(),
                                     static_cast<int32_t>(queries.size()), visibility_out.data()};
     PICTURA_CUDA(cuda::launch_visibility(library_.kernels(), task, room_.large.view(),
@@ -169,7 +167,6 @@ class CudaRenderer final : public Renderer {
   // Counters are 0 before each call; the last launch leaves them so, unless one before it failed.
   void clear_counters(cudaStream_t stream) {
     if (counters_are_clear_) return;
-    static_assert(std::is_trivially_copyable_v<cuda::DrawCounters>);
     PICTURA_CUDA(cudaMemsetAsync(counters_.data(), 0, sizeof(cuda::DrawCounters), stream));
     counters_are_clear_ = true;
   }

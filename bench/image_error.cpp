@@ -29,12 +29,6 @@ double channel_at(const CameraImages& images, PixelFormat format, int64_t elemen
   }
 }
 
-// A depth of infinity is nothing's, and equal to itself alone.
-bool is_same_depth(double actual_m, double expected_m) {
-  return actual_m == expected_m ||
-         value_error(actual_m, expected_m) <= kKernelDepthError * std::min(actual_m, expected_m);
-}
-
 }  // namespace
 
 void ImageError::add(const ImageError& other) {

@@ -64,6 +64,12 @@ Settings draw_settings(const SoakOptions& options, int64_t scene, const std::vec
   return settings;
 }
 
+// From where a scene is drawn, and the list of agents that the views hide ranges of.
+struct ViewsOfScene {
+  std::vector<View> views;
+  std::vector<int32_t> hidden_agents;
+};
+
 // A world of one of the maps, driven anew for each scene: its number says which and for how long, so that a scene can
 // be drawn again without those before it.
 class Scenes {
@@ -87,10 +93,10 @@ class Scenes {
   }
 
   // Of agents, as they are or from somewhere near them; some leave more agents out than their own.
-  std::vector<View> views(int64_t scene) {
+  ViewsOfScene views(int64_t scene) const {
     RandomStream random = random_of(options_, scene, Draw::views);
     const Span<const View> of_agents = simulator_->views();
-    std::vector<View> views;
+    ViewsOfScene result;
     for (int i = 0; i < options_.views; ++i) {
       View view = of_agents[static_cast<std::size_t>(random.below(static_cast<int>(of_agents.size())))];
       if (random.below(2) == 0) {
@@ -101,16 +107,16 @@ class Scenes {
         view.cos_heading = moved.cos_heading;
         view.sin_heading = moved.sin_heading;
       }
-      views.push_back(view);
+      result.views.push_back(view);
     }
-    hide_agents(scene, &views);
-    return views;
+    hide_agents(scene, &result);
+    return result;
   }
 
-  // As the views that were drawn last need it.
-  SceneBatch batch() const {
+  // With the agents that the views hide, to whose list it points.
+  SceneBatch batch(const ViewsOfScene& views) const {
     SceneBatch batch = simulator_->scene();
-    batch.hidden_agents = hidden_agents_;
+    batch.hidden_agents = views.hidden_agents;
     return batch;
   }
 
@@ -126,21 +132,20 @@ class Scenes {
  private:
   int num_agents() const { return static_cast<int>(simulator_->scene().agents.size()); }
 
-  void hide_agents(int64_t scene, std::vector<View>* views_inout) {
+  void hide_agents(int64_t scene, ViewsOfScene* views_inout) const {
     RandomStream random = random_of(options_, scene, Draw::hidden_agents);
-    hidden_agents_.clear();
-    for (View& view : *views_inout) {
-      view.hidden_begin = static_cast<int32_t>(hidden_agents_.size());
+    std::vector<int32_t>& hidden = views_inout->hidden_agents;
+    for (View& view : views_inout->views) {
+      view.hidden_begin = static_cast<int32_t>(hidden.size());
       const int count = random.below(2) > 0 ? 1 + random.below(std::min(num_agents(), kMostHiddenAgents)) : 0;
-      for (int i = 0; i < count; ++i) hidden_agents_.push_back(random.below(num_agents()));
-      view.hidden_end = static_cast<int32_t>(hidden_agents_.size());
+      for (int i = 0; i < count; ++i) hidden.push_back(random.below(num_agents()));
+      view.hidden_end = static_cast<int32_t>(hidden.size());
     }
   }
 
   SoakOptions options_;
   std::vector<std::shared_ptr<const RoadMap>> maps_;
   std::unique_ptr<Simulator> simulator_;
-  std::vector<int32_t> hidden_agents_;
 };
 
 // Keeps a fault, unless there are many already.
@@ -200,10 +205,10 @@ void compare_scene(const SoakOptions& options, int64_t scene, const std::vector<
     renderer->upload(geometry);
     oracle->upload(geometry);
   }
-  const std::vector<View> views = scenes->views(scene);
-  const SceneBatch batch = scenes->batch();
-  compare_images(scene, batch, views, settings, renderer.get(), oracle.get(), result_out);
-  compare_visibility(scene, batch, views, scenes->queries(scene), renderer.get(), oracle.get(), result_out);
+  const ViewsOfScene seen = scenes->views(scene);
+  const SceneBatch batch = scenes->batch(seen);
+  compare_images(scene, batch, seen.views, settings, renderer.get(), oracle.get(), result_out);
+  compare_visibility(scene, batch, seen.views, scenes->queries(scene), renderer.get(), oracle.get(), result_out);
   ++result_out->scenes;
 }
 

@@ -54,9 +54,7 @@ class NullRenderer final : public Renderer {
 
   void visibility(const SceneBatch&, Span<const View>, Span<const VisibilityQuery> queries, Span<float> visibility_out,
                   Stream) override {
-    PICTURA_CHECK(visibility_out.size() == queries.size(),
-                  "renderer null: visibility: expected room for {} values, got {}", queries.size(),
-                  visibility_out.size());
+    check_answers(name(), queries.size(), visibility_out.size());
     for (std::size_t i = 0; i < queries.size(); ++i) visibility_out[i] = std::numeric_limits<float>::quiet_NaN();
   }
 

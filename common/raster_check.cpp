@@ -134,10 +134,14 @@ void check_views(std::string_view renderer, const SceneBatch& scene, Span<const 
   }
 }
 
+void check_answers(std::string_view renderer, std::size_t num_queries, std::size_t num_answers) {
+  PICTURA_CHECK(num_answers == num_queries, "renderer {}: visibility: expected room for {} values, got {}", renderer,
+                num_queries, num_answers);
+}
+
 void check_queries(std::string_view renderer, const SceneBatch& scene, Span<const View> views,
                    Span<const VisibilityQuery> queries, std::size_t num_answers) {
-  PICTURA_CHECK(num_answers == queries.size(), "renderer {}: visibility: expected room for {} values, got {}", renderer,
-                queries.size(), num_answers);
+  check_answers(renderer, queries.size(), num_answers);
   for (std::size_t i = 0; i < queries.size(); ++i) {
     const VisibilityQuery& query = queries[i];
     PICTURA_CHECK(query.view >= 0 && static_cast<std::size_t>(query.view) < views.size(),

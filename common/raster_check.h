@@ -24,6 +24,9 @@ void check_scene(std::string_view renderer, const SceneBatch& scene, Span<const 
 /// passed, and its pose is finite.
 void check_views(std::string_view renderer, const SceneBatch& scene, Span<const View> views);
 
+/// Throws Error unless there is room for as many answers as there are visibility queries.
+void check_answers(std::string_view renderer, std::size_t num_queries, std::size_t num_answers);
+
 /// Throws Error unless each query's view, one of those that check_views passed, and its agent, of that view's world,
 /// exist, and there is room for as many answers.
 void check_queries(std::string_view renderer, const SceneBatch& scene, Span<const View> views,

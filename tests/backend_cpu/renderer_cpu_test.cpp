@@ -340,12 +340,8 @@ class CpuRendererErrors : public testing::Test {
     views_ = {make_view({}, 0)};
   }
   void expect_error(const char* what) {
-    try {
-      renderer_->render(scene_.batch(), views_, images_.batch());
-      ADD_FAILURE() << "expected an error about " << what;
-    } catch (const Error& error) {
-      EXPECT_THAT(error.what(), HasSubstr(what));
-    }
+    EXPECT_THAT(test::message_of([this] { renderer_->render(scene_.batch(), views_, images_.batch()); }),
+                HasSubstr(what));
   }
   std::unique_ptr<Renderer> renderer_;
   GeometryHandle handle_ = -1;
@@ -465,8 +461,7 @@ TEST(CpuRenderer, AWidenedStripIsInThePlanesWhereItsColourIs) {
   town.geometry.strips.push_back(strip);
   town.geometry.build_grids();
   town.scene.end_world(0);
-  Rig rig = paper_rig();
-  rig.cameras.resize(1);
+  const Rig rig = front_rig();
   int drawn = 0;
   for (int i = -40; i <= 40; ++i) {
     town.views = {make_view({0, 0, 0.0005f * static_cast<float>(i)}, 0)};

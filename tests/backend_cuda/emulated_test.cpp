@@ -227,8 +227,7 @@ TEST(EmulatedKernels, NameWhatIsWrong) {
                                  kMaxBoxesPerWorld + 1};
        }},
   };
-  Rig rig = paper_rig(16, 9);
-  rig.cameras.resize(1);
+  const Rig rig = front_rig(16, 9);
   for (const Case& each : cases) {
     SyntheticWorlds worlds = sound;
     worlds.views.resize(2);
@@ -350,8 +349,7 @@ TEST(EmulatedKernels, WriteTheOraclesBytesAndHalves) {
 
 TEST(EmulatedKernels, DrawCrowdsInPartsAndLeaveNothingOut) {
   // More than one pass has room for: parts of images, and images that are left to the last launch.
-  Rig rig = paper_rig();
-  rig.cameras.resize(1);
+  const Rig rig = front_rig();
   EmulatedRenderer renderer(config_of(rig), 4);
   expect_oracles(&renderer, make_crowd(), Planes::all);
   EXPECT_GT(renderer.overflow(), 0);
@@ -359,8 +357,7 @@ TEST(EmulatedKernels, DrawCrowdsInPartsAndLeaveNothingOut) {
 
 // The last launch draws images in bands of as many rows as its memory holds.
 TEST(EmulatedKernels, DrawCrowdsOfImagesHigherThanTheLastLaunchDrawsAtOnce) {
-  Rig rig = paper_rig(24, 600);
-  rig.cameras.resize(1);
+  const Rig rig = front_rig(24, 600);
   EmulatedRenderer renderer(config_of(rig), 17);
   SyntheticTown crowd = make_crowd();
   crowd.views.resize(1);
@@ -378,8 +375,7 @@ TEST(EmulatedKernels, HaveRoomForTheBatchesOfManyEqualImages) {
   town.geometry.build_grids();
   town.scene.end_world(0);
   town.views.assign(24, make_view({0, 0, 0}, 0));
-  Rig rig = paper_rig(4, 3);
-  rig.cameras.resize(1);
+  const Rig rig = front_rig(4, 3);
   EmulatedRenderer renderer(config_of(rig), 18, {.faces = cuda::kPoolFaces, .clipped_edges = 128});
   expect_oracles(&renderer, town);
   EXPECT_GT(renderer.postponed(), 0);
@@ -395,8 +391,7 @@ TEST(EmulatedKernels, DrawPlanesOfMoreRowsThanThereIsRoomFor) {
   town.geometry.build_grids();
   town.scene.end_world(0);
   town.views = {make_view({0, 0, 0}, 0)};
-  Rig rig = paper_rig();
-  rig.cameras.resize(1);
+  const Rig rig = front_rig();
   EmulatedRenderer renderer(config_of(rig), 12);
   expect_oracles(&renderer, town, Planes::all);
   EXPECT_EQ(renderer.overflow(), 0);

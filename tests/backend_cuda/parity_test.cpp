@@ -49,10 +49,8 @@ void expect_parity(const Scene& town, const RendererConfig& config) {
   // Planes are of one surface or another at a pixel's centre: no rounding shows but at edges.
   std::size_t differ = 0;
   for (std::size_t i = 0; i < host.depth_m.size(); ++i) {
-    const double depth_m = static_cast<double>(host.depth_m[i]);
-    const double depth_error = value_error(static_cast<double>(device.depth_m[i]), depth_m) / depth_m;
     differ += host.class_id[i] != device.class_id[i] || host.instance_id[i] != device.instance_id[i] ||
-              !(host.depth_m[i] == device.depth_m[i] || depth_error < kKernelDepthError);
+              !is_same_depth(static_cast<double>(device.depth_m[i]), static_cast<double>(host.depth_m[i]));
   }
   EXPECT_LE(static_cast<double>(differ), (1 - kKernelShareWithin) * static_cast<double>(host.depth_m.size()));
 }

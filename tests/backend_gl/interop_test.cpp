@@ -82,8 +82,7 @@ TEST_F(GlInterop, WritesTheSameBytesToDeviceMemoryAsToTheHost) {
 TEST_F(GlInterop, ASingleViewMayHaveAnyStride) {
   SyntheticTown town = make_synthetic_town(1, 60);
   town.views.resize(1);
-  RendererConfig config{.rig = paper_rig(97, 55)};
-  config.rig.cameras.resize(1);
+  RendererConfig config{.rig = front_rig(97, 55)};
   const auto on_host = make_renderer("gl:egl", config);
   config.space = MemorySpace::cuda;
   const auto on_device = make_renderer("gl:egl", config);

@@ -193,14 +193,9 @@ TEST_P(GlRenderer, BatchesLargerThanAnArrayAreTheSameImages) {
 
 TEST_P(GlRenderer, ImagesOfMoreWordsThanOpenGlPromisesInvocationsAreWhole) {
   StaticGeometry geometry;
-  WallFace wall;
-  wall.a_m = {20, -60, -30};
-  wall.b_m = {20, 60, -30};
-  wall.height_m = 60;
-  geometry.walls.push_back(wall);
+  geometry.walls.push_back({{20, -60, -30}, {20, 60, -30}, 60});
   geometry.build_grids();
-  RendererConfig config{.rig = paper_rig(2049, 2048), .num_threads = 1};
-  config.rig.cameras.resize(1);
+  const RendererConfig config{.rig = front_rig(2049, 2048), .num_threads = 1};
   ASSERT_GT(2049 * 2048, 65535 * 64);
   SceneOwner scene;
   scene.end_world(0);

@@ -7,21 +7,18 @@
 
 #include <gtest/gtest.h>
 
+#include "pictura/tests/support/image_scenes.h"
+
 namespace pictura {
 namespace {
 
-// A camera of 8x8 pixels.
-Rig small_rig() {
-  Rig rig = paper_rig(8, 8);
-  rig.cameras.resize(1);
-  return rig;
-}
+const Rig kRig = front_rig(8, 8);
 
 // The error of images that are black but for the first bytes of one of them.
 template <typename Value>
 ImageError error_with(PixelFormat format, Value first_value) {
-  HostImages actual(small_rig(), 1, format);
-  HostImages expected(small_rig(), 1, format);
+  HostImages actual(kRig, 1, format);
+  HostImages expected(kRig, 1, format);
   std::memcpy(actual.bytes().data(), &first_value, sizeof first_value);
   return compare_image(actual.camera(0), expected.camera(0), format, 0);
 }
@@ -50,7 +47,7 @@ TEST(ImageError, EachFormatIsReadInItsOwnUnits) {
 
 TEST(ImageError, WhatIsNotDrawnShowsInEveryFormatAndPlane) {
   for (const PixelFormat format : {PixelFormat::u8, PixelFormat::f16, PixelFormat::f32}) {
-    HostImages actual(small_rig(), 2, format, Planes::all), expected(small_rig(), 2, format, Planes::all);
+    HostImages actual(kRig, 2, format, Planes::all), expected(kRig, 2, format, Planes::all);
     spoil(actual.batch());
     for (int view = 0; view < 2; ++view) {
       const ImageError error = compare_image(actual.camera(0), expected.camera(0), format, view);
@@ -63,8 +60,7 @@ TEST(ImageError, WhatIsNotDrawnShowsInEveryFormatAndPlane) {
 
 TEST(ImageError, PlanesTellOfTheSameSurfaceOrNot) {
   const float infinite = std::numeric_limits<float>::infinity();
-  HostImages actual(small_rig(), 2, PixelFormat::u8, Planes::all),
-      expected(small_rig(), 2, PixelFormat::u8, Planes::all);
+  HostImages actual(kRig, 2, PixelFormat::u8, Planes::all), expected(kRig, 2, PixelFormat::u8, Planes::all);
   const CameraImages &drawn = actual.camera(0), &wanted = expected.camera(0);
   auto differing = [&] { return compare_image(drawn, wanted, PixelFormat::u8, 1).differing_plane_pixels; };
   auto depths_differ = [&](float depth_m, float expected_m) {

@@ -205,6 +205,12 @@ Rig simple_rig(int width_px, int height_px, float focal_px) {
   return {{camera}};
 }
 
+Rig front_rig(int width_px, int height_px) {
+  Rig rig = paper_rig(width_px, height_px);
+  rig.cameras.resize(1);
+  return rig;
+}
+
 Rig mixed_rig() {
   Rig rig = paper_rig(97, 55);
   rig.cameras[1] = paper_rig(1, 1).cameras[1];

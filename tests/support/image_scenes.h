@@ -40,6 +40,9 @@ SyntheticTown make_bridge();
 /// One camera at the origin of the ego frame, 1.5 m up, looking ahead, with round numbers.
 Rig simple_rig(int width_px = 100, int height_px = 100, float focal_px = 50);
 
+/// The first camera of the paper's rig alone.
+Rig front_rig(int width_px = 96, int height_px = 54);
+
 /// Four cameras of 97x55, 1x1 and 40x130 pixels.
 Rig mixed_rig();
 

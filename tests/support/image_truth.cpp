@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "pictura/common/raster_check.h"
+#include "pictura/tests/support/tolerances.h"
 
 namespace pictura {
 
@@ -487,6 +488,11 @@ TruthVisibility trace_visibility(const StaticGeometry& geometry, const SceneBatc
 double value_error(double actual, double expected) {
   const double error = std::abs(actual - expected);
   return std::isfinite(error) ? error : std::numeric_limits<double>::infinity();
+}
+
+bool is_same_depth(double actual_m, double expected_m) {
+  return actual_m == expected_m ||
+         value_error(actual_m, expected_m) < kKernelDepthError * std::min(actual_m, expected_m);
 }
 
 namespace {

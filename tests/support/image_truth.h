@@ -42,6 +42,10 @@ TruthVisibility trace_visibility(const StaticGeometry& geometry, const SceneBatc
 /// no tolerance takes it.
 double value_error(double actual, double expected);
 
+/// Whether the depths that two kernels tell of a surface are the same, within kKernelDepthError. A depth of infinity is
+/// nothing's, and equal to itself alone.
+bool is_same_depth(double actual_m, double expected_m);
+
 /// Pools the squared error of many images; channels in [0, 1].
 class PooledError {
  public:
