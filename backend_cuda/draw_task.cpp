@@ -45,7 +45,7 @@ DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeC
     task.cameras[i].camera = cameras[i];
     if (!images) continue;
     const CameraImages& out = images->cameras[i];
-    task.cameras[i] = {cameras[i], out.data, out.view_stride, out.depth_m, out.class_id, out.instance_id};
+    task.cameras[i] = {cameras[i], out.data, out.view_stride, out.depth_m, out.class_id, out.instance_id, {}};
     task.wants_planes = task.wants_planes || out.depth_m || out.class_id || out.instance_id;
   }
   if (images) task.format = images->format;

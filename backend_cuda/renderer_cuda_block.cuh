@@ -63,7 +63,8 @@ struct BlockState {
   GatherCounts listed;
   int32_t num_entries, num_faces, num_clipped, overflow, usable;
   // While pixels are drawn.
-  int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, next_fragments, image, tile;
+  int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, next_fragments, image;
+  Part part, upcoming_part;
   PartPlan plan;
   WarpState warps[kMaxWarps];
 };

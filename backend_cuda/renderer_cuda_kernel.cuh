@@ -352,6 +352,14 @@ extern "C" __global__ void __launch_bounds__(kGatherThreads, kClipBlocksPerProce
   }
 }
 
+// A tile of a camera's images; without rows behind the last.
+__device__ inline Part tile_of(const CameraSlot& slot, int32_t tile) {
+  const TileGrid& tiles = slot.tiles;
+  const int height = height_px(slot.camera);
+  return tile_at(tile % tiles.across * tiles.tile_width_px, min_of(tile / tiles.across * kTileHeight_px, height),
+                 tiles.tile_width_px, kTileHeight_px, width_px(slot.camera), height);
+}
+
 extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcessor)
     pictura_draw(const __grid_constant__ DrawTask task) {
   wait_for_earlier_launch();
@@ -360,11 +368,11 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
   // While the block draws a tile, a thread of the last warp, which has the fewest faces to look at, asks for the number
   // of the next but one, and what the next one shows.
   DrawOrder order(task);
-  int32_t next_image = -1, next_tile = 0, after = 0;
+  int32_t next_image = -1, after = 0;
   auto take_next = [&] {
     next_image = order.image_of(after / task.most_tiles);
-    next_tile = after % task.most_tiles;
     if (next_image < 0) return;
+    state->upcoming_part = tile_of(task.cameras[camera_of(task, next_image)], after % task.most_tiles);
     after = atomicAdd(counter, 1);
     const GatheredImage* image = task.pool.images + next_image;
     for (size_t at = 0; at < sizeof(GatheredImage); at += sizeof(uint64_t)) {
@@ -382,24 +390,19 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
     if (is_taker) {
       wait_for_copies();
       state->image = next_image;
-      state->tile = next_tile;
+      state->part = state->upcoming_part;
       state->shown = state->upcoming;
       state->faces = task.pool.faces + state->shown.face_begin;
       state->edges = task.pool.edges;
     }
     sync_block();
-    const int32_t image = state->image, tile = state->tile;
+    const int32_t image = state->image;
+    const Part part = state->part;
     if (image < 0) return;
     if (is_taker) take_next();
-    const int32_t camera = camera_of(task, image);
-    const PinholeCamera& shows = task.cameras[camera].camera;
-    const int width = width_px(shows), height = height_px(shows);
-    const TileGrid tiles = tiles_of(task.tile_width_px, width, height);
-    if (tile < tiles.count() && state->shown.face_count >= 0) {
-      const Part part = tile_at(tile % tiles.across * tiles.tile_width_px, tile / tiles.across * kTileHeight_px,
-                                tiles.tile_width_px, kTileHeight_px, width, height);
-      if (!draw_image_part(SmallDrawMemory::current(), task, view_of(task, image), camera, part) && threadIdx.x == 0 &&
-          atomicExch(&task.pool.images[image].is_left_to_last, 1) == 0) {
+    if (part.num_rows() > 0 && state->shown.face_count >= 0) {
+      if (!draw_image_part(SmallDrawMemory::current(), task, view_of(task, image), camera_of(task, image), part) &&
+          threadIdx.x == 0 && atomicExch(&task.pool.images[image].is_left_to_last, 1) == 0) {
         leave_to_last(task, image);
       }
     } else {

@@ -20,7 +20,7 @@ constexpr int kWrittenAtOnce = 4;
 constexpr int kTileWidth_px = 48, kNarrowTile_px = 32, kTileHeight_px = 54;
 /// The tiles of an image that are at most so wide: as wide as each other, but for the last.
 struct TileGrid {
-  int tile_width_px, across, down;
+  int tile_width_px = 0, across = 0, down = 0;
   PICTURA_HD constexpr int count() const { return across * down; }
 };
 PICTURA_HD constexpr TileGrid tiles_of(int most_px, int width_px, int height_px) {
@@ -37,6 +37,7 @@ struct CameraSlot {
   float* depth_m = nullptr;
   uint8_t* class_id = nullptr;
   uint16_t* instance_id = nullptr;
+  TileGrid tiles;  // see choose_tiles
 };
 
 /// A piece's surroundings, for culling without a look at the piece itself.
@@ -188,7 +189,7 @@ struct DrawTask {
   const View* views = nullptr;
   int32_t first_view = 0;  // views [first_view, first_view + num_views) are drawn
   int32_t num_views = 0, num_cameras = 0;
-  int32_t tile_width_px = kTileWidth_px, most_tiles = 0;  // at most, of a tile; of an image
+  int32_t most_tiles = 0;  // of an image
   const DeviceGeometry* geometries = nullptr;
   int32_t num_geometries = 0;
   float line_floor_px = 0;
@@ -204,18 +205,18 @@ struct DrawTask {
   CameraSlot cameras[kMaxCameras];
 };
 
-/// Sets how wide the tiles are that so many blocks draw, and how many an image has at most.
+/// Sets the tiles that so many blocks draw.
 PICTURA_HD inline void choose_tiles(DrawTask* task, int blocks) {
   // Wide tiles keep all threads busy; of few, blocks that end early would wait for the others.
   constexpr int kTilesOfBlock = 12;
   const int images = task->num_views * task->num_cameras;
   constexpr int kWidths_px[] = {kTileWidth_px, kNarrowTile_px};
   for (const int most_px : kWidths_px) {
-    task->tile_width_px = most_px;
     task->most_tiles = 0;
     for (int i = 0; i < task->num_cameras; ++i) {
-      const PinholeCamera& camera = task->cameras[i].camera;
-      task->most_tiles = max_of(task->most_tiles, tiles_of(most_px, camera.width_px, camera.height_px).count());
+      CameraSlot& slot = task->cameras[i];
+      slot.tiles = tiles_of(most_px, slot.camera.width_px, slot.camera.height_px);
+      task->most_tiles = max_of(task->most_tiles, slot.tiles.count());
     }
     if (images * task->most_tiles >= kTilesOfBlock * blocks) return;
   }
