@@ -176,9 +176,10 @@ __device__ inline void share_out(WarpState* warp, int count, int end, Visit&& vi
 
 // A list dealt out like cards, at most 32 to a deal, because entries that stand side by side are much work together:
 // entry lane * deals + deal of a deal is a lane's. As many deals for each warp, so that none waits long for the others.
+template <int kThreads>
 __device__ inline int deals_of(int count) {
-  const int rounds = (count + num_threads() - 1) / num_threads();
-  return rounds * num_warps();
+  const unsigned rounds = static_cast<unsigned>(count + kThreads - 1) / kThreads;
+  return static_cast<int>(rounds) * (kThreads / kWarpSize);
 }
 
 // Pairs of numbers that the lanes of a warp put aside until there are enough for every lane to take one: each lane may

@@ -59,7 +59,7 @@ __device__ void list_rows(const Memory& memory, int num_faces, const Part& part)
   using Word = typename Memory::Word;
   WarpState* warp = &memory.state->warps[warp_index()];
   PICTURA_KEEP_LOOP
-  for (int first = warp_index() * kWarpSize; first < num_faces; first += num_threads()) {
+  for (int first = warp_index() * kWarpSize; first < num_faces; first += Memory::kThreads) {
     const int face = first + lane_index();
     int y_begin = 0, rows = 0;
     if (face < num_faces) {
@@ -131,9 +131,9 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
   using Word = typename Memory::Word;
   BlockState* state = memory.state;
   WarpState* warp = &state->warps[warp_index()];
-  const int num_rows = state->num_rows, deals = deals_of(num_rows);
+  const int num_rows = state->num_rows, deals = deals_of<Memory::kThreads>(num_rows);
   PICTURA_KEEP_LOOP
-  for (int deal = warp_index(); deal < deals; deal += num_warps()) {
+  for (int deal = warp_index(); deal < deals; deal += Memory::kThreads / kWarpSize) {
     const int at = lane_index() * deals + deal;
     Word row = 0;
     TileSpan span;
@@ -223,7 +223,7 @@ __device__ void make_fragments(const Memory& memory, const Part& part) {
   WarpQueue shown(&memory.state->warps[warp_index()].queue);
   const int count = memory.state->num_candidates;
   PICTURA_KEEP_LOOP
-  for (int first = warp_index() * kWarpSize;; first += num_threads()) {
+  for (int first = warp_index() * kWarpSize;; first += Memory::kThreads) {
     const int i = first + lane_index();
     const bool more = i - lane_index() < count;
     bool shows = false;
@@ -256,7 +256,7 @@ __device__ void finish_fragments(const Memory& memory, int count) {
     memory.free_high[fragment] = static_cast<uint32_t>(reach >> 32);
   };
   PICTURA_KEEP_LOOP
-  for (int first = warp_index() * kWarpSize; first < count; first += num_threads()) {
+  for (int first = warp_index() * kWarpSize; first < count; first += Memory::kThreads) {
     const int i = first + lane_index();
     // The last of a chain stands for its pixel.
     const bool is_listed =

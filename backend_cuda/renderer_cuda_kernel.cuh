@@ -120,14 +120,14 @@ __device__ __noinline__ void draw_planes(CameraSlot slot, int32_t view, int num_
   const int num_rows = memory.state->num_rows;
   const bool has_room = num_rows <= memory.max_rows;
   PICTURA_KEEP_LOOP
-  for (int i = static_cast<int>(threadIdx.x); has_room && i < num_rows; i += num_threads()) {
+  for (int i = static_cast<int>(threadIdx.x); has_room && i < num_rows; i += Memory::kThreads) {
     memory.candidates[i] = atomicExch(&memory.pixels[memory.rows[i] & Memory::kNone], static_cast<Word>(i + 1));
   }
   sync_block();
   const int width = width_px(slot.camera);
   const int64_t plane = static_cast<int64_t>(width) * height_px(slot.camera);
   PICTURA_KEEP_LOOP
-  for (int p = static_cast<int>(threadIdx.x); p < part.num_pixels(); p += num_threads()) {
+  for (int p = static_cast<int>(threadIdx.x); p < part.num_pixels(); p += Memory::kThreads) {
     const int x = part.x_of(p), y = part.y_of(p);
     if (x >= part.x_end) continue;
     const Vec2 center = pixel_middle(x, y);
@@ -379,7 +379,7 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
       copy_into_shared(reinterpret_cast<char*>(&state->upcoming) + at, reinterpret_cast<const char*>(image) + at);
     }
   };
-  const bool is_taker = static_cast<int>(threadIdx.x) == num_threads() - kWarpSize;
+  const bool is_taker = static_cast<int>(threadIdx.x) == kDrawThreads - kWarpSize;
   if (is_taker) {
     after = atomicAdd(counter, 1);
     take_next();

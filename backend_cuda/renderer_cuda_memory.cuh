@@ -21,11 +21,13 @@ constexpr int kLargeThreads = 128, kLargePixels = kTileWidth_px * 512, kLargeFra
 // Faces that the mark of a pixel's nearest full face can tell apart in 32 bits.
 constexpr int kMarkedFaceBits = 11, kMostMarkedFaces = (1 << kMarkedFaceBits) - 1;
 
-/// What is kept while pixels are drawn. Index: of faces, pixels and fragments, 16 bits where they suffice. Word: two.
-template <typename Index_, typename Word_>
+/// What is kept while pixels are drawn, and by how many threads. Index: of faces, pixels and fragments, 16 bits where
+/// they suffice. Word: two.
+template <typename Index_, typename Word_, int kThreads_>
 struct DrawMemory {
   using Index = Index_;
   using Word = Word_;
+  static constexpr int kThreads = kThreads_;
   static constexpr int kHalf = 4 * sizeof(Word);
   /// Of the lower half of a word: no face, no pixel.
   static constexpr Word kNone = (Word{1} << kHalf) - 1;
@@ -132,7 +134,7 @@ extern __shared__ __align__(16) unsigned char block_memory[];
 __device__ inline BlockState* block_state() { return reinterpret_cast<BlockState*>(block_memory); }
 
 /// In shared memory, at places that are known when the kernel is compiled.
-struct SmallDrawMemory : DrawMemory<uint16_t, uint32_t> {
+struct SmallDrawMemory : DrawMemory<uint16_t, uint32_t, kDrawThreads> {
   __host__ __device__ size_t place(unsigned char* bytes) { return lay_out(this, kDrawPixels, kDrawFragments, bytes); }
   __device__ static SmallDrawMemory current() {
     SmallDrawMemory memory;
@@ -155,7 +157,7 @@ __host__ __device__ inline size_t lay_out(GatherLists* lists, const Scratch& siz
   layout.place(&lists->entries, lists->max_entries);
   return layout.used;
 }
-struct LargeDrawMemory : DrawMemory<uint32_t, unsigned long long> {
+struct LargeDrawMemory : DrawMemory<uint32_t, unsigned long long, kLargeThreads> {
   __host__ __device__ size_t place(unsigned char* bytes) { return lay_out(this, kLargePixels, kLargeFragments, bytes); }
   __device__ static LargeDrawMemory current() {
     LargeDrawMemory memory;

@@ -93,7 +93,7 @@ struct NoVisit {
 template <typename Memory, typename Visit, typename Write>
 __device__ void weigh_fragments(const Memory& memory, int count, const Visit& visit, const Write& write) {
   PICTURA_KEEP_LOOP
-  for (int i = static_cast<int>(threadIdx.x); i < count; i += num_threads()) {
+  for (int i = static_cast<int>(threadIdx.x); i < count; i += Memory::kThreads) {
     const ScreenFace& face = memory.faces[memory.face[i]];
     const Rgb color = face.color;
     if (is_alone(memory, i, memory.pixel[i])) {
@@ -113,7 +113,7 @@ template <typename Memory, typename Visit, typename Write>
 __device__ void mix_pixels(const Memory& memory, const Visit& visit, const Write& write) {
   const int num_drawn = memory.state->num_drawn;
   PICTURA_KEEP_LOOP
-  for (int d = static_cast<int>(threadIdx.x); d < num_drawn; d += num_threads()) {
+  for (int d = static_cast<int>(threadIdx.x); d < num_drawn; d += Memory::kThreads) {
     const int pixel = memory.drawn[d];
     const auto full = full_of(memory, pixel);
     const auto head = static_cast<int>(first_of(memory, pixel));
@@ -145,7 +145,7 @@ __device__ void write_pixels(const Memory& memory, const Part& part, const Visit
   const int pixels = part.num_pixels();
   PICTURA_KEEP_LOOP
   for (int first = kWrittenAtOnce * static_cast<int>(threadIdx.x); first < pixels;
-       first += kWrittenAtOnce * num_threads()) {
+       first += kWrittenAtOnce * Memory::kThreads) {
     const int x = part.x_of(first), y = part.y_of(first), count = min_of(part.x_end - x, kWrittenAtOnce);
     Word word[kWrittenAtOnce];
     for (int i = 0; i < kWrittenAtOnce; ++i) {
@@ -176,7 +176,7 @@ template <typename Memory>
 __device__ void reset_part(const Memory& memory) {
   sync_block();
   PICTURA_KEEP_LOOP
-  for (int p = static_cast<int>(threadIdx.x); p < memory.max_pixels; p += num_threads()) memory.pixels[p] = 0;
+  for (int p = static_cast<int>(threadIdx.x); p < memory.max_pixels; p += Memory::kThreads) memory.pixels[p] = 0;
   reset_counts(memory);
   sync_block();
 }
