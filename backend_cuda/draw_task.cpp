@@ -42,10 +42,16 @@ DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeC
   task.line_floor_px = config.line_floor_px;
   task.debug_palette = config.debug_palette;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
-    task.cameras[i].camera = cameras[i];
+    CameraSlot& slot = task.cameras[i];
+    slot.camera = cameras[i];
+    slot.frustum = make_frustum(cameras[i]);
     if (!images) continue;
     const CameraImages& out = images->cameras[i];
-    task.cameras[i] = {cameras[i], out.data, out.view_stride, out.depth_m, out.class_id, out.instance_id, {}};
+    slot.color = out.data;
+    slot.view_stride = out.view_stride;
+    slot.depth_m = out.depth_m;
+    slot.class_id = out.class_id;
+    slot.instance_id = out.instance_id;
     task.wants_planes = task.wants_planes || out.depth_m || out.class_id || out.instance_id;
   }
   if (images) task.format = images->format;

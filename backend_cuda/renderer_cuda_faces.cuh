@@ -277,9 +277,9 @@ __device__ inline ClippedItem clipped_item(const GatherLists& lists, const Gathe
 __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_t view, int32_t camera) {
   if (!set_view(&state->view, task, view)) return false;
   FaceMaking* making = &state->making;
-  const PinholeCamera placed = place_camera(task.cameras[camera].camera, state->view.view);
-  making->setting.camera = placed;
-  making->setting.frustum = make_frustum(placed);
+  const CameraSlot& slot = task.cameras[camera];
+  making->setting.camera = place_camera(slot.camera, state->view.view);
+  making->setting.frustum = slot.frustum;
   making->setting.line_floor_px = task.line_floor_px;
   making->setting.debug_palette = task.debug_palette;
   making->setting.occluders.count = 0;

@@ -37,7 +37,8 @@ struct CameraSlot {
   float* depth_m = nullptr;
   uint8_t* class_id = nullptr;
   uint16_t* instance_id = nullptr;
-  TileGrid tiles;  // see choose_tiles
+  TileGrid tiles;   // see choose_tiles
+  Frustum frustum;  // of the camera, wherever it is
 };
 
 /// A piece's surroundings, for culling without a look at the piece itself.
