@@ -224,6 +224,17 @@ struct ScreenBounds {
     inverse_depth_low = lesser_of(inverse_depth_low, inverse_depth);
     inverse_depth_high = greater_of(inverse_depth_high, inverse_depth);
   }
+  /// Whether they are within an image and so much around it.
+  PICTURA_HD bool are_within(const PinholeCamera& camera, float margin_px) const {
+    return low.x >= -margin_px && low.y >= -margin_px && high.x <= static_cast<float>(camera.width_px) + margin_px &&
+           high.y <= static_cast<float>(camera.height_px) + margin_px;
+  }
+  /// What of them is in the image.
+  PICTURA_HD Aabb2 in_image(const PinholeCamera& camera) const {
+    return {{greater_of(low.x, 0.0f), greater_of(low.y, 0.0f)},
+            {lesser_of(high.x, static_cast<float>(camera.width_px)),
+             lesser_of(high.y, static_cast<float>(camera.height_px))}};
+  }
   /// Whether the polygon may touch pixels of an image.
   PICTURA_HD bool meet_image(const PinholeCamera& camera) const {
     return high.x >= 0.0f && high.y >= 0.0f && low.x < static_cast<float>(camera.width_px) &&
@@ -341,9 +352,7 @@ PICTURA_HD inline QuadSight project_quad(const PinholeCamera& camera, const Vec3
   ScreenBounds* const bounds = &quad_out->bounds;
   *bounds = {};
   for (int i = 0; i < 4; ++i) bounds->add(corner[i], inverse_depth[i]);
-  const bool is_whole = bounds->low.x >= -kGuardBand_px && bounds->low.y >= -kGuardBand_px &&
-                        bounds->high.x <= static_cast<float>(camera.width_px) + kGuardBand_px &&
-                        bounds->high.y <= static_cast<float>(camera.height_px) + kGuardBand_px;
+  const bool is_whole = bounds->are_within(camera, kGuardBand_px);
   // Of what reaches behind the near plane all that was computed means nothing.
   if (nearest_m < kNear_m) return QuadSight::cut;
   return !bounds->meet_image(camera) ? QuadSight::none : (is_whole ? QuadSight::whole : QuadSight::cut);

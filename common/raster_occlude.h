@@ -36,13 +36,10 @@ PICTURA_HD inline float occluded_px2(const PinholeCamera& camera, const CameraQu
   const float nearest_m =
       lesser_of(lesser_of(face.corner[0].z, face.corner[1].z), lesser_of(face.corner[2].z, face.corner[3].z));
   if (nearest_m < kNear_m || project_quad(camera, face.corner, 0.0f, quad_out) == QuadSight::none) return 0.0f;
-  const Vec2 low = quad_out->bounds.low, high = quad_out->bounds.high;
-  const float width_px = static_cast<float>(camera.width_px), height_px = static_cast<float>(camera.height_px);
-  const bool is_near = low.x >= -kMostOccluder_px && low.y >= -kMostOccluder_px &&
-                       high.x <= width_px + kMostOccluder_px && high.y <= height_px + kMostOccluder_px;
+  const bool is_near = quad_out->bounds.are_within(camera, kMostOccluder_px);
   if (!find_turn(*quad_out, kLeastOccluder_px2, turns_right_out) || !is_near) return 0.0f;
-  return (lesser_of(high.x, width_px) - greater_of(low.x, 0.0f)) *
-         (lesser_of(high.y, height_px) - greater_of(low.y, 0.0f));
+  const Aabb2 seen = quad_out->bounds.in_image(camera);
+  return (seen.high.x - seen.low.x) * (seen.high.y - seen.low.y);
 }
 
 /// The occluder of a solid's face that hides something.
@@ -67,12 +64,10 @@ struct Occluders {
 
   /// Whether one of them hides all of the image that is within the bounds of a face.
   PICTURA_HD bool hide(const PinholeCamera& camera, const ScreenBounds& bounds) const {
-    const Vec2 low{greater_of(bounds.low.x, 0.0f), greater_of(bounds.low.y, 0.0f)};
-    const Vec2 high{lesser_of(bounds.high.x, static_cast<float>(camera.width_px)),
-                    lesser_of(bounds.high.y, static_cast<float>(camera.height_px))};
+    const Aabb2 box = bounds.in_image(camera);
     // The least of a linear function over the box.
     auto least = [&](Vec3 of) {
-      return of.x * (of.x > 0.0f ? low.x : high.x) + of.y * (of.y > 0.0f ? low.y : high.y) + of.z;
+      return of.x * (of.x > 0.0f ? box.low.x : box.high.x) + of.y * (of.y > 0.0f ? box.low.y : box.high.y) + of.z;
     };
     const float nearness = bounds.inverse_depth_high * kOccluderLead;
     bool is_hidden = false;
