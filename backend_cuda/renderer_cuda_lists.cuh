@@ -1,5 +1,5 @@
-// Which images wait for what: for their tiles to be drawn, the most crowded first, for the pool to be free again, or for
-// a block with room for a whole map; and the places that an image takes in the pool.
+// Which images wait for what: for their tiles to be drawn, the most crowded first, for the pool to be free again, or
+// for a block with room for a whole map; and the places that an image takes in the pool.
 #pragma once
 
 #include "pictura/backend_cuda/renderer_cuda_faces.cuh"
