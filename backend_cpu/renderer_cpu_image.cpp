@@ -92,16 +92,15 @@ void ImageDrawer::visit_spans(const ScreenFace& face, RowRange rows, Visit&& vis
   }
 }
 
-// Finds, for each pixel of some rows, the nearest face that covers it fully.
-void ImageDrawer::find_full(FaceRange faces, RowRange rows) {
-  full_.assign(static_cast<std::size_t>((rows.y_end - rows.y_begin) * setting_.camera.width_px), FullFace{});
+// Finds, for each pixel of some rows, how near the faces that cover it fully bury others.
+void ImageDrawer::find_buried(FaceRange faces, RowRange rows) {
+  burying_.assign(static_cast<std::size_t>((rows.y_end - rows.y_begin) * setting_.camera.width_px), 0.0f);
   for (int32_t f = faces.begin; f < faces.end; ++f) {
     const ScreenFace& face = faces_[static_cast<std::size_t>(f)];
     visit_spans(face, rows, [&](int y, std::size_t row, const RowSpan& span) {
       for (int x = span.full_begin; x < span.full_end; ++x) {
-        FullFace& full = full_[row + static_cast<std::size_t>(x)];
-        const float nearness = middle_nearness(face, x, y);
-        if (nearness > full.nearness) full = {nearness, f};
+        float& burying = burying_[row + static_cast<std::size_t>(x)];
+        burying = max_of(burying, burying_nearness(face, x, y));
       }
     });
   }
@@ -109,8 +108,8 @@ void ImageDrawer::find_full(FaceRange faces, RowRange rows) {
 
 // Spreads faces over the pixels of some rows.
 void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
-  find_full(faces, rows);
-  first_fragment_.assign(full_.size(), -1);
+  find_buried(faces, rows);
+  first_fragment_.assign(burying_.size(), -1);
   fragments_.clear();
   for (int32_t f = faces.begin; f < faces.end; ++f) {
     const ScreenFace& face = faces_[static_cast<std::size_t>(f)];
@@ -119,11 +118,7 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
       for (int x = span.begin; x < span.end; ++x) {
         const bool covers_fully = x >= span.full_begin && x < span.full_end;
         const std::size_t pixel = row + static_cast<std::size_t>(x);
-        const int32_t full = full_[pixel].face;
-        if (full >= 0 && full != f &&
-            !may_show_before(face, faces_[static_cast<std::size_t>(full)], x, y, covers_fully)) {
-          continue;
-        }
+        if (!may_show_before(face, burying_[pixel], x, y)) continue;
         const PixelCoverage coverage = covers_fully ? PixelCoverage{1.0f, kAllSamples}
                                                     : pixel_coverage(edges, face.edge_count, face.least_area(), x, y);
         if (coverage.area <= 0.0f) continue;

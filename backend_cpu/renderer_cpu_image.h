@@ -67,12 +67,6 @@ class ImageDrawer {
     int32_t next;
   };
 
-  // The nearest face that covers a pixel fully.
-  struct FullFace {
-    float nearness = -1;
-    int32_t face = -1;
-  };
-
   // A face of an agent's box, or a wall.
   struct Solid {
     FaceOwner owner;
@@ -103,7 +97,7 @@ class ImageDrawer {
   auto face_maker(FaceOwner owner);
   template <typename Visit>
   void visit_spans(const ScreenFace& face, RowRange rows, Visit&& visit) const;
-  void find_full(FaceRange faces, RowRange rows);
+  void find_buried(FaceRange faces, RowRange rows);
   void make_fragments(FaceRange faces, RowRange rows);
   void gather_pixel(int32_t first);
   void order_pixel(int x, int y);
@@ -122,7 +116,7 @@ class ImageDrawer {
   std::vector<OccludingFace> occluding_;
   EdgePool edges_;
   std::vector<ScreenFace> faces_;
-  std::vector<FullFace> full_;           // [pixels of some rows]
+  std::vector<float> burying_;           // [pixels of some rows] the largest burying_nearness()
   std::vector<int32_t> first_fragment_;  // [pixels of some rows] the head of each one's list
   std::vector<LinkedFragment> fragments_;
   // Of one pixel.

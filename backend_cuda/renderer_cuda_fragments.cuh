@@ -1,6 +1,6 @@
-// From the faces of an image to fragments: what a face covers of a pixel. Rows of faces find, for each pixel, the
-// nearest face that covers it fully, behind which nothing can be seen, and list the pixels that faces cover partly;
-// those that may show become fragments, one thread for each, in a chain for each pixel.
+// From the faces of an image to fragments: what a face covers of a pixel. Rows of faces find, for each pixel, the face
+// that covers it fully and buries most, and list the pixels that faces cover partly; those that may show become
+// fragments, one thread for each, in a chain for each pixel.
 #pragma once
 
 #include "pictura/backend_cuda/renderer_cuda_memory.cuh"
@@ -13,17 +13,17 @@ __device__ inline Part tile_at(int x, int y, int columns, int rows, int width_px
   return {x, min_of(x + columns, width_px), y, min_of(y + rows, y_end)};
 }
 
-/// A pixel's word. While the nearest full faces are found it is a mark, the larger the nearer: the upper bits of the
-/// face's nearness, which sort like the nearness, and the face's number plus 1. From the pixel's first fragment on,
-/// that stands where the nearness did, and the sign bit tells so. 0: neither.
+/// A pixel's word. While full faces are found it is the mark of the one that buries most: the bits of its
+/// burying_nearness(), which sort like that, and the face's number plus 1. From the pixel's first fragment on, that
+/// stands where the nearness did, and the sign bit tells so. 0: neither.
 template <typename Word>
 struct PixelWord {
   static constexpr int kFaceBits = sizeof(Word) == 4 ? kMarkedFaceBits : 32;
   static constexpr Word kFace = (Word{1} << kFaceBits) - 1, kHasChain = Word{1} << (8 * sizeof(Word) - 1);
 
-  __device__ static Word mark(float nearness, int face) {
-    const Word bits = __float_as_uint(nearness);
-    return (sizeof(Word) == 4 ? bits & ~kFace : bits << (kFaceBits % (8 * sizeof(Word)))) | static_cast<Word>(face + 1);
+  __device__ static Word mark(float burying_nearness, int face) {
+    static_assert(kMarkedFaceBits + kBuryingBits == 32);
+    return Word{bits_of(burying_nearness)} << (kFaceBits - kMarkedFaceBits) | static_cast<Word>(face + 1);
   }
   __device__ static int marked_face(Word mark) { return static_cast<int>(mark & kFace) - 1; }
   /// With a fragment as the first of the chain, and the face as it is.
@@ -89,18 +89,18 @@ __device__ void list_candidate(const Memory& memory, int place, int face, int pi
                              (covers_fully ? Memory::kCoversFully : Word{0});
 }
 
-// Marks a pixel that a face covers fully, unless a nearer one has. Returns the face that gives way to the other, and
-// may still show before it; -1: none does.
+// Marks a pixel that a face covers fully, unless one has that buries more. Returns the face that gives way to the
+// other, and may still show before it; -1: none does.
 template <typename Memory>
 __device__ int mark_pixel(const Memory& memory, int face, int x, int y, int pixel) {
   using Word = typename Memory::Word;
-  const Word mark = PixelWord<Word>::mark(middle_nearness(memory.faces[face], x, y), face);
+  const Word mark = PixelWord<Word>::mark(burying_nearness(memory.faces[face], x, y), face);
   Word had = memory.pixels[pixel];
   if (had < mark) had = atomicMax(&memory.pixels[pixel], mark);
   const int other = PixelWord<Word>::marked_face(had);
   if (other < 0) return -1;
   const int loser = had < mark ? other : face, winner = had < mark ? face : other;
-  return may_show_before(memory.faces[loser], memory.faces[winner], x, y, true) ? loser : -1;
+  return may_show_before(memory.faces[loser], burying_nearness(memory.faces[winner], x, y), x, y) ? loser : -1;
 }
 
 // A row of a face within a tile: columns from the tile's first on, a byte each, so that lanes hand them on at once.
@@ -124,8 +124,8 @@ struct TileSpan {
   __device__ int partial(int k) const { return begin() + k + (begin() + k < full_begin() ? 0 : num_full()); }
 };
 
-// Marks, in a part, the nearest face that covers each pixel fully, and lists the pixels that faces cover partly. Rows
-// of a large face stand side by side, so they are dealt out. All threads of the block.
+// Marks, in a part, of the faces that cover a pixel fully the one that buries most, and lists the pixels that faces
+// cover partly. Rows of a large face stand side by side, so they are dealt out. All threads of the block.
 template <typename Memory>
 __device__ void mark_and_list(const Memory& memory, const Part& part) {
   using Word = typename Memory::Word;
@@ -234,8 +234,9 @@ __device__ void make_fragments(const Memory& memory, const Part& part) {
       place = static_cast<uint32_t>(candidate & Memory::kNone);
       const int pixel = Memory::pixel_of(place);
       const auto full = full_of(memory, pixel);
-      shows = full == Memory::kNone || may_show_before(memory.faces[face], memory.faces[full], part.x_of(pixel),
-                                                       part.y_of(pixel), Memory::covers_fully(place));
+      const int x = part.x_of(pixel), y = part.y_of(pixel);
+      shows = full == Memory::kNone ||
+              may_show_before(memory.faces[face], burying_nearness(memory.faces[full], x, y), x, y);
     }
     shown.push(shows, face, place);
     if (shown.is_ready() || (!more && !shown.is_empty())) make_fragment(memory, shown.take(), part);

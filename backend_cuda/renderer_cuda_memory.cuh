@@ -18,7 +18,7 @@ constexpr int kPostponedBlocksPerProcessor = 2;
 // A block of the last launch.
 constexpr int kLargeThreads = 128, kLargePixels = kTileWidth_px * 512, kLargeFragments = 1 << 16;
 
-// Faces that the mark of a pixel's nearest full face can tell apart in 32 bits.
+// Faces that the mark of a pixel's full face can tell apart in 32 bits.
 constexpr int kMarkedFaceBits = 11, kMostMarkedFaces = (1 << kMarkedFaceBits) - 1;
 
 /// What is kept while pixels are drawn, and by how many threads. Index: of faces, pixels and fragments, 16 bits where

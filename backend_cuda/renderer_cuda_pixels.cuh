@@ -214,8 +214,10 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
                           const Write& write) {
   list_rows(memory, num_faces, part);
   sync_block();
-  if (memory.state->num_rows != 0 && !mix_rows(memory, part, visit, write)) return false;
-  reset_counts(memory);
+  if (memory.state->num_rows != 0) {
+    if (!mix_rows(memory, part, visit, write)) return false;
+    reset_counts(memory);
+  }
   write_pixels(memory, part, visit, write);
   return true;
 }

@@ -197,18 +197,26 @@ PICTURA_HD inline Vec2 pixel_middle(int x, int y) {
 PICTURA_HD inline float middle_nearness(const ScreenFace& face, int x, int y) {
   return nearness_at(face, pixel_middle(x, y));
 }
+/// By how much that rises or falls within the pixel, at most.
+PICTURA_HD inline float nearness_rise(const ScreenFace& face) {
+  return 0.5f * (fabsf(face.inverse_depth_x) + fabsf(face.inverse_depth_y));
+}
 
-/// Whether a face may weigh anything in pixel (x, y), which another one, `full`, covers fully: no where it lies well
-/// behind that in all of the pixel. Strips may be painted over each other, and a solid may stand on the strip that
-/// covers the pixel. A fragment of which this is false changes nothing and need not be made.
-PICTURA_HD inline bool may_show_before(const ScreenFace& face, const ScreenFace& full, int x, int y,
-                                       bool covers_fully) {
-  if (is_strip(full) && !is_strip(face)) return true;
-  if (is_strip(full) && (!covers_fully || of_one_level(face, full, pixel_middle(x, y)))) return true;
-  const float rise = 0.5f * (fabsf(face.inverse_depth_x) + fabsf(face.inverse_depth_y) + fabsf(full.inverse_depth_x) +
-                             fabsf(full.inverse_depth_y));
-  constexpr float kLeeway = 1.004f;  // more than the bits that a kernel may leave off when it looks for `full`
-  return (middle_nearness(face, x, y) + rise) * kLeeway >= middle_nearness(full, x, y);
+/// Bits of a burying_nearness(), the highest of a float; the others are 0.
+constexpr int kBuryingBits = 21;
+/// How near a face that covers a pixel fully is in all of it. What is further away everywhere in the pixel is buried.
+/// Strips bury nothing, 0: others are painted over them, and what lies behind one may stand on it.
+PICTURA_HD inline float burying_nearness(const ScreenFace& face, int x, int y) {
+  if (is_strip(face)) return 0.0f;
+  const float least = max_of(middle_nearness(face, x, y) - nearness_rise(face), face.inverse_depth_low);
+  return number_of_bits(bits_of(least) & ~((1u << (32 - kBuryingBits)) - 1));
+}
+
+/// Whether a face may weigh anything in pixel (x, y), which others cover fully, given the largest burying_nearness() of
+/// those. Where this is false no fragment is made of it: it would be hidden by the face that buries it. Whether others
+/// are asked before that one makes no difference, since they are not nearer, so devices may ask in any order.
+PICTURA_HD inline bool may_show_before(const ScreenFace& face, float burying_nearness, int x, int y) {
+  return middle_nearness(face, x, y) + nearness_rise(face) >= burying_nearness;
 }
 
 /// Order of fragments that does not depend on how they are listed: the nearer first, then by number.

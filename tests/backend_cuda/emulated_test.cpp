@@ -183,6 +183,19 @@ TEST(EmulatedKernels, DrawTheOraclesTownsInAnyOrderOfThreads) {
   }
 }
 
+// Lines far away as wide as a floor may make them, many to a pixel, in which things are in front of each other in
+// rings.
+TEST(EmulatedKernels, DrawTheWidestLinesInAnyOrderOfThreads) {
+  SyntheticTown town = make_synthetic_town(1, 120);
+  town.views.resize(4);
+  RendererConfig config = config_of(paper_rig());
+  config.line_floor_px = kGuardBand_px;
+  for (const uint64_t seed : {19, 20}) {
+    EmulatedRenderer renderer(config, seed);
+    expect_oracles(&renderer, town);
+  }
+}
+
 TEST(EmulatedKernels, DrawWorldsOfSeveralMaps) {
   EmulatedRenderer renderer(config_of(paper_rig()), 13);
   expect_oracles(&renderer, make_synthetic_worlds(), Planes::all);
