@@ -17,6 +17,7 @@ namespace pictura {
 namespace {
 
 struct Arguments {
+  std::string backend = "cuda";
   SoakOptions soak;
   double minutes = 8;
   bool json = false;
@@ -44,7 +45,7 @@ void print_result(const Arguments& arguments, const SoakResult& result) {
     BenchContext context{.workload = fmt::format("soak: {}, at most {} agents, {} views a scene, seed {}; {}",
                                                  fmt::join(arguments.soak.maps, " "), arguments.soak.agents,
                                                  arguments.soak.views, arguments.soak.seed, result.choice),
-                         .backend = arguments.soak.backend};
+                         .backend = arguments.backend};
     context.add_gpu(cuda_device_name(), cuda_driver_name());
     Json object = context.json();
     object.update({{"seconds", result.seconds},
@@ -65,7 +66,7 @@ void print_result(const Arguments& arguments, const SoakResult& result) {
   fmt::print(
       "{}: {} images of {} scenes in {:.0f} s, {} of {} values unlike the oracle's, worst {:.2f}/255; planes unlike at "
       "{} of {} pixels; {} of {} answers about visibility unlike\n{}\n",
-      arguments.soak.backend, result.images, result.scenes, result.seconds, result.error.differing, result.error.values,
+      arguments.backend, result.images, result.scenes, result.seconds, result.error.differing, result.error.values,
       255 * result.error.worst, result.error.differing_plane_pixels, result.error.plane_pixels,
       result.differing_answers, result.queries, result.choice);
   for (const SoakFault& fault : result.faults) {
@@ -83,11 +84,14 @@ void print_result(const Arguments& arguments, const SoakResult& result) {
 
 void run(Arguments arguments) {
   SoakOptions& options = arguments.soak;
-  check_backends({options.backend}, renderer_names());
+  check_backends({arguments.backend}, renderer_names());
   options.maps = named_maps(options.maps);
   options.most_seconds = 60 * arguments.minutes;
   ProgressLine progress;
-  const SoakResult result = soak(options, [&](const SoakResult& so_far) {
+  auto make = [&](const RendererConfig& config, std::string* choice_out) {
+    return make_renderer(arguments.backend, config, choice_out);
+  };
+  const SoakResult result = soak(options, make, [&](const SoakResult& so_far) {
     const double of_time = so_far.seconds / options.most_seconds;
     const double of_scenes =
         options.most_scenes > 0 ? static_cast<double>(so_far.scenes) / static_cast<double>(options.most_scenes) : 0.0;
@@ -111,7 +115,7 @@ void add_soak_benchmark(CLI::App& bench) {
   auto arguments = std::make_shared<Arguments>();
   SoakOptions& soak = arguments->soak;
   CLI::App* command = bench.add_subcommand("soak", "Hold a renderer against the oracle on random scenes, for long");
-  command->add_option("--backend", soak.backend, "The renderer")->capture_default_str();
+  command->add_option("--backend", arguments->backend, "The renderer")->capture_default_str();
   add_maps_option(command, &soak.maps);
   command->add_option("--minutes", arguments->minutes, "At most")
       ->check(finite_range(1e-3, 1e5))

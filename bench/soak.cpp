@@ -195,11 +195,11 @@ void compare_visibility(int64_t scene, const SceneBatch& batch, const std::vecto
 }
 
 // Drives a scene, draws it with both and adds how far they are apart.
-void compare_scene(const SoakOptions& options, int64_t scene, const std::vector<Rig>& rigs, Scenes* scenes,
-                   SoakResult* result_out) {
+void compare_scene(const SoakOptions& options, const MakeRenderer& make, int64_t scene, const std::vector<Rig>& rigs,
+                   Scenes* scenes, SoakResult* result_out) {
   scenes->drive(scene);
   const Settings settings = draw_settings(options, scene, rigs);
-  const auto renderer = make_renderer(options.backend, settings.config, &result_out->choice);
+  const auto renderer = make(settings.config, &result_out->choice);
   const auto oracle = make_renderer("cpu", settings.config);
   for (const StaticGeometry& geometry : scenes->geometries()) {
     renderer->upload(geometry);
@@ -214,7 +214,8 @@ void compare_scene(const SoakOptions& options, int64_t scene, const std::vector<
 
 }  // namespace
 
-SoakResult soak(const SoakOptions& options, const std::function<void(const SoakResult&)>& on_scene) {
+SoakResult soak(const SoakOptions& options, const MakeRenderer& make,
+                const std::function<void(const SoakResult&)>& on_scene) {
   const auto begin = std::chrono::steady_clock::now();
   SoakResult result;
   Scenes scenes(options);
@@ -222,7 +223,7 @@ SoakResult soak(const SoakOptions& options, const std::function<void(const SoakR
   for (int64_t scene = options.first_scene;; ++scene) {
     if (interrupted()) throw Interrupted("interrupted");
     try {
-      compare_scene(options, scene, rigs, &scenes, &result);
+      compare_scene(options, make, scene, rigs, &scenes, &result);
     } catch (const UsageError&) {
       throw;
     } catch (const Error& error) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -12,7 +13,6 @@
 namespace pictura {
 
 struct SoakOptions {
-  std::string backend = "cuda";
   std::vector<std::string> maps;
   int agents = 120, parked_cars = 32;  // of a scene's world, at most
   int views = 16;                      // of each scene
@@ -38,7 +38,7 @@ struct VisibilityFault {
 };
 
 struct SoakResult {
-  std::string choice;  // what make_renderer() says
+  std::string choice;  // of the last renderer
   int64_t scenes = 0, images = 0, queries = 0;
   double seconds = 0;
   ImageError error;  // over all images
@@ -49,8 +49,12 @@ struct SoakResult {
   int64_t first_faulty_scene = -1;
 };
 
-/// Calls on_scene(result so far) after each scene. Throws Error when the backend cannot run here or draws no planes,
-/// halves or visibility, as gl.
-SoakResult soak(const SoakOptions& options, const std::function<void(const SoakResult&)>& on_scene);
+/// Makes the renderer that is compared, for each scene anew; may say how it was chosen.
+using MakeRenderer = std::function<std::unique_ptr<Renderer>(const RendererConfig&, std::string* choice_out)>;
+
+/// Calls on_scene(result so far) after each scene. Throws what make throws, and Error when its renderer draws no
+/// planes, halves or visibility, as gl.
+SoakResult soak(const SoakOptions& options, const MakeRenderer& make,
+                const std::function<void(const SoakResult&)>& on_scene);
 
 }  // namespace pictura

@@ -3,161 +3,24 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
-#include <memory>
 #include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "pictura/backend_cuda/draw_task.h"
 #include "pictura/backend_cuda/scratch_buffers.h"
-#include "pictura/common/error.h"
+#include "pictura/bench/soak.h"
 #include "pictura/common/make_renderer.h"
-#include "pictura/common/raster_check.h"
 #include "pictura/common/scene_file.h"
+#include "pictura/tests/backend_cuda/emulated_renderer.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/image_scenes.h"
-// After all else, because it gives the compiler's words other meanings.
-#include "pictura/tests/backend_cuda/emulated_device.h"
-// The kernels, under names of their own beside those that were compiled ahead of time.
-#define pictura_cull emulated_cull
-#define pictura_gather emulated_gather
-#define pictura_clip emulated_clip
-#define pictura_draw emulated_draw
-#define pictura_draw_postponed emulated_draw_postponed
-#define pictura_draw_overflow emulated_draw_overflow
-#define pictura_visibility emulated_visibility
-#include "pictura/backend_cuda/renderer_cuda_kernel.cuh"
 
 namespace pictura {
 
-namespace cuda {
-// The shared memory of the block that runs.
-alignas(16) unsigned char block_memory[232448];
-}  // namespace cuda
-
 namespace {
 
-template <typename Value>
-using HostBuffer = std::vector<Value>;
-
-// Draws with the kernels. Two blocks of each launch, so that each draws several images, one after the other.
-class EmulatedRenderer final : public Renderer {
- public:
-  /// Room in the pool, for an image.
-  struct Pool {
-    std::size_t faces = 2048, clipped_edges = 4096;
-  };
-  EmulatedRenderer(const RendererConfig& config, uint64_t seed) : EmulatedRenderer(config, seed, Pool{}) {}
-  EmulatedRenderer(const RendererConfig& config, uint64_t seed, const Pool& pool)
-      : config_(config), seed_(seed), pool_(pool), cameras_(pinhole_cameras(config.rig)) {}
-  std::string_view name() const override { return "emulated"; }
-  MemorySpace space() const override { return MemorySpace::host; }
-  const RendererConfig& config() const override { return config_; }
-
-  GeometryHandle upload(const StaticGeometry& geometry) override {
-    kept_.push_back(std::make_unique<Kept>(geometry));
-    cuda::DeviceGeometry view{kept_.back()->geometry.view(), kept_.back()->strips.view(), kept_.back()->walls.view()};
-    geometries_.push_back(view);
-    return static_cast<GeometryHandle>(geometries_.size()) - 1;
-  }
-
-  void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream) override {
-    Setup setup(*this, cuda::make_draw_task(config_, cameras_, scene, views, &images_out), scene);
-    cuda::DrawTask& task = setup.task;
-    launch(cuda::kGatherThreads, [&] { cuda::emulated_cull(task); });
-    launch(cuda::kGatherThreads, [&] { cuda::emulated_gather(task); });
-    launch(cuda::kGatherThreads, [&] { cuda::emulated_clip(task); });
-    launch(cuda::kDrawThreads, [&] { cuda::emulated_draw(task); });
-    postponed_ = setup.counters.postponed;
-    const int gathering = cuda::gathering_blocks(task.pool, kBlocks);
-    launch(cuda::kDrawThreads, [&] { cuda::emulated_draw_postponed(task); }, static_cast<unsigned>(gathering));
-    overflow_ = setup.counters.overflow;
-    launch(cuda::kLargeThreads, [&] { cuda::emulated_draw_overflow(task, setup.large.view()); });
-    fault_ = setup.fault;
-  }
-
-  /// Throws what the last call found wrong.
-  void check() override {
-    const cuda::Fault fault = cuda::fault_of(std::exchange(fault_, cuda::kNoFault));
-    if (fault.kind != cuda::FaultKind::none) fail("{}", cuda::message_of(fault));
-  }
-
-  void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
-                  Span<float> visibility_out, Stream) override {
-    Setup setup(*this, cuda::make_draw_task(config_, cameras_, scene, views, nullptr), scene);
-    const cuda::VisibilityTask task{setup.task, queries.data(), static_cast<int32_t>(queries.size()),
-                                    visibility_out.data()};
-    launch(cuda::kLargeThreads, [&] { cuda::emulated_visibility(task, setup.large.view()); });
-    fault_ = setup.fault;
-  }
-
-  /// Images that the last call left to the last launch, and for which the pool had no room.
-  int overflow() const { return overflow_; }
-  int postponed() const { return postponed_; }
-
- private:
-  static constexpr int kBlocks = 2;
-
-  struct Kept {
-    StaticGeometry geometry;
-    cuda::SortedPieces strips, walls;
-    explicit Kept(const StaticGeometry& map) : geometry(map), strips(geometry.strips), walls(geometry.walls) {}
-  };
-
-  // What a renderer keeps in device memory.
-  struct Setup {
-    cuda::DrawTask task;
-    cuda::DrawCounters counters;
-    cuda::FaultWord fault = cuda::kNoFault;
-    cuda::PoolBuffers<HostBuffer> pool;
-    cuda::LargeBuffers<HostBuffer> large;
-
-    Setup(const EmulatedRenderer& renderer, const cuda::DrawTask& draw, const SceneBatch& scene) : task(draw) {
-      int pieces = 0, heads = 0;
-      for (const auto& kept : renderer.kept_) {
-        const StaticGeometry& map = kept->geometry;
-        heads = std::max(heads, static_cast<int>(map.heads.size()));
-        pieces = std::max(pieces, static_cast<int>(map.strips.size() + map.walls.size() + map.heads.size()));
-      }
-      const auto images = static_cast<std::size_t>(task.num_views * task.num_cameras);
-      const std::size_t faces = renderer.pool_.faces * images;
-      pool = cuda::PoolBuffers<HostBuffer>({images, faces, 4 * faces + renderer.pool_.clipped_edges * images});
-      pool.serve(&task);
-      task.geometries = renderer.geometries_.data();
-      task.num_geometries = static_cast<int32_t>(renderer.geometries_.size());
-      task.counters = &counters;
-      task.fault = &fault;
-      cuda::choose_tiles(&task, kBlocks);
-      cuda::Scratch sizes = cuda::large_sizes(pieces, heads, scene.agents.size());
-      sizes.blocks = kBlocks;
-      large = cuda::LargeBuffers<HostBuffer>(sizes, cuda::large_bytes(sizes));
-    }
-    Setup(const Setup&) = delete;
-  };
-
-  template <typename Kernel>
-  void launch(int threads, Kernel&& kernel, unsigned blocks = kBlocks) {
-    using namespace emulation;
-    grid_dim = {blocks, 1, 1};
-    block_dim = {static_cast<unsigned>(threads), 1, 1};
-    for (unsigned block = 0; block < blocks; ++block) {
-      block_index = {block, 0, 0};
-      // Whatever an earlier block has left.
-      std::memset(cuda::block_memory, 0xA5, sizeof(cuda::block_memory));
-      Block::run(threads, seed_ + block, kernel);
-    }
-  }
-
-  RendererConfig config_;
-  uint64_t seed_;
-  Pool pool_;
-  std::vector<PinholeCamera> cameras_;
-  std::vector<std::unique_ptr<Kept>> kept_;
-  std::vector<cuda::DeviceGeometry> geometries_;
-  cuda::FaultWord fault_ = cuda::kNoFault;
-  int overflow_ = 0, postponed_ = 0;
-};
+using test::EmulatedRenderer;
 
 template <typename Scene>  // SyntheticTown or SyntheticWorlds
 void expect_oracles(EmulatedRenderer* renderer, const Scene& town, Planes planes = Planes::none) {
@@ -169,6 +32,24 @@ void expect_oracles(EmulatedRenderer* renderer, const Scene& town, Planes planes
   for (std::size_t i = 0; i < oracle.color.size(); ++i) differ += emulated.color[i] != oracle.color[i];
   EXPECT_EQ(differ, 0u) << "of " << oracle.color.size() << " values";
   EXPECT_TRUE(emulated == oracle);
+}
+
+// What random scenes, views, rigs and settings find.
+TEST(EmulatedKernels, DrawWhatASoakDraws) {
+  const SoakOptions options{
+      .maps = {"procedural:1", "procedural:2"}, .agents = 60, .views = 2, .most_scenes = 8, .num_threads = 1};
+  uint64_t order = 30;
+  const SoakResult result = soak(
+      options,
+      [&](const RendererConfig& config, std::string*) { return std::make_unique<EmulatedRenderer>(config, order++); },
+      [](const SoakResult&) {});
+  EXPECT_EQ(result.scenes, 8);
+  EXPECT_GT(result.error.values, 500'000);
+  EXPECT_GT(result.error.plane_pixels, 50'000);
+  EXPECT_GT(result.queries, 200);
+  EXPECT_EQ(result.error.differing, 0);
+  EXPECT_EQ(result.error.differing_plane_pixels, 0);
+  EXPECT_EQ(result.differing_answers, 0);
 }
 
 RendererConfig config_of(const Rig& rig) { return {.rig = rig, .num_threads = 1}; }
