@@ -148,19 +148,20 @@ void append_results(const std::string& name, const RenderCase& measured, const R
 /// Draws the rates that the sweeps in earlier results have found.
 void draw_rates(const PlotArguments& plot) {
   const std::regex swept(R"((.+) ((\d+)x(\d+)) (\d+) egos)");
-  const char* rate = "log10 of agent-steps/s";
-  PlotPanel by_size{fmt::format("{} egos", kSweptEgos), "log2 of the width in pixels, 16:9", rate, {}};
-  PlotPanel by_egos{fmt::format("{} pixels", kSweptSize), "log2 of egos in one call", rate, {}};
-  PlotPanel by_square{fmt::format("{} egos, walls off", kSweptEgos), "log2 of the width in pixels, square", rate, {}};
+  auto panel = [](const std::string& title, const std::string& x_label) {
+    return PlotPanel{title, x_label, "agent-steps/s", {}, AxisScale::binary, AxisScale::decimal};
+  };
+  PlotPanel by_size = panel(fmt::format("{} egos", kSweptEgos), "width in pixels, 16:9");
+  PlotPanel by_egos = panel(fmt::format("{} pixels", kSweptSize), "egos in one call");
+  PlotPanel by_square = panel(fmt::format("{} egos, walls off", kSweptEgos), "width in pixels, square");
   for (const PlottedResult& result : read_results(plot.results)) {
     std::smatch match;
     if (!std::regex_match(result.name, match, swept)) continue;
-    const double width = std::stod(match[3]), y = std::log10(result.value);
     const int egos = std::stoi(match[5]);
     if (egos == kSweptEgos) {
-      add_point(match[3] == match[4] ? &by_square : &by_size, match[1], std::log2(width), y);
+      add_point(match[3] == match[4] ? &by_square : &by_size, match[1], std::stod(match[3]), result.value);
     }
-    if (match[2] == kSweptSize) add_point(&by_egos, match[1], std::log2(egos), y);
+    if (match[2] == kSweptSize) add_point(&by_egos, match[1], egos, result.value);
   }
   draw_plots_png({by_size, by_egos, by_square}, plot.figure, {.columns = 3, .title = "Rates of rendering"});
 }

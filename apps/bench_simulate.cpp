@@ -105,19 +105,20 @@ void measure(const Arguments& arguments, const std::string& backend,
 /// Draws what the sweeps in earlier results say an agent-step costs.
 void draw_cost(const PlotArguments& plot) {
   const std::regex swept(R"((\w+), (\d+) worlds of (\d+) agents)");
-  PlotPanel by_agents{
-      fmt::format("{} worlds", kSweptWorlds), "log2 of agents in each world", "log10 of ns for an agent-step", {}};
-  PlotPanel by_worlds{
-      fmt::format("{} agents in each world", kSweptAgents), "log2 of worlds", "log10 of ns for an agent-step", {}};
+  auto panel = [](const std::string& title, const std::string& x_label) {
+    return PlotPanel{title, x_label, "ns for an agent-step", {}, AxisScale::binary, AxisScale::decimal};
+  };
+  PlotPanel by_agents = panel(fmt::format("{} worlds", kSweptWorlds), "agents in each world");
+  PlotPanel by_worlds = panel(fmt::format("{} agents in each world", kSweptAgents), "worlds");
   for (const PlottedResult& result : read_results(plot.results)) {
     std::smatch match;
     if (!std::regex_match(result.name, match, swept)) continue;
     const int worlds = std::stoi(match[2]), agents = std::stoi(match[3]);
-    const double cost = std::log10(1e9 / result.value);
+    const double cost = 1e9 / result.value;
     if (agents == kSweptAgents) {
-      add_point(&by_worlds, match[1], std::log2(worlds), cost);
+      add_point(&by_worlds, match[1], worlds, cost);
     } else if (worlds == kSweptWorlds) {
-      add_point(&by_agents, match[1], std::log2(agents), cost);
+      add_point(&by_agents, match[1], agents, cost);
     }
   }
   draw_plots_png({by_agents, by_worlds}, plot.figure, {.title = "What an agent-step costs"});

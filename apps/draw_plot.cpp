@@ -51,9 +51,49 @@ std::string tick_text(double value, double step) {
   return fmt::format("{:.{}f}{}", value / unit, decimals, suffix);
 }
 
-bool drawable(const PlotSeries& series, size_t i) { return std::isfinite(series.x[i]) && std::isfinite(series.y[i]); }
+/// From values to pixels.
+class Axis {
+ public:
+  struct Tick {
+    double value;
+    std::string text;
+  };
+  explicit Axis(AxisScale scale) : scale_(scale) {}
+  bool shows(double value) const { return std::isfinite(value) && (scale_ == AxisScale::linear || value > 0); }
+  void add(double value) { range_.add(scaled(value)); }
+  /// Spreads the values added, with a little air, from one place to another.
+  void place(double air, double low_px, double high_px) {
+    range_ = range_.padded(air);
+    low_px_ = low_px;
+    high_px_ = high_px;
+  }
+  double at_px(double value) const {
+    return low_px_ + (high_px_ - low_px_) * (scaled(value) - range_.low) / (range_.high - range_.low);
+  }
+  std::vector<Tick> ticks(int wanted) const {
+    std::vector<Tick> ticks;
+    if (scale_ == AxisScale::linear) {
+      const std::vector<double> values = round_ticks(range_.low, range_.high, wanted);
+      const double step = values.size() > 1 ? values[1] - values[0] : 1.0;
+      for (const double value : values) ticks.push_back({value, tick_text(value, step)});
+      return ticks;
+    }
+    const double low = std::exp2(range_.low), high = std::exp2(range_.high);
+    const auto values =
+        scale_ == AxisScale::binary ? binary_ticks(low, high, wanted) : decimal_ticks(low, high, wanted);
+    for (const double value : values) ticks.push_back({value, tick_text(value, value)});
+    return ticks;
+  }
 
-/// Where a box of that size covers the fewest points: one of the four corners of the plot.
+ private:
+  double scaled(double value) const { return scale_ == AxisScale::linear ? value : std::log2(value); }
+
+  AxisScale scale_;
+  Range range_;
+  double low_px_ = 0, high_px_ = 1;
+};
+
+/// Where a box of that size covers least of the lines: one of the four corners of the plot.
 struct Place {
   double x, y;
 };
@@ -76,7 +116,18 @@ Place emptiest_corner(const std::vector<Place>& points, Place top_left, double w
   return best;
 }
 
-/// `points`: every point of the panel, in pixels.
+/// Adds places along the line from the last one to another.
+void add_line(std::vector<Place>* places_inout, Place to) {
+  constexpr double kStep_px = 4;
+  const Place from = places_inout->back();
+  const int steps = 1 + static_cast<int>(std::hypot(to.x - from.x, to.y - from.y) / kStep_px);
+  for (int i = 1; i <= steps; ++i) {
+    const double share = static_cast<double>(i) / steps;
+    places_inout->push_back({from.x + share * (to.x - from.x), from.y + share * (to.y - from.y)});
+  }
+}
+
+/// `points`: places along all lines of the panel, in pixels.
 void draw_legend(Canvas& canvas, const PlotPanel& panel, const std::vector<Place>& points, Place top_left, double width,
                  double height) {
   const TextStyle style{.size_px = 12, .color = hex(0x22262B)};
@@ -99,35 +150,36 @@ void draw_legend(Canvas& canvas, const PlotPanel& panel, const std::vector<Place
 }
 
 void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, double width_px, double height_px) {
-  Range x_data, y_data;
+  Axis x_axis(panel.x_scale), y_axis(panel.y_scale);
+  const auto drawable = [&](const PlotSeries& series, size_t i) {
+    return x_axis.shows(series.x[i]) && y_axis.shows(series.y[i]);
+  };
   for (const PlotSeries& series : panel.series) {
     for (size_t i = 0; i < series.x.size(); ++i) {
       if (!drawable(series, i)) continue;
-      x_data.add(series.x[i]);
-      y_data.add(series.y[i]);
+      x_axis.add(series.x[i]);
+      y_axis.add(series.y[i]);
     }
   }
-  const Range xs = x_data.padded(0.0), ys = y_data.padded(0.06);
   const double left = x0 + kLeft_px, top = y0 + kTop_px;
   const double width = width_px - kLeft_px - kRight_px, height = height_px - kTop_px - kBottom_px;
-  const auto to_x = [&](double x) { return left + width * (x - xs.low) / (xs.high - xs.low); };
-  const auto to_y = [&](double y) { return top + height * (ys.high - y) / (ys.high - ys.low); };
+  x_axis.place(0.0, left, left + width);
+  y_axis.place(0.06, top + height, top);
   cairo_t* context = canvas.context();
 
   canvas.text(x0 + 0.5 * (kLeft_px + width_px - kRight_px), y0 + 24, panel.title,
               {.size_px = 15, .bold = true, .align = Align::center});
   const TextStyle tick_style{.size_px = 11.5, .align = Align::center, .color = kLabelColor};
   const TextStyle y_tick_style{.size_px = 11.5, .align = Align::right, .color = kLabelColor};
-  const std::vector<double> x_ticks = round_ticks(xs.low, xs.high, std::max(2, static_cast<int>(width / 80)));
-  const std::vector<double> y_ticks = round_ticks(ys.low, ys.high, std::max(2, static_cast<int>(height / 45)));
-  const auto step_of = [](const std::vector<double>& ticks) { return ticks.size() > 1 ? ticks[1] - ticks[0] : 1.0; };
-  for (const double tick : x_ticks) {
-    canvas.fill_rectangle(std::round(to_x(tick)), top, 1, height, kGridColor);
-    canvas.text(to_x(tick), top + height + 17, tick_text(tick, step_of(x_ticks)), tick_style);
+  for (const Axis::Tick& tick : x_axis.ticks(std::max(2, static_cast<int>(width / 80)))) {
+    const double x = x_axis.at_px(tick.value);
+    canvas.fill_rectangle(std::round(x), top, 1, height, kGridColor);
+    canvas.text(x, top + height + 17, tick.text, tick_style);
   }
-  for (const double tick : y_ticks) {
-    canvas.fill_rectangle(left, std::round(to_y(tick)), width, 1, kGridColor);
-    canvas.text(left - 8, to_y(tick) + 4, tick_text(tick, step_of(y_ticks)), y_tick_style);
+  for (const Axis::Tick& tick : y_axis.ticks(std::max(2, static_cast<int>(height / 45)))) {
+    const double y = y_axis.at_px(tick.value);
+    canvas.fill_rectangle(left, std::round(y), width, 1, kGridColor);
+    canvas.text(left - 8, y + 4, tick.text, y_tick_style);
   }
   canvas.fill_rectangle(left - 1, top, 1, height + 1, kAxisColor);
   canvas.fill_rectangle(left - 1, top + height, width + 1, 1, kAxisColor);
@@ -141,7 +193,7 @@ void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, do
   cairo_set_line_width(context, 2);
   cairo_set_line_join(context, CAIRO_LINE_JOIN_ROUND);
   cairo_set_line_cap(context, CAIRO_LINE_CAP_ROUND);
-  std::vector<Place> points;
+  std::vector<Place> along;
   for (size_t s = 0; s < panel.series.size(); ++s) {
     const PlotSeries& series = panel.series[s];
     canvas.set_color(kSeriesColors[s % kSeriesColors.size()]);
@@ -150,21 +202,26 @@ void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, do
         cairo_stroke(context);
         continue;
       }
-      points.push_back({to_x(series.x[i]), to_y(series.y[i])});
+      const Place at{x_axis.at_px(series.x[i]), y_axis.at_px(series.y[i])};
       const bool starts = i == 0 || !drawable(series, i - 1);
       const bool alone = starts && (i + 1 == series.x.size() || !drawable(series, i + 1));
-      if (starts) cairo_move_to(context, to_x(series.x[i]), to_y(series.y[i]));
-      cairo_line_to(context, to_x(series.x[i]), to_y(series.y[i]));
+      if (starts) {
+        cairo_move_to(context, at.x, at.y);
+        along.push_back(at);
+      } else {
+        add_line(&along, at);
+      }
+      cairo_line_to(context, at.x, at.y);
       if (alone) {
         cairo_stroke(context);
-        cairo_arc(context, to_x(series.x[i]), to_y(series.y[i]), 3, 0, kTwoPi);
+        cairo_arc(context, at.x, at.y, 3, 0, kTwoPi);
         cairo_fill(context);
       }
     }
     cairo_stroke(context);
   }
   cairo_restore(context);
-  if (panel.series.size() > 1) draw_legend(canvas, panel, points, {left, top}, width, height);
+  if (panel.series.size() > 1) draw_legend(canvas, panel, along, {left, top}, width, height);
 }
 
 }  // namespace
@@ -178,6 +235,34 @@ std::vector<double> round_ticks(double low, double high, int wanted) {
   const double step = power * (ratio < 1.5 ? 1 : (ratio < 3.5 ? 2 : (ratio < 7.5 ? 5 : 10)));
   const double first = std::ceil(low / step - 1e-9), last = std::floor(high / step + 1e-9);
   for (double i = first; i <= last; ++i) ticks.push_back(i * step);
+  return ticks;
+}
+
+std::vector<double> binary_ticks(double low, double high, int wanted) {
+  std::vector<double> ticks;
+  if (!(low > 0 && high >= low) || wanted < 1 || !std::isfinite(high)) return ticks;
+  const double first = std::ceil(std::log2(low) - 1e-9), last = std::floor(std::log2(high) + 1e-9);
+  const double step = std::max(1.0, std::ceil((last - first + 1) / wanted));
+  for (double power = first; power <= last; power += step) ticks.push_back(std::exp2(power));
+  return ticks;
+}
+
+std::vector<double> decimal_ticks(double low, double high, int wanted) {
+  std::vector<double> ticks;
+  if (!(low > 0 && high >= low) || wanted < 1 || !std::isfinite(high)) return ticks;
+  const double first = std::floor(std::log10(low)), last = std::floor(std::log10(high));
+  auto list = [&](std::initializer_list<int> factors, double step) {
+    ticks.clear();
+    for (double power = first; power <= last; power += step) {
+      for (const int factor : factors) {
+        const double tick = factor * std::pow(10.0, power);
+        if (tick >= low * (1 - 1e-9) && tick <= high * (1 + 1e-9)) ticks.push_back(tick);
+      }
+    }
+    return ticks.size() <= static_cast<std::size_t>(wanted);
+  };
+  if (list({1, 2, 5}, 1)) return ticks;
+  for (double step = 1; !list({1}, step); ++step) continue;
   return ticks;
 }
 

@@ -8,7 +8,10 @@
 
 namespace pictura {
 
-/// One line; points that are not finite leave a gap.
+/// Linear, or logarithmic with ticks at powers of 2, or at 1, 2 and 5 times powers of 10.
+enum class AxisScale { linear, binary, decimal };
+
+/// One line; points that are not finite, or not above 0 on a logarithmic axis, leave a gap.
 struct PlotSeries {
   std::string name;
   std::vector<double> x, y;  // equally many
@@ -17,6 +20,7 @@ struct PlotSeries {
 struct PlotPanel {
   std::string title, x_label, y_label;
   std::vector<PlotSeries> series;
+  AxisScale x_scale = AxisScale::linear, y_scale = AxisScale::linear;
 };
 
 struct PlotOptions {
@@ -35,5 +39,10 @@ void draw_plots_png(const std::vector<PlotPanel>& panels, const std::string& pat
 
 /// Round positions for axis ticks: a step of 1, 2 or 5 times a power of ten, about `wanted` of them within [low, high].
 std::vector<double> round_ticks(double low, double high, int wanted);
+
+/// ... of a logarithmic one, from 0 < low to high: at most `wanted`, evenly spaced powers of two; 1, 2 and 5 times
+/// powers of ten, or powers of ten alone where those are too many.
+std::vector<double> binary_ticks(double low, double high, int wanted);
+std::vector<double> decimal_ticks(double low, double high, int wanted);
 
 }  // namespace pictura

@@ -555,6 +555,13 @@ TEST(Plots, TicksAreRound) {
   EXPECT_THAT(round_ticks(1.3e6, 2.9e6, 3), testing::ElementsAre(1.5e6, 2e6, 2.5e6));
   EXPECT_TRUE(round_ticks(1, 1, 4).empty());
   EXPECT_TRUE(round_ticks(0, std::numeric_limits<double>::infinity(), 4).empty());
+  EXPECT_THAT(binary_ticks(32, 768, 6), testing::ElementsAre(32, 64, 128, 256, 512));
+  EXPECT_THAT(binary_ticks(1, 1024, 6), testing::ElementsAre(1, 4, 16, 64, 256, 1024));
+  EXPECT_THAT(decimal_ticks(400, 3e6, 5), testing::ElementsAre(1e3, 1e4, 1e5, 1e6));
+  EXPECT_THAT(decimal_ticks(4e5, 3e6, 5), testing::ElementsAre(5e5, 1e6, 2e6));
+  EXPECT_THAT(decimal_ticks(1, 1e9, 4), testing::ElementsAre(1, 1e3, 1e6, 1e9));
+  EXPECT_TRUE(binary_ticks(0, 4, 4).empty());
+  EXPECT_TRUE(decimal_ticks(-1, 4, 4).empty());
 }
 
 TEST(Plots, DrawSeriesWithGapsInPanels) {
