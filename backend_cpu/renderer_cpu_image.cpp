@@ -255,20 +255,27 @@ void ImageDrawer::visit_fragments(const std::function<void(int, const PixelCover
 void ImageDrawer::draw_planes(const ImageTarget& target) const {
   const int width = setting_.camera.width_px, height = setting_.camera.height_px;
   std::vector<FrontFace> fronts(static_cast<std::size_t>(width));
-  auto offer = [&](int y, auto&& take) {
+  auto offer = [&](int y, auto&& is_wanted, auto&& take) {
     for (const ScreenFace& face : faces_) {
       if (y < face.box.y_begin || y >= face.box.y_end) continue;
       for (int x = face.box.x_begin; x < face.box.x_end; ++x) {
         const Vec2 center = pixel_middle(x, y);
-        if (!covers_point(edges_.at(face.edge_begin), face.edge_count, center.x, center.y)) continue;
-        take(fronts[static_cast<std::size_t>(x)], face, center);
+        FrontFace& front = fronts[static_cast<std::size_t>(x)];
+        if (!is_wanted(front, face) || !covers_point(edges_.at(face.edge_begin), face.edge_count, center.x, center.y)) {
+          continue;
+        }
+        take(front, face, center);
       }
     }
   };
   for (int y = 0; y < height; ++y) {
     std::fill(fronts.begin(), fronts.end(), FrontFace{});
-    offer(y, [](FrontFace& front, const ScreenFace& face, Vec2 at) { front.offer(face, at); });
-    offer(y, [](FrontFace& front, const ScreenFace& face, Vec2 at) { front.offer_again(face, at); });
+    offer(
+        y, [](const FrontFace&, const ScreenFace&) { return true; },
+        [](FrontFace& front, const ScreenFace& face, Vec2 at) { front.offer(face, at); });
+    offer(
+        y, [](const FrontFace& front, const ScreenFace& face) { return front.wants_strips_again() && is_strip(face); },
+        [](FrontFace& front, const ScreenFace& face, Vec2 at) { front.offer_again(face, at); });
     for (int x = 0; x < width; ++x) {
       const Vec2 center = pixel_middle(x, y);
       const ScreenFace* face = fronts[static_cast<std::size_t>(x)].front(

@@ -112,10 +112,11 @@ class FrontFace {
   PICTURA_HD void offer(const ScreenFace& face, Vec2 at_px) {
     const ScreenFace*& best = is_strip(face) ? strip_ : solid_;
     if (!best || nearer(face, *best, at_px)) best = &face;
+    num_strips_ += is_strip(face) ? 1 : 0;
   }
-  /// A second round over the same faces, once all have been offered.
+  /// Whether strips, of which several may be painted over each other, are to be offered once more when all have been.
+  PICTURA_HD bool wants_strips_again() const { return num_strips_ > 1; }
   PICTURA_HD void offer_again(const ScreenFace& face, Vec2 at_px) {
-    if (!is_strip(face) || !strip_) return;
     if (!of_one_level(face, *strip_, at_px)) return;
     if (!painted_ || face.number < painted_->number) painted_ = &face;
   }
@@ -135,6 +136,7 @@ class FrontFace {
   const ScreenFace* solid_ = nullptr;
   const ScreenFace* strip_ = nullptr;    // the nearest
   const ScreenFace* painted_ = nullptr;  // ... or what is painted over it
+  int32_t num_strips_ = 0;
 };
 
 }  // namespace pictura
