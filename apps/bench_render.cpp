@@ -1,7 +1,6 @@
 // `pictura bench render`: how fast backends draw what the agents of many worlds see, by backend, size and number of
 // egos, and how much device memory that takes.
 #include <algorithm>
-#include <cmath>
 #include <regex>
 
 #include <fmt/format.h>

@@ -1,7 +1,6 @@
 // `pictura bench simulate`: how fast executors step worlds, by backend, number of worlds and agents in each, with and
 // without entity sets; and what an agent-step costs, as a figure.
 #include <algorithm>
-#include <cmath>
 #include <regex>
 
 #include <fmt/format.h>

@@ -25,10 +25,10 @@ struct Range {
     low = std::min(low, value);
     high = std::max(high, value);
   }
-  /// Never empty, with a little air.
-  Range padded(double share) const {
+  /// Never empty, with a little air; that around a lone value is told.
+  Range padded(double share, double lone_air) const {
     if (!(low <= high)) return {0, 1};
-    const double air = high > low ? share * (high - low) : std::max(0.5 * std::abs(low), 0.5);
+    const double air = high > low ? share * (high - low) : lone_air;
     return {low - air, high + air};
   }
 };
@@ -51,6 +51,13 @@ std::string tick_text(double value, double step) {
   return fmt::format("{:.{}f}{}", value / unit, decimals, suffix);
 }
 
+/// "2M", "50k", "16384", "0.25": a tick of a logarithmic axis, exactly.
+std::string tick_text(double value) {
+  if (value >= 1e6) return fmt::format("{:g}M", value / 1e6);
+  const bool is_of_thousands = value >= 1e4 && std::fmod(value, 1e3) == 0;
+  return is_of_thousands ? fmt::format("{:g}k", value / 1e3) : fmt::format("{:g}", value);
+}
+
 /// From values to pixels.
 class Axis {
  public:
@@ -63,7 +70,7 @@ class Axis {
   void add(double value) { range_.add(scaled(value)); }
   /// Spreads the values added, with a little air, from one place to another.
   void place(double air, double low_px, double high_px) {
-    range_ = range_.padded(air);
+    range_ = range_.padded(air, scale_ == AxisScale::linear ? std::max(0.5 * std::abs(range_.low), 0.5) : 1.0);
     low_px_ = low_px;
     high_px_ = high_px;
   }
@@ -81,7 +88,7 @@ class Axis {
     const double low = std::exp2(range_.low), high = std::exp2(range_.high);
     const auto values =
         scale_ == AxisScale::binary ? binary_ticks(low, high, wanted) : decimal_ticks(low, high, wanted);
-    for (const double value : values) ticks.push_back({value, tick_text(value, value)});
+    for (const double value : values) ticks.push_back({value, tick_text(value)});
     return ticks;
   }
 
@@ -244,13 +251,13 @@ std::vector<double> binary_ticks(double low, double high, int wanted) {
   const double first = std::ceil(std::log2(low) - 1e-9), last = std::floor(std::log2(high) + 1e-9);
   const double step = std::max(1.0, std::ceil((last - first + 1) / wanted));
   for (double power = first; power <= last; power += step) ticks.push_back(std::exp2(power));
-  return ticks;
+  return ticks.size() > 1 ? ticks : round_ticks(low, high, wanted);
 }
 
 std::vector<double> decimal_ticks(double low, double high, int wanted) {
   std::vector<double> ticks;
   if (!(low > 0 && high >= low) || wanted < 1 || !std::isfinite(high)) return ticks;
-  const double first = std::floor(std::log10(low)), last = std::floor(std::log10(high));
+  const double first = std::floor(std::log10(low)), last = std::floor(std::log10(high) + 1e-9);
   auto list = [&](std::initializer_list<int> factors, double step) {
     ticks.clear();
     for (double power = first; power <= last; power += step) {
@@ -261,7 +268,7 @@ std::vector<double> decimal_ticks(double low, double high, int wanted) {
     }
     return ticks.size() <= static_cast<std::size_t>(wanted);
   };
-  if (list({1, 2, 5}, 1)) return ticks;
+  if (list({1, 2, 5}, 1)) return ticks.size() > 1 ? ticks : round_ticks(low, high, wanted);
   for (double step = 1; !list({1}, step); ++step) continue;
   return ticks;
 }

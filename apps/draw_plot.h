@@ -41,7 +41,7 @@ void draw_plots_png(const std::vector<PlotPanel>& panels, const std::string& pat
 std::vector<double> round_ticks(double low, double high, int wanted);
 
 /// ... of a logarithmic one, from 0 < low to high: at most `wanted`, evenly spaced powers of two; 1, 2 and 5 times
-/// powers of ten, or powers of ten alone where those are too many.
+/// powers of ten, or powers of ten alone where those are too many. Those of a linear axis where there would be but one.
 std::vector<double> binary_ticks(double low, double high, int wanted);
 std::vector<double> decimal_ticks(double low, double high, int wanted);
 

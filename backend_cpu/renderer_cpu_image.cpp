@@ -97,6 +97,7 @@ void ImageDrawer::find_buried(FaceRange faces, RowRange rows) {
   burying_.assign(static_cast<std::size_t>((rows.y_end - rows.y_begin) * setting_.camera.width_px), 0.0f);
   for (int32_t f = faces.begin; f < faces.end; ++f) {
     const ScreenFace& face = faces_[static_cast<std::size_t>(f)];
+    if (is_strip(face)) continue;  // buries nothing
     visit_spans(face, rows, [&](int y, std::size_t row, const RowSpan& span) {
       for (int x = span.full_begin; x < span.full_end; ++x) {
         float& burying = burying_[row + static_cast<std::size_t>(x)];

@@ -49,10 +49,8 @@ DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeC
     const CameraImages& out = images->cameras[i];
     slot.color = out.data;
     slot.view_stride = out.view_stride;
-    slot.depth_m = out.depth_m;
-    slot.class_id = out.class_id;
-    slot.instance_id = out.instance_id;
-    task.wants_planes = task.wants_planes || out.depth_m || out.class_id || out.instance_id;
+    slot.planes = {out.depth_m, out.class_id, out.instance_id};
+    task.wants_planes = task.wants_planes || slot.planes.are_wanted();
   }
   if (images) task.format = images->format;
   return task;

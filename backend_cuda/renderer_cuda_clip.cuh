@@ -66,7 +66,7 @@ __device__ void store_whole(Value* to, const Value& value) {
 template <typename Value>
 __device__ void copy_whole(Value* to, const Value& from) {
   constexpr int kWords = sizeof(Value) / sizeof(uint4);
-  static_assert(sizeof(Value) % sizeof(uint4) == 0);
+  static_assert(sizeof(Value) % sizeof(uint4) == 0 && alignof(Value) >= sizeof(uint4));
   for (int word = lane_index(); word < kWords; word += kWarpSize) {
     reinterpret_cast<uint4*>(to)[word] = reinterpret_cast<const uint4*>(&from)[word];
   }
@@ -75,7 +75,7 @@ __device__ void copy_whole(Value* to, const Value& from) {
 // ... from global into shared memory; it is there once all lanes have waited for their copies.
 template <typename Value>
 __device__ void copy_whole_later(Value* to, const Value& from) {
-  static_assert(sizeof(Value) % sizeof(uint64_t) == 0);
+  static_assert(sizeof(Value) % sizeof(uint64_t) == 0 && alignof(Value) >= sizeof(uint64_t));
   for (size_t at = sizeof(uint64_t) * static_cast<size_t>(lane_index()); at < sizeof(Value);
        at += sizeof(uint64_t) * kWarpSize) {
     copy_into_shared(reinterpret_cast<char*>(to) + at, reinterpret_cast<const char*>(&from) + at);

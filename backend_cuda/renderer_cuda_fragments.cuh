@@ -21,9 +21,9 @@ struct PixelWord {
   static constexpr int kFaceBits = sizeof(Word) == 4 ? kMarkedFaceBits : 32;
   static constexpr Word kFace = (Word{1} << kFaceBits) - 1, kHasChain = Word{1} << (8 * sizeof(Word) - 1);
 
-  __device__ static Word mark(float burying_nearness, int face) {
+  __device__ static Word mark(float burying, int face) {
     static_assert(kMarkedFaceBits + kBuryingBits == 32);
-    return Word{bits_of(burying_nearness)} << (kFaceBits - kMarkedFaceBits) | static_cast<Word>(face + 1);
+    return Word{bits_of(burying)} << (kFaceBits - kMarkedFaceBits) | static_cast<Word>(face + 1);
   }
   __device__ static int marked_face(Word mark) { return static_cast<int>(mark & kFace) - 1; }
   /// With a fragment as the first of the chain, and the face as it is.
@@ -32,8 +32,8 @@ struct PixelWord {
   }
 };
 
-// The face of a word that covers its pixel fully and hides what is behind it; kNone where there is none, or where it
-// stands among the pixel's fragments.
+// The face of a word that covers its pixel fully, of several the one that buries most; kNone where there is none, or
+// where it stands among the pixel's fragments.
 template <typename Memory>
 __device__ typename Memory::Word full_of_word(typename Memory::Word word) {
   return ((word & PixelWord<typename Memory::Word>::kFace) - 1) & Memory::kNone;

@@ -17,10 +17,10 @@ __device__ bool draw_image_part(const Memory& memory, const DrawTask& task, int3
                                 const Part& part) {
   const CameraSlot& slot = task.cameras[camera];
   const int width = width_px(slot.camera), num_faces = memory.state->shown.face_count;
-  const ImageWriter writer{task.format, slot.color, view * slot.view_stride,
-                           static_cast<int64_t>(width) * height_px(slot.camera), width};
+  const int64_t plane = static_cast<int64_t>(width) * height_px(slot.camera);
+  const ImageWriter writer{task.format, slot.color, view * slot.view_stride, plane, width};
   if (!draw_faces(memory, num_faces, part, NoVisit{}, writer)) return false;
-  if (task.wants_planes) draw_planes<Memory>(slot, view, num_faces, part);
+  if (task.wants_planes) draw_planes<Memory>(slot.planes, width, view * plane, num_faces, part);
   return true;
 }
 
@@ -139,7 +139,8 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
   BlockState* state = block_state();
   int32_t* const counter = &task.counters->next_drawn;
   // While the block draws a tile, a thread of the last warp, which has the fewest faces to look at, asks for the number
-  // of the next but one, and what the next one shows.
+  // of the next but one, and what the next one shows and where it lies (kept in shared memory: the thread has no
+  // registers left for it).
   DrawOrder order(task);
   int32_t next_image = -1, after = 0;
   auto take_next = [&] {

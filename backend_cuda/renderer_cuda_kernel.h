@@ -29,16 +29,22 @@ PICTURA_HD constexpr TileGrid tiles_of(int most_px, int width_px, int height_px)
   return {together, parts_of(width_px, together), parts_of(height_px, kTileHeight_px)};
 }
 
-/// Where one camera's images go; strides as in CameraImages.
-struct CameraSlot {
-  PinholeCamera camera;  // in the ego frame
-  void* color = nullptr;
-  int64_t view_stride = 0;
+/// Where one camera's planes go; null: nowhere.
+struct CameraPlanes {
   float* depth_m = nullptr;
   uint8_t* class_id = nullptr;
   uint16_t* instance_id = nullptr;
-  TileGrid tiles;   // see choose_tiles
-  Frustum frustum;  // of the camera, wherever it is
+  PICTURA_HD bool are_wanted() const { return depth_m || class_id || instance_id; }
+};
+
+/// A camera, what follows from it, and where its images go; strides as in CameraImages.
+struct CameraSlot {
+  PinholeCamera camera;  // in the ego frame
+  Frustum frustum;       // of the camera, wherever it is
+  TileGrid tiles;        // see choose_tiles
+  void* color = nullptr;
+  int64_t view_stride = 0;
+  CameraPlanes planes;
 };
 
 /// A piece's surroundings, for culling without a look at the piece itself.

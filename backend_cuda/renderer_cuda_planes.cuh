@@ -8,7 +8,8 @@ namespace pictura::cuda {
 // Writes the optional planes of a part: the front surface at each pixel's centre, of the faces that have its row. All
 // threads of the block.
 template <typename Memory>
-__device__ __noinline__ void draw_planes(CameraSlot slot, int32_t view, int num_faces, Part part) {
+__device__ __noinline__ void draw_planes(CameraPlanes planes, int width_px, int64_t first_pixel, int num_faces,
+                                         Part part) {
   using Word = typename Memory::Word;
   const Memory memory = Memory::current();
   sync_block();
@@ -22,8 +23,6 @@ __device__ __noinline__ void draw_planes(CameraSlot slot, int32_t view, int num_
     memory.candidates[i] = atomicExch(&memory.pixels[memory.rows[i] & Memory::kNone], static_cast<Word>(i + 1));
   }
   sync_block();
-  const int width = width_px(slot.camera);
-  const int64_t plane = static_cast<int64_t>(width) * height_px(slot.camera);
   PICTURA_KEEP_LOOP
   for (int p = static_cast<int>(threadIdx.x); p < part.num_pixels(); p += Memory::kThreads) {
     const int x = part.x_of(p), y = part.y_of(p);
@@ -52,11 +51,11 @@ __device__ __noinline__ void draw_planes(CameraSlot slot, int32_t view, int num_
            [&](const ScreenFace& face) { front.offer_again(face, center); });
     }
     const ScreenFace* face = front.front(center, [](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
-    const int64_t at = view * plane + static_cast<int64_t>(y) * width + x;
+    const int64_t at = first_pixel + static_cast<int64_t>(y) * width_px + x;
     const float infinity = __uint_as_float(0x7F800000u);
-    if (slot.depth_m) slot.depth_m[at] = face ? face_depth_m(*face, center) : infinity;
-    if (slot.class_id) slot.class_id[at] = face ? face->class_id : uint8_t{0};
-    if (slot.instance_id) slot.instance_id[at] = face ? instance_of(*face) : uint16_t{0};
+    if (planes.depth_m) planes.depth_m[at] = face ? face_depth_m(*face, center) : infinity;
+    if (planes.class_id) planes.class_id[at] = face ? face->class_id : uint8_t{0};
+    if (planes.instance_id) planes.instance_id[at] = face ? instance_of(*face) : uint16_t{0};
   }
   reset_part(memory);
 }

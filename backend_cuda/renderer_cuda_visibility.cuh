@@ -49,7 +49,7 @@ __device__ inline bool weigh(BlockState* state, uint32_t number, SeenWeight* sum
   if (!add_to(&sum_inout->among_all)) return false;
   sync_block();
   PICTURA_KEEP_LOOP
-  for (int i = static_cast<int>(threadIdx.x); i < num_faces; i += num_threads()) {
+  for (int i = static_cast<int>(threadIdx.x); i < num_faces; i += LargeDrawMemory::kThreads) {
     if (state->faces[i].number != number) state->faces[i].box = PixelBox{};
   }
   sync_block();

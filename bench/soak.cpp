@@ -184,6 +184,7 @@ void compare_visibility(int64_t scene, const SceneBatch& batch, const std::vecto
                         SoakResult* result_out) {
   std::vector<float> answers(queries.size(), -1.0f), expected(queries.size());
   renderer->visibility(batch, views, queries, answers);
+  renderer->check();
   oracle->visibility(batch, views, queries, expected);
   result_out->queries += static_cast<int64_t>(queries.size());
   for (std::size_t i = 0; i < queries.size(); ++i) {

@@ -49,11 +49,12 @@ struct SoakResult {
   int64_t first_faulty_scene = -1;
 };
 
-/// Makes the renderer that is compared, for each scene anew; may say how it was chosen.
+/// Makes the renderer that is compared, for each scene anew, one that takes memory of the host; may say how it was
+/// chosen.
 using MakeRenderer = std::function<std::unique_ptr<Renderer>(const RendererConfig&, std::string* choice_out)>;
 
-/// Calls on_scene(result so far) after each scene. Throws what make throws, and Error when its renderer draws no
-/// planes, halves or visibility, as gl.
+/// Calls on_scene(result so far) after each scene. Throws Error naming the scene where making a renderer or drawing
+/// fails, as for gl, which draws no planes, halves or visibility; UsageError as make throws it.
 SoakResult soak(const SoakOptions& options, const MakeRenderer& make,
                 const std::function<void(const SoakResult&)>& on_scene);
 

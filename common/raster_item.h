@@ -104,8 +104,8 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, FaceOwner owner, c
   return true;
 }
 
-/// The front surface at a point of the screen: visit(candidate) offers faces that cover it, in any order, and front()
-/// is the one in front of all, or null. The nearest strip gives way to those of its level that rank before it, and to a
+/// The front surface at a point of the screen: faces that cover it are offered, in any order, and front() is the one in
+/// front of all, or null. The nearest strip gives way to those of its level that rank before it, and to a
 /// solid that stands on it.
 class FrontFace {
  public:
@@ -114,7 +114,8 @@ class FrontFace {
     if (!best || nearer(face, *best, at_px)) best = &face;
     num_strips_ += is_strip(face) ? 1 : 0;
   }
-  /// Whether strips, of which several may be painted over each other, are to be offered once more when all have been.
+  /// Whether the strips, of which several may be painted over each other, are to be offered once more when all faces
+  /// have been; only then, and only strips.
   PICTURA_HD bool wants_strips_again() const { return num_strips_ > 1; }
   PICTURA_HD void offer_again(const ScreenFace& face, Vec2 at_px) {
     if (!of_one_level(face, *strip_, at_px)) return;

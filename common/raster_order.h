@@ -205,18 +205,20 @@ PICTURA_HD inline float nearness_rise(const ScreenFace& face) {
 /// Bits of a burying_nearness(), the highest of a float; the others are 0.
 constexpr int kBuryingBits = 21;
 /// How near a face that covers a pixel fully is in all of it. What is further away everywhere in the pixel is buried.
-/// Strips bury nothing, 0: others are painted over them, and what lies behind one may stand on it.
+/// Strips bury nothing, 0: others are painted over them, and what lies behind one may stand on it. Never negative and
+/// never not a number, because kernels sort by its bits; never more than how near the face is anywhere in the pixel, so
+/// that no face buries itself.
 PICTURA_HD inline float burying_nearness(const ScreenFace& face, int x, int y) {
   if (is_strip(face)) return 0.0f;
-  const float least = max_of(middle_nearness(face, x, y) - nearness_rise(face), face.inverse_depth_low);
+  const float least = max_of(face.inverse_depth_low, middle_nearness(face, x, y) - nearness_rise(face));
   return number_of_bits(bits_of(least) & ~((1u << (32 - kBuryingBits)) - 1));
 }
 
 /// Whether a face may weigh anything in pixel (x, y), which others cover fully, given the largest burying_nearness() of
-/// those. Where this is false no fragment is made of it: it would be hidden by the face that buries it. Whether others
-/// are asked before that one makes no difference, since they are not nearer, so devices may ask in any order.
-PICTURA_HD inline bool may_show_before(const ScreenFace& face, float burying_nearness, int x, int y) {
-  return middle_nearness(face, x, y) + nearness_rise(face) >= burying_nearness;
+/// those. Where this is false no fragment is made of it: it would be hidden by the face that buries it. Devices may ask
+/// others of those before that one, in any order: they bury less, so whom they bury it buries too.
+PICTURA_HD inline bool may_show_before(const ScreenFace& face, float burying, int x, int y) {
+  return !(middle_nearness(face, x, y) + nearness_rise(face) < burying);
 }
 
 /// Order of fragments that does not depend on how they are listed: the nearer first, then by number.

@@ -560,6 +560,9 @@ TEST(Plots, TicksAreRound) {
   EXPECT_THAT(decimal_ticks(400, 3e6, 5), testing::ElementsAre(1e3, 1e4, 1e5, 1e6));
   EXPECT_THAT(decimal_ticks(4e5, 3e6, 5), testing::ElementsAre(5e5, 1e6, 2e6));
   EXPECT_THAT(decimal_ticks(1, 1e9, 4), testing::ElementsAre(1, 1e3, 1e6, 1e9));
+  EXPECT_THAT(decimal_ticks(1, std::exp2(std::log2(10.0)), 5), testing::ElementsAre(1, 2, 5, 10));
+  EXPECT_THAT(decimal_ticks(2.1e6, 4.9e6, 3), testing::ElementsAre(3e6, 4e6)) << "within 2 and 5 million";
+  EXPECT_THAT(binary_ticks(33, 63, 3), testing::ElementsAre(40, 50, 60)) << "between two powers";
   EXPECT_TRUE(binary_ticks(0, 4, 4).empty());
   EXPECT_TRUE(decimal_ticks(-1, 4, 4).empty());
 }
@@ -581,6 +584,13 @@ TEST(Plots, DrawSeriesWithGapsInPanels) {
   EXPECT_EQ(count(draw_plots({panel}), blue), 0);
   panel.series[0] = {"constant", {5}, {7}};
   EXPECT_GT(count(draw_plots({panel}), blue), 0) << "a single point is a dot";
+  PlotPanel decades{"rate", "egos", "rate", {{"a", {1, 2, 4, 8}, {1, 1e3, 1e3, 1}}}};
+  decades.x_scale = AxisScale::binary;
+  decades.y_scale = AxisScale::decimal;
+  const int on_decades = count(draw_plots({decades}), blue);
+  EXPECT_GT(on_decades, 300);
+  decades.series[0].y[1] = 0;
+  EXPECT_LT(count(draw_plots({decades}), blue), 0.7 * on_decades) << "a logarithm has no 0";
   const RgbImage three = draw_plots({panel, panel, panel}, {.columns = 2, .title = "run"});
   EXPECT_EQ(three.width_px, 2 * 560 + 12);
   EXPECT_GT(three.height_px, 2 * 360);

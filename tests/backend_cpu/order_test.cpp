@@ -379,6 +379,79 @@ TEST(Order, WhatFillsThePixelIsHiddenOnlyByWhatDoesToo) {
   EXPECT_EQ(hide_each_other({0.5f, 0xFFFF}, {1, kAllSamples}, far, near, {}, never).of_a, 0xFFFFu);
 }
 
+// Random planes in one pixel, two thirds of them of solids.
+std::vector<ScreenFace> random_planes(std::mt19937_64* random, std::size_t count) {
+  std::uniform_real_distribution<float> unit(0, 1);
+  auto tilt = [&] { return 0.04f * (unit(*random) - 0.5f); };
+  std::vector<ScreenFace> faces;
+  for (std::size_t i = 0; i < count; ++i) {
+    const uint32_t kind = i % 3 == 2 ? kStripKind : i % 3 == 1 ? kWallKind : kAgentKind;
+    faces.push_back(
+        plane_face(thing_number(kind, static_cast<int32_t>(i)), 0.08f + 0.04f * unit(*random), Vec2{tilt(), tilt()}));
+  }
+  return faces;
+}
+
+TEST(Order, WhatIsBuriedIsHiddenByWhatBuriesIt) {
+  std::mt19937_64 random(11);
+  int buried = 0;
+  for (int round = 0; round < 20000; ++round) {
+    const std::vector<ScreenFace> faces = random_planes(&random, 3);
+    const ScreenFace& full = faces[static_cast<std::size_t>(round % 2)];
+    const ScreenFace& face = faces[static_cast<std::size_t>(round % 3 ? 2 : 1 - round % 2)];
+    const float burying = burying_nearness(full, 0, 0);
+    ASSERT_EQ(bits_of(burying) << kBuryingBits, 0u);
+    ASSERT_TRUE(may_show_before(full, burying, 0, 0)) << "nothing buries itself";
+    if (may_show_before(face, burying, 0, 0)) continue;
+    ++buried;
+    const uint64_t samples = random() | 1;
+    const Hidden hidden =
+        hide_each_other({1, kAllSamples}, {0.5f, samples}, full, face, {}, [](uint32_t, uint32_t) { return true; });
+    EXPECT_EQ(hidden.of_a, 0u);
+    const Vec2 gradient{full.inverse_depth_x - face.inverse_depth_x, full.inverse_depth_y - face.inverse_depth_y};
+    for (int sample = 0; sample < 64; ++sample) {
+      if (!((samples & ~hidden.of_b) >> sample & 1)) continue;
+      // A line that is almost upright is turned by as much in a pixel (see make_edge).
+      const Vec2 at = middle_of(uint64_t{1} << sample);
+      const float lead = inverse_depth(full, at) - inverse_depth(face, at);
+      ASSERT_GE(lead, 0.0f) << round;
+      ASSERT_LT(lead, 0.5f / kSteepest * length(gradient)) << round;
+    }
+  }
+  EXPECT_GT(buried, 2000);
+}
+
+// Devices ask whichever face holds a pixel when another one comes.
+TEST(Order, WhatIsBuriedDoesNotDependOnWhoIsAskedFirst) {
+  std::mt19937_64 random(12);
+  for (int round = 0; round < 2000; ++round) {
+    std::vector<ScreenFace> faces = random_planes(&random, 2 + random() % 8);
+    if (round % 4 == 0) faces.push_back(faces.front());  // as near as another
+    float most = 0;
+    for (const ScreenFace& face : faces) most = std::max(most, burying_nearness(face, 0, 0));
+    std::vector<const ScreenFace*> expected;
+    for (const ScreenFace& face : faces) {
+      if (may_show_before(face, most, 0, 0)) expected.push_back(&face);
+    }
+    std::vector<const ScreenFace*> order;
+    for (const ScreenFace& face : faces) order.push_back(&face);
+    for (int shuffle = 0; shuffle < 5; ++shuffle) {
+      std::shuffle(order.begin(), order.end(), random);
+      std::vector<const ScreenFace*> left;
+      const ScreenFace* holder = order.front();
+      for (std::size_t i = 1; i < order.size(); ++i) {
+        const ScreenFace* loser = order[i];
+        if (burying_nearness(*loser, 0, 0) > burying_nearness(*holder, 0, 0)) std::swap(loser, holder);
+        if (may_show_before(*loser, burying_nearness(*holder, 0, 0), 0, 0)) left.push_back(loser);
+      }
+      left.push_back(holder);
+      std::erase_if(left, [&](const ScreenFace* face) { return !may_show_before(*face, most, 0, 0); });
+      std::ranges::sort(left);
+      ASSERT_EQ(left, expected) << round;
+    }
+  }
+}
+
 TEST(Order, ASliverIsHiddenByWhatIsInFrontOfItAndHidesNothing) {
   auto never = [](uint32_t, uint32_t) { return false; };
   const ScreenFace other = plane_face(thing_number(kWallKind, 1), 0.1f);

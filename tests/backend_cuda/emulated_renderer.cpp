@@ -1,6 +1,7 @@
 #include "pictura/tests/backend_cuda/emulated_renderer.h"
 
 #include <algorithm>
+#include <cstring>
 #include <utility>
 
 #include "pictura/backend_cuda/draw_task.h"

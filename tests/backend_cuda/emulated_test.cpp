@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <utility>
 
 #include <gmock/gmock.h>
@@ -36,8 +37,12 @@ void expect_oracles(EmulatedRenderer* renderer, const Scene& town, Planes planes
 
 // What random scenes, views, rigs and settings find.
 TEST(EmulatedKernels, DrawWhatASoakDraws) {
-  const SoakOptions options{
-      .maps = {"procedural:1", "procedural:2"}, .agents = 60, .views = 2, .most_scenes = 8, .num_threads = 1};
+  const SoakOptions options{.maps = {"procedural:1", "procedural:2"},
+                            .agents = 60,
+                            .views = 2,
+                            .most_scenes = 8,
+                            .most_seconds = std::numeric_limits<double>::infinity(),
+                            .num_threads = 1};
   uint64_t order = 30;
   const SoakResult result = soak(
       options,
@@ -72,6 +77,7 @@ TEST(EmulatedKernels, DrawTheWidestLinesInAnyOrderOfThreads) {
   RendererConfig config = config_of(paper_rig());
   config.line_floor_px = kGuardBand_px;
   for (const uint64_t seed : {19, 20}) {
+    SCOPED_TRACE(seed);
     EmulatedRenderer renderer(config, seed);
     expect_oracles(&renderer, town);
   }
