@@ -147,12 +147,10 @@ void append_results(const std::string& name, const RenderCase& measured, const R
 /// Draws the rates that the sweeps in earlier results have found.
 void draw_rates(const PlotArguments& plot) {
   const std::regex swept(R"((.+) ((\d+)x(\d+)) (\d+) egos)");
-  auto panel = [](const std::string& title, const std::string& x_label) {
-    return PlotPanel{title, x_label, "agent-steps/s", {}, AxisScale::binary, AxisScale::decimal};
-  };
-  PlotPanel by_size = panel(fmt::format("{} egos", kSweptEgos), "width in pixels, 16:9");
-  PlotPanel by_egos = panel(fmt::format("{} pixels", kSweptSize), "egos in one call");
-  PlotPanel by_square = panel(fmt::format("{} egos, walls off", kSweptEgos), "width in pixels, square");
+  const char* rate = "agent-steps/s";
+  PlotPanel by_size = sweep_panel(fmt::format("{} egos", kSweptEgos), "width in pixels, 16:9", rate);
+  PlotPanel by_egos = sweep_panel(fmt::format("{} pixels", kSweptSize), "egos in one call", rate);
+  PlotPanel by_square = sweep_panel(fmt::format("{} egos, walls off", kSweptEgos), "width in pixels, square", rate);
   for (const PlottedResult& result : read_results(plot.results)) {
     std::smatch match;
     if (!std::regex_match(result.name, match, swept)) continue;

@@ -104,11 +104,9 @@ void measure(const Arguments& arguments, const std::string& backend,
 /// Draws what the sweeps in earlier results say an agent-step costs.
 void draw_cost(const PlotArguments& plot) {
   const std::regex swept(R"((\w+), (\d+) worlds of (\d+) agents)");
-  auto panel = [](const std::string& title, const std::string& x_label) {
-    return PlotPanel{title, x_label, "ns for an agent-step", {}, AxisScale::binary, AxisScale::decimal};
-  };
-  PlotPanel by_agents = panel(fmt::format("{} worlds", kSweptWorlds), "agents in each world");
-  PlotPanel by_worlds = panel(fmt::format("{} agents in each world", kSweptAgents), "worlds");
+  const char* cost_label = "ns for an agent-step";
+  PlotPanel by_agents = sweep_panel(fmt::format("{} worlds", kSweptWorlds), "agents in each world", cost_label);
+  PlotPanel by_worlds = sweep_panel(fmt::format("{} agents in each world", kSweptAgents), "worlds", cost_label);
   for (const PlottedResult& result : read_results(plot.results)) {
     std::smatch match;
     if (!std::regex_match(result.name, match, swept)) continue;

@@ -43,6 +43,10 @@ std::vector<PlottedResult> read_results(const std::vector<std::string>& paths) {
   return results;
 }
 
+PlotPanel sweep_panel(const std::string& title, const std::string& x_label, const std::string& y_label) {
+  return {title, x_label, y_label, {}, AxisScale::binary, AxisScale::decimal};
+}
+
 void add_point(PlotPanel* panel, const std::string& series, double x, double y) {
   auto& all = panel->series;
   auto found = std::find_if(all.begin(), all.end(), [&](const PlotSeries& s) { return s.name == series; });

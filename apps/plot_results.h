@@ -35,6 +35,9 @@ struct PlottedResult {
 /// The results in the files, in their order. Throws Error naming the file that cannot be read or holds none.
 std::vector<PlottedResult> read_results(const std::vector<std::string>& paths);
 
+/// A panel of a sweep, whose x doubles and whose y spans decades.
+PlotPanel sweep_panel(const std::string& title, const std::string& x_label, const std::string& y_label);
+
 /// Adds a point to the series of that name, which begins with it if there is none; points of a series ascend in x, and
 /// the first that is given for an x stays.
 void add_point(PlotPanel* panel, const std::string& series, double x, double y);

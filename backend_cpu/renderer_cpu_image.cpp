@@ -92,8 +92,8 @@ void ImageDrawer::visit_spans(const ScreenFace& face, RowRange rows, Visit&& vis
   }
 }
 
-// Finds, for each pixel of some rows, how near the faces that cover it fully bury others.
-void ImageDrawer::find_buried(FaceRange faces, RowRange rows) {
+// Finds, for each pixel of some rows, the largest burying_nearness() of the faces that cover it fully.
+void ImageDrawer::find_burying(FaceRange faces, RowRange rows) {
   burying_.assign(static_cast<std::size_t>((rows.y_end - rows.y_begin) * setting_.camera.width_px), 0.0f);
   for (int32_t f = faces.begin; f < faces.end; ++f) {
     const ScreenFace& face = faces_[static_cast<std::size_t>(f)];
@@ -109,7 +109,7 @@ void ImageDrawer::find_buried(FaceRange faces, RowRange rows) {
 
 // Spreads faces over the pixels of some rows.
 void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
-  find_buried(faces, rows);
+  find_burying(faces, rows);
   first_fragment_.assign(burying_.size(), -1);
   fragments_.clear();
   for (int32_t f = faces.begin; f < faces.end; ++f) {
@@ -256,27 +256,22 @@ void ImageDrawer::visit_fragments(const std::function<void(int, const PixelCover
 void ImageDrawer::draw_planes(const ImageTarget& target) const {
   const int width = setting_.camera.width_px, height = setting_.camera.height_px;
   std::vector<FrontFace> fronts(static_cast<std::size_t>(width));
-  auto offer = [&](int y, auto&& is_wanted, auto&& take) {
+  auto offer = [&](int y, bool strips_again) {
     for (const ScreenFace& face : faces_) {
-      if (y < face.box.y_begin || y >= face.box.y_end) continue;
+      if (y < face.box.y_begin || y >= face.box.y_end || (strips_again && !is_strip(face))) continue;
       for (int x = face.box.x_begin; x < face.box.x_end; ++x) {
         const Vec2 center = pixel_middle(x, y);
         FrontFace& front = fronts[static_cast<std::size_t>(x)];
-        if (!is_wanted(front, face) || !covers_point(edges_.at(face.edge_begin), face.edge_count, center.x, center.y)) {
-          continue;
-        }
-        take(front, face, center);
+        if (strips_again && !front.wants_strips_again()) continue;
+        if (!covers_point(edges_.at(face.edge_begin), face.edge_count, center.x, center.y)) continue;
+        strips_again ? front.offer_again(face, center) : front.offer(face, center);
       }
     }
   };
   for (int y = 0; y < height; ++y) {
     std::fill(fronts.begin(), fronts.end(), FrontFace{});
-    offer(
-        y, [](const FrontFace&, const ScreenFace&) { return true; },
-        [](FrontFace& front, const ScreenFace& face, Vec2 at) { front.offer(face, at); });
-    offer(
-        y, [](const FrontFace& front, const ScreenFace& face) { return front.wants_strips_again() && is_strip(face); },
-        [](FrontFace& front, const ScreenFace& face, Vec2 at) { front.offer_again(face, at); });
+    offer(y, /*strips_again=*/false);
+    offer(y, /*strips_again=*/true);
     for (int x = 0; x < width; ++x) {
       const Vec2 center = pixel_middle(x, y);
       const ScreenFace* face = fronts[static_cast<std::size_t>(x)].front(

@@ -97,7 +97,7 @@ class ImageDrawer {
   auto face_maker(FaceOwner owner);
   template <typename Visit>
   void visit_spans(const ScreenFace& face, RowRange rows, Visit&& visit) const;
-  void find_buried(FaceRange faces, RowRange rows);
+  void find_burying(FaceRange faces, RowRange rows);
   void make_fragments(FaceRange faces, RowRange rows);
   void gather_pixel(int32_t first);
   void order_pixel(int x, int y);

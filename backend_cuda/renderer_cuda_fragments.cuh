@@ -26,6 +26,10 @@ struct PixelWord {
     return Word{bits_of(burying)} << (kFaceBits - kMarkedFaceBits) | static_cast<Word>(face + 1);
   }
   __device__ static int marked_face(Word mark) { return static_cast<int>(mark & kFace) - 1; }
+  __device__ static float marked_burying(Word mark) {
+    constexpr uint32_t kBurying = ~0u << kMarkedFaceBits;
+    return number_of_bits(static_cast<uint32_t>(mark >> (kFaceBits - kMarkedFaceBits)) & kBurying);
+  }
   /// With a fragment as the first of the chain, and the face as it is.
   __device__ static Word with_first(Word word, Word fragment) {
     return kHasChain | fragment << kFaceBits | (word & kFace);
@@ -99,8 +103,9 @@ __device__ int mark_pixel(const Memory& memory, int face, int x, int y, int pixe
   if (had < mark) had = atomicMax(&memory.pixels[pixel], mark);
   const int other = PixelWord<Word>::marked_face(had);
   if (other < 0) return -1;
-  const int loser = had < mark ? other : face, winner = had < mark ? face : other;
-  return may_show_before(memory.faces[loser], burying_nearness(memory.faces[winner], x, y), x, y) ? loser : -1;
+  const int loser = had < mark ? other : face;
+  const float burying = PixelWord<Word>::marked_burying(had < mark ? mark : had);
+  return may_show_before(memory.faces[loser], burying, x, y) ? loser : -1;
 }
 
 // A row of a face within a tile: columns from the tile's first on, a byte each, so that lanes hand them on at once.

@@ -214,6 +214,7 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
                           const Write& write) {
   list_rows(memory, num_faces, part);
   sync_block();
+  // Counters of nothing are 0 already, and others may still be asking.
   if (memory.state->num_rows != 0) {
     if (!mix_rows(memory, part, visit, write)) return false;
     reset_counts(memory);
