@@ -15,13 +15,20 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
   command->add_option("--agents", options_out->agents, "Vehicles, cyclists and pedestrians in the world")
       ->check(CLI::Range(1, kMaxAgentsPerWorld))
       ->capture_default_str();
+  // What a command sets beforehand is its default; else who drives decides.
+  auto with_default = [](const char* what, auto preset, const char* else_default) {
+    return preset ? fmt::format("{}; default: {}", what, *preset)
+                  : fmt::format("{}; default: as the policy was trained, else {}", what, else_default);
+  };
   command
       ->add_option("--pedestrians", options_out->pedestrian_fraction,
-                   "Share of the agents; default: as the policy was trained, else 0.1")
+                   with_default("Share of the agents", options_out->pedestrian_fraction, "0.1"))
       ->check(finite_range(0, 1));
-  command->add_option("--cyclists", options_out->cyclist_fraction, "Share of the agents; default: likewise")
+  command
+      ->add_option("--cyclists", options_out->cyclist_fraction,
+                   with_default("Share of the agents", options_out->cyclist_fraction, "0.1"))
       ->check(finite_range(0, 1));
-  command->add_option("--parked", options_out->parked_cars, "Parked cars; default: likewise, else 32")
+  command->add_option("--parked", options_out->parked_cars, with_default("Parked cars", options_out->parked_cars, "32"))
       ->check(CLI::Range(0, kMaxAgentsPerWorld));
   command->add_option("--seed", options_out->seed, "Places, sizes, goals and actions")->capture_default_str();
   command->add_option("--threads", options_out->num_threads, "Host threads; 0: all")

@@ -32,11 +32,11 @@ SUMMARY = re.compile(r"\[  PASSED  \]|=========.* SUMMARY: ")
 
 
 def source_hash():
-    """Of each file its place, its length and its bytes."""
+    """Of each file its place, its length and its bytes; documents do not count."""
     files = {path for folder in SOURCES for path in pathlib.Path(folder).rglob("*") if path.is_file()}
     digest = hashlib.sha256()
     for path in sorted(files | {pathlib.Path("CMakeLists.txt")}):
-        if RESULTS not in path.parents and "__pycache__" not in path.parts:
+        if RESULTS not in path.parents and "__pycache__" not in path.parts and path.suffix != ".md":
             content = path.read_bytes()
             digest.update(f"{path.as_posix()} {len(content)}\n".encode() + content)
     return digest.hexdigest()[:16]

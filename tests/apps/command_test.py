@@ -359,6 +359,17 @@ class Benchmarks(CommandCase):
             self.assertAlmostEqual(rate * call / 1e3 / egos, 1, places=6)
             self.assertAlmostEqual(image * 4 * egos / call, 1, places=6)
 
+    def test_rendering_on_a_device_names_it_and_its_driver(self):
+        if os.environ.get("PICTURA_REQUIRE_GPU") != "1":
+            self.skipTest("PICTURA_REQUIRE_GPU is not 1")
+        facts = self.json_of("bench", "render", *self.QUICK, "--backend", "cuda", "--size", "8x8", "--egos", 3)
+        self.assertRegex(facts["driver"], r"^\d+\.\d+.*, CUDA \d+\.\d+$")
+        self.assertIn("NVIDIA", facts["device"])
+        self.assertRegex(facts["workload"], "cuda: asked for; kernels built .* for sm_")
+        rows = {row["name"]: row["value"] for row in facts["results"]}
+        self.assertGreater(rows["cuda 8x8 3 egos"], 0)
+        self.assertEqual(rows["cuda 8x8 3 egos, values unlike the oracle's"], 0)
+
     def test_steps_are_measured_with_and_without_entity_sets(self):
         facts = self.json_of("bench", "simulate", *self.QUICK, "--worlds", 3)
         rows = {row["name"]: row for row in facts["results"]}

@@ -14,6 +14,8 @@
 #include "pictura/common/make_renderer.h"
 #include "pictura/common/scene_file.h"
 #include "pictura/tests/backend_cuda/emulated_renderer.h"
+#include "pictura/tests/backend_cuda/equal_outputs.h"
+#include "pictura/tests/golden/golden_scenes.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/image_scenes.h"
 
@@ -27,12 +29,7 @@ template <typename Scene>  // SyntheticTown or SyntheticWorlds
 void expect_oracles(EmulatedRenderer* renderer, const Scene& town, Planes planes = Planes::none) {
   const Outputs emulated = draw_outputs(renderer, town, planes);
   renderer->check();
-  const Outputs oracle = draw_outputs(make_renderer("cpu", renderer->config()).get(), town, planes);
-  ASSERT_EQ(emulated.color.size(), oracle.color.size());
-  std::size_t differ = 0;
-  for (std::size_t i = 0; i < oracle.color.size(); ++i) differ += emulated.color[i] != oracle.color[i];
-  EXPECT_EQ(differ, 0u) << "of " << oracle.color.size() << " values";
-  EXPECT_TRUE(emulated == oracle);
+  test::expect_equal(emulated, draw_outputs(make_renderer("cpu", renderer->config()).get(), town, planes));
 }
 
 // What random scenes, views, rigs and settings find.
@@ -300,35 +297,30 @@ TEST(EmulatedKernels, DrawPlanesOfMoreRowsThanThereIsRoomFor) {
 TEST(EmulatedKernels, TellVisibility) {
   SyntheticTown town = make_synthetic_town(4, 30);
   town.views.resize(1);
-  std::vector<VisibilityQuery> queries;
-  for (int32_t agent = 0; agent < 12; ++agent) queries.push_back({0, agent});
+  town.scene.agents.resize(12);
+  town.scene.world_begin.back() = 12;
   const RendererConfig config = config_of(paper_rig(48, 27));
   EmulatedRenderer emulated(config, 5);
-  const auto oracle = make_renderer("cpu", config);
-  std::vector<float> told(queries.size()), truth(queries.size());
-  emulated.upload(town.geometry);
-  oracle->upload(town.geometry);
-  emulated.visibility(town.scene.batch(), town.views, queries, told, {});
-  oracle->visibility(town.scene.batch(), town.views, queries, truth);
-  for (std::size_t i = 0; i < queries.size(); ++i) {
-    if (!std::isnan(truth[i])) {
-      EXPECT_EQ(told[i], truth[i]) << i;
-    } else {
-      EXPECT_TRUE(std::isnan(told[i])) << i;
-    }
-  }
+  test::expect_equal_visibility(&emulated, make_renderer("cpu", config).get(), town);
 }
 
-// Golden scenes in which solids intersect, and dozens of things share a pixel.
-TEST(EmulatedKernels, DrawTheGoldenScenes) {
-  for (const char* name : {"overlapping_boxes", "bridge", "crossing", "one_pixel", "near_plane", "lights"}) {
-    SCOPED_TRACE(name);
-    const SceneFile scene = load_scene(std::string(PICTURA_GOLDEN_DIR "/") + name + ".toml");
-    RendererConfig config = scene.config;
-    config.num_threads = 1;
-    EmulatedRenderer renderer(config, 6);
-    expect_oracles(&renderer, SyntheticTown{scene.geometry, scene.scene, scene.views});
-  }
+class EmulatedHardScenes : public testing::TestWithParam<HardScene> {};
+INSTANTIATE_TEST_SUITE_P(All, EmulatedHardScenes, testing::ValuesIn(hard_scenes()),
+                         [](const auto& scene) { return scene.param.name; });
+TEST_P(EmulatedHardScenes, LookLikeTheOracle) {
+  EmulatedRenderer renderer(config_of(GetParam().rig), 21);
+  expect_oracles(&renderer, GetParam().town, Planes::all);
+}
+
+class EmulatedGoldenScenes : public testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(All, EmulatedGoldenScenes, testing::ValuesIn(golden_names(".toml")),
+                         [](const auto& scene) { return scene.param; });
+TEST_P(EmulatedGoldenScenes, LookLikeTheOracle) {
+  const SceneFile scene = load_scene(scene_path(GetParam()));
+  RendererConfig config = scene.config;
+  config.num_threads = 1;
+  EmulatedRenderer renderer(config, 6);
+  expect_oracles(&renderer, SyntheticTown{scene.geometry, scene.scene, scene.views}, Planes::all);
 }
 
 }  // namespace

@@ -1,20 +1,16 @@
 // The CUDA renderer against the oracle, on a device. Without one these tests are skipped, unless PICTURA_REQUIRE_GPU=1
 // says that there must be one.
-#include <algorithm>
-#include <cmath>
-#include <cstring>
-
-#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "pictura/common/cuda/device_scene.cuh"
 #include "pictura/common/error.h"
 #include "pictura/common/make_renderer.h"
+#include "pictura/common/scene_file.h"
 #include "pictura/tests/backend_cuda/device_test.h"
+#include "pictura/tests/backend_cuda/equal_outputs.h"
+#include "pictura/tests/golden/golden_scenes.h"
 #include "pictura/tests/support/image_scenes.h"
-#include "pictura/tests/support/image_truth.h"
-#include "pictura/tests/support/tolerances.h"
 
 namespace pictura {
 
@@ -25,34 +21,14 @@ using testing::HasSubstr;
 class CudaRendererTest : public test::DeviceTest {};
 
 template <typename Scene>  // SyntheticTown or SyntheticWorlds
-Outputs draw(const std::string& backend, const Scene& town, const RendererConfig& config) {
-  return draw_outputs(make_renderer(backend, config).get(), town, Planes::all);
+void expect_parity(const Scene& town, const RendererConfig& config) {
+  const auto oracle = make_renderer("cpu", config), device = make_renderer("cuda", config);
+  test::expect_equal(draw_outputs(device.get(), town, Planes::all), draw_outputs(oracle.get(), town, Planes::all));
 }
 
-template <typename Scene>
-void expect_parity(const Scene& town, const RendererConfig& config) {
-  const Outputs host = draw("cpu", town, config), device = draw("cuda", town, config);
-  ASSERT_EQ(host.color.size(), device.color.size());
-  std::size_t within = 0, equal = 0;
-  double worst = 0;
-  for (std::size_t i = 0; i < host.color.size(); ++i) {
-    const double error = value_error(static_cast<double>(device.color[i]), static_cast<double>(host.color[i]));
-    within += error <= kKernelError;
-    equal += error == 0;
-    worst = std::max(worst, error);
-  }
-  const double count = static_cast<double>(host.color.size());
-  fmt::print("{} values: {:.6f} % equal, {:.6f} % within 1/255, worst {:.4f}/255\n", host.color.size(),
-             100 * static_cast<double>(equal) / count, 100 * static_cast<double>(within) / count, 255 * worst);
-  EXPECT_GE(static_cast<double>(within), kKernelShareWithin * count);
-  EXPECT_LE(worst, kKernelWorstError);
-  // Planes are of one surface or another at a pixel's centre: no rounding shows but at edges.
-  std::size_t differ = 0;
-  for (std::size_t i = 0; i < host.depth_m.size(); ++i) {
-    differ += host.class_id[i] != device.class_id[i] || host.instance_id[i] != device.instance_id[i] ||
-              !is_same_depth(static_cast<double>(device.depth_m[i]), static_cast<double>(host.depth_m[i]));
-  }
-  EXPECT_LE(static_cast<double>(differ), (1 - kKernelShareWithin) * static_cast<double>(host.depth_m.size()));
+void expect_parity_of_visibility(const SyntheticTown& town, const RendererConfig& config) {
+  const auto oracle = make_renderer("cpu", config), device = make_renderer("cuda", config);
+  test::expect_equal_visibility(device.get(), oracle.get(), town);
 }
 
 TEST_F(CudaRendererTest, TownsLookLikeTheOracle) { expect_parity(make_synthetic_town(1, 120), {.rig = paper_rig()}); }
@@ -81,24 +57,22 @@ TEST_F(CudaRendererTest, NothingIsCutOffInCrowdedImages) { expect_parity(make_cr
 TEST_F(CudaRendererTest, VisibilityAgrees) {
   SyntheticTown town = make_synthetic_town(4, 60);
   town.views.resize(3);
-  std::vector<VisibilityQuery> queries;
-  for (int32_t view = 0; view < 3; ++view) {
-    for (int32_t agent = 0; agent < 60; ++agent) queries.push_back({view, agent});
-  }
-  const RendererConfig config{.rig = paper_rig()};
-  const auto host = make_renderer("cpu", config), device = make_renderer("cuda", config);
-  host->upload(town.geometry);
-  device->upload(town.geometry);
-  std::vector<float> expected(queries.size()), actual(queries.size());
-  host->visibility(town.scene.batch(), town.views, queries, expected);
-  device->visibility(town.scene.batch(), town.views, queries, actual);
-  for (std::size_t i = 0; i < queries.size(); ++i) {
-    if (std::isnan(expected[i])) {
-      EXPECT_TRUE(std::isnan(actual[i])) << i;
-    } else {
-      EXPECT_EQ(actual[i], expected[i]) << i;  // sums are of whole units
-    }
-  }
+  expect_parity_of_visibility(town, {.rig = paper_rig()});
+}
+
+class CudaHardScenes : public CudaRendererTest, public testing::WithParamInterface<HardScene> {};
+INSTANTIATE_TEST_SUITE_P(All, CudaHardScenes, testing::ValuesIn(hard_scenes()),
+                         [](const auto& scene) { return scene.param.name; });
+TEST_P(CudaHardScenes, LookLikeTheOracle) { expect_parity(GetParam().town, {.rig = GetParam().rig}); }
+TEST_P(CudaHardScenes, AreSeenAsMuch) { expect_parity_of_visibility(GetParam().town, {.rig = GetParam().rig}); }
+
+// Their pictures are compared by golden_test, in bytes; here values and planes.
+class CudaGoldenScenes : public CudaRendererTest, public testing::WithParamInterface<std::string> {};
+INSTANTIATE_TEST_SUITE_P(All, CudaGoldenScenes, testing::ValuesIn(golden_names(".toml")),
+                         [](const auto& scene) { return scene.param; });
+TEST_P(CudaGoldenScenes, LookLikeTheOracle) {
+  const SceneFile scene = load_scene(scene_path(GetParam()));
+  expect_parity(SyntheticTown{scene.geometry, scene.scene, scene.views}, scene.config);
 }
 
 TEST_F(CudaRendererTest, FaultsOfTheDeviceAreThrownByTheNextCall) {

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <filesystem>
 #include <functional>
 
 #include <gmock/gmock.h>
@@ -16,28 +15,15 @@
 #include "pictura/common/file.h"
 #include "pictura/common/make_renderer.h"
 #include "pictura/tests/golden/golden_picture.h"
+#include "pictura/tests/golden/golden_scenes.h"
 
 namespace pictura {
 namespace {
-
-namespace fs = std::filesystem;
 
 struct Options {
   std::string backend = "cpu", out = "golden_failures";
   bool update = false;
 } options;
-
-std::string scene_path(const std::string& name) { return fmt::format("{}/{}.toml", PICTURA_GOLDEN_DIR, name); }
-std::string picture_path(const std::string& name) { return fmt::format("{}/{}.png", PICTURA_GOLDEN_DIR, name); }
-
-std::vector<std::string> names_of(const std::string& extension) {
-  std::vector<std::string> names;
-  for (const auto& entry : fs::directory_iterator(PICTURA_GOLDEN_DIR)) {
-    if (entry.path().extension() == extension) names.push_back(entry.path().stem().string());
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
 
 std::unique_ptr<Renderer> oracle_for(const SceneFile& scene) {
   RendererConfig config = scene.config;
@@ -102,7 +88,7 @@ void expect_within(const std::string& name, const SceneFile& scene, const Drawin
 }
 
 class Golden : public testing::TestWithParam<std::string> {};
-INSTANTIATE_TEST_SUITE_P(Scenes, Golden, testing::ValuesIn(names_of(".toml")),
+INSTANTIATE_TEST_SUITE_P(Scenes, Golden, testing::ValuesIn(golden_names(".toml")),
                          [](const auto& scene) { return scene.param; });
 
 TEST_P(Golden, LooksLikeItsPicture) {
@@ -131,7 +117,7 @@ TEST_P(Golden, LooksLikeTheTruth) {
   expect_within(GetParam() + "_truth", scene, actual, truth, truth_tolerance_of(GetParam()));
 }
 
-TEST(GoldenFolder, EveryPictureHasItsScene) { EXPECT_EQ(names_of(".png"), names_of(".toml")); }
+TEST(GoldenFolder, EveryPictureHasItsScene) { EXPECT_EQ(golden_names(".png"), golden_names(".toml")); }
 
 // Faults that a renderer could have, put into the scene that the oracle draws. Every tolerance must tell each of them
 // from the sound picture; a tolerance that does not is too wide to protect anything.

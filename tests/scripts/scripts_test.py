@@ -26,6 +26,33 @@ class Help(unittest.TestCase):
                 self.assertGreater(len(result.stdout.splitlines()), 1)
 
 
+class Profile(unittest.TestCase):
+    COLUMNS = ["ID", "Kernel Name", "Metric Name", "Metric Unit", "Metric Value"]
+
+    def profile(self, *arguments):
+        command = [sys.executable, str(SCRIPTS / "gpu_profile.py"), *map(str, arguments)]
+        return subprocess.run(command, capture_output=True, text=True, timeout=60)
+
+    def test_what_ncu_tells_becomes_rows(self):
+        with tempfile.TemporaryDirectory(prefix="pictura-test-") as folder:
+            table = pathlib.Path(folder) / "table.csv"
+            lines = [self.COLUMNS, ["0", "pictura_draw", "Executed Instructions", "inst", "1,234,567"],
+                     ["0", "pictura_draw", "Stack Size", "", "1,024"], ["1", "pictura_cull", "Duration", "us", "80.8"]]
+            table.write_text("==PROF== Connected\n" + "".join(",".join(f'"{word}"' for word in line) + "\n" for line in lines))
+            result = self.profile("--csv", table)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertEqual(json.loads(result.stdout)["results"], [
+                {"name": "pictura_draw, Executed Instructions", "value": 1234567.0, "unit": "inst"},
+                {"name": "pictura_cull, Duration", "value": 80.8, "unit": "us"}])
+            table.write_text("==ERROR== No kernels were profiled\n")
+            result = self.profile("--csv", table)
+            self.assertEqual((result.returncode, result.stdout), (1, ""))
+            self.assertIn("No kernels were profiled", result.stderr)
+
+    def test_a_command_or_a_table_is_expected(self):
+        self.assertEqual(self.profile().returncode, 2)
+
+
 class Record(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory(prefix="pictura-test-")

@@ -193,6 +193,64 @@ SyntheticTown make_bridge() {
   return bridge;
 }
 
+SyntheticTown make_hill() {
+  SyntheticTown hill;
+  auto road = [](float x, float y) { return Vec3{x, y, x < 10 ? 0.0f : 0.12f * (x - 10)}; };
+  for (const float y : {-3.5f, 0.0f, 3.5f}) {
+    add_polyline(&hill.geometry, {road(-20, y), road(10, y), road(40, y), road(80, y)}, 0.15f, StripKind::lane_mark);
+  }
+  for (const float y : {-7.0f, 7.0f}) {
+    add_polyline(&hill.geometry, {road(-20, y), road(10, y), road(40, y), road(80, y)}, 0.2f, StripKind::road_edge);
+  }
+  add_polyline(&hill.geometry, {road(30, -7), road(30, 0)}, 0.4f, StripKind::stop_line);
+  for (const float x : {44.0f, 48.0f}) {
+    add_polyline(&hill.geometry, {{x, -40, 9.5f}, {x, 40, 9.5f}}, 0.2f, StripKind::road_edge);
+  }
+  for (int i = 0; i < 5; ++i) {
+    WallFace wall;
+    wall.a_m = road(12 + 12 * static_cast<float>(i), 11);
+    wall.b_m = road(20 + 12 * static_cast<float>(i), 12);
+    wall.height_m = 6;
+    hill.geometry.walls.push_back(wall);
+  }
+  for (const float facing : {-1.0f, 1.0f}) {
+    LightHead head;
+    head.position_m = road(34, 8.5f * facing) + Vec3{0, 0, 5};
+    head.facing = {facing, 0};
+    head.signal = hill.geometry.num_signals++;
+    hill.geometry.heads.push_back(head);
+    hill.scene.light_states.push_back(LightState::red);
+  }
+  hill.geometry.build_grids();
+  for (int i = 0; i < 7; ++i) {
+    const float x = 7 + 9 * static_cast<float>(i), y = i % 2 ? 1.8f : -1.8f;
+    hill.scene.agents.push_back(
+        make_box(AgentClass::vehicle, road(x, y), 0.1f * static_cast<float>(i), {4.4f, 1.9f, 1.5f}));
+    hill.scene.agents.push_back(make_box(AgentClass::pedestrian, road(x + 3, 8.5f), 0, {0.6f, 0.6f, 1.75f}));
+    hill.scene.agents.push_back(make_box(AgentClass::cyclist, road(x + 2, -5.5f), 0, {1.8f, 0.6f, 1.7f}));
+  }
+  hill.scene.end_world(0);
+  hill.views = {make_view(road(-6, -1.8f), 0.05f), make_view(road(60, 0), kPi), make_view({46, -12, 9.5f}, 1.8f)};
+  return hill;
+}
+
+SyntheticTown make_crash() {
+  SyntheticTown crash;
+  crash.scene.agents = {make_box(AgentClass::vehicle, {11, 0.5f, 0}, 0.3f, {4.4f, 1.9f, 1.5f}),
+                        make_box(AgentClass::vehicle, {13, -0.6f, 0}, 1.4f, {4.6f, 2.0f, 1.7f}),
+                        make_box(AgentClass::cyclist, {8, 1.5f, 0}, 0.9f, {1.8f, 0.6f, 1.7f}),
+                        make_box(AgentClass::vehicle, {9, 2.2f, 0}, -0.4f, {4.4f, 1.9f, 1.5f})};
+  crash.scene.end_world(0);
+  WallFace wall;
+  wall.a_m = {10, 3, 0};
+  wall.b_m = {16, -9, 0};
+  wall.height_m = 3;
+  crash.geometry.walls.push_back(wall);
+  crash.geometry.build_grids();
+  crash.views = {make_view({}, 0), make_view({22, 5, 0}, 3.6f)};
+  return crash;
+}
+
 Rig simple_rig(int width_px, int height_px, float focal_px) {
   Camera camera;
   camera.name = "simple";
@@ -216,6 +274,28 @@ Rig mixed_rig() {
   rig.cameras[1] = paper_rig(1, 1).cameras[1];
   rig.cameras[2] = paper_rig(40, 130).cameras[2];
   return rig;
+}
+
+Rig eight_camera_rig() {
+  Rig eight;
+  const int widths[] = {96, 64, 33, 128, 17, 50, 80, 7}, heights[] = {54, 36, 71, 20, 90, 50, 31, 5};
+  for (int i = 0; i < 8; ++i) {
+    Camera camera = paper_rig(widths[i], heights[i]).cameras[static_cast<std::size_t>(i % 4)];
+    camera.name = std::to_string(i);
+    camera.pitch_rad = 0.05f * static_cast<float>(i - 4);
+    camera.roll_rad = 0.04f * static_cast<float>(4 - i);
+    eight.cameras.push_back(camera);
+  }
+  return eight;
+}
+
+std::vector<HardScene> hard_scenes() {
+  return {{"hill", make_hill(), paper_rig()},
+          {"hill_of_odd_size", make_hill(), paper_rig(97, 55)},
+          {"hill_in_one_pixel", make_hill(), paper_rig(1, 1)},
+          {"hill_by_eight_cameras", make_hill(), eight_camera_rig()},
+          {"bridge", make_bridge(), paper_rig()},
+          {"crash", make_crash(), paper_rig()}};
 }
 
 namespace {

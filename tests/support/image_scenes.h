@@ -2,6 +2,7 @@
 // walls and lights, drawn from a seed, with disjoint footprints.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "pictura/common/renderer.h"
@@ -37,6 +38,13 @@ SyntheticWorlds make_synthetic_worlds();
 /// bridge, and from above both.
 SyntheticTown make_bridge();
 
+/// A road that climbs by 12 %, with marks, a stop line, a bridge over it, walls along it, lights, and upright agents on
+/// it: seen up the hill, down from it, and across it from the bridge.
+SyntheticTown make_hill();
+
+/// Cars that have driven into others, in front of a wall that one of them has driven into; seen from both sides.
+SyntheticTown make_crash();
+
 /// One camera at the origin of the ego frame, 1.5 m up, looking ahead, with round numbers.
 Rig simple_rig(int width_px = 100, int height_px = 100, float focal_px = 50);
 
@@ -45,6 +53,17 @@ Rig front_rig(int width_px = 96, int height_px = 54);
 
 /// Four cameras of 97x55, 1x1 and 40x130 pixels.
 Rig mixed_rig();
+
+/// Eight cameras of eight sizes, pitched and rolled.
+Rig eight_camera_rig();
+
+/// Scenes that are easily drawn wrong, each with a rig: hills, bridges, solids that intersect, odd sizes, one pixel.
+struct HardScene {
+  std::string name;
+  SyntheticTown town;
+  Rig rig;
+};
+std::vector<HardScene> hard_scenes();
 
 /// All images of a batch, one camera after the other: colours as floats, and planes where they are wanted.
 struct Outputs {

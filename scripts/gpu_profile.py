@@ -1,0 +1,73 @@
+#!/usr/bin/env python3
+"""Prints what Nsight Compute tells of some launches of a command's kernels, as one JSON object.
+
+gpu_profile.py [--skip N] [--launches N] -- COMMAND...   runs COMMAND under ncu
+gpu_profile.py --csv FILE                                reads what ncu has printed: --csv --page details
+
+Launches are of kernels whose names begin with pictura_; N of them are profiled after the skipped ones. Profiled kernels
+run one after the other at ncu's clock, so durations are to be compared with each other, not with a bench's.
+Exit status: 0, or 1 with the reason where ncu is missing, fails or tells nothing.
+"""
+import argparse
+import csv
+import io
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+SECTIONS = ("SpeedOfLight ComputeWorkloadAnalysis MemoryWorkloadAnalysis SchedulerStats WarpStateStats InstructionStats "
+            "LaunchStats Occupancy").split()
+METRICS = ("Duration", "SM Frequency", "Executed Instructions", "Executed Ipc Active", "Issue Slots Busy",
+           "Avg. Active Threads Per Warp", "Warp Cycles Per Issued Instruction", "Mem Busy", "L1/TEX Hit Rate",
+           "L2 Hit Rate", "DRAM Throughput", "Registers Per Thread", "Achieved Occupancy")
+
+
+def rows_of(table):
+    """Rows as benches print them, one for each launch and metric."""
+    lines = [line for line in table.splitlines() if line.startswith('"')]
+    rows = []
+    for line in csv.DictReader(io.StringIO("\n".join(lines))):
+        if line["Metric Name"] in METRICS:
+            rows.append({"name": f"{line['Kernel Name']}, {line['Metric Name']}",
+                         "value": float(line["Metric Value"].replace(",", "")), "unit": line["Metric Unit"]})
+    return rows
+
+
+def profile(command, skip, launches):
+    with tempfile.TemporaryDirectory() as folder:
+        table = pathlib.Path(folder) / "table.csv"
+        ncu = ["ncu", "--csv", "--page", "details", "--log-file", str(table), "--kernel-name", "regex:^pictura_",
+               "--launch-skip", str(skip), "--launch-count", str(launches)]
+        for section in SECTIONS:
+            ncu += ["--section", section]
+        try:
+            run = subprocess.run(ncu + command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace")
+        except OSError as error:
+            sys.exit(f"error: gpu_profile: {error}")
+        text = table.read_text() if table.exists() else ""
+        if run.returncode != 0:
+            sys.exit(f"error: gpu_profile: exit status {run.returncode}\n{run.stdout}{text[-2000:]}")
+        return text
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--skip", type=int, default=0)
+    parser.add_argument("--launches", type=int, default=1)
+    parser.add_argument("--csv", type=pathlib.Path, metavar="FILE")
+    words = sys.argv[1:]
+    at = words.index("--") if "--" in words else len(words)
+    arguments, command = parser.parse_args(words[:at]), words[at + 1:]
+    if (arguments.csv is None) == (not command):
+        parser.error("expected a command after --, or --csv FILE")
+    text = arguments.csv.read_text() if arguments.csv else profile(command, arguments.skip, arguments.launches)
+    rows = rows_of(text)
+    if not rows:
+        sys.exit(f"error: gpu_profile: expected metrics of kernels, got '{text[:200]}'")
+    print(json.dumps({"workload": " ".join(command), "results": rows}))
+
+
+if __name__ == "__main__":
+    main()
