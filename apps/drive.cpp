@@ -15,20 +15,23 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
   command->add_option("--agents", options_out->agents, "Vehicles, cyclists and pedestrians in the world")
       ->check(CLI::Range(1, kMaxAgentsPerWorld))
       ->capture_default_str();
-  // What a command sets beforehand is its default; else who drives decides.
-  auto with_default = [](const char* what, auto preset, const char* else_default) {
-    return preset ? fmt::format("{}; default: {}", what, *preset)
-                  : fmt::format("{}; default: as the policy was trained, else {}", what, else_default);
+  // What a command sets beforehand is its default; else who drives decides, or the simulator.
+  const SimulatorConfig simulator;
+  auto with_default = [](const char* what, auto preset, auto simulators) {
+    return fmt::format("{}; default: {}{}", what, preset ? "" : "as the policy was trained, else ",
+                       preset.value_or(simulators));
   };
   command
       ->add_option("--pedestrians", options_out->pedestrian_fraction,
-                   with_default("Share of the agents", options_out->pedestrian_fraction, "0.1"))
+                   with_default("Share of the agents", options_out->pedestrian_fraction, simulator.pedestrian_fraction))
       ->check(finite_range(0, 1));
   command
       ->add_option("--cyclists", options_out->cyclist_fraction,
-                   with_default("Share of the agents", options_out->cyclist_fraction, "0.1"))
+                   with_default("Share of the agents", options_out->cyclist_fraction, simulator.cyclist_fraction))
       ->check(finite_range(0, 1));
-  command->add_option("--parked", options_out->parked_cars, with_default("Parked cars", options_out->parked_cars, "32"))
+  command
+      ->add_option("--parked", options_out->parked_cars,
+                   with_default("Parked cars", options_out->parked_cars, simulator.parked_cars))
       ->check(CLI::Range(0, kMaxAgentsPerWorld));
   command->add_option("--seed", options_out->seed, "Places, sizes, goals and actions")->capture_default_str();
   command->add_option("--threads", options_out->num_threads, "Host threads; 0: all")

@@ -17,8 +17,9 @@ import subprocess
 import sys
 import tempfile
 
-SECTIONS = ("SpeedOfLight ComputeWorkloadAnalysis MemoryWorkloadAnalysis SchedulerStats WarpStateStats InstructionStats "
-            "LaunchStats Occupancy").split()
+# Those that hold the metrics.
+SECTIONS = ("SpeedOfLight ComputeWorkloadAnalysis MemoryWorkloadAnalysis WarpStateStats InstructionStats LaunchStats "
+            "Occupancy").split()
 METRICS = ("Duration", "SM Frequency", "Executed Instructions", "Executed Ipc Active", "Issue Slots Busy",
            "Avg. Active Threads Per Warp", "Warp Cycles Per Issued Instruction", "Mem Busy", "L1/TEX Hit Rate",
            "L2 Hit Rate", "DRAM Throughput", "Registers Per Thread", "Achieved Occupancy")
@@ -48,7 +49,7 @@ def profile(command, skip, launches):
             sys.exit(f"error: gpu_profile: {error}")
         text = table.read_text() if table.exists() else ""
         if run.returncode != 0:
-            sys.exit(f"error: gpu_profile: exit status {run.returncode}\n{run.stdout}{text[-2000:]}")
+            sys.exit(f"error: gpu_profile: exit status {run.returncode}\n{run.stdout}{text}")
         return text
 
 
@@ -57,16 +58,15 @@ def main():
     parser.add_argument("--skip", type=int, default=0)
     parser.add_argument("--launches", type=int, default=1)
     parser.add_argument("--csv", type=pathlib.Path, metavar="FILE")
-    words = sys.argv[1:]
-    at = words.index("--") if "--" in words else len(words)
-    arguments, command = parser.parse_args(words[:at]), words[at + 1:]
-    if (arguments.csv is None) == (not command):
+    parser.add_argument("command", nargs="*")
+    arguments = parser.parse_args()
+    if (arguments.csv is None) == (not arguments.command):
         parser.error("expected a command after --, or --csv FILE")
-    text = arguments.csv.read_text() if arguments.csv else profile(command, arguments.skip, arguments.launches)
+    text = arguments.csv.read_text() if arguments.csv else profile(arguments.command, arguments.skip, arguments.launches)
     rows = rows_of(text)
     if not rows:
         sys.exit(f"error: gpu_profile: expected metrics of kernels, got '{text[:200]}'")
-    print(json.dumps({"workload": " ".join(command), "results": rows}))
+    print(json.dumps({"workload": " ".join(arguments.command), "results": rows}))
 
 
 if __name__ == "__main__":

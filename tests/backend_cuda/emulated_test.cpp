@@ -297,8 +297,6 @@ TEST(EmulatedKernels, DrawPlanesOfMoreRowsThanThereIsRoomFor) {
 TEST(EmulatedKernels, TellVisibility) {
   SyntheticTown town = make_synthetic_town(4, 30);
   town.views.resize(1);
-  town.scene.agents.resize(12);
-  town.scene.world_begin.back() = 12;
   const RendererConfig config = config_of(paper_rig(48, 27));
   EmulatedRenderer emulated(config, 5);
   test::expect_equal_visibility(&emulated, make_renderer("cpu", config).get(), town);

@@ -30,8 +30,8 @@ inline void expect_equal_visibility(Renderer* actual, Renderer* oracle, const Sy
   std::vector<float> told(queries.size()), expected(queries.size());
   actual->upload(town.geometry);
   oracle->upload(town.geometry);
-  actual->visibility(town.scene.batch(), town.views, queries, told, {});
-  oracle->visibility(town.scene.batch(), town.views, queries, expected, {});
+  actual->visibility(town.scene.batch(), town.views, queries, told);
+  oracle->visibility(town.scene.batch(), town.views, queries, expected);
   for (std::size_t i = 0; i < queries.size(); ++i) {
     if (std::isnan(expected[i])) {
       EXPECT_TRUE(std::isnan(told[i])) << i;
