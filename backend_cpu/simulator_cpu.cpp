@@ -151,7 +151,7 @@ class SimulatorCpu final : public Simulator {
         return may_spawn(world.map, box) && is_clear(world, box, 0, agent) &&
                is_clear(world, box, world.num_agents, world.num_boxes);
       });
-      put_agent(world, agent, chosen);
+      place_agent(world, agent, chosen);
       spawned += chosen >= 0;
     }
     batch_.spawned[index] = spawned;
@@ -181,12 +181,12 @@ class SimulatorCpu final : public Simulator {
     sort_into_cells(world, &batch_.box_cells[index]);
     for (int agent = 0; agent < world.num_agents; ++agent) find_collisions(world, agent);
 
-    std::array<SimulatorTotals, kTotalsLanes> lanes{};
-    const auto lane_of = [&lanes](int agent) { return &lanes[static_cast<size_t>(agent % kTotalsLanes)]; };
+    std::array<SimulatorTotals, kTotalsBins> bins{};
+    const auto bin_of = [&bins](int agent) { return &bins[static_cast<size_t>(agent % kTotalsBins)]; };
     int active = 0;
     for (int agent = 0; agent < world.num_agents; ++agent) {
-      const float step_m = settle_agent(world, agent, results);
-      count_agent(world, agent, results, step_m, lane_of(agent));
+      const float step_m = apply_reward_and_halt(world, agent, results);
+      count_agent(world, agent, results, step_m, bin_of(agent));
       active += is_active(world, agent);
     }
     for (int light = 0; light < static_cast<int>(world.map.stop_lines.size()); ++light) {
@@ -194,9 +194,9 @@ class SimulatorCpu final : public Simulator {
     }
     const bool ends = episode_ends(world.options, steps, batch_.spawned[index], active);
     batch_.episode_over[index] = ends;
-    for (int agent = 0; agent < world.num_agents; ++agent) finish_agent(world, agent, ends, results, lane_of(agent));
+    for (int agent = 0; agent < world.num_agents; ++agent) finish_agent(world, agent, ends, results, bin_of(agent));
     SimulatorTotals sum;
-    for (const SimulatorTotals& lane : lanes) sum.add(lane);
+    for (const SimulatorTotals& bin : bins) sum.add(bin);
     batch_.world_totals[index].add(sum);
   }
 

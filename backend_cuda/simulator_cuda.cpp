@@ -121,8 +121,8 @@ struct DeviceScratch {
   DeviceBuffer<int32_t> known_tries, chosen_try, next_try;
   DeviceBuffer<float> step_m;
   DeviceBuffer<uint8_t> began, prepares;
-  DeviceBuffer<int32_t> refused_slot;
-  MappedValue<int64_t> refusal;
+  DeviceBuffer<int32_t> rejected_slot;
+  MappedValue<int64_t> rejected_action;
 };
 
 /// The part of the state that an episode begins with, for the next one.
@@ -157,7 +157,7 @@ class SideStream {
       event->reset(made);
     }
   }
-  cuda::StepStreams beside(Stream stream) const {
+  cuda::StepStreams streams_from(Stream stream) const {
     return {static_cast<cudaStream_t>(stream.handle), side_.get(), forked_.get(), joined_.get()};
   }
 
@@ -206,7 +206,7 @@ class SimulatorCuda final : public Simulator {
   void reset(Stream stream) override {
     device_.check_current("simulator cuda");
     throw_refused();
-    cuda::launch_reset(arrays(), side_.beside(stream));
+    cuda::launch_reset(arrays(), side_.streams_from(stream));
     PICTURA_CUDA(cudaGetLastError());
   }
 
@@ -215,7 +215,7 @@ class SimulatorCuda final : public Simulator {
     throw_refused();
     PICTURA_CHECK(actions.size() == static_cast<size_t>(num_slots()), "step: expected {} actions, got {}", num_slots(),
                   actions.size());
-    cuda::launch_step(arrays(), actions.data(), side_.beside(stream));
+    cuda::launch_step(arrays(), actions.data(), side_.streams_from(stream));
     PICTURA_CUDA(cudaGetLastError());
     return {results_.reward.span(), results_.terminated.span(), results_.truncated.span(), results_.valid.span(),
             agents_.refusal.span()};
@@ -263,7 +263,7 @@ class SimulatorCuda final : public Simulator {
     WorldBatch::visit_state(*batch_, state_, [](auto& host, auto& device) { device.copy_from_host(host.data()); });
     upload_worlds();
     results_.clear();
-    cuda::launch_restored(arrays(), side_.beside({}));
+    cuda::launch_restored(arrays(), side_.streams_from({}));
     PICTURA_CUDA(cudaGetLastError());
     synchronize();
   }
@@ -286,26 +286,26 @@ class SimulatorCuda final : public Simulator {
   }
 
   void throw_refused() {
-    const int64_t refusal = *scratch_.refusal.host();
-    if (refusal < 0) return;
-    *scratch_.refusal.host() = -1;
-    fail("step: in an earlier call: slot {}: expected an action in [0, {}), got {}", refusal >> 32, kNumActions,
-         static_cast<int32_t>(refusal));
+    const int64_t rejected_action = *scratch_.rejected_action.host();
+    if (rejected_action < 0) return;
+    *scratch_.rejected_action.host() = -1;
+    fail("step: in an earlier call: slot {}: expected an action in [0, {}), got {}", rejected_action >> 32, kNumActions,
+         static_cast<int32_t>(rejected_action));
   }
 
   void allocate_scratch() {
     const size_t num_worlds = batch_->worlds.size(), num_boxes = batch_->boxes.size();
     std::vector<int32_t> world_of_slot;
     std::vector<int32_t> cell_begin;
-    int32_t most_boxes = 0;
+    int32_t max_boxes = 0;
     for (size_t w = 0; w < num_worlds; ++w) {
       world_of_slot.insert(world_of_slot.end(), static_cast<size_t>(batch_->worlds[w].num_agents),
                            static_cast<int32_t>(w));
       const int32_t boxes = batch_->box_begin[w + 1] - batch_->box_begin[w];
       cell_begin.insert(cell_begin.end(), {0, boxes});
-      most_boxes = std::max(most_boxes, boxes);
+      max_boxes = std::max(max_boxes, boxes);
     }
-    std::vector<int32_t> cell_items(static_cast<size_t>(most_boxes));
+    std::vector<int32_t> cell_items(static_cast<size_t>(max_boxes));
     std::iota(cell_items.begin(), cell_items.end(), 0);
     scratch_.world_of_slot = device_copy(world_of_slot);
     scratch_.options = DeviceBuffer<RuleOptions>(Span<const RuleOptions>(&batch_->options, 1));
@@ -323,8 +323,8 @@ class SimulatorCuda final : public Simulator {
     scratch_.step_m = DeviceBuffer<float>(world_of_slot.size());
     scratch_.began = DeviceBuffer<uint8_t>(num_worlds);
     scratch_.prepares = DeviceBuffer<uint8_t>(num_worlds);
-    scratch_.refused_slot = DeviceBuffer<int32_t>(1);
-    *scratch_.refusal.host() = -1;
+    scratch_.rejected_slot = DeviceBuffer<int32_t>(1);
+    *scratch_.rejected_action.host() = -1;
   }
 
   /// The worlds as the rules see them, at the episodes that the host's state is in, over device memory.
@@ -383,8 +383,8 @@ class SimulatorCuda final : public Simulator {
     arrays.began = scratch_.began.data();
     arrays.prepares = scratch_.prepares.data();
     arrays.next_spawned = next_.spawned.data();
-    arrays.refused_slot = scratch_.refused_slot.data();
-    arrays.refusal = scratch_.refusal.device();
+    arrays.rejected_slot = scratch_.rejected_slot.data();
+    arrays.rejected_action = scratch_.rejected_action.device();
     return arrays;
   }
 

@@ -7,8 +7,9 @@
 namespace pictura::cuda {
 namespace {
 
-constexpr int kThreads = 128;                         // per block
-constexpr int kTeamThreads = kTurn * kLanesPerAgent;  // a world's start is one long chain of work: as wide as its loops
+constexpr int kThreads = 128;  // per block
+constexpr int kTeamThreads =
+    kTurn * kThreadsPerAgent;  // a world's start is one long chain of work: as wide as its loops
 
 struct DeviceAtomics {
   /// Returns the value before.
@@ -48,7 +49,7 @@ class NearestOfWarp {
 
 /// A group of a warp's lanes, beside other groups.
 template <int kGroup>
-struct DeviceLanes {
+struct DeviceThreadGroup {
   static constexpr int kSize = kGroup;
   template <int capacity>
   using Nearest = NearestOfWarp<capacity>;
@@ -56,7 +57,7 @@ struct DeviceLanes {
 
   __device__ static constexpr int size() { return kSize; }
   __device__ int rank() const { return static_cast<int>(threadIdx.x) % kSize; }
-  __device__ void wait() const { __syncwarp(mask()); }
+  __device__ void sync() const { __syncwarp(mask()); }
   __device__ bool any(bool value) const { return __any_sync(mask(), value); }
   __device__ uint32_t ballot(bool value) const { return __ballot_sync(mask(), value) >> first(); }
   __device__ int count_before(uint32_t lanes) const { return __popc(lanes & ((1u << rank()) - 1u)); }
@@ -90,7 +91,7 @@ struct DeviceLanes {
     memcpy(&result, words, sizeof(T));
     return result;
   }
-  /// Room for ShowAgent::kStaging floats.
+  /// Room for WriteObservation::kStaging floats.
   __device__ float* staging() const { return rows; }
   /// Writes the first `filled` of staging(), then zeros up to `end` or a little beyond, but not beyond `capacity`.
   __device__ void write(const float* values, int filled, int end, int capacity, float* out) const {
@@ -122,11 +123,11 @@ struct DeviceTeam : DeviceAtomics {
     for (int i = static_cast<int>(threadIdx.x); i < count; i += kTeamThreads) body(i);
     __syncthreads();
   }
-  /// body(lanes, i) likewise.
+  /// body(group, i) likewise.
   template <int kGroup, typename Body>
-  __device__ void for_each_by_lanes(int count, const Body& body) const {
+  __device__ void for_each_by_groups(int count, const Body& body) const {
     for (int i = static_cast<int>(threadIdx.x) / kGroup; i < count; i += kTeamThreads / kGroup) {
-      body(DeviceLanes<kGroup>{}, i);
+      body(DeviceThreadGroup<kGroup>{}, i);
     }
     __syncthreads();
   }
@@ -139,23 +140,24 @@ __global__ void __launch_bounds__(kThreads) run_threads(int32_t count, Phase pha
 }
 
 // Blocks that fit a processor at once: fewer registers than the compiler would take hide more of the waiting.
-constexpr int kLanesBlocks = 5, kShowBlocks = 16;
+constexpr int kGroupBlocks = 5, kObserveBlocks = 16;
 
 template <int kGroup, typename Phase>
-__global__ void __launch_bounds__(kThreads, kLanesBlocks) run_lanes(int32_t count, Phase phase) {
+__global__ void __launch_bounds__(kThreads, kGroupBlocks) run_groups(int32_t count, Phase phase) {
   const int64_t item = (int64_t{blockIdx.x} * kThreads + threadIdx.x) / kGroup;
-  if (item < count) phase(DeviceLanes<kGroup>{}, static_cast<int32_t>(item));
+  if (item < count) phase(DeviceThreadGroup<kGroup>{}, static_cast<int32_t>(item));
 }
 
 /// Lanes with memory of their own. Small blocks, since the last of its warps holds a block's place.
-constexpr int kShowThreads = 64;
-__global__ void __launch_bounds__(kShowThreads, kShowBlocks) run_show(int32_t count, ShowAgent phase) {
-  __shared__ float4 staging[kShowThreads / kWarp][ShowAgent::kStaging / 4];
-  static_assert(ShowAgent::kStaging % 4 == 0);
-  const int64_t item = (int64_t{blockIdx.x} * kShowThreads + threadIdx.x) / kWarp;
-  DeviceLanes<kWarp> lanes;
-  lanes.rows = reinterpret_cast<float*>(staging[threadIdx.x / kWarp]);
-  if (item < count) phase(lanes, static_cast<int32_t>(item));
+constexpr int kObserveThreads = 64;
+__global__ void __launch_bounds__(kObserveThreads, kObserveBlocks)
+    run_write_observation(int32_t count, WriteObservation phase) {
+  __shared__ float4 staging[kObserveThreads / kWarp][WriteObservation::kStaging / 4];
+  static_assert(WriteObservation::kStaging % 4 == 0);
+  const int64_t item = (int64_t{blockIdx.x} * kObserveThreads + threadIdx.x) / kWarp;
+  DeviceThreadGroup<kWarp> group;
+  group.rows = reinterpret_cast<float*>(staging[threadIdx.x / kWarp]);
+  if (item < count) phase(group, static_cast<int32_t>(item));
 }
 
 template <typename Phase>
@@ -184,12 +186,13 @@ struct DeviceLaunch {
     run_threads<<<blocks_for(count), kThreads, 0, streams.main>>>(count, phase);
   }
   template <int kGroup, typename Phase>
-  void lanes(int32_t count, const Phase& phase) const {
-    if constexpr (std::is_same_v<Phase, ShowAgent>) {
+  void groups(int32_t count, const Phase& phase) const {
+    if constexpr (std::is_same_v<Phase, WriteObservation>) {
       static_assert(kGroup == kWarp);
-      run_show<<<blocks_for(int64_t{count} * kGroup, kShowThreads), kShowThreads, 0, streams.main>>>(count, phase);
+      run_write_observation<<<blocks_for(int64_t{count} * kGroup, kObserveThreads), kObserveThreads, 0, streams.main>>>(
+          count, phase);
     } else {
-      run_lanes<kGroup><<<blocks_for(int64_t{count} * kGroup), kThreads, 0, streams.main>>>(count, phase);
+      run_groups<kGroup><<<blocks_for(int64_t{count} * kGroup), kThreads, 0, streams.main>>>(count, phase);
     }
   }
   template <typename Phase>
@@ -200,14 +203,14 @@ struct DeviceLaunch {
   }
   /// Both at once: what `aside` starts on the launch that it is given, beside what `here` starts on this one. What
   /// follows waits for both.
-  template <typename Aside, typename Here>
-  void beside(const Aside& aside, const Here& here) const {
+  template <typename Side, typename Main>
+  void fork_join(const Side& side, const Main& main) const {
     cudaEventRecord(streams.forked, streams.main);
     cudaStreamWaitEvent(streams.side, streams.forked, 0);
     DeviceLaunch launch = *this;
     launch.streams.main = streams.side;
-    aside(launch);
-    here();
+    side(launch);
+    main();
     cudaEventRecord(streams.joined, streams.side);
     cudaStreamWaitEvent(streams.main, streams.joined, 0);
   }

@@ -1,7 +1,7 @@
 // The CUDA executor's step as phases over agents and worlds, each of which reads only what an earlier one has finished.
 // They say what every thread does and not how threads are started, so that a host can run them too, in any order:
 //   threads  one thread per item: phase(atomics, item)
-//   lanes    lanes in lockstep (simulator/rules/lanes.h), a group of them per item: phase(lanes, item)
+//   lanes    lanes in lockstep (simulator/rules/thread_group.h), a group of them per item: phase(group, item)
 //   teams    threads that wait for each other, one team per world: phase(team, world)
 // simulator_cuda_kernel.cu starts them on a device; tests/simulator/shuffled_executor.h on a host.
 #pragma once
@@ -13,7 +13,7 @@
 namespace pictura::cuda {
 
 /// How many lanes share an agent: about as many as there are lane segments, barriers and boxes to look at.
-constexpr int kLanesPerAgent = 8, kWarp = 32;
+constexpr int kThreadsPerAgent = 8, kWarp = 32;
 /// How many boxes of a world look for a place at once.
 constexpr int kTurn = 128;
 
@@ -30,7 +30,7 @@ struct WorldScratch {
 constexpr int32_t kNoSlot = 0x7F7F7F7F;
 
 /// An action that a step refused, in one word that the host reads whole: slot and action, or -1 for none.
-PICTURA_HD constexpr int64_t refusal(int32_t slot, int32_t action) {
+PICTURA_HD constexpr int64_t rejected_action(int32_t slot, int32_t action) {
   return (static_cast<int64_t>(slot) << 32) | static_cast<uint32_t>(action);
 }
 
@@ -55,12 +55,12 @@ struct SimulatorArrays {
   ObservationView observations;
   uint8_t entity_sets = 0;
   // Between phases and steps.
-  float* step_m = nullptr;          // [num_slots] driven in the present step
-  uint8_t* began = nullptr;         // [num_worlds] an episode began in the last step: the one after it is to be made
-  uint8_t* prepares = nullptr;      // [num_worlds] it is made in the present step
-  int32_t* next_spawned = nullptr;  // [num_worlds] in the next episode
-  int32_t* refused_slot = nullptr;  // the lowest one with an action out of range, or kNoSlot
-  int64_t* refusal = nullptr;       // the first since the host looked, or -1
+  float* step_m = nullptr;             // [num_slots] driven in the present step
+  uint8_t* began = nullptr;            // [num_worlds] an episode began in the last step: the one after it is to be made
+  uint8_t* prepares = nullptr;         // [num_worlds] it is made in the present step
+  int32_t* next_spawned = nullptr;     // [num_worlds] in the next episode
+  int32_t* rejected_slot = nullptr;    // the lowest one with an action out of range, or kNoSlot
+  int64_t* rejected_action = nullptr;  // the first since the host looked, or -1
 
   PICTURA_HD WorldView world(int w) const {
     WorldView world = worlds[w];
@@ -72,7 +72,7 @@ struct SimulatorArrays {
     world.agents = next_agents;
     return world;
   }
-  PICTURA_HD bool is_refused() const { return *refused_slot != kNoSlot; }
+  PICTURA_HD bool has_rejected_action() const { return *rejected_slot != kNoSlot; }
 };
 
 /// A world's boxes as one cell: with a warp to look at them, all are looked at sooner than they are sorted.
@@ -97,7 +97,7 @@ struct TeamMemory {
 /// team has groups for choose at once, given what the others chose last, until nobody changes: then everybody's choice
 /// agrees with the choices before it, which only the sequential result does. Every round settles at least the lowest
 /// one that changed. Those of an earlier turn stand.
-///   box_of_try(i, try), permits(lanes, i, try, box)
+///   box_of_try(i, try), permits(group, i, try, box)
 template <typename Team, typename BoxOfTry, typename Permits>
 PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const WorldScratch& scratch, int first_box,
                              int count, const BoxOfTry& box_of_try, const Permits& permits) {
@@ -118,27 +118,27 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
     chosen_try[i] = -1;
   });
   // Whether the map, and what stands, leave a try free.
-  const auto look_at = [&](const auto& lanes, int turn_begin, int i, int t) {
+  const auto look_at = [&](const auto& group, int turn_begin, int i, int t) {
     const AgentBox box = box_of_try(i, t);
-    const bool is_free = permits(lanes, i, t, box) && is_clear(world, box, first_box, first_box + turn_begin, lanes);
-    if (is_free && lanes.rank() == 0) try_boxes[i * kSpawnTries + t] = box;
+    const bool is_free = permits(group, i, t, box) && is_clear(world, box, first_box, first_box + turn_begin, group);
+    if (is_free && group.rank() == 0) try_boxes[i * kSpawnTries + t] = box;
     return is_free;
   };
   // Looks at a box's tries until one is free of what stands and of what the boxes of this turn chose.
-  const auto choose = [&](const auto& lanes, int turn_begin, int i) {
+  const auto choose = [&](const auto& group, int turn_begin, int i) {
     uint32_t free = free_tries[i];
     int known = known_tries[i], chosen = -1;
     for (int t = 0; t < kSpawnTries && chosen < 0; ++t) {
       if (t == known) {
         ++known;
-        if (look_at(lanes, turn_begin, i, t)) free |= 1u << t;
-        lanes.wait();
+        if (look_at(group, turn_begin, i, t)) free |= 1u << t;
+        group.sync();
       }
       const AgentBox& box = try_boxes[i * kSpawnTries + t];
-      if ((free >> t & 1u) && is_clear(world, box, first_box + turn_begin, first_box + i, lanes)) chosen = t;
+      if ((free >> t & 1u) && is_clear(world, box, first_box + turn_begin, first_box + i, group)) chosen = t;
     }
-    lanes.wait();
-    if (lanes.rank() > 0) return;
+    group.sync();
+    if (group.rank() > 0) return;
     free_tries[i] = free;
     known_tries[i] = known;
     next_try[i] = chosen;
@@ -148,17 +148,17 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
     if (settled >= turn_begin + kTurn) {
       turn_begin = settled;
       const int num_tries = min_of(kTurn, count - turn_begin) * first_tries;
-      team.template for_each_by_lanes<kLanesPerAgent>(num_tries, [&](const auto& lanes, int k) {
+      team.template for_each_by_groups<kThreadsPerAgent>(num_tries, [&](const auto& group, int k) {
         const int i = turn_begin + k / first_tries, t = k % first_tries;
-        const bool is_free = look_at(lanes, turn_begin, i, t);
-        if (lanes.rank() == 0 && is_free) team.set_bits(&free_tries[i], 1u << t);
-        if (lanes.rank() == 0 && t == 0) known_tries[i] = first_tries;
+        const bool is_free = look_at(group, turn_begin, i, t);
+        if (group.rank() == 0 && is_free) team.set_bits(&free_tries[i], 1u << t);
+        if (group.rank() == 0 && t == 0) known_tries[i] = first_tries;
       });
     }
     const int unsettled = min_of(turn_begin + kTurn, count) - settled;
     team.for_each(1, [&](int) { lowest_changed = settled + unsettled; });
-    team.template for_each_by_lanes<kLanesPerAgent>(
-        unsettled, [&](const auto& lanes, int k) { choose(lanes, turn_begin, settled + k); });
+    team.template for_each_by_groups<kThreadsPerAgent>(
+        unsettled, [&](const auto& group, int k) { choose(group, turn_begin, settled + k); });
     const int changed = lowest_changed;
     team.for_each(unsettled, [&](int k) {
       const int i = settled + k;
@@ -182,23 +182,23 @@ PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const Wo
     return parked_box(world, car, world.map.parking_spots.empty() ? ParkingSpot{} : parking_spot(world, car, i));
   };
   choose_tries(team, world, scratch, world.num_agents, num_parked, parked_at,
-               [&](const auto& lanes, int car, int i, const AgentBox& box) {
+               [&](const auto& group, int car, int i, const AgentBox& box) {
                  return !world.map.parking_spots.empty() &&
-                        may_park(world.map, box, parking_spot(world, car, i), lanes);
+                        may_park(world.map, box, parking_spot(world, car, i), group);
                });
   team.for_each(num_parked, [&](int car) { put_parked_car(world, car, scratch.chosen_try[world.num_agents + car]); });
   const auto agent_at = [&](int agent, int i) {
     return has_places(world, agent) ? spawn_box(world, agent, i) : AgentBox{};
   };
   choose_tries(team, world, scratch, 0, world.num_agents, agent_at,
-               [&](const auto& lanes, int agent, int, const AgentBox& box) {
-                 return has_places(world, agent) && may_spawn(world.map, box, lanes) &&
-                        is_clear(world, box, world.num_agents, world.num_boxes, lanes);
+               [&](const auto& group, int agent, int, const AgentBox& box) {
+                 return has_places(world, agent) && may_spawn(world.map, box, group) &&
+                        is_clear(world, box, world.num_agents, world.num_boxes, group);
                });
   team.for_each(1, [&](int) { *spawned_out = 0; });
-  team.template for_each_by_lanes<kLanesPerAgent>(world.num_agents, [&](const auto& lanes, int agent) {
-    put_agent(world, agent, scratch.chosen_try[agent], lanes);
-    if (lanes.rank() == 0 && scratch.chosen_try[agent] >= 0) team.add(spawned_out, 1);
+  team.template for_each_by_groups<kThreadsPerAgent>(world.num_agents, [&](const auto& group, int agent) {
+    place_agent(world, agent, scratch.chosen_try[agent], group);
+    if (group.rank() == 0 && scratch.chosen_try[agent] >= 0) team.add(spawned_out, 1);
   });
 }
 
@@ -221,10 +221,10 @@ struct BeginFirstEpisode {
 /// Says where the boxes of a world stand.
 struct PlaceCenters {
   SimulatorArrays arrays;
-  template <typename Lanes>
-  PICTURA_HD void operator()(const Lanes& lanes, int w) const {
+  template <typename ThreadGroup>
+  PICTURA_HD void operator()(const ThreadGroup& group, int w) const {
     const WorldView world = arrays.world(w);
-    for (int i = lanes.rank(); i < world.num_boxes; i += lanes.size()) {
+    for (int i = group.rank(); i < world.num_boxes; i += group.size()) {
       world.cell_centers[i] = center_of(world.boxes[i]);
     }
   }
@@ -250,7 +250,7 @@ struct CheckActions {
     const WorldView world = arrays.world(arrays.world_of_slot[slot]);
     if (slot == world.first_slot) arrays.began[world.index] = 0;  // arrays.prepares says it now
     if (arrays.episode_over[world.index] || is_sound_action(world, slot - world.first_slot, actions[slot])) return;
-    atomics.lower(arrays.refused_slot, slot);
+    atomics.lower(arrays.rejected_slot, slot);
   }
 };
 
@@ -258,37 +258,37 @@ struct CheckActions {
 struct Advance {
   SimulatorArrays arrays;
   const int32_t* actions;
-  template <typename Lanes>
-  PICTURA_HD void operator()(const Lanes& lanes, int slot) const {
-    if (arrays.is_refused()) return;
+  template <typename ThreadGroup>
+  PICTURA_HD void operator()(const ThreadGroup& group, int slot) const {
+    if (arrays.has_rejected_action()) return;
     const int w = arrays.world_of_slot[slot];
     const WorldView world = arrays.world(w);
     const int agent = slot - world.first_slot;
     if (!arrays.episode_over[w]) {
       const bool drives = is_active(world, agent);
-      if (lanes.rank() == 0) arrays.results.valid[slot] = drives;
-      advance(world, agent, actions[slot], lanes);
-    } else if (lanes.rank() == 0) {
+      if (group.rank() == 0) arrays.results.valid[slot] = drives;
+      advance(world, agent, actions[slot], group);
+    } else if (group.rank() == 0) {
       const WorldView next = arrays.next_world(w);
       clear_result(arrays.results, slot);
       copy_fields(next.agents, world.agents, slot);
       world.boxes[agent] = world.boxes_before[agent] = next.boxes[agent];
     }
-    if (lanes.rank() == 0) world.cell_centers[agent] = center_of(world.boxes[agent]);
+    if (group.rank() == 0) world.cell_centers[agent] = center_of(world.boxes[agent]);
   }
 };
 
 /// Collisions, reward and halt of an agent.
-struct Settle {
+struct ApplyRewardAndHalt {
   SimulatorArrays arrays;
-  template <typename Lanes>
-  PICTURA_HD void operator()(const Lanes& lanes, int slot) const {
+  template <typename ThreadGroup>
+  PICTURA_HD void operator()(const ThreadGroup& group, int slot) const {
     const int w = arrays.world_of_slot[slot];
-    if (arrays.is_refused() || arrays.episode_over[w]) return;
+    if (arrays.has_rejected_action() || arrays.episode_over[w]) return;
     const WorldView world = arrays.world(w);
     const int agent = slot - world.first_slot;
-    find_collisions(world, agent, lanes);
-    if (lanes.rank() == 0) arrays.step_m[slot] = settle_agent(world, agent, arrays.results);
+    find_collisions(world, agent, group);
+    if (group.rank() == 0) arrays.step_m[slot] = apply_reward_and_halt(world, agent, arrays.results);
   }
 };
 
@@ -297,19 +297,19 @@ struct Settle {
 struct FinishStep {
   SimulatorArrays arrays;
   const int32_t* actions;
-  template <typename Lanes>
-  PICTURA_HD void operator()(const Lanes& lanes, int w) const {
-    if (arrays.is_refused()) return refuse(lanes, w);
+  template <typename ThreadGroup>
+  PICTURA_HD void operator()(const ThreadGroup& group, int w) const {
+    if (arrays.has_rejected_action()) return refuse(group, w);
     const bool begins = arrays.episode_over[w] != 0;
     SimulatorTotals totals;
     bool ends = false;
     if (begins) {
-      take_next(lanes, w);
+      take_next(group, w);
     } else {
-      ends = count(lanes, w, &totals);
+      ends = count(group, w, &totals);
     }
-    lanes.wait();
-    if (lanes.rank() > 0) return;
+    group.sync();
+    if (group.rank() > 0) return;
     totals.slot_steps = arrays.worlds[w].num_agents;
     totals.episodes = begins;
     arrays.world_totals[w].add(totals);
@@ -324,36 +324,36 @@ struct FinishStep {
   }
 
  private:
-  template <typename Lanes>
-  PICTURA_HD void refuse(const Lanes& lanes, int w) const {
-    if (w > 0 || lanes.rank() > 0 || *arrays.refusal >= 0) return;
-    *arrays.refusal = refusal(*arrays.refused_slot, actions[*arrays.refused_slot]);
+  template <typename ThreadGroup>
+  PICTURA_HD void refuse(const ThreadGroup& group, int w) const {
+    if (w > 0 || group.rank() > 0 || *arrays.rejected_action >= 0) return;
+    *arrays.rejected_action = rejected_action(*arrays.rejected_slot, actions[*arrays.rejected_slot]);
   }
 
   /// What belongs to no agent.
-  template <typename Lanes>
-  PICTURA_HD void take_next(const Lanes& lanes, int w) const {
+  template <typename ThreadGroup>
+  PICTURA_HD void take_next(const ThreadGroup& group, int w) const {
     const WorldView world = arrays.world(w), next = arrays.next_world(w);
-    for (int i = world.num_agents + lanes.rank(); i < world.num_boxes; i += lanes.size()) {
+    for (int i = world.num_agents + group.rank(); i < world.num_boxes; i += group.size()) {
       world.boxes[i] = world.boxes_before[i] = next.boxes[i];
       world.cell_centers[i] = center_of(next.boxes[i]);
     }
-    for (int i = lanes.rank(); i < static_cast<int>(world.map.stop_lines.size()); i += lanes.size()) {
+    for (int i = group.rank(); i < static_cast<int>(world.map.stop_lines.size()); i += group.size()) {
       world.light_plans[i] = next.light_plans[i];
       world.lights[i] = next.lights[i];
     }
   }
 
   /// Returns whether the episode is over.
-  template <typename Lanes>
-  PICTURA_HD bool count(const Lanes& lanes, int w, SimulatorTotals* totals_out) const {
+  template <typename ThreadGroup>
+  PICTURA_HD bool count(const ThreadGroup& group, int w, SimulatorTotals* totals_out) const {
     const WorldView world = arrays.world(w);
     const int steps = arrays.episode_step[w] + 1;
-    constexpr int kParts = kTotalsLanes / Lanes::kSize;  // of the totals' lanes, that one of these sums up
+    constexpr int kParts = kTotalsBins / ThreadGroup::kSize;  // of the totals' lanes, that one of these sums up
     SimulatorTotals parts[kParts];
     const auto for_each_agent = [&](const auto& body) {
       for (int part = 0; part < kParts; ++part) {
-        for (int agent = part * Lanes::kSize + lanes.rank(); agent < world.num_agents; agent += kTotalsLanes) {
+        for (int agent = part * ThreadGroup::kSize + group.rank(); agent < world.num_agents; agent += kTotalsBins) {
           body(agent, &parts[part]);
         }
       }
@@ -363,94 +363,94 @@ struct FinishStep {
       count_agent(world, agent, arrays.results, arrays.step_m[world.first_slot + agent], part);
       active += is_active(world, agent);
     });
-    const bool ends = episode_ends(world.options, steps, arrays.spawned[w], lanes.sum(active));
+    const bool ends = episode_ends(world.options, steps, arrays.spawned[w], group.sum(active));
     for_each_agent([&](int agent, SimulatorTotals* part) { finish_agent(world, agent, ends, arrays.results, part); });
-    add_up(lanes, parts, totals_out);
-    for (int i = lanes.rank(); i < static_cast<int>(world.map.stop_lines.size()); i += lanes.size()) {
+    add_up(group, parts, totals_out);
+    for (int i = group.rank(); i < static_cast<int>(world.map.stop_lines.size()); i += group.size()) {
       world.lights[i] = light_state(world.light_plans[i], steps);
     }
     return ends;
   }
 
   /// Counts in any order; the rest in that of the totals' lanes, see simulator/totals.h.
-  template <typename Lanes, int kParts>
-  PICTURA_HD static void add_up(const Lanes& lanes, SimulatorTotals (&parts)[kParts], SimulatorTotals* sum_out) {
+  template <typename ThreadGroup, int kParts>
+  PICTURA_HD static void add_up(const ThreadGroup& group, SimulatorTotals (&parts)[kParts], SimulatorTotals* sum_out) {
     for (SimulatorTotals& part : parts) {
-      SimulatorTotals::visit_counts(*sum_out, part, [&lanes](int64_t& sum, int64_t count) {
-        sum += lanes.sum(static_cast<int>(count));  // at most a world's agents
+      SimulatorTotals::visit_counts(*sum_out, part, [&group](int64_t& sum, int64_t count) {
+        sum += group.sum(static_cast<int>(count));  // at most a world's agents
       });
     }
-    for (int lane = 0; lane < kTotalsLanes; ++lane) {
-      SimulatorTotals::visit_sums(*sum_out, parts[lane / Lanes::kSize], [&lanes, lane](double& sum, double value) {
-        sum += lanes.from(lane % Lanes::kSize, value);
-      });
+    for (int lane = 0; lane < kTotalsBins; ++lane) {
+      SimulatorTotals::visit_sums(
+          *sum_out, parts[lane / ThreadGroup::kSize],
+          [&group, lane](double& sum, double value) { sum += group.from(lane % ThreadGroup::kSize, value); });
     }
   }
 };
 
 /// Writes a slot's view and observation.
-struct ShowAgent {
+struct WriteObservation {
   SimulatorArrays arrays;
   /// Floats that the rows of any set need.
   static constexpr int kStaging = max_of(max_of(max_of(kMaxLanes, kMaxBoundaries), kMaxWalls) * kLaneFeatures,
                                          max_of(kMaxPartners* kPartnerFeatures, kMaxControls* kControlFeatures));
 
-  template <typename Lanes>
-  PICTURA_HD void operator()(const Lanes& lanes, int slot) const {
+  template <typename ThreadGroup>
+  PICTURA_HD void operator()(const ThreadGroup& group, int slot) const {
     const WorldView world = arrays.world(arrays.world_of_slot[slot]);
     const int agent = slot - world.first_slot;
-    observe_own(world, agent, arrays.observations, lanes);
-    if (lanes.rank() == lanes.size() - 1) arrays.views[slot] = view_of(world, agent);
+    observe_own(world, agent, arrays.observations, group);
+    if (group.rank() == group.size() - 1) arrays.views[slot] = view_of(world, agent);
     const int num_sets = arrays.entity_sets ? num_observed_sets(arrays.observations) : 0;
-    for (int set = 0; set < num_sets; ++set) show_set(lanes, world, agent, static_cast<EntitySet>(set));
+    for (int set = 0; set < num_sets; ++set) write_set(group, world, agent, static_cast<EntitySet>(set));
   }
 
  private:
   /// The rows are put together in the lanes' own memory, so that they are written whole and in order.
-  template <typename Lanes>
-  PICTURA_HD void show_set(const Lanes& lanes, const WorldView& world, int agent, EntitySet set) const {
+  template <typename ThreadGroup>
+  PICTURA_HD void write_set(const ThreadGroup& group, const WorldView& world, int agent, EntitySet set) const {
     const int slot = world.first_slot + agent;
     const SetRows out = set_rows(arrays.observations, slot, set);
-    float* rows = lanes.staging();
+    float* rows = group.staging();
     int count = 0;
     if (observes(world, agent)) {
       const EgoFrame frame = ego_frame(world.agents, slot);
       if (set == EntitySet::partners) {
-        count = observe_partners(world, agent, frame, rows, lanes);
+        count = observe_partners(world, agent, frame, rows, group);
       } else if (set == EntitySet::controls) {
-        count = observe_controls(world, slot, frame, rows, lanes);
+        count = observe_controls(world, slot, frame, rows, group);
       } else {
-        count = gather_pieces(lanes, pieces_near(world, slot, set), frame, out.capacity, rows);
+        count = collect_pieces(group, pieces_near(world, slot, set), frame, out.capacity, rows);
       }
     }
     const int end = max_of(count, *out.count);
-    lanes.wait();
-    lanes.write(rows, count * out.features, end * out.features, out.capacity * out.features, out.rows);
-    if (lanes.rank() == 0) *out.count = count;
-    lanes.wait();
+    group.sync();
+    group.write(rows, count * out.features, end * out.features, out.capacity * out.features, out.rows);
+    if (group.rank() == 0) *out.count = count;
+    group.sync();
   }
 
   /// observe_pieces() by several pieces a lane at a time, whose loads are under way together.
-  template <typename Lanes>
-  PICTURA_HD static int gather_pieces(const Lanes& lanes, const PieceList& near, const EgoFrame& frame, int capacity,
-                                      float* rows) {
+  template <typename ThreadGroup>
+  PICTURA_HD static int collect_pieces(const ThreadGroup& group, const PieceList& near, const EgoFrame& frame,
+                                       int capacity, float* rows) {
     constexpr int kAtOnce = 2;
     const int num_items = static_cast<int>(near.items.size());
     int count = 0;
-    for (int first = lanes.rank(); first - lanes.rank() < num_items && count < capacity;
-         first += kAtOnce * lanes.size()) {
+    for (int first = group.rank(); first - group.rank() < num_items && count < capacity;
+         first += kAtOnce * group.size()) {
       ObservedPiece pieces[kAtOnce];
       for (int k = 0; k < kAtOnce; ++k) {
-        const int i = min_of(first + k * lanes.size(), num_items - 1);
-        pieces[k] = lanes.read(near.pieces[static_cast<size_t>(near.items[static_cast<size_t>(i)])]);
+        const int i = min_of(first + k * group.size(), num_items - 1);
+        pieces[k] = group.read(near.pieces[static_cast<size_t>(near.items[static_cast<size_t>(i)])]);
       }
       for (int k = 0; k < kAtOnce; ++k) {
         float row[kLaneFeatures];
-        const bool in_sight = observe_piece(pieces[k], frame, row) && first + k * lanes.size() < num_items;
-        const uint32_t seen = lanes.ballot(in_sight);
-        const int at = count + lanes.count_before(seen);
+        const bool in_sight = observe_piece(pieces[k], frame, row) && first + k * group.size() < num_items;
+        const uint32_t seen = group.ballot(in_sight);
+        const int at = count + group.count_before(seen);
         for (int f = 0; f < kLaneFeatures && in_sight && at < capacity; ++f) rows[at * kLaneFeatures + f] = row[f];
-        count = min_of(capacity, count + count_bits(seen));
+        count = min_of(capacity, count + popcount(seen));
       }
     }
     return count;
@@ -458,16 +458,16 @@ struct ShowAgent {
 };
 
 template <typename Launch>
-void launch_show(const Launch& launch, const SimulatorArrays& arrays) {
-  launch.template lanes<kWarp>(arrays.num_slots, ShowAgent{arrays});
+void launch_write_observations(const Launch& launch, const SimulatorArrays& arrays) {
+  launch.template groups<kWarp>(arrays.num_slots, WriteObservation{arrays});
 }
 
 /// Episode 0 of every world.
 template <typename Launch>
 void launch_reset(const Launch& launch, const SimulatorArrays& arrays) {
   launch.teams(arrays.num_worlds, BeginFirstEpisode{arrays});
-  launch.template lanes<kWarp>(arrays.num_worlds, PlaceCenters{arrays});
-  launch_show(launch, arrays);
+  launch.template groups<kWarp>(arrays.num_worlds, PlaceCenters{arrays});
+  launch_write_observations(launch, arrays);
 }
 
 /// Shows a state that was put there.
@@ -476,22 +476,22 @@ void launch_restored(const Launch& launch, const SimulatorArrays& arrays) {
   launch.fill(arrays.began, static_cast<size_t>(arrays.num_worlds), 0);
   launch.fill(arrays.prepares, static_cast<size_t>(arrays.num_worlds), 1);
   launch.teams(arrays.num_worlds, PrepareEpisode{arrays});
-  launch.template lanes<kWarp>(arrays.num_worlds, PlaceCenters{arrays});
-  launch_show(launch, arrays);
+  launch.template groups<kWarp>(arrays.num_worlds, PlaceCenters{arrays});
+  launch_write_observations(launch, arrays);
 }
 
 template <typename Launch>
 void launch_step(const Launch& launch, const SimulatorArrays& arrays, const int32_t* actions) {
   launch.copy(arrays.prepares, arrays.began, static_cast<size_t>(arrays.num_worlds));
-  launch.beside([&](const Launch& aside) { aside.teams(arrays.num_worlds, PrepareEpisode{arrays}); },
-                [&] {
-                  launch.fill(arrays.refused_slot, sizeof(int32_t), kNoSlot & 0xFF);
-                  launch.threads(arrays.num_slots, CheckActions{arrays, actions});
-                  launch.template lanes<kLanesPerAgent>(arrays.num_slots, Advance{arrays, actions});
-                  launch.template lanes<kLanesPerAgent>(arrays.num_slots, Settle{arrays});
-                  launch.template lanes<kWarp>(arrays.num_worlds, FinishStep{arrays, actions});
-                  launch_show(launch, arrays);
-                });
+  launch.fork_join([&](const Launch& side) { side.teams(arrays.num_worlds, PrepareEpisode{arrays}); },
+                   [&] {
+                     launch.fill(arrays.rejected_slot, sizeof(int32_t), kNoSlot & 0xFF);
+                     launch.threads(arrays.num_slots, CheckActions{arrays, actions});
+                     launch.template groups<kThreadsPerAgent>(arrays.num_slots, Advance{arrays, actions});
+                     launch.template groups<kThreadsPerAgent>(arrays.num_slots, ApplyRewardAndHalt{arrays});
+                     launch.template groups<kWarp>(arrays.num_worlds, FinishStep{arrays, actions});
+                     launch_write_observations(launch, arrays);
+                   });
 }
 
 }  // namespace pictura::cuda

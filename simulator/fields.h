@@ -11,7 +11,7 @@ namespace pictura {
 enum class AgentStatus : uint8_t { active, halted, parked, absent };
 
 /// Why an agent found no place at the start of its episode.
-enum class Refusal : uint8_t {
+enum class SpawnFailure : uint8_t {
   none,
   no_place,  // the map has nowhere to stand for its class
   taken,     // all places that it tried were taken, or too near to something
@@ -69,7 +69,7 @@ constexpr int kNumWaypoints = 3;
   X(conditioning, float, 17, 0, "reward coefficients and dynamics multipliers; see simulator/conditioning.h")    \
   X(agent_class, uint8_t, 1, 0, "AgentClass")                                                                    \
   X(status, uint8_t, 1, 3, "AgentStatus")                                                                        \
-  X(refusal, uint8_t, 1, 0, "Refusal, of an absent agent")                                                       \
+  X(refusal, uint8_t, 1, 0, "SpawnFailure, of an absent agent")                                                  \
   X(halt_reason, uint8_t, 1, 0, "Event bits that halted it")                                                     \
   X(events, uint8_t, 1, 0, "Event bits of the last step")                                                        \
   X(goals_reached, int32_t, 1, 0, "last waypoints passed within 2 m in this episode")                            \

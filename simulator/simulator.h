@@ -67,13 +67,13 @@ struct StepResult {
   Span<const uint8_t> terminated;  // [slots] 1: an infraction ended the agent's episode in this step
   Span<const uint8_t> truncated;   // [slots] 1: the episode ended for another reason; bootstrap
   Span<const uint8_t> valid;       // [slots] 1: the agent was active when the step began: learn from it
-  Span<const uint8_t> refusal;     // [slots] Refusal: why the agent is absent from this episode, 0 where it is not
+  Span<const uint8_t> refusal;     // [slots] SpawnFailure: why the agent is absent from this episode, 0 where it is not
 };
 
 /// What became of the agents that were asked for, over all worlds, in their current episodes.
 struct SpawnReport {
   int64_t asked = 0, spawned = 0, refused = 0;      // asked == spawned + refused
-  int64_t refused_no_place = 0, refused_taken = 0;  // the reasons: Refusal of each absent agent
+  int64_t refused_no_place = 0, refused_taken = 0;  // the reasons: SpawnFailure of each absent agent
   int64_t parked_asked = 0, parked_placed = 0;
 };
 

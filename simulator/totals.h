@@ -1,12 +1,12 @@
 // What a simulator counts. Sums of floating-point numbers have one order on every executor: agent i of a world adds to
-// lane i mod kTotalsLanes, and the lanes are added up in order.
+// lane i mod kTotalsBins, and the lanes are added up in order.
 #pragma once
 
 #include "pictura/common/hd.h"
 
 namespace pictura {
 
-constexpr int kTotalsLanes = 32;
+constexpr int kTotalsBins = 32;
 
 /// Totals since construction; counts are of controlled agents.
 struct SimulatorTotals {

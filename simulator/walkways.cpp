@@ -79,7 +79,7 @@ void drop_edges_on_road(const MapView& roads, Network* out) {
 
 /// The way over a crosswalk: the middle line of the least rectangle about its outline, along its longer side.
 void add_middle_line(Span<const Vec3> outline, Vec3* a_out, Vec3* b_out) {
-  float least_area = INFINITY;
+  float min_area = INFINITY;
   for (size_t i = 0; i < outline.size(); ++i) {
     const Vec2 side = (outline[(i + 1) % outline.size()] - outline[i]).xy();
     const float side_m = length(side);
@@ -94,8 +94,8 @@ void add_middle_line(Span<const Vec3> outline, Vec3* a_out, Vec3* b_out) {
       z += corner.z / static_cast<float>(outline.size());
     }
     const Vec2 size = high - low, middle = (low + high) * 0.5f;
-    if (size.x * size.y >= least_area) continue;
-    least_area = size.x * size.y;
+    if (size.x * size.y >= min_area) continue;
+    min_area = size.x * size.y;
     const Vec2 half = size.x >= size.y ? Vec2{0.5f * size.x, 0.0f} : Vec2{0.0f, 0.5f * size.y};
     const auto place = [&](Vec2 p) {
       const Vec2 xy = along * p.x + across * p.y;

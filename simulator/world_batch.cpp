@@ -97,7 +97,7 @@ RuleOptions rule_options(const SimulatorConfig& config) {
 }
 
 /// Of one world; without room for cells and boxes yet.
-CellLists box_grid(const WorldMap& map) {
+CellLists box_grid(const MapRules& map) {
   CellLists cells;
   cells.origin_m = map.low_m;
   cells.cell_m = kBoxCell_m;
@@ -107,10 +107,10 @@ CellLists box_grid(const WorldMap& map) {
 }
 
 /// Throws UsageError when the worlds' box cells would take more than a gigabyte: each world has its own.
-void check_box_cells(const std::vector<WorldMap>& world_maps, const std::vector<WorldSpec>& worlds) {
+void check_box_cells(const std::vector<MapRules>& map_rules, const std::vector<WorldSpec>& worlds) {
   constexpr int64_t kMaxCells = int64_t{1} << 28;
   std::vector<int64_t> cells_of_map;
-  for (const WorldMap& map : world_maps) {
+  for (const MapRules& map : map_rules) {
     const CellLists grid = box_grid(map);
     cells_of_map.push_back(int64_t{grid.num_x} * grid.num_y + 1);
   }
@@ -122,7 +122,7 @@ void check_box_cells(const std::vector<WorldMap>& world_maps, const std::vector<
   }
 }
 
-CellLists empty_box_cells(const WorldMap& map, size_t num_boxes) {
+CellLists empty_box_cells(const MapRules& map, size_t num_boxes) {
   CellLists cells = box_grid(map);
   cells.begin.assign(static_cast<size_t>(cells.num_x) * static_cast<size_t>(cells.num_y) + 1, 0);
   cells.items.assign(num_boxes, 0);
@@ -223,7 +223,7 @@ void check_restored(const WorldBatch& batch) {
     PICTURA_CHECK(is_sound, "simulator state: agent {}: {}: {} is out of range", slot, field, value);
   };
   for (size_t w = 0; w < batch.worlds.size(); ++w) {
-    const WorldMap& map = batch.world_maps[static_cast<size_t>(batch.worlds[w].map)];
+    const MapRules& map = batch.map_rules[static_cast<size_t>(batch.worlds[w].map)];
     const std::vector<MapLane>& lanes = map.lanes;
     const auto num_walk_pieces = static_cast<int32_t>(map.walkways.pieces.size());
     const auto is_lane = [&lanes](int32_t lane) {
@@ -288,22 +288,22 @@ WorldBatch::WorldBatch(const SimulatorConfig& config_in, std::vector<std::shared
   check(config);
   check(config, maps, worlds);
   options = rule_options(config);
-  world_maps.resize(maps.size());
+  map_rules.resize(maps.size());
   parallel_for(config.num_threads, static_cast<int64_t>(maps.size()), [this](int64_t index) {
     const RoadMap& map = *maps[static_cast<size_t>(index)];
-    WorldMap& world_map = world_maps[static_cast<size_t>(index)];
+    MapRules& world_map = map_rules[static_cast<size_t>(index)];
     const MapGeometryOptions geometry_options{.walls = config.walls, .wall_seed = config.wall_seed};
     const std::vector<WallFace> walls = config.walls ? make_walls(map, geometry_options) : std::vector<WallFace>{};
-    world_map = make_world_map(map, walls, config.observes(ObservationPart::walls));
+    world_map = make_map_rules(map, walls, config.observes(ObservationPart::walls));
     PICTURA_CHECK(!world_map.spawn_lanes.empty(),
                   "map {}: expected a lane outside junctions from which a route goes on for ever, got none", map.name);
   });
 
-  for (const WorldMap& map : world_maps) map_views.push_back(map.view());
-  check_box_cells(world_maps, worlds);
+  for (const MapRules& map : map_rules) map_views.push_back(map.view());
+  check_box_cells(map_rules, worlds);
   slot_begin = box_begin = light_begin = {0};
   for (const WorldSpec& world : worlds) {
-    const WorldMap& map = world_maps[static_cast<size_t>(world.map)];
+    const MapRules& map = map_rules[static_cast<size_t>(world.map)];
     const int num_boxes = world.num_agents + config.parked_cars;
     slot_begin.push_back(slot_begin.back() + world.num_agents);
     box_begin.push_back(box_begin.back() + num_boxes);
@@ -359,11 +359,11 @@ SpawnReport WorldBatch::spawn_report() const {
   SpawnReport report;
   report.asked = num_slots();
   report.spawned = std::accumulate(spawned.begin(), spawned.end(), int64_t{0});
-  const auto refused_for = [this](Refusal reason) {
+  const auto refused_for = [this](SpawnFailure reason) {
     return std::count(agents.refusal.begin(), agents.refusal.end(), static_cast<uint8_t>(reason));
   };
-  report.refused_no_place = refused_for(Refusal::no_place);
-  report.refused_taken = refused_for(Refusal::taken);
+  report.refused_no_place = refused_for(SpawnFailure::no_place);
+  report.refused_taken = refused_for(SpawnFailure::taken);
   report.refused = report.refused_no_place + report.refused_taken;
   report.parked_asked = int64_t{num_worlds()} * config.parked_cars;
   for (size_t w = 0; w < worlds.size(); ++w) {

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "pictura/simulator/agent_state.h"
+#include "pictura/simulator/map_rules.h"
 #include "pictura/simulator/rules/episode.h"
 #include "pictura/simulator/simulator.h"
-#include "pictura/simulator/world_map.h"
 
 namespace pictura {
 
@@ -41,8 +41,8 @@ struct WorldBatch {
   std::vector<std::shared_ptr<const RoadMap>> maps;
   std::vector<WorldSpec> worlds;
   RuleOptions options;
-  std::vector<WorldMap> world_maps;                         // [maps]
-  std::vector<MapView> map_views;                           // [maps] of world_maps
+  std::vector<MapRules> map_rules;                          // [maps]
+  std::vector<MapView> map_views;                           // [maps] of map_rules
   std::vector<int32_t> slot_begin, box_begin, light_begin;  // [worlds + 1]
 
   // State. box_cells and cell_centers are made anew by every step and are not saved.

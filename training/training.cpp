@@ -50,7 +50,7 @@ Observation allocate_rollout(const Observer& observer, const Config& config) {
 }
 
 // What happened in one rollout: differences of the simulator's totals.
-struct Happened {
+struct TotalsDelta {
   int64_t agent_steps = 0, slot_steps = 0, goals = 0, waypoints = 0, finished = 0;
   int64_t collisions = 0, at_fault = 0, off_road = 0, red_light = 0, wall_contacts = 0;
   double distance_m = 0, finished_return = 0, reward = 0;
@@ -172,7 +172,7 @@ class Trainer {
 
     while (update_ < config_.train.updates && !report.interrupted) {
       const std::vector<uint8_t> boundary = simulator_->save();
-      Happened happened;
+      TotalsDelta happened;
       happened.add(simulator_->totals(), -1);
       const double rate = cosine_rate(config_.train.learning_rate, update_, config_.train.schedule_updates);
       const double render_before_s = observer_.render_s();
@@ -297,7 +297,7 @@ class Trainer {
     return static_cast<double>(goals) / km;
   }
 
-  Scalars scalars_of(const TrainProgress& progress, const Happened& h, const UpdateStats& stats, double rate,
+  Scalars scalars_of(const TrainProgress& progress, const TotalsDelta& h, const UpdateStats& stats, double rate,
                      const PhaseTimes& times) const {
     const auto steps = static_cast<double>(h.agent_steps);
     const double km = h.distance_m / 1000;

@@ -4,8 +4,8 @@
 
 #include "pictura/common/math.h"
 #include "pictura/common/scene_types.h"
-#include "pictura/simulator/rules/lanes.h"
 #include "pictura/simulator/rules/map_view.h"
+#include "pictura/simulator/rules/thread_group.h"
 
 namespace pictura {
 
@@ -62,10 +62,10 @@ PICTURA_HD inline bool collide(const AgentBox& a_from, const AgentBox& a_to, con
   const Vec2 apart = (b_to.center_m - a_to.center_m).xy();
   if (dot(apart, apart) > square(radius(a_to) + radius(b_to) + approach) || !same_level(a_to, b_to)) return false;
   if (overlap(footprint(a_to), footprint(b_to))) return true;
-  constexpr int kMaxLooks = 16;
-  const int looks = clamp(static_cast<int>(approach / (0.5f * min_of(a_to.width_m, b_to.width_m))), 0, kMaxLooks);
-  for (int i = 1; i <= looks; ++i) {
-    const float fraction = static_cast<float>(i) / static_cast<float>(looks + 1);
+  constexpr int kMaxSubsteps = 16;
+  const int substeps = clamp(static_cast<int>(approach / (0.5f * min_of(a_to.width_m, b_to.width_m))), 0, kMaxSubsteps);
+  for (int i = 1; i <= substeps; ++i) {
+    const float fraction = static_cast<float>(i) / static_cast<float>(substeps + 1);
     if (overlap(between(a_from, a_to, fraction), between(b_from, b_to, fraction))) return true;
   }
   return false;
@@ -111,21 +111,21 @@ PICTURA_HD inline bool touches(const OrientedBox& box, Vec2 a_m, Vec2 b_m) {
 
 /// Whether the box touches any barrier on its level. Boxes are longer than a step's way, so that consecutive ones
 /// overlap and no barrier is passed unnoticed.
-template <typename Lanes = OneLane>
+template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool touches_any(const OrientedBox& box, float z_m, Span<const Barrier> barriers, const GridView& cells,
-                            const Lanes& lanes = {}) {
+                            const ThreadGroup& group = {}) {
   const float reach = box.half_length_m + box.half_width_m;
   const Span<const int32_t> items = items_at(cells, box.center_m);
   bool found = false;
-  for (size_t i = static_cast<size_t>(lanes.rank()); i < items.size() && !found;
-       i += static_cast<size_t>(lanes.size())) {
+  for (size_t i = static_cast<size_t>(group.rank()); i < items.size() && !found;
+       i += static_cast<size_t>(group.size())) {
     const Barrier& barrier = barriers[static_cast<size_t>(items[i])];
     const Vec2 to_middle = (barrier.a_m + barrier.b_m) * 0.5f - box.center_m;
     const Vec2 half = (barrier.b_m - barrier.a_m) * 0.5f;
     if (fabsf(to_middle.x) > fabsf(half.x) + reach || fabsf(to_middle.y) > fabsf(half.y) + reach) continue;
     found = fabsf(barrier.z_m - z_m) < kLevel_m && touches(box, barrier.a_m, barrier.b_m);
   }
-  return lanes.any(found);
+  return group.any(found);
 }
 
 }  // namespace pictura

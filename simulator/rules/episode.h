@@ -43,10 +43,10 @@ PICTURA_HD inline void count_events(int events, SimulatorTotals* totals_inout) {
 }
 
 /// Settles one agent (phase 3) and writes its reward and end. Returns how far it drove in the step, in metres.
-PICTURA_HD inline float settle_agent(const WorldView& world, int agent, const StepArrays& results) {
+PICTURA_HD inline float apply_reward_and_halt(const WorldView& world, int agent, const StepArrays& results) {
   const int slot = world.first_slot + agent;
   const float step_m = driven_m(world.agents.speed_mps[slot], world.options.dt_s);
-  results.reward[slot] = settle(world, agent);
+  results.reward[slot] = apply_reward_and_halt(world, agent);
   results.terminated[slot] = results.valid[slot] && !is_active(world, agent);
   return step_m;
 }

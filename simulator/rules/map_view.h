@@ -1,4 +1,4 @@
-// What rules read of a map: flat arrays and cell lists that both devices can hold. simulator/world_map.h makes them
+// What rules read of a map: flat arrays and cell lists that both devices can hold. simulator/map_rules.h makes them
 // from a RoadMap. Cell lists come in two kinds: `*_cells` list, for a point's one cell, everything within reach of any
 // point in it; `near_*` list what may be observed from it, nearest to the cell's centre first.
 #pragma once

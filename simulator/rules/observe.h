@@ -52,9 +52,9 @@ PICTURA_HD inline void observe_ego(const WorldView& world, int slot, float* out)
 
 /// Scaled by the paper's training ranges, whatever the run's own are, so that a policy reads the same number for the
 /// same coefficient everywhere; fixed coefficients read 0.
-template <typename Lanes = OneLane>
-PICTURA_HD void observe_conditioning(const WorldView& world, int slot, float* out, const Lanes& lanes = {}) {
-  for (int i = lanes.rank(); i < kNumConditioning; i += lanes.size()) {
+template <typename ThreadGroup = SingleThread>
+PICTURA_HD void observe_conditioning(const WorldView& world, int slot, float* out, const ThreadGroup& group = {}) {
+  for (int i = group.rank(); i < kNumConditioning; i += group.size()) {
     const ConditioningRange range = world.options.conditioning_scale[i];
     const float value = world.agents.conditioning[slot * kNumConditioning + i];
     out[i] = range.high > range.low ? clamp(2.0f * (value - range.low) / (range.high - range.low) - 1.0f, -1.0f, 1.0f)
@@ -63,10 +63,10 @@ PICTURA_HD void observe_conditioning(const WorldView& world, int slot, float* ou
 }
 
 /// The active waypoint first, then those after it; where the chain has no more, its last one again.
-template <typename Lanes = OneLane>
+template <typename ThreadGroup = SingleThread>
 PICTURA_HD void observe_waypoints(const WorldView& world, int slot, const EgoFrame& frame, float* out,
-                                  const Lanes& lanes = {}) {
-  for (int i = lanes.rank(); i < kNumWaypoints; i += lanes.size()) {
+                                  const ThreadGroup& group = {}) {
+  for (int i = group.rank(); i < kNumWaypoints; i += group.size()) {
     const int index = min_of(world.agents.next_waypoint[slot] + i, kNumWaypoints - 1);
     const Vec3 local = frame.to_local(waypoint_of(world.agents, slot, index));
     out[kWaypointFeatures * i] = local.x * per(kScalePosition_m);
@@ -77,9 +77,9 @@ PICTURA_HD void observe_waypoints(const WorldView& world, int slot, const EgoFra
 
 /// The partners of `agent` by distance from its reference point to their box centres: from the near cells where enough
 /// stand there, else from all that are in range.
-template <typename Lanes>
-PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin, const Lanes& lanes) {
-  using Nearest = typename Lanes::template Nearest<kMaxPartners>;
+template <typename ThreadGroup>
+PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin, const ThreadGroup& group) {
+  using Nearest = typename ThreadGroup::template Nearest<kMaxPartners>;
   const GridView& cells = world.box_cells;
   for (float reach = cells.cell_m;; reach = kPartnerRange_m) {
     const CellRange range = cells_around(cells, origin, reach);
@@ -90,19 +90,19 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
     Nearest nearest;
     for (int y = range.y0; y <= range.y1; ++y) {
       const int32_t begin = range.begin(cells, y), end = range.end(cells, y);
-      constexpr int kAtOnce = Lanes::kSize > 1 ? 4 : 1;  // whose loads are under way together
-      for (int32_t first = begin + lanes.rank(); first - lanes.rank() < end; first += kAtOnce * lanes.size()) {
+      constexpr int kAtOnce = ThreadGroup::kSize > 1 ? 4 : 1;  // whose loads are under way together
+      for (int32_t first = begin + group.rank(); first - group.rank() < end; first += kAtOnce * group.size()) {
         int32_t others[kAtOnce];
         Vec2 centers[kAtOnce];
         for (int k = 0; k < kAtOnce; ++k) {
-          const int32_t i = min_of(first + k * lanes.size(), end - 1);
+          const int32_t i = min_of(first + k * group.size(), end - 1);
           others[k] = cells.items[static_cast<size_t>(i)];
           centers[k] = world.cell_centers[i];
         }
         for (int k = 0; k < kAtOnce; ++k) {
           const Vec2 apart = centers[k] - origin;
           const float d2 = dot(apart, apart);
-          const bool is_one = first + k * lanes.size() < end && others[k] != agent && d2 < square(kPartnerRange_m);
+          const bool is_one = first + k * group.size() < end && others[k] != agent && d2 < square(kPartnerRange_m);
           nearest.offer(is_one, d2, others[k]);
         }
       }
@@ -111,12 +111,12 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
   }
 }
 
-template <typename Lanes = OneLane>
+template <typename ThreadGroup = SingleThread>
 PICTURA_HD int observe_partners(const WorldView& world, int agent, const EgoFrame& frame, float* rows,
-                                const Lanes& lanes = {}) {
-  const auto nearest = nearest_partners(world, agent, frame.origin_m.xy(), lanes);
+                                const ThreadGroup& group = {}) {
+  const auto nearest = nearest_partners(world, agent, frame.origin_m.xy(), group);
   const int count = nearest.count();
-  for (int i = lanes.rank(); i < count; i += lanes.size()) {
+  for (int i = group.rank(); i < count; i += group.size()) {
     float* out = rows + i * kPartnerFeatures;
     const int other = nearest.item(i);
     const AgentBox& box = world.boxes[other];
@@ -173,14 +173,14 @@ PICTURA_HD constexpr float light_code(LightState state) {
 }
 
 /// The nearest stop lines: left and right end, height, state, and whether it holds the ego's lane.
-template <typename Lanes = OneLane>
+template <typename ThreadGroup = SingleThread>
 PICTURA_HD int observe_controls(const WorldView& world, int slot, const EgoFrame& frame, float* rows,
-                                const Lanes& lanes = {}) {
+                                const ThreadGroup& group = {}) {
   const Span<const int32_t> items = items_at(world.map.near_stop_lines, frame.origin_m.xy());
   const int num_items = static_cast<int>(items.size());
-  typename Lanes::template Nearest<kMaxControls> nearest;
-  for (int first = 0; first < num_items; first += lanes.size()) {
-    const int i = first + lanes.rank();
+  typename ThreadGroup::template Nearest<kMaxControls> nearest;
+  for (int first = 0; first < num_items; first += group.size()) {
+    const int i = first + group.rank();
     const int32_t light = items[static_cast<size_t>(min_of(i, num_items - 1))];
     const Vec2 apart = world.map.stop_lines[static_cast<size_t>(light)].middle_m.xy() - frame.origin_m.xy();
     const float d2 = dot(apart, apart);
@@ -189,7 +189,7 @@ PICTURA_HD int observe_controls(const WorldView& world, int slot, const EgoFrame
   const int32_t lane = world.agents.lane[slot];
   const int32_t own_light = lane < 0 ? -1 : world.map.lanes[static_cast<size_t>(lane)].light;
   const int count = nearest.count();
-  for (int i = lanes.rank(); i < count; i += lanes.size()) {
+  for (int i = group.rank(); i < count; i += group.size()) {
     float* out = rows + i * kControlFeatures;
     const int32_t light = nearest.item(i);
     const StopLine& line = world.map.stop_lines[static_cast<size_t>(light)];
@@ -219,22 +219,23 @@ PICTURA_HD inline bool observes(const WorldView& world, int agent) {
 }
 
 /// What is no set: all zeros for the absent and for those that halted in an earlier step.
-template <typename Lanes = OneLane>
-PICTURA_HD void observe_own(const WorldView& world, int agent, const ObservationView& out, const Lanes& lanes = {}) {
+template <typename ThreadGroup = SingleThread>
+PICTURA_HD void observe_own(const WorldView& world, int agent, const ObservationView& out,
+                            const ThreadGroup& group = {}) {
   const int slot = world.first_slot + agent;
   const size_t row = static_cast<size_t>(slot);
   float* ego = out.ego.data() + row * kEgoFeatures;
   float* conditioning = out.conditioning.data() + row * kNumConditioning;
   float* waypoints = out.waypoints.data() + row * kNumWaypoints * kWaypointFeatures;
   if (observes(world, agent)) {
-    if (lanes.rank() == 0) observe_ego(world, slot, ego);
-    observe_conditioning(world, slot, conditioning, lanes);
-    observe_waypoints(world, slot, ego_frame(world.agents, slot), waypoints, lanes);
+    if (group.rank() == 0) observe_ego(world, slot, ego);
+    observe_conditioning(world, slot, conditioning, group);
+    observe_waypoints(world, slot, ego_frame(world.agents, slot), waypoints, group);
     return;
   }
-  for (int i = lanes.rank(); i < kEgoFeatures; i += lanes.size()) ego[i] = 0.0f;
-  for (int i = lanes.rank(); i < kNumConditioning; i += lanes.size()) conditioning[i] = 0.0f;
-  for (int i = lanes.rank(); i < kNumWaypoints * kWaypointFeatures; i += lanes.size()) waypoints[i] = 0.0f;
+  for (int i = group.rank(); i < kEgoFeatures; i += group.size()) ego[i] = 0.0f;
+  for (int i = group.rank(); i < kNumConditioning; i += group.size()) conditioning[i] = 0.0f;
+  for (int i = group.rank(); i < kNumWaypoints * kWaypointFeatures; i += group.size()) waypoints[i] = 0.0f;
 }
 
 /// How many sets are written: all, or all but the walls.

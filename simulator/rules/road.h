@@ -3,8 +3,8 @@
 #pragma once
 
 #include "pictura/map/speed_limit.h"
-#include "pictura/simulator/rules/lanes.h"
 #include "pictura/simulator/rules/map_view.h"
+#include "pictura/simulator/rules/thread_group.h"
 
 namespace pictura {
 
@@ -39,9 +39,9 @@ PICTURA_HD inline Foot foot_on(const LaneSegment& segment, Vec2 p) {
 /// (0.3 per half turn), with 0.05 against leaving current_lane (-1: none), so that an agent between two lanes keeps its
 /// own. z_m is the agent's present height: only lanes on its level count. Nothing within kLaneReach_m: no lane, and
 /// z_m stays.
-template <typename Lanes = OneLane>
+template <typename ThreadGroup = SingleThread>
 PICTURA_HD LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float heading_rad, int32_t current_lane,
-                            const Lanes& lanes = {}) {
+                            const ThreadGroup& group = {}) {
   constexpr float kDistanceWeight = 0.7f / 4.0f;
   constexpr float kAngleWeight = 0.3f / kPi;
   constexpr float kHysteresis = 0.05f;
@@ -51,7 +51,7 @@ PICTURA_HD LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float heading
   const Span<const int32_t> items = items_at(map.segment_cells, p);
   const int num_items = static_cast<int>(items.size());
   int best_item = num_items;
-  for (int i = lanes.rank(); i < num_items; i += lanes.size()) {
+  for (int i = group.rank(); i < num_items; i += group.size()) {
     const LaneSegment& segment = map.segments[static_cast<size_t>(items[static_cast<size_t>(i)])];
     if (!segment.is_driven) continue;
     const Foot foot = foot_on(segment, p);
@@ -69,22 +69,22 @@ PICTURA_HD LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float heading
     best = {segment.lane, foot.side < 0.0f ? -foot.distance_m : foot.distance_m, angle, height,
             map.lanes[static_cast<size_t>(segment.lane)].speed_limit_mps};
   }
-  return lanes.of_lowest(best_score, best_item, best);
+  return group.of_lowest(best_score, best_item, best);
 }
 
 /// Whether a point lies on the drivable surface of its level: within half a width of some drivable lane's centre line.
-template <typename Lanes = OneLane>
-PICTURA_HD bool is_on_road(const MapView& map, Vec2 p, float z_m, const Lanes& lanes = {}) {
+template <typename ThreadGroup = SingleThread>
+PICTURA_HD bool is_on_road(const MapView& map, Vec2 p, float z_m, const ThreadGroup& group = {}) {
   const Span<const int32_t> items = items_at(map.segment_cells, p);
   bool is_on = false;
-  for (size_t i = static_cast<size_t>(lanes.rank()); i < items.size() && !is_on;
-       i += static_cast<size_t>(lanes.size())) {
+  for (size_t i = static_cast<size_t>(group.rank()); i < items.size() && !is_on;
+       i += static_cast<size_t>(group.size())) {
     const LaneSegment& segment = map.segments[static_cast<size_t>(items[i])];
     const Foot foot = foot_on(segment, p);
     const float height = segment.a_m.z + segment.slope * foot.along_m;
     is_on = foot.distance_m <= segment.half_width_m + kSeamTolerance_m && fabsf(height - z_m) < kLevel_m;
   }
-  return lanes.any(is_on);
+  return group.any(is_on);
 }
 
 /// A place on a route: on a lane, or for pedestrians on a piece of a walkway.

@@ -55,29 +55,30 @@ PICTURA_HD inline void draw_agent(const WorldView& world, int agent) {
 }
 
 /// Whether a box keeps kSpawnClearance_m from the boxes [begin, end).
-template <typename Lanes = OneLane>
-PICTURA_HD bool is_clear(const WorldView& world, const AgentBox& box, int begin, int end, const Lanes& lanes = {}) {
+template <typename ThreadGroup = SingleThread>
+PICTURA_HD bool is_clear(const WorldView& world, const AgentBox& box, int begin, int end,
+                         const ThreadGroup& group = {}) {
   AgentBox inflated = box;
   inflated.length_m += 2.0f * kSpawnClearance_m;
   inflated.width_m += 2.0f * kSpawnClearance_m;
   bool is_taken = false;
-  for (int i = begin + lanes.rank(); i < end && !is_taken; i += lanes.size()) {
+  for (int i = begin + group.rank(); i < end && !is_taken; i += group.size()) {
     const AgentBox& other = world.boxes[i];
     const Vec2 apart = (other.center_m - box.center_m).xy();
     if (!other.drawn || dot(apart, apart) > square(radius(inflated) + kMaxBoxRadius_m)) continue;
     is_taken = same_level(inflated, other) && overlap(footprint(inflated), footprint(other));
   }
-  return !lanes.any(is_taken);
+  return !group.any(is_taken);
 }
 
-template <typename Lanes = OneLane>
-PICTURA_HD bool touches_wall(const MapView& map, const AgentBox& box, const Lanes& lanes = {}) {
-  return touches_any(footprint(box), box.center_m.z, map.walls, map.wall_cells, lanes);
+template <typename ThreadGroup = SingleThread>
+PICTURA_HD bool touches_wall(const MapView& map, const AgentBox& box, const ThreadGroup& group = {}) {
+  return touches_any(footprint(box), box.center_m.z, map.walls, map.wall_cells, group);
 }
 
-template <typename Lanes = OneLane>
-PICTURA_HD bool touches_barrier(const MapView& map, const AgentBox& box, const Lanes& lanes = {}) {
-  return touches_any(footprint(box), box.center_m.z, map.edges, map.edge_cells, lanes) || touches_wall(map, box, lanes);
+template <typename ThreadGroup = SingleThread>
+PICTURA_HD bool touches_barrier(const MapView& map, const AgentBox& box, const ThreadGroup& group = {}) {
+  return touches_any(footprint(box), box.center_m.z, map.edges, map.edge_cells, group) || touches_wall(map, box, group);
 }
 
 /// Where pedestrians walk, and everybody else drives.
@@ -89,48 +90,48 @@ PICTURA_HD inline LanePose pose_of(const WorldView& world, int agent, RoutePoint
   return walks(world, agent) ? pose_on_walk(world.map, at.lane, at.s_m) : pose_on_lane(world.map, at.lane, at.s_m);
 }
 
-template <typename Lanes>
+template <typename ThreadGroup>
 PICTURA_HD LaneFit fit_agent(const WorldView& world, int agent, Vec2 p, float z_m, float heading_rad,
-                             int32_t current_lane, const Lanes& lanes) {
-  return walks(world, agent) ? fit_walk(world.map, p, z_m, heading_rad, current_lane, lanes)
-                             : fit_lane(world.map, p, z_m, heading_rad, current_lane, lanes);
+                             int32_t current_lane, const ThreadGroup& group) {
+  return walks(world, agent) ? fit_walk(world.map, p, z_m, heading_rad, current_lane, group)
+                             : fit_lane(world.map, p, z_m, heading_rad, current_lane, group);
 }
 
 /// The next waypoint of a pedestrian: the gap, and then on until no parked car stands there.
-template <typename Lanes = OneLane>
+template <typename ThreadGroup = SingleThread>
 PICTURA_HD RoutePoint next_walk_waypoint(const WorldView& world, int agent, RoutePoint at, RandomStream* random_inout,
-                                         const Lanes& lanes = {}) {
+                                         const ThreadGroup& group = {}) {
   constexpr float kStride_m = 1.0f;
   constexpr int kMaxStrides = 64;
   at = stroll(world.map, at, random_inout->uniform(kMinWaypointGap_m, kMaxWaypointGap_m), random_inout);
   for (int i = 0; i < kMaxStrides; ++i) {
     const LanePose pose = pose_on_walk(world.map, at.lane, at.s_m);
     const AgentBox box = box_at(world.agents, world.first_slot + agent, pose.position_m, sincos_of(pose.heading_rad));
-    if (is_clear(world, box, world.num_agents, world.num_boxes, lanes)) break;
+    if (is_clear(world, box, world.num_agents, world.num_boxes, group)) break;
     at = stroll(world.map, at, kStride_m, random_inout);
   }
   return at;
 }
 
 /// Draws a new goal chain that starts where the last one ended.
-template <typename Lanes = OneLane>
-PICTURA_HD void draw_goal_chain(const WorldView& world, int agent, const Lanes& lanes = {}) {
+template <typename ThreadGroup = SingleThread>
+PICTURA_HD void draw_goal_chain(const WorldView& world, int agent, const ThreadGroup& group = {}) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
   const int32_t chain = agents.goal_chains[slot];
   RandomStream random = agent_stream(world, agent, static_cast<uint32_t>(chain), Purpose::goals);
   RoutePoint at{agents.goal_lane[slot], agents.goal_lane_s_m[slot]};
-  lanes.wait();
+  group.sync();
   for (int i = 0; i < kNumWaypoints; ++i) {
-    at = walks(world, agent) ? next_walk_waypoint(world, agent, at, &random, lanes)
+    at = walks(world, agent) ? next_walk_waypoint(world, agent, at, &random, group)
                              : next_waypoint(world.map, at, &random);
     const LanePose pose = pose_of(world, agent, at);
-    if (lanes.rank() > 0) continue;
+    if (group.rank() > 0) continue;
     agents.waypoint_x_m[slot * kNumWaypoints + i] = pose.position_m.x;
     agents.waypoint_y_m[slot * kNumWaypoints + i] = pose.position_m.y;
     agents.waypoint_z_m[slot * kNumWaypoints + i] = pose.position_m.z;
   }
-  if (lanes.rank() > 0) return;
+  if (group.rank() > 0) return;
   agents.next_waypoint[slot] = 0;
   agents.goal_lane[slot] = at.lane;
   agents.goal_lane_s_m[slot] = at.s_m;
@@ -165,13 +166,13 @@ PICTURA_HD inline AgentBox parked_box(const WorldView& world, int car, const Par
 }
 
 /// Whether the box reaches into a lane that is driven on, on its level, by more than kSeamTolerance_m.
-template <typename Lanes = OneLane>
-PICTURA_HD bool covers_driven_lane(const MapView& map, const AgentBox& box, const Lanes& lanes = {}) {
+template <typename ThreadGroup = SingleThread>
+PICTURA_HD bool covers_driven_lane(const MapView& map, const AgentBox& box, const ThreadGroup& group = {}) {
   const OrientedBox print = footprint(box);
   const Span<const int32_t> items = items_at(map.segment_cells, print.center_m);
   bool covers = false;
-  for (size_t i = static_cast<size_t>(lanes.rank()); i < items.size() && !covers;
-       i += static_cast<size_t>(lanes.size())) {
+  for (size_t i = static_cast<size_t>(group.rank()); i < items.size() && !covers;
+       i += static_cast<size_t>(group.size())) {
     const LaneSegment& segment = map.segments[static_cast<size_t>(items[i])];
     const float half_m = 0.5f * segment.length_m;
     const OrientedBox surface{segment.a_m.xy() + segment.direction * half_m, segment.direction, half_m,
@@ -179,16 +180,17 @@ PICTURA_HD bool covers_driven_lane(const MapView& map, const AgentBox& box, cons
     const float height = segment.a_m.z + segment.slope * half_m;
     covers = segment.is_driven && fabsf(height - box.center_m.z) < kLevel_m && overlap(print, surface);
   }
-  return lanes.any(covers);
+  return group.any(covers);
 }
 
 /// Whether the map permits the box on its spot: clear of barriers and of lanes that are driven on, and off the road
 /// where that is beside a kerb.
-template <typename Lanes = OneLane>
-PICTURA_HD bool may_park(const MapView& map, const AgentBox& box, const ParkingSpot& spot, const Lanes& lanes = {}) {
+template <typename ThreadGroup = SingleThread>
+PICTURA_HD bool may_park(const MapView& map, const AgentBox& box, const ParkingSpot& spot,
+                         const ThreadGroup& group = {}) {
   const bool is_at_kerb = dot(spot.outward, spot.outward) > 0.0f;
-  return !touches_barrier(map, box, lanes) && !covers_driven_lane(map, box, lanes) &&
-         !(is_at_kerb && is_on_road(map, box.center_m.xy(), box.center_m.z, lanes));
+  return !touches_barrier(map, box, group) && !covers_driven_lane(map, box, group) &&
+         !(is_at_kerb && is_on_road(map, box.center_m.xy(), box.center_m.z, group));
 }
 
 /// Parks car `car` at its try `i`; with -1 it found no place, is not drawn, and nobody meets it.
@@ -238,27 +240,28 @@ PICTURA_HD inline AgentBox spawn_box(const WorldView& world, int agent, int i) {
 
 /// Whether the map permits an agent's box there: clear of barriers, its centre on the road. Pedestrians need only keep
 /// clear of walls.
-template <typename Lanes = OneLane>
-PICTURA_HD bool may_spawn(const MapView& map, const AgentBox& box, const Lanes& lanes = {}) {
-  if (box.agent_class == AgentClass::pedestrian) return !touches_wall(map, box, lanes);
-  return !touches_barrier(map, box, lanes) && is_on_road(map, box.center_m.xy(), box.center_m.z, lanes);
+template <typename ThreadGroup = SingleThread>
+PICTURA_HD bool may_spawn(const MapView& map, const AgentBox& box, const ThreadGroup& group = {}) {
+  if (box.agent_class == AgentClass::pedestrian) return !touches_wall(map, box, group);
+  return !touches_barrier(map, box, group) && is_on_road(map, box.center_m.xy(), box.center_m.z, group);
 }
 
 /// Puts the agent at the place of its try `i`, standing still, and draws its first goals; with -1 it stays absent.
-template <typename Lanes = OneLane>
-PICTURA_HD void put_agent(const WorldView& world, int agent, int i, const Lanes& lanes = {}) {
+template <typename ThreadGroup = SingleThread>
+PICTURA_HD void place_agent(const WorldView& world, int agent, int i, const ThreadGroup& group = {}) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
-  const bool is_writer = lanes.rank() == 0;
+  const bool is_writer = group.rank() == 0;
   if (i < 0) {
     if (!is_writer) return;
     world.boxes[agent] = world.boxes_before[agent] = box_of(agents, slot);
-    agents.refusal[slot] = static_cast<uint8_t>(has_places(world, agent) ? Refusal::taken : Refusal::no_place);
+    agents.refusal[slot] =
+        static_cast<uint8_t>(has_places(world, agent) ? SpawnFailure::taken : SpawnFailure::no_place);
     return;
   }
   const RoutePoint at = spawn_point(world, agent, i);
   const LanePose pose = pose_of(world, agent, at);
-  const LaneFit fit = fit_lane(world.map, pose.position_m.xy(), pose.position_m.z, pose.heading_rad, at.lane, lanes);
+  const LaneFit fit = fit_lane(world.map, pose.position_m.xy(), pose.position_m.z, pose.heading_rad, at.lane, group);
   if (is_writer) {
     Motion motion;
     motion.x_m = pose.position_m.x;
@@ -272,8 +275,8 @@ PICTURA_HD void put_agent(const WorldView& world, int agent, int i, const Lanes&
     world.boxes[agent] = world.boxes_before[agent] = box_of(agents, slot);
     store_fit(agents, slot, fit);
   }
-  lanes.wait();
-  draw_goal_chain(world, agent, lanes);
+  group.sync();
+  draw_goal_chain(world, agent, group);
 }
 
 }  // namespace pictura

@@ -37,18 +37,18 @@ PICTURA_HD inline Vec3 waypoint_of(const AgentStateView& agents, int slot, int i
 /// Passes waypoints along the way from `from` to `to`; returns event bits. The last waypoint becomes the
 /// metric's goal when it becomes the active one, and stays it until it has been passed within kMetricGoalRadius_m or
 /// the next chain's last waypoint replaces it: a wide reward radius does not keep an agent from reaching it.
-template <typename Lanes>
-PICTURA_HD int pass_waypoints(const WorldView& world, int agent, Vec3 from, Vec3 to, const Lanes& lanes) {
+template <typename ThreadGroup>
+PICTURA_HD int pass_waypoints(const WorldView& world, int agent, Vec3 from, Vec3 to, const ThreadGroup& group) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
-  const bool is_writer = lanes.rank() == 0;
+  const bool is_writer = group.rank() == 0;
   const bool reaches_goal =
       agents.goal_open[slot] &&
       passes(from, to, {agents.goal_x_m[slot], agents.goal_y_m[slot], agents.goal_z_m[slot]}, kMetricGoalRadius_m);
   const int index = agents.next_waypoint[slot];
   const float radius_m = agents.conditioning[slot * kNumConditioning + static_cast<int>(Conditioning::delta_goal_m)];
   const bool passes_waypoint = passes(from, to, waypoint_of(agents, slot, index), radius_m);
-  lanes.wait();
+  group.sync();
   if (is_writer && reaches_goal) {
     agents.goal_open[slot] = 0;
     ++agents.goals_reached[slot];
@@ -57,7 +57,7 @@ PICTURA_HD int pass_waypoints(const WorldView& world, int agent, Vec3 from, Vec3
   if (!passes_waypoint) return events;
   if (is_writer) ++agents.waypoints_reached[slot];
   if (index + 1 == kNumWaypoints) {
-    draw_goal_chain(world, agent, lanes);
+    draw_goal_chain(world, agent, group);
     return events | kEventGoal;
   }
   if (!is_writer) return events | kEventWaypoint;
@@ -85,13 +85,13 @@ PICTURA_HD inline DynamicsParameters dynamics_of(const AgentStateView& agents, i
 
 /// Phase 1: moves an active agent and finds what the road says about it. Its first lane alone writes, once all have
 /// read.
-template <typename Lanes = OneLane>
-PICTURA_HD void advance(const WorldView& world, int agent, int32_t action, const Lanes& lanes = {}) {
+template <typename ThreadGroup = SingleThread>
+PICTURA_HD void advance(const WorldView& world, int agent, int32_t action, const ThreadGroup& group = {}) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
   const AgentBox before = world.boxes[agent];
   if (!is_active(world, agent)) {
-    if (lanes.rank() > 0) return;
+    if (group.rank() > 0) return;
     world.boxes_before[agent] = before;
     agents.events[slot] = kEventNone;
     return;
@@ -102,21 +102,21 @@ PICTURA_HD void advance(const WorldView& world, int agent, int32_t action, const
   const Motion motion = move(motion_of(agents, slot), controls_of_action(action), dynamics_of(agents, slot),
                              class_limits(agent_class), world.options.dt_s);
   const int32_t lane_before = agents.lane[slot];
-  const LaneFit fit = fit_agent(world, agent, {motion.x_m, motion.y_m}, from.z, motion.heading_rad, lane_before, lanes);
+  const LaneFit fit = fit_agent(world, agent, {motion.x_m, motion.y_m}, from.z, motion.heading_rad, lane_before, group);
   const AgentBox box = box_at(agents, slot, {motion.x_m, motion.y_m, fit.z_m}, sincos_of(motion.heading_rad));
 
   int events = kEventNone;
   const OrientedBox print = footprint(box);
-  if (touches_any(print, box.center_m.z, world.map.walls, world.map.wall_cells, lanes)) events |= kEventWall;
+  if (touches_any(print, box.center_m.z, world.map.walls, world.map.wall_cells, group)) events |= kEventWall;
   if (agent_class != AgentClass::pedestrian) {
-    if (touches_any(print, box.center_m.z, world.map.edges, world.map.edge_cells, lanes) ||
-        !is_on_road(world.map, print.center_m, box.center_m.z, lanes)) {
+    if (touches_any(print, box.center_m.z, world.map.edges, world.map.edge_cells, group) ||
+        !is_on_road(world.map, print.center_m, box.center_m.z, group)) {
       events |= kEventOffRoad;
     }
     if (runs_red_light(world, before, box, lane_before, fit.lane)) events |= kEventRedLight;
   }
-  events |= pass_waypoints(world, agent, from, {motion.x_m, motion.y_m, fit.z_m}, lanes);
-  if (lanes.rank() > 0) return;
+  events |= pass_waypoints(world, agent, from, {motion.x_m, motion.y_m, fit.z_m}, group);
+  if (group.rank() > 0) return;
   agents.distance_m[slot] += driven_m(motion.speed_mps, world.options.dt_s);
   world.boxes_before[agent] = before;
   world.boxes[agent] = box;
@@ -126,8 +126,8 @@ PICTURA_HD void advance(const WorldView& world, int agent, int32_t action, const
 }
 
 /// Phase 2: finds the collisions of an active agent with every other box, halted and parked ones included.
-template <typename Lanes = OneLane>
-PICTURA_HD void find_collisions(const WorldView& world, int agent, const Lanes& lanes = {}) {
+template <typename ThreadGroup = SingleThread>
+PICTURA_HD void find_collisions(const WorldView& world, int agent, const ThreadGroup& group = {}) {
   if (!is_active(world, agent)) return;
   const AgentBox& own = world.boxes[agent];
   const AgentBox& own_before = world.boxes_before[agent];
@@ -138,7 +138,7 @@ PICTURA_HD void find_collisions(const WorldView& world, int agent, const Lanes& 
   bool collides = false, is_at_fault = false;
   for (int y = range.y0; y <= range.y1; ++y) {
     const int32_t end = range.end(cells, y);
-    for (int32_t i = range.begin(cells, y) + lanes.rank(); i < end; i += lanes.size()) {
+    for (int32_t i = range.begin(cells, y) + group.rank(); i < end; i += group.size()) {
       const Vec2 apart = world.cell_centers[i] - own.center_m.xy();
       if (dot(apart, apart) > square(own_reach)) continue;
       const int32_t other = cells.items[static_cast<size_t>(i)];
@@ -147,16 +147,16 @@ PICTURA_HD void find_collisions(const WorldView& world, int agent, const Lanes& 
       is_at_fault = is_at_fault || at_fault(own_before, world.agents.speed_mps[slot], world.boxes_before[other]);
     }
   }
-  collides = lanes.any(collides);
-  is_at_fault = lanes.any(is_at_fault);
-  if (lanes.rank() > 0 || !collides) return;
+  collides = group.any(collides);
+  is_at_fault = group.any(is_at_fault);
+  if (group.rank() > 0 || !collides) return;
   uint8_t& events = world.agents.events[slot];
   events = static_cast<uint8_t>(events | kEventCollision | (is_at_fault ? kEventAtFault : kEventNone));
 }
 
 /// Phase 3: the reward of an active agent, and its halt after an infraction. Returns the reward. Nothing that it writes
 /// is read by another agent's phase 2.
-PICTURA_HD inline float settle(const WorldView& world, int agent) {
+PICTURA_HD inline float apply_reward_and_halt(const WorldView& world, int agent) {
   if (!is_active(world, agent)) return 0.0f;
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;

@@ -44,15 +44,15 @@ PICTURA_HD inline RoutePoint stroll(const MapView& map, RoutePoint at, float dis
 
 /// The lane that fits as in fit_lane(). Pedestrians stand at the height of the nearest walkway within kWalkReach_m on
 /// their level, unless the lane is nearer.
-template <typename Lanes = OneLane>
+template <typename ThreadGroup = SingleThread>
 PICTURA_HD LaneFit fit_walk(const MapView& map, Vec2 p, float z_m, float heading_rad, int32_t current_lane,
-                            const Lanes& lanes = {}) {
-  LaneFit fit = fit_lane(map, p, z_m, heading_rad, current_lane, lanes);
+                            const ThreadGroup& group = {}) {
+  LaneFit fit = fit_lane(map, p, z_m, heading_rad, current_lane, group);
   float nearest_m = fit.lane < 0 ? kWalkReach_m : fabsf(fit.offset_m);
   const Span<const int32_t> items = items_at(map.walk_cells, p);
   const int num_items = static_cast<int>(items.size());
   int nearest_item = num_items;
-  for (int i = lanes.rank(); i < num_items; i += lanes.size()) {
+  for (int i = group.rank(); i < num_items; i += group.size()) {
     const WalkPiece& piece = map.walk_pieces[2 * static_cast<size_t>(items[static_cast<size_t>(i)])];
     const Vec2 from_a = p - piece.a_m.xy();
     const float along = clamp(dot(from_a, piece.direction), 0.0f, piece.length_m);
@@ -63,7 +63,7 @@ PICTURA_HD LaneFit fit_walk(const MapView& map, Vec2 p, float z_m, float heading
     nearest_item = i;
     fit.z_m = height;
   }
-  fit.z_m = lanes.of_lowest(nearest_m, nearest_item, fit.z_m);
+  fit.z_m = group.of_lowest(nearest_m, nearest_item, fit.z_m);
   return fit;
 }
 

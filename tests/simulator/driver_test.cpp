@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "pictura/map/load_map.h"
-#include "pictura/tests/simulator/lane_driver.h"
+#include "pictura/tests/simulator/lane_keeping.h"
 #include "pictura/tests/simulator/stage.h"
 
 namespace pictura {

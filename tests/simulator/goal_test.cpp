@@ -17,7 +17,7 @@ double arc_length(const RoutePoint& at, double straight_m, double arc_m) {
 }
 
 TEST(Goal, WaypointsLie20To60MetresApartAlongTheRoute) {
-  const WorldMap map = make_world_map(*testing::stadium(200, 1), {});
+  const MapRules map = make_map_rules(*testing::stadium(200, 1), {});
   const double arc_m = map.lanes[1].length_m, lap_m = 400 + 2 * arc_m;
   RandomStream random(3, 0, 0, 0, 0, Purpose::goals);
   RoutePoint at{0, 10};
@@ -36,7 +36,7 @@ TEST(Goal, WaypointsLie20To60MetresApartAlongTheRoute) {
 }
 
 TEST(Goal, LanesChangeWithAQuarterOfTheWaypoints) {
-  const WorldMap map = make_world_map(*testing::stadium(200, 2), {});
+  const MapRules map = make_map_rules(*testing::stadium(200, 2), {});
   RandomStream random(3, 0, 0, 0, 0, Purpose::goals);
   RoutePoint at{0, 10};
   int changes = 0;
@@ -56,7 +56,7 @@ TEST(Goal, RoutesAvoidDeadEnds) {
   map->lanes[1].is_endless = true;
   map->lanes[2].successors = {};
   map->lanes[3].is_endless = false;
-  const WorldMap world_map = make_world_map(*map, {});
+  const MapRules world_map = make_map_rules(*map, {});
   RandomStream random(3, 0, 0, 0, 0, Purpose::goals);
   RoutePoint at{2, 150};
   for (int i = 0; i < 200; ++i) {

@@ -44,8 +44,8 @@ void LanePath::cut(size_t last) {
 }
 
 bool LanePath::go_to(RoutePoint to) {
-  constexpr int kMostDetours = 4;
-  for (int detour = 0; detour <= kMostDetours; ++detour) {
+  constexpr int kMaxDetours = 4;
+  for (int detour = 0; detour <= kMaxDetours; ++detour) {
     if (follow_route(route_to(to), to)) return true;
     follow(lane(at_.lane).length_m);
     enter(best_successor(to));
@@ -75,7 +75,7 @@ std::vector<int32_t> LanePath::route_to(RoutePoint to) const {
 
 /// False, and goes no further, where a lane change has too little room and need not be made.
 bool LanePath::follow_route(const std::vector<int32_t>& lanes, RoutePoint to) {
-  constexpr float kLeastRoom_m = 12;  // for one change
+  constexpr float kMinRoom_m = 12;  // for one change
   for (size_t i = 1; i < lanes.size(); ++i) {
     if (!is_change(at_.lane, lanes[i])) {
       follow(lane(at_.lane).length_m);
@@ -86,7 +86,7 @@ bool LanePath::follow_route(const std::vector<int32_t>& lanes, RoutePoint to) {
     while (i + 1 < lanes.size() && is_change(lanes[i], lanes[i + 1])) ++i;
     const float length_m = lane(lanes[i]).length_m;
     const float room_m = (i + 1 == lanes.size() ? to.s_m : length_m) - length_m * (at_.s_m / lane(at_.lane).length_m);
-    const bool fits = room_m >= kLeastRoom_m * static_cast<float>(i + 1 - first);
+    const bool fits = room_m >= kMinRoom_m * static_cast<float>(i + 1 - first);
     if (!fits && lane(at_.lane).num_successors > 0) return false;
     change_to(lanes[i], room_m);
   }
@@ -132,7 +132,7 @@ int32_t LanePath::best_successor(RoutePoint to) const {
 
 /// Begins to draw nearer to a lane beside, within room_m where that can be driven.
 void LanePath::change_to(int32_t to, float room_m) {
-  constexpr float kLeast_m = 8, kPerMetreAside = 7;
+  constexpr float kMin_m = 8, kPerMetreAside = 7;
   const Vec2 here = end().position_m.xy();
   Foot best;
   best.distance_m = INFINITY;
@@ -144,7 +144,7 @@ void LanePath::change_to(int32_t to, float room_m) {
     at_ = {to, segment.s_m + foot.along_m};
   }
   const float aside_m = std::copysign(best.distance_m, best.side);
-  change_ = {aside_m, std::max(kLeast_m, std::min(room_m, kPerMetreAside * best.distance_m)), 0};
+  change_ = {aside_m, std::max(kMin_m, std::min(room_m, kPerMetreAside * best.distance_m)), 0};
 }
 
 void LanePath::follow(float to_s_m) {

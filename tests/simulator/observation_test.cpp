@@ -123,7 +123,7 @@ float rounded_dot(Vec2 a, Vec2 b) {
 }
 
 TEST_F(Observation, ProductsAreRoundedBeforeTheyAreAdded) {
-  const StopLine& line = stage.batch.world_maps[0].stop_lines[0];
+  const StopLine& line = stage.batch.map_rules[0].stop_lines[0];
   const AgentState& agents = stage.batch.agents;
   for (int i = 0; i < 100; ++i) {
     const auto k = static_cast<float>(i);
@@ -200,7 +200,7 @@ TEST_F(Observation, EveryCoefficientHasThePapersRange) {
 /// What is listed must be what is in sight: checked against all pieces of the map, from many places and headings.
 TEST_F(Observation, LanesBoundariesAndWallsAreAllThatIsInSight) {
   RandomStream random(5, 0, 0, 0, 0, Purpose::town);
-  const WorldMap& map = stage.batch.world_maps[0];
+  const MapRules& map = stage.batch.map_rules[0];
   for (int i = 0; i < 300; ++i) {
     const float heading = random.uniform(-kPi, kPi);
     const Vec2 at{random.uniform(0, 200), random.uniform(-1, 5)};
@@ -240,7 +240,7 @@ TEST_F(Observation, LanesBoundariesAndWallsAreAllThatIsInSight) {
 }
 
 TEST_F(Observation, PiecesAreAtMostTenMetresLong) {
-  const WorldMap& map = stage.batch.world_maps[0];
+  const MapRules& map = stage.batch.map_rules[0];
   const auto total_of = [](const std::vector<ObservedPiece>& pieces) {
     double total = 0;
     for (const ObservedPiece& piece : pieces) {

@@ -63,11 +63,11 @@ TEST(Phases, RefuseAnActionOutOfRangeAndChangeNothing) {
   actions[35] = -1;
   executor.step(actions);
   EXPECT_EQ(executor.batch.save(), before);
-  EXPECT_EQ(executor.refused(), cuda::refusal(31, kNumActions));
+  EXPECT_EQ(executor.refused(), cuda::rejected_action(31, kNumActions));
   actions[31] = 0;
   executor.step(actions);
   EXPECT_EQ(executor.batch.save(), before);
-  EXPECT_EQ(executor.refused(), cuda::refusal(31, kNumActions)) << "the first one stands";
+  EXPECT_EQ(executor.refused(), cuda::rejected_action(31, kNumActions)) << "the first one stands";
   actions[35] = 0;
   executor.step(actions);
   EXPECT_NE(executor.batch.save(), before);

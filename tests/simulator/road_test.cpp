@@ -11,7 +11,7 @@ namespace pictura {
 namespace {
 
 TEST(Road, FitsTheLaneUnderIt) {
-  const WorldMap map = make_world_map(*testing::stadium(200, 2), {});
+  const MapRules map = make_map_rules(*testing::stadium(200, 2), {});
   const LaneFit fit = fit_lane(map.view(), {55, 0.5f}, 0, 0.1f, -1);
   EXPECT_EQ(fit.lane, 0);
   EXPECT_NEAR(fit.offset_m, 0.5f, 1e-5);
@@ -23,7 +23,7 @@ TEST(Road, FitsTheLaneUnderIt) {
 }
 
 TEST(Road, KeepsItsLaneNearTheBorder) {
-  const WorldMap map = make_world_map(*testing::stadium(200, 2), {});
+  const MapRules map = make_map_rules(*testing::stadium(200, 2), {});
   // 2.1 m is nearer to lane 4 by 0.2 m, which weighs 0.035: less than the 0.05 for leaving.
   EXPECT_EQ(fit_lane(map.view(), {55, 2.1f}, 0, 0, 0).lane, 0);
   EXPECT_EQ(fit_lane(map.view(), {55, 2.1f}, 0, 0, 4).lane, 4);
@@ -32,21 +32,21 @@ TEST(Road, KeepsItsLaneNearTheBorder) {
 
 TEST(Road, PrefersTheLaneThatPointsItsWay) {
   // Two opposite lanes at y = 0 and y = 40 of a stadium are far apart; on a ring, heading decides nothing.
-  const WorldMap map = make_world_map(*testing::ring_road(30), {});
+  const MapRules map = make_map_rules(*testing::ring_road(30), {});
   const LaneFit fit = fit_lane(map.view(), {0, -31}, 0, 0, -1);
   EXPECT_NEAR(fit.offset_m, -1, 0.02);
   EXPECT_NEAR(fit.angle_rad, 0, 0.01);
 }
 
 TEST(Road, LevelsAreApart) {
-  const WorldMap map = make_world_map(*testing::stadium(200, 1), {});
+  const MapRules map = make_map_rules(*testing::stadium(200, 1), {});
   EXPECT_EQ(fit_lane(map.view(), {55, 0}, 3, 0, -1).lane, -1);
   EXPECT_FALSE(is_on_road(map.view(), {55, 0}, 3));
   EXPECT_TRUE(is_on_road(map.view(), {55, 0}, 1));
 }
 
 TEST(Road, KnowsTheDrivableSurface) {
-  const WorldMap map = make_world_map(*testing::stadium(200, 2), {});
+  const MapRules map = make_map_rules(*testing::stadium(200, 2), {});
   EXPECT_TRUE(is_on_road(map.view(), {55, -1.9f}, 0));
   EXPECT_TRUE(is_on_road(map.view(), {55, 5.9f}, 0));
   EXPECT_FALSE(is_on_road(map.view(), {55, -2.3f}, 0));
@@ -54,7 +54,7 @@ TEST(Road, KnowsTheDrivableSurface) {
 }
 
 TEST(Road, PosesFollowTheArcLength) {
-  const WorldMap map = make_world_map(*testing::ring_road(30), {});
+  const MapRules map = make_map_rules(*testing::ring_road(30), {});
   const LanePose pose = pose_on_lane(map.view(), 1, 30 * 0.5f);
   const float angle = kHalfPi + 0.5f;
   EXPECT_NEAR(pose.position_m.x, 30 * std::cos(angle), 0.1);
@@ -87,8 +87,8 @@ TEST(Road, WallsHaltAndAreCountedApart) {
   const auto map = testing::stadium(200, 1);
   testing::Stage stage(map, 2);
   const std::vector<WallFace> walls{{{60, -1, 0}, {60, 1, 0}, 3}, {{160, -1, 8}, {160, 1, 8}, 3}};
-  stage.batch.world_maps[0] = make_world_map(*map, walls);
-  stage.batch.map_views[0] = stage.batch.world_maps[0].view();
+  stage.batch.map_rules[0] = make_map_rules(*map, walls);
+  stage.batch.map_views[0] = stage.batch.map_rules[0].view();
   stage.set(0, Conditioning::off_road, 2);
   stage.put(0, {56.3f, 0}, 0, 10);   // bumper at 59.5
   stage.put(1, {156.3f, 0}, 0, 10);  // that wall is on a bridge

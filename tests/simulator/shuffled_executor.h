@@ -30,7 +30,7 @@ void shuffled(std::mt19937* random, int count, const Body& body) {
 }
 
 /// A group of one lane.
-struct HostLanes : OneLane {
+struct HostThreadGroup : SingleThread {
   float* rows = nullptr;
   float* staging() const { return rows; }
   template <typename T>
@@ -55,8 +55,8 @@ struct ShuffledTeam : HostAtomics {
     shuffled(random, count, body);
   }
   template <int kGroup, typename Body>
-  void for_each_by_lanes(int count, const Body& body) const {
-    shuffled(random, count, [&body](int i) { body(HostLanes{}, i); });
+  void for_each_by_groups(int count, const Body& body) const {
+    shuffled(random, count, [&body](int i) { body(HostThreadGroup{}, i); });
   }
 };
 
@@ -79,20 +79,20 @@ struct ShuffledLaunch {
     });
   }
   template <int kGroup, typename Phase>
-  void lanes(int32_t count, const Phase& phase) const {
+  void groups(int32_t count, const Phase& phase) const {
     shuffled(random, count, [&phase](int i) {
-      std::array<float, cuda::ShowAgent::kStaging> rows{};
-      HostLanes lanes;
-      lanes.rows = rows.data();
-      phase(lanes, i);
+      std::array<float, cuda::WriteObservation::kStaging> rows{};
+      HostThreadGroup group;
+      group.rows = rows.data();
+      phase(group, i);
     });
   }
-  template <typename Aside, typename Here>
-  void beside(const Aside& aside, const Here& here) const {
+  template <typename Side, typename Main>
+  void fork_join(const Side& side, const Main& main) const {
     const bool is_first = (*random)() % 2 == 0;
-    if (is_first) aside(*this);
-    here();
-    if (!is_first) aside(*this);
+    if (is_first) side(*this);
+    main();
+    if (!is_first) side(*this);
   }
 };
 
@@ -172,8 +172,8 @@ class ShuffledExecutor {
     arrays.began = began_.data();
     arrays.prepares = prepares_.data();
     arrays.next_spawned = next_spawned_.data();
-    arrays.refused_slot = &refused_slot_;
-    arrays.refusal = &refusal_;
+    arrays.rejected_slot = &refused_slot_;
+    arrays.rejected_action = &refusal_;
     return arrays;
   }
 

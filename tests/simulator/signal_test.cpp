@@ -214,14 +214,14 @@ TEST(RedLightSection, DrivingOnToTheNextLaneIsNone) {
 }
 
 TEST(RedLightSection, LaneChangesAreWhatNoRouteDoes) {
-  const WorldMap map = make_world_map(*short_section(false), {});
+  const MapRules map = make_map_rules(*short_section(false), {});
   EXPECT_FALSE(is_lane_change(map.view(), 0, 0));
   EXPECT_FALSE(is_lane_change(map.view(), 0, 4));
   EXPECT_FALSE(is_lane_change(map.view(), 0, 5));
   EXPECT_FALSE(is_lane_change(map.view(), 5, 4));  // backing up
   EXPECT_FALSE(is_lane_change(map.view(), -1, 4));
   EXPECT_FALSE(is_lane_change(map.view(), 4, -1));
-  const WorldMap side_by_side = make_world_map(*testing::stadium(200, 2), {});
+  const MapRules side_by_side = make_map_rules(*testing::stadium(200, 2), {});
   EXPECT_TRUE(is_lane_change(side_by_side.view(), 4, 0));
   EXPECT_TRUE(is_lane_change(side_by_side.view(), 4, 1));
 }

@@ -63,7 +63,7 @@ std::vector<float> Stage::step(int32_t action) {
   const WorldView sorted = world();
   for (int agent = 0; agent < view.num_agents; ++agent) find_collisions(sorted, agent);
   std::vector<float> rewards;
-  for (int agent = 0; agent < view.num_agents; ++agent) rewards.push_back(settle(sorted, agent));
+  for (int agent = 0; agent < view.num_agents; ++agent) rewards.push_back(apply_reward_and_halt(sorted, agent));
   return rewards;
 }
 

@@ -11,7 +11,7 @@ namespace pictura::testing {
 namespace {
 
 constexpr int kStrides = 30;
-constexpr size_t kMostNodes = 500'000;
+constexpr size_t kMaxNodes = 500'000;
 
 struct Node {
   Motion motion;
@@ -41,7 +41,7 @@ class Search {
   DrivingPlan from(const Node& start) {
     size_t farthest = 0;
     open(start);
-    while (!queue_.empty() && nodes_[farthest].stride < kStrides && nodes_.size() < kMostNodes) {
+    while (!queue_.empty() && nodes_[farthest].stride < kStrides && nodes_.size() < kMaxNodes) {
       const size_t index = queue_.top().second;
       queue_.pop();
       if (!closed_.insert(key_of(nodes_[index])).second) continue;
@@ -79,21 +79,21 @@ class Search {
 
   /// A step; false where that leaves the road or the path.
   bool drive(int32_t action, Node* node_inout) const {
-    constexpr float kFarthestAside_m = 3, kMostAskew_rad = 1.6f;
-    constexpr float kLeastMargin_m = 0.02f, kMargin_m = 0.2f, kTight = 3;
+    constexpr float kFarthestAside_m = 3, kMaxAskew_rad = 1.6f;
+    constexpr float kMinMargin_m = 0.02f, kMargin_m = 0.2f, kTight = 3;
     Node& node = *node_inout;
     node.motion = agent_.after(node.motion, action);
     const Vec2 axle{node.motion.x_m, node.motion.y_m};
     node.place = nearest_point(path_, node.place, axle);
     const PathPoint& point = path_[node.place];
     const bool is_tight = agent_.leaves_road(node.motion, point.position_m.z, kMargin_m);
-    if (is_tight && agent_.leaves_road(node.motion, point.position_m.z, kLeastMargin_m)) return false;
+    if (is_tight && agent_.leaves_road(node.motion, point.position_m.z, kMinMargin_m)) return false;
     const SinCos way = sincos_of(point.heading_rad);
     node.aside_m = cross({way.cos, way.sin}, axle - point.position_m.xy());
     const float askew_rad = wrap_angle(node.motion.heading_rad - point.heading_rad);
     node.cost += driven_m(node.motion.speed_mps, agent_.dt_s()) *
                  (square(node.aside_m) + square(askew_rad) + (is_tight ? kTight : 0));
-    return std::fabs(node.aside_m) < kFarthestAside_m && std::fabs(askew_rad) < kMostAskew_rad;
+    return std::fabs(node.aside_m) < kFarthestAside_m && std::fabs(askew_rad) < kMaxAskew_rad;
   }
 
   DrivingPlan plan_to(size_t index) const {

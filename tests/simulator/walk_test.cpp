@@ -31,7 +31,7 @@ std::shared_ptr<RoadMap> street() {
   return map;
 }
 
-WorldMap world_map(const RoadMap& map) { return make_world_map(map, {}); }
+MapRules world_map(const RoadMap& map) { return make_map_rules(map, {}); }
 
 float total_m(const Walkways& walkways) { return walkways.end_m.empty() ? 0 : walkways.end_m.back(); }
 
@@ -100,7 +100,7 @@ TEST(Walkways, AreShouldersWhereThereIsNoSidewalk) {
 }
 
 TEST(Walkways, StrollsHaveTheirLengthAndTurnBackAtDeadEnds) {
-  const WorldMap map = world_map(*street());
+  const MapRules map = world_map(*street());
   const MapView view = map.view();
   for (uint32_t i = 0; i < 200; ++i) {
     RandomStream random(1, 0, i, 0, 0, Purpose::goals);
@@ -130,7 +130,7 @@ TEST(Pedestrians, StandAndAimOnWalkwaysAndAreToldOfGoalsAndCollisionsAlone) {
   int on_crosswalk = 0;
   for (int agent = 0; agent < 40; ++agent) {
     draw_agent(world, agent);
-    put_agent(world, agent, 0);
+    place_agent(world, agent, 0);
     const auto i = static_cast<size_t>(agent);
     EXPECT_EQ(stage.batch.agents.agent_class[i], static_cast<uint8_t>(AgentClass::pedestrian));
     const auto on_walk = [&](float x, float y) {
@@ -181,7 +181,7 @@ TEST(Pedestrians, AreAtTheHeightOfTheirWalkway) {
   std::vector<Vec3> kerb = straight({0, -6}, {200, -6}, 20);
   for (Vec3& point : kerb) point.z = 0.2f + 0.005f * point.x;
   testing::add_side_lane(map.get(), LaneType::sidewalk, kerb);
-  const WorldMap world = world_map(*map);
+  const MapRules world = world_map(*map);
   EXPECT_NEAR(fit_walk(world.view(), {100, -6}, 0.6f, 0, -1).z_m, 0.7, 1e-4);
   EXPECT_EQ(fit_walk(world.view(), {100, -1}, 0.6f, 0, -1).z_m, 0) << "nearer to the road";
   EXPECT_EQ(fit_lane(world.view(), {100, -1}, 0.6f, 0, -1).z_m, 0);

@@ -1,4 +1,4 @@
-#include "pictura/tests/simulator/lane_driver.h"
+#include "pictura/tests/simulator/lane_keeping.h"
 
 #include <algorithm>
 #include <cmath>
@@ -26,7 +26,7 @@ size_t first_touching(const std::vector<AgentBox>& boxes, const AgentBox& other)
 
 }  // namespace
 
-LaneDriver::LaneDriver(const WorldView& world, int agent, const LaneGraph& graph)
+LaneKeepingController::LaneKeepingController(const WorldView& world, int agent, const LaneGraph& graph)
     : world_(world),
       self_(agent),
       slot_(world.first_slot + agent),
@@ -35,23 +35,23 @@ LaneDriver::LaneDriver(const WorldView& world, int agent, const LaneGraph& graph
   waypoints_.back() = points().front().at;  // where the first chain starts
 }
 
-int32_t LaneDriver::act() {
+int32_t LaneKeepingController::act() {
   find_place();
   follow_goals();
   const Motion now = agent_.now();
-  const float most_mps = std::min(speed_before_light(now), speed_behind_others());
-  if (most_mps < kPlannedSpeed_mps) {
+  const float max_mps = std::min(speed_before_light(now), speed_behind_others());
+  if (max_mps < kPlannedSpeed_mps) {
     plan_ = {};
     next_planned_ = 0;
   } else if (next_planned_ % kStrideSteps == 0 || next_planned_ >= plan_.actions.size()) {
     renew_plan(now);
   }
   if (next_planned_ < plan_.actions.size()) return plan_.actions[next_planned_++];
-  return pursuing_action(now, place_, std::min(points()[place_].speed_mps, most_mps));
+  return pursuing_action(now, place_, std::min(points()[place_].speed_mps, max_mps));
 }
 
 /// Nothing is planned while pursuing the path will do. A plan is followed for half of it at least.
-void LaneDriver::renew_plan(const Motion& now) {
+void LaneKeepingController::renew_plan(const Motion& now) {
   if (stays_on_road(now)) {
     plan_ = {};
     next_planned_ = 0;
@@ -66,7 +66,7 @@ void LaneDriver::renew_plan(const Motion& now) {
 }
 
 /// Goes on to the waypoints of a new chain, or back to one that was missed.
-void LaneDriver::follow_goals() {
+void LaneKeepingController::follow_goals() {
   const int32_t chain = world_.agents.goal_chains[slot_] - 1;
   PICTURA_CHECK(chain <= chain_ + 1, "lane driver: expected a look at every chain, got {} after {}", chain, chain_);
   if (chain != chain_) {
@@ -82,7 +82,7 @@ void LaneDriver::follow_goals() {
 }
 
 /// From the end of the path through the waypoints that are left, and on.
-void LaneDriver::plan() {
+void LaneKeepingController::plan() {
   for (auto i = static_cast<size_t>(world_.agents.next_waypoint[slot_]); i < kNumWaypoints; ++i) {
     const bool gets_there = path_.go_to(waypoints_[i]);
     for (size_t goal = i; goal < kNumWaypoints; ++goal) goals_[goal] = points().size() - 1;
@@ -96,7 +96,7 @@ void LaneDriver::plan() {
 }
 
 /// Where a turn cannot be taken, the straightest way on, if that is clear, and only then to the waypoints.
-DrivingPlan LaneDriver::plan_elsewhere(DrivingPlan plan) {
+DrivingPlan LaneKeepingController::plan_elsewhere(DrivingPlan plan) {
   constexpr float kPassed_m = 20;
   LanePath other = path_;
   other.cut(place_);
@@ -109,12 +109,12 @@ DrivingPlan LaneDriver::plan_elsewhere(DrivingPlan plan) {
   return straight;
 }
 
-size_t LaneDriver::ahead(size_t from, float distance_m) const {
+size_t LaneKeepingController::ahead(size_t from, float distance_m) const {
   return std::min(from + static_cast<size_t>(distance_m / LanePath::kSpacing_m), points().size() - 1);
 }
 
 /// Moves its place along the path to where it is nearest to the rear axle.
-void LaneDriver::find_place() {
+void LaneKeepingController::find_place() {
   constexpr float kReach_m = 3;
   const Motion now = agent_.now();
   const size_t last = ahead(place_, kReach_m);
@@ -129,7 +129,7 @@ void LaneDriver::find_place() {
 }
 
 /// Pure pursuit (Coulter, Implementation of the pure pursuit path tracking algorithm, 1992) from a place on the path.
-float LaneDriver::steer_to(const Motion& now, size_t place) const {
+float LaneKeepingController::steer_to(const Motion& now, size_t place) const {
   const Vec2 target = points()[ahead(place, std::clamp(2 + 0.6f * now.speed_mps, 2.0f, 10.0f))].position_m.xy();
   const SinCos heading = sincos_of(now.heading_rad);
   const Vec2 apart = target - Vec2{now.x_m, now.y_m};
@@ -137,7 +137,7 @@ float LaneDriver::steer_to(const Motion& now, size_t place) const {
   return std::atan(2 * left_m * agent_.wheelbase_m() / std::max(dot(apart, apart), 1.0f));
 }
 
-int32_t LaneDriver::pursuing_action(const Motion& now, size_t place, float wanted_mps) const {
+int32_t LaneKeepingController::pursuing_action(const Motion& now, size_t place, float wanted_mps) const {
   const int32_t straight = agent_.speed_action(now, wanted_mps);
   const float wanted_rad = steer_to(now, place);
   int32_t best = straight;
@@ -154,7 +154,7 @@ int32_t LaneDriver::pursuing_action(const Motion& now, size_t place, float wante
 }
 
 /// Whether pursuing the path keeps it on the road so far ahead, by a margin.
-bool LaneDriver::stays_on_road(Motion now) const {
+bool LaneKeepingController::stays_on_road(Motion now) const {
   constexpr float kHorizon_m = 20, kMargin_m = 0.1f;
   size_t place = place_;
   for (float ahead_m = 0; ahead_m < kHorizon_m; ahead_m += driven_m(now.speed_mps, agent_.dt_s())) {
@@ -166,7 +166,7 @@ bool LaneDriver::stays_on_road(Motion now) const {
 }
 
 /// The speed from which it can stop before the next closed line.
-float LaneDriver::speed_before_light(const Motion& now) {
+float LaneKeepingController::speed_before_light(const Motion& now) {
   constexpr float kMargin_m = 2.0f;
   const float gap_m = to_closed_line(now.speed_mps) - kMargin_m;
   stops_ += gap_m < 1 && now.speed_mps < 0.1f;
@@ -175,7 +175,7 @@ float LaneDriver::speed_before_light(const Motion& now) {
 
 /// From the bumper along the route to the next line that is red, or yellow and can still be stopped at; 1000 where none
 /// is near.
-float LaneDriver::to_closed_line(float speed_mps) const {
+float LaneKeepingController::to_closed_line(float speed_mps) const {
   constexpr float kLook_m = 45;
   const Vec2 here = points()[place_].position_m.xy();
   std::vector<size_t> near;
@@ -208,10 +208,10 @@ float LaneDriver::to_closed_line(float speed_mps) const {
 
 /// The speed from which it can stop before it would touch another agent on its path, now or, if that has the right of
 /// way, where that will soon be.
-float LaneDriver::speed_behind_others() const {
+float LaneKeepingController::speed_behind_others() const {
   constexpr float kLook_m = 40, kMargin_m = 0.4f, kGap_m = 2, kBraking_mps2 = 1.5f;
   constexpr float kForesight_s = 4, kStep_s = 0.5f;
-  float most_mps = INFINITY;
+  float max_mps = INFINITY;
   std::vector<AgentBox> way;
   for (int other = 0; other < world_.num_agents; ++other) {
     const int slot = world_.first_slot + other;
@@ -230,14 +230,14 @@ float LaneDriver::speed_behind_others() const {
       const float gap_m = std::max(LanePath::kSpacing_m * static_cast<float>(first) - kGap_m, 0.0f);
       const float along_mps = dot(velocity, {way[first].cos_heading, way[first].sin_heading});
       const float then_mps = soon_s > 0 ? 0 : std::max(along_mps, 0.0f);
-      most_mps = std::min(most_mps, std::sqrt(square(then_mps) + 2 * kBraking_mps2 * gap_m));
+      max_mps = std::min(max_mps, std::sqrt(square(then_mps) + 2 * kBraking_mps2 * gap_m));
     }
   }
-  return most_mps;
+  return max_mps;
 }
 
 /// Those with lower numbers do, unless they go the same way.
-bool LaneDriver::has_way(int other) const {
+bool LaneKeepingController::has_way(int other) const {
   const float turned = wrap_angle(world_.agents.heading_rad[world_.first_slot + other] - agent_.now().heading_rad);
   return other < self_ && std::fabs(turned) > 0.5f;
 }
@@ -258,7 +258,7 @@ std::vector<DrivenEpisode> drive_lanes(const std::shared_ptr<const RoadMap>& map
   WorldBatch batch(config, {map}, specs);
   batch.restore(simulator->save());
   const LaneGraph graph(*map);
-  std::vector<LaneDriver> drivers;
+  std::vector<LaneKeepingController> drivers;
   for (int w = 0; w < num_worlds; ++w) {
     WorldView view = batch.world(w);
     view.agents = simulator->state();

@@ -1,4 +1,4 @@
-#include "pictura/simulator/world_map.h"
+#include "pictura/simulator/map_rules.h"
 
 #include <algorithm>
 #include <cmath>
@@ -58,7 +58,7 @@ void append_pieces(const std::vector<Vec3>& points, float extent, std::vector<Ob
   }
 }
 
-void add_lanes(const RoadMap& map, WorldMap* out) {
+void add_lanes(const RoadMap& map, MapRules* out) {
   out->lanes.resize(map.lanes.size());
   for (size_t index = 0; index < map.lanes.size(); ++index) {
     const Lane& lane = map.lanes[index];
@@ -116,7 +116,7 @@ void add_lanes(const RoadMap& map, WorldMap* out) {
   }
 }
 
-void add_barriers(const RoadMap& map, Span<const WallFace> walls, WorldMap* out) {
+void add_barriers(const RoadMap& map, Span<const WallFace> walls, MapRules* out) {
   std::vector<Vec3> line;
   const auto finish_line = [&] {
     if (line.size() > 1) append_pieces(line, 0.0f, &out->boundary_pieces);
@@ -138,7 +138,7 @@ void add_barriers(const RoadMap& map, Span<const WallFace> walls, WorldMap* out)
   }
 }
 
-void add_stop_lines(const RoadMap& map, WorldMap* out) {
+void add_stop_lines(const RoadMap& map, MapRules* out) {
   for (size_t index = 0; index < map.lights.size(); ++index) {
     const TrafficLight& light = map.lights[index];
     StopLine line;
@@ -161,7 +161,7 @@ void add_stop_lines(const RoadMap& map, WorldMap* out) {
 
 /// The spot outside the kerb nearest to p, if that is within reach_m. Right-hand traffic: the kerb is to the right of
 /// the cars beside it, and a road edge has the road on its own right, so the cars point against it.
-void add_kerb_spot(Vec3 p, float reach_m, WorldMap* out) {
+void add_kerb_spot(Vec3 p, float reach_m, MapRules* out) {
   const Barrier* nearest = nullptr;
   float best_m = reach_m;
   for (const Barrier& edge : out->edges) {
@@ -182,7 +182,7 @@ void add_kerb_spot(Vec3 p, float reach_m, WorldMap* out) {
 
 /// Parking spaces, and outside junctions a spot every few metres of parking lanes and of the kerbs beside shoulders and
 /// sidewalks.
-void add_parking_spots(const RoadMap& map, WorldMap* out) {
+void add_parking_spots(const RoadMap& map, MapRules* out) {
   constexpr float kSpacing_m = 7.0f;
   for (const ParkingSpace& space : map.parking_spaces) {
     out->parking_spots.push_back({space.center_m, space.heading_rad, {}});
@@ -225,7 +225,7 @@ struct Neighbor {
 /// go through `append(center, neighbors, &lists)`, which appends lists_per_cell lists. Throws Error naming the map when
 /// they would take more than a gigabyte: so they also fit their 32-bit ends.
 template <typename Append>
-CellLists lists_by_distance(const WorldMap& map, const std::string& map_name, const std::vector<Vec2>& points,
+CellLists lists_by_distance(const MapRules& map, const std::string& map_name, const std::vector<Vec2>& points,
                             float range_m, int lists_per_cell, Append&& append) {
   constexpr size_t kMaxItems = size_t{1} << 28;
   CellLists lists;
@@ -293,7 +293,7 @@ bool may_be_seen(Vec2 offset, float distance_m, float sector_middle_rad) {
   return aside <= kRoadAside_m + margin_m || distance_m <= close_m;
 }
 
-CellLists lists_of_pieces(const WorldMap& map, const std::string& map_name, const std::vector<ObservedPiece>& pieces) {
+CellLists lists_of_pieces(const MapRules& map, const std::string& map_name, const std::vector<ObservedPiece>& pieces) {
   std::vector<Vec2> middles;
   for (const ObservedPiece& piece : pieces) middles.push_back(piece.middle_m.xy());
   const float sight_m = std::sqrt(square(kRoadAhead_m) + square(kRoadAside_m)) + kNearCell_m;
@@ -314,7 +314,7 @@ CellLists lists_of_pieces(const WorldMap& map, const std::string& map_name, cons
 
 /// Whatever can be among the nearest kMaxControls from anywhere in the cell: as far from its centre as the last of them
 /// and a cell's diagonal.
-CellLists lists_of_stop_lines(const WorldMap& map, const std::string& map_name) {
+CellLists lists_of_stop_lines(const MapRules& map, const std::string& map_name) {
   std::vector<Vec2> middles;
   for (const StopLine& line : map.stop_lines) middles.push_back(line.middle_m.xy());
   return lists_by_distance(map, map_name, middles, kControlRange_m + kNearCell_m, 1,
@@ -332,8 +332,8 @@ CellLists lists_of_stop_lines(const WorldMap& map, const std::string& map_name) 
 
 }  // namespace
 
-WorldMap make_world_map(const RoadMap& map, Span<const WallFace> walls, bool observe_walls) {
-  WorldMap out;
+MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool observe_walls) {
+  MapRules out;
   add_lanes(map, &out);
   PICTURA_CHECK(!out.segments.empty(), "map {}: expected at least one drivable lane, got none", map.name);
   add_barriers(map, walls, &out);
@@ -376,7 +376,7 @@ WorldMap make_world_map(const RoadMap& map, Span<const WallFace> walls, bool obs
   return out;
 }
 
-MapView WorldMap::view() const {
+MapView MapRules::view() const {
   MapView view;
   view.segments = segments;
   view.lanes = lanes;

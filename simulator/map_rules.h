@@ -23,7 +23,7 @@ struct CellLists {
   GridView view() const { return {origin_m, cell_m, num_x, num_y, begin, items}; }
 };
 
-struct WorldMap {
+struct MapRules {
   std::vector<LaneSegment> segments;
   std::vector<MapLane> lanes;  // of the RoadMap, in its order; those that are not drivable have no segments
   std::vector<int32_t> successors;
@@ -42,6 +42,6 @@ struct WorldMap {
 };
 
 /// Walls can be observed on it if `observe_walls`. Throws Error naming the map when it has no drivable lane.
-WorldMap make_world_map(const RoadMap& map, Span<const WallFace> walls, bool observe_walls = false);
+MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool observe_walls = false);
 
 }  // namespace pictura

@@ -1,7 +1,7 @@
 // How the loops of one agent's rules are shared out: rules that look at many things take `lanes`, threads in lockstep
 // that all call the rule with the same arguments, each take every size()-th thing, and all return the same. A host
-// calls them with OneLane. Only what does not depend on the order of things is shared out: whether any of them is so,
-// and the least of them.
+// calls them with SingleThread. Only what does not depend on the order of things is shared out: whether any of them is
+// so, and the least of them.
 #pragma once
 
 #include "pictura/common/hd.h"
@@ -10,7 +10,7 @@ namespace pictura {
 
 /// The nearest of the things offered, in ascending order of squared distance, then item.
 template <int capacity>
-class NearestOfOneLane {
+class NearestOfOneThread {
  public:
   PICTURA_HD int count() const { return count_; }
   PICTURA_HD int32_t item(int at) const { return item_[at]; }
@@ -37,15 +37,15 @@ class NearestOfOneLane {
 };
 
 /// A thread alone.
-struct OneLane {
+struct SingleThread {
   static constexpr int kSize = 1;
   template <int capacity>
-  using Nearest = NearestOfOneLane<capacity>;
+  using Nearest = NearestOfOneThread<capacity>;
 
   PICTURA_HD static constexpr int size() { return kSize; }
   PICTURA_HD int rank() const { return 0; }
   /// What each lane wrote before, every lane sees after.
-  PICTURA_HD void wait() const {}
+  PICTURA_HD void sync() const {}
   PICTURA_HD bool any(bool value) const { return value; }
   PICTURA_HD int sum(int value) const { return value; }
   /// The value of the lane with the lowest (score, index); scores are not negative.

@@ -15,11 +15,11 @@
 namespace pictura::testing {
 
 /// Drives an agent of a world.
-class LaneDriver {
+class LaneKeepingController {
  public:
   /// `world` shows the simulator's agents and lights as they are at every act(), and has not been stepped yet; the
   /// graph is its map's. Its arrays and the graph must outlive the driver.
-  LaneDriver(const WorldView& world, int agent, const LaneGraph& graph);
+  LaneKeepingController(const WorldView& world, int agent, const LaneGraph& graph);
 
   /// The action for what the agent and the lights are now.
   int32_t act();
