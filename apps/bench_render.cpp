@@ -139,7 +139,7 @@ void append_results(const std::string& name, const RenderCase& measured, const R
   if (measured.watches_memory) {
     constexpr double kGiB = 1 << 30;
     results_out->push_back({name + ", up front", "GiB", {measurement.up_front_bytes / kGiB}});
-    results_out->push_back({name + ", high-water mark beyond images", "GiB", {measurement.most_bytes / kGiB}});
+    results_out->push_back({name + ", high-water mark beyond images", "GiB", {measurement.max_bytes / kGiB}});
     results_out->push_back({name + ", images", "GiB", {measurement.image_bytes / kGiB}});
   }
 }

@@ -86,15 +86,15 @@ void run(Arguments arguments) {
   SoakOptions& options = arguments.soak;
   check_backends({arguments.backend}, renderer_names());
   options.maps = named_maps(options.maps);
-  options.most_seconds = 60 * arguments.minutes;
+  options.max_seconds = 60 * arguments.minutes;
   ProgressLine progress;
   auto make = [&](const RendererConfig& config, std::string* choice_out) {
     return make_renderer(arguments.backend, config, choice_out);
   };
   const SoakResult result = soak(options, make, [&](const SoakResult& so_far) {
-    const double of_time = so_far.seconds / options.most_seconds;
+    const double of_time = so_far.seconds / options.max_seconds;
     const double of_scenes =
-        options.most_scenes > 0 ? static_cast<double>(so_far.scenes) / static_cast<double>(options.most_scenes) : 0.0;
+        options.max_scenes > 0 ? static_cast<double>(so_far.scenes) / static_cast<double>(options.max_scenes) : 0.0;
     progress.update(fmt::format("{} images, {} out of tolerance", so_far.images,
                                 so_far.images_out_of_tolerance + so_far.differing_answers),
                     std::min(1.0, std::max(of_time, of_scenes)));
@@ -120,7 +120,7 @@ void add_soak_benchmark(CLI::App& bench) {
   command->add_option("--minutes", arguments->minutes, "At most")
       ->check(finite_range(1e-3, 1e5))
       ->capture_default_str();
-  command->add_option("--scenes", soak.most_scenes, "At most; 0: as many as there is time for")
+  command->add_option("--scenes", soak.max_scenes, "At most; 0: as many as there is time for")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_option("--first", soak.first_scene, "Number of the first scene, which is the same in every run")

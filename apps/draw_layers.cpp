@@ -119,7 +119,7 @@ GroundPen::GroundPen(Canvas& canvas, Vec2 left_top_m, double px_per_m)
 
 GroundPen::~GroundPen() { cairo_restore(context()); }
 
-double GroundPen::at_least(double metres, double least_px) const { return std::max(metres, least_px / px_per_m_); }
+double GroundPen::at_least(double metres, double min_px) const { return std::max(metres, min_px / px_per_m_); }
 
 bool GroundPen::sees(const Aabb2& box) const {
   return box.low.x <= visible_.high.x && visible_.low.x <= box.high.x && box.low.y <= visible_.high.y &&

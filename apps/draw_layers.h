@@ -40,7 +40,7 @@ class GroundPen {
   cairo_t* context() { return canvas_.context(); }
   double px_per_m() const { return px_per_m_; }
   /// The larger of a size in metres and one in pixels, in metres.
-  double at_least(double metres, double least_px) const;
+  double at_least(double metres, double min_px) const;
   /// Whether something with this bounding box touches the canvas.
   bool sees(const Aabb2& box) const;
   bool sees(Vec2 place, float margin_m) const;

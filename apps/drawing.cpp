@@ -155,13 +155,13 @@ struct Layout {
 Aabb2 shown_part(const RoadMap& map, const MapPictureOptions& options) {
   const Aabb2 whole = bounds_of(map);
   if (!options.box) return whole;
-  constexpr double kLeast_m = 1, kMost_m = 1e6;
+  constexpr double kMin_m = 1, kMax_m = 1e6;
   const FileBox& box = *options.box;
   const double width_m = box.x1_m - box.x0_m, height_m = box.y1_m - box.y0_m;
-  PICTURA_CHECK(width_m >= kLeast_m && width_m <= kMost_m && height_m >= kLeast_m && height_m <= kMost_m,
+  PICTURA_CHECK(width_m >= kMin_m && width_m <= kMax_m && height_m >= kMin_m && height_m <= kMax_m,
                 "picture of {}: expected a box of {} to {} m, from its lower left to its upper right corner, got "
                 "({}, {}) to ({}, {})",
-                map.name, kLeast_m, kMost_m, box.x0_m, box.y0_m, box.x1_m, box.y1_m);
+                map.name, kMin_m, kMax_m, box.x0_m, box.y0_m, box.x1_m, box.y1_m);
   const auto to_map = [&](double x, double y) {
     return Vec2{static_cast<float>(x - map.origin_m[0]), static_cast<float>(y - map.origin_m[1])};
   };
@@ -209,9 +209,9 @@ Layout layout_of(const RoadMap& map, const MapPictureOptions& options) {
 void draw_scale_bar(Canvas& canvas, const Layout& layout) {
   const Metrics& m = layout.m;
   // The longest round length that takes at most a fifth of the width.
-  const double most_m = 0.2 * canvas.width_px() / layout.px_per_m;
-  const double power = std::pow(10.0, std::floor(std::log10(most_m)));
-  const double length_m = most_m >= 5 * power ? 5 * power : (most_m >= 2 * power ? 2 * power : power);
+  const double max_m = 0.2 * canvas.width_px() / layout.px_per_m;
+  const double power = std::pow(10.0, std::floor(std::log10(max_m)));
+  const double length_m = max_m >= 5 * power ? 5 * power : (max_m >= 2 * power ? 2 * power : power);
   const double width = length_m * layout.px_per_m, height = m.px(6);
   const double x = canvas.width_px() - m.px(24) - width, y = canvas.height_px() - m.px(22);
   canvas.fill_rectangle(x - m.px(10), y - m.px(24), width + m.px(20), m.px(38), kGroundColor, 0.8);

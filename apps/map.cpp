@@ -72,8 +72,8 @@ void print_table(const Json& object) {
 
 /// One line each on stderr, and how many there were.
 void print_warnings(const std::vector<std::string>& warnings) {
-  constexpr std::size_t kMostLines = 100;
-  for (std::size_t i = 0; i < std::min(warnings.size(), kMostLines); ++i) {
+  constexpr std::size_t kMaxLines = 100;
+  for (std::size_t i = 0; i < std::min(warnings.size(), kMaxLines); ++i) {
     fmt::print(stderr, "warning: {}\n", warnings[i]);
   }
   if (!warnings.empty()) {

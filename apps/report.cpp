@@ -70,17 +70,17 @@ Pair parse_pair(const std::string& option, const std::string& text, int max) {
 }
 
 PixelSamples parse_samples(const std::string& option, const std::string& text) {
-  constexpr int kMost = 64;
+  constexpr int kMaxCount = 64;
   if (text.find('x') != std::string::npos) {
-    const Pair grid = parse_pair(option, text, kMost);
+    const Pair grid = parse_pair(option, text, kMaxCount);
     if (grid.first != grid.second) fail_usage("{}: expected as many samples across as down, got '{}'", option, text);
     return {.grid = grid.first};
   }
   PixelSamples samples;
   const char* const end = text.data() + text.size();
   const auto parsed = std::from_chars(text.data(), end, samples.multisample);
-  if (parsed.ec != std::errc() || parsed.ptr != end || samples.multisample < 1 || samples.multisample > kMost) {
-    fail_usage("{}: expected 1 to {} samples like 4, or a grid of them like 4x4, got '{}'", option, kMost, text);
+  if (parsed.ec != std::errc() || parsed.ptr != end || samples.multisample < 1 || samples.multisample > kMaxCount) {
+    fail_usage("{}: expected 1 to {} samples like 4, or a grid of them like 4x4, got '{}'", option, kMaxCount, text);
   }
   return samples;
 }

@@ -53,12 +53,12 @@ class CpuRenderer final : public Renderer {
     parallel_for(num_threads(), static_cast<int64_t>(queries.size()), [&](int64_t i) {
       const VisibilityQuery& query = queries[static_cast<std::size_t>(i)];
       ImageDrawer& drawer = drawers_[static_cast<std::size_t>(omp_get_thread_num())];
-      SeenWeight seen;
+      VisibilitySum seen;
       for (std::size_t camera = 0; camera < cameras_.size(); ++camera) {
         ImageRequest asked = request(scene, views[static_cast<std::size_t>(query.view)], camera);
         asked.leaves_out_hidden = false;  // what is hidden counts where the agent is alone
         drawer.prepare(asked);
-        drawer.weigh_agent(query.agent, &seen);
+        drawer.accumulate_visibility(query.agent, &seen);
       }
       visibility_out[static_cast<std::size_t>(i)] = seen.share();
     });

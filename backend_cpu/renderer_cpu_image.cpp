@@ -12,10 +12,10 @@ namespace {
 constexpr int kBandPixels = 1 << 14;
 }  // namespace
 
-auto ImageDrawer::face_maker(FaceOwner owner) {
-  return [this, owner](const CameraFace& seen) {
+auto ImageDrawer::face_maker(PrimitiveRef primitive) {
+  return [this, primitive](const CameraFace& seen) {
     ScreenFace face;
-    if (make_face(setting_, owner, seen, edges_, &face)) faces_.push_back(face);
+    if (make_face(setting_, primitive, seen, edges_, &face)) faces_.push_back(face);
   };
 }
 
@@ -26,13 +26,13 @@ void ImageDrawer::prepare(const ImageRequest& request) {
   if (request.leaves_out_hidden) find_occluders();
   edges_.clear();
   faces_.clear();
-  for (const Solid& solid : solids_) face_maker(solid.owner)(whole_quad(solid.seen, 0.0f));
+  for (const Solid& solid : solids_) face_maker(solid.primitive)(whole_quad(solid.seen, 0.0f));
   visit_lights(setting_, *request.geometry, *request.scene, *request.view,
                [&](const LightHead& head, LightState state, int32_t index) {
-                 light_faces(head, state, setting_.camera, face_maker(light_owner(index)));
+                 light_faces(head, state, setting_.camera, face_maker(light_ref(index)));
                });
   visit_strips(setting_, *request.geometry, [&](const Strip& strip, int32_t index) {
-    strip_faces(strip, setting_.camera, setting_.line_floor_px, face_maker(strip_owner(strip, index)));
+    strip_faces(strip, setting_.camera, setting_.line_floor_px, face_maker(strip_ref(strip, index)));
   });
 }
 
@@ -42,15 +42,16 @@ void ImageDrawer::find_solids() {
     if (see_quad(quad, setting_.camera, &solid.seen)) solids_.push_back(solid);
   };
   visit_agents(setting_, *request_.scene, *request_.view, [&](const AgentBox& box, int32_t agent) {
-    const FaceOwner owner = agent_owner(box, agent - world_begin());
+    const PrimitiveRef primitive = agent_ref(box, agent - world_begin());
     const bool may_hide = may_occlude(box, setting_.camera);
     visit_faces_to_eye(box, setting_.camera, [&](int face) {
-      keep(cuboid_quad(box, face, setting_.debug_palette), {owner, face_entry(owner.number, face), may_hide, {}});
+      keep(cuboid_quad(box, face, setting_.debug_palette),
+           {primitive, face_entry(primitive.object_id, face), may_hide, {}});
     });
   });
   visit_walls(setting_, *request_.geometry, [&](const WallFace& wall, int32_t index) {
-    const FaceOwner owner = wall_owner(index);
-    keep(wall_quad(wall), {owner, owner.number, may_occlude(wall, setting_.camera), {}});
+    const PrimitiveRef primitive = wall_ref(index);
+    keep(wall_quad(wall), {primitive, primitive.object_id, may_occlude(wall, setting_.camera), {}});
   });
 }
 
@@ -62,7 +63,7 @@ void ImageDrawer::find_occluders() {
     face.covered_px2 = occluded_px2(setting_.camera, solid.seen, &face.quad, &face.turns_right);
     if (face.covered_px2 > 0.0f) occluding_.push_back(face);
   }
-  const auto count = std::min(occluding_.size(), static_cast<std::size_t>(Occluders::kMost));
+  const auto count = std::min(occluding_.size(), static_cast<std::size_t>(Occluders::kMaxCount));
   std::partial_sort(occluding_.begin(), occluding_.begin() + static_cast<std::ptrdiff_t>(count), occluding_.end(),
                     [](const OccludingFace& a, const OccludingFace& b) {
                       return a.covered_px2 != b.covered_px2 ? a.covered_px2 > b.covered_px2
@@ -92,16 +93,16 @@ void ImageDrawer::visit_spans(const ScreenFace& face, RowRange rows, Visit&& vis
   }
 }
 
-// Finds, for each pixel of some rows, the largest burying_nearness() of the faces that cover it fully.
-void ImageDrawer::find_burying(FaceRange faces, RowRange rows) {
-  burying_.assign(static_cast<std::size_t>((rows.y_end - rows.y_begin) * setting_.camera.width_px), 0.0f);
+// Finds, for each pixel of some rows, the largest occluder_bound() of the faces that cover it fully.
+void ImageDrawer::find_occluder_bounds(FaceRange faces, RowRange rows) {
+  occluder_bounds_.assign(static_cast<std::size_t>((rows.y_end - rows.y_begin) * setting_.camera.width_px), 0.0f);
   for (int32_t f = faces.begin; f < faces.end; ++f) {
     const ScreenFace& face = faces_[static_cast<std::size_t>(f)];
     if (is_strip(face)) continue;  // buries nothing
     visit_spans(face, rows, [&](int y, std::size_t row, const RowSpan& span) {
       for (int x = span.full_begin; x < span.full_end; ++x) {
-        float& burying = burying_[row + static_cast<std::size_t>(x)];
-        burying = max_of(burying, burying_nearness(face, x, y));
+        float& bound = occluder_bounds_[row + static_cast<std::size_t>(x)];
+        bound = max_of(bound, occluder_bound(face, x, y));
       }
     });
   }
@@ -109,8 +110,8 @@ void ImageDrawer::find_burying(FaceRange faces, RowRange rows) {
 
 // Spreads faces over the pixels of some rows.
 void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
-  find_burying(faces, rows);
-  first_fragment_.assign(burying_.size(), -1);
+  find_occluder_bounds(faces, rows);
+  first_fragment_.assign(occluder_bounds_.size(), -1);
   fragments_.clear();
   for (int32_t f = faces.begin; f < faces.end; ++f) {
     const ScreenFace& face = faces_[static_cast<std::size_t>(f)];
@@ -119,9 +120,9 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
       for (int x = span.begin; x < span.end; ++x) {
         const bool covers_fully = x >= span.full_begin && x < span.full_end;
         const std::size_t pixel = row + static_cast<std::size_t>(x);
-        if (!may_show_before(face, burying_[pixel], x, y)) continue;
+        if (!passes_occluder_bound(face, occluder_bounds_[pixel], x, y)) continue;
         const PixelCoverage coverage = covers_fully ? PixelCoverage{1.0f, kAllSamples}
-                                                    : pixel_coverage(edges, face.edge_count, face.least_area(), x, y);
+                                                    : pixel_coverage(edges, face.edge_count, face.min_area(), x, y);
         if (coverage.area <= 0.0f) continue;
         fragments_.push_back({make_fragment(face, f, coverage, x, y), first_fragment_[pixel]});
         first_fragment_[pixel] = static_cast<int32_t>(fragments_.size()) - 1;
@@ -131,7 +132,7 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
 }
 
 // Takes the fragments of a pixel, given the first of them, from their list; the nearest first.
-void ImageDrawer::gather_pixel(int32_t first) {
+void ImageDrawer::collect_fragments(int32_t first) {
   pixel_.clear();
   for (int32_t i = first; i >= 0; i = fragments_[static_cast<std::size_t>(i)].next) {
     pixel_.push_back(fragments_[static_cast<std::size_t>(i)].fragment);
@@ -160,7 +161,7 @@ void ImageDrawer::hide_fragments(int x, int y) {
 }
 
 template <typename Visit, typename Finish>
-void ImageDrawer::weigh_rows(RowRange rows, Visit&& visit, Finish&& finish) {
+void ImageDrawer::composite_rows(RowRange rows, Visit&& visit, Finish&& finish) {
   const int width = setting_.camera.width_px;
   int pixel = 0;
   for (int y = rows.y_begin; y < rows.y_end; ++y) {
@@ -177,15 +178,15 @@ void ImageDrawer::weigh_rows(RowRange rows, Visit&& visit, Finish&& finish) {
         finish(pixel, faces_[static_cast<std::size_t>(alone.fragment.face)].color * weight);
         continue;
       }
-      gather_pixel(first);
+      collect_fragments(first);
       hide_fragments(x, y);
-      PixelSum sum;
+      PixelAccumulator sum;
       weights_.resize(pixel_.size());
       for (std::size_t i = 0; i < pixel_.size(); ++i) {
-        weights_[i] = PixelSum::weight_of(pixel_[i].coverage, free_[i]);
+        weights_[i] = PixelAccumulator::weight_of(pixel_[i].coverage, free_[i]);
         sum.add(weights_[i], faces_[static_cast<std::size_t>(pixel_[i].face)].color);
       }
-      const PixelSum::Shares shares = sum.shares();
+      const PixelAccumulator::Shares shares = sum.shares();
       for (std::size_t i = 0; i < pixel_.size(); ++i) visit(pixel, pixel_[i], shares.of(weights_[i]));
       finish(pixel, sum.color(shares));
     }
@@ -201,7 +202,7 @@ void ImageDrawer::draw(const ImageTarget& target) {
       const RowRange rows{y_begin, min_of(height, y_begin + band_rows)};
       make_fragments({0, static_cast<int32_t>(faces_.size())}, rows);
       auto* first = out + int64_t{y_begin} * width;
-      weigh_rows(
+      composite_rows(
           rows, [](int, const Fragment&, float) {},
           [&](int pixel, Rgb color) {
             first[pixel] = value_of(color.r);
@@ -229,7 +230,7 @@ void ImageDrawer::order_pixel(int x, int y) {
     const uint64_t shared = shared_samples(other.coverage, fragment.coverage);
     const ScreenFace& face = faces_[static_cast<std::size_t>(fragment.face)];
     const ScreenFace& other_face = faces_[static_cast<std::size_t>(other.face)];
-    return shared != 0 && face.number != other_face.number &&
+    return shared != 0 && face.object_id != other_face.object_id &&
            is_in_front(other_face, face, corner + middle_of(shared), stands_here);
   };
   for (auto next = pixel_.begin(); next != pixel_.end(); ++next) {
@@ -245,7 +246,7 @@ void ImageDrawer::visit_fragments(const std::function<void(int, const PixelCover
   const int width = setting_.camera.width_px, height = setting_.camera.height_px;
   make_fragments({0, static_cast<int32_t>(faces_.size())}, {0, height});
   for (int pixel = 0; pixel < width * height; ++pixel) {
-    gather_pixel(first_fragment_[static_cast<std::size_t>(pixel)]);
+    collect_fragments(first_fragment_[static_cast<std::size_t>(pixel)]);
     order_pixel(pixel % width, pixel / width);
     for (const Fragment& fragment : pixel_) {
       visit(pixel, fragment.coverage, faces_[static_cast<std::size_t>(fragment.face)].color);
@@ -287,9 +288,9 @@ void ImageDrawer::draw_planes(const ImageTarget& target) const {
   }
 }
 
-void ImageDrawer::weigh_agent(int32_t agent, SeenWeight* sum_inout) {
-  const uint32_t number = thing_number(kAgentKind, agent - world_begin());
-  auto is_wanted = [number](const ScreenFace& face) { return face.number == number; };
+void ImageDrawer::accumulate_visibility(int32_t agent, VisibilitySum* sum_inout) {
+  const uint32_t object_id = make_object_id(kAgentKind, agent - world_begin());
+  auto is_wanted = [object_id](const ScreenFace& face) { return face.object_id == object_id; };
   const auto begin = std::find_if(faces_.begin(), faces_.end(), is_wanted);
   const auto end = std::find_if_not(begin, faces_.end(), is_wanted);
   const FaceRange wanted{static_cast<int32_t>(begin - faces_.begin()), static_cast<int32_t>(end - faces_.begin())};
@@ -304,10 +305,10 @@ void ImageDrawer::weigh_agent(int32_t agent, SeenWeight* sum_inout) {
     auto weigh = [&](FaceRange faces) {
       int64_t weight = 0;
       make_fragments(faces, rows);
-      weigh_rows(
+      composite_rows(
           rows,
           [&](int, const Fragment& fragment, float weighs) {
-            if (fragment.face >= wanted.begin && fragment.face < wanted.end) weight += SeenWeight::units_of(weighs);
+            if (fragment.face >= wanted.begin && fragment.face < wanted.end) weight += VisibilitySum::units_of(weighs);
           },
           [](int, Rgb) {});
       return weight;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "pictura/common/image.h"
-#include "pictura/common/raster_item.h"
+#include "pictura/common/raster_face_setup.h"
 
 namespace pictura {
 
@@ -41,7 +41,7 @@ class ImageDrawer {
   /// Draws what was prepared.
   void draw(const ImageTarget& target);
   /// Adds what an agent weighs in the prepared image, among all others and without them.
-  void weigh_agent(int32_t agent, SeenWeight* sum_inout);
+  void accumulate_visibility(int32_t agent, VisibilitySum* sum_inout);
   /// Calls visit(y * width + x, coverage, colour) for what each face covers of each pixel of the prepared image, front
   /// to back: for measuring other ways to composite.
   void visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit);
@@ -69,7 +69,7 @@ class ImageDrawer {
 
   // A face of an agent's box, or a wall.
   struct Solid {
-    FaceOwner owner;
+    PrimitiveRef primitive;
     uint32_t entry = 0;
     bool may_occlude = false;
     CameraQuad seen;
@@ -94,18 +94,18 @@ class ImageDrawer {
   void find_solids();
   void find_occluders();
   // Takes the faces that a thing emits.
-  auto face_maker(FaceOwner owner);
+  auto face_maker(PrimitiveRef primitive);
   template <typename Visit>
   void visit_spans(const ScreenFace& face, RowRange rows, Visit&& visit) const;
-  void find_burying(FaceRange faces, RowRange rows);
+  void find_occluder_bounds(FaceRange faces, RowRange rows);
   void make_fragments(FaceRange faces, RowRange rows);
-  void gather_pixel(int32_t first);
+  void collect_fragments(int32_t first);
   void order_pixel(int x, int y);
   void hide_fragments(int x, int y);
   // Weighs the fragments of all pixels of the rows: visit(pixel index, fragment, weight) for each, then
   // finish(pixel index, color).
   template <typename Visit, typename Finish>
-  void weigh_rows(RowRange rows, Visit&& visit, Finish&& finish);
+  void composite_rows(RowRange rows, Visit&& visit, Finish&& finish);
   void draw_planes(const ImageTarget& target) const;
   bool stands(uint32_t solid, uint32_t strip) const;
   int32_t world_begin() const { return request_.scene->world_begin[static_cast<std::size_t>(request_.view->world)]; }
@@ -116,13 +116,13 @@ class ImageDrawer {
   std::vector<OccludingFace> occluding_;
   EdgePool edges_;
   std::vector<ScreenFace> faces_;
-  std::vector<float> burying_;           // [pixels of some rows] the largest burying_nearness()
+  std::vector<float> occluder_bounds_;   // [pixels of some rows] the largest occluder_bound()
   std::vector<int32_t> first_fragment_;  // [pixels of some rows] the head of each one's list
   std::vector<LinkedFragment> fragments_;
   // Of one pixel.
   std::vector<Fragment> pixel_;
   std::vector<uint64_t> free_;
-  std::vector<PixelSum::Weight> weights_;
+  std::vector<PixelAccumulator::Weight> weights_;
 };
 
 }  // namespace pictura

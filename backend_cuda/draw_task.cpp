@@ -65,7 +65,7 @@ std::string message_of(const Fault& fault) {
       case FaultKind::too_few_lights: return "its world has fewer light states than its map signals";
       case FaultKind::too_many_agents: return fmt::format("its world has more than {} agents", kMaxBoxesPerWorld);
       case FaultKind::bad_query: return "no such view, or no such agent in its world";
-      case FaultKind::no_room: return "shows more than a world can hold";
+      case FaultKind::capacity_exceeded: return "shows more than a world can hold";
       case FaultKind::none: break;
     }
     return "";

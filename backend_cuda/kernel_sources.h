@@ -22,9 +22,9 @@ struct KernelProgram {
 KernelProgram renderer_program();
 
 /// The kernels, in the order in which they are launched.
-enum Kernel { kCull, kGather, kClip, kDraw, kDrawPostponed, kDrawOverflow, kVisibility, kNumKernels };
+enum Kernel { kCull, kSetupFaces, kClip, kDraw, kDrawDeferred, kDrawOverflow, kVisibility, kNumKernels };
 constexpr std::array<const char*, kNumKernels> kKernelNames{
-    "pictura_cull",           "pictura_gather",        "pictura_clip",      "pictura_draw",
-    "pictura_draw_postponed", "pictura_draw_overflow", "pictura_visibility"};
+    "pictura_cull",          "pictura_setup_faces",   "pictura_clip",      "pictura_draw",
+    "pictura_draw_deferred", "pictura_draw_overflow", "pictura_visibility"};
 
 }  // namespace pictura::cuda

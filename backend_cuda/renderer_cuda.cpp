@@ -66,7 +66,7 @@ struct UploadedGeometry {
 };
 
 // Scratch memory, and the largest calls that it is for.
-struct Room {
+struct ScratchMemory {
   std::size_t agents = 0, views = 0;
   int pieces = 0, heads = 0;
   cuda::ScratchPlan plan;
@@ -80,7 +80,7 @@ class CudaRenderer final : public Renderer {
       : config_(check_config("cuda", config)), cameras_(pinhole_cameras(config.rig)), library_(config.rig) {
     PICTURA_CUDA(cudaDeviceGetAttribute(&processors_, cudaDevAttrMultiProcessorCount, device_.number()));
     *origin_out = library_.origin();
-    make_room(0, 1);  // what is too little for any scene is told at once
+    ensure_capacity(0, 1);  // what is too little for any scene is told at once
     *fault_.host() = cuda::kNoFault;
     counters_.fill(0);
     PICTURA_CUDA(cudaDeviceSynchronize());  // for whatever stream the first call is on
@@ -112,12 +112,12 @@ class CudaRenderer final : public Renderer {
     const auto on_stream = static_cast<cudaStream_t>(stream.handle);
     clear_counters(on_stream);
     // In as few parts as there is room for, of one size.
-    const std::size_t most_views = room_.plan.views, parts = (views.size() + most_views - 1) / most_views;
+    const std::size_t max_views = scratch_.plan.views, parts = (views.size() + max_views - 1) / max_views;
     const auto views_at_once = static_cast<int32_t>((views.size() + parts - 1) / std::max(parts, std::size_t{1}));
     for (int32_t left = task.num_views; left > 0; left -= task.num_views, task.first_view += task.num_views) {
       task.num_views = std::min(left, views_at_once);
       counters_are_clear_ = false;  // where a launch fails
-      PICTURA_CUDA(cuda::launch_draw(library_.kernels(), task, room_.large.view(), processors_, on_stream));
+      PICTURA_CUDA(cuda::launch_draw(library_.kernels(), task, scratch_.large.view(), processors_, on_stream));
       counters_are_clear_ = true;
     }
   }
@@ -134,7 +134,7 @@ class CudaRenderer final : public Renderer {
     check_answers(name(), queries.size(), visibility_out.size());
     const cuda::VisibilityTask task{draw_task(scene, views, nullptr), queries.data(),
                                     static_cast<int32_t>(queries.size()), visibility_out.data()};
-    PICTURA_CUDA(cuda::launch_visibility(library_.kernels(), task, room_.large.view(),
+    PICTURA_CUDA(cuda::launch_visibility(library_.kernels(), task, scratch_.large.view(),
                                          static_cast<cudaStream_t>(stream.handle)));
   }
 
@@ -154,12 +154,12 @@ class CudaRenderer final : public Renderer {
     const std::size_t images_total = views.size() * config_.rig.cameras.size();
     PICTURA_CHECK(images_total < (std::size_t{1} << 31), "renderer cuda: expected fewer than 2^31 images, got {}",
                   images_total);
-    make_room(scene.agents.size(), views.size());
+    ensure_capacity(scene.agents.size(), views.size());
     cuda::DrawTask task = cuda::make_draw_task(config_, cameras_, scene, views, images);
     task.geometries = geometry_views_.data();
     task.num_geometries = static_cast<int32_t>(geometries_.size());
     task.fault = fault_.device();
-    room_.pool.serve(&task);
+    scratch_.pool.serve(&task);
     task.counters = counters_.data();
     return task;
   }
@@ -171,18 +171,19 @@ class CudaRenderer final : public Renderer {
     counters_are_clear_ = true;
   }
 
-  // Room for as many views as the bound allows, and in the last launch for all that a world can hold: after this
+  // Memory for as many views as the bound allows, and in the last launch for all that a world can hold: after this
   // nothing is cut off. Allocates nothing where an earlier call needed as much. Where it throws, the next call makes
   // room anew.
-  void make_room(std::size_t agents, std::size_t views) {
-    agents = std::max(room_.agents, std::min(agents, static_cast<std::size_t>(kMaxBoxesPerWorld)));
-    views = std::max({room_.views, std::size_t{1}, std::min(views, kViewsAtOnce)});
+  void ensure_capacity(std::size_t agents, std::size_t views) {
+    agents = std::max(scratch_.agents, std::min(agents, static_cast<std::size_t>(kMaxBoxesPerWorld)));
+    views = std::max({scratch_.views, std::size_t{1}, std::min(views, kViewsAtOnce)});
     int pieces = 0, heads = 0;
     for (const UploadedGeometry& each : geometries_) {
       pieces = std::max(pieces, each.pieces());
       heads = std::max(heads, static_cast<int>(each.heads.size()));
     }
-    if (agents == room_.agents && views == room_.views && pieces == room_.pieces && heads == room_.heads) return;
+    if (agents == scratch_.agents && views == scratch_.views && pieces == scratch_.pieces && heads == scratch_.heads)
+      return;
     cuda::Scratch large = cuda::large_sizes(pieces, heads, agents);
     const std::size_t large_bytes = cuda::large_block_bytes(large);
     const cuda::ScratchPlan plan =
@@ -190,15 +191,15 @@ class CudaRenderer final : public Renderer {
                             .large_block_bytes = cuda::LargeBuffers<DeviceBuffer>::block_bytes(large, large_bytes),
                             .views = views,
                             .view_bytes = cameras_.size() * cuda::kPoolImageBytes,
-                            .pool_bytes = cuda::kLeastPoolBytes},
+                            .pool_bytes = cuda::kMinPoolBytes},
                            config_.max_scratch_bytes);
     large.blocks = plan.large_blocks;
     // Released before it is replaced, or both would count.
-    room_ = Room();
-    Room room{agents, views, pieces, heads, plan, {}, {}};
-    room.large = cuda::LargeBuffers<DeviceBuffer>(large, large_bytes);
-    room.pool = cuda::PoolBuffers<DeviceBuffer>(cuda::pool_sizes(plan.views * cameras_.size()));
-    room_ = std::move(room);
+    scratch_ = ScratchMemory();
+    ScratchMemory larger{agents, views, pieces, heads, plan, {}, {}};
+    larger.large = cuda::LargeBuffers<DeviceBuffer>(large, large_bytes);
+    larger.pool = cuda::PoolBuffers<DeviceBuffer>(cuda::pool_sizes(plan.views * cameras_.size()));
+    scratch_ = std::move(larger);
   }
 
   void throw_fault() {
@@ -215,7 +216,7 @@ class CudaRenderer final : public Renderer {
   std::vector<UploadedGeometry> geometries_;
   DeviceBuffer<cuda::DeviceGeometry> geometry_views_;
   int processors_ = 0;
-  Room room_;
+  ScratchMemory scratch_;
   DeviceBuffer<cuda::DrawCounters> counters_{1};
   bool counters_are_clear_ = true;
   MappedValue<cuda::FaultWord> fault_;

@@ -40,27 +40,27 @@ struct PartPlan {
 };
 
 /// Room for what a WarpQueue holds.
-struct WarpQueueRoom {
+struct WarpQueueStorage {
   uint32_t a[2 * kWarpSize], b[2 * kWarpSize];
 };
 
 /// What a warp keeps for its lanes to read of each other.
 struct WarpState {
-  WarpQueueRoom queue;
+  WarpQueueStorage queue;
   uint8_t owners[kWarpSize];
 };
 
 /// In shared memory, whatever the block's other memory is.
 struct BlockState {
-  GatheredImage shown;     // what is drawn
-  GatheredImage upcoming;  // what is drawn next
+  PreparedImage shown;     // what is drawn
+  PreparedImage upcoming;  // what is drawn next
   Scratch scratch;         // this block's
   ScreenFace* faces;       // of this image
   PolygonEdge* edges;      // of all images in the pool
   // While faces are gathered.
   ViewState view;
-  FaceMaking making;
-  GatherCounts listed;
+  FaceSetupContext context;
+  SetupCounts listed;
   int32_t num_entries, num_faces, num_clipped, overflow, usable;
   // While pixels are drawn.
   int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, next_fragments, image;
@@ -121,7 +121,7 @@ __device__ inline bool set_view(ViewState* state, const DrawTask& task, int32_t 
 }
 
 // Sum of the values of the lanes up to this one.
-__device__ inline int sum_up_to(int value) {
+__device__ inline int warp_inclusive_sum(int value) {
   for (int step = 1; step < kWarpSize; step *= 2) {
     const int other = __shfl_up_sync(kAllLanes, value, step);
     if (lane_index() >= step) value += other;
@@ -131,13 +131,13 @@ __device__ inline int sum_up_to(int value) {
 
 // Adds what the lanes of a warp want together to a counter, whose value before that all get. end: of each lane, what it
 // and those before it want.
-__device__ inline int32_t take_places(int32_t* counter, int end) {
+__device__ inline int32_t warp_allocate(int32_t* counter, int end) {
   int32_t first = 0;
   if (lane_index() == kWarpSize - 1) first = atomicAdd(counter, end);
   return __shfl_sync(kAllLanes, first, kWarpSize - 1);
 }
 // ... of those that want one.
-__device__ inline int32_t take_place(int32_t* counter, bool wanted) {
+__device__ inline int32_t warp_allocate_one(int32_t* counter, bool wanted) {
   const unsigned wanting = __ballot_sync(kAllLanes, wanted);
   int32_t first = 0;
   if (lane_index() == 0 && wanting != 0) first = atomicAdd(counter, __popc(wanting));
@@ -146,7 +146,7 @@ __device__ inline int32_t take_place(int32_t* counter, bool wanted) {
 
 // Lanes of a warp bring items that stand one behind the other, those of a lane from `begin` on. Of the item that stands
 // as far behind `first` as the lane is: the number, among lanes that have some, of the lane whose item it is.
-__device__ inline int owners_rank(int first, int begin, bool has_some) {
+__device__ inline int owner_rank(int first, int begin, bool has_some) {
   const bool starts_here = has_some && begin >= first && begin < first + kWarpSize;
   const unsigned starts = __reduce_or_sync(kAllLanes, starts_here ? 1u << (begin - first) : 0u);
   const int before = __popc(__ballot_sync(kAllLanes, has_some && begin < first));
@@ -157,7 +157,7 @@ __device__ inline int owners_rank(int first, int begin, bool has_some) {
 // owner, k) is called by all lanes, for 32 items at a time, with the item's number, the lane whose item it is (-1: none
 // is left), and its number among that lane's.
 template <typename Visit>
-__device__ inline void share_out(WarpState* warp, int count, int end, Visit&& visit) {
+__device__ inline void warp_expand(WarpState* warp, int count, int end, Visit&& visit) {
   const int lane = lane_index(), begin = end - count;
   const int total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
   // Those that have items, without gaps.
@@ -166,9 +166,9 @@ __device__ inline void share_out(WarpState* warp, int count, int end, Visit&& vi
   __syncwarp();
   const int owner_of_rank = warp->owners[lane];
   __syncwarp();
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int item = 0; item < total; item += kWarpSize) {
-    const int owner = __shfl_sync(kAllLanes, owner_of_rank, owners_rank(item, begin, count > 0)) % kWarpSize;
+    const int owner = __shfl_sync(kAllLanes, owner_of_rank, owner_rank(item, begin, count > 0)) % kWarpSize;
     const int k = item + lane - __shfl_sync(kAllLanes, begin, owner);
     visit(item + lane, item + lane < total ? owner : -1, k);
   }
@@ -186,13 +186,13 @@ __device__ inline int deals_of(int count) {
 // push a pair; while is_ready(), take() gives a pair to each lane, or to as many as there are left.
 class WarpQueue {
  public:
-  __device__ explicit WarpQueue(WarpQueueRoom* room) : room_(room) {}
+  __device__ explicit WarpQueue(WarpQueueStorage* storage) : storage_(storage) {}
   __device__ void push(bool wanted, uint32_t a, uint32_t b) {
     const unsigned pushing = __ballot_sync(kAllLanes, wanted);
     if (wanted) {
       const int place = count_ + __popc(pushing & lanes_below());
-      room_->a[place] = a;
-      room_->b[place] = b;
+      storage_->a[place] = a;
+      storage_->b[place] = b;
     }
     count_ += __popc(pushing);
   }
@@ -207,8 +207,8 @@ class WarpQueue {
     const int first = max_of(count_ - kWarpSize, 0), place = first + lane_index();
     Pair pair{place < count_, 0, 0};
     if (pair.is_one) {
-      pair.a = room_->a[place];
-      pair.b = room_->b[place];
+      pair.a = storage_->a[place];
+      pair.b = storage_->b[place];
     }
     count_ = first;
     __syncwarp();
@@ -216,7 +216,7 @@ class WarpQueue {
   }
 
  private:
-  WarpQueueRoom* room_;
+  WarpQueueStorage* storage_;
   int count_ = 0;
 };
 
@@ -226,7 +226,7 @@ __device__ inline int64_t block_sum(int64_t* of_thread, int64_t value) {
   of_thread[threadIdx.x] = value;
   sync_block();
   int64_t sum = 0;
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int i = 0; i < num_threads(); ++i) sum += of_thread[i];
   return sum;
 }

@@ -13,7 +13,7 @@ static_assert(kMaxPolygonCorners <= kWarpSize);
 constexpr int kLaneCorners = 8;
 
 /// What a warp that clips keeps in shared memory.
-struct ClipRoom {
+struct ClipShared {
   Quad quad;  // of one lane, for all
   // Of corners: a column for each lane, or the first row for all. A corner may be cut and stay beyond the last.
   static constexpr int kRows = kLaneCorners + 2;
@@ -38,18 +38,18 @@ static_assert(kWarpSize <= 32 && kLaneCorners <= 16);
 /// The corners of one lane's face.
 class LaneCorners {
  public:
-  __device__ explicit LaneCorners(ClipRoom* room) : room_(room) {}
+  __device__ explicit LaneCorners(ClipShared* storage) : storage_(storage) {}
   __device__ Vec3 operator[](int i) const {
-    return {room_->x[i][lane_index()], room_->y[i][lane_index()], room_->z[i][lane_index()]};
+    return {storage_->x[i][lane_index()], storage_->y[i][lane_index()], storage_->z[i][lane_index()]};
   }
   __device__ void set(int i, Vec3 p) const {
-    room_->x[i][lane_index()] = p.x;
-    room_->y[i][lane_index()] = p.y;
-    room_->z[i][lane_index()] = p.z;
+    storage_->x[i][lane_index()] = p.x;
+    storage_->y[i][lane_index()] = p.y;
+    storage_->z[i][lane_index()] = p.z;
   }
 
  private:
-  ClipRoom* room_;
+  ClipShared* storage_;
 };
 
 // Stores a value by words of 16 bytes: by words of 4, the lanes of a warp would write a part of memory each.
@@ -88,7 +88,7 @@ struct SharedFace {
   int count = 0;
   FacePlane plane;
   Rgb color;
-  FaceOwner owner;
+  PrimitiveRef primitive;
 };
 
 __device__ inline Vec3 corner_of(Vec3 corner, int lane) {
@@ -105,30 +105,30 @@ __device__ inline float sum_in_order(float value) {
 
 // The least and the greatest of the lanes' values, by integers of the same order.
 __device__ inline int32_t in_order(int32_t bits) { return bits ^ (bits >> 31 & 0x7FFFFFFF); }
-__device__ inline float least_of(float value) {
+__device__ inline float warp_min(float value) {
   return __int_as_float(in_order(__reduce_min_sync(kAllLanes, in_order(__float_as_int(value)))));
 }
-__device__ inline float greatest_of(float value) {
+__device__ inline float warp_max(float value) {
   return __int_as_float(in_order(__reduce_max_sync(kAllLanes, in_order(__float_as_int(value)))));
 }
 
 // Hands the quad of a lane to all.
-__device__ inline SharedFace share_quad(ClipRoom* room, int owner, const Quad& quad) {
+__device__ inline SharedFace share_quad(ClipShared* storage, int owner, const Quad& quad) {
   __syncwarp();
-  if (lane_index() == owner) room->quad = quad;
+  if (lane_index() == owner) storage->quad = quad;
   __syncwarp();
-  const CameraQuad& seen = room->quad.seen;
-  return {seen.corner[lane_index() & 3], 4, seen.plane, seen.color, room->quad.owner};
+  const CameraQuad& seen = storage->quad.seen;
+  return {seen.corner[lane_index() & 3], 4, seen.plane, seen.color, storage->quad.primitive};
 }
 
 // The disk of a lit head; of no corners where it has faded to black.
-__device__ inline SharedFace make_light(const FaceMaking& making, int32_t index) {
-  const LightHead head = making.heads[index];
-  const PinholeCamera& camera = making.setting.camera;
+__device__ inline SharedFace make_light(const FaceSetupContext& context, int32_t index) {
+  const LightHead head = context.heads[index];
+  const PinholeCamera& camera = context.setting.camera;
   LightDisk disk;
-  const bool is_seen = see_light(head, making.lights[head.signal], camera, &disk);
+  const bool is_seen = see_light(head, context.lights[head.signal], camera, &disk);
   return {to_camera(camera, light_corner(head, lane_index())), is_seen ? kLightSides : 0, disk.plane, disk.color,
-          light_owner(index)};
+          light_ref(index)};
 }
 
 // clip_face of a lane's face, in place: corners are written no further than one behind the last that was read. The
@@ -137,13 +137,13 @@ constexpr int kOutgrown = -1;
 __device__ inline int clip(const Frustum& f, unsigned crossed, LaneCorners corners) {
   int count = crossed == kOutside ? 0 : 4;
   // Each lane goes through its own planes.
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (; crossed != 0 && count > 0; crossed &= crossed - 1) {
     const ClipPlane plane(f, __ffs(static_cast<int>(crossed)) - 1);
     Vec3 previous = corners[count - 1], current = corners[0];
     float previous_inside = plane.inside(previous);
     int kept = 0;
-    PICTURA_KEEP_LOOP
+    PICTURA_NO_UNROLL
     for (int i = 0; i < count; ++i) {
       const Vec3 next = corners[min_of(i + 1, count - 1)];
       const float inside = plane.inside(current);
@@ -166,10 +166,10 @@ __device__ inline int clip(const Frustum& f, unsigned crossed, LaneCorners corne
 // returns which of its corners begin an edge, a bit for each; none where it covers nothing.
 __device__ inline unsigned project_in_place(const PinholeCamera& camera, LaneCorners corners, int count,
                                             ScreenBounds* bounds, bool* turns_right) {
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int i = 0; i < count; ++i) {
     const Vec3 p = corners[i];
-    const float inverse_depth = inverse_of(p.z);
+    const float inverse_depth = reciprocal_in_range(p.z);
     const Vec2 corner = project(camera, p, inverse_depth);
     bounds->add(corner, inverse_depth);
     corners.set(i, {corner.x, corner.y, 0.0f});
@@ -179,7 +179,7 @@ __device__ inline unsigned project_in_place(const PinholeCamera& camera, LaneCor
   Vec2 corner = first;
   float twice_area = 0.0f;
   unsigned edges = 0;
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int i = 0; i < count; ++i) {
     const Vec2 next = i + 1 < count ? corners[i + 1].xy() : first;
     if (i > 0 && i + 1 < count) twice_area += cross(corner - first, next - first);
@@ -187,11 +187,11 @@ __device__ inline unsigned project_in_place(const PinholeCamera& camera, LaneCor
     corner = next;
   }
   *turns_right = twice_area > 0.0f;
-  return fabsf(twice_area) < kLeastTwiceArea_px2 ? 0 : edges;
+  return fabsf(twice_area) < kMinTwiceArea_px2 ? 0 : edges;
 }
 
 // ... of a face whose corners the lanes hold.
-__device__ inline void clip(const Frustum& f, ClipRoom* room, SharedFace* face_inout) {
+__device__ inline void clip(const Frustum& f, ClipShared* storage, SharedFace* face_inout) {
   const int lane = lane_index();
   Vec3 corner = face_inout->corner;
   int count = face_inout->count;
@@ -199,7 +199,7 @@ __device__ inline void clip(const Frustum& f, ClipRoom* room, SharedFace* face_i
   const bool is_outside = __reduce_or_sync(kAllLanes, lane < count ? ~outside : 0u) != ~0u;
   unsigned crossed = is_outside ? 0u : __reduce_or_sync(kAllLanes, outside);
   if (is_outside) count = 0;
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (; crossed != 0 && count > 0; crossed &= crossed - 1) {
     const ClipPlane plane(f, __ffs(static_cast<int>(crossed)) - 1);
     const int before = lane > 0 ? lane - 1 : count - 1;
@@ -212,9 +212,9 @@ __device__ inline void clip(const Frustum& f, ClipRoom* room, SharedFace* face_i
     // Only a face that is not quite convex could outgrow the room; it loses corners then.
     const bool fits = place + 2 <= kMaxPolygonCorners;
     auto keep = [&](int at, Vec3 p) {
-      room->x[0][at] = p.x;
-      room->y[0][at] = p.y;
-      room->z[0][at] = p.z;
+      storage->x[0][at] = p.x;
+      storage->y[0][at] = p.y;
+      storage->z[0][at] = p.z;
     };
     if (is_cut && fits) keep(place, cut_between(previous, previous_inside, corner, inside));
     if (stays && fits) keep(place + (is_cut ? 1 : 0), corner);
@@ -222,7 +222,7 @@ __device__ inline void clip(const Frustum& f, ClipRoom* room, SharedFace* face_i
     count = __popc(cuts & fitting) + __popc(staying & fitting);
     if (count < 3) count = 0;
     __syncwarp();
-    corner = {room->x[0][lane], room->y[0][lane], room->z[0][lane]};
+    corner = {storage->x[0][lane], storage->y[0][lane], storage->z[0][lane]};
     __syncwarp();
   }
   face_inout->corner = corner;
@@ -230,18 +230,18 @@ __device__ inline void clip(const Frustum& f, ClipRoom* room, SharedFace* face_i
 }
 
 // make_screen_face of a clipped face whose corners the lanes hold, with edges from edge_begin on.
-__device__ inline bool make_screen_face(const FaceMaking& making, const SharedFace& face, int32_t edge_begin,
+__device__ inline bool make_screen_face(const FaceSetupContext& context, const SharedFace& face, int32_t edge_begin,
                                         ScreenFace* face_out) {
-  const PinholeCamera& camera = making.setting.camera;
+  const PinholeCamera& camera = context.setting.camera;
   const int lane = lane_index(), count = face.count;
   const bool is_corner = lane < count;
-  const float inverse_depth = is_corner ? inverse_of(face.corner.z) : 0.0f;
+  const float inverse_depth = is_corner ? reciprocal_in_range(face.corner.z) : 0.0f;
   const Vec2 corner = project(camera, face.corner, inverse_depth);
   ScreenBounds bounds;
-  bounds.low = {least_of(is_corner ? corner.x : 1e30f), least_of(is_corner ? corner.y : 1e30f)};
-  bounds.high = {greatest_of(is_corner ? corner.x : -1e30f), greatest_of(is_corner ? corner.y : -1e30f)};
-  bounds.inverse_depth_low = least_of(is_corner ? inverse_depth : 1e30f);
-  bounds.inverse_depth_high = greatest_of(inverse_depth);
+  bounds.low = {warp_min(is_corner ? corner.x : 1e30f), warp_min(is_corner ? corner.y : 1e30f)};
+  bounds.high = {warp_max(is_corner ? corner.x : -1e30f), warp_max(is_corner ? corner.y : -1e30f)};
+  bounds.inverse_depth_low = warp_min(is_corner ? inverse_depth : 1e30f);
+  bounds.inverse_depth_high = warp_max(inverse_depth);
   if (!bounds.meet_image(camera)) return false;
   const int next_lane = lane + 1 < count ? lane + 1 : 0;
   const Vec2 next{__shfl_sync(kAllLanes, corner.x, next_lane), __shfl_sync(kAllLanes, corner.y, next_lane)};
@@ -249,17 +249,17 @@ __device__ inline bool make_screen_face(const FaceMaking& making, const SharedFa
   // To add 0 changes nothing.
   const bool is_between = lane > 0 && lane + 1 < count;
   const float twice_area = sum_in_order(is_between ? cross(corner - first, next - first) : 0.0f);
-  if (fabsf(twice_area) < kLeastTwiceArea_px2) return false;
+  if (fabsf(twice_area) < kMinTwiceArea_px2) return false;
   const bool turns_right = twice_area > 0.0f;
   const bool is_edge = is_corner && (corner.x != next.x || corner.y != next.y);
   const unsigned edges = __ballot_sync(kAllLanes, is_edge);
   if (is_edge) {
-    store_whole(making.edges + edge_begin + __popc(edges & lanes_below()),
+    store_whole(context.edges + edge_begin + __popc(edges & lanes_below()),
                 make_edge(turns_right ? corner : next, turns_right ? next : corner));
   }
   face_out->edge_count = static_cast<uint8_t>(__popc(edges));
   face_out->color = face.color;
-  set_bounds(camera, making.setting.frustum, bounds, face.plane, face_out);
+  set_bounds(camera, context.setting.frustum, bounds, face.plane, face_out);
   return true;
 }
 

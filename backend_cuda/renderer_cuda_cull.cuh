@@ -17,7 +17,7 @@ struct alignas(16) OutlineSide {
 constexpr int kOutlineSides = 8;
 
 /// What a warp that culls keeps in shared memory.
-struct CullRoom {
+struct CullShared {
   OutlineSide sides[kOutlineSides];
   // Of strips and of walls, as pieces_of says.
   const Ball* balls[2];
@@ -33,16 +33,16 @@ class EntryList {
   __device__ EntryList(uint32_t* entries, int32_t max_entries, int32_t* count)
       : entries_(entries), max_entries_(max_entries), count_(count) {}
   __device__ void push(bool wanted, uint32_t entry) {
-    const int32_t place = take_place(count_, wanted);
+    const int32_t place = warp_allocate_one(count_, wanted);
     if (wanted) set(place, entry);
   }
   /// An entry for each of an agent's faces.
-  __device__ void push_faces(unsigned faces, uint32_t number) {
-    const int count = __popc(faces), end = sum_up_to(count);
-    int32_t place = take_places(count_, end) + end - count;
-    PICTURA_KEEP_LOOP
+  __device__ void push_faces(unsigned faces, uint32_t object_id) {
+    const int count = __popc(faces), end = warp_inclusive_sum(count);
+    int32_t place = warp_allocate(count_, end) + end - count;
+    PICTURA_NO_UNROLL
     for (; faces != 0; faces &= faces - 1) {
-      set(place++, face_entry(number, __ffs(static_cast<int>(faces)) - 1));
+      set(place++, face_entry(object_id, __ffs(static_cast<int>(faces)) - 1));
     }
   }
   /// Fills the last batch, once all warps have found theirs.
@@ -77,7 +77,8 @@ struct GridRows {
 
 // Sets the outline. The hull of the eye and the far corners on the ground has no other sides than those of the pyramid:
 // from the eye to the corners, and around them. All lanes of the warp, one a side, for the rows of strips and of walls.
-__device__ inline GridRows set_outline(CullRoom* room, const ImageSetting& setting, const DeviceGeometry& geometry) {
+__device__ inline GridRows set_outline(CullShared* storage, const ImageSetting& setting,
+                                       const DeviceGeometry& geometry) {
   const int side = lane_index() % kOutlineSides, of_walls = lane_index() / kOutlineSides & 1;
   const PieceGrid& pieces = pieces_of(geometry, of_walls);
   auto corner = [&](int i) { return far_corner(setting.camera, setting.frustum, i).xy(); };
@@ -89,15 +90,15 @@ __device__ inline GridRows set_outline(CullRoom* room, const ImageSetting& setti
   out.a = rises ? first : second;
   out.b = rises ? second : first;
   out.dx_dy = out.a.y != out.b.y ? (out.b.x - out.a.x) / (out.b.y - out.a.y) : 0.0f;
-  out.x_low = lesser_of(out.a.x, out.b.x);
-  out.x_high = greater_of(out.a.x, out.b.x);
-  if (lane_index() < kOutlineSides) room->sides[side] = out;
+  out.x_low = min_no_nan(out.a.x, out.b.x);
+  out.x_high = max_no_nan(out.a.x, out.b.x);
+  if (lane_index() < kOutlineSides) storage->sides[side] = out;
   if (side == 0) {
-    room->balls[of_walls] = pieces.balls.data();
-    room->items[of_walls] = pieces.cells.items.data();
+    storage->balls[of_walls] = pieces.balls.data();
+    storage->items[of_walls] = pieces.cells.items.data();
   }
   const GridView& grid = pieces.cells;
-  const float cells_per_m = inverse_of(grid.cell_m), radius_m = pieces.largest_radius_m;
+  const float cells_per_m = reciprocal_in_range(grid.cell_m), radius_m = pieces.largest_radius_m;
   const int low = cell_at(out.a.y - radius_m - grid.origin_m.y, cells_per_m, grid.num_y);
   const int high = cell_at(out.b.y + radius_m - grid.origin_m.y, cells_per_m, grid.num_y);
   const bool has_pieces = !grid.items.empty();
@@ -122,48 +123,48 @@ __device__ inline PieceRange pieces_of_row(const PieceGrid& pieces, const Outlin
   const float y_high = y_low + grid.cell_m + 2.0f * radius_m;
   // The range in x of the outline's hull between them.
   float x_low = 1e30f, x_high = -1e30f;
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int i = 0; i < kOutlineSides; ++i) {
     const OutlineSide side = sides[i];
-    const float enter = greater_of(side.a.y, y_low), leave = lesser_of(side.b.y, y_high);
-    auto within = [&](float x) { return lesser_of(greater_of(x, side.x_low), side.x_high); };
+    const float enter = max_no_nan(side.a.y, y_low), leave = min_no_nan(side.b.y, y_high);
+    auto within = [&](float x) { return min_no_nan(max_no_nan(x, side.x_low), side.x_high); };
     const float x_in = within(side.a.x + (enter - side.a.y) * side.dx_dy);
     const float x_out = within(side.b.x + (leave - side.b.y) * side.dx_dy);
     const bool is_between = enter <= leave;
-    x_low = lesser_of(x_low, is_between ? lesser_of(x_in, x_out) : x_low);
-    x_high = greater_of(x_high, is_between ? greater_of(x_in, x_out) : x_high);
+    x_low = min_no_nan(x_low, is_between ? min_no_nan(x_in, x_out) : x_low);
+    x_high = max_no_nan(x_high, is_between ? max_no_nan(x_in, x_out) : x_high);
   }
   if (x_low > x_high) return {};
-  const float cells_per_m = inverse_of(grid.cell_m);
+  const float cells_per_m = reciprocal_in_range(grid.cell_m);
   const int32_t* row_cells = grid.begin.data() + static_cast<ptrdiff_t>(row) * grid.num_x;
   const int begin = row_cells[cell_at(x_low - radius_m - grid.origin_m.x, cells_per_m, grid.num_x)];
   return {begin, row_cells[cell_at(x_high + radius_m - grid.origin_m.x, cells_per_m, grid.num_x) + 1] - begin};
 }
 
 // Lists the strips and walls that may show. Each warp of the block, for its part of the candidates.
-__device__ inline void cull_pieces(BlockState* state, CullRoom* room, EntryList* list) {
-  const PinholeCamera& camera = state->making.setting.camera;
-  const Frustum& frustum = state->making.setting.frustum;
+__device__ inline void cull_pieces(BlockState* state, CullShared* storage, EntryList* list) {
+  const PinholeCamera& camera = state->context.setting.camera;
+  const Frustum& frustum = state->context.setting.frustum;
   const DeviceGeometry& geometry = *state->view.geometry;
-  const GridRows rows = set_outline(room, state->making.setting, geometry);
+  const GridRows rows = set_outline(storage, state->context.setting, geometry);
   const int num_rows = rows.count[0] + rows.count[1], lane = lane_index();
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int first_row = 0; first_row < num_rows; first_row += kWarpSize) {
     const int row = first_row + lane;
     const int of_walls = row >= rows.count[0] ? 1 : 0;
     PieceRange range;
     if (row < num_rows) {
-      range = pieces_of_row(pieces_of(geometry, of_walls), room->sides,
+      range = pieces_of_row(pieces_of(geometry, of_walls), storage->sides,
                             of_walls != 0 ? row - rows.count[0] + rows.begin[1] : row + rows.begin[0]);
     }
     // The rows' pieces one behind the other, those of strips first. Of each row that has some, how far its pieces in
     // the grid's list are from there.
     const bool has_some = range.count > 0;
-    const int end = sum_up_to(range.count), begin = end - range.count;
+    const int end = warp_inclusive_sum(range.count), begin = end - range.count;
     const int total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
     const unsigned owning = __ballot_sync(kAllLanes, has_some);
     const int num_of_strips = __popc(__ballot_sync(kAllLanes, has_some && of_walls == 0));
-    if (has_some) room->offsets[__popc(owning & lanes_below())] = range.begin - begin;
+    if (has_some) storage->offsets[__popc(owning & lanes_below())] = range.begin - begin;
     __syncwarp();
     struct Candidate {
       Ball ball;
@@ -171,23 +172,23 @@ __device__ inline void cull_pieces(BlockState* state, CullRoom* room, EntryList*
       int kind;  // as in the room
     };
     auto candidate_of = [&](int item) {
-      const int rank = owners_rank(item, begin, has_some);
+      const int rank = owner_rank(item, begin, has_some);
       const int kind = rank >= num_of_strips ? 1 : 0;
-      const int place = min_of(item + lane, total - 1) + room->offsets[rank];
-      return Candidate{room->balls[kind][place], room->items[kind][place], kind};
+      const int place = min_of(item + lane, total - 1) + storage->offsets[rank];
+      return Candidate{storage->balls[kind][place], storage->items[kind][place], kind};
     };
     int item = warp_index() * kWarpSize;
     Candidate next;
     if (item < total) next = candidate_of(item);
     // The next ones are asked for before these are looked at; beyond the last there stands the last one.
-    PICTURA_KEEP_LOOP
+    PICTURA_NO_UNROLL
     while (item < total) {
       const Candidate candidate = next;
       const bool is_one = item + lane < total;
       item += num_threads();
       next = candidate_of(item);
       const bool shows = ball_in_frustum(frustum, to_camera(camera, candidate.ball.center_m), candidate.ball.radius_m);
-      list->push(shows && is_one, thing_number(candidate.kind != 0 ? kWallKind : kStripKind, candidate.index));
+      list->push(shows && is_one, make_object_id(candidate.kind != 0 ? kWallKind : kStripKind, candidate.index));
     }
     __syncwarp();
   }
@@ -196,8 +197,8 @@ __device__ inline void cull_pieces(BlockState* state, CullRoom* room, EntryList*
 // Lists the faces of agents that may show. Each warp of the block, for its part.
 __device__ inline void cull_agents(const BlockState& state, const DrawTask& task, EntryList* list) {
   const ViewState& view = state.view;
-  const ImageSetting& setting = state.making.setting;
-  PICTURA_KEEP_LOOP
+  const ImageSetting& setting = state.context.setting;
+  PICTURA_NO_UNROLL
   for (int32_t first = view.world_begin + warp_index() * kWarpSize; first < view.world_end; first += num_threads()) {
     const int32_t agent = first + lane_index();
     uint32_t faces = 0;
@@ -207,33 +208,33 @@ __device__ inline void cull_agents(const BlockState& state, const DrawTask& task
         faces = faces_to_eye(box, setting.camera.position_m);
       }
     }
-    list->push_faces(faces, thing_number(kAgentKind, agent - view.world_begin));
+    list->push_faces(faces, make_object_id(kAgentKind, agent - view.world_begin));
   }
 }
 
 // ... the lit heads that are turned to the camera.
 __device__ inline void cull_lights(const BlockState& state, EntryList* list) {
-  const ImageSetting& setting = state.making.setting;
+  const ImageSetting& setting = state.context.setting;
   const Span<const LightHead> heads = state.view.geometry->pieces.heads;
   const int num_heads = state.view.light_end > state.view.light_begin ? static_cast<int>(heads.size()) : 0;
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int first = warp_index() * kWarpSize; first < num_heads; first += num_threads()) {
     const int index = first + lane_index();
     bool shows = false;
     if (index < num_heads) {
       const LightHead head = heads[static_cast<size_t>(index)];
       shows = may_show(head, setting.camera, setting.frustum) &&
-              light_is_visible(head, state.making.lights[head.signal], setting.camera.position_m);
+              light_is_visible(head, state.context.lights[head.signal], setting.camera.position_m);
     }
-    list->push(shows, thing_number(kLightKind, index));
+    list->push(shows, make_object_id(kLightKind, index));
   }
 }
 
 // Lists all faces that an image may show. Each warp of the block, for its part.
-__device__ inline void cull(BlockState* state, const DrawTask& task, CullRoom* room, EntryList* list) {
+__device__ inline void cull(BlockState* state, const DrawTask& task, CullShared* storage, EntryList* list) {
   cull_agents(*state, task, list);
   cull_lights(*state, list);
-  cull_pieces(state, room, list);
+  cull_pieces(state, storage, list);
 }
 
 }  // namespace pictura::cuda

@@ -22,39 +22,39 @@ using EdgeRow = LaneRow<PolygonEdge, 4>;
 using FaceRow = LaneRow<ScreenFace>;
 
 /// What a warp that makes faces keeps in shared memory: strips, then the edges of faces, then the faces themselves.
-union FaceRoom {
+union FaceShared {
   StripRow strips[kWarpSize];
   EdgeRow edges[kWarpSize];
   FaceRow faces[kWarpSize];
 };
 
 /// What a warp that gathers keeps in shared memory, one step after the other.
-union GatherRoom {
-  CullRoom cull;
-  FaceRoom faces;
-  ClipRoom clip;
+union GeometryShared {
+  CullShared cull;
+  FaceShared faces;
+  ClipShared clip;
 };
 
 /// The shared memory of a block that makes faces and does nothing else. With the 1 KiB that each block takes, 32 of
 /// them leave 28 KiB of cache to a processor that has 256 KiB for both: little of what they read is read again.
-struct MakingState {
-  FaceMaking makings[2];  // of this batch and the next, by turns
-  FaceRoom room;
+struct FaceSetupState {
+  FaceSetupContext contexts[2];  // of this batch and the next, by turns
+  FaceShared storage;
 };
-__device__ inline MakingState* making_state() { return reinterpret_cast<MakingState*>(block_memory); }
+__device__ inline FaceSetupState* face_setup_state() { return reinterpret_cast<FaceSetupState*>(block_memory); }
 
 // Bytes of shared memory of a block that culls and of one that takes all steps, and where a warp's part of it is.
-__host__ __device__ constexpr size_t cull_bytes() { return state_bytes(kGatherThreads) + sizeof(CullRoom); }
-__host__ __device__ constexpr size_t gather_bytes(int threads) {
-  return state_bytes(threads) + static_cast<size_t>(threads / kWarpSize) * sizeof(GatherRoom);
+__host__ __device__ constexpr size_t cull_bytes() { return state_bytes(kSetupThreads) + sizeof(CullShared); }
+__host__ __device__ constexpr size_t setup_bytes(int threads) {
+  return state_bytes(threads) + static_cast<size_t>(threads / kWarpSize) * sizeof(GeometryShared);
 }
-__device__ inline GatherRoom* gather_room() {
-  return reinterpret_cast<GatherRoom*>(block_memory + state_bytes(num_threads())) + warp_index();
+__device__ inline GeometryShared* geometry_shared() {
+  return reinterpret_cast<GeometryShared*>(block_memory + state_bytes(num_threads())) + warp_index();
 }
 
 // Loads the strips among the lanes' entries, four lanes a strip and all of them eight at once, because lanes that load
 // a strip each ask for every sector several times. All lanes of the warp.
-__device__ inline void load_strips(const FaceMaking& making, uint32_t entry, StripRow* rows_out) {
+__device__ inline void load_strips(const FaceSetupContext& context, uint32_t entry, StripRow* rows_out) {
   const bool is_strip = kind_of(entry) == kStripKind;
   const unsigned strips = __ballot_sync(kAllLanes, is_strip);
   if (strips == 0) return;
@@ -66,7 +66,7 @@ __device__ inline void load_strips(const FaceMaking& making, uint32_t entry, Str
   uint4 words[kWords];
   for (int i = 0; i < kWords; ++i) {
     const uint32_t its_index = __shfl_sync(kAllLanes, index, kRowsAtOnce * i + row);
-    words[i] = reinterpret_cast<const uint4*>(making.strips)[kWords * its_index + static_cast<uint32_t>(word)];
+    words[i] = reinterpret_cast<const uint4*>(context.strips)[kWords * its_index + static_cast<uint32_t>(word)];
   }
   for (int i = 0; i < kWords; ++i) rows_out[kRowsAtOnce * i + row].words()[word] = words[i];
   __syncwarp();
@@ -74,8 +74,8 @@ __device__ inline void load_strips(const FaceMaking& making, uint32_t entry, Str
 
 // The face of an entry that is no light; false where it has faded to black. strip_of(index) is a strip.
 template <typename StripOf>
-__device__ bool make_quad(const FaceMaking& making, uint32_t entry, Quad* quad_out, StripOf&& strip_of) {
-  const ImageSetting& setting = making.setting;
+__device__ bool make_quad(const FaceSetupContext& context, uint32_t entry, Quad* quad_out, StripOf&& strip_of) {
+  const ImageSetting& setting = context.setting;
   const uint32_t kind = kind_of(entry);
   const auto index = static_cast<int32_t>(entry & kFaceIndexMask);
   // One body for all kinds but for their corners: lanes of a warp have different ones.
@@ -83,24 +83,24 @@ __device__ bool make_quad(const FaceMaking& making, uint32_t entry, Quad* quad_o
   quad_out->floor_px = 0.0f;
   if (kind == kStripKind) {
     const Strip strip = strip_of(index);
-    quad_out->owner = strip_owner(strip, index);
+    quad_out->primitive = strip_ref(strip, index);
     quad_out->floor_px = setting.line_floor_px;
     world = strip_quad(strip);
   } else if (kind == kAgentKind) {
-    const AgentBox box = making.agents[index];
-    quad_out->owner = agent_owner(box, index);
+    const AgentBox box = context.agents[index];
+    quad_out->primitive = agent_ref(box, index);
     world = cuboid_quad(box, static_cast<int>(entry >> kFaceShift) & 7, setting.debug_palette);
   } else {
-    quad_out->owner = wall_owner(index);
-    world = wall_quad(making.walls[index]);
+    quad_out->primitive = wall_ref(index);
+    world = wall_quad(context.walls[index]);
   }
   return see_quad(world, setting.camera, &quad_out->seen);
 }
 
 // Keeps the faces of those lanes that have one. Each image has room for all of its own.
-__device__ inline void keep_face(const FaceMaking& making, const ScreenFace& face, FaceOwner owner, int32_t edge_begin,
-                                 int32_t at) {
-  if (at >= 0) store_whole(making.faces + at, whole_face(face, owner, edge_begin));
+__device__ inline void keep_face(const FaceSetupContext& context, const ScreenFace& face, PrimitiveRef primitive,
+                                 int32_t edge_begin, int32_t at) {
+  if (at >= 0) store_whole(context.faces + at, whole_face(face, primitive, edge_begin));
 }
 
 // Stores the first rows side by side, all lanes 512 bytes at once: lanes that store a row each would fill halves of
@@ -122,26 +122,27 @@ __device__ void store_rows(uint4* to, Row* rows, int count) {
 }
 
 // Makes the faces of a batch of the image, an entry each lane, and lists what is to be clipped. All lanes of the warp.
-__device__ inline void make_faces(const FaceMaking& making, FaceRoom* room, const GatherLists& lists,
-                                  GatherCounts* counts, uint32_t entry, int32_t image) {
+__device__ inline void make_faces(const FaceSetupContext& context, FaceShared* storage, const SetupLists& lists,
+                                  SetupCounts* counts, uint32_t entry, int32_t image) {
   const bool is_light = entry != kNoEntry && kind_of(entry) == kLightKind, is_quad = entry != kNoEntry && !is_light;
   if (__any_sync(kAllLanes, is_light)) {
-    const int32_t at = take_place(&counts->lights, is_light);
+    const int32_t at = warp_allocate_one(&counts->lights, is_light);
     if (is_light) lists.clipped[lists.max_clipped - 1 - at] = {entry, image};
   }
   const unsigned quads = __ballot_sync(kAllLanes, is_quad);
   if (quads == 0) return;
   // Lanes that have no face make another lane's, which is not kept: so none waits for what lanes do differently.
   const uint32_t of_another = __shfl_sync(kAllLanes, entry, __ffs(static_cast<int>(quads)) - 1);
-  const PinholeCamera& camera = making.setting.camera;
+  const PinholeCamera& camera = context.setting.camera;
   Quad quad;
   const uint32_t made = is_quad ? entry : of_another;
-  load_strips(making, made, room->strips);
-  const bool is_seen = make_quad(making, made, &quad, [&](int32_t) { return room->strips[lane_index()].values[0]; });
+  load_strips(context, made, storage->strips);
+  const bool is_seen =
+      make_quad(context, made, &quad, [&](int32_t) { return storage->strips[lane_index()].values[0]; });
   ScreenQuad on_screen;
   bool turns_right = false;
   const QuadSight sight = project_quad(camera, quad.seen.corner, quad.floor_px, &on_screen);
-  const bool covers = shows_whole(making.setting, on_screen, quad.seen.color, quad.owner, &turns_right),
+  const bool covers = shows_whole(context.setting, on_screen, quad.seen.color, quad.primitive, &turns_right),
              is_wanted = is_quad && is_seen;
   const bool shows = is_wanted && sight == QuadSight::whole && covers,
              is_clipped = is_wanted && sight == QuadSight::cut;
@@ -149,57 +150,58 @@ __device__ inline void make_faces(const FaceMaking& making, FaceRoom* room, cons
   const unsigned showing = __ballot_sync(kAllLanes, shows), clipped = __ballot_sync(kAllLanes, is_clipped);
   const int lane = lane_index(), wanted = __popc(lane == 0 ? showing : (lane == 1 ? clipped : 0u));
   int32_t taken = 0;
-  if (wanted > 0) taken = atomicAdd(lane == 0 ? making.num_faces : &counts->clipped, wanted);
+  if (wanted > 0) taken = atomicAdd(lane == 0 ? context.num_faces : &counts->clipped, wanted);
   const int rank = __popc(showing & lanes_below()), count = __popc(showing);
   __syncwarp();  // edges go where strips were
   ScreenFace face;
   if (shows) {
-    PolygonEdge* const edges = room->edges[rank].values;
+    PolygonEdge* const edges = storage->edges[rank].values;
     auto keep_edge = [edges](int k, const PolygonEdge& edge) { store_whole(edges + k, edge); };
-    make_quad_face(camera, making.setting.frustum, on_screen, turns_right, quad.seen.plane, quad.seen.color, keep_edge,
+    make_quad_face(camera, context.setting.frustum, on_screen, turns_right, quad.seen.plane, quad.seen.color, keep_edge,
                    &face);
   }
   __syncwarp();
   const int32_t at = __shfl_sync(kAllLanes, taken, 0), clipped_at = __shfl_sync(kAllLanes, taken, 1);
   if (is_clipped) lists.clipped[clipped_at + __popc(clipped & lanes_below())] = {entry, image};
   // The place of a face's edges follows from its own.
-  const int32_t edge_begin = making.edge_begin + 4 * at;
-  store_rows(reinterpret_cast<uint4*>(making.edges + edge_begin), room->edges, count);
+  const int32_t edge_begin = context.edge_begin + 4 * at;
+  store_rows(reinterpret_cast<uint4*>(context.edges + edge_begin), storage->edges, count);
   __syncwarp();
   if (shows) {
-    store_whole(room->faces[rank].values, whole_face(face, quad.owner, edge_begin + 4 * rank));
+    store_whole(storage->faces[rank].values, whole_face(face, quad.primitive, edge_begin + 4 * rank));
   }
   __syncwarp();
-  store_rows(reinterpret_cast<uint4*>(making.faces + at), room->faces, count);
+  store_rows(reinterpret_cast<uint4*>(context.faces + at), storage->faces, count);
 }
 
 // Makes a face whose corners the lanes hold. False where there is no room for its edges. All lanes of the warp.
-__device__ inline bool make_shared_face(const FaceMaking& making, ClipRoom* room, SharedFace shared) {
-  clip(making.setting.frustum, room, &shared);
+__device__ inline bool make_shared_face(const FaceSetupContext& context, ClipShared* storage, SharedFace shared) {
+  clip(context.setting.frustum, storage, &shared);
   if (shared.count == 0) return true;
   int32_t edge_begin = 0;
-  if (lane_index() == 0) edge_begin = making.clipped_begin + atomicAdd(making.num_clipped, shared.count);
+  if (lane_index() == 0) edge_begin = context.clipped_begin + atomicAdd(context.num_clipped, shared.count);
   edge_begin = __shfl_sync(kAllLanes, edge_begin, 0);
-  if (edge_begin + shared.count > making.clipped_end) return false;
+  if (edge_begin + shared.count > context.clipped_end) return false;
   ScreenFace face;
-  const bool shows = make_screen_face(making, shared, edge_begin, &face);
-  if (shows && lane_index() == 0) keep_face(making, face, shared.owner, edge_begin, atomicAdd(making.num_faces, 1));
+  const bool shows = make_screen_face(context, shared, edge_begin, &face);
+  if (shows && lane_index() == 0)
+    keep_face(context, face, shared.primitive, edge_begin, atomicAdd(context.num_faces, 1));
   return true;
 }
 
 // Clips faces of four corners, the lanes' `thing` where is_one, and makes theirs but for what outgrows a lane's room:
 // of that *quad_out is kept. False in those lanes for whose face there is no room. All lanes of the warp.
-__device__ inline bool clip_quads(const FaceMaking* makings, ClipRoom* room, bool is_one, ClippedThing thing,
-                                  Quad* quad_out, bool* has_outgrown_out) {
-  const FaceMaking& making = makings[thing.image];
-  const PinholeCamera& camera = making.setting.camera;
-  const LaneCorners corners(room);
+__device__ inline bool clip_quads(const FaceSetupContext* contexts, ClipShared* storage, bool is_one,
+                                  ClippedPrimitive primitive, Quad* quad_out, bool* has_outgrown_out) {
+  const FaceSetupContext& context = contexts[primitive.image];
+  const PinholeCamera& camera = context.setting.camera;
+  const LaneCorners corners(storage);
   Quad& quad = *quad_out;
   int kept = 0;
-  auto strip_of = [&](int32_t index) { return making.strips[index]; };
-  if (is_one && make_quad(making, thing.entry, &quad, strip_of) &&
+  auto strip_of = [&](int32_t index) { return context.strips[index]; };
+  if (is_one && make_quad(context, primitive.entry, &quad, strip_of) &&
       (quad.floor_px <= 0.0f || widen_strip(camera, quad.floor_px, quad.seen.corner))) {
-    const Frustum frustum = making.setting.frustum;
+    const Frustum frustum = context.setting.frustum;
     for (int i = 0; i < 4; ++i) corners.set(i, quad.seen.corner[i]);
     kept = clip(frustum, planes_crossed(frustum, quad.seen.corner, 4), corners);
   }
@@ -207,51 +209,51 @@ __device__ inline bool clip_quads(const FaceMaking* makings, ClipRoom* room, boo
   bool turns_right = false;
   const unsigned edges = kept > 0 ? project_in_place(camera, corners, kept, &bounds, &turns_right) : 0;
   // The edges of all lanes, one face's behind the other's.
-  const int count = __popc(edges), end = sum_up_to(count), total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
+  const int count = __popc(edges), end = warp_inclusive_sum(count), total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
   int32_t edge_begin = 0;
-  if (lane_index() == 0 && total > 0) edge_begin = making.clipped_begin + atomicAdd(making.num_clipped, total);
+  if (lane_index() == 0 && total > 0) edge_begin = context.clipped_begin + atomicAdd(context.num_clipped, total);
   edge_begin = __shfl_sync(kAllLanes, edge_begin, 0);
   int at = end - count;
-  const bool has_room = edges == 0 || edge_begin + end <= making.clipped_end;
+  const bool has_room = edges == 0 || edge_begin + end <= context.clipped_end;
   if (edges != 0 && has_room) {
     ScreenFace face;
     face.edge_count = static_cast<uint8_t>(count);
     face.color = quad.seen.color;
-    set_bounds(camera, making.setting.frustum, bounds, quad.seen.plane, &face);
-    keep_face(making, face, quad.owner, edge_begin + at, atomicAdd(making.num_faces, 1));
+    set_bounds(camera, context.setting.frustum, bounds, quad.seen.plane, &face);
+    keep_face(context, face, quad.primitive, edge_begin + at, atomicAdd(context.num_faces, 1));
   }
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (unsigned left = edges; left != 0; left &= left - 1, ++at) {
     const int from = __ffs(static_cast<int>(left)) - 1;
-    room->edges[at] = LaneEdge{lane_index(), from, from + 1 < kept ? from + 1 : 0, turns_right}.packed();
+    storage->edges[at] = LaneEdge{lane_index(), from, from + 1 < kept ? from + 1 : 0, turns_right}.packed();
   }
   __syncwarp();
-  PICTURA_KEEP_LOOP
-  for (int i = lane_index(); i < min_of(total, making.clipped_end - edge_begin); i += kWarpSize) {
-    const LaneEdge edge = LaneEdge::unpacked(room->edges[i]);
-    const Vec2 from{room->x[edge.from][edge.lane], room->y[edge.from][edge.lane]};
-    const Vec2 to{room->x[edge.to][edge.lane], room->y[edge.to][edge.lane]};
-    store_whole(making.edges + edge_begin + i, make_edge(edge.turns_right ? from : to, edge.turns_right ? to : from));
+  PICTURA_NO_UNROLL
+  for (int i = lane_index(); i < min_of(total, context.clipped_end - edge_begin); i += kWarpSize) {
+    const LaneEdge edge = LaneEdge::unpacked(storage->edges[i]);
+    const Vec2 from{storage->x[edge.from][edge.lane], storage->y[edge.from][edge.lane]};
+    const Vec2 to{storage->x[edge.to][edge.lane], storage->y[edge.to][edge.lane]};
+    store_whole(context.edges + edge_begin + i, make_edge(edge.turns_right ? from : to, edge.turns_right ? to : from));
   }
   __syncwarp();
   *has_outgrown_out = kept == kOutgrown;
   return has_room;
 }
 
-// Clips things of a list, the lanes' `thing` where is_one, and makes their faces; thing.image is that of makings. All
-// are lights or none. False in those lanes for whose face there is no room. All lanes of the warp.
-__device__ inline bool clip_things(const FaceMaking* makings, ClipRoom* room, bool is_one, bool are_lights,
-                                   ClippedThing thing) {
+// Clips things of a list, the lanes' `thing` where is_one, and makes their faces; primitive.image is that of contexts.
+// All are lights or none. False in those lanes for whose face there is no room. All lanes of the warp.
+__device__ inline bool clip_primitives(const FaceSetupContext* contexts, ClipShared* storage, bool is_one,
+                                       bool are_lights, ClippedPrimitive primitive) {
   Quad quad;
   bool has_room = true, is_shared = is_one;
-  if (!are_lights) has_room = clip_quads(makings, room, is_one, thing, &quad, &is_shared);
-  PICTURA_KEEP_LOOP
+  if (!are_lights) has_room = clip_quads(contexts, storage, is_one, primitive, &quad, &is_shared);
+  PICTURA_NO_UNROLL
   for (unsigned shared = __ballot_sync(kAllLanes, is_shared); shared != 0; shared &= shared - 1) {
     const int owner = __ffs(static_cast<int>(shared)) - 1;
-    const FaceMaking& its_making = makings[__shfl_sync(kAllLanes, thing.image, owner)];
-    const int32_t index = index_of(__shfl_sync(kAllLanes, thing.entry, owner));
-    const bool is_made =
-        make_shared_face(its_making, room, are_lights ? make_light(its_making, index) : share_quad(room, owner, quad));
+    const FaceSetupContext& its_context = contexts[__shfl_sync(kAllLanes, primitive.image, owner)];
+    const int32_t index = index_of(__shfl_sync(kAllLanes, primitive.entry, owner));
+    const bool is_made = make_shared_face(
+        its_context, storage, are_lights ? make_light(its_context, index) : share_quad(storage, owner, quad));
     if (lane_index() == owner) has_room = is_made;
   }
   return has_room;
@@ -262,9 +264,9 @@ __device__ inline bool clip_things(const FaceMaking* makings, ClipRoom* room, bo
 struct ClippedItem {
   bool is_any, are_lights;
   bool is_one;  // of the lane
-  ClippedThing thing;
+  ClippedPrimitive primitive;
 };
-__device__ inline ClippedItem clipped_item(const GatherLists& lists, const GatherCounts& listed, int item, int batch) {
+__device__ inline ClippedItem clipped_item(const SetupLists& lists, const SetupCounts& listed, int item, int batch) {
   const bool are_lights = item < listed.lights;
   const int first = (item - listed.lights) * batch, quad = first + lane_index();
   if (!are_lights && first >= listed.clipped) return {};
@@ -276,19 +278,19 @@ __device__ inline ClippedItem clipped_item(const GatherLists& lists, const Gathe
 // does not exist. One thread.
 __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_t view, int32_t camera) {
   if (!set_view(&state->view, task, view)) return false;
-  FaceMaking* making = &state->making;
+  FaceSetupContext* context = &state->context;
   const CameraSlot& slot = task.cameras[camera];
-  making->setting.camera = place_camera(slot.camera, state->view.view);
-  making->setting.frustum = slot.frustum;
-  making->setting.line_floor_px = task.line_floor_px;
-  making->setting.debug_palette = task.debug_palette;
-  making->setting.occluders.count = 0;
+  context->setting.camera = place_camera(slot.camera, state->view.view);
+  context->setting.frustum = slot.frustum;
+  context->setting.line_floor_px = task.line_floor_px;
+  context->setting.debug_palette = task.debug_palette;
+  context->setting.occluders.count = 0;
   const StaticGeometryView& pieces = state->view.geometry->pieces;
-  making->strips = pieces.strips.data();
-  making->walls = pieces.walls.data();
-  making->heads = pieces.heads.data();
-  making->agents = task.scene.agents.data() + state->view.world_begin;
-  making->lights = task.scene.light_states.data() + state->view.light_begin;
+  context->strips = pieces.strips.data();
+  context->walls = pieces.walls.data();
+  context->heads = pieces.heads.data();
+  context->agents = task.scene.agents.data() + state->view.world_begin;
+  context->lights = task.scene.light_states.data() + state->view.light_begin;
   return true;
 }
 
@@ -296,21 +298,21 @@ __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_
 // may be, the entry and what it covers; the occluder stands at the lane's place in the setting.
 class BestOccluders {
  public:
-  __device__ explicit BestOccluders(FaceMaking* making) : making_(making) {}
+  __device__ explicit BestOccluders(FaceSetupContext* context) : context_(context) {}
 
   /// Each lane offers the face of an entry, or none. All lanes of the warp.
   __device__ void offer(bool is_one, uint32_t entry) {
-    const ImageSetting& setting = making_->setting;
-    const FaceMaking* making = making_;
+    const ImageSetting& setting = context_->setting;
+    const FaceSetupContext* context = context_;
     Quad quad;
     Offered own{is_one ? entry : kNoEntry};
-    if (is_one && make_quad(*making, entry, &quad, [making](int32_t i) { return making->strips[i]; })) {
+    if (is_one && make_quad(*context, entry, &quad, [context](int32_t i) { return context->strips[i]; })) {
       own.covers = __float_as_int(occluded_px2(setting.camera, quad.seen, &own.on_screen, &own.turns_right));
     }
     const Chosen chosen = choose(own);
     const int place = move_in(own, chosen);
     if (chosen.own) {
-      making_->setting.occluders.occluder[place] =
+      context_->setting.occluders.occluder[place] =
           make_occluder(setting.camera, setting.frustum, quad.seen.plane, own.on_screen, own.turns_right);
     }
   }
@@ -333,8 +335,8 @@ class BestOccluders {
   __device__ Chosen choose(const Offered& own) const {
     Chosen chosen;
     int left = own.covers, kept_left = kept_covers_;
-    PICTURA_KEEP_LOOP
-    for (int k = 0; k < Occluders::kMost; ++k) {
+    PICTURA_NO_UNROLL
+    for (int k = 0; k < Occluders::kMaxCount; ++k) {
       const int most = __reduce_max_sync(kAllLanes, max_of(left, kept_left));
       if (most == 0) break;
       const uint32_t its = left == most ? own.entry : kNoEntry, other = kept_left == most ? kept_ : kNoEntry;
@@ -353,9 +355,9 @@ class BestOccluders {
 
   // The chosen offers take the places of those that go. The place of the lane's own.
   __device__ int move_in(const Offered& own, Chosen chosen) {
-    unsigned places = ~__ballot_sync(kAllLanes, chosen.kept) & ((1u << Occluders::kMost) - 1);
+    unsigned places = ~__ballot_sync(kAllLanes, chosen.kept) & ((1u << Occluders::kMaxCount) - 1);
     int place = 0;
-    PICTURA_KEEP_LOOP
+    PICTURA_NO_UNROLL
     for (unsigned added = __ballot_sync(kAllLanes, chosen.own); added != 0; added &= added - 1, places &= places - 1) {
       const int from = __ffs(static_cast<int>(added)) - 1, to = __ffs(static_cast<int>(places)) - 1;
       const uint32_t entry = __shfl_sync(kAllLanes, own.entry, from);
@@ -369,24 +371,24 @@ class BestOccluders {
     return place;
   }
 
-  FaceMaking* making_;
+  FaceSetupContext* context_;
   uint32_t kept_ = kNoEntry;
   int kept_covers_ = 0;
 };
 
 // Finds what hides whole faces among the solids of a list. All lanes of one warp.
-__device__ inline void find_occluders(FaceMaking* making, const uint32_t* entries, int32_t count) {
+__device__ inline void find_occluders(FaceSetupContext* context, const uint32_t* entries, int32_t count) {
   auto may_hide = [&](uint32_t entry) {
-    const PinholeCamera& camera = making->setting.camera;
+    const PinholeCamera& camera = context->setting.camera;
     const uint32_t index = entry & kFaceIndexMask;
     if (entry == kNoEntry) return false;
-    if (kind_of(entry) == kAgentKind) return may_occlude(making->agents[index], camera);
-    return kind_of(entry) == kWallKind && may_occlude(making->walls[index], camera);
+    if (kind_of(entry) == kAgentKind) return may_occlude(context->agents[index], camera);
+    return kind_of(entry) == kWallKind && may_occlude(context->walls[index], camera);
   };
-  BestOccluders best(making);
+  BestOccluders best(context);
   // Near ones are put aside until every lane has one.
   WarpQueue near_ones(&block_state()->warps[warp_index()].queue);
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int32_t first = 0;; first += kWarpSize) {
     const bool is_more = first < count;
     const uint32_t entry = first + lane_index() < count ? entries[first + lane_index()] : kNoEntry;
@@ -398,74 +400,75 @@ __device__ inline void find_occluders(FaceMaking* making, const uint32_t* entrie
     if (!is_more) break;
   }
   const int found = best.count();
-  if (lane_index() == 0) making->setting.occluders.count = found;
+  if (lane_index() == 0) context->setting.occluders.count = found;
   __syncwarp();
 }
 
 // What drawing is told of an image.
-__device__ inline GatheredImage image_of(const BlockState& state, int32_t face_begin, int32_t face_count) {
-  return {state.view.geometry, state.making.agents, state.making.setting.camera.position_m, face_begin, face_count};
+__device__ inline PreparedImage image_of(const BlockState& state, int32_t face_begin, int32_t face_count) {
+  return {state.view.geometry, state.context.agents, state.context.setting.camera.position_m, face_begin, face_count};
 }
 
 /// Where a block gathers an image of its own.
-struct GatherPlace {
+struct SetupTarget {
   ScreenFace* faces;
   PolygonEdge* edges;
   int32_t edge_begin, clipped_begin, clipped_end;
-  GatherLists lists;
+  SetupLists lists;
 };
 
 // There the lists hold all that a world does.
-__device__ inline GatherPlace place_of(const Scratch& scratch) {
-  GatherPlace place{scratch.faces, scratch.edges, 0, 4 * scratch.max_faces, scratch.max_edges, {}};
+__device__ inline SetupTarget place_of(const Scratch& scratch) {
+  SetupTarget place{scratch.faces, scratch.edges, 0, 4 * scratch.max_faces, scratch.max_edges, {}};
   lay_out(&place.lists, scratch, scratch.bytes);
   return place;
 }
 
 // Gathers an image into the block's own memory, all of it in one launch. False where there is no room for all, or where
 // its view names something that does not exist. All threads of the block.
-__device__ inline bool gather(const DrawTask& task, int32_t view, int32_t camera, const GatherPlace& place,
-                              bool leaves_out_hidden) {
+__device__ inline bool prepare_image(const DrawTask& task, int32_t view, int32_t camera, const SetupTarget& place,
+                                     bool leaves_out_hidden) {
   BlockState* state = block_state();
-  GatherRoom* room = gather_room();
-  const GatherLists& lists = place.lists;
+  GeometryShared* storage = geometry_shared();
+  const SetupLists& lists = place.lists;
   sync_block();
   if (threadIdx.x == 0) {
     state->listed = {};
     state->num_entries = state->num_faces = state->num_clipped = state->overflow = 0;
     state->usable = set_image(state, task, view, camera) ? 1 : 0;
-    FaceMaking* making = &state->making;
-    making->faces = state->faces = place.faces;
-    making->edges = state->edges = place.edges;
-    making->num_faces = &state->num_faces;
-    making->num_clipped = &state->num_clipped;
-    making->edge_begin = place.edge_begin;
-    making->clipped_begin = place.clipped_begin;
-    making->clipped_end = place.clipped_end;
+    FaceSetupContext* context = &state->context;
+    context->faces = state->faces = place.faces;
+    context->edges = state->edges = place.edges;
+    context->num_faces = &state->num_faces;
+    context->num_clipped = &state->num_clipped;
+    context->edge_begin = place.edge_begin;
+    context->clipped_begin = place.clipped_begin;
+    context->clipped_end = place.clipped_end;
   }
   sync_block();
   if (state->usable == 0) return false;
   EntryList list(lists.entries, lists.max_entries, &state->num_entries);
-  cull(state, task, &room->cull, &list);
+  cull(state, task, &storage->cull, &list);
   sync_block();
   if (state->num_entries > lists.max_entries) return false;
   if (warp_index() == 0) {
     list.finish();
-    if (leaves_out_hidden) find_occluders(&state->making, lists.entries, state->num_entries);
+    if (leaves_out_hidden) find_occluders(&state->context, lists.entries, state->num_entries);
   }
   sync_block();
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int i = warp_index(); i < FaceBatch::count_of(state->num_entries); i += num_warps()) {
-    make_faces(state->making, &room->faces, lists, &state->listed,
+    make_faces(state->context, &storage->faces, lists, &state->listed,
                lists.entries[i * FaceBatch::kEntries + lane_index()], 0);
     __syncwarp();
   }
   sync_block();
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int i = warp_index();; i += num_warps()) {
     const ClippedItem item = clipped_item(lists, state->listed, i, kWarpSize);
     if (!item.is_any) break;
-    if (!clip_things(&state->making, &room->clip, item.is_one, item.are_lights, item.thing)) state->overflow = 1;
+    if (!clip_primitives(&state->context, &storage->clip, item.is_one, item.are_lights, item.primitive))
+      state->overflow = 1;
   }
   sync_block();
   if (threadIdx.x == 0) state->shown = image_of(*state, 0, state->num_faces);

@@ -14,21 +14,21 @@ __device__ inline Part tile_at(int x, int y, int columns, int rows, int width_px
 }
 
 /// A pixel's word. While full faces are found it is the mark of the one that buries most: the bits of its
-/// burying_nearness(), which sort like that, and the face's number plus 1. From the pixel's first fragment on, that
-/// stands where the nearness did, and the sign bit tells so. 0: neither.
+/// occluder_bound(), which sort like that, and the face's number plus 1. From the pixel's first fragment on, that
+/// stands where the inverse_depth did, and the sign bit tells so. 0: neither.
 template <typename Word>
 struct PixelWord {
   static constexpr int kFaceBits = sizeof(Word) == 4 ? kMarkedFaceBits : 32;
   static constexpr Word kFace = (Word{1} << kFaceBits) - 1, kHasChain = Word{1} << (8 * sizeof(Word) - 1);
 
-  __device__ static Word mark(float burying, int face) {
-    static_assert(kMarkedFaceBits + kBuryingBits == 32);
-    return Word{bits_of(burying)} << (kFaceBits - kMarkedFaceBits) | static_cast<Word>(face + 1);
+  __device__ static Word mark(float bound, int face) {
+    static_assert(kMarkedFaceBits + kOccluderBoundBits == 32);
+    return Word{bits_from_float(bound)} << (kFaceBits - kMarkedFaceBits) | static_cast<Word>(face + 1);
   }
   __device__ static int marked_face(Word mark) { return static_cast<int>(mark & kFace) - 1; }
-  __device__ static float marked_burying(Word mark) {
-    constexpr uint32_t kBurying = ~0u << kMarkedFaceBits;
-    return number_of_bits(static_cast<uint32_t>(mark >> (kFaceBits - kMarkedFaceBits)) & kBurying);
+  __device__ static float marked_bound(Word mark) {
+    constexpr uint32_t kBoundMask = ~0u << kMarkedFaceBits;
+    return float_from_bits(static_cast<uint32_t>(mark >> (kFaceBits - kMarkedFaceBits)) & kBoundMask);
   }
   /// With a fragment as the first of the chain, and the face as it is.
   __device__ static Word with_first(Word word, Word fragment) {
@@ -62,7 +62,7 @@ template <typename Memory>
 __device__ void list_rows(const Memory& memory, int num_faces, const Part& part) {
   using Word = typename Memory::Word;
   WarpState* warp = &memory.state->warps[warp_index()];
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int first = warp_index() * kWarpSize; first < num_faces; first += Memory::kThreads) {
     const int face = first + lane_index();
     int y_begin = 0, rows = 0;
@@ -72,10 +72,10 @@ __device__ void list_rows(const Memory& memory, int num_faces, const Part& part)
       const bool is_beside = box.x_begin >= part.x_end || box.x_end <= part.x_begin;
       rows = is_beside ? 0 : max_of(0, min_of(box.y_end, part.y_end) - y_begin);
     }
-    if (rows > 0) ask_for(memory.edges + memory.faces[face].edge_begin);
-    const int end = sum_up_to(rows), row = y_begin - part.y_begin;
-    const int32_t place = take_places(&memory.state->num_rows, end);
-    share_out(warp, rows, end, [&](int item, int owner, int k) {
+    if (rows > 0) prefetch(memory.edges + memory.faces[face].edge_begin);
+    const int end = warp_inclusive_sum(rows), row = y_begin - part.y_begin;
+    const int32_t place = warp_allocate(&memory.state->num_rows, end);
+    warp_expand(warp, rows, end, [&](int item, int owner, int k) {
       const int its_row = __shfl_sync(kAllLanes, row, max_of(owner, 0)) + k;
       if (owner >= 0 && place + item < memory.max_rows) {
         memory.rows[place + item] = static_cast<Word>(first + owner) << Memory::kHalf | static_cast<Word>(its_row);
@@ -98,14 +98,14 @@ __device__ void list_candidate(const Memory& memory, int place, int face, int pi
 template <typename Memory>
 __device__ int mark_pixel(const Memory& memory, int face, int x, int y, int pixel) {
   using Word = typename Memory::Word;
-  const Word mark = PixelWord<Word>::mark(burying_nearness(memory.faces[face], x, y), face);
+  const Word mark = PixelWord<Word>::mark(occluder_bound(memory.faces[face], x, y), face);
   Word had = memory.pixels[pixel];
   if (had < mark) had = atomicMax(&memory.pixels[pixel], mark);
   const int other = PixelWord<Word>::marked_face(had);
   if (other < 0) return -1;
   const int loser = had < mark ? other : face;
-  const float burying = PixelWord<Word>::marked_burying(had < mark ? mark : had);
-  return may_show_before(memory.faces[loser], burying, x, y) ? loser : -1;
+  const float bound = PixelWord<Word>::marked_bound(had < mark ? mark : had);
+  return passes_occluder_bound(memory.faces[loser], bound, x, y) ? loser : -1;
 }
 
 // A row of a face within a tile: columns from the tile's first on, a byte each, so that lanes hand them on at once.
@@ -137,7 +137,7 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
   BlockState* state = memory.state;
   WarpState* warp = &state->warps[warp_index()];
   const int num_rows = state->num_rows, deals = deals_of<Memory::kThreads>(num_rows);
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int deal = warp_index(); deal < deals; deal += Memory::kThreads / kWarpSize) {
     const int at = lane_index() * deals + deal;
     Word row = 0;
@@ -150,7 +150,7 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
     }
     const int full = span.num_full(), partial = span.end() - span.begin() - full;
     // Both sums at once: neither reaches 2^16.
-    const int ends = sum_up_to(full | partial << 16), full_end = ends & 0xFFFF, partial_end = ends >> 16;
+    const int ends = warp_inclusive_sum(full | partial << 16), full_end = ends & 0xFFFF, partial_end = ends >> 16;
     struct SharedRow {
       int face, y;
       TileSpan span;
@@ -162,16 +162,16 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
                        part.y_begin + static_cast<int>(its_row & Memory::kNone),
                        TileSpan(__shfl_sync(kAllLanes, span.bytes, from))};
     };
-    share_out(warp, full, full_end, [&](int, int owner, int k) {
+    warp_expand(warp, full, full_end, [&](int, int owner, int k) {
       const SharedRow its = row_of(owner);
       const int x = part.x_begin + its.span.full_begin() + k, pixel = part.pixel(x, its.y);
       const int loser = owner >= 0 ? mark_pixel(memory, its.face, x, its.y, pixel) : -1;
       if (!__any_sync(kAllLanes, loser >= 0)) return;
-      const int32_t place = take_place(&state->num_candidates, loser >= 0);
+      const int32_t place = warp_allocate_one(&state->num_candidates, loser >= 0);
       if (loser >= 0) list_candidate(memory, place, loser, pixel, true);
     });
-    const int32_t place = take_places(&state->num_candidates, partial_end);
-    share_out(warp, partial, partial_end, [&](int item, int owner, int k) {
+    const int32_t place = warp_allocate(&state->num_candidates, partial_end);
+    warp_expand(warp, partial, partial_end, [&](int item, int owner, int k) {
       const SharedRow its = row_of(owner);
       const int pixel = part.pixel(part.x_begin + its.span.partial(k), its.y);
       if (owner >= 0) list_candidate(memory, place + item, its.face, pixel, false);
@@ -210,13 +210,12 @@ __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, c
   PixelCoverage coverage;
   if (candidate.is_one) {
     const ScreenFace& face = memory.faces[candidate.a];
-    coverage = Memory::covers_fully(candidate.b)
-                   ? PixelCoverage{1.0f, kAllSamples}
-                   : pixel_coverage(memory.edges + face.edge_begin, face.edge_count, face.least_area(),
-                                    part.x_of(pixel), part.y_of(pixel));
+    coverage = Memory::covers_fully(candidate.b) ? PixelCoverage{1.0f, kAllSamples}
+                                                 : pixel_coverage(memory.edges + face.edge_begin, face.edge_count,
+                                                                  face.min_area(), part.x_of(pixel), part.y_of(pixel));
   }
   const bool is_left = coverage.area > 0.0f;
-  const int32_t fragment = take_place(&memory.state->num_fragments, is_left);
+  const int32_t fragment = warp_allocate_one(&memory.state->num_fragments, is_left);
   if (!is_left || fragment >= memory.max_fragments) return;
   keep_fragment(memory, fragment, candidate.a, pixel, coverage.samples, coverage.area);
 }
@@ -227,7 +226,7 @@ template <typename Memory>
 __device__ void make_fragments(const Memory& memory, const Part& part) {
   WarpQueue shown(&memory.state->warps[warp_index()].queue);
   const int count = memory.state->num_candidates;
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int first = warp_index() * kWarpSize;; first += Memory::kThreads) {
     const int i = first + lane_index();
     const bool more = i - lane_index() < count;
@@ -241,7 +240,7 @@ __device__ void make_fragments(const Memory& memory, const Part& part) {
       const auto full = full_of(memory, pixel);
       const int x = part.x_of(pixel), y = part.y_of(pixel);
       shows = full == Memory::kNone ||
-              may_show_before(memory.faces[face], burying_nearness(memory.faces[full], x, y), x, y);
+              passes_occluder_bound(memory.faces[face], occluder_bound(memory.faces[full], x, y), x, y);
     }
     shown.push(shows, face, place);
     if (shown.is_ready() || (!more && !shown.is_empty())) make_fragment(memory, shown.take(), part);
@@ -261,13 +260,13 @@ __device__ void finish_fragments(const Memory& memory, int count) {
     memory.free_low[fragment] = static_cast<uint32_t>(reach);
     memory.free_high[fragment] = static_cast<uint32_t>(reach >> 32);
   };
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int first = warp_index() * kWarpSize; first < count; first += Memory::kThreads) {
     const int i = first + lane_index();
     // The last of a chain stands for its pixel.
     const bool is_listed =
         i < count && memory.next[i] == static_cast<Index>(Memory::kNone) && !is_alone(memory, i, memory.pixel[i]);
-    const int32_t place = take_place(&memory.state->num_drawn, is_listed);
+    const int32_t place = warp_allocate_one(&memory.state->num_drawn, is_listed);
     if (is_listed) memory.drawn[place] = memory.pixel[i];
     if (i >= count) continue;
     free_all(i);

@@ -4,13 +4,13 @@
 // hold.
 #pragma once
 
-#include "pictura/common/raster_item.h"
+#include "pictura/common/raster_face_setup.h"
 
 namespace pictura::cuda {
 
 /// Images are drawn in the order of how many faces they list, in classes of so many, the most crowded first: blocks
 /// that come late to their last tile have a light one.
-constexpr int kCrowds = 16, kCrowdFaces = 64;
+constexpr int kNumCostBuckets = 16, kFacesPerCostBucket = 64;
 
 /// Pixels side by side that a thread writes together.
 constexpr int kWrittenAtOnce = 4;
@@ -23,9 +23,9 @@ struct TileGrid {
   int tile_width_px = 0, across = 0, down = 0;
   PICTURA_HD constexpr int count() const { return across * down; }
 };
-PICTURA_HD constexpr TileGrid tiles_of(int most_px, int width_px, int height_px) {
+PICTURA_HD constexpr TileGrid tiles_of(int max_px, int width_px, int height_px) {
   auto parts_of = [](int whole, int most) { return (whole + most - 1) / most; };
-  const int together = kWrittenAtOnce * parts_of(parts_of(width_px, parts_of(width_px, most_px)), kWrittenAtOnce);
+  const int together = kWrittenAtOnce * parts_of(parts_of(width_px, parts_of(width_px, max_px)), kWrittenAtOnce);
   return {together, parts_of(width_px, together), parts_of(height_px, kTileHeight_px)};
 }
 
@@ -77,7 +77,7 @@ enum class FaultKind : uint32_t {
   too_few_lights,
   too_many_agents,
   bad_query,
-  no_room
+  capacity_exceeded
 };
 struct Fault {
   FaultKind kind = FaultKind::none;
@@ -93,28 +93,28 @@ PICTURA_HD constexpr Fault fault_of(FaultWord word) {
 }
 
 /// Count of faces of an image that is not gathered; faces that are added meanwhile leave it negative.
-constexpr int32_t kNotGathered = -(1 << 30);
+constexpr int32_t kNotPrepared = -(1 << 30);
 
 /// What an image shows: its faces in a pool, and what tells which of them is in front. Copied whole, so it has no gaps.
-struct GatheredImage {
+struct PreparedImage {
   const DeviceGeometry* geometry = nullptr;
   const AgentBox* agents = nullptr;  // the first of its world
   Vec3 eye_m;
-  int32_t face_begin = 0, face_count = 0;  // ... or kNotGathered
-  int32_t is_left_to_last = 0;             // 1: to the last launch, when it was found too crowded
+  int32_t face_begin = 0, face_count = 0;  // ... or kNotPrepared
+  int32_t has_overflowed = 0;              // 1: to the last launch, when it was found too crowded
 };
-static_assert(sizeof(GatheredImage) == 2 * sizeof(void*) + 6 * sizeof(int32_t));
+static_assert(sizeof(PreparedImage) == 2 * sizeof(void*) + 6 * sizeof(int32_t));
 
 /// A face of four corners, and what it belongs to.
 struct alignas(16) Quad {
   CameraQuad seen;
-  FaceOwner owner;
+  PrimitiveRef primitive;
   float floor_px;  // see CameraFace
 };
 
 /// From what the faces of an image are made, and where they go. Each thing that may show has a place for a face and for
 /// four edges, which stand where the face does; edges of what is clipped go to a part that many images may share.
-struct alignas(16) FaceMaking {
+struct alignas(16) FaceSetupContext {
   ImageSetting setting;
   const Strip* strips = nullptr;
   const WallFace* walls = nullptr;
@@ -130,7 +130,7 @@ struct alignas(16) FaceMaking {
 };
 
 /// Entries of an image that there is room for, if it is drawn from the pool.
-constexpr int kMostEntries = 1536;
+constexpr int kMaxEntries = 1536;
 
 /// Of the entries of an image (renderer_cuda_cull.cuh) those that a warp makes faces of at once, one for each lane.
 struct FaceBatch {
@@ -140,19 +140,19 @@ struct FaceBatch {
   int32_t image, first_entry;
 };
 /// An entry that is to be clipped.
-struct ClippedThing {
+struct ClippedPrimitive {
   uint32_t entry;
   int32_t image;
 };
 
 /// What each step of gathering leaves to the next one. There is room to clip whatever may show.
-struct GatherLists {
-  uint32_t* entries = nullptr;      // [max_entries] for each image, whole batches of those that it has
-  ClippedThing* clipped = nullptr;  // faces of four corners from the front, lights from the back
+struct SetupLists {
+  uint32_t* entries = nullptr;          // [max_entries] for each image, whole batches of those that it has
+  ClippedPrimitive* clipped = nullptr;  // faces of four corners from the front, lights from the back
   int32_t max_entries = 0, max_clipped = 0;
 };
 /// How much of what is to be clipped there is.
-struct GatherCounts {
+struct SetupCounts {
   int32_t clipped = 0, lights = 0;
 };
 
@@ -160,16 +160,16 @@ struct GatherCounts {
 struct FacePool {
   ScreenFace* faces = nullptr;
   PolygonEdge* edges = nullptr;
-  GatheredImage* images = nullptr;  // [images]
-  FaceMaking* makings = nullptr;    // [images]
-  FaceBatch* batches = nullptr;     // as many as max_faces in so many images may make
-  GatherLists lists;
+  PreparedImage* images = nullptr;       // [images]
+  FaceSetupContext* contexts = nullptr;  // [images]
+  FaceBatch* batches = nullptr;          // as many as max_faces in so many images may make
+  SetupLists lists;
   int32_t max_faces = 0, max_edges = 0;  // of edges, four for each face, the rest for those that are clipped
 };
 
 /// Of at most so many blocks, those that find room in a pool to gather an image each. A pool has room for one.
-PICTURA_HD inline int gathering_blocks(const FacePool& pool, int most) {
-  return min_of(pool.max_faces / kMostEntries, most);
+PICTURA_HD inline int setup_blocks(const FacePool& pool, int most) {
+  return min_of(pool.max_faces / kMaxEntries, most);
 }
 
 /// Memory of the blocks of the last launch, and how much each of them has.
@@ -183,10 +183,10 @@ struct Scratch {
 /// What the blocks of a batch's launches count together; 0 before, and again when the last block has ended.
 struct DrawCounters {
   int32_t next_culled = 0, next_clipped = 0, next_drawn = 0;  // the last counts tiles
-  GatherCounts listed;
+  SetupCounts listed;
   int32_t faces = 0, batches = 0, clipped_edges = 0;  // of the pool that are taken
-  int32_t crowds[kCrowds] = {};                       // images that are drawn from it, by how much they list
-  int32_t postponed = 0;                              // images for which it has no room
+  int32_t cost_buckets[kNumCostBuckets] = {};         // images that are drawn from it, by how much they list
+  int32_t deferred = 0;                               // images for which it has no room
   int32_t overflow = 0;                               // ... that are left to the last launch
   int32_t ended = 0;                                  // blocks of that
 };
@@ -196,7 +196,7 @@ struct DrawTask {
   const View* views = nullptr;
   int32_t first_view = 0;  // views [first_view, first_view + num_views) are drawn
   int32_t num_views = 0, num_cameras = 0;
-  int32_t most_tiles = 0;  // of an image
+  int32_t max_tiles = 0;  // of an image
   const DeviceGeometry* geometries = nullptr;
   int32_t num_geometries = 0;
   float line_floor_px = 0;
@@ -206,9 +206,9 @@ struct DrawTask {
   FaultWord* fault = nullptr;
   FacePool pool;
   DrawCounters* counters = nullptr;
-  int32_t* postponed_images = nullptr;  // [images]
-  int32_t* overflow_images = nullptr;   // [images]
-  int32_t* drawn_images = nullptr;      // [kCrowds][images]
+  int32_t* deferred_images = nullptr;  // [images]
+  int32_t* overflow_images = nullptr;  // [images]
+  int32_t* drawn_images = nullptr;     // [kNumCostBuckets][images]
   CameraSlot cameras[kMaxCameras];
 };
 
@@ -218,14 +218,14 @@ PICTURA_HD inline void choose_tiles(DrawTask* task, int blocks) {
   constexpr int kTilesOfBlock = 12;
   const int images = task->num_views * task->num_cameras;
   constexpr int kWidths_px[] = {kTileWidth_px, kNarrowTile_px};
-  for (const int most_px : kWidths_px) {
-    task->most_tiles = 0;
+  for (const int max_px : kWidths_px) {
+    task->max_tiles = 0;
     for (int i = 0; i < task->num_cameras; ++i) {
       CameraSlot& slot = task->cameras[i];
-      slot.tiles = tiles_of(most_px, slot.camera.width_px, slot.camera.height_px);
-      task->most_tiles = max_of(task->most_tiles, slot.tiles.count());
+      slot.tiles = tiles_of(max_px, slot.camera.width_px, slot.camera.height_px);
+      task->max_tiles = max_of(task->max_tiles, slot.tiles.count());
     }
-    if (images * task->most_tiles >= kTilesOfBlock * blocks) return;
+    if (images * task->max_tiles >= kTilesOfBlock * blocks) return;
   }
 }
 

@@ -42,9 +42,9 @@ cudaError_t allow_shared(const void* kernel, std::size_t bytes) {
 }  // namespace
 
 KernelSet ahead_of_time_kernels() {
-  return {{reinterpret_cast<const void*>(pictura_cull), reinterpret_cast<const void*>(pictura_gather),
+  return {{reinterpret_cast<const void*>(pictura_cull), reinterpret_cast<const void*>(pictura_setup_faces),
            reinterpret_cast<const void*>(pictura_clip), reinterpret_cast<const void*>(pictura_draw),
-           reinterpret_cast<const void*>(pictura_draw_postponed), reinterpret_cast<const void*>(pictura_draw_overflow),
+           reinterpret_cast<const void*>(pictura_draw_deferred), reinterpret_cast<const void*>(pictura_draw_overflow),
            reinterpret_cast<const void*>(pictura_visibility)}};
 }
 
@@ -55,7 +55,7 @@ cudaError_t prepare_kernels(KernelSet* kernels) {
   // From there on kernels wait for the launch before theirs, see wait_for_earlier_launch.
   kernels->may_begin_early = attributes.ptxVersion >= 90;
   const cudaError_t allowed = allow_shared(kernels->handle[kDraw], draw_bytes());
-  return allowed != cudaSuccess ? allowed : allow_shared(kernels->handle[kDrawPostponed], postponed_bytes());
+  return allowed != cudaSuccess ? allowed : allow_shared(kernels->handle[kDrawDeferred], deferred_bytes());
 }
 
 std::size_t large_block_bytes(const Scratch& large) { return large_bytes(large); }
@@ -65,26 +65,26 @@ cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& 
   const LaunchPlace place{stream, kernels.may_begin_early};
   const int images = task.num_views * task.num_cameras, draw_blocks = kDrawBlocksPerProcessor * processors;
   choose_tiles(&task, draw_blocks);
-  const int postponed_blocks = gathering_blocks(task.pool, min_of(images, kPostponedBlocksPerProcessor * processors));
+  const int deferred_blocks = setup_blocks(task.pool, min_of(images, kDeferredBlocksPerProcessor * processors));
   const std::pair<Kernel, LaunchShape> launches[] = {
-      {kCull, {min_of(images, kCullBlocksPerProcessor * processors), kGatherThreads, cull_bytes()}},
-      {kGather, {kMakingBlocksPerProcessor * processors, kGatherThreads, sizeof(MakingState)}},
-      {kClip, {kClipBlocksPerProcessor * processors, kGatherThreads, gather_bytes(kGatherThreads)}},
-      {kDraw, {min_of(images * task.most_tiles, draw_blocks), kDrawThreads, draw_bytes()}},
-      {kDrawPostponed, {postponed_blocks, kDrawThreads, postponed_bytes()}}};
+      {kCull, {min_of(images, kCullBlocksPerProcessor * processors), kSetupThreads, cull_bytes()}},
+      {kSetupFaces, {kFaceSetupBlocksPerProcessor * processors, kSetupThreads, sizeof(FaceSetupState)}},
+      {kClip, {kClipBlocksPerProcessor * processors, kSetupThreads, setup_bytes(kSetupThreads)}},
+      {kDraw, {min_of(images * task.max_tiles, draw_blocks), kDrawThreads, draw_bytes()}},
+      {kDrawDeferred, {deferred_blocks, kDrawThreads, deferred_bytes()}}};
   for (const auto& [kernel, shape] : launches) {
     const cudaError_t status = launch(kernels.handle[kernel], shape, place, task);
     if (status != cudaSuccess) return status;
   }
   return launch(kernels.handle[kDrawOverflow],
-                {min_of(images, large.blocks), kLargeThreads, gather_bytes(kLargeThreads)}, place, task, large);
+                {min_of(images, large.blocks), kLargeThreads, setup_bytes(kLargeThreads)}, place, task, large);
 }
 
 cudaError_t launch_visibility(const KernelSet& kernels, const VisibilityTask& task, const Scratch& large,
                               cudaStream_t stream) {
   if (task.num_queries == 0) return cudaSuccess;
   return launch(kernels.handle[kVisibility],
-                {min_of(task.num_queries, large.blocks), kLargeThreads, gather_bytes(kLargeThreads)},
+                {min_of(task.num_queries, large.blocks), kLargeThreads, setup_bytes(kLargeThreads)},
                 LaunchPlace{stream, kernels.may_begin_early}, task, large);
 }
 

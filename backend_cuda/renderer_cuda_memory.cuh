@@ -3,23 +3,23 @@
 #pragma once
 
 #include "pictura/backend_cuda/renderer_cuda_block.cuh"
-#include "pictura/common/raster_pixel.h"
+#include "pictura/common/raster_compositing.h"
 
 namespace pictura::cuda {
 
 // A block that gathers faces: a warp, as many of them as a processor takes.
-constexpr int kGatherThreads = 32, kCullBlocksPerProcessor = 32, kMakingBlocksPerProcessor = 32,
+constexpr int kSetupThreads = 32, kCullBlocksPerProcessor = 32, kFaceSetupBlocksPerProcessor = 32,
               kClipBlocksPerProcessor = 24;
 // A block that draws them, a tile of an image at a time. What has more fragments is drawn in parts.
 constexpr int kDrawThreads = 256, kDrawBlocksPerProcessor = 4;
 constexpr int kDrawPixels = kTileWidth_px * kTileHeight_px, kDrawFragments = 1152;
-// Few images are postponed, mostly none.
-constexpr int kPostponedBlocksPerProcessor = 2;
+// Few images are deferred, mostly none.
+constexpr int kDeferredBlocksPerProcessor = 2;
 // A block of the last launch.
 constexpr int kLargeThreads = 128, kLargePixels = kTileWidth_px * 512, kLargeFragments = 1 << 16;
 
 // Faces that the mark of a pixel's full face can tell apart in 32 bits.
-constexpr int kMarkedFaceBits = 11, kMostMarkedFaces = (1 << kMarkedFaceBits) - 1;
+constexpr int kMarkedFaceBits = 11, kMaxMarkedFaces = (1 << kMarkedFaceBits) - 1;
 
 /// What is kept while pixels are drawn, and by how many threads. Index: of faces, pixels and fragments, 16 bits where
 /// they suffice. Word: two.
@@ -62,13 +62,13 @@ struct DrawMemory {
   }
   // Once a fragment is weighed, there stands where its samples did what it adds to its pixel's sum; in the end, of the
   // first of a pixel's chain, the pixel's colour, as numbers or as bytes.
-  __device__ void set_part(int fragment, const PixelSum::Part& part) const {
+  __device__ void set_part(int fragment, const PixelAccumulator::Part& part) const {
     samples_low[fragment] = static_cast<uint32_t>(part.area);
     samples_high[fragment] = static_cast<uint32_t>(part.r);
     free_low[fragment] = static_cast<uint32_t>(part.g);
     free_high[fragment] = static_cast<uint32_t>(part.b);
   }
-  __device__ PixelSum::Part part(int fragment) const {
+  __device__ PixelAccumulator::Part part(int fragment) const {
     return {static_cast<int32_t>(samples_low[fragment]), static_cast<int32_t>(samples_high[fragment]),
             static_cast<int32_t>(free_low[fragment]), static_cast<int32_t>(free_high[fragment])};
   }
@@ -145,11 +145,11 @@ struct SmallDrawMemory : DrawMemory<uint16_t, uint32_t, kDrawThreads> {
     return memory;
   }
 };
-static_assert(kMostEntries <= kMostMarkedFaces);
-static_assert(kMostMarkedFaces < 0xFFFF && kDrawFragments < 0xFFFF && kDrawPixels < 0x7FFF);
+static_assert(kMaxEntries <= kMaxMarkedFaces);
+static_assert(kMaxMarkedFaces < 0xFFFF && kDrawFragments < 0xFFFF && kDrawPixels < 0x7FFF);
 
 // In global memory. What drawing keeps lies where gathering has left its lists.
-__host__ __device__ inline size_t lay_out(GatherLists* lists, const Scratch& sizes, unsigned char* bytes) {
+__host__ __device__ inline size_t lay_out(SetupLists* lists, const Scratch& sizes, unsigned char* bytes) {
   lists->max_entries = FaceBatch::count_of(sizes.max_faces) * FaceBatch::kEntries;
   lists->max_clipped = sizes.max_faces;
   Layout layout{bytes};
@@ -171,7 +171,7 @@ struct LargeDrawMemory : DrawMemory<uint32_t, unsigned long long, kLargeThreads>
 
 __host__ __device__ inline size_t draw_bytes() { return state_bytes(kDrawThreads) + SmallDrawMemory().place(nullptr); }
 __host__ __device__ inline size_t large_bytes(const Scratch& sizes) {
-  GatherLists lists;
+  SetupLists lists;
   const size_t to_gather = lay_out(&lists, sizes, nullptr), to_draw = LargeDrawMemory().place(nullptr);
   return ((to_gather > to_draw ? to_gather : to_draw) + 15) / 16 * 16;
 }

@@ -8,14 +8,14 @@ namespace pictura::cuda {
 
 // Whether, in the image that the block draws, a solid stands on a strip.
 __device__ __noinline__ inline bool stands(uint32_t solid, uint32_t strip) {
-  const GatheredImage& shown = block_state()->shown;
+  const PreparedImage& shown = block_state()->shown;
   const StaticGeometryView& pieces = shown.geometry->pieces;
   return stands_on(extent_of(solid, pieces, shown.agents), extent_of(strip, pieces, shown.agents), shown.eye_m);
 }
 
 // Takes samples from a fragment's free ones.
 template <typename Memory>
-__device__ void lose(const Memory& memory, uint32_t fragment, uint64_t samples) {
+__device__ void clear_visible_samples(const Memory& memory, uint32_t fragment, uint64_t samples) {
   const auto low = static_cast<uint32_t>(samples), high = static_cast<uint32_t>(samples >> 32);
   if (low != 0) atomicAnd(&memory.free_low[fragment], ~low);
   if (high != 0) atomicAnd(&memory.free_high[fragment], ~high);
@@ -23,7 +23,7 @@ __device__ void lose(const Memory& memory, uint32_t fragment, uint64_t samples) 
 
 // Asks pairs of fragments what they hide of each other; b may be kNone, for the pixel's full face.
 template <typename Memory>
-__device__ __noinline__ void ask_pairs(WarpQueue::Pair pair, Part part) {
+__device__ __noinline__ void resolve_pairs(WarpQueue::Pair pair, Part part) {
   if (!pair.is_one) return;
   const Memory memory = Memory::current();
   const int pixel = memory.pixel[pair.a];
@@ -34,8 +34,8 @@ __device__ __noinline__ void ask_pairs(WarpQueue::Pair pair, Part part) {
   const Vec2 corner{static_cast<float>(part.x_of(pixel)), static_cast<float>(part.y_of(pixel))};
   const Hidden hidden = hide_each_other(a, b, memory.faces[memory.face[pair.a]], memory.faces[face_b], corner,
                                         [](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
-  lose(memory, pair.a, hidden.of_a);
-  if (!with_full) lose(memory, pair.b, hidden.of_b);
+  clear_visible_samples(memory, pair.a, hidden.of_a);
+  if (!with_full) clear_visible_samples(memory, pair.b, hidden.of_b);
 }
 
 // Asks every two fragments of a pixel what they hide of each other, unless nothing is left that they might; a pixel's
@@ -50,7 +50,7 @@ __device__ void hide_fragments(const Memory& memory, const Part& part, int count
   uint32_t other = Memory::kNone;  // of the chain
   bool is_before_full = false;     // the full face comes first
   uint64_t samples = 0;
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (;;) {
     const bool is_idle = !is_before_full && other == Memory::kNone;
     const unsigned idle = __ballot_sync(kAllLanes, is_idle);
@@ -77,9 +77,9 @@ __device__ void hide_fragments(const Memory& memory, const Part& part, int count
     }
     is_before_full = false;
     pairs.push(meet, static_cast<uint32_t>(fragment), with);
-    if (pairs.is_ready()) ask_pairs<Memory>(pairs.take(), part);
+    if (pairs.is_ready()) resolve_pairs<Memory>(pairs.take(), part);
   }
-  if (!pairs.is_empty()) ask_pairs<Memory>(pairs.take(), part);
+  if (!pairs.is_empty()) resolve_pairs<Memory>(pairs.take(), part);
 }
 
 /// Hears of no fragment's weight.
@@ -91,8 +91,8 @@ struct NoVisit {
 // Weighs fragments. What is alone in its pixel gives that its colour; what the others add to the sums of theirs, and
 // what kind of weight that is, stands from then on where their samples and pixels did.
 template <typename Memory, typename Visit, typename Write>
-__device__ void weigh_fragments(const Memory& memory, int count, const Visit& visit, const Write& write) {
-  PICTURA_KEEP_LOOP
+__device__ void composite_fragments(const Memory& memory, int count, const Visit& visit, const Write& write) {
+  PICTURA_NO_UNROLL
   for (int i = static_cast<int>(threadIdx.x); i < count; i += Memory::kThreads) {
     const ScreenFace& face = memory.faces[memory.face[i]];
     const Rgb color = face.color;
@@ -101,8 +101,8 @@ __device__ void weigh_fragments(const Memory& memory, int count, const Visit& vi
       write.keep(memory, i, color * memory.area[i]);
       continue;
     }
-    const PixelSum::Weight weight = PixelSum::weight_of(memory.coverage(i), memory.free(i));
-    memory.set_part(i, PixelSum::part_of(weight, color));
+    const PixelAccumulator::Weight weight = PixelAccumulator::weight_of(memory.coverage(i), memory.free(i));
+    memory.set_part(i, PixelAccumulator::part_of(weight, color));
     memory.area[i] = weight.area;
     memory.kind[i] = weight.kind;
   }
@@ -112,27 +112,28 @@ __device__ void weigh_fragments(const Memory& memory, int count, const Visit& vi
 template <typename Memory, typename Visit, typename Write>
 __device__ void mix_pixels(const Memory& memory, const Visit& visit, const Write& write) {
   const int num_drawn = memory.state->num_drawn;
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int d = static_cast<int>(threadIdx.x); d < num_drawn; d += Memory::kThreads) {
     const int pixel = memory.drawn[d];
     const auto full = full_of(memory, pixel);
     const auto head = static_cast<int>(first_of(memory, pixel));
     auto each_fragment = [&](auto&& take) {
-      PICTURA_KEEP_LOOP
+      PICTURA_NO_UNROLL
       for (auto i = first_of(memory, pixel); i != Memory::kNone; i = memory.next[i]) {
-        take(static_cast<int>(i), static_cast<PixelSum::Kind>(memory.kind[i]));
+        take(static_cast<int>(i), static_cast<PixelAccumulator::Kind>(memory.kind[i]));
       }
     };
     // Nothing hides the full face but what covers the pixel too, and then it is a fragment.
-    const PixelSum::Weight of_full = PixelSum::weight_of({1.0f, kAllSamples}, kAllSamples);
-    PixelSum sum;
+    const PixelAccumulator::Weight of_full = PixelAccumulator::weight_of({1.0f, kAllSamples}, kAllSamples);
+    PixelAccumulator sum;
     if (full != Memory::kNone) sum.add(of_full, memory.faces[full].color);
-    each_fragment([&](int i, PixelSum::Kind kind) { sum.add(kind, memory.part(i)); });
-    const PixelSum::Shares shares = sum.shares();
+    each_fragment([&](int i, PixelAccumulator::Kind kind) { sum.add(kind, memory.part(i)); });
+    const PixelAccumulator::Shares shares = sum.shares();
     if constexpr (Visit::kWanted) {
       if (full != Memory::kNone) visit(memory.faces[full], shares.of(of_full));
-      each_fragment(
-          [&](int i, PixelSum::Kind kind) { visit(memory.faces[memory.face[i]], shares.of({memory.area[i], kind})); });
+      each_fragment([&](int i, PixelAccumulator::Kind kind) {
+        visit(memory.faces[memory.face[i]], shares.of({memory.area[i], kind}));
+      });
     }
     write.keep(memory, head, sum.color(shares));
   }
@@ -143,7 +144,7 @@ template <typename Memory, typename Visit, typename Write>
 __device__ void write_pixels(const Memory& memory, const Part& part, const Visit& visit, const Write& write) {
   using Word = typename Memory::Word;
   const int pixels = part.num_pixels();
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int first = kWrittenAtOnce * static_cast<int>(threadIdx.x); first < pixels;
        first += kWrittenAtOnce * Memory::kThreads) {
     const int x = part.x_of(first), y = part.y_of(first), count = min_of(part.x_end - x, kWrittenAtOnce);
@@ -175,7 +176,7 @@ __device__ void reset_counts(const Memory& memory) {
 template <typename Memory>
 __device__ void reset_part(const Memory& memory) {
   sync_block();
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int p = static_cast<int>(threadIdx.x); p < memory.max_pixels; p += Memory::kThreads) memory.pixels[p] = 0;
   reset_counts(memory);
   sync_block();
@@ -200,7 +201,7 @@ __device__ bool mix_rows(const Memory& memory, const Part& part, const Visit& vi
   if (count > memory.max_fragments) return false;
   hide_fragments(memory, part, count);
   sync_block();
-  weigh_fragments(memory, count, visit, write);
+  composite_fragments(memory, count, visit, write);
   sync_block();
   mix_pixels(memory, visit, write);
   sync_block();
@@ -278,7 +279,7 @@ template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whole, const Visit& visit,
                            const Write& write) {
   Part part = whole;
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (;;) {
     const bool is_drawn = draw_part(memory, num_faces, part, visit, write);
     if (is_drawn && part.x_end == whole.x_end && part.y_end == whole.y_end) return true;
@@ -290,13 +291,13 @@ __device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whol
 // Tiles of an image as high as there is room for, one after the other: draw(memory, tile) for each, until one is false.
 template <typename Memory, typename Draw>
 __device__ bool each_tile(const Memory& memory, int width_px, int y_begin, int y_end, const Draw& draw) {
-  const int most_rows = memory.max_pixels / kTileWidth_px;
+  const int max_rows = memory.max_pixels / kTileWidth_px;
   reset_part(memory);
-  PICTURA_KEEP_LOOP
-  for (int y = y_begin; y < y_end; y += most_rows) {
-    PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
+  for (int y = y_begin; y < y_end; y += max_rows) {
+    PICTURA_NO_UNROLL
     for (int x = 0; x < width_px; x += kTileWidth_px) {
-      if (!draw(memory, tile_at(x, y, kTileWidth_px, most_rows, width_px, y_end))) return false;
+      if (!draw(memory, tile_at(x, y, kTileWidth_px, max_rows, width_px, y_end))) return false;
       sync_block();
     }
   }

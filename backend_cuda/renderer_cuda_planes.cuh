@@ -18,12 +18,12 @@ __device__ __noinline__ void draw_planes(CameraPlanes planes, int width_px, int6
   // Those of a row in a chain, which begins where its first pixel was and goes on where candidates were; 0 ends it.
   const int num_rows = memory.state->num_rows;
   const bool has_room = num_rows <= memory.max_rows;
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int i = static_cast<int>(threadIdx.x); has_room && i < num_rows; i += Memory::kThreads) {
     memory.candidates[i] = atomicExch(&memory.pixels[memory.rows[i] & Memory::kNone], static_cast<Word>(i + 1));
   }
   sync_block();
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int p = static_cast<int>(threadIdx.x); p < part.num_pixels(); p += Memory::kThreads) {
     const int x = part.x_of(p), y = part.y_of(p);
     if (x >= part.x_end) continue;
@@ -36,12 +36,12 @@ __device__ __noinline__ void draw_planes(CameraPlanes planes, int width_px, int6
         if (covers_point(memory.edges + face.edge_begin, face.edge_count, center.x, center.y)) take(face);
       };
       if (has_room) {
-        PICTURA_KEEP_LOOP
+        PICTURA_NO_UNROLL
         for (Word at = memory.pixels[y - part.y_begin]; at != 0; at = memory.candidates[at - 1]) {
           ask(memory.faces[memory.rows[at - 1] >> Memory::kHalf]);
         }
       } else {
-        PICTURA_KEEP_LOOP
+        PICTURA_NO_UNROLL
         for (int i = 0; i < num_faces; ++i) ask(memory.faces[i]);
       }
     };

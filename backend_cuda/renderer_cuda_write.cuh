@@ -77,7 +77,7 @@ struct ImageWriter {
   // value_of(i, channel): of the i-th pixel.
   template <typename Value, typename ValueOf>
   __device__ void store_channels(Value* to, int count, ValueOf&& value_of) const {
-    PICTURA_KEEP_LOOP
+    PICTURA_NO_UNROLL
     for (int channel = 0; channel < 3; ++channel, to += plane) {
       Together<Value> values;
       for (int i = 0; i < kWrittenAtOnce; ++i) values.value[i] = value_of(i, channel);

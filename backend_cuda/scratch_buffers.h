@@ -11,30 +11,30 @@ namespace pictura::cuda {
 /// are clipped.
 constexpr std::size_t kPoolFaces = 200, kPoolEdges = 928;
 /// ... and of few images, which may all be crowded.
-constexpr std::size_t kLeastPoolImages = 4 * kMostEntries / kPoolFaces + 1;
-static_assert(kLeastPoolImages * kPoolFaces >= kMostEntries, "an image that is postponed finds room");
+constexpr std::size_t kMinPoolImages = 4 * kMaxEntries / kPoolFaces + 1;
+static_assert(kMinPoolImages * kPoolFaces >= kMaxEntries, "an image that is deferred finds room");
 
 /// How much of everything a pool holds for so many images.
 struct PoolSizes {
   std::size_t images, faces, edges;
   /// As many as the faces make, of each image with a last one that may not be full.
   constexpr std::size_t batches() const { return faces / FaceBatch::kEntries + images; }
-  constexpr std::size_t entries() const { return images * kMostEntries; }
-  constexpr std::size_t listed_images() const { return (2 + kCrowds) * images; }
+  constexpr std::size_t entries() const { return images * kMaxEntries; }
+  constexpr std::size_t listed_images() const { return (2 + kNumCostBuckets) * images; }
   constexpr std::size_t bytes() const {
-    return faces * (sizeof(ScreenFace) + sizeof(ClippedThing)) + edges * sizeof(PolygonEdge) +
-           images * (sizeof(GatheredImage) + sizeof(FaceMaking)) + batches() * sizeof(FaceBatch) +
+    return faces * (sizeof(ScreenFace) + sizeof(ClippedPrimitive)) + edges * sizeof(PolygonEdge) +
+           images * (sizeof(PreparedImage) + sizeof(FaceSetupContext)) + batches() * sizeof(FaceBatch) +
            entries() * sizeof(uint32_t) + listed_images() * sizeof(int32_t);
   }
 };
 constexpr PoolSizes pool_sizes(std::size_t images) {
-  const std::size_t rooms = images + kLeastPoolImages;
+  const std::size_t rooms = images + kMinPoolImages;
   return {images, rooms * kPoolFaces, rooms * kPoolEdges};
 }
 /// What a pool takes without images, and what each of them adds; together within a batch of its bytes, and not less.
 constexpr std::size_t kPoolImageBytes =
     (pool_sizes(FaceBatch::kEntries).bytes() - pool_sizes(0).bytes()) / FaceBatch::kEntries;
-constexpr std::size_t kLeastPoolBytes = pool_sizes(0).bytes() + sizeof(FaceBatch);
+constexpr std::size_t kMinPoolBytes = pool_sizes(0).bytes() + sizeof(FaceBatch);
 
 /// Owns the faces that are gathered before they are drawn, and what is known of their images.
 template <template <typename> class Buffer>
@@ -57,10 +57,10 @@ class PoolBuffers {
                       images_.data(),
                       makings_.data(),
                       batches_.data(),
-                      {entries_.data(), clipped_.data(), kMostEntries, static_cast<int32_t>(clipped_.size())},
+                      {entries_.data(), clipped_.data(), kMaxEntries, static_cast<int32_t>(clipped_.size())},
                       static_cast<int32_t>(faces_.size()),
                       static_cast<int32_t>(edges_.size())};
-    task_out->postponed_images = lists_.data();
+    task_out->deferred_images = lists_.data();
     task_out->overflow_images = lists_.data() + images_.size();
     task_out->drawn_images = lists_.data() + 2 * images_.size();
   }
@@ -68,11 +68,11 @@ class PoolBuffers {
  private:
   Buffer<ScreenFace> faces_;
   Buffer<PolygonEdge> edges_;
-  Buffer<GatheredImage> images_;
-  Buffer<FaceMaking> makings_;
+  Buffer<PreparedImage> images_;
+  Buffer<FaceSetupContext> makings_;
   Buffer<FaceBatch> batches_;
   Buffer<uint32_t> entries_;
-  Buffer<ClippedThing> clipped_;
+  Buffer<ClippedPrimitive> clipped_;
   Buffer<int32_t> lists_;
 };
 

@@ -63,17 +63,17 @@ ImageArray::ImageArray(const Functions& gl, std::string renderer, const PixelSam
       interop_(interop),
       width_px_(width_px),
       height_px_(height_px) {
-  const int most_texels = gl_.integer(GL_MAX_TEXTURE_SIZE);
+  const int max_texels = gl_.integer(GL_MAX_TEXTURE_SIZE);
   const int64_t texels = int64_t{samples_.grid} * std::max(width_px_, height_px_);
-  PICTURA_CHECK(texels <= most_texels,
+  PICTURA_CHECK(texels <= max_texels,
                 "renderer {}: {}x{} pixels of {}x{} samples: expected at most {} samples along an axis, which is this "
                 "driver's limit, got {}",
-                renderer_, width_px_, height_px_, samples_.grid, samples_.grid, most_texels, texels);
-  const int most_samples =
+                renderer_, width_px_, height_px_, samples_.grid, samples_.grid, max_texels, texels);
+  const int max_samples =
       std::min(gl_.integer(GL_MAX_COLOR_TEXTURE_SAMPLES), gl_.integer(GL_MAX_DEPTH_TEXTURE_SAMPLES));
-  PICTURA_CHECK(samples_.multisample <= most_samples,
+  PICTURA_CHECK(samples_.multisample <= max_samples,
                 "renderer {}: expected at most {} samples, which is this driver's limit for MSAA, got {}", renderer_,
-                most_samples, samples_.multisample);
+                max_samples, samples_.multisample);
 }
 
 std::size_t ImageArray::plane_bytes() const {
@@ -81,15 +81,15 @@ std::size_t ImageArray::plane_bytes() const {
   return format_ == PixelFormat::u8 ? (pixels + 3) / 4 * 4 : 4 * pixels;
 }
 
-int ImageArray::most_layers() const {
+int ImageArray::max_layers() const {
   const int64_t image_bytes = 3 * static_cast<int64_t>(plane_bytes());
-  const int64_t most_bytes = gl_.integer(GL_MAX_SHADER_STORAGE_BLOCK_SIZE);
-  PICTURA_CHECK(image_bytes <= most_bytes,
+  const int64_t max_bytes = gl_.integer(GL_MAX_SHADER_STORAGE_BLOCK_SIZE);
+  PICTURA_CHECK(image_bytes <= max_bytes,
                 "renderer {}: {}x{} pixels: expected at most {} bytes an image, which is this driver's limit, got {}",
-                renderer_, width_px_, height_px_, most_bytes, image_bytes);
+                renderer_, width_px_, height_px_, max_bytes, image_bytes);
   const int64_t texels = int64_t{width_px_} * height_px_ * samples_.grid * samples_.grid * samples_.multisample;
   const int64_t most = std::max<int64_t>(1, kArrayBytes / (texels * texel_bytes(format_)));
-  return static_cast<int>(std::min({most, most_bytes / image_bytes, int64_t{gl_.integer(GL_MAX_ARRAY_TEXTURE_LAYERS)},
+  return static_cast<int>(std::min({most, max_bytes / image_bytes, int64_t{gl_.integer(GL_MAX_ARRAY_TEXTURE_LAYERS)},
                                     int64_t{gl_.integer(GL_MAX_FRAMEBUFFER_LAYERS)}}));
 }
 
@@ -120,7 +120,7 @@ void ImageArray::release() {
 int ImageArray::reserve(int64_t images, PixelFormat format) {
   if (format_ != format) release();
   format_ = format;
-  const int wanted = static_cast<int>(std::min<int64_t>(images, most_layers()));
+  const int wanted = static_cast<int>(std::min<int64_t>(images, max_layers()));
   if (wanted <= layers_) return layers_;
   release();
   layers_ = wanted;
@@ -177,12 +177,12 @@ void ImageArray::begin() {
 }
 
 void ImageArray::resolve(int images) {
-  constexpr std::size_t kGroup = 64;          // local_size_x
-  constexpr std::size_t kMostGroups = 65535;  // every OpenGL takes so many along an axis
+  constexpr std::size_t kGroup = 64;         // local_size_x
+  constexpr std::size_t kMaxGroups = 65535;  // every OpenGL takes so many along an axis
   gl_.BindTextureUnit(0, color_);
   gl_.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, output_);
   gl_.UseProgram(resolve_program_);
-  const std::size_t groups = std::min((plane_bytes() / 4 + kGroup - 1) / kGroup, kMostGroups);
+  const std::size_t groups = std::min((plane_bytes() / 4 + kGroup - 1) / kGroup, kMaxGroups);
   gl_.DispatchCompute(static_cast<GLuint>(groups), static_cast<GLuint>(images), 1);
   gl_.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
 }

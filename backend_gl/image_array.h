@@ -44,7 +44,7 @@ class ImageArray {
 
  private:
   // Of the present format.
-  int most_layers() const;
+  int max_layers() const;
   std::size_t plane_bytes() const;
   GLuint make_texture(GLenum format) const;
   void make_storage();

@@ -10,9 +10,9 @@ namespace {
 
 // Strips of one level lie nearly in one plane, where rank is to decide which is in front. Each is therefore compared as
 // if it lay further from the camera, the more so the later it comes in the order of ranks: seen from above by up to
-// kMostPush_m, which is several times what parts strips of one level, and little to what parts two levels of road. Seen
+// kMaxPush_m, which is several times what parts strips of one level, and little to what parts two levels of road. Seen
 // from below, what stands on a strip is just behind it and has to stay there: by this share of its plane's distance.
-constexpr float kMostPush_m = 4 * kSameLevel_m, kMostPushShare = 0.01f;
+constexpr float kMaxPush_m = 4 * kSameLevel_m, kMaxPushShare = 0.01f;
 
 // The plane whose depth is compared for a strip that has `order`, 0 to 1, among those of the image. Where it is below
 // the camera it is lowered by how far solids that stand on it may dip into it: they are then in front.
@@ -20,8 +20,8 @@ Vec3 compared_plane(const FacePlane& plane, const PinholeCamera& camera, float o
   const Vec3 up{camera.right.z, camera.down.z, camera.forward.z};
   const float above = dot(plane.normal, up);  // also the scale of the offset: above * height of the plane
   const bool camera_above = plane.offset * above <= 0.0f;
-  const float offset = camera_above ? plane.offset - (kStanding_m + order * kMostPush_m) * above
-                                    : plane.offset * (1.0f + order * kMostPushShare);
+  const float offset = camera_above ? plane.offset - (kStanding_m + order * kMaxPush_m) * above
+                                    : plane.offset * (1.0f + order * kMaxPushShare);
   return offset == 0.0f ? Vec3{} : plane.normal * (1.0f / offset);
 }
 
@@ -46,7 +46,7 @@ void ImageFaces::gather(const ImageSetting& setting, const StaticGeometryView& g
     light_faces(head, state, setting.camera, emit);
   });
   visit_strips(setting, geometry,
-               [&](const Strip& strip, int32_t index) { strips_.push_back({strip_number(strip, index), &strip}); });
+               [&](const Strip& strip, int32_t index) { strips_.push_back({strip_object_id(strip, index), &strip}); });
   std::sort(strips_.begin(), strips_.end(), [](const RankedStrip& a, const RankedStrip& b) { return a.rank < b.rank; });
   for (std::size_t i = 0; i < strips_.size(); ++i) {
     const float order = static_cast<float>(i) / static_cast<float>(strips_.size());

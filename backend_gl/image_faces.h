@@ -5,13 +5,13 @@
 #include <utility>
 #include <vector>
 
-#include "pictura/common/raster_item.h"
+#include "pictura/common/raster_face_setup.h"
 
 namespace pictura::gl {
 
 /// Bounds on the depth of a strip's corner over that of its compared plane there: as good as infinitely far, beyond the
 /// horizon of the plane, and as near as the oracle lets it come.
-constexpr float kLeastNearness = 1e-4f, kMostNearness = kWidenedDepth;
+constexpr float kMinNearness = 1e-4f, kMaxNearness = kWidenedDepth;
 
 /// One instance of the draw call: a flat quadrilateral, in camera coordinates.
 struct FaceInstance {

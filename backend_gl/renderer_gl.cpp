@@ -103,8 +103,8 @@ class GlRenderer final : public Renderer {
     positions_ = gl_->GetUniformLocation(program_, "positions");
     positions_per_px_ = static_cast<float>(config_.samples.grid << gl_->integer(GL_SUBPIXEL_BITS));
     gl_->ProgramUniform1f(program_, gl_->GetUniformLocation(program_, "near_m"), kNear_m);
-    gl_->ProgramUniform2f(program_, gl_->GetUniformLocation(program_, "nearness"), gl::kLeastNearness,
-                          gl::kMostNearness);
+    gl_->ProgramUniform2f(program_, gl_->GetUniformLocation(program_, "inverse_depth"), gl::kMinNearness,
+                          gl::kMaxNearness);
     gl_->CreateBuffers(1, &instances_);
     gl_->CreateVertexArrays(1, &vertex_array_);
     gl_->VertexArrayVertexBuffer(vertex_array_, 0, instances_, 0, sizeof(FaceInstance));

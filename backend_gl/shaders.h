@@ -18,7 +18,7 @@ layout(location = 5) in vec3 color;
 layout(location = 6) in int layer;
 uniform vec4 projection;  // scale of x and y, offset of x and y
 uniform vec2 positions;   // of corners that hardware tells apart along half an image
-uniform vec2 nearness;    // bounds on the depth of a corner over that of the plane that is compared
+uniform vec2 inverse_depth;    // bounds on the depth of a corner over that of the plane that is compared
 uniform float near_m;
 flat out vec3 face_color;
 void main() {
@@ -32,7 +32,7 @@ void main() {
     p.xy = (at - projection.zw * p.z) / projection.xy;
   }
   // Its depth over the one that is compared.
-  float nearer = compared_plane == vec3(0.0) ? 1.0 : clamp(dot(compared_plane, p), nearness.x, nearness.y);
+  float nearer = compared_plane == vec3(0.0) ? 1.0 : clamp(dot(compared_plane, p), inverse_depth.x, inverse_depth.y);
   // Inverse depth: 1 at the near plane, 0 infinitely far.
   gl_Position = vec4(at, near_m * nearer, p.z);
   gl_Layer = layer;

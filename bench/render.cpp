@@ -16,7 +16,7 @@ namespace pictura {
 namespace {
 
 // In a row: more than any repeat needs, and fewer than an int has room for.
-constexpr double kMostCalls = 1e9;
+constexpr double kMaxCalls = 1e9;
 
 class HostTarget final : public RenderTarget {
  public:
@@ -124,7 +124,7 @@ RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& r
   if (render_case.repeats > 0) {
     target->spoil();
     const double one_ms = target->draw(renderer.get(), 1);
-    const int calls = static_cast<int>(std::clamp(1e3 * render_case.repeat_s / one_ms, 1.0, kMostCalls));
+    const int calls = static_cast<int>(std::clamp(1e3 * render_case.repeat_s / one_ms, 1.0, kMaxCalls));
     for (int repeat = 0; repeat < render_case.repeats; ++repeat) {
       result.call_ms.push_back(target->draw(renderer.get(), calls));
       if (interrupted()) throw Interrupted("interrupted");
@@ -133,7 +133,7 @@ RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& r
     if (check) check->compare(target.get(), &result.error);
   }
 #ifdef PICTURA_HAS_CUDA
-  if (watch) result.most_bytes = watch->most_bytes();
+  if (watch) result.max_bytes = watch->max_bytes();
 #endif
   return result;
 }

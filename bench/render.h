@@ -30,7 +30,7 @@ struct RenderMeasurement {
   ImageError error;             // against the oracle, of the views that are checked, both times
   // Where memory is watched, of the device: once the maps are uploaded, and the most that was ever taken, both without
   // scene, views and images.
-  double up_front_bytes = 0, most_bytes = 0, image_bytes = 0;
+  double up_front_bytes = 0, max_bytes = 0, image_bytes = 0;
 };
 
 /// Throws Error when `cuda` draws other images than the oracle does, or a backend cannot run here.

@@ -84,7 +84,7 @@ DeviceMemoryWatch::DeviceMemoryWatch() : free_before_(free_bytes()) {
       std::size_t free = 0, total = 0;
       status_ = cudaMemGetInfo(&free, &total);
       if (status_ != cudaSuccess) return;
-      most_bytes_ = std::max(most_bytes_.load(), static_cast<double>(free_before_) - static_cast<double>(free));
+      max_bytes_ = std::max(max_bytes_.load(), static_cast<double>(free_before_) - static_cast<double>(free));
       std::this_thread::sleep_for(std::chrono::microseconds(200));
     }
   });
@@ -99,9 +99,9 @@ double DeviceMemoryWatch::taken_bytes() const {
   return static_cast<double>(free_before_) - static_cast<double>(free_bytes());
 }
 
-double DeviceMemoryWatch::most_bytes() const {
+double DeviceMemoryWatch::max_bytes() const {
   check_cuda(status_, "cudaMemGetInfo of the watch");
-  return std::max(most_bytes_.load(), taken_bytes());
+  return std::max(max_bytes_.load(), taken_bytes());
 }
 
 std::string cuda_device_name() {

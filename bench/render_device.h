@@ -23,11 +23,11 @@ class DeviceMemoryWatch {
 
   double taken_bytes() const;
   /// What is taken now included. Throws Error when the thread could not ask.
-  double most_bytes() const;
+  double max_bytes() const;
 
  private:
   std::size_t free_before_ = 0;
-  std::atomic<double> most_bytes_ = 0;
+  std::atomic<double> max_bytes_ = 0;
   std::atomic<cudaError_t> status_ = cudaSuccess;
   std::atomic<bool> ends_ = false;
   std::thread poller_;

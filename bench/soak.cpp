@@ -16,9 +16,9 @@ namespace pictura {
 
 namespace {
 
-constexpr std::size_t kMostFaults = 100;
-constexpr int kQueries = 32;           // of visibility, in each scene
-constexpr int kMostHiddenAgents = 64;  // in a view's list
+constexpr std::size_t kMaxFaults = 100;
+constexpr int kQueries = 32;          // of visibility, in each scene
+constexpr int kMaxHiddenAgents = 64;  // in a view's list
 
 // What is drawn of a scene, each from a stream of its own.
 enum class Draw : uint32_t { rigs, world, views, settings, hidden_agents, queries };
@@ -137,7 +137,7 @@ class Scenes {
     std::vector<int32_t>& hidden = views_inout->hidden_agents;
     for (View& view : views_inout->views) {
       view.hidden_begin = static_cast<int32_t>(hidden.size());
-      const int count = random.below(2) > 0 ? 1 + random.below(std::min(num_agents(), kMostHiddenAgents)) : 0;
+      const int count = random.below(2) > 0 ? 1 + random.below(std::min(num_agents(), kMaxHiddenAgents)) : 0;
       for (int i = 0; i < count; ++i) hidden.push_back(random.below(num_agents()));
       view.hidden_end = static_cast<int32_t>(hidden.size());
     }
@@ -152,7 +152,7 @@ class Scenes {
 template <typename Fault>
 void note(const Fault& fault, std::vector<Fault>* faults_out, SoakResult* result_out) {
   if (result_out->first_faulty_scene < 0) result_out->first_faulty_scene = fault.scene;
-  if (faults_out->size() < kMostFaults) faults_out->push_back(fault);
+  if (faults_out->size() < kMaxFaults) faults_out->push_back(fault);
 }
 
 // Draws a scene with both and adds how far they are apart.
@@ -232,7 +232,7 @@ SoakResult soak(const SoakOptions& options, const MakeRenderer& make,
     }
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     on_scene(result);
-    if (result.scenes == options.most_scenes || result.seconds >= options.most_seconds) return result;
+    if (result.scenes == options.max_scenes || result.seconds >= options.max_seconds) return result;
   }
 }
 

@@ -17,8 +17,8 @@ struct SoakOptions {
   int agents = 120, parked_cars = 32;  // of a scene's world, at most
   int views = 16;                      // of each scene
   int64_t first_scene = 0;             // scenes are numbered from 0; each is drawn by its number and the seed alone
-  int64_t most_scenes = 0;             // 0: as many as there is time for
-  double most_seconds = 480;
+  int64_t max_scenes = 0;              // 0: as many as there is time for
+  double max_seconds = 480;
   uint64_t seed = 0;
   int num_threads = 0;  // 0: all
 };

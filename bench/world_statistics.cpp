@@ -8,7 +8,7 @@
 #include "pictura/common/interrupt.h"
 #include "pictura/simulator/world_batch.h"
 #include "pictura/tests/simulator/goal_places.h"
-#include "pictura/tests/simulator/lane_driver.h"
+#include "pictura/tests/simulator/lane_keeping.h"
 
 namespace pictura {
 
@@ -46,10 +46,10 @@ void count_population(WorldBatch& batch, const LaneGraph& graph, Counts* counts_
     count("refused, no place", "agents", 0);
     for (int agent = 0; agent < world.num_agents; ++agent) {
       const int slot = world.first_slot + agent;
-      switch (static_cast<Refusal>(world.agents.refusal[slot])) {
-        case Refusal::none: count(kClasses[world.agents.agent_class[slot]], "agents", 1); break;
-        case Refusal::taken: count("refused, places taken", "agents", 1); break;
-        case Refusal::no_place: count("refused, no place", "agents", 1); break;
+      switch (static_cast<SpawnFailure>(world.agents.refusal[slot])) {
+        case SpawnFailure::none: count(kClasses[world.agents.agent_class[slot]], "agents", 1); break;
+        case SpawnFailure::taken: count("refused, places taken", "agents", 1); break;
+        case SpawnFailure::no_place: count("refused, no place", "agents", 1); break;
       }
     }
     for (int i = world.num_agents; i < world.num_boxes; ++i) count("parked cars", "cars", world.boxes[i].drawn);
@@ -96,7 +96,7 @@ void drive_randomly(Simulator& simulator, const WorldStatisticsOptions& options,
 
 void drive_lanes(const std::shared_ptr<const RoadMap>& map, const SimulatorConfig& config, int episodes,
                  Counts* counts_inout) {
-  static_assert(testing::LaneDriver::kAstray_m == 1);
+  static_assert(testing::LaneKeepingController::kAstray_m == 1);
   constexpr std::pair<const char*, Event> kReasons[] = {{"lane driver: collisions", kEventCollision},
                                                         {"lane driver: off-road", kEventOffRoad},
                                                         {"lane driver: wall contacts", kEventWall},

@@ -11,9 +11,9 @@
 // Before a loop that a kernel keeps as it is written: unrolled, the code of a kernel does not fit into the instruction
 // caches, and waiting for instructions costs more than a loop does.
 #if defined(__CUDA_ARCH__)
-#define PICTURA_KEEP_LOOP _Pragma("unroll 1")
+#define PICTURA_NO_UNROLL _Pragma("unroll 1")
 #else
-#define PICTURA_KEEP_LOOP
+#define PICTURA_NO_UNROLL
 #endif
 // Before a loop over the corners of a face, of which nearly all have four: those stay in registers then.
 #if defined(__CUDA_ARCH__)
@@ -64,7 +64,7 @@ PICTURA_HD inline float saturate(float x) {
 
 /// 1 / x and the square root of x, for a magnitude of x between 2^-100 and 2^100, rounded to nearest as IEEE demands. A
 /// device takes the steps that its compiler takes for numbers of that range, without asking first whether x is one.
-PICTURA_HD inline float inverse_of(float x) {
+PICTURA_HD inline float reciprocal_in_range(float x) {
 #if defined(__CUDA_ARCH__)
   float guess;
   asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(guess) : "f"(x));
@@ -73,7 +73,7 @@ PICTURA_HD inline float inverse_of(float x) {
   return 1.0f / x;
 #endif
 }
-PICTURA_HD inline float root_of(float x) {
+PICTURA_HD inline float sqrt_in_range(float x) {
 #if defined(__CUDA_ARCH__)
   float inverse_guess;
   asm("rsqrt.approx.ftz.f32 %0, %1;" : "=f"(inverse_guess) : "f"(x));
@@ -85,7 +85,7 @@ PICTURA_HD inline float root_of(float x) {
 }
 
 /// The number that a word is.
-PICTURA_HD inline float number_of_bits(uint32_t bits) {
+PICTURA_HD inline float float_from_bits(uint32_t bits) {
 #if defined(__CUDA_ARCH__)
   return __uint_as_float(bits);
 #else
@@ -114,7 +114,7 @@ PICTURA_HD inline void wait_for_copies() {
 }
 
 /// Asks for the memory around an address, which is read soon.
-PICTURA_HD inline void ask_for([[maybe_unused]] const void* address) {
+PICTURA_HD inline void prefetch([[maybe_unused]] const void* address) {
 #if defined(__CUDA_ARCH__)
   asm volatile("prefetch.global.L2 [%0];" : : "l"(address));
 #endif
@@ -128,14 +128,14 @@ PICTURA_HD inline void wait_for_earlier_launch() {
 }
 
 /// The lesser and the greater of two numbers that are numbers; one instruction of a device. Of two zeros it is either.
-PICTURA_HD inline float lesser_of(float a, float b) {
+PICTURA_HD inline float min_no_nan(float a, float b) {
 #if defined(__CUDA_ARCH__)
   return fminf(a, b);
 #else
   return a < b ? a : b;
 #endif
 }
-PICTURA_HD inline float greater_of(float a, float b) {
+PICTURA_HD inline float max_no_nan(float a, float b) {
 #if defined(__CUDA_ARCH__)
   return fmaxf(a, b);
 #else
@@ -144,7 +144,7 @@ PICTURA_HD inline float greater_of(float a, float b) {
 }
 
 /// The bits of a number.
-PICTURA_HD inline uint32_t bits_of(float x) {
+PICTURA_HD inline uint32_t bits_from_float(float x) {
 #if defined(__CUDA_ARCH__)
   return __float_as_uint(x);
 #else
@@ -153,7 +153,7 @@ PICTURA_HD inline uint32_t bits_of(float x) {
 }
 
 /// x itself, computed before and not anew at each use: a device's compiler moves what seems cheap into loops.
-PICTURA_HD inline float computed_once(float x) {
+PICTURA_HD inline float no_rematerialize(float x) {
 #if defined(__CUDA_ARCH__)
   asm volatile("" : "+f"(x));
 #endif
@@ -161,46 +161,46 @@ PICTURA_HD inline float computed_once(float x) {
 }
 
 /// Eight numbers of 16 bits. A device holds number k and number k + 4 as the halves of a word, on which one instruction
-/// does the same; a host holds them one after the other, in one register of eight.
-struct Eight {
+/// does the same; a host holds them one after the other, in one register.
+struct Int16x8 {
 #if defined(__CUDA_ARCH__)
   uint32_t halves[4];
 #else
-  int16_t number[8];
+  int16_t value[8];
 #endif
 };
-constexpr int kEight = 8, kHalfOfEight = 4;
+constexpr int kInt16x8Size = 8, kInt16x8Half = 4;
 
 /// Numbers of(0) to of(7).
 template <typename Of>
-PICTURA_HD inline Eight eight_of(Of&& of) {
-  Eight eight;
+PICTURA_HD inline Int16x8 make_int16x8(Of&& of) {
+  Int16x8 result;
 #if defined(__CUDA_ARCH__)
-  for (int k = 0; k < kHalfOfEight; ++k) {
-    eight.halves[k] = static_cast<uint32_t>(of(k)) & 0xFFFFu | static_cast<uint32_t>(of(k + kHalfOfEight)) << 16;
+  for (int k = 0; k < kInt16x8Half; ++k) {
+    result.halves[k] = static_cast<uint32_t>(of(k)) & 0xFFFFu | static_cast<uint32_t>(of(k + kInt16x8Half)) << 16;
   }
 #else
-  for (int k = 0; k < kEight; ++k) eight.number[k] = static_cast<int16_t>(of(k));
+  for (int k = 0; k < kInt16x8Size; ++k) result.value[k] = static_cast<int16_t>(of(k));
 #endif
-  return eight;
+  return result;
 }
 
 /// base + (k - 4) * step, which lie in [0, 65,536), of which numbers keep the bits.
-PICTURA_HD inline Eight multiples_of(int32_t step, int32_t base) {
+PICTURA_HD inline Int16x8 arithmetic_sequence(int32_t step, int32_t base) {
 #if defined(__CUDA_ARCH__)
-  Eight eight;
-  for (int k = 0; k < kHalfOfEight; ++k) {
-    eight.halves[k] =
-        static_cast<uint32_t>(step * ((k << 16) + k - kHalfOfEight)) + static_cast<uint32_t>(base) * 0x10001u;
+  Int16x8 result;
+  for (int k = 0; k < kInt16x8Half; ++k) {
+    result.halves[k] =
+        static_cast<uint32_t>(step * ((k << 16) + k - kInt16x8Half)) + static_cast<uint32_t>(base) * 0x10001u;
   }
-  return eight;
+  return result;
 #else
-  return eight_of([=](int k) { return base + (k - kHalfOfEight) * step; });
+  return make_int16x8([=](int k) { return base + (k - kInt16x8Half) * step; });
 #endif
 }
 
 /// The lower half of a word, in both of its halves.
-PICTURA_HD inline uint32_t in_both_halves(uint32_t word) {
+PICTURA_HD inline uint32_t broadcast_low16(uint32_t word) {
 #if defined(__CUDA_ARCH__)
   return __byte_perm(word, 0, 0x1010);
 #else
@@ -210,46 +210,46 @@ PICTURA_HD inline uint32_t in_both_halves(uint32_t word) {
 
 /// Of each number the greater, or the lesser, of a + b and c, where both halves of b hold the same, and what is carried
 /// out of a sum's 16 bits is lost.
-PICTURA_HD inline Eight greater_of_sum(const Eight& a, uint32_t b, const Eight& c) {
-  Eight eight;
+PICTURA_HD inline Int16x8 add_max(const Int16x8& a, uint32_t b, const Int16x8& c) {
+  Int16x8 result;
 #if defined(__CUDA_ARCH__)
-  for (int k = 0; k < kHalfOfEight; ++k) eight.halves[k] = __viaddmax_s16x2(a.halves[k], b, c.halves[k]);
+  for (int k = 0; k < kInt16x8Half; ++k) result.halves[k] = __viaddmax_s16x2(a.halves[k], b, c.halves[k]);
 #else
-  for (int k = 0; k < kEight; ++k) {
-    const auto sum = static_cast<int16_t>(static_cast<uint16_t>(a.number[k]) + b);
-    eight.number[k] = sum > c.number[k] ? sum : c.number[k];
+  for (int k = 0; k < kInt16x8Size; ++k) {
+    const auto sum = static_cast<int16_t>(static_cast<uint16_t>(a.value[k]) + b);
+    result.value[k] = sum > c.value[k] ? sum : c.value[k];
   }
 #endif
-  return eight;
+  return result;
 }
-PICTURA_HD inline Eight lesser_of_sum(const Eight& a, uint32_t b, const Eight& c) {
-  Eight eight;
+PICTURA_HD inline Int16x8 add_min(const Int16x8& a, uint32_t b, const Int16x8& c) {
+  Int16x8 result;
 #if defined(__CUDA_ARCH__)
-  for (int k = 0; k < kHalfOfEight; ++k) eight.halves[k] = __viaddmin_s16x2(a.halves[k], b, c.halves[k]);
+  for (int k = 0; k < kInt16x8Half; ++k) result.halves[k] = __viaddmin_s16x2(a.halves[k], b, c.halves[k]);
 #else
-  for (int k = 0; k < kEight; ++k) {
-    const auto sum = static_cast<int16_t>(static_cast<uint16_t>(a.number[k]) + b);
-    eight.number[k] = sum < c.number[k] ? sum : c.number[k];
+  for (int k = 0; k < kInt16x8Size; ++k) {
+    const auto sum = static_cast<int16_t>(static_cast<uint16_t>(a.value[k]) + b);
+    result.value[k] = sum < c.value[k] ? sum : c.value[k];
   }
 #endif
-  return eight;
+  return result;
 }
 
 /// a + b within [0, high], where no sum leaves its 16 bits.
-PICTURA_HD inline Eight sum_within(const Eight& a, const Eight& b, const Eight& high) {
-  Eight eight;
+PICTURA_HD inline Int16x8 add_clamp(const Int16x8& a, const Int16x8& b, const Int16x8& high) {
+  Int16x8 result;
 #if defined(__CUDA_ARCH__)
-  for (int k = 0; k < kHalfOfEight; ++k) {
-    eight.halves[k] = __viaddmin_s16x2_relu(a.halves[k], b.halves[k], high.halves[k]);
+  for (int k = 0; k < kInt16x8Half; ++k) {
+    result.halves[k] = __viaddmin_s16x2_relu(a.halves[k], b.halves[k], high.halves[k]);
   }
 #else
-  for (int k = 0; k < kEight; ++k) {
-    const auto sum = static_cast<int16_t>(a.number[k] + b.number[k]);
-    const int16_t bounded = sum < high.number[k] ? sum : high.number[k];
-    eight.number[k] = bounded > 0 ? bounded : int16_t{0};
+  for (int k = 0; k < kInt16x8Size; ++k) {
+    const auto sum = static_cast<int16_t>(a.value[k] + b.value[k]);
+    const int16_t bounded = sum < high.value[k] ? sum : high.value[k];
+    result.value[k] = bounded > 0 ? bounded : int16_t{0};
   }
 #endif
-  return eight;
+  return result;
 }
 
 #if defined(__CUDA_ARCH__)
@@ -263,7 +263,7 @@ __device__ inline uint32_t bytes_of(uint64_t table, uint32_t selectors) {
   return bytes;
 }
 /// The bits 7 to 10 of the numbers as selectors, those of the first four in the lower half.
-__device__ inline uint32_t selectors_of(const Eight& a) {
+__device__ inline uint32_t selectors_of(const Int16x8& a) {
   const uint32_t low = (a.halves[0] >> 7 & 0x000F000Fu) | (a.halves[1] >> 3 & ~0x000F000Fu),
                  high = (a.halves[2] << 1 & 0x0F000F00u) | (a.halves[3] << 5 & ~0x0F000F00u);
   return (low & 0x00FF00FFu) | (high & ~0x00FF00FFu);
@@ -272,7 +272,7 @@ __device__ inline uint32_t selectors_of(const Eight& a) {
 
 /// Byte k has those bits that begin at a 128th of number k of `from` and end before that of `to`. None of `from` is
 /// less than 0, more than that of `to`, or more than 8 of 128.
-PICTURA_HD inline uint64_t bits_between(const Eight& from, const Eight& to) {
+PICTURA_HD inline uint64_t bits_between(const Int16x8& from, const Int16x8& to) {
 #if defined(__CUDA_ARCH__)
   // Looked up, for 0 to 8: the bits from there on, but that of the upper four those stand there in which they differ
   // from the lower four. So byte 0 has no sign, and 8 finds none.
@@ -284,17 +284,17 @@ PICTURA_HD inline uint64_t bits_between(const Eight& from, const Eight& to) {
   return static_cast<uint64_t>(high ^ (high << 4 & kUpperFour)) << 32 | (low ^ (low << 4 & kUpperFour));
 #else
   struct Bytes {
-    uint8_t byte[kEight];
+    uint8_t byte[kInt16x8Size];
   } bytes;
-  for (int k = 0; k < kEight; ++k) {
-    bytes.byte[k] = static_cast<uint8_t>((1u << (to.number[k] >> 7)) - (1u << (from.number[k] >> 7)));
+  for (int k = 0; k < kInt16x8Size; ++k) {
+    bytes.byte[k] = static_cast<uint8_t>((1u << (to.value[k] >> 7)) - (1u << (from.value[k] >> 7)));
   }
   return __builtin_bit_cast(uint64_t, bytes);
 #endif
 }
 
 /// Number of bits that are set.
-PICTURA_HD inline int count_bits(uint64_t bits) {
+PICTURA_HD inline int popcount(uint64_t bits) {
 #if defined(__CUDA_ARCH__)
   return __popcll(bits);
 #else

@@ -53,13 +53,13 @@ struct Frustum {
 
 PICTURA_HD inline Frustum make_frustum(const PinholeCamera& camera) {
   Frustum f;
-  f.x_per_px = inverse_of(camera.focal_x_px);
-  f.y_per_px = inverse_of(camera.focal_y_px);
+  f.x_per_px = reciprocal_in_range(camera.focal_x_px);
+  f.y_per_px = reciprocal_in_range(camera.focal_y_px);
   f.x_low = (-kGuardBand_px - camera.center_x_px) * f.x_per_px;
   f.x_high = (static_cast<float>(camera.width_px) + kGuardBand_px - camera.center_x_px) * f.x_per_px;
   f.y_low = (-kGuardBand_px - camera.center_y_px) * f.y_per_px;
   f.y_high = (static_cast<float>(camera.height_px) + kGuardBand_px - camera.center_y_px) * f.y_per_px;
-  auto scale = [](float slope) { return inverse_of(root_of(1.0f + slope * slope)); };
+  auto scale = [](float slope) { return reciprocal_in_range(sqrt_in_range(1.0f + slope * slope)); };
   f.x_low_scale = scale(f.x_low);
   f.x_high_scale = scale(f.x_high);
   f.y_low_scale = scale(f.y_low);

@@ -8,11 +8,11 @@ namespace pictura {
 
 /// What the fragments of a pixel weigh in its colour. Sums are of whole units, so that they do not depend on the order
 /// in which fragments are added.
-class PixelSum {
+class PixelAccumulator {
  public:
   /// What is wholly free weighs its exact area; what is partly hidden its area times the share of its reach that is
   /// free; what covers the whole pixel that share of what the others leave.
-  enum Kind : uint8_t { kWhole, kPartial, kRest, kNumKinds };
+  enum Kind : uint8_t { kWhole, kPartial, kRemainder, kNumKinds };
   struct Weight {
     float area = 0;
     Kind kind = kWhole;
@@ -26,8 +26,8 @@ class PixelSum {
   /// free: what is left of the coverage's reach after all that others hide.
   PICTURA_HD static Weight weight_of(const PixelCoverage& coverage, uint64_t free) {
     const uint64_t reach = reach_of(coverage);
-    const float share = static_cast<float>(count_bits(free)) / static_cast<float>(count_bits(reach));
-    if (coverage.is_full()) return {share, kRest};
+    const float share = static_cast<float>(popcount(free)) / static_cast<float>(popcount(reach));
+    if (coverage.is_full()) return {share, kRemainder};
     if (free == reach) return {coverage.area, kWhole};
     return {coverage.area * share, kPartial};
   }
@@ -59,7 +59,7 @@ class PixelSum {
     Shares shares;
     if (whole > 1.0f) shares.of_kind[kWhole] = 1.0f / whole;
     if (partial > for_partial) shares.of_kind[kPartial] = for_partial / partial;
-    shares.of_kind[kRest] = max_of(for_partial - partial, 0.0f);
+    shares.of_kind[kRemainder] = max_of(for_partial - partial, 0.0f);
     return shares;
   }
 
@@ -103,7 +103,7 @@ PICTURA_HD inline uint32_t to_bytes(Rgb color) {
 
 /// How much of an agent an image shows: what its fragments weigh, in whole units, so that sums do not depend on the
 /// order in which fragments are added.
-struct SeenWeight {
+struct VisibilitySum {
   int64_t among_all = 0, alone = 0;
 
   PICTURA_HD static int64_t units_of(float weight) {
@@ -113,7 +113,7 @@ struct SeenWeight {
   }
   /// Of all that is to be seen of it alone, what is seen among all others; not a number where that is nothing.
   PICTURA_HD float share() const {
-    if (alone <= 0) return number_of_bits(0x7FC00000u);
+    if (alone <= 0) return float_from_bits(0x7FC00000u);
     const double share = static_cast<double>(among_all) / static_cast<double>(alone);
     return static_cast<float>(share < 1.0 ? share : 1.0);
   }

@@ -59,7 +59,7 @@ PICTURA_HD inline Vec3 cut_between(Vec3 a, float a_inside, Vec3 b, float b_insid
   const bool a_is_inner = a_inside >= 0.0f;
   const Vec3 inner = a_is_inner ? a : b, outer = a_is_inner ? b : a;
   const float inside = a_is_inner ? a_inside : b_inside, outside = a_is_inner ? b_inside : a_inside;
-  return inner + (outer - inner) * (inside * inverse_of(inside - outside));
+  return inner + (outer - inner) * (inside * reciprocal_in_range(inside - outside));
 }
 
 /// Clips a convex face to the near plane and the guard band. Writes to polygon_out (camera coordinates, room for
@@ -72,12 +72,12 @@ PICTURA_HD inline int clip_face(const Frustum& f, const Vec3* corners, int count
   int remaining_planes = 0;
   for (int plane = 0; plane < kClipPlanes; ++plane) remaining_planes += (crossed >> plane) & 1u;
   if (remaining_planes == 0) {
-    PICTURA_KEEP_LOOP
+    PICTURA_NO_UNROLL
     for (int i = 0; i < count; ++i) polygon_out[i] = corners[i];
     return count;
   }
   // The buffers alternate so that the last plane writes to polygon_out.
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int number = 0; number < kClipPlanes; ++number) {
     if (!((crossed >> number) & 1u)) continue;
     const ClipPlane plane(f, number);
@@ -86,7 +86,7 @@ PICTURA_HD inline int clip_face(const Frustum& f, const Vec3* corners, int count
     Vec3 previous = from[count - 1];
     float previous_inside = plane.inside(previous);
     // Only a face that is not quite convex could outgrow the room; it loses corners then.
-    PICTURA_KEEP_LOOP
+    PICTURA_NO_UNROLL
     for (int i = 0; i < count && kept + 2 <= kMaxPolygonCorners; ++i) {
       const Vec3 current = from[i];
       const float current_inside = plane.inside(current);
@@ -130,7 +130,7 @@ struct alignas(16) PolygonEdge {
 template <typename Visit>
 PICTURA_HD inline void each_edge(const PolygonEdge* edges, int count, Visit&& visit) {
   PolygonEdge even = edges[0], odd;
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int i = 1;; i += 2) {
     if (i < count) odd = edges[i];
     visit(even);
@@ -145,7 +145,7 @@ PICTURA_HD inline void each_edge(const PolygonEdge* edges, int count, Visit&& vi
 /// much to the right.
 constexpr float kLevel_px = 1e-6f, kUpright_px = 1e-6f;
 /// Columns and rows of a pixel's samples.
-constexpr int kSampleColumns = kEight, kSampleRows = 8;
+constexpr int kSampleColumns = kInt16x8Size, kSampleRows = 8;
 /// To samples, heights are whole numbers of 16 bits, so many of them a row, from the pixel's middle. There a line is
 /// cut off at half of kLines_rows from it in the first column right of the middle, and goes down by at most kSteepest
 /// rows from one column to the next: so it leaves the pixel before it is cut off, and nothing leaves the 16 bits.
@@ -157,12 +157,12 @@ PICTURA_HD inline PolygonEdge make_edge(Vec2 from, Vec2 to) {
   const Vec2 upper = downward ? from : to, lower = downward ? to : from;
   const bool is_upright = fabsf(lower.x - upper.x) < kUpright_px, is_level = lower.y - upper.y < kLevel_px;
   const float dx = is_upright ? kUpright_px : lower.x - upper.x, dy = is_level ? 0.0f : lower.y - upper.y;
-  const float dx_dy = is_level ? 0.0f : dx * inverse_of(dy);
+  const float dx_dy = is_level ? 0.0f : dx * reciprocal_in_range(dy);
   PolygonEdge edge;
   edge.x0 = upper.x;
   edge.y0 = upper.y;
   edge.y1 = is_level ? upper.y : lower.y;
-  edge.dy_dx = dy * inverse_of(dx);
+  edge.dy_dx = dy * reciprocal_in_range(dx);
   edge.half_dx_dy = 0.5f * dx_dy;
   // Of what is steeper, all heights from the pixel's middle are lessened alike: it crosses that at the same place.
   const float lessened = is_level ? 1.0f : min_of(kSteepest * fabsf(dx_dy), 1.0f);
@@ -194,20 +194,20 @@ struct alignas(16) ScreenFace {
   PixelBox box;
   int32_t edge_begin = 0;
   uint8_t edge_count = 0;
-  uint8_t class_id = 0;           // of the class plane
-  uint16_t least_area_units = 0;  // see least_area()
+  uint8_t class_id = 0;         // of the class plane
+  uint16_t min_area_units = 0;  // see min_area()
   // Inverse depth at a point of the screen.
   float inverse_depth_x = 0, inverse_depth_y = 0, inverse_depth_0 = 0;
-  uint32_t number = 0;  // of the thing that it belongs to, see raster_order.h
+  uint32_t object_id = 0;  // of the thing that it belongs to, see raster_order.h
   // Range of the inverse depth over the face's corners.
   float inverse_depth_low = 0, inverse_depth_high = 0;
   float plane_distance_m = 0;  // from the camera to the face's plane
   uint32_t color_bytes = 0;    // to_bytes(color), for devices
   Rgb color;
 
-  /// What it covers less of a pixel than this is nothing, see least_area_of.
-  PICTURA_HD float least_area() const { return static_cast<float>(least_area_units) * (1.0f / kAreaUnits); }
-  PICTURA_HD void set_least_area(float area) { least_area_units = static_cast<uint16_t>(area * kAreaUnits + 0.5f); }
+  /// What it covers less of a pixel than this is nothing, see min_area_of.
+  PICTURA_HD float min_area() const { return static_cast<float>(min_area_units) * (1.0f / kAreaUnits); }
+  PICTURA_HD void set_min_area(float area) { min_area_units = static_cast<uint16_t>(area * kAreaUnits + 0.5f); }
 
  private:
   static constexpr float kAreaUnits = 1 << 16;
@@ -219,10 +219,10 @@ struct ScreenBounds {
   Vec2 low{1e30f, 1e30f}, high{-1e30f, -1e30f};
   float inverse_depth_low = 1e30f, inverse_depth_high = 0.0f;
   PICTURA_HD void add(Vec2 corner, float inverse_depth) {
-    low = {lesser_of(low.x, corner.x), lesser_of(low.y, corner.y)};
-    high = {greater_of(high.x, corner.x), greater_of(high.y, corner.y)};
-    inverse_depth_low = lesser_of(inverse_depth_low, inverse_depth);
-    inverse_depth_high = greater_of(inverse_depth_high, inverse_depth);
+    low = {min_no_nan(low.x, corner.x), min_no_nan(low.y, corner.y)};
+    high = {max_no_nan(high.x, corner.x), max_no_nan(high.y, corner.y)};
+    inverse_depth_low = min_no_nan(inverse_depth_low, inverse_depth);
+    inverse_depth_high = max_no_nan(inverse_depth_high, inverse_depth);
   }
   /// Whether they are within an image and so much around it.
   PICTURA_HD bool are_within(const PinholeCamera& camera, float margin_px) const {
@@ -231,9 +231,9 @@ struct ScreenBounds {
   }
   /// What of them is in the image.
   PICTURA_HD Aabb2 in_image(const PinholeCamera& camera) const {
-    return {{greater_of(low.x, 0.0f), greater_of(low.y, 0.0f)},
-            {lesser_of(high.x, static_cast<float>(camera.width_px)),
-             lesser_of(high.y, static_cast<float>(camera.height_px))}};
+    return {{max_no_nan(low.x, 0.0f), max_no_nan(low.y, 0.0f)},
+            {min_no_nan(high.x, static_cast<float>(camera.width_px)),
+             min_no_nan(high.y, static_cast<float>(camera.height_px))}};
   }
   /// Whether the polygon may touch pixels of an image.
   PICTURA_HD bool meet_image(const PinholeCamera& camera) const {
@@ -252,17 +252,17 @@ PICTURA_HD inline PixelBox pixel_box(const PinholeCamera& camera, const ScreenBo
 }
 
 /// Polygons of less than half of this are nothing.
-constexpr float kLeastTwiceArea_px2 = 1e-6f;
+constexpr float kMinTwiceArea_px2 = 1e-6f;
 
 /// Whether a plane has an inverse depth: faces without an area and planes through the camera have none.
 PICTURA_HD inline bool has_inverse_depth(const FacePlane& plane) {
-  constexpr float kLeast = 1e-30f;
-  return dot(plane.normal, plane.normal) > kLeast && fabsf(plane.offset) > kLeast;
+  constexpr float kMinMagnitude = 1e-30f;
+  return dot(plane.normal, plane.normal) > kMinMagnitude && fabsf(plane.offset) > kMinMagnitude;
 }
 /// Inverse depth of a plane as a linear function of the screen: of x, of y, and at (0, 0). normal . p = offset on the
 /// plane, and p = depth * ray: inverse depth is linear in the ray.
 PICTURA_HD inline Vec3 inverse_depth_plane(const PinholeCamera& camera, const Frustum& f, const FacePlane& plane) {
-  const Vec3 inverse = plane.normal * (has_inverse_depth(plane) ? inverse_of(plane.offset) : 0.0f);
+  const Vec3 inverse = plane.normal * (has_inverse_depth(plane) ? reciprocal_in_range(plane.offset) : 0.0f);
   const float x = inverse.x * f.x_per_px, y = inverse.y * f.y_per_px;
   return {x, y, inverse.z - x * camera.center_x_px - y * camera.center_y_px};
 }
@@ -278,7 +278,9 @@ PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f,
   face_out->inverse_depth_y = inverse_depth.y;
   face_out->inverse_depth_0 = inverse_depth.z;
   face_out->plane_distance_m =
-      has_inverse_depth(plane) ? fabsf(plane.offset) * inverse_of(root_of(dot(plane.normal, plane.normal))) : 0.0f;
+      has_inverse_depth(plane)
+          ? fabsf(plane.offset) * reciprocal_in_range(sqrt_in_range(dot(plane.normal, plane.normal)))
+          : 0.0f;
 }
 
 /// Calls keep_edge(0, edge), keep_edge(1, edge), ... for the edges of a polygon on screen, at most `count`, and returns
@@ -295,18 +297,18 @@ PICTURA_HD inline int make_edges(const Vec2* corner, int count, bool turns_right
   return edges;
 }
 
-/// Projects a clipped face (camera coordinates) of at most kRoom corners, which lies in `plane`. Calls keep_edge as
-/// make_edges does, and sets all of face_out but edge_begin and what it belongs to. False where it covers nothing.
-template <int kRoom, typename Corners, typename KeepEdge>
+/// Projects a clipped face (camera coordinates) of at most kMaxCorners corners, which lies in `plane`. Calls keep_edge
+/// as make_edges does, and sets all of face_out but edge_begin and what it belongs to. False where it covers nothing.
+template <int kMaxCorners, typename Corners, typename KeepEdge>
 PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Frustum& f, const Corners& polygon,
                                         int count, const FacePlane& plane, Rgb color, KeepEdge&& keep_edge,
                                         ScreenFace* face_out) {
-  Vec2 corner[kRoom];
+  Vec2 corner[kMaxCorners];
   ScreenBounds bounds;
   PICTURA_UNROLL_FOUR
   for (int i = 0; i < count; ++i) {
     const Vec3 p = polygon[i];
-    const float inverse_depth = inverse_of(p.z);
+    const float inverse_depth = reciprocal_in_range(p.z);
     corner[i] = project(camera, p, inverse_depth);
     bounds.add(corner[i], inverse_depth);
   }
@@ -314,7 +316,7 @@ PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Frust
   float twice_area = 0.0f;
   PICTURA_UNROLL_FOUR
   for (int i = 1; i + 1 < count; ++i) twice_area += cross(corner[i] - corner[0], corner[i + 1] - corner[0]);
-  if (fabsf(twice_area) < kLeastTwiceArea_px2) return false;
+  if (fabsf(twice_area) < kMinTwiceArea_px2) return false;
   face_out->edge_count = static_cast<uint8_t>(make_edges(corner, count, twice_area > 0.0f, keep_edge));
   face_out->color = color;
   set_bounds(camera, f, bounds, plane, face_out);
@@ -334,11 +336,11 @@ enum class QuadSight : uint8_t { none, whole, cut };
 /// needs no clipping, nearly all, is thus never widened in camera coordinates.
 PICTURA_HD inline QuadSight project_quad(const PinholeCamera& camera, const Vec3* corners, float floor_px,
                                          ScreenQuad* quad_out) {
-  const float nearest_m = lesser_of(lesser_of(corners[0].z, corners[1].z), lesser_of(corners[2].z, corners[3].z));
+  const float nearest_m = min_no_nan(min_no_nan(corners[0].z, corners[1].z), min_no_nan(corners[2].z, corners[3].z));
   Vec2* const corner = quad_out->corner;
   float inverse_depth[4];
   for (int i = 0; i < 4; ++i) {
-    inverse_depth[i] = inverse_of(corners[i].z);
+    inverse_depth[i] = reciprocal_in_range(corners[i].z);
     corner[i] = project(camera, corners[i], inverse_depth[i]);
   }
   if (floor_px > 0.0f) {
@@ -359,10 +361,10 @@ PICTURA_HD inline QuadSight project_quad(const PinholeCamera& camera, const Vec3
 }
 
 /// Sets whether a face turns right on screen; false where it covers less than that.
-PICTURA_HD inline bool find_turn(const ScreenQuad& quad, float least_twice_area_px2, bool* turns_right_out) {
+PICTURA_HD inline bool find_turn(const ScreenQuad& quad, float min_twice_area_px2, bool* turns_right_out) {
   const float twice_area = cross(quad.corner[2] - quad.corner[0], quad.corner[3] - quad.corner[1]);
   *turns_right_out = twice_area > 0.0f;
-  return fabsf(twice_area) >= least_twice_area_px2;
+  return fabsf(twice_area) >= min_twice_area_px2;
 }
 
 /// make_screen_face of what project_quad found to be whole and find_turn to cover something.
@@ -386,7 +388,7 @@ PICTURA_HD inline float face_depth_m(const ScreenFace& face, Vec2 at_px) {
 }
 
 PICTURA_HD inline bool covers_point(const PolygonEdge* edges, int count, float x_px, float y_px) {
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int i = 0; i < count; ++i) {
     if (!is_inside(edges[i], {x_px, y_px})) return false;
   }
@@ -430,11 +432,11 @@ PICTURA_HD inline Passage passage_of(const PolygonEdge& edge, float left_px, flo
 
 /// For each column of a pixel's samples, the heights (see kRowUnits) between which it is inside of the edges so far.
 struct SampleRange {
-  Eight low, high;
+  Int16x8 low, high;
 };
 PICTURA_HD inline SampleRange whole_range() {
   constexpr int kFar = 64 * kRowUnits;
-  return {eight_of([](int) { return -kFar; }), eight_of([](int) { return kFar; })};
+  return {make_int16x8([](int) { return -kFar; }), make_int16x8([](int) { return kFar; })};
 }
 
 /// Narrows a range to the inner side of an edge.
@@ -442,23 +444,23 @@ PICTURA_HD inline void narrow(const PolygonEdge& edge, const Passage& passage, S
   constexpr float kWhole = 1 << 8;  // the lowest bit of what is added to it is one of kLines_rows * kRowUnits
   constexpr uint32_t kLowest = 0, kHighest = 0x80008000u;
   const float at = saturate((passage.left + passage.right) * fabsf(edge.rows_scale) + edge.rows_offset);
-  const uint32_t height = in_both_halves(bits_of(at + kWhole));
+  const uint32_t height = broadcast_low16(bits_from_float(at + kWhole));
   // Of the sums, one half of 2^15 is the middle, which is 0.
-  const Eight columns = multiples_of(edge.rows_step, (1 << 16) - (1 << 14));
+  const Int16x8 columns = arithmetic_sequence(edge.rows_step, (1 << 16) - (1 << 14));
   const bool is_below = edge.rows_scale > 0.0f;
-  range_inout->low = greater_of_sum(columns, is_below ? height : kLowest, range_inout->low);
-  range_inout->high = lesser_of_sum(columns, is_below ? kHighest : height, range_inout->high);
+  range_inout->low = add_max(columns, is_below ? height : kLowest, range_inout->low);
+  range_inout->high = add_min(columns, is_below ? kHighest : height, range_inout->high);
 }
 
 /// The samples within a range.
 PICTURA_HD inline uint64_t samples_within(const SampleRange& range) {
   // What is to be added so that whole rows are those whose samples are above.
-  const Eight from_top = eight_of([](int column) {
+  const Int16x8 from_top = make_int16x8([](int column) {
     return kSampleRows / 2 * kRowUnits + kRowUnits - 1 -
            static_cast<int>(sample_column_offset(column) * static_cast<float>(kRowUnits));
   });
-  const Eight to = sum_within(range.high, from_top, eight_of([](int) { return kSampleRows * kRowUnits; }));
-  return bits_between(sum_within(range.low, from_top, to), to);
+  const Int16x8 to = add_clamp(range.high, from_top, make_int16x8([](int) { return kSampleRows * kRowUnits; }));
+  return bits_between(add_clamp(range.low, from_top, to), to);
 }
 
 /// Samples on the inner side of an edge; left_px and top_px are the pixel's corner relative to the edge's upper end.
@@ -474,8 +476,8 @@ PICTURA_HD inline uint64_t samples_inside(const PolygonEdge& edge, float left_px
 PICTURA_HD inline float area_of(const PolygonEdge& edge, const Passage& passage, float y_px) {
   const float from = saturate(edge.y0 - y_px), to = saturate(edge.y1 - y_px);
   // Between these the edge is within the pixel's width; from the second on, the pixel's whole width is to its left.
-  const float left = greater_of(lesser_of(passage.left, to), from);
-  const float right = greater_of(lesser_of(passage.right, to), from);
+  const float left = max_no_nan(min_no_nan(passage.left, to), from);
+  const float right = max_no_nan(min_no_nan(passage.right, to), from);
   // Half of the width is where the line has gone half of its way.
   const float width = saturate(((left + right) - (passage.left + passage.right)) * edge.half_dx_dy + 0.5f);
   const float area = (right - left) * width + ((edge.dy_dx > 0.0f ? to : from) - right);
@@ -484,8 +486,8 @@ PICTURA_HD inline float area_of(const PolygonEdge& edge, const Passage& passage,
 
 /// Area of a convex polygon in pixel (x, y), and the samples that it covers. Edges that do not cross the pixel keep all
 /// samples and add their part to the area, so none is asked where it lies.
-PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int count, float least_area, int x, int y) {
-  const float x_px = computed_once(static_cast<float>(x)), y_px = computed_once(static_cast<float>(y));
+PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int count, float min_area, int x, int y) {
+  const float x_px = no_rematerialize(static_cast<float>(x)), y_px = no_rematerialize(static_cast<float>(y));
   float area = 0.0f;
   SampleRange range = whole_range();
   each_edge(edges, count, [&](const PolygonEdge& edge) {
@@ -493,7 +495,7 @@ PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int cou
     area += area_of(edge, passage, y_px);
     narrow(edge, passage, &range);
   });
-  if (area < least_area) return {0.0f, 0};
+  if (area < min_area) return {0.0f, 0};
   const uint64_t samples = samples_within(range);
   if (samples == kAllSamples && area > 1.0f - kFullCoverage) return {1.0f, kAllSamples};
   return {min_of(area, 1.0f), samples};
@@ -522,11 +524,11 @@ PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const Pi
     const float twice_above_px = 2.0f * (middle_px - edge.y0), middle = edge.x0 + twice_above_px * edge.half_dx_dy;
     const float reach = fabsf(edge.half_dx_dy), low = middle - reach, high = middle + reach;
     if (side < 0.0f) {
-      touch_low = greater_of(touch_low, low - 1.0f);
-      full_low = greater_of(full_low, high);
+      touch_low = max_no_nan(touch_low, low - 1.0f);
+      full_low = max_no_nan(full_low, high);
     } else {
-      touch_high = lesser_of(touch_high, high);
-      full_high = lesser_of(full_high, low - 1.0f);
+      touch_high = min_no_nan(touch_high, high);
+      full_high = min_no_nan(full_high, low - 1.0f);
     }
   });
   if (is_beside) return {};

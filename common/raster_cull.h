@@ -41,7 +41,7 @@ PICTURA_HD inline bool may_show(const LightHead& head, const PinholeCamera& came
 PICTURA_HD inline bool may_show(const AgentBox& box, const PinholeCamera& camera, const Frustum& f) {
   const Vec3 center = box.center_m + Vec3{0.0f, 0.0f, 0.5f * box.height_m};
   const Vec3 size{box.length_m, box.width_m, box.height_m};
-  const float radius_m = 0.5f * root_of(greater_of(dot(size, size), 1e-12f));
+  const float radius_m = 0.5f * sqrt_in_range(max_no_nan(dot(size, size), 1e-12f));
   return box.drawn != 0 && ball_in_frustum(f, to_camera(camera, center), radius_m);
 }
 

@@ -2,10 +2,10 @@
 // work and where they keep the results.
 #pragma once
 
+#include "pictura/common/raster_compositing.h"
 #include "pictura/common/raster_cull.h"
-#include "pictura/common/raster_occlude.h"
+#include "pictura/common/raster_occluders.h"
 #include "pictura/common/raster_order.h"
-#include "pictura/common/raster_pixel.h"
 
 namespace pictura {
 
@@ -19,63 +19,63 @@ struct ImageSetting {
 };
 
 /// What a face belongs to: the thing's number, and what the class plane says of it.
-struct FaceOwner {
-  uint32_t number = 0;
+struct PrimitiveRef {
+  uint32_t object_id = 0;
   uint8_t class_id = 0;
 };
-PICTURA_HD constexpr FaceOwner agent_owner(const AgentBox& box, int32_t index_in_world) {
-  return {thing_number(kAgentKind, index_in_world),
+PICTURA_HD constexpr PrimitiveRef agent_ref(const AgentBox& box, int32_t index_in_world) {
+  return {make_object_id(kAgentKind, index_in_world),
           static_cast<uint8_t>(static_cast<int>(SurfaceClass::vehicle) + static_cast<int>(box.agent_class))};
 }
-PICTURA_HD constexpr FaceOwner wall_owner(int32_t index) {
-  return {thing_number(kWallKind, index), static_cast<uint8_t>(SurfaceClass::wall)};
+PICTURA_HD constexpr PrimitiveRef wall_ref(int32_t index) {
+  return {make_object_id(kWallKind, index), static_cast<uint8_t>(SurfaceClass::wall)};
 }
-PICTURA_HD constexpr FaceOwner light_owner(int32_t index) {
-  return {thing_number(kLightKind, index), static_cast<uint8_t>(SurfaceClass::light)};
+PICTURA_HD constexpr PrimitiveRef light_ref(int32_t index) {
+  return {make_object_id(kLightKind, index), static_cast<uint8_t>(SurfaceClass::light)};
 }
-PICTURA_HD inline FaceOwner strip_owner(const Strip& strip, int32_t index) {
-  return {strip_number(strip, index), static_cast<uint8_t>(kClassOfStrip + static_cast<int>(strip.kind))};
+PICTURA_HD inline PrimitiveRef strip_ref(const Strip& strip, int32_t index) {
+  return {strip_object_id(strip, index), static_cast<uint8_t>(kClassOfStrip + static_cast<int>(strip.kind))};
 }
 
 /// What the instance plane says of a face.
 PICTURA_HD constexpr uint16_t instance_of(const ScreenFace& face) {
-  return static_cast<uint16_t>(kind_of(face.number) == kAgentKind ? 1 + index_of(face.number) : 0);
+  return static_cast<uint16_t>(kind_of(face.object_id) == kAgentKind ? 1 + index_of(face.object_id) : 0);
 }
 
 /// What a face covers less of a pixel than this is nothing, and so is a face that is smaller. Strips hide little but
-/// each other, so of theirs more can be spared: what adds less than kLeastWeight to any channel, and an eighth of a
+/// each other, so of theirs more can be spared: what adds less than kMinWeight to any channel, and an eighth of a
 /// pixel at most, for dark ones may hide bright ones.
-constexpr float kLeastArea = 1e-4f, kLeastWeight = 2.0f / 255.0f, kMostSparedArea = 0.125f;
-PICTURA_HD inline float least_area_of(Rgb color, FaceOwner owner) {
-  if (kind_of(owner.number) != kStripKind) return kLeastArea;
+constexpr float kMinArea = 1e-4f, kMinWeight = 2.0f / 255.0f, kMaxSparedArea = 0.125f;
+PICTURA_HD inline float min_area_of(Rgb color, PrimitiveRef primitive) {
+  if (kind_of(primitive.object_id) != kStripKind) return kMinArea;
   const float brightest = max_of(color.r, max_of(color.g, color.b));
-  return kLeastWeight * inverse_of(max_of(brightest, kLeastWeight / kMostSparedArea));
+  return kMinWeight * reciprocal_in_range(max_of(brightest, kMinWeight / kMaxSparedArea));
 }
 
 /// Whether a face that needs no clipping shows: whether it is large enough, and not behind an occluder. Sets whether it
 /// turns right.
-PICTURA_HD inline bool shows_whole(const ImageSetting& setting, const ScreenQuad& quad, Rgb color, FaceOwner owner,
-                                   bool* turns_right_out) {
-  return find_turn(quad, 2.0f * least_area_of(color, owner), turns_right_out) &&
+PICTURA_HD inline bool shows_whole(const ImageSetting& setting, const ScreenQuad& quad, Rgb color,
+                                   PrimitiveRef primitive, bool* turns_right_out) {
+  return find_turn(quad, 2.0f * min_area_of(color, primitive), turns_right_out) &&
          !setting.occluders.hide(setting.camera, quad.bounds);
 }
 
 /// A face with all that its making did not set.
-PICTURA_HD inline ScreenFace whole_face(const ScreenFace& face, FaceOwner owner, int32_t edge_begin) {
+PICTURA_HD inline ScreenFace whole_face(const ScreenFace& face, PrimitiveRef primitive, int32_t edge_begin) {
   ScreenFace whole = face;
   whole.edge_begin = edge_begin;
-  whole.number = owner.number;
-  whole.class_id = owner.class_id;
+  whole.object_id = primitive.object_id;
+  whole.class_id = primitive.class_id;
   whole.color_bytes = to_bytes(face.color);
-  whole.set_least_area(least_area_of(face.color, owner));
+  whole.set_min_area(min_area_of(face.color, primitive));
   return whole;
 }
 
 /// Clips and projects a face. Its edges go to a pool: take(count) returns the index of the first, or -1 where there is
 /// no room left, and put(index, edge) keeps one. False where nothing of it is in the image.
 template <typename EdgePool>
-PICTURA_HD inline bool make_face(const ImageSetting& setting, FaceOwner owner, const CameraFace& face, EdgePool& pool,
-                                 ScreenFace* face_out) {
+PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primitive, const CameraFace& face,
+                                 EdgePool& pool, ScreenFace* face_out) {
   int32_t edge_begin = 0;
   auto keep_edge = [&](int i, const PolygonEdge& edge) { pool.put(edge_begin + i, edge); };
   ScreenQuad quad;
@@ -84,7 +84,7 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, FaceOwner owner, c
   if (sight == QuadSight::none) return false;
   if (sight == QuadSight::whole) {
     bool turns_right = false;
-    if (!shows_whole(setting, quad, face.color, owner, &turns_right)) return false;
+    if (!shows_whole(setting, quad, face.color, primitive, &turns_right)) return false;
     edge_begin = pool.take(4);
     if (edge_begin < 0) return false;
     make_quad_face(setting.camera, setting.frustum, quad, turns_right, face.plane, face.color, keep_edge, face_out);
@@ -100,7 +100,7 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, FaceOwner owner, c
       return false;
     }
   }
-  *face_out = whole_face(*face_out, owner, edge_begin);
+  *face_out = whole_face(*face_out, primitive, edge_begin);
   return true;
 }
 
@@ -119,7 +119,7 @@ class FrontFace {
   PICTURA_HD bool wants_strips_again() const { return num_strips_ > 1; }
   PICTURA_HD void offer_again(const ScreenFace& face, Vec2 at_px) {
     if (!of_one_level(face, *strip_, at_px)) return;
-    if (!painted_ || face.number < painted_->number) painted_ = &face;
+    if (!painted_ || face.object_id < painted_->object_id) painted_ = &face;
   }
   template <typename Stands>
   PICTURA_HD const ScreenFace* front(Vec2 at_px, Stands&& stands) const {
@@ -131,8 +131,8 @@ class FrontFace {
 
  private:
   PICTURA_HD static bool nearer(const ScreenFace& a, const ScreenFace& b, Vec2 at_px) {
-    const float nearness_a = nearness_at(a, at_px), nearness_b = nearness_at(b, at_px);
-    return nearness_a != nearness_b ? nearness_a > nearness_b : a.number < b.number;
+    const float inverse_depth_a = clamped_inverse_depth(a, at_px), inverse_depth_b = clamped_inverse_depth(b, at_px);
+    return inverse_depth_a != inverse_depth_b ? inverse_depth_a > inverse_depth_b : a.object_id < b.object_id;
   }
   const ScreenFace* solid_ = nullptr;
   const ScreenFace* strip_ = nullptr;    // the nearest

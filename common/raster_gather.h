@@ -2,7 +2,7 @@
 // walk of renderers that give an image to one thread.
 #pragma once
 
-#include "pictura/common/raster_item.h"
+#include "pictura/common/raster_face_setup.h"
 
 namespace pictura {
 

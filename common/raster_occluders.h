@@ -23,9 +23,9 @@ PICTURA_HD inline bool may_occlude(const WallFace& wall, const PinholeCamera& ca
 }
 
 /// A face of less than half of this hides nothing, and a side shorter than this borders nothing.
-constexpr float kLeastOccluder_px2 = 1.0f, kLeastSide_px = 1e-3f;
+constexpr float kMinOccluder_px2 = 1.0f, kMinSide_px = 1e-3f;
 /// Corners further from the image than this leave too few bits for what is between them.
-constexpr float kMostOccluder_px = 4096.0f;
+constexpr float kMaxOccluder_px = 4096.0f;
 /// So far inside of an occluder, and behind it by this factor, nothing shows before it, whatever is rounded.
 constexpr float kOccluderMargin_px = 0.05f, kOccluderLead = 1.002f;
 
@@ -34,10 +34,10 @@ constexpr float kOccluderMargin_px = 0.05f, kOccluderLead = 1.002f;
 PICTURA_HD inline float occluded_px2(const PinholeCamera& camera, const CameraQuad& face, ScreenQuad* quad_out,
                                      bool* turns_right_out) {
   const float nearest_m =
-      lesser_of(lesser_of(face.corner[0].z, face.corner[1].z), lesser_of(face.corner[2].z, face.corner[3].z));
+      min_no_nan(min_no_nan(face.corner[0].z, face.corner[1].z), min_no_nan(face.corner[2].z, face.corner[3].z));
   if (nearest_m < kNear_m || project_quad(camera, face.corner, 0.0f, quad_out) == QuadSight::none) return 0.0f;
-  const bool is_near = quad_out->bounds.are_within(camera, kMostOccluder_px);
-  if (!find_turn(*quad_out, kLeastOccluder_px2, turns_right_out) || !is_near) return 0.0f;
+  const bool is_near = quad_out->bounds.are_within(camera, kMaxOccluder_px);
+  if (!find_turn(*quad_out, kMinOccluder_px2, turns_right_out) || !is_near) return 0.0f;
   const Aabb2 seen = quad_out->bounds.in_image(camera);
   return (seen.high.x - seen.low.x) * (seen.high.y - seen.low.y);
 }
@@ -49,7 +49,7 @@ PICTURA_HD inline Occluder make_occluder(const PinholeCamera& camera, const Frus
   const float sign = turns_right ? 1.0f : -1.0f;
   for (int i = 0; i < 4; ++i) {
     const Vec2 from = quad.corner[i], along = quad.corner[(i + 1) % 4] - from;
-    const Vec2 inward = Vec2{-along.y, along.x} * (sign * inverse_of(greater_of(length(along), kLeastSide_px)));
+    const Vec2 inward = Vec2{-along.y, along.x} * (sign * reciprocal_in_range(max_no_nan(length(along), kMinSide_px)));
     occluder.side[i] = {inward.x, inward.y, -(inward.x * from.x + inward.y * from.y)};
   }
   occluder.inverse_depth = inverse_depth_plane(camera, f, plane);
@@ -58,9 +58,9 @@ PICTURA_HD inline Occluder make_occluder(const PinholeCamera& camera, const Frus
 
 /// The occluders of an image: the faces that cover most of it, of two that cover as much that of the lower entry.
 struct Occluders {
-  static constexpr int kMost = 4;
+  static constexpr int kMaxCount = 4;
   int32_t count = 0;
-  Occluder occluder[kMost];
+  Occluder occluder[kMaxCount];
 
   /// Whether one of them hides all of the image that is within the bounds of a face.
   PICTURA_HD bool hide(const PinholeCamera& camera, const ScreenBounds& bounds) const {
@@ -69,14 +69,14 @@ struct Occluders {
     auto least = [&](Vec3 of) {
       return of.x * (of.x > 0.0f ? box.low.x : box.high.x) + of.y * (of.y > 0.0f ? box.low.y : box.high.y) + of.z;
     };
-    const float nearness = bounds.inverse_depth_high * kOccluderLead;
+    const float inverse_depth = bounds.inverse_depth_high * kOccluderLead;
     bool is_hidden = false;
-    PICTURA_KEEP_LOOP
+    PICTURA_NO_UNROLL
     for (int k = 0; k < count; ++k) {
       const Occluder one = occluder[k];
       float inside_px = least(one.side[0]);
-      for (int i = 1; i < 4; ++i) inside_px = lesser_of(inside_px, least(one.side[i]));
-      is_hidden = is_hidden || (inside_px >= kOccluderMargin_px && least(one.inverse_depth) >= nearness);
+      for (int i = 1; i < 4; ++i) inside_px = min_no_nan(inside_px, least(one.side[i]));
+      is_hidden = is_hidden || (inside_px >= kOccluderMargin_px && least(one.inverse_depth) >= inverse_depth);
     }
     return is_hidden;
   }

@@ -13,23 +13,23 @@ constexpr int kKindShift = 30, kRankShift = 28;
 constexpr uint32_t kAgentKind = 0, kWallKind = 1, kLightKind = 2, kStripKind = 3;
 constexpr uint32_t kIndexMask = (1u << kRankShift) - 1;
 
-PICTURA_HD constexpr uint32_t thing_number(uint32_t kind, int32_t index) {
+PICTURA_HD constexpr uint32_t make_object_id(uint32_t kind, int32_t index) {
   return (kind << kKindShift) | static_cast<uint32_t>(index);
 }
 /// index: the strip's place among the geometry's strips.
-PICTURA_HD inline uint32_t strip_number(const Strip& strip, int32_t index) {
+PICTURA_HD inline uint32_t strip_object_id(const Strip& strip, int32_t index) {
   return (kStripKind << kKindShift) | (static_cast<uint32_t>(strip_rank(strip.kind)) << kRankShift) |
          static_cast<uint32_t>(index);
 }
 /// A face that may show: the number of its thing, and of agents which face.
 constexpr int kFaceShift = 27;
 constexpr uint32_t kFaceIndexMask = (1u << kFaceShift) - 1;
-PICTURA_HD constexpr uint32_t face_entry(uint32_t number, int face) {
-  return number | static_cast<uint32_t>(face) << kFaceShift;
+PICTURA_HD constexpr uint32_t face_entry(uint32_t object_id, int face) {
+  return object_id | static_cast<uint32_t>(face) << kFaceShift;
 }
-PICTURA_HD constexpr uint32_t kind_of(uint32_t number) { return number >> kKindShift; }
-PICTURA_HD constexpr int32_t index_of(uint32_t number) { return static_cast<int32_t>(number & kIndexMask); }
-PICTURA_HD constexpr bool is_strip(const ScreenFace& face) { return kind_of(face.number) == kStripKind; }
+PICTURA_HD constexpr uint32_t kind_of(uint32_t object_id) { return object_id >> kKindShift; }
+PICTURA_HD constexpr int32_t index_of(uint32_t object_id) { return static_cast<int32_t>(object_id & kIndexMask); }
+PICTURA_HD constexpr bool is_strip(const ScreenFace& face) { return kind_of(face.object_id) == kStripKind; }
 
 /// What a thing covers of the ground: corners with the heights of its lower end. Of what has two ends, each stands
 /// twice.
@@ -56,9 +56,9 @@ PICTURA_HD inline Extent extent_of(const Strip& strip) {
 }
 
 /// The extent of a thing of an image, by its number; agents: the first of the world.
-PICTURA_HD inline Extent extent_of(uint32_t number, const StaticGeometryView& pieces, const AgentBox* agents) {
-  const int32_t index = index_of(number);
-  switch (kind_of(number)) {
+PICTURA_HD inline Extent extent_of(uint32_t object_id, const StaticGeometryView& pieces, const AgentBox* agents) {
+  const int32_t index = index_of(object_id);
+  switch (kind_of(object_id)) {
     case kAgentKind: return extent_of(agents[index]);
     case kWallKind: return extent_of(pieces.walls[static_cast<size_t>(index)]);
     case kLightKind: return extent_of(pieces.heads[static_cast<size_t>(index)]);
@@ -92,14 +92,14 @@ PICTURA_HD inline bool first_side_separates(const GroundQuad& a, const GroundQua
     Interval interval;
     for (const Vec2 corner : quad.corner) {
       const float at = dot(axis, corner);
-      interval.low = lesser_of(interval.low, at);
-      interval.high = greater_of(interval.high, at);
+      interval.low = min_no_nan(interval.low, at);
+      interval.high = max_no_nan(interval.high, at);
     }
     return interval;
   };
   const Interval of_a = project(a), of_b = project(b);
   // By how much they overlap, in multiples of the side's length.
-  const float overlap = lesser_of(of_a.high, of_b.high) - greater_of(of_a.low, of_b.low);
+  const float overlap = min_no_nan(of_a.high, of_b.high) - max_no_nan(of_a.low, of_b.low);
   const float length2_m2 = dot(side, side);
   return length2_m2 > 1e-12f && (overlap <= 0.0f || overlap * overlap <= kTouching_m * kTouching_m * length2_m2);
 }
@@ -109,7 +109,7 @@ PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
   // Relative to a point near by, for precision.
   const Vec2 origin = a.corner[0].xy();
   GroundQuad one = ground_quad(a, origin), other = ground_quad(b, origin);
-  PICTURA_KEEP_LOOP
+  PICTURA_NO_UNROLL
   for (int side = 0; side < 8; ++side) {
     if (first_side_separates(one, other)) return false;
     one.turn();
@@ -140,7 +140,7 @@ PICTURA_HD inline bool of_one_level(const ScreenFace& a, const ScreenFace& b, Ve
 
 /// 1 / depth of a face at a point of the screen, for telling which of two is in front there; within the depths of its
 /// corners, which those of a strip may leave by a factor (see kWidenedDepth).
-PICTURA_HD inline float nearness_at(const ScreenFace& face, Vec2 at_px) {
+PICTURA_HD inline float clamped_inverse_depth(const ScreenFace& face, Vec2 at_px) {
   const float factor = is_strip(face) ? kWidenedDepth : 1.0f,
               inverse_factor = is_strip(face) ? 1.0f / kWidenedDepth : 1.0f;
   return clamp(inverse_depth(face, at_px), face.inverse_depth_low * inverse_factor, face.inverse_depth_high * factor);
@@ -151,24 +151,23 @@ PICTURA_HD inline float nearness_at(const ScreenFace& face, Vec2 at_px) {
 template <typename Stands>
 PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec2 at_px, Stands&& stands) {
   const bool strip_a = is_strip(a), strip_b = is_strip(b);
-  if (strip_a && strip_b && of_one_level(a, b, at_px)) return a.number < b.number;
-  const float nearness_a = nearness_at(a, at_px), nearness_b = nearness_at(b, at_px);
-  const bool first = nearness_a != nearness_b ? nearness_a > nearness_b : a.number < b.number;
+  if (strip_a && strip_b && of_one_level(a, b, at_px)) return a.object_id < b.object_id;
+  const float inverse_depth_a = clamped_inverse_depth(a, at_px), inverse_depth_b = clamped_inverse_depth(b, at_px);
+  const bool first = inverse_depth_a != inverse_depth_b ? inverse_depth_a > inverse_depth_b : a.object_id < b.object_id;
   if (strip_a == strip_b || first != strip_a) return first;
   // A strip before a solid that stands on it: the solid dips into the road.
-  return stands(strip_a ? b.number : a.number, strip_a ? a.number : b.number) ? !first : first;
+  return stands(strip_a ? b.object_id : a.object_id, strip_a ? a.object_id : b.object_id) ? !first : first;
 }
 
 /// Middle of some samples, from the pixel's corner; of none, the pixel's middle.
 PICTURA_HD inline Vec2 middle_of(uint64_t samples) {
-  const int count = count_bits(samples);
+  const int count = popcount(samples);
   if (count == 0) return {0.5f, 0.5f};
   // Sums over the samples of the bits of their column and row.
-  const int column_0 = count_bits(samples & 0xFF00FF00FF00FF00ull),
-            column_1 = count_bits(samples & 0xFFFF0000FFFF0000ull),
-            column_2 = count_bits(samples & 0xFFFFFFFF00000000ull);
-  const int rows = count_bits(samples & 0xAAAAAAAAAAAAAAAAull) + 2 * count_bits(samples & 0xCCCCCCCCCCCCCCCCull) +
-                   4 * count_bits(samples & 0xF0F0F0F0F0F0F0F0ull);
+  const int column_0 = popcount(samples & 0xFF00FF00FF00FF00ull), column_1 = popcount(samples & 0xFFFF0000FFFF0000ull),
+            column_2 = popcount(samples & 0xFFFFFFFF00000000ull);
+  const int rows = popcount(samples & 0xAAAAAAAAAAAAAAAAull) + 2 * popcount(samples & 0xCCCCCCCCCCCCCCCCull) +
+                   4 * popcount(samples & 0xF0F0F0F0F0F0F0F0ull);
   const int columns = column_0 + 2 * column_1 + 4 * column_2;
   const int offsets = 4 * column_0 + 2 * column_1 + column_2;  // in eighths of a row, see sample_column_offset
   const float n = static_cast<float>(count);
@@ -179,14 +178,14 @@ PICTURA_HD inline Vec2 middle_of(uint64_t samples) {
 /// What a face covers of one pixel.
 struct Fragment {
   PixelCoverage coverage;
-  float nearness = 0;  // inverse depth of the face in the middle of its samples
+  float inverse_depth = 0;  // inverse depth of the face in the middle of its samples
   int32_t face = 0;
 };
 
 PICTURA_HD inline Fragment make_fragment(const ScreenFace& face, int32_t face_index, const PixelCoverage& coverage,
                                          int x, int y) {
   const Vec2 middle = Vec2{static_cast<float>(x), static_cast<float>(y)} + middle_of(coverage.samples);
-  return {coverage, nearness_at(face, middle), face_index};
+  return {coverage, clamped_inverse_depth(face, middle), face_index};
 }
 
 PICTURA_HD inline Vec2 pixel_middle(int x, int y) {
@@ -194,38 +193,38 @@ PICTURA_HD inline Vec2 pixel_middle(int x, int y) {
 }
 
 /// Nearness of a face in the middle of a pixel: that of its fragment where it covers the pixel fully.
-PICTURA_HD inline float middle_nearness(const ScreenFace& face, int x, int y) {
-  return nearness_at(face, pixel_middle(x, y));
+PICTURA_HD inline float center_inverse_depth(const ScreenFace& face, int x, int y) {
+  return clamped_inverse_depth(face, pixel_middle(x, y));
 }
 /// By how much that rises or falls within the pixel, at most.
-PICTURA_HD inline float nearness_rise(const ScreenFace& face) {
+PICTURA_HD inline float inverse_depth_half_range(const ScreenFace& face) {
   return 0.5f * (fabsf(face.inverse_depth_x) + fabsf(face.inverse_depth_y));
 }
 
-/// Bits of a burying_nearness(), the highest of a float; the others are 0.
-constexpr int kBuryingBits = 21;
+/// Bits of a occluder_bound(), the highest of a float; the others are 0.
+constexpr int kOccluderBoundBits = 21;
 /// How near a face that covers a pixel fully is in all of it. What is further away everywhere in the pixel is buried.
 /// Strips bury nothing, 0: others are painted over them, and what lies behind one may stand on it. Never negative and
 /// never not a number, because kernels sort by its bits; never more than how near the face is anywhere in the pixel, so
 /// that no face buries itself.
-PICTURA_HD inline float burying_nearness(const ScreenFace& face, int x, int y) {
+PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
   if (is_strip(face)) return 0.0f;
-  const float least = max_of(face.inverse_depth_low, middle_nearness(face, x, y) - nearness_rise(face));
-  return number_of_bits(bits_of(least) & ~((1u << (32 - kBuryingBits)) - 1));
+  const float least = max_of(face.inverse_depth_low, center_inverse_depth(face, x, y) - inverse_depth_half_range(face));
+  return float_from_bits(bits_from_float(least) & ~((1u << (32 - kOccluderBoundBits)) - 1));
 }
 
-/// Whether a face may weigh anything in pixel (x, y), which others cover fully, given the largest burying_nearness() of
+/// Whether a face may weigh anything in pixel (x, y), which others cover fully, given the largest occluder_bound() of
 /// those. Where this is false no fragment is made of it: it would be hidden by the face that buries it. Devices may ask
 /// others of those before that one, in any order: they bury less, so whom they bury it buries too.
-PICTURA_HD inline bool may_show_before(const ScreenFace& face, float burying, int x, int y) {
-  return !(middle_nearness(face, x, y) + nearness_rise(face) < burying);
+PICTURA_HD inline bool passes_occluder_bound(const ScreenFace& face, float bound, int x, int y) {
+  return !(center_inverse_depth(face, x, y) + inverse_depth_half_range(face) < bound);
 }
 
 /// Order of fragments that does not depend on how they are listed: the nearer first, then by number.
 PICTURA_HD inline bool is_nearer(const Fragment& a, const Fragment& b, const ScreenFace* faces) {
-  if (a.nearness != b.nearness) return a.nearness > b.nearness;
-  const uint32_t number_a = faces[a.face].number, number_b = faces[b.face].number;
-  return number_a != number_b ? number_a < number_b : a.face < b.face;
+  if (a.inverse_depth != b.inverse_depth) return a.inverse_depth > b.inverse_depth;
+  const uint32_t object_id_a = faces[a.face].object_id, object_id_b = faces[b.face].object_id;
+  return object_id_a != object_id_b ? object_id_a < object_id_b : a.face < b.face;
 }
 
 /// Where two fragments of a pixel meet: the samples that both cover. A sliver that touches no sample counts as being
@@ -252,7 +251,7 @@ PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFac
                                             bool all_or_none, Stands&& stands) {
   const Vec2 middle = middle_of(shared), at = corner + middle;
   // Of the lower number before the higher, so that both ways round are the same arithmetic.
-  const bool swapped = b.number < a.number;
+  const bool swapped = b.object_id < a.object_id;
   const float sign = swapped ? -1.0f : 1.0f, lead = sign * (inverse_depth(a, at) - inverse_depth(b, at));
   const Vec2 gradient{sign * (a.inverse_depth_x - b.inverse_depth_x), sign * (a.inverse_depth_y - b.inverse_depth_y)};
   // No sample is further than a pixel from the middle along either axis.
@@ -280,12 +279,13 @@ struct Hidden {
 };
 
 /// ... where they share samples; corner is the pixel's. Faces of one thing do not hide each other. A sliver hides
-/// nothing, and is hidden as a whole; what covers the whole pixel is hidden only by what does so too (see PixelSum).
+/// nothing, and is hidden as a whole; what covers the whole pixel is hidden only by what does so too (see
+/// PixelAccumulator).
 template <typename Stands>
 PICTURA_HD inline Hidden hide_each_other(const PixelCoverage& a, const PixelCoverage& b, const ScreenFace& face_a,
                                          const ScreenFace& face_b, Vec2 corner, Stands&& stands) {
   const uint64_t shared = shared_samples(a, b);
-  if (shared == 0 || face_a.number == face_b.number || fit_together(a, b)) return {};
+  if (shared == 0 || face_a.object_id == face_b.object_id || fit_together(a, b)) return {};
   const bool has_sliver = a.samples == 0 || b.samples == 0;
   const uint64_t a_first = samples_in_front(face_a, face_b, shared, corner, has_sliver, stands);
   if (has_sliver) {

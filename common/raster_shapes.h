@@ -169,7 +169,7 @@ PICTURA_HD inline bool light_is_visible(const LightHead& head, LightState state,
   const Vec2 to_eye = position_m.xy() - head.position_m.xy();
   const float ahead_m = dot(to_eye, head.facing);
   // Of the half-angle's cosine, by squares.
-  const float cosine = greater_of(head.cos_half_angle, 0.0f);
+  const float cosine = max_no_nan(head.cos_half_angle, 0.0f);
   return ahead_m > 0.0f && ahead_m * ahead_m >= cosine * cosine * dot(to_eye, to_eye);
 }
 
@@ -225,7 +225,7 @@ struct Widening {
   /// How far the left end of a gap between the sides is to go, on screen, and the right end the other way.
   PICTURA_HD Vec2 push_px(Vec2 gap_px) const {
     const float width_px = dot(gap_px, across);
-    const float missing_px = 0.5f * greater_of(floor_px - fabsf(width_px), 0.0f);
+    const float missing_px = 0.5f * max_no_nan(floor_px - fabsf(width_px), 0.0f);
     return across * (width_px < 0.0f ? -missing_px : missing_px);
   }
 };
@@ -237,16 +237,17 @@ PICTURA_HD inline Widening widening_of(const PinholeCamera& camera, float floor_
   const Vec2 ahead{camera.focal_x_px * (b.x * a.z - a.x * b.z), camera.focal_y_px * (b.y * a.z - a.y * b.z)};
   const float length2 = dot(ahead, ahead), least = 1e-6f * (a.z * b.z);
   if (!(length2 > least * least)) return {};
-  return {left_normal(ahead) * root_of(inverse_of(length2)), floor_px};
+  return {left_normal(ahead) * sqrt_in_range(reciprocal_in_range(length2)), floor_px};
 }
 
 /// Pushes the two corners of one end of a strip apart until they are wide enough on screen. Depths stay.
 PICTURA_HD inline void widen_strip_end(const PinholeCamera& camera, const Widening& widening, Vec3* left, Vec3* right) {
   if (left->z < kNear_m || right->z < kNear_m) return;
-  const float of_left = inverse_of(left->z), of_right = inverse_of(right->z);
+  const float of_left = reciprocal_in_range(left->z), of_right = reciprocal_in_range(right->z);
   const Vec2 push_px = widening.push_px({camera.focal_x_px * (left->x * of_left - right->x * of_right),
                                          camera.focal_y_px * (left->y * of_left - right->y * of_right)});
-  const Vec2 push{push_px.x * inverse_of(camera.focal_x_px), push_px.y * inverse_of(camera.focal_y_px)};
+  const Vec2 push{push_px.x * reciprocal_in_range(camera.focal_x_px),
+                  push_px.y * reciprocal_in_range(camera.focal_y_px)};
   left->x += push.x * left->z;
   left->y += push.y * left->z;
   right->x -= push.x * right->z;
@@ -267,7 +268,7 @@ PICTURA_HD inline bool widen_strip(const PinholeCamera& camera, float floor_px, 
   const float a_in = a.z - kNear_m, b_in = b.z - kNear_m;
   const bool cut_a = a_in < 0.0f, cut_b = b_in < 0.0f;
   if (cut_a || cut_b) {
-    const float t = (cut_a ? a_in : b_in) * inverse_of(cut_a ? a_in - b_in : b_in - a_in);
+    const float t = (cut_a ? a_in : b_in) * reciprocal_in_range(cut_a ? a_in - b_in : b_in - a_in);
     const Vec3 left = (corners[3] - corners[0]) * t, right = (corners[2] - corners[1]) * t, middle = (b - a) * t;
     if (cut_a) {
       corners[0] = corners[0] + left;

@@ -56,10 +56,10 @@ static_assert(is_plain<LanePoint>() && is_plain<RoadEdge>() && !is_plain<Lane>()
 
 /// The fewest bytes that a T takes in the file.
 template <typename T>
-constexpr uint64_t least_bytes() {
+constexpr uint64_t min_bytes() {
   if constexpr (HasFields<T>) {
     return []<typename... F>(std::type_identity<std::tuple<F&...>>) {
-      return (least_bytes<F>() + ...);
+      return (min_bytes<F>() + ...);
     }(std::type_identity<FieldsOf<T>>());
   } else if constexpr (kIsVector<T> || std::is_same_v<T, std::string>) {
     return sizeof(uint64_t);
@@ -112,9 +112,9 @@ class Reader {
       using Item = typename T::value_type;
       uint64_t count = 0;
       get(&count);
-      PICTURA_CHECK(count <= left_.size() / least_bytes<Item>(),
+      PICTURA_CHECK(count <= left_.size() / min_bytes<Item>(),
                     "damaged: a size of {} elements of at least {} bytes, where {} bytes are left", count,
-                    least_bytes<Item>(), left_.size());
+                    min_bytes<Item>(), left_.size());
       value_out->resize(static_cast<std::size_t>(count));
       get_items(value_out->data(), value_out->size());
     } else if constexpr (std::is_same_v<T, bool>) {

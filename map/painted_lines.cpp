@@ -68,13 +68,13 @@ class PieceIndex {
   const std::vector<Piece>& pieces() const { return pieces_; }
 
   /// Whether there is, beside all of the straight way from a to b, some piece within tolerance_m(line), negative for
-  /// lines that do not count. It is at most most_m; gaps so short do not matter.
+  /// lines that do not count. It is at most max_m; gaps so short do not matter.
   template <typename Tolerance>
-  bool run_along(Vec3 a_m, Vec3 b_m, float most_m, const Tolerance& tolerance_m) const {
+  bool run_along(Vec3 a_m, Vec3 b_m, float max_m, const Tolerance& tolerance_m) const {
     const float length_m = length(b_m - a_m);
     const Way way{a_m, (b_m - a_m) * (1.0f / length_m), length_m};
     std::vector<Stretch> accompanied;
-    visit_items(grid_.view(), box_around(a_m.xy(), b_m.xy(), most_m), [&](std::size_t i) {
+    visit_items(grid_.view(), box_around(a_m.xy(), b_m.xy(), max_m), [&](std::size_t i) {
       const float its_tolerance_m = tolerance_m(pieces_[i].line);
       if (its_tolerance_m < 0) return;
       const Stretch shared = shared_stretch(way, pieces_[i], its_tolerance_m);
@@ -83,10 +83,10 @@ class PieceIndex {
     std::sort(accompanied.begin(), accompanied.end(), [](Stretch a, Stretch b) { return a.begin_m < b.begin_m; });
     float reached_m = 0;
     for (const Stretch& stretch : accompanied) {
-      if (stretch.begin_m > reached_m + most_m) return false;
+      if (stretch.begin_m > reached_m + max_m) return false;
       reached_m = max_of(reached_m, stretch.end_m);
     }
-    return !accompanied.empty() && reached_m >= length_m - most_m;
+    return !accompanied.empty() && reached_m >= length_m - max_m;
   }
 
  private:

@@ -94,7 +94,7 @@ void validate_lanes(const RoadMap& map) {
   check_mutual(map, &Lane::predecessors, &Lane::successors, "predecessors");
 }
 
-void validate_looks(const RoadMap& map) {
+void validate_appearance(const RoadMap& map) {
   for (std::size_t i = 0; i < map.markings.size(); ++i) {
     check_range("marking", i, "points", map.markings[i].points, map.marking_points.size(), 2);
     check_number("marking", i, "width_m", map.markings[i].width_m, 1e-3f, 10.0f);
@@ -219,7 +219,7 @@ const char* to_string(MarkColor color) {
 void validate(const RoadMap& map) {
   try {
     validate_lanes(map);
-    validate_looks(map);
+    validate_appearance(map);
     validate_signs(map);
     validate_lights(map);
     validate_provenance(map);

@@ -6,7 +6,7 @@ namespace pictura::town {
 namespace {
 
 constexpr double kWidest_m = 1e9;
-constexpr double kMostTurnRadius_m = 14;  // of the left border of a turn that is no right turn
+constexpr double kMaxTurnRadius_m = 14;  // of the left border of a turn that is no right turn
 // Lanes that turn across the junction are wider half-way, so that what comes beside them leaves no sliver between.
 constexpr double kTurningWidth_m = 4;
 constexpr double kCrosswalkBegin_m = 0.6, kCrosswalkEnd_m = 3.4;  // beyond the stop line
@@ -44,7 +44,7 @@ int TownBuilder::lay_movement(const Node& node, const Movement& movement, opendr
   const bool is_straight = straight_on(node, movement.from) == movement.to;
   const double radius = movement.is_slip ? kWidest_m
                         : turns_right    ? right_turn_radius_m(full_turn(to.heading - from.heading))
-                                         : kMostTurnRadius_m;
+                                         : kMaxTurnRadius_m;
   const double speed = !is_straight ? kJunctionSpeed_mps : in.is_avenue ? kAvenueSpeed_mps : kStreetSpeed_mps;
   const Side right{.driving = movement.lanes,
                    .has_shoulder = has_corner,

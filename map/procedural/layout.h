@@ -14,7 +14,7 @@ namespace pictura::town {
 inline constexpr double kMinStreetRadius_m = 30;  // unless a fifth arm bends a street more
 inline constexpr double kLaneWidth_m = 3.5, kShoulderWidth_m = 0.5, kSidewalkWidth_m = 2.5, kParkingWidth_m = 2.3;
 
-/// Eight directions of arms, counter-clockwise from east; streets of the grid have even ones, diagonals odd ones.
+/// Int16x8 directions of arms, counter-clockwise from east; streets of the grid have even ones, diagonals odd ones.
 inline constexpr int kNumDirections = 8;
 constexpr int opposite(int direction) { return (direction + kNumDirections / 2) % kNumDirections; }
 

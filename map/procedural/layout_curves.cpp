@@ -29,8 +29,8 @@ double side_width_m(const Street& street) {
 }  // namespace
 
 double right_turn_radius_m(double gap_rad) {
-  constexpr double kLeast_m = 7.5, kMost_m = 12, kOverlap = 0.95;
-  return std::clamp(kOverlap * kLaneWidth_m / (1 - std::sin(0.5 * gap_rad)), kLeast_m, kMost_m);
+  constexpr double kMin_m = 7.5, kMax_m = 12, kOverlap = 0.95;
+  return std::clamp(kOverlap * kLaneWidth_m / (1 - std::sin(0.5 * gap_rad)), kMin_m, kMax_m);
 }
 
 void Layout::set_arm_heading(int street, bool at_start, double heading) {

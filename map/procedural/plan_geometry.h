@@ -84,9 +84,9 @@ inline Curve biarc(Pose from, Pose to) {
 /// A line, an arc and a line, tangent to each other, the arc as wide as fits but at most of `max_radius_m`; a biarc
 /// where the tangents do not cross between the poses.
 inline Curve fillet(Pose from, Pose to, double max_radius_m) {
-  constexpr double kLeastTurn_rad = 0.1, kLeastLine_m = 1e-7;
+  constexpr double kMinTurn_rad = 0.1, kMinLine_m = 1e-7;
   const double turn = wrapped(to.heading - from.heading);
-  if (std::abs(turn) < kLeastTurn_rad) return biarc(from, to);
+  if (std::abs(turn) < kMinTurn_rad) return biarc(from, to);
   const double sine = std::sin(turn);
   const double dx = to.x - from.x, dy = to.y - from.y;
   // Distances from both ends to the crossing of their tangents.
@@ -97,9 +97,9 @@ inline Curve fillet(Pose from, Pose to, double max_radius_m) {
   const double tangent = std::min({lead_in, lead_out, max_radius_m * half_tangent});
   const double curvature = std::copysign(half_tangent / tangent, turn);
   Curve curve;
-  if (lead_in - tangent > kLeastLine_m) curve.push_back(piece_of(from, lead_in - tangent, 0));
+  if (lead_in - tangent > kMinLine_m) curve.push_back(piece_of(from, lead_in - tangent, 0));
   curve.push_back(piece_of(ahead(from, lead_in - tangent), turn / curvature, curvature));
-  if (lead_out - tangent > kLeastLine_m) {
+  if (lead_out - tangent > kMinLine_m) {
     curve.push_back(piece_of(ahead(to, tangent - lead_out), lead_out - tangent, 0));
   }
   return curve;

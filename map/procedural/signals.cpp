@@ -31,13 +31,13 @@ Place near_side(Pose arriving, int lanes, bool has_slip) {
 Place far_side_between(const Layout& layout, const Node& node, int arm) {
   const double forward = node.arm(arm).heading + kPi_rad;
   double nearest = 0.5 * kPi_rad;
-  int most_lanes = 0;
+  int max_lanes = 0;
   for (int i = 0; i < node.degree(); ++i) {
     if (i == arm) continue;
     nearest = std::min(nearest, std::abs(wrapped(node.arm(i).heading - forward)));
-    most_lanes = std::max(most_lanes, layout.streets()[node.arm(i).street].lanes);
+    max_lanes = std::max(max_lanes, layout.streets()[node.arm(i).street].lanes);
   }
-  return at(ahead({node.x, node.y, forward}, behind_kerb_m(most_lanes) / std::sin(nearest)));
+  return at(ahead({node.x, node.y, forward}, behind_kerb_m(max_lanes) / std::sin(nearest)));
 }
 
 /// A place in the terms of a road: the foot on its reference line and the distance to the left of it.

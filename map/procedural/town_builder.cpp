@@ -8,7 +8,7 @@ namespace pictura::town {
 namespace {
 
 constexpr double kMinParking_m = 30;  // of a section with parking bays
-constexpr double kSlipSection_m = 32, kMostSlipShare = 0.48;
+constexpr double kSlipSection_m = 32, kMaxSlipShare = 0.48;
 constexpr double kSpaceLength_m = 6, kParkedLength_m = 5, kParkedWidth_m = 2;
 
 void add_parking_spaces(opendrive::FileRoad* road, const opendrive::FileSection& section, bool left) {
@@ -67,7 +67,7 @@ int TownBuilder::add_road(Curve curve, double height_m, const std::string& junct
 void TownBuilder::lay_street(int index) {
   const Street& street = layout_.streets()[index];
   const double length = street.length_m;
-  const double slip = std::min(kSlipSection_m, kMostSlipShare * length);
+  const double slip = std::min(kSlipSection_m, kMaxSlipShare * length);
   const double begin = street.slip_at_start ? slip : 0, end = street.slip_at_end ? length - slip : length;
   const Side plain{.driving = street.lanes, .has_sidewalk = street.has_sidewalks};
   Side left = plain, right = plain, with_slip = plain;

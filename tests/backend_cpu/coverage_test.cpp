@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "pictura/common/camera.h"
-#include "pictura/common/raster_item.h"
-#include "pictura/common/raster_pixel.h"
+#include "pictura/common/raster_compositing.h"
+#include "pictura/common/raster_face_setup.h"
 
 namespace pictura {
 namespace {
@@ -74,17 +74,17 @@ double sample_leeway_px(Vec2 side) {
 
 // Holds what pixel_coverage finds of a polygon in pixel (x, y) against its exact area and the samples within.
 void expect_covered(const std::vector<Vec2>& polygon, const std::vector<PolygonEdge>& edges, int x, int y) {
-  const PixelCoverage coverage = pixel_coverage(edges.data(), static_cast<int>(edges.size()), kLeastArea, x, y);
+  const PixelCoverage coverage = pixel_coverage(edges.data(), static_cast<int>(edges.size()), kMinArea, x, y);
   const double area = clipped_area(polygon, x, y);
   constexpr double kLeeway = 1e-4;
   if (coverage.area == 1.0f) {
     ASSERT_GT(area, 1 - kFullCoverage - kLeeway);
   } else if (coverage.area == 0.0f) {
-    ASSERT_LT(area, kLeastArea + kLeeway);
+    ASSERT_LT(area, kMinArea + kLeeway);
   } else {
     ASSERT_NEAR(coverage.area, area, kLeeway);
   }
-  if (area <= 2 * kLeastArea) return;
+  if (area <= 2 * kMinArea) return;
   for (int sample = 0; sample < 64; ++sample) {
     const int column = sample / 8, row = sample % 8;
     const double sample_x = x + (column + 0.5) / 8, sample_y = y + (row + double{sample_column_offset(column)}) / 8;
@@ -176,8 +176,8 @@ TEST(Coverage, ASharedEdgeSplitsAreaAndSamplesWithoutGapOrOverlap) {
     const auto one = oriented(right), other = oriented(left);
     for (int i = 0; i < 8; ++i) {
       const int x = level ? 4 : i, y = level ? i : 4;
-      const PixelCoverage c = pixel_coverage(one.data(), 3, kLeastArea, x, y),
-                          d = pixel_coverage(other.data(), 3, kLeastArea, x, y);
+      const PixelCoverage c = pixel_coverage(one.data(), 3, kMinArea, x, y),
+                          d = pixel_coverage(other.data(), 3, kMinArea, x, y);
       ASSERT_EQ(c.samples & d.samples, 0u);
       if (c.area > 0 && d.area > 0) {
         ASSERT_EQ(c.samples | d.samples, kAllSamples);
@@ -218,7 +218,7 @@ TEST(Coverage, RowSpansAgreeWithPixels) {
     for (int y = 0; y < 12; ++y) {
       const RowSpan span = row_span(edges.data(), count, box, y);
       for (int x = 0; x < 12; ++x) {
-        const PixelCoverage coverage = pixel_coverage(edges.data(), count, kLeastArea, x, y);
+        const PixelCoverage coverage = pixel_coverage(edges.data(), count, kMinArea, x, y);
         if (x < span.begin || x >= span.end) {
           ASSERT_EQ(coverage.area, 0.0f);
         }
@@ -238,8 +238,8 @@ struct Laid {
   Rgb color;
 };
 Rgb color_of(const std::vector<Laid>& fragments) {
-  PixelSum sum;
-  for (const Laid& laid : fragments) sum.add(PixelSum::weight_of(laid.coverage, laid.free), laid.color);
+  PixelAccumulator sum;
+  for (const Laid& laid : fragments) sum.add(PixelAccumulator::weight_of(laid.coverage, laid.free), laid.color);
   return sum.color();
 }
 
@@ -287,20 +287,20 @@ TEST(Coverage, WeightsNeverExceedThePixel) {
 }
 
 TEST(Coverage, LeavesOutWhatAStripHardlyAdds) {
-  const FaceOwner strip{kStripKind << kKindShift, 0}, wall = wall_owner(0);
+  const PrimitiveRef strip{kStripKind << kKindShift, 0}, wall = wall_ref(0);
   const Rgb white{0.9f, 0.88f, 0.85f};
   for (const float brightness : {1.0f, 0.5f, 0.15f}) {
     const Rgb color = white * brightness;
-    EXPECT_NEAR(least_area_of(color, strip) * color.r, kLeastWeight, 1e-7f) << brightness;
-    EXPECT_EQ(least_area_of(color, wall), kLeastArea);
+    EXPECT_NEAR(min_area_of(color, strip) * color.r, kMinWeight, 1e-7f) << brightness;
+    EXPECT_EQ(min_area_of(color, wall), kMinArea);
   }
   // What is dark may hide what is bright.
-  EXPECT_FLOAT_EQ(least_area_of(white * 0.01f, strip), kMostSparedArea);
-  EXPECT_FLOAT_EQ(least_area_of({}, strip), kMostSparedArea);
-  const float least = kLeastWeight / white.r;
+  EXPECT_FLOAT_EQ(min_area_of(white * 0.01f, strip), kMaxSparedArea);
+  EXPECT_FLOAT_EQ(min_area_of({}, strip), kMaxSparedArea);
+  const float least = kMinWeight / white.r;
   for (const float area : {0.9f * least, 1.1f * least}) {
     const std::vector<PolygonEdge> edges = edges_of({{2, 1}, {3, 1}, {3, 1 + area}, {2, 1 + area}});
-    const PixelCoverage coverage = pixel_coverage(edges.data(), 4, least_area_of(white, strip), 2, 1);
+    const PixelCoverage coverage = pixel_coverage(edges.data(), 4, min_area_of(white, strip), 2, 1);
     if (area < least) {
       EXPECT_EQ(coverage.area, 0.0f);
     } else {

@@ -44,7 +44,7 @@ bool hides(const WallFace& wall, Vec3 a_m, Vec3 b_m) {
   ScreenBounds bounds;
   for (const Vec3 corner_m : {a_m, b_m}) {
     const Vec3 corner = to_camera(setting.camera, corner_m);
-    bounds.add(project(setting.camera, corner, inverse_of(corner.z)), inverse_of(corner.z));
+    bounds.add(project(setting.camera, corner, reciprocal_in_range(corner.z)), reciprocal_in_range(corner.z));
   }
   return setting.occluders.hide(setting.camera, bounds);
 }
@@ -79,7 +79,7 @@ TEST(Occluders, AreThoseThatCoverMost) {
   ImageDrawer drawer;
   drawer.prepare({&pieces, &batch, &view, setting_ahead().camera});
   const Occluders& occluders = drawer.occluders();
-  ASSERT_EQ(occluders.count, Occluders::kMost);
+  ASSERT_EQ(occluders.count, Occluders::kMaxCount);
   const float distances_m[] = {20, 30, 10, 40};
   for (int i = 0; i < occluders.count; ++i) {
     EXPECT_NEAR(1 / occluders.occluder[i].inverse_depth.z, distances_m[i], 1e-3f) << i;

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "pictura/common/raster_check.h"
-#include "pictura/common/raster_item.h"
+#include "pictura/common/raster_face_setup.h"
 #include "pictura/tests/support/image_scenes.h"
 
 namespace pictura {
@@ -33,14 +33,14 @@ class Sight {
     setting_.line_floor_px = 0.35f;
   }
   Thing see(const AgentBox& box, int32_t index = 0) {
-    return keep(agent_owner(box, index), extent_of(box),
+    return keep(agent_ref(box, index), extent_of(box),
                 [&](auto&& emit) { agent_faces(box, setting_.camera, false, emit); });
   }
   Thing see(const WallFace& wall) {
-    return keep(wall_owner(0), extent_of(wall), [&](auto&& emit) { wall_faces(wall, setting_.camera, emit); });
+    return keep(wall_ref(0), extent_of(wall), [&](auto&& emit) { wall_faces(wall, setting_.camera, emit); });
   }
   Thing see(const Strip& strip, int32_t index = 0) {
-    return keep(strip_owner(strip, index), extent_of(strip),
+    return keep(strip_ref(strip, index), extent_of(strip),
                 [&](auto&& emit) { strip_faces(strip, setting_.camera, setting_.line_floor_px, emit); });
   }
   // Calls visit(face of a, face of b, point) for a grid of points of the image that both cover.
@@ -89,22 +89,22 @@ class Sight {
     void put(int32_t index, const PolygonEdge& edge) { (*edges)[static_cast<std::size_t>(index)] = edge; }
   };
   template <typename MakeFaces>
-  Thing keep(FaceOwner owner, const Extent& extent, MakeFaces&& make_faces) {
+  Thing keep(PrimitiveRef primitive, const Extent& extent, MakeFaces&& make_faces) {
     Thing thing;
     Pool pool{&edges_};
     make_faces([&](const CameraFace& seen) {
       ScreenFace face;
-      if (make_face(setting_, owner, seen, pool, &face)) thing.push_back(face);
+      if (make_face(setting_, primitive, seen, pool, &face)) thing.push_back(face);
     });
-    extents_.emplace_back(owner.number, extent);
+    extents_.emplace_back(primitive.object_id, extent);
     return thing;
   }
   bool covers(const ScreenFace& face, Vec2 at) const {
     return covers_point(edges_.data() + face.edge_begin, face.edge_count, at.x, at.y);
   }
-  // Of the thing seen last under a number.
-  const Extent& extent(uint32_t number) const {
-    return std::find_if(extents_.rbegin(), extents_.rend(), [&](const auto& seen) { return seen.first == number; })
+  // Of the thing seen last under a object_id.
+  const Extent& extent(uint32_t object_id) const {
+    return std::find_if(extents_.rbegin(), extents_.rend(), [&](const auto& seen) { return seen.first == object_id; })
         ->second;
   }
 
@@ -264,9 +264,9 @@ TEST(Order, ComparesInTheMiddleOfTheSharedSamples) {
 }
 
 // A face whose plane has some inverse depth at a pixel's corner and some gradient; it has no edges.
-ScreenFace plane_face(uint32_t number, float inverse_depth_0, Vec2 gradient = {}) {
+ScreenFace plane_face(uint32_t object_id, float inverse_depth_0, Vec2 gradient = {}) {
   ScreenFace face;
-  face.number = number;
+  face.object_id = object_id;
   face.plane_distance_m = 1.5f;
   face.inverse_depth_0 = inverse_depth_0;
   face.inverse_depth_x = gradient.x;
@@ -282,10 +282,10 @@ TEST(Order, SolidsThatIntersectShareSamplesByWhichIsNearer) {
   auto never = [](uint32_t, uint32_t) { return false; };
   int split = 0;
   for (int round = 0; round < 2000; ++round) {
-    auto plane = [&](uint32_t number) {
-      return plane_face(number, 0.1f + 0.02f * unit(random), Vec2{unit(random) - 0.5f, unit(random) - 0.5f} * 0.02f);
+    auto plane = [&](uint32_t object_id) {
+      return plane_face(object_id, 0.1f + 0.02f * unit(random), Vec2{unit(random) - 0.5f, unit(random) - 0.5f} * 0.02f);
     };
-    const ScreenFace a = plane(thing_number(kWallKind, 5)), b = plane(thing_number(kAgentKind, 3));
+    const ScreenFace a = plane(make_object_id(kWallKind, 5)), b = plane(make_object_id(kAgentKind, 3));
     const uint64_t shared = random() | random();
     const Vec2 corner{static_cast<float>(round % 3), static_cast<float>(round % 5)};
     const uint64_t a_first = samples_in_front(a, b, shared, corner, false, never);
@@ -306,13 +306,13 @@ TEST(Order, SolidsThatIntersectShareSamplesByWhichIsNearer) {
 
 TEST(Order, TwoFacesThatFillAPixelAndIntersectFillItTogether) {
   // The first is in front in the left five eighths of the pixel.
-  const ScreenFace first = plane_face(thing_number(kAgentKind, 0), 0.2f, {-0.08f, 0}),
-                   second = plane_face(thing_number(kAgentKind, 1), 0.15f);
+  const ScreenFace first = plane_face(make_object_id(kAgentKind, 0), 0.2f, {-0.08f, 0}),
+                   second = plane_face(make_object_id(kAgentKind, 1), 0.15f);
   const PixelCoverage full{1, kAllSamples};
   const Hidden hidden = hide_each_other(full, full, first, second, {}, [](uint32_t, uint32_t) { return false; });
-  PixelSum sum;
-  sum.add(PixelSum::weight_of(full, ~hidden.of_a), {1, 0, 0});
-  sum.add(PixelSum::weight_of(full, ~hidden.of_b), {0, 1, 0});
+  PixelAccumulator sum;
+  sum.add(PixelAccumulator::weight_of(full, ~hidden.of_a), {1, 0, 0});
+  sum.add(PixelAccumulator::weight_of(full, ~hidden.of_b), {0, 1, 0});
   EXPECT_NEAR(sum.color().r, 5.0 / 8, 1e-5);
   EXPECT_NEAR(sum.color().g, 3.0 / 8, 1e-5);
 }
@@ -327,7 +327,7 @@ TEST(Order, WhatIsFreeOfAPixelsFragmentsDoesNotDependOnTheirList) {
     std::vector<ScreenFace> faces(2 + random() % 6);
     std::vector<Fragment> fragments;
     for (std::size_t i = 0; i < faces.size(); ++i) {
-      faces[i] = plane_face(thing_number(with_strips && i % 2 ? kStripKind : kAgentKind, static_cast<int32_t>(i)),
+      faces[i] = plane_face(make_object_id(with_strips && i % 2 ? kStripKind : kAgentKind, static_cast<int32_t>(i)),
                             0.05f + 0.05f * unit(random), Vec2{unit(random) - 0.5f, unit(random) - 0.5f} * tilt);
       faces[i].color = {unit(random), unit(random), unit(random)};
       const uint64_t samples = random() & (round % 3 ? random() : kAllSamples);
@@ -335,7 +335,7 @@ TEST(Order, WhatIsFreeOfAPixelsFragmentsDoesNotDependOnTheirList) {
       fragments.push_back(make_fragment(faces[i], static_cast<int32_t>(i), coverage, 0, 0));
     }
     auto stands = [](uint32_t solid, uint32_t strip) { return (solid + strip) % 3 == 0; };
-    auto free_by_face = [&](PixelSum* sum) {
+    auto free_by_face = [&](PixelAccumulator* sum) {
       std::vector<uint64_t> free(faces.size());
       for (const Fragment& fragment : fragments) {
         uint64_t& of_face = free[static_cast<std::size_t>(fragment.face)];
@@ -345,11 +345,12 @@ TEST(Order, WhatIsFreeOfAPixelsFragmentsDoesNotDependOnTheirList) {
                                       faces[static_cast<std::size_t>(other.face)], {}, stands)
                           .of_a;
         }
-        sum->add(PixelSum::weight_of(fragment.coverage, of_face), faces[static_cast<std::size_t>(fragment.face)].color);
+        sum->add(PixelAccumulator::weight_of(fragment.coverage, of_face),
+                 faces[static_cast<std::size_t>(fragment.face)].color);
       }
       return free;
     };
-    PixelSum sum;
+    PixelAccumulator sum;
     const std::vector<uint64_t> free = free_by_face(&sum);
     // No sample belongs to two; without rings, each that is covered belongs to one.
     uint64_t seen = 0, covered = 0;
@@ -363,7 +364,7 @@ TEST(Order, WhatIsFreeOfAPixelsFragmentsDoesNotDependOnTheirList) {
     }
     for (int shuffle = 0; shuffle < 5; ++shuffle) {
       std::shuffle(fragments.begin(), fragments.end(), random);
-      PixelSum again;
+      PixelAccumulator again;
       ASSERT_EQ(free_by_face(&again), free) << round;
       ASSERT_EQ(again.color().r, sum.color().r) << round;
     }
@@ -371,8 +372,8 @@ TEST(Order, WhatIsFreeOfAPixelsFragmentsDoesNotDependOnTheirList) {
 }
 
 TEST(Order, WhatFillsThePixelIsHiddenOnlyByWhatDoesToo) {
-  const ScreenFace near = plane_face(thing_number(kWallKind, 0), 0.2f),
-                   far = plane_face(thing_number(kWallKind, 1), 0.1f);
+  const ScreenFace near = plane_face(make_object_id(kWallKind, 0), 0.2f),
+                   far = plane_face(make_object_id(kWallKind, 1), 0.1f);
   auto never = [](uint32_t, uint32_t) { return false; };
   EXPECT_EQ(hide_each_other({0.5f, 0xFFFF}, {1, kAllSamples}, near, far, {}, never).of_b, 0u);
   EXPECT_EQ(hide_each_other({1, kAllSamples}, {1, kAllSamples}, near, far, {}, never).of_b, kAllSamples);
@@ -387,7 +388,7 @@ std::vector<ScreenFace> random_planes(std::mt19937_64* random, std::size_t count
   for (std::size_t i = 0; i < count; ++i) {
     const uint32_t kind = i % 3 == 2 ? kStripKind : i % 3 == 1 ? kWallKind : kAgentKind;
     faces.push_back(
-        plane_face(thing_number(kind, static_cast<int32_t>(i)), 0.08f + 0.04f * unit(*random), Vec2{tilt(), tilt()}));
+        plane_face(make_object_id(kind, static_cast<int32_t>(i)), 0.08f + 0.04f * unit(*random), Vec2{tilt(), tilt()}));
   }
   return faces;
 }
@@ -399,10 +400,10 @@ TEST(Order, WhatIsBuriedIsHiddenByWhatBuriesIt) {
     const std::vector<ScreenFace> faces = random_planes(&random, 3);
     const ScreenFace& full = faces[static_cast<std::size_t>(round % 2)];
     const ScreenFace& face = faces[static_cast<std::size_t>(round % 3 ? 2 : 1 - round % 2)];
-    const float burying = burying_nearness(full, 0, 0);
-    ASSERT_EQ(bits_of(burying) << kBuryingBits, 0u);
-    ASSERT_TRUE(may_show_before(full, burying, 0, 0)) << "nothing buries itself";
-    if (may_show_before(face, burying, 0, 0)) continue;
+    const float bound = occluder_bound(full, 0, 0);
+    ASSERT_EQ(bits_from_float(bound) << kOccluderBoundBits, 0u);
+    ASSERT_TRUE(passes_occluder_bound(full, bound, 0, 0)) << "nothing buries itself";
+    if (passes_occluder_bound(face, bound, 0, 0)) continue;
     ++buried;
     const uint64_t samples = random() | 1;
     const Hidden hidden =
@@ -428,10 +429,10 @@ TEST(Order, WhatIsBuriedDoesNotDependOnWhoIsAskedFirst) {
     std::vector<ScreenFace> faces = random_planes(&random, 2 + random() % 8);
     if (round % 4 == 0) faces.push_back(faces.front());  // as near as another
     float most = 0;
-    for (const ScreenFace& face : faces) most = std::max(most, burying_nearness(face, 0, 0));
+    for (const ScreenFace& face : faces) most = std::max(most, occluder_bound(face, 0, 0));
     std::vector<const ScreenFace*> expected;
     for (const ScreenFace& face : faces) {
-      if (may_show_before(face, most, 0, 0)) expected.push_back(&face);
+      if (passes_occluder_bound(face, most, 0, 0)) expected.push_back(&face);
     }
     std::vector<const ScreenFace*> order;
     for (const ScreenFace& face : faces) order.push_back(&face);
@@ -441,11 +442,11 @@ TEST(Order, WhatIsBuriedDoesNotDependOnWhoIsAskedFirst) {
       const ScreenFace* holder = order.front();
       for (std::size_t i = 1; i < order.size(); ++i) {
         const ScreenFace* loser = order[i];
-        if (burying_nearness(*loser, 0, 0) > burying_nearness(*holder, 0, 0)) std::swap(loser, holder);
-        if (may_show_before(*loser, burying_nearness(*holder, 0, 0), 0, 0)) left.push_back(loser);
+        if (occluder_bound(*loser, 0, 0) > occluder_bound(*holder, 0, 0)) std::swap(loser, holder);
+        if (passes_occluder_bound(*loser, occluder_bound(*holder, 0, 0), 0, 0)) left.push_back(loser);
       }
       left.push_back(holder);
-      std::erase_if(left, [&](const ScreenFace* face) { return !may_show_before(*face, most, 0, 0); });
+      std::erase_if(left, [&](const ScreenFace* face) { return !passes_occluder_bound(*face, most, 0, 0); });
       std::ranges::sort(left);
       ASSERT_EQ(left, expected) << round;
     }
@@ -454,9 +455,9 @@ TEST(Order, WhatIsBuriedDoesNotDependOnWhoIsAskedFirst) {
 
 TEST(Order, ASliverIsHiddenByWhatIsInFrontOfItAndHidesNothing) {
   auto never = [](uint32_t, uint32_t) { return false; };
-  const ScreenFace other = plane_face(thing_number(kWallKind, 1), 0.1f);
+  const ScreenFace other = plane_face(make_object_id(kWallKind, 1), 0.1f);
   for (const bool sliver_in_front : {false, true}) {
-    const ScreenFace sliver = plane_face(thing_number(kWallKind, 0), sliver_in_front ? 0.2f : 0.05f);
+    const ScreenFace sliver = plane_face(make_object_id(kWallKind, 0), sliver_in_front ? 0.2f : 0.05f);
     const Hidden hidden = hide_each_other({0.01f, 0}, {0.5f, 0xFFFFFFFF}, sliver, other, {}, never);
     EXPECT_EQ(hidden.of_a, sliver_in_front ? 0u : kAllSamples);
     EXPECT_EQ(hidden.of_b, 0u);

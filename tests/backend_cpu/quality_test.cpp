@@ -20,7 +20,7 @@ TEST(Quality, TownsAreWithinThePromisedError) {
     fmt::print("seed {}: {:.2f} dB, u8 {:.2f} dB, 2x2 samples {:.2f} dB, worst {:.1f}/255, {:.3f} % beyond 1/255\n",
                seed, quality.oracle.psnr_db(), quality.oracle_bytes.psnr_db(), quality.grid_2x2.psnr_db(),
                255 * quality.oracle.max_error(), 100 * quality.oracle.share_above(1.0 / 255));
-    EXPECT_GE(quality.oracle.psnr_db(), kLeastOraclePsnr_db);
+    EXPECT_GE(quality.oracle.psnr_db(), kMinOraclePsnr_db);
     EXPECT_GE(quality.oracle.psnr_db(), quality.grid_2x2.psnr_db() + kOracleGain_db);
     EXPECT_LE(quality.oracle.max_error(), kWorstOracleError);
   }
@@ -34,8 +34,7 @@ TEST(Quality, OddSizesAndMixedRigsToo) {
   config.rig.cameras[1] = paper_rig(33, 71).cameras[1];
   config.rig.cameras[1].pitch_rad = -0.2f;
   config.rig.cameras[1].roll_rad = 0.3f;
-  EXPECT_GE(measure_quality(town.geometry, town.scene.batch(), town.views, config).oracle.psnr_db(),
-            kLeastOraclePsnr_db);
+  EXPECT_GE(measure_quality(town.geometry, town.scene.batch(), town.views, config).oracle.psnr_db(), kMinOraclePsnr_db);
 }
 
 // A bright wall across the view, 20 m ahead, and things before it.
@@ -72,7 +71,7 @@ TEST(Quality, AgentsThatStraddleTheNearPlane) {
   // Beside the camera, partly behind it, its side face crossing the near plane.
   const Quality quality =
       measure_boxes(bright_wall(), {make_box(AgentClass::vehicle, {2.0f, 1.2f, 0}, 0.2f, {4.5f, 1.9f, 1.7f})});
-  EXPECT_GE(quality.oracle.psnr_db(), kLeastOraclePsnr_db);
+  EXPECT_GE(quality.oracle.psnr_db(), kMinOraclePsnr_db);
 }
 
 TEST(Quality, AWallThroughTheImageAndCarsOnBothSides) {
@@ -93,14 +92,14 @@ TEST(Quality, AWallThroughTheImageAndCarsOnBothSides) {
     boxes.push_back(make_box(AgentClass::vehicle, {x, 6.5f - 0.05f * x, 0}, 0.3f, {4.2f, 1.8f, 1.5f}));
     boxes.push_back(make_box(AgentClass::vehicle, {x + 4, -6.5f - 0.05f * x, 0}, -0.2f, {4.2f, 1.8f, 2.8f}));
   }
-  EXPECT_GE(measure_boxes(geometry, boxes).oracle.psnr_db(), kLeastOraclePsnr_db);
+  EXPECT_GE(measure_boxes(geometry, boxes).oracle.psnr_db(), kMinOraclePsnr_db);
 }
 
 TEST(Quality, RoadsOnTwoLevels) {
   const SyntheticTown bridge = make_bridge();
   EXPECT_GE(measure_quality(bridge.geometry, bridge.scene.batch(), bridge.views, {.rig = paper_rig(), .num_threads = 1})
                 .oracle.psnr_db(),
-            kLeastOraclePsnr_db);
+            kMinOraclePsnr_db);
 }
 
 }  // namespace

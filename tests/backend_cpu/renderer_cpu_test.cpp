@@ -9,7 +9,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/make_renderer.h"
-#include "pictura/common/raster_pixel.h"
+#include "pictura/common/raster_compositing.h"
 #include "pictura/common/raster_shapes.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/image_drawing.h"

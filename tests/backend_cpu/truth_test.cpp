@@ -19,16 +19,16 @@ Quality quality_of(const SyntheticTown& town, const Rig& rig, float line_floor_p
 
 TEST(Truth, HillsAndBridges) {
   const Quality quality = quality_of(make_hill(), paper_rig());
-  EXPECT_GE(quality.oracle.psnr_db(), kLeastOraclePsnr_db);
-  EXPECT_GE(quality.worst_image_db, kLeastImagePsnr_db);
+  EXPECT_GE(quality.oracle.psnr_db(), kMinOraclePsnr_db);
+  EXPECT_GE(quality.worst_image_db, kMinImagePsnr_db);
 }
 
 TEST(Truth, OddSizesDownToOnePixelAndEightCamerasOfEightSizes) {
   const SyntheticTown town = make_hill();
-  EXPECT_GE(quality_of(town, paper_rig(97, 55)).oracle.psnr_db(), kLeastOraclePsnr_db);
+  EXPECT_GE(quality_of(town, paper_rig(97, 55)).oracle.psnr_db(), kMinOraclePsnr_db);
   // Everything shares the one pixel.
   EXPECT_LE(quality_of(town, paper_rig(1, 1)).oracle.max_error(), kWorstOracleError);
-  EXPECT_GE(quality_of(town, eight_camera_rig()).oracle.psnr_db(), kLeastOraclePsnr_db);
+  EXPECT_GE(quality_of(town, eight_camera_rig()).oracle.psnr_db(), kMinOraclePsnr_db);
 }
 
 // The oracle's planes of one image.
@@ -178,9 +178,9 @@ TEST(Truth, WithoutAFloorALargerImageAveragedDownIsTheSmallOne) {
   const Camera camera = paper_rig().cameras[0];
   const TruthImage bare = trace_image(town.geometry, town.scene.batch(), town.views[0], camera, 0);
   const std::vector<float> small = drawn_down(town, camera, 1, 0), large = drawn_down(town, camera, 16, 0);
-  EXPECT_GE(PooledError(small, bare.rgb).psnr_db(), kLeastOraclePsnr_db);
-  EXPECT_GE(PooledError(large, bare.rgb).psnr_db(), kLeastOraclePsnr_db);
-  EXPECT_GE(PooledError(large, small).psnr_db(), kLeastOraclePsnr_db);
+  EXPECT_GE(PooledError(small, bare.rgb).psnr_db(), kMinOraclePsnr_db);
+  EXPECT_GE(PooledError(large, bare.rgb).psnr_db(), kMinOraclePsnr_db);
+  EXPECT_GE(PooledError(large, small).psnr_db(), kMinOraclePsnr_db);
   // The floor is of pixels of the image, so it is another one at another size.
   EXPECT_LT(PooledError(drawn_down(town, camera, 16, 0.35f), drawn_down(town, camera, 1, 0.35f)).psnr_db(), 45);
 }

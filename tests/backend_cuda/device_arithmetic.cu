@@ -12,9 +12,9 @@ __global__ void count_unlike(unsigned long long* inverses, unsigned long long* r
   for (unsigned mantissa = blockIdx.x * blockDim.x + threadIdx.x; mantissa < 1u << kMantissaBits;
        mantissa += gridDim.x * blockDim.x) {
     const float x = __uint_as_float(exponent << kMantissaBits | mantissa);
-    if (bits_of(inverse_of(x)) != bits_of(__frcp_rn(x))) atomicAdd(inverses, 1ull);
-    if (bits_of(inverse_of(-x)) != bits_of(__frcp_rn(-x))) atomicAdd(inverses, 1ull);
-    if (bits_of(root_of(x)) != bits_of(__fsqrt_rn(x))) atomicAdd(roots, 1ull);
+    if (bits_from_float(reciprocal_in_range(x)) != bits_from_float(__frcp_rn(x))) atomicAdd(inverses, 1ull);
+    if (bits_from_float(reciprocal_in_range(-x)) != bits_from_float(__frcp_rn(-x))) atomicAdd(inverses, 1ull);
+    if (bits_from_float(sqrt_in_range(x)) != bits_from_float(__fsqrt_rn(x))) atomicAdd(roots, 1ull);
   }
 }
 

@@ -6,7 +6,7 @@
 namespace pictura::test {
 
 /// Adds to *inverses and *roots (device memory) for how many numbers, of all mantissas at exponents -100 to 99,
-/// inverse_of (of both signs) and root_of are not rounded to nearest.
+/// reciprocal_in_range (of both signs) and sqrt_in_range are not rounded to nearest.
 cudaError_t count_unlike_ieee(unsigned long long* inverses, unsigned long long* roots);
 
 }  // namespace pictura::test

@@ -12,10 +12,10 @@
 #include "pictura/tests/backend_cuda/emulated_device.h"
 // The kernels, under names of their own beside those that were compiled ahead of time.
 #define pictura_cull emulated_cull
-#define pictura_gather emulated_gather
+#define pictura_setup_faces emulated_gather
 #define pictura_clip emulated_clip
 #define pictura_draw emulated_draw
-#define pictura_draw_postponed emulated_draw_postponed
+#define pictura_draw_deferred emulated_draw_deferred
 #define pictura_draw_overflow emulated_draw_overflow
 #define pictura_visibility emulated_visibility
 #include "pictura/backend_cuda/renderer_cuda_kernel.cuh"
@@ -101,13 +101,13 @@ void EmulatedRenderer::launch(int threads, unsigned blocks, Kernel&& kernel) con
 void EmulatedRenderer::render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream) {
   Setup setup(*this, cuda::make_draw_task(config_, cameras_, scene, views, &images_out), scene);
   cuda::DrawTask& task = setup.task;
-  launch(cuda::kGatherThreads, kBlocks, [&] { cuda::emulated_cull(task); });
-  launch(cuda::kGatherThreads, kBlocks, [&] { cuda::emulated_gather(task); });
-  launch(cuda::kGatherThreads, kBlocks, [&] { cuda::emulated_clip(task); });
+  launch(cuda::kSetupThreads, kBlocks, [&] { cuda::emulated_cull(task); });
+  launch(cuda::kSetupThreads, kBlocks, [&] { cuda::emulated_gather(task); });
+  launch(cuda::kSetupThreads, kBlocks, [&] { cuda::emulated_clip(task); });
   launch(cuda::kDrawThreads, kBlocks, [&] { cuda::emulated_draw(task); });
-  postponed_ = setup.counters.postponed;
-  const int gathering = cuda::gathering_blocks(task.pool, kBlocks);
-  launch(cuda::kDrawThreads, static_cast<unsigned>(gathering), [&] { cuda::emulated_draw_postponed(task); });
+  deferred_ = setup.counters.deferred;
+  const int gathering = cuda::setup_blocks(task.pool, kBlocks);
+  launch(cuda::kDrawThreads, static_cast<unsigned>(gathering), [&] { cuda::emulated_draw_deferred(task); });
   overflow_ = setup.counters.overflow;
   launch(cuda::kLargeThreads, kBlocks, [&] { cuda::emulated_draw_overflow(task, setup.large.view()); });
   fault_ = setup.fault;

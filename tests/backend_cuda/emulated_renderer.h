@@ -32,7 +32,7 @@ class EmulatedRenderer final : public Renderer {
 
   /// Images that the last call left to the last launch, and for which the pool had no room.
   int overflow() const { return overflow_; }
-  int postponed() const { return postponed_; }
+  int deferred() const { return deferred_; }
 
  private:
   struct Map;
@@ -48,7 +48,7 @@ class EmulatedRenderer final : public Renderer {
   std::vector<std::unique_ptr<Map>> maps_;
   std::vector<cuda::DeviceGeometry> geometries_;
   cuda::FaultWord fault_ = cuda::kNoFault;
-  int overflow_ = 0, postponed_ = 0;
+  int overflow_ = 0, deferred_ = 0;
 };
 
 }  // namespace pictura::test

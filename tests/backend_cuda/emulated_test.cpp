@@ -37,8 +37,8 @@ TEST(EmulatedKernels, DrawWhatASoakDraws) {
   const SoakOptions options{.maps = {"procedural:1", "procedural:2"},
                             .agents = 60,
                             .views = 2,
-                            .most_scenes = 8,
-                            .most_seconds = std::numeric_limits<double>::infinity(),
+                            .max_scenes = 8,
+                            .max_seconds = std::numeric_limits<double>::infinity(),
                             .num_threads = 1};
   uint64_t order = 30;
   const SoakResult result = soak(
@@ -165,8 +165,8 @@ void expect_some_postponed(uint64_t seed, const EmulatedRenderer::Pool& pool) {
   town.views.resize(2);
   EmulatedRenderer renderer(config_of(paper_rig()), seed, pool);
   expect_oracles(&renderer, town);
-  EXPECT_GT(renderer.postponed(), 0);
-  EXPECT_LT(renderer.postponed(), 8);
+  EXPECT_GT(renderer.deferred(), 0);
+  EXPECT_LT(renderer.deferred(), 8);
   EXPECT_EQ(renderer.overflow(), 0);
 }
 
@@ -275,7 +275,7 @@ TEST(EmulatedKernels, HaveRoomForTheBatchesOfManyEqualImages) {
   const Rig rig = front_rig(4, 3);
   EmulatedRenderer renderer(config_of(rig), 18, {.faces = cuda::kPoolFaces, .clipped_edges = 128});
   expect_oracles(&renderer, town);
-  EXPECT_GT(renderer.postponed(), 0);
+  EXPECT_GT(renderer.deferred(), 0);
 }
 
 TEST(EmulatedKernels, DrawPlanesOfMoreRowsThanThereIsRoomFor) {

@@ -67,8 +67,8 @@ TEST(Pool, TakesWhatItIsReckonedToTake) {
     allocated_bytes = 0;
     PoolBuffers<CountedBuffer>{sizes};
     EXPECT_EQ(allocated_bytes, sizes.bytes());
-    EXPECT_LE(sizes.bytes(), kLeastPoolBytes + images * kPoolImageBytes);
-    EXPECT_GE(sizes.bytes() + sizeof(FaceBatch), kLeastPoolBytes + images * kPoolImageBytes);
+    EXPECT_LE(sizes.bytes(), kMinPoolBytes + images * kPoolImageBytes);
+    EXPECT_GE(sizes.bytes() + sizeof(FaceBatch), kMinPoolBytes + images * kPoolImageBytes);
   }
 }
 
@@ -76,7 +76,7 @@ TEST(Pool, HasRoomForEveryBatch) {
   for (const std::size_t images : {1, 2, 7, 100}) {
     const PoolSizes sizes = pool_sizes(images);
     // Whatever each image lists, if it is the same for all: as many of them as find room.
-    for (std::size_t listed = 1; listed <= kMostEntries; ++listed) {
+    for (std::size_t listed = 1; listed <= kMaxEntries; ++listed) {
       const std::size_t drawn = std::min(images, sizes.faces / listed);
       const auto batches = static_cast<std::size_t>(FaceBatch::count_of(static_cast<int32_t>(listed)));
       ASSERT_LE(drawn * batches, sizes.batches()) << images << " images that list " << listed;

@@ -10,7 +10,7 @@
 
 #include "pictura/common/cuda/device_scene.cuh"
 #include "pictura/common/make_renderer.h"
-#include "pictura/common/raster_pixel.h"
+#include "pictura/common/raster_compositing.h"
 #include "pictura/tests/backend_cuda/device_test.h"
 #include "pictura/tests/support/allocations.h"
 #include "pictura/tests/support/error_message.h"
@@ -187,7 +187,7 @@ TEST_F(CudaStreamTest, RunsOnTheCallersStreamWithoutWaitingOrAllocating) {
 }
 
 // The least bound under which the stage's scene can be drawn, as the renderer itself tells it.
-std::size_t least_scratch_bytes(int agents, std::size_t num_views, RendererConfig config) {
+std::size_t min_scratch_bytes(int agents, std::size_t num_views, RendererConfig config) {
   auto told = [](const std::function<void()>& work) -> std::size_t {
     const std::string message = test::message_of(work), marker = "max_scratch_bytes: expected at least ";
     const std::size_t at = message.find(marker);
@@ -203,7 +203,7 @@ std::size_t least_scratch_bytes(int agents, std::size_t num_views, RendererConfi
 // Captures refuse every call that allocates or waits.
 TEST_F(CudaStreamTest, IsCapturedIntoAGraph) {
   RendererConfig config{.rig = paper_rig()};
-  config.max_scratch_bytes = least_scratch_bytes(60, 7, config) + 40;  // a view at a time
+  config.max_scratch_bytes = min_scratch_bytes(60, 7, config) + 40;  // a view at a time
   Stage stage(60, 7, config);
   const std::vector<uint8_t> first = bytes_of(stage.draw());
   HostImages host = stage.host_images();
@@ -250,7 +250,7 @@ TEST_F(CudaStreamTest, DrawsTheSameInPartsUnderATightBound) {
   const RendererConfig config{.rig = paper_rig()};
   Stage whole(60, 7, config);
   RendererConfig tight = config;
-  tight.max_scratch_bytes = least_scratch_bytes(60, 7, config) + 40;
+  tight.max_scratch_bytes = min_scratch_bytes(60, 7, config) + 40;
   Stage parts(60, 7, tight);
   EXPECT_EQ(bytes_of(parts.draw()), bytes_of(whole.draw()));
   // A fault names the view of the batch, not of its part.
@@ -262,7 +262,7 @@ TEST_F(CudaStreamTest, DrawsTheSameInPartsUnderATightBound) {
 
 TEST_F(CudaStreamTest, ACallThatFindsNoRoomHarmsNoOther) {
   RendererConfig config{.rig = paper_rig()};
-  config.max_scratch_bytes = least_scratch_bytes(5, 1, config);
+  config.max_scratch_bytes = min_scratch_bytes(5, 1, config);
   Stage stage(5, 1, config);
   const std::vector<uint8_t> first = bytes_of(stage.draw());
   const DeviceScene crowded(make_synthetic_town(7, 120).scene.batch());

@@ -28,13 +28,13 @@ INSTANTIATE_TEST_SUITE_P(Contexts, GlRenderer, testing::Values("gl:osmesa", "gl:
 
 struct SampledQuality {
   PixelSamples samples;
-  double least_psnr_db;
+  double min_psnr_db;
 };
-constexpr SampledQuality kQualities[] = {{{.grid = 1}, kLeastGlPsnr1_db},
-                                         {{.multisample = 4}, kLeastGlPsnrMsaa4_db},
-                                         {{.grid = 2}, kLeastGlPsnr2x2_db},
-                                         {{.grid = 4}, kLeastGlPsnr4x4_db},
-                                         {{.grid = 8}, kLeastGlPsnr8x8_db}};
+constexpr SampledQuality kQualities[] = {{{.grid = 1}, kMinGlPsnr1_db},
+                                         {{.multisample = 4}, kMinGlPsnrMsaa4_db},
+                                         {{.grid = 2}, kMinGlPsnr2x2_db},
+                                         {{.grid = 4}, kMinGlPsnr4x4_db},
+                                         {{.grid = 8}, kMinGlPsnr8x8_db}};
 
 SyntheticTown town_of(uint64_t seed, int num_views) {
   SyntheticTown town = make_synthetic_town(seed, 120);
@@ -53,7 +53,7 @@ TEST_P(GlRenderer, DrawsWhatTheOracleDraws) {
           PooledError(draw(GetParam(), town.geometry, town.scene, town.views, config), oracle).psnr_db();
       fmt::print("seed {}, {}x{} grid, {} samples: {:.2f} dB\n", seed, quality.samples.grid, quality.samples.grid,
                  quality.samples.multisample, measured_db);
-      EXPECT_GE(measured_db, quality.least_psnr_db);
+      EXPECT_GE(measured_db, quality.min_psnr_db);
     }
   }
 }
@@ -77,13 +77,13 @@ TEST_P(GlRenderer, TheTolerancesSeeFaults) {
       with_fault.samples = quality.samples;
       return PooledError(draw(GetParam(), geometry, scene, town.views, with_fault), oracle).psnr_db();
     };
-    EXPECT_LT(sampled_db(town.geometry, town.scene, shifted), quality.least_psnr_db);
-    EXPECT_LT(sampled_db(town.geometry, halted, tinted), quality.least_psnr_db);
+    EXPECT_LT(sampled_db(town.geometry, town.scene, shifted), quality.min_psnr_db);
+    EXPECT_LT(sampled_db(town.geometry, halted, tinted), quality.min_psnr_db);
     // What concerns thin lines alone is lost in the noise of few samples.
-    if (quality.least_psnr_db < kLeastGlPsnr2x2_db) continue;
-    EXPECT_LT(sampled_db(town.geometry, town.scene, without_floor), quality.least_psnr_db);
-    if (quality.least_psnr_db < kLeastGlPsnr8x8_db) continue;
-    EXPECT_LT(sampled_db(edges_on_top, town.scene, config), quality.least_psnr_db);
+    if (quality.min_psnr_db < kMinGlPsnr2x2_db) continue;
+    EXPECT_LT(sampled_db(town.geometry, town.scene, without_floor), quality.min_psnr_db);
+    if (quality.min_psnr_db < kMinGlPsnr8x8_db) continue;
+    EXPECT_LT(sampled_db(edges_on_top, town.scene, config), quality.min_psnr_db);
   }
 }
 
@@ -102,7 +102,7 @@ TEST_P(GlRenderer, AnySizeAndMixedRigs) {
   EXPECT_GE(PooledError(draw(GetParam(), town.geometry, town.scene, town.views, config),
                         draw("cpu", town.geometry, town.scene, town.views, exact))
                 .psnr_db(),
-            kLeastGlPsnr8x8_db);
+            kMinGlPsnr8x8_db);
 }
 
 TEST_P(GlRenderer, RoadsOnTwoLevels) {
@@ -111,7 +111,7 @@ TEST_P(GlRenderer, RoadsOnTwoLevels) {
   const std::vector<float> oracle = draw("cpu", bridge.geometry, bridge.scene, bridge.views, config);
   config.samples.grid = 8;
   EXPECT_GE(PooledError(draw(GetParam(), bridge.geometry, bridge.scene, bridge.views, config), oracle).psnr_db(),
-            kLeastGlPsnr8x8_db);
+            kMinGlPsnr8x8_db);
 }
 
 TEST_P(GlRenderer, BoxesThatDipIntoARoadLieOverItsStrips) {
@@ -126,7 +126,7 @@ TEST_P(GlRenderer, BoxesThatDipIntoARoadLieOverItsStrips) {
   const std::vector<float> oracle = draw("cpu", geometry, scene, {make_view({}, 0)}, config);
   config.samples.grid = 8;
   EXPECT_GE(PooledError(draw(GetParam(), geometry, scene, {make_view({}, 0)}, config), oracle).psnr_db(),
-            kLeastGlPsnr8x8_db);
+            kMinGlPsnr8x8_db);
 }
 
 // How many pixels of a patch of road are not of the strip that lies on top of all, where the first `count` of five

@@ -146,8 +146,8 @@ std::string complaint(const PooledError& error, const ImageTolerance& tolerance)
                        100 * error.share_above(tolerance.usual + rounding), 255 * tolerance.usual,
                        100 * tolerance.share_above_usual);
   }
-  if (error.psnr_db() < tolerance.least_psnr_db) {
-    return fmt::format("{:.2f} dB, expected at least {:.2f} dB", error.psnr_db(), tolerance.least_psnr_db);
+  if (error.psnr_db() < tolerance.min_psnr_db) {
+    return fmt::format("{:.2f} dB, expected at least {:.2f} dB", error.psnr_db(), tolerance.min_psnr_db);
   }
   return "";
 }

@@ -204,7 +204,7 @@ class Town {
 
   /// Lights stop their lanes at the mouth, and are seen from there and from further back.
   void check_lights() {
-    const float least_cosine = std::cos(MapGeometryOptions().light_half_angle_rad);
+    const float min_cosine = std::cos(MapGeometryOptions().light_half_angle_rad);
     for (std::size_t i = 0; i < map_.lights.size(); ++i) {
       const TrafficLight& light = map_.lights[i];
       const Vec2 stop = (light.stop_a_m.xy() + light.stop_b_m.xy()) * 0.5f;
@@ -224,7 +224,7 @@ class Town {
           });
           eye.z += 1.5f;
           const Vec3 to_eye = eye - light.head_m;
-          EXPECT_GT(dot(light.head_facing, to_eye.xy()), least_cosine * length(to_eye))
+          EXPECT_GT(dot(light.head_facing, to_eye.xy()), min_cosine * length(to_eye))
               << light.name << " from " << back_m;
         }
       }

@@ -184,7 +184,7 @@ TEST(ProceduralTownText, EqualOptionsGiveEqualBytesAndOthersDiffer) {
 /// What a town has of each feature.
 struct Counts {
   double streets_m = 0;
-  int arcs = 0, five_arms = 0, roundabouts = 0, most_lanes = 0, slips = 0, heights = 0, crosswalks = 0, sidewalks = 0,
+  int arcs = 0, five_arms = 0, roundabouts = 0, max_lanes = 0, slips = 0, heights = 0, crosswalks = 0, sidewalks = 0,
       parking = 0, lights = 0, crossings = 0;
 };
 
@@ -201,7 +201,7 @@ Counts count(const TownOptions& options) {
   counts.roundabouts = town.count("//road[@junction='-1'][not(.//left)]");
   for (int lanes = 1; lanes <= 3; ++lanes) {
     if (town.count(fmt::format("//road[@junction='-1']//right/lane[@id='{}'][@type='driving']", -lanes).c_str()) > 0) {
-      counts.most_lanes = lanes;
+      counts.max_lanes = lanes;
     }
   }
   std::set<double> heights;
@@ -235,11 +235,11 @@ TEST(ProceduralTownOptions, NothingOfAFeatureAtZero) {
   EXPECT_EQ(count_with(&TownOptions::sidewalks, 0).sidewalks, 0);
   EXPECT_EQ(count_with(&TownOptions::parking, 0).parking, 0);
   EXPECT_EQ(count_with(&TownOptions::lights, 0).lights, 0);
-  EXPECT_EQ(count_with(&TownOptions::max_lanes, 1).most_lanes, 1);
-  EXPECT_EQ(count_with(&TownOptions::max_lanes, 2).most_lanes, 2);
+  EXPECT_EQ(count_with(&TownOptions::max_lanes, 1).max_lanes, 1);
+  EXPECT_EQ(count_with(&TownOptions::max_lanes, 2).max_lanes, 2);
   TownOptions options = options_of(5, 5, 5);
   options.avenues = options.ring_road = 0;
-  EXPECT_EQ(count(options).most_lanes, 1);
+  EXPECT_EQ(count(options).max_lanes, 1);
   options.hills_m = options.overpasses = 0;
   EXPECT_EQ(count(options).heights, 1);
 }
@@ -266,7 +266,7 @@ TEST(ProceduralTownOptions, MoreOfAFeatureTheMoreIsAskedFor) {
   EXPECT_GT(count_with(&TownOptions::curved, 1).arcs, count_with(&TownOptions::curved, 0).arcs);
   EXPECT_GT(count_with(&TownOptions::density, 1).streets_m, usual.streets_m);
   EXPECT_LT(count_with(&TownOptions::density, 0).streets_m, usual.streets_m);
-  EXPECT_EQ(usual.most_lanes, 3);
+  EXPECT_EQ(usual.max_lanes, 3);
 }
 
 TEST(ProceduralTownOptions, RoundaboutsAndLightsEverywhere) {
@@ -287,7 +287,7 @@ TEST(ProceduralTownOptions, TheDefaultTownHasEverything) {
   for (uint64_t seed = 0; seed < 10; ++seed) {
     const Counts counts = count(options_of(seed, 3, 3));
     for (const int feature : {counts.roundabouts, counts.slips, counts.heights - 1, counts.crosswalks, counts.sidewalks,
-                              counts.parking, counts.lights, counts.most_lanes - 1, counts.arcs, counts.five_arms}) {
+                              counts.parking, counts.lights, counts.max_lanes - 1, counts.arcs, counts.five_arms}) {
       EXPECT_GT(feature, 0) << "seed " << seed;
     }
   }

@@ -54,7 +54,7 @@ Rig front_rig(int width_px = 96, int height_px = 54);
 /// Four cameras of 97x55, 1x1 and 40x130 pixels.
 Rig mixed_rig();
 
-/// Eight cameras of eight sizes, pitched and rolled.
+/// Int16x8 cameras of eight sizes, pitched and rolled.
 Rig eight_camera_rig();
 
 /// Scenes that are easily drawn wrong, each with a rig: hills, bridges, solids that intersect, odd sizes, one pixel.

@@ -5,9 +5,9 @@ namespace pictura {
 
 /// Least pooled PSNR of the oracle against the truth. The design's promise; 61 dB is what town-like scenes measure, and
 /// the truth's own error with 1,024 samples a pixel is about 68 dB.
-constexpr double kLeastOraclePsnr_db = 55.0;
+constexpr double kMinOraclePsnr_db = 55.0;
 /// Least PSNR of the worst single image: an image that shows little but one crowded horizon.
-constexpr double kLeastImagePsnr_db = 45.0;
+constexpr double kMinImagePsnr_db = 45.0;
 /// 2x2 supersampling, the bar that the paper compares with, must stay this far behind.
 constexpr double kOracleGain_db = 20.0;
 /// Worst channel of the oracle on a lone cuboid before a wall: the design's promise. Coverage taken for alpha errs by
@@ -43,14 +43,14 @@ constexpr double kKernelDepthError = 1e-4;
 /// Least pooled PSNR of the OpenGL baseline against the oracle on towns, by its samples: what point samples miss of the
 /// coverage. About half a decibel below what the towns of the tests measure with Mesa's rasterizer, because drivers
 /// place samples and round corners to parts of a pixel (1/256 at least) as they like.
-constexpr double kLeastGlPsnr1_db = 24.0, kLeastGlPsnr2x2_db = 31.7, kLeastGlPsnrMsaa4_db = 34.4,
-                 kLeastGlPsnr4x4_db = 39.0, kLeastGlPsnr8x8_db = 46.5;
+constexpr double kMinGlPsnr1_db = 24.0, kMinGlPsnr2x2_db = 31.7, kMinGlPsnrMsaa4_db = 34.4, kMinGlPsnr4x4_db = 39.0,
+                 kMinGlPsnr8x8_db = 46.5;
 
 /// How far a golden scene's images (tests/golden) may be from others of it: the worst value, the share of values that
 /// may be further off than usual, and the pooled PSNR. golden_test shows that seeded faults are beyond each.
 struct ImageTolerance {
   const char* name;
-  double worst, usual, share_above_usual, least_psnr_db;
+  double worst, usual, share_above_usual, min_psnr_db;
 };
 /// The oracle against its own pictures: its arithmetic is the same on every machine (docs/house.md).
 constexpr ImageTolerance kGoldenOracle{"oracle", 0, 0, 0, 0};
@@ -58,7 +58,7 @@ constexpr ImageTolerance kGoldenOracle{"oracle", 0, 0, 0, 0};
 constexpr ImageTolerance kGoldenKernel{"kernel", kKernelWorstError, kKernelError, 1 - kKernelShareWithin, 0};
 /// The oracle against the truth, in floats: the promised PSNR in every scene, where there is no town to average over.
 /// The worst value is 12/255.
-constexpr ImageTolerance kGoldenTruth{"truth", kWorstOracleError, 1.0 / 255, 1, kLeastOraclePsnr_db};
+constexpr ImageTolerance kGoldenTruth{"truth", kWorstOracleError, 1.0 / 255, 1, kMinOraclePsnr_db};
 /// The same for images of a single pixel, in which dozens of things share 64 samples and nothing averages out.
 constexpr ImageTolerance kGoldenTruthOnePixel{"truth, one pixel", 10.0 / 255, 1.0 / 255, 1, 0};
 /// The OpenGL baseline against the oracle's pictures, with so many samples squared in a pixel that what they miss is
