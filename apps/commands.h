@@ -14,6 +14,5 @@ void add_simulate_command(CLI::App& app);
 void add_train_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
 #endif
-void add_bench_command(CLI::App& app);
 
 }  // namespace pictura

@@ -1,6 +1,6 @@
 // `pictura evaluate`: the paper's five driving metrics of a checkpoint, by traffic density.
 #include "pictura/apps/commands.h"
-#include "pictura/apps/report.h"
+#include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/training/training.h"
 

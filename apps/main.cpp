@@ -3,8 +3,9 @@
 #include <cstdio>
 
 #include "pictura/apps/commands.h"
+#include "pictura/bench/commands/bench.h"
 #include "pictura/common/error.h"
-#include "pictura/common/interrupt.h"
+#include "pictura/common/support/interrupt.h"
 #include "pictura/version.h"
 
 int main(int argc, char** argv) {

@@ -3,11 +3,11 @@
 #include <chrono>
 
 #include "pictura/apps/commands.h"
-#include "pictura/apps/drawing.h"
-#include "pictura/apps/map_listing.h"
-#include "pictura/apps/report.h"
+#include "pictura/cli/map_listing.h"
+#include "pictura/cli/report.h"
 #include "pictura/common/error.h"
-#include "pictura/common/file.h"
+#include "pictura/common/support/file.h"
+#include "pictura/drawing/drawing.h"
 #include "pictura/map/blind_approaches.h"
 #include "pictura/map/load_map.h"
 #include "pictura/map/map_geometry.h"

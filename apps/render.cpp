@@ -3,18 +3,18 @@
 #include <filesystem>
 
 #include "pictura/apps/commands.h"
-#include "pictura/apps/draw_planes.h"
-#include "pictura/apps/drawing.h"
-#include "pictura/apps/drive.h"
-#include "pictura/apps/finite_range.h"
-#include "pictura/apps/report.h"
+#include "pictura/backends/make_renderer.h"
+#include "pictura/cli/drive.h"
+#include "pictura/cli/finite_range.h"
+#include "pictura/cli/report.h"
 #include "pictura/common/error.h"
-#include "pictura/common/file.h"
-#include "pictura/common/hash.h"
-#include "pictura/common/interrupt.h"
-#include "pictura/common/make_renderer.h"
-#include "pictura/common/raster_camera.h"
+#include "pictura/common/raster/camera.h"
 #include "pictura/common/scene_file.h"
+#include "pictura/common/support/file.h"
+#include "pictura/common/support/hash.h"
+#include "pictura/common/support/interrupt.h"
+#include "pictura/drawing/drawing.h"
+#include "pictura/drawing/planes.h"
 
 namespace pictura {
 

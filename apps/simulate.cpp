@@ -4,13 +4,13 @@
 #include <chrono>
 
 #include "pictura/apps/commands.h"
-#include "pictura/apps/drawing.h"
-#include "pictura/apps/drive.h"
-#include "pictura/apps/film.h"
-#include "pictura/apps/finite_range.h"
-#include "pictura/apps/report.h"
+#include "pictura/cli/drive.h"
+#include "pictura/cli/finite_range.h"
+#include "pictura/cli/report.h"
 #include "pictura/common/error.h"
-#include "pictura/common/interrupt.h"
+#include "pictura/common/support/interrupt.h"
+#include "pictura/drawing/drawing.h"
+#include "pictura/drawing/film.h"
 #include "pictura/map/load_map.h"
 
 namespace pictura {

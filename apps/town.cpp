@@ -1,9 +1,9 @@
 // `pictura town`: writes a procedural town as OpenDRIVE.
 #include "pictura/apps/commands.h"
-#include "pictura/apps/finite_range.h"
-#include "pictura/apps/report.h"
+#include "pictura/cli/finite_range.h"
+#include "pictura/cli/report.h"
 #include "pictura/common/error.h"
-#include "pictura/common/file.h"
+#include "pictura/common/support/file.h"
 #include "pictura/map/procedural/procedural_town.h"
 
 namespace pictura {

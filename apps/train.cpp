@@ -2,9 +2,9 @@
 #include <cmath>
 
 #include "pictura/apps/commands.h"
-#include "pictura/apps/learning_curve.h"
-#include "pictura/apps/report.h"
+#include "pictura/cli/report.h"
 #include "pictura/common/error.h"
+#include "pictura/drawing/learning_curve.h"
 #include "pictura/training/training.h"
 
 namespace pictura {

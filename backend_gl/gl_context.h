@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "pictura/common/shared_library.h"
+#include "pictura/common/support/shared_library.h"
 
 namespace pictura::gl {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "pictura/backend_gl/cuda_interop.h"
+#include "pictura/backend_gl/cuda/interop.h"
 #include "pictura/backend_gl/gl_functions.h"
 #include "pictura/common/renderer.h"
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "pictura/common/raster_gather.h"
+#include "pictura/common/raster/visible_primitives.h"
 
 namespace pictura::gl {
 

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "pictura/common/raster_face_setup.h"
+#include "pictura/common/raster/face_setup.h"
 
 namespace pictura::gl {
 

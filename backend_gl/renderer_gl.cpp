@@ -7,9 +7,9 @@
 #include "pictura/backend_gl/image_faces.h"
 #include "pictura/backend_gl/shaders.h"
 #include "pictura/common/error.h"
-#include "pictura/common/host_geometries.h"
-#include "pictura/common/parallel_for.h"
-#include "pictura/common/raster_check.h"
+#include "pictura/common/raster/check.h"
+#include "pictura/common/raster/host_geometries.h"
+#include "pictura/common/support/parallel_for.h"
 
 namespace pictura {
 

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 
+#include "pictura/backends/make_simulator.h"
 #include "pictura/common/error.h"
-#include "pictura/common/interrupt.h"
 #include "pictura/common/rng.h"
+#include "pictura/common/support/interrupt.h"
 #include "pictura/map/load_map.h"
 
 namespace pictura {

@@ -5,8 +5,8 @@
 #include <cstring>
 #include <limits>
 
-#include "pictura/tests/support/image_truth.h"
-#include "pictura/tests/support/tolerances.h"
+#include "pictura/bench/truth/image_truth.h"
+#include "pictura/bench/truth/tolerances.h"
 
 namespace pictura {
 

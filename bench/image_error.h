@@ -16,7 +16,7 @@ struct ImageError {
   int64_t plane_pixels = 0, differing_plane_pixels = 0;
 
   void add(const ImageError& other);
-  /// The tolerance of the CUDA renderer (tests/support/tolerances.h).
+  /// The tolerance of the CUDA renderer (bench/truth/tolerances.h).
   bool is_within_tolerance() const;
 };
 

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <utility>
 
-#include "pictura/backend_cpu/renderer_cpu_image.h"
+#include "pictura/backend_cpu/renderer/image_drawer.h"
 #include "pictura/bench/driving.h"
-#include "pictura/common/parallel_for.h"
-#include "pictura/common/raster_check.h"
+#include "pictura/common/raster/check.h"
+#include "pictura/common/support/parallel_for.h"
 
 namespace pictura {
 

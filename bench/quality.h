@@ -1,4 +1,4 @@
-// How far images are from the truth: the ray caster of tests/support/image_truth.h against the CPU renderer and against
+// How far images are from the truth: the ray caster of bench/truth/image_truth.h against the CPU renderer and against
 // simpler ways to draw the same scene. Used by `pictura bench quality` and by tests, and by nothing that is installed.
 #pragma once
 
@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "pictura/tests/support/image_scenes.h"
-#include "pictura/tests/support/image_truth.h"
+#include "pictura/bench/truth/image_scenes.h"
+#include "pictura/bench/truth/image_truth.h"
 
 namespace pictura {
 

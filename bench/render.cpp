@@ -4,9 +4,9 @@
 #include <chrono>
 #include <optional>
 
+#include "pictura/backends/make_renderer.h"
 #include "pictura/common/error.h"
-#include "pictura/common/interrupt.h"
-#include "pictura/common/make_renderer.h"
+#include "pictura/common/support/interrupt.h"
 #ifdef PICTURA_HAS_CUDA
 #include "pictura/bench/render_device.h"
 #endif

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "pictura/common/cuda/device_scene.cuh"
+#include "pictura/common/cuda/device_scene.h"
 
 namespace pictura {
 

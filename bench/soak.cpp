@@ -4,12 +4,13 @@
 #include <chrono>
 #include <cmath>
 
+#include "pictura/backends/make_renderer.h"
+#include "pictura/backends/make_simulator.h"
 #include "pictura/bench/driving.h"
 #include "pictura/common/error.h"
-#include "pictura/common/interrupt.h"
-#include "pictura/common/make_renderer.h"
-#include "pictura/common/raster_camera.h"
+#include "pictura/common/raster/camera.h"
 #include "pictura/common/rng.h"
+#include "pictura/common/support/interrupt.h"
 #include "pictura/map/load_map.h"
 
 namespace pictura {

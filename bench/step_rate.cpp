@@ -5,7 +5,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
 #ifdef PICTURA_HAS_CUDA
-#include "pictura/common/cuda/device_buffer.cuh"
+#include "pictura/common/cuda/device_buffer.h"
 #endif
 
 namespace pictura {

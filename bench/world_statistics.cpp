@@ -4,11 +4,13 @@
 
 #include <fmt/format.h>
 
+#include "pictura/backends/make_simulator.h"
+#include "pictura/bench/lane_keeping_episodes.h"
 #include "pictura/common/error.h"
-#include "pictura/common/interrupt.h"
+#include "pictura/common/support/interrupt.h"
+#include "pictura/simulator/controllers/goal_places.h"
+#include "pictura/simulator/controllers/lane_keeping.h"
 #include "pictura/simulator/world_batch.h"
-#include "pictura/tests/simulator/goal_places.h"
-#include "pictura/tests/simulator/lane_keeping.h"
 
 namespace pictura {
 
@@ -53,7 +55,7 @@ void count_population(WorldBatch& batch, const LaneGraph& graph, Counts* counts_
       }
     }
     for (int i = world.num_agents; i < world.num_boxes; ++i) count("parked cars", "cars", world.boxes[i].drawn);
-    const auto [on_roads, on_walkways] = testing::follow_goals(world, graph, 1);
+    const auto [on_roads, on_walkways] = follow_goals(world, graph, 1);
     count("waypoints of the first chains", "waypoints",
           static_cast<double>(on_roads.waypoints + on_walkways.waypoints));
     count("of these out of reach", "waypoints", static_cast<double>(on_roads.unreachable + on_walkways.unreachable));
@@ -96,12 +98,12 @@ void drive_randomly(Simulator& simulator, const WorldStatisticsOptions& options,
 
 void drive_lanes(const std::shared_ptr<const RoadMap>& map, const SimulatorConfig& config, int episodes,
                  Counts* counts_inout) {
-  static_assert(testing::LaneKeepingController::kAstray_m == 1);
+  static_assert(LaneKeepingController::kAstray_m == 1);
   constexpr std::pair<const char*, Event> kReasons[] = {{"lane driver: collisions", kEventCollision},
                                                         {"lane driver: off-road", kEventOffRoad},
                                                         {"lane driver: wall contacts", kEventWall},
                                                         {"lane driver: red lights", kEventRedLight}};
-  const auto driven = testing::drive_lanes(map, config, episodes, 1, config.episode_steps);
+  const auto driven = drive_lane_keeping_episodes(map, config, episodes, 1, config.episode_steps);
   for (size_t w = 0; w < driven.size(); ++w) {
     counts_inout->of("lane driver: goals", "goals", w) = driven[w].goals;
     counts_inout->of("lane driver: distance", "m", w) = driven[w].distance_m;

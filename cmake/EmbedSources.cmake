@@ -1,5 +1,6 @@
 # Run at every build in which a source changed: writes OUTPUT, a C++ file with the texts of ROOTS and of every header of
-# ours that they include, as backend_cuda/kernel_sources.h declares them. Paths are relative to SOURCE_DIR.
+# ours that they include, as backend_cuda/renderer/kernel_sources.h declares them. Paths are relative to SOURCE_DIR. Fails
+# where one of them is not among DEPENDENCIES (absolute paths), since nothing would embed it anew when it changes.
 set(files ${ROOTS})
 set(entries "")
 set(program "")
@@ -12,6 +13,9 @@ while(files)
     continue()
   endif()
   list(APPEND seen ${file})
+  if(NOT ${SOURCE_DIR}/${file} IN_LIST DEPENDENCIES)
+    message(FATAL_ERROR "${file}: included by the embedded kernels, but not among the files that they are built from")
+  endif()
   file(READ ${SOURCE_DIR}/${file} text)
   string(REGEX MATCHALL "#include \"pictura/[^\"]+\"" includes "${text}")
   foreach(include ${includes})
@@ -21,7 +25,7 @@ while(files)
   string(APPEND entries "    {\"pictura/${file}\", R\"__source__(${text})__source__\"},\n")
 endwhile()
 file(WRITE ${OUTPUT} "// Written by cmake/EmbedSources.cmake.
-#include \"pictura/backend_cuda/kernel_sources.h\"
+#include \"pictura/backend_cuda/renderer/kernel_sources.h\"
 
 namespace pictura::cuda {
 

@@ -11,9 +11,10 @@ if(PICTURA_HAS_GL)
 endif()
 install(TARGETS ${installed} EXPORT pictura ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(TARGETS pictura RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-foreach(folder common map simulator)
+foreach(folder backends common map simulator)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/pictura/${folder}
-    FILES_MATCHING PATTERN "*.h" PATTERN "cuda" EXCLUDE PATTERN "toml_fields.h" EXCLUDE)
+    FILES_MATCHING PATTERN "*.h" PATTERN "cuda" EXCLUDE PATTERN "controllers" EXCLUDE
+    PATTERN "toml_fields.h" EXCLUDE)
 endforeach()
 install(FILES ${PICTURA_INCLUDE_DIR}/pictura/version.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/pictura)
 install(EXPORT pictura NAMESPACE pictura:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/pictura)

@@ -4,9 +4,9 @@
 #include <set>
 
 #include "pictura/common/error.h"
-#include "pictura/common/file.h"
-#include "pictura/common/raster_camera.h"
-#include "pictura/common/toml_fields.h"
+#include "pictura/common/raster/camera.h"
+#include "pictura/common/support/file.h"
+#include "pictura/common/support/toml_fields.h"
 
 namespace pictura {
 

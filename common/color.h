@@ -2,7 +2,7 @@
 // Vehicles take RAP's colours (vita-epfl/RAP, renderer.py); the other hues are ours, see docs/image.md.
 #pragma once
 
-#include "pictura/common/hd.h"
+#include "pictura/common/portable/hd.h"
 
 namespace pictura {
 

@@ -5,7 +5,7 @@
 #include <png.h>
 
 #include "pictura/common/error.h"
-#include "pictura/common/file.h"
+#include "pictura/common/support/file.h"
 
 namespace pictura {
 

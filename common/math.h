@@ -2,7 +2,7 @@
 // sin, cos, atan and exp are our own: single-precision polynomials after S. Moshier's Cephes, built from + - * / alone.
 #pragma once
 
-#include "pictura/common/hd.h"
+#include "pictura/common/portable/hd.h"
 
 namespace pictura {
 

@@ -1,10 +1,11 @@
-// The interface of everything that draws: `cpu`, `cuda`, `gl` and `null`. Made by name in make_renderer.h.
+// The interface of everything that draws: `cpu`, `cuda`, `gl` and `null`. Made by name in backends/make_renderer.h.
 #pragma once
 
 #include <string>
 #include <string_view>
 
 #include "pictura/common/camera.h"
+#include "pictura/common/error.h"
 #include "pictura/common/image.h"
 #include "pictura/common/scene.h"
 
@@ -62,5 +63,15 @@ class Renderer {
   virtual void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
                           Span<float> visibility_out, Stream stream = {}) = 0;
 };
+
+/// Uploads geometries to a new renderer, so that handles equal their indices.
+inline void upload_geometries(Span<const StaticGeometry> geometries, Renderer* renderer_out) {
+  GeometryHandle expected = 0;
+  for (const StaticGeometry& geometry : geometries) {
+    const GeometryHandle handle = renderer_out->upload(geometry);
+    PICTURA_CHECK(handle == expected++, "renderer {}: expected handle {}, got {}", renderer_out->name(), expected - 1,
+                  handle);
+  }
+}
 
 }  // namespace pictura

@@ -2,8 +2,8 @@
 // for what, so results depend neither on the number of threads nor on how a batch is split over devices.
 #pragma once
 
-#include "pictura/common/hd.h"
 #include "pictura/common/math.h"
+#include "pictura/common/portable/hd.h"
 
 namespace pictura {
 

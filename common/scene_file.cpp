@@ -5,8 +5,8 @@
 #include <set>
 
 #include "pictura/common/error.h"
-#include "pictura/common/file.h"
-#include "pictura/common/toml_fields.h"
+#include "pictura/common/support/file.h"
+#include "pictura/common/support/toml_fields.h"
 
 namespace pictura {
 

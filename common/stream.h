@@ -1,7 +1,7 @@
 // Where memory lives and the queue that work is put on, without any CUDA header.
 #pragma once
 
-#include "pictura/common/hd.h"
+#include "pictura/common/portable/hd.h"
 
 namespace pictura {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "pictura/common/error.h"
-#include "pictura/common/file.h"
+#include "pictura/common/support/file.h"
 #include "pictura/map/map_cache.h"
 #include "pictura/map/procedural/procedural_town.h"
 

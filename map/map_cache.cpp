@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "pictura/common/error.h"
-#include "pictura/common/file.h"
-#include "pictura/common/hash.h"
+#include "pictura/common/support/file.h"
+#include "pictura/common/support/hash.h"
 #include "pictura/map/map_fields.h"
 #include "pictura/map_fingerprint.h"
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "pictura/common/hash.h"
+#include "pictura/common/support/hash.h"
 #include "pictura/simulator/fields.h"
 
 namespace pictura {

@@ -2,7 +2,7 @@
 // table of the conditioning coefficients) and the scale to [-1, 1] in which the policy sees them.
 #pragma once
 
-#include "pictura/common/hd.h"
+#include "pictura/common/portable/hd.h"
 
 namespace pictura {
 

@@ -3,7 +3,7 @@
 // owns them on the host.
 #pragma once
 
-#include "pictura/common/hd.h"
+#include "pictura/common/portable/hd.h"
 
 namespace pictura {
 

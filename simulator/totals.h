@@ -2,7 +2,7 @@
 // lane i mod kTotalsBins, and the lanes are added up in order.
 #pragma once
 
-#include "pictura/common/hd.h"
+#include "pictura/common/portable/hd.h"
 
 namespace pictura {
 

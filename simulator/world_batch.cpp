@@ -6,8 +6,8 @@
 #include <numeric>
 
 #include "pictura/common/error.h"
-#include "pictura/common/hash.h"
-#include "pictura/common/parallel_for.h"
+#include "pictura/common/support/hash.h"
+#include "pictura/common/support/parallel_for.h"
 #include "pictura/simulator/rules/collision.h"
 #include "pictura/simulator/rules/limits.h"
 

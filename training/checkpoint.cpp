@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "pictura/common/error.h"
-#include "pictura/common/file.h"
-#include "pictura/common/hash.h"
+#include "pictura/common/support/file.h"
+#include "pictura/common/support/hash.h"
 
 namespace pictura {
 

@@ -9,7 +9,7 @@
 #include <toml++/toml.h>
 
 #include "pictura/common/error.h"
-#include "pictura/common/file.h"
+#include "pictura/common/support/file.h"
 
 namespace pictura {
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "pictura/common/hd.h"
+#include "pictura/common/portable/hd.h"
 
 namespace pictura {
 

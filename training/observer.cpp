@@ -5,10 +5,10 @@
 
 #include <ATen/core/grad_mode.h>
 
+#include "pictura/backends/make_renderer.h"
 #include "pictura/common/error.h"
-#include "pictura/common/make_renderer.h"
-#include "pictura/common/parallel_for.h"
 #include "pictura/common/rng.h"
+#include "pictura/common/support/parallel_for.h"
 
 namespace pictura {
 

@@ -4,8 +4,8 @@
 #include <numbers>
 
 #include "pictura/common/error.h"
-#include "pictura/common/hash.h"
 #include "pictura/common/rng.h"
+#include "pictura/common/support/hash.h"
 
 namespace pictura {
 

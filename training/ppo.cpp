@@ -7,7 +7,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
-#include "pictura/training/gae.h"
+#include "pictura/training/rules/gae.h"
 
 namespace pictura {
 

@@ -11,10 +11,11 @@
 #include <ATen/Parallel.h>
 #include <unistd.h>
 
+#include "pictura/backends/make_simulator.h"
 #include "pictura/common/error.h"
-#include "pictura/common/file.h"
-#include "pictura/common/interrupt.h"
-#include "pictura/common/parallel_for.h"
+#include "pictura/common/support/file.h"
+#include "pictura/common/support/interrupt.h"
+#include "pictura/common/support/parallel_for.h"
 #include "pictura/map/load_map.h"
 #include "pictura/training/checkpoint.h"
 #include "pictura/training/event_file.h"

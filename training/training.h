@@ -38,7 +38,8 @@ struct TrainReport {
 
 /// Trains as the configuration says and writes into out_folder: config.toml (resolved), untrained.ckpt (the policy
 /// before its first update), checkpoint.ckpt, policy.safetensors, progress.csv and TensorBoard events. After ^C
-/// (common/interrupt.h) it saves and returns with `interrupted`. Throws Error naming file and key for bad input.
+/// (common/support/interrupt.h) it saves and returns with `interrupted`. Throws Error naming file and key for bad
+/// input.
 TrainReport train(const TrainOptions& options);
 
 /// A trained policy that chooses actions for every slot of a simulator.
@@ -89,7 +90,7 @@ struct EvaluateRow {
 
 struct EvaluateReport {
   std::vector<EvaluateRow> rows;  // of the densities that were finished, in the order in which they were asked for
-  bool interrupted = false;       // ^C came (common/interrupt.h) before the last one was
+  bool interrupted = false;       // ^C came (common/support/interrupt.h) before the last one was
 };
 
 /// Scenario k is on map k modulo the number of maps and draws its random numbers as world kFirstEvaluationWorld + k, so

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "pictura/common/color.h"
-#include "pictura/common/hd.h"
 #include "pictura/common/math.h"
+#include "pictura/common/portable/hd.h"
 
 namespace pictura {
 

@@ -4,7 +4,7 @@
 // so, and the least of them.
 #pragma once
 
-#include "pictura/common/hd.h"
+#include "pictura/common/portable/hd.h"
 
 namespace pictura {
 

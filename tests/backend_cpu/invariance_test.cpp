@@ -4,8 +4,8 @@
 #include <cmath>
 #include <random>
 
+#include "pictura/bench/truth/tolerances.h"
 #include "pictura/tests/support/image_drawing.h"
-#include "pictura/tests/support/tolerances.h"
 
 namespace pictura {
 namespace {

@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "pictura/tests/support/tolerances.h"
+#include "pictura/bench/truth/tolerances.h"
 
 namespace pictura {
 namespace {

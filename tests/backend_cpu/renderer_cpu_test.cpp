@@ -7,13 +7,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "pictura/backends/make_renderer.h"
+#include "pictura/bench/truth/tolerances.h"
 #include "pictura/common/error.h"
-#include "pictura/common/make_renderer.h"
-#include "pictura/common/raster_compositing.h"
-#include "pictura/common/raster_shapes.h"
+#include "pictura/common/raster/compositing.h"
+#include "pictura/common/raster/shapes.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/image_drawing.h"
-#include "pictura/tests/support/tolerances.h"
 
 namespace pictura {
 namespace {

@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "pictura/bench/quality.h"
+#include "pictura/bench/truth/tolerances.h"
 #include "pictura/tests/support/named_maps.h"
-#include "pictura/tests/support/tolerances.h"
 
 namespace pictura {
 namespace {

@@ -5,9 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include "pictura/backends/make_renderer.h"
 #include "pictura/bench/quality.h"
-#include "pictura/common/make_renderer.h"
-#include "pictura/tests/support/tolerances.h"
+#include "pictura/bench/truth/tolerances.h"
 
 namespace pictura {
 namespace {

@@ -39,8 +39,8 @@ std::vector<std::string> shared_headers() {
   const std::filesystem::path root = PICTURA_TEST_INCLUDE_DIR "/pictura";
   for (const auto& file : std::filesystem::directory_iterator(root / "common")) {
     const std::string name = file.path().filename().string();
-    // raster_check.h is for hosts: it speaks of errors and vectors.
-    if (name.starts_with("raster_") && name.ends_with(".h") && name != "raster_check.h") {
+    // common/raster/check.h is for hosts: it speaks of errors and vectors.
+    if (name.starts_with("raster_") && name.ends_with(".h") && name != "common/raster/check.h") {
       headers.push_back("pictura/common/" + name);
     }
   }

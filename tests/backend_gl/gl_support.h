@@ -9,9 +9,9 @@
 
 #include <gtest/gtest.h>
 
+#include "pictura/backends/make_renderer.h"
+#include "pictura/bench/truth/image_scenes.h"
 #include "pictura/common/error.h"
-#include "pictura/common/make_renderer.h"
-#include "pictura/tests/support/image_scenes.h"
 
 namespace pictura {
 

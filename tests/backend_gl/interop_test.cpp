@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "pictura/common/cuda/device_scene.cuh"
+#include "pictura/common/cuda/device_scene.h"
 #include "pictura/tests/backend_gl/gl_support.h"
 
 namespace pictura {

@@ -7,9 +7,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "pictura/bench/truth/image_truth.h"
+#include "pictura/bench/truth/tolerances.h"
 #include "pictura/tests/backend_gl/gl_support.h"
-#include "pictura/tests/support/image_truth.h"
-#include "pictura/tests/support/tolerances.h"
 
 namespace pictura {
 namespace {

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pictura/tests/support/image_scenes.h"
+#include "pictura/bench/truth/image_scenes.h"
 
 namespace pictura {
 namespace {

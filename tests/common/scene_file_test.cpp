@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "pictura/common/error.h"
-#include "pictura/common/file.h"
+#include "pictura/common/support/file.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 

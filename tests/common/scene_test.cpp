@@ -4,9 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "pictura/backends/make_renderer.h"
 #include "pictura/common/error.h"
-#include "pictura/common/make_renderer.h"
-#include "pictura/common/raster_shapes.h"
+#include "pictura/common/raster/shapes.h"
 
 namespace pictura {
 namespace {

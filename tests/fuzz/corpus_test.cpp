@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "pictura/common/file.h"
+#include "pictura/common/support/file.h"
 #include "pictura/tests/fuzz/fuzz_map.h"
 
 namespace pictura {

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "pictura/bench/truth/image_truth.h"
+#include "pictura/bench/truth/tolerances.h"
 #include "pictura/common/scene_file.h"
-#include "pictura/tests/support/image_truth.h"
-#include "pictura/tests/support/tolerances.h"
 
 namespace pictura {
 

@@ -11,9 +11,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "pictura/backends/make_renderer.h"
 #include "pictura/common/error.h"
-#include "pictura/common/file.h"
-#include "pictura/common/make_renderer.h"
+#include "pictura/common/support/file.h"
 #include "pictura/tests/golden/golden_picture.h"
 #include "pictura/tests/golden/golden_scenes.h"
 
@@ -45,7 +45,7 @@ const ImageTolerance& tolerance_of(const std::string& backend, const std::string
   if (backend == "cpu") return kGoldenOracle;
   if (backend == "cuda") return kGoldenKernel;
   if (is_gl(backend)) return gl_tolerance_of(scene);
-  fail_usage("--backend {}: no tolerance for it in tests/support/tolerances.h", backend);
+  fail_usage("--backend {}: no tolerance for it in bench/truth/tolerances.h", backend);
 }
 
 /// A renderer for the scene with the backend of the command line, or null and why there is none here. A failure where

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "pictura/common/error.h"
-#include "pictura/common/file.h"
+#include "pictura/common/support/file.h"
 #include "pictura/map/load_map.h"
 #include "pictura/map/map_fields.h"
 #include "pictura/map/opendrive/opendrive.h"

@@ -1,6 +1,7 @@
 // A step allocates nothing: every allocation of this binary is counted, and those of one thread's steps are none.
 #include <gtest/gtest.h>
 
+#include "pictura/backends/make_simulator.h"
 #include "pictura/simulator/simulator.h"
 #include "pictura/tests/simulator/test_maps.h"
 #include "pictura/tests/support/allocations.h"

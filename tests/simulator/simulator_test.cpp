@@ -8,8 +8,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "pictura/backends/make_simulator.h"
 #include "pictura/common/error.h"
-#include "pictura/common/raster_check.h"
+#include "pictura/common/raster/check.h"
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/rules/limits.h"
 #include "pictura/tests/simulator/same_bits.h"

@@ -4,13 +4,14 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "pictura/backends/make_simulator.h"
 #include "pictura/map/lane_graph.h"
 #include "pictura/map/load_map.h"
+#include "pictura/simulator/controllers/goal_places.h"
 #include "pictura/simulator/rules/observe.h"
 #include "pictura/simulator/rules/spawn.h"
 #include "pictura/simulator/simulator.h"
 #include "pictura/simulator/world_batch.h"
-#include "pictura/tests/simulator/goal_places.h"
 #include "pictura/tests/simulator/test_maps.h"
 
 namespace pictura {
@@ -105,14 +106,14 @@ TEST(Towns, EveryGoalCanBeReached) {
     // What is drawn again is what the agents were given.
     for (int agent = 0; agent < 150; ++agent) {
       if (!is_active(world, agent)) continue;
-      const auto places = testing::goal_places(world, agent, 0, testing::spawn_place(world, agent));
+      const auto places = goal_places(world, agent, 0, spawn_place(world, agent));
       for (int i = 0; i < kNumWaypoints; ++i) {
         const Vec3 given = waypoint_of(world.agents, agent, i);
         const Vec3 drawn = pose_of(world, agent, places[static_cast<size_t>(i)]).position_m;
         ASSERT_TRUE(given.x == drawn.x && given.y == drawn.y && given.z == drawn.z);
       }
     }
-    const auto [on_roads, on_walkways] = testing::follow_goals(world, LaneGraph(*map), 4);
+    const auto [on_roads, on_walkways] = follow_goals(world, LaneGraph(*map), 4);
     EXPECT_GT(on_roads.waypoints, 1000);
     EXPECT_GT(on_walkways.waypoints, 40);
     EXPECT_EQ(on_roads.unreachable, 0) << "of " << on_roads.waypoints;
@@ -131,7 +132,7 @@ TEST(Towns, GoalsBeyondAWallCannotBeReached) {
   const auto unreachable = [&] {
     WorldBatch batch(config, {map}, {{0, 20, 0}});
     batch.restore(make_simulator("cpu", config, {map}, {{0, 20, 0}})->save());
-    const auto [on_roads, on_walkways] = testing::follow_goals(batch.world(0), LaneGraph(*map), 4);
+    const auto [on_roads, on_walkways] = follow_goals(batch.world(0), LaneGraph(*map), 4);
     EXPECT_EQ(on_roads.waypoints, 0);
     EXPECT_GT(on_walkways.waypoints, 100);
     return on_walkways.unreachable;

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "pictura/backends/make_simulator.h"
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/simulator.h"
 #include "pictura/tests/simulator/stage.h"

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "pictura/common/error.h"
-#include "pictura/common/file.h"
+#include "pictura/common/support/file.h"
 #include "pictura/tests/support/error_message.h"
 
 namespace pictura {

@@ -11,8 +11,8 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
-#include "pictura/training/gae.h"
 #include "pictura/training/observer.h"
+#include "pictura/training/rules/gae.h"
 
 namespace pictura {
 namespace {

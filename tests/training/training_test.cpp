@@ -11,9 +11,10 @@
 
 #include <gmock/gmock.h>
 
+#include "pictura/backends/make_simulator.h"
 #include "pictura/common/error.h"
-#include "pictura/common/file.h"
-#include "pictura/common/interrupt.h"
+#include "pictura/common/support/file.h"
+#include "pictura/common/support/interrupt.h"
 #include "pictura/map/load_map.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"

@@ -1,7 +1,7 @@
 // Draws one car in front of the camera and says whether it is there.
 #include <cstdio>
 
-#include "pictura/common/make_renderer.h"
+#include "pictura/backends/make_renderer.h"
 #include "pictura/version.h"
 
 int main() {

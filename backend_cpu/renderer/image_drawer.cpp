@@ -1,0 +1,321 @@
+#include "pictura/backend_cpu/renderer/image_drawer.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "pictura/common/raster/visible_primitives.h"
+
+namespace pictura {
+
+namespace {
+// Images are drawn in bands of rows, so that their fragments stay in the cache whatever their size.
+constexpr int kBandPixels = 1 << 14;
+}  // namespace
+
+auto ImageDrawer::face_maker(PrimitiveRef primitive) {
+  return [this, primitive](const CameraFace& seen) {
+    ScreenFace face;
+    if (make_face(setting_, primitive, seen, edges_, &face)) faces_.push_back(face);
+  };
+}
+
+void ImageDrawer::prepare(const ImageRequest& request) {
+  request_ = request;
+  setting_ = {request.camera, make_frustum(request.camera), request.line_floor_px, request.debug_palette};
+  find_solids();
+  if (request.leaves_out_hidden) find_occluders();
+  edges_.clear();
+  faces_.clear();
+  for (const Solid& solid : solids_) face_maker(solid.primitive)(whole_quad(solid.seen, 0.0f));
+  visit_lights(setting_, *request.geometry, *request.scene, *request.view,
+               [&](const LightHead& head, LightState state, int32_t index) {
+                 light_faces(head, state, setting_.camera, face_maker(light_ref(index)));
+               });
+  visit_strips(setting_, *request.geometry, [&](const Strip& strip, int32_t index) {
+    strip_faces(strip, setting_.camera, setting_.line_floor_px, face_maker(strip_ref(strip, index)));
+  });
+}
+
+void ImageDrawer::find_solids() {
+  solids_.clear();
+  auto keep = [this](const WorldQuad& quad, Solid solid) {
+    if (see_quad(quad, setting_.camera, &solid.seen)) solids_.push_back(solid);
+  };
+  visit_agents(setting_, *request_.scene, *request_.view, [&](const AgentBox& box, int32_t agent) {
+    const PrimitiveRef primitive = agent_ref(box, agent - world_begin());
+    const bool may_hide = may_occlude(box, setting_.camera);
+    visit_faces_to_eye(box, setting_.camera, [&](int face) {
+      keep(cuboid_quad(box, face, setting_.debug_palette),
+           {primitive, face_entry(primitive.object_id, face), may_hide, {}});
+    });
+  });
+  visit_walls(setting_, *request_.geometry, [&](const WallFace& wall, int32_t index) {
+    const PrimitiveRef primitive = wall_ref(index);
+    keep(wall_quad(wall), {primitive, primitive.object_id, may_occlude(wall, setting_.camera), {}});
+  });
+}
+
+void ImageDrawer::find_occluders() {
+  occluding_.clear();
+  for (const Solid& solid : solids_) {
+    if (!solid.may_occlude) continue;
+    OccludingFace face{.solid = &solid};
+    face.covered_px2 = occluded_px2(setting_.camera, solid.seen, &face.quad, &face.turns_right);
+    if (face.covered_px2 > 0.0f) occluding_.push_back(face);
+  }
+  const auto count = std::min(occluding_.size(), static_cast<std::size_t>(Occluders::kMaxCount));
+  std::partial_sort(occluding_.begin(), occluding_.begin() + static_cast<std::ptrdiff_t>(count), occluding_.end(),
+                    [](const OccludingFace& a, const OccludingFace& b) {
+                      return a.covered_px2 != b.covered_px2 ? a.covered_px2 > b.covered_px2
+                                                            : a.solid->entry < b.solid->entry;
+                    });
+  for (std::size_t i = 0; i < count; ++i) {
+    const OccludingFace& face = occluding_[i];
+    setting_.occluders.occluder[i] =
+        make_occluder(setting_.camera, setting_.frustum, face.solid->seen.plane, face.quad, face.turns_right);
+  }
+  setting_.occluders.count = static_cast<int32_t>(count);
+}
+
+bool ImageDrawer::stands(uint32_t solid, uint32_t strip) const {
+  const StaticGeometryView& pieces = *request_.geometry;
+  const AgentBox* agents = request_.scene->agents.data() + world_begin();
+  return stands_on(extent_of(solid, pieces, agents), extent_of(strip, pieces, agents), setting_.camera.position_m);
+}
+
+// Calls visit(y, pixel, span) for each row of a face within some rows; pixel is the index of the row's first.
+template <typename Visit>
+void ImageDrawer::visit_spans(const ScreenFace& face, RowRange rows, Visit&& visit) const {
+  const int width = setting_.camera.width_px;
+  for (int y = max_of(rows.y_begin, face.box.y_begin); y < min_of(rows.y_end, face.box.y_end); ++y) {
+    visit(y, static_cast<std::size_t>(y - rows.y_begin) * static_cast<std::size_t>(width),
+          row_span(edges_.at(face.edge_begin), face.edge_count, face.box, y));
+  }
+}
+
+// Finds, for each pixel of some rows, the largest occluder_bound() of the faces that cover it fully.
+void ImageDrawer::find_occluder_bounds(FaceRange faces, RowRange rows) {
+  occluder_bounds_.assign(static_cast<std::size_t>((rows.y_end - rows.y_begin) * setting_.camera.width_px), 0.0f);
+  for (int32_t f = faces.begin; f < faces.end; ++f) {
+    const ScreenFace& face = faces_[static_cast<std::size_t>(f)];
+    if (is_strip(face)) continue;  // buries nothing
+    visit_spans(face, rows, [&](int y, std::size_t row, const RowSpan& span) {
+      for (int x = span.full_begin; x < span.full_end; ++x) {
+        float& bound = occluder_bounds_[row + static_cast<std::size_t>(x)];
+        bound = max_of(bound, occluder_bound(face, x, y));
+      }
+    });
+  }
+}
+
+// Spreads faces over the pixels of some rows.
+void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
+  find_occluder_bounds(faces, rows);
+  first_fragment_.assign(occluder_bounds_.size(), -1);
+  fragments_.clear();
+  for (int32_t f = faces.begin; f < faces.end; ++f) {
+    const ScreenFace& face = faces_[static_cast<std::size_t>(f)];
+    const PolygonEdge* edges = edges_.at(face.edge_begin);
+    visit_spans(face, rows, [&](int y, std::size_t row, const RowSpan& span) {
+      for (int x = span.begin; x < span.end; ++x) {
+        const bool covers_fully = x >= span.full_begin && x < span.full_end;
+        const std::size_t pixel = row + static_cast<std::size_t>(x);
+        if (!passes_occluder_bound(face, occluder_bounds_[pixel], x, y)) continue;
+        const PixelCoverage coverage = covers_fully ? PixelCoverage{1.0f, kAllSamples}
+                                                    : pixel_coverage(edges, face.edge_count, face.min_area(), x, y);
+        if (coverage.area <= 0.0f) continue;
+        fragments_.push_back({make_fragment(face, f, coverage, x, y), first_fragment_[pixel]});
+        first_fragment_[pixel] = static_cast<int32_t>(fragments_.size()) - 1;
+      }
+    });
+  }
+}
+
+// Takes the fragments of a pixel, given the first of them, from their list; the nearest first.
+void ImageDrawer::collect_fragments(int32_t first) {
+  pixel_.clear();
+  for (int32_t i = first; i >= 0; i = fragments_[static_cast<std::size_t>(i)].next) {
+    pixel_.push_back(fragments_[static_cast<std::size_t>(i)].fragment);
+  }
+  std::sort(pixel_.begin(), pixel_.end(),
+            [this](const Fragment& a, const Fragment& b) { return is_nearer(a, b, faces_.data()); });
+}
+
+// Finds what is free of the gathered fragments of a pixel.
+void ImageDrawer::hide_fragments(int x, int y) {
+  const Vec2 corner{static_cast<float>(x), static_cast<float>(y)};
+  free_.clear();
+  for (const Fragment& fragment : pixel_) free_.push_back(reach_of(fragment.coverage));
+  for (std::size_t i = 0; i < pixel_.size(); ++i) {
+    const PixelCoverage& a = pixel_[i].coverage;
+    for (std::size_t j = i + 1; j < pixel_.size(); ++j) {
+      const PixelCoverage& b = pixel_[j].coverage;
+      if (!may_hide_more(free_[i], a.samples, free_[j], b.samples)) continue;
+      const Hidden hidden = hide_each_other(a, b, faces_[static_cast<std::size_t>(pixel_[i].face)],
+                                            faces_[static_cast<std::size_t>(pixel_[j].face)], corner,
+                                            [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
+      free_[i] &= ~hidden.of_a;
+      free_[j] &= ~hidden.of_b;
+    }
+  }
+}
+
+template <typename Visit, typename Finish>
+void ImageDrawer::composite_rows(RowRange rows, Visit&& visit, Finish&& finish) {
+  const int width = setting_.camera.width_px;
+  int pixel = 0;
+  for (int y = rows.y_begin; y < rows.y_end; ++y) {
+    for (int x = 0; x < width; ++x, ++pixel) {
+      const int32_t first = first_fragment_[static_cast<std::size_t>(pixel)];
+      if (first < 0) {
+        finish(pixel, Rgb{});
+        continue;
+      }
+      const LinkedFragment& alone = fragments_[static_cast<std::size_t>(first)];
+      if (alone.next < 0) {
+        const float weight = alone.fragment.coverage.area;
+        visit(pixel, alone.fragment, weight);
+        finish(pixel, faces_[static_cast<std::size_t>(alone.fragment.face)].color * weight);
+        continue;
+      }
+      collect_fragments(first);
+      hide_fragments(x, y);
+      PixelAccumulator sum;
+      weights_.resize(pixel_.size());
+      for (std::size_t i = 0; i < pixel_.size(); ++i) {
+        weights_[i] = PixelAccumulator::weight_of(pixel_[i].coverage, free_[i]);
+        sum.add(weights_[i], faces_[static_cast<std::size_t>(pixel_[i].face)].color);
+      }
+      const PixelAccumulator::Shares shares = sum.shares();
+      for (std::size_t i = 0; i < pixel_.size(); ++i) visit(pixel, pixel_[i], shares.of(weights_[i]));
+      finish(pixel, sum.color(shares));
+    }
+  }
+}
+
+void ImageDrawer::draw(const ImageTarget& target) {
+  const int width = setting_.camera.width_px, height = setting_.camera.height_px;
+  const int band_rows = max_of(1, min_of(height, kBandPixels / width));
+  const int64_t plane = int64_t{width} * height;
+  auto draw_as = [&](auto* out, auto&& value_of) {
+    for (int y_begin = 0; y_begin < height; y_begin += band_rows) {
+      const RowRange rows{y_begin, min_of(height, y_begin + band_rows)};
+      make_fragments({0, static_cast<int32_t>(faces_.size())}, rows);
+      auto* first = out + int64_t{y_begin} * width;
+      composite_rows(
+          rows, [](int, const Fragment&, float) {},
+          [&](int pixel, Rgb color) {
+            first[pixel] = value_of(color.r);
+            first[plane + pixel] = value_of(color.g);
+            first[2 * plane + pixel] = value_of(color.b);
+          });
+    }
+  };
+  if (target.format == PixelFormat::u8) {
+    draw_as(static_cast<uint8_t*>(target.color), [](float channel) { return to_byte(channel); });
+  } else if (target.format == PixelFormat::f16) {
+    draw_as(static_cast<uint16_t*>(target.color), [](float channel) { return to_half(channel); });
+  } else {
+    draw_as(static_cast<float*>(target.color), [](float channel) { return clamp(channel, 0.0f, 1.0f); });
+  }
+  if (target.depth_m || target.class_id || target.instance_id) draw_planes(target);
+}
+
+// Puts the gathered fragments of a pixel in an order, front to back: next comes the nearest that nothing left is in
+// front of, in a ring the nearest.
+void ImageDrawer::order_pixel(int x, int y) {
+  const Vec2 corner{static_cast<float>(x), static_cast<float>(y)};
+  auto stands_here = [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); };
+  auto hides = [&](const Fragment& other, const Fragment& fragment) {
+    const uint64_t shared = shared_samples(other.coverage, fragment.coverage);
+    const ScreenFace& face = faces_[static_cast<std::size_t>(fragment.face)];
+    const ScreenFace& other_face = faces_[static_cast<std::size_t>(other.face)];
+    return shared != 0 && face.object_id != other_face.object_id &&
+           is_in_front(other_face, face, corner + middle_of(shared), stands_here);
+  };
+  for (auto next = pixel_.begin(); next != pixel_.end(); ++next) {
+    auto is_hidden = [&](const Fragment& fragment) {
+      return std::any_of(next, pixel_.end(), [&](const Fragment& other) { return hides(other, fragment); });
+    };
+    const auto front = std::find_if_not(next, pixel_.end(), is_hidden);
+    if (front != pixel_.end()) std::rotate(next, front, front + 1);
+  }
+}
+
+void ImageDrawer::visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit) {
+  const int width = setting_.camera.width_px, height = setting_.camera.height_px;
+  make_fragments({0, static_cast<int32_t>(faces_.size())}, {0, height});
+  for (int pixel = 0; pixel < width * height; ++pixel) {
+    collect_fragments(first_fragment_[static_cast<std::size_t>(pixel)]);
+    order_pixel(pixel % width, pixel / width);
+    for (const Fragment& fragment : pixel_) {
+      visit(pixel, fragment.coverage, faces_[static_cast<std::size_t>(fragment.face)].color);
+    }
+  }
+}
+
+void ImageDrawer::draw_planes(const ImageTarget& target) const {
+  const int width = setting_.camera.width_px, height = setting_.camera.height_px;
+  std::vector<FrontFace> fronts(static_cast<std::size_t>(width));
+  auto offer = [&](int y, bool strips_again) {
+    for (const ScreenFace& face : faces_) {
+      if (y < face.box.y_begin || y >= face.box.y_end || (strips_again && !is_strip(face))) continue;
+      for (int x = face.box.x_begin; x < face.box.x_end; ++x) {
+        const Vec2 center = pixel_middle(x, y);
+        FrontFace& front = fronts[static_cast<std::size_t>(x)];
+        if (strips_again && !front.wants_strips_again()) continue;
+        if (!covers_point(edges_.at(face.edge_begin), face.edge_count, center.x, center.y)) continue;
+        strips_again ? front.offer_again(face, center) : front.offer(face, center);
+      }
+    }
+  };
+  for (int y = 0; y < height; ++y) {
+    std::fill(fronts.begin(), fronts.end(), FrontFace{});
+    offer(y, /*strips_again=*/false);
+    offer(y, /*strips_again=*/true);
+    for (int x = 0; x < width; ++x) {
+      const Vec2 center = pixel_middle(x, y);
+      const ScreenFace* face = fronts[static_cast<std::size_t>(x)].front(
+          center, [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
+      const std::size_t pixel =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+      if (target.depth_m) {
+        target.depth_m[pixel] = face ? face_depth_m(*face, center) : std::numeric_limits<float>::infinity();
+      }
+      if (target.class_id) target.class_id[pixel] = face ? face->class_id : uint8_t{0};
+      if (target.instance_id) target.instance_id[pixel] = face ? instance_of(*face) : uint16_t{0};
+    }
+  }
+}
+
+void ImageDrawer::accumulate_visibility(int32_t agent, VisibilitySum* sum_inout) {
+  const uint32_t object_id = make_object_id(kAgentKind, agent - world_begin());
+  auto is_wanted = [object_id](const ScreenFace& face) { return face.object_id == object_id; };
+  const auto begin = std::find_if(faces_.begin(), faces_.end(), is_wanted);
+  const auto end = std::find_if_not(begin, faces_.end(), is_wanted);
+  const FaceRange wanted{static_cast<int32_t>(begin - faces_.begin()), static_cast<int32_t>(end - faces_.begin())};
+  int y_begin = setting_.camera.height_px, y_end = 0;
+  for (auto face = begin; face != end; ++face) {
+    y_begin = min_of(y_begin, face->box.y_begin);
+    y_end = max_of(y_end, face->box.y_end);
+  }
+  const int band_rows = max_of(1, kBandPixels / setting_.camera.width_px);
+  for (; y_begin < y_end; y_begin += band_rows) {
+    const RowRange rows{y_begin, min_of(y_end, y_begin + band_rows)};
+    auto weigh = [&](FaceRange faces) {
+      int64_t weight = 0;
+      make_fragments(faces, rows);
+      composite_rows(
+          rows,
+          [&](int, const Fragment& fragment, float weighs) {
+            if (fragment.face >= wanted.begin && fragment.face < wanted.end) weight += VisibilitySum::units_of(weighs);
+          },
+          [](int, Rgb) {});
+      return weight;
+    };
+    sum_inout->among_all += weigh({0, static_cast<int32_t>(faces_.size())});
+    sum_inout->alone += weigh(wanted);
+  }
+}
+
+}  // namespace pictura

@@ -1,0 +1,128 @@
+// Draws one image: makes the faces of all that a camera may see, spreads them over the pixels as fragments, and weighs
+// the fragments of each pixel. All rules are the shared ones of common/raster*.h; here is only the traversal, and the
+// memory that it reuses from image to image.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "pictura/common/image.h"
+#include "pictura/common/raster/face_setup.h"
+
+namespace pictura {
+
+/// What one image shows.
+struct ImageRequest {
+  const StaticGeometryView* geometry = nullptr;
+  const SceneBatch* scene = nullptr;
+  const View* view = nullptr;
+  PinholeCamera camera;  // in the world
+  float line_floor_px = 0;
+  bool debug_palette = false;
+  bool leaves_out_hidden = true;  // faces behind the solids that cover most of it
+};
+
+/// Where one image goes.
+struct ImageTarget {
+  PixelFormat format = PixelFormat::u8;
+  void* color = nullptr;  // [3, height, width]
+  float* depth_m = nullptr;
+  uint8_t* class_id = nullptr;
+  uint16_t* instance_id = nullptr;
+};
+
+/// An object serves one thread.
+class ImageDrawer {
+ public:
+  /// Makes the faces of what the image shows.
+  void prepare(const ImageRequest& request);
+  /// What hides whole faces of the prepared image.
+  const Occluders& occluders() const { return setting_.occluders; }
+  /// Draws what was prepared.
+  void draw(const ImageTarget& target);
+  /// Adds what an agent weighs in the prepared image, among all others and without them.
+  void accumulate_visibility(int32_t agent, VisibilitySum* sum_inout);
+  /// Calls visit(y * width + x, coverage, colour) for what each face covers of each pixel of the prepared image, front
+  /// to back: for measuring other ways to composite.
+  void visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit);
+
+ private:
+  class EdgePool {
+   public:
+    void clear() { edges_.clear(); }
+    int32_t take(int count) {
+      edges_.resize(edges_.size() + static_cast<std::size_t>(count));
+      return static_cast<int32_t>(edges_.size()) - count;
+    }
+    void put(int32_t index, const PolygonEdge& edge) { edges_[static_cast<std::size_t>(index)] = edge; }
+    const PolygonEdge* at(int32_t index) const { return edges_.data() + index; }
+
+   private:
+    std::vector<PolygonEdge> edges_;
+  };
+
+  // A fragment and the next of its pixel.
+  struct LinkedFragment {
+    Fragment fragment;
+    int32_t next;
+  };
+
+  // A face of an agent's box, or a wall.
+  struct Solid {
+    PrimitiveRef primitive;
+    uint32_t entry = 0;
+    bool may_occlude = false;
+    CameraQuad seen;
+  };
+
+  // A solid's face on screen, which may hide others.
+  struct OccludingFace {
+    const Solid* solid = nullptr;
+    float covered_px2 = 0;
+    ScreenQuad quad;
+    bool turns_right = false;
+  };
+
+  // The faces [begin, end), and rows [y_begin, y_end) of the image.
+  struct FaceRange {
+    int32_t begin, end;
+  };
+  struct RowRange {
+    int y_begin, y_end;
+  };
+
+  void find_solids();
+  void find_occluders();
+  // Takes the faces that a thing emits.
+  auto face_maker(PrimitiveRef primitive);
+  template <typename Visit>
+  void visit_spans(const ScreenFace& face, RowRange rows, Visit&& visit) const;
+  void find_occluder_bounds(FaceRange faces, RowRange rows);
+  void make_fragments(FaceRange faces, RowRange rows);
+  void collect_fragments(int32_t first);
+  void order_pixel(int x, int y);
+  void hide_fragments(int x, int y);
+  // Weighs the fragments of all pixels of the rows: visit(pixel index, fragment, weight) for each, then
+  // finish(pixel index, color).
+  template <typename Visit, typename Finish>
+  void composite_rows(RowRange rows, Visit&& visit, Finish&& finish);
+  void draw_planes(const ImageTarget& target) const;
+  bool stands(uint32_t solid, uint32_t strip) const;
+  int32_t world_begin() const { return request_.scene->world_begin[static_cast<std::size_t>(request_.view->world)]; }
+
+  ImageRequest request_;
+  ImageSetting setting_;
+  std::vector<Solid> solids_;
+  std::vector<OccludingFace> occluding_;
+  EdgePool edges_;
+  std::vector<ScreenFace> faces_;
+  std::vector<float> occluder_bounds_;   // [pixels of some rows] the largest occluder_bound()
+  std::vector<int32_t> first_fragment_;  // [pixels of some rows] the head of each one's list
+  std::vector<LinkedFragment> fragments_;
+  // Of one pixel.
+  std::vector<Fragment> pixel_;
+  std::vector<uint64_t> free_;
+  std::vector<PixelAccumulator::Weight> weights_;
+};
+
+}  // namespace pictura

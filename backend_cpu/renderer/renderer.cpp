@@ -1,0 +1,100 @@
+// The oracle: the CPU renderer. It checks its input, places the cameras, and spreads images over OpenMP threads.
+#include <cstddef>
+#include <memory>
+
+#include <omp.h>
+
+#include "pictura/backend_cpu/renderer/image_drawer.h"
+#include "pictura/common/error.h"
+#include "pictura/common/raster/check.h"
+#include "pictura/common/raster/host_geometries.h"
+#include "pictura/common/support/parallel_for.h"
+
+namespace pictura {
+
+std::unique_ptr<Renderer> make_cpu_renderer(const RendererConfig& config);
+
+namespace {
+
+class CpuRenderer final : public Renderer {
+ public:
+  explicit CpuRenderer(const RendererConfig& config)
+      : config_(check_config("cpu", config)),
+        cameras_(pinhole_cameras(config.rig)),
+        drawers_(static_cast<std::size_t>(resolve_num_threads(config.num_threads))) {}
+  std::string_view name() const override { return "cpu"; }
+  MemorySpace space() const override { return MemorySpace::host; }
+  const RendererConfig& config() const override { return config_; }
+
+  GeometryHandle upload(const StaticGeometry& geometry) override {
+    check_geometry(name(), geometry);
+    return geometries_.add(geometry);
+  }
+
+  void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream) override {
+    check_images(name(), config_.rig, space(), views.size(), images_out, /*draws_f16=*/true);
+    check_scene(name(), scene, geometries_.views());
+    check_views(name(), scene, views);
+    const std::size_t num_cameras = cameras_.size();
+    parallel_for(num_threads(), static_cast<int64_t>(views.size() * num_cameras), [&](int64_t image) {
+      const std::size_t view = static_cast<std::size_t>(image) / num_cameras;
+      const std::size_t camera = static_cast<std::size_t>(image) % num_cameras;
+      ImageDrawer& drawer = drawers_[static_cast<std::size_t>(omp_get_thread_num())];
+      drawer.prepare(request(scene, views[view], camera));
+      drawer.draw(target(images_out, view, camera));
+    });
+  }
+
+  void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
+                  Span<float> visibility_out, Stream) override {
+    check_scene(name(), scene, geometries_.views());
+    check_views(name(), scene, views);
+    check_queries(name(), scene, views, queries, visibility_out.size());
+    parallel_for(num_threads(), static_cast<int64_t>(queries.size()), [&](int64_t i) {
+      const VisibilityQuery& query = queries[static_cast<std::size_t>(i)];
+      ImageDrawer& drawer = drawers_[static_cast<std::size_t>(omp_get_thread_num())];
+      VisibilitySum seen;
+      for (std::size_t camera = 0; camera < cameras_.size(); ++camera) {
+        ImageRequest asked = request(scene, views[static_cast<std::size_t>(query.view)], camera);
+        asked.leaves_out_hidden = false;  // what is hidden counts where the agent is alone
+        drawer.prepare(asked);
+        drawer.accumulate_visibility(query.agent, &seen);
+      }
+      visibility_out[static_cast<std::size_t>(i)] = seen.share();
+    });
+  }
+
+ private:
+  int num_threads() const { return static_cast<int>(drawers_.size()); }
+
+  ImageRequest request(const SceneBatch& scene, const View& view, std::size_t camera) const {
+    const GeometryHandle handle = scene.geometry[static_cast<std::size_t>(view.world)];
+    return {&geometries_[handle], &scene, &view, place_camera(cameras_[camera], view), config_.line_floor_px,
+            config_.debug_palette};
+  }
+
+  static ImageTarget target(const ImageBatch& images, std::size_t view, std::size_t camera) {
+    const CameraImages& out = images.cameras[camera];
+    const int64_t offset = static_cast<int64_t>(view) * out.view_stride;
+    const std::size_t pixels = static_cast<std::size_t>(out.width_px) * static_cast<std::size_t>(out.height_px);
+    ImageTarget target{images.format};
+    target.color = static_cast<std::byte*>(out.data) + offset * static_cast<int64_t>(bytes_per_value(images.format));
+    if (out.depth_m) target.depth_m = out.depth_m + view * pixels;
+    if (out.class_id) target.class_id = out.class_id + view * pixels;
+    if (out.instance_id) target.instance_id = out.instance_id + view * pixels;
+    return target;
+  }
+
+  RendererConfig config_;
+  std::vector<PinholeCamera> cameras_;  // in the ego frame
+  HostGeometries geometries_;
+  std::vector<ImageDrawer> drawers_;  // one per thread
+};
+
+}  // namespace
+
+std::unique_ptr<Renderer> make_cpu_renderer(const RendererConfig& config) {
+  return std::make_unique<CpuRenderer>(config);
+}
+
+}  // namespace pictura

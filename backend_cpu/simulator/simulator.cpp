@@ -1,0 +1,227 @@
+// The simulator's oracle: the rules of simulator/rules/ run world by world on host threads.
+#include "pictura/simulator/simulator.h"
+
+#include <algorithm>
+#include <array>
+
+#include "pictura/common/error.h"
+#include "pictura/common/support/parallel_for.h"
+#include "pictura/simulator/rules/episode.h"
+#include "pictura/simulator/rules/observe.h"
+#include "pictura/simulator/rules/spawn.h"
+#include "pictura/simulator/world_batch.h"
+
+namespace pictura {
+namespace {
+
+/// Sorts the boxes that stand anywhere into their cells, by counting; within a cell in ascending order.
+void sort_into_cells(const WorldView& world, CellLists* cells_inout) {
+  std::vector<int32_t>& begin = cells_inout->begin;
+  const GridView cells = cells_inout->view();
+  const auto cell_of = [&](const AgentBox& box) {
+    return static_cast<size_t>(cells.cell_y(box.center_m.y) * cells.num_x + cells.cell_x(box.center_m.x));
+  };
+  std::fill(begin.begin(), begin.end(), 0);
+  for (int i = 0; i < world.num_boxes; ++i) {
+    if (world.boxes[i].drawn) ++begin[cell_of(world.boxes[i])];
+  }
+  int32_t sum = 0;
+  for (int32_t& count : begin) count = sum += count;  // the end of each cell, for now
+  for (int i = world.num_boxes - 1; i >= 0; --i) {
+    if (!world.boxes[i].drawn) continue;
+    const int32_t at = --begin[cell_of(world.boxes[i])];
+    cells_inout->items[static_cast<size_t>(at)] = i;
+    world.cell_centers[at] = world.boxes[i].center_m.xy();
+  }
+}
+
+class SimulatorCpu final : public Simulator {
+ public:
+  SimulatorCpu(const SimulatorConfig& config, std::vector<std::shared_ptr<const RoadMap>> maps,
+               std::vector<WorldSpec> worlds)
+      : batch_(config, std::move(maps), std::move(worlds)), results_(static_cast<size_t>(batch_.num_slots()), config) {
+    reset({});
+  }
+
+  std::string_view name() const override { return "cpu"; }
+  MemorySpace space() const override { return MemorySpace::host; }
+  const SimulatorConfig& config() const override { return batch_.config; }
+  const std::vector<std::shared_ptr<const RoadMap>>& maps() const override { return batch_.maps; }
+  const std::vector<WorldSpec>& worlds() const override { return batch_.worlds; }
+  int num_slots() const override { return batch_.num_slots(); }
+
+  void reset(Stream) override {
+    for_each_world([this](int w) {
+      batch_.episode_index[static_cast<size_t>(w)] = 0;
+      begin_episode(w);
+      show(w);
+    });
+  }
+
+  StepResult step(Span<const int32_t> actions, Stream) override {
+    check_actions(actions);
+    for_each_world([this, actions](int w) {
+      const auto index = static_cast<size_t>(w);
+      if (batch_.episode_over[index]) {
+        clear_results(w);
+        ++batch_.episode_index[index];
+        ++batch_.world_totals[index].episodes;
+        begin_episode(w);
+      } else {
+        step_world(w, actions);
+      }
+      batch_.world_totals[index].slot_steps += batch_.worlds[index].num_agents;
+      show(w);
+    });
+    totals_ = batch_.totals();
+    return {results_.reward, results_.terminated, results_.truncated, results_.valid, batch_.agents.refusal};
+  }
+  void check() override {}
+
+  ObservationView observations() override { return results_.observation_view(); }
+  const SceneBatch& scene() override { return batch_.scene; }
+  Span<const View> views() override { return results_.views; }
+  std::vector<StaticGeometry> geometries() const override { return batch_.geometries(); }
+
+  AgentStateView state() override { return batch_.agents.view(); }
+  Span<const int32_t> episode_step() const override { return batch_.episode_step; }
+  Span<const int32_t> episode_index() const override { return batch_.episode_index; }
+  SpawnReport spawn_report() const override { return batch_.spawn_report(); }
+  const SimulatorTotals& totals() const override { return totals_; }
+  uint64_t state_hash() const override { return batch_.state_hash(); }
+
+  std::vector<uint8_t> save() const override { return batch_.save(); }
+  void restore(Span<const uint8_t> bytes) override {
+    batch_.restore(bytes);
+    totals_ = batch_.totals();
+    for_each_world([this](int w) {
+      clear_results(w);
+      sort_into_cells(batch_.world(w), &batch_.box_cells[static_cast<size_t>(w)]);
+      show(w);
+    });
+  }
+
+ private:
+  template <typename Body>
+  void for_each_world(Body&& body) {
+    parallel_for(batch_.config.num_threads, batch_.num_worlds(), [&body](int64_t w) { body(static_cast<int>(w)); });
+  }
+
+  /// Before anything changes, so that a refused step leaves the state as it was.
+  void check_actions(Span<const int32_t> actions) {
+    PICTURA_CHECK(actions.size() == static_cast<size_t>(num_slots()), "step: expected {} actions, got {}", num_slots(),
+                  actions.size());
+    for (int w = 0; w < batch_.num_worlds(); ++w) {
+      if (batch_.episode_over[static_cast<size_t>(w)]) continue;
+      const WorldView world = batch_.world(w);
+      for (int agent = 0; agent < world.num_agents; ++agent) {
+        const auto slot = static_cast<size_t>(world.first_slot + agent);
+        PICTURA_CHECK(is_sound_action(world, agent, actions[slot]),
+                      "step: slot {}: expected an action in [0, {}), got {}", slot, kNumActions, actions[slot]);
+      }
+    }
+  }
+
+  void clear_results(int w) {
+    const WorldView world = batch_.world(w);
+    for (int agent = 0; agent < world.num_agents; ++agent) {
+      clear_result(results_.step_arrays(), world.first_slot + agent);
+    }
+  }
+
+  void begin_episode(int w) {
+    const auto index = static_cast<size_t>(w);
+    batch_.episode_step[index] = 0;
+    batch_.episode_over[index] = 0;
+    const WorldView world = batch_.world(w);
+    for (int light = 0; light < static_cast<int>(world.map.stop_lines.size()); ++light) begin_light(world, light);
+    const int num_parked = world.num_boxes - world.num_agents;
+    for (int car = 0; car < num_parked; ++car) {
+      put_parked_car(world, car, first_try(!world.map.parking_spots.empty(), [&](int i) {
+                       const ParkingSpot& spot = parking_spot(world, car, i);
+                       const AgentBox box = parked_box(world, car, spot);
+                       return may_park(world.map, box, spot) &&
+                              is_clear(world, box, world.num_agents, world.num_agents + car);
+                     }));
+    }
+    int spawned = 0;
+    for (int agent = 0; agent < world.num_agents; ++agent) {
+      draw_agent(world, agent);
+      const int chosen = first_try(has_places(world, agent), [&](int i) {
+        const AgentBox box = spawn_box(world, agent, i);
+        return may_spawn(world.map, box) && is_clear(world, box, 0, agent) &&
+               is_clear(world, box, world.num_agents, world.num_boxes);
+      });
+      place_agent(world, agent, chosen);
+      spawned += chosen >= 0;
+    }
+    batch_.spawned[index] = spawned;
+    sort_into_cells(world, &batch_.box_cells[index]);
+  }
+
+  /// The first try that succeeds; -1: none, or nothing to try.
+  template <typename Succeeds>
+  static int first_try(bool has_places, Succeeds&& succeeds) {
+    for (int i = 0; has_places && i < kSpawnTries; ++i) {
+      if (succeeds(i)) return i;
+    }
+    return -1;
+  }
+
+  void step_world(int w, Span<const int32_t> actions) {
+    const auto index = static_cast<size_t>(w);
+    const WorldView world = batch_.world(w);
+    const StepArrays results = results_.step_arrays();
+    const int steps = ++batch_.episode_step[index];
+
+    for (int agent = 0; agent < world.num_agents; ++agent) {
+      const auto slot = static_cast<size_t>(world.first_slot + agent);
+      results.valid[slot] = is_active(world, agent);
+      advance(world, agent, actions[slot]);
+    }
+    sort_into_cells(world, &batch_.box_cells[index]);
+    for (int agent = 0; agent < world.num_agents; ++agent) find_collisions(world, agent);
+
+    std::array<SimulatorTotals, kTotalsBins> bins{};
+    const auto bin_of = [&bins](int agent) { return &bins[static_cast<size_t>(agent % kTotalsBins)]; };
+    int active = 0;
+    for (int agent = 0; agent < world.num_agents; ++agent) {
+      const float step_m = apply_reward_and_halt(world, agent, results);
+      count_agent(world, agent, results, step_m, bin_of(agent));
+      active += is_active(world, agent);
+    }
+    for (int light = 0; light < static_cast<int>(world.map.stop_lines.size()); ++light) {
+      world.lights[light] = light_state(world.light_plans[light], steps);
+    }
+    const bool ends = episode_ends(world.options, steps, batch_.spawned[index], active);
+    batch_.episode_over[index] = ends;
+    for (int agent = 0; agent < world.num_agents; ++agent) finish_agent(world, agent, ends, results, bin_of(agent));
+    SimulatorTotals sum;
+    for (const SimulatorTotals& bin : bins) sum.add(bin);
+    batch_.world_totals[index].add(sum);
+  }
+
+  /// Writes what the world's agents observe and where their cameras stand.
+  void show(int w) {
+    const WorldView world = batch_.world(w);
+    const ObservationView observations = results_.observation_view();
+    for (int agent = 0; agent < world.num_agents; ++agent) {
+      observe(world, agent, batch_.config.vector_observations, observations);
+      results_.views[static_cast<size_t>(world.first_slot + agent)] = view_of(world, agent);
+    }
+  }
+
+  WorldBatch batch_;
+  HostResults results_;
+  SimulatorTotals totals_;
+};
+
+}  // namespace
+
+std::unique_ptr<Simulator> make_cpu_simulator(const SimulatorConfig& config,
+                                              std::vector<std::shared_ptr<const RoadMap>> maps,
+                                              std::vector<WorldSpec> worlds) {
+  return std::make_unique<SimulatorCpu>(config, std::move(maps), std::move(worlds));
+}
+
+}  // namespace pictura

@@ -1,0 +1,234 @@
+// What the threads of a block share while they draw an image: what the view shows, and the ways in which the lanes of a
+// warp share out uneven work. Warps work on their own; the block waits only between phases.
+#pragma once
+
+#include "pictura/backend_cuda/renderer/kernel_arguments.h"
+
+namespace pictura::cuda {
+
+constexpr int kWarpSize = 32, kMaxWarps = 8;
+constexpr unsigned kAllLanes = 0xFFFFFFFFu;
+
+/// What a view shows, for gathering its faces.
+struct ViewState {
+  View view;
+  const DeviceGeometry* geometry;
+  int32_t world_begin, world_end, light_begin, light_end;
+};
+
+/// A part of an image, at most as wide as a tile. Its pixels count row by row.
+struct Part {
+  int x_begin, x_end, y_begin, y_end;
+  __device__ int num_columns() const { return x_end - x_begin; }
+  __device__ int num_rows() const { return y_end - y_begin; }
+  __device__ int num_pixels() const { return num_rows() * kTileWidth_px; }
+  __device__ int pixel(int x, int y) const { return (y - y_begin) * kTileWidth_px + (x - x_begin); }
+  __device__ int x_of(int pixel) const {
+    return x_begin + static_cast<int>(static_cast<unsigned>(pixel) % kTileWidth_px);
+  }
+  __device__ int y_of(int pixel) const {
+    return y_begin + static_cast<int>(static_cast<unsigned>(pixel) / kTileWidth_px);
+  }
+};
+
+/// How a tile is drawn for whose fragments there is no room at once: in upright bands from left to right, and those in
+/// parts from top to bottom.
+struct PartPlan {
+  int band_begin, band_px;  // the band, and how wide it is
+  int wide_px, rows;        // at most, of a part
+  Part part;                // the next one
+};
+
+/// Room for what a WarpQueue holds.
+struct WarpQueueStorage {
+  uint32_t a[2 * kWarpSize], b[2 * kWarpSize];
+};
+
+/// What a warp keeps for its lanes to read of each other.
+struct WarpState {
+  WarpQueueStorage queue;
+  uint8_t owners[kWarpSize];
+};
+
+/// In shared memory, whatever the block's other memory is.
+struct BlockState {
+  PreparedImage shown;     // what is drawn
+  PreparedImage upcoming;  // what is drawn next
+  Scratch scratch;         // this block's
+  ScreenFace* faces;       // of this image
+  PolygonEdge* edges;      // of all images in the pool
+  // While faces are gathered.
+  ViewState view;
+  FaceSetupContext context;
+  SetupCounts listed;
+  int32_t num_entries, num_faces, num_clipped, overflow, usable;
+  // While pixels are drawn.
+  int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, next_fragments, image;
+  Part part, upcoming_part;
+  PartPlan plan;
+  WarpState warps[kMaxWarps];
+};
+
+__device__ inline int num_threads() { return static_cast<int>(blockDim.x); }
+__device__ inline int num_warps() { return num_threads() / kWarpSize; }
+__device__ inline int lane_index() { return static_cast<int>(threadIdx.x) % kWarpSize; }
+__device__ inline int warp_index() { return static_cast<int>(threadIdx.x) / kWarpSize; }
+__device__ inline unsigned lanes_below() { return (1u << lane_index()) - 1; }
+
+// Waits for all threads of the block. A warp whose lanes have parted would arrive at the barrier twice.
+__device__ inline void sync_block() {
+  __syncwarp();
+  __syncthreads();
+}
+
+// The next number of a counter, for a warp.
+__device__ inline int next_of(int32_t* counter) {
+  int next = 0;
+  if (lane_index() == 0) next = atomicAdd(counter, 1);
+  return __shfl_sync(kAllLanes, next, 0);
+}
+
+// The first fault stands until the host has thrown it.
+__device__ inline void note_fault(const DrawTask& task, int32_t index, FaultKind kind) {
+  atomicCAS(task.fault, kNoFault, word_of({kind, index}));
+}
+
+// Sets what a view shows; false, with a fault noted, where it names something that does not exist.
+__device__ inline bool set_view(ViewState* state, const DrawTask& task, int32_t view_index) {
+  auto fault = [&](FaultKind kind) {
+    note_fault(task, view_index, kind);
+    return false;
+  };
+  state->view = task.views[view_index];
+  const View& view = state->view;
+  if (view.world < 0 || static_cast<size_t>(view.world) + 1 >= task.scene.world_begin.size()) {
+    return fault(FaultKind::bad_world);
+  }
+  const GeometryHandle handle = task.scene.geometry[static_cast<size_t>(view.world)];
+  if (handle < 0 || handle >= task.num_geometries) return fault(FaultKind::bad_geometry);
+  if (!has_finite_pose(view) || !hides_within(view, task.scene.hidden_agents.size())) return fault(FaultKind::bad_pose);
+  const size_t world = static_cast<size_t>(view.world);
+  state->geometry = task.geometries + handle;
+  state->world_begin = task.scene.world_begin[world];
+  state->world_end = task.scene.world_begin[world + 1];
+  state->light_begin = task.scene.light_begin[world];
+  state->light_end = task.scene.light_begin[world + 1];
+  if (state->world_end - state->world_begin > kMaxBoxesPerWorld) return fault(FaultKind::too_many_agents);
+  if (!has_enough_lights(state->light_end - state->light_begin, state->geometry->pieces.num_signals)) {
+    return fault(FaultKind::too_few_lights);
+  }
+  return true;
+}
+
+// Sum of the values of the lanes up to this one.
+__device__ inline int warp_inclusive_sum(int value) {
+  for (int step = 1; step < kWarpSize; step *= 2) {
+    const int other = __shfl_up_sync(kAllLanes, value, step);
+    if (lane_index() >= step) value += other;
+  }
+  return value;
+}
+
+// Adds what the lanes of a warp want together to a counter, whose value before that all get. end: of each lane, what it
+// and those before it want.
+__device__ inline int32_t warp_allocate(int32_t* counter, int end) {
+  int32_t first = 0;
+  if (lane_index() == kWarpSize - 1) first = atomicAdd(counter, end);
+  return __shfl_sync(kAllLanes, first, kWarpSize - 1);
+}
+// ... of those that want one.
+__device__ inline int32_t warp_allocate_one(int32_t* counter, bool wanted) {
+  const unsigned wanting = __ballot_sync(kAllLanes, wanted);
+  int32_t first = 0;
+  if (lane_index() == 0 && wanting != 0) first = atomicAdd(counter, __popc(wanting));
+  return __shfl_sync(kAllLanes, first, 0) + __popc(wanting & lanes_below());
+}
+
+// Lanes of a warp bring items that stand one behind the other, those of a lane from `begin` on. Of the item that stands
+// as far behind `first` as the lane is: the number, among lanes that have some, of the lane whose item it is.
+__device__ inline int owner_rank(int first, int begin, bool has_some) {
+  const bool starts_here = has_some && begin >= first && begin < first + kWarpSize;
+  const unsigned starts = __reduce_or_sync(kAllLanes, starts_here ? 1u << (begin - first) : 0u);
+  const int before = __popc(__ballot_sync(kAllLanes, has_some && begin < first));
+  return before + __popc(starts & (lanes_below() << 1 | 1u)) - 1;
+}
+
+// Shares out what the lanes of a warp bring, `count` items each, with those of the lanes before it `end`: visit(item,
+// owner, k) is called by all lanes, for 32 items at a time, with the item's number, the lane whose item it is (-1: none
+// is left), and its number among that lane's.
+template <typename Visit>
+__device__ inline void warp_expand(WarpState* warp, int count, int end, Visit&& visit) {
+  const int lane = lane_index(), begin = end - count;
+  const int total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
+  // Those that have items, without gaps.
+  const unsigned owning = __ballot_sync(kAllLanes, count > 0);
+  if (count > 0) warp->owners[__popc(owning & lanes_below())] = static_cast<uint8_t>(lane);
+  __syncwarp();
+  const int owner_of_rank = warp->owners[lane];
+  __syncwarp();
+  PICTURA_NO_UNROLL
+  for (int item = 0; item < total; item += kWarpSize) {
+    const int owner = __shfl_sync(kAllLanes, owner_of_rank, owner_rank(item, begin, count > 0)) % kWarpSize;
+    const int k = item + lane - __shfl_sync(kAllLanes, begin, owner);
+    visit(item + lane, item + lane < total ? owner : -1, k);
+  }
+}
+
+// A list dealt out like cards, at most 32 to a deal, because entries that stand side by side are much work together:
+// entry lane * deals + deal of a deal is a lane's. As many deals for each warp, so that none waits long for the others.
+template <int kThreads>
+__device__ inline int deals_of(int count) {
+  const unsigned rounds = static_cast<unsigned>(count + kThreads - 1) / kThreads;
+  return static_cast<int>(rounds) * (kThreads / kWarpSize);
+}
+
+// Pairs of numbers that the lanes of a warp put aside until there are enough for every lane to take one: each lane may
+// push a pair; while is_ready(), take() gives a pair to each lane, or to as many as there are left.
+class WarpQueue {
+ public:
+  __device__ explicit WarpQueue(WarpQueueStorage* storage) : storage_(storage) {}
+  __device__ void push(bool wanted, uint32_t a, uint32_t b) {
+    const unsigned pushing = __ballot_sync(kAllLanes, wanted);
+    if (wanted) {
+      const int place = count_ + __popc(pushing & lanes_below());
+      storage_->a[place] = a;
+      storage_->b[place] = b;
+    }
+    count_ += __popc(pushing);
+  }
+  __device__ bool is_ready() const { return count_ >= kWarpSize; }
+  __device__ bool is_empty() const { return count_ == 0; }
+  struct Pair {
+    bool is_one;
+    uint32_t a, b;
+  };
+  __device__ Pair take() {
+    __syncwarp();
+    const int first = max_of(count_ - kWarpSize, 0), place = first + lane_index();
+    Pair pair{place < count_, 0, 0};
+    if (pair.is_one) {
+      pair.a = storage_->a[place];
+      pair.b = storage_->b[place];
+    }
+    count_ = first;
+    __syncwarp();
+    return pair;
+  }
+
+ private:
+  WarpQueueStorage* storage_;
+  int count_ = 0;
+};
+
+// Sum over the threads by way of an array of as many. All threads of the block.
+__device__ inline int64_t block_sum(int64_t* of_thread, int64_t value) {
+  sync_block();
+  of_thread[threadIdx.x] = value;
+  sync_block();
+  int64_t sum = 0;
+  PICTURA_NO_UNROLL
+  for (int i = 0; i < num_threads(); ++i) sum += of_thread[i];
+  return sum;
+}
+
+}  // namespace pictura::cuda

@@ -1,0 +1,269 @@
+// Faces that cross the border of what is drawn, and lights, which have many corners. A lane clips a face of four
+// corners, and all lanes make the edges; a light, or what outgrows a lane's room, a whole warp makes, a lane a corner.
+// Values are those of clip_face and make_screen_face, sums in their order.
+#pragma once
+
+#include "pictura/backend_cuda/renderer/draw_memory.cuh"
+#include "pictura/common/portable/async_copy.h"
+#include "pictura/common/portable/intrinsics.h"
+#include "pictura/common/raster/clip.h"
+
+namespace pictura::cuda {
+
+static_assert(kMaxPolygonCorners <= kWarpSize);
+
+/// Corners that a lane has room for; what is cut by all five planes may have nine.
+constexpr int kLaneCorners = 8;
+
+/// What a warp that clips keeps in shared memory.
+struct ClipShared {
+  Quad quad;  // of one lane, for all
+  // Of corners: a column for each lane, or the first row for all. A corner may be cut and stay beyond the last.
+  static constexpr int kRows = kLaneCorners + 2;
+  float x[kRows][kWarpSize], y[kRows][kWarpSize], z[kRows][kWarpSize];
+  uint16_t edges[kLaneCorners * kWarpSize];  // see LaneEdge
+};
+
+/// An edge of a lane's face, in 16 bits.
+struct LaneEdge {
+  int lane, from, to;  // the face's, and rows of its corners
+  bool turns_right;    // the face
+  __device__ uint16_t packed() const {
+    return static_cast<uint16_t>(lane | from << 5 | to << 9 | (turns_right ? 1 << 13 : 0));
+  }
+  __device__ static LaneEdge unpacked(unsigned word) {
+    return {static_cast<int>(word & 31), static_cast<int>(word >> 5 & 15), static_cast<int>(word >> 9 & 15),
+            (word >> 13 & 1) != 0};
+  }
+};
+static_assert(kWarpSize <= 32 && kLaneCorners <= 16);
+
+/// The corners of one lane's face.
+class LaneCorners {
+ public:
+  __device__ explicit LaneCorners(ClipShared* storage) : storage_(storage) {}
+  __device__ Vec3 operator[](int i) const {
+    return {storage_->x[i][lane_index()], storage_->y[i][lane_index()], storage_->z[i][lane_index()]};
+  }
+  __device__ void set(int i, Vec3 p) const {
+    storage_->x[i][lane_index()] = p.x;
+    storage_->y[i][lane_index()] = p.y;
+    storage_->z[i][lane_index()] = p.z;
+  }
+
+ private:
+  ClipShared* storage_;
+};
+
+// Stores a value by words of 16 bytes: by words of 4, the lanes of a warp would write a part of memory each.
+template <typename Value>
+__device__ void store_whole(Value* to, const Value& value) {
+  static_assert(sizeof(Value) % sizeof(uint4) == 0 && alignof(Value) >= sizeof(uint4));
+  constexpr int kWords = sizeof(Value) / sizeof(uint4);
+  uint4 words[kWords];
+  memcpy(words, &value, sizeof(Value));
+  for (int i = 0; i < kWords; ++i) reinterpret_cast<uint4*>(to)[i] = words[i];
+}
+
+// Copies a value, a lane each word of 16 bytes.
+template <typename Value>
+__device__ void copy_whole(Value* to, const Value& from) {
+  constexpr int kWords = sizeof(Value) / sizeof(uint4);
+  static_assert(sizeof(Value) % sizeof(uint4) == 0 && alignof(Value) >= sizeof(uint4));
+  for (int word = lane_index(); word < kWords; word += kWarpSize) {
+    reinterpret_cast<uint4*>(to)[word] = reinterpret_cast<const uint4*>(&from)[word];
+  }
+}
+
+// ... from global into shared memory; it is there once all lanes have waited for their copies.
+template <typename Value>
+__device__ void copy_whole_later(Value* to, const Value& from) {
+  static_assert(sizeof(Value) % sizeof(uint64_t) == 0 && alignof(Value) >= sizeof(uint64_t));
+  for (size_t at = sizeof(uint64_t) * static_cast<size_t>(lane_index()); at < sizeof(Value);
+       at += sizeof(uint64_t) * kWarpSize) {
+    copy_into_shared(reinterpret_cast<char*>(to) + at, reinterpret_cast<const char*>(&from) + at);
+  }
+}
+
+/// A face whose corners the lanes hold, one each; the rest is the same in all lanes.
+struct SharedFace {
+  Vec3 corner;  // of lanes below count
+  int count = 0;
+  FacePlane plane;
+  Rgb color;
+  PrimitiveRef primitive;
+};
+
+__device__ inline Vec3 corner_of(Vec3 corner, int lane) {
+  return {__shfl_sync(kAllLanes, corner.x, lane), __shfl_sync(kAllLanes, corner.y, lane),
+          __shfl_sync(kAllLanes, corner.z, lane)};
+}
+
+// Sum of the values of the first lanes, as many as a face may have corners, one after the other.
+__device__ inline float sum_in_order(float value) {
+  float sum = 0.0f;
+  for (int lane = 0; lane < kMaxPolygonCorners; ++lane) sum += __shfl_sync(kAllLanes, value, lane);
+  return sum;
+}
+
+// The least and the greatest of the lanes' values, by integers of the same order.
+__device__ inline int32_t in_order(int32_t bits) { return bits ^ (bits >> 31 & 0x7FFFFFFF); }
+__device__ inline float warp_min(float value) {
+  return __int_as_float(in_order(__reduce_min_sync(kAllLanes, in_order(__float_as_int(value)))));
+}
+__device__ inline float warp_max(float value) {
+  return __int_as_float(in_order(__reduce_max_sync(kAllLanes, in_order(__float_as_int(value)))));
+}
+
+// Hands the quad of a lane to all.
+__device__ inline SharedFace share_quad(ClipShared* storage, int owner, const Quad& quad) {
+  __syncwarp();
+  if (lane_index() == owner) storage->quad = quad;
+  __syncwarp();
+  const CameraQuad& seen = storage->quad.seen;
+  return {seen.corner[lane_index() & 3], 4, seen.plane, seen.color, storage->quad.primitive};
+}
+
+// The disk of a lit head; of no corners where it has faded to black.
+__device__ inline SharedFace make_light(const FaceSetupContext& context, int32_t index) {
+  const LightHead head = context.heads[index];
+  const PinholeCamera& camera = context.setting.camera;
+  LightDisk disk;
+  const bool is_seen = see_light(head, context.lights[head.signal], camera, &disk);
+  return {to_camera(camera, light_corner(head, lane_index())), is_seen ? kLightSides : 0, disk.plane, disk.color,
+          light_ref(index)};
+}
+
+// clip_face of a lane's face, in place: corners are written no further than one behind the last that was read. The
+// number of corners, or kOutgrown where a lane has no room for them or the face is not quite convex.
+constexpr int kOutgrown = -1;
+__device__ inline int clip(const Frustum& f, unsigned crossed, LaneCorners corners) {
+  int count = crossed == kOutside ? 0 : 4;
+  // Each lane goes through its own planes.
+  PICTURA_NO_UNROLL
+  for (; crossed != 0 && count > 0; crossed &= crossed - 1) {
+    const ClipPlane plane(f, __ffs(static_cast<int>(crossed)) - 1);
+    Vec3 previous = corners[count - 1], current = corners[0];
+    float previous_inside = plane.inside(previous);
+    int kept = 0;
+    PICTURA_NO_UNROLL
+    for (int i = 0; i < count; ++i) {
+      const Vec3 next = corners[min_of(i + 1, count - 1)];
+      const float inside = plane.inside(current);
+      const bool is_cut = (previous_inside >= 0.0f) != (inside >= 0.0f), stays = inside >= 0.0f;
+      if (is_cut) corners.set(kept, cut_between(previous, previous_inside, current, inside));
+      kept += is_cut ? 1 : 0;
+      if (stays) corners.set(kept, current);
+      kept += stays ? 1 : 0;
+      if (kept > min_of(i + 2, kLaneCorners)) return kOutgrown;
+      previous = current;
+      previous_inside = inside;
+      current = next;
+    }
+    count = kept < 3 ? 0 : kept;
+  }
+  return count;
+}
+
+// Projects a lane's clipped face in place, as make_screen_face does. Sets its bounds and whether it turns right, and
+// returns which of its corners begin an edge, a bit for each; none where it covers nothing.
+__device__ inline unsigned project_in_place(const PinholeCamera& camera, LaneCorners corners, int count,
+                                            ScreenBounds* bounds, bool* turns_right) {
+  PICTURA_NO_UNROLL
+  for (int i = 0; i < count; ++i) {
+    const Vec3 p = corners[i];
+    const float inverse_depth = reciprocal_in_range(p.z);
+    const Vec2 corner = project(camera, p, inverse_depth);
+    bounds->add(corner, inverse_depth);
+    corners.set(i, {corner.x, corner.y, 0.0f});
+  }
+  if (!bounds->meet_image(camera)) return 0;
+  const Vec2 first = corners[0].xy();
+  Vec2 corner = first;
+  float twice_area = 0.0f;
+  unsigned edges = 0;
+  PICTURA_NO_UNROLL
+  for (int i = 0; i < count; ++i) {
+    const Vec2 next = i + 1 < count ? corners[i + 1].xy() : first;
+    if (i > 0 && i + 1 < count) twice_area += cross(corner - first, next - first);
+    if (corner.x != next.x || corner.y != next.y) edges |= 1u << i;
+    corner = next;
+  }
+  *turns_right = twice_area > 0.0f;
+  return fabsf(twice_area) < kMinTwiceArea_px2 ? 0 : edges;
+}
+
+// ... of a face whose corners the lanes hold.
+__device__ inline void clip(const Frustum& f, ClipShared* storage, SharedFace* face_inout) {
+  const int lane = lane_index();
+  Vec3 corner = face_inout->corner;
+  int count = face_inout->count;
+  const unsigned outside = lane < count ? planes_outside(f, corner) : 0;
+  const bool is_outside = __reduce_or_sync(kAllLanes, lane < count ? ~outside : 0u) != ~0u;
+  unsigned crossed = is_outside ? 0u : __reduce_or_sync(kAllLanes, outside);
+  if (is_outside) count = 0;
+  PICTURA_NO_UNROLL
+  for (; crossed != 0 && count > 0; crossed &= crossed - 1) {
+    const ClipPlane plane(f, __ffs(static_cast<int>(crossed)) - 1);
+    const int before = lane > 0 ? lane - 1 : count - 1;
+    const Vec3 previous = corner_of(corner, before);
+    const float inside = plane.inside(corner), previous_inside = __shfl_sync(kAllLanes, inside, before);
+    const bool stays = lane < count && inside >= 0.0f;
+    const bool is_cut = lane < count && (previous_inside >= 0.0f) != (inside >= 0.0f);
+    const unsigned cuts = __ballot_sync(kAllLanes, is_cut), staying = __ballot_sync(kAllLanes, stays);
+    const int place = __popc(cuts & lanes_below()) + __popc(staying & lanes_below());
+    // Only a face that is not quite convex could outgrow the room; it loses corners then.
+    const bool fits = place + 2 <= kMaxPolygonCorners;
+    auto keep = [&](int at, Vec3 p) {
+      storage->x[0][at] = p.x;
+      storage->y[0][at] = p.y;
+      storage->z[0][at] = p.z;
+    };
+    if (is_cut && fits) keep(place, cut_between(previous, previous_inside, corner, inside));
+    if (stays && fits) keep(place + (is_cut ? 1 : 0), corner);
+    const unsigned fitting = __ballot_sync(kAllLanes, fits);
+    count = __popc(cuts & fitting) + __popc(staying & fitting);
+    if (count < 3) count = 0;
+    __syncwarp();
+    corner = {storage->x[0][lane], storage->y[0][lane], storage->z[0][lane]};
+    __syncwarp();
+  }
+  face_inout->corner = corner;
+  face_inout->count = count;
+}
+
+// make_screen_face of a clipped face whose corners the lanes hold, with edges from edge_begin on.
+__device__ inline bool make_screen_face(const FaceSetupContext& context, const SharedFace& face, int32_t edge_begin,
+                                        ScreenFace* face_out) {
+  const PinholeCamera& camera = context.setting.camera;
+  const int lane = lane_index(), count = face.count;
+  const bool is_corner = lane < count;
+  const float inverse_depth = is_corner ? reciprocal_in_range(face.corner.z) : 0.0f;
+  const Vec2 corner = project(camera, face.corner, inverse_depth);
+  ScreenBounds bounds;
+  bounds.low = {warp_min(is_corner ? corner.x : 1e30f), warp_min(is_corner ? corner.y : 1e30f)};
+  bounds.high = {warp_max(is_corner ? corner.x : -1e30f), warp_max(is_corner ? corner.y : -1e30f)};
+  bounds.inverse_depth_low = warp_min(is_corner ? inverse_depth : 1e30f);
+  bounds.inverse_depth_high = warp_max(inverse_depth);
+  if (!bounds.meet_image(camera)) return false;
+  const int next_lane = lane + 1 < count ? lane + 1 : 0;
+  const Vec2 next{__shfl_sync(kAllLanes, corner.x, next_lane), __shfl_sync(kAllLanes, corner.y, next_lane)};
+  const Vec2 first{__shfl_sync(kAllLanes, corner.x, 0), __shfl_sync(kAllLanes, corner.y, 0)};
+  // To add 0 changes nothing.
+  const bool is_between = lane > 0 && lane + 1 < count;
+  const float twice_area = sum_in_order(is_between ? cross(corner - first, next - first) : 0.0f);
+  if (fabsf(twice_area) < kMinTwiceArea_px2) return false;
+  const bool turns_right = twice_area > 0.0f;
+  const bool is_edge = is_corner && (corner.x != next.x || corner.y != next.y);
+  const unsigned edges = __ballot_sync(kAllLanes, is_edge);
+  if (is_edge) {
+    store_whole(context.edges + edge_begin + __popc(edges & lanes_below()),
+                make_edge(turns_right ? corner : next, turns_right ? next : corner));
+  }
+  face_out->edge_count = static_cast<uint8_t>(__popc(edges));
+  face_out->color = face.color;
+  set_bounds(camera, context.setting.frustum, bounds, face.plane, face_out);
+  return true;
+}
+
+}  // namespace pictura::cuda

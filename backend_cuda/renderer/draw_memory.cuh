@@ -1,0 +1,191 @@
+// The memory of a block: what stands where in shared memory, or in the global memory of blocks that draw what does not
+// fit into that. Any function of a kernel can ask for it.
+#pragma once
+
+#include "pictura/backend_cuda/renderer/block.cuh"
+#include "pictura/common/raster/compositing.h"
+
+namespace pictura::cuda {
+
+// A block that gathers faces: a warp, as many of them as a processor takes.
+constexpr int kSetupThreads = 32, kCullBlocksPerProcessor = 32, kFaceSetupBlocksPerProcessor = 32,
+              kClipBlocksPerProcessor = 24;
+// A block that draws them, a tile of an image at a time. What has more fragments is drawn in parts.
+constexpr int kDrawThreads = 256, kDrawBlocksPerProcessor = 4;
+constexpr int kDrawPixels = kTileWidth_px * kTileHeight_px, kDrawFragments = 1152;
+// Few images are deferred, mostly none.
+constexpr int kDeferredBlocksPerProcessor = 2;
+// A block of the last launch.
+constexpr int kLargeThreads = 128, kLargePixels = kTileWidth_px * 512, kLargeFragments = 1 << 16;
+
+// Faces that the mark of a pixel's full face can tell apart in 32 bits.
+constexpr int kMarkedFaceBits = 11, kMaxMarkedFaces = (1 << kMarkedFaceBits) - 1;
+
+/// What is kept while pixels are drawn, and by how many threads. Index: of faces, pixels and fragments, 16 bits where
+/// they suffice. Word: two.
+template <typename Index_, typename Word_, int kThreads_>
+struct DrawMemory {
+  using Index = Index_;
+  using Word = Word_;
+  static constexpr int kThreads = kThreads_;
+  static constexpr int kHalf = 4 * sizeof(Word);
+  /// Of the lower half of a word: no face, no pixel.
+  static constexpr Word kNone = (Word{1} << kHalf) - 1;
+  /// Of a candidate's pixel: the face covers all of it.
+  static constexpr Word kCoversFully = Word{1} << (kHalf - 1);
+  /// Of the lower half of a candidate.
+  __device__ static int pixel_of(uint32_t place) {
+    return static_cast<int>(place & ~static_cast<uint32_t>(kCoversFully));
+  }
+  __device__ static bool covers_fully(uint32_t place) { return (place & kCoversFully) != 0; }
+
+  BlockState* state;
+  const ScreenFace* faces;   // of the image
+  const PolygonEdge* edges;  // that its faces name
+  Word* pixels;              // [max_pixels] of the part of the image that is drawn, see PixelWord
+  Word* rows;                // [max_rows] of faces: in the upper half the face, in the lower the row of the part
+  Word* candidates;          // [max_candidates] that may become fragments: face, and pixel
+  // Fragments.
+  uint32_t *samples_low, *samples_high, *free_low, *free_high;  // [max_fragments]
+  float* area;                                                  // [max_fragments]
+  Index *face, *pixel, *next;                                   // [max_fragments] next: of the pixel's chain, or kNone
+  Index* kind;                                                  // ... in the end, where `pixel` stood: of its weight
+  Index* drawn;                                                 // [max_fragments] pixels that have fragments
+  int32_t max_pixels, max_rows, max_candidates, max_fragments;
+
+  __device__ uint64_t samples(int fragment) const {
+    return static_cast<uint64_t>(samples_high[fragment]) << 32 | samples_low[fragment];
+  }
+  __device__ PixelCoverage coverage(int fragment) const { return {area[fragment], samples(fragment)}; }
+  __device__ uint64_t free(int fragment) const {
+    return static_cast<uint64_t>(free_high[fragment]) << 32 | free_low[fragment];
+  }
+  // Once a fragment is weighed, there stands where its samples did what it adds to its pixel's sum; in the end, of the
+  // first of a pixel's chain, the pixel's colour, as numbers or as bytes.
+  __device__ void set_part(int fragment, const PixelAccumulator::Part& part) const {
+    samples_low[fragment] = static_cast<uint32_t>(part.area);
+    samples_high[fragment] = static_cast<uint32_t>(part.r);
+    free_low[fragment] = static_cast<uint32_t>(part.g);
+    free_high[fragment] = static_cast<uint32_t>(part.b);
+  }
+  __device__ PixelAccumulator::Part part(int fragment) const {
+    return {static_cast<int32_t>(samples_low[fragment]), static_cast<int32_t>(samples_high[fragment]),
+            static_cast<int32_t>(free_low[fragment]), static_cast<int32_t>(free_high[fragment])};
+  }
+  __device__ void set_color(int fragment, Rgb color) const {
+    samples_low[fragment] = __float_as_uint(color.r);
+    samples_high[fragment] = __float_as_uint(color.g);
+    free_low[fragment] = __float_as_uint(color.b);
+  }
+  __device__ void set_color_bytes(int fragment, uint32_t bytes) const { samples_low[fragment] = bytes; }
+  __device__ uint32_t color_bytes(int fragment) const { return samples_low[fragment]; }
+  __device__ Rgb color(int fragment) const {
+    return {__uint_as_float(samples_low[fragment]), __uint_as_float(samples_high[fragment]),
+            __uint_as_float(free_low[fragment])};
+  }
+};
+
+// Puts arrays side by side.
+struct Layout {
+  unsigned char* bytes;
+  size_t used = 0;
+  template <typename Value>
+  __host__ __device__ void place(Value** array, int count) {
+    *array = reinterpret_cast<Value*>(bytes + used);
+    used += (static_cast<size_t>(count) * sizeof(Value) + 15) / 16 * 16;
+  }
+};
+
+// Lays out what drawing keeps from `bytes` on, and returns how many bytes that takes. Rows lie where samples do later,
+// candidates where what is free of fragments does, and pixels that have some.
+template <typename Memory>
+__host__ __device__ size_t lay_out(Memory* memory, int max_pixels, int max_fragments, unsigned char* bytes) {
+  memory->max_pixels = max_pixels;
+  memory->max_fragments = max_fragments;
+  Layout layout{bytes};
+  layout.place(&memory->pixels, max_pixels);
+  layout.place(&memory->area, max_fragments);
+  layout.place(&memory->face, max_fragments);
+  layout.place(&memory->pixel, max_fragments);
+  layout.place(&memory->next, max_fragments);
+  const size_t rows_begin = layout.used;
+  layout.place(&memory->samples_low, max_fragments);
+  layout.place(&memory->samples_high, max_fragments);
+  const size_t candidates_begin = layout.used;
+  layout.place(&memory->free_low, max_fragments);
+  layout.place(&memory->free_high, max_fragments);
+  layout.place(&memory->drawn, max_fragments);
+  memory->kind = memory->pixel;
+  using Word = typename Memory::Word;
+  memory->rows = reinterpret_cast<Word*>(bytes + rows_begin);
+  memory->max_rows = static_cast<int32_t>((candidates_begin - rows_begin) / sizeof(Word));
+  memory->candidates = reinterpret_cast<Word*>(bytes + candidates_begin);
+  // Few become no fragments: of more there would be no room for those that do.
+  memory->max_candidates = max_fragments + max_fragments / 2;
+  return layout.used;
+}
+
+// A block's state ends with what its warps keep.
+__host__ __device__ constexpr size_t state_bytes(int threads) {
+  return (sizeof(BlockState) - static_cast<size_t>(kMaxWarps - threads / kWarpSize) * sizeof(WarpState) + 15) / 16 * 16;
+}
+
+extern __shared__ __align__(16) unsigned char block_memory[];
+__device__ inline BlockState* block_state() { return reinterpret_cast<BlockState*>(block_memory); }
+
+/// In shared memory, at places that are known when the kernel is compiled.
+struct SmallDrawMemory : DrawMemory<uint16_t, uint32_t, kDrawThreads> {
+  __host__ __device__ size_t place(unsigned char* bytes) { return lay_out(this, kDrawPixels, kDrawFragments, bytes); }
+  __device__ static SmallDrawMemory current() {
+    SmallDrawMemory memory;
+    memory.place(block_memory + state_bytes(kDrawThreads));
+    memory.state = block_state();
+    memory.faces = memory.state->faces;
+    memory.edges = memory.state->edges;
+    return memory;
+  }
+};
+static_assert(kMaxEntries <= kMaxMarkedFaces);
+static_assert(kMaxMarkedFaces < 0xFFFF && kDrawFragments < 0xFFFF && kDrawPixels < 0x7FFF);
+
+// In global memory. What drawing keeps lies where gathering has left its lists.
+__host__ __device__ inline size_t lay_out(SetupLists* lists, const Scratch& sizes, unsigned char* bytes) {
+  lists->max_entries = FaceBatch::count_of(sizes.max_faces) * FaceBatch::kEntries;
+  lists->max_clipped = sizes.max_faces;
+  Layout layout{bytes};
+  layout.place(&lists->clipped, lists->max_clipped);
+  layout.place(&lists->entries, lists->max_entries);
+  return layout.used;
+}
+struct LargeDrawMemory : DrawMemory<uint32_t, unsigned long long, kLargeThreads> {
+  __host__ __device__ size_t place(unsigned char* bytes) { return lay_out(this, kLargePixels, kLargeFragments, bytes); }
+  __device__ static LargeDrawMemory current() {
+    LargeDrawMemory memory;
+    memory.state = block_state();
+    memory.place(memory.state->scratch.bytes);
+    memory.faces = memory.state->faces;
+    memory.edges = memory.state->edges;
+    return memory;
+  }
+};
+
+__host__ __device__ inline size_t draw_bytes() { return state_bytes(kDrawThreads) + SmallDrawMemory().place(nullptr); }
+__host__ __device__ inline size_t large_bytes(const Scratch& sizes) {
+  SetupLists lists;
+  const size_t to_gather = lay_out(&lists, sizes, nullptr), to_draw = LargeDrawMemory().place(nullptr);
+  return ((to_gather > to_draw ? to_gather : to_draw) + 15) / 16 * 16;
+}
+
+// Gives the block its part of a launch's scratch memory. All threads of the block.
+__device__ inline void take_scratch(const Scratch& scratch) {
+  if (threadIdx.x == 0) {
+    Scratch own = scratch;
+    own.faces += static_cast<size_t>(blockIdx.x) * static_cast<size_t>(scratch.max_faces);
+    own.edges += static_cast<size_t>(blockIdx.x) * static_cast<size_t>(scratch.max_edges);
+    own.bytes += blockIdx.x * large_bytes(scratch);
+    block_state()->scratch = own;
+  }
+  sync_block();
+}
+
+}  // namespace pictura::cuda

@@ -1,0 +1,480 @@
+// From entries that may show to faces. Nearly all have four corners and need no clipping: a lane makes one of those.
+// The others are listed, and clipped when many have come together. Edges and faces take room by counters, so that
+// nobody waits for others.
+#pragma once
+
+#include "pictura/backend_cuda/renderer/clip.cuh"
+#include "pictura/backend_cuda/renderer/cull.cuh"
+#include "pictura/common/raster/clip.h"
+
+namespace pictura::cuda {
+
+/// What a lane is to load or store, by words of 16 bytes. One more keeps rows apart: lanes that write a word of their
+/// own meet in no bank, those that read rows together in no more than two.
+template <typename Value, int kValues = 1>
+struct LaneRow {
+  static constexpr int kWords = kValues * sizeof(Value) / sizeof(uint4), kRowsAtOnce = kWarpSize / kWords;
+  Value values[kValues];
+  uint4 gap;
+  __device__ uint4* words() { return reinterpret_cast<uint4*>(values); }
+};
+using StripRow = LaneRow<Strip>;
+using EdgeRow = LaneRow<PolygonEdge, 4>;
+using FaceRow = LaneRow<ScreenFace>;
+
+/// What a warp that makes faces keeps in shared memory: strips, then the edges of faces, then the faces themselves.
+union FaceShared {
+  StripRow strips[kWarpSize];
+  EdgeRow edges[kWarpSize];
+  FaceRow faces[kWarpSize];
+};
+
+/// What a warp that gathers keeps in shared memory, one step after the other.
+union GeometryShared {
+  CullShared cull;
+  FaceShared faces;
+  ClipShared clip;
+};
+
+/// The shared memory of a block that makes faces and does nothing else. With the 1 KiB that each block takes, 32 of
+/// them leave 28 KiB of cache to a processor that has 256 KiB for both: little of what they read is read again.
+struct FaceSetupState {
+  FaceSetupContext contexts[2];  // of this batch and the next, by turns
+  FaceShared storage;
+};
+__device__ inline FaceSetupState* face_setup_state() { return reinterpret_cast<FaceSetupState*>(block_memory); }
+
+// Bytes of shared memory of a block that culls and of one that takes all steps, and where a warp's part of it is.
+__host__ __device__ constexpr size_t cull_bytes() { return state_bytes(kSetupThreads) + sizeof(CullShared); }
+__host__ __device__ constexpr size_t setup_bytes(int threads) {
+  return state_bytes(threads) + static_cast<size_t>(threads / kWarpSize) * sizeof(GeometryShared);
+}
+__device__ inline GeometryShared* geometry_shared() {
+  return reinterpret_cast<GeometryShared*>(block_memory + state_bytes(num_threads())) + warp_index();
+}
+
+// Loads the strips among the lanes' entries, four lanes a strip and all of them eight at once, because lanes that load
+// a strip each ask for every sector several times. All lanes of the warp.
+__device__ inline void load_strips(const FaceSetupContext& context, uint32_t entry, StripRow* rows_out) {
+  const bool is_strip = kind_of(entry) == kStripKind;
+  const unsigned strips = __ballot_sync(kAllLanes, is_strip);
+  if (strips == 0) return;
+  // Lanes that have none take another lane's.
+  const uint32_t of_another = __shfl_sync(kAllLanes, entry, __ffs(static_cast<int>(strips)) - 1);
+  const uint32_t index = (is_strip ? entry : of_another) & kFaceIndexMask;
+  constexpr int kWords = StripRow::kWords, kRowsAtOnce = StripRow::kRowsAtOnce;
+  const int row = lane_index() / kWords, word = lane_index() % kWords;
+  uint4 words[kWords];
+  for (int i = 0; i < kWords; ++i) {
+    const uint32_t its_index = __shfl_sync(kAllLanes, index, kRowsAtOnce * i + row);
+    words[i] = reinterpret_cast<const uint4*>(context.strips)[kWords * its_index + static_cast<uint32_t>(word)];
+  }
+  for (int i = 0; i < kWords; ++i) rows_out[kRowsAtOnce * i + row].words()[word] = words[i];
+  __syncwarp();
+}
+
+// The face of an entry that is no light; false where it has faded to black. strip_of(index) is a strip.
+template <typename StripOf>
+__device__ bool make_quad(const FaceSetupContext& context, uint32_t entry, Quad* quad_out, StripOf&& strip_of) {
+  const ImageSetting& setting = context.setting;
+  const uint32_t kind = kind_of(entry);
+  const auto index = static_cast<int32_t>(entry & kFaceIndexMask);
+  // One body for all kinds but for their corners: lanes of a warp have different ones.
+  WorldQuad world;
+  quad_out->floor_px = 0.0f;
+  if (kind == kStripKind) {
+    const Strip strip = strip_of(index);
+    quad_out->primitive = strip_ref(strip, index);
+    quad_out->floor_px = setting.line_floor_px;
+    world = strip_quad(strip);
+  } else if (kind == kAgentKind) {
+    const AgentBox box = context.agents[index];
+    quad_out->primitive = agent_ref(box, index);
+    world = cuboid_quad(box, static_cast<int>(entry >> kFaceShift) & 7, setting.debug_palette);
+  } else {
+    quad_out->primitive = wall_ref(index);
+    world = wall_quad(context.walls[index]);
+  }
+  return see_quad(world, setting.camera, &quad_out->seen);
+}
+
+// Keeps the faces of those lanes that have one. Each image has room for all of its own.
+__device__ inline void keep_face(const FaceSetupContext& context, const ScreenFace& face, PrimitiveRef primitive,
+                                 int32_t edge_begin, int32_t at) {
+  if (at >= 0) store_whole(context.faces + at, whole_face(face, primitive, edge_begin));
+}
+
+// Stores the first rows side by side, all lanes 512 bytes at once: lanes that store a row each would fill halves of
+// what memory takes.
+template <typename Row>
+__device__ void store_rows(uint4* to, Row* rows, int count) {
+  constexpr int kWords = Row::kWords, kRowsAtOnce = Row::kRowsAtOnce;
+  const int row = lane_index() / kWords, word = lane_index() % kWords, left = count - row;
+  uint4* const own = to + lane_index();
+  // Four are read before any is stored, or each would wait for its own.
+  constexpr int kAtOnce = 4;
+  for (int first = 0; first < kWords; first += kAtOnce) {
+    uint4 words[kAtOnce];
+    for (int i = 0; i < kAtOnce; ++i) words[i] = rows[row + kRowsAtOnce * (first + i)].words()[word];
+    for (int i = 0; i < kAtOnce; ++i) {
+      if (kRowsAtOnce * (first + i) < left) own[kWarpSize * (first + i)] = words[i];
+    }
+  }
+}
+
+// Makes the faces of a batch of the image, an entry each lane, and lists what is to be clipped. All lanes of the warp.
+__device__ inline void make_faces(const FaceSetupContext& context, FaceShared* storage, const SetupLists& lists,
+                                  SetupCounts* counts, uint32_t entry, int32_t image) {
+  const bool is_light = entry != kNoEntry && kind_of(entry) == kLightKind, is_quad = entry != kNoEntry && !is_light;
+  if (__any_sync(kAllLanes, is_light)) {
+    const int32_t at = warp_allocate_one(&counts->lights, is_light);
+    if (is_light) lists.clipped[lists.max_clipped - 1 - at] = {entry, image};
+  }
+  const unsigned quads = __ballot_sync(kAllLanes, is_quad);
+  if (quads == 0) return;
+  // Lanes that have no face make another lane's, which is not kept: so none waits for what lanes do differently.
+  const uint32_t of_another = __shfl_sync(kAllLanes, entry, __ffs(static_cast<int>(quads)) - 1);
+  const PinholeCamera& camera = context.setting.camera;
+  Quad quad;
+  const uint32_t made = is_quad ? entry : of_another;
+  load_strips(context, made, storage->strips);
+  const bool is_seen =
+      make_quad(context, made, &quad, [&](int32_t) { return storage->strips[lane_index()].values[0]; });
+  ScreenQuad on_screen;
+  bool turns_right = false;
+  const QuadSight sight = project_quad(camera, quad.seen.corner, quad.floor_px, &on_screen);
+  const bool covers = shows_whole(context.setting, on_screen, quad.seen.color, quad.primitive, &turns_right),
+             is_wanted = is_quad && is_seen;
+  const bool shows = is_wanted && sight == QuadSight::whole && covers,
+             is_clipped = is_wanted && sight == QuadSight::cut;
+  // Two lanes ask for the places of all at once, and wait for them when edges are made.
+  const unsigned showing = __ballot_sync(kAllLanes, shows), clipped = __ballot_sync(kAllLanes, is_clipped);
+  const int lane = lane_index(), wanted = __popc(lane == 0 ? showing : (lane == 1 ? clipped : 0u));
+  int32_t taken = 0;
+  if (wanted > 0) taken = atomicAdd(lane == 0 ? context.num_faces : &counts->clipped, wanted);
+  const int rank = __popc(showing & lanes_below()), count = __popc(showing);
+  __syncwarp();  // edges go where strips were
+  ScreenFace face;
+  if (shows) {
+    PolygonEdge* const edges = storage->edges[rank].values;
+    auto keep_edge = [edges](int k, const PolygonEdge& edge) { store_whole(edges + k, edge); };
+    make_quad_face(camera, context.setting.frustum, on_screen, turns_right, quad.seen.plane, quad.seen.color, keep_edge,
+                   &face);
+  }
+  __syncwarp();
+  const int32_t at = __shfl_sync(kAllLanes, taken, 0), clipped_at = __shfl_sync(kAllLanes, taken, 1);
+  if (is_clipped) lists.clipped[clipped_at + __popc(clipped & lanes_below())] = {entry, image};
+  // The place of a face's edges follows from its own.
+  const int32_t edge_begin = context.edge_begin + 4 * at;
+  store_rows(reinterpret_cast<uint4*>(context.edges + edge_begin), storage->edges, count);
+  __syncwarp();
+  if (shows) {
+    store_whole(storage->faces[rank].values, whole_face(face, quad.primitive, edge_begin + 4 * rank));
+  }
+  __syncwarp();
+  store_rows(reinterpret_cast<uint4*>(context.faces + at), storage->faces, count);
+}
+
+// Makes a face whose corners the lanes hold. False where there is no room for its edges. All lanes of the warp.
+__device__ inline bool make_shared_face(const FaceSetupContext& context, ClipShared* storage, SharedFace shared) {
+  clip(context.setting.frustum, storage, &shared);
+  if (shared.count == 0) return true;
+  int32_t edge_begin = 0;
+  if (lane_index() == 0) edge_begin = context.clipped_begin + atomicAdd(context.num_clipped, shared.count);
+  edge_begin = __shfl_sync(kAllLanes, edge_begin, 0);
+  if (edge_begin + shared.count > context.clipped_end) return false;
+  ScreenFace face;
+  const bool shows = make_screen_face(context, shared, edge_begin, &face);
+  if (shows && lane_index() == 0)
+    keep_face(context, face, shared.primitive, edge_begin, atomicAdd(context.num_faces, 1));
+  return true;
+}
+
+// Clips faces of four corners, the lanes' `thing` where is_one, and makes theirs but for what outgrows a lane's room:
+// of that *quad_out is kept. False in those lanes for whose face there is no room. All lanes of the warp.
+__device__ inline bool clip_quads(const FaceSetupContext* contexts, ClipShared* storage, bool is_one,
+                                  ClippedPrimitive primitive, Quad* quad_out, bool* has_outgrown_out) {
+  const FaceSetupContext& context = contexts[primitive.image];
+  const PinholeCamera& camera = context.setting.camera;
+  const LaneCorners corners(storage);
+  Quad& quad = *quad_out;
+  int kept = 0;
+  auto strip_of = [&](int32_t index) { return context.strips[index]; };
+  if (is_one && make_quad(context, primitive.entry, &quad, strip_of) &&
+      (quad.floor_px <= 0.0f || widen_strip(camera, quad.floor_px, quad.seen.corner))) {
+    const Frustum frustum = context.setting.frustum;
+    for (int i = 0; i < 4; ++i) corners.set(i, quad.seen.corner[i]);
+    kept = clip(frustum, planes_crossed(frustum, quad.seen.corner, 4), corners);
+  }
+  ScreenBounds bounds;
+  bool turns_right = false;
+  const unsigned edges = kept > 0 ? project_in_place(camera, corners, kept, &bounds, &turns_right) : 0;
+  // The edges of all lanes, one face's behind the other's.
+  const int count = __popc(edges), end = warp_inclusive_sum(count), total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
+  int32_t edge_begin = 0;
+  if (lane_index() == 0 && total > 0) edge_begin = context.clipped_begin + atomicAdd(context.num_clipped, total);
+  edge_begin = __shfl_sync(kAllLanes, edge_begin, 0);
+  int at = end - count;
+  const bool has_room = edges == 0 || edge_begin + end <= context.clipped_end;
+  if (edges != 0 && has_room) {
+    ScreenFace face;
+    face.edge_count = static_cast<uint8_t>(count);
+    face.color = quad.seen.color;
+    set_bounds(camera, context.setting.frustum, bounds, quad.seen.plane, &face);
+    keep_face(context, face, quad.primitive, edge_begin + at, atomicAdd(context.num_faces, 1));
+  }
+  PICTURA_NO_UNROLL
+  for (unsigned left = edges; left != 0; left &= left - 1, ++at) {
+    const int from = __ffs(static_cast<int>(left)) - 1;
+    storage->edges[at] = LaneEdge{lane_index(), from, from + 1 < kept ? from + 1 : 0, turns_right}.packed();
+  }
+  __syncwarp();
+  PICTURA_NO_UNROLL
+  for (int i = lane_index(); i < min_of(total, context.clipped_end - edge_begin); i += kWarpSize) {
+    const LaneEdge edge = LaneEdge::unpacked(storage->edges[i]);
+    const Vec2 from{storage->x[edge.from][edge.lane], storage->y[edge.from][edge.lane]};
+    const Vec2 to{storage->x[edge.to][edge.lane], storage->y[edge.to][edge.lane]};
+    store_whole(context.edges + edge_begin + i, make_edge(edge.turns_right ? from : to, edge.turns_right ? to : from));
+  }
+  __syncwarp();
+  *has_outgrown_out = kept == kOutgrown;
+  return has_room;
+}
+
+// Clips things of a list, the lanes' `thing` where is_one, and makes their faces; primitive.image is that of contexts.
+// All are lights or none. False in those lanes for whose face there is no room. All lanes of the warp.
+__device__ inline bool clip_primitives(const FaceSetupContext* contexts, ClipShared* storage, bool is_one,
+                                       bool are_lights, ClippedPrimitive primitive) {
+  Quad quad;
+  bool has_room = true, is_shared = is_one;
+  if (!are_lights) has_room = clip_quads(contexts, storage, is_one, primitive, &quad, &is_shared);
+  PICTURA_NO_UNROLL
+  for (unsigned shared = __ballot_sync(kAllLanes, is_shared); shared != 0; shared &= shared - 1) {
+    const int owner = __ffs(static_cast<int>(shared)) - 1;
+    const FaceSetupContext& its_context = contexts[__shfl_sync(kAllLanes, primitive.image, owner)];
+    const int32_t index = index_of(__shfl_sync(kAllLanes, primitive.entry, owner));
+    const bool is_made = make_shared_face(
+        its_context, storage, are_lights ? make_light(its_context, index) : share_quad(storage, owner, quad));
+    if (lane_index() == owner) has_room = is_made;
+  }
+  return has_room;
+}
+
+// What a warp is to clip at once: a light, which all of its lanes make, or `batch` faces of four corners, a lane each.
+// Lights come first: they take longest.
+struct ClippedItem {
+  bool is_any, are_lights;
+  bool is_one;  // of the lane
+  ClippedPrimitive primitive;
+};
+__device__ inline ClippedItem clipped_item(const SetupLists& lists, const SetupCounts& listed, int item, int batch) {
+  const bool are_lights = item < listed.lights;
+  const int first = (item - listed.lights) * batch, quad = first + lane_index();
+  if (!are_lights && first >= listed.clipped) return {};
+  return {true, are_lights, are_lights ? lane_index() == 0 : lane_index() < batch && quad < listed.clipped,
+          lists.clipped[are_lights ? lists.max_clipped - 1 - item : min_of(quad, listed.clipped - 1)]};
+}
+
+// Sets what an image shows, but for where its faces go; false, with a fault noted, where its view names something that
+// does not exist. One thread.
+__device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_t view, int32_t camera) {
+  if (!set_view(&state->view, task, view)) return false;
+  FaceSetupContext* context = &state->context;
+  const CameraSlot& slot = task.cameras[camera];
+  context->setting.camera = place_camera(slot.camera, state->view.view);
+  context->setting.frustum = slot.frustum;
+  context->setting.line_floor_px = task.line_floor_px;
+  context->setting.debug_palette = task.debug_palette;
+  context->setting.occluders.count = 0;
+  const StaticGeometryView& pieces = state->view.geometry->pieces;
+  context->strips = pieces.strips.data();
+  context->walls = pieces.walls.data();
+  context->heads = pieces.heads.data();
+  context->agents = task.scene.agents.data() + state->view.world_begin;
+  context->lights = task.scene.light_states.data() + state->view.light_begin;
+  return true;
+}
+
+// The faces of solids that cover most of an image, of those that were offered. A lane each keeps, for as many as there
+// may be, the entry and what it covers; the occluder stands at the lane's place in the setting.
+class BestOccluders {
+ public:
+  __device__ explicit BestOccluders(FaceSetupContext* context) : context_(context) {}
+
+  /// Each lane offers the face of an entry, or none. All lanes of the warp.
+  __device__ void offer(bool is_one, uint32_t entry) {
+    const ImageSetting& setting = context_->setting;
+    const FaceSetupContext* context = context_;
+    Quad quad;
+    Offered own{is_one ? entry : kNoEntry};
+    if (is_one && make_quad(*context, entry, &quad, [context](int32_t i) { return context->strips[i]; })) {
+      own.covers = __float_as_int(occluded_px2(setting.camera, quad.seen, &own.on_screen, &own.turns_right));
+    }
+    const Chosen chosen = choose(own);
+    const int place = move_in(own, chosen);
+    if (chosen.own) {
+      context_->setting.occluders.occluder[place] =
+          make_occluder(setting.camera, setting.frustum, quad.seen.plane, own.on_screen, own.turns_right);
+    }
+  }
+
+  /// How many there are. All lanes of the warp.
+  __device__ int count() const { return __popc(__ballot_sync(kAllLanes, kept_covers_ != 0)); }
+
+ private:
+  struct Offered {
+    uint32_t entry;
+    int covers = 0;  // the area's bits, which sort as it does; 0: hides nothing
+    ScreenQuad on_screen;
+    bool turns_right = false;
+  };
+  // Whether what the lane offers, and what it has kept so far, is among the best.
+  struct Chosen {
+    bool own = false, kept = false;
+  };
+
+  __device__ Chosen choose(const Offered& own) const {
+    Chosen chosen;
+    int left = own.covers, kept_left = kept_covers_;
+    PICTURA_NO_UNROLL
+    for (int k = 0; k < Occluders::kMaxCount; ++k) {
+      const int most = __reduce_max_sync(kAllLanes, max_of(left, kept_left));
+      if (most == 0) break;
+      const uint32_t its = left == most ? own.entry : kNoEntry, other = kept_left == most ? kept_ : kNoEntry;
+      const uint32_t lowest = __reduce_min_sync(kAllLanes, its < other ? its : other);
+      if (own.entry == lowest) {
+        chosen.own = true;
+        left = 0;
+      }
+      if (kept_ == lowest) {
+        chosen.kept = true;
+        kept_left = 0;
+      }
+    }
+    return chosen;
+  }
+
+  // The chosen offers take the places of those that go. The place of the lane's own.
+  __device__ int move_in(const Offered& own, Chosen chosen) {
+    unsigned places = ~__ballot_sync(kAllLanes, chosen.kept) & ((1u << Occluders::kMaxCount) - 1);
+    int place = 0;
+    PICTURA_NO_UNROLL
+    for (unsigned added = __ballot_sync(kAllLanes, chosen.own); added != 0; added &= added - 1, places &= places - 1) {
+      const int from = __ffs(static_cast<int>(added)) - 1, to = __ffs(static_cast<int>(places)) - 1;
+      const uint32_t entry = __shfl_sync(kAllLanes, own.entry, from);
+      const int covers = __shfl_sync(kAllLanes, own.covers, from);
+      if (lane_index() == from) place = to;
+      if (lane_index() == to) {
+        kept_ = entry;
+        kept_covers_ = covers;
+      }
+    }
+    return place;
+  }
+
+  FaceSetupContext* context_;
+  uint32_t kept_ = kNoEntry;
+  int kept_covers_ = 0;
+};
+
+// Finds what hides whole faces among the solids of a list. All lanes of one warp.
+__device__ inline void find_occluders(FaceSetupContext* context, const uint32_t* entries, int32_t count) {
+  auto may_hide = [&](uint32_t entry) {
+    const PinholeCamera& camera = context->setting.camera;
+    const uint32_t index = entry & kFaceIndexMask;
+    if (entry == kNoEntry) return false;
+    if (kind_of(entry) == kAgentKind) return may_occlude(context->agents[index], camera);
+    return kind_of(entry) == kWallKind && may_occlude(context->walls[index], camera);
+  };
+  BestOccluders best(context);
+  // Near ones are put aside until every lane has one.
+  WarpQueue near_ones(&block_state()->warps[warp_index()].queue);
+  PICTURA_NO_UNROLL
+  for (int32_t first = 0;; first += kWarpSize) {
+    const bool is_more = first < count;
+    const uint32_t entry = first + lane_index() < count ? entries[first + lane_index()] : kNoEntry;
+    near_ones.push(may_hide(entry), entry, 0);
+    if (near_ones.is_ready() || (!is_more && !near_ones.is_empty())) {
+      const WarpQueue::Pair near_one = near_ones.take();
+      best.offer(near_one.is_one, near_one.a);
+    }
+    if (!is_more) break;
+  }
+  const int found = best.count();
+  if (lane_index() == 0) context->setting.occluders.count = found;
+  __syncwarp();
+}
+
+// What drawing is told of an image.
+__device__ inline PreparedImage image_of(const BlockState& state, int32_t face_begin, int32_t face_count) {
+  return {state.view.geometry, state.context.agents, state.context.setting.camera.position_m, face_begin, face_count};
+}
+
+/// Where a block gathers an image of its own.
+struct SetupTarget {
+  ScreenFace* faces;
+  PolygonEdge* edges;
+  int32_t edge_begin, clipped_begin, clipped_end;
+  SetupLists lists;
+};
+
+// There the lists hold all that a world does.
+__device__ inline SetupTarget place_of(const Scratch& scratch) {
+  SetupTarget place{scratch.faces, scratch.edges, 0, 4 * scratch.max_faces, scratch.max_edges, {}};
+  lay_out(&place.lists, scratch, scratch.bytes);
+  return place;
+}
+
+// Gathers an image into the block's own memory, all of it in one launch. False where there is no room for all, or where
+// its view names something that does not exist. All threads of the block.
+__device__ inline bool prepare_image(const DrawTask& task, int32_t view, int32_t camera, const SetupTarget& place,
+                                     bool leaves_out_hidden) {
+  BlockState* state = block_state();
+  GeometryShared* storage = geometry_shared();
+  const SetupLists& lists = place.lists;
+  sync_block();
+  if (threadIdx.x == 0) {
+    state->listed = {};
+    state->num_entries = state->num_faces = state->num_clipped = state->overflow = 0;
+    state->usable = set_image(state, task, view, camera) ? 1 : 0;
+    FaceSetupContext* context = &state->context;
+    context->faces = state->faces = place.faces;
+    context->edges = state->edges = place.edges;
+    context->num_faces = &state->num_faces;
+    context->num_clipped = &state->num_clipped;
+    context->edge_begin = place.edge_begin;
+    context->clipped_begin = place.clipped_begin;
+    context->clipped_end = place.clipped_end;
+  }
+  sync_block();
+  if (state->usable == 0) return false;
+  EntryList list(lists.entries, lists.max_entries, &state->num_entries);
+  cull(state, task, &storage->cull, &list);
+  sync_block();
+  if (state->num_entries > lists.max_entries) return false;
+  if (warp_index() == 0) {
+    list.finish();
+    if (leaves_out_hidden) find_occluders(&state->context, lists.entries, state->num_entries);
+  }
+  sync_block();
+  PICTURA_NO_UNROLL
+  for (int i = warp_index(); i < FaceBatch::count_of(state->num_entries); i += num_warps()) {
+    make_faces(state->context, &storage->faces, lists, &state->listed,
+               lists.entries[i * FaceBatch::kEntries + lane_index()], 0);
+    __syncwarp();
+  }
+  sync_block();
+  PICTURA_NO_UNROLL
+  for (int i = warp_index();; i += num_warps()) {
+    const ClippedItem item = clipped_item(lists, state->listed, i, kWarpSize);
+    if (!item.is_any) break;
+    if (!clip_primitives(&state->context, &storage->clip, item.is_one, item.are_lights, item.primitive))
+      state->overflow = 1;
+  }
+  sync_block();
+  if (threadIdx.x == 0) state->shown = image_of(*state, 0, state->num_faces);
+  sync_block();
+  return state->overflow == 0;
+}
+
+}  // namespace pictura::cuda

@@ -1,0 +1,286 @@
+// From the faces of an image to fragments: what a face covers of a pixel. Rows of faces find, for each pixel, the face
+// that covers it fully and buries most, and list the pixels that faces cover partly; those that may show become
+// fragments, one thread for each, in a chain for each pixel.
+#pragma once
+
+#include "pictura/backend_cuda/renderer/draw_memory.cuh"
+#include "pictura/backend_cuda/renderer/rig.cuh"
+#include "pictura/common/portable/async_copy.h"
+#include "pictura/common/portable/intrinsics.h"
+
+namespace pictura::cuda {
+
+// The tile from (x, y) on, so many columns and rows large, of an image of that width whose rows end at y_end.
+__device__ inline Part tile_at(int x, int y, int columns, int rows, int width_px, int y_end) {
+  return {x, min_of(x + columns, width_px), y, min_of(y + rows, y_end)};
+}
+
+/// A pixel's word. While full faces are found it is the mark of the one that buries most: the bits of its
+/// occluder_bound(), which sort like that, and the face's number plus 1. From the pixel's first fragment on, that
+/// stands where the inverse_depth did, and the sign bit tells so. 0: neither.
+template <typename Word>
+struct PixelWord {
+  static constexpr int kFaceBits = sizeof(Word) == 4 ? kMarkedFaceBits : 32;
+  static constexpr Word kFace = (Word{1} << kFaceBits) - 1, kHasChain = Word{1} << (8 * sizeof(Word) - 1);
+
+  __device__ static Word mark(float bound, int face) {
+    static_assert(kMarkedFaceBits + kOccluderBoundBits == 32);
+    return Word{bits_from_float(bound)} << (kFaceBits - kMarkedFaceBits) | static_cast<Word>(face + 1);
+  }
+  __device__ static int marked_face(Word mark) { return static_cast<int>(mark & kFace) - 1; }
+  __device__ static float marked_bound(Word mark) {
+    constexpr uint32_t kBoundMask = ~0u << kMarkedFaceBits;
+    return float_from_bits(static_cast<uint32_t>(mark >> (kFaceBits - kMarkedFaceBits)) & kBoundMask);
+  }
+  /// With a fragment as the first of the chain, and the face as it is.
+  __device__ static Word with_first(Word word, Word fragment) {
+    return kHasChain | fragment << kFaceBits | (word & kFace);
+  }
+};
+
+// The face of a word that covers its pixel fully, of several the one that buries most; kNone where there is none, or
+// where it stands among the pixel's fragments.
+template <typename Memory>
+__device__ typename Memory::Word full_of_word(typename Memory::Word word) {
+  return ((word & PixelWord<typename Memory::Word>::kFace) - 1) & Memory::kNone;
+}
+// The first fragment of its chain; kNone where there is none.
+template <typename Memory>
+__device__ typename Memory::Word first_of_word(typename Memory::Word word) {
+  using Pixel = PixelWord<typename Memory::Word>;
+  return (word & Pixel::kHasChain) != 0 ? (word & ~Pixel::kHasChain) >> Pixel::kFaceBits : Memory::kNone;
+}
+template <typename Memory>
+__device__ typename Memory::Word full_of(const Memory& memory, int pixel) {
+  return full_of_word<Memory>(memory.pixels[pixel]);
+}
+template <typename Memory>
+__device__ typename Memory::Word first_of(const Memory& memory, int pixel) {
+  return first_of_word<Memory>(memory.pixels[pixel]);
+}
+
+// Lists the rows that faces have in a part. Those that find no room are counted. All threads of the block.
+template <typename Memory>
+__device__ void list_rows(const Memory& memory, int num_faces, const Part& part) {
+  using Word = typename Memory::Word;
+  WarpState* warp = &memory.state->warps[warp_index()];
+  PICTURA_NO_UNROLL
+  for (int first = warp_index() * kWarpSize; first < num_faces; first += Memory::kThreads) {
+    const int face = first + lane_index();
+    int y_begin = 0, rows = 0;
+    if (face < num_faces) {
+      const PixelBox box = memory.faces[face].box;
+      y_begin = max_of(box.y_begin, part.y_begin);
+      const bool is_beside = box.x_begin >= part.x_end || box.x_end <= part.x_begin;
+      rows = is_beside ? 0 : max_of(0, min_of(box.y_end, part.y_end) - y_begin);
+    }
+    if (rows > 0) prefetch(memory.edges + memory.faces[face].edge_begin);
+    const int end = warp_inclusive_sum(rows), row = y_begin - part.y_begin;
+    const int32_t place = warp_allocate(&memory.state->num_rows, end);
+    warp_expand(warp, rows, end, [&](int item, int owner, int k) {
+      const int its_row = __shfl_sync(kAllLanes, row, max_of(owner, 0)) + k;
+      if (owner >= 0 && place + item < memory.max_rows) {
+        memory.rows[place + item] = static_cast<Word>(first + owner) << Memory::kHalf | static_cast<Word>(its_row);
+      }
+    });
+  }
+}
+
+// Lists what may become a fragment, where there is room.
+template <typename Memory>
+__device__ void list_candidate(const Memory& memory, int place, int face, int pixel, bool covers_fully) {
+  using Word = typename Memory::Word;
+  if (place >= memory.max_candidates) return;
+  memory.candidates[place] = static_cast<Word>(face) << Memory::kHalf | static_cast<Word>(pixel) |
+                             (covers_fully ? Memory::kCoversFully : Word{0});
+}
+
+// Marks a pixel that a face covers fully, unless one has that buries more. Returns the face that gives way to the
+// other, and may still show before it; -1: none does.
+template <typename Memory>
+__device__ int mark_pixel(const Memory& memory, int face, int x, int y, int pixel) {
+  using Word = typename Memory::Word;
+  const Word mark = PixelWord<Word>::mark(occluder_bound(memory.faces[face], x, y), face);
+  Word had = memory.pixels[pixel];
+  if (had < mark) had = atomicMax(&memory.pixels[pixel], mark);
+  const int other = PixelWord<Word>::marked_face(had);
+  if (other < 0) return -1;
+  const int loser = had < mark ? other : face;
+  const float bound = PixelWord<Word>::marked_bound(had < mark ? mark : had);
+  return passes_occluder_bound(memory.faces[loser], bound, x, y) ? loser : -1;
+}
+
+// A row of a face within a tile: columns from the tile's first on, a byte each, so that lanes hand them on at once.
+static_assert(kTileWidth_px <= 255);
+struct TileSpan {
+  uint32_t bytes = 0;
+  TileSpan() = default;
+  __device__ explicit TileSpan(uint32_t all) : bytes(all) {}
+  __device__ TileSpan(const RowSpan& span, const Part& part) {
+    auto within = [&](int32_t x) {
+      return static_cast<uint32_t>(min_of(max_of(x, part.x_begin), part.x_end) - part.x_begin);
+    };
+    bytes = within(span.begin) | within(span.full_begin) << 8 | within(span.full_end) << 16 | within(span.end) << 24;
+  }
+  __device__ int begin() const { return static_cast<int>(bytes & 0xFF); }
+  __device__ int full_begin() const { return static_cast<int>(bytes >> 8 & 0xFF); }
+  __device__ int full_end() const { return static_cast<int>(bytes >> 16 & 0xFF); }
+  __device__ int end() const { return static_cast<int>(bytes >> 24); }
+  __device__ int num_full() const { return full_end() - full_begin(); }
+  /// Column k of those that are covered partly: some before those that are covered fully, and some behind.
+  __device__ int partial(int k) const { return begin() + k + (begin() + k < full_begin() ? 0 : num_full()); }
+};
+
+// Marks, in a part, of the faces that cover a pixel fully the one that buries most, and lists the pixels that faces
+// cover partly. Rows of a large face stand side by side, so they are dealt out. All threads of the block.
+template <typename Memory>
+__device__ void mark_and_list(const Memory& memory, const Part& part) {
+  using Word = typename Memory::Word;
+  BlockState* state = memory.state;
+  WarpState* warp = &state->warps[warp_index()];
+  const int num_rows = state->num_rows, deals = deals_of<Memory::kThreads>(num_rows);
+  PICTURA_NO_UNROLL
+  for (int deal = warp_index(); deal < deals; deal += Memory::kThreads / kWarpSize) {
+    const int at = lane_index() * deals + deal;
+    Word row = 0;
+    TileSpan span;
+    if (at < num_rows) {
+      row = memory.rows[at];
+      const ScreenFace& face = memory.faces[row >> Memory::kHalf];
+      const int y = part.y_begin + static_cast<int>(row & Memory::kNone);
+      span = TileSpan(row_span(memory.edges + face.edge_begin, face.edge_count, face.box, y), part);
+    }
+    const int full = span.num_full(), partial = span.end() - span.begin() - full;
+    // Both sums at once: neither reaches 2^16.
+    const int ends = warp_inclusive_sum(full | partial << 16), full_end = ends & 0xFFFF, partial_end = ends >> 16;
+    struct SharedRow {
+      int face, y;
+      TileSpan span;
+    };
+    auto row_of = [&](int owner) {
+      const int from = max_of(owner, 0);
+      const Word its_row = __shfl_sync(kAllLanes, row, from);
+      return SharedRow{static_cast<int>(its_row >> Memory::kHalf),
+                       part.y_begin + static_cast<int>(its_row & Memory::kNone),
+                       TileSpan(__shfl_sync(kAllLanes, span.bytes, from))};
+    };
+    warp_expand(warp, full, full_end, [&](int, int owner, int k) {
+      const SharedRow its = row_of(owner);
+      const int x = part.x_begin + its.span.full_begin() + k, pixel = part.pixel(x, its.y);
+      const int loser = owner >= 0 ? mark_pixel(memory, its.face, x, its.y, pixel) : -1;
+      if (!__any_sync(kAllLanes, loser >= 0)) return;
+      const int32_t place = warp_allocate_one(&state->num_candidates, loser >= 0);
+      if (loser >= 0) list_candidate(memory, place, loser, pixel, true);
+    });
+    const int32_t place = warp_allocate(&state->num_candidates, partial_end);
+    warp_expand(warp, partial, partial_end, [&](int item, int owner, int k) {
+      const SharedRow its = row_of(owner);
+      const int pixel = part.pixel(part.x_begin + its.span.partial(k), its.y);
+      if (owner >= 0) list_candidate(memory, place + item, its.face, pixel, false);
+    });
+  }
+}
+
+// Whether a fragment is all that a pixel has.
+template <typename Memory>
+__device__ bool is_alone(const Memory& memory, int fragment, int pixel) {
+  using Word = typename Memory::Word;
+  return memory.pixels[pixel] == PixelWord<Word>::with_first(0, static_cast<Word>(fragment)) &&
+         memory.next[fragment] == static_cast<typename Memory::Index>(Memory::kNone);
+}
+
+// Keeps a fragment, as the first of its pixel's chain. Nobody changes the pixel's full face meanwhile.
+template <typename Memory>
+__device__ void keep_fragment(const Memory& memory, int fragment, uint32_t face, int pixel, uint64_t samples,
+                              float area) {
+  using Index = typename Memory::Index;
+  using Word = typename Memory::Word;
+  memory.samples_low[fragment] = static_cast<uint32_t>(samples);
+  memory.samples_high[fragment] = static_cast<uint32_t>(samples >> 32);
+  memory.area[fragment] = area;
+  memory.face[fragment] = static_cast<Index>(face);
+  memory.pixel[fragment] = static_cast<Index>(pixel);
+  Word* const word = &memory.pixels[pixel];
+  const Word before = atomicExch(word, PixelWord<Word>::with_first(*word, static_cast<Word>(fragment)));
+  memory.next[fragment] = static_cast<Index>(first_of_word<Memory>(before));
+}
+
+// Makes a fragment of each lane's candidate, unless its face leaves nothing in the pixel.
+template <typename Memory>
+__device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, const Part& part) {
+  const int pixel = Memory::pixel_of(candidate.b);
+  PixelCoverage coverage;
+  if (candidate.is_one) {
+    const ScreenFace& face = memory.faces[candidate.a];
+    coverage = Memory::covers_fully(candidate.b) ? PixelCoverage{1.0f, kAllSamples}
+                                                 : pixel_coverage(memory.edges + face.edge_begin, face.edge_count,
+                                                                  face.min_area(), part.x_of(pixel), part.y_of(pixel));
+  }
+  const bool is_left = coverage.area > 0.0f;
+  const int32_t fragment = warp_allocate_one(&memory.state->num_fragments, is_left);
+  if (!is_left || fragment >= memory.max_fragments) return;
+  keep_fragment(memory, fragment, candidate.a, pixel, coverage.samples, coverage.area);
+}
+
+// Makes fragments of those candidates that may show before what covers their pixel fully. Threads put them aside until
+// every lane of a warp has one. All threads of the block.
+template <typename Memory>
+__device__ void make_fragments(const Memory& memory, const Part& part) {
+  WarpQueue shown(&memory.state->warps[warp_index()].queue);
+  const int count = memory.state->num_candidates;
+  PICTURA_NO_UNROLL
+  for (int first = warp_index() * kWarpSize;; first += Memory::kThreads) {
+    const int i = first + lane_index();
+    const bool more = i - lane_index() < count;
+    bool shows = false;
+    uint32_t face = 0, place = 0;
+    if (i < count) {
+      const auto candidate = memory.candidates[i];
+      face = static_cast<uint32_t>(candidate >> Memory::kHalf);
+      place = static_cast<uint32_t>(candidate & Memory::kNone);
+      const int pixel = Memory::pixel_of(place);
+      const auto full = full_of(memory, pixel);
+      const int x = part.x_of(pixel), y = part.y_of(pixel);
+      shows = full == Memory::kNone ||
+              passes_occluder_bound(memory.faces[face], occluder_bound(memory.faces[full], x, y), x, y);
+    }
+    shown.push(shows, face, place);
+    if (shown.is_ready() || (!more && !shown.is_empty())) make_fragment(memory, shown.take(), part);
+    if (!more) return;
+  }
+}
+
+// What is free of each fragment is all that it reaches, before others hide some. Where one covers its pixel, it may
+// intersect the pixel's full face, which then becomes a fragment too. Lists the pixels of whose fragments none is
+// alone.
+template <typename Memory>
+__device__ void finish_fragments(const Memory& memory, int count) {
+  using Index = typename Memory::Index;
+  using Word = typename Memory::Word;
+  auto free_all = [&](int fragment) {
+    const uint64_t reach = reach_of(memory.coverage(fragment));
+    memory.free_low[fragment] = static_cast<uint32_t>(reach);
+    memory.free_high[fragment] = static_cast<uint32_t>(reach >> 32);
+  };
+  PICTURA_NO_UNROLL
+  for (int first = warp_index() * kWarpSize; first < count; first += Memory::kThreads) {
+    const int i = first + lane_index();
+    // The last of a chain stands for its pixel.
+    const bool is_listed =
+        i < count && memory.next[i] == static_cast<Index>(Memory::kNone) && !is_alone(memory, i, memory.pixel[i]);
+    const int32_t place = warp_allocate_one(&memory.state->num_drawn, is_listed);
+    if (is_listed) memory.drawn[place] = memory.pixel[i];
+    if (i >= count) continue;
+    free_all(i);
+    if (!memory.coverage(i).is_full()) continue;
+    const int pixel = memory.pixel[i];
+    const Word full = full_of_word<Memory>(atomicAnd(&memory.pixels[pixel], ~PixelWord<Word>::kFace));
+    if (full == Memory::kNone) continue;
+    const int32_t added = count + atomicAdd(&memory.state->num_added, 1);
+    if (added >= memory.max_fragments) continue;
+    keep_fragment(memory, added, static_cast<uint32_t>(full), pixel, kAllSamples, 1.0f);
+    free_all(added);
+  }
+}
+
+}  // namespace pictura::cuda

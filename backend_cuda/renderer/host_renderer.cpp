@@ -1,0 +1,79 @@
+// The CUDA renderer for callers whose scenes and images lie in host memory: it stages them through the device and
+// waits. What the device would only notice later is checked on the host, with the oracle's checks.
+#include <memory>
+
+#include "pictura/common/cuda/device_scene.h"
+#include "pictura/common/error.h"
+#include "pictura/common/raster/check.h"
+#include "pictura/common/raster/host_geometries.h"
+
+namespace pictura {
+
+std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config, std::string* origin_out);
+std::unique_ptr<Renderer> make_cuda_renderer_for_host(const RendererConfig& config, std::string* origin_out);
+
+namespace {
+
+class HostRendererCuda final : public Renderer {
+ public:
+  HostRendererCuda(const RendererConfig& config, std::string* origin_out)
+      : renderer_(make_cuda_renderer(config, origin_out)) {}
+  std::string_view name() const override { return renderer_->name(); }
+  MemorySpace space() const override { return MemorySpace::host; }
+  const RendererConfig& config() const override { return renderer_->config(); }
+
+  GeometryHandle upload(const StaticGeometry& geometry) override {
+    renderer_->upload(geometry);
+    return geometries_.add(geometry);
+  }
+
+  void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override {
+    check_images(name(), config().rig, space(), views.size(), images_out, /*draws_f16=*/true);
+    check_input(scene, views);
+    const auto queue = static_cast<cudaStream_t>(stream.handle);
+    renderer_->render(scene_.assign(scene, queue), views_.assign(views, queue), images_.like(images_out), stream);
+    images_.copy_to_host(images_out, queue);
+    check();
+  }
+
+  void check() override { renderer_->check(); }
+
+  void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
+                  Span<float> visibility_out, Stream stream) override {
+    check_input(scene, views);
+    check_queries(name(), scene, views, queries, visibility_out.size());
+    const auto queue = static_cast<cudaStream_t>(stream.handle);
+    const Span<float> result = visibility_.resize(queries.size());
+    renderer_->visibility(scene_.assign(scene, queue), views_.assign(views, queue), queries_.assign(queries, queue),
+                          result, stream);
+    if (!queries.empty()) {
+      PICTURA_CUDA(cudaMemcpyAsync(visibility_out.data(), result.data(), result.size() * sizeof(float),
+                                   cudaMemcpyDeviceToHost, queue));
+    }
+    check();
+  }
+
+ private:
+  void check_input(const SceneBatch& scene, Span<const View> views) const {
+    device_.check_current("renderer cuda");
+    check_scene(name(), scene, geometries_.views());
+    check_views(name(), scene, views);
+  }
+
+  CurrentDevice device_;
+  std::unique_ptr<Renderer> renderer_;
+  HostGeometries geometries_;  // for checks, with the device's handles
+  DeviceScene scene_;
+  DeviceImages images_;
+  DeviceCopy<View> views_;
+  DeviceCopy<VisibilityQuery> queries_;
+  DeviceCopy<float> visibility_;
+};
+
+}  // namespace
+
+std::unique_ptr<Renderer> make_cuda_renderer_for_host(const RendererConfig& config, std::string* origin_out) {
+  return std::make_unique<HostRendererCuda>(config, origin_out);
+}
+
+}  // namespace pictura

@@ -1,0 +1,90 @@
+// Which images wait for what: for their tiles to be drawn, the most crowded first, for the pool to be free again, or
+// for a block with room for a whole map; and the places that an image takes in the pool.
+#pragma once
+
+#include "pictura/backend_cuda/renderer/face_setup.cuh"
+#include "pictura/backend_cuda/renderer/rig.cuh"
+
+namespace pictura::cuda {
+
+__device__ inline int32_t view_of(const DrawTask& task, int32_t image) {
+  return task.first_view + image / num_cameras(task);
+}
+__device__ inline int32_t camera_of(const DrawTask& task, int32_t image) { return image % num_cameras(task); }
+
+// Leaves an image to the blocks with room for a whole map.
+__device__ inline void mark_overflowed(const DrawTask& task, int32_t image) {
+  task.overflow_images[atomicAdd(&task.counters->overflow, 1)] = image;
+}
+
+// Leaves an image for which the pool has no room until it is free again.
+__device__ inline void defer(const DrawTask& task, int32_t image) {
+  task.deferred_images[atomicAdd(&task.counters->deferred, 1)] = image;
+}
+
+// The images that are drawn from the pool, by classes of how much they list.
+__device__ inline int32_t* images_of_bucket(const DrawTask& task, int bucket) {
+  return task.drawn_images + static_cast<int64_t>(bucket) * task.num_views * num_cameras(task);
+}
+__device__ inline void list_drawn(const DrawTask& task, int32_t image, int32_t listed) {
+  const int bucket = min_of(listed / kFacesPerCostBucket, kNumCostBuckets - 1);
+  images_of_bucket(task, bucket)[atomicAdd(&task.counters->cost_buckets[bucket], 1)] = image;
+}
+// Goes through them, the most crowded first.
+class DrawOrder {
+ public:
+  __device__ explicit DrawOrder(const DrawTask& task) : task_(task) {}
+  /// The image whose turn it is, no earlier than that of the call before; -1 after the last.
+  __device__ int32_t image_of(int32_t turn) {
+    const int32_t* cost_buckets = task_.counters->cost_buckets;
+    PICTURA_NO_UNROLL
+    for (; bucket_ >= 0; --bucket_) {
+      const int32_t count = cost_buckets[bucket_];
+      if (turn - begin_ < count) return images_of_bucket(task_, bucket_)[turn - begin_];
+      begin_ += count;
+    }
+    return -1;
+  }
+
+ private:
+  const DrawTask& task_;
+  int bucket_ = kNumCostBuckets - 1;
+  int32_t begin_ = 0;  // the first turn of the bucket
+};
+
+// Takes room for the faces of an image of which so many things may show, and lists it to be drawn. Its first batch, or
+// -1 where it has to wait. One thread.
+__device__ inline int32_t allocate_faces(const DrawTask& task, int32_t image, int32_t listed) {
+  BlockState* state = block_state();
+  FaceSetupContext* context = &state->context;
+  PreparedImage* out = task.pool.images + image;
+  *out = {.face_count = kNotPrepared};
+  if (listed > kMaxEntries) {
+    mark_overflowed(task, image);
+    return -1;
+  }
+  DrawCounters* counters = task.counters;
+  const int32_t face_begin = atomicAdd(&counters->faces, listed);
+  if (face_begin + listed > task.pool.max_faces) {
+    defer(task, image);
+    return -1;
+  }
+  const int32_t first_batch = atomicAdd(&counters->batches, FaceBatch::count_of(listed));
+  list_drawn(task, image, listed);
+  context->faces = task.pool.faces + face_begin;
+  context->edges = task.pool.edges;
+  context->num_faces = &out->face_count;
+  context->num_clipped = &counters->clipped_edges;
+  context->edge_begin = 4 * face_begin;
+  context->clipped_begin = 4 * task.pool.max_faces;
+  context->clipped_end = task.pool.max_edges;
+  *out = image_of(*state, face_begin, 0);
+  return first_batch;
+}
+
+// The entries of an image.
+__device__ inline uint32_t* entries_of(const SetupLists& lists, int32_t image) {
+  return lists.entries + static_cast<int64_t>(image) * lists.max_entries;
+}
+
+}  // namespace pictura::cuda

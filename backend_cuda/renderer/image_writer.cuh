@@ -1,0 +1,110 @@
+// How pixels are written: as bytes, halves or floats, a plane for each channel, several side by side at once; or not
+// at all.
+#pragma once
+
+#include "pictura/backend_cuda/renderer/fragments.cuh"
+#include "pictura/common/portable/intrinsics.h"
+
+namespace pictura::cuda {
+
+/// Writes pixels of an image, a plane for each channel.
+struct ImageWriter {
+  PixelFormat format;
+  void* images;
+  int64_t first, plane;  // elements: of this image, and from a plane to the next
+  int width_px;
+
+  /// Keeps the colour that a fragment gives its pixel.
+  template <typename Memory>
+  __device__ void keep(const Memory& memory, int fragment, Rgb color) const {
+    if (format == PixelFormat::u8) {
+      memory.set_color_bytes(fragment, to_bytes(color));
+    } else {
+      memory.set_color(fragment, color);
+    }
+  }
+
+  /// Writes at most kWrittenAtOnce pixels side by side, given their words.
+  template <typename Memory>
+  __device__ void pixels(const Memory& memory, int x, int y, int count, const typename Memory::Word* words) const {
+    const int64_t at = first + static_cast<int64_t>(y) * width_px + x;
+    if (format == PixelFormat::u8) {
+      write_bytes(memory, static_cast<uint8_t*>(images) + at, count, words);
+    } else if (format == PixelFormat::f16) {
+      write_numbers(memory, static_cast<uint16_t*>(images) + at, count, words, [](float v) { return to_half(v); });
+    } else {
+      write_numbers(memory, static_cast<float*>(images) + at, count, words, [](float v) { return saturate(v); });
+    }
+  }
+
+ private:
+  template <typename Value>
+  struct alignas(kWrittenAtOnce * sizeof(Value)) Together {
+    Value value[kWrittenAtOnce];
+  };
+
+  template <typename Memory>
+  __device__ void write_bytes(const Memory& memory, uint8_t* to, int count, const typename Memory::Word* words) const {
+    // Many warps write nothing but black.
+    uint32_t bytes[kWrittenAtOnce] = {};
+    typename Memory::Word some = 0;
+    for (int i = 0; i < kWrittenAtOnce; ++i) some |= words[i];
+    for (int i = 0; i < kWrittenAtOnce && some != 0; ++i) {
+      const auto full = full_of_word<Memory>(words[i]), head = first_of_word<Memory>(words[i]);
+      bytes[i] = head != Memory::kNone   ? memory.color_bytes(static_cast<int>(head))
+                 : full != Memory::kNone ? memory.faces[full].color_bytes
+                                         : 0u;
+    }
+    store_channels(to, count, [&](int i, int channel) { return static_cast<uint8_t>(bytes[i] >> (8 * channel)); });
+  }
+
+  template <typename Memory, typename Value, typename ValueOf>
+  __device__ void write_numbers(const Memory& memory, Value* to, int count, const typename Memory::Word* words,
+                                ValueOf&& value_of) const {
+    Rgb colors[kWrittenAtOnce];
+    for (int i = 0; i < kWrittenAtOnce; ++i) {
+      const auto full = full_of_word<Memory>(words[i]), head = first_of_word<Memory>(words[i]);
+      if (head != Memory::kNone) {
+        colors[i] = memory.color(static_cast<int>(head));
+      } else if (full != Memory::kNone) {
+        colors[i] = memory.faces[full].color;
+      }
+    }
+    store_channels(to, count, [&](int i, int channel) {
+      return value_of(channel == 0 ? colors[i].r : channel == 1 ? colors[i].g : colors[i].b);
+    });
+  }
+
+  // value_of(i, channel): of the i-th pixel.
+  template <typename Value, typename ValueOf>
+  __device__ void store_channels(Value* to, int count, ValueOf&& value_of) const {
+    PICTURA_NO_UNROLL
+    for (int channel = 0; channel < 3; ++channel, to += plane) {
+      Together<Value> values;
+      for (int i = 0; i < kWrittenAtOnce; ++i) values.value[i] = value_of(i, channel);
+      store(to, count, values);
+    }
+  }
+
+  // At once where all are written and lie where such a store may go.
+  template <typename Value>
+  __device__ static void store(Value* to, int count, const Together<Value>& values) {
+    if (count == kWrittenAtOnce && reinterpret_cast<uintptr_t>(to) % sizeof(values) == 0) {
+      *reinterpret_cast<Together<Value>*>(to) = values;
+      return;
+    }
+    for (int i = 0; i < kWrittenAtOnce; ++i) {
+      if (i < count) to[i] = values.value[i];
+    }
+  }
+};
+
+/// Writes nothing.
+struct NoImage {
+  template <typename Memory>
+  __device__ void keep(const Memory&, int, Rgb) const {}
+  template <typename Memory>
+  __device__ void pixels(const Memory&, int, int, int, const typename Memory::Word*) const {}
+};
+
+}  // namespace pictura::cuda

@@ -1,0 +1,54 @@
+#include "pictura/backend_cuda/renderer/kernel_library.h"
+
+#include "pictura/backend_cuda/renderer/kernel_build.h"
+#include "pictura/common/cuda/check.h"
+
+namespace pictura::cuda {
+
+namespace {
+
+int compute_capability() {
+  const int device = CurrentDevice().number();
+  int major = 0, minor = 0;
+  PICTURA_CUDA(cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, device));
+  PICTURA_CUDA(cudaDeviceGetAttribute(&minor, cudaDevAttrComputeCapabilityMinor, device));
+  return 10 * major + minor;
+}
+
+KernelTarget target_of(const Rig& rig) {
+  KernelTarget target{compute_capability(), static_cast<int>(rig.cameras.size())};
+  const Camera& first = rig.cameras.front();
+  for (const Camera& camera : rig.cameras) {
+    if (camera.width_px != first.width_px || camera.height_px != first.height_px) return target;
+  }
+  target.width_px = first.width_px;
+  target.height_px = first.height_px;
+  return target;
+}
+
+}  // namespace
+
+KernelLibrary::KernelLibrary(const Rig& rig) {
+  const std::string why_not = nvrtc_unavailable();
+  if (!why_not.empty()) {
+    kernels_ = ahead_of_time_kernels();
+    origin_ = fmt::format("kernels built ahead of time, for {} ({})", PICTURA_CUDA_ARCHITECTURES, why_not);
+    const cudaError_t status = prepare_kernels(&kernels_);
+    PICTURA_CHECK(status == cudaSuccess, "renderer cuda: {} do not run on a device of compute capability {}: {}",
+                  origin_, compute_capability(), cudaGetErrorString(status));
+    return;
+  }
+  const KernelCode code = build_kernels(renderer_program(), target_of(rig));
+  cudaLibrary_t library = nullptr;
+  PICTURA_CUDA(cudaLibraryLoadData(&library, code.bytes.data(), nullptr, nullptr, 0, nullptr, nullptr, 0));
+  library_.reset(library);
+  for (std::size_t i = 0; i < kKernelNames.size(); ++i) {
+    cudaKernel_t handle = nullptr;
+    PICTURA_CUDA(cudaLibraryGetKernel(&handle, library, kKernelNames[i]));
+    kernels_.handle[i] = reinterpret_cast<const void*>(handle);
+  }
+  PICTURA_CUDA(prepare_kernels(&kernels_));
+  origin_ = fmt::format("kernels {} for {} and this rig", code.cached ? "built earlier" : "built", code.architecture);
+}
+
+}  // namespace pictura::cuda

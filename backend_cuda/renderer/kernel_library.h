@@ -1,0 +1,33 @@
+// The renderer's kernels on a device: those built for its rig by NVRTC, or those built ahead of time.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <type_traits>
+
+#include "pictura/backend_cuda/renderer/launch.h"
+#include "pictura/common/camera.h"
+
+namespace pictura::cuda {
+
+/// Owns the code that its kernels are in.
+class KernelLibrary {
+ public:
+  /// Builds the kernels for the current device and the rig; where NVRTC is missing, takes those of this program. Throws
+  /// Error where those do not run on the device.
+  explicit KernelLibrary(const Rig& rig);
+
+  const KernelSet& kernels() const { return kernels_; }
+  /// Where they come from, for people.
+  const std::string& origin() const { return origin_; }
+
+ private:
+  struct Unload {
+    void operator()(cudaLibrary_t library) const { cudaLibraryUnload(library); }
+  };
+  std::unique_ptr<std::remove_pointer_t<cudaLibrary_t>, Unload> library_;
+  KernelSet kernels_;
+  std::string origin_;
+};
+
+}  // namespace pictura::cuda

@@ -1,0 +1,35 @@
+// The drawing kernels as the host sees them: where they come from, how much memory they want, and their launches. All
+// launches are put on a stream and wait for nothing.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include <cuda_runtime_api.h>
+
+#include "pictura/backend_cuda/renderer/kernel_arguments.h"
+#include "pictura/backend_cuda/renderer/kernel_sources.h"
+
+namespace pictura::cuda {
+
+/// The kernels' handles: symbols of this program, or cudaKernel_t of code that was loaded.
+struct KernelSet {
+  std::array<const void*, kNumKernels> handle{};
+  bool may_begin_early = false;  // a launch of theirs, while the one before it ends
+};
+
+/// Those that were compiled with this program, for any rig.
+KernelSet ahead_of_time_kernels();
+/// What is to be done once before the first launch; fails where the kernels do not run on the device.
+cudaError_t prepare_kernels(KernelSet* kernels);
+
+/// Bytes that a block of the last launch needs besides faces and edges.
+std::size_t large_block_bytes(const Scratch& large);
+
+/// Draws all images, in six launches.
+cudaError_t launch_draw(const KernelSet& kernels, DrawTask task, const Scratch& large, int processors,
+                        cudaStream_t stream);
+cudaError_t launch_visibility(const KernelSet& kernels, const VisibilityTask& task, const Scratch& large,
+                              cudaStream_t stream);
+
+}  // namespace pictura::cuda

@@ -1,0 +1,307 @@
+// From fragments to pixels: every two fragments of a pixel are asked what they hide of each other, then each pixel sums
+// up what its fragments weigh.
+#pragma once
+
+#include "pictura/backend_cuda/renderer/fragments.cuh"
+
+namespace pictura::cuda {
+
+// Whether, in the image that the block draws, a solid stands on a strip.
+__device__ __noinline__ inline bool stands(uint32_t solid, uint32_t strip) {
+  const PreparedImage& shown = block_state()->shown;
+  const StaticGeometryView& pieces = shown.geometry->pieces;
+  return stands_on(extent_of(solid, pieces, shown.agents), extent_of(strip, pieces, shown.agents), shown.eye_m);
+}
+
+// Takes samples from a fragment's free ones.
+template <typename Memory>
+__device__ void clear_visible_samples(const Memory& memory, uint32_t fragment, uint64_t samples) {
+  const auto low = static_cast<uint32_t>(samples), high = static_cast<uint32_t>(samples >> 32);
+  if (low != 0) atomicAnd(&memory.free_low[fragment], ~low);
+  if (high != 0) atomicAnd(&memory.free_high[fragment], ~high);
+}
+
+// Asks pairs of fragments what they hide of each other; b may be kNone, for the pixel's full face.
+template <typename Memory>
+__device__ __noinline__ void resolve_pairs(WarpQueue::Pair pair, Part part) {
+  if (!pair.is_one) return;
+  const Memory memory = Memory::current();
+  const int pixel = memory.pixel[pair.a];
+  const bool with_full = pair.b == Memory::kNone;
+  const size_t face_b = with_full ? full_of(memory, pixel) : memory.face[pair.b];
+  const PixelCoverage a = memory.coverage(static_cast<int>(pair.a));
+  const PixelCoverage b = with_full ? PixelCoverage{1.0f, kAllSamples} : memory.coverage(static_cast<int>(pair.b));
+  const Vec2 corner{static_cast<float>(part.x_of(pixel)), static_cast<float>(part.y_of(pixel))};
+  const Hidden hidden = hide_each_other(a, b, memory.faces[memory.face[pair.a]], memory.faces[face_b], corner,
+                                        [](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
+  clear_visible_samples(memory, pair.a, hidden.of_a);
+  if (!with_full) clear_visible_samples(memory, pair.b, hidden.of_b);
+}
+
+// Asks every two fragments of a pixel what they hide of each other, unless nothing is left that they might; a pixel's
+// full face is one of them. A lane walks the rest of the chain behind a fragment, one step at a time, and takes the
+// next fragment at its end; the last made first, because theirs are the longest ways. Pairs that meet are put aside
+// until every lane of the warp has one.
+template <typename Memory>
+__device__ void hide_fragments(const Memory& memory, const Part& part, int count) {
+  WarpQueue pairs(&memory.state->warps[warp_index()].queue);
+  int begin = 0, used = kWarpSize;  // the warp's fragments of the list, and how many of them lanes have taken
+  int fragment = 0;
+  uint32_t other = Memory::kNone;  // of the chain
+  bool is_before_full = false;     // the full face comes first
+  uint64_t samples = 0;
+  PICTURA_NO_UNROLL
+  for (;;) {
+    const bool is_idle = !is_before_full && other == Memory::kNone;
+    const unsigned idle = __ballot_sync(kAllLanes, is_idle);
+    if (idle == kAllLanes && begin >= count) break;
+    if (used >= kWarpSize && begin < count) {
+      begin = next_of(&memory.state->next_fragments) * kWarpSize;
+      used = 0;
+    }
+    const int place = used + __popc(idle & lanes_below());
+    used += __popc(idle);
+    if (is_idle && place < kWarpSize && begin + place < count) {
+      fragment = count - 1 - (begin + place);
+      samples = memory.samples(fragment);
+      other = memory.next[fragment];
+      is_before_full = full_of(memory, memory.pixel[fragment]) != Memory::kNone;
+    }
+    uint32_t with = Memory::kNone;
+    bool meet = is_before_full && memory.free(fragment) != 0;
+    if (!is_before_full && other != Memory::kNone) {
+      with = other;
+      const auto its = static_cast<int>(with);
+      meet = may_hide_more(memory.free(fragment), samples, memory.free(its), memory.samples(its));
+      other = memory.next[with];
+    }
+    is_before_full = false;
+    pairs.push(meet, static_cast<uint32_t>(fragment), with);
+    if (pairs.is_ready()) resolve_pairs<Memory>(pairs.take(), part);
+  }
+  if (!pairs.is_empty()) resolve_pairs<Memory>(pairs.take(), part);
+}
+
+/// Hears of no fragment's weight.
+struct NoVisit {
+  static constexpr bool kWanted = false;
+  __device__ void operator()(const ScreenFace&, float) const {}
+};
+
+// Weighs fragments. What is alone in its pixel gives that its colour; what the others add to the sums of theirs, and
+// what kind of weight that is, stands from then on where their samples and pixels did.
+template <typename Memory, typename Visit, typename Write>
+__device__ void composite_fragments(const Memory& memory, int count, const Visit& visit, const Write& write) {
+  PICTURA_NO_UNROLL
+  for (int i = static_cast<int>(threadIdx.x); i < count; i += Memory::kThreads) {
+    const ScreenFace& face = memory.faces[memory.face[i]];
+    const Rgb color = face.color;
+    if (is_alone(memory, i, memory.pixel[i])) {
+      visit(face, memory.area[i]);
+      write.keep(memory, i, color * memory.area[i]);
+      continue;
+    }
+    const PixelAccumulator::Weight weight = PixelAccumulator::weight_of(memory.coverage(i), memory.free(i));
+    memory.set_part(i, PixelAccumulator::part_of(weight, color));
+    memory.area[i] = weight.area;
+    memory.kind[i] = weight.kind;
+  }
+}
+
+// Mixes the colours of those pixels of a part that have more than one fragment: visit(face, weight) hears of each.
+template <typename Memory, typename Visit, typename Write>
+__device__ void mix_pixels(const Memory& memory, const Visit& visit, const Write& write) {
+  const int num_drawn = memory.state->num_drawn;
+  PICTURA_NO_UNROLL
+  for (int d = static_cast<int>(threadIdx.x); d < num_drawn; d += Memory::kThreads) {
+    const int pixel = memory.drawn[d];
+    const auto full = full_of(memory, pixel);
+    const auto head = static_cast<int>(first_of(memory, pixel));
+    auto each_fragment = [&](auto&& take) {
+      PICTURA_NO_UNROLL
+      for (auto i = first_of(memory, pixel); i != Memory::kNone; i = memory.next[i]) {
+        take(static_cast<int>(i), static_cast<PixelAccumulator::Kind>(memory.kind[i]));
+      }
+    };
+    // Nothing hides the full face but what covers the pixel too, and then it is a fragment.
+    const PixelAccumulator::Weight of_full = PixelAccumulator::weight_of({1.0f, kAllSamples}, kAllSamples);
+    PixelAccumulator sum;
+    if (full != Memory::kNone) sum.add(of_full, memory.faces[full].color);
+    each_fragment([&](int i, PixelAccumulator::Kind kind) { sum.add(kind, memory.part(i)); });
+    const PixelAccumulator::Shares shares = sum.shares();
+    if constexpr (Visit::kWanted) {
+      if (full != Memory::kNone) visit(memory.faces[full], shares.of(of_full));
+      each_fragment([&](int i, PixelAccumulator::Kind kind) {
+        visit(memory.faces[memory.face[i]], shares.of({memory.area[i], kind}));
+      });
+    }
+    write.keep(memory, head, sum.color(shares));
+  }
+}
+
+// Hands on the pixels of a part, a few side by side for each thread, and marks none from then on.
+template <typename Memory, typename Visit, typename Write>
+__device__ void write_pixels(const Memory& memory, const Part& part, const Visit& visit, const Write& write) {
+  using Word = typename Memory::Word;
+  const int pixels = part.num_pixels();
+  PICTURA_NO_UNROLL
+  for (int first = kWrittenAtOnce * static_cast<int>(threadIdx.x); first < pixels;
+       first += kWrittenAtOnce * Memory::kThreads) {
+    const int x = part.x_of(first), y = part.y_of(first), count = min_of(part.x_end - x, kWrittenAtOnce);
+    Word word[kWrittenAtOnce];
+    for (int i = 0; i < kWrittenAtOnce; ++i) {
+      word[i] = memory.pixels[first + i];
+      memory.pixels[first + i] = 0;
+      if constexpr (Visit::kWanted) {
+        const Word full = full_of_word<Memory>(word[i]);
+        if (i < count && full != Memory::kNone && first_of_word<Memory>(word[i]) == Memory::kNone) {
+          visit(memory.faces[full], 1.0f);
+        }
+      }
+    }
+    if (count > 0) write.pixels(memory, x, y, count, word);
+  }
+}
+
+// Nothing is listed.
+template <typename Memory>
+__device__ void reset_counts(const Memory& memory) {
+  BlockState* state = memory.state;
+  if (threadIdx.x != 0) return;
+  state->num_rows = state->num_candidates = state->num_fragments = state->num_added = state->num_drawn = 0;
+  state->next_fragments = 0;
+}
+// What a part finds when it begins: nothing is marked, nothing listed. For a block's first part, and after one that was
+// given up. All threads of the block.
+template <typename Memory>
+__device__ void reset_part(const Memory& memory) {
+  sync_block();
+  PICTURA_NO_UNROLL
+  for (int p = static_cast<int>(threadIdx.x); p < memory.max_pixels; p += Memory::kThreads) memory.pixels[p] = 0;
+  reset_counts(memory);
+  sync_block();
+}
+
+// Makes the fragments of the listed rows and mixes the colours of their pixels. False where there is no room for all
+// that is listed. All threads of the block.
+template <typename Memory, typename Visit, typename Write>
+__device__ bool mix_rows(const Memory& memory, const Part& part, const Visit& visit, const Write& write) {
+  BlockState* state = memory.state;
+  if (state->num_rows > memory.max_rows) return false;
+  mark_and_list(memory, part);
+  sync_block();
+  if (state->num_candidates > memory.max_candidates) return false;
+  make_fragments(memory, part);
+  sync_block();
+  const int made = state->num_fragments;
+  if (made > memory.max_fragments) return false;
+  finish_fragments(memory, made);
+  sync_block();
+  const int count = made + state->num_added;
+  if (count > memory.max_fragments) return false;
+  hide_fragments(memory, part, count);
+  sync_block();
+  composite_fragments(memory, count, visit, write);
+  sync_block();
+  mix_pixels(memory, visit, write);
+  sync_block();
+  return true;
+}
+
+// Draws the faces into one part, and leaves all as a next one is to find it, once all threads have come so far. False,
+// and nothing left so, where it has no room for all that it lists. All threads of the block.
+template <typename Memory, typename Visit, typename Write>
+__device__ bool draw_part(const Memory& memory, int num_faces, const Part& part, const Visit& visit,
+                          const Write& write) {
+  list_rows(memory, num_faces, part);
+  sync_block();
+  // Counters of nothing are 0 already, and others may still be asking.
+  if (memory.state->num_rows != 0) {
+    if (!mix_rows(memory, part, visit, write)) return false;
+    reset_counts(memory);
+  }
+  write_pixels(memory, part, visit, write);
+  return true;
+}
+
+// Plans the part of a tile to draw after one that was drawn, or for which there was no room: narrower ones first,
+// because what is far away crowds along the horizon, then lower ones. False where there is no room for a single pixel.
+// All threads of the block.
+template <typename Memory>
+__device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn) {
+  constexpr int kNarrowPart_px = 2 * kWrittenAtOnce;
+  const Memory memory = Memory::current();
+  auto half_of = [](int size) { return (size + 1) / 2; };
+  sync_block();
+  if (threadIdx.x == 0) {
+    PartPlan& plan = memory.state->plan;
+    const int columns = part.num_columns(), rows = part.num_rows();
+    if (columns == whole.num_columns() && rows == whole.num_rows()) plan = {whole.x_begin, columns, columns, rows};
+    int x = part.x_begin, y = part.y_begin;
+    if (is_drawn) {
+      // Along the rows, then down the band, then to the next one.
+      const int band_end = min_of(plan.band_begin + plan.band_px, whole.x_end);
+      x = part.x_end;
+      if (x == band_end) {
+        plan.wide_px = plan.band_px;
+        plan.rows = min_of(2 * plan.rows, whole.num_rows());
+        y = part.y_end;
+        if (y == whole.y_end) {
+          plan.band_begin = band_end;
+          plan.rows = whole.num_rows();
+          y = whole.y_begin;
+        }
+        x = plan.band_begin;
+      }
+    } else if (rows == whole.num_rows() && columns > kNarrowPart_px) {
+      plan.band_px = plan.wide_px = (half_of(columns) + kWrittenAtOnce - 1) / kWrittenAtOnce * kWrittenAtOnce;
+    } else if (rows > 1) {
+      plan.rows = half_of(rows);
+    } else {
+      plan.wide_px = half_of(columns);
+    }
+    plan.part = {x, min_of(x + plan.wide_px, min_of(plan.band_begin + plan.band_px, whole.x_end)), y,
+                 min_of(y + plan.rows, whole.y_end)};
+  }
+  if (is_drawn) {
+    sync_block();
+  } else {
+    reset_part(memory);
+  }
+  return is_drawn || part.num_columns() > 1 || part.num_rows() > 1;
+}
+
+// Draws the faces into a part of an image, in smaller ones where there is no room for all of it. visit(face, weight)
+// hears of each fragment, write.keep(memory, fragment, colour) of what fragments give their pixels, and
+// write.pixels(memory, x, y, count, words) of pixels side by side. False where there is no room for a single pixel. All
+// threads of the block, which then wait for each other before the next.
+template <typename Memory, typename Visit, typename Write>
+__device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whole, const Visit& visit,
+                           const Write& write) {
+  Part part = whole;
+  PICTURA_NO_UNROLL
+  for (;;) {
+    const bool is_drawn = draw_part(memory, num_faces, part, visit, write);
+    if (is_drawn && part.x_end == whole.x_end && part.y_end == whole.y_end) return true;
+    if (!plan_next_part<Memory>(whole, part, is_drawn)) return false;
+    part = memory.state->plan.part;
+  }
+}
+
+// Tiles of an image as high as there is room for, one after the other: draw(memory, tile) for each, until one is false.
+template <typename Memory, typename Draw>
+__device__ bool each_tile(const Memory& memory, int width_px, int y_begin, int y_end, const Draw& draw) {
+  const int max_rows = memory.max_pixels / kTileWidth_px;
+  reset_part(memory);
+  PICTURA_NO_UNROLL
+  for (int y = y_begin; y < y_end; y += max_rows) {
+    PICTURA_NO_UNROLL
+    for (int x = 0; x < width_px; x += kTileWidth_px) {
+      if (!draw(memory, tile_at(x, y, kTileWidth_px, max_rows, width_px, y_end))) return false;
+      sync_block();
+    }
+  }
+  return true;
+}
+
+}  // namespace pictura::cuda

@@ -1,0 +1,243 @@
+// The CUDA renderer's host side: checks, uploads, scratch memory and launches. Scenes, views, queries and images lie in
+// device memory; calls that draw wait for nothing once there is room for them.
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "pictura/backend_cuda/renderer/draw_task.h"
+#include "pictura/backend_cuda/renderer/kernel_library.h"
+#include "pictura/backend_cuda/renderer/launch.h"
+#include "pictura/backend_cuda/renderer/scratch_buffers.h"
+#include "pictura/backend_cuda/renderer/scratch_plan.h"
+#include "pictura/common/cuda/check.h"
+#include "pictura/common/cuda/device_buffer.h"
+#include "pictura/common/error.h"
+#include "pictura/common/raster/check.h"
+
+namespace pictura {
+
+std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config, std::string* origin_out);
+std::string cuda_unavailable();
+
+namespace {
+
+// Of the last launch.
+constexpr int kLargeBlocks = 8;
+// Views that are drawn at once, at most: enough that the last images of a launch, for which few blocks are left to
+// work, do not count.
+constexpr std::size_t kViewsAtOnce = 2048;
+
+// Pieces of one kind in device memory.
+struct UploadedPieces {
+  DeviceBuffer<int32_t> begin, items;
+  DeviceBuffer<cuda::Ball> balls;
+  cuda::PieceGrid view;
+
+  explicit UploadedPieces(const cuda::PieceGrid& host)
+      : begin(host.cells.begin), items(host.cells.items), balls(host.balls), view(host) {
+    view.cells.begin = begin.span();
+    view.cells.items = items.span();
+    view.balls = balls.span();
+  }
+};
+
+// A map's looks in device memory.
+struct UploadedGeometry {
+  DeviceBuffer<Strip> strips;
+  DeviceBuffer<WallFace> walls;
+  DeviceBuffer<LightHead> heads;
+  UploadedPieces strip_pieces, wall_pieces;
+  cuda::DeviceGeometry view;
+
+  explicit UploadedGeometry(const StaticGeometry& host)
+      : strips(host.view().strips),
+        walls(host.view().walls),
+        heads(host.view().heads),
+        strip_pieces(cuda::SortedPieces(host.strips).view()),
+        wall_pieces(cuda::SortedPieces(host.walls).view()) {
+    view.pieces.strips = strips.span();
+    view.pieces.walls = walls.span();
+    view.pieces.heads = heads.span();
+    view.pieces.num_signals = host.num_signals;
+    view.strips = strip_pieces.view;
+    view.walls = wall_pieces.view;
+  }
+  int pieces() const { return static_cast<int>(strips.size() + walls.size() + heads.size()); }
+};
+
+// Scratch memory, and the largest calls that it is for.
+struct ScratchMemory {
+  std::size_t agents = 0, views = 0;
+  int pieces = 0, heads = 0;
+  cuda::ScratchPlan plan;
+  cuda::LargeBuffers<DeviceBuffer> large;
+  cuda::PoolBuffers<DeviceBuffer> pool;
+};
+
+class CudaRenderer final : public Renderer {
+ public:
+  CudaRenderer(const RendererConfig& config, std::string* origin_out)
+      : config_(check_config("cuda", config)), cameras_(pinhole_cameras(config.rig)), library_(config.rig) {
+    PICTURA_CUDA(cudaDeviceGetAttribute(&processors_, cudaDevAttrMultiProcessorCount, device_.number()));
+    *origin_out = library_.origin();
+    ensure_capacity(0, 1);  // what is too little for any scene is told at once
+    *fault_.host() = cuda::kNoFault;
+    counters_.fill(0);
+    PICTURA_CUDA(cudaDeviceSynchronize());  // for whatever stream the first call is on
+  }
+  std::string_view name() const override { return "cuda"; }
+  MemorySpace space() const override { return MemorySpace::cuda; }
+  const RendererConfig& config() const override { return config_; }
+
+  GeometryHandle upload(const StaticGeometry& geometry) override {
+    device_.check_current("renderer cuda");
+    check_geometry(name(), geometry);
+    UploadedGeometry uploaded(geometry);
+    std::vector<cuda::DeviceGeometry> views;
+    for (const UploadedGeometry& each : geometries_) views.push_back(each.view);
+    views.push_back(uploaded.view);
+    DeviceBuffer<cuda::DeviceGeometry> table{Span<const cuda::DeviceGeometry>(views)};
+    geometries_.reserve(views.size());
+    // Frames in flight may read the table that is replaced here.
+    PICTURA_CUDA(cudaDeviceSynchronize());
+    geometry_views_ = std::move(table);
+    geometries_.push_back(std::move(uploaded));
+    return static_cast<GeometryHandle>(geometries_.size()) - 1;
+  }
+
+  void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override {
+    check_call(scene);
+    check_images(name(), config_.rig, space(), views.size(), images_out, /*draws_f16=*/true);
+    cuda::DrawTask task = draw_task(scene, views, &images_out);
+    const auto on_stream = static_cast<cudaStream_t>(stream.handle);
+    clear_counters(on_stream);
+    // In as few parts as there is room for, of one size.
+    const std::size_t max_views = scratch_.plan.views, parts = (views.size() + max_views - 1) / max_views;
+    const auto views_at_once = static_cast<int32_t>((views.size() + parts - 1) / std::max(parts, std::size_t{1}));
+    for (int32_t left = task.num_views; left > 0; left -= task.num_views, task.first_view += task.num_views) {
+      task.num_views = std::min(left, views_at_once);
+      counters_are_clear_ = false;  // where a launch fails
+      PICTURA_CUDA(cuda::launch_draw(library_.kernels(), task, scratch_.large.view(), processors_, on_stream));
+      counters_are_clear_ = true;
+    }
+  }
+
+  void check() override {
+    device_.check_current("renderer cuda");
+    PICTURA_CUDA(cudaDeviceSynchronize());
+    throw_fault();
+  }
+
+  void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
+                  Span<float> visibility_out, Stream stream) override {
+    check_call(scene);
+    check_answers(name(), queries.size(), visibility_out.size());
+    const cuda::VisibilityTask task{draw_task(scene, views, nullptr), queries.data(),
+                                    static_cast<int32_t>(queries.size()), visibility_out.data()};
+    PICTURA_CUDA(cuda::launch_visibility(library_.kernels(), task, scratch_.large.view(),
+                                         static_cast<cudaStream_t>(stream.handle)));
+  }
+
+ private:
+  // What the host can see of a call.
+  void check_call(const SceneBatch& scene) {
+    device_.check_current("renderer cuda");
+    throw_fault();
+    PICTURA_CHECK(scene.space == MemorySpace::cuda, "renderer cuda: scene: expected cuda memory, got host");
+    PICTURA_CHECK(scene.world_begin.empty() || (scene.geometry.size() + 1 == scene.world_begin.size() &&
+                                                scene.light_begin.size() == scene.world_begin.size()),
+                  "renderer cuda: scene: expected a geometry and a range of lights for each of {} worlds",
+                  scene.world_begin.size() - 1);
+  }
+
+  cuda::DrawTask draw_task(const SceneBatch& scene, Span<const View> views, const ImageBatch* images) {
+    const std::size_t images_total = views.size() * config_.rig.cameras.size();
+    PICTURA_CHECK(images_total < (std::size_t{1} << 31), "renderer cuda: expected fewer than 2^31 images, got {}",
+                  images_total);
+    ensure_capacity(scene.agents.size(), views.size());
+    cuda::DrawTask task = cuda::make_draw_task(config_, cameras_, scene, views, images);
+    task.geometries = geometry_views_.data();
+    task.num_geometries = static_cast<int32_t>(geometries_.size());
+    task.fault = fault_.device();
+    scratch_.pool.serve(&task);
+    task.counters = counters_.data();
+    return task;
+  }
+
+  // Counters are 0 before each call; the last launch leaves them so, unless one before it failed.
+  void clear_counters(cudaStream_t stream) {
+    if (counters_are_clear_) return;
+    PICTURA_CUDA(cudaMemsetAsync(counters_.data(), 0, sizeof(cuda::DrawCounters), stream));
+    counters_are_clear_ = true;
+  }
+
+  // Memory for as many views as the bound allows, and in the last launch for all that a world can hold: after this
+  // nothing is cut off. Allocates nothing where an earlier call needed as much. Where it throws, the next call makes
+  // room anew.
+  void ensure_capacity(std::size_t agents, std::size_t views) {
+    agents = std::max(scratch_.agents, std::min(agents, static_cast<std::size_t>(kMaxBoxesPerWorld)));
+    views = std::max({scratch_.views, std::size_t{1}, std::min(views, kViewsAtOnce)});
+    int pieces = 0, heads = 0;
+    for (const UploadedGeometry& each : geometries_) {
+      pieces = std::max(pieces, each.pieces());
+      heads = std::max(heads, static_cast<int>(each.heads.size()));
+    }
+    if (agents == scratch_.agents && views == scratch_.views && pieces == scratch_.pieces && heads == scratch_.heads)
+      return;
+    cuda::Scratch large = cuda::large_sizes(pieces, heads, agents);
+    const std::size_t large_bytes = cuda::large_block_bytes(large);
+    const cuda::ScratchPlan plan =
+        cuda::plan_scratch({.large_blocks = kLargeBlocks,
+                            .large_block_bytes = cuda::LargeBuffers<DeviceBuffer>::block_bytes(large, large_bytes),
+                            .views = views,
+                            .view_bytes = cameras_.size() * cuda::kPoolImageBytes,
+                            .pool_bytes = cuda::kMinPoolBytes},
+                           config_.max_scratch_bytes);
+    large.blocks = plan.large_blocks;
+    // Released before it is replaced, or both would count.
+    scratch_ = ScratchMemory();
+    ScratchMemory larger{agents, views, pieces, heads, plan, {}, {}};
+    larger.large = cuda::LargeBuffers<DeviceBuffer>(large, large_bytes);
+    larger.pool = cuda::PoolBuffers<DeviceBuffer>(cuda::pool_sizes(plan.views * cameras_.size()));
+    scratch_ = std::move(larger);
+  }
+
+  void throw_fault() {
+    const cuda::Fault fault = cuda::fault_of(*fault_.host());
+    if (fault.kind == cuda::FaultKind::none) return;
+    *fault_.host() = cuda::kNoFault;
+    fail("renderer cuda: in an earlier call: {}", cuda::message_of(fault));
+  }
+
+  CurrentDevice device_;
+  RendererConfig config_;
+  std::vector<PinholeCamera> cameras_;  // in the ego frame
+  cuda::KernelLibrary library_;         // outlives the buffers, whose release waits for the device
+  std::vector<UploadedGeometry> geometries_;
+  DeviceBuffer<cuda::DeviceGeometry> geometry_views_;
+  int processors_ = 0;
+  ScratchMemory scratch_;
+  DeviceBuffer<cuda::DrawCounters> counters_{1};
+  bool counters_are_clear_ = true;
+  MappedValue<cuda::FaultWord> fault_;
+};
+
+}  // namespace
+
+std::string cuda_unavailable() {
+  int devices = 0;
+  const cudaError_t status = cudaGetDeviceCount(&devices);
+  if (status != cudaSuccess) {
+    cudaGetLastError();  // the error is ours to report, not the next call's
+    int driver = 0;
+    const bool has_driver = cudaDriverGetVersion(&driver) == cudaSuccess && driver > 0;
+    return has_driver ? cudaGetErrorString(status) : "no CUDA device: no NVIDIA driver was found";
+  }
+  return devices > 0 ? "" : "no CUDA device";
+}
+
+std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config, std::string* origin_out) {
+  return std::make_unique<CudaRenderer>(config, origin_out);
+}
+
+}  // namespace pictura

@@ -1,0 +1,25 @@
+// What is known of the rig when kernels are compiled. Those that are built at run time are built for one rig
+// (kernel_build.h defines these names); 0 stands for what only the task says.
+#pragma once
+
+#include "pictura/backend_cuda/renderer/kernel_arguments.h"
+
+#ifndef PICTURA_RIG_CAMERAS
+#define PICTURA_RIG_CAMERAS 0
+#define PICTURA_RIG_WIDTH_PX 0  // of all its cameras, where they have one size
+#define PICTURA_RIG_HEIGHT_PX 0
+#endif
+
+namespace pictura::cuda {
+
+__device__ inline int num_cameras(const DrawTask& task) {
+  return PICTURA_RIG_CAMERAS > 0 ? PICTURA_RIG_CAMERAS : task.num_cameras;
+}
+__device__ inline int width_px(const PinholeCamera& camera) {
+  return PICTURA_RIG_WIDTH_PX > 0 ? PICTURA_RIG_WIDTH_PX : camera.width_px;
+}
+__device__ inline int height_px(const PinholeCamera& camera) {
+  return PICTURA_RIG_HEIGHT_PX > 0 ? PICTURA_RIG_HEIGHT_PX : camera.height_px;
+}
+
+}  // namespace pictura::cuda

@@ -1,0 +1,110 @@
+// The memory of drawing beyond images, scenes and maps: how large each part of it is, and what owns it. Buffer is
+// DeviceBuffer, or std::vector where kernels are emulated.
+#pragma once
+
+#include "pictura/backend_cuda/renderer/kernel_arguments.h"
+
+namespace pictura::cuda {
+
+/// Room in the pool for the faces and edges of an image: what CARLA's towns ask for on average. Those with more are
+/// drawn when it is free again. Four edges are for each face, the rest, of which a third is asked for, for those that
+/// are clipped.
+constexpr std::size_t kPoolFaces = 200, kPoolEdges = 928;
+/// ... and of few images, which may all be crowded.
+constexpr std::size_t kMinPoolImages = 4 * kMaxEntries / kPoolFaces + 1;
+static_assert(kMinPoolImages * kPoolFaces >= kMaxEntries, "an image that is deferred finds room");
+
+/// How much of everything a pool holds for so many images.
+struct PoolSizes {
+  std::size_t images, faces, edges;
+  /// As many as the faces make, of each image with a last one that may not be full.
+  constexpr std::size_t batches() const { return faces / FaceBatch::kEntries + images; }
+  constexpr std::size_t entries() const { return images * kMaxEntries; }
+  constexpr std::size_t listed_images() const { return (2 + kNumCostBuckets) * images; }
+  constexpr std::size_t bytes() const {
+    return faces * (sizeof(ScreenFace) + sizeof(ClippedPrimitive)) + edges * sizeof(PolygonEdge) +
+           images * (sizeof(PreparedImage) + sizeof(FaceSetupContext)) + batches() * sizeof(FaceBatch) +
+           entries() * sizeof(uint32_t) + listed_images() * sizeof(int32_t);
+  }
+};
+constexpr PoolSizes pool_sizes(std::size_t images) {
+  const std::size_t rooms = images + kMinPoolImages;
+  return {images, rooms * kPoolFaces, rooms * kPoolEdges};
+}
+/// What a pool takes without images, and what each of them adds; together within a batch of its bytes, and not less.
+constexpr std::size_t kPoolImageBytes =
+    (pool_sizes(FaceBatch::kEntries).bytes() - pool_sizes(0).bytes()) / FaceBatch::kEntries;
+constexpr std::size_t kMinPoolBytes = pool_sizes(0).bytes() + sizeof(FaceBatch);
+
+/// Owns the faces that are gathered before they are drawn, and what is known of their images.
+template <template <typename> class Buffer>
+class PoolBuffers {
+ public:
+  PoolBuffers() = default;
+  explicit PoolBuffers(const PoolSizes& sizes)
+      : faces_(sizes.faces),
+        edges_(sizes.edges),
+        images_(sizes.images),
+        makings_(sizes.images),
+        batches_(sizes.batches()),
+        entries_(sizes.entries()),
+        clipped_(sizes.faces),
+        lists_(sizes.listed_images()) {}
+  /// Sets where a task finds the pool and lists images.
+  void serve(DrawTask* task_out) {
+    task_out->pool = {faces_.data(),
+                      edges_.data(),
+                      images_.data(),
+                      makings_.data(),
+                      batches_.data(),
+                      {entries_.data(), clipped_.data(), kMaxEntries, static_cast<int32_t>(clipped_.size())},
+                      static_cast<int32_t>(faces_.size()),
+                      static_cast<int32_t>(edges_.size())};
+    task_out->deferred_images = lists_.data();
+    task_out->overflow_images = lists_.data() + images_.size();
+    task_out->drawn_images = lists_.data() + 2 * images_.size();
+  }
+
+ private:
+  Buffer<ScreenFace> faces_;
+  Buffer<PolygonEdge> edges_;
+  Buffer<PreparedImage> images_;
+  Buffer<FaceSetupContext> makings_;
+  Buffer<FaceBatch> batches_;
+  Buffer<uint32_t> entries_;
+  Buffer<ClippedPrimitive> clipped_;
+  Buffer<int32_t> lists_;
+};
+
+/// Owns what the blocks of the last launch work in.
+template <template <typename> class Buffer>
+class LargeBuffers {
+ public:
+  LargeBuffers() = default;
+  /// Room for sizes.blocks blocks.
+  LargeBuffers(const Scratch& sizes, std::size_t bytes_per_block)
+      : scratch_(sizes),
+        faces_(count(sizes.blocks, sizes.max_faces)),
+        edges_(count(sizes.blocks, sizes.max_edges)),
+        bytes_(static_cast<std::size_t>(sizes.blocks) * bytes_per_block) {
+    scratch_.faces = faces_.data();
+    scratch_.edges = edges_.data();
+    scratch_.bytes = bytes_.data();
+  }
+  const Scratch& view() const { return scratch_; }
+  static std::size_t block_bytes(const Scratch& sizes, std::size_t bytes_per_block) {
+    return count(1, sizes.max_faces) * sizeof(ScreenFace) + count(1, sizes.max_edges) * sizeof(PolygonEdge) +
+           bytes_per_block;
+  }
+
+ private:
+  static std::size_t count(int blocks, int each) {
+    return static_cast<std::size_t>(blocks) * static_cast<std::size_t>(each);
+  }
+  Scratch scratch_;
+  Buffer<ScreenFace> faces_;
+  Buffer<PolygonEdge> edges_;
+  Buffer<unsigned char> bytes_;
+};
+
+}  // namespace pictura::cuda

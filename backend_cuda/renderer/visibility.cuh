@@ -1,0 +1,59 @@
+// What an agent weighs in an image, among all others and alone (see VisibilitySum).
+#pragma once
+
+#include "pictura/backend_cuda/renderer/face_setup.cuh"
+#include "pictura/backend_cuda/renderer/image_writer.cuh"
+#include "pictura/backend_cuda/renderer/pixels.cuh"
+
+namespace pictura::cuda {
+
+/// Adds up what the faces of an agent weigh.
+struct AccumulateVisibility {
+  static constexpr bool kWanted = true;
+  uint32_t object_id;
+  int64_t* sum;
+  __device__ void operator()(const ScreenFace& face, float weight) const {
+    if (face.object_id == object_id) *sum += VisibilitySum::units_of(weight);
+  }
+};
+
+/// Rows of an image.
+struct RowRange {
+  int y_begin, y_end;
+};
+
+// The rows in which a thing of the gathered image may show. Every thread finds them by itself.
+__device__ inline RowRange rows_of(const BlockState& state, uint32_t object_id) {
+  RowRange rows{state.context.setting.camera.height_px, 0};
+  PICTURA_NO_UNROLL
+  for (int i = 0; i < state.num_faces; ++i) {
+    const ScreenFace& face = state.faces[i];
+    if (face.object_id != object_id || face.box.y_begin >= face.box.y_end) continue;
+    rows.y_begin = min_of(rows.y_begin, int{face.box.y_begin});
+    rows.y_end = max_of(rows.y_end, int{face.box.y_end});
+  }
+  return rows;
+}
+
+// Adds what a thing of the gathered image weighs, among all others and then without them, to each thread's sum of its
+// own. False where there is no room for all of it. All threads of the block.
+__device__ inline bool accumulate_visibility(BlockState* state, uint32_t object_id, VisibilitySum* sum_inout) {
+  const RowRange rows = rows_of(*state, object_id);
+  const int num_faces = state->num_faces;
+  auto add_to = [&](int64_t* sum) {
+    return each_tile(LargeDrawMemory::current(), state->context.setting.camera.width_px, rows.y_begin, rows.y_end,
+                     [&](const LargeDrawMemory& memory, const Part& part) {
+                       return draw_faces(memory, num_faces, part, AccumulateVisibility{object_id, sum}, NoImage{});
+                     });
+  };
+  if (!add_to(&sum_inout->among_all)) return false;
+  sync_block();
+  PICTURA_NO_UNROLL
+  for (int i = static_cast<int>(threadIdx.x); i < num_faces; i += LargeDrawMemory::kThreads) {
+    if (state->faces[i].object_id != object_id) state->faces[i].box = PixelBox{};
+  }
+  sync_block();
+  return add_to(&sum_inout->alone);
+}
+
+}  // namespace pictura::cuda

@@ -1,0 +1,233 @@
+// How the simulator's phases are started on a device: a thread or a group of lanes per item, or a block per world.
+// Kernels of a stream follow one another, which is the barrier between phases.
+#include <type_traits>
+
+#include "pictura/backend_cuda/simulator/kernels.h"
+
+namespace pictura::cuda {
+namespace {
+
+constexpr int kThreads = 128;  // per block
+constexpr int kTeamThreads =
+    kTurn * kThreadsPerAgent;  // a world's start is one long chain of work: as wide as its loops
+
+struct DeviceAtomics {
+  /// Returns the value before.
+  __device__ int32_t add(int32_t* value, int32_t change) const { return atomicAdd(value, change); }
+  __device__ void set_bits(uint32_t* value, uint32_t bits) const { atomicOr(value, bits); }
+  __device__ void lower(int32_t* value, int32_t bound) const { atomicMin(value, bound); }
+};
+
+/// The nearest of the things offered by a warp's lanes: the lane of rank k holds the k-th, as squared distance and
+/// item.
+template <int capacity>
+class NearestOfWarp {
+  static_assert(capacity <= kWarp);
+
+ public:
+  __device__ int count() const { return min(capacity, __popc(__ballot_sync(~0u, key_ != kNone))); }
+  /// at: the caller's own rank.
+  __device__ int32_t item(int) const { return static_cast<int32_t>(key_); }
+  __device__ float worst() const {
+    return __uint_as_float(static_cast<uint32_t>(__shfl_sync(~0u, key_, capacity - 1) >> 32));
+  }
+  __device__ void offer(bool is_one, float distance2, int32_t item) {
+    const uint64_t offered = is_one ? uint64_t{__float_as_uint(distance2)} << 32 | static_cast<uint32_t>(item) : kNone;
+    const bool is_first = threadIdx.x % kWarp == 0;
+    const uint64_t worst = __shfl_sync(~0u, key_, capacity - 1);
+    for (uint32_t better = __ballot_sync(~0u, offered < worst); better != 0; better &= better - 1) {
+      const uint64_t next = __shfl_sync(~0u, offered, __ffs(static_cast<int>(better)) - 1);
+      const uint64_t before = __shfl_up_sync(~0u, key_, 1);
+      if (next < key_) key_ = is_first || before < next ? next : before;
+    }
+  }
+
+ private:
+  static constexpr uint64_t kNone = ~uint64_t{0};
+  uint64_t key_ = kNone;
+};
+
+/// A group of a warp's lanes, beside other groups.
+template <int kGroup>
+struct DeviceThreadGroup {
+  static constexpr int kSize = kGroup;
+  template <int capacity>
+  using Nearest = NearestOfWarp<capacity>;
+  float* rows = nullptr;
+
+  __device__ static constexpr int size() { return kSize; }
+  __device__ int rank() const { return static_cast<int>(threadIdx.x) % kSize; }
+  __device__ void sync() const { __syncwarp(mask()); }
+  __device__ bool any(bool value) const { return __any_sync(mask(), value); }
+  __device__ uint32_t ballot(bool value) const { return __ballot_sync(mask(), value) >> first(); }
+  __device__ int count_before(uint32_t lanes) const { return __popc(lanes & ((1u << rank()) - 1u)); }
+  __device__ int sum(int value) const { return __reduce_add_sync(mask(), value); }
+  template <typename T>
+  __device__ T from(int rank, const T& value) const {
+    static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(uint32_t) == 0);
+    uint32_t words[sizeof(T) / sizeof(uint32_t)];
+    memcpy(words, &value, sizeof(T));
+    for (uint32_t& word : words) word = __shfl_sync(mask(), word, rank, kSize);
+    T result;
+    memcpy(&result, words, sizeof(T));
+    return result;
+  }
+  template <typename T>
+  __device__ T of_lowest(float score, int index, const T& value) const {
+    // Bits of floats that are not negative are ordered as the floats are.
+    const uint32_t lowest = __reduce_min_sync(mask(), __float_as_uint(score));
+    const bool is_lowest = __float_as_uint(score) == lowest;
+    const int first_index = __reduce_min_sync(mask(), is_lowest ? index : INT_MAX);
+    return from(__ffs(static_cast<int>(ballot(is_lowest && index == first_index))) - 1, value);
+  }
+  /// A value that no kernel changes, in loads of 16 bytes.
+  template <typename T>
+  __device__ T read(const T& value) const {
+    static_assert(std::is_trivially_copyable_v<T> && alignof(T) % sizeof(float4) == 0);
+    float4 words[sizeof(T) / sizeof(float4)];
+    for (size_t i = 0; i < sizeof(T) / sizeof(float4); ++i)
+      words[i] = __ldg(reinterpret_cast<const float4*>(&value) + i);
+    T result;
+    memcpy(&result, words, sizeof(T));
+    return result;
+  }
+  /// Room for WriteObservation::kStaging floats.
+  __device__ float* staging() const { return rows; }
+  /// Writes the first `filled` of staging(), then zeros up to `end` or a little beyond, but not beyond `capacity`.
+  __device__ void write(const float* values, int filled, int end, int capacity, float* out) const {
+    if (capacity % 4 != 0) {
+      for (int i = rank(); i < end; i += kSize) out[i] = i < filled ? values[i] : 0.0f;
+      return;
+    }
+    for (int i = 4 * rank(); i < end; i += 4 * kSize) {
+      float4 four = *reinterpret_cast<const float4*>(values + i);
+      if (i + 3 >= filled) {
+        four = {i < filled ? four.x : 0.0f, i + 1 < filled ? four.y : 0.0f, i + 2 < filled ? four.z : 0.0f, 0.0f};
+      }
+      *reinterpret_cast<float4*>(out + i) = four;
+    }
+  }
+
+ private:
+  __device__ static unsigned first() { return threadIdx.x % kWarp / kSize * kSize; }
+  __device__ static unsigned mask() { return (~0u >> (kWarp - kSize)) << first(); }
+};
+
+/// The threads of a block.
+struct DeviceTeam : DeviceAtomics {
+  TeamMemory* shared;
+  __device__ TeamMemory& memory() const { return *shared; }
+  /// body(i) for all i in [0, count); then everybody waits for everybody.
+  template <typename Body>
+  __device__ void for_each(int count, const Body& body) const {
+    for (int i = static_cast<int>(threadIdx.x); i < count; i += kTeamThreads) body(i);
+    __syncthreads();
+  }
+  /// body(group, i) likewise.
+  template <int kGroup, typename Body>
+  __device__ void for_each_by_groups(int count, const Body& body) const {
+    for (int i = static_cast<int>(threadIdx.x) / kGroup; i < count; i += kTeamThreads / kGroup) {
+      body(DeviceThreadGroup<kGroup>{}, i);
+    }
+    __syncthreads();
+  }
+};
+
+template <typename Phase>
+__global__ void __launch_bounds__(kThreads) run_threads(int32_t count, Phase phase) {
+  const int64_t item = int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  if (item < count) phase(DeviceAtomics{}, static_cast<int32_t>(item));
+}
+
+// Blocks that fit a processor at once: fewer registers than the compiler would take hide more of the waiting.
+constexpr int kGroupBlocks = 5, kObserveBlocks = 16;
+
+template <int kGroup, typename Phase>
+__global__ void __launch_bounds__(kThreads, kGroupBlocks) run_groups(int32_t count, Phase phase) {
+  const int64_t item = (int64_t{blockIdx.x} * kThreads + threadIdx.x) / kGroup;
+  if (item < count) phase(DeviceThreadGroup<kGroup>{}, static_cast<int32_t>(item));
+}
+
+/// Lanes with memory of their own. Small blocks, since the last of its warps holds a block's place.
+constexpr int kObserveThreads = 64;
+__global__ void __launch_bounds__(kObserveThreads, kObserveBlocks)
+    run_write_observation(int32_t count, WriteObservation phase) {
+  __shared__ float4 staging[kObserveThreads / kWarp][WriteObservation::kStaging / 4];
+  static_assert(WriteObservation::kStaging % 4 == 0);
+  const int64_t item = (int64_t{blockIdx.x} * kObserveThreads + threadIdx.x) / kWarp;
+  DeviceThreadGroup<kWarp> group;
+  group.rows = reinterpret_cast<float*>(staging[threadIdx.x / kWarp]);
+  if (item < count) phase(group, static_cast<int32_t>(item));
+}
+
+template <typename Phase>
+__global__ void __launch_bounds__(kTeamThreads) run_teams(int32_t count, Phase phase) {
+  __shared__ TeamMemory memory;
+  DeviceTeam team;
+  team.shared = &memory;
+  for (int32_t item = static_cast<int32_t>(blockIdx.x); item < count; item += static_cast<int32_t>(gridDim.x)) {
+    phase(team, item);
+  }
+}
+
+/// Errors stay with the runtime until the caller asks for the last one.
+struct DeviceLaunch {
+  StepStreams streams;
+
+  static unsigned blocks_for(int64_t threads, int block = kThreads) {
+    return static_cast<unsigned>((threads + block - 1) / block);
+  }
+  void fill(void* memory, size_t size, int byte) const { cudaMemsetAsync(memory, byte, size, streams.main); }
+  void copy(void* to, const void* from, size_t size) const {
+    cudaMemcpyAsync(to, from, size, cudaMemcpyDeviceToDevice, streams.main);
+  }
+  template <typename Phase>
+  void threads(int32_t count, const Phase& phase) const {
+    run_threads<<<blocks_for(count), kThreads, 0, streams.main>>>(count, phase);
+  }
+  template <int kGroup, typename Phase>
+  void groups(int32_t count, const Phase& phase) const {
+    if constexpr (std::is_same_v<Phase, WriteObservation>) {
+      static_assert(kGroup == kWarp);
+      run_write_observation<<<blocks_for(int64_t{count} * kGroup, kObserveThreads), kObserveThreads, 0, streams.main>>>(
+          count, phase);
+    } else {
+      run_groups<kGroup><<<blocks_for(int64_t{count} * kGroup), kThreads, 0, streams.main>>>(count, phase);
+    }
+  }
+  template <typename Phase>
+  void teams(int32_t count, const Phase& phase) const {
+    // Not a block for each world: one of this size waits for a whole processor, even if it has nothing to do.
+    constexpr int32_t kMaxTeams = 128;
+    run_teams<<<static_cast<unsigned>(min(count, kMaxTeams)), kTeamThreads, 0, streams.main>>>(count, phase);
+  }
+  /// Both at once: what `aside` starts on the launch that it is given, beside what `here` starts on this one. What
+  /// follows waits for both.
+  template <typename Side, typename Main>
+  void fork_join(const Side& side, const Main& main) const {
+    cudaEventRecord(streams.forked, streams.main);
+    cudaStreamWaitEvent(streams.side, streams.forked, 0);
+    DeviceLaunch launch = *this;
+    launch.streams.main = streams.side;
+    side(launch);
+    main();
+    cudaEventRecord(streams.joined, streams.side);
+    cudaStreamWaitEvent(streams.main, streams.joined, 0);
+  }
+};
+
+}  // namespace
+
+void launch_reset(const SimulatorArrays& arrays, const StepStreams& streams) {
+  launch_reset(DeviceLaunch{streams}, arrays);
+}
+
+void launch_restored(const SimulatorArrays& arrays, const StepStreams& streams) {
+  launch_restored(DeviceLaunch{streams}, arrays);
+}
+
+void launch_step(const SimulatorArrays& arrays, const int32_t* actions, const StepStreams& streams) {
+  launch_step(DeviceLaunch{streams}, arrays, actions);
+}
+
+}  // namespace pictura::cuda

@@ -1,0 +1,21 @@
+// What the simulator's host side asks of its kernels. All of it is put on a stream and waits for nothing; what goes
+// wrong, cudaGetLastError() tells.
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include "pictura/backend_cuda/simulator/phases.h"
+
+namespace pictura::cuda {
+
+/// The caller's stream, and one beside it for what may overlap, which the events tie to it; a graph captures both.
+struct StepStreams {
+  cudaStream_t main = nullptr, side = nullptr;
+  cudaEvent_t forked = nullptr, joined = nullptr;
+};
+
+void launch_reset(const SimulatorArrays& arrays, const StepStreams& streams);
+void launch_restored(const SimulatorArrays& arrays, const StepStreams& streams);
+void launch_step(const SimulatorArrays& arrays, const int32_t* actions, const StepStreams& streams);
+
+}  // namespace pictura::cuda

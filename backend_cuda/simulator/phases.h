@@ -1,0 +1,499 @@
+// The CUDA executor's step as phases over agents and worlds, each of which reads only what an earlier one has finished.
+// They say what every thread does and not how threads are started, so that a host can run them too, in any order:
+//   threads  one thread per item: phase(atomics, item)
+//   lanes    lanes in lockstep (simulator/rules/thread_group.h), a group of them per item: phase(group, item)
+//   teams    threads that wait for each other, one team per world: phase(team, world)
+// backend_cuda/simulator/kernels.cu starts them on a device; tests/backend_cuda/simulator/shuffled_executor.h on a
+// host.
+#pragma once
+
+#include "pictura/common/portable/intrinsics.h"
+#include "pictura/simulator/rules/episode.h"
+#include "pictura/simulator/rules/observe.h"
+#include "pictura/simulator/rules/spawn.h"
+
+namespace pictura::cuda {
+
+/// How many lanes share an agent: about as many as there are lane segments, barriers and boxes to look at.
+constexpr int kThreadsPerAgent = 8, kWarp = 32;
+/// How many boxes of a world look for a place at once.
+constexpr int kTurn = 128;
+
+/// One world's memory for spawning.
+struct WorldScratch {
+  AgentBox* try_boxes = nullptr;   // [boxes, kSpawnTries] of the free ones
+  uint32_t* free_tries = nullptr;  // [boxes] which of the known tries are free of all that stands, as bits
+  int32_t* known_tries = nullptr;  // [boxes] how many have been looked at
+  int32_t* chosen_try = nullptr;   // [boxes] -1: none
+  int32_t* next_try = nullptr;     // [boxes]
+};
+
+/// What no step has as its lowest slot with an action out of range. All its bytes are equal, for memset.
+constexpr int32_t kNoSlot = 0x7F7F7F7F;
+
+/// An action that a step refused, in one word that the host reads whole: slot and action, or -1 for none.
+PICTURA_HD constexpr int64_t rejected_action(int32_t slot, int32_t action) {
+  return (static_cast<int64_t>(slot) << 32) | static_cast<uint32_t>(action);
+}
+
+/// Everything that the phases read and write, in one memory.
+struct SimulatorArrays {
+  WorldView* worlds = nullptr;             // [num_worlds] their box_cells are one cell, which lists all boxes
+  WorldView* next_worlds = nullptr;        // [num_worlds] the same worlds, over memory for their next episode
+  const WorldScratch* scratch = nullptr;   // [num_worlds]
+  const int32_t* world_of_slot = nullptr;  // [num_slots]
+  int32_t num_worlds = 0, num_slots = 0;
+  // Of all worlds, as in their views; and here, where no store can change them.
+  AgentStateView agents{}, next_agents{};
+  // State, as in WorldBatch.
+  int32_t* episode_step = nullptr;
+  int32_t* episode_index = nullptr;
+  uint8_t* episode_over = nullptr;
+  int32_t* spawned = nullptr;
+  SimulatorTotals* world_totals = nullptr;
+  // Results.
+  StepArrays results;
+  View* views = nullptr;
+  ObservationView observations;
+  uint8_t entity_sets = 0;
+  // Between phases and steps.
+  float* step_m = nullptr;             // [num_slots] driven in the present step
+  uint8_t* began = nullptr;            // [num_worlds] an episode began in the last step: the one after it is to be made
+  uint8_t* prepares = nullptr;         // [num_worlds] it is made in the present step
+  int32_t* next_spawned = nullptr;     // [num_worlds] in the next episode
+  int32_t* rejected_slot = nullptr;    // the lowest one with an action out of range, or kNoSlot
+  int64_t* rejected_action = nullptr;  // the first since the host looked, or -1
+
+  PICTURA_HD WorldView world(int w) const {
+    WorldView world = worlds[w];
+    world.agents = agents;
+    return world;
+  }
+  PICTURA_HD WorldView next_world(int w) const {
+    WorldView world = next_worlds[w];
+    world.agents = next_agents;
+    return world;
+  }
+  PICTURA_HD bool has_rejected_action() const { return *rejected_slot != kNoSlot; }
+};
+
+/// A world's boxes as one cell: with a warp to look at them, all are looked at sooner than they are sorted.
+PICTURA_HD inline GridView one_cell(Span<const int32_t> begin, Span<const int32_t> items) {
+  constexpr float kWhole_m = 1e9f;
+  return {{}, kWhole_m, 1, 1, begin, items};
+}
+
+/// Where a box is looked for in that cell: what stands nowhere is far from everything.
+PICTURA_HD inline Vec2 center_of(const AgentBox& box) {
+  constexpr float kNowhere_m = 1e9f;
+  return box.drawn ? box.center_m.xy() : Vec2{kNowhere_m, kNowhere_m};
+}
+
+/// What a team's threads share.
+struct TeamMemory {
+  int32_t lowest_changed;
+};
+
+/// Finds for each of `count` boxes, which are the world's from first_box on, the first of its tries that the map
+/// permits and that is clear of the boxes before it: what placing them one after the other would find. As many as the
+/// team has groups for choose at once, given what the others chose last, until nobody changes: then everybody's choice
+/// agrees with the choices before it, which only the sequential result does. Every round settles at least the lowest
+/// one that changed. Those of an earlier turn stand.
+///   box_of_try(i, try), permits(group, i, try, box)
+template <typename Team, typename BoxOfTry, typename Permits>
+PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const WorldScratch& scratch, int first_box,
+                             int count, const BoxOfTry& box_of_try, const Permits& permits) {
+  static_assert(kSpawnTries <= 32);
+  AgentBox* boxes = world.boxes + first_box;
+  AgentBox* try_boxes = scratch.try_boxes + first_box * kSpawnTries;
+  uint32_t* free_tries = scratch.free_tries + first_box;
+  int32_t* known_tries = scratch.known_tries + first_box;
+  int32_t* chosen_try = scratch.chosen_try + first_box;
+  int32_t* next_try = scratch.next_try + first_box;
+  int32_t& lowest_changed = team.memory().lowest_changed;
+  // The first tries of few boxes are looked at together.
+  const int first_tries = clamp(kTurn / max_of(count, 1), 2, kSpawnTries);
+  team.for_each(count, [&](int i) {
+    boxes[i].drawn = 0;
+    free_tries[i] = 0;
+    known_tries[i] = 0;
+    chosen_try[i] = -1;
+  });
+  // Whether the map, and what stands, leave a try free.
+  const auto look_at = [&](const auto& group, int turn_begin, int i, int t) {
+    const AgentBox box = box_of_try(i, t);
+    const bool is_free = permits(group, i, t, box) && is_clear(world, box, first_box, first_box + turn_begin, group);
+    if (is_free && group.rank() == 0) try_boxes[i * kSpawnTries + t] = box;
+    return is_free;
+  };
+  // Looks at a box's tries until one is free of what stands and of what the boxes of this turn chose.
+  const auto choose = [&](const auto& group, int turn_begin, int i) {
+    uint32_t free = free_tries[i];
+    int known = known_tries[i], chosen = -1;
+    for (int t = 0; t < kSpawnTries && chosen < 0; ++t) {
+      if (t == known) {
+        ++known;
+        if (look_at(group, turn_begin, i, t)) free |= 1u << t;
+        group.sync();
+      }
+      const AgentBox& box = try_boxes[i * kSpawnTries + t];
+      if ((free >> t & 1u) && is_clear(world, box, first_box + turn_begin, first_box + i, group)) chosen = t;
+    }
+    group.sync();
+    if (group.rank() > 0) return;
+    free_tries[i] = free;
+    known_tries[i] = known;
+    next_try[i] = chosen;
+    if (chosen != chosen_try[i]) team.lower(&lowest_changed, i);
+  };
+  for (int settled = 0, turn_begin = -kTurn; settled < count;) {
+    if (settled >= turn_begin + kTurn) {
+      turn_begin = settled;
+      const int num_tries = min_of(kTurn, count - turn_begin) * first_tries;
+      team.template for_each_by_groups<kThreadsPerAgent>(num_tries, [&](const auto& group, int k) {
+        const int i = turn_begin + k / first_tries, t = k % first_tries;
+        const bool is_free = look_at(group, turn_begin, i, t);
+        if (group.rank() == 0 && is_free) team.set_bits(&free_tries[i], 1u << t);
+        if (group.rank() == 0 && t == 0) known_tries[i] = first_tries;
+      });
+    }
+    const int unsettled = min_of(turn_begin + kTurn, count) - settled;
+    team.for_each(1, [&](int) { lowest_changed = settled + unsettled; });
+    team.template for_each_by_groups<kThreadsPerAgent>(
+        unsettled, [&](const auto& group, int k) { choose(group, turn_begin, settled + k); });
+    const int changed = lowest_changed;
+    team.for_each(unsettled, [&](int k) {
+      const int i = settled + k;
+      if (next_try[i] == chosen_try[i]) return;
+      chosen_try[i] = next_try[i];
+      if (chosen_try[i] >= 0) boxes[i] = try_boxes[i * kSpawnTries + chosen_try[i]];
+      boxes[i].drawn = chosen_try[i] >= 0;
+    });
+    settled = min_of(changed + 1, settled + unsettled);
+  }
+}
+
+/// Begins the episode that `world` says; counts who found a place.
+template <typename Team>
+PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const WorldScratch& scratch,
+                              int32_t* spawned_out) {
+  const int num_parked = world.num_boxes - world.num_agents;
+  team.for_each(static_cast<int>(world.map.stop_lines.size()), [&](int light) { begin_light(world, light); });
+  team.for_each(world.num_agents, [&](int agent) { draw_agent(world, agent); });
+  const auto parked_at = [&](int car, int i) {
+    return parked_box(world, car, world.map.parking_spots.empty() ? ParkingSpot{} : parking_spot(world, car, i));
+  };
+  choose_tries(team, world, scratch, world.num_agents, num_parked, parked_at,
+               [&](const auto& group, int car, int i, const AgentBox& box) {
+                 return !world.map.parking_spots.empty() &&
+                        may_park(world.map, box, parking_spot(world, car, i), group);
+               });
+  team.for_each(num_parked, [&](int car) { put_parked_car(world, car, scratch.chosen_try[world.num_agents + car]); });
+  const auto agent_at = [&](int agent, int i) {
+    return has_places(world, agent) ? spawn_box(world, agent, i) : AgentBox{};
+  };
+  choose_tries(team, world, scratch, 0, world.num_agents, agent_at,
+               [&](const auto& group, int agent, int, const AgentBox& box) {
+                 return has_places(world, agent) && may_spawn(world.map, box, group) &&
+                        is_clear(world, box, world.num_agents, world.num_boxes, group);
+               });
+  team.for_each(1, [&](int) { *spawned_out = 0; });
+  team.template for_each_by_groups<kThreadsPerAgent>(world.num_agents, [&](const auto& group, int agent) {
+    place_agent(world, agent, scratch.chosen_try[agent], group);
+    if (group.rank() == 0 && scratch.chosen_try[agent] >= 0) team.add(spawned_out, 1);
+  });
+}
+
+/// Begins episode 0 in every world.
+struct BeginFirstEpisode {
+  SimulatorArrays arrays;
+  template <typename Team>
+  PICTURA_HD void operator()(const Team& team, int w) const {
+    team.for_each(1, [&](int) {
+      arrays.episode_over[w] = 0;
+      arrays.episode_step[w] = arrays.episode_index[w] = 0;
+      arrays.worlds[w].episode = 0;
+      arrays.next_worlds[w].episode = 1;
+      arrays.began[w] = 1;
+    });
+    begin_episode(team, arrays.world(w), arrays.scratch[w], &arrays.spawned[w]);
+  }
+};
+
+/// Says where the boxes of a world stand.
+struct PlaceCenters {
+  SimulatorArrays arrays;
+  template <typename ThreadGroup>
+  PICTURA_HD void operator()(const ThreadGroup& group, int w) const {
+    const WorldView world = arrays.world(w);
+    for (int i = group.rank(); i < world.num_boxes; i += group.size()) {
+      world.cell_centers[i] = center_of(world.boxes[i]);
+    }
+  }
+};
+
+/// Makes a world's next episode, as early as its memory is free and long before it is needed: a start depends on
+/// nothing that steps change.
+struct PrepareEpisode {
+  SimulatorArrays arrays;
+  template <typename Team>
+  PICTURA_HD void operator()(const Team& team, int w) const {
+    if (!arrays.prepares[w]) return;
+    begin_episode(team, arrays.next_world(w), arrays.scratch[w], &arrays.next_spawned[w]);
+  }
+};
+
+/// Finds the lowest slot whose action is out of range.
+struct CheckActions {
+  SimulatorArrays arrays;
+  const int32_t* actions;
+  template <typename Atomics>
+  PICTURA_HD void operator()(const Atomics& atomics, int slot) const {
+    const WorldView world = arrays.world(arrays.world_of_slot[slot]);
+    if (slot == world.first_slot) arrays.began[world.index] = 0;  // arrays.prepares says it now
+    if (arrays.episode_over[world.index] || is_sound_action(world, slot - world.first_slot, actions[slot])) return;
+    atomics.lower(arrays.rejected_slot, slot);
+  }
+};
+
+/// Moves an agent, or takes it into the episode that was prepared.
+struct Advance {
+  SimulatorArrays arrays;
+  const int32_t* actions;
+  template <typename ThreadGroup>
+  PICTURA_HD void operator()(const ThreadGroup& group, int slot) const {
+    if (arrays.has_rejected_action()) return;
+    const int w = arrays.world_of_slot[slot];
+    const WorldView world = arrays.world(w);
+    const int agent = slot - world.first_slot;
+    if (!arrays.episode_over[w]) {
+      const bool drives = is_active(world, agent);
+      if (group.rank() == 0) arrays.results.valid[slot] = drives;
+      advance(world, agent, actions[slot], group);
+    } else if (group.rank() == 0) {
+      const WorldView next = arrays.next_world(w);
+      clear_result(arrays.results, slot);
+      copy_fields(next.agents, world.agents, slot);
+      world.boxes[agent] = world.boxes_before[agent] = next.boxes[agent];
+    }
+    if (group.rank() == 0) world.cell_centers[agent] = center_of(world.boxes[agent]);
+  }
+};
+
+/// Collisions, reward and halt of an agent.
+struct ApplyRewardAndHalt {
+  SimulatorArrays arrays;
+  template <typename ThreadGroup>
+  PICTURA_HD void operator()(const ThreadGroup& group, int slot) const {
+    const int w = arrays.world_of_slot[slot];
+    if (arrays.has_rejected_action() || arrays.episode_over[w]) return;
+    const WorldView world = arrays.world(w);
+    const int agent = slot - world.first_slot;
+    find_collisions(world, agent, group);
+    if (group.rank() == 0) arrays.step_m[slot] = apply_reward_and_halt(world, agent, arrays.results);
+  }
+};
+
+/// Counts a world's step, moves its lights on, and says whether its episode is over; or ends the move into its next
+/// episode.
+struct FinishStep {
+  SimulatorArrays arrays;
+  const int32_t* actions;
+  template <typename ThreadGroup>
+  PICTURA_HD void operator()(const ThreadGroup& group, int w) const {
+    if (arrays.has_rejected_action()) return refuse(group, w);
+    const bool begins = arrays.episode_over[w] != 0;
+    SimulatorTotals totals;
+    bool ends = false;
+    if (begins) {
+      take_next(group, w);
+    } else {
+      ends = count(group, w, &totals);
+    }
+    group.sync();
+    if (group.rank() > 0) return;
+    totals.slot_steps = arrays.worlds[w].num_agents;
+    totals.episodes = begins;
+    arrays.world_totals[w].add(totals);
+    arrays.episode_over[w] = ends;
+    ++arrays.episode_step[w];
+    if (!begins) return;
+    arrays.episode_step[w] = 0;
+    arrays.spawned[w] = arrays.next_spawned[w];
+    arrays.worlds[w].episode = static_cast<uint32_t>(++arrays.episode_index[w]);
+    arrays.next_worlds[w].episode = arrays.worlds[w].episode + 1;
+    arrays.began[w] = 1;
+  }
+
+ private:
+  template <typename ThreadGroup>
+  PICTURA_HD void refuse(const ThreadGroup& group, int w) const {
+    if (w > 0 || group.rank() > 0 || *arrays.rejected_action >= 0) return;
+    *arrays.rejected_action = rejected_action(*arrays.rejected_slot, actions[*arrays.rejected_slot]);
+  }
+
+  /// What belongs to no agent.
+  template <typename ThreadGroup>
+  PICTURA_HD void take_next(const ThreadGroup& group, int w) const {
+    const WorldView world = arrays.world(w), next = arrays.next_world(w);
+    for (int i = world.num_agents + group.rank(); i < world.num_boxes; i += group.size()) {
+      world.boxes[i] = world.boxes_before[i] = next.boxes[i];
+      world.cell_centers[i] = center_of(next.boxes[i]);
+    }
+    for (int i = group.rank(); i < static_cast<int>(world.map.stop_lines.size()); i += group.size()) {
+      world.light_plans[i] = next.light_plans[i];
+      world.lights[i] = next.lights[i];
+    }
+  }
+
+  /// Returns whether the episode is over.
+  template <typename ThreadGroup>
+  PICTURA_HD bool count(const ThreadGroup& group, int w, SimulatorTotals* totals_out) const {
+    const WorldView world = arrays.world(w);
+    const int steps = arrays.episode_step[w] + 1;
+    constexpr int kParts = kTotalsBins / ThreadGroup::kSize;  // of the totals' lanes, that one of these sums up
+    SimulatorTotals parts[kParts];
+    const auto for_each_agent = [&](const auto& body) {
+      for (int part = 0; part < kParts; ++part) {
+        for (int agent = part * ThreadGroup::kSize + group.rank(); agent < world.num_agents; agent += kTotalsBins) {
+          body(agent, &parts[part]);
+        }
+      }
+    };
+    int active = 0;
+    for_each_agent([&](int agent, SimulatorTotals* part) {
+      count_agent(world, agent, arrays.results, arrays.step_m[world.first_slot + agent], part);
+      active += is_active(world, agent);
+    });
+    const bool ends = episode_ends(world.options, steps, arrays.spawned[w], group.sum(active));
+    for_each_agent([&](int agent, SimulatorTotals* part) { finish_agent(world, agent, ends, arrays.results, part); });
+    add_up(group, parts, totals_out);
+    for (int i = group.rank(); i < static_cast<int>(world.map.stop_lines.size()); i += group.size()) {
+      world.lights[i] = light_state(world.light_plans[i], steps);
+    }
+    return ends;
+  }
+
+  /// Counts in any order; the rest in that of the totals' lanes, see simulator/totals.h.
+  template <typename ThreadGroup, int kParts>
+  PICTURA_HD static void add_up(const ThreadGroup& group, SimulatorTotals (&parts)[kParts], SimulatorTotals* sum_out) {
+    for (SimulatorTotals& part : parts) {
+      SimulatorTotals::visit_counts(*sum_out, part, [&group](int64_t& sum, int64_t count) {
+        sum += group.sum(static_cast<int>(count));  // at most a world's agents
+      });
+    }
+    for (int lane = 0; lane < kTotalsBins; ++lane) {
+      SimulatorTotals::visit_sums(
+          *sum_out, parts[lane / ThreadGroup::kSize],
+          [&group, lane](double& sum, double value) { sum += group.from(lane % ThreadGroup::kSize, value); });
+    }
+  }
+};
+
+/// Writes a slot's view and observation.
+struct WriteObservation {
+  SimulatorArrays arrays;
+  /// Floats that the rows of any set need.
+  static constexpr int kStaging = max_of(max_of(max_of(kMaxLanes, kMaxBoundaries), kMaxWalls) * kLaneFeatures,
+                                         max_of(kMaxPartners* kPartnerFeatures, kMaxControls* kControlFeatures));
+
+  template <typename ThreadGroup>
+  PICTURA_HD void operator()(const ThreadGroup& group, int slot) const {
+    const WorldView world = arrays.world(arrays.world_of_slot[slot]);
+    const int agent = slot - world.first_slot;
+    observe_own(world, agent, arrays.observations, group);
+    if (group.rank() == group.size() - 1) arrays.views[slot] = view_of(world, agent);
+    const int num_sets = arrays.entity_sets ? num_observed_sets(arrays.observations) : 0;
+    for (int set = 0; set < num_sets; ++set) write_set(group, world, agent, static_cast<EntitySet>(set));
+  }
+
+ private:
+  /// The rows are put together in the lanes' own memory, so that they are written whole and in order.
+  template <typename ThreadGroup>
+  PICTURA_HD void write_set(const ThreadGroup& group, const WorldView& world, int agent, EntitySet set) const {
+    const int slot = world.first_slot + agent;
+    const SetRows out = set_rows(arrays.observations, slot, set);
+    float* rows = group.staging();
+    int count = 0;
+    if (observes(world, agent)) {
+      const EgoFrame frame = ego_frame(world.agents, slot);
+      if (set == EntitySet::partners) {
+        count = observe_partners(world, agent, frame, rows, group);
+      } else if (set == EntitySet::controls) {
+        count = observe_controls(world, slot, frame, rows, group);
+      } else {
+        count = collect_pieces(group, pieces_near(world, slot, set), frame, out.capacity, rows);
+      }
+    }
+    const int end = max_of(count, *out.count);
+    group.sync();
+    group.write(rows, count * out.features, end * out.features, out.capacity * out.features, out.rows);
+    if (group.rank() == 0) *out.count = count;
+    group.sync();
+  }
+
+  /// observe_pieces() by several pieces a lane at a time, whose loads are under way together.
+  template <typename ThreadGroup>
+  PICTURA_HD static int collect_pieces(const ThreadGroup& group, const PieceList& near, const EgoFrame& frame,
+                                       int capacity, float* rows) {
+    constexpr int kAtOnce = 2;
+    const int num_items = static_cast<int>(near.items.size());
+    int count = 0;
+    for (int first = group.rank(); first - group.rank() < num_items && count < capacity;
+         first += kAtOnce * group.size()) {
+      ObservedPiece pieces[kAtOnce];
+      for (int k = 0; k < kAtOnce; ++k) {
+        const int i = min_of(first + k * group.size(), num_items - 1);
+        pieces[k] = group.read(near.pieces[static_cast<size_t>(near.items[static_cast<size_t>(i)])]);
+      }
+      for (int k = 0; k < kAtOnce; ++k) {
+        float row[kLaneFeatures];
+        const bool in_sight = observe_piece(pieces[k], frame, row) && first + k * group.size() < num_items;
+        const uint32_t seen = group.ballot(in_sight);
+        const int at = count + group.count_before(seen);
+        for (int f = 0; f < kLaneFeatures && in_sight && at < capacity; ++f) rows[at * kLaneFeatures + f] = row[f];
+        count = min_of(capacity, count + popcount(seen));
+      }
+    }
+    return count;
+  }
+};
+
+template <typename Launch>
+void launch_write_observations(const Launch& launch, const SimulatorArrays& arrays) {
+  launch.template groups<kWarp>(arrays.num_slots, WriteObservation{arrays});
+}
+
+/// Episode 0 of every world.
+template <typename Launch>
+void launch_reset(const Launch& launch, const SimulatorArrays& arrays) {
+  launch.teams(arrays.num_worlds, BeginFirstEpisode{arrays});
+  launch.template groups<kWarp>(arrays.num_worlds, PlaceCenters{arrays});
+  launch_write_observations(launch, arrays);
+}
+
+/// Shows a state that was put there.
+template <typename Launch>
+void launch_restored(const Launch& launch, const SimulatorArrays& arrays) {
+  launch.fill(arrays.began, static_cast<size_t>(arrays.num_worlds), 0);
+  launch.fill(arrays.prepares, static_cast<size_t>(arrays.num_worlds), 1);
+  launch.teams(arrays.num_worlds, PrepareEpisode{arrays});
+  launch.template groups<kWarp>(arrays.num_worlds, PlaceCenters{arrays});
+  launch_write_observations(launch, arrays);
+}
+
+template <typename Launch>
+void launch_step(const Launch& launch, const SimulatorArrays& arrays, const int32_t* actions) {
+  launch.copy(arrays.prepares, arrays.began, static_cast<size_t>(arrays.num_worlds));
+  launch.fork_join([&](const Launch& side) { side.teams(arrays.num_worlds, PrepareEpisode{arrays}); },
+                   [&] {
+                     launch.fill(arrays.rejected_slot, sizeof(int32_t), kNoSlot & 0xFF);
+                     launch.threads(arrays.num_slots, CheckActions{arrays, actions});
+                     launch.template groups<kThreadsPerAgent>(arrays.num_slots, Advance{arrays, actions});
+                     launch.template groups<kThreadsPerAgent>(arrays.num_slots, ApplyRewardAndHalt{arrays});
+                     launch.template groups<kWarp>(arrays.num_worlds, FinishStep{arrays, actions});
+                     launch_write_observations(launch, arrays);
+                   });
+}
+
+}  // namespace pictura::cuda

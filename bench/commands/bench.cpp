@@ -1,0 +1,163 @@
+// `pictura bench`: rates of rendering, simulation and training as medians of several repeats, with the device's name,
+// the commit and the workload beside them.
+#include "pictura/bench/commands/bench.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <numeric>
+
+#include <fmt/ranges.h>
+
+#include "pictura/cli/drive.h"
+#include "pictura/cli/report.h"
+#include "pictura/commit.h"
+#include "pictura/common/error.h"
+#include "pictura/common/support/interrupt.h"
+#include "pictura/map/load_map.h"
+#ifdef PICTURA_HAS_TORCH
+#include "pictura/training/training.h"
+#endif
+
+namespace pictura {
+
+std::string processor_name() {
+  std::ifstream in("/proc/cpuinfo");
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with("model name")) return line.substr(line.find(':') + 2);
+  }
+  return "unknown processor";
+}
+
+std::string population_of(const WorldOptions& world) {
+  const float pedestrians = *world.pedestrian_fraction, cyclists = *world.cyclist_fraction;
+  std::string text = fmt::format("{} agents", world.agents);
+  if (pedestrians > 0 || cyclists > 0) text += fmt::format(" ({} pedestrians, {} cyclists)", pedestrians, cyclists);
+  if (*world.parked_cars > 0) text += fmt::format(", {} parked cars", *world.parked_cars);
+  return text;
+}
+
+void add_maps_option(CLI::App* command, std::vector<std::string>* maps, const std::string& default_maps) {
+  command->add_option("--map", *maps, "Maps, in turn; towns: all of the map folder; default: " + default_maps)
+      ->delimiter(',');
+}
+
+std::vector<std::string> named_maps(const std::vector<std::string>& maps) {
+  const std::vector<std::string> towns = known_towns();
+  // The town that the numbers of docs/ are about.
+  if (maps.empty()) return {std::binary_search(towns.begin(), towns.end(), "Town01") ? "Town01" : "procedural:1"};
+  if (maps != std::vector<std::string>{"towns"}) return maps;
+  PICTURA_CHECK(!towns.empty(), "--map towns: {} has none", map_folder());
+  return towns;
+}
+
+void check_backends(const std::vector<std::string>& backends, const std::vector<std::string>& known) {
+  for (const std::string& backend : backends) {
+    if (std::find(known.begin(), known.end(), backend) != known.end()) continue;
+    fail_usage("--backend: expected one of {}; got '{}'", fmt::join(known, ", "), backend);
+  }
+}
+
+void BenchContext::add_gpu(const std::string& name, const std::string& driver_name) {
+  if (name.empty()) return;
+  device = name + "; " + device;
+  driver = driver_name;
+}
+
+Json BenchContext::json() const {
+  Json object{{"workload", workload}, {"backend", backend}, {"device", device}};
+  if (!driver.empty()) object["driver"] = driver;
+  object["commit"] = PICTURA_COMMIT;
+  return object;
+}
+
+void report_benchmark(bool json, const BenchContext& context, std::vector<BenchResult> results) {
+  Json rows = Json::array();
+  for (BenchResult& result : results) {
+    std::sort(result.values.begin(), result.values.end());
+    const size_t n = result.values.size();
+    const double median = 0.5 * (result.values[(n - 1) / 2] + result.values[n / 2]);
+    const double mean = std::accumulate(result.values.begin(), result.values.end(), 0.0) / static_cast<double>(n);
+    rows.push_back({{"name", result.name},
+                    {"value", median},
+                    {"unit", result.unit},
+                    {"mean", mean},
+                    {"min", result.values.front()},
+                    {"max", result.values.back()},
+                    {"repeats", n}});
+  }
+  if (json) {
+    Json object = context.json();
+    object["results"] = rows;
+    return print_json(object);
+  }
+  fmt::print("{}\nbackend {} on {}{}, commit {}\n", context.workload, context.backend, context.device,
+             context.driver.empty() ? "" : ", driver " + context.driver, PICTURA_COMMIT);
+  for (const Json& row : rows) {
+    fmt::print("{:50} {:>14.6g} {:18} (mean {:.6g}, min {:.6g}, max {:.6g}, {} repeats)\n",
+               row["name"].get<std::string>(), row["value"].get<double>(), row["unit"].get<std::string>(),
+               row["mean"].get<double>(), row["min"].get<double>(), row["max"].get<double>(),
+               row["repeats"].get<int>());
+  }
+}
+
+#ifdef PICTURA_HAS_TORCH
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+struct TrainArguments {
+  std::string config = "configs/smoke.toml";
+  bool json = false;
+};
+
+void bench_train(const TrainArguments& arguments) {
+  const std::string folder = std::filesystem::temp_directory_path() / fmt::format("pictura-bench-{}", getpid());
+  BenchResult rate{"train, one update", "agent_steps_per_s", {}};
+  TrainOptions options{.config_path = arguments.config, .out_folder = folder};
+  int64_t steps_before = 0;
+  auto begin = Clock::now();
+  options.on_progress = [&](const TrainProgress& progress) {
+    // The first update warms caches and allocators up.
+    if (progress.update > 1)
+      rate.values.push_back(static_cast<double>(progress.agent_steps - steps_before) / seconds_since(begin));
+    steps_before = progress.agent_steps;
+    begin = Clock::now();
+  };
+  const TrainReport trained = train(options);
+  std::filesystem::remove_all(folder);
+  if (trained.interrupted) throw Interrupted("interrupted");
+  PICTURA_CHECK(!rate.values.empty(), "bench train: {}: expected at least 2 updates", arguments.config);
+  report_benchmark(arguments.json, {fmt::format("train: {}, rollout and update", arguments.config), "cpu"}, {rate});
+}
+
+}  // namespace
+#endif
+
+void add_bench_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand(
+      "bench",
+      "Measure rates, quality and worlds: bench render, bench simulate, bench train, bench quality, bench worlds, "
+      "bench soak");
+  command->require_subcommand(1);
+  command->footer(
+      "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n  pictura bench render --size 192x108");
+#ifdef PICTURA_HAS_TORCH
+  auto arguments = std::make_shared<TrainArguments>();
+  CLI::App* train_command = command->add_subcommand("train", "Rollouts and updates of a configuration");
+  train_command->add_option("--config", arguments->config, "TOML file")->capture_default_str();
+  train_command->add_flag("--json", arguments->json, "Print one JSON object");
+  train_command->callback([arguments] { bench_train(*arguments); });
+#endif
+#ifdef PICTURA_HAS_BENCH
+  add_simulate_benchmark(*command);
+  add_quality_benchmark(*command);
+  add_render_benchmark(*command);
+  add_worlds_benchmark(*command);
+  add_soak_benchmark(*command);
+#endif
+}
+
+}  // namespace pictura

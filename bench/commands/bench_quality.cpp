@@ -1,0 +1,120 @@
+// `pictura bench quality`: how far images are from the truth, a ray caster with 1,024 samples a pixel, at the paper's
+// five sizes: the oracle beside a z-buffer with one sample and 2x2 samples, and beside exact areas taken for opacity.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "pictura/bench/commands/bench.h"
+#include "pictura/bench/quality.h"
+#include "pictura/cli/finite_range.h"
+#include "pictura/cli/report.h"
+#include "pictura/common/error.h"
+#include "pictura/common/raster/camera.h"
+#include "pictura/common/support/interrupt.h"
+#include "pictura/map/load_map.h"
+
+namespace pictura {
+
+namespace {
+
+struct Arguments {
+  std::vector<std::string> maps;
+  std::vector<std::string> sizes = {"32x18", "64x36", "96x54", "192x108", "384x216"};
+  SnapshotOptions world{.views = 2};
+  float line_floor_px = RendererConfig{}.line_floor_px;
+  std::string figure;
+  bool json = false;
+};
+
+std::vector<Snapshot> drive_all(const Arguments& arguments, ProgressLine* progress) {
+  std::vector<Snapshot> snapshots;
+  for (const std::string& map : arguments.maps) {
+    if (interrupted()) throw Interrupted("interrupted");
+    progress->update(fmt::format("driving on {}", map));
+    SnapshotOptions world = arguments.world;
+    world.map = map;
+    snapshots.push_back(drive_snapshot(world));
+  }
+  return snapshots;
+}
+
+void run(Arguments arguments) {
+  if (arguments.maps.empty()) {
+    arguments.maps = known_towns();
+    arguments.maps.insert(arguments.maps.end(), {"procedural:1", "procedural:2"});
+  }
+  arguments.maps = named_maps(arguments.maps);
+  std::vector<Pair> sizes;
+  for (const std::string& size : arguments.sizes) sizes.push_back(parse_pair("--size", size, 8192));
+  ProgressLine progress;
+  const std::vector<Snapshot> snapshots = drive_all(arguments, &progress);
+  std::vector<BenchResult> results;
+  int images = 0;
+  for (const Pair& size : sizes) {
+    const std::string text = fmt::format("{}x{}", size.first, size.second);
+    RendererConfig config{.rig = paper_rig(size.first, size.second), .num_threads = arguments.world.num_threads};
+    config.line_floor_px = arguments.line_floor_px;
+    Quality quality;
+    for (std::size_t i = 0; i < snapshots.size(); ++i) {
+      if (interrupted()) throw Interrupted("interrupted");
+      progress.update(fmt::format("{} on {}", text, arguments.maps[i]));
+      quality.add(measure_quality(snapshots[i].geometry, snapshots[i].scene.batch(), snapshots[i].views, config));
+    }
+    images += quality.images;
+    auto add = [&](const std::string& way, double psnr_db) {
+      results.push_back({fmt::format("{} {}", way, text), "dB", {psnr_db}});
+    };
+    add("1 sample", quality.one_sample.psnr_db());
+    add("2x2 samples", quality.grid_2x2.psnr_db());
+    add("area coverage", quality.area.psnr_db());
+    add("oracle", quality.oracle.psnr_db());
+    add("oracle in bytes", quality.oracle_bytes.psnr_db());
+    add("oracle, worst image", quality.worst_image_db);
+  }
+  progress.finish();
+  if (!arguments.figure.empty()) {
+    RendererConfig config{.rig = paper_rig()};
+    config.line_floor_px = arguments.line_floor_px;
+    write_quality_figure(arguments.figure, snapshots, config);
+  }
+  report_benchmark(
+      arguments.json,
+      {fmt::format(
+           "quality: PSNR against 1,024 samples a pixel, {} images that are not blank, maps {}, {} agents, walls {}, "
+           "{} views x 4 cameras each, line floor {} px",
+           images, fmt::join(arguments.maps, " "), arguments.world.agents, arguments.world.walls ? "on" : "off",
+           arguments.world.views, arguments.line_floor_px),
+       "cpu"},
+      results);
+}
+
+}  // namespace
+
+void add_quality_benchmark(CLI::App& bench) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = bench.add_subcommand("quality", "PSNR of images against a ray caster");
+  add_maps_option(command, &arguments->maps, "all towns of the map folder and two procedural ones");
+  command->add_option("--size", arguments->sizes, "Sizes, WxH; default: the paper's five")->delimiter(',');
+  command->add_option("--agents", arguments->world.agents, "Agents in each world")
+      ->check(CLI::Range(1, kMaxAgentsPerWorld))
+      ->capture_default_str();
+  command->add_option("--views", arguments->world.views, "Agents whose cameras are drawn, of each world")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_option("--steps", arguments->world.steps, "Steps of random actions before the pictures")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--seed", arguments->world.seed)->capture_default_str();
+  command->add_option("--threads", arguments->world.num_threads, "Host threads; 0: all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_flag("!--no-walls", arguments->world.walls, "Leave out the walls along the building lines");
+  command->add_option("--line-floor", arguments->line_floor_px, "Least width of a line on screen in pixels")
+      ->check(finite_range(0, kGuardBand_px))
+      ->capture_default_str();
+  command->add_option("--figure", arguments->figure, "Write crops side by side as PNG");
+  command->add_flag("--json", arguments->json, "Print one JSON object");
+  command->footer("Example:\n  pictura bench quality --map Town03 --size 96x54 --views 10 --figure quality.png");
+  command->callback([arguments] { run(*arguments); });
+}
+
+}  // namespace pictura

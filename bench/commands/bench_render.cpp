@@ -1,0 +1,247 @@
+// `pictura bench render`: how fast backends draw what the agents of many worlds see, by backend, size and number of
+// egos, and how much device memory that takes.
+#include <algorithm>
+#include <regex>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "pictura/backends/make_renderer.h"
+#include "pictura/bench/commands/bench.h"
+#include "pictura/bench/commands/plot_results.h"
+#include "pictura/bench/render.h"
+#include "pictura/cli/drive.h"
+#include "pictura/cli/report.h"
+#include "pictura/common/error.h"
+
+namespace pictura {
+
+namespace {
+
+struct Arguments {
+  WorldOptions world{
+      .agents = 120, .num_threads = 1, .pedestrian_fraction = 0.0f, .cyclist_fraction = 0.0f, .parked_cars = 0};
+  std::vector<std::string> maps, backends = {"cpu"}, sizes, samples = {"1"};
+  std::vector<int> egos;
+  std::string sweep, format = "u8";
+  int checked_views = 8;
+  bool planes = false, host_memory = false, memory = false;
+  RateArguments rate;
+};
+
+// What the sweeps hold fixed.
+constexpr int kSweptEgos = 2048;
+constexpr const char* kSweptSize = "96x54";
+
+// What the paper measures, and what lies beyond: see bench/README.md.
+void apply_sweep(Arguments* arguments) {
+  const std::string& sweep = arguments->sweep;
+  if (sweep.empty()) return;
+  if (!arguments->sizes.empty() || (sweep == "egos" && !arguments->egos.empty())) {
+    fail_usage("--sweep {}: chooses sizes or egos itself", sweep);
+  }
+  if (sweep == "egos") {
+    arguments->egos = {64, 128, 256, 512, 1024, 2048, 4096, 8192, 20480};
+    return;
+  }
+  if (sweep == "squares") {
+    arguments->sizes = {"32x32", "64x64", "128x128", "256x256"};
+    arguments->world.walls = false;
+  } else {
+    arguments->sizes = {"32x18", "64x36", "96x54", "192x108", "384x216", "768x432"};
+  }
+  if (arguments->egos.empty()) arguments->egos = {kSweptEgos};
+}
+
+void apply_defaults(Arguments* arguments) {
+  apply_sweep(arguments);
+  if (arguments->sizes.empty()) arguments->sizes = {kSweptSize};
+  if (arguments->egos.empty()) arguments->egos = {0};
+  arguments->maps = named_maps(arguments->maps);
+}
+
+bool reaches_device_memory(const std::string& backend) { return backend == "cuda" || backend == "gl:egl"; }
+
+RenderCase case_of(const Arguments& arguments, const std::string& backend, const std::string& size,
+                   const std::string& samples, int egos) {
+  const Pair pixels = parse_pair("--size", size, 8192);
+  RenderCase result{.backend = backend, .num_views = egos};
+  result.config.rig = paper_rig(pixels.first, pixels.second);
+  const bool in_device_memory = reaches_device_memory(backend) && !arguments.host_memory && !cuda_device_name().empty();
+  result.config.space = in_device_memory ? MemorySpace::cuda : MemorySpace::host;
+  result.config.num_threads = arguments.world.num_threads;
+  result.config.samples = parse_samples("--samples", samples);
+  result.format = arguments.format == "u8"    ? PixelFormat::u8
+                  : arguments.format == "f16" ? PixelFormat::f16
+                                              : PixelFormat::f32;
+  result.planes = arguments.planes ? Planes::all : Planes::none;
+  result.checked_views = arguments.checked_views;
+  result.repeats = arguments.memory ? 0 : arguments.rate.repeats;
+  result.repeat_s = arguments.rate.repeat_s;
+  result.watches_memory = arguments.memory;
+  return result;
+}
+
+struct NamedCase {
+  std::string renderer, size;  // the backend, with its samples where it takes them
+  RenderCase measured;         // of 0 views: of all agents that will have found a place
+  std::string name() const { return fmt::format("{} {} {} egos", renderer, size, measured.num_views); }
+};
+
+// All of them, so that what is wrong in the arguments of the last shows before the first is measured.
+std::vector<NamedCase> cases_of(const Arguments& arguments) {
+  check_backends(arguments.backends, renderer_names());
+  std::vector<NamedCase> cases;
+  for (const std::string& backend : arguments.backends) {
+    for (const std::string& samples : arguments.samples) {
+      // The others compute exact coverage, once for all numbers of samples.
+      const bool takes_samples = backend.starts_with("gl");
+      if (!takes_samples && samples != arguments.samples.front()) continue;
+      for (const std::string& size : arguments.sizes) {
+        for (const int egos : arguments.egos) {
+          cases.push_back({takes_samples ? backend + " " + samples : backend, size,
+                           case_of(arguments, backend, size, takes_samples ? samples : "1", egos)});
+        }
+      }
+    }
+  }
+  if (arguments.memory && cases.size() > 1) {
+    fail_usage(
+        "--memory: expected one backend, size and number of egos and samples, since drivers keep what an "
+        "earlier case has released; got {} cases",
+        cases.size());
+  }
+  return cases;
+}
+
+void append_results(const std::string& name, const RenderCase& measured, const RenderMeasurement& measurement,
+                    std::vector<BenchResult>* results_out) {
+  BenchResult rate{name, "agent_steps_per_s", {}}, call{name + ", one call", "ms", {}},
+      image{name + ", one image", "ms", {}};
+  const double egos = measured.num_views, cameras = static_cast<double>(measured.config.rig.cameras.size());
+  for (const double ms : measurement.call_ms) {
+    rate.values.push_back(1e3 * egos / ms);
+    call.values.push_back(ms);
+    image.values.push_back(ms / (egos * cameras));
+  }
+  if (!measurement.call_ms.empty()) results_out->insert(results_out->end(), {rate, call, image});
+  if (measurement.error.values > 0) {
+    const double share =
+        static_cast<double>(measurement.error.differing) / static_cast<double>(measurement.error.values);
+    results_out->push_back({name + ", values unlike the oracle's", "%", {100 * share}});
+    results_out->push_back({name + ", most unlike", "1/255", {255 * measurement.error.worst}});
+    if (measured.planes == Planes::all) {
+      results_out->push_back({name + ", planes unlike the oracle's",
+                              "pixels",
+                              {static_cast<double>(measurement.error.differing_plane_pixels)}});
+    }
+  }
+  if (measured.watches_memory) {
+    constexpr double kGiB = 1 << 30;
+    results_out->push_back({name + ", up front", "GiB", {measurement.up_front_bytes / kGiB}});
+    results_out->push_back({name + ", high-water mark beyond images", "GiB", {measurement.max_bytes / kGiB}});
+    results_out->push_back({name + ", images", "GiB", {measurement.image_bytes / kGiB}});
+  }
+}
+
+/// Draws the rates that the sweeps in earlier results have found.
+void draw_rates(const PlotArguments& plot) {
+  const std::regex swept(R"((.+) ((\d+)x(\d+)) (\d+) egos)");
+  const char* rate = "agent-steps/s";
+  PlotPanel by_size = sweep_panel(fmt::format("{} egos", kSweptEgos), "width in pixels, 16:9", rate);
+  PlotPanel by_egos = sweep_panel(fmt::format("{} pixels", kSweptSize), "egos in one call", rate);
+  PlotPanel by_square = sweep_panel(fmt::format("{} egos, walls off", kSweptEgos), "width in pixels, square", rate);
+  for (const PlottedResult& result : read_results(plot.results)) {
+    std::smatch match;
+    if (!std::regex_match(result.name, match, swept)) continue;
+    const int egos = std::stoi(match[5]);
+    if (egos == kSweptEgos) {
+      add_point(match[3] == match[4] ? &by_square : &by_size, match[1], std::stod(match[3]), result.value);
+    }
+    if (match[2] == kSweptSize) add_point(&by_egos, match[1], egos, result.value);
+  }
+  draw_plots_png({by_size, by_egos, by_square}, plot.figure, {.columns = 3, .title = "Rates of rendering"});
+}
+
+void run(Arguments arguments) {
+  if (wants_plot(arguments.rate.plot)) return draw_rates(arguments.rate.plot);
+  apply_defaults(&arguments);
+  std::vector<NamedCase> cases = cases_of(arguments);
+  ProgressLine progress;
+  progress.update("driving");
+  const WorldOptions& world = arguments.world;
+  const DrivenWorlds worlds =
+      drive_worlds({.maps = arguments.maps,
+                    .num_views = *std::max_element(arguments.egos.begin(), arguments.egos.end()),
+                    .agents = world.agents,
+                    .pedestrian_fraction = *world.pedestrian_fraction,
+                    .cyclist_fraction = *world.cyclist_fraction,
+                    .parked_cars = *world.parked_cars,
+                    .walls = world.walls,
+                    .seed = world.seed});
+  std::vector<BenchResult> results;
+  std::vector<std::string> choices;  // of each renderer, the last
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    RenderCase& measured = cases[i].measured;
+    if (measured.num_views == 0) measured.num_views = static_cast<int>(worlds.views.size());
+    progress.update(cases[i].name());
+    const RenderMeasurement measurement = measure_render(worlds, measured);
+    append_results(cases[i].name(), measured, measurement, &results);
+    const bool is_last_of_renderer = i + 1 == cases.size() || cases[i + 1].renderer != cases[i].renderer;
+    if (is_last_of_renderer) choices.push_back(measurement.choice);
+  }
+  progress.finish();
+  BenchContext context{
+      .workload = fmt::format("render: {}, {} in each of {} worlds, walls {}, {} cameras, {}{}, {} threads; {}",
+                              fmt::join(arguments.maps, " "), population_of(world), worlds.simulator->worlds().size(),
+                              world.walls ? "on" : "off", paper_rig().cameras.size(), arguments.format,
+                              arguments.planes ? " and planes" : "", world.num_threads, fmt::join(choices, "; ")),
+      .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
+  // In host memory gl:egl may be drawn by anybody; its choice says by whom.
+  auto is_of_cuda_device = [](const NamedCase& each) {
+    return each.measured.backend == "cuda" || each.measured.config.space == MemorySpace::cuda;
+  };
+  if (std::any_of(cases.begin(), cases.end(), is_of_cuda_device)) {
+    context.add_gpu(cuda_device_name(), cuda_driver_name());
+  }
+  report_benchmark(arguments.rate.json, context, results);
+}
+
+}  // namespace
+
+void add_render_benchmark(CLI::App& bench) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = bench.add_subcommand("render", "Images of the agents of many worlds");
+  add_maps_option(command, &arguments->maps);
+  add_world_options(command, &arguments->world);
+  command->add_option("--egos", arguments->egos, "Agents drawn in one call; default: all of one world for each map")
+      ->delimiter(',')
+      ->check(CLI::Range(1, kMaxSlots));
+  command->add_option("--backend", arguments->backends, "cpu, cuda, gl, gl:egl, gl:osmesa")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->add_option("--size", arguments->sizes, "Sizes in pixels, WxH; default: 96x54")->delimiter(',');
+  command->add_option("--samples", arguments->samples, "Of a pixel, for gl: 1, N (MSAA) or NxN (supersampling)")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->add_option("--format", arguments->format)->check(CLI::IsMember({"u8", "f16", "f32"}))->capture_default_str();
+  command->add_flag("--planes", arguments->planes, "Draw depth, class and instance planes too");
+  command->add_flag("--host-memory", arguments->host_memory,
+                    "Keep scenes and images on the host for cuda and gl:egl, too, which else draw in device memory");
+  command
+      ->add_option("--sweep", arguments->sweep,
+                   "sizes: the paper's five and 768x432; squares: without walls; egos: 64 to 20,480")
+      ->check(CLI::IsMember({"sizes", "squares", "egos"}));
+  command->add_flag("--memory", arguments->memory, "Watch device memory in a single case, and time nothing");
+  command
+      ->add_option("--check", arguments->checked_views, "Compare so many egos with the oracle, before timing and after")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  add_rate_options(command, &arguments->rate);
+  command->footer(
+      "Examples:\n  pictura bench render --size 192x108 --threads 0\n"
+      "  pictura bench render --backend cuda,gl:egl --samples 1,4,2x2 --map towns --parked 32 --egos 2048,256 --json");
+  command->callback([arguments] { run(*arguments); });
+}
+
+}  // namespace pictura

@@ -1,0 +1,182 @@
+// `pictura bench simulate`: how fast executors step worlds, by backend, number of worlds and agents in each, with and
+// without entity sets; and what an agent-step costs, as a figure.
+#include <algorithm>
+#include <regex>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "pictura/backends/make_simulator.h"
+#include "pictura/bench/commands/bench.h"
+#include "pictura/bench/commands/plot_results.h"
+#include "pictura/bench/render.h"
+#include "pictura/bench/step_rate.h"
+#include "pictura/cli/report.h"
+#include "pictura/common/error.h"
+#include "pictura/common/support/interrupt.h"
+#include "pictura/map/load_map.h"
+
+namespace pictura {
+
+namespace {
+
+struct Arguments {
+  // Vehicles alone, as the peers that rates are compared with; what a world of all classes costs is an option.
+  WorldOptions world{
+      .agents = 120, .num_threads = 1, .pedestrian_fraction = 0.0f, .cyclist_fraction = 0.0f, .parked_cars = 0};
+  std::vector<std::string> maps, backends = {"cpu"};
+  int num_worlds = 0, slots = 0;
+  std::string sweep;
+  int warm_up_steps = 60;
+  RateArguments rate;
+};
+
+/// Worlds that are measured together.
+struct Case {
+  std::string name;  // of the worlds
+  std::vector<WorldSpec> worlds;
+  bool vector_observations = true;
+};
+
+/// Equal worlds, on the maps in turn.
+Case equal_worlds(int num_worlds, int agents, int num_maps) {
+  Case result{.name = fmt::format("{} worlds of {} agents", num_worlds, agents)};
+  for (int w = 0; w < num_worlds; ++w) {
+    result.worlds.push_back({w % num_maps, agents, static_cast<uint32_t>(w)});
+  }
+  return result;
+}
+
+// What the sweeps hold fixed.
+constexpr int kSweptWorlds = 64, kSweptAgents = 60;
+
+std::vector<Case> cases_of(const Arguments& arguments) {
+  const int num_maps = static_cast<int>(arguments.maps.size());
+  std::vector<Case> cases;
+  if (arguments.sweep == "agents") {
+    for (int agents = 1; agents <= 1024; agents *= 4) cases.push_back(equal_worlds(kSweptWorlds, agents, num_maps));
+  } else if (arguments.sweep == "worlds") {
+    for (int worlds = 1; worlds <= 4096; worlds *= 4) cases.push_back(equal_worlds(worlds, kSweptAgents, num_maps));
+  } else {
+    Case both =
+        equal_worlds(arguments.num_worlds > 0 ? arguments.num_worlds : num_maps, arguments.world.agents, num_maps);
+    if (arguments.slots > 0) {
+      both.worlds = draw_worlds(arguments.world.seed, arguments.slots, 1, arguments.world.agents, num_maps);
+      both.name = fmt::format("{} agents in worlds of 1 to {}", arguments.slots, arguments.world.agents);
+    }
+    cases.push_back(both);
+    both.vector_observations = false;
+    both.name += " without entity sets";
+    cases.push_back(both);
+  }
+  return cases;
+}
+
+void measure(const Arguments& arguments, const std::string& backend,
+             const std::vector<std::shared_ptr<const RoadMap>>& maps, const Case& measured,
+             std::vector<BenchResult>* results_out) {
+  const WorldOptions& world = arguments.world;
+  SimulatorConfig config;
+  config.seed = world.seed;
+  config.num_threads = world.num_threads;
+  config.walls = world.walls;
+  config.pedestrian_fraction = *world.pedestrian_fraction;
+  config.cyclist_fraction = *world.cyclist_fraction;
+  config.parked_cars = *world.parked_cars;
+  config.vector_observations = measured.vector_observations;
+  const auto simulator = make_simulator(backend, config, maps, measured.worlds);
+  StepBench bench(simulator.get(), world.seed);
+  const StepTiming warm_up = bench.run(arguments.warm_up_steps);
+  const double steps_per_s = static_cast<double>(warm_up.steps) / warm_up.elapsed_s;
+  const int64_t steps = std::max<int64_t>(1, static_cast<int64_t>(arguments.rate.repeat_s * steps_per_s));
+  const std::string name = fmt::format("{}, {}", backend, measured.name);
+  BenchResult live{name, "agent_steps_per_s", {}}, slots{name + ", slots", "slot_steps_per_s", {}},
+      step{name + ", one step", "ms", {}};
+  for (int repeat = 0; repeat < arguments.rate.repeats; ++repeat) {
+    if (interrupted()) throw Interrupted("interrupted");
+    const StepTiming timing = bench.run(steps);
+    live.values.push_back(static_cast<double>(timing.agent_steps) / timing.elapsed_s);
+    slots.values.push_back(static_cast<double>(timing.slot_steps) / timing.elapsed_s);
+    step.values.push_back(1e3 * timing.elapsed_s / static_cast<double>(timing.steps));
+  }
+  results_out->insert(results_out->end(), {live, slots, step});
+}
+
+/// Draws what the sweeps in earlier results say an agent-step costs.
+void draw_cost(const PlotArguments& plot) {
+  const std::regex swept(R"((\w+), (\d+) worlds of (\d+) agents)");
+  const char* cost_label = "ns for an agent-step";
+  PlotPanel by_agents = sweep_panel(fmt::format("{} worlds", kSweptWorlds), "agents in each world", cost_label);
+  PlotPanel by_worlds = sweep_panel(fmt::format("{} agents in each world", kSweptAgents), "worlds", cost_label);
+  for (const PlottedResult& result : read_results(plot.results)) {
+    std::smatch match;
+    if (!std::regex_match(result.name, match, swept)) continue;
+    const int worlds = std::stoi(match[2]), agents = std::stoi(match[3]);
+    const double cost = 1e9 / result.value;
+    if (agents == kSweptAgents) {
+      add_point(&by_worlds, match[1], worlds, cost);
+    } else if (worlds == kSweptWorlds) {
+      add_point(&by_agents, match[1], agents, cost);
+    }
+  }
+  draw_plots_png({by_agents, by_worlds}, plot.figure, {.title = "What an agent-step costs"});
+}
+
+void run(Arguments arguments) {
+  if (wants_plot(arguments.rate.plot)) return draw_cost(arguments.rate.plot);
+  check_backends(arguments.backends, simulator_names());
+  arguments.maps = named_maps(arguments.maps);
+  std::vector<std::shared_ptr<const RoadMap>> maps;
+  for (const std::string& name : arguments.maps) maps.push_back(load_map(name));
+  std::vector<BenchResult> results;
+  ProgressLine progress;
+  bool on_device = false;
+  for (const std::string& backend : arguments.backends) {
+    on_device = on_device || backend == "cuda";
+    for (const Case& measured : cases_of(arguments)) {
+      progress.update(fmt::format("{}, {}", backend, measured.name));
+      measure(arguments, backend, maps, measured, &results);
+    }
+  }
+  progress.finish();
+  BenchContext context{.workload = fmt::format("simulate: {}, {}, walls {}, random actions with resets, {} threads",
+                                               fmt::join(arguments.maps, " "), population_of(arguments.world),
+                                               arguments.world.walls ? "on" : "off", arguments.world.num_threads),
+                       .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
+  if (on_device) context.add_gpu(cuda_device_name(), cuda_driver_name());
+  report_benchmark(arguments.rate.json, context, results);
+}
+
+}  // namespace
+
+void add_simulate_benchmark(CLI::App& bench) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = bench.add_subcommand("simulate", "Steps of worlds, observations included");
+  add_maps_option(command, &arguments->maps);
+  add_world_options(command, &arguments->world);
+  command->add_option("--backend", arguments->backends, "cpu, cuda")->delimiter(',')->capture_default_str();
+  auto* worlds = command->add_option("--worlds", arguments->num_worlds, "Default: one for each map")
+                     ->check(CLI::Range(1, kMaxSlots));
+  auto* slots = command
+                    ->add_option("--slots", arguments->slots,
+                                 "So many agents in worlds of 1 to --agents, as in training, instead of equal worlds")
+                    ->check(CLI::Range(1, kMaxSlots))
+                    ->excludes(worlds);
+  command
+      ->add_option(
+          "--sweep", arguments->sweep,
+          fmt::format("agents: {} worlds of 1 to 1,024; worlds: 1 to 4,096 of {} agents", kSweptWorlds, kSweptAgents))
+      ->check(CLI::IsMember({"agents", "worlds"}))
+      ->excludes(worlds)
+      ->excludes(slots);
+  command->add_option("--warm-up", arguments->warm_up_steps, "Steps before timing")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  add_rate_options(command, &arguments->rate);
+  command->footer(
+      "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n"
+      "  pictura bench simulate --backend cuda --map towns --slots 20480 --pedestrians 0.1 --cyclists 0.1 --parked 32");
+  command->callback([arguments] { run(*arguments); });
+}
+
+}  // namespace pictura

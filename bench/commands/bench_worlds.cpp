@@ -1,0 +1,65 @@
+// `pictura bench worlds`: distributions over many episodes of each map: agents by class, refusals by reason, goals that
+// cannot be reached, what a random policy does wrong, and what a driver reaches who keeps its lane.
+#include <fmt/format.h>
+
+#include "pictura/bench/commands/bench.h"
+#include "pictura/bench/world_statistics.h"
+#include "pictura/cli/report.h"
+#include "pictura/map/load_map.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+namespace {
+
+struct Arguments {
+  std::vector<std::string> maps;
+  WorldStatisticsOptions options;
+  bool json = false;
+};
+
+void run(Arguments arguments) {
+  if (arguments.maps.empty()) arguments.maps = known_towns();
+  arguments.maps = named_maps(arguments.maps);
+  ProgressLine progress;
+  std::vector<BenchResult> results;
+  for (size_t i = 0; i < arguments.maps.size(); ++i) {
+    arguments.options.on_progress = [&](const std::string& phase) {
+      progress.update(fmt::format("{}: {}", arguments.maps[i], phase),
+                      static_cast<double>(i) / static_cast<double>(arguments.maps.size()));
+    };
+    for (EpisodeValues& quantity : measure_worlds(load_map(arguments.maps[i]), arguments.options)) {
+      results.push_back(
+          {fmt::format("{}: {}", arguments.maps[i], quantity.name), quantity.unit, std::move(quantity.values)});
+    }
+  }
+  progress.finish();
+  report_benchmark(arguments.json,
+                   {.workload = fmt::format("worlds: {} episodes of each map, {} agents asked for; lane drivers alone "
+                                            "among parked cars, for 1,280 steps",
+                                            arguments.options.episodes, arguments.options.agents),
+                    .backend = "cpu"},
+                   results);
+}
+
+}  // namespace
+
+void add_worlds_benchmark(CLI::App& bench) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command =
+      bench.add_subcommand("worlds", "Distributions over many episodes: who is there, what befalls them");
+  add_maps_option(command, &arguments->maps, "all towns of the map folder, else procedural:1");
+  command->add_option("--episodes", arguments->options.episodes)->check(CLI::Range(1, 10'000))->capture_default_str();
+  command->add_option("--agents", arguments->options.agents, "Asked for in each world")
+      ->check(CLI::Range(1, kMaxAgentsPerWorld))
+      ->capture_default_str();
+  command->add_option("--seed", arguments->options.seed)->capture_default_str();
+  command->add_option("--threads", arguments->options.num_threads, "Host threads; 0: all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_flag("--json", arguments->json, "Print one JSON object");
+  command->footer("Example:\n  pictura bench worlds --map Town03 --episodes 100 --json");
+  command->callback([arguments] { run(*arguments); });
+}
+
+}  // namespace pictura

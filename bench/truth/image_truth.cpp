@@ -1,0 +1,535 @@
+#include "pictura/bench/truth/image_truth.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <utility>
+
+#include "pictura/bench/truth/tolerances.h"
+#include "pictura/common/raster/check.h"
+
+namespace pictura {
+
+namespace {
+
+struct Point {
+  double x = 0, y = 0, z = 0;
+};
+Point operator+(Point a, Point b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+Point operator-(Point a, Point b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+Point operator*(Point a, double s) { return {a.x * s, a.y * s, a.z * s}; }
+double dot(Point a, Point b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+Point cross(Point a, Point b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+Point point(Vec3 v) { return {v.x, v.y, v.z}; }
+
+constexpr double kFar = std::numeric_limits<double>::infinity();
+
+// A parallelogram or disk in camera coordinates: a solid's face.
+struct Facet {
+  Point origin, u, v;  // corner and sides; of a disk, centre and two radii
+  bool is_disk = false;
+  Rgb color;
+  int solid = 0;  // index into Tracer::solids
+  // Depth of the hit along the ray (x, y, 1), or kFar.
+  double hit(Point ray) const {
+    const Point normal = cross(u, v);
+    const double along = dot(normal, ray);
+    if (along == 0) return kFar;
+    const double depth = dot(normal, origin) / along;
+    if (!(depth >= kNear_m)) return kFar;
+    const Point p = ray * depth - origin;
+    // The sides of a wall with a sloping foot are not at right angles.
+    const double area2 = dot(normal, normal);
+    const double at_u = dot(cross(p, v), normal) / area2, at_v = dot(cross(u, p), normal) / area2;
+    if (is_disk) return at_u * at_u + at_v * at_v <= 1 ? depth : kFar;
+    return at_u >= 0 && at_u <= 1 && at_v >= 0 && at_v <= 1 ? depth : kFar;
+  }
+  Point center() const { return is_disk ? origin : origin + (u + v) * 0.5; }
+  double radius() const {
+    return is_disk ? std::sqrt(dot(u, u)) : 0.5 * std::sqrt(std::max(dot(u + v, u + v), dot(u - v, u - v)));
+  }
+};
+
+// What a facet belongs to: its foot in the world, and what the planes say of it.
+struct Solid {
+  std::vector<Point> foot;  // corners
+  uint8_t class_id = 0;
+  uint16_t instance_id = 0;
+  Point middle() const {
+    Point sum;
+    for (Point corner : foot) sum = sum + corner;
+    return sum * (1.0 / static_cast<double>(foot.size()));
+  }
+};
+
+// A strip as drawn: the cone of directions through its four corners, and the plane that it is painted on.
+struct PaintedStrip {
+  Point edge_normal[4];  // inwards
+  Point plane;           // unit normal
+  double offset = 0;
+  double nearest_m = 0, farthest_m = 0;  // depths of its corners
+  uint32_t rank = 0;
+  uint8_t class_id = 0;
+  Rgb color;
+  std::vector<int> carries;  // solids that stand on it
+  bool covers(Point ray) const {
+    for (const Point& normal : edge_normal) {
+      if (dot(normal, ray) < 0) return false;
+    }
+    return true;
+  }
+  // Of its plane; infinite beyond the horizon.
+  double plane_depth(Point ray) const {
+    const double depth = offset / dot(plane, ray);
+    return depth > 0 ? depth : kFar;
+  }
+  double distance_to(Point p) const { return std::abs(dot(plane, p) - offset); }
+};
+
+struct Tracer {
+  std::vector<Solid> solids;
+  std::vector<Facet> facets;
+  std::vector<PaintedStrip> strips;
+};
+
+// The rays through a rectangle of the image.
+struct Cone {
+  Point corner[4], middle;
+  double middle2 = 0, spread = 0;
+  template <typename RayAt>
+  Cone(RayAt&& ray_at, double x_low, double y_low, double x_high, double y_high)
+      : corner{ray_at(x_low, y_low), ray_at(x_high, y_low), ray_at(x_low, y_high), ray_at(x_high, y_high)},
+        middle(ray_at(0.5 * (x_low + x_high), 0.5 * (y_low + y_high))),
+        middle2(dot(middle, middle)),
+        spread(std::sqrt(dot(corner[3] - corner[0], corner[3] - corner[0]))) {}
+  // Whether the ball around the facet touches the cone.
+  bool may_meet(const Facet& facet) const {
+    const Point center = facet.center();
+    const double along = dot(center, middle) / middle2;
+    const Point off = center - middle * along;
+    const double reach = facet.radius() + spread * (std::abs(along) + facet.radius());
+    return dot(off, off) <= reach * reach;
+  }
+  // Whether no edge of the strip has all of the cone on its outer side.
+  bool may_meet(const PaintedStrip& strip) const {
+    return std::none_of(std::begin(strip.edge_normal), std::end(strip.edge_normal), [&](Point normal) {
+      return std::all_of(std::begin(corner), std::end(corner), [&](Point ray) { return dot(normal, ray) < 0; });
+    });
+  }
+};
+
+class Eye {
+ public:
+  Eye(const Camera& camera, const View& view) {
+    const double yaw = camera.yaw_rad, pitch = camera.pitch_rad, roll = camera.roll_rad;
+    const Point ahead{std::cos(yaw) * std::cos(pitch), std::sin(yaw) * std::cos(pitch), std::sin(pitch)};
+    const Point level_right{std::sin(yaw), -std::cos(yaw), 0};
+    const Point level_down = cross(ahead, level_right);
+    const double shrink = std::min(1.0, view.body_length_m / 4.5);
+    auto turned = [&](Point p) {
+      return Point{p.x * view.cos_heading - p.y * view.sin_heading, p.x * view.sin_heading + p.y * view.cos_heading,
+                   p.z};
+    };
+    right_ = turned(level_right * std::cos(roll) + level_down * std::sin(roll));
+    down_ = turned(level_down * std::cos(roll) - level_right * std::sin(roll));
+    forward_ = turned(ahead);
+    position_ = point(view.origin_m) + turned({camera.position_m.x * shrink, camera.position_m.y, camera.position_m.z});
+  }
+  Point position() const { return position_; }
+  Point direction(Point d) const { return {dot(right_, d), dot(down_, d), dot(forward_, d)}; }
+  Point operator()(Point world) const { return direction(world - position_); }
+
+ private:
+  Point right_, down_, forward_, position_;
+};
+
+// Brightness by the shared rule, from corners of our own.
+double brightness(const Point* corners, int count) {
+  Vec3 shared[4];
+  for (int i = 0; i < count; ++i) {
+    shared[i] = {static_cast<float>(corners[i].x), static_cast<float>(corners[i].y), static_cast<float>(corners[i].z)};
+  }
+  return face_brightness(shared, count);
+}
+
+void add_rectangle(Tracer* tracer, const Eye& eye, Point origin, Point u, Point v, Rgb color) {
+  const Point corners[4] = {eye(origin), eye(origin + u), eye(origin + u + v), eye(origin + v)};
+  const double fade = brightness(corners, 4);
+  if (fade <= 0) return;
+  tracer->facets.push_back({corners[0], corners[1] - corners[0], corners[3] - corners[0], false,
+                            color * static_cast<float>(fade), static_cast<int>(tracer->solids.size()) - 1});
+}
+
+void add_agent(Tracer* tracer, const Eye& eye, const AgentBox& box, uint16_t instance_id) {
+  const Point ahead{box.cos_heading, box.sin_heading, 0}, left{-box.sin_heading, box.cos_heading, 0};
+  const Point length = ahead * box.length_m, width = left * box.width_m, height{0, 0, box.height_m};
+  const Point rear_right = point(box.center_m) - length * 0.5 - width * 0.5;
+  tracer->solids.push_back({{rear_right, rear_right + length, rear_right + length + width, rear_right + width},
+                            static_cast<uint8_t>(1 + static_cast<int>(box.agent_class)),
+                            instance_id});
+  const Point to_eye = eye.position() - point(box.center_m);
+  auto color = [&](BoxFace face) { return agent_color(box.agent_class, face); };
+  if (dot(to_eye, ahead) > 0.5 * box.length_m) {
+    add_rectangle(tracer, eye, rear_right + length, width, height, color(BoxFace::front));
+  }
+  if (dot(to_eye, ahead) < -0.5 * box.length_m) {
+    add_rectangle(tracer, eye, rear_right, width, height, color(BoxFace::back));
+  }
+  if (dot(to_eye, left) > 0.5 * box.width_m) {
+    add_rectangle(tracer, eye, rear_right + width, length, height, color(BoxFace::left));
+  }
+  if (dot(to_eye, left) < -0.5 * box.width_m) {
+    add_rectangle(tracer, eye, rear_right, length, height, color(BoxFace::right));
+  }
+  if (to_eye.z > box.height_m) add_rectangle(tracer, eye, rear_right + height, length, width, color(BoxFace::top));
+  if (to_eye.z < 0) add_rectangle(tracer, eye, rear_right, length, width, color(BoxFace::top));
+}
+
+void add_wall(Tracer* tracer, const Eye& eye, const WallFace& wall) {
+  const Point a = point(wall.a_m), b = point(wall.b_m);
+  tracer->solids.push_back({{a, b}, static_cast<uint8_t>(SurfaceClass::wall), 0});
+  add_rectangle(tracer, eye, a, b - a, {0, 0, wall.height_m}, wall.color);
+}
+
+void add_light(Tracer* tracer, const Eye& eye, const LightHead& head, LightState state) {
+  if (state == LightState::off) return;
+  const Point center = point(head.position_m), facing{head.facing.x, head.facing.y, 0};
+  Point to_eye = eye.position() - center;
+  to_eye.z = 0;
+  if (dot(to_eye, facing) <= 0 || dot(to_eye, facing) < head.cos_half_angle * std::sqrt(dot(to_eye, to_eye))) return;
+  const Point left{-head.facing.y, head.facing.x, 0};
+  const Point at = eye(center);
+  const double fade = brightness(&at, 1);
+  if (fade <= 0) return;
+  tracer->solids.push_back({{center - left * kLightRadius_m - Point{0, 0, kLightRadius_m},
+                             center + left * kLightRadius_m - Point{0, 0, kLightRadius_m}},
+                            static_cast<uint8_t>(SurfaceClass::light),
+                            0});
+  tracer->facets.push_back({at, eye.direction(left * kLightRadius_m), eye.direction({0, 0, kLightRadius_m}), true,
+                            light_color(state) * static_cast<float>(fade),
+                            static_cast<int>(tracer->solids.size()) - 1});
+}
+
+// Whether two convex outlines on the ground overlap: no side of either separates them by a millimetre or less.
+bool overlap_on_ground(const std::vector<Point>& a, const std::vector<Point>& b) {
+  auto separates = [&](Point normal) {
+    double low_a = kFar, high_a = -kFar, low_b = kFar, high_b = -kFar;
+    for (Point p : a) low_a = std::min(low_a, dot(normal, p)), high_a = std::max(high_a, dot(normal, p));
+    for (Point p : b) low_b = std::min(low_b, dot(normal, p)), high_b = std::max(high_b, dot(normal, p));
+    return std::min(high_a, high_b) - std::max(low_a, low_b) <= 1e-3;
+  };
+  for (const std::vector<Point>* outline : {&a, &b}) {
+    for (std::size_t i = 0; i < outline->size(); ++i) {
+      const Point side = (*outline)[(i + 1) % outline->size()] - (*outline)[i];
+      const double length = std::hypot(side.x, side.y);
+      if (length > 1e-6 && separates({-side.y / length, side.x / length, 0})) return false;
+    }
+  }
+  return true;
+}
+
+// Solids whose foot lies over the strip and, in its middle, at most kStanding_m above or below the strip's plane; none
+// where the strip is seen from below.
+std::vector<int> solids_on(const Tracer& tracer, const Vec3* strip_corners, Point eye) {
+  std::vector<Point> outline;
+  for (int i = 0; i < 4; ++i) outline.push_back(point(strip_corners[i]));
+  const Point normal = cross(outline[2] - outline[0], outline[3] - outline[1]);
+  if (normal.z == 0 || dot(normal, eye - outline[0]) / normal.z <= 0) return {};
+  std::vector<int> standing;
+  for (std::size_t i = 0; i < tracer.solids.size(); ++i) {
+    const Point above = tracer.solids[i].middle() - outline[0];
+    const double height_m = dot(normal, above) / normal.z;
+    if (std::abs(height_m) <= kStanding_m && overlap_on_ground(tracer.solids[i].foot, outline)) {
+      standing.push_back(static_cast<int>(i));
+    }
+  }
+  return standing;
+}
+
+void add_strip(Tracer* tracer, const Eye& eye, const PinholeCamera& pinhole, const Cone& image, float floor_px,
+               const Strip& strip, uint32_t index) {
+  Vec3 world[4];
+  strip_corners(strip, world);
+  Point corners[4];
+  Vec3 widened[4];
+  for (int i = 0; i < 4; ++i) {
+    corners[i] = eye(point(world[i]));
+    widened[i] = {static_cast<float>(corners[i].x), static_cast<float>(corners[i].y), static_cast<float>(corners[i].z)};
+  }
+  const double fade = brightness(corners, 4);
+  if (fade <= 0 || !widen_strip(pinhole, floor_px, widened)) return;
+  PaintedStrip painted;
+  painted.plane = cross(corners[2] - corners[0], corners[3] - corners[1]);
+  painted.plane = painted.plane * (1 / std::max(1e-30, std::sqrt(dot(painted.plane, painted.plane))));
+  painted.offset = dot(painted.plane, corners[0]);
+  painted.class_id = static_cast<uint8_t>(kClassOfStrip + static_cast<int>(strip.kind));
+  painted.rank = static_cast<uint32_t>(strip_rank(strip.kind)) << 28 | index;
+  painted.color = strip.color * static_cast<float>(fade);
+  Point as_drawn[4];
+  for (int i = 0; i < 4; ++i) as_drawn[i] = point(widened[i]);
+  const double side = dot(cross(as_drawn[2] - as_drawn[0], as_drawn[3] - as_drawn[1]), as_drawn[0]) > 0 ? 1 : -1;
+  for (int i = 0; i < 4; ++i) painted.edge_normal[i] = cross(as_drawn[i], as_drawn[(i + 1) % 4]) * side;
+  if (!image.may_meet(painted)) return;
+  painted.carries = solids_on(*tracer, world, eye.position());
+  auto by_depth = [](Point a, Point b) { return a.z < b.z; };
+  painted.nearest_m = std::min_element(as_drawn, as_drawn + 4, by_depth)->z;
+  painted.farthest_m = std::max_element(as_drawn, as_drawn + 4, by_depth)->z;
+  tracer->strips.push_back(painted);
+}
+
+// What may be seen through a cone.
+struct Candidates {
+  std::vector<const Facet*> facets;
+  std::vector<const PaintedStrip*> strips;
+};
+
+Candidates all_of(const Tracer& tracer) {
+  Candidates all;
+  for (const Facet& facet : tracer.facets) all.facets.push_back(&facet);
+  for (const PaintedStrip& strip : tracer.strips) all.strips.push_back(&strip);
+  return all;
+}
+
+Candidates within(const Candidates& candidates, const Cone& cone) {
+  Candidates kept;
+  for (const Facet* facet : candidates.facets) {
+    if (cone.may_meet(*facet)) kept.facets.push_back(facet);
+  }
+  for (const PaintedStrip* strip : candidates.strips) {
+    if (cone.may_meet(*strip)) kept.strips.push_back(strip);
+  }
+  return kept;
+}
+
+// What a ray meets first.
+struct Surface {
+  const Rgb* color = nullptr;  // null: nothing
+  const Facet* facet = nullptr;
+  const PaintedStrip* strip = nullptr;
+  double depth = kFar;
+};
+
+// The nearest surface: of facets and of strips the one of least depth, but of strips whose planes lie within
+// kSameLevel_m of each other there the one of least rank, and never a strip before a solid that stands on it.
+Surface front_of(const Candidates& candidates, Point ray) {
+  Surface front;
+  for (const Facet* facet : candidates.facets) {
+    const double at = facet->hit(ray);
+    if (at < front.depth) front = {&facet->color, facet, nullptr, at};
+  }
+  const PaintedStrip* painted = nullptr;
+  double painted_depth = kFar, painted_plane = kFar;
+  for (const PaintedStrip* strip : candidates.strips) {
+    if (!strip->covers(ray)) continue;
+    const double plane = strip->plane_depth(ray),
+                 at = std::clamp(plane, strip->nearest_m / kWidenedDepth, strip->farthest_m * kWidenedDepth);
+    if (at < kNear_m) continue;
+    if (front.facet && std::count(strip->carries.begin(), strip->carries.end(), front.facet->solid)) continue;
+    bool comes_first = !painted || at < painted_depth;
+    if (painted && std::max(plane, painted_plane) < kFar) {
+      const double gap_m =
+          plane < painted_plane ? painted->distance_to(ray * plane) : strip->distance_to(ray * painted_plane);
+      if (gap_m < kSameLevel_m) comes_first = strip->rank < painted->rank;
+    }
+    if (comes_first) {
+      painted = strip;
+      painted_depth = at;
+      painted_plane = plane;
+    }
+  }
+  if (painted && (!front.facet || painted_depth < front.depth)) {
+    front = {&painted->color, nullptr, painted, std::clamp(painted_depth, painted->nearest_m, painted->farthest_m)};
+  }
+  return front;
+}
+
+}  // namespace
+
+bool TruthImage::blank() const {
+  return std::all_of(rgb.begin(), rgb.end(), [](float channel) { return channel == 0; });
+}
+
+namespace {
+
+// What one camera sees of one view, ready to be sampled.
+class Sight {
+ public:
+  Sight(const StaticGeometry& geometry, const SceneBatch& scene, const View& view, const Camera& camera,
+        float line_floor_px)
+      : camera_(camera), whole_(cone(0, 0, camera.width_px, camera.height_px)) {
+    const Eye eye(camera, view);
+    const auto world = static_cast<std::size_t>(view.world);
+    for (int32_t i = scene.world_begin[world]; i < scene.world_begin[world + 1]; ++i) {
+      const AgentBox& box = scene.agents[static_cast<std::size_t>(i)];
+      const auto hidden = scene.hidden_agents.subspan(static_cast<std::size_t>(view.hidden_begin),
+                                                      static_cast<std::size_t>(view.hidden_end - view.hidden_begin));
+      if (!box.drawn || i == view.ego_agent || std::count(hidden.begin(), hidden.end(), i)) continue;
+      add_agent(&tracer_, eye, box, static_cast<uint16_t>(1 + i - scene.world_begin[world]));
+    }
+    for (const WallFace& wall : geometry.walls) add_wall(&tracer_, eye, wall);
+    const auto lights = static_cast<std::size_t>(scene.light_begin[world]);
+    if (scene.light_begin[world + 1] > scene.light_begin[world]) {
+      for (const LightHead& head : geometry.heads) {
+        add_light(&tracer_, eye, head, scene.light_states[lights + static_cast<std::size_t>(head.signal)]);
+      }
+    }
+    Rig rig;
+    rig.cameras = {camera};
+    const PinholeCamera pinhole = pinhole_cameras(rig)[0];
+    for (std::size_t i = 0; i < geometry.strips.size(); ++i) {
+      add_strip(&tracer_, eye, pinhole, whole_, line_floor_px, geometry.strips[i], static_cast<uint32_t>(i));
+    }
+  }
+
+  // Calls visit(x, y, candidates) for each pixel, with what may appear in it.
+  template <typename Visit>
+  void for_each_pixel(Visit&& visit) const {
+    // What may appear in the image, then in each of its rows, then in each pixel.
+    const Candidates in_image = within(all_of(tracer_), whole_);
+    for (int y = 0; y < camera_.height_px; ++y) {
+      const Candidates in_row = within(in_image, cone(0, y, camera_.width_px, y + 1));
+      for (int x = 0; x < camera_.width_px; ++x) visit(x, y, within(in_row, cone(x, y, x + 1, y + 1)));
+    }
+  }
+
+  Point ray_at(double x, double y) const {
+    return {(x - camera_.center_x_px) / camera_.focal_x_px, (y - camera_.center_y_px) / camera_.focal_y_px, 1};
+  }
+  const Tracer& tracer() const { return tracer_; }
+
+ private:
+  Cone cone(double x_low, double y_low, double x_high, double y_high) const {
+    return Cone([this](double x, double y) { return ray_at(x, y); }, x_low, y_low, x_high, y_high);
+  }
+
+  Camera camera_;
+  Cone whole_;
+  Tracer tracer_;
+};
+
+// Offsets of a pixel's samples from its corner.
+std::vector<std::pair<double, double>> sample_offsets(TruthSamples samples) {
+  if (samples == TruthSamples::center) return {{0.5, 0.5}};
+  if (samples == TruthSamples::grid_2x2) return {{0.25, 0.25}, {0.75, 0.25}, {0.25, 0.75}, {0.75, 0.75}};
+  // Additive recurrence on the plastic number (M. Roberts' R2 sequence).
+  std::vector<std::pair<double, double>> offsets;
+  for (int i = 0; i < 1024; ++i) {
+    offsets.emplace_back(std::fmod(0.5 + 0.7548776662466927 * i, 1.0), std::fmod(0.5 + 0.5698402909980532 * i, 1.0));
+  }
+  return offsets;
+}
+
+}  // namespace
+
+TruthImage trace_image(const StaticGeometry& geometry, const SceneBatch& scene, const View& view, const Camera& camera,
+                       float line_floor_px, TruthSamples samples) {
+  const Sight sight(geometry, scene, view, camera, line_floor_px);
+  const auto offsets = sample_offsets(samples);
+  const int width = camera.width_px, height = camera.height_px;
+  const auto plane = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  TruthImage image{width,
+                   height,
+                   std::vector<float>(3 * plane),
+                   std::vector<float>(plane),
+                   std::vector<uint8_t>(plane),
+                   std::vector<uint16_t>(plane)};
+  sight.for_each_pixel([&](int x, int y, const Candidates& in_pixel) {
+    const std::size_t pixel = static_cast<std::size_t>(y * width + x);
+    double sum[3] = {};
+    for (const auto& [dx, dy] : offsets) {
+      const Surface front = front_of(in_pixel, sight.ray_at(x + dx, y + dy));
+      if (!front.color) continue;
+      sum[0] += front.color->r;
+      sum[1] += front.color->g;
+      sum[2] += front.color->b;
+    }
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      image.rgb[channel * plane + pixel] = static_cast<float>(sum[channel] / static_cast<double>(offsets.size()));
+    }
+    const Surface at_center = front_of(in_pixel, sight.ray_at(x + 0.5, y + 0.5));
+    image.depth_m[pixel] = static_cast<float>(at_center.depth);
+    if (at_center.strip) image.class_id[pixel] = at_center.strip->class_id;
+    if (at_center.facet) {
+      const Solid& solid = sight.tracer().solids[static_cast<std::size_t>(at_center.facet->solid)];
+      image.class_id[pixel] = solid.class_id;
+      image.instance_id[pixel] = solid.instance_id;
+    }
+  });
+  return image;
+}
+
+TruthVisibility trace_visibility(const StaticGeometry& geometry, const SceneBatch& scene, const View& view,
+                                 const Rig& rig, float line_floor_px, int32_t agent) {
+  const auto offsets = sample_offsets(TruthSamples::low_discrepancy_1024);
+  const int instance_id = 1 + agent - scene.world_begin[static_cast<std::size_t>(view.world)];
+  double seen = 0, alone = 0;
+  for (const Camera& camera : rig.cameras) {
+    const Sight sight(geometry, scene, view, camera, line_floor_px);
+    auto is_wanted = [&](const Facet* facet) {
+      return sight.tracer().solids[static_cast<std::size_t>(facet->solid)].instance_id == instance_id;
+    };
+    sight.for_each_pixel([&](int x, int y, const Candidates& in_pixel) {
+      Candidates wanted;
+      std::copy_if(in_pixel.facets.begin(), in_pixel.facets.end(), std::back_inserter(wanted.facets), is_wanted);
+      if (wanted.facets.empty()) return;
+      for (const auto& [dx, dy] : offsets) {
+        const Point ray = sight.ray_at(x + dx, y + dy);
+        if (!front_of(wanted, ray).facet) continue;
+        const Surface front = front_of(in_pixel, ray);
+        alone += 1;
+        seen += front.facet && is_wanted(front.facet);
+      }
+    });
+  }
+  return {seen / alone, alone / static_cast<double>(offsets.size())};
+}
+
+double value_error(double actual, double expected) {
+  const double error = std::abs(actual - expected);
+  return std::isfinite(error) ? error : std::numeric_limits<double>::infinity();
+}
+
+bool is_same_depth(double actual_m, double expected_m) {
+  return actual_m == expected_m ||
+         value_error(actual_m, expected_m) < kKernelDepthError * std::min(actual_m, expected_m);
+}
+
+namespace {
+
+// Bin k holds errors of more than k - 1 and at most k steps, but for the rounding of floats that stand for bytes.
+constexpr double kStepsOfOne = 8 * 255, kRounding_steps = 1e-3;
+
+std::size_t bin_of(double error) {
+  return static_cast<std::size_t>(
+      std::ceil(std::max(0.0, std::min(kStepsOfOne, error * kStepsOfOne - kRounding_steps))));
+}
+
+}  // namespace
+
+void PooledError::add(const std::vector<float>& image, const std::vector<float>& truth) {
+  for (std::size_t i = 0; i < image.size(); ++i) {
+    const double error = value_error(image[i], truth[i]);
+    squared_ += error * error;
+    max_error_ = std::max(max_error_, error);
+    ++histogram_[bin_of(error)];
+  }
+  count_ += image.size();
+}
+
+void PooledError::add(const PooledError& other) {
+  squared_ += other.squared_;
+  max_error_ = std::max(max_error_, other.max_error_);
+  count_ += other.count_;
+  for (std::size_t i = 0; i < histogram_.size(); ++i) histogram_[i] += other.histogram_[i];
+}
+
+double PooledError::psnr_db() const { return 10 * std::log10(static_cast<double>(count_) / squared_); }
+
+double PooledError::share_above(double error) const {
+  std::size_t above = 0;
+  for (std::size_t i = bin_of(error) + 1; i < histogram_.size(); ++i) above += histogram_[i];
+  return static_cast<double>(above) / static_cast<double>(count_);
+}
+
+}  // namespace pictura

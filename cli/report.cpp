@@ -1,0 +1,88 @@
+#include "pictura/cli/report.h"
+
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+
+#include <unistd.h>
+
+#include "pictura/common/error.h"
+
+namespace pictura {
+
+Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+void print_json(const Json& object) {
+  const std::string text = object.dump(2) + "\n";
+  std::fwrite(text.data(), 1, text.size(), stdout);
+  if (std::fflush(stdout) != 0) fail("stdout: cannot be written");
+}
+
+std::string format_duration(double seconds) {
+  if (!std::isfinite(seconds)) return "?";
+  const auto total = static_cast<long>(std::lround(seconds));
+  if (total >= 3600) return fmt::format("{} h {:02} min", total / 3600, total / 60 % 60);
+  if (total >= 60) return fmt::format("{} min {:02} s", total / 60, total % 60);
+  return fmt::format("{} s", total);
+}
+
+std::string format_count(double value) {
+  if (value >= 1e6) return fmt::format("{:.2f} M", value / 1e6);
+  if (value >= 1e3) return fmt::format("{:.1f} K", value / 1e3);
+  return fmt::format("{:.0f}", value);
+}
+
+ProgressLine::~ProgressLine() { finish(); }
+
+void ProgressLine::update(const std::string& text) {
+  text_ = text;
+  dirty_ = true;
+  const auto now = std::chrono::steady_clock::now();
+  const bool terminal = isatty(STDERR_FILENO) != 0;
+  if (now - last_print_ < std::chrono::milliseconds(terminal ? 200 : 10000)) return;
+  last_print_ = now;
+  std::fprintf(stderr, terminal ? "\r\033[K%s" : "%s\n", text_.c_str());
+  dirty_ = terminal;
+}
+
+void ProgressLine::update(const std::string& text, double done) {
+  const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  update(fmt::format("{}  ETA {}", text, format_duration(elapsed_s * (1 - done) / done)));
+}
+
+void ProgressLine::finish() {
+  if (!dirty_) return;
+  std::fprintf(stderr, isatty(STDERR_FILENO) ? "\r\033[K%s\n" : "%s\n", text_.c_str());
+  dirty_ = false;
+}
+
+Pair parse_pair(const std::string& option, const std::string& text, int max) {
+  Pair pair{};
+  const char* const end = text.data() + text.size();
+  const auto first = std::from_chars(text.data(), end, pair.first);
+  const bool crossed = first.ec == std::errc() && first.ptr != end && *first.ptr == 'x';
+  const auto second = crossed ? std::from_chars(first.ptr + 1, end, pair.second) : first;
+  if (!crossed || second.ec != std::errc() || second.ptr != end || pair.first < 1 || pair.second < 1 ||
+      pair.first > max || pair.second > max) {
+    fail_usage("{}: expected two numbers of 1 to {} like 4x3, got '{}'", option, max, text);
+  }
+  return pair;
+}
+
+PixelSamples parse_samples(const std::string& option, const std::string& text) {
+  constexpr int kMaxCount = 64;
+  if (text.find('x') != std::string::npos) {
+    const Pair grid = parse_pair(option, text, kMaxCount);
+    if (grid.first != grid.second) fail_usage("{}: expected as many samples across as down, got '{}'", option, text);
+    return {.grid = grid.first};
+  }
+  PixelSamples samples;
+  const char* const end = text.data() + text.size();
+  const auto parsed = std::from_chars(text.data(), end, samples.multisample);
+  if (parsed.ec != std::errc() || parsed.ptr != end || samples.multisample < 1 || samples.multisample > kMaxCount) {
+    fail_usage("{}: expected 1 to {} samples like 4, or a grid of them like 4x4, got '{}'", option, kMaxCount, text);
+  }
+  return samples;
+}
+
+}  // namespace pictura

@@ -1,0 +1,92 @@
+// Scalar operations that are one or few instructions of a device: the same bits on both.
+#pragma once
+
+#include "pictura/common/portable/hd.h"
+
+namespace pictura {
+
+/// x within [0, 1]; one instruction of a device.
+PICTURA_HD inline float saturate(float x) {
+#if defined(__CUDA_ARCH__)
+  return __saturatef(x);
+#else
+  return x < 0.0f ? 0.0f : (1.0f < x ? 1.0f : x);
+#endif
+}
+
+/// 1 / x and the square root of x, for a magnitude of x between 2^-100 and 2^100, rounded to nearest as IEEE demands. A
+/// device takes the steps that its compiler takes for numbers of that range, without asking first whether x is one.
+PICTURA_HD inline float reciprocal_in_range(float x) {
+#if defined(__CUDA_ARCH__)
+  float guess;
+  asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(guess) : "f"(x));
+  return __fmaf_rn(guess, __fmaf_rn(-x, guess, 1.0f), guess);
+#else
+  return 1.0f / x;
+#endif
+}
+PICTURA_HD inline float sqrt_in_range(float x) {
+#if defined(__CUDA_ARCH__)
+  float inverse_guess;
+  asm("rsqrt.approx.ftz.f32 %0, %1;" : "=f"(inverse_guess) : "f"(x));
+  const float guess = x * inverse_guess;
+  return __fmaf_rn(__fmaf_rn(-guess, guess, x), 0.5f * inverse_guess, guess);
+#else
+  return sqrtf(x);
+#endif
+}
+
+/// The number that a word is.
+PICTURA_HD inline float float_from_bits(uint32_t bits) {
+#if defined(__CUDA_ARCH__)
+  return __uint_as_float(bits);
+#else
+  float number;
+  __builtin_memcpy(&number, &bits, sizeof(number));
+  return number;
+#endif
+}
+
+/// The lesser and the greater of two numbers that are numbers; one instruction of a device. Of two zeros it is either.
+PICTURA_HD inline float min_no_nan(float a, float b) {
+#if defined(__CUDA_ARCH__)
+  return fminf(a, b);
+#else
+  return a < b ? a : b;
+#endif
+}
+PICTURA_HD inline float max_no_nan(float a, float b) {
+#if defined(__CUDA_ARCH__)
+  return fmaxf(a, b);
+#else
+  return a > b ? a : b;
+#endif
+}
+
+/// The bits of a number.
+PICTURA_HD inline uint32_t bits_from_float(float x) {
+#if defined(__CUDA_ARCH__)
+  return __float_as_uint(x);
+#else
+  return __builtin_bit_cast(uint32_t, x);
+#endif
+}
+
+/// x itself, computed before and not anew at each use: a device's compiler moves what seems cheap into loops.
+PICTURA_HD inline float no_rematerialize(float x) {
+#if defined(__CUDA_ARCH__)
+  asm volatile("" : "+f"(x));
+#endif
+  return x;
+}
+
+/// Number of bits that are set.
+PICTURA_HD inline int popcount(uint64_t bits) {
+#if defined(__CUDA_ARCH__)
+  return __popcll(bits);
+#else
+  return __builtin_popcountll(bits);
+#endif
+}
+
+}  // namespace pictura

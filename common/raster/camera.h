@@ -1,0 +1,117 @@
+// Cameras as the rasterizers use them: a pose, a projection, and the volume that is drawn. Camera coordinates are
+// (right, down, forward) in metres; the third is the depth. Shared by both devices.
+#pragma once
+
+#include "pictura/common/color.h"
+#include "pictura/common/portable/intrinsics.h"
+#include "pictura/common/scene_types.h"
+
+namespace pictura {
+
+/// Nothing nearer than this is drawn.
+constexpr float kNear_m = 0.1f;
+/// Polygons are clipped this far outside the image: far enough that most need no clipping, near enough that screen
+/// coordinates keep their precision.
+constexpr float kGuardBand_px = 8.0f;
+
+/// Of a rig, at most.
+constexpr int kMaxCameras = 64;
+
+/// A camera of a rig (pose in the ego frame) or of a view (pose in the world).
+struct PinholeCamera {
+  Vec3 position_m;
+  Vec3 right, down, forward;
+  float focal_x_px = 0, focal_y_px = 0, center_x_px = 0, center_y_px = 0;
+  int32_t width_px = 0, height_px = 0;
+};
+
+/// A rig's camera where a view puts it. Bodies shorter than the rig's reference have its x offset shrunk in proportion.
+PICTURA_HD inline PinholeCamera place_camera(const PinholeCamera& in_ego, const View& view) {
+  const float shrink = min_of(1.0f, view.body_length_m / View::kRigBodyLength_m);
+  const float c = view.cos_heading, s = view.sin_heading;
+  const Vec3 p{in_ego.position_m.x * shrink, in_ego.position_m.y, in_ego.position_m.z};
+  auto turned = [&](Vec3 v) { return Vec3{v.x * c - v.y * s, v.x * s + v.y * c, v.z}; };
+  PinholeCamera camera = in_ego;
+  camera.position_m = view.origin_m + turned(p);
+  camera.right = turned(in_ego.right);
+  camera.down = turned(in_ego.down);
+  camera.forward = turned(in_ego.forward);
+  return camera;
+}
+
+PICTURA_HD inline Vec3 to_camera(const PinholeCamera& camera, Vec3 world_m) {
+  const Vec3 d = world_m - camera.position_m;
+  return {dot(camera.right, d), dot(camera.down, d), dot(camera.forward, d)};
+}
+
+/// Slopes x/depth and y/depth of the four sides of the drawn volume, guard band included, the lengths that normalise
+/// distances to those sides, and slopes per pixel. They depend on the camera's projection alone.
+struct Frustum {
+  float x_low = 0, x_high = 0, y_low = 0, y_high = 0;
+  float x_low_scale = 0, x_high_scale = 0, y_low_scale = 0, y_high_scale = 0;
+  float x_per_px = 0, y_per_px = 0;
+};
+
+PICTURA_HD inline Frustum make_frustum(const PinholeCamera& camera) {
+  Frustum f;
+  f.x_per_px = reciprocal_in_range(camera.focal_x_px);
+  f.y_per_px = reciprocal_in_range(camera.focal_y_px);
+  f.x_low = (-kGuardBand_px - camera.center_x_px) * f.x_per_px;
+  f.x_high = (static_cast<float>(camera.width_px) + kGuardBand_px - camera.center_x_px) * f.x_per_px;
+  f.y_low = (-kGuardBand_px - camera.center_y_px) * f.y_per_px;
+  f.y_high = (static_cast<float>(camera.height_px) + kGuardBand_px - camera.center_y_px) * f.y_per_px;
+  auto scale = [](float slope) { return reciprocal_in_range(sqrt_in_range(1.0f + slope * slope)); };
+  f.x_low_scale = scale(f.x_low);
+  f.x_high_scale = scale(f.x_high);
+  f.y_low_scale = scale(f.y_low);
+  f.y_high_scale = scale(f.y_high);
+  return f;
+}
+
+/// Whether a ball (camera coordinates) may touch what is drawn. Faces whose corners are all out of range are black.
+PICTURA_HD inline bool ball_in_frustum(const Frustum& f, Vec3 center, float radius_m) {
+  // All at once: lanes of a warp differ in what fails first.
+  const bool in_range = (center.z + radius_m > kNear_m) & (center.z - radius_m < kVisibleRange_m);
+  const bool in_width = ((center.x - f.x_low * center.z) * f.x_low_scale > -radius_m) &
+                        ((f.x_high * center.z - center.x) * f.x_high_scale > -radius_m);
+  const bool in_height = ((center.y - f.y_low * center.z) * f.y_low_scale > -radius_m) &
+                         ((f.y_high * center.z - center.y) * f.y_high_scale > -radius_m);
+  return in_range & in_width & in_height;
+}
+
+/// One of the four corners (0 to 3) of what is in range, in the world.
+PICTURA_HD inline Vec3 far_corner(const PinholeCamera& camera, const Frustum& f, int corner) {
+  const float x = (corner & 1) ? f.x_high : f.x_low;
+  const float y = (corner & 2) ? f.y_high : f.y_low;
+  return camera.position_m + (camera.right * x + camera.down * y + camera.forward) * kVisibleRange_m;
+}
+
+/// Bounding box on the ground of what is in range.
+PICTURA_HD inline Aabb2 frustum_ground_box(const PinholeCamera& camera, const Frustum& f) {
+  Aabb2 box{camera.position_m.xy(), camera.position_m.xy()};
+  for (int corner = 0; corner < 4; ++corner) {
+    const Vec3 p = far_corner(camera, f, corner);
+    box.low = {min_of(box.low.x, p.x), min_of(box.low.y, p.y)};
+    box.high = {max_of(box.high.x, p.x), max_of(box.high.y, p.y)};
+  }
+  return box;
+}
+
+/// Cells of a grid that a box touches, as half-open ranges; empty where the grid has no items.
+struct CellRange {
+  int x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;
+};
+
+PICTURA_HD inline CellRange cells_of(const GridView& grid, const Aabb2& box) {
+  if (grid.items.empty()) return {};
+  return {grid.cell_x(box.low.x), grid.cell_x(box.high.x) + 1, grid.cell_y(box.low.y), grid.cell_y(box.high.y) + 1};
+}
+
+/// An item stands in every cell that its box touches; it is taken in the first of those that a query visits.
+PICTURA_HD inline bool is_first_visit(const GridView& grid, const CellRange& query, const Aabb2& item_box, int cell_x,
+                                      int cell_y) {
+  return cell_x == max_of(grid.cell_x(item_box.low.x), query.x_begin) &&
+         cell_y == max_of(grid.cell_y(item_box.low.y), query.y_begin);
+}
+
+}  // namespace pictura

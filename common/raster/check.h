@@ -1,0 +1,42 @@
+// What every renderer checks at its door before it draws: the images it is to fill, and scenes that lie on the host.
+#pragma once
+
+#include <string_view>
+
+#include "pictura/common/raster/cull.h"
+#include "pictura/common/renderer.h"
+
+namespace pictura {
+
+/// Throws Error unless the images lie in `space`, fit the rig and the number of views, and have a format that the
+/// renderer draws: u8, f32 and, where it says so, f16.
+void check_images(std::string_view renderer, const Rig& rig, MemorySpace space, std::size_t num_views,
+                  const ImageBatch& images, bool draws_f16 = false);
+
+/// Throws Error unless the rig is valid and the line floor within the guard band; returns the configuration.
+const RendererConfig& check_config(std::string_view renderer, const RendererConfig& config);
+
+/// Throws Error unless all spans of a host scene fit together, handles name geometries, lights suffice for their
+/// signals, worlds are not too large, hidden agents exist, and every agent's box is finite.
+void check_scene(std::string_view renderer, const SceneBatch& scene, Span<const StaticGeometryView> geometries);
+
+/// Throws Error unless each view's world, ego and range of hidden agents exist in the (host) scene that check_scene
+/// passed, and its pose is finite.
+void check_views(std::string_view renderer, const SceneBatch& scene, Span<const View> views);
+
+/// Throws Error unless there is room for as many answers as there are visibility queries.
+void check_answers(std::string_view renderer, std::size_t num_queries, std::size_t num_answers);
+
+/// Throws Error unless each query's view, one of those that check_views passed, and its agent, of that view's world,
+/// exist, and there is room for as many answers.
+void check_queries(std::string_view renderer, const SceneBatch& scene, Span<const View> views,
+                   Span<const VisibilityQuery> queries, std::size_t num_answers);
+
+/// Throws Error unless each piece is finite, has sizes of 0 or more, colours of 0 to 1, and names a signal that exists,
+/// and the grids hold all pieces.
+void check_geometry(std::string_view renderer, const StaticGeometry& geometry);
+
+/// The rig's cameras as the rasterizers use them, in the ego frame.
+std::vector<PinholeCamera> pinhole_cameras(const Rig& rig);
+
+}  // namespace pictura

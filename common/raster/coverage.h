@@ -1,0 +1,169 @@
+// For each pixel the exact area that a convex polygon covers and which of 64 samples it covers. Shared by both devices,
+// which therefore agree bit for bit.
+#pragma once
+
+#include "pictura/common/portable/int16x8.h"
+#include "pictura/common/portable/intrinsics.h"
+#include "pictura/common/raster/project.h"
+
+namespace pictura {
+
+PICTURA_HD inline bool covers_point(const PolygonEdge* edges, int count, float x_px, float y_px) {
+  PICTURA_NO_UNROLL
+  for (int i = 0; i < count; ++i) {
+    if (!is_inside(edges[i], {x_px, y_px})) return false;
+  }
+  return true;
+}
+
+/// The samples of a pixel: 8 columns of 8 rows, each column shifted down by its own part of a row, so that 64 different
+/// heights occur: road scenes are full of nearly level edges. Sample (column, row) is bit 8 * column + row.
+constexpr uint64_t kAllSamples = ~uint64_t{0};
+/// Offset of a column's first sample from the pixel's top, in rows.
+PICTURA_HD constexpr float sample_column_offset(int column) {
+  // Bit reversal of the column, so that neighbouring columns have distant offsets.
+  const int reversed = ((column & 1) << 2) | (column & 2) | ((column & 4) >> 2);
+  return (static_cast<float>(reversed) + 0.5f) / 8.0f;
+}
+
+/// What a polygon covers of one pixel.
+struct PixelCoverage {
+  float area = 0;  // in [0, 1]
+  uint64_t samples = 0;
+  PICTURA_HD bool is_full() const { return area == 1.0f && samples == kAllSamples; }
+};
+
+/// Where a coverage counts as being: its samples; a sliver that touches none is wherever another one is.
+PICTURA_HD inline uint64_t reach_of(const PixelCoverage& coverage) {
+  return coverage.samples != 0 ? coverage.samples : kAllSamples;
+}
+
+/// More than one minus this of a pixel with every sample is all of it.
+constexpr float kFullCoverage = 1e-3f;
+
+/// Heights at which an edge's line passes the left and the right side of a pixel, in pixels from its top.
+struct Passage {
+  float left = 0, right = 0;
+};
+/// left_px and top_px are the pixel's corner relative to the edge's upper end.
+PICTURA_HD inline Passage passage_of(const PolygonEdge& edge, float left_px, float top_px) {
+  const float left = left_px * edge.dy_dx - top_px;
+  return {left, left + edge.dy_dx};
+}
+
+/// For each column of a pixel's samples, the heights (see kRowUnits) between which it is inside of the edges so far.
+struct SampleRange {
+  Int16x8 low, high;
+};
+PICTURA_HD inline SampleRange whole_range() {
+  constexpr int kFar = 64 * kRowUnits;
+  return {make_int16x8([](int) { return -kFar; }), make_int16x8([](int) { return kFar; })};
+}
+
+/// Narrows a range to the inner side of an edge.
+PICTURA_HD inline void narrow(const PolygonEdge& edge, const Passage& passage, SampleRange* range_inout) {
+  constexpr float kWhole = 1 << 8;  // the lowest bit of what is added to it is one of kLines_rows * kRowUnits
+  constexpr uint32_t kLowest = 0, kHighest = 0x80008000u;
+  const float at = saturate((passage.left + passage.right) * fabsf(edge.rows_scale) + edge.rows_offset);
+  const uint32_t height = broadcast_low16(bits_from_float(at + kWhole));
+  // Of the sums, one half of 2^15 is the middle, which is 0.
+  const Int16x8 columns = arithmetic_sequence(edge.rows_step, (1 << 16) - (1 << 14));
+  const bool is_below = edge.rows_scale > 0.0f;
+  range_inout->low = add_max(columns, is_below ? height : kLowest, range_inout->low);
+  range_inout->high = add_min(columns, is_below ? kHighest : height, range_inout->high);
+}
+
+/// The samples within a range.
+PICTURA_HD inline uint64_t samples_within(const SampleRange& range) {
+  // What is to be added so that whole rows are those whose samples are above.
+  const Int16x8 from_top = make_int16x8([](int column) {
+    return kSampleRows / 2 * kRowUnits + kRowUnits - 1 -
+           static_cast<int>(sample_column_offset(column) * static_cast<float>(kRowUnits));
+  });
+  const Int16x8 to = add_clamp(range.high, from_top, make_int16x8([](int) { return kSampleRows * kRowUnits; }));
+  return bits_between(add_clamp(range.low, from_top, to), to);
+}
+
+/// Samples on the inner side of an edge; left_px and top_px are the pixel's corner relative to the edge's upper end.
+PICTURA_HD inline uint64_t samples_inside(const PolygonEdge& edge, float left_px, float top_px) {
+  SampleRange range = whole_range();
+  narrow(edge, passage_of(edge, left_px, top_px), &range);
+  return samples_within(range);
+}
+
+/// What an edge adds to a polygon's area in a pixel, in the rows that it spans: a right border the area to its left, a
+/// left border the same negative, both less what is the same for all edges that end there: the sum over a polygon is
+/// its area.
+PICTURA_HD inline float area_of(const PolygonEdge& edge, const Passage& passage, float y_px) {
+  const float from = saturate(edge.y0 - y_px), to = saturate(edge.y1 - y_px);
+  // Between these the edge is within the pixel's width; from the second on, the pixel's whole width is to its left.
+  const float left = max_no_nan(min_no_nan(passage.left, to), from);
+  const float right = max_no_nan(min_no_nan(passage.right, to), from);
+  // Half of the width is where the line has gone half of its way.
+  const float width = saturate(((left + right) - (passage.left + passage.right)) * edge.half_dx_dy + 0.5f);
+  const float area = (right - left) * width + ((edge.dy_dx > 0.0f ? to : from) - right);
+  return edge.rows_scale > 0.0f ? area : -area;
+}
+
+/// Area of a convex polygon in pixel (x, y), and the samples that it covers. Edges that do not cross the pixel keep all
+/// samples and add their part to the area, so none is asked where it lies.
+PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int count, float min_area, int x, int y) {
+  const float x_px = no_rematerialize(static_cast<float>(x)), y_px = no_rematerialize(static_cast<float>(y));
+  float area = 0.0f;
+  SampleRange range = whole_range();
+  each_edge(edges, count, [&](const PolygonEdge& edge) {
+    const Passage passage = passage_of(edge, x_px - edge.x0, y_px - edge.y0);
+    area += area_of(edge, passage, y_px);
+    narrow(edge, passage, &range);
+  });
+  if (area < min_area) return {0.0f, 0};
+  const uint64_t samples = samples_within(range);
+  if (samples == kAllSamples && area > 1.0f - kFullCoverage) return {1.0f, kAllSamples};
+  return {min_of(area, 1.0f), samples};
+}
+
+/// Range of pixels of row y that the polygon may touch, and within it the range that it covers fully.
+struct RowSpan {
+  int32_t begin = 0, end = 0, full_begin = 0, full_end = 0;
+};
+
+PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const PixelBox& box, int y) {
+  const float y_px = static_cast<float>(y), middle_px = y_px + 0.5f;
+  float touch_low = static_cast<float>(box.x_begin), touch_high = static_cast<float>(box.x_end);
+  float full_low = touch_low, full_high = touch_high;
+  bool is_beside = false;
+  each_edge(edges, count, [&](const PolygonEdge& edge) {
+    const float side = side_of(edge);
+    if (side == 0.0f) {
+      // Level: the row is on one side of it, or it runs through the row.
+      const float inner_px = edge.rows_scale > 0.0f ? y_px - edge.y0 : edge.y0 - (y_px + 1.0f);
+      if (inner_px <= -1.0f) is_beside = true;
+      if (inner_px < 0.0f) full_high = -1.0f;
+      return;
+    }
+    // Where the edge's line passes the row's middle, and how far it goes to both sides from there.
+    const float twice_above_px = 2.0f * (middle_px - edge.y0), middle = edge.x0 + twice_above_px * edge.half_dx_dy;
+    const float reach = fabsf(edge.half_dx_dy), low = middle - reach, high = middle + reach;
+    if (side < 0.0f) {
+      touch_low = max_no_nan(touch_low, low - 1.0f);
+      full_low = max_no_nan(full_low, high);
+    } else {
+      touch_high = min_no_nan(touch_high, high);
+      full_high = min_no_nan(full_high, low - 1.0f);
+    }
+  });
+  if (is_beside) return {};
+  // A little leeway: the exact tests of pixel_coverage decide at the borders.
+  constexpr float kLeeway_px = 1e-3f;
+  const float begin = static_cast<float>(box.x_begin), end = static_cast<float>(box.x_end);
+  auto first_at_or_after = [&](float x) { return static_cast<int>(ceilf(clamp(x, begin, end))); };
+  auto first_after = [&](float x) { return static_cast<int>(floorf(clamp(x, begin - 1.0f, end - 1.0f))) + 1; };
+  RowSpan span;
+  span.begin = first_at_or_after(touch_low - kLeeway_px);
+  span.end = max_of(first_after(touch_high + kLeeway_px), span.begin);
+  span.full_begin = min_of(max_of(first_at_or_after(full_low + kLeeway_px), span.begin), span.end);
+  span.full_end = min_of(max_of(first_after(full_high - kLeeway_px), span.full_begin), span.end);
+  return span;
+}
+
+}  // namespace pictura

@@ -1,0 +1,75 @@
+// Which things of a scene may appear in an image: those that touch the camera's frustum within the visible range, found
+// through the uniform grids, less those that a view leaves out. Shared by both devices.
+#pragma once
+
+#include "pictura/common/portable/intrinsics.h"
+#include "pictura/common/raster/camera.h"
+#include "pictura/common/raster/shapes.h"
+
+namespace pictura {
+
+PICTURA_HD inline Vec3 strip_middle(const Strip& strip) { return (strip.a_m + strip.b_m) * 0.5f; }
+
+/// Half of a strip's greatest extent: length, mitres and width.
+PICTURA_HD inline float strip_radius_m(const Strip& strip) {
+  const float side = max_of(length(strip.side_a), length(strip.side_b));
+  return 0.5f * (length(strip.b_m - strip.a_m) + side * strip.width_m);
+}
+
+PICTURA_HD inline Vec3 wall_middle(const WallFace& wall) {
+  return (wall.a_m + wall.b_m) * 0.5f + Vec3{0.0f, 0.0f, 0.5f * wall.height_m};
+}
+
+PICTURA_HD inline float wall_radius_m(const WallFace& wall) {
+  return 0.5f * (length(wall.b_m - wall.a_m) + wall.height_m);
+}
+
+PICTURA_HD inline bool may_show(const Strip& strip, const PinholeCamera& camera, const Frustum& f) {
+  // The floor on its width may widen a strip by less than the guard band, which the frustum includes.
+  return ball_in_frustum(f, to_camera(camera, strip_middle(strip)), strip_radius_m(strip));
+}
+
+PICTURA_HD inline bool may_show(const WallFace& wall, const PinholeCamera& camera, const Frustum& f) {
+  return ball_in_frustum(f, to_camera(camera, wall_middle(wall)), wall_radius_m(wall));
+}
+
+PICTURA_HD inline bool may_show(const LightHead& head, const PinholeCamera& camera, const Frustum& f) {
+  // A little more than the disk: the polygon that it is drawn as has the disk's area.
+  const float radius_m = 1.1f * kLightRadius_m;
+  return ball_in_frustum(f, to_camera(camera, head.position_m), radius_m);
+}
+
+PICTURA_HD inline bool may_show(const AgentBox& box, const PinholeCamera& camera, const Frustum& f) {
+  const Vec3 center = box.center_m + Vec3{0.0f, 0.0f, 0.5f * box.height_m};
+  const Vec3 size{box.length_m, box.width_m, box.height_m};
+  const float radius_m = 0.5f * sqrt_in_range(max_no_nan(dot(size, size), 1e-12f));
+  return box.drawn != 0 && ball_in_frustum(f, to_camera(camera, center), radius_m);
+}
+
+/// Whether a view leaves an agent out: its own ego and those it hides.
+PICTURA_HD inline bool is_left_out(const View& view, Span<const int32_t> hidden_agents, int32_t agent) {
+  if (agent == view.ego_agent) return true;
+  for (int32_t i = view.hidden_begin; i < view.hidden_end; ++i) {
+    if (hidden_agents[static_cast<size_t>(i)] == agent) return true;
+  }
+  return false;
+}
+
+/// Calls visit(item) once for each item of a grid in the cells that a box on the ground touches; box_of(item) is what
+/// the grid files it under.
+template <typename BoxOf, typename Visit>
+PICTURA_HD inline void for_each_item(const GridView& grid, const Aabb2& query_box, BoxOf&& box_of, Visit&& visit) {
+  const CellRange cells = cells_of(grid, query_box);
+  const int columns = cells.x_end - cells.x_begin;
+  const int count = columns * (cells.y_end - cells.y_begin);
+  for (int cell = 0; cell < count; ++cell) {
+    const int x = cells.x_begin + cell % columns, y = cells.y_begin + cell / columns;
+    const size_t at = static_cast<size_t>(y) * static_cast<size_t>(grid.num_x) + static_cast<size_t>(x);
+    for (int32_t i = grid.begin[at]; i < grid.begin[at + 1]; ++i) {
+      const int32_t item = grid.items[static_cast<size_t>(i)];
+      if (is_first_visit(grid, cells, box_of(item), x, y)) visit(item);
+    }
+  }
+}
+
+}  // namespace pictura

@@ -1,0 +1,145 @@
+// From a thing of the scene to its faces on screen. Shared by both devices, which differ only in how they share out the
+// work and where they keep the results.
+#pragma once
+
+#include "pictura/common/portable/intrinsics.h"
+#include "pictura/common/raster/clip.h"
+#include "pictura/common/raster/compositing.h"
+#include "pictura/common/raster/cull.h"
+#include "pictura/common/raster/occluders.h"
+#include "pictura/common/raster/visibility.h"
+
+namespace pictura {
+
+/// What one image shows, and how.
+struct ImageSetting {
+  PinholeCamera camera;  // in the world
+  Frustum frustum;
+  float line_floor_px = 0;
+  bool debug_palette = false;
+  Occluders occluders;
+};
+
+/// What a face belongs to: the thing's number, and what the class plane says of it.
+struct PrimitiveRef {
+  uint32_t object_id = 0;
+  uint8_t class_id = 0;
+};
+PICTURA_HD constexpr PrimitiveRef agent_ref(const AgentBox& box, int32_t index_in_world) {
+  return {make_object_id(kAgentKind, index_in_world),
+          static_cast<uint8_t>(static_cast<int>(SurfaceClass::vehicle) + static_cast<int>(box.agent_class))};
+}
+PICTURA_HD constexpr PrimitiveRef wall_ref(int32_t index) {
+  return {make_object_id(kWallKind, index), static_cast<uint8_t>(SurfaceClass::wall)};
+}
+PICTURA_HD constexpr PrimitiveRef light_ref(int32_t index) {
+  return {make_object_id(kLightKind, index), static_cast<uint8_t>(SurfaceClass::light)};
+}
+PICTURA_HD inline PrimitiveRef strip_ref(const Strip& strip, int32_t index) {
+  return {strip_object_id(strip, index), static_cast<uint8_t>(kClassOfStrip + static_cast<int>(strip.kind))};
+}
+
+/// What the instance plane says of a face.
+PICTURA_HD constexpr uint16_t instance_of(const ScreenFace& face) {
+  return static_cast<uint16_t>(kind_of(face.object_id) == kAgentKind ? 1 + index_of(face.object_id) : 0);
+}
+
+/// What a face covers less of a pixel than this is nothing, and so is a face that is smaller. Strips hide little but
+/// each other, so of theirs more can be spared: what adds less than kMinWeight to any channel, and an eighth of a
+/// pixel at most, for dark ones may hide bright ones.
+constexpr float kMinArea = 1e-4f, kMinWeight = 2.0f / 255.0f, kMaxSparedArea = 0.125f;
+PICTURA_HD inline float min_area_of(Rgb color, PrimitiveRef primitive) {
+  if (kind_of(primitive.object_id) != kStripKind) return kMinArea;
+  const float brightest = max_of(color.r, max_of(color.g, color.b));
+  return kMinWeight * reciprocal_in_range(max_of(brightest, kMinWeight / kMaxSparedArea));
+}
+
+/// Whether a face that needs no clipping shows: whether it is large enough, and not behind an occluder. Sets whether it
+/// turns right.
+PICTURA_HD inline bool shows_whole(const ImageSetting& setting, const ScreenQuad& quad, Rgb color,
+                                   PrimitiveRef primitive, bool* turns_right_out) {
+  return find_turn(quad, 2.0f * min_area_of(color, primitive), turns_right_out) &&
+         !setting.occluders.hide(setting.camera, quad.bounds);
+}
+
+/// A face with all that its making did not set.
+PICTURA_HD inline ScreenFace whole_face(const ScreenFace& face, PrimitiveRef primitive, int32_t edge_begin) {
+  ScreenFace whole = face;
+  whole.edge_begin = edge_begin;
+  whole.object_id = primitive.object_id;
+  whole.class_id = primitive.class_id;
+  whole.color_bytes = to_bytes(face.color);
+  whole.set_min_area(min_area_of(face.color, primitive));
+  return whole;
+}
+
+/// Clips and projects a face. Its edges go to a pool: take(count) returns the index of the first, or -1 where there is
+/// no room left, and put(index, edge) keeps one. False where nothing of it is in the image.
+template <typename EdgePool>
+PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primitive, const CameraFace& face,
+                                 EdgePool& pool, ScreenFace* face_out) {
+  int32_t edge_begin = 0;
+  auto keep_edge = [&](int i, const PolygonEdge& edge) { pool.put(edge_begin + i, edge); };
+  ScreenQuad quad;
+  const QuadSight sight =
+      face.count == 4 ? project_quad(setting.camera, face.corners, face.floor_px, &quad) : QuadSight::cut;
+  if (sight == QuadSight::none) return false;
+  if (sight == QuadSight::whole) {
+    bool turns_right = false;
+    if (!shows_whole(setting, quad, face.color, primitive, &turns_right)) return false;
+    edge_begin = pool.take(4);
+    if (edge_begin < 0) return false;
+    make_quad_face(setting.camera, setting.frustum, quad, turns_right, face.plane, face.color, keep_edge, face_out);
+  } else {
+    Vec3 corners[kMaxFaceCorners], polygon[kMaxPolygonCorners];
+    for (int i = 0; i < face.count; ++i) corners[i] = face.corners[i];
+    if (face.floor_px > 0.0f && !widen_strip(setting.camera, face.floor_px, corners)) return false;
+    const int kept = clip_face(setting.frustum, corners, face.count, polygon);
+    if (kept < 3) return false;
+    edge_begin = pool.take(kept);
+    if (edge_begin < 0 || !make_screen_face<kMaxPolygonCorners>(setting.camera, setting.frustum, polygon, kept,
+                                                                face.plane, face.color, keep_edge, face_out)) {
+      return false;
+    }
+  }
+  *face_out = whole_face(*face_out, primitive, edge_begin);
+  return true;
+}
+
+/// The front surface at a point of the screen: faces that cover it are offered, in any order, and front() is the one in
+/// front of all, or null. The nearest strip gives way to those of its level that rank before it, and to a
+/// solid that stands on it.
+class FrontFace {
+ public:
+  PICTURA_HD void offer(const ScreenFace& face, Vec2 at_px) {
+    const ScreenFace*& best = is_strip(face) ? strip_ : solid_;
+    if (!best || nearer(face, *best, at_px)) best = &face;
+    num_strips_ += is_strip(face) ? 1 : 0;
+  }
+  /// Whether the strips, of which several may be painted over each other, are to be offered once more when all faces
+  /// have been; only then, and only strips.
+  PICTURA_HD bool wants_strips_again() const { return num_strips_ > 1; }
+  PICTURA_HD void offer_again(const ScreenFace& face, Vec2 at_px) {
+    if (!of_one_level(face, *strip_, at_px)) return;
+    if (!painted_ || face.object_id < painted_->object_id) painted_ = &face;
+  }
+  template <typename Stands>
+  PICTURA_HD const ScreenFace* front(Vec2 at_px, Stands&& stands) const {
+    // A strip that is widened may show where its plane is behind the camera: no strip is of one level with it there.
+    const ScreenFace* const strip = painted_ ? painted_ : strip_;
+    if (!solid_ || !strip) return solid_ ? solid_ : strip;
+    return is_in_front(*solid_, *strip, at_px, stands) ? solid_ : strip;
+  }
+
+ private:
+  PICTURA_HD static bool nearer(const ScreenFace& a, const ScreenFace& b, Vec2 at_px) {
+    const float inverse_depth_a = clamped_inverse_depth(a, at_px), inverse_depth_b = clamped_inverse_depth(b, at_px);
+    return inverse_depth_a != inverse_depth_b ? inverse_depth_a > inverse_depth_b : a.object_id < b.object_id;
+  }
+  const ScreenFace* solid_ = nullptr;
+  const ScreenFace* strip_ = nullptr;    // the nearest
+  const ScreenFace* painted_ = nullptr;  // ... or what is painted over it
+  int32_t num_strips_ = 0;
+};
+
+}  // namespace pictura

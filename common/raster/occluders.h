@@ -1,0 +1,86 @@
+// What hides whole faces: the walls and sides of boxes that cover most of an image. A face that lies behind one of
+// them, in depth and on screen, need not be drawn. Shared by both devices.
+#pragma once
+
+#include "pictura/common/portable/intrinsics.h"
+#include "pictura/common/raster/coverage.h"
+#include "pictura/common/raster/cull.h"
+
+namespace pictura {
+
+/// The face of a solid on screen, all of it before the near plane. Aligned for devices.
+struct alignas(16) Occluder {
+  Vec3 side[4];        // how far inside of a side a point of the screen is, in px: x, y, and what is added
+  Vec3 inverse_depth;  // likewise, of its plane
+};
+
+/// Whether a solid is near enough to hide much.
+constexpr float kOccluderRange_m = 45.0f;
+PICTURA_HD inline bool may_occlude(const AgentBox& box, const PinholeCamera& camera) {
+  return to_camera(camera, box.center_m).z - 0.5f * box.length_m < kOccluderRange_m;
+}
+PICTURA_HD inline bool may_occlude(const WallFace& wall, const PinholeCamera& camera) {
+  return to_camera(camera, wall_middle(wall)).z - wall_radius_m(wall) < kOccluderRange_m;
+}
+
+/// A face of less than half of this hides nothing, and a side shorter than this borders nothing.
+constexpr float kMinOccluder_px2 = 1.0f, kMinSide_px = 1e-3f;
+/// Corners further from the image than this leave too few bits for what is between them.
+constexpr float kMaxOccluder_px = 4096.0f;
+/// So far inside of an occluder, and behind it by this factor, nothing shows before it, whatever is rounded.
+constexpr float kOccluderMargin_px = 0.05f, kOccluderLead = 1.002f;
+
+/// Of the image, the part within the bounds of a solid's face: the more, the more it may hide. 0 where it hides
+/// nothing; otherwise the face on screen, and how it turns, are set.
+PICTURA_HD inline float occluded_px2(const PinholeCamera& camera, const CameraQuad& face, ScreenQuad* quad_out,
+                                     bool* turns_right_out) {
+  const float nearest_m =
+      min_no_nan(min_no_nan(face.corner[0].z, face.corner[1].z), min_no_nan(face.corner[2].z, face.corner[3].z));
+  if (nearest_m < kNear_m || project_quad(camera, face.corner, 0.0f, quad_out) == QuadSight::none) return 0.0f;
+  const bool is_near = quad_out->bounds.are_within(camera, kMaxOccluder_px);
+  if (!find_turn(*quad_out, kMinOccluder_px2, turns_right_out) || !is_near) return 0.0f;
+  const Aabb2 seen = quad_out->bounds.in_image(camera);
+  return (seen.high.x - seen.low.x) * (seen.high.y - seen.low.y);
+}
+
+/// The occluder of a solid's face that hides something.
+PICTURA_HD inline Occluder make_occluder(const PinholeCamera& camera, const Frustum& f, const FacePlane& plane,
+                                         const ScreenQuad& quad, bool turns_right) {
+  Occluder occluder;
+  const float sign = turns_right ? 1.0f : -1.0f;
+  for (int i = 0; i < 4; ++i) {
+    const Vec2 from = quad.corner[i], along = quad.corner[(i + 1) % 4] - from;
+    const Vec2 inward = Vec2{-along.y, along.x} * (sign * reciprocal_in_range(max_no_nan(length(along), kMinSide_px)));
+    occluder.side[i] = {inward.x, inward.y, -(inward.x * from.x + inward.y * from.y)};
+  }
+  occluder.inverse_depth = inverse_depth_plane(camera, f, plane);
+  return occluder;
+}
+
+/// The occluders of an image: the faces that cover most of it, of two that cover as much that of the lower entry.
+struct Occluders {
+  static constexpr int kMaxCount = 4;
+  int32_t count = 0;
+  Occluder occluder[kMaxCount];
+
+  /// Whether one of them hides all of the image that is within the bounds of a face.
+  PICTURA_HD bool hide(const PinholeCamera& camera, const ScreenBounds& bounds) const {
+    const Aabb2 box = bounds.in_image(camera);
+    // The least of a linear function over the box.
+    auto least = [&](Vec3 of) {
+      return of.x * (of.x > 0.0f ? box.low.x : box.high.x) + of.y * (of.y > 0.0f ? box.low.y : box.high.y) + of.z;
+    };
+    const float inverse_depth = bounds.inverse_depth_high * kOccluderLead;
+    bool is_hidden = false;
+    PICTURA_NO_UNROLL
+    for (int k = 0; k < count; ++k) {
+      const Occluder one = occluder[k];
+      float inside_px = least(one.side[0]);
+      for (int i = 1; i < 4; ++i) inside_px = min_no_nan(inside_px, least(one.side[i]));
+      is_hidden = is_hidden || (inside_px >= kOccluderMargin_px && least(one.inverse_depth) >= inverse_depth);
+    }
+    return is_hidden;
+  }
+};
+
+}  // namespace pictura

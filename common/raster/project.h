@@ -1,0 +1,207 @@
+// From a face in camera coordinates to a polygon on screen: projection, bounds, the depth of its plane. Shared by both
+// devices.
+#pragma once
+
+#include "pictura/common/portable/intrinsics.h"
+#include "pictura/common/raster/camera.h"
+#include "pictura/common/raster/edges.h"
+#include "pictura/common/raster/shapes.h"
+
+namespace pictura {
+
+/// Where a point in front of the near plane is on screen.
+PICTURA_HD inline Vec2 project(const PinholeCamera& camera, Vec3 p, float inverse_depth) {
+  return {camera.center_x_px + camera.focal_x_px * (p.x * inverse_depth),
+          camera.center_y_px + camera.focal_y_px * (p.y * inverse_depth)};
+}
+
+/// Pixels that a polygon may touch: half-open ranges within the image.
+struct PixelBox {
+  int16_t x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;
+};
+
+/// A convex polygon on screen, without its edges, which stand in a pool. In the order in which it is asked for.
+struct alignas(16) ScreenFace {
+  PixelBox box;
+  int32_t edge_begin = 0;
+  uint8_t edge_count = 0;
+  uint8_t class_id = 0;         // of the class plane
+  uint16_t min_area_units = 0;  // see min_area()
+  // Inverse depth at a point of the screen.
+  float inverse_depth_x = 0, inverse_depth_y = 0, inverse_depth_0 = 0;
+  uint32_t object_id = 0;  // of the thing that it belongs to, see common/raster/visibility.h
+  // Range of the inverse depth over the face's corners.
+  float inverse_depth_low = 0, inverse_depth_high = 0;
+  float plane_distance_m = 0;  // from the camera to the face's plane
+  uint32_t color_bytes = 0;    // to_bytes(color), for devices
+  Rgb color;
+
+  /// What it covers less of a pixel than this is nothing, see min_area_of.
+  PICTURA_HD float min_area() const { return static_cast<float>(min_area_units) * (1.0f / kAreaUnits); }
+  PICTURA_HD void set_min_area(float area) { min_area_units = static_cast<uint16_t>(area * kAreaUnits + 0.5f); }
+
+ private:
+  static constexpr float kAreaUnits = 1 << 16;
+};
+static_assert(sizeof(ScreenFace) == 4 * 16);
+
+/// What bounds the corners of a polygon on screen.
+struct ScreenBounds {
+  Vec2 low{1e30f, 1e30f}, high{-1e30f, -1e30f};
+  float inverse_depth_low = 1e30f, inverse_depth_high = 0.0f;
+  PICTURA_HD void add(Vec2 corner, float inverse_depth) {
+    low = {min_no_nan(low.x, corner.x), min_no_nan(low.y, corner.y)};
+    high = {max_no_nan(high.x, corner.x), max_no_nan(high.y, corner.y)};
+    inverse_depth_low = min_no_nan(inverse_depth_low, inverse_depth);
+    inverse_depth_high = max_no_nan(inverse_depth_high, inverse_depth);
+  }
+  /// Whether they are within an image and so much around it.
+  PICTURA_HD bool are_within(const PinholeCamera& camera, float margin_px) const {
+    return low.x >= -margin_px && low.y >= -margin_px && high.x <= static_cast<float>(camera.width_px) + margin_px &&
+           high.y <= static_cast<float>(camera.height_px) + margin_px;
+  }
+  /// What of them is in the image.
+  PICTURA_HD Aabb2 in_image(const PinholeCamera& camera) const {
+    return {{max_no_nan(low.x, 0.0f), max_no_nan(low.y, 0.0f)},
+            {min_no_nan(high.x, static_cast<float>(camera.width_px)),
+             min_no_nan(high.y, static_cast<float>(camera.height_px))}};
+  }
+  /// Whether the polygon may touch pixels of an image.
+  PICTURA_HD bool meet_image(const PinholeCamera& camera) const {
+    return high.x >= 0.0f && high.y >= 0.0f && low.x < static_cast<float>(camera.width_px) &&
+           low.y < static_cast<float>(camera.height_px);
+  }
+};
+
+/// The pixels of an image that a polygon may touch whose bounds meet the image and are within the guard band.
+PICTURA_HD inline PixelBox pixel_box(const PinholeCamera& camera, const ScreenBounds& bounds) {
+  auto pixel_of = [](float at) { return static_cast<int>(floorf(at)); };
+  return {static_cast<int16_t>(max_of(pixel_of(bounds.low.x), 0)),
+          static_cast<int16_t>(min_of(pixel_of(bounds.high.x) + 1, camera.width_px)),
+          static_cast<int16_t>(max_of(pixel_of(bounds.low.y), 0)),
+          static_cast<int16_t>(min_of(pixel_of(bounds.high.y) + 1, camera.height_px))};
+}
+
+/// Polygons of less than half of this are nothing.
+constexpr float kMinTwiceArea_px2 = 1e-6f;
+
+/// Whether a plane has an inverse depth: faces without an area and planes through the camera have none.
+PICTURA_HD inline bool has_inverse_depth(const FacePlane& plane) {
+  constexpr float kMinMagnitude = 1e-30f;
+  return dot(plane.normal, plane.normal) > kMinMagnitude && fabsf(plane.offset) > kMinMagnitude;
+}
+/// Inverse depth of a plane as a linear function of the screen: of x, of y, and at (0, 0). normal . p = offset on the
+/// plane, and p = depth * ray: inverse depth is linear in the ray.
+PICTURA_HD inline Vec3 inverse_depth_plane(const PinholeCamera& camera, const Frustum& f, const FacePlane& plane) {
+  const Vec3 inverse = plane.normal * (has_inverse_depth(plane) ? reciprocal_in_range(plane.offset) : 0.0f);
+  const float x = inverse.x * f.x_per_px, y = inverse.y * f.y_per_px;
+  return {x, y, inverse.z - x * camera.center_x_px - y * camera.center_y_px};
+}
+
+/// Sets what the bounds of a face, which meet the image, and its plane say of it.
+PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f, const ScreenBounds& bounds,
+                                  const FacePlane& plane, ScreenFace* face_out) {
+  face_out->box = pixel_box(camera, bounds);
+  face_out->inverse_depth_low = bounds.inverse_depth_low;
+  face_out->inverse_depth_high = bounds.inverse_depth_high;
+  const Vec3 inverse_depth = inverse_depth_plane(camera, f, plane);
+  face_out->inverse_depth_x = inverse_depth.x;
+  face_out->inverse_depth_y = inverse_depth.y;
+  face_out->inverse_depth_0 = inverse_depth.z;
+  face_out->plane_distance_m =
+      has_inverse_depth(plane)
+          ? fabsf(plane.offset) * reciprocal_in_range(sqrt_in_range(dot(plane.normal, plane.normal)))
+          : 0.0f;
+}
+
+/// Projects a clipped face (camera coordinates) of at most kMaxCorners corners, which lies in `plane`. Calls keep_edge
+/// as make_edges does, and sets all of face_out but edge_begin and what it belongs to. False where it covers nothing.
+template <int kMaxCorners, typename Corners, typename KeepEdge>
+PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Frustum& f, const Corners& polygon,
+                                        int count, const FacePlane& plane, Rgb color, KeepEdge&& keep_edge,
+                                        ScreenFace* face_out) {
+  Vec2 corner[kMaxCorners];
+  ScreenBounds bounds;
+  PICTURA_UNROLL_FOUR
+  for (int i = 0; i < count; ++i) {
+    const Vec3 p = polygon[i];
+    const float inverse_depth = reciprocal_in_range(p.z);
+    corner[i] = project(camera, p, inverse_depth);
+    bounds.add(corner[i], inverse_depth);
+  }
+  if (!bounds.meet_image(camera)) return false;
+  float twice_area = 0.0f;
+  PICTURA_UNROLL_FOUR
+  for (int i = 1; i + 1 < count; ++i) twice_area += cross(corner[i] - corner[0], corner[i + 1] - corner[0]);
+  if (fabsf(twice_area) < kMinTwiceArea_px2) return false;
+  face_out->edge_count = static_cast<uint8_t>(make_edges(corner, count, twice_area > 0.0f, keep_edge));
+  face_out->color = color;
+  set_bounds(camera, f, bounds, plane, face_out);
+  return true;
+}
+
+/// A face of four corners on screen.
+struct ScreenQuad {
+  Vec2 corner[4];
+  ScreenBounds bounds;
+};
+
+/// What is to be done with a face of four corners: nothing, where it is out of the image; draw it; or clip it first.
+enum class QuadSight : uint8_t { none, whole, cut };
+
+/// Projects a face of four corners, a strip with its corners pushed apart where it is less than floor_px wide. What
+/// needs no clipping, nearly all, is thus never widened in camera coordinates.
+PICTURA_HD inline QuadSight project_quad(const PinholeCamera& camera, const Vec3* corners, float floor_px,
+                                         ScreenQuad* quad_out) {
+  const float nearest_m = min_no_nan(min_no_nan(corners[0].z, corners[1].z), min_no_nan(corners[2].z, corners[3].z));
+  Vec2* const corner = quad_out->corner;
+  float inverse_depth[4];
+  for (int i = 0; i < 4; ++i) {
+    inverse_depth[i] = reciprocal_in_range(corners[i].z);
+    corner[i] = project(camera, corners[i], inverse_depth[i]);
+  }
+  if (floor_px > 0.0f) {
+    const Widening widening = widening_of(camera, floor_px, corners[0] + corners[1], corners[3] + corners[2]);
+    const Vec2 at_a = widening.push_px(corner[0] - corner[1]), at_b = widening.push_px(corner[3] - corner[2]);
+    corner[0] = corner[0] + at_a;
+    corner[1] = corner[1] - at_a;
+    corner[2] = corner[2] - at_b;
+    corner[3] = corner[3] + at_b;
+  }
+  ScreenBounds* const bounds = &quad_out->bounds;
+  *bounds = {};
+  for (int i = 0; i < 4; ++i) bounds->add(corner[i], inverse_depth[i]);
+  const bool is_whole = bounds->are_within(camera, kGuardBand_px);
+  // Of what reaches behind the near plane all that was computed means nothing.
+  if (nearest_m < kNear_m) return QuadSight::cut;
+  return !bounds->meet_image(camera) ? QuadSight::none : (is_whole ? QuadSight::whole : QuadSight::cut);
+}
+
+/// Sets whether a face turns right on screen; false where it covers less than that.
+PICTURA_HD inline bool find_turn(const ScreenQuad& quad, float min_twice_area_px2, bool* turns_right_out) {
+  const float twice_area = cross(quad.corner[2] - quad.corner[0], quad.corner[3] - quad.corner[1]);
+  *turns_right_out = twice_area > 0.0f;
+  return fabsf(twice_area) >= min_twice_area_px2;
+}
+
+/// make_screen_face of what project_quad found to be whole and find_turn to cover something.
+template <typename KeepEdge>
+PICTURA_HD inline void make_quad_face(const PinholeCamera& camera, const Frustum& f, const ScreenQuad& quad,
+                                      bool turns_right, const FacePlane& plane, Rgb color, KeepEdge&& keep_edge,
+                                      ScreenFace* face_out) {
+  face_out->edge_count = static_cast<uint8_t>(make_edges(quad.corner, 4, turns_right, keep_edge));
+  face_out->color = color;
+  set_bounds(camera, f, quad.bounds, plane, face_out);
+}
+
+/// 1 / depth of a face's plane at a point of the screen; negative where the plane is behind the camera.
+PICTURA_HD inline float inverse_depth(const ScreenFace& face, Vec2 at_px) {
+  return face.inverse_depth_0 + face.inverse_depth_x * at_px.x + face.inverse_depth_y * at_px.y;
+}
+
+/// Depth (camera z) of a face at a point of the screen, within the depths of its corners.
+PICTURA_HD inline float face_depth_m(const ScreenFace& face, Vec2 at_px) {
+  return 1.0f / clamp(inverse_depth(face, at_px), face.inverse_depth_low, face.inverse_depth_high);
+}
+
+}  // namespace pictura

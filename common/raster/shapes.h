@@ -1,0 +1,319 @@
+// What each primitive of a scene looks like to a camera: its visible faces as convex polygons in camera coordinates,
+// each with its colour already faded, and the rule that keeps thin strips visible. Shared by both devices.
+#pragma once
+
+#include "pictura/common/portable/intrinsics.h"
+#include "pictura/common/raster/camera.h"
+
+namespace pictura {
+
+/// What the class plane of an image says of the front surface at a pixel's centre.
+enum class SurfaceClass : uint8_t { nothing, vehicle, cyclist, pedestrian, wall, light, strip };
+/// Class of a strip: kClassOfStrip + StripKind.
+constexpr int kClassOfStrip = static_cast<int>(SurfaceClass::strip);
+
+/// Sides of the polygon that a light's disk is drawn as, of the disk's area.
+constexpr int kLightSides = 24;
+/// Corners that a face may have before clipping.
+constexpr int kMaxFaceCorners = kLightSides;
+
+/// The plane that a face lies in, in camera coordinates: normal . p = offset. The normal's length is of no importance.
+struct FacePlane {
+  Vec3 normal;
+  float offset = 0;
+};
+PICTURA_HD inline FacePlane quad_plane(const Vec3* corners) {
+  const Vec3 normal = cross(corners[2] - corners[0], corners[3] - corners[1]);
+  return {normal, dot(normal, corners[0])};
+}
+
+/// Brightness of a face: 1 less the mean over its corners of their share of the visible range. A face that has faded
+/// to 0 is not drawn, and so hides nothing.
+PICTURA_HD inline float face_brightness(const Vec3* corners, int count) {
+  float faded = 0.0f;
+  PICTURA_UNROLL_FOUR
+  for (int i = 0; i < count; ++i) faded += saturate(corners[i].z * (1.0f / kVisibleRange_m));
+  return 1.0f - faded / static_cast<float>(count);
+}
+
+/// A face in camera coordinates, as it is handed on.
+struct CameraFace {
+  const Vec3* corners = nullptr;
+  int count = 0;
+  FacePlane plane;
+  Rgb color;
+  float floor_px = 0;  // of a strip, which is still to be widened to that; 0: of no strip
+};
+
+/// Colour of an agent's face before it fades; the debug palette pales halted agents and greys parked ones.
+PICTURA_HD inline Rgb agent_face_color(const AgentBox& box, BoxFace face, bool debug_palette) {
+  const Rgb color = agent_color(box.agent_class, face);
+  if (!debug_palette || box.palette == 0) return color;
+  const float tint = box.palette == 1 ? 1.0f : 0.35f;
+  return {0.5f * (color.r + tint), 0.5f * (color.g + tint), 0.5f * (color.b + tint)};
+}
+
+/// Faces that a cuboid may turn to a camera: those of BoxFace, and the underside, which roads below a bridge see and
+/// which has the top's colour.
+constexpr int kUnderside = kNumBoxFaces, kNumCuboidFaces = kNumBoxFaces + 1;
+
+/// The faces of a box on whose outer side a camera at eye_m is, a bit for each.
+PICTURA_HD inline unsigned faces_to_eye(const AgentBox& box, Vec3 eye_m) {
+  const Vec2 ahead{box.cos_heading, box.sin_heading};
+  const Vec2 from_center = eye_m.xy() - box.center_m.xy();
+  const float ahead_m = dot(from_center, ahead), left_m = cross(ahead, from_center);
+  auto bit_of = [](bool is_turned, BoxFace face) { return is_turned ? 1u << static_cast<int>(face) : 0u; };
+  return bit_of(ahead_m > 0.5f * box.length_m, BoxFace::front) | bit_of(ahead_m < -0.5f * box.length_m, BoxFace::back) |
+         bit_of(left_m > 0.5f * box.width_m, BoxFace::left) | bit_of(left_m < -0.5f * box.width_m, BoxFace::right) |
+         bit_of(eye_m.z > box.center_m.z + box.height_m, BoxFace::top) |
+         (eye_m.z < box.center_m.z ? 1u << kUnderside : 0u);
+}
+
+/// The four corners of a face of a box, in the world. Corners 0 to 3 of the box are front left, rear left, rear right
+/// and front right on the ground, 4 to 7 the same on the roof.
+PICTURA_HD inline void cuboid_face_corners(const AgentBox& box, int face, Vec3* corners_out) {
+  const Vec2 ahead{box.cos_heading, box.sin_heading};
+  const Vec2 along = ahead * (0.5f * box.length_m), across = left_normal(ahead) * (0.5f * box.width_m);
+  const Vec2 center = box.center_m.xy();
+  auto corner = [&](int i) {
+    const Vec2 at_end = (i & 3) == 0 || (i & 3) == 3 ? center + along : center - along;
+    const Vec2 ground = (i & 3) < 2 ? at_end + across : at_end - across;
+    return Vec3{ground.x, ground.y, i < 4 ? box.center_m.z : box.center_m.z + box.height_m};
+  };
+  // Four corners a face, three bits each, the first lowest.
+  constexpr int kFrontCorners = 07403, kBackCorners = 05621, kLeftCorners = 04510, kRightCorners = 06732,
+                kTopCorners = 07654, kUndersideCorners = 00123;
+  int corners = kUndersideCorners;
+  switch (face) {
+    case static_cast<int>(BoxFace::front): corners = kFrontCorners; break;
+    case static_cast<int>(BoxFace::back): corners = kBackCorners; break;
+    case static_cast<int>(BoxFace::left): corners = kLeftCorners; break;
+    case static_cast<int>(BoxFace::right): corners = kRightCorners; break;
+    case static_cast<int>(BoxFace::top): corners = kTopCorners; break;
+    default: break;
+  }
+  for (int i = 0; i < 4; ++i) corners_out[i] = corner(corners >> (3 * i) & 7);
+}
+
+/// A face of four corners in the world, with its colour before it fades.
+struct WorldQuad {
+  Vec3 corner[4];
+  Rgb color;
+};
+
+PICTURA_HD inline WorldQuad cuboid_quad(const AgentBox& box, int face, bool debug_palette) {
+  const BoxFace painted = face == kUnderside ? BoxFace::top : static_cast<BoxFace>(face);
+  WorldQuad quad;
+  cuboid_face_corners(box, face, quad.corner);
+  quad.color = agent_face_color(box, painted, debug_palette);
+  return quad;
+}
+
+/// A wall's face; seen from both sides.
+PICTURA_HD inline WorldQuad wall_quad(const WallFace& wall) {
+  const Vec3 up{0.0f, 0.0f, wall.height_m};
+  return {{wall.a_m, wall.b_m, wall.b_m + up, wall.a_m + up}, wall.color};
+}
+
+/// A face of four corners in camera coordinates, with its colour faded; strips are not yet widened.
+struct CameraQuad {
+  Vec3 corner[4];
+  FacePlane plane;
+  Rgb color;
+};
+
+/// Where a quad is to a camera; false where it has faded to black.
+PICTURA_HD inline bool see_quad(const WorldQuad& quad, const PinholeCamera& camera, CameraQuad* quad_out) {
+  for (int i = 0; i < 4; ++i) quad_out->corner[i] = to_camera(camera, quad.corner[i]);
+  const float brightness = face_brightness(quad_out->corner, 4);
+  quad_out->plane = quad_plane(quad_out->corner);
+  quad_out->color = quad.color * brightness;
+  return brightness > 0.0f;
+}
+
+/// All of a quad, to be clipped and widened; floor_px is that of strips, 0 of others. It points into the quad.
+PICTURA_HD inline CameraFace whole_quad(const CameraQuad& quad, float floor_px) {
+  return {quad.corner, 4, quad.plane, quad.color, floor_px};
+}
+
+/// Calls emit(face) for a quad, unless it has faded to black; floor_px as of whole_quad.
+template <typename Emit>
+PICTURA_HD inline void emit_quad(const WorldQuad& quad, const PinholeCamera& camera, float floor_px, Emit&& emit) {
+  CameraQuad seen;
+  if (see_quad(quad, camera, &seen)) emit(whole_quad(seen, floor_px));
+}
+
+/// Calls visit(face) for each face of a box that is turned to the camera.
+template <typename Visit>
+PICTURA_HD inline void visit_faces_to_eye(const AgentBox& box, const PinholeCamera& camera, Visit&& visit) {
+  const unsigned faces = faces_to_eye(box, camera.position_m);
+  for (int face = 0; face < kNumCuboidFaces; ++face) {
+    if ((faces >> face & 1u) != 0) visit(face);
+  }
+}
+
+/// emit_quad for each of those.
+template <typename Emit>
+PICTURA_HD inline void agent_faces(const AgentBox& box, const PinholeCamera& camera, bool debug_palette, Emit&& emit) {
+  visit_faces_to_eye(box, camera,
+                     [&](int face) { emit_quad(cuboid_quad(box, face, debug_palette), camera, 0.0f, emit); });
+}
+
+template <typename Emit>
+PICTURA_HD inline void wall_faces(const WallFace& wall, const PinholeCamera& camera, Emit&& emit) {
+  emit_quad(wall_quad(wall), camera, 0.0f, emit);
+}
+
+/// Whether a camera at position_m is in front of the head and within its half-angle, seen on the ground plane.
+PICTURA_HD inline bool light_is_visible(const LightHead& head, LightState state, Vec3 position_m) {
+  if (state == LightState::off) return false;
+  const Vec2 to_eye = position_m.xy() - head.position_m.xy();
+  const float ahead_m = dot(to_eye, head.facing);
+  // Of the half-angle's cosine, by squares.
+  const float cosine = max_no_nan(head.cos_half_angle, 0.0f);
+  return ahead_m > 0.0f && ahead_m * ahead_m >= cosine * cosine * dot(to_eye, to_eye);
+}
+
+/// A corner of the polygon that a head is drawn as, which has the disk's area, in the world: 0 is left of the disk's
+/// middle, those that follow go on upwards.
+PICTURA_HD inline Vec3 light_corner(const LightHead& head, int corner) {
+  constexpr float kRadius_m = kLightRadius_m * 1.00574110f;  // square root of the turn of a side over its sine
+  const SinCos at = sincos_of(static_cast<float>(corner) * (kTwoPi / kLightSides));
+  const Vec2 ground = head.position_m.xy() + left_normal(head.facing) * (kRadius_m * at.cos);
+  return {ground.x, ground.y, head.position_m.z + kRadius_m * at.sin};
+}
+
+/// The disk of a lit head, as bright as its middle: its plane in camera coordinates, and its colour.
+struct LightDisk {
+  FacePlane plane;
+  Rgb color;
+};
+/// False where it has faded to black.
+PICTURA_HD inline bool see_light(const LightHead& head, LightState state, const PinholeCamera& camera,
+                                 LightDisk* disk_out) {
+  const Vec3 middle = to_camera(camera, head.position_m), facing{head.facing.x, head.facing.y, 0.0f};
+  const Vec3 normal{dot(camera.right, facing), dot(camera.down, facing), dot(camera.forward, facing)};
+  const float brightness = face_brightness(&middle, 1);
+  *disk_out = {{normal, dot(normal, middle)}, light_color(state) * brightness};
+  return brightness > 0.0f;
+}
+
+/// The disk of a head, where it is turned to the camera and lit.
+template <typename Emit>
+PICTURA_HD inline void light_faces(const LightHead& head, LightState state, const PinholeCamera& camera, Emit&& emit) {
+  if (!light_is_visible(head, state, camera.position_m)) return;
+  LightDisk disk;
+  if (!see_light(head, state, camera, &disk)) return;
+  Vec3 corners[kLightSides];
+  for (int i = 0; i < kLightSides; ++i) corners[i] = to_camera(camera, light_corner(head, i));
+  emit(CameraFace{corners, kLightSides, disk.plane, disk.color});
+}
+
+/// The strip's four corners in the world: left of a, right of a, right of b, left of b.
+PICTURA_HD inline void strip_corners(const Strip& strip, Vec3* corners_out) {
+  const Vec2 at_a = strip.side_a * (0.5f * strip.width_m), at_b = strip.side_b * (0.5f * strip.width_m);
+  const Vec3 a = strip.a_m, b = strip.b_m;
+  corners_out[0] = {a.x + at_a.x, a.y + at_a.y, a.z};
+  corners_out[1] = {a.x - at_a.x, a.y - at_a.y, a.z};
+  corners_out[2] = {b.x - at_b.x, b.y - at_b.y, b.z};
+  corners_out[3] = {b.x + at_b.x, b.y + at_b.y, b.z};
+}
+
+/// The direction in which a strip is widened: across it on screen.
+struct Widening {
+  Vec2 across;  // unit vector, from the right side of the strip to its left; 0 where the strip is a point on screen
+  float floor_px = 0;
+  /// How far the left end of a gap between the sides is to go, on screen, and the right end the other way.
+  PICTURA_HD Vec2 push_px(Vec2 gap_px) const {
+    const float width_px = dot(gap_px, across);
+    const float missing_px = 0.5f * max_no_nan(floor_px - fabsf(width_px), 0.0f);
+    return across * (width_px < 0.0f ? -missing_px : missing_px);
+  }
+};
+
+/// ... of a strip whose centre line runs from a to b, in camera coordinates and in front of the near plane; both may be
+/// multiples by the same factor.
+PICTURA_HD inline Widening widening_of(const PinholeCamera& camera, float floor_px, Vec3 a, Vec3 b) {
+  // The direction on screen times both depths.
+  const Vec2 ahead{camera.focal_x_px * (b.x * a.z - a.x * b.z), camera.focal_y_px * (b.y * a.z - a.y * b.z)};
+  const float length2 = dot(ahead, ahead), least = 1e-6f * (a.z * b.z);
+  if (!(length2 > least * least)) return {};
+  return {left_normal(ahead) * sqrt_in_range(reciprocal_in_range(length2)), floor_px};
+}
+
+/// Pushes the two corners of one end of a strip apart until they are wide enough on screen. Depths stay.
+PICTURA_HD inline void widen_strip_end(const PinholeCamera& camera, const Widening& widening, Vec3* left, Vec3* right) {
+  if (left->z < kNear_m || right->z < kNear_m) return;
+  const float of_left = reciprocal_in_range(left->z), of_right = reciprocal_in_range(right->z);
+  const Vec2 push_px = widening.push_px({camera.focal_x_px * (left->x * of_left - right->x * of_right),
+                                         camera.focal_y_px * (left->y * of_left - right->y * of_right)});
+  const Vec2 push{push_px.x * reciprocal_in_range(camera.focal_x_px),
+                  push_px.y * reciprocal_in_range(camera.focal_y_px)};
+  left->x += push.x * left->z;
+  left->y += push.y * left->z;
+  right->x -= push.x * right->z;
+  right->y -= push.y * right->z;
+}
+
+/// A strip's corners as drawn, in camera coordinates, after the floor on its width on screen; `corners` are its own
+/// corners in camera coordinates. The part of its centre line behind the near plane is cut off first, so that the floor
+/// is measured where the strip can be seen. False where nothing is left.
+PICTURA_HD inline bool widen_strip(const PinholeCamera& camera, float floor_px, Vec3* corners) {
+  Vec3 a = (corners[0] + corners[1]) * 0.5f, b = (corners[3] + corners[2]) * 0.5f;
+  if (a.z < kNear_m && b.z < kNear_m) {
+    // Only a corner may still reach past the near plane; it is too close for any floor.
+    return corners[0].z > kNear_m || corners[1].z > kNear_m || corners[2].z > kNear_m || corners[3].z > kNear_m;
+  }
+  if (floor_px <= 0.0f) return true;
+  // Centre line in front of the near plane, and its direction on screen.
+  const float a_in = a.z - kNear_m, b_in = b.z - kNear_m;
+  const bool cut_a = a_in < 0.0f, cut_b = b_in < 0.0f;
+  if (cut_a || cut_b) {
+    const float t = (cut_a ? a_in : b_in) * reciprocal_in_range(cut_a ? a_in - b_in : b_in - a_in);
+    const Vec3 left = (corners[3] - corners[0]) * t, right = (corners[2] - corners[1]) * t, middle = (b - a) * t;
+    if (cut_a) {
+      corners[0] = corners[0] + left;
+      corners[1] = corners[1] + right;
+      a = a + middle;
+    } else {
+      corners[3] = corners[3] - left;
+      corners[2] = corners[2] - right;
+      b = b - middle;
+    }
+  }
+  const Widening widening = widening_of(camera, floor_px, a, b);
+  if (!cut_a) widen_strip_end(camera, widening, &corners[0], &corners[1]);
+  if (!cut_b) widen_strip_end(camera, widening, &corners[3], &corners[2]);
+  return true;
+}
+
+PICTURA_HD inline WorldQuad strip_quad(const Strip& strip) {
+  WorldQuad quad;
+  strip_corners(strip, quad.corner);
+  quad.color = strip.color;
+  return quad;
+}
+
+/// The strip's face, to be widened to floor_px on screen, in the plane of the strip itself.
+template <typename Emit>
+PICTURA_HD inline void strip_faces(const Strip& strip, const PinholeCamera& camera, float floor_px, Emit&& emit) {
+  emit_quad(strip_quad(strip), camera, floor_px, emit);
+}
+
+/// Strips that are closer than this are of one level: there rank decides, and not depth.
+constexpr float kSameLevel_m = 0.05f;
+/// A strip that is drawn wider than it is stays within this factor of the depths of its corners: where the camera is
+/// close to its plane, that comes near and goes beyond the horizon within a pixel.
+constexpr float kWidenedDepth = 2.0f;
+/// A solid stands on a strip where its foot overlaps the strip on the ground plane and, in its middle, lies at most
+/// this far from the strip's plane: upright boxes dip into slopes.
+constexpr float kStanding_m = 0.5f;
+
+/// Where strips of one level overlap, the lower rank is painted over the higher.
+PICTURA_HD constexpr int strip_rank(StripKind kind) {
+  // Two bits each, the first kind lowest: lane mark, road edge, crosswalk, stop line.
+  constexpr int kRanks = 2 | 3 << 2 | 1 << 4 | 0 << 6;
+  return kRanks >> (2 * static_cast<int>(kind)) & 3;
+}
+
+}  // namespace pictura

@@ -1,0 +1,298 @@
+// Which of two faces is in front where both cover a pixel, and what the fragments of a pixel hide of each other. That
+// is asked of each two anew, at the middle of what they share of the pixel's samples: there the nearer plane is in
+// front, whatever cycles, slopes and intersections make of an order of whole things. Shared by both devices.
+#pragma once
+
+#include "pictura/common/portable/intrinsics.h"
+#include "pictura/common/raster/coverage.h"
+#include "pictura/common/raster/shapes.h"
+
+namespace pictura {
+
+// Numbers of things are unique within an image: kind, then index. Those of strips ascend with their rank.
+constexpr int kKindShift = 30, kRankShift = 28;
+constexpr uint32_t kAgentKind = 0, kWallKind = 1, kLightKind = 2, kStripKind = 3;
+constexpr uint32_t kIndexMask = (1u << kRankShift) - 1;
+
+PICTURA_HD constexpr uint32_t make_object_id(uint32_t kind, int32_t index) {
+  return (kind << kKindShift) | static_cast<uint32_t>(index);
+}
+/// index: the strip's place among the geometry's strips.
+PICTURA_HD inline uint32_t strip_object_id(const Strip& strip, int32_t index) {
+  return (kStripKind << kKindShift) | (static_cast<uint32_t>(strip_rank(strip.kind)) << kRankShift) |
+         static_cast<uint32_t>(index);
+}
+/// A face that may show: the number of its thing, and of agents which face.
+constexpr int kFaceShift = 27;
+constexpr uint32_t kFaceIndexMask = (1u << kFaceShift) - 1;
+PICTURA_HD constexpr uint32_t face_entry(uint32_t object_id, int face) {
+  return object_id | static_cast<uint32_t>(face) << kFaceShift;
+}
+PICTURA_HD constexpr uint32_t kind_of(uint32_t object_id) { return object_id >> kKindShift; }
+PICTURA_HD constexpr int32_t index_of(uint32_t object_id) { return static_cast<int32_t>(object_id & kIndexMask); }
+PICTURA_HD constexpr bool is_strip(const ScreenFace& face) { return kind_of(face.object_id) == kStripKind; }
+
+/// What a thing covers of the ground: corners with the heights of its lower end. Of what has two ends, each stands
+/// twice.
+struct Extent {
+  Vec3 corner[4];
+};
+PICTURA_HD inline Extent extent_between(Vec3 a, Vec3 b) { return {{a, b, b, a}}; }
+
+PICTURA_HD inline Extent extent_of(const AgentBox& box) {
+  Extent extent;
+  cuboid_face_corners(box, kUnderside, extent.corner);
+  return extent;
+}
+PICTURA_HD inline Extent extent_of(const WallFace& wall) { return extent_between(wall.a_m, wall.b_m); }
+PICTURA_HD inline Extent extent_of(const LightHead& head) {
+  const Vec2 left = left_normal(head.facing) * kLightRadius_m;
+  const Vec3 lowest = head.position_m - Vec3{0.0f, 0.0f, kLightRadius_m};
+  return extent_between(lowest + Vec3{left.x, left.y, 0.0f}, lowest - Vec3{left.x, left.y, 0.0f});
+}
+PICTURA_HD inline Extent extent_of(const Strip& strip) {
+  Extent extent;
+  strip_corners(strip, extent.corner);
+  return extent;
+}
+
+/// The extent of a thing of an image, by its number; agents: the first of the world.
+PICTURA_HD inline Extent extent_of(uint32_t object_id, const StaticGeometryView& pieces, const AgentBox* agents) {
+  const int32_t index = index_of(object_id);
+  switch (kind_of(object_id)) {
+    case kAgentKind: return extent_of(agents[index]);
+    case kWallKind: return extent_of(pieces.walls[static_cast<size_t>(index)]);
+    case kLightKind: return extent_of(pieces.heads[static_cast<size_t>(index)]);
+    default: return extent_of(pieces.strips[static_cast<size_t>(index)]);
+  }
+}
+
+/// Corners on the ground. Whoever asks for all sides turns them on: an index would keep a device's corners in memory.
+struct GroundQuad {
+  Vec2 corner[4];
+  PICTURA_HD void turn() {
+    const Vec2 first = corner[0];
+    for (int i = 0; i < 3; ++i) corner[i] = corner[i + 1];
+    corner[3] = first;
+  }
+};
+PICTURA_HD inline GroundQuad ground_quad(const Extent& extent, Vec2 origin) {
+  GroundQuad quad;
+  for (int i = 0; i < 4; ++i) quad.corner[i] = extent.corner[i].xy() - origin;
+  return quad;
+}
+
+/// Whether the first side of a separates a from b. Touching is no overlap.
+PICTURA_HD inline bool first_side_separates(const GroundQuad& a, const GroundQuad& b) {
+  constexpr float kTouching_m = 1e-3f;
+  struct Interval {
+    float low = 1e30f, high = -1e30f;
+  };
+  const Vec2 side = a.corner[1] - a.corner[0], axis = left_normal(side);
+  auto project = [axis](const GroundQuad& quad) {
+    Interval interval;
+    for (const Vec2 corner : quad.corner) {
+      const float at = dot(axis, corner);
+      interval.low = min_no_nan(interval.low, at);
+      interval.high = max_no_nan(interval.high, at);
+    }
+    return interval;
+  };
+  const Interval of_a = project(a), of_b = project(b);
+  // By how much they overlap, in multiples of the side's length.
+  const float overlap = min_no_nan(of_a.high, of_b.high) - max_no_nan(of_a.low, of_b.low);
+  const float length2_m2 = dot(side, side);
+  return length2_m2 > 1e-12f && (overlap <= 0.0f || overlap * overlap <= kTouching_m * kTouching_m * length2_m2);
+}
+
+/// Whether two extents overlap on the ground plane: no side of either separates them.
+PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
+  // Relative to a point near by, for precision.
+  const Vec2 origin = a.corner[0].xy();
+  GroundQuad one = ground_quad(a, origin), other = ground_quad(b, origin);
+  PICTURA_NO_UNROLL
+  for (int side = 0; side < 8; ++side) {
+    if (first_side_separates(one, other)) return false;
+    one.turn();
+    if (side != 3) continue;
+    const GroundQuad first = one;
+    one = other;
+    other = first;
+  }
+  return true;
+}
+
+/// Whether a solid stands on a strip that is seen from above, which then lies behind it (see kStanding_m).
+PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip, Vec3 eye_m) {
+  Vec3 sum{};
+  for (const Vec3 corner : solid.corner) sum = sum + (corner - strip.corner[0]);
+  const Vec3 middle = sum * 0.25f;
+  const Vec3 normal = cross(strip.corner[2] - strip.corner[0], strip.corner[3] - strip.corner[1]);
+  if (dot(normal, eye_m - strip.corner[0]) * normal.z <= 0.0f) return false;
+  return fabsf(dot(normal, middle)) <= kStanding_m * fabsf(normal.z) && overlap_on_ground(solid, strip);
+}
+
+/// Whether two strips are of one level where a ray meets their planes: the nearer point is close to the other's plane.
+PICTURA_HD inline bool of_one_level(const ScreenFace& a, const ScreenFace& b, Vec2 at_px) {
+  const float inverse_a = inverse_depth(a, at_px), inverse_b = inverse_depth(b, at_px);
+  const float gap_m = fabsf(inverse_a - inverse_b) * (inverse_a < inverse_b ? a.plane_distance_m : b.plane_distance_m);
+  return gap_m < kSameLevel_m * max_of(inverse_a, inverse_b);
+}
+
+/// 1 / depth of a face at a point of the screen, for telling which of two is in front there; within the depths of its
+/// corners, which those of a strip may leave by a factor (see kWidenedDepth).
+PICTURA_HD inline float clamped_inverse_depth(const ScreenFace& face, Vec2 at_px) {
+  const float factor = is_strip(face) ? kWidenedDepth : 1.0f,
+              inverse_factor = is_strip(face) ? 1.0f / kWidenedDepth : 1.0f;
+  return clamp(inverse_depth(face, at_px), face.inverse_depth_low * inverse_factor, face.inverse_depth_high * factor);
+}
+
+/// Whether face a is in front of face b at a point of the screen that both cover. `stands(solid, strip)` says, by their
+/// numbers, whether stands_on() holds.
+template <typename Stands>
+PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec2 at_px, Stands&& stands) {
+  const bool strip_a = is_strip(a), strip_b = is_strip(b);
+  if (strip_a && strip_b && of_one_level(a, b, at_px)) return a.object_id < b.object_id;
+  const float inverse_depth_a = clamped_inverse_depth(a, at_px), inverse_depth_b = clamped_inverse_depth(b, at_px);
+  const bool first = inverse_depth_a != inverse_depth_b ? inverse_depth_a > inverse_depth_b : a.object_id < b.object_id;
+  if (strip_a == strip_b || first != strip_a) return first;
+  // A strip before a solid that stands on it: the solid dips into the road.
+  return stands(strip_a ? b.object_id : a.object_id, strip_a ? a.object_id : b.object_id) ? !first : first;
+}
+
+/// Middle of some samples, from the pixel's corner; of none, the pixel's middle.
+PICTURA_HD inline Vec2 middle_of(uint64_t samples) {
+  const int count = popcount(samples);
+  if (count == 0) return {0.5f, 0.5f};
+  // Sums over the samples of the bits of their column and row.
+  const int column_0 = popcount(samples & 0xFF00FF00FF00FF00ull), column_1 = popcount(samples & 0xFFFF0000FFFF0000ull),
+            column_2 = popcount(samples & 0xFFFFFFFF00000000ull);
+  const int rows = popcount(samples & 0xAAAAAAAAAAAAAAAAull) + 2 * popcount(samples & 0xCCCCCCCCCCCCCCCCull) +
+                   4 * popcount(samples & 0xF0F0F0F0F0F0F0F0ull);
+  const int columns = column_0 + 2 * column_1 + 4 * column_2;
+  const int offsets = 4 * column_0 + 2 * column_1 + column_2;  // in eighths of a row, see sample_column_offset
+  const float n = static_cast<float>(count);
+  return {(static_cast<float>(columns) + 0.5f * n) / (8.0f * n),
+          (static_cast<float>(rows) + (static_cast<float>(offsets) + 0.5f * n) / 8.0f) / (8.0f * n)};
+}
+
+/// What a face covers of one pixel.
+struct Fragment {
+  PixelCoverage coverage;
+  float inverse_depth = 0;  // inverse depth of the face in the middle of its samples
+  int32_t face = 0;
+};
+
+PICTURA_HD inline Fragment make_fragment(const ScreenFace& face, int32_t face_index, const PixelCoverage& coverage,
+                                         int x, int y) {
+  const Vec2 middle = Vec2{static_cast<float>(x), static_cast<float>(y)} + middle_of(coverage.samples);
+  return {coverage, clamped_inverse_depth(face, middle), face_index};
+}
+
+PICTURA_HD inline Vec2 pixel_middle(int x, int y) {
+  return {static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f};
+}
+
+/// Nearness of a face in the middle of a pixel: that of its fragment where it covers the pixel fully.
+PICTURA_HD inline float center_inverse_depth(const ScreenFace& face, int x, int y) {
+  return clamped_inverse_depth(face, pixel_middle(x, y));
+}
+/// By how much that rises or falls within the pixel, at most.
+PICTURA_HD inline float inverse_depth_half_range(const ScreenFace& face) {
+  return 0.5f * (fabsf(face.inverse_depth_x) + fabsf(face.inverse_depth_y));
+}
+
+/// Bits of a occluder_bound(), the highest of a float; the others are 0.
+constexpr int kOccluderBoundBits = 21;
+/// How near a face that covers a pixel fully is in all of it. What is further away everywhere in the pixel is buried.
+/// Strips bury nothing, 0: others are painted over them, and what lies behind one may stand on it. Never negative and
+/// never not a number, because kernels sort by its bits; never more than how near the face is anywhere in the pixel, so
+/// that no face buries itself.
+PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
+  if (is_strip(face)) return 0.0f;
+  const float least = max_of(face.inverse_depth_low, center_inverse_depth(face, x, y) - inverse_depth_half_range(face));
+  return float_from_bits(bits_from_float(least) & ~((1u << (32 - kOccluderBoundBits)) - 1));
+}
+
+/// Whether a face may weigh anything in pixel (x, y), which others cover fully, given the largest occluder_bound() of
+/// those. Where this is false no fragment is made of it: it would be hidden by the face that buries it. Devices may ask
+/// others of those before that one, in any order: they bury less, so whom they bury it buries too.
+PICTURA_HD inline bool passes_occluder_bound(const ScreenFace& face, float bound, int x, int y) {
+  return !(center_inverse_depth(face, x, y) + inverse_depth_half_range(face) < bound);
+}
+
+/// Order of fragments that does not depend on how they are listed: the nearer first, then by number.
+PICTURA_HD inline bool is_nearer(const Fragment& a, const Fragment& b, const ScreenFace* faces) {
+  if (a.inverse_depth != b.inverse_depth) return a.inverse_depth > b.inverse_depth;
+  const uint32_t object_id_a = faces[a.face].object_id, object_id_b = faces[b.face].object_id;
+  return object_id_a != object_id_b ? object_id_a < object_id_b : a.face < b.face;
+}
+
+/// Where two fragments of a pixel meet: the samples that both cover. A sliver that touches no sample counts as being
+/// wherever the other is. None: neither hides anything of the other.
+PICTURA_HD inline uint64_t shared_samples(const PixelCoverage& a, const PixelCoverage& b) {
+  return a.samples != 0 && b.samples != 0 ? a.samples & b.samples : a.samples | b.samples;
+}
+
+/// Samples of a pixel at which a linear function of the screen, given by its value at `middle` and its gradient (not
+/// 0), is positive.
+PICTURA_HD inline uint64_t samples_where_positive(float value, Vec2 gradient, Vec2 middle) {
+  const float scale = 1.0f / length(gradient);
+  const Vec2 up = gradient * scale;
+  const Vec2 zero = middle - up * (value * scale);
+  const PolygonEdge edge = make_edge(zero, zero + Vec2{up.y, -up.x});
+  return samples_inside(edge, -edge.x0, -edge.y0);
+}
+
+/// Of the samples of a pixel that faces a and b of two things share, those at which a is in front: all or none, as in
+/// their middle, but where the planes of two solids intersect near by, those at which that of a is nearer, unless only
+/// all or none is asked for. The others are those at which b is in front of a.
+template <typename Stands>
+PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFace& b, uint64_t shared, Vec2 corner,
+                                            bool all_or_none, Stands&& stands) {
+  const Vec2 middle = middle_of(shared), at = corner + middle;
+  // Of the lower number before the higher, so that both ways round are the same arithmetic.
+  const bool swapped = b.object_id < a.object_id;
+  const float sign = swapped ? -1.0f : 1.0f, lead = sign * (inverse_depth(a, at) - inverse_depth(b, at));
+  const Vec2 gradient{sign * (a.inverse_depth_x - b.inverse_depth_x), sign * (a.inverse_depth_y - b.inverse_depth_y)};
+  // No sample is further than a pixel from the middle along either axis.
+  const bool intersect =
+      fabsf(lead) < fabsf(gradient.x) + fabsf(gradient.y) && !is_strip(a) && !is_strip(b) && !all_or_none;
+  if (!intersect) return is_in_front(a, b, at, stands) ? shared : 0;
+  const uint64_t low_first = samples_where_positive(lead, gradient, middle);
+  return shared & (swapped ? ~low_first : low_first);
+}
+
+/// Whether two fragments fill a pixel exactly, one of them a sliver that touches no sample: pieces that meet there.
+PICTURA_HD inline bool fit_together(const PixelCoverage& a, const PixelCoverage& b) {
+  return (a.samples == 0 || b.samples == 0) && fabsf(a.area + b.area - 1.0f) < kFullCoverage;
+}
+
+/// Whether two fragments of a pixel may still hide something of each other, given what is free of each of them. That
+/// only becomes less, so nothing is lost where they are not asked any more, whenever others take what.
+PICTURA_HD inline bool may_hide_more(uint64_t free_a, uint64_t samples_a, uint64_t free_b, uint64_t samples_b) {
+  return ((free_a & samples_b) | (free_b & samples_a)) != 0;
+}
+
+/// What two fragments of a pixel hide of each other.
+struct Hidden {
+  uint64_t of_a = 0, of_b = 0;
+};
+
+/// ... where they share samples; corner is the pixel's. Faces of one thing do not hide each other. A sliver hides
+/// nothing, and is hidden as a whole; what covers the whole pixel is hidden only by what does so too (see
+/// PixelAccumulator).
+template <typename Stands>
+PICTURA_HD inline Hidden hide_each_other(const PixelCoverage& a, const PixelCoverage& b, const ScreenFace& face_a,
+                                         const ScreenFace& face_b, Vec2 corner, Stands&& stands) {
+  const uint64_t shared = shared_samples(a, b);
+  if (shared == 0 || face_a.object_id == face_b.object_id || fit_together(a, b)) return {};
+  const bool has_sliver = a.samples == 0 || b.samples == 0;
+  const uint64_t a_first = samples_in_front(face_a, face_b, shared, corner, has_sliver, stands);
+  if (has_sliver) {
+    return {a.samples == 0 && a_first == 0 ? kAllSamples : 0, b.samples == 0 && a_first != 0 ? kAllSamples : 0};
+  }
+  return {a.is_full() && !b.is_full() ? 0 : shared & ~a_first, b.is_full() && !a.is_full() ? 0 : a_first};
+}
+
+}  // namespace pictura

@@ -1,0 +1,61 @@
+// Which things of a scene an image may show, one kind after the other, in an order that depends on the scene alone: the
+// walk of renderers that give an image to one thread.
+#pragma once
+
+#include "pictura/common/raster/face_setup.h"
+
+namespace pictura {
+
+/// Calls visit(box, agent) for each agent of the view's world that the image may show.
+template <typename Visit>
+PICTURA_HD inline void visit_agents(const ImageSetting& setting, const SceneBatch& scene, const View& view,
+                                    Visit&& visit) {
+  const auto world = static_cast<size_t>(view.world);
+  for (int32_t agent = scene.world_begin[world]; agent < scene.world_begin[world + 1]; ++agent) {
+    const AgentBox& box = scene.agents[static_cast<size_t>(agent)];
+    if (!may_show(box, setting.camera, setting.frustum)) continue;
+    if (!is_left_out(view, scene.hidden_agents, agent)) visit(box, agent);
+  }
+}
+
+/// Calls visit(wall, index) for each wall that the image may show.
+template <typename Visit>
+PICTURA_HD inline void visit_walls(const ImageSetting& setting, const StaticGeometryView& geometry, Visit&& visit) {
+  const Span<const WallFace> walls = geometry.walls;
+  for_each_item(
+      geometry.wall_grid, frustum_ground_box(setting.camera, setting.frustum),
+      [&](int32_t i) { return ground_box(walls[static_cast<size_t>(i)]); },
+      [&](int32_t i) {
+        const WallFace& wall = walls[static_cast<size_t>(i)];
+        if (may_show(wall, setting.camera, setting.frustum)) visit(wall, i);
+      });
+}
+
+/// Calls visit(head, state, index) for each light head that the image may show.
+template <typename Visit>
+PICTURA_HD inline void visit_lights(const ImageSetting& setting, const StaticGeometryView& geometry,
+                                    const SceneBatch& scene, const View& view, Visit&& visit) {
+  const int32_t begin = scene.light_begin[static_cast<size_t>(view.world)];
+  if (begin == scene.light_begin[static_cast<size_t>(view.world) + 1]) return;
+  const Span<const LightHead> heads = geometry.heads;
+  for (int32_t i = 0; i < static_cast<int32_t>(heads.size()); ++i) {
+    const LightHead& head = heads[static_cast<size_t>(i)];
+    if (!may_show(head, setting.camera, setting.frustum)) continue;
+    visit(head, scene.light_states[static_cast<size_t>(begin + head.signal)], i);
+  }
+}
+
+/// Calls visit(strip, index) for each strip that the image may show.
+template <typename Visit>
+PICTURA_HD inline void visit_strips(const ImageSetting& setting, const StaticGeometryView& geometry, Visit&& visit) {
+  const Span<const Strip> strips = geometry.strips;
+  for_each_item(
+      geometry.strip_grid, frustum_ground_box(setting.camera, setting.frustum),
+      [&](int32_t i) { return ground_box(strips[static_cast<size_t>(i)]); },
+      [&](int32_t i) {
+        const Strip& strip = strips[static_cast<size_t>(i)];
+        if (may_show(strip, setting.camera, setting.frustum)) visit(strip, i);
+      });
+}
+
+}  // namespace pictura

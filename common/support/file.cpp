@@ -1,0 +1,159 @@
+#include "pictura/common/support/file.h"
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "pictura/common/error.h"
+
+namespace pictura {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// An open file that closes itself.
+class OpenFile {
+ public:
+  explicit OpenFile(const std::string& path) : path_(path), fd_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
+    PICTURA_CHECK(fd_ >= 0 || errno != ENOENT, "{}: no such file", path_);
+    PICTURA_CHECK(fd_ >= 0, "{}: cannot be opened: {}", path_, std::strerror(errno));
+  }
+  ~OpenFile() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  OpenFile(const OpenFile&) = delete;
+  OpenFile& operator=(const OpenFile&) = delete;
+
+  struct stat status() const {
+    struct stat result{};
+    PICTURA_CHECK(::fstat(fd_, &result) == 0, "{}: cannot be asked for its size: {}", path_, std::strerror(errno));
+    return result;
+  }
+
+  /// Appends the next bytes, at most `count`; returns how many there were, 0 at the end.
+  std::size_t append_to(std::string* bytes, std::size_t count) const {
+    const std::size_t before = bytes->size();
+    bytes->resize(before + count);
+    ssize_t got = 0;
+    do {
+      got = ::read(fd_, bytes->data() + before, count);
+    } while (got < 0 && errno == EINTR);
+    PICTURA_CHECK(got >= 0, "{}: reading failed: {}", path_, std::strerror(errno));
+    bytes->resize(before + static_cast<std::size_t>(got));
+    return static_cast<std::size_t>(got);
+  }
+
+ private:
+  const std::string& path_;
+  int fd_;
+};
+
+bool is_same_version(const struct stat& a, const struct stat& b) {
+  return a.st_size == b.st_size && a.st_mtim.tv_sec == b.st_mtim.tv_sec && a.st_mtim.tv_nsec == b.st_mtim.tv_nsec;
+}
+
+}  // namespace
+
+std::string read_file(const std::string& path, std::size_t max_bytes) {
+  const OpenFile file(path);
+  const struct stat before = file.status();
+  PICTURA_CHECK(!S_ISDIR(before.st_mode), "{}: expected a file, got a folder", path);
+  // Pipes and the like have no size to be asked for beforehand.
+  const bool is_regular = S_ISREG(before.st_mode);
+  const auto check_size = [&](std::size_t bytes) {
+    PICTURA_CHECK(bytes <= max_bytes, "{}: larger than {} bytes", path, max_bytes);
+  };
+  if (is_regular) check_size(static_cast<std::size_t>(before.st_size));
+  constexpr std::size_t kChunk_bytes = std::size_t{1} << 16;
+  std::string bytes;
+  if (is_regular) bytes.reserve(static_cast<std::size_t>(before.st_size) + kChunk_bytes);
+  while (file.append_to(&bytes, kChunk_bytes) > 0) check_size(bytes.size());
+  if (is_regular) {
+    // Files of the kernel's own have no size, and bytes all the same.
+    const bool is_whole = before.st_size == 0 || bytes.size() == static_cast<std::size_t>(before.st_size);
+    PICTURA_CHECK(is_whole && is_same_version(before, file.status()), "{}: changed while it was read", path);
+  }
+  return bytes;
+}
+
+void write_renamed(const std::string& path, const std::function<void(const std::string&)>& write) {
+  // The ending stays, for writers that choose a format by it.
+  const fs::path target(path);
+  const std::string temporary = (target.parent_path() / fmt::format(".{}.{}.tmp{}", target.stem().string(), getpid(),
+                                                                    target.extension().string()))
+                                    .string();
+  try {
+    write(temporary);
+    // On disk before the rename, so that a crash never leaves an empty file under the final name.
+    const int fd = ::open(temporary.c_str(), O_RDONLY | O_CLOEXEC);
+    PICTURA_CHECK(fd >= 0, "{}: cannot be written: {}", path, std::strerror(errno));
+    const bool synced = ::fsync(fd) == 0;
+    ::close(fd);
+    PICTURA_CHECK(synced, "{}: cannot be written: {}", path, std::strerror(errno));
+    PICTURA_CHECK(std::rename(temporary.c_str(), path.c_str()) == 0, "{}: cannot be replaced: {}", path,
+                  std::strerror(errno));
+  } catch (...) {
+    std::error_code ignored;
+    fs::remove(temporary, ignored);
+    throw;
+  }
+}
+
+void write_file(const std::string& path, std::string_view bytes) {
+  write_renamed(path, [&](const std::string& temporary) {
+    std::ofstream out(temporary, std::ios::binary);
+    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    out.close();
+    PICTURA_CHECK(out, "{}: cannot be written: {}", path, std::strerror(errno));
+  });
+}
+
+std::string cache_folder(const std::string& name) {
+  auto variable = [](const char* variable_name) -> std::string {
+    const char* value = std::getenv(variable_name);
+    return value ? value : "";
+  };
+  if (variable("PICTURA_CACHE") == "off") return "";
+  std::string folder = variable("XDG_CACHE_HOME");
+  if (folder.empty()) {
+    const std::string home = variable("HOME");
+    if (home.empty()) return "";
+    folder = home + "/.cache";
+  }
+  return folder + "/pictura/" + name;
+}
+
+void try_to_cache(const std::string& path, std::string_view bytes) {
+  try {
+    make_output_folder(fs::path(path).parent_path().string());
+    write_file(path, bytes);
+  } catch (const Error&) {
+  }
+}
+
+void make_output_folder(const std::string& path) {
+  std::error_code making, asking;
+  fs::create_directories(path, making);
+  const bool is_folder = fs::is_directory(path, asking);
+  PICTURA_CHECK(is_folder, "{}: cannot be made: {}", path,
+                making   ? making.message()
+                : asking ? asking.message()
+                         : "it is a file");
+  // Ask by trying: permission bits say nothing of read-only mounts, and a superuser passes access().
+  const std::string probe = (fs::path(path) / fmt::format(".probe.{}", getpid())).string();
+  {
+    std::ofstream out(probe);
+    PICTURA_CHECK(out, "{}: cannot be written to: {}", path, std::strerror(errno));
+  }
+  std::error_code ignored;
+  fs::remove(probe, ignored);
+}
+
+}  // namespace pictura

@@ -1,0 +1,86 @@
+// The still parts of a map from above, painted onto a canvas: shared by the picture of a map and by films of a world.
+// Private to the drawing library.
+#pragma once
+
+#include <vector>
+
+#include "pictura/common/grid.h"
+#include "pictura/drawing/canvas.h"
+#include "pictura/map/road_map.h"
+
+namespace pictura {
+
+constexpr Rgb kGroundColor = hex(0xEEF0E8);
+constexpr Rgb kRoadEdgeInk = hex(0xC8312F);
+constexpr Rgb kStopLineInk = hex(0xFFFFFF);
+constexpr Rgb kParkingSpaceInk = hex(0xC9D2DE);
+
+/// Bounding box of everything that is drawn of a map. Throws Error when there is nothing.
+Aabb2 bounds_of(const RoadMap& map);
+
+/// Colour of a lane's surface from above.
+Rgb lane_color(LaneType type);
+
+/// Colour of a painted line from above.
+Rgb paint_color(MarkColor color);
+
+/// Colours of a junction's phases, as stop lines and heads show them where no state is known.
+Rgb phase_color(int phase);
+
+/// Draws on a canvas in the map's metres: its top left pixel shows left_top_m, north is up. The canvas's own units come
+/// back when it goes away.
+class GroundPen {
+ public:
+  GroundPen(Canvas& canvas, Vec2 left_top_m, double px_per_m);
+  ~GroundPen();
+  GroundPen(const GroundPen&) = delete;
+  GroundPen& operator=(const GroundPen&) = delete;
+
+  Canvas& canvas() { return canvas_; }
+  cairo_t* context() { return canvas_.context(); }
+  double px_per_m() const { return px_per_m_; }
+  /// The larger of a size in metres and one in pixels, in metres.
+  double at_least(double metres, double min_px) const;
+  /// Whether something with this bounding box touches the canvas.
+  bool sees(const Aabb2& box) const;
+  bool sees(Vec2 place, float margin_m) const;
+
+  void move_to(Vec2 p) { cairo_move_to(context(), p.x, p.y); }
+  void line_to(Vec2 p) { cairo_line_to(context(), p.x, p.y); }
+  void line(Vec2 a, Vec2 b, double width_m, Rgb color, double alpha = 1);
+  void disk(Vec2 center, double radius_m, Rgb color, double alpha = 1);
+  /// Text around a place, in pixels whatever the scale.
+  void label(Vec2 place, const std::string& words, const TextStyle& style);
+
+ private:
+  Canvas& canvas_;
+  Vec2 left_top_m_;
+  double px_per_m_;
+  Aabb2 visible_;
+};
+
+/// Paints lanes, parking spaces, crosswalks, markings, painted stop lines and road edges, without lights.
+class MapLayers {
+ public:
+  explicit MapLayers(const RoadMap& map);
+
+  /// The top left pixel of the canvas shows left_top_m; only what touches the canvas is painted.
+  void paint(Canvas& canvas, Vec2 left_top_m, double px_per_m) const;
+
+ private:
+  void paint_lanes(GroundPen& pen) const;
+  void paint_parking_spaces(GroundPen& pen) const;
+  void paint_crosswalk(GroundPen& pen, const Crosswalk& crosswalk) const;
+  void paint_markings(GroundPen& pen) const;
+  void paint_road_edges(GroundPen& pen) const;
+
+  const RoadMap& map_;
+  std::vector<int32_t> lanes_in_order_;  // those drawn first come first
+  std::vector<Aabb2> lane_boxes_;        // [lanes]
+  std::vector<Aabb2> marking_boxes_;     // [markings]
+};
+
+/// A light's stop line and head: the line in `color`, the head as a disk with a beak towards those it is meant for.
+void paint_light(Canvas& canvas, const TrafficLight& light, Vec2 left_top_m, double px_per_m, Rgb color);
+
+}  // namespace pictura

@@ -1,0 +1,308 @@
+#include "pictura/drawing/plot.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "pictura/common/error.h"
+#include "pictura/drawing/canvas.h"
+
+namespace pictura {
+
+namespace {
+
+constexpr Rgb kAxisColor = hex(0x3A3F46), kGridColor = hex(0xE3E5E8), kLabelColor = hex(0x5A6068);
+constexpr std::array<Rgb, 7> kSeriesColors{hex(0x1F6FEB), hex(0xE8590C), hex(0x2B8A3E), hex(0x9C36B5),
+                                           hex(0xC92A2A), hex(0x0B7285), hex(0x846358)};
+constexpr double kLeft_px = 74, kRight_px = 18, kTop_px = 40, kBottom_px = 50;
+
+struct Range {
+  double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
+  void add(double value) {
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  /// Never empty, with a little air; that around a lone value is told.
+  Range padded(double share, double lone_air) const {
+    if (!(low <= high)) return {0, 1};
+    const double air = high > low ? share * (high - low) : lone_air;
+    return {low - air, high + air};
+  }
+};
+
+/// "1.5M", "20k", "0.02": as many decimals as the step between ticks asks for.
+std::string tick_text(double value, double step) {
+  const double magnitude = std::max(std::abs(value), step);
+  double unit = 1;
+  const char* suffix = "";
+  if (magnitude >= 1e9) {
+    unit = 1e9, suffix = "G";
+  } else if (magnitude >= 1e6) {
+    unit = 1e6, suffix = "M";
+  } else if (magnitude >= 1e4) {
+    unit = 1e3, suffix = "k";
+  }
+  if (std::abs(value) < 1e-9 * step) return "0";
+  if (magnitude < 1e-4) return fmt::format("{:.2g}", value);
+  const int decimals = std::clamp(static_cast<int>(std::ceil(-std::log10(step / unit) - 1e-9)), 0, 6);
+  return fmt::format("{:.{}f}{}", value / unit, decimals, suffix);
+}
+
+/// "2M", "50k", "16384", "0.25": a tick of a logarithmic axis, exactly.
+std::string tick_text(double value) {
+  if (value >= 1e6) return fmt::format("{:g}M", value / 1e6);
+  const bool is_of_thousands = value >= 1e4 && std::fmod(value, 1e3) == 0;
+  return is_of_thousands ? fmt::format("{:g}k", value / 1e3) : fmt::format("{:g}", value);
+}
+
+/// From values to pixels.
+class Axis {
+ public:
+  struct Tick {
+    double value;
+    std::string text;
+  };
+  explicit Axis(AxisScale scale) : scale_(scale) {}
+  bool shows(double value) const { return std::isfinite(value) && (scale_ == AxisScale::linear || value > 0); }
+  void add(double value) { range_.add(scaled(value)); }
+  /// Spreads the values added, with a little air, from one place to another.
+  void place(double air, double low_px, double high_px) {
+    range_ = range_.padded(air, scale_ == AxisScale::linear ? std::max(0.5 * std::abs(range_.low), 0.5) : 1.0);
+    low_px_ = low_px;
+    high_px_ = high_px;
+  }
+  double at_px(double value) const {
+    return low_px_ + (high_px_ - low_px_) * (scaled(value) - range_.low) / (range_.high - range_.low);
+  }
+  std::vector<Tick> ticks(int wanted) const {
+    std::vector<Tick> ticks;
+    if (scale_ == AxisScale::linear) {
+      const std::vector<double> values = round_ticks(range_.low, range_.high, wanted);
+      const double step = values.size() > 1 ? values[1] - values[0] : 1.0;
+      for (const double value : values) ticks.push_back({value, tick_text(value, step)});
+      return ticks;
+    }
+    const double low = std::exp2(range_.low), high = std::exp2(range_.high);
+    const auto values =
+        scale_ == AxisScale::binary ? binary_ticks(low, high, wanted) : decimal_ticks(low, high, wanted);
+    for (const double value : values) ticks.push_back({value, tick_text(value)});
+    return ticks;
+  }
+
+ private:
+  double scaled(double value) const { return scale_ == AxisScale::linear ? value : std::log2(value); }
+
+  AxisScale scale_;
+  Range range_;
+  double low_px_ = 0, high_px_ = 1;
+};
+
+/// Where a box of that size covers least of the lines: one of the four corners of the plot.
+struct Place {
+  double x, y;
+};
+Place emptiest_corner(const std::vector<Place>& points, Place top_left, double width, double height, double box_width,
+                      double box_height) {
+  constexpr double kAir_px = 8;
+  const double left = top_left.x + kAir_px, right = top_left.x + width - box_width - kAir_px;
+  const double top = top_left.y + kAir_px, bottom = top_left.y + height - box_height - kAir_px;
+  Place best{right, top};
+  long fewest = std::numeric_limits<long>::max();
+  for (const Place corner : {Place{right, top}, Place{left, top}, Place{right, bottom}, Place{left, bottom}}) {
+    const long covered = std::count_if(points.begin(), points.end(), [&](const Place& p) {
+      return p.x >= corner.x && p.x <= corner.x + box_width && p.y >= corner.y && p.y <= corner.y + box_height;
+    });
+    if (covered < fewest) {
+      fewest = covered;
+      best = corner;
+    }
+  }
+  return best;
+}
+
+/// Adds places along the line from the last one to another.
+void add_line(std::vector<Place>* places_inout, Place to) {
+  constexpr double kStep_px = 4;
+  const Place from = places_inout->back();
+  const int steps = 1 + static_cast<int>(std::hypot(to.x - from.x, to.y - from.y) / kStep_px);
+  for (int i = 1; i <= steps; ++i) {
+    const double share = static_cast<double>(i) / steps;
+    places_inout->push_back({from.x + share * (to.x - from.x), from.y + share * (to.y - from.y)});
+  }
+}
+
+/// `points`: places along all lines of the panel, in pixels.
+void draw_legend(Canvas& canvas, const PlotPanel& panel, const std::vector<Place>& points, Place top_left, double width,
+                 double height) {
+  const TextStyle style{.size_px = 12, .color = hex(0x22262B)};
+  double widest = 0;
+  for (const PlotSeries& series : panel.series) widest = std::max(widest, canvas.text_width(series.name, style));
+  constexpr double kRow_px = 18;
+  const double box_width = widest + 44, box_height = kRow_px * static_cast<double>(panel.series.size()) + 8;
+  const auto [x, y] = emptiest_corner(points, top_left, width, height, box_width, box_height);
+  canvas.round_rectangle_path(x, y, box_width, box_height, 4);
+  canvas.set_color(hex(0xFFFFFF), 0.85);
+  cairo_fill_preserve(canvas.context());
+  canvas.set_color(kGridColor);
+  cairo_set_line_width(canvas.context(), 1);
+  cairo_stroke(canvas.context());
+  for (size_t i = 0; i < panel.series.size(); ++i) {
+    const double middle = y + 4 + kRow_px * (static_cast<double>(i) + 0.5);
+    canvas.fill_rectangle(x + 8, middle - 1.25, 20, 2.5, kSeriesColors[i % kSeriesColors.size()]);
+    canvas.text(x + 36, middle + 4, panel.series[i].name, style);
+  }
+}
+
+void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, double width_px, double height_px) {
+  Axis x_axis(panel.x_scale), y_axis(panel.y_scale);
+  const auto drawable = [&](const PlotSeries& series, size_t i) {
+    return x_axis.shows(series.x[i]) && y_axis.shows(series.y[i]);
+  };
+  for (const PlotSeries& series : panel.series) {
+    for (size_t i = 0; i < series.x.size(); ++i) {
+      if (!drawable(series, i)) continue;
+      x_axis.add(series.x[i]);
+      y_axis.add(series.y[i]);
+    }
+  }
+  const double left = x0 + kLeft_px, top = y0 + kTop_px;
+  const double width = width_px - kLeft_px - kRight_px, height = height_px - kTop_px - kBottom_px;
+  x_axis.place(0.0, left, left + width);
+  y_axis.place(0.06, top + height, top);
+  cairo_t* context = canvas.context();
+
+  canvas.text(x0 + 0.5 * (kLeft_px + width_px - kRight_px), y0 + 24, panel.title,
+              {.size_px = 15, .bold = true, .align = Align::center});
+  const TextStyle tick_style{.size_px = 11.5, .align = Align::center, .color = kLabelColor};
+  const TextStyle y_tick_style{.size_px = 11.5, .align = Align::right, .color = kLabelColor};
+  for (const Axis::Tick& tick : x_axis.ticks(std::max(2, static_cast<int>(width / 80)))) {
+    const double x = x_axis.at_px(tick.value);
+    canvas.fill_rectangle(std::round(x), top, 1, height, kGridColor);
+    canvas.text(x, top + height + 17, tick.text, tick_style);
+  }
+  for (const Axis::Tick& tick : y_axis.ticks(std::max(2, static_cast<int>(height / 45)))) {
+    const double y = y_axis.at_px(tick.value);
+    canvas.fill_rectangle(left, std::round(y), width, 1, kGridColor);
+    canvas.text(left - 8, y + 4, tick.text, y_tick_style);
+  }
+  canvas.fill_rectangle(left - 1, top, 1, height + 1, kAxisColor);
+  canvas.fill_rectangle(left - 1, top + height, width + 1, 1, kAxisColor);
+  const TextStyle label_style{.size_px = 12.5, .align = Align::center, .color = kAxisColor};
+  canvas.text(left + 0.5 * width, y0 + height_px - 12, panel.x_label, label_style);
+  canvas.text(x0 + 17, top + 0.5 * height, panel.y_label, label_style, 0.5 * static_cast<double>(kPi));
+
+  cairo_save(context);
+  cairo_rectangle(context, left - 1, top - 2, width + 3, height + 4);
+  cairo_clip(context);
+  cairo_set_line_width(context, 2);
+  cairo_set_line_join(context, CAIRO_LINE_JOIN_ROUND);
+  cairo_set_line_cap(context, CAIRO_LINE_CAP_ROUND);
+  std::vector<Place> along;
+  for (size_t s = 0; s < panel.series.size(); ++s) {
+    const PlotSeries& series = panel.series[s];
+    canvas.set_color(kSeriesColors[s % kSeriesColors.size()]);
+    for (size_t i = 0; i < series.x.size(); ++i) {
+      if (!drawable(series, i)) {
+        cairo_stroke(context);
+        continue;
+      }
+      const Place at{x_axis.at_px(series.x[i]), y_axis.at_px(series.y[i])};
+      const bool starts = i == 0 || !drawable(series, i - 1);
+      const bool alone = starts && (i + 1 == series.x.size() || !drawable(series, i + 1));
+      if (starts) {
+        cairo_move_to(context, at.x, at.y);
+        along.push_back(at);
+      } else {
+        add_line(&along, at);
+      }
+      cairo_line_to(context, at.x, at.y);
+      if (alone) {
+        cairo_stroke(context);
+        cairo_arc(context, at.x, at.y, 3, 0, kTwoPi);
+        cairo_fill(context);
+      }
+    }
+    cairo_stroke(context);
+  }
+  cairo_restore(context);
+  if (panel.series.size() > 1) draw_legend(canvas, panel, along, {left, top}, width, height);
+}
+
+}  // namespace
+
+std::vector<double> round_ticks(double low, double high, int wanted) {
+  std::vector<double> ticks;
+  if (!(high > low) || wanted < 1 || !std::isfinite(high - low)) return ticks;
+  const double raw = (high - low) / wanted;
+  const double power = std::pow(10.0, std::floor(std::log10(raw)));
+  const double ratio = raw / power;
+  const double step = power * (ratio < 1.5 ? 1 : (ratio < 3.5 ? 2 : (ratio < 7.5 ? 5 : 10)));
+  const double first = std::ceil(low / step - 1e-9), last = std::floor(high / step + 1e-9);
+  for (double i = first; i <= last; ++i) ticks.push_back(i * step);
+  return ticks;
+}
+
+std::vector<double> binary_ticks(double low, double high, int wanted) {
+  std::vector<double> ticks;
+  if (!(low > 0 && high >= low) || wanted < 1 || !std::isfinite(high)) return ticks;
+  const double first = std::ceil(std::log2(low) - 1e-9), last = std::floor(std::log2(high) + 1e-9);
+  const double step = std::max(1.0, std::ceil((last - first + 1) / wanted));
+  for (double power = first; power <= last; power += step) ticks.push_back(std::exp2(power));
+  return ticks.size() > 1 ? ticks : round_ticks(low, high, wanted);
+}
+
+std::vector<double> decimal_ticks(double low, double high, int wanted) {
+  std::vector<double> ticks;
+  if (!(low > 0 && high >= low) || wanted < 1 || !std::isfinite(high)) return ticks;
+  const double first = std::floor(std::log10(low)), last = std::floor(std::log10(high) + 1e-9);
+  auto list = [&](std::initializer_list<int> factors, double step) {
+    ticks.clear();
+    for (double power = first; power <= last; power += step) {
+      for (const int factor : factors) {
+        const double tick = factor * std::pow(10.0, power);
+        if (tick >= low * (1 - 1e-9) && tick <= high * (1 + 1e-9)) ticks.push_back(tick);
+      }
+    }
+    return ticks.size() <= static_cast<std::size_t>(wanted);
+  };
+  if (list({1, 2, 5}, 1)) return ticks.size() > 1 ? ticks : round_ticks(low, high, wanted);
+  for (double step = 1; !list({1}, step); ++step) continue;
+  return ticks;
+}
+
+RgbImage draw_plots(const std::vector<PlotPanel>& panels, const PlotOptions& options) {
+  PICTURA_CHECK(!panels.empty(), "plot '{}': expected at least one panel", options.title);
+  PICTURA_CHECK(options.panel_width_px >= 160 && options.panel_width_px <= 8192 && options.panel_height_px >= 140 &&
+                    options.panel_height_px <= 8192 && options.columns >= 1,
+                "plot '{}': expected panels of 160x140 to 8192x8192 px and 1 column or more, got {}x{} and {}",
+                options.title, options.panel_width_px, options.panel_height_px, options.columns);
+  for (const PlotPanel& panel : panels) {
+    for (const PlotSeries& series : panel.series) {
+      PICTURA_CHECK(series.x.size() == series.y.size(),
+                    "plot '{}', series '{}': expected equally many x and y, got {} and {}", panel.title, series.name,
+                    series.x.size(), series.y.size());
+    }
+  }
+  const int num_panels = static_cast<int>(panels.size());
+  const int columns = std::min(options.columns, num_panels), rows = (num_panels + columns - 1) / columns;
+  const int top = options.title.empty() ? 6 : 44;
+  Canvas canvas(columns * options.panel_width_px + 12, top + rows * options.panel_height_px + 6, hex(0xFFFFFF));
+  if (!options.title.empty()) {
+    canvas.text(0.5 * canvas.width_px(), 31, options.title, {.size_px = 19, .bold = true, .align = Align::center});
+  }
+  for (int i = 0; i < num_panels; ++i) {
+    draw_panel(canvas, panels[static_cast<size_t>(i)], 6 + i % columns * options.panel_width_px,
+               top + i / columns * options.panel_height_px, options.panel_width_px, options.panel_height_px);
+  }
+  return canvas.image();
+}
+
+void draw_plots_png(const std::vector<PlotPanel>& panels, const std::string& path, const PlotOptions& options) {
+  const RgbImage image = draw_plots(panels, options);
+  write_png(path, image.width_px, image.height_px, image.rgb);
+}
+
+}  // namespace pictura

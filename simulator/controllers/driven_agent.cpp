@@ -1,0 +1,65 @@
+#include "pictura/simulator/controllers/driven_agent.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pictura {
+
+DrivenAgent::DrivenAgent(const WorldView& world, int agent)
+    : world_(world),
+      slot_(world.first_slot + agent),
+      parameters_(dynamics_of(world.agents, slot_)),
+      limits_(class_limits(class_of(world.agents, slot_))) {}
+
+Motion DrivenAgent::after(const Motion& from, int32_t action) const {
+  return move(from, controls_of_action(action), parameters_, limits_, world_.options.dt_s);
+}
+
+int32_t DrivenAgent::speed_action(const Motion& from, float wanted_mps) const {
+  constexpr float kSlow_mps = 0.5f, kReaction_s = 0.6f, kBraking_mps2 = 4, kAccelerating_mps2 = 1.5f;
+  if (wanted_mps == 0 && std::fabs(from.speed_mps) < kSlow_mps) return halt(from, kStepsToHalt).action;
+  const float wanted_mps2 = std::clamp((wanted_mps - from.speed_mps) / kReaction_s, -kBraking_mps2, kAccelerating_mps2);
+  // What rounding leaves of an acceleration would be stopped at zero first, by any jerk against it alike.
+  Motion rounded = from;
+  if (std::fabs(from.accel_long_mps2) < 1e-3f) rounded.accel_long_mps2 = 0;
+  int32_t best = kStraight;
+  float least = INFINITY;
+  for (int32_t action = kStraight; action < kNumActions; action += kNumLatActions) {
+    const float off = std::fabs(after(rounded, action).accel_long_mps2 - wanted_mps2);
+    if (off >= least) continue;
+    least = off;
+    best = action;
+  }
+  return best;
+}
+
+/// Jerks are too coarse to come to rest by ever smaller accelerations: looks so many steps ahead.
+DrivenAgent::Halt DrivenAgent::halt(const Motion& from, int steps) const {
+  constexpr float kPerAcceleration_s = 0.3f;
+  if (steps == 0) return {kStraight, kPerAcceleration_s * std::fabs(from.accel_long_mps2)};
+  Halt best{kStraight, INFINITY};
+  for (int32_t action = kStraight; action < kNumActions; action += kNumLatActions) {
+    const Motion next = after(from, action);
+    const float cost = std::fabs(next.speed_mps) + halt(next, steps - 1).cost;
+    if (cost < best.cost) best = {action, cost};
+  }
+  return best;
+}
+
+AgentBox DrivenAgent::box(Vec3 axle_m, float heading_rad, float margin_m) const {
+  AgentBox box = box_at(world_.agents, slot_, axle_m, sincos_of(heading_rad));
+  box.length_m += 2 * margin_m;
+  box.width_m += 2 * margin_m;
+  return box;
+}
+
+bool DrivenAgent::leaves_road(const Motion& at, float z_m, float margin_m) const {
+  return !may_spawn(world_.map, box({at.x_m, at.y_m, z_m}, at.heading_rad, margin_m));
+}
+
+float DrivenAgent::to_bumper_m() const {
+  const float length_m = world_.agents.length_m[slot_];
+  return reference_to_center(class_of(world_.agents, slot_), length_m) + 0.5f * length_m;
+}
+
+}  // namespace pictura

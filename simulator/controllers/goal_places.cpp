@@ -1,0 +1,130 @@
+#include "pictura/simulator/controllers/goal_places.h"
+
+#include <vector>
+
+#include "pictura/common/error.h"
+
+namespace pictura {
+
+namespace {
+
+/// Whether pedestrians of the largest size touch no wall anywhere along the piece.
+bool is_passable(const MapView& map, const WalkPiece& piece) {
+  constexpr float kStep_m = 0.25f;
+  const ClassLimits limits = class_limits(AgentClass::pedestrian);
+  const int steps = static_cast<int>(piece.length_m / kStep_m) + 1;
+  for (int i = 0; i <= steps; ++i) {
+    const float along_m = piece.length_m * static_cast<float>(i) / static_cast<float>(steps);
+    AgentBox box;
+    const Vec2 at = piece.a_m.xy() + piece.direction * along_m;
+    box.center_m = {at.x, at.y, piece.a_m.z + piece.slope * along_m};
+    box.cos_heading = piece.direction.x;
+    box.sin_heading = piece.direction.y;
+    box.length_m = limits.max_length_m;
+    box.width_m = limits.max_width_m;
+    if (touches_wall(map, box)) return false;
+  }
+  return true;
+}
+
+/// Which places of the walkways can be reached from which, along passable pieces.
+class WalkGraph {
+ public:
+  explicit WalkGraph(const MapView& map) : map_(map), network_(map.walk_leave_begin.size(), -1) {
+    for (const WalkPiece& piece : map.walk_pieces) passable_.push_back(is_passable(map, piece));
+    // Every piece has one back, so that networks are found by spreading from node to node.
+    for (size_t node = 0; node + 1 < map.walk_leave_begin.size(); ++node) {
+      if (network_[node] < 0) spread(static_cast<int32_t>(node));
+    }
+  }
+
+  bool leads(RoutePoint from, RoutePoint to) const {
+    const auto a = static_cast<size_t>(from.lane), b = static_cast<size_t>(to.lane);
+    return passable_[a] && passable_[b] &&
+           network_[static_cast<size_t>(map_.walk_pieces[a].to_node)] ==
+               network_[static_cast<size_t>(map_.walk_pieces[b].to_node)];
+  }
+
+ private:
+  void spread(int32_t first) {
+    std::vector<int32_t> open{first};
+    network_[static_cast<size_t>(first)] = first;
+    while (!open.empty()) {
+      const auto node = static_cast<size_t>(open.back());
+      open.pop_back();
+      for (int32_t i = map_.walk_leave_begin[node]; i < map_.walk_leave_begin[node + 1]; ++i) {
+        const auto piece = static_cast<size_t>(map_.walk_leaving[static_cast<size_t>(i)]);
+        const int32_t next = map_.walk_pieces[piece].to_node;
+        if (!passable_[piece] || network_[static_cast<size_t>(next)] >= 0) continue;
+        network_[static_cast<size_t>(next)] = first;
+        open.push_back(next);
+      }
+    }
+  }
+
+  const MapView map_;
+  std::vector<bool> passable_;    // [walk_pieces]
+  std::vector<int32_t> network_;  // [nodes] a node of the same network
+};
+
+bool road_leads(const WorldView& world, const LaneGraph& graph, RoutePoint from, RoutePoint to) {
+  const auto route = graph.route(lane_place(world.map, from), lane_place(world.map, to));
+  // The gap itself, but for what neighbours differ in length.
+  return route && route->length_m <= 2 * kMaxWaypointGap_m;
+}
+
+bool walk_leads(const WorldView& world, int agent, const WalkGraph& graph, RoutePoint from, RoutePoint to) {
+  const LanePose pose = pose_of(world, agent, to);
+  const AgentBox box = box_at(world.agents, world.first_slot + agent, pose.position_m, sincos_of(pose.heading_rad));
+  return graph.leads(from, to) && is_clear(world, box, world.num_agents, world.num_boxes) &&
+         !touches_wall(world.map, box);
+}
+
+}  // namespace
+
+RoutePoint spawn_place(const WorldView& world, int agent) {
+  const int slot = world.first_slot + agent;
+  for (int i = 0; i < kSpawnTries; ++i) {
+    const RoutePoint at = spawn_point(world, agent, i);
+    const Vec3 place = pose_of(world, agent, at).position_m;
+    if (place.x == world.agents.x_m[slot] && place.y == world.agents.y_m[slot]) return at;
+  }
+  fail("agent {}: expected it where one of its tries put it", agent);
+}
+
+std::array<RoutePoint, kNumWaypoints> goal_places(const WorldView& world, int agent, uint32_t chain, RoutePoint from) {
+  RandomStream random = agent_stream(world, agent, chain, Purpose::goals);
+  std::array<RoutePoint, kNumWaypoints> places;
+  for (RoutePoint& place : places) {
+    from = place =
+        walks(world, agent) ? next_walk_waypoint(world, agent, from, &random) : next_waypoint(world.map, from, &random);
+  }
+  return places;
+}
+
+LanePlace lane_place(const MapView& map, RoutePoint at) {
+  return {at.lane, min_of(at.s_m, map.lanes[static_cast<size_t>(at.lane)].length_m)};
+}
+
+std::array<GoalReach, 2> follow_goals(const WorldView& world, const LaneGraph& graph, uint32_t chains) {
+  const WalkGraph walkways(world.map);
+  std::array<GoalReach, 2> reach;
+  for (int agent = 0; agent < world.num_agents; ++agent) {
+    if (!is_active(world, agent)) continue;
+    const bool on_foot = walks(world, agent);
+    GoalReach& count = reach[on_foot];
+    ++count.agents;
+    RoutePoint at = spawn_place(world, agent);
+    for (uint32_t chain = 0; chain < chains; ++chain) {
+      for (const RoutePoint next : goal_places(world, agent, chain, at)) {
+        ++count.waypoints;
+        count.unreachable +=
+            !(on_foot ? walk_leads(world, agent, walkways, at, next) : road_leads(world, graph, at, next));
+        at = next;
+      }
+    }
+  }
+  return reach;
+}
+
+}  // namespace pictura

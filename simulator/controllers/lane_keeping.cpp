@@ -1,0 +1,245 @@
+#include "pictura/simulator/controllers/lane_keeping.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pictura/common/error.h"
+#include "pictura/simulator/controllers/goal_places.h"
+#include "pictura/simulator/world_batch.h"
+
+namespace pictura {
+
+namespace {
+
+constexpr float kWayOn_m = 80;   // beyond the last waypoint
+constexpr float kMissed_m = 10;  // a waypoint so far behind has been missed
+
+/// The first of `boxes` that touches `other`, or how many there are.
+size_t first_touching(const std::vector<AgentBox>& boxes, const AgentBox& other) {
+  const auto touches = [&other](const AgentBox& box) {
+    const Vec2 apart = (box.center_m - other.center_m).xy();
+    return dot(apart, apart) <= square(radius(box) + radius(other)) && same_level(box, other) &&
+           overlap(footprint(box), footprint(other));
+  };
+  return static_cast<size_t>(std::find_if(boxes.begin(), boxes.end(), touches) - boxes.begin());
+}
+
+}  // namespace
+
+LaneKeepingController::LaneKeepingController(const WorldView& world, int agent, const LaneGraph& graph)
+    : world_(world),
+      self_(agent),
+      slot_(world.first_slot + agent),
+      agent_(world, agent),
+      path_(world.map, graph, spawn_place(world, agent)) {
+  waypoints_.back() = points().front().at;  // where the first chain starts
+}
+
+int32_t LaneKeepingController::act() {
+  find_place();
+  follow_goals();
+  const Motion now = agent_.now();
+  const float max_mps = std::min(speed_before_light(now), speed_behind_others());
+  if (max_mps < kPlannedSpeed_mps) {
+    plan_ = {};
+    next_planned_ = 0;
+  } else if (next_planned_ % kStrideSteps == 0 || next_planned_ >= plan_.actions.size()) {
+    renew_plan(now);
+  }
+  if (next_planned_ < plan_.actions.size()) return plan_.actions[next_planned_++];
+  return pursuing_action(now, place_, std::min(points()[place_].speed_mps, max_mps));
+}
+
+/// Nothing is planned while pursuing the path will do. A plan is followed for half of it at least.
+void LaneKeepingController::renew_plan(const Motion& now) {
+  if (stays_on_road(now)) {
+    plan_ = {};
+    next_planned_ = 0;
+    return;
+  }
+  if (plan_.is_clear && next_planned_ < plan_.actions.size() / 2) return;
+  DrivingPlan plan = search_steering(agent_, points(), place_);
+  if (!plan.is_clear) plan = plan_elsewhere(std::move(plan));
+  if (!plan.is_clear && plan.actions.size() <= plan_.actions.size() - next_planned_) return;
+  plan_ = std::move(plan);
+  next_planned_ = 0;
+}
+
+/// Goes on to the waypoints of a new chain, or back to one that was missed.
+void LaneKeepingController::follow_goals() {
+  const int32_t chain = world_.agents.goal_chains[slot_] - 1;
+  PICTURA_CHECK(chain <= chain_ + 1, "lane driver: expected a look at every chain, got {} after {}", chain, chain_);
+  if (chain != chain_) {
+    waypoints_ = goal_places(world_, self_, static_cast<uint32_t>(chain), waypoints_.back());
+    chain_ = chain;
+    path_.cut(std::max(goals_.back(), place_));
+    plan();
+  } else if (place_ + 1 >= points().size() ||
+             place_ > ahead(goals_[static_cast<size_t>(world_.agents.next_waypoint[slot_])], kMissed_m)) {
+    path_.cut(place_);
+    plan();
+  }
+}
+
+/// From the end of the path through the waypoints that are left, and on.
+void LaneKeepingController::plan() {
+  for (auto i = static_cast<size_t>(world_.agents.next_waypoint[slot_]); i < kNumWaypoints; ++i) {
+    const bool gets_there = path_.go_to(waypoints_[i]);
+    for (size_t goal = i; goal < kNumWaypoints; ++goal) goals_[goal] = points().size() - 1;
+    if (!gets_there) break;
+  }
+  // It does not know yet which way to go then, and must be able to turn.
+  constexpr float kTurn_m = 20, kTurning_mps = 3;
+  const bool may_turn = path_.forks_within(kTurn_m);
+  path_.go_on(kWayOn_m);
+  path_.limit_speeds(goals_.back(), may_turn ? kTurning_mps : INFINITY);
+}
+
+/// Where a turn cannot be taken, the straightest way on, if that is clear, and only then to the waypoints.
+DrivingPlan LaneKeepingController::plan_elsewhere(DrivingPlan plan) {
+  constexpr float kPassed_m = 20;
+  LanePath other = path_;
+  other.cut(place_);
+  other.go_on(kWayOn_m);
+  other.limit_speeds(place_, INFINITY);
+  DrivingPlan straight = search_steering(agent_, other.points(), place_);
+  if (!straight.is_clear) return plan;
+  path_ = std::move(other);
+  goals_.fill(ahead(place_, kPassed_m));
+  return straight;
+}
+
+size_t LaneKeepingController::ahead(size_t from, float distance_m) const {
+  return std::min(from + static_cast<size_t>(distance_m / LanePath::kSpacing_m), points().size() - 1);
+}
+
+/// Moves its place along the path to where it is nearest to the rear axle.
+void LaneKeepingController::find_place() {
+  constexpr float kReach_m = 3;
+  const Motion now = agent_.now();
+  const size_t last = ahead(place_, kReach_m);
+  float best_m = INFINITY;
+  for (size_t i = place_; i <= last; ++i) {
+    const float apart_m = length(points()[i].position_m.xy() - Vec2{now.x_m, now.y_m});
+    if (apart_m >= best_m) continue;
+    best_m = apart_m;
+    place_ = i;
+  }
+  steps_astray_ += best_m > kAstray_m;
+}
+
+/// Pure pursuit (Coulter, Implementation of the pure pursuit path tracking algorithm, 1992) from a place on the path.
+float LaneKeepingController::steer_to(const Motion& now, size_t place) const {
+  const Vec2 target = points()[ahead(place, std::clamp(2 + 0.6f * now.speed_mps, 2.0f, 10.0f))].position_m.xy();
+  const SinCos heading = sincos_of(now.heading_rad);
+  const Vec2 apart = target - Vec2{now.x_m, now.y_m};
+  const float left_m = cross({heading.cos, heading.sin}, apart);
+  return std::atan(2 * left_m * agent_.wheelbase_m() / std::max(dot(apart, apart), 1.0f));
+}
+
+int32_t LaneKeepingController::pursuing_action(const Motion& now, size_t place, float wanted_mps) const {
+  const int32_t straight = agent_.speed_action(now, wanted_mps);
+  const float wanted_rad = steer_to(now, place);
+  int32_t best = straight;
+  float least = INFINITY;
+  for (const int32_t side : {-1, 0, 1}) {
+    // An acceleration that changes its sign stops at zero for a step, so that steering shows in the second one alone.
+    const Motion next = agent_.after(agent_.after(now, straight + side), straight + side);
+    const float off = std::fabs(next.steer_rad - wanted_rad);
+    if (off >= least) continue;
+    least = off;
+    best = straight + side;
+  }
+  return best;
+}
+
+/// Whether pursuing the path keeps it on the road so far ahead, by a margin.
+bool LaneKeepingController::stays_on_road(Motion now) const {
+  constexpr float kHorizon_m = 20, kMargin_m = 0.1f;
+  size_t place = place_;
+  for (float ahead_m = 0; ahead_m < kHorizon_m; ahead_m += driven_m(now.speed_mps, agent_.dt_s())) {
+    now = agent_.after(now, pursuing_action(now, place, points()[place].speed_mps));
+    place = nearest_point(points(), place, {now.x_m, now.y_m});
+    if (agent_.leaves_road(now, points()[place].position_m.z, kMargin_m)) return false;
+  }
+  return true;
+}
+
+/// The speed from which it can stop before the next closed line.
+float LaneKeepingController::speed_before_light(const Motion& now) {
+  constexpr float kMargin_m = 2.0f;
+  const float gap_m = to_closed_line(now.speed_mps) - kMargin_m;
+  stops_ += gap_m < 1 && now.speed_mps < 0.1f;
+  return std::sqrt(2 * 1.5f * std::max(gap_m, 0.0f));
+}
+
+/// From the bumper along the route to the next line that is red, or yellow and can still be stopped at; 1000 where none
+/// is near.
+float LaneKeepingController::to_closed_line(float speed_mps) const {
+  constexpr float kLook_m = 45;
+  const Vec2 here = points()[place_].position_m.xy();
+  std::vector<size_t> near;
+  for (size_t light = 0; light < world_.map.stop_lines.size(); ++light) {
+    const LightState state = world_.lights[light];
+    const bool closes = state == LightState::red || state == LightState::yellow;
+    if (closes && length(world_.map.stop_lines[light].middle_m.xy() - here) < kLook_m + 10) near.push_back(light);
+  }
+  if (near.empty()) return 1000;
+  const size_t first = ahead(place_, agent_.to_bumper_m()), last = ahead(place_, kLook_m);
+  for (size_t i = first; i < last; ++i) {
+    const PathPoint &a = points()[i], &b = points()[i + 1];
+    const float to_line_m = LanePath::kSpacing_m * static_cast<float>(i - first);
+    const SinCos heading = sincos_of(b.heading_rad);
+    for (const size_t light : near) {
+      const StopLine& line = world_.map.stop_lines[light];
+      const bool can_stop = to_line_m > 0.5f * square(speed_mps) / 3.0f;
+      if (world_.lights[light] == LightState::yellow && !can_stop) continue;
+      const Vec2 from = a.position_m.xy() - line.middle_m.xy(), to = b.position_m.xy() - line.middle_m.xy();
+      if (dot(from, line.direction) < 0 && dot(to, line.direction) >= 0 &&
+          std::fabs(cross(line.direction, to)) <= line.half_length_m + 0.5f &&
+          heading.cos * line.direction.x + heading.sin * line.direction.y > 0.7f &&
+          std::fabs(line.middle_m.z - b.position_m.z) < kLevel_m) {
+        return to_line_m;
+      }
+    }
+  }
+  return 1000;
+}
+
+/// The speed from which it can stop before it would touch another agent on its path, now or, if that has the right of
+/// way, where that will soon be.
+float LaneKeepingController::speed_behind_others() const {
+  constexpr float kLook_m = 40, kMargin_m = 0.4f, kGap_m = 2, kBraking_mps2 = 1.5f;
+  constexpr float kForesight_s = 4, kStep_s = 0.5f;
+  float max_mps = INFINITY;
+  std::vector<AgentBox> way;
+  for (int other = 0; other < world_.num_agents; ++other) {
+    const int slot = world_.first_slot + other;
+    const AgentBox box = box_of(world_.agents, slot);
+    const Vec2 apart = box.center_m.xy() - points()[place_].position_m.xy();
+    if (other == self_ || !box.drawn || dot(apart, apart) > square(kLook_m)) continue;
+    for (size_t i = place_ + way.size(); i < ahead(place_, kLook_m); ++i) {
+      way.push_back(agent_.box(points()[i].position_m, points()[i].heading_rad, kMargin_m));
+    }
+    const Vec2 velocity = Vec2{box.cos_heading, box.sin_heading} * world_.agents.speed_mps[slot];
+    for (float soon_s = 0; soon_s <= (has_way(other) ? kForesight_s : 0); soon_s += kStep_s) {
+      AgentBox there = box;
+      there.center_m = box.center_m + Vec3{velocity.x, velocity.y, 0} * soon_s;
+      const size_t first = first_touching(way, there);
+      if (first == way.size()) continue;
+      const float gap_m = std::max(LanePath::kSpacing_m * static_cast<float>(first) - kGap_m, 0.0f);
+      const float along_mps = dot(velocity, {way[first].cos_heading, way[first].sin_heading});
+      const float then_mps = soon_s > 0 ? 0 : std::max(along_mps, 0.0f);
+      max_mps = std::min(max_mps, std::sqrt(square(then_mps) + 2 * kBraking_mps2 * gap_m));
+    }
+  }
+  return max_mps;
+}
+
+/// Those with lower numbers do, unless they go the same way.
+bool LaneKeepingController::has_way(int other) const {
+  const float turned = wrap_angle(world_.agents.heading_rad[world_.first_slot + other] - agent_.now().heading_rad);
+  return other < self_ && std::fabs(turned) > 0.5f;
+}
+
+}  // namespace pictura

@@ -1,0 +1,61 @@
+// A driver that keeps its lane, goes where its waypoints lead, and stops at red lights and behind others: what the
+// rules ask for can be driven with the jerk actions. It pursues the path of its lanes, and where that would leave the
+// road, since long cars cut corners, it follows a plan that does not.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "pictura/simulator/controllers/lane_path.h"
+#include "pictura/simulator/controllers/steering_search.h"
+#include "pictura/simulator/rules/step.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+/// Drives an agent of a world.
+class LaneKeepingController {
+ public:
+  /// `world` shows the simulator's agents and lights as they are at every act(), and has not been stepped yet; the
+  /// graph is its map's. Its arrays and the graph must outlive the driver.
+  LaneKeepingController(const WorldView& world, int agent, const LaneGraph& graph);
+
+  /// The action for what the agent and the lights are now.
+  int32_t act();
+  /// Steps in which it waited at a red light.
+  int stops() const { return stops_; }
+  /// Steps in which its rear axle was more than kAstray_m from its path.
+  int steps_astray() const { return steps_astray_; }
+  static constexpr float kAstray_m = 1;
+
+ private:
+  void follow_goals();
+  void plan();
+  void find_place();
+  size_t ahead(size_t from, float distance_m) const;
+  void renew_plan(const Motion& now);
+  DrivingPlan plan_elsewhere(DrivingPlan plan);
+  float steer_to(const Motion& now, size_t place) const;
+  int32_t pursuing_action(const Motion& now, size_t place, float wanted_mps) const;
+  bool stays_on_road(Motion now) const;
+  float speed_before_light(const Motion& now);
+  float to_closed_line(float speed_mps) const;
+  float speed_behind_others() const;
+  bool has_way(int other) const;
+  const std::vector<PathPoint>& points() const { return path_.points(); }
+
+  const WorldView world_;
+  const int self_, slot_;
+  const DrivenAgent agent_;
+  std::array<RoutePoint, kNumWaypoints> waypoints_;
+  int32_t chain_ = -1;  // whose waypoints these are
+  LanePath path_;
+  size_t place_ = 0;                           // the point of the path nearest to it
+  std::array<size_t, kNumWaypoints> goals_{};  // the points where the waypoints are
+  DrivingPlan plan_;
+  size_t next_planned_ = 0;  // of its actions
+  int stops_ = 0, steps_astray_ = 0;
+};
+
+}  // namespace pictura

@@ -1,0 +1,131 @@
+#include "pictura/tests/backend_cuda/renderer/emulated_renderer.h"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "pictura/backend_cuda/renderer/draw_task.h"
+#include "pictura/backend_cuda/renderer/scratch_buffers.h"
+#include "pictura/common/error.h"
+#include "pictura/common/raster/check.h"
+// After all else, because it gives the compiler's words other meanings.
+#include "pictura/tests/backend_cuda/renderer/emulated_device.h"
+// The kernels, under names of their own beside those that were compiled ahead of time.
+#define pictura_cull emulated_cull
+#define pictura_setup_faces emulated_gather
+#define pictura_clip emulated_clip
+#define pictura_draw emulated_draw
+#define pictura_draw_deferred emulated_draw_deferred
+#define pictura_draw_overflow emulated_draw_overflow
+#define pictura_visibility emulated_visibility
+#include "pictura/backend_cuda/renderer/kernels.cuh"
+
+namespace pictura {
+
+namespace cuda {
+// The shared memory of the block that runs.
+alignas(16) unsigned char block_memory[232448];
+}  // namespace cuda
+
+namespace test {
+
+namespace {
+constexpr int kBlocks = 2;
+template <typename Value>
+using HostBuffer = std::vector<Value>;
+}  // namespace
+
+struct EmulatedRenderer::Map {
+  StaticGeometry geometry;
+  cuda::SortedPieces strips, walls;
+  explicit Map(const StaticGeometry& map) : geometry(map), strips(geometry.strips), walls(geometry.walls) {}
+};
+
+// What a renderer keeps in device memory.
+struct EmulatedRenderer::Setup {
+  cuda::DrawTask task;
+  cuda::DrawCounters counters;
+  cuda::FaultWord fault = cuda::kNoFault;
+  cuda::PoolBuffers<HostBuffer> pool;
+  cuda::LargeBuffers<HostBuffer> large;
+
+  Setup(const EmulatedRenderer& renderer, const cuda::DrawTask& draw, const SceneBatch& scene) : task(draw) {
+    int pieces = 0, heads = 0;
+    for (const auto& kept : renderer.maps_) {
+      const StaticGeometry& map = kept->geometry;
+      heads = std::max(heads, static_cast<int>(map.heads.size()));
+      pieces = std::max(pieces, static_cast<int>(map.strips.size() + map.walls.size() + map.heads.size()));
+    }
+    const auto images = static_cast<std::size_t>(task.num_views * task.num_cameras);
+    const std::size_t faces = renderer.pool_.faces * images;
+    pool = cuda::PoolBuffers<HostBuffer>({images, faces, 4 * faces + renderer.pool_.clipped_edges * images});
+    pool.serve(&task);
+    task.geometries = renderer.geometries_.data();
+    task.num_geometries = static_cast<int32_t>(renderer.geometries_.size());
+    task.counters = &counters;
+    task.fault = &fault;
+    cuda::choose_tiles(&task, kBlocks);
+    cuda::Scratch sizes = cuda::large_sizes(pieces, heads, scene.agents.size());
+    sizes.blocks = kBlocks;
+    large = cuda::LargeBuffers<HostBuffer>(sizes, cuda::large_bytes(sizes));
+  }
+  Setup(const Setup&) = delete;
+};
+
+EmulatedRenderer::EmulatedRenderer(const RendererConfig& config, uint64_t seed)
+    : EmulatedRenderer(config, seed, Pool{}) {}
+EmulatedRenderer::EmulatedRenderer(const RendererConfig& config, uint64_t seed, const Pool& pool)
+    : config_(config), seed_(seed), pool_(pool), cameras_(pinhole_cameras(config.rig)) {}
+EmulatedRenderer::~EmulatedRenderer() = default;
+
+GeometryHandle EmulatedRenderer::upload(const StaticGeometry& geometry) {
+  maps_.push_back(std::make_unique<Map>(geometry));
+  const Map& map = *maps_.back();
+  geometries_.push_back({map.geometry.view(), map.strips.view(), map.walls.view()});
+  return static_cast<GeometryHandle>(geometries_.size()) - 1;
+}
+
+template <typename Kernel>
+void EmulatedRenderer::launch(int threads, unsigned blocks, Kernel&& kernel) const {
+  using namespace emulation;
+  grid_dim = {blocks, 1, 1};
+  block_dim = {static_cast<unsigned>(threads), 1, 1};
+  for (unsigned block = 0; block < blocks; ++block) {
+    block_index = {block, 0, 0};
+    // Whatever an earlier block has left.
+    std::memset(cuda::block_memory, 0xA5, sizeof(cuda::block_memory));
+    Block::run(threads, seed_ + block, kernel);
+  }
+}
+
+void EmulatedRenderer::render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream) {
+  Setup setup(*this, cuda::make_draw_task(config_, cameras_, scene, views, &images_out), scene);
+  cuda::DrawTask& task = setup.task;
+  launch(cuda::kSetupThreads, kBlocks, [&] { cuda::emulated_cull(task); });
+  launch(cuda::kSetupThreads, kBlocks, [&] { cuda::emulated_gather(task); });
+  launch(cuda::kSetupThreads, kBlocks, [&] { cuda::emulated_clip(task); });
+  launch(cuda::kDrawThreads, kBlocks, [&] { cuda::emulated_draw(task); });
+  deferred_ = setup.counters.deferred;
+  const int gathering = cuda::setup_blocks(task.pool, kBlocks);
+  launch(cuda::kDrawThreads, static_cast<unsigned>(gathering), [&] { cuda::emulated_draw_deferred(task); });
+  overflow_ = setup.counters.overflow;
+  launch(cuda::kLargeThreads, kBlocks, [&] { cuda::emulated_draw_overflow(task, setup.large.view()); });
+  fault_ = setup.fault;
+}
+
+void EmulatedRenderer::visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
+                                  Span<float> visibility_out, Stream) {
+  Setup setup(*this, cuda::make_draw_task(config_, cameras_, scene, views, nullptr), scene);
+  const cuda::VisibilityTask task{setup.task, queries.data(), static_cast<int32_t>(queries.size()),
+                                  visibility_out.data()};
+  launch(cuda::kLargeThreads, kBlocks, [&] { cuda::emulated_visibility(task, setup.large.view()); });
+  fault_ = setup.fault;
+}
+
+void EmulatedRenderer::check() {
+  const cuda::Fault fault = cuda::fault_of(std::exchange(fault_, cuda::kNoFault));
+  if (fault.kind != cuda::FaultKind::none) fail("{}", cuda::message_of(fault));
+}
+
+}  // namespace test
+}  // namespace pictura

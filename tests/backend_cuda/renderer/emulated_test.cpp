@@ -1,0 +1,325 @@
+// The drawing kernels, run thread by thread on the host, against the oracle: every value equal, in whatever order
+// threads take turns. So a change that breaks a kernel shows where there is no GPU.
+#include <algorithm>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <utility>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/backend_cuda/renderer/scratch_buffers.h"
+#include "pictura/backends/make_renderer.h"
+#include "pictura/bench/soak.h"
+#include "pictura/bench/truth/image_scenes.h"
+#include "pictura/common/scene_file.h"
+#include "pictura/tests/backend_cuda/renderer/emulated_renderer.h"
+#include "pictura/tests/backend_cuda/renderer/equal_outputs.h"
+#include "pictura/tests/golden/golden_scenes.h"
+#include "pictura/tests/support/error_message.h"
+
+namespace pictura {
+
+namespace {
+
+using test::EmulatedRenderer;
+
+template <typename Scene>  // SyntheticTown or SyntheticWorlds
+void expect_oracles(EmulatedRenderer* renderer, const Scene& town, Planes planes = Planes::none) {
+  const Outputs emulated = draw_outputs(renderer, town, planes);
+  renderer->check();
+  test::expect_equal(emulated, draw_outputs(make_renderer("cpu", renderer->config()).get(), town, planes));
+}
+
+// What random scenes, views, rigs and settings find.
+TEST(EmulatedKernels, DrawWhatASoakDraws) {
+  const SoakOptions options{.maps = {"procedural:1", "procedural:2"},
+                            .agents = 60,
+                            .views = 2,
+                            .max_scenes = 8,
+                            .max_seconds = std::numeric_limits<double>::infinity(),
+                            .num_threads = 1};
+  uint64_t order = 30;
+  const SoakResult result = soak(
+      options,
+      [&](const RendererConfig& config, std::string*) { return std::make_unique<EmulatedRenderer>(config, order++); },
+      [](const SoakResult&) {});
+  EXPECT_EQ(result.scenes, 8);
+  EXPECT_GT(result.error.values, 500'000);
+  EXPECT_GT(result.error.plane_pixels, 50'000);
+  EXPECT_GT(result.queries, 200);
+  EXPECT_EQ(result.error.differing, 0);
+  EXPECT_EQ(result.error.differing_plane_pixels, 0);
+  EXPECT_EQ(result.differing_answers, 0);
+}
+
+RendererConfig config_of(const Rig& rig) { return {.rig = rig, .num_threads = 1}; }
+
+TEST(EmulatedKernels, DrawTheOraclesTownsInAnyOrderOfThreads) {
+  SyntheticTown town = make_synthetic_town(1, 120);
+  town.views.resize(2);
+  for (const uint64_t seed : {1, 2}) {
+    EmulatedRenderer renderer(config_of(paper_rig()), seed);
+    expect_oracles(&renderer, town);
+    EXPECT_EQ(renderer.overflow(), 0);
+  }
+}
+
+// Lines far away as wide as a floor may make them, many to a pixel, in which things are in front of each other in
+// rings.
+TEST(EmulatedKernels, DrawTheWidestLinesInAnyOrderOfThreads) {
+  SyntheticTown town = make_synthetic_town(1, 120);
+  town.views.resize(4);
+  RendererConfig config = config_of(paper_rig());
+  config.line_floor_px = kGuardBand_px;
+  for (const uint64_t seed : {19, 20}) {
+    SCOPED_TRACE(seed);
+    EmulatedRenderer renderer(config, seed);
+    expect_oracles(&renderer, town);
+  }
+}
+
+TEST(EmulatedKernels, DrawWorldsOfSeveralMaps) {
+  EmulatedRenderer renderer(config_of(paper_rig()), 13);
+  expect_oracles(&renderer, make_synthetic_worlds(), Planes::all);
+}
+
+TEST(EmulatedKernels, DrawBlackWhereNothingIsToBeSeen) {
+  EmulatedRenderer renderer(config_of(mixed_rig()), 14);
+  SyntheticTown town;
+  town.geometry.build_grids();
+  town.scene.end_world(0);
+  town.views = {make_view({0, 0, 0}, 0)};
+  expect_oracles(&renderer, town, Planes::all);
+}
+
+// What host callers are told by checks, callers on a device are told by the kernels. Such views are black.
+TEST(EmulatedKernels, NameWhatIsWrong) {
+  const SyntheticWorlds sound = make_synthetic_worlds();
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  struct Case {
+    const char* told;
+    std::function<void(SyntheticWorlds*)> spoil;
+  };
+  const Case cases[] = {
+      {"view 1: no such world", [](auto* w) { w->views[1].world = 4; }},
+      {"view 1: no such world", [](auto* w) { w->views[1].world = -1; }},
+      {"view 1: its world has no such geometry", [](auto* w) { w->scene.geometry[0] = 2; }},
+      {"view 1: expected a finite pose and hidden agents within the list",
+       [](auto* w) { w->views[1].origin_m.z = kInfinity; }},
+      {"view 1: expected a finite pose and hidden agents within the list",
+       [](auto* w) { w->views[1].cos_heading = 2.0f; }},
+      {"view 1: expected a finite pose and hidden agents within the list",
+       [](auto* w) { w->views[1].body_length_m = kInfinity; }},
+      {"view 1: expected a finite pose and hidden agents within the list",
+       [](auto* w) { w->views[1].hidden_end = static_cast<int32_t>(w->scene.hidden_agents.size()) + 1; }},
+      {"view 1: expected a finite pose and hidden agents within the list",
+       [](auto* w) { std::swap(w->views[1].hidden_begin, w->views[1].hidden_end); }},
+      {"view 1: its world has fewer light states than its map signals", [](auto* w) { w->scene.light_begin[1] = 1; }},
+      {"view 1: its world has more than 8192 agents",
+       [](auto* w) {
+         w->scene.agents.resize(kMaxBoxesPerWorld + 1);
+         w->scene.world_begin = {0, kMaxBoxesPerWorld + 1, kMaxBoxesPerWorld + 1, kMaxBoxesPerWorld + 1,
+                                 kMaxBoxesPerWorld + 1};
+       }},
+  };
+  const Rig rig = front_rig(16, 9);
+  for (const Case& each : cases) {
+    SyntheticWorlds worlds = sound;
+    worlds.views.resize(2);
+    worlds.views[0] = sound.views[3];  // of the empty world, whatever is spoilt
+    each.spoil(&worlds);
+    EmulatedRenderer renderer(config_of(rig), 15);
+    for (const StaticGeometry& map : worlds.maps) renderer.upload(map);
+    HostImages images(rig, 2);
+    std::ranges::fill(images.bytes(), uint8_t{0xA5});
+    renderer.render(worlds.scene.batch(), worlds.views, images.batch(), {});
+    EXPECT_EQ(test::message_of([&] { renderer.check(); }), each.told);
+    EXPECT_TRUE(std::ranges::all_of(images.interleaved(1, 0), [](uint8_t byte) { return byte == 0; })) << each.told;
+    EXPECT_NO_THROW(renderer.check());
+  }
+}
+
+TEST(EmulatedKernels, NameWhatIsWrongWithQueries) {
+  const SyntheticWorlds worlds = make_synthetic_worlds();
+  const RendererConfig config = config_of(paper_rig(16, 9));
+  EmulatedRenderer renderer(config, 16);
+  for (const StaticGeometry& map : worlds.maps) renderer.upload(map);
+  // The first view is of the first world, whose agents come first.
+  const int32_t of_another_world = worlds.scene.world_begin[2];
+  for (const VisibilityQuery bad :
+       {VisibilityQuery{10, 0}, VisibilityQuery{-1, 0}, VisibilityQuery{0, -1}, VisibilityQuery{0, of_another_world}}) {
+    const std::vector<VisibilityQuery> queries{{0, 1}, bad};
+    std::vector<float> told(2, 7.0f);
+    renderer.visibility(worlds.scene.batch(), worlds.views, queries, told, {});
+    EXPECT_EQ(test::message_of([&] { renderer.check(); }),
+              "visibility query 1: no such view, or no such agent in its world");
+    EXPECT_TRUE(std::isnan(told[1]));
+  }
+}
+
+// Draws a town from a pool that has room for some of its images alone.
+void expect_some_postponed(uint64_t seed, const EmulatedRenderer::Pool& pool) {
+  SyntheticTown town = make_synthetic_town(1, 120);
+  town.views.resize(2);
+  EmulatedRenderer renderer(config_of(paper_rig()), seed, pool);
+  expect_oracles(&renderer, town);
+  EXPECT_GT(renderer.deferred(), 0);
+  EXPECT_LT(renderer.deferred(), 8);
+  EXPECT_EQ(renderer.overflow(), 0);
+}
+
+TEST(EmulatedKernels, PostponeWhatThePoolHasNoRoomFor) { expect_some_postponed(7, {.faces = 192}); }
+// Noticed when some of an image's faces are made already.
+TEST(EmulatedKernels, PostponeWhatHasNoRoomForItsClippedEdges) { expect_some_postponed(8, {.clipped_edges = 70}); }
+
+TEST(EmulatedKernels, ClipLightsOnAllSides) {
+  // A spiral of heads around a camera, from before its near plane on, that turn to it and cross each other's disks and
+  // all borders of the image; a batch holds nothing else.
+  SyntheticTown town;
+  for (int i = 0; i < 300; ++i) {
+    const float angle = 0.4f * static_cast<float>(i), range_m = 0.05f + 0.02f * static_cast<float>(i);
+    const SinCos at = sincos_of(angle);
+    LightHead head;
+    head.position_m = {range_m * at.cos, range_m * at.sin, 1.5f + 0.004f * static_cast<float>(i % 7 - 3) * range_m};
+    head.facing = {-at.cos, -at.sin};
+    head.signal = i;
+    town.geometry.heads.push_back(head);
+    town.scene.light_states.push_back(static_cast<LightState>(1 + i % 3));
+  }
+  town.geometry.num_signals = 300;
+  town.geometry.build_grids();
+  town.scene.end_world(0);
+  town.views = {make_view({0, 0, 0}, 0)};
+  EmulatedRenderer renderer(config_of(mixed_rig()), 9);
+  expect_oracles(&renderer, town, Planes::all);
+  EXPECT_EQ(renderer.overflow(), 0);
+}
+
+// What crosses itself along a border enters the frame twice, and outgrows the room of the lane that clips it.
+TEST(EmulatedKernels, ClipStripsThatCrossThemselves) {
+  SyntheticTown town;
+  for (int i = 0; i < 60; ++i) {
+    const SinCos at = sincos_of(0.1f * static_cast<float>(i));
+    const Vec2 ahead{at.cos, at.sin}, left = left_normal(ahead);
+    const float near_m = 3.0f + 0.05f * static_cast<float>(i), far_m = near_m + 6.0f;
+    Strip strip;
+    strip.a_m = {near_m * ahead.x, near_m * ahead.y, 0};
+    strip.b_m = {far_m * ahead.x, far_m * ahead.y, 0};
+    strip.side_a = left;
+    strip.side_b = left * -1.0f;
+    strip.width_m = 4.0f;
+    strip.color = kWhiteMarkColor;
+    town.geometry.strips.push_back(strip);
+  }
+  town.geometry.build_grids();
+  town.scene.end_world(0);
+  for (int i = 0; i < 4; ++i) town.views.push_back(make_view({0.2f, 0.1f, 0}, 0.3f + 0.02f * static_cast<float>(i)));
+  EmulatedRenderer renderer(config_of(mixed_rig()), 11);
+  expect_oracles(&renderer, town, Planes::all);
+  EXPECT_EQ(renderer.overflow(), 0);
+}
+
+TEST(EmulatedKernels, DrawOddSizesAndPlanes) {
+  SyntheticTown town = make_synthetic_town(2, 60);
+  town.views.resize(2);
+  EmulatedRenderer renderer(config_of(mixed_rig()), 3);
+  expect_oracles(&renderer, town, Planes::all);
+}
+
+TEST(EmulatedKernels, WriteTheOraclesBytesAndHalves) {
+  SyntheticTown town = make_synthetic_town(3, 60);
+  town.views.resize(1);
+  const RendererConfig config = config_of(mixed_rig());
+  EmulatedRenderer emulated(config, 12);
+  const auto oracle = make_renderer("cpu", config);
+  emulated.upload(town.geometry);
+  oracle->upload(town.geometry);
+  for (const PixelFormat format : {PixelFormat::u8, PixelFormat::f16}) {
+    HostImages told(config.rig, 1, format), truth(config.rig, 1, format);
+    emulated.render(town.scene.batch(), town.views, told.batch(), {});
+    oracle->render(town.scene.batch(), town.views, truth.batch(), {});
+    EXPECT_TRUE(std::ranges::equal(told.bytes(), truth.bytes())) << static_cast<int>(format);
+  }
+}
+
+TEST(EmulatedKernels, DrawCrowdsInPartsAndLeaveNothingOut) {
+  // More than one pass has room for: parts of images, and images that are left to the last launch.
+  const Rig rig = front_rig();
+  EmulatedRenderer renderer(config_of(rig), 4);
+  expect_oracles(&renderer, make_crowd(), Planes::all);
+  EXPECT_GT(renderer.overflow(), 0);
+}
+
+// The last launch draws images in bands of as many rows as its memory holds.
+TEST(EmulatedKernels, DrawCrowdsOfImagesHigherThanTheLastLaunchDrawsAtOnce) {
+  const Rig rig = front_rig(24, 600);
+  EmulatedRenderer renderer(config_of(rig), 17);
+  SyntheticTown crowd = make_crowd();
+  crowd.views.resize(1);
+  expect_oracles(&renderer, crowd, Planes::all);
+  EXPECT_GT(renderer.overflow(), 0);
+}
+
+// Each image of a call lists one face more than fills its batches, so that there are as many batches as can be.
+TEST(EmulatedKernels, HaveRoomForTheBatchesOfManyEqualImages) {
+  SyntheticTown town;
+  for (int i = 0; i < 225; ++i) {
+    const float x = 5.0f + 0.1f * static_cast<float>(i);
+    town.geometry.walls.push_back({{x, -1, 0}, {x, 1, 0}, 1.0f + 0.02f * static_cast<float>(i)});
+  }
+  town.geometry.build_grids();
+  town.scene.end_world(0);
+  town.views.assign(24, make_view({0, 0, 0}, 0));
+  const Rig rig = front_rig(4, 3);
+  EmulatedRenderer renderer(config_of(rig), 18, {.faces = cuda::kPoolFaces, .clipped_edges = 128});
+  expect_oracles(&renderer, town);
+  EXPECT_GT(renderer.deferred(), 0);
+}
+
+TEST(EmulatedKernels, DrawPlanesOfMoreRowsThanThereIsRoomFor) {
+  // Walls one behind the other, each of which has all rows of a tile.
+  SyntheticTown town;
+  for (int i = 0; i < 100; ++i) {
+    const float x = 4.0f + 0.25f * static_cast<float>(i);
+    town.geometry.walls.push_back({{x, -x, 0}, {x + 0.1f, x, 0}, 12.0f + static_cast<float>(i)});
+  }
+  town.geometry.build_grids();
+  town.scene.end_world(0);
+  town.views = {make_view({0, 0, 0}, 0)};
+  const Rig rig = front_rig();
+  EmulatedRenderer renderer(config_of(rig), 12);
+  expect_oracles(&renderer, town, Planes::all);
+  EXPECT_EQ(renderer.overflow(), 0);
+}
+
+TEST(EmulatedKernels, TellVisibility) {
+  SyntheticTown town = make_synthetic_town(4, 30);
+  town.views.resize(1);
+  const RendererConfig config = config_of(paper_rig(48, 27));
+  EmulatedRenderer emulated(config, 5);
+  test::expect_equal_visibility(&emulated, make_renderer("cpu", config).get(), town);
+}
+
+class EmulatedHardScenes : public testing::TestWithParam<HardScene> {};
+INSTANTIATE_TEST_SUITE_P(All, EmulatedHardScenes, testing::ValuesIn(hard_scenes()),
+                         [](const auto& scene) { return scene.param.name; });
+TEST_P(EmulatedHardScenes, LookLikeTheOracle) {
+  EmulatedRenderer renderer(config_of(GetParam().rig), 21);
+  expect_oracles(&renderer, GetParam().town, Planes::all);
+}
+
+class EmulatedGoldenScenes : public testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(All, EmulatedGoldenScenes, testing::ValuesIn(golden_names(".toml")),
+                         [](const auto& scene) { return scene.param; });
+TEST_P(EmulatedGoldenScenes, LookLikeTheOracle) {
+  const SceneFile scene = load_scene(scene_path(GetParam()));
+  RendererConfig config = scene.config;
+  config.num_threads = 1;
+  EmulatedRenderer renderer(config, 6);
+  expect_oracles(&renderer, SyntheticTown{scene.geometry, scene.scene, scene.views}, Planes::all);
+}
+
+}  // namespace
+}  // namespace pictura

@@ -1,0 +1,44 @@
+// The kernels follow the oracle's rules in the oracle's arithmetic, and what they sum is in whole units: so they are
+// held to every bit of its images, not to the tolerance that other backends get. Equal to the oracle, they are also
+// equal to themselves, in whatever order threads come.
+#pragma once
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "pictura/bench/truth/image_scenes.h"
+
+namespace pictura::test {
+
+inline void expect_equal(const Outputs& actual, const Outputs& oracle) {
+  ASSERT_EQ(actual.color.size(), oracle.color.size());
+  std::size_t differ = 0;
+  for (std::size_t i = 0; i < oracle.color.size(); ++i) differ += actual.color[i] != oracle.color[i];
+  EXPECT_EQ(differ, 0u) << "of " << oracle.color.size() << " values";
+  EXPECT_TRUE(actual == oracle) << "colours or planes differ";
+}
+
+/// Asks how much of each agent of a world all views see, where not a number is an answer too.
+inline void expect_equal_visibility(Renderer* actual, Renderer* oracle, const SyntheticTown& town) {
+  std::vector<VisibilityQuery> queries;
+  for (std::size_t view = 0; view < town.views.size(); ++view) {
+    for (std::size_t agent = 0; agent < town.scene.agents.size(); ++agent) {
+      queries.push_back({static_cast<int32_t>(view), static_cast<int32_t>(agent)});
+    }
+  }
+  std::vector<float> told(queries.size()), expected(queries.size());
+  actual->upload(town.geometry);
+  oracle->upload(town.geometry);
+  actual->visibility(town.scene.batch(), town.views, queries, told);
+  oracle->visibility(town.scene.batch(), town.views, queries, expected);
+  for (std::size_t i = 0; i < queries.size(); ++i) {
+    if (std::isnan(expected[i])) {
+      EXPECT_TRUE(std::isnan(told[i])) << i;
+    } else {
+      EXPECT_EQ(told[i], expected[i]) << i;
+    }
+  }
+}
+
+}  // namespace pictura::test

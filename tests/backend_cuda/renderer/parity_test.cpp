@@ -1,0 +1,134 @@
+// The CUDA renderer against the oracle, on a device. Without one these tests are skipped, unless PICTURA_REQUIRE_GPU=1
+// says that there must be one.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/backends/make_renderer.h"
+#include "pictura/bench/truth/image_scenes.h"
+#include "pictura/common/cuda/device_scene.h"
+#include "pictura/common/error.h"
+#include "pictura/common/scene_file.h"
+#include "pictura/tests/backend_cuda/device_test.h"
+#include "pictura/tests/backend_cuda/renderer/equal_outputs.h"
+#include "pictura/tests/golden/golden_scenes.h"
+
+namespace pictura {
+
+namespace {
+
+using testing::HasSubstr;
+
+class CudaRendererTest : public test::DeviceTest {};
+
+template <typename Scene>  // SyntheticTown or SyntheticWorlds
+void expect_parity(const Scene& town, const RendererConfig& config) {
+  const auto oracle = make_renderer("cpu", config), device = make_renderer("cuda", config);
+  test::expect_equal(draw_outputs(device.get(), town, Planes::all), draw_outputs(oracle.get(), town, Planes::all));
+}
+
+void expect_parity_of_visibility(const SyntheticTown& town, const RendererConfig& config) {
+  const auto oracle = make_renderer("cpu", config), device = make_renderer("cuda", config);
+  test::expect_equal_visibility(device.get(), oracle.get(), town);
+}
+
+TEST_F(CudaRendererTest, TownsLookLikeTheOracle) { expect_parity(make_synthetic_town(1, 120), {.rig = paper_rig()}); }
+
+TEST_F(CudaRendererTest, OddSizesAndMixedRigsDoToo) {
+  SyntheticTown town = make_synthetic_town(2, 60);
+  town.views.resize(5);
+  expect_parity(town, {.rig = mixed_rig(), .line_floor_px = 0});
+}
+
+TEST_F(CudaRendererTest, WorldsOfSeveralMapsDoToo) { expect_parity(make_synthetic_worlds(), {.rig = paper_rig()}); }
+
+// The paper's sizes, and one that a screen shows; each has kernels of its own to build.
+class CudaRendererSizes : public CudaRendererTest, public testing::WithParamInterface<int> {};
+TEST_P(CudaRendererSizes, DoToo) {
+  SyntheticTown town = make_synthetic_town(6, 80);
+  town.views.resize(3);
+  expect_parity(town, {.rig = paper_rig(GetParam(), GetParam() * 9 / 16)});
+}
+INSTANTIATE_TEST_SUITE_P(Widths, CudaRendererSizes, testing::Values(32, 64, 96, 192, 384, 768));
+
+TEST_F(CudaRendererTest, CrowdsInImagesOfManyRowsDoToo) { expect_parity(make_crowd(), {.rig = paper_rig(64, 1100)}); }
+
+TEST_F(CudaRendererTest, NothingIsCutOffInCrowdedImages) { expect_parity(make_crowd(), {.rig = paper_rig()}); }
+
+TEST_F(CudaRendererTest, VisibilityAgrees) {
+  SyntheticTown town = make_synthetic_town(4, 60);
+  town.views.resize(3);
+  expect_parity_of_visibility(town, {.rig = paper_rig()});
+}
+
+class CudaHardScenes : public CudaRendererTest, public testing::WithParamInterface<HardScene> {};
+INSTANTIATE_TEST_SUITE_P(All, CudaHardScenes, testing::ValuesIn(hard_scenes()),
+                         [](const auto& scene) { return scene.param.name; });
+TEST_P(CudaHardScenes, LookLikeTheOracle) { expect_parity(GetParam().town, {.rig = GetParam().rig}); }
+TEST_P(CudaHardScenes, AreSeenAsMuch) { expect_parity_of_visibility(GetParam().town, {.rig = GetParam().rig}); }
+
+// Their pictures are compared by golden_test, in bytes; here values and planes.
+class CudaGoldenScenes : public CudaRendererTest, public testing::WithParamInterface<std::string> {};
+INSTANTIATE_TEST_SUITE_P(All, CudaGoldenScenes, testing::ValuesIn(golden_names(".toml")),
+                         [](const auto& scene) { return scene.param; });
+TEST_P(CudaGoldenScenes, LookLikeTheOracle) {
+  const SceneFile scene = load_scene(scene_path(GetParam()));
+  expect_parity(SyntheticTown{scene.geometry, scene.scene, scene.views}, scene.config);
+}
+
+TEST_F(CudaRendererTest, FaultsOfTheDeviceAreThrownByTheNextCall) {
+  SyntheticTown town = make_synthetic_town(5, 5);
+  town.views.resize(1);
+  const RendererConfig config{.rig = paper_rig(8, 8), .space = MemorySpace::cuda};
+  const auto renderer = make_renderer("cuda", config);
+  renderer->upload(town.geometry);
+  const DeviceScene scene(town.scene.batch());
+  HostImages shape(config.rig, 1);
+  DeviceBuffer<uint8_t> memory(shape.bytes().size());
+  std::vector<CameraImages> cameras;
+  for (std::size_t k = 0; k < 4; ++k) {
+    cameras.push_back(shape.camera(static_cast<int>(k)));
+    cameras[k].data = memory.data() + 3 * 64 * k;
+  }
+  const ImageBatch images{MemorySpace::cuda, PixelFormat::u8, 1, cameras};
+  std::vector<View> bad = town.views;
+  bad[0].world = 9;
+  const DeviceBuffer<View> views{Span<const View>(bad)}, good{Span<const View>(town.views)};
+  EXPECT_NO_THROW(renderer->render(scene.batch(), views.span(), images));
+  PICTURA_CUDA(cudaDeviceSynchronize());
+  try {
+    renderer->render(scene.batch(), good.span(), images);
+    ADD_FAILURE() << "expected the fault of the earlier call";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("no such world"));
+  }
+  EXPECT_NO_THROW(renderer->render(scene.batch(), good.span(), images));
+  EXPECT_NO_THROW(renderer->check());
+  // ... or when it is asked for.
+  EXPECT_NO_THROW(renderer->render(scene.batch(), views.span(), images));
+  EXPECT_THROW(renderer->check(), Error);
+  EXPECT_NO_THROW(renderer->check());
+  // What the host can see is refused at once.
+  EXPECT_THROW(renderer->render(town.scene.batch(), good.span(), images), Error);
+  EXPECT_THROW(renderer->render(scene.batch(), good.span(), shape.batch()), Error);
+}
+
+// What lies on the host is checked there, before the device sees it.
+TEST_F(CudaRendererTest, HostCallersLearnAtOnceWhatIsWrong) {
+  SyntheticTown town = make_synthetic_town(5, 5);
+  const RendererConfig config{.rig = paper_rig(8, 8)};
+  const auto renderer = make_renderer("cuda", config);
+  renderer->upload(town.geometry);
+  EXPECT_EQ(renderer->space(), MemorySpace::host);
+  HostImages images(config.rig, static_cast<int>(town.views.size()));
+  EXPECT_NO_THROW(renderer->render(town.scene.batch(), town.views, images.batch()));
+  std::vector<View> bad = town.views;
+  bad[0].world = 9;
+  EXPECT_THROW(renderer->render(town.scene.batch(), bad, images.batch()), Error);
+  std::vector<float> answer(1);
+  const std::vector<VisibilityQuery> query{{0, 99}};
+  EXPECT_THROW(renderer->visibility(town.scene.batch(), town.views, query, answer), Error);
+  EXPECT_NO_THROW(renderer->render(town.scene.batch(), town.views, images.batch()));
+}
+
+}  // namespace
+}  // namespace pictura

@@ -1,0 +1,308 @@
+// The CUDA simulator against the CPU's, on a device: the same bits. Without a device these tests are skipped, unless
+// PICTURA_REQUIRE_GPU=1 says that there must be one.
+#include <algorithm>
+#include <chrono>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/backends/make_simulator.h"
+#include "pictura/common/cuda/device_buffer.h"
+#include "pictura/common/error.h"
+#include "pictura/map/load_map.h"
+#include "pictura/tests/backend_cuda/device_test.h"
+#include "pictura/tests/simulator/same_bits.h"
+
+namespace pictura {
+
+namespace {
+
+using ::testing::HasSubstr;
+using Maps = std::vector<std::shared_ptr<const RoadMap>>;
+
+class CudaSimulatorTest : public test::DeviceTest {};
+
+/// Of device memory, once the device has written it.
+template <typename T>
+std::vector<std::remove_const_t<T>> on_host(Span<T> device) {
+  std::vector<std::remove_const_t<T>> host(device.size());
+  PICTURA_CUDA(cudaDeviceSynchronize());
+  if (!host.empty()) {
+    PICTURA_CUDA(cudaMemcpy(host.data(), device.data(), host.size() * sizeof(T), cudaMemcpyDeviceToHost));
+  }
+  return host;
+}
+
+template <typename T>
+bool same(Span<T> host, Span<T> device) {
+  const auto copy = on_host(device);
+  return testing::same_bits(Span<const T>(host), Span<const T>(copy));
+}
+
+/// A device observation's copy.
+struct HostObservation {
+#define X(name, type, per_slot, part, comment) std::vector<type> name;
+  PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
+  explicit HostObservation(const ObservationView& device){
+#define X(name, type, per_slot, part, comment) name = on_host(device.name);
+      PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
+  } ObservationView view() {
+#define X(name, type, per_slot, part, comment) name,
+    return {PICTURA_OBSERVATION_ARRAYS(X)};
+#undef X
+  }
+};
+
+void expect_same_view(Simulator* cpu, Simulator* cuda, int step) {
+  ASSERT_EQ(cpu->state_hash(), cuda->state_hash()) << "step " << step;
+  ASSERT_EQ(testing::first_difference(cpu->observations(), HostObservation(cuda->observations()).view()), "")
+      << "step " << step;
+  const SceneBatch &a = cpu->scene(), &b = cuda->scene();
+  ASSERT_EQ(b.space, MemorySpace::cuda);
+  ASSERT_TRUE(same(a.agents, b.agents) && same(a.light_states, b.light_states)) << "step " << step;
+  ASSERT_TRUE(same(a.world_begin, b.world_begin) && same(a.geometry, b.geometry) && same(a.light_begin, b.light_begin));
+  ASSERT_TRUE(same(cpu->views(), cuda->views())) << "step " << step;
+  ASSERT_TRUE(same(cpu->episode_step(), cuda->episode_step()) && same(cpu->episode_index(), cuda->episode_index()));
+}
+
+/// What a device's steps return, kept in device memory so that no step waits for the host.
+class StepLog {
+ public:
+  StepLog(int steps, int num_slots)
+      : num_slots_(static_cast<size_t>(num_slots)),
+        reward_(static_cast<size_t>(steps) * num_slots_),
+        terminated_(reward_.size()),
+        truncated_(reward_.size()),
+        valid_(reward_.size()) {}
+
+  void append(const StepResult& result) {
+    append(result.reward, &reward_);
+    append(result.terminated, &terminated_);
+    append(result.truncated, &truncated_);
+    append(result.valid, &valid_);
+    ++num_steps_;
+  }
+  void copy_to_host() {
+    host_reward_ = on_host(reward_.span());
+    host_terminated_ = on_host(terminated_.span());
+    host_truncated_ = on_host(truncated_.span());
+    host_valid_ = on_host(valid_.span());
+  }
+  /// On the host, but for refusals, which are state.
+  StepResult of_step(int step) const {
+    const auto part = [&](const auto& log) {
+      return Span(log.data() + static_cast<size_t>(step) * num_slots_, num_slots_);
+    };
+    return {part(host_reward_), part(host_terminated_), part(host_truncated_), part(host_valid_), {}};
+  }
+
+ private:
+  template <typename T>
+  void append(Span<const T> result, DeviceBuffer<T>* log) {
+    PICTURA_CUDA(cudaMemcpyAsync(log->data() + num_steps_ * num_slots_, result.data(), result.size() * sizeof(T),
+                                 cudaMemcpyDeviceToDevice, nullptr));
+  }
+
+  size_t num_slots_, num_steps_ = 0;
+  DeviceBuffer<float> reward_;
+  DeviceBuffer<uint8_t> terminated_, truncated_, valid_;
+  std::vector<float> host_reward_;
+  std::vector<uint8_t> host_terminated_, host_truncated_, host_valid_;
+};
+
+/// Steps both with the same actions and compares what every step returns. The device runs ahead: with a wait for each
+/// step, tests that share a device take turns at it thousands of times.
+void step_same(Simulator* cpu, Simulator* cuda, int steps, uint32_t first_step) {
+  const auto slots = static_cast<size_t>(cpu->num_slots());
+  std::vector<int32_t> actions;
+  for (int i = 0; i < steps; ++i) {
+    const std::vector<int32_t> drawn = testing::mixed_actions(cpu->num_slots(), first_step + static_cast<uint32_t>(i));
+    actions.insert(actions.end(), drawn.begin(), drawn.end());
+  }
+  const DeviceBuffer<int32_t> device_actions{Span<const int32_t>(actions)};
+  StepLog log(steps, cpu->num_slots());
+  for (size_t i = 0; i < static_cast<size_t>(steps); ++i) {
+    log.append(cuda->step({device_actions.data() + i * slots, slots}));
+  }
+  log.copy_to_host();
+  for (int i = 0; i < steps; ++i) {
+    const StepResult a = cpu->step({actions.data() + static_cast<size_t>(i) * slots, slots});
+    const StepResult b = log.of_step(i);
+    ASSERT_TRUE(testing::same_bits(a.reward, b.reward)) << "step " << first_step + static_cast<uint32_t>(i);
+    ASSERT_TRUE(testing::same_bits(a.terminated, b.terminated) && testing::same_bits(a.truncated, b.truncated) &&
+                testing::same_bits(a.valid, b.valid))
+        << "step " << first_step + static_cast<uint32_t>(i);
+  }
+}
+
+/// Steps both; results are compared at every step, all that users see every `look_every` steps.
+void run_same(Simulator* cpu, Simulator* cuda, int steps, int look_every, uint32_t first_step = 0) {
+  expect_same_view(cpu, cuda, 0);
+  for (int done = 0; done < steps && !::testing::Test::HasFatalFailure();) {
+    const int stretch = std::min(look_every, steps - done);
+    step_same(cpu, cuda, stretch, first_step + static_cast<uint32_t>(done) + 1);
+    if (::testing::Test::HasFatalFailure()) return;
+    done += stretch;
+    expect_same_view(cpu, cuda, done);
+  }
+  ASSERT_EQ(cpu->save(), cuda->save()) << "totals included";
+}
+
+void expect_parity(const SimulatorConfig& config, const Maps& maps, const std::vector<WorldSpec>& worlds, int steps,
+                   int look_every = 100) {
+  const auto cpu = make_simulator("cpu", config, maps, worlds);
+  const auto cuda = make_simulator("cuda", config, maps, worlds);
+  run_same(cpu.get(), cuda.get(), steps, look_every);
+  const SpawnReport a = cpu->spawn_report(), b = cuda->spawn_report();
+  EXPECT_EQ(a.spawned, b.spawned);
+  EXPECT_EQ(a.parked_placed, b.parked_placed);
+  EXPECT_EQ(cpu->totals().reward, cuda->totals().reward);
+}
+
+SimulatorConfig whole_world() {
+  SimulatorConfig config;
+  config.wall_observations = true;
+  return config;
+}
+
+TEST_F(CudaSimulatorTest, ProceduralTownsOver1000Steps) {
+  for (const char* name : {"procedural:1", "procedural:2", "procedural:3"}) {
+    SCOPED_TRACE(name);
+    expect_parity(whole_world(), {load_map(name)}, {{0, 120, 0}}, 1000);
+  }
+}
+
+TEST_F(CudaSimulatorTest, CarlaTownsOver1000Steps) {
+  const std::vector<std::string> towns = known_towns();
+  if (towns.empty()) GTEST_SKIP() << "no towns: set PICTURA_DATA";
+  for (const std::string& town : towns) {
+    SCOPED_TRACE(town);
+    expect_parity(whole_world(), {load_map(town)}, {{0, 120, 0}}, 1000);
+  }
+}
+
+TEST_F(CudaSimulatorTest, TenThousandSteps) {
+  expect_parity(whole_world(), {load_map("procedural:4")}, {{0, 120, 0}}, 10'000, 1000);
+}
+
+TEST_F(CudaSimulatorTest, ThousandsOfSmallWorldsOnManyMaps) {
+  SimulatorConfig config = whole_world();
+  config.parked_cars = 3;
+  config.episode_steps = 40;
+  const Maps maps{load_map("procedural:1"), load_map("procedural:2"), load_map("procedural:3")};
+  expect_parity(config, maps, draw_worlds(1, 8000, 1, 5, 3), 100, 25);
+}
+
+TEST_F(CudaSimulatorTest, CrowdsUpToTheLargestWorld) {
+  SimulatorConfig config;
+  config.episode_steps = 20;
+  config.vector_observations = false;
+  expect_parity(config, {load_map("procedural:1")}, {{0, kMaxAgentsPerWorld, 0}, {0, 1000, 1}, {0, 1, 2}}, 45, 5);
+}
+
+TEST_F(CudaSimulatorTest, WhatOneSavesTheOtherRestores) {
+  SimulatorConfig config = whole_world();
+  config.episode_steps = 70;
+  const Maps maps{load_map("procedural:1"), load_map("procedural:2")};
+  const std::vector<WorldSpec> worlds = draw_worlds(3, 400, 1, 120, 2);
+  const auto cpu = make_simulator("cpu", config, maps, worlds);
+  const auto cuda = make_simulator("cuda", config, maps, worlds);
+  run_same(cpu.get(), cuda.get(), 100, 100);
+  const auto cpu_after = make_simulator("cpu", config, maps, worlds);
+  const auto cuda_after = make_simulator("cuda", config, maps, worlds);
+  cpu_after->restore(cuda->save());
+  cuda_after->restore(cpu->save());
+  run_same(cpu_after.get(), cuda_after.get(), 100, 20, 100);
+  run_same(cpu.get(), cuda.get(), 100, 20, 100);
+  EXPECT_EQ(cpu->state_hash(), cuda_after->state_hash());
+  std::vector<uint8_t> broken = cpu->save();
+  broken.pop_back();
+  EXPECT_THROW(cuda->restore(broken), Error);
+  EXPECT_EQ(cpu->state_hash(), cuda->state_hash());
+  cpu->reset();
+  cuda->reset();
+  expect_same_view(cpu.get(), cuda.get(), 0);
+}
+
+TEST_F(CudaSimulatorTest, AGraphReplaysSteps) {
+  SimulatorConfig config = whole_world();
+  config.episode_steps = 50;
+  const Maps maps{load_map("procedural:1")};
+  const std::vector<WorldSpec> worlds = draw_worlds(3, 300, 1, 60, 1);
+  const auto cpu = make_simulator("cpu", config, maps, worlds);
+  const auto cuda = make_simulator("cuda", config, maps, worlds);
+  DeviceBuffer<int32_t> actions(300);
+  cudaStream_t stream = nullptr;
+  PICTURA_CUDA(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
+  cudaGraph_t graph = nullptr;
+  PICTURA_CUDA(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal));
+  cuda->step(actions.span(), {stream});
+  PICTURA_CUDA(cudaStreamEndCapture(stream, &graph));
+  cudaGraphExec_t executable = nullptr;
+  PICTURA_CUDA(cudaGraphInstantiate(&executable, graph, 0));
+  for (uint32_t step = 0; step < 200; ++step) {
+    const std::vector<int32_t> host = testing::mixed_actions(300, step);
+    PICTURA_CUDA(
+        cudaMemcpyAsync(actions.data(), host.data(), host.size() * sizeof(int32_t), cudaMemcpyHostToDevice, stream));
+    PICTURA_CUDA(cudaGraphLaunch(executable, stream));
+    cpu->step(host);
+  }
+  expect_same_view(cpu.get(), cuda.get(), 200);
+  EXPECT_GT(cuda->totals().episodes, 0) << "resets are part of the graph";
+  PICTURA_CUDA(cudaGraphExecDestroy(executable));
+  PICTURA_CUDA(cudaGraphDestroy(graph));
+  PICTURA_CUDA(cudaStreamDestroy(stream));
+}
+
+TEST_F(CudaSimulatorTest, AnActionOutOfRangeChangesNothingAndIsThrownLater) {
+  const auto cuda = make_simulator("cuda", {}, {load_map("procedural:1")}, {{0, 30, 0}, {0, 10, 1}});
+  std::vector<int32_t> actions(40, 7);
+  actions[33] = kNumActions;
+  const uint64_t before = cuda->state_hash();
+  const DeviceBuffer<int32_t> bad{Span<const int32_t>(actions)};
+  EXPECT_NO_THROW(cuda->step(bad.span()));
+  EXPECT_EQ(cuda->state_hash(), before);
+  try {
+    cuda->check();
+    ADD_FAILURE() << "expected the refusal of the earlier call";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("slot 33: expected an action in [0, 12), got 12"));
+  }
+  actions[33] = 0;
+  const DeviceBuffer<int32_t> good{Span<const int32_t>(actions)};
+  cuda->step(good.span());
+  EXPECT_NO_THROW(cuda->check());
+  EXPECT_NE(cuda->state_hash(), before);
+}
+
+// Printed, not judged: the paper's number of agents, with and without entity sets.
+TEST_F(CudaSimulatorTest, RateOf20480Agents) {
+  for (const bool sets : {true, false}) {
+    SimulatorConfig config;
+    config.vector_observations = sets;
+    const Maps maps{load_map("procedural:1"), load_map("procedural:2"), load_map("procedural:3")};
+    const auto cuda = make_simulator("cuda", config, maps, draw_worlds(1, 20480, 1, 120, 3));
+    std::vector<DeviceBuffer<int32_t>> actions;
+    for (uint32_t step = 0; step < 16; ++step) {
+      const std::vector<int32_t> host = testing::mixed_actions(20480, step);
+      actions.emplace_back(Span<const int32_t>(host));
+    }
+    const auto run = [&](size_t steps) {
+      for (size_t step = 0; step < steps; ++step) cuda->step(actions[step % actions.size()].span());
+      cuda->check();
+    };
+    run(200);
+    const int64_t agent_steps = cuda->totals().agent_steps;
+    const auto begin = std::chrono::steady_clock::now();
+    run(1000);
+    const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    fmt::print("entity sets {}: {:.3f} ms a step, {:.1f} M agent-steps/s, {:.1f} M slot-steps/s\n", sets, elapsed_s,
+               static_cast<double>(cuda->totals().agent_steps - agent_steps) / elapsed_s / 1e6,
+               20480 * 1000 / elapsed_s / 1e6);
+  }
+}
+
+}  // namespace
+}  // namespace pictura

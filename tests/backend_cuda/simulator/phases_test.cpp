@@ -1,0 +1,89 @@
+// The CUDA executor's phases, run on the host in random orders, against the CPU executor: the same bits everywhere.
+#include <cstring>
+
+#include <gtest/gtest.h>
+
+#include "pictura/backends/make_simulator.h"
+#include "pictura/map/load_map.h"
+#include "pictura/tests/backend_cuda/simulator/shuffled_executor.h"
+#include "pictura/tests/simulator/same_bits.h"
+#include "pictura/tests/simulator/test_maps.h"
+
+namespace pictura {
+namespace {
+
+/// Steps both with the same actions and compares everything that their users see.
+void expect_same(const SimulatorConfig& config, const std::vector<std::shared_ptr<const RoadMap>>& maps,
+                 const std::vector<WorldSpec>& worlds, int steps, unsigned shuffle_seed) {
+  const auto cpu = make_simulator("cpu", config, maps, worlds);
+  testing::ShuffledExecutor other(config, maps, worlds, shuffle_seed);
+  for (int step = 0; step <= steps; ++step) {
+    ASSERT_EQ(cpu->state_hash(), other.batch.state_hash()) << "step " << step;
+    ASSERT_EQ(testing::first_difference(cpu->observations(), other.results.observation_view()), "") << "step " << step;
+    ASSERT_TRUE(testing::same_bits(cpu->views(), Span<const View>(other.results.views))) << "step " << step;
+    ASSERT_TRUE(testing::same_bits(cpu->scene().agents, Span<const AgentBox>(other.batch.boxes))) << "step " << step;
+    if (step == steps) break;
+    const std::vector<int32_t> actions = testing::mixed_actions(cpu->num_slots(), static_cast<uint32_t>(step));
+    const StepResult result = cpu->step(actions);
+    other.step(actions);
+    ASSERT_TRUE(testing::same_bits(result.reward, Span<const float>(other.results.reward))) << "step " << step;
+    ASSERT_TRUE(testing::same_bits(result.terminated, Span<const uint8_t>(other.results.terminated)));
+    ASSERT_TRUE(testing::same_bits(result.truncated, Span<const uint8_t>(other.results.truncated)));
+    ASSERT_TRUE(testing::same_bits(result.valid, Span<const uint8_t>(other.results.valid)));
+  }
+  EXPECT_EQ(cpu->save(), other.batch.save());
+  EXPECT_EQ(other.refused(), -1);
+}
+
+TEST(Phases, GiveTheBitsOfTheCpuExecutorInAnyOrderOfThreads) {
+  SimulatorConfig config;
+  config.episode_steps = 60;
+  config.pedestrian_fraction = config.cyclist_fraction = 0.2f;
+  config.parked_cars = 12;
+  config.wall_observations = true;
+  const std::vector<std::shared_ptr<const RoadMap>> maps{load_map("procedural:1"), load_map("procedural:2"),
+                                                         testing::stadium(200, 2)};
+  expect_same(config, maps, draw_worlds(5, 300, 1, 60, 3), 150, 1);
+  config.vector_observations = config.auxiliary_observations = false;
+  expect_same(config, maps, draw_worlds(6, 100, 1, 60, 3), 70, 2);
+}
+
+TEST(Phases, PlaceCrowdsAsOneAfterTheOtherWould) {
+  // A ring of 251 m takes some forty cars: almost every choice depends on the ones before it.
+  const SimulatorConfig config = testing::cars({.episode_steps = 3});
+  expect_same(config, {testing::ring_road(40)}, {{0, 300, 0}, {0, 37, 1}, {0, 1, 2}}, 12, 3);
+}
+
+TEST(Phases, RefuseAnActionOutOfRangeAndChangeNothing) {
+  const auto map = testing::stadium(200, 2);
+  testing::ShuffledExecutor executor(testing::cars(), {map}, {{0, 30, 0}, {0, 10, 1}}, 4);
+  std::vector<int32_t> actions = testing::mixed_actions(40, 0);
+  executor.step(actions);
+  const std::vector<uint8_t> before = executor.batch.save();
+  actions[31] = kNumActions;
+  actions[35] = -1;
+  executor.step(actions);
+  EXPECT_EQ(executor.batch.save(), before);
+  EXPECT_EQ(executor.refused(), cuda::rejected_action(31, kNumActions));
+  actions[31] = 0;
+  executor.step(actions);
+  EXPECT_EQ(executor.batch.save(), before);
+  EXPECT_EQ(executor.refused(), cuda::rejected_action(31, kNumActions)) << "the first one stands";
+  actions[35] = 0;
+  executor.step(actions);
+  EXPECT_NE(executor.batch.save(), before);
+}
+
+TEST(Phases, CarlaTowns) {
+  const std::vector<std::string> towns = known_towns();
+  if (towns.empty()) GTEST_SKIP() << "no towns: set PICTURA_DATA";
+  SimulatorConfig config;
+  config.episode_steps = 15;
+  for (const std::string& town : towns) {
+    SCOPED_TRACE(town);
+    expect_same(config, {load_map(town)}, {{0, 120, 0}}, 40, 5);
+  }
+}
+
+}  // namespace
+}  // namespace pictura

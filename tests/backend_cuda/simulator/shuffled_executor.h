@@ -1,0 +1,198 @@
+// The CUDA executor's phases on a host: every loop over threads runs in a random order, so that what a device may do in
+// any order must not matter. What it cannot show are two threads in the middle of one phase, and warps of many lanes.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "pictura/backend_cuda/simulator/phases.h"
+#include "pictura/simulator/world_batch.h"
+
+namespace pictura::testing {
+
+struct HostAtomics {
+  void set_bits(uint32_t* value, uint32_t bits) const { *value |= bits; }
+  int32_t add(int32_t* value, int32_t change) const { return std::exchange(*value, *value + change); }
+  void lower(int32_t* value, int32_t bound) const { *value = std::min(*value, bound); }
+};
+
+/// Calls body(i) for all i in [0, count), in a random order.
+template <typename Body>
+void shuffled(std::mt19937* random, int count, const Body& body) {
+  std::vector<int> order(static_cast<size_t>(count));
+  std::iota(order.begin(), order.end(), 0);
+  std::shuffle(order.begin(), order.end(), *random);
+  for (const int i : order) body(i);
+}
+
+/// A group of one lane.
+struct HostThreadGroup : SingleThread {
+  float* rows = nullptr;
+  float* staging() const { return rows; }
+  template <typename T>
+  T read(const T& value) const {
+    return value;
+  }
+  uint32_t ballot(bool value) const { return value; }
+  int count_before(uint32_t) const { return 0; }
+  void write(const float* values, int filled, int end, int capacity, float* out) const {
+    ASSERT_LE(end, capacity);
+    std::copy(values, values + filled, out);
+    std::fill(out + filled, out + std::max(filled, end), 0.0f);
+  }
+};
+
+struct ShuffledTeam : HostAtomics {
+  std::mt19937* random;
+  cuda::TeamMemory* shared;
+  cuda::TeamMemory& memory() const { return *shared; }
+  template <typename Body>
+  void for_each(int count, const Body& body) const {
+    shuffled(random, count, body);
+  }
+  template <int kGroup, typename Body>
+  void for_each_by_groups(int count, const Body& body) const {
+    shuffled(random, count, [&body](int i) { body(HostThreadGroup{}, i); });
+  }
+};
+
+struct ShuffledLaunch {
+  std::mt19937* random;
+  void copy(void* to, const void* from, size_t size) const { std::memcpy(to, from, size); }
+  void fill(void* memory, size_t size, int byte) const { std::memset(memory, byte, size); }
+  template <typename Phase>
+  void threads(int32_t count, const Phase& phase) const {
+    shuffled(random, count, [&phase](int i) { phase(HostAtomics{}, i); });
+  }
+  template <typename Phase>
+  void teams(int32_t count, const Phase& phase) const {
+    shuffled(random, count, [this, &phase](int i) {
+      cuda::TeamMemory memory;
+      ShuffledTeam team;
+      team.random = random;
+      team.shared = &memory;
+      phase(team, i);
+    });
+  }
+  template <int kGroup, typename Phase>
+  void groups(int32_t count, const Phase& phase) const {
+    shuffled(random, count, [&phase](int i) {
+      std::array<float, cuda::WriteObservation::kStaging> rows{};
+      HostThreadGroup group;
+      group.rows = rows.data();
+      phase(group, i);
+    });
+  }
+  template <typename Side, typename Main>
+  void fork_join(const Side& side, const Main& main) const {
+    const bool is_first = (*random)() % 2 == 0;
+    if (is_first) side(*this);
+    main();
+    if (!is_first) side(*this);
+  }
+};
+
+/// Steps worlds by the phases, from episode 0.
+class ShuffledExecutor {
+ public:
+  ShuffledExecutor(const SimulatorConfig& config, std::vector<std::shared_ptr<const RoadMap>> maps,
+                   std::vector<WorldSpec> worlds, unsigned shuffle_seed)
+      : batch(config, std::move(maps), std::move(worlds)),
+        results(static_cast<size_t>(batch.num_slots()), config),
+        random_(shuffle_seed),
+        next_agents_(static_cast<size_t>(batch.num_slots())),
+        next_boxes_(batch.boxes.size()),
+        next_light_plans_(batch.light_plans.size()),
+        next_lights_(batch.lights.size()),
+        next_spawned_(batch.worlds.size()),
+        cell_items_(batch.boxes.size()),
+        try_boxes_(batch.boxes.size() * kSpawnTries),
+        free_tries_(batch.boxes.size()),
+        known_tries_(batch.boxes.size()),
+        chosen_try_(batch.boxes.size()),
+        next_try_(batch.boxes.size()),
+        step_m_(static_cast<size_t>(batch.num_slots())),
+        began_(batch.worlds.size()),
+        prepares_(batch.worlds.size()) {
+    std::iota(cell_items_.begin(), cell_items_.end(), 0);
+    for (int w = 0; w < batch.num_worlds(); ++w) {
+      cell_begin_.insert(cell_begin_.end(), {0, batch.world(w).num_boxes});
+    }
+    for (int w = 0; w < batch.num_worlds(); ++w) {
+      const auto first_box = static_cast<size_t>(batch.box_begin[static_cast<size_t>(w)]);
+      WorldView view = batch.world(w);
+      const auto first_light = static_cast<size_t>(batch.light_begin[static_cast<size_t>(w)]);
+      view.box_cells =
+          cuda::one_cell({cell_begin_.data() + 2 * w, 2}, {cell_items_.data(), static_cast<size_t>(view.num_boxes)});
+      scratch_.push_back({try_boxes_.data() + first_box * kSpawnTries, free_tries_.data() + first_box,
+                          known_tries_.data() + first_box, chosen_try_.data() + first_box,
+                          next_try_.data() + first_box});
+      worlds_.push_back(view);
+      view.agents = next_agents_.view();
+      view.boxes = view.boxes_before = next_boxes_.data() + first_box;
+      view.light_plans = next_light_plans_.data() + first_light;
+      view.lights = next_lights_.data() + first_light;
+      next_worlds_.push_back(view);
+      world_of_slot_.insert(world_of_slot_.end(), static_cast<size_t>(view.num_agents), w);
+    }
+    launch_reset(ShuffledLaunch{&random_}, arrays());
+  }
+
+  void step(Span<const int32_t> actions) { launch_step(ShuffledLaunch{&random_}, arrays(), actions.data()); }
+  int64_t refused() const { return refusal_; }
+
+  WorldBatch batch;
+  HostResults results;
+
+ private:
+  cuda::SimulatorArrays arrays() {
+    cuda::SimulatorArrays arrays;
+    arrays.worlds = worlds_.data();
+    arrays.next_worlds = next_worlds_.data();
+    arrays.scratch = scratch_.data();
+    arrays.world_of_slot = world_of_slot_.data();
+    arrays.agents = batch.agents.view();
+    arrays.next_agents = next_agents_.view();
+    arrays.num_worlds = batch.num_worlds();
+    arrays.num_slots = batch.num_slots();
+    arrays.episode_step = batch.episode_step.data();
+    arrays.episode_index = batch.episode_index.data();
+    arrays.episode_over = batch.episode_over.data();
+    arrays.spawned = batch.spawned.data();
+    arrays.world_totals = batch.world_totals.data();
+    arrays.results = results.step_arrays();
+    arrays.views = results.views.data();
+    arrays.observations = results.observation_view();
+    arrays.entity_sets = batch.config.vector_observations;
+    arrays.step_m = step_m_.data();
+    arrays.began = began_.data();
+    arrays.prepares = prepares_.data();
+    arrays.next_spawned = next_spawned_.data();
+    arrays.rejected_slot = &refused_slot_;
+    arrays.rejected_action = &refusal_;
+    return arrays;
+  }
+
+  std::mt19937 random_;
+  std::vector<WorldView> worlds_, next_worlds_;
+  AgentState next_agents_;
+  std::vector<AgentBox> next_boxes_;
+  std::vector<LightPlan> next_light_plans_;
+  std::vector<LightState> next_lights_;
+  std::vector<int32_t> next_spawned_;
+  std::vector<cuda::WorldScratch> scratch_;
+  std::vector<int32_t> world_of_slot_, cell_begin_, cell_items_;
+  std::vector<AgentBox> try_boxes_;
+  std::vector<uint32_t> free_tries_;
+  std::vector<int32_t> known_tries_, chosen_try_, next_try_;
+  std::vector<float> step_m_;
+  std::vector<uint8_t> began_, prepares_;
+  int32_t refused_slot_ = 0;
+  int64_t refusal_ = -1;
+};
+
+}  // namespace pictura::testing

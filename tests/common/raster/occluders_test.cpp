@@ -1,0 +1,132 @@
+// Occluders: what they hide and what not, which of a scene's walls are taken, and that towns look the same
+// with and without them.
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "pictura/backend_cpu/renderer/image_drawer.h"
+#include "pictura/bench/quality.h"
+#include "pictura/common/camera.h"
+#include "pictura/common/portable/intrinsics.h"
+#include "pictura/common/raster/check.h"
+#include "pictura/tests/support/image_drawing.h"
+#include "pictura/tests/support/named_maps.h"
+
+namespace pictura {
+namespace {
+
+/// A camera at (0, 0, 1.5) that looks along x: 96x54 pixels of 1/48 of a radian in the middle.
+ImageSetting setting_ahead() {
+  Camera camera = paper_rig().cameras[0];
+  camera.position_m = {0, 0, 1.5f};
+  camera.yaw_rad = camera.pitch_rad = camera.roll_rad = 0;
+  Rig rig;
+  rig.cameras = {camera};
+  ImageSetting setting;
+  setting.camera = place_camera(pinhole_cameras(rig)[0], make_view({}, 0));
+  setting.frustum = make_frustum(setting.camera);
+  return setting;
+}
+
+WallFace wall_between(Vec3 a_m, Vec3 b_m, float height_m = 6) { return {a_m, b_m, height_m}; }
+
+/// Whether a wall hides a strip's face.
+bool hides(const WallFace& wall, Vec3 a_m, Vec3 b_m) {
+  ImageSetting setting = setting_ahead();
+  CameraQuad seen;
+  ScreenQuad quad;
+  bool turns_right = false;
+  if (see_quad(wall_quad(wall), setting.camera, &seen) && occluded_px2(setting.camera, seen, &quad, &turns_right) > 0) {
+    setting.occluders.occluder[0] = make_occluder(setting.camera, setting.frustum, seen.plane, quad, turns_right);
+    setting.occluders.count = 1;
+  }
+  ScreenBounds bounds;
+  for (const Vec3 corner_m : {a_m, b_m}) {
+    const Vec3 corner = to_camera(setting.camera, corner_m);
+    bounds.add(project(setting.camera, corner, reciprocal_in_range(corner.z)), reciprocal_in_range(corner.z));
+  }
+  return setting.occluders.hide(setting.camera, bounds);
+}
+
+TEST(Occluders, HideWhatIsBehindThemInDepthAndOnScreen) {
+  const WallFace wall = wall_between({20, -6, 0}, {20, 6, 0});
+  EXPECT_TRUE(hides(wall, {40, -4, 0}, {50, 4, 0}));
+  EXPECT_TRUE(hides(wall_between({20, 6, 0}, {20, -6, 0}), {40, -4, 0}, {50, 4, 0})) << "the other way round";
+  EXPECT_TRUE(hides(wall, {21, -4, 1}, {21, 4, 1}));
+  EXPECT_FALSE(hides(wall, {18, -4, 0}, {18, 4, 0})) << "before it";
+  EXPECT_FALSE(hides(wall, {18, -4, 1}, {40, 4, 0})) << "through it";
+  EXPECT_FALSE(hides(wall, {40, -4, 0}, {50, 16, 0})) << "past its side";
+  EXPECT_FALSE(hides(wall, {40, -4, 0}, {50, 4, 20})) << "above it";
+  EXPECT_FALSE(hides(wall_between({20, -6, 1}, {20, 6, 1}), {21, -4, 0}, {21, 4, 0})) << "below it";
+  EXPECT_FALSE(hides(wall_between({20, -6, 0}, {-20, 6, 0}), {40, -4, 0}, {50, 4, 0})) << "behind the camera, partly";
+  EXPECT_FALSE(hides(wall_between({130, -60, 0}, {130, 60, 0}), {140, -4, 0}, {141, 4, 0})) << "black";
+}
+
+TEST(Occluders, AreThoseThatCoverMost) {
+  // Walls of one size at different distances, the nearest of which one covers as much as a box's side; walls that
+  // are out of the frame, behind the camera or black.
+  StaticGeometry geometry;
+  for (const float distance_m : {60.0f, 20.0f, 50.0f, 40.0f, 30.0f, -20.0f, 130.0f}) {
+    geometry.walls.push_back(wall_between({distance_m, -3, 0}, {distance_m, 3, 0}));
+  }
+  geometry.walls.push_back(wall_between({20, 60, 0}, {20, 66, 0}));
+  geometry.build_grids();
+  const auto scene = scene_of({make_box(AgentClass::vehicle, {12.25f, 0, 0}, 0, {4.5f, 2, 1.6f})});
+  const View view = make_view({}, 0);
+  const SceneBatch batch = scene.batch();
+  const StaticGeometryView pieces = geometry.view();
+  ImageDrawer drawer;
+  drawer.prepare({&pieces, &batch, &view, setting_ahead().camera});
+  const Occluders& occluders = drawer.occluders();
+  ASSERT_EQ(occluders.count, Occluders::kMaxCount);
+  const float distances_m[] = {20, 30, 10, 40};
+  for (int i = 0; i < occluders.count; ++i) {
+    EXPECT_NEAR(1 / occluders.occluder[i].inverse_depth.z, distances_m[i], 1e-3f) << i;
+  }
+}
+
+class OccludersOfTowns : public testing::TestWithParam<const char*> {};
+
+TEST_P(OccludersOfTowns, ChangeNothingThatIsSeen) {
+  const std::string map = GetParam();
+  if (const std::string why = test::missing(map); !why.empty()) GTEST_SKIP() << why;
+  const Snapshot snapshot = drive_snapshot({.map = map, .views = 24});
+  const StaticGeometryView pieces = snapshot.geometry.view();
+  const SceneBatch scene = snapshot.scene.batch();
+  const std::vector<PinholeCamera> cameras = pinhole_cameras(paper_rig());
+  ImageDrawer drawer;
+  // Fragments that are hidden as a whole weigh nothing, but what is added up beside them is rounded; and slivers that
+  // fill a pixel together with a wall show a little.
+  constexpr float kRounding = 1e-6f, kWorst = 4.0f / 255.0f;
+  std::size_t differing = 0, values = 0;
+  float worst = 0;
+  for (const View& view : snapshot.views) {
+    for (const PinholeCamera& camera : cameras) {
+      std::vector<float> images[2];
+      for (const bool leaves_out : {false, true}) {
+        std::vector<float>& image = images[leaves_out ? 1 : 0];
+        image.resize(3 * static_cast<std::size_t>(camera.width_px * camera.height_px));
+        drawer.prepare({&pieces, &scene, &view, place_camera(camera, view), 0.35f, false, leaves_out});
+        drawer.draw({PixelFormat::f32, image.data()});
+      }
+      values += images[0].size();
+      for (std::size_t i = 0; i < images[0].size(); ++i) {
+        const float off = std::abs(images[0][i] - images[1][i]);
+        differing += off > kRounding ? 1 : 0;
+        worst = std::max(worst, off);
+      }
+    }
+  }
+  fmt::print("{}: {} of {} values, at most {:.2f}/255\n", map, differing, values, 255 * worst);
+  EXPECT_LE(static_cast<double>(differing), 1e-4 * static_cast<double>(values));
+  EXPECT_LE(worst, kWorst);
+}
+
+INSTANTIATE_TEST_SUITE_P(Maps, OccludersOfTowns,
+                         testing::Values("Town01", "Town03", "Town05", "Town07", "Town10HD", "procedural:1"),
+                         test::map_name);
+
+}  // namespace
+}  // namespace pictura

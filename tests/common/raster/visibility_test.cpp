@@ -1,0 +1,472 @@
+// The shared order rules against brute force: which of two faces is in front, and in which order a pixel's fragments
+// are laid over each other.
+#include <algorithm>
+#include <bit>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "pictura/bench/truth/image_scenes.h"
+#include "pictura/common/portable/intrinsics.h"
+#include "pictura/common/raster/check.h"
+#include "pictura/common/raster/face_setup.h"
+
+namespace pictura {
+namespace {
+
+using Extents = std::vector<std::pair<uint32_t, Extent>>;
+
+// Things as a camera at eye_m that looks along x sees them, and their order.
+class Sight {
+ public:
+  // Faces of a thing.
+  using Thing = std::vector<ScreenFace>;
+
+  explicit Sight(Vec3 eye_m, float pitch_rad = 0) {
+    Camera camera;
+    camera.width_px = camera.height_px = kSize;
+    camera.focal_x_px = camera.focal_y_px = 60;
+    camera.center_x_px = camera.center_y_px = 0.5f * kSize;
+    camera.position_m = eye_m;
+    camera.pitch_rad = pitch_rad;
+    setting_.camera = place_camera(pinhole_cameras({{camera}})[0], View{});
+    setting_.frustum = make_frustum(setting_.camera);
+    setting_.line_floor_px = 0.35f;
+  }
+  Thing see(const AgentBox& box, int32_t index = 0) {
+    return keep(agent_ref(box, index), extent_of(box),
+                [&](auto&& emit) { agent_faces(box, setting_.camera, false, emit); });
+  }
+  Thing see(const WallFace& wall) {
+    return keep(wall_ref(0), extent_of(wall), [&](auto&& emit) { wall_faces(wall, setting_.camera, emit); });
+  }
+  Thing see(const Strip& strip, int32_t index = 0) {
+    return keep(strip_ref(strip, index), extent_of(strip),
+                [&](auto&& emit) { strip_faces(strip, setting_.camera, setting_.line_floor_px, emit); });
+  }
+  // Calls visit(face of a, face of b, point) for a grid of points of the image that both cover.
+  template <typename Visit>
+  void where_both(const Thing& a, const Thing& b, Visit&& visit) const {
+    for (const ScreenFace& of_a : a) {
+      for (const ScreenFace& of_b : b) {
+        const PixelBox box = of_a.box;
+        for (float y = static_cast<float>(box.y_begin) + 0.1f; y < static_cast<float>(box.y_end); y += kStep_px) {
+          for (float x = static_cast<float>(box.x_begin) + 0.1f; x < static_cast<float>(box.x_end); x += kStep_px) {
+            if (covers(of_a, {x, y}) && covers(of_b, {x, y})) visit(of_a, of_b, Vec2{x, y});
+          }
+        }
+      }
+    }
+  }
+  bool in_front(const ScreenFace& a, const ScreenFace& b, Vec2 at) const {
+    return is_in_front(a, b, at, [&](uint32_t solid, uint32_t strip) {
+      return stands_on(extent(solid), extent(strip), setting_.camera.position_m);
+    });
+  }
+  // -1 the first is in front wherever both are seen, 1 the second, 0 they do not meet, 2 it depends on where.
+  int order(const Thing& a, const Thing& b) const {
+    int first = 0, second = 0;
+    where_both(a, b, [&](const ScreenFace& of_a, const ScreenFace& of_b, Vec2 at) {
+      EXPECT_NE(in_front(of_a, of_b, at), in_front(of_b, of_a, at));
+      (in_front(of_a, of_b, at) ? first : second) += 1;
+    });
+    return first && second ? 2 : first ? -1 : second ? 1 : 0;
+  }
+  Vec3 ray(Vec2 at) const {
+    const PinholeCamera& camera = setting_.camera;
+    return camera.right * ((at.x - camera.center_x_px) / camera.focal_x_px) +
+           camera.down * ((at.y - camera.center_y_px) / camera.focal_y_px) + camera.forward;
+  }
+
+ private:
+  static constexpr int kSize = 100;
+  static constexpr float kStep_px = 0.2f;
+  struct Pool {
+    std::vector<PolygonEdge>* edges;
+    int32_t take(int count) {
+      edges->resize(edges->size() + static_cast<std::size_t>(count));
+      return static_cast<int32_t>(edges->size()) - count;
+    }
+    void put(int32_t index, const PolygonEdge& edge) { (*edges)[static_cast<std::size_t>(index)] = edge; }
+  };
+  template <typename MakeFaces>
+  Thing keep(PrimitiveRef primitive, const Extent& extent, MakeFaces&& make_faces) {
+    Thing thing;
+    Pool pool{&edges_};
+    make_faces([&](const CameraFace& seen) {
+      ScreenFace face;
+      if (make_face(setting_, primitive, seen, pool, &face)) thing.push_back(face);
+    });
+    extents_.emplace_back(primitive.object_id, extent);
+    return thing;
+  }
+  bool covers(const ScreenFace& face, Vec2 at) const {
+    return covers_point(edges_.data() + face.edge_begin, face.edge_count, at.x, at.y);
+  }
+  // Of the thing seen last under a object_id.
+  const Extent& extent(uint32_t object_id) const {
+    return std::find_if(extents_.rbegin(), extents_.rend(), [&](const auto& seen) { return seen.first == object_id; })
+        ->second;
+  }
+
+  ImageSetting setting_;
+  std::vector<PolygonEdge> edges_;
+  Extents extents_;
+};
+
+Strip strip_between(Vec3 a_m, Vec3 b_m, StripKind kind = StripKind::lane_mark, float width_m = 0.2f) {
+  Strip strip;
+  strip.a_m = a_m;
+  strip.b_m = b_m;
+  const Vec2 along = b_m.xy() - a_m.xy();
+  strip.side_a = strip.side_b = left_normal(along) * (1 / length(along));
+  strip.width_m = width_m;
+  strip.color = {1, 1, 1};
+  strip.kind = kind;
+  return strip;
+}
+
+// How many times as far as it is long a ray from the eye goes before it enters a box; -1 where it misses.
+float enter(const AgentBox& box, Vec3 eye, Vec3 ray) {
+  const Vec3 ahead{box.cos_heading, box.sin_heading, 0}, left{-box.sin_heading, box.cos_heading, 0}, up{0, 0, 1};
+  const Vec3 middle = box.center_m + up * (0.5f * box.height_m) - eye;
+  float from = 0, to = 1e9f;
+  for (const auto& [axis, size] :
+       {std::pair{ahead, box.length_m}, std::pair{left, box.width_m}, std::pair{up, box.height_m}}) {
+    const float speed = dot(ray, axis), at = dot(middle, axis);
+    const float t0 = (at - 0.5f * size) / speed, t1 = (at + 0.5f * size) / speed;
+    from = std::max(from, std::min(t0, t1));
+    to = std::min(to, std::max(t0, t1));
+  }
+  return from < to ? from : -1;
+}
+
+TEST(Order, OfDisjointBoxesIsWhatRaysSee) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<float> ahead(4, 40), aside(-15, 15), foot(-3, 1), size(0.2f, 20), angle(-3, 3);
+  const Vec3 eye{0, 0, 1};
+  int compared = 0;
+  for (int round = 0; round < 1500; ++round) {
+    auto box = [&] {
+      return make_box(AgentClass::vehicle, {ahead(random), aside(random), foot(random)}, angle(random),
+                      {size(random), 0.5f, 2});
+    };
+    const AgentBox a = box(), b = box();
+    if (overlap_on_ground(extent_of(a), extent_of(b))) continue;
+    Sight sight(eye);
+    const Sight::Thing seen_a = sight.see(a, 0), seen_b = sight.see(b, 1);
+    sight.where_both(seen_a, seen_b, [&](const ScreenFace& of_a, const ScreenFace& of_b, Vec2 at) {
+      const float at_a = enter(a, eye, sight.ray(at)), at_b = enter(b, eye, sight.ray(at));
+      if (at_a < 0 || at_b < 0) return;  // the border, where rounding decides
+      EXPECT_EQ(sight.in_front(of_a, of_b, at), at_a < at_b) << round;
+      ++compared;
+    });
+  }
+  EXPECT_GT(compared, 20000);
+}
+
+TEST(Order, OfLevelsIsByHeight) {
+  // A car on a bridge above a car, from below both, from above, and from between the two.
+  const AgentBox low = make_box(AgentClass::vehicle, {12, 0, 0}, 0, {14, 2, 1.5f});
+  const AgentBox high = make_box(AgentClass::vehicle, {12, 0, 6}, 0, {14, 2, 1.5f});
+  const Strip bridge = strip_between({6, 0, 6}, {15, 0, 6});
+  for (const auto& [eye_z, pitch, expected] :
+       {std::tuple{-3.0f, 0.5f, -1}, std::tuple{20.0f, -0.9f, 1}, std::tuple{4.0f, 0.0f, 0}}) {
+    Sight sight({0, 0, eye_z}, pitch);
+    EXPECT_EQ(sight.order(sight.see(low, 0), sight.see(high, 1)), expected) << eye_z;
+    EXPECT_EQ(sight.order(sight.see(low), sight.see(bridge)), expected) << eye_z;
+  }
+}
+
+TEST(Order, StripsOfOneLevelGoByRankAndOthersByDepth) {
+  const Strip mark = strip_between({10, -2, 0}, {18, 2, 0}, StripKind::lane_mark, 0.5f);
+  for (const float height_m : {-0.04f, 0.0f, 0.04f}) {
+    // An edge that crosses the mark, a little above or below it: rank.
+    const Strip edge = strip_between({10, 2, height_m}, {18, -2, height_m}, StripKind::road_edge, 0.5f);
+    const Strip stop = strip_between({10, 2, height_m}, {18, -2, height_m}, StripKind::stop_line, 0.5f);
+    Sight sight({0, 0, 1.5f});
+    EXPECT_EQ(sight.order(sight.see(mark), sight.see(edge)), -1) << height_m;
+    EXPECT_EQ(sight.order(sight.see(mark), sight.see(stop)), 1) << height_m;
+    EXPECT_EQ(sight.order(sight.see(mark, 7), sight.see(mark, 4)), 1);
+  }
+  for (const float height_m : {-0.5f, 0.5f}) {
+    // On another level: the camera is above both, so the upper is in front.
+    const Strip stop = strip_between({8, 4, height_m}, {20, -4, height_m}, StripKind::stop_line, 3.0f);
+    Sight sight({0, 0, 3});
+    EXPECT_EQ(sight.order(sight.see(mark), sight.see(stop)), height_m < 0 ? -1 : 1) << height_m;
+  }
+}
+
+TEST(Order, WhatStandsOnAStripIsInFrontOfItEvenWhereItDipsIn) {
+  // A road that falls by 15 % away from the camera, and a car upright on it: its near end lies 0.3 m below the road.
+  const Strip mark = strip_between({10, 0, -1}, {20, 0, -2.5f});
+  const AgentBox car = make_box(AgentClass::vehicle, {15, 0, -1.75f}, 0, {4, 2, 1.5f});
+  Sight sight({0, 0, 1});
+  EXPECT_EQ(sight.order(sight.see(mark), sight.see(car)), 1);
+  EXPECT_EQ(sight.order(sight.see(car), sight.see(mark)), -1);
+  // The same car beyond the end of the strip does not stand on it, and neither does one on a road 2 m below.
+  const Vec3 eye{0, 0, 1};
+  EXPECT_TRUE(stands_on(extent_of(car), extent_of(mark), eye));
+  // Seen from below the road, the mark is in front of the car.
+  EXPECT_FALSE(stands_on(extent_of(car), extent_of(mark), {0, 0, -4}));
+  AgentBox beyond = car;
+  beyond.center_m.x = 23;
+  EXPECT_FALSE(stands_on(extent_of(beyond), extent_of(mark), eye));
+  AgentBox below = car;
+  below.center_m.z -= 2;
+  EXPECT_FALSE(stands_on(extent_of(below), extent_of(mark), eye));
+}
+
+TEST(Order, StripsInFrontOfAWallOrBehindIt) {
+  WallFace wall;
+  wall.a_m = {12, 10, -3};
+  wall.b_m = {12, -10, -3};
+  wall.height_m = 8;
+  const Strip before = strip_between({6, 0, 0}, {11, 1, 0.3f}), beyond = strip_between({13, 0, 0}, {20, 1, 0.3f});
+  Sight sight({0, 0, 1.5f});
+  EXPECT_EQ(sight.order(sight.see(before), sight.see(wall)), -1);
+  EXPECT_EQ(sight.order(sight.see(wall), sight.see(beyond)), -1);
+}
+
+TEST(Order, AStripDrawnWiderThanItIsStaysAtItsDepth) {
+  // Its plane almost passes through the eye: on that plane, half of its width on screen would be much nearer, and half
+  // beyond the horizon.
+  const Strip strip = strip_between({40, -4, 0.9995f}, {45, 4, 0.9985f});
+  for (const float wall_at_m : {15.0f, 110.0f}) {
+    WallFace wall;
+    wall.a_m = {wall_at_m, 10, -3};
+    wall.b_m = {wall_at_m, -10, -3};
+    wall.height_m = 8;
+    Sight sight({0, 0, 1});
+    EXPECT_EQ(sight.order(sight.see(strip), sight.see(wall)), wall_at_m < 40 ? 1 : -1) << wall_at_m;
+  }
+}
+
+TEST(Order, ComparesInTheMiddleOfTheSharedSamples) {
+  std::mt19937_64 random(3);
+  for (int round = 0; round < 2000; ++round) {
+    const uint64_t samples = round % 3 ? random() & random() & random() : random();
+    double x = 0, y = 0;
+    for (int column = 0; column < kSampleColumns; ++column) {
+      for (int row = 0; row < 8; ++row) {
+        if (!(samples >> (8 * column + row) & 1)) continue;
+        x += (column + 0.5) / 8;
+        y += (row + static_cast<double>(sample_column_offset(column))) / 8;
+      }
+    }
+    const int count = std::popcount(samples);
+    if (count == 0) continue;
+    EXPECT_NEAR(middle_of(samples).x, x / count, 1e-6) << samples;
+    EXPECT_NEAR(middle_of(samples).y, y / count, 1e-6) << samples;
+  }
+  EXPECT_EQ(middle_of(kAllSamples).x, 0.5f);
+  EXPECT_EQ(middle_of(kAllSamples).y, 0.5f);
+  EXPECT_EQ(middle_of(0).x, 0.5f);
+}
+
+// A face whose plane has some inverse depth at a pixel's corner and some gradient; it has no edges.
+ScreenFace plane_face(uint32_t object_id, float inverse_depth_0, Vec2 gradient = {}) {
+  ScreenFace face;
+  face.object_id = object_id;
+  face.plane_distance_m = 1.5f;
+  face.inverse_depth_0 = inverse_depth_0;
+  face.inverse_depth_x = gradient.x;
+  face.inverse_depth_y = gradient.y;
+  face.inverse_depth_low = 1e-3f;
+  face.inverse_depth_high = 10;
+  return face;
+}
+
+TEST(Order, SolidsThatIntersectShareSamplesByWhichIsNearer) {
+  std::mt19937_64 random(8);
+  std::uniform_real_distribution<float> unit(0, 1);
+  auto never = [](uint32_t, uint32_t) { return false; };
+  int split = 0;
+  for (int round = 0; round < 2000; ++round) {
+    auto plane = [&](uint32_t object_id) {
+      return plane_face(object_id, 0.1f + 0.02f * unit(random), Vec2{unit(random) - 0.5f, unit(random) - 0.5f} * 0.02f);
+    };
+    const ScreenFace a = plane(make_object_id(kWallKind, 5)), b = plane(make_object_id(kAgentKind, 3));
+    const uint64_t shared = random() | random();
+    const Vec2 corner{static_cast<float>(round % 3), static_cast<float>(round % 5)};
+    const uint64_t a_first = samples_in_front(a, b, shared, corner, false, never);
+    ASSERT_EQ(samples_in_front(b, a, shared, corner, false, never), shared & ~a_first) << round;
+    split += a_first != 0 && a_first != shared;
+    for (int sample = 0; sample < 64; ++sample) {
+      if (!(shared >> sample & 1)) continue;
+      const Vec2 at = corner + middle_of(uint64_t{1} << sample);
+      const float lead = inverse_depth(a, at) - inverse_depth(b, at);
+      // A line that is almost upright is turned by as much in a pixel (see make_edge).
+      const Vec2 gradient{a.inverse_depth_x - b.inverse_depth_x, a.inverse_depth_y - b.inverse_depth_y};
+      if (std::abs(lead) < 0.5f / kSteepest * length(gradient)) continue;
+      ASSERT_EQ(a_first >> sample & 1, lead > 0 ? 1u : 0u) << round;
+    }
+  }
+  EXPECT_GT(split, 200);
+}
+
+TEST(Order, TwoFacesThatFillAPixelAndIntersectFillItTogether) {
+  // The first is in front in the left five eighths of the pixel.
+  const ScreenFace first = plane_face(make_object_id(kAgentKind, 0), 0.2f, {-0.08f, 0}),
+                   second = plane_face(make_object_id(kAgentKind, 1), 0.15f);
+  const PixelCoverage full{1, kAllSamples};
+  const Hidden hidden = hide_each_other(full, full, first, second, {}, [](uint32_t, uint32_t) { return false; });
+  PixelAccumulator sum;
+  sum.add(PixelAccumulator::weight_of(full, ~hidden.of_a), {1, 0, 0});
+  sum.add(PixelAccumulator::weight_of(full, ~hidden.of_b), {0, 1, 0});
+  EXPECT_NEAR(sum.color().r, 5.0 / 8, 1e-5);
+  EXPECT_NEAR(sum.color().g, 3.0 / 8, 1e-5);
+}
+
+TEST(Order, WhatIsFreeOfAPixelsFragmentsDoesNotDependOnTheirList) {
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<float> unit(0, 1);
+  for (int round = 0; round < 500; ++round) {
+    // Planes in one pixel; those of random tilt intersect, and with strips among them may hide each other in a ring.
+    const float tilt = round % 2 ? 0.1f : 0.0f;
+    const bool with_strips = round % 4 == 3;
+    std::vector<ScreenFace> faces(2 + random() % 6);
+    std::vector<Fragment> fragments;
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+      faces[i] = plane_face(make_object_id(with_strips && i % 2 ? kStripKind : kAgentKind, static_cast<int32_t>(i)),
+                            0.05f + 0.05f * unit(random), Vec2{unit(random) - 0.5f, unit(random) - 0.5f} * tilt);
+      faces[i].color = {unit(random), unit(random), unit(random)};
+      const uint64_t samples = random() & (round % 3 ? random() : kAllSamples);
+      const PixelCoverage coverage{static_cast<float>(std::popcount(samples)) / 64.0f, samples};
+      fragments.push_back(make_fragment(faces[i], static_cast<int32_t>(i), coverage, 0, 0));
+    }
+    auto stands = [](uint32_t solid, uint32_t strip) { return (solid + strip) % 3 == 0; };
+    auto free_by_face = [&](PixelAccumulator* sum) {
+      std::vector<uint64_t> free(faces.size());
+      for (const Fragment& fragment : fragments) {
+        uint64_t& of_face = free[static_cast<std::size_t>(fragment.face)];
+        of_face = reach_of(fragment.coverage);
+        for (const Fragment& other : fragments) {
+          of_face &= ~hide_each_other(fragment.coverage, other.coverage, faces[static_cast<std::size_t>(fragment.face)],
+                                      faces[static_cast<std::size_t>(other.face)], {}, stands)
+                          .of_a;
+        }
+        sum->add(PixelAccumulator::weight_of(fragment.coverage, of_face),
+                 faces[static_cast<std::size_t>(fragment.face)].color);
+      }
+      return free;
+    };
+    PixelAccumulator sum;
+    const std::vector<uint64_t> free = free_by_face(&sum);
+    // No sample belongs to two; without rings, each that is covered belongs to one.
+    uint64_t seen = 0, covered = 0;
+    for (std::size_t i = 0; i < fragments.size(); ++i) {
+      ASSERT_EQ(seen & free[i], 0u) << round;
+      seen |= free[i];
+      covered |= fragments[i].coverage.samples;
+    }
+    if (!with_strips) {
+      ASSERT_EQ(seen, covered) << round;
+    }
+    for (int shuffle = 0; shuffle < 5; ++shuffle) {
+      std::shuffle(fragments.begin(), fragments.end(), random);
+      PixelAccumulator again;
+      ASSERT_EQ(free_by_face(&again), free) << round;
+      ASSERT_EQ(again.color().r, sum.color().r) << round;
+    }
+  }
+}
+
+TEST(Order, WhatFillsThePixelIsHiddenOnlyByWhatDoesToo) {
+  const ScreenFace near = plane_face(make_object_id(kWallKind, 0), 0.2f),
+                   far = plane_face(make_object_id(kWallKind, 1), 0.1f);
+  auto never = [](uint32_t, uint32_t) { return false; };
+  EXPECT_EQ(hide_each_other({0.5f, 0xFFFF}, {1, kAllSamples}, near, far, {}, never).of_b, 0u);
+  EXPECT_EQ(hide_each_other({1, kAllSamples}, {1, kAllSamples}, near, far, {}, never).of_b, kAllSamples);
+  EXPECT_EQ(hide_each_other({0.5f, 0xFFFF}, {1, kAllSamples}, far, near, {}, never).of_a, 0xFFFFu);
+}
+
+// Random planes in one pixel, two thirds of them of solids.
+std::vector<ScreenFace> random_planes(std::mt19937_64* random, std::size_t count) {
+  std::uniform_real_distribution<float> unit(0, 1);
+  auto tilt = [&] { return 0.04f * (unit(*random) - 0.5f); };
+  std::vector<ScreenFace> faces;
+  for (std::size_t i = 0; i < count; ++i) {
+    const uint32_t kind = i % 3 == 2 ? kStripKind : i % 3 == 1 ? kWallKind : kAgentKind;
+    faces.push_back(
+        plane_face(make_object_id(kind, static_cast<int32_t>(i)), 0.08f + 0.04f * unit(*random), Vec2{tilt(), tilt()}));
+  }
+  return faces;
+}
+
+TEST(Order, WhatIsBuriedIsHiddenByWhatBuriesIt) {
+  std::mt19937_64 random(11);
+  int buried = 0;
+  for (int round = 0; round < 20000; ++round) {
+    const std::vector<ScreenFace> faces = random_planes(&random, 3);
+    const ScreenFace& full = faces[static_cast<std::size_t>(round % 2)];
+    const ScreenFace& face = faces[static_cast<std::size_t>(round % 3 ? 2 : 1 - round % 2)];
+    const float bound = occluder_bound(full, 0, 0);
+    ASSERT_EQ(bits_from_float(bound) << kOccluderBoundBits, 0u);
+    ASSERT_TRUE(passes_occluder_bound(full, bound, 0, 0)) << "nothing buries itself";
+    if (passes_occluder_bound(face, bound, 0, 0)) continue;
+    ++buried;
+    const uint64_t samples = random() | 1;
+    const Hidden hidden =
+        hide_each_other({1, kAllSamples}, {0.5f, samples}, full, face, {}, [](uint32_t, uint32_t) { return true; });
+    EXPECT_EQ(hidden.of_a, 0u);
+    const Vec2 gradient{full.inverse_depth_x - face.inverse_depth_x, full.inverse_depth_y - face.inverse_depth_y};
+    for (int sample = 0; sample < 64; ++sample) {
+      if (!((samples & ~hidden.of_b) >> sample & 1)) continue;
+      // A line that is almost upright is turned by as much in a pixel (see make_edge).
+      const Vec2 at = middle_of(uint64_t{1} << sample);
+      const float lead = inverse_depth(full, at) - inverse_depth(face, at);
+      ASSERT_GE(lead, 0.0f) << round;
+      ASSERT_LT(lead, 0.5f / kSteepest * length(gradient)) << round;
+    }
+  }
+  EXPECT_GT(buried, 2000);
+}
+
+// Devices ask whichever face holds a pixel when another one comes.
+TEST(Order, WhatIsBuriedDoesNotDependOnWhoIsAskedFirst) {
+  std::mt19937_64 random(12);
+  for (int round = 0; round < 2000; ++round) {
+    std::vector<ScreenFace> faces = random_planes(&random, 2 + random() % 8);
+    if (round % 4 == 0) faces.push_back(faces.front());  // as near as another
+    float most = 0;
+    for (const ScreenFace& face : faces) most = std::max(most, occluder_bound(face, 0, 0));
+    std::vector<const ScreenFace*> expected;
+    for (const ScreenFace& face : faces) {
+      if (passes_occluder_bound(face, most, 0, 0)) expected.push_back(&face);
+    }
+    std::vector<const ScreenFace*> order;
+    for (const ScreenFace& face : faces) order.push_back(&face);
+    for (int shuffle = 0; shuffle < 5; ++shuffle) {
+      std::shuffle(order.begin(), order.end(), random);
+      std::vector<const ScreenFace*> left;
+      const ScreenFace* holder = order.front();
+      for (std::size_t i = 1; i < order.size(); ++i) {
+        const ScreenFace* loser = order[i];
+        if (occluder_bound(*loser, 0, 0) > occluder_bound(*holder, 0, 0)) std::swap(loser, holder);
+        if (passes_occluder_bound(*loser, occluder_bound(*holder, 0, 0), 0, 0)) left.push_back(loser);
+      }
+      left.push_back(holder);
+      std::erase_if(left, [&](const ScreenFace* face) { return !passes_occluder_bound(*face, most, 0, 0); });
+      std::ranges::sort(left);
+      ASSERT_EQ(left, expected) << round;
+    }
+  }
+}
+
+TEST(Order, ASliverIsHiddenByWhatIsInFrontOfItAndHidesNothing) {
+  auto never = [](uint32_t, uint32_t) { return false; };
+  const ScreenFace other = plane_face(make_object_id(kWallKind, 1), 0.1f);
+  for (const bool sliver_in_front : {false, true}) {
+    const ScreenFace sliver = plane_face(make_object_id(kWallKind, 0), sliver_in_front ? 0.2f : 0.05f);
+    const Hidden hidden = hide_each_other({0.01f, 0}, {0.5f, 0xFFFFFFFF}, sliver, other, {}, never);
+    EXPECT_EQ(hidden.of_a, sliver_in_front ? 0u : kAllSamples);
+    EXPECT_EQ(hidden.of_b, 0u);
+    // Pieces that meet in a pixel and fill it: neither is behind the other.
+    EXPECT_EQ(hide_each_other({0.01f, 0}, {0.99f, kAllSamples}, sliver, other, {}, never).of_a, 0u);
+    EXPECT_EQ(hide_each_other({0.99f, kAllSamples}, {0.01f, 0}, other, sliver, {}, never).of_b, 0u);
+  }
+}
+
+}  // namespace
+}  // namespace pictura

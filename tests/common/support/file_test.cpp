@@ -1,0 +1,123 @@
+// Files written beside and renamed; PNG and hash.
+#include "pictura/common/support/file.h"
+
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/common/error.h"
+#include "pictura/common/image.h"
+#include "pictura/common/support/hash.h"
+#include "pictura/tests/support/error_message.h"
+#include "pictura/tests/support/scratch_folder.h"
+
+namespace pictura {
+namespace {
+
+class FileTest : public testing::Test {
+ protected:
+  test::ScratchFolder folder_;
+};
+
+TEST_F(FileTest, AFailedWriteKeepsTheOldFileAndLeavesNothingBeside) {
+  const std::string path = folder_ / "a.txt";
+  write_file(path, "old");
+  EXPECT_THROW(write_renamed(path,
+                             [](const std::string& temporary) {
+                               std::ofstream(temporary) << "half";
+                               throw Error("disk full");
+                             }),
+               Error);
+  EXPECT_EQ(read_file(path), "old");
+  EXPECT_EQ(folder_.num_entries(), 1u);
+}
+
+TEST_F(FileTest, ErrorsNameThePath) {
+  EXPECT_THROW(read_file(folder_ / "missing"), Error);
+  EXPECT_THROW(read_file(folder_.path()), Error);
+  EXPECT_THROW(write_file("/proc/nowhere/a", "x"), Error);
+  EXPECT_THROW(make_output_folder("/proc/nowhere"), Error);
+  write_file(folder_ / "file", "x");
+  EXPECT_THROW(make_output_folder(folder_ / "file"), Error);
+  EXPECT_THROW(read_file("/dev/zero", 1 << 20), Error) << "endless files stop at the limit";
+  try {
+    write_file("/proc/nowhere/a", "x");
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), testing::StartsWith("/proc/nowhere/a: cannot be written"));
+  }
+}
+
+TEST_F(FileTest, AFolderThatCannotBeReachedIsAnErrorAndNoneForACache) {
+  const std::string unreachable = folder_ / (std::string(300, 'x') + "/deeper");  // file systems end at 255
+  EXPECT_EQ(test::message_of([&] { make_output_folder(unreachable); }),
+            unreachable + ": cannot be made: File name too long");
+  EXPECT_NO_THROW(try_to_cache(unreachable + "/a.map", "x"));
+  EXPECT_EQ(folder_.num_entries(), 0u);
+}
+
+TEST_F(FileTest, AFileThatChangesWhileItIsReadIsRefused) {
+  const std::string path = folder_ / "growing";
+  write_file(path, std::string(std::size_t{64} << 20, 'x'));
+  EXPECT_EQ(read_file(path).size(), std::size_t{64} << 20);
+  std::atomic<bool> stop{false}, started{false};
+  std::thread writer([&] {
+    std::ofstream out(path, std::ios::app);
+    while (!stop) {
+      out << 'y' << std::flush;
+      started = true;
+    }
+  });
+  while (!started) std::this_thread::yield();
+  std::string message;
+  try {
+    read_file(path);
+  } catch (const Error& error) {
+    message = error.what();
+  }
+  stop = true;
+  writer.join();
+  EXPECT_EQ(message, path + ": changed while it was read");
+}
+
+TEST_F(FileTest, LargeFilesAreRefusedBeforeTheyAreRead) {
+  const std::string path = folder_ / "sparse";
+  write_file(path, "x");
+  std::filesystem::resize_file(path, std::uintmax_t{1} << 40);
+  EXPECT_THROW(read_file(path), Error);
+}
+
+TEST_F(FileTest, PngKeepsEveryPixel) {
+  std::vector<uint8_t> rgb;
+  for (int i = 0; i < 5 * 3 * 3; ++i) rgb.push_back(static_cast<uint8_t>(i * 5));
+  write_png(folder_ / "a.png", 5, 3, rgb);
+  const RgbImage image = read_png(folder_ / "a.png");
+  EXPECT_EQ(image.width_px, 5);
+  EXPECT_EQ(image.height_px, 3);
+  EXPECT_EQ(image.rgb, rgb);
+  EXPECT_THROW(write_png(folder_ / "b.png", 5, 4, rgb), Error);
+}
+
+TEST(Hash, IsFnv1a) {
+  Hash64 hash;
+  hash.add_bytes("a", 1);
+  EXPECT_EQ(hash.hex(), "af63dc4c8601ec8c");  // published test vector of FNV-1a, 64 bits
+}
+
+TEST(HostImages, MixedSizesGetOneBlockEach) {
+  Rig rig = paper_rig(8, 4);
+  rig.cameras[2].width_px = 5;
+  HostImages images(rig, 3);
+  EXPECT_EQ(images.bytes().size(), 3u * 3 * (3 * 8 * 4 + 5 * 4));
+  EXPECT_EQ(images.camera(0).view_stride, 3 * 3 * 8 * 4);
+  EXPECT_EQ(images.camera(2).view_stride, 3 * 5 * 4);
+  const auto* first = static_cast<const uint8_t*>(images.camera(0).data);
+  EXPECT_EQ(static_cast<const uint8_t*>(images.camera(3).data) - first, 2 * 3 * 8 * 4)
+      << "camera 3 is the third of its size";
+}
+
+}  // namespace
+}  // namespace pictura

@@ -1,0 +1,164 @@
+// The lane driver, and in every town: keeping one's lane and stopping at red lights causes no infraction, and reaches
+// goals.
+#include "pictura/simulator/controllers/lane_keeping.h"
+
+#include <gtest/gtest.h>
+
+#include "pictura/bench/lane_keeping_episodes.h"
+#include "pictura/map/load_map.h"
+#include "pictura/tests/simulator/stage.h"
+
+namespace pictura {
+namespace {
+
+/// Nothing may halt a driver, who seldom leaves the middle of the lane.
+void drive_everywhere(float cyclist_fraction, int drivers, int drivers_each, int steps) {
+  std::vector<std::string> towns = known_towns();
+  for (const char* town : {"procedural:1", "procedural:2"}) towns.emplace_back(town);
+  for (const std::string& town : towns) {
+    SCOPED_TRACE(town);
+    const auto map = load_map(town);
+    int stops = 0, goals = 0, steps_astray = 0;
+    double distance_m = 0;
+    for (const DrivenEpisode& driven :
+         drive_lane_keeping_episodes(map, {.num_threads = 1, .cyclist_fraction = cyclist_fraction},
+                                     drivers / drivers_each, drivers_each, steps)) {
+      EXPECT_EQ(driven.halt_reason, kEventNone) << "at " << driven.end_m.x << ' ' << driven.end_m.y;
+      stops += driven.stops;
+      goals += driven.goals;
+      steps_astray += driven.steps_astray;
+      distance_m += driven.distance_m;
+    }
+    EXPECT_GT(goals, drivers * steps / 1000);
+    EXPECT_GT(distance_m, 0.25 * drivers * steps);
+    EXPECT_LT(steps_astray, 0.02 * drivers * steps);
+    if (!map->lights.empty()) {
+      EXPECT_GT(stops, 0) << "nobody ever waited at a red light";
+    }
+  }
+}
+
+TEST(Driver, OfABicycleKeepsItsLaneAndStopsAtRedLightsInEveryTown) { drive_everywhere(1, 16, 1, 600); }
+
+TEST(Driver, OfACarKeepsItsLaneAndStopsAtRedLightsInEveryTown) { drive_everywhere(0, 24, 1, 1280); }
+
+TEST(Driver, OfThreeTouchesNoOtherInEveryTown) { drive_everywhere(0.2f, 48, 3, 600); }
+
+/// Paths advance evenly, and in the direction that they say.
+void expect_smooth(const std::vector<PathPoint>& points) {
+  for (size_t i = 1; i < points.size(); ++i) {
+    const Vec2 way = (points[i].position_m - points[i - 1].position_m).xy();
+    ASSERT_GT(length(way), 0.6f * LanePath::kSpacing_m) << i;
+    ASSERT_LT(length(way), 1.4f * LanePath::kSpacing_m) << i;
+    const float heading = std::atan2(way.y, way.x);
+    ASSERT_LT(std::fabs(wrap_angle(points[i].heading_rad - heading)), 0.1f) << i;
+  }
+}
+
+TEST(LanePath, DrawsALaneChangeOutOverTheRoomThereIs) {
+  const auto map = testing::stadium(200, 2);
+  testing::Stage stage(map, 1);
+  const LaneGraph graph(*map);
+  const MapView view = stage.world().map;
+  // From the outer lane, at y = 0, to the inner one, at y = 4.
+  for (const float room_m : {14.0f, 20.0f, 60.0f}) {
+    LanePath path(view, graph, {0, 50});
+    ASSERT_TRUE(path.go_to({4, 50 + room_m}));
+    expect_smooth(path.points());
+    for (const PathPoint& point : path.points()) {
+      const float share = std::min((point.at.s_m - 50) / std::min(room_m, 28.0f), 1.0f);
+      EXPECT_NEAR(point.position_m.y, 4 * share * share * (3 - 2 * share), 0.01f);
+    }
+    EXPECT_NEAR(path.points().back().position_m.x, 50 + room_m, LanePath::kSpacing_m);
+  }
+}
+
+TEST(LanePath, GoesRoundForALaneChangeWithoutRoom) {
+  const auto map = testing::stadium(200, 2);
+  testing::Stage stage(map, 1);
+  const LaneGraph graph(*map);
+  const MapView view = stage.world().map;
+  LanePath path(view, graph, {0, 50});
+  ASSERT_TRUE(path.go_to({4, 55}));
+  expect_smooth(path.points());
+  EXPECT_GT(path.points().size(), 400 / LanePath::kSpacing_m);
+  EXPECT_EQ(path.points().back().at.lane, 4);
+  EXPECT_NEAR(path.points().back().position_m.x, 55, LanePath::kSpacing_m);
+}
+
+TEST(LanePath, SlowsDownBeforeCurves) {
+  const auto map = testing::stadium(200, 1);
+  testing::Stage stage(map, 1);
+  const LaneGraph graph(*map);
+  const MapView view = stage.world().map;
+  LanePath path(view, graph, {0, 100});
+  path.go_on(150);
+  const size_t slow = 20;
+  path.limit_speeds(slow, 3);
+  const std::vector<PathPoint>& points = path.points();
+  EXPECT_LE(points[slow].speed_mps, 3);
+  for (size_t i = 0; i + 1 < points.size(); ++i) {
+    EXPECT_LE(square(points[i].speed_mps) - square(points[i + 1].speed_mps), 2 * 1.0f * LanePath::kSpacing_m + 0.01f);
+    // Half circles of 20 m at 1.5 m/s^2.
+    if (points[i].at.lane == 1 && std::fabs(points[i].at.s_m - 10 * kPi) < 10 * kPi - 2) {
+      EXPECT_NEAR(points[i].speed_mps, std::sqrt(30.0f), 0.2f);
+    }
+  }
+}
+
+/// A car of 5.5 x 2.2 m on a ring whose road is 4 m wide: its rear axle draws a circle of at least 3.3 m / tan(0.55) =
+/// 5.38 m; its inner side is 1.1 m nearer to the centre, and its front outer corner 4.4 m ahead.
+struct LongCarOnARing {
+  explicit LongCarOnARing(float ring_m, float axle_m)
+      : map(testing::ring_road(ring_m)), stage(map, 1), graph(*map), view(stage.world().map) {
+    stage.batch.agents.length_m[0] = 5.5f;
+    stage.batch.agents.width_m[0] = 2.2f;
+    stage.put(0, {axle_m, 0}, kHalfPi, kPlannedSpeed_mps);
+    const float curvature = std::min(1 / axle_m, std::tan(0.55f) / 3.3f);
+    stage.batch.agents.steer_rad[0] = std::atan(3.3f * curvature);
+    stage.batch.agents.accel_lat_mps2[0] = square(kPlannedSpeed_mps) * curvature;
+    path.emplace(view, graph, RoutePoint{0, 0});
+    path->go_on(60);
+    path->limit_speeds(0, INFINITY);
+  }
+
+  std::shared_ptr<RoadMap> map;
+  testing::Stage stage;
+  LaneGraph graph;
+  MapView view;
+  std::optional<LanePath> path;
+};
+
+TEST(SteeringSearch, FindsTheWayRoundThatTheMiddleOfTheLaneIsNot) {
+  // From 4.5 to 8.5 m: the axle's circle is to be between 5.6 and 6.17 m, where the lane's middle is at 6.5 m.
+  LongCarOnARing car(6.5f, 6);
+  const DrivenAgent agent(car.stage.world(), 0);
+  Motion middle = agent.now();
+  EXPECT_FALSE(agent.leaves_road(middle, 0, 0));
+  middle.x_m = 6.5f;
+  EXPECT_TRUE(agent.leaves_road(middle, 0, 0));
+
+  const DrivingPlan plan = search_steering(agent, car.path->points(), 0);
+  ASSERT_TRUE(plan.is_clear);
+  for (const int32_t action : plan.actions) {
+    car.stage.step(action);
+    ASSERT_EQ(car.stage.events(0) & kInfractions, 0);
+  }
+  EXPECT_GT(car.stage.batch.agents.distance_m[0], 20);
+}
+
+TEST(SteeringSearch, SaysHowFarItGetsWhereNoCarCan) {
+  // From 3.4 to 7.4 m: the front corner of the tightest circle is 7.83 m from the centre.
+  LongCarOnARing car(5.4f, 4.6f);
+  const DrivenAgent agent(car.stage.world(), 0);
+  const DrivingPlan plan = search_steering(agent, car.path->points(), 0);
+  EXPECT_FALSE(plan.is_clear);
+  EXPECT_FALSE(plan.actions.empty());
+  for (const int32_t action : plan.actions) {
+    car.stage.step(action);
+    ASSERT_EQ(car.stage.events(0) & kInfractions, 0);
+  }
+}
+
+}  // namespace
+}  // namespace pictura

@@ -1,0 +1,192 @@
+// A trained policy at the wheel, and the paper's evaluation of it.
+#include <chrono>
+#include <limits>
+
+#include <ATen/Parallel.h>
+
+#include "pictura/backends/make_simulator.h"
+#include "pictura/common/error.h"
+#include "pictura/common/support/interrupt.h"
+#include "pictura/common/support/parallel_for.h"
+#include "pictura/map/load_map.h"
+#include "pictura/training/checkpoint.h"
+#include "pictura/training/observer.h"
+#include "pictura/training/training.h"
+
+namespace pictura {
+
+namespace {
+
+class PolicyDriver final : public Driver {
+ public:
+  PolicyDriver(const Checkpoint& checkpoint, int num_threads)
+      : config_(checkpoint.config),
+        rig_(checkpoint.rig),
+        policy_(config_.policy, static_cast<int>(rig_.cameras.size()), config_.run.seed),
+        num_threads_(num_threads) {
+    restore_tensors(checkpoint, checkpoint.parameters, policy_.parameters());
+  }
+
+  bool needs_images() const override { return config_.policy.modality == Modality::perspective; }
+  const Rig& rig() const override { return rig_; }
+  SimulatorConfig evaluation_world() const override {
+    return evaluation_simulator_config(config_, config_.simulator.episode_steps);
+  }
+
+  void act(Simulator& simulator, Renderer* renderer, bool argmax, Span<int32_t> actions_out) override {
+    PICTURA_CHECK(!needs_images() || renderer, "driver: this policy needs images: give it a renderer");
+    PICTURA_CHECK(actions_out.size() == static_cast<size_t>(simulator.num_slots()),
+                  "driver: expected room for {} actions, got {}", simulator.num_slots(), actions_out.size());
+    at::set_num_threads(resolve_num_threads(num_threads_));
+    Observer observer(&simulator, needs_images() ? renderer : nullptr);
+    if (!storage_.ego.defined() || storage_.ego.size(1) != simulator.num_slots()) storage_ = observer.allocate(1);
+    const Observation row = row_of(storage_, 0);
+    observer.observe(row);
+    const Decision decision = decide(policy_, row, config_.train.forward_chunk);
+    choose_actions(decision.log_probs, simulator, simulator.config().seed, argmax, actions_out);
+  }
+
+ private:
+  const Config config_;
+  const Rig rig_;
+  const Policy policy_;
+  const int num_threads_;
+  Observation storage_;
+};
+
+struct DensityOf {
+  const char* name;
+  int agents;
+};
+DensityOf density_of(Density density) {
+  switch (density) {
+    case Density::light: return {"light", 60};
+    case Density::medium: return {"medium", 120};
+    default: return {"dense", 150};
+  }
+}
+
+// Worlds that are simulated and drawn together: bounded by what their images take, or a few thousand agents.
+int worlds_per_batch(const Checkpoint& checkpoint, int agents_per_world) {
+  constexpr int64_t kMaxImageBytes = int64_t{256} << 20;
+  constexpr int64_t kMaxAgents = 4096;
+  int64_t bytes_per_agent = 1;
+  for (const Camera& camera : checkpoint.rig.cameras)
+    bytes_per_agent += 3 * int64_t{camera.width_px} * camera.height_px;
+  return static_cast<int>(
+      std::max<int64_t>(1, std::min(kMaxAgents, kMaxImageBytes / bytes_per_agent) / agents_per_world));
+}
+
+// Sums over vehicle episodes.
+struct Tally {
+  int64_t episodes = 0, at_fault = 0, off_road = 0, red_light = 0, infractions = 0, goals = 0, waypoints = 0;
+  double distance_m = 0, returns = 0;
+
+  void add(const AgentStateView& state, int64_t slot) {
+    if (static_cast<AgentStatus>(state.status[slot]) == AgentStatus::absent) return;
+    if (static_cast<AgentClass>(state.agent_class[slot]) != AgentClass::vehicle) return;
+    const uint8_t events = state.episode_events[slot];
+    ++episodes;
+    at_fault += (events & kEventAtFault) != 0;
+    off_road += (events & kEventOffRoad) != 0;
+    red_light += (events & kEventRedLight) != 0;
+    infractions += (events & (kEventAtFault | kEventOffRoad | kEventRedLight)) != 0;
+    goals += state.goals_reached[slot];
+    waypoints += state.waypoints_reached[slot];
+    distance_m += static_cast<double>(state.distance_m[slot]);
+    returns += static_cast<double>(state.episode_return[slot]);
+  }
+
+  EvaluateRow row(const std::string& density, int scenarios, int steps) const {
+    const auto vehicles = static_cast<double>(episodes);
+    EvaluateRow result;
+    result.density = density;
+    result.scenarios = scenarios;
+    result.steps = steps;
+    result.vehicle_episodes = episodes;
+    result.at_fault_collision_rate = static_cast<double>(at_fault) / vehicles;
+    result.off_road_rate = static_cast<double>(off_road) / vehicles;
+    result.red_light_rate = static_cast<double>(red_light) / vehicles;
+    result.goals_per_vehicle = static_cast<double>(goals) / vehicles;
+    result.waypoints_per_vehicle = static_cast<double>(waypoints) / vehicles;
+    result.return_per_vehicle = returns / vehicles;
+    result.km_driven = distance_m / 1000;
+    result.km_per_infraction =
+        infractions > 0 ? result.km_driven / static_cast<double>(infractions) : std::numeric_limits<double>::infinity();
+    return result;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Driver> load_driver(const std::string& checkpoint_path, int num_threads) {
+  return std::make_unique<PolicyDriver>(read_checkpoint(checkpoint_path), num_threads);
+}
+
+EvaluateReport evaluate(const EvaluateOptions& options) {
+  if (options.scenarios < 1) fail_usage("evaluate: expected one scenario or more, got {}", options.scenarios);
+  if (options.steps < 1) fail_usage("evaluate: expected one step or more, got {}", options.steps);
+  if (options.maps.empty()) fail_usage("evaluate: expected one map or more");
+  if (options.agents_per_world < 0 || options.agents_per_world > kMaxAgentsPerWorld) {
+    fail_usage("evaluate: expected 1 to {} agents per world, got {}", kMaxAgentsPerWorld, options.agents_per_world);
+  }
+  Checkpoint checkpoint = read_checkpoint(options.checkpoint);
+  checkpoint.config.run.num_threads = options.num_threads;
+  checkpoint.config.run.backend = options.backend;
+  PolicyDriver driver(checkpoint, options.num_threads);
+  SimulatorConfig simulator_config = evaluation_simulator_config(checkpoint.config, options.steps);
+  simulator_config.seed = options.seed;
+  std::vector<std::shared_ptr<const RoadMap>> maps;
+  for (const std::string& name : options.maps) maps.push_back(load_map(name));
+
+  std::vector<DensityOf> densities;
+  if (options.agents_per_world > 0)
+    densities.push_back({"custom", options.agents_per_world});
+  else
+    for (const Density density : options.densities) densities.push_back(density_of(density));
+  double work = 0, done = 0;  // in agents times steps
+  for (const DensityOf& density : densities) work += double(density.agents) * options.scenarios * options.steps;
+
+  const auto start = std::chrono::steady_clock::now();
+  std::unique_ptr<Renderer> renderer;
+  EvaluateReport report;
+  for (const DensityOf& density : densities) {
+    Tally tally;
+    const int per_batch = worlds_per_batch(checkpoint, density.agents);
+    for (int first = 0; first < options.scenarios; first += per_batch) {
+      std::vector<WorldSpec> worlds;
+      for (int scenario = first; scenario < std::min(first + per_batch, options.scenarios); ++scenario) {
+        worlds.push_back({scenario % static_cast<int>(maps.size()), density.agents,
+                          kFirstEvaluationWorld + static_cast<uint32_t>(scenario)});
+      }
+      const std::unique_ptr<Simulator> simulator =
+          make_simulator(simulator_name(options.backend), simulator_config, maps, worlds);
+      if (driver.needs_images() && !renderer)
+        renderer = make_policy_renderer(checkpoint.config, driver.rig(), *simulator);
+      simulator->reset();
+      std::vector<int32_t> actions(static_cast<size_t>(simulator->num_slots()));
+      // Halted agents stay as they are, so a batch is over when nobody is left to drive.
+      for (int step = 0; step < options.steps && !active_slots(*simulator).empty(); ++step) {
+        if (interrupted()) {
+          report.interrupted = true;
+          return report;
+        }
+        driver.act(*simulator, renderer.get(), options.argmax, actions);
+        simulator->step(actions);
+        if (options.on_progress && step % 10 == 0) {
+          const double fraction = (done + double(simulator->num_slots()) * (step + 1)) / work;
+          const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+          options.on_progress(fraction, elapsed_s * (1 - fraction) / fraction);
+        }
+      }
+      done += double(simulator->num_slots()) * options.steps;
+      const AgentStateView state = simulator->state();
+      for (int slot = 0; slot < simulator->num_slots(); ++slot) tally.add(state, slot);
+    }
+    report.rows.push_back(tally.row(density.name, options.scenarios, options.steps));
+  }
+  if (options.on_progress) options.on_progress(1, 0);
+  return report;
+}
+
+}  // namespace pictura
