@@ -8,8 +8,8 @@
 
 #include "pictura/common/camera.h"
 #include "pictura/common/color.h"
+#include "pictura/common/device.h"
 #include "pictura/common/span.h"
-#include "pictura/common/stream.h"
 
 namespace pictura {
 

@@ -3,9 +3,9 @@
 #pragma once
 
 #include "pictura/common/color.h"
+#include "pictura/common/device.h"
 #include "pictura/common/grid_view.h"
 #include "pictura/common/span.h"
-#include "pictura/common/stream.h"
 
 namespace pictura {
 

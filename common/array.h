@@ -1,0 +1,104 @@
+// Arrays at public interfaces: a pointer with element type, shape, strides and device, owned by somebody else. What a
+// caller hands in is checked against what is expected; what differs is named. Kernels take spans, see span.h.
+#pragma once
+
+#include <array>
+#include <concepts>
+#include <initializer_list>
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+#include "pictura/common/device.h"
+#include "pictura/common/error.h"
+#include "pictura/common/span.h"
+
+namespace pictura {
+
+enum class ElementType : uint8_t { u8, u16, u32, i32, i64, f16, bf16, f32, f64 };
+std::size_t bytes_of(ElementType type);
+/// "u8", "i32", ...
+std::string_view name_of(ElementType type);
+/// "cpu" or "cuda:0".
+std::string name_of(Device device);
+
+/// The element type of a C++ type; f16 and bf16 have none of their own.
+template <typename T>
+consteval ElementType element_type() {
+  using U = std::remove_const_t<T>;
+  if constexpr (std::same_as<U, uint8_t>) return ElementType::u8;
+  if constexpr (std::same_as<U, uint16_t>) return ElementType::u16;
+  if constexpr (std::same_as<U, uint32_t>) return ElementType::u32;
+  if constexpr (std::same_as<U, int32_t>) return ElementType::i32;
+  if constexpr (std::same_as<U, int64_t>) return ElementType::i64;
+  if constexpr (std::same_as<U, float>) return ElementType::f32;
+  if constexpr (std::same_as<U, double>) return ElementType::f64;
+}
+template <typename T>
+concept ArrayElement =
+    std::same_as<T, uint8_t> || std::same_as<T, uint16_t> || std::same_as<T, uint32_t> || std::same_as<T, int32_t> ||
+    std::same_as<T, int64_t> || std::same_as<T, float> || std::same_as<T, double>;
+
+/// Lengths or strides of up to five dimensions.
+class Dims {
+ public:
+  static constexpr int kMaxRank = 5;
+  Dims() = default;
+  /// Throws Error for more than kMaxRank.
+  Dims(std::initializer_list<int64_t> values);
+  int rank() const { return rank_; }
+  int64_t operator[](int dimension) const { return values_[static_cast<std::size_t>(dimension)]; }
+  int64_t& operator[](int dimension) { return values_[static_cast<std::size_t>(dimension)]; }
+  /// The product of all lengths.
+  int64_t count() const;
+  /// Strides, in elements, of an array of these lengths without gaps, the last dimension fastest.
+  Dims contiguous_strides() const;
+  bool operator==(const Dims& other) const;
+  /// "[4096, 7]".
+  std::string text() const;
+
+ private:
+  std::array<int64_t, kMaxRank> values_{};
+  int rank_ = 0;
+};
+
+/// Does not own its memory. Element (i, j, ...) is at data + (i * strides[0] + j * strides[1] + ...) elements.
+struct Array {
+  void* data = nullptr;
+  ElementType type = ElementType::u8;
+  bool is_read_only = false;
+  Dims shape, strides;  // strides in elements
+  Device device;
+
+  Array() = default;
+  Array(void* its_data, ElementType its_type, Dims its_shape, Device its_device);
+  /// Without gaps.
+  template <typename T>
+    requires ArrayElement<std::remove_const_t<T>>
+  Array(T* first, Dims its_shape, Device its_device)
+      : Array(const_cast<std::remove_const_t<T>*>(first), element_type<T>(), its_shape, its_device) {
+    is_read_only = std::is_const_v<T>;
+  }
+  /// All of a container on the host, [size]: so that calls take a std::vector as it is.
+  template <typename Container>
+    requires ArrayElement<std::remove_cvref_t<decltype(*std::declval<Container&>().data())>>
+  Array(Container&& container)  // NOLINT: converts
+      : Array(container.data(), {static_cast<int64_t>(container.size())}, Device{}) {}
+
+  bool is_contiguous() const { return strides == shape.contiguous_strides(); }
+  /// The elements of an array without gaps as a span. Throws Error naming `what` ("step: actions"), what was expected
+  /// and what came, where element type, shape or device differ, it has gaps, or T may be written and the array may not.
+  template <typename T>
+  Span<T> checked(std::string_view what, const Dims& expected_shape, Device expected_device) const {
+    check(what, element_type<T>(), !std::is_const_v<T>, expected_shape, expected_device);
+    return {static_cast<T*>(data), static_cast<std::size_t>(shape.count())};
+  }
+  /// "f32 [4096, 7] on cuda:0".
+  std::string text() const;
+
+ private:
+  void check(std::string_view what, ElementType expected_type, bool is_written, const Dims& expected_shape,
+             Device expected_device) const;
+};
+
+}  // namespace pictura
