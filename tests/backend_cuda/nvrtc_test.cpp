@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nvrtc.h>
@@ -33,21 +34,20 @@ std::string compile(const std::string& source, const std::string& architecture) 
 // Names of the headers that both devices read, as they are included.
 std::vector<std::string> shared_headers() {
   std::vector<std::string> headers;
-  for (const char* name : {"color", "grid_view", "hd", "math", "rng", "scene_types", "span", "stream"}) {
+  for (const char* name : {"color", "device", "grid_view", "math", "rng", "scene_types", "span"}) {
     headers.push_back(std::string("pictura/common/") + name + ".h");
   }
   const std::filesystem::path root = PICTURA_TEST_INCLUDE_DIR "/pictura";
-  for (const auto& file : std::filesystem::directory_iterator(root / "common")) {
-    const std::string name = file.path().filename().string();
-    // common/raster/check.h is for hosts: it speaks of errors and vectors.
-    if (name.starts_with("raster_") && name.ends_with(".h") && name != "common/raster/check.h") {
-      headers.push_back("pictura/common/" + name);
-    }
-  }
-  if (std::filesystem::is_directory(root / "simulator" / "rules")) {
-    for (const auto& file : std::filesystem::directory_iterator(root / "simulator" / "rules")) {
-      const std::string name = file.path().filename().string();
-      if (name.ends_with(".h")) headers.push_back("pictura/simulator/rules/" + name);
+  // These are for hosts: they speak of errors and vectors.
+  const std::vector<std::string> host_headers{"pictura/common/raster/check.h",
+                                              "pictura/common/raster/host_geometries.h"};
+  for (const char* folder : {"common/portable", "common/raster", "simulator/rules"}) {
+    if (!std::filesystem::is_directory(root / folder)) continue;
+    for (const auto& file : std::filesystem::directory_iterator(root / folder)) {
+      const std::string name = fmt::format("pictura/{}/{}", folder, file.path().filename().string());
+      if (name.ends_with(".h") && std::find(host_headers.begin(), host_headers.end(), name) == host_headers.end()) {
+        headers.push_back(name);
+      }
     }
   }
   std::sort(headers.begin(), headers.end());
@@ -61,8 +61,8 @@ TEST_P(NvrtcHeader, CompilesTheHeaderAlone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, NvrtcHeader, testing::ValuesIn(shared_headers()), [](const auto& header) {
-  std::string name = header.param.substr(header.param.rfind('/') + 1);
-  std::replace(name.begin(), name.end(), '.', '_');
+  std::string name = header.param.substr(std::string("pictura/").size());
+  std::replace_if(name.begin(), name.end(), [](char c) { return c == '.' || c == '/'; }, '_');
   return name;
 });
 
