@@ -13,9 +13,9 @@ constexpr int kBandPixels = 1 << 14;
 }  // namespace
 
 auto ImageDrawer::face_maker(PrimitiveRef primitive) {
-  return [this, primitive](const CameraFace& seen) {
+  return [this, primitive](const CameraFace& face_in_camera) {
     ScreenFace face;
-    if (make_face(setting_, primitive, seen, edges_, &face)) faces_.push_back(face);
+    if (make_face(setting_, primitive, face_in_camera, edges_, &face)) faces_.push_back(face);
   };
 }
 
@@ -23,10 +23,10 @@ void ImageDrawer::prepare(const ImageRequest& request) {
   request_ = request;
   setting_ = {request.camera, make_frustum(request.camera), request.line_floor_px, request.debug_palette};
   find_solids();
-  if (request.leaves_out_hidden) find_occluders();
+  if (request.culls_occluded) find_occluders();
   edges_.clear();
   faces_.clear();
-  for (const Solid& solid : solids_) face_maker(solid.primitive)(whole_quad(solid.seen, 0.0f));
+  for (const Solid& solid : solids_) face_maker(solid.primitive)(make_camera_face(solid.in_camera, 0.0f));
   visit_lights(setting_, *request.geometry, *request.scene, *request.view,
                [&](const LightHead& head, LightState state, int32_t index) {
                  light_faces(head, state, setting_.camera, face_maker(light_ref(index)));
@@ -39,12 +39,12 @@ void ImageDrawer::prepare(const ImageRequest& request) {
 void ImageDrawer::find_solids() {
   solids_.clear();
   auto keep = [this](const WorldQuad& quad, Solid solid) {
-    if (see_quad(quad, setting_.camera, &solid.seen)) solids_.push_back(solid);
+    if (quad_to_camera(quad, setting_.camera, &solid.in_camera)) solids_.push_back(solid);
   };
   visit_agents(setting_, *request_.scene, *request_.view, [&](const AgentBox& box, int32_t agent) {
     const PrimitiveRef primitive = agent_ref(box, agent - world_begin());
     const bool may_hide = may_occlude(box, setting_.camera);
-    visit_faces_to_eye(box, setting_.camera, [&](int face) {
+    visit_front_facing(box, setting_.camera, [&](int face) {
       keep(cuboid_quad(box, face, setting_.debug_palette),
            {primitive, face_entry(primitive.object_id, face), may_hide, {}});
     });
@@ -60,7 +60,7 @@ void ImageDrawer::find_occluders() {
   for (const Solid& solid : solids_) {
     if (!solid.may_occlude) continue;
     OccludingFace face{.solid = &solid};
-    face.covered_px2 = occluded_px2(setting_.camera, solid.seen, &face.quad, &face.turns_right);
+    face.covered_px2 = occluder_area_px2(setting_.camera, solid.in_camera, &face.quad, &face.is_clockwise);
     if (face.covered_px2 > 0.0f) occluding_.push_back(face);
   }
   const auto count = std::min(occluding_.size(), static_cast<std::size_t>(Occluders::kMaxCount));
@@ -72,7 +72,7 @@ void ImageDrawer::find_occluders() {
   for (std::size_t i = 0; i < count; ++i) {
     const OccludingFace& face = occluding_[i];
     setting_.occluders.occluder[i] =
-        make_occluder(setting_.camera, setting_.frustum, face.solid->seen.plane, face.quad, face.turns_right);
+        make_occluder(setting_.camera, setting_.frustum, face.solid->in_camera.plane, face.quad, face.is_clockwise);
   }
   setting_.occluders.count = static_cast<int32_t>(count);
 }
@@ -142,20 +142,20 @@ void ImageDrawer::collect_fragments(int32_t first) {
 }
 
 // Finds what is free of the gathered fragments of a pixel.
-void ImageDrawer::hide_fragments(int x, int y) {
+void ImageDrawer::resolve_occlusion(int x, int y) {
   const Vec2 corner{static_cast<float>(x), static_cast<float>(y)};
-  free_.clear();
-  for (const Fragment& fragment : pixel_) free_.push_back(reach_of(fragment.coverage));
+  visible_.clear();
+  for (const Fragment& fragment : pixel_) visible_.push_back(effective_samples(fragment.coverage));
   for (std::size_t i = 0; i < pixel_.size(); ++i) {
     const PixelCoverage& a = pixel_[i].coverage;
     for (std::size_t j = i + 1; j < pixel_.size(); ++j) {
       const PixelCoverage& b = pixel_[j].coverage;
-      if (!may_hide_more(free_[i], a.samples, free_[j], b.samples)) continue;
-      const Hidden hidden = hide_each_other(a, b, faces_[static_cast<std::size_t>(pixel_[i].face)],
-                                            faces_[static_cast<std::size_t>(pixel_[j].face)], corner,
-                                            [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
-      free_[i] &= ~hidden.of_a;
-      free_[j] &= ~hidden.of_b;
+      if (!may_occlude_more(visible_[i], a.samples, visible_[j], b.samples)) continue;
+      const OccludedSamples occluded = occlude_pair(
+          a, b, faces_[static_cast<std::size_t>(pixel_[i].face)], faces_[static_cast<std::size_t>(pixel_[j].face)],
+          corner, [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
+      visible_[i] &= ~occluded.of_a;
+      visible_[j] &= ~occluded.of_b;
     }
   }
 }
@@ -179,11 +179,11 @@ void ImageDrawer::composite_rows(RowRange rows, Visit&& visit, Finish&& finish) 
         continue;
       }
       collect_fragments(first);
-      hide_fragments(x, y);
+      resolve_occlusion(x, y);
       PixelAccumulator sum;
       weights_.resize(pixel_.size());
       for (std::size_t i = 0; i < pixel_.size(); ++i) {
-        weights_[i] = PixelAccumulator::weight_of(pixel_[i].coverage, free_[i]);
+        weights_[i] = PixelAccumulator::weight_of(pixel_[i].coverage, visible_[i]);
         sum.add(weights_[i], faces_[static_cast<std::size_t>(pixel_[i].face)].color);
       }
       const PixelAccumulator::Shares shares = sum.shares();
@@ -226,18 +226,18 @@ void ImageDrawer::draw(const ImageTarget& target) {
 void ImageDrawer::order_pixel(int x, int y) {
   const Vec2 corner{static_cast<float>(x), static_cast<float>(y)};
   auto stands_here = [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); };
-  auto hides = [&](const Fragment& other, const Fragment& fragment) {
+  auto occludes = [&](const Fragment& other, const Fragment& fragment) {
     const uint64_t shared = shared_samples(other.coverage, fragment.coverage);
     const ScreenFace& face = faces_[static_cast<std::size_t>(fragment.face)];
     const ScreenFace& other_face = faces_[static_cast<std::size_t>(other.face)];
     return shared != 0 && face.object_id != other_face.object_id &&
-           is_in_front(other_face, face, corner + middle_of(shared), stands_here);
+           is_in_front(other_face, face, corner + centroid_of(shared), stands_here);
   };
   for (auto next = pixel_.begin(); next != pixel_.end(); ++next) {
-    auto is_hidden = [&](const Fragment& fragment) {
-      return std::any_of(next, pixel_.end(), [&](const Fragment& other) { return hides(other, fragment); });
+    auto is_occluded = [&](const Fragment& fragment) {
+      return std::any_of(next, pixel_.end(), [&](const Fragment& other) { return occludes(other, fragment); });
     };
-    const auto front = std::find_if_not(next, pixel_.end(), is_hidden);
+    const auto front = std::find_if_not(next, pixel_.end(), is_occluded);
     if (front != pixel_.end()) std::rotate(next, front, front + 1);
   }
 }
@@ -261,7 +261,7 @@ void ImageDrawer::draw_planes(const ImageTarget& target) const {
     for (const ScreenFace& face : faces_) {
       if (y < face.box.y_begin || y >= face.box.y_end || (strips_again && !is_strip(face))) continue;
       for (int x = face.box.x_begin; x < face.box.x_end; ++x) {
-        const Vec2 center = pixel_middle(x, y);
+        const Vec2 center = pixel_center(x, y);
         FrontFace& front = fronts[static_cast<std::size_t>(x)];
         if (strips_again && !front.wants_strips_again()) continue;
         if (!covers_point(edges_.at(face.edge_begin), face.edge_count, center.x, center.y)) continue;
@@ -274,7 +274,7 @@ void ImageDrawer::draw_planes(const ImageTarget& target) const {
     offer(y, /*strips_again=*/false);
     offer(y, /*strips_again=*/true);
     for (int x = 0; x < width; ++x) {
-      const Vec2 center = pixel_middle(x, y);
+      const Vec2 center = pixel_center(x, y);
       const ScreenFace* face = fronts[static_cast<std::size_t>(x)].front(
           center, [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
       const std::size_t pixel =
@@ -302,19 +302,20 @@ void ImageDrawer::accumulate_visibility(int32_t agent, VisibilitySum* sum_inout)
   const int band_rows = max_of(1, kBandPixels / setting_.camera.width_px);
   for (; y_begin < y_end; y_begin += band_rows) {
     const RowRange rows{y_begin, min_of(y_end, y_begin + band_rows)};
-    auto weigh = [&](FaceRange faces) {
+    auto sum_weights = [&](FaceRange faces) {
       int64_t weight = 0;
       make_fragments(faces, rows);
       composite_rows(
           rows,
-          [&](int, const Fragment& fragment, float weighs) {
-            if (fragment.face >= wanted.begin && fragment.face < wanted.end) weight += VisibilitySum::units_of(weighs);
+          [&](int, const Fragment& fragment, float fragment_weight) {
+            if (fragment.face >= wanted.begin && fragment.face < wanted.end)
+              weight += VisibilitySum::units_of(fragment_weight);
           },
           [](int, Rgb) {});
       return weight;
     };
-    sum_inout->among_all += weigh({0, static_cast<int32_t>(faces_.size())});
-    sum_inout->alone += weigh(wanted);
+    sum_inout->among_all += sum_weights({0, static_cast<int32_t>(faces_.size())});
+    sum_inout->alone += sum_weights(wanted);
   }
 }
 

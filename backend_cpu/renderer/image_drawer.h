@@ -19,7 +19,7 @@ struct ImageRequest {
   PinholeCamera camera;  // in the world
   float line_floor_px = 0;
   bool debug_palette = false;
-  bool leaves_out_hidden = true;  // faces behind the solids that cover most of it
+  bool culls_occluded = true;  // faces behind the solids that cover most of it
 };
 
 /// Where one image goes.
@@ -72,7 +72,7 @@ class ImageDrawer {
     PrimitiveRef primitive;
     uint32_t entry = 0;
     bool may_occlude = false;
-    CameraQuad seen;
+    CameraQuad in_camera;
   };
 
   // A solid's face on screen, which may hide others.
@@ -80,7 +80,7 @@ class ImageDrawer {
     const Solid* solid = nullptr;
     float covered_px2 = 0;
     ScreenQuad quad;
-    bool turns_right = false;
+    bool is_clockwise = false;
   };
 
   // The faces [begin, end), and rows [y_begin, y_end) of the image.
@@ -101,7 +101,7 @@ class ImageDrawer {
   void make_fragments(FaceRange faces, RowRange rows);
   void collect_fragments(int32_t first);
   void order_pixel(int x, int y);
-  void hide_fragments(int x, int y);
+  void resolve_occlusion(int x, int y);
   // Weighs the fragments of all pixels of the rows: visit(pixel index, fragment, weight) for each, then
   // finish(pixel index, color).
   template <typename Visit, typename Finish>
@@ -121,7 +121,7 @@ class ImageDrawer {
   std::vector<LinkedFragment> fragments_;
   // Of one pixel.
   std::vector<Fragment> pixel_;
-  std::vector<uint64_t> free_;
+  std::vector<uint64_t> visible_;
   std::vector<PixelAccumulator::Weight> weights_;
 };
 

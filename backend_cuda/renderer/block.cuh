@@ -52,7 +52,7 @@ struct WarpState {
 
 /// In shared memory, whatever the block's other memory is.
 struct BlockState {
-  PreparedImage shown;     // what is drawn
+  PreparedImage current;   // what is drawn
   PreparedImage upcoming;  // what is drawn next
   Scratch scratch;         // this block's
   ScreenFace* faces;       // of this image
@@ -63,7 +63,7 @@ struct BlockState {
   SetupCounts listed;
   int32_t num_entries, num_faces, num_clipped, overflow, usable;
   // While pixels are drawn.
-  int32_t num_rows, num_candidates, num_fragments, num_added, num_drawn, next_fragments, image;
+  int32_t num_rows, num_candidates, num_fragments, num_added, num_composited, next_fragments, image;
   Part part, upcoming_part;
   PartPlan plan;
   WarpState warps[kMaxWarps];
@@ -82,7 +82,7 @@ __device__ inline void sync_block() {
 }
 
 // The next number of a counter, for a warp.
-__device__ inline int next_of(int32_t* counter) {
+__device__ inline int warp_next(int32_t* counter) {
   int next = 0;
   if (lane_index() == 0) next = atomicAdd(counter, 1);
   return __shfl_sync(kAllLanes, next, 0);
@@ -177,7 +177,7 @@ __device__ inline void warp_expand(WarpState* warp, int count, int end, Visit&& 
 // A list dealt out like cards, at most 32 to a deal, because entries that stand side by side are much work together:
 // entry lane * deals + deal of a deal is a lane's. As many deals for each warp, so that none waits long for the others.
 template <int kThreads>
-__device__ inline int deals_of(int count) {
+__device__ inline int passes_of(int count) {
   const unsigned rounds = static_cast<unsigned>(count + kThreads - 1) / kThreads;
   return static_cast<int>(rounds) * (kThreads / kWarpSize);
 }
@@ -190,25 +190,25 @@ class WarpQueue {
   __device__ void push(bool wanted, uint32_t a, uint32_t b) {
     const unsigned pushing = __ballot_sync(kAllLanes, wanted);
     if (wanted) {
-      const int place = count_ + __popc(pushing & lanes_below());
-      storage_->a[place] = a;
-      storage_->b[place] = b;
+      const int index = count_ + __popc(pushing & lanes_below());
+      storage_->a[index] = a;
+      storage_->b[index] = b;
     }
     count_ += __popc(pushing);
   }
   __device__ bool is_ready() const { return count_ >= kWarpSize; }
   __device__ bool is_empty() const { return count_ == 0; }
   struct Pair {
-    bool is_one;
+    bool is_valid;
     uint32_t a, b;
   };
   __device__ Pair take() {
     __syncwarp();
-    const int first = max_of(count_ - kWarpSize, 0), place = first + lane_index();
-    Pair pair{place < count_, 0, 0};
-    if (pair.is_one) {
-      pair.a = storage_->a[place];
-      pair.b = storage_->b[place];
+    const int first = max_of(count_ - kWarpSize, 0), index = first + lane_index();
+    Pair pair{index < count_, 0, 0};
+    if (pair.is_valid) {
+      pair.a = storage_->a[index];
+      pair.b = storage_->b[index];
     }
     count_ = first;
     __syncwarp();

@@ -27,9 +27,9 @@ struct ClipShared {
 /// An edge of a lane's face, in 16 bits.
 struct LaneEdge {
   int lane, from, to;  // the face's, and rows of its corners
-  bool turns_right;    // the face
+  bool is_clockwise;   // the face
   __device__ uint16_t packed() const {
-    return static_cast<uint16_t>(lane | from << 5 | to << 9 | (turns_right ? 1 << 13 : 0));
+    return static_cast<uint16_t>(lane | from << 5 | to << 9 | (is_clockwise ? 1 << 13 : 0));
   }
   __device__ static LaneEdge unpacked(unsigned word) {
     return {static_cast<int>(word & 31), static_cast<int>(word >> 5 & 15), static_cast<int>(word >> 9 & 15),
@@ -57,7 +57,7 @@ class LaneCorners {
 
 // Stores a value by words of 16 bytes: by words of 4, the lanes of a warp would write a part of memory each.
 template <typename Value>
-__device__ void store_whole(Value* to, const Value& value) {
+__device__ void store_words(Value* to, const Value& value) {
   static_assert(sizeof(Value) % sizeof(uint4) == 0 && alignof(Value) >= sizeof(uint4));
   constexpr int kWords = sizeof(Value) / sizeof(uint4);
   uint4 words[kWords];
@@ -67,7 +67,7 @@ __device__ void store_whole(Value* to, const Value& value) {
 
 // Copies a value, a lane each word of 16 bytes.
 template <typename Value>
-__device__ void copy_whole(Value* to, const Value& from) {
+__device__ void copy_words(Value* to, const Value& from) {
   constexpr int kWords = sizeof(Value) / sizeof(uint4);
   static_assert(sizeof(Value) % sizeof(uint4) == 0 && alignof(Value) >= sizeof(uint4));
   for (int word = lane_index(); word < kWords; word += kWarpSize) {
@@ -77,7 +77,7 @@ __device__ void copy_whole(Value* to, const Value& from) {
 
 // ... from global into shared memory; it is there once all lanes have waited for their copies.
 template <typename Value>
-__device__ void copy_whole_later(Value* to, const Value& from) {
+__device__ void copy_words_async(Value* to, const Value& from) {
   static_assert(sizeof(Value) % sizeof(uint64_t) == 0 && alignof(Value) >= sizeof(uint64_t));
   for (size_t at = sizeof(uint64_t) * static_cast<size_t>(lane_index()); at < sizeof(Value);
        at += sizeof(uint64_t) * kWarpSize) {
@@ -86,7 +86,7 @@ __device__ void copy_whole_later(Value* to, const Value& from) {
 }
 
 /// A face whose corners the lanes hold, one each; the rest is the same in all lanes.
-struct SharedFace {
+struct WarpFace {
   Vec3 corner;  // of lanes below count
   int count = 0;
   FacePlane plane;
@@ -107,36 +107,36 @@ __device__ inline float sum_in_order(float value) {
 }
 
 // The least and the greatest of the lanes' values, by integers of the same order.
-__device__ inline int32_t in_order(int32_t bits) { return bits ^ (bits >> 31 & 0x7FFFFFFF); }
+__device__ inline int32_t sortable_bits(int32_t bits) { return bits ^ (bits >> 31 & 0x7FFFFFFF); }
 __device__ inline float warp_min(float value) {
-  return __int_as_float(in_order(__reduce_min_sync(kAllLanes, in_order(__float_as_int(value)))));
+  return __int_as_float(sortable_bits(__reduce_min_sync(kAllLanes, sortable_bits(__float_as_int(value)))));
 }
 __device__ inline float warp_max(float value) {
-  return __int_as_float(in_order(__reduce_max_sync(kAllLanes, in_order(__float_as_int(value)))));
+  return __int_as_float(sortable_bits(__reduce_max_sync(kAllLanes, sortable_bits(__float_as_int(value)))));
 }
 
 // Hands the quad of a lane to all.
-__device__ inline SharedFace share_quad(ClipShared* storage, int owner, const Quad& quad) {
+__device__ inline WarpFace broadcast_quad(ClipShared* storage, int owner, const Quad& quad) {
   __syncwarp();
   if (lane_index() == owner) storage->quad = quad;
   __syncwarp();
-  const CameraQuad& seen = storage->quad.seen;
-  return {seen.corner[lane_index() & 3], 4, seen.plane, seen.color, storage->quad.primitive};
+  const CameraQuad& quad_of_owner = storage->quad.in_camera;
+  return {quad_of_owner.corner[lane_index() & 3], 4, quad_of_owner.plane, quad_of_owner.color, storage->quad.primitive};
 }
 
 // The disk of a lit head; of no corners where it has faded to black.
-__device__ inline SharedFace make_light(const FaceSetupContext& context, int32_t index) {
+__device__ inline WarpFace make_light(const FaceSetupContext& context, int32_t index) {
   const LightHead head = context.heads[index];
   const PinholeCamera& camera = context.setting.camera;
   LightDisk disk;
-  const bool is_seen = see_light(head, context.lights[head.signal], camera, &disk);
+  const bool is_seen = light_to_camera(head, context.lights[head.signal], camera, &disk);
   return {to_camera(camera, light_corner(head, lane_index())), is_seen ? kLightSides : 0, disk.plane, disk.color,
           light_ref(index)};
 }
 
 // clip_face of a lane's face, in place: corners are written no further than one behind the last that was read. The
-// number of corners, or kOutgrown where a lane has no room for them or the face is not quite convex.
-constexpr int kOutgrown = -1;
+// number of corners, or kTooManyCorners where a lane has no room for them or the face is not quite convex.
+constexpr int kTooManyCorners = -1;
 __device__ inline int clip(const Frustum& f, unsigned crossed, LaneCorners corners) {
   int count = crossed == kOutside ? 0 : 4;
   // Each lane goes through its own planes.
@@ -155,7 +155,7 @@ __device__ inline int clip(const Frustum& f, unsigned crossed, LaneCorners corne
       kept += is_cut ? 1 : 0;
       if (stays) corners.set(kept, current);
       kept += stays ? 1 : 0;
-      if (kept > min_of(i + 2, kLaneCorners)) return kOutgrown;
+      if (kept > min_of(i + 2, kLaneCorners)) return kTooManyCorners;
       previous = current;
       previous_inside = inside;
       current = next;
@@ -168,7 +168,7 @@ __device__ inline int clip(const Frustum& f, unsigned crossed, LaneCorners corne
 // Projects a lane's clipped face in place, as make_screen_face does. Sets its bounds and whether it turns right, and
 // returns which of its corners begin an edge, a bit for each; none where it covers nothing.
 __device__ inline unsigned project_in_place(const PinholeCamera& camera, LaneCorners corners, int count,
-                                            ScreenBounds* bounds, bool* turns_right) {
+                                            ScreenBounds* bounds, bool* is_clockwise) {
   PICTURA_NO_UNROLL
   for (int i = 0; i < count; ++i) {
     const Vec3 p = corners[i];
@@ -189,12 +189,12 @@ __device__ inline unsigned project_in_place(const PinholeCamera& camera, LaneCor
     if (corner.x != next.x || corner.y != next.y) edges |= 1u << i;
     corner = next;
   }
-  *turns_right = twice_area > 0.0f;
+  *is_clockwise = twice_area > 0.0f;
   return fabsf(twice_area) < kMinTwiceArea_px2 ? 0 : edges;
 }
 
 // ... of a face whose corners the lanes hold.
-__device__ inline void clip(const Frustum& f, ClipShared* storage, SharedFace* face_inout) {
+__device__ inline void clip(const Frustum& f, ClipShared* storage, WarpFace* face_inout) {
   const int lane = lane_index();
   Vec3 corner = face_inout->corner;
   int count = face_inout->count;
@@ -211,16 +211,16 @@ __device__ inline void clip(const Frustum& f, ClipShared* storage, SharedFace* f
     const bool stays = lane < count && inside >= 0.0f;
     const bool is_cut = lane < count && (previous_inside >= 0.0f) != (inside >= 0.0f);
     const unsigned cuts = __ballot_sync(kAllLanes, is_cut), staying = __ballot_sync(kAllLanes, stays);
-    const int place = __popc(cuts & lanes_below()) + __popc(staying & lanes_below());
+    const int index = __popc(cuts & lanes_below()) + __popc(staying & lanes_below());
     // Only a face that is not quite convex could outgrow the room; it loses corners then.
-    const bool fits = place + 2 <= kMaxPolygonCorners;
+    const bool fits = index + 2 <= kMaxPolygonCorners;
     auto keep = [&](int at, Vec3 p) {
       storage->x[0][at] = p.x;
       storage->y[0][at] = p.y;
       storage->z[0][at] = p.z;
     };
-    if (is_cut && fits) keep(place, cut_between(previous, previous_inside, corner, inside));
-    if (stays && fits) keep(place + (is_cut ? 1 : 0), corner);
+    if (is_cut && fits) keep(index, cut_between(previous, previous_inside, corner, inside));
+    if (stays && fits) keep(index + (is_cut ? 1 : 0), corner);
     const unsigned fitting = __ballot_sync(kAllLanes, fits);
     count = __popc(cuts & fitting) + __popc(staying & fitting);
     if (count < 3) count = 0;
@@ -233,7 +233,7 @@ __device__ inline void clip(const Frustum& f, ClipShared* storage, SharedFace* f
 }
 
 // make_screen_face of a clipped face whose corners the lanes hold, with edges from edge_begin on.
-__device__ inline bool make_screen_face(const FaceSetupContext& context, const SharedFace& face, int32_t edge_begin,
+__device__ inline bool make_screen_face(const FaceSetupContext& context, const WarpFace& face, int32_t edge_begin,
                                         ScreenFace* face_out) {
   const PinholeCamera& camera = context.setting.camera;
   const int lane = lane_index(), count = face.count;
@@ -253,12 +253,12 @@ __device__ inline bool make_screen_face(const FaceSetupContext& context, const S
   const bool is_between = lane > 0 && lane + 1 < count;
   const float twice_area = sum_in_order(is_between ? cross(corner - first, next - first) : 0.0f);
   if (fabsf(twice_area) < kMinTwiceArea_px2) return false;
-  const bool turns_right = twice_area > 0.0f;
+  const bool is_clockwise = twice_area > 0.0f;
   const bool is_edge = is_corner && (corner.x != next.x || corner.y != next.y);
   const unsigned edges = __ballot_sync(kAllLanes, is_edge);
   if (is_edge) {
-    store_whole(context.edges + edge_begin + __popc(edges & lanes_below()),
-                make_edge(turns_right ? corner : next, turns_right ? next : corner));
+    store_words(context.edges + edge_begin + __popc(edges & lanes_below()),
+                make_edge(is_clockwise ? corner : next, is_clockwise ? next : corner));
   }
   face_out->edge_count = static_cast<uint8_t>(__popc(edges));
   face_out->color = face.color;

@@ -34,16 +34,16 @@ class EntryList {
   __device__ EntryList(uint32_t* entries, int32_t max_entries, int32_t* count)
       : entries_(entries), max_entries_(max_entries), count_(count) {}
   __device__ void push(bool wanted, uint32_t entry) {
-    const int32_t place = warp_allocate_one(count_, wanted);
-    if (wanted) set(place, entry);
+    const int32_t index = warp_allocate_one(count_, wanted);
+    if (wanted) set(index, entry);
   }
   /// An entry for each of an agent's faces.
   __device__ void push_faces(unsigned faces, uint32_t object_id) {
     const int count = __popc(faces), end = warp_inclusive_sum(count);
-    int32_t place = warp_allocate(count_, end) + end - count;
+    int32_t index = warp_allocate(count_, end) + end - count;
     PICTURA_NO_UNROLL
     for (; faces != 0; faces &= faces - 1) {
-      set(place++, face_entry(object_id, __ffs(static_cast<int>(faces)) - 1));
+      set(index++, face_entry(object_id, __ffs(static_cast<int>(faces)) - 1));
     }
   }
   /// Fills the last batch, once all warps have found theirs.
@@ -53,8 +53,8 @@ class EntryList {
   }
 
  private:
-  __device__ void set(int32_t place, uint32_t entry) {
-    if (place < max_entries_) entries_[place] = entry;
+  __device__ void set(int32_t index, uint32_t entry) {
+    if (index < max_entries_) entries_[index] = entry;
   }
   uint32_t* entries_;
   int32_t max_entries_;
@@ -105,9 +105,9 @@ __device__ inline GridRows set_outline(CullShared* storage, const ImageSetting& 
   const bool has_pieces = !grid.items.empty();
   GridRows rows;
   for (int i = 0; i < 2; ++i) {
-    const bool is_one = has_pieces && of_walls == i;
-    rows.begin[i] = __reduce_min_sync(kAllLanes, is_one ? low : 0x7FFFFFFF);
-    rows.count[i] = max_of(__reduce_max_sync(kAllLanes, is_one ? high + 1 : 0) - rows.begin[i], 0);
+    const bool is_valid = has_pieces && of_walls == i;
+    rows.begin[i] = __reduce_min_sync(kAllLanes, is_valid ? low : 0x7FFFFFFF);
+    rows.count[i] = max_of(__reduce_max_sync(kAllLanes, is_valid ? high + 1 : 0) - rows.begin[i], 0);
   }
   __syncwarp();
   return rows;
@@ -175,8 +175,8 @@ __device__ inline void cull_pieces(BlockState* state, CullShared* storage, Entry
     auto candidate_of = [&](int item) {
       const int rank = owner_rank(item, begin, has_some);
       const int kind = rank >= num_of_strips ? 1 : 0;
-      const int place = min_of(item + lane, total - 1) + storage->offsets[rank];
-      return Candidate{storage->balls[kind][place], storage->items[kind][place], kind};
+      const int index = min_of(item + lane, total - 1) + storage->offsets[rank];
+      return Candidate{storage->balls[kind][index], storage->items[kind][index], kind};
     };
     int item = warp_index() * kWarpSize;
     Candidate next;
@@ -185,11 +185,12 @@ __device__ inline void cull_pieces(BlockState* state, CullShared* storage, Entry
     PICTURA_NO_UNROLL
     while (item < total) {
       const Candidate candidate = next;
-      const bool is_one = item + lane < total;
+      const bool is_valid = item + lane < total;
       item += num_threads();
       next = candidate_of(item);
-      const bool shows = ball_in_frustum(frustum, to_camera(camera, candidate.ball.center_m), candidate.ball.radius_m);
-      list->push(shows && is_one, make_object_id(candidate.kind != 0 ? kWallKind : kStripKind, candidate.index));
+      const bool is_visible =
+          sphere_in_frustum(frustum, to_camera(camera, candidate.ball.center_m), candidate.ball.radius_m);
+      list->push(is_visible && is_valid, make_object_id(candidate.kind != 0 ? kWallKind : kStripKind, candidate.index));
     }
     __syncwarp();
   }
@@ -205,8 +206,9 @@ __device__ inline void cull_agents(const BlockState& state, const DrawTask& task
     uint32_t faces = 0;
     if (agent < view.world_end) {
       const AgentBox box = task.scene.agents[static_cast<size_t>(agent)];
-      if (may_show(box, setting.camera, setting.frustum) && !is_left_out(view.view, task.scene.hidden_agents, agent)) {
-        faces = faces_to_eye(box, setting.camera.position_m);
+      if (may_be_visible(box, setting.camera, setting.frustum) &&
+          !is_excluded(view.view, task.scene.hidden_agents, agent)) {
+        faces = front_facing_mask(box, setting.camera.position_m);
       }
     }
     list->push_faces(faces, make_object_id(kAgentKind, agent - view.world_begin));
@@ -221,13 +223,13 @@ __device__ inline void cull_lights(const BlockState& state, EntryList* list) {
   PICTURA_NO_UNROLL
   for (int first = warp_index() * kWarpSize; first < num_heads; first += num_threads()) {
     const int index = first + lane_index();
-    bool shows = false;
+    bool is_visible = false;
     if (index < num_heads) {
       const LightHead head = heads[static_cast<size_t>(index)];
-      shows = may_show(head, setting.camera, setting.frustum) &&
-              light_is_visible(head, state.context.lights[head.signal], setting.camera.position_m);
+      is_visible = may_be_visible(head, setting.camera, setting.frustum) &&
+                   light_is_visible(head, state.context.lights[head.signal], setting.camera.position_m);
     }
-    list->push(shows, make_object_id(kLightKind, index));
+    list->push(is_visible, make_object_id(kLightKind, index));
   }
 }
 

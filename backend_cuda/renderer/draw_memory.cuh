@@ -34,10 +34,10 @@ struct DrawMemory {
   /// Of a candidate's pixel: the face covers all of it.
   static constexpr Word kCoversFully = Word{1} << (kHalf - 1);
   /// Of the lower half of a candidate.
-  __device__ static int pixel_of(uint32_t place) {
-    return static_cast<int>(place & ~static_cast<uint32_t>(kCoversFully));
+  __device__ static int pixel_of(uint32_t coded_pixel) {
+    return static_cast<int>(coded_pixel & ~static_cast<uint32_t>(kCoversFully));
   }
-  __device__ static bool covers_fully(uint32_t place) { return (place & kCoversFully) != 0; }
+  __device__ static bool covers_fully(uint32_t coded_pixel) { return (coded_pixel & kCoversFully) != 0; }
 
   BlockState* state;
   const ScreenFace* faces;   // of the image
@@ -46,42 +46,42 @@ struct DrawMemory {
   Word* rows;                // [max_rows] of faces: in the upper half the face, in the lower the row of the part
   Word* candidates;          // [max_candidates] that may become fragments: face, and pixel
   // Fragments.
-  uint32_t *samples_low, *samples_high, *free_low, *free_high;  // [max_fragments]
-  float* area;                                                  // [max_fragments]
-  Index *face, *pixel, *next;                                   // [max_fragments] next: of the pixel's chain, or kNone
-  Index* kind;                                                  // ... in the end, where `pixel` stood: of its weight
-  Index* drawn;                                                 // [max_fragments] pixels that have fragments
+  uint32_t *samples_low, *samples_high, *visible_low, *visible_high;  // [max_fragments]
+  float* area;                                                        // [max_fragments]
+  Index *face, *pixel, *next;  // [max_fragments] next: of the pixel's chain, or kNone
+  Index* kind;                 // ... in the end, where `pixel` stood: of its weight
+  Index* composited;           // [max_fragments] pixels that have fragments
   int32_t max_pixels, max_rows, max_candidates, max_fragments;
 
   __device__ uint64_t samples(int fragment) const {
     return static_cast<uint64_t>(samples_high[fragment]) << 32 | samples_low[fragment];
   }
   __device__ PixelCoverage coverage(int fragment) const { return {area[fragment], samples(fragment)}; }
-  __device__ uint64_t free(int fragment) const {
-    return static_cast<uint64_t>(free_high[fragment]) << 32 | free_low[fragment];
+  __device__ uint64_t visible(int fragment) const {
+    return static_cast<uint64_t>(visible_high[fragment]) << 32 | visible_low[fragment];
   }
   // Once a fragment is weighed, there stands where its samples did what it adds to its pixel's sum; in the end, of the
   // first of a pixel's chain, the pixel's colour, as numbers or as bytes.
   __device__ void set_part(int fragment, const PixelAccumulator::Part& part) const {
     samples_low[fragment] = static_cast<uint32_t>(part.area);
     samples_high[fragment] = static_cast<uint32_t>(part.r);
-    free_low[fragment] = static_cast<uint32_t>(part.g);
-    free_high[fragment] = static_cast<uint32_t>(part.b);
+    visible_low[fragment] = static_cast<uint32_t>(part.g);
+    visible_high[fragment] = static_cast<uint32_t>(part.b);
   }
   __device__ PixelAccumulator::Part part(int fragment) const {
     return {static_cast<int32_t>(samples_low[fragment]), static_cast<int32_t>(samples_high[fragment]),
-            static_cast<int32_t>(free_low[fragment]), static_cast<int32_t>(free_high[fragment])};
+            static_cast<int32_t>(visible_low[fragment]), static_cast<int32_t>(visible_high[fragment])};
   }
   __device__ void set_color(int fragment, Rgb color) const {
     samples_low[fragment] = __float_as_uint(color.r);
     samples_high[fragment] = __float_as_uint(color.g);
-    free_low[fragment] = __float_as_uint(color.b);
+    visible_low[fragment] = __float_as_uint(color.b);
   }
   __device__ void set_color_bytes(int fragment, uint32_t bytes) const { samples_low[fragment] = bytes; }
   __device__ uint32_t color_bytes(int fragment) const { return samples_low[fragment]; }
   __device__ Rgb color(int fragment) const {
     return {__uint_as_float(samples_low[fragment]), __uint_as_float(samples_high[fragment]),
-            __uint_as_float(free_low[fragment])};
+            __uint_as_float(visible_low[fragment])};
   }
 };
 
@@ -112,9 +112,9 @@ __host__ __device__ size_t lay_out(Memory* memory, int max_pixels, int max_fragm
   layout.place(&memory->samples_low, max_fragments);
   layout.place(&memory->samples_high, max_fragments);
   const size_t candidates_begin = layout.used;
-  layout.place(&memory->free_low, max_fragments);
-  layout.place(&memory->free_high, max_fragments);
-  layout.place(&memory->drawn, max_fragments);
+  layout.place(&memory->visible_low, max_fragments);
+  layout.place(&memory->visible_high, max_fragments);
+  layout.place(&memory->composited, max_fragments);
   memory->kind = memory->pixel;
   using Word = typename Memory::Word;
   memory->rows = reinterpret_cast<Word*>(bytes + rows_begin);
@@ -172,8 +172,8 @@ struct LargeDrawMemory : DrawMemory<uint32_t, unsigned long long, kLargeThreads>
 __host__ __device__ inline size_t draw_bytes() { return state_bytes(kDrawThreads) + SmallDrawMemory().place(nullptr); }
 __host__ __device__ inline size_t large_bytes(const Scratch& sizes) {
   SetupLists lists;
-  const size_t to_gather = lay_out(&lists, sizes, nullptr), to_draw = LargeDrawMemory().place(nullptr);
-  return ((to_gather > to_draw ? to_gather : to_draw) + 15) / 16 * 16;
+  const size_t to_set_up = lay_out(&lists, sizes, nullptr), to_draw = LargeDrawMemory().place(nullptr);
+  return ((to_set_up > to_draw ? to_set_up : to_draw) + 15) / 16 * 16;
 }
 
 // Gives the block its part of a launch's scratch memory. All threads of the block.

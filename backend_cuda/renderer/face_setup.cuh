@@ -95,13 +95,13 @@ __device__ bool make_quad(const FaceSetupContext& context, uint32_t entry, Quad*
     quad_out->primitive = wall_ref(index);
     world = wall_quad(context.walls[index]);
   }
-  return see_quad(world, setting.camera, &quad_out->seen);
+  return quad_to_camera(world, setting.camera, &quad_out->in_camera);
 }
 
 // Keeps the faces of those lanes that have one. Each image has room for all of its own.
 __device__ inline void keep_face(const FaceSetupContext& context, const ScreenFace& face, PrimitiveRef primitive,
                                  int32_t edge_begin, int32_t at) {
-  if (at >= 0) store_whole(context.faces + at, whole_face(face, primitive, edge_begin));
+  if (at >= 0) store_words(context.faces + at, complete_face(face, primitive, edge_begin));
 }
 
 // Stores the first rows side by side, all lanes 512 bytes at once: lanes that store a row each would fill halves of
@@ -141,25 +141,25 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
   const bool is_seen =
       make_quad(context, made, &quad, [&](int32_t) { return storage->strips[lane_index()].values[0]; });
   ScreenQuad on_screen;
-  bool turns_right = false;
-  const QuadSight sight = project_quad(camera, quad.seen.corner, quad.floor_px, &on_screen);
-  const bool covers = shows_whole(context.setting, on_screen, quad.seen.color, quad.primitive, &turns_right),
+  bool is_clockwise = false;
+  const ClipClass clip_class = project_quad(camera, quad.in_camera.corner, quad.floor_px, &on_screen);
+  const bool covers = is_quad_visible(context.setting, on_screen, quad.in_camera.color, quad.primitive, &is_clockwise),
              is_wanted = is_quad && is_seen;
-  const bool shows = is_wanted && sight == QuadSight::whole && covers,
-             is_clipped = is_wanted && sight == QuadSight::cut;
+  const bool is_visible = is_wanted && clip_class == ClipClass::inside && covers,
+             is_clipped = is_wanted && clip_class == ClipClass::crossing;
   // Two lanes ask for the places of all at once, and wait for them when edges are made.
-  const unsigned showing = __ballot_sync(kAllLanes, shows), clipped = __ballot_sync(kAllLanes, is_clipped);
-  const int lane = lane_index(), wanted = __popc(lane == 0 ? showing : (lane == 1 ? clipped : 0u));
+  const unsigned visible = __ballot_sync(kAllLanes, is_visible), clipped = __ballot_sync(kAllLanes, is_clipped);
+  const int lane = lane_index(), wanted = __popc(lane == 0 ? visible : (lane == 1 ? clipped : 0u));
   int32_t taken = 0;
   if (wanted > 0) taken = atomicAdd(lane == 0 ? context.num_faces : &counts->clipped, wanted);
-  const int rank = __popc(showing & lanes_below()), count = __popc(showing);
+  const int rank = __popc(visible & lanes_below()), count = __popc(visible);
   __syncwarp();  // edges go where strips were
   ScreenFace face;
-  if (shows) {
+  if (is_visible) {
     PolygonEdge* const edges = storage->edges[rank].values;
-    auto keep_edge = [edges](int k, const PolygonEdge& edge) { store_whole(edges + k, edge); };
-    make_quad_face(camera, context.setting.frustum, on_screen, turns_right, quad.seen.plane, quad.seen.color, keep_edge,
-                   &face);
+    auto keep_edge = [edges](int k, const PolygonEdge& edge) { store_words(edges + k, edge); };
+    make_quad_face(camera, context.setting.frustum, on_screen, is_clockwise, quad.in_camera.plane, quad.in_camera.color,
+                   keep_edge, &face);
   }
   __syncwarp();
   const int32_t at = __shfl_sync(kAllLanes, taken, 0), clipped_at = __shfl_sync(kAllLanes, taken, 1);
@@ -168,65 +168,65 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
   const int32_t edge_begin = context.edge_begin + 4 * at;
   store_rows(reinterpret_cast<uint4*>(context.edges + edge_begin), storage->edges, count);
   __syncwarp();
-  if (shows) {
-    store_whole(storage->faces[rank].values, whole_face(face, quad.primitive, edge_begin + 4 * rank));
+  if (is_visible) {
+    store_words(storage->faces[rank].values, complete_face(face, quad.primitive, edge_begin + 4 * rank));
   }
   __syncwarp();
   store_rows(reinterpret_cast<uint4*>(context.faces + at), storage->faces, count);
 }
 
 // Makes a face whose corners the lanes hold. False where there is no room for its edges. All lanes of the warp.
-__device__ inline bool make_shared_face(const FaceSetupContext& context, ClipShared* storage, SharedFace shared) {
-  clip(context.setting.frustum, storage, &shared);
-  if (shared.count == 0) return true;
+__device__ inline bool make_warp_face(const FaceSetupContext& context, ClipShared* storage, WarpFace warp_face) {
+  clip(context.setting.frustum, storage, &warp_face);
+  if (warp_face.count == 0) return true;
   int32_t edge_begin = 0;
-  if (lane_index() == 0) edge_begin = context.clipped_begin + atomicAdd(context.num_clipped, shared.count);
+  if (lane_index() == 0) edge_begin = context.clipped_begin + atomicAdd(context.num_clipped, warp_face.count);
   edge_begin = __shfl_sync(kAllLanes, edge_begin, 0);
-  if (edge_begin + shared.count > context.clipped_end) return false;
+  if (edge_begin + warp_face.count > context.clipped_end) return false;
   ScreenFace face;
-  const bool shows = make_screen_face(context, shared, edge_begin, &face);
-  if (shows && lane_index() == 0)
-    keep_face(context, face, shared.primitive, edge_begin, atomicAdd(context.num_faces, 1));
+  const bool is_visible = make_screen_face(context, warp_face, edge_begin, &face);
+  if (is_visible && lane_index() == 0)
+    keep_face(context, face, warp_face.primitive, edge_begin, atomicAdd(context.num_faces, 1));
   return true;
 }
 
 // Clips faces of four corners, the lanes' `thing` where is_one, and makes theirs but for what outgrows a lane's room:
 // of that *quad_out is kept. False in those lanes for whose face there is no room. All lanes of the warp.
-__device__ inline bool clip_quads(const FaceSetupContext* contexts, ClipShared* storage, bool is_one,
-                                  ClippedPrimitive primitive, Quad* quad_out, bool* has_outgrown_out) {
+__device__ inline bool clip_quads(const FaceSetupContext* contexts, ClipShared* storage, bool is_active,
+                                  ClippedPrimitive primitive, Quad* quad_out, bool* has_too_many_corners_out) {
   const FaceSetupContext& context = contexts[primitive.image];
   const PinholeCamera& camera = context.setting.camera;
   const LaneCorners corners(storage);
   Quad& quad = *quad_out;
   int kept = 0;
   auto strip_of = [&](int32_t index) { return context.strips[index]; };
-  if (is_one && make_quad(context, primitive.entry, &quad, strip_of) &&
-      (quad.floor_px <= 0.0f || widen_strip(camera, quad.floor_px, quad.seen.corner))) {
+  if (is_active && make_quad(context, primitive.entry, &quad, strip_of) &&
+      (quad.floor_px <= 0.0f || widen_strip(camera, quad.floor_px, quad.in_camera.corner))) {
     const Frustum frustum = context.setting.frustum;
-    for (int i = 0; i < 4; ++i) corners.set(i, quad.seen.corner[i]);
-    kept = clip(frustum, planes_crossed(frustum, quad.seen.corner, 4), corners);
+    for (int i = 0; i < 4; ++i) corners.set(i, quad.in_camera.corner[i]);
+    kept = clip(frustum, planes_crossed(frustum, quad.in_camera.corner, 4), corners);
   }
   ScreenBounds bounds;
-  bool turns_right = false;
-  const unsigned edges = kept > 0 ? project_in_place(camera, corners, kept, &bounds, &turns_right) : 0;
+  bool is_clockwise = false;
+  const unsigned edges = kept > 0 ? project_in_place(camera, corners, kept, &bounds, &is_clockwise) : 0;
   // The edges of all lanes, one face's behind the other's.
   const int count = __popc(edges), end = warp_inclusive_sum(count), total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
   int32_t edge_begin = 0;
   if (lane_index() == 0 && total > 0) edge_begin = context.clipped_begin + atomicAdd(context.num_clipped, total);
   edge_begin = __shfl_sync(kAllLanes, edge_begin, 0);
   int at = end - count;
-  const bool has_room = edges == 0 || edge_begin + end <= context.clipped_end;
-  if (edges != 0 && has_room) {
+  const bool fits = edges == 0 || edge_begin + end <= context.clipped_end;
+  if (edges != 0 && fits) {
     ScreenFace face;
     face.edge_count = static_cast<uint8_t>(count);
-    face.color = quad.seen.color;
-    set_bounds(camera, context.setting.frustum, bounds, quad.seen.plane, &face);
+    face.color = quad.in_camera.color;
+    set_bounds(camera, context.setting.frustum, bounds, quad.in_camera.plane, &face);
     keep_face(context, face, quad.primitive, edge_begin + at, atomicAdd(context.num_faces, 1));
   }
   PICTURA_NO_UNROLL
   for (unsigned left = edges; left != 0; left &= left - 1, ++at) {
     const int from = __ffs(static_cast<int>(left)) - 1;
-    storage->edges[at] = LaneEdge{lane_index(), from, from + 1 < kept ? from + 1 : 0, turns_right}.packed();
+    storage->edges[at] = LaneEdge{lane_index(), from, from + 1 < kept ? from + 1 : 0, is_clockwise}.packed();
   }
   __syncwarp();
   PICTURA_NO_UNROLL
@@ -234,37 +234,38 @@ __device__ inline bool clip_quads(const FaceSetupContext* contexts, ClipShared* 
     const LaneEdge edge = LaneEdge::unpacked(storage->edges[i]);
     const Vec2 from{storage->x[edge.from][edge.lane], storage->y[edge.from][edge.lane]};
     const Vec2 to{storage->x[edge.to][edge.lane], storage->y[edge.to][edge.lane]};
-    store_whole(context.edges + edge_begin + i, make_edge(edge.turns_right ? from : to, edge.turns_right ? to : from));
+    store_words(context.edges + edge_begin + i,
+                make_edge(edge.is_clockwise ? from : to, edge.is_clockwise ? to : from));
   }
   __syncwarp();
-  *has_outgrown_out = kept == kOutgrown;
-  return has_room;
+  *has_too_many_corners_out = kept == kTooManyCorners;
+  return fits;
 }
 
 // Clips things of a list, the lanes' `thing` where is_one, and makes their faces; primitive.image is that of contexts.
 // All are lights or none. False in those lanes for whose face there is no room. All lanes of the warp.
-__device__ inline bool clip_primitives(const FaceSetupContext* contexts, ClipShared* storage, bool is_one,
+__device__ inline bool clip_primitives(const FaceSetupContext* contexts, ClipShared* storage, bool is_active,
                                        bool are_lights, ClippedPrimitive primitive) {
   Quad quad;
-  bool has_room = true, is_shared = is_one;
-  if (!are_lights) has_room = clip_quads(contexts, storage, is_one, primitive, &quad, &is_shared);
+  bool fits = true, is_by_warp = is_active;
+  if (!are_lights) fits = clip_quads(contexts, storage, is_active, primitive, &quad, &is_by_warp);
   PICTURA_NO_UNROLL
-  for (unsigned shared = __ballot_sync(kAllLanes, is_shared); shared != 0; shared &= shared - 1) {
-    const int owner = __ffs(static_cast<int>(shared)) - 1;
+  for (unsigned pending = __ballot_sync(kAllLanes, is_by_warp); pending != 0; pending &= pending - 1) {
+    const int owner = __ffs(static_cast<int>(pending)) - 1;
     const FaceSetupContext& its_context = contexts[__shfl_sync(kAllLanes, primitive.image, owner)];
     const int32_t index = index_of(__shfl_sync(kAllLanes, primitive.entry, owner));
-    const bool is_made = make_shared_face(
-        its_context, storage, are_lights ? make_light(its_context, index) : share_quad(storage, owner, quad));
-    if (lane_index() == owner) has_room = is_made;
+    const bool is_made = make_warp_face(
+        its_context, storage, are_lights ? make_light(its_context, index) : broadcast_quad(storage, owner, quad));
+    if (lane_index() == owner) fits = is_made;
   }
-  return has_room;
+  return fits;
 }
 
 // What a warp is to clip at once: a light, which all of its lanes make, or `batch` faces of four corners, a lane each.
 // Lights come first: they take longest.
 struct ClippedItem {
-  bool is_any, are_lights;
-  bool is_one;  // of the lane
+  bool exists, are_lights;
+  bool is_active;  // of the lane
   ClippedPrimitive primitive;
 };
 __device__ inline ClippedItem clipped_item(const SetupLists& lists, const SetupCounts& listed, int item, int batch) {
@@ -302,19 +303,19 @@ class BestOccluders {
   __device__ explicit BestOccluders(FaceSetupContext* context) : context_(context) {}
 
   /// Each lane offers the face of an entry, or none. All lanes of the warp.
-  __device__ void offer(bool is_one, uint32_t entry) {
+  __device__ void offer(bool is_active, uint32_t entry) {
     const ImageSetting& setting = context_->setting;
     const FaceSetupContext* context = context_;
     Quad quad;
-    Offered own{is_one ? entry : kNoEntry};
-    if (is_one && make_quad(*context, entry, &quad, [context](int32_t i) { return context->strips[i]; })) {
-      own.covers = __float_as_int(occluded_px2(setting.camera, quad.seen, &own.on_screen, &own.turns_right));
+    Offered own{is_active ? entry : kNoEntry};
+    if (is_active && make_quad(*context, entry, &quad, [context](int32_t i) { return context->strips[i]; })) {
+      own.covers = __float_as_int(occluder_area_px2(setting.camera, quad.in_camera, &own.on_screen, &own.is_clockwise));
     }
     const Chosen chosen = choose(own);
-    const int place = move_in(own, chosen);
+    const int slot = insert(own, chosen);
     if (chosen.own) {
-      context_->setting.occluders.occluder[place] =
-          make_occluder(setting.camera, setting.frustum, quad.seen.plane, own.on_screen, own.turns_right);
+      context_->setting.occluders.occluder[slot] =
+          make_occluder(setting.camera, setting.frustum, quad.in_camera.plane, own.on_screen, own.is_clockwise);
     }
   }
 
@@ -326,7 +327,7 @@ class BestOccluders {
     uint32_t entry;
     int covers = 0;  // the area's bits, which sort as it does; 0: hides nothing
     ScreenQuad on_screen;
-    bool turns_right = false;
+    bool is_clockwise = false;
   };
   // Whether what the lane offers, and what it has kept so far, is among the best.
   struct Chosen {
@@ -338,9 +339,9 @@ class BestOccluders {
     int left = own.covers, kept_left = kept_covers_;
     PICTURA_NO_UNROLL
     for (int k = 0; k < Occluders::kMaxCount; ++k) {
-      const int most = __reduce_max_sync(kAllLanes, max_of(left, kept_left));
-      if (most == 0) break;
-      const uint32_t its = left == most ? own.entry : kNoEntry, other = kept_left == most ? kept_ : kNoEntry;
+      const int maximum = __reduce_max_sync(kAllLanes, max_of(left, kept_left));
+      if (maximum == 0) break;
+      const uint32_t its = left == maximum ? own.entry : kNoEntry, other = kept_left == maximum ? kept_ : kNoEntry;
       const uint32_t lowest = __reduce_min_sync(kAllLanes, its < other ? its : other);
       if (own.entry == lowest) {
         chosen.own = true;
@@ -355,21 +356,21 @@ class BestOccluders {
   }
 
   // The chosen offers take the places of those that go. The place of the lane's own.
-  __device__ int move_in(const Offered& own, Chosen chosen) {
-    unsigned places = ~__ballot_sync(kAllLanes, chosen.kept) & ((1u << Occluders::kMaxCount) - 1);
-    int place = 0;
+  __device__ int insert(const Offered& own, Chosen chosen) {
+    unsigned slots = ~__ballot_sync(kAllLanes, chosen.kept) & ((1u << Occluders::kMaxCount) - 1);
+    int slot = 0;
     PICTURA_NO_UNROLL
-    for (unsigned added = __ballot_sync(kAllLanes, chosen.own); added != 0; added &= added - 1, places &= places - 1) {
-      const int from = __ffs(static_cast<int>(added)) - 1, to = __ffs(static_cast<int>(places)) - 1;
+    for (unsigned added = __ballot_sync(kAllLanes, chosen.own); added != 0; added &= added - 1, slots &= slots - 1) {
+      const int from = __ffs(static_cast<int>(added)) - 1, to = __ffs(static_cast<int>(slots)) - 1;
       const uint32_t entry = __shfl_sync(kAllLanes, own.entry, from);
       const int covers = __shfl_sync(kAllLanes, own.covers, from);
-      if (lane_index() == from) place = to;
+      if (lane_index() == from) slot = to;
       if (lane_index() == to) {
         kept_ = entry;
         kept_covers_ = covers;
       }
     }
-    return place;
+    return slot;
   }
 
   FaceSetupContext* context_;
@@ -388,15 +389,15 @@ __device__ inline void find_occluders(FaceSetupContext* context, const uint32_t*
   };
   BestOccluders best(context);
   // Near ones are put aside until every lane has one.
-  WarpQueue near_ones(&block_state()->warps[warp_index()].queue);
+  WarpQueue queue(&block_state()->warps[warp_index()].queue);
   PICTURA_NO_UNROLL
   for (int32_t first = 0;; first += kWarpSize) {
     const bool is_more = first < count;
     const uint32_t entry = first + lane_index() < count ? entries[first + lane_index()] : kNoEntry;
-    near_ones.push(may_hide(entry), entry, 0);
-    if (near_ones.is_ready() || (!is_more && !near_ones.is_empty())) {
-      const WarpQueue::Pair near_one = near_ones.take();
-      best.offer(near_one.is_one, near_one.a);
+    queue.push(may_hide(entry), entry, 0);
+    if (queue.is_ready() || (!is_more && !queue.is_empty())) {
+      const WarpQueue::Pair candidate = queue.take();
+      best.offer(candidate.is_valid, candidate.a);
     }
     if (!is_more) break;
   }
@@ -419,32 +420,32 @@ struct SetupTarget {
 };
 
 // There the lists hold all that a world does.
-__device__ inline SetupTarget place_of(const Scratch& scratch) {
-  SetupTarget place{scratch.faces, scratch.edges, 0, 4 * scratch.max_faces, scratch.max_edges, {}};
-  lay_out(&place.lists, scratch, scratch.bytes);
-  return place;
+__device__ inline SetupTarget setup_target_of(const Scratch& scratch) {
+  SetupTarget target{scratch.faces, scratch.edges, 0, 4 * scratch.max_faces, scratch.max_edges, {}};
+  lay_out(&target.lists, scratch, scratch.bytes);
+  return target;
 }
 
 // Gathers an image into the block's own memory, all of it in one launch. False where there is no room for all, or where
 // its view names something that does not exist. All threads of the block.
-__device__ inline bool prepare_image(const DrawTask& task, int32_t view, int32_t camera, const SetupTarget& place,
-                                     bool leaves_out_hidden) {
+__device__ inline bool prepare_image(const DrawTask& task, int32_t view, int32_t camera, const SetupTarget& target,
+                                     bool culls_occluded) {
   BlockState* state = block_state();
   GeometryShared* storage = geometry_shared();
-  const SetupLists& lists = place.lists;
+  const SetupLists& lists = target.lists;
   sync_block();
   if (threadIdx.x == 0) {
     state->listed = {};
     state->num_entries = state->num_faces = state->num_clipped = state->overflow = 0;
     state->usable = set_image(state, task, view, camera) ? 1 : 0;
     FaceSetupContext* context = &state->context;
-    context->faces = state->faces = place.faces;
-    context->edges = state->edges = place.edges;
+    context->faces = state->faces = target.faces;
+    context->edges = state->edges = target.edges;
     context->num_faces = &state->num_faces;
     context->num_clipped = &state->num_clipped;
-    context->edge_begin = place.edge_begin;
-    context->clipped_begin = place.clipped_begin;
-    context->clipped_end = place.clipped_end;
+    context->edge_begin = target.edge_begin;
+    context->clipped_begin = target.clipped_begin;
+    context->clipped_end = target.clipped_end;
   }
   sync_block();
   if (state->usable == 0) return false;
@@ -454,7 +455,7 @@ __device__ inline bool prepare_image(const DrawTask& task, int32_t view, int32_t
   if (state->num_entries > lists.max_entries) return false;
   if (warp_index() == 0) {
     list.finish();
-    if (leaves_out_hidden) find_occluders(&state->context, lists.entries, state->num_entries);
+    if (culls_occluded) find_occluders(&state->context, lists.entries, state->num_entries);
   }
   sync_block();
   PICTURA_NO_UNROLL
@@ -467,12 +468,12 @@ __device__ inline bool prepare_image(const DrawTask& task, int32_t view, int32_t
   PICTURA_NO_UNROLL
   for (int i = warp_index();; i += num_warps()) {
     const ClippedItem item = clipped_item(lists, state->listed, i, kWarpSize);
-    if (!item.is_any) break;
-    if (!clip_primitives(&state->context, &storage->clip, item.is_one, item.are_lights, item.primitive))
+    if (!item.exists) break;
+    if (!clip_primitives(&state->context, &storage->clip, item.is_active, item.are_lights, item.primitive))
       state->overflow = 1;
   }
   sync_block();
-  if (threadIdx.x == 0) state->shown = image_of(*state, 0, state->num_faces);
+  if (threadIdx.x == 0) state->current = image_of(*state, 0, state->num_faces);
   sync_block();
   return state->overflow == 0;
 }

@@ -71,16 +71,16 @@ __device__ void list_rows(const Memory& memory, int num_faces, const Part& part)
     if (face < num_faces) {
       const PixelBox box = memory.faces[face].box;
       y_begin = max_of(box.y_begin, part.y_begin);
-      const bool is_beside = box.x_begin >= part.x_end || box.x_end <= part.x_begin;
-      rows = is_beside ? 0 : max_of(0, min_of(box.y_end, part.y_end) - y_begin);
+      const bool is_outside = box.x_begin >= part.x_end || box.x_end <= part.x_begin;
+      rows = is_outside ? 0 : max_of(0, min_of(box.y_end, part.y_end) - y_begin);
     }
     if (rows > 0) prefetch(memory.edges + memory.faces[face].edge_begin);
     const int end = warp_inclusive_sum(rows), row = y_begin - part.y_begin;
-    const int32_t place = warp_allocate(&memory.state->num_rows, end);
+    const int32_t index = warp_allocate(&memory.state->num_rows, end);
     warp_expand(warp, rows, end, [&](int item, int owner, int k) {
       const int its_row = __shfl_sync(kAllLanes, row, max_of(owner, 0)) + k;
-      if (owner >= 0 && place + item < memory.max_rows) {
-        memory.rows[place + item] = static_cast<Word>(first + owner) << Memory::kHalf | static_cast<Word>(its_row);
+      if (owner >= 0 && index + item < memory.max_rows) {
+        memory.rows[index + item] = static_cast<Word>(first + owner) << Memory::kHalf | static_cast<Word>(its_row);
       }
     });
   }
@@ -88,10 +88,10 @@ __device__ void list_rows(const Memory& memory, int num_faces, const Part& part)
 
 // Lists what may become a fragment, where there is room.
 template <typename Memory>
-__device__ void list_candidate(const Memory& memory, int place, int face, int pixel, bool covers_fully) {
+__device__ void list_candidate(const Memory& memory, int index, int face, int pixel, bool covers_fully) {
   using Word = typename Memory::Word;
-  if (place >= memory.max_candidates) return;
-  memory.candidates[place] = static_cast<Word>(face) << Memory::kHalf | static_cast<Word>(pixel) |
+  if (index >= memory.max_candidates) return;
+  memory.candidates[index] = static_cast<Word>(face) << Memory::kHalf | static_cast<Word>(pixel) |
                              (covers_fully ? Memory::kCoversFully : Word{0});
 }
 
@@ -101,13 +101,13 @@ template <typename Memory>
 __device__ int mark_pixel(const Memory& memory, int face, int x, int y, int pixel) {
   using Word = typename Memory::Word;
   const Word mark = PixelWord<Word>::mark(occluder_bound(memory.faces[face], x, y), face);
-  Word had = memory.pixels[pixel];
-  if (had < mark) had = atomicMax(&memory.pixels[pixel], mark);
-  const int other = PixelWord<Word>::marked_face(had);
+  Word previous = memory.pixels[pixel];
+  if (previous < mark) previous = atomicMax(&memory.pixels[pixel], mark);
+  const int other = PixelWord<Word>::marked_face(previous);
   if (other < 0) return -1;
-  const int loser = had < mark ? other : face;
-  const float bound = PixelWord<Word>::marked_bound(had < mark ? mark : had);
-  return passes_occluder_bound(memory.faces[loser], bound, x, y) ? loser : -1;
+  const int farther = previous < mark ? other : face;
+  const float bound = PixelWord<Word>::marked_bound(previous < mark ? mark : previous);
+  return passes_occluder_bound(memory.faces[farther], bound, x, y) ? farther : -1;
 }
 
 // A row of a face within a tile: columns from the tile's first on, a byte each, so that lanes hand them on at once.
@@ -138,10 +138,10 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
   using Word = typename Memory::Word;
   BlockState* state = memory.state;
   WarpState* warp = &state->warps[warp_index()];
-  const int num_rows = state->num_rows, deals = deals_of<Memory::kThreads>(num_rows);
+  const int num_rows = state->num_rows, passes = passes_of<Memory::kThreads>(num_rows);
   PICTURA_NO_UNROLL
-  for (int deal = warp_index(); deal < deals; deal += Memory::kThreads / kWarpSize) {
-    const int at = lane_index() * deals + deal;
+  for (int pass = warp_index(); pass < passes; pass += Memory::kThreads / kWarpSize) {
+    const int at = lane_index() * passes + pass;
     Word row = 0;
     TileSpan span;
     if (at < num_rows) {
@@ -167,16 +167,16 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
     warp_expand(warp, full, full_end, [&](int, int owner, int k) {
       const SharedRow its = row_of(owner);
       const int x = part.x_begin + its.span.full_begin() + k, pixel = part.pixel(x, its.y);
-      const int loser = owner >= 0 ? mark_pixel(memory, its.face, x, its.y, pixel) : -1;
-      if (!__any_sync(kAllLanes, loser >= 0)) return;
-      const int32_t place = warp_allocate_one(&state->num_candidates, loser >= 0);
-      if (loser >= 0) list_candidate(memory, place, loser, pixel, true);
+      const int farther = owner >= 0 ? mark_pixel(memory, its.face, x, its.y, pixel) : -1;
+      if (!__any_sync(kAllLanes, farther >= 0)) return;
+      const int32_t index = warp_allocate_one(&state->num_candidates, farther >= 0);
+      if (farther >= 0) list_candidate(memory, index, farther, pixel, true);
     });
-    const int32_t place = warp_allocate(&state->num_candidates, partial_end);
+    const int32_t index = warp_allocate(&state->num_candidates, partial_end);
     warp_expand(warp, partial, partial_end, [&](int item, int owner, int k) {
       const SharedRow its = row_of(owner);
       const int pixel = part.pixel(part.x_begin + its.span.partial(k), its.y);
-      if (owner >= 0) list_candidate(memory, place + item, its.face, pixel, false);
+      if (owner >= 0) list_candidate(memory, index + item, its.face, pixel, false);
     });
   }
 }
@@ -210,15 +210,15 @@ template <typename Memory>
 __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, const Part& part) {
   const int pixel = Memory::pixel_of(candidate.b);
   PixelCoverage coverage;
-  if (candidate.is_one) {
+  if (candidate.is_valid) {
     const ScreenFace& face = memory.faces[candidate.a];
     coverage = Memory::covers_fully(candidate.b) ? PixelCoverage{1.0f, kAllSamples}
                                                  : pixel_coverage(memory.edges + face.edge_begin, face.edge_count,
                                                                   face.min_area(), part.x_of(pixel), part.y_of(pixel));
   }
-  const bool is_left = coverage.area > 0.0f;
-  const int32_t fragment = warp_allocate_one(&memory.state->num_fragments, is_left);
-  if (!is_left || fragment >= memory.max_fragments) return;
+  const bool is_covered = coverage.area > 0.0f;
+  const int32_t fragment = warp_allocate_one(&memory.state->num_fragments, is_covered);
+  if (!is_covered || fragment >= memory.max_fragments) return;
   keep_fragment(memory, fragment, candidate.a, pixel, coverage.samples, coverage.area);
 }
 
@@ -226,26 +226,26 @@ __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, c
 // every lane of a warp has one. All threads of the block.
 template <typename Memory>
 __device__ void make_fragments(const Memory& memory, const Part& part) {
-  WarpQueue shown(&memory.state->warps[warp_index()].queue);
+  WarpQueue queue(&memory.state->warps[warp_index()].queue);
   const int count = memory.state->num_candidates;
   PICTURA_NO_UNROLL
   for (int first = warp_index() * kWarpSize;; first += Memory::kThreads) {
     const int i = first + lane_index();
     const bool more = i - lane_index() < count;
-    bool shows = false;
-    uint32_t face = 0, place = 0;
+    bool is_visible = false;
+    uint32_t face = 0, coded_pixel = 0;
     if (i < count) {
       const auto candidate = memory.candidates[i];
       face = static_cast<uint32_t>(candidate >> Memory::kHalf);
-      place = static_cast<uint32_t>(candidate & Memory::kNone);
-      const int pixel = Memory::pixel_of(place);
+      coded_pixel = static_cast<uint32_t>(candidate & Memory::kNone);
+      const int pixel = Memory::pixel_of(coded_pixel);
       const auto full = full_of(memory, pixel);
       const int x = part.x_of(pixel), y = part.y_of(pixel);
-      shows = full == Memory::kNone ||
-              passes_occluder_bound(memory.faces[face], occluder_bound(memory.faces[full], x, y), x, y);
+      is_visible = full == Memory::kNone ||
+                   passes_occluder_bound(memory.faces[face], occluder_bound(memory.faces[full], x, y), x, y);
     }
-    shown.push(shows, face, place);
-    if (shown.is_ready() || (!more && !shown.is_empty())) make_fragment(memory, shown.take(), part);
+    queue.push(is_visible, face, coded_pixel);
+    if (queue.is_ready() || (!more && !queue.is_empty())) make_fragment(memory, queue.take(), part);
     if (!more) return;
   }
 }
@@ -257,10 +257,10 @@ template <typename Memory>
 __device__ void finish_fragments(const Memory& memory, int count) {
   using Index = typename Memory::Index;
   using Word = typename Memory::Word;
-  auto free_all = [&](int fragment) {
-    const uint64_t reach = reach_of(memory.coverage(fragment));
-    memory.free_low[fragment] = static_cast<uint32_t>(reach);
-    memory.free_high[fragment] = static_cast<uint32_t>(reach >> 32);
+  auto set_all_visible = [&](int fragment) {
+    const uint64_t reach = effective_samples(memory.coverage(fragment));
+    memory.visible_low[fragment] = static_cast<uint32_t>(reach);
+    memory.visible_high[fragment] = static_cast<uint32_t>(reach >> 32);
   };
   PICTURA_NO_UNROLL
   for (int first = warp_index() * kWarpSize; first < count; first += Memory::kThreads) {
@@ -268,10 +268,10 @@ __device__ void finish_fragments(const Memory& memory, int count) {
     // The last of a chain stands for its pixel.
     const bool is_listed =
         i < count && memory.next[i] == static_cast<Index>(Memory::kNone) && !is_alone(memory, i, memory.pixel[i]);
-    const int32_t place = warp_allocate_one(&memory.state->num_drawn, is_listed);
-    if (is_listed) memory.drawn[place] = memory.pixel[i];
+    const int32_t index = warp_allocate_one(&memory.state->num_composited, is_listed);
+    if (is_listed) memory.composited[index] = memory.pixel[i];
     if (i >= count) continue;
-    free_all(i);
+    set_all_visible(i);
     if (!memory.coverage(i).is_full()) continue;
     const int pixel = memory.pixel[i];
     const Word full = full_of_word<Memory>(atomicAnd(&memory.pixels[pixel], ~PixelWord<Word>::kFace));
@@ -279,7 +279,7 @@ __device__ void finish_fragments(const Memory& memory, int count) {
     const int32_t added = count + atomicAdd(&memory.state->num_added, 1);
     if (added >= memory.max_fragments) continue;
     keep_fragment(memory, added, static_cast<uint32_t>(full), pixel, kAllSamples, 1.0f);
-    free_all(added);
+    set_all_visible(added);
   }
 }
 

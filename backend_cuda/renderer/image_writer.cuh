@@ -24,32 +24,32 @@ struct ImageWriter {
     }
   }
 
-  /// Writes at most kWrittenAtOnce pixels side by side, given their words.
+  /// Writes at most kPixelsPerWrite pixels side by side, given their words.
   template <typename Memory>
   __device__ void pixels(const Memory& memory, int x, int y, int count, const typename Memory::Word* words) const {
     const int64_t at = first + static_cast<int64_t>(y) * width_px + x;
     if (format == PixelFormat::u8) {
       write_bytes(memory, static_cast<uint8_t*>(images) + at, count, words);
     } else if (format == PixelFormat::f16) {
-      write_numbers(memory, static_cast<uint16_t*>(images) + at, count, words, [](float v) { return to_half(v); });
+      write_floats(memory, static_cast<uint16_t*>(images) + at, count, words, [](float v) { return to_half(v); });
     } else {
-      write_numbers(memory, static_cast<float*>(images) + at, count, words, [](float v) { return saturate(v); });
+      write_floats(memory, static_cast<float*>(images) + at, count, words, [](float v) { return saturate(v); });
     }
   }
 
  private:
   template <typename Value>
-  struct alignas(kWrittenAtOnce * sizeof(Value)) Together {
-    Value value[kWrittenAtOnce];
+  struct alignas(kPixelsPerWrite * sizeof(Value)) PixelVector {
+    Value value[kPixelsPerWrite];
   };
 
   template <typename Memory>
   __device__ void write_bytes(const Memory& memory, uint8_t* to, int count, const typename Memory::Word* words) const {
     // Many warps write nothing but black.
-    uint32_t bytes[kWrittenAtOnce] = {};
+    uint32_t bytes[kPixelsPerWrite] = {};
     typename Memory::Word some = 0;
-    for (int i = 0; i < kWrittenAtOnce; ++i) some |= words[i];
-    for (int i = 0; i < kWrittenAtOnce && some != 0; ++i) {
+    for (int i = 0; i < kPixelsPerWrite; ++i) some |= words[i];
+    for (int i = 0; i < kPixelsPerWrite && some != 0; ++i) {
       const auto full = full_of_word<Memory>(words[i]), head = first_of_word<Memory>(words[i]);
       bytes[i] = head != Memory::kNone   ? memory.color_bytes(static_cast<int>(head))
                  : full != Memory::kNone ? memory.faces[full].color_bytes
@@ -59,10 +59,10 @@ struct ImageWriter {
   }
 
   template <typename Memory, typename Value, typename ValueOf>
-  __device__ void write_numbers(const Memory& memory, Value* to, int count, const typename Memory::Word* words,
-                                ValueOf&& value_of) const {
-    Rgb colors[kWrittenAtOnce];
-    for (int i = 0; i < kWrittenAtOnce; ++i) {
+  __device__ void write_floats(const Memory& memory, Value* to, int count, const typename Memory::Word* words,
+                               ValueOf&& value_of) const {
+    Rgb colors[kPixelsPerWrite];
+    for (int i = 0; i < kPixelsPerWrite; ++i) {
       const auto full = full_of_word<Memory>(words[i]), head = first_of_word<Memory>(words[i]);
       if (head != Memory::kNone) {
         colors[i] = memory.color(static_cast<int>(head));
@@ -80,20 +80,20 @@ struct ImageWriter {
   __device__ void store_channels(Value* to, int count, ValueOf&& value_of) const {
     PICTURA_NO_UNROLL
     for (int channel = 0; channel < 3; ++channel, to += plane) {
-      Together<Value> values;
-      for (int i = 0; i < kWrittenAtOnce; ++i) values.value[i] = value_of(i, channel);
+      PixelVector<Value> values;
+      for (int i = 0; i < kPixelsPerWrite; ++i) values.value[i] = value_of(i, channel);
       store(to, count, values);
     }
   }
 
   // At once where all are written and lie where such a store may go.
   template <typename Value>
-  __device__ static void store(Value* to, int count, const Together<Value>& values) {
-    if (count == kWrittenAtOnce && reinterpret_cast<uintptr_t>(to) % sizeof(values) == 0) {
-      *reinterpret_cast<Together<Value>*>(to) = values;
+  __device__ static void store(Value* to, int count, const PixelVector<Value>& values) {
+    if (count == kPixelsPerWrite && reinterpret_cast<uintptr_t>(to) % sizeof(values) == 0) {
+      *reinterpret_cast<PixelVector<Value>*>(to) = values;
       return;
     }
-    for (int i = 0; i < kWrittenAtOnce; ++i) {
+    for (int i = 0; i < kPixelsPerWrite; ++i) {
       if (i < count) to[i] = values.value[i];
     }
   }

@@ -13,7 +13,7 @@ namespace pictura::cuda {
 constexpr int kNumCostBuckets = 16, kFacesPerCostBucket = 64;
 
 /// Pixels side by side that a thread writes together.
-constexpr int kWrittenAtOnce = 4;
+constexpr int kPixelsPerWrite = 4;
 
 /// Images are drawn tile by tile, upright ones, because what is far away crowds along the horizon. Tiles are at most so
 /// wide and high; narrower where there are few images, for blocks to end at about the same time.
@@ -24,8 +24,8 @@ struct TileGrid {
   PICTURA_HD constexpr int count() const { return across * down; }
 };
 PICTURA_HD constexpr TileGrid tiles_of(int max_px, int width_px, int height_px) {
-  auto parts_of = [](int whole, int most) { return (whole + most - 1) / most; };
-  const int together = kWrittenAtOnce * parts_of(parts_of(width_px, parts_of(width_px, max_px)), kWrittenAtOnce);
+  auto parts_of = [](int whole, int part) { return (whole + part - 1) / part; };
+  const int together = kPixelsPerWrite * parts_of(parts_of(width_px, parts_of(width_px, max_px)), kPixelsPerWrite);
   return {together, parts_of(width_px, together), parts_of(height_px, kTileHeight_px)};
 }
 
@@ -107,7 +107,7 @@ static_assert(sizeof(PreparedImage) == 2 * sizeof(void*) + 6 * sizeof(int32_t));
 
 /// A face of four corners, and what it belongs to.
 struct alignas(16) Quad {
-  CameraQuad seen;
+  CameraQuad in_camera;
   PrimitiveRef primitive;
   float floor_px;  // see CameraFace
 };
@@ -169,8 +169,8 @@ struct FacePool {
 };
 
 /// Of at most so many blocks, those that find room in a pool to gather an image each. A pool has room for one.
-PICTURA_HD inline int setup_blocks(const FacePool& pool, int most) {
-  return min_of(pool.max_faces / kMaxEntries, most);
+PICTURA_HD inline int setup_blocks(const FacePool& pool, int max_blocks) {
+  return min_of(pool.max_faces / kMaxEntries, max_blocks);
 }
 
 /// Memory of the blocks of the last launch, and how much each of them has.
@@ -189,7 +189,7 @@ struct DrawCounters {
   int32_t cost_buckets[kNumCostBuckets] = {};         // images that are drawn from it, by how much they list
   int32_t deferred = 0;                               // images for which it has no room
   int32_t overflow = 0;                               // ... that are left to the last launch
-  int32_t ended = 0;                                  // blocks of that
+  int32_t finished_blocks = 0;                        // blocks of that
 };
 
 struct DrawTask {

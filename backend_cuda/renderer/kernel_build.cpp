@@ -29,13 +29,13 @@ SharedLibrary open_nvrtc() {
     return {"cuda", chosen, kSource};
   }
   const std::string file = fmt::format("libnvrtc.so.{}", CUDART_VERSION / 1000);
-  const std::string beside = fmt::format("{}/{}", PICTURA_NVRTC_FOLDER, file);
+  const std::string fallback = fmt::format("{}/{}", PICTURA_NVRTC_FOLDER, file);
   std::error_code error;
   try {
     return {"cuda", file, kSource};
   } catch (const Error&) {
-    if (!std::filesystem::exists(beside, error)) throw;
-    return {"cuda", beside, kSource};
+    if (!std::filesystem::exists(fallback, error)) throw;
+    return {"cuda", fallback, kSource};
   }
 }
 

@@ -17,7 +17,7 @@ template <typename Memory>
 __device__ bool draw_image_part(const Memory& memory, const DrawTask& task, int32_t view, int32_t camera,
                                 const Part& part) {
   const CameraSlot& slot = task.cameras[camera];
-  const int width = width_px(slot.camera), num_faces = memory.state->shown.face_count;
+  const int width = width_px(slot.camera), num_faces = memory.state->current.face_count;
   const int64_t plane = static_cast<int64_t>(width) * height_px(slot.camera);
   const ImageWriter writer{task.format, slot.color, view * slot.view_stride, plane, width};
   if (!draw_faces(memory, num_faces, part, NoVisit{}, writer)) return false;
@@ -35,7 +35,7 @@ extern "C" __global__ void __launch_bounds__(kSetupThreads, kCullBlocksPerProces
   const int32_t num_images = task.num_views * num_cameras(task), num_blocks = static_cast<int32_t>(gridDim.x);
   PICTURA_NO_UNROLL
   for (auto image = static_cast<int32_t>(blockIdx.x); image < num_images;
-       image = num_blocks + next_of(&counters->next_culled)) {
+       image = num_blocks + warp_next(&counters->next_culled)) {
     const int32_t camera = camera_of(task, image);
     if (lane_index() == 0) {
       state->num_entries = 0;
@@ -58,7 +58,7 @@ extern "C" __global__ void __launch_bounds__(kSetupThreads, kCullBlocksPerProces
     int32_t first_batch = -1;
     if (lane_index() == 0) first_batch = allocate_faces(task, image, listed);
     __syncwarp();
-    copy_whole(task.pool.contexts + image, state->context);
+    copy_words(task.pool.contexts + image, state->context);
     first_batch = __shfl_sync(kAllLanes, first_batch, 0);
     const int32_t batches = first_batch >= 0 ? FaceBatch::count_of(listed) : 0;
     PICTURA_NO_UNROLL
@@ -85,7 +85,7 @@ extern "C" __global__ void __launch_bounds__(kSetupThreads, kFaceSetupBlocksPerP
   uint32_t entry = kNoEntry;
   auto prefetch_next = [&] {
     entry = entries_of(task.pool.lists, next.image)[next.first_entry + lane_index()];
-    copy_whole_later(&state->contexts[turn], task.pool.contexts[next.image]);
+    copy_words_async(&state->contexts[turn], task.pool.contexts[next.image]);
   };
   if (i < num_batches) prefetch_next();
   PICTURA_NO_UNROLL
@@ -115,10 +115,10 @@ extern "C" __global__ void __launch_bounds__(kSetupThreads, kClipBlocksPerProces
   const auto num_blocks = static_cast<int32_t>(gridDim.x);
   const int batch = clamp((listed.clipped + num_blocks - 1) / num_blocks, 1, kWarpSize);
   PICTURA_NO_UNROLL
-  for (auto i = static_cast<int32_t>(blockIdx.x);; i = num_blocks + next_of(&counters->next_clipped)) {
+  for (auto i = static_cast<int32_t>(blockIdx.x);; i = num_blocks + warp_next(&counters->next_clipped)) {
     const ClippedItem item = clipped_item(task.pool.lists, listed, i, batch);
-    if (!item.is_any) return;
-    if (!clip_primitives(task.pool.contexts, storage, item.is_one, item.are_lights, item.primitive) &&
+    if (!item.exists) return;
+    if (!clip_primitives(task.pool.contexts, storage, item.is_active, item.are_lights, item.primitive) &&
         atomicMin(&task.pool.images[item.primitive.image].face_count, kNotPrepared) >= 0) {
       defer(task, item.primitive.image);
     }
@@ -154,28 +154,28 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
       copy_into_shared(reinterpret_cast<char*>(&state->upcoming) + at, reinterpret_cast<const char*>(image) + at);
     }
   };
-  const bool is_taker = static_cast<int>(threadIdx.x) == kDrawThreads - kWarpSize;
-  if (is_taker) {
+  const bool is_prefetcher = static_cast<int>(threadIdx.x) == kDrawThreads - kWarpSize;
+  if (is_prefetcher) {
     after = atomicAdd(counter, 1);
     take_next();
   }
   reset_part(SmallDrawMemory::current());
   PICTURA_NO_UNROLL
   for (;;) {
-    if (is_taker) {
+    if (is_prefetcher) {
       wait_for_copies();
       state->image = next_image;
       state->part = state->upcoming_part;
-      state->shown = state->upcoming;
-      state->faces = task.pool.faces + state->shown.face_begin;
+      state->current = state->upcoming;
+      state->faces = task.pool.faces + state->current.face_begin;
       state->edges = task.pool.edges;
     }
     sync_block();
     const int32_t image = state->image;
     const Part part = state->part;
     if (image < 0) return;
-    if (is_taker) take_next();
-    if (part.num_rows() > 0 && state->shown.face_count >= 0) {
+    if (is_prefetcher) take_next();
+    if (part.num_rows() > 0 && state->current.face_count >= 0) {
       if (!draw_image_part(SmallDrawMemory::current(), task, view_of(task, image), camera_of(task, image), part) &&
           threadIdx.x == 0 && atomicExch(&task.pool.images[image].has_overflowed, 1) == 0) {
         mark_overflowed(task, image);
@@ -189,19 +189,19 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
 // Draws an image whose faces the block gathers itself. False where there is no room for all of it, or where its view
 // names something that does not exist. All threads of the block.
 template <typename Memory>
-__device__ bool prepare_and_draw(const DrawTask& task, int32_t image, const SetupTarget& place) {
+__device__ bool prepare_and_draw(const DrawTask& task, int32_t image, const SetupTarget& target) {
   const int32_t view = view_of(task, image), camera = camera_of(task, image);
-  const PinholeCamera& shows = task.cameras[camera].camera;
-  return prepare_image(task, view, camera, place, true) &&
-         each_tile(Memory::current(), width_px(shows), 0, height_px(shows), [&](const auto& memory, const Part& part) {
-           return draw_image_part(memory, task, view, camera, part);
-         });
+  const PinholeCamera& in_ego = task.cameras[camera].camera;
+  return prepare_image(task, view, camera, target, true) &&
+         for_each_tile(
+             Memory::current(), width_px(in_ego), 0, height_px(in_ego),
+             [&](const auto& memory, const Part& part) { return draw_image_part(memory, task, view, camera, part); });
 }
 
 // Shared memory of a block that draws what was deferred.
 __host__ __device__ inline size_t deferred_bytes() {
-  const size_t to_gather = setup_bytes(kDrawThreads), to_draw = draw_bytes();
-  return to_gather > to_draw ? to_gather : to_draw;
+  const size_t to_set_up = setup_bytes(kDrawThreads), to_draw = draw_bytes();
+  return to_set_up > to_draw ? to_set_up : to_draw;
 }
 
 // Draws the images for which the pool had no room: a block gathers one at a time where faces of others were.
@@ -213,7 +213,7 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDeferredBlocksPerPro
   const FacePool& pool = task.pool;
   const int32_t clipped_edges = (pool.max_edges - 4 * pool.max_faces) / num_blocks;
   const int32_t clipped_begin = 4 * pool.max_faces + block * clipped_edges;
-  const SetupTarget place{
+  const SetupTarget target{
       pool.faces + block * kMaxEntries,
       pool.edges,
       4 * block * kMaxEntries,
@@ -223,7 +223,7 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDeferredBlocksPerPro
   PICTURA_NO_UNROLL
   for (int32_t i = block; i < count; i += num_blocks) {
     const int32_t image = task.deferred_images[i];
-    if (!prepare_and_draw<SmallDrawMemory>(task, image, place) && threadIdx.x == 0) mark_overflowed(task, image);
+    if (!prepare_and_draw<SmallDrawMemory>(task, image, target) && threadIdx.x == 0) mark_overflowed(task, image);
   }
 }
 
@@ -236,11 +236,11 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
   PICTURA_NO_UNROLL
   for (int32_t i = static_cast<int32_t>(blockIdx.x); i < count; i += static_cast<int32_t>(gridDim.x)) {
     const int32_t image = task.overflow_images[i];
-    const bool is_drawn = prepare_and_draw<LargeDrawMemory>(task, image, place_of(state->scratch));
+    const bool is_drawn = prepare_and_draw<LargeDrawMemory>(task, image, setup_target_of(state->scratch));
     if (!is_drawn && threadIdx.x == 0) note_fault(task, view_of(task, image), FaultKind::capacity_exceeded);
   }
   sync_block();
-  if (threadIdx.x == 0 && atomicAdd(&task.counters->ended, 1) + 1 == static_cast<int32_t>(gridDim.x)) {
+  if (threadIdx.x == 0 && atomicAdd(&task.counters->finished_blocks, 1) + 1 == static_cast<int32_t>(gridDim.x)) {
     *task.counters = {};
   }
 }
@@ -256,13 +256,13 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
     auto fault = [&](int32_t index, FaultKind kind) {
       if (threadIdx.x == 0) note_fault(task.draw, index, kind);
     };
-    VisibilitySum seen;
+    VisibilitySum sum;
     const bool is_view = view >= 0 && view < task.draw.num_views;
     if (!is_view) fault(q, FaultKind::bad_query);
     PICTURA_NO_UNROLL
     for (int32_t camera = 0; is_view && camera < num_cameras(task.draw); ++camera) {
       // What is hidden counts where the agent is alone. What is wrong with the view, set_view notes.
-      if (!prepare_image(task.draw, view, camera, place_of(state->scratch), false)) {
+      if (!prepare_image(task.draw, view, camera, setup_target_of(state->scratch), false)) {
         if (state->usable != 0) fault(view, FaultKind::capacity_exceeded);
         continue;
       }
@@ -270,13 +270,13 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
         fault(q, FaultKind::bad_query);
         break;
       }
-      if (!accumulate_visibility(state, make_object_id(kAgentKind, agent - state->view.world_begin), &seen)) {
+      if (!accumulate_visibility(state, make_object_id(kAgentKind, agent - state->view.world_begin), &sum)) {
         fault(view, FaultKind::capacity_exceeded);
       }
     }
     // Nothing is drawn any more where drawing keeps its pixels.
     auto* of_thread = reinterpret_cast<int64_t*>(state->scratch.bytes);
-    const VisibilitySum all{block_sum(of_thread, seen.among_all), block_sum(of_thread, seen.alone)};
+    const VisibilitySum all{block_sum(of_thread, sum.among_all), block_sum(of_thread, sum.alone)};
     if (threadIdx.x == 0) task.visibility[q] = all.share();
     sync_block();
   }

@@ -8,23 +8,23 @@ namespace pictura::cuda {
 
 // Whether, in the image that the block draws, a solid stands on a strip.
 __device__ __noinline__ inline bool stands(uint32_t solid, uint32_t strip) {
-  const PreparedImage& shown = block_state()->shown;
-  const StaticGeometryView& pieces = shown.geometry->pieces;
-  return stands_on(extent_of(solid, pieces, shown.agents), extent_of(strip, pieces, shown.agents), shown.eye_m);
+  const PreparedImage& image = block_state()->current;
+  const StaticGeometryView& pieces = image.geometry->pieces;
+  return stands_on(extent_of(solid, pieces, image.agents), extent_of(strip, pieces, image.agents), image.eye_m);
 }
 
 // Takes samples from a fragment's free ones.
 template <typename Memory>
 __device__ void clear_visible_samples(const Memory& memory, uint32_t fragment, uint64_t samples) {
   const auto low = static_cast<uint32_t>(samples), high = static_cast<uint32_t>(samples >> 32);
-  if (low != 0) atomicAnd(&memory.free_low[fragment], ~low);
-  if (high != 0) atomicAnd(&memory.free_high[fragment], ~high);
+  if (low != 0) atomicAnd(&memory.visible_low[fragment], ~low);
+  if (high != 0) atomicAnd(&memory.visible_high[fragment], ~high);
 }
 
 // Asks pairs of fragments what they hide of each other; b may be kNone, for the pixel's full face.
 template <typename Memory>
 __device__ __noinline__ void resolve_pairs(WarpQueue::Pair pair, Part part) {
-  if (!pair.is_one) return;
+  if (!pair.is_valid) return;
   const Memory memory = Memory::current();
   const int pixel = memory.pixel[pair.a];
   const bool with_full = pair.b == Memory::kNone;
@@ -32,10 +32,10 @@ __device__ __noinline__ void resolve_pairs(WarpQueue::Pair pair, Part part) {
   const PixelCoverage a = memory.coverage(static_cast<int>(pair.a));
   const PixelCoverage b = with_full ? PixelCoverage{1.0f, kAllSamples} : memory.coverage(static_cast<int>(pair.b));
   const Vec2 corner{static_cast<float>(part.x_of(pixel)), static_cast<float>(part.y_of(pixel))};
-  const Hidden hidden = hide_each_other(a, b, memory.faces[memory.face[pair.a]], memory.faces[face_b], corner,
-                                        [](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
-  clear_visible_samples(memory, pair.a, hidden.of_a);
-  if (!with_full) clear_visible_samples(memory, pair.b, hidden.of_b);
+  const OccludedSamples occluded = occlude_pair(a, b, memory.faces[memory.face[pair.a]], memory.faces[face_b], corner,
+                                                [](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
+  clear_visible_samples(memory, pair.a, occluded.of_a);
+  if (!with_full) clear_visible_samples(memory, pair.b, occluded.of_b);
 }
 
 // Asks every two fragments of a pixel what they hide of each other, unless nothing is left that they might; a pixel's
@@ -43,7 +43,7 @@ __device__ __noinline__ void resolve_pairs(WarpQueue::Pair pair, Part part) {
 // next fragment at its end; the last made first, because theirs are the longest ways. Pairs that meet are put aside
 // until every lane of the warp has one.
 template <typename Memory>
-__device__ void hide_fragments(const Memory& memory, const Part& part, int count) {
+__device__ void resolve_occlusion(const Memory& memory, const Part& part, int count) {
   WarpQueue pairs(&memory.state->warps[warp_index()].queue);
   int begin = 0, used = kWarpSize;  // the warp's fragments of the list, and how many of them lanes have taken
   int fragment = 0;
@@ -56,27 +56,28 @@ __device__ void hide_fragments(const Memory& memory, const Part& part, int count
     const unsigned idle = __ballot_sync(kAllLanes, is_idle);
     if (idle == kAllLanes && begin >= count) break;
     if (used >= kWarpSize && begin < count) {
-      begin = next_of(&memory.state->next_fragments) * kWarpSize;
+      begin = warp_next(&memory.state->next_fragments) * kWarpSize;
       used = 0;
     }
-    const int place = used + __popc(idle & lanes_below());
+    const int index = used + __popc(idle & lanes_below());
     used += __popc(idle);
-    if (is_idle && place < kWarpSize && begin + place < count) {
-      fragment = count - 1 - (begin + place);
+    if (is_idle && index < kWarpSize && begin + index < count) {
+      fragment = count - 1 - (begin + index);
       samples = memory.samples(fragment);
       other = memory.next[fragment];
       is_before_full = full_of(memory, memory.pixel[fragment]) != Memory::kNone;
     }
     uint32_t with = Memory::kNone;
-    bool meet = is_before_full && memory.free(fragment) != 0;
+    bool may_overlap = is_before_full && memory.visible(fragment) != 0;
     if (!is_before_full && other != Memory::kNone) {
       with = other;
-      const auto its = static_cast<int>(with);
-      meet = may_hide_more(memory.free(fragment), samples, memory.free(its), memory.samples(its));
+      const auto its_index = static_cast<int>(with);
+      may_overlap =
+          may_occlude_more(memory.visible(fragment), samples, memory.visible(its_index), memory.samples(its_index));
       other = memory.next[with];
     }
     is_before_full = false;
-    pairs.push(meet, static_cast<uint32_t>(fragment), with);
+    pairs.push(may_overlap, static_cast<uint32_t>(fragment), with);
     if (pairs.is_ready()) resolve_pairs<Memory>(pairs.take(), part);
   }
   if (!pairs.is_empty()) resolve_pairs<Memory>(pairs.take(), part);
@@ -91,7 +92,7 @@ struct NoVisit {
 // Weighs fragments. What is alone in its pixel gives that its colour; what the others add to the sums of theirs, and
 // what kind of weight that is, stands from then on where their samples and pixels did.
 template <typename Memory, typename Visit, typename Write>
-__device__ void composite_fragments(const Memory& memory, int count, const Visit& visit, const Write& write) {
+__device__ void compute_weights(const Memory& memory, int count, const Visit& visit, const Write& write) {
   PICTURA_NO_UNROLL
   for (int i = static_cast<int>(threadIdx.x); i < count; i += Memory::kThreads) {
     const ScreenFace& face = memory.faces[memory.face[i]];
@@ -101,7 +102,7 @@ __device__ void composite_fragments(const Memory& memory, int count, const Visit
       write.keep(memory, i, color * memory.area[i]);
       continue;
     }
-    const PixelAccumulator::Weight weight = PixelAccumulator::weight_of(memory.coverage(i), memory.free(i));
+    const PixelAccumulator::Weight weight = PixelAccumulator::weight_of(memory.coverage(i), memory.visible(i));
     memory.set_part(i, PixelAccumulator::part_of(weight, color));
     memory.area[i] = weight.area;
     memory.kind[i] = weight.kind;
@@ -110,11 +111,11 @@ __device__ void composite_fragments(const Memory& memory, int count, const Visit
 
 // Mixes the colours of those pixels of a part that have more than one fragment: visit(face, weight) hears of each.
 template <typename Memory, typename Visit, typename Write>
-__device__ void mix_pixels(const Memory& memory, const Visit& visit, const Write& write) {
-  const int num_drawn = memory.state->num_drawn;
+__device__ void composite_pixels(const Memory& memory, const Visit& visit, const Write& write) {
+  const int num_composited = memory.state->num_composited;
   PICTURA_NO_UNROLL
-  for (int d = static_cast<int>(threadIdx.x); d < num_drawn; d += Memory::kThreads) {
-    const int pixel = memory.drawn[d];
+  for (int d = static_cast<int>(threadIdx.x); d < num_composited; d += Memory::kThreads) {
+    const int pixel = memory.composited[d];
     const auto full = full_of(memory, pixel);
     const auto head = static_cast<int>(first_of(memory, pixel));
     auto each_fragment = [&](auto&& take) {
@@ -145,11 +146,11 @@ __device__ void write_pixels(const Memory& memory, const Part& part, const Visit
   using Word = typename Memory::Word;
   const int pixels = part.num_pixels();
   PICTURA_NO_UNROLL
-  for (int first = kWrittenAtOnce * static_cast<int>(threadIdx.x); first < pixels;
-       first += kWrittenAtOnce * Memory::kThreads) {
-    const int x = part.x_of(first), y = part.y_of(first), count = min_of(part.x_end - x, kWrittenAtOnce);
-    Word word[kWrittenAtOnce];
-    for (int i = 0; i < kWrittenAtOnce; ++i) {
+  for (int first = kPixelsPerWrite * static_cast<int>(threadIdx.x); first < pixels;
+       first += kPixelsPerWrite * Memory::kThreads) {
+    const int x = part.x_of(first), y = part.y_of(first), count = min_of(part.x_end - x, kPixelsPerWrite);
+    Word word[kPixelsPerWrite];
+    for (int i = 0; i < kPixelsPerWrite; ++i) {
       word[i] = memory.pixels[first + i];
       memory.pixels[first + i] = 0;
       if constexpr (Visit::kWanted) {
@@ -168,7 +169,7 @@ template <typename Memory>
 __device__ void reset_counts(const Memory& memory) {
   BlockState* state = memory.state;
   if (threadIdx.x != 0) return;
-  state->num_rows = state->num_candidates = state->num_fragments = state->num_added = state->num_drawn = 0;
+  state->num_rows = state->num_candidates = state->num_fragments = state->num_added = state->num_composited = 0;
   state->next_fragments = 0;
 }
 // What a part finds when it begins: nothing is marked, nothing listed. For a block's first part, and after one that was
@@ -185,7 +186,7 @@ __device__ void reset_part(const Memory& memory) {
 // Makes the fragments of the listed rows and mixes the colours of their pixels. False where there is no room for all
 // that is listed. All threads of the block.
 template <typename Memory, typename Visit, typename Write>
-__device__ bool mix_rows(const Memory& memory, const Part& part, const Visit& visit, const Write& write) {
+__device__ bool draw_rows(const Memory& memory, const Part& part, const Visit& visit, const Write& write) {
   BlockState* state = memory.state;
   if (state->num_rows > memory.max_rows) return false;
   mark_and_list(memory, part);
@@ -199,11 +200,11 @@ __device__ bool mix_rows(const Memory& memory, const Part& part, const Visit& vi
   sync_block();
   const int count = made + state->num_added;
   if (count > memory.max_fragments) return false;
-  hide_fragments(memory, part, count);
+  resolve_occlusion(memory, part, count);
   sync_block();
-  composite_fragments(memory, count, visit, write);
+  compute_weights(memory, count, visit, write);
   sync_block();
-  mix_pixels(memory, visit, write);
+  composite_pixels(memory, visit, write);
   sync_block();
   return true;
 }
@@ -217,7 +218,7 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
   sync_block();
   // Counters of nothing are 0 already, and others may still be asking.
   if (memory.state->num_rows != 0) {
-    if (!mix_rows(memory, part, visit, write)) return false;
+    if (!draw_rows(memory, part, visit, write)) return false;
     reset_counts(memory);
   }
   write_pixels(memory, part, visit, write);
@@ -229,7 +230,7 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
 // All threads of the block.
 template <typename Memory>
 __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn) {
-  constexpr int kNarrowPart_px = 2 * kWrittenAtOnce;
+  constexpr int kNarrowPart_px = 2 * kPixelsPerWrite;
   const Memory memory = Memory::current();
   auto half_of = [](int size) { return (size + 1) / 2; };
   sync_block();
@@ -254,7 +255,7 @@ __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn
         x = plan.band_begin;
       }
     } else if (rows == whole.num_rows() && columns > kNarrowPart_px) {
-      plan.band_px = plan.wide_px = (half_of(columns) + kWrittenAtOnce - 1) / kWrittenAtOnce * kWrittenAtOnce;
+      plan.band_px = plan.wide_px = (half_of(columns) + kPixelsPerWrite - 1) / kPixelsPerWrite * kPixelsPerWrite;
     } else if (rows > 1) {
       plan.rows = half_of(rows);
     } else {
@@ -290,7 +291,7 @@ __device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whol
 
 // Tiles of an image as high as there is room for, one after the other: draw(memory, tile) for each, until one is false.
 template <typename Memory, typename Draw>
-__device__ bool each_tile(const Memory& memory, int width_px, int y_begin, int y_end, const Draw& draw) {
+__device__ bool for_each_tile(const Memory& memory, int width_px, int y_begin, int y_end, const Draw& draw) {
   const int max_rows = memory.max_pixels / kTileWidth_px;
   reset_part(memory);
   PICTURA_NO_UNROLL

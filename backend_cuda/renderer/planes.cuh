@@ -17,9 +17,9 @@ __device__ __noinline__ void draw_planes(CameraPlanes planes, int width_px, int6
   sync_block();
   // Those of a row in a chain, which begins where its first pixel was and goes on where candidates were; 0 ends it.
   const int num_rows = memory.state->num_rows;
-  const bool has_room = num_rows <= memory.max_rows;
+  const bool fits = num_rows <= memory.max_rows;
   PICTURA_NO_UNROLL
-  for (int i = static_cast<int>(threadIdx.x); has_room && i < num_rows; i += Memory::kThreads) {
+  for (int i = static_cast<int>(threadIdx.x); fits && i < num_rows; i += Memory::kThreads) {
     memory.candidates[i] = atomicExch(&memory.pixels[memory.rows[i] & Memory::kNone], static_cast<Word>(i + 1));
   }
   sync_block();
@@ -27,7 +27,7 @@ __device__ __noinline__ void draw_planes(CameraPlanes planes, int width_px, int6
   for (int p = static_cast<int>(threadIdx.x); p < part.num_pixels(); p += Memory::kThreads) {
     const int x = part.x_of(p), y = part.y_of(p);
     if (x >= part.x_end) continue;
-    const Vec2 center = pixel_middle(x, y);
+    const Vec2 center = pixel_center(x, y);
     FrontFace front;
     auto each = [&](auto&& is_wanted, auto&& take) {
       auto ask = [&](const ScreenFace& face) {
@@ -35,7 +35,7 @@ __device__ __noinline__ void draw_planes(CameraPlanes planes, int width_px, int6
         if (x < face.box.x_begin || x >= face.box.x_end || y < face.box.y_begin || y >= face.box.y_end) return;
         if (covers_point(memory.edges + face.edge_begin, face.edge_count, center.x, center.y)) take(face);
       };
-      if (has_room) {
+      if (fits) {
         PICTURA_NO_UNROLL
         for (Word at = memory.pixels[y - part.y_begin]; at != 0; at = memory.candidates[at - 1]) {
           ask(memory.faces[memory.rows[at - 1] >> Memory::kHalf]);

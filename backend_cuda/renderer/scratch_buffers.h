@@ -28,8 +28,8 @@ struct PoolSizes {
   }
 };
 constexpr PoolSizes pool_sizes(std::size_t images) {
-  const std::size_t rooms = images + kMinPoolImages;
-  return {images, rooms * kPoolFaces, rooms * kPoolEdges};
+  const std::size_t num_allocations = images + kMinPoolImages;
+  return {images, num_allocations * kPoolFaces, num_allocations * kPoolEdges};
 }
 /// What a pool takes without images, and what each of them adds; together within a batch of its bytes, and not less.
 constexpr std::size_t kPoolImageBytes =
@@ -45,7 +45,7 @@ class PoolBuffers {
       : faces_(sizes.faces),
         edges_(sizes.edges),
         images_(sizes.images),
-        makings_(sizes.images),
+        contexts_(sizes.images),
         batches_(sizes.batches()),
         entries_(sizes.entries()),
         clipped_(sizes.faces),
@@ -55,7 +55,7 @@ class PoolBuffers {
     task_out->pool = {faces_.data(),
                       edges_.data(),
                       images_.data(),
-                      makings_.data(),
+                      contexts_.data(),
                       batches_.data(),
                       {entries_.data(), clipped_.data(), kMaxEntries, static_cast<int32_t>(clipped_.size())},
                       static_cast<int32_t>(faces_.size()),
@@ -69,7 +69,7 @@ class PoolBuffers {
   Buffer<ScreenFace> faces_;
   Buffer<PolygonEdge> edges_;
   Buffer<PreparedImage> images_;
-  Buffer<FaceSetupContext> makings_;
+  Buffer<FaceSetupContext> contexts_;
   Buffer<FaceBatch> batches_;
   Buffer<uint32_t> entries_;
   Buffer<ClippedPrimitive> clipped_;

@@ -41,10 +41,10 @@ __device__ inline bool accumulate_visibility(BlockState* state, uint32_t object_
   const RowRange rows = rows_of(*state, object_id);
   const int num_faces = state->num_faces;
   auto add_to = [&](int64_t* sum) {
-    return each_tile(LargeDrawMemory::current(), state->context.setting.camera.width_px, rows.y_begin, rows.y_end,
-                     [&](const LargeDrawMemory& memory, const Part& part) {
-                       return draw_faces(memory, num_faces, part, AccumulateVisibility{object_id, sum}, NoImage{});
-                     });
+    return for_each_tile(LargeDrawMemory::current(), state->context.setting.camera.width_px, rows.y_begin, rows.y_end,
+                         [&](const LargeDrawMemory& memory, const Part& part) {
+                           return draw_faces(memory, num_faces, part, AccumulateVisibility{object_id, sum}, NoImage{});
+                         });
   };
   if (!add_to(&sum_inout->among_all)) return false;
   sync_block();

@@ -69,7 +69,7 @@ PICTURA_HD inline Frustum make_frustum(const PinholeCamera& camera) {
 }
 
 /// Whether a ball (camera coordinates) may touch what is drawn. Faces whose corners are all out of range are black.
-PICTURA_HD inline bool ball_in_frustum(const Frustum& f, Vec3 center, float radius_m) {
+PICTURA_HD inline bool sphere_in_frustum(const Frustum& f, Vec3 center, float radius_m) {
   // All at once: lanes of a warp differ in what fails first.
   const bool in_range = (center.z + radius_m > kNear_m) & (center.z - radius_m < kVisibleRange_m);
   const bool in_width = ((center.x - f.x_low * center.z) * f.x_low_scale > -radius_m) &

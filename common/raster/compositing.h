@@ -25,11 +25,11 @@ class PixelAccumulator {
   };
 
   /// free: what is left of the coverage's reach after all that others hide.
-  PICTURA_HD static Weight weight_of(const PixelCoverage& coverage, uint64_t free) {
-    const uint64_t reach = reach_of(coverage);
-    const float share = static_cast<float>(popcount(free)) / static_cast<float>(popcount(reach));
+  PICTURA_HD static Weight weight_of(const PixelCoverage& coverage, uint64_t visible) {
+    const uint64_t samples = effective_samples(coverage);
+    const float share = static_cast<float>(popcount(visible)) / static_cast<float>(popcount(samples));
     if (coverage.is_full()) return {share, kRemainder};
-    if (free == reach) return {coverage.area, kWhole};
+    if (visible == samples) return {coverage.area, kWhole};
     return {coverage.area * share, kPartial};
   }
 

@@ -34,7 +34,7 @@ struct PixelCoverage {
 };
 
 /// Where a coverage counts as being: its samples; a sliver that touches none is wherever another one is.
-PICTURA_HD inline uint64_t reach_of(const PixelCoverage& coverage) {
+PICTURA_HD inline uint64_t effective_samples(const PixelCoverage& coverage) {
   return coverage.samples != 0 ? coverage.samples : kAllSamples;
 }
 
@@ -42,11 +42,11 @@ PICTURA_HD inline uint64_t reach_of(const PixelCoverage& coverage) {
 constexpr float kFullCoverage = 1e-3f;
 
 /// Heights at which an edge's line passes the left and the right side of a pixel, in pixels from its top.
-struct Passage {
+struct EdgeCrossing {
   float left = 0, right = 0;
 };
 /// left_px and top_px are the pixel's corner relative to the edge's upper end.
-PICTURA_HD inline Passage passage_of(const PolygonEdge& edge, float left_px, float top_px) {
+PICTURA_HD inline EdgeCrossing edge_crossing(const PolygonEdge& edge, float left_px, float top_px) {
   const float left = left_px * edge.dy_dx - top_px;
   return {left, left + edge.dy_dx};
 }
@@ -61,10 +61,10 @@ PICTURA_HD inline SampleRange whole_range() {
 }
 
 /// Narrows a range to the inner side of an edge.
-PICTURA_HD inline void narrow(const PolygonEdge& edge, const Passage& passage, SampleRange* range_inout) {
+PICTURA_HD inline void narrow(const PolygonEdge& edge, const EdgeCrossing& crossing, SampleRange* range_inout) {
   constexpr float kWhole = 1 << 8;  // the lowest bit of what is added to it is one of kLines_rows * kRowUnits
   constexpr uint32_t kLowest = 0, kHighest = 0x80008000u;
-  const float at = saturate((passage.left + passage.right) * fabsf(edge.rows_scale) + edge.rows_offset);
+  const float at = saturate((crossing.left + crossing.right) * fabsf(edge.rows_scale) + edge.rows_offset);
   const uint32_t height = broadcast_low16(bits_from_float(at + kWhole));
   // Of the sums, one half of 2^15 is the middle, which is 0.
   const Int16x8 columns = arithmetic_sequence(edge.rows_step, (1 << 16) - (1 << 14));
@@ -87,20 +87,20 @@ PICTURA_HD inline uint64_t samples_within(const SampleRange& range) {
 /// Samples on the inner side of an edge; left_px and top_px are the pixel's corner relative to the edge's upper end.
 PICTURA_HD inline uint64_t samples_inside(const PolygonEdge& edge, float left_px, float top_px) {
   SampleRange range = whole_range();
-  narrow(edge, passage_of(edge, left_px, top_px), &range);
+  narrow(edge, edge_crossing(edge, left_px, top_px), &range);
   return samples_within(range);
 }
 
 /// What an edge adds to a polygon's area in a pixel, in the rows that it spans: a right border the area to its left, a
 /// left border the same negative, both less what is the same for all edges that end there: the sum over a polygon is
 /// its area.
-PICTURA_HD inline float area_of(const PolygonEdge& edge, const Passage& passage, float y_px) {
+PICTURA_HD inline float area_of(const PolygonEdge& edge, const EdgeCrossing& crossing, float y_px) {
   const float from = saturate(edge.y0 - y_px), to = saturate(edge.y1 - y_px);
   // Between these the edge is within the pixel's width; from the second on, the pixel's whole width is to its left.
-  const float left = max_no_nan(min_no_nan(passage.left, to), from);
-  const float right = max_no_nan(min_no_nan(passage.right, to), from);
+  const float left = max_no_nan(min_no_nan(crossing.left, to), from);
+  const float right = max_no_nan(min_no_nan(crossing.right, to), from);
   // Half of the width is where the line has gone half of its way.
-  const float width = saturate(((left + right) - (passage.left + passage.right)) * edge.half_dx_dy + 0.5f);
+  const float width = saturate(((left + right) - (crossing.left + crossing.right)) * edge.half_dx_dy + 0.5f);
   const float area = (right - left) * width + ((edge.dy_dx > 0.0f ? to : from) - right);
   return edge.rows_scale > 0.0f ? area : -area;
 }
@@ -111,10 +111,10 @@ PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int cou
   const float x_px = no_rematerialize(static_cast<float>(x)), y_px = no_rematerialize(static_cast<float>(y));
   float area = 0.0f;
   SampleRange range = whole_range();
-  each_edge(edges, count, [&](const PolygonEdge& edge) {
-    const Passage passage = passage_of(edge, x_px - edge.x0, y_px - edge.y0);
-    area += area_of(edge, passage, y_px);
-    narrow(edge, passage, &range);
+  for_each_edge(edges, count, [&](const PolygonEdge& edge) {
+    const EdgeCrossing crossing = edge_crossing(edge, x_px - edge.x0, y_px - edge.y0);
+    area += area_of(edge, crossing, y_px);
+    narrow(edge, crossing, &range);
   });
   if (area < min_area) return {0.0f, 0};
   const uint64_t samples = samples_within(range);
@@ -131,13 +131,13 @@ PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const Pi
   const float y_px = static_cast<float>(y), middle_px = y_px + 0.5f;
   float touch_low = static_cast<float>(box.x_begin), touch_high = static_cast<float>(box.x_end);
   float full_low = touch_low, full_high = touch_high;
-  bool is_beside = false;
-  each_edge(edges, count, [&](const PolygonEdge& edge) {
+  bool is_outside = false;
+  for_each_edge(edges, count, [&](const PolygonEdge& edge) {
     const float side = side_of(edge);
     if (side == 0.0f) {
       // Level: the row is on one side of it, or it runs through the row.
       const float inner_px = edge.rows_scale > 0.0f ? y_px - edge.y0 : edge.y0 - (y_px + 1.0f);
-      if (inner_px <= -1.0f) is_beside = true;
+      if (inner_px <= -1.0f) is_outside = true;
       if (inner_px < 0.0f) full_high = -1.0f;
       return;
     }
@@ -152,7 +152,7 @@ PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const Pi
       full_high = min_no_nan(full_high, low - 1.0f);
     }
   });
-  if (is_beside) return {};
+  if (is_outside) return {};
   // A little leeway: the exact tests of pixel_coverage decide at the borders.
   constexpr float kLeeway_px = 1e-3f;
   const float begin = static_cast<float>(box.x_begin), end = static_cast<float>(box.x_end);

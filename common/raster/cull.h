@@ -24,30 +24,30 @@ PICTURA_HD inline float wall_radius_m(const WallFace& wall) {
   return 0.5f * (length(wall.b_m - wall.a_m) + wall.height_m);
 }
 
-PICTURA_HD inline bool may_show(const Strip& strip, const PinholeCamera& camera, const Frustum& f) {
+PICTURA_HD inline bool may_be_visible(const Strip& strip, const PinholeCamera& camera, const Frustum& f) {
   // The floor on its width may widen a strip by less than the guard band, which the frustum includes.
-  return ball_in_frustum(f, to_camera(camera, strip_middle(strip)), strip_radius_m(strip));
+  return sphere_in_frustum(f, to_camera(camera, strip_middle(strip)), strip_radius_m(strip));
 }
 
-PICTURA_HD inline bool may_show(const WallFace& wall, const PinholeCamera& camera, const Frustum& f) {
-  return ball_in_frustum(f, to_camera(camera, wall_middle(wall)), wall_radius_m(wall));
+PICTURA_HD inline bool may_be_visible(const WallFace& wall, const PinholeCamera& camera, const Frustum& f) {
+  return sphere_in_frustum(f, to_camera(camera, wall_middle(wall)), wall_radius_m(wall));
 }
 
-PICTURA_HD inline bool may_show(const LightHead& head, const PinholeCamera& camera, const Frustum& f) {
+PICTURA_HD inline bool may_be_visible(const LightHead& head, const PinholeCamera& camera, const Frustum& f) {
   // A little more than the disk: the polygon that it is drawn as has the disk's area.
   const float radius_m = 1.1f * kLightRadius_m;
-  return ball_in_frustum(f, to_camera(camera, head.position_m), radius_m);
+  return sphere_in_frustum(f, to_camera(camera, head.position_m), radius_m);
 }
 
-PICTURA_HD inline bool may_show(const AgentBox& box, const PinholeCamera& camera, const Frustum& f) {
+PICTURA_HD inline bool may_be_visible(const AgentBox& box, const PinholeCamera& camera, const Frustum& f) {
   const Vec3 center = box.center_m + Vec3{0.0f, 0.0f, 0.5f * box.height_m};
   const Vec3 size{box.length_m, box.width_m, box.height_m};
   const float radius_m = 0.5f * sqrt_in_range(max_no_nan(dot(size, size), 1e-12f));
-  return box.drawn != 0 && ball_in_frustum(f, to_camera(camera, center), radius_m);
+  return box.drawn != 0 && sphere_in_frustum(f, to_camera(camera, center), radius_m);
 }
 
 /// Whether a view leaves an agent out: its own ego and those it hides.
-PICTURA_HD inline bool is_left_out(const View& view, Span<const int32_t> hidden_agents, int32_t agent) {
+PICTURA_HD inline bool is_excluded(const View& view, Span<const int32_t> hidden_agents, int32_t agent) {
   if (agent == view.ego_agent) return true;
   for (int32_t i = view.hidden_begin; i < view.hidden_end; ++i) {
     if (hidden_agents[static_cast<size_t>(i)] == agent) return true;

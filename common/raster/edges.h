@@ -24,7 +24,7 @@ struct alignas(16) PolygonEdge {
 /// Visits the edges of a polygon; each is asked for while the one before it is visited. By turns they stand in two
 /// places, so that none is moved.
 template <typename Visit>
-PICTURA_HD inline void each_edge(const PolygonEdge* edges, int count, Visit&& visit) {
+PICTURA_HD inline void for_each_edge(const PolygonEdge* edges, int count, Visit&& visit) {
   PolygonEdge even = edges[0], odd;
   PICTURA_NO_UNROLL
   for (int i = 1;; i += 2) {
@@ -61,8 +61,8 @@ PICTURA_HD inline PolygonEdge make_edge(Vec2 from, Vec2 to) {
   edge.dy_dx = dy * reciprocal_in_range(dx);
   edge.half_dx_dy = 0.5f * dx_dy;
   // Of what is steeper, all heights from the pixel's middle are lessened alike: it crosses that at the same place.
-  const float lessened = is_level ? 1.0f : min_of(kSteepest * fabsf(dx_dy), 1.0f);
-  const float scale = lessened * (0.5f * kSampleRows / kLines_rows), step_rows = lessened * edge.dy_dx;
+  const float shrink = is_level ? 1.0f : min_of(kSteepest * fabsf(dx_dy), 1.0f);
+  const float scale = shrink * (0.5f * kSampleRows / kLines_rows), step_rows = shrink * edge.dy_dx;
   // The sum of the heights at which the line passes the pixel's left and right side, in pixels from its top, to that at
   // which it passes the first column right of the middle, in parts of kLines_rows, of which a half is the middle.
   edge.rows_scale = (dx > 0.0f) == downward ? scale : -scale;
@@ -83,13 +83,13 @@ PICTURA_HD inline bool is_inside(const PolygonEdge& edge, Vec2 p) {
 /// Calls keep_edge(0, edge), keep_edge(1, edge), ... for the edges of a polygon on screen, at most `count`, and returns
 /// how many there are.
 template <typename KeepEdge>
-PICTURA_HD inline int make_edges(const Vec2* corner, int count, bool turns_right, KeepEdge&& keep_edge) {
+PICTURA_HD inline int make_edges(const Vec2* corner, int count, bool is_clockwise, KeepEdge&& keep_edge) {
   int edges = 0;
   PICTURA_UNROLL_FOUR
   for (int i = 0; i < count; ++i) {
     const Vec2 from = corner[i], to = corner[i + 1 < count ? i + 1 : 0];
     if (from.x == to.x && from.y == to.y) continue;
-    keep_edge(edges++, make_edge(turns_right ? from : to, turns_right ? to : from));
+    keep_edge(edges++, make_edge(is_clockwise ? from : to, is_clockwise ? to : from));
   }
   return edges;
 }

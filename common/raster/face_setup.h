@@ -56,14 +56,14 @@ PICTURA_HD inline float min_area_of(Rgb color, PrimitiveRef primitive) {
 
 /// Whether a face that needs no clipping shows: whether it is large enough, and not behind an occluder. Sets whether it
 /// turns right.
-PICTURA_HD inline bool shows_whole(const ImageSetting& setting, const ScreenQuad& quad, Rgb color,
-                                   PrimitiveRef primitive, bool* turns_right_out) {
-  return find_turn(quad, 2.0f * min_area_of(color, primitive), turns_right_out) &&
-         !setting.occluders.hide(setting.camera, quad.bounds);
+PICTURA_HD inline bool is_quad_visible(const ImageSetting& setting, const ScreenQuad& quad, Rgb color,
+                                       PrimitiveRef primitive, bool* is_clockwise_out) {
+  return find_winding(quad, 2.0f * min_area_of(color, primitive), is_clockwise_out) &&
+         !setting.occluders.occludes(setting.camera, quad.bounds);
 }
 
 /// A face with all that its making did not set.
-PICTURA_HD inline ScreenFace whole_face(const ScreenFace& face, PrimitiveRef primitive, int32_t edge_begin) {
+PICTURA_HD inline ScreenFace complete_face(const ScreenFace& face, PrimitiveRef primitive, int32_t edge_begin) {
   ScreenFace whole = face;
   whole.edge_begin = edge_begin;
   whole.object_id = primitive.object_id;
@@ -81,15 +81,15 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primi
   int32_t edge_begin = 0;
   auto keep_edge = [&](int i, const PolygonEdge& edge) { pool.put(edge_begin + i, edge); };
   ScreenQuad quad;
-  const QuadSight sight =
-      face.count == 4 ? project_quad(setting.camera, face.corners, face.floor_px, &quad) : QuadSight::cut;
-  if (sight == QuadSight::none) return false;
-  if (sight == QuadSight::whole) {
-    bool turns_right = false;
-    if (!shows_whole(setting, quad, face.color, primitive, &turns_right)) return false;
+  const ClipClass clip_class =
+      face.count == 4 ? project_quad(setting.camera, face.corners, face.floor_px, &quad) : ClipClass::crossing;
+  if (clip_class == ClipClass::outside) return false;
+  if (clip_class == ClipClass::inside) {
+    bool is_clockwise = false;
+    if (!is_quad_visible(setting, quad, face.color, primitive, &is_clockwise)) return false;
     edge_begin = pool.take(4);
     if (edge_begin < 0) return false;
-    make_quad_face(setting.camera, setting.frustum, quad, turns_right, face.plane, face.color, keep_edge, face_out);
+    make_quad_face(setting.camera, setting.frustum, quad, is_clockwise, face.plane, face.color, keep_edge, face_out);
   } else {
     Vec3 corners[kMaxFaceCorners], polygon[kMaxPolygonCorners];
     for (int i = 0; i < face.count; ++i) corners[i] = face.corners[i];
@@ -102,7 +102,7 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primi
       return false;
     }
   }
-  *face_out = whole_face(*face_out, primitive, edge_begin);
+  *face_out = complete_face(*face_out, primitive, edge_begin);
   return true;
 }
 

@@ -28,26 +28,26 @@ constexpr float kMinOccluder_px2 = 1.0f, kMinSide_px = 1e-3f;
 /// Corners further from the image than this leave too few bits for what is between them.
 constexpr float kMaxOccluder_px = 4096.0f;
 /// So far inside of an occluder, and behind it by this factor, nothing shows before it, whatever is rounded.
-constexpr float kOccluderMargin_px = 0.05f, kOccluderLead = 1.002f;
+constexpr float kOccluderMargin_px = 0.05f, kOccluderDepthFactor = 1.002f;
 
 /// Of the image, the part within the bounds of a solid's face: the more, the more it may hide. 0 where it hides
 /// nothing; otherwise the face on screen, and how it turns, are set.
-PICTURA_HD inline float occluded_px2(const PinholeCamera& camera, const CameraQuad& face, ScreenQuad* quad_out,
-                                     bool* turns_right_out) {
+PICTURA_HD inline float occluder_area_px2(const PinholeCamera& camera, const CameraQuad& face, ScreenQuad* quad_out,
+                                          bool* is_clockwise_out) {
   const float nearest_m =
       min_no_nan(min_no_nan(face.corner[0].z, face.corner[1].z), min_no_nan(face.corner[2].z, face.corner[3].z));
-  if (nearest_m < kNear_m || project_quad(camera, face.corner, 0.0f, quad_out) == QuadSight::none) return 0.0f;
+  if (nearest_m < kNear_m || project_quad(camera, face.corner, 0.0f, quad_out) == ClipClass::outside) return 0.0f;
   const bool is_near = quad_out->bounds.are_within(camera, kMaxOccluder_px);
-  if (!find_turn(*quad_out, kMinOccluder_px2, turns_right_out) || !is_near) return 0.0f;
-  const Aabb2 seen = quad_out->bounds.in_image(camera);
-  return (seen.high.x - seen.low.x) * (seen.high.y - seen.low.y);
+  if (!find_winding(*quad_out, kMinOccluder_px2, is_clockwise_out) || !is_near) return 0.0f;
+  const Aabb2 in_image = quad_out->bounds.in_image(camera);
+  return (in_image.high.x - in_image.low.x) * (in_image.high.y - in_image.low.y);
 }
 
 /// The occluder of a solid's face that hides something.
 PICTURA_HD inline Occluder make_occluder(const PinholeCamera& camera, const Frustum& f, const FacePlane& plane,
-                                         const ScreenQuad& quad, bool turns_right) {
+                                         const ScreenQuad& quad, bool is_clockwise) {
   Occluder occluder;
-  const float sign = turns_right ? 1.0f : -1.0f;
+  const float sign = is_clockwise ? 1.0f : -1.0f;
   for (int i = 0; i < 4; ++i) {
     const Vec2 from = quad.corner[i], along = quad.corner[(i + 1) % 4] - from;
     const Vec2 inward = Vec2{-along.y, along.x} * (sign * reciprocal_in_range(max_no_nan(length(along), kMinSide_px)));
@@ -64,22 +64,23 @@ struct Occluders {
   Occluder occluder[kMaxCount];
 
   /// Whether one of them hides all of the image that is within the bounds of a face.
-  PICTURA_HD bool hide(const PinholeCamera& camera, const ScreenBounds& bounds) const {
+  PICTURA_HD bool occludes(const PinholeCamera& camera, const ScreenBounds& bounds) const {
     const Aabb2 box = bounds.in_image(camera);
     // The least of a linear function over the box.
-    auto least = [&](Vec3 of) {
+    auto min_over_box = [&](Vec3 of) {
       return of.x * (of.x > 0.0f ? box.low.x : box.high.x) + of.y * (of.y > 0.0f ? box.low.y : box.high.y) + of.z;
     };
-    const float inverse_depth = bounds.inverse_depth_high * kOccluderLead;
-    bool is_hidden = false;
+    const float inverse_depth = bounds.inverse_depth_high * kOccluderDepthFactor;
+    bool is_occluded = false;
     PICTURA_NO_UNROLL
     for (int k = 0; k < count; ++k) {
       const Occluder one = occluder[k];
-      float inside_px = least(one.side[0]);
-      for (int i = 1; i < 4; ++i) inside_px = min_no_nan(inside_px, least(one.side[i]));
-      is_hidden = is_hidden || (inside_px >= kOccluderMargin_px && least(one.inverse_depth) >= inverse_depth);
+      float inside_px = min_over_box(one.side[0]);
+      for (int i = 1; i < 4; ++i) inside_px = min_no_nan(inside_px, min_over_box(one.side[i]));
+      is_occluded =
+          is_occluded || (inside_px >= kOccluderMargin_px && min_over_box(one.inverse_depth) >= inverse_depth);
     }
-    return is_hidden;
+    return is_occluded;
   }
 };
 

@@ -147,11 +147,11 @@ struct ScreenQuad {
 };
 
 /// What is to be done with a face of four corners: nothing, where it is out of the image; draw it; or clip it first.
-enum class QuadSight : uint8_t { none, whole, cut };
+enum class ClipClass : uint8_t { outside, inside, crossing };
 
 /// Projects a face of four corners, a strip with its corners pushed apart where it is less than floor_px wide. What
 /// needs no clipping, nearly all, is thus never widened in camera coordinates.
-PICTURA_HD inline QuadSight project_quad(const PinholeCamera& camera, const Vec3* corners, float floor_px,
+PICTURA_HD inline ClipClass project_quad(const PinholeCamera& camera, const Vec3* corners, float floor_px,
                                          ScreenQuad* quad_out) {
   const float nearest_m = min_no_nan(min_no_nan(corners[0].z, corners[1].z), min_no_nan(corners[2].z, corners[3].z));
   Vec2* const corner = quad_out->corner;
@@ -171,25 +171,26 @@ PICTURA_HD inline QuadSight project_quad(const PinholeCamera& camera, const Vec3
   ScreenBounds* const bounds = &quad_out->bounds;
   *bounds = {};
   for (int i = 0; i < 4; ++i) bounds->add(corner[i], inverse_depth[i]);
-  const bool is_whole = bounds->are_within(camera, kGuardBand_px);
+  const bool is_inside_guard_band = bounds->are_within(camera, kGuardBand_px);
   // Of what reaches behind the near plane all that was computed means nothing.
-  if (nearest_m < kNear_m) return QuadSight::cut;
-  return !bounds->meet_image(camera) ? QuadSight::none : (is_whole ? QuadSight::whole : QuadSight::cut);
+  if (nearest_m < kNear_m) return ClipClass::crossing;
+  return !bounds->meet_image(camera) ? ClipClass::outside
+                                     : (is_inside_guard_band ? ClipClass::inside : ClipClass::crossing);
 }
 
 /// Sets whether a face turns right on screen; false where it covers less than that.
-PICTURA_HD inline bool find_turn(const ScreenQuad& quad, float min_twice_area_px2, bool* turns_right_out) {
+PICTURA_HD inline bool find_winding(const ScreenQuad& quad, float min_twice_area_px2, bool* is_clockwise_out) {
   const float twice_area = cross(quad.corner[2] - quad.corner[0], quad.corner[3] - quad.corner[1]);
-  *turns_right_out = twice_area > 0.0f;
+  *is_clockwise_out = twice_area > 0.0f;
   return fabsf(twice_area) >= min_twice_area_px2;
 }
 
-/// make_screen_face of what project_quad found to be whole and find_turn to cover something.
+/// make_screen_face of what project_quad found to be whole and find_winding to cover something.
 template <typename KeepEdge>
 PICTURA_HD inline void make_quad_face(const PinholeCamera& camera, const Frustum& f, const ScreenQuad& quad,
-                                      bool turns_right, const FacePlane& plane, Rgb color, KeepEdge&& keep_edge,
+                                      bool is_clockwise, const FacePlane& plane, Rgb color, KeepEdge&& keep_edge,
                                       ScreenFace* face_out) {
-  face_out->edge_count = static_cast<uint8_t>(make_edges(quad.corner, 4, turns_right, keep_edge));
+  face_out->edge_count = static_cast<uint8_t>(make_edges(quad.corner, 4, is_clockwise, keep_edge));
   face_out->color = color;
   set_bounds(camera, f, quad.bounds, plane, face_out);
 }

@@ -58,7 +58,7 @@ PICTURA_HD inline Rgb agent_face_color(const AgentBox& box, BoxFace face, bool d
 constexpr int kUnderside = kNumBoxFaces, kNumCuboidFaces = kNumBoxFaces + 1;
 
 /// The faces of a box on whose outer side a camera at eye_m is, a bit for each.
-PICTURA_HD inline unsigned faces_to_eye(const AgentBox& box, Vec3 eye_m) {
+PICTURA_HD inline unsigned front_facing_mask(const AgentBox& box, Vec3 eye_m) {
   const Vec2 ahead{box.cos_heading, box.sin_heading};
   const Vec2 from_center = eye_m.xy() - box.center_m.xy();
   const float ahead_m = dot(from_center, ahead), left_m = cross(ahead, from_center);
@@ -123,7 +123,7 @@ struct CameraQuad {
 };
 
 /// Where a quad is to a camera; false where it has faded to black.
-PICTURA_HD inline bool see_quad(const WorldQuad& quad, const PinholeCamera& camera, CameraQuad* quad_out) {
+PICTURA_HD inline bool quad_to_camera(const WorldQuad& quad, const PinholeCamera& camera, CameraQuad* quad_out) {
   for (int i = 0; i < 4; ++i) quad_out->corner[i] = to_camera(camera, quad.corner[i]);
   const float brightness = face_brightness(quad_out->corner, 4);
   quad_out->plane = quad_plane(quad_out->corner);
@@ -132,21 +132,21 @@ PICTURA_HD inline bool see_quad(const WorldQuad& quad, const PinholeCamera& came
 }
 
 /// All of a quad, to be clipped and widened; floor_px is that of strips, 0 of others. It points into the quad.
-PICTURA_HD inline CameraFace whole_quad(const CameraQuad& quad, float floor_px) {
+PICTURA_HD inline CameraFace make_camera_face(const CameraQuad& quad, float floor_px) {
   return {quad.corner, 4, quad.plane, quad.color, floor_px};
 }
 
-/// Calls emit(face) for a quad, unless it has faded to black; floor_px as of whole_quad.
+/// Calls emit(face) for a quad, unless it has faded to black; floor_px as of make_camera_face.
 template <typename Emit>
 PICTURA_HD inline void emit_quad(const WorldQuad& quad, const PinholeCamera& camera, float floor_px, Emit&& emit) {
-  CameraQuad seen;
-  if (see_quad(quad, camera, &seen)) emit(whole_quad(seen, floor_px));
+  CameraQuad in_camera;
+  if (quad_to_camera(quad, camera, &in_camera)) emit(make_camera_face(in_camera, floor_px));
 }
 
 /// Calls visit(face) for each face of a box that is turned to the camera.
 template <typename Visit>
-PICTURA_HD inline void visit_faces_to_eye(const AgentBox& box, const PinholeCamera& camera, Visit&& visit) {
-  const unsigned faces = faces_to_eye(box, camera.position_m);
+PICTURA_HD inline void visit_front_facing(const AgentBox& box, const PinholeCamera& camera, Visit&& visit) {
+  const unsigned faces = front_facing_mask(box, camera.position_m);
   for (int face = 0; face < kNumCuboidFaces; ++face) {
     if ((faces >> face & 1u) != 0) visit(face);
   }
@@ -155,7 +155,7 @@ PICTURA_HD inline void visit_faces_to_eye(const AgentBox& box, const PinholeCame
 /// emit_quad for each of those.
 template <typename Emit>
 PICTURA_HD inline void agent_faces(const AgentBox& box, const PinholeCamera& camera, bool debug_palette, Emit&& emit) {
-  visit_faces_to_eye(box, camera,
+  visit_front_facing(box, camera,
                      [&](int face) { emit_quad(cuboid_quad(box, face, debug_palette), camera, 0.0f, emit); });
 }
 
@@ -189,8 +189,8 @@ struct LightDisk {
   Rgb color;
 };
 /// False where it has faded to black.
-PICTURA_HD inline bool see_light(const LightHead& head, LightState state, const PinholeCamera& camera,
-                                 LightDisk* disk_out) {
+PICTURA_HD inline bool light_to_camera(const LightHead& head, LightState state, const PinholeCamera& camera,
+                                       LightDisk* disk_out) {
   const Vec3 middle = to_camera(camera, head.position_m), facing{head.facing.x, head.facing.y, 0.0f};
   const Vec3 normal{dot(camera.right, facing), dot(camera.down, facing), dot(camera.forward, facing)};
   const float brightness = face_brightness(&middle, 1);
@@ -203,7 +203,7 @@ template <typename Emit>
 PICTURA_HD inline void light_faces(const LightHead& head, LightState state, const PinholeCamera& camera, Emit&& emit) {
   if (!light_is_visible(head, state, camera.position_m)) return;
   LightDisk disk;
-  if (!see_light(head, state, camera, &disk)) return;
+  if (!light_to_camera(head, state, camera, &disk)) return;
   Vec3 corners[kLightSides];
   for (int i = 0; i < kLightSides; ++i) corners[i] = to_camera(camera, light_corner(head, i));
   emit(CameraFace{corners, kLightSides, disk.plane, disk.color});
@@ -236,8 +236,8 @@ struct Widening {
 PICTURA_HD inline Widening widening_of(const PinholeCamera& camera, float floor_px, Vec3 a, Vec3 b) {
   // The direction on screen times both depths.
   const Vec2 ahead{camera.focal_x_px * (b.x * a.z - a.x * b.z), camera.focal_y_px * (b.y * a.z - a.y * b.z)};
-  const float length2 = dot(ahead, ahead), least = 1e-6f * (a.z * b.z);
-  if (!(length2 > least * least)) return {};
+  const float length2 = dot(ahead, ahead), min_length = 1e-6f * (a.z * b.z);
+  if (!(length2 > min_length * min_length)) return {};
   return {left_normal(ahead) * sqrt_in_range(reciprocal_in_range(length2)), floor_px};
 }
 

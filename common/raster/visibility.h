@@ -161,7 +161,7 @@ PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec
 }
 
 /// Middle of some samples, from the pixel's corner; of none, the pixel's middle.
-PICTURA_HD inline Vec2 middle_of(uint64_t samples) {
+PICTURA_HD inline Vec2 centroid_of(uint64_t samples) {
   const int count = popcount(samples);
   if (count == 0) return {0.5f, 0.5f};
   // Sums over the samples of the bits of their column and row.
@@ -185,17 +185,17 @@ struct Fragment {
 
 PICTURA_HD inline Fragment make_fragment(const ScreenFace& face, int32_t face_index, const PixelCoverage& coverage,
                                          int x, int y) {
-  const Vec2 middle = Vec2{static_cast<float>(x), static_cast<float>(y)} + middle_of(coverage.samples);
+  const Vec2 middle = Vec2{static_cast<float>(x), static_cast<float>(y)} + centroid_of(coverage.samples);
   return {coverage, clamped_inverse_depth(face, middle), face_index};
 }
 
-PICTURA_HD inline Vec2 pixel_middle(int x, int y) {
+PICTURA_HD inline Vec2 pixel_center(int x, int y) {
   return {static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f};
 }
 
 /// Nearness of a face in the middle of a pixel: that of its fragment where it covers the pixel fully.
 PICTURA_HD inline float center_inverse_depth(const ScreenFace& face, int x, int y) {
-  return clamped_inverse_depth(face, pixel_middle(x, y));
+  return clamped_inverse_depth(face, pixel_center(x, y));
 }
 /// By how much that rises or falls within the pixel, at most.
 PICTURA_HD inline float inverse_depth_half_range(const ScreenFace& face) {
@@ -210,8 +210,9 @@ constexpr int kOccluderBoundBits = 21;
 /// that no face buries itself.
 PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
   if (is_strip(face)) return 0.0f;
-  const float least = max_of(face.inverse_depth_low, center_inverse_depth(face, x, y) - inverse_depth_half_range(face));
-  return float_from_bits(bits_from_float(least) & ~((1u << (32 - kOccluderBoundBits)) - 1));
+  const float lowest =
+      max_of(face.inverse_depth_low, center_inverse_depth(face, x, y) - inverse_depth_half_range(face));
+  return float_from_bits(bits_from_float(lowest) & ~((1u << (32 - kOccluderBoundBits)) - 1));
 }
 
 /// Whether a face may weigh anything in pixel (x, y), which others cover fully, given the largest occluder_bound() of
@@ -250,7 +251,7 @@ PICTURA_HD inline uint64_t samples_where_positive(float value, Vec2 gradient, Ve
 template <typename Stands>
 PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFace& b, uint64_t shared, Vec2 corner,
                                             bool all_or_none, Stands&& stands) {
-  const Vec2 middle = middle_of(shared), at = corner + middle;
+  const Vec2 middle = centroid_of(shared), at = corner + middle;
   // Of the lower number before the higher, so that both ways round are the same arithmetic.
   const bool swapped = b.object_id < a.object_id;
   const float sign = swapped ? -1.0f : 1.0f, lead = sign * (inverse_depth(a, at) - inverse_depth(b, at));
@@ -264,18 +265,19 @@ PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFac
 }
 
 /// Whether two fragments fill a pixel exactly, one of them a sliver that touches no sample: pieces that meet there.
-PICTURA_HD inline bool fit_together(const PixelCoverage& a, const PixelCoverage& b) {
+PICTURA_HD inline bool are_complementary(const PixelCoverage& a, const PixelCoverage& b) {
   return (a.samples == 0 || b.samples == 0) && fabsf(a.area + b.area - 1.0f) < kFullCoverage;
 }
 
 /// Whether two fragments of a pixel may still hide something of each other, given what is free of each of them. That
 /// only becomes less, so nothing is lost where they are not asked any more, whenever others take what.
-PICTURA_HD inline bool may_hide_more(uint64_t free_a, uint64_t samples_a, uint64_t free_b, uint64_t samples_b) {
-  return ((free_a & samples_b) | (free_b & samples_a)) != 0;
+PICTURA_HD inline bool may_occlude_more(uint64_t visible_a, uint64_t samples_a, uint64_t visible_b,
+                                        uint64_t samples_b) {
+  return ((visible_a & samples_b) | (visible_b & samples_a)) != 0;
 }
 
 /// What two fragments of a pixel hide of each other.
-struct Hidden {
+struct OccludedSamples {
   uint64_t of_a = 0, of_b = 0;
 };
 
@@ -283,10 +285,10 @@ struct Hidden {
 /// nothing, and is hidden as a whole; what covers the whole pixel is hidden only by what does so too (see
 /// PixelAccumulator).
 template <typename Stands>
-PICTURA_HD inline Hidden hide_each_other(const PixelCoverage& a, const PixelCoverage& b, const ScreenFace& face_a,
-                                         const ScreenFace& face_b, Vec2 corner, Stands&& stands) {
+PICTURA_HD inline OccludedSamples occlude_pair(const PixelCoverage& a, const PixelCoverage& b, const ScreenFace& face_a,
+                                               const ScreenFace& face_b, Vec2 corner, Stands&& stands) {
   const uint64_t shared = shared_samples(a, b);
-  if (shared == 0 || face_a.object_id == face_b.object_id || fit_together(a, b)) return {};
+  if (shared == 0 || face_a.object_id == face_b.object_id || are_complementary(a, b)) return {};
   const bool has_sliver = a.samples == 0 || b.samples == 0;
   const uint64_t a_first = samples_in_front(face_a, face_b, shared, corner, has_sliver, stands);
   if (has_sliver) {

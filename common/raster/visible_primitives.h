@@ -13,8 +13,8 @@ PICTURA_HD inline void visit_agents(const ImageSetting& setting, const SceneBatc
   const auto world = static_cast<size_t>(view.world);
   for (int32_t agent = scene.world_begin[world]; agent < scene.world_begin[world + 1]; ++agent) {
     const AgentBox& box = scene.agents[static_cast<size_t>(agent)];
-    if (!may_show(box, setting.camera, setting.frustum)) continue;
-    if (!is_left_out(view, scene.hidden_agents, agent)) visit(box, agent);
+    if (!may_be_visible(box, setting.camera, setting.frustum)) continue;
+    if (!is_excluded(view, scene.hidden_agents, agent)) visit(box, agent);
   }
 }
 
@@ -27,7 +27,7 @@ PICTURA_HD inline void visit_walls(const ImageSetting& setting, const StaticGeom
       [&](int32_t i) { return ground_box(walls[static_cast<size_t>(i)]); },
       [&](int32_t i) {
         const WallFace& wall = walls[static_cast<size_t>(i)];
-        if (may_show(wall, setting.camera, setting.frustum)) visit(wall, i);
+        if (may_be_visible(wall, setting.camera, setting.frustum)) visit(wall, i);
       });
 }
 
@@ -40,7 +40,7 @@ PICTURA_HD inline void visit_lights(const ImageSetting& setting, const StaticGeo
   const Span<const LightHead> heads = geometry.heads;
   for (int32_t i = 0; i < static_cast<int32_t>(heads.size()); ++i) {
     const LightHead& head = heads[static_cast<size_t>(i)];
-    if (!may_show(head, setting.camera, setting.frustum)) continue;
+    if (!may_be_visible(head, setting.camera, setting.frustum)) continue;
     visit(head, scene.light_states[static_cast<size_t>(begin + head.signal)], i);
   }
 }
@@ -54,7 +54,7 @@ PICTURA_HD inline void visit_strips(const ImageSetting& setting, const StaticGeo
       [&](int32_t i) { return ground_box(strips[static_cast<size_t>(i)]); },
       [&](int32_t i) {
         const Strip& strip = strips[static_cast<size_t>(i)];
-        if (may_show(strip, setting.camera, setting.frustum)) visit(strip, i);
+        if (may_be_visible(strip, setting.camera, setting.frustum)) visit(strip, i);
       });
 }
 

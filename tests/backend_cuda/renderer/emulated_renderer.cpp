@@ -12,7 +12,7 @@
 #include "pictura/tests/backend_cuda/renderer/emulated_device.h"
 // The kernels, under names of their own beside those that were compiled ahead of time.
 #define pictura_cull emulated_cull
-#define pictura_setup_faces emulated_gather
+#define pictura_setup_faces emulated_setup_faces
 #define pictura_clip emulated_clip
 #define pictura_draw emulated_draw
 #define pictura_draw_deferred emulated_draw_deferred
@@ -102,7 +102,7 @@ void EmulatedRenderer::render(const SceneBatch& scene, Span<const View> views, c
   Setup setup(*this, cuda::make_draw_task(config_, cameras_, scene, views, &images_out), scene);
   cuda::DrawTask& task = setup.task;
   launch(cuda::kSetupThreads, kBlocks, [&] { cuda::emulated_cull(task); });
-  launch(cuda::kSetupThreads, kBlocks, [&] { cuda::emulated_gather(task); });
+  launch(cuda::kSetupThreads, kBlocks, [&] { cuda::emulated_setup_faces(task); });
   launch(cuda::kSetupThreads, kBlocks, [&] { cuda::emulated_clip(task); });
   launch(cuda::kDrawThreads, kBlocks, [&] { cuda::emulated_draw(task); });
   deferred_ = setup.counters.deferred;

@@ -160,7 +160,7 @@ TEST(EmulatedKernels, NameWhatIsWrongWithQueries) {
 }
 
 // Draws a town from a pool that has room for some of its images alone.
-void expect_some_postponed(uint64_t seed, const EmulatedRenderer::Pool& pool) {
+void expect_some_deferred(uint64_t seed, const EmulatedRenderer::Pool& pool) {
   SyntheticTown town = make_synthetic_town(1, 120);
   town.views.resize(2);
   EmulatedRenderer renderer(config_of(paper_rig()), seed, pool);
@@ -170,9 +170,9 @@ void expect_some_postponed(uint64_t seed, const EmulatedRenderer::Pool& pool) {
   EXPECT_EQ(renderer.overflow(), 0);
 }
 
-TEST(EmulatedKernels, PostponeWhatThePoolHasNoRoomFor) { expect_some_postponed(7, {.faces = 192}); }
+TEST(EmulatedKernels, PostponeWhatThePoolHasNoRoomFor) { expect_some_deferred(7, {.faces = 192}); }
 // Noticed when some of an image's faces are made already.
-TEST(EmulatedKernels, PostponeWhatHasNoRoomForItsClippedEdges) { expect_some_postponed(8, {.clipped_edges = 70}); }
+TEST(EmulatedKernels, PostponeWhatHasNoRoomForItsClippedEdges) { expect_some_deferred(8, {.clipped_edges = 70}); }
 
 TEST(EmulatedKernels, ClipLightsOnAllSides) {
   // A spiral of heads around a camera, from before its near plane on, that turn to it and cross each other's disks and

@@ -204,8 +204,8 @@ TEST(Coverage, BothDirectionsOfAnEdgeAreOppositesWhereverItLies) {
     const uint64_t samples = samples_inside(one, -one.x0, -one.y0);
     ASSERT_EQ(samples, ~samples_inside(other, -other.x0, -other.y0)) << round;
     split += samples != 0 && samples != kAllSamples;
-    const Passage passage = passage_of(one, -one.x0, -one.y0);
-    ASSERT_EQ(area_of(one, passage, 0), -area_of(other, passage_of(other, -other.x0, -other.y0), 0)) << round;
+    const EdgeCrossing crossing = edge_crossing(one, -one.x0, -one.y0);
+    ASSERT_EQ(area_of(one, crossing, 0), -area_of(other, edge_crossing(other, -other.x0, -other.y0), 0)) << round;
   }
   EXPECT_GT(split, 4000);
 }
@@ -233,14 +233,15 @@ TEST(Coverage, RowSpansAgreeWithPixels) {
 }
 
 // The colour of fragments, each with its coverage, its free samples, and its colour.
-struct Laid {
+struct TestFragment {
   PixelCoverage coverage;
-  uint64_t free;
+  uint64_t visible;
   Rgb color;
 };
-Rgb color_of(const std::vector<Laid>& fragments) {
+Rgb color_of(const std::vector<TestFragment>& fragments) {
   PixelAccumulator sum;
-  for (const Laid& laid : fragments) sum.add(PixelAccumulator::weight_of(laid.coverage, laid.free), laid.color);
+  for (const TestFragment& fragment : fragments)
+    sum.add(PixelAccumulator::weight_of(fragment.coverage, fragment.visible), fragment.color);
   return sum.color();
 }
 
@@ -298,11 +299,11 @@ TEST(Coverage, LeavesOutWhatAStripHardlyAdds) {
   // What is dark may hide what is bright.
   EXPECT_FLOAT_EQ(min_area_of(white * 0.01f, strip), kMaxSparedArea);
   EXPECT_FLOAT_EQ(min_area_of({}, strip), kMaxSparedArea);
-  const float least = kMinWeight / white.r;
-  for (const float area : {0.9f * least, 1.1f * least}) {
+  const float min_area = kMinWeight / white.r;
+  for (const float area : {0.9f * min_area, 1.1f * min_area}) {
     const std::vector<PolygonEdge> edges = edges_of({{2, 1}, {3, 1}, {3, 1 + area}, {2, 1 + area}});
     const PixelCoverage coverage = pixel_coverage(edges.data(), 4, min_area_of(white, strip), 2, 1);
-    if (area < least) {
+    if (area < min_area) {
       EXPECT_EQ(coverage.area, 0.0f);
     } else {
       EXPECT_NEAR(coverage.area, area, 1e-6f);

@@ -37,9 +37,10 @@ bool hides(const WallFace& wall, Vec3 a_m, Vec3 b_m) {
   ImageSetting setting = setting_ahead();
   CameraQuad seen;
   ScreenQuad quad;
-  bool turns_right = false;
-  if (see_quad(wall_quad(wall), setting.camera, &seen) && occluded_px2(setting.camera, seen, &quad, &turns_right) > 0) {
-    setting.occluders.occluder[0] = make_occluder(setting.camera, setting.frustum, seen.plane, quad, turns_right);
+  bool is_clockwise = false;
+  if (quad_to_camera(wall_quad(wall), setting.camera, &seen) &&
+      occluder_area_px2(setting.camera, seen, &quad, &is_clockwise) > 0) {
+    setting.occluders.occluder[0] = make_occluder(setting.camera, setting.frustum, seen.plane, quad, is_clockwise);
     setting.occluders.count = 1;
   }
   ScreenBounds bounds;
@@ -47,7 +48,7 @@ bool hides(const WallFace& wall, Vec3 a_m, Vec3 b_m) {
     const Vec3 corner = to_camera(setting.camera, corner_m);
     bounds.add(project(setting.camera, corner, reciprocal_in_range(corner.z)), reciprocal_in_range(corner.z));
   }
-  return setting.occluders.hide(setting.camera, bounds);
+  return setting.occluders.occludes(setting.camera, bounds);
 }
 
 TEST(Occluders, HideWhatIsBehindThemInDepthAndOnScreen) {

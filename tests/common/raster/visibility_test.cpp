@@ -17,12 +17,12 @@ namespace {
 using Extents = std::vector<std::pair<uint32_t, Extent>>;
 
 // Things as a camera at eye_m that looks along x sees them, and their order.
-class Sight {
+class TestView {
  public:
   // Faces of a thing.
-  using Thing = std::vector<ScreenFace>;
+  using Faces = std::vector<ScreenFace>;
 
-  explicit Sight(Vec3 eye_m, float pitch_rad = 0) {
+  explicit TestView(Vec3 eye_m, float pitch_rad = 0) {
     Camera camera;
     camera.width_px = camera.height_px = kSize;
     camera.focal_x_px = camera.focal_y_px = 60;
@@ -33,20 +33,20 @@ class Sight {
     setting_.frustum = make_frustum(setting_.camera);
     setting_.line_floor_px = 0.35f;
   }
-  Thing see(const AgentBox& box, int32_t index = 0) {
+  Faces see(const AgentBox& box, int32_t index = 0) {
     return keep(agent_ref(box, index), extent_of(box),
                 [&](auto&& emit) { agent_faces(box, setting_.camera, false, emit); });
   }
-  Thing see(const WallFace& wall) {
+  Faces see(const WallFace& wall) {
     return keep(wall_ref(0), extent_of(wall), [&](auto&& emit) { wall_faces(wall, setting_.camera, emit); });
   }
-  Thing see(const Strip& strip, int32_t index = 0) {
+  Faces see(const Strip& strip, int32_t index = 0) {
     return keep(strip_ref(strip, index), extent_of(strip),
                 [&](auto&& emit) { strip_faces(strip, setting_.camera, setting_.line_floor_px, emit); });
   }
   // Calls visit(face of a, face of b, point) for a grid of points of the image that both cover.
   template <typename Visit>
-  void where_both(const Thing& a, const Thing& b, Visit&& visit) const {
+  void where_both(const Faces& a, const Faces& b, Visit&& visit) const {
     for (const ScreenFace& of_a : a) {
       for (const ScreenFace& of_b : b) {
         const PixelBox box = of_a.box;
@@ -64,7 +64,7 @@ class Sight {
     });
   }
   // -1 the first is in front wherever both are seen, 1 the second, 0 they do not meet, 2 it depends on where.
-  int order(const Thing& a, const Thing& b) const {
+  int order(const Faces& a, const Faces& b) const {
     int first = 0, second = 0;
     where_both(a, b, [&](const ScreenFace& of_a, const ScreenFace& of_b, Vec2 at) {
       EXPECT_NE(in_front(of_a, of_b, at), in_front(of_b, of_a, at));
@@ -90,15 +90,15 @@ class Sight {
     void put(int32_t index, const PolygonEdge& edge) { (*edges)[static_cast<std::size_t>(index)] = edge; }
   };
   template <typename MakeFaces>
-  Thing keep(PrimitiveRef primitive, const Extent& extent, MakeFaces&& make_faces) {
-    Thing thing;
+  Faces keep(PrimitiveRef primitive, const Extent& extent, MakeFaces&& make_faces) {
+    Faces faces;
     Pool pool{&edges_};
     make_faces([&](const CameraFace& seen) {
       ScreenFace face;
-      if (make_face(setting_, primitive, seen, pool, &face)) thing.push_back(face);
+      if (make_face(setting_, primitive, seen, pool, &face)) faces.push_back(face);
     });
     extents_.emplace_back(primitive.object_id, extent);
-    return thing;
+    return faces;
   }
   bool covers(const ScreenFace& face, Vec2 at) const {
     return covers_point(edges_.data() + face.edge_begin, face.edge_count, at.x, at.y);
@@ -153,12 +153,12 @@ TEST(Order, OfDisjointBoxesIsWhatRaysSee) {
     };
     const AgentBox a = box(), b = box();
     if (overlap_on_ground(extent_of(a), extent_of(b))) continue;
-    Sight sight(eye);
-    const Sight::Thing seen_a = sight.see(a, 0), seen_b = sight.see(b, 1);
-    sight.where_both(seen_a, seen_b, [&](const ScreenFace& of_a, const ScreenFace& of_b, Vec2 at) {
-      const float at_a = enter(a, eye, sight.ray(at)), at_b = enter(b, eye, sight.ray(at));
+    TestView view(eye);
+    const TestView::Faces seen_a = view.see(a, 0), seen_b = view.see(b, 1);
+    view.where_both(seen_a, seen_b, [&](const ScreenFace& of_a, const ScreenFace& of_b, Vec2 at) {
+      const float at_a = enter(a, eye, view.ray(at)), at_b = enter(b, eye, view.ray(at));
       if (at_a < 0 || at_b < 0) return;  // the border, where rounding decides
-      EXPECT_EQ(sight.in_front(of_a, of_b, at), at_a < at_b) << round;
+      EXPECT_EQ(view.in_front(of_a, of_b, at), at_a < at_b) << round;
       ++compared;
     });
   }
@@ -172,9 +172,9 @@ TEST(Order, OfLevelsIsByHeight) {
   const Strip bridge = strip_between({6, 0, 6}, {15, 0, 6});
   for (const auto& [eye_z, pitch, expected] :
        {std::tuple{-3.0f, 0.5f, -1}, std::tuple{20.0f, -0.9f, 1}, std::tuple{4.0f, 0.0f, 0}}) {
-    Sight sight({0, 0, eye_z}, pitch);
-    EXPECT_EQ(sight.order(sight.see(low, 0), sight.see(high, 1)), expected) << eye_z;
-    EXPECT_EQ(sight.order(sight.see(low), sight.see(bridge)), expected) << eye_z;
+    TestView view({0, 0, eye_z}, pitch);
+    EXPECT_EQ(view.order(view.see(low, 0), view.see(high, 1)), expected) << eye_z;
+    EXPECT_EQ(view.order(view.see(low), view.see(bridge)), expected) << eye_z;
   }
 }
 
@@ -184,16 +184,16 @@ TEST(Order, StripsOfOneLevelGoByRankAndOthersByDepth) {
     // An edge that crosses the mark, a little above or below it: rank.
     const Strip edge = strip_between({10, 2, height_m}, {18, -2, height_m}, StripKind::road_edge, 0.5f);
     const Strip stop = strip_between({10, 2, height_m}, {18, -2, height_m}, StripKind::stop_line, 0.5f);
-    Sight sight({0, 0, 1.5f});
-    EXPECT_EQ(sight.order(sight.see(mark), sight.see(edge)), -1) << height_m;
-    EXPECT_EQ(sight.order(sight.see(mark), sight.see(stop)), 1) << height_m;
-    EXPECT_EQ(sight.order(sight.see(mark, 7), sight.see(mark, 4)), 1);
+    TestView view({0, 0, 1.5f});
+    EXPECT_EQ(view.order(view.see(mark), view.see(edge)), -1) << height_m;
+    EXPECT_EQ(view.order(view.see(mark), view.see(stop)), 1) << height_m;
+    EXPECT_EQ(view.order(view.see(mark, 7), view.see(mark, 4)), 1);
   }
   for (const float height_m : {-0.5f, 0.5f}) {
     // On another level: the camera is above both, so the upper is in front.
     const Strip stop = strip_between({8, 4, height_m}, {20, -4, height_m}, StripKind::stop_line, 3.0f);
-    Sight sight({0, 0, 3});
-    EXPECT_EQ(sight.order(sight.see(mark), sight.see(stop)), height_m < 0 ? -1 : 1) << height_m;
+    TestView view({0, 0, 3});
+    EXPECT_EQ(view.order(view.see(mark), view.see(stop)), height_m < 0 ? -1 : 1) << height_m;
   }
 }
 
@@ -201,9 +201,9 @@ TEST(Order, WhatStandsOnAStripIsInFrontOfItEvenWhereItDipsIn) {
   // A road that falls by 15 % away from the camera, and a car upright on it: its near end lies 0.3 m below the road.
   const Strip mark = strip_between({10, 0, -1}, {20, 0, -2.5f});
   const AgentBox car = make_box(AgentClass::vehicle, {15, 0, -1.75f}, 0, {4, 2, 1.5f});
-  Sight sight({0, 0, 1});
-  EXPECT_EQ(sight.order(sight.see(mark), sight.see(car)), 1);
-  EXPECT_EQ(sight.order(sight.see(car), sight.see(mark)), -1);
+  TestView view({0, 0, 1});
+  EXPECT_EQ(view.order(view.see(mark), view.see(car)), 1);
+  EXPECT_EQ(view.order(view.see(car), view.see(mark)), -1);
   // The same car beyond the end of the strip does not stand on it, and neither does one on a road 2 m below.
   const Vec3 eye{0, 0, 1};
   EXPECT_TRUE(stands_on(extent_of(car), extent_of(mark), eye));
@@ -223,9 +223,9 @@ TEST(Order, StripsInFrontOfAWallOrBehindIt) {
   wall.b_m = {12, -10, -3};
   wall.height_m = 8;
   const Strip before = strip_between({6, 0, 0}, {11, 1, 0.3f}), beyond = strip_between({13, 0, 0}, {20, 1, 0.3f});
-  Sight sight({0, 0, 1.5f});
-  EXPECT_EQ(sight.order(sight.see(before), sight.see(wall)), -1);
-  EXPECT_EQ(sight.order(sight.see(wall), sight.see(beyond)), -1);
+  TestView view({0, 0, 1.5f});
+  EXPECT_EQ(view.order(view.see(before), view.see(wall)), -1);
+  EXPECT_EQ(view.order(view.see(wall), view.see(beyond)), -1);
 }
 
 TEST(Order, AStripDrawnWiderThanItIsStaysAtItsDepth) {
@@ -237,8 +237,8 @@ TEST(Order, AStripDrawnWiderThanItIsStaysAtItsDepth) {
     wall.a_m = {wall_at_m, 10, -3};
     wall.b_m = {wall_at_m, -10, -3};
     wall.height_m = 8;
-    Sight sight({0, 0, 1});
-    EXPECT_EQ(sight.order(sight.see(strip), sight.see(wall)), wall_at_m < 40 ? 1 : -1) << wall_at_m;
+    TestView view({0, 0, 1});
+    EXPECT_EQ(view.order(view.see(strip), view.see(wall)), wall_at_m < 40 ? 1 : -1) << wall_at_m;
   }
 }
 
@@ -256,12 +256,12 @@ TEST(Order, ComparesInTheMiddleOfTheSharedSamples) {
     }
     const int count = std::popcount(samples);
     if (count == 0) continue;
-    EXPECT_NEAR(middle_of(samples).x, x / count, 1e-6) << samples;
-    EXPECT_NEAR(middle_of(samples).y, y / count, 1e-6) << samples;
+    EXPECT_NEAR(centroid_of(samples).x, x / count, 1e-6) << samples;
+    EXPECT_NEAR(centroid_of(samples).y, y / count, 1e-6) << samples;
   }
-  EXPECT_EQ(middle_of(kAllSamples).x, 0.5f);
-  EXPECT_EQ(middle_of(kAllSamples).y, 0.5f);
-  EXPECT_EQ(middle_of(0).x, 0.5f);
+  EXPECT_EQ(centroid_of(kAllSamples).x, 0.5f);
+  EXPECT_EQ(centroid_of(kAllSamples).y, 0.5f);
+  EXPECT_EQ(centroid_of(0).x, 0.5f);
 }
 
 // A face whose plane has some inverse depth at a pixel's corner and some gradient; it has no edges.
@@ -294,7 +294,7 @@ TEST(Order, SolidsThatIntersectShareSamplesByWhichIsNearer) {
     split += a_first != 0 && a_first != shared;
     for (int sample = 0; sample < 64; ++sample) {
       if (!(shared >> sample & 1)) continue;
-      const Vec2 at = corner + middle_of(uint64_t{1} << sample);
+      const Vec2 at = corner + centroid_of(uint64_t{1} << sample);
       const float lead = inverse_depth(a, at) - inverse_depth(b, at);
       // A line that is almost upright is turned by as much in a pixel (see make_edge).
       const Vec2 gradient{a.inverse_depth_x - b.inverse_depth_x, a.inverse_depth_y - b.inverse_depth_y};
@@ -310,10 +310,11 @@ TEST(Order, TwoFacesThatFillAPixelAndIntersectFillItTogether) {
   const ScreenFace first = plane_face(make_object_id(kAgentKind, 0), 0.2f, {-0.08f, 0}),
                    second = plane_face(make_object_id(kAgentKind, 1), 0.15f);
   const PixelCoverage full{1, kAllSamples};
-  const Hidden hidden = hide_each_other(full, full, first, second, {}, [](uint32_t, uint32_t) { return false; });
+  const OccludedSamples occluded =
+      occlude_pair(full, full, first, second, {}, [](uint32_t, uint32_t) { return false; });
   PixelAccumulator sum;
-  sum.add(PixelAccumulator::weight_of(full, ~hidden.of_a), {1, 0, 0});
-  sum.add(PixelAccumulator::weight_of(full, ~hidden.of_b), {0, 1, 0});
+  sum.add(PixelAccumulator::weight_of(full, ~occluded.of_a), {1, 0, 0});
+  sum.add(PixelAccumulator::weight_of(full, ~occluded.of_b), {0, 1, 0});
   EXPECT_NEAR(sum.color().r, 5.0 / 8, 1e-5);
   EXPECT_NEAR(sum.color().g, 3.0 / 8, 1e-5);
 }
@@ -336,28 +337,28 @@ TEST(Order, WhatIsFreeOfAPixelsFragmentsDoesNotDependOnTheirList) {
       fragments.push_back(make_fragment(faces[i], static_cast<int32_t>(i), coverage, 0, 0));
     }
     auto stands = [](uint32_t solid, uint32_t strip) { return (solid + strip) % 3 == 0; };
-    auto free_by_face = [&](PixelAccumulator* sum) {
-      std::vector<uint64_t> free(faces.size());
+    auto visible_by_face = [&](PixelAccumulator* sum) {
+      std::vector<uint64_t> visible(faces.size());
       for (const Fragment& fragment : fragments) {
-        uint64_t& of_face = free[static_cast<std::size_t>(fragment.face)];
-        of_face = reach_of(fragment.coverage);
+        uint64_t& of_face = visible[static_cast<std::size_t>(fragment.face)];
+        of_face = effective_samples(fragment.coverage);
         for (const Fragment& other : fragments) {
-          of_face &= ~hide_each_other(fragment.coverage, other.coverage, faces[static_cast<std::size_t>(fragment.face)],
-                                      faces[static_cast<std::size_t>(other.face)], {}, stands)
+          of_face &= ~occlude_pair(fragment.coverage, other.coverage, faces[static_cast<std::size_t>(fragment.face)],
+                                   faces[static_cast<std::size_t>(other.face)], {}, stands)
                           .of_a;
         }
         sum->add(PixelAccumulator::weight_of(fragment.coverage, of_face),
                  faces[static_cast<std::size_t>(fragment.face)].color);
       }
-      return free;
+      return visible;
     };
     PixelAccumulator sum;
-    const std::vector<uint64_t> free = free_by_face(&sum);
+    const std::vector<uint64_t> visible = visible_by_face(&sum);
     // No sample belongs to two; without rings, each that is covered belongs to one.
     uint64_t seen = 0, covered = 0;
     for (std::size_t i = 0; i < fragments.size(); ++i) {
-      ASSERT_EQ(seen & free[i], 0u) << round;
-      seen |= free[i];
+      ASSERT_EQ(seen & visible[i], 0u) << round;
+      seen |= visible[i];
       covered |= fragments[i].coverage.samples;
     }
     if (!with_strips) {
@@ -366,7 +367,7 @@ TEST(Order, WhatIsFreeOfAPixelsFragmentsDoesNotDependOnTheirList) {
     for (int shuffle = 0; shuffle < 5; ++shuffle) {
       std::shuffle(fragments.begin(), fragments.end(), random);
       PixelAccumulator again;
-      ASSERT_EQ(free_by_face(&again), free) << round;
+      ASSERT_EQ(visible_by_face(&again), visible) << round;
       ASSERT_EQ(again.color().r, sum.color().r) << round;
     }
   }
@@ -376,9 +377,9 @@ TEST(Order, WhatFillsThePixelIsHiddenOnlyByWhatDoesToo) {
   const ScreenFace near = plane_face(make_object_id(kWallKind, 0), 0.2f),
                    far = plane_face(make_object_id(kWallKind, 1), 0.1f);
   auto never = [](uint32_t, uint32_t) { return false; };
-  EXPECT_EQ(hide_each_other({0.5f, 0xFFFF}, {1, kAllSamples}, near, far, {}, never).of_b, 0u);
-  EXPECT_EQ(hide_each_other({1, kAllSamples}, {1, kAllSamples}, near, far, {}, never).of_b, kAllSamples);
-  EXPECT_EQ(hide_each_other({0.5f, 0xFFFF}, {1, kAllSamples}, far, near, {}, never).of_a, 0xFFFFu);
+  EXPECT_EQ(occlude_pair({0.5f, 0xFFFF}, {1, kAllSamples}, near, far, {}, never).of_b, 0u);
+  EXPECT_EQ(occlude_pair({1, kAllSamples}, {1, kAllSamples}, near, far, {}, never).of_b, kAllSamples);
+  EXPECT_EQ(occlude_pair({0.5f, 0xFFFF}, {1, kAllSamples}, far, near, {}, never).of_a, 0xFFFFu);
 }
 
 // Random planes in one pixel, two thirds of them of solids.
@@ -396,7 +397,7 @@ std::vector<ScreenFace> random_planes(std::mt19937_64* random, std::size_t count
 
 TEST(Order, WhatIsBuriedIsHiddenByWhatBuriesIt) {
   std::mt19937_64 random(11);
-  int buried = 0;
+  int behind = 0;
   for (int round = 0; round < 20000; ++round) {
     const std::vector<ScreenFace> faces = random_planes(&random, 3);
     const ScreenFace& full = faces[static_cast<std::size_t>(round % 2)];
@@ -405,22 +406,22 @@ TEST(Order, WhatIsBuriedIsHiddenByWhatBuriesIt) {
     ASSERT_EQ(bits_from_float(bound) << kOccluderBoundBits, 0u);
     ASSERT_TRUE(passes_occluder_bound(full, bound, 0, 0)) << "nothing buries itself";
     if (passes_occluder_bound(face, bound, 0, 0)) continue;
-    ++buried;
+    ++behind;
     const uint64_t samples = random() | 1;
-    const Hidden hidden =
-        hide_each_other({1, kAllSamples}, {0.5f, samples}, full, face, {}, [](uint32_t, uint32_t) { return true; });
-    EXPECT_EQ(hidden.of_a, 0u);
+    const OccludedSamples occluded =
+        occlude_pair({1, kAllSamples}, {0.5f, samples}, full, face, {}, [](uint32_t, uint32_t) { return true; });
+    EXPECT_EQ(occluded.of_a, 0u);
     const Vec2 gradient{full.inverse_depth_x - face.inverse_depth_x, full.inverse_depth_y - face.inverse_depth_y};
     for (int sample = 0; sample < 64; ++sample) {
-      if (!((samples & ~hidden.of_b) >> sample & 1)) continue;
+      if (!((samples & ~occluded.of_b) >> sample & 1)) continue;
       // A line that is almost upright is turned by as much in a pixel (see make_edge).
-      const Vec2 at = middle_of(uint64_t{1} << sample);
+      const Vec2 at = centroid_of(uint64_t{1} << sample);
       const float lead = inverse_depth(full, at) - inverse_depth(face, at);
       ASSERT_GE(lead, 0.0f) << round;
       ASSERT_LT(lead, 0.5f / kSteepest * length(gradient)) << round;
     }
   }
-  EXPECT_GT(buried, 2000);
+  EXPECT_GT(behind, 2000);
 }
 
 // Devices ask whichever face holds a pixel when another one comes.
@@ -429,25 +430,25 @@ TEST(Order, WhatIsBuriedDoesNotDependOnWhoIsAskedFirst) {
   for (int round = 0; round < 2000; ++round) {
     std::vector<ScreenFace> faces = random_planes(&random, 2 + random() % 8);
     if (round % 4 == 0) faces.push_back(faces.front());  // as near as another
-    float most = 0;
-    for (const ScreenFace& face : faces) most = std::max(most, occluder_bound(face, 0, 0));
+    float bound = 0;
+    for (const ScreenFace& face : faces) bound = std::max(bound, occluder_bound(face, 0, 0));
     std::vector<const ScreenFace*> expected;
     for (const ScreenFace& face : faces) {
-      if (passes_occluder_bound(face, most, 0, 0)) expected.push_back(&face);
+      if (passes_occluder_bound(face, bound, 0, 0)) expected.push_back(&face);
     }
     std::vector<const ScreenFace*> order;
     for (const ScreenFace& face : faces) order.push_back(&face);
     for (int shuffle = 0; shuffle < 5; ++shuffle) {
       std::shuffle(order.begin(), order.end(), random);
       std::vector<const ScreenFace*> left;
-      const ScreenFace* holder = order.front();
+      const ScreenFace* nearest = order.front();
       for (std::size_t i = 1; i < order.size(); ++i) {
-        const ScreenFace* loser = order[i];
-        if (occluder_bound(*loser, 0, 0) > occluder_bound(*holder, 0, 0)) std::swap(loser, holder);
-        if (passes_occluder_bound(*loser, occluder_bound(*holder, 0, 0), 0, 0)) left.push_back(loser);
+        const ScreenFace* farther = order[i];
+        if (occluder_bound(*farther, 0, 0) > occluder_bound(*nearest, 0, 0)) std::swap(farther, nearest);
+        if (passes_occluder_bound(*farther, occluder_bound(*nearest, 0, 0), 0, 0)) left.push_back(farther);
       }
-      left.push_back(holder);
-      std::erase_if(left, [&](const ScreenFace* face) { return !passes_occluder_bound(*face, most, 0, 0); });
+      left.push_back(nearest);
+      std::erase_if(left, [&](const ScreenFace* face) { return !passes_occluder_bound(*face, bound, 0, 0); });
       std::ranges::sort(left);
       ASSERT_EQ(left, expected) << round;
     }
@@ -459,12 +460,12 @@ TEST(Order, ASliverIsHiddenByWhatIsInFrontOfItAndHidesNothing) {
   const ScreenFace other = plane_face(make_object_id(kWallKind, 1), 0.1f);
   for (const bool sliver_in_front : {false, true}) {
     const ScreenFace sliver = plane_face(make_object_id(kWallKind, 0), sliver_in_front ? 0.2f : 0.05f);
-    const Hidden hidden = hide_each_other({0.01f, 0}, {0.5f, 0xFFFFFFFF}, sliver, other, {}, never);
-    EXPECT_EQ(hidden.of_a, sliver_in_front ? 0u : kAllSamples);
-    EXPECT_EQ(hidden.of_b, 0u);
+    const OccludedSamples occluded = occlude_pair({0.01f, 0}, {0.5f, 0xFFFFFFFF}, sliver, other, {}, never);
+    EXPECT_EQ(occluded.of_a, sliver_in_front ? 0u : kAllSamples);
+    EXPECT_EQ(occluded.of_b, 0u);
     // Pieces that meet in a pixel and fill it: neither is behind the other.
-    EXPECT_EQ(hide_each_other({0.01f, 0}, {0.99f, kAllSamples}, sliver, other, {}, never).of_a, 0u);
-    EXPECT_EQ(hide_each_other({0.99f, kAllSamples}, {0.01f, 0}, other, sliver, {}, never).of_b, 0u);
+    EXPECT_EQ(occlude_pair({0.01f, 0}, {0.99f, kAllSamples}, sliver, other, {}, never).of_a, 0u);
+    EXPECT_EQ(occlude_pair({0.99f, kAllSamples}, {0.01f, 0}, other, sliver, {}, never).of_b, 0u);
   }
 }
 
