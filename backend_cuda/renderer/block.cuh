@@ -1,5 +1,5 @@
-// What the threads of a block share while they draw an image: what the view shows, and the ways in which the lanes of a
-// warp share out uneven work. Warps work on their own; the block waits only between phases.
+// The state that the threads of a block share while they draw an image, and warp collectives that balance uneven work.
+// Warps run independently and synchronize only between phases.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/kernel_arguments.h"
@@ -9,14 +9,14 @@ namespace pictura::cuda {
 constexpr int kWarpSize = 32, kMaxWarps = 8;
 constexpr unsigned kAllLanes = 0xFFFFFFFFu;
 
-/// What a view shows, for gathering its faces.
+/// A view and its world's ranges, for culling and face set-up.
 struct ViewState {
   View view;
   const DeviceGeometry* geometry;
   int32_t world_begin, world_end, light_begin, light_end;
 };
 
-/// A part of an image, at most as wide as a tile. Its pixels count row by row.
+/// A rectangle of an image, at most as wide as a tile. Its pixels are indexed row by row.
 struct Part {
   int x_begin, x_end, y_begin, y_end;
   __device__ int num_columns() const { return x_end - x_begin; }
@@ -31,38 +31,38 @@ struct Part {
   }
 };
 
-/// How a tile is drawn for whose fragments there is no room at once: in upright bands from left to right, and those in
+/// The order in which a tile is drawn whose fragments do not fit at once: vertical bands from left to right, each in
 /// parts from top to bottom.
 struct PartPlan {
-  int band_begin, band_px;  // the band, and how wide it is
-  int wide_px, rows;        // at most, of a part
+  int band_begin, band_px;  // of the current band
+  int wide_px, rows;        // maximum size of a part
   Part part;                // the next one
 };
 
-/// Room for what a WarpQueue holds.
+/// Storage of a WarpQueue.
 struct WarpQueueStorage {
   uint32_t a[2 * kWarpSize], b[2 * kWarpSize];
 };
 
-/// What a warp keeps for its lanes to read of each other.
+/// Shared memory of one warp.
 struct WarpState {
   WarpQueueStorage queue;
   uint8_t owners[kWarpSize];
 };
 
-/// In shared memory, whatever the block's other memory is.
+/// Always in shared memory, also where the rest of the block's memory is global.
 struct BlockState {
-  PreparedImage current;   // what is drawn
-  PreparedImage upcoming;  // what is drawn next
-  Scratch scratch;         // this block's
-  ScreenFace* faces;       // of this image
+  PreparedImage current;   // the image that is drawn
+  PreparedImage upcoming;  // the next one
+  Scratch scratch;         // of this block
+  ScreenFace* faces;       // of the current image
   PolygonEdge* edges;      // of all images in the pool
-  // While faces are gathered.
+  // During culling and face set-up.
   ViewState view;
   FaceSetupContext context;
   SetupCounts listed;
   int32_t num_entries, num_faces, num_clipped, overflow, usable;
-  // While pixels are drawn.
+  // During drawing.
   int32_t num_rows, num_candidates, num_fragments, num_added, num_composited, next_fragments, image;
   Part part, upcoming_part;
   PartPlan plan;
@@ -75,25 +75,25 @@ __device__ inline int lane_index() { return static_cast<int>(threadIdx.x) % kWar
 __device__ inline int warp_index() { return static_cast<int>(threadIdx.x) / kWarpSize; }
 __device__ inline unsigned lanes_below() { return (1u << lane_index()) - 1; }
 
-// Waits for all threads of the block. A warp whose lanes have parted would arrive at the barrier twice.
+// Synchronizes the block. Without __syncwarp() a diverged warp would arrive at the barrier twice.
 __device__ inline void sync_block() {
   __syncwarp();
   __syncthreads();
 }
 
-// The next number of a counter, for a warp.
+// Fetches and increments a counter, once per warp.
 __device__ inline int warp_next(int32_t* counter) {
   int next = 0;
   if (lane_index() == 0) next = atomicAdd(counter, 1);
   return __shfl_sync(kAllLanes, next, 0);
 }
 
-// The first fault stands until the host has thrown it.
+// Only the first fault is kept, until the host has thrown it.
 __device__ inline void note_fault(const DrawTask& task, int32_t index, FaultKind kind) {
   atomicCAS(task.fault, kNoFault, word_of({kind, index}));
 }
 
-// Sets what a view shows; false, with a fault noted, where it names something that does not exist.
+// Sets the state of a view. False, with a fault reported, if it names something that does not exist.
 __device__ inline bool set_view(ViewState* state, const DrawTask& task, int32_t view_index) {
   auto fault = [&](FaultKind kind) {
     note_fault(task, view_index, kind);
@@ -120,7 +120,7 @@ __device__ inline bool set_view(ViewState* state, const DrawTask& task, int32_t 
   return true;
 }
 
-// Sum of the values of the lanes up to this one.
+// Inclusive prefix sum over the lanes of a warp.
 __device__ inline int warp_inclusive_sum(int value) {
   for (int step = 1; step < kWarpSize; step *= 2) {
     const int other = __shfl_up_sync(kAllLanes, value, step);
@@ -129,14 +129,14 @@ __device__ inline int warp_inclusive_sum(int value) {
   return value;
 }
 
-// Adds what the lanes of a warp want together to a counter, whose value before that all get. end: of each lane, what it
-// and those before it want.
+// Allocates for a whole warp from a counter with one atomic addition and returns the warp's first index in all lanes.
+// end: inclusive prefix sum of the lanes' counts.
 __device__ inline int32_t warp_allocate(int32_t* counter, int end) {
   int32_t first = 0;
   if (lane_index() == kWarpSize - 1) first = atomicAdd(counter, end);
   return __shfl_sync(kAllLanes, first, kWarpSize - 1);
 }
-// ... of those that want one.
+// Allocates one index for each lane where `wanted` is true, and returns it.
 __device__ inline int32_t warp_allocate_one(int32_t* counter, bool wanted) {
   const unsigned wanting = __ballot_sync(kAllLanes, wanted);
   int32_t first = 0;
@@ -144,8 +144,8 @@ __device__ inline int32_t warp_allocate_one(int32_t* counter, bool wanted) {
   return __shfl_sync(kAllLanes, first, 0) + __popc(wanting & lanes_below());
 }
 
-// Lanes of a warp bring items that stand one behind the other, those of a lane from `begin` on. Of the item that stands
-// as far behind `first` as the lane is: the number, among lanes that have some, of the lane whose item it is.
+// The items of all lanes of a warp are numbered consecutively, those of a lane from `begin` on. Returns the rank, among
+// lanes with items, of the lane that owns item `first + lane_index()`.
 __device__ inline int owner_rank(int first, int begin, bool has_some) {
   const bool starts_here = has_some && begin >= first && begin < first + kWarpSize;
   const unsigned starts = __reduce_or_sync(kAllLanes, starts_here ? 1u << (begin - first) : 0u);
@@ -153,14 +153,14 @@ __device__ inline int owner_rank(int first, int begin, bool has_some) {
   return before + __popc(starts & (lanes_below() << 1 | 1u)) - 1;
 }
 
-// Shares out what the lanes of a warp bring, `count` items each, with those of the lanes before it `end`: visit(item,
-// owner, k) is called by all lanes, for 32 items at a time, with the item's number, the lane whose item it is (-1: none
-// is left), and its number among that lane's.
+// Load balancing: each lane has `count` items, with inclusive prefix sum `end`. All lanes call visit(item, owner, k)
+// together, for 32 items at a time: the item's number in the warp, the lane that owns it (-1: past the last item), and
+// its index among that lane's items.
 template <typename Visit>
 __device__ inline void warp_expand(WarpState* warp, int count, int end, Visit&& visit) {
   const int lane = lane_index(), begin = end - count;
   const int total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
-  // Those that have items, without gaps.
+  // Lanes that have items, compacted.
   const unsigned owning = __ballot_sync(kAllLanes, count > 0);
   if (count > 0) warp->owners[__popc(owning & lanes_below())] = static_cast<uint8_t>(lane);
   __syncwarp();
@@ -174,16 +174,16 @@ __device__ inline void warp_expand(WarpState* warp, int count, int end, Visit&& 
   }
 }
 
-// A list dealt out like cards, at most 32 to a deal, because entries that stand side by side are much work together:
-// entry lane * deals + deal of a deal is a lane's. As many deals for each warp, so that none waits long for the others.
+// Neighbouring entries of a list tend to be expensive together, so lanes take entries a stride apart: in a pass a lane
+// takes entry lane * passes + pass. Every warp has equally many passes.
 template <int kThreads>
 __device__ inline int passes_of(int count) {
   const unsigned rounds = static_cast<unsigned>(count + kThreads - 1) / kThreads;
   return static_cast<int>(rounds) * (kThreads / kWarpSize);
 }
 
-// Pairs of numbers that the lanes of a warp put aside until there are enough for every lane to take one: each lane may
-// push a pair; while is_ready(), take() gives a pair to each lane, or to as many as there are left.
+// Compacts work within a warp: lanes push pairs; while is_ready(), take() hands one pair to every lane. At the end
+// take() also hands out fewer than 32, then is_valid tells which lanes have one.
 class WarpQueue {
  public:
   __device__ explicit WarpQueue(WarpQueueStorage* storage) : storage_(storage) {}
@@ -220,7 +220,7 @@ class WarpQueue {
   int count_ = 0;
 };
 
-// Sum over the threads by way of an array of as many. All threads of the block.
+// Sum over the threads of a block, through an array with one element per thread. All threads of the block.
 __device__ inline int64_t block_sum(int64_t* of_thread, int64_t value) {
   sync_block();
   of_thread[threadIdx.x] = value;

@@ -12,7 +12,7 @@
 
 namespace pictura::cuda {
 
-// Draws a part of the image that state->shown tells of. False where it has outgrown the block's memory.
+// Draws a part of the image state->current. False if it does not fit into the block's memory.
 template <typename Memory>
 __device__ bool draw_image_part(const Memory& memory, const DrawTask& task, int32_t view, int32_t camera,
                                 const Part& part) {
@@ -25,7 +25,7 @@ __device__ bool draw_image_part(const Memory& memory, const DrawTask& task, int3
   return true;
 }
 
-// Lists what images may show.
+// Culls: lists the primitives of each image that may be visible, and allocates its faces. One warp per image.
 extern "C" __global__ void __launch_bounds__(kSetupThreads, kCullBlocksPerProcessor)
     pictura_cull(const __grid_constant__ DrawTask task) {
   wait_for_earlier_launch();
@@ -69,15 +69,15 @@ extern "C" __global__ void __launch_bounds__(kSetupThreads, kCullBlocksPerProces
   }
 }
 
-// Makes the faces that need no clipping, and lists the others.
+// Sets up the faces that need no clipping, a warp per batch of entries, and lists those that do.
 extern "C" __global__ void __launch_bounds__(kSetupThreads, kFaceSetupBlocksPerProcessor)
     pictura_setup_faces(const __grid_constant__ DrawTask task) {
   wait_for_earlier_launch();
   FaceSetupState* state = face_setup_state();
   DrawCounters* counters = task.counters;
   const int32_t num_batches = counters->batches, num_blocks = static_cast<int32_t>(gridDim.x);
-  // They are much of a size, so they are dealt out. While the warp makes the faces of one, what the next one needs is
-  // on its way, and where the next but one begins.
+  // Batches take about equal time, so each block takes every num_blocks-th. While the warp sets up one, it loads the
+  // entries and the context of the next, and the descriptor of the one after.
   auto i = static_cast<int32_t>(blockIdx.x);
   auto batch_at = [&](int32_t at) { return at < num_batches ? task.pool.batches[at] : FaceBatch{}; };
   FaceBatch next = batch_at(i), after = batch_at(i + num_blocks);
@@ -104,14 +104,14 @@ extern "C" __global__ void __launch_bounds__(kSetupThreads, kFaceSetupBlocksPerP
   }
 }
 
-// Clips those, and makes lights.
+// Clips the listed faces and sets up lights.
 extern "C" __global__ void __launch_bounds__(kSetupThreads, kClipBlocksPerProcessor)
     pictura_clip(const __grid_constant__ DrawTask task) {
   wait_for_earlier_launch();
   ClipShared* storage = &geometry_shared()->clip;
   DrawCounters* counters = task.counters;
   const SetupCounts listed = counters->listed;
-  // No more faces for a warp than it takes for all warps to have some: each is one long chain of instructions.
+  // A warp takes no more faces than spread the work over all warps: each is a long chain of dependent instructions.
   const auto num_blocks = static_cast<int32_t>(gridDim.x);
   const int batch = clamp((listed.clipped + num_blocks - 1) / num_blocks, 1, kWarpSize);
   PICTURA_NO_UNROLL
@@ -126,7 +126,7 @@ extern "C" __global__ void __launch_bounds__(kSetupThreads, kClipBlocksPerProces
   }
 }
 
-// A tile of a camera's images; without rows behind the last.
+// A tile of a camera's images; empty below the last row.
 __device__ inline Part tile_of(const CameraSlot& slot, int32_t tile) {
   const TileGrid& tiles = slot.tiles;
   const int height = height_px(slot.camera);
@@ -139,9 +139,9 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
   wait_for_earlier_launch();
   BlockState* state = block_state();
   int32_t* const counter = &task.counters->next_drawn;
-  // While the block draws a tile, a thread of the last warp, which has the fewest faces to look at, asks for the number
-  // of the next but one, and what the next one shows and where it lies (kept in shared memory: the thread has no
-  // registers left for it).
+  // While the block draws a tile, one thread of the last warp, which has the fewest faces to process, fetches the
+  // number of the tile after next and prefetches the next tile and its image (into shared memory: the thread has no
+  // registers to spare).
   DrawOrder order(task);
   int32_t next_image = -1, after = 0;
   auto take_next = [&] {
@@ -186,8 +186,8 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
   }
 }
 
-// Draws an image whose faces the block gathers itself. False where there is no room for all of it, or where its view
-// names something that does not exist. All threads of the block.
+// Sets up the faces of an image and draws it, all in one block. False if it does not fit, or if its view is invalid.
+// All threads of the block.
 template <typename Memory>
 __device__ bool prepare_and_draw(const DrawTask& task, int32_t image, const SetupTarget& target) {
   const int32_t view = view_of(task, image), camera = camera_of(task, image);
@@ -198,13 +198,13 @@ __device__ bool prepare_and_draw(const DrawTask& task, int32_t image, const Setu
              [&](const auto& memory, const Part& part) { return draw_image_part(memory, task, view, camera, part); });
 }
 
-// Shared memory of a block that draws what was deferred.
+// Shared memory of a block of pictura_draw_deferred, in bytes.
 __host__ __device__ inline size_t deferred_bytes() {
   const size_t to_set_up = setup_bytes(kDrawThreads), to_draw = draw_bytes();
   return to_set_up > to_draw ? to_set_up : to_draw;
 }
 
-// Draws the images for which the pool had no room: a block gathers one at a time where faces of others were.
+// Draws the images that did not fit into the pool, an image per block at a time; it reuses the pool's memory.
 extern "C" __global__ void __launch_bounds__(kDrawThreads, kDeferredBlocksPerProcessor)
     pictura_draw_deferred(const __grid_constant__ DrawTask task) {
   wait_for_earlier_launch();
@@ -261,7 +261,8 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
     if (!is_view) fault(q, FaultKind::bad_query);
     PICTURA_NO_UNROLL
     for (int32_t camera = 0; is_view && camera < num_cameras(task.draw); ++camera) {
-      // What is hidden counts where the agent is alone. What is wrong with the view, set_view notes.
+      // Occluded faces count when the agent is drawn alone, so occlusion culling is off. set_view reports faults of the
+      // view.
       if (!prepare_image(task.draw, view, camera, setup_target_of(state->scratch), false)) {
         if (state->usable != 0) fault(view, FaultKind::capacity_exceeded);
         continue;
@@ -274,7 +275,7 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
         fault(view, FaultKind::capacity_exceeded);
       }
     }
-    // Nothing is drawn any more where drawing keeps its pixels.
+    // Drawing is done, so its memory is free for the sums.
     auto* of_thread = reinterpret_cast<int64_t*>(state->scratch.bytes);
     const VisibilitySum all{block_sum(of_thread, sum.among_all), block_sum(of_thread, sum.alone)};
     if (threadIdx.x == 0) task.visibility[q] = all.share();

@@ -1,4 +1,4 @@
-// What an agent weighs in an image, among all others and alone (see VisibilitySum).
+// The visible weight of an agent in an image, among all others and alone (see VisibilitySum).
 #pragma once
 
 #include "pictura/backend_cuda/renderer/face_setup.cuh"
@@ -7,7 +7,7 @@
 
 namespace pictura::cuda {
 
-/// Adds up what the faces of an agent weigh.
+/// Sums the weights of an agent's fragments.
 struct AccumulateVisibility {
   static constexpr bool kWanted = true;
   uint32_t object_id;
@@ -17,12 +17,11 @@ struct AccumulateVisibility {
   }
 };
 
-/// Rows of an image.
 struct RowRange {
   int y_begin, y_end;
 };
 
-// The rows in which a thing of the gathered image may show. Every thread finds them by itself.
+// The rows of the prepared image that a primitive may touch. Every thread finds them on its own.
 __device__ inline RowRange rows_of(const BlockState& state, uint32_t object_id) {
   RowRange rows{state.context.setting.camera.height_px, 0};
   PICTURA_NO_UNROLL
@@ -35,8 +34,8 @@ __device__ inline RowRange rows_of(const BlockState& state, uint32_t object_id) 
   return rows;
 }
 
-// Adds what a thing of the gathered image weighs, among all others and then without them, to each thread's sum of its
-// own. False where there is no room for all of it. All threads of the block.
+// Adds the weights of a primitive's fragments in the prepared image, among all others and then alone, to a sum per
+// thread. False if the image does not fit into the block's memory. All threads of the block.
 __device__ inline bool accumulate_visibility(BlockState* state, uint32_t object_id, VisibilitySum* sum_inout) {
   const RowRange rows = rows_of(*state, object_id);
   const int num_faces = state->num_faces;
