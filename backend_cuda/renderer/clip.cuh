@@ -1,6 +1,6 @@
-// Faces that cross the border of what is drawn, and lights, which have many corners. A lane clips a face of four
-// corners, and all lanes make the edges; a light, or what outgrows a lane's room, a whole warp makes, a lane a corner.
-// Values are those of clip_face and make_screen_face, sums in their order.
+// Clipping of faces that cross the frustum, and set-up of lights, which have many corners. A lane clips a face of four
+// corners, and all lanes make the edges; a light, or a face with too many corners for a lane, is handled by a whole
+// warp, a lane per corner. Results equal those of clip_face and make_screen_face bit for bit: sums are in their order.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/draw_memory.cuh"
@@ -12,13 +12,14 @@ namespace pictura::cuda {
 
 static_assert(kMaxPolygonCorners <= kWarpSize);
 
-/// Corners that a lane has room for; what is cut by all five planes may have nine.
+/// Maximum number of corners of a lane's face; a face cut by all five planes may have nine.
 constexpr int kLaneCorners = 8;
 
-/// What a warp that clips keeps in shared memory.
+/// Shared memory of a warp that clips.
 struct ClipShared {
-  Quad quad;  // of one lane, for all
-  // Of corners: a column for each lane, or the first row for all. A corner may be cut and stay beyond the last.
+  Quad quad;  // of one lane, read by all
+  // Corners: a column per lane, or the first row for the whole warp. Two more rows: a cut and a kept corner may be
+  // written past the last before the count is checked.
   static constexpr int kRows = kLaneCorners + 2;
   float x[kRows][kWarpSize], y[kRows][kWarpSize], z[kRows][kWarpSize];
   uint16_t edges[kLaneCorners * kWarpSize];  // see LaneEdge
@@ -26,8 +27,8 @@ struct ClipShared {
 
 /// An edge of a lane's face, in 16 bits.
 struct LaneEdge {
-  int lane, from, to;  // the face's, and rows of its corners
-  bool is_clockwise;   // the face
+  int lane, from, to;  // the face's lane, and the rows of the edge's corners
+  bool is_clockwise;   // of the face
   __device__ uint16_t packed() const {
     return static_cast<uint16_t>(lane | from << 5 | to << 9 | (is_clockwise ? 1 << 13 : 0));
   }
@@ -55,7 +56,7 @@ class LaneCorners {
   ClipShared* storage_;
 };
 
-// Stores a value by words of 16 bytes: by words of 4, the lanes of a warp would write a part of memory each.
+// Stores a value in words of 16 bytes: with words of 4, each store of a warp would touch parts of many memory segments.
 template <typename Value>
 __device__ void store_words(Value* to, const Value& value) {
   static_assert(sizeof(Value) % sizeof(uint4) == 0 && alignof(Value) >= sizeof(uint4));
@@ -65,7 +66,7 @@ __device__ void store_words(Value* to, const Value& value) {
   for (int i = 0; i < kWords; ++i) reinterpret_cast<uint4*>(to)[i] = words[i];
 }
 
-// Copies a value, a lane each word of 16 bytes.
+// Copies a value, a lane per word of 16 bytes.
 template <typename Value>
 __device__ void copy_words(Value* to, const Value& from) {
   constexpr int kWords = sizeof(Value) / sizeof(uint4);
@@ -75,7 +76,7 @@ __device__ void copy_words(Value* to, const Value& from) {
   }
 }
 
-// ... from global into shared memory; it is there once all lanes have waited for their copies.
+// Copies a value from global to shared memory asynchronously; valid after all lanes have called wait_for_copies().
 template <typename Value>
 __device__ void copy_words_async(Value* to, const Value& from) {
   static_assert(sizeof(Value) % sizeof(uint64_t) == 0 && alignof(Value) >= sizeof(uint64_t));
@@ -85,7 +86,7 @@ __device__ void copy_words_async(Value* to, const Value& from) {
   }
 }
 
-/// A face whose corners the lanes hold, one each; the rest is the same in all lanes.
+/// A face whose corners are spread over the lanes, one each; the rest is the same in all lanes.
 struct WarpFace {
   Vec3 corner;  // of lanes below count
   int count = 0;
@@ -99,14 +100,14 @@ __device__ inline Vec3 corner_of(Vec3 corner, int lane) {
           __shfl_sync(kAllLanes, corner.z, lane)};
 }
 
-// Sum of the values of the first lanes, as many as a face may have corners, one after the other.
+// Sequential sum over the first kMaxPolygonCorners lanes, in lane order.
 __device__ inline float sum_in_order(float value) {
   float sum = 0.0f;
   for (int lane = 0; lane < kMaxPolygonCorners; ++lane) sum += __shfl_sync(kAllLanes, value, lane);
   return sum;
 }
 
-// The least and the greatest of the lanes' values, by integers of the same order.
+// Minimum and maximum over the lanes' values, by integers that sort like the floats.
 __device__ inline int32_t sortable_bits(int32_t bits) { return bits ^ (bits >> 31 & 0x7FFFFFFF); }
 __device__ inline float warp_min(float value) {
   return __int_as_float(sortable_bits(__reduce_min_sync(kAllLanes, sortable_bits(__float_as_int(value)))));
@@ -115,7 +116,7 @@ __device__ inline float warp_max(float value) {
   return __int_as_float(sortable_bits(__reduce_max_sync(kAllLanes, sortable_bits(__float_as_int(value)))));
 }
 
-// Hands the quad of a lane to all.
+// Broadcasts the quad of lane `owner`.
 __device__ inline WarpFace broadcast_quad(ClipShared* storage, int owner, const Quad& quad) {
   __syncwarp();
   if (lane_index() == owner) storage->quad = quad;
@@ -124,7 +125,7 @@ __device__ inline WarpFace broadcast_quad(ClipShared* storage, int owner, const 
   return {quad_of_owner.corner[lane_index() & 3], 4, quad_of_owner.plane, quad_of_owner.color, storage->quad.primitive};
 }
 
-// The disk of a lit head; of no corners where it has faded to black.
+// The disk of a lit head; no corners if it has faded to black.
 __device__ inline WarpFace make_light(const FaceSetupContext& context, int32_t index) {
   const LightHead head = context.heads[index];
   const PinholeCamera& camera = context.setting.camera;
@@ -134,12 +135,12 @@ __device__ inline WarpFace make_light(const FaceSetupContext& context, int32_t i
           light_ref(index)};
 }
 
-// clip_face of a lane's face, in place: corners are written no further than one behind the last that was read. The
-// number of corners, or kTooManyCorners where a lane has no room for them or the face is not quite convex.
+// clip_face of a lane's face, in place: at most one corner past the last one read is written. Returns the number of
+// corners, or kTooManyCorners if they do not fit or the face is not quite convex.
 constexpr int kTooManyCorners = -1;
 __device__ inline int clip(const Frustum& f, unsigned crossed, LaneCorners corners) {
   int count = crossed == kOutside ? 0 : 4;
-  // Each lane goes through its own planes.
+  // Each lane iterates over its own planes.
   PICTURA_NO_UNROLL
   for (; crossed != 0 && count > 0; crossed &= crossed - 1) {
     const ClipPlane plane(f, __ffs(static_cast<int>(crossed)) - 1);
@@ -165,8 +166,8 @@ __device__ inline int clip(const Frustum& f, unsigned crossed, LaneCorners corne
   return count;
 }
 
-// Projects a lane's clipped face in place, as make_screen_face does. Sets its bounds and whether it turns right, and
-// returns which of its corners begin an edge, a bit for each; none where it covers nothing.
+// Projects a lane's clipped face in place, as make_screen_face does. Sets its bounds and winding, and returns a bit
+// mask of the corners at which an edge begins; 0 if the face covers nothing.
 __device__ inline unsigned project_in_place(const PinholeCamera& camera, LaneCorners corners, int count,
                                             ScreenBounds* bounds, bool* is_clockwise) {
   PICTURA_NO_UNROLL
@@ -193,7 +194,7 @@ __device__ inline unsigned project_in_place(const PinholeCamera& camera, LaneCor
   return fabsf(twice_area) < kMinTwiceArea_px2 ? 0 : edges;
 }
 
-// ... of a face whose corners the lanes hold.
+// clip_face of a face whose corners are spread over the lanes.
 __device__ inline void clip(const Frustum& f, ClipShared* storage, WarpFace* face_inout) {
   const int lane = lane_index();
   Vec3 corner = face_inout->corner;
@@ -212,7 +213,7 @@ __device__ inline void clip(const Frustum& f, ClipShared* storage, WarpFace* fac
     const bool is_cut = lane < count && (previous_inside >= 0.0f) != (inside >= 0.0f);
     const unsigned cuts = __ballot_sync(kAllLanes, is_cut), staying = __ballot_sync(kAllLanes, stays);
     const int index = __popc(cuts & lanes_below()) + __popc(staying & lanes_below());
-    // Only a face that is not quite convex could outgrow the room; it loses corners then.
+    // Only a face that is not quite convex could exceed the maximum; the excess corners are dropped.
     const bool fits = index + 2 <= kMaxPolygonCorners;
     auto keep = [&](int at, Vec3 p) {
       storage->x[0][at] = p.x;
@@ -232,7 +233,7 @@ __device__ inline void clip(const Frustum& f, ClipShared* storage, WarpFace* fac
   face_inout->count = count;
 }
 
-// make_screen_face of a clipped face whose corners the lanes hold, with edges from edge_begin on.
+// make_screen_face of a clipped face whose corners are spread over the lanes, with edges from edge_begin on.
 __device__ inline bool make_screen_face(const FaceSetupContext& context, const WarpFace& face, int32_t edge_begin,
                                         ScreenFace* face_out) {
   const PinholeCamera& camera = context.setting.camera;
@@ -249,7 +250,7 @@ __device__ inline bool make_screen_face(const FaceSetupContext& context, const W
   const int next_lane = lane + 1 < count ? lane + 1 : 0;
   const Vec2 next{__shfl_sync(kAllLanes, corner.x, next_lane), __shfl_sync(kAllLanes, corner.y, next_lane)};
   const Vec2 first{__shfl_sync(kAllLanes, corner.x, 0), __shfl_sync(kAllLanes, corner.y, 0)};
-  // To add 0 changes nothing.
+  // Adding 0 does not change the sum.
   const bool is_between = lane > 0 && lane + 1 < count;
   const float twice_area = sum_in_order(is_between ? cross(corner - first, next - first) : 0.0f);
   if (fabsf(twice_area) < kMinTwiceArea_px2) return false;

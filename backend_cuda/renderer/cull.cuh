@@ -1,5 +1,5 @@
-// What an image may show: a warp looks at the rows of the map's grid, a lane a row, then at the balls of the pieces in
-// them, a lane a piece. What is found is left in batches of as many entries as a warp has lanes.
+// Culling: a warp tests the rows of the map's grid, one lane per row, then the bounding spheres of the pieces in them,
+// one lane per piece. The entries that may be visible are stored in batches of warp size.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/draw_memory.cuh"
@@ -9,35 +9,35 @@ namespace pictura::cuda {
 
 constexpr uint32_t kNoEntry = ~0u;
 
-/// The outline on the ground of what a camera sees, by its sides, each from its end of lower y.
+/// A side of the frustum's outline on the ground plane, from its end of lower y to that of higher y.
 struct alignas(16) OutlineSide {
   Vec2 a, b;
-  float dx_dy;  // 0 for level ones
+  float dx_dy;  // 0 for sides of constant y
   float x_low, x_high;
 };
 constexpr int kOutlineSides = 8;
 
-/// What a warp that culls keeps in shared memory.
+/// Shared memory of a warp that culls.
 struct CullShared {
   OutlineSide sides[kOutlineSides];
-  // Of strips and of walls, as pieces_of says.
+  // Of strips and of walls, in the order of pieces_of.
   const Ball* balls[2];
   const int32_t* items[2];
-  int32_t offsets[kWarpSize];  // of rows that have pieces, see cull_pieces
+  int32_t offsets[kWarpSize];  // of non-empty rows, see cull_pieces
 };
 static_assert(FaceBatch::kEntries == kWarpSize);
 
-/// The entries of an image. All lanes of a warp call what follows, of one warp or more.
+/// The entries of an image. All lanes of a warp call its functions together; several warps may share a list.
 class EntryList {
  public:
-  /// count: in shared memory, of the entries that were wanted; those for which there is no room are not kept.
+  /// count: in shared memory; it counts all entries pushed, also those beyond max_entries, which are dropped.
   __device__ EntryList(uint32_t* entries, int32_t max_entries, int32_t* count)
       : entries_(entries), max_entries_(max_entries), count_(count) {}
   __device__ void push(bool wanted, uint32_t entry) {
     const int32_t index = warp_allocate_one(count_, wanted);
     if (wanted) set(index, entry);
   }
-  /// An entry for each of an agent's faces.
+  /// Pushes an entry for each set bit of `faces`, the faces of an agent.
   __device__ void push_faces(unsigned faces, uint32_t object_id) {
     const int count = __popc(faces), end = warp_inclusive_sum(count);
     int32_t index = warp_allocate(count_, end) + end - count;
@@ -46,7 +46,7 @@ class EntryList {
       set(index++, face_entry(object_id, __ffs(static_cast<int>(faces)) - 1));
     }
   }
-  /// Fills the last batch, once all warps have found theirs.
+  /// Pads the last batch, once all warps have pushed.
   __device__ void finish() {
     const int32_t count = *count_, end = FaceBatch::count_of(count) * FaceBatch::kEntries;
     if (count + lane_index() < end) set(count + lane_index(), kNoEntry);
@@ -61,29 +61,30 @@ class EntryList {
   int32_t* count_;
 };
 
-// Strips and walls, in this order.
+// The strips (0) or the walls (1) of a map.
 __device__ inline const PieceGrid& pieces_of(const DeviceGeometry& geometry, int of_walls) {
   return of_walls != 0 ? geometry.walls : geometry.strips;
 }
 
-// The cell of a row or column at a distance from the grid's first; pieces have more leeway than rounding takes.
+// The row or column of a distance from the grid's origin. Bounding spheres exceed their pieces by more than rounding
+// errors.
 __device__ inline int cell_at(float distance_m, float cells_per_m, int count) {
   return clamp(static_cast<int>(floorf(distance_m * cells_per_m)), 0, count - 1);
 }
 
-// The rows of the grids that the outline may touch.
+// The rows of the grids, of strips and of walls, that the outline may touch.
 struct GridRows {
   int begin[2], count[2];
 };
 
-// Sets the outline. The hull of the eye and the far corners on the ground has no other sides than those of the pyramid:
-// from the eye to the corners, and around them. All lanes of the warp, one a side, for the rows of strips and of walls.
+// Sets the outline: the four edges from the eye to the far corners, and the four between neighbouring corners. On the
+// ground they contain all sides of the convex hull. All lanes of the warp, one per side, for strips and for walls.
 __device__ inline GridRows set_outline(CullShared* storage, const ImageSetting& setting,
                                        const DeviceGeometry& geometry) {
   const int side = lane_index() % kOutlineSides, of_walls = lane_index() / kOutlineSides & 1;
   const PieceGrid& pieces = pieces_of(geometry, of_walls);
   auto corner = [&](int i) { return far_corner(setting.camera, setting.frustum, i).xy(); };
-  // Corners differ in their first bit along x, and in their second along y.
+  // Bit 0 of a corner's index selects x, bit 1 selects y.
   const int along = side & 3, from = along < 2 ? 2 * along : along - 2, to = along < 2 ? from + 1 : from + 2;
   const Vec2 first = side < 4 ? setting.camera.position_m.xy() : corner(from), second = corner(side < 4 ? side : to);
   const bool rises = first.y <= second.y;
@@ -113,7 +114,7 @@ __device__ inline GridRows set_outline(CullShared* storage, const ImageSetting& 
   return rows;
 }
 
-// The pieces of a row that the outline may touch, which stand side by side.
+// The contiguous range of pieces of a row that the outline may touch.
 struct PieceRange {
   int begin = 0, count = 0;
 };
@@ -122,7 +123,7 @@ __device__ inline PieceRange pieces_of_row(const PieceGrid& pieces, const Outlin
   const float radius_m = pieces.largest_radius_m;
   const float y_low = grid.origin_m.y + grid.cell_m * static_cast<float>(row) - radius_m;
   const float y_high = y_low + grid.cell_m + 2.0f * radius_m;
-  // The range in x of the outline's hull between them.
+  // The x range of the outline's convex hull within [y_low, y_high].
   float x_low = 1e30f, x_high = -1e30f;
   PICTURA_NO_UNROLL
   for (int i = 0; i < kOutlineSides; ++i) {
@@ -142,7 +143,7 @@ __device__ inline PieceRange pieces_of_row(const PieceGrid& pieces, const Outlin
   return {begin, row_cells[cell_at(x_high + radius_m - grid.origin_m.x, cells_per_m, grid.num_x) + 1] - begin};
 }
 
-// Lists the strips and walls that may show. Each warp of the block, for its part of the candidates.
+// Lists the strips and walls that may be visible. Each warp of the block takes its share of the candidates.
 __device__ inline void cull_pieces(BlockState* state, CullShared* storage, EntryList* list) {
   const PinholeCamera& camera = state->context.setting.camera;
   const Frustum& frustum = state->context.setting.frustum;
@@ -158,8 +159,8 @@ __device__ inline void cull_pieces(BlockState* state, CullShared* storage, Entry
       range = pieces_of_row(pieces_of(geometry, of_walls), storage->sides,
                             of_walls != 0 ? row - rows.count[0] + rows.begin[1] : row + rows.begin[0]);
     }
-    // The rows' pieces one behind the other, those of strips first. Of each row that has some, how far its pieces in
-    // the grid's list are from there.
+    // The pieces of all rows are numbered consecutively, those of strips first. For each non-empty row, the offset from
+    // that number to the piece's index in the grid.
     const bool has_some = range.count > 0;
     const int end = warp_inclusive_sum(range.count), begin = end - range.count;
     const int total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
@@ -170,7 +171,7 @@ __device__ inline void cull_pieces(BlockState* state, CullShared* storage, Entry
     struct Candidate {
       Ball ball;
       int32_t index;
-      int kind;  // as in the room
+      int kind;  // index into CullShared::balls
     };
     auto candidate_of = [&](int item) {
       const int rank = owner_rank(item, begin, has_some);
@@ -181,7 +182,7 @@ __device__ inline void cull_pieces(BlockState* state, CullShared* storage, Entry
     int item = warp_index() * kWarpSize;
     Candidate next;
     if (item < total) next = candidate_of(item);
-    // The next ones are asked for before these are looked at; beyond the last there stands the last one.
+    // Software prefetch: load the next candidates before testing these. Past the end, the last one is loaded again.
     PICTURA_NO_UNROLL
     while (item < total) {
       const Candidate candidate = next;
@@ -196,7 +197,7 @@ __device__ inline void cull_pieces(BlockState* state, CullShared* storage, Entry
   }
 }
 
-// Lists the faces of agents that may show. Each warp of the block, for its part.
+// Lists the front-facing faces of agents that may be visible. Each warp of the block takes its share.
 __device__ inline void cull_agents(const BlockState& state, const DrawTask& task, EntryList* list) {
   const ViewState& view = state.view;
   const ImageSetting& setting = state.context.setting;
@@ -215,7 +216,7 @@ __device__ inline void cull_agents(const BlockState& state, const DrawTask& task
   }
 }
 
-// ... the lit heads that are turned to the camera.
+// Lists the light heads that are lit, face the camera and may be visible.
 __device__ inline void cull_lights(const BlockState& state, EntryList* list) {
   const ImageSetting& setting = state.context.setting;
   const Span<const LightHead> heads = state.view.geometry->pieces.heads;
@@ -233,7 +234,7 @@ __device__ inline void cull_lights(const BlockState& state, EntryList* list) {
   }
 }
 
-// Lists all faces that an image may show. Each warp of the block, for its part.
+// Lists everything that may be visible in an image. Each warp of the block takes its share.
 __device__ inline void cull(BlockState* state, const DrawTask& task, CullShared* storage, EntryList* list) {
   cull_agents(*state, task, list);
   cull_lights(*state, list);

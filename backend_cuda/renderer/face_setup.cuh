@@ -1,6 +1,6 @@
-// From entries that may show to faces. Nearly all have four corners and need no clipping: a lane makes one of those.
-// The others are listed, and clipped when many have come together. Edges and faces take room by counters, so that
-// nobody waits for others.
+// Face set-up: from entries to faces on screen. Nearly all faces have four corners and need no clipping: one lane sets
+// up one of those. The others are listed and clipped in batches. Faces and edges are allocated with atomic counters, so
+// no warp waits for another.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/clip.cuh"
@@ -9,8 +9,8 @@
 
 namespace pictura::cuda {
 
-/// What a lane is to load or store, by words of 16 bytes. One more keeps rows apart: lanes that write a word of their
-/// own meet in no bank, those that read rows together in no more than two.
+/// Values that a lane loads or stores, as words of 16 bytes. One word of padding avoids bank conflicts: there are none
+/// when each lane writes a word of its own row, and at most two-way ones when lanes read rows together.
 template <typename Value, int kValues = 1>
 struct LaneRow {
   static constexpr int kWords = kValues * sizeof(Value) / sizeof(uint4), kRowsAtOnce = kWarpSize / kWords;
@@ -22,29 +22,29 @@ using StripRow = LaneRow<Strip>;
 using EdgeRow = LaneRow<PolygonEdge, 4>;
 using FaceRow = LaneRow<ScreenFace>;
 
-/// What a warp that makes faces keeps in shared memory: strips, then the edges of faces, then the faces themselves.
+/// Shared memory of a warp that sets up faces: strips, then the faces' edges, then the faces.
 union FaceShared {
   StripRow strips[kWarpSize];
   EdgeRow edges[kWarpSize];
   FaceRow faces[kWarpSize];
 };
 
-/// What a warp that gathers keeps in shared memory, one step after the other.
+/// Shared memory of a warp that runs all stages, one after the other.
 union GeometryShared {
   CullShared cull;
   FaceShared faces;
   ClipShared clip;
 };
 
-/// The shared memory of a block that makes faces and does nothing else. With the 1 KiB that each block takes, 32 of
-/// them leave 28 KiB of cache to a processor that has 256 KiB for both: little of what they read is read again.
+/// Shared memory of a block of pictura_setup_faces. With the 1 KiB that each block reserves, 32 of them leave 28 KiB of
+/// L1 cache on an SM that has 256 KiB for both; that is enough because little of what they read is read again.
 struct FaceSetupState {
-  FaceSetupContext contexts[2];  // of this batch and the next, by turns
+  FaceSetupContext contexts[2];  // of this batch and the next, alternating
   FaceShared storage;
 };
 __device__ inline FaceSetupState* face_setup_state() { return reinterpret_cast<FaceSetupState*>(block_memory); }
 
-// Bytes of shared memory of a block that culls and of one that takes all steps, and where a warp's part of it is.
+// Bytes of shared memory of a block that culls, and of a block that runs all stages; then a warp's part of the latter.
 __host__ __device__ constexpr size_t cull_bytes() { return state_bytes(kSetupThreads) + sizeof(CullShared); }
 __host__ __device__ constexpr size_t setup_bytes(int threads) {
   return state_bytes(threads) + static_cast<size_t>(threads / kWarpSize) * sizeof(GeometryShared);
@@ -53,13 +53,13 @@ __device__ inline GeometryShared* geometry_shared() {
   return reinterpret_cast<GeometryShared*>(block_memory + state_bytes(num_threads())) + warp_index();
 }
 
-// Loads the strips among the lanes' entries, four lanes a strip and all of them eight at once, because lanes that load
-// a strip each ask for every sector several times. All lanes of the warp.
+// Loads the strips among the lanes' entries, four lanes per strip and eight strips at once: if each lane loaded its
+// own, every sector would be requested several times. All lanes of the warp.
 __device__ inline void load_strips(const FaceSetupContext& context, uint32_t entry, StripRow* rows_out) {
   const bool is_strip = kind_of(entry) == kStripKind;
   const unsigned strips = __ballot_sync(kAllLanes, is_strip);
   if (strips == 0) return;
-  // Lanes that have none take another lane's.
+  // Lanes without a strip load another lane's.
   const uint32_t of_another = __shfl_sync(kAllLanes, entry, __ffs(static_cast<int>(strips)) - 1);
   const uint32_t index = (is_strip ? entry : of_another) & kFaceIndexMask;
   constexpr int kWords = StripRow::kWords, kRowsAtOnce = StripRow::kRowsAtOnce;
@@ -73,13 +73,13 @@ __device__ inline void load_strips(const FaceSetupContext& context, uint32_t ent
   __syncwarp();
 }
 
-// The face of an entry that is no light; false where it has faded to black. strip_of(index) is a strip.
+// The face of an entry that is not a light; false if it has faded to black. strip_of(index) returns a strip.
 template <typename StripOf>
 __device__ bool make_quad(const FaceSetupContext& context, uint32_t entry, Quad* quad_out, StripOf&& strip_of) {
   const ImageSetting& setting = context.setting;
   const uint32_t kind = kind_of(entry);
   const auto index = static_cast<int32_t>(entry & kFaceIndexMask);
-  // One body for all kinds but for their corners: lanes of a warp have different ones.
+  // Only the corners are computed per kind, to limit divergence: lanes of a warp have different kinds.
   WorldQuad world;
   quad_out->floor_px = 0.0f;
   if (kind == kStripKind) {
@@ -98,20 +98,20 @@ __device__ bool make_quad(const FaceSetupContext& context, uint32_t entry, Quad*
   return quad_to_camera(world, setting.camera, &quad_out->in_camera);
 }
 
-// Keeps the faces of those lanes that have one. Each image has room for all of its own.
+// Stores the faces of those lanes with at >= 0. Every image has capacity for all of its faces.
 __device__ inline void keep_face(const FaceSetupContext& context, const ScreenFace& face, PrimitiveRef primitive,
                                  int32_t edge_begin, int32_t at) {
   if (at >= 0) store_words(context.faces + at, complete_face(face, primitive, edge_begin));
 }
 
-// Stores the first rows side by side, all lanes 512 bytes at once: lanes that store a row each would fill halves of
-// what memory takes.
+// Stores the first `count` rows contiguously, the warp 512 bytes at a time: if each lane stored its own row, memory
+// transactions would be half empty.
 template <typename Row>
 __device__ void store_rows(uint4* to, Row* rows, int count) {
   constexpr int kWords = Row::kWords, kRowsAtOnce = Row::kRowsAtOnce;
   const int row = lane_index() / kWords, word = lane_index() % kWords, left = count - row;
   uint4* const own = to + lane_index();
-  // Four are read before any is stored, or each would wait for its own.
+  // Read four before storing any, so that their latencies overlap.
   constexpr int kAtOnce = 4;
   for (int first = 0; first < kWords; first += kAtOnce) {
     uint4 words[kAtOnce];
@@ -122,7 +122,8 @@ __device__ void store_rows(uint4* to, Row* rows, int count) {
   }
 }
 
-// Makes the faces of a batch of the image, an entry each lane, and lists what is to be clipped. All lanes of the warp.
+// Sets up the faces of a batch of the image, one entry per lane, and lists those that need clipping. All lanes of the
+// warp.
 __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* storage, const SetupLists& lists,
                                   SetupCounts* counts, uint32_t entry, int32_t image) {
   const bool is_light = entry != kNoEntry && kind_of(entry) == kLightKind, is_quad = entry != kNoEntry && !is_light;
@@ -132,7 +133,7 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
   }
   const unsigned quads = __ballot_sync(kAllLanes, is_quad);
   if (quads == 0) return;
-  // Lanes that have no face make another lane's, which is not kept: so none waits for what lanes do differently.
+  // Lanes without a face compute another lane's, which is not stored, so the warp does not diverge.
   const uint32_t of_another = __shfl_sync(kAllLanes, entry, __ffs(static_cast<int>(quads)) - 1);
   const PinholeCamera& camera = context.setting.camera;
   Quad quad;
@@ -147,13 +148,14 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
              is_wanted = is_quad && is_seen;
   const bool is_visible = is_wanted && clip_class == ClipClass::inside && covers,
              is_clipped = is_wanted && clip_class == ClipClass::crossing;
-  // Two lanes ask for the places of all at once, and wait for them when edges are made.
+  // Two lanes allocate for the whole warp, faces and clipped entries at once; the results are needed only after the
+  // edges.
   const unsigned visible = __ballot_sync(kAllLanes, is_visible), clipped = __ballot_sync(kAllLanes, is_clipped);
   const int lane = lane_index(), wanted = __popc(lane == 0 ? visible : (lane == 1 ? clipped : 0u));
   int32_t taken = 0;
   if (wanted > 0) taken = atomicAdd(lane == 0 ? context.num_faces : &counts->clipped, wanted);
   const int rank = __popc(visible & lanes_below()), count = __popc(visible);
-  __syncwarp();  // edges go where strips were
+  __syncwarp();  // edges overwrite the strips
   ScreenFace face;
   if (is_visible) {
     PolygonEdge* const edges = storage->edges[rank].values;
@@ -164,7 +166,7 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
   __syncwarp();
   const int32_t at = __shfl_sync(kAllLanes, taken, 0), clipped_at = __shfl_sync(kAllLanes, taken, 1);
   if (is_clipped) lists.clipped[clipped_at + __popc(clipped & lanes_below())] = {entry, image};
-  // The place of a face's edges follows from its own.
+  // The index of a face's edges follows from its own.
   const int32_t edge_begin = context.edge_begin + 4 * at;
   store_rows(reinterpret_cast<uint4*>(context.edges + edge_begin), storage->edges, count);
   __syncwarp();
@@ -175,7 +177,7 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
   store_rows(reinterpret_cast<uint4*>(context.faces + at), storage->faces, count);
 }
 
-// Makes a face whose corners the lanes hold. False where there is no room for its edges. All lanes of the warp.
+// Sets up a face whose corners are spread over the lanes. False if its edges do not fit. All lanes of the warp.
 __device__ inline bool make_warp_face(const FaceSetupContext& context, ClipShared* storage, WarpFace warp_face) {
   clip(context.setting.frustum, storage, &warp_face);
   if (warp_face.count == 0) return true;
@@ -190,8 +192,9 @@ __device__ inline bool make_warp_face(const FaceSetupContext& context, ClipShare
   return true;
 }
 
-// Clips faces of four corners, the lanes' `thing` where is_one, and makes theirs but for what outgrows a lane's room:
-// of that *quad_out is kept. False in those lanes for whose face there is no room. All lanes of the warp.
+// Clips the faces of lanes with is_active and sets them up, except for those that need more corners than a lane can
+// hold: of those *quad_out is set and has_too_many_corners_out is true. False in lanes whose edges do not fit. All
+// lanes of the warp.
 __device__ inline bool clip_quads(const FaceSetupContext* contexts, ClipShared* storage, bool is_active,
                                   ClippedPrimitive primitive, Quad* quad_out, bool* has_too_many_corners_out) {
   const FaceSetupContext& context = contexts[primitive.image];
@@ -209,7 +212,7 @@ __device__ inline bool clip_quads(const FaceSetupContext* contexts, ClipShared* 
   ScreenBounds bounds;
   bool is_clockwise = false;
   const unsigned edges = kept > 0 ? project_in_place(camera, corners, kept, &bounds, &is_clockwise) : 0;
-  // The edges of all lanes, one face's behind the other's.
+  // The edges of all lanes are stored contiguously.
   const int count = __popc(edges), end = warp_inclusive_sum(count), total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
   int32_t edge_begin = 0;
   if (lane_index() == 0 && total > 0) edge_begin = context.clipped_begin + atomicAdd(context.num_clipped, total);
@@ -242,8 +245,8 @@ __device__ inline bool clip_quads(const FaceSetupContext* contexts, ClipShared* 
   return fits;
 }
 
-// Clips things of a list, the lanes' `thing` where is_one, and makes their faces; primitive.image is that of contexts.
-// All are lights or none. False in those lanes for whose face there is no room. All lanes of the warp.
+// Clips the primitives of lanes with is_active and sets up their faces; primitive.image indexes contexts. Either all
+// are lights or none is. False in lanes whose edges do not fit. All lanes of the warp.
 __device__ inline bool clip_primitives(const FaceSetupContext* contexts, ClipShared* storage, bool is_active,
                                        bool are_lights, ClippedPrimitive primitive) {
   Quad quad;
@@ -261,11 +264,11 @@ __device__ inline bool clip_primitives(const FaceSetupContext* contexts, ClipSha
   return fits;
 }
 
-// What a warp is to clip at once: a light, which all of its lanes make, or `batch` faces of four corners, a lane each.
-// Lights come first: they take longest.
+// A unit of clipping work for a warp: one light, set up by all lanes together, or `batch` faces of four corners, one
+// per lane. Lights come first because they take longest.
 struct ClippedItem {
   bool exists, are_lights;
-  bool is_active;  // of the lane
+  bool is_active;  // this lane has a primitive
   ClippedPrimitive primitive;
 };
 __device__ inline ClippedItem clipped_item(const SetupLists& lists, const SetupCounts& listed, int item, int batch) {
@@ -276,7 +279,7 @@ __device__ inline ClippedItem clipped_item(const SetupLists& lists, const SetupC
           lists.clipped[are_lights ? lists.max_clipped - 1 - item : min_of(quad, listed.clipped - 1)]};
 }
 
-// Sets what an image shows, but for where its faces go; false, with a fault noted, where its view names something that
+// Sets the context of an image except for its outputs; false, with a fault reported, if its view names something that
 // does not exist. One thread.
 __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_t view, int32_t camera) {
   if (!set_view(&state->view, task, view)) return false;
@@ -296,13 +299,13 @@ __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_
   return true;
 }
 
-// The faces of solids that cover most of an image, of those that were offered. A lane each keeps, for as many as there
-// may be, the entry and what it covers; the occluder stands at the lane's place in the setting.
+// Selects, of the solid faces that are offered, those with the largest area as occluders. Lane i holds the entry and
+// area of occluder i; the occluder itself is in the context's setting.
 class BestOccluders {
  public:
   __device__ explicit BestOccluders(FaceSetupContext* context) : context_(context) {}
 
-  /// Each lane offers the face of an entry, or none. All lanes of the warp.
+  /// Each lane with is_active offers the face of an entry. All lanes of the warp.
   __device__ void offer(bool is_active, uint32_t entry) {
     const ImageSetting& setting = context_->setting;
     const FaceSetupContext* context = context_;
@@ -319,17 +322,17 @@ class BestOccluders {
     }
   }
 
-  /// How many there are. All lanes of the warp.
+  /// Number of occluders selected. All lanes of the warp.
   __device__ int count() const { return __popc(__ballot_sync(kAllLanes, kept_covers_ != 0)); }
 
  private:
   struct Offered {
     uint32_t entry;
-    int covers = 0;  // the area's bits, which sort as it does; 0: hides nothing
+    int covers = 0;  // bits of the area, in the same order; 0: occludes nothing
     ScreenQuad on_screen;
     bool is_clockwise = false;
   };
-  // Whether what the lane offers, and what it has kept so far, is among the best.
+  // Whether the lane's offered face, and the one it holds, are among the best.
   struct Chosen {
     bool own = false, kept = false;
   };
@@ -355,7 +358,7 @@ class BestOccluders {
     return chosen;
   }
 
-  // The chosen offers take the places of those that go. The place of the lane's own.
+  // The chosen offers replace those that drop out. Returns the slot of the lane's own.
   __device__ int insert(const Offered& own, Chosen chosen) {
     unsigned slots = ~__ballot_sync(kAllLanes, chosen.kept) & ((1u << Occluders::kMaxCount) - 1);
     int slot = 0;
@@ -378,7 +381,7 @@ class BestOccluders {
   int kept_covers_ = 0;
 };
 
-// Finds what hides whole faces among the solids of a list. All lanes of one warp.
+// Finds the occluders among the solids of a list. All lanes of one warp.
 __device__ inline void find_occluders(FaceSetupContext* context, const uint32_t* entries, int32_t count) {
   auto may_hide = [&](uint32_t entry) {
     const PinholeCamera& camera = context->setting.camera;
@@ -388,7 +391,7 @@ __device__ inline void find_occluders(FaceSetupContext* context, const uint32_t*
     return kind_of(entry) == kWallKind && may_occlude(context->walls[index], camera);
   };
   BestOccluders best(context);
-  // Near ones are put aside until every lane has one.
+  // Near solids are queued until every lane has one.
   WarpQueue queue(&block_state()->warps[warp_index()].queue);
   PICTURA_NO_UNROLL
   for (int32_t first = 0;; first += kWarpSize) {
@@ -406,12 +409,12 @@ __device__ inline void find_occluders(FaceSetupContext* context, const uint32_t*
   __syncwarp();
 }
 
-// What drawing is told of an image.
+// The description of an image for drawing.
 __device__ inline PreparedImage image_of(const BlockState& state, int32_t face_begin, int32_t face_count) {
   return {state.view.geometry, state.context.agents, state.context.setting.camera.position_m, face_begin, face_count};
 }
 
-/// Where a block gathers an image of its own.
+/// Memory in which a block sets up an image of its own.
 struct SetupTarget {
   ScreenFace* faces;
   PolygonEdge* edges;
@@ -419,15 +422,15 @@ struct SetupTarget {
   SetupLists lists;
 };
 
-// There the lists hold all that a world does.
+// The block's scratch memory, whose lists have capacity for a whole world.
 __device__ inline SetupTarget setup_target_of(const Scratch& scratch) {
   SetupTarget target{scratch.faces, scratch.edges, 0, 4 * scratch.max_faces, scratch.max_edges, {}};
   lay_out(&target.lists, scratch, scratch.bytes);
   return target;
 }
 
-// Gathers an image into the block's own memory, all of it in one launch. False where there is no room for all, or where
-// its view names something that does not exist. All threads of the block.
+// Culls, sets up and clips the faces of an image in the block's own memory. False if they do not fit, or if the view
+// names something that does not exist. All threads of the block.
 __device__ inline bool prepare_image(const DrawTask& task, int32_t view, int32_t camera, const SetupTarget& target,
                                      bool culls_occluded) {
   BlockState* state = block_state();

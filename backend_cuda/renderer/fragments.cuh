@@ -1,6 +1,6 @@
-// From the faces of an image to fragments: what a face covers of a pixel. Rows of faces find, for each pixel, the face
-// that covers it fully and buries most, and list the pixels that faces cover partly; those that may show become
-// fragments, one thread for each, in a chain for each pixel.
+// From the faces of an image to fragments. Rows of faces find, for each pixel, the face that covers it fully with the
+// largest occluder bound, and list the pixels that faces cover partly; those that may be visible become fragments, one
+// thread each, in a linked list per pixel.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/draw_memory.cuh"
@@ -10,14 +10,14 @@
 
 namespace pictura::cuda {
 
-// The tile from (x, y) on, so many columns and rows large, of an image of that width whose rows end at y_end.
+// The tile at (x, y) of the given size, clipped to an image of that width whose rows end at y_end.
 __device__ inline Part tile_at(int x, int y, int columns, int rows, int width_px, int y_end) {
   return {x, min_of(x + columns, width_px), y, min_of(y + rows, y_end)};
 }
 
-/// A pixel's word. While full faces are found it is the mark of the one that buries most: the bits of its
-/// occluder_bound(), which sort like that, and the face's number plus 1. From the pixel's first fragment on, that
-/// stands where the inverse_depth did, and the sign bit tells so. 0: neither.
+/// The word of a pixel. While full faces are found, it holds the largest occluder bound in the upper bits, which sort
+/// as the bound does, and the index of its face plus 1 in the lower bits. From the pixel's first fragment on, the upper
+/// bits hold the first fragment of its list, and the sign bit is set. 0: no face and no fragment.
 template <typename Word>
 struct PixelWord {
   static constexpr int kFaceBits = sizeof(Word) == 4 ? kMarkedFaceBits : 32;
@@ -32,19 +32,19 @@ struct PixelWord {
     constexpr uint32_t kBoundMask = ~0u << kMarkedFaceBits;
     return float_from_bits(static_cast<uint32_t>(mark >> (kFaceBits - kMarkedFaceBits)) & kBoundMask);
   }
-  /// With a fragment as the first of the chain, and the face as it is.
+  /// Replaces the first fragment of the list and keeps the face.
   __device__ static Word with_first(Word word, Word fragment) {
     return kHasChain | fragment << kFaceBits | (word & kFace);
   }
 };
 
-// The face of a word that covers its pixel fully, of several the one that buries most; kNone where there is none, or
-// where it stands among the pixel's fragments.
+// The face that covers the pixel fully, with the largest occluder bound; kNone if there is no such face, or if it is in
+// the pixel's fragment list.
 template <typename Memory>
 __device__ typename Memory::Word full_of_word(typename Memory::Word word) {
   return ((word & PixelWord<typename Memory::Word>::kFace) - 1) & Memory::kNone;
 }
-// The first fragment of its chain; kNone where there is none.
+// The first fragment of the pixel's list; kNone if the list is empty.
 template <typename Memory>
 __device__ typename Memory::Word first_of_word(typename Memory::Word word) {
   using Pixel = PixelWord<typename Memory::Word>;
@@ -59,7 +59,7 @@ __device__ typename Memory::Word first_of(const Memory& memory, int pixel) {
   return first_of_word<Memory>(memory.pixels[pixel]);
 }
 
-// Lists the rows that faces have in a part. Those that find no room are counted. All threads of the block.
+// Lists the rows of faces in a part. Rows beyond max_rows are counted but not stored. All threads of the block.
 template <typename Memory>
 __device__ void list_rows(const Memory& memory, int num_faces, const Part& part) {
   using Word = typename Memory::Word;
@@ -86,7 +86,7 @@ __device__ void list_rows(const Memory& memory, int num_faces, const Part& part)
   }
 }
 
-// Lists what may become a fragment, where there is room.
+// Stores a candidate unless the list is full.
 template <typename Memory>
 __device__ void list_candidate(const Memory& memory, int index, int face, int pixel, bool covers_fully) {
   using Word = typename Memory::Word;
@@ -95,8 +95,8 @@ __device__ void list_candidate(const Memory& memory, int index, int face, int pi
                              (covers_fully ? Memory::kCoversFully : Word{0});
 }
 
-// Marks a pixel that a face covers fully, unless one has that buries more. Returns the face that gives way to the
-// other, and may still show before it; -1: none does.
+// Marks a pixel that a face covers fully, unless its current face has a larger occluder bound. Returns the face of the
+// two with the lower bound if it may still be visible in front of the other, else -1.
 template <typename Memory>
 __device__ int mark_pixel(const Memory& memory, int face, int x, int y, int pixel) {
   using Word = typename Memory::Word;
@@ -110,7 +110,8 @@ __device__ int mark_pixel(const Memory& memory, int face, int x, int y, int pixe
   return passes_occluder_bound(memory.faces[farther], bound, x, y) ? farther : -1;
 }
 
-// A row of a face within a tile: columns from the tile's first on, a byte each, so that lanes hand them on at once.
+// A row of a face within a tile: four columns relative to the tile, a byte each, so that one shuffle hands them to
+// another lane.
 static_assert(kTileWidth_px <= 255);
 struct TileSpan {
   uint32_t bytes = 0;
@@ -127,12 +128,13 @@ struct TileSpan {
   __device__ int full_end() const { return static_cast<int>(bytes >> 16 & 0xFF); }
   __device__ int end() const { return static_cast<int>(bytes >> 24); }
   __device__ int num_full() const { return full_end() - full_begin(); }
-  /// Column k of those that are covered partly: some before those that are covered fully, and some behind.
+  /// Column k of those that are partly covered: they lie on both sides of the fully covered ones.
   __device__ int partial(int k) const { return begin() + k + (begin() + k < full_begin() ? 0 : num_full()); }
 };
 
-// Marks, in a part, of the faces that cover a pixel fully the one that buries most, and lists the pixels that faces
-// cover partly. Rows of a large face stand side by side, so they are dealt out. All threads of the block.
+// For each pixel of a part, marks the fully covering face with the largest occluder bound, and lists the partly covered
+// pixels. Neighbouring rows often belong to one large face, so they are spread over the passes. All threads of the
+// block.
 template <typename Memory>
 __device__ void mark_and_list(const Memory& memory, const Part& part) {
   using Word = typename Memory::Word;
@@ -151,7 +153,7 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
       span = TileSpan(row_span(memory.edges + face.edge_begin, face.edge_count, face.box, y), part);
     }
     const int full = span.num_full(), partial = span.end() - span.begin() - full;
-    // Both sums at once: neither reaches 2^16.
+    // Both prefix sums at once: neither reaches 2^16.
     const int ends = warp_inclusive_sum(full | partial << 16), full_end = ends & 0xFFFF, partial_end = ends >> 16;
     struct SharedRow {
       int face, y;
@@ -181,7 +183,7 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
   }
 }
 
-// Whether a fragment is all that a pixel has.
+// Whether a fragment is the only one of its pixel and there is no full face.
 template <typename Memory>
 __device__ bool is_alone(const Memory& memory, int fragment, int pixel) {
   using Word = typename Memory::Word;
@@ -189,7 +191,7 @@ __device__ bool is_alone(const Memory& memory, int fragment, int pixel) {
          memory.next[fragment] == static_cast<typename Memory::Index>(Memory::kNone);
 }
 
-// Keeps a fragment, as the first of its pixel's chain. Nobody changes the pixel's full face meanwhile.
+// Stores a fragment at the front of its pixel's list. No other thread changes the pixel's full face meanwhile.
 template <typename Memory>
 __device__ void keep_fragment(const Memory& memory, int fragment, uint32_t face, int pixel, uint64_t samples,
                               float area) {
@@ -205,7 +207,7 @@ __device__ void keep_fragment(const Memory& memory, int fragment, uint32_t face,
   memory.next[fragment] = static_cast<Index>(first_of_word<Memory>(before));
 }
 
-// Makes a fragment of each lane's candidate, unless its face leaves nothing in the pixel.
+// Makes a fragment of each lane's candidate unless its coverage is empty.
 template <typename Memory>
 __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, const Part& part) {
   const int pixel = Memory::pixel_of(candidate.b);
@@ -222,8 +224,8 @@ __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, c
   keep_fragment(memory, fragment, candidate.a, pixel, coverage.samples, coverage.area);
 }
 
-// Makes fragments of those candidates that may show before what covers their pixel fully. Threads put them aside until
-// every lane of a warp has one. All threads of the block.
+// Makes fragments of those candidates that pass their pixel's occluder bound. Warps queue them until every lane has
+// one. All threads of the block.
 template <typename Memory>
 __device__ void make_fragments(const Memory& memory, const Part& part) {
   WarpQueue queue(&memory.state->warps[warp_index()].queue);
@@ -250,9 +252,9 @@ __device__ void make_fragments(const Memory& memory, const Part& part) {
   }
 }
 
-// What is free of each fragment is all that it reaches, before others hide some. Where one covers its pixel, it may
-// intersect the pixel's full face, which then becomes a fragment too. Lists the pixels of whose fragments none is
-// alone.
+// Initially all effective samples of a fragment are visible. A fragment that covers its pixel fully may intersect the
+// pixel's full face, which then becomes a fragment too. Lists the pixels that must be composited: those with fragments
+// that are not alone.
 template <typename Memory>
 __device__ void finish_fragments(const Memory& memory, int count) {
   using Index = typename Memory::Index;
@@ -265,7 +267,7 @@ __device__ void finish_fragments(const Memory& memory, int count) {
   PICTURA_NO_UNROLL
   for (int first = warp_index() * kWarpSize; first < count; first += Memory::kThreads) {
     const int i = first + lane_index();
-    // The last of a chain stands for its pixel.
+    // Each pixel is listed by the last fragment of its list.
     const bool is_listed =
         i < count && memory.next[i] == static_cast<Index>(Memory::kNone) && !is_alone(memory, i, memory.pixel[i]);
     const int32_t index = warp_allocate_one(&memory.state->num_composited, is_listed);

@@ -1,5 +1,5 @@
-// Which images wait for what: for their tiles to be drawn, the most crowded first, for the pool to be free again, or
-// for a block with room for a whole map; and the places that an image takes in the pool.
+// Lists of images: those to be drawn from the pool, most expensive first; those deferred until the pool is free; those
+// that overflow into the last launch. Allocates an image's memory in the pool.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/face_setup.cuh"
@@ -12,17 +12,17 @@ __device__ inline int32_t view_of(const DrawTask& task, int32_t image) {
 }
 __device__ inline int32_t camera_of(const DrawTask& task, int32_t image) { return image % num_cameras(task); }
 
-// Leaves an image to the blocks with room for a whole map.
+// Leaves an image to the last launch, whose blocks have memory for a whole map.
 __device__ inline void mark_overflowed(const DrawTask& task, int32_t image) {
   task.overflow_images[atomicAdd(&task.counters->overflow, 1)] = image;
 }
 
-// Leaves an image for which the pool has no room until it is free again.
+// Defers an image that does not fit into the pool until the pool is free again.
 __device__ inline void defer(const DrawTask& task, int32_t image) {
   task.deferred_images[atomicAdd(&task.counters->deferred, 1)] = image;
 }
 
-// The images that are drawn from the pool, by classes of how much they list.
+// The images of a cost bucket that are drawn from the pool.
 __device__ inline int32_t* images_of_bucket(const DrawTask& task, int bucket) {
   return task.drawn_images + static_cast<int64_t>(bucket) * task.num_views * num_cameras(task);
 }
@@ -30,11 +30,11 @@ __device__ inline void list_drawn(const DrawTask& task, int32_t image, int32_t l
   const int bucket = min_of(listed / kFacesPerCostBucket, kNumCostBuckets - 1);
   images_of_bucket(task, bucket)[atomicAdd(&task.counters->cost_buckets[bucket], 1)] = image;
 }
-// Goes through them, the most crowded first.
+// Iterates over them, the most expensive bucket first.
 class DrawOrder {
  public:
   __device__ explicit DrawOrder(const DrawTask& task) : task_(task) {}
-  /// The image whose turn it is, no earlier than that of the call before; -1 after the last.
+  /// The image with the given number, which must not decrease from call to call; -1 after the last.
   __device__ int32_t image_of(int32_t turn) {
     const int32_t* cost_buckets = task_.counters->cost_buckets;
     PICTURA_NO_UNROLL
@@ -49,11 +49,11 @@ class DrawOrder {
  private:
   const DrawTask& task_;
   int bucket_ = kNumCostBuckets - 1;
-  int32_t begin_ = 0;  // the first turn of the bucket
+  int32_t begin_ = 0;  // number of the bucket's first image
 };
 
-// Takes room for the faces of an image of which so many things may show, and lists it to be drawn. Its first batch, or
-// -1 where it has to wait. One thread.
+// Allocates the faces of an image with `listed` entries, and lists it to be drawn. Returns its first batch, or -1 if it
+// was deferred or overflowed. One thread.
 __device__ inline int32_t allocate_faces(const DrawTask& task, int32_t image, int32_t listed) {
   BlockState* state = block_state();
   FaceSetupContext* context = &state->context;

@@ -1,5 +1,4 @@
-// How pixels are written: as bytes, halves or floats, a plane for each channel, several side by side at once; or not
-// at all.
+// Writes pixels as bytes, halves or floats, one plane per channel, several neighbours per store; or not at all.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/fragments.cuh"
@@ -7,14 +6,14 @@
 
 namespace pictura::cuda {
 
-/// Writes pixels of an image, a plane for each channel.
+/// Writes the pixels of one image, one plane per channel.
 struct ImageWriter {
   PixelFormat format;
   void* images;
-  int64_t first, plane;  // elements: of this image, and from a plane to the next
+  int64_t first, plane;  // in elements: the image's offset, and the stride of planes
   int width_px;
 
-  /// Keeps the colour that a fragment gives its pixel.
+  /// Stores the colour of a pixel with a fragment list at the first of its fragments.
   template <typename Memory>
   __device__ void keep(const Memory& memory, int fragment, Rgb color) const {
     if (format == PixelFormat::u8) {
@@ -24,7 +23,7 @@ struct ImageWriter {
     }
   }
 
-  /// Writes at most kPixelsPerWrite pixels side by side, given their words.
+  /// Writes at most kPixelsPerWrite neighbouring pixels, given their words.
   template <typename Memory>
   __device__ void pixels(const Memory& memory, int x, int y, int count, const typename Memory::Word* words) const {
     const int64_t at = first + static_cast<int64_t>(y) * width_px + x;
@@ -45,7 +44,7 @@ struct ImageWriter {
 
   template <typename Memory>
   __device__ void write_bytes(const Memory& memory, uint8_t* to, int count, const typename Memory::Word* words) const {
-    // Many warps write nothing but black.
+    // Many warps write only black.
     uint32_t bytes[kPixelsPerWrite] = {};
     typename Memory::Word some = 0;
     for (int i = 0; i < kPixelsPerWrite; ++i) some |= words[i];
@@ -75,7 +74,7 @@ struct ImageWriter {
     });
   }
 
-  // value_of(i, channel): of the i-th pixel.
+  // value_of(i, channel) is a channel of the i-th pixel.
   template <typename Value, typename ValueOf>
   __device__ void store_channels(Value* to, int count, ValueOf&& value_of) const {
     PICTURA_NO_UNROLL
@@ -86,7 +85,7 @@ struct ImageWriter {
     }
   }
 
-  // At once where all are written and lie where such a store may go.
+  // One vector store if all pixels are written and the address is aligned.
   template <typename Value>
   __device__ static void store(Value* to, int count, const PixelVector<Value>& values) {
     if (count == kPixelsPerWrite && reinterpret_cast<uintptr_t>(to) % sizeof(values) == 0) {

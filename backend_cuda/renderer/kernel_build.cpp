@@ -19,8 +19,8 @@ namespace {
 
 constexpr std::size_t kMaxCode_bytes = std::size_t{64} << 20;
 
-// Opens the library that the user names, else the one of the toolkit's major version wherever the loader finds it, else
-// the one that this program was built beside.
+// Opens NVRTC: the library that PICTURA_NVRTC names, else the one of the toolkit's major version on the loader's path,
+// else the one in the folder that this program was built with.
 SharedLibrary open_nvrtc() {
   constexpr const char* kSource = "CUDA toolkit, or Python package nvidia-cuda-nvrtc";
   const char* chosen = std::getenv("PICTURA_NVRTC");
@@ -39,7 +39,7 @@ SharedLibrary open_nvrtc() {
   }
 }
 
-// NVRTC's functions that we call.
+// The functions of NVRTC that are used.
 struct Nvrtc {
   SharedLibrary library = open_nvrtc();
 #define PICTURA_NVRTC_FUNCTION(name) decltype(&::name) name = function<decltype(&::name)>(#name)
@@ -69,7 +69,7 @@ struct Nvrtc {
   }
 };
 
-// How NVRTC is called: everything that its result depends on but the sources.
+// The inputs of a compilation, except for the sources.
 struct Compilation {
   std::string architecture;
   bool is_cubin = true;
@@ -82,7 +82,7 @@ Compilation compilation_for(const Nvrtc& nvrtc, const KernelProgram& program, co
   nvrtc.check(nvrtc.nvrtcGetNumSupportedArchs(&count), "supported architectures");
   std::vector<int> known(static_cast<std::size_t>(count));
   nvrtc.check(nvrtc.nvrtcGetSupportedArchs(known.data()), "supported architectures");
-  // The newest that the device can run; where that is an older one, the driver compiles PTX to the end.
+  // The newest architecture that the device can run; if it is older than the device, the driver compiles PTX.
   int nearest = 0;
   for (const int each : known) {
     if (each <= target.compute_capability && each > nearest) nearest = each;
@@ -94,8 +94,8 @@ Compilation compilation_for(const Nvrtc& nvrtc, const KernelProgram& program, co
   compilation.architecture = fmt::format("{}_{}", compilation.is_cubin ? "sm" : "compute", nearest);
   compilation.options = {"--gpu-architecture=" + compilation.architecture,
                          "--std=c++20",
-                         "--fmad=false",     // the arithmetic contract
-                         "-default-device",  // lambdas in kernels are the device's, as nvcc takes them
+                         "--fmad=false",     // no contraction: bits agree with the CPU
+                         "-default-device",  // lambdas in kernels are device functions, as with nvcc
                          fmt::format("-DPICTURA_RIG_CAMERAS={}", target.num_cameras),
                          fmt::format("-DPICTURA_RIG_WIDTH_PX={}", target.width_px),
                          fmt::format("-DPICTURA_RIG_HEIGHT_PX={}", target.height_px)};
@@ -143,12 +143,12 @@ std::string cache_path_of(const Compilation& compilation) {
   return fmt::format("{}/{}-{:016x}.kernels", folder, compilation.architecture, compilation.key);
 }
 
-// The first line of a file of code: what it was made from, and what its bytes hash to.
+// The first line of a cached file: the key of its inputs, and the size and hash of its code.
 std::string header_of(uint64_t key, std::string_view code) {
   return fmt::format("pictura kernels 1 {:016x} {} {:016x}\n", key, code.size(), hash_of(code));
 }
 
-// The code in a file that was kept, or nothing where it is damaged or foreign.
+// The code in a cached file, or an empty string if it is missing, damaged or foreign.
 std::string kept_code(const std::string& path, uint64_t key) {
   std::error_code error;
   if (path.empty() || !std::filesystem::exists(path, error)) return "";

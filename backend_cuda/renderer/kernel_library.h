@@ -10,15 +10,15 @@
 
 namespace pictura::cuda {
 
-/// Owns the code that its kernels are in.
+/// Owns the loaded code of its kernels.
 class KernelLibrary {
  public:
-  /// Builds the kernels for the current device and the rig; where NVRTC is missing, takes those of this program. Throws
-  /// Error where those do not run on the device.
+  /// Builds the kernels for the current device and the rig; without NVRTC, uses those compiled into this program.
+  /// Throws Error if those do not run on the device.
   explicit KernelLibrary(const Rig& rig);
 
   const KernelSet& kernels() const { return kernels_; }
-  /// Where they come from, for people.
+  /// Their origin, for messages.
   const std::string& origin() const { return origin_; }
 
  private:

@@ -1,5 +1,5 @@
-// The texts that kernels are compiled from at run time: part of the library, so that an installed copy needs no source
-// tree. cmake/EmbedSources.cmake writes their definitions.
+// The sources that kernels are compiled from at run time: part of the library, so that an installed copy needs no
+// source tree. cmake/EmbedSources.cmake generates their definitions.
 #pragma once
 
 #include <array>
@@ -9,13 +9,13 @@
 namespace pictura::cuda {
 
 struct KernelSource {
-  const char* name;  // as it is included: pictura/FOLDER/FILE
+  const char* name;  // the path in #include: pictura/FOLDER/FILE
   const char* text;
 };
 
 struct KernelProgram {
   const char* text;
-  Span<const KernelSource> headers;  // what it includes, directly or not
+  Span<const KernelSource> headers;  // all that it includes, directly or indirectly
 };
 
 /// The renderer's kernels.

@@ -1,19 +1,18 @@
-// From fragments to pixels: every two fragments of a pixel are asked what they hide of each other, then each pixel sums
-// up what its fragments weigh.
+// From fragments to pixels: resolves the occlusion of each pair of fragments of a pixel, then composites each pixel.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/fragments.cuh"
 
 namespace pictura::cuda {
 
-// Whether, in the image that the block draws, a solid stands on a strip.
+// Whether a solid stands on a strip (stands_on) in the current image.
 __device__ __noinline__ inline bool stands(uint32_t solid, uint32_t strip) {
   const PreparedImage& image = block_state()->current;
   const StaticGeometryView& pieces = image.geometry->pieces;
   return stands_on(extent_of(solid, pieces, image.agents), extent_of(strip, pieces, image.agents), image.eye_m);
 }
 
-// Takes samples from a fragment's free ones.
+// Removes samples from those of a fragment that are visible.
 template <typename Memory>
 __device__ void clear_visible_samples(const Memory& memory, uint32_t fragment, uint64_t samples) {
   const auto low = static_cast<uint32_t>(samples), high = static_cast<uint32_t>(samples >> 32);
@@ -21,7 +20,7 @@ __device__ void clear_visible_samples(const Memory& memory, uint32_t fragment, u
   if (high != 0) atomicAnd(&memory.visible_high[fragment], ~high);
 }
 
-// Asks pairs of fragments what they hide of each other; b may be kNone, for the pixel's full face.
+// Resolves the occlusion of a pair of fragments; pair.b may be kNone, for the pixel's full face.
 template <typename Memory>
 __device__ __noinline__ void resolve_pairs(WarpQueue::Pair pair, Part part) {
   if (!pair.is_valid) return;
@@ -38,17 +37,17 @@ __device__ __noinline__ void resolve_pairs(WarpQueue::Pair pair, Part part) {
   if (!with_full) clear_visible_samples(memory, pair.b, occluded.of_b);
 }
 
-// Asks every two fragments of a pixel what they hide of each other, unless nothing is left that they might; a pixel's
-// full face is one of them. A lane walks the rest of the chain behind a fragment, one step at a time, and takes the
-// next fragment at its end; the last made first, because theirs are the longest ways. Pairs that meet are put aside
-// until every lane of the warp has one.
+// Resolves occlusion between all pairs of fragments of a pixel, its full face included, except for pairs that can no
+// longer occlude each other. A lane walks the rest of the list behind a fragment, one step at a time, and takes the
+// next fragment at its end; fragments with the longest lists, those made last, come first. Pairs that overlap are
+// queued until every lane of the warp has one.
 template <typename Memory>
 __device__ void resolve_occlusion(const Memory& memory, const Part& part, int count) {
   WarpQueue pairs(&memory.state->warps[warp_index()].queue);
-  int begin = 0, used = kWarpSize;  // the warp's fragments of the list, and how many of them lanes have taken
+  int begin = 0, used = kWarpSize;  // the warp's block of fragments, and how many are taken
   int fragment = 0;
-  uint32_t other = Memory::kNone;  // of the chain
-  bool is_before_full = false;     // the full face comes first
+  uint32_t other = Memory::kNone;  // the next of the list
+  bool is_before_full = false;     // the pair with the full face comes first
   uint64_t samples = 0;
   PICTURA_NO_UNROLL
   for (;;) {
@@ -83,14 +82,14 @@ __device__ void resolve_occlusion(const Memory& memory, const Part& part, int co
   if (!pairs.is_empty()) resolve_pairs<Memory>(pairs.take(), part);
 }
 
-/// Hears of no fragment's weight.
+/// Ignores fragments' weights.
 struct NoVisit {
   static constexpr bool kWanted = false;
   __device__ void operator()(const ScreenFace&, float) const {}
 };
 
-// Weighs fragments. What is alone in its pixel gives that its colour; what the others add to the sums of theirs, and
-// what kind of weight that is, stands from then on where their samples and pixels did.
+// Computes the fragments' weights. A fragment that is alone in its pixel gives the pixel's colour at once; for the
+// others the contribution and the kind of weight overwrite the samples and the pixel index.
 template <typename Memory, typename Visit, typename Write>
 __device__ void compute_weights(const Memory& memory, int count, const Visit& visit, const Write& write) {
   PICTURA_NO_UNROLL
@@ -109,7 +108,7 @@ __device__ void compute_weights(const Memory& memory, int count, const Visit& vi
   }
 }
 
-// Mixes the colours of those pixels of a part that have more than one fragment: visit(face, weight) hears of each.
+// Composites the pixels of a part that have more than one fragment, and calls visit(face, weight) for each fragment.
 template <typename Memory, typename Visit, typename Write>
 __device__ void composite_pixels(const Memory& memory, const Visit& visit, const Write& write) {
   const int num_composited = memory.state->num_composited;
@@ -124,7 +123,7 @@ __device__ void composite_pixels(const Memory& memory, const Visit& visit, const
         take(static_cast<int>(i), static_cast<PixelAccumulator::Kind>(memory.kind[i]));
       }
     };
-    // Nothing hides the full face but what covers the pixel too, and then it is a fragment.
+    // Only a face that also covers the pixel fully can occlude the full face, and then the full face is a fragment too.
     const PixelAccumulator::Weight of_full = PixelAccumulator::weight_of({1.0f, kAllSamples}, kAllSamples);
     PixelAccumulator sum;
     if (full != Memory::kNone) sum.add(of_full, memory.faces[full].color);
@@ -140,7 +139,7 @@ __device__ void composite_pixels(const Memory& memory, const Visit& visit, const
   }
 }
 
-// Hands on the pixels of a part, a few side by side for each thread, and marks none from then on.
+// Writes the pixels of a part, a few neighbours per thread, and clears their words.
 template <typename Memory, typename Visit, typename Write>
 __device__ void write_pixels(const Memory& memory, const Part& part, const Visit& visit, const Write& write) {
   using Word = typename Memory::Word;
@@ -164,7 +163,7 @@ __device__ void write_pixels(const Memory& memory, const Part& part, const Visit
   }
 }
 
-// Nothing is listed.
+// Clears the counters of a part.
 template <typename Memory>
 __device__ void reset_counts(const Memory& memory) {
   BlockState* state = memory.state;
@@ -172,8 +171,8 @@ __device__ void reset_counts(const Memory& memory) {
   state->num_rows = state->num_candidates = state->num_fragments = state->num_added = state->num_composited = 0;
   state->next_fragments = 0;
 }
-// What a part finds when it begins: nothing is marked, nothing listed. For a block's first part, and after one that was
-// given up. All threads of the block.
+// Clears the pixels and counters. Before a block's first part, and after a part that did not fit. All threads of the
+// block.
 template <typename Memory>
 __device__ void reset_part(const Memory& memory) {
   sync_block();
@@ -183,8 +182,8 @@ __device__ void reset_part(const Memory& memory) {
   sync_block();
 }
 
-// Makes the fragments of the listed rows and mixes the colours of their pixels. False where there is no room for all
-// that is listed. All threads of the block.
+// Makes the fragments of the listed rows and composites their pixels. False if they do not fit into memory. All threads
+// of the block.
 template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_rows(const Memory& memory, const Part& part, const Visit& visit, const Write& write) {
   BlockState* state = memory.state;
@@ -209,14 +208,14 @@ __device__ bool draw_rows(const Memory& memory, const Part& part, const Visit& v
   return true;
 }
 
-// Draws the faces into one part, and leaves all as a next one is to find it, once all threads have come so far. False,
-// and nothing left so, where it has no room for all that it lists. All threads of the block.
+// Draws the faces into one part and clears the memory for the next. False, and nothing cleared, if it does not fit. All
+// threads of the block; the caller synchronizes before the next part.
 template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part, const Visit& visit,
                           const Write& write) {
   list_rows(memory, num_faces, part);
   sync_block();
-  // Counters of nothing are 0 already, and others may still be asking.
+  // Without rows the counters are 0 already; other threads may still read num_rows.
   if (memory.state->num_rows != 0) {
     if (!draw_rows(memory, part, visit, write)) return false;
     reset_counts(memory);
@@ -225,9 +224,9 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
   return true;
 }
 
-// Plans the part of a tile to draw after one that was drawn, or for which there was no room: narrower ones first,
-// because what is far away crowds along the horizon, then lower ones. False where there is no room for a single pixel.
-// All threads of the block.
+// Plans the next part of a tile, after one that was drawn or did not fit. Parts become narrower first, because distant
+// primitives are concentrated along the horizon, then lower. False if a single pixel does not fit. All threads of the
+// block.
 template <typename Memory>
 __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn) {
   constexpr int kNarrowPart_px = 2 * kPixelsPerWrite;
@@ -240,7 +239,7 @@ __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn
     if (columns == whole.num_columns() && rows == whole.num_rows()) plan = {whole.x_begin, columns, columns, rows};
     int x = part.x_begin, y = part.y_begin;
     if (is_drawn) {
-      // Along the rows, then down the band, then to the next one.
+      // Along the row of parts, then down the band, then to the next band.
       const int band_end = min_of(plan.band_begin + plan.band_px, whole.x_end);
       x = part.x_end;
       if (x == band_end) {
@@ -272,10 +271,10 @@ __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn
   return is_drawn || part.num_columns() > 1 || part.num_rows() > 1;
 }
 
-// Draws the faces into a part of an image, in smaller ones where there is no room for all of it. visit(face, weight)
-// hears of each fragment, write.keep(memory, fragment, colour) of what fragments give their pixels, and
-// write.pixels(memory, x, y, count, words) of pixels side by side. False where there is no room for a single pixel. All
-// threads of the block, which then wait for each other before the next.
+// Draws the faces into a part of an image, in smaller parts if it does not fit. Calls visit(face, weight) for each
+// fragment, write.keep(memory, fragment, colour) for each pixel with fragments, and write.pixels(memory, x, y, count,
+// words) for neighbouring pixels. False if a single pixel does not fit. All threads of the block; the caller
+// synchronizes before the next call.
 template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whole, const Visit& visit,
                            const Write& write) {
@@ -289,7 +288,8 @@ __device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whol
   }
 }
 
-// Tiles of an image as high as there is room for, one after the other: draw(memory, tile) for each, until one is false.
+// Calls draw(memory, tile) for tiles of an image, as high as the memory allows, one after the other, until one returns
+// false.
 template <typename Memory, typename Draw>
 __device__ bool for_each_tile(const Memory& memory, int width_px, int y_begin, int y_end, const Draw& draw) {
   const int max_rows = memory.max_pixels / kTileWidth_px;

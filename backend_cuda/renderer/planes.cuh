@@ -1,12 +1,11 @@
-// The optional planes: depth, class and instance of what is in front at each pixel's centre.
+// The optional planes: depth, class and instance of the front surface at each pixel's centre.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/pixels.cuh"
 
 namespace pictura::cuda {
 
-// Writes the optional planes of a part: the front surface at each pixel's centre, of the faces that have its row. All
-// threads of the block.
+// Writes the optional planes of a part from the faces that touch it. All threads of the block.
 template <typename Memory>
 __device__ __noinline__ void draw_planes(CameraPlanes planes, int width_px, int64_t first_pixel, int num_faces,
                                          Part part) {
@@ -15,7 +14,8 @@ __device__ __noinline__ void draw_planes(CameraPlanes planes, int width_px, int6
   sync_block();
   list_rows(memory, num_faces, part);
   sync_block();
-  // Those of a row in a chain, which begins where its first pixel was and goes on where candidates were; 0 ends it.
+  // Builds a linked list of the faces of each row: the heads are kept in memory.pixels, the links in memory.candidates;
+  // 0 ends a list.
   const int num_rows = memory.state->num_rows;
   const bool fits = num_rows <= memory.max_rows;
   PICTURA_NO_UNROLL

@@ -1,12 +1,12 @@
-// What is known of the rig when kernels are compiled. Those that are built at run time are built for one rig
-// (kernel_build.h defines these names); 0 stands for what only the task says.
+// The rig's sizes as compile-time constants. Kernels built at run time are built for one rig (kernel_build.h defines
+// these macros); 0 means that the size is read from the task.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/kernel_arguments.h"
 
 #ifndef PICTURA_RIG_CAMERAS
 #define PICTURA_RIG_CAMERAS 0
-#define PICTURA_RIG_WIDTH_PX 0  // of all its cameras, where they have one size
+#define PICTURA_RIG_WIDTH_PX 0  // if all cameras have the same size
 #define PICTURA_RIG_HEIGHT_PX 0
 #endif
 

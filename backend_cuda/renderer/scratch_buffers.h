@@ -1,23 +1,23 @@
-// The memory of drawing beyond images, scenes and maps: how large each part of it is, and what owns it. Buffer is
-// DeviceBuffer, or std::vector where kernels are emulated.
+// The renderer's scratch memory (all but images, scenes and maps): sizes and owners. Buffer is DeviceBuffer, or
+// std::vector where kernels are emulated.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/kernel_arguments.h"
 
 namespace pictura::cuda {
 
-/// Room in the pool for the faces and edges of an image: what CARLA's towns ask for on average. Those with more are
-/// drawn when it is free again. Four edges are for each face, the rest, of which a third is asked for, for those that
-/// are clipped.
+/// Capacity of the pool per image, in faces and edges: the average need in CARLA's towns. Images that do not fit are
+/// drawn when the pool is free again. Four edges belong to each face; the rest, of which a third is used, is for
+/// clipped faces.
 constexpr std::size_t kPoolFaces = 200, kPoolEdges = 928;
-/// ... and of few images, which may all be crowded.
+/// Additional images' worth of capacity, for batches of few images that may all have many faces.
 constexpr std::size_t kMinPoolImages = 4 * kMaxEntries / kPoolFaces + 1;
 static_assert(kMinPoolImages * kPoolFaces >= kMaxEntries, "an image that is deferred finds room");
 
-/// How much of everything a pool holds for so many images.
+/// Capacities of a pool.
 struct PoolSizes {
   std::size_t images, faces, edges;
-  /// As many as the faces make, of each image with a last one that may not be full.
+  /// Enough for all faces; the last batch of each image may be partly filled.
   constexpr std::size_t batches() const { return faces / FaceBatch::kEntries + images; }
   constexpr std::size_t entries() const { return images * kMaxEntries; }
   constexpr std::size_t listed_images() const { return (2 + kNumCostBuckets) * images; }
@@ -31,12 +31,13 @@ constexpr PoolSizes pool_sizes(std::size_t images) {
   const std::size_t num_allocations = images + kMinPoolImages;
   return {images, num_allocations * kPoolFaces, num_allocations * kPoolEdges};
 }
-/// What a pool takes without images, and what each of them adds; together within a batch of its bytes, and not less.
+/// Bytes of a pool per image and without images. Their sum is never too small, and too large by at most the bytes of a
+/// batch.
 constexpr std::size_t kPoolImageBytes =
     (pool_sizes(FaceBatch::kEntries).bytes() - pool_sizes(0).bytes()) / FaceBatch::kEntries;
 constexpr std::size_t kMinPoolBytes = pool_sizes(0).bytes() + sizeof(FaceBatch);
 
-/// Owns the faces that are gathered before they are drawn, and what is known of their images.
+/// Owns the pool: the faces of many images and the intermediate results of their set-up.
 template <template <typename> class Buffer>
 class PoolBuffers {
  public:
@@ -50,7 +51,7 @@ class PoolBuffers {
         entries_(sizes.entries()),
         clipped_(sizes.faces),
         lists_(sizes.listed_images()) {}
-  /// Sets where a task finds the pool and lists images.
+  /// Points a task to the pool and to the lists of images.
   void serve(DrawTask* task_out) {
     task_out->pool = {faces_.data(),
                       edges_.data(),
@@ -76,12 +77,12 @@ class PoolBuffers {
   Buffer<int32_t> lists_;
 };
 
-/// Owns what the blocks of the last launch work in.
+/// Owns the memory of the blocks of the last launch.
 template <template <typename> class Buffer>
 class LargeBuffers {
  public:
   LargeBuffers() = default;
-  /// Room for sizes.blocks blocks.
+  /// Allocates for sizes.blocks blocks.
   LargeBuffers(const Scratch& sizes, std::size_t bytes_per_block)
       : scratch_(sizes),
         faces_(count(sizes.blocks, sizes.max_faces)),
