@@ -10,29 +10,29 @@ namespace pictura {
 
 namespace {
 
-constexpr float kEye_m = 1.5f;  // above the road, as the cameras
-// The box that has to be seen: a car of CARLA's.
+constexpr float kEyeHeight_m = 1.5f;  // above the road, like the cameras
+// The box of the crossing vehicle: a CARLA car.
 constexpr float kCarLength_m = 4.5f, kCarWidth_m = 2.0f, kCarHeight_m = 1.5f;
 constexpr float kSameLevel_m = 2.0f;
 
-/// A way through a junction, with the lanes that lead to it.
+/// A path through a junction, with the lanes that lead to it.
 struct Path {
   int32_t approach = -1;     // the lane before the junction
-  int32_t road = -1;         // on which that lies
-  std::vector<Vec3> points;  // from far enough before the junction, if the lanes reach so far
-  std::vector<float> s_m;    // [points] arc length, 0 where the junction begins
+  int32_t road = -1;         // of the approach lane
+  std::vector<Vec3> points;  // starting far enough before the junction, if the lanes do
+  std::vector<float> s_m;    // [points] arc length, 0 at the start of the junction
   size_t first_inside = 0;   // the point at arc length 0
 };
 
 bool is_driven(const Lane& lane) { return is_drivable(lane.type) && lane.type != LaneType::parking; }
 
-/// The lane that leads to `lane`, or -1: the first, where there are several.
-int32_t lane_before(const RoadMap& map, const Lane& lane) {
+/// The first predecessor of `lane`, or -1.
+int32_t predecessor_of(const RoadMap& map, const Lane& lane) {
   const Span<const int32_t> before = map.links(lane.predecessors);
   return before.empty() ? -1 : before[0];
 }
 
-/// Puts the points of `lane` before those of the path.
+/// Inserts the points of `lane` before those of the path.
 void prepend(const RoadMap& map, const Lane& lane, std::vector<Vec3>* points_inout) {
   std::vector<Vec3> points;
   for (const LanePoint& point : map.points_of(lane)) points.push_back(point.position_m);
@@ -40,15 +40,15 @@ void prepend(const RoadMap& map, const Lane& lane, std::vector<Vec3>* points_ino
   points_inout->insert(points_inout->begin(), points.begin(), points.end());
 }
 
-/// The path of a lane of a junction into which a lane from outside leads; nothing for other lanes.
+/// The path that begins with this junction lane, if its predecessor is outside the junction.
 std::optional<Path> path_through(const RoadMap& map, const Lane& first, float lead_m) {
-  const int32_t approach = lane_before(map, first);
+  const int32_t approach = predecessor_of(map, first);
   if (approach < 0 || map.lanes[static_cast<size_t>(approach)].junction == first.junction) return std::nullopt;
   Path path;
   path.approach = approach;
   path.road = map.lanes[static_cast<size_t>(approach)].source_road;
   for (const LanePoint& point : map.points_of(first)) path.points.push_back(point.position_m);
-  // A road of several sections goes on in the junction.
+  // Later sections of the connecting road.
   constexpr int kMaxLanes = 16;
   const Lane* lane = &first;
   for (int i = 0; i < kMaxLanes; ++i) {
@@ -64,7 +64,7 @@ std::optional<Path> path_through(const RoadMap& map, const Lane& first, float le
     lane = &map.lanes[static_cast<size_t>(at)];
     prepend(map, *lane, &path.points);
     before_m += lane->length_m;
-    at = lane_before(map, *lane);
+    at = predecessor_of(map, *lane);
   }
   path.first_inside = path.points.size() - inside;
   path.s_m.assign(path.points.size(), 0);
@@ -77,59 +77,59 @@ std::optional<Path> path_through(const RoadMap& map, const Lane& first, float le
   return path;
 }
 
-/// The share of a-b at which c-d crosses it, if it does.
-std::optional<float> crossing_share(Vec2 a, Vec2 b, Vec2 c, Vec2 d) {
+/// The fraction of a-b at which c-d crosses it, if it does.
+std::optional<float> crossing_fraction(Vec2 a, Vec2 b, Vec2 c, Vec2 d) {
   const Vec2 along = b - a, across = d - c;
   const float area = cross(along, across);
   if (area == 0) return std::nullopt;
-  const float share = cross(c - a, across) / area, other_share = cross(c - a, along) / area;
-  if (share < 0 || share > 1 || other_share < 0 || other_share > 1) return std::nullopt;
-  return share;
+  const float fraction = cross(c - a, across) / area, other_fraction = cross(c - a, along) / area;
+  if (fraction < 0 || fraction > 1 || other_fraction < 0 || other_fraction > 1) return std::nullopt;
+  return fraction;
 }
 
-/// Whether two paths meet inside the junction, on one level.
-bool meet(const Path& path, const Path& other) {
+/// Whether two paths cross inside the junction, at the same level.
+bool paths_cross(const Path& path, const Path& other) {
   for (size_t i = path.first_inside; i + 1 < path.points.size(); ++i) {
     for (size_t k = other.first_inside; k + 1 < other.points.size(); ++k) {
       const Vec3 a = path.points[i], b = path.points[i + 1], c = other.points[k], d = other.points[k + 1];
-      if (std::abs(a.z - c.z) < kSameLevel_m && crossing_share(a.xy(), b.xy(), c.xy(), d.xy())) return true;
+      if (std::abs(a.z - c.z) < kSameLevel_m && crossing_fraction(a.xy(), b.xy(), c.xy(), d.xy())) return true;
     }
   }
   return false;
 }
 
-struct Place {
+struct PathPose {
   Vec3 position_m;
   Vec2 forward;
 };
 
-/// Nothing where the path begins later.
-std::optional<Place> place_at(const Path& path, float s_m) {
+/// Nothing if the path begins after s_m.
+std::optional<PathPose> pose_at(const Path& path, float s_m) {
   if (s_m < path.s_m.front()) return std::nullopt;
   const auto after = std::upper_bound(path.s_m.begin() + 1, path.s_m.end() - 1, s_m);
   const size_t i = static_cast<size_t>(after - path.s_m.begin()) - 1;
   const float piece_m = path.s_m[i + 1] - path.s_m[i];
   if (!(piece_m > 0)) return std::nullopt;
-  const Vec3 way = path.points[i + 1] - path.points[i];
-  return Place{path.points[i] + way * ((s_m - path.s_m[i]) / piece_m), way.xy() * (1.0f / piece_m)};
+  const Vec3 piece = path.points[i + 1] - path.points[i];
+  return PathPose{path.points[i] + piece * ((s_m - path.s_m[i]) / piece_m), piece.xy() * (1.0f / piece_m)};
 }
 
-/// The walls of a map in a grid, and the question what they hide.
-class Sight {
+/// The walls of a map in a grid, for line-of-sight queries.
+class LineOfSight {
  public:
-  explicit Sight(Span<const WallFace> walls) : walls_(walls) {
+  explicit LineOfSight(Span<const WallFace> walls) : walls_(walls) {
     constexpr float kCell_m = 10.0f;
     std::vector<Aabb2> boxes;
     for (const WallFace& wall : walls) boxes.push_back(box_of(wall.a_m.xy(), wall.b_m.xy()));
     if (!boxes.empty()) grid_ = Grid(boxes, kCell_m);
   }
 
-  /// Whether walls stand before the corners, the middles of the sides and the centre of a car.
-  bool is_hidden(Vec3 eye, const Place& car) const {
+  /// Whether walls block the view of the corners, side midpoints and centre of a car.
+  bool is_hidden(Vec3 eye, const PathPose& car) const {
     for (int along = -1; along <= 1; ++along) {
-      for (int aside = -1; aside <= 1; ++aside) {
+      for (int side = -1; side <= 1; ++side) {
         const Vec2 xy = car.position_m.xy() + car.forward * (0.5f * kCarLength_m * static_cast<float>(along)) +
-                        left_normal(car.forward) * (0.5f * kCarWidth_m * static_cast<float>(aside));
+                        left_normal(car.forward) * (0.5f * kCarWidth_m * static_cast<float>(side));
         if (!is_blocked(eye, {xy.x, xy.y, car.position_m.z + 0.5f * kCarHeight_m})) return false;
       }
     }
@@ -147,9 +147,9 @@ class Sight {
     visit_items(grid_.view(), box_of(from.xy(), to.xy()), [&](std::size_t i) {
       if (blocked) return;
       const WallFace& wall = walls_[i];
-      const auto share = crossing_share(from.xy(), to.xy(), wall.a_m.xy(), wall.b_m.xy());
-      if (!share) return;
-      const float above_m = from.z + (to.z - from.z) * *share - 0.5f * (wall.a_m.z + wall.b_m.z);
+      const auto fraction = crossing_fraction(from.xy(), to.xy(), wall.a_m.xy(), wall.b_m.xy());
+      if (!fraction) return;
+      const float above_m = from.z + (to.z - from.z) * *fraction - 0.5f * (wall.a_m.z + wall.b_m.z);
       blocked = above_m >= 0 && above_m <= wall.height_m;
     });
     return blocked;
@@ -169,18 +169,18 @@ BlindApproaches count_blind_approaches(const RoadMap& map, Span<const WallFace> 
       of_junction[static_cast<size_t>(lane.junction)].push_back(std::move(*path));
     }
   }
-  const Sight sight(walls);
+  const LineOfSight line_of_sight(walls);
   BlindApproaches count;
   std::set<int32_t> approaches, blind;
   for (const std::vector<Path>& paths : of_junction) {
     for (const Path& own : paths) {
       for (const Path& other : paths) {
-        if (own.road == other.road || !meet(own, other)) continue;
-        const auto eye = place_at(own, -distance_m), car = place_at(other, -distance_m);
+        if (own.road == other.road || !paths_cross(own, other)) continue;
+        const auto eye = pose_at(own, -distance_m), car = pose_at(other, -distance_m);
         if (!eye || !car) continue;
         ++count.crossings;
         approaches.insert(own.approach);
-        if (!sight.is_hidden(eye->position_m + Vec3{0, 0, kEye_m}, *car)) continue;
+        if (!line_of_sight.is_hidden(eye->position_m + Vec3{0, 0, kEyeHeight_m}, *car)) continue;
         ++count.hidden;
         blind.insert(own.approach);
       }

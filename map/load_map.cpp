@@ -23,15 +23,15 @@ constexpr std::size_t kMaxFile_bytes = std::size_t{1} << 29;
 
 std::vector<fs::path> town_folders() { return {fs::path(map_folder()), fs::path(map_folder()) / "carla"}; }
 
-/// The options of `procedural[:SEED[:NAME=VALUE,...]]`, or nothing when the name is not of that kind.
+/// The options of `procedural[:SEED[:NAME=VALUE,...]]`, or nothing when the name is of another kind.
 std::optional<TownOptions> procedural_options(std::string_view name) {
   if (name == kProcedural) return TownOptions();
   if (!name.starts_with(kProcedural) || name[kProcedural.size()] != ':') return std::nullopt;
   return parse_town_options(name.substr(kProcedural.size() + 1), name);
 }
 
-/// The file that a name stands for which is not procedural. Throws UsageError when there is none.
-std::string file_of(const std::string& name) {
+/// The file of a name that is not procedural. Throws UsageError when there is none.
+std::string file_path_of(const std::string& name) {
   std::error_code error;
   if (name.ends_with(kExtension)) return name;
   if (fs::exists(name, error) && !fs::is_directory(name, error)) {
@@ -103,12 +103,12 @@ std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDrive
     map->name = name == kProcedural ? fmt::format("{}:{}", kProcedural, town->seed) : name;
     return map;
   }
-  return std::make_shared<RoadMap>(load_file(file_of(name), options, &report));
+  return std::make_shared<RoadMap>(load_file(file_path_of(name), options, &report));
 }
 
 MapText map_text(const std::string& name) {
   if (const std::optional<TownOptions> town = procedural_options(name)) return {procedural_town(*town), name};
-  const std::string path = file_of(name);
+  const std::string path = file_path_of(name);
   return {read_file(path, kMaxFile_bytes), path};
 }
 

@@ -1,4 +1,4 @@
-// From what a user writes after MAP to a RoadMap: the one function that knows all kinds of maps.
+// Loads maps by the name that a user gives after MAP: the one function that knows all kinds of maps.
 #pragma once
 
 #include <memory>
@@ -10,32 +10,32 @@
 
 namespace pictura {
 
-/// How a map came to be loaded.
+/// How a map was loaded.
 struct LoadReport {
-  bool cached = false;                // the map is the one that an earlier load left in the cache
-  std::string cache_refusal;          // why a cached file was there and not used, or empty
-  std::vector<std::string> warnings;  // what a lenient import left out
+  bool cached = false;                // the map was read from the cache
+  std::string cache_refusal;          // why an existing cached file was not used, or empty
+  std::vector<std::string> warnings;  // what a lenient import skipped
 };
 
 /// Loads `name`: a file (.xodr), a town's name looked up as NAME.xodr in the map folder, or
-/// `procedural[:SEED[:NAME=VALUE,...]]`. Files are imported once and, where that gave no warnings, kept in the cache
-/// (map_cache.h); a cache that cannot be read or written costs time alone. Throws Error naming the file and the line or
+/// `procedural[:SEED[:NAME=VALUE,...]]`. Files are imported once and, if that gave no warnings, stored in the cache
+/// (map_cache.h); a cache that cannot be read or written only costs time. Throws Error naming the file and the line or
 /// element; UsageError when there is no such map.
 std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDriveOptions& options = {},
                                         LoadReport* report_out = nullptr);
 
 struct MapText {
-  std::string text, source;  // OpenDRIVE, and what messages call it
+  std::string text, source;  // OpenDRIVE, and its name in messages
 };
 
-/// What load_map() would import for this name. Throws as it does.
+/// The text that load_map() would import for this name. Throws as load_map() does.
 MapText map_text(const std::string& name);
 
-/// $PICTURA_DATA, or $XDG_DATA_HOME/pictura/maps, or ~/.local/share/pictura/maps. CARLA's towns are looked for here and
-/// in its folder `carla`.
+/// $PICTURA_DATA, or $XDG_DATA_HOME/pictura/maps, or ~/.local/share/pictura/maps. CARLA's towns are looked up here and
+/// in its subfolder `carla`.
 std::string map_folder();
 
-/// The towns that the map folder holds, by name, sorted.
+/// The names of the towns in the map folder, sorted.
 std::vector<std::string> known_towns();
 
 }  // namespace pictura

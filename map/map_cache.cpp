@@ -19,7 +19,7 @@ namespace pictura {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'P', 'I', 'C', 'T', 'R', 'M', 'A', 'P'};
-constexpr uint32_t kVersion = 1;  // of the header; what follows it is the importer's affair
+constexpr uint32_t kVersion = 1;  // of the header; the payload format is covered by the importer hash
 constexpr uint32_t kByteOrder = 0x01020304;
 
 struct Header {
@@ -28,7 +28,7 @@ struct Header {
   MapCacheKey key;
   uint64_t payload_bytes = 0, payload_hash = 0;
 };
-static_assert(std::has_unique_object_representations_v<Header>, "padding would be written without a meaning");
+static_assert(std::has_unique_object_representations_v<Header>, "the header must have no padding");
 
 template <typename T>
 using FieldsOf = decltype(fields_of(std::declval<T&>()));
@@ -41,7 +41,7 @@ constexpr bool kIsVector = false;
 template <typename T>
 constexpr bool kIsVector<std::vector<T>> = true;
 
-/// Whether the bytes of a T in memory are those in the file, with any bits allowed: numbers alone, without padding.
+/// Whether a T's bytes in memory equal those in the file and any bit pattern is valid: only numbers, no padding.
 template <typename T>
 constexpr bool is_plain() {
   if constexpr (HasFields<T>) {
@@ -54,7 +54,7 @@ constexpr bool is_plain() {
 }
 static_assert(is_plain<LanePoint>() && is_plain<RoadEdge>() && !is_plain<Lane>() && !is_plain<Sign>());
 
-/// The fewest bytes that a T takes in the file.
+/// The minimum size of a T in the file.
 template <typename T>
 constexpr uint64_t min_bytes() {
   if constexpr (HasFields<T>) {
@@ -102,7 +102,7 @@ class Writer {
 
 class Reader {
  public:
-  explicit Reader(std::string_view bytes) : left_(bytes) {}
+  explicit Reader(std::string_view bytes) : rest_(bytes) {}
 
   template <typename T>
   void get(T* value_out) {
@@ -112,9 +112,9 @@ class Reader {
       using Item = typename T::value_type;
       uint64_t count = 0;
       get(&count);
-      PICTURA_CHECK(count <= left_.size() / min_bytes<Item>(),
+      PICTURA_CHECK(count <= rest_.size() / min_bytes<Item>(),
                     "damaged: a size of {} elements of at least {} bytes, where {} bytes are left", count,
-                    min_bytes<Item>(), left_.size());
+                    min_bytes<Item>(), rest_.size());
       value_out->resize(static_cast<std::size_t>(count));
       get_items(value_out->data(), value_out->size());
     } else if constexpr (std::is_same_v<T, bool>) {
@@ -134,7 +134,7 @@ class Reader {
   }
 
   void expect_end() const {
-    PICTURA_CHECK(left_.empty(), "damaged: {} bytes are left after the last element", left_.size());
+    PICTURA_CHECK(rest_.empty(), "damaged: {} bytes are left after the last element", rest_.size());
   }
 
  private:
@@ -147,19 +147,19 @@ class Reader {
     }
   }
   void get_bytes(void* out, std::size_t size) {
-    PICTURA_CHECK(size <= left_.size(), "damaged: expected {} bytes more, {} are left", size, left_.size());
-    if (size > 0) std::memcpy(out, left_.data(), size);
-    left_.remove_prefix(size);
+    PICTURA_CHECK(size <= rest_.size(), "damaged: expected {} bytes more, {} are left", size, rest_.size());
+    if (size > 0) std::memcpy(out, rest_.data(), size);
+    rest_.remove_prefix(size);
   }
   template <typename Enum>
   static bool is_known(Enum value) {
     return std::string_view(to_string(value)) != "unknown";
   }
 
-  std::string_view left_;
+  std::string_view rest_;
 };
 
-/// Reads the header and checks it; what follows it is returned.
+/// Checks the header and returns the payload.
 std::string_view checked_payload(std::string_view bytes, const MapCacheKey& key) {
   Header header;
   const std::size_t magic_bytes = std::min(bytes.size(), kMagic.size());
@@ -219,8 +219,8 @@ std::string map_cache_path(const std::string& source_path, const OpenDriveOption
   if (folder.empty()) return "";
   std::error_code error;
   const std::filesystem::path source = std::filesystem::weakly_canonical(source_path, error);
-  const uint64_t place = hash_of(source.string() + fmt::format(" {:x}", map_cache_key("", options).options));
-  return fmt::format("{}/{}-{:016x}.map", folder, source.stem().string(), place);
+  const uint64_t path_hash = hash_of(source.string() + fmt::format(" {:x}", map_cache_key("", options).options));
+  return fmt::format("{}/{}-{:016x}.map", folder, source.stem().string(), path_hash);
 }
 
 }  // namespace pictura

@@ -13,7 +13,7 @@ namespace {
 template <typename T>
 std::string difference(const T& a, const T& b);
 
-/// The i-th of the names that PICTURA_FIELDS was given.
+/// The i-th name passed to PICTURA_FIELDS.
 std::string name_at(std::string_view names, std::size_t i) {
   for (; i > 0; --i) names.remove_prefix(names.find(',') + 2);
   return std::string(names.substr(0, names.find(',')));

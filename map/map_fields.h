@@ -1,5 +1,5 @@
-// The fields of RoadMap and of everything in it, listed once: what writes, reads or compares whole maps goes through
-// these lists. A structured binding must name every field, so a list that misses one does not compile.
+// The fields of RoadMap and of its elements, listed once: whole maps are written, read and compared through these
+// lists. A structured binding must name every field, so an incomplete list does not compile.
 #pragma once
 
 #include <string>
@@ -9,8 +9,8 @@
 #include "pictura/map/opendrive/opendrive.h"
 #include "pictura/map/road_map.h"
 
-/// Defines fields_of(value), a tuple of references to all fields in the order of their declaration, and
-/// field_names_of(value), their names separated by ", ".
+/// Defines fields_of(value), a tuple of references to all fields in declaration order, and field_names_of(value), their
+/// names separated by ", ".
 #define PICTURA_FIELDS(Type, ...)            \
   inline auto fields_of(Type& value) {       \
     auto& [__VA_ARGS__] = value;             \
@@ -51,8 +51,8 @@ PICTURA_FIELDS(RoadMap, name, origin_m, geo_reference, road_names, lanes, lane_p
 
 PICTURA_FIELDS(OpenDriveOptions, chord_error_m, lenient)
 
-/// Where two maps first differ, in any bit, as a path like "lanes[3].length_m" or "lights: 8 and 9 of them"; empty when
-/// they are equal.
+/// The first bitwise difference of two maps, as a path like "lanes[3].length_m" or "lights: 8 and 9 of them"; empty
+/// when they are equal.
 std::string first_difference(const RoadMap& a, const RoadMap& b);
 
 }  // namespace pictura

@@ -13,12 +13,12 @@ namespace pictura {
 namespace {
 
 constexpr float kRoadEdgeWidth_m = 0.15f;
-constexpr float kCrosswalkWidth_m = 0.3f;  // of the line around a crosswalk
+constexpr float kCrosswalkWidth_m = 0.3f;  // of the outline of a crosswalk
 constexpr float kStopLineWidth_m = 0.4f;
 constexpr float kSameStopLine_m = 8.0f;
-// Buildings of 1 to 4 pieces (about 8 m each) with gaps of 1 or 2 between most of them.
+// Buildings of 1 to 4 pieces (about 8 m each), mostly separated by gaps of 1 or 2.
 constexpr int kMaxBuildingPieces = 4, kMaxGapPieces = 2;
-constexpr float kTerracedShare = 0.3f;
+constexpr float kTerracedFraction = 0.3f;
 constexpr float kMinWall_m = 3.0f, kMaxWall_m = 12.0f;
 
 Rgb mark_color(MarkColor color) {
@@ -35,7 +35,7 @@ Rgb mark_color(MarkColor color) {
   return kWhiteMarkColor;
 }
 
-/// Whether a light's stop line is this one: files paint theirs up to some metres into the junction.
+/// Whether a light has this stop line: painted ones may lie some metres inside the junction.
 bool has_light(const RoadMap& map, const PaintedStopLine& line) {
   const Vec3 middle = (line.a_m + line.b_m) * 0.5f;
   return std::any_of(map.lights.begin(), map.lights.end(), [&](const TrafficLight& light) {
@@ -43,7 +43,7 @@ bool has_light(const RoadMap& map, const PaintedStopLine& line) {
   });
 }
 
-/// Consecutive edges that meet end to end, as one polyline each, so that their strips are mitred.
+/// Draws consecutive edges that meet end to end as one polyline, so that their strips are mitred.
 void append_road_edges(const std::vector<RoadEdge>& edges, std::vector<Strip>* strips_out) {
   std::vector<Vec3> points;
   auto flush = [&] {
@@ -60,11 +60,11 @@ void append_road_edges(const std::vector<RoadEdge>& edges, std::vector<Strip>* s
   flush();
 }
 
-/// Leaves one of the strips that are the same: roads of a junction that run over each other may bring one crosswalk
-/// each. Of lane marks, painted_lines() has left one.
-void drop_repeated(std::vector<Strip>* strips_inout) {
+/// Removes duplicate strips: overlapping roads of a junction may repeat a crosswalk. painted_lines() has already
+/// removed duplicate lane marks.
+void remove_duplicates(std::vector<Strip>* strips_inout) {
   using Key = std::array<float, 15>;
-  std::set<Key> seen;
+  std::set<Key> keys;
   std::erase_if(*strips_inout, [&](const Strip& strip) {
     const Vec3 a = strip.a_m, b = strip.b_m;
     const Rgb color = strip.color;
@@ -83,7 +83,7 @@ void drop_repeated(std::vector<Strip>* strips_inout) {
                   color.g,
                   color.b,
                   static_cast<float>(strip.kind)};
-    return !seen.insert(key).second;
+    return !keys.insert(key).second;
   });
 }
 
@@ -95,7 +95,7 @@ StaticGeometry make_static_geometry(const RoadMap& map, const MapGeometryOptions
   for (const PaintedLine& line : lines) {
     append_strips(line.points_m, line.width_m, mark_color(line.color), StripKind::lane_mark, &geometry.strips);
   }
-  append_road_edges(edges_beside(map, lines, kRoadEdgeWidth_m), &geometry.strips);
+  append_road_edges(uncovered_edges(map, lines, kRoadEdgeWidth_m), &geometry.strips);
   for (const Crosswalk& crosswalk : map.crosswalks) {
     std::vector<Vec3> ring(map.outline_points.begin() + crosswalk.outline.begin,
                            map.outline_points.begin() + crosswalk.outline.end);
@@ -114,7 +114,7 @@ StaticGeometry make_static_geometry(const RoadMap& map, const MapGeometryOptions
     geometry.heads.push_back(
         {light.head_m, light.head_facing, cos_of(options.light_half_angle_rad), static_cast<int32_t>(i)});
   }
-  drop_repeated(&geometry.strips);
+  remove_duplicates(&geometry.strips);
   if (options.walls) geometry.walls = make_walls(map, options);
   geometry.num_signals = static_cast<int32_t>(map.lights.size());
   geometry.build_grids();
@@ -123,20 +123,20 @@ StaticGeometry make_static_geometry(const RoadMap& map, const MapGeometryOptions
 
 std::vector<WallFace> make_walls(const RoadMap& map, const MapGeometryOptions& options) {
   std::vector<WallFace> walls;
-  uint32_t drawn = 0;
-  int pieces_left = 0;
-  bool stands = false;
+  uint32_t num_draws = 0;
+  int remaining_pieces = 0;
+  bool is_building = false;
   float height_m = 0;
   for (const BuildingLine& line : map.building_lines) {
-    if (pieces_left == 0) {
-      // The next building or the next gap, of so many pieces of building line.
-      RandomStream random(options.wall_seed, 0, 0, drawn++, 0, Purpose::walls);
-      stands = !stands || random.uniform() < kTerracedShare;
-      pieces_left = 1 + random.below(stands ? kMaxBuildingPieces : kMaxGapPieces);
+    if (remaining_pieces == 0) {
+      // The next building or gap, and its length in pieces of building line.
+      RandomStream random(options.wall_seed, 0, 0, num_draws++, 0, Purpose::walls);
+      is_building = !is_building || random.uniform() < kTerracedFraction;
+      remaining_pieces = 1 + random.below(is_building ? kMaxBuildingPieces : kMaxGapPieces);
       height_m = random.uniform(kMinWall_m, kMaxWall_m);
     }
-    --pieces_left;
-    if (stands) walls.push_back({line.a_m, line.b_m, height_m});
+    --remaining_pieces;
+    if (is_building) walls.push_back({line.a_m, line.b_m, height_m});
   }
   return walls;
 }

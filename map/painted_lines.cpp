@@ -14,24 +14,26 @@ namespace pictura {
 
 namespace {
 
-// What is nearer than this is at one place: ends that meet, and paint that is there twice. Of the ends in CARLA's towns
-// that another continues within 1 cm, it does so within 1 mm for 99 %.
-constexpr float kSame_m = 1e-3f;
-// A repeated line may lie aside of the one that is drawn, end before it does, and the drawn one's pieces may each move
-// where they were joined; thinning has what is left of the tolerance.
-constexpr float kThinning_m = kPaintTolerance_m - 3 * kSame_m;
-constexpr float kMaxBend = 0.25f;                    // sine of the angle between lines that continue each other
-constexpr float kLongestChord_m = 10 * kMaxPiece_m;  // bounds the time of thinning; chords are drawn in even pieces
+// Points closer than this coincide: ends that meet, and duplicate paint. Of the line ends in CARLA's towns that have a
+// continuation within 1 cm, 99 % have it within 1 mm.
+constexpr float kCoincident_m = 1e-3f;
+// A duplicate may deviate sideways and beyond the ends by kCoincident_m each, and joining may move points by as much;
+// thinning gets the rest of the tolerance.
+constexpr float kThinningTolerance_m = kPaintTolerance_m - 3 * kCoincident_m;
+constexpr float kMaxBend = 0.25f;                // sine of the angle between lines that continue each other
+constexpr float kMaxChord_m = 10 * kMaxPiece_m;  // bounds the time of thinning; chords are drawn in equal pieces
 constexpr float kCell_m = 20.0f;
 
-bool is_same_paint(const PaintedLine& a, const PaintedLine& b) { return a.width_m == b.width_m && a.color == b.color; }
+bool have_equal_style(const PaintedLine& a, const PaintedLine& b) {
+  return a.width_m == b.width_m && a.color == b.color;
+}
 
 Aabb2 box_around(Vec2 a, Vec2 b, float margin_m) {
   return {{min_of(a.x, b.x) - margin_m, min_of(a.y, b.y) - margin_m},
           {max_of(a.x, b.x) + margin_m, max_of(a.y, b.y) + margin_m}};
 }
 
-std::vector<PaintedLine> lines_of(const RoadMap& map) {
+std::vector<PaintedLine> lines_of_markings(const RoadMap& map) {
   std::vector<PaintedLine> lines;
   for (const Marking& marking : map.markings) {
     PaintedLine line{.width_m = marking.width_m, .color = marking.color};
@@ -46,7 +48,7 @@ std::vector<PaintedLine> lines_of(const RoadMap& map) {
   return lines;
 }
 
-/// Pieces of lines, to be asked whether they run along a way.
+/// Line segments in a grid, to test whether they cover a given segment.
 class PieceIndex {
  public:
   struct Piece {
@@ -59,7 +61,7 @@ class PieceIndex {
       const std::vector<Vec3>& points = lines[line].points_m;
       for (std::size_t i = 1; i < points.size(); ++i) {
         pieces_.push_back({points[i - 1], points[i], line});
-        boxes.push_back(box_around(points[i - 1].xy(), points[i].xy(), kSame_m));
+        boxes.push_back(box_around(points[i - 1].xy(), points[i].xy(), kCoincident_m));
       }
     }
     grid_ = Grid(boxes, kCell_m);
@@ -67,62 +69,64 @@ class PieceIndex {
 
   const std::vector<Piece>& pieces() const { return pieces_; }
 
-  /// Whether there is, beside all of the straight way from a to b, some piece within tolerance_m(line), negative for
-  /// lines that do not count. It is at most max_m; gaps so short do not matter.
+  /// Whether lines cover the straight segment from a to b along all its length, each within tolerance_m(line); lines
+  /// with negative tolerance are ignored. max_m is the largest tolerance; gaps up to max_m are ignored.
   template <typename Tolerance>
-  bool run_along(Vec3 a_m, Vec3 b_m, float max_m, const Tolerance& tolerance_m) const {
+  bool is_covered(Vec3 a_m, Vec3 b_m, float max_m, const Tolerance& tolerance_m) const {
     const float length_m = length(b_m - a_m);
-    const Way way{a_m, (b_m - a_m) * (1.0f / length_m), length_m};
-    std::vector<Stretch> accompanied;
+    const Segment segment{a_m, (b_m - a_m) * (1.0f / length_m), length_m};
+    std::vector<Interval> intervals;
     visit_items(grid_.view(), box_around(a_m.xy(), b_m.xy(), max_m), [&](std::size_t i) {
-      const float its_tolerance_m = tolerance_m(pieces_[i].line);
-      if (its_tolerance_m < 0) return;
-      const Stretch shared = shared_stretch(way, pieces_[i], its_tolerance_m);
-      if (shared.end_m > shared.begin_m) accompanied.push_back(shared);
+      const float line_tolerance_m = tolerance_m(pieces_[i].line);
+      if (line_tolerance_m < 0) return;
+      const Interval covered = covered_interval(segment, pieces_[i], line_tolerance_m);
+      if (covered.end_m > covered.begin_m) intervals.push_back(covered);
     });
-    std::sort(accompanied.begin(), accompanied.end(), [](Stretch a, Stretch b) { return a.begin_m < b.begin_m; });
-    float reached_m = 0;
-    for (const Stretch& stretch : accompanied) {
-      if (stretch.begin_m > reached_m + max_m) return false;
-      reached_m = max_of(reached_m, stretch.end_m);
+    std::sort(intervals.begin(), intervals.end(), [](Interval a, Interval b) { return a.begin_m < b.begin_m; });
+    float covered_to_m = 0;
+    for (const Interval& interval : intervals) {
+      if (interval.begin_m > covered_to_m + max_m) return false;
+      covered_to_m = max_of(covered_to_m, interval.end_m);
     }
-    return !accompanied.empty() && reached_m >= length_m - max_m;
+    return !intervals.empty() && covered_to_m >= length_m - max_m;
   }
 
  private:
-  struct Way {
+  struct Segment {
     Vec3 begin_m, along;  // along: a unit vector
     float length_m = 0;
   };
-  /// A part of a way, in metres from its beginning.
-  struct Stretch {
+  /// A part of a segment, in metres from its start.
+  struct Interval {
     float begin_m = 0, end_m = 0;
   };
 
-  /// The part of a way that has a piece beside it, if all that the piece has there is that near; else none.
-  static Stretch shared_stretch(const Way& way, const Piece& piece, float tolerance_m) {
-    const float a_m = dot(piece.a_m - way.begin_m, way.along), b_m = dot(piece.b_m - way.begin_m, way.along);
-    const Stretch beside{max_of(min_of(a_m, b_m), 0.0f), min_of(max_of(a_m, b_m), way.length_m)};
-    if (beside.end_m <= beside.begin_m) return {};
-    for (const float at_m : {beside.begin_m, beside.end_m}) {
-      const Vec3 place_m = piece.a_m + (piece.b_m - piece.a_m) * ((at_m - a_m) / (b_m - a_m));
-      if (length(place_m - (way.begin_m + way.along * at_m)) > tolerance_m) return {};
+  /// The part of a segment alongside a piece, if that part of the piece is within tolerance at both its ends; else
+  /// empty.
+  static Interval covered_interval(const Segment& segment, const Piece& piece, float tolerance_m) {
+    const float a_m = dot(piece.a_m - segment.begin_m, segment.along),
+                b_m = dot(piece.b_m - segment.begin_m, segment.along);
+    const Interval overlap{max_of(min_of(a_m, b_m), 0.0f), min_of(max_of(a_m, b_m), segment.length_m)};
+    if (overlap.end_m <= overlap.begin_m) return {};
+    for (const float at_m : {overlap.begin_m, overlap.end_m}) {
+      const Vec3 position_m = piece.a_m + (piece.b_m - piece.a_m) * ((at_m - a_m) / (b_m - a_m));
+      if (length(position_m - (segment.begin_m + segment.along * at_m)) > tolerance_m) return {};
     }
-    return beside;
+    return overlap;
   }
 
   std::vector<Piece> pieces_;
   Grid grid_;
 };
 
-/// Leaves out lines all of whose length others paint too: roads of a junction that run over each other bring the same
-/// paint, cut in other places. Longer lines are kept first, so that what a line is left out for is never left out.
-class RepeatedPaint {
+/// Removes lines that others cover along their whole length: overlapping roads of a junction contain the same paint,
+/// cut in different places. Longer lines are processed first, and only kept lines count as cover.
+class DuplicateLines {
  public:
-  explicit RepeatedPaint(std::vector<PaintedLine> lines)
-      : lines_(std::move(lines)), kept_(lines_.size(), false), pieces_(lines_) {}
+  explicit DuplicateLines(std::vector<PaintedLine> lines)
+      : lines_(std::move(lines)), is_kept_(lines_.size(), false), pieces_(lines_) {}
 
-  std::vector<PaintedLine> leave_out() {
+  std::vector<PaintedLine> remove() {
     std::vector<float> lengths_m(lines_.size(), 0.0f);
     for (const PieceIndex::Piece& piece : pieces_.pieces()) lengths_m[piece.line] += length(piece.b_m - piece.a_m);
     std::vector<std::size_t> order(lines_.size());
@@ -131,44 +135,43 @@ class RepeatedPaint {
                      [&](std::size_t a, std::size_t b) { return lengths_m[a] > lengths_m[b]; });
     for (const std::size_t line : order) {
       const std::vector<Vec3>& points = lines_[line].points_m;
-      for (std::size_t i = 1; i < points.size() && !kept_[line]; ++i) {
-        kept_[line] = !is_painted(line, points[i - 1], points[i]);
+      for (std::size_t i = 1; i < points.size() && !is_kept_[line]; ++i) {
+        is_kept_[line] = !is_covered_by_kept(line, points[i - 1], points[i]);
       }
     }
-    std::vector<PaintedLine> once;
+    std::vector<PaintedLine> unique_lines;
     for (std::size_t line = 0; line < lines_.size(); ++line) {
-      if (kept_[line]) once.push_back(std::move(lines_[line]));
+      if (is_kept_[line]) unique_lines.push_back(std::move(lines_[line]));
     }
-    return once;
+    return unique_lines;
   }
 
  private:
-  /// Whether lines that are kept paint all of a piece of a line.
-  bool is_painted(std::size_t line, Vec3 a_m, Vec3 b_m) const {
-    return pieces_.run_along(a_m, b_m, kSame_m, [&](std::size_t other) {
-      return kept_[other] && is_same_paint(lines_[other], lines_[line]) ? kSame_m : -1.0f;
+  /// Whether kept lines of the same style cover a piece of `line`.
+  bool is_covered_by_kept(std::size_t line, Vec3 a_m, Vec3 b_m) const {
+    return pieces_.is_covered(a_m, b_m, kCoincident_m, [&](std::size_t other) {
+      return is_kept_[other] && have_equal_style(lines_[other], lines_[line]) ? kCoincident_m : -1.0f;
     });
   }
 
   std::vector<PaintedLine> lines_;
-  std::vector<bool> kept_;
+  std::vector<bool> is_kept_;
   PieceIndex pieces_;
 };
 
-/// Joins lines end to end, whichever way round they are. End 2 * i is the first point of line i, end 2 * i + 1 its
-/// last.
+/// Joins lines end to end, in any orientation. End 2 * i is the first point of line i, end 2 * i + 1 its last.
 class LineJoiner {
  public:
   explicit LineJoiner(std::vector<PaintedLine> lines)
-      : lines_(std::move(lines)), partner_(2 * lines_.size(), kNone), used_(lines_.size(), false) {
+      : lines_(std::move(lines)), partners_(2 * lines_.size(), kNone), is_joined_(lines_.size(), false) {
     match();
   }
 
-  /// In the order of their first lines: where lane marks overlap, the lower index is in front.
+  /// In the order of their first lines, since among overlapping lane marks the lower index is in front.
   std::vector<PaintedLine> join() {
     std::vector<PaintedLine> joined;
     for (std::size_t line = 0; line < lines_.size(); ++line) {
-      if (!used_[line]) joined.push_back(follow(begin_of(line)));
+      if (!is_joined_[line]) joined.push_back(join_chain(chain_begin(line)));
     }
     return joined;
   }
@@ -176,37 +179,37 @@ class LineJoiner {
  private:
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
-  Vec3 place(std::size_t end) const {
+  Vec3 end_point(std::size_t end) const {
     const std::vector<Vec3>& points = lines_[end / 2].points_m;
     return end % 2 == 0 ? points.front() : points.back();
   }
 
-  /// The unit vector in plan that leads out of the line.
+  /// The unit vector in plan that points out of the line at this end.
   Vec2 outward(std::size_t end) const {
     const std::vector<Vec3>& points = lines_[end / 2].points_m;
     const Vec3 before = end % 2 == 0 ? points[1] : points[points.size() - 2];
-    const Vec2 out = (place(end) - before).xy();
+    const Vec2 out = (end_point(end) - before).xy();
     return out * (1.0f / length(out));
   }
 
-  /// Ends that meet in pairs, the straightest first: where lines fork, one branch goes on.
+  /// Pairs coincident ends, the straightest pair first: at a fork only one branch is joined.
   void match() {
     struct Pair {
       float bend = 0, gap_m = 0;  // sine of the angle between the lines; how far apart they end
       std::size_t a = 0, b = 0;
     };
     std::vector<Aabb2> boxes;
-    for (std::size_t end = 0; end < partner_.size(); ++end)
-      boxes.push_back(box_around(place(end).xy(), place(end).xy(), kSame_m));
+    for (std::size_t end = 0; end < partners_.size(); ++end)
+      boxes.push_back(box_around(end_point(end).xy(), end_point(end).xy(), kCoincident_m));
     const Grid grid(boxes, kCell_m);
     std::vector<Pair> pairs;
-    for (std::size_t a = 0; a < partner_.size(); ++a) {
-      const Vec2 here = place(a).xy(), out = outward(a);
+    for (std::size_t a = 0; a < partners_.size(); ++a) {
+      const Vec2 here = end_point(a).xy(), out = outward(a);
       visit_items(grid.view(), {here, here}, [&](std::size_t b) {
-        if (b <= a || !is_same_paint(lines_[a / 2], lines_[b / 2])) return;
+        if (b <= a || !have_equal_style(lines_[a / 2], lines_[b / 2])) return;
         const Vec2 other_out = outward(b);
-        const float gap_m = length(place(a) - place(b)), bend = std::abs(cross(out, other_out));
-        if (gap_m > kSame_m || bend > kMaxBend || dot(out, other_out) > 0) return;
+        const float gap_m = length(end_point(a) - end_point(b)), bend = std::abs(cross(out, other_out));
+        if (gap_m > kCoincident_m || bend > kMaxBend || dot(out, other_out) > 0) return;
         pairs.push_back({bend, gap_m, a, b});
       });
     }
@@ -214,70 +217,71 @@ class LineJoiner {
       return std::tie(p.bend, p.gap_m, p.a, p.b) < std::tie(q.bend, q.gap_m, q.a, q.b);
     });
     for (const Pair& pair : pairs) {
-      if (partner_[pair.a] != kNone || partner_[pair.b] != kNone) continue;
-      partner_[pair.a] = pair.b;
-      partner_[pair.b] = pair.a;
+      if (partners_[pair.a] != kNone || partners_[pair.b] != kNone) continue;
+      partners_[pair.a] = pair.b;
+      partners_[pair.b] = pair.a;
     }
   }
 
-  /// Where what the line is a part of begins; rings begin with the line.
-  std::size_t begin_of(std::size_t line) const {
+  /// The end where the chain of this line begins; rings begin with the line itself.
+  std::size_t chain_begin(std::size_t line) const {
     std::size_t end = 2 * line;
-    while (partner_[end] != kNone) {
-      end = partner_[end] ^ 1;
+    while (partners_[end] != kNone) {
+      end = partners_[end] ^ 1;
       if (end == 2 * line) break;
     }
     return end;
   }
 
-  /// The line that begins with this end.
-  PaintedLine follow(std::size_t begin) {
+  /// The joined line that begins with this end.
+  PaintedLine join_chain(std::size_t begin) {
     const PaintedLine& first = lines_[begin / 2];
     PaintedLine joined{.width_m = first.width_m, .color = first.color};
     std::size_t end = begin;
-    while (end != kNone && !used_[end / 2]) {
-      used_[end / 2] = true;
+    while (end != kNone && !is_joined_[end / 2]) {
+      is_joined_[end / 2] = true;
       std::vector<Vec3>& points = lines_[end / 2].points_m;
       if (end % 2 == 1) std::reverse(points.begin(), points.end());
       joined.points_m.insert(joined.points_m.end(), points.begin() + (end == begin ? 0 : 1), points.end());
-      end = partner_[end ^ 1];
+      end = partners_[end ^ 1];
     }
     if (end == begin) joined.points_m.back() = joined.points_m.front();
     return joined;
   }
 
   std::vector<PaintedLine> lines_;
-  std::vector<std::size_t> partner_;
-  std::vector<bool> used_;
+  std::vector<std::size_t> partners_;
+  std::vector<bool> is_joined_;
 };
 
-/// Leaves out points that the chords between the others pass within kThinning_m.
+/// Removes points within kThinningTolerance_m of the chords between the remaining ones.
 void thin(PaintedLine* line) {
   std::vector<CurvePoint> points;
   for (const Vec3 point : line->points_m) points.push_back({0, point.x, point.y, point.z, 0});
-  std::vector<Vec3> kept;
-  for (const std::size_t i : thin_polyline(points, kThinning_m, kLongestChord_m)) kept.push_back(line->points_m[i]);
-  line->points_m = std::move(kept);
+  std::vector<Vec3> thinned;
+  for (const std::size_t i : thin_polyline(points, kThinningTolerance_m, kMaxChord_m))
+    thinned.push_back(line->points_m[i]);
+  line->points_m = std::move(thinned);
 }
 
 }  // namespace
 
 std::vector<PaintedLine> painted_lines(const RoadMap& map) {
-  std::vector<PaintedLine> lines = LineJoiner(RepeatedPaint(lines_of(map)).leave_out()).join();
+  std::vector<PaintedLine> lines = LineJoiner(DuplicateLines(lines_of_markings(map)).remove()).join();
   for (PaintedLine& line : lines) thin(&line);
   return lines;
 }
 
-std::vector<RoadEdge> edges_beside(const RoadMap& map, const std::vector<PaintedLine>& lines, float width_m) {
+std::vector<RoadEdge> uncovered_edges(const RoadMap& map, const std::vector<PaintedLine>& lines, float width_m) {
   const PieceIndex pieces(lines);
-  std::vector<RoadEdge> seen;
+  std::vector<RoadEdge> uncovered;
   for (const RoadEdge& edge : map.road_edges) {
-    const bool is_hidden = pieces.run_along(edge.a_m, edge.b_m, kHiddenEdge_m, [&](std::size_t line) {
-      return kHiddenEdge_m - 0.5f * (width_m - lines[line].width_m);
+    const bool is_covered = pieces.is_covered(edge.a_m, edge.b_m, kCoveredEdgeTolerance_m, [&](std::size_t line) {
+      return kCoveredEdgeTolerance_m - 0.5f * (width_m - lines[line].width_m);
     });
-    if (!is_hidden) seen.push_back(edge);
+    if (!is_covered) uncovered.push_back(edge);
   }
-  return seen;
+  return uncovered;
 }
 
 }  // namespace pictura

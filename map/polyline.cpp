@@ -15,22 +15,22 @@ double chord_error(const CurvePoint& a, const CurvePoint& b, const CurvePoint& p
 }
 
 std::vector<std::size_t> thin_polyline(const std::vector<CurvePoint>& points, double tolerance_m, double max_piece_m) {
-  std::vector<std::size_t> kept{0};
+  std::vector<std::size_t> indices{0};
   std::size_t first = 0;
   while (first + 1 < points.size()) {
     std::size_t last = first + 1;
     for (std::size_t next = last + 1; next < points.size(); ++next) {
       const CurvePoint &a = points[first], &b = points[next];
-      if (std::hypot(b.x - a.x, b.y - a.y) > max_piece_m + kPieceSlack) break;
+      if (std::hypot(b.x - a.x, b.y - a.y) > max_piece_m + kPieceRounding) break;
       bool close = true;
       for (std::size_t i = first + 1; i < next && close; ++i) close = chord_error(a, b, points[i]) <= tolerance_m;
       if (!close) break;
       last = next;
     }
-    kept.push_back(last);
+    indices.push_back(last);
     first = last;
   }
-  return kept;
+  return indices;
 }
 
 }  // namespace pictura

@@ -11,14 +11,14 @@ namespace pictura {
 namespace {
 
 constexpr double kLevel_m = 2.0;
-constexpr double kCrack_m = 0.05;        // a gap this wide between two bands is a crack and no edge
-constexpr double kCoincident_m = 0.004;  // borders nearer than this are one border
-constexpr double kStep_m = 0.5;          // borders are tested at least this often
-constexpr double kTransition_m = 0.002;  // where an outline begins and ends is found to this
-constexpr double kJoin_m = 0.06;         // ends of outlines nearer than this are joined
+constexpr double kMaxGap_m = 0.05;               // gaps between two bands up to this width count as closed
+constexpr double kSharedBorder_m = 0.004;        // borders closer than this count as shared
+constexpr double kSampleStep_m = 0.5;            // sampling step along borders
+constexpr double kBisectionTolerance_m = 0.002;  // bisection tolerance of the points where an outline begins and ends
+constexpr double kMaxJoinGap_m = 0.06;           // maximum distance of outline ends that are joined
 constexpr double kMinOutline_m = 0.3;
 
-/// A place on an outline and the band whose border it is.
+/// A point on an outline and the band whose border it lies on.
 struct OutlinePoint : Point3 {
   int32_t band = 0;
 };
@@ -29,7 +29,7 @@ Point3 lerp(const Point3& a, const Point3& b, double u) {
 
 double plan_distance(const Point3& a, const Point3& b) { return std::hypot(b.x - a.x, b.y - a.y); }
 
-/// Walks the four sides of each band clockwise, surface to the right, and keeps what lies on the outline.
+/// Traverses the four sides of each band clockwise, surface to the right, and collects the parts on the outline.
 class Tracer {
  public:
   Tracer(const std::vector<SurfaceBand>& bands, const Surface& surface) : bands_(bands), surface_(surface) {}
@@ -38,78 +38,78 @@ class Tracer {
     for (std::size_t band = 0; band < bands_.size(); ++band) {
       const SurfaceBand& sides = bands_[band];
       band_ = static_cast<int32_t>(band);
-      auto is_narrow = [&](std::size_t i) { return plan_distance(sides.left[i], sides.right[i]) < kCrack_m; };
+      auto is_narrow = [&](std::size_t i) { return plan_distance(sides.left[i], sides.right[i]) < kMaxGap_m; };
       const std::size_t last = sides.left.size() - 1;
       for (std::size_t i = 0; i < last; ++i) {
-        side(sides.left[i], sides.left[i + 1], is_narrow(i) && is_narrow(i + 1));
+        trace_side(sides.left[i], sides.left[i + 1], is_narrow(i) && is_narrow(i + 1));
       }
-      side(sides.left[last], sides.right[last], is_narrow(last));
+      trace_side(sides.left[last], sides.right[last], is_narrow(last));
       for (std::size_t i = last; i > 0; --i) {
-        side(sides.right[i], sides.right[i - 1], is_narrow(i) && is_narrow(i - 1));
+        trace_side(sides.right[i], sides.right[i - 1], is_narrow(i) && is_narrow(i - 1));
       }
-      side(sides.right[0], sides.left[0], is_narrow(0));
+      trace_side(sides.right[0], sides.left[0], is_narrow(0));
       finish_run();
     }
     return std::move(runs_);
   }
 
  private:
-  /// One straight piece of the walk.
-  void side(const Point3& a, const Point3& b, bool skipped) {
+  /// One straight segment of a band's side.
+  void trace_side(const Point3& a, const Point3& b, bool is_skipped) {
     const double length_m = plan_distance(a, b);
-    if (skipped) finish_run();
-    if (skipped || length_m < 1e-9) return;
+    if (is_skipped) finish_run();
+    if (is_skipped || length_m < 1e-9) return;
     const Point2 outward{-(b.y - a.y) / length_m, (b.x - a.x) / length_m};
-    const int steps = std::max(1, static_cast<int>(std::ceil(length_m / kStep_m)));
-    // Just inside the ends, where the neighbouring piece has the say.
+    const int steps = std::max(1, static_cast<int>(std::ceil(length_m / kSampleStep_m)));
+    // Stay off the ends, where the adjacent segment decides.
     const double margin = std::min(0.25, 1e-4 / length_m);
-    double before = margin;
-    bool kept_before = is_outline(lerp(a, b, before), outward, band_);
-    if (kept_before) {
+    double previous = margin;
+    bool was_edge = is_outline(lerp(a, b, previous), outward, band_);
+    if (was_edge) {
       append(a);
     } else {
       finish_run();
     }
     for (int step = 1; step <= steps; ++step) {
       const double here = step == steps ? 1.0 - margin : static_cast<double>(step) / steps;
-      const bool kept = is_outline(lerp(a, b, here), outward, band_);
-      if (kept != kept_before) {
-        double low = before, high = here;
-        while ((high - low) * length_m > kTransition_m) {
+      const bool is_edge = is_outline(lerp(a, b, here), outward, band_);
+      if (is_edge != was_edge) {
+        double low = previous, high = here;
+        while ((high - low) * length_m > kBisectionTolerance_m) {
           const double middle = 0.5 * (low + high);
-          (is_outline(lerp(a, b, middle), outward, band_) == kept_before ? low : high) = middle;
+          (is_outline(lerp(a, b, middle), outward, band_) == was_edge ? low : high) = middle;
         }
-        append(lerp(a, b, kept ? high : low));
-        if (!kept) finish_run();
+        append(lerp(a, b, is_edge ? high : low));
+        if (!is_edge) finish_run();
       }
-      before = here;
-      kept_before = kept;
+      previous = here;
+      was_edge = is_edge;
     }
-    if (kept_before) append(b);
+    if (was_edge) append(b);
   }
 
-  /// Whether no other band covers the place just outside `p` on the border of `band`, and no band of a lower index is
-  /// to draw a border that both share. Bands that share a border within kCoincident_m may each lie a little further out
-  /// than another, so the question goes down to whether the lower one really draws it: one of them always does.
+  /// Whether no other band covers the point just outside `p` on the border of `band`, and no band of a lower index
+  /// emits the same shared border. Bands that share a border within kSharedBorder_m may each extend slightly beyond the
+  /// other, so the test recurses to check that the lower band really emits it: one of them always does.
   bool is_outline(const Point3& p, const Point2& outward, int32_t band) const {
     auto at = [&](double distance) { return Point2{p.x + distance * outward.x, p.y + distance * outward.y}; };
     auto is_other = [&](int32_t other) { return other != band; };
-    if (surface_.any_band_at(at(kCoincident_m), p.z, is_other)) return false;
-    if (surface_.any_band_at(at(kCrack_m), p.z, is_other)) return false;
-    std::vector<int32_t> sharers;
-    surface_.any_band_at(at(-kCoincident_m), p.z, [&](int32_t other) {
-      if (other < band && (sharers.empty() || sharers.back() != other)) sharers.push_back(other);
+    if (surface_.any_band_at(at(kSharedBorder_m), p.z, is_other)) return false;
+    if (surface_.any_band_at(at(kMaxGap_m), p.z, is_other)) return false;
+    std::vector<int32_t> adjacent_bands;
+    surface_.any_band_at(at(-kSharedBorder_m), p.z, [&](int32_t other) {
+      if (other < band && (adjacent_bands.empty() || adjacent_bands.back() != other)) adjacent_bands.push_back(other);
       return false;
     });
-    for (const int32_t sharer : sharers) {
-      double inside = -kCoincident_m, outside = kCoincident_m;
-      for (int halving = 0; halving < 6; ++halving) {
+    for (const int32_t adjacent : adjacent_bands) {
+      double inside = -kSharedBorder_m, outside = kSharedBorder_m;
+      for (int iteration = 0; iteration < 6; ++iteration) {
         const double middle = 0.5 * (inside + outside);
-        const bool covered = surface_.any_band_at(at(middle), p.z, [&](int32_t other) { return other == sharer; });
+        const bool covered = surface_.any_band_at(at(middle), p.z, [&](int32_t other) { return other == adjacent; });
         (covered ? inside : outside) = middle;
       }
       const Point2 border = at(inside);
-      if (is_outline({border.x, border.y, p.z}, outward, sharer)) return false;
+      if (is_outline({border.x, border.y, p.z}, outward, adjacent)) return false;
     }
     return true;
   }
@@ -129,10 +129,11 @@ class Tracer {
   std::vector<std::vector<OutlinePoint>> runs_;
 };
 
-/// Joins runs whose end lies at another's beginning, so that pieces may be merged across bands.
+/// Joins runs that meet end to start, so that pieces can be merged across bands.
 class Joiner {
  public:
-  explicit Joiner(std::vector<std::vector<OutlinePoint>> runs) : runs_(std::move(runs)), used_(runs_.size(), false) {
+  explicit Joiner(std::vector<std::vector<OutlinePoint>> runs)
+      : runs_(std::move(runs)), is_joined_(runs_.size(), false) {
     for (std::size_t i = 0; i < runs_.size(); ++i) {
       starts_[key(runs_[i].front(), 0, 0)].push_back(i);
       ends_[key(runs_[i].back(), 0, 0)].push_back(i);
@@ -141,13 +142,13 @@ class Joiner {
 
   std::vector<std::vector<OutlinePoint>> join() {
     std::vector<std::vector<OutlinePoint>> joined;
-    // Open outlines from their beginnings first, then what is left: rings.
+    // Open outlines first, from their start, then rings.
     for (const bool rings : {false, true}) {
       for (std::size_t i = 0; i < runs_.size(); ++i) {
-        if (used_[i] || (!rings && has_predecessor(i))) continue;
+        if (is_joined_[i] || (!rings && has_predecessor(i))) continue;
         std::vector<OutlinePoint> outline;
         for (std::size_t at = i; at != kNone; at = next_of(outline.back())) {
-          used_[at] = true;
+          is_joined_[at] = true;
           outline.insert(outline.end(), runs_[at].begin(), runs_[at].end());
         }
         joined.push_back(std::move(outline));
@@ -166,7 +167,7 @@ class Joiner {
   }
 
   template <typename Visit>
-  static void near(const Buckets& buckets, const Point3& p, Visit&& visit) {
+  static void visit_near(const Buckets& buckets, const Point3& p, Visit&& visit) {
     for (int dy = -1; dy <= 1; ++dy) {
       for (int dx = -1; dx <= 1; ++dx) {
         const auto bucket = buckets.find(key(p, dx, dy));
@@ -182,9 +183,9 @@ class Joiner {
 
   std::size_t next_of(const Point3& end) const {
     std::size_t best = kNone;
-    double best_gap = kJoin_m;
-    near(starts_, end, [&](std::size_t i) {
-      if (used_[i] || gap(end, runs_[i].front()) > best_gap) return;
+    double best_gap = kMaxJoinGap_m;
+    visit_near(starts_, end, [&](std::size_t i) {
+      if (is_joined_[i] || gap(end, runs_[i].front()) > best_gap) return;
       best = i;
       best_gap = gap(end, runs_[i].front());
     });
@@ -193,14 +194,15 @@ class Joiner {
 
   bool has_predecessor(std::size_t i) const {
     bool found = false;
-    near(ends_, runs_[i].front(), [&](std::size_t other) {
-      found = found || (other != i && !used_[other] && gap(runs_[other].back(), runs_[i].front()) <= kJoin_m);
+    visit_near(ends_, runs_[i].front(), [&](std::size_t other) {
+      found =
+          found || (other != i && !is_joined_[other] && gap(runs_[other].back(), runs_[i].front()) <= kMaxJoinGap_m);
     });
     return found;
   }
 
   std::vector<std::vector<OutlinePoint>> runs_;
-  std::vector<bool> used_;
+  std::vector<bool> is_joined_;
   Buckets starts_, ends_;
 };
 
@@ -225,13 +227,13 @@ std::vector<RoadEdge> outline_of(const std::vector<SurfaceBand>& bands, double c
       bands_of_points.push_back(p.band);
     }
     if (length_m < kMinOutline_m) continue;
-    const std::vector<std::size_t> kept = thin_polyline(points, chord_error_m, kMaxPiece_m);
+    const std::vector<std::size_t> indices = thin_polyline(points, chord_error_m, kMaxPiece_m);
     auto to_vec3 = [](const CurvePoint& p) {
       return Vec3{static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
     };
-    for (std::size_t i = 1; i < kept.size(); ++i) {
-      edges.push_back({to_vec3(points[kept[i - 1]]), to_vec3(points[kept[i]])});
-      if (bands_out) bands_out->push_back(bands_of_points[kept[i - 1]]);
+    for (std::size_t i = 1; i < indices.size(); ++i) {
+      edges.push_back({to_vec3(points[indices[i - 1]]), to_vec3(points[indices[i]])});
+      if (bands_out) bands_out->push_back(bands_of_points[indices[i - 1]]);
     }
   }
   return edges;

@@ -1,4 +1,4 @@
-// The outline of a surface that is given as overlapping bands (lanes), level by level.
+// The outline of a surface given as overlapping bands (lanes), computed per level.
 #pragma once
 
 #include <vector>
@@ -9,9 +9,9 @@
 namespace pictura {
 
 /// The outline of the union of the bands, as pieces of at most kMaxPiece_m with the surface on their right, each within
-/// `chord_error_m` of the true outline. Surfaces more than 2 m apart in height do not touch. Cracks of up to 5 cm
-/// between bands count as closed, and outlines shorter than 0.3 m in all are left out. `bands_out`, unless null, gets
-/// the band on which each piece begins.
+/// `chord_error_m` of the true outline. Surfaces at least 2 m apart in height do not touch. Gaps of up to 5 cm between
+/// bands count as closed, and outlines shorter than 0.3 m in total are dropped. `bands_out`, unless null, gets the band
+/// on which each piece begins.
 std::vector<RoadEdge> outline_of(const std::vector<SurfaceBand>& bands, double chord_error_m,
                                  std::vector<int32_t>* bands_out = nullptr);
 

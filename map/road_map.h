@@ -1,5 +1,5 @@
-// RoadMap: the validated, immutable road network that everything else reads, whatever file it came from. Positions are
-// float metres about an origin kept in double; indices are into the vectors of the same RoadMap, -1 means none.
+// RoadMap: the validated, immutable road network that everything else reads, whatever the file format. Positions are
+// float metres relative to an origin kept in double; indices are into the vectors of the same RoadMap, -1 means none.
 #pragma once
 
 #include <array>
@@ -28,7 +28,7 @@ enum class LaneType : uint8_t {
   other,
 };
 
-/// Drivable lanes make the surface whose outline the road edges are.
+/// The road edges are the outline of the drivable lanes.
 constexpr bool is_drivable(LaneType type) { return type <= LaneType::ramp; }
 const char* to_string(LaneType type);
 
@@ -38,7 +38,7 @@ struct IndexRange {
   int32_t size() const { return end - begin; }
 };
 
-/// A sample of a lane's centre line, in the direction of travel, at most kMaxPiece_m from the next.
+/// A sample of a lane's centre line, in the direction of travel, at most kMaxPiece_m from the next sample.
 struct LanePoint {
   Vec3 position_m;
   float heading_rad = 0;
@@ -49,20 +49,20 @@ struct LanePoint {
 struct Lane {
   LaneType type = LaneType::other;
   bool in_junction = false;
-  bool is_endless = false;  // a route along successors (and lane changes) goes on for ever from here
+  bool is_endless = false;  // an unbounded route along successors (and lane changes) starts here
   int32_t junction = -1;
   IndexRange points;                                // RoadMap::lane_points, at least two
   IndexRange successors, predecessors;              // RoadMap::lane_links: lanes
-  int32_t left_neighbor = -1, right_neighbor = -1;  // same direction, driving, change permitted by geometry
+  int32_t left_neighbor = -1, right_neighbor = -1;  // same direction, driving or ramp; marks are not considered
   float length_m = 0;
   float speed_limit_mps = 0;
-  int32_t source_road = 0, source_section = 0, source_lane = 0;  // as the file names it; see RoadMap::road_names
+  int32_t source_road = 0, source_section = 0, source_lane = 0;  // indices and id in the file; see RoadMap::road_names
 };
 
 enum class MarkColor : uint8_t { white, yellow, red, green, blue, orange, violet, black };
 const char* to_string(MarkColor color);
 
-/// A painted line, one per stripe and dash run: a double line is two markings, a broken one is many.
+/// A painted line, one per stripe or dash: a double line is two markings, a broken line is many.
 struct Marking {
   IndexRange points;  // RoadMap::marking_points, at least two
   float width_m = 0;
@@ -85,28 +85,28 @@ struct ParkingSpace {
   float length_m = 0, width_m = 0;
 };
 
-/// A stop line that the file paints, whether a light or a sign governs it or nothing does.
+/// A stop line painted in the file, whether or not a light or sign controls it.
 struct PaintedStopLine {
   Vec3 a_m, b_m;
   float width_m = 0;
 };
 
-/// A sign at the road: what the file says of it, and the lanes for which it holds (by its validity and references).
+/// A traffic sign as described in the file, and the lanes to which it applies (by its validity and references).
 struct Sign {
   std::string name;           // the signal's id in the file
-  std::string type, subtype;  // of the catalogue of `country`; "206" is a stop sign in OpenDRIVE's own
+  std::string type, subtype;  // codes of the catalogue of `country`; "206" is a stop sign in OpenDRIVE's own
   std::string country;
   Vec3 position_m;
-  float heading_rad = 0;  // of the traffic for which it stands
+  float heading_rad = 0;  // of the traffic to which it applies
   IndexRange lanes;       // RoadMap::sign_lanes
 };
 
-/// A traffic light: its stop line, head, phase, and the lanes that it holds (incoming and connecting ones).
+/// A traffic light: its stop line, head, phase, and the lanes that it controls (incoming and connecting ones).
 struct TrafficLight {
   Vec3 stop_a_m, stop_b_m;     // the stop line, left end first as seen by traffic
-  float stop_heading_rad = 0;  // direction of the traffic that it stops
+  float stop_heading_rad = 0;  // travel direction of the controlled traffic
   Vec3 head_m;                 // centre of the head
-  Vec2 head_facing;            // unit vector towards the traffic that it is meant for
+  Vec2 head_facing;            // unit vector towards the controlled traffic
   int32_t junction = -1;
   int32_t phase = 0;  // rank of its controller in the junction
   IndexRange lanes;   // RoadMap::light_lanes, incoming lanes first, then connecting ones
@@ -123,13 +123,13 @@ struct BuildingLine {
   Vec3 a_m, b_m;  // the road lies to the right of a -> b
 };
 
-/// Where a file says something: the road's index in RoadMap::road_names (-1: on no road) and the line of its element
-/// (0: derived, or the map came from no text).
+/// The source of an element: the road's index in RoadMap::road_names (-1: on no road) and the line of the XML element
+/// (0: derived, or the map was not read from text).
 struct SourceElement {
   int32_t road = -1, line = 0;
 };
 
-/// The origin of every element, parallel to RoadMap's vectors of the same names.
+/// The source of every element, parallel to RoadMap's vectors of the same names.
 struct Provenance {
   std::vector<SourceElement> lanes, markings, road_edges, crosswalks, parking_spaces, stop_lines, signs, lights,
       junctions, building_lines;
@@ -147,7 +147,7 @@ struct MapFacts {
 struct RoadMap {
   std::string name;                     // "Town01", "procedural:7", or the file's stem
   std::array<double, 3> origin_m{};     // file coordinates of this map's (0, 0, 0)
-  std::string geo_reference;            // how the file's coordinates lie on the globe, a PROJ string; may be empty
+  std::string geo_reference;            // geographic reference of the file's coordinates, a PROJ string; may be empty
   std::vector<std::string> road_names;  // [roads] id in the file
 
   std::vector<Lane> lanes;
@@ -177,7 +177,7 @@ struct RoadMap {
   }
 };
 
-/// Throws Error naming the element unless every index, length, width and coordinate is sound and links are mutual.
+/// Throws Error naming the element unless every index, length, width and coordinate is valid and links are mutual.
 void validate(const RoadMap& map);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// The speed limit where the map file gives none, for importers and for the rules of the simulator alike.
+// The default speed limit, shared by importers and simulator rules.
 #pragma once
 
 namespace pictura {

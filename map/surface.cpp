@@ -7,15 +7,15 @@ namespace pictura {
 namespace {
 
 constexpr float kCell_m = 4.0f;
-// Looks at quads that a surface allows, in all and for each of its quads.
-constexpr int64_t kFreeLooks = 10'000'000, kLooksPerQuad = 5000;  // CARLA's towns take up to 544 for a quad
+// Budget of quad tests of a surface: a constant, plus an amount per quad.
+constexpr int64_t kBaseLookups = 10'000'000, kLookupsPerQuad = 5000;  // CARLA's towns need up to 544 per quad
 
-double cross_of(const Point3& a, const Point3& b, const Point2& p) {
+double cross_product(const Point3& a, const Point3& b, const Point2& p) {
   return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
 }
 
 bool in_triangle(const Point3& a, const Point3& b, const Point3& c, const Point2& p) {
-  const double ab = cross_of(a, b, p), bc = cross_of(b, c, p), ca = cross_of(c, a, p);
+  const double ab = cross_product(a, b, p), bc = cross_product(b, c, p), ca = cross_product(c, a, p);
   return (ab >= 0 && bc >= 0 && ca >= 0) || (ab <= 0 && bc <= 0 && ca <= 0);
 }
 
@@ -38,10 +38,10 @@ Surface::Surface(const std::vector<SurfaceBand>& bands, double level_m) : level_
     }
   }
   grid_ = Grid(boxes, kCell_m);
-  looks_left_ = kFreeLooks + kLooksPerQuad * static_cast<int64_t>(quads_.size());
+  remaining_lookups_ = kBaseLookups + kLookupsPerQuad * static_cast<int64_t>(quads_.size());
 }
 
-/// Two triangles, so that a quad that is not convex is still covered as drawn.
+/// Two triangles, so that non-convex quads are covered as drawn.
 bool Surface::contains(const Quad& quad, const Point2& p, double z) const {
   const Point3* c = quad.corners;
   const double mean_z = 0.25 * (c[0].z + c[1].z + c[2].z + c[3].z);

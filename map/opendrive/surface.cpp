@@ -1,5 +1,5 @@
-// The surface of an OpenDRIVE network, as bands: road edges are the outline of its drivable part, and building lines
-// run where there is none.
+// The lane surfaces of an OpenDRIVE network as bands: road edges are the outline of the drivable ones, and building
+// lines run on free ground.
 #include <algorithm>
 #include <cmath>
 
@@ -10,33 +10,33 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Edges: the surface is followed much more closely than what is drawn of it.
+// Road edges need a surface much more precise than what is drawn.
 constexpr double kEdgeBandChordError_m = 0.001;
-// Building lines keep their distance anyway.
+// Building lines keep a clearance from the surface, so less precision is enough.
 constexpr double kLotBandChordError_m = 0.05;
 constexpr double kBandPiece_m = 5.0;
 
 constexpr double kSetback_m = 1.0;    // of a building from the outermost lane
 constexpr double kLotDepth_m = 6.0;   // free ground that a building needs behind its line
-constexpr double kClearance_m = 0.5;  // from any surface, at its ends too
+constexpr double kClearance_m = 0.5;  // from any surface, also beyond the ends of a building line
 constexpr double kProbeStep_m = 1.0;
 constexpr double kBuildingPiece_m = 8.0;  // of a building line
 constexpr double kAnyLevel_m = 1e9;
 
 SurfaceBand lane_band(Build* build, const FileRoad& road, const FileSection& section, const FileLane& lane,
                       double chord_error_m) {
-  const double left = lane.id > 0 ? 1 : 0, right = 1 - left;  // shares of the way outwards
-  auto border = [&](double outer_share, double s) {
-    const Point3 p = point_on_lane(road, section, lane, s, outer_share);
+  const double left = lane.id > 0 ? 1 : 0, right = 1 - left;  // 0: inner border, 1: outer border
+  auto border = [&](double outer_fraction, double s) {
+    const Point3 p = point_on_lane(road, section, lane, s, outer_fraction);
     return Point3{p.x - build->map->origin_m[0], p.y - build->map->origin_m[1], p.z - build->map->origin_m[2]};
   };
-  // Both borders get the same stations, the union of what either needs.
+  // Both borders are sampled at the same stations, the union of those that either needs.
   const std::vector<double> breaks = formula_changes(road, section, lane.id, section.s, section.end);
   std::vector<double> stations;
-  for (const double which : {left, right}) {
+  for (const double side : {left, right}) {
     const std::vector<CurvePoint> points =
         sample_curve(breaks, chord_error_m, kBandPiece_m, &build->budget, [&](double s) {
-          const Point3 p = border(which, s);
+          const Point3 p = border(side, s);
           return CurvePoint{s, p.x, p.y, p.z, 0};
         });
     for (const CurvePoint& point : points) stations.push_back(point.s);
@@ -53,15 +53,15 @@ SurfaceBand lane_band(Build* build, const FileRoad& road, const FileSection& sec
   return band;
 }
 
-/// One band for each wanted lane of the map; `roads_out`, unless null, gets the road of each.
-template <typename Wanted>
+/// One band for each selected lane of the map; `roads_out`, unless null, gets the road of each.
+template <typename IsSelected>
 std::vector<SurfaceBand> lane_bands(Build* build, double chord_error_m, std::vector<int32_t>* roads_out,
-                                    Wanted&& wanted) {
+                                    IsSelected&& is_selected) {
   std::vector<SurfaceBand> bands;
   for (std::size_t i = 0; i < build->map->lanes.size(); ++i) {
     const int32_t road = build->map->lanes[i].source_road;
     const auto [section, lane] = build->file_lanes[i];
-    if (!wanted(*lane)) continue;
+    if (!is_selected(*lane)) continue;
     SurfaceBand band =
         lane_band(build, build->network.roads[static_cast<std::size_t>(road)], *section, *lane, chord_error_m);
     if (band.left.size() < 2) continue;
@@ -71,7 +71,7 @@ std::vector<SurfaceBand> lane_bands(Build* build, double chord_error_m, std::vec
   return bands;
 }
 
-/// The outermost lane with a surface, or 0.
+/// The id of the outermost lane with a surface, or 0.
 int outermost_lane(const std::vector<FileLane>& side) {
   for (std::size_t i = side.size(); i-- > 0;) {
     if (!side[i].is_void) return side[i].id;
@@ -79,7 +79,8 @@ int outermost_lane(const std::vector<FileLane>& side) {
   return 0;
 }
 
-/// Whether a building may stand along a-b, seen with the road on its right: no surface on, at or close behind it.
+/// Whether the ground for a building along a-b is free: no surface on, near or closely behind it. The road is on the
+/// right of a-b.
 bool is_free(const Surface& surface, const Point3& a, const Point3& b) {
   const double length_m = std::hypot(b.x - a.x, b.y - a.y);
   const Point2 along{(b.x - a.x) / length_m, (b.y - a.y) / length_m};
@@ -123,13 +124,13 @@ void build_building_lines(Build* build) {
         const int pieces = std::max(1, static_cast<int>(std::round((section.end - section.s) / kBuildingPiece_m)));
         const double step = (section.end - section.s) / pieces;
         for (int i = 0; i < pieces; ++i) {
-          build->budget.spend();
-          // With the road to the right: against s on its left side, with s on its right side.
+          build->budget.count_sample();
+          // Directed so that the road is on the right.
           const double low = section.s + i * step, high = i + 1 == pieces ? section.end : section.s + (i + 1) * step;
           const Point3 a = at(sign > 0 ? low : high), b = at(sign > 0 ? high : low);
           const double length_m = std::hypot(b.x - a.x, b.y - a.y);
           if (length_m < 2 * kClearance_m || length_m > kMaxPiece_m || !is_free(surface, a, b)) continue;
-          // Inside a bend that is tighter than the line's offset the line folds back.
+          // On the inside of a bend tighter than the offset the line reverses direction.
           const double heading = pose_at(road, 0.5 * (low + high)).heading;
           if (sign * ((b.x - a.x) * std::cos(heading) + (b.y - a.y) * std::sin(heading)) < 0.5 * length_m) continue;
           auto to_vec3 = [](const Point3& p) {

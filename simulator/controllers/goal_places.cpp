@@ -102,7 +102,7 @@ std::array<RoutePoint, kNumWaypoints> goal_places(const WorldView& world, int ag
   return places;
 }
 
-LanePlace lane_place(const MapView& map, RoutePoint at) {
+LanePosition lane_place(const MapView& map, RoutePoint at) {
   return {at.lane, min_of(at.s_m, map.lanes[static_cast<size_t>(at.lane)].length_m)};
 }
 

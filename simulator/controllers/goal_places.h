@@ -17,7 +17,7 @@ RoutePoint spawn_place(const WorldView& world, int agent);
 std::array<RoutePoint, kNumWaypoints> goal_places(const WorldView& world, int agent, uint32_t chain, RoutePoint from);
 
 /// As the lane graph knows it.
-LanePlace lane_place(const MapView& map, RoutePoint at);
+LanePosition lane_place(const MapView& map, RoutePoint at);
 
 struct GoalReach {
   int64_t agents = 0, waypoints = 0, unreachable = 0;

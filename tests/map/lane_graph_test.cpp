@@ -104,7 +104,7 @@ TEST(LaneGraph, DistancesReachAndComponentsOfTheRing) {
 TEST(LaneGraph, RefusesWhatIsNotThere) {
   const RoadMap map = ring();
   const LaneGraph graph(map);
-  const auto message_of = [&](LanePlace from, LanePlace to) -> std::string {
+  const auto message_of = [&](LanePosition from, LanePosition to) -> std::string {
     return test::message_of([&] { graph.route(from, to); });
   };
   EXPECT_THAT(message_of({5, 0}, {0, 0}), HasSubstr("[0, 5), got 5"));
@@ -180,7 +180,8 @@ std::vector<std::vector<double>> all_distances(const RoadMap& map, const std::ve
 }
 
 /// Drives the route from lane to lane and adds up what it costs.
-void expect_drivable(const RoadMap& map, const LaneRoute& route, LanePlace from, LanePlace to, double change_cost_m) {
+void expect_drivable(const RoadMap& map, const LaneRoute& route, LanePosition from, LanePosition to,
+                     double change_cost_m) {
   ASSERT_EQ(route.lanes.front(), from.lane);
   ASSERT_EQ(route.lanes.back(), to.lane);
   double share = double{from.s_m} / map.lanes[at(from.lane)].length_m, length_m = 0;
@@ -213,16 +214,16 @@ TEST(LaneGraph, AgreesWithBruteForceOnRandomMaps) {
     const std::vector<double> shares{0, 0.25, 0.75};
     const std::vector<std::vector<double>> expected = all_distances(map, shares, change_cost_m);
     const LaneGraph graph(map, change_cost_m);
-    const auto node_of = [&](LanePlace place) {
+    const auto node_of = [&](LanePosition place) {
       const double share = place.s_m / map.lanes[at(place.lane)].length_m;
       return static_cast<std::size_t>(std::lround(share * 4) + 1) / 2 * lanes + at(place.lane);
     };
     for (int query = 0; query < 100; ++query) {
       const auto place = [&] {
         const auto lane = static_cast<int32_t>(random() % lanes);
-        return LanePlace{lane, static_cast<float>(shares[random() % shares.size()]) * map.lanes[at(lane)].length_m};
+        return LanePosition{lane, static_cast<float>(shares[random() % shares.size()]) * map.lanes[at(lane)].length_m};
       };
-      const LanePlace from = place(), to = place();
+      const LanePosition from = place(), to = place();
       const double least = expected[node_of(from)][node_of(to)];
       const std::optional<LaneRoute> route = graph.route(from, to);
       ASSERT_EQ(route.has_value(), least < kInfinite);
@@ -282,9 +283,9 @@ TEST(LaneGraph, ProceduralTownsAreOfOnePiece) {
         int32_t lane = 0;
         do lane = static_cast<int32_t>(random() % map->lanes.size());
         while (map->lanes[at(lane)].type != LaneType::driving);
-        return LanePlace{lane, 0.3f * map->lanes[at(lane)].length_m};
+        return LanePosition{lane, 0.3f * map->lanes[at(lane)].length_m};
       };
-      const LanePlace from = place(), to = place();
+      const LanePosition from = place(), to = place();
       const std::optional<LaneRoute> route = graph.route(from, to);
       ASSERT_TRUE(route.has_value()) << name << ": " << from.lane << " to " << to.lane;
       expect_drivable(*map, *route, from, to, 20);

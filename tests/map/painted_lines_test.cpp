@@ -207,7 +207,7 @@ TEST(PaintedLines, EdgesBeneathThemAreNotDrawn) {
   const auto is_drawn = [&](const std::vector<PaintedLine>& lines) {
     RoadMap map;
     map.road_edges = {{{2, 0, 1}, {10, 0, 1}}};
-    return !edges_beside(map, lines, kEdgeWidth_m).empty();
+    return !uncovered_edges(map, lines, kEdgeWidth_m).empty();
   };
   EXPECT_TRUE(is_drawn({}));
   EXPECT_FALSE(is_drawn({white({{0, 0, 1}, {30, 0, 1}})}));
@@ -222,7 +222,7 @@ TEST(PaintedLines, EdgesBeneathThemAreNotDrawn) {
   EXPECT_TRUE(is_drawn({white({{0, 0, 1}, {5, 0, 1}}), white({{6, 0, 1}, {12, 0, 1}})})) << "beneath dashes";
   RoadMap map;
   map.road_edges = {{{2, 0, 1}, {2.01f, 0, 1}}};
-  EXPECT_EQ(edges_beside(map, {white({{0, 1, 1}, {30, 1, 1}})}, kEdgeWidth_m).size(), 1u) << "shorter than a gap";
+  EXPECT_EQ(uncovered_edges(map, {white({{0, 1, 1}, {30, 1, 1}})}, kEdgeWidth_m).size(), 1u) << "shorter than a gap";
 }
 
 /// Paint to be asked how far a place is from it.
@@ -333,7 +333,7 @@ TEST_P(PaintOfTowns, HidesNoEdgeButThoseBeneathIt) {
     widest_m = std::max(widest_m, line.width_m);
     lines.push_back({line.points_m, 0.0f, MarkColor::white});
   }
-  const std::vector<RoadEdge> seen = edges_beside(*map_, drawn_, kEdgeWidth_m);
+  const std::vector<RoadEdge> seen = uncovered_edges(*map_, drawn_, kEdgeWidth_m);
   std::size_t next = 0;
   for (const RoadEdge& edge : map_->road_edges) {
     if (next < seen.size() && is_at(seen[next].a_m, edge.a_m) && is_at(seen[next].b_m, edge.b_m)) {
@@ -344,7 +344,7 @@ TEST_P(PaintOfTowns, HidesNoEdgeButThoseBeneathIt) {
   }
   EXPECT_EQ(next, seen.size());
   // Beside a line, and beyond its end.
-  const float aside_m = kHiddenEdge_m + 0.5f * (widest_m - kEdgeWidth_m), beyond_m = kHiddenEdge_m;
+  const float aside_m = kCoveredEdgeTolerance_m + 0.5f * (widest_m - kEdgeWidth_m), beyond_m = kCoveredEdgeTolerance_m;
   EXPECT_LE(furthest_from(Paint(lines), hidden), std::hypot(aside_m, beyond_m) + 1e-3f);
   fmt::print("{}: {} edges of {}\n", GetParam(), seen.size(), map_->road_edges.size());
 }
