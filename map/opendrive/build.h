@@ -1,5 +1,5 @@
 // The stages that turn a Network into a RoadMap, in the order in which parse_opendrive runs them. Each fills its own
-// vectors of the map and reads those of the stages before it.
+// vectors of the map and may read those of earlier stages.
 #pragma once
 
 #include <vector>
@@ -13,7 +13,7 @@
 
 namespace pictura::opendrive {
 
-/// Indices into RoadMap::lanes of a section's lanes, outwards from the center; -1 where there is no surface.
+/// Indices into RoadMap::lanes of a section's lanes, from the center outwards; -1 for lanes without surface.
 struct SectionLanes {
   std::vector<int32_t> left, right;
 
@@ -24,7 +24,7 @@ struct SectionLanes {
   }
 };
 
-/// What the stages share.
+/// State shared by the stages.
 struct Build {
   const Network& network;
   const OpenDriveOptions& options;
@@ -32,13 +32,13 @@ struct Build {
   RoadMap* map;
   SampleBudget budget;
   std::vector<std::vector<SectionLanes>> lanes;  // [roads][sections]
-  struct LanePlace {
+  struct LaneSource {
     const FileSection* section;
     const FileLane* lane;
   };
-  std::vector<LanePlace> file_lanes;  // parallel to RoadMap::lanes
+  std::vector<LaneSource> file_lanes;  // parallel to RoadMap::lanes
 
-  /// File coordinates to the map's.
+  /// Converts file coordinates to map coordinates.
   Vec3 to_map(double x, double y, double z) const {
     return {static_cast<float>(x - map->origin_m[0]), static_cast<float>(y - map->origin_m[1]),
             static_cast<float>(z - map->origin_m[2])};
@@ -46,24 +46,25 @@ struct Build {
   Vec3 to_map(const Point3& p) const { return to_map(p.x, p.y, p.z); }
 };
 
-/// Types that one may drive through from lane to lane; routes are made of them.
+/// Lane types of which routes are made.
 constexpr bool is_route(LaneType type) { return type == LaneType::driving || type == LaneType::ramp; }
 
-/// Whether traffic runs along s on the side of that sign: on the right of the reference line where it keeps right.
+/// Whether traffic on the side of that sign (lane ids' sign) travels towards growing s: on the right of the reference
+/// line under right-hand traffic.
 constexpr bool travels_forward(const FileRoad& road, int side) { return (side < 0) != road.left_hand; }
 inline bool travels_forward(const FileRoad& road, const FileLane& lane) {
   return travels_forward(road, lane.id) != (lane.direction == LaneDirection::reversed);
 }
 
-/// The origin, in the middle of the reference lines, in whole metres.
+/// Sets the map origin: the centre of the reference lines, in whole metres.
 void choose_origin(Build* build);
 
-/// The provenance of something that stands on road `road` of the network.
-inline SourceElement source_of(std::size_t road, const Where& where) {
+/// The provenance of an element on road `road` of the network.
+inline SourceElement source_of(std::size_t road, const SourceLocation& where) {
   return {static_cast<int32_t>(road), where.line()};
 }
 
-/// Lanes of every type but "none", their centre lines, neighbours and links, speed limits, and which are endless.
+/// Lanes of every type but "none": centre lines and neighbours, links, speed limits, and which are endless.
 void build_lanes(Build* build);
 void link_lanes(Build* build);
 void set_speed_limits(Build* build);
@@ -72,14 +73,14 @@ void find_endless_lanes(Build* build);
 /// The outline of the drivable surface.
 void build_road_edges(Build* build);
 
-/// Painted lines, crosswalks, parking spaces and stop lines.
+/// Lane marks; then crosswalks, parking spaces and stop lines.
 void build_markings(Build* build);
 void build_objects(Build* build);
 
 /// Junctions, traffic lights and signs.
 void build_signals(Build* build);
 
-/// Where walls may stand.
+/// The lines along which walls may be placed.
 void build_building_lines(Build* build);
 
 void count_facts(Build* build);

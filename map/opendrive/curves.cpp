@@ -7,9 +7,9 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Formulae that begin this close to a section's ends belong to its neighbour or to itself, whichever begins there.
+// Stations are clamped this far inside a section, so that cubics that begin at its ends are taken from its own side.
 constexpr double kSectionMargin_m = 1e-5;
-// Spirals are integrated in panels that turn by at most this; five points are then exact to rounding.
+// Spirals are integrated in panels that turn by at most this; five Gauss points are then exact to rounding.
 constexpr double kPanelTurn_rad = 0.5;
 
 struct GaussPoint {
@@ -23,14 +23,14 @@ constexpr GaussPoint kGauss[5] = {{0.046910077030668004, 0.11846344252809454},
 
 /// The last element of `items` whose s is at most `s`, or the first one.
 template <typename Item>
-const Item& item_at(const std::vector<Item>& items, double s) {
+const Item& last_item_at(const std::vector<Item>& items, double s) {
   const auto after =
       std::upper_bound(items.begin(), items.end(), s, [](double x, const Item& item) { return x < item.s; });
   return after == items.begin() ? items.front() : *(after - 1);
 }
 
-/// `s` moved just inside the section: offsets and widths step where sections meet, and each section wants its own side.
-double inside(const FileSection& section, double s) {
+/// `s` clamped to just inside the section: offsets and widths may jump where sections meet.
+double clamp_inside(const FileSection& section, double s) {
   const double margin = std::min(kSectionMargin_m, 0.5 * (section.end - section.s));
   return std::clamp(s, section.s + margin, section.end - margin);
 }
@@ -39,10 +39,12 @@ double inside(const FileSection& section, double s) {
 double sinc(double x) { return std::abs(x) < 1e-6 ? 1.0 - x * x / 6.0 : std::sin(x) / x; }
 
 double value_of(const std::array<double, 4>& c, double p) { return c[0] + p * (c[1] + p * (c[2] + p * c[3])); }
-double slope_of(const std::array<double, 4>& c, double p) { return c[1] + p * (2 * c[2] + p * 3 * c[3]); }
-double bend_of(const std::array<double, 4>& c, double p) { return 2 * c[2] + p * 6 * c[3]; }
+double derivative_of(const std::array<double, 4>& c, double p) { return c[1] + p * (2 * c[2] + p * 3 * c[3]); }
+double second_derivative_of(const std::array<double, 4>& c, double p) { return 2 * c[2] + p * 6 * c[3]; }
 
-double speed_of(const PlaneCubic& cubic, double p) { return std::hypot(slope_of(cubic.u, p), slope_of(cubic.v, p)); }
+double speed_of(const PlaneCubic& cubic, double p) {
+  return std::hypot(derivative_of(cubic.u, p), derivative_of(cubic.v, p));
+}
 
 double length_between(const PlaneCubic& cubic, double from, double to) {
   double sum = 0;
@@ -50,10 +52,10 @@ double length_between(const PlaneCubic& cubic, double from, double to) {
   return sum * (to - from);
 }
 
-/// The p at which `share` of the curve's length lies behind: Newton's method in the panel of the table that holds it.
-double parameter_at(const PlaneCubic& cubic, double share) {
+/// The p at the given fraction of the curve's length: Newton's method within one interval of the arc-length table.
+double parameter_at(const PlaneCubic& cubic, double fraction) {
   const auto& lengths = cubic.arc_length;
-  const double target = std::clamp(share, 0.0, 1.0) * lengths.back();
+  const double target = std::clamp(fraction, 0.0, 1.0) * lengths.back();
   const std::size_t panels = lengths.size() - 1;
   std::size_t panel = 0;
   while (panel + 1 < panels && lengths[panel + 1] < target) ++panel;
@@ -61,10 +63,10 @@ double parameter_at(const PlaneCubic& cubic, double share) {
   const double high = cubic.p_end * static_cast<double>(panel + 1) / static_cast<double>(panels);
   double p = low;
   for (int step = 0; step < 8; ++step) {
-    const double missing = target - lengths[panel] - length_between(cubic, low, p);
+    const double remaining = target - lengths[panel] - length_between(cubic, low, p);
     const double speed = speed_of(cubic, p);
-    if (speed < 1e-9 || std::abs(missing) < 1e-12) break;
-    p = std::clamp(p + missing / speed, low, high);
+    if (speed < 1e-9 || std::abs(remaining) < 1e-12) break;
+    p = std::clamp(p + remaining / speed, low, high);
   }
   return p;
 }
@@ -73,16 +75,16 @@ Pose pose_on_cubic(const GeometryPiece& piece, double ds) {
   const PlaneCubic& cubic = *piece.cubic;
   const double p = parameter_at(cubic, ds / piece.length);
   const double u = value_of(cubic.u, p), v = value_of(cubic.v, p);
-  const double du = slope_of(cubic.u, p), dv = slope_of(cubic.v, p);
+  const double du = derivative_of(cubic.u, p), dv = derivative_of(cubic.v, p);
   const double speed = std::max(speed_of(cubic, p), 1e-9);
   const double c = std::cos(piece.heading), s = std::sin(piece.heading);
   return {piece.x + u * c - v * s, piece.y + u * s + v * c, piece.heading + std::atan2(dv, du),
-          (du * bend_of(cubic.v, p) - dv * bend_of(cubic.u, p)) / (speed * speed * speed)};
+          (du * second_derivative_of(cubic.v, p) - dv * second_derivative_of(cubic.u, p)) / (speed * speed * speed)};
 }
 
 double shape_height(const std::vector<CrossSection>& shape, double s, double t) {
   if (shape.empty()) return 0;
-  const CrossSection& before = item_at(shape, s);
+  const CrossSection& before = last_item_at(shape, s);
   const std::size_t index = static_cast<std::size_t>(&before - shape.data());
   const double here = before.height.value(t);
   if (s <= before.s || index + 1 == shape.size()) return here;
@@ -90,14 +92,14 @@ double shape_height(const std::vector<CrossSection>& shape, double s, double t) 
   return here + (s - before.s) / (after.s - before.s) * (after.height.value(t) - here);
 }
 
-bool is_banked(const FileRoad& road) {
+bool has_banking(const FileRoad& road) {
   return !(road.superelevation.cubics.empty() && road.left_crossfall.cubics.empty() &&
            road.right_crossfall.cubics.empty() && road.shape.empty());
 }
 
-/// `t`, or the inner border of the first lane on its way outwards that keeps level.
-double banked_part(const FileRoad& road, double s, double t) {
-  const FileSection& section = item_at(road.sections, s);
+/// `t`, clamped to the inner border of the first `level` lane on that side.
+double banked_t(const FileRoad& road, double s, double t) {
+  const FileSection& section = last_item_at(road.sections, s);
   for (const FileLane& lane : t > 0 ? section.left : section.right) {
     if (!lane.is_level) continue;
     const double border = border_at(road, section, inner_border(lane.id), s).t;
@@ -106,13 +108,13 @@ double banked_part(const FileRoad& road, double s, double t) {
   return t;
 }
 
-/// By how much the heading of a spiral has changed ds behind its start.
+/// The change of heading of a spiral from its start to ds.
 double spiral_turn(const GeometryPiece& piece, double ds) {
   const double rate = (piece.end_curvature - piece.start_curvature) / piece.length;
   return ds * (piece.start_curvature + 0.5 * rate * ds);
 }
 
-/// The way from one place on a spiral to another within a panel, as seen along its first heading.
+/// The displacement between two positions on a spiral within one panel, in the frame of the spiral's start.
 std::array<double, 2> spiral_step(const GeometryPiece& piece, double from, double to) {
   double x = 0, y = 0;
   for (const GaussPoint& gauss : kGauss) {
@@ -130,11 +132,11 @@ void measure(GeometryPiece* piece) {
   if (piece->cubic || piece->start_curvature == piece->end_curvature) return;
   const double turn = std::max(std::abs(piece->start_curvature), std::abs(piece->end_curvature)) * piece->length;
   const int count = 1 + static_cast<int>(turn / kPanelTurn_rad);
-  std::array<double, 2> place{};
+  std::array<double, 2> position{};
   for (int i = 0; i < count; ++i) {
-    piece->panels.push_back(place);
+    piece->panels.push_back(position);
     const auto [dx, dy] = spiral_step(*piece, i * piece->length / count, (i + 1) * piece->length / count);
-    place = {place[0] + dx, place[1] + dy};
+    position = {position[0] + dx, position[1] + dy};
   }
 }
 
@@ -149,14 +151,14 @@ void measure(PlaneCubic* cubic) {
 
 double Profile::value(double s) const {
   if (cubics.empty() || s < cubics.front().s - 1e-6) return 0;
-  const Cubic& cubic = item_at(cubics, s);
+  const Cubic& cubic = last_item_at(cubics, s);
   const double ds = s - cubic.s;
   return cubic.a + ds * (cubic.b + ds * (cubic.c + ds * cubic.d));
 }
 
 double Profile::slope(double s) const {
   if (cubics.empty() || s < cubics.front().s - 1e-6) return 0;
-  const Cubic& cubic = item_at(cubics, s);
+  const Cubic& cubic = last_item_at(cubics, s);
   const double ds = s - cubic.s;
   return cubic.b + ds * (2 * cubic.c + ds * 3 * cubic.d);
 }
@@ -166,7 +168,7 @@ Pose pose_on(const GeometryPiece& piece, double ds) {
   const double k0 = piece.start_curvature;
   const double rate = (piece.end_curvature - k0) / piece.length;
   if (rate == 0) {
-    // The chord of an arc points along its middle heading.
+    // The heading of an arc's chord is the mean of the end headings.
     const double half_turn = 0.5 * k0 * ds;
     const double chord = ds * sinc(half_turn);
     return {piece.x + chord * std::cos(piece.heading + half_turn),
@@ -181,7 +183,7 @@ Pose pose_on(const GeometryPiece& piece, double ds) {
 }
 
 Pose pose_at(const FileRoad& road, double s) {
-  const GeometryPiece& piece = item_at(road.geometry, s);
+  const GeometryPiece& piece = last_item_at(road.geometry, s);
   return pose_on(piece, std::clamp(s - piece.s, 0.0, piece.length));
 }
 
@@ -189,8 +191,8 @@ Point3 point_at(const FileRoad& road, double s, double t) {
   s = std::clamp(s, 0.0, road.length);
   const Pose pose = pose_at(road, s);
   double lateral = t, z = road.elevation.value(s);
-  if (is_banked(road)) {
-    const double banked = banked_part(road, s, t);
+  if (has_banking(road)) {
+    const double banked = banked_t(road, s, t);
     const double roll = road.superelevation.value(s);
     const double fall = (t > 0 ? road.left_crossfall : road.right_crossfall).value(s);
     lateral = t - banked + banked * std::cos(roll);
@@ -200,14 +202,14 @@ Point3 point_at(const FileRoad& road, double s, double t) {
 }
 
 Point3 point_on_lane(const FileRoad& road, const FileSection& section, const FileLane& lane, double s,
-                     double outer_share) {
+                     double outer_fraction) {
   const double outer = border_at(road, section, lane.id, s).t;
   double t = outer;
-  if (lane.id != 0) t -= (1 - outer_share) * (outer - border_at(road, section, inner_border(lane.id), s).t);
+  if (lane.id != 0) t -= (1 - outer_fraction) * (outer - border_at(road, section, inner_border(lane.id), s).t);
   Point3 point = point_at(road, s, t);
   if (!lane.inner_height.cubics.empty()) {
-    const double ds = inside(section, s) - section.s;
-    point.z += (1 - outer_share) * lane.inner_height.value(ds) + outer_share * lane.outer_height.value(ds);
+    const double ds = clamp_inside(section, s) - section.s;
+    point.z += (1 - outer_fraction) * lane.inner_height.value(ds) + outer_fraction * lane.outer_height.value(ds);
   }
   return point;
 }
@@ -219,18 +221,18 @@ double heading_between(const FileRoad& road, const FileSection& section, int inn
   const double lateral = t * std::cos(roll);
   const double lateral_slope = slope * std::cos(roll) - t * std::sin(roll) * road.superelevation.slope(s);
   const Pose pose = pose_at(road, s);
-  // The slope of the offset turns the line away from the reference line, more so where it runs inside a curve. Slopes
-  // come from the formulae, since files have steps between them.
+  // A lateral slope turns the line away from the reference line, more so on the inside of a curve. Slopes are the
+  // formulae's derivatives, since files have steps between cubics.
   return pose.heading + std::atan2(lateral_slope, 1.0 - pose.curvature * lateral);
 }
 
 double lane_width(const FileRoad& road, const FileSection& section, const FileLane& lane, double s) {
-  if (lane.border.cubics.empty()) return std::max(lane.width.value(inside(section, s) - section.s), 0.0);
+  if (lane.border.cubics.empty()) return std::max(lane.width.value(clamp_inside(section, s) - section.s), 0.0);
   return std::abs(border_at(road, section, lane.id, s).t - border_at(road, section, inner_border(lane.id), s).t);
 }
 
 Border border_at(const FileRoad& road, const FileSection& section, int border, double s) {
-  const double here = inside(section, s);
+  const double here = clamp_inside(section, s);
   const double sign = border > 0 ? 1 : -1;
   const std::vector<FileLane>& side = border > 0 ? section.left : section.right;
   Border result{road.lane_offset.value(here), road.lane_offset.slope(here)};

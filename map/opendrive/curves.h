@@ -1,5 +1,5 @@
-// Positions on and beside a reference line: OpenDRIVE's lines, arcs, spirals and plane cubics, and the cubics for
-// heights, banking, offsets and widths. In double and in the file's own coordinates.
+// Positions relative to a reference line: OpenDRIVE's lines, arcs, spirals and plane cubics, and the cubics for
+// elevation, banking, offsets and widths. In double, in file coordinates.
 #pragma once
 
 #include "pictura/map/opendrive/model.h"
@@ -11,47 +11,49 @@ struct Pose {
   double x = 0, y = 0, heading = 0, curvature = 0;
 };
 
-/// Fills the lengths of a cubic along its p_end.
+/// Fills the table of arc lengths of a cubic up to its p_end.
 void measure(PlaneCubic* cubic);
 
-/// Fills the panels of a spiral; other pieces have none.
+/// Fills the integration panels of a spiral; other pieces have none.
 void measure(GeometryPiece* piece);
 
-/// The pose `ds` behind the start of a piece: exact for lines and arcs, Gauss-Legendre quadrature for spirals, which
-/// must be measured. Plane cubics are passed evenly along their arc, so that their end is the piece's.
+/// The pose at distance `ds` from the start of a piece: exact for lines and arcs, Gauss-Legendre quadrature for
+/// spirals, which must be measured first. Plane cubics are parametrised by arc length, scaled so that they end where
+/// the piece ends.
 Pose pose_on(const GeometryPiece& piece, double ds);
 
-/// The pose of the reference line at s, which is clamped to the road.
+/// The pose of the reference line at s; s is clamped to the road.
 Pose pose_at(const FileRoad& road, double s);
 
-/// The point `t` metres to the left of the reference line at s, along the banked road and at its height. s is clamped
-/// to the road.
+/// The point `t` metres to the left of the reference line at s, measured along the banked road surface, with its
+/// height. s is clamped to the road.
 Point3 point_at(const FileRoad& road, double s, double t);
 
-/// The same for a place on a lane: `outer_share` is 0 on its inner border, 1 on its outer one. Adds the lane's height.
+/// The point on a lane at s: `outer_fraction` is 0 on the inner border and 1 on the outer one. Includes the lane's
+/// <height>.
 Point3 point_on_lane(const FileRoad& road, const FileSection& section, const FileLane& lane, double s,
-                     double outer_share);
+                     double outer_fraction);
 
-/// Heading of the line in the middle between two borders, towards growing s.
+/// Heading of the line midway between two borders, in the direction of growing s.
 double heading_between(const FileRoad& road, const FileSection& section, int inner, int outer, double s);
 
-/// A lane's border at one s: its lateral position, and how fast that grows with s.
+/// A lane border at some s: its lateral position, and the derivative of that with respect to s.
 struct Border {
   double t = 0, slope = 0;
 };
 
-/// Border 0 is the center line, border k (-k) the outer border of lane k (-k). Widths below 0 count as 0, and borders
-/// that would lie inside the one before lie on it.
+/// Border 0 is the center line, border k (-k) the outer border of lane k (-k). Negative widths count as 0; a border
+/// that would lie clamp_inside the previous one coincides with it.
 Border border_at(const FileRoad& road, const FileSection& section, int border, double s);
 
-/// Width of a lane at s, along the banked road.
+/// Width of a lane at s, measured along the banked surface.
 double lane_width(const FileRoad& road, const FileSection& section, const FileLane& lane, double s);
 
-/// The border on the inside of a lane.
+/// The inner border of a lane.
 constexpr int inner_border(int lane_id) { return lane_id > 0 ? lane_id - 1 : lane_id + 1; }
 
-/// Every s in [begin, end] at which a formula changes: pieces and cubics of the reference line, heights and offset, and
-/// the widths and heights of lanes up to `border`. Sorted, with begin and end themselves.
+/// Every s in [begin, end] at which a formula changes: geometry pieces, cubics of elevation, banking and lane offset,
+/// and the widths and heights of lanes up to `border`. Sorted, including begin and end.
 std::vector<double> formula_changes(const FileRoad& road, const FileSection& section, int border, double begin,
                                     double end);
 

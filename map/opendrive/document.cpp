@@ -9,7 +9,7 @@ namespace {
 constexpr int kMaxDepth = 64;
 constexpr std::size_t kMaxAttribute_bytes = std::size_t{1} << 16;
 
-/// The length of the UTF-8 sequence at the beginning of `text`, 0 where there is none.
+/// The length of the UTF-8 sequence at the beginning of `text`, 0 if it is invalid.
 std::size_t sequence_length(std::string_view text) {
   const unsigned char lead = static_cast<unsigned char>(text[0]);
   if (lead < 0x80) return 1;
@@ -32,7 +32,7 @@ void check_characters(std::string_view text, const Source& source) {
   }
 }
 
-/// Looks at every node once; the parser itself does not recurse, however deep the nesting.
+/// Visits every node once; neither it nor the parser recurses, however deep the nesting.
 class ShapeCheck : public pugi::xml_tree_walker {
  public:
   explicit ShapeCheck(const Source& source) : source_(source) {}

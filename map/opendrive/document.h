@@ -1,4 +1,4 @@
-// The XML document of an OpenDRIVE file, refused unless it is of a shape that is safe to read.
+// Parses the XML of an OpenDRIVE file and rejects documents that are unsafe to read.
 #pragma once
 
 #include <string_view>
@@ -9,7 +9,7 @@
 
 namespace pictura::opendrive {
 
-/// Parses `text`. Throws Error naming source and line for anything but well-formed UTF-8 XML without a document type,
+/// Parses `text`. Throws Error naming source and line unless it is well-formed UTF-8 XML without a document type,
 /// nested at most 64 deep, with attributes of at most 64 KiB.
 void read_document(std::string_view text, const Source& source, pugi::xml_document* document_out);
 

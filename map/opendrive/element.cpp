@@ -18,9 +18,9 @@ std::string_view trim(std::string_view text) {
 
 }  // namespace
 
-Where Element::where() const { return {source_, node_.offset_debug(), owner_, node_.name()}; }
+SourceLocation Element::where() const { return {source_, node_.offset_debug(), owner_, node_.name()}; }
 
-Element Element::needed_child(const char* name) const {
+Element Element::required_child(const char* name) const {
   const Element element = child(name);
   if (!element) fail("expected a <{}> in it, found none", name);
   return element;

@@ -1,5 +1,5 @@
-// Elements of the XML tree, read with checks: every attribute that is missing, malformed or out of range is an error
-// that names the element, its line and what it belongs to.
+// Elements of the XML tree, read with checks: an attribute that is missing, malformed or out of range is an error that
+// names the element, its line and its owner.
 #pragma once
 
 #include <string>
@@ -12,14 +12,13 @@
 
 namespace pictura::opendrive {
 
-/// An XML element together with what it belongs to ("road 12"). Refers to the document and the source, which must
-/// outlive it.
+/// An XML element with the name of its owner ("road 12"). Refers to the document and the source, which must outlive it.
 class Element {
  public:
   Element(pugi::xml_node node, const Source* source, std::string owner)
       : node_(node), source_(source), owner_(std::move(owner)) {}
 
-  Where where() const;
+  SourceLocation where() const;
   template <typename... Args>
   [[noreturn]] void fail(fmt::format_string<Args...> format, Args&&... args) const {
     where().fail_with(fmt::format(format, std::forward<Args>(args)...));
@@ -27,8 +26,8 @@ class Element {
 
   explicit operator bool() const { return static_cast<bool>(node_); }
   Element child(const char* name) const { return {node_.child(name), source_, owner_}; }
-  Element needed_child(const char* name) const;
-  /// Calls visit(Element) for every child of that name.
+  Element required_child(const char* name) const;
+  /// Calls visit(Element) for every child with that name.
   template <typename Visit>
   void each(const char* name, Visit&& visit) const {
     for (const pugi::xml_node node : node_.children(name)) visit(Element(node, source_, owner_));
@@ -53,7 +52,7 @@ class Element {
     return has(attribute) ? number_in(attribute, low, high) : fallback;
   }
   int integer(const char* attribute) const;
-  bool flag(const char* attribute) const;  // false where there is none
+  bool flag(const char* attribute) const;  // false if absent
 
   /// The text between the element's tags.
   std::string content() const { return node_.text().as_string(); }
@@ -64,16 +63,17 @@ class Element {
   std::string owner_;
 };
 
-// Stations that differ by less are the same.
+// Stations that differ by less count as equal.
 inline constexpr double kStationTolerance_m = 1e-3;
 
-/// A cubic whose station, the attribute of that name, lies within [0, length].
+/// Reads a cubic whose station (the attribute named `station`) lies within [0, length].
 Cubic read_cubic(const Element& element, const char* station, double length);
 
-/// Appends the cubic of `element`, which must not lie before the last one.
+/// Appends the cubic of `element`, which must not begin before the last one.
 void append_cubic(const Element& element, const Cubic& cubic, Profile* profile);
 
-/// The cubics in the children `name` of `parent`, whose stations (their attribute `station`) ascend within [0, length].
+/// Reads the cubics in the children `name` of `parent`, whose stations (the attribute named `station`) ascend within
+/// [0, length].
 Profile read_profile(const Element& parent, const char* name, const char* station, double length);
 
 }  // namespace pictura::opendrive

@@ -9,11 +9,11 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Below this a width is taken for 0: what writers' rounding leaves of a lane that tapers off.
+// Widths down to minus this count as 0: the rounding that writers leave where a lane tapers off.
 constexpr double kWidthTolerance_m = 0.01;
 constexpr double kMaxWidth_m = 500;
 constexpr double kMaxBanking_rad = 0.5;
-// Between its stations everything is a cubic of s, and a cubic is within a small factor of its values at five places.
+// Between stations everything is a cubic of s, which is bounded within a small factor by its values at five points.
 constexpr int kProbes = 4;
 
 template <typename Probe>
@@ -39,7 +39,7 @@ void check_widths(const FileRoad& road, const FileSection& section, const FileLa
   });
 }
 
-void check_place(const FileRoad& road, const FileSection& section, int border, double s) {
+void check_position(const FileRoad& road, const FileSection& section, int border, double s) {
   const double t = border_at(road, section, border, s).t;
   const double roll = road.superelevation.value(s);
   const double fall = std::max(std::abs(road.left_crossfall.value(s)), std::abs(road.right_crossfall.value(s)));
@@ -65,7 +65,7 @@ void check_extent(Faults* faults, FileRoad* road) {
     }
     for (const int border : {static_cast<int>(section.left.size()), -static_cast<int>(section.right.size())}) {
       at_probes(formula_changes(*road, section, border, section.s, section.end),
-                [&](double s) { check_place(*road, section, border, s); });
+                [&](double s) { check_position(*road, section, border, s); });
     }
   }
 }

@@ -1,4 +1,4 @@
-// Whether a road lies where a road can lie: checked once, so that what is built from it need not ask again.
+// Checks that a road's offsets, heights, banking and widths are plausible, so that later stages need not check again.
 #pragma once
 
 #include "pictura/map/opendrive/faults.h"
@@ -6,8 +6,8 @@
 
 namespace pictura::opendrive {
 
-/// Throws Error unless offsets, heights and banking of the road are of this world everywhere. A lane whose width falls
-/// below zero is a fault of the lane; where that is let pass, the lane becomes void.
+/// Throws Error unless offsets, heights and banking are within limits along the whole road. A lane whose width is below
+/// zero is a fault of the lane; in lenient mode that lane becomes void.
 void check_extent(Faults* faults, FileRoad* road);
 
 }  // namespace pictura::opendrive

@@ -1,4 +1,4 @@
-// Counts over a finished map.
+// Statistics of a finished map.
 #include <algorithm>
 
 #include "pictura/map/opendrive/build.h"
@@ -19,11 +19,11 @@ void count_facts(Build* build) {
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
     const Lane& lane = map.lanes[i];
     const auto [section, file_lane] = build->file_lanes[i];
-    // Lanes that are cut where their speed limit changes are one lane of the file.
+    // Lanes cut where their speed limit changes are one lane of the file.
     if (!file_lane->is_continued) ++facts.lanes;
     if (lane.type != LaneType::driving) continue;
     if (!file_lane->is_continued) ++facts.driving_lanes;
-    // Along the reference line, as the file itself measures.
+    // Measured along the reference line, like s in the file.
     facts.driving_lane_km += 1e-3 * (section->end - section->s);
     if (lane.in_junction) facts.driving_lane_km_in_junctions += 1e-3 * (section->end - section->s);
     for (const LanePoint& point : map.points_of(lane)) {

@@ -1,4 +1,4 @@
-// What a fault in a file does: it ends the reading, or the smallest part around it is left out and the reason noted.
+// Handling of faults in a file: strict mode throws; lenient mode drops the smallest faulty part and records a warning.
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@ class Faults {
  public:
   explicit Faults(bool lenient) : lenient_(lenient) {}
 
-  /// Runs `part()`. Strict: passes its Error on. Lenient: notes it as a warning and returns false. Parts must leave
+  /// Runs `part()`. Strict: propagates its Error. Lenient: records it as a warning and returns false. Parts must leave
   /// nothing half done when they throw.
   template <typename Part>
   bool attempt(Part&& part) {
@@ -31,7 +31,7 @@ class Faults {
     }
   }
 
-  /// The messages of the first faults and, where there were more, how many.
+  /// The recorded warnings and, if there were more than the limit, how many more.
   std::vector<std::string> take_warnings() {
     if (num_faults_ > warnings_.size()) warnings_.push_back(fmt::format("and {} more", num_faults_ - warnings_.size()));
     return std::move(warnings_);

@@ -1,4 +1,4 @@
-// Lanes from sections: centre lines in the direction of travel, and neighbours.
+// Builds lanes from sections: centre lines in the direction of travel, and neighbours.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -9,7 +9,7 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Float coordinates keep a resolution of 8 mm within this range of the origin.
+// Float coordinates have a resolution of 8 mm within this distance of the origin.
 constexpr double kMaxMapRadius_m = 1e5;
 
 Lane make_lane(Build* build, const FileRoad& road, const FileSection& section, const FileLane& lane) {
@@ -40,7 +40,7 @@ Lane make_lane(Build* build, const FileRoad& road, const FileSection& section, c
   return result;
 }
 
-/// Lanes that touch are neighbours where one may drive on both in the same direction.
+/// Adjacent route lanes with the same direction of travel become neighbours.
 void join_neighbors(Build* build, const FileRoad& road, const FileSection& section, const SectionLanes& indices) {
   std::vector<Lane>& lanes = build->map->lanes;
   auto join = [&](const FileLane& left, const FileLane& right) {

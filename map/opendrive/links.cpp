@@ -1,4 +1,4 @@
-// Which lane leads into which: lanes' own links, over the links of their roads, and junctions' connections.
+// Lane links: from lanes' own links, across the links of their roads, and from junctions' connections.
 #include <algorithm>
 #include <set>
 
@@ -8,11 +8,11 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Lanes whose ends lie further apart than this do not continue each other, whatever the file says (Town03 links two
-// neighbouring lanes to the same next one).
+// Lanes whose ends are further apart are not linked, whatever the file says (Town03 links two neighbouring lanes to the
+// same next one).
 constexpr float kMaxLinkGap_m = 1.0f;
 
-/// One end of a lane, in terms of its road's s.
+/// One end of a lane, in terms of s of its road.
 struct LaneEnd {
   int road = 0, section = 0, id = 0;
   ContactPoint end = ContactPoint::start;
@@ -35,13 +35,13 @@ class Linker {
  private:
   const FileRoad& road_of(int index) const { return build_.network.roads[static_cast<std::size_t>(index)]; }
 
-  int road_named(const std::string& id, const Where& where) const {
+  int road_named(const std::string& id, const SourceLocation& where) const {
     const auto found = build_.network.road_index.find(id);
     if (found == build_.network.road_index.end()) where.fail("refers to road {}, which does not exist", id);
     return found->second;
   }
 
-  /// The lane `id` at one end of a road.
+  /// The end of lane `id` at one end of a road.
   LaneEnd end_of_road(int road, ContactPoint contact, int id) const {
     const int section = contact == ContactPoint::start ? 0 : static_cast<int>(road_of(road).sections.size()) - 1;
     return {road, section, id, contact};
@@ -53,7 +53,7 @@ class Linker {
 
   bool exists(const LaneEnd& end) const { return file_lane(end) != nullptr; }
 
-  [[noreturn]] void fail_missing(const LaneEnd& end, const Where& where) const {
+  [[noreturn]] void fail_missing(const LaneEnd& end, const SourceLocation& where) const {
     where.fail("is linked to lane {} of road {}, which does not exist there", end.id, road_of(end.road).id);
   }
 
@@ -83,7 +83,7 @@ class Linker {
     return end == ContactPoint::start ? road.predecessor : road.successor;
   }
 
-  /// What a road's end is linked to exists, and the road there does not say that it meets another one.
+  /// Checks that a road link's target exists and that the target's own link there is not to another road end.
   void check_road_link(const FileRoad& road, ContactPoint end) const {
     const RoadLink& link = link_at(road, end);
     if (link.kind == RoadLink::Kind::junction && !build_.network.junction_index.contains(link.id)) {
@@ -103,7 +103,7 @@ class Linker {
 
   static const char* name_of(ContactPoint end) { return end == ContactPoint::start ? "start" : "end"; }
 
-  /// Follows the lane's own link at one end of its section: to the next section, or over the road's link.
+  /// Links a lane at one end of its section: to the next section, or across the road's link.
   void link_lane(int road, int section, const FileLane& lane, ContactPoint end, int target_id) {
     const FileRoad& file_road = road_of(road);
     const bool at_end = end == ContactPoint::end;
@@ -117,7 +117,7 @@ class Linker {
     if (exists(target)) {
       add({road, section, lane.id, end}, target);
     } else if (is_drivable(lane.type)) {
-      // Town07 has a shoulder whose link leads nowhere; only where one drives is that a fault.
+      // Only an error on drivable lanes: Town07 has a shoulder whose link target is missing.
       fail_missing(target, lane.where);
     }
   }
@@ -153,7 +153,7 @@ class Linker {
     }
   }
 
-  /// Links two lanes that touch, in whichever order traffic passes them.
+  /// Links two lanes that meet, in the order in which traffic passes them.
   void add(const LaneEnd& a, const LaneEnd& b) {
     const int32_t lane_a = lane_at(a), lane_b = lane_at(b);
     if (lane_a < 0 || lane_b < 0) return;

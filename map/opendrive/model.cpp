@@ -20,7 +20,7 @@ int32_t Source::line_at(std::ptrdiff_t offset) const {
   return 1 + static_cast<int32_t>(std::lower_bound(line_ends_.begin(), line_ends_.end(), offset) - line_ends_.begin());
 }
 
-void Where::fail_with(const std::string& message) const {
+void SourceLocation::fail_with(const std::string& message) const {
   pictura::fail("{}:{}: {}: <{}>: {}", source ? source->name() : "network", line(), owner, element, message);
 }
 

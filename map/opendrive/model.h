@@ -1,5 +1,5 @@
-// What an OpenDRIVE file says, as plain structs in the file's own terms: s and t along reference lines, lane ids,
-// signal ids. The reader fills them and checks every attribute; the builders turn them into a RoadMap.
+// The contents of an OpenDRIVE file as plain structs in the file's own terms: s and t along reference lines, lane ids,
+// signal ids. The reader fills them and checks every attribute; the build stages turn them into a RoadMap.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@
 
 namespace pictura::opendrive {
 
-/// The file's name and text; turns an element's byte offset into a line, counted from 1.
+/// The file's name and line index; converts an element's byte offset to a line, counted from 1.
 class Source {
  public:
   Source() = default;
@@ -30,8 +30,8 @@ class Source {
   std::vector<std::ptrdiff_t> line_ends_;
 };
 
-/// Where an element stands: its byte offset in the text and what it belongs to ("road 12", "junction 3").
-struct Where {
+/// The location of an element: its byte offset in the text and its owner ("road 12", "junction 3").
+struct SourceLocation {
   const Source* source = nullptr;
   std::ptrdiff_t offset = 0;
   std::string owner, element;
@@ -47,12 +47,12 @@ struct Where {
   }
 };
 
-/// a + b ds + c ds^2 + d ds^3 from s on, ds = s' - s.
+/// a + b ds + c ds^2 + d ds^3 for s' >= s, with ds = s' - s.
 struct Cubic {
   double s = 0, a = 0, b = 0, c = 0, d = 0;
 };
 
-/// A function of s made of cubics, in ascending order of s; 0 before the first.
+/// A piecewise cubic function of s, in ascending order of s; 0 before the first cubic.
 struct Profile {
   std::vector<Cubic> cubics;
 
@@ -60,29 +60,29 @@ struct Profile {
   double slope(double s) const;
 };
 
-/// A curve (u(p), v(p)), p from 0 to p_end, in the frame of its start; <poly3> is one with u = p.
+/// A parametric cubic (u(p), v(p)), p from 0 to p_end, in the frame of its start; <poly3> is the case u = p.
 struct PlaneCubic {
   std::array<double, 4> u{}, v{};  // coefficients of p^0 to p^3
   double p_end = 0;
-  std::array<double, 17> arc_length{};  // from the start to p_end i / 16; see measure() in curves.h
+  std::array<double, 17> arc_length{};  // arc length from the start to p_end i / 16; see measure() in curves.h
 };
 
-/// A piece of a reference line: a cubic, or a curve whose curvature changes linearly from one end to the other (line: 0
-/// and 0, arc: equal).
+/// A piece of a reference line: a cubic, or a curve whose curvature changes linearly from start to end (line: both 0,
+/// arc: equal).
 struct GeometryPiece {
   double s = 0, x = 0, y = 0, heading = 0, length = 0;
   double start_curvature = 0, end_curvature = 0;
   std::optional<PlaneCubic> cubic;
-  // Of a spiral: where each of its panels begins, as seen from its start along its heading; see measure() in curves.h.
+  // Spirals only: the start of each integration panel, in the frame of the piece's start; see measure() in curves.h.
   std::vector<std::array<double, 2>> panels;
 };
 
-/// One stripe of a mark, as <line> gives it.
+/// One stripe of a mark, from <line>.
 struct MarkLine {
-  double length = 0, space = 0;  // of a dash and of the gap behind it; explicit lines have no gap
-  double t_offset = 0;           // of its middle, left of the lane's border
-  double s_offset = 0;           // where its first dash begins, from the mark's begin
-  double width = 0;              // 0: the mark's
+  double length = 0, space = 0;  // of a dash and of the gap after it; explicit lines have no gap
+  double t_offset = 0;           // of its centre line, left of the lane's border
+  double s_offset = 0;           // start of its first dash, from the start of the mark
+  double width = 0;              // 0: use the mark's width
   std::optional<MarkColor> color;
 };
 
@@ -93,15 +93,15 @@ struct RoadMark {
   std::string type;     // "none", "solid", "broken solid", ...
   bool bold = false;
   MarkColor color = MarkColor::white;
-  double width = 0;                           // 0: the file gives none
-  LaneChange lane_change = LaneChange::both;  // towards which lane ids one may change over it
-  std::vector<MarkLine> lines;                // repeated along the mark; instead of the type's own pattern
+  double width = 0;                           // 0: not given
+  LaneChange lane_change = LaneChange::both;  // permitted directions of lane changes across it
+  std::vector<MarkLine> lines;                // repeated along the mark; they replace the pattern of the type
   std::vector<MarkLine> explicit_lines;       // painted once each
-  Profile sway;                               // moves the lines to the left; of s - the mark's begin
-  Where where;
+  Profile sway;                               // lateral shift of the lines to the left; of s - start of the mark
+  SourceLocation where;
 };
 
-/// Whether traffic runs as the road's rule says, against it, or both ways.
+/// Direction of traffic relative to the road's rule: same, opposite or both ways.
 enum class LaneDirection : uint8_t { standard, reversed, both };
 
 struct FileLane {
@@ -109,18 +109,18 @@ struct FileLane {
   std::string type_name;
   LaneType type = LaneType::other;
   int section = 0;            // the file's <laneSection> in its road, from 0
-  bool is_continued = false;  // the rest of the same <lane>, which stands in an earlier FileSection too
+  bool is_continued = false;  // continues a <lane> that an earlier FileSection also contains
   bool is_void = false;       // type "none": no surface
   bool is_level = false;      // keeps the height of its inner border on banked roads
   LaneDirection direction = LaneDirection::standard;
   std::vector<int> predecessors, successors;
   // Functions of s - the section's s.
   Profile width;
-  Profile border;                      // where there is no width: t of the outer border from the reference line
-  Profile inner_height, outer_height;  // constants: above the road at the lane's borders
-  Profile speed_limit_mps;             // constants; 0 where there is none
+  Profile border;  // used if there is no width: t of the outer border relative to the reference line
+  Profile inner_height, outer_height;  // constants: height above the road at the lane's borders
+  Profile speed_limit_mps;             // constants; 0: no limit
   std::vector<RoadMark> marks;         // on its outer border, in ascending order of s_offset
-  Where where;
+  SourceLocation where;
 };
 
 struct FileSection {
@@ -133,15 +133,15 @@ struct FileSection {
 
 enum class ContactPoint : uint8_t { start, end };
 
-/// The end of a road that another one meets.
+/// The predecessor or successor of a road.
 struct RoadLink {
   enum class Kind : uint8_t { none, road, junction } kind = Kind::none;
   std::string id;
   ContactPoint contact = ContactPoint::start;
-  Where where;
+  SourceLocation where;
 };
 
-/// For which traffic of a road something stands: along s ("+"), against it ("-"), or either.
+/// The traffic to which a signal applies: along s ("+"), against it ("-"), or either.
 enum class Orientation : uint8_t { along, against, either };
 
 struct LaneRange {
@@ -153,20 +153,20 @@ struct FileSignal {
   double s = 0, t = 0, z_offset = 0, heading_offset = 0;
   bool is_dynamic = false;
   Orientation orientation = Orientation::either;
-  std::vector<LaneRange> validity;  // empty: every lane of its orientation
-  Where where;
+  std::vector<LaneRange> validity;  // empty: all lanes of its orientation
+  SourceLocation where;
 };
 
-/// Says that a signal holds for lanes of the road on which the reference stands.
+/// Declares that a signal applies to lanes of the road that contains the reference.
 struct SignalReference {
   std::string signal;
   double s = 0, t = 0;
   Orientation orientation = Orientation::either;
-  std::vector<LaneRange> validity;  // empty: every lane of its orientation
-  Where where;
+  std::vector<LaneRange> validity;  // empty: all lanes of its orientation
+  SourceLocation where;
 };
 
-/// Corners are (u, v) in the object's frame, or (s, t) along the road.
+/// An object; outline corners are (u, v) in the object's frame, or (s, t) along the road.
 struct FileObject {
   enum class Kind : uint8_t { crosswalk, parking_space, stop_line } kind = Kind::crosswalk;
   std::string id, name;
@@ -176,7 +176,7 @@ struct FileObject {
     bool along_road = false;
   };
   std::vector<Corner> outline;
-  Where where;
+  SourceLocation where;
 };
 
 /// Heights above the banked road at one s, as a function of t.
@@ -186,11 +186,11 @@ struct CrossSection {
 };
 
 struct FileRoad {
-  std::string id, junction;  // junction is empty when the road is none's
+  std::string id, junction;  // junction is empty if the road belongs to none
   double length = 0;
   bool left_hand = false;  // traffic keeps left
   RoadLink predecessor, successor;
-  Profile speed_limit_mps;  // constants; 0 where the file gives none
+  Profile speed_limit_mps;  // constants; 0: no limit
   std::vector<GeometryPiece> geometry;
   Profile elevation, lane_offset;
   Profile superelevation;                   // rad, about the reference line, left side up
@@ -200,34 +200,34 @@ struct FileRoad {
   std::vector<FileObject> objects;
   std::vector<FileSignal> signals;
   std::vector<SignalReference> signal_references;
-  Where where;
+  SourceLocation where;
 };
 
 struct LaneLink {
   int from = 0, to = 0;
-  Where where;
+  SourceLocation where;
 };
 
 struct Connection {
-  std::string incoming_road, connecting_road;  // direct junctions: the linked road
-  ContactPoint contact = ContactPoint::start;  // the end of the connecting road that meets the incoming one
+  std::string incoming_road, connecting_road;  // in direct junctions connecting_road is the linked road
+  ContactPoint contact = ContactPoint::start;  // the end of the connecting road at the incoming one
   std::vector<LaneLink> lane_links;
-  Where where;
+  SourceLocation where;
 };
 
 struct FileJunction {
   std::string id;
-  bool is_direct = false;  // roads meet without roads of the junction's own
+  bool is_direct = false;  // roads are linked directly, without connecting roads
   std::vector<Connection> connections;
   std::vector<std::string> controllers;
-  Where where;
+  SourceLocation where;
 };
 
 struct FileController {
   std::string id;
   int sequence = 0;
   std::vector<std::string> signals;
-  Where where;
+  SourceLocation where;
 };
 
 struct Network {

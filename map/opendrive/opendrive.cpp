@@ -11,10 +11,11 @@ namespace pictura {
 
 namespace {
 
-/// Small files take little time: CARLA's towns need 0.2 samples a byte, and one straight road of 100 km half a million.
+/// Bounds the import time of small files: CARLA's towns need 0.2 samples per byte, and a straight road of 100 km half a
+/// million.
 SampleBudget budget_for(std::size_t text_bytes) {
-  constexpr std::int64_t kFreeSamples = 500'000, kSamplesPerByte = 10, kMaxSamples = 10'000'000;
-  return SampleBudget(std::min(kMaxSamples, kFreeSamples + kSamplesPerByte * static_cast<std::int64_t>(text_bytes)));
+  constexpr std::int64_t kBaseSamples = 500'000, kSamplesPerByte = 10, kMaxSamples = 10'000'000;
+  return SampleBudget(std::min(kMaxSamples, kBaseSamples + kSamplesPerByte * static_cast<std::int64_t>(text_bytes)));
 }
 
 }  // namespace

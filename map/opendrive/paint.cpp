@@ -1,4 +1,4 @@
-// What is painted on the roads of an OpenDRIVE network: lane marks, crosswalks, stop lines, parking spaces.
+// Paint of an OpenDRIVE network: lane marks, crosswalks, stop lines, parking spaces.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -12,16 +12,16 @@ namespace {
 constexpr double kDefaultMarkWidth_m = 0.125, kBoldMarkWidth_m = 0.25;
 constexpr double kStopLineWidth_m = 0.4, kMinStopLine_m = 0.1, kMinParking_m = 0.1;
 constexpr double kMinMarkLength_m = 0.05;
-// Dashes of 3 m with gaps of 9 m, the pattern of North American roads, which CARLA's towns imitate.
+// Dashes of 3 m with gaps of 9 m: the North American pattern, which CARLA's towns imitate.
 constexpr double kDash_m = 3.0, kDashPeriod_m = 12.0;
-// Botts' dots are 4 inches wide; one stands every 48 inches.
+// Botts' dots: 4 inches wide, one every 48 inches.
 constexpr double kDot_m = 0.1016, kDotPeriod_m = 1.2192;
 
-// Corners nearer to each other than this are one.
+// Corners closer than this are merged.
 constexpr float kSamePoint_m = 1e-3f;
 
-/// One stripe of a mark, `left` of the border. Dashes begin at origin + i * period along the road, for i = 0 alone
-/// where they are painted once.
+/// One stripe of a mark, `left` metres from the border. Dashes begin at origin + i * period along the road; with `once`
+/// there is only i = 0.
 struct Stripe {
   double left = 0;
   double width = 0;
@@ -31,12 +31,12 @@ struct Stripe {
   bool once = false;
 };
 
-/// The stripes of a mark's type. Double lines leave one width between their stripes; the first word names the stripe
-/// nearer to the center lane, which is to the left on the right side of the road.
+/// The stripes of a mark's type. The two stripes of a double line are one width apart; the first word of the type names
+/// the stripe nearer to the center lane, which is on the left on the right side of the road.
 std::vector<Stripe> stripes_of_type(const RoadMark& mark, int lane_id) {
   const double width = mark.width > 0 ? mark.width : mark.bold ? kBoldMarkWidth_m : kDefaultMarkWidth_m;
   const double inner = lane_id > 0 ? -width : width;
-  // Dashes are counted from the road's start, so that they run on across sections and changes of mark.
+  // Dashes are counted from the road's start, so that they continue across sections and mark records.
   auto solid = [&](double left) { return Stripe{.left = left, .width = width, .color = mark.color}; };
   auto broken = [&](double left) {
     return Stripe{
@@ -54,7 +54,7 @@ std::vector<Stripe> stripes_of_type(const RoadMark& mark, int lane_id) {
   return {};
 }
 
-/// What the mark lists itself goes before its type's own pattern. `begin` is its s.
+/// Lines listed in the mark replace the pattern of its type. `begin` is the mark's s.
 std::vector<Stripe> stripes_of(const RoadMark& mark, int lane_id, double begin) {
   if (mark.type == "none") return {};
   if (mark.lines.empty() && mark.explicit_lines.empty()) return stripes_of_type(mark, lane_id);
@@ -80,7 +80,7 @@ class MarkPainter {
   MarkPainter(Build* build, std::size_t road, const FileSection& section, const FileLane& lane)
       : build_(*build), road_index_(road), road_(build->network.roads[road]), section_(section), lane_(lane) {}
 
-  /// Paints from `begin` to `end` what the mark asks for.
+  /// Paints the mark from `begin` to `end`.
   void paint(const RoadMark& mark, double begin, double end) {
     const double mark_begin = section_.s + mark.s_offset;
     for (const Stripe& stripe : stripes_of(mark, lane_.id, mark_begin)) {
@@ -110,7 +110,7 @@ class MarkPainter {
         sample_curve(breaks, build_.options.chord_error_m, kMaxPiece_m, &build_.budget, [&](double s) {
           const double t = border_at(road_, section_, lane_.id, s).t + stripe.left + mark.sway.value(s - mark_begin);
           const Point3 p = point_at(road_, s, t);
-          // On a raised lane the mark lies at the height of its border.
+          // On a raised lane the mark is at the height of the lane's outer border.
           const bool is_raised = !lane_.inner_height.cubics.empty();
           return CurvePoint{s, p.x, p.y, is_raised ? point_on_lane(road_, section_, lane_, s, 1).z : p.z, 0};
         });
@@ -130,7 +130,7 @@ class MarkPainter {
   const FileLane& lane_;
 };
 
-/// The corners of an object: its outline, or those of its box.
+/// The corners of an object: its outline, or its bounding box.
 std::vector<Vec3> corners_of(Build* build, const FileRoad& road, const FileObject& object) {
   std::vector<FileObject::Corner> corners = object.outline;
   if (corners.empty()) {
@@ -172,7 +172,7 @@ void add_crosswalk(Build* build, std::size_t road, const FileObject& object) {
   map.provenance.crosswalks.push_back(source_of(road, object.where));
 }
 
-/// A stop line lies along the longer extent of its corners, in the middle of the shorter one, which is its width.
+/// The stop line runs along the longer extent of the corners, centred in the shorter one, which is its width.
 void add_stop_line(Build* build, std::size_t road, const FileObject& object) {
   const std::vector<Vec3> corners = corners_of(build, build->network.roads[road], object);
   Vec2 along{};
@@ -185,7 +185,7 @@ void add_stop_line(Build* build, std::size_t road, const FileObject& object) {
     object.where.fail("expected a stop line at least {} m long, got {}", kMinStopLine_m, length(along));
   }
   if (corners.size() >= 4) {
-    // Of a box the longest extent is a diagonal; its longest side runs along it.
+    // The longest extent of a box is its diagonal; use its longest side.
     along = {};
     for (std::size_t i = 0; i < corners.size(); ++i) {
       const Vec2 side = (corners[(i + 1) % corners.size()] - corners[i]).xy();
@@ -223,12 +223,12 @@ void add_parking_space(Build* build, std::size_t road_index, const FileObject& o
     object.where.fail("expected a parking space with a length and a width of at least {} m, got {} and {}",
                       kMinParking_m, length_m, width_m);
   }
-  // Cars stand along the longer side, whichever the file calls its length.
+  // Cars park along the longer side, whichever dimension the file calls length.
   if (width_m > length_m) {
     std::swap(width_m, length_m);
     heading += 0.5 * std::numbers::pi;
   }
-  // Of the two ways to stand in it: the one of the traffic on this side of the road.
+  // Of the two headings take that of the traffic on this side of the road.
   const bool forward = travels_forward(road, object.t > 0 ? 1 : -1);
   const double traffic = pose_at(road, object.s).heading + (forward ? 0.0 : std::numbers::pi);
   if (std::cos(heading - traffic) < 0) heading += std::numbers::pi;

@@ -1,4 +1,4 @@
-// Reference lines: <geometry> in plan, heights along it.
+// Reads reference lines: <geometry> in plan, elevation and banking.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,9 +11,9 @@ namespace pictura::opendrive {
 namespace {
 
 constexpr double kMaxCoordinate_m = 1e8;
-constexpr double kMaxTurn_rad = 100.0;    // of one geometry: 16 turns of a helix are enough
+constexpr double kMaxTurn_rad = 100.0;    // of one geometry: 16 turns, enough for a helix
 constexpr double kMaxGap_m = 0.1;         // between two geometries of a reference line
-constexpr double kMaxLengthError = 0.01;  // of the length that a <paramPoly3> states, beside that gap
+constexpr double kMaxLengthError = 0.01;  // relative error of a <paramPoly3>'s length, in addition to kMaxGap_m
 
 std::array<double, 4> coefficients(const Element& element, const char* suffix) {
   std::array<double, 4> result{};
@@ -23,11 +23,11 @@ std::array<double, 4> coefficients(const Element& element, const char* suffix) {
   return result;
 }
 
-/// v as a cubic of u; u ends where the curve is as long as the piece.
+/// v is a cubic of u; u ends where the arc length equals the length of the piece.
 PlaneCubic read_poly3(const Element& element, double length) {
   PlaneCubic cubic{.u = {0, 1, 0, 0}, .v = coefficients(element, "")};
   double low = 0, high = length;
-  for (int halving = 0; halving < 60; ++halving) {
+  for (int iteration = 0; iteration < 60; ++iteration) {
     cubic.p_end = 0.5 * (low + high);
     measure(&cubic);
     (cubic.arc_length.back() < length ? low : high) = cubic.p_end;
@@ -81,7 +81,8 @@ GeometryPiece read_geometry(const Element& element) {
   return piece;
 }
 
-/// Every geometry begins where and when the one before it ends, and together they are as long as the road.
+/// Checks that every geometry begins at the s and position where the previous one ends, and that together they are as
+/// long as the road.
 void check_geometry(const std::vector<Element>& elements, const FileRoad& road) {
   for (std::size_t i = 0; i < elements.size(); ++i) {
     const GeometryPiece& piece = road.geometry[i];
@@ -113,7 +114,7 @@ bool is_zero(const Profile& profile) {
                      [](const Cubic& c) { return c.a == 0 && c.b == 0 && c.c == 0 && c.d == 0; });
 }
 
-/// Cubics of t at stations of s: one cross-section for each s.
+/// Cubics of t at stations s: one cross-section per s.
 std::vector<CrossSection> read_shape(const Element& lateral, double road_length) {
   std::vector<CrossSection> sections;
   lateral.each("shape", [&](const Element& element) {
@@ -139,7 +140,7 @@ std::vector<CrossSection> read_shape(const Element& lateral, double road_length)
   return sections;
 }
 
-/// Superelevation, crossfall (1.4) and shape. Profiles that are zero all along, as most are, are left out.
+/// Superelevation, crossfall (1.4) and shape. Profiles that are zero everywhere, as most are, are dropped.
 void read_banking(const Element& lateral, FileRoad* road) {
   if (!lateral) return;
   if (const Element strips = lateral.child("crossSectionSurface")) {
@@ -165,7 +166,7 @@ void read_banking(const Element& lateral, FileRoad* road) {
 
 void read_reference_line(const Element& road_element, FileRoad* road) {
   std::vector<Element> geometry;
-  road_element.needed_child("planView").each("geometry", [&](const Element& piece) {
+  road_element.required_child("planView").each("geometry", [&](const Element& piece) {
     geometry.push_back(piece);
     road->geometry.push_back(read_geometry(piece));
   });

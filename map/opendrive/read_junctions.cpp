@@ -1,4 +1,4 @@
-// How roads are joined: links, junctions, and the controllers of their lights.
+// Reads how roads are connected: links, junctions, and the controllers of traffic lights.
 #include "pictura/map/opendrive/read_parts.h"
 
 namespace pictura::opendrive {
@@ -64,7 +64,7 @@ FileJunction read_junction(const Element& element, Faults* faults) {
       element.fail("attribute type: '{}' junctions are not supported; expected default or direct", type);
     }
   });
-  // Where it is let pass, a junction of another kind stays as one that connects nothing: roads refer to it.
+  // In lenient mode an unsupported junction is kept without connections, since roads refer to it.
   if (!is_read) return junction;
   element.each("connection", [&](const Element& child) {
     faults->attempt([&] { junction.connections.push_back(read_connection(child, junction.is_direct, faults)); });

@@ -1,4 +1,4 @@
-// Lane sections: lanes with their widths, links and road marks.
+// Reads lane sections: lanes with their widths, links and road marks.
 #include <algorithm>
 #include <cmath>
 #include <unordered_map>
@@ -10,7 +10,7 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Sections that editors leave behind when they snap; no lane can be built from less.
+// Shorter sections, which editors leave behind when snapping, are removed: no lane can be built from them.
 constexpr double kMinSection_m = 1e-3;
 constexpr double kMaxLaneWidth_m = 1e3, kMaxLaneHeight_m = 100;
 constexpr int kMaxLanesPerSide = 64;
@@ -107,7 +107,7 @@ FileLane read_lane(const Element& element, double section_length, Faults* faults
   FileLane lane;
   lane.where = element.where();
   lane.id = element.integer("id");
-  // A faulty lane keeps its place between its neighbours, without a surface.
+  // A faulty lane keeps its index, without a surface.
   bool is_sound = faults->attempt([&] { read_type(element, &lane); });
   if (const Element link = element.child("link")) {
     link.each("predecessor",
@@ -160,35 +160,35 @@ void read_side(const Element& section, const char* side, int sign, double sectio
   }
 }
 
-/// Takes a section out of the road: its neighbours' lane links lead through it.
+/// Removes a section from the road and connects its neighbours' lane links across it.
 void bridge_section(std::vector<FileSection>* sections, std::size_t index) {
   const FileSection removed = (*sections)[index];
-  auto lead_through = [&](FileSection& section, std::vector<int> FileLane::* links) {
+  auto link_across = [&](FileSection& section, std::vector<int> FileLane::* links) {
     for (std::vector<FileLane>* side : {&section.left, &section.right}) {
       for (FileLane& lane : *side) {
-        std::vector<int> beyond;
+        std::vector<int> targets;
         for (const int id : lane.*links) {
           if (const FileLane* through = removed.lane(id)) {
-            beyond.insert(beyond.end(), (through->*links).begin(), (through->*links).end());
+            targets.insert(targets.end(), (through->*links).begin(), (through->*links).end());
           }
         }
-        lane.*links = beyond;
+        lane.*links = targets;
       }
     }
   };
   if (index > 0) {
-    lead_through((*sections)[index - 1], &FileLane::successors);
+    link_across((*sections)[index - 1], &FileLane::successors);
     (*sections)[index - 1].end = removed.end;
   }
   if (index + 1 < sections->size()) {
     FileSection& next = (*sections)[index + 1];
-    lead_through(next, &FileLane::predecessors);
-    // Cubics and marks are relative to the section's start, which stays where it is.
+    link_across(next, &FileLane::predecessors);
+    // The next section keeps its start, to which its cubics and marks are relative.
   }
   sections->erase(sections->begin() + static_cast<std::ptrdiff_t>(index));
 }
 
-/// The sections on both sides of the road, or on one: those with singleSide go on until the next of their side.
+/// Reads the sections. A singleSide section gives one side; the lanes of the other side continue.
 std::vector<FileSection> read_sections(const Element& lanes, double road_length, Faults* faults) {
   std::vector<Element> elements;
   lanes.each("laneSection", [&](const Element& element) { elements.push_back(element); });
@@ -206,14 +206,14 @@ std::vector<FileSection> read_sections(const Element& lanes, double road_length,
     }
     std::size_t both_sided = i + 1;
     while (both_sided < elements.size() && elements[both_sided].flag("singleSide")) ++both_sided;
-    const double reach = both_sided < elements.size() ? elements[both_sided].number("s") : road_length;
-    const double length = std::max(reach, section.end) - section.s;
+    const double lanes_end = both_sided < elements.size() ? elements[both_sided].number("s") : road_length;
+    const double length = std::max(lanes_end, section.end) - section.s;
     read_side(elements[i], "left", 1, length, faults, &section.left);
     read_side(elements[i], "right", -1, length, faults, &section.right);
     if (i > 0 && elements[i].flag("singleSide")) {
       FileSection& before = sections.back();
-      if (section.left.empty()) section.left = lanes_further_on(&before.left, section.s - before.s);
-      if (section.right.empty()) section.right = lanes_further_on(&before.right, section.s - before.s);
+      if (section.left.empty()) section.left = continue_lanes(&before.left, section.s - before.s);
+      if (section.right.empty()) section.right = continue_lanes(&before.right, section.s - before.s);
     }
     for (std::vector<FileLane>* side : {&section.left, &section.right}) {
       for (FileLane& lane : *side) lane.section = lane.is_continued ? lane.section : static_cast<int>(i);
@@ -231,7 +231,7 @@ std::vector<FileSection> read_sections(const Element& lanes, double road_length,
 }  // namespace
 
 void read_lanes(const Element& road_element, Faults* faults, FileRoad* road) {
-  const Element lanes = road_element.needed_child("lanes");
+  const Element lanes = road_element.required_child("lanes");
   road->lane_offset = read_profile(lanes, "laneOffset", "s", road->length);
   road->sections = read_sections(lanes, road->length, faults);
   for (std::size_t i = road->sections.size(); i-- > 0;) {

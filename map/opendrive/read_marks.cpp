@@ -1,4 +1,4 @@
-// Road marks: their type, colour and width, and the stripes that they may list.
+// Reads road marks: type, colour, width, and explicitly listed lines.
 #include <cmath>
 #include <unordered_map>
 #include <unordered_set>
@@ -10,7 +10,7 @@ namespace pictura::opendrive {
 namespace {
 
 constexpr double kMaxMarkWidth_m = 10;
-constexpr double kMinDashPeriod_m = 0.05;  // shorter ones would eat the memory
+constexpr double kMinDashPeriod_m = 0.05;  // bounds the number of dashes
 
 MarkColor mark_color(const Element& element, const std::string& name) {
   static const std::unordered_map<std::string_view, MarkColor> kColors = {
@@ -84,7 +84,7 @@ std::vector<RoadMark> read_marks(const Element& lane_element, double section_len
   lane_element.each("roadMark", [&](const Element& element) {
     faults->attempt([&] {
       RoadMark mark = read_mark(element, section_length);
-      // Marks that begin behind the section's end are met in CARLA's towns; they show nothing.
+      // Marks that begin after the section's end occur in CARLA's towns; they are invisible.
       if (mark.s_offset > section_length + kStationTolerance_m) return;
       if (!marks.empty() && mark.s_offset < marks.back().s_offset) {
         element.fail("attribute sOffset: expected at least the previous one's {}, got {}", marks.back().s_offset,

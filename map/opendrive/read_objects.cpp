@@ -1,4 +1,4 @@
-// What stands on and beside a road: objects (crosswalks, parking spaces, stop lines), signals and references to them.
+// Reads objects (crosswalks, parking spaces, stop lines), signals and signal references.
 #include <cctype>
 #include <cmath>
 #include <optional>
@@ -9,9 +9,9 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Objects may stand this far before or behind their road.
-constexpr double kOverhang_m = 10;
-// Objects repeated closer than this are one continuous thing.
+// Objects may lie this far before the start or after the end of their road.
+constexpr double kMaxOverhang_m = 10;
+// Smaller distances mean one continuous object.
 constexpr double kMinRepeat_m = 0.1;
 constexpr std::size_t kMaxCopies = 10'000;
 constexpr double kMaxSize_m = 1e3;
@@ -22,8 +22,8 @@ bool contains_word(std::string text, std::string_view word) {
   return text.find(word) != std::string::npos;
 }
 
-/// The kinds that make a RoadMap; nothing for all others. Stop lines have no type of their own in OpenDRIVE: they are
-/// road marks of the subtype signalLines, or objects of that name.
+/// The kinds that RoadMap stores; nothing for all others. OpenDRIVE has no type for stop lines: they are road marks of
+/// the subtype signalLines, or objects with that name.
 std::optional<FileObject::Kind> kind_of(const Element& element) {
   const std::string type = element.text("type", "none");
   if (type == "crosswalk") return FileObject::Kind::crosswalk;
@@ -37,7 +37,7 @@ std::optional<FileObject::Kind> kind_of(const Element& element) {
 }
 
 double read_station(const Element& element, double road_length) {
-  return element.number_in("s", -kOverhang_m, road_length + kOverhang_m);
+  return element.number_in("s", -kMaxOverhang_m, road_length + kMaxOverhang_m);
 }
 
 double read_offset(const Element& element, const char* attribute) {
@@ -51,7 +51,7 @@ double read_height(const Element& element, const char* attribute) {
 std::vector<FileObject::Corner> read_outline(const Element& element, double road_length) {
   Element outline = element.child("outline");
   if (const Element outlines = element.child("outlines"); !outline && outlines) {
-    // The outer one of several; the others are holes or parts of it.
+    // Use the outer one of several outlines; the others are holes or parts of it.
     outlines.each("outline", [&](const Element& candidate) {
       if (!outline || (candidate.flag("outer") && !outline.flag("outer"))) outline = candidate;
     });
@@ -84,12 +84,12 @@ FileObject read_object(const Element& element, FileObject::Kind kind, double roa
   return object;
 }
 
-/// The object once, or at every place of its <repeat> elements, changing linearly along each.
+/// The object itself, or its copies along each <repeat> element, with linearly interpolated attributes.
 std::vector<FileObject> repeated(const Element& element, const FileObject& object, double road_length) {
   std::vector<FileObject> copies;
   element.each("repeat", [&](const Element& repeat) {
     const double begin = repeat.number_in("s", 0, road_length);
-    const double length = repeat.number_in("length", 0, road_length + kOverhang_m);
+    const double length = repeat.number_in("length", 0, road_length + kMaxOverhang_m);
     const double distance = repeat.number_in("distance", 0, kMaxRoadLength_m);
     if (distance < kMinRepeat_m) {
       repeat.fail("attribute distance: expected at least {} m (continuous objects are not supported), got {}",

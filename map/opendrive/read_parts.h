@@ -1,5 +1,5 @@
-// The parts of read_network: one function for each part of a road, in files of their own. Whatever can be left out by
-// itself when it is faulty is read in a Faults::attempt.
+// The parts of read_network, one function per part of a road, each in its own file. Whatever can be skipped on its own
+// when faulty is read in a Faults::attempt.
 #pragma once
 
 #include "pictura/map/opendrive/element.h"
@@ -10,13 +10,14 @@ namespace pictura::opendrive {
 inline constexpr double kMaxRoadLength_m = 1e5;
 inline constexpr double kMaxOffset_m = 1e4, kMaxHeight_m = 1e4;
 
-/// <planView>, <elevationProfile> and <lateralProfile>: the reference line and its heights. Needs the road's length.
+/// <planView>, <elevationProfile> and <lateralProfile>: the reference line, its elevation and banking. Needs the road's
+/// length.
 void read_reference_line(const Element& road_element, FileRoad* road);
 
-/// <lanes>: offset, sections, lanes with their marks.
+/// <lanes>: lane offset, sections, lanes with their marks.
 void read_lanes(const Element& road_element, Faults* faults, FileRoad* road);
 
-/// The <roadMark> elements of a lane whose section has the given length.
+/// The <roadMark> elements of a lane in a section of the given length.
 std::vector<RoadMark> read_marks(const Element& lane_element, double section_length, Faults* faults);
 
 /// <objects> and <signals>. Need the road's length.
@@ -28,7 +29,7 @@ void read_road_links(const Element& road_element, Faults* faults, FileRoad* road
 FileJunction read_junction(const Element& element, Faults* faults);
 FileController read_controller(const Element& element, Faults* faults);
 
-/// The attributes max and unit of a <speed>, in m/s; 0 where there is no limit.
+/// The attributes max and unit of a <speed>, in m/s; 0: no limit.
 double read_speed_mps(const Element& element);
 
 }  // namespace pictura::opendrive

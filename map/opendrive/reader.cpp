@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kMinRoadLength_m = 1e-3;
 
-/// What the header adds to the file's coordinates: a turn about the origin, then a shift.
+/// The header's transform of all coordinates: a rotation about the origin, then a translation.
 struct Offset {
   double x = 0, y = 0, z = 0, heading = 0;
 };
@@ -73,7 +73,7 @@ FileRoad read_road(const Element& element, const Offset& offset, Faults* faults)
   return road;
 }
 
-/// Appends `item`, which must be the only one of its id.
+/// Appends `item`, whose id must be unique.
 template <typename Item>
 void append(Item item, const Element& element, std::vector<Item>* items, std::unordered_map<std::string, int>* index) {
   if (!index->emplace(item.id, static_cast<int>(items->size())).second) {

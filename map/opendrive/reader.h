@@ -1,4 +1,4 @@
-// From the text of an OpenDRIVE file to its Network.
+// Reads the text of an OpenDRIVE file into a Network.
 #pragma once
 
 #include "pictura/map/opendrive/faults.h"
@@ -6,9 +6,9 @@
 
 namespace pictura::opendrive {
 
-/// Parses and checks `text`, which must outlive `network_out`. Throws Error naming source, line, road and element for
-/// whatever is malformed, missing, out of range or not supported, unless `faults` lets it pass: then the mark, object,
-/// signal, reference, link, connection, lane or road around it is left out. The header's offset is applied.
+/// Parses and checks `text`, which must outlive `network_out`. Throws Error naming source, line, owner and element for
+/// anything malformed, missing, out of range or not supported; if `faults` is lenient the enclosing mark, object,
+/// signal, reference, link, connection, lane or road is skipped instead. The header's offset is applied.
 void read_network(std::string_view text, const std::string& source_name, Faults* faults, Network* network_out);
 
 }  // namespace pictura::opendrive

@@ -1,4 +1,4 @@
-// What follows from the lane graph: speed limits that lanes inherit, and where routes never end.
+// Derives from the lane graph inherited speed limits and lanes with unbounded routes.
 #include <map>
 
 #include "pictura/map/opendrive/build.h"
@@ -11,21 +11,22 @@ void set_speed_limits(Build* build) {
   for (Lane& lane : map.lanes) {
     const FileRoad& road = build->network.roads[static_cast<std::size_t>(lane.source_road)];
     const auto [section, file_lane] = build->file_lanes[static_cast<std::size_t>(&lane - map.lanes.data())];
-    // Sections are cut where a limit changes: the one in the middle holds all along. The lane's own goes first.
+    // Sections are cut where a limit changes, so the limit at the middle applies throughout. The lane's own limit has
+    // precedence.
     const double middle = 0.5 * (section->s + section->end);
     const double own_mps = file_lane->speed_limit_mps.value(middle - section->s);
     lane.speed_limit_mps = static_cast<float>(own_mps > 0 ? own_mps : road.speed_limit_mps.value(middle));
   }
-  // Lanes without a limit, as those of junctions, take the highest of the lanes that lead into them, then of those that
-  // they lead to, over as many lanes as it takes.
+  // Lanes without a limit, such as those of junctions, inherit the highest limit of their predecessors, else of their
+  // successors, across any number of lanes.
   auto inherit = [&](IndexRange Lane::* onward) {
-    std::vector<int32_t> known;
+    std::vector<int32_t> frontier;
     for (std::size_t i = 0; i < map.lanes.size(); ++i) {
-      if (map.lanes[i].speed_limit_mps > 0) known.push_back(static_cast<int32_t>(i));
+      if (map.lanes[i].speed_limit_mps > 0) frontier.push_back(static_cast<int32_t>(i));
     }
-    while (!known.empty()) {
+    while (!frontier.empty()) {
       std::map<int32_t, float> inherited;
-      for (const int32_t from : known) {
+      for (const int32_t from : frontier) {
         const Lane& lane = map.lanes[static_cast<std::size_t>(from)];
         for (const int32_t to : map.links(lane.*onward)) {
           if (map.lanes[static_cast<std::size_t>(to)].speed_limit_mps > 0) continue;
@@ -33,10 +34,10 @@ void set_speed_limits(Build* build) {
           limit = max_of(limit, lane.speed_limit_mps);
         }
       }
-      known.clear();
+      frontier.clear();
       for (const auto& [lane, limit] : inherited) {
         map.lanes[static_cast<std::size_t>(lane)].speed_limit_mps = limit;
-        known.push_back(lane);
+        frontier.push_back(lane);
       }
     }
   };
@@ -49,8 +50,8 @@ void set_speed_limits(Build* build) {
 
 void find_endless_lanes(Build* build) {
   RoadMap& map = *build->map;
-  // Lanes between which one may change share a group, named by its leftmost lane. A group dies when none of its lanes
-  // leads to a living group, and takes with it what only led there.
+  // Lanes connected by lane changes form a group, named by its leftmost lane. A group is a dead_ends end when none of
+  // its lanes leads to another group that is not; dead_ends ends are removed repeatedly.
   std::vector<std::size_t> group(map.lanes.size());
   std::vector<std::vector<std::size_t>> members(map.lanes.size());
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
@@ -61,29 +62,29 @@ void find_endless_lanes(Build* build) {
     members[leftmost].push_back(i);
   }
   auto is_route_lane = [&](int32_t lane) { return is_route(map.lanes[static_cast<std::size_t>(lane)].type); };
-  std::vector<int> ways_on(map.lanes.size(), 0);
+  std::vector<int> num_exits(map.lanes.size(), 0);
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
     if (!is_route(map.lanes[i].type)) continue;
-    for (const int32_t next : map.links(map.lanes[i].successors)) ways_on[group[i]] += is_route_lane(next) ? 1 : 0;
+    for (const int32_t next : map.links(map.lanes[i].successors)) num_exits[group[i]] += is_route_lane(next) ? 1 : 0;
   }
-  std::vector<std::size_t> dead;
+  std::vector<std::size_t> dead_ends;
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
-    if (group[i] == i && ways_on[i] == 0) dead.push_back(i);
+    if (group[i] == i && num_exits[i] == 0) dead_ends.push_back(i);
   }
-  while (!dead.empty()) {
-    const std::size_t died = dead.back();
-    dead.pop_back();
-    for (const std::size_t lane : members[died]) {
+  while (!dead_ends.empty()) {
+    const std::size_t dead_end = dead_ends.back();
+    dead_ends.pop_back();
+    for (const std::size_t lane : members[dead_end]) {
       if (!is_route(map.lanes[lane].type)) continue;
       for (const int32_t before : map.links(map.lanes[lane].predecessors)) {
         if (!is_route_lane(before)) continue;
         const std::size_t other = group[static_cast<std::size_t>(before)];
-        if (--ways_on[other] == 0) dead.push_back(other);
+        if (--num_exits[other] == 0) dead_ends.push_back(other);
       }
     }
   }
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
-    map.lanes[i].is_endless = is_route(map.lanes[i].type) && ways_on[group[i]] > 0;
+    map.lanes[i].is_endless = is_route(map.lanes[i].type) && num_exits[group[i]] > 0;
   }
 }
 

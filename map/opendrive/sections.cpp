@@ -6,13 +6,13 @@ namespace pictura::opendrive {
 
 namespace {
 
-constexpr double kMinPiece_m = 0.5;
+constexpr double kMinSection_m = 0.5;
 
 void shift(Profile* profile, double ds) {
   for (Cubic& cubic : profile->cubics) cubic.s -= ds;
 }
 
-FileLane further_on(const FileLane& lane, double ds) {
+FileLane continue_lane(const FileLane& lane, double ds) {
   FileLane rest = lane;
   rest.is_continued = true;
   for (Profile* profile : {&rest.width, &rest.border, &rest.inner_height, &rest.outer_height, &rest.speed_limit_mps}) {
@@ -22,7 +22,7 @@ FileLane further_on(const FileLane& lane, double ds) {
   return rest;
 }
 
-/// Where limits change within the section, sorted.
+/// The stations of speed limit changes, sorted.
 std::vector<double> speed_changes(const FileRoad& road, const FileSection& section) {
   std::vector<double> changes;
   auto add_all = [&](const Profile& limits, double offset) {
@@ -42,10 +42,10 @@ std::vector<double> speed_changes(const FileRoad& road, const FileSection& secti
 
 }  // namespace
 
-std::vector<FileLane> lanes_further_on(std::vector<FileLane>* lanes, double ds) {
+std::vector<FileLane> continue_lanes(std::vector<FileLane>* lanes, double ds) {
   std::vector<FileLane> rest;
   for (FileLane& lane : *lanes) {
-    rest.push_back(further_on(lane, ds));
+    rest.push_back(continue_lane(lane, ds));
     rest.back().predecessors = lane.successors = {lane.id};
   }
   return rest;
@@ -56,14 +56,14 @@ void split_at_speed_changes(Network* network) {
     for (std::size_t i = 0; i < road.sections.size(); ++i) {
       for (const double change : speed_changes(road, road.sections[i])) {
         FileSection& section = road.sections[i];
-        if (change < section.s + kMinPiece_m || change > section.end - kMinPiece_m) continue;
+        if (change < section.s + kMinSection_m || change > section.end - kMinSection_m) continue;
         const double ds = change - section.s;
         FileSection rest;
         rest.s = change;
         rest.end = section.end;
-        rest.center = further_on(section.center, ds);
-        rest.left = lanes_further_on(&section.left, ds);
-        rest.right = lanes_further_on(&section.right, ds);
+        rest.center = continue_lane(section.center, ds);
+        rest.left = continue_lanes(&section.left, ds);
+        rest.right = continue_lanes(&section.right, ds);
         section.end = change;
         road.sections.insert(road.sections.begin() + static_cast<std::ptrdiff_t>(++i), std::move(rest));
       }

@@ -1,4 +1,4 @@
-// Sections cut in two: lanes that go on from one FileSection into the next are the same lane of the file.
+// Splits sections; lanes that continue from one FileSection into the next are the same lane of the file.
 #pragma once
 
 #include <vector>
@@ -7,12 +7,12 @@
 
 namespace pictura::opendrive {
 
-/// What is left of `lanes` from `ds` behind their section's s on, as lanes of a section that begins there. The lanes
-/// and what is left of them are linked to each other.
-std::vector<FileLane> lanes_further_on(std::vector<FileLane>* lanes, double ds);
+/// The parts of `lanes` that are more than `ds` after the start of their section, as lanes of a new section that begins
+/// there. The lanes and their continuations are linked to each other.
+std::vector<FileLane> continue_lanes(std::vector<FileLane>* lanes, double ds);
 
-/// Cuts sections where the speed limit of the road or of one of its lanes changes, so that a lane has one limit.
-/// Changes within 0.5 m of a section's end count from there.
+/// Splits sections where the speed limit of the road or of one of its lanes changes, so that each lane has one limit.
+/// Changes within 0.5 m of a section's ends are not split.
 void split_at_speed_changes(Network* network);
 
 }  // namespace pictura::opendrive

@@ -15,7 +15,7 @@ namespace pictura::opendrive {
 
 namespace {
 
-/// The value of an attribute. fmt prints the fewest digits that read back as the same double.
+/// The value of an attribute. fmt prints the shortest digits that read back as the same double.
 class Value {
  public:
   Value(const std::string& text) : text_(text) {}
@@ -161,7 +161,7 @@ void add_speed(pugi::xml_node parent, double limit_mps, const double* station = 
   }
 }
 
-/// `successors` are those of the whole <lane>, which may go on in later sections.
+/// `successors` are those of the whole <lane>, which may continue in later sections.
 void add_lane(pugi::xml_node side, const FileLane& lane, const std::vector<int>& successors) {
   pugi::xml_node node =
       add(side, "lane", {{"id", lane.id}, {"type", lane.type_name}, {"level", lane.is_level ? "true" : "false"}});
@@ -186,7 +186,7 @@ void add_lane(pugi::xml_node side, const FileLane& lane, const std::vector<int>&
 
 bool is_continued(const std::vector<FileLane>& side) { return !side.empty() && side.front().is_continued; }
 
-/// Lanes that go on in sections of which only the other side is new lead where the last of those leads.
+/// The successors of a lane that continues in single-sided sections are those of its last part.
 std::vector<int> successors_of(const FileRoad& road, std::size_t section, const FileLane& lane) {
   while (section + 1 < road.sections.size()) {
     const FileLane* next = road.sections[section + 1].lane(lane.id);
@@ -200,10 +200,10 @@ std::vector<int> successors_of(const FileRoad& road, std::size_t section, const 
 void add_section(pugi::xml_node lanes, const FileRoad& road, std::size_t index) {
   const FileSection& section = road.sections[index];
   pugi::xml_node node = add(lanes, "laneSection", {{"s", section.s}});
-  const bool left_goes_on = is_continued(section.left), right_goes_on = is_continued(section.right);
-  if (left_goes_on || right_goes_on) set(node, "singleSide", "true");
-  // The standard lists lanes from left to right.
-  if (!section.left.empty() && !left_goes_on) {
+  const bool left_continues = is_continued(section.left), right_continues = is_continued(section.right);
+  if (left_continues || right_continues) set(node, "singleSide", "true");
+  // The standard orders lanes from left to right.
+  if (!section.left.empty() && !left_continues) {
     const pugi::xml_node left = add(node, "left");
     for (auto lane = section.left.rbegin(); lane != section.left.rend(); ++lane) {
       add_lane(left, *lane, successors_of(road, index, *lane));
@@ -212,7 +212,7 @@ void add_section(pugi::xml_node lanes, const FileRoad& road, std::size_t index) 
   FileLane center = section.center;
   if (center.type_name.empty()) center.type_name = "none";
   add_lane(add(node, "center"), center, center.successors);
-  if (!section.right.empty() && !right_goes_on) {
+  if (!section.right.empty() && !right_continues) {
     const pugi::xml_node right = add(node, "right");
     for (const FileLane& lane : section.right) add_lane(right, lane, successors_of(road, index, lane));
   }
@@ -285,7 +285,7 @@ void add_signals(pugi::xml_node road_node, const FileRoad& road) {
   }
 }
 
-/// Ids of objects: their own, unless they have none or another object of the file has it (copies of a <repeat>).
+/// Assigns object ids: their own, unless empty or already used in the file (copies of a <repeat>).
 class ObjectIds {
  public:
   explicit ObjectIds(const Network& network) {
@@ -355,7 +355,7 @@ void add_controller(pugi::xml_node root, const FileController& controller) {
   for (const std::string& signal : controller.signals) add(node, "control", {{"signalId", signal}});
 }
 
-/// 1.4, or 1.8 where there is what 1.4 does not know.
+/// Minor revision: 4 (OpenDRIVE 1.4), or 8 (1.8) if the network uses newer features.
 int minor_revision(const Network& network) {
   const auto is_new = [](const FileLane& lane) {
     return lane.direction != LaneDirection::standard || lane.predecessors.size() > 1 || lane.successors.size() > 1;

@@ -1,4 +1,4 @@
-// From a Network back to the text of an OpenDRIVE file.
+// Writes a Network as the text of an OpenDRIVE file.
 #pragma once
 
 #include <string>
@@ -8,17 +8,17 @@
 
 namespace pictura::opendrive {
 
-/// The network as OpenDRIVE text. Every number is written with as many digits as it takes to read the same double
-/// again, so that reading and writing what was written once changes nothing. What a Network does not hold (names,
-/// weights and materials of marks, objects other than crosswalks and parking spaces) is not written.
+/// The network as OpenDRIVE text. Numbers have as many digits as needed to read back the same double, so that reading
+/// and writing the output again changes nothing. What a Network does not contain (names, weights and materials of
+/// marks, objects other than crosswalks, parking spaces and stop lines) is not written.
 std::string write_opendrive(const Network& network);
 
 }  // namespace pictura::opendrive
 
 namespace pictura {
 
-/// Reads the text of an OpenDRIVE file and writes it again, with no more in it than the importer uses. Throws Error
-/// naming `source`, line and element for whatever the importer refuses.
+/// Reads the text of an OpenDRIVE file and writes only what the importer uses. Throws Error naming `source`, line and
+/// element for whatever the importer rejects.
 std::string export_opendrive(std::string_view text, const std::string& source);
 
 }  // namespace pictura
