@@ -12,13 +12,13 @@ using opendrive::Profile;
 constexpr double kSlipTaper_m = 14;
 constexpr double kMarkWidth_m = 0.12;
 
-/// A smooth step from one width to another over `length_m`, from s on.
+/// A smooth step (cubic) from one width to another over `length_m`, starting at s.
 Cubic step(double s, double from_m, double to_m, double length_m) {
   const double rise = to_m - from_m;
   return {s, from_m, 0, 3 * rise / (length_m * length_m), -2 * rise / (length_m * length_m * length_m)};
 }
 
-Profile bay(double width_m, double length_m) {
+Profile parking_bay(double width_m, double length_m) {
   return {{{0, 0, 0, 0, 0},
            step(kParkingLead_m, 0, width_m, kParkingTaper_m),
            {kParkingLead_m + kParkingTaper_m, width_m, 0, 0, 0},
@@ -39,7 +39,7 @@ Profile width_of(LaneKind kind, double length_m, bool left, const SectionStyle& 
         return {{{0, kLaneWidth_m, 0, 0, 0}, step(length_m - kSlipTaper_m, kLaneWidth_m, 0, kSlipTaper_m)}};
       }
       return {{step(0, 0, kLaneWidth_m, kSlipTaper_m), {kSlipTaper_m, kLaneWidth_m, 0, 0, 0}}};
-    case LaneKind::parking: return bay(kParkingWidth_m, length_m);
+    case LaneKind::parking: return parking_bay(kParkingWidth_m, length_m);
     case LaneKind::shoulder: return {{{0, kShoulderWidth_m, 0, 0, 0}}};
     case LaneKind::sidewalk: return {{{0, kSidewalkWidth_m, 0, 0, 0}}};
   }
@@ -54,7 +54,7 @@ struct TypeName {
 TypeName type_of(LaneKind kind) {
   switch (kind) {
     case LaneKind::driving: return {"driving", LaneType::driving};
-    case LaneKind::slip: return {"exit", LaneType::ramp};  // OpenDRIVE 1.4's word for a lane that leaves the others
+    case LaneKind::slip: return {"exit", LaneType::ramp};  // OpenDRIVE 1.4's type of a diverging lane
     case LaneKind::parking: return {"parking", LaneType::parking};
     case LaneKind::shoulder: return {"shoulder", LaneType::shoulder};
     case LaneKind::sidewalk: return {"sidewalk", LaneType::sidewalk};
@@ -70,7 +70,7 @@ opendrive::RoadMark make_mark(const char* type) {
   return mark;
 }
 
-/// The line on a lane's outer border.
+/// The mark on a lane's outer border.
 opendrive::RoadMark outer_mark(const Side& side, int rank, const SectionStyle& style) {
   const LaneKind kind = side.kind_at(rank);
   if (kind == LaneKind::shoulder) return make_mark("curb");

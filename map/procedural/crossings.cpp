@@ -1,26 +1,26 @@
-// Junctions of three to five arms: a connecting road for every movement, corners with sidewalks, crosswalks.
+// Junctions of three to five arms: one connecting road per movement, corners with sidewalks, crosswalks.
 #include "pictura/map/procedural/town_builder.h"
 
 namespace pictura::town {
 
 namespace {
 
-constexpr double kWidest_m = 1e9;
-constexpr double kMaxTurnRadius_m = 14;  // of the left border of a turn that is no right turn
-// Lanes that turn across the junction are wider half-way, so that what comes beside them leaves no sliver between.
+constexpr double kNoRadiusLimit_m = 1e9;
+constexpr double kMaxTurnRadius_m = 14;  // of the left border of turns other than right turns
+// Lanes that turn across the junction are wider half-way, so that no sliver is left between adjacent lanes.
 constexpr double kTurningWidth_m = 4;
 constexpr double kCrosswalkBegin_m = 0.6, kCrosswalkEnd_m = 3.4;  // beyond the stop line
 constexpr Side kNoSide{.driving = 0, .has_shoulder = false, .has_sidewalk = false};
 
 }  // namespace
 
-void TownBuilder::lay_crossing(const Node& node) {
+void TownBuilder::build_crossing(const Node& node) {
   opendrive::FileJunction junction;
   junction.id = next_id();
   for (const Arm& arm : node.arms) set_junction_link(end_of(arm), junction.id);
   const std::vector<Movement> movements = movements_of(layout_, node);
   std::vector<int> roads;
-  for (const Movement& movement : movements) roads.push_back(lay_movement(node, movement, &junction));
+  for (const Movement& movement : movements) roads.push_back(build_movement(node, movement, &junction));
   if (node.has_crosswalks) {
     for (std::size_t i = 0; i < movements.size(); ++i) {
       if (i == 0 || movements[i].from != movements[i - 1].from) add_crosswalk(node.arm(movements[i].from), roads[i]);
@@ -30,20 +30,20 @@ void TownBuilder::lay_crossing(const Node& node) {
   finish_junction(std::move(junction));
 }
 
-int TownBuilder::lay_movement(const Node& node, const Movement& movement, opendrive::FileJunction* junction) {
+int TownBuilder::build_movement(const Node& node, const Movement& movement, opendrive::FileJunction* junction) {
   const Arm &from = node.arm(movement.from), &to = node.arm(movement.to);
   const Street &in = street_of(from), &out = street_of(to);
   const int first_in = movement.is_slip ? in.lanes : movement.first_in;
-  const Pose start = to_the_right(turned_back(mouth_of(node, from)), first_in * kLaneWidth_m);
-  const Pose end = to_the_right(mouth_of(node, to), movement.first_out * kLaneWidth_m);
-  // Those who turn into the next arm on their right go round a corner, and the sidewalk goes with the outermost lane.
+  const Pose start = offset_right(reversed(mouth_of(node, from)), first_in * kLaneWidth_m);
+  const Pose end = offset_right(mouth_of(node, to), movement.first_out * kLaneWidth_m);
+  // A right turn into the next arm makes a corner, whose sidewalk follows the outermost lane.
   const bool turns_right = movement.to == (movement.from + 1) % node.degree();
   const int in_lanes = in.lanes + (layout_.has_slip(from) ? 1 : 0);
   const bool has_corner =
       turns_right && first_in + movement.lanes == in_lanes && movement.first_out + movement.lanes == out.lanes;
   const bool is_straight = straight_on(node, movement.from) == movement.to;
-  const double radius = movement.is_slip ? kWidest_m
-                        : turns_right    ? right_turn_radius_m(full_turn(to.heading - from.heading))
+  const double radius = movement.is_slip ? kNoRadiusLimit_m
+                        : turns_right    ? right_turn_radius_m(wrap_to_2pi(to.heading - from.heading))
                                          : kMaxTurnRadius_m;
   const double speed = !is_straight ? kJunctionSpeed_mps : in.is_avenue ? kAvenueSpeed_mps : kStreetSpeed_mps;
   const Side right{.driving = movement.lanes,
@@ -51,14 +51,15 @@ int TownBuilder::lay_movement(const Node& node, const Movement& movement, opendr
                    .has_sidewalk = has_corner && in.has_sidewalks && out.has_sidewalks};
   SectionStyle style{.in_junction = true, .one_way = true};
   if (!is_straight && !has_corner) style.driving_middle_m = kTurningWidth_m;
-  const int laid = add_road(is_straight ? biarc(start, end) : fillet(start, end, radius), node.z, junction->id, speed,
-                            kNoSide, right, style);
-  connect(end_of(from), laid, end_of(to), movement, junction);
-  return laid;
+  const int connecting = add_road(is_straight ? biarc(start, end) : fillet(start, end, radius), node.z, junction->id,
+                                  speed, kNoSide, right, style);
+  connect(end_of(from), connecting, end_of(to), movement, junction);
+  return connecting;
 }
 
-/// Across the arm, just inside the junction, from kerb to kerb; `carrier` begins at the arm's middle.
-void TownBuilder::add_crosswalk(const Arm& arm, int carrier) {
+/// Adds a crosswalk across the arm, just inside the junction, from kerb to kerb; `owner_road` begins at the arm's
+/// centre.
+void TownBuilder::add_crosswalk(const Arm& arm, int owner_road) {
   const double out = street_of(arm).lanes * kLaneWidth_m + kShoulderWidth_m;
   const double in = out + (layout_.has_slip(arm) ? kLaneWidth_m : 0);
   opendrive::FileObject crosswalk;
@@ -69,7 +70,7 @@ void TownBuilder::add_crosswalk(const Arm& arm, int carrier) {
                        {kCrosswalkEnd_m, -in, 0, false},
                        {kCrosswalkEnd_m, out, 0, false},
                        {kCrosswalkBegin_m, out, 0, false}};
-  road(carrier).objects.push_back(std::move(crosswalk));
+  road(owner_road).objects.push_back(std::move(crosswalk));
 }
 
 }  // namespace pictura::town

@@ -1,4 +1,4 @@
-// The heights of a street between two level junctions.
+// Elevation profile of a street between two level junctions.
 #pragma once
 
 #include "pictura/map/opendrive/model.h"
@@ -6,21 +6,21 @@
 namespace pictura::town {
 
 inline constexpr double kMaxGrade = 0.075;
-// The share of a street over which its grade grows from 0, and falls to 0 again.
-inline constexpr double kVerticalCurveShare = 0.25;
+// The fraction of a street over which its grade rises from 0, and falls back to 0.
+inline constexpr double kVerticalCurveFraction = 0.25;
 
-/// The greatest difference in height that a street of this length overcomes.
-inline double greatest_climb_m(double length_m) { return kMaxGrade * (1 - kVerticalCurveShare) * length_m; }
+/// The maximum height difference of a street of this length.
+inline double max_climb_m(double length_m) { return kMaxGrade * (1 - kVerticalCurveFraction) * length_m; }
 
-/// From one height to another: a parabola, a constant grade, a parabola; level at both ends.
-inline opendrive::Profile climb(double from_m, double to_m, double length_m) {
+/// A profile from one height to another: a parabola, a constant grade, a parabola; level at both ends.
+inline opendrive::Profile elevation_profile(double from_m, double to_m, double length_m) {
   if (from_m == to_m) return {{{0, from_m, 0, 0, 0}}};
-  const double curve = kVerticalCurveShare * length_m;
+  const double curve = kVerticalCurveFraction * length_m;
   const double grade = (to_m - from_m) / (length_m - curve);
-  const double bend = 0.5 * grade / curve;
-  return {{{0, from_m, 0, bend, 0},
+  const double quadratic = 0.5 * grade / curve;
+  return {{{0, from_m, 0, quadratic, 0},
            {curve, from_m + 0.5 * grade * curve, grade, 0, 0},
-           {length_m - curve, to_m - 0.5 * grade * curve, grade, -bend, 0}}};
+           {length_m - curve, to_m - 0.5 * grade * curve, grade, -quadratic, 0}}};
 }
 
 }  // namespace pictura::town

@@ -1,4 +1,4 @@
-// Which crossings, streets and features a town has.
+// Chooses the crossings, streets and features of a town.
 #include "pictura/map/procedural/layout.h"
 
 #include <cmath>
@@ -8,8 +8,8 @@ namespace pictura::town {
 
 namespace {
 
-/// What is drawn; each has its own stream.
-enum Draw : uint32_t {
+/// Purposes of random draws; each has its own stream.
+enum DrawPurpose : uint32_t {
   kSpacing,
   kJitter,
   kRingRoad,
@@ -28,7 +28,7 @@ enum Draw : uint32_t {
   kCrosswalks,
 };
 
-// Blocks differ by this share of their mean length, nodes by this much in each coordinate.
+// Block lengths vary by this fraction of their mean, node positions by this much in each coordinate.
 constexpr double kSpacingSpread = 0.12, kJitter_m = 3.5;
 constexpr int kStepX[kNumDirections] = {1, 1, 0, -1, -1, -1, 0, 1};
 constexpr int kStepY[kNumDirections] = {0, 1, 1, 1, 0, -1, -1, -1};
@@ -42,28 +42,28 @@ Layout::Layout(const TownOptions& options) : options_(options) {
   choose_overpasses();
   choose_roundabouts();
   add_diagonals();
-  thin_out();
+  remove_streets();
   choose_street_features();
   join_streets();
   choose_crossing_features();
   set_headings();
   curve_streets();
   choose_slip_lanes();
-  lay_curves();
+  build_curves();
   set_heights();
 }
 
-std::vector<int> Layout::shuffled(std::vector<int> candidates, uint32_t what) const {
+std::vector<int> Layout::shuffled(std::vector<int> candidates, uint32_t purpose) const {
   std::vector<std::pair<uint32_t, int>> order;
-  for (const int candidate : candidates) order.emplace_back(draw(what, candidate).bits(), candidate);
+  for (const int candidate : candidates) order.emplace_back(draw(purpose, candidate).bits(), candidate);
   std::sort(order.begin(), order.end());
   for (std::size_t i = 0; i < order.size(); ++i) candidates[i] = order[i].second;
   return candidates;
 }
 
-std::vector<int> Layout::pick(double share, std::vector<int> candidates, uint32_t what) const {
-  const double count = std::ceil(share * static_cast<double>(candidates.size()) - 1e-9);
-  candidates = shuffled(std::move(candidates), what);
+std::vector<int> Layout::pick(double fraction, std::vector<int> candidates, uint32_t purpose) const {
+  const double count = std::ceil(fraction * static_cast<double>(candidates.size()) - 1e-9);
+  candidates = shuffled(std::move(candidates), purpose);
   candidates.resize(static_cast<std::size_t>(count));
   return candidates;
 }
@@ -109,15 +109,15 @@ void Layout::plan_streets() {
   }
 }
 
-/// The border, and whole rows and columns inside it.
+/// Avenues: the border, and whole rows and columns inside it.
 void Layout::choose_avenues() {
   has_ring_road_ = draw(kRingRoad, 0).uniform() < static_cast<float>(options_.ring_road) && options_.max_lanes > 1;
-  // An avenue ends at the border, where its lanes part: half to the left, half to the right.
+  // An avenue ends at the border, where half of its lanes turn left and half right.
   const auto lanes_of = [&](int line) {
-    const int most = static_cast<int>(has_ring_road_ ? options_.max_lanes : std::min(options_.max_lanes, 2.0));
-    return 2 + draw(kAvenueLanes, line).below(most - 1);
+    const int max_lanes = static_cast<int>(has_ring_road_ ? options_.max_lanes : std::min(options_.max_lanes, 2.0));
+    return 2 + draw(kAvenueLanes, line).below(max_lanes - 1);
   };
-  std::vector<int> lines;  // rows count from 0, columns behind them
+  std::vector<int> lines;  // rows from 0, columns from kMaxTownBlocks
   for (int j = 1; j < options_.blocks_y; ++j) lines.push_back(j);
   for (int i = 1; i < options_.blocks_x; ++i) lines.push_back(kMaxTownBlocks + i);
   if (options_.max_lanes < 2) lines.clear();
@@ -136,7 +136,7 @@ void Layout::choose_avenues() {
   }
 }
 
-/// Inner nodes, those on avenues first, no two of them next to each other, so that ramps are whole streets.
+/// Chooses inner nodes, those on avenues first, no two adjacent, so that each ramp can use a whole street.
 void Layout::choose_overpasses() {
   std::vector<int> inner;
   for (int n = 0; n < static_cast<int>(nodes_.size()); ++n) {
@@ -164,7 +164,7 @@ void Layout::choose_overpasses() {
 std::vector<int> Layout::streets_at(int node) const {
   std::vector<int> found;
   for (int s = 0; s < static_cast<int>(streets_.size()); ++s) {
-    if (streets_[s].is_kept && (streets_[s].from == node || streets_[s].to == node)) found.push_back(s);
+    if (streets_[s].is_present && (streets_[s].from == node || streets_[s].to == node)) found.push_back(s);
   }
   return found;
 }
@@ -185,7 +185,7 @@ void Layout::choose_roundabouts() {
   for (const int n : pick(options_.roundabouts, candidates, kRoundabouts)) nodes_[n].kind = NodeKind::roundabout;
 }
 
-/// Fifth arms: streets through a block to the node across it.
+/// Adds fifth arms: streets through a block to the diagonally opposite node.
 void Layout::add_diagonals() {
   std::vector<char> block_is_cut(static_cast<std::size_t>(options_.blocks_x * options_.blocks_y), 0);
   std::vector<char> has_diagonal(nodes_.size(), 0);
@@ -202,7 +202,7 @@ void Layout::add_diagonals() {
     is_cut = has_diagonal[node] = has_diagonal[to] = 1;
     return true;
   };
-  // Around a single block traffic would circle for ever, either way.
+  // Around a single block traffic would circle without a choice, in either direction.
   if (nodes_.size() == 4) {
     add_street(0, 3, 1);
     return;
@@ -218,9 +218,10 @@ void Layout::add_diagonals() {
   }
 }
 
-/// Whether the kept streets join all nodes; an overpass joins its streets in pairs only.
+/// Whether the remaining streets connect all nodes; an overpass connects its streets only in pairs.
 bool Layout::is_connected() const {
-  // Two halves to a node: of an overpass the eastward and the northward street, else one and the same.
+  // Union-find over two halves per node: of an overpass the eastward and the northward street; of other nodes only the
+  // first is used.
   std::vector<int> parent(2 * nodes_.size());
   std::iota(parent.begin(), parent.end(), 0);
   const auto root = [&](int i) {
@@ -231,7 +232,7 @@ bool Layout::is_connected() const {
     return 2 * node + (nodes_[node].kind == NodeKind::overpass && direction % 4 == 2 ? 1 : 0);
   };
   for (const Street& street : streets_) {
-    if (street.is_kept) parent[root(half(street.from, street.direction))] = root(half(street.to, street.direction));
+    if (street.is_present) parent[root(half(street.from, street.direction))] = root(half(street.to, street.direction));
   }
   for (int n = 0; n < static_cast<int>(nodes_.size()); ++n) {
     if (root(2 * n) != root(0)) return false;
@@ -240,8 +241,8 @@ bool Layout::is_connected() const {
   return true;
 }
 
-/// Whether a street can go: both its ends keep a way on without turning back, and somewhere routes still part.
-bool Layout::may_go(int s) const {
+/// Whether a street may be removed: neither end becomes a dead end, and both keep what their kind of node needs.
+bool Layout::is_removable(int s) const {
   const Street& street = streets_[s];
   if (street.is_avenue || street.direction % 2 == 1) return false;
   for (const int node : {street.from, street.to}) {
@@ -258,17 +259,17 @@ bool Layout::may_go(int s) const {
   return true;
 }
 
-void Layout::thin_out() {
+void Layout::remove_streets() {
   std::vector<int> candidates;
   for (int s = 0; s < static_cast<int>(streets_.size()); ++s) {
-    if (may_go(s)) candidates.push_back(s);
+    if (is_removable(s)) candidates.push_back(s);
   }
   auto wanted = std::lround((1 - options_.density) * static_cast<double>(candidates.size()));
   const auto num_forks = [&] {
     std::vector<int> degrees(nodes_.size(), 0);
     for (const Street& street : streets_) {
-      degrees[street.from] += street.is_kept ? 1 : 0;
-      degrees[street.to] += street.is_kept ? 1 : 0;
+      degrees[street.from] += street.is_present ? 1 : 0;
+      degrees[street.to] += street.is_present ? 1 : 0;
     }
     int forks = 0;
     for (std::size_t n = 0; n < nodes_.size(); ++n) {
@@ -278,19 +279,19 @@ void Layout::thin_out() {
   };
   for (const int s : shuffled(candidates, kThinning)) {
     if (wanted == 0) break;
-    if (!may_go(s)) continue;
-    streets_[s].is_kept = false;
+    if (!is_removable(s)) continue;
+    streets_[s].is_present = false;
     if (is_connected() && num_forks() > 0) {
       --wanted;
     } else {
-      streets_[s].is_kept = true;
+      streets_[s].is_present = true;
     }
   }
-  std::erase_if(streets_, [](const Street& street) { return !street.is_kept; });
+  std::erase_if(streets_, [](const Street& street) { return !street.is_present; });
 }
 
 void Layout::choose_street_features() {
-  std::vector<int> all, sides;  // a side: twice the street, and one more for its left
+  std::vector<int> all, sides;  // side: twice the street index, plus one for the left side
   for (int s = 0; s < static_cast<int>(streets_.size()); ++s) {
     streets_[s].has_sidewalks = false;
     all.push_back(s);

@@ -1,4 +1,4 @@
-// Where streets run: the headings of arms, how far junctions reach, and the curves between their mouths.
+// The curves of streets: the headings of arms, the extent of junctions, and the curves between their mouths.
 #include "pictura/map/procedural/layout.h"
 #include "pictura/map/procedural/movements.h"
 #include "pictura/map/procedural/roundabout_shape.h"
@@ -7,19 +7,19 @@ namespace pictura::town {
 
 namespace {
 
-enum Draw : uint32_t { kCurved = 100, kCurveShape, kSlipLanes };
+enum DrawPurpose : uint32_t { kCurved = 100, kCurveShape, kSlipLanes };
 
 constexpr double degrees(double angle) { return angle * kPi_rad / 180; }
 
-// Arms are at least this far apart: where all are of the grid, and where a diagonal squeezes in.
+// Minimum angles between arms: at nodes with grid streets only, between opposite arms, and at nodes with a diagonal.
 constexpr double kMinGap_rad = degrees(72), kMinOppositeGap_rad = degrees(150), kMinFiveArmGap_rad = degrees(62);
-// Neighbouring arms that are further apart meet without a corner.
+// Neighbouring arms at a larger angle meet without a corner.
 constexpr double kFlatGap_rad = degrees(140);
 constexpr double kMinMouth_m = 9, kMinBendMouth_m = 10;
 constexpr double kOverpassMargin_m = 2;
 constexpr double kSlipRadius_m = 16;
-// Streets with a slip lane, and those that one leads into, are at least this long between their mouths; a lane that
-// opens on the inside of a sharper curve would open at once.
+// Minimum lengths between the mouths of streets with a slip lane and of those that one leads into; and the minimum
+// radius of the former: on the inside of a sharper curve the lane would open abruptly.
 constexpr double kMinSlipStreet_m = 42, kMinSlipExit_m = 25, kMinSlipStreetRadius_m = 60;
 
 double side_width_m(const Street& street) {
@@ -55,15 +55,15 @@ void Layout::set_headings() {
   }
 }
 
-/// Turns the arms of a node with a diagonal away from each other until every two have room.
+/// Rotates the arms of a node with a diagonal apart until every two have the minimum angle.
 void Layout::spread_arms(Node* node) {
   const int count = node->degree();
-  const double wanted = std::min(kMinFiveArmGap_rad, 0.97 * 2 * kPi_rad / count);
+  const double min_gap = std::min(kMinFiveArmGap_rad, 0.97 * 2 * kPi_rad / count);
   constexpr int kSweeps = 200;
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
     for (int i = 0; i < count; ++i) {
       const Arm a = node->arm(i), b = node->arm(i + 1);
-      const double missing = wanted - full_turn(b.heading - a.heading);
+      const double missing = min_gap - wrap_to_2pi(b.heading - a.heading);
       if (missing <= 0) continue;
       set_arm_heading(a.street, a.at_start, a.heading - 0.5 * missing);
       set_arm_heading(b.street, b.at_start, b.heading + 0.5 * missing);
@@ -71,18 +71,18 @@ void Layout::spread_arms(Node* node) {
   }
 }
 
-bool Layout::is_crowded(const Node& node) const {
+bool Layout::has_close_arms(const Node& node) const {
   for (int i = 0; i < node.degree(); ++i) {
     for (int j = 0; j < i; ++j) {
       const Arm &a = node.arm(i), &b = node.arm(j);
-      const double least = opposite(a.direction) == b.direction ? kMinOppositeGap_rad : kMinGap_rad;
-      if (std::abs(wrapped(a.heading - b.heading)) < least) return true;
+      const double min_gap = opposite(a.direction) == b.direction ? kMinOppositeGap_rad : kMinGap_rad;
+      if (std::abs(wrap_to_pi(a.heading - b.heading)) < min_gap) return true;
     }
   }
   return false;
 }
 
-/// Bends streets one by one: in an arc or an S, as much as their neighbours at both ends leave room for.
+/// Curves streets one by one, as an arc or an S, as far as the neighbouring arms at both ends allow.
 void Layout::curve_streets() {
   std::vector<int> candidates;
   for (int s = 0; s < static_cast<int>(streets_.size()); ++s) {
@@ -105,13 +105,13 @@ void Layout::curve_streets() {
       set_arm_heading(s, true, straight + angle);
       set_arm_heading(s, false, straight + arrive_sign * angle + kPi_rad);
       if (angle == 0) break;
-      if (is_crowded(from) || is_crowded(to)) continue;
-      if (sharpest_curvature(curve_of(streets_[s])) <= 1 / kMinStreetRadius_m) break;
+      if (has_close_arms(from) || has_close_arms(to)) continue;
+      if (max_curvature(curve_of(streets_[s])) <= 1 / kMinStreetRadius_m) break;
     }
   }
 }
 
-/// From the node to the end of an arm: as far as the corners with its two neighbours need.
+/// Distance from the node to the end of an arm: as far as the corners with its two neighbours need.
 double Layout::mouth_distance_m(const Node& node, int index) const {
   const Arm& arm = node.arm(index);
   const Street& street = streets_[arm.street];
@@ -122,24 +122,24 @@ double Layout::mouth_distance_m(const Node& node, int index) const {
   }
   if (node.is_bend()) {
     constexpr double kInnerRadius_m = 10;
-    const double gap = std::abs(wrapped(node.arm(index + 1).heading - arm.heading));
+    const double gap = std::abs(wrap_to_pi(node.arm(index + 1).heading - arm.heading));
     return std::max(kMinBendMouth_m, (side_width_m(street) + kInnerRadius_m) / std::tan(0.5 * gap));
   }
   if (node.kind == NodeKind::roundabout) {
     double mouth = 0;
     for (const int side : {1, -1}) {
-      const double gap = full_turn(side * (node.arm(index + side).heading - arm.heading));
+      const double gap = wrap_to_2pi(side * (node.arm(index + side).heading - arm.heading));
       mouth = std::max(mouth, roundabout_mouth_m(roundabout_half_angle(gap)));
     }
     return mouth;
   }
   double mouth = kMinMouth_m;
-  for (const int side : {1, -1}) {  // the neighbour on the left, then on the right, as seen from the node
+  for (const int side : {1, -1}) {  // the left neighbour, then the right one, as seen from the node
     const Arm& left = side > 0 ? node.arm(index + 1) : arm;
     const Arm& right = side > 0 ? arm : node.arm(index - 1);
-    const double gap = full_turn(left.heading - right.heading);
+    const double gap = wrap_to_2pi(left.heading - right.heading);
     if (gap > kFlatGap_rad) continue;
-    // Traffic that comes in by the right arm turns right into the left one. Its path begins on the left border of the
+    // Traffic arriving on the right arm turns right into the left one. Its path begins on the left border of the
     // outermost lane of the one and ends on that of the other.
     const double in_offset = (streets_[right.street].lanes - (has_slip(right) ? 0 : 1)) * kLaneWidth_m;
     const double out_offset = (streets_[left.street].lanes - 1) * kLaneWidth_m;
@@ -158,11 +158,11 @@ Curve Layout::curve_of(const Street& street) const {
     return mouth_distance_m(node, index);
   };
   const Node &from = nodes_[street.from], &to = nodes_[street.to];
-  return biarc(ahead({from.x, from.y, street.leave}, mouth(street.from)),
-               ahead({to.x, to.y, street.arrive}, -mouth(street.to)));
+  return biarc(moved_forward({from.x, from.y, street.leave}, mouth(street.from)),
+               moved_forward({to.x, to.y, street.arrive}, -mouth(street.to)));
 }
 
-/// Right turns at lights, where both streets are long enough for the wider corner.
+/// Chooses right turns at lights, where both streets are long enough for the larger corner.
 void Layout::choose_slip_lanes() {
   struct Turn {
     int node, arm;
@@ -175,9 +175,9 @@ void Layout::choose_slip_lanes() {
         std::any_of(node.arms.begin(), node.arms.end(), [](const Arm& arm) { return arm.direction % 2 == 1; });
     if (!node.is_crossing() || !node.has_lights || has_diagonal) continue;
     for (int i = 0; i < node.degree(); ++i) {
-      // The lanes of a stem are needed for both its directions.
+      // A stem needs its lanes for both directions.
       if (straight_on(node, i) < 0 && streets_[node.arm(i).street].lanes > 1) continue;
-      if (full_turn(node.arm(i + 1).heading - node.arm(i).heading) > degrees(115)) continue;
+      if (wrap_to_2pi(node.arm(i + 1).heading - node.arm(i).heading) > degrees(115)) continue;
       candidates.push_back(static_cast<int>(turns.size()));
       turns.push_back({n, i});
     }
@@ -193,21 +193,21 @@ void Layout::choose_slip_lanes() {
     Curve in_curve = curve_of(street), out_curve = curve_of(exit);
     const int ends = (street.slip_at_start ? 1 : 0) + (street.slip_at_end ? 1 : 0);
     const int exit_ends = (exit.slip_at_start ? 1 : 0) + (exit.slip_at_end ? 1 : 0);
-    slip = sharpest_curvature(in_curve) <= 1 / kMinSlipStreetRadius_m &&
-           sharpest_curvature(out_curve) <= 1 / kMinStreetRadius_m &&
-           number_stations(&in_curve) >= ends * kMinSlipStreet_m &&
-           number_stations(&out_curve) >= std::max(kMinSlipExit_m, exit_ends * kMinSlipStreet_m);
+    slip = max_curvature(in_curve) <= 1 / kMinSlipStreetRadius_m &&
+           max_curvature(out_curve) <= 1 / kMinStreetRadius_m &&
+           assign_stations(&in_curve) >= ends * kMinSlipStreet_m &&
+           assign_stations(&out_curve) >= std::max(kMinSlipExit_m, exit_ends * kMinSlipStreet_m);
     if (slip) --wanted;
   }
 }
 
-void Layout::lay_curves() {
+void Layout::build_curves() {
   for (Node& node : nodes_) {
     for (int i = 0; i < node.degree(); ++i) node.arms[i].mouth_m = mouth_distance_m(node, i);
   }
   for (Street& street : streets_) {
     street.curve = curve_of(street);
-    street.length_m = number_stations(&street.curve);
+    street.length_m = assign_stations(&street.curve);
   }
 }
 

@@ -1,4 +1,4 @@
-// How high crossings lie: on gentle hills, the upper street of an overpass clear of the lower one, no street too steep.
+// Heights of crossings: gentle hills, clearance at overpasses, limited grades.
 #include <cmath>
 
 #include "pictura/map/procedural/elevation.h"
@@ -8,7 +8,7 @@ namespace pictura::town {
 
 namespace {
 
-enum Draw : uint32_t { kHills = 200 };
+enum DrawPurpose : uint32_t { kHills = 200 };
 
 constexpr double kClearance_m = 5.5;  // between the surfaces of an overpass
 constexpr int kSweeps = 2000;
@@ -24,8 +24,8 @@ void Layout::set_heights() {
   for (int i = 0; i < kWaves; ++i) {
     RandomStream stream = draw(kHills, i);
     const double direction = static_cast<double>(stream.uniform()) * 2 * kPi_rad;
-    const double number = 2 * kPi_rad / static_cast<double>(stream.uniform(200, 600));
-    waves[i] = {number * std::cos(direction), number * std::sin(direction),
+    const double wavenumber = 2 * kPi_rad / static_cast<double>(stream.uniform(200, 600));
+    waves[i] = {wavenumber * std::cos(direction), wavenumber * std::sin(direction),
                 static_cast<double>(stream.uniform()) * 2 * kPi_rad};
   }
   for (Node& node : nodes_) {
@@ -33,16 +33,16 @@ void Layout::set_heights() {
     for (const Wave& wave : waves) sum += std::sin(wave.x * node.x + wave.y * node.y + wave.phase);
     node.z = node.upper_z = options_.hills_m * 0.5 * (1 + sum / kWaves);
   }
-  // Heights that no street forbids, by moving the ends of every street that is too steep towards each other, and the
-  // streets of overpasses apart, until all agree.
+  // Relaxation: repeatedly moves the ends of every street that is too steep towards each other, and the streets of
+  // overpasses apart, until all constraints hold.
   const auto height = [&](int n, const Street& street) -> double& {
     const bool is_upper =
         nodes_[n].kind == NodeKind::overpass && (street.direction % 4 == 2) == nodes_[n].upper_runs_north;
     return is_upper ? nodes_[n].upper_z : nodes_[n].z;
   };
-  bool agreed = false;
-  for (int sweep = 0; sweep < kSweeps && !agreed; ++sweep) {
-    agreed = true;
+  bool converged = false;
+  for (int sweep = 0; sweep < kSweeps && !converged; ++sweep) {
+    converged = true;
     for (Node& node : nodes_) {
       if (node.kind != NodeKind::overpass) continue;
       const double missing = kClearance_m - (node.upper_z - node.z);
@@ -51,9 +51,9 @@ void Layout::set_heights() {
     }
     for (const Street& street : streets_) {
       double &from = height(street.from, street), &to = height(street.to, street);
-      const double excess = std::abs(to - from) - greatest_climb_m(street.length_m);
+      const double excess = std::abs(to - from) - max_climb_m(street.length_m);
       if (excess <= 1e-9) continue;
-      agreed = false;
+      converged = false;
       from += std::copysign(0.5 * excess, to - from);
       to += std::copysign(0.5 * excess, from - to);
     }

@@ -4,7 +4,7 @@ namespace pictura::town {
 
 namespace {
 
-/// The movements of those who arrive on one arm.
+/// The movements of traffic that arrives on one arm.
 class Approach {
  public:
   Approach(const Layout& layout, const Node& node, int arm)
@@ -15,26 +15,28 @@ class Approach {
     if (straight >= 0) {
       go_straight(straight);
     } else {
-      part_left_and_right();
+      split_left_and_right();
     }
     if (has_slip_) {
       const int exit = arm_at(1);
-      found_.push_back({arm_, exit, 0, lanes_of(exit) - 1, 1, true});
+      movements_.push_back({arm_, exit, 0, lanes_of(exit) - 1, 1, true});
     }
-    return found_;
+    return movements_;
   }
 
  private:
   int lanes_of(int arm) const { return layout_.streets()[node_.arm(arm).street].lanes; }
-  /// The exits, from 1, the one to the right, to degree - 1, the one to the left.
+  /// The arm of an exit: exit 1 is on the right, degree - 1 on the left.
   int arm_at(int exit) const { return (arm_ + exit) % node_.degree(); }
-  void add(int to, int first_in, int first_out, int lanes) { found_.push_back({arm_, to, first_in, first_out, lanes}); }
+  void add(int to, int first_in, int first_out, int lanes) {
+    movements_.push_back({arm_, to, first_in, first_out, lanes});
+  }
 
-  /// Whether nobody goes straight on into this arm, so that turns alone must fill its lanes.
+  /// Whether no traffic goes straight on into this arm, so that only turns use its lanes.
   bool is_stem(int arm) const { return straight_on(node_, arm) < 0; }
 
-  /// All lanes go straight on, the innermost also left and the outermost also right. None crosses another: of a stem
-  /// that they turn into they choose the lane.
+  /// All lanes go straight on, the innermost also turns left and the outermost right. Paths do not cross; a turn into a
+  /// stem may take any lane on its side of the stem.
   void go_straight(int straight) {
     add(straight, 0, 0, in_);
     bool is_left = false;
@@ -51,14 +53,14 @@ class Approach {
     }
   }
 
-  /// From the stem of a T, or an arm between two others.
-  void part_left_and_right() {
+  /// From the stem of a T, or an arm between two others: the lanes split into left and right turns.
+  void split_left_and_right() {
     const int left = arm_at(node_.degree() - 1), right = arm_at(1);
     const int to_left = std::min(lanes_of(left), num_left(in_));
     add(left, 0, 0, to_left);
     for (int exit = 2; exit < node_.degree() - 1; ++exit) {
       const int to = arm_at(exit);
-      const bool turns_right = wrapped(node_.arm(to).heading - node_.arm(arm_).heading - kPi_rad) < 0;
+      const bool turns_right = wrap_to_pi(node_.arm(to).heading - node_.arm(arm_).heading - kPi_rad) < 0;
       add(to, to_left - 1, turns_right ? lanes_of(to) - 1 : 0, 1);
     }
     if (has_slip_) return;
@@ -66,8 +68,7 @@ class Approach {
     add(right, in_ - to_right, lanes_of(right) - to_right, to_right);
   }
 
-  // Of a stem's lanes, one belongs to the traffic of both sides: those inside it to the left, those outside to the
-  // right.
+  // The middle lane of a stem serves both turns, lanes inside it only left turns, lanes outside it only right turns.
   static int num_left(int lanes) { return (lanes + 1) / 2; }
   static int first_right(int lanes) { return num_left(lanes) - 1; }
 
@@ -75,7 +76,7 @@ class Approach {
   const Node& node_;
   int arm_, in_;
   bool has_slip_;
-  std::vector<Movement> found_;
+  std::vector<Movement> movements_;
 };
 
 }  // namespace

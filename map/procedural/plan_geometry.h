@@ -1,4 +1,4 @@
-// Curves of reference lines in plan: lines and arcs from one pose to another, in double.
+// Reference lines in plan: lines and arcs from one pose to another, in double.
 #pragma once
 
 #include <algorithm>
@@ -16,30 +16,30 @@ struct Pose {
   double x = 0, y = 0, heading = 0;
 };
 
-inline Pose ahead(Pose p, double distance_m) {
+inline Pose moved_forward(Pose p, double distance_m) {
   return {p.x + distance_m * std::cos(p.heading), p.y + distance_m * std::sin(p.heading), p.heading};
 }
-inline Pose to_the_right(Pose p, double distance_m) {
+inline Pose offset_right(Pose p, double distance_m) {
   return {p.x + distance_m * std::sin(p.heading), p.y - distance_m * std::cos(p.heading), p.heading};
 }
-inline Pose turned_back(Pose p) { return {p.x, p.y, p.heading + kPi_rad}; }
+inline Pose reversed(Pose p) { return {p.x, p.y, p.heading + kPi_rad}; }
 
 /// In [-pi, pi].
-inline double wrapped(double angle_rad) { return std::remainder(angle_rad, 2 * kPi_rad); }
+inline double wrap_to_pi(double angle_rad) { return std::remainder(angle_rad, 2 * kPi_rad); }
 /// In [0, 2 pi).
-inline double full_turn(double angle_rad) {
-  const double angle = wrapped(angle_rad);
+inline double wrap_to_2pi(double angle_rad) {
+  const double angle = wrap_to_pi(angle_rad);
   return angle < 0 ? angle + 2 * kPi_rad : angle;
 }
 
 using Curve = std::vector<opendrive::GeometryPiece>;
 
 inline opendrive::GeometryPiece piece_of(Pose start, double length_m, double curvature) {
-  return {0, start.x, start.y, wrapped(start.heading), length_m, curvature, curvature, {}};
+  return {0, start.x, start.y, wrap_to_pi(start.heading), length_m, curvature, curvature, {}};
 }
 
 /// Sets the stations of the pieces and returns the curve's length.
-inline double number_stations(Curve* curve) {
+inline double assign_stations(Curve* curve) {
   double s = 0;
   for (opendrive::GeometryPiece& piece : *curve) {
     piece.s = s;
@@ -48,7 +48,7 @@ inline double number_stations(Curve* curve) {
   return s;
 }
 
-inline double sharpest_curvature(const Curve& curve) {
+inline double max_curvature(const Curve& curve) {
   double sharpest = 0;
   for (const opendrive::GeometryPiece& piece : curve) sharpest = std::max(sharpest, std::abs(piece.start_curvature));
   return sharpest;
@@ -58,20 +58,20 @@ inline double sharpest_curvature(const Curve& curve) {
 inline opendrive::GeometryPiece arc_to(Pose from, double x, double y) {
   const double chord = std::hypot(x - from.x, y - from.y);
   const double chord_heading = std::atan2(y - from.y, x - from.x);
-  const double half_turn = wrapped(chord_heading - from.heading);
+  const double half_turn = wrap_to_pi(chord_heading - from.heading);
   if (std::abs(half_turn) < 1e-9) return piece_of({from.x, from.y, chord_heading}, chord, 0);
   return piece_of(from, chord * half_turn / std::sin(half_turn), 2 * std::sin(half_turn) / chord);
 }
 
-/// Two arcs with a common tangent, the control arms of both equally long; one piece where one is enough.
+/// A biarc: two arcs with a common tangent and equal control arms; one piece where that is enough.
 inline Curve biarc(Pose from, Pose to) {
   const double from_x = std::cos(from.heading), from_y = std::sin(from.heading);
   const double to_x = std::cos(to.heading), to_y = std::sin(to.heading);
   const double dx = to.x - from.x, dy = to.y - from.y;
   const double along = dx * (from_x + to_x) + dy * (from_y + to_y);
   const double chord2 = dx * dx + dy * dy;
-  const double bend = 2 * (1 - (from_x * to_x + from_y * to_y));
-  const double arm = chord2 / (along + std::sqrt(along * along + bend * chord2));
+  const double quadratic = 2 * (1 - (from_x * to_x + from_y * to_y));
+  const double arm = chord2 / (along + std::sqrt(along * along + quadratic * chord2));
   const double middle_x = 0.5 * (from.x + to.x + arm * (from_x - to_x));
   const double middle_y = 0.5 * (from.y + to.y + arm * (from_y - to_y));
   const opendrive::GeometryPiece first = arc_to(from, middle_x, middle_y);
@@ -81,15 +81,15 @@ inline Curve biarc(Pose from, Pose to) {
   return {first, second};
 }
 
-/// A line, an arc and a line, tangent to each other, the arc as wide as fits but at most of `max_radius_m`; a biarc
-/// where the tangents do not cross between the poses.
+/// A fillet: line, arc and line, tangent to each other, with the largest radius that fits but at most `max_radius_m`; a
+/// biarc if the tangents do not intersect between the poses.
 inline Curve fillet(Pose from, Pose to, double max_radius_m) {
   constexpr double kMinTurn_rad = 0.1, kMinLine_m = 1e-7;
-  const double turn = wrapped(to.heading - from.heading);
+  const double turn = wrap_to_pi(to.heading - from.heading);
   if (std::abs(turn) < kMinTurn_rad) return biarc(from, to);
   const double sine = std::sin(turn);
   const double dx = to.x - from.x, dy = to.y - from.y;
-  // Distances from both ends to the crossing of their tangents.
+  // Distances from both ends to the intersection of their tangents.
   const double lead_in = (dx * std::sin(to.heading) - dy * std::cos(to.heading)) / sine;
   const double lead_out = (dy * std::cos(from.heading) - dx * std::sin(from.heading)) / sine;
   if (lead_in <= 0 || lead_out <= 0) return biarc(from, to);
@@ -98,9 +98,9 @@ inline Curve fillet(Pose from, Pose to, double max_radius_m) {
   const double curvature = std::copysign(half_tangent / tangent, turn);
   Curve curve;
   if (lead_in - tangent > kMinLine_m) curve.push_back(piece_of(from, lead_in - tangent, 0));
-  curve.push_back(piece_of(ahead(from, lead_in - tangent), turn / curvature, curvature));
+  curve.push_back(piece_of(moved_forward(from, lead_in - tangent), turn / curvature, curvature));
   if (lead_out - tangent > kMinLine_m) {
-    curve.push_back(piece_of(ahead(to, tangent - lead_out), lead_out - tangent, 0));
+    curve.push_back(piece_of(moved_forward(to, tangent - lead_out), lead_out - tangent, 0));
   }
   return curve;
 }

@@ -1,5 +1,5 @@
-// A town from a seed, as OpenDRIVE text: streets and avenues on a jittered grid, crossings of three to five arms,
-// roundabouts, overpasses, slip lanes, hills, lights. It goes through the same importer as any other file.
+// Generates a town from a seed as OpenDRIVE text: streets and avenues on a jittered grid, crossings of three to five
+// arms, roundabouts, overpasses, slip lanes, hills, lights. It is imported like any other file.
 #pragma once
 
 #include <string>

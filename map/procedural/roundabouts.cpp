@@ -1,5 +1,5 @@
-// Roundabouts: a one-way circle in pieces, and where each arm meets it a junction of three roads: on along the circle,
-// off it, and onto it.
+// Roundabouts: a one-way circle in pieces, and at each arm a junction of three connecting roads: along the circle, exit
+// and entry.
 #include "pictura/map/procedural/roundabout_shape.h"
 #include "pictura/map/procedural/town_builder.h"
 
@@ -7,11 +7,11 @@ namespace pictura::town {
 
 namespace {
 
-constexpr double kWidest_m = 1e9;
+constexpr double kNoRadiusLimit_m = 1e9;
 constexpr Side kNoSide{.driving = 0, .has_shoulder = false, .has_sidewalk = false};
 constexpr Side kBareLane{.driving = 1, .has_shoulder = false, .has_sidewalk = false};
 
-/// On the circle's inner edge, in the direction of traffic.
+/// A pose on the circle's inner edge, in the direction of traffic.
 Pose on_circle(const Node& node, double angle) {
   return {node.x + kCircleRadius_m * std::cos(angle), node.y + kCircleRadius_m * std::sin(angle),
           angle + 0.5 * kPi_rad};
@@ -23,9 +23,9 @@ Curve circle_piece(const Node& node, double from_angle, double turn) {
 
 }  // namespace
 
-void TownBuilder::lay_roundabout(const Node& node) {
+void TownBuilder::build_roundabout(const Node& node) {
   const int count = node.degree();
-  const auto gap_after = [&](int arm) { return full_turn(node.arm(arm + 1).heading - node.arm(arm).heading); };
+  const auto gap_after = [&](int arm) { return wrap_to_2pi(node.arm(arm + 1).heading - node.arm(arm).heading); };
   const auto entry_angle = [&](int arm) { return node.arm(arm).heading + roundabout_half_angle(gap_after(arm)); };
   const auto exit_angle = [&](int arm) {
     return node.arm(arm).heading - roundabout_half_angle(gap_after((arm + count - 1) % count));
@@ -40,10 +40,10 @@ void TownBuilder::lay_roundabout(const Node& node) {
   SectionStyle inside = on_the_circle;
   inside.in_junction = true;
 
-  std::vector<int> pieces;  // of the circle, each behind the arm of its index
+  std::vector<int> pieces;  // of the circle, each after the arm of the same index
   for (int i = 0; i < count; ++i) {
     pieces.push_back(
-        add_road(circle_piece(node, entry_angle(i), full_turn(exit_angle((i + 1) % count) - entry_angle(i))), node.z,
+        add_road(circle_piece(node, entry_angle(i), wrap_to_2pi(exit_angle((i + 1) % count) - entry_angle(i))), node.z,
                  "", kRoundaboutSpeed_mps, kNoSide, corner(node.arm(i), node.arm(i + 1)), on_the_circle));
   }
   for (int i = 0; i < count; ++i) {
@@ -52,17 +52,17 @@ void TownBuilder::lay_roundabout(const Node& node) {
     opendrive::FileJunction junction;
     junction.id = next_id();
     for (const RoadEnd end : {before, after, end_of(arm)}) set_junction_link(end, junction.id);
-    const int on = add_road(circle_piece(node, exit_angle(i), full_turn(entry_angle(i) - exit_angle(i))), node.z,
+    const int on = add_road(circle_piece(node, exit_angle(i), wrap_to_2pi(entry_angle(i) - exit_angle(i))), node.z,
                             junction.id, kRoundaboutSpeed_mps, kNoSide, kBareLane, inside);
     connect(before, on, after, {}, &junction);
     SectionStyle narrowing = inside, widening = inside;
     narrowing.driving_to_m = widening.driving_from_m = kLaneWidth_m;
     const int exit =
-        add_road(fillet(on_circle(node, exit_angle(i)), mouth_of(node, arm), kWidest_m), node.z, junction.id,
+        add_road(fillet(on_circle(node, exit_angle(i)), mouth_of(node, arm), kNoRadiusLimit_m), node.z, junction.id,
                  kRoundaboutSpeed_mps, kNoSide, corner(node.arm(i + count - 1), arm), narrowing);
     connect(before, exit, end_of(arm), {}, &junction);
     const int entry =
-        add_road(fillet(turned_back(mouth_of(node, arm)), on_circle(node, entry_angle(i)), kWidest_m), node.z,
+        add_road(fillet(reversed(mouth_of(node, arm)), on_circle(node, entry_angle(i)), kNoRadiusLimit_m), node.z,
                  junction.id, kRoundaboutSpeed_mps, kNoSide, corner(arm, node.arm(i + 1)), widening);
     connect(end_of(arm), entry, after, {}, &junction);
     if (node.has_crosswalks) add_crosswalk(arm, entry);

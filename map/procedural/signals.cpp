@@ -1,4 +1,4 @@
-// Traffic lights: one, with a controller and a phase of its own, for every approach of a crossing.
+// Traffic lights: one for every approach of a crossing, each with its own controller and phase.
 #include <cmath>
 #include <limits>
 
@@ -9,54 +9,54 @@ namespace pictura::town {
 
 namespace {
 
-constexpr double kPostSetback_m = 0.8;  // of a post, behind the kerb
-// Near-side heads: on a post beyond the stop line, or on an arm over the lanes, high enough for what passes below.
+constexpr double kPostSetback_m = 0.8;  // distance of a post from the kerb
+// Near-side heads: on a post beyond the stop line, or on a mast arm over the lanes, high enough for traffic below.
 constexpr double kNearPost_m = 3, kNearArm_m = 4, kArmRise_m = 2;
 
-struct Place {
+struct SignalPosition {
   double x = 0, y = 0, z_offset_m = 0;
 };
 
 double behind_kerb_m(int lanes) { return lanes * kLaneWidth_m + kShoulderWidth_m + kPostSetback_m; }
 
-Place at(Pose pose, double z_offset_m = 0) { return {pose.x, pose.y, z_offset_m}; }
+SignalPosition position_at(Pose pose, double z_offset_m = 0) { return {pose.x, pose.y, z_offset_m}; }
 
-/// Just beyond the stop line: beside a single lane, over several.
-Place near_side(Pose arriving, int lanes, bool has_slip) {
-  if (lanes == 1 && !has_slip) return at(ahead(to_the_right(arriving, behind_kerb_m(1)), kNearPost_m));
-  return at(ahead(to_the_right(arriving, 0.5 * lanes * kLaneWidth_m), kNearArm_m), kArmRise_m);
+/// Just beyond the stop line: next to a single lane, above several.
+SignalPosition near_side(Pose arriving, int lanes, bool has_slip) {
+  if (lanes == 1 && !has_slip) return position_at(moved_forward(offset_right(arriving, behind_kerb_m(1)), kNearPost_m));
+  return position_at(moved_forward(offset_right(arriving, 0.5 * lanes * kLaneWidth_m), kNearArm_m), kArmRise_m);
 }
 
-/// Beyond the junction between the two arms to either side of the direction of travel, behind both their kerbs.
-Place far_side_between(const Layout& layout, const Node& node, int arm) {
+/// Beyond the junction, between the arms on both sides of the direction of travel, behind the kerbs of both.
+SignalPosition far_side_between(const Layout& layout, const Node& node, int arm) {
   const double forward = node.arm(arm).heading + kPi_rad;
   double nearest = 0.5 * kPi_rad;
   int max_lanes = 0;
   for (int i = 0; i < node.degree(); ++i) {
     if (i == arm) continue;
-    nearest = std::min(nearest, std::abs(wrapped(node.arm(i).heading - forward)));
+    nearest = std::min(nearest, std::abs(wrap_to_pi(node.arm(i).heading - forward)));
     max_lanes = std::max(max_lanes, layout.streets()[node.arm(i).street].lanes);
   }
-  return at(ahead({node.x, node.y, forward}, behind_kerb_m(max_lanes) / std::sin(nearest)));
+  return position_at(moved_forward({node.x, node.y, forward}, behind_kerb_m(max_lanes) / std::sin(nearest)));
 }
 
-/// A place in the terms of a road: the foot on its reference line and the distance to the left of it.
-struct Foot {
+/// Road coordinates of a point: its projection onto the reference line and its distance to the left.
+struct RoadPosition {
   double s = 0, t = std::numeric_limits<double>::infinity();
 };
 
-Foot foot_on(const opendrive::FileRoad& road, const Place& place) {
+RoadPosition project_onto(const opendrive::FileRoad& road, const SignalPosition& position) {
   constexpr int kStarts = 8, kSteps = 30;
-  constexpr double kOff_m = 1e-6;
-  Foot best;
+  constexpr double kConverged_m = 1e-6;
+  RoadPosition best;
   for (int start = 0; start <= kStarts; ++start) {
     double s = road.length * start / kStarts;
     for (int step = 0; step < kSteps; ++step) {
       const opendrive::Pose pose = opendrive::pose_at(road, s);
-      const double dx = place.x - pose.x, dy = place.y - pose.y;
+      const double dx = position.x - pose.x, dy = position.y - pose.y;
       const double along = dx * std::cos(pose.heading) + dy * std::sin(pose.heading);
       const double left = dy * std::cos(pose.heading) - dx * std::sin(pose.heading);
-      if (std::abs(along) < kOff_m && std::abs(left) < std::abs(best.t)) best = {s, left};
+      if (std::abs(along) < kConverged_m && std::abs(left) < std::abs(best.t)) best = {s, left};
       s = std::clamp(s + along / std::max(0.2, 1 - pose.curvature * left), 0.0, road.length);
     }
   }
@@ -70,21 +70,21 @@ void TownBuilder::add_lights(const Node& node, const std::vector<Movement>& move
   for (int i = 0; i < node.degree(); ++i) {
     const Arm& arm = node.arm(i);
     const int straight = straight_on(node, i);
-    Place place = near_side(turned_back(mouth_of(node, arm)), street_of(arm).lanes, layout_.has_slip(arm));
+    SignalPosition position = near_side(reversed(mouth_of(node, arm)), street_of(arm).lanes, layout_.has_slip(arm));
     if (node.far_side_heads && straight >= 0) {
       const Arm& exit = node.arm(straight);
-      place = at(to_the_right(mouth_of(node, exit), behind_kerb_m(street_of(exit).lanes)));
+      position = position_at(offset_right(mouth_of(node, exit), behind_kerb_m(street_of(exit).lanes)));
     } else if (node.far_side_heads) {
-      place = far_side_between(layout_, node, i);
+      position = far_side_between(layout_, node, i);
     }
-    // The signal belongs to the connecting road that passes closest.
-    int carrier = roads[0];
-    Foot foot;
+    // The signal is attached to the closest connecting road.
+    int owner_road = roads[0];
+    RoadPosition projection;
     for (const int candidate : roads) {
-      const Foot other = foot_on(road(candidate), place);
-      if (std::abs(other.t) >= std::abs(foot.t)) continue;
-      foot = other;
-      carrier = candidate;
+      const RoadPosition other = project_onto(road(candidate), position);
+      if (std::abs(other.t) >= std::abs(projection.t)) continue;
+      projection = other;
+      owner_road = candidate;
     }
     opendrive::FileSignal signal;
     signal.id = next_id();
@@ -92,9 +92,9 @@ void TownBuilder::add_lights(const Node& node, const std::vector<Movement>& move
     signal.subtype = "-1";
     signal.country = "OpenDRIVE";
     signal.is_dynamic = true;
-    signal.s = foot.s;
-    signal.t = foot.t;
-    signal.z_offset = place.z_offset_m;
+    signal.s = projection.s;
+    signal.t = projection.t;
+    signal.z_offset = position.z_offset_m;
     for (std::size_t m = 0; m < movements.size(); ++m) {
       if (movements[m].from != i || movements[m].is_slip) continue;
       opendrive::SignalReference reference;
@@ -108,7 +108,7 @@ void TownBuilder::add_lights(const Node& node, const std::vector<Movement>& move
     controller.signals.push_back(signal.id);
     junction->controllers.push_back(controller.id);
     network_.controllers.push_back(std::move(controller));
-    road(carrier).signals.push_back(std::move(signal));
+    road(owner_road).signals.push_back(std::move(signal));
   }
 }
 

@@ -1,4 +1,4 @@
-// Streets and bends, and how the lanes of roads are joined.
+// Builds streets and bends, and links the lanes of roads.
 #include "pictura/map/procedural/town_builder.h"
 
 #include "pictura/map/procedural/elevation.h"
@@ -8,18 +8,18 @@ namespace pictura::town {
 namespace {
 
 constexpr double kMinParking_m = 30;  // of a section with parking bays
-constexpr double kSlipSection_m = 32, kMaxSlipShare = 0.48;
+constexpr double kSlipSection_m = 32, kMaxSlipFraction = 0.48;
 constexpr double kSpaceLength_m = 6, kParkedLength_m = 5, kParkedWidth_m = 2;
 
 void add_parking_spaces(opendrive::FileRoad* road, const opendrive::FileSection& section, bool left) {
   const double begin = section.s + kParkingLead_m + kParkingTaper_m;
-  const double room = section.end - kParkingLead_m - kParkingTaper_m - begin;
+  const double available_m = section.end - kParkingLead_m - kParkingTaper_m - begin;
   const double t = kLaneWidth_m + 0.5 * kParkingWidth_m;
-  const int spaces = static_cast<int>(room / kSpaceLength_m);
+  const int spaces = static_cast<int>(available_m / kSpaceLength_m);
   for (int i = 0; i < spaces; ++i) {
     opendrive::FileObject space;
     space.kind = opendrive::FileObject::Kind::parking_space;
-    space.s = begin + (i + 0.5) * room / spaces;
+    space.s = begin + (i + 0.5) * available_m / spaces;
     space.t = left ? t : -t;
     space.length = kParkedLength_m;
     space.width = kParkedWidth_m;
@@ -30,17 +30,17 @@ void add_parking_spaces(opendrive::FileRoad* road, const opendrive::FileSection&
 }  // namespace
 
 TownBuilder::TownBuilder(const Layout& layout) : layout_(layout) {
-  for (int s = 0; s < static_cast<int>(layout.streets().size()); ++s) lay_street(s);
+  for (int s = 0; s < static_cast<int>(layout.streets().size()); ++s) build_street(s);
   for (const Node& node : layout.nodes()) {
     if (node.kind == NodeKind::overpass) {
-      lay_bend(node, node.arm(0), node.arm(2), node.upper_runs_north ? node.z : node.upper_z);
-      lay_bend(node, node.arm(1), node.arm(3), node.upper_runs_north ? node.upper_z : node.z);
+      build_bend(node, node.arm(0), node.arm(2), node.upper_runs_north ? node.z : node.upper_z);
+      build_bend(node, node.arm(1), node.arm(3), node.upper_runs_north ? node.upper_z : node.z);
     } else if (node.kind == NodeKind::roundabout) {
-      lay_roundabout(node);
+      build_roundabout(node);
     } else if (node.is_bend()) {
-      lay_bend(node, node.arm(0), node.arm(1), node.z);
+      build_bend(node, node.arm(0), node.arm(1), node.z);
     } else {
-      lay_crossing(node);
+      build_crossing(node);
     }
   }
   for (std::size_t i = 0; i < network_.roads.size(); ++i) {
@@ -54,9 +54,9 @@ int TownBuilder::add_road(Curve curve, double height_m, const std::string& junct
   opendrive::FileRoad& added = network_.roads.emplace_back();
   added.id = fmt::format("{}", network_.roads.size() - 1);
   added.junction = junction;
-  added.length = number_stations(&curve);
+  added.length = assign_stations(&curve);
   added.geometry = std::move(curve);
-  added.elevation = climb(height_m, height_m, added.length);
+  added.elevation = elevation_profile(height_m, height_m, added.length);
   added.speed_limit_mps = {{{0, speed_mps, 0, 0, 0}}};
   added.sections.push_back(make_section(0, added.length, left, right, style));
   end_sides_.push_back({left, right});
@@ -64,16 +64,15 @@ int TownBuilder::add_road(Curve curve, double height_m, const std::string& junct
   return static_cast<int>(network_.roads.size()) - 1;
 }
 
-void TownBuilder::lay_street(int index) {
+void TownBuilder::build_street(int index) {
   const Street& street = layout_.streets()[index];
   const double length = street.length_m;
-  const double slip = std::min(kSlipSection_m, kMaxSlipShare * length);
+  const double slip = std::min(kSlipSection_m, kMaxSlipFraction * length);
   const double begin = street.slip_at_start ? slip : 0, end = street.slip_at_end ? length - slip : length;
   const Side plain{.driving = street.lanes, .has_sidewalk = street.has_sidewalks};
   Side left = plain, right = plain, with_slip = plain;
   constexpr double kRounding = 1 + 1e-9;
-  const bool may_park =
-      end - begin >= kMinParking_m && sharpest_curvature(street.curve) <= kRounding / kMinStreetRadius_m;
+  const bool may_park = end - begin >= kMinParking_m && max_curvature(street.curve) <= kRounding / kMinStreetRadius_m;
   left.has_parking = street.parks_left && may_park;
   right.has_parking = street.parks_right && may_park;
   with_slip.has_slip = true;
@@ -88,31 +87,32 @@ void TownBuilder::lay_street(int index) {
 
   const int added =
       add_road(street.curve, 0, "", street.is_avenue ? kAvenueSpeed_mps : kStreetSpeed_mps, left, right, {});
-  opendrive::FileRoad& laid = road(added);
-  laid.elevation = climb(layout_.end_height_m(index, true), layout_.end_height_m(index, false), length);
-  laid.sections.clear();
-  for (const Part& part : parts) laid.sections.push_back(make_section(part.begin, part.end, part.left, part.right, {}));
+  opendrive::FileRoad& built = road(added);
+  built.elevation = elevation_profile(layout_.end_height_m(index, true), layout_.end_height_m(index, false), length);
+  built.sections.clear();
+  for (const Part& part : parts)
+    built.sections.push_back(make_section(part.begin, part.end, part.left, part.right, {}));
   for (std::size_t i = 1; i < parts.size(); ++i) {
-    link_sections(&laid.sections[i - 1], parts[i - 1].left, parts[i - 1].right, &laid.sections[i], parts[i].left,
+    link_sections(&built.sections[i - 1], parts[i - 1].left, parts[i - 1].right, &built.sections[i], parts[i].left,
                   parts[i].right);
   }
-  for (const opendrive::FileSection& section : laid.sections) {
+  for (const opendrive::FileSection& section : built.sections) {
     if (section.s != begin) continue;
-    if (left.has_parking) add_parking_spaces(&laid, section, true);
-    if (right.has_parking) add_parking_spaces(&laid, section, false);
+    if (left.has_parking) add_parking_spaces(&built, section, true);
+    if (right.has_parking) add_parking_spaces(&built, section, false);
   }
   sides_at({added, true}) = {parts.front().left, parts.front().right};
   sides_at({added, false}) = {parts.back().left, parts.back().right};
 }
 
-/// A road from one arm to another without a junction: a corner, or one of the streets of an overpass.
-void TownBuilder::lay_bend(const Node& node, const Arm& from, const Arm& to, double height_m) {
+/// A road from one arm to another without a junction: a bend, or one of the streets of an overpass.
+void TownBuilder::build_bend(const Node& node, const Arm& from, const Arm& to, double height_m) {
   const Side side{.driving = street_of(from).lanes,
                   .has_sidewalk = street_of(from).has_sidewalks && street_of(to).has_sidewalks};
   const bool is_corner = node.is_bend();
   const double speed = is_corner ? kJunctionSpeed_mps : street_of(from).is_avenue ? kAvenueSpeed_mps : kStreetSpeed_mps;
-  constexpr double kWidest_m = 1e9;
-  const int bend = add_road(fillet(turned_back(mouth_of(node, from)), mouth_of(node, to), kWidest_m), height_m, "",
+  constexpr double kNoRadiusLimit_m = 1e9;
+  const int bend = add_road(fillet(reversed(mouth_of(node, from)), mouth_of(node, to), kNoRadiusLimit_m), height_m, "",
                             speed, side, side, {});
   join({bend, true}, end_of(from));
   join({bend, false}, end_of(to));

@@ -1,4 +1,4 @@
-// Lays a planned town: fills a Network with roads, lanes, links, junctions, lights and objects.
+// Builds a planned town: fills a Network with roads, lanes, links, junctions, lights and objects.
 #pragma once
 
 #include <string>
@@ -17,7 +17,7 @@ struct RoadEnd {
   bool at_start = false;
 };
 
-/// The sides of a road where it ends.
+/// The two sides of a road at one of its ends.
 struct EndSides {
   Side left, right;
 };
@@ -29,28 +29,30 @@ class TownBuilder {
   opendrive::Network take() { return std::move(network_); }
 
  private:
-  void lay_street(int street);
-  void lay_bend(const Node& node, const Arm& from, const Arm& to, double height_m);
+  void build_street(int street);
+  void build_bend(const Node& node, const Arm& from, const Arm& to, double height_m);
   // crossings.cpp
-  void lay_crossing(const Node& node);
-  int lay_movement(const Node& node, const Movement& movement, opendrive::FileJunction* junction);
-  void add_crosswalk(const Arm& arm, int carrier);
+  void build_crossing(const Node& node);
+  int build_movement(const Node& node, const Movement& movement, opendrive::FileJunction* junction);
+  void add_crosswalk(const Arm& arm, int owner_road);
   // roundabouts.cpp
-  void lay_roundabout(const Node& node);
+  void build_roundabout(const Node& node);
   // signals.cpp
   void add_lights(const Node& node, const std::vector<Movement>& movements, const std::vector<int>& roads,
                   opendrive::FileJunction* junction);
 
   const Street& street_of(const Arm& arm) const { return layout_.streets()[arm.street]; }
-  /// Streets are the first roads, in their order.
+  /// The first roads are the streets, in their order.
   static RoadEnd end_of(const Arm& arm) { return {arm.street, arm.at_start}; }
-  static Pose mouth_of(const Node& node, const Arm& arm) { return ahead({node.x, node.y, arm.heading}, arm.mouth_m); }
+  static Pose mouth_of(const Node& node, const Arm& arm) {
+    return moved_forward({node.x, node.y, arm.heading}, arm.mouth_m);
+  }
 
-  /// Adds a road of one section; its right side, and its left one unless it is one-way.
+  /// Adds a road with one section; the left side is ignored for one-way roads. Returns its index.
   int add_road(Curve curve, double height_m, const std::string& junction, double speed_mps, const Side& left,
                const Side& right, const SectionStyle& style);
   EndSides& sides_at(RoadEnd end) { return end_sides_[2 * end.road + (end.at_start ? 0 : 1)]; }
-  /// The side of those who arrive at the end, or who leave from it; and the id of a lane on it, 0: none.
+  /// The side of traffic that arrives at the end, or leaves from it; and the id of a lane on it, 0: none.
   const Side& side(RoadEnd end, bool arriving) {
     return arriving == end.at_start ? sides_at(end).left : sides_at(end).right;
   }
@@ -60,9 +62,9 @@ class TownBuilder {
   void set_lane_link(RoadEnd end, int lane, int other);
   void set_road_link(RoadEnd end, RoadEnd other);
   void set_junction_link(RoadEnd end, const std::string& junction);
-  /// Joins two ends with each other, lane by lane, both ways.
+  /// Links two road ends with each other, lane by lane, in both directions.
   void join(RoadEnd a, RoadEnd b);
-  /// Leads lanes that arrive at `from` over the connecting road, which begins there and ends at `to`.
+  /// Connects lanes that arrive at `from` through the connecting road, which begins there and ends at `to`.
   void connect(RoadEnd from, int connecting, RoadEnd to, const Movement& movement, opendrive::FileJunction* junction);
   void finish_junction(opendrive::FileJunction junction);
 
@@ -72,7 +74,7 @@ class TownBuilder {
   const Layout& layout_;
   opendrive::Network network_;
   std::vector<EndSides> end_sides_;  // [roads][start, end]
-  int next_id_ = 1000000;            // of everything that is not a road
+  int next_id_ = 1000000;            // for everything except roads
 };
 
 inline constexpr double mph(double speed) { return speed * 0.44704; }

@@ -11,7 +11,7 @@ namespace pictura {
 
 namespace {
 
-/// The number at the start of `text`, which is taken off; false when there is none.
+/// Removes the number at the start of `text`; false if there is none.
 template <typename Number>
 bool take_number(std::string_view* text, Number* number_out) {
   const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), *number_out);
@@ -49,21 +49,22 @@ void set_option(std::string_view name, std::string_view value, std::string_view 
 const std::vector<TownFeature>& town_features() {
   static const std::vector<TownFeature> kFeatures = {
       {"block-m", &TownOptions::block_m, 80, 200, "Mean distance between crossings"},
-      {"density", &TownOptions::density, 0, 1, "Share of the streets that can be left out that stay"},
+      {"density", &TownOptions::density, 0, 1, "Share of the removable streets that are kept"},
       {"curved", &TownOptions::curved, 0, 1, "Share of curved streets"},
       {"five-arms", &TownOptions::five_arms, 0, 1, "Share of inner crossings with a fifth arm"},
       {"roundabouts", &TownOptions::roundabouts, 0, 1, "Share of crossings of single-lane streets"},
       {"avenues", &TownOptions::avenues, 0, 1, "Share of inner rows and columns with several lanes each way"},
-      {"max-lanes", &TownOptions::max_lanes, 1, 3, "Most lanes each way of avenues and the ring road"},
+      {"max-lanes", &TownOptions::max_lanes, 1, 3, "Maximum number of lanes each way of avenues and the ring road"},
       {"ring-road", &TownOptions::ring_road, 0, 1, "Chance of an avenue around the town"},
       {"slip-lanes", &TownOptions::slip_lanes, 0, 1, "Share of right turns that bypass their light"},
-      {"hills-m", &TownOptions::hills_m, 0, 50, "Greatest difference in height, before grades are limited"},
+      {"hills-m", &TownOptions::hills_m, 0, 50, "Maximum height difference, before grades are limited"},
       {"overpasses", &TownOptions::overpasses, 0, 1, "Share of inner crossings where one street crosses over another"},
       {"crosswalks", &TownOptions::crosswalks, 0, 1, "Share of crossings with crosswalks"},
       {"sidewalks", &TownOptions::sidewalks, 0, 1, "Share of streets with sidewalks"},
       {"parking", &TownOptions::parking, 0, 1, "Share of the sides of single-lane streets with parking bays"},
       {"lights", &TownOptions::lights, 0, 1, "Share of crossings with traffic lights"},
-      {"far-side", &TownOptions::far_side, 0, 1, "Share of those whose heads hang beyond the junction"},
+      {"far-side", &TownOptions::far_side, 0, 1,
+       "Share of the crossings with lights whose heads are beyond the junction"},
   };
   return kFeatures;
 }

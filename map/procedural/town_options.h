@@ -1,4 +1,4 @@
-// What a procedural town is made of: its seed, its size, and how much of each feature it has.
+// Options of procedural towns: seed, size, and the amount of each feature.
 #pragma once
 
 #include <cstdint>
@@ -7,20 +7,20 @@
 
 namespace pictura {
 
-/// Shares lie in [0, 1]. A share of things that a town chooses from takes at least one of them unless it is 0.
+/// Fractions lie in [0, 1]. A fraction of some elements selects at least one of them unless it is 0.
 struct TownOptions {
   uint64_t seed = 0;
-  int blocks_x = 3, blocks_y = 3;  // blocks of houses, in [1, 32] each
+  int blocks_x = 3, blocks_y = 3;  // blocks, in [1, 32] each
   double block_m = 90;             // mean distance between crossings
-  double density = 0.9;            // of the streets that can go, how many stay
+  double density = 0.9;            // fraction of the removable streets that are kept
   double curved = 0.6;             // of the streets
-  double five_arms = 0.2;          // of the inner crossings, by a diagonal street
+  double five_arms = 0.2;          // of the inner crossings, made by a diagonal street
   double roundabouts = 0.2;        // of the crossings of single-lane streets
   double avenues = 0.2;            // of the inner rows and columns: two or more lanes each way
   double max_lanes = 3;            // each way, of avenues and the ring road
   double ring_road = 1;            // chance that an avenue runs around the town
-  double slip_lanes = 0.1;         // of the right turns at lights that have room for one
-  double hills_m = 6;              // greatest difference in height, before grades are limited
+  double slip_lanes = 0.1;         // of the right turns at lights that are large enough
+  double hills_m = 6;              // maximum height difference, before grades are limited
   double overpasses = 0.1;         // of the inner crossings of four arms
   double crosswalks = 0.9;         // of the crossings
   double sidewalks = 0.95;         // of the streets
@@ -29,7 +29,7 @@ struct TownOptions {
   double far_side = 0.5;           // of the crossings with lights: heads beyond the junction
 };
 
-/// An option that is a number: its name in commands and map names, its range, and what it means.
+/// A numeric option: its name in commands and map names, its range and its help text.
 struct TownFeature {
   const char* name;
   double TownOptions::* value;
@@ -43,8 +43,8 @@ constexpr int kMaxTownBlocks = 32;
 /// Throws UsageError naming the option, its range and its value.
 void check_town_options(const TownOptions& options);
 
-/// The options of `SEED[:NAME=VALUE,...]`, where NAME is `blocks` (as AxB) or a feature's. `map_name` is what the user
-/// wrote, for messages. Throws UsageError.
+/// Parses `SEED[:NAME=VALUE,...]`, where NAME is `blocks` (as AxB) or a feature's name. `map_name` is the user's text,
+/// for messages. Throws UsageError.
 TownOptions parse_town_options(std::string_view text, std::string_view map_name);
 
 }  // namespace pictura
