@@ -3,6 +3,7 @@
 Run by ctest: python3 scripts_test.py [unittest arguments].
 """
 
+import hashlib
 import json
 import os
 import pathlib
@@ -24,6 +25,50 @@ class Help(unittest.TestCase):
                 result = subprocess.run([f"./{name}", "--help"], cwd=SCRIPTS, capture_output=True, text=True, timeout=60)
                 self.assertEqual((result.returncode, result.stderr), (0, ""))
                 self.assertGreater(len(result.stdout.splitlines()), 1)
+
+
+class Setup(unittest.TestCase):
+    """A copy of scripts/setup that finds everything installed."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="pictura-test-")
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name)
+        (self.root / "scripts").mkdir()
+        for name in ("scripts/setup", "requirements.txt"):
+            shutil.copy(SCRIPTS.parent / name, self.root / name)
+        installed = (self.root / "requirements.txt").read_bytes() + (self.root / "scripts/setup").read_bytes()
+        self.write_program("venv/bin/python", "echo 2.11.0")
+        self.write_program("venv/bin/cmake", "echo cmake version 3.30")
+        (self.root / "venv/pictura-setup").write_text(hashlib.sha256(installed).hexdigest()[:16])
+        self.write_program("bin/dpkg-query", "echo installed")
+
+    def write_program(self, name, script):
+        path = self.root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"#!/bin/sh\n{script}\n")
+        path.chmod(0o755)
+
+    def link(self):
+        """The link that set-up leaves, however often it runs."""
+        environment = dict(os.environ, PICTURA_VENV="venv", PATH=f"{self.root}/bin:/usr/bin:/bin")
+        for _ in range(2):
+            result = subprocess.run([self.root / "scripts/setup"], env=environment, capture_output=True, text=True, timeout=60)
+            self.assertEqual((result.returncode, result.stderr), (0, ""), result.stdout)
+        return os.readlink(self.root / "compile_commands.json")
+
+    def test_compile_commands_are_linked_at_the_root(self):
+        has_nvcc = shutil.which("nvcc", path="/usr/bin:/bin") or os.access("/usr/local/cuda/bin/nvcc", os.X_OK)
+        self.assertEqual(self.link(), f"build/{'cuda' if has_nvcc else 'cpu'}/compile_commands.json")
+        self.write_program("bin/nvcc", "true")
+        self.assertEqual(self.link(), "build/cuda/compile_commands.json")
+
+    def test_presets_export_them_and_git_ignores_the_link(self):
+        presets = json.loads((SCRIPTS.parent / "CMakePresets.json").read_text())["configurePresets"]
+        base = next(preset for preset in presets if preset["name"] == "base")
+        self.assertEqual(base["cacheVariables"]["CMAKE_EXPORT_COMPILE_COMMANDS"], "ON")
+        self.assertTrue(all(preset.get("inherits") == "base" for preset in presets if preset is not base))
+        self.assertIn("/compile_commands.json", (SCRIPTS.parent / ".gitignore").read_text().split())
 
 
 class Profile(unittest.TestCase):
