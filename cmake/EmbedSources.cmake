@@ -1,6 +1,6 @@
-# Run at every build in which a source changed: writes OUTPUT, a C++ file with the texts of ROOTS and of every header of
-# ours that they include, as backend_cuda/renderer/kernel_sources.h declares them. Paths are relative to SOURCE_DIR. Fails
-# where one of them is not among DEPENDENCIES (absolute paths), since nothing would embed it anew when it changes.
+# Runs at every build in which a source changed: writes OUTPUT, a C++ file with the text of ROOTS and of every pictura
+# header that they include, as declared in backend_cuda/renderer/kernel_sources.h. Paths are relative to SOURCE_DIR. Fails
+# if one of them is not among DEPENDENCIES (absolute paths), because a change to it would not embed it again.
 cmake_minimum_required(VERSION 3.25)
 set(files ${ROOTS})
 set(entries "")

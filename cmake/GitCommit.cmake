@@ -1,5 +1,5 @@
-# Run at every build: writes OUTPUT with the commit of the sources (COMMIT, or what git says where that is empty), and
-# touches it only when the commit changes.
+# Runs at every build: writes OUTPUT with the commit of the sources (COMMIT, or git's answer if that is empty), only when
+# the commit changes.
 set(commit "${COMMIT}")
 if(commit STREQUAL "")
   execute_process(COMMAND git -C ${SOURCE} describe --always --dirty --abbrev=12

@@ -1,4 +1,4 @@
-# The CUDA language and toolkit, where a compiler of 12.8 or later is found. Architectures come from the preset.
+# The CUDA language and toolkit, where nvcc 12.8 or later is found. Architectures come from the preset.
 
 set(PICTURA_HAS_CUDA OFF)
 if(NOT PICTURA_WITH_CUDA STREQUAL OFF)

@@ -1,5 +1,5 @@
-# How every target of this project is made: flags through one interface target, includes as `pictura/FOLDER/FILE.h` in
-# the tree as when installed, and tests that know where map files may be.
+# Settings of every target: flags through one interface target, includes as `pictura/FOLDER/FILE.h` in the tree as when
+# installed, and tests with their environment.
 
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
@@ -14,7 +14,7 @@ endif()
 find_package(OpenMP REQUIRED)
 find_package(fmt REQUIRED)
 
-# <build>/include/pictura/FOLDER -> FOLDER: sources include their headers by the names that users have after install.
+# <build>/include/pictura/FOLDER -> FOLDER: sources include headers by their installed names.
 set(PICTURA_INCLUDE_DIR ${PROJECT_BINARY_DIR}/include)
 file(MAKE_DIRECTORY ${PICTURA_INCLUDE_DIR}/pictura)
 foreach(folder common map simulator backend_cpu backend_cuda backend_gl backends training drawing cli apps bench tests)
@@ -31,20 +31,20 @@ target_include_directories(pictura_flags INTERFACE
   $<BUILD_INTERFACE:${PICTURA_INCLUDE_DIR}> $<INSTALL_INTERFACE:include>)
 target_compile_options(pictura_flags INTERFACE
   $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wpedantic -Wshadow>
-  # Designated initializers leave the rest to the members' own defaults, on purpose.
+  # Designated initializers leave the other members at their defaults, on purpose.
   $<$<COMPILE_LANGUAGE:CXX>:-Wno-missing-field-initializers>
-  # g++ 13 takes every reference that a function returns for one into its temporary arguments.
+  # g++ 13 assumes that every returned reference refers to a temporary argument.
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_HAS_WDANGLING_REFERENCE}>>:-Wno-dangling-reference>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_WERROR}>>:-Werror>
-  # The arithmetic contract: a product and a sum round twice on every device, and nothing is reordered.
+  # The arithmetic contract: no fused multiply-add and no reordering, on every device.
   $<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off -fno-math-errno -fno-trapping-math>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_CPU_ARCH}>>:-march=${PICTURA_CPU_ARCH}>)
-set(PICTURA_IS_SANITIZED 0)  # for tests that time something
+set(PICTURA_IS_SANITIZED 0)  # for tests with time limits
 if(PICTURA_SANITIZE)
   set(PICTURA_IS_SANITIZED 1)
   target_compile_options(pictura_flags INTERFACE -fsanitize=${PICTURA_SANITIZE} -fno-omit-frame-pointer -g
     -fno-sanitize-recover=all
-    # The checks hide from g++ 13 how long an initializer list is.
+    # With the checks g++ 13 does not know the length of initializer lists.
     "$<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>>:-Wno-array-bounds;-Wno-stringop-overread>")
   target_link_options(pictura_flags INTERFACE -fsanitize=${PICTURA_SANITIZE})
 endif()
@@ -59,8 +59,8 @@ function(pictura_add_library name)
   target_link_libraries(pictura_${name} PUBLIC pictura_flags ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
 endfunction()
 
-# pictura_forbid_fma(TARGET): g++ 12 contracts, whatever -ffp-contract says, where it vectorises sums beside differences
-# (vfmaddsub). Code that must give a device's bits is left no such instruction.
+# pictura_forbid_fma(TARGET): for code that must equal a device bit for bit, because g++ 12 ignores -ffp-contract where it
+# vectorises alternating sums and differences (vfmaddsub).
 function(pictura_forbid_fma target)
   if(PICTURA_HAS_MNO_FMA)
     target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-mno-fma>)
@@ -75,7 +75,7 @@ function(pictura_test_properties out timeout_s labels)
   endif()
   set(environment ${PICTURA_TEST_ENVIRONMENT})
   if(gpu IN_LIST labels)
-    # A rig's kernels take seconds to compile; tests that draw with the same ones share them.
+    # A rig's kernels take seconds to compile; tests share them.
     list(REMOVE_ITEM environment PICTURA_CACHE=off)
     list(APPEND environment XDG_CACHE_HOME=${PROJECT_BINARY_DIR}/cache)
   endif()
@@ -87,7 +87,7 @@ function(pictura_test_properties out timeout_s labels)
 endfunction()
 
 # pictura_add_test(NAME SOURCES... LINK libs... [LABELS labels...]): GoogleTest binary NAME_test, every test its own
-# ctest entry, with PICTURA_DATA set to ../shared/data where that exists and the caller has not set it.
+# ctest entry, with PICTURA_DATA set to ../shared/data if that exists and the caller has not set it.
 function(pictura_add_test name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;LINK;LABELS")
   find_package(GTest REQUIRED)
@@ -98,15 +98,15 @@ function(pictura_add_test name)
   gtest_discover_tests(${name}_test DISCOVERY_TIMEOUT 120 PROPERTIES ${properties})
 endfunction()
 
-# What tests find in their environment. Maps are imported anew: tests are about the importer that was just built. Threads
-# that have nothing to do sleep: side by side, the tests' spinning threads would take the processor from each other.
+# The environment of tests. Maps are not cached, so that the importer just built is tested. Idle threads sleep: spinning
+# threads of parallel tests would take the processor from each other.
 set(PICTURA_TEST_ENVIRONMENT PICTURA_CACHE=off OMP_WAIT_POLICY=passive)
 if(NOT DEFINED ENV{PICTURA_DATA} AND EXISTS ${PROJECT_SOURCE_DIR}/../shared/data)
   get_filename_component(data_folder ${PROJECT_SOURCE_DIR}/../shared/data REALPATH)
   list(APPEND PICTURA_TEST_ENVIRONMENT PICTURA_DATA=${data_folder})
 endif()
 if(PICTURA_SANITIZE MATCHES thread)
-  # Archer tells the sanitizer about OpenMP's own synchronisation; without it every parallel loop looks like a race.
+  # Archer tells the sanitizer about OpenMP's synchronisation; without it every parallel loop looks like a race.
   file(GLOB llvm_folders /usr/lib/llvm-*/lib)
   find_file(ARCHER libarcher.so HINTS ${llvm_folders} NO_CACHE)
   if(NOT ARCHER)
@@ -114,8 +114,8 @@ if(PICTURA_SANITIZE MATCHES thread)
   endif()
   list(APPEND PICTURA_TEST_ENVIRONMENT OMP_TOOL_LIBRARIES=${ARCHER} TSAN_OPTIONS=ignore_noninstrumented_modules=1)
 elseif(PICTURA_SANITIZE MATCHES address)
-  # Where threads' variables of libraries that are loaded late lie, the sanitizer guesses from the words before them; of
-  # Mesa's it may take some that are none, and ends there.
+  # The sanitizer guesses where thread-local variables of libraries loaded at run time lie from the words before them;
+  # with Mesa's it may guess wrong and abort.
   list(APPEND PICTURA_TEST_ENVIRONMENT ASAN_OPTIONS=intercept_tls_get_addr=0 UBSAN_OPTIONS=print_stacktrace=1
     LSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/support/leaks.txt:print_suppressions=0)
 endif()

@@ -1,5 +1,5 @@
 # libtorch from the torch wheel of the virtual environment (or of python3), as one imported target `pictura_torch`.
-# The wheel's own CMake package is not used: it demands nvcc for CPU targets and links CUDA into everything.
+# The wheel's own CMake package is not used: it requires nvcc for CPU targets and links CUDA into everything.
 
 set(PICTURA_HAS_TORCH OFF)
 if(NOT PICTURA_WITH_TORCH STREQUAL OFF)
@@ -25,7 +25,7 @@ if(NOT PICTURA_WITH_TORCH STREQUAL OFF)
     add_library(pictura_torch INTERFACE)
     target_include_directories(pictura_torch SYSTEM INTERFACE
       ${torch_root}/include ${torch_root}/include/torch/csrc/api/include)
-    # By name, not by path: the wheel's folder also holds a libgomp, which is then the one that the program loads.
+    # By name, not by path: the wheel's folder also contains a libgomp, which the program then loads.
     target_link_libraries(pictura_torch INTERFACE -L${torch_root}/lib -ltorch_cpu -lc10 -Wl,-rpath,${torch_root}/lib)
     message(STATUS "torch: ${torch_root}")
   elseif(PICTURA_WITH_TORCH STREQUAL ON)

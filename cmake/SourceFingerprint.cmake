@@ -1,4 +1,4 @@
-# Run at every build in which one of SOURCES changed: writes OUTPUT with a hash of their contents and of COMPILER.
+# Runs at every build in which one of SOURCES changed: writes OUTPUT with a hash of their contents and of COMPILER.
 set(hashes "${COMPILER}")
 foreach(source ${SOURCES})
   file(SHA256 ${source} hash)
@@ -6,4 +6,4 @@ foreach(source ${SOURCES})
 endforeach()
 string(SHA256 hash "${hashes}")
 string(SUBSTRING ${hash} 0 16 hash)
-file(WRITE ${OUTPUT} "// The sources that maps are imported by, as one number.\n#pragma once\n\n#define PICTURA_MAP_FINGERPRINT 0x${hash}ull\n")
+file(WRITE ${OUTPUT} "// A hash of the sources that import maps.\n#pragma once\n\n#define PICTURA_MAP_FINGERPRINT 0x${hash}ull\n")

@@ -2,12 +2,12 @@
 """Runs the commands of scripts/gpu_check and keeps their results in one JSON file, which is rewritten after each.
 
 gpu_check_record.py FILE start                         begins FILE: source hash, GPU, driver
-gpu_check_record.py FILE run NAME [--limit S] -- COMMAND...    seconds, and what it says in summary or at its end
-gpu_check_record.py FILE bench NAME [--limit S] -- COMMAND...  the JSON object that it prints, where it fails too
-gpu_check_record.py FILE tests -- ctest...             counts, what failed, what was skipped, what took longest
-gpu_check_record.py FILE finish                        says that nothing is missing
+gpu_check_record.py FILE run NAME [--limit S] -- COMMAND...    seconds, and its summary or last lines
+gpu_check_record.py FILE bench NAME [--limit S] -- COMMAND...  the JSON object that it prints, even if it fails
+gpu_check_record.py FILE tests -- ctest...             counts, failed, skipped and slowest tests
+gpu_check_record.py FILE finish                        marks FILE as complete
 
-Exit status: 0 where the command succeeded, else 1.
+Exit status: 0 if the command succeeded, else 1.
 """
 import argparse
 import contextlib
@@ -33,7 +33,7 @@ SUMMARY = re.compile(r"\[  PASSED  \]|=========.* SUMMARY: ")
 
 
 def source_hash():
-    """Of each file its place, its length and its bytes; documents do not count."""
+    """Over each file's path, length and bytes, except documents."""
     files = {path for folder in SOURCES for path in pathlib.Path(folder).rglob("*") if path.is_file()}
     digest = hashlib.sha256()
     for path in sorted(files | {pathlib.Path("CMakeLists.txt")}):
@@ -54,10 +54,10 @@ def gpu_and_driver():
 
 
 def write(file, content):
-    """Beside, then renamed: a reader, or whoever cuts the run off, finds a whole file."""
-    beside = file.with_name(f"{file.name}.{os.getpid()}.tmp")
-    beside.write_text(json.dumps(content, indent=2) + "\n")
-    beside.replace(file)
+    """Writes a temporary file and renames it, so that readers, and an interrupted run, always leave a whole file."""
+    temporary = file.with_name(f"{file.name}.{os.getpid()}.tmp")
+    temporary.write_text(json.dumps(content, indent=2) + "\n")
+    temporary.replace(file)
 
 
 def read(file):
@@ -87,7 +87,7 @@ def kill_group(process):
 
 @contextlib.contextmanager
 def started(command, stderr):
-    """A command in a process group of its own: whatever ends the block early ends the command's children with it."""
+    """A command in its own process group, which is killed with its children if the block ends early."""
     process = subprocess.Popen(command, text=True, errors="replace", process_group=0, stdout=subprocess.PIPE, stderr=stderr)
     try:
         yield process
@@ -97,7 +97,7 @@ def started(command, stderr):
 
 
 class Run:
-    """A command that has ended: its outcome in words, empty for success; seconds; what it printed."""
+    """A finished command: its outcome in words, empty for success; seconds; its output."""
 
     def __init__(self, command, limit_s, keeps_stdout):
         begin = time.monotonic()
@@ -145,7 +145,7 @@ def run_command(file, name, command, limit_s):
 
 
 def json_object(text):
-    """The object that a text is, or None."""
+    """The parsed text if it is a JSON object, else None."""
     try:
         value = json.loads(text)
     except json.JSONDecodeError:
@@ -160,7 +160,7 @@ def run_bench(file, name, command, limit_s):
         run.outcome = f"expected a JSON object, got '{run.stdout[:80]}'"
     say(name, run)
     if run.outcome:
-        # A bench may fail because of what it has measured: a soak, for one.
+        # A bench may fail because of its results, as a soak does.
         add(file, "failed", run.failure(name) | ({} if measured is None else {"measured": measured}))
     else:
         add(file, "bench", run.entry(name) | measured)
@@ -168,7 +168,7 @@ def run_bench(file, name, command, limit_s):
 
 
 class Tests:
-    """What ctest's lines say so far."""
+    """Results parsed from ctest's lines so far."""
 
     def __init__(self):
         self.passed = self.total = 0
@@ -176,7 +176,7 @@ class Tests:
         self.output_of = None  # the failed test whose output follows
 
     def take(self, line):
-        """True where the line is a test's result."""
+        """True if the line is a test's result."""
         match = TEST.match(line)
         if not match:
             if NEXT_TEST.match(line):
@@ -223,7 +223,7 @@ def run_tests(file, command):
 
 
 def end_with_command(*_):
-    """What a signal ends, ends its command too."""
+    """Signal handler: exits, which kills the command too."""
     sys.exit(1)
 
 

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Prints what Nsight Compute tells of some launches of a command's kernels, as one JSON object.
+"""Prints Nsight Compute's metrics of some kernel launches of a command, as one JSON object.
 
 gpu_profile.py [--skip N] [--launches N] -- COMMAND...   runs COMMAND under ncu
-gpu_profile.py --csv FILE                                reads what ncu has printed: --csv --page details
+gpu_profile.py --csv FILE                                reads ncu's output: --csv --page details
 
-Launches are of kernels whose names begin with pictura_; N of them are profiled after the skipped ones. Profiled kernels
-run one after the other at ncu's clock, so durations are to be compared with each other, not with a bench's.
-Exit status: 0, or 1 with the reason where ncu is missing, fails or tells nothing.
+Only kernels whose names begin with pictura_ count; N launches are profiled after the skipped ones. Profiled kernels run
+one after the other at ncu's clock, so compare durations with each other, not with a bench's.
+Exit status: 0, or 1 with the reason if ncu is missing, fails or prints no metrics.
 """
 import argparse
 import csv
@@ -17,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 
-# Those that hold the metrics.
+# The sections that contain the metrics.
 SECTIONS = ("SpeedOfLight ComputeWorkloadAnalysis MemoryWorkloadAnalysis WarpStateStats InstructionStats LaunchStats "
             "Occupancy").split()
 METRICS = ("Duration", "SM Frequency", "Executed Instructions", "Executed Ipc Active", "Issue Slots Busy",
@@ -26,7 +26,7 @@ METRICS = ("Duration", "SM Frequency", "Executed Instructions", "Executed Ipc Ac
 
 
 def rows_of(table):
-    """Rows as benches print them, one for each launch and metric."""
+    """Rows in the format of the benches, one for each launch and metric."""
     lines = [line for line in table.splitlines() if line.startswith('"')]
     rows = []
     for line in csv.DictReader(io.StringIO("\n".join(lines))):

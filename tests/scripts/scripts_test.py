@@ -1,4 +1,4 @@
-"""The scripts from outside: their help from any folder, and what scripts/gpu_check_record.py keeps of what it runs.
+"""The scripts: their help from any folder, what scripts/setup links, and the results of scripts/gpu_check_record.py.
 
 Run by ctest: python3 scripts_test.py [unittest arguments].
 """
@@ -78,7 +78,7 @@ class Profile(unittest.TestCase):
         command = [sys.executable, str(SCRIPTS / "gpu_profile.py"), *map(str, arguments)]
         return subprocess.run(command, capture_output=True, text=True, timeout=60)
 
-    def test_what_ncu_tells_becomes_rows(self):
+    def test_metrics_of_ncu_become_rows(self):
         with tempfile.TemporaryDirectory(prefix="pictura-test-") as folder:
             table = pathlib.Path(folder) / "table.csv"
             lines = [self.COLUMNS, ["0", "pictura_draw", "Executed Instructions", "inst", "1,234,567"],
@@ -120,7 +120,7 @@ class Record(unittest.TestCase):
         self.record("start")
         return self.record("bench", "soak", "--", "sh", "-c", script)
 
-    def test_a_bench_leaves_what_it_measured_where_it_failed_too(self):
+    def test_a_failed_bench_keeps_its_measurements(self):
         status, content = self.bench("""echo '{"faults": [3]}'""")
         self.assertEqual((status, content["bench"][0]["faults"]), (0, [3]))
         status, content = self.bench("""echo '{"faults": [3]}'; echo broken >&2; exit 1""")
@@ -129,13 +129,13 @@ class Record(unittest.TestCase):
         self.assertEqual((failed["measured"], failed["outcome"]), ({"faults": [3]}, "exit status 1"))
         self.assertEqual(failed["last_lines"], ["broken"])
 
-    def test_what_prints_no_object_has_failed(self):
+    def test_a_bench_without_a_json_object_has_failed(self):
         for script in ("echo '[1]'", "echo fast", "true", "exit 1"):
             with self.subTest(script):
                 status, content = self.bench(script)
                 self.assertEqual((status, "measured" in content["failed"][0]), (1, False))
 
-    def test_the_hash_of_the_sources_knows_where_they_lie_and_leaves_out_what_is_made_of_them(self):
+    def test_the_source_hash_covers_paths_and_excludes_generated_files(self):
         for name in ("common/a.h", "bench/b.h"):
             (self.folder / name).parent.mkdir()
             (self.folder / name).write_text(name)
@@ -150,7 +150,7 @@ class Record(unittest.TestCase):
         shutil.move(self.folder / "common/aa.h", self.folder / "common/a.h")
         self.assertEqual(self.source_hash(), before)
 
-    def test_a_signal_ends_the_command_and_its_children(self):
+    def test_a_signal_kills_the_command_and_its_children(self):
         for verb in (["run", "build"], ["bench", "rate"], ["tests"]):
             with self.subTest(verb[0]):
                 self.record("start")
@@ -164,7 +164,7 @@ class Record(unittest.TestCase):
                 self.assertTrue(self.ends(int(child.read_text())))
 
     def ends(self, process, within_s=10):
-        """Whether it does; killed, it may stay as a zombie where nobody waits for orphans."""
+        """Whether the process ends; a killed orphan may remain as a zombie."""
         deadline = time.monotonic() + within_s
         while time.monotonic() < deadline:
             try:
