@@ -44,8 +44,8 @@ std::unique_ptr<Renderer> open_renderer(const Arguments& arguments, RendererConf
   config.samples = parse_samples("--samples", arguments.samples);
   std::string choice;
   auto renderer = make_renderer(arguments.backend, config, &choice);
-  PICTURA_CHECK(renderer->space() == MemorySpace::host,
-                "--backend {}: pictures are written from host memory; choose cpu", renderer->name());
+  PICTURA_CHECK(renderer->device().is_host(), "--backend {}: pictures are written from host memory; choose cpu",
+                renderer->name());
   if (arguments.backend == "auto") fmt::print(stderr, "backend {}\n", choice);
   make_output_folder(arguments.out);
   return renderer;

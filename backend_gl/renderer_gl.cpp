@@ -45,14 +45,15 @@ class GlRenderer final : public Renderer {
         cameras_(pinhole_cameras(config.rig)),
         context_(std::move(context)),
         interop_(std::move(interop)),
+        memory_(interop_ ? interop_->device() : Device{}),
         name_(context_->name()) {
     PICTURA_CHECK(config_.samples.grid >= 1 && config_.samples.multisample >= 1,
                   "renderer {}: expected 1 sample or more, got a grid of {} and {} samples", name_,
                   config_.samples.grid, config_.samples.multisample);
     const gl::CurrentContext current(context_.get());
     gl_ = std::make_unique<gl::Functions>(*context_);
-    device_ = reinterpret_cast<const char*>(gl_->GetString(GL_RENDERER));
-    PICTURA_CHECK(has_extension(*gl_, kLayerExtension), "renderer {}: {} lacks {}", name_, device_, kLayerExtension);
+    drawn_by_ = reinterpret_cast<const char*>(gl_->GetString(GL_RENDERER));
+    PICTURA_CHECK(has_extension(*gl_, kLayerExtension), "renderer {}: {} lacks {}", name_, drawn_by_, kLayerExtension);
     make_pipeline();
     groups_ = make_groups();  // last: what it made goes, if it throws, while the context is current
   }
@@ -61,10 +62,10 @@ class GlRenderer final : public Renderer {
     groups_.clear();  // all else goes with the context
   }
   std::string_view name() const override { return name_; }
-  MemorySpace space() const override { return interop_ ? MemorySpace::cuda : MemorySpace::host; }
+  Device device() const override { return memory_; }
   const RendererConfig& config() const override { return config_; }
   /// What draws, as the driver calls it.
-  const std::string& device() const { return device_; }
+  const std::string& drawn_by() const { return drawn_by_; }
 
   GeometryHandle upload(const StaticGeometry& geometry) override {
     check_geometry(name_, geometry);
@@ -72,14 +73,14 @@ class GlRenderer final : public Renderer {
   }
 
   void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override {
-    check_images(name_, config_.rig, space(), views.size(), images_out);
+    check_images(name_, config_.rig, device(), views.size(), images_out);
     for (std::size_t i = 0; i < images_out.cameras.size(); ++i) {
       const CameraImages& camera = images_out.cameras[i];
       PICTURA_CHECK(!camera.depth_m && !camera.class_id && !camera.instance_id,
                     "renderer {}: images: camera {}: depth, class and instance planes are cpu's and cuda's", name_, i);
     }
     if (interop_) {
-      PICTURA_CHECK(scene.space == MemorySpace::cuda, "renderer {}: scene: expected cuda memory, got host", name_);
+      check_device(name_, "scene", device(), scene.device);
       interop_->copy_to_host(scene, views, stream, &host_scene_);
       draw(host_scene_.batch(), host_scene_.views, images_out, stream);
     } else {
@@ -238,7 +239,8 @@ class GlRenderer final : public Renderer {
   std::vector<PinholeCamera> cameras_;  // in the ego frame
   std::unique_ptr<gl::Context> context_;
   std::unique_ptr<gl::CudaInterop> interop_;  // where scenes and images lie in device memory
-  std::string name_, device_;
+  Device memory_;                             // of scenes and images
+  std::string name_, drawn_by_;
   std::unique_ptr<gl::Functions> gl_;
   std::vector<SizeGroup> groups_;
   GLuint program_ = 0, instances_ = 0, vertex_array_ = 0;
@@ -251,11 +253,11 @@ class GlRenderer final : public Renderer {
   std::vector<gl::RowCopy> copies_planned_;
 };
 
-std::unique_ptr<gl::CudaInterop> interop_for(const std::string& name, MemorySpace space) {
-  if (space == MemorySpace::host) return nullptr;
+std::unique_ptr<gl::CudaInterop> interop_for(const std::string& name, Device device) {
+  if (device.is_host()) return nullptr;
   PICTURA_CHECK(name != "gl:osmesa", "renderer gl:osmesa: draws in host memory alone; device memory is gl:egl's");
 #ifdef PICTURA_HAS_CUDA
-  return gl::make_cuda_interop();
+  return gl::make_cuda_interop(device);
 #else
   fail("renderer {}: images in device memory: this build has no CUDA", name);
 #endif
@@ -266,8 +268,8 @@ std::unique_ptr<gl::CudaInterop> interop_for(const std::string& name, MemorySpac
 std::unique_ptr<Renderer> make_gl_renderer(const std::string& name, const RendererConfig& config,
                                            std::string* choice_out) {
   check_config(name, config);
-  auto interop = interop_for(name, config.space);
-  const int cuda_device = interop ? interop->device() : -1;
+  auto interop = interop_for(name, config.device);
+  const int cuda_device = interop ? interop->device().index : -1;
   std::unique_ptr<gl::Context> context;
   std::string why = "asked for";
   if (name == "gl:osmesa") {
@@ -289,7 +291,7 @@ std::unique_ptr<Renderer> make_gl_renderer(const std::string& name, const Render
   }
   const std::string chosen = context->name();
   auto renderer = std::make_unique<GlRenderer>(config, std::move(context), std::move(interop));
-  if (choice_out) *choice_out = fmt::format("{}: {}; on {}", chosen, why, renderer->device());
+  if (choice_out) *choice_out = fmt::format("{}: {}; on {}", chosen, why, renderer->drawn_by());
   return renderer;
 }
 

@@ -30,12 +30,12 @@ class NullRenderer final : public Renderer {
  public:
   explicit NullRenderer(const RendererConfig& config) : config_(check_config("null", config)) {}
   std::string_view name() const override { return "null"; }
-  MemorySpace space() const override { return MemorySpace::host; }
+  Device device() const override { return {}; }
   const RendererConfig& config() const override { return config_; }
   GeometryHandle upload(const StaticGeometry&) override { return next_handle_++; }
 
   void render(const SceneBatch&, Span<const View> views, const ImageBatch& images_out, Stream) override {
-    check_images(name(), config_.rig, space(), views.size(), images_out, /*draws_f16=*/true);
+    check_images(name(), config_.rig, device(), views.size(), images_out, /*draws_f16=*/true);
     const std::size_t value_bytes = bytes_per_value(images_out.format);
     for (const CameraImages& camera : images_out.cameras) {
       const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
@@ -95,7 +95,7 @@ std::unique_ptr<Renderer> make_renderer(const std::string& name, const RendererC
 #ifdef PICTURA_HAS_CUDA
   const std::string unavailable = cuda_unavailable();
   auto make_cuda = [&](const char* why) {
-    const auto make = config.space == MemorySpace::cuda ? make_cuda_renderer : make_cuda_renderer_for_host;
+    const auto make = !config.device.is_host() ? make_cuda_renderer : make_cuda_renderer_for_host;
     std::string origin;
     auto renderer = make(config, &origin);
     chosen(fmt::format("cuda: {}; {}", why, origin));
@@ -105,8 +105,7 @@ std::unique_ptr<Renderer> make_renderer(const std::string& name, const RendererC
     PICTURA_CHECK(unavailable.empty(), "renderer cuda: {}", unavailable);
     return make_cuda("asked for");
   }
-  const std::string why_not_cuda =
-      config.space == MemorySpace::cuda ? unavailable : "scenes and images lie in host memory";
+  const std::string why_not_cuda = !config.device.is_host() ? unavailable : "scenes and images lie in host memory";
   if (name == "auto" && why_not_cuda.empty()) return make_cuda("a device was found");
 #else
   const std::string why_not_cuda = "this build has no CUDA";

@@ -76,7 +76,7 @@ class OracleCheck {
 };
 
 std::unique_ptr<RenderTarget> make_target(const DrivenWorlds& worlds, const RenderCase& render_case) {
-  if (render_case.config.space == MemorySpace::host) return make_host_target(worlds, render_case);
+  if (render_case.config.device.is_host()) return make_host_target(worlds, render_case);
 #ifdef PICTURA_HAS_CUDA
   return make_device_target(worlds, render_case);
 #else

@@ -14,7 +14,7 @@ namespace pictura {
 
 struct RenderCase {
   std::string backend = "cpu";
-  RendererConfig config;  // config.space: where scenes, views and images lie
+  RendererConfig config;  // config.device: where scenes, views and images lie
   int num_views = 0;      // the first so many of the driven worlds
   PixelFormat format = PixelFormat::u8;
   Planes planes = Planes::none;

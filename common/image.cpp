@@ -71,7 +71,7 @@ HostImages::HostImages(const Rig& rig, int num_views, PixelFormat format, Planes
   }
 }
 
-ImageBatch HostImages::batch() { return {MemorySpace::host, format_, num_views_, cameras_}; }
+ImageBatch HostImages::batch() { return {Device{}, format_, num_views_, cameras_}; }
 
 std::vector<uint8_t> HostImages::interleaved(int view, int camera_index) const {
   PICTURA_CHECK(format_ == PixelFormat::u8, "images: expected the u8 format");

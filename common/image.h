@@ -29,7 +29,7 @@ struct CameraImages {
 
 /// What render() fills.
 struct ImageBatch {
-  MemorySpace space = MemorySpace::host;
+  Device device;  // of all that follows
   PixelFormat format = PixelFormat::u8;
   int num_views = 0;
   Span<const CameraImages> cameras;  // [cameras of the rig]

@@ -20,10 +20,10 @@ struct PixelSamples {
 
 struct RendererConfig {
   Rig rig = paper_rig();
-  MemorySpace space = MemorySpace::host;  // where the caller keeps scenes and images
-  int num_threads = 0;                    // host threads; 0: all
-  float line_floor_px = 0.35f;            // least width of a strip on screen, measured across it; 0 turns the floor off
-  bool debug_palette = false;             // tint halted and parked agents
+  Device device;                // where the caller keeps scenes, views and images
+  int num_threads = 0;          // host threads; 0: all
+  float line_floor_px = 0.35f;  // least width of a strip on screen, measured across it; 0 turns the floor off
+  bool debug_palette = false;   // tint halted and parked agents
   PixelSamples samples;
   /// cuda: the most device memory that it takes beyond images, scenes and maps; what does not fit is drawn in parts.
   std::size_t max_scratch_bytes = std::size_t{512} << 20;
@@ -41,8 +41,8 @@ class Renderer {
   Renderer& operator=(const Renderer&) = delete;
 
   virtual std::string_view name() const = 0;
-  /// Where scenes are read from and images written to.
-  virtual MemorySpace space() const = 0;
+  /// Where scenes, views and queries are read from and images written to.
+  virtual Device device() const = 0;
   virtual const RendererConfig& config() const = 0;
 
   /// Takes a copy of a map's geometry; the handle names it in SceneBatch::geometry and is valid for the object's life.

@@ -33,7 +33,7 @@ struct SceneOwner {
   std::vector<int32_t> hidden_agents;
 
   SceneBatch batch() const {
-    return {MemorySpace::host, world_begin, agents, geometry, light_begin, light_states, hidden_agents};
+    return {Device{}, world_begin, agents, geometry, light_begin, light_states, hidden_agents};
   }
   /// Closes a world: agents and lights added since the last call belong to it.
   void end_world(GeometryHandle handle) {

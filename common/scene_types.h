@@ -80,9 +80,9 @@ using GeometryHandle = int32_t;
 /// Agents of one world that a scene may hold: as many as a simulator steps, and as many parked cars.
 constexpr int kMaxBoxesPerWorld = 8192;
 
-/// Everything that moves, for all worlds, of one step. Spans lie in `space`.
+/// Everything that moves, for all worlds, of one step.
 struct SceneBatch {
-  MemorySpace space = MemorySpace::host;
+  Device device;                        // of all spans
   Span<const int32_t> world_begin;      // [worlds + 1] first agent of each world; ends with the number of agents
   Span<const AgentBox> agents;          // [agents] controlled and parked alike
   Span<const GeometryHandle> geometry;  // [worlds]

@@ -82,7 +82,7 @@ std::unique_ptr<Renderer> make_policy_renderer(const Config& config, const Rig& 
 }
 
 Observer::Observer(Simulator* simulator, Renderer* renderer) : simulator_(*simulator), renderer_(renderer) {
-  const bool on_host = simulator->space() == MemorySpace::host && (!renderer || renderer->space() == MemorySpace::host);
+  const bool on_host = simulator->space() == MemorySpace::host && (!renderer || renderer->device().is_host());
   PICTURA_CHECK(on_host,
                 "training: simulator '{}' keeps its arrays on a CUDA device, and this build trains on the host: "
                 "set run.backend to \"cpu\"",
@@ -147,8 +147,7 @@ void Observer::observe(const Observation& out) {
   const std::vector<int64_t> seeing = active_slots(simulator_);
   std::vector<View> views;
   for (const int64_t slot : seeing) views.push_back(simulator_.views()[static_cast<size_t>(slot)]);
-  renderer_->render(simulator_.scene(), views,
-                    {MemorySpace::host, PixelFormat::u8, static_cast<int>(views.size()), cameras});
+  renderer_->render(simulator_.scene(), views, {Device{}, PixelFormat::u8, static_cast<int>(views.size()), cameras});
   for (const ImageBlock& block : out.images) spread(seeing, block.pixels);
   render_s_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }

@@ -23,7 +23,7 @@ class CpuRenderer final : public Renderer {
         cameras_(pinhole_cameras(config.rig)),
         drawers_(static_cast<std::size_t>(resolve_num_threads(config.num_threads))) {}
   std::string_view name() const override { return "cpu"; }
-  MemorySpace space() const override { return MemorySpace::host; }
+  Device device() const override { return {}; }
   const RendererConfig& config() const override { return config_; }
 
   GeometryHandle upload(const StaticGeometry& geometry) override {
@@ -32,7 +32,7 @@ class CpuRenderer final : public Renderer {
   }
 
   void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream) override {
-    check_images(name(), config_.rig, space(), views.size(), images_out, /*draws_f16=*/true);
+    check_images(name(), config_.rig, device(), views.size(), images_out, /*draws_f16=*/true);
     check_scene(name(), scene, geometries_.views());
     check_views(name(), scene, views);
     const std::size_t num_cameras = cameras_.size();

@@ -2,6 +2,7 @@
 // waits. What the device would only notice later is checked on the host, with the oracle's checks.
 #include <memory>
 
+#include "pictura/common/cuda/device_guard.h"
 #include "pictura/common/cuda/device_scene.h"
 #include "pictura/common/error.h"
 #include "pictura/common/raster/check.h"
@@ -17,10 +18,10 @@ namespace {
 class HostRendererCuda final : public Renderer {
  public:
   HostRendererCuda(const RendererConfig& config, std::string* origin_out)
-      : renderer_(make_cuda_renderer(config, origin_out)) {}
+      : config_(config), renderer_(make_cuda_renderer(on_current_device(config), origin_out)) {}
   std::string_view name() const override { return renderer_->name(); }
-  MemorySpace space() const override { return MemorySpace::host; }
-  const RendererConfig& config() const override { return renderer_->config(); }
+  Device device() const override { return {}; }
+  const RendererConfig& config() const override { return config_; }
 
   GeometryHandle upload(const StaticGeometry& geometry) override {
     renderer_->upload(geometry);
@@ -28,7 +29,8 @@ class HostRendererCuda final : public Renderer {
   }
 
   void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override {
-    check_images(name(), config().rig, space(), views.size(), images_out, /*draws_f16=*/true);
+    const DeviceGuard guard(renderer_->device());
+    check_images(name(), config_.rig, device(), views.size(), images_out, /*draws_f16=*/true);
     check_input(scene, views);
     const auto queue = static_cast<cudaStream_t>(stream.handle);
     renderer_->render(scene_.assign(scene, queue), views_.assign(views, queue), images_.like(images_out), stream);
@@ -40,6 +42,7 @@ class HostRendererCuda final : public Renderer {
 
   void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
                   Span<float> visibility_out, Stream stream) override {
+    const DeviceGuard guard(renderer_->device());
     check_input(scene, views);
     check_queries(name(), scene, views, queries, visibility_out.size());
     const auto queue = static_cast<cudaStream_t>(stream.handle);
@@ -54,13 +57,17 @@ class HostRendererCuda final : public Renderer {
   }
 
  private:
+  static RendererConfig on_current_device(RendererConfig config) {
+    config.device = current_device();
+    return config;
+  }
+
   void check_input(const SceneBatch& scene, Span<const View> views) const {
-    device_.check_current("renderer cuda");
     check_scene(name(), scene, geometries_.views());
     check_views(name(), scene, views);
   }
 
-  CurrentDevice device_;
+  RendererConfig config_;
   std::unique_ptr<Renderer> renderer_;
   HostGeometries geometries_;  // for checks, with the device's handles
   DeviceScene scene_;

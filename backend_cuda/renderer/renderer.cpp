@@ -9,8 +9,8 @@
 #include "pictura/backend_cuda/renderer/launch.h"
 #include "pictura/backend_cuda/renderer/scratch_buffers.h"
 #include "pictura/backend_cuda/renderer/scratch_plan.h"
-#include "pictura/common/cuda/check.h"
 #include "pictura/common/cuda/device_buffer.h"
+#include "pictura/common/cuda/device_guard.h"
 #include "pictura/common/error.h"
 #include "pictura/common/raster/check.h"
 
@@ -76,9 +76,12 @@ struct ScratchMemory {
 
 class CudaRenderer final : public Renderer {
  public:
+  /// Its device is the current one.
   CudaRenderer(const RendererConfig& config, std::string* origin_out)
-      : config_(check_config("cuda", config)), cameras_(pinhole_cameras(config.rig)), library_(config.rig) {
-    PICTURA_CUDA(cudaDeviceGetAttribute(&processors_, cudaDevAttrMultiProcessorCount, device_.number()));
+      : config_(check_config("cuda", config)),
+        cameras_(pinhole_cameras(config.rig)),
+        library_(config.rig, config.device.index) {
+    PICTURA_CUDA(cudaDeviceGetAttribute(&processors_, cudaDevAttrMultiProcessorCount, config.device.index));
     *origin_out = library_.origin();
     ensure_capacity(0, 1);  // what is too little for any scene is told at once
     *fault_.host() = cuda::kNoFault;
@@ -86,11 +89,11 @@ class CudaRenderer final : public Renderer {
     PICTURA_CUDA(cudaDeviceSynchronize());  // for whatever stream the first call is on
   }
   std::string_view name() const override { return "cuda"; }
-  MemorySpace space() const override { return MemorySpace::cuda; }
+  Device device() const override { return config_.device; }
   const RendererConfig& config() const override { return config_; }
 
   GeometryHandle upload(const StaticGeometry& geometry) override {
-    device_.check_current("renderer cuda");
+    const DeviceGuard guard(device());
     check_geometry(name(), geometry);
     UploadedGeometry uploaded(geometry);
     std::vector<cuda::DeviceGeometry> views;
@@ -106,8 +109,9 @@ class CudaRenderer final : public Renderer {
   }
 
   void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override {
+    const DeviceGuard guard(device());
     check_call(scene);
-    check_images(name(), config_.rig, space(), views.size(), images_out, /*draws_f16=*/true);
+    check_images(name(), config_.rig, device(), views.size(), images_out, /*draws_f16=*/true);
     cuda::DrawTask task = draw_task(scene, views, &images_out);
     const auto on_stream = static_cast<cudaStream_t>(stream.handle);
     clear_counters(on_stream);
@@ -123,13 +127,14 @@ class CudaRenderer final : public Renderer {
   }
 
   void check() override {
-    device_.check_current("renderer cuda");
+    const DeviceGuard guard(device());
     PICTURA_CUDA(cudaDeviceSynchronize());
     throw_fault();
   }
 
   void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
                   Span<float> visibility_out, Stream stream) override {
+    const DeviceGuard guard(device());
     check_call(scene);
     check_answers(name(), queries.size(), visibility_out.size());
     const cuda::VisibilityTask task{draw_task(scene, views, nullptr), queries.data(),
@@ -141,9 +146,8 @@ class CudaRenderer final : public Renderer {
  private:
   // What the host can see of a call.
   void check_call(const SceneBatch& scene) {
-    device_.check_current("renderer cuda");
     throw_fault();
-    PICTURA_CHECK(scene.space == MemorySpace::cuda, "renderer cuda: scene: expected cuda memory, got host");
+    check_device(name(), "scene", device(), scene.device);
     PICTURA_CHECK(scene.world_begin.empty() || (scene.geometry.size() + 1 == scene.world_begin.size() &&
                                                 scene.light_begin.size() == scene.world_begin.size()),
                   "renderer cuda: scene: expected a geometry and a range of lights for each of {} worlds",
@@ -209,7 +213,6 @@ class CudaRenderer final : public Renderer {
     fail("renderer cuda: in an earlier call: {}", cuda::message_of(fault));
   }
 
-  CurrentDevice device_;
   RendererConfig config_;
   std::vector<PinholeCamera> cameras_;  // in the ego frame
   cuda::KernelLibrary library_;         // outlives the buffers, whose release waits for the device
@@ -237,6 +240,11 @@ std::string cuda_unavailable() {
 }
 
 std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config, std::string* origin_out) {
+  int devices = 0;
+  PICTURA_CUDA(cudaGetDeviceCount(&devices));
+  PICTURA_CHECK(!config.device.is_host() && config.device.index >= 0 && config.device.index < devices,
+                "renderer cuda: device: expected cuda:0 to cuda:{}, got {}", devices - 1, name_of(config.device));
+  const DeviceGuard guard(config.device);
   return std::make_unique<CudaRenderer>(config, origin_out);
 }
 

@@ -185,7 +185,7 @@ class SimulatorCuda final : public Simulator {
     world_begin_ = device_copy(batch_->box_begin);
     light_begin_ = device_copy(batch_->light_begin);
     geometry_ = device_copy(batch_->geometry);
-    scene_.space = MemorySpace::cuda;
+    scene_.device = {MemorySpace::cuda, device_.number()};
     scene_.world_begin = world_begin_.span();
     scene_.agents = state_.boxes.span();
     scene_.geometry = geometry_.span();

@@ -3,7 +3,7 @@
 #include <cuda_gl_interop.h>
 #include <cuda_runtime_api.h>
 
-#include "pictura/common/cuda/check.h"
+#include "pictura/common/cuda/device_guard.h"
 
 namespace pictura::gl {
 
@@ -11,12 +11,20 @@ namespace {
 
 class RegisteredBuffer final : public CudaBuffer {
  public:
-  explicit RegisteredBuffer(GLuint buffer) {
+  RegisteredBuffer(Device device, GLuint buffer) : device_(device) {
+    const DeviceGuard guard(device_);
     PICTURA_CUDA(cudaGraphicsGLRegisterBuffer(&resource_, buffer, cudaGraphicsRegisterFlagsReadOnly));
   }
-  ~RegisteredBuffer() override { cudaGraphicsUnregisterResource(resource_); }
+  ~RegisteredBuffer() override {
+    int previous = 0;
+    const bool is_known = cudaGetDevice(&previous) == cudaSuccess;
+    cudaSetDevice(device_.index);
+    cudaGraphicsUnregisterResource(resource_);
+    if (is_known) cudaSetDevice(previous);
+  }
 
   void copy(Span<const RowCopy> copies, Stream stream) override {
+    const DeviceGuard guard(device_);
     const auto queue = static_cast<cudaStream_t>(stream.handle);
     PICTURA_CUDA(cudaGraphicsMapResources(1, &resource_, queue));
     void* mapped = nullptr;
@@ -32,6 +40,7 @@ class RegisteredBuffer final : public CudaBuffer {
   }
 
  private:
+  Device device_;
   cudaGraphicsResource_t resource_ = nullptr;
 };
 
@@ -45,13 +54,18 @@ void download(Span<const T> device, std::vector<T>* host_out, cudaStream_t queue
 
 class RuntimeInterop final : public CudaInterop {
  public:
-  int device() const override { return CurrentDevice().number(); }
-  void synchronize() const override { PICTURA_CUDA(cudaDeviceSynchronize()); }
+  explicit RuntimeInterop(Device device) : device_(device) {}
+  Device device() const override { return device_; }
+  void synchronize() const override {
+    const DeviceGuard guard(device_);
+    PICTURA_CUDA(cudaDeviceSynchronize());
+  }
   std::unique_ptr<CudaBuffer> share(unsigned int buffer) const override {
-    return std::make_unique<RegisteredBuffer>(buffer);
+    return std::make_unique<RegisteredBuffer>(device_, buffer);
   }
   void copy_to_host(const SceneBatch& scene, Span<const View> views, Stream stream,
                     HostScene* scene_out) const override {
+    const DeviceGuard guard(device_);
     const auto queue = static_cast<cudaStream_t>(stream.handle);
     download(scene.world_begin, &scene_out->world_begin, queue);
     download(scene.agents, &scene_out->agents, queue);
@@ -62,14 +76,16 @@ class RuntimeInterop final : public CudaInterop {
     download(views, &scene_out->views, queue);
     PICTURA_CUDA(cudaStreamSynchronize(queue));
   }
+
+ private:
+  Device device_;
 };
 
 }  // namespace
 
-std::unique_ptr<CudaInterop> make_cuda_interop() {
-  auto interop = std::make_unique<RuntimeInterop>();
-  interop->device();
-  return interop;
+std::unique_ptr<CudaInterop> make_cuda_interop(Device device) {
+  const DeviceGuard guard(device);  // throws where there is no such device
+  return std::make_unique<RuntimeInterop>(device);
 }
 
 }  // namespace pictura::gl

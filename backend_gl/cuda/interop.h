@@ -1,5 +1,5 @@
 // The way between this backend and CUDA on one GPU: scenes come from device memory, images go to device memory without
-// passing through the host. No CUDA type is seen here; cuda_interop.cpp, which sees them, is built where CUDA is.
+// passing through the host. No CUDA type appears here; interop.cpp, which uses them, is built where CUDA is.
 #pragma once
 
 #include <memory>
@@ -34,15 +34,15 @@ struct HostScene {
   std::vector<LightState> light_states;
   std::vector<View> views;
   SceneBatch batch() const {
-    return {MemorySpace::host, world_begin, agents, geometry, light_begin, light_states, hidden_agents};
+    return {Device{}, world_begin, agents, geometry, light_begin, light_states, hidden_agents};
   }
 };
 
 class CudaInterop {
  public:
   virtual ~CudaInterop() = default;
-  /// CUDA's number of the device that is the calling thread's.
-  virtual int device() const = 0;
+  /// The CUDA device that all calls work on; callers need not make it current.
+  virtual Device device() const = 0;
   /// Waits for all of its work.
   virtual void synchronize() const = 0;
   /// Registers a buffer object of the current context.
@@ -52,7 +52,7 @@ class CudaInterop {
                             HostScene* scene_out) const = 0;
 };
 
-/// Throws Error where no CUDA device can be used. Defined where the build has CUDA.
-std::unique_ptr<CudaInterop> make_cuda_interop();
+/// Throws Error where the CUDA device cannot be used. Defined where the build has CUDA.
+std::unique_ptr<CudaInterop> make_cuda_interop(Device device);
 
 }  // namespace pictura::gl

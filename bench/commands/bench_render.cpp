@@ -68,7 +68,7 @@ RenderCase case_of(const Arguments& arguments, const std::string& backend, const
   RenderCase result{.backend = backend, .num_views = egos};
   result.config.rig = paper_rig(pixels.first, pixels.second);
   const bool in_device_memory = reaches_device_memory(backend) && !arguments.host_memory && !cuda_device_name().empty();
-  result.config.space = in_device_memory ? MemorySpace::cuda : MemorySpace::host;
+  if (in_device_memory) result.config.device = {MemorySpace::cuda, 0};
   result.config.num_threads = arguments.world.num_threads;
   result.config.samples = parse_samples("--samples", samples);
   result.format = arguments.format == "u8"    ? PixelFormat::u8
@@ -199,7 +199,7 @@ void run(Arguments arguments) {
       .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
   // In host memory gl:egl may be drawn by anybody; its choice says by whom.
   auto is_of_cuda_device = [](const NamedCase& each) {
-    return each.measured.backend == "cuda" || each.measured.config.space == MemorySpace::cuda;
+    return each.measured.backend == "cuda" || !each.measured.config.device.is_host();
   };
   if (std::any_of(cases.begin(), cases.end(), is_of_cuda_device)) {
     context.add_gpu(cuda_device_name(), cuda_driver_name());

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "pictura/common/cuda/device_buffer.h"
+#include "pictura/common/cuda/device_guard.h"
 #include "pictura/common/image.h"
 #include "pictura/common/scene.h"
 
@@ -39,7 +40,7 @@ class DeviceScene {
   explicit DeviceScene(const SceneBatch& host) { assign(host); }
   const SceneBatch& batch() const { return batch_; }
   const SceneBatch& assign(const SceneBatch& host, cudaStream_t stream = nullptr) {
-    batch_ = {MemorySpace::cuda,
+    batch_ = {current_device(),
               world_begin_.assign(host.world_begin, stream),
               agents_.assign(host.agents, stream),
               geometry_.assign(host.geometry, stream),
@@ -74,7 +75,7 @@ class DeviceImages {
       if (camera.class_id) camera.class_id = staged.class_id.resize(pixels * views).data();
       if (camera.instance_id) camera.instance_id = staged.instance_id.resize(pixels * views).data();
     }
-    return {MemorySpace::cuda, host.format, host.num_views, cameras_};
+    return {current_device(), host.format, host.num_views, cameras_};
   }
 
   /// Copies what like(host) made back into the host's images, on the stream.

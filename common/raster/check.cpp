@@ -1,12 +1,11 @@
 #include "pictura/common/raster/check.h"
 
+#include "pictura/common/array.h"
 #include "pictura/common/error.h"
 
 namespace pictura {
 
 namespace {
-
-std::string_view name_of(MemorySpace space) { return space == MemorySpace::host ? "host" : "cuda"; }
 
 bool is_color(Rgb color) {
   auto is_channel = [](float value) { return value >= 0.0f && value <= 1.0f; };
@@ -37,10 +36,14 @@ void check_ranges(std::string_view renderer, std::string_view name, Span<const i
 
 }  // namespace
 
-void check_images(std::string_view renderer, const Rig& rig, MemorySpace space, std::size_t num_views,
+void check_device(std::string_view renderer, std::string_view what, Device expected, Device device) {
+  PICTURA_CHECK(device == expected, "renderer {}: {}: expected {}, got {}", renderer, what, name_of(expected),
+                name_of(device));
+}
+
+void check_images(std::string_view renderer, const Rig& rig, Device device, std::size_t num_views,
                   const ImageBatch& images, bool draws_f16) {
-  PICTURA_CHECK(images.space == space, "renderer {}: images: expected {} memory, got {}", renderer, name_of(space),
-                name_of(images.space));
+  check_device(renderer, "images", device, images.device);
   PICTURA_CHECK(draws_f16 || images.format != PixelFormat::f16,
                 "renderer {}: images: expected the format u8 or f32, got f16", renderer);
   PICTURA_CHECK(images.num_views >= 0 && static_cast<std::size_t>(images.num_views) == num_views,
@@ -63,8 +66,7 @@ void check_images(std::string_view renderer, const Rig& rig, MemorySpace space, 
 }
 
 void check_scene(std::string_view renderer, const SceneBatch& scene, Span<const StaticGeometryView> geometries) {
-  PICTURA_CHECK(scene.space == MemorySpace::host, "renderer {}: scene: expected host memory, got {}", renderer,
-                name_of(scene.space));
+  check_device(renderer, "scene", Device{}, scene.device);
   if (scene.world_begin.empty()) {
     PICTURA_CHECK(scene.agents.empty() && scene.geometry.empty(), "renderer {}: scene: no worlds, but agents or maps",
                   renderer);

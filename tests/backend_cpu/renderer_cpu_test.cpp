@@ -288,7 +288,7 @@ TEST(CpuRenderer, PlanesTellDepthClassAndInstance) {
   out.instance_id = instances.data();
   const std::vector<CameraImages> cameras{out};
   const std::vector<View> views{make_view({}, 0)};
-  renderer->render(scene.batch(), views, {MemorySpace::host, PixelFormat::u8, 1, cameras});
+  renderer->render(scene.batch(), views, {Device{}, PixelFormat::u8, 1, cameras});
   auto check = [&](int x, int y, double depth_m, int class_id, int instance) {
     const auto i = static_cast<std::size_t>(100 * y + x);
     if (std::isinf(depth_m)) {
@@ -358,8 +358,9 @@ TEST_F(CpuRendererErrors, GoodInputIsFine) {
 }
 TEST_F(CpuRendererErrors, ImagesOfAnotherSpaceSizeOrNumber) {
   ImageBatch images = images_.batch();
-  images.space = MemorySpace::cuda;
-  EXPECT_THROW(renderer_->render(scene_.batch(), views_, images), Error);
+  images.device = {MemorySpace::cuda, 1};
+  EXPECT_THAT(test::message_of([&] { renderer_->render(scene_.batch(), views_, images); }),
+              HasSubstr("renderer cpu: images: expected cpu, got cuda:1"));
   images_ = HostImages(paper_rig(8, 9), 1);
   expect_error("8x9");
   images_ = HostImages(paper_rig(8, 8), 2);
@@ -371,8 +372,9 @@ TEST_F(CpuRendererErrors, ImagesOfAnotherSpaceSizeOrNumber) {
 }
 TEST_F(CpuRendererErrors, ScenesInDeviceMemory) {
   SceneBatch scene = scene_.batch();
-  scene.space = MemorySpace::cuda;
-  EXPECT_THROW(renderer_->render(scene, views_, images_.batch()), Error);
+  scene.device = {MemorySpace::cuda, 0};
+  EXPECT_THAT(test::message_of([&] { renderer_->render(scene, views_, images_.batch()); }),
+              HasSubstr("renderer cpu: scene: expected cpu, got cuda:0"));
 }
 TEST_F(CpuRendererErrors, HandlesAndIndicesOutOfRange) {
   views_[0].world = 1;

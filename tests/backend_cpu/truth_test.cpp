@@ -50,7 +50,7 @@ Planes planes_of(const StaticGeometry& geometry, const SceneOwner& scene, const 
   out.class_id = planes.class_id.data();
   out.instance_id = planes.instance_id.data();
   const std::vector<CameraImages> cameras{out};
-  renderer->render(scene.batch(), std::vector<View>{view}, {MemorySpace::host, PixelFormat::u8, 1, cameras});
+  renderer->render(scene.batch(), std::vector<View>{view}, {Device{}, PixelFormat::u8, 1, cameras});
   return planes;
 }
 

@@ -11,11 +11,13 @@
 namespace pictura {
 namespace {
 
+constexpr Device kGpu{MemorySpace::cuda, 0};
+
 class GlInterop : public testing::Test {
  protected:
   void SetUp() override {
     try {
-      make_renderer("gl:egl", {.space = MemorySpace::cuda});
+      make_renderer("gl:egl", {.device = kGpu});
     } catch (const Error& error) {
       const char* required = std::getenv("PICTURA_REQUIRE_GPU");
       if (required && std::string(required) == "1") FAIL() << "PICTURA_REQUIRE_GPU=1, but " << error.what();
@@ -45,9 +47,9 @@ TEST_F(GlInterop, WritesTheSameBytesToDeviceMemoryAsToTheHost) {
     RendererConfig config{.rig = paper_rig(97, 55), .samples = samples};
     config.rig.cameras[1] = paper_rig(32, 18).cameras[1];
     const auto on_host = make_renderer("gl:egl", config);
-    config.space = MemorySpace::cuda;
+    config.device = kGpu;
     const auto on_device = make_renderer("gl:egl", config);
-    EXPECT_EQ(on_device->space(), MemorySpace::cuda);
+    EXPECT_EQ(on_device->device(), kGpu);
     on_host->upload(town.geometry);
     on_device->upload(town.geometry);
 
@@ -63,7 +65,7 @@ TEST_F(GlInterop, WritesTheSameBytesToDeviceMemoryAsToTheHost) {
       cameras.push_back(device_images.back().camera);
     }
     for (int repeat = 0; repeat < 2; ++repeat) {
-      on_device->render(scene.batch(), views.span(), {MemorySpace::cuda, PixelFormat::u8, 12, cameras});
+      on_device->render(scene.batch(), views.span(), {kGpu, PixelFormat::u8, 12, cameras});
     }
     for (std::size_t k = 0; k < cameras.size(); ++k) {
       const std::vector<uint8_t> drawn = device_images[k].on_host();
@@ -84,7 +86,7 @@ TEST_F(GlInterop, ASingleViewMayHaveAnyStride) {
   town.views.resize(1);
   RendererConfig config{.rig = front_rig(97, 55)};
   const auto on_host = make_renderer("gl:egl", config);
-  config.space = MemorySpace::cuda;
+  config.device = kGpu;
   const auto on_device = make_renderer("gl:egl", config);
   on_host->upload(town.geometry);
   on_device->upload(town.geometry);
@@ -96,7 +98,7 @@ TEST_F(GlInterop, ASingleViewMayHaveAnyStride) {
     DeviceImages device_images(config.rig.cameras[0], 1, 3 * 97 * 55);
     device_images.camera.view_stride = stride;
     on_device->render(scene.batch(), views.span(),
-                      {MemorySpace::cuda, PixelFormat::u8, 1, Span<const CameraImages>(&device_images.camera, 1)});
+                      {kGpu, PixelFormat::u8, 1, Span<const CameraImages>(&device_images.camera, 1)});
     EXPECT_THAT(device_images.on_host(), testing::ElementsAreArray(host_images.bytes())) << stride;
   }
 }
@@ -104,7 +106,7 @@ TEST_F(GlInterop, ASingleViewMayHaveAnyStride) {
 TEST_F(GlInterop, RefusesAHostScene) {
   SyntheticTown town = make_synthetic_town(1, 10);
   town.views.resize(1);
-  const auto renderer = make_renderer("gl:egl", {.space = MemorySpace::cuda});
+  const auto renderer = make_renderer("gl:egl", {.device = kGpu});
   renderer->upload(town.geometry);
   std::vector<CameraImages> cameras;
   uint8_t never_written = 0;
@@ -112,10 +114,10 @@ TEST_F(GlInterop, RefusesAHostScene) {
     cameras.push_back({camera.width_px, camera.height_px, &never_written, 3 * camera.width_px * camera.height_px});
   }
   try {
-    renderer->render(town.scene.batch(), town.views, {MemorySpace::cuda, PixelFormat::u8, 1, cameras});
+    renderer->render(town.scene.batch(), town.views, {kGpu, PixelFormat::u8, 1, cameras});
     FAIL() << "expected an Error";
   } catch (const Error& error) {
-    EXPECT_THAT(error.what(), testing::HasSubstr("renderer gl:egl: scene: expected cuda memory, got host"));
+    EXPECT_THAT(error.what(), testing::HasSubstr("renderer gl:egl: scene: expected cuda:0, got cpu"));
   }
 }
 

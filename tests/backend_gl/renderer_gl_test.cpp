@@ -327,7 +327,8 @@ TEST(GlNames, GlSaysWhichContextItTook) {
 }
 
 TEST(GlNames, OsmesaDrawsInHostMemoryAlone) {
-  expect_error([] { make_renderer("gl:osmesa", {.space = MemorySpace::cuda}); }, "renderer gl:osmesa: draws in host");
+  expect_error([] { make_renderer("gl:osmesa", {.device = {MemorySpace::cuda, 0}}); },
+               "renderer gl:osmesa: draws in host");
 }
 
 }  // namespace

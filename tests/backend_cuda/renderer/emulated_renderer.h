@@ -21,7 +21,7 @@ class EmulatedRenderer final : public Renderer {
   EmulatedRenderer(const RendererConfig& config, uint64_t seed, const Pool& pool);
   ~EmulatedRenderer() override;
   std::string_view name() const override { return "emulated"; }
-  MemorySpace space() const override { return MemorySpace::host; }
+  Device device() const override { return {}; }
   const RendererConfig& config() const override { return config_; }
   GeometryHandle upload(const StaticGeometry& geometry) override;
   void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override;

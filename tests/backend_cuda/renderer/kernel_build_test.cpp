@@ -153,7 +153,7 @@ TEST(NoDevice, CudaIsRefusedAndAutoDrawsOnTheCpuSayingWhy) {
   if (why.empty()) GTEST_SKIP() << "this machine has a CUDA device";
   EXPECT_EQ(test::message_of([] { make_renderer("cuda", {}); }), "renderer cuda: " + why);
   std::string choice;
-  EXPECT_EQ(make_renderer("auto", {.space = MemorySpace::cuda}, &choice)->name(), "cpu");
+  EXPECT_EQ(make_renderer("auto", {.device = {MemorySpace::cuda, 0}}, &choice)->name(), "cpu");
   EXPECT_EQ(choice, "cpu: " + why);
 }
 

@@ -1,5 +1,7 @@
 // The CUDA renderer against the oracle, on a device. Without one these tests are skipped, unless PICTURA_REQUIRE_GPU=1
 // says that there must be one.
+#include <algorithm>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,6 +13,7 @@
 #include "pictura/tests/backend_cuda/device_test.h"
 #include "pictura/tests/backend_cuda/renderer/equal_outputs.h"
 #include "pictura/tests/golden/golden_scenes.h"
+#include "pictura/tests/support/error_message.h"
 
 namespace pictura {
 
@@ -78,7 +81,7 @@ TEST_P(CudaGoldenScenes, LookLikeTheOracle) {
 TEST_F(CudaRendererTest, FaultsOfTheDeviceAreThrownByTheNextCall) {
   SyntheticTown town = make_synthetic_town(5, 5);
   town.views.resize(1);
-  const RendererConfig config{.rig = paper_rig(8, 8), .space = MemorySpace::cuda};
+  const RendererConfig config{.rig = paper_rig(8, 8), .device = {MemorySpace::cuda, 0}};
   const auto renderer = make_renderer("cuda", config);
   renderer->upload(town.geometry);
   const DeviceScene scene(town.scene.batch());
@@ -89,7 +92,7 @@ TEST_F(CudaRendererTest, FaultsOfTheDeviceAreThrownByTheNextCall) {
     cameras.push_back(shape.camera(static_cast<int>(k)));
     cameras[k].data = memory.data() + 3 * 64 * k;
   }
-  const ImageBatch images{MemorySpace::cuda, PixelFormat::u8, 1, cameras};
+  const ImageBatch images{config.device, PixelFormat::u8, 1, cameras};
   std::vector<View> bad = town.views;
   bad[0].world = 9;
   const DeviceBuffer<View> views{Span<const View>(bad)}, good{Span<const View>(town.views)};
@@ -112,13 +115,69 @@ TEST_F(CudaRendererTest, FaultsOfTheDeviceAreThrownByTheNextCall) {
   EXPECT_THROW(renderer->render(scene.batch(), good.span(), shape.batch()), Error);
 }
 
+TEST_F(CudaRendererTest, WrongDevicesAreRefusedByName) {
+  RendererConfig config{.rig = paper_rig(8, 8), .device = {MemorySpace::cuda, 0}};
+  const auto renderer = make_renderer("cuda", config);
+  EXPECT_EQ(renderer->device(), config.device);
+  const SyntheticTown town = make_synthetic_town(5, 5);
+  const DeviceScene on_device(town.scene.batch());
+  DeviceImages staged;
+  HostImages images(config.rig, 0);
+  const ImageBatch none = staged.like(images.batch());
+  auto told = [&](const SceneBatch& scene, const ImageBatch& out) {
+    return test::message_of([&] { renderer->render(scene, {}, out); });
+  };
+  EXPECT_EQ(told(on_device.batch(), none), test::kNoError);
+  EXPECT_EQ(told(town.scene.batch(), none), "renderer cuda: scene: expected cuda:0, got cpu");
+  EXPECT_EQ(told(on_device.batch(), images.batch()), "renderer cuda: images: expected cuda:0, got cpu");
+  SceneBatch elsewhere = on_device.batch();
+  elsewhere.device.index = 1;
+  EXPECT_EQ(told(elsewhere, none), "renderer cuda: scene: expected cuda:0, got cuda:1");
+  config.device.index = 99;
+  EXPECT_THAT(test::message_of([&] { make_renderer("cuda", config); }), HasSubstr("renderer cuda: device: expected"));
+}
+
+// Callers need not make the renderer's device current, and find theirs as it was.
+TEST_F(CudaRendererTest, DrawsOnItsDeviceWhateverTheCurrentOneIs) {
+  int devices = 0;
+  PICTURA_CUDA(cudaGetDeviceCount(&devices));
+  if (devices < 2) GTEST_SKIP() << "needs two CUDA devices";
+  SyntheticTown town = make_synthetic_town(1, 20);
+  town.views.resize(2);
+  const RendererConfig config{.rig = paper_rig(16, 9), .device = {MemorySpace::cuda, 1}};
+  const auto renderer = make_renderer("cuda", config);
+  EXPECT_EQ(current_device().index, 0);
+  renderer->upload(town.geometry);
+  HostImages images(config.rig, 2), expected(config.rig, 2);
+  {
+    const DeviceGuard there(config.device);
+    const DeviceScene scene(town.scene.batch());
+    const DeviceBuffer<View> views{Span<const View>(town.views)};
+    DeviceImages staged;
+    const ImageBatch batch = staged.like(images.batch());
+    {
+      const DeviceGuard here({MemorySpace::cuda, 0});
+      renderer->render(scene.batch(), views.span(), batch);
+      renderer->check();
+      EXPECT_EQ(current_device().index, 0);
+    }
+    staged.copy_to_host(images.batch());
+    PICTURA_CUDA(cudaDeviceSynchronize());
+  }
+  EXPECT_EQ(current_device().index, 0);
+  const auto oracle = make_renderer("cpu", {.rig = config.rig});
+  oracle->upload(town.geometry);
+  oracle->render(town.scene.batch(), town.views, expected.batch());
+  EXPECT_TRUE(std::ranges::equal(images.bytes(), expected.bytes()));
+}
+
 // What lies on the host is checked there, before the device sees it.
 TEST_F(CudaRendererTest, HostCallersLearnAtOnceWhatIsWrong) {
   SyntheticTown town = make_synthetic_town(5, 5);
   const RendererConfig config{.rig = paper_rig(8, 8)};
   const auto renderer = make_renderer("cuda", config);
   renderer->upload(town.geometry);
-  EXPECT_EQ(renderer->space(), MemorySpace::host);
+  EXPECT_EQ(renderer->device(), Device{});
   HostImages images(config.rig, static_cast<int>(town.views.size()));
   EXPECT_NO_THROW(renderer->render(town.scene.batch(), town.views, images.batch()));
   std::vector<View> bad = town.views;

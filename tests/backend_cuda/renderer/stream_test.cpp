@@ -40,7 +40,7 @@ struct Stage {
     town.views.resize(num_views);
     scene.assign(town.scene.batch());
     views = view_copy.assign(Span<const View>(town.views), nullptr);
-    config.space = MemorySpace::cuda;
+    config.device = {MemorySpace::cuda, 0};
     renderer = make_renderer("cuda", config);
     renderer->upload(town.geometry);
   }
@@ -108,7 +108,7 @@ TEST_F(CudaStreamTest, WritesEveryValueOfItsImagesAndNothingElse) {
                            reinterpret_cast<uint16_t*>(poisoned(pixels * sizeof(uint16_t)))});
       }
       stage.renderer->render(stage.scene.batch(), stage.views,
-                             {MemorySpace::cuda, format, static_cast<int>(kViews), cameras});
+                             {stage.config.device, format, static_cast<int>(kViews), cameras});
       std::vector<uint8_t> all;
       for (std::size_t k = 0; k < memory.size(); ++k) {
         std::vector<uint8_t> bytes(memory[k].size());
@@ -277,7 +277,7 @@ TEST_F(CudaStreamTest, KernelsBuiltAheadOfTimeDrawTheSame) {
   Rig mixed = paper_rig(50, 30);
   mixed.cameras[1] = paper_rig(31, 17).cameras[1];
   for (const Rig& rig : {paper_rig(), mixed}) {
-    RendererConfig config{.rig = rig, .space = MemorySpace::cuda};
+    RendererConfig config{.rig = rig, .device = {MemorySpace::cuda, 0}};
     const test::EnvironmentVariable on("PICTURA_NVRTC", std::nullopt);
     std::string choice;
     make_renderer("cuda", config, &choice);

@@ -1,0 +1,37 @@
+// The CUDA device that calls work on. Objects that live on one device set it in each call, so that callers need not.
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include "pictura/common/array.h"
+#include "pictura/common/cuda/check.h"
+
+namespace pictura {
+
+/// Makes a device the current one of the calling thread, and restores the one before at the end of the scope.
+class DeviceGuard {
+ public:
+  /// Throws Error where this is no CUDA device, or one that does not exist.
+  explicit DeviceGuard(Device device) : index_(device.index) {
+    PICTURA_CHECK(!device.is_host(), "cuda: expected a CUDA device, got {}", name_of(device));
+    PICTURA_CUDA(cudaGetDevice(&previous_));
+    if (index_ != previous_) PICTURA_CUDA(cudaSetDevice(index_));
+  }
+  ~DeviceGuard() {
+    if (index_ != previous_) cudaSetDevice(previous_);
+  }
+  DeviceGuard(const DeviceGuard&) = delete;
+  DeviceGuard& operator=(const DeviceGuard&) = delete;
+
+ private:
+  int index_ = 0, previous_ = 0;
+};
+
+/// The calling thread's current device.
+inline Device current_device() {
+  Device device{MemorySpace::cuda, 0};
+  PICTURA_CUDA(cudaGetDevice(&device.index));
+  return device;
+}
+
+}  // namespace pictura
