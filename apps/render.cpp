@@ -134,13 +134,12 @@ void render_world(const Arguments& arguments) {
   config.line_floor_px = arguments.line_floor_px;
   const auto renderer = open_renderer(arguments, config);
 
-  const auto pilot = make_pilot("random", arguments.world.seed, arguments.backend, arguments.world.num_threads);
-  const auto simulator = make_world(arguments.world, pilot.get());
-  std::vector<int32_t> actions(static_cast<size_t>(simulator->num_slots()));
+  DrivenWorld world = make_world(arguments.world, "random", arguments.backend);
+  Simulator* const simulator = world.simulator.get();
   for (int step = 0; step < arguments.steps; ++step) {
     if (interrupted()) throw Interrupted(fmt::format("interrupted at step {} of {}", step, arguments.steps));
-    pilot->act(*simulator, actions);
-    simulator->step(actions);
+    world.act();
+    world.step();
   }
 
   Subject subject{simulator->geometries(),

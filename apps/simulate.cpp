@@ -36,8 +36,8 @@ std::array<int64_t, kNumAgentClasses> spawned_by_class(Simulator& simulator) {
 }
 
 void run(const Arguments& arguments) {
-  const auto pilot = make_pilot(arguments.policy, arguments.world.seed, arguments.backend, arguments.world.num_threads);
-  const auto simulator = make_world(arguments.world, pilot.get());
+  DrivenWorld world = make_world(arguments.world, arguments.policy, arguments.backend);
+  Simulator* const simulator = world.simulator.get();
   const SpawnReport spawned = simulator->spawn_report();
   const auto of_class = spawned_by_class(*simulator);
   std::unique_ptr<Film> film;
@@ -46,15 +46,14 @@ void run(const Arguments& arguments) {
                                   arguments.world.num_threads);
   }
 
-  std::vector<int32_t> actions(static_cast<size_t>(simulator->num_slots()));
   ProgressLine line;
   double simulate_s = 0;
   int step = 0;
   for (; step < arguments.steps && !interrupted(); ++step) {
     if (film) film->add_frame(*simulator);
-    pilot->act(*simulator, actions);
+    world.act();
     const auto begin = std::chrono::steady_clock::now();
-    simulator->step(actions);
+    world.step();
     simulate_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     line.update(fmt::format("step {}/{}", step + 1, arguments.steps), static_cast<double>(step + 1) / arguments.steps);
   }
@@ -106,7 +105,7 @@ void add_simulate_command(CLI::App& app) {
   command->add_option("MAP", arguments->world.map, "A .xodr file, a town's name, or procedural[:SEED]")->required();
   add_world_options(command, &arguments->world);
   command->add_option("--steps", arguments->steps, "Steps of 0.1 s")->check(CLI::PositiveNumber)->capture_default_str();
-  command->add_option("--policy", arguments->policy, "random, idle, or a checkpoint that train wrote")
+  command->add_option("--policy", arguments->policy, "random, idle, lane_keeping, or a checkpoint that train wrote")
       ->capture_default_str();
   command->add_option("--backend", arguments->backend, "Renderer for policies that see: cpu, cuda or auto")
       ->capture_default_str();

@@ -2,23 +2,21 @@
 
 #include <algorithm>
 
+#include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/common/error.h"
-#include "pictura/common/rng.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/map/load_map.h"
 
 namespace pictura {
 
-void drive_randomly(Simulator* simulator, uint64_t seed, int steps) {
-  std::vector<int32_t> actions(static_cast<std::size_t>(simulator->num_slots()));
+void step_randomly(Simulator* simulator, uint64_t seed, int steps) {
+  const auto controller = make_controller("random", *simulator, seed);
+  std::vector<Command> commands(static_cast<std::size_t>(simulator->num_slots()));
   for (int step = 0; step < steps; ++step) {
     if (interrupted()) throw Interrupted("interrupted");
-    for (std::size_t slot = 0; slot < actions.size(); ++slot) {
-      RandomStream random(seed, 0, static_cast<uint32_t>(slot), 0, static_cast<uint32_t>(step), Purpose::action);
-      actions[slot] = random.below(kNumActions);
-    }
-    simulator->step(actions);
+    controller->act(simulator->controller_input(), {}, commands);
+    simulator->step(commands);
   }
 }
 
@@ -44,7 +42,7 @@ DrivenWorlds drive_worlds(const DrivenOptions& options) {
   DrivenWorlds worlds;
   worlds.simulator = make_simulator("cpu", config, maps, specs);
   worlds.geometries = worlds.simulator->geometries();
-  drive_randomly(worlds.simulator.get(), options.seed, options.steps);
+  step_randomly(worlds.simulator.get(), options.seed, options.steps);
   const uint8_t* refusal = worlds.simulator->state().refusal;
   const Span<const View> views = worlds.simulator->views();
   for (int agent = 0; agent < options.agents; ++agent) {

@@ -9,8 +9,8 @@
 
 namespace pictura {
 
-/// Drives with uniform actions, keyed by seed, slot and step.
-void drive_randomly(Simulator* simulator, uint64_t seed, int steps);
+/// Steps a simulator in host memory with the random controller.
+void step_randomly(Simulator* simulator, uint64_t seed, int steps);
 
 struct DrivenOptions {
   std::vector<std::string> maps;

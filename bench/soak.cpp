@@ -90,7 +90,7 @@ class Scenes {
     const auto map = static_cast<std::size_t>(random.below(static_cast<int>(maps_.size())));
     const WorldSpec world{0, 1 + random.below(options_.agents), static_cast<uint32_t>(scene)};
     simulator_ = make_simulator("cpu", config, {maps_[map]}, {world});
-    drive_randomly(simulator_.get(), config.seed, 1 + random.below(30));
+    step_randomly(simulator_.get(), config.seed, 1 + random.below(30));
   }
 
   // Of agents, as they are or from somewhere near them; some leave more agents out than their own.

@@ -3,7 +3,7 @@
 #include <chrono>
 
 #include "pictura/common/error.h"
-#include "pictura/common/rng.h"
+#include "pictura/simulator/rules/control.h"
 #ifdef PICTURA_HAS_CUDA
 #include "pictura/common/cuda/device_buffer.h"
 #endif
@@ -14,11 +14,12 @@ namespace {
 
 constexpr size_t kActionSets = 64;
 
-std::vector<int32_t> draw_actions(uint64_t seed, int num_slots, uint32_t step) {
+std::vector<int32_t> draw_actions(uint64_t seed, const std::vector<WorldSpec>& worlds, uint32_t step) {
   std::vector<int32_t> actions;
-  for (int slot = 0; slot < num_slots; ++slot) {
-    RandomStream random(seed, 0, static_cast<uint32_t>(slot), 0, step, Purpose::action);
-    actions.push_back(random.below(kNumActions));
+  for (const WorldSpec& world : worlds) {
+    for (int agent = 0; agent < world.num_agents; ++agent) {
+      actions.push_back(random_action(seed, world.global_world, agent, step));
+    }
   }
   return actions;
 }
@@ -36,7 +37,7 @@ struct StepBench::Actions {
 StepBench::StepBench(Simulator* simulator, uint64_t seed)
     : simulator_(simulator), actions_(std::make_unique<Actions>()) {
   for (uint32_t step = 0; step < kActionSets; ++step) {
-    actions_->host.push_back(draw_actions(seed, simulator->num_slots(), step));
+    actions_->host.push_back(draw_actions(seed, simulator->worlds(), step));
   }
   for (const std::vector<int32_t>& set : actions_->host) {
     if (simulator->space() == MemorySpace::host) {

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/bench/lane_keeping_episodes.h"
 #include "pictura/common/error.h"
@@ -63,24 +64,22 @@ void count_population(WorldBatch& batch, const LaneGraph& graph, Counts* counts_
   }
 }
 
-void drive_randomly(Simulator& simulator, const WorldStatisticsOptions& options, Counts* counts_inout) {
+void count_random_policy(Simulator& simulator, const WorldStatisticsOptions& options, Counts* counts_inout) {
   constexpr std::pair<const char*, Event> kEvents[] = {
       {"random policy: collisions", kEventCollision}, {"random policy: of these at fault", kEventAtFault},
       {"random policy: off-road", kEventOffRoad},     {"random policy: wall contacts", kEventWall},
       {"random policy: red lights", kEventRedLight},  {"random policy: goals", kEventMetricGoal}};
   const AgentStateView state = simulator.state();
   const std::vector<WorldSpec>& worlds = simulator.worlds();
-  std::vector<int32_t> actions(static_cast<size_t>(simulator.num_slots()));
+  const auto controller = make_controller("random", simulator, options.seed);
+  std::vector<Command> commands(static_cast<size_t>(simulator.num_slots()));
   const auto in_first_episode = [](int32_t episode) { return episode == 0; };
   for (uint32_t step = 0;; ++step) {
     const Span<const int32_t> before = simulator.episode_index();
     const std::vector<int32_t> episode(before.begin(), before.end());
     if (std::none_of(episode.begin(), episode.end(), in_first_episode)) break;
-    for (size_t slot = 0; slot < actions.size(); ++slot) {
-      actions[slot] =
-          RandomStream(options.seed, 0, static_cast<uint32_t>(slot), 0, step, Purpose::action).below(kNumActions);
-    }
-    const StepResult result = simulator.step(actions);
+    controller->act(simulator.controller_input(), {}, commands);
+    const StepResult result = simulator.step(commands);
     size_t slot = 0;
     for (size_t w = 0; w < worlds.size(); ++w) {
       const bool counts = episode[w] == 0 && simulator.episode_index()[w] == 0;
@@ -98,7 +97,7 @@ void drive_randomly(Simulator& simulator, const WorldStatisticsOptions& options,
 
 void drive_lanes(const std::shared_ptr<const RoadMap>& map, const SimulatorConfig& config, int episodes,
                  Counts* counts_inout) {
-  static_assert(LaneKeepingController::kAstray_m == 1);
+  static_assert(LaneKeepingAgent::kAstray_m == 1);
   constexpr std::pair<const char*, Event> kReasons[] = {{"lane driver: collisions", kEventCollision},
                                                         {"lane driver: off-road", kEventOffRoad},
                                                         {"lane driver: wall contacts", kEventWall},
@@ -135,7 +134,7 @@ std::vector<EpisodeValues> measure_worlds(const std::shared_ptr<const RoadMap>& 
   WorldBatch batch(config, {map}, worlds);
   batch.restore(simulator->save());
   count_population(batch, LaneGraph(*map), &counts);
-  drive_randomly(*simulator, options, &counts);
+  count_random_policy(*simulator, options, &counts);
   say("lane driver");
   config.cyclist_fraction = 0;
   drive_lanes(map, config, options.episodes, &counts);

@@ -1,11 +1,14 @@
 #include "pictura/cli/drive.h"
 
+#include <algorithm>
+
+#include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_renderer.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/cli/finite_range.h"
 #include "pictura/common/error.h"
-#include "pictura/common/rng.h"
 #include "pictura/map/load_map.h"
+#include "pictura/simulator/controllers/host_controllers.h"
 #ifdef PICTURA_HAS_TORCH
 #include "pictura/training/training.h"
 #endif
@@ -16,7 +19,7 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
   command->add_option("--agents", options_out->agents, "Vehicles, cyclists and pedestrians in the world")
       ->check(CLI::Range(1, kMaxAgentsPerWorld))
       ->capture_default_str();
-  // What a command sets beforehand is its default; else who drives decides, or the simulator.
+  // What a command sets beforehand is its default; else the policy decides, or the simulator.
   const SimulatorConfig simulator;
   auto with_default = [](const char* what, auto preset, auto simulators) {
     return fmt::format("{}; default: {}{}", what, preset ? "" : "as the policy was trained, else ",
@@ -43,40 +46,18 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
 
 namespace {
 
-class RandomPilot final : public Pilot {
- public:
-  explicit RandomPilot(uint64_t seed) : seed_(seed) {}
-  void act(Simulator&, Span<int32_t> actions_out) override {
-    for (size_t slot = 0; slot < actions_out.size(); ++slot) {
-      RandomStream random(seed_, 0, static_cast<uint32_t>(slot), 0, step_, Purpose::action);
-      actions_out[slot] = random.below(kNumActions);
-    }
-    ++step_;
-  }
-
- private:
-  uint64_t seed_;
-  uint32_t step_ = 0;
-};
-
-class IdlePilot final : public Pilot {
- public:
-  void act(Simulator&, Span<int32_t> actions_out) override {
-    constexpr int kNoJerk = 2 * kNumLatActions + 1;
-    for (int32_t& action : actions_out) action = kNoJerk;
-  }
-};
-
 #ifdef PICTURA_HAS_TORCH
-class PolicyPilot final : public Pilot {
+/// A trained policy, for the simulator that it was given to.
+class PolicyController final : public Controller {
  public:
-  PolicyPilot(const std::string& checkpoint, const std::string& backend, int num_threads)
+  PolicyController(const std::string& checkpoint, const std::string& backend, int num_threads)
       : driver_(load_driver(checkpoint, num_threads)) {
     if (driver_->needs_images()) {
       renderer_ = make_renderer(backend, {.rig = driver_->rig(), .num_threads = num_threads});
     }
   }
-  void adapt(SimulatorConfig* config_inout) const override {
+  std::string_view name() const override { return "policy"; }
+  void adapt(SimulatorConfig* config_inout) const {
     const SimulatorConfig known = driver_->evaluation_world();
     config_inout->conditioning = known.conditioning;
     config_inout->auxiliary_observations = known.auxiliary_observations;
@@ -86,46 +67,66 @@ class PolicyPilot final : public Pilot {
     config_inout->cyclist_fraction = known.cyclist_fraction;
     config_inout->parked_cars = known.parked_cars;
   }
-  void enter(const Simulator& simulator) override {
-    if (renderer_) upload_geometries(simulator.geometries(), renderer_.get());
+  void enter(Simulator* simulator) {
+    simulator_ = simulator;
+    actions_.resize(static_cast<size_t>(simulator->num_slots()));
+    if (renderer_) upload_geometries(simulator->geometries(), renderer_.get());
   }
-  void act(Simulator& simulator, Span<int32_t> actions_out) override {
-    driver_->act(simulator, renderer_.get(), /*argmax=*/true, actions_out);
+  void act(const ControllerInput&, Span<const uint8_t> mask, Span<Command> commands_out, Stream) override {
+    driver_->act(*simulator_, renderer_.get(), /*argmax=*/true, actions_);
+    for (size_t slot = 0; slot < commands_out.size(); ++slot) {
+      if (!mask.empty() && !mask[slot]) continue;
+      commands_out[slot] = {};
+      commands_out[slot].action = actions_[slot];
+    }
   }
 
  private:
   std::unique_ptr<Driver> driver_;
   std::unique_ptr<Renderer> renderer_;
+  Simulator* simulator_ = nullptr;
+  std::vector<int32_t> actions_;
 };
 #endif
 
 }  // namespace
 
-std::unique_ptr<Pilot> make_pilot(const std::string& name, uint64_t seed, [[maybe_unused]] const std::string& backend,
-                                  [[maybe_unused]] int num_threads) {
-  if (name == "random") return std::make_unique<RandomPilot>(seed);
-  if (name == "idle") return std::make_unique<IdlePilot>();
-#ifdef PICTURA_HAS_TORCH
-  return std::make_unique<PolicyPilot>(name, backend, num_threads);
-#else
-  fail_usage("--policy: expected random or idle (this build has no torch for checkpoints), got '{}'", name);
-#endif
-}
-
-std::unique_ptr<Simulator> make_world(const WorldOptions& options, Pilot* pilot) {
+DrivenWorld make_world(const WorldOptions& options, const std::string& policy,
+                       [[maybe_unused]] const std::string& backend) {
   SimulatorConfig config;
   config.seed = options.seed;
   config.num_threads = options.num_threads;
   config.walls = options.walls;
   config.fixed_lights = true;
   config.vector_observations = options.vector_observations;
-  pilot->adapt(&config);
+  const std::vector<std::string> names = host_controller_names();
+  const bool is_named = std::find(names.begin(), names.end(), policy) != names.end();
+#ifdef PICTURA_HAS_TORCH
+  std::unique_ptr<PolicyController> trained;
+  if (!is_named) {
+    trained = std::make_unique<PolicyController>(policy, backend, options.num_threads);
+    trained->adapt(&config);
+  }
+#else
+  if (!is_named) {
+    fail_usage("--policy: expected {} (this build has no torch for checkpoints), got '{}'", fmt::join(names, ", "),
+               policy);
+  }
+#endif
   config.pedestrian_fraction = options.pedestrian_fraction.value_or(config.pedestrian_fraction);
   config.cyclist_fraction = options.cyclist_fraction.value_or(config.cyclist_fraction);
   config.parked_cars = options.parked_cars.value_or(config.parked_cars);
-  auto simulator = make_simulator("cpu", config, {load_map(options.map)}, {{0, options.agents, 0}});
-  pilot->enter(*simulator);
-  return simulator;
+  DrivenWorld world;
+  world.simulator = make_simulator("cpu", config, {load_map(options.map)}, {{0, options.agents, 0}});
+  world.commands.resize(static_cast<size_t>(world.simulator->num_slots()));
+#ifdef PICTURA_HAS_TORCH
+  if (trained) {
+    trained->enter(world.simulator.get());
+    world.controller = std::move(trained);
+  }
+#endif
+  if (!world.controller) world.controller = make_controller(policy, *world.simulator, options.seed);
+  return world;
 }
 
 }  // namespace pictura

@@ -1,13 +1,15 @@
-// Who drives in `render` and `simulate`: random actions, no action, or a saved policy, on one world of one map.
+// One world of one map for `render` and `simulate`, and the controller that drives in it, by name or from a checkpoint.
 #pragma once
 
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "pictura/common/renderer.h"
+#include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/simulator.h"
 
 namespace pictura {
@@ -20,7 +22,7 @@ struct WorldOptions {
   int num_threads = 0;
   bool walls = true;
   bool vector_observations = true;
-  // Where nothing is said, the pilot's world has them, or the paper's where the pilot knows none.
+  // Where nothing is said, as the policy was trained, or as in the paper.
   std::optional<float> pedestrian_fraction, cyclist_fraction;
   std::optional<int> parked_cars;
 };
@@ -28,22 +30,20 @@ struct WorldOptions {
 /// Adds --agents, --pedestrians, --cyclists, --parked, --seed, --threads and --no-walls, which fill *options_out.
 void add_world_options(CLI::App* command, WorldOptions* options_out);
 
-/// Chooses the actions of all slots.
-class Pilot {
- public:
-  virtual ~Pilot() = default;
-  /// Makes the world one that this pilot can drive in; does nothing for pilots that look at nothing.
-  virtual void adapt(SimulatorConfig*) const {}
-  /// Takes what the pilot needs of the world before its first act().
-  virtual void enter(const Simulator&) {}
-  virtual void act(Simulator& simulator, Span<int32_t> actions_out) = 0;
+/// One world and who drives in it.
+struct DrivenWorld {
+  std::unique_ptr<Simulator> simulator;
+  std::unique_ptr<Controller> controller;
+  std::vector<Command> commands;
+
+  /// Lets the controller choose the commands of the next step.
+  void act() { controller->act(simulator->controller_input(), {}, commands); }
+  StepResult step() { return simulator->step(commands); }
 };
 
-/// "random" (uniform, keyed by seed, slot and step), "idle" (no jerk), or a checkpoint's path (argmax; needs torch).
-std::unique_ptr<Pilot> make_pilot(const std::string& name, uint64_t seed, const std::string& backend, int num_threads);
-
-/// One world of options.agents agents on the map, at the start of its first episode, with evaluation's light timing,
-/// which the pilot has entered.
-std::unique_ptr<Simulator> make_world(const WorldOptions& options, Pilot* pilot);
+/// A world of options.agents agents on the map, at the start of its first episode, with evaluation's light timing.
+/// `policy` drives: a controller's name (random, idle, lane_keeping), or a checkpoint's path (argmax; needs torch),
+/// whose world it is then and whose images `backend` draws.
+DrivenWorld make_world(const WorldOptions& options, const std::string& policy, const std::string& backend);
 
 }  // namespace pictura

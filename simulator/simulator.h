@@ -13,7 +13,9 @@
 #include "pictura/map/map_geometry.h"
 #include "pictura/map/road_map.h"
 #include "pictura/simulator/actions.h"
+#include "pictura/simulator/command.h"
 #include "pictura/simulator/conditioning.h"
+#include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/fields.h"
 #include "pictura/simulator/observation.h"
 #include "pictura/simulator/totals.h"
@@ -101,6 +103,9 @@ class Simulator {
   /// next call, or check(), throws it. There a step allocates nothing and waits for nothing, and a CUDA graph can
   /// capture it.
   virtual StepResult step(Span<const int32_t> actions, Stream stream = {}) = 0;
+  /// The same by commands, [slots], see command.h: what a Controller writes. A step of actions alone gives the bits
+  /// that the simple form gives.
+  virtual StepResult step(Span<const Command> commands, Stream stream = {}) = 0;
 
   /// Waits until everything asked for is done; throws Error when a step was refused since the last call that threw.
   virtual void check() = 0;
@@ -114,6 +119,9 @@ class Simulator {
   virtual Span<const View> views() = 0;
   /// One per map, in the order of maps(), for Renderer::upload; its handle must equal the map's index.
   virtual std::vector<StaticGeometry> geometries() const = 0;
+
+  /// What controllers read: all of the above, and which agent each slot is.
+  virtual ControllerInput controller_input() = 0;
 
   virtual AgentStateView state() = 0;
   /// Steps done in the current episode of each world, and the number of that episode.

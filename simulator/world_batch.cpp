@@ -305,6 +305,11 @@ WorldBatch::WorldBatch(const SimulatorConfig& config_in, std::vector<std::shared
   for (const WorldSpec& world : worlds) {
     const MapRules& map = map_rules[static_cast<size_t>(world.map)];
     const int num_boxes = world.num_agents + config.parked_cars;
+    for (int agent = 0; agent < world.num_agents; ++agent) {
+      world_of_slot.push_back(static_cast<int32_t>(global_world.size()));
+      agent_of_slot.push_back(agent);
+    }
+    global_world.push_back(world.global_world);
     slot_begin.push_back(slot_begin.back() + world.num_agents);
     box_begin.push_back(box_begin.back() + num_boxes);
     light_begin.push_back(light_begin.back() + static_cast<int32_t>(map.stop_lines.size()));
@@ -472,6 +477,19 @@ void WorldBatch::restore(Span<const uint8_t> bytes) {
   } catch (const Error&) {
     assign_from(present.data());
     throw;
+  }
+}
+
+std::string rejection_text(int64_t rejected) {
+  const int64_t slot = rejected >> 32 & 0x0FFFFFFF;
+  switch (static_cast<CommandKind>(rejected >> 60)) {
+    case CommandKind::action:
+      return fmt::format("slot {}: expected an action in [0, {}), got {}", slot, kNumActions,
+                         static_cast<int32_t>(rejected));
+    case CommandKind::kinematic_state:
+      return fmt::format("slot {}: expected a kinematic state within {} m, {} rad and {} m/s, got one beyond", slot,
+                         kMaxCommanded_m, kMaxCommanded_rad, kMaxCommanded_mps);
+    default: return fmt::format("slot {}: expected a command that is an action, a kinematic state or absence", slot);
   }
 }
 

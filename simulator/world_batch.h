@@ -5,6 +5,7 @@
 
 #include <array>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "pictura/simulator/agent_state.h"
@@ -30,6 +31,7 @@ struct WorldBatch {
   SpawnReport spawn_report() const;
   SimulatorTotals totals() const;
   std::vector<StaticGeometry> geometries() const;
+  SlotTable slot_table() const { return {world_of_slot, agent_of_slot, slot_begin, global_world}; }
 
   uint64_t state_hash() const;
   std::vector<uint8_t> save() const;
@@ -44,6 +46,8 @@ struct WorldBatch {
   std::vector<MapRules> map_rules;                          // [maps]
   std::vector<MapView> map_views;                           // [maps] of map_rules
   std::vector<int32_t> slot_begin, box_begin, light_begin;  // [worlds + 1]
+  std::vector<int32_t> world_of_slot, agent_of_slot;        // [slots]
+  std::vector<uint32_t> global_world;                       // [worlds]
 
   // State. box_cells and cell_centers are made anew by every step and are not saved.
   AgentState agents;
@@ -87,6 +91,9 @@ struct WorldBatch {
   void copy_to(uint8_t* bytes_out) const;
   void assign_from(const uint8_t* bytes);
 };
+
+/// What an Error says of a command that a step rejected, see rejected_command().
+std::string rejection_text(int64_t rejected);
 
 /// What an executor on the host writes for its users, besides the state.
 struct HostResults {

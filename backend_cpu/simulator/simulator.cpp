@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <type_traits>
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/parallel_for.h"
@@ -58,30 +59,20 @@ class SimulatorCpu final : public Simulator {
     });
   }
 
-  StepResult step(Span<const int32_t> actions, Stream) override {
-    check_actions(actions);
-    for_each_world([this, actions](int w) {
-      const auto index = static_cast<size_t>(w);
-      if (batch_.episode_over[index]) {
-        clear_results(w);
-        ++batch_.episode_index[index];
-        ++batch_.world_totals[index].episodes;
-        begin_episode(w);
-      } else {
-        step_world(w, actions);
-      }
-      batch_.world_totals[index].slot_steps += batch_.worlds[index].num_agents;
-      show(w);
-    });
-    totals_ = batch_.totals();
-    return {results_.reward, results_.terminated, results_.truncated, results_.valid, batch_.agents.refusal};
-  }
+  StepResult step(Span<const int32_t> actions, Stream) override { return step_all(actions); }
+  StepResult step(Span<const Command> commands, Stream) override { return step_all(commands); }
   void check() override {}
 
   ObservationView observations() override { return results_.observation_view(); }
   const SceneBatch& scene() override { return batch_.scene; }
   Span<const View> views() override { return results_.views; }
   std::vector<StaticGeometry> geometries() const override { return batch_.geometries(); }
+
+  ControllerInput controller_input() override {
+    return {Device{},           batch_.slot_table(),  results_.observation_view(), batch_.scene,
+            results_.views,     batch_.agents.view(), batch_.episode_step,         batch_.episode_index,
+            batch_.world_totals};
+  }
 
   AgentStateView state() override { return batch_.agents.view(); }
   Span<const int32_t> episode_step() const override { return batch_.episode_step; }
@@ -107,17 +98,38 @@ class SimulatorCpu final : public Simulator {
     parallel_for(batch_.config.num_threads, batch_.num_worlds(), [&body](int64_t w) { body(static_cast<int>(w)); });
   }
 
+  template <typename CommandType>
+  StepResult step_all(Span<const CommandType> commands) {
+    check_commands(commands);
+    for_each_world([this, commands](int w) {
+      const auto index = static_cast<size_t>(w);
+      if (batch_.episode_over[index]) {
+        clear_results(w);
+        ++batch_.episode_index[index];
+        ++batch_.world_totals[index].episodes;
+        begin_episode(w);
+      } else {
+        step_world(w, commands);
+      }
+      batch_.world_totals[index].slot_steps += batch_.worlds[index].num_agents;
+      show(w);
+    });
+    totals_ = batch_.totals();
+    return {results_.reward, results_.terminated, results_.truncated, results_.valid, batch_.agents.refusal};
+  }
+
   /// Before anything changes, so that a refused step leaves the state as it was.
-  void check_actions(Span<const int32_t> actions) {
-    PICTURA_CHECK(actions.size() == static_cast<size_t>(num_slots()), "step: expected {} actions, got {}", num_slots(),
-                  actions.size());
+  template <typename CommandType>
+  void check_commands(Span<const CommandType> commands) {
+    PICTURA_CHECK(commands.size() == static_cast<size_t>(num_slots()), "step: expected {} {}, got {}", num_slots(),
+                  std::is_same_v<CommandType, Command> ? "commands" : "actions", commands.size());
     for (int w = 0; w < batch_.num_worlds(); ++w) {
       if (batch_.episode_over[static_cast<size_t>(w)]) continue;
       const WorldView world = batch_.world(w);
       for (int agent = 0; agent < world.num_agents; ++agent) {
-        const auto slot = static_cast<size_t>(world.first_slot + agent);
-        PICTURA_CHECK(is_sound_action(world, agent, actions[slot]),
-                      "step: slot {}: expected an action in [0, {}), got {}", slot, kNumActions, actions[slot]);
+        const int slot = world.first_slot + agent;
+        const CommandType& command = commands[static_cast<size_t>(slot)];
+        if (!accepts(world, agent, command)) fail("step: {}", rejection_text(rejected_command(slot, command)));
       }
     }
   }
@@ -168,7 +180,8 @@ class SimulatorCpu final : public Simulator {
     return -1;
   }
 
-  void step_world(int w, Span<const int32_t> actions) {
+  template <typename CommandType>
+  void step_world(int w, Span<const CommandType> commands) {
     const auto index = static_cast<size_t>(w);
     const WorldView world = batch_.world(w);
     const StepArrays results = results_.step_arrays();
@@ -176,8 +189,8 @@ class SimulatorCpu final : public Simulator {
 
     for (int agent = 0; agent < world.num_agents; ++agent) {
       const auto slot = static_cast<size_t>(world.first_slot + agent);
-      results.valid[slot] = is_active(world, agent);
-      advance(world, agent, actions[slot]);
+      results.valid[slot] = takes_part(world, agent, commands[slot]);
+      advance(world, agent, commands[slot]);
     }
     sort_into_cells(world, &batch_.box_cells[index]);
     for (int agent = 0; agent < world.num_agents; ++agent) find_collisions(world, agent);

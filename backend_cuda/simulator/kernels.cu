@@ -230,4 +230,18 @@ void launch_step(const SimulatorArrays& arrays, const int32_t* actions, const St
   launch_step(DeviceLaunch{streams}, arrays, actions);
 }
 
+void launch_step(const SimulatorArrays& arrays, const Command* commands, const StepStreams& streams) {
+  launch_step(DeviceLaunch{streams}, arrays, commands);
+}
+
+void launch_commands(const RandomCommands& rule, int32_t num_slots, const uint8_t* mask, Command* commands_out,
+                     cudaStream_t stream) {
+  DeviceLaunch{{stream}}.threads(num_slots, WriteCommands<RandomCommands>{rule, mask, commands_out});
+}
+
+void launch_commands(const IdleCommands& rule, int32_t num_slots, const uint8_t* mask, Command* commands_out,
+                     cudaStream_t stream) {
+  DeviceLaunch{{stream}}.threads(num_slots, WriteCommands<IdleCommands>{rule, mask, commands_out});
+}
+
 }  // namespace pictura::cuda

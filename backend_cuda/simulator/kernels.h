@@ -5,6 +5,7 @@
 #include <cuda_runtime_api.h>
 
 #include "pictura/backend_cuda/simulator/phases.h"
+#include "pictura/simulator/rules/control.h"
 
 namespace pictura::cuda {
 
@@ -17,5 +18,12 @@ struct StepStreams {
 void launch_reset(const SimulatorArrays& arrays, const StepStreams& streams);
 void launch_restored(const SimulatorArrays& arrays, const StepStreams& streams);
 void launch_step(const SimulatorArrays& arrays, const int32_t* actions, const StepStreams& streams);
+void launch_step(const SimulatorArrays& arrays, const Command* commands, const StepStreams& streams);
+
+/// Commands of the slots that `mask` [slots] names, or of all where it is null.
+void launch_commands(const RandomCommands& rule, int32_t num_slots, const uint8_t* mask, Command* commands_out,
+                     cudaStream_t stream);
+void launch_commands(const IdleCommands& rule, int32_t num_slots, const uint8_t* mask, Command* commands_out,
+                     cudaStream_t stream);
 
 }  // namespace pictura::cuda

@@ -31,11 +31,6 @@ struct WorldScratch {
 /// What no step has as its lowest slot with an action out of range. All its bytes are equal, for memset.
 constexpr int32_t kNoSlot = 0x7F7F7F7F;
 
-/// An action that a step refused, in one word that the host reads whole: slot and action, or -1 for none.
-PICTURA_HD constexpr int64_t rejected_action(int32_t slot, int32_t action) {
-  return (static_cast<int64_t>(slot) << 32) | static_cast<uint32_t>(action);
-}
-
 /// Everything that the phases read and write, in one memory.
 struct SimulatorArrays {
   WorldView* worlds = nullptr;             // [num_worlds] their box_cells are one cell, which lists all boxes
@@ -57,12 +52,12 @@ struct SimulatorArrays {
   ObservationView observations;
   uint8_t entity_sets = 0;
   // Between phases and steps.
-  float* step_m = nullptr;             // [num_slots] driven in the present step
-  uint8_t* began = nullptr;            // [num_worlds] an episode began in the last step: the one after it is to be made
-  uint8_t* prepares = nullptr;         // [num_worlds] it is made in the present step
-  int32_t* next_spawned = nullptr;     // [num_worlds] in the next episode
-  int32_t* rejected_slot = nullptr;    // the lowest one with an action out of range, or kNoSlot
-  int64_t* rejected_action = nullptr;  // the first since the host looked, or -1
+  float* step_m = nullptr;           // [num_slots] driven in the present step
+  uint8_t* began = nullptr;          // [num_worlds] an episode began in the last step: the one after it is to be made
+  uint8_t* prepares = nullptr;       // [num_worlds] it is made in the present step
+  int32_t* next_spawned = nullptr;   // [num_worlds] in the next episode
+  int32_t* rejected_slot = nullptr;  // the lowest one with a command out of range, or kNoSlot
+  int64_t* rejected_command = nullptr;  // the first since the host looked, or kNothingRejected
 
   PICTURA_HD WorldView world(int w) const {
     WorldView world = worlds[w];
@@ -74,7 +69,7 @@ struct SimulatorArrays {
     world.agents = next_agents;
     return world;
   }
-  PICTURA_HD bool has_rejected_action() const { return *rejected_slot != kNoSlot; }
+  PICTURA_HD bool has_rejected_command() const { return *rejected_slot != kNoSlot; }
 };
 
 /// A world's boxes as one cell: with a warp to look at them, all are looked at sooner than they are sorted.
@@ -243,33 +238,36 @@ struct PrepareEpisode {
   }
 };
 
-/// Finds the lowest slot whose action is out of range.
-struct CheckActions {
+/// Finds the lowest slot whose command is out of range. Commands are actions or Commands, here and in what follows.
+template <typename CommandType>
+struct CheckCommands {
   SimulatorArrays arrays;
-  const int32_t* actions;
+  const CommandType* commands;
   template <typename Atomics>
   PICTURA_HD void operator()(const Atomics& atomics, int slot) const {
     const WorldView world = arrays.world(arrays.world_of_slot[slot]);
     if (slot == world.first_slot) arrays.began[world.index] = 0;  // arrays.prepares says it now
-    if (arrays.episode_over[world.index] || is_sound_action(world, slot - world.first_slot, actions[slot])) return;
+    if (arrays.episode_over[world.index] || accepts(world, slot - world.first_slot, commands[slot])) return;
     atomics.lower(arrays.rejected_slot, slot);
   }
 };
 
 /// Moves an agent, or takes it into the episode that was prepared.
+template <typename CommandType>
 struct Advance {
   SimulatorArrays arrays;
-  const int32_t* actions;
+  const CommandType* commands;
   template <typename ThreadGroup>
   PICTURA_HD void operator()(const ThreadGroup& group, int slot) const {
-    if (arrays.has_rejected_action()) return;
+    if (arrays.has_rejected_command()) return;
     const int w = arrays.world_of_slot[slot];
     const WorldView world = arrays.world(w);
     const int agent = slot - world.first_slot;
     if (!arrays.episode_over[w]) {
-      const bool drives = is_active(world, agent);
+      const CommandType& command = commands[slot];
+      const bool drives = takes_part(world, agent, command);
       if (group.rank() == 0) arrays.results.valid[slot] = drives;
-      advance(world, agent, actions[slot], group);
+      advance(world, agent, command, group);
     } else if (group.rank() == 0) {
       const WorldView next = arrays.next_world(w);
       clear_result(arrays.results, slot);
@@ -286,7 +284,7 @@ struct ApplyRewardAndHalt {
   template <typename ThreadGroup>
   PICTURA_HD void operator()(const ThreadGroup& group, int slot) const {
     const int w = arrays.world_of_slot[slot];
-    if (arrays.has_rejected_action() || arrays.episode_over[w]) return;
+    if (arrays.has_rejected_command() || arrays.episode_over[w]) return;
     const WorldView world = arrays.world(w);
     const int agent = slot - world.first_slot;
     find_collisions(world, agent, group);
@@ -296,12 +294,13 @@ struct ApplyRewardAndHalt {
 
 /// Counts a world's step, moves its lights on, and says whether its episode is over; or ends the move into its next
 /// episode.
+template <typename CommandType>
 struct FinishStep {
   SimulatorArrays arrays;
-  const int32_t* actions;
+  const CommandType* commands;
   template <typename ThreadGroup>
   PICTURA_HD void operator()(const ThreadGroup& group, int w) const {
-    if (arrays.has_rejected_action()) return refuse(group, w);
+    if (arrays.has_rejected_command()) return refuse(group, w);
     const bool begins = arrays.episode_over[w] != 0;
     SimulatorTotals totals;
     bool ends = false;
@@ -328,8 +327,8 @@ struct FinishStep {
  private:
   template <typename ThreadGroup>
   PICTURA_HD void refuse(const ThreadGroup& group, int w) const {
-    if (w > 0 || group.rank() > 0 || *arrays.rejected_action >= 0) return;
-    *arrays.rejected_action = rejected_action(*arrays.rejected_slot, actions[*arrays.rejected_slot]);
+    if (w > 0 || group.rank() > 0 || *arrays.rejected_command != kNothingRejected) return;
+    *arrays.rejected_command = rejected_command(*arrays.rejected_slot, commands[*arrays.rejected_slot]);
   }
 
   /// What belongs to no agent.
@@ -459,6 +458,18 @@ struct WriteObservation {
   }
 };
 
+/// Writes what a controller's rule tells a slot, where the mask has it.
+template <typename Rule>
+struct WriteCommands {
+  Rule rule;
+  const uint8_t* mask;  // null: all
+  Command* commands_out;
+  template <typename Atomics>
+  PICTURA_HD void operator()(const Atomics&, int slot) const {
+    if (!mask || mask[slot]) commands_out[slot] = rule(static_cast<size_t>(slot));
+  }
+};
+
 template <typename Launch>
 void launch_write_observations(const Launch& launch, const SimulatorArrays& arrays) {
   launch.template groups<kWarp>(arrays.num_slots, WriteObservation{arrays});
@@ -482,16 +493,16 @@ void launch_restored(const Launch& launch, const SimulatorArrays& arrays) {
   launch_write_observations(launch, arrays);
 }
 
-template <typename Launch>
-void launch_step(const Launch& launch, const SimulatorArrays& arrays, const int32_t* actions) {
+template <typename Launch, typename CommandType>
+void launch_step(const Launch& launch, const SimulatorArrays& arrays, const CommandType* commands) {
   launch.copy(arrays.prepares, arrays.began, static_cast<size_t>(arrays.num_worlds));
   launch.fork_join([&](const Launch& side) { side.teams(arrays.num_worlds, PrepareEpisode{arrays}); },
                    [&] {
                      launch.fill(arrays.rejected_slot, sizeof(int32_t), kNoSlot & 0xFF);
-                     launch.threads(arrays.num_slots, CheckActions{arrays, actions});
-                     launch.template groups<kThreadsPerAgent>(arrays.num_slots, Advance{arrays, actions});
+                     launch.threads(arrays.num_slots, CheckCommands<CommandType>{arrays, commands});
+                     launch.template groups<kThreadsPerAgent>(arrays.num_slots, Advance<CommandType>{arrays, commands});
                      launch.template groups<kThreadsPerAgent>(arrays.num_slots, ApplyRewardAndHalt{arrays});
-                     launch.template groups<kWarp>(arrays.num_worlds, FinishStep{arrays, actions});
+                     launch.template groups<kWarp>(arrays.num_worlds, FinishStep<CommandType>{arrays, commands});
                      launch_write_observations(launch, arrays);
                    });
 }

@@ -58,6 +58,16 @@ struct DeviceState {
   DeviceBuffer<SimulatorTotals> world_totals;
 };
 
+/// A SlotTable's arrays.
+struct DeviceSlots {
+  DeviceBuffer<int32_t> world_of_slot, agent_of_slot, slot_begin;
+  DeviceBuffer<uint32_t> global_world;
+
+  SlotTable table() const {
+    return {world_of_slot.span(), agent_of_slot.span(), slot_begin.span(), global_world.span()};
+  }
+};
+
 /// A map's arrays.
 class DeviceMap {
  public:
@@ -114,7 +124,6 @@ struct DeviceScratch {
   DeviceBuffer<RuleOptions> options;
   DeviceBuffer<WorldView> worlds, next_worlds;
   DeviceBuffer<cuda::WorldScratch> of_worlds;
-  DeviceBuffer<int32_t> world_of_slot;
   DeviceBuffer<int32_t> cell_begin, cell_items;  // each world's one cell: {0, boxes}; and 0, 1, 2, ...
   DeviceBuffer<Vec2> cell_centers;
   DeviceBuffer<AgentBox> try_boxes;
@@ -123,7 +132,7 @@ struct DeviceScratch {
   DeviceBuffer<float> step_m;
   DeviceBuffer<uint8_t> began, prepares;
   DeviceBuffer<int32_t> rejected_slot;
-  MappedValue<int64_t> rejected_action;
+  MappedValue<int64_t> rejected_command;
 };
 
 /// The part of the state that an episode begins with, for the next one.
@@ -185,6 +194,8 @@ class SimulatorCuda final : public Simulator {
     world_begin_ = device_copy(batch_->box_begin);
     light_begin_ = device_copy(batch_->light_begin);
     geometry_ = device_copy(batch_->geometry);
+    slots_ = {device_copy(batch_->world_of_slot), device_copy(batch_->agent_of_slot), device_copy(batch_->slot_begin),
+              device_copy(batch_->global_world)};
     scene_.device = {MemorySpace::cuda, device_.number()};
     scene_.world_begin = world_begin_.span();
     scene_.agents = state_.boxes.span();
@@ -206,30 +217,36 @@ class SimulatorCuda final : public Simulator {
 
   void reset(Stream stream) override {
     device_.check_current("simulator cuda");
-    throw_refused();
+    throw_rejected();
     cuda::launch_reset(arrays(), side_.streams_from(stream));
     PICTURA_CUDA(cudaGetLastError());
   }
 
-  StepResult step(Span<const int32_t> actions, Stream stream) override {
-    device_.check_current("simulator cuda");
-    throw_refused();
-    PICTURA_CHECK(actions.size() == static_cast<size_t>(num_slots()), "step: expected {} actions, got {}", num_slots(),
-                  actions.size());
-    cuda::launch_step(arrays(), actions.data(), side_.streams_from(stream));
-    PICTURA_CUDA(cudaGetLastError());
-    return {results_.reward.span(), results_.terminated.span(), results_.truncated.span(), results_.valid.span(),
-            agents_.refusal.span()};
+  StepResult step(Span<const int32_t> actions, Stream stream) override { return step_all(actions, "actions", stream); }
+  StepResult step(Span<const Command> commands, Stream stream) override {
+    return step_all(commands, "commands", stream);
   }
   void check() override {
     synchronize();
-    throw_refused();
+    throw_rejected();
   }
 
   ObservationView observations() override { return results_.observations(); }
   const SceneBatch& scene() override { return scene_; }
   Span<const View> views() override { return results_.views.span(); }
   std::vector<StaticGeometry> geometries() const override { return batch_->geometries(); }
+
+  ControllerInput controller_input() override {
+    return {Device{MemorySpace::cuda, device_.number()},
+            slots_.table(),
+            results_.observations(),
+            scene_,
+            results_.views.span(),
+            agents_.view(),
+            state_.episode_step.span(),
+            state_.episode_index.span(),
+            state_.world_totals.span()};
+  }
 
   AgentStateView state() override { return agents_.view(); }
   Span<const int32_t> episode_step() const override { return state_.episode_step.span(); }
@@ -286,29 +303,36 @@ class SimulatorCuda final : public Simulator {
     WorldBatch::visit_state(*batch_, state_, [](auto& host, const auto& device) { device.copy_to_host(host.data()); });
   }
 
-  void throw_refused() {
-    const int64_t rejected_action = *scratch_.rejected_action.host();
-    if (rejected_action < 0) return;
-    *scratch_.rejected_action.host() = -1;
-    fail("step: in an earlier call: slot {}: expected an action in [0, {}), got {}", rejected_action >> 32, kNumActions,
-         static_cast<int32_t>(rejected_action));
+  template <typename CommandType>
+  StepResult step_all(Span<const CommandType> commands, const char* what, Stream stream) {
+    device_.check_current("simulator cuda");
+    throw_rejected();
+    PICTURA_CHECK(commands.size() == static_cast<size_t>(num_slots()), "step: expected {} {}, got {}", num_slots(),
+                  what, commands.size());
+    cuda::launch_step(arrays(), commands.data(), side_.streams_from(stream));
+    PICTURA_CUDA(cudaGetLastError());
+    return {results_.reward.span(), results_.terminated.span(), results_.truncated.span(), results_.valid.span(),
+            agents_.refusal.span()};
+  }
+
+  void throw_rejected() {
+    const int64_t rejected = *scratch_.rejected_command.host();
+    if (rejected == kNothingRejected) return;
+    *scratch_.rejected_command.host() = kNothingRejected;
+    fail("step: in an earlier call: {}", rejection_text(rejected));
   }
 
   void allocate_scratch() {
     const size_t num_worlds = batch_->worlds.size(), num_boxes = batch_->boxes.size();
-    std::vector<int32_t> world_of_slot;
     std::vector<int32_t> cell_begin;
     int32_t max_boxes = 0;
     for (size_t w = 0; w < num_worlds; ++w) {
-      world_of_slot.insert(world_of_slot.end(), static_cast<size_t>(batch_->worlds[w].num_agents),
-                           static_cast<int32_t>(w));
       const int32_t boxes = batch_->box_begin[w + 1] - batch_->box_begin[w];
       cell_begin.insert(cell_begin.end(), {0, boxes});
       max_boxes = std::max(max_boxes, boxes);
     }
     std::vector<int32_t> cell_items(static_cast<size_t>(max_boxes));
     std::iota(cell_items.begin(), cell_items.end(), 0);
-    scratch_.world_of_slot = device_copy(world_of_slot);
     scratch_.options = DeviceBuffer<RuleOptions>(Span<const RuleOptions>(&batch_->options, 1));
     scratch_.worlds = DeviceBuffer<WorldView>(num_worlds);
     scratch_.next_worlds = DeviceBuffer<WorldView>(num_worlds);
@@ -321,11 +345,11 @@ class SimulatorCuda final : public Simulator {
     scratch_.known_tries = DeviceBuffer<int32_t>(num_boxes);
     scratch_.chosen_try = DeviceBuffer<int32_t>(num_boxes);
     scratch_.next_try = DeviceBuffer<int32_t>(num_boxes);
-    scratch_.step_m = DeviceBuffer<float>(world_of_slot.size());
+    scratch_.step_m = DeviceBuffer<float>(static_cast<size_t>(num_slots()));
     scratch_.began = DeviceBuffer<uint8_t>(num_worlds);
     scratch_.prepares = DeviceBuffer<uint8_t>(num_worlds);
     scratch_.rejected_slot = DeviceBuffer<int32_t>(1);
-    *scratch_.rejected_action.host() = -1;
+    *scratch_.rejected_command.host() = kNothingRejected;
   }
 
   /// The worlds as the rules see them, at the episodes that the host's state is in, over device memory.
@@ -366,7 +390,7 @@ class SimulatorCuda final : public Simulator {
     arrays.worlds = scratch_.worlds.data();
     arrays.next_worlds = scratch_.next_worlds.data();
     arrays.scratch = scratch_.of_worlds.data();
-    arrays.world_of_slot = scratch_.world_of_slot.data();
+    arrays.world_of_slot = slots_.world_of_slot.data();
     arrays.agents = agents_.view();
     arrays.next_agents = next_.agents.view();
     arrays.num_worlds = batch_->num_worlds();
@@ -385,7 +409,7 @@ class SimulatorCuda final : public Simulator {
     arrays.prepares = scratch_.prepares.data();
     arrays.next_spawned = next_.spawned.data();
     arrays.rejected_slot = scratch_.rejected_slot.data();
-    arrays.rejected_action = scratch_.rejected_action.device();
+    arrays.rejected_command = scratch_.rejected_command.device();
     return arrays;
   }
 
@@ -398,6 +422,7 @@ class SimulatorCuda final : public Simulator {
   DeviceNext next_;
   DeviceResults results_;
   DeviceScratch scratch_;
+  DeviceSlots slots_;
   SideStream side_;
   DeviceBuffer<int32_t> world_begin_, light_begin_;
   DeviceBuffer<GeometryHandle> geometry_;

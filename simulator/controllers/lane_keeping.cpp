@@ -5,6 +5,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/simulator/controllers/goal_places.h"
+#include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/simulator/world_batch.h"
 
 namespace pictura {
@@ -26,7 +27,7 @@ size_t first_touching(const std::vector<AgentBox>& boxes, const AgentBox& other)
 
 }  // namespace
 
-LaneKeepingController::LaneKeepingController(const WorldView& world, int agent, const LaneGraph& graph)
+LaneKeepingAgent::LaneKeepingAgent(const WorldView& world, int agent, const LaneGraph& graph)
     : world_(world),
       self_(agent),
       slot_(world.first_slot + agent),
@@ -35,7 +36,7 @@ LaneKeepingController::LaneKeepingController(const WorldView& world, int agent, 
   waypoints_.back() = points().front().at;  // where the first chain starts
 }
 
-int32_t LaneKeepingController::act() {
+int32_t LaneKeepingAgent::act() {
   find_place();
   follow_goals();
   const Motion now = agent_.now();
@@ -51,7 +52,7 @@ int32_t LaneKeepingController::act() {
 }
 
 /// Nothing is planned while pursuing the path will do. A plan is followed for half of it at least.
-void LaneKeepingController::renew_plan(const Motion& now) {
+void LaneKeepingAgent::renew_plan(const Motion& now) {
   if (stays_on_road(now)) {
     plan_ = {};
     next_planned_ = 0;
@@ -66,9 +67,9 @@ void LaneKeepingController::renew_plan(const Motion& now) {
 }
 
 /// Goes on to the waypoints of a new chain, or back to one that was missed.
-void LaneKeepingController::follow_goals() {
+void LaneKeepingAgent::follow_goals() {
   const int32_t chain = world_.agents.goal_chains[slot_] - 1;
-  PICTURA_CHECK(chain <= chain_ + 1, "lane driver: expected a look at every chain, got {} after {}", chain, chain_);
+  PICTURA_CHECK(chain <= chain_ + 1, "lane keeping: expected a look at every chain, got {} after {}", chain, chain_);
   if (chain != chain_) {
     waypoints_ = goal_places(world_, self_, static_cast<uint32_t>(chain), waypoints_.back());
     chain_ = chain;
@@ -82,7 +83,7 @@ void LaneKeepingController::follow_goals() {
 }
 
 /// From the end of the path through the waypoints that are left, and on.
-void LaneKeepingController::plan() {
+void LaneKeepingAgent::plan() {
   for (auto i = static_cast<size_t>(world_.agents.next_waypoint[slot_]); i < kNumWaypoints; ++i) {
     const bool gets_there = path_.go_to(waypoints_[i]);
     for (size_t goal = i; goal < kNumWaypoints; ++goal) goals_[goal] = points().size() - 1;
@@ -96,7 +97,7 @@ void LaneKeepingController::plan() {
 }
 
 /// Where a turn cannot be taken, the straightest way on, if that is clear, and only then to the waypoints.
-DrivingPlan LaneKeepingController::plan_elsewhere(DrivingPlan plan) {
+DrivingPlan LaneKeepingAgent::plan_elsewhere(DrivingPlan plan) {
   constexpr float kPassed_m = 20;
   LanePath other = path_;
   other.cut(place_);
@@ -109,12 +110,12 @@ DrivingPlan LaneKeepingController::plan_elsewhere(DrivingPlan plan) {
   return straight;
 }
 
-size_t LaneKeepingController::ahead(size_t from, float distance_m) const {
+size_t LaneKeepingAgent::ahead(size_t from, float distance_m) const {
   return std::min(from + static_cast<size_t>(distance_m / LanePath::kSpacing_m), points().size() - 1);
 }
 
 /// Moves its place along the path to where it is nearest to the rear axle.
-void LaneKeepingController::find_place() {
+void LaneKeepingAgent::find_place() {
   constexpr float kReach_m = 3;
   const Motion now = agent_.now();
   const size_t last = ahead(place_, kReach_m);
@@ -129,7 +130,7 @@ void LaneKeepingController::find_place() {
 }
 
 /// Pure pursuit (Coulter, Implementation of the pure pursuit path tracking algorithm, 1992) from a place on the path.
-float LaneKeepingController::steer_to(const Motion& now, size_t place) const {
+float LaneKeepingAgent::steer_to(const Motion& now, size_t place) const {
   const Vec2 target = points()[ahead(place, std::clamp(2 + 0.6f * now.speed_mps, 2.0f, 10.0f))].position_m.xy();
   const SinCos heading = sincos_of(now.heading_rad);
   const Vec2 apart = target - Vec2{now.x_m, now.y_m};
@@ -137,7 +138,7 @@ float LaneKeepingController::steer_to(const Motion& now, size_t place) const {
   return std::atan(2 * left_m * agent_.wheelbase_m() / std::max(dot(apart, apart), 1.0f));
 }
 
-int32_t LaneKeepingController::pursuing_action(const Motion& now, size_t place, float wanted_mps) const {
+int32_t LaneKeepingAgent::pursuing_action(const Motion& now, size_t place, float wanted_mps) const {
   const int32_t straight = agent_.speed_action(now, wanted_mps);
   const float wanted_rad = steer_to(now, place);
   int32_t best = straight;
@@ -154,7 +155,7 @@ int32_t LaneKeepingController::pursuing_action(const Motion& now, size_t place, 
 }
 
 /// Whether pursuing the path keeps it on the road so far ahead, by a margin.
-bool LaneKeepingController::stays_on_road(Motion now) const {
+bool LaneKeepingAgent::stays_on_road(Motion now) const {
   constexpr float kHorizon_m = 20, kMargin_m = 0.1f;
   size_t place = place_;
   for (float ahead_m = 0; ahead_m < kHorizon_m; ahead_m += driven_m(now.speed_mps, agent_.dt_s())) {
@@ -166,7 +167,7 @@ bool LaneKeepingController::stays_on_road(Motion now) const {
 }
 
 /// The speed from which it can stop before the next closed line.
-float LaneKeepingController::speed_before_light(const Motion& now) {
+float LaneKeepingAgent::speed_before_light(const Motion& now) {
   constexpr float kMargin_m = 2.0f;
   const float gap_m = to_closed_line(now.speed_mps) - kMargin_m;
   stops_ += gap_m < 1 && now.speed_mps < 0.1f;
@@ -175,7 +176,7 @@ float LaneKeepingController::speed_before_light(const Motion& now) {
 
 /// From the bumper along the route to the next line that is red, or yellow and can still be stopped at; 1000 where none
 /// is near.
-float LaneKeepingController::to_closed_line(float speed_mps) const {
+float LaneKeepingAgent::to_closed_line(float speed_mps) const {
   constexpr float kLook_m = 45;
   const Vec2 here = points()[place_].position_m.xy();
   std::vector<size_t> near;
@@ -208,7 +209,7 @@ float LaneKeepingController::to_closed_line(float speed_mps) const {
 
 /// The speed from which it can stop before it would touch another agent on its path, now or, if that has the right of
 /// way, where that will soon be.
-float LaneKeepingController::speed_behind_others() const {
+float LaneKeepingAgent::speed_behind_others() const {
   constexpr float kLook_m = 40, kMargin_m = 0.4f, kGap_m = 2, kBraking_mps2 = 1.5f;
   constexpr float kForesight_s = 4, kStep_s = 0.5f;
   float max_mps = INFINITY;
@@ -237,9 +238,54 @@ float LaneKeepingController::speed_behind_others() const {
 }
 
 /// Those with lower numbers do, unless they go the same way.
-bool LaneKeepingController::has_way(int other) const {
+bool LaneKeepingAgent::has_way(int other) const {
   const float turned = wrap_angle(world_.agents.heading_rad[world_.first_slot + other] - agent_.now().heading_rad);
   return other < self_ && std::fabs(turned) > 0.5f;
+}
+
+LaneKeepingController::LaneKeepingController(const Simulator& simulator) {
+  PICTURA_CHECK(simulator.space() == MemorySpace::host,
+                "controller lane_keeping: expected a simulator in host memory, got {}", simulator.name());
+  batch_ = std::make_unique<WorldBatch>(simulator.config(), simulator.maps(), simulator.worlds());
+  for (const auto& map : simulator.maps()) graphs_.push_back(std::make_unique<LaneGraph>(*map));
+  episode_.assign(simulator.worlds().size(), -1);
+  agents_.resize(static_cast<size_t>(simulator.num_slots()));
+}
+
+LaneKeepingController::~LaneKeepingController() = default;
+
+void LaneKeepingController::act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out,
+                                Stream) {
+  check_controller_arrays(name(), input, Device{}, mask, commands_out);
+  for (size_t w = 0; w < episode_.size(); ++w) {
+    if (input.episode_step[w] == 0) begin_episode(input, w);
+    PICTURA_CHECK(
+        episode_[w] == input.episode_index[w],
+        "controller lane_keeping: world {}: expected to act from the first step of episode {} on, got step {}", w,
+        input.episode_index[w], input.episode_step[w]);
+  }
+  for (size_t slot = 0; slot < agents_.size(); ++slot) {
+    if (!mask.empty() && !mask[slot]) continue;
+    commands_out[slot] = {};
+    const bool is_active = input.state.status[slot] == static_cast<uint8_t>(AgentStatus::active);
+    if (agents_[slot] && is_active) commands_out[slot].action = agents_[slot]->act();
+  }
+}
+
+void LaneKeepingController::begin_episode(const ControllerInput& input, size_t world) {
+  // The batch's maps and options, over the simulator's agents, boxes and lights, which nothing here writes.
+  WorldView view = batch_->world(static_cast<int>(world));
+  view.episode = static_cast<uint32_t>(input.episode_index[world]);
+  view.agents = input.state;
+  view.boxes = view.boxes_before = const_cast<AgentBox*>(input.scene.agents.data()) + view.first_box;
+  view.lights = const_cast<LightState*>(input.scene.light_states.data()) + input.scene.light_begin[world];
+  const LaneGraph& graph = *graphs_[static_cast<size_t>(batch_->worlds[world].map)];
+  for (int agent = 0; agent < view.num_agents; ++agent) {
+    const bool drives = is_active(view, agent) && !walks(view, agent);
+    agents_[static_cast<size_t>(view.first_slot + agent)] =
+        drives ? std::make_unique<LaneKeepingAgent>(view, agent, graph) : nullptr;
+  }
+  episode_[world] = input.episode_index[world];
 }
 
 }  // namespace pictura

@@ -1,12 +1,13 @@
-// A driver that keeps its lane, goes where its waypoints lead, and stops at red lights and behind others: what the
-// rules ask for can be driven with the jerk actions. It pursues the path of its lanes, and where that would leave the
-// road, since long cars cut corners, it follows a plan that does not.
+// A controller that keeps its lane, goes where its waypoints lead, and stops at red lights and behind others: what the
+// rules demand can be driven with the jerk actions. It pursues the path of its lanes, and where that would leave the
+// road, since long cars cut corners, it follows a plan that does not. On the host only.
 #pragma once
 
 #include <array>
 #include <memory>
 #include <vector>
 
+#include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/controllers/lane_path.h"
 #include "pictura/simulator/controllers/steering_search.h"
 #include "pictura/simulator/rules/step.h"
@@ -14,12 +15,14 @@
 
 namespace pictura {
 
-/// Drives an agent of a world.
-class LaneKeepingController {
+struct WorldBatch;
+
+/// Drives one vehicle or cyclist of a world through one episode.
+class LaneKeepingAgent {
  public:
-  /// `world` shows the simulator's agents and lights as they are at every act(), and has not been stepped yet; the
-  /// graph is its map's. Its arrays and the graph must outlive the driver.
-  LaneKeepingController(const WorldView& world, int agent, const LaneGraph& graph);
+  /// `world` shows the simulator's agents and lights as they are at every act(), and has not been stepped in this
+  /// episode yet; the graph is its map's. Its arrays and the graph must outlive this.
+  LaneKeepingAgent(const WorldView& world, int agent, const LaneGraph& graph);
 
   /// The action for what the agent and the lights are now.
   int32_t act();
@@ -56,6 +59,29 @@ class LaneKeepingController {
   DrivingPlan plan_;
   size_t next_planned_ = 0;  // of its actions
   int stops_ = 0, steps_astray_ = 0;
+};
+
+/// Drives all vehicles and cyclists of a simulator; pedestrians stand still.
+class LaneKeepingController final : public Controller {
+ public:
+  /// The simulator must outlive this. Throws Error unless it works in host memory.
+  explicit LaneKeepingController(const Simulator& simulator);
+  ~LaneKeepingController() override;
+
+  std::string_view name() const override { return "lane_keeping"; }
+  /// Throws Error besides where a world is in the middle of an episode whose first step this has not seen.
+  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out,
+           Stream stream = {}) override;
+  /// Null for pedestrians, for the absent, and before the first act().
+  const LaneKeepingAgent* agent(size_t slot) const { return agents_[slot].get(); }
+
+ private:
+  void begin_episode(const ControllerInput& input, size_t world);
+
+  std::unique_ptr<WorldBatch> batch_;                      // maps and rule options
+  std::vector<std::unique_ptr<LaneGraph>> graphs_;         // [maps]
+  std::vector<int32_t> episode_;                           // [worlds] the one that agents_ drive, or -1
+  std::vector<std::unique_ptr<LaneKeepingAgent>> agents_;  // [slots]
 };
 
 }  // namespace pictura

@@ -19,9 +19,29 @@ PICTURA_HD inline void clear_result(const StepArrays& results, int slot) {
   results.terminated[slot] = results.truncated[slot] = results.valid[slot] = 0;
 }
 
-/// Actions of agents that do not drive are ignored.
-PICTURA_HD inline bool is_sound_action(const WorldView& world, int agent, int32_t action) {
-  return !is_active(world, agent) || (action >= 0 && action < kNumActions);
+/// Commands to agents that are not active are ignored.
+template <typename CommandType>
+PICTURA_HD bool accepts(const WorldView& world, int agent, const CommandType& command) {
+  return !is_active(world, agent) || is_sound(command);
+}
+
+/// Whether a step is one of the agent's own: it was active before and is not told to leave.
+template <typename CommandType>
+PICTURA_HD bool takes_part(const WorldView& world, int agent, const CommandType& command) {
+  return is_active(world, agent) && !tells_to_leave(command);
+}
+
+/// A command that a step refused, in one word that a host reads whole: slot, kind, and the action of an action.
+constexpr int64_t kNothingRejected = -1;
+PICTURA_HD constexpr int64_t rejected_command(int32_t slot, CommandKind kind, int32_t action) {
+  const auto kind_bits = static_cast<int64_t>(static_cast<uint32_t>(kind) < 3 ? static_cast<uint32_t>(kind) : 3u);
+  return (kind_bits << 60) | (static_cast<int64_t>(slot) << 32) | static_cast<uint32_t>(action);
+}
+PICTURA_HD constexpr int64_t rejected_command(int32_t slot, int32_t action) {
+  return rejected_command(slot, CommandKind::action, action);
+}
+PICTURA_HD constexpr int64_t rejected_command(int32_t slot, const Command& command) {
+  return rejected_command(slot, command.kind, command.kind == CommandKind::action ? command.action : 0);
 }
 
 /// Draws the episode's cycle of one stop line and shows its first state.

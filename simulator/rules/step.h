@@ -3,6 +3,7 @@
 // halting).
 #pragma once
 
+#include "pictura/simulator/command.h"
 #include "pictura/simulator/rules/collision.h"
 #include "pictura/simulator/rules/reward.h"
 #include "pictura/simulator/rules/spawn.h"
@@ -83,10 +84,52 @@ PICTURA_HD inline DynamicsParameters dynamics_of(const AgentStateView& agents, i
   return parameters;
 }
 
-/// Phase 1: moves an active agent and finds what the road says about it. Its first lane alone writes, once all have
-/// read.
-template <typename ThreadGroup = SingleThread>
-PICTURA_HD void advance(const WorldView& world, int agent, int32_t action, const ThreadGroup& group = {}) {
+/// Whether an agent can be told this; see command.h.
+PICTURA_HD inline bool is_sound(int32_t action) { return action >= 0 && action < kNumActions; }
+PICTURA_HD inline bool is_sound(const Command& command) {
+  switch (command.kind) {
+    case CommandKind::action: return is_sound(command.action);
+    case CommandKind::kinematic_state:  // comparisons are false for NaN
+      return fabsf(command.x_m) <= kMaxCommanded_m && fabsf(command.y_m) <= kMaxCommanded_m &&
+             fabsf(command.z_m) <= kMaxCommanded_m && fabsf(command.heading_rad) <= kMaxCommanded_rad &&
+             fabsf(command.speed_mps) <= kMaxCommanded_mps;
+    case CommandKind::absent: return true;
+    default: return false;
+  }
+}
+
+PICTURA_HD constexpr bool tells_to_leave(int32_t) { return false; }
+PICTURA_HD inline bool tells_to_leave(const Command& command) { return command.kind == CommandKind::absent; }
+
+/// Where an agent is told to be after the step. Which level it is then on is looked for around *z_m_inout.
+PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, int32_t action, float*) {
+  const int slot = world.first_slot + agent;
+  return move(motion_of(world.agents, slot), controls_of_action(action), dynamics_of(world.agents, slot),
+              class_limits(class_of(world.agents, slot)), world.options.dt_s);
+}
+PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, const Command& command, float* z_m_inout) {
+  if (command.kind == CommandKind::action) return commanded_motion(world, agent, command.action, z_m_inout);
+  Motion motion;
+  motion.x_m = command.x_m;
+  motion.y_m = command.y_m;
+  motion.heading_rad = wrap_angle(command.heading_rad);
+  motion.speed_mps = command.speed_mps;
+  *z_m_inout = command.z_m;
+  return motion;
+}
+
+/// Takes an agent out of its world's episode.
+PICTURA_HD inline void leave(const WorldView& world, int agent) {
+  const int slot = world.first_slot + agent;
+  world.agents.status[slot] = static_cast<uint8_t>(AgentStatus::absent);
+  world.agents.events[slot] = kEventNone;
+  world.boxes[agent] = world.boxes_before[agent] = box_of(world.agents, slot);
+}
+
+/// Phase 1: moves an active agent as it is told, by an action or a Command, and finds what the road says about it. The
+/// first thread of its group alone writes, once all have read.
+template <typename CommandType, typename ThreadGroup = SingleThread>
+PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& command, const ThreadGroup& group = {}) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
   const AgentBox before = world.boxes[agent];
@@ -97,12 +140,19 @@ PICTURA_HD void advance(const WorldView& world, int agent, int32_t action, const
     return;
   }
 
+  if (tells_to_leave(command)) {
+    group.sync();
+    if (group.rank() == 0) leave(world, agent);
+    return;
+  }
+
   const AgentClass agent_class = class_of(agents, slot);
   const Vec3 from{agents.x_m[slot], agents.y_m[slot], agents.z_m[slot]};
-  const Motion motion = move(motion_of(agents, slot), controls_of_action(action), dynamics_of(agents, slot),
-                             class_limits(agent_class), world.options.dt_s);
+  float level_m = from.z;
+  const Motion motion = commanded_motion(world, agent, command, &level_m);
   const int32_t lane_before = agents.lane[slot];
-  const LaneFit fit = fit_agent(world, agent, {motion.x_m, motion.y_m}, from.z, motion.heading_rad, lane_before, group);
+  const LaneFit fit =
+      fit_agent(world, agent, {motion.x_m, motion.y_m}, level_m, motion.heading_rad, lane_before, group);
   const AgentBox box = box_at(agents, slot, {motion.x_m, motion.y_m, fit.z_m}, sincos_of(motion.heading_rad));
 
   int events = kEventNone;

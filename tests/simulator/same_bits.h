@@ -42,4 +42,27 @@ inline std::vector<int32_t> mixed_actions(int num_slots, uint32_t step) {
   return actions;
 }
 
+/// The same as commands, some of which put agents a little farther along, to the side or onto another, or take them
+/// out. The state is on the host.
+inline std::vector<Command> mixed_commands(const AgentStateView& state, int num_slots, uint32_t step) {
+  const std::vector<int32_t> actions = mixed_actions(num_slots, step);
+  std::vector<Command> commands(actions.size());
+  for (int slot = 0; slot < num_slots; ++slot) {
+    Command& command = commands[static_cast<size_t>(slot)];
+    command.action = actions[static_cast<size_t>(slot)];
+    RandomStream random(8, 0, static_cast<uint32_t>(slot), 0, step, Purpose::action);
+    const float kind = random.uniform();
+    if (kind >= 0.1f) continue;
+    const int of = kind < 0.005f ? random.below(num_slots) : slot;
+    command.kind = kind < 0.003f ? CommandKind::absent : CommandKind::kinematic_state;
+    const float ahead_m = random.uniform(0, 3), left_m = random.uniform(-0.2f, 0.2f);
+    command.x_m = state.x_m[of] + ahead_m * state.cos_heading[of] - left_m * state.sin_heading[of];
+    command.y_m = state.y_m[of] + ahead_m * state.sin_heading[of] + left_m * state.cos_heading[of];
+    command.z_m = state.z_m[of];
+    command.heading_rad = state.heading_rad[of] + random.uniform(-0.1f, 0.1f);
+    command.speed_mps = random.uniform(-1, 15);
+  }
+  return commands;
+}
+
 }  // namespace pictura::testing

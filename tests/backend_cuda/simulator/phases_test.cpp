@@ -1,6 +1,7 @@
 // The CUDA executor's phases, run on the host in random orders, against the CPU executor: the same bits everywhere.
 #include <cstring>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "pictura/backends/make_simulator.h"
@@ -12,9 +13,9 @@
 namespace pictura {
 namespace {
 
-/// Steps both with the same actions and compares everything that their users see.
+/// Steps both with the same actions, or commands of all kinds, and compares everything that their users see.
 void expect_same(const SimulatorConfig& config, const std::vector<std::shared_ptr<const RoadMap>>& maps,
-                 const std::vector<WorldSpec>& worlds, int steps, unsigned shuffle_seed) {
+                 const std::vector<WorldSpec>& worlds, int steps, unsigned shuffle_seed, bool by_commands = false) {
   const auto cpu = make_simulator("cpu", config, maps, worlds);
   testing::ShuffledExecutor other(config, maps, worlds, shuffle_seed);
   for (int step = 0; step <= steps; ++step) {
@@ -23,16 +24,20 @@ void expect_same(const SimulatorConfig& config, const std::vector<std::shared_pt
     ASSERT_TRUE(testing::same_bits(cpu->views(), Span<const View>(other.results.views))) << "step " << step;
     ASSERT_TRUE(testing::same_bits(cpu->scene().agents, Span<const AgentBox>(other.batch.boxes))) << "step " << step;
     if (step == steps) break;
-    const std::vector<int32_t> actions = testing::mixed_actions(cpu->num_slots(), static_cast<uint32_t>(step));
-    const StepResult result = cpu->step(actions);
-    other.step(actions);
+    const auto step_both = [&](const auto& commands) {
+      other.step(commands);
+      return cpu->step(commands);
+    };
+    const auto key = static_cast<uint32_t>(step);
+    const StepResult result = by_commands ? step_both(testing::mixed_commands(cpu->state(), cpu->num_slots(), key))
+                                          : step_both(testing::mixed_actions(cpu->num_slots(), key));
     ASSERT_TRUE(testing::same_bits(result.reward, Span<const float>(other.results.reward))) << "step " << step;
     ASSERT_TRUE(testing::same_bits(result.terminated, Span<const uint8_t>(other.results.terminated)));
     ASSERT_TRUE(testing::same_bits(result.truncated, Span<const uint8_t>(other.results.truncated)));
     ASSERT_TRUE(testing::same_bits(result.valid, Span<const uint8_t>(other.results.valid)));
   }
   EXPECT_EQ(cpu->save(), other.batch.save());
-  EXPECT_EQ(other.refused(), -1);
+  EXPECT_EQ(other.rejected(), kNothingRejected);
 }
 
 TEST(Phases, GiveTheBitsOfTheCpuExecutorInAnyOrderOfThreads) {
@@ -54,6 +59,15 @@ TEST(Phases, PlaceCrowdsAsOneAfterTheOtherWould) {
   expect_same(config, {testing::ring_road(40)}, {{0, 300, 0}, {0, 37, 1}, {0, 1, 2}}, 12, 3);
 }
 
+TEST(Phases, TakeCommandsOfAllKinds) {
+  SimulatorConfig config;
+  config.episode_steps = 60;
+  config.pedestrian_fraction = config.cyclist_fraction = 0.2f;
+  config.parked_cars = 12;
+  const std::vector<std::shared_ptr<const RoadMap>> maps{load_map("procedural:1"), testing::stadium(200, 2)};
+  expect_same(config, maps, draw_worlds(5, 300, 1, 60, 2), 130, 6, /*by_commands=*/true);
+}
+
 TEST(Phases, RefuseAnActionOutOfRangeAndChangeNothing) {
   const auto map = testing::stadium(200, 2);
   testing::ShuffledExecutor executor(testing::cars(), {map}, {{0, 30, 0}, {0, 10, 1}}, 4);
@@ -64,13 +78,28 @@ TEST(Phases, RefuseAnActionOutOfRangeAndChangeNothing) {
   actions[35] = -1;
   executor.step(actions);
   EXPECT_EQ(executor.batch.save(), before);
-  EXPECT_EQ(executor.refused(), cuda::rejected_action(31, kNumActions));
+  EXPECT_EQ(executor.rejected(), rejected_command(31, kNumActions));
   actions[31] = 0;
   executor.step(actions);
   EXPECT_EQ(executor.batch.save(), before);
-  EXPECT_EQ(executor.refused(), cuda::rejected_action(31, kNumActions)) << "the first one stands";
+  EXPECT_EQ(executor.rejected(), rejected_command(31, kNumActions)) << "the first one stands";
   actions[35] = 0;
   executor.step(actions);
+  EXPECT_NE(executor.batch.save(), before);
+}
+
+TEST(Phases, RefuseACommandOutOfRangeAndChangeNothing) {
+  testing::ShuffledExecutor executor(testing::cars(), {testing::stadium(200, 2)}, {{0, 30, 0}, {0, 10, 1}}, 4);
+  std::vector<Command> commands(40);
+  const std::vector<uint8_t> before = executor.batch.save();
+  commands[31].kind = CommandKind::kinematic_state;
+  commands[31].speed_mps = NAN;
+  executor.step(commands);
+  EXPECT_EQ(executor.batch.save(), before);
+  EXPECT_EQ(executor.rejected(), rejected_command(31, commands[31]));
+  EXPECT_THAT(rejection_text(executor.rejected()), ::testing::HasSubstr("slot 31: expected a kinematic state"));
+  commands[31].speed_mps = 0;
+  executor.step(commands);
   EXPECT_NE(executor.batch.save(), before);
 }
 

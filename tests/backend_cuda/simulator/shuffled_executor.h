@@ -137,13 +137,15 @@ class ShuffledExecutor {
       view.light_plans = next_light_plans_.data() + first_light;
       view.lights = next_lights_.data() + first_light;
       next_worlds_.push_back(view);
-      world_of_slot_.insert(world_of_slot_.end(), static_cast<size_t>(view.num_agents), w);
     }
     launch_reset(ShuffledLaunch{&random_}, arrays());
   }
 
-  void step(Span<const int32_t> actions) { launch_step(ShuffledLaunch{&random_}, arrays(), actions.data()); }
-  int64_t refused() const { return refusal_; }
+  template <typename CommandType>
+  void step(const std::vector<CommandType>& commands) {
+    launch_step(ShuffledLaunch{&random_}, arrays(), commands.data());
+  }
+  int64_t rejected() const { return rejected_command_; }
 
   WorldBatch batch;
   HostResults results;
@@ -154,7 +156,7 @@ class ShuffledExecutor {
     arrays.worlds = worlds_.data();
     arrays.next_worlds = next_worlds_.data();
     arrays.scratch = scratch_.data();
-    arrays.world_of_slot = world_of_slot_.data();
+    arrays.world_of_slot = batch.world_of_slot.data();
     arrays.agents = batch.agents.view();
     arrays.next_agents = next_agents_.view();
     arrays.num_worlds = batch.num_worlds();
@@ -172,8 +174,8 @@ class ShuffledExecutor {
     arrays.began = began_.data();
     arrays.prepares = prepares_.data();
     arrays.next_spawned = next_spawned_.data();
-    arrays.rejected_slot = &refused_slot_;
-    arrays.rejected_action = &refusal_;
+    arrays.rejected_slot = &rejected_slot_;
+    arrays.rejected_command = &rejected_command_;
     return arrays;
   }
 
@@ -185,14 +187,14 @@ class ShuffledExecutor {
   std::vector<LightState> next_lights_;
   std::vector<int32_t> next_spawned_;
   std::vector<cuda::WorldScratch> scratch_;
-  std::vector<int32_t> world_of_slot_, cell_begin_, cell_items_;
+  std::vector<int32_t> cell_begin_, cell_items_;
   std::vector<AgentBox> try_boxes_;
   std::vector<uint32_t> free_tries_;
   std::vector<int32_t> known_tries_, chosen_try_, next_try_;
   std::vector<float> step_m_;
   std::vector<uint8_t> began_, prepares_;
-  int32_t refused_slot_ = 0;
-  int64_t refusal_ = -1;
+  int32_t rejected_slot_ = 0;
+  int64_t rejected_command_ = kNothingRejected;
 };
 
 }  // namespace pictura::testing

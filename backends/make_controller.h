@@ -1,0 +1,17 @@
+// Controllers by name, for the memory that a simulator works in.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "pictura/simulator/controllers/controller.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+/// "random" (uniform actions, keyed by seed, world, agent and step), "idle" (no jerk), or, for a simulator in host
+/// memory, "lane_keeping". It drives this simulator alone, which must outlive it. Throws UsageError listing the known
+/// names.
+std::unique_ptr<Controller> make_controller(const std::string& name, Simulator& simulator, uint64_t seed);
+
+}  // namespace pictura

@@ -1,0 +1,53 @@
+// Who drives: the one interface of everything that commands agents (random, idle, lane keeping, policies, logs).
+#pragma once
+
+#include <string_view>
+
+#include "pictura/common/scene_types.h"
+#include "pictura/simulator/command.h"
+#include "pictura/simulator/fields.h"
+#include "pictura/simulator/observation.h"
+#include "pictura/simulator/totals.h"
+
+namespace pictura {
+
+/// Which agent of which world a slot is.
+struct SlotTable {
+  Span<const int32_t> world_of_slot, agent_of_slot;  // [slots] index of the world; of the agent in its world
+  Span<const int32_t> slot_begin;                    // [worlds + 1] the first slot of each world
+  Span<const uint32_t> global_world;                 // [worlds] WorldSpec::global_world
+};
+
+/// What a simulator shows its controllers, of the state after its last reset() or step(). Everything lies in its
+/// memory, at addresses that last as long as the simulator's.
+struct ControllerInput {
+  Device device;
+  SlotTable slots;
+  ObservationView observations;
+  SceneBatch scene;
+  Span<const View> views;  // [slots]
+  AgentStateView state{};
+  Span<const int32_t> episode_step, episode_index;  // [worlds]
+  Span<const SimulatorTotals> world_totals;         // [worlds]
+};
+
+/// Chooses a command for every slot. It belongs to one simulator and works in that one's memory.
+class Controller {
+ public:
+  Controller() = default;
+  virtual ~Controller() = default;
+  Controller(const Controller&) = delete;
+  Controller& operator=(const Controller&) = delete;
+
+  virtual std::string_view name() const = 0;
+
+  /// Writes commands_out [slots] for the step after the state that `input` shows. mask [slots] says which slots it
+  /// commands, 1 or 0: the others' commands stay as they are, so that several controllers can share a simulator; an
+  /// empty mask commands all. Commands of inactive agents mean nothing. On a device all three lie there, the work is
+  /// put on the stream without waiting for it or allocating, and a CUDA graph can capture it; on the host it is done
+  /// on return. Throws Error when an array is of another size than the simulator's slots.
+  virtual void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out,
+                   Stream stream = {}) = 0;
+};
+
+}  // namespace pictura

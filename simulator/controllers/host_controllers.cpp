@@ -1,0 +1,63 @@
+#include "pictura/simulator/controllers/host_controllers.h"
+
+#include "pictura/common/array.h"
+#include "pictura/common/error.h"
+#include "pictura/simulator/controllers/lane_keeping.h"
+#include "pictura/simulator/rules/control.h"
+
+namespace pictura {
+
+void check_controller_arrays(std::string_view who, const ControllerInput& input, Device device,
+                             Span<const uint8_t> mask, Span<const Command> commands) {
+  const size_t num_slots = input.slots.world_of_slot.size();
+  PICTURA_CHECK(input.device == device, "controller {}: expected input on {}, got {}", who, name_of(device),
+                name_of(input.device));
+  PICTURA_CHECK(mask.empty() || mask.size() == num_slots, "controller {}: expected a mask of {} slots, got {}", who,
+                num_slots, mask.size());
+  PICTURA_CHECK(commands.size() == num_slots, "controller {}: expected memory for {} commands, got {}", who, num_slots,
+                commands.size());
+}
+
+namespace {
+
+template <typename Rule>
+void fill(const Rule& rule, Span<const uint8_t> mask, Span<Command> commands_out) {
+  for (size_t slot = 0; slot < commands_out.size(); ++slot) {
+    if (mask.empty() || mask[slot]) commands_out[slot] = rule(slot);
+  }
+}
+
+class RandomController final : public Controller {
+ public:
+  explicit RandomController(uint64_t seed) : seed_(seed) {}
+  std::string_view name() const override { return "random"; }
+  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream) override {
+    check_controller_arrays(name(), input, Device{}, mask, commands_out);
+    fill(RandomCommands{seed_, input.slots, input.world_totals}, mask, commands_out);
+  }
+
+ private:
+  uint64_t seed_;
+};
+
+class IdleController final : public Controller {
+ public:
+  std::string_view name() const override { return "idle"; }
+  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream) override {
+    check_controller_arrays(name(), input, Device{}, mask, commands_out);
+    fill(IdleCommands{}, mask, commands_out);
+  }
+};
+
+}  // namespace
+
+std::vector<std::string> host_controller_names() { return {"random", "idle", "lane_keeping"}; }
+
+std::unique_ptr<Controller> make_host_controller(const std::string& name, const Simulator& simulator, uint64_t seed) {
+  if (name == "random") return std::make_unique<RandomController>(seed);
+  if (name == "idle") return std::make_unique<IdleController>();
+  if (name == "lane_keeping") return std::make_unique<LaneKeepingController>(simulator);
+  fail_usage("controller: expected one of {}; got '{}'", fmt::join(host_controller_names(), ", "), name);
+}
+
+}  // namespace pictura

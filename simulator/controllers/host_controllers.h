@@ -1,0 +1,24 @@
+// Controllers without a device, by name.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pictura/simulator/controllers/controller.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+/// "random", "idle" (no jerk) or "lane_keeping".
+std::vector<std::string> host_controller_names();
+
+/// Throws UsageError listing the known names, or Error where the simulator's memory is not the host's.
+std::unique_ptr<Controller> make_host_controller(const std::string& name, const Simulator& simulator, uint64_t seed);
+
+/// Throws Error, naming the controller, unless mask (or nothing) and commands have one element for each slot and the
+/// input lies on `device`.
+void check_controller_arrays(std::string_view who, const ControllerInput& input, Device device,
+                             Span<const uint8_t> mask, Span<const Command> commands);
+
+}  // namespace pictura

@@ -1,0 +1,43 @@
+// The controllers that need no more than a slot's number: the same rule on every executor.
+#pragma once
+
+#include "pictura/common/rng.h"
+#include "pictura/simulator/command.h"
+#include "pictura/simulator/controllers/controller.h"
+
+namespace pictura {
+
+/// Uniform over all actions.
+PICTURA_HD inline int32_t random_action(uint64_t seed, uint32_t global_world, int agent, uint32_t step) {
+  RandomStream random(seed, global_world, static_cast<uint32_t>(agent), 0, step, Purpose::action);
+  return random.below(kNumActions);
+}
+
+/// Steps that a world has taken since its simulator was made, the ones that began episodes included.
+PICTURA_HD inline uint32_t steps_of(const SimulatorTotals& world_totals, int32_t num_agents) {
+  return static_cast<uint32_t>(world_totals.slot_steps / num_agents);
+}
+
+/// Random actions, keyed by world, agent in the world, and the steps that the world has taken: no state of its own, so
+/// that a restored simulator is driven on as the saved one.
+struct RandomCommands {
+  uint64_t seed;
+  SlotTable slots;
+  Span<const SimulatorTotals> world_totals;
+
+  PICTURA_HD Command operator()(size_t slot) const {
+    const auto world = static_cast<size_t>(slots.world_of_slot[slot]);
+    const int32_t num_agents = slots.slot_begin[world + 1] - slots.slot_begin[world];
+    Command command;
+    command.action = random_action(seed, slots.global_world[world], slots.agent_of_slot[slot],
+                                   steps_of(world_totals[world], num_agents));
+    return command;
+  }
+};
+
+/// No jerk.
+struct IdleCommands {
+  PICTURA_HD Command operator()(size_t) const { return {}; }
+};
+
+}  // namespace pictura
