@@ -1,5 +1,5 @@
-// The palette: one base colour per kind of thing (per face for agents), and the range at which all have faded to black.
-// Vehicles take RAP's colours (vita-epfl/RAP, renderer.py); the other hues are ours, see docs/image.md.
+// The palette: one base colour per kind of primitive (per face for agents), and the range at which all have faded to
+// black. Vehicles take RAP's colours (vita-epfl/RAP, renderer.py); the other hues are ours, see docs/image.md.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -11,7 +11,7 @@ struct Rgb {
   float r = 0, g = 0, b = 0;
 };
 
-/// How a channel is stored: as a byte, or as a number in [0, 1].
+/// Storage of a channel: a byte, or a half or float in [0, 1].
 enum class PixelFormat : uint8_t { u8, f16, f32 };
 
 PICTURA_HD constexpr Rgb rgb8(int r, int g, int b) {
@@ -30,7 +30,7 @@ constexpr int kNumBoxFaces = 5;
 constexpr float kVisibleRange_m = 120.0f;
 
 PICTURA_HD constexpr Rgb agent_color(AgentClass agent_class, BoxFace face) {
-  // A choice and no table, which each thread of a kernel would have to write down first.
+  // Conditionals instead of a table: each thread of a kernel would have to build the table in its local memory first.
   auto chosen = [face](Rgb front, Rgb back, Rgb left, Rgb right, Rgb top) {
     const Rgb of_sides = face == BoxFace::left ? left : face == BoxFace::right ? right : top;
     return face == BoxFace::front ? front : face == BoxFace::back ? back : of_sides;

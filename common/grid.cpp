@@ -25,7 +25,7 @@ Grid::Grid(Span<const Aabb2> boxes, float cell_m) : cell_m_(cell_m), num_boxes_(
   num_x_ = static_cast<int>(cells_x);
   num_y_ = static_cast<int>(cells_y);
 
-  // Counting sort: how many items a cell has, where its range begins, then the items themselves in order.
+  // Counting sort: the number of items of each cell, the start of its range, then the items in order.
   const GridView grid = view();
   begin_.assign(static_cast<std::size_t>(num_x_) * static_cast<std::size_t>(num_y_) + 1, 0);
   for (const Aabb2& box : boxes) visit_cells(grid, box, [&](std::size_t cell) { ++begin_[cell + 1]; });

@@ -11,11 +11,11 @@ namespace pictura {
 class Grid {
  public:
   Grid() = default;
-  /// Puts item i into every cell that boxes[i] touches. Throws on a non-finite box, or when the area over the cell size
-  /// would need more than 2^26 cells.
+  /// Puts item i into every cell that boxes[i] touches. Throws if a box is not finite, or if the area would need more
+  /// than 2^26 cells.
   Grid(Span<const Aabb2> boxes, float cell_m);
   GridView view() const { return {origin_m_, cell_m_, num_x_, num_y_, begin_, items_}; }
-  /// How many it was built from.
+  /// Number of boxes that it was built from.
   std::size_t num_boxes() const { return num_boxes_; }
 
  private:
@@ -27,7 +27,7 @@ class Grid {
   std::vector<int32_t> items_;
 };
 
-/// Calls visit(cell) for the number of each cell that a box touches.
+/// Calls visit(cell) with the index of each cell that a box touches.
 template <typename Visit>
 void visit_cells(const GridView& grid, const Aabb2& box, Visit&& visit) {
   for (int y = grid.cell_y(box.low.y); y <= grid.cell_y(box.high.y); ++y) {
@@ -36,7 +36,7 @@ void visit_cells(const GridView& grid, const Aabb2& box, Visit&& visit) {
     }
   }
 }
-/// ... visit(item) for each item in those cells, as often as it stands in one.
+/// Calls visit(item) for each item in those cells, once per cell that it is in.
 template <typename Visit>
 void visit_items(const GridView& grid, const Aabb2& box, Visit&& visit) {
   visit_cells(grid, box, [&](std::size_t cell) {

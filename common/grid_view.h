@@ -1,4 +1,4 @@
-// What both devices read of a uniform grid over the ground plane: which items touch which square cell, in compressed
+// A uniform grid over the ground plane as both devices read it: which items touch which square cell, in compressed
 // rows. Built on the host by Grid in grid.h.
 #pragma once
 
@@ -11,8 +11,7 @@ struct Aabb2 {
   Vec2 low, high;
 };
 
-/// What both devices read. Items of cell (ix, iy) are items[begin[c]] .. items[begin[c + 1] - 1], c = iy * num_x + ix,
-/// in ascending order of item.
+/// Items of cell (ix, iy) are items[begin[c]] .. items[begin[c + 1] - 1], c = iy * num_x + ix, in ascending order.
 struct GridView {
   Vec2 origin_m;
   float cell_m = 1;

@@ -1,5 +1,6 @@
-// Small vectors and the transcendental functions that both devices share. libm and CUDA differ in their last bits, so
-// sin, cos, atan and exp are our own: single-precision polynomials after S. Moshier's Cephes, built from + - * / alone.
+// Small vectors, and transcendental functions that are bit-equal on both devices. libm and CUDA differ in their last
+// bits, so sin, cos, atan and exp are our own: single-precision polynomials after S. Moshier's Cephes, built from + - *
+// / alone.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -26,9 +27,9 @@ PICTURA_HD constexpr Vec2 operator+(Vec2 a, Vec2 b) { return {a.x + b.x, a.y + b
 PICTURA_HD constexpr Vec2 operator-(Vec2 a, Vec2 b) { return {a.x - b.x, a.y - b.y}; }
 PICTURA_HD constexpr Vec2 operator*(Vec2 a, float s) { return {a.x * s, a.y * s}; }
 PICTURA_HD constexpr float dot(Vec2 a, Vec2 b) { return a.x * b.x + a.y * b.y; }
-/// z of the cross product: positive where b lies to the left of a.
+/// z of the cross product: positive if b lies to the left of a.
 PICTURA_HD constexpr float cross(Vec2 a, Vec2 b) { return a.x * b.y - a.y * b.x; }
-/// a turned by a quarter to the left.
+/// a rotated by 90 degrees counter-clockwise.
 PICTURA_HD constexpr Vec2 left_normal(Vec2 a) { return {-a.y, a.x}; }
 PICTURA_HD inline float length(Vec2 a) { return sqrtf(dot(a, a)); }
 
@@ -41,7 +42,7 @@ PICTURA_HD constexpr Vec3 cross(Vec3 a, Vec3 b) {
 }
 PICTURA_HD inline float length(Vec3 a) { return sqrtf(dot(a, a)); }
 
-/// Whether a number is neither infinite nor none.
+/// True unless the value is infinite or NaN.
 PICTURA_HD inline bool is_finite(float value) { return fabsf(value) <= 3.4e38f; }
 PICTURA_HD inline bool is_finite(Vec2 v) { return is_finite(v.x) && is_finite(v.y); }
 PICTURA_HD inline bool is_finite(Vec3 v) { return is_finite(v.xy()) && is_finite(v.z); }
@@ -135,7 +136,7 @@ PICTURA_HD inline float exp_of(float x) {
   return y;
 }
 
-/// x_rad less whole turns, in [-pi, pi].
+/// x_rad minus whole turns, in [-pi, pi].
 PICTURA_HD inline float wrap_angle(float x_rad) {
   const float wrapped = x_rad - kTwoPi * floorf(x_rad * (1.0f / kTwoPi) + 0.5f);
   return clamp(wrapped, -kPi, kPi);

@@ -8,7 +8,7 @@
 namespace pictura {
 
 namespace {
-// Images are drawn in bands of rows, so that their fragments stay in the cache whatever their size.
+// Images are drawn in bands of rows, so that the fragments stay in the cache for any image size.
 constexpr int kBandPixels = 1 << 14;
 }  // namespace
 
@@ -83,7 +83,7 @@ bool ImageDrawer::stands(uint32_t solid, uint32_t strip) const {
   return stands_on(extent_of(solid, pieces, agents), extent_of(strip, pieces, agents), setting_.camera.position_m);
 }
 
-// Calls visit(y, pixel, span) for each row of a face within some rows; pixel is the index of the row's first.
+// Calls visit(y, pixel, span) for each row of a face within `rows`; pixel is the index of the row's first pixel.
 template <typename Visit>
 void ImageDrawer::visit_spans(const ScreenFace& face, RowRange rows, Visit&& visit) const {
   const int width = setting_.camera.width_px;
@@ -93,12 +93,12 @@ void ImageDrawer::visit_spans(const ScreenFace& face, RowRange rows, Visit&& vis
   }
 }
 
-// Finds, for each pixel of some rows, the largest occluder_bound() of the faces that cover it fully.
+// Finds, for each pixel of the rows, the largest occluder_bound() of the faces that cover it fully.
 void ImageDrawer::find_occluder_bounds(FaceRange faces, RowRange rows) {
   occluder_bounds_.assign(static_cast<std::size_t>((rows.y_end - rows.y_begin) * setting_.camera.width_px), 0.0f);
   for (int32_t f = faces.begin; f < faces.end; ++f) {
     const ScreenFace& face = faces_[static_cast<std::size_t>(f)];
-    if (is_strip(face)) continue;  // buries nothing
+    if (is_strip(face)) continue;  // has no bound
     visit_spans(face, rows, [&](int y, std::size_t row, const RowSpan& span) {
       for (int x = span.full_begin; x < span.full_end; ++x) {
         float& bound = occluder_bounds_[row + static_cast<std::size_t>(x)];
@@ -108,7 +108,7 @@ void ImageDrawer::find_occluder_bounds(FaceRange faces, RowRange rows) {
   }
 }
 
-// Spreads faces over the pixels of some rows.
+// Rasterizes faces into fragments, a linked list per pixel of the rows.
 void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
   find_occluder_bounds(faces, rows);
   first_fragment_.assign(occluder_bounds_.size(), -1);
@@ -131,7 +131,7 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
   }
 }
 
-// Takes the fragments of a pixel, given the first of them, from their list; the nearest first.
+// Copies the fragments of a pixel from its list and sorts them, nearest first.
 void ImageDrawer::collect_fragments(int32_t first) {
   pixel_.clear();
   for (int32_t i = first; i >= 0; i = fragments_[static_cast<std::size_t>(i)].next) {
@@ -141,7 +141,7 @@ void ImageDrawer::collect_fragments(int32_t first) {
             [this](const Fragment& a, const Fragment& b) { return is_nearer(a, b, faces_.data()); });
 }
 
-// Finds what is free of the gathered fragments of a pixel.
+// Finds the visible samples of the collected fragments of a pixel.
 void ImageDrawer::resolve_occlusion(int x, int y) {
   const Vec2 corner{static_cast<float>(x), static_cast<float>(y)};
   visible_.clear();
@@ -221,8 +221,8 @@ void ImageDrawer::draw(const ImageTarget& target) {
   if (target.depth_m || target.class_id || target.instance_id) draw_planes(target);
 }
 
-// Puts the gathered fragments of a pixel in an order, front to back: next comes the nearest that nothing left is in
-// front of, in a ring the nearest.
+// Orders the collected fragments of a pixel front to back: next is the nearest one that no remaining one occludes; in a
+// cycle, the nearest.
 void ImageDrawer::order_pixel(int x, int y) {
   const Vec2 corner{static_cast<float>(x), static_cast<float>(y)};
   auto stands_here = [this](uint32_t solid, uint32_t strip) { return stands(solid, strip); };

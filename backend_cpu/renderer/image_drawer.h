@@ -1,6 +1,6 @@
-// Draws one image: makes the faces of all that a camera may see, spreads them over the pixels as fragments, and weighs
-// the fragments of each pixel. All rules are the shared ones of common/raster*.h; here is only the traversal, and the
-// memory that it reuses from image to image.
+// Draws one image: sets up the faces of all primitives that may be visible, rasterizes them into fragments, and
+// composites each pixel. The rules are those of common/raster, shared with the kernels; only the traversal and the
+// memory, reused from image to image, are here.
 #pragma once
 
 #include <functional>
@@ -11,7 +11,7 @@
 
 namespace pictura {
 
-/// What one image shows.
+/// Inputs of one image.
 struct ImageRequest {
   const StaticGeometryView* geometry = nullptr;
   const SceneBatch* scene = nullptr;
@@ -19,10 +19,10 @@ struct ImageRequest {
   PinholeCamera camera;  // in the world
   float line_floor_px = 0;
   bool debug_palette = false;
-  bool culls_occluded = true;  // faces behind the solids that cover most of it
+  bool culls_occluded = true;  // drop faces behind the solids that cover most of the image
 };
 
-/// Where one image goes.
+/// Outputs of one image.
 struct ImageTarget {
   PixelFormat format = PixelFormat::u8;
   void* color = nullptr;  // [3, height, width]
@@ -31,19 +31,19 @@ struct ImageTarget {
   uint16_t* instance_id = nullptr;
 };
 
-/// An object serves one thread.
+/// Draws images one after another. An object serves one thread.
 class ImageDrawer {
  public:
-  /// Makes the faces of what the image shows.
+  /// Sets up the faces of an image.
   void prepare(const ImageRequest& request);
-  /// What hides whole faces of the prepared image.
+  /// The occluders of the prepared image.
   const Occluders& occluders() const { return setting_.occluders; }
-  /// Draws what was prepared.
+  /// Draws the prepared image.
   void draw(const ImageTarget& target);
-  /// Adds what an agent weighs in the prepared image, among all others and without them.
+  /// Adds an agent's visible weight in the prepared image, among all others and alone.
   void accumulate_visibility(int32_t agent, VisibilitySum* sum_inout);
-  /// Calls visit(y * width + x, coverage, colour) for what each face covers of each pixel of the prepared image, front
-  /// to back: for measuring other ways to composite.
+  /// Calls visit(y * width + x, coverage, colour) for each fragment of each pixel of the prepared image, front to back:
+  /// for measuring other ways of compositing.
   void visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit);
 
  private:
@@ -61,7 +61,7 @@ class ImageDrawer {
     std::vector<PolygonEdge> edges_;
   };
 
-  // A fragment and the next of its pixel.
+  // A fragment and the index of the next one of its pixel.
   struct LinkedFragment {
     Fragment fragment;
     int32_t next;
@@ -75,7 +75,7 @@ class ImageDrawer {
     CameraQuad in_camera;
   };
 
-  // A solid's face on screen, which may hide others.
+  // A solid's face on screen that may occlude others.
   struct OccludingFace {
     const Solid* solid = nullptr;
     float covered_px2 = 0;
@@ -83,7 +83,7 @@ class ImageDrawer {
     bool is_clockwise = false;
   };
 
-  // The faces [begin, end), and rows [y_begin, y_end) of the image.
+  // Faces [begin, end), and rows [y_begin, y_end) of the image.
   struct FaceRange {
     int32_t begin, end;
   };
@@ -93,7 +93,7 @@ class ImageDrawer {
 
   void find_solids();
   void find_occluders();
-  // Takes the faces that a thing emits.
+  // Returns a function that sets up the faces of a primitive.
   auto face_maker(PrimitiveRef primitive);
   template <typename Visit>
   void visit_spans(const ScreenFace& face, RowRange rows, Visit&& visit) const;
@@ -102,8 +102,8 @@ class ImageDrawer {
   void collect_fragments(int32_t first);
   void order_pixel(int x, int y);
   void resolve_occlusion(int x, int y);
-  // Weighs the fragments of all pixels of the rows: visit(pixel index, fragment, weight) for each, then
-  // finish(pixel index, color).
+  // Composites the pixels of the rows: visit(pixel index, fragment, weight) for each fragment, then finish(pixel index,
+  // color) for each pixel.
   template <typename Visit, typename Finish>
   void composite_rows(RowRange rows, Visit&& visit, Finish&& finish);
   void draw_planes(const ImageTarget& target) const;
@@ -116,8 +116,8 @@ class ImageDrawer {
   std::vector<OccludingFace> occluding_;
   EdgePool edges_;
   std::vector<ScreenFace> faces_;
-  std::vector<float> occluder_bounds_;   // [pixels of some rows] the largest occluder_bound()
-  std::vector<int32_t> first_fragment_;  // [pixels of some rows] the head of each one's list
+  std::vector<float> occluder_bounds_;   // [pixels of the rows] the largest occluder_bound()
+  std::vector<int32_t> first_fragment_;  // [pixels of the rows] the first of each list
   std::vector<LinkedFragment> fragments_;
   // Of one pixel.
   std::vector<Fragment> pixel_;

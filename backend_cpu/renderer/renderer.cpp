@@ -56,7 +56,7 @@ class CpuRenderer final : public Renderer {
       VisibilitySum seen;
       for (std::size_t camera = 0; camera < cameras_.size(); ++camera) {
         ImageRequest asked = request(scene, views[static_cast<std::size_t>(query.view)], camera);
-        asked.culls_occluded = false;  // what is hidden counts where the agent is alone
+        asked.culls_occluded = false;  // occluded faces count when the agent is drawn alone
         drawer.prepare(asked);
         drawer.accumulate_visibility(query.agent, &seen);
       }

@@ -1,12 +1,13 @@
-// Asynchronous copies to shared memory, prefetches, and launches that overlap. On the host copies are made at once.
+// Asynchronous copies to shared memory, prefetches, and overlapping launches. On the host, copies are immediate and the
+// rest does nothing.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
 
 namespace pictura {
 
-/// Copies 8 bytes, aligned to as many, into a block's shared memory. A device goes on meanwhile: they are there once
-/// the same thread has waited for its copies.
+/// Copies 8 bytes, aligned to 8, into a block's shared memory. On a device asynchronously: valid after the same thread
+/// has called wait_for_copies().
 PICTURA_HD inline void copy_into_shared(void* to, const void* from) {
 #if defined(__CUDA_ARCH__)
   asm volatile("cp.async.ca.shared.global [%0], [%1], 8;"
@@ -23,14 +24,15 @@ PICTURA_HD inline void wait_for_copies() {
 #endif
 }
 
-/// Asks for the memory around an address, which is read soon.
+/// Prefetches the memory at an address into the L2 cache.
 PICTURA_HD inline void prefetch([[maybe_unused]] const void* address) {
 #if defined(__CUDA_ARCH__)
   asm volatile("prefetch.global.L2 [%0];" : : "l"(address));
 #endif
 }
 
-/// A launch may begin before the one before it on its stream has ended. Waits for that, and for all that it wrote.
+/// Waits until the previous launch on the stream has ended and its writes are visible: with programmatic dependent
+/// launch a kernel may start earlier.
 PICTURA_HD inline void wait_for_earlier_launch() {
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
   asm volatile("griddepcontrol.wait;" : : : "memory");

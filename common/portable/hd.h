@@ -1,6 +1,5 @@
-// Host-device vocabulary: PICTURA_HD marks a function that runs on both devices. Gives every shared header its
-// fixed-width integers and C maths, also under NVRTC, which has no standard library. What differs by compiler stands in
-// this folder.
+// PICTURA_HD marks a function that runs on host and device. Also defines fixed-width integers and C maths for every
+// shared header, under NVRTC too, which has no standard library. What depends on the compiler belongs in this folder.
 #pragma once
 
 #if defined(__CUDACC__)
@@ -8,14 +7,14 @@
 #else
 #define PICTURA_HD
 #endif
-// Before a loop that a kernel keeps as it is written: unrolled, the code of a kernel does not fit into the instruction
-// caches, and waiting for instructions costs more than a loop does.
+// Keeps a kernel's loop from being unrolled: unrolled, the kernels do not fit into the instruction cache, and fetching
+// instructions costs more than the loop does.
 #if defined(__CUDA_ARCH__)
 #define PICTURA_NO_UNROLL _Pragma("unroll 1")
 #else
 #define PICTURA_NO_UNROLL
 #endif
-// Before a loop over the corners of a face, of which nearly all have four: those stay in registers then.
+// Unrolls a loop over the corners of a face by four: nearly all faces have four corners, which then stay in registers.
 #if defined(__CUDA_ARCH__)
 #define PICTURA_UNROLL_FOUR _Pragma("unroll 4")
 #else

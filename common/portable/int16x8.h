@@ -1,12 +1,12 @@
-// Eight 16-bit integers, on which one instruction of a host, or four of a device, does the same.
+// SIMD on eight 16-bit integers: one instruction on a host, four on a device.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
 
 namespace pictura {
 
-/// Eight numbers of 16 bits. A device holds number k and number k + 4 as the halves of a word, on which one instruction
-/// does the same; a host holds them one after the other, in one register.
+/// Eight 16-bit integers. On a device, words hold element k and element k + 4 as halves, for instructions on pairs; on
+/// a host, the elements are contiguous, for one register.
 struct Int16x8 {
 #if defined(__CUDA_ARCH__)
   uint32_t halves[4];
@@ -16,7 +16,7 @@ struct Int16x8 {
 };
 constexpr int kInt16x8Size = 8, kInt16x8Half = 4;
 
-/// Numbers of(0) to of(7).
+/// The elements of(0) to of(7).
 template <typename Of>
 PICTURA_HD inline Int16x8 make_int16x8(Of&& of) {
   Int16x8 result;
@@ -30,7 +30,7 @@ PICTURA_HD inline Int16x8 make_int16x8(Of&& of) {
   return result;
 }
 
-/// base + (k - 4) * step, which lie in [0, 65,536), of which numbers keep the bits.
+/// Element k is base + (k - 4) * step, which must be in [0, 65,536); its 16 bits are stored.
 PICTURA_HD inline Int16x8 arithmetic_sequence(int32_t step, int32_t base) {
 #if defined(__CUDA_ARCH__)
   Int16x8 result;
@@ -44,7 +44,7 @@ PICTURA_HD inline Int16x8 arithmetic_sequence(int32_t step, int32_t base) {
 #endif
 }
 
-/// The lower half of a word, in both of its halves.
+/// A word whose two halves are both the lower half of `word`.
 PICTURA_HD inline uint32_t broadcast_low16(uint32_t word) {
 #if defined(__CUDA_ARCH__)
   return __byte_perm(word, 0, 0x1010);
@@ -53,8 +53,7 @@ PICTURA_HD inline uint32_t broadcast_low16(uint32_t word) {
 #endif
 }
 
-/// Of each number the greater, or the lesser, of a + b and c, where both halves of b hold the same, and what is carried
-/// out of a sum's 16 bits is lost.
+/// max(a + b, c) and min(a + b, c) for each element; both halves of b must be equal, and sums wrap around at 16 bits.
 PICTURA_HD inline Int16x8 add_max(const Int16x8& a, uint32_t b, const Int16x8& c) {
   Int16x8 result;
 #if defined(__CUDA_ARCH__)
@@ -80,7 +79,7 @@ PICTURA_HD inline Int16x8 add_min(const Int16x8& a, uint32_t b, const Int16x8& c
   return result;
 }
 
-/// a + b within [0, high], where no sum leaves its 16 bits.
+/// a + b, clamped to [0, high], for each element. Sums must not overflow 16 bits.
 PICTURA_HD inline Int16x8 add_clamp(const Int16x8& a, const Int16x8& b, const Int16x8& high) {
   Int16x8 result;
 #if defined(__CUDA_ARCH__)
@@ -98,8 +97,8 @@ PICTURA_HD inline Int16x8 add_clamp(const Int16x8& a, const Int16x8& b, const In
 }
 
 #if defined(__CUDA_ARCH__)
-/// The bytes of `table` that four selectors of four bits name; one above 7 takes the sign of the byte that is 8 less,
-/// eight times (__byte_perm does not).
+/// Looks up four bytes of `table` by four selectors of four bits; a selector above 7 gives the sign of byte (selector -
+/// 8), replicated over 8 bits (__byte_perm does not).
 __device__ inline uint32_t bytes_of(uint64_t table, uint32_t selectors) {
   uint32_t bytes;
   asm("prmt.b32 %0, %1, %2, %3;"
@@ -107,7 +106,7 @@ __device__ inline uint32_t bytes_of(uint64_t table, uint32_t selectors) {
       : "r"(static_cast<uint32_t>(table)), "r"(static_cast<uint32_t>(table >> 32)), "r"(selectors));
   return bytes;
 }
-/// The bits 7 to 10 of the numbers as selectors, those of the first four in the lower half.
+/// Bits 7 to 10 of the elements as selectors, those of the first four in the lower half.
 __device__ inline uint32_t selectors_of(const Int16x8& a) {
   const uint32_t low = (a.halves[0] >> 7 & 0x000F000Fu) | (a.halves[1] >> 3 & ~0x000F000Fu),
                  high = (a.halves[2] << 1 & 0x0F000F00u) | (a.halves[3] << 5 & ~0x0F000F00u);
@@ -115,12 +114,12 @@ __device__ inline uint32_t selectors_of(const Int16x8& a) {
 }
 #endif
 
-/// Byte k has those bits that begin at a 128th of number k of `from` and end before that of `to`. None of `from` is
-/// less than 0, more than that of `to`, or more than 8 of 128.
+/// A bit mask per element: in byte k, the bits from (from[k] / 128) up to but excluding (to[k] / 128) are set. Requires
+/// 0 <= from[k] <= to[k] <= 8 * 128.
 PICTURA_HD inline uint64_t bits_between(const Int16x8& from, const Int16x8& to) {
 #if defined(__CUDA_ARCH__)
-  // Looked up, for 0 to 8: the bits from there on, but that of the upper four those stand there in which they differ
-  // from the lower four. So byte 0 has no sign, and 8 finds none.
+  // Byte i of the table is the mask of the bits from i on, except that its upper four bits are XORed with its lower
+  // four. So byte 0 has no sign bit, and selector 8 gives 0.
   constexpr uint64_t kTable = 0x80C0E0F0783C1E0Full;
   constexpr uint32_t kUpperFour = 0xF0F0F0F0u;
   const uint32_t begin = selectors_of(from), end = selectors_of(to);

@@ -1,11 +1,11 @@
-// Scalar operations that are one or few instructions of a device: the same bits on both.
+// Scalar operations that a device has one or few instructions for; the results are bit-equal on both devices.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
 
 namespace pictura {
 
-/// x within [0, 1]; one instruction of a device.
+/// x clamped to [0, 1]; one instruction on a device.
 PICTURA_HD inline float saturate(float x) {
 #if defined(__CUDA_ARCH__)
   return __saturatef(x);
@@ -14,8 +14,8 @@ PICTURA_HD inline float saturate(float x) {
 #endif
 }
 
-/// 1 / x and the square root of x, for a magnitude of x between 2^-100 and 2^100, rounded to nearest as IEEE demands. A
-/// device takes the steps that its compiler takes for numbers of that range, without asking first whether x is one.
+/// 1 / x and the square root of x, correctly rounded as IEEE demands, for |x| in [2^-100, 2^100]. The device code is
+/// the compiler's own for that range, without its test of the range.
 PICTURA_HD inline float reciprocal_in_range(float x) {
 #if defined(__CUDA_ARCH__)
   float guess;
@@ -36,7 +36,7 @@ PICTURA_HD inline float sqrt_in_range(float x) {
 #endif
 }
 
-/// The number that a word is.
+/// The float with the given bits.
 PICTURA_HD inline float float_from_bits(uint32_t bits) {
 #if defined(__CUDA_ARCH__)
   return __uint_as_float(bits);
@@ -47,7 +47,8 @@ PICTURA_HD inline float float_from_bits(uint32_t bits) {
 #endif
 }
 
-/// The lesser and the greater of two numbers that are numbers; one instruction of a device. Of two zeros it is either.
+/// Minimum and maximum; one instruction on a device. Arguments must not be NaN: given one NaN, a device returns the
+/// other argument, a host returns b. Of +0 and -0 either may be returned.
 PICTURA_HD inline float min_no_nan(float a, float b) {
 #if defined(__CUDA_ARCH__)
   return fminf(a, b);
@@ -63,7 +64,7 @@ PICTURA_HD inline float max_no_nan(float a, float b) {
 #endif
 }
 
-/// The bits of a number.
+/// The bits of a float.
 PICTURA_HD inline uint32_t bits_from_float(float x) {
 #if defined(__CUDA_ARCH__)
   return __float_as_uint(x);
@@ -72,7 +73,7 @@ PICTURA_HD inline uint32_t bits_from_float(float x) {
 #endif
 }
 
-/// x itself, computed before and not anew at each use: a device's compiler moves what seems cheap into loops.
+/// x itself, as a value that the device's compiler cannot recompute: otherwise it moves cheap computations into loops.
 PICTURA_HD inline float no_rematerialize(float x) {
 #if defined(__CUDA_ARCH__)
   asm volatile("" : "+f"(x));
@@ -80,7 +81,7 @@ PICTURA_HD inline float no_rematerialize(float x) {
   return x;
 }
 
-/// Number of bits that are set.
+/// Number of set bits.
 PICTURA_HD inline int popcount(uint64_t bits) {
 #if defined(__CUDA_ARCH__)
   return __popcll(bits);

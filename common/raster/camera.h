@@ -1,5 +1,5 @@
-// Cameras as the rasterizers use them: a pose, a projection, and the volume that is drawn. Camera coordinates are
-// (right, down, forward) in metres; the third is the depth. Shared by both devices.
+// Cameras of the rasterizers: pose, projection and frustum. Camera coordinates are (right, down, forward) in metres;
+// the third is the depth. Shared by both devices.
 #pragma once
 
 #include "pictura/common/color.h"
@@ -8,13 +8,13 @@
 
 namespace pictura {
 
-/// Nothing nearer than this is drawn.
+/// Depth of the near plane.
 constexpr float kNear_m = 0.1f;
-/// Polygons are clipped this far outside the image: far enough that most need no clipping, near enough that screen
-/// coordinates keep their precision.
+/// Width of the guard band: polygons are clipped this far outside the image. Large enough that most need no clipping,
+/// small enough that screen coordinates keep their precision.
 constexpr float kGuardBand_px = 8.0f;
 
-/// Of a rig, at most.
+/// Maximum number of cameras of a rig.
 constexpr int kMaxCameras = 64;
 
 /// A camera of a rig (pose in the ego frame) or of a view (pose in the world).
@@ -25,7 +25,8 @@ struct PinholeCamera {
   int32_t width_px = 0, height_px = 0;
 };
 
-/// A rig's camera where a view puts it. Bodies shorter than the rig's reference have its x offset shrunk in proportion.
+/// A rig's camera in the world, for a view. For bodies shorter than the rig's reference length, the x offset shrinks in
+/// proportion.
 PICTURA_HD inline PinholeCamera place_camera(const PinholeCamera& in_ego, const View& view) {
   const float shrink = min_of(1.0f, view.body_length_m / View::kRigBodyLength_m);
   const float c = view.cos_heading, s = view.sin_heading;
@@ -44,8 +45,8 @@ PICTURA_HD inline Vec3 to_camera(const PinholeCamera& camera, Vec3 world_m) {
   return {dot(camera.right, d), dot(camera.down, d), dot(camera.forward, d)};
 }
 
-/// Slopes x/depth and y/depth of the four sides of the drawn volume, guard band included, the lengths that normalise
-/// distances to those sides, and slopes per pixel. They depend on the camera's projection alone.
+/// The frustum: slopes x/depth and y/depth of its four sides, guard band included, factors that normalise distances to
+/// those sides, and slopes per pixel. Depends only on the projection.
 struct Frustum {
   float x_low = 0, x_high = 0, y_low = 0, y_high = 0;
   float x_low_scale = 0, x_high_scale = 0, y_low_scale = 0, y_high_scale = 0;
@@ -68,9 +69,10 @@ PICTURA_HD inline Frustum make_frustum(const PinholeCamera& camera) {
   return f;
 }
 
-/// Whether a ball (camera coordinates) may touch what is drawn. Faces whose corners are all out of range are black.
+/// False if a sphere (camera coordinates) is entirely outside the frustum or beyond the visible range, where all faces
+/// have faded to black.
 PICTURA_HD inline bool sphere_in_frustum(const Frustum& f, Vec3 center, float radius_m) {
-  // All at once: lanes of a warp differ in what fails first.
+  // Without short circuits: lanes of a warp would diverge.
   const bool in_range = (center.z + radius_m > kNear_m) & (center.z - radius_m < kVisibleRange_m);
   const bool in_width = ((center.x - f.x_low * center.z) * f.x_low_scale > -radius_m) &
                         ((f.x_high * center.z - center.x) * f.x_high_scale > -radius_m);
@@ -79,14 +81,14 @@ PICTURA_HD inline bool sphere_in_frustum(const Frustum& f, Vec3 center, float ra
   return in_range & in_width & in_height;
 }
 
-/// One of the four corners (0 to 3) of what is in range, in the world.
+/// Corner 0 to 3 of the frustum at the visible range, in the world.
 PICTURA_HD inline Vec3 far_corner(const PinholeCamera& camera, const Frustum& f, int corner) {
   const float x = (corner & 1) ? f.x_high : f.x_low;
   const float y = (corner & 2) ? f.y_high : f.y_low;
   return camera.position_m + (camera.right * x + camera.down * y + camera.forward) * kVisibleRange_m;
 }
 
-/// Bounding box on the ground of what is in range.
+/// Bounding box on the ground of the frustum within the visible range.
 PICTURA_HD inline Aabb2 frustum_ground_box(const PinholeCamera& camera, const Frustum& f) {
   Aabb2 box{camera.position_m.xy(), camera.position_m.xy()};
   for (int corner = 0; corner < 4; ++corner) {
@@ -97,7 +99,7 @@ PICTURA_HD inline Aabb2 frustum_ground_box(const PinholeCamera& camera, const Fr
   return box;
 }
 
-/// Cells of a grid that a box touches, as half-open ranges; empty where the grid has no items.
+/// Cells of a grid that a box touches, as half-open ranges; empty if the grid has no items.
 struct CellRange {
   int x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;
 };
@@ -107,7 +109,8 @@ PICTURA_HD inline CellRange cells_of(const GridView& grid, const Aabb2& box) {
   return {grid.cell_x(box.low.x), grid.cell_x(box.high.x) + 1, grid.cell_y(box.low.y), grid.cell_y(box.high.y) + 1};
 }
 
-/// An item stands in every cell that its box touches; it is taken in the first of those that a query visits.
+/// An item is in every cell that its box touches. True only for the first of those cells that a query visits, so that
+/// the item is visited once.
 PICTURA_HD inline bool is_first_visit(const GridView& grid, const CellRange& query, const Aabb2& item_box, int cell_x,
                                       int cell_y) {
   return cell_x == max_of(grid.cell_x(item_box.low.x), query.x_begin) &&

@@ -7,11 +7,11 @@
 
 namespace pictura {
 
-/// Clipping by five planes adds at most one corner each; one more is room for a cut while it is made.
+/// Clipping by five planes adds at most one corner each; one more for a cut in progress.
 constexpr int kMaxPolygonCorners = kMaxFaceCorners + 6;
 
-/// One of the five planes of the drawn volume: how far a point is inside, by a measure of each plane's own; negative
-/// outside. By weights, so that lanes of a warp may ask for different planes: what is added for one is 0.
+/// One of the five planes of the frustum. inside() is a distance in units of the plane's own, negative outside.
+/// Coefficients instead of branches, so that lanes of a warp can use different planes: terms of other planes are 0.
 constexpr int kClipPlanes = 5;
 class ClipPlane {
  public:
@@ -30,7 +30,7 @@ class ClipPlane {
   float x_, y_, z_, offset_;
 };
 
-/// The planes that a point is outside of, a bit for each.
+/// Bit mask of the planes that a point is outside of.
 PICTURA_HD inline unsigned planes_outside(const Frustum& f, Vec3 p) {
   unsigned outside = 0;
   for (int plane = 0; plane < kClipPlanes; ++plane) {
@@ -39,8 +39,8 @@ PICTURA_HD inline unsigned planes_outside(const Frustum& f, Vec3 p) {
   return outside;
 }
 
-/// The planes of the drawn volume that a face (camera coordinates) crosses, a bit for each; kOutside where all of it is
-/// outside of one.
+/// Bit mask of the frustum's planes that a face (camera coordinates) crosses; kOutside if it is entirely outside of
+/// one.
 constexpr unsigned kOutside = ~0u;
 PICTURA_HD inline unsigned planes_crossed(const Frustum& f, const Vec3* corners, int count) {
   unsigned outside_of_any = 0, outside_of_all = ~0u;
@@ -53,8 +53,8 @@ PICTURA_HD inline unsigned planes_crossed(const Frustum& f, const Vec3* corners,
   return outside_of_all != 0 ? kOutside : outside_of_any;
 }
 
-/// Where the side from one corner to the next crosses a plane, of which they are that far inside. Computed from the
-/// inner corner, whichever way round: faces that share an edge get the same point.
+/// The intersection of the side from a to b with a plane, given their distances inside. Computed from the inner corner
+/// in both directions: faces that share an edge get the same point.
 PICTURA_HD inline Vec3 cut_between(Vec3 a, float a_inside, Vec3 b, float b_inside) {
   const bool a_is_inner = a_inside >= 0.0f;
   const Vec3 inner = a_is_inner ? a : b, outer = a_is_inner ? b : a;
@@ -62,8 +62,8 @@ PICTURA_HD inline Vec3 cut_between(Vec3 a, float a_inside, Vec3 b, float b_insid
   return inner + (outer - inner) * (inside * reciprocal_in_range(inside - outside));
 }
 
-/// Clips a convex face to the near plane and the guard band. Writes to polygon_out (camera coordinates, room for
-/// kMaxPolygonCorners) and returns the number of corners; below 3 nothing is left.
+/// Clips a convex face to the near plane and the guard band. Writes at most kMaxPolygonCorners corners (camera
+/// coordinates) to polygon_out and returns their number; below 3 nothing is left.
 PICTURA_HD inline int clip_face(const Frustum& f, const Vec3* corners, int count, Vec3* polygon_out) {
   const unsigned crossed = planes_crossed(f, corners, count);
   if (crossed == kOutside) return 0;
@@ -85,7 +85,7 @@ PICTURA_HD inline int clip_face(const Frustum& f, const Vec3* corners, int count
     int kept = 0;
     Vec3 previous = from[count - 1];
     float previous_inside = plane.inside(previous);
-    // Only a face that is not quite convex could outgrow the room; it loses corners then.
+    // Only a face that is not quite convex could exceed the maximum; the excess corners are dropped.
     PICTURA_NO_UNROLL
     for (int i = 0; i < count && kept + 2 <= kMaxPolygonCorners; ++i) {
       const Vec3 current = from[i];

@@ -1,5 +1,5 @@
-// What the fragments of a pixel weigh in its colour, given what is free of each, and colours as numbers of an image.
-// Shared by both devices.
+// Compositing: the weights of a pixel's fragments in its colour, given their visible samples; and conversion of colours
+// to the image's formats. Shared by both devices.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -7,24 +7,25 @@
 
 namespace pictura {
 
-/// What the fragments of a pixel weigh in its colour. Sums are of whole units, so that they do not depend on the order
-/// in which fragments are added.
+/// Accumulates the fragments of a pixel. Sums are of integers, so that they do not depend on the order of the
+/// fragments.
 class PixelAccumulator {
  public:
-  /// What is wholly free weighs its exact area; what is partly hidden its area times the share of its reach that is
-  /// free; what covers the whole pixel that share of what the others leave.
+  /// kWhole: entirely visible, weighted by its exact area. kPartial: partly occluded, weighted by its area times the
+  /// visible fraction of its samples. kRemainder: covers the whole pixel, weighted by its visible fraction of what the
+  /// others leave.
   enum Kind : uint8_t { kWhole, kPartial, kRemainder, kNumKinds };
   struct Weight {
     float area = 0;
     Kind kind = kWhole;
   };
-  /// Factors on the weights of each kind, once all fragments have been added.
+  /// Factors on the weights of each kind, known after all fragments have been added.
   struct Shares {
     float of_kind[kNumKinds] = {1.0f, 1.0f, 1.0f};
     PICTURA_HD float of(Weight weight) const { return weight.area * of_kind[weight.kind]; }
   };
 
-  /// free: what is left of the coverage's reach after all that others hide.
+  /// visible: the effective samples that no other fragment occludes.
   PICTURA_HD static Weight weight_of(const PixelCoverage& coverage, uint64_t visible) {
     const uint64_t samples = effective_samples(coverage);
     const float share = static_cast<float>(popcount(visible)) / static_cast<float>(popcount(samples));
@@ -33,7 +34,7 @@ class PixelAccumulator {
     return {coverage.area * share, kPartial};
   }
 
-  /// A weight, and the colour times it, in whole units; those of one kind may be summed in any order.
+  /// A weight, and the colour times the weight, as integers; those of one kind can be summed in any order.
   struct Part {
     int32_t area = 0, r = 0, g = 0, b = 0;
   };
@@ -42,7 +43,7 @@ class PixelAccumulator {
             to_units(weight.area * color.b)};
   }
   PICTURA_HD void add(Kind kind, const Part& part) {
-    // A choice for each kind, and no index, for which a device would keep the sums in memory.
+    // Conditionals instead of an index, which would force the sums into a device's local memory.
     for (int k = 0; k < kNumKinds; ++k) {
       const bool is_its = k == kind;
       part_[k].area += is_its ? part.area : 0;
@@ -55,7 +56,7 @@ class PixelAccumulator {
 
   PICTURA_HD Shares shares() const {
     const float whole = area_of(kWhole), partial = area_of(kPartial);
-    // Where they are more than a pixel, what samples know least of gives way.
+    // If the areas exceed a pixel, the weights that samples estimate least accurately are reduced first.
     const float for_partial = max_of(1.0f - whole, 0.0f);
     Shares shares;
     if (whole > 1.0f) shares.of_kind[kWhole] = 1.0f / whole;
@@ -77,17 +78,17 @@ class PixelAccumulator {
   }
 
  private:
-  static constexpr float kUnits = 1 << 20;  // of a pixel and a channel of 1; a thousand fragments do not overflow
+  static constexpr float kUnits = 1 << 20;  // per pixel and channel of 1; a thousand fragments do not overflow
   PICTURA_HD static int32_t to_units(float value) { return static_cast<int32_t>(value * kUnits + 0.5f); }
   PICTURA_HD float area_of(Kind kind) const { return static_cast<float>(part_[kind].area) * (1.0f / kUnits); }
 
   Part part_[kNumKinds];
 };
 
-/// A channel as an IEEE half, rounded to nearest, ties to even.
+/// A channel as an IEEE half, rounded to nearest even.
 PICTURA_HD inline uint16_t to_half(float channel) {
   float mantissa = saturate(channel);
-  // Below 2^-14 halves are multiples of 2^-24.
+  // Subnormal halves, below 2^-14, are multiples of 2^-24.
   if (mantissa < 6.103515625e-5f) return static_cast<uint16_t>(rintf(mantissa * 16777216.0f));
   int exponent = 15;
   for (; mantissa < 1.0f; --exponent) mantissa = mantissa * 2.0f;
@@ -97,22 +98,22 @@ PICTURA_HD inline uint16_t to_half(float channel) {
 
 /// A channel as an unsigned byte.
 PICTURA_HD inline uint8_t to_byte(float channel) { return static_cast<uint8_t>(saturate(channel) * 255.0f + 0.5f); }
-/// ... all of a colour, red lowest.
+/// A colour as three bytes, red lowest.
 PICTURA_HD inline uint32_t to_bytes(Rgb color) {
   return uint32_t{to_byte(color.r)} | uint32_t{to_byte(color.g)} << 8 | uint32_t{to_byte(color.b)} << 16;
 }
 
-/// How much of an agent an image shows: what its fragments weigh, in whole units, so that sums do not depend on the
-/// order in which fragments are added.
+/// The visible weight of an agent in an image: sums over its fragments, as integers, so that they do not depend on the
+/// order of the fragments.
 struct VisibilitySum {
   int64_t among_all = 0, alone = 0;
 
   PICTURA_HD static int64_t units_of(float weight) {
-    // As many as leave room for the pixels of the largest rig, 64 images of 8192 x 8192.
+    // Chosen so that the sum over the pixels of the largest rig, 64 images of 8192 x 8192, does not overflow.
     constexpr float kUnits = 1 << 30;
     return static_cast<int64_t>(weight * kUnits);
   }
-  /// Of all that is to be seen of it alone, what is seen among all others; not a number where that is nothing.
+  /// The visible weight among all others divided by that of the agent alone; NaN if the latter is 0.
   PICTURA_HD float share() const {
     if (alone <= 0) return float_from_bits(0x7FC00000u);
     const double share = static_cast<double>(among_all) / static_cast<double>(alone);

@@ -1,5 +1,5 @@
-// For each pixel the exact area that a convex polygon covers and which of 64 samples it covers. Shared by both devices,
-// which therefore agree bit for bit.
+// Coverage of a pixel by a convex polygon: the exact area and a mask of 64 samples. Shared by both devices, whose
+// results are bit-equal.
 #pragma once
 
 #include "pictura/common/portable/int16x8.h"
@@ -16,42 +16,43 @@ PICTURA_HD inline bool covers_point(const PolygonEdge* edges, int count, float x
   return true;
 }
 
-/// The samples of a pixel: 8 columns of 8 rows, each column shifted down by its own part of a row, so that 64 different
-/// heights occur: road scenes are full of nearly level edges. Sample (column, row) is bit 8 * column + row.
+/// The samples of a pixel: 8 columns of 8 rows. Each column is shifted down by its own fraction of a row, so that there
+/// are 64 different heights: road scenes are full of nearly level edges. Sample (column, row) is bit 8 * column + row.
 constexpr uint64_t kAllSamples = ~uint64_t{0};
 /// Offset of a column's first sample from the pixel's top, in rows.
 PICTURA_HD constexpr float sample_column_offset(int column) {
-  // Bit reversal of the column, so that neighbouring columns have distant offsets.
+  // Bit reversal of the column: neighbouring columns have distant offsets.
   const int reversed = ((column & 1) << 2) | (column & 2) | ((column & 4) >> 2);
   return (static_cast<float>(reversed) + 0.5f) / 8.0f;
 }
 
-/// What a polygon covers of one pixel.
+/// The coverage of one pixel by a polygon.
 struct PixelCoverage {
   float area = 0;  // in [0, 1]
   uint64_t samples = 0;
   PICTURA_HD bool is_full() const { return area == 1.0f && samples == kAllSamples; }
 };
 
-/// Where a coverage counts as being: its samples; a sliver that touches none is wherever another one is.
+/// The samples of a coverage; all samples for a sliver, which touches none and counts as being wherever another
+/// fragment is.
 PICTURA_HD inline uint64_t effective_samples(const PixelCoverage& coverage) {
   return coverage.samples != 0 ? coverage.samples : kAllSamples;
 }
 
-/// More than one minus this of a pixel with every sample is all of it.
+/// A coverage of all samples and more than 1 minus this area counts as full.
 constexpr float kFullCoverage = 1e-3f;
 
-/// Heights at which an edge's line passes the left and the right side of a pixel, in pixels from its top.
+/// Heights at which an edge's line crosses the left and right sides of a pixel, in pixels from its top.
 struct EdgeCrossing {
   float left = 0, right = 0;
 };
-/// left_px and top_px are the pixel's corner relative to the edge's upper end.
+/// left_px and top_px: the pixel's corner relative to the edge's upper end.
 PICTURA_HD inline EdgeCrossing edge_crossing(const PolygonEdge& edge, float left_px, float top_px) {
   const float left = left_px * edge.dy_dx - top_px;
   return {left, left + edge.dy_dx};
 }
 
-/// For each column of a pixel's samples, the heights (see kRowUnits) between which it is inside of the edges so far.
+/// For each column of samples, the range of heights (see kRowUnits) inside all edges so far.
 struct SampleRange {
   Int16x8 low, high;
 };
@@ -60,22 +61,22 @@ PICTURA_HD inline SampleRange whole_range() {
   return {make_int16x8([](int) { return -kFar; }), make_int16x8([](int) { return kFar; })};
 }
 
-/// Narrows a range to the inner side of an edge.
+/// Clips a range to the inner side of an edge.
 PICTURA_HD inline void narrow(const PolygonEdge& edge, const EdgeCrossing& crossing, SampleRange* range_inout) {
-  constexpr float kWhole = 1 << 8;  // the lowest bit of what is added to it is one of kLines_rows * kRowUnits
+  constexpr float kWhole = 1 << 8;  // a sum's lowest mantissa bit is 1 / (kLines_rows * kRowUnits)
   constexpr uint32_t kLowest = 0, kHighest = 0x80008000u;
   const float at = saturate((crossing.left + crossing.right) * fabsf(edge.rows_scale) + edge.rows_offset);
   const uint32_t height = broadcast_low16(bits_from_float(at + kWhole));
-  // Of the sums, one half of 2^15 is the middle, which is 0.
+  // `height` is 2^14 at the pixel's centre; the base of the sequence moves that to 0.
   const Int16x8 columns = arithmetic_sequence(edge.rows_step, (1 << 16) - (1 << 14));
   const bool is_below = edge.rows_scale > 0.0f;
   range_inout->low = add_max(columns, is_below ? height : kLowest, range_inout->low);
   range_inout->high = add_min(columns, is_below ? kHighest : height, range_inout->high);
 }
 
-/// The samples within a range.
+/// The mask of the samples within a range.
 PICTURA_HD inline uint64_t samples_within(const SampleRange& range) {
-  // What is to be added so that whole rows are those whose samples are above.
+  // Offsets that turn a height into the number of samples above it, as whole rows.
   const Int16x8 from_top = make_int16x8([](int column) {
     return kSampleRows / 2 * kRowUnits + kRowUnits - 1 -
            static_cast<int>(sample_column_offset(column) * static_cast<float>(kRowUnits));
@@ -84,29 +85,30 @@ PICTURA_HD inline uint64_t samples_within(const SampleRange& range) {
   return bits_between(add_clamp(range.low, from_top, to), to);
 }
 
-/// Samples on the inner side of an edge; left_px and top_px are the pixel's corner relative to the edge's upper end.
+/// Mask of the samples on the inner side of an edge; left_px and top_px: the pixel's corner relative to the edge's
+/// upper end.
 PICTURA_HD inline uint64_t samples_inside(const PolygonEdge& edge, float left_px, float top_px) {
   SampleRange range = whole_range();
   narrow(edge, edge_crossing(edge, left_px, top_px), &range);
   return samples_within(range);
 }
 
-/// What an edge adds to a polygon's area in a pixel, in the rows that it spans: a right border the area to its left, a
-/// left border the same negative, both less what is the same for all edges that end there: the sum over a polygon is
-/// its area.
+/// An edge's contribution to a polygon's area in a pixel: a right border adds the area to its left within the rows that
+/// it spans, a left border subtracts it, both up to a term that cancels in the sum over a closed polygon.
 PICTURA_HD inline float area_of(const PolygonEdge& edge, const EdgeCrossing& crossing, float y_px) {
   const float from = saturate(edge.y0 - y_px), to = saturate(edge.y1 - y_px);
-  // Between these the edge is within the pixel's width; from the second on, the pixel's whole width is to its left.
+  // Between these heights the edge is within the pixel's width; beyond the second, the pixel's whole width is to its
+  // left.
   const float left = max_no_nan(min_no_nan(crossing.left, to), from);
   const float right = max_no_nan(min_no_nan(crossing.right, to), from);
-  // Half of the width is where the line has gone half of its way.
+  // Mean width: half of the pixel where the line has gone half of its way across.
   const float width = saturate(((left + right) - (crossing.left + crossing.right)) * edge.half_dx_dy + 0.5f);
   const float area = (right - left) * width + ((edge.dy_dx > 0.0f ? to : from) - right);
   return edge.rows_scale > 0.0f ? area : -area;
 }
 
-/// Area of a convex polygon in pixel (x, y), and the samples that it covers. Edges that do not cross the pixel keep all
-/// samples and add their part to the area, so none is asked where it lies.
+/// Area of a convex polygon in pixel (x, y), and the samples that it covers; nothing below min_area. Edges that do not
+/// cross the pixel keep all samples and add their part of the area, so no edge needs a special case.
 PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int count, float min_area, int x, int y) {
   const float x_px = no_rematerialize(static_cast<float>(x)), y_px = no_rematerialize(static_cast<float>(y));
   float area = 0.0f;
@@ -122,7 +124,7 @@ PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int cou
   return {min_of(area, 1.0f), samples};
 }
 
-/// Range of pixels of row y that the polygon may touch, and within it the range that it covers fully.
+/// Pixels of row y that the polygon may touch, and within them the range that it covers fully.
 struct RowSpan {
   int32_t begin = 0, end = 0, full_begin = 0, full_end = 0;
 };
@@ -135,13 +137,13 @@ PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const Pi
   for_each_edge(edges, count, [&](const PolygonEdge& edge) {
     const float side = side_of(edge);
     if (side == 0.0f) {
-      // Level: the row is on one side of it, or it runs through the row.
+      // Level edge: the row is on one side of it, or contains it.
       const float inner_px = edge.rows_scale > 0.0f ? y_px - edge.y0 : edge.y0 - (y_px + 1.0f);
       if (inner_px <= -1.0f) is_outside = true;
       if (inner_px < 0.0f) full_high = -1.0f;
       return;
     }
-    // Where the edge's line passes the row's middle, and how far it goes to both sides from there.
+    // The x at which the edge's line crosses the row's centre, and its half-range in x within the row.
     const float twice_above_px = 2.0f * (middle_px - edge.y0), middle = edge.x0 + twice_above_px * edge.half_dx_dy;
     const float reach = fabsf(edge.half_dx_dy), low = middle - reach, high = middle + reach;
     if (side < 0.0f) {
@@ -153,7 +155,7 @@ PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const Pi
     }
   });
   if (is_outside) return {};
-  // A little leeway: the exact tests of pixel_coverage decide at the borders.
+  // Conservative margin: the exact tests of pixel_coverage decide at the borders.
   constexpr float kLeeway_px = 1e-3f;
   const float begin = static_cast<float>(box.x_begin), end = static_cast<float>(box.x_end);
   auto first_at_or_after = [&](float x) { return static_cast<int>(ceilf(clamp(x, begin, end))); };

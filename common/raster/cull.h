@@ -1,5 +1,5 @@
-// Which things of a scene may appear in an image: those that touch the camera's frustum within the visible range, found
-// through the uniform grids, less those that a view leaves out. Shared by both devices.
+// Culling: the primitives that may be visible in an image are those that touch the camera's frustum within the visible
+// range, found through the uniform grids, except for agents that a view excludes. Shared by both devices.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -10,7 +10,7 @@ namespace pictura {
 
 PICTURA_HD inline Vec3 strip_middle(const Strip& strip) { return (strip.a_m + strip.b_m) * 0.5f; }
 
-/// Half of a strip's greatest extent: length, mitres and width.
+/// Upper bound of a strip's radius, from its length, mitres and width.
 PICTURA_HD inline float strip_radius_m(const Strip& strip) {
   const float side = max_of(length(strip.side_a), length(strip.side_b));
   return 0.5f * (length(strip.b_m - strip.a_m) + side * strip.width_m);
@@ -25,7 +25,7 @@ PICTURA_HD inline float wall_radius_m(const WallFace& wall) {
 }
 
 PICTURA_HD inline bool may_be_visible(const Strip& strip, const PinholeCamera& camera, const Frustum& f) {
-  // The floor on its width may widen a strip by less than the guard band, which the frustum includes.
+  // The minimum width on screen widens a strip by less than the guard band, which the frustum includes.
   return sphere_in_frustum(f, to_camera(camera, strip_middle(strip)), strip_radius_m(strip));
 }
 
@@ -34,7 +34,7 @@ PICTURA_HD inline bool may_be_visible(const WallFace& wall, const PinholeCamera&
 }
 
 PICTURA_HD inline bool may_be_visible(const LightHead& head, const PinholeCamera& camera, const Frustum& f) {
-  // A little more than the disk: the polygon that it is drawn as has the disk's area.
+  // Slightly larger than the disk: the polygon that it is drawn as has the disk's area.
   const float radius_m = 1.1f * kLightRadius_m;
   return sphere_in_frustum(f, to_camera(camera, head.position_m), radius_m);
 }
@@ -46,7 +46,7 @@ PICTURA_HD inline bool may_be_visible(const AgentBox& box, const PinholeCamera& 
   return box.drawn != 0 && sphere_in_frustum(f, to_camera(camera, center), radius_m);
 }
 
-/// Whether a view leaves an agent out: its own ego and those it hides.
+/// Whether a view excludes an agent: its own ego and those it hides.
 PICTURA_HD inline bool is_excluded(const View& view, Span<const int32_t> hidden_agents, int32_t agent) {
   if (agent == view.ego_agent) return true;
   for (int32_t i = view.hidden_begin; i < view.hidden_end; ++i) {
@@ -55,8 +55,8 @@ PICTURA_HD inline bool is_excluded(const View& view, Span<const int32_t> hidden_
   return false;
 }
 
-/// Calls visit(item) once for each item of a grid in the cells that a box on the ground touches; box_of(item) is what
-/// the grid files it under.
+/// Calls visit(item) once for each item of a grid in the cells that a box on the ground touches; box_of(item) is the
+/// box by which the item was put into the grid.
 template <typename BoxOf, typename Visit>
 PICTURA_HD inline void for_each_item(const GridView& grid, const Aabb2& query_box, BoxOf&& box_of, Visit&& visit) {
   const CellRange cells = cells_of(grid, query_box);

@@ -1,5 +1,5 @@
-// From a thing of the scene to its faces on screen. Shared by both devices, which differ only in how they share out the
-// work and where they keep the results.
+// Face set-up: from a primitive to its faces on screen. Shared by both devices, which differ only in how they
+// distribute the work and where they store the results.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -11,7 +11,7 @@
 
 namespace pictura {
 
-/// What one image shows, and how.
+/// Camera, settings and occluders of one image.
 struct ImageSetting {
   PinholeCamera camera;  // in the world
   Frustum frustum;
@@ -20,7 +20,7 @@ struct ImageSetting {
   Occluders occluders;
 };
 
-/// What a face belongs to: the thing's number, and what the class plane says of it.
+/// The primitive that a face belongs to: its object id and its value in the class plane.
 struct PrimitiveRef {
   uint32_t object_id = 0;
   uint8_t class_id = 0;
@@ -39,14 +39,14 @@ PICTURA_HD inline PrimitiveRef strip_ref(const Strip& strip, int32_t index) {
   return {strip_object_id(strip, index), static_cast<uint8_t>(kClassOfStrip + static_cast<int>(strip.kind))};
 }
 
-/// What the instance plane says of a face.
+/// Value of the instance plane for a face.
 PICTURA_HD constexpr uint16_t instance_of(const ScreenFace& face) {
   return static_cast<uint16_t>(kind_of(face.object_id) == kAgentKind ? 1 + index_of(face.object_id) : 0);
 }
 
-/// What a face covers less of a pixel than this is nothing, and so is a face that is smaller. Strips hide little but
-/// each other, so of theirs more can be spared: what adds less than kMinWeight to any channel, and an eighth of a
-/// pixel at most, for dark ones may hide bright ones.
+/// Coverage below this area of a pixel is ignored, and so are smaller faces. Strips hardly occlude anything but each
+/// other, so more of theirs can be ignored: up to what adds less than kMinWeight to every channel, and at most an
+/// eighth of a pixel, because dark strips may occlude bright ones.
 constexpr float kMinArea = 1e-4f, kMinWeight = 2.0f / 255.0f, kMaxSparedArea = 0.125f;
 PICTURA_HD inline float min_area_of(Rgb color, PrimitiveRef primitive) {
   if (kind_of(primitive.object_id) != kStripKind) return kMinArea;
@@ -54,15 +54,14 @@ PICTURA_HD inline float min_area_of(Rgb color, PrimitiveRef primitive) {
   return kMinWeight * reciprocal_in_range(max_of(brightest, kMinWeight / kMaxSparedArea));
 }
 
-/// Whether a face that needs no clipping shows: whether it is large enough, and not behind an occluder. Sets whether it
-/// turns right.
+/// Whether a face that needs no clipping is large enough and not behind an occluder. Sets its winding.
 PICTURA_HD inline bool is_quad_visible(const ImageSetting& setting, const ScreenQuad& quad, Rgb color,
                                        PrimitiveRef primitive, bool* is_clockwise_out) {
   return find_winding(quad, 2.0f * min_area_of(color, primitive), is_clockwise_out) &&
          !setting.occluders.occludes(setting.camera, quad.bounds);
 }
 
-/// A face with all that its making did not set.
+/// Completes a face with the fields that make_screen_face and make_quad_face leave unset.
 PICTURA_HD inline ScreenFace complete_face(const ScreenFace& face, PrimitiveRef primitive, int32_t edge_begin) {
   ScreenFace whole = face;
   whole.edge_begin = edge_begin;
@@ -73,8 +72,8 @@ PICTURA_HD inline ScreenFace complete_face(const ScreenFace& face, PrimitiveRef 
   return whole;
 }
 
-/// Clips and projects a face. Its edges go to a pool: take(count) returns the index of the first, or -1 where there is
-/// no room left, and put(index, edge) keeps one. False where nothing of it is in the image.
+/// Clips and projects a face. Its edges go to a pool: take(count) returns the index of the first, or -1 if the pool is
+/// full, and put(index, edge) stores one. False if nothing of it is in the image.
 template <typename EdgePool>
 PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primitive, const CameraFace& face,
                                  EdgePool& pool, ScreenFace* face_out) {
@@ -106,8 +105,8 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primi
   return true;
 }
 
-/// The front surface at a point of the screen: faces that cover it are offered, in any order, and front() is the one in
-/// front of all, or null. The nearest strip gives way to those of its level that rank before it, and to a
+/// The front surface at a screen point: faces that cover it are offered in any order, and front() returns the one in
+/// front of all, or null. Strips on the level of the nearest strip that rank before it replace it, and it is behind a
 /// solid that stands on it.
 class FrontFace {
  public:
@@ -116,8 +115,7 @@ class FrontFace {
     if (!best || nearer(face, *best, at_px)) best = &face;
     num_strips_ += is_strip(face) ? 1 : 0;
   }
-  /// Whether the strips, of which several may be painted over each other, are to be offered once more when all faces
-  /// have been; only then, and only strips.
+  /// Whether all strips must be offered once more, after all faces have been, because several may be on one level.
   PICTURA_HD bool wants_strips_again() const { return num_strips_ > 1; }
   PICTURA_HD void offer_again(const ScreenFace& face, Vec2 at_px) {
     if (!of_one_level(face, *strip_, at_px)) return;
@@ -125,7 +123,7 @@ class FrontFace {
   }
   template <typename Stands>
   PICTURA_HD const ScreenFace* front(Vec2 at_px, Stands&& stands) const {
-    // A strip that is widened may show where its plane is behind the camera: no strip is of one level with it there.
+    // A widened strip may be visible where its plane is behind the camera; no strip is on one level with it there.
     const ScreenFace* const strip = painted_ ? painted_ : strip_;
     if (!solid_ || !strip) return solid_ ? solid_ : strip;
     return is_in_front(*solid_, *strip, at_px, stands) ? solid_ : strip;
@@ -137,8 +135,8 @@ class FrontFace {
     return inverse_depth_a != inverse_depth_b ? inverse_depth_a > inverse_depth_b : a.object_id < b.object_id;
   }
   const ScreenFace* solid_ = nullptr;
-  const ScreenFace* strip_ = nullptr;    // the nearest
-  const ScreenFace* painted_ = nullptr;  // ... or what is painted over it
+  const ScreenFace* strip_ = nullptr;    // the nearest strip
+  const ScreenFace* painted_ = nullptr;  // the strip of its level with the lowest rank
   int32_t num_strips_ = 0;
 };
 

@@ -1,5 +1,5 @@
-// What hides whole faces: the walls and sides of boxes that cover most of an image. A face that lies behind one of
-// them, in depth and on screen, need not be drawn. Shared by both devices.
+// Occlusion culling: the walls and box sides that cover most of an image are its occluders. A face that is behind one
+// of them, in depth and on screen, is not drawn. Shared by both devices.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -8,13 +8,13 @@
 
 namespace pictura {
 
-/// The face of a solid on screen, all of it before the near plane. Aligned for devices.
+/// The face of a solid on screen, entirely in front of the near plane. Aligned for wide loads.
 struct alignas(16) Occluder {
-  Vec3 side[4];        // how far inside of a side a point of the screen is, in px: x, y, and what is added
-  Vec3 inverse_depth;  // likewise, of its plane
+  Vec3 side[4];        // distance in px inside a side: factors of x and y, constant
+  Vec3 inverse_depth;  // of its plane, in the same form
 };
 
-/// Whether a solid is near enough to hide much.
+/// Only solids nearer than this are occluder candidates.
 constexpr float kOccluderRange_m = 45.0f;
 PICTURA_HD inline bool may_occlude(const AgentBox& box, const PinholeCamera& camera) {
   return to_camera(camera, box.center_m).z - 0.5f * box.length_m < kOccluderRange_m;
@@ -23,15 +23,16 @@ PICTURA_HD inline bool may_occlude(const WallFace& wall, const PinholeCamera& ca
   return to_camera(camera, wall_middle(wall)).z - wall_radius_m(wall) < kOccluderRange_m;
 }
 
-/// A face of less than half of this hides nothing, and a side shorter than this borders nothing.
+/// Twice the minimum area of an occluder, and the length below which a side does not bound it.
 constexpr float kMinOccluder_px2 = 1.0f, kMinSide_px = 1e-3f;
-/// Corners further from the image than this leave too few bits for what is between them.
+/// Maximum distance of an occluder's corners from the image; beyond, precision is too low.
 constexpr float kMaxOccluder_px = 4096.0f;
-/// So far inside of an occluder, and behind it by this factor, nothing shows before it, whatever is rounded.
+/// A face is occluded if it is inside the occluder by this margin and its depth is larger by this factor: conservative
+/// under rounding.
 constexpr float kOccluderMargin_px = 0.05f, kOccluderDepthFactor = 1.002f;
 
-/// Of the image, the part within the bounds of a solid's face: the more, the more it may hide. 0 where it hides
-/// nothing; otherwise the face on screen, and how it turns, are set.
+/// The area in the image of the bounding box of a solid's face, by which occluders are chosen. 0 if the face cannot
+/// occlude; otherwise the face on screen and its winding are set.
 PICTURA_HD inline float occluder_area_px2(const PinholeCamera& camera, const CameraQuad& face, ScreenQuad* quad_out,
                                           bool* is_clockwise_out) {
   const float nearest_m =
@@ -43,7 +44,7 @@ PICTURA_HD inline float occluder_area_px2(const PinholeCamera& camera, const Cam
   return (in_image.high.x - in_image.low.x) * (in_image.high.y - in_image.low.y);
 }
 
-/// The occluder of a solid's face that hides something.
+/// The occluder of a face for which occluder_area_px2() is positive.
 PICTURA_HD inline Occluder make_occluder(const PinholeCamera& camera, const Frustum& f, const FacePlane& plane,
                                          const ScreenQuad& quad, bool is_clockwise) {
   Occluder occluder;
@@ -57,16 +58,16 @@ PICTURA_HD inline Occluder make_occluder(const PinholeCamera& camera, const Frus
   return occluder;
 }
 
-/// The occluders of an image: the faces that cover most of it, of two that cover as much that of the lower entry.
+/// The occluders of an image: the faces of largest area; of equal ones, that of the lower entry.
 struct Occluders {
   static constexpr int kMaxCount = 4;
   int32_t count = 0;
   Occluder occluder[kMaxCount];
 
-  /// Whether one of them hides all of the image that is within the bounds of a face.
+  /// Whether one of them occludes all of a face's bounds that is in the image.
   PICTURA_HD bool occludes(const PinholeCamera& camera, const ScreenBounds& bounds) const {
     const Aabb2 box = bounds.in_image(camera);
-    // The least of a linear function over the box.
+    // Minimum of a linear function over the box.
     auto min_over_box = [&](Vec3 of) {
       return of.x * (of.x > 0.0f ? box.low.x : box.high.x) + of.y * (of.y > 0.0f ? box.low.y : box.high.y) + of.z;
     };

@@ -1,5 +1,5 @@
-// From a face in camera coordinates to a polygon on screen: projection, bounds, the depth of its plane. Shared by both
-// devices.
+// From a face in camera coordinates to a polygon on screen: projection, bounds, and the inverse depth of its plane.
+// Shared by both devices.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -9,34 +9,34 @@
 
 namespace pictura {
 
-/// Where a point in front of the near plane is on screen.
+/// Screen position of a point in front of the near plane.
 PICTURA_HD inline Vec2 project(const PinholeCamera& camera, Vec3 p, float inverse_depth) {
   return {camera.center_x_px + camera.focal_x_px * (p.x * inverse_depth),
           camera.center_y_px + camera.focal_y_px * (p.y * inverse_depth)};
 }
 
-/// Pixels that a polygon may touch: half-open ranges within the image.
+/// Pixels that a polygon may touch, as half-open ranges within the image.
 struct PixelBox {
   int16_t x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;
 };
 
-/// A convex polygon on screen, without its edges, which stand in a pool. In the order in which it is asked for.
+/// A convex polygon on screen; its edges are stored in a pool. Members in the order of access.
 struct alignas(16) ScreenFace {
   PixelBox box;
   int32_t edge_begin = 0;
   uint8_t edge_count = 0;
-  uint8_t class_id = 0;         // of the class plane
+  uint8_t class_id = 0;         // value of the class plane
   uint16_t min_area_units = 0;  // see min_area()
-  // Inverse depth at a point of the screen.
+  // Inverse depth at screen point (x, y): inverse_depth_x * x + inverse_depth_y * y + inverse_depth_0.
   float inverse_depth_x = 0, inverse_depth_y = 0, inverse_depth_0 = 0;
-  uint32_t object_id = 0;  // of the thing that it belongs to, see common/raster/visibility.h
+  uint32_t object_id = 0;  // of its primitive, see common/raster/visibility.h
   // Range of the inverse depth over the face's corners.
   float inverse_depth_low = 0, inverse_depth_high = 0;
   float plane_distance_m = 0;  // from the camera to the face's plane
-  uint32_t color_bytes = 0;    // to_bytes(color), for devices
+  uint32_t color_bytes = 0;    // to_bytes(color), used by devices
   Rgb color;
 
-  /// What it covers less of a pixel than this is nothing, see min_area_of.
+  /// Coverage of a pixel below this area is ignored, see min_area_of.
   PICTURA_HD float min_area() const { return static_cast<float>(min_area_units) * (1.0f / kAreaUnits); }
   PICTURA_HD void set_min_area(float area) { min_area_units = static_cast<uint16_t>(area * kAreaUnits + 0.5f); }
 
@@ -45,7 +45,7 @@ struct alignas(16) ScreenFace {
 };
 static_assert(sizeof(ScreenFace) == 4 * 16);
 
-/// What bounds the corners of a polygon on screen.
+/// Bounds of a polygon's corners on screen and of their inverse depths.
 struct ScreenBounds {
   Vec2 low{1e30f, 1e30f}, high{-1e30f, -1e30f};
   float inverse_depth_low = 1e30f, inverse_depth_high = 0.0f;
@@ -55,12 +55,12 @@ struct ScreenBounds {
     inverse_depth_low = min_no_nan(inverse_depth_low, inverse_depth);
     inverse_depth_high = max_no_nan(inverse_depth_high, inverse_depth);
   }
-  /// Whether they are within an image and so much around it.
+  /// Whether they are within an image enlarged by a margin.
   PICTURA_HD bool are_within(const PinholeCamera& camera, float margin_px) const {
     return low.x >= -margin_px && low.y >= -margin_px && high.x <= static_cast<float>(camera.width_px) + margin_px &&
            high.y <= static_cast<float>(camera.height_px) + margin_px;
   }
-  /// What of them is in the image.
+  /// Their intersection with the image.
   PICTURA_HD Aabb2 in_image(const PinholeCamera& camera) const {
     return {{max_no_nan(low.x, 0.0f), max_no_nan(low.y, 0.0f)},
             {min_no_nan(high.x, static_cast<float>(camera.width_px)),
@@ -73,7 +73,7 @@ struct ScreenBounds {
   }
 };
 
-/// The pixels of an image that a polygon may touch whose bounds meet the image and are within the guard band.
+/// The pixels that a polygon may touch; its bounds must meet the image and be within the guard band.
 PICTURA_HD inline PixelBox pixel_box(const PinholeCamera& camera, const ScreenBounds& bounds) {
   auto pixel_of = [](float at) { return static_cast<int>(floorf(at)); };
   return {static_cast<int16_t>(max_of(pixel_of(bounds.low.x), 0)),
@@ -82,23 +82,23 @@ PICTURA_HD inline PixelBox pixel_box(const PinholeCamera& camera, const ScreenBo
           static_cast<int16_t>(min_of(pixel_of(bounds.high.y) + 1, camera.height_px))};
 }
 
-/// Polygons of less than half of this are nothing.
+/// Polygons of less than half of this area are dropped.
 constexpr float kMinTwiceArea_px2 = 1e-6f;
 
-/// Whether a plane has an inverse depth: faces without an area and planes through the camera have none.
+/// Whether a plane has an inverse depth: not those of faces without area, nor those through the camera.
 PICTURA_HD inline bool has_inverse_depth(const FacePlane& plane) {
   constexpr float kMinMagnitude = 1e-30f;
   return dot(plane.normal, plane.normal) > kMinMagnitude && fabsf(plane.offset) > kMinMagnitude;
 }
-/// Inverse depth of a plane as a linear function of the screen: of x, of y, and at (0, 0). normal . p = offset on the
-/// plane, and p = depth * ray: inverse depth is linear in the ray.
+/// Inverse depth of a plane as a linear function of the screen: factors of x and y, and constant. normal . p = offset
+/// on the plane and p = depth * ray, so inverse depth is linear in the ray.
 PICTURA_HD inline Vec3 inverse_depth_plane(const PinholeCamera& camera, const Frustum& f, const FacePlane& plane) {
   const Vec3 inverse = plane.normal * (has_inverse_depth(plane) ? reciprocal_in_range(plane.offset) : 0.0f);
   const float x = inverse.x * f.x_per_px, y = inverse.y * f.y_per_px;
   return {x, y, inverse.z - x * camera.center_x_px - y * camera.center_y_px};
 }
 
-/// Sets what the bounds of a face, which meet the image, and its plane say of it.
+/// Sets the members of a face that follow from its bounds, which must meet the image, and its plane.
 PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f, const ScreenBounds& bounds,
                                   const FacePlane& plane, ScreenFace* face_out) {
   face_out->box = pixel_box(camera, bounds);
@@ -115,7 +115,8 @@ PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f,
 }
 
 /// Projects a clipped face (camera coordinates) of at most kMaxCorners corners, which lies in `plane`. Calls keep_edge
-/// as make_edges does, and sets all of face_out but edge_begin and what it belongs to. False where it covers nothing.
+/// as make_edges does, and sets all of face_out except edge_begin and the members of its primitive. False if it covers
+/// nothing.
 template <int kMaxCorners, typename Corners, typename KeepEdge>
 PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Frustum& f, const Corners& polygon,
                                         int count, const FacePlane& plane, Rgb color, KeepEdge&& keep_edge,
@@ -146,11 +147,12 @@ struct ScreenQuad {
   ScreenBounds bounds;
 };
 
-/// What is to be done with a face of four corners: nothing, where it is out of the image; draw it; or clip it first.
+/// Position of a face relative to the image and its guard band: not in the image (dropped), drawn as it is, or to be
+/// clipped first.
 enum class ClipClass : uint8_t { outside, inside, crossing };
 
-/// Projects a face of four corners, a strip with its corners pushed apart where it is less than floor_px wide. What
-/// needs no clipping, nearly all, is thus never widened in camera coordinates.
+/// Projects a face of four corners, and widens strips to at least floor_px on screen. Thus faces that need no clipping,
+/// nearly all, are never widened in camera coordinates.
 PICTURA_HD inline ClipClass project_quad(const PinholeCamera& camera, const Vec3* corners, float floor_px,
                                          ScreenQuad* quad_out) {
   const float nearest_m = min_no_nan(min_no_nan(corners[0].z, corners[1].z), min_no_nan(corners[2].z, corners[3].z));
@@ -172,20 +174,20 @@ PICTURA_HD inline ClipClass project_quad(const PinholeCamera& camera, const Vec3
   *bounds = {};
   for (int i = 0; i < 4; ++i) bounds->add(corner[i], inverse_depth[i]);
   const bool is_inside_guard_band = bounds->are_within(camera, kGuardBand_px);
-  // Of what reaches behind the near plane all that was computed means nothing.
+  // For faces that reach behind the near plane the values computed above are meaningless.
   if (nearest_m < kNear_m) return ClipClass::crossing;
   return !bounds->meet_image(camera) ? ClipClass::outside
                                      : (is_inside_guard_band ? ClipClass::inside : ClipClass::crossing);
 }
 
-/// Sets whether a face turns right on screen; false where it covers less than that.
+/// Sets a face's winding on screen; false if its area is too small.
 PICTURA_HD inline bool find_winding(const ScreenQuad& quad, float min_twice_area_px2, bool* is_clockwise_out) {
   const float twice_area = cross(quad.corner[2] - quad.corner[0], quad.corner[3] - quad.corner[1]);
   *is_clockwise_out = twice_area > 0.0f;
   return fabsf(twice_area) >= min_twice_area_px2;
 }
 
-/// make_screen_face of what project_quad found to be whole and find_winding to cover something.
+/// make_screen_face of a quad that project_quad found inside and find_winding found large enough.
 template <typename KeepEdge>
 PICTURA_HD inline void make_quad_face(const PinholeCamera& camera, const Frustum& f, const ScreenQuad& quad,
                                       bool is_clockwise, const FacePlane& plane, Rgb color, KeepEdge&& keep_edge,
@@ -195,12 +197,12 @@ PICTURA_HD inline void make_quad_face(const PinholeCamera& camera, const Frustum
   set_bounds(camera, f, quad.bounds, plane, face_out);
 }
 
-/// 1 / depth of a face's plane at a point of the screen; negative where the plane is behind the camera.
+/// 1 / depth of a face's plane at a screen point; negative where the plane is behind the camera.
 PICTURA_HD inline float inverse_depth(const ScreenFace& face, Vec2 at_px) {
   return face.inverse_depth_0 + face.inverse_depth_x * at_px.x + face.inverse_depth_y * at_px.y;
 }
 
-/// Depth (camera z) of a face at a point of the screen, within the depths of its corners.
+/// Depth (camera z) of a face at a screen point, clamped to the depths of its corners.
 PICTURA_HD inline float face_depth_m(const ScreenFace& face, Vec2 at_px) {
   return 1.0f / clamp(inverse_depth(face, at_px), face.inverse_depth_low, face.inverse_depth_high);
 }

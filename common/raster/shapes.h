@@ -1,5 +1,5 @@
-// What each primitive of a scene looks like to a camera: its visible faces as convex polygons in camera coordinates,
-// each with its colour already faded, and the rule that keeps thin strips visible. Shared by both devices.
+// The faces of each primitive: convex polygons in camera coordinates, each with its faded colour, and the minimum width
+// on screen of thin strips. Shared by both devices.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -7,17 +7,17 @@
 
 namespace pictura {
 
-/// What the class plane of an image says of the front surface at a pixel's centre.
+/// Value of the class plane: the front surface at a pixel's centre.
 enum class SurfaceClass : uint8_t { nothing, vehicle, cyclist, pedestrian, wall, light, strip };
 /// Class of a strip: kClassOfStrip + StripKind.
 constexpr int kClassOfStrip = static_cast<int>(SurfaceClass::strip);
 
-/// Sides of the polygon that a light's disk is drawn as, of the disk's area.
+/// Number of sides of the polygon, of the disk's area, that a light is drawn as.
 constexpr int kLightSides = 24;
-/// Corners that a face may have before clipping.
+/// Maximum number of corners of a face before clipping.
 constexpr int kMaxFaceCorners = kLightSides;
 
-/// The plane that a face lies in, in camera coordinates: normal . p = offset. The normal's length is of no importance.
+/// The plane of a face, in camera coordinates: normal . p = offset. The normal has any length.
 struct FacePlane {
   Vec3 normal;
   float offset = 0;
@@ -27,8 +27,8 @@ PICTURA_HD inline FacePlane quad_plane(const Vec3* corners) {
   return {normal, dot(normal, corners[0])};
 }
 
-/// Brightness of a face: 1 less the mean over its corners of their share of the visible range. A face that has faded
-/// to 0 is not drawn, and so hides nothing.
+/// Brightness of a face: 1 minus the mean over its corners of depth / visible range, clamped to [0, 1]. A face that has
+/// faded to 0 is not drawn and occludes nothing.
 PICTURA_HD inline float face_brightness(const Vec3* corners, int count) {
   float faded = 0.0f;
   PICTURA_UNROLL_FOUR
@@ -36,16 +36,16 @@ PICTURA_HD inline float face_brightness(const Vec3* corners, int count) {
   return 1.0f - faded / static_cast<float>(count);
 }
 
-/// A face in camera coordinates, as it is handed on.
+/// A face in camera coordinates.
 struct CameraFace {
   const Vec3* corners = nullptr;
   int count = 0;
   FacePlane plane;
   Rgb color;
-  float floor_px = 0;  // of a strip, which is still to be widened to that; 0: of no strip
+  float floor_px = 0;  // minimum width on screen of a strip that is not yet widened; 0 for other primitives
 };
 
-/// Colour of an agent's face before it fades; the debug palette pales halted agents and greys parked ones.
+/// Colour of an agent's face before fading; the debug palette pales halted agents and greys parked ones.
 PICTURA_HD inline Rgb agent_face_color(const AgentBox& box, BoxFace face, bool debug_palette) {
   const Rgb color = agent_color(box.agent_class, face);
   if (!debug_palette || box.palette == 0) return color;
@@ -53,11 +53,11 @@ PICTURA_HD inline Rgb agent_face_color(const AgentBox& box, BoxFace face, bool d
   return {0.5f * (color.r + tint), 0.5f * (color.g + tint), 0.5f * (color.b + tint)};
 }
 
-/// Faces that a cuboid may turn to a camera: those of BoxFace, and the underside, which roads below a bridge see and
-/// which has the top's colour.
+/// Faces of a cuboid: those of BoxFace, and the underside, which is visible from roads below a bridge and has the top's
+/// colour.
 constexpr int kUnderside = kNumBoxFaces, kNumCuboidFaces = kNumBoxFaces + 1;
 
-/// The faces of a box on whose outer side a camera at eye_m is, a bit for each.
+/// Bit mask of a box's front-facing faces, for a camera at eye_m.
 PICTURA_HD inline unsigned front_facing_mask(const AgentBox& box, Vec3 eye_m) {
   const Vec2 ahead{box.cos_heading, box.sin_heading};
   const Vec2 from_center = eye_m.xy() - box.center_m.xy();
@@ -95,7 +95,7 @@ PICTURA_HD inline void cuboid_face_corners(const AgentBox& box, int face, Vec3* 
   for (int i = 0; i < 4; ++i) corners_out[i] = corner(corners >> (3 * i) & 7);
 }
 
-/// A face of four corners in the world, with its colour before it fades.
+/// A face of four corners in the world, with its colour before fading.
 struct WorldQuad {
   Vec3 corner[4];
   Rgb color;
@@ -109,20 +109,20 @@ PICTURA_HD inline WorldQuad cuboid_quad(const AgentBox& box, int face, bool debu
   return quad;
 }
 
-/// A wall's face; seen from both sides.
+/// A wall's face, visible from both sides.
 PICTURA_HD inline WorldQuad wall_quad(const WallFace& wall) {
   const Vec3 up{0.0f, 0.0f, wall.height_m};
   return {{wall.a_m, wall.b_m, wall.b_m + up, wall.a_m + up}, wall.color};
 }
 
-/// A face of four corners in camera coordinates, with its colour faded; strips are not yet widened.
+/// A face of four corners in camera coordinates, with its faded colour; strips are not yet widened.
 struct CameraQuad {
   Vec3 corner[4];
   FacePlane plane;
   Rgb color;
 };
 
-/// Where a quad is to a camera; false where it has faded to black.
+/// Transforms a quad to camera coordinates; false if it has faded to black.
 PICTURA_HD inline bool quad_to_camera(const WorldQuad& quad, const PinholeCamera& camera, CameraQuad* quad_out) {
   for (int i = 0; i < 4; ++i) quad_out->corner[i] = to_camera(camera, quad.corner[i]);
   const float brightness = face_brightness(quad_out->corner, 4);
@@ -131,19 +131,19 @@ PICTURA_HD inline bool quad_to_camera(const WorldQuad& quad, const PinholeCamera
   return brightness > 0.0f;
 }
 
-/// All of a quad, to be clipped and widened; floor_px is that of strips, 0 of others. It points into the quad.
+/// A quad as a CameraFace that points into it; floor_px is 0 except for strips.
 PICTURA_HD inline CameraFace make_camera_face(const CameraQuad& quad, float floor_px) {
   return {quad.corner, 4, quad.plane, quad.color, floor_px};
 }
 
-/// Calls emit(face) for a quad, unless it has faded to black; floor_px as of make_camera_face.
+/// Calls emit(face) for a quad unless it has faded to black; floor_px as in make_camera_face.
 template <typename Emit>
 PICTURA_HD inline void emit_quad(const WorldQuad& quad, const PinholeCamera& camera, float floor_px, Emit&& emit) {
   CameraQuad in_camera;
   if (quad_to_camera(quad, camera, &in_camera)) emit(make_camera_face(in_camera, floor_px));
 }
 
-/// Calls visit(face) for each face of a box that is turned to the camera.
+/// Calls visit(face) for each front-facing face of a box.
 template <typename Visit>
 PICTURA_HD inline void visit_front_facing(const AgentBox& box, const PinholeCamera& camera, Visit&& visit) {
   const unsigned faces = front_facing_mask(box, camera.position_m);
@@ -152,7 +152,7 @@ PICTURA_HD inline void visit_front_facing(const AgentBox& box, const PinholeCame
   }
 }
 
-/// emit_quad for each of those.
+/// Calls emit(face) for each of those that has not faded to black.
 template <typename Emit>
 PICTURA_HD inline void agent_faces(const AgentBox& box, const PinholeCamera& camera, bool debug_palette, Emit&& emit) {
   visit_front_facing(box, camera,
@@ -164,31 +164,31 @@ PICTURA_HD inline void wall_faces(const WallFace& wall, const PinholeCamera& cam
   emit_quad(wall_quad(wall), camera, 0.0f, emit);
 }
 
-/// Whether a camera at position_m is in front of the head and within its half-angle, seen on the ground plane.
+/// Whether a light is on and visible from position_m: from the front and within its half-angle, on the ground plane.
 PICTURA_HD inline bool light_is_visible(const LightHead& head, LightState state, Vec3 position_m) {
   if (state == LightState::off) return false;
   const Vec2 to_eye = position_m.xy() - head.position_m.xy();
   const float ahead_m = dot(to_eye, head.facing);
-  // Of the half-angle's cosine, by squares.
+  // Compares the squares of cosines.
   const float cosine = max_no_nan(head.cos_half_angle, 0.0f);
   return ahead_m > 0.0f && ahead_m * ahead_m >= cosine * cosine * dot(to_eye, to_eye);
 }
 
-/// A corner of the polygon that a head is drawn as, which has the disk's area, in the world: 0 is left of the disk's
-/// middle, those that follow go on upwards.
+/// A corner, in the world, of the polygon that a head is drawn as: corner 0 is left of the centre, the next ones go
+/// upwards.
 PICTURA_HD inline Vec3 light_corner(const LightHead& head, int corner) {
-  constexpr float kRadius_m = kLightRadius_m * 1.00574110f;  // square root of the turn of a side over its sine
+  constexpr float kRadius_m = kLightRadius_m * 1.00574110f;  // sqrt(a / sin(a)), a = 2 pi / kLightSides
   const SinCos at = sincos_of(static_cast<float>(corner) * (kTwoPi / kLightSides));
   const Vec2 ground = head.position_m.xy() + left_normal(head.facing) * (kRadius_m * at.cos);
   return {ground.x, ground.y, head.position_m.z + kRadius_m * at.sin};
 }
 
-/// The disk of a lit head, as bright as its middle: its plane in camera coordinates, and its colour.
+/// The disk of a lit head: its plane in camera coordinates, and its colour, faded by the depth of its centre.
 struct LightDisk {
   FacePlane plane;
   Rgb color;
 };
-/// False where it has faded to black.
+/// False if it has faded to black.
 PICTURA_HD inline bool light_to_camera(const LightHead& head, LightState state, const PinholeCamera& camera,
                                        LightDisk* disk_out) {
   const Vec3 middle = to_camera(camera, head.position_m), facing{head.facing.x, head.facing.y, 0.0f};
@@ -198,7 +198,7 @@ PICTURA_HD inline bool light_to_camera(const LightHead& head, LightState state, 
   return brightness > 0.0f;
 }
 
-/// The disk of a head, where it is turned to the camera and lit.
+/// Calls emit(face) for the disk of a head if it is visible.
 template <typename Emit>
 PICTURA_HD inline void light_faces(const LightHead& head, LightState state, const PinholeCamera& camera, Emit&& emit) {
   if (!light_is_visible(head, state, camera.position_m)) return;
@@ -219,11 +219,12 @@ PICTURA_HD inline void strip_corners(const Strip& strip, Vec3* corners_out) {
   corners_out[3] = {b.x + at_b.x, b.y + at_b.y, b.z};
 }
 
-/// The direction in which a strip is widened: across it on screen.
+/// The widening of a strip, across it on screen.
 struct Widening {
-  Vec2 across;  // unit vector, from the right side of the strip to its left; 0 where the strip is a point on screen
+  Vec2 across;  // unit vector from the strip's right side to its left; 0 if the strip is a point on screen
   float floor_px = 0;
-  /// How far the left end of a gap between the sides is to go, on screen, and the right end the other way.
+  /// How far to move the left corner of an end of the strip on screen, given its offset from the right corner; the
+  /// right corner moves the opposite way.
   PICTURA_HD Vec2 push_px(Vec2 gap_px) const {
     const float width_px = dot(gap_px, across);
     const float missing_px = 0.5f * max_no_nan(floor_px - fabsf(width_px), 0.0f);
@@ -231,17 +232,17 @@ struct Widening {
   }
 };
 
-/// ... of a strip whose centre line runs from a to b, in camera coordinates and in front of the near plane; both may be
-/// multiples by the same factor.
+/// The widening of a strip whose centre line runs from a to b, in camera coordinates and in front of the near plane;
+/// both may be scaled by the same factor.
 PICTURA_HD inline Widening widening_of(const PinholeCamera& camera, float floor_px, Vec3 a, Vec3 b) {
-  // The direction on screen times both depths.
+  // The direction on screen, times the product of both depths.
   const Vec2 ahead{camera.focal_x_px * (b.x * a.z - a.x * b.z), camera.focal_y_px * (b.y * a.z - a.y * b.z)};
   const float length2 = dot(ahead, ahead), min_length = 1e-6f * (a.z * b.z);
   if (!(length2 > min_length * min_length)) return {};
   return {left_normal(ahead) * sqrt_in_range(reciprocal_in_range(length2)), floor_px};
 }
 
-/// Pushes the two corners of one end of a strip apart until they are wide enough on screen. Depths stay.
+/// Moves the two corners of one end of a strip apart until it has its minimum width on screen. Depths do not change.
 PICTURA_HD inline void widen_strip_end(const PinholeCamera& camera, const Widening& widening, Vec3* left, Vec3* right) {
   if (left->z < kNear_m || right->z < kNear_m) return;
   const float of_left = reciprocal_in_range(left->z), of_right = reciprocal_in_range(right->z);
@@ -255,17 +256,17 @@ PICTURA_HD inline void widen_strip_end(const PinholeCamera& camera, const Wideni
   right->y -= push.y * right->z;
 }
 
-/// A strip's corners as drawn, in camera coordinates, after the floor on its width on screen; `corners` are its own
-/// corners in camera coordinates. The part of its centre line behind the near plane is cut off first, so that the floor
-/// is measured where the strip can be seen. False where nothing is left.
+/// Widens a strip to its minimum width on screen; `corners` are in camera coordinates. The part of its centre line
+/// behind the near plane is cut off first, so that the width is measured where the strip is visible. False if nothing
+/// is left.
 PICTURA_HD inline bool widen_strip(const PinholeCamera& camera, float floor_px, Vec3* corners) {
   Vec3 a = (corners[0] + corners[1]) * 0.5f, b = (corners[3] + corners[2]) * 0.5f;
   if (a.z < kNear_m && b.z < kNear_m) {
-    // Only a corner may still reach past the near plane; it is too close for any floor.
+    // Only a corner may still be in front of the near plane, and there the strip needs no widening.
     return corners[0].z > kNear_m || corners[1].z > kNear_m || corners[2].z > kNear_m || corners[3].z > kNear_m;
   }
   if (floor_px <= 0.0f) return true;
-  // Centre line in front of the near plane, and its direction on screen.
+  // Cut the centre line at the near plane.
   const float a_in = a.z - kNear_m, b_in = b.z - kNear_m;
   const bool cut_a = a_in < 0.0f, cut_b = b_in < 0.0f;
   if (cut_a || cut_b) {
@@ -294,24 +295,24 @@ PICTURA_HD inline WorldQuad strip_quad(const Strip& strip) {
   return quad;
 }
 
-/// The strip's face, to be widened to floor_px on screen, in the plane of the strip itself.
+/// Emits the strip's face, in the plane of the strip and not yet widened to floor_px.
 template <typename Emit>
 PICTURA_HD inline void strip_faces(const Strip& strip, const PinholeCamera& camera, float floor_px, Emit&& emit) {
   emit_quad(strip_quad(strip), camera, floor_px, emit);
 }
 
-/// Strips that are closer than this are of one level: there rank decides, and not depth.
+/// Strips closer than this in height are on one level: there the rank decides, not the depth.
 constexpr float kSameLevel_m = 0.05f;
-/// A strip that is drawn wider than it is stays within this factor of the depths of its corners: where the camera is
-/// close to its plane, that comes near and goes beyond the horizon within a pixel.
+/// The depth of a widened strip is clamped to the depths of its corners, times or divided by this factor: when the
+/// camera is close to its plane, the plane's depth varies without bound within a pixel.
 constexpr float kWidenedDepth = 2.0f;
-/// A solid stands on a strip where its foot overlaps the strip on the ground plane and, in its middle, lies at most
-/// this far from the strip's plane: upright boxes dip into slopes.
+/// A solid stands on a strip if their outlines overlap on the ground plane and the centre of its base is at most this
+/// far from the strip's plane: upright boxes cut into slopes.
 constexpr float kStanding_m = 0.5f;
 
-/// Where strips of one level overlap, the lower rank is painted over the higher.
+/// Where strips of one level overlap, the one with the lower rank is in front.
 PICTURA_HD constexpr int strip_rank(StripKind kind) {
-  // Two bits each, the first kind lowest: lane mark, road edge, crosswalk, stop line.
+  // Two bits per kind, from the lowest: lane mark, road edge, crosswalk, stop line.
   constexpr int kRanks = 2 | 3 << 2 | 1 << 4 | 0 << 6;
   return kRanks >> (2 * static_cast<int>(kind)) & 3;
 }

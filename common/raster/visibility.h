@@ -1,6 +1,6 @@
-// Which of two faces is in front where both cover a pixel, and what the fragments of a pixel hide of each other. That
-// is asked of each two anew, at the middle of what they share of the pixel's samples: there the nearer plane is in
-// front, whatever cycles, slopes and intersections make of an order of whole things. Shared by both devices.
+// Visibility within a pixel: which of two faces is in front, and which samples fragments occlude of each other. It is
+// decided for each pair of fragments anew, at the centroid of the samples that both cover: the nearer plane is in
+// front. So cycles, slopes and intersections need no order of whole primitives. Shared by both devices.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -9,7 +9,7 @@
 
 namespace pictura {
 
-// Numbers of things are unique within an image: kind, then index. Those of strips ascend with their rank.
+// Object ids are unique within an image: kind, then index. Those of strips ascend with their rank.
 constexpr int kKindShift = 30, kRankShift = 28;
 constexpr uint32_t kAgentKind = 0, kWallKind = 1, kLightKind = 2, kStripKind = 3;
 constexpr uint32_t kIndexMask = (1u << kRankShift) - 1;
@@ -17,12 +17,12 @@ constexpr uint32_t kIndexMask = (1u << kRankShift) - 1;
 PICTURA_HD constexpr uint32_t make_object_id(uint32_t kind, int32_t index) {
   return (kind << kKindShift) | static_cast<uint32_t>(index);
 }
-/// index: the strip's place among the geometry's strips.
+/// index: of the strip in the geometry's strips.
 PICTURA_HD inline uint32_t strip_object_id(const Strip& strip, int32_t index) {
   return (kStripKind << kKindShift) | (static_cast<uint32_t>(strip_rank(strip.kind)) << kRankShift) |
          static_cast<uint32_t>(index);
 }
-/// A face that may show: the number of its thing, and of agents which face.
+/// An entry of a list of visible faces: the object id and, for agents, the number of the face.
 constexpr int kFaceShift = 27;
 constexpr uint32_t kFaceIndexMask = (1u << kFaceShift) - 1;
 PICTURA_HD constexpr uint32_t face_entry(uint32_t object_id, int face) {
@@ -32,8 +32,8 @@ PICTURA_HD constexpr uint32_t kind_of(uint32_t object_id) { return object_id >> 
 PICTURA_HD constexpr int32_t index_of(uint32_t object_id) { return static_cast<int32_t>(object_id & kIndexMask); }
 PICTURA_HD constexpr bool is_strip(const ScreenFace& face) { return kind_of(face.object_id) == kStripKind; }
 
-/// What a thing covers of the ground: corners with the heights of its lower end. Of what has two ends, each stands
-/// twice.
+/// The outline of a primitive on the ground: four corners, each at the height of the primitive's lower end. A line's
+/// two ends occur twice each.
 struct Extent {
   Vec3 corner[4];
 };
@@ -56,7 +56,7 @@ PICTURA_HD inline Extent extent_of(const Strip& strip) {
   return extent;
 }
 
-/// The extent of a thing of an image, by its number; agents: the first of the world.
+/// The extent of a primitive, by its object id; agents: the first of the world.
 PICTURA_HD inline Extent extent_of(uint32_t object_id, const StaticGeometryView& pieces, const AgentBox* agents) {
   const int32_t index = index_of(object_id);
   switch (kind_of(object_id)) {
@@ -67,7 +67,8 @@ PICTURA_HD inline Extent extent_of(uint32_t object_id, const StaticGeometryView&
   }
 }
 
-/// Corners on the ground. Whoever asks for all sides turns them on: an index would keep a device's corners in memory.
+/// Corners on the ground. turn() rotates them, so that all sides are visited without an index, which would force the
+/// corners into a device's local memory.
 struct GroundQuad {
   Vec2 corner[4];
   PICTURA_HD void turn() {
@@ -82,7 +83,7 @@ PICTURA_HD inline GroundQuad ground_quad(const Extent& extent, Vec2 origin) {
   return quad;
 }
 
-/// Whether the first side of a separates a from b. Touching is no overlap.
+/// Whether the first side of a separates a from b on the ground. Touching counts as separated.
 PICTURA_HD inline bool first_side_separates(const GroundQuad& a, const GroundQuad& b) {
   constexpr float kTouching_m = 1e-3f;
   struct Interval {
@@ -99,7 +100,7 @@ PICTURA_HD inline bool first_side_separates(const GroundQuad& a, const GroundQua
     return interval;
   };
   const Interval of_a = project(a), of_b = project(b);
-  // By how much they overlap, in multiples of the side's length.
+  // The overlap along the axis, times the side's length.
   const float overlap = min_no_nan(of_a.high, of_b.high) - max_no_nan(of_a.low, of_b.low);
   const float length2_m2 = dot(side, side);
   return length2_m2 > 1e-12f && (overlap <= 0.0f || overlap * overlap <= kTouching_m * kTouching_m * length2_m2);
@@ -107,7 +108,7 @@ PICTURA_HD inline bool first_side_separates(const GroundQuad& a, const GroundQua
 
 /// Whether two extents overlap on the ground plane: no side of either separates them.
 PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
-  // Relative to a point near by, for precision.
+  // Relative to a nearby point, for precision.
   const Vec2 origin = a.corner[0].xy();
   GroundQuad one = ground_quad(a, origin), other = ground_quad(b, origin);
   PICTURA_NO_UNROLL
@@ -122,7 +123,7 @@ PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
   return true;
 }
 
-/// Whether a solid stands on a strip that is seen from above, which then lies behind it (see kStanding_m).
+/// Whether a solid stands on a strip (see kStanding_m) that is visible from above; then the strip is behind the solid.
 PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip, Vec3 eye_m) {
   Vec3 sum{};
   for (const Vec3 corner : solid.corner) sum = sum + (corner - strip.corner[0]);
@@ -132,23 +133,23 @@ PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip, Vec3 
   return fabsf(dot(normal, middle)) <= kStanding_m * fabsf(normal.z) && overlap_on_ground(solid, strip);
 }
 
-/// Whether two strips are of one level where a ray meets their planes: the nearer point is close to the other's plane.
+/// Whether two strips are on one level where a ray meets their planes: the nearer point is close to the other plane.
 PICTURA_HD inline bool of_one_level(const ScreenFace& a, const ScreenFace& b, Vec2 at_px) {
   const float inverse_a = inverse_depth(a, at_px), inverse_b = inverse_depth(b, at_px);
   const float gap_m = fabsf(inverse_a - inverse_b) * (inverse_a < inverse_b ? a.plane_distance_m : b.plane_distance_m);
   return gap_m < kSameLevel_m * max_of(inverse_a, inverse_b);
 }
 
-/// 1 / depth of a face at a point of the screen, for telling which of two is in front there; within the depths of its
-/// corners, which those of a strip may leave by a factor (see kWidenedDepth).
+/// 1 / depth of a face at a screen point, clamped to the depths of its corners; for strips that range is widened by
+/// kWidenedDepth. Used to compare faces.
 PICTURA_HD inline float clamped_inverse_depth(const ScreenFace& face, Vec2 at_px) {
   const float factor = is_strip(face) ? kWidenedDepth : 1.0f,
               inverse_factor = is_strip(face) ? 1.0f / kWidenedDepth : 1.0f;
   return clamp(inverse_depth(face, at_px), face.inverse_depth_low * inverse_factor, face.inverse_depth_high * factor);
 }
 
-/// Whether face a is in front of face b at a point of the screen that both cover. `stands(solid, strip)` says, by their
-/// numbers, whether stands_on() holds.
+/// Whether face a is in front of face b at a screen point that both cover. `stands(solid, strip)` is stands_on() of
+/// their object ids.
 template <typename Stands>
 PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec2 at_px, Stands&& stands) {
   const bool strip_a = is_strip(a), strip_b = is_strip(b);
@@ -156,15 +157,15 @@ PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec
   const float inverse_depth_a = clamped_inverse_depth(a, at_px), inverse_depth_b = clamped_inverse_depth(b, at_px);
   const bool first = inverse_depth_a != inverse_depth_b ? inverse_depth_a > inverse_depth_b : a.object_id < b.object_id;
   if (strip_a == strip_b || first != strip_a) return first;
-  // A strip before a solid that stands on it: the solid dips into the road.
+  // The strip is nearer, but a solid that stands on it cuts into the road: then the solid is in front.
   return stands(strip_a ? b.object_id : a.object_id, strip_a ? a.object_id : b.object_id) ? !first : first;
 }
 
-/// Middle of some samples, from the pixel's corner; of none, the pixel's middle.
+/// Centroid of samples, relative to the pixel's corner; the pixel's centre if there are no samples.
 PICTURA_HD inline Vec2 centroid_of(uint64_t samples) {
   const int count = popcount(samples);
   if (count == 0) return {0.5f, 0.5f};
-  // Sums over the samples of the bits of their column and row.
+  // Sums of the samples' columns and rows, bit by bit.
   const int column_0 = popcount(samples & 0xFF00FF00FF00FF00ull), column_1 = popcount(samples & 0xFFFF0000FFFF0000ull),
             column_2 = popcount(samples & 0xFFFFFFFF00000000ull);
   const int rows = popcount(samples & 0xAAAAAAAAAAAAAAAAull) + 2 * popcount(samples & 0xCCCCCCCCCCCCCCCCull) +
@@ -176,10 +177,10 @@ PICTURA_HD inline Vec2 centroid_of(uint64_t samples) {
           (static_cast<float>(rows) + (static_cast<float>(offsets) + 0.5f * n) / 8.0f) / (8.0f * n)};
 }
 
-/// What a face covers of one pixel.
+/// A face's coverage of one pixel.
 struct Fragment {
   PixelCoverage coverage;
-  float inverse_depth = 0;  // inverse depth of the face in the middle of its samples
+  float inverse_depth = 0;  // at the centroid of its samples
   int32_t face = 0;
 };
 
@@ -193,21 +194,21 @@ PICTURA_HD inline Vec2 pixel_center(int x, int y) {
   return {static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f};
 }
 
-/// Nearness of a face in the middle of a pixel: that of its fragment where it covers the pixel fully.
+/// Inverse depth of a face at a pixel's centre; equal to that of its fragment if it covers the pixel fully.
 PICTURA_HD inline float center_inverse_depth(const ScreenFace& face, int x, int y) {
   return clamped_inverse_depth(face, pixel_center(x, y));
 }
-/// By how much that rises or falls within the pixel, at most.
+/// Maximum change of a face's inverse depth from the centre to anywhere in the pixel.
 PICTURA_HD inline float inverse_depth_half_range(const ScreenFace& face) {
   return 0.5f * (fabsf(face.inverse_depth_x) + fabsf(face.inverse_depth_y));
 }
 
-/// Bits of a occluder_bound(), the highest of a float; the others are 0.
+/// Number of bits of occluder_bound() that may be set, the highest of a float.
 constexpr int kOccluderBoundBits = 21;
-/// How near a face that covers a pixel fully is in all of it. What is further away everywhere in the pixel is buried.
-/// Strips bury nothing, 0: others are painted over them, and what lies behind one may stand on it. Never negative and
-/// never not a number, because kernels sort by its bits; never more than how near the face is anywhere in the pixel, so
-/// that no face buries itself.
+/// Lower bound of the inverse depth, over a pixel, of a face that covers it fully. Faces with a smaller inverse depth
+/// everywhere in the pixel are fully occluded. 0 for strips, which occlude nothing here: others are painted over them,
+/// and a solid behind one may stand on it. Never negative or NaN, because kernels sort by its bits. Rounded down, so
+/// that no face occludes itself.
 PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
   if (is_strip(face)) return 0.0f;
   const float lowest =
@@ -215,28 +216,28 @@ PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
   return float_from_bits(bits_from_float(lowest) & ~((1u << (32 - kOccluderBoundBits)) - 1));
 }
 
-/// Whether a face may weigh anything in pixel (x, y), which others cover fully, given the largest occluder_bound() of
-/// those. Where this is false no fragment is made of it: it would be hidden by the face that buries it. Devices may ask
-/// others of those before that one, in any order: they bury less, so whom they bury it buries too.
+/// True unless the face lies entirely behind the occluder bound of pixel (x, y). If false, it gets no fragment: the
+/// face of the largest bound would occlude it. A device may test against other full faces' bounds first, in any order:
+/// they are smaller, so what they reject the largest rejects too.
 PICTURA_HD inline bool passes_occluder_bound(const ScreenFace& face, float bound, int x, int y) {
   return !(center_inverse_depth(face, x, y) + inverse_depth_half_range(face) < bound);
 }
 
-/// Order of fragments that does not depend on how they are listed: the nearer first, then by number.
+/// Order of fragments, independent of their list: nearer first, then by object id.
 PICTURA_HD inline bool is_nearer(const Fragment& a, const Fragment& b, const ScreenFace* faces) {
   if (a.inverse_depth != b.inverse_depth) return a.inverse_depth > b.inverse_depth;
   const uint32_t object_id_a = faces[a.face].object_id, object_id_b = faces[b.face].object_id;
   return object_id_a != object_id_b ? object_id_a < object_id_b : a.face < b.face;
 }
 
-/// Where two fragments of a pixel meet: the samples that both cover. A sliver that touches no sample counts as being
-/// wherever the other is. None: neither hides anything of the other.
+/// The samples that two fragments of a pixel share. A sliver, which touches no sample, shares all samples of the other.
+/// If 0, neither occludes the other.
 PICTURA_HD inline uint64_t shared_samples(const PixelCoverage& a, const PixelCoverage& b) {
   return a.samples != 0 && b.samples != 0 ? a.samples & b.samples : a.samples | b.samples;
 }
 
-/// Samples of a pixel at which a linear function of the screen, given by its value at `middle` and its gradient (not
-/// 0), is positive.
+/// Mask of the samples at which a linear function of the screen is positive, given its value at `middle` and its
+/// gradient (not 0).
 PICTURA_HD inline uint64_t samples_where_positive(float value, Vec2 gradient, Vec2 middle) {
   const float scale = 1.0f / length(gradient);
   const Vec2 up = gradient * scale;
@@ -245,18 +246,18 @@ PICTURA_HD inline uint64_t samples_where_positive(float value, Vec2 gradient, Ve
   return samples_inside(edge, -edge.x0, -edge.y0);
 }
 
-/// Of the samples of a pixel that faces a and b of two things share, those at which a is in front: all or none, as in
-/// their middle, but where the planes of two solids intersect near by, those at which that of a is nearer, unless only
-/// all or none is asked for. The others are those at which b is in front of a.
+/// Of the samples that faces a and b of two primitives share, those at which a is in front: all or none, decided at
+/// their centroid. Only where the planes of two solids intersect within a pixel of it, and all_or_none is false, each
+/// sample is decided by the nearer plane. At all others, b is in front.
 template <typename Stands>
 PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFace& b, uint64_t shared, Vec2 corner,
                                             bool all_or_none, Stands&& stands) {
   const Vec2 middle = centroid_of(shared), at = corner + middle;
-  // Of the lower number before the higher, so that both ways round are the same arithmetic.
+  // Always the lower object id first, so that swapping a and b gives the same arithmetic.
   const bool swapped = b.object_id < a.object_id;
   const float sign = swapped ? -1.0f : 1.0f, lead = sign * (inverse_depth(a, at) - inverse_depth(b, at));
   const Vec2 gradient{sign * (a.inverse_depth_x - b.inverse_depth_x), sign * (a.inverse_depth_y - b.inverse_depth_y)};
-  // No sample is further than a pixel from the middle along either axis.
+  // No sample is further than a pixel from the centroid along either axis.
   const bool intersect =
       fabsf(lead) < fabsf(gradient.x) + fabsf(gradient.y) && !is_strip(a) && !is_strip(b) && !all_or_none;
   if (!intersect) return is_in_front(a, b, at, stands) ? shared : 0;
@@ -264,26 +265,26 @@ PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFac
   return shared & (swapped ? ~low_first : low_first);
 }
 
-/// Whether two fragments fill a pixel exactly, one of them a sliver that touches no sample: pieces that meet there.
+/// Whether two fragments, one of them a sliver, together fill a pixel exactly: neighbouring surfaces that meet there.
 PICTURA_HD inline bool are_complementary(const PixelCoverage& a, const PixelCoverage& b) {
   return (a.samples == 0 || b.samples == 0) && fabsf(a.area + b.area - 1.0f) < kFullCoverage;
 }
 
-/// Whether two fragments of a pixel may still hide something of each other, given what is free of each of them. That
-/// only becomes less, so nothing is lost where they are not asked any more, whenever others take what.
+/// Whether two fragments of a pixel may still occlude more of each other, given their visible samples. Those only
+/// decrease, so a pair that is skipped stays irrelevant, in any order of pairs.
 PICTURA_HD inline bool may_occlude_more(uint64_t visible_a, uint64_t samples_a, uint64_t visible_b,
                                         uint64_t samples_b) {
   return ((visible_a & samples_b) | (visible_b & samples_a)) != 0;
 }
 
-/// What two fragments of a pixel hide of each other.
+/// Of each of two fragments of a pixel, the samples that the other occludes.
 struct OccludedSamples {
   uint64_t of_a = 0, of_b = 0;
 };
 
-/// ... where they share samples; corner is the pixel's. Faces of one thing do not hide each other. A sliver hides
-/// nothing, and is hidden as a whole; what covers the whole pixel is hidden only by what does so too (see
-/// PixelAccumulator).
+/// Resolves the occlusion of two fragments; corner is the pixel's. Faces of one primitive do not occlude each other. A
+/// sliver occludes nothing and is occluded as a whole; a fragment that covers the whole pixel is occluded only by
+/// another such (see PixelAccumulator).
 template <typename Stands>
 PICTURA_HD inline OccludedSamples occlude_pair(const PixelCoverage& a, const PixelCoverage& b, const ScreenFace& face_a,
                                                const ScreenFace& face_b, Vec2 corner, Stands&& stands) {

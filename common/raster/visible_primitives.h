@@ -1,12 +1,12 @@
-// Which things of a scene an image may show, one kind after the other, in an order that depends on the scene alone: the
-// walk of renderers that give an image to one thread.
+// Iterates over the primitives of a scene that may be visible in an image, kind by kind, in an order that depends on
+// the scene alone: for renderers that draw an image in one thread.
 #pragma once
 
 #include "pictura/common/raster/face_setup.h"
 
 namespace pictura {
 
-/// Calls visit(box, agent) for each agent of the view's world that the image may show.
+/// Calls visit(box, agent) for each agent of the view's world that may be visible.
 template <typename Visit>
 PICTURA_HD inline void visit_agents(const ImageSetting& setting, const SceneBatch& scene, const View& view,
                                     Visit&& visit) {
@@ -18,7 +18,7 @@ PICTURA_HD inline void visit_agents(const ImageSetting& setting, const SceneBatc
   }
 }
 
-/// Calls visit(wall, index) for each wall that the image may show.
+/// Calls visit(wall, index) for each wall that may be visible.
 template <typename Visit>
 PICTURA_HD inline void visit_walls(const ImageSetting& setting, const StaticGeometryView& geometry, Visit&& visit) {
   const Span<const WallFace> walls = geometry.walls;
@@ -31,7 +31,7 @@ PICTURA_HD inline void visit_walls(const ImageSetting& setting, const StaticGeom
       });
 }
 
-/// Calls visit(head, state, index) for each light head that the image may show.
+/// Calls visit(head, state, index) for each light head that may be visible.
 template <typename Visit>
 PICTURA_HD inline void visit_lights(const ImageSetting& setting, const StaticGeometryView& geometry,
                                     const SceneBatch& scene, const View& view, Visit&& visit) {
@@ -45,7 +45,7 @@ PICTURA_HD inline void visit_lights(const ImageSetting& setting, const StaticGeo
   }
 }
 
-/// Calls visit(strip, index) for each strip that the image may show.
+/// Calls visit(strip, index) for each strip that may be visible.
 template <typename Visit>
 PICTURA_HD inline void visit_strips(const ImageSetting& setting, const StaticGeometryView& geometry, Visit&& visit) {
   const Span<const Strip> strips = geometry.strips;

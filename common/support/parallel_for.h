@@ -1,5 +1,5 @@
-// The one way that host code runs over many items: OpenMP with an explicit number of threads. An exception in a body
-// is carried to the caller; which one, when several bodies throw, is the lowest item's.
+// Parallel loops of host code: OpenMP with an explicit number of threads. An exception in a body is rethrown in the
+// caller; if several bodies throw, that of the lowest item.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace pictura {
 
-/// Threads to use when the caller asks for 0: all that OpenMP would use.
+/// The number of threads to use; 0 means OpenMP's default.
 inline int resolve_num_threads(int num_threads) { return num_threads > 0 ? num_threads : omp_get_max_threads(); }
 
 /// Calls body(i) for i in [0, count), over num_threads threads (0: all). Bodies must not touch each other's outputs.
