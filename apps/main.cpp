@@ -1,5 +1,5 @@
-// The `pictura` command: subcommands, exit statuses (0 done, 1 the work failed, 2 wrong usage, 130 after ^C) and the
-// one line that an error gets.
+// The `pictura` command: subcommands, exit statuses (0 success, 1 failure, 2 wrong usage, 130 after ^C) and one-line
+// error messages.
 #include <cstdio>
 
 #include "pictura/apps/commands.h"
@@ -23,7 +23,7 @@ int main(int argc, char** argv) {
       "  pictura render procedural --agents 40 --steps 50 --views 4 --out images\n"
       "  pictura simulate procedural --agents 40 --steps 300 --video drive.mp4\n"
       "  pictura train --config configs/demo.toml --out runs/demo\n"
-      "Every subcommand explains itself: pictura render --help");
+      "Every subcommand has its own help: pictura render --help");
   add_town_command(app);
   add_map_command(app);
   add_render_command(app);
@@ -41,7 +41,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::Success& success) {  // --help, --version
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
-    std::fprintf(stderr, "error: %s (pictura --help explains the usage)\n", error.what());
+    std::fprintf(stderr, "error: %s (see pictura --help)\n", error.what());
     return 2;
   } catch (const UsageError& error) {
     std::fprintf(stderr, "error: %s\n", error.what());

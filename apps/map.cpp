@@ -1,4 +1,4 @@
-// `pictura map`: the facts of a map, its elements, and its picture from above.
+// `pictura map`: a map's properties, its elements, and its picture from above.
 #include <algorithm>
 #include <chrono>
 
@@ -52,7 +52,7 @@ Json facts_of(const RoadMap& map) {
           {"z_max_m", facts.z_max_m}};
 }
 
-/// With the walls that simulations have by default.
+/// With the default walls of simulations.
 void add_blind_approaches(const RoadMap& map, Json* object_out) {
   const std::vector<WallFace> walls = make_walls(map, {});
   const BlindApproaches count = count_blind_approaches(map, walls);
@@ -70,7 +70,7 @@ void print_table(const Json& object) {
   }
 }
 
-/// One line each on stderr, and how many there were.
+/// One line each on stderr, and their number.
 void print_warnings(const std::vector<std::string>& warnings) {
   constexpr std::size_t kMaxLines = 100;
   for (std::size_t i = 0; i < std::min(warnings.size(), kMaxLines); ++i) {
@@ -114,33 +114,32 @@ void run_map(const Arguments& arguments) {
 
 void add_map_command(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("map", "Print a map's facts, list its elements, draw it from above");
+  CLI::App* command = app.add_subcommand("map", "Print a map's properties, list its elements, draw it from above");
   command->add_option("MAP", arguments->map, "A .xodr file, a town's name, or procedural[:SEED]")->required();
   command->add_option(
       "--png", arguments->png,
       "Draw lanes, markings, edges, lights, signs, crosswalks, parking and building lines into this file");
-  command->add_option("--svg", arguments->svg, "Draw the same as lines and areas, to look closer");
+  command->add_option("--svg", arguments->svg, "Draw the same as vector graphics");
   command->add_option("--size", arguments->size_px, "Longer side of the picture in pixels")
       ->check(CLI::Range(64, 16384))
       ->capture_default_str();
   CLI::Option* box =
-      command->add_option("--box", arguments->box, "Draw this part alone: two corners, in the file's metres")
+      command->add_option("--box", arguments->box, "Draw only this part: two corners, in the file's metres")
           ->expected(4)
           ->type_name("X0 Y0 X1 Y1");
   CLI::Option* at =
-      command->add_option("--at", arguments->at, "Draw the surroundings of this place, in the file's metres")
+      command->add_option("--at", arguments->at, "Draw the surroundings of this point, in the file's metres")
           ->expected(2)
           ->type_name("X Y")
           ->excludes(box);
   command->add_option("--radius", arguments->radius_m, "How far to draw around --at, in metres")
       ->needs(at)
       ->capture_default_str();
-  command->add_option("--xodr", arguments->xodr,
-                      "Write the map as OpenDRIVE, with no more in it than the importer uses");
+  command->add_option("--xodr", arguments->xodr, "Write the map as OpenDRIVE, with only what the importer uses");
   command->add_flag("--lenient", arguments->lenient,
-                    "Leave faulty parts of the file out, with a warning on stderr each");
+                    "Leave out faulty parts of the file, each with a warning on stderr");
   command->add_flag("--json", arguments->json, "Print one JSON object");
-  command->add_flag("--full", arguments->full, "With --json: list every element and where the file says it");
+  command->add_flag("--full", arguments->full, "With --json: list every element with its position in the file");
   command->footer(
       "Examples:\n  pictura map Town01 --json\n  pictura map procedural:7 --png town.png\n"
       "  pictura map Town03 --svg crossing.svg --at 0 0 --radius 40");

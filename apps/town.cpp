@@ -26,7 +26,7 @@ void add_town_command(CLI::App& app) {
   command->add_option("--out", arguments->out, "The .xodr file to write")->required();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
-      "Shares take at least one of what they choose from unless they are 0.\n"
+      "A share above 0 selects at least one.\n"
       "Examples:\n"
       "  pictura town --seed 7 --blocks 4x3 --out town.xodr && pictura map town.xodr --png town.png\n"
       "  pictura town --roundabouts 1 --ring-road 0 --hills-m 0 --out roundabouts.xodr\n"
@@ -46,7 +46,7 @@ void add_town_command(CLI::App& app) {
       for (const TownFeature& feature : town_features()) object[feature.name] = arguments->town.*feature.value;
       print_json(object);
     } else {
-      fmt::print("{}: {} bytes; look at it with: pictura map {} --png town.png\n", arguments->out, text.size(),
+      fmt::print("{}: {} bytes; to view it: pictura map {} --png town.png\n", arguments->out, text.size(),
                  arguments->out);
     }
   });

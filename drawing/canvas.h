@@ -1,4 +1,4 @@
-// A Cairo surface that frees itself, its colours, and text. Private to the drawing library.
+// An owning Cairo surface with colours and text. Private to the drawing library.
 #pragma once
 
 #include <memory>
@@ -26,10 +26,10 @@ struct TextStyle {
   Rgb color = hex(0x22262B);
 };
 
-/// Something opaque to draw on, pixels or an SVG file; user space is pixels until somebody changes the matrix.
+/// An opaque drawing surface, an image or an SVG file; user space is pixels until the matrix is changed.
 class Canvas {
  public:
-  /// Pixels, filled with one colour. Throws Error when the surface cannot be made.
+  /// An image filled with one colour. Throws Error when the surface cannot be created.
   Canvas(int width_px, int height_px, Rgb background);
   /// An SVG file, complete after finish(). Throws Error naming the path.
   Canvas(const std::string& svg_path, int width_px, int height_px, Rgb background);
@@ -47,7 +47,7 @@ class Canvas {
   double text(double x, double y, const std::string& words, const TextStyle& style, double angle_rad = 0);
   double text_width(const std::string& words, const TextStyle& style) const;
 
-  /// The pixels. Throws Error naming Cairo's reason when anything went wrong since the canvas was made.
+  /// The image. Throws Error with Cairo's reason if any call since the constructor failed.
   RgbImage image() const;
   /// Ends the SVG file. Throws Error as image() does.
   void finish();

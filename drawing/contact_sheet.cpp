@@ -1,4 +1,4 @@
-// Contact sheets: what the cameras of some agents see, side by side.
+// Contact sheets: the camera images of some agents in a grid.
 #include <algorithm>
 #include <vector>
 

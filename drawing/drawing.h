@@ -1,5 +1,5 @@
-// Pictures for people: a map from above, and what the cameras of some agents see, side by side. See drawing/world.h for
-// a simulated world from above, drawing/plot.h for curves and video.h for film.
+// Pictures for people: a map from above, and contact sheets of camera images. See drawing/world.h for a simulated world
+// from above, drawing/plot.h for curves and drawing/video.h for videos.
 #pragma once
 
 #include <optional>
@@ -21,19 +21,19 @@ struct MapPictureOptions {
 };
 
 /// Draws lanes by type, markings, road edges, crosswalks, parking spaces, building lines, signs, painted stop lines,
-/// and lights with their stop lines, phases, and the angle within which their heads are seen; a legend, the map's
-/// facts, file coordinates along two sides and a scale bar. Throws Error for a size out of range, a box that is not
-/// finite or not between 1 m and 1000 km wide and high, or a map with nothing to draw.
+/// and lights with their stop lines, phases, and the angle within which their heads are visible; a legend, the map's
+/// properties, file coordinates along two sides and a scale bar. Throws Error for a size out of range, a box that is
+/// not finite or not between 1 m and 1000 km wide and high, or a map with nothing to draw.
 RgbImage draw_map(const RoadMap& map, const MapPictureOptions& options = {});
 
-/// draw_map() as a file, beside and then renamed. Throws Error naming the path.
+/// draw_map() as a PNG file, written under a temporary name and renamed. Throws Error naming the path.
 void draw_map_png(const RoadMap& map, const std::string& path, const MapPictureOptions& options = {});
 
-/// The same picture made of lines and areas, for looking closer; size_px is its size where none is asked for.
+/// The same picture as vector graphics; size_px is its nominal size.
 void draw_map_svg(const RoadMap& map, const std::string& path, const MapPictureOptions& options = {});
 
-/// Rows of views, columns of cameras, every image enlarged by one whole factor without smoothing (0: chosen so that the
-/// sheet is about 1600 px wide), labelled with camera and view names. Images must hold u8 colour of the rig.
+/// Rows of views, columns of cameras, every image enlarged by one integer factor without smoothing (0: chosen so that
+/// the sheet is about 1600 px wide), labelled with camera and view names. Images must be u8 images of the rig.
 RgbImage contact_sheet(const HostImages& images, const Rig& rig, const std::vector<std::string>& view_names,
                        int enlargement = 0);
 
@@ -41,10 +41,10 @@ RgbImage contact_sheet(const HostImages& images, const Rig& rig, const std::vect
 void draw_contact_sheet(const HostImages& images, const Rig& rig, const std::vector<std::string>& view_names,
                         const std::string& path);
 
-/// One image, enlarged by a whole factor without smoothing to about 480 px, over its caption.
+/// One image, enlarged by an integer factor without smoothing to about 480 px, above its caption.
 RgbImage captioned(const HostImages& images, int view, int camera, const std::string& caption);
 
-/// Pictures of one size in rows of three. Throws Error where there is none, or sizes differ.
+/// Pictures of one size in rows of three. Throws Error if there is none, or sizes differ.
 RgbImage assembled(const std::vector<RgbImage>& pictures);
 
 }  // namespace pictura

@@ -10,14 +10,14 @@ namespace pictura {
 
 namespace {
 
-// Scales, in pixels a metre, from which on there is room for more.
+// Minimum scales of arrows, names and lane numbers, in pixels a metre.
 constexpr double kArrowScale = 1.5, kNameScale = 5, kNumberScale = 9;
 
 Vec2 direction(float heading_rad) { return {std::cos(heading_rad), std::sin(heading_rad)}; }
 
-/// The place and heading on a lane's centre line s metres from its start.
+/// Position and heading on a lane's centre line s metres from its start.
 struct LanePose {
-  Vec2 place_m;
+  Vec2 position_m;
   float heading_rad;
 };
 LanePose pose_at(Span<const LanePoint> points, float s_m) {
@@ -28,7 +28,7 @@ LanePose pose_at(Span<const LanePoint> points, float s_m) {
   return {a + (b - a) * share, points[i - 1].heading_rad};
 }
 
-/// Chevrons along the lane, as far apart as looks well at this scale.
+/// Chevrons along the lane, at a spacing that suits the scale.
 void paint_arrows(GroundPen& pen, const RoadMap& map, const Lane& lane) {
   const double spacing_m = pen.at_least(12, 70), size_m = pen.at_least(0.7, 2.5);
   const auto count = static_cast<int>(std::max(1.0, lane.length_m / spacing_m));
@@ -37,39 +37,39 @@ void paint_arrows(GroundPen& pen, const RoadMap& map, const Lane& lane) {
   for (int i = 0; i < count; ++i) {
     const float s_m = lane.length_m * (static_cast<float>(i) + 0.5f) / static_cast<float>(count);
     const LanePose pose = pose_at(map.points_of(lane), s_m);
-    if (!pen.sees(pose.place_m, 1)) continue;
+    if (!pen.is_visible(pose.position_m, 1)) continue;
     const Vec2 ahead = direction(pose.heading_rad) * static_cast<float>(size_m), left = left_normal(ahead);
-    pen.move_to(pose.place_m - ahead * 0.6f + left);
-    pen.line_to(pose.place_m + ahead * 0.6f);
-    pen.line_to(pose.place_m - ahead * 0.6f - left);
+    pen.move_to(pose.position_m - ahead * 0.6f + left);
+    pen.line_to(pose.position_m + ahead * 0.6f);
+    pen.line_to(pose.position_m - ahead * 0.6f - left);
     cairo_stroke(pen.context());
   }
 }
 
 void paint_lane_number(GroundPen& pen, const RoadMap& map, size_t index) {
   const Lane& lane = map.lanes[index];
-  // Beside the arrow in the middle, where there is one.
+  // Before the arrow in the middle, if there is one.
   const LanePose pose = pose_at(map.points_of(lane), 0.5f * lane.length_m);
-  const Vec2 place = pose.place_m - direction(pose.heading_rad) * static_cast<float>(14 / pen.px_per_m());
-  if (!pen.sees(place, 1)) return;
+  const Vec2 position = pose.position_m - direction(pose.heading_rad) * static_cast<float>(14 / pen.px_per_m());
+  if (!pen.is_visible(position, 1)) return;
   const bool on_dark = is_drivable(lane.type);
-  pen.label(place, fmt::format("{}", index),
+  pen.label(position, fmt::format("{}", index),
             {.size_px = 9, .align = Align::center, .color = on_dark ? hex(0xE6E9ED) : hex(0x5A6068)});
 }
 
-/// The line with its buildings' side shaded.
+/// The line, shaded on the side of its buildings.
 void paint_building_line(GroundPen& pen, const BuildingLine& line) {
   const Vec2 a = line.a_m.xy(), b = line.b_m.xy();
   const Vec2 along = b - a;
-  if (length(along) == 0 || !pen.sees((a + b) * 0.5f, length(along))) return;
+  if (length(along) == 0 || !pen.is_visible((a + b) * 0.5f, length(along))) return;
   const auto depth_m = static_cast<float>(pen.at_least(1.2, 3));
   const Vec2 back = left_normal(along * (1 / length(along))) * (0.5f * depth_m);
   pen.line(a + back, b + back, depth_m, kBuildingLineInk, 0.25);
   pen.line(a, b, pen.at_least(0.2, 1), kBuildingLineInk);
 }
 
-/// The angle within which the head is seen, and which stop line it belongs to.
-void paint_light_reach(GroundPen& pen, const TrafficLight& light) {
+/// The angle within which the head is visible, and a line to its stop line.
+void paint_light_angle(GroundPen& pen, const TrafficLight& light) {
   const float half_angle = MapGeometryOptions{}.light_half_angle_rad;
   const double radius_m = pen.at_least(6, 14);
   const Vec2 head = light.head_m.xy();
@@ -90,14 +90,14 @@ void paint_light_reach(GroundPen& pen, const TrafficLight& light) {
   cairo_set_dash(pen.context(), nullptr, 0, 0);
 }
 
-/// A diamond with a tail on the side of the traffic for which the sign stands.
+/// A diamond with a tail towards the traffic that the sign addresses.
 void paint_sign(GroundPen& pen, const Sign& sign) {
-  const Vec2 place = sign.position_m.xy();
+  const Vec2 position = sign.position_m.xy();
   const double radius_m = pen.at_least(0.7, 3);
-  if (!pen.sees(place, static_cast<float>(3 * radius_m))) return;
-  const Vec2 tail = place - direction(sign.heading_rad) * static_cast<float>(2.6 * radius_m);
-  pen.line(place, tail, pen.at_least(0.15, 0.8), kSignInk);
-  sign_path(pen.context(), place.x, place.y, radius_m);
+  if (!pen.is_visible(position, static_cast<float>(3 * radius_m))) return;
+  const Vec2 tail = position - direction(sign.heading_rad) * static_cast<float>(2.6 * radius_m);
+  pen.line(position, tail, pen.at_least(0.15, 0.8), kSignInk);
+  sign_path(pen.context(), position.x, position.y, radius_m);
   pen.canvas().set_color(kSignInk);
   cairo_fill_preserve(pen.context());
   pen.canvas().set_color(hex(0xFFFFFF));
@@ -105,12 +105,12 @@ void paint_sign(GroundPen& pen, const Sign& sign) {
   cairo_stroke(pen.context());
 }
 
-/// On the side that the light or sign does not face, where nothing else of it is drawn.
-void paint_name(GroundPen& pen, Vec2 place, Vec2 facing, const std::string& name, Rgb color) {
-  if (!pen.sees(place, 1)) return;
-  const Vec2 beside = place - facing * static_cast<float>(11 / pen.px_per_m());
+/// On the back of the light or sign, where nothing else of it is drawn.
+void paint_name(GroundPen& pen, Vec2 position, Vec2 facing, const std::string& name, Rgb color) {
+  if (!pen.is_visible(position, 1)) return;
+  const Vec2 behind = position - facing * static_cast<float>(11 / pen.px_per_m());
   const Align align = facing.x > 0.4f ? Align::right : (facing.x < -0.4f ? Align::left : Align::center);
-  pen.label(beside, name, {.size_px = 10, .bold = true, .align = align, .color = color});
+  pen.label(behind, name, {.size_px = 10, .bold = true, .align = align, .color = color});
 }
 
 }  // namespace
@@ -134,7 +134,7 @@ void paint_details(const RoadMap& map, Canvas& canvas, Vec2 left_top_m, double p
         if (lane.type == LaneType::driving || lane.type == LaneType::ramp) paint_arrows(pen, map, lane);
       }
     }
-    for (const TrafficLight& light : map.lights) paint_light_reach(pen, light);
+    for (const TrafficLight& light : map.lights) paint_light_angle(pen, light);
   }
   for (const TrafficLight& light : map.lights) {
     paint_light(canvas, light, left_top_m, px_per_m, phase_color(light.phase));

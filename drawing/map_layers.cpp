@@ -11,7 +11,7 @@ namespace pictura {
 
 namespace {
 
-Aabb2 nothing() {
+Aabb2 empty_box() {
   constexpr float kFar = std::numeric_limits<float>::max();
   return {{kFar, kFar}, {-kFar, -kFar}};
 }
@@ -22,7 +22,7 @@ void grow(Aabb2* box_inout, Vec2 p, float margin) {
 }
 
 Aabb2 box_of(Span<const LanePoint> points) {
-  Aabb2 box = nothing();
+  Aabb2 box = empty_box();
   for (const LanePoint& point : points) grow(&box, point.position_m.xy(), 0.5f * point.width_m);
   return box;
 }
@@ -51,7 +51,7 @@ int layer_of(LaneType type) {
 }  // namespace
 
 Aabb2 bounds_of(const RoadMap& map) {
-  Aabb2 box = nothing();
+  Aabb2 box = empty_box();
   for (const Lane& lane : map.lanes) {
     const Aabb2 of_lane = box_of(map.points_of(lane));
     grow(&box, of_lane.low, 0);
@@ -121,15 +121,15 @@ GroundPen::~GroundPen() { cairo_restore(context()); }
 
 double GroundPen::at_least(double metres, double min_px) const { return std::max(metres, min_px / px_per_m_); }
 
-bool GroundPen::sees(const Aabb2& box) const {
+bool GroundPen::is_visible(const Aabb2& box) const {
   return box.low.x <= visible_.high.x && visible_.low.x <= box.high.x && box.low.y <= visible_.high.y &&
          visible_.low.y <= box.high.y;
 }
 
-bool GroundPen::sees(Vec2 place, float margin_m) const {
-  Aabb2 box = nothing();
-  grow(&box, place, margin_m);
-  return sees(box);
+bool GroundPen::is_visible(Vec2 position, float margin_m) const {
+  Aabb2 box = empty_box();
+  grow(&box, position, margin_m);
+  return is_visible(box);
 }
 
 void GroundPen::line(Vec2 a, Vec2 b, double width_m, Rgb color, double alpha) {
@@ -147,11 +147,11 @@ void GroundPen::disk(Vec2 center, double radius_m, Rgb color, double alpha) {
   cairo_fill(context());
 }
 
-void GroundPen::label(Vec2 place, const std::string& words, const TextStyle& style) {
+void GroundPen::label(Vec2 position, const std::string& words, const TextStyle& style) {
   cairo_save(context());
   cairo_identity_matrix(context());
-  canvas_.text((place.x - left_top_m_.x) * px_per_m_, (left_top_m_.y - place.y) * px_per_m_ + 0.35 * style.size_px,
-               words, style);
+  canvas_.text((position.x - left_top_m_.x) * px_per_m_,
+               (left_top_m_.y - position.y) * px_per_m_ + 0.35 * style.size_px, words, style);
   cairo_restore(context());
 }
 
@@ -160,7 +160,7 @@ MapLayers::MapLayers(const RoadMap& map) : map_(map) {
     lane_boxes_.push_back(box_of(map.points_of(map.lanes[i])));
     lanes_in_order_.push_back(static_cast<int32_t>(i));
   }
-  // What lies higher covers what lies lower, in steps of a storey; bridges thus show above the road that they cross.
+  // Higher storeys cover lower ones, so that bridges are drawn above the road that they cross.
   const auto storey = [&](int32_t lane) {
     return std::floor((map.points_of(map.lanes[static_cast<size_t>(lane)])[0].position_m.z + 2.0f) / 4.0f);
   };
@@ -170,7 +170,7 @@ MapLayers::MapLayers(const RoadMap& map) : map_(map) {
     return layer_of(map.lanes[static_cast<size_t>(a)].type) < layer_of(map.lanes[static_cast<size_t>(b)].type);
   });
   for (const Marking& marking : map.markings) {
-    Aabb2 box = nothing();
+    Aabb2 box = empty_box();
     for (int32_t i = marking.points.begin; i < marking.points.end; ++i) {
       grow(&box, map.marking_points[static_cast<size_t>(i)].xy(), 0.5f);
     }
@@ -190,7 +190,7 @@ void MapLayers::paint(Canvas& canvas, Vec2 left_top_m, double px_per_m) const {
 void MapLayers::paint_lanes(GroundPen& pen) const {
   cairo_t* context = pen.context();
   for (const int32_t index : lanes_in_order_) {
-    if (!pen.sees(lane_boxes_[static_cast<size_t>(index)])) continue;
+    if (!pen.is_visible(lane_boxes_[static_cast<size_t>(index)])) continue;
     const Lane& lane = map_.lanes[static_cast<size_t>(index)];
     const Span<const LanePoint> points = map_.points_of(lane);
     cairo_new_path(context);
@@ -199,7 +199,7 @@ void MapLayers::paint_lanes(GroundPen& pen) const {
     cairo_close_path(context);
     pen.canvas().set_color(lane_color(lane.type));
     cairo_fill_preserve(context);
-    // A hair wider than the lane, so that neighbours leave no seam.
+    // Slightly wider than the lane, so that neighbours leave no seam.
     cairo_set_line_width(context, pen.at_least(0.1, 0.7));
     cairo_stroke(context);
   }
@@ -208,7 +208,7 @@ void MapLayers::paint_lanes(GroundPen& pen) const {
 void MapLayers::paint_parking_spaces(GroundPen& pen) const {
   cairo_t* context = pen.context();
   for (const ParkingSpace& space : map_.parking_spaces) {
-    if (!pen.sees(space.center_m.xy(), 0.5f * (space.length_m + space.width_m))) continue;
+    if (!pen.is_visible(space.center_m.xy(), 0.5f * (space.length_m + space.width_m))) continue;
     cairo_save(context);
     cairo_translate(context, space.center_m.x, space.center_m.y);
     cairo_rotate(context, space.heading_rad);
@@ -238,7 +238,7 @@ void MapLayers::paint_crosswalk(GroundPen& pen, const Crosswalk& crosswalk) cons
       along = side * (1.0f / longest);
     }
   }
-  if (!pen.sees(center, longest)) return;
+  if (!pen.is_visible(center, longest)) return;
   cairo_save(context);
   cairo_new_path(context);
   for (int32_t i = 0; i < count; ++i) pen.line_to(corner(i));
@@ -262,7 +262,7 @@ void MapLayers::paint_crosswalk(GroundPen& pen, const Crosswalk& crosswalk) cons
 void MapLayers::paint_markings(GroundPen& pen) const {
   cairo_t* context = pen.context();
   for (size_t i = 0; i < map_.markings.size(); ++i) {
-    if (!pen.sees(marking_boxes_[i])) continue;
+    if (!pen.is_visible(marking_boxes_[i])) continue;
     const Marking& marking = map_.markings[i];
     cairo_new_path(context);
     for (int32_t p = marking.points.begin; p < marking.points.end; ++p)
@@ -282,10 +282,10 @@ void MapLayers::paint_road_edges(GroundPen& pen) const {
   cairo_set_line_width(context, pen.at_least(0.15, 0.7));
   cairo_set_line_cap(context, CAIRO_LINE_CAP_ROUND);
   for (const RoadEdge& edge : map_.road_edges) {
-    Aabb2 box = nothing();
+    Aabb2 box = empty_box();
     grow(&box, edge.a_m.xy(), 0);
     grow(&box, edge.b_m.xy(), 0);
-    if (!pen.sees(box)) continue;
+    if (!pen.is_visible(box)) continue;
     pen.move_to(edge.a_m.xy());
     pen.line_to(edge.b_m.xy());
   }
@@ -298,12 +298,12 @@ void paint_light(Canvas& canvas, const TrafficLight& light, Vec2 left_top_m, dou
   cairo_set_line_cap(context, CAIRO_LINE_CAP_BUTT);
   pen.line(light.stop_a_m.xy(), light.stop_b_m.xy(), pen.at_least(0.7, 2.6), color);
   const double radius = pen.at_least(0.6, 2.2);
-  const Vec2 beak = light.head_facing * static_cast<float>(2.6 * radius);
+  const Vec2 pointer = light.head_facing * static_cast<float>(2.6 * radius);
   const Vec2 left = left_normal(light.head_facing) * static_cast<float>(radius);
   const Vec2 head = light.head_m.xy();
   const Rgb housing = hex(0x1E2126);
   pen.move_to(head + left);
-  pen.line_to(head + beak);
+  pen.line_to(head + pointer);
   pen.line_to(head - left);
   cairo_close_path(context);
   canvas.set_color(housing);

@@ -24,11 +24,11 @@ Rgb lane_color(LaneType type);
 /// Colour of a painted line from above.
 Rgb paint_color(MarkColor color);
 
-/// Colours of a junction's phases, as stop lines and heads show them where no state is known.
+/// Colours of a junction's phases, for stop lines and heads without a known state.
 Rgb phase_color(int phase);
 
-/// Draws on a canvas in the map's metres: its top left pixel shows left_top_m, north is up. The canvas's own units come
-/// back when it goes away.
+/// Draws on a canvas in the map's metres: its top left pixel shows left_top_m, north is up. The destructor restores the
+/// canvas's units.
 class GroundPen {
  public:
   GroundPen(Canvas& canvas, Vec2 left_top_m, double px_per_m);
@@ -41,16 +41,16 @@ class GroundPen {
   double px_per_m() const { return px_per_m_; }
   /// The larger of a size in metres and one in pixels, in metres.
   double at_least(double metres, double min_px) const;
-  /// Whether something with this bounding box touches the canvas.
-  bool sees(const Aabb2& box) const;
-  bool sees(Vec2 place, float margin_m) const;
+  /// Whether the bounding box touches the canvas.
+  bool is_visible(const Aabb2& box) const;
+  bool is_visible(Vec2 position, float margin_m) const;
 
   void move_to(Vec2 p) { cairo_move_to(context(), p.x, p.y); }
   void line_to(Vec2 p) { cairo_line_to(context(), p.x, p.y); }
   void line(Vec2 a, Vec2 b, double width_m, Rgb color, double alpha = 1);
   void disk(Vec2 center, double radius_m, Rgb color, double alpha = 1);
-  /// Text around a place, in pixels whatever the scale.
-  void label(Vec2 place, const std::string& words, const TextStyle& style);
+  /// Text at a position, sized in pixels at any scale.
+  void label(Vec2 position, const std::string& words, const TextStyle& style);
 
  private:
   Canvas& canvas_;
@@ -64,7 +64,7 @@ class MapLayers {
  public:
   explicit MapLayers(const RoadMap& map);
 
-  /// The top left pixel of the canvas shows left_top_m; only what touches the canvas is painted.
+  /// The top left pixel of the canvas shows left_top_m; layers outside the canvas are skipped.
   void paint(Canvas& canvas, Vec2 left_top_m, double px_per_m) const;
 
  private:
@@ -75,12 +75,12 @@ class MapLayers {
   void paint_road_edges(GroundPen& pen) const;
 
   const RoadMap& map_;
-  std::vector<int32_t> lanes_in_order_;  // those drawn first come first
+  std::vector<int32_t> lanes_in_order_;  // in drawing order
   std::vector<Aabb2> lane_boxes_;        // [lanes]
   std::vector<Aabb2> marking_boxes_;     // [markings]
 };
 
-/// A light's stop line and head: the line in `color`, the head as a disk with a beak towards those it is meant for.
+/// A light's stop line and head: the line in `color`, the head as a disk with a pointer towards its traffic.
 void paint_light(Canvas& canvas, const TrafficLight& light, Vec2 left_top_m, double px_per_m, Rgb color);
 
 }  // namespace pictura

@@ -19,14 +19,14 @@ namespace {
 constexpr Rgb kPanelColor = hex(0xFFFFFF), kPanelLine = hex(0xC9CCC4);
 constexpr Rgb kQuietText = hex(0x5A6068), kInk = hex(0x22262B);
 
-/// Sizes that grow with the picture.
+/// Sizes that scale with the picture.
 struct Metrics {
   double unit;  // 1 for a picture of 1600 px
   double px(double at_1600) const { return std::max(1.0, at_1600 * unit); }
 };
 
 struct LegendEntry {
-  std::string words;
+  std::string label;
   Rgb color;
   enum Shape { area, frame, bars, line, light, sign } shape;
 };
@@ -39,7 +39,7 @@ bool has_markings_of(const RoadMap& map, MarkColor color) {
   return std::any_of(map.markings.begin(), map.markings.end(), [&](const Marking& m) { return m.color == color; });
 }
 
-/// Everything that the picture of this map shows, and nothing else.
+/// An entry for each kind of element that the map has.
 std::vector<LegendEntry> legend_of(const RoadMap& map) {
   std::vector<LegendEntry> entries;
   for (int i = 0; i <= static_cast<int>(LaneType::other); ++i) {
@@ -51,8 +51,8 @@ std::vector<LegendEntry> legend_of(const RoadMap& map) {
     if (!has_markings_of(map, color)) continue;
     entries.push_back({fmt::format("{} line", to_string(color)), paint_color(color), LegendEntry::line});
   }
-  const auto add_if = [&](bool used, const char* words, Rgb color, LegendEntry::Shape shape) {
-    if (used) entries.push_back({words, color, shape});
+  const auto add_if = [&](bool used, const char* label, Rgb color, LegendEntry::Shape shape) {
+    if (used) entries.push_back({label, color, shape});
   };
   add_if(!map.stop_lines.empty(), "painted stop line", kStopLineInk, LegendEntry::line);
   add_if(!map.crosswalks.empty(), "crosswalk", paint_color(MarkColor::white), LegendEntry::bars);
@@ -68,14 +68,14 @@ std::vector<LegendEntry> legend_of(const RoadMap& map) {
   return entries;
 }
 
-/// The legend broken into rows that fit a width.
+/// The legend in rows that fit a width.
 class Legend {
  public:
   Legend(const RoadMap& map, const Metrics& m, double width_px) : m_(m) {
     const Canvas measure(1, 1, kPanelColor);
     double x = m.px(24);
     for (const LegendEntry& entry : legend_of(map)) {
-      const double width = m.px(20) + m.px(7) + measure.text_width(entry.words, style());
+      const double width = m.px(20) + m.px(7) + measure.text_width(entry.label, style());
       if (x + width > width_px - m.px(16) && x > m.px(24)) {
         x = m.px(24);
         ++last_row_;
@@ -91,7 +91,7 @@ class Legend {
     for (const Placed& placed : placed_) {
       const double y = first_baseline + placed.row * m_.px(24), middle = y - m_.px(4.5), sample = m_.px(20);
       draw_sample(canvas, placed.entry, placed.x, middle, sample);
-      canvas.text(placed.x + sample + m_.px(7), y, placed.entry.words, style());
+      canvas.text(placed.x + sample + m_.px(7), y, placed.entry.label, style());
     }
   }
 
@@ -107,7 +107,7 @@ class Legend {
   void draw_sample(Canvas& canvas, const LegendEntry& entry, double x, double middle, double width) const {
     const double top = middle - m_.px(6), height = m_.px(12);
     cairo_t* context = canvas.context();
-    // Paint is shown on the colour of a road.
+    // Paint is drawn on the colour of a road.
     if (entry.shape == LegendEntry::line || entry.shape == LegendEntry::bars || entry.shape == LegendEntry::frame) {
       canvas.fill_rectangle(x, top, width, height, lane_color(LaneType::driving));
     }
@@ -141,7 +141,7 @@ class Legend {
   std::vector<Placed> placed_;
 };
 
-/// What the picture shows and where: sizes in pixels, the map below a band for its name and legend.
+/// The picture's layout: sizes in pixels, the map below a band for its name and legend.
 struct Layout {
   Metrics m;
   Legend legend;
@@ -182,13 +182,15 @@ Layout layout_of(const RoadMap& map, const MapPictureOptions& options) {
   const double margin = m.px(28), strip = m.px(36);  // the strip below is the scale bar's
   const double width_m = std::max(1.0f, shown.high.x - shown.low.x),
                height_m = std::max(1.0f, shown.high.y - shown.low.y);
-  // The longer side of the whole picture, band included, is size_px; a narrow map still gets room for its title. The
-  // band's height depends on the width, and the width on the band's height: a wider picture needs no more rows.
+  // The longer side of the whole picture, band included, is size_px; a narrow map is still wide enough for its title.
+  // The band's height depends on the width, and the width on the band's height: a wider picture needs no more rows.
   const auto width_at = [&](double px_per_m) {
     return std::clamp(static_cast<int>(std::ceil(width_m * px_per_m + 2 * margin)), size_px * 3 / 5, size_px);
   };
-  const double room = size_px - 2 * margin;
-  const auto scale_below = [&](double band) { return std::min(room / width_m, (room - band - strip) / height_m); };
+  const double available = size_px - 2 * margin;
+  const auto scale_below = [&](double band) {
+    return std::min(available / width_m, (available - band - strip) / height_m);
+  };
   Legend legend(map, m, width_at(scale_below(m.px(96))));
   double band = m.px(64) + legend.height_px();
   legend = Legend(map, m, width_at(scale_below(band)));
@@ -207,7 +209,7 @@ Layout layout_of(const RoadMap& map, const MapPictureOptions& options) {
 
 void draw_scale_bar(Canvas& canvas, const Layout& layout) {
   const Metrics& m = layout.m;
-  // The longest round length that takes at most a fifth of the width.
+  // The longest round length of at most a fifth of the width.
   const double max_m = 0.2 * canvas.width_px() / layout.px_per_m;
   const double power = std::pow(10.0, std::floor(std::log10(max_m)));
   const double length_m = max_m >= 5 * power ? 5 * power : (max_m >= 2 * power ? 2 * power : power);

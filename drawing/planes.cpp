@@ -22,7 +22,7 @@ constexpr Rgb kClassColors[] = {{},
                                 kCrosswalkColor,
                                 kStopLineColor};
 
-// Neighbouring numbers get hues far apart: steps of the golden ratio around the circle.
+// Consecutive numbers get distant hues: steps of the golden ratio around the circle.
 Rgb hue_of(int instance) {
   const float hue = 6 * std::fmod(0.61803399f * static_cast<float>(instance), 1.0f);
   auto channel = [&](float shift) {
@@ -32,7 +32,7 @@ Rgb hue_of(int instance) {
   return {channel(0), channel(4), channel(2)};
 }
 
-// Darker with range, and never the black of nothing.
+// Darker with range, but never black, which means nothing.
 Rgb grey_of(float depth_m) {
   const float value = clamp(1.0f - depth_m / kVisibleRange_m, 1.0f / 255, 1.0f);
   return {value, value, value};

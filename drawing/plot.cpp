@@ -25,15 +25,15 @@ struct Range {
     low = std::min(low, value);
     high = std::max(high, value);
   }
-  /// Never empty, with a little air; that around a lone value is told.
-  Range padded(double share, double lone_air) const {
+  /// Padded by a share of its size, or by single_padding around a single value; never empty.
+  Range padded(double share, double single_padding) const {
     if (!(low <= high)) return {0, 1};
-    const double air = high > low ? share * (high - low) : lone_air;
-    return {low - air, high + air};
+    const double padding = high > low ? share * (high - low) : single_padding;
+    return {low - padding, high + padding};
   }
 };
 
-/// "1.5M", "20k", "0.02": as many decimals as the step between ticks asks for.
+/// "1.5M", "20k", "0.02": as many decimals as the step between ticks needs.
 std::string tick_text(double value, double step) {
   const double magnitude = std::max(std::abs(value), step);
   double unit = 1;
@@ -68,9 +68,9 @@ class Axis {
   explicit Axis(AxisScale scale) : scale_(scale) {}
   bool shows(double value) const { return std::isfinite(value) && (scale_ == AxisScale::linear || value > 0); }
   void add(double value) { range_.add(scaled(value)); }
-  /// Spreads the values added, with a little air, from one place to another.
-  void place(double air, double low_px, double high_px) {
-    range_ = range_.padded(air, scale_ == AxisScale::linear ? std::max(0.5 * std::abs(range_.low), 0.5) : 1.0);
+  /// Maps the range of the added values, padded by a share of it, to [low_px, high_px].
+  void set_pixels(double padding, double low_px, double high_px) {
+    range_ = range_.padded(padding, scale_ == AxisScale::linear ? std::max(0.5 * std::abs(range_.low), 0.5) : 1.0);
     low_px_ = low_px;
     high_px_ = high_px;
   }
@@ -100,19 +100,19 @@ class Axis {
   double low_px_ = 0, high_px_ = 1;
 };
 
-/// Where a box of that size covers least of the lines: one of the four corners of the plot.
-struct Place {
+struct Point {
   double x, y;
 };
-Place emptiest_corner(const std::vector<Place>& points, Place top_left, double width, double height, double box_width,
+/// The corner of the plot in which a box of that size covers the fewest points.
+Point emptiest_corner(const std::vector<Point>& points, Point top_left, double width, double height, double box_width,
                       double box_height) {
-  constexpr double kAir_px = 8;
-  const double left = top_left.x + kAir_px, right = top_left.x + width - box_width - kAir_px;
-  const double top = top_left.y + kAir_px, bottom = top_left.y + height - box_height - kAir_px;
-  Place best{right, top};
+  constexpr double kPadding_px = 8;
+  const double left = top_left.x + kPadding_px, right = top_left.x + width - box_width - kPadding_px;
+  const double top = top_left.y + kPadding_px, bottom = top_left.y + height - box_height - kPadding_px;
+  Point best{right, top};
   long fewest = std::numeric_limits<long>::max();
-  for (const Place corner : {Place{right, top}, Place{left, top}, Place{right, bottom}, Place{left, bottom}}) {
-    const long covered = std::count_if(points.begin(), points.end(), [&](const Place& p) {
+  for (const Point corner : {Point{right, top}, Point{left, top}, Point{right, bottom}, Point{left, bottom}}) {
+    const long covered = std::count_if(points.begin(), points.end(), [&](const Point& p) {
       return p.x >= corner.x && p.x <= corner.x + box_width && p.y >= corner.y && p.y <= corner.y + box_height;
     });
     if (covered < fewest) {
@@ -123,19 +123,19 @@ Place emptiest_corner(const std::vector<Place>& points, Place top_left, double w
   return best;
 }
 
-/// Adds places along the line from the last one to another.
-void add_line(std::vector<Place>* places_inout, Place to) {
+/// Adds points along the line from the last one to another.
+void add_line(std::vector<Point>* points_inout, Point to) {
   constexpr double kStep_px = 4;
-  const Place from = places_inout->back();
+  const Point from = points_inout->back();
   const int steps = 1 + static_cast<int>(std::hypot(to.x - from.x, to.y - from.y) / kStep_px);
   for (int i = 1; i <= steps; ++i) {
     const double share = static_cast<double>(i) / steps;
-    places_inout->push_back({from.x + share * (to.x - from.x), from.y + share * (to.y - from.y)});
+    points_inout->push_back({from.x + share * (to.x - from.x), from.y + share * (to.y - from.y)});
   }
 }
 
-/// `points`: places along all lines of the panel, in pixels.
-void draw_legend(Canvas& canvas, const PlotPanel& panel, const std::vector<Place>& points, Place top_left, double width,
+/// `points`: along all lines of the panel, in pixels.
+void draw_legend(Canvas& canvas, const PlotPanel& panel, const std::vector<Point>& points, Point top_left, double width,
                  double height) {
   const TextStyle style{.size_px = 12, .color = hex(0x22262B)};
   double widest = 0;
@@ -170,8 +170,8 @@ void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, do
   }
   const double left = x0 + kLeft_px, top = y0 + kTop_px;
   const double width = width_px - kLeft_px - kRight_px, height = height_px - kTop_px - kBottom_px;
-  x_axis.place(0.0, left, left + width);
-  y_axis.place(0.06, top + height, top);
+  x_axis.set_pixels(0.0, left, left + width);
+  y_axis.set_pixels(0.06, top + height, top);
   cairo_t* context = canvas.context();
 
   canvas.text(x0 + 0.5 * (kLeft_px + width_px - kRight_px), y0 + 24, panel.title,
@@ -200,7 +200,7 @@ void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, do
   cairo_set_line_width(context, 2);
   cairo_set_line_join(context, CAIRO_LINE_JOIN_ROUND);
   cairo_set_line_cap(context, CAIRO_LINE_CAP_ROUND);
-  std::vector<Place> along;
+  std::vector<Point> along;
   for (size_t s = 0; s < panel.series.size(); ++s) {
     const PlotSeries& series = panel.series[s];
     canvas.set_color(kSeriesColors[s % kSeriesColors.size()]);
@@ -209,7 +209,7 @@ void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, do
         cairo_stroke(context);
         continue;
       }
-      const Place at{x_axis.at_px(series.x[i]), y_axis.at_px(series.y[i])};
+      const Point at{x_axis.at_px(series.x[i]), y_axis.at_px(series.y[i])};
       const bool starts = i == 0 || !drawable(series, i - 1);
       const bool alone = starts && (i + 1 == series.x.size() || !drawable(series, i + 1));
       if (starts) {

@@ -14,7 +14,7 @@ enum class AxisScale { linear, binary, decimal };
 /// One line; points that are not finite, or not above 0 on a logarithmic axis, leave a gap.
 struct PlotSeries {
   std::string name;
-  std::vector<double> x, y;  // equally many
+  std::vector<double> x, y;  // of equal length
 };
 
 struct PlotPanel {
@@ -29,9 +29,9 @@ struct PlotOptions {
   std::string title;
 };
 
-/// Panels in rows of options.columns, with axes, ticks at round numbers, a grid and a legend where there is more than
-/// one series. Throws Error when there is no panel, a series has unequal x and y, or a panel is not of 160x140 to
-/// 8192x8192 px.
+/// Panels in rows of options.columns, with axes, ticks at round numbers, a grid and a legend if there is more than one
+/// series. Throws Error if there is no panel, a series has unequal x and y, or a panel is not of 160x140 to 8192x8192
+/// px.
 RgbImage draw_plots(const std::vector<PlotPanel>& panels, const PlotOptions& options = {});
 
 /// draw_plots() as a PNG file. Throws Error naming the path.
@@ -40,8 +40,8 @@ void draw_plots_png(const std::vector<PlotPanel>& panels, const std::string& pat
 /// Round positions for axis ticks: a step of 1, 2 or 5 times a power of ten, about `wanted` of them within [low, high].
 std::vector<double> round_ticks(double low, double high, int wanted);
 
-/// ... of a logarithmic one, from 0 < low to high: at most `wanted`, evenly spaced powers of two; 1, 2 and 5 times
-/// powers of ten, or powers of ten alone where those are too many. Those of a linear axis where there would be but one.
+/// ... of a logarithmic axis, 0 < low: at most `wanted`, evenly spaced powers of two; or 1, 2 and 5 times powers of
+/// ten, or only powers of ten if those are too many. If only one would remain, the ticks of a linear axis.
 std::vector<double> binary_ticks(double low, double high, int wanted);
 std::vector<double> decimal_ticks(double low, double high, int wanted);
 

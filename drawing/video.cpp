@@ -64,7 +64,7 @@ struct VideoWriter::Impl {
   int width_px = 0, height_px = 0;
   int64_t num_frames = 0;
   pid_t child = -1;
-  // A socket instead of a pipe: writing to one that nobody reads can be told not to raise SIGPIPE.
+  // A socket instead of a pipe, because send() can write without raising SIGPIPE when the reader has ended.
   Descriptor frames;
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> messages{nullptr, std::fclose};
 
@@ -88,7 +88,7 @@ struct VideoWriter::Impl {
     return status;
   }
 
-  /// Throws what ffmpeg said last.
+  /// Throws with ffmpeg's last line.
   [[noreturn]] void fail_with_message(int status) {
     const std::string said = last_line(messages.get());
     const std::string how = WIFSIGNALED(status) ? fmt::format("ended by signal {}", WTERMSIG(status))
@@ -111,7 +111,7 @@ void VideoWriter::Impl::start(std::vector<std::string> arguments) {
   posix_spawn_file_actions_adddup2(&actions, child_end.get(), STDIN_FILENO);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, ::fileno(messages.get()), STDERR_FILENO);
-  // A group of its own, so that ^C in a terminal leaves it to this process to finish the film.
+  // In its own process group, so that ^C in a terminal does not end ffmpeg before this process has finished the video.
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
@@ -174,7 +174,7 @@ VideoWriter::VideoWriter(const std::string& path, int width_px, int height_px, d
           : std::vector<std::string>{"-filter_complex",
                                      "split[a][b];[a]palettegen[p];[b][p]paletteuse=dither=bayer:bayer_scale=4"};
   arguments.insert(arguments.end(), format.begin(), format.end());
-  // A relative name that starts with '-' or holds ':' must not be read as an option or a protocol.
+  // A relative name that starts with '-' or contains ':' must not be read as an option or a protocol.
   arguments.push_back("file:" + temporary);
   impl_->start(std::move(arguments));
 }

@@ -19,7 +19,7 @@ constexpr int kTile_px = 512;
 constexpr size_t kMaxTiles = 160;  // 160 MiB
 constexpr Rgb kHaloColor = hex(0xFFE45C);
 
-/// Whole pixels from the place (0, 0) of the map to the top left corner of the picture.
+/// Whole pixels from the origin of the map to the top left corner of the picture.
 struct Corner {
   int x = 0, y = 0;
 };
@@ -39,7 +39,7 @@ Rgb mixed(Rgb a, Rgb b, float share_of_b) {
   return {a.r + (b.r - a.r) * share_of_b, a.g + (b.g - a.g) * share_of_b, a.b + (b.b - a.b) * share_of_b};
 }
 
-/// The colours that cameras see at the back (body) and at the front (mark); parked and halted ones fade to grey.
+/// The colours of the back (body) and the front (mark) in camera images; parked and halted agents fade to grey.
 struct AgentColors {
   Rgb body, mark;
 };
@@ -53,12 +53,12 @@ AgentColors colors_of(AgentClass agent_class, AgentStatus status) {
 
 void paint_agent(Canvas& canvas, const AgentBox& agent, AgentStatus status, Vec2 center_px, double px_per_m) {
   cairo_t* context = canvas.context();
-  // Large enough to be seen where a pixel is a metre or more.
+  // Large enough to be visible where a pixel is a metre or more.
   const double length = std::max(agent.length_m * px_per_m, 7.0), width = std::max(agent.width_m * px_per_m, 4.0);
   const AgentColors colors = colors_of(agent.agent_class, status);
   cairo_save(context);
   cairo_translate(context, center_px.x, center_px.y);
-  // Pixels point down: a heading counter-clockwise on the ground is clockwise here.
+  // The y axis of pixels points down: a counter-clockwise heading is clockwise here.
   cairo_rotate(context, -std::atan2(agent.sin_heading, agent.cos_heading));
   cairo_rectangle(context, -0.5 * length, -0.5 * width, length, width);
   canvas.set_color(colors.body);
@@ -86,7 +86,7 @@ void paint_wall(Canvas& canvas, const WallFace& wall, Vec2 left_top_m, double px
   cairo_stroke(context);
 }
 
-/// The reasons to halt, as the legend lists them; a ring shows the first that is true.
+/// The reasons to halt, in the order of the legend; a ring shows the first that applies.
 struct HaltReason {
   int events;
   const char* name;
@@ -125,10 +125,10 @@ void paint_halt(Canvas& canvas, const HaltReason& reason, Vec2 center_px, double
   cairo_stroke(context);
 }
 
-/// How many drive, and how many halted for which reason.
+/// The number of active agents, and of halted ones by reason.
 void paint_legend(Canvas& canvas, const WorldFrame& frame) {
   struct Row {
-    std::string words;
+    std::string label;
     Rgb color;
   };
   const auto count = [&frame](auto&& counts) {
@@ -152,7 +152,7 @@ void paint_legend(Canvas& canvas, const WorldFrame& frame) {
   for (size_t i = 0; i < rows.size(); ++i) {
     const double y = std::round(top + 5 + kRow_px * (static_cast<double>(i) + 0.5));
     canvas.fill_rectangle(kMargin_px + 9, y - 5, 10, 10, rows[i].color);
-    canvas.text(kMargin_px + 27, y + 4.5, rows[i].words, {.size_px = 13, .color = hex(0xFFFFFF)});
+    canvas.text(kMargin_px + 27, y + 4.5, rows[i].label, {.size_px = 13, .color = hex(0xFFFFFF)});
   }
 }
 
@@ -232,10 +232,10 @@ TopCamera WorldPainter::around(Vec2 center_m, float width_m) const {
   return {center_m, static_cast<float>(impl_->width_px) / width_m};
 }
 
-Vec2 WorldPainter::pixel_of(const TopCamera& camera, Vec2 place_m) const {
+Vec2 WorldPainter::pixel_of(const TopCamera& camera, Vec2 position_m) const {
   const Corner corner = corner_of(camera, impl_->width_px, impl_->height_px);
-  return {place_m.x * camera.px_per_m - static_cast<float>(corner.x),
-          -place_m.y * camera.px_per_m - static_cast<float>(corner.y)};
+  return {position_m.x * camera.px_per_m - static_cast<float>(corner.x),
+          -position_m.y * camera.px_per_m - static_cast<float>(corner.y)};
 }
 
 RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
@@ -259,17 +259,17 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
 
   for (const AgentGoal& goal : frame.goals) {
     const AgentBox& agent = frame.agents[static_cast<size_t>(goal.agent)];
-    paint_goal(canvas, pixel_of(camera, agent.center_m.xy()), pixel_of(camera, goal.place_m), agent.agent_class);
+    paint_goal(canvas, pixel_of(camera, agent.center_m.xy()), pixel_of(camera, goal.position_m), agent.agent_class);
   }
 
   const bool has_highlight = frame.highlighted >= 0 && static_cast<size_t>(frame.highlighted) < frame.agents.size();
   if (has_highlight) {
-    const Vec2 place = pixel_of(camera, frame.agents[static_cast<size_t>(frame.highlighted)].center_m.xy());
+    const Vec2 position = pixel_of(camera, frame.agents[static_cast<size_t>(frame.highlighted)].center_m.xy());
     const double dashes[] = {6, 5};
     cairo_set_dash(context, dashes, 2, 0);
     cairo_set_line_width(context, 2);
     canvas.set_color(kHaloColor, 0.9);
-    cairo_move_to(context, place.x, place.y);
+    cairo_move_to(context, position.x, position.y);
     for (const Vec2 waypoint : frame.waypoints_m) {
       const Vec2 p = pixel_of(camera, waypoint);
       cairo_line_to(context, p.x, p.y);
@@ -287,7 +287,7 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
     }
     const double radius =
         std::max(0.75 * frame.agents[static_cast<size_t>(frame.highlighted)].length_m * camera.px_per_m, 9.0);
-    cairo_arc(context, place.x, place.y, radius, 0, kTwoPi);
+    cairo_arc(context, position.x, position.y, radius, 0, kTwoPi);
     canvas.set_color(kHaloColor, 0.28);
     cairo_fill_preserve(context);
     canvas.set_color(kHaloColor);
@@ -298,11 +298,11 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
   for (size_t i = 0; i < frame.agents.size(); ++i) {
     const auto status = frame.status.empty() ? AgentStatus::active : static_cast<AgentStatus>(frame.status[i]);
     if (!frame.agents[i].drawn || status == AgentStatus::absent) continue;
-    const Vec2 place = pixel_of(camera, frame.agents[i].center_m.xy());
-    paint_agent(canvas, frame.agents[i], status, place, camera.px_per_m);
+    const Vec2 position = pixel_of(camera, frame.agents[i].center_m.xy());
+    paint_agent(canvas, frame.agents[i], status, position, camera.px_per_m);
     const HaltReason* reason =
         status != AgentStatus::halted || frame.halt_reason.empty() ? nullptr : reason_of(frame.halt_reason[i]);
-    if (reason) paint_halt(canvas, *reason, place, frame.agents[i].length_m * camera.px_per_m);
+    if (reason) paint_halt(canvas, *reason, position, frame.agents[i].length_m * camera.px_per_m);
   }
 
   if (!frame.halt_reason.empty()) paint_legend(canvas, frame);

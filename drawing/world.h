@@ -1,6 +1,5 @@
-// One simulated world from above: the road map, its lights as they are now, the agents as boxes, where each is headed,
-// and why some have halted. North is up. The map is drawn once, in tiles, so that a frame costs little more than its
-// agents.
+// One simulated world from above: the road map, the current lights, agents as boxes, their goals, and why some have
+// halted. North is up. The map is drawn once, in tiles, so that a frame costs little more than its agents.
 #pragma once
 
 #include <memory>
@@ -14,31 +13,31 @@
 
 namespace pictura {
 
-/// Where a picture from above looks.
+/// An orthographic camera that looks down.
 struct TopCamera {
   Vec2 center_m;
   float px_per_m = 4;
 };
 
-/// Where an agent is headed.
+/// An agent's active waypoint.
 struct AgentGoal {
   int agent = 0;  // index into WorldFrame::agents
-  Vec2 place_m;
+  Vec2 position_m;
 };
 
-/// What moves in one world; spans are read while drawing alone.
+/// The changing state of one world; spans are read only during draw().
 struct WorldFrame {
-  Span<const AgentBox> agents;      // of this world alone
+  Span<const AgentBox> agents;      // of this world
   Span<const LightState> lights;    // [map.lights]
   Span<const uint8_t> status;       // [agents] AgentStatus, or empty: all active
   Span<const uint8_t> halt_reason;  // [agents] Event bits: a ring in the colour of the reason, and a legend that counts
   Span<const AgentGoal> goals;      // a thin line leads to each
-  int highlighted = -1;             // index of an agent that gets a halo, and whose waypoints these are
+  int highlighted = -1;             // index of the agent with a halo and the waypoints below, or -1
   Span<const Vec2> waypoints_m;     // those not yet passed, nearest first
   std::string caption;              // one line at the top left, or empty
 };
 
-/// Draws frames of one size of worlds on one map, with the walls that stand there. The map must outlive it.
+/// Draws frames of one size of worlds on one map, with its walls. The map must outlive it.
 class WorldPainter {
  public:
   /// Throws Error unless both sizes are in [16, 8192] px.
@@ -50,11 +49,11 @@ class WorldPainter {
 
   /// The camera that shows the whole map, with a small margin.
   TopCamera whole_map() const;
-  /// The camera that shows width_m metres from side to side around a place, which may move from frame to frame.
+  /// The camera that shows width_m metres around a centre, which may move from frame to frame.
   TopCamera around(Vec2 center_m, float width_m) const;
 
-  /// Pixel coordinates of a place.
-  Vec2 pixel_of(const TopCamera& camera, Vec2 place_m) const;
+  /// Pixel coordinates of a position.
+  Vec2 pixel_of(const TopCamera& camera, Vec2 position_m) const;
 
   RgbImage draw(const WorldFrame& frame, const TopCamera& camera);
 
@@ -63,9 +62,9 @@ class WorldPainter {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Draws one world of a simulator whose arrays lie in host memory, with the active waypoint of everybody who drives;
-/// `followed` (a slot of that world counted from its first, or -1) is highlighted with all its waypoints and, where
-/// follow_width_m > 0, the camera stays over it.
+/// Draws one world of a simulator in host memory, with the active waypoint of each active agent; `followed` (a slot of
+/// that world counted from its first, or -1) is highlighted with all its waypoints and, if follow_width_m > 0, the
+/// camera follows it.
 RgbImage draw_world(WorldPainter& painter, Simulator& simulator, int world, int followed = -1, float follow_width_m = 0,
                     const std::string& caption = {});
 
