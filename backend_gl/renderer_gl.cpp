@@ -67,9 +67,14 @@ class GlRenderer final : public Renderer {
   /// What draws, as the driver calls it.
   const std::string& drawn_by() const { return drawn_by_; }
 
-  GeometryHandle upload(const StaticGeometry& geometry) override {
+  void upload(GeometryHandle handle, const StaticGeometry& geometry, Stream) override {
+    check_handle(name_, handle);
     check_geometry(name_, geometry);
-    return geometries_.add(geometry);
+    geometries_.upload(handle, geometry);
+  }
+  void release(GeometryHandle handle, Stream) override {
+    check_handle(name_, handle);
+    geometries_.release(handle);
   }
 
   void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override {
@@ -88,8 +93,8 @@ class GlRenderer final : public Renderer {
     }
   }
 
-  void check() override {
-    if (interop_) interop_->synchronize();
+  void check(Stream stream) override {
+    if (interop_) interop_->synchronize(stream);
   }
 
   void visibility(const SceneBatch&, Span<const View>, Span<const VisibilityQuery>, Span<float>, Stream) override {
@@ -152,7 +157,7 @@ class GlRenderer final : public Renderer {
   }
 
   void draw(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) {
-    check_scene(name_, scene, geometries_.views());
+    check_scene(name_, scene, geometries_);
     check_views(name_, scene, views);
     if (views.empty()) return;
     const gl::CurrentContext current(context_.get());
@@ -206,8 +211,8 @@ class GlRenderer final : public Renderer {
     const PinholeCamera camera = place_camera(in_ego, view);
     const GeometryHandle handle = scene.geometry[static_cast<std::size_t>(view.world)];
     faces_[static_cast<std::size_t>(layer)].gather(
-        {camera, make_frustum(camera), config_.line_floor_px, config_.debug_palette}, geometries_[handle], scene, view,
-        layer);
+        {camera, make_frustum(camera), config_.line_floor_px, config_.debug_palette}, *geometries_.find(handle), scene,
+        view, layer);
   }
 
   // Puts the faces of the first `count` images one after the other into the buffer that is drawn from.

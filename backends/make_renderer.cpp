@@ -32,7 +32,8 @@ class NullRenderer final : public Renderer {
   std::string_view name() const override { return "null"; }
   Device device() const override { return {}; }
   const RendererConfig& config() const override { return config_; }
-  GeometryHandle upload(const StaticGeometry&) override { return next_handle_++; }
+  void upload(GeometryHandle handle, const StaticGeometry&, Stream) override { check_handle(name(), handle); }
+  void release(GeometryHandle handle, Stream) override { check_handle(name(), handle); }
 
   void render(const SceneBatch&, Span<const View> views, const ImageBatch& images_out, Stream) override {
     check_images(name(), config_.rig, device(), views.size(), images_out, /*draws_f16=*/true);
@@ -60,7 +61,6 @@ class NullRenderer final : public Renderer {
 
  private:
   RendererConfig config_;
-  GeometryHandle next_handle_ = 0;
 };
 
 std::string joined(const std::vector<std::string>& names) { return fmt::format("{}", fmt::join(names, ", ")); }

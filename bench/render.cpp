@@ -47,7 +47,7 @@ class OracleCheck {
         expected_(render_case.config.rig, num_views_, render_case.format, render_case.planes) {
     const RendererConfig config{.rig = render_case.config.rig, .line_floor_px = render_case.config.line_floor_px};
     const auto oracle = make_renderer("cpu", config);
-    for (const StaticGeometry& geometry : worlds.geometries) oracle->upload(geometry);
+    upload_geometries(worlds.geometries, oracle.get());
     oracle->render(worlds.simulator->scene(), {worlds.views.data(), static_cast<std::size_t>(num_views_)},
                    expected_.batch());
   }
@@ -110,7 +110,7 @@ RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& r
   if (render_case.watches_memory) watch = std::make_unique<DeviceMemoryWatch>();
 #endif
   const auto renderer = make_renderer(render_case.backend, render_case.config, &result.choice);
-  for (const StaticGeometry& geometry : worlds.geometries) renderer->upload(geometry);
+  upload_geometries(worlds.geometries, renderer.get());
 #ifdef PICTURA_HAS_CUDA
   if (watch) result.up_front_bytes = watch->taken_bytes();
 #endif

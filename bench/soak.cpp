@@ -203,10 +203,8 @@ void compare_scene(const SoakOptions& options, const MakeRenderer& make, int64_t
   const Settings settings = draw_settings(options, scene, rigs);
   const auto renderer = make(settings.config, &result_out->choice);
   const auto oracle = make_renderer("cpu", settings.config);
-  for (const StaticGeometry& geometry : scenes->geometries()) {
-    renderer->upload(geometry);
-    oracle->upload(geometry);
-  }
+  upload_geometries(scenes->geometries(), renderer.get());
+  upload_geometries(scenes->geometries(), oracle.get());
   const ViewsOfScene seen = scenes->views(scene);
   const SceneBatch batch = scenes->batch(seen);
   compare_images(scene, batch, seen.views, settings, renderer.get(), oracle.get(), result_out);

@@ -22,17 +22,21 @@ struct RendererConfig {
   Rig rig = paper_rig();
   Device device;                // where the caller keeps scenes, views and images
   int num_threads = 0;          // host threads; 0: all
-  float line_floor_px = 0.35f;  // least width of a strip on screen, measured across it; 0 turns the floor off
+  float line_floor_px = 0.35f;  // minimum width of a strip on screen, measured across it; 0 turns the floor off
   bool debug_palette = false;   // tint halted and parked agents
   PixelSamples samples;
-  /// cuda: the most device memory that it takes beyond images, scenes and maps; what does not fit is drawn in parts.
+  /// cuda: upper bound on the device memory that it takes beyond images, scenes and maps; calls that need more are
+  /// drawn in several parts.
   std::size_t max_scratch_bytes = std::size_t{512} << 20;
 };
 
-/// An object serves one thread at a time; distinct objects are independent. A renderer on a device works on the device
-/// that was current when it was made, and shares its memory among its calls: put them on one stream, or let each wait
-/// for the one before. A captured CUDA graph holds for as long as no call is for more than was seen before (views,
-/// agents, maps): then capture anew.
+/// An object serves one thread at a time; distinct objects are independent.
+///
+/// A renderer on a CUDA device makes that device current in each call and restores the caller's. Its calls return when
+/// their work is on the stream, and share the renderer's memory: put them on one stream, or make each wait for the one
+/// before. A call whose sizes are within those of an earlier call, or of reserve(), neither allocates nor waits, and
+/// can be captured into a CUDA graph; the graph is valid for as long as generation() does not change. What kernels find
+/// wrong with a scene is latched: poll(), check() or the next call throws it.
 class Renderer {
  public:
   virtual ~Renderer() = default;
@@ -45,33 +49,41 @@ class Renderer {
   virtual Device device() const = 0;
   virtual const RendererConfig& config() const = 0;
 
-  /// Takes a copy of a map's geometry; the handle names it in SceneBatch::geometry and is valid for the object's life.
-  virtual GeometryHandle upload(const StaticGeometry& geometry) = 0;
+  /// Copies a map's geometry. The caller chooses the handle, in [0, kNumGeometryHandles), that names it in
+  /// SceneBatch::geometry, so that one scene serves several renderers; what the handle held before is replaced for the
+  /// calls that follow. Waits for the stream. Throws Error where the handle or the geometry is invalid.
+  virtual void upload(GeometryHandle handle, const StaticGeometry& geometry, Stream stream = {}) = 0;
+  /// Frees a handle after the calls before; nothing happens where it holds nothing. Its memory may be kept for maps
+  /// that are uploaded later.
+  virtual void release(GeometryHandle handle, Stream stream = {}) = 0;
 
-  /// Draws every camera of the rig for every view: each pixel of `images_out` is written. Throws Error when a span lies
-  /// in the wrong memory space, a handle or index is out of range, or the images do not fit the rig and views. What
-  /// only a device can see is wrong with a scene there, the next call throws, or check(); such views are black.
+  /// Allocates what calls of up to so many views, of scenes of up to so many boxes in all worlds, need with the maps
+  /// that are uploaded now. May wait for the device. Renderers on the host allocate as they draw.
+  virtual void reserve(int /*max_views*/, int /*max_boxes*/) {}
+  /// How often memory that calls use has moved; captured graphs of an earlier generation are stale. 0 on the host.
+  virtual uint64_t generation() const { return 0; }
+
+  /// Draws every camera of the rig for every view and writes each pixel of `images_out`. Throws Error where an array
+  /// lies on the wrong device, a handle or an index is out of range, or the images do not fit the rig and the views.
+  /// On a CUDA device a wrong handle, index or pose is a latched fault, and the images of that view are black.
   virtual void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out,
                       Stream stream = {}) = 0;
-
-  /// Waits until everything asked for is done; throws Error where a device found a fault since the last call that
-  /// threw.
-  virtual void check() {}
 
   /// For each query: coverage of the agent in the view's images over its coverage when drawn alone, summed over the
   /// cameras, in [0, 1]; NaN where it is in no camera's frame. `visibility_out` has the queries' length.
   virtual void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
                           Span<float> visibility_out, Stream stream = {}) = 0;
+
+  /// Throws Error where a latched fault has reached the host; does not wait.
+  virtual void poll() {}
+  /// Waits for the work on this stream, then polls.
+  virtual void check(Stream /*stream*/ = {}) {}
 };
 
-/// Uploads geometries to a new renderer, so that handles equal their indices.
+/// Uploads geometries to the handles 0, 1, ...
 inline void upload_geometries(Span<const StaticGeometry> geometries, Renderer* renderer_out) {
-  GeometryHandle expected = 0;
-  for (const StaticGeometry& geometry : geometries) {
-    const GeometryHandle handle = renderer_out->upload(geometry);
-    PICTURA_CHECK(handle == expected++, "renderer {}: expected handle {}, got {}", renderer_out->name(), expected - 1,
-                  handle);
-  }
+  GeometryHandle handle = 0;
+  for (const StaticGeometry& geometry : geometries) renderer_out->upload(handle++, geometry);
 }
 
 }  // namespace pictura

@@ -74,8 +74,9 @@ struct AgentBox {
   uint8_t padding = 0;
 };
 
-/// Index of a StaticGeometry in the renderer that it was uploaded to.
+/// Names a StaticGeometry in renderers; chosen by whoever uploads it, in [0, kNumGeometryHandles).
 using GeometryHandle = int32_t;
+constexpr GeometryHandle kNumGeometryHandles = 1 << 16;
 
 /// Agents of one world that a scene may hold: as many as a simulator steps, and as many parked cars.
 constexpr int kMaxBoxesPerWorld = 8192;

@@ -77,7 +77,7 @@ std::unique_ptr<Renderer> make_policy_renderer(const Config& config, const Rig& 
   renderer_config.num_threads = config.run.num_threads;
   renderer_config.line_floor_px = static_cast<float>(config.render.line_floor_px);
   std::unique_ptr<Renderer> renderer = make_renderer(config.run.backend, renderer_config);
-  for (const StaticGeometry& geometry : simulator.geometries()) renderer->upload(geometry);
+  upload_geometries(simulator.geometries(), renderer.get());
   return renderer;
 }
 

@@ -26,14 +26,19 @@ class CpuRenderer final : public Renderer {
   Device device() const override { return {}; }
   const RendererConfig& config() const override { return config_; }
 
-  GeometryHandle upload(const StaticGeometry& geometry) override {
+  void upload(GeometryHandle handle, const StaticGeometry& geometry, Stream) override {
+    check_handle(name(), handle);
     check_geometry(name(), geometry);
-    return geometries_.add(geometry);
+    geometries_.upload(handle, geometry);
+  }
+  void release(GeometryHandle handle, Stream) override {
+    check_handle(name(), handle);
+    geometries_.release(handle);
   }
 
   void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream) override {
     check_images(name(), config_.rig, device(), views.size(), images_out, /*draws_f16=*/true);
-    check_scene(name(), scene, geometries_.views());
+    check_scene(name(), scene, geometries_);
     check_views(name(), scene, views);
     const std::size_t num_cameras = cameras_.size();
     parallel_for(num_threads(), static_cast<int64_t>(views.size() * num_cameras), [&](int64_t image) {
@@ -47,7 +52,7 @@ class CpuRenderer final : public Renderer {
 
   void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
                   Span<float> visibility_out, Stream) override {
-    check_scene(name(), scene, geometries_.views());
+    check_scene(name(), scene, geometries_);
     check_views(name(), scene, views);
     check_queries(name(), scene, views, queries, visibility_out.size());
     parallel_for(num_threads(), static_cast<int64_t>(queries.size()), [&](int64_t i) {
@@ -69,7 +74,7 @@ class CpuRenderer final : public Renderer {
 
   ImageRequest request(const SceneBatch& scene, const View& view, std::size_t camera) const {
     const GeometryHandle handle = scene.geometry[static_cast<std::size_t>(view.world)];
-    return {&geometries_[handle], &scene, &view, place_camera(cameras_[camera], view), config_.line_floor_px,
+    return {geometries_.find(handle), &scene, &view, place_camera(cameras_[camera], view), config_.line_floor_px,
             config_.debug_palette};
   }
 

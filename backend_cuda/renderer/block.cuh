@@ -114,6 +114,7 @@ __device__ inline bool set_view(ViewState* state, const DrawTask& task, int32_t 
   state->light_begin = task.scene.light_begin[world];
   state->light_end = task.scene.light_begin[world + 1];
   if (state->world_end - state->world_begin > kMaxBoxesPerWorld) return fault(FaultKind::too_many_agents);
+  if (!state->geometry->is_held()) return fault(FaultKind::bad_geometry);
   if (!has_enough_lights(state->light_end - state->light_begin, state->geometry->pieces.num_signals)) {
     return fault(FaultKind::too_few_lights);
   }

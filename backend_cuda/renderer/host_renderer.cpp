@@ -23,10 +23,15 @@ class HostRendererCuda final : public Renderer {
   Device device() const override { return {}; }
   const RendererConfig& config() const override { return config_; }
 
-  GeometryHandle upload(const StaticGeometry& geometry) override {
-    renderer_->upload(geometry);
-    return geometries_.add(geometry);
+  void upload(GeometryHandle handle, const StaticGeometry& geometry, Stream stream) override {
+    renderer_->upload(handle, geometry, stream);
+    geometries_.upload(handle, geometry);
   }
+  void release(GeometryHandle handle, Stream stream) override {
+    renderer_->release(handle, stream);
+    geometries_.release(handle);
+  }
+  void reserve(int max_views, int max_boxes) override { renderer_->reserve(max_views, max_boxes); }
 
   void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override {
     const DeviceGuard guard(renderer_->device());
@@ -35,10 +40,11 @@ class HostRendererCuda final : public Renderer {
     const auto queue = static_cast<cudaStream_t>(stream.handle);
     renderer_->render(scene_.assign(scene, queue), views_.assign(views, queue), images_.like(images_out), stream);
     images_.copy_to_host(images_out, queue);
-    check();
+    check(stream);
   }
 
-  void check() override { renderer_->check(); }
+  void poll() override { renderer_->poll(); }
+  void check(Stream stream) override { renderer_->check(stream); }
 
   void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
                   Span<float> visibility_out, Stream stream) override {
@@ -53,7 +59,7 @@ class HostRendererCuda final : public Renderer {
       PICTURA_CUDA(cudaMemcpyAsync(visibility_out.data(), result.data(), result.size() * sizeof(float),
                                    cudaMemcpyDeviceToHost, queue));
     }
-    check();
+    check(stream);
   }
 
  private:
@@ -63,13 +69,13 @@ class HostRendererCuda final : public Renderer {
   }
 
   void check_input(const SceneBatch& scene, Span<const View> views) const {
-    check_scene(name(), scene, geometries_.views());
+    check_scene(name(), scene, geometries_);
     check_views(name(), scene, views);
   }
 
   RendererConfig config_;
   std::unique_ptr<Renderer> renderer_;
-  HostGeometries geometries_;  // for checks, with the device's handles
+  HostGeometries geometries_;  // for checks
   DeviceScene scene_;
   DeviceImages images_;
   DeviceCopy<View> views_;

@@ -60,11 +60,18 @@ struct PieceGrid {
   float largest_radius_m = 0;
 };
 
-/// A map's static geometry in device memory.
+/// A map's static geometry in device memory; an entry of the renderer's table by handle.
 struct DeviceGeometry {
   StaticGeometryView pieces;  // without its grids
   PieceGrid strips, walls;
+  /// False for a handle that holds no map.
+  PICTURA_HD constexpr bool is_held() const { return pieces.num_signals >= 0; }
 };
+inline DeviceGeometry empty_entry() {
+  DeviceGeometry entry;
+  entry.pieces.num_signals = -1;
+  return entry;
+}
 
 /// A fault of a view or a query: written by the kernels, thrown by the host at the next call. One word, so that it is
 /// read and written atomically.

@@ -49,9 +49,12 @@ KernelSet ahead_of_time_kernels() {
 }
 
 cudaError_t prepare_kernels(KernelSet* kernels) {
+  // Of all kernels: code that is only loaded by its first launch would be loaded while a graph is captured.
   cudaFuncAttributes attributes{};
-  const cudaError_t status = cudaFuncGetAttributes(&attributes, kernels->handle[kDraw]);
-  if (status != cudaSuccess) return status;
+  for (const void* kernel : kernels->handle) {
+    const cudaError_t status = cudaFuncGetAttributes(&attributes, kernel);
+    if (status != cudaSuccess) return status;
+  }
   // From there on kernels wait for the launch before theirs, see wait_for_earlier_launch.
   kernels->may_begin_early = attributes.ptxVersion >= 90;
   const cudaError_t allowed = allow_shared(kernels->handle[kDraw], draw_bytes());

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "pictura/backend_cuda/renderer/draw_task.h"
+#include "pictura/backend_cuda/renderer/geometry_table.h"
 #include "pictura/backend_cuda/renderer/kernel_library.h"
 #include "pictura/backend_cuda/renderer/launch.h"
 #include "pictura/backend_cuda/renderer/scratch_buffers.h"
@@ -26,44 +27,6 @@ constexpr int kLargeBlocks = 8;
 // Views that are drawn at once, at most: enough that the last images of a launch, for which few blocks are left to
 // work, do not count.
 constexpr std::size_t kViewsAtOnce = 2048;
-
-// Pieces of one kind in device memory.
-struct UploadedPieces {
-  DeviceBuffer<int32_t> begin, items;
-  DeviceBuffer<cuda::Ball> balls;
-  cuda::PieceGrid view;
-
-  explicit UploadedPieces(const cuda::PieceGrid& host)
-      : begin(host.cells.begin), items(host.cells.items), balls(host.balls), view(host) {
-    view.cells.begin = begin.span();
-    view.cells.items = items.span();
-    view.balls = balls.span();
-  }
-};
-
-// A map's looks in device memory.
-struct UploadedGeometry {
-  DeviceBuffer<Strip> strips;
-  DeviceBuffer<WallFace> walls;
-  DeviceBuffer<LightHead> heads;
-  UploadedPieces strip_pieces, wall_pieces;
-  cuda::DeviceGeometry view;
-
-  explicit UploadedGeometry(const StaticGeometry& host)
-      : strips(host.view().strips),
-        walls(host.view().walls),
-        heads(host.view().heads),
-        strip_pieces(cuda::SortedPieces(host.strips).view()),
-        wall_pieces(cuda::SortedPieces(host.walls).view()) {
-    view.pieces.strips = strips.span();
-    view.pieces.walls = walls.span();
-    view.pieces.heads = heads.span();
-    view.pieces.num_signals = host.num_signals;
-    view.strips = strip_pieces.view;
-    view.walls = wall_pieces.view;
-  }
-  int pieces() const { return static_cast<int>(strips.size() + walls.size() + heads.size()); }
-};
 
 // Scratch memory, and the largest calls that it is for.
 struct ScratchMemory {
@@ -92,21 +55,24 @@ class CudaRenderer final : public Renderer {
   Device device() const override { return config_.device; }
   const RendererConfig& config() const override { return config_; }
 
-  GeometryHandle upload(const StaticGeometry& geometry) override {
+  void upload(GeometryHandle handle, const StaticGeometry& geometry, Stream stream) override {
     const DeviceGuard guard(device());
+    check_handle(name(), handle);
     check_geometry(name(), geometry);
-    UploadedGeometry uploaded(geometry);
-    std::vector<cuda::DeviceGeometry> views;
-    for (const UploadedGeometry& each : geometries_) views.push_back(each.view);
-    views.push_back(uploaded.view);
-    DeviceBuffer<cuda::DeviceGeometry> table{Span<const cuda::DeviceGeometry>(views)};
-    geometries_.reserve(views.size());
-    // Frames in flight may read the table that is replaced here.
-    PICTURA_CUDA(cudaDeviceSynchronize());
-    geometry_views_ = std::move(table);
-    geometries_.push_back(std::move(uploaded));
-    return static_cast<GeometryHandle>(geometries_.size()) - 1;
+    geometries_.upload(handle, geometry, static_cast<cudaStream_t>(stream.handle));
   }
+  void release(GeometryHandle handle, Stream stream) override {
+    const DeviceGuard guard(device());
+    check_handle(name(), handle);
+    geometries_.release(handle, static_cast<cudaStream_t>(stream.handle));
+  }
+
+  void reserve(int max_views, int max_boxes) override {
+    const DeviceGuard guard(device());
+    check_reserved(name(), max_views, max_boxes);
+    ensure_capacity(static_cast<std::size_t>(max_boxes), static_cast<std::size_t>(max_views));
+  }
+  uint64_t generation() const override { return scratch_generation_ + geometries_.generation(); }
 
   void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override {
     const DeviceGuard guard(device());
@@ -126,10 +92,11 @@ class CudaRenderer final : public Renderer {
     }
   }
 
-  void check() override {
+  void poll() override { throw_fault(); }
+  void check(Stream stream) override {
     const DeviceGuard guard(device());
-    PICTURA_CUDA(cudaDeviceSynchronize());
-    throw_fault();
+    PICTURA_CUDA(cudaStreamSynchronize(static_cast<cudaStream_t>(stream.handle)));
+    poll();
   }
 
   void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
@@ -160,8 +127,8 @@ class CudaRenderer final : public Renderer {
                   images_total);
     ensure_capacity(scene.agents.size(), views.size());
     cuda::DrawTask task = cuda::make_draw_task(config_, cameras_, scene, views, images);
-    task.geometries = geometry_views_.data();
-    task.num_geometries = static_cast<int32_t>(geometries_.size());
+    task.geometries = geometries_.entries();
+    task.num_geometries = geometries_.num_entries();
     task.fault = fault_.device();
     scratch_.pool.serve(&task);
     task.counters = counters_.data();
@@ -181,11 +148,8 @@ class CudaRenderer final : public Renderer {
   void ensure_capacity(std::size_t agents, std::size_t views) {
     agents = std::max(scratch_.agents, std::min(agents, static_cast<std::size_t>(kMaxBoxesPerWorld)));
     views = std::max({scratch_.views, std::size_t{1}, std::min(views, kViewsAtOnce)});
-    int pieces = 0, heads = 0;
-    for (const UploadedGeometry& each : geometries_) {
-      pieces = std::max(pieces, each.pieces());
-      heads = std::max(heads, static_cast<int>(each.heads.size()));
-    }
+    const int pieces = std::max(scratch_.pieces, geometries_.max_pieces());
+    const int heads = std::max(scratch_.heads, geometries_.max_heads());
     if (agents == scratch_.agents && views == scratch_.views && pieces == scratch_.pieces && heads == scratch_.heads)
       return;
     cuda::Scratch large = cuda::large_sizes(pieces, heads, agents);
@@ -200,6 +164,7 @@ class CudaRenderer final : public Renderer {
     large.blocks = plan.large_blocks;
     // Released before it is replaced, or both would count.
     scratch_ = ScratchMemory();
+    ++scratch_generation_;
     ScratchMemory larger{agents, views, pieces, heads, plan, {}, {}};
     larger.large = cuda::LargeBuffers<DeviceBuffer>(large, large_bytes);
     larger.pool = cuda::PoolBuffers<DeviceBuffer>(cuda::pool_sizes(plan.views * cameras_.size()));
@@ -216,10 +181,10 @@ class CudaRenderer final : public Renderer {
   RendererConfig config_;
   std::vector<PinholeCamera> cameras_;  // in the ego frame
   cuda::KernelLibrary library_;         // outlives the buffers, whose release waits for the device
-  std::vector<UploadedGeometry> geometries_;
-  DeviceBuffer<cuda::DeviceGeometry> geometry_views_;
+  cuda::GeometryTable geometries_;
   int processors_ = 0;
   ScratchMemory scratch_;
+  uint64_t scratch_generation_ = 0;
   DeviceBuffer<cuda::DrawCounters> counters_{1};
   bool counters_are_clear_ = true;
   MappedValue<cuda::FaultWord> fault_;

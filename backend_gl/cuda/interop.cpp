@@ -56,9 +56,9 @@ class RuntimeInterop final : public CudaInterop {
  public:
   explicit RuntimeInterop(Device device) : device_(device) {}
   Device device() const override { return device_; }
-  void synchronize() const override {
+  void synchronize(Stream stream) const override {
     const DeviceGuard guard(device_);
-    PICTURA_CUDA(cudaDeviceSynchronize());
+    PICTURA_CUDA(cudaStreamSynchronize(static_cast<cudaStream_t>(stream.handle)));
   }
   std::unique_ptr<CudaBuffer> share(unsigned int buffer) const override {
     return std::make_unique<RegisteredBuffer>(device_, buffer);

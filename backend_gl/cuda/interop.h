@@ -43,8 +43,8 @@ class CudaInterop {
   virtual ~CudaInterop() = default;
   /// The CUDA device that all calls work on; callers need not make it current.
   virtual Device device() const = 0;
-  /// Waits for all of its work.
-  virtual void synchronize() const = 0;
+  /// Waits for the work on a stream.
+  virtual void synchronize(Stream stream) const = 0;
   /// Registers a buffer object of the current context.
   virtual std::unique_ptr<CudaBuffer> share(unsigned int buffer) const = 0;
   /// Waits for the stream and copies what lies in device memory.

@@ -322,12 +322,12 @@ Outputs draw_outputs(Renderer* renderer, const SceneOwner& scene, const std::vec
 }  // namespace
 
 Outputs draw_outputs(Renderer* renderer, const SyntheticTown& town, Planes planes) {
-  renderer->upload(town.geometry);
+  renderer->upload(0, town.geometry);
   return draw_outputs(renderer, town.scene, town.views, planes);
 }
 
 Outputs draw_outputs(Renderer* renderer, const SyntheticWorlds& worlds, Planes planes) {
-  for (const StaticGeometry& map : worlds.maps) renderer->upload(map);
+  upload_geometries(worlds.maps, renderer);
   return draw_outputs(renderer, worlds.scene, worlds.views, planes);
 }
 

@@ -65,7 +65,7 @@ void check_images(std::string_view renderer, const Rig& rig, Device device, std:
   }
 }
 
-void check_scene(std::string_view renderer, const SceneBatch& scene, Span<const StaticGeometryView> geometries) {
+void check_scene(std::string_view renderer, const SceneBatch& scene, const HostGeometries& geometries) {
   check_device(renderer, "scene", Device{}, scene.device);
   if (scene.world_begin.empty()) {
     PICTURA_CHECK(scene.agents.empty() && scene.geometry.empty(), "renderer {}: scene: no worlds, but agents or maps",
@@ -82,11 +82,11 @@ void check_scene(std::string_view renderer, const SceneBatch& scene, Span<const 
   check_ranges(renderer, "light_begin", scene.light_begin, scene.light_states.size());
   for (std::size_t world = 0; world < worlds; ++world) {
     const GeometryHandle handle = scene.geometry[world];
-    PICTURA_CHECK(handle >= 0 && static_cast<std::size_t>(handle) < geometries.size(),
-                  "renderer {}: scene: world {}: expected a geometry handle below {}, got {}", renderer, world,
-                  geometries.size(), handle);
+    const StaticGeometryView* const geometry = geometries.find(handle);
+    PICTURA_CHECK(geometry != nullptr, "renderer {}: scene: world {}: expected a handle that holds a geometry, got {}",
+                  renderer, world, handle);
     const int32_t lights = scene.light_begin[world + 1] - scene.light_begin[world];
-    const int32_t signals = geometries[static_cast<std::size_t>(handle)].num_signals;
+    const int32_t signals = geometry->num_signals;
     PICTURA_CHECK(has_enough_lights(lights, signals),
                   "renderer {}: scene: world {}: expected a light state for each of {} signals, or none, got {}",
                   renderer, world, signals, lights);
@@ -155,6 +155,18 @@ void check_queries(std::string_view renderer, const SceneBatch& scene, Span<cons
                   "renderer {}: visibility query {}: expected an agent of the view's world, {} to {}, got {}", renderer,
                   i, begin, end - 1, query.agent);
   }
+}
+
+void check_handle(std::string_view renderer, GeometryHandle handle) {
+  PICTURA_CHECK(handle >= 0 && handle < kNumGeometryHandles,
+                "renderer {}: geometry: expected a handle of 0 to {}, got {}", renderer, kNumGeometryHandles - 1,
+                handle);
+}
+
+void check_reserved(std::string_view renderer, int max_views, int max_boxes) {
+  PICTURA_CHECK(max_views >= 0 && max_boxes >= 0,
+                "renderer {}: reserve: expected 0 views and boxes or more, got {} views and {} boxes", renderer,
+                max_views, max_boxes);
 }
 
 void check_geometry(std::string_view renderer, const StaticGeometry& geometry) {

@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "pictura/common/raster/cull.h"
+#include "pictura/common/raster/host_geometries.h"
 #include "pictura/common/renderer.h"
 
 namespace pictura {
@@ -19,9 +20,9 @@ void check_images(std::string_view renderer, const Rig& rig, Device device, std:
 /// Throws Error unless the rig is valid and the line floor within the guard band; returns the configuration.
 const RendererConfig& check_config(std::string_view renderer, const RendererConfig& config);
 
-/// Throws Error unless all spans of a host scene fit together, handles name geometries, lights suffice for their
+/// Throws Error unless all spans of a host scene fit together, handles hold geometries, lights suffice for their
 /// signals, worlds are not too large, hidden agents exist, and every agent's box is finite.
-void check_scene(std::string_view renderer, const SceneBatch& scene, Span<const StaticGeometryView> geometries);
+void check_scene(std::string_view renderer, const SceneBatch& scene, const HostGeometries& geometries);
 
 /// Throws Error unless each view's world, ego and range of hidden agents exist in the (host) scene that check_scene
 /// passed, and its pose is finite.
@@ -34,6 +35,12 @@ void check_answers(std::string_view renderer, std::size_t num_queries, std::size
 /// exist, and there is room for as many answers.
 void check_queries(std::string_view renderer, const SceneBatch& scene, Span<const View> views,
                    Span<const VisibilityQuery> queries, std::size_t num_answers);
+
+/// Throws Error unless the handle is one that geometries can be uploaded to.
+void check_handle(std::string_view renderer, GeometryHandle handle);
+
+/// Throws Error unless both sizes of Renderer::reserve are 0 or more.
+void check_reserved(std::string_view renderer, int max_views, int max_boxes);
 
 /// Throws Error unless each piece is finite, has sizes of 0 or more, colours of 0 to 1, and names a signal that exists,
 /// and the grids hold all pieces.

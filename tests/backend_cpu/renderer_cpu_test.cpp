@@ -14,6 +14,7 @@
 #include "pictura/common/raster/shapes.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/image_drawing.h"
+#include "pictura/tests/support/renderer_interface.h"
 
 namespace pictura {
 namespace {
@@ -192,7 +193,7 @@ TEST(CpuRenderer, DrawsSizesFromOnePixelAndRigsOfMixedSizes) {
   rig.cameras[1] = paper_rig(97, 55).cameras[1];
   rig.cameras[2] = paper_rig(20, 200).cameras[2];
   const auto renderer = make_renderer("cpu", {.rig = rig, .num_threads = 2});
-  renderer->upload(town.geometry);
+  renderer->upload(0, town.geometry);
   HostImages images(rig, 3);
   for (uint8_t& byte : images.bytes()) byte = 0xAA;
   renderer->render(town.scene.batch(), town.views, images.batch());
@@ -201,7 +202,7 @@ TEST(CpuRenderer, DrawsSizesFromOnePixelAndRigsOfMixedSizes) {
     Rig alone;
     alone.cameras = {rig.cameras[static_cast<std::size_t>(k)]};
     const auto single = make_renderer("cpu", {.rig = alone, .num_threads = 1});
-    single->upload(town.geometry);
+    single->upload(0, town.geometry);
     HostImages expected(alone, 3);
     single->render(town.scene.batch(), town.views, expected.batch());
     for (int view = 0; view < 3; ++view) EXPECT_EQ(images.interleaved(view, k), expected.interleaved(view, 0)) << k;
@@ -251,7 +252,7 @@ TEST(CpuRenderer, HalvesAndBytesAreTheFloatsRounded) {
   town.views.resize(2);
   const RendererConfig config{.rig = paper_rig(20, 11), .num_threads = 1};
   const auto renderer = make_renderer("cpu", config);
-  renderer->upload(town.geometry);
+  renderer->upload(0, town.geometry);
   HostImages floats(config.rig, 2, PixelFormat::f32), halves(config.rig, 2, PixelFormat::f16), bytes(config.rig, 2);
   for (HostImages* images : {&floats, &halves, &bytes}) {
     renderer->render(town.scene.batch(), town.views, images->batch());
@@ -277,7 +278,7 @@ TEST(CpuRenderer, PlanesTellDepthClassAndInstance) {
                                      make_box(AgentClass::pedestrian, {10, 0, 0}, 0, {0.6f, 0.6f, 1.8f})});
   const RendererConfig config{.rig = simple_rig(), .num_threads = 1};
   const auto renderer = make_renderer("cpu", config);
-  renderer->upload(geometry);
+  renderer->upload(0, geometry);
   HostImages images(config.rig, 1);
   CameraImages out = images.camera(0);
   std::vector<float> depth(10000);
@@ -320,7 +321,7 @@ TEST(CpuRenderer, VisibilityIsTheShareThatIsSeen) {
                                      make_box(AgentClass::vehicle, {22, -6, 0}, 0, {4, 2, 1.5f}),
                                      make_box(AgentClass::vehicle, {-20, 0, 0}, 0, {4, 2, 1.5f})});
   const auto renderer = make_renderer("cpu", {.rig = simple_rig(), .num_threads = 2});
-  renderer->upload(geometry);
+  renderer->upload(0, geometry);
   const std::vector<View> views{make_view({}, 0)};
   const std::vector<VisibilityQuery> queries{{0, 0}, {0, 1}, {0, 2}, {0, 3}};
   std::vector<float> visibility(4);
@@ -331,11 +332,18 @@ TEST(CpuRenderer, VisibilityIsTheShareThatIsSeen) {
   EXPECT_TRUE(std::isnan(visibility[3]));
 }
 
+std::unique_ptr<Renderer> make_cpu(const Rig& rig) { return make_renderer("cpu", {.rig = rig, .num_threads = 1}); }
+
+TEST(CpuRenderer, KeepsMapsByHandle) {
+  test::expect_maps_by_handle(make_cpu);
+  test::expect_refused_handles(make_cpu);
+}
+
 class CpuRendererErrors : public testing::Test {
  protected:
   void SetUp() override {
     renderer_ = make_renderer("cpu", {.rig = paper_rig(8, 8), .num_threads = 1});
-    handle_ = renderer_->upload(no_geometry());
+    renderer_->upload(0, no_geometry());
     scene_ = scene_of({make_box(AgentClass::vehicle, {5, 0, 0}, 0, {4, 2, 1})});
     views_ = {make_view({}, 0)};
   }
@@ -344,14 +352,12 @@ class CpuRendererErrors : public testing::Test {
                 HasSubstr(what));
   }
   std::unique_ptr<Renderer> renderer_;
-  GeometryHandle handle_ = -1;
   SceneOwner scene_;
   std::vector<View> views_;
   HostImages images_{paper_rig(8, 8), 1};
 };
 
 TEST_F(CpuRendererErrors, GoodInputIsFine) {
-  EXPECT_EQ(handle_, 0);
   EXPECT_NO_THROW(renderer_->render(scene_.batch(), views_, images_.batch()));
   HostImages none(paper_rig(8, 8), 0);
   EXPECT_NO_THROW(renderer_->render({}, {}, none.batch()));
@@ -387,7 +393,7 @@ TEST_F(CpuRendererErrors, HandlesAndIndicesOutOfRange) {
   expect_error("hidden agents");
   views_[0] = make_view({}, 0);
   scene_.geometry[0] = 4;
-  expect_error("geometry handle below 1, got 4");
+  expect_error("world 0: expected a handle that holds a geometry, got 4");
   scene_.geometry[0] = 0;
   scene_.world_begin = {0, 2};
   expect_error("world_begin");
@@ -430,7 +436,7 @@ TEST_F(CpuRendererErrors, GeometryThatIsFaulty) {
   sound.heads.push_back({{0, 0, 5}, {1, 0}});
   sound.num_signals = 1;
   sound.build_grids();
-  EXPECT_NO_THROW(renderer_->upload(sound));
+  EXPECT_NO_THROW(renderer_->upload(0, sound));
   constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
   struct Case {
     const char* told;
@@ -452,7 +458,7 @@ TEST_F(CpuRendererErrors, GeometryThatIsFaulty) {
   for (const Case& each : cases) {
     StaticGeometry geometry = sound;
     each.spoil(&geometry);
-    EXPECT_THAT(test::message_of([&] { renderer_->upload(geometry); }), HasSubstr(each.told));
+    EXPECT_THAT(test::message_of([&] { renderer_->upload(0, geometry); }), HasSubstr(each.told));
   }
 }
 

@@ -41,7 +41,7 @@ struct Planes {
 Planes planes_of(const StaticGeometry& geometry, const SceneOwner& scene, const View& view, const Camera& camera) {
   const RendererConfig config{.rig = {{camera}}, .num_threads = 1};
   const auto renderer = make_renderer("cpu", config);
-  renderer->upload(geometry);
+  renderer->upload(0, geometry);
   const auto pixels = static_cast<std::size_t>(camera.width_px * camera.height_px);
   Planes planes{std::vector<float>(pixels), std::vector<uint8_t>(pixels), std::vector<uint16_t>(pixels)};
   HostImages images(config.rig, 1);
@@ -121,7 +121,7 @@ TEST(Truth, VisibilityAgrees) {
   for (const SyntheticTown& scene : scenes) {
     const RendererConfig config{.rig = paper_rig(), .num_threads = 1};
     const auto renderer = make_renderer("cpu", config);
-    renderer->upload(scene.geometry);
+    renderer->upload(0, scene.geometry);
     for (std::size_t v = 0; v < scene.views.size(); ++v) {
       std::vector<VisibilityQuery> queries;
       for (std::size_t agent = 0; agent < scene.scene.agents.size(); agent += 3) {
@@ -156,7 +156,7 @@ std::vector<float> drawn_down(const SyntheticTown& town, Camera camera, int fact
   camera.center_y_px *= scale;
   const RendererConfig config{.rig = {{camera}}, .num_threads = 1, .line_floor_px = line_floor_px};
   const auto renderer = make_renderer("cpu", config);
-  renderer->upload(town.geometry);
+  renderer->upload(0, town.geometry);
   HostImages images(config.rig, 1, PixelFormat::f32);
   renderer->render(town.scene.batch(), town.views, images.batch());
   const auto* large = static_cast<const float*>(images.camera(0).data);

@@ -33,7 +33,7 @@ inline std::string missing(const std::string& backend) {
 inline std::vector<float> draw(const std::string& backend, const StaticGeometry& geometry, const SceneOwner& scene,
                                const std::vector<View>& views, const RendererConfig& config) {
   const auto renderer = make_renderer(backend, config);
-  renderer->upload(geometry);
+  renderer->upload(0, geometry);
   HostImages images(config.rig, static_cast<int>(views.size()), PixelFormat::f32);
   renderer->render(scene.batch(), views, images.batch());
   std::vector<float> values(images.bytes().size() / sizeof(float));

@@ -50,8 +50,8 @@ TEST_F(GlInterop, WritesTheSameBytesToDeviceMemoryAsToTheHost) {
     config.device = kGpu;
     const auto on_device = make_renderer("gl:egl", config);
     EXPECT_EQ(on_device->device(), kGpu);
-    on_host->upload(town.geometry);
-    on_device->upload(town.geometry);
+    on_host->upload(0, town.geometry);
+    on_device->upload(0, town.geometry);
 
     HostImages host_images(config.rig, 12);
     on_host->render(town.scene.batch(), town.views, host_images.batch());
@@ -88,8 +88,8 @@ TEST_F(GlInterop, ASingleViewMayHaveAnyStride) {
   const auto on_host = make_renderer("gl:egl", config);
   config.device = kGpu;
   const auto on_device = make_renderer("gl:egl", config);
-  on_host->upload(town.geometry);
-  on_device->upload(town.geometry);
+  on_host->upload(0, town.geometry);
+  on_device->upload(0, town.geometry);
   HostImages host_images(config.rig, 1);
   on_host->render(town.scene.batch(), town.views, host_images.batch());
   const DeviceScene scene(town.scene.batch());
@@ -107,7 +107,7 @@ TEST_F(GlInterop, RefusesAHostScene) {
   SyntheticTown town = make_synthetic_town(1, 10);
   town.views.resize(1);
   const auto renderer = make_renderer("gl:egl", {.device = kGpu});
-  renderer->upload(town.geometry);
+  renderer->upload(0, town.geometry);
   std::vector<CameraImages> cameras;
   uint8_t never_written = 0;
   for (const Camera& camera : renderer->config().rig.cameras) {

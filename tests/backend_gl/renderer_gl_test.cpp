@@ -10,6 +10,7 @@
 #include "pictura/bench/truth/image_truth.h"
 #include "pictura/bench/truth/tolerances.h"
 #include "pictura/tests/backend_gl/gl_support.h"
+#include "pictura/tests/support/renderer_interface.h"
 
 namespace pictura {
 namespace {
@@ -221,7 +222,7 @@ TEST_P(GlRenderer, BytesAreTheRoundedColors) {
     const RendererConfig config{.rig = paper_rig(97, 55), .num_threads = 1, .samples = samples};
     const std::vector<float> colors = draw(GetParam(), town.geometry, town.scene, town.views, config);
     const auto renderer = make_renderer(GetParam(), config);
-    renderer->upload(town.geometry);
+    renderer->upload(0, town.geometry);
     const std::vector<uint8_t> bytes = draw_bytes(renderer.get(), town, town.views);
     ASSERT_EQ(bytes.size(), colors.size());
     // Samples are rounded before they are averaged, and the mean after; drivers round to within 0.6 of a step.
@@ -236,7 +237,7 @@ TEST_P(GlRenderer, RenderersAreIndependent) {
   const SyntheticTown town = town_of(1, 6), other_town = town_of(2, 6);
   auto alone = [](const std::string& backend, const SyntheticTown& shown, PixelSamples samples) {
     const auto renderer = make_renderer(backend, {.num_threads = 1, .samples = samples});
-    renderer->upload(shown.geometry);
+    renderer->upload(0, shown.geometry);
     return draw_bytes(renderer.get(), shown, shown.views);
   };
   const auto expected = alone(GetParam(), town, {}), expected_other = alone(GetParam(), other_town, {.grid = 2});
@@ -245,9 +246,9 @@ TEST_P(GlRenderer, RenderersAreIndependent) {
   // Of another library, if this machine has it.
   const std::string other = std::string(GetParam()) == "gl:egl" ? "gl:osmesa" : "gl:egl";
   const auto third = missing(other).empty() ? make_renderer(other, {.num_threads = 1}) : nullptr;
-  first->upload(town.geometry);
-  second->upload(other_town.geometry);
-  if (third) third->upload(other_town.geometry);
+  first->upload(0, town.geometry);
+  second->upload(0, other_town.geometry);
+  if (third) third->upload(0, other_town.geometry);
   for (int repeat = 0; repeat < 3; ++repeat) {
     EXPECT_EQ(draw_bytes(first.get(), town, town.views), expected);
     if (third) draw_bytes(third.get(), other_town, other_town.views);
@@ -258,7 +259,7 @@ TEST_P(GlRenderer, RenderersAreIndependent) {
 TEST_P(GlRenderer, ServesOneThreadAfterTheOther) {
   const SyntheticTown town = town_of(1, 4);
   const auto renderer = make_renderer(GetParam(), {.num_threads = 1});
-  renderer->upload(town.geometry);
+  renderer->upload(0, town.geometry);
   const std::vector<uint8_t> here = draw_bytes(renderer.get(), town, town.views);
   std::vector<uint8_t> there;
   std::thread([&] { there = draw_bytes(renderer.get(), town, town.views); }).join();
@@ -269,6 +270,15 @@ TEST_P(GlRenderer, ServesOneThreadAfterTheOther) {
   EXPECT_TRUE(std::equal(first.begin(), first.end(), here.begin()));
   EXPECT_EQ(draw_bytes(renderer.get(), town, town.views), here);
   EXPECT_TRUE(draw_bytes(renderer.get(), town, {}).empty());
+}
+
+test::MakeForRig maker(const std::string& backend) {
+  return [backend](const Rig& rig) { return make_renderer(backend, {.rig = rig, .num_threads = 1}); };
+}
+
+TEST_P(GlRenderer, KeepsMapsByHandle) {
+  test::expect_maps_by_handle(maker(GetParam()));
+  test::expect_refused_handles(maker(GetParam()));
 }
 
 void expect_error(const std::function<void()>& call, const std::string& part) {
@@ -284,7 +294,7 @@ TEST_P(GlRenderer, RefusesByNameWhatItDoesNotOffer) {
   const std::string name = GetParam();
   const SyntheticTown town = town_of(1, 1);
   const auto renderer = make_renderer(name, {.num_threads = 1});
-  renderer->upload(town.geometry);
+  renderer->upload(0, town.geometry);
   HostImages images(renderer->config().rig, 1);
   std::vector<CameraImages> cameras(images.batch().cameras.begin(), images.batch().cameras.end());
   std::vector<float> depth(96 * 54);

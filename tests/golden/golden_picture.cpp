@@ -55,7 +55,7 @@ void visit_values(const SceneFile& scene, Visit&& visit) {
 }  // namespace
 
 Drawing draw_scene(Renderer* renderer, const SceneFile& scene, PixelFormat format) {
-  renderer->upload(scene.geometry);
+  renderer->upload(0, scene.geometry);
   HostImages images(scene.config.rig, static_cast<int>(scene.views.size()), format);
   renderer->render(scene.scene.batch(), scene.views, images.batch());
   Drawing drawing;

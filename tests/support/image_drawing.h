@@ -25,7 +25,7 @@ struct Drawn {
 inline Drawn draw(const StaticGeometry& geometry, const SceneOwner& scene, const std::vector<View>& views,
                   const RendererConfig& config) {
   const auto renderer = make_renderer("cpu", config);
-  renderer->upload(geometry);
+  renderer->upload(0, geometry);
   HostImages images(config.rig, static_cast<int>(views.size()), PixelFormat::f32);
   renderer->render(scene.batch(), views, images.batch());
   const auto bytes = images.bytes();

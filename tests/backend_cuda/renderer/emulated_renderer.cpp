@@ -52,6 +52,7 @@ struct EmulatedRenderer::Setup {
   Setup(const EmulatedRenderer& renderer, const cuda::DrawTask& draw, const SceneBatch& scene) : task(draw) {
     int pieces = 0, heads = 0;
     for (const auto& kept : renderer.maps_) {
+      if (!kept) continue;
       const StaticGeometry& map = kept->geometry;
       heads = std::max(heads, static_cast<int>(map.heads.size()));
       pieces = std::max(pieces, static_cast<int>(map.strips.size() + map.walls.size() + map.heads.size()));
@@ -78,11 +79,22 @@ EmulatedRenderer::EmulatedRenderer(const RendererConfig& config, uint64_t seed, 
     : config_(config), seed_(seed), pool_(pool), cameras_(pinhole_cameras(config.rig)) {}
 EmulatedRenderer::~EmulatedRenderer() = default;
 
-GeometryHandle EmulatedRenderer::upload(const StaticGeometry& geometry) {
-  maps_.push_back(std::make_unique<Map>(geometry));
-  const Map& map = *maps_.back();
-  geometries_.push_back({map.geometry.view(), map.strips.view(), map.walls.view()});
-  return static_cast<GeometryHandle>(geometries_.size()) - 1;
+void EmulatedRenderer::upload(GeometryHandle handle, const StaticGeometry& geometry, Stream) {
+  const auto index = static_cast<std::size_t>(handle);
+  if (index >= maps_.size()) {
+    maps_.resize(index + 1);
+    geometries_.resize(index + 1, cuda::empty_entry());
+  }
+  maps_[index] = std::make_unique<Map>(geometry);
+  const Map& map = *maps_[index];
+  geometries_[index] = {map.geometry.view(), map.strips.view(), map.walls.view()};
+}
+
+void EmulatedRenderer::release(GeometryHandle handle, Stream) {
+  const auto index = static_cast<std::size_t>(handle);
+  if (index >= maps_.size()) return;
+  maps_[index].reset();
+  geometries_[index] = cuda::empty_entry();
 }
 
 template <typename Kernel>
@@ -122,7 +134,9 @@ void EmulatedRenderer::visibility(const SceneBatch& scene, Span<const View> view
   fault_ = setup.fault;
 }
 
-void EmulatedRenderer::check() {
+void EmulatedRenderer::check(Stream) { poll(); }
+
+void EmulatedRenderer::poll() {
   const cuda::Fault fault = cuda::fault_of(std::exchange(fault_, cuda::kNoFault));
   if (fault.kind != cuda::FaultKind::none) fail("{}", cuda::message_of(fault));
 }

@@ -23,12 +23,14 @@ class EmulatedRenderer final : public Renderer {
   std::string_view name() const override { return "emulated"; }
   Device device() const override { return {}; }
   const RendererConfig& config() const override { return config_; }
-  GeometryHandle upload(const StaticGeometry& geometry) override;
+  void upload(GeometryHandle handle, const StaticGeometry& geometry, Stream stream = {}) override;
+  void release(GeometryHandle handle, Stream stream = {}) override;
   void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override;
   void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
                   Span<float> visibility_out, Stream stream) override;
   /// Throws what the last call found wrong.
-  void check() override;
+  void poll() override;
+  void check(Stream stream = {}) override;
 
   /// Images that the last call left to the last launch, and for which the pool had no room.
   int overflow() const { return overflow_; }
@@ -45,8 +47,8 @@ class EmulatedRenderer final : public Renderer {
   uint64_t seed_;
   Pool pool_;
   std::vector<PinholeCamera> cameras_;
-  std::vector<std::unique_ptr<Map>> maps_;
-  std::vector<cuda::DeviceGeometry> geometries_;
+  std::vector<std::unique_ptr<Map>> maps_;        // [handle], null where it holds none
+  std::vector<cuda::DeviceGeometry> geometries_;  // [handle]
   cuda::FaultWord fault_ = cuda::kNoFault;
   int overflow_ = 0, deferred_ = 0;
 };

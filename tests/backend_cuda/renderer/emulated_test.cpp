@@ -18,6 +18,7 @@
 #include "pictura/tests/backend_cuda/renderer/equal_outputs.h"
 #include "pictura/tests/golden/golden_scenes.h"
 #include "pictura/tests/support/error_message.h"
+#include "pictura/tests/support/renderer_interface.h"
 
 namespace pictura {
 
@@ -131,7 +132,7 @@ TEST(EmulatedKernels, NameWhatIsWrong) {
     worlds.views[0] = sound.views[3];  // of the empty world, whatever is spoilt
     each.spoil(&worlds);
     EmulatedRenderer renderer(config_of(rig), 15);
-    for (const StaticGeometry& map : worlds.maps) renderer.upload(map);
+    upload_geometries(worlds.maps, &renderer);
     HostImages images(rig, 2);
     std::ranges::fill(images.bytes(), uint8_t{0xA5});
     renderer.render(worlds.scene.batch(), worlds.views, images.batch(), {});
@@ -145,7 +146,7 @@ TEST(EmulatedKernels, NameWhatIsWrongWithQueries) {
   const SyntheticWorlds worlds = make_synthetic_worlds();
   const RendererConfig config = config_of(paper_rig(16, 9));
   EmulatedRenderer renderer(config, 16);
-  for (const StaticGeometry& map : worlds.maps) renderer.upload(map);
+  upload_geometries(worlds.maps, &renderer);
   // The first view is of the first world, whose agents come first.
   const int32_t of_another_world = worlds.scene.world_begin[2];
   for (const VisibilityQuery bad :
@@ -234,8 +235,8 @@ TEST(EmulatedKernels, WriteTheOraclesBytesAndHalves) {
   const RendererConfig config = config_of(mixed_rig());
   EmulatedRenderer emulated(config, 12);
   const auto oracle = make_renderer("cpu", config);
-  emulated.upload(town.geometry);
-  oracle->upload(town.geometry);
+  emulated.upload(0, town.geometry);
+  oracle->upload(0, town.geometry);
   for (const PixelFormat format : {PixelFormat::u8, PixelFormat::f16}) {
     HostImages told(config.rig, 1, format), truth(config.rig, 1, format);
     emulated.render(town.scene.batch(), town.views, told.batch(), {});
@@ -300,6 +301,12 @@ TEST(EmulatedKernels, TellVisibility) {
   const RendererConfig config = config_of(paper_rig(48, 27));
   EmulatedRenderer emulated(config, 5);
   test::expect_equal_visibility(&emulated, make_renderer("cpu", config).get(), town);
+}
+
+TEST(EmulatedKernels, KeepMapsByHandle) {
+  uint64_t seed = 40;
+  test::expect_maps_by_handle(
+      [&](const Rig& rig) { return std::make_unique<EmulatedRenderer>(config_of(rig), seed++); });
 }
 
 class EmulatedHardScenes : public testing::TestWithParam<HardScene> {};

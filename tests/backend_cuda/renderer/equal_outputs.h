@@ -28,8 +28,8 @@ inline void expect_equal_visibility(Renderer* actual, Renderer* oracle, const Sy
     }
   }
   std::vector<float> told(queries.size()), expected(queries.size());
-  actual->upload(town.geometry);
-  oracle->upload(town.geometry);
+  actual->upload(0, town.geometry);
+  oracle->upload(0, town.geometry);
   actual->visibility(town.scene.batch(), town.views, queries, told);
   oracle->visibility(town.scene.batch(), town.views, queries, expected);
   for (std::size_t i = 0; i < queries.size(); ++i) {

@@ -14,6 +14,7 @@
 #include "pictura/tests/backend_cuda/renderer/equal_outputs.h"
 #include "pictura/tests/golden/golden_scenes.h"
 #include "pictura/tests/support/error_message.h"
+#include "pictura/tests/support/renderer_interface.h"
 
 namespace pictura {
 
@@ -83,7 +84,7 @@ TEST_F(CudaRendererTest, FaultsOfTheDeviceAreThrownByTheNextCall) {
   town.views.resize(1);
   const RendererConfig config{.rig = paper_rig(8, 8), .device = {MemorySpace::cuda, 0}};
   const auto renderer = make_renderer("cuda", config);
-  renderer->upload(town.geometry);
+  renderer->upload(0, town.geometry);
   const DeviceScene scene(town.scene.batch());
   HostImages shape(config.rig, 1);
   DeviceBuffer<uint8_t> memory(shape.bytes().size());
@@ -147,7 +148,7 @@ TEST_F(CudaRendererTest, DrawsOnItsDeviceWhateverTheCurrentOneIs) {
   const RendererConfig config{.rig = paper_rig(16, 9), .device = {MemorySpace::cuda, 1}};
   const auto renderer = make_renderer("cuda", config);
   EXPECT_EQ(current_device().index, 0);
-  renderer->upload(town.geometry);
+  renderer->upload(0, town.geometry);
   HostImages images(config.rig, 2), expected(config.rig, 2);
   {
     const DeviceGuard there(config.device);
@@ -166,9 +167,16 @@ TEST_F(CudaRendererTest, DrawsOnItsDeviceWhateverTheCurrentOneIs) {
   }
   EXPECT_EQ(current_device().index, 0);
   const auto oracle = make_renderer("cpu", {.rig = config.rig});
-  oracle->upload(town.geometry);
+  oracle->upload(0, town.geometry);
   oracle->render(town.scene.batch(), town.views, expected.batch());
   EXPECT_TRUE(std::ranges::equal(images.bytes(), expected.bytes()));
+}
+
+std::unique_ptr<Renderer> make_for_host(const Rig& rig) { return make_renderer("cuda", {.rig = rig}); }
+
+TEST_F(CudaRendererTest, KeepsMapsByHandle) {
+  test::expect_maps_by_handle(make_for_host);
+  test::expect_refused_handles(make_for_host);
 }
 
 // What lies on the host is checked there, before the device sees it.
@@ -176,7 +184,7 @@ TEST_F(CudaRendererTest, HostCallersLearnAtOnceWhatIsWrong) {
   SyntheticTown town = make_synthetic_town(5, 5);
   const RendererConfig config{.rig = paper_rig(8, 8)};
   const auto renderer = make_renderer("cuda", config);
-  renderer->upload(town.geometry);
+  renderer->upload(0, town.geometry);
   EXPECT_EQ(renderer->device(), Device{});
   HostImages images(config.rig, static_cast<int>(town.views.size()));
   EXPECT_NO_THROW(renderer->render(town.scene.batch(), town.views, images.batch()));

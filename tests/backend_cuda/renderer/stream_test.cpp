@@ -42,7 +42,7 @@ struct Stage {
     views = view_copy.assign(Span<const View>(town.views), nullptr);
     config.device = {MemorySpace::cuda, 0};
     renderer = make_renderer("cuda", config);
-    renderer->upload(town.geometry);
+    renderer->upload(0, town.geometry);
   }
   HostImages host_images(PixelFormat format = PixelFormat::u8, Planes planes = Planes::none) const {
     return {config.rig, static_cast<int>(views.size()), format, planes};

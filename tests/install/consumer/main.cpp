@@ -9,7 +9,8 @@ int main() {
   const auto renderer = make_renderer("cpu", {});
   StaticGeometry nothing;
   nothing.build_grids();
-  const GeometryHandle geometry = renderer->upload(nothing);
+  const GeometryHandle geometry = 0;
+  renderer->upload(geometry, nothing);
   const std::vector<int32_t> world_begin{0, 1}, light_begin{0, 0};
   const std::vector<AgentBox> agents{{.center_m = {15, 0, 0}, .length_m = 4.5f, .width_m = 2, .height_m = 1.5f}};
   const std::vector<GeometryHandle> handles{geometry};

@@ -1,0 +1,63 @@
+// The maps of a renderer in device memory, and the table by handle that kernels read.
+#pragma once
+
+#include <memory>
+#include <type_traits>
+#include <vector>
+
+#include "pictura/backend_cuda/renderer/kernel_arguments.h"
+#include "pictura/common/cuda/device_buffer.h"
+#include "pictura/common/scene.h"
+
+namespace pictura::cuda {
+
+/// All calls are made with its device current, and handles are checked before. Memory of maps that were replaced or
+/// released is kept until the stream has passed that point, and then reused.
+class GeometryTable {
+ public:
+  /// Copies an empty table to the device on the default stream.
+  GeometryTable() { grow(kMinEntries, nullptr); }
+
+  /// Writes a map and its entry. Waits for the stream, so that the host's memory is free and nothing reads what was
+  /// replaced.
+  void upload(GeometryHandle handle, const StaticGeometry& geometry, cudaStream_t stream);
+  /// Empties an entry, on the stream.
+  void release(GeometryHandle handle, cudaStream_t stream);
+
+  const DeviceGeometry* entries() const { return table_.data(); }
+  int32_t num_entries() const { return static_cast<int32_t>(maps_.size()); }
+  /// How often the table has moved.
+  uint64_t generation() const { return generation_; }
+  /// The largest numbers of pieces of a map that is held, and of light heads among them.
+  int max_pieces() const;
+  int max_heads() const;
+
+ private:
+  static constexpr std::size_t kMinEntries = 16;
+
+  struct Map {
+    DeviceBuffer<std::byte> memory;  // all arrays of the map
+    int pieces = 0, heads = 0;
+    DeviceGeometry entry = empty_entry();
+  };
+  struct DestroyEvent {
+    void operator()(cudaEvent_t event) const { cudaEventDestroy(event); }
+  };
+  /// Memory that the device has done with once the event has passed.
+  struct Retired {
+    DeviceBuffer<std::byte> memory;
+    std::unique_ptr<std::remove_pointer_t<cudaEvent_t>, DestroyEvent> event;
+    bool has_passed() const;
+  };
+
+  void grow(std::size_t entries, cudaStream_t stream);
+  void retire(DeviceBuffer<std::byte> memory, cudaStream_t stream);
+  DeviceBuffer<std::byte> allocate(std::size_t bytes);
+
+  std::vector<Map> maps_;  // [handle], as many as the table has entries
+  DeviceBuffer<DeviceGeometry> table_;
+  std::vector<Retired> retired_;
+  uint64_t generation_ = 0;
+};
+
+}  // namespace pictura::cuda

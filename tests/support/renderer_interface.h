@@ -1,0 +1,87 @@
+// What every renderer for callers in host memory promises, whatever draws: tests of the backends call these.
+#pragma once
+
+#include <algorithm>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/bench/truth/image_scenes.h"
+#include "pictura/common/renderer.h"
+#include "pictura/tests/support/error_message.h"
+
+namespace pictura::test {
+
+/// Makes renderers of one kind with a rig.
+using MakeForRig = std::function<std::unique_ptr<Renderer>(const Rig& rig)>;
+
+/// The bytes of a town's images, with its map in the handle that its world names.
+inline std::vector<uint8_t> draw_town(Renderer* renderer, const SceneOwner& scene, const std::vector<View>& views) {
+  HostImages images(renderer->config().rig, static_cast<int>(views.size()));
+  std::ranges::fill(images.bytes(), uint8_t{0xA5});
+  renderer->render(scene.batch(), views, images.batch());
+  renderer->check();
+  return {images.bytes().begin(), images.bytes().end()};
+}
+
+/// Handles are the caller's choice; maps are replaced and released under them; one scene serves several renderers.
+inline void expect_maps_by_handle(const MakeForRig& make) {
+  const Rig rig = front_rig(32, 18);
+  SyntheticTown town = make_synthetic_town(1, 20);
+  const SyntheticTown other = make_synthetic_town(2, 20);
+  town.views.resize(2);
+  auto named = [&](GeometryHandle handle) {
+    SceneOwner scene = town.scene;
+    scene.geometry[0] = handle;
+    return scene;
+  };
+  const auto first = make(rig), second = make(rig), only_other = make(rig);
+  first->upload(0, town.geometry);
+  only_other->upload(3, other.geometry);
+  const std::vector<uint8_t> expected = draw_town(first.get(), named(0), town.views);
+  const std::vector<uint8_t> expected_other = draw_town(only_other.get(), named(3), town.views);
+  ASSERT_NE(expected, expected_other);
+
+  // Far apart, in any order.
+  constexpr GeometryHandle kLast = kNumGeometryHandles - 1;
+  second->upload(kLast, other.geometry);
+  second->upload(7, town.geometry);
+  EXPECT_EQ(draw_town(second.get(), named(7), town.views), expected);
+  EXPECT_EQ(draw_town(second.get(), named(kLast), town.views), expected_other);
+  // One scene for several renderers.
+  first->upload(7, town.geometry);
+  const SceneOwner shared = named(7);
+  EXPECT_EQ(draw_town(first.get(), shared, town.views), draw_town(second.get(), shared, town.views));
+  // Replaced.
+  second->upload(7, other.geometry);
+  EXPECT_EQ(draw_town(second.get(), shared, town.views), expected_other);
+  EXPECT_EQ(draw_town(first.get(), shared, town.views), expected);
+  // Released; others are not touched.
+  second->release(7);
+  second->release(7);
+  for (const GeometryHandle empty : {7, 8, kNumGeometryHandles, -1}) {
+    EXPECT_THAT(message_of([&] { draw_town(second.get(), named(empty), town.views); }),
+                testing::AnyOf(testing::HasSubstr("world 0: expected a handle that holds a geometry, got"),
+                               testing::HasSubstr("its world has no such geometry")));
+  }
+  EXPECT_EQ(draw_town(second.get(), named(kLast), town.views), expected_other);
+  second->upload(7, town.geometry);
+  EXPECT_EQ(draw_town(second.get(), shared, town.views), expected);
+}
+
+/// Handles that no map can have are refused by name.
+inline void expect_refused_handles(const MakeForRig& make) {
+  const auto renderer = make(front_rig(8, 8));
+  const StaticGeometry geometry = make_synthetic_town(1, 1).geometry;
+  for (const GeometryHandle handle : {-1, 65536}) {
+    const std::string told = "geometry: expected a handle of 0 to 65535, got " + std::to_string(handle);
+    EXPECT_THAT(message_of([&] { renderer->upload(handle, geometry); }), testing::HasSubstr(told));
+    EXPECT_THAT(message_of([&] { renderer->release(handle); }), testing::HasSubstr(told));
+  }
+}
+
+}  // namespace pictura::test
