@@ -77,7 +77,7 @@ class GlRenderer final : public Renderer {
     geometries_.release(handle);
   }
 
-  void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override {
+  void render(const SceneBatch& scene, const ViewBatch& views, const ImageBatch& images_out, Stream stream) override {
     check_images(name_, config_.rig, device(), views.size(), images_out);
     for (std::size_t i = 0; i < images_out.cameras.size(); ++i) {
       const CameraImages& camera = images_out.cameras[i];
@@ -87,7 +87,7 @@ class GlRenderer final : public Renderer {
     if (interop_) {
       check_device(name_, "scene", device(), scene.device);
       interop_->copy_to_host(scene, views, stream, &host_scene_);
-      draw(host_scene_.batch(), host_scene_.views, images_out, stream);
+      draw(host_scene_.batch(), host_scene_.view_batch(), images_out, stream);
     } else {
       draw(scene, views, images_out, stream);
     }
@@ -97,7 +97,7 @@ class GlRenderer final : public Renderer {
     if (interop_) interop_->synchronize(stream);
   }
 
-  void visibility(const SceneBatch&, Span<const View>, Span<const VisibilityQuery>, Span<float>, Stream) override {
+  void visibility(const SceneBatch&, const ViewBatch&, Span<const VisibilityQuery>, Span<float>, Stream) override {
     fail("renderer {}: visibility is cpu's and cuda's", name_);
   }
 
@@ -156,7 +156,8 @@ class GlRenderer final : public Renderer {
     return groups;
   }
 
-  void draw(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) {
+  void draw(const SceneBatch& scene, const ViewBatch& batch, const ImageBatch& images_out, Stream stream) {
+    const Span<const View> views = counted_views(name_, batch);
     check_scene(name_, scene, geometries_);
     check_views(name_, scene, views);
     if (views.empty()) return;

@@ -35,8 +35,9 @@ class NullRenderer final : public Renderer {
   void upload(GeometryHandle handle, const StaticGeometry&, Stream) override { check_handle(name(), handle); }
   void release(GeometryHandle handle, Stream) override { check_handle(name(), handle); }
 
-  void render(const SceneBatch&, Span<const View> views, const ImageBatch& images_out, Stream) override {
-    check_images(name(), config_.rig, device(), views.size(), images_out, /*draws_f16=*/true);
+  void render(const SceneBatch&, const ViewBatch& batch, const ImageBatch& images_out, Stream) override {
+    check_images(name(), config_.rig, device(), batch.size(), images_out, /*draws_f16=*/true);
+    const Span<const View> views = counted_views(name(), batch);
     const std::size_t value_bytes = bytes_per_value(images_out.format);
     for (const CameraImages& camera : images_out.cameras) {
       const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
@@ -53,7 +54,7 @@ class NullRenderer final : public Renderer {
     }
   }
 
-  void visibility(const SceneBatch&, Span<const View>, Span<const VisibilityQuery> queries, Span<float> visibility_out,
+  void visibility(const SceneBatch&, const ViewBatch&, Span<const VisibilityQuery> queries, Span<float> visibility_out,
                   Stream) override {
     check_answers(name(), queries.size(), visibility_out.size());
     for (std::size_t i = 0; i < queries.size(); ++i) visibility_out[i] = std::numeric_limits<float>::quiet_NaN();

@@ -48,8 +48,8 @@ class OracleCheck {
     const RendererConfig config{.rig = render_case.config.rig, .line_floor_px = render_case.config.line_floor_px};
     const auto oracle = make_renderer("cpu", config);
     upload_geometries(worlds.geometries, oracle.get());
-    oracle->render(worlds.simulator->scene(), {worlds.views.data(), static_cast<std::size_t>(num_views_)},
-                   expected_.batch());
+    oracle->render(worlds.simulator->scene(),
+                   Span<const View>(worlds.views.data(), static_cast<std::size_t>(num_views_)), expected_.batch());
   }
 
   /// Adds to the error; throws when `cuda` is out of tolerance.

@@ -63,15 +63,18 @@ class Renderer {
   /// How often memory that calls use has moved; captured graphs of an earlier generation are stale. 0 on the host.
   virtual uint64_t generation() const { return 0; }
 
-  /// Draws every camera of the rig for every view and writes each pixel of `images_out`. Throws Error where an array
-  /// lies on the wrong device, a handle or an index is out of range, or the images do not fit the rig and the views.
-  /// On a CUDA device a wrong handle, index or pose is a latched fault, and the images of that view are black.
-  virtual void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out,
+  /// Draws every camera of the rig for every view and writes each pixel of their images. Views at and beyond
+  /// views.num_views are not read or drawn, and their images are not written. Throws Error where an array lies on the
+  /// wrong device, a handle, an index or the number of views is out of range, or the images do not fit the rig and all
+  /// views. On a CUDA device a wrong handle, index or pose is a latched fault, and the images of that view are black;
+  /// so is a wrong number of views, which is clamped.
+  virtual void render(const SceneBatch& scene, const ViewBatch& views, const ImageBatch& images_out,
                       Stream stream = {}) = 0;
 
   /// For each query: coverage of the agent in the view's images over its coverage when drawn alone, summed over the
-  /// cameras, in [0, 1]; NaN where it is in no camera's frame. `visibility_out` has the queries' length.
-  virtual void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
+  /// cameras, in [0, 1]; NaN where it is in no camera's frame, and for a view at or beyond views.num_views.
+  /// `visibility_out` has the queries' length.
+  virtual void visibility(const SceneBatch& scene, const ViewBatch& views, Span<const VisibilityQuery> queries,
                           Span<float> visibility_out, Stream stream = {}) = 0;
 
   /// Throws Error where a latched fault has reached the host; does not wait.

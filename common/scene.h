@@ -49,6 +49,19 @@ AgentBox make_box(AgentClass agent_class, Vec3 center_m, float heading_rad, Vec3
 /// A view at a pose, with nobody left out.
 View make_view(Vec3 origin_m, float heading_rad);
 
+/// The views of a call. Where num_views is given, it lies with the views, on their device, and only views
+/// [0, *num_views) are read: a list that was compacted on a device needs no host to be drawn.
+struct ViewBatch {
+  Span<const View> views;
+  const int32_t* num_views = nullptr;
+
+  ViewBatch() = default;
+  ViewBatch(Span<const View> all, const int32_t* count = nullptr) : views(all), num_views(count) {}  // NOLINT: converts
+  ViewBatch(const std::vector<View>& all, const int32_t* count = nullptr)                            // NOLINT: converts
+      : views(all), num_views(count) {}
+  std::size_t size() const { return views.size(); }
+};
+
 /// Points of a polyline that are closer to the one before than this, in plan, count as that.
 constexpr float kRepeatedPoint_m = 1e-4f;
 /// Cuts polylines (at least two points each) into mitred strips of at most kMaxPiece_m and appends them.

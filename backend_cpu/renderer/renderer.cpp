@@ -36,8 +36,9 @@ class CpuRenderer final : public Renderer {
     geometries_.release(handle);
   }
 
-  void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream) override {
-    check_images(name(), config_.rig, device(), views.size(), images_out, /*draws_f16=*/true);
+  void render(const SceneBatch& scene, const ViewBatch& batch, const ImageBatch& images_out, Stream) override {
+    check_images(name(), config_.rig, device(), batch.size(), images_out, /*draws_f16=*/true);
+    const Span<const View> views = counted_views(name(), batch);
     check_scene(name(), scene, geometries_);
     check_views(name(), scene, views);
     const std::size_t num_cameras = cameras_.size();
@@ -50,16 +51,18 @@ class CpuRenderer final : public Renderer {
     });
   }
 
-  void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
+  void visibility(const SceneBatch& scene, const ViewBatch& batch, Span<const VisibilityQuery> queries,
                   Span<float> visibility_out, Stream) override {
+    const Span<const View> views = counted_views(name(), batch);
     check_scene(name(), scene, geometries_);
     check_views(name(), scene, views);
-    check_queries(name(), scene, views, queries, visibility_out.size());
+    check_queries(name(), scene, views, batch.size(), queries, visibility_out.size());
     parallel_for(num_threads(), static_cast<int64_t>(queries.size()), [&](int64_t i) {
       const VisibilityQuery& query = queries[static_cast<std::size_t>(i)];
       ImageDrawer& drawer = drawers_[static_cast<std::size_t>(omp_get_thread_num())];
       VisibilitySum seen;
-      for (std::size_t camera = 0; camera < cameras_.size(); ++camera) {
+      const bool is_drawn = static_cast<std::size_t>(query.view) < views.size();
+      for (std::size_t camera = 0; is_drawn && camera < cameras_.size(); ++camera) {
         ImageRequest asked = request(scene, views[static_cast<std::size_t>(query.view)], camera);
         asked.culls_occluded = false;  // occluded faces count when the agent is drawn alone
         drawer.prepare(asked);

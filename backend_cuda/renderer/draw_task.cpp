@@ -35,11 +35,12 @@ void SortedPieces::sort(std::vector<Ball> balls) {
 }
 
 DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeCamera>& cameras,
-                        const SceneBatch& scene, Span<const View> views, const ImageBatch* images) {
+                        const SceneBatch& scene, const ViewBatch& views, const ImageBatch* images) {
   DrawTask task;
   task.scene = scene;
-  task.views = views.data();
-  task.num_views = static_cast<int32_t>(views.size());
+  task.views = views.views.data();
+  task.view_count = views.num_views;
+  task.num_views = task.max_views = static_cast<int32_t>(views.size());
   task.num_cameras = static_cast<int32_t>(cameras.size());
   task.line_floor_px = config.line_floor_px;
   task.debug_palette = config.debug_palette;
@@ -67,13 +68,16 @@ std::string message_of(const Fault& fault) {
       case FaultKind::too_few_lights: return "its world has fewer light states than its map signals";
       case FaultKind::too_many_agents: return fmt::format("its world has more than {} agents", kMaxBoxesPerWorld);
       case FaultKind::bad_query: return "no such view, or no such agent in its world";
+      case FaultKind::bad_view_count: return "expected 0 or more, and no more than the call has views";
       case FaultKind::capacity_exceeded: return "shows more than a world can hold";
       case FaultKind::none: break;
     }
     return "";
   };
-  const bool is_query = fault.kind == FaultKind::bad_query;
-  return fmt::format("{} {}: {}", is_query ? "visibility query" : "view", fault.index, what());
+  const char* where = fault.kind == FaultKind::bad_query        ? "visibility query"
+                      : fault.kind == FaultKind::bad_view_count ? "number of views"
+                                                                : "view";
+  return fmt::format("{} {}: {}", where, fault.index, what());
 }
 
 Scratch large_sizes(int pieces, int heads, std::size_t agents) {

@@ -28,7 +28,7 @@ class SortedPieces {
 /// Everything of a task but what lies in the renderer's own memory: geometries, pool, counters, lists of images and
 /// fault. images may be null.
 DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeCamera>& cameras,
-                        const SceneBatch& scene, Span<const View> views, const ImageBatch* images);
+                        const SceneBatch& scene, const ViewBatch& views, const ImageBatch* images);
 
 /// Room, for a block of the last launch, for all that a world can hold of a map with so many pieces, heads among them,
 /// and so many agents.

@@ -33,24 +33,28 @@ class HostRendererCuda final : public Renderer {
   }
   void reserve(int max_views, int max_boxes) override { renderer_->reserve(max_views, max_boxes); }
 
-  void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override {
+  void render(const SceneBatch& scene, const ViewBatch& batch, const ImageBatch& images_out, Stream stream) override {
     const DeviceGuard guard(renderer_->device());
-    check_images(name(), config_.rig, device(), views.size(), images_out, /*draws_f16=*/true);
+    check_images(name(), config_.rig, device(), batch.size(), images_out, /*draws_f16=*/true);
+    const Span<const View> views = counted_views(name(), batch);
     check_input(scene, views);
+    ImageBatch drawn = images_out;
+    drawn.num_views = static_cast<int>(views.size());
     const auto queue = static_cast<cudaStream_t>(stream.handle);
-    renderer_->render(scene_.assign(scene, queue), views_.assign(views, queue), images_.like(images_out), stream);
-    images_.copy_to_host(images_out, queue);
+    renderer_->render(scene_.assign(scene, queue), views_.assign(views, queue), images_.like(drawn), stream);
+    images_.copy_to_host(drawn, queue);
     check(stream);
   }
 
   void poll() override { renderer_->poll(); }
   void check(Stream stream) override { renderer_->check(stream); }
 
-  void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
+  void visibility(const SceneBatch& scene, const ViewBatch& batch, Span<const VisibilityQuery> queries,
                   Span<float> visibility_out, Stream stream) override {
     const DeviceGuard guard(renderer_->device());
+    const Span<const View> views = counted_views(name(), batch);
     check_input(scene, views);
-    check_queries(name(), scene, views, queries, visibility_out.size());
+    check_queries(name(), scene, views, batch.size(), queries, visibility_out.size());
     const auto queue = static_cast<cudaStream_t>(stream.handle);
     const Span<float> result = visibility_.resize(queries.size());
     renderer_->visibility(scene_.assign(scene, queue), views_.assign(views, queue), queries_.assign(queries, queue),

@@ -12,6 +12,15 @@ __device__ inline int32_t view_of(const DrawTask& task, int32_t image) {
 }
 __device__ inline int32_t camera_of(const DrawTask& task, int32_t image) { return image % num_cameras(task); }
 
+// The number of the launch's views that are drawn: those within the caller's count. A count outside [0, max_views] is a
+// fault.
+__device__ inline int32_t num_drawn_views(const DrawTask& task) {
+  if (task.view_count == nullptr) return task.num_views;
+  const int32_t count = *task.view_count, drawn = clamp(count, 0, task.max_views);
+  if (drawn != count && blockIdx.x == 0 && threadIdx.x == 0) note_fault(task, count, FaultKind::bad_view_count);
+  return clamp(drawn - task.first_view, 0, task.num_views);
+}
+
 // Leaves an image to the last launch, whose blocks have memory for a whole map.
 __device__ inline void mark_overflowed(const DrawTask& task, int32_t image) {
   task.overflow_images[atomicAdd(&task.counters->overflow, 1)] = image;

@@ -83,11 +83,12 @@ enum class FaultKind : uint32_t {
   too_few_lights,
   too_many_agents,
   bad_query,
-  capacity_exceeded
+  capacity_exceeded,
+  bad_view_count
 };
 struct Fault {
   FaultKind kind = FaultKind::none;
-  int32_t index = 0;  // of the view or the query
+  int32_t index = 0;  // of the view or the query, or the number of views
 };
 using FaultWord = unsigned long long;
 constexpr FaultWord kNoFault = 0;
@@ -199,9 +200,11 @@ struct DrawCounters {
 };
 
 struct DrawTask {
-  SceneBatch scene;  // in device memory, like all pointers below
-  const View* views = nullptr;
-  int32_t first_view = 0;  // views [first_view, first_view + num_views) are drawn
+  SceneBatch scene;                     // in device memory, like all pointers below
+  const View* views = nullptr;          // [max_views]
+  const int32_t* view_count = nullptr;  // how many of them are drawn; null: all
+  int32_t max_views = 0;
+  int32_t first_view = 0;  // views [first_view, first_view + num_views) are drawn by this launch
   int32_t num_views = 0, num_cameras = 0;
   int32_t max_tiles = 0;  // of any image
   const DeviceGeometry* geometries = nullptr;

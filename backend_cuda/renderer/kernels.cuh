@@ -32,7 +32,7 @@ extern "C" __global__ void __launch_bounds__(kSetupThreads, kCullBlocksPerProces
   BlockState* state = block_state();
   CullShared* storage = &geometry_shared()->cull;
   DrawCounters* counters = task.counters;
-  const int32_t num_images = task.num_views * num_cameras(task), num_blocks = static_cast<int32_t>(gridDim.x);
+  const int32_t num_images = num_drawn_views(task) * num_cameras(task), num_blocks = static_cast<int32_t>(gridDim.x);
   PICTURA_NO_UNROLL
   for (auto image = static_cast<int32_t>(blockIdx.x); image < num_images;
        image = num_blocks + warp_next(&counters->next_culled)) {
@@ -250,6 +250,7 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
   wait_for_earlier_launch();
   take_scratch(scratch);
   BlockState* state = block_state();
+  const int32_t num_drawn = num_drawn_views(task.draw);
   PICTURA_NO_UNROLL
   for (int32_t q = static_cast<int32_t>(blockIdx.x); q < task.num_queries; q += static_cast<int32_t>(gridDim.x)) {
     const auto [view, agent] = task.queries[q];
@@ -260,7 +261,7 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
     const bool is_view = view >= 0 && view < task.draw.num_views;
     if (!is_view) fault(q, FaultKind::bad_query);
     PICTURA_NO_UNROLL
-    for (int32_t camera = 0; is_view && camera < num_cameras(task.draw); ++camera) {
+    for (int32_t camera = 0; is_view && view < num_drawn && camera < num_cameras(task.draw); ++camera) {
       // Occluded faces count when the agent is drawn alone, so occlusion culling is off. set_view reports faults of the
       // view.
       if (!prepare_image(task.draw, view, camera, setup_target_of(state->scratch), false)) {

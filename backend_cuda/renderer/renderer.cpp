@@ -74,7 +74,7 @@ class CudaRenderer final : public Renderer {
   }
   uint64_t generation() const override { return scratch_generation_ + geometries_.generation(); }
 
-  void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override {
+  void render(const SceneBatch& scene, const ViewBatch& views, const ImageBatch& images_out, Stream stream) override {
     const DeviceGuard guard(device());
     check_call(scene);
     check_images(name(), config_.rig, device(), views.size(), images_out, /*draws_f16=*/true);
@@ -99,7 +99,7 @@ class CudaRenderer final : public Renderer {
     poll();
   }
 
-  void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
+  void visibility(const SceneBatch& scene, const ViewBatch& views, Span<const VisibilityQuery> queries,
                   Span<float> visibility_out, Stream stream) override {
     const DeviceGuard guard(device());
     check_call(scene);
@@ -121,7 +121,7 @@ class CudaRenderer final : public Renderer {
                   scene.world_begin.size() - 1);
   }
 
-  cuda::DrawTask draw_task(const SceneBatch& scene, Span<const View> views, const ImageBatch* images) {
+  cuda::DrawTask draw_task(const SceneBatch& scene, const ViewBatch& views, const ImageBatch* images) {
     const std::size_t images_total = views.size() * config_.rig.cameras.size();
     PICTURA_CHECK(images_total < (std::size_t{1} << 31), "renderer cuda: expected fewer than 2^31 images, got {}",
                   images_total);

@@ -63,7 +63,7 @@ class RuntimeInterop final : public CudaInterop {
   std::unique_ptr<CudaBuffer> share(unsigned int buffer) const override {
     return std::make_unique<RegisteredBuffer>(device_, buffer);
   }
-  void copy_to_host(const SceneBatch& scene, Span<const View> views, Stream stream,
+  void copy_to_host(const SceneBatch& scene, const ViewBatch& views, Stream stream,
                     HostScene* scene_out) const override {
     const DeviceGuard guard(device_);
     const auto queue = static_cast<cudaStream_t>(stream.handle);
@@ -73,7 +73,8 @@ class RuntimeInterop final : public CudaInterop {
     download(scene.light_begin, &scene_out->light_begin, queue);
     download(scene.light_states, &scene_out->light_states, queue);
     download(scene.hidden_agents, &scene_out->hidden_agents, queue);
-    download(views, &scene_out->views, queue);
+    download(views.views, &scene_out->views, queue);
+    download(Span<const int32_t>(views.num_views, views.num_views ? 1 : 0), &scene_out->num_views, queue);
     PICTURA_CUDA(cudaStreamSynchronize(queue));
   }
 

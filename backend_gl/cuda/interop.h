@@ -33,6 +33,8 @@ struct HostScene {
   std::vector<GeometryHandle> geometry;
   std::vector<LightState> light_states;
   std::vector<View> views;
+  std::vector<int32_t> num_views;  // [1], or empty: all
+  ViewBatch view_batch() const { return {views, num_views.empty() ? nullptr : num_views.data()}; }
   SceneBatch batch() const {
     return {Device{}, world_begin, agents, geometry, light_begin, light_states, hidden_agents};
   }
@@ -48,7 +50,7 @@ class CudaInterop {
   /// Registers a buffer object of the current context.
   virtual std::unique_ptr<CudaBuffer> share(unsigned int buffer) const = 0;
   /// Waits for the stream and copies what lies in device memory.
-  virtual void copy_to_host(const SceneBatch& scene, Span<const View> views, Stream stream,
+  virtual void copy_to_host(const SceneBatch& scene, const ViewBatch& views, Stream stream,
                             HostScene* scene_out) const = 0;
 };
 

@@ -136,19 +136,28 @@ void check_views(std::string_view renderer, const SceneBatch& scene, Span<const 
   }
 }
 
+Span<const View> counted_views(std::string_view renderer, const ViewBatch& views) {
+  if (views.num_views == nullptr) return views.views;
+  const int32_t count = *views.num_views;
+  PICTURA_CHECK(count >= 0 && static_cast<std::size_t>(count) <= views.size(),
+                "renderer {}: number of views: expected 0 to {}, got {}", renderer, views.size(), count);
+  return views.views.subspan(0, static_cast<std::size_t>(count));
+}
+
 void check_answers(std::string_view renderer, std::size_t num_queries, std::size_t num_answers) {
   PICTURA_CHECK(num_answers == num_queries, "renderer {}: visibility: expected room for {} values, got {}", renderer,
                 num_queries, num_answers);
 }
 
-void check_queries(std::string_view renderer, const SceneBatch& scene, Span<const View> views,
+void check_queries(std::string_view renderer, const SceneBatch& scene, Span<const View> views, std::size_t max_views,
                    Span<const VisibilityQuery> queries, std::size_t num_answers) {
   check_answers(renderer, queries.size(), num_answers);
   for (std::size_t i = 0; i < queries.size(); ++i) {
     const VisibilityQuery& query = queries[i];
-    PICTURA_CHECK(query.view >= 0 && static_cast<std::size_t>(query.view) < views.size(),
-                  "renderer {}: visibility query {}: expected a view below {}, got {}", renderer, i, views.size(),
+    PICTURA_CHECK(query.view >= 0 && static_cast<std::size_t>(query.view) < max_views,
+                  "renderer {}: visibility query {}: expected a view below {}, got {}", renderer, i, max_views,
                   query.view);
+    if (static_cast<std::size_t>(query.view) >= views.size()) continue;
     const auto world = static_cast<std::size_t>(views[static_cast<std::size_t>(query.view)].world);
     const int32_t begin = scene.world_begin[world], end = scene.world_begin[world + 1];
     PICTURA_CHECK(query.agent >= begin && query.agent < end,

@@ -28,12 +28,15 @@ void check_scene(std::string_view renderer, const SceneBatch& scene, const HostG
 /// passed, and its pose is finite.
 void check_views(std::string_view renderer, const SceneBatch& scene, Span<const View> views);
 
+/// The views of a batch on the host that its count includes. Throws Error unless that is 0 to the number of views.
+Span<const View> counted_views(std::string_view renderer, const ViewBatch& views);
+
 /// Throws Error unless there is room for as many answers as there are visibility queries.
 void check_answers(std::string_view renderer, std::size_t num_queries, std::size_t num_answers);
 
-/// Throws Error unless each query's view, one of those that check_views passed, and its agent, of that view's world,
-/// exist, and there is room for as many answers.
-void check_queries(std::string_view renderer, const SceneBatch& scene, Span<const View> views,
+/// Throws Error unless each query's view is one of max_views, its agent, where the view is one of `views`, which
+/// check_views passed, is of that view's world, and there is room for as many answers.
+void check_queries(std::string_view renderer, const SceneBatch& scene, Span<const View> views, std::size_t max_views,
                    Span<const VisibilityQuery> queries, std::size_t num_answers);
 
 /// Throws Error unless the handle is one that geometries can be uploaded to.

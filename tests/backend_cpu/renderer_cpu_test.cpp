@@ -339,6 +339,11 @@ TEST(CpuRenderer, KeepsMapsByHandle) {
   test::expect_refused_handles(make_cpu);
 }
 
+TEST(CpuRenderer, DrawsAsManyViewsAsItsCountSays) {
+  test::expect_counted_views(make_cpu);
+  test::expect_counted_queries(make_cpu);
+}
+
 class CpuRendererErrors : public testing::Test {
  protected:
   void SetUp() override {

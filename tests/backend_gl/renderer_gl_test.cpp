@@ -281,6 +281,8 @@ TEST_P(GlRenderer, KeepsMapsByHandle) {
   test::expect_refused_handles(maker(GetParam()));
 }
 
+TEST_P(GlRenderer, DrawsAsManyViewsAsItsCountSays) { test::expect_counted_views(maker(GetParam())); }
+
 void expect_error(const std::function<void()>& call, const std::string& part) {
   try {
     call();

@@ -1,6 +1,8 @@
 // Polylines into mitred strips, and renderers by name.
 #include "pictura/common/scene.h"
 
+#include <algorithm>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -84,6 +86,13 @@ TEST(Renderers, NullDrawsBlack) {
   const std::vector<View> views(2);
   renderer->render({}, views, images.batch());
   for (const uint8_t byte : images.bytes()) ASSERT_EQ(byte, 0);
+  // ... in the images of the views that are counted.
+  std::fill(images.bytes().begin(), images.bytes().end(), uint8_t{7});
+  const int32_t count = 1;
+  renderer->render({}, {views, &count}, images.batch());
+  const auto half = static_cast<std::ptrdiff_t>(images.bytes().size() / 2);
+  EXPECT_TRUE(std::all_of(images.bytes().begin(), images.bytes().begin() + half, [](uint8_t b) { return b == 0; }));
+  EXPECT_TRUE(std::all_of(images.bytes().begin() + half, images.bytes().end(), [](uint8_t b) { return b == 7; }));
 }
 
 }  // namespace

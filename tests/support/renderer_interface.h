@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <string>
@@ -82,6 +83,69 @@ inline void expect_refused_handles(const MakeForRig& make) {
     EXPECT_THAT(message_of([&] { renderer->upload(handle, geometry); }), testing::HasSubstr(told));
     EXPECT_THAT(message_of([&] { renderer->release(handle); }), testing::HasSubstr(told));
   }
+}
+
+/// Drawing a compacted list with its count equals drawing exactly those views; the images of others are not written,
+/// and what lies beyond the count is not read.
+inline void expect_counted_views(const MakeForRig& make) {
+  const Rig rig = paper_rig(24, 14);
+  SyntheticTown town = make_synthetic_town(1, 20);
+  town.views.resize(5);
+  const auto renderer = make(rig);
+  renderer->upload(0, town.geometry);
+  std::vector<View> list{town.views[1], town.views[3], town.views[4], {}, {}};
+  list[3].world = list[4].world = 1'000'000;
+  for (const int32_t count : {3, 2, 0}) {
+    const std::vector<View> exactly(list.begin(), list.begin() + count);
+    const std::vector<uint8_t> expected = draw_town(renderer.get(), town.scene, exactly);
+    HostImages images(rig, 5);
+    std::ranges::fill(images.bytes(), uint8_t{0xA5});
+    renderer->render(town.scene.batch(), {list, &count}, images.batch());
+    renderer->check();
+    const auto written = static_cast<std::ptrdiff_t>(expected.size());
+    EXPECT_TRUE(std::equal(expected.begin(), expected.end(), images.bytes().begin())) << count;
+    EXPECT_TRUE(std::all_of(images.bytes().begin() + written, images.bytes().end(), [](uint8_t byte) {
+      return byte == 0xA5;
+    })) << count;
+  }
+  for (const int32_t count : {-1, 6}) {
+    HostImages images(rig, 5);
+    const std::vector<View> sound(5, town.views[0]);
+    EXPECT_THAT(message_of([&] {
+                  renderer->render(town.scene.batch(), {sound, &count}, images.batch());
+                  renderer->check();
+                }),
+                testing::ContainsRegex(count < 0 ? "number of views.*-1" : "number of views.*6"));
+  }
+}
+
+/// ... and so do queries; of a view beyond the count the answer is NaN.
+inline void expect_counted_queries(const MakeForRig& make) {
+  SyntheticTown town = make_synthetic_town(1, 20);
+  town.views.resize(2);
+  const auto renderer = make(paper_rig(24, 14));
+  renderer->upload(0, town.geometry);
+  std::vector<VisibilityQuery> queries;
+  for (int32_t agent = 0; agent < 20; ++agent) queries.insert(queries.end(), {{0, agent}, {1, agent}});
+  std::vector<float> all(queries.size()), counted(queries.size());
+  const int32_t count = 1;
+  renderer->visibility(town.scene.batch(), town.views, queries, all);
+  renderer->visibility(town.scene.batch(), {town.views, &count}, queries, counted);
+  renderer->check();
+  int in_frame = 0, in_frame_of_second = 0;
+  for (std::size_t i = 0; i < queries.size(); ++i) {
+    if (queries[i].view == 1) {
+      in_frame_of_second += std::isnan(all[i]) ? 0 : 1;
+      EXPECT_TRUE(std::isnan(counted[i])) << i;
+    } else if (std::isnan(all[i])) {
+      EXPECT_TRUE(std::isnan(counted[i])) << i;
+    } else {
+      ++in_frame;
+      EXPECT_EQ(counted[i], all[i]) << i;
+    }
+  }
+  EXPECT_GT(in_frame, 0);
+  EXPECT_GT(in_frame_of_second, 0);
 }
 
 }  // namespace pictura::test

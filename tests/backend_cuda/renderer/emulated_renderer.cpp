@@ -110,7 +110,7 @@ void EmulatedRenderer::launch(int threads, unsigned blocks, Kernel&& kernel) con
   }
 }
 
-void EmulatedRenderer::render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream) {
+void EmulatedRenderer::render(const SceneBatch& scene, const ViewBatch& views, const ImageBatch& images_out, Stream) {
   Setup setup(*this, cuda::make_draw_task(config_, cameras_, scene, views, &images_out), scene);
   cuda::DrawTask& task = setup.task;
   launch(cuda::kSetupThreads, kBlocks, [&] { cuda::emulated_cull(task); });
@@ -125,7 +125,7 @@ void EmulatedRenderer::render(const SceneBatch& scene, Span<const View> views, c
   fault_ = setup.fault;
 }
 
-void EmulatedRenderer::visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
+void EmulatedRenderer::visibility(const SceneBatch& scene, const ViewBatch& views, Span<const VisibilityQuery> queries,
                                   Span<float> visibility_out, Stream) {
   Setup setup(*this, cuda::make_draw_task(config_, cameras_, scene, views, nullptr), scene);
   const cuda::VisibilityTask task{setup.task, queries.data(), static_cast<int32_t>(queries.size()),

@@ -25,8 +25,8 @@ class EmulatedRenderer final : public Renderer {
   const RendererConfig& config() const override { return config_; }
   void upload(GeometryHandle handle, const StaticGeometry& geometry, Stream stream = {}) override;
   void release(GeometryHandle handle, Stream stream = {}) override;
-  void render(const SceneBatch& scene, Span<const View> views, const ImageBatch& images_out, Stream stream) override;
-  void visibility(const SceneBatch& scene, Span<const View> views, Span<const VisibilityQuery> queries,
+  void render(const SceneBatch& scene, const ViewBatch& views, const ImageBatch& images_out, Stream stream) override;
+  void visibility(const SceneBatch& scene, const ViewBatch& views, Span<const VisibilityQuery> queries,
                   Span<float> visibility_out, Stream stream) override;
   /// Throws what the last call found wrong.
   void poll() override;

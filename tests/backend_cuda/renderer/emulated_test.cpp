@@ -303,10 +303,17 @@ TEST(EmulatedKernels, TellVisibility) {
   test::expect_equal_visibility(&emulated, make_renderer("cpu", config).get(), town);
 }
 
-TEST(EmulatedKernels, KeepMapsByHandle) {
-  uint64_t seed = 40;
-  test::expect_maps_by_handle(
-      [&](const Rig& rig) { return std::make_unique<EmulatedRenderer>(config_of(rig), seed++); });
+test::MakeForRig maker(uint64_t first_seed) {
+  return [seed = first_seed](const Rig& rig) mutable {
+    return std::make_unique<EmulatedRenderer>(config_of(rig), seed++);
+  };
+}
+
+TEST(EmulatedKernels, KeepMapsByHandle) { test::expect_maps_by_handle(maker(40)); }
+
+TEST(EmulatedKernels, DrawAsManyViewsAsTheirCountSays) {
+  test::expect_counted_views(maker(50));
+  test::expect_counted_queries(maker(60));
 }
 
 class EmulatedHardScenes : public testing::TestWithParam<HardScene> {};

@@ -179,6 +179,11 @@ TEST_F(CudaRendererTest, KeepsMapsByHandle) {
   test::expect_refused_handles(make_for_host);
 }
 
+TEST_F(CudaRendererTest, DrawsAsManyViewsAsItsCountSays) {
+  test::expect_counted_views(make_for_host);
+  test::expect_counted_queries(make_for_host);
+}
+
 // What lies on the host is checked there, before the device sees it.
 TEST_F(CudaRendererTest, HostCallersLearnAtOnceWhatIsWrong) {
   SyntheticTown town = make_synthetic_town(5, 5);
