@@ -26,7 +26,11 @@ enum class Draw : uint32_t { rigs, world, views, settings, hidden_agents, querie
 
 RandomStream random_of(const SoakOptions& options, int64_t scene, Draw what) {
   const auto high = static_cast<uint32_t>(scene >> 32), low = static_cast<uint32_t>(scene);
-  return {options.seed, static_cast<uint32_t>(what), 0, high, low, Purpose::soak};
+  return RandomStream({.seed = options.seed,
+                       .world = static_cast<uint32_t>(what),
+                       .episode = high,
+                       .step = low,
+                       .purpose = Purpose::soak});
 }
 
 // Rigs are few, because kernels are built for each: the paper's, and three of cameras of odd sizes.

@@ -1,8 +1,9 @@
-// Counter-based random numbers: Philox4x32-10 (Salmon et al., SC 2011). A draw is a pure function of who asks, when and
-// for what, so results depend neither on the number of threads nor on how a batch is split over devices.
+// Counter-based random numbers: Philox4x32-10 (Salmon et al., SC 2011). A draw is a pure function of its key, so
+// results depend neither on the number of threads nor on how a batch is split over devices.
 #pragma once
 
 #include "pictura/common/math.h"
+#include "pictura/common/portable/debug_check.h"
 #include "pictura/common/portable/hd.h"
 
 namespace pictura {
@@ -44,20 +45,39 @@ enum class Purpose : uint8_t {
   soak,
 };
 
-/// A stream of draws for one (seed, world, agent, episode, step, purpose). Ids are global across ranks.
+/// Whose draws they are, when, and what for. Ids are global across ranks. Fields that are not given are 0.
+struct RandomKey {
+  static constexpr int kAgentBits = 12, kPurposeBits = 8;  // those of the others are all of their bits
+  static constexpr uint32_t kMaxAgents = 1u << kAgentBits;
+
+  uint64_t seed = 0;
+  uint32_t world = 0;
+  uint32_t agent = 0;  // of its world, below kMaxAgents: not a slot of a simulator
+  uint32_t episode = 0;
+  uint32_t step = 0;
+  Purpose purpose = Purpose::world_size;
+
+  PICTURA_HD constexpr bool is_in_range() const { return agent < kMaxAgents; }
+};
+
+/// The stream of draws of one key. A key out of range would draw what another one draws: it ends a debug build.
 class RandomStream {
  public:
-  PICTURA_HD RandomStream(uint64_t seed, uint32_t world, uint32_t agent, uint32_t episode, uint32_t step,
-                          Purpose purpose)
-      : key0_(static_cast<uint32_t>(seed)),
-        key1_(static_cast<uint32_t>(seed >> 32)),
-        counter_{{world, (agent & 0xFFFu) | (static_cast<uint32_t>(purpose) << 12), episode, step}} {}
+  PICTURA_HD explicit RandomStream(const RandomKey& key)
+      : key0_(static_cast<uint32_t>(key.seed)),
+        key1_(static_cast<uint32_t>(key.seed >> 32)),
+        counter_{
+            {key.world,
+             (key.agent & (RandomKey::kMaxAgents - 1)) | (static_cast<uint32_t>(key.purpose) << RandomKey::kAgentBits),
+             key.episode, key.step}} {
+    PICTURA_DEBUG_CHECK(key.is_in_range());
+  }
 
   /// 32 uniform bits. A stream holds 16,384 of them.
   PICTURA_HD uint32_t bits() {
     if (next_ == 4) {
       block_ = philox4x32_10(counter_, key0_, key1_);
-      counter_.word[1] += 1u << 20;
+      counter_.word[1] += 1u << kBlockShift;
       next_ = 0;
     }
     return block_.word[next_++];
@@ -66,7 +86,7 @@ class RandomStream {
   /// Passes over `count` draws, each of 32 bits.
   PICTURA_HD void skip(int count) {
     for (; count > 0 && next_ < 4; --count) ++next_;
-    counter_.word[1] += static_cast<uint32_t>(count / 4) << 20;
+    counter_.word[1] += static_cast<uint32_t>(count / 4) << kBlockShift;
     for (count %= 4; count > 0; --count) bits();
   }
 
@@ -78,6 +98,7 @@ class RandomStream {
   PICTURA_HD int below(int n) { return static_cast<int>((uint64_t{bits()} * static_cast<uint32_t>(n)) >> 32); }
 
  private:
+  static constexpr int kBlockShift = RandomKey::kAgentBits + RandomKey::kPurposeBits;
   uint32_t key0_, key1_;
   Philox4 counter_;
   Philox4 block_{};

@@ -130,7 +130,7 @@ std::vector<WallFace> make_walls(const RoadMap& map, const MapGeometryOptions& o
   for (const BuildingLine& line : map.building_lines) {
     if (remaining_pieces == 0) {
       // The next building or gap, and its length in pieces of building line.
-      RandomStream random(options.wall_seed, 0, 0, num_draws++, 0, Purpose::walls);
+      RandomStream random({.seed = options.wall_seed, .episode = num_draws++, .purpose = Purpose::walls});
       is_building = !is_building || random.uniform() < kTerracedFraction;
       remaining_pieces = 1 + random.below(is_building ? kMaxBuildingPieces : kMaxGapPieces);
       height_m = random.uniform(kMinWall_m, kMaxWall_m);

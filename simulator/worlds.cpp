@@ -24,7 +24,7 @@ std::vector<WorldSpec> draw_worlds(uint64_t seed, int num_slots, int min_agents,
   std::vector<WorldSpec> worlds;
   for (int filled = 0; filled < num_slots;) {
     const auto index = static_cast<uint32_t>(worlds.size());
-    RandomStream random(seed, index, 0, 0, 0, Purpose::world_size);
+    RandomStream random({.seed = seed, .world = index, .purpose = Purpose::world_size});
     const int size = min_agents + random.below(max_agents - min_agents + 1);
     WorldSpec world;
     world.map = static_cast<int>(index % static_cast<uint32_t>(num_maps));

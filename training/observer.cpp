@@ -193,7 +193,12 @@ void choose_actions(const at::Tensor& log_probs, const Simulator& simulator, uin
       if (argmax) {
         actions_out[slot] = static_cast<int32_t>(std::max_element(row, row + kNumActions) - row);
       } else {
-        RandomStream stream(seed, world.global_world, static_cast<uint32_t>(agent), episode, step, Purpose::action);
+        RandomStream stream({.seed = seed,
+                             .world = world.global_world,
+                             .agent = static_cast<uint32_t>(agent),
+                             .episode = episode,
+                             .step = step,
+                             .purpose = Purpose::action});
         actions_out[slot] = draw_action({row, kNumActions}, stream.uniform());
       }
     }

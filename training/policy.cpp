@@ -22,8 +22,10 @@ class ParameterMaker {
     float* values = drawn.data_ptr<float>();
     for (int64_t i = 0; i < drawn.numel(); ++i) {
       // Box-Muller, one stream per element.
-      RandomStream stream(seed_, static_cast<uint32_t>(parameters_->size()), 0, static_cast<uint32_t>(i), 0,
-                          Purpose::parameters);
+      RandomStream stream({.seed = seed_,
+                           .world = static_cast<uint32_t>(parameters_->size()),
+                           .episode = static_cast<uint32_t>(i),
+                           .purpose = Purpose::parameters});
       const double radius = std::sqrt(-2.0 * std::log(1.0 - stream.uniform()));
       const double angle = 2.0 * std::numbers::pi * stream.uniform();
       values[i] = static_cast<float>(deviation * radius * std::cos(angle));

@@ -71,8 +71,11 @@ std::vector<int64_t> shuffled(int64_t n, uint64_t seed, int64_t update, int64_t 
   std::vector<int64_t> order(static_cast<size_t>(n));
   for (int64_t i = 0; i < n; ++i) order[static_cast<size_t>(i)] = i;
   for (int64_t i = n - 1; i > 0; --i) {
-    RandomStream stream(seed, static_cast<uint32_t>(i), 0, static_cast<uint32_t>(update), static_cast<uint32_t>(epoch),
-                        Purpose::minibatch);
+    RandomStream stream({.seed = seed,
+                         .world = static_cast<uint32_t>(i),
+                         .episode = static_cast<uint32_t>(update),
+                         .step = static_cast<uint32_t>(epoch),
+                         .purpose = Purpose::minibatch});
     std::swap(order[static_cast<size_t>(i)], order[static_cast<size_t>(stream.below(static_cast<int>(i + 1)))]);
   }
   return order;

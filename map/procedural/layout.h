@@ -98,7 +98,8 @@ class Layout {
 
   /// The random stream of one decision (`purpose`) about one element (`index`).
   RandomStream draw(uint32_t purpose, int index) const {
-    return {options_.seed, static_cast<uint32_t>(index), 0, purpose, 0, Purpose::town};
+    return RandomStream(
+        {.seed = options_.seed, .world = static_cast<uint32_t>(index), .episode = purpose, .purpose = Purpose::town});
   }
   /// A random selection of the given fraction of the candidates: at least one unless the fraction is 0 or there are
   /// none.

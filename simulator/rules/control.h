@@ -9,7 +9,11 @@ namespace pictura {
 
 /// Uniform over all actions.
 PICTURA_HD inline int32_t random_action(uint64_t seed, uint32_t global_world, int agent, uint32_t step) {
-  RandomStream random(seed, global_world, static_cast<uint32_t>(agent), 0, step, Purpose::action);
+  RandomStream random({.seed = seed,
+                       .world = global_world,
+                       .agent = static_cast<uint32_t>(agent),
+                       .step = step,
+                       .purpose = Purpose::action});
   return random.below(kNumActions);
 }
 

@@ -27,7 +27,12 @@ PICTURA_HD inline LightPlan draw_light_plan(const StopLine& line, int32_t light,
   constexpr uint32_t kEpisodeKey = 0, kJunctionKey = 1, kLightKey = 2, kLoneLightKey = 3;
   // The stream's agent and step say whose draws these are: the episode's, a junction's, a light's.
   const uint32_t group = static_cast<uint32_t>(line.junction >= 0 ? line.junction : light);
-  RandomStream timing(seed, world, line.junction >= 0 ? kJunctionKey : kLoneLightKey, episode, group, Purpose::lights);
+  RandomStream timing({.seed = seed,
+                       .world = world,
+                       .agent = line.junction >= 0 ? kJunctionKey : kLoneLightKey,
+                       .episode = episode,
+                       .step = group,
+                       .purpose = Purpose::lights});
   const float green_s = timing.uniform(1.0f, 10.0f);
   const float yellow_s = timing.uniform(1.5f, 2.25f);
   const float red_s = timing.uniform(0.3f, 10.0f);
@@ -39,8 +44,14 @@ PICTURA_HD inline LightPlan draw_light_plan(const StopLine& line, int32_t light,
   plan.num_phases = line.num_phases;
   plan.offset_steps = timing.below(plan.num_phases * (plan.green_steps + plan.yellow_steps + plan.red_steps));
   if (!fixed) {
-    RandomStream whole_episode(seed, world, kEpisodeKey, episode, 0, Purpose::lights);
-    RandomStream own(seed, world, kLightKey, episode, static_cast<uint32_t>(light), Purpose::lights);
+    RandomStream whole_episode(
+        {.seed = seed, .world = world, .agent = kEpisodeKey, .episode = episode, .purpose = Purpose::lights});
+    RandomStream own({.seed = seed,
+                      .world = world,
+                      .agent = kLightKey,
+                      .episode = episode,
+                      .step = static_cast<uint32_t>(light),
+                      .purpose = Purpose::lights});
     plan.is_off = whole_episode.uniform() < kOffFraction || own.uniform() < kOffFraction;
   }
   return plan;

@@ -21,7 +21,12 @@ PICTURA_HD inline float draw_conditioning(const ConditioningRange& range, Random
 }
 
 PICTURA_HD inline RandomStream agent_stream(const WorldView& world, int agent, uint32_t step, Purpose purpose) {
-  return {world.seed, world.global_world, static_cast<uint32_t>(agent), world.episode, step, purpose};
+  return RandomStream({.seed = world.seed,
+                       .world = world.global_world,
+                       .agent = static_cast<uint32_t>(agent),
+                       .episode = world.episode,
+                       .step = step,
+                       .purpose = purpose});
 }
 
 /// Clears the agent's fields and draws its class, size and conditioning. It is absent until place_agent finds room.

@@ -12,7 +12,7 @@ namespace pictura {
 namespace {
 
 TEST(Grid, EveryBoxIsInEveryCellThatItTouches) {
-  RandomStream random(3, 0, 0, 0, 0, Purpose::town);
+  RandomStream random({.seed = 3, .purpose = Purpose::town});
   std::vector<Aabb2> boxes;
   for (int i = 0; i < 200; ++i) {
     const Vec2 low{random.uniform(-100, 100), random.uniform(-40, 90)};

@@ -29,7 +29,13 @@ TEST(Rng, StreamsOfDifferentKeysDiffer) {
         for (uint32_t episode : {0u, 1u}) {
           for (uint32_t step : {0u, 1u}) {
             for (Purpose purpose : {Purpose::world_size, Purpose::spawn, Purpose::action}) {
-              first_draws.insert(RandomStream(seed, world, agent, episode, step, purpose).bits());
+              first_draws.insert(RandomStream({.seed = seed,
+                                               .world = world,
+                                               .agent = agent,
+                                               .episode = episode,
+                                               .step = step,
+                                               .purpose = purpose})
+                                     .bits());
             }
           }
         }
@@ -39,8 +45,16 @@ TEST(Rng, StreamsOfDifferentKeysDiffer) {
   EXPECT_EQ(first_draws.size(), 3u * 2 * 3 * 2 * 2 * 3);
 }
 
+TEST(Rng, KeysBeyondTheirFieldsAreFaults) {
+  EXPECT_TRUE((RandomKey{.agent = 4095, .purpose = Purpose::soak}.is_in_range()));
+  EXPECT_FALSE((RandomKey{.agent = 4096}.is_in_range()));
+  // Such a key would draw what agent 0 draws.
+  EXPECT_DEBUG_DEATH(RandomStream({.agent = 4096}), "is_in_range");
+}
+
 TEST(Rng, AStreamRepeatsAndDoesNotCycleBetweenBlocks) {
-  RandomStream a(5, 1, 2, 3, 4, Purpose::goals), b(5, 1, 2, 3, 4, Purpose::goals);
+  RandomStream a({.seed = 5, .world = 1, .agent = 2, .episode = 3, .step = 4, .purpose = Purpose::goals}),
+      b({.seed = 5, .world = 1, .agent = 2, .episode = 3, .step = 4, .purpose = Purpose::goals});
   std::set<uint32_t> seen;
   for (int i = 0; i < 1000; ++i) {
     const uint32_t bits = a.bits();
@@ -51,7 +65,7 @@ TEST(Rng, AStreamRepeatsAndDoesNotCycleBetweenBlocks) {
 }
 
 TEST(Rng, UniformDrawsHaveTheMomentsOfTheirRange) {
-  RandomStream random(1, 0, 0, 0, 0, Purpose::spawn);
+  RandomStream random({.seed = 1, .purpose = Purpose::spawn});
   double sum = 0, sum_squares = 0;
   std::array<int, 7> histogram{};
   constexpr int kDraws = 8000;

@@ -347,7 +347,7 @@ TEST(ProceduralTownMap, SmallTownsAreSound) {
 TEST(ProceduralTownMap, TownsOfDrawnOptionsAreSound) {
   for (uint64_t seed = 0; seed < num_seeds() / 2; ++seed) {
     TownOptions options = options_of(seed, 2, 2);
-    RandomStream stream(seed, 0, 0, 0, 0, Purpose::town);
+    RandomStream stream({.seed = seed, .purpose = Purpose::town});
     for (const TownFeature& feature : town_features()) {
       const double value = feature.low + (feature.high - feature.low) * static_cast<double>(stream.uniform());
       options.*feature.value = feature.value == &TownOptions::max_lanes ? std::round(value) : value;

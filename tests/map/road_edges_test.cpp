@@ -80,7 +80,7 @@ TEST(RoadEdges, SliversAreDropped) { EXPECT_TRUE(outline({band_of(0, 0, 0, 0.06,
 
 TEST(RoadEdges, RandomBandsHaveAnEdgeExactlyWhereTheirUnionEnds) {
   for (uint64_t seed = 0; seed < 20; ++seed) {
-    RandomStream random(seed, 0, 0, 0, 0, Purpose::town);
+    RandomStream random({.seed = seed, .purpose = Purpose::town});
     struct Box {
       double x, y, heading, length, width;
       bool holds(double px, double py, double margin) const {

@@ -39,7 +39,7 @@ bool overlap_by_points(const OrientedBox& a, const OrientedBox& b) {
 }
 
 TEST(Collision, OverlapAgreesWithPoints) {
-  RandomStream random(1, 0, 0, 0, 0, Purpose::town);
+  RandomStream random({.seed = 1, .purpose = Purpose::town});
   int overlaps = 0, undecided = 0;
   for (int i = 0; i < 400; ++i) {
     const OrientedBox a =

@@ -19,7 +19,7 @@ double arc_length(const RoutePoint& at, double straight_m, double arc_m) {
 TEST(Goal, WaypointsLie20To60MetresApartAlongTheRoute) {
   const MapRules map = make_map_rules(*testing::stadium(200, 1), {});
   const double arc_m = map.lanes[1].length_m, lap_m = 400 + 2 * arc_m;
-  RandomStream random(3, 0, 0, 0, 0, Purpose::goals);
+  RandomStream random({.seed = 3, .purpose = Purpose::goals});
   RoutePoint at{0, 10};
   double shortest = 1e9, longest = 0;
   for (int i = 0; i < 500; ++i) {
@@ -37,7 +37,7 @@ TEST(Goal, WaypointsLie20To60MetresApartAlongTheRoute) {
 
 TEST(Goal, LanesChangeWithAQuarterOfTheWaypoints) {
   const MapRules map = make_map_rules(*testing::stadium(200, 2), {});
-  RandomStream random(3, 0, 0, 0, 0, Purpose::goals);
+  RandomStream random({.seed = 3, .purpose = Purpose::goals});
   RoutePoint at{0, 10};
   int changes = 0;
   constexpr int kWaypoints = 4000;
@@ -57,7 +57,7 @@ TEST(Goal, RoutesAvoidDeadEnds) {
   map->lanes[2].successors = {};
   map->lanes[3].is_endless = false;
   const MapRules world_map = make_map_rules(*map, {});
-  RandomStream random(3, 0, 0, 0, 0, Purpose::goals);
+  RandomStream random({.seed = 3, .purpose = Purpose::goals});
   RoutePoint at{2, 150};
   for (int i = 0; i < 200; ++i) {
     at = next_waypoint(world_map.view(), at, &random);

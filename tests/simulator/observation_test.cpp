@@ -199,7 +199,7 @@ TEST_F(Observation, EveryCoefficientHasThePapersRange) {
 
 /// What is listed must be what is in sight: checked against all pieces of the map, from many places and headings.
 TEST_F(Observation, LanesBoundariesAndWallsAreAllThatIsInSight) {
-  RandomStream random(5, 0, 0, 0, 0, Purpose::town);
+  RandomStream random({.seed = 5, .purpose = Purpose::town});
   const MapRules& map = stage.batch.map_rules[0];
   for (int i = 0; i < 300; ++i) {
     const float heading = random.uniform(-kPi, kPi);

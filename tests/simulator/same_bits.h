@@ -36,7 +36,11 @@ inline std::vector<int32_t> mixed_actions(int num_slots, uint32_t step) {
   constexpr int32_t kCoasting = 2 * kNumLatActions + 1;
   std::vector<int32_t> actions;
   for (int slot = 0; slot < num_slots; ++slot) {
-    RandomStream random(9, 0, static_cast<uint32_t>(slot), 0, step, Purpose::action);
+    RandomStream random({.seed = 9,
+                         .world = static_cast<uint32_t>(slot / kMaxAgentsPerWorld),
+                         .agent = static_cast<uint32_t>(slot % kMaxAgentsPerWorld),
+                         .step = step,
+                         .purpose = Purpose::action});
     actions.push_back(random.uniform() < 0.3f ? random.below(kNumActions) : kCoasting);
   }
   return actions;
@@ -50,7 +54,11 @@ inline std::vector<Command> mixed_commands(const AgentStateView& state, int num_
   for (int slot = 0; slot < num_slots; ++slot) {
     Command& command = commands[static_cast<size_t>(slot)];
     command.action = actions[static_cast<size_t>(slot)];
-    RandomStream random(8, 0, static_cast<uint32_t>(slot), 0, step, Purpose::action);
+    RandomStream random({.seed = 8,
+                         .world = static_cast<uint32_t>(slot / kMaxAgentsPerWorld),
+                         .agent = static_cast<uint32_t>(slot % kMaxAgentsPerWorld),
+                         .step = step,
+                         .purpose = Purpose::action});
     const float kind = random.uniform();
     if (kind >= 0.1f) continue;
     const int of = kind < 0.005f ? random.below(num_slots) : slot;

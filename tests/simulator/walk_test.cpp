@@ -104,7 +104,7 @@ TEST(Walkways, StrollsHaveTheirLengthAndTurnBackAtDeadEnds) {
   const MapRules map = world_map(*street());
   const MapView view = map.view();
   for (uint32_t i = 0; i < 200; ++i) {
-    RandomStream random(1, 0, i, 0, 0, Purpose::goals);
+    RandomStream random({.seed = 1, .agent = i, .purpose = Purpose::goals});
     const RoutePoint from{static_cast<int32_t>(i % view.walk_pieces.size()), 0.5f};
     // Shorter than the way to the far end and back: the way from A to B is the distance, or mirrored at one end.
     const float distance_m = random.uniform(20, 60);

@@ -39,7 +39,7 @@ std::vector<float> plain_gae(const std::vector<float>& rewards, const std::vecto
 
 TEST(Gae, EqualsThePlainRecursionExactly) {
   const size_t num_steps = 37, num_slots = 53;
-  RandomStream stream(1, 2, 3, 4, 5, Purpose::initial_state);
+  RandomStream stream({.seed = 1, .world = 2, .agent = 3, .episode = 4, .step = 5, .purpose = Purpose::initial_state});
   std::vector<float> rewards(num_steps * num_slots), values((num_steps + 1) * num_slots);
   std::vector<uint8_t> terminated(rewards.size()), truncated(rewards.size()), valid(rewards.size());
   for (float& x : rewards) x = stream.uniform(-1, 1);
@@ -173,8 +173,11 @@ struct Corridor {
       rollout.values.select(0, t).copy_(decision.value);
       if (t == kSteps) break;
       for (int64_t slot = 0; slot < kSlots; ++slot) {
-        RandomStream stream(9, 0, static_cast<uint32_t>(slot), static_cast<uint32_t>(update), static_cast<uint32_t>(t),
-                            Purpose::action);
+        RandomStream stream({.seed = 9,
+                             .agent = static_cast<uint32_t>(slot),
+                             .episode = static_cast<uint32_t>(update),
+                             .step = static_cast<uint32_t>(t),
+                             .purpose = Purpose::action});
         const float* log_probs = decision.log_probs.const_data_ptr<float>() + slot * kNumActions;
         const int action = draw_action({log_probs, kNumActions}, stream.uniform());
         const bool was_open = open[slot].item<float>() > 0;

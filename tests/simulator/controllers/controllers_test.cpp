@@ -48,13 +48,30 @@ TEST(Controller, RandomActionsAreKeyedByWorldAgentAndStep) {
     controller->act(simulator->controller_input(), {}, commands);
     for (uint32_t slot = 0; slot < 45; ++slot) {
       const uint32_t world = slot < 5 ? 7 : 2, agent = slot < 5 ? slot : slot - 5;
-      RandomStream random(11, world, agent, 0, step, Purpose::action);
+      RandomStream random({.seed = 11, .world = world, .agent = agent, .step = step, .purpose = Purpose::action});
       ASSERT_EQ(commands[slot].kind, CommandKind::action);
       ASSERT_EQ(commands[slot].action, random.below(kNumActions)) << "step " << step << ", slot " << slot;
     }
     simulator->step(commands);
   }
   EXPECT_GT(simulator->totals().episodes, 0) << "steps go on over episodes";
+}
+
+// Slots 0 and 4,096 drew alike as long as actions were keyed by slot.
+TEST(Controller, RandomActionsOfManySlotsDiffer) {
+  const auto simulator =
+      make(testing::cars({.vector_observations = false}), testing::stadium(1500, 2), {{0, 4090, 0}, {0, 100, 1}});
+  const auto controller = make_controller("random", *simulator, 11);
+  std::vector<Command> commands(4190);
+  int alike = 0;
+  for (int step = 0; step < 20; ++step) {
+    controller->act(simulator->controller_input(), {}, commands);
+    for (size_t slot = 0; slot + 4096 < commands.size(); ++slot) {
+      alike += commands[slot].action == commands[slot + 4096].action;
+    }
+    simulator->step(commands);
+  }
+  EXPECT_NEAR(alike, 20 * 94 / 12.0, 60);
 }
 
 TEST(Controller, RandomActionsGoOnWithARestoredSimulator) {
