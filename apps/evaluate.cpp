@@ -1,8 +1,10 @@
 // `pictura evaluate`: the paper's five driving metrics of a checkpoint, by traffic density.
+#include "pictura/training/evaluation/evaluate.h"
+
 #include "pictura/apps/commands.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
-#include "pictura/training/training.h"
+#include "pictura/simulator/simulator.h"
 
 namespace pictura {
 

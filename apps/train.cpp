@@ -5,7 +5,7 @@
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/drawing/learning_curve.h"
-#include "pictura/training/training.h"
+#include "pictura/training/loop.h"
 
 namespace pictura {
 

@@ -10,7 +10,7 @@
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/controllers/host_controllers.h"
 #ifdef PICTURA_HAS_TORCH
-#include "pictura/training/training.h"
+#include "pictura/training/session.h"
 #endif
 
 namespace pictura {

@@ -3,9 +3,12 @@
 #include <cmath>
 #include <numbers>
 
+#include <ATen/core/grad_mode.h>
+
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
 #include "pictura/common/support/hash.h"
+#include "pictura/training/rules/choose_action.h"
 
 namespace pictura {
 
@@ -244,6 +247,35 @@ std::string Policy::hash() const {
     hash.add_bytes(host.const_data_ptr(), host.nbytes());
   }
   return hash.hex();
+}
+
+Decision decide(const Policy& policy, const Observation& observation, int64_t chunk) {
+  const at::NoGradGuard no_grad;
+  const int64_t batch = observation.ego.size(0);
+  std::vector<at::Tensor> log_probs, values;
+  for (int64_t begin = 0; begin < batch; begin += chunk) {
+    const int64_t count = std::min(chunk, batch - begin);
+    const Policy::Output output =
+        policy.forward(observation.map([&](const at::Tensor& t) { return t.narrow(0, begin, count); }));
+    log_probs.push_back(at::log_softmax(output.logits, 1));
+    values.push_back(output.value);
+  }
+  return {at::cat(log_probs), at::cat(values)};
+}
+
+void choose_actions(const at::Tensor& log_probs, const Simulator& simulator, uint64_t seed, bool argmax,
+                    Span<int32_t> actions_out) {
+  const at::Tensor host = log_probs.contiguous();
+  const float* row = host.const_data_ptr<float>();
+  size_t slot = 0;
+  for (size_t w = 0; w < simulator.worlds().size(); ++w) {
+    const WorldSpec& world = simulator.worlds()[w];
+    ActionKey key{seed, world.global_world, 0, static_cast<uint32_t>(simulator.episode_index()[w]),
+                  static_cast<uint32_t>(simulator.episode_step()[w])};
+    for (; key.agent < static_cast<uint32_t>(world.num_agents); ++key.agent, ++slot, row += kNumActions) {
+      actions_out[slot] = argmax ? most_likely_action(row, kNumActions) : draw_action(row, kNumActions, key);
+    }
+  }
 }
 
 }  // namespace pictura

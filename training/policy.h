@@ -9,38 +9,9 @@
 #include <ATen/ATen.h>
 
 #include "pictura/training/config.h"
+#include "pictura/training/observation.h"
 
 namespace pictura {
-
-/// The images of the cameras that share one size.
-struct ImageBlock {
-  at::Tensor pixels;             // u8 [batch, cameras of this size, 3, height, width]
-  std::vector<int64_t> cameras;  // their indices in the rig
-};
-
-/// What a batch of agents sees. Tensors that the modality does not use are undefined.
-struct Observation {
-  at::Tensor ego;                                    // [batch, kEgoFeatures]
-  at::Tensor conditioning;                           // [batch, kNumConditioning]
-  at::Tensor waypoints;                              // [batch, kNumWaypoints * kWaypointFeatures]
-  at::Tensor partners, lanes, boundaries, controls;  // [batch, members, features]
-  at::Tensor set_counts;                             // i32 [batch, kNumEntitySets]
-  std::vector<ImageBlock> images;
-
-  /// Applies f to every defined tensor.
-  template <typename F>
-  Observation map(F&& f) const {
-    Observation result;
-    at::Tensor Observation::* const tensors[] = {
-        &Observation::ego,   &Observation::conditioning, &Observation::waypoints, &Observation::partners,
-        &Observation::lanes, &Observation::boundaries,   &Observation::controls,  &Observation::set_counts};
-    for (const auto tensor : tensors) {
-      if ((this->*tensor).defined()) result.*tensor = f(this->*tensor);
-    }
-    for (const ImageBlock& block : images) result.images.push_back({f(block.pixels), block.cameras});
-    return result;
-  }
-};
 
 /// A parameter by the name under which it is saved.
 struct NamedTensor {
@@ -48,7 +19,7 @@ struct NamedTensor {
   at::Tensor value;
 };
 
-/// Turns what stands around an agent into one embedding of 4 * policy.embedding_width.
+/// Turns what is around an agent into one embedding of 4 * policy.embedding_width.
 class SceneEncoder {
  public:
   virtual ~SceneEncoder() = default;
@@ -91,6 +62,17 @@ class Policy {
   friend class VectorEncoder;
   friend class PerspectiveEncoder;
 };
+
+/// Policy outputs for a whole batch without gradients, `chunk` agents at a time: log-probabilities [batch, actions] and
+/// values [batch].
+struct Decision {
+  at::Tensor log_probs, value;
+};
+Decision decide(const Policy& policy, const Observation& observation, int64_t chunk);
+
+/// Chooses one action per slot: the most likely one, or a draw keyed by (seed, global world, agent, episode, step).
+void choose_actions(const at::Tensor& log_probs, const Simulator& simulator, uint64_t seed, bool argmax,
+                    Span<int32_t> actions_out);
 
 /// Largest value over the members of each set, [batch, members, width] -> [batch, width]; members at and beyond
 /// counts [batch] are padding; an empty set gives zeros.

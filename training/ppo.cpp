@@ -7,30 +7,13 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
-#include "pictura/training/rules/gae.h"
+#include "pictura/training/rules/advantage_filter.h"
 
 namespace pictura {
 
-Rollout::Rollout(Observation storage, int64_t num_steps, int64_t num_slots)
-    : observation(std::move(storage)),
-      values(at::zeros({num_steps + 1, num_slots}, at::kFloat)),
-      actions(at::zeros({num_steps, num_slots}, at::kInt)),
-      log_probs(at::zeros({num_steps, num_slots}, at::kFloat)),
-      rewards(at::zeros({num_steps, num_slots}, at::kFloat)),
-      terminated(at::zeros({num_steps, num_slots}, at::kByte)),
-      truncated(at::zeros({num_steps, num_slots}, at::kByte)),
-      valid(at::zeros({num_steps, num_slots}, at::kByte)),
-      advantages(at::zeros({num_steps, num_slots}, at::kFloat)) {}
-
-void Rollout::compute_advantages(double gamma, double gae_lambda) {
-  gae(num_steps(), num_slots(), rewards.const_data_ptr<float>(), values.const_data_ptr<float>(),
-      terminated.const_data_ptr<uint8_t>(), truncated.const_data_ptr<uint8_t>(), valid.const_data_ptr<uint8_t>(),
-      static_cast<float>(gamma), static_cast<float>(gae_lambda), advantages.data_ptr<float>());
-}
-
 float AdvantageFilter::threshold(float max_advantage, double ema, double fraction) {
-  average = average < 0 ? max_advantage : ema * max_advantage + (1 - ema) * average;
-  return static_cast<float>(fraction * average);
+  average = filter_average(average, max_advantage, ema);
+  return filter_threshold(average, fraction);
 }
 
 AdamW::AdamW(const Policy& policy, const Config::Train& config) : parameters_(policy.parameters()), config_(config) {
@@ -89,6 +72,17 @@ double explained_variance(const at::Tensor& values, const at::Tensor& returns) {
   return variance > 0 ? 1 - (returns - values).var().item<double>() / variance : 0;
 }
 
+// Indices of the transitions that the filter keeps, in ascending order.
+at::Tensor kept_transitions(const at::Tensor& advantages, const at::Tensor& valid, float threshold) {
+  const float* const advantage = advantages.const_data_ptr<float>();
+  const uint8_t* const is_valid = valid.const_data_ptr<uint8_t>();
+  std::vector<int64_t> kept;
+  for (int64_t i = 0; i < advantages.numel(); ++i) {
+    if (filter_keeps(advantage[i], is_valid[i] != 0, threshold)) kept.push_back(i);
+  }
+  return at::tensor(kept, at::kLong);
+}
+
 }  // namespace
 
 UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Config::Train& config, uint64_t seed,
@@ -103,14 +97,13 @@ UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Confi
   const at::Tensor returns = advantages + values;
 
   // Filter, once per rollout.
-  const at::Tensor magnitude = advantages.abs();
-  const float max_advantage = magnitude.max().item<float>();
+  const float max_advantage = advantages.abs().max().item<float>();
   PICTURA_CHECK(std::isfinite(max_advantage), "update {}: an advantage is not finite", update + 1);
-  stats.adv_threshold = filter->threshold(max_advantage, config.adv_filter_ema, config.adv_filter_threshold);
-  const at::Tensor is_valid = rollout.valid.flatten().to(at::kBool);
-  const at::Tensor kept =
-      is_valid.logical_and(magnitude >= static_cast<float>(stats.adv_threshold)).nonzero().squeeze(1);
-  const int64_t num_valid = is_valid.sum().item<int64_t>(), num_kept = kept.size(0);
+  const float threshold = filter->threshold(max_advantage, config.adv_filter_ema, config.adv_filter_threshold);
+  stats.adv_threshold = static_cast<double>(threshold);
+  const at::Tensor valid = rollout.valid.flatten();
+  const at::Tensor kept = kept_transitions(advantages, valid, threshold);
+  const int64_t num_valid = valid.sum().item<int64_t>(), num_kept = kept.size(0);
   if (num_kept == 0) return stats;
   stats.kept_fraction = static_cast<double>(num_kept) / static_cast<double>(num_valid);
   stats.explained_variance = explained_variance(values.index_select(0, kept), returns.index_select(0, kept));

@@ -3,30 +3,14 @@
 #pragma once
 
 #include "pictura/training/policy.h"
+#include "pictura/training/rollout.h"
 
 namespace pictura {
 
-/// What all slots saw, did and got in num_steps steps; time first.
-struct Rollout {
-  Observation observation;                  // [num_steps + 1, num_slots, ...]; the last row is seen after the last step
-  at::Tensor values;                        // f32 [num_steps + 1, num_slots]
-  at::Tensor actions;                       // i32 [num_steps, num_slots], as all below
-  at::Tensor log_probs;                     // f32, of the chosen actions
-  at::Tensor rewards;                       // f32
-  at::Tensor terminated, truncated, valid;  // u8, as StepResult defines them
-  at::Tensor advantages;                    // f32, see gae.h
-
-  Rollout(Observation storage, int64_t num_steps, int64_t num_slots);
-  int64_t num_steps() const { return actions.size(0); }
-  int64_t num_slots() const { return actions.size(1); }
-  void compute_advantages(double gamma, double gae_lambda);
-};
-
-/// Drops transitions whose advantages are too small to teach anything (paper, appendix, optimization; after Gigaflow).
+/// The memory of the advantage filter (rules/advantage_filter.h) from rollout to rollout.
 class AdvantageFilter {
  public:
-  /// Takes in the newest rollout's max |advantage|: average = ema * newest + (1 - ema) * average, the first one as it
-  /// is. Returns the least |advantage| that is kept.
+  /// Takes in the newest rollout's max |advantage|. Returns the least |advantage| that is kept.
   float threshold(float max_advantage, double ema, double fraction);
   double average = -1;  // of the rollouts' maxima; negative before the first
 };

@@ -13,8 +13,8 @@ namespace pictura::cuda {
 /// Owns the loaded code of its kernels.
 class KernelLibrary {
  public:
-  /// Builds the kernels for the rig and a CUDA device, which must be the current one; without NVRTC, uses those compiled
-  /// into this program. Throws Error if those do not run on the device.
+  /// Builds the kernels for the rig and a CUDA device, which must be the current one; without NVRTC, uses those
+  /// compiled into this program. Throws Error if those do not run on the device.
   KernelLibrary(const Rig& rig, int device_index);
 
   const KernelSet& kernels() const { return kernels_; }

@@ -16,7 +16,7 @@
 #include "pictura/common/support/interrupt.h"
 #include "pictura/map/load_map.h"
 #ifdef PICTURA_HAS_TORCH
-#include "pictura/training/training.h"
+#include "pictura/training/loop.h"
 #endif
 
 namespace pictura {

@@ -14,7 +14,7 @@
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/training/event_file.h"
-#include "pictura/training/training.h"
+#include "pictura/training/session.h"
 
 namespace pictura {
 namespace {

@@ -11,8 +11,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
-#include "pictura/training/observer.h"
-#include "pictura/training/rules/gae.h"
+#include "pictura/training/rules/choose_action.h"
 
 namespace pictura {
 namespace {
@@ -37,6 +36,23 @@ std::vector<float> plain_gae(const std::vector<float>& rewards, const std::vecto
   return advantages;
 }
 
+// Advantages of a rollout that consists of these numbers alone. [num_steps * num_slots], but values, which have a row
+// more.
+std::vector<float> advantages_of(int64_t num_steps, int64_t num_slots, const std::vector<float>& rewards,
+                                 const std::vector<float>& values, const std::vector<uint8_t>& terminated,
+                                 const std::vector<uint8_t>& truncated, const std::vector<uint8_t>& valid, double gamma,
+                                 double gae_lambda) {
+  Rollout rollout({}, num_steps, num_slots);
+  std::copy(rewards.begin(), rewards.end(), rollout.rewards.data_ptr<float>());
+  std::copy(values.begin(), values.end(), rollout.values.data_ptr<float>());
+  std::copy(terminated.begin(), terminated.end(), rollout.terminated.data_ptr<uint8_t>());
+  std::copy(truncated.begin(), truncated.end(), rollout.truncated.data_ptr<uint8_t>());
+  std::copy(valid.begin(), valid.end(), rollout.valid.data_ptr<uint8_t>());
+  rollout.compute_advantages(gamma, gae_lambda);
+  const float* first = rollout.advantages.const_data_ptr<float>();
+  return {first, first + num_steps * num_slots};
+}
+
 TEST(Gae, EqualsThePlainRecursionExactly) {
   const size_t num_steps = 37, num_slots = 53;
   RandomStream stream({.seed = 1, .world = 2, .agent = 3, .episode = 4, .step = 5, .purpose = Purpose::initial_state});
@@ -49,9 +65,8 @@ TEST(Gae, EqualsThePlainRecursionExactly) {
     truncated[i] = stream.below(9) == 0;
     valid[i] = stream.below(5) != 0;
   }
-  std::vector<float> advantages(rewards.size());
-  gae(num_steps, num_slots, rewards.data(), values.data(), terminated.data(), truncated.data(), valid.data(), 0.97f,
-      0.9f, advantages.data());
+  const std::vector<float> advantages =
+      advantages_of(num_steps, num_slots, rewards, values, terminated, truncated, valid, 0.97f, 0.9f);
   auto column = [&](const auto& all, size_t slot) {
     std::decay_t<decltype(all)> one;
     for (size_t i = slot; i < all.size(); i += num_slots) one.push_back(all[i]);
@@ -65,15 +80,14 @@ TEST(Gae, EqualsThePlainRecursionExactly) {
 
 TEST(Gae, TruncationBootstrapsTerminationDoesNotAndResetsAreMasked) {
   // One slot, gamma 0.5, lambda 1. Step 1 ends the episode, step 2 is the reset, step 3 begins anew.
-  const float rewards[] = {1, 2, 100, 4}, values[] = {10, 20, 40, 80, 160};
-  const uint8_t none[] = {0, 0, 0, 0}, end[] = {0, 1, 0, 0}, valid[] = {1, 1, 0, 1};
-  float advantages[4];
-  gae(4, 1, rewards, values, none, end, valid, 0.5f, 1.0f, advantages);
+  const std::vector<float> rewards{1, 2, 100, 4}, values{10, 20, 40, 80, 160};
+  const std::vector<uint8_t> never{0, 0, 0, 0}, end{0, 1, 0, 0}, valid{1, 1, 0, 1};
+  std::vector<float> advantages = advantages_of(4, 1, rewards, values, never, end, valid, 0.5, 1.0);
   EXPECT_EQ(advantages[3], 4 + 80 - 80);
   EXPECT_EQ(advantages[2], 0);
   EXPECT_EQ(advantages[1], 2 + 20 - 20);  // bootstraps from the final observation's value, 40
   EXPECT_EQ(advantages[0], 1 + 10 - 10 + 0.5f * 2);
-  gae(4, 1, rewards, values, end, none, valid, 0.5f, 1.0f, advantages);
+  advantages = advantages_of(4, 1, rewards, values, end, never, valid, 0.5, 1.0);
   EXPECT_EQ(advantages[1], 2 - 20);
   EXPECT_EQ(advantages[0], 1 + 10 - 10 + 0.5f * (2 - 20));
 }
@@ -104,11 +118,11 @@ TEST(Shuffle, IsAPermutationThatOnlyItsArgumentsDecide) {
 
 TEST(DrawAction, FollowsTheCumulativeProbabilities) {
   const float log_probs[] = {std::log(0.25f), std::log(0.5f), std::log(0.25f)};
-  EXPECT_EQ(draw_action({log_probs, 3}, 0.0f), 0);
-  EXPECT_EQ(draw_action({log_probs, 3}, 0.24f), 0);
-  EXPECT_EQ(draw_action({log_probs, 3}, 0.26f), 1);
-  EXPECT_EQ(draw_action({log_probs, 3}, 0.74f), 1);
-  EXPECT_EQ(draw_action({log_probs, 3}, 0.9999999f), 2);
+  EXPECT_EQ(draw_action(log_probs, 3, 0.0f), 0);
+  EXPECT_EQ(draw_action(log_probs, 3, 0.24f), 0);
+  EXPECT_EQ(draw_action(log_probs, 3, 0.26f), 1);
+  EXPECT_EQ(draw_action(log_probs, 3, 0.74f), 1);
+  EXPECT_EQ(draw_action(log_probs, 3, 0.9999999f), 2);
 }
 
 TEST(AdamW, StepsAsLoshchilovAndHutterDefineIt) {
@@ -179,7 +193,7 @@ struct Corridor {
                              .step = static_cast<uint32_t>(t),
                              .purpose = Purpose::action});
         const float* log_probs = decision.log_probs.const_data_ptr<float>() + slot * kNumActions;
-        const int action = draw_action({log_probs, kNumActions}, stream.uniform());
+        const int action = draw_action(log_probs, kNumActions, stream.uniform());
         const bool was_open = open[slot].item<float>() > 0;
         const int right = sign[slot].item<float>() > 0 ? 2 : 10;
         rollout.actions[t][slot] = action;

@@ -1,6 +1,4 @@
 // Training end to end on a few vehicles of the procedural town: files, exact resume, ^C's boundary, evaluation.
-#include "pictura/training/training.h"
-
 #include <algorithm>
 #include <cmath>
 #include <csignal>
@@ -18,7 +16,11 @@
 #include "pictura/map/load_map.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
-#include "pictura/training/observer.h"
+#include "pictura/training/evaluation/evaluate.h"
+#include "pictura/training/loop.h"
+#include "pictura/training/observation.h"
+#include "pictura/training/run.h"
+#include "pictura/training/session.h"
 
 namespace pictura {
 namespace {

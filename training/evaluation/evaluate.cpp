@@ -1,58 +1,20 @@
-// A trained policy at the wheel, and the paper's evaluation of it.
+#include "pictura/training/evaluation/evaluate.h"
+
 #include <chrono>
 #include <limits>
-
-#include <ATen/Parallel.h>
 
 #include "pictura/backends/make_simulator.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
-#include "pictura/common/support/parallel_for.h"
 #include "pictura/map/load_map.h"
 #include "pictura/training/checkpoint.h"
-#include "pictura/training/observer.h"
-#include "pictura/training/training.h"
+#include "pictura/training/observation.h"
+#include "pictura/training/run.h"
+#include "pictura/training/session.h"
 
 namespace pictura {
 
 namespace {
-
-class PolicyDriver final : public Driver {
- public:
-  PolicyDriver(const Checkpoint& checkpoint, int num_threads)
-      : config_(checkpoint.config),
-        rig_(checkpoint.rig),
-        policy_(config_.policy, static_cast<int>(rig_.cameras.size()), config_.run.seed),
-        num_threads_(num_threads) {
-    restore_tensors(checkpoint, checkpoint.parameters, policy_.parameters());
-  }
-
-  bool needs_images() const override { return config_.policy.modality == Modality::perspective; }
-  const Rig& rig() const override { return rig_; }
-  SimulatorConfig evaluation_world() const override {
-    return evaluation_simulator_config(config_, config_.simulator.episode_steps);
-  }
-
-  void act(Simulator& simulator, Renderer* renderer, bool argmax, Span<int32_t> actions_out) override {
-    PICTURA_CHECK(!needs_images() || renderer, "driver: this policy needs images: give it a renderer");
-    PICTURA_CHECK(actions_out.size() == static_cast<size_t>(simulator.num_slots()),
-                  "driver: expected room for {} actions, got {}", simulator.num_slots(), actions_out.size());
-    at::set_num_threads(resolve_num_threads(num_threads_));
-    Observer observer(&simulator, needs_images() ? renderer : nullptr);
-    if (!storage_.ego.defined() || storage_.ego.size(1) != simulator.num_slots()) storage_ = observer.allocate(1);
-    const Observation row = row_of(storage_, 0);
-    observer.observe(row);
-    const Decision decision = decide(policy_, row, config_.train.forward_chunk);
-    choose_actions(decision.log_probs, simulator, simulator.config().seed, argmax, actions_out);
-  }
-
- private:
-  const Config config_;
-  const Rig rig_;
-  const Policy policy_;
-  const int num_threads_;
-  Observation storage_;
-};
 
 struct DensityOf {
   const char* name;
@@ -119,10 +81,6 @@ struct Tally {
 
 }  // namespace
 
-std::unique_ptr<Driver> load_driver(const std::string& checkpoint_path, int num_threads) {
-  return std::make_unique<PolicyDriver>(read_checkpoint(checkpoint_path), num_threads);
-}
-
 EvaluateReport evaluate(const EvaluateOptions& options) {
   if (options.scenarios < 1) fail_usage("evaluate: expected one scenario or more, got {}", options.scenarios);
   if (options.steps < 1) fail_usage("evaluate: expected one step or more, got {}", options.steps);
@@ -133,7 +91,7 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
   Checkpoint checkpoint = read_checkpoint(options.checkpoint);
   checkpoint.config.run.num_threads = options.num_threads;
   checkpoint.config.run.backend = options.backend;
-  PolicyDriver driver(checkpoint, options.num_threads);
+  const std::unique_ptr<Driver> driver = load_driver(options.checkpoint, options.num_threads);
   SimulatorConfig simulator_config = evaluation_simulator_config(checkpoint.config, options.steps);
   simulator_config.seed = options.seed;
   std::vector<std::shared_ptr<const RoadMap>> maps;
@@ -161,8 +119,8 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
       }
       const std::unique_ptr<Simulator> simulator =
           make_simulator(simulator_name(options.backend), simulator_config, maps, worlds);
-      if (driver.needs_images() && !renderer)
-        renderer = make_policy_renderer(checkpoint.config, driver.rig(), *simulator);
+      if (driver->needs_images() && !renderer)
+        renderer = make_policy_renderer(checkpoint.config, driver->rig(), *simulator);
       simulator->reset();
       std::vector<int32_t> actions(static_cast<size_t>(simulator->num_slots()));
       // Halted agents stay as they are, so a batch is over when nobody is left to drive.
@@ -171,7 +129,7 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
           report.interrupted = true;
           return report;
         }
-        driver.act(*simulator, renderer.get(), options.argmax, actions);
+        driver->act(*simulator, renderer.get(), options.argmax, actions);
         simulator->step(actions);
         if (options.on_progress && step % 10 == 0) {
           const double fraction = (done + double(simulator->num_slots()) * (step + 1)) / work;

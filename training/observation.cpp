@@ -1,14 +1,9 @@
-#include "pictura/training/observer.h"
+#include "pictura/training/observation.h"
 
 #include <chrono>
 #include <cstring>
 
-#include <ATen/core/grad_mode.h>
-
-#include "pictura/backends/make_renderer.h"
 #include "pictura/common/error.h"
-#include "pictura/common/rng.h"
-#include "pictura/common/support/parallel_for.h"
 
 namespace pictura {
 
@@ -67,18 +62,6 @@ std::vector<int64_t> active_slots(Simulator& simulator) {
     if (static_cast<AgentStatus>(state.status[slot]) == AgentStatus::active) slots.push_back(slot);
   }
   return slots;
-}
-
-std::string simulator_name(const std::string& backend) { return backend == "null" ? "cpu" : backend; }
-
-std::unique_ptr<Renderer> make_policy_renderer(const Config& config, const Rig& rig, const Simulator& simulator) {
-  RendererConfig renderer_config;
-  renderer_config.rig = rig;
-  renderer_config.num_threads = config.run.num_threads;
-  renderer_config.line_floor_px = static_cast<float>(config.render.line_floor_px);
-  std::unique_ptr<Renderer> renderer = make_renderer(config.run.backend, renderer_config);
-  upload_geometries(simulator.geometries(), renderer.get());
-  return renderer;
 }
 
 Observer::Observer(Simulator* simulator, Renderer* renderer) : simulator_(*simulator), renderer_(renderer) {
@@ -154,55 +137,6 @@ void Observer::observe(const Observation& out) {
 
 Observation row_of(const Observation& rows, int64_t row) {
   return rows.map([row](const at::Tensor& t) { return t.select(0, row); });
-}
-
-Decision decide(const Policy& policy, const Observation& observation, int64_t chunk) {
-  const at::NoGradGuard no_grad;
-  const int64_t batch = observation.ego.size(0);
-  std::vector<at::Tensor> log_probs, values;
-  for (int64_t begin = 0; begin < batch; begin += chunk) {
-    const int64_t count = std::min(chunk, batch - begin);
-    const Policy::Output output =
-        policy.forward(observation.map([&](const at::Tensor& t) { return t.narrow(0, begin, count); }));
-    log_probs.push_back(at::log_softmax(output.logits, 1));
-    values.push_back(output.value);
-  }
-  return {at::cat(log_probs), at::cat(values)};
-}
-
-int32_t draw_action(Span<const float> log_probs, float uniform) {
-  double cumulative = 0;
-  for (size_t i = 0; i + 1 < log_probs.size(); ++i) {
-    cumulative += std::exp(static_cast<double>(log_probs[i]));
-    if (uniform < cumulative) return static_cast<int32_t>(i);
-  }
-  return static_cast<int32_t>(log_probs.size()) - 1;
-}
-
-void choose_actions(const at::Tensor& log_probs, const Simulator& simulator, uint64_t seed, bool argmax,
-                    Span<int32_t> actions_out) {
-  const at::Tensor host = log_probs.contiguous();
-  const float* rows = host.const_data_ptr<float>();
-  size_t slot = 0;
-  for (size_t w = 0; w < simulator.worlds().size(); ++w) {
-    const WorldSpec& world = simulator.worlds()[w];
-    const auto episode = static_cast<uint32_t>(simulator.episode_index()[w]);
-    const auto step = static_cast<uint32_t>(simulator.episode_step()[w]);
-    for (int agent = 0; agent < world.num_agents; ++agent, ++slot) {
-      const float* row = rows + slot * kNumActions;
-      if (argmax) {
-        actions_out[slot] = static_cast<int32_t>(std::max_element(row, row + kNumActions) - row);
-      } else {
-        RandomStream stream({.seed = seed,
-                             .world = world.global_world,
-                             .agent = static_cast<uint32_t>(agent),
-                             .episode = episode,
-                             .step = step,
-                             .purpose = Purpose::action});
-        actions_out[slot] = draw_action({row, kNumActions}, stream.uniform());
-      }
-    }
-  }
 }
 
 }  // namespace pictura

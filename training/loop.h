@@ -1,0 +1,43 @@
+// Training a policy by self-play, without torch headers.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "pictura/common/portable/hd.h"
+
+namespace pictura {
+
+/// What a run has done so far; given to on_progress after every update.
+struct TrainProgress {
+  int64_t update = 0, updates = 0;
+  int64_t agent_steps = 0;
+  double agent_steps_per_s = 0;
+  double episode_return = 0;  // mean over agent episodes that ended lately; NaN before the first
+  double goals_per_km = 0;    // goals per km driven, lately
+  double eta_s = 0;
+};
+
+struct TrainOptions {
+  std::string config_path;             // TOML, see configs/paper.toml for every field
+  std::vector<std::string> overrides;  // "train.updates=2"
+  std::string out_folder;
+  bool resume = false;  // go on from out_folder's checkpoint
+  std::function<void(const TrainProgress&)> on_progress;
+};
+
+struct TrainReport {
+  int64_t agent_steps = 0, updates = 0;
+  double agent_steps_per_s = 0, episode_return = 0, km_driven = 0;
+  bool interrupted = false;
+  std::string checkpoint, policy_hash;
+};
+
+/// Trains as the configuration says and writes into out_folder: config.toml (resolved), untrained.ckpt (the policy
+/// before its first update), checkpoint.ckpt, policy.safetensors, progress.csv and TensorBoard events. After ^C
+/// (common/support/interrupt.h) it saves and returns with `interrupted`. Throws Error naming file and key for bad
+/// input.
+TrainReport train(const TrainOptions& options);
+
+}  // namespace pictura

@@ -1,0 +1,87 @@
+#include "pictura/training/run.h"
+
+#include "pictura/backends/make_renderer.h"
+#include "pictura/backends/make_simulator.h"
+#include "pictura/common/error.h"
+#include "pictura/map/load_map.h"
+
+namespace pictura {
+
+std::string simulator_name(const std::string& backend) { return backend == "null" ? "cpu" : backend; }
+
+std::unique_ptr<Renderer> make_policy_renderer(const Config& config, const Rig& rig, const Simulator& simulator) {
+  RendererConfig renderer_config;
+  renderer_config.rig = rig;
+  renderer_config.num_threads = config.run.num_threads;
+  renderer_config.line_floor_px = static_cast<float>(config.render.line_floor_px);
+  std::unique_ptr<Renderer> renderer = make_renderer(config.run.backend, renderer_config);
+  upload_geometries(simulator.geometries(), renderer.get());
+  return renderer;
+}
+
+namespace {
+
+std::unique_ptr<Simulator> make_training_simulator(const Config& config) {
+  const Config::SimulatorSection& section = config.simulator;
+  std::vector<std::shared_ptr<const RoadMap>> maps;
+  for (const std::string& name : section.maps) maps.push_back(load_map(name));
+  const int num_maps = static_cast<int>(maps.size());
+  return make_simulator(
+      simulator_name(config.run.backend), simulator_config(config), std::move(maps),
+      draw_worlds(config.run.seed, section.num_slots, section.min_agents, section.max_agents, num_maps));
+}
+
+std::unique_ptr<Renderer> make_training_renderer(const Config& config, const Rig& rig, const Simulator& simulator) {
+  if (config.policy.modality == Modality::vector) return nullptr;
+  return make_policy_renderer(config, rig, simulator);
+}
+
+}  // namespace
+
+Run::Run(const Config& its_config)
+    : config(its_config),
+      rig(rig_of(config)),
+      simulator(make_training_simulator(config)),
+      renderer(make_training_renderer(config, rig, *simulator)),
+      observer(simulator.get(), renderer.get()),
+      policy(config.policy, static_cast<int>(rig.cameras.size()), config.run.seed),
+      optimizer(policy, config.train),
+      rollout(allocate_rollout(observer, simulator->num_slots(), config.train.num_steps), config.train.num_steps,
+              simulator->num_slots()) {}
+
+void Run::save(const std::string& path, const std::vector<RecentUpdate>& recent,
+               std::vector<uint8_t> simulator_bytes) const {
+  Checkpoint checkpoint;
+  checkpoint.config = config;
+  checkpoint.rig = rig;
+  checkpoint.update = update;
+  checkpoint.agent_steps = agent_steps;
+  checkpoint.distance_m = distance_m;
+  checkpoint.adam_steps = optimizer.steps;
+  checkpoint.filter_average = filter.average;
+  checkpoint.recent = recent;
+  checkpoint.parameters = policy.parameters();
+  checkpoint.first_moments = optimizer.first_moments;
+  checkpoint.second_moments = optimizer.second_moments;
+  checkpoint.simulator = std::move(simulator_bytes);
+  write_checkpoint(path, checkpoint);
+}
+
+void Run::restore(const Checkpoint& saved) {
+  const std::string difference = first_difference(saved.config, config);
+  PICTURA_CHECK(difference.empty(), "{}: saved under another configuration: {}", saved.path, difference);
+  const std::string rig_difference = first_difference(saved.rig, rig);
+  PICTURA_CHECK(rig_difference.empty(), "{}: saved with other cameras than {} has: {}", saved.path,
+                config.render.rig.empty() ? "the paper's rig" : config.render.rig, rig_difference);
+  restore_tensors(saved, saved.parameters, policy.parameters());
+  restore_tensors(saved, saved.first_moments, optimizer.first_moments);
+  restore_tensors(saved, saved.second_moments, optimizer.second_moments);
+  optimizer.steps = saved.adam_steps;
+  filter.average = saved.filter_average;
+  simulator->restore(saved.simulator);
+  update = saved.update;
+  agent_steps = saved.agent_steps;
+  distance_m = saved.distance_m;
+}
+
+}  // namespace pictura

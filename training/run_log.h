@@ -1,0 +1,82 @@
+// What a run reports after each update: a row of progress.csv, a TensorBoard event, and the progress line's numbers.
+#pragma once
+
+#include <chrono>
+#include <deque>
+
+#include "pictura/training/checkpoint.h"
+#include "pictura/training/event_file.h"
+#include "pictura/training/loop.h"
+#include "pictura/training/ppo.h"
+
+namespace pictura {
+
+/// Time since it was made or last restarted.
+class Stopwatch {
+ public:
+  /// Seconds since then; starts again.
+  double restart() {
+    const auto now = Clock::now();
+    return std::chrono::duration<double>(now - std::exchange(start_, now)).count();
+  }
+  double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start_ = Clock::now();
+};
+
+/// Where the time of one update went.
+struct PhaseTimes {
+  double rollout_s = 0, forward_s = 0, simulate_s = 0, render_s = 0, optimize_s = 0;
+};
+
+/// One CSV per run. On resume the rows of updates that the checkpoint does not hold are dropped.
+class ProgressCsv {
+ public:
+  ProgressCsv(const std::string& path, int64_t updates_done);
+  void write(int64_t update, const Scalars& scalars);
+
+ private:
+  std::string path_;
+  std::ofstream out_;
+  bool needs_head_ = true;
+};
+
+/// What was counted between two readings of a simulator's totals.
+SimulatorTotals difference(SimulatorTotals after, const SimulatorTotals& before);
+
+/// What one update did.
+struct UpdateRecord {
+  SimulatorTotals totals;  // counted in its rollout
+  UpdateStats stats;
+  PhaseTimes times;
+};
+
+class RunLog {
+ public:
+  /// Opens the files of a run that has done `updates_done` updates and `agent_steps` in them. Throws Error naming the
+  /// path.
+  RunLog(const std::string& folder, const Config& config, int64_t updates_done, int64_t agent_steps,
+         const std::vector<RecentUpdate>& recent);
+
+  /// Writes the row and the event of an update, after which the run has done `update` updates and `agent_steps`.
+  TrainProgress add(int64_t update, int64_t agent_steps, const UpdateRecord& record);
+
+  /// What the averages over the last updates are made of.
+  std::vector<RecentUpdate> recent() const { return {recent_.begin(), recent_.end()}; }
+  /// Mean over agent episodes that ended in the last updates; NaN before the first.
+  double episode_return() const;
+
+ private:
+  double goals_per_km() const;
+
+  const Config config_;
+  const int64_t first_update_, first_agent_steps_;
+  EventFile events_;
+  ProgressCsv csv_;
+  std::deque<RecentUpdate> recent_;
+  Stopwatch since_start_;
+};
+
+}  // namespace pictura
