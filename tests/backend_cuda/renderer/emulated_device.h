@@ -1,7 +1,7 @@
-// A device on the host, for running the text of kernels where there is no GPU: the vocabulary of CUDA that they use,
-// and blocks whose threads are fibers. Threads of a warp, and warps, take turns in an order that a seed draws, and go
-// on to the next collective step; where lanes of a warp wait for different steps, that is a fault. Races within a step
-// do not show. Include before the kernels, in one source file.
+// Emulates a device on the host, to run the source of kernels without a GPU: the parts of CUDA that they use, and
+// blocks whose threads are fibers. Threads of a warp, and warps, run in a random order given by a seed, each up to the
+// next collective operation; lanes of a warp that wait for different operations are an error. Races between two
+// collective operations are not detected. Include before the kernels, in one source file.
 #pragma once
 
 #include <algorithm>
@@ -33,7 +33,7 @@ class Block {
   enum class Step { none, warp, block, done };
   static constexpr int kLanes = 32;
 
-  /// Calls kernel() in each of `threads` threads, a whole number of warps.
+  /// Calls kernel() in each of `threads` threads, a multiple of the warp size.
   static void run(int threads, uint64_t seed, const std::function<void()>& kernel) {
     Block block(threads, seed, kernel);
     current() = &block;
@@ -45,7 +45,8 @@ class Block {
     return block;
   }
 
-  /// Waits for the lanes of the warp; returns what each of them brought. `what`: all must wait for the same.
+  /// Waits for all lanes of the warp and returns their values. `what` names the operation and must be the same in all
+  /// lanes.
   const uint64_t* exchange(const char* what, uint64_t value) {
     Thread& thread = threads_[running_];
     thread.what = what;
@@ -103,7 +104,7 @@ class Block {
     return std::all_of(threads_.begin(), threads_.end(), [&](const Thread& t) { return t.waits_for == step; });
   }
 
-  // Lets the lanes of a warp go on to their next step.
+  // Runs the lanes of a warp up to their next collective operation.
   void run_warp(std::size_t warp) {
     std::size_t order[kLanes];
     for (std::size_t lane = 0; lane < kLanes; ++lane) order[lane] = warp * kLanes + lane;
@@ -113,7 +114,7 @@ class Block {
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       const Thread& thread = threads_[warp * kLanes + lane];
       if (thread.waits_for != first.waits_for || std::strcmp(thread.what, first.what) != 0) {
-        throw std::logic_error(std::string("lanes of a warp have parted: ") + first.what + " and " + thread.what);
+        throw std::logic_error(std::string("lanes of a warp have diverged: ") + first.what + " and " + thread.what);
       }
       warps_[warp].values[lane] = thread.value;
     }
@@ -130,14 +131,14 @@ class Block {
       for (const std::size_t warp : order) {
         const Step step = threads_[warp * kLanes].waits_for;
         if (step != Step::warp && !(step == Step::block && at_barrier)) continue;
-        // Some warps run far ahead of others.
+        // A random number of steps, so that some warps run far ahead.
         for (int steps = 1 << (random_() % 8); steps > 0; --steps) {
           run_warp(warp);
           moved = true;
           if (threads_[warp * kLanes].waits_for != Step::warp) break;
         }
       }
-      if (!moved) throw std::logic_error("some threads wait for others that have gone");
+      if (!moved) throw std::logic_error("some threads wait for others that have ended");
     }
   }
 

@@ -8,9 +8,9 @@
 #include "pictura/backend_cuda/renderer/scratch_buffers.h"
 #include "pictura/common/error.h"
 #include "pictura/common/raster/check.h"
-// After all else, because it gives the compiler's words other meanings.
+// Last, because it redefines CUDA's keywords.
 #include "pictura/tests/backend_cuda/renderer/emulated_device.h"
-// The kernels, under names of their own beside those that were compiled ahead of time.
+// The kernels are renamed, because the same program contains those compiled ahead of time.
 #define pictura_cull emulated_cull
 #define pictura_setup_faces emulated_setup_faces
 #define pictura_clip emulated_clip
@@ -23,7 +23,7 @@
 namespace pictura {
 
 namespace cuda {
-// The shared memory of the block that runs.
+// Shared memory of the running block.
 alignas(16) unsigned char block_memory[232448];
 }  // namespace cuda
 
@@ -41,7 +41,7 @@ struct EmulatedRenderer::Map {
   explicit Map(const StaticGeometry& map) : geometry(map), strips(geometry.strips), walls(geometry.walls) {}
 };
 
-// What a renderer keeps in device memory.
+// What a CUDA renderer has in device memory.
 struct EmulatedRenderer::Setup {
   cuda::DrawTask task;
   cuda::DrawCounters counters;
@@ -104,7 +104,7 @@ void EmulatedRenderer::launch(int threads, unsigned blocks, Kernel&& kernel) con
   block_dim = {static_cast<unsigned>(threads), 1, 1};
   for (unsigned block = 0; block < blocks; ++block) {
     block_index = {block, 0, 0};
-    // Whatever an earlier block has left.
+    // Shared memory starts with arbitrary contents.
     std::memset(cuda::block_memory, 0xA5, sizeof(cuda::block_memory));
     Block::run(threads, seed_ + block, kernel);
   }
@@ -118,8 +118,8 @@ void EmulatedRenderer::render(const SceneBatch& scene, const ViewBatch& views, c
   launch(cuda::kSetupThreads, kBlocks, [&] { cuda::emulated_clip(task); });
   launch(cuda::kDrawThreads, kBlocks, [&] { cuda::emulated_draw(task); });
   deferred_ = setup.counters.deferred;
-  const int gathering = cuda::setup_blocks(task.pool, kBlocks);
-  launch(cuda::kDrawThreads, static_cast<unsigned>(gathering), [&] { cuda::emulated_draw_deferred(task); });
+  const int deferred_blocks = cuda::setup_blocks(task.pool, kBlocks);
+  launch(cuda::kDrawThreads, static_cast<unsigned>(deferred_blocks), [&] { cuda::emulated_draw_deferred(task); });
   overflow_ = setup.counters.overflow;
   launch(cuda::kLargeThreads, kBlocks, [&] { cuda::emulated_draw_overflow(task, setup.large.view()); });
   fault_ = setup.fault;

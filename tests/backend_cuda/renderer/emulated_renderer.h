@@ -1,4 +1,4 @@
-// A renderer whose kernels, the text of the CUDA renderer's, run thread by thread on the host.
+// A renderer that runs the source of the CUDA renderer's kernels on the host, thread by thread.
 #pragma once
 
 #include <memory>
@@ -9,11 +9,11 @@
 
 namespace pictura::test {
 
-/// Draws with the kernels. Two blocks of each launch, so that each draws several images, one after the other. Its
-/// threads take turns in an order that a seed draws.
+/// Draws with the emulated kernels. Each launch has two blocks, so that each block draws several images. The order of
+/// threads is random, given by a seed.
 class EmulatedRenderer final : public Renderer {
  public:
-  /// Room in the pool, for an image.
+  /// Capacity of the pool per image.
   struct Pool {
     std::size_t faces = 2048, clipped_edges = 4096;
   };
@@ -28,11 +28,11 @@ class EmulatedRenderer final : public Renderer {
   void render(const SceneBatch& scene, const ViewBatch& views, const ImageBatch& images_out, Stream stream) override;
   void visibility(const SceneBatch& scene, const ViewBatch& views, Span<const VisibilityQuery> queries,
                   Span<float> visibility_out, Stream stream) override;
-  /// Throws what the last call found wrong.
+  /// Throws the fault of the last call, if any.
   void poll() override;
   void check(Stream stream = {}) override;
 
-  /// Images that the last call left to the last launch, and for which the pool had no room.
+  /// Images of the last call that were left to the last launch, and that did not fit into the pool.
   int overflow() const { return overflow_; }
   int deferred() const { return deferred_; }
 

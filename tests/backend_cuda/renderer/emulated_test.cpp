@@ -1,5 +1,5 @@
-// The drawing kernels, run thread by thread on the host, against the oracle: every value equal, in whatever order
-// threads take turns. So a change that breaks a kernel shows where there is no GPU.
+// The drawing kernels, run thread by thread on the host, against the oracle: all values are equal, for any order of
+// threads. So broken kernels are found without a GPU.
 #include <algorithm>
 #include <functional>
 #include <limits>
@@ -33,7 +33,7 @@ void expect_oracles(EmulatedRenderer* renderer, const Scene& town, Planes planes
   test::expect_equal(emulated, draw_outputs(make_renderer("cpu", renderer->config()).get(), town, planes));
 }
 
-// What random scenes, views, rigs and settings find.
+// Random scenes, views, rigs and settings.
 TEST(EmulatedKernels, DrawWhatASoakDraws) {
   const SoakOptions options{.maps = {"procedural:1", "procedural:2"},
                             .agents = 60,
@@ -67,8 +67,7 @@ TEST(EmulatedKernels, DrawTheOraclesTownsInAnyOrderOfThreads) {
   }
 }
 
-// Lines far away as wide as a floor may make them, many to a pixel, in which things are in front of each other in
-// rings.
+// Distant lines with the largest allowed minimum width, many to a pixel, which occlude each other in cycles.
 TEST(EmulatedKernels, DrawTheWidestLinesInAnyOrderOfThreads) {
   SyntheticTown town = make_synthetic_town(1, 120);
   town.views.resize(4);
@@ -86,7 +85,7 @@ TEST(EmulatedKernels, DrawWorldsOfSeveralMaps) {
   expect_oracles(&renderer, make_synthetic_worlds(), Planes::all);
 }
 
-TEST(EmulatedKernels, DrawBlackWhereNothingIsToBeSeen) {
+TEST(EmulatedKernels, DrawBlackWhereNothingIsVisible) {
   EmulatedRenderer renderer(config_of(mixed_rig()), 14);
   SyntheticTown town;
   town.geometry.build_grids();
@@ -95,13 +94,13 @@ TEST(EmulatedKernels, DrawBlackWhereNothingIsToBeSeen) {
   expect_oracles(&renderer, town, Planes::all);
 }
 
-// What host callers are told by checks, callers on a device are told by the kernels. Such views are black.
-TEST(EmulatedKernels, NameWhatIsWrong) {
-  const SyntheticWorlds sound = make_synthetic_worlds();
+// Errors that host callers get from checks, device callers get from the kernels. Images of such views are black.
+TEST(EmulatedKernels, ReportInvalidViews) {
+  const SyntheticWorlds valid = make_synthetic_worlds();
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   struct Case {
-    const char* told;
-    std::function<void(SyntheticWorlds*)> spoil;
+    const char* message;
+    std::function<void(SyntheticWorlds*)> corrupt;
   };
   const Case cases[] = {
       {"view 1: no such world", [](auto* w) { w->views[1].world = 4; }},
@@ -127,40 +126,40 @@ TEST(EmulatedKernels, NameWhatIsWrong) {
   };
   const Rig rig = front_rig(16, 9);
   for (const Case& each : cases) {
-    SyntheticWorlds worlds = sound;
+    SyntheticWorlds worlds = valid;
     worlds.views.resize(2);
-    worlds.views[0] = sound.views[3];  // of the empty world, whatever is spoilt
-    each.spoil(&worlds);
+    worlds.views[0] = valid.views[3];  // of the empty world, so that its image is valid in all cases
+    each.corrupt(&worlds);
     EmulatedRenderer renderer(config_of(rig), 15);
     upload_geometries(worlds.maps, &renderer);
     HostImages images(rig, 2);
     std::ranges::fill(images.bytes(), uint8_t{0xA5});
     renderer.render(worlds.scene.batch(), worlds.views, images.batch(), {});
-    EXPECT_EQ(test::message_of([&] { renderer.check(); }), each.told);
-    EXPECT_TRUE(std::ranges::all_of(images.interleaved(1, 0), [](uint8_t byte) { return byte == 0; })) << each.told;
+    EXPECT_EQ(test::message_of([&] { renderer.check(); }), each.message);
+    EXPECT_TRUE(std::ranges::all_of(images.interleaved(1, 0), [](uint8_t byte) { return byte == 0; })) << each.message;
     EXPECT_NO_THROW(renderer.check());
   }
 }
 
-TEST(EmulatedKernels, NameWhatIsWrongWithQueries) {
+TEST(EmulatedKernels, ReportInvalidQueries) {
   const SyntheticWorlds worlds = make_synthetic_worlds();
   const RendererConfig config = config_of(paper_rig(16, 9));
   EmulatedRenderer renderer(config, 16);
   upload_geometries(worlds.maps, &renderer);
-  // The first view is of the first world, whose agents come first.
+  // The first view is of the first world, whose agents are first.
   const int32_t of_another_world = worlds.scene.world_begin[2];
   for (const VisibilityQuery bad :
        {VisibilityQuery{10, 0}, VisibilityQuery{-1, 0}, VisibilityQuery{0, -1}, VisibilityQuery{0, of_another_world}}) {
     const std::vector<VisibilityQuery> queries{{0, 1}, bad};
-    std::vector<float> told(2, 7.0f);
-    renderer.visibility(worlds.scene.batch(), worlds.views, queries, told, {});
+    std::vector<float> result(2, 7.0f);
+    renderer.visibility(worlds.scene.batch(), worlds.views, queries, result, {});
     EXPECT_EQ(test::message_of([&] { renderer.check(); }),
               "visibility query 1: no such view, or no such agent in its world");
-    EXPECT_TRUE(std::isnan(told[1]));
+    EXPECT_TRUE(std::isnan(result[1]));
   }
 }
 
-// Draws a town from a pool that has room for some of its images alone.
+// Draws a town with a pool that holds only some of its images.
 void expect_some_deferred(uint64_t seed, const EmulatedRenderer::Pool& pool) {
   SyntheticTown town = make_synthetic_town(1, 120);
   town.views.resize(2);
@@ -171,13 +170,13 @@ void expect_some_deferred(uint64_t seed, const EmulatedRenderer::Pool& pool) {
   EXPECT_EQ(renderer.overflow(), 0);
 }
 
-TEST(EmulatedKernels, PostponeWhatThePoolHasNoRoomFor) { expect_some_deferred(7, {.faces = 192}); }
-// Noticed when some of an image's faces are made already.
-TEST(EmulatedKernels, PostponeWhatHasNoRoomForItsClippedEdges) { expect_some_deferred(8, {.clipped_edges = 70}); }
+TEST(EmulatedKernels, DeferWhatDoesNotFitIntoThePool) { expect_some_deferred(7, {.faces = 192}); }
+// This is found after some of an image's faces have been set up.
+TEST(EmulatedKernels, DeferWhenClippedEdgesDoNotFit) { expect_some_deferred(8, {.clipped_edges = 70}); }
 
 TEST(EmulatedKernels, ClipLightsOnAllSides) {
-  // A spiral of heads around a camera, from before its near plane on, that turn to it and cross each other's disks and
-  // all borders of the image; a batch holds nothing else.
+  // A spiral of light heads around a camera, starting nearer than its near plane; they face the camera and overlap each
+  // other's disks and all borders of the image. The batch contains nothing else.
   SyntheticTown town;
   for (int i = 0; i < 300; ++i) {
     const float angle = 0.4f * static_cast<float>(i), range_m = 0.05f + 0.02f * static_cast<float>(i);
@@ -198,7 +197,7 @@ TEST(EmulatedKernels, ClipLightsOnAllSides) {
   EXPECT_EQ(renderer.overflow(), 0);
 }
 
-// What crosses itself along a border enters the frame twice, and outgrows the room of the lane that clips it.
+// A strip that crosses itself along a border enters the frame twice, and has more corners than a lane can hold.
 TEST(EmulatedKernels, ClipStripsThatCrossThemselves) {
   SyntheticTown town;
   for (int i = 0; i < 60; ++i) {
@@ -238,23 +237,23 @@ TEST(EmulatedKernels, WriteTheOraclesBytesAndHalves) {
   emulated.upload(0, town.geometry);
   oracle->upload(0, town.geometry);
   for (const PixelFormat format : {PixelFormat::u8, PixelFormat::f16}) {
-    HostImages told(config.rig, 1, format), truth(config.rig, 1, format);
-    emulated.render(town.scene.batch(), town.views, told.batch(), {});
-    oracle->render(town.scene.batch(), town.views, truth.batch(), {});
-    EXPECT_TRUE(std::ranges::equal(told.bytes(), truth.bytes())) << static_cast<int>(format);
+    HostImages result(config.rig, 1, format), expected(config.rig, 1, format);
+    emulated.render(town.scene.batch(), town.views, result.batch(), {});
+    oracle->render(town.scene.batch(), town.views, expected.batch(), {});
+    EXPECT_TRUE(std::ranges::equal(result.bytes(), expected.bytes())) << static_cast<int>(format);
   }
 }
 
-TEST(EmulatedKernels, DrawCrowdsInPartsAndLeaveNothingOut) {
-  // More than one pass has room for: parts of images, and images that are left to the last launch.
+TEST(EmulatedKernels, DrawTooManyFragmentsInParts) {
+  // More than fits at once: tiles are drawn in parts, and images are left to the last launch.
   const Rig rig = front_rig();
   EmulatedRenderer renderer(config_of(rig), 4);
   expect_oracles(&renderer, make_crowd(), Planes::all);
   EXPECT_GT(renderer.overflow(), 0);
 }
 
-// The last launch draws images in bands of as many rows as its memory holds.
-TEST(EmulatedKernels, DrawCrowdsOfImagesHigherThanTheLastLaunchDrawsAtOnce) {
+// The last launch draws images in tiles as high as its memory allows.
+TEST(EmulatedKernels, DrawImagesHigherThanTheLastLaunchDrawsAtOnce) {
   const Rig rig = front_rig(24, 600);
   EmulatedRenderer renderer(config_of(rig), 17);
   SyntheticTown crowd = make_crowd();
@@ -263,8 +262,8 @@ TEST(EmulatedKernels, DrawCrowdsOfImagesHigherThanTheLastLaunchDrawsAtOnce) {
   EXPECT_GT(renderer.overflow(), 0);
 }
 
-// Each image of a call lists one face more than fills its batches, so that there are as many batches as can be.
-TEST(EmulatedKernels, HaveRoomForTheBatchesOfManyEqualImages) {
+// Each image has one face more than fills its batches, so the number of batches is the maximum.
+TEST(EmulatedKernels, HaveCapacityForTheBatchesOfManyEqualImages) {
   SyntheticTown town;
   for (int i = 0; i < 225; ++i) {
     const float x = 5.0f + 0.1f * static_cast<float>(i);
@@ -279,8 +278,8 @@ TEST(EmulatedKernels, HaveRoomForTheBatchesOfManyEqualImages) {
   EXPECT_GT(renderer.deferred(), 0);
 }
 
-TEST(EmulatedKernels, DrawPlanesOfMoreRowsThanThereIsRoomFor) {
-  // Walls one behind the other, each of which has all rows of a tile.
+TEST(EmulatedKernels, DrawPlanesOfMoreRowsThanFit) {
+  // Walls one behind the other, each covering all rows of a tile.
   SyntheticTown town;
   for (int i = 0; i < 100; ++i) {
     const float x = 4.0f + 0.25f * static_cast<float>(i);
@@ -295,7 +294,7 @@ TEST(EmulatedKernels, DrawPlanesOfMoreRowsThanThereIsRoomFor) {
   EXPECT_EQ(renderer.overflow(), 0);
 }
 
-TEST(EmulatedKernels, TellVisibility) {
+TEST(EmulatedKernels, MeasureVisibility) {
   SyntheticTown town = make_synthetic_town(4, 30);
   town.views.resize(1);
   const RendererConfig config = config_of(paper_rig(48, 27));

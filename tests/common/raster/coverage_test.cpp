@@ -66,14 +66,14 @@ double clipped_area(const std::vector<Vec2>& polygon, int x, int y) {
   return area;
 }
 
-// How far a sample may be from an edge's line and still be taken for one on its other side, in px: two rounded numbers
-// of kRowUnits, and what a line that is steeper than kSteepest is turned.
+// Maximum distance in px of a sample from an edge's line at which it may be assigned to the wrong side: rounding of two
+// heights to kRowUnits, and the rotation of lines steeper than kSteepest.
 double sample_leeway_px(Vec2 side) {
   const double dx_dy = std::abs(double{side.x} / double{side.y});
   return 2.6 / (kRowUnits * kSampleRows) + std::max(0.0, 0.5 * (1.0 / kSteepest - dx_dy));
 }
 
-// Holds what pixel_coverage finds of a polygon in pixel (x, y) against its exact area and the samples within.
+// Compares pixel_coverage of a polygon in pixel (x, y) with its exact area and the samples inside.
 void expect_covered(const std::vector<Vec2>& polygon, const std::vector<PolygonEdge>& edges, int x, int y) {
   const PixelCoverage coverage = pixel_coverage(edges.data(), static_cast<int>(edges.size()), kMinArea, x, y);
   const double area = clipped_area(polygon, x, y);
@@ -125,7 +125,7 @@ TEST(Coverage, HoldsForTinyPolygonsAndForFarEndsOfEdges) {
   std::uniform_real_distribution<float> unit(0, 1);
   for (int round = 0; round < 4000; ++round) {
     SCOPED_TRACE(round);
-    // Corners on an ellipse, of which one point is among the pixels; thin ones lie in all directions.
+    // Corners on an ellipse that has a point among the pixels; thin ellipses lie in all directions.
     const float rx = std::pow(10.0f, 5.5f * unit(random) - 2.6f), ry = std::pow(10.0f, 5.3f * unit(random) - 2.6f);
     const SinCos at = sincos_of(kTwoPi * unit(random));
     const SinCos turn = round % 2 ? sincos_of(kTwoPi * unit(random)) : SinCos{0, 1};
@@ -164,7 +164,7 @@ TEST(Coverage, ASharedEdgeSplitsAreaAndSamplesWithoutGapOrOverlap) {
   std::mt19937 random(2);
   std::uniform_real_distribution<float> unit(0, 8);
   for (int round = 0; round < 2000; ++round) {
-    // Two triangles on either side of the segment ab, both larger than the pixels that are looked at.
+    // Two triangles on either side of the segment ab, both much larger than the tested pixels.
     const Vec2 a{unit(random), -50}, b{unit(random), 60};
     const bool level = round % 2;
     auto turned = [&](Vec2 p) { return level ? Vec2{p.y, p.x} : p; };
@@ -182,7 +182,7 @@ TEST(Coverage, ASharedEdgeSplitsAreaAndSamplesWithoutGapOrOverlap) {
       ASSERT_EQ(c.samples & d.samples, 0u);
       if (c.area > 0 && d.area > 0) {
         ASSERT_EQ(c.samples | d.samples, kAllSamples);
-        // A pixel that lacks less than kFullCoverage counts as full.
+        // A coverage of more than 1 - kFullCoverage is rounded to 1.
         const bool rounded = c.area == 1.0f || d.area == 1.0f;
         ASSERT_NEAR(c.area + d.area, 1, rounded ? kFullCoverage : 1e-6);
       }
@@ -195,7 +195,7 @@ TEST(Coverage, BothDirectionsOfAnEdgeAreOppositesWhereverItLies) {
   std::uniform_real_distribution<float> unit(0, 1);
   int split = 0;
   for (int round = 0; round < 20000; ++round) {
-    // Through the pixel, or past it, in any direction; every other one almost level or upright.
+    // Through the pixel or past it, in any direction; every other one almost level or upright.
     const float exponent = round % 4 < 2 ? 0.0f : -9 * unit(random);
     const Vec2 lean = Vec2{std::pow(10.0f, exponent), 1} * (800 * unit(random)),
                way = round % 2 ? lean : Vec2{lean.y, -lean.x};
@@ -232,7 +232,7 @@ TEST(Coverage, RowSpansAgreeWithPixels) {
   }
 }
 
-// The colour of fragments, each with its coverage, its free samples, and its colour.
+// The composited colour of fragments, each with its coverage, visible samples and colour.
 struct TestFragment {
   PixelCoverage coverage;
   uint64_t visible;
@@ -245,7 +245,7 @@ Rgb color_of(const std::vector<TestFragment>& fragments) {
   return sum.color();
 }
 
-TEST(Coverage, WhatIsHiddenWeighsNothing) {
+TEST(Coverage, OccludedFragmentsHaveNoWeight) {
   const Rgb color = color_of({{{1, kAllSamples}, kAllSamples, {1, 0, 0}},
                               {{1, kAllSamples}, 0, {0, 1, 0}},
                               {{0.01f, 0}, 0, {0, 1, 0}},
@@ -259,8 +259,9 @@ TEST(Coverage, TwoFacesOfOneThirdAndTwoThirdsFillAPixel) {
   EXPECT_NEAR(color_of({{{1.0f / 3, third}, third, {1, 1, 1}}, {{2.0f / 3, ~third}, ~third, {1, 1, 1}}}).r, 1, 2e-6);
 }
 
-TEST(Coverage, WhatFillsThePixelTakesWhatTheOthersLeave) {
-  // A quarter in front by area, although 20 of 64 samples; then something partly behind it, by samples; then a wall.
+TEST(Coverage, AFullFragmentGetsTheRemainderOfTheOthers) {
+  // In front a quarter of the area, although 20 of 64 samples; behind it a partly occluded fragment, weighted by
+  // samples; then a wall.
   const uint64_t front = (1ull << 20) - 1, middle = (1ull << 40) - 1;
   const Rgb color = color_of({{{0.25f, front}, front, {1, 0, 0}},
                               {{0.5f, middle}, middle & ~front, {0, 1, 0}},
@@ -270,8 +271,8 @@ TEST(Coverage, WhatFillsThePixelTakesWhatTheOthersLeave) {
   EXPECT_NEAR(color.b, 0.5f, 2e-6f);
 }
 
-TEST(Coverage, WhatFillsThePixelTakesWhatNoSampleSees) {
-  // Two faces that take all samples, but not all of the area.
+TEST(Coverage, AFullFragmentGetsAreaThatNoSampleShows) {
+  // Two faces that cover all samples but not all of the area.
   const uint64_t half = 0xFFFFFFFFull;
   const Rgb color = color_of({{{0.48f, half}, half, {1, 0, 0}},
                               {{0.5f, ~half}, ~half, {0, 1, 0}},
@@ -288,7 +289,7 @@ TEST(Coverage, WeightsNeverExceedThePixel) {
   EXPECT_NEAR(color.g, 0.4f, 2e-6f);
 }
 
-TEST(Coverage, LeavesOutWhatAStripHardlyAdds) {
+TEST(Coverage, IgnoresStripsBelowTheirMinimumArea) {
   const PrimitiveRef strip{kStripKind << kKindShift, 0}, wall = wall_ref(0);
   const Rgb white{0.9f, 0.88f, 0.85f};
   for (const float brightness : {1.0f, 0.5f, 0.15f}) {
@@ -296,7 +297,7 @@ TEST(Coverage, LeavesOutWhatAStripHardlyAdds) {
     EXPECT_NEAR(min_area_of(color, strip) * color.r, kMinWeight, 1e-7f) << brightness;
     EXPECT_EQ(min_area_of(color, wall), kMinArea);
   }
-  // What is dark may hide what is bright.
+  // A dark strip may occlude a bright one, so its minimum area is bounded.
   EXPECT_FLOAT_EQ(min_area_of(white * 0.01f, strip), kMaxSparedArea);
   EXPECT_FLOAT_EQ(min_area_of({}, strip), kMaxSparedArea);
   const float min_area = kMinWeight / white.r;

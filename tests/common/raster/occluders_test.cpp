@@ -1,5 +1,5 @@
-// Occluders: what they hide and what not, which of a scene's walls are taken, and that towns look the same
-// with and without them.
+// Occluders: which faces they occlude, which walls of a scene are chosen, and that towns look the same with and without
+// occlusion culling.
 #include <algorithm>
 #include <cmath>
 
@@ -32,15 +32,15 @@ ImageSetting setting_ahead() {
 
 WallFace wall_between(Vec3 a_m, Vec3 b_m, float height_m = 6) { return {a_m, b_m, height_m}; }
 
-/// Whether a wall hides a strip's face.
-bool hides(const WallFace& wall, Vec3 a_m, Vec3 b_m) {
+/// Whether a wall, as an occluder, occludes the bounds of a strip's face.
+bool occludes(const WallFace& wall, Vec3 a_m, Vec3 b_m) {
   ImageSetting setting = setting_ahead();
-  CameraQuad seen;
+  CameraQuad face;
   ScreenQuad quad;
   bool is_clockwise = false;
-  if (quad_to_camera(wall_quad(wall), setting.camera, &seen) &&
-      occluder_area_px2(setting.camera, seen, &quad, &is_clockwise) > 0) {
-    setting.occluders.occluder[0] = make_occluder(setting.camera, setting.frustum, seen.plane, quad, is_clockwise);
+  if (quad_to_camera(wall_quad(wall), setting.camera, &face) &&
+      occluder_area_px2(setting.camera, face, &quad, &is_clockwise) > 0) {
+    setting.occluders.occluder[0] = make_occluder(setting.camera, setting.frustum, face.plane, quad, is_clockwise);
     setting.occluders.count = 1;
   }
   ScreenBounds bounds;
@@ -51,23 +51,24 @@ bool hides(const WallFace& wall, Vec3 a_m, Vec3 b_m) {
   return setting.occluders.occludes(setting.camera, bounds);
 }
 
-TEST(Occluders, HideWhatIsBehindThemInDepthAndOnScreen) {
+TEST(Occluders, OccludeWhatIsBehindThemInDepthAndOnScreen) {
   const WallFace wall = wall_between({20, -6, 0}, {20, 6, 0});
-  EXPECT_TRUE(hides(wall, {40, -4, 0}, {50, 4, 0}));
-  EXPECT_TRUE(hides(wall_between({20, 6, 0}, {20, -6, 0}), {40, -4, 0}, {50, 4, 0})) << "the other way round";
-  EXPECT_TRUE(hides(wall, {21, -4, 1}, {21, 4, 1}));
-  EXPECT_FALSE(hides(wall, {18, -4, 0}, {18, 4, 0})) << "before it";
-  EXPECT_FALSE(hides(wall, {18, -4, 1}, {40, 4, 0})) << "through it";
-  EXPECT_FALSE(hides(wall, {40, -4, 0}, {50, 16, 0})) << "past its side";
-  EXPECT_FALSE(hides(wall, {40, -4, 0}, {50, 4, 20})) << "above it";
-  EXPECT_FALSE(hides(wall_between({20, -6, 1}, {20, 6, 1}), {21, -4, 0}, {21, 4, 0})) << "below it";
-  EXPECT_FALSE(hides(wall_between({20, -6, 0}, {-20, 6, 0}), {40, -4, 0}, {50, 4, 0})) << "behind the camera, partly";
-  EXPECT_FALSE(hides(wall_between({130, -60, 0}, {130, 60, 0}), {140, -4, 0}, {141, 4, 0})) << "black";
+  EXPECT_TRUE(occludes(wall, {40, -4, 0}, {50, 4, 0}));
+  EXPECT_TRUE(occludes(wall_between({20, 6, 0}, {20, -6, 0}), {40, -4, 0}, {50, 4, 0})) << "the other way round";
+  EXPECT_TRUE(occludes(wall, {21, -4, 1}, {21, 4, 1}));
+  EXPECT_FALSE(occludes(wall, {18, -4, 0}, {18, 4, 0})) << "before it";
+  EXPECT_FALSE(occludes(wall, {18, -4, 1}, {40, 4, 0})) << "through it";
+  EXPECT_FALSE(occludes(wall, {40, -4, 0}, {50, 16, 0})) << "past its side";
+  EXPECT_FALSE(occludes(wall, {40, -4, 0}, {50, 4, 20})) << "above it";
+  EXPECT_FALSE(occludes(wall_between({20, -6, 1}, {20, 6, 1}), {21, -4, 0}, {21, 4, 0})) << "below it";
+  EXPECT_FALSE(occludes(wall_between({20, -6, 0}, {-20, 6, 0}), {40, -4, 0}, {50, 4, 0}))
+      << "behind the camera, partly";
+  EXPECT_FALSE(occludes(wall_between({130, -60, 0}, {130, 60, 0}), {140, -4, 0}, {141, 4, 0})) << "black";
 }
 
 TEST(Occluders, AreThoseThatCoverMost) {
-  // Walls of one size at different distances, the nearest of which one covers as much as a box's side; walls that
-  // are out of the frame, behind the camera or black.
+  // Walls of one size at different distances, and a box's side that covers as much as a wall at 10 m; also walls
+  // outside the frame, behind the camera, and black.
   StaticGeometry geometry;
   for (const float distance_m : {60.0f, 20.0f, 50.0f, 40.0f, 30.0f, -20.0f, 130.0f}) {
     geometry.walls.push_back(wall_between({distance_m, -3, 0}, {distance_m, 3, 0}));
@@ -90,7 +91,7 @@ TEST(Occluders, AreThoseThatCoverMost) {
 
 class OccludersOfTowns : public testing::TestWithParam<const char*> {};
 
-TEST_P(OccludersOfTowns, ChangeNothingThatIsSeen) {
+TEST_P(OccludersOfTowns, DoNotChangeTheImage) {
   const std::string map = GetParam();
   if (const std::string why = test::missing(map); !why.empty()) GTEST_SKIP() << why;
   const Snapshot snapshot = drive_snapshot({.map = map, .views = 24});
@@ -98,8 +99,8 @@ TEST_P(OccludersOfTowns, ChangeNothingThatIsSeen) {
   const SceneBatch scene = snapshot.scene.batch();
   const std::vector<PinholeCamera> cameras = pinhole_cameras(paper_rig());
   ImageDrawer drawer;
-  // Fragments that are hidden as a whole weigh nothing, but what is added up beside them is rounded; and slivers that
-  // fill a pixel together with a wall show a little.
+  // Fully occluded fragments have weight 0, but other weights are rounded differently; and slivers that fill a pixel
+  // together with a wall are slightly visible.
   constexpr float kRounding = 1e-6f, kWorst = 4.0f / 255.0f;
   std::size_t differing = 0, values = 0;
   float worst = 0;

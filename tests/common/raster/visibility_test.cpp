@@ -1,5 +1,5 @@
-// The shared order rules against brute force: which of two faces is in front, and in which order a pixel's fragments
-// are laid over each other.
+// The shared visibility rules against brute force: which of two faces is in front, and which samples of a pixel's
+// fragments are visible.
 #include <algorithm>
 #include <bit>
 #include <random>
@@ -16,10 +16,10 @@ namespace {
 
 using Extents = std::vector<std::pair<uint32_t, Extent>>;
 
-// Things as a camera at eye_m that looks along x sees them, and their order.
+// A camera at eye_m that looks along x: sets up faces of primitives and compares their order.
 class TestView {
  public:
-  // Faces of a thing.
+  // Faces of a primitive.
   using Faces = std::vector<ScreenFace>;
 
   explicit TestView(Vec3 eye_m, float pitch_rad = 0) {
@@ -63,7 +63,7 @@ class TestView {
       return stands_on(extent(solid), extent(strip), setting_.camera.position_m);
     });
   }
-  // -1 the first is in front wherever both are seen, 1 the second, 0 they do not meet, 2 it depends on where.
+  // -1: the first is in front wherever both overlap, 1: the second, 0: they do not overlap, 2: it depends on the point.
   int order(const Faces& a, const Faces& b) const {
     int first = 0, second = 0;
     where_both(a, b, [&](const ScreenFace& of_a, const ScreenFace& of_b, Vec2 at) {
@@ -103,7 +103,7 @@ class TestView {
   bool covers(const ScreenFace& face, Vec2 at) const {
     return covers_point(edges_.data() + face.edge_begin, face.edge_count, at.x, at.y);
   }
-  // Of the thing seen last under a object_id.
+  // The extent of the last primitive with this object id.
   const Extent& extent(uint32_t object_id) const {
     return std::find_if(extents_.rbegin(), extents_.rend(), [&](const auto& seen) { return seen.first == object_id; })
         ->second;
@@ -126,7 +126,7 @@ Strip strip_between(Vec3 a_m, Vec3 b_m, StripKind kind = StripKind::lane_mark, f
   return strip;
 }
 
-// How many times as far as it is long a ray from the eye goes before it enters a box; -1 where it misses.
+// Distance at which a ray from the eye enters a box, in multiples of the ray's length; -1 if it misses.
 float enter(const AgentBox& box, Vec3 eye, Vec3 ray) {
   const Vec3 ahead{box.cos_heading, box.sin_heading, 0}, left{-box.sin_heading, box.cos_heading, 0}, up{0, 0, 1};
   const Vec3 middle = box.center_m + up * (0.5f * box.height_m) - eye;
@@ -157,7 +157,7 @@ TEST(Order, OfDisjointBoxesIsWhatRaysSee) {
     const TestView::Faces seen_a = view.see(a, 0), seen_b = view.see(b, 1);
     view.where_both(seen_a, seen_b, [&](const ScreenFace& of_a, const ScreenFace& of_b, Vec2 at) {
       const float at_a = enter(a, eye, view.ray(at)), at_b = enter(b, eye, view.ray(at));
-      if (at_a < 0 || at_b < 0) return;  // the border, where rounding decides
+      if (at_a < 0 || at_b < 0) return;  // at the border, where rounding decides
       EXPECT_EQ(view.in_front(of_a, of_b, at), at_a < at_b) << round;
       ++compared;
     });
@@ -166,7 +166,7 @@ TEST(Order, OfDisjointBoxesIsWhatRaysSee) {
 }
 
 TEST(Order, OfLevelsIsByHeight) {
-  // A car on a bridge above a car, from below both, from above, and from between the two.
+  // A car on a bridge above another car, seen from below both, from above, and from between.
   const AgentBox low = make_box(AgentClass::vehicle, {12, 0, 0}, 0, {14, 2, 1.5f});
   const AgentBox high = make_box(AgentClass::vehicle, {12, 0, 6}, 0, {14, 2, 1.5f});
   const Strip bridge = strip_between({6, 0, 6}, {15, 0, 6});
@@ -181,7 +181,7 @@ TEST(Order, OfLevelsIsByHeight) {
 TEST(Order, StripsOfOneLevelGoByRankAndOthersByDepth) {
   const Strip mark = strip_between({10, -2, 0}, {18, 2, 0}, StripKind::lane_mark, 0.5f);
   for (const float height_m : {-0.04f, 0.0f, 0.04f}) {
-    // An edge that crosses the mark, a little above or below it: rank.
+    // An edge that crosses the mark, slightly above or below it: the rank decides.
     const Strip edge = strip_between({10, 2, height_m}, {18, -2, height_m}, StripKind::road_edge, 0.5f);
     const Strip stop = strip_between({10, 2, height_m}, {18, -2, height_m}, StripKind::stop_line, 0.5f);
     TestView view({0, 0, 1.5f});
@@ -190,7 +190,7 @@ TEST(Order, StripsOfOneLevelGoByRankAndOthersByDepth) {
     EXPECT_EQ(view.order(view.see(mark, 7), view.see(mark, 4)), 1);
   }
   for (const float height_m : {-0.5f, 0.5f}) {
-    // On another level: the camera is above both, so the upper is in front.
+    // On different levels: the camera is above both, so the upper one is in front.
     const Strip stop = strip_between({8, 4, height_m}, {20, -4, height_m}, StripKind::stop_line, 3.0f);
     TestView view({0, 0, 3});
     EXPECT_EQ(view.order(view.see(mark), view.see(stop)), height_m < 0 ? -1 : 1) << height_m;
@@ -207,7 +207,7 @@ TEST(Order, WhatStandsOnAStripIsInFrontOfItEvenWhereItDipsIn) {
   // The same car beyond the end of the strip does not stand on it, and neither does one on a road 2 m below.
   const Vec3 eye{0, 0, 1};
   EXPECT_TRUE(stands_on(extent_of(car), extent_of(mark), eye));
-  // Seen from below the road, the mark is in front of the car.
+  // From below the road, the mark is in front of the car.
   EXPECT_FALSE(stands_on(extent_of(car), extent_of(mark), {0, 0, -4}));
   AgentBox beyond = car;
   beyond.center_m.x = 23;
@@ -229,8 +229,8 @@ TEST(Order, StripsInFrontOfAWallOrBehindIt) {
 }
 
 TEST(Order, AStripDrawnWiderThanItIsStaysAtItsDepth) {
-  // Its plane almost passes through the eye: on that plane, half of its width on screen would be much nearer, and half
-  // beyond the horizon.
+  // Its plane almost contains the eye: in that plane, half of its width on screen would be much nearer, and half beyond
+  // the horizon.
   const Strip strip = strip_between({40, -4, 0.9995f}, {45, 4, 0.9985f});
   for (const float wall_at_m : {15.0f, 110.0f}) {
     WallFace wall;
@@ -242,7 +242,7 @@ TEST(Order, AStripDrawnWiderThanItIsStaysAtItsDepth) {
   }
 }
 
-TEST(Order, ComparesInTheMiddleOfTheSharedSamples) {
+TEST(Order, ComparesAtTheCentroidOfTheSharedSamples) {
   std::mt19937_64 random(3);
   for (int round = 0; round < 2000; ++round) {
     const uint64_t samples = round % 3 ? random() & random() & random() : random();
@@ -264,7 +264,7 @@ TEST(Order, ComparesInTheMiddleOfTheSharedSamples) {
   EXPECT_EQ(centroid_of(0).x, 0.5f);
 }
 
-// A face whose plane has some inverse depth at a pixel's corner and some gradient; it has no edges.
+// A face without edges whose plane has the given inverse depth at a pixel's corner and the given gradient.
 ScreenFace plane_face(uint32_t object_id, float inverse_depth_0, Vec2 gradient = {}) {
   ScreenFace face;
   face.object_id = object_id;
@@ -296,7 +296,7 @@ TEST(Order, SolidsThatIntersectShareSamplesByWhichIsNearer) {
       if (!(shared >> sample & 1)) continue;
       const Vec2 at = corner + centroid_of(uint64_t{1} << sample);
       const float lead = inverse_depth(a, at) - inverse_depth(b, at);
-      // A line that is almost upright is turned by as much in a pixel (see make_edge).
+      // Almost upright lines are rotated by up to this much in a pixel (see make_edge).
       const Vec2 gradient{a.inverse_depth_x - b.inverse_depth_x, a.inverse_depth_y - b.inverse_depth_y};
       if (std::abs(lead) < 0.5f / kSteepest * length(gradient)) continue;
       ASSERT_EQ(a_first >> sample & 1, lead > 0 ? 1u : 0u) << round;
@@ -306,7 +306,7 @@ TEST(Order, SolidsThatIntersectShareSamplesByWhichIsNearer) {
 }
 
 TEST(Order, TwoFacesThatFillAPixelAndIntersectFillItTogether) {
-  // The first is in front in the left five eighths of the pixel.
+  // The first is in front in the left 5/8 of the pixel.
   const ScreenFace first = plane_face(make_object_id(kAgentKind, 0), 0.2f, {-0.08f, 0}),
                    second = plane_face(make_object_id(kAgentKind, 1), 0.15f);
   const PixelCoverage full{1, kAllSamples};
@@ -319,11 +319,11 @@ TEST(Order, TwoFacesThatFillAPixelAndIntersectFillItTogether) {
   EXPECT_NEAR(sum.color().g, 3.0 / 8, 1e-5);
 }
 
-TEST(Order, WhatIsFreeOfAPixelsFragmentsDoesNotDependOnTheirList) {
+TEST(Order, VisibleSamplesDoNotDependOnTheOrderOfFragments) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<float> unit(0, 1);
   for (int round = 0; round < 500; ++round) {
-    // Planes in one pixel; those of random tilt intersect, and with strips among them may hide each other in a ring.
+    // Planes in one pixel; randomly tilted ones intersect, and strips among them may occlude each other in a cycle.
     const float tilt = round % 2 ? 0.1f : 0.0f;
     const bool with_strips = round % 4 == 3;
     std::vector<ScreenFace> faces(2 + random() % 6);
@@ -354,15 +354,15 @@ TEST(Order, WhatIsFreeOfAPixelsFragmentsDoesNotDependOnTheirList) {
     };
     PixelAccumulator sum;
     const std::vector<uint64_t> visible = visible_by_face(&sum);
-    // No sample belongs to two; without rings, each that is covered belongs to one.
-    uint64_t seen = 0, covered = 0;
+    // No sample belongs to two fragments; without cycles, each covered sample belongs to one.
+    uint64_t assigned = 0, covered = 0;
     for (std::size_t i = 0; i < fragments.size(); ++i) {
-      ASSERT_EQ(seen & visible[i], 0u) << round;
-      seen |= visible[i];
+      ASSERT_EQ(assigned & visible[i], 0u) << round;
+      assigned |= visible[i];
       covered |= fragments[i].coverage.samples;
     }
     if (!with_strips) {
-      ASSERT_EQ(seen, covered) << round;
+      ASSERT_EQ(assigned, covered) << round;
     }
     for (int shuffle = 0; shuffle < 5; ++shuffle) {
       std::shuffle(fragments.begin(), fragments.end(), random);
@@ -373,7 +373,7 @@ TEST(Order, WhatIsFreeOfAPixelsFragmentsDoesNotDependOnTheirList) {
   }
 }
 
-TEST(Order, WhatFillsThePixelIsHiddenOnlyByWhatDoesToo) {
+TEST(Order, AFullFragmentIsOccludedOnlyByAnother) {
   const ScreenFace near = plane_face(make_object_id(kWallKind, 0), 0.2f),
                    far = plane_face(make_object_id(kWallKind, 1), 0.1f);
   auto never = [](uint32_t, uint32_t) { return false; };
@@ -382,7 +382,7 @@ TEST(Order, WhatFillsThePixelIsHiddenOnlyByWhatDoesToo) {
   EXPECT_EQ(occlude_pair({0.5f, 0xFFFF}, {1, kAllSamples}, far, near, {}, never).of_a, 0xFFFFu);
 }
 
-// Random planes in one pixel, two thirds of them of solids.
+// Random planes in one pixel, two thirds of them solids.
 std::vector<ScreenFace> random_planes(std::mt19937_64* random, std::size_t count) {
   std::uniform_real_distribution<float> unit(0, 1);
   auto tilt = [&] { return 0.04f * (unit(*random) - 0.5f); };
@@ -395,7 +395,7 @@ std::vector<ScreenFace> random_planes(std::mt19937_64* random, std::size_t count
   return faces;
 }
 
-TEST(Order, WhatIsBuriedIsHiddenByWhatBuriesIt) {
+TEST(Order, FacesBehindTheOccluderBoundAreOccluded) {
   std::mt19937_64 random(11);
   int behind = 0;
   for (int round = 0; round < 20000; ++round) {
@@ -404,7 +404,7 @@ TEST(Order, WhatIsBuriedIsHiddenByWhatBuriesIt) {
     const ScreenFace& face = faces[static_cast<std::size_t>(round % 3 ? 2 : 1 - round % 2)];
     const float bound = occluder_bound(full, 0, 0);
     ASSERT_EQ(bits_from_float(bound) << kOccluderBoundBits, 0u);
-    ASSERT_TRUE(passes_occluder_bound(full, bound, 0, 0)) << "nothing buries itself";
+    ASSERT_TRUE(passes_occluder_bound(full, bound, 0, 0)) << "no face occludes itself";
     if (passes_occluder_bound(face, bound, 0, 0)) continue;
     ++behind;
     const uint64_t samples = random() | 1;
@@ -414,7 +414,7 @@ TEST(Order, WhatIsBuriedIsHiddenByWhatBuriesIt) {
     const Vec2 gradient{full.inverse_depth_x - face.inverse_depth_x, full.inverse_depth_y - face.inverse_depth_y};
     for (int sample = 0; sample < 64; ++sample) {
       if (!((samples & ~occluded.of_b) >> sample & 1)) continue;
-      // A line that is almost upright is turned by as much in a pixel (see make_edge).
+      // Almost upright lines are rotated by up to this much in a pixel (see make_edge).
       const Vec2 at = centroid_of(uint64_t{1} << sample);
       const float lead = inverse_depth(full, at) - inverse_depth(face, at);
       ASSERT_GE(lead, 0.0f) << round;
@@ -424,12 +424,12 @@ TEST(Order, WhatIsBuriedIsHiddenByWhatBuriesIt) {
   EXPECT_GT(behind, 2000);
 }
 
-// Devices ask whichever face holds a pixel when another one comes.
-TEST(Order, WhatIsBuriedDoesNotDependOnWhoIsAskedFirst) {
+// A device tests each face against the full face that a pixel has at that moment.
+TEST(Order, TheOccluderBoundTestDoesNotDependOnTheOrder) {
   std::mt19937_64 random(12);
   for (int round = 0; round < 2000; ++round) {
     std::vector<ScreenFace> faces = random_planes(&random, 2 + random() % 8);
-    if (round % 4 == 0) faces.push_back(faces.front());  // as near as another
+    if (round % 4 == 0) faces.push_back(faces.front());  // equally near
     float bound = 0;
     for (const ScreenFace& face : faces) bound = std::max(bound, occluder_bound(face, 0, 0));
     std::vector<const ScreenFace*> expected;
@@ -455,7 +455,7 @@ TEST(Order, WhatIsBuriedDoesNotDependOnWhoIsAskedFirst) {
   }
 }
 
-TEST(Order, ASliverIsHiddenByWhatIsInFrontOfItAndHidesNothing) {
+TEST(Order, ASliverIsOccludedAndDoesNotOcclude) {
   auto never = [](uint32_t, uint32_t) { return false; };
   const ScreenFace other = plane_face(make_object_id(kWallKind, 1), 0.1f);
   for (const bool sliver_in_front : {false, true}) {
@@ -463,7 +463,7 @@ TEST(Order, ASliverIsHiddenByWhatIsInFrontOfItAndHidesNothing) {
     const OccludedSamples occluded = occlude_pair({0.01f, 0}, {0.5f, 0xFFFFFFFF}, sliver, other, {}, never);
     EXPECT_EQ(occluded.of_a, sliver_in_front ? 0u : kAllSamples);
     EXPECT_EQ(occluded.of_b, 0u);
-    // Pieces that meet in a pixel and fill it: neither is behind the other.
+    // Surfaces that meet in a pixel and fill it: neither occludes the other.
     EXPECT_EQ(occlude_pair({0.01f, 0}, {0.99f, kAllSamples}, sliver, other, {}, never).of_a, 0u);
     EXPECT_EQ(occlude_pair({0.99f, kAllSamples}, {0.01f, 0}, other, sliver, {}, never).of_b, 0u);
   }
