@@ -38,20 +38,20 @@ void ImageDrawer::prepare(const ImageRequest& request) {
 
 void ImageDrawer::find_solids() {
   solids_.clear();
-  auto keep = [this](const WorldQuad& quad, Solid solid) {
+  auto add_unless_black = [this](const WorldQuad& quad, Solid solid) {
     if (quad_to_camera(quad, setting_.camera, &solid.in_camera)) solids_.push_back(solid);
   };
   visit_agents(setting_, *request_.scene, *request_.view, [&](const AgentBox& box, int32_t agent) {
     const PrimitiveRef primitive = agent_ref(box, agent - world_begin());
-    const bool may_hide = may_occlude(box, setting_.camera);
+    const bool may_occlude_others = may_occlude(box, setting_.camera);
     visit_front_facing(box, setting_.camera, [&](int face) {
-      keep(cuboid_quad(box, face, setting_.debug_palette),
-           {primitive, face_entry(primitive.object_id, face), may_hide, {}});
+      add_unless_black(cuboid_quad(box, face, setting_.debug_palette),
+                       {primitive, face_entry(primitive.object_id, face), may_occlude_others, {}});
     });
   });
   visit_walls(setting_, *request_.geometry, [&](const WallFace& wall, int32_t index) {
     const PrimitiveRef primitive = wall_ref(index);
-    keep(wall_quad(wall), {primitive, primitive.object_id, may_occlude(wall, setting_.camera), {}});
+    add_unless_black(wall_quad(wall), {primitive, primitive.object_id, may_occlude(wall, setting_.camera), {}});
   });
 }
 

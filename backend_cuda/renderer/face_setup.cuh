@@ -15,7 +15,7 @@ template <typename Value, int kValues = 1>
 struct LaneRow {
   static constexpr int kWords = kValues * sizeof(Value) / sizeof(uint4), kRowsAtOnce = kWarpSize / kWords;
   Value values[kValues];
-  uint4 gap;
+  uint4 padding;
   __device__ uint4* words() { return reinterpret_cast<uint4*>(values); }
 };
 using StripRow = LaneRow<Strip>;
@@ -99,8 +99,8 @@ __device__ bool make_quad(const FaceSetupContext& context, uint32_t entry, Quad*
 }
 
 // Stores the faces of those lanes with at >= 0. Every image has capacity for all of its faces.
-__device__ inline void keep_face(const FaceSetupContext& context, const ScreenFace& face, PrimitiveRef primitive,
-                                 int32_t edge_begin, int32_t at) {
+__device__ inline void store_face(const FaceSetupContext& context, const ScreenFace& face, PrimitiveRef primitive,
+                                  int32_t edge_begin, int32_t at) {
   if (at >= 0) store_words(context.faces + at, complete_face(face, primitive, edge_begin));
 }
 
@@ -139,14 +139,15 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
   Quad quad;
   const uint32_t made = is_quad ? entry : of_another;
   load_strips(context, made, storage->strips);
-  const bool is_seen =
+  const bool is_not_black =
       make_quad(context, made, &quad, [&](int32_t) { return storage->strips[lane_index()].values[0]; });
   ScreenQuad on_screen;
   bool is_clockwise = false;
   const ClipClass clip_class = project_quad(camera, quad.in_camera.corner, quad.floor_px, &on_screen);
-  const bool covers = is_quad_visible(context.setting, on_screen, quad.in_camera.color, quad.primitive, &is_clockwise),
-             is_wanted = is_quad && is_seen;
-  const bool is_visible = is_wanted && clip_class == ClipClass::inside && covers,
+  const bool passes_culling =
+                 is_quad_visible(context.setting, on_screen, quad.in_camera.color, quad.primitive, &is_clockwise),
+             is_wanted = is_quad && is_not_black;
+  const bool is_visible = is_wanted && clip_class == ClipClass::inside && passes_culling,
              is_clipped = is_wanted && clip_class == ClipClass::crossing;
   // Two lanes allocate for the whole warp, faces and clipped entries at once; the results are needed only after the
   // edges.
@@ -159,9 +160,9 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
   ScreenFace face;
   if (is_visible) {
     PolygonEdge* const edges = storage->edges[rank].values;
-    auto keep_edge = [edges](int k, const PolygonEdge& edge) { store_words(edges + k, edge); };
+    auto store_edge = [edges](int k, const PolygonEdge& edge) { store_words(edges + k, edge); };
     make_quad_face(camera, context.setting.frustum, on_screen, is_clockwise, quad.in_camera.plane, quad.in_camera.color,
-                   keep_edge, &face);
+                   store_edge, &face);
   }
   __syncwarp();
   const int32_t at = __shfl_sync(kAllLanes, taken, 0), clipped_at = __shfl_sync(kAllLanes, taken, 1);
@@ -188,7 +189,7 @@ __device__ inline bool make_warp_face(const FaceSetupContext& context, ClipShare
   ScreenFace face;
   const bool is_visible = make_screen_face(context, warp_face, edge_begin, &face);
   if (is_visible && lane_index() == 0)
-    keep_face(context, face, warp_face.primitive, edge_begin, atomicAdd(context.num_faces, 1));
+    store_face(context, face, warp_face.primitive, edge_begin, atomicAdd(context.num_faces, 1));
   return true;
 }
 
@@ -224,7 +225,7 @@ __device__ inline bool clip_quads(const FaceSetupContext* contexts, ClipShared* 
     face.edge_count = static_cast<uint8_t>(count);
     face.color = quad.in_camera.color;
     set_bounds(camera, context.setting.frustum, bounds, quad.in_camera.plane, &face);
-    keep_face(context, face, quad.primitive, edge_begin + at, atomicAdd(context.num_faces, 1));
+    store_face(context, face, quad.primitive, edge_begin + at, atomicAdd(context.num_faces, 1));
   }
   PICTURA_NO_UNROLL
   for (unsigned left = edges; left != 0; left &= left - 1, ++at) {
@@ -257,9 +258,9 @@ __device__ inline bool clip_primitives(const FaceSetupContext* contexts, ClipSha
     const int owner = __ffs(static_cast<int>(pending)) - 1;
     const FaceSetupContext& its_context = contexts[__shfl_sync(kAllLanes, primitive.image, owner)];
     const int32_t index = index_of(__shfl_sync(kAllLanes, primitive.entry, owner));
-    const bool is_made = make_warp_face(
+    const bool is_stored = make_warp_face(
         its_context, storage, are_lights ? make_light(its_context, index) : broadcast_quad(storage, owner, quad));
-    if (lane_index() == owner) fits = is_made;
+    if (lane_index() == owner) fits = is_stored;
   }
   return fits;
 }
@@ -312,7 +313,8 @@ class BestOccluders {
     Quad quad;
     Offered own{is_active ? entry : kNoEntry};
     if (is_active && make_quad(*context, entry, &quad, [context](int32_t i) { return context->strips[i]; })) {
-      own.covers = __float_as_int(occluder_area_px2(setting.camera, quad.in_camera, &own.on_screen, &own.is_clockwise));
+      own.area_bits =
+          __float_as_int(occluder_area_px2(setting.camera, quad.in_camera, &own.on_screen, &own.is_clockwise));
     }
     const Chosen chosen = choose(own);
     const int slot = insert(own, chosen);
@@ -323,12 +325,12 @@ class BestOccluders {
   }
 
   /// Number of occluders selected. All lanes of the warp.
-  __device__ int count() const { return __popc(__ballot_sync(kAllLanes, kept_covers_ != 0)); }
+  __device__ int count() const { return __popc(__ballot_sync(kAllLanes, kept_area_bits_ != 0)); }
 
  private:
   struct Offered {
     uint32_t entry;
-    int covers = 0;  // bits of the area, in the same order; 0: occludes nothing
+    int area_bits = 0;  // bits of the area, in the same order; 0: occludes nothing
     ScreenQuad on_screen;
     bool is_clockwise = false;
   };
@@ -339,7 +341,7 @@ class BestOccluders {
 
   __device__ Chosen choose(const Offered& own) const {
     Chosen chosen;
-    int left = own.covers, kept_left = kept_covers_;
+    int left = own.area_bits, kept_left = kept_area_bits_;
     PICTURA_NO_UNROLL
     for (int k = 0; k < Occluders::kMaxCount; ++k) {
       const int maximum = __reduce_max_sync(kAllLanes, max_of(left, kept_left));
@@ -366,11 +368,11 @@ class BestOccluders {
     for (unsigned added = __ballot_sync(kAllLanes, chosen.own); added != 0; added &= added - 1, slots &= slots - 1) {
       const int from = __ffs(static_cast<int>(added)) - 1, to = __ffs(static_cast<int>(slots)) - 1;
       const uint32_t entry = __shfl_sync(kAllLanes, own.entry, from);
-      const int covers = __shfl_sync(kAllLanes, own.covers, from);
+      const int area_bits = __shfl_sync(kAllLanes, own.area_bits, from);
       if (lane_index() == from) slot = to;
       if (lane_index() == to) {
         kept_ = entry;
-        kept_covers_ = covers;
+        kept_area_bits_ = area_bits;
       }
     }
     return slot;
@@ -378,12 +380,12 @@ class BestOccluders {
 
   FaceSetupContext* context_;
   uint32_t kept_ = kNoEntry;
-  int kept_covers_ = 0;
+  int kept_area_bits_ = 0;
 };
 
 // Finds the occluders among the solids of a list. All lanes of one warp.
 __device__ inline void find_occluders(FaceSetupContext* context, const uint32_t* entries, int32_t count) {
-  auto may_hide = [&](uint32_t entry) {
+  auto is_candidate = [&](uint32_t entry) {
     const PinholeCamera& camera = context->setting.camera;
     const uint32_t index = entry & kFaceIndexMask;
     if (entry == kNoEntry) return false;
@@ -397,7 +399,7 @@ __device__ inline void find_occluders(FaceSetupContext* context, const uint32_t*
   for (int32_t first = 0;; first += kWarpSize) {
     const bool is_more = first < count;
     const uint32_t entry = first + lane_index() < count ? entries[first + lane_index()] : kNoEntry;
-    queue.push(may_hide(entry), entry, 0);
+    queue.push(is_candidate(entry), entry, 0);
     if (queue.is_ready() || (!is_more && !queue.is_empty())) {
       const WarpQueue::Pair candidate = queue.take();
       best.offer(candidate.is_valid, candidate.a);

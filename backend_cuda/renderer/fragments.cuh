@@ -21,7 +21,7 @@ __device__ inline Part tile_at(int x, int y, int columns, int rows, int width_px
 template <typename Word>
 struct PixelWord {
   static constexpr int kFaceBits = sizeof(Word) == 4 ? kMarkedFaceBits : 32;
-  static constexpr Word kFace = (Word{1} << kFaceBits) - 1, kHasChain = Word{1} << (8 * sizeof(Word) - 1);
+  static constexpr Word kFace = (Word{1} << kFaceBits) - 1, kHasFragments = Word{1} << (8 * sizeof(Word) - 1);
 
   __device__ static Word mark(float bound, int face) {
     static_assert(kMarkedFaceBits + kOccluderBoundBits == 32);
@@ -34,7 +34,7 @@ struct PixelWord {
   }
   /// Replaces the first fragment of the list and keeps the face.
   __device__ static Word with_first(Word word, Word fragment) {
-    return kHasChain | fragment << kFaceBits | (word & kFace);
+    return kHasFragments | fragment << kFaceBits | (word & kFace);
   }
 };
 
@@ -48,7 +48,7 @@ __device__ typename Memory::Word full_of_word(typename Memory::Word word) {
 template <typename Memory>
 __device__ typename Memory::Word first_of_word(typename Memory::Word word) {
   using Pixel = PixelWord<typename Memory::Word>;
-  return (word & Pixel::kHasChain) != 0 ? (word & ~Pixel::kHasChain) >> Pixel::kFaceBits : Memory::kNone;
+  return (word & Pixel::kHasFragments) != 0 ? (word & ~Pixel::kHasFragments) >> Pixel::kFaceBits : Memory::kNone;
 }
 template <typename Memory>
 __device__ typename Memory::Word full_of(const Memory& memory, int pixel) {
@@ -193,8 +193,8 @@ __device__ bool is_alone(const Memory& memory, int fragment, int pixel) {
 
 // Stores a fragment at the front of its pixel's list. No other thread changes the pixel's full face meanwhile.
 template <typename Memory>
-__device__ void keep_fragment(const Memory& memory, int fragment, uint32_t face, int pixel, uint64_t samples,
-                              float area) {
+__device__ void store_fragment(const Memory& memory, int fragment, uint32_t face, int pixel, uint64_t samples,
+                               float area) {
   using Index = typename Memory::Index;
   using Word = typename Memory::Word;
   memory.samples_low[fragment] = static_cast<uint32_t>(samples);
@@ -221,7 +221,7 @@ __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, c
   const bool is_covered = coverage.area > 0.0f;
   const int32_t fragment = warp_allocate_one(&memory.state->num_fragments, is_covered);
   if (!is_covered || fragment >= memory.max_fragments) return;
-  keep_fragment(memory, fragment, candidate.a, pixel, coverage.samples, coverage.area);
+  store_fragment(memory, fragment, candidate.a, pixel, coverage.samples, coverage.area);
 }
 
 // Makes fragments of those candidates that pass their pixel's occluder bound. Warps queue them until every lane has
@@ -260,9 +260,9 @@ __device__ void finish_fragments(const Memory& memory, int count) {
   using Index = typename Memory::Index;
   using Word = typename Memory::Word;
   auto set_all_visible = [&](int fragment) {
-    const uint64_t reach = effective_samples(memory.coverage(fragment));
-    memory.visible_low[fragment] = static_cast<uint32_t>(reach);
-    memory.visible_high[fragment] = static_cast<uint32_t>(reach >> 32);
+    const uint64_t samples = effective_samples(memory.coverage(fragment));
+    memory.visible_low[fragment] = static_cast<uint32_t>(samples);
+    memory.visible_high[fragment] = static_cast<uint32_t>(samples >> 32);
   };
   PICTURA_NO_UNROLL
   for (int first = warp_index() * kWarpSize; first < count; first += Memory::kThreads) {
@@ -280,7 +280,7 @@ __device__ void finish_fragments(const Memory& memory, int count) {
     if (full == Memory::kNone) continue;
     const int32_t added = count + atomicAdd(&memory.state->num_added, 1);
     if (added >= memory.max_fragments) continue;
-    keep_fragment(memory, added, static_cast<uint32_t>(full), pixel, kAllSamples, 1.0f);
+    store_fragment(memory, added, static_cast<uint32_t>(full), pixel, kAllSamples, 1.0f);
     set_all_visible(added);
   }
 }

@@ -15,7 +15,7 @@ struct ImageWriter {
 
   /// Stores the colour of a pixel with a fragment list at the first of its fragments.
   template <typename Memory>
-  __device__ void keep(const Memory& memory, int fragment, Rgb color) const {
+  __device__ void store_color(const Memory& memory, int fragment, Rgb color) const {
     if (format == PixelFormat::u8) {
       memory.set_color_bytes(fragment, to_bytes(color));
     } else {
@@ -101,7 +101,7 @@ struct ImageWriter {
 /// Writes nothing.
 struct NoImage {
   template <typename Memory>
-  __device__ void keep(const Memory&, int, Rgb) const {}
+  __device__ void store_color(const Memory&, int, Rgb) const {}
   template <typename Memory>
   __device__ void pixels(const Memory&, int, int, int, const typename Memory::Word*) const {}
 };

@@ -66,17 +66,17 @@ __device__ void resolve_occlusion(const Memory& memory, const Part& part, int co
       other = memory.next[fragment];
       is_before_full = full_of(memory, memory.pixel[fragment]) != Memory::kNone;
     }
-    uint32_t with = Memory::kNone;
+    uint32_t partner = Memory::kNone;
     bool may_overlap = is_before_full && memory.visible(fragment) != 0;
     if (!is_before_full && other != Memory::kNone) {
-      with = other;
-      const auto its_index = static_cast<int>(with);
+      partner = other;
+      const auto its_index = static_cast<int>(partner);
       may_overlap =
           may_occlude_more(memory.visible(fragment), samples, memory.visible(its_index), memory.samples(its_index));
-      other = memory.next[with];
+      other = memory.next[partner];
     }
     is_before_full = false;
-    pairs.push(may_overlap, static_cast<uint32_t>(fragment), with);
+    pairs.push(may_overlap, static_cast<uint32_t>(fragment), partner);
     if (pairs.is_ready()) resolve_pairs<Memory>(pairs.take(), part);
   }
   if (!pairs.is_empty()) resolve_pairs<Memory>(pairs.take(), part);
@@ -98,7 +98,7 @@ __device__ void compute_weights(const Memory& memory, int count, const Visit& vi
     const Rgb color = face.color;
     if (is_alone(memory, i, memory.pixel[i])) {
       visit(face, memory.area[i]);
-      write.keep(memory, i, color * memory.area[i]);
+      write.store_color(memory, i, color * memory.area[i]);
       continue;
     }
     const PixelAccumulator::Weight weight = PixelAccumulator::weight_of(memory.coverage(i), memory.visible(i));
@@ -135,7 +135,7 @@ __device__ void composite_pixels(const Memory& memory, const Visit& visit, const
         visit(memory.faces[memory.face[i]], shares.of({memory.area[i], kind}));
       });
     }
-    write.keep(memory, head, sum.color(shares));
+    write.store_color(memory, head, sum.color(shares));
   }
 }
 
@@ -272,8 +272,8 @@ __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn
 }
 
 // Draws the faces into a part of an image, in smaller parts if it does not fit. Calls visit(face, weight) for each
-// fragment, write.keep(memory, fragment, colour) for each pixel with fragments, and write.pixels(memory, x, y, count,
-// words) for neighbouring pixels. False if a single pixel does not fit. All threads of the block; the caller
+// fragment, write.store_color(memory, fragment, colour) for each pixel with fragments, and write.pixels(memory, x, y,
+// count, words) for neighbouring pixels. False if a single pixel does not fit. All threads of the block; the caller
 // synchronizes before the next call.
 template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whole, const Visit& visit,

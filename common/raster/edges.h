@@ -81,16 +81,16 @@ PICTURA_HD inline bool is_inside(const PolygonEdge& edge, Vec2 p) {
   return (edge.rows_scale > 0.0f ? below_px : -below_px) >= 0.0f;
 }
 
-/// Calls keep_edge(i, edge), i = 0, 1, ..., for the edges of a polygon on screen, skipping those of length 0, and
+/// Calls store_edge(i, edge), i = 0, 1, ..., for the edges of a polygon on screen, skipping those of length 0, and
 /// returns their number, at most `count`.
-template <typename KeepEdge>
-PICTURA_HD inline int make_edges(const Vec2* corner, int count, bool is_clockwise, KeepEdge&& keep_edge) {
+template <typename StoreEdge>
+PICTURA_HD inline int make_edges(const Vec2* corner, int count, bool is_clockwise, StoreEdge&& store_edge) {
   int edges = 0;
   PICTURA_UNROLL_FOUR
   for (int i = 0; i < count; ++i) {
     const Vec2 from = corner[i], to = corner[i + 1 < count ? i + 1 : 0];
     if (from.x == to.x && from.y == to.y) continue;
-    keep_edge(edges++, make_edge(is_clockwise ? from : to, is_clockwise ? to : from));
+    store_edge(edges++, make_edge(is_clockwise ? from : to, is_clockwise ? to : from));
   }
   return edges;
 }

@@ -78,7 +78,7 @@ template <typename EdgePool>
 PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primitive, const CameraFace& face,
                                  EdgePool& pool, ScreenFace* face_out) {
   int32_t edge_begin = 0;
-  auto keep_edge = [&](int i, const PolygonEdge& edge) { pool.put(edge_begin + i, edge); };
+  auto store_edge = [&](int i, const PolygonEdge& edge) { pool.put(edge_begin + i, edge); };
   ScreenQuad quad;
   const ClipClass clip_class =
       face.count == 4 ? project_quad(setting.camera, face.corners, face.floor_px, &quad) : ClipClass::crossing;
@@ -88,7 +88,7 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primi
     if (!is_quad_visible(setting, quad, face.color, primitive, &is_clockwise)) return false;
     edge_begin = pool.take(4);
     if (edge_begin < 0) return false;
-    make_quad_face(setting.camera, setting.frustum, quad, is_clockwise, face.plane, face.color, keep_edge, face_out);
+    make_quad_face(setting.camera, setting.frustum, quad, is_clockwise, face.plane, face.color, store_edge, face_out);
   } else {
     Vec3 corners[kMaxFaceCorners], polygon[kMaxPolygonCorners];
     for (int i = 0; i < face.count; ++i) corners[i] = face.corners[i];
@@ -97,7 +97,7 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primi
     if (kept < 3) return false;
     edge_begin = pool.take(kept);
     if (edge_begin < 0 || !make_screen_face<kMaxPolygonCorners>(setting.camera, setting.frustum, polygon, kept,
-                                                                face.plane, face.color, keep_edge, face_out)) {
+                                                                face.plane, face.color, store_edge, face_out)) {
       return false;
     }
   }

@@ -114,12 +114,12 @@ PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f,
           : 0.0f;
 }
 
-/// Projects a clipped face (camera coordinates) of at most kMaxCorners corners, which lies in `plane`. Calls keep_edge
+/// Projects a clipped face (camera coordinates) of at most kMaxCorners corners, which lies in `plane`. Calls store_edge
 /// as make_edges does, and sets all of face_out except edge_begin and the members of its primitive. False if it covers
 /// nothing.
-template <int kMaxCorners, typename Corners, typename KeepEdge>
+template <int kMaxCorners, typename Corners, typename StoreEdge>
 PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Frustum& f, const Corners& polygon,
-                                        int count, const FacePlane& plane, Rgb color, KeepEdge&& keep_edge,
+                                        int count, const FacePlane& plane, Rgb color, StoreEdge&& store_edge,
                                         ScreenFace* face_out) {
   Vec2 corner[kMaxCorners];
   ScreenBounds bounds;
@@ -135,7 +135,7 @@ PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Frust
   PICTURA_UNROLL_FOUR
   for (int i = 1; i + 1 < count; ++i) twice_area += cross(corner[i] - corner[0], corner[i + 1] - corner[0]);
   if (fabsf(twice_area) < kMinTwiceArea_px2) return false;
-  face_out->edge_count = static_cast<uint8_t>(make_edges(corner, count, twice_area > 0.0f, keep_edge));
+  face_out->edge_count = static_cast<uint8_t>(make_edges(corner, count, twice_area > 0.0f, store_edge));
   face_out->color = color;
   set_bounds(camera, f, bounds, plane, face_out);
   return true;
@@ -188,11 +188,11 @@ PICTURA_HD inline bool find_winding(const ScreenQuad& quad, float min_twice_area
 }
 
 /// make_screen_face of a quad that project_quad found inside and find_winding found large enough.
-template <typename KeepEdge>
+template <typename StoreEdge>
 PICTURA_HD inline void make_quad_face(const PinholeCamera& camera, const Frustum& f, const ScreenQuad& quad,
-                                      bool is_clockwise, const FacePlane& plane, Rgb color, KeepEdge&& keep_edge,
+                                      bool is_clockwise, const FacePlane& plane, Rgb color, StoreEdge&& store_edge,
                                       ScreenFace* face_out) {
-  face_out->edge_count = static_cast<uint8_t>(make_edges(quad.corner, 4, is_clockwise, keep_edge));
+  face_out->edge_count = static_cast<uint8_t>(make_edges(quad.corner, 4, is_clockwise, store_edge));
   face_out->color = color;
   set_bounds(camera, f, quad.bounds, plane, face_out);
 }

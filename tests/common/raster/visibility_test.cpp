@@ -33,20 +33,20 @@ class TestView {
     setting_.frustum = make_frustum(setting_.camera);
     setting_.line_floor_px = 0.35f;
   }
-  Faces see(const AgentBox& box, int32_t index = 0) {
+  Faces set_up(const AgentBox& box, int32_t index = 0) {
     return keep(agent_ref(box, index), extent_of(box),
                 [&](auto&& emit) { agent_faces(box, setting_.camera, false, emit); });
   }
-  Faces see(const WallFace& wall) {
+  Faces set_up(const WallFace& wall) {
     return keep(wall_ref(0), extent_of(wall), [&](auto&& emit) { wall_faces(wall, setting_.camera, emit); });
   }
-  Faces see(const Strip& strip, int32_t index = 0) {
+  Faces set_up(const Strip& strip, int32_t index = 0) {
     return keep(strip_ref(strip, index), extent_of(strip),
                 [&](auto&& emit) { strip_faces(strip, setting_.camera, setting_.line_floor_px, emit); });
   }
   // Calls visit(face of a, face of b, point) for a grid of points of the image that both cover.
   template <typename Visit>
-  void where_both(const Faces& a, const Faces& b, Visit&& visit) const {
+  void for_each_overlap(const Faces& a, const Faces& b, Visit&& visit) const {
     for (const ScreenFace& of_a : a) {
       for (const ScreenFace& of_b : b) {
         const PixelBox box = of_a.box;
@@ -66,7 +66,7 @@ class TestView {
   // -1: the first is in front wherever both overlap, 1: the second, 0: they do not overlap, 2: it depends on the point.
   int order(const Faces& a, const Faces& b) const {
     int first = 0, second = 0;
-    where_both(a, b, [&](const ScreenFace& of_a, const ScreenFace& of_b, Vec2 at) {
+    for_each_overlap(a, b, [&](const ScreenFace& of_a, const ScreenFace& of_b, Vec2 at) {
       EXPECT_NE(in_front(of_a, of_b, at), in_front(of_b, of_a, at));
       (in_front(of_a, of_b, at) ? first : second) += 1;
     });
@@ -154,8 +154,8 @@ TEST(Order, OfDisjointBoxesIsWhatRaysSee) {
     const AgentBox a = box(), b = box();
     if (overlap_on_ground(extent_of(a), extent_of(b))) continue;
     TestView view(eye);
-    const TestView::Faces seen_a = view.see(a, 0), seen_b = view.see(b, 1);
-    view.where_both(seen_a, seen_b, [&](const ScreenFace& of_a, const ScreenFace& of_b, Vec2 at) {
+    const TestView::Faces seen_a = view.set_up(a, 0), seen_b = view.set_up(b, 1);
+    view.for_each_overlap(seen_a, seen_b, [&](const ScreenFace& of_a, const ScreenFace& of_b, Vec2 at) {
       const float at_a = enter(a, eye, view.ray(at)), at_b = enter(b, eye, view.ray(at));
       if (at_a < 0 || at_b < 0) return;  // at the border, where rounding decides
       EXPECT_EQ(view.in_front(of_a, of_b, at), at_a < at_b) << round;
@@ -173,8 +173,8 @@ TEST(Order, OfLevelsIsByHeight) {
   for (const auto& [eye_z, pitch, expected] :
        {std::tuple{-3.0f, 0.5f, -1}, std::tuple{20.0f, -0.9f, 1}, std::tuple{4.0f, 0.0f, 0}}) {
     TestView view({0, 0, eye_z}, pitch);
-    EXPECT_EQ(view.order(view.see(low, 0), view.see(high, 1)), expected) << eye_z;
-    EXPECT_EQ(view.order(view.see(low), view.see(bridge)), expected) << eye_z;
+    EXPECT_EQ(view.order(view.set_up(low, 0), view.set_up(high, 1)), expected) << eye_z;
+    EXPECT_EQ(view.order(view.set_up(low), view.set_up(bridge)), expected) << eye_z;
   }
 }
 
@@ -185,15 +185,15 @@ TEST(Order, StripsOfOneLevelGoByRankAndOthersByDepth) {
     const Strip edge = strip_between({10, 2, height_m}, {18, -2, height_m}, StripKind::road_edge, 0.5f);
     const Strip stop = strip_between({10, 2, height_m}, {18, -2, height_m}, StripKind::stop_line, 0.5f);
     TestView view({0, 0, 1.5f});
-    EXPECT_EQ(view.order(view.see(mark), view.see(edge)), -1) << height_m;
-    EXPECT_EQ(view.order(view.see(mark), view.see(stop)), 1) << height_m;
-    EXPECT_EQ(view.order(view.see(mark, 7), view.see(mark, 4)), 1);
+    EXPECT_EQ(view.order(view.set_up(mark), view.set_up(edge)), -1) << height_m;
+    EXPECT_EQ(view.order(view.set_up(mark), view.set_up(stop)), 1) << height_m;
+    EXPECT_EQ(view.order(view.set_up(mark, 7), view.set_up(mark, 4)), 1);
   }
   for (const float height_m : {-0.5f, 0.5f}) {
     // On different levels: the camera is above both, so the upper one is in front.
     const Strip stop = strip_between({8, 4, height_m}, {20, -4, height_m}, StripKind::stop_line, 3.0f);
     TestView view({0, 0, 3});
-    EXPECT_EQ(view.order(view.see(mark), view.see(stop)), height_m < 0 ? -1 : 1) << height_m;
+    EXPECT_EQ(view.order(view.set_up(mark), view.set_up(stop)), height_m < 0 ? -1 : 1) << height_m;
   }
 }
 
@@ -202,8 +202,8 @@ TEST(Order, WhatStandsOnAStripIsInFrontOfItEvenWhereItDipsIn) {
   const Strip mark = strip_between({10, 0, -1}, {20, 0, -2.5f});
   const AgentBox car = make_box(AgentClass::vehicle, {15, 0, -1.75f}, 0, {4, 2, 1.5f});
   TestView view({0, 0, 1});
-  EXPECT_EQ(view.order(view.see(mark), view.see(car)), 1);
-  EXPECT_EQ(view.order(view.see(car), view.see(mark)), -1);
+  EXPECT_EQ(view.order(view.set_up(mark), view.set_up(car)), 1);
+  EXPECT_EQ(view.order(view.set_up(car), view.set_up(mark)), -1);
   // The same car beyond the end of the strip does not stand on it, and neither does one on a road 2 m below.
   const Vec3 eye{0, 0, 1};
   EXPECT_TRUE(stands_on(extent_of(car), extent_of(mark), eye));
@@ -224,8 +224,8 @@ TEST(Order, StripsInFrontOfAWallOrBehindIt) {
   wall.height_m = 8;
   const Strip before = strip_between({6, 0, 0}, {11, 1, 0.3f}), beyond = strip_between({13, 0, 0}, {20, 1, 0.3f});
   TestView view({0, 0, 1.5f});
-  EXPECT_EQ(view.order(view.see(before), view.see(wall)), -1);
-  EXPECT_EQ(view.order(view.see(wall), view.see(beyond)), -1);
+  EXPECT_EQ(view.order(view.set_up(before), view.set_up(wall)), -1);
+  EXPECT_EQ(view.order(view.set_up(wall), view.set_up(beyond)), -1);
 }
 
 TEST(Order, AStripDrawnWiderThanItIsStaysAtItsDepth) {
@@ -238,7 +238,7 @@ TEST(Order, AStripDrawnWiderThanItIsStaysAtItsDepth) {
     wall.b_m = {wall_at_m, -10, -3};
     wall.height_m = 8;
     TestView view({0, 0, 1});
-    EXPECT_EQ(view.order(view.see(strip), view.see(wall)), wall_at_m < 40 ? 1 : -1) << wall_at_m;
+    EXPECT_EQ(view.order(view.set_up(strip), view.set_up(wall)), wall_at_m < 40 ? 1 : -1) << wall_at_m;
   }
 }
 
