@@ -19,7 +19,7 @@ inline void expect_equal(const Outputs& actual, const Outputs& oracle) {
   EXPECT_TRUE(actual == oracle) << "colours or planes differ";
 }
 
-/// Asks how much of each agent of a world all views see, where not a number is an answer too.
+/// Queries the visibility of each agent of a world in all views; NaN is a valid answer.
 inline void expect_equal_visibility(Renderer* actual, Renderer* oracle, const SyntheticTown& town) {
   std::vector<VisibilityQuery> queries;
   for (std::size_t view = 0; view < town.views.size(); ++view) {

@@ -110,7 +110,7 @@ TEST_F(KernelCache, KernelsAreCompiledOnce) {
   EXPECT_TRUE(second.cached);
   EXPECT_EQ(first.bytes, second.bytes);
   EXPECT_EQ(second.architecture, "sm_90");
-  // One file for each target, and nothing beside it.
+  // The path depends on the target and the sources.
   EXPECT_NE(kernel_cache_path(kSmall, {80, 4, 96, 54}), kernel_cache_path(kSmall, kPaperRig));
   EXPECT_NE(kernel_cache_path(kSmall, {90, 4, 97, 54}), kernel_cache_path(kSmall, kPaperRig));
   EXPECT_NE(kernel_cache_path(kSmall, {90, 5, 96, 54}), kernel_cache_path(kSmall, kPaperRig));

@@ -72,10 +72,10 @@ TEST(Pool, TakesWhatItIsReckonedToTake) {
   }
 }
 
-TEST(Pool, HasRoomForEveryBatch) {
+TEST(Pool, HasCapacityForEveryBatch) {
   for (const std::size_t images : {1, 2, 7, 100}) {
     const PoolSizes sizes = pool_sizes(images);
-    // Whatever each image lists, if it is the same for all: as many of them as find room.
+    // If all images have equally many entries, as many images as fit.
     for (std::size_t listed = 1; listed <= kMaxEntries; ++listed) {
       const std::size_t drawn = std::min(images, sizes.faces / listed);
       const auto batches = static_cast<std::size_t>(FaceBatch::count_of(static_cast<int32_t>(listed)));
@@ -84,7 +84,7 @@ TEST(Pool, HasRoomForEveryBatch) {
   }
 }
 
-TEST(LargeBlocks, TakeWhatTheyAreReckonedToTake) {
+TEST(LargeBlocks, AllocateTheComputedSize) {
   const Scratch sizes{.blocks = 3, .max_faces = 7, .max_edges = 11};
   allocated_bytes = 0;
   LargeBuffers<CountedBuffer>(sizes, 160);
