@@ -16,7 +16,7 @@ constexpr double kRounding = 1e-6;
 
 double half_to_number(uint16_t half) {
   const int exponent = half >> 10 & 31, mantissa = half & 1023;
-  if (exponent == 31) return std::numeric_limits<double>::quiet_NaN();  // or infinite, which is as far off
+  if (exponent == 31) return std::numeric_limits<double>::quiet_NaN();  // infinity is treated alike
   const double size = exponent > 0 ? std::ldexp(1024 + mantissa, exponent - 25) : std::ldexp(mantissa, -24);
   return half >> 15 ? -size : size;
 }
@@ -68,7 +68,7 @@ ImageError compare_image(const CameraImages& actual, const CameraImages& expecte
   return error;
 }
 
-void spoil(const ImageBatch& images) {
+void fill_unwritten(const ImageBatch& images) {
   visit_memory(images, [](void* first, std::size_t stride_bytes, std::size_t row_bytes, std::size_t rows) {
     for (std::size_t row = 0; row < rows; ++row) {
       std::memset(static_cast<uint8_t*>(first) + row * stride_bytes, kUnwrittenByte, row_bytes);

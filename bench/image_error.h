@@ -1,4 +1,4 @@
-// How far drawn images are from the oracle's, value by value, and whether that is within what kernels may err.
+// Differences of images from the oracle's, value by value, and the tolerance for kernels.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@ struct ImageError {
   int64_t values = 0, differing = 0;
   int64_t beyond = 0;  // off by more than kKernelError
   double worst = 0;
-  // Pixels that have planes, and those whose planes tell of another surface.
+  // Pixels with planes, and those whose planes show another surface.
   int64_t plane_pixels = 0, differing_plane_pixels = 0;
 
   void add(const ImageError& other);
@@ -20,11 +20,11 @@ struct ImageError {
   bool is_within_tolerance() const;
 };
 
-/// Of one view's image of one camera and its planes, where it has them; both of one format and size.
+/// The error of one view's image of one camera, and of its planes if it has them; both of one format and size.
 ImageError compare_image(const CameraImages& actual, const CameraImages& expected, PixelFormat format, int view);
 
-/// What images hold before they are drawn, so that a value that is not written shows: far from any colour as a float or
-/// a half, and no depth, class or instance.
+/// Fills images before they are drawn, so that unwritten values are found: far from any colour as a float or a half,
+/// and no valid depth, class or instance.
 constexpr int kUnwrittenByte = 0x7F;
 
 /// Calls visit(first byte, bytes from one row to the next, bytes of a row, rows) for all memory of colours and planes.
@@ -45,6 +45,6 @@ void visit_memory(const ImageBatch& images, Visit&& visit) {
 }
 
 /// Fills images on the host with kUnwrittenByte.
-void spoil(const ImageBatch& images);
+void fill_unwritten(const ImageBatch& images);
 
 }  // namespace pictura

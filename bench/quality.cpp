@@ -45,14 +45,14 @@ void Quality::add(const Quality& other) {
 
 namespace {
 
-// One image in all ways, [3, height, width] in [0, 1].
-struct Ways {
+// One image by all methods, [3, height, width] in [0, 1].
+struct MethodImages {
   TruthImage truth;
   std::vector<float> one_sample, grid_2x2, area, oracle;
 };
 
-// Exact areas taken for opacity: each face covers its area's share of what is left of the pixel.
-std::vector<float> draw_areas(ImageDrawer* drawer, std::size_t pixels) {
+// Exact coverage as alpha: each face covers its area's share of the remaining pixel.
+std::vector<float> composite_areas(ImageDrawer* drawer, std::size_t pixels) {
   std::vector<float> rgb(3 * pixels), left(pixels, 1.0f);
   drawer->visit_fragments([&](int pixel, const PixelCoverage& coverage, Rgb color) {
     const auto i = static_cast<std::size_t>(pixel);
@@ -65,24 +65,24 @@ std::vector<float> draw_areas(ImageDrawer* drawer, std::size_t pixels) {
   return rgb;
 }
 
-Ways draw_all_ways(const StaticGeometry& geometry, const SceneBatch& scene, const View& view, const Camera& camera,
-                   float line_floor_px) {
+MethodImages draw_all_methods(const StaticGeometry& geometry, const SceneBatch& scene, const View& view,
+                              const Camera& camera, float line_floor_px) {
   auto trace = [&](TruthSamples samples) { return trace_image(geometry, scene, view, camera, line_floor_px, samples); };
-  Ways ways{trace(TruthSamples::low_discrepancy_1024),
-            trace(TruthSamples::center).rgb,
-            trace(TruthSamples::grid_2x2).rgb,
-            {},
-            {}};
+  MethodImages drawn{trace(TruthSamples::low_discrepancy_1024),
+                     trace(TruthSamples::center).rgb,
+                     trace(TruthSamples::grid_2x2).rgb,
+                     {},
+                     {}};
   const StaticGeometryView pieces = geometry.view();
   const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
   Rig rig;
   rig.cameras = {camera};
   ImageDrawer drawer;
   drawer.prepare({&pieces, &scene, &view, place_camera(pinhole_cameras(rig)[0], view), line_floor_px, false});
-  ways.oracle.resize(3 * pixels);
-  drawer.draw({PixelFormat::f32, ways.oracle.data()});
-  ways.area = draw_areas(&drawer, pixels);
-  return ways;
+  drawn.oracle.resize(3 * pixels);
+  drawer.draw({PixelFormat::f32, drawn.oracle.data()});
+  drawn.area = composite_areas(&drawer, pixels);
+  return drawn;
 }
 
 }  // namespace
@@ -90,14 +90,14 @@ Ways draw_all_ways(const StaticGeometry& geometry, const SceneBatch& scene, cons
 Quality measure_quality(const StaticGeometry& geometry, const SceneBatch& scene, Span<const View> views,
                         const RendererConfig& config) {
   const std::size_t cameras = config.rig.cameras.size(), images = views.size() * cameras;
-  std::vector<Ways> ways(images);
+  std::vector<MethodImages> drawn(images);
   parallel_for(resolve_num_threads(config.num_threads), static_cast<int64_t>(images), [&](int64_t i) {
     const auto image = static_cast<std::size_t>(i);
-    ways[image] = draw_all_ways(geometry, scene, views[image / cameras], config.rig.cameras[image % cameras],
-                                config.line_floor_px);
+    drawn[image] = draw_all_methods(geometry, scene, views[image / cameras], config.rig.cameras[image % cameras],
+                                    config.line_floor_px);
   });
   Quality quality;
-  for (const Ways& image : ways) {
+  for (const MethodImages& image : drawn) {
     if (image.truth.blank()) continue;
     const std::vector<float>& truth = image.truth.rgb;
     std::vector<float> bytes = image.oracle;
@@ -117,8 +117,8 @@ namespace {
 
 constexpr int kCropWidth_px = 32, kCropHeight_px = 18, kZoom = 8, kGap_px = 4;
 
-// Top left corner of the crop in which area coverage and one sample err most.
-std::pair<int, int> worst_crop(const Ways& ways, int width, int height) {
+// Top left corner of the crop with the largest error of area coverage and 2x2 samples.
+std::pair<int, int> worst_crop(const MethodImages& drawn, int width, int height) {
   const int crop_width = std::min(kCropWidth_px, width), crop_height = std::min(kCropHeight_px, height);
   std::pair<int, int> worst{0, 0};
   double worst_error = -1;
@@ -129,7 +129,7 @@ std::pair<int, int> worst_crop(const Ways& ways, int width, int height) {
         for (int y = y0; y < y0 + crop_height; ++y) {
           for (int x = x0; x < x0 + crop_width; ++x) {
             const auto i = static_cast<std::size_t>((channel * height + y) * width + x);
-            error += std::abs(ways.area[i] - ways.truth.rgb[i]) + std::abs(ways.grid_2x2[i] - ways.truth.rgb[i]);
+            error += std::abs(drawn.area[i] - drawn.truth.rgb[i]) + std::abs(drawn.grid_2x2[i] - drawn.truth.rgb[i]);
           }
         }
       }
@@ -149,15 +149,15 @@ void write_quality_figure(const std::string& path, Span<const Snapshot> snapshot
   const int rows = static_cast<int>(snapshots.size());
   const int width = kColumns * (crop_width * kZoom + kGap_px) - kGap_px;
   const int height = rows * (crop_height * kZoom + kGap_px) - kGap_px;
-  // White between the crops: the images' ground is black.
+  // White between the crops, because the images' background is black.
   std::vector<uint8_t> sheet(static_cast<std::size_t>(3 * width) * static_cast<std::size_t>(height), 255);
   for (int row = 0; row < rows; ++row) {
     const Snapshot& snapshot = snapshots[static_cast<std::size_t>(row)];
-    const Ways ways =
-        draw_all_ways(snapshot.geometry, snapshot.scene.batch(), snapshot.views.at(0), camera, config.line_floor_px);
-    const auto [x0, y0] = worst_crop(ways, camera.width_px, camera.height_px);
-    const std::vector<float>* images[kColumns] = {&ways.truth.rgb, &ways.oracle, &ways.area, &ways.grid_2x2,
-                                                  &ways.one_sample};
+    const MethodImages drawn =
+        draw_all_methods(snapshot.geometry, snapshot.scene.batch(), snapshot.views.at(0), camera, config.line_floor_px);
+    const auto [x0, y0] = worst_crop(drawn, camera.width_px, camera.height_px);
+    const std::vector<float>* images[kColumns] = {&drawn.truth.rgb, &drawn.oracle, &drawn.area, &drawn.grid_2x2,
+                                                  &drawn.one_sample};
     for (int column = 0; column < kColumns; ++column) {
       for (int y = 0; y < crop_height * kZoom; ++y) {
         for (int x = 0; x < crop_width * kZoom; ++x) {

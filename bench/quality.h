@@ -1,5 +1,5 @@
-// How far images are from the truth: the ray caster of bench/truth/image_truth.h against the CPU renderer and against
-// simpler ways to draw the same scene. Used by `pictura bench quality` and by tests, and by nothing that is installed.
+// Errors of images against the truth, the ray caster of bench/truth/image_truth.h: of the CPU renderer and of simpler
+// methods. Used by `pictura bench quality` and by tests; not installed.
 #pragma once
 
 #include <limits>
@@ -11,11 +11,11 @@
 
 namespace pictura {
 
-/// A moment of one world on one map, ready to be drawn.
+/// One step of one world on one map, ready to be drawn.
 struct Snapshot {
   StaticGeometry geometry;
   SceneOwner scene;         // one world with handle 0
-  std::vector<View> views;  // a choice of the agents that found a place, spread over them all
+  std::vector<View> views;  // an even selection of the spawned agents
 };
 
 struct SnapshotOptions {
@@ -28,15 +28,15 @@ struct SnapshotOptions {
   int num_threads = 0;  // 0: all
 };
 
-/// Drives a world with random actions; one agent in ten is a cyclist, one a pedestrian. Throws Error when the map
-/// cannot be read or nobody finds a place.
+/// Drives a world with random actions; one agent in ten is a cyclist, one a pedestrian. Throws Error if the map
+/// cannot be read or no agent can be spawned.
 Snapshot drive_snapshot(const SnapshotOptions& options);
 
 /// Error against the truth, pooled over the images that are not blank.
 struct Quality {
-  PooledError one_sample;                                           // a z-buffer's, at the pixel's centre
+  PooledError one_sample;                                           // a z-buffer, at the pixel's centre
   PooledError grid_2x2;                                             // ... with 2x2 supersampling
-  PooledError area;                                                 // exact areas taken for opacity, front to back
+  PooledError area;                                                 // exact coverage as alpha, front to back
   PooledError oracle;                                               // the CPU renderer
   PooledError oracle_bytes;                                         // ... rounded to bytes
   double worst_image_db = std::numeric_limits<double>::infinity();  // of the oracle
@@ -49,8 +49,9 @@ struct Quality {
 Quality measure_quality(const StaticGeometry& geometry, const SceneBatch& scene, Span<const View> views,
                         const RendererConfig& config);
 
-/// Writes one picture with a row for each snapshot: of its first view's first camera the crop that the simpler ways get
-/// most wrong, in the truth, the oracle, area coverage, 2x2 samples and one sample, enlarged without smoothing.
+/// Writes one picture with a row for each snapshot: of its first view's first camera the crop with the largest error
+/// of the simpler methods, in the truth, the oracle, area coverage, 2x2 samples and one sample, enlarged without
+/// smoothing.
 void write_quality_figure(const std::string& path, Span<const Snapshot> snapshots, const RendererConfig& config);
 
 }  // namespace pictura

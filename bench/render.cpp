@@ -15,7 +15,7 @@ namespace pictura {
 
 namespace {
 
-// In a row: more than any repeat needs, and fewer than an int has room for.
+// Calls of a repeat: more than any needs, and below the maximum of an int.
 constexpr double kMaxCalls = 1e9;
 
 class HostTarget final : public RenderTarget {
@@ -24,7 +24,7 @@ class HostTarget final : public RenderTarget {
       : scene_(worlds.simulator->scene()),
         views_(worlds.views.data(), static_cast<std::size_t>(render_case.num_views)),
         images_(render_case.config.rig, render_case.num_views, render_case.format, render_case.planes) {}
-  void spoil() override { pictura::spoil(images_.batch()); }
+  void fill_unwritten() override { pictura::fill_unwritten(images_.batch()); }
   double draw(Renderer* renderer, int calls) override {
     const auto begin = std::chrono::steady_clock::now();
     for (int call = 0; call < calls; ++call) renderer->render(scene_, views_, images_.batch());
@@ -38,7 +38,7 @@ class HostTarget final : public RenderTarget {
   HostImages images_;
 };
 
-// The oracle's images of the first views, and how far others are from them.
+// The oracle's images of the first views, to compare others with.
 class OracleCheck {
  public:
   OracleCheck(const DrivenWorlds& worlds, const RenderCase& render_case)
@@ -101,18 +101,18 @@ std::unique_ptr<RenderTarget> make_host_target(const DrivenWorlds& worlds, const
 RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& render_case) {
   RenderMeasurement result;
   const auto target = make_target(worlds, render_case);
-  target->spoil();  // before the memory is watched: what that may take is not the renderer's
+  target->fill_unwritten();  // before memory is measured, because its memory is not the renderer's
   result.image_bytes = static_cast<double>(image_bytes_of(render_case));
-  PICTURA_CHECK(!render_case.watches_memory || !cuda_device_name().empty(),
-                "bench render: expected a CUDA device whose memory could be watched, found none");
+  PICTURA_CHECK(!render_case.measures_memory || !cuda_device_name().empty(),
+                "bench render: expected a CUDA device to measure memory on, found none");
 #ifdef PICTURA_HAS_CUDA
-  std::unique_ptr<DeviceMemoryWatch> watch;
-  if (render_case.watches_memory) watch = std::make_unique<DeviceMemoryWatch>();
+  std::unique_ptr<DeviceMemoryMeter> meter;
+  if (render_case.measures_memory) meter = std::make_unique<DeviceMemoryMeter>();
 #endif
   const auto renderer = make_renderer(render_case.backend, render_case.config, &result.choice);
   upload_geometries(worlds.geometries, renderer.get());
 #ifdef PICTURA_HAS_CUDA
-  if (watch) result.up_front_bytes = watch->taken_bytes();
+  if (meter) result.up_front_bytes = meter->used_bytes();
 #endif
   target->draw(renderer.get(), 1);  // warms up
   renderer->check();
@@ -122,7 +122,7 @@ RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& r
     check->compare(target.get(), &result.error);
   }
   if (render_case.repeats > 0) {
-    target->spoil();
+    target->fill_unwritten();
     const double one_ms = target->draw(renderer.get(), 1);
     const int calls = static_cast<int>(std::clamp(1e3 * render_case.repeat_s / one_ms, 1.0, kMaxCalls));
     for (int repeat = 0; repeat < render_case.repeats; ++repeat) {
@@ -133,7 +133,7 @@ RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& r
     if (check) check->compare(target.get(), &result.error);
   }
 #ifdef PICTURA_HAS_CUDA
-  if (watch) result.max_bytes = watch->max_bytes();
+  if (meter) result.max_bytes = meter->max_bytes();
 #endif
   return result;
 }

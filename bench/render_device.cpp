@@ -22,7 +22,7 @@ class DeviceTarget final : public RenderTarget {
   DeviceTarget(const DrivenWorlds& worlds, const RenderCase& render_case)
       : render_case_(render_case), scene_(worlds.simulator->scene()) {
     views_ = view_copy_.assign({worlds.views.data(), static_cast<std::size_t>(render_case.num_views)}, nullptr);
-    // One image a camera tells the sizes and the planes.
+    // One image per camera defines the sizes and planes.
     HostImages one(render_case.config.rig, 1, render_case.format, render_case.planes);
     ImageBatch shape = one.batch();
     shape.num_views = render_case.num_views;
@@ -38,7 +38,7 @@ class DeviceTarget final : public RenderTarget {
   DeviceTarget(const DeviceTarget&) = delete;
   DeviceTarget& operator=(const DeviceTarget&) = delete;
 
-  void spoil() override {
+  void fill_unwritten() override {
     visit_memory(batch_, [](void* first, std::size_t stride_bytes, std::size_t row_bytes, std::size_t rows) {
       PICTURA_CUDA(cudaMemset2D(first, stride_bytes, kUnwrittenByte, row_bytes, rows));
     });
@@ -78,9 +78,9 @@ std::unique_ptr<RenderTarget> make_device_target(const DrivenWorlds& worlds, con
   return std::make_unique<DeviceTarget>(worlds, render_case);
 }
 
-DeviceMemoryWatch::DeviceMemoryWatch() : free_before_(free_bytes()) {
+DeviceMemoryMeter::DeviceMemoryMeter() : free_before_(free_bytes()) {
   poller_ = std::thread([this] {
-    while (!ends_) {
+    while (!stops_) {
       std::size_t free = 0, total = 0;
       status_ = cudaMemGetInfo(&free, &total);
       if (status_ != cudaSuccess) return;
@@ -90,18 +90,18 @@ DeviceMemoryWatch::DeviceMemoryWatch() : free_before_(free_bytes()) {
   });
 }
 
-DeviceMemoryWatch::~DeviceMemoryWatch() {
-  ends_ = true;
+DeviceMemoryMeter::~DeviceMemoryMeter() {
+  stops_ = true;
   poller_.join();
 }
 
-double DeviceMemoryWatch::taken_bytes() const {
+double DeviceMemoryMeter::used_bytes() const {
   return static_cast<double>(free_before_) - static_cast<double>(free_bytes());
 }
 
-double DeviceMemoryWatch::max_bytes() const {
-  check_cuda(status_, "cudaMemGetInfo of the watch");
-  return std::max(max_bytes_.load(), taken_bytes());
+double DeviceMemoryMeter::max_bytes() const {
+  check_cuda(status_, "cudaMemGetInfo of DeviceMemoryMeter");
+  return std::max(max_bytes_.load(), used_bytes());
 }
 
 std::string cuda_device_name() {

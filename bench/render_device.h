@@ -1,4 +1,4 @@
-// What the rendering benchmark does on a CUDA device.
+// The rendering benchmark on a CUDA device.
 #pragma once
 
 #include <atomic>
@@ -10,26 +10,26 @@
 
 namespace pictura {
 
-/// Times by events of the stream: the device's time, waits for the host between launches included.
+/// Times with stream events: the device's time, including waits for the host between launches.
 std::unique_ptr<RenderTarget> make_device_target(const DrivenWorlds& worlds, const RenderCase& render_case);
 
-/// Device memory taken since its beginning, by whatever process: a thread asks cudaMemGetInfo all the time.
-class DeviceMemoryWatch {
+/// Device memory used since construction, by any process: a thread polls cudaMemGetInfo.
+class DeviceMemoryMeter {
  public:
-  DeviceMemoryWatch();
-  ~DeviceMemoryWatch();
-  DeviceMemoryWatch(const DeviceMemoryWatch&) = delete;
-  DeviceMemoryWatch& operator=(const DeviceMemoryWatch&) = delete;
+  DeviceMemoryMeter();
+  ~DeviceMemoryMeter();
+  DeviceMemoryMeter(const DeviceMemoryMeter&) = delete;
+  DeviceMemoryMeter& operator=(const DeviceMemoryMeter&) = delete;
 
-  double taken_bytes() const;
-  /// What is taken now included. Throws Error when the thread could not ask.
+  double used_bytes() const;
+  /// The peak, including the current use. Throws Error if polling failed.
   double max_bytes() const;
 
  private:
   std::size_t free_before_ = 0;
   std::atomic<double> max_bytes_ = 0;
   std::atomic<cudaError_t> status_ = cudaSuccess;
-  std::atomic<bool> ends_ = false;
+  std::atomic<bool> stops_ = false;
   std::thread poller_;
 };
 

@@ -21,7 +21,7 @@ constexpr std::size_t kMaxFaults = 100;
 constexpr int kQueries = 32;          // of visibility, in each scene
 constexpr int kMaxHiddenAgents = 64;  // in a view's list
 
-// What is drawn of a scene, each from a stream of its own.
+// Random parts of a scene, each with its own stream.
 enum class Draw : uint32_t { rigs, world, views, settings, hidden_agents, queries };
 
 RandomStream random_of(const SoakOptions& options, int64_t scene, Draw what) {
@@ -33,7 +33,7 @@ RandomStream random_of(const SoakOptions& options, int64_t scene, Draw what) {
                        .purpose = Purpose::soak});
 }
 
-// Rigs are few, because kernels are built for each: the paper's, and three of cameras of odd sizes.
+// Few rigs, because kernels are compiled for each: the paper's, and three with cameras of random sizes.
 std::vector<Rig> draw_rigs(const SoakOptions& options) {
   std::vector<Rig> rigs{paper_rig()};
   RandomStream random = random_of(options, 0, Draw::rigs);
@@ -49,7 +49,7 @@ std::vector<Rig> draw_rigs(const SoakOptions& options) {
   return rigs;
 }
 
-// How a scene is drawn: settings of the renderer and of the call. None of them asks for other kernels.
+// Settings of the renderer and of the call; none of them needs other kernels.
 struct Settings {
   RendererConfig config;
   PixelFormat format = PixelFormat::u8;
@@ -69,14 +69,14 @@ Settings draw_settings(const SoakOptions& options, int64_t scene, const std::vec
   return settings;
 }
 
-// From where a scene is drawn, and the list of agents that the views hide ranges of.
+// The views of a scene, and the list of agents of which each view hides a range.
 struct ViewsOfScene {
   std::vector<View> views;
   std::vector<int32_t> hidden_agents;
 };
 
-// A world of one of the maps, driven anew for each scene: its number says which and for how long, so that a scene can
-// be drawn again without those before it.
+// A world of one of the maps, simulated anew for each scene. The scene's number selects map and steps, so that a scene
+// can be repeated without those before it.
 class Scenes {
  public:
   explicit Scenes(const SoakOptions& options) : options_(options) {
@@ -97,7 +97,7 @@ class Scenes {
     step_randomly(simulator_.get(), config.seed, 1 + random.below(30));
   }
 
-  // Of agents, as they are or from somewhere near them; some leave more agents out than their own.
+  // Views of agents, half of them moved and turned at random; some hide more agents than their own.
   ViewsOfScene views(int64_t scene) const {
     RandomStream random = random_of(options_, scene, Draw::views);
     const Span<const View> of_agents = simulator_->views();
@@ -118,7 +118,7 @@ class Scenes {
     return result;
   }
 
-  // With the agents that the views hide, to whose list it points.
+  // Refers to the views' list of hidden agents.
   SceneBatch batch(const ViewsOfScene& views) const {
     SceneBatch batch = simulator_->scene();
     batch.hidden_agents = views.hidden_agents;
@@ -153,21 +153,21 @@ class Scenes {
   std::unique_ptr<Simulator> simulator_;
 };
 
-// Keeps a fault, unless there are many already.
+// Adds a fault, up to kMaxFaults.
 template <typename Fault>
-void note(const Fault& fault, std::vector<Fault>* faults_out, SoakResult* result_out) {
+void add_fault(const Fault& fault, std::vector<Fault>* faults_out, SoakResult* result_out) {
   if (result_out->first_faulty_scene < 0) result_out->first_faulty_scene = fault.scene;
   if (faults_out->size() < kMaxFaults) faults_out->push_back(fault);
 }
 
-// Draws a scene with both and adds how far they are apart.
+// Draws a scene with both renderers and adds the differences.
 void compare_images(int64_t scene, const SceneBatch& batch, const std::vector<View>& views, const Settings& settings,
                     Renderer* renderer, Renderer* oracle, SoakResult* result_out) {
   const Rig& rig = settings.config.rig;
   const int num_views = static_cast<int>(views.size());
   HostImages drawn(rig, num_views, settings.format, settings.planes);
   HostImages expected(rig, num_views, settings.format, settings.planes);
-  spoil(drawn.batch());
+  fill_unwritten(drawn.batch());
   renderer->render(batch, views, drawn.batch());
   renderer->check();
   oracle->render(batch, views, expected.batch());
@@ -178,12 +178,12 @@ void compare_images(int64_t scene, const SceneBatch& batch, const std::vector<Vi
       ++result_out->images;
       if (error.is_within_tolerance()) continue;
       ++result_out->images_out_of_tolerance;
-      note({scene, view, camera, error}, &result_out->faults, result_out);
+      add_fault({scene, view, camera, error}, &result_out->faults, result_out);
     }
   }
 }
 
-// Asks both of the same agents and adds how far their answers are apart.
+// Computes visibilities with both renderers and adds the differences.
 void compare_visibility(int64_t scene, const SceneBatch& batch, const std::vector<View>& views,
                         const std::vector<VisibilityQuery>& queries, Renderer* renderer, Renderer* oracle,
                         SoakResult* result_out) {
@@ -194,13 +194,13 @@ void compare_visibility(int64_t scene, const SceneBatch& batch, const std::vecto
   result_out->queries += static_cast<int64_t>(queries.size());
   for (std::size_t i = 0; i < queries.size(); ++i) {
     const bool in_no_frame = std::isnan(expected[i]) && std::isnan(answers[i]);
-    if (in_no_frame || answers[i] == expected[i]) continue;  // sums are of whole units
+    if (in_no_frame || answers[i] == expected[i]) continue;  // exact, because sums are in fixed point
     ++result_out->differing_answers;
-    note({scene, queries[i], answers[i], expected[i]}, &result_out->visibility_faults, result_out);
+    add_fault({scene, queries[i], answers[i], expected[i]}, &result_out->visibility_faults, result_out);
   }
 }
 
-// Drives a scene, draws it with both and adds how far they are apart.
+// Simulates a scene, draws it with both renderers and adds the differences.
 void compare_scene(const SoakOptions& options, const MakeRenderer& make, int64_t scene, const std::vector<Rig>& rigs,
                    Scenes* scenes, SoakResult* result_out) {
   scenes->drive(scene);
@@ -209,10 +209,10 @@ void compare_scene(const SoakOptions& options, const MakeRenderer& make, int64_t
   const auto oracle = make_renderer("cpu", settings.config);
   upload_geometries(scenes->geometries(), renderer.get());
   upload_geometries(scenes->geometries(), oracle.get());
-  const ViewsOfScene seen = scenes->views(scene);
-  const SceneBatch batch = scenes->batch(seen);
-  compare_images(scene, batch, seen.views, settings, renderer.get(), oracle.get(), result_out);
-  compare_visibility(scene, batch, seen.views, scenes->queries(scene), renderer.get(), oracle.get(), result_out);
+  const ViewsOfScene views = scenes->views(scene);
+  const SceneBatch batch = scenes->batch(views);
+  compare_images(scene, batch, views.views, settings, renderer.get(), oracle.get(), result_out);
+  compare_visibility(scene, batch, views.views, scenes->queries(scene), renderer.get(), oracle.get(), result_out);
   ++result_out->scenes;
 }
 

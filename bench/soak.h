@@ -1,4 +1,4 @@
-// A long comparison of a renderer with the oracle, over scenes, views, rigs and settings that a seed draws: of colours
+// A long comparison of a renderer with the oracle, over scenes, views, rigs and settings drawn from a seed: of colours
 // in every format, planes and visibility.
 #pragma once
 
@@ -14,10 +14,10 @@ namespace pictura {
 
 struct SoakOptions {
   std::vector<std::string> maps;
-  int agents = 120, parked_cars = 32;  // of a scene's world, at most
+  int agents = 120, parked_cars = 32;  // maxima of a scene's world
   int views = 16;                      // of each scene
-  int64_t first_scene = 0;             // scenes are numbered from 0; each is drawn by its number and the seed alone
-  int64_t max_scenes = 0;              // 0: as many as there is time for
+  int64_t first_scene = 0;             // scenes are numbered from 0; each depends only on its number and the seed
+  int64_t max_scenes = 0;              // 0: limited by time only
   double max_seconds = 480;
   uint64_t seed = 0;
   int num_threads = 0;  // 0: all
@@ -30,7 +30,7 @@ struct SoakFault {
   ImageError error;
 };
 
-/// An answer unlike the oracle's.
+/// A visibility that differs from the oracle's.
 struct VisibilityFault {
   int64_t scene = 0;
   VisibilityQuery query;
@@ -49,12 +49,11 @@ struct SoakResult {
   int64_t first_faulty_scene = -1;
 };
 
-/// Makes the renderer that is compared, for each scene anew, one that takes memory of the host; may say how it was
-/// chosen.
+/// Creates the renderer to compare, once for each scene, for host memory; may report how it was chosen.
 using MakeRenderer = std::function<std::unique_ptr<Renderer>(const RendererConfig&, std::string* choice_out)>;
 
-/// Calls on_scene(result so far) after each scene. Throws Error naming the scene where making a renderer or drawing
-/// fails, as for gl, which draws no planes, halves or visibility; UsageError as make throws it.
+/// Calls on_scene(result so far) after each scene. Throws Error naming the scene if creating a renderer or drawing
+/// fails, as for gl, which supports no planes, halves or visibility; UsageError as make throws it.
 SoakResult soak(const SoakOptions& options, const MakeRenderer& make,
                 const std::function<void(const SoakResult&)>& on_scene);
 

@@ -1,5 +1,5 @@
-// `pictura bench`: rates of rendering, simulation and training as medians of several repeats, with the device's name,
-// the commit and the workload beside them.
+// `pictura bench`: rates of rendering, simulation and training as medians of several repeats, with device, commit and
+// workload.
 #include "pictura/bench/commands/bench.h"
 
 #include <algorithm>
@@ -44,7 +44,7 @@ void add_maps_option(CLI::App* command, std::vector<std::string>* maps, const st
 
 std::vector<std::string> named_maps(const std::vector<std::string>& maps) {
   const std::vector<std::string> towns = known_towns();
-  // The town that the numbers of docs/ are about.
+  // The town of the numbers in docs/.
   if (maps.empty()) return {std::binary_search(towns.begin(), towns.end(), "Town01") ? "Town01" : "procedural:1"};
   if (maps != std::vector<std::string>{"towns"}) return maps;
   PICTURA_CHECK(!towns.empty(), "--map towns: {} has none", map_folder());
@@ -120,7 +120,7 @@ void bench_train(const TrainArguments& arguments) {
   int64_t steps_before = 0;
   auto begin = Clock::now();
   options.on_progress = [&](const TrainProgress& progress) {
-    // The first update warms caches and allocators up.
+    // The first update warms up caches and allocators.
     if (progress.update > 1)
       rate.values.push_back(static_cast<double>(progress.agent_steps - steps_before) / seconds_since(begin));
     steps_before = progress.agent_steps;

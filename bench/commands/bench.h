@@ -1,4 +1,4 @@
-// What the benchmarks of `pictura bench` share: results, and how they are reported.
+// Shared by the benchmarks of `pictura bench`: results and their report.
 #pragma once
 
 #include <string>
@@ -13,27 +13,27 @@ namespace pictura {
 
 /// Name of the first processor.
 std::string processor_name();
-/// The agents of a world whose options say all of them, in words.
+/// Describes the agents of a world; its options must set all fractions.
 std::string population_of(const WorldOptions& world);
 
-/// Adds the option --map, which takes several; the help says what the default is.
+/// Adds the option --map, which takes several maps; default_maps describes the default in the help.
 void add_maps_option(CLI::App* command, std::vector<std::string>* maps,
                      const std::string& default_maps = "Town01 where it is found, else procedural:1");
-/// The maps that it means: `towns` is all of the map folder, which may not be empty then; nothing, the default one.
+/// The maps of that option: `towns` means all of the map folder, which must not be empty; no value means the default.
 std::vector<std::string> named_maps(const std::vector<std::string>& maps);
 
-/// Throws UsageError unless each of the option's backends is among those that this build knows.
+/// Throws UsageError unless each backend is one of the known ones.
 void check_backends(const std::vector<std::string>& backends, const std::vector<std::string>& known);
 
-/// What results were measured on.
+/// Workload and device of a measurement.
 struct BenchContext {
   std::string workload, backend;
   std::string device = processor_name();
   std::string driver;  // of a GPU
 
-  /// Names a GPU and its driver beside the processor; nobody where there is none, whose name is empty.
+  /// Adds a GPU and its driver to the device; an empty name adds nothing.
   void add_gpu(const std::string& name, const std::string& driver_name);
-  /// With the commit of this program.
+  /// As JSON, with the commit of this program.
   Json json() const;
 };
 
@@ -42,7 +42,7 @@ struct BenchResult {
   std::vector<double> values;  // one per repeat
 };
 
-/// Prints medians and means with their least and greatest values.
+/// Prints medians and means with minimum and maximum.
 void report_benchmark(bool json, const BenchContext& context, std::vector<BenchResult> results);
 
 /// Adds the subcommand `bench`.

@@ -1,5 +1,5 @@
-// `pictura bench quality`: how far images are from the truth, a ray caster with 1,024 samples a pixel, at the paper's
-// five sizes: the oracle beside a z-buffer with one sample and 2x2 samples, and beside exact areas taken for opacity.
+// `pictura bench quality`: PSNR of images against the truth, a ray caster with 1,024 samples a pixel, at the paper's
+// five sizes: of the oracle, of a z-buffer with one sample and 2x2 samples, and of exact coverage used as alpha.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -60,8 +60,8 @@ void run(Arguments arguments) {
       quality.add(measure_quality(snapshots[i].geometry, snapshots[i].scene.batch(), snapshots[i].views, config));
     }
     images += quality.images;
-    auto add = [&](const std::string& way, double psnr_db) {
-      results.push_back({fmt::format("{} {}", way, text), "dB", {psnr_db}});
+    auto add = [&](const std::string& method, double psnr_db) {
+      results.push_back({fmt::format("{} {}", method, text), "dB", {psnr_db}});
     };
     add("1 sample", quality.one_sample.psnr_db());
     add("2x2 samples", quality.grid_2x2.psnr_db());
@@ -100,7 +100,7 @@ void add_quality_benchmark(CLI::App& bench) {
   command->add_option("--views", arguments->world.views, "Agents whose cameras are drawn, of each world")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  command->add_option("--steps", arguments->world.steps, "Steps of random actions before the pictures")
+  command->add_option("--steps", arguments->world.steps, "Steps of random actions before the images")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_option("--seed", arguments->world.seed)->capture_default_str();
@@ -108,10 +108,10 @@ void add_quality_benchmark(CLI::App& bench) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_flag("!--no-walls", arguments->world.walls, "Leave out the walls along the building lines");
-  command->add_option("--line-floor", arguments->line_floor_px, "Least width of a line on screen in pixels")
+  command->add_option("--line-floor", arguments->line_floor_px, "Minimum width of a line on screen in pixels")
       ->check(finite_range(0, kGuardBand_px))
       ->capture_default_str();
-  command->add_option("--figure", arguments->figure, "Write crops side by side as PNG");
+  command->add_option("--figure", arguments->figure, "Write crops of all methods to this PNG file");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer("Example:\n  pictura bench quality --map Town03 --size 96x54 --views 10 --figure quality.png");
   command->callback([arguments] { run(*arguments); });

@@ -1,5 +1,5 @@
-// `pictura bench render`: how fast backends draw what the agents of many worlds see, by backend, size and number of
-// egos, and how much device memory that takes.
+// `pictura bench render`: rates of drawing the images of agents of many worlds, by backend, size and number of egos,
+// and the device memory used.
 #include <algorithm>
 #include <regex>
 
@@ -29,11 +29,11 @@ struct Arguments {
   RateArguments rate;
 };
 
-// What the sweeps hold fixed.
+// Fixed in sweeps over the other.
 constexpr int kSweptEgos = 2048;
 constexpr const char* kSweptSize = "96x54";
 
-// What the paper measures, and what lies beyond: see bench/README.md.
+// The paper's cases and larger ones, see bench/README.md.
 void apply_sweep(Arguments* arguments) {
   const std::string& sweep = arguments->sweep;
   if (sweep.empty()) return;
@@ -60,14 +60,15 @@ void apply_defaults(Arguments* arguments) {
   arguments->maps = named_maps(arguments->maps);
 }
 
-bool reaches_device_memory(const std::string& backend) { return backend == "cuda" || backend == "gl:egl"; }
+bool draws_in_device_memory(const std::string& backend) { return backend == "cuda" || backend == "gl:egl"; }
 
 RenderCase case_of(const Arguments& arguments, const std::string& backend, const std::string& size,
                    const std::string& samples, int egos) {
   const Pair pixels = parse_pair("--size", size, 8192);
   RenderCase result{.backend = backend, .num_views = egos};
   result.config.rig = paper_rig(pixels.first, pixels.second);
-  const bool in_device_memory = reaches_device_memory(backend) && !arguments.host_memory && !cuda_device_name().empty();
+  const bool in_device_memory =
+      draws_in_device_memory(backend) && !arguments.host_memory && !cuda_device_name().empty();
   if (in_device_memory) result.config.device = {MemorySpace::cuda, 0};
   result.config.num_threads = arguments.world.num_threads;
   result.config.samples = parse_samples("--samples", samples);
@@ -78,17 +79,17 @@ RenderCase case_of(const Arguments& arguments, const std::string& backend, const
   result.checked_views = arguments.checked_views;
   result.repeats = arguments.memory ? 0 : arguments.rate.repeats;
   result.repeat_s = arguments.rate.repeat_s;
-  result.watches_memory = arguments.memory;
+  result.measures_memory = arguments.memory;
   return result;
 }
 
 struct NamedCase {
-  std::string renderer, size;  // the backend, with its samples where it takes them
-  RenderCase measured;         // of 0 views: of all agents that will have found a place
+  std::string renderer, size;  // the backend, with its samples if it takes them
+  RenderCase measured;         // 0 views: all spawned agents
   std::string name() const { return fmt::format("{} {} {} egos", renderer, size, measured.num_views); }
 };
 
-// All of them, so that what is wrong in the arguments of the last shows before the first is measured.
+// All cases at once, so that errors in any arguments are reported before the first case is measured.
 std::vector<NamedCase> cases_of(const Arguments& arguments) {
   check_backends(arguments.backends, renderer_names());
   std::vector<NamedCase> cases;
@@ -107,7 +108,7 @@ std::vector<NamedCase> cases_of(const Arguments& arguments) {
   }
   if (arguments.memory && cases.size() > 1) {
     fail_usage(
-        "--memory: expected one backend, size and number of egos and samples, since drivers keep what an "
+        "--memory: expected one backend, size and number of egos and samples, because drivers keep memory that an "
         "earlier case has released; got {} cases",
         cases.size());
   }
@@ -136,7 +137,7 @@ void append_results(const std::string& name, const RenderCase& measured, const R
                               {static_cast<double>(measurement.error.differing_plane_pixels)}});
     }
   }
-  if (measured.watches_memory) {
+  if (measured.measures_memory) {
     constexpr double kGiB = 1 << 30;
     results_out->push_back({name + ", up front", "GiB", {measurement.up_front_bytes / kGiB}});
     results_out->push_back({name + ", high-water mark beyond images", "GiB", {measurement.max_bytes / kGiB}});
@@ -144,7 +145,7 @@ void append_results(const std::string& name, const RenderCase& measured, const R
   }
 }
 
-/// Draws the rates that the sweeps in earlier results have found.
+/// Plots the rates of the sweeps in earlier results.
 void draw_rates(const PlotArguments& plot) {
   const std::regex swept(R"((.+) ((\d+)x(\d+)) (\d+) egos)");
   const char* rate = "agent-steps/s";
@@ -180,7 +181,7 @@ void run(Arguments arguments) {
                     .walls = world.walls,
                     .seed = world.seed});
   std::vector<BenchResult> results;
-  std::vector<std::string> choices;  // of each renderer, the last
+  std::vector<std::string> choices;  // of the last case of each renderer
   for (std::size_t i = 0; i < cases.size(); ++i) {
     RenderCase& measured = cases[i].measured;
     if (measured.num_views == 0) measured.num_views = static_cast<int>(worlds.views.size());
@@ -197,7 +198,7 @@ void run(Arguments arguments) {
                               world.walls ? "on" : "off", paper_rig().cameras.size(), arguments.format,
                               arguments.planes ? " and planes" : "", world.num_threads, fmt::join(choices, "; ")),
       .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
-  // In host memory gl:egl may be drawn by anybody; its choice says by whom.
+  // In host memory any driver may run gl:egl; its choice names it.
   auto is_of_cuda_device = [](const NamedCase& each) {
     return each.measured.backend == "cuda" || !each.measured.config.device.is_host();
   };
@@ -221,20 +222,21 @@ void add_render_benchmark(CLI::App& bench) {
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--size", arguments->sizes, "Sizes in pixels, WxH; default: 96x54")->delimiter(',');
-  command->add_option("--samples", arguments->samples, "Of a pixel, for gl: 1, N (MSAA) or NxN (supersampling)")
+  command->add_option("--samples", arguments->samples, "Samples of a pixel, for gl: 1, N (MSAA) or NxN (supersampling)")
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--format", arguments->format)->check(CLI::IsMember({"u8", "f16", "f32"}))->capture_default_str();
   command->add_flag("--planes", arguments->planes, "Draw depth, class and instance planes too");
   command->add_flag("--host-memory", arguments->host_memory,
-                    "Keep scenes and images on the host for cuda and gl:egl, too, which else draw in device memory");
+                    "Keep scenes and images in host memory for cuda and gl:egl, which otherwise use device memory");
   command
       ->add_option("--sweep", arguments->sweep,
                    "sizes: the paper's five and 768x432; squares: without walls; egos: 64 to 20,480")
       ->check(CLI::IsMember({"sizes", "squares", "egos"}));
-  command->add_flag("--memory", arguments->memory, "Watch device memory in a single case, and time nothing");
+  command->add_flag("--memory", arguments->memory, "Measure device memory of a single case instead of rates");
   command
-      ->add_option("--check", arguments->checked_views, "Compare so many egos with the oracle, before timing and after")
+      ->add_option("--check", arguments->checked_views,
+                   "Number of egos compared with the oracle, before and after timing")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   add_rate_options(command, &arguments->rate);

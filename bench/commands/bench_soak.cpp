@@ -1,4 +1,4 @@
-// `pictura bench soak`: a renderer held against the oracle for a long time, on scenes that a seed draws.
+// `pictura bench soak`: compares a renderer with the oracle for minutes, on random scenes of a seed.
 #include <algorithm>
 
 #include <fmt/format.h>
@@ -64,14 +64,15 @@ void print_result(const Arguments& arguments, const SoakResult& result) {
     return print_json(object);
   }
   fmt::print(
-      "{}: {} images of {} scenes in {:.0f} s, {} of {} values unlike the oracle's, worst {:.2f}/255; planes unlike at "
-      "{} of {} pixels; {} of {} answers about visibility unlike\n{}\n",
+      "{}: {} images of {} scenes in {:.0f} s, {} of {} values differ from the oracle's, worst {:.2f}/255; planes "
+      "differ "
+      "at {} of {} pixels; {} of {} visibilities differ\n{}\n",
       arguments.backend, result.images, result.scenes, result.seconds, result.error.differing, result.error.values,
       255 * result.error.worst, result.error.differing_plane_pixels, result.error.plane_pixels,
       result.differing_answers, result.queries, result.choice);
   for (const SoakFault& fault : result.faults) {
     fmt::print(
-        "scene {} view {} camera {}: {} of {} values off by more than 1/255, worst {:.2f}/255; planes unlike at {} of "
+        "scene {} view {} camera {}: {} of {} values off by more than 1/255, worst {:.2f}/255; planes differ at {} of "
         "{} pixels\n",
         fault.scene, fault.view, fault.camera, fault.error.beyond, fault.error.values, 255 * fault.error.worst,
         fault.error.differing_plane_pixels, fault.error.plane_pixels);
@@ -103,8 +104,8 @@ void run(Arguments arguments) {
   print_result(arguments, result);
   PICTURA_CHECK(
       result.first_faulty_scene < 0,
-      "bench soak: {} of {} images are out of tolerance and {} of {} answers about visibility differ; draw the first "
-      "again with --first {} --scenes 1",
+      "bench soak: {} of {} images are out of tolerance and {} of {} visibilities differ; to repeat the first: "
+      "--first {} --scenes 1",
       result.images_out_of_tolerance, result.images, result.differing_answers, result.queries,
       result.first_faulty_scene);
 }
@@ -114,19 +115,20 @@ void run(Arguments arguments) {
 void add_soak_benchmark(CLI::App& bench) {
   auto arguments = std::make_shared<Arguments>();
   SoakOptions& soak = arguments->soak;
-  CLI::App* command = bench.add_subcommand("soak", "Hold a renderer against the oracle on random scenes, for long");
+  CLI::App* command = bench.add_subcommand("soak", "Compare a renderer with the oracle on random scenes for minutes");
   command->add_option("--backend", arguments->backend, "The renderer")->capture_default_str();
   add_maps_option(command, &soak.maps);
-  command->add_option("--minutes", arguments->minutes, "At most")
+  command->add_option("--minutes", arguments->minutes, "Time limit")
       ->check(finite_range(1e-3, 1e5))
       ->capture_default_str();
-  command->add_option("--scenes", soak.max_scenes, "At most; 0: as many as there is time for")
+  command->add_option("--scenes", soak.max_scenes, "Maximum number of scenes; 0: limited by time only")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command->add_option("--first", soak.first_scene, "Number of the first scene, which is the same in every run")
+  command
+      ->add_option("--first", soak.first_scene, "Number of the first scene; a number gives the same scene in every run")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command->add_option("--agents", soak.agents, "Agents of a world, at most")
+  command->add_option("--agents", soak.agents, "Maximum number of agents of a world")
       ->check(CLI::Range(1, kMaxAgentsPerWorld))
       ->capture_default_str();
   command->add_option("--views", soak.views, "Views of a scene")->check(CLI::Range(1, 4096))->capture_default_str();
@@ -136,9 +138,9 @@ void add_soak_benchmark(CLI::App& bench) {
       ->capture_default_str();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
-      "Ends with status 1 where an image is further from the oracle's than kernels may be: by more than 1/255 on one\n"
-      "value in 10,000, by more than 4/255 anywhere, or in the planes of one pixel in 10,000; or an answer about an\n"
-      "agent's visibility differs.\n"
+      "Exits with status 1 if an image differs from the oracle's by more than kernels may: by more than 1/255 at one\n"
+      "value in 10,000, by more than 4/255 anywhere, or in the planes of one pixel in 10,000; or if the visibility of\n"
+      "an agent differs.\n"
       "Example:\n  pictura bench soak --map towns --minutes 8");
   command->callback([arguments] { run(*arguments); });
 }

@@ -1,5 +1,5 @@
-// What benchmarks of rates share: the options of how they are measured and reported, and figures from earlier results:
-// of the JSON that they print, and of the files of scripts/gpu_check, which hold several of those.
+// Shared by benchmarks of rates: options of measurement and report, and figures from earlier results: from their JSON
+// output, and from files of scripts/gpu_check, which contain several of those.
 #pragma once
 
 #include <string>
@@ -11,17 +11,17 @@
 
 namespace pictura {
 
-/// Files of results, and the PNG file that is drawn from them.
+/// Files of results, and the PNG file to draw.
 struct PlotArguments {
   std::vector<std::string> results;
   std::string figure;
 };
-/// Whether they were given; throws UsageError where only one of them was.
+/// Whether both were given; throws UsageError if only one was.
 bool wants_plot(const PlotArguments& arguments);
 
 struct RateArguments {
   int repeats = 7;
-  double repeat_s = 1.0;  // of each repeat, about
+  double repeat_s = 1.0;  // approximate duration of a repeat
   PlotArguments plot;
   bool json = false;
 };
@@ -32,14 +32,14 @@ struct PlottedResult {
   std::string name;
   double value = 0;
 };
-/// The results in the files, in their order. Throws Error naming the file that cannot be read or holds none.
+/// The results in the files, in order. Throws Error naming a file that cannot be read or contains none.
 std::vector<PlottedResult> read_results(const std::vector<std::string>& paths);
 
-/// A panel of a sweep, whose x doubles and whose y spans decades.
+/// A panel of a sweep, with ticks at powers of 2 in x and at decades in y.
 PlotPanel sweep_panel(const std::string& title, const std::string& x_label, const std::string& y_label);
 
-/// Adds a point to the series of that name, which begins with it if there is none; points of a series ascend in x, and
-/// the first that is given for an x stays.
+/// Adds a point to the series of that name, which is created if missing; points of a series ascend in x, and of several
+/// with one x the first is kept.
 void add_point(PlotPanel* panel, const std::string& series, double x, double y);
 
 }  // namespace pictura

@@ -18,7 +18,7 @@ constexpr float kBlock_m = 60.0f;
 constexpr int kBlocks = 5;
 constexpr float kHalfRoad_m = 7.0f;
 
-// Boxes are apart when circles around them are; crude, and enough for disjoint footprints.
+// Whether the bounding circles are disjoint; conservative, and enough for disjoint footprints.
 bool apart(const AgentBox& a, const AgentBox& b) {
   auto radius = [](const AgentBox& box) { return 0.5f * length(Vec2{box.length_m, box.width_m}); };
   return length(a.center_m.xy() - b.center_m.xy()) > radius(a) + radius(b) + 0.1f;
@@ -34,7 +34,7 @@ SyntheticTown make_synthetic_town(uint64_t seed, int num_agents) {
   SyntheticTown town;
   StaticGeometry& geometry = town.geometry;
 
-  // Streets along x and y. at(u, v) is a point u along and v across the street `line`.
+  // Streets along x and y. at(u, v) is the point u along and v across street `line`.
   for (int along_y = 0; along_y < 2; ++along_y) {
     for (int line = 0; line <= kBlocks; ++line) {
       const float offset = static_cast<float>(line) * kBlock_m;

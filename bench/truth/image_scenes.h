@@ -1,5 +1,5 @@
 // Synthetic scenes for tests and benchmarks of renderers: streets with lane marks, edges, crosswalks, cars, people,
-// walls and lights, drawn from a seed, with disjoint footprints.
+// walls and lights, random from a seed, with disjoint footprints.
 #pragma once
 
 #include <string>
@@ -9,11 +9,11 @@
 
 namespace pictura {
 
-/// Appends the outline of a ring or line as strips, with white marks unless said otherwise.
+/// Appends the outline of a ring or line as strips of that kind.
 void add_polyline(StaticGeometry* geometry, std::vector<Vec3> points_m, float width_m, StripKind kind);
 
 /// A town-like scene: a grid of streets 60 m apart, crosswalks and lights at crossings, walls along blocks, and
-/// `num_agents` agents that stand on the streets, none touching another.
+/// `num_agents` agents on the streets, none touching another.
 struct SyntheticTown {
   StaticGeometry geometry;
   SceneOwner scene;         // one world with handle 0
@@ -21,12 +21,12 @@ struct SyntheticTown {
 };
 SyntheticTown make_synthetic_town(uint64_t seed, int num_agents);
 
-/// A town of strips and walls with 900 people in a crowd, seen from above it and along it: far more than the kernels'
-/// fast memory has room for.
+/// A town of strips and walls with a crowd of 900 people, seen from above and along it: far more than fits into the
+/// kernels' shared memory.
 SyntheticTown make_crowd();
 
-/// Four worlds on two towns: the second town, nobody on the first one, the first and, without lights, the second again.
-/// Of each but the empty one some views, which hide each other's vehicles by turns.
+/// Four worlds on two towns: the second town, the first without agents, the first and, without lights, the second
+/// again. One view of the empty world, three of each other, which alternately hide each other's vehicles.
 struct SyntheticWorlds {
   std::vector<StaticGeometry> maps;
   SceneOwner scene;
@@ -54,10 +54,10 @@ Rig front_rig(int width_px = 96, int height_px = 54);
 /// Four cameras of 97x55, 1x1 and 40x130 pixels.
 Rig mixed_rig();
 
-/// Int16x8 cameras of eight sizes, pitched and rolled.
+/// Eight cameras of eight sizes, pitched and rolled.
 Rig eight_camera_rig();
 
-/// Scenes that are easily drawn wrong, each with a rig: hills, bridges, solids that intersect, odd sizes, one pixel.
+/// Difficult scenes, each with a rig: hills, bridges, solids that intersect, odd sizes, one pixel.
 struct HardScene {
   std::string name;
   SyntheticTown town;
@@ -65,7 +65,7 @@ struct HardScene {
 };
 std::vector<HardScene> hard_scenes();
 
-/// All images of a batch, one camera after the other: colours as floats, and planes where they are wanted.
+/// All images of a batch, one camera after the other: colours as floats, and planes if requested.
 struct Outputs {
   std::vector<float> color;
   std::vector<float> depth_m;

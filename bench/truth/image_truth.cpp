@@ -39,7 +39,7 @@ struct Facet {
     const double depth = dot(normal, origin) / along;
     if (!(depth >= kNear_m)) return kFar;
     const Point p = ray * depth - origin;
-    // The sides of a wall with a sloping foot are not at right angles.
+    // The sides of a wall on a slope are not at right angles.
     const double area2 = dot(normal, normal);
     const double at_u = dot(cross(p, v), normal) / area2, at_v = dot(cross(u, p), normal) / area2;
     if (is_disk) return at_u * at_u + at_v * at_v <= 1 ? depth : kFar;
@@ -51,19 +51,19 @@ struct Facet {
   }
 };
 
-// What a facet belongs to: its foot in the world, and what the planes say of it.
+// The object of a facet: its footprint in the world, and its values in the planes.
 struct Solid {
-  std::vector<Point> foot;  // corners
+  std::vector<Point> footprint;  // corners
   uint8_t class_id = 0;
   uint16_t instance_id = 0;
   Point middle() const {
     Point sum;
-    for (Point corner : foot) sum = sum + corner;
-    return sum * (1.0 / static_cast<double>(foot.size()));
+    for (Point corner : footprint) sum = sum + corner;
+    return sum * (1.0 / static_cast<double>(footprint.size()));
   }
 };
 
-// A strip as drawn: the cone of directions through its four corners, and the plane that it is painted on.
+// A strip as drawn: the cone of directions through its four corners, and its plane.
 struct PaintedStrip {
   Point edge_normal[4];  // inwards
   Point plane;           // unit normal
@@ -79,7 +79,7 @@ struct PaintedStrip {
     }
     return true;
   }
-  // Of its plane; infinite beyond the horizon.
+  // Depth of its plane; infinite beyond the horizon.
   double plane_depth(Point ray) const {
     const double depth = offset / dot(plane, ray);
     return depth > 0 ? depth : kFar;
@@ -104,7 +104,7 @@ struct Cone {
         middle2(dot(middle, middle)),
         spread(std::sqrt(dot(corner[3] - corner[0], corner[3] - corner[0]))) {}
   // Whether the ball around the facet touches the cone.
-  bool may_meet(const Facet& facet) const {
+  bool may_intersect(const Facet& facet) const {
     const Point center = facet.center();
     const double along = dot(center, middle) / middle2;
     const Point off = center - middle * along;
@@ -112,7 +112,7 @@ struct Cone {
     return dot(off, off) <= reach * reach;
   }
   // Whether no edge of the strip has all of the cone on its outer side.
-  bool may_meet(const PaintedStrip& strip) const {
+  bool may_intersect(const PaintedStrip& strip) const {
     return std::none_of(std::begin(strip.edge_normal), std::end(strip.edge_normal), [&](Point normal) {
       return std::all_of(std::begin(corner), std::end(corner), [&](Point ray) { return dot(normal, ray) < 0; });
     });
@@ -144,7 +144,7 @@ class Eye {
   Point right_, down_, forward_, position_;
 };
 
-// Brightness by the shared rule, from corners of our own.
+// Brightness by the shared rule, from double-precision corners.
 double brightness(const Point* corners, int count) {
   Vec3 shared[4];
   for (int i = 0; i < count; ++i) {
@@ -211,7 +211,7 @@ void add_light(Tracer* tracer, const Eye& eye, const LightHead& head, LightState
                             static_cast<int>(tracer->solids.size()) - 1});
 }
 
-// Whether two convex outlines on the ground overlap: no side of either separates them by a millimetre or less.
+// Whether two convex outlines overlap on the ground: by more than a millimetre along the normal of every side.
 bool overlap_on_ground(const std::vector<Point>& a, const std::vector<Point>& b) {
   auto separates = [&](Point normal) {
     double low_a = kFar, high_a = -kFar, low_b = kFar, high_b = -kFar;
@@ -229,8 +229,8 @@ bool overlap_on_ground(const std::vector<Point>& a, const std::vector<Point>& b)
   return true;
 }
 
-// Solids whose foot lies over the strip and, in its middle, at most kStanding_m above or below the strip's plane; none
-// where the strip is seen from below.
+// Solids whose footprint overlaps the strip and whose footprint's centre is at most kStanding_m above or below the
+// strip's plane; none if the strip is seen from below.
 std::vector<int> solids_on(const Tracer& tracer, const Vec3* strip_corners, Point eye) {
   std::vector<Point> outline;
   for (int i = 0; i < 4; ++i) outline.push_back(point(strip_corners[i]));
@@ -240,7 +240,7 @@ std::vector<int> solids_on(const Tracer& tracer, const Vec3* strip_corners, Poin
   for (std::size_t i = 0; i < tracer.solids.size(); ++i) {
     const Point above = tracer.solids[i].middle() - outline[0];
     const double height_m = dot(normal, above) / normal.z;
-    if (std::abs(height_m) <= kStanding_m && overlap_on_ground(tracer.solids[i].foot, outline)) {
+    if (std::abs(height_m) <= kStanding_m && overlap_on_ground(tracer.solids[i].footprint, outline)) {
       standing.push_back(static_cast<int>(i));
     }
   }
@@ -270,7 +270,7 @@ void add_strip(Tracer* tracer, const Eye& eye, const PinholeCamera& pinhole, con
   for (int i = 0; i < 4; ++i) as_drawn[i] = point(widened[i]);
   const double side = dot(cross(as_drawn[2] - as_drawn[0], as_drawn[3] - as_drawn[1]), as_drawn[0]) > 0 ? 1 : -1;
   for (int i = 0; i < 4; ++i) painted.edge_normal[i] = cross(as_drawn[i], as_drawn[(i + 1) % 4]) * side;
-  if (!image.may_meet(painted)) return;
+  if (!image.may_intersect(painted)) return;
   painted.carries = solids_on(*tracer, world, eye.position());
   auto by_depth = [](Point a, Point b) { return a.z < b.z; };
   painted.nearest_m = std::min_element(as_drawn, as_drawn + 4, by_depth)->z;
@@ -278,7 +278,7 @@ void add_strip(Tracer* tracer, const Eye& eye, const PinholeCamera& pinhole, con
   tracer->strips.push_back(painted);
 }
 
-// What may be seen through a cone.
+// Potentially visible surfaces in a cone.
 struct Candidates {
   std::vector<const Facet*> facets;
   std::vector<const PaintedStrip*> strips;
@@ -294,15 +294,15 @@ Candidates all_of(const Tracer& tracer) {
 Candidates within(const Candidates& candidates, const Cone& cone) {
   Candidates kept;
   for (const Facet* facet : candidates.facets) {
-    if (cone.may_meet(*facet)) kept.facets.push_back(facet);
+    if (cone.may_intersect(*facet)) kept.facets.push_back(facet);
   }
   for (const PaintedStrip* strip : candidates.strips) {
-    if (cone.may_meet(*strip)) kept.strips.push_back(strip);
+    if (cone.may_intersect(*strip)) kept.strips.push_back(strip);
   }
   return kept;
 }
 
-// What a ray meets first.
+// The first hit of a ray.
 struct Surface {
   const Rgb* color = nullptr;  // null: nothing
   const Facet* facet = nullptr;
@@ -310,9 +310,9 @@ struct Surface {
   double depth = kFar;
 };
 
-// The nearest surface: of facets and of strips the one of least depth, but of strips whose planes lie within
-// kSameLevel_m of each other there the one of least rank, and never a strip before a solid that stands on it.
-Surface front_of(const Candidates& candidates, Point ray) {
+// The nearest surface: the facet or strip of least depth, but of strips whose planes are within kSameLevel_m of each
+// other there the one of lowest rank, and never a strip before a solid that stands on it.
+Surface first_hit(const Candidates& candidates, Point ray) {
   Surface front;
   for (const Facet* facet : candidates.facets) {
     const double at = facet->hit(ray);
@@ -352,11 +352,11 @@ bool TruthImage::blank() const {
 
 namespace {
 
-// What one camera sees of one view, ready to be sampled.
-class Sight {
+// One camera's image of one view, ready to be sampled.
+class ImageSampler {
  public:
-  Sight(const StaticGeometry& geometry, const SceneBatch& scene, const View& view, const Camera& camera,
-        float line_floor_px)
+  ImageSampler(const StaticGeometry& geometry, const SceneBatch& scene, const View& view, const Camera& camera,
+               float line_floor_px)
       : camera_(camera), whole_(cone(0, 0, camera.width_px, camera.height_px)) {
     const Eye eye(camera, view);
     const auto world = static_cast<std::size_t>(view.world);
@@ -382,10 +382,10 @@ class Sight {
     }
   }
 
-  // Calls visit(x, y, candidates) for each pixel, with what may appear in it.
+  // Calls visit(x, y, candidates) for each pixel, with its potentially visible surfaces.
   template <typename Visit>
   void for_each_pixel(Visit&& visit) const {
-    // What may appear in the image, then in each of its rows, then in each pixel.
+    // Culled for the image, then for each row, then for each pixel.
     const Candidates in_image = within(all_of(tracer_), whole_);
     for (int y = 0; y < camera_.height_px; ++y) {
       const Candidates in_row = within(in_image, cone(0, y, camera_.width_px, y + 1));
@@ -424,7 +424,7 @@ std::vector<std::pair<double, double>> sample_offsets(TruthSamples samples) {
 
 TruthImage trace_image(const StaticGeometry& geometry, const SceneBatch& scene, const View& view, const Camera& camera,
                        float line_floor_px, TruthSamples samples) {
-  const Sight sight(geometry, scene, view, camera, line_floor_px);
+  const ImageSampler sampler(geometry, scene, view, camera, line_floor_px);
   const auto offsets = sample_offsets(samples);
   const int width = camera.width_px, height = camera.height_px;
   const auto plane = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
@@ -434,11 +434,11 @@ TruthImage trace_image(const StaticGeometry& geometry, const SceneBatch& scene, 
                    std::vector<float>(plane),
                    std::vector<uint8_t>(plane),
                    std::vector<uint16_t>(plane)};
-  sight.for_each_pixel([&](int x, int y, const Candidates& in_pixel) {
+  sampler.for_each_pixel([&](int x, int y, const Candidates& in_pixel) {
     const std::size_t pixel = static_cast<std::size_t>(y * width + x);
     double sum[3] = {};
     for (const auto& [dx, dy] : offsets) {
-      const Surface front = front_of(in_pixel, sight.ray_at(x + dx, y + dy));
+      const Surface front = first_hit(in_pixel, sampler.ray_at(x + dx, y + dy));
       if (!front.color) continue;
       sum[0] += front.color->r;
       sum[1] += front.color->g;
@@ -447,11 +447,11 @@ TruthImage trace_image(const StaticGeometry& geometry, const SceneBatch& scene, 
     for (std::size_t channel = 0; channel < 3; ++channel) {
       image.rgb[channel * plane + pixel] = static_cast<float>(sum[channel] / static_cast<double>(offsets.size()));
     }
-    const Surface at_center = front_of(in_pixel, sight.ray_at(x + 0.5, y + 0.5));
+    const Surface at_center = first_hit(in_pixel, sampler.ray_at(x + 0.5, y + 0.5));
     image.depth_m[pixel] = static_cast<float>(at_center.depth);
     if (at_center.strip) image.class_id[pixel] = at_center.strip->class_id;
     if (at_center.facet) {
-      const Solid& solid = sight.tracer().solids[static_cast<std::size_t>(at_center.facet->solid)];
+      const Solid& solid = sampler.tracer().solids[static_cast<std::size_t>(at_center.facet->solid)];
       image.class_id[pixel] = solid.class_id;
       image.instance_id[pixel] = solid.instance_id;
     }
@@ -463,26 +463,26 @@ TruthVisibility trace_visibility(const StaticGeometry& geometry, const SceneBatc
                                  const Rig& rig, float line_floor_px, int32_t agent) {
   const auto offsets = sample_offsets(TruthSamples::low_discrepancy_1024);
   const int instance_id = 1 + agent - scene.world_begin[static_cast<std::size_t>(view.world)];
-  double seen = 0, alone = 0;
+  double visible = 0, alone = 0;
   for (const Camera& camera : rig.cameras) {
-    const Sight sight(geometry, scene, view, camera, line_floor_px);
+    const ImageSampler sampler(geometry, scene, view, camera, line_floor_px);
     auto is_wanted = [&](const Facet* facet) {
-      return sight.tracer().solids[static_cast<std::size_t>(facet->solid)].instance_id == instance_id;
+      return sampler.tracer().solids[static_cast<std::size_t>(facet->solid)].instance_id == instance_id;
     };
-    sight.for_each_pixel([&](int x, int y, const Candidates& in_pixel) {
+    sampler.for_each_pixel([&](int x, int y, const Candidates& in_pixel) {
       Candidates wanted;
       std::copy_if(in_pixel.facets.begin(), in_pixel.facets.end(), std::back_inserter(wanted.facets), is_wanted);
       if (wanted.facets.empty()) return;
       for (const auto& [dx, dy] : offsets) {
-        const Point ray = sight.ray_at(x + dx, y + dy);
-        if (!front_of(wanted, ray).facet) continue;
-        const Surface front = front_of(in_pixel, ray);
+        const Point ray = sampler.ray_at(x + dx, y + dy);
+        if (!first_hit(wanted, ray).facet) continue;
+        const Surface front = first_hit(in_pixel, ray);
         alone += 1;
-        seen += front.facet && is_wanted(front.facet);
+        visible += front.facet && is_wanted(front.facet);
       }
     });
   }
-  return {seen / alone, alone / static_cast<double>(offsets.size())};
+  return {visible / alone, alone / static_cast<double>(offsets.size())};
 }
 
 double value_error(double actual, double expected) {
@@ -497,7 +497,7 @@ bool is_same_depth(double actual_m, double expected_m) {
 
 namespace {
 
-// Bin k holds errors of more than k - 1 and at most k steps, but for the rounding of floats that stand for bytes.
+// Bin k counts errors of more than k - 1 and at most k steps, except for the rounding of floats converted from bytes.
 constexpr double kStepsOfOne = 8 * 255, kRounding_steps = 1e-3;
 
 std::size_t bin_of(double error) {

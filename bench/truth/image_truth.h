@@ -1,7 +1,7 @@
-// The truth that renderers are measured against: a small ray caster in double precision. Every pixel is the box filter
-// of the nearest drawn primitive, by point samples. It shares with the renderers the colours, the brightness, the
-// widths and ranks of strips and the two lengths that say what is of one level and what stands on what, and neither
-// their projection nor their coverage nor their order.
+// The reference that renderers are measured against: a small ray caster in double precision. Every pixel is the box
+// filter of the nearest drawn primitive, by point samples. It shares with the renderers the colours, the brightness,
+// the widths and ranks of strips and the two lengths that define one level and standing on a strip, but not projection,
+// coverage or visibility.
 #pragma once
 
 #include <vector>
@@ -22,7 +22,7 @@ struct TruthImage {
 
 enum class TruthSamples {
   low_discrepancy_1024,  // the truth
-  grid_2x2,              // what 2x2 supersampling of a z-buffer shows
+  grid_2x2,              // 2x2 supersampling of a z-buffer
   center,                // ... and one sample a pixel
 };
 
@@ -31,19 +31,17 @@ TruthImage trace_image(const StaticGeometry& geometry, const SceneBatch& scene, 
                        float line_floor_px, TruthSamples samples = TruthSamples::low_discrepancy_1024);
 
 /// Share of the samples in which an agent is in front of everything, over those in which it would be seen alone, summed
-/// over the rig's cameras; `alone_px` is the latter in pixels. NaN where it is in no frame.
+/// over the rig's cameras; `alone_px` is the latter in pixels. NaN if it is in no image.
 struct TruthVisibility {
   double share = 0, alone_px = 0;
 };
 TruthVisibility trace_visibility(const StaticGeometry& geometry, const SceneBatch& scene, const View& view,
                                  const Rig& rig, float line_floor_px, int32_t agent);
 
-/// How far a channel value is from the one that was expected; infinitely where one of them is no finite number, so that
-/// no tolerance takes it.
+/// Absolute difference of channel values; infinity if one of them is not finite, so that it exceeds every tolerance.
 double value_error(double actual, double expected);
 
-/// Whether the depths that two kernels tell of a surface are the same, within kKernelDepthError. A depth of infinity is
-/// nothing's, and equal to itself alone.
+/// Whether two depths are equal within kKernelDepthError. Infinity means nothing, and equals only itself.
 bool is_same_depth(double actual_m, double expected_m);
 
 /// Pools the squared error of many images; channels in [0, 1].
@@ -55,7 +53,7 @@ class PooledError {
   void add(const PooledError& other);
   double psnr_db() const;
   double max_error() const { return max_error_; }
-  /// Share of channel values that are further than this from the truth; in steps of 1/8 of 1/255, rounded up.
+  /// Share of channel values with a larger error; in steps of 1/8 of 1/255, rounded up.
   double share_above(double error) const;
 
  private:

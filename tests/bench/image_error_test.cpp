@@ -48,7 +48,7 @@ TEST(ImageError, EachFormatIsReadInItsOwnUnits) {
 TEST(ImageError, WhatIsNotDrawnShowsInEveryFormatAndPlane) {
   for (const PixelFormat format : {PixelFormat::u8, PixelFormat::f16, PixelFormat::f32}) {
     HostImages actual(kRig, 2, format, Planes::all), expected(kRig, 2, format, Planes::all);
-    spoil(actual.batch());
+    fill_unwritten(actual.batch());
     for (int view = 0; view < 2; ++view) {
       const ImageError error = compare_image(actual.camera(0), expected.camera(0), format, view);
       EXPECT_EQ(error.beyond, error.values);
