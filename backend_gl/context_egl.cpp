@@ -75,7 +75,7 @@ bool is_gpu(const Egl& egl, EGLDeviceEXT device) {
   return !has(egl.query_device_string(device, EGL_EXTENSIONS), "EGL_MESA_device_software");
 }
 
-// A display is the process's, not ours: it is shared by all who ask for it, and so is never terminated.
+// The display is shared by the whole process, so it is never terminated.
 EGLDisplay open_display(const Egl& egl, int cuda_device) {
   auto initialized = [&](EGLenum platform, void* native) {
     const EGLDisplay display = egl.get_platform_display(platform, native, nullptr);
@@ -117,7 +117,7 @@ class EglContext final : public Context {
   void* entry_point(const char* name) const override { return reinterpret_cast<void*>(egl_.get_proc_address(name)); }
 
   void enter() override {
-    // Which API is bound decides which context is asked about; EGL keeps it per thread.
+    // EGL returns the current context of the bound API, which is per thread.
     before_ = {egl_.query_api(), egl_.get_current_display(), egl_.get_current_context(),
                egl_.get_current_surface(EGL_DRAW), egl_.get_current_surface(EGL_READ)};
     PICTURA_CHECK(

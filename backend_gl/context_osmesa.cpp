@@ -60,7 +60,7 @@ class OsmesaContext final : public Context {
   decltype(&OSMesaGetProcAddress) get_proc_address_ = function<decltype(get_proc_address_)>("OSMesaGetProcAddress");
 
   OSMesaContext context_ = nullptr;
-  unsigned char pixel_[4] = {};  // OSMesa wants a window's memory; everything is drawn into textures
+  unsigned char pixel_[4] = {};  // OSMesa requires a framebuffer; all drawing goes to textures
   struct Before {
     OSMesaContext context = nullptr;
     void* pixels = nullptr;

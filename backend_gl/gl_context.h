@@ -1,5 +1,5 @@
-// Where OpenGL comes from: a context of OSMesa or of EGL, without any OpenGL header. Their libraries are opened when a
-// context is asked for, never linked, so that the program starts where they are missing.
+// OpenGL contexts of OSMesa or EGL, without any OpenGL header. Their libraries are loaded when a context is created,
+// never linked, so that the program starts without them.
 #pragma once
 
 #include <memory>
@@ -9,7 +9,7 @@
 
 namespace pictura::gl {
 
-/// An OpenGL 4.5 core context, current nowhere until a CurrentContext makes it so.
+/// An OpenGL 4.5 core context, not current in any thread until a CurrentContext makes it so.
 class Context {
  public:
   virtual ~Context() = default;
@@ -21,21 +21,20 @@ class Context {
   virtual std::string name() const = 0;
   /// Address of an OpenGL function, or null.
   virtual void* entry_point(const char* name) const = 0;
-  /// Makes it the calling thread's, and remembers which context of the same library was.
+  /// Makes it current in the calling thread, and saves which context of the same library was.
   virtual void enter() = 0;
-  /// Puts back what enter() found.
+  /// Restores the context saved by enter().
   virtual void leave() = 0;
 };
 
-/// Throws Error where libOSMesa or its context is missing.
+/// Throws Error if libOSMesa or its context is missing.
 std::unique_ptr<Context> make_osmesa_context();
 
-/// On a GPU where EGL offers one, else Mesa's software rasterizer, without any window system. Of several GPUs the one
-/// that CUDA numbers cuda_device, unless that is -1. Throws Error where libEGL, such a device or its context is
-/// missing.
+/// On a GPU if EGL offers one, else Mesa's software rasterizer, without any window system. Of several GPUs the one with
+/// CUDA's index cuda_device, unless that is -1. Throws Error if libEGL, such a device or its context is missing.
 std::unique_ptr<Context> make_egl_context(int cuda_device = -1);
 
-/// Makes a context current for as long as it lives.
+/// Makes a context current for its own lifetime.
 class CurrentContext {
  public:
   explicit CurrentContext(Context* context) : context_(context) { context_->enter(); }

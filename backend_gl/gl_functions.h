@@ -1,5 +1,5 @@
-// The OpenGL 4.5 entry points that this folder uses, in one table that is filled from the library of a context: nothing
-// is linked, and two libraries (OSMesa, EGL) can serve one process.
+// The OpenGL 4.5 entry points that this folder uses, in one table filled from the library of a context: nothing is
+// linked, and one process can use both libraries (OSMesa, EGL).
 #pragma once
 
 #define GL_GLEXT_PROTOTYPES

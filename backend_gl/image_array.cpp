@@ -152,7 +152,7 @@ void ImageArray::make_storage() {
 }
 
 void ImageArray::make_resolve_program() {
-  // The driver may have taken more samples than were asked for.
+  // The driver may use more samples than requested.
   GLint samples = 1;
   if (samples_.multisample > 1) gl_.GetTextureLevelParameteriv(color_, 0, GL_TEXTURE_SAMPLES, &samples);
   resolve_program_ = make_program(
@@ -178,7 +178,7 @@ void ImageArray::begin() {
 
 void ImageArray::resolve(int images) {
   constexpr std::size_t kGroup = 64;         // local_size_x
-  constexpr std::size_t kMaxGroups = 65535;  // every OpenGL takes so many along an axis
+  constexpr std::size_t kMaxGroups = 65535;  // OpenGL's guaranteed minimum along an axis
   gl_.BindTextureUnit(0, color_);
   gl_.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, output_);
   gl_.UseProgram(resolve_program_);
@@ -191,7 +191,7 @@ void ImageArray::plan_copy(int first, int images, void* out, int64_t stride, std
   const std::size_t value_bytes = bytes_per_value(format_);
   const std::size_t row_bytes =
       static_cast<std::size_t>(width_px_) * static_cast<std::size_t>(height_px_) * value_bytes;
-  // A single image may have any stride; CUDA takes no pitch below a row.
+  // A single image may have any stride; CUDA rejects a pitch below a row.
   const std::size_t pitch = images > 1 ? static_cast<std::size_t>(stride) * value_bytes : row_bytes;
   for (std::size_t plane = 0; plane < 3; ++plane) {
     copies_out->push_back({(3 * static_cast<std::size_t>(first) + plane) * plane_bytes(), 3 * plane_bytes(),

@@ -1,4 +1,4 @@
-// Images of one size as the layers of one array texture: room for a whole batch, the samples of every pixel, and the
+// Images of one size as the layers of one array texture: memory for a whole batch, the samples of every pixel, and the
 // pass that averages them into planar images in a buffer.
 #pragma once
 
@@ -16,34 +16,33 @@ namespace pictura::gl {
 /// A linked program. Throws Error with the compiler's log.
 GLuint make_program(const Functions& gl, std::initializer_list<std::pair<GLenum, std::string>> shaders);
 
-/// Throws Error naming `where` after anything that OpenGL complained of.
+/// Throws Error naming `where` if OpenGL has reported an error.
 void check_errors(const Functions& gl, const std::string& where);
 
-/// The context is current wherever anything of this class is called, the destructor included.
+/// The context must be current in all calls, the destructor included.
 class ImageArray {
  public:
-  /// `renderer` begins errors; images are copied to device memory where `interop` is given, else to the host. Throws
-  /// Error where this driver has no room for one image, or not so many samples.
+  /// `renderer` prefixes errors; images are copied to device memory if `interop` is given, else to the host. Throws
+  /// Error if the driver cannot hold one image, or that many samples.
   ImageArray(const Functions& gl, std::string renderer, const PixelSamples& samples, const CudaInterop* interop,
              int width_px, int height_px);
   ~ImageArray() { release(); }
   ImageArray(const ImageArray&) = delete;
   ImageArray& operator=(const ImageArray&) = delete;
 
-  /// Makes room for `images`, or for as many of them as the driver and a fixed amount of memory allow; returns that.
+  /// Allocates memory for `images`, or for as many as the driver and a fixed limit allow; returns their number.
   int reserve(int64_t images, PixelFormat format);
-  /// Clears all layers and has them drawn into from now on.
+  /// Clears all layers and makes them the render target.
   void begin();
   /// Averages the samples of the first `images` layers into the buffer.
   void resolve(int images);
-  /// Appends what copy() is to do to bring consecutive images to `out`: three planes each, an image every `stride`
-  /// values.
+  /// Appends the copies of consecutive images to `out`, for copy(): three planes each, an image every `stride` values.
   void plan_copy(int first, int images, void* out, int64_t stride, std::vector<RowCopy>* copies_out) const;
-  /// On the host, returns when the copies are made; on a device they are put on the stream.
+  /// To the host, returns when the copies are finished; to a device, enqueues them on the stream.
   void copy(Span<const RowCopy> copies, Stream stream);
 
  private:
-  // Of the present format.
+  // Of the current format.
   int max_layers() const;
   std::size_t plane_bytes() const;
   GLuint make_texture(GLenum format) const;

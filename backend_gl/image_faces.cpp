@@ -8,14 +8,14 @@ namespace pictura::gl {
 
 namespace {
 
-// Strips of one level lie nearly in one plane, where rank is to decide which is in front. Each is therefore compared as
-// if it lay further from the camera, the more so the later it comes in the order of ranks: seen from above by up to
-// kMaxPush_m, which is several times what parts strips of one level, and little to what parts two levels of road. Seen
-// from below, what stands on a strip is just behind it and has to stay there: by this share of its plane's distance.
+// Strips of one level are nearly coplanar, and rank decides which is in front. Each is therefore depth-tested with an
+// offset away from the camera that grows with its rank: seen from above by up to kMaxPush_m, several times the distance
+// between strips of one level and little compared with that between two levels of road. Seen from below, objects on a
+// strip are just behind it and must stay behind: by up to kMaxPushShare of the distance of its plane.
 constexpr float kMaxPush_m = 4 * kSameLevel_m, kMaxPushShare = 0.01f;
 
-// The plane whose depth is compared for a strip that has `order`, 0 to 1, among those of the image. Where it is below
-// the camera it is lowered by how far solids that stand on it may dip into it: they are then in front.
+// The plane whose depth is tested for a strip of rank `order`, 0 to 1, among those of the image. Below the camera it is
+// lowered by the depth that solids on it may dip into it, so that they are in front.
 Vec3 compared_plane(const FacePlane& plane, const PinholeCamera& camera, float order) {
   const Vec3 up{camera.right.z, camera.down.z, camera.forward.z};
   const float above = dot(plane.normal, up);  // also the scale of the offset: above * height of the plane

@@ -1,5 +1,5 @@
-// What one image draws: the faces of all that its camera may see, by the shared rules of shape, colour and width, in
-// camera coordinates. Projection, clipping and visibility are OpenGL's.
+// The faces of one image, of all that its camera may show, by the shared rules of shape, colour and width, in camera
+// coordinates. OpenGL projects, clips and decides visibility.
 #pragma once
 
 #include <utility>
@@ -9,14 +9,14 @@
 
 namespace pictura::gl {
 
-/// Bounds on the depth of a strip's corner over that of its compared plane there: as good as infinitely far, beyond the
-/// horizon of the plane, and as near as the oracle lets it come.
+/// Bounds on the ratio of a strip corner's depth to that of its compared plane there: practically infinitely far,
+/// beyond the plane's horizon, and as near as the oracle allows.
 constexpr float kMinNearness = 1e-4f, kMaxNearness = kWidenedDepth;
 
 /// One instance of the draw call: a flat quadrilateral, in camera coordinates.
 struct FaceInstance {
   Vec3 corner[4];  // in order around it
-  // The plane compared_plane . p = 1, whose depth decides what is in front; 0: the face's own depth does.
+  // The plane compared_plane . p = 1, whose depth is tested; 0: the face's own depth.
   Vec3 compared_plane;
   Rgb color;
   int32_t layer = 0;  // of the image array
@@ -24,7 +24,7 @@ struct FaceInstance {
 
 class ImageFaces {
  public:
-  /// Replaces the faces by those that the view shows. `scene` lies on the host.
+  /// Replaces the faces by those of the view. `scene` is in host memory.
   void gather(const ImageSetting& setting, const StaticGeometryView& geometry, const SceneBatch& scene,
               const View& view, int32_t layer);
   Span<const FaceInstance> faces() const { return faces_; }

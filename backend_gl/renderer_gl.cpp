@@ -31,7 +31,7 @@ bool has_extension(const gl::Functions& functions, const char* wanted) {
   return false;
 }
 
-// The cameras of one size, whose images share an array.
+// Cameras of one size, whose images share an array.
 struct SizeGroup {
   std::vector<std::size_t> cameras;  // of the rig
   std::unique_ptr<gl::ImageArray> array;
@@ -55,16 +55,16 @@ class GlRenderer final : public Renderer {
     drawn_by_ = reinterpret_cast<const char*>(gl_->GetString(GL_RENDERER));
     PICTURA_CHECK(has_extension(*gl_, kLayerExtension), "renderer {}: {} lacks {}", name_, drawn_by_, kLayerExtension);
     make_pipeline();
-    groups_ = make_groups();  // last: what it made goes, if it throws, while the context is current
+    groups_ = make_groups();  // last: if it throws, its objects are destroyed while the context is current
   }
   ~GlRenderer() override {
     const gl::CurrentContext current(context_.get());
-    groups_.clear();  // all else goes with the context
+    groups_.clear();  // everything else is destroyed with the context
   }
   std::string_view name() const override { return name_; }
   Device device() const override { return memory_; }
   const RendererConfig& config() const override { return config_; }
-  /// What draws, as the driver calls it.
+  /// The driver's name of the device.
   const std::string& drawn_by() const { return drawn_by_; }
 
   void upload(GeometryHandle handle, const StaticGeometry& geometry, Stream) override {
@@ -130,7 +130,7 @@ class GlRenderer final : public Renderer {
     attribute(4, 3, offsetof(FaceInstance, compared_plane));
     attribute(5, 3, offsetof(FaceInstance, color));
     attribute(6, 0, offsetof(FaceInstance, layer));
-    // Depth is inverse: 1 at the near plane, 0 infinitely far; single precision is then fine at every range.
+    // Depth is inverse: 1 at the near plane, 0 infinitely far, so that single precision suffices at every range.
     gl_->ClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
     gl_->Enable(GL_DEPTH_TEST);
     gl_->DepthFunc(GL_GREATER);
@@ -163,7 +163,7 @@ class GlRenderer final : public Renderer {
     if (views.empty()) return;
     const gl::CurrentContext current(context_.get());
     for (SizeGroup& group : groups_) {
-      // Images are taken camera by camera, so that each camera's views are consecutive.
+      // Images are ordered by camera, so that each camera's views are consecutive.
       const int64_t total = static_cast<int64_t>(views.size() * group.cameras.size());
       const int room = group.array->reserve(total, images_out.format);
       for (int64_t begin = 0; begin < total; begin += room) {
@@ -216,7 +216,7 @@ class GlRenderer final : public Renderer {
         view, layer);
   }
 
-  // Puts the faces of the first `count` images one after the other into the buffer that is drawn from.
+  // Uploads the faces of the first `count` images, one after the other, to the instance buffer.
   void upload_faces(std::size_t count) {
     first_face_.resize(count + 1);
     first_face_[0] = 0;
@@ -244,14 +244,14 @@ class GlRenderer final : public Renderer {
   RendererConfig config_;
   std::vector<PinholeCamera> cameras_;  // in the ego frame
   std::unique_ptr<gl::Context> context_;
-  std::unique_ptr<gl::CudaInterop> interop_;  // where scenes and images lie in device memory
+  std::unique_ptr<gl::CudaInterop> interop_;  // if scenes and images are in device memory
   Device memory_;                             // of scenes and images
   std::string name_, drawn_by_;
   std::unique_ptr<gl::Functions> gl_;
   std::vector<SizeGroup> groups_;
   GLuint program_ = 0, instances_ = 0, vertex_array_ = 0;
   GLint projection_ = -1, positions_ = -1;
-  float positions_per_px_ = 0;  // of the grid that the driver rounds corners to, along each axis
+  float positions_per_px_ = 0;  // of the driver's grid of corner positions, along each axis
   HostGeometries geometries_;
   gl::HostScene host_scene_;
   std::vector<gl::ImageFaces> faces_;    // one per layer

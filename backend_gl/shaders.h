@@ -1,12 +1,11 @@
-// The two programs of the pipeline: faces to samples, and samples to the planar images that callers get.
+// The two programs of the pipeline: faces to samples, and samples to the callers' planar images.
 #pragma once
 
 namespace pictura::gl {
 
-/// Hardware moves corners to the nearest 1/n of a texel (GL_SUBPIXEL_BITS), but leaves them their depths: a face's
-/// plane then tilts, towards the horizon by more than what parts strips of one level. So corners are moved here, and
-/// their depths are asked where they then are: strips of one plane have the same depths, whatever their corners, but
-/// for rounding.
+/// Hardware rounds corners to 1/n of a texel (GL_SUBPIXEL_BITS) but keeps their depths: a face's plane then tilts, near
+/// the horizon by more than the distance between strips of one level. So corners are rounded here, and their depths are
+/// computed at the rounded positions: strips of one plane have the same depths for any corners, except for rounding.
 constexpr const char* kFaceVertexShader = R"(#version 450 core
 #extension GL_ARB_shader_viewport_layer_array : require
 layout(location = 0) in vec3 corner0;  // camera coordinates
@@ -17,21 +16,21 @@ layout(location = 4) in vec3 compared_plane;
 layout(location = 5) in vec3 color;
 layout(location = 6) in int layer;
 uniform vec4 projection;  // scale of x and y, offset of x and y
-uniform vec2 positions;   // of corners that hardware tells apart along half an image
-uniform vec2 inverse_depth;    // bounds on the depth of a corner over that of the plane that is compared
+uniform vec2 positions;   // of corners that hardware resolves along half an image
+uniform vec2 inverse_depth;    // bounds on the ratio of a corner's depth to that of the compared plane
 uniform float near_m;
 flat out vec3 face_color;
 void main() {
-  // A strip of two triangles goes across the quadrilateral.
+  // A strip of two triangles covers the quadrilateral.
   vec3 p = gl_VertexID == 0 ? corner0 : gl_VertexID == 1 ? corner1 : gl_VertexID == 2 ? corner3 : corner2;
   vec2 at = projection.xy * p.xy + projection.zw * p.z;  // on screen, times depth
-  // Behind the near plane there is no place on screen. The corners that clipping makes instead lie so far below the
-  // horizon that moving them tilts next to nothing.
+  // Points behind the near plane have no position on screen. The corners that clipping creates instead are so far below
+  // the horizon that rounding them tilts the plane negligibly.
   if (p.z >= near_m) {
     at = round(at / p.z * positions) / positions * p.z;
     p.xy = (at - projection.zw * p.z) / projection.xy;
   }
-  // Its depth over the one that is compared.
+  // The ratio of its depth to the compared one.
   float nearer = compared_plane == vec3(0.0) ? 1.0 : clamp(dot(compared_plane, p), inverse_depth.x, inverse_depth.y);
   // Inverse depth: 1 at the near plane, 0 infinitely far.
   gl_Position = vec4(at, near_m * nearer, p.z);
@@ -46,8 +45,8 @@ out vec4 color;
 void main() { color = vec4(face_color, 1.0); }
 )";
 
-/// Needs, defined before it: MULTISAMPLE and PACKED as 0 or 1. An invocation makes what words of each colour plane
-/// hold, four bytes (PACKED) or one float each.
+/// Requires MULTISAMPLE and PACKED, defined before it as 0 or 1. An invocation writes one word of each colour plane,
+/// four bytes (PACKED) or one float.
 constexpr const char* kResolveShader = R"(
 #if MULTISAMPLE
 uniform sampler2DMSArray drawn;
@@ -102,7 +101,7 @@ void resolve(int word, int layer) {
 }
 
 void main() {
-  // Large images have more words than there may be invocations.
+  // Large images have more words than the limit on invocations.
   int invocations = int(gl_NumWorkGroups.x * gl_WorkGroupSize.x), layer = int(gl_GlobalInvocationID.y);
   for (int word = int(gl_GlobalInvocationID.x); word < plane_words; word += invocations) resolve(word, layer);
 }

@@ -1,5 +1,5 @@
-// The way between this backend and CUDA on one GPU: scenes come from device memory, images go to device memory without
-// passing through the host. No CUDA type appears here; interop.cpp, which uses them, is built where CUDA is.
+// Interoperability of this backend and CUDA on one GPU: scenes are read from device memory, images are copied to device
+// memory without passing through the host. No CUDA type appears here; interop.cpp is built only with CUDA.
 #pragma once
 
 #include <memory>
@@ -9,7 +9,7 @@
 
 namespace pictura::gl {
 
-/// Rows of bytes from a buffer to memory.
+/// A copy of rows of bytes from a buffer to memory.
 struct RowCopy {
   std::size_t from = 0, from_pitch = 0;  // offset in the buffer, and from row to row
   std::byte* to = nullptr;
@@ -21,8 +21,8 @@ struct RowCopy {
 class CudaBuffer {
  public:
   virtual ~CudaBuffer() = default;
-  /// Puts the copies to device memory on the stream, after all OpenGL that was asked for before and before all that is
-  /// asked for after. The buffer's context is current.
+  /// Enqueues the copies to device memory on the stream, ordered after all earlier and before all later OpenGL
+  /// commands. The buffer's context must be current.
   virtual void copy(Span<const RowCopy> copies, Stream stream) = 0;
 };
 
@@ -49,12 +49,12 @@ class CudaInterop {
   virtual void synchronize(Stream stream) const = 0;
   /// Registers a buffer object of the current context.
   virtual std::unique_ptr<CudaBuffer> share(unsigned int buffer) const = 0;
-  /// Waits for the stream and copies what lies in device memory.
+  /// Waits for the stream and copies what is in device memory.
   virtual void copy_to_host(const SceneBatch& scene, const ViewBatch& views, Stream stream,
                             HostScene* scene_out) const = 0;
 };
 
-/// Throws Error where the CUDA device cannot be used. Defined where the build has CUDA.
+/// Throws Error if the CUDA device cannot be used. Defined only in builds with CUDA.
 std::unique_ptr<CudaInterop> make_cuda_interop(Device device);
 
 }  // namespace pictura::gl
