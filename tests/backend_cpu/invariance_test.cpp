@@ -1,5 +1,5 @@
-// What must not change an image: moving the world as a whole, mirroring it, cutting lines up, hiding what is hidden,
-// the number of threads and the order of the input.
+// What must not change an image: moving or mirroring the whole world, dividing lines, adding hidden agents, the number
+// of threads and the order of the input.
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -55,7 +55,7 @@ TEST(Invariance, AWallInFrontHidesAnAgentToTheLastBit) {
   const RendererConfig config{.rig = paper_rig(97, 55), .num_threads = 1};
   EXPECT_EQ(draw(geometry, scene_of({near, hidden}), views, config).rgb,
             draw(geometry, scene_of({near}), views, config).rgb);
-  // ... and without the wall it shows.
+  // Without the wall it is visible.
   const StaticGeometry open = no_geometry();
   EXPECT_NE(draw(open, scene_of({near, hidden}), views, config).rgb, draw(open, scene_of({near}), views, config).rgb);
 }
@@ -92,34 +92,34 @@ SyntheticTown moved(const SyntheticTown& town, SinCos turn, Vec3 shift_m, bool m
     if (mirror) v.y = -v.y;
     return Vec2{v.x * turn.cos - v.y * turn.sin, v.x * turn.sin + v.y * turn.cos};
   };
-  auto place = [&](Vec3 p) {
+  auto transformed = [&](Vec3 p) {
     const Vec2 turned = direction(p.xy());
     return Vec3{turned.x, turned.y, p.z} + shift_m;
   };
   SyntheticTown out = town;
   for (Strip& strip : out.geometry.strips) {
-    strip.a_m = place(strip.a_m);
-    strip.b_m = place(strip.b_m);
+    strip.a_m = transformed(strip.a_m);
+    strip.b_m = transformed(strip.b_m);
     strip.side_a = direction(strip.side_a);
     strip.side_b = direction(strip.side_b);
   }
   for (WallFace& wall : out.geometry.walls) {
-    wall.a_m = place(wall.a_m);
-    wall.b_m = place(wall.b_m);
+    wall.a_m = transformed(wall.a_m);
+    wall.b_m = transformed(wall.b_m);
   }
   for (LightHead& head : out.geometry.heads) {
-    head.position_m = place(head.position_m);
+    head.position_m = transformed(head.position_m);
     head.facing = direction(head.facing);
   }
   out.geometry.build_grids();
   for (AgentBox& box : out.scene.agents) {
-    box.center_m = place(box.center_m);
+    box.center_m = transformed(box.center_m);
     const Vec2 heading = direction({box.cos_heading, box.sin_heading});
     box.cos_heading = heading.x;
     box.sin_heading = heading.y;
   }
   for (View& view : out.views) {
-    view.origin_m = place(view.origin_m);
+    view.origin_m = transformed(view.origin_m);
     const Vec2 heading = direction({view.cos_heading, view.sin_heading});
     view.cos_heading = heading.x;
     view.sin_heading = heading.y;
@@ -163,7 +163,7 @@ TEST(Invariance, AMirroredWorldGivesMirroredImages) {
     std::reverse(there.rgb.begin() + static_cast<std::ptrdiff_t>(96 * row),
                  there.rgb.begin() + static_cast<std::ptrdiff_t>(96 * (row + 1)));
   }
-  // Samples are not mirrored, so pixels that several things share differ by the oracle's own error.
+  // Samples are not mirrored, so pixels shared by several objects differ by the oracle's own error.
   double worst = 0;
   for (std::size_t i = 0; i < there.rgb.size(); ++i) {
     worst = std::max(worst, std::abs(static_cast<double>(there.rgb[i]) - here.rgb[i]));
@@ -171,7 +171,7 @@ TEST(Invariance, AMirroredWorldGivesMirroredImages) {
   EXPECT_LE(worst, kWorstOracleError);
 }
 
-TEST(Invariance, TheOrderOfTheInputDoesNotShow) {
+TEST(Invariance, ImagesDoNotDependOnTheOrderOfTheInput) {
   SyntheticTown town = make_synthetic_town(8, 100);
   town.views.resize(4);
   for (View& view : town.views) view.ego_agent = -1;
@@ -181,14 +181,14 @@ TEST(Invariance, TheOrderOfTheInputDoesNotShow) {
   std::shuffle(town.scene.agents.begin(), town.scene.agents.end(), random);
   std::shuffle(town.geometry.walls.begin(), town.geometry.walls.end(), random);
   std::shuffle(town.geometry.heads.begin(), town.geometry.heads.end(), random);
-  // Of strips of one kind the index decides which is on top, so those keep their order, and kinds are dealt anew.
+  // The index orders strips of one kind, so those keep their order; only the order of kinds changes.
   std::stable_sort(town.geometry.strips.begin(), town.geometry.strips.end(),
                    [](const Strip& a, const Strip& b) { return a.kind > b.kind; });
   town.geometry.build_grids();
   EXPECT_EQ(draw(town.geometry, town.scene, town.views, config).rgb, before);
 }
 
-// Sum of what is covered of all pixels, of a scene in which everything has one colour.
+// Covered area in pixels, of a scene in which everything has one colour.
 double covered_px(const Drawn& image, float color) {
   double sum = 0;
   for (int y = 0; y < image.height_px; ++y) {
@@ -198,7 +198,7 @@ double covered_px(const Drawn& image, float color) {
 }
 
 TEST(Invariance, TheFacesOfABoxSumToItsSilhouette) {
-  // Coverage is the share of a pixel that is not the wall behind: a white wall, and the box's red channel left out.
+  // Coverage is the share of a pixel that does not show the green wall behind, less the box's own green.
   StaticGeometry geometry;
   WallFace wall;
   wall.a_m = {30, -90, -30};
@@ -224,17 +224,17 @@ TEST(Invariance, TheFacesOfABoxSumToItsSilhouette) {
       corners.push_back({50 - 50 * ground.y / ground.x, 50 - 50 * (z - 1.5f) / ground.x});
     }
     const double silhouette_px = hull_area(corners);
-    // What the wall loses is what the faces cover.
-    double lost_px = 0;
+    // The faces cover the hidden part of the wall.
+    double hidden_px = 0;
     for (int y = 0; y < 100; ++y) {
-      for (int x = 0; x < 100; ++x) lost_px += (behind - (with.at(x, y).g - alone.at(x, y).g)) / behind;
+      for (int x = 0; x < 100; ++x) hidden_px += (behind - (with.at(x, y).g - alone.at(x, y).g)) / behind;
     }
-    EXPECT_NEAR(lost_px, silhouette_px, kSilhouetteError * silhouette_px) << i;
+    EXPECT_NEAR(hidden_px, silhouette_px, kSilhouetteError * silhouette_px) << i;
   }
 }
 
 TEST(Invariance, TwoPiecesOfALineCoverWhatTheWholeLineDoes) {
-  // Brightness is by the piece, so the line lies across the view: all of it at one depth.
+  // Each piece has one brightness, so the line is across the view, at one depth.
   for (const float tilt : {0.0f, 0.05f}) {
     const Vec3 a{20, 8, 0}, b{20, -6, tilt * 14};
     StaticGeometry whole, halves;

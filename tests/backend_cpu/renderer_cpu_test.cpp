@@ -1,4 +1,4 @@
-// What the CPU renderer promises about images: invariances, rules, planes, visibility, and clear errors.
+// The CPU renderer's images by hand computation: rules, sizes, planes, visibility, and errors.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -21,7 +21,7 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(CpuRenderer, DrawsABoxWhereAHandComputesIt) {
+TEST(CpuRenderer, DrawsABoxAtHandComputedPixels) {
   // The back of a car 10 m ahead: 2 m wide, 1 m high. At 50 px/m/m: x from 50 - 5 to 50 + 5, y from 50 + 50 * 0.5/10
   // (roof, 1 m up) to 50 + 50 * 1.5/10 (ground): 52.5 to 57.5.
   const SceneOwner scene = scene_of({make_box(AgentClass::vehicle, {12, 0, 0}, 0, {4, 2, 1})});
@@ -82,7 +82,7 @@ StaticGeometry long_mark() {
   return geometry;
 }
 
-// Sum over a row of what the mark covers of each pixel.
+// Width of the mark in a row: the sum of its coverage.
 double row_coverage(const Drawn& image, int y) {
   double sum = 0;
   for (int x = 0; x < image.width_px; ++x) sum += image.at(x, y).r;
@@ -95,7 +95,7 @@ TEST(CpuRenderer, StripsTaperWithDepth) {
                            {.rig = simple_rig(200, 200, 100), .num_threads = 1, .line_floor_px = 0});
   for (const int y : {108, 112, 118}) {
     const double depth = 100 * 1.5 / (y + 0.5 - 100);
-    // Brightness is that of a piece of 10 m: within 5 m of the depth there.
+    // Brightness is that of a piece of 10 m, so of a depth at most 5 m off.
     const double expected = 0.3 * 100 / depth * kWhiteMarkColor.r;
     EXPECT_NEAR(row_coverage(image, y), expected * (1 - depth / 120), expected * 6.0 / 120) << y;
   }
@@ -122,7 +122,7 @@ TEST(CpuRenderer, TheFloorIsMeasuredAcrossTheStripOnScreen) {
   EXPECT_NEAR(covered, 0.35f, 1e-3);
 }
 
-TEST(CpuRenderer, LightsShowTheirStateToThoseInFrontAlone) {
+TEST(CpuRenderer, LightsShowTheirStateOnlyToTheFront) {
   StaticGeometry geometry = no_geometry();
   LightHead head;
   head.position_m = {20, 0, 1.5f};
@@ -154,7 +154,7 @@ TEST(CpuRenderer, LightsShowTheirStateToThoseInFrontAlone) {
   EXPECT_NEAR(area / fade, kPi * 3.75 * 3.75, 1e-3);
 }
 
-TEST(CpuRenderer, EgoHiddenAndUndrawnAgentsAreLeftOut) {
+TEST(CpuRenderer, EgoHiddenAndUndrawnAgentsAreNotDrawn) {
   std::vector<AgentBox> boxes{make_box(AgentClass::vehicle, {0, 0, 0}, 0, {4.5f, 2, 1.5f}),
                               make_box(AgentClass::vehicle, {10, 0, 0}, 0, {4, 2, 1.5f}),
                               make_box(AgentClass::pedestrian, {8, 3, 0}, 0, {0.6f, 0.6f, 1.7f})};
@@ -174,7 +174,7 @@ TEST(CpuRenderer, EgoHiddenAndUndrawnAgentsAreLeftOut) {
   EXPECT_EQ(draw(no_geometry(), scene, {without}, config).at(29, 52).g, 0.0f);
 }
 
-TEST(CpuRenderer, ShortBodiesCarryTheirCamerasOverThemselves) {
+TEST(CpuRenderer, CamerasOfShortBodiesMoveInward) {
   Rig rig = simple_rig();
   rig.cameras[0].position_m.x = 1.6f;
   const SceneOwner scene = scene_of({make_box(AgentClass::vehicle, {12, 0, 0}, 0, {4, 2, 1})});
@@ -240,7 +240,7 @@ TEST(CpuRenderer, HalvesAndBytesAreTheFloatsRounded) {
   for (int bits = 0; bits <= 0x3C00; ++bits) {
     const float value = from_half(static_cast<uint16_t>(bits));
     ASSERT_EQ(to_half(value), bits);
-    // Halfway between two halves goes to the even one.
+    // Ties between two halves round to even.
     if (bits == 0x3C00) break;
     const float middle = 0.5f * (value + from_half(static_cast<uint16_t>(bits + 1)));
     ASSERT_EQ(to_half(middle), bits + (bits & 1)) << bits;
@@ -265,7 +265,7 @@ TEST(CpuRenderer, HalvesAndBytesAreTheFloatsRounded) {
   }
 }
 
-TEST(CpuRenderer, PlanesTellDepthClassAndInstance) {
+TEST(CpuRenderer, PlanesHoldDepthClassAndInstance) {
   StaticGeometry geometry;
   WallFace wall;
   wall.a_m = {30, -40, 0};
@@ -307,8 +307,8 @@ TEST(CpuRenderer, PlanesTellDepthClassAndInstance) {
   check(50, 64, 50 * 1.5 / 14.5, kClassOfStrip + 3, 0);
 }
 
-TEST(CpuRenderer, VisibilityIsTheShareThatIsSeen) {
-  // A pillar of 1 m before the right half of a car's back; the same car beside it; one out of sight.
+TEST(CpuRenderer, VisibilityIsTheVisibleShare) {
+  // A pillar of 1 m in front of the right half of a car's back; the same car next to it; one outside the image.
   StaticGeometry geometry;
   WallFace wall;
   wall.a_m = {10, 0, 0};
@@ -410,7 +410,7 @@ TEST_F(CpuRendererErrors, HandlesAndIndicesOutOfRange) {
   scene_.world_begin = {0, kMaxBoxesPerWorld + 1};
   expect_error("world 0: expected at most 8192 agents, got 8193");
 }
-TEST_F(CpuRendererErrors, PosesThatAreNotNumbers) {
+TEST_F(CpuRendererErrors, PosesThatAreNotFinite) {
   views_[0].origin_m.y = std::numeric_limits<float>::quiet_NaN();
   expect_error("finite pose");
   views_[0] = make_view({}, 0);
@@ -467,7 +467,7 @@ TEST_F(CpuRendererErrors, GeometryThatIsFaulty) {
   }
 }
 
-// What is pushed wider on screen may show where the strip's own plane has passed behind the camera.
+// A widened strip may cover pixels at which the strip's plane is behind the camera.
 TEST(CpuRenderer, AWidenedStripIsInThePlanesWhereItsColourIs) {
   SyntheticTown town;
   Strip strip = {{60, -6, 1.4999f}, {62, 6, 1.49f}, {0.98f, -0.16f}, {0.98f, -0.16f}, 0.15f, kWhiteMarkColor};
@@ -482,7 +482,7 @@ TEST(CpuRenderer, AWidenedStripIsInThePlanesWhereItsColourIs) {
     const Outputs out = draw_outputs(renderer.get(), town, Planes::all);
     const std::size_t pixels = out.class_id.size();
     for (std::size_t at = 0; at < pixels; ++at) {
-      if (out.color[at] < 0.45f * strip.color.r) continue;  // not nearly all of a pixel, faded by half
+      if (out.color[at] < 0.45f * strip.color.r) continue;  // less than about a whole pixel at half brightness
       ++drawn;
       EXPECT_NE(out.class_id[at], 0) << "height " << i << ", pixel " << at;
       EXPECT_TRUE(std::isfinite(out.depth_m[at])) << "height " << i << ", pixel " << at;

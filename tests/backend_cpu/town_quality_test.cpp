@@ -1,5 +1,5 @@
-// The oracle against the truth on whole maps: CARLA's towns, with their hills and bridges, and procedural ones; agents
-// of all kinds on the move, walls and lights on.
+// The oracle against the truth on whole maps: CARLA's towns, with their hills and bridges, and procedural ones; moving
+// agents of all classes, walls and lights on.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 

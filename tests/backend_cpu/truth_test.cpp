@@ -1,5 +1,4 @@
-// The oracle against the truth in what is not colour at a size: the planes, visibility, the floor on widths, and scenes
-// that are easily drawn wrong.
+// The oracle against the truth besides colours of towns: planes, visibility, the floor on widths, and difficult scenes.
 #include <algorithm>
 #include <cmath>
 
@@ -26,7 +25,7 @@ TEST(Truth, HillsAndBridges) {
 TEST(Truth, OddSizesDownToOnePixelAndEightCamerasOfEightSizes) {
   const SyntheticTown town = make_hill();
   EXPECT_GE(quality_of(town, paper_rig(97, 55)).oracle.psnr_db(), kMinOraclePsnr_db);
-  // Everything shares the one pixel.
+  // All objects share the one pixel.
   EXPECT_LE(quality_of(town, paper_rig(1, 1)).oracle.max_error(), kWorstOracleError);
   EXPECT_GE(quality_of(town, eight_camera_rig()).oracle.psnr_db(), kMinOraclePsnr_db);
 }
@@ -78,7 +77,7 @@ PlaneDifference compare_planes(const SyntheticTown& town, const Camera& camera) 
   return difference;
 }
 
-TEST(Truth, PlanesTellOfTheSameSurfaces) {
+TEST(Truth, PlanesShowTheSameSurfaces) {
   SyntheticTown town = make_synthetic_town(11, 120);
   town.views.resize(6);
   const SyntheticTown scenes[] = {town, make_hill()};
@@ -92,7 +91,7 @@ TEST(Truth, PlanesTellOfTheSameSurfaces) {
 }
 
 TEST(Truth, NoSolidIsInFrontOfTheWrongOne) {
-  // Disjoint footprints: at every centre of a pixel that is not at an edge, the solid that the truth sees.
+  // Disjoint footprints: every pixel centre that is not on an edge must show the truth's solid.
   for (const uint64_t seed : {21, 22, 23}) {
     SyntheticTown town = make_synthetic_town(seed, 150);
     town.geometry.strips.clear();
@@ -105,7 +104,7 @@ TEST(Truth, NoSolidIsInFrontOfTheWrongOne) {
   }
 }
 
-TEST(Truth, BoxesThatIntersectShowWhereTheyDo) {
+TEST(Truth, IntersectingBoxesAreDividedWhereTheyMeet) {
   const SyntheticTown crash = make_crash();
   const Quality quality = quality_of(crash, paper_rig());
   EXPECT_LE(quality.oracle.max_error(), kWorstOracleError);
@@ -181,7 +180,7 @@ TEST(Truth, WithoutAFloorALargerImageAveragedDownIsTheSmallOne) {
   EXPECT_GE(PooledError(small, bare.rgb).psnr_db(), kMinOraclePsnr_db);
   EXPECT_GE(PooledError(large, bare.rgb).psnr_db(), kMinOraclePsnr_db);
   EXPECT_GE(PooledError(large, small).psnr_db(), kMinOraclePsnr_db);
-  // The floor is of pixels of the image, so it is another one at another size.
+  // The floor is in pixels, so it differs between sizes.
   EXPECT_LT(PooledError(drawn_down(town, camera, 16, 0.35f), drawn_down(town, camera, 1, 0.35f)).psnr_db(), 45);
 }
 

@@ -1,4 +1,4 @@
-// Libraries and contexts: what a missing library says, and that a context leaves a thread as it found it.
+// Libraries and contexts: errors for missing libraries, and contexts that restore a thread's previous one.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -31,7 +31,7 @@ TEST(GlContext, AMissingFunctionIsNamed) {
   }
 }
 
-// A renderer that draws while another context is current leaves that one current.
+// A renderer that draws while another context is current restores that one.
 template <typename Context>
 void expect_left_current(gl::Context* outer, const char* file, const char* package, const char* get_current,
                          const std::string& backend) {
@@ -56,7 +56,7 @@ TEST(GlContext, LeavesTheThreadAsItFoundIt) {
                                "gl:osmesa");
   }
   if (no_egl.empty()) {
-    // EGL answers for the API that is bound: ours is bound while a renderer of ours draws, and put back after.
+    // EGL's queries refer to the bound API: a renderer binds OpenGL while it draws and restores the previous one.
     const SharedLibrary library("gl:egl", "libEGL.so.1", "libegl1");
     const auto query_api = reinterpret_cast<unsigned (*)()>(library.function("eglQueryAPI"));
     const unsigned api = query_api();

@@ -1,4 +1,4 @@
-// What the tests of backend_gl/ share: skipping where a machine lacks a library, and drawing in float.
+// Shared by the tests of backend_gl/: skipping on machines without a library, and drawing in float.
 #pragma once
 
 #include <cstdlib>
@@ -15,7 +15,7 @@
 
 namespace pictura {
 
-/// Why a renderer cannot run here, or an empty string. A failure of the test where PICTURA_REQUIRE_GL names it.
+/// Why a renderer cannot run here, or an empty string. The test fails if PICTURA_REQUIRE_GL names the renderer.
 inline std::string missing(const std::string& backend) {
   try {
     make_renderer(backend, {});

@@ -1,5 +1,5 @@
-// The OpenGL baseline with scenes and images in device memory. Without a GPU these tests are skipped, unless
-// PICTURA_REQUIRE_GPU=1 says that there must be one.
+// The OpenGL baseline with scenes and images in device memory. Without a GPU these tests are skipped, or fail with
+// PICTURA_REQUIRE_GPU=1.
 #include <algorithm>
 
 #include <gmock/gmock.h>
@@ -26,7 +26,7 @@ class GlInterop : public testing::Test {
   }
 };
 
-// Every byte of a camera's images in device memory, `stride` bytes from view to view, 0xA5 where nothing was written.
+// Every byte of a camera's images in device memory, `stride` bytes from view to view, 0xA5 where unwritten.
 struct DeviceImages {
   DeviceBuffer<uint8_t> bytes;
   CameraImages camera;

@@ -1,4 +1,4 @@
-// The OpenGL baseline against the oracle, within the tolerances of its samples, and what else a renderer promises.
+// The OpenGL baseline against the oracle, within the tolerances of its samples, and its interface.
 #include <algorithm>
 #include <functional>
 #include <thread>
@@ -59,7 +59,7 @@ TEST_P(GlRenderer, DrawsWhatTheOracleDraws) {
   }
 }
 
-TEST_P(GlRenderer, TheTolerancesSeeFaults) {
+TEST_P(GlRenderer, TolerancesDetectFaults) {
   const SyntheticTown town = town_of(1, 8);
   const RendererConfig config{.num_threads = 1};
   const std::vector<float> oracle = draw("cpu", town.geometry, town.scene, town.views, config);
@@ -80,7 +80,7 @@ TEST_P(GlRenderer, TheTolerancesSeeFaults) {
     };
     EXPECT_LT(sampled_db(town.geometry, town.scene, shifted), quality.min_psnr_db);
     EXPECT_LT(sampled_db(town.geometry, halted, tinted), quality.min_psnr_db);
-    // What concerns thin lines alone is lost in the noise of few samples.
+    // With few samples, errors of thin lines are below the noise.
     if (quality.min_psnr_db < kMinGlPsnr2x2_db) continue;
     EXPECT_LT(sampled_db(town.geometry, town.scene, without_floor), quality.min_psnr_db);
     if (quality.min_psnr_db < kMinGlPsnr8x8_db) continue;
@@ -95,7 +95,7 @@ TEST_P(GlRenderer, AnySizeAndMixedRigs) {
   config.rig.cameras[1].pitch_rad = -0.2f;
   config.rig.cameras[1].roll_rad = 0.3f;
   config.rig.cameras[2] = paper_rig(1, 1).cameras[2];
-  config.rig.cameras[3].focal_x_px *= 0.5f;  // of the first one's size, and another projection
+  config.rig.cameras[3].focal_x_px *= 0.5f;  // the first one's size with another projection
   config.rig.cameras[3].center_y_px += 7.25f;
   config.samples.grid = 8;
   RendererConfig exact = config;
@@ -115,8 +115,8 @@ TEST_P(GlRenderer, RoadsOnTwoLevels) {
             kMinGlPsnr8x8_db);
 }
 
-TEST_P(GlRenderer, BoxesThatDipIntoARoadLieOverItsStrips) {
-  // As upright boxes do on slopes. The strip that the car stands on reaches out to the camera.
+TEST_P(GlRenderer, BoxesThatDipIntoARoadAreInFrontOfItsStrips) {
+  // As upright boxes do on slopes. The strip under the car extends towards the camera.
   StaticGeometry geometry;
   add_polyline(&geometry, {{2, 0.3f, 0}, {12, 0.3f, 0}}, 0.8f, StripKind::lane_mark);
   geometry.build_grids();
@@ -130,8 +130,8 @@ TEST_P(GlRenderer, BoxesThatDipIntoARoadLieOverItsStrips) {
             kMinGlPsnr8x8_db);
 }
 
-// How many pixels of a patch of road are not of the strip that lies on top of all, where the first `count` of five
-// cover it, 2 to 10 m ahead at height z. The image shows so many others beside them.
+// Number of pixels of a patch of road that do not show the topmost strip, where the first `count` of five strips cover
+// it, 2 to 10 m ahead at height z. The image shows `others` further strips elsewhere.
 int wrong_pixels(const std::string& backend, int count, float z, int others) {
   const StripKind kinds[] = {StripKind::road_edge, StripKind::lane_mark, StripKind::lane_mark, StripKind::crosswalk,
                              StripKind::stop_line};
@@ -156,16 +156,16 @@ int wrong_pixels(const std::string& backend, int count, float z, int others) {
     for (int x = 45; x < 55; ++x) {
       const auto pixel = static_cast<std::size_t>(100 * y + x);
       const float r = image[pixel], g = image[pixel + 10000], b = image[pixel + 20000];
-      // Compared by hue: pieces fade by their distance.
+      // Compared by hue, because pieces fade with distance.
       wrong += r == 0 || std::abs(r * top.g - g * top.r) > 1e-3f || std::abs(b * top.g - g * top.b) > 1e-3f;
     }
   }
   return wrong;
 }
 
-TEST_P(GlRenderer, StripsOfOneLevelLieOverEachOtherByKindThenIndex) {
-  // At heights of which each rounds differently, the last two above the camera; the more strips an image shows, the
-  // less parts them.
+TEST_P(GlRenderer, StripsOfOneLevelAreOrderedByKindThenIndex) {
+  // At heights with different rounding, the last two above the camera; the more strips an image shows, the smaller
+  // their depth offsets.
   for (const int others : {0, 2000}) {
     for (const float z : {0.0f, 0.1f, -0.3f, 1.0f / 3, 3.0f, 3.1f}) {
       for (int count = 1; count <= 5; ++count) {
@@ -176,7 +176,7 @@ TEST_P(GlRenderer, StripsOfOneLevelLieOverEachOtherByKindThenIndex) {
 }
 
 TEST_P(GlRenderer, BatchesLargerThanAnArrayAreTheSameImages) {
-  // More images of a size than OpenGL promises layers (2048), in two cameras: arrays end within a camera's views.
+  // More images of one size than OpenGL's guaranteed layers (2048), in two cameras: arrays end within a camera's views.
   const SyntheticTown town = town_of(3, 16);
   RendererConfig config{.rig = paper_rig(3, 2), .num_threads = 1};
   config.rig.cameras.resize(2);
@@ -192,7 +192,7 @@ TEST_P(GlRenderer, BatchesLargerThanAnArrayAreTheSameImages) {
   }
 }
 
-TEST_P(GlRenderer, ImagesOfMoreWordsThanOpenGlPromisesInvocationsAreWhole) {
+TEST_P(GlRenderer, ImagesLargerThanTheInvocationLimitAreComplete) {
   StaticGeometry geometry;
   geometry.walls.push_back({{20, -60, -30}, {20, 60, -30}, 60});
   geometry.build_grids();
@@ -225,7 +225,7 @@ TEST_P(GlRenderer, BytesAreTheRoundedColors) {
     renderer->upload(0, town.geometry);
     const std::vector<uint8_t> bytes = draw_bytes(renderer.get(), town, town.views);
     ASSERT_EQ(bytes.size(), colors.size());
-    // Samples are rounded before they are averaged, and the mean after; drivers round to within 0.6 of a step.
+    // Samples are rounded before averaging, and the mean afterwards; drivers round to within 0.6 of a step.
     const float most = samples.grid > 1 ? 1.1f : 0.6f;
     for (std::size_t i = 0; i < bytes.size(); ++i) {
       ASSERT_NEAR(bytes[i], 255 * colors[i], most + 1e-3f) << "value " << i;
@@ -243,7 +243,7 @@ TEST_P(GlRenderer, RenderersAreIndependent) {
   const auto expected = alone(GetParam(), town, {}), expected_other = alone(GetParam(), other_town, {.grid = 2});
   const auto first = make_renderer(GetParam(), {.num_threads = 1});
   const auto second = make_renderer(GetParam(), {.num_threads = 1, .samples = {.grid = 2}});
-  // Of another library, if this machine has it.
+  // From another library, if installed.
   const std::string other = std::string(GetParam()) == "gl:egl" ? "gl:osmesa" : "gl:egl";
   const auto third = missing(other).empty() ? make_renderer(other, {.num_threads = 1}) : nullptr;
   first->upload(0, town.geometry);
@@ -256,7 +256,7 @@ TEST_P(GlRenderer, RenderersAreIndependent) {
   }
 }
 
-TEST_P(GlRenderer, ServesOneThreadAfterTheOther) {
+TEST_P(GlRenderer, CanBeUsedByOneThreadAfterAnother) {
   const SyntheticTown town = town_of(1, 4);
   const auto renderer = make_renderer(GetParam(), {.num_threads = 1});
   renderer->upload(0, town.geometry);
@@ -264,7 +264,7 @@ TEST_P(GlRenderer, ServesOneThreadAfterTheOther) {
   std::vector<uint8_t> there;
   std::thread([&] { there = draw_bytes(renderer.get(), town, town.views); }).join();
   EXPECT_EQ(there, here);
-  // A smaller batch, and then the old one, through memory that has grown.
+  // A smaller batch, and then the first one again, in memory that has grown.
   const std::vector<View> fewer(town.views.begin(), town.views.begin() + 1);
   const std::vector<uint8_t> first = draw_bytes(renderer.get(), town, fewer);
   EXPECT_TRUE(std::equal(first.begin(), first.end(), here.begin()));
@@ -292,7 +292,7 @@ void expect_error(const std::function<void()>& call, const std::string& part) {
   }
 }
 
-TEST_P(GlRenderer, RefusesByNameWhatItDoesNotOffer) {
+TEST_P(GlRenderer, RejectsUnsupportedFeaturesByName) {
   const std::string name = GetParam();
   const SyntheticTown town = town_of(1, 1);
   const auto renderer = make_renderer(name, {.num_threads = 1});
@@ -326,7 +326,7 @@ TEST(GlNames, AnUnknownOneListsAll) {
   expect_error([] { make_renderer("gl:glx", {}); }, "gl, gl:egl, gl:osmesa");
 }
 
-TEST(GlNames, OthersTakeNoSamples) {
+TEST(GlNames, OtherBackendsTakeNoSamples) {
   expect_error([] { make_renderer("cpu", {.samples = {.grid = 4}}); }, "renderer cpu: samples: only gl takes samples");
 }
 
@@ -338,7 +338,7 @@ TEST(GlNames, GlSaysWhichContextItTook) {
   EXPECT_EQ(renderer->name(), missing("gl:egl").empty() ? "gl:egl" : "gl:osmesa");
 }
 
-TEST(GlNames, OsmesaDrawsInHostMemoryAlone) {
+TEST(GlNames, OsmesaDrawsOnlyInHostMemory) {
   expect_error([] { make_renderer("gl:osmesa", {.device = {MemorySpace::cuda, 0}}); },
                "renderer gl:osmesa: draws in host");
 }

@@ -1,4 +1,4 @@
-// What the comparison with the oracle sees, and what it lets pass.
+// Differences that the comparison with the oracle detects, and those within tolerance.
 #include "pictura/bench/image_error.h"
 
 #include <cmath>
@@ -14,7 +14,7 @@ namespace {
 
 const Rig kRig = front_rig(8, 8);
 
-// The error of images that are black but for the first bytes of one of them.
+// The error of two black images, of which one has other first bytes.
 template <typename Value>
 ImageError error_with(PixelFormat format, Value first_value) {
   HostImages actual(kRig, 1, format);
@@ -23,7 +23,7 @@ ImageError error_with(PixelFormat format, Value first_value) {
   return compare_image(actual.camera(0), expected.camera(0), format, 0);
 }
 
-TEST(ImageError, WhatIsNoFiniteNumberIsInfinitelyOff) {
+TEST(ImageError, NonFiniteValuesHaveInfiniteError) {
   const float infinite = std::numeric_limits<float>::infinity();
   for (const ImageError& error : {error_with(PixelFormat::f32, std::nanf("")), error_with(PixelFormat::f32, infinite),
                                   error_with(PixelFormat::f16, uint16_t{0x7E00}),     // NaN
@@ -45,7 +45,7 @@ TEST(ImageError, EachFormatIsReadInItsOwnUnits) {
   EXPECT_EQ(error_with(PixelFormat::f16, uint16_t{0x8000}).differing, 0);           // -0
 }
 
-TEST(ImageError, WhatIsNotDrawnShowsInEveryFormatAndPlane) {
+TEST(ImageError, UnwrittenValuesAreDetectedInEveryFormatAndPlane) {
   for (const PixelFormat format : {PixelFormat::u8, PixelFormat::f16, PixelFormat::f32}) {
     HostImages actual(kRig, 2, format, Planes::all), expected(kRig, 2, format, Planes::all);
     fill_unwritten(actual.batch());
@@ -58,7 +58,7 @@ TEST(ImageError, WhatIsNotDrawnShowsInEveryFormatAndPlane) {
   }
 }
 
-TEST(ImageError, PlanesTellOfTheSameSurfaceOrNot) {
+TEST(ImageError, PlanesAreComparedBySurface) {
   const float infinite = std::numeric_limits<float>::infinity();
   HostImages actual(kRig, 2, PixelFormat::u8, Planes::all), expected(kRig, 2, PixelFormat::u8, Planes::all);
   const CameraImages &drawn = actual.camera(0), &wanted = expected.camera(0);

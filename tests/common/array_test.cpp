@@ -1,4 +1,4 @@
-// Arrays at public interfaces: their text, and what is refused by name.
+// Arrays at public interfaces: their description, and errors that name them.
 #include "pictura/common/array.h"
 
 #include <gmock/gmock.h>
@@ -31,7 +31,7 @@ TEST(Array, StridesFollowTheShape) {
   EXPECT_EQ(array.shape.count(), 24);
 }
 
-TEST(Array, RefusesByName) {
+TEST(Array, RejectsByName) {
   std::vector<float> values(8);
   const Array array = values;
   auto refused = [&](auto element, Dims shape, Device device) {

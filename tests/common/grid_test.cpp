@@ -1,4 +1,4 @@
-// The uniform grid against a brute-force look-up.
+// The uniform grid against brute-force search.
 #include "pictura/common/grid.h"
 
 #include <limits>
@@ -43,7 +43,7 @@ TEST(Grid, OfNothingIsEmpty) {
   EXPECT_EQ(grid.view().items.size(), 0u);
 }
 
-TEST(Grid, RefusesWhatCannotBeIndexed) {
+TEST(Grid, RejectsWhatCannotBeIndexed) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const std::vector<Aabb2> bad{{{0, 0}, {nan, 1}}};
   EXPECT_THROW(Grid(bad, 5.0f), Error);

@@ -1,4 +1,4 @@
-// Our own transcendental functions against libm in double, over the ranges that their comments promise.
+// pictura's transcendental functions against libm in double, over their documented ranges.
 #include "pictura/common/math.h"
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// Our Philox against Random123's, and what streams promise.
+// pictura's Philox against Random123's, and properties of streams.
 #include "pictura/common/rng.h"
 
 #include <set>

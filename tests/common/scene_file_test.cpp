@@ -1,4 +1,4 @@
-// Scenes as text: what each table becomes, and what bad files get.
+// Scene files: each table, and errors for bad files.
 #include "pictura/common/scene_file.h"
 
 #include <filesystem>
@@ -125,7 +125,7 @@ TEST(SceneFile, LinesByStyleAndColor) {
   EXPECT_EQ(line("kind = 'crosswalk'\nclosed = true\npoints_m = [[0, 0], [3, 0], [3, 3]]\n").size(), 3u);
 }
 
-TEST(SceneFile, BadFilesAreRefusedWithTheirLine) {
+TEST(SceneFile, BadFilesAreRejectedWithTheirLine) {
   EXPECT_THAT(message_of("[[view\n"), HasSubstr("s.toml:1: "));
   EXPECT_THAT(message_of(""), HasSubstr("expected one or more [[view]] tables"));
   EXPECT_THAT(message_of("sky = 1\n" + kView), HasSubstr("s.toml:1: unknown key 'sky'"));
@@ -164,13 +164,13 @@ TEST(SceneFile, BadFilesAreRefusedWithTheirLine) {
   EXPECT_THAT(message_of("size_px = [0, 8]\n" + kView), HasSubstr("size_px: expected an integer in [1, 8192], got 0"));
   EXPECT_THAT(message_of("[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = 9\nzoom = 2\n" + kView),
               HasSubstr("s.toml:5: camera 0 'camera0': unknown key 'zoom'"));
-  // A line that would be cut into millions of pieces is refused before it is.
+  // A line of millions of pieces is rejected before it is divided.
   std::string zigzag = kView + "[[line]]\nkind = 'lane_mark'\nwidth_m = 0.1\npoints_m = [";
   for (int i = 0; i < 50; ++i) zigzag += "[-9000, 0], [9000, 0], ";
   EXPECT_THAT(message_of(zigzag + "]\n"), HasSubstr("points_m: expected at most 100000 m of line"));
 }
 
-TEST(SceneFile, ARigFileIsFoundBesideTheScene) {
+TEST(SceneFile, ARigFileIsFoundInTheScenesFolder) {
   const test::ScratchFolder folder;
   std::filesystem::create_directory(folder / "rigs");
   write_file(folder / "rigs/one.toml", "[[camera]]\nname = 'one'\nwidth_px = 8\nheight_px = 4\nfocal_px = 9\n");

@@ -39,7 +39,7 @@ TEST(Strips, RepeatedPointsAreSkippedAndSharpTurnsBounded) {
   EXPECT_THROW(append_strips(single, 0.2f, kWhiteMarkColor, StripKind::lane_mark, &strips), Error);
 }
 
-TEST(Strips, AreFiledUnderTheBoxAroundTheirCorners) {
+TEST(Strips, AreStoredByTheBoxAroundTheirCorners) {
   // A straight end, a right angle, and a turn by 150 degrees.
   const std::vector<Vec3> points{{0, 0, 0}, {8, 0, 0}, {8, 6, 0}, {5.5f, 1.67f, 0}};
   std::vector<Strip> strips;
@@ -71,7 +71,7 @@ TEST(Renderers, AnUnknownNameListsTheKnownOnes) {
   }
 }
 
-TEST(Renderers, AutoSaysWhatItChose) {
+TEST(Renderers, AutoReportsItsChoice) {
   std::string choice;
   EXPECT_NE(make_renderer("auto", {}, &choice), nullptr);
   EXPECT_THAT(choice, testing::ContainsRegex("^(cpu|cuda): "));

@@ -1,4 +1,4 @@
-// Pictures and films for people: facts about single pixels, sizes and files.
+// Pictures and videos for people: single pixels, sizes and files.
 #include "pictura/drawing/drawing.h"
 
 #include <algorithm>
@@ -58,7 +58,7 @@ int count(const RgbImage& image, Pixel wanted) {
   return found;
 }
 
-// As the palette has them: a vehicle's back and front, and a cyclist's back.
+// From the palette: a vehicle's back and front, and a cyclist's back.
 constexpr Pixel kVehicleBody{76, 201, 240}, kVehicleMark{247, 37, 133}, kCyclistBody{251, 133, 0};
 constexpr Pixel kGround{238, 240, 232};
 
@@ -79,9 +79,9 @@ AgentBox box(float x, float y, float heading, AgentClass agent_class = AgentClas
   return agent;
 }
 
-TEST(WorldPainter, PutsABoxWhereItBelongs) {
+TEST(WorldPainter, DrawsABoxAtItsPosition) {
   WorldPainter painter(town(), 400, 300);
-  const std::vector<AgentBox> agents{box(500, 400, 0)};  // far out, on plain ground
+  const std::vector<AgentBox> agents{box(500, 400, 0)};  // away from all roads
   WorldFrame frame;
   frame.agents = agents;
   // 10 px a metre, the box's centre in the middle of the picture.
@@ -100,7 +100,7 @@ TEST(WorldPainter, PutsABoxWhereItBelongs) {
   EXPECT_NEAR(wide_px, 20, 2);
 }
 
-TEST(WorldPainter, HeadsCountCounterClockwiseFromEast) {
+TEST(WorldPainter, HeadingsAreCounterClockwiseFromEast) {
   WorldPainter painter(town(), 300, 300);
   const std::vector<AgentBox> agents{box(500, 400, kHalfPi)};
   WorldFrame frame;
@@ -111,7 +111,7 @@ TEST(WorldPainter, HeadsCountCounterClockwiseFromEast) {
   EXPECT_EQ(at(image, 150 + 15, 150), kGround);
 }
 
-TEST(WorldPainter, PlacesLandWherePixelOfSays) {
+TEST(WorldPainter, PixelOfIsTheDrawnPosition) {
   WorldPainter painter(town(), 320, 200);
   const TopCamera camera = painter.around({510, 410}, 64);  // 5 px a metre
   const Vec2 p = painter.pixel_of(camera, {520, 420});
@@ -123,7 +123,7 @@ TEST(WorldPainter, PlacesLandWherePixelOfSays) {
   EXPECT_EQ(at(painter.draw(frame, camera), p - Vec2{6, 0}), kCyclistBody);
 }
 
-TEST(WorldPainter, DrawsNobodyWhoIsAbsentAndDimsTheHalted) {
+TEST(WorldPainter, SkipsAbsentAgentsAndDimsHaltedOnes) {
   WorldPainter painter(town(), 400, 300);
   std::vector<AgentBox> agents{box(500, 400, 0), box(500, 405, 0), box(500, 395, 0), box(510, 400, 0)};
   agents[3].drawn = 0;
@@ -145,7 +145,7 @@ TEST(WorldPainter, DrawsNobodyWhoIsAbsentAndDimsTheHalted) {
   EXPECT_THAT(test::message_of([&] { painter.draw(frame, painter.whole_map()); }), HasSubstr("4 agents, got 3"));
 }
 
-TEST(WorldPainter, RingsSayWhyAgentsHaltedAndTheLegendCountsThem) {
+TEST(WorldPainter, RingsShowHaltReasonsAndTheLegendCountsThem) {
   WorldPainter painter(town(), 800, 600);
   const std::vector<AgentBox> agents{box(500, 400, 0), box(510, 400, 0), box(500, 410, 0), box(510, 410, 0)};
   const auto active = static_cast<uint8_t>(AgentStatus::active), halted = static_cast<uint8_t>(AgentStatus::halted);
@@ -166,7 +166,7 @@ TEST(WorldPainter, RingsSayWhyAgentsHaltedAndTheLegendCountsThem) {
   EXPECT_EQ(ring(2), kGround);
   EXPECT_LT(distance(ring(3), off_road), 20);
   EXPECT_EQ(count(image, wall), 100) << "in the legend alone, a square of 10 px";
-  // Another count is another legend; the digits stand in its bottom left corner.
+  // Other counts change the legend; its digits are in the bottom left corner.
   reasons[1] = kEventCollision;
   const RgbImage more = painter.draw(frame, camera);
   int different = 0;
@@ -178,7 +178,7 @@ TEST(WorldPainter, RingsSayWhyAgentsHaltedAndTheLegendCountsThem) {
   EXPECT_THAT(test::message_of([&] { painter.draw(frame, camera); }), HasSubstr("4 agents, got 0 and 4"));
 }
 
-TEST(WorldPainter, WallsStandOnTheGround) {
+TEST(WorldPainter, DrawsWalls) {
   WorldPainter painter(town(), 400, 300, {{{490, 400, 0}, {510, 400, 0}, 5}});
   const TopCamera camera = painter.around({500, 400}, 40);
   const RgbImage image = painter.draw({}, camera);
@@ -203,8 +203,8 @@ TEST(WorldPainter, LinesLeadToGoals) {
   EXPECT_EQ(at(image, goal - Vec2{0, 10}), kGround) << "beyond";
 }
 
-TEST(WorldPainter, MovingTheCameraMovesThePictureAndNothingElse) {
-  // 8 px a metre, so that 16 m are 128 px and the cached tiles are cut elsewhere.
+TEST(WorldPainter, MovingTheCameraOnlyShiftsThePicture) {
+  // 8 px a metre, so that 16 m are 128 px and the cached tiles are cropped differently.
   WorldPainter painter(town(), 640, 480), fresh(town(), 640, 480);
   const Vec2 middle = town().points_of(town().lanes[0])[0].position_m.xy();
   const RgbImage a = painter.draw({}, painter.around(middle, 80));
@@ -214,7 +214,7 @@ TEST(WorldPainter, MovingTheCameraMovesThePictureAndNothingElse) {
     for (int x = 0; x < 640 - 128; ++x) different += at(a, x + 128, y) != at(b, x, y);
   }
   EXPECT_EQ(different, 0);
-  EXPECT_GT(static_cast<int>(a.rgb.size()) / 3 - count(a, kGround), 5000);  // there is something to see
+  EXPECT_GT(static_cast<int>(a.rgb.size()) / 3 - count(a, kGround), 5000);  // not an empty picture
   EXPECT_EQ(fresh.draw({}, fresh.around(middle + Vec2{16, 0}, 80)).rgb, b.rgb);
   // Another scale, and back.
   painter.draw({}, painter.whole_map());
@@ -257,7 +257,7 @@ TEST(WorldPainter, LightsShowTheirState) {
   EXPECT_THAT(test::message_of([&] { painter.draw(frame, painter.whole_map()); }), HasSubstr("1 lights, got 2"));
 }
 
-TEST(WorldPainter, RefusesSizesOutOfRange) {
+TEST(WorldPainter, RejectsSizesOutOfRange) {
   EXPECT_THROW(WorldPainter(town(), 10, 300), Error);
   EXPECT_THROW(WorldPainter(town(), 400, 10000), Error);
   EXPECT_THROW(WorldPainter(RoadMap{}, 400, 300), Error);
@@ -313,7 +313,7 @@ class StillSimulator final : public Simulator {
   std::vector<AgentBox> agents_;
   std::vector<int32_t> world_begin_, light_begin_;
   std::vector<LightState> lights_;
-  // Only slot 2 has waypoints to show, of which the first is passed.
+  // Only slot 2 has waypoints, and has passed the first.
   std::vector<uint8_t> status_{0, 0, 0, 1};
   std::vector<uint8_t> halt_reason_{0, 0, 0, kEventWall};
   std::vector<int32_t> next_waypoint_{0, 0, 1, 0};
@@ -366,11 +366,11 @@ RoadMap one_road() {
   return parse_opendrive(test::file_of(road.text()), "one_road");
 }
 
-/// A picture of the 80 m x 30 m about the middle of one_road(), and where its places are.
+/// A picture of the 80 m x 30 m around the middle of one_road(), and the pixels of its points.
 struct Closeup {
   explicit Closeup(const RoadMap& road_map)
       : map(road_map), image(draw_map(map, {.size_px = 800, .box = FileBox{1010, 485, 1090, 515}})) {}
-  /// As draw_map lays it out: margins of 28 px and a strip of 36 px below, at half of its 1600 px.
+  /// The layout of draw_map: margins of 28 px and a strip of 36 px below, at half of its 1600 px.
   Pixel at_m(float x_m, float y_m) const {
     constexpr float kPxPerM = (800 - 28) / 80.0f;
     return at(image,
@@ -389,7 +389,7 @@ TEST(DrawMap, ShowsAPartInFileCoordinates) {
   const Pixel driving{91, 97, 107}, edge{200, 49, 47};
   EXPECT_EQ(closeup.at_m(30, -1.0f), driving);
   EXPECT_EQ(closeup.at_m(30, -3.4f), driving);
-  // Lines of a pixel or two, between other colours.
+  // Lines of one or two pixels, between other colours.
   EXPECT_LT(distance(closeup.at_m(30, -4), edge), 80);
   EXPECT_LT(distance(closeup.at_m(30, 0), edge), 80);
   EXPECT_EQ(closeup.at_m(30, -4.6f), kGround);
@@ -399,7 +399,7 @@ TEST(DrawMap, ShowsAPartInFileCoordinates) {
   EXPECT_GT(white, 10) << "arrows along the lane";
 }
 
-TEST(DrawMap, HeadsShowWhereTheyFaceAndHowWide) {
+TEST(DrawMap, HeadsShowTheirDirectionAndAngle) {
   RoadMap map = one_road();
   TrafficLight light;
   light.stop_a_m = {60, 0, 0};
@@ -443,7 +443,7 @@ TEST(DrawMap, ShowsSignsPaintAndBuildingLines) {
   EXPECT_NEAR(full.at_m(60, -1).b, violet.b, 15);
 }
 
-TEST(DrawMap, TheSvgHasTheSameSizeAndIsWhole) {
+TEST(DrawMap, TheSvgHasTheSameSizeAndIsComplete) {
   const ScratchFolder folder;
   draw_map_svg(town(), folder / "map.svg", {.size_px = 700});
   const RgbImage image = draw_map(town(), {.size_px = 700});
@@ -457,7 +457,7 @@ TEST(DrawMap, TheSvgHasTheSameSizeAndIsWhole) {
   EXPECT_THAT(test::message_of([] { draw_map_svg(town(), "/nonexistent/a/map.svg"); }), HasSubstr("/nonexistent/a/"));
 }
 
-TEST(DrawMap, RefusesPartsThatShowNothing) {
+TEST(DrawMap, RejectsEmptyParts) {
   const RoadMap map = one_road();
   const auto message = [&](FileBox box) { return test::message_of([&] { draw_map(map, {.box = box}); }); };
   EXPECT_THAT(message({1090, 485, 1010, 515}), HasSubstr("expected a box of 1 to 1000000 m"));
@@ -467,7 +467,7 @@ TEST(DrawMap, RefusesPartsThatShowNothing) {
   EXPECT_THAT(message({0, 500, 900, 515}), HasSubstr("which lies in (998, 496) to (1102, 500)"));
 }
 
-TEST(DrawMap, RefusesWhatCannotBeDrawn) {
+TEST(DrawMap, RejectsWhatCannotBeDrawn) {
   EXPECT_THROW(draw_map(town(), {.size_px = 63}), Error);
   EXPECT_THROW(draw_map(town(), {.size_px = 20000}), Error);
   EXPECT_THAT(test::message_of([] { draw_map(RoadMap{}, {.size_px = 300}); }), HasSubstr("nothing to draw"));
@@ -505,7 +505,7 @@ TEST(ContactSheet, EnlargesEveryPixelWithoutSmoothing) {
   EXPECT_THROW(contact_sheet(images, rig, {}), Error);
 }
 
-TEST(Figure, PanelsStandInRowsOfThreeOverTheirCaptions) {
+TEST(Figure, PanelsAreInRowsOfThreeAboveTheirCaptions) {
   HostImages images(paper_rig(8, 6), 1);
   static_cast<uint8_t*>(images.camera(0).data)[0] = 255;  // the corner is red
   const RgbImage panel = captioned(images, 0, 0, "(a) a corner");
@@ -575,7 +575,7 @@ TEST(Plots, DrawSeriesWithGapsInPanels) {
   EXPECT_EQ(whole.width_px, 560 + 12);
   const int drawn = count(whole, blue);
   EXPECT_GT(drawn, 300);
-  // The flat middle third goes.
+  // The flat middle third is a gap.
   panel.series[0].y = {0, 1, nan, 0};
   const int with_gap = count(draw_plots({panel}), blue);
   EXPECT_LT(with_gap, 0.7 * drawn);
@@ -601,7 +601,7 @@ TEST(Plots, DrawSeriesWithGapsInPanels) {
   EXPECT_THROW(draw_plots_png({PlotPanel{}}, "/nonexistent/a/plot.png"), Error);
 }
 
-// ---- film
+// ---- video
 
 RgbImage solid(int width, int height, Pixel color) {
   RgbImage image{width, height, std::vector<uint8_t>(static_cast<size_t>(3 * width * height))};
@@ -626,7 +626,7 @@ bool has_ffmpeg() { return std::system("ffmpeg -version > /dev/null 2>&1 && ffpr
 
 bool has_children() { return !(waitpid(-1, nullptr, WNOHANG) < 0 && errno == ECHILD); }
 
-TEST(Video, HoldsTheFramesThatWereGiven) {
+TEST(Video, ContainsTheGivenFrames) {
   if (!has_ffmpeg()) GTEST_SKIP() << "no ffmpeg and ffprobe on this machine";
   const ScratchFolder folder;
   for (const std::string ending : {"mp4", "gif"}) {
@@ -664,7 +664,7 @@ TEST(Video, OddSidesLoseTheirLastPixel) {
             "64,46,yuv420p\n");
 }
 
-TEST(Video, RefusesBadPathsAndFrames) {
+TEST(Video, RejectsBadPathsAndFrames) {
   if (!has_ffmpeg()) GTEST_SKIP() << "no ffmpeg and ffprobe on this machine";
   EXPECT_THAT(test::message_of([] { VideoWriter("/nonexistent/a/film.mp4", 64, 48, 10); }),
               HasSubstr("/nonexistent/a/film.mp4"));
@@ -683,7 +683,7 @@ TEST(Video, RefusesBadPathsAndFrames) {
   EXPECT_FALSE(has_children());
 }
 
-TEST(Video, SaysThatFfmpegIsMissing) {
+TEST(Video, ReportsThatFfmpegIsMissing) {
   const ScratchFolder folder, empty;
   const EnvironmentVariable path("PATH", empty.path());
   const std::string message = test::message_of([&] { VideoWriter(folder / "film.mp4", 64, 48, 10); });
@@ -691,7 +691,7 @@ TEST(Video, SaysThatFfmpegIsMissing) {
   EXPECT_EQ(folder.num_entries(), 0u);
 }
 
-TEST(Video, PassesOnWhatFfmpegSaidLast) {
+TEST(Video, ReportsFfmpegsLastLine) {
   const ScratchFolder folder, programs;
   {
     std::ofstream script(programs / "ffmpeg");
@@ -702,7 +702,7 @@ TEST(Video, PassesOnWhatFfmpegSaidLast) {
   const std::string file = folder / "film.mp4";
   const std::string message = test::message_of([&] {
     VideoWriter video(file, 640, 480, 10);
-    // More than any socket holds: the writer must meet the closed end, and live.
+    // More than any socket buffers, so that the writer must handle the closed end.
     for (int i = 0; i < 30; ++i) video.add(solid(640, 480, {0, 0, 0}));
     video.finish();
   });

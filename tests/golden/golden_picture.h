@@ -1,4 +1,4 @@
-// A scene's images as one picture, and how far two pictures are apart.
+// A scene's images as one picture, and the difference of two pictures.
 #pragma once
 
 #include <string>
@@ -13,16 +13,16 @@ namespace pictura {
 /// Channel values in [0, 1] of all images of a scene: [views x cameras][3 x height x width].
 using Drawing = std::vector<std::vector<float>>;
 
-/// Draws with a backend that reads and writes host memory, in bytes or in floats.
+/// Draws with a backend that uses host memory, in bytes or in floats.
 Drawing draw_scene(Renderer* renderer, const SceneFile& scene, PixelFormat format);
 
 /// The truth's images of the scene.
 Drawing trace_scene(const SceneFile& scene);
 
-/// Rows of views, columns of cameras, grey between and beside them.
+/// Rows of views, columns of cameras, grey in the gaps.
 RgbImage to_picture(const SceneFile& scene, const Drawing& drawing);
 
-/// The images of a picture that to_picture() made. Throws Error when its size is not what the scene asks for.
+/// The images of a picture made by to_picture(). Throws Error if its size does not match the scene.
 Drawing from_picture(const SceneFile& scene, const RgbImage& picture);
 
 /// |a - b| times eight.
@@ -34,7 +34,7 @@ RgbImage enlarged(const RgbImage& picture);
 /// Pools the error over all images.
 PooledError error_of(const Drawing& actual, const Drawing& expected);
 
-/// Why the error is not within the tolerance, or empty.
+/// Why the error exceeds the tolerance, or empty.
 std::string complaint(const PooledError& error, const ImageTolerance& tolerance);
 
 }  // namespace pictura

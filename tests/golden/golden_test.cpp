@@ -1,7 +1,7 @@
-// Golden images: each scene of this folder, drawn by a backend, against its PNG, which the oracle drew; and the oracle
-// against the truth.
+// Golden images: each scene of this folder, drawn by a backend, against its PNG by the oracle; and the oracle against
+// the truth.
 //   golden_test [--backend NAME] [--out DIR] [GoogleTest's options]
-//   golden_test --update     draws the pictures anew, with the oracle
+//   golden_test --update     redraws the pictures with the oracle
 // A failure writes DIR/SCENE_{expected,actual,difference}.png, enlarged, the difference with eightfold contrast.
 #include <algorithm>
 #include <cmath>
@@ -48,8 +48,8 @@ const ImageTolerance& tolerance_of(const std::string& backend, const std::string
   fail_usage("--backend {}: no tolerance for it in bench/truth/tolerances.h", backend);
 }
 
-/// A renderer for the scene with the backend of the command line, or null and why there is none here. A failure where
-/// PICTURA_REQUIRE_GPU=1 or PICTURA_REQUIRE_GL says that there must be one.
+/// A renderer for the scene with the backend of the command line, or null and the reason. Null is a failure if
+/// PICTURA_REQUIRE_GPU=1 or PICTURA_REQUIRE_GL requires the backend.
 std::unique_ptr<Renderer> backend_for(const SceneFile& scene, std::string* why_not_out) {
   RendererConfig config = scene.config;
   config.num_threads = 1;
@@ -119,8 +119,8 @@ TEST_P(Golden, LooksLikeTheTruth) {
 
 TEST(GoldenFolder, EveryPictureHasItsScene) { EXPECT_EQ(golden_names(".png"), golden_names(".toml")); }
 
-// Faults that a renderer could have, put into the scene that the oracle draws. Every tolerance must tell each of them
-// from the sound picture; a tolerance that does not is too wide to protect anything.
+// Possible faults of a renderer, put into the scene that the oracle draws. Each must exceed every tolerance against the
+// correct picture; a tolerance that accepts one is too wide.
 struct Fault {
   const char *what, *scene;
   std::function<void(SceneFile*)> seed;
@@ -129,7 +129,7 @@ struct Fault {
 const std::vector<Fault>& faults() {
   static const std::vector<Fault> all{
       {"a box 10 cm to the side", "vehicles", [](SceneFile* s) { s->scene.agents[0].center_m.y += 0.1f; }},
-      {"front for back", "vehicles",
+      {"front and back swapped", "vehicles",
        [](SceneFile* s) {
          s->scene.agents[0].cos_heading *= -1;
          s->scene.agents[0].sin_heading *= -1;
@@ -145,21 +145,21 @@ const std::vector<Fault>& faults() {
        [](SceneFile* s) {
          for (Strip& strip : s->geometry.strips) strip.width_m *= 2;
        }},
-      {"a strip of the wrong kind, drawn under another", "road_lines",
+      {"strips of one level in the wrong order", "road_lines",
        [](SceneFile* s) { s->geometry.strips.back().kind = StripKind::road_edge; }},
       {"green for red", "lights", [](SceneFile* s) { s->scene.light_states[1] = LightState::green; }},
       {"a light seen from behind", "light_from_behind", [](SceneFile* s) { s->geometry.heads[0].facing = {-1, 0}; }},
       {"half-angles ignored", "lights", [](SceneFile* s) { s->geometry.heads[3].cos_half_angle = -1; }},
       {"no floor", "taper", [](SceneFile* s) { s->config.line_floor_px = 0; }},
       {"a floor where there is none", "taper_without_floor", [](SceneFile* s) { s->config.line_floor_px = 0.35f; }},
-      {"what straddles the near plane dropped", "near_plane", [](SceneFile* s) { s->scene.agents[0].drawn = 0; }},
+      {"faces across the near plane dropped", "near_plane", [](SceneFile* s) { s->scene.agents[0].drawn = 0; }},
       {"a car on the bridge 30 cm too low", "bridge", [](SceneFile* s) { s->scene.agents[2].center_m.z -= 0.3f; }},
       {"a colliding box 20 cm farther", "overlapping_boxes",
        [](SceneFile* s) { s->scene.agents[1].center_m.x += 0.2f; }},
       {"the slope ignored", "ramp", [](SceneFile* s) { s->scene.agents[0].center_m.z = 0; }},
       {"hidden agents drawn", "left_out", [](SceneFile* s) { s->views[1].hidden_end = s->views[1].hidden_begin; }},
       {"the ego drawn", "left_out", [](SceneFile* s) { s->views[2].ego_agent = -1; }},
-      {"cameras of short bodies not drawn in", "short_bodies", [](SceneFile* s) { s->views[1].body_length_m = 4.5f; }},
+      {"cameras of short bodies not moved in", "short_bodies", [](SceneFile* s) { s->views[1].body_length_m = 4.5f; }},
       {"half a degree of roll", "eight_cameras",
        [](SceneFile* s) { s->config.rig.cameras[4].roll_rad += radians_of(0.5); }},
       {"a principal point half a pixel off", "eight_cameras",
@@ -182,14 +182,14 @@ INSTANTIATE_TEST_SUITE_P(All, SeededFault, testing::Range(std::size_t{0}, faults
   return name;
 });
 
-TEST_P(SeededFault, IsSeenByEveryTolerance) {
+TEST_P(SeededFault, ExceedsEveryTolerance) {
   const Fault& fault = faults()[GetParam()];
   SceneFile scene = load_scene(scene_path(fault.scene));
-  const Drawing sound = draw_scene(oracle_for(scene).get(), scene, PixelFormat::f32);
+  const Drawing correct = draw_scene(oracle_for(scene).get(), scene, PixelFormat::f32);
   fault.seed(&scene);
   scene.geometry.build_grids();
   const Drawing faulty = draw_scene(oracle_for(scene).get(), scene, PixelFormat::f32);
-  const PooledError error = error_of(faulty, sound);
+  const PooledError error = error_of(faulty, correct);
   fmt::print("{:.2f} dB, worst {:.1f}/255\n", error.psnr_db(), 255 * error.max_error());
   for (const ImageTolerance& tolerance :
        {kGoldenOracle, kGoldenKernel, truth_tolerance_of(fault.scene), gl_tolerance_of(fault.scene)}) {
@@ -197,8 +197,8 @@ TEST_P(SeededFault, IsSeenByEveryTolerance) {
   }
 }
 
-TEST(GoldenTolerances, EachPartOfThemFails) {
-  // One image of 100,000 values, some of them off by so much.
+TEST(GoldenTolerances, EachPartFails) {
+  // One image of 100,000 values, some with an error.
   auto complaint_of = [](int values, double off, const ImageTolerance& tolerance) {
     const Drawing expected{std::vector<float>(100000, 0.5f)};
     Drawing actual = expected;
@@ -213,7 +213,7 @@ TEST(GoldenTolerances, EachPartOfThemFails) {
   EXPECT_THAT(complaint_of(11, 2.0 / 255, kGoldenKernel), HasSubstr("%"));
   EXPECT_EQ(complaint_of(100000, 0.4 / 255, kGoldenTruth), "");
   EXPECT_THAT(complaint_of(100000, 0.5 / 255, kGoldenTruth), HasSubstr("dB"));
-  // What is no number is within none.
+  // NaN exceeds every tolerance.
   for (const ImageTolerance& tolerance : {kGoldenOracle, kGoldenKernel, kGoldenTruth, kGoldenGl}) {
     EXPECT_THAT(complaint_of(1, std::nan(""), tolerance), HasSubstr("worst")) << tolerance.name;
   }
@@ -230,7 +230,7 @@ int run(int argc, char** argv) {
     } else if ((option == "--backend" || option == "--out") && i + 1 < argc) {
       (option == "--out" ? options.out : options.backend) = argv[++i];
     } else {
-      fmt::print(stderr, "error: unknown option {}; see the head of golden_test.cpp\n", option);
+      fmt::print(stderr, "error: unknown option {}; see the top of golden_test.cpp\n", option);
       return 2;
     }
   }

@@ -19,7 +19,7 @@ void* counted_or_throw(std::size_t size) {
 
 }  // namespace
 
-// All forms but those for extended alignment, which nothing here asks for.
+// All forms except those for extended alignment, which are not used.
 void* operator new(std::size_t size) { return counted_or_throw(size); }
 void* operator new[](std::size_t size) { return counted_or_throw(size); }
 void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return counted(size); }

@@ -1,4 +1,4 @@
-// Counts what the thread allocates. A binary that links allocations.cpp has its operator new replaced.
+// Counts the allocations of a thread. Linking allocations.cpp replaces a binary's operator new.
 #pragma once
 
 namespace pictura::test {

@@ -1,4 +1,4 @@
-// What an error says, for tests that look at messages.
+// Error messages, for tests that check them.
 #pragma once
 
 #include <string>
@@ -8,10 +8,10 @@
 
 namespace pictura::test {
 
-/// What message_of() returns where nothing is thrown.
+/// Returned by message_of() if nothing is thrown.
 constexpr const char* kNoError = "no error";
 
-/// The message of the error of that type that `work` throws.
+/// The message of the error of type Expected that `work` throws.
 template <typename Expected = Error, typename Work>
 std::string message_of(Work&& work) {
   try {

@@ -1,4 +1,4 @@
-// Small scenes drawn by the CPU renderer, for tests that look at pixels.
+// Small scenes drawn by the CPU renderer, for tests that check pixels.
 #pragma once
 
 #include <cstring>

@@ -1,4 +1,4 @@
-// Tests that take a map's name: whether there is such a map, and the name as a part of the test's.
+// Tests parameterized by map name: whether the map exists, and the test's name.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace pictura::test {
 
-/// What a test of a map needs and does not find; empty where it is there.
+/// What a test of a map lacks; empty if the map exists.
 inline std::string missing(const std::string& map) {
   const std::vector<std::string> towns = known_towns();
   const bool is_there = !map.starts_with("Town") || std::binary_search(towns.begin(), towns.end(), map);

@@ -1,4 +1,4 @@
-// A folder for the files of one test, and variables of the environment that a test sets.
+// A folder for the files of one test, and environment variables set by a test.
 #pragma once
 
 #include <cstdlib>
@@ -12,8 +12,7 @@
 
 namespace pictura::test {
 
-/// A new, empty folder under the test's name and process (ctest runs tests side by side), removed with all that is in
-/// it.
+/// A new, empty folder named by test and process (ctest runs tests in parallel), removed with its contents.
 class ScratchFolder {
  public:
   ScratchFolder() {
@@ -44,7 +43,7 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
-/// Sets a variable of the environment, or unsets it, until the end of its scope.
+/// Sets or unsets an environment variable until the end of its scope.
 class EnvironmentVariable {
  public:
   EnvironmentVariable(const char* name, const std::optional<std::string>& value) : name_(name) {

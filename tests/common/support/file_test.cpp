@@ -1,4 +1,4 @@
-// Files written beside and renamed; PNG and hash.
+// Files written under a temporary name and renamed; PNG and hash.
 #include "pictura/common/support/file.h"
 
 #include <atomic>
@@ -23,7 +23,7 @@ class FileTest : public testing::Test {
   test::ScratchFolder folder_;
 };
 
-TEST_F(FileTest, AFailedWriteKeepsTheOldFileAndLeavesNothingBeside) {
+TEST_F(FileTest, AFailedWriteKeepsTheOldFileAndLeavesNoOther) {
   const std::string path = folder_ / "a.txt";
   write_file(path, "old");
   EXPECT_THROW(write_renamed(path,
@@ -59,7 +59,7 @@ TEST_F(FileTest, AFolderThatCannotBeReachedIsAnErrorAndNoneForACache) {
   EXPECT_EQ(folder_.num_entries(), 0u);
 }
 
-TEST_F(FileTest, AFileThatChangesWhileItIsReadIsRefused) {
+TEST_F(FileTest, AFileThatChangesWhileItIsReadIsRejected) {
   const std::string path = folder_ / "growing";
   write_file(path, std::string(std::size_t{64} << 20, 'x'));
   EXPECT_EQ(read_file(path).size(), std::size_t{64} << 20);
@@ -83,7 +83,7 @@ TEST_F(FileTest, AFileThatChangesWhileItIsReadIsRefused) {
   EXPECT_EQ(message, path + ": changed while it was read");
 }
 
-TEST_F(FileTest, LargeFilesAreRefusedBeforeTheyAreRead) {
+TEST_F(FileTest, LargeFilesAreRejectedBeforeTheyAreRead) {
   const std::string path = folder_ / "sparse";
   write_file(path, "x");
   std::filesystem::resize_file(path, std::uintmax_t{1} << 40);

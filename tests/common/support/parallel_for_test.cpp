@@ -1,4 +1,4 @@
-// Every item once, and the lowest item's exception.
+// parallel_for visits every item once and rethrows the lowest item's exception.
 #include "pictura/common/support/parallel_for.h"
 
 #include <stdexcept>
@@ -18,7 +18,7 @@ TEST(ParallelFor, VisitsEveryItemOnce) {
   }
 }
 
-TEST(ParallelFor, CarriesTheLowestItemsException) {
+TEST(ParallelFor, RethrowsTheLowestItemsException) {
   try {
     parallel_for(3, 100, [](std::int64_t i) {
       if (i >= 40) throw std::runtime_error(std::to_string(i));
