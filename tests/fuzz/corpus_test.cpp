@@ -1,4 +1,4 @@
-// The fuzzers' corpus in every test run: each file, and mutations of it, is a map or an Error, in bounded time.
+// Runs the fuzzers' corpus in every test run: each file, and mutations of it, gives a map or an Error in bounded time.
 #include <algorithm>
 #include <ctime>
 #include <filesystem>
@@ -27,7 +27,7 @@ std::vector<fs::path> corpus(const std::string& folder) {
   return files;
 }
 
-/// Of the processor: other programs share the machine.
+/// CPU time, since other programs share the machine.
 template <typename Fuzz>
 double seconds_of(Fuzz fuzz) {
   const std::clock_t begin = std::clock();
@@ -35,7 +35,7 @@ double seconds_of(Fuzz fuzz) {
   return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
 }
 
-/// Flips, inserts, removes, repeats and swaps bytes, a few at a time.
+/// Mutates bytes: flips, insertions, deletions and changed digits, a few at a time.
 std::string mutated(std::string bytes, std::mt19937* random) {
   const auto below = [&](size_t count) { return count ? (*random)() % count : 0; };
   for (size_t edits = 1 + below(2); edits > 0 && !bytes.empty(); --edits) {
@@ -46,7 +46,7 @@ std::string mutated(std::string bytes, std::mt19937* random) {
       case 2: bytes.insert(below(bytes.size()), bytes.substr(at, length)); break;
       case 3: bytes.resize(at); break;
       default: {
-        // Another digit somewhere: most of what a file says is numbers.
+        // Change a digit: most of the content is numbers.
         const size_t digit = bytes.find_first_of("0123456789", at);
         if (digit != std::string::npos) bytes[digit] = "0123456789-.e"[below(13)];
       }
@@ -60,12 +60,12 @@ TEST(FuzzCorpus, EveryOpenDriveFileIsAMapOrAnError) {
   for (const fs::path& path : corpus("opendrive")) {
     (test::fuzz_opendrive(read_file(path.string())) ? maps : errors)++;
   }
-  // Both ends of the importer are reached.
+  // Both outcomes occur.
   EXPECT_GT(maps, 15);
   EXPECT_GT(errors, 15);
 }
 
-/// What a few hundred bytes can ask for at most: long roads, wound up, upon each other.
+/// Worst cases for small files: long, tightly wound and overlapping roads.
 TEST(FuzzCorpus, SmallFilesTakeLittleTime) {
   for (const fs::path& path : corpus("opendrive_slow")) {
     const std::string bytes = read_file(path.string());
@@ -81,7 +81,7 @@ TEST(FuzzCorpus, MutatedOpenDriveFilesAreMapsOrErrors) {
   int maps = 0, errors = 0;
   for (const fs::path& path : corpus("opendrive")) {
     const std::string bytes = read_file(path.string());
-    if (bytes.size() > 8192) continue;  // slow under sanitizers, and more of the same
+    if (bytes.size() > 8192) continue;  // slow under sanitizers
     for (int i = 0; i < 60; ++i) (test::fuzz_opendrive(mutated(bytes, &random)) ? maps : errors)++;
   }
   EXPECT_GT(maps, 100);

@@ -17,18 +17,18 @@ namespace {
 
 constexpr MapCacheKey kKey{.importer = 1, .source = 2, .options = 3};
 
-/// A map that was accepted must serve.
-void use(const RoadMap& map) {
+/// Exercises an accepted map.
+void exercise(const RoadMap& map) {
   make_static_geometry(map);
   const std::string difference = first_difference(decode_map(encode_map(map, kKey), kKey, "cache"), map);
   if (!difference.empty()) {
-    std::fprintf(stderr, "a map does not come back from the cache: %s\n", difference.c_str());
+    std::fprintf(stderr, "the cache does not restore a map exactly: %s\n", difference.c_str());
     std::abort();
   }
 }
 
-/// The payload of a sound map with something in all of its vectors.
-const std::string& sound_payload() {
+/// The payload of a valid map with content in all of its vectors.
+const std::string& valid_payload() {
   static const std::string payload = [] {
     RoadMap map = parse_opendrive(procedural_town({.blocks_x = 1, .blocks_y = 1}), "town");
     map.stop_lines = {{{1, 2, 3}, {4, 5, 6}, 0.3f}};
@@ -45,9 +45,9 @@ const std::string& sound_payload() {
 std::string edited(std::string payload, std::string_view edits) {
   constexpr std::size_t kEdit_bytes = 5;
   for (; edits.size() >= kEdit_bytes; edits.remove_prefix(kEdit_bytes)) {
-    uint32_t place = 0;
-    std::memcpy(&place, edits.data(), sizeof place);
-    payload[place % payload.size()] = edits[sizeof place];
+    uint32_t position = 0;
+    std::memcpy(&position, edits.data(), sizeof position);
+    payload[position % payload.size()] = edits[sizeof position];
   }
   return payload;
 }
@@ -59,7 +59,7 @@ bool fuzz_opendrive(std::string_view bytes) {
   for (const bool lenient : {true, false}) {
     is_map = false;
     try {
-      use(parse_opendrive(bytes, "fuzz.xodr", {.lenient = lenient}));
+      exercise(parse_opendrive(bytes, "fuzz.xodr", {.lenient = lenient}));
       is_map = true;
     } catch (const Error&) {
     }
@@ -73,11 +73,11 @@ bool fuzz_map_cache(std::string_view bytes) {
   std::string file(rest);
   if (bytes[0] == 'p') file = map_cache_header(rest, kKey) + std::string(rest);
   if (bytes[0] == 'e') {
-    const std::string payload = edited(sound_payload(), rest);
+    const std::string payload = edited(valid_payload(), rest);
     file = map_cache_header(payload, kKey) + payload;
   }
   try {
-    use(decode_map(file, kKey, "fuzz"));
+    exercise(decode_map(file, kKey, "fuzz"));
     return true;
   } catch (const Error&) {
     return false;

@@ -1,4 +1,4 @@
-// What the fuzz targets do with their input; the corpus goes through the same functions in every test run.
+// The functions behind the fuzz targets; the corpus test uses them too.
 #pragma once
 
 #include <cstdint>
@@ -6,13 +6,13 @@
 
 namespace pictura::test {
 
-/// Imports the bytes as an OpenDRIVE file, strictly and leniently, and puts what comes out to use: its geometry, and
-/// the cache there and back. Says whether the strict importer made a map; an Error is an answer too. Anything else
-/// escapes, and a map that does not come back from the cache aborts.
+/// Imports the bytes as an OpenDRIVE file, in strict and lenient mode, and exercises the result: its geometry and a
+/// round trip through the cache. Returns whether the strict importer made a map; Error is an accepted outcome. Other
+/// exceptions propagate, and a map that the cache does not restore exactly aborts.
 bool fuzz_opendrive(std::string_view bytes);
 
-/// Reads a cached map. The first byte says what the rest is: `f` a whole file, `p` what follows a header that fits it,
-/// `e` edits of five bytes each (a place and a value) to such a payload that is sound. Says whether a map came out.
+/// Reads a cached map. The first byte says what the rest is: `f` a whole file, `p` a payload that gets a matching
+/// header, `e` edits of five bytes each (a position and a value) of a valid payload. Returns whether it is a map.
 bool fuzz_map_cache(std::string_view bytes);
 
 }  // namespace pictura::test

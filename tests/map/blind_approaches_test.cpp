@@ -1,4 +1,4 @@
-// What walls hide at a crossing made by hand, recomputed by hand, and how much in the towns.
+// Occlusion by walls at a hand-made crossing against values computed by hand, and plausible counts in the towns.
 #include "pictura/map/blind_approaches.h"
 
 #include <fmt/format.h>
@@ -10,8 +10,8 @@
 namespace pictura {
 namespace {
 
-/// Two one-way roads of one lane that cross at the origin, eastwards and northwards. The junction reaches 10 m from
-/// there; lanes lead to it from 40 m before, in two pieces.
+/// Two one-way roads of one lane that cross at the origin, eastwards and northwards. The junction extends 10 m from
+/// there; the lanes before it begin at 50 m, in two pieces.
 struct Crossing {
   Crossing() {
     map.junctions = {{"1", 0}};
@@ -47,7 +47,7 @@ struct Crossing {
   RoadMap map;
 };
 
-/// A building in the corner between the two roads that lead to the crossing, its walls as far from their centre lines.
+/// A building in the corner between the approaches, its walls `clear_m` from both centre lines.
 std::vector<WallFace> corner(float clear_m, float z_m = 0, float height_m = 4) {
   return {{{-48, -clear_m, z_m}, {-clear_m, -clear_m, z_m}, height_m},
           {{-clear_m, -clear_m, z_m}, {-clear_m, -48, z_m}, height_m}};
@@ -66,24 +66,25 @@ TEST(BlindApproaches, AWallInTheCornerHidesCrossingTraffic) {
   // The eye at (-30, 0) and the car at (0, -30): the line between them passes 15 m from either road.
   expect_count(count_blind_approaches(map, corner(6)), 2, 2, 2, 2);
   expect_count(count_blind_approaches(map, corner(16)), 2, 0, 2, 0);
-  // The car's front right corner, (1, -27.75), comes into sight past a building that stands back 14.17 m.
+  // The car's front right corner, (1, -27.75), is visible past a building that is 14.17 m from the centre lines.
   expect_count(count_blind_approaches(map, corner(14.1f)), 2, 2, 2, 2);
   expect_count(count_blind_approaches(map, corner(14.3f)), 2, 0, 2, 0);
-  // Nearer to the junction the building no longer reaches between the two.
+  // Closer to the junction the building no longer blocks the line between the two.
   expect_count(count_blind_approaches(map, corner(12), 20), 2, 2, 2, 2);
   expect_count(count_blind_approaches(map, corner(12), 10), 2, 0, 2, 0);
 }
 
-TEST(BlindApproaches, WallsHideOnTheirLevelAndInTheirDirectionAlone) {
+TEST(BlindApproaches, WallsHideOnlyOnTheirLevelAndInTheirDirection) {
   const RoadMap map = Crossing().map;
   expect_count(count_blind_approaches(map, corner(6, -20)), 2, 0, 2, 0);
-  expect_count(count_blind_approaches(map, corner(6, 0, 0.5f)), 2, 0, 2, 0);  // one looks over it
-  // A short wall close to the eye at (-30, 0) hides the other car; from (0, -30) a car at (-30, 0) shows beside it.
+  expect_count(count_blind_approaches(map, corner(6, 0, 0.5f)), 2, 0, 2, 0);  // lower than the line of sight
+  // A short wall close to the eye at (-30, 0) hides the other car; from (0, -30) the car at (-30, 0) is visible next to
+  // it.
   const std::vector<WallFace> short_wall{{{-28, -1.2f, 0}, {-24, -7.5f, 0}, 4}};
   expect_count(count_blind_approaches(map, short_wall), 2, 1, 2, 1);
 }
 
-TEST(BlindApproaches, LanesThatBeginTooNearAreLeftOut) {
+TEST(BlindApproaches, LanesThatBeginTooCloseAreSkipped) {
   const RoadMap map = Crossing().map;
   expect_count(count_blind_approaches(map, corner(6), 40), 2, 2, 2, 2);
   expect_count(count_blind_approaches(map, corner(6), 41), 0, 0, 0, 0);

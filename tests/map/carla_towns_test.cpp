@@ -1,4 +1,4 @@
-// CARLA's eight towns against what their files are known to hold, and what must be true of any map made from them.
+// CARLA's eight towns: counts known from their files, and properties that any map made from them must have.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -24,7 +24,7 @@ struct TownFacts {
   int painted_stop_lines, painted_near_lights, stop_signs, yield_signs;
 };
 
-// Counted in the files, without this importer. Town10HD has two more signals of a light's type, without references.
+// Counted in the files, without this importer. Town10HD has two more signals of the light type, without references.
 const TownFacts kTowns[] = {
     {"Town01", 122, 96, 12, 6.4, 1.4, 0, 0, 36, 12, {{3, 12}}, 36, 0, 0, 0, 0, 0, 0},
     {"Town02", 84, 64, 8, 2.9, 0.8, 0, 0, 24, 8, {{3, 8}}, 24, 0, 0, 0, 0, 0, 0},
@@ -55,7 +55,7 @@ class CarlaTowns : public ::testing::TestWithParam<TownFacts> {
 INSTANTIATE_TEST_SUITE_P(All, CarlaTowns, ::testing::ValuesIn(kTowns),
                          [](const ::testing::TestParamInfo<TownFacts>& town) { return std::string(town.param.name); });
 
-TEST_P(CarlaTowns, HoldWhatTheirFilesHold) {
+TEST_P(CarlaTowns, MatchTheCountsOfTheirFiles) {
   const TownFacts& expected = GetParam();
   const MapFacts& facts = map_->facts;
   EXPECT_EQ(map_->name, expected.name);
@@ -123,30 +123,30 @@ TEST_P(CarlaTowns, LanesContinueEachOther) {
     }
     for (const int32_t neighbor : {from.left_neighbor, from.right_neighbor}) {
       if (neighbor < 0) continue;
-      const LanePoint beside = map_->lane_points[static_cast<std::size_t>(lane(neighbor).points.end) - 1];
-      EXPECT_NEAR(length(beside.position_m - end.position_m), 0.5f * (beside.width_m + end.width_m), 0.01);
+      const LanePoint neighbor_end = map_->lane_points[static_cast<std::size_t>(lane(neighbor).points.end) - 1];
+      EXPECT_NEAR(length(neighbor_end.position_m - end.position_m), 0.5f * (neighbor_end.width_m + end.width_m), 0.01);
     }
   }
-  // True lengths differ from those along the reference lines only by what lanes gain and lose in curves.
+  // Lane lengths differ from the lengths along the reference lines only in curves.
   EXPECT_NEAR(lane_km, map_->facts.driving_lane_km, 0.01 * map_->facts.driving_lane_km);
 }
 
-TEST_P(CarlaTowns, LightsFaceTheirTrafficAndStandAtItsLine) {
+TEST_P(CarlaTowns, LightsFaceTheirTrafficAtItsStopLine) {
   for (const TrafficLight& light : map_->lights) {
     const Vec2 heading{std::cos(light.stop_heading_rad), std::sin(light.stop_heading_rad)};
     EXPECT_NEAR(dot(light.head_facing, heading), -1, 1e-5);
-    // Left end first, square to the traffic.
+    // Left end first, perpendicular to the traffic.
     const Vec2 line = light.stop_b_m.xy() - light.stop_a_m.xy();
     EXPECT_GT(cross(line, heading), 0.99f * length(line));
     float incoming_width_m = 0;
     for (int32_t i = light.lanes.begin; i < light.lanes.end; ++i) {
-      const Lane& held = lane(map_->light_lanes[static_cast<std::size_t>(i)]);
-      if (held.in_junction) {
-        EXPECT_EQ(held.junction, light.junction);
-        const LanePoint begin = map_->lane_points[static_cast<std::size_t>(held.points.begin)];
+      const Lane& controlled = lane(map_->light_lanes[static_cast<std::size_t>(i)]);
+      if (controlled.in_junction) {
+        EXPECT_EQ(controlled.junction, light.junction);
+        const LanePoint begin = map_->lane_points[static_cast<std::size_t>(controlled.points.begin)];
         EXPECT_LT(std::abs(dot(begin.position_m.xy() - light.stop_a_m.xy(), heading)), 0.1f);
       } else {
-        incoming_width_m += map_->lane_points[static_cast<std::size_t>(held.points.end) - 1].width_m;
+        incoming_width_m += map_->lane_points[static_cast<std::size_t>(controlled.points.end) - 1].width_m;
       }
     }
     EXPECT_GE(length(line), incoming_width_m - 0.01f);
@@ -154,7 +154,7 @@ TEST_P(CarlaTowns, LightsFaceTheirTrafficAndStandAtItsLine) {
   }
 }
 
-/// Road edges in a grid, for queries by place.
+/// Road edges in a grid, for spatial queries.
 class EdgeGrid {
  public:
   explicit EdgeGrid(const RoadMap& map) : edges_(map.road_edges) {
@@ -166,12 +166,13 @@ class EdgeGrid {
     grid_ = Grid(boxes, 10.0f);
   }
 
-  /// Whether `test(edge)` holds for an edge of about the height of `p` in a square of `reach_m` about it.
+  /// Whether `test(edge)` holds for an edge at about the height of `p` within a square of half-size `radius_m` around
+  /// it.
   template <typename Test>
-  bool any_near(Vec3 p, float reach_m, Test&& test) const {
+  bool any_near(Vec3 p, float radius_m, Test&& test) const {
     const GridView grid = grid_.view();
-    for (int y = grid.cell_y(p.y - reach_m); y <= grid.cell_y(p.y + reach_m); ++y) {
-      for (int x = grid.cell_x(p.x - reach_m); x <= grid.cell_x(p.x + reach_m); ++x) {
+    for (int y = grid.cell_y(p.y - radius_m); y <= grid.cell_y(p.y + radius_m); ++y) {
+      for (int x = grid.cell_x(p.x - radius_m); x <= grid.cell_x(p.x + radius_m); ++x) {
         const std::size_t cell = static_cast<std::size_t>(y * grid.num_x + x);
         for (int32_t i = grid.begin[cell]; i < grid.begin[cell + 1]; ++i) {
           const RoadEdge& edge = edges_[static_cast<std::size_t>(grid.items[static_cast<std::size_t>(i)])];
@@ -187,8 +188,8 @@ class EdgeGrid {
   Grid grid_;
 };
 
-/// Whether a segment meets the box of half-size (half_length, half_width) about `center`.
-bool box_meets(const RoadEdge& edge, Vec3 center, float heading_rad, float half_length, float half_width) {
+/// Whether a segment intersects the box of half-size (half_length, half_width) around `center`.
+bool box_intersects(const RoadEdge& edge, Vec3 center, float heading_rad, float half_length, float half_width) {
   const float c = std::cos(heading_rad), s = std::sin(heading_rad);
   auto local = [&](Vec3 p) {
     const float dx = p.x - center.x, dy = p.y - center.y;
@@ -212,13 +213,13 @@ bool box_meets(const RoadEdge& edge, Vec3 center, float heading_rad, float half_
 TEST_P(CarlaTowns, ACarOnItsLaneTouchesNoRoadEdge) {
   const EdgeGrid edges(*map_);
   int poses = 0, touched = 0;
-  for (const Lane& driven : map_->lanes) {
-    if (driven.type != LaneType::driving) continue;
-    const Span<const LanePoint> points = map_->points_of(driven);
+  for (const Lane& lane_to_drive : map_->lanes) {
+    if (lane_to_drive.type != LaneType::driving) continue;
+    const Span<const LanePoint> points = map_->points_of(lane_to_drive);
     for (std::size_t i = 1; i < points.size(); ++i) {
       const LanePoint &a = points[i - 1], &b = points[i];
       for (float u = 0; u < 1; u += 0.5f / (b.s_m - a.s_m)) {
-        // Lanes that open from nothing or taper off are narrower than a car there: Town06 has five, Town07 one.
+        // Lanes that open from zero width or taper off are narrower than a car there: five in Town06, one in Town07.
         bool tapers = false;
         for (const LanePoint& near : points) {
           tapers = tapers || (near.width_m < 0.05f && std::abs(near.s_m - a.s_m - u * (b.s_m - a.s_m)) < 30.0f);
@@ -228,7 +229,7 @@ TEST_P(CarlaTowns, ACarOnItsLaneTouchesNoRoadEdge) {
         const Vec3 center = a.position_m + (b.position_m - a.position_m) * u;
         const float heading = a.heading_rad + u * wrap_angle(b.heading_rad - a.heading_rad);
         const bool touches = edges.any_near(
-            center, 2.5f, [&](const RoadEdge& edge) { return box_meets(edge, center, heading, 2.25f, 1.0f); });
+            center, 2.5f, [&](const RoadEdge& edge) { return box_intersects(edge, center, heading, 2.25f, 1.0f); });
         touched += touches ? 1 : 0;
       }
     }
@@ -237,7 +238,7 @@ TEST_P(CarlaTowns, ACarOnItsLaneTouchesNoRoadEdge) {
   EXPECT_EQ(touched, 0);
 }
 
-/// The drivable surface once more, as quads between the map's own lane points, to hold against the edges.
+/// The drivable surface, rebuilt as quads between the map's own lane points, to compare the edges with.
 class DrivableSurface {
  public:
   explicit DrivableSurface(const RoadMap& map) {
@@ -270,7 +271,7 @@ class DrivableSurface {
     for (int32_t i = grid.begin[cell]; i < grid.begin[cell + 1]; ++i) {
       const std::array<Vec3, 4>& quad = quads_[static_cast<std::size_t>(grid.items[static_cast<std::size_t>(i)])];
       if (p.z < min_of(quad[0].z, quad[2].z) - 2.0f || p.z > max_of(quad[0].z, quad[2].z) + 2.0f) continue;
-      bool inside = true;  // of a convex quad that runs counter-clockwise
+      bool inside = true;  // for a convex, counter-clockwise quad
       for (std::size_t k = 0; k < 4; ++k) {
         const Vec3 a = quad[k], b = quad[(k + 1) % 4];
         inside = inside && cross(b.xy() - a.xy(), p.xy() - a.xy()) >= 0;
@@ -280,10 +281,10 @@ class DrivableSurface {
     return false;
   }
 
-  /// Whether a lane changes its width so fast hereabouts that its borders are not square to its heading.
+  /// Whether a lane nearby changes its width so fast that its borders are not perpendicular to its heading.
   bool is_skewed_near(Vec3 p) const {
-    for (const Vec3 place : skewed_) {
-      if (length(place.xy() - p.xy()) < 12.0f) return true;
+    for (const Vec3 position : skewed_) {
+      if (length(position.xy() - p.xy()) < 12.0f) return true;
     }
     return false;
   }
@@ -308,7 +309,7 @@ bool segments_cross(Vec2 a, Vec2 b, const RoadEdge& edge) {
   return on_segment >= 0 && on_segment <= 1 && on_edge >= -1e-3f && on_edge <= 1.001f;
 }
 
-TEST_P(CarlaTowns, EdgesStandExactlyWhereTheDrivableSurfaceEnds) {
+TEST_P(CarlaTowns, EdgesAreExactlyWhereTheDrivableSurfaceEnds) {
   const DrivableSurface surface(*map_);
   const EdgeGrid edges(*map_);
 
@@ -318,19 +319,19 @@ TEST_P(CarlaTowns, EdgesStandExactlyWhereTheDrivableSurfaceEnds) {
     const Vec3 along = edge.b_m - edge.a_m, middle = (edge.a_m + edge.b_m) * 0.5f;
     if (length(along) < 0.3f || surface.is_skewed_near(middle)) continue;
     const Vec2 left = left_normal(along.xy()) * (1.0f / length(along.xy()));
-    auto beside = [&](float distance) {
+    auto left_of_middle = [&](float distance) {
       return Vec3{middle.x + distance * left.x, middle.y + distance * left.y, middle.z};
     };
-    wrong_side += !surface.covers(beside(-0.06f)) || surface.covers(beside(0.06f)) ? 1 : 0;
+    wrong_side += !surface.covers(left_of_middle(-0.06f)) || surface.covers(left_of_middle(0.06f)) ? 1 : 0;
   }
-  // Two lanes that part leave a slit; Town06 has some whose sides are still within reach of each other's probes.
+  // Diverging lanes leave a narrow gap; in Town06 some gaps are narrower than the probes' distance.
   EXPECT_LE(wrong_side, static_cast<int>(map_->road_edges.size()) / 500) << "of " << map_->road_edges.size();
 
-  // Where a lane's border has no surface beyond it, an edge stands; where surface goes on, none crosses.
+  // Where nothing is drivable beyond a lane's border there is an edge; where the surface continues no edge crosses.
   int borders = 0, missing = 0, across = 0;
-  for (const Lane& bordered : map_->lanes) {
-    if (!is_drivable(bordered.type)) continue;
-    const Span<const LanePoint> points = map_->points_of(bordered);
+  for (const Lane& border_lane : map_->lanes) {
+    if (!is_drivable(border_lane.type)) continue;
+    const Span<const LanePoint> points = map_->points_of(border_lane);
     for (std::size_t i = 1; i + 1 < points.size(); ++i) {
       if (points[i].width_m < 0.1f || surface.is_skewed_near(points[i].position_m)) continue;
       for (const float side : {1.0f, -1.0f}) {

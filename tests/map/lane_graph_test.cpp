@@ -1,5 +1,5 @@
-// Routes, distances, reachability and components of lanes, against a hand-made map, against brute force on random ones,
-// and on towns.
+// Routes, distances, reachability and components of lanes: on a hand-made map, against brute force on random maps, and
+// on towns.
 #include "pictura/map/lane_graph.h"
 
 #include <algorithm>
@@ -26,7 +26,7 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 std::size_t at(int32_t index) { return static_cast<std::size_t>(index); }
 
-/// Lanes of the given lengths without links; the graph asks for nothing else.
+/// Lanes of the given lengths without links; LaneGraph uses nothing else.
 RoadMap lanes_of(const std::vector<float>& lengths_m) {
   RoadMap map;
   map.lanes.resize(lengths_m.size());
@@ -47,7 +47,7 @@ void set_side_by_side(int32_t left, int32_t right, RoadMap* map) {
   map->lanes[at(right)].left_neighbor = left;
 }
 
-/// A ring 0 -> 1 -> 2 -> 0 of 100 m lanes with 3 to the right of 1, from which an exit 4 leads away.
+/// A ring 0 -> 1 -> 2 -> 0 of 100 m lanes; lane 3 is on the right of lane 1 and leads to an exit, lane 4.
 RoadMap ring() {
   RoadMap map = lanes_of({100, 100, 100, 80, 50});
   set_successors({{1}, {2}, {0}, {4}, {}}, &map);
@@ -55,7 +55,7 @@ RoadMap ring() {
   return map;
 }
 
-TEST(LaneGraph, RoutesAlongOneLaneAndRoundTheBlock) {
+TEST(LaneGraph, RoutesAlongOneLaneAndAroundALoop) {
   const RoadMap map = ring();
   const LaneGraph graph(map, 10);
   const LaneRoute ahead = graph.route({0, 20}, {0, 70}).value();
@@ -69,7 +69,7 @@ TEST(LaneGraph, RoutesAlongOneLaneAndRoundTheBlock) {
   EXPECT_EQ(behind.cost_m, behind.length_m);
 }
 
-TEST(LaneGraph, ChangesLanesAtEqualShares) {
+TEST(LaneGraph, ChangesLanesAtEqualFractions) {
   const RoadMap map = ring();
   const LaneGraph graph(map, 10);
   const LaneRoute exit = graph.route({0, 40}, {4, 5}).value();
@@ -78,9 +78,9 @@ TEST(LaneGraph, ChangesLanesAtEqualShares) {
   EXPECT_EQ(exit.lane_changes, 1);
   EXPECT_NEAR(exit.cost_m, exit.length_m + 10, 1e-5);
   // Half of lane 1 is half of lane 3.
-  const LaneRoute beside = graph.route({1, 50}, {3, 60}).value();
-  EXPECT_THAT(beside.lanes, ElementsAre(1, 3));
-  EXPECT_NEAR(beside.length_m, 20, 1e-5);
+  const LaneRoute adjacent = graph.route({1, 50}, {3, 60}).value();
+  EXPECT_THAT(adjacent.lanes, ElementsAre(1, 3));
+  EXPECT_NEAR(adjacent.length_m, 20, 1e-5);
   EXPECT_NEAR(graph.route({1, 50}, {3, 40})->cost_m, 10, 1e-5);
   const LaneRoute behind = graph.route({1, 50}, {3, 39}).value();
   EXPECT_THAT(behind.lanes, ElementsAre(1, 2, 0, 1, 3));
@@ -88,7 +88,7 @@ TEST(LaneGraph, ChangesLanesAtEqualShares) {
   EXPECT_FALSE(graph.route({4, 0}, {0, 0}).has_value());
 }
 
-TEST(LaneGraph, DistancesReachAndComponentsOfTheRing) {
+TEST(LaneGraph, DistancesReachabilityAndComponentsOfTheRing) {
   const RoadMap map = ring();
   const LaneGraph graph(map, 10);
   EXPECT_THAT(graph.distances_from({0, 0}), ElementsAre(0, 100, 200, 110, 190));
@@ -101,7 +101,7 @@ TEST(LaneGraph, DistancesReachAndComponentsOfTheRing) {
   EXPECT_THAT(components.of_lane, ElementsAre(1, 1, 1, 1, 0));
 }
 
-TEST(LaneGraph, RefusesWhatIsNotThere) {
+TEST(LaneGraph, RejectsInvalidPositions) {
   const RoadMap map = ring();
   const LaneGraph graph(map);
   const auto message_of = [&](LanePosition from, LanePosition to) -> std::string {
@@ -118,7 +118,7 @@ TEST(LaneGraph, RefusesWhatIsNotThere) {
   EXPECT_THROW(LaneGraph(map, kInfinite), Error);
 }
 
-/// Rows of one to four lanes of equal length side by side, linked at random.
+/// Rows of one to four adjacent lanes of equal length, linked at random.
 RoadMap random_map(std::mt19937* random) {
   const auto below = [&](uint32_t count) { return static_cast<int32_t>((*random)() % count); };
   std::vector<float> lengths;
@@ -140,7 +140,7 @@ RoadMap random_map(std::mt19937* random) {
   for (int32_t lane = 0; lane < count; ++lane) {
     for (int32_t i = below(3); i > 0; --i) {
       const int32_t next = below(static_cast<uint32_t>(count));
-      // A loop is fine, a successor beside its own lane would be a change of lanes.
+      // A loop is allowed; a successor adjacent to its own lane would be a lane change.
       if (next == lane || row_of[at(next)] != row_of[at(lane)]) successors[at(lane)].push_back(next);
     }
   }
@@ -148,43 +148,43 @@ RoadMap random_map(std::mt19937* random) {
   return map;
 }
 
-/// Least costs between all places at given shares of all lanes by Floyd and Warshall, with lane changes allowed at
-/// every one of them. Node share_index * lanes + lane; the first share is 0.
-std::vector<std::vector<double>> all_distances(const RoadMap& map, const std::vector<double>& shares,
+/// Least costs between positions at the given fractions of all lanes by Floyd and Warshall, with lane changes allowed
+/// at each of them. Node index: fraction_index * lanes + lane; the first fraction is 0.
+std::vector<std::vector<double>> all_distances(const RoadMap& map, const std::vector<double>& fractions,
                                                double change_cost_m) {
-  const std::size_t lanes = map.lanes.size(), nodes = shares.size() * lanes;
+  const std::size_t lanes = map.lanes.size(), nodes = fractions.size() * lanes;
   std::vector<std::vector<double>> distance(nodes, std::vector<double>(nodes, kInfinite));
-  const auto offer = [&](std::size_t from, std::size_t to, double cost) {
+  const auto relax = [&](std::size_t from, std::size_t to, double cost) {
     distance[from][to] = std::min(distance[from][to], cost);
   };
   for (std::size_t lane = 0; lane < lanes; ++lane) {
     const Lane& each = map.lanes[lane];
-    for (std::size_t k = 0; k < shares.size(); ++k) {
+    for (std::size_t k = 0; k < fractions.size(); ++k) {
       const std::size_t node = k * lanes + lane;
-      offer(node, node, 0);
-      for (std::size_t later = k + 1; later < shares.size(); ++later) {
-        offer(node, later * lanes + lane, (shares[later] - shares[k]) * each.length_m);
+      relax(node, node, 0);
+      for (std::size_t later = k + 1; later < fractions.size(); ++later) {
+        relax(node, later * lanes + lane, (fractions[later] - fractions[k]) * each.length_m);
       }
-      for (const int32_t next : map.links(each.successors)) offer(node, at(next), (1 - shares[k]) * each.length_m);
-      for (const int32_t beside : {each.left_neighbor, each.right_neighbor}) {
-        if (beside >= 0) offer(node, k * lanes + at(beside), change_cost_m);
+      for (const int32_t next : map.links(each.successors)) relax(node, at(next), (1 - fractions[k]) * each.length_m);
+      for (const int32_t neighbor : {each.left_neighbor, each.right_neighbor}) {
+        if (neighbor >= 0) relax(node, k * lanes + at(neighbor), change_cost_m);
       }
     }
   }
   for (std::size_t via = 0; via < nodes; ++via) {
     for (std::size_t from = 0; from < nodes; ++from) {
-      for (std::size_t to = 0; to < nodes; ++to) offer(from, to, distance[from][via] + distance[via][to]);
+      for (std::size_t to = 0; to < nodes; ++to) relax(from, to, distance[from][via] + distance[via][to]);
     }
   }
   return distance;
 }
 
-/// Drives the route from lane to lane and adds up what it costs.
+/// Follows the route from lane to lane and adds up its cost.
 void expect_drivable(const RoadMap& map, const LaneRoute& route, LanePosition from, LanePosition to,
                      double change_cost_m) {
   ASSERT_EQ(route.lanes.front(), from.lane);
   ASSERT_EQ(route.lanes.back(), to.lane);
-  double share = double{from.s_m} / map.lanes[at(from.lane)].length_m, length_m = 0;
+  double fraction = double{from.s_m} / map.lanes[at(from.lane)].length_m, length_m = 0;
   int32_t changes = 0;
   for (std::size_t i = 0; i + 1 < route.lanes.size(); ++i) {
     const Lane& lane = map.lanes[at(route.lanes[i])];
@@ -195,10 +195,10 @@ void expect_drivable(const RoadMap& map, const LaneRoute& route, LanePosition fr
     }
     const Span<const int32_t> links = map.links(lane.successors);
     ASSERT_NE(std::find(links.begin(), links.end(), next), links.end()) << route.lanes[i] << " to " << next;
-    length_m += (1 - share) * lane.length_m;
-    share = 0;
+    length_m += (1 - fraction) * lane.length_m;
+    fraction = 0;
   }
-  length_m += to.s_m - share * map.lanes[at(to.lane)].length_m;
+  length_m += to.s_m - fraction * map.lanes[at(to.lane)].length_m;
   EXPECT_NEAR(route.length_m, length_m, 1e-3);
   EXPECT_EQ(route.lane_changes, changes);
   EXPECT_NEAR(route.cost_m, length_m + change_cost_m * changes, 1e-3);
@@ -206,27 +206,28 @@ void expect_drivable(const RoadMap& map, const LaneRoute& route, LanePosition fr
 
 TEST(LaneGraph, AgreesWithBruteForceOnRandomMaps) {
   std::mt19937 random(7);
-  int routes = 0, refusals = 0, with_changes = 0, on_one_lane = 0;
+  int routes = 0, unreachable = 0, with_changes = 0, on_one_lane = 0;
   for (int trial = 0; trial < 60; ++trial) {
     const RoadMap map = random_map(&random);
     const auto lanes = static_cast<uint32_t>(map.lanes.size());
     const double change_cost_m = 0.5 + static_cast<double>(random() % 40);
-    const std::vector<double> shares{0, 0.25, 0.75};
-    const std::vector<std::vector<double>> expected = all_distances(map, shares, change_cost_m);
+    const std::vector<double> fractions{0, 0.25, 0.75};
+    const std::vector<std::vector<double>> expected = all_distances(map, fractions, change_cost_m);
     const LaneGraph graph(map, change_cost_m);
-    const auto node_of = [&](LanePosition place) {
-      const double share = place.s_m / map.lanes[at(place.lane)].length_m;
-      return static_cast<std::size_t>(std::lround(share * 4) + 1) / 2 * lanes + at(place.lane);
+    const auto node_of = [&](LanePosition position) {
+      const double fraction = position.s_m / map.lanes[at(position.lane)].length_m;
+      return static_cast<std::size_t>(std::lround(fraction * 4) + 1) / 2 * lanes + at(position.lane);
     };
     for (int query = 0; query < 100; ++query) {
-      const auto place = [&] {
+      const auto random_position = [&] {
         const auto lane = static_cast<int32_t>(random() % lanes);
-        return LanePosition{lane, static_cast<float>(shares[random() % shares.size()]) * map.lanes[at(lane)].length_m};
+        return LanePosition{lane,
+                            static_cast<float>(fractions[random() % fractions.size()]) * map.lanes[at(lane)].length_m};
       };
-      const LanePosition from = place(), to = place();
-      const double least = expected[node_of(from)][node_of(to)];
+      const LanePosition from = random_position(), to = random_position();
+      const double expected_cost_m = expected[node_of(from)][node_of(to)];
       const std::optional<LaneRoute> route = graph.route(from, to);
-      ASSERT_EQ(route.has_value(), least < kInfinite);
+      ASSERT_EQ(route.has_value(), expected_cost_m < kInfinite);
       const std::vector<double> distances = graph.distances_from(from);
       for (uint32_t lane = 0; lane < lanes; ++lane) {
         if (distances[lane] < kInfinite || expected[node_of(from)][lane] < kInfinite) {
@@ -234,13 +235,13 @@ TEST(LaneGraph, AgreesWithBruteForceOnRandomMaps) {
         }
       }
       if (!route) {
-        ++refusals;
+        ++unreachable;
         continue;
       }
       ++routes;
       with_changes += route->lane_changes > 0;
       on_one_lane += route->lanes.size() == 1;
-      ASSERT_NEAR(route->cost_m, least, 1e-3);
+      ASSERT_NEAR(route->cost_m, expected_cost_m, 1e-3);
       expect_drivable(map, *route, from, to, change_cost_m);
     }
     const LaneComponents components = graph.components();
@@ -256,14 +257,14 @@ TEST(LaneGraph, AgreesWithBruteForceOnRandomMaps) {
       }
     }
   }
-  // The maps are neither all connected nor all apart.
+  // The maps are neither fully connected nor fully disconnected.
   EXPECT_GT(routes, 1000);
-  EXPECT_GT(refusals, 500);
+  EXPECT_GT(unreachable, 500);
   EXPECT_GT(with_changes, 500);
   EXPECT_GT(on_one_lane, 50);
 }
 
-/// The components among the lanes that traffic drives on for ever.
+/// The components of the endless driving lanes.
 std::set<int32_t> endless_components(const RoadMap& map, const LaneComponents& components) {
   std::set<int32_t> found;
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
@@ -272,20 +273,20 @@ std::set<int32_t> endless_components(const RoadMap& map, const LaneComponents& c
   return found;
 }
 
-TEST(LaneGraph, ProceduralTownsAreOfOnePiece) {
+TEST(LaneGraph, ProceduralTownsHaveOneComponent) {
   for (const char* name : {"procedural:1", "procedural:8"}) {
     const std::shared_ptr<const RoadMap> map = load_map(name);
     const LaneGraph graph(*map, 20);
     EXPECT_EQ(endless_components(*map, graph.components()).size(), 1u) << name;
     std::mt19937 random(3);
     for (int i = 0; i < 50; ++i) {
-      const auto place = [&] {
+      const auto random_position = [&] {
         int32_t lane = 0;
         do lane = static_cast<int32_t>(random() % map->lanes.size());
         while (map->lanes[at(lane)].type != LaneType::driving);
         return LanePosition{lane, 0.3f * map->lanes[at(lane)].length_m};
       };
-      const LanePosition from = place(), to = place();
+      const LanePosition from = random_position(), to = random_position();
       const std::optional<LaneRoute> route = graph.route(from, to);
       ASSERT_TRUE(route.has_value()) << name << ": " << from.lane << " to " << to.lane;
       expect_drivable(*map, *route, from, to, 20);

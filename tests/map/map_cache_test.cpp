@@ -1,5 +1,5 @@
-// The cache of maps: what is written comes back in every bit, whatever is not exactly that is refused by name, and
-// load_map() then imports the file.
+// The map cache: maps are restored bit by bit, any other file is rejected with its reason, and load_map() then imports
+// the source.
 #include "pictura/map/map_cache.h"
 
 #include <algorithm>
@@ -47,7 +47,7 @@ std::string small_file(int num_roads = 1) {
   return test::file_of(roads);
 }
 
-/// A town with something in every vector of a map.
+/// A map with content in every vector.
 RoadMap full_map() {
   RoadMap map = parse_opendrive(procedural_town({.seed = 4}), "town");
   map.geo_reference = "+proj=tmerc +lat_0=49";
@@ -70,10 +70,10 @@ std::string reason_of(const std::string& bytes, const MapCacheKey& key = kKey) {
   return "(accepted)";
 }
 
-/// A file whose header fits the payload, whatever that is.
-std::string sealed(const std::string& payload) { return map_cache_header(payload, kKey) + payload; }
+/// A file whose header matches the payload.
+std::string with_header(const std::string& payload) { return map_cache_header(payload, kKey) + payload; }
 
-TEST(MapCache, EveryFieldComesBack) {
+TEST(MapCache, EveryFieldIsRestored) {
   const RoadMap map = full_map();
   EXPECT_EQ(first_difference(decode_map(encode_map(map, kKey), kKey, "town.map"), map), "");
   EXPECT_EQ(encode_map(map, kKey), encode_map(full_map(), kKey)) << "equal maps are equal bytes";
@@ -100,7 +100,7 @@ TEST(MapCache, DifferencesAreFoundAndNamed) {
   }
 }
 
-TEST(MapCache, TruncatedFilesAreRefusedAtEveryLength) {
+TEST(MapCache, TruncatedFilesAreRejectedAtEveryLength) {
   const std::string bytes = encode_map(parse_opendrive(small_file(), "small"), kKey);
   ASSERT_EQ(reason_of(bytes), "(accepted)");
   for (std::size_t length = 0; length < bytes.size(); ++length) {
@@ -109,7 +109,7 @@ TEST(MapCache, TruncatedFilesAreRefusedAtEveryLength) {
   EXPECT_THAT(reason_of(bytes + "x"), HasSubstr("damaged"));
 }
 
-TEST(MapCache, EveryBitOfTheHeaderCounts) {
+TEST(MapCache, EveryBitOfTheHeaderIsChecked) {
   const std::string bytes = encode_map(parse_opendrive(small_file(), "small"), kKey);
   for (std::size_t i = 0; i < kHeaderBytes; ++i) {
     const char* expected = i < kVersionAt        ? "foreign"
@@ -131,7 +131,7 @@ TEST(MapCache, EveryBitOfTheHeaderCounts) {
   }
 }
 
-TEST(MapCache, ForeignFilesAndOtherKeysAreRefused) {
+TEST(MapCache, ForeignFilesAndOtherKeysAreRejected) {
   EXPECT_THAT(reason_of("\x89PNG\r\n\x1a\n and so on"), HasSubstr("foreign: expected it to begin with PICTRMAP"));
   EXPECT_THAT(reason_of(small_file()), HasSubstr("foreign"));
   std::string bytes = encode_map(parse_opendrive(small_file(), "small"), kKey);
@@ -148,7 +148,7 @@ TEST(MapCache, ForeignFilesAndOtherKeysAreRefused) {
   EXPECT_THAT(reason_of(bytes), HasSubstr("another byte order"));
 }
 
-TEST(MapCache, FlippedBytesAreRefused) {
+TEST(MapCache, FlippedBytesAreRejected) {
   const std::string bytes = encode_map(full_map(), kKey);
   std::mt19937 random(1);
   for (int i = 0; i < 300; ++i) {
@@ -159,50 +159,50 @@ TEST(MapCache, FlippedBytesAreRefused) {
   }
 }
 
-TEST(MapCache, SizesAreCheckedBeforeMemoryIsTaken) {
+TEST(MapCache, SizesAreCheckedBeforeAllocation) {
   const std::string bytes = encode_map(parse_opendrive(small_file(), "small"), kKey);
   const uint64_t huge = uint64_t{1} << 60;
   std::string damaged = bytes;
   std::memcpy(damaged.data() + kPayloadBytesAt, &huge, sizeof huge);
   EXPECT_THAT(reason_of(damaged), HasSubstr("truncated"));
-  // The payload begins with the size of the map's name; behind its five letters, the origin and the empty reference
-  // stands the number of roads.
+  // The payload begins with the size of the map's name; its five letters, the origin and the empty geo reference are
+  // followed by the number of roads.
   const std::string payload = bytes.substr(kHeaderBytes);
   for (const std::size_t at : {std::size_t{0}, sizeof huge + 5 + 3 * sizeof(double) + sizeof huge}) {
     for (const uint64_t size : {huge, uint64_t{payload.size()}, ~uint64_t{0}}) {
       damaged = payload;
       std::memcpy(damaged.data() + at, &size, sizeof size);
-      EXPECT_THAT(reason_of(sealed(damaged)), HasSubstr(fmt::format("damaged: a size of {} elements", size)));
+      EXPECT_THAT(reason_of(with_header(damaged)), HasSubstr(fmt::format("damaged: a size of {} elements", size)));
     }
   }
-  EXPECT_EQ(reason_of(sealed(payload)), "(accepted)");
-  EXPECT_THAT(reason_of(sealed(payload + "x")), HasSubstr("1 bytes are left"));
-  EXPECT_THAT(reason_of(sealed(payload.substr(0, 4))), HasSubstr("damaged: expected 8 bytes more, 4 are left"));
+  EXPECT_EQ(reason_of(with_header(payload)), "(accepted)");
+  EXPECT_THAT(reason_of(with_header(payload + "x")), HasSubstr("1 bytes are left"));
+  EXPECT_THAT(reason_of(with_header(payload.substr(0, 4))), HasSubstr("damaged: expected 8 bytes more, 4 are left"));
 }
 
-TEST(MapCache, WhatFitsItsHashIsStillValidated) {
+TEST(MapCache, ContentWithAValidHashIsStillValidated) {
   RoadMap map = full_map();
   map.lanes[1].points.end = 1 << 30;
   EXPECT_THAT(reason_of(encode_map(map, kKey)), HasSubstr("lane 1: points"));
   map = full_map();
   map.lanes[1].type = static_cast<LaneType>(77);
   EXPECT_THAT(reason_of(encode_map(map, kKey)), HasSubstr("no enumerator has the number 77"));
-  // A truth value that is neither: at the byte in which two maps differ.
+  // A bool that is neither 0 nor 1, at the first byte in which two maps differ.
   map = full_map();
   std::string bytes = encode_map(map, kKey);
   map.lanes[0].is_endless = !map.lanes[0].is_endless;
   const std::string other = encode_map(map, kKey);
   *std::mismatch(bytes.begin() + kHeaderBytes, bytes.end(), other.begin() + kHeaderBytes).first = 2;
-  EXPECT_THAT(reason_of(sealed(bytes.substr(kHeaderBytes))), HasSubstr("expected 0 or 1 for a truth value, got 2"));
-  // Damage under a hash that fits: a map or an Error, whatever it is.
+  EXPECT_THAT(reason_of(with_header(bytes.substr(kHeaderBytes))), HasSubstr("expected 0 or 1 for a truth value, got 2"));
+  // Damaged content with a valid hash gives a map or an Error.
   const std::string payload = encode_map(full_map(), kKey).substr(kHeaderBytes);
   std::mt19937 random(2);
   for (int i = 0; i < 500; ++i) {
     std::string damaged = payload;
-    // The first kilobytes hold names and lanes, where most can go wrong.
+    // The first kilobytes contain names and lanes, where most errors are possible.
     const std::size_t range = i % 2 ? payload.size() : 8192;
     for (int k = 0; k < 3; ++k) damaged[random() % range] = static_cast<char>(random());
-    reason_of(sealed(damaged));
+    reason_of(with_header(damaged));
   }
 }
 
@@ -210,7 +210,7 @@ class MapCacheFolder : public ::testing::Test {
  protected:
   void write_source(const std::string& text) { write_file(source_, text); }
   std::string cache_file() const { return map_cache_path(source_, {}); }
-  /// Loads the source and says what became of the cache.
+  /// Loads the source and returns how the cache was used.
   std::string outcome(const OpenDriveOptions& options = {}) {
     LoadReport report;
     map_ = load_map(source_, options, &report);
@@ -243,7 +243,7 @@ TEST_F(MapCacheFolder, ChangedFilesAreImportedAgain) {
   EXPECT_EQ(outcome(), "cached");
   EXPECT_EQ(map_->road_names.size(), 2u);
   write_source(small_file(1).substr(0, 300));
-  EXPECT_THROW(outcome(), Error) << "a cached map does not stand in for a broken file";
+  EXPECT_THROW(outcome(), Error) << "a cached map does not replace a broken file";
 }
 
 TEST_F(MapCacheFolder, OtherOptionsHaveTheirOwnFile) {
@@ -259,7 +259,7 @@ TEST_F(MapCacheFolder, OtherOptionsHaveTheirOwnFile) {
   EXPECT_EQ(outcome(), "cached");
 }
 
-TEST_F(MapCacheFolder, AnotherImporterIsAskedAgain) {
+TEST_F(MapCacheFolder, AnotherImporterImportsAgain) {
   write_source(small_file());
   outcome();
   MapCacheKey key = map_cache_key(read_file(source_), {});
@@ -272,12 +272,13 @@ TEST_F(MapCacheFolder, AnotherImporterIsAskedAgain) {
 TEST_F(MapCacheFolder, DamagedCachesAreReplaced) {
   write_source(small_file());
   outcome();
-  const std::string sound = read_file(cache_file());
-  for (const std::string& bytes : {std::string(), sound.substr(0, 100), "\x7f" + sound, sound + "more"}) {
+  const std::string valid_bytes = read_file(cache_file());
+  for (const std::string& bytes :
+       {std::string(), valid_bytes.substr(0, 100), "\x7f" + valid_bytes, valid_bytes + "more"}) {
     write_file(cache_file(), bytes);
     EXPECT_THAT(outcome(), HasSubstr(cache_file()));
     EXPECT_EQ(outcome(), "cached");
-    EXPECT_EQ(read_file(cache_file()), sound);
+    EXPECT_EQ(read_file(cache_file()), valid_bytes);
   }
   fs::remove(cache_file());
   fs::create_directory(cache_file());
@@ -294,19 +295,19 @@ TEST_F(MapCacheFolder, TheCacheCanBeTurnedOffOrBeMissing) {
     EXPECT_EQ(cache_file(), "");
   }
   {
-    const EnvironmentVariable nowhere("XDG_CACHE_HOME", "/proc/nowhere");
+    const EnvironmentVariable invalid_cache("XDG_CACHE_HOME", "/proc/nowhere");
     EXPECT_EQ(outcome(), "imported");
     EXPECT_EQ(outcome(), "imported");
   }
   EXPECT_FALSE(fs::exists(folder_ / "cache"));
   const EnvironmentVariable none("XDG_CACHE_HOME", std::nullopt), home("HOME", folder_.path());
   EXPECT_THAT(cache_file(), ::testing::StartsWith(folder_ / ".cache/pictura/maps/small-"));
-  const EnvironmentVariable homeless("HOME", std::nullopt);
+  const EnvironmentVariable no_home("HOME", std::nullopt);
   EXPECT_EQ(cache_file(), "");
 }
 
-TEST_F(MapCacheFolder, ImportsWithWarningsAreNotKept) {
-  // A road that is linked to one that is not there.
+TEST_F(MapCacheFolder, ImportsWithWarningsAreNotCached) {
+  // A road linked to a missing one.
   const std::string text = small_file();
   write_source(std::string(text).replace(text.find("<link>"), 6,
                                          R"(<link><successor elementType="road" elementId="9" )"
@@ -323,7 +324,7 @@ TEST_F(MapCacheFolder, ImportsWithWarningsAreNotKept) {
   EXPECT_EQ(outcome({.lenient = true}), "cached");
 }
 
-TEST_F(MapCacheFolder, ProceduralTownsNeedNone) {
+TEST_F(MapCacheFolder, ProceduralTownsAreNotCached) {
   LoadReport report;
   load_map("procedural:3", {}, &report);
   load_map("procedural:3", {}, &report);
@@ -334,7 +335,7 @@ TEST_F(MapCacheFolder, ProceduralTownsNeedNone) {
 TEST_F(MapCacheFolder, CarlaTownsLoadInLessThan50Ms) {
   const std::vector<std::string> towns = known_towns();
   if (towns.empty()) GTEST_SKIP() << "no .xodr files in " << map_folder() << " (set PICTURA_DATA)";
-  // Of the processor: other programs share the machine.
+  // CPU time, since other programs share the machine.
   const auto load_ms = [](const std::string& town, LoadReport* report) {
     const std::clock_t begin = std::clock();
     load_map(town, {}, report);

@@ -1,4 +1,4 @@
-// What a map looks like: strips, heads and walls of a small road, of a procedural town, and of Town01.
+// Static geometry: strips, heads and walls of small roads, procedural towns and CARLA towns.
 #include "pictura/map/map_geometry.h"
 
 #include <cmath>
@@ -19,7 +19,7 @@ int count_of(const StaticGeometry& geometry, StripKind kind) {
   return count;
 }
 
-TEST(MapGeometry, AStraightRoadHasItsMarksAndItsFrame) {
+TEST(MapGeometry, AStraightRoadHasItsMarksAndItsEdges) {
   test::RoadText road;
   road.center_mark = R"(<roadMark sOffset="0" type="solid" color="yellow" width="0.12"/>)";
   road.left = test::lane_of(1, "driving", 4);
@@ -41,7 +41,7 @@ TEST(MapGeometry, AStraightRoadHasItsMarksAndItsFrame) {
   }
 }
 
-TEST(MapGeometry, WhatIsPaintedTwiceIsDrawnOnce) {
+TEST(MapGeometry, DuplicateMarkingsAreDrawnOnce) {
   test::RoadText road;
   road.center_mark = R"(<roadMark sOffset="0" type="solid" color="yellow" width="0.12"/>)";
   road.right = test::lane_of(-1, "driving", 4);
@@ -54,7 +54,7 @@ TEST(MapGeometry, WhatIsPaintedTwiceIsDrawnOnce) {
   EXPECT_GT(make_static_geometry(map, {.walls = false}).strips.size(), strips);
 }
 
-TEST(MapGeometry, ACrosswalkThatTwoRoadsBringIsDrawnOnce) {
+TEST(MapGeometry, ADuplicateCrosswalkIsDrawnOnce) {
   test::RoadText road;
   road.right = test::lane_of(-1, "driving", 4);
   road.rest = R"(<objects><object id="2" type="crosswalk" s="50" t="0" length="4" width="3"/></objects>)";
@@ -116,7 +116,7 @@ class Walls : public ::testing::TestWithParam<const char*> {
  protected:
   void SetUp() override {
     const std::string name = GetParam();
-    if (const std::string why = test::missing(name); !why.empty()) GTEST_SKIP() << why;
+    if (const std::string reason = test::missing(name); !reason.empty()) GTEST_SKIP() << reason;
     map_ = load_map(name);
   }
   std::shared_ptr<const RoadMap> map_;
@@ -126,7 +126,7 @@ INSTANTIATE_TEST_SUITE_P(All, Walls,
                          ::testing::Values("Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07",
                                            "Town10HD", "procedural:1", "procedural:2"));
 
-TEST_P(Walls, FollowTheirSeedAndLeaveGaps) {
+TEST_P(Walls, DependOnTheirSeedAndLeaveGaps) {
   const std::vector<WallFace> walls = make_walls(*map_, {.wall_seed = 7}), again = make_walls(*map_, {.wall_seed = 7}),
                               other = make_walls(*map_, {.wall_seed = 8});
   ASSERT_EQ(walls.size(), again.size());
@@ -153,23 +153,23 @@ bool cross_each_other(Vec2 a, Vec2 b, Vec2 c, Vec2 d) {
   return side(a, b, c) != side(a, b, d) && side(c, d, a) != side(c, d, b);
 }
 
-/// Up to 60 m, as long as the street bends by less than 15 degrees: beyond that a building beside it may hide what is
-/// ahead.
-TEST_P(Walls, LeaveSightAlongStreets) {
-  constexpr float kSight_m = 60, kBend_rad = 15 * kPi / 180;
+/// Up to 60 m, as long as the street bends by less than 15 degrees: beyond that a building next to it may block the
+/// view.
+TEST_P(Walls, DoNotBlockTheViewAlongStreets) {
+  constexpr float kViewDistance_m = 60, kBend_rad = 15 * kPi / 180;
   const std::vector<WallFace> walls = make_walls(*map_, {});
-  int looks = 0;
+  int num_views = 0;
   for (const Lane& lane : map_->lanes) {
     if (!is_drivable(lane.type) || lane.in_junction) continue;
     const Span<const LanePoint> points = map_->points_of(lane);
     for (std::size_t from = 0, to = 0; from < points.size(); ++from) {
       to = std::max(to, from);
-      while (to + 1 < points.size() && points[to + 1].s_m <= points[from].s_m + kSight_m &&
+      while (to + 1 < points.size() && points[to + 1].s_m <= points[from].s_m + kViewDistance_m &&
              std::abs(wrap_angle(points[to + 1].heading_rad - points[from].heading_rad)) < kBend_rad) {
         ++to;
       }
       const Vec3 eye = points[from].position_m, ahead = points[to].position_m;
-      ++looks;
+      ++num_views;
       for (const WallFace& wall : walls) {
         if (std::abs(wall.a_m.z - eye.z) > 2) continue;
         ASSERT_FALSE(cross_each_other(eye.xy(), ahead.xy(), wall.a_m.xy(), wall.b_m.xy()))
@@ -177,10 +177,10 @@ TEST_P(Walls, LeaveSightAlongStreets) {
       }
     }
   }
-  EXPECT_GT(looks, 100);
+  EXPECT_GT(num_views, 100);
 }
 
-/// Lanes of every type: what is driven on, parked on and walked on.
+/// Checked against lanes of every type.
 TEST_P(Walls, StandOnNoLaneAndHaveTheRoadOnTheirRight) {
   ASSERT_GT(map_->building_lines.size(), 50u);
   for (const BuildingLine& line : map_->building_lines) {
@@ -189,14 +189,14 @@ TEST_P(Walls, StandOnNoLaneAndHaveTheRoadOnTheirRight) {
     bool on_right = false;
     for (const Lane& lane : map_->lanes) {
       for (const LanePoint& point : map_->points_of(lane)) {
-        for (const Vec2 place : {line.a_m.xy(), middle, line.b_m.xy()}) {
-          const float clear_m = length(point.position_m.xy() - place) - 0.5f * point.width_m;
-          ASSERT_GT(clear_m, 0.3f) << "at " << place.x << ", " << place.y;
+        for (const Vec2 point_m : {line.a_m.xy(), middle, line.b_m.xy()}) {
+          const float clearance_m = length(point.position_m.xy() - point_m) - 0.5f * point.width_m;
+          ASSERT_GT(clearance_m, 0.3f) << "at " << point_m.x << ", " << point_m.y;
         }
-        // The road wraps round the corners of a block: its side is judged from the middle.
-        const float clear_m = length(point.position_m.xy() - middle) - 0.5f * point.width_m;
-        if (clear_m >= nearest_m) continue;
-        nearest_m = clear_m;
+        // The road surrounds the corners of a block, so its side is determined from the middle of the line.
+        const float clearance_m = length(point.position_m.xy() - middle) - 0.5f * point.width_m;
+        if (clearance_m >= nearest_m) continue;
+        nearest_m = clearance_m;
         on_right = cross(along, point.position_m.xy() - middle) < 0;
       }
     }

@@ -1,4 +1,4 @@
-// Cubic reference lines and banked roads against what their formulae give by hand.
+// Cubic reference lines and banked roads against formulae evaluated by hand.
 #include <cmath>
 #include <string>
 #include <vector>
@@ -36,13 +36,13 @@ RoadText parabola(const std::string& cubic) {
 }
 
 TEST(OpenDriveCurves, TheSameParabolaAsPoly3AndBothParamPoly3) {
-  const double length = parabola_length(60), share = 60 / length;
+  const double length = parabola_length(60), scale = 60 / length;
   const std::string as_poly3 = R"(<poly3 a="0" b="0" c="0.01" d="0"/>)";
   const std::string normalized =
       R"(<paramPoly3 pRange="normalized" aU="0" bU="60" cU="0" dU="0" aV="0" bV="0" cV="36" dV="0"/>)";
   const std::string by_length =
       fmt::format(R"(<paramPoly3 pRange="arcLength" aU="0" bU="{}" cU="0" dU="0" aV="0" bV="0" cV="{}" dV="0"/>)",
-                  share, 0.01 * share * share);
+                  scale, 0.01 * scale * scale);
   for (const std::string& cubic : {as_poly3, normalized, by_length}) {
     const RoadMap map = parse(parabola(cubic).text());
     const Span<const LanePoint> points = map.points_of(map.lanes[0]);
@@ -58,7 +58,7 @@ TEST(OpenDriveCurves, TheSameParabolaAsPoly3AndBothParamPoly3) {
 }
 
 TEST(OpenDriveCurves, StationsOnCubicsAreArcLengths) {
-  // The second half of the lane is wider from the s at which the parabola passes u = 40.
+  // The second section begins at the s at which the parabola passes u = 40.
   RoadText road = parabola(R"(<poly3 a="0" b="0" c="0.01" d="0"/>)");
   road.sections = "<laneSection s=\"0\"><center/><right>" + lane_of(-1, "driving", 4) +
                   fmt::format("</right></laneSection><laneSection s=\"{}\"><center/><right>", parabola_length(40)) +
@@ -67,7 +67,7 @@ TEST(OpenDriveCurves, StationsOnCubicsAreArcLengths) {
   expect_at(map, map.points_of(lane_named(map, "1", 1, -1))[0].position_m, 40, 16);
 }
 
-TEST(OpenDriveCurves, ACurveOfAnotherLengthThanItsGeometryIsRefused) {
+TEST(OpenDriveCurves, ACurveOfAnotherLengthThanItsGeometryIsRejected) {
   EXPECT_THROW(
       parse(parabola(R"(<paramPoly3 pRange="normalized" aU="0" bU="30" cU="0" dU="0" aV="0" bV="0" cV="9" dV="0"/>)")
                 .text()),
@@ -78,7 +78,7 @@ TEST(OpenDriveCurves, ACurveOfAnotherLengthThanItsGeometryIsRefused) {
       Error);
 }
 
-opendrive::Profile falling(double at_start, double per_metre) { return {{{0, at_start, per_metre, 0, 0}}}; }
+opendrive::Profile linear_profile(double at_start, double per_metre) { return {{{0, at_start, per_metre, 0, 0}}}; }
 
 void expect_border(const opendrive::Border& border, double t, double slope) {
   EXPECT_NEAR(border.t, t, 1e-12);
@@ -87,43 +87,43 @@ void expect_border(const opendrive::Border& border, double t, double slope) {
 
 TEST(OpenDriveCurves, ALaneOfNegativeWidthNeitherMovesNorTurnsItsBorder) {
   opendrive::FileRoad road;
-  road.lane_offset = falling(0.5, 0.01);
+  road.lane_offset = linear_profile(0.5, 0.01);
   opendrive::FileSection section;
   section.end = 20;
   section.left.resize(2);
-  section.left[0].width = falling(1, -0.1);  // 0 at s = 10
-  section.left[1].width = falling(3, 0.02);
+  section.left[0].width = linear_profile(1, -0.1);  // 0 at s = 10
+  section.left[1].width = linear_profile(3, 0.02);
   expect_border(border_at(road, section, 1, 5), 0.55 + 0.5, 0.01 - 0.1);
   expect_border(border_at(road, section, 1, 15), 0.65, 0.01);
   expect_border(border_at(road, section, 2, 15), 0.65 + 3.3, 0.01 + 0.02);
 }
 
-TEST(OpenDriveCurves, ABorderInsideTheOneBeforeLiesOnItAndRunsAsItDoes) {
+TEST(OpenDriveCurves, ABorderInsideThePreviousOneCoincidesWithIt) {
   const opendrive::FileRoad road;
   opendrive::FileSection section;
   section.end = 20;
   section.right.resize(2);
-  section.right[0].border = falling(-3, -0.1);
-  section.right[1].border = falling(-4, 0.02);  // crosses the first one at s = 8.33
+  section.right[0].border = linear_profile(-3, -0.1);
+  section.right[1].border = linear_profile(-4, 0.02);  // crosses the first one at s = 8.33
   expect_border(border_at(road, section, -2, 5), -3.9, 0.02);
   expect_border(border_at(road, section, -2, 15), -4.5, -0.1);
 }
 
-/// A straight road with lanes of 4 m on both sides and a pavement of 2 m on the right, banked as `lateral` says.
-RoadMap banked(const std::string& lateral, const std::string& pavement_attributes = "",
-               const std::string& pavement_more = "") {
+/// A straight road with lanes of 4 m on both sides and a sidewalk of 2 m on the right, with the banking in `lateral`.
+RoadMap banked(const std::string& lateral, const std::string& sidewalk_attributes = "",
+               const std::string& sidewalk_more = "") {
   RoadText road;
   road.lateral = lateral;
   road.left = lane_of(1, "driving", 4);
   road.right = lane_of(-1, "driving", 4) +
                fmt::format(R"(<lane id="-2" type="sidewalk"{}>{}<width sOffset="0" a="2" b="0" c="0" d="0"/></lane>)",
-                           pavement_attributes, pavement_more);
+                           sidewalk_attributes, sidewalk_more);
   return parse(road.text());
 }
 
 Vec3 first_of(const RoadMap& map, int lane) { return map.points_of(lane_named(map, "1", 0, lane))[0].position_m; }
 
-TEST(OpenDriveBanking, SuperelevationTurnsTheRoadAboutItsReferenceLine) {
+TEST(OpenDriveBanking, SuperelevationRotatesTheRoadAboutItsReferenceLine) {
   const RoadMap map = banked(R"(<superelevation s="0" a="0.1" b="0" c="0" d="0"/>)");
   const double c = std::cos(0.1), s = std::sin(0.1);
   expect_at(map, first_of(map, -1), 0, -2 * c, -2 * s);
@@ -150,7 +150,7 @@ TEST(OpenDriveBanking, CrossfallFallsOutwardsOnItsSide) {
 }
 
 TEST(OpenDriveBanking, ShapesAreLinearBetweenTheirStations) {
-  // At s = 0 flat, at s = 100 a roof: it falls by 0.1 per metre to both sides of the middle.
+  // Flat at s = 0; at s = 100 it falls by 0.1 per metre to both sides of the centre.
   const RoadMap map =
       banked(R"(<shape s="0" t="-10" a="0" b="0" c="0" d="0"/><shape s="100" t="-10" a="-1" b="0.1" c="0" d="0"/>)"
              R"(<shape s="100" t="0" a="0" b="-0.1" c="0" d="0"/>)");
@@ -167,7 +167,7 @@ TEST(OpenDriveBanking, LevelLanesKeepTheHeightOfTheirInnerBorder) {
   expect_at(map, first_of(map, -1), 0, -2 * std::cos(0.1), -2 * std::sin(0.1));
 }
 
-TEST(OpenDriveBanking, LanesStandAsHighAsTheirHeightSays) {
+TEST(OpenDriveBanking, LaneHeightsAreAdded) {
   const RoadMap map = banked("", "",
                              R"(<height sOffset="0" inner="0.1" outer="0.2"/>)"
                              R"(<roadMark sOffset="0" type="solid" color="white"/>)");
@@ -182,7 +182,7 @@ TEST(OpenDriveBanking, RoadEdgesLieOnTheBankedRoad) {
   for (const RoadEdge& edge : map.road_edges) EXPECT_NEAR(edge.a_m.z, edge.a_m.y * std::tan(0.1), 1e-3);
 }
 
-TEST(OpenDriveBanking, CrossSectionsOfStripsAreRefusedByName) {
+TEST(OpenDriveBanking, CrossSectionsOfStripsAreRejectedByName) {
   try {
     banked("<crossSectionSurface/>");
     ADD_FAILURE();

@@ -1,4 +1,4 @@
-// What malformed OpenDRIVE files get: an Error that names source, line, road and element, and nothing worse.
+// Malformed OpenDRIVE files give an Error that names source, line, road and element.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -33,16 +33,16 @@ std::string replaced(std::string text, const std::string& from, const std::strin
   return text.replace(at, from.size(), to);
 }
 
-TEST(OpenDriveErrors, TheUnspoiltFileIsGood) { EXPECT_EQ(message_of(good_file()), test::kNoError); }
+TEST(OpenDriveErrors, TheUnchangedFileIsValid) { EXPECT_EQ(message_of(good_file()), test::kNoError); }
 
-TEST(OpenDriveErrors, WhatIsNotOpenDriveIsRefused) {
+TEST(OpenDriveErrors, OtherFormatsAreRejected) {
   EXPECT_THAT(message_of(""), HasSubstr("bad.xodr"));
   EXPECT_THAT(message_of("P6 640 480 255"), HasSubstr("bad.xodr"));
   EXPECT_THAT(message_of("<svg/>"), AllOf(HasSubstr("expected OpenDRIVE"), HasSubstr("<svg>")));
   EXPECT_THAT(message_of("<OpenDRIVE/>"), HasSubstr("<road>"));
 }
 
-TEST(OpenDriveErrors, EveryTruncationIsRefused) {
+TEST(OpenDriveErrors, EveryTruncationIsRejected) {
   const std::string text = good_file();
   for (std::size_t length = 0; length + 14 < text.size(); ++length) {
     EXPECT_NE(message_of(text.substr(0, length)), test::kNoError) << length;
@@ -51,7 +51,7 @@ TEST(OpenDriveErrors, EveryTruncationIsRefused) {
 
 TEST(OpenDriveErrors, AttributesAreCheckedAndNamedWithTheirLine) {
   const std::string text = good_file();
-  // <geometry> is on the seventh line: three of the file's head, <road>, <link>, <planView>, <geometry>.
+  // <geometry> is on the seventh line: after three lines of file header, <road>, <link> and <planView>.
   for (const auto& [from, to, expected] : std::vector<std::array<std::string, 3>>{
            {"x=\"0\"", "x=\"nan\"", "bad.xodr:7: road 1: <geometry>: attribute x: expected a finite number, got 'nan'"},
            {"x=\"0\"", "x=\"inf\"", "attribute x"},
@@ -117,7 +117,7 @@ TEST(OpenDriveErrors, IdsAreUnique) {
   EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("another signal has 5 already"));
 }
 
-TEST(OpenDriveErrors, LinksMustLeadSomewhere) {
+TEST(OpenDriveErrors, LinksMustHaveATarget) {
   RoadText road;
   road.link = R"(<predecessor elementType="road" elementId="1" contactPoint="end"/>)"
               R"(<successor elementType="road" elementId="1" contactPoint="start"/>)";
@@ -139,7 +139,7 @@ TEST(OpenDriveErrors, LinksMustLeadSomewhere) {
               HasSubstr("controller 4: <controller>: controls signal 6"));
 }
 
-TEST(OpenDriveErrors, RoadsThatContradictEachOtherAreRefused) {
+TEST(OpenDriveErrors, ContradictoryRoadLinksAreRejected) {
   auto link = [](const char* end, const char* road, const char* contact) {
     return fmt::format(R"(<{} elementType="road" elementId="{}" contactPoint="{}"/>)", end, road, contact);
   };
@@ -149,7 +149,7 @@ TEST(OpenDriveErrors, RoadsThatContradictEachOtherAreRefused) {
   b.geometry = line_at(0, 100, 0, 0, 100);
   c.id = "3";
   c.geometry = line_at(0, 100, 50, 0, 100);
-  // A road that is its own predecessor is a ring, whose end says so too.
+  // A road that is its own predecessor is a ring; its end must be linked back.
   for (const char* contact : {"start", "end"}) {
     a.link = link("predecessor", "1", contact);
     EXPECT_THAT(message_of(file_of(a.text())),
@@ -159,7 +159,7 @@ TEST(OpenDriveErrors, RoadsThatContradictEachOtherAreRefused) {
   a.link += link("successor", "2", "start");
   EXPECT_THAT(message_of(file_of(a.text() + b.text())),
               HasSubstr("bad.xodr:5: road 1: <predecessor>: the end of road 1 is linked to the start of road 2"));
-  // 1 goes on into 2, which says that it comes from 3.
+  // Road 1 continues into 2, which names 3 as its predecessor.
   a.link = link("successor", "2", "start");
   b.link = link("predecessor", "3", "end");
   EXPECT_THAT(message_of(file_of(a.text() + b.text() + c.text())),
@@ -181,7 +181,7 @@ TEST(OpenDriveErrors, SectionsAreInOrder) {
   EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("<laneSection>: attribute s: expected a number in [0, 100]"));
 }
 
-TEST(OpenDriveErrors, WhatIsNotSupportedIsRefusedByName) {
+TEST(OpenDriveErrors, UnsupportedFeaturesAreRejectedByName) {
   RoadText road;
   road.right = lane_of(-1, "driving", 3);
   for (const char* type : {"virtual", "crossing"}) {
@@ -195,9 +195,9 @@ TEST(OpenDriveErrors, WhatIsNotSupportedIsRefusedByName) {
   EXPECT_THAT(message_of(file_of("<include file=\"other.xodr\"/>" + road.text())), HasSubstr("<include>"));
 }
 
-TEST(OpenDriveErrors, HostileFilesAreRefusedAtTheDoor) {
+TEST(OpenDriveErrors, MaliciousFilesAreRejected) {
   const std::string text = good_file();
-  // Entities that grow a thousandfold with each level.
+  // Entities that expand exponentially.
   EXPECT_THAT(message_of(replaced(text, "<OpenDRIVE>", "<!DOCTYPE a [<!ENTITY b \"&a;&a;\">]><OpenDRIVE>")),
               HasSubstr("bad.xodr:2: a document type (<!DOCTYPE>) is not supported"));
   std::string nul = text;
@@ -215,7 +215,7 @@ TEST(OpenDriveErrors, HostileFilesAreRefusedAtTheDoor) {
               HasSubstr("bad.xodr:13: <lane> attribute type: expected at most 65536 bytes, got 1048576"));
 }
 
-TEST(OpenDriveErrors, ObjectsAndSignalsStandAtTheirRoad) {
+TEST(OpenDriveErrors, ObjectsAndSignalsAreNearTheirRoad) {
   RoadText road;
   road.right = lane_of(-1, "driving", 3);
   for (
@@ -237,8 +237,8 @@ TEST(OpenDriveErrors, ObjectsAndSignalsStandAtTheirRoad) {
   }
 }
 
-TEST(OpenDriveErrors, WindingCurvesDoNotEatTheMemory) {
-  // A cubic of height that rises and falls by kilometres within metres.
+TEST(OpenDriveErrors, WindingCurvesUseBoundedMemory) {
+  // An elevation cubic that exceeds all limits.
   RoadText road;
   road.length = 1e5;
   road.right = lane_of(-1, "driving", 3);
@@ -248,7 +248,7 @@ TEST(OpenDriveErrors, WindingCurvesDoNotEatTheMemory) {
   const std::string text = file_of(road.text());
   const RoadMap map = parse_opendrive(text, "long.xodr");
   EXPECT_LT(map.lane_points.size(), 20'000u);
-  // Kilometres of lane that swings by hundreds of metres.
+  // A lane of 3 km that swings by hundreds of metres.
   road.length = 3e3;
   road.geometry.clear();
   for (int i = 0; i < 30; ++i) {

@@ -1,4 +1,4 @@
-// Where lanes run: small OpenDRIVE files against coordinates computed by hand.
+// Lane geometry: small OpenDRIVE files against coordinates computed by hand.
 #include <cmath>
 #include <map>
 
@@ -67,7 +67,7 @@ TEST(OpenDriveGeometry, ArcLanesKeepTheirRadiusWithinTheChordError) {
   EXPECT_LT(points.size(), 60u);
 }
 
-TEST(OpenDriveGeometry, SpiralEndsWhereItsSeriesSays) {
+TEST(OpenDriveGeometry, SpiralMatchesItsSeries) {
   // Curvature 0 to 0.02 over 100 m turns by 1 rad. Ends of a clothoid by the series of the Fresnel integrals:
   // x = L (1 - 1/10 + 1/216 - 1/9360 + 1/685440), y = L (1/3 - 1/42 + 1/1320 - 1/75600 + 1/6894720).
   const double x = 100 * (1 - 1.0 / 10 + 1.0 / 216 - 1.0 / 9360 + 1.0 / 685440);
@@ -118,7 +118,7 @@ TEST(OpenDriveGeometry, CoordinatesAreKeptFarFromTheFilesOrigin) {
   expect_at(map, map.lane_points[0].position_m, 4.5e6, -7.25e6 - 1.5);
 }
 
-TEST(OpenDriveLanes, SectionsAreJoinedAndNeighboursStandSideBySide) {
+TEST(OpenDriveLanes, SectionsAreLinkedAndNeighboursAreAdjacent) {
   RoadText road;
   const std::string left = lane_of(1, "driving", 3, R"(<link><successor id="1"/></link>)");
   road.sections = "<laneSection s=\"0\"><left>" + lane_of(1, "driving", 3, R"(<link><successor id="2"/></link>)") +
@@ -135,7 +135,7 @@ TEST(OpenDriveLanes, SectionsAreJoinedAndNeighboursStandSideBySide) {
   EXPECT_EQ(a2.left_neighbor, index_of(map, a1));
   EXPECT_EQ(a1.left_neighbor, -1);
   EXPECT_EQ(a2.right_neighbor, -1);  // a shoulder
-  // On the left side traffic runs from the second section into the first, and the lane further out is on its right.
+  // On the left side traffic runs from the second section into the first, and the outer lane is on its right.
   const Lane &left_a = lane_named(map, "1", 0, 1), &left_b = lane_named(map, "1", 1, 2);
   EXPECT_EQ(list(map, left_b.successors), std::vector<int32_t>{index_of(map, left_a)});
   EXPECT_EQ(left_b.left_neighbor, index_of(map, lane_named(map, "1", 1, 1)));
@@ -143,7 +143,7 @@ TEST(OpenDriveLanes, SectionsAreJoinedAndNeighboursStandSideBySide) {
   EXPECT_NEAR(b1.length_m, 60, 1e-3);
 }
 
-TEST(OpenDriveLanes, ASectionOfAMicrometreIsBridged) {
+TEST(OpenDriveLanes, ASectionOfAMicrometreIsRemoved) {
   RoadText road;
   auto section = [](const char* s, const char* link) {
     return fmt::format("<laneSection s=\"{}\"><center/><right>{}</right></laneSection>\n", s,
@@ -215,7 +215,7 @@ TEST(OpenDriveLanes, SpeedUnits) {
 }
 
 TEST(OpenDriveLanes, ARingIsEndlessAndADeadEndIsNotUnlessOneCanChangeLanes) {
-  // A circle of radius 20 that leads into itself; only the outer of its two lanes does.
+  // A circular road of radius 20, linked to itself; only the outer of its two lanes is linked.
   RoadText ring;
   ring.length = 40 * M_PI;
   ring.geometry =

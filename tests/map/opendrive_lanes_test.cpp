@@ -1,5 +1,4 @@
-// How lanes are described and joined: borders, one-sided sections, limits along the way, direct junctions, left-hand
-// traffic, the header.
+// Lanes and links: borders, one-sided sections, speed limits, direct junctions, left-hand traffic, the header.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -43,19 +42,19 @@ TEST(OpenDriveLanes, BordersAreOffsetsFromTheReferenceLine) {
   expect_at(map, outer.position_m, 0, -5);
   EXPECT_FLOAT_EQ(outer.width_m, 4);
   EXPECT_FLOAT_EQ(map.points_of(lane_named(map, "1", 0, 1))[0].width_m, 4);
-  // Borders that cross make a lane of negative width.
+  // Crossing borders give a negative width.
   road.right = R"(<lane id="-1" type="driving"><border sOffset="0" a="-3" b="0.1" c="0" d="0"/></lane>)";
   EXPECT_THROW(parse(road.text()), Error);
 }
 
-TEST(OpenDriveLanes, WidthsGoBeforeBorders) {
+TEST(OpenDriveLanes, WidthsOverrideBorders) {
   RoadText road;
   road.right = R"(<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/>)"
                R"(<border sOffset="0" a="-9" b="0" c="0" d="0"/></lane>)";
   EXPECT_FLOAT_EQ(parse(road.text()).lane_points[0].width_m, 3);
 }
 
-TEST(OpenDriveLanes, OneSidedSectionsLeaveTheOtherSideAsItIs) {
+TEST(OpenDriveLanes, OneSidedSectionsContinueTheOtherSide) {
   auto linked = [](int id, const char* link) { return lane_of(id, "driving", 3, link); };
   RoadText road;
   road.sections = "<laneSection s=\"0\"><left>" + linked(1, R"(<link><successor id="1"/></link>)") +
@@ -67,7 +66,7 @@ TEST(OpenDriveLanes, OneSidedSectionsLeaveTheOtherSideAsItIs) {
                   linked(1, R"(<link><predecessor id="1"/></link>)") + "</left><center/><right>" +
                   linked(-1, R"(<link><predecessor id="-1"/></link>)") + "</right></laneSection>";
   const RoadMap map = parse(road.text());
-  // Five lanes of the left side and the right side's two, the first of which is cut at 30.
+  // Four lanes of the left side and the right side's two, the first of which is split at 30.
   EXPECT_EQ(map.facts.lanes, 6);
   EXPECT_EQ(map.lanes.size(), 7u);
   int32_t at = index_of(map, lane_named(map, "1", 0, -1));
@@ -131,7 +130,7 @@ TEST(OpenDriveLanes, DirectionsOfLanesMayDifferFromTheirSide) {
   EXPECT_EQ(lane_named(map, "1", 0, -2).type, LaneType::bidirectional);
 }
 
-TEST(OpenDriveLanes, DirectJunctionsJoinRoadsWithoutRoadsOfTheirOwn) {
+TEST(OpenDriveLanes, DirectJunctionsLinkRoadsDirectly) {
   RoadText main, on, exit;
   main.link = R"(<successor elementType="junction" elementId="7"/>)";
   main.right = lane_of(-1, "driving", 3) + lane_of(-2, "exit", 3);
@@ -155,7 +154,7 @@ TEST(OpenDriveLanes, DirectJunctionsJoinRoadsWithoutRoadsOfTheirOwn) {
   EXPECT_EQ(map.facts.junction_roads, 0);
 }
 
-TEST(OpenDriveHeader, TheOffsetTurnsAndShiftsTheMap) {
+TEST(OpenDriveHeader, TheOffsetRotatesAndTranslatesTheMap) {
   RoadText road;
   road.geometry = line_at(0, 10, 5, 0, 100);
   road.right = lane_of(-1, "driving", 4);
@@ -165,12 +164,12 @@ TEST(OpenDriveHeader, TheOffsetTurnsAndShiftsTheMap) {
           road.text() + "</OpenDRIVE>",
       "geo.xodr");
   EXPECT_EQ(map.geo_reference, "+proj=utm +zone=32");
-  // (10, 5 - 2) turned by 90 degrees is (-3, 10).
+  // (10, 5 - 2) rotated by 90 degrees is (-3, 10).
   expect_at(map, map.lane_points[0].position_m, 1000 - 3, 2000 + 10, 30);
   EXPECT_NEAR(map.lane_points[0].heading_rad, M_PI / 2, 1e-5);
 }
 
-TEST(OpenDriveProvenance, EveryElementKnowsItsRoadAndLine) {
+TEST(OpenDriveProvenance, EveryElementHasItsRoadAndLine) {
   RoadText road;
   road.id = "12";
   road.center_mark = "\n<roadMark sOffset=\"0\" type=\"solid\" color=\"white\"/>";
@@ -202,8 +201,8 @@ TEST(OpenDriveProvenance, EveryElementKnowsItsRoadAndLine) {
   expect_from(from.building_lines, map.building_lines.size(), 0, 0);
 }
 
-/// A bend with two lanes each way, parking and a crosswalk, that leads over a junction with a light into a straight
-/// road; or the same seen in a mirror along x, where traffic keeps left.
+/// A bend with two lanes each way, parking and a sign, that leads through a junction with a light into a straight road;
+/// or its mirror image about the x axis, with left-hand traffic.
 std::string bend(bool mirrored) {
   const int m = mirrored ? -1 : 1;
   auto side = [&](int road) {
@@ -269,22 +268,23 @@ TEST(OpenDriveLeftHand, AMirroredFileGivesTheMirroredMap) {
     EXPECT_NEAR(a.y + map.origin_m[1], -(b.y + other.origin_m[1]), 1e-3);
     EXPECT_NEAR(a.z, b.z, 1e-3);
   };
-  auto twin = [&](int32_t lane) {
+  auto mirror_index = [&](int32_t lane) {
     if (lane < 0) return -1;
     const Lane& original = map.lanes[static_cast<std::size_t>(lane)];
     return index_of(other, lane_named(other, map.road_names[static_cast<std::size_t>(original.source_road)],
                                       original.source_section, -original.source_lane));
   };
-  auto twins = [&](const std::vector<int32_t>& lanes) {
+  auto mirror_indices = [&](const std::vector<int32_t>& lanes) {
     std::vector<int32_t> result;
-    for (const int32_t lane : lanes) result.push_back(twin(lane));
+    for (const int32_t lane : lanes) result.push_back(mirror_index(lane));
     std::sort(result.begin(), result.end());
     return result;
   };
   ASSERT_EQ(map.lanes.size(), 12u);
   ASSERT_EQ(other.lanes.size(), 12u);
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
-    const Lane &lane = map.lanes[i], &mirror = other.lanes[static_cast<std::size_t>(twin(static_cast<int32_t>(i)))];
+    const Lane &lane = map.lanes[i],
+               &mirror = other.lanes[static_cast<std::size_t>(mirror_index(static_cast<int32_t>(i)))];
     ASSERT_EQ(lane.points.size(), mirror.points.size());
     for (std::size_t k = 0; k < map.points_of(lane).size(); ++k) {
       const LanePoint &p = map.points_of(lane)[k], &q = other.points_of(mirror)[k];
@@ -292,12 +292,12 @@ TEST(OpenDriveLeftHand, AMirroredFileGivesTheMirroredMap) {
       EXPECT_NEAR(wrap_angle(p.heading_rad + q.heading_rad), 0, 1e-4);
       EXPECT_NEAR(p.width_m, q.width_m, 1e-4);
     }
-    EXPECT_EQ(twin(lane.left_neighbor), mirror.right_neighbor);
-    EXPECT_EQ(twin(lane.right_neighbor), mirror.left_neighbor);
-    EXPECT_EQ(twins(list(map, lane.successors)), list(other, mirror.successors));
-    EXPECT_EQ(twins(list(map, lane.predecessors)), list(other, mirror.predecessors));
+    EXPECT_EQ(mirror_index(lane.left_neighbor), mirror.right_neighbor);
+    EXPECT_EQ(mirror_index(lane.right_neighbor), mirror.left_neighbor);
+    EXPECT_EQ(mirror_indices(list(map, lane.successors)), list(other, mirror.successors));
+    EXPECT_EQ(mirror_indices(list(map, lane.predecessors)), list(other, mirror.predecessors));
   }
-  // Traffic of the mirrored road keeps left: lane 1 runs along s, with lane 2 on its left.
+  // Left-hand traffic: lane 1 runs along s, with lane 2 on its left.
   const Lane& first = lane_named(other, "3", 0, 1);
   EXPECT_EQ(first.left_neighbor, index_of(other, lane_named(other, "3", 0, 2)));
   EXPECT_NEAR(other.points_of(first)[0].heading_rad, -1.2, 0.01);

@@ -1,4 +1,4 @@
-// Lenient reading: faulty parts are left out with a warning each, and what remains is a valid map.
+// Lenient reading: faulty parts are skipped with a warning each, and the rest is a valid map.
 #include <random>
 #include <string>
 #include <vector>
@@ -32,7 +32,7 @@ LenientMap read_leniently(const std::string& text) {
   return result;
 }
 
-/// Two roads in a row with a bit of everything.
+/// Two consecutive roads with elements of several kinds.
 RoadText first_road() {
   RoadText road;
   road.link = R"(<successor elementType="road" elementId="2" contactPoint="start"/>)";
@@ -59,13 +59,13 @@ std::string replaced(std::string text, const std::string& from, const std::strin
   return text.replace(at, from.size(), to);
 }
 
-TEST(OpenDriveLenient, ASoundFileGivesNoWarning) {
+TEST(OpenDriveLenient, AValidFileGivesNoWarning) {
   const LenientMap read = read_leniently(good_file());
   EXPECT_THAT(read.warnings, IsEmpty());
   EXPECT_EQ(read.map.lanes.size(), 3u);
 }
 
-TEST(OpenDriveLenient, TheSmallestPartAroundAFaultIsLeftOut) {
+TEST(OpenDriveLenient, TheSmallestFaultyPartIsSkipped) {
   struct Case {
     const char *from, *to, *warning;
     std::size_t lanes, markings, crosswalks, signs, links;
@@ -115,20 +115,20 @@ TEST(OpenDriveLenient, ManyFaultsAreCountedRatherThanListed) {
   EXPECT_EQ(read.warnings.back(), "and 50 more");
 }
 
-TEST(OpenDriveLenient, WhatLeavesNoMapIsStillAnError) {
+TEST(OpenDriveLenient, FaultsThatLeaveNoMapAreErrors) {
   EXPECT_THROW(read_leniently(""), Error);
   EXPECT_THROW(read_leniently("<OpenDRIVE/>"), Error);
   EXPECT_THROW(read_leniently(replaced(file_of(second_road().text()), "x=\"100\"", "x=\"inf\"")), Error);
 }
 
 TEST(OpenDriveLenient, DamagedFilesGiveAValidMapOrAnError) {
-  // parse_opendrive validates what it returns; anything but a map or an Error ends the test.
-  const std::string sound = good_file();
+  // parse_opendrive validates its result; anything but a map or an Error ends the test.
+  const std::string valid_text = good_file();
   std::mt19937 random(7);
   const std::string alphabet = "0123456789-.e\"<>/= abcxyz";
   int maps = 0;
   for (int trial = 0; trial < 3000; ++trial) {
-    std::string text = sound;
+    std::string text = valid_text;
     for (unsigned damage = random() % 3 + 1; damage-- > 0;) {
       const std::size_t at = random() % text.size();
       if (random() % 4 == 0) {

@@ -1,4 +1,4 @@
-// What is painted: marks of every type, listed lines, crosswalks, stop lines, parking spaces.
+// Paint: marks of every type, listed lines, crosswalks, stop lines, parking spaces.
 #include <cmath>
 #include <string>
 #include <vector>
@@ -20,7 +20,7 @@ using test::line_at;
 using test::parse;
 using test::RoadText;
 
-/// The map of a straight road of 100 m whose middle has these marks.
+/// The map of a straight road of 100 m with these marks on its center lane.
 RoadMap marked(const std::string& marks) {
   RoadText road;
   road.center_mark = marks;
@@ -28,7 +28,7 @@ RoadMap marked(const std::string& marks) {
   return parse(road.text());
 }
 
-/// Begin and end of a marking along the road, and how far left of the middle it begins.
+/// Start and end of a marking along the road, and its lateral offset to the left at the start.
 struct Stroke {
   double begin, end, left;
   bool operator==(const Stroke&) const = default;
@@ -69,7 +69,7 @@ TEST(OpenDrivePaint, MarksHaveTheirPatternsColoursAndWidths) {
     EXPECT_TRUE(broken.markings[i].broken);
   }
 
-  // The center line's first word is its left stripe, one width from the middle.
+  // The first word of a center line's type is its left stripe, one width from the centre.
   const RoadMap both = marks(R"(type="solid broken" color="white" width="0.1")");
   ASSERT_EQ(both.markings.size(), 10u);
   for (const Marking& marking : both.markings) {
@@ -84,7 +84,7 @@ TEST(OpenDrivePaint, MarksHaveTheirPatternsColoursAndWidths) {
   }
 }
 
-TEST(OpenDrivePaint, CrosswalksAndParkingSpacesStandWhereTheyShould) {
+TEST(OpenDrivePaint, CrosswalksAndParkingSpacesAreWhereTheyShouldBe) {
   RoadText road;
   road.geometry = line_at(0, 0, 0, M_PI / 2, 100);
   road.right = lane_of(-1, "driving", 3);
@@ -98,7 +98,7 @@ TEST(OpenDrivePaint, CrosswalksAndParkingSpacesStandWhereTheyShould) {
   const RoadMap map = parse(road.text());
   ASSERT_EQ(map.crosswalks.size(), 2u);
   ASSERT_EQ(map.crosswalks[0].outline.size(), 3);
-  // Along the road is +y here, and its left is -x.
+  // The road runs along +y, so its left is -x.
   expect_at(map, map.outline_points[0], -3, 11, 0.5);
   expect_at(map, map.outline_points[1], -3, 9, 0.5);
   expect_at(map, map.outline_points[2], -1, 9, 0.5);
@@ -128,16 +128,16 @@ TEST(OpenDrivePaint, ColoursAndWeightsOfAllVersions) {
   EXPECT_THROW(marked(R"(<roadMark sOffset="0" type="dotted" color="white"/>)"), Error);
 }
 
-TEST(OpenDrivePaint, BottsDotsStandApart) {
+TEST(OpenDrivePaint, BottsDotsAreSpaced) {
   const RoadMap map = marked(R"(<roadMark sOffset="0" type="botts dots" color="white"/>)");
   const std::vector<Stroke> strokes = strokes_of(map);
-  ASSERT_EQ(strokes.size(), 82u);  // one every 1.2192 m from 0 on; of the last, 3 cm are left, which is too little
+  ASSERT_EQ(strokes.size(), 82u);  // one every 1.2192 m; the remaining 3 cm of the last are too short
   EXPECT_NEAR(strokes[1].begin, 1.219, 1e-3);
   EXPECT_NEAR(strokes[1].end - strokes[1].begin, 0.1016, 2e-3);
 }
 
-TEST(OpenDrivePaint, ListedLinesTakeThePlaceOfTheTypesOwn) {
-  // Dashes of 6 m and gaps of 9 m from 2 m behind the mark's begin at 40, 0.3 m to the left; a yellow line to the
+TEST(OpenDrivePaint, ListedLinesReplaceTheTypesPattern) {
+  // Dashes of 6 m and gaps of 9 m, from 2 m after the start of the mark at 40, 0.3 m to the left; a yellow line on the
   // right.
   const RoadMap map =
       marked(R"(<roadMark sOffset="40" type="broken solid" color="white" width="0.12"><type name="" width="0.12">)"
@@ -181,7 +181,7 @@ TEST(OpenDrivePaint, StopLinesAreReadFromTheirCornersAndBoxes) {
   EXPECT_FLOAT_EQ(map.stop_lines[1].width_m, 0.5f);
 }
 
-TEST(OpenDrivePaint, RepeatedParkingSpacesStandInARow) {
+TEST(OpenDrivePaint, RepeatedParkingSpacesAreInARow) {
   RoadText road;
   road.right = lane_of(-1, "driving", 3);
   const std::string object = R"(<objects><object id="1" type="parkingSpace" s="5" t="-5" length="5" width="2">)"

@@ -1,4 +1,4 @@
-// Lights and signs: which lanes they hold, where traffic stops, where heads hang.
+// Lights and signs: the lanes they control, stop lines, and positions of heads.
 #include <cmath>
 #include <string>
 #include <vector>
@@ -40,7 +40,7 @@ TEST(OpenDriveLights, StopLineHeadPhaseAndLanesFollowFromTheReferences) {
                                   R"(<controller id="91" sequence="1"><control signalId="51"/></controller>)";
   const RoadMap map =
       parse(three_roads(signals, R"(<controller id="90" type="0"/><controller id="91" type="0"/>)") + controllers);
-  ASSERT_EQ(map.lights.size(), 1u);  // 51 holds no lane
+  ASSERT_EQ(map.lights.size(), 1u);  // 51 controls no lane
   const TrafficLight& light = map.lights[0];
   EXPECT_EQ(light.name, "50");
   EXPECT_EQ(light.junction, 0);
@@ -51,7 +51,7 @@ TEST(OpenDriveLights, StopLineHeadPhaseAndLanesFollowFromTheReferences) {
   EXPECT_NEAR(light.stop_heading_rad, 0, 1e-6);
   EXPECT_NEAR(light.head_facing.x, -1, 1e-6);
   EXPECT_NEAR(light.head_facing.y, 0, 1e-6);
-  expect_at(map, light.head_m, 118, -5, 5.0);  // beyond the junction: 5.5 m above the post's foot
+  expect_at(map, light.head_m, 118, -5, 5.0);  // beyond the junction: 5.5 m above the foot of the post
   const std::vector<int32_t> expected = {
       index_of(map, lane_named(map, "1", 0, -1)), index_of(map, lane_named(map, "1", 0, -2)),
       index_of(map, lane_named(map, "2", 0, -1)), index_of(map, lane_named(map, "2", 0, -2))};
@@ -60,7 +60,7 @@ TEST(OpenDriveLights, StopLineHeadPhaseAndLanesFollowFromTheReferences) {
       expected);
 }
 
-TEST(OpenDriveLights, WithoutReferencesTheyHoldTheirOwnRoadsLanes) {
+TEST(OpenDriveLights, WithoutReferencesTheyControlTheirOwnRoadsLanes) {
   const std::string on_2 = R"(<signals><signal id="50" type="1000001" s="1" t="-7" orientation="+">)"
                            R"(<validity fromLane="-2" toLane="-2"/></signal></signals>)";
   const std::string on_1 = R"(<signals><signal id="50" type="1000001" s="60" t="-7" orientation="+">)"
@@ -75,7 +75,7 @@ TEST(OpenDriveLights, WithoutReferencesTheyHoldTheirOwnRoadsLanes) {
   }
 }
 
-TEST(OpenDriveLights, WithoutValidityTheyHoldTheLanesOfTheirOrientation) {
+TEST(OpenDriveLights, WithoutValidityTheyControlTheLanesOfTheirOrientation) {
   auto lights_with = [](const char* orientation) {
     return parse(three_roads("", kInJunction,
                              fmt::format(R"(<signals><signal id="50" type="1000001" s="99" t="-7" orientation="{}"/>)"
@@ -90,14 +90,14 @@ TEST(OpenDriveLights, WithoutValidityTheyHoldTheLanesOfTheirOrientation) {
   EXPECT_EQ(lights_with("-").size(), 0u);
 }
 
-TEST(OpenDriveLights, WithoutAControllerOfAJunctionTheyHaveNoPhaseAndAreLeftOut) {
+TEST(OpenDriveLights, WithoutAControllerOfAJunctionTheyAreSkipped) {
   const std::string light = R"(<signals><signal id="50" type="1000001" s="1" t="-7"/></signals>)";
   EXPECT_EQ(parse(three_roads(light)).lights.size(), 0u);
   EXPECT_EQ(parse(three_roads(light) + kController).lights.size(), 0u);
   EXPECT_EQ(parse(three_roads(light, kInJunction) + kController).lights.size(), 1u);
 }
 
-TEST(OpenDriveSigns, StandForTheLanesThatTheyNameAndFaceTheirTraffic) {
+TEST(OpenDriveSigns, ApplyToTheLanesThatTheyNameAndFaceTheirTraffic) {
   RoadText road;
   road.left = lane_of(1, "driving", 3);
   road.right = lane_of(-1, "driving", 3) + lane_of(-2, "sidewalk", 2);
@@ -116,7 +116,7 @@ TEST(OpenDriveSigns, StandForTheLanesThatTheyNameAndFaceTheirTraffic) {
   expect_at(map, map.signs[0].position_m, 90, -5, 2);
   EXPECT_EQ(lanes_of(map, map.signs[0]), std::vector<int32_t>{right});
   EXPECT_NEAR(map.signs[0].heading_rad, 0, 1e-5);
-  // Its orientation is wrong; its lane runs the other way.
+  // Its orientation is wrong; the heading is that of its lane.
   EXPECT_EQ(lanes_of(map, map.signs[1]), std::vector<int32_t>{left});
   EXPECT_NEAR(std::abs(map.signs[1].heading_rad), M_PI, 1e-5);
   EXPECT_EQ(map.signs[2].subtype, "50");

@@ -36,9 +36,9 @@ pugi::xml_node end_section(const pugi::xml_node& road, bool at_start) {
   return last;
 }
 
-class Rules {
+class RuleChecker {
  public:
-  explicit Rules(const OpenDriveText& text) : text_(text), root_(text.root()) {}
+  explicit RuleChecker(const OpenDriveText& text) : text_(text), root_(text.root()) {}
 
   std::vector<std::string> check() {
     const pugi::xml_node header = root_.child("header");
@@ -50,19 +50,19 @@ class Rules {
     for (const pugi::xml_node& road : root_.children("road")) {
       check_road(road);
       for (const pugi::xml_node& signal : road.child("signals").children("signal")) {
-        needs(signal, {"s", "t", "id", "dynamic", "orientation", "zOffset", "type", "subtype"});
+        requires_attributes(signal, {"s", "t", "id", "dynamic", "orientation", "zOffset", "type", "subtype"});
         in_range(signal, "s", 0, number(road, "length"));
         expect(signals.insert(signal.attribute("id").value()).second, "signal id twice");
       }
       for (const pugi::xml_node& object : road.child("objects").children("object")) {
-        needs(object, {"id", "s", "t", "zOffset", "type"});
+        requires_attributes(object, {"id", "s", "t", "zOffset", "type"});
         in_range(object, "s", 0, number(road, "length"));
         expect(objects.insert(object.attribute("id").value()).second, "object id twice");
       }
     }
     for (const pugi::xml_node& road : root_.children("road")) {
       for (const pugi::xml_node& reference : road.child("signals").children("signalReference")) {
-        needs(reference, {"s", "t", "id", "orientation"});
+        requires_attributes(reference, {"s", "t", "id", "orientation"});
         expect(signals.contains(reference.attribute("id").value()), "reference to no signal");
       }
     }
@@ -79,14 +79,14 @@ class Rules {
         expect(controllers.contains(controller.attribute("id").value()), "junction's controller does not exist");
       }
     }
-    return broken_;
+    return violations_;
   }
 
  private:
   void expect(bool holds, const std::string& what) {
-    if (!holds) broken_.push_back(owner_ + ": " + what);
+    if (!holds) violations_.push_back(owner_ + ": " + what);
   }
-  void needs(const pugi::xml_node& node, std::initializer_list<const char*> attributes) {
+  void requires_attributes(const pugi::xml_node& node, std::initializer_list<const char*> attributes) {
     for (const char* attribute : attributes) {
       expect(!node.attribute(attribute).empty(), fmt::format("<{}> without {}", node.name(), attribute));
     }
@@ -99,7 +99,7 @@ class Rules {
   void unique(const char* what, const Nodes& nodes, const char* attribute) {
     std::set<std::string> seen;
     for (const pugi::xml_node& node : nodes) {
-      needs(node, {attribute});
+      requires_attributes(node, {attribute});
       expect(seen.insert(node.attribute(attribute).value()).second, fmt::format("{} {} twice", what, attribute));
     }
   }
@@ -116,13 +116,13 @@ class Rules {
 
   void check_road(const pugi::xml_node& road) {
     owner_ = fmt::format("road {}", road.attribute("id").value());
-    needs(road, {"id", "length", "junction"});
+    requires_attributes(road, {"id", "length", "junction"});
     const double length = number(road, "length");
     expect(length > 0, "length");
     ascends(road.child("planView"), "geometry", "s", length);
     double s = 0;
     for (const pugi::xml_node& geometry : road.child("planView").children("geometry")) {
-      needs(geometry, {"s", "x", "y", "hdg", "length"});
+      requires_attributes(geometry, {"s", "x", "y", "hdg", "length"});
       expect(std::abs(number(geometry, "s") - s) < 1e-6, "geometry does not begin where the one before it ends");
       expect(std::distance(geometry.begin(), geometry.end()) == 1, "geometry of one kind");
       s += number(geometry, "length");
@@ -154,7 +154,7 @@ class Rules {
       expect(lane.attribute("id").as_int() == --expected, "right lanes descend from -1");
     }
     for (const pugi::xml_node& lane : lanes_of(section)) {
-      needs(lane, {"id", "type", "level"});
+      requires_attributes(lane, {"id", "type", "level"});
       expect(lane.child("width"), "lane without width");
       ascends(lane, "width", "sOffset", length);
       ascends(lane, "roadMark", "sOffset", length);
@@ -164,7 +164,7 @@ class Rules {
     }
   }
 
-  /// What the one section says of the next, the next says of it.
+  /// Links of adjacent sections must be mutual.
   void check_section_links(const pugi::xml_node& before, const pugi::xml_node& after) {
     const auto agree = [&](const pugi::xml_node& from, const pugi::xml_node& to, const char* on, const char* back) {
       for (const pugi::xml_node& lane : lanes_of(from)) {
@@ -186,13 +186,13 @@ class Rules {
     const char* const direction = at_start ? "predecessor" : "successor";
     const pugi::xml_node link = road.child("link").child(direction);
     if (!link) return;
-    needs(link, {"elementType", "elementId"});
+    requires_attributes(link, {"elementType", "elementId"});
     if (is(link, "elementType", "junction")) {
       expect(root_.find_child_by_attribute("junction", "id", link.attribute("elementId").value()),
              "link to a junction");
       return;
     }
-    needs(link, {"contactPoint"});
+    requires_attributes(link, {"contactPoint"});
     const pugi::xml_node other = text_.road(link.attribute("elementId").value());
     expect(other, "link to a road");
     const bool other_start = is(link, "contactPoint", "start");
@@ -220,11 +220,11 @@ class Rules {
 
   void check_junction(const pugi::xml_node& junction) {
     owner_ = fmt::format("junction {}", junction.attribute("id").value());
-    needs(junction, {"id"});
+    requires_attributes(junction, {"id"});
     unique("connection", junction.children("connection"), "id");
     expect(junction.child("connection"), "no connections");
     for (const pugi::xml_node& connection : junction.children("connection")) {
-      needs(connection, {"id", "incomingRoad", "connectingRoad", "contactPoint"});
+      requires_attributes(connection, {"id", "incomingRoad", "connectingRoad", "contactPoint"});
       const std::string incoming = connection.attribute("incomingRoad").value();
       const pugi::xml_node road = text_.road(connection.attribute("connectingRoad").value());
       const bool at_start = is(connection, "contactPoint", "start");
@@ -246,7 +246,7 @@ class Rules {
   const OpenDriveText& text_;
   pugi::xml_node root_;
   std::string owner_ = "file";
-  std::vector<std::string> broken_;
+  std::vector<std::string> violations_;
 };
 
 }  // namespace
@@ -256,13 +256,13 @@ OpenDriveText::OpenDriveText(const std::string& text) {
   for (const pugi::xml_node& road : root().children("road")) roads_[road.attribute("id").value()] = road;
 }
 
-std::vector<std::string> broken_rules(const OpenDriveText& text) { return Rules(text).check(); }
+std::vector<std::string> violated_rules(const OpenDriveText& text) { return RuleChecker(text).check(); }
 
 Pose on_geometry(const pugi::xml_node& geometry, double ds) {
   const double x = number(geometry, "x"), y = number(geometry, "y"), heading = number(geometry, "hdg");
   const double k = number(geometry.child("arc"), "curvature");
   if (k == 0) return {x + ds * std::cos(heading), y + ds * std::sin(heading), heading};
-  // About the centre of the circle.
+  // Relative to the centre of the circle.
   const double center_x = x - std::sin(heading) / k, center_y = y + std::cos(heading) / k;
   return {center_x + std::sin(heading + k * ds) / k, center_y - std::cos(heading + k * ds) / k, heading + k * ds};
 }

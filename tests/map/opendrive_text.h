@@ -1,5 +1,5 @@
-// OpenDRIVE text on its own, for tests: an evaluation of lines, arcs, widths and heights that shares no code with the
-// writer or the importer, and the rules of the standard that can be stated in a few lines.
+// OpenDRIVE text for tests: an evaluation of lines, arcs, widths and elevations that shares no code with the writer or
+// the importer, and checks of simple rules of the standard.
 #pragma once
 
 #include <string>
@@ -26,24 +26,24 @@ class OpenDriveText {
   std::unordered_map<std::string, pugi::xml_node> roads_;
 };
 
-/// What the text breaks of OpenDRIVE 1.4: needed attributes, ascending stations, lanes counted from the center, unique
-/// ids, links that lead somewhere and are mutual, and junctions whose connections say what their roads say.
-std::vector<std::string> broken_rules(const OpenDriveText& text);
+/// The violated rules of OpenDRIVE 1.4: required attributes, ascending stations, lane ids counted from the center,
+/// unique ids, links with a target that are mutual, and junction connections that agree with their roads.
+std::vector<std::string> violated_rules(const OpenDriveText& text);
 
 struct Pose {
   double x = 0, y = 0, heading = 0;
 };
 
-/// On a line or an arc, `ds` from its start.
+/// The pose on a line or an arc, `ds` from its start.
 Pose on_geometry(const pugi::xml_node& geometry, double ds);
 
-/// The borders of a lane at an end of its road, the direction of +s there, and the height and the grade along +s.
+/// The borders of a lane at an end of its road, the heading of +s there, the height, and the grade along +s.
 struct LaneEnd {
   double inner_x = 0, inner_y = 0, outer_x = 0, outer_y = 0, heading = 0, z = 0, grade = 0;
 };
 LaneEnd lane_end(const pugi::xml_node& road, int lane, bool at_start);
 
-/// The lane of that id in the first or the last section of a road; none: an empty node.
+/// The lane with that id in the first or last section of a road; an empty node if there is none.
 pugi::xml_node lane_at(const pugi::xml_node& road, int lane, bool at_start);
 
 /// All lanes of a section, from left to right, without the center.

@@ -1,5 +1,5 @@
-// Painted lines as they are drawn: what is joined and what is not, repeated paint, and the same paint as the map's on
-// whole towns.
+// Painted lines as they are drawn: which lines are joined, duplicate paint, and agreement with the markings of whole
+// towns.
 #include "pictura/map/painted_lines.h"
 
 #include <algorithm>
@@ -20,7 +20,7 @@ namespace {
 
 using Points = std::vector<Vec3>;
 
-/// A map of markings alone.
+/// A map with markings only.
 RoadMap map_of(const std::vector<PaintedLine>& lines) {
   RoadMap map;
   for (const PaintedLine& line : lines) {
@@ -42,7 +42,7 @@ std::vector<PaintedLine> painted(const std::vector<PaintedLine>& lines) { return
 
 bool is_at(Vec3 a, Vec3 b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
-/// Whether one of the lines goes through exactly these points, either way round.
+/// Whether one of the lines has exactly these points, in either direction.
 bool has_line(const std::vector<PaintedLine>& lines, const Points& points) {
   return std::any_of(lines.begin(), lines.end(), [&](const PaintedLine& line) {
     return std::equal(line.points_m.begin(), line.points_m.end(), points.begin(), points.end(), is_at) ||
@@ -50,7 +50,7 @@ bool has_line(const std::vector<PaintedLine>& lines, const Points& points) {
   });
 }
 
-TEST(PaintedLines, ACutLineIsOneAgain) {
+TEST(PaintedLines, ACutLineIsJoined) {
   const std::vector<PaintedLine> lines = painted(
       {white({{12, 0, 1}, {17, 0, 1}}), white({{0, 0, 1}, {9, 0, 1}, {12, 0, 1}}), white({{17, 0, 1}, {30, 0, 1}})});
   ASSERT_EQ(lines.size(), 1u);
@@ -59,7 +59,7 @@ TEST(PaintedLines, ACutLineIsOneAgain) {
   EXPECT_EQ(lines[0].color, MarkColor::white);
 }
 
-TEST(PaintedLines, AreDrawnInEvenPieces) {
+TEST(PaintedLines, AreDrawnInEqualPieces) {
   const RoadMap map = map_of({white({{0, 0, 0}, {9, 0, 0}, {13, 0, 0}}), white({{13, 0, 0}, {15, 0, 0}, {24, 0, 0}})});
   const std::vector<Strip> strips = make_static_geometry(map).strips;
   ASSERT_EQ(strips.size(), 3u);
@@ -69,26 +69,27 @@ TEST(PaintedLines, AreDrawnInEvenPieces) {
 TEST(PaintedLines, DirectionDoesNotMatter) {
   const std::array<PaintedLine, 3> parts{white({{0, 0, 0}, {4, 1, 0}}), white({{4, 1, 0}, {8, 1.5f, 0}}),
                                          white({{8, 1.5f, 0}, {12, 1, 0}})};
-  for (unsigned turned = 0; turned < 8; ++turned) {
+  for (unsigned reversed_mask = 0; reversed_mask < 8; ++reversed_mask) {
     std::vector<PaintedLine> lines;
-    for (unsigned i = 0; i < parts.size(); ++i) lines.push_back((turned >> i & 1) != 0 ? reversed(parts[i]) : parts[i]);
+    for (unsigned i = 0; i < parts.size(); ++i)
+      lines.push_back((reversed_mask >> i & 1) != 0 ? reversed(parts[i]) : parts[i]);
     const std::vector<PaintedLine> joined = painted(lines);
-    EXPECT_EQ(joined.size(), 1u) << turned;
-    EXPECT_TRUE(has_line(joined, {{0, 0, 0}, {4, 1, 0}, {8, 1.5f, 0}, {12, 1, 0}})) << turned;
+    EXPECT_EQ(joined.size(), 1u) << reversed_mask;
+    EXPECT_TRUE(has_line(joined, {{0, 0, 0}, {4, 1, 0}, {8, 1.5f, 0}, {12, 1, 0}})) << reversed_mask;
   }
 }
 
-TEST(PaintedLines, PointsWithinTheToleranceAreSpared) {
-  const auto points_left = [](float aside_m) {
+TEST(PaintedLines, PointsWithinTheToleranceAreRemoved) {
+  const auto num_points = [](float lateral_m) {
     const std::vector<PaintedLine> lines =
-        painted({white({{0, 0, 0}, {4, aside_m, 0}}), white({{4, aside_m, 0}, {8, 0, 0}})});
+        painted({white({{0, 0, 0}, {4, lateral_m, 0}}), white({{4, lateral_m, 0}, {8, 0, 0}})});
     return lines.at(0).points_m.size();
   };
-  EXPECT_EQ(points_left(0.8f * kPaintTolerance_m), 2u);
-  EXPECT_EQ(points_left(1.01f * kPaintTolerance_m), 3u);
+  EXPECT_EQ(num_points(0.8f * kPaintTolerance_m), 2u);
+  EXPECT_EQ(num_points(1.01f * kPaintTolerance_m), 3u);
 }
 
-TEST(PaintedLines, ADashThatIsCutIsOneAndGapsStayOpen) {
+TEST(PaintedLines, ACutDashIsJoinedAndGapsStayOpen) {
   const std::vector<PaintedLine> lines =
       painted({white({{0, 0, 0}, {1.2f, 0, 0}}), white({{1.2f, 0, 0}, {3, 0, 0}}), white({{12, 0, 0}, {15, 0, 0}}),
                white({{15.005f, 0, 0}, {18, 0, 0}})});
@@ -98,7 +99,7 @@ TEST(PaintedLines, ADashThatIsCutIsOneAndGapsStayOpen) {
   EXPECT_TRUE(has_line(lines, {{15.005f, 0, 0}, {18, 0, 0}}));
 }
 
-TEST(PaintedLines, WhatDiffersIsNotJoined) {
+TEST(PaintedLines, DifferentLinesAreNotJoined) {
   const PaintedLine first = white({{0, 0, 0}, {5, 0, 0}}), next = white({{5, 0, 0}, {9, 0, 0}});
   ASSERT_EQ(painted({first, next}).size(), 1u);
   PaintedLine other = next;
@@ -114,14 +115,14 @@ TEST(PaintedLines, WhatDiffersIsNotJoined) {
   EXPECT_EQ(painted({first, white({{5, 0, 0}, {1, 0.1f, 0}})}).size(), 2u) << "back again";
 }
 
-TEST(PaintedLines, WhereLinesForkTheStraightestGoesOn) {
+TEST(PaintedLines, AtForksTheStraightestPairIsJoined) {
   const std::array<PaintedLine, 3> parts{white({{0, 0, 0}, {10, 0, 0}}), white({{10, 0, 0}, {20, 1, 0}}),
                                          white({{10, 0, 0}, {20, -0.5f, 0}})};
   std::array<std::size_t, 3> order{0, 1, 2};
   do {
-    for (unsigned turned = 0; turned < 8; ++turned) {
+    for (unsigned reversed_mask = 0; reversed_mask < 8; ++reversed_mask) {
       std::vector<PaintedLine> lines;
-      for (const std::size_t i : order) lines.push_back((turned >> i & 1) != 0 ? reversed(parts[i]) : parts[i]);
+      for (const std::size_t i : order) lines.push_back((reversed_mask >> i & 1) != 0 ? reversed(parts[i]) : parts[i]);
       const std::vector<PaintedLine> joined = painted(lines);
       EXPECT_EQ(joined.size(), 2u);
       EXPECT_TRUE(has_line(joined, {{0, 0, 0}, {10, 0, 0}, {20, -0.5f, 0}}));
@@ -130,8 +131,8 @@ TEST(PaintedLines, WhereLinesForkTheStraightestGoesOn) {
   } while (std::next_permutation(order.begin(), order.end()));
 }
 
-/// Of lane marks that overlap, the one of the lower index is in front.
-TEST(PaintedLines, StandWhereTheFirstOfTheirMarkingsStood) {
+/// Among overlapping lane marks the one with the lower index is in front.
+TEST(PaintedLines, KeepTheOrderOfTheirFirstMarkings) {
   const PaintedLine across{{{15, -5, 0}, {15, 5, 0}}, 0.12f, MarkColor::yellow};
   const PaintedLine along{{{0, 0.05f, 0}, {10, 0.05f, 0}}, 0.12f, MarkColor::blue};
   const std::vector<PaintedLine> lines =
@@ -144,7 +145,7 @@ TEST(PaintedLines, StandWhereTheFirstOfTheirMarkingsStood) {
   EXPECT_EQ(lines[2].color, MarkColor::blue);
 }
 
-/// A ring of three arcs, one of them the other way round, that end beside each other; and one of a single marking.
+/// A ring of three arcs, one of them reversed, whose ends do not meet exactly; and one of a single marking.
 TEST(PaintedLines, ARingIsMitredAllRound) {
   constexpr int kCorners = 30;
   Points ring;
@@ -171,23 +172,23 @@ TEST(PaintedLines, ARingIsMitredAllRound) {
   }
 }
 
-TEST(PaintedLines, PaintThatIsThereTwiceIsDrawnOnce) {
+TEST(PaintedLines, DuplicatePaintIsDrawnOnce) {
   const PaintedLine line = white({{0, 0, 0}, {8, 0, 0}, {14, 2, 0}, {20, 4, 0}});
-  // Cut in other places, the other way round, within rounding; in order of length, and the other way round.
+  // Cut in other places, reversed, within tolerance; in both orders of length.
   const PaintedLine part = white({{17, 3, 0}, {11, 1, 0}, {8, 0.0005f, 0}, {3, 0.0005f, 0}});
   for (const std::vector<PaintedLine>& lines :
        {std::vector<PaintedLine>{line, part}, {part, line}, {line, line, part}}) {
-    const std::vector<PaintedLine> once = painted(lines);
-    EXPECT_EQ(once.size(), 1u);
-    EXPECT_TRUE(has_line(once, {{0, 0, 0}, {8, 0, 0}, {20, 4, 0}}));
+    const std::vector<PaintedLine> unique_lines = painted(lines);
+    EXPECT_EQ(unique_lines.size(), 1u);
+    EXPECT_TRUE(has_line(unique_lines, {{0, 0, 0}, {8, 0, 0}, {20, 4, 0}}));
   }
 }
 
-TEST(PaintedLines, WhatOthersPaintOnlyInPartStays) {
+TEST(PaintedLines, PartlyCoveredLinesAreKept) {
   const PaintedLine line = white({{0, 0, 0}, {8, 0, 0}});
   const auto count_with = [&](PaintedLine other) { return painted({line, std::move(other)}).size(); };
   ASSERT_EQ(count_with(white({{2, 0, 0}, {6, 0, 0}})), 1u);
-  EXPECT_EQ(count_with(white({{2, 0.005f, 0}, {6, 0.005f, 0}})), 2u) << "beside it";
+  EXPECT_EQ(count_with(white({{2, 0.005f, 0}, {6, 0.005f, 0}})), 2u) << "next to it";
   EXPECT_EQ(count_with(white({{2, 0, 0}, {6, 0.05f, 0}})), 2u) << "at an angle";
   EXPECT_EQ(count_with(white({{6, 0, 0}, {8.05f, 0, 0}})), 2u) << "beyond its end";
   EXPECT_EQ(count_with(white({{2, 0, 5}, {6, 0, 5}})), 2u) << "above it";
@@ -203,7 +204,7 @@ TEST(PaintedLines, WhatOthersPaintOnlyInPartStays) {
 
 constexpr float kEdgeWidth_m = 0.15f;
 
-TEST(PaintedLines, EdgesBeneathThemAreNotDrawn) {
+TEST(PaintedLines, CoveredEdgesAreNotDrawn) {
   const auto is_drawn = [&](const std::vector<PaintedLine>& lines) {
     RoadMap map;
     map.road_edges = {{{2, 0, 1}, {10, 0, 1}}};
@@ -211,7 +212,7 @@ TEST(PaintedLines, EdgesBeneathThemAreNotDrawn) {
   };
   EXPECT_TRUE(is_drawn({}));
   EXPECT_FALSE(is_drawn({white({{0, 0, 1}, {30, 0, 1}})}));
-  EXPECT_FALSE(is_drawn({white({{30, 0.02f, 1}, {0, 0.02f, 1}})})) << "it sticks out by 3.5 cm";
+  EXPECT_FALSE(is_drawn({white({{30, 0.02f, 1}, {0, 0.02f, 1}})})) << "it extends 3.5 cm beyond the line";
   EXPECT_TRUE(is_drawn({white({{0, 0.03f, 1}, {30, 0.03f, 1}})})) << "by 4.5 cm";
   EXPECT_TRUE(is_drawn({white({{0, 0, 1}, {30, 0.3f, 1}})})) << "at an angle";
   EXPECT_TRUE(is_drawn({white({{0, 0, 2}, {30, 0, 2}})})) << "below a bridge";
@@ -225,7 +226,7 @@ TEST(PaintedLines, EdgesBeneathThemAreNotDrawn) {
   EXPECT_EQ(uncovered_edges(map, {white({{0, 1, 1}, {30, 1, 1}})}, kEdgeWidth_m).size(), 1u) << "shorter than a gap";
 }
 
-/// Paint to be asked how far a place is from it.
+/// Painted segments in a grid, for distance queries.
 class Paint {
  public:
   explicit Paint(const std::vector<PaintedLine>& lines) {
@@ -234,31 +235,31 @@ class Paint {
       for (std::size_t i = 1; i < line.points_m.size(); ++i) {
         const Vec3 a = line.points_m[i - 1], b = line.points_m[i];
         pieces_.push_back({a, b, line.width_m, line.color});
-        boxes.push_back({{std::min(a.x, b.x) - kReach_m, std::min(a.y, b.y) - kReach_m},
-                         {std::max(a.x, b.x) + kReach_m, std::max(a.y, b.y) + kReach_m}});
+        boxes.push_back({{std::min(a.x, b.x) - kMaxDistance_m, std::min(a.y, b.y) - kMaxDistance_m},
+                         {std::max(a.x, b.x) + kMaxDistance_m, std::max(a.y, b.y) + kMaxDistance_m}});
       }
     }
     grid_ = Grid(boxes, 10.0f);
   }
 
-  /// In metres; kReach_m where nothing is as near as that.
+  /// Distance in metres to paint of this width and colour, at most kMaxDistance_m.
   float distance(Vec3 p, float width_m, MarkColor color) const {
     const GridView grid = grid_.view();
-    if (!grid.contains(p.xy())) return kReach_m;
+    if (!grid.contains(p.xy())) return kMaxDistance_m;
     const std::size_t cell = static_cast<std::size_t>(grid.cell_y(p.y) * grid.num_x + grid.cell_x(p.x));
-    float nearest_m = kReach_m;
+    float distance_m = kMaxDistance_m;
     for (int32_t i = grid.begin[cell]; i < grid.begin[cell + 1]; ++i) {
       const Piece& piece = pieces_[static_cast<std::size_t>(grid.items[static_cast<std::size_t>(i)])];
       if (piece.width_m != width_m || piece.color != color) continue;
       const Vec3 along = piece.b_m - piece.a_m;
-      const float share = clamp(dot(p - piece.a_m, along) / dot(along, along), 0.0f, 1.0f);
-      nearest_m = std::min(nearest_m, length(p - (piece.a_m + along * share)));
+      const float fraction = clamp(dot(p - piece.a_m, along) / dot(along, along), 0.0f, 1.0f);
+      distance_m = std::min(distance_m, length(p - (piece.a_m + along * fraction)));
     }
-    return nearest_m;
+    return distance_m;
   }
 
  private:
-  static constexpr float kReach_m = 0.5f;
+  static constexpr float kMaxDistance_m = 0.5f;
   struct Piece {
     Vec3 a_m, b_m;
     float width_m = 0;
@@ -268,28 +269,28 @@ class Paint {
   Grid grid_;
 };
 
-/// The furthest that a place of the lines is from the paint, in metres.
-float furthest_from(const Paint& paint, const std::vector<PaintedLine>& lines) {
+/// The maximum distance in metres of points on the lines from the paint.
+float max_distance_from(const Paint& paint, const std::vector<PaintedLine>& lines) {
   constexpr float kStep_m = 0.25f;
-  float furthest_m = 0;
+  float max_distance_m = 0;
   for (const PaintedLine& line : lines) {
     for (std::size_t i = 1; i < line.points_m.size(); ++i) {
       const Vec3 a = line.points_m[i - 1], b = line.points_m[i];
       const int steps = static_cast<int>(std::ceil(length(b - a) / kStep_m));
       for (int step = 0; step <= steps; ++step) {
         const Vec3 p = a + (b - a) * (static_cast<float>(step) / static_cast<float>(steps));
-        furthest_m = std::max(furthest_m, paint.distance(p, line.width_m, line.color));
+        max_distance_m = std::max(max_distance_m, paint.distance(p, line.width_m, line.color));
       }
     }
   }
-  return furthest_m;
+  return max_distance_m;
 }
 
 class PaintOfTowns : public ::testing::TestWithParam<const char*> {
  protected:
   void SetUp() override {
     const std::string name = GetParam();
-    if (const std::string why = test::missing(name); !why.empty()) GTEST_SKIP() << why;
+    if (const std::string reason = test::missing(name); !reason.empty()) GTEST_SKIP() << reason;
     map_ = load_map(name);
     drawn_ = painted_lines(*map_);
     for (const Marking& marking : map_->markings) {
@@ -307,10 +308,10 @@ INSTANTIATE_TEST_SUITE_P(All, PaintOfTowns,
                          ::testing::Values("Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07",
                                            "Town10HD", "procedural:1", "procedural:2", "procedural:5:blocks=5x4"));
 
-TEST_P(PaintOfTowns, IsThatOfTheMap) {
+TEST_P(PaintOfTowns, MatchesTheMarkings) {
   constexpr float kRounding_m = 1e-4f;
-  EXPECT_LE(furthest_from(Paint(drawn_), markings_), kPaintTolerance_m + kRounding_m);
-  EXPECT_LE(furthest_from(Paint(markings_), drawn_), kPaintTolerance_m + kRounding_m);
+  EXPECT_LE(max_distance_from(Paint(drawn_), markings_), kPaintTolerance_m + kRounding_m);
+  EXPECT_LE(max_distance_from(Paint(markings_), drawn_), kPaintTolerance_m + kRounding_m);
 }
 
 TEST_P(PaintOfTowns, EndsWhereMarkingsEnd) {
@@ -325,32 +326,33 @@ TEST_P(PaintOfTowns, EndsWhereMarkingsEnd) {
   }
 }
 
-TEST_P(PaintOfTowns, HidesNoEdgeButThoseBeneathIt) {
-  // Of one width and colour, which Paint tells apart.
-  std::vector<PaintedLine> lines, hidden;
+TEST_P(PaintOfTowns, RemovesOnlyCoveredEdges) {
+  // Equal width and colour, since Paint distinguishes them.
+  std::vector<PaintedLine> lines, covered;
   float widest_m = 0;
   for (const PaintedLine& line : drawn_) {
     widest_m = std::max(widest_m, line.width_m);
     lines.push_back({line.points_m, 0.0f, MarkColor::white});
   }
-  const std::vector<RoadEdge> seen = uncovered_edges(*map_, drawn_, kEdgeWidth_m);
+  const std::vector<RoadEdge> uncovered = uncovered_edges(*map_, drawn_, kEdgeWidth_m);
   std::size_t next = 0;
   for (const RoadEdge& edge : map_->road_edges) {
-    if (next < seen.size() && is_at(seen[next].a_m, edge.a_m) && is_at(seen[next].b_m, edge.b_m)) {
+    if (next < uncovered.size() && is_at(uncovered[next].a_m, edge.a_m) && is_at(uncovered[next].b_m, edge.b_m)) {
       ++next;
     } else {
-      hidden.push_back({{edge.a_m, edge.b_m}, 0.0f, MarkColor::white});
+      covered.push_back({{edge.a_m, edge.b_m}, 0.0f, MarkColor::white});
     }
   }
-  EXPECT_EQ(next, seen.size());
-  // Beside a line, and beyond its end.
-  const float aside_m = kCoveredEdgeTolerance_m + 0.5f * (widest_m - kEdgeWidth_m), beyond_m = kCoveredEdgeTolerance_m;
-  EXPECT_LE(furthest_from(Paint(lines), hidden), std::hypot(aside_m, beyond_m) + 1e-3f);
-  fmt::print("{}: {} edges of {}\n", GetParam(), seen.size(), map_->road_edges.size());
+  EXPECT_EQ(next, uncovered.size());
+  // Tolerances beside a line, and beyond its end.
+  const float lateral_m = kCoveredEdgeTolerance_m + 0.5f * (widest_m - kEdgeWidth_m),
+              beyond_m = kCoveredEdgeTolerance_m;
+  EXPECT_LE(max_distance_from(Paint(lines), covered), std::hypot(lateral_m, beyond_m) + 1e-3f);
+  fmt::print("{}: {} edges of {}\n", GetParam(), uncovered.size(), map_->road_edges.size());
 }
 
-/// Against the markings cut into strips as they are, without those that are there twice.
-TEST_P(PaintOfTowns, TakesFewerStrips) {
+/// Compared with the markings cut into strips individually, without duplicates.
+TEST_P(PaintOfTowns, NeedsFewerStrips) {
   std::vector<Strip> strips, drawn;
   for (const PaintedLine& line : markings_)
     append_strips(line.points_m, line.width_m, {}, StripKind::lane_mark, &strips);

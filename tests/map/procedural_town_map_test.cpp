@@ -1,4 +1,4 @@
-// Procedural towns as the importer reads them: one network on which everything can be driven, and nothing in the way.
+// Procedural towns after import: one connected network that can be driven_lane without obstacles.
 #include <array>
 #include <cmath>
 #include <cstdlib>
@@ -46,17 +46,17 @@ void along(const RoadMap& map, const Lane& lane, float step_m, Visit&& visit) {
   }
 }
 
-Vec3 beside(const LanePoint& pose, float left_m) {
+Vec3 offset_left(const LanePoint& pose, float left_m) {
   const Vec2 left = left_normal(direction(pose.heading_rad)) * left_m;
   return {pose.position_m.x + left.x, pose.position_m.y + left.y, pose.position_m.z};
 }
 
-/// All lanes as bands, and the question which of them cover a place.
+/// All lanes as bands, with queries of which of them cover a point.
 class LaneSurface {
  public:
   LaneSurface(const RoadMap& map, double level_m) : surface_(bands_of(map), level_m) {}
 
-  /// Whether a lane for which `counts` holds covers p.
+  /// Whether a lane that satisfies `counts` covers p.
   template <typename Counts>
   bool covers(Vec3 p, Counts&& counts) const {
     return surface_.any_band_at({static_cast<double>(p.x), static_cast<double>(p.y)}, static_cast<double>(p.z), counts);
@@ -69,7 +69,7 @@ class LaneSurface {
       SurfaceBand& band = bands.emplace_back();
       along(map, lane, 1, [&](const LanePoint& pose) {
         const auto add = [&](std::vector<Point3>* border, float left_m) {
-          const Vec3 p = beside(pose, left_m);
+          const Vec3 p = offset_left(pose, left_m);
           border->push_back({static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)});
         };
         add(&band.left, 0.5f * pose.width_m);
@@ -82,7 +82,7 @@ class LaneSurface {
   Surface surface_;
 };
 
-/// Road edges that may touch a box, by a grid.
+/// Road edges in a grid, for intersection queries.
 class Edges {
  public:
   explicit Edges(const RoadMap& map) : map_(map) {
@@ -94,7 +94,7 @@ class Edges {
     grid_ = Grid(boxes, 5.0f);
   }
 
-  /// Whether an edge of that height crosses the segment.
+  /// Whether an edge at that height crosses the segment.
   bool cross(Vec3 a, Vec3 b) const {
     const GridView grid = grid_.view();
     for (int iy = grid.cell_y(min_of(a.y, b.y)); iy <= grid.cell_y(max_of(a.y, b.y)); ++iy) {
@@ -137,7 +137,7 @@ class Town {
   const LanePoint& first(const Lane& of) const { return map_.points_of(of)[0]; }
   const LanePoint& last(const Lane& of) const { return map_.points_of(of)[map_.points_of(of).size() - 1]; }
 
-  /// Every driving lane leads to every other, and on for ever.
+  /// Every driving lane leads to every other and is endless.
   void check_network() {
     const LaneComponents components = LaneGraph(map_).components();
     std::set<int32_t> found;
@@ -158,39 +158,39 @@ class Town {
 
   /// A car of 4.5 x 2 m in the middle of its lane touches no road edge, and the lane's ends are open.
   void check_driving() {
-    for (const Lane& driven : map_.lanes) {
-      if (driven.type != LaneType::driving && driven.type != LaneType::ramp) continue;
-      along(map_, driven, 1, [&](const LanePoint& pose) {
-        constexpr float kTaper_m = 17;  // a slip lane opens from nothing
-        if (driven.type == LaneType::ramp && pose.s_m < kTaper_m) return;
+    for (const Lane& driven_lane : map_.lanes) {
+      if (driven_lane.type != LaneType::driving && driven_lane.type != LaneType::ramp) continue;
+      along(map_, driven_lane, 1, [&](const LanePoint& pose) {
+        constexpr float kTaper_m = 17;  // a slip lane opens from zero width
+        if (driven_lane.type == LaneType::ramp && pose.s_m < kTaper_m) return;
         const Vec2 forward = direction(pose.heading_rad) * 2.25f;
         std::array<Vec3, 4> corners;
         for (std::size_t k = 0; k < 4; ++k) {
           const float sign = k < 2 ? 1.0f : -1.0f;
-          const Vec3 side = beside(pose, k == 0 || k == 3 ? 1.0f : -1.0f);
+          const Vec3 side = offset_left(pose, k == 0 || k == 3 ? 1.0f : -1.0f);
           corners[k] = {side.x + sign * forward.x, side.y + sign * forward.y, side.z};
         }
         for (std::size_t k = 0; k < 4; ++k) {
-          EXPECT_FALSE(edges_.cross(corners[k], corners[(k + 1) % 4])) << name(driven) << " at " << pose.s_m;
+          EXPECT_FALSE(edges_.cross(corners[k], corners[(k + 1) % 4])) << name(driven_lane) << " at " << pose.s_m;
         }
       });
-      for (const LanePoint& end : {first(driven), last(driven)}) {
+      for (const LanePoint& end : {first(driven_lane), last(driven_lane)}) {
         const float half_m = 0.5f * end.width_m - 0.1f;
         if (half_m <= 0) continue;
-        EXPECT_FALSE(edges_.cross(beside(end, half_m), beside(end, -half_m))) << name(driven);
+        EXPECT_FALSE(edges_.cross(offset_left(end, half_m), offset_left(end, -half_m))) << name(driven_lane);
       }
     }
   }
 
-  /// Lanes of different roads lie apart, at different heights, or in the same junction.
+  /// Lanes of different roads do not overlap, unless at different heights or in the same junction.
   void check_overlaps() {
     constexpr float kInset_m = 0.1f;
     for (const Lane& own : map_.lanes) {
       along(map_, own, 2, [&](const LanePoint& pose) {
         const bool at_end = pose.s_m < kInset_m || pose.s_m > own.length_m - kInset_m;
         if (at_end || pose.width_m < 4 * kInset_m) return;
-        for (const float share : {-1.0f, 0.0f, 1.0f}) {
-          const Vec3 p = beside(pose, share * (0.5f * pose.width_m - kInset_m));
+        for (const float side : {-1.0f, 0.0f, 1.0f}) {
+          const Vec3 p = offset_left(pose, side * (0.5f * pose.width_m - kInset_m));
           EXPECT_FALSE(surface_.covers(p,
                                        [&](int32_t other) {
                                          return lane(other).source_road != own.source_road &&
@@ -202,7 +202,7 @@ class Town {
     }
   }
 
-  /// Lights stop their lanes at the mouth, and are seen from there and from further back.
+  /// Lights stop their lanes at the junction mouth and are visible from there and from further back.
   void check_lights() {
     const float min_cosine = std::cos(MapGeometryOptions().light_half_angle_rad);
     for (std::size_t i = 0; i < map_.lights.size(); ++i) {
@@ -211,16 +211,16 @@ class Town {
       EXPECT_GT(dot(light.head_m.xy() - stop, direction(light.stop_heading_rad)), 1.0f) << light.name;
       int incoming = 0, connecting = 0;
       for (int32_t k = light.lanes.begin; k < light.lanes.end; ++k) {
-        const Lane& held = lane(map_.light_lanes[static_cast<std::size_t>(k)]);
-        ++(held.in_junction ? connecting : incoming);
-        if (held.in_junction) continue;
-        EXPECT_EQ(held.type, LaneType::driving) << "slip lanes go past the light";
-        EXPECT_LT(std::abs(dot(last(held).position_m.xy() - stop, direction(light.stop_heading_rad))), 0.01f);
+        const Lane& controlled = lane(map_.light_lanes[static_cast<std::size_t>(k)]);
+        ++(controlled.in_junction ? connecting : incoming);
+        if (controlled.in_junction) continue;
+        EXPECT_EQ(controlled.type, LaneType::driving) << "slip lanes bypass the light";
+        EXPECT_LT(std::abs(dot(last(controlled).position_m.xy() - stop, direction(light.stop_heading_rad))), 0.01f);
         for (const float back_m : {0.0f, 5.0f, 15.0f}) {
-          if (back_m > held.length_m) continue;
+          if (back_m > controlled.length_m) continue;
           Vec3 eye{};
-          along(map_, held, 0.5f, [&](const LanePoint& pose) {
-            if (pose.s_m <= held.length_m - back_m + 0.01f) eye = pose.position_m;
+          along(map_, controlled, 0.5f, [&](const LanePoint& pose) {
+            if (pose.s_m <= controlled.length_m - back_m + 0.01f) eye = pose.position_m;
           });
           eye.z += 1.5f;
           const Vec3 to_eye = eye - light.head_m;
@@ -233,13 +233,13 @@ class Town {
     }
   }
 
-  /// No two paths that are green at a time cross.
+  /// No two paths that are green at the same time cross.
   void check_phases() {
     std::map<std::pair<int32_t, int32_t>, std::set<int32_t>> greens;
     for (const TrafficLight& light : map_.lights) {
       for (int32_t k = light.lanes.begin; k < light.lanes.end; ++k) {
-        const int32_t held = map_.light_lanes[static_cast<std::size_t>(k)];
-        if (lane(held).in_junction) greens[{light.junction, light.phase}].insert(held);
+        const int32_t controlled = map_.light_lanes[static_cast<std::size_t>(k)];
+        if (lane(controlled).in_junction) greens[{light.junction, light.phase}].insert(controlled);
       }
     }
     for (const auto& [phase, lanes] : greens) {
@@ -259,7 +259,7 @@ class Town {
     }
   }
 
-  /// Crosswalks lie in junctions, parking spaces beside the lanes, building lines beside everything.
+  /// Crosswalks are in junctions, parking spaces on parking lanes only, building lines clear of all lanes.
   void check_objects() {
     for (const Crosswalk& crosswalk : map_.crosswalks) {
       std::array<Vec3, 4> corners;
@@ -267,7 +267,7 @@ class Town {
       for (std::size_t k = 0; k < 4; ++k) {
         corners[k] = map_.outline_points[static_cast<std::size_t>(crosswalk.outline.begin) + k];
       }
-      // It leads over the junction's lanes, with an island between them at most.
+      // It crosses the junction's lanes, possibly with an island between them.
       constexpr int kSteps = 20;
       int on_lanes = 0;
       for (int k = 0; k <= kSteps; ++k) {
@@ -287,7 +287,7 @@ class Town {
       pose.heading_rad = space.heading_rad;
       for (const float ahead : {-0.5f, 0.0f, 0.5f}) {
         for (const float left : {-0.5f, 0.0f, 0.5f}) {
-          Vec3 p = beside(pose, left * space.width_m);
+          Vec3 p = offset_left(pose, left * space.width_m);
           p = p + Vec3{direction(space.heading_rad).x, direction(space.heading_rad).y, 0} * (ahead * space.length_m);
           EXPECT_FALSE(surface_.covers(p, [&](int32_t i) { return lane(i).type != LaneType::parking; }));
           EXPECT_TRUE(surface_.covers(p, [&](int32_t i) { return lane(i).type == LaneType::parking; }));
@@ -312,8 +312,8 @@ class Town {
   Edges edges_;
 };
 
-/// Checks a town and says whether that was without failures.
-bool is_sound(const TownOptions& options) {
+/// Checks a town; false after a failure.
+bool is_valid(const TownOptions& options) {
   std::string text = fmt::format("procedural:{}:blocks={}x{}", options.seed, options.blocks_x, options.blocks_y);
   for (const TownFeature& feature : town_features())
     text += fmt::format(",{}={}", feature.name, options.*feature.value);
@@ -330,21 +330,21 @@ TownOptions options_of(uint64_t seed, int blocks_x, int blocks_y) {
   return options;
 }
 
-/// PICTURA_TOWN_SEEDS asks for more than the fifty that every run checks.
+/// The number of seeds: PICTURA_TOWN_SEEDS, or fifty.
 uint64_t num_seeds() {
-  const char* const asked = std::getenv("PICTURA_TOWN_SEEDS");
-  return asked ? std::strtoull(asked, nullptr, 10) : 50;
+  const char* const requested = std::getenv("PICTURA_TOWN_SEEDS");
+  return requested ? std::strtoull(requested, nullptr, 10) : 50;
 }
 
-TEST(ProceduralTownMap, SmallTownsAreSound) {
+TEST(ProceduralTownMap, SmallTownsAreValid) {
   constexpr std::array<std::array<int, 2>, 5> kSizes{{{1, 1}, {1, 2}, {2, 2}, {3, 1}, {3, 3}}};
   for (uint64_t seed = 0; seed < num_seeds(); ++seed) {
     const auto& [x, y] = kSizes[seed % kSizes.size()];
-    if (!is_sound(options_of(seed, x, y))) return;
+    if (!is_valid(options_of(seed, x, y))) return;
   }
 }
 
-TEST(ProceduralTownMap, TownsOfDrawnOptionsAreSound) {
+TEST(ProceduralTownMap, TownsWithRandomOptionsAreValid) {
   for (uint64_t seed = 0; seed < num_seeds() / 2; ++seed) {
     TownOptions options = options_of(seed, 2, 2);
     RandomStream stream({.seed = seed, .purpose = Purpose::town});
@@ -352,28 +352,28 @@ TEST(ProceduralTownMap, TownsOfDrawnOptionsAreSound) {
       const double value = feature.low + (feature.high - feature.low) * static_cast<double>(stream.uniform());
       options.*feature.value = feature.value == &TownOptions::max_lanes ? std::round(value) : value;
     }
-    if (!is_sound(options)) return;
+    if (!is_valid(options)) return;
   }
 }
 
-TEST(ProceduralTownMap, TownsWithOneFeatureAtItsLeastOrMostAreSound) {
+TEST(ProceduralTownMap, TownsWithOneFeatureAtItsMinimumOrMaximumAreValid) {
   uint64_t seed = 1000;
   for (const TownFeature& feature : town_features()) {
     for (const double value : {feature.low, feature.high}) {
       TownOptions options = options_of(seed++, 3, 2);
       options.*feature.value = value;
-      if (!is_sound(options)) return;
+      if (!is_valid(options)) return;
     }
   }
 }
 
-TEST(ProceduralTownMap, LargeTownsAreSound) { EXPECT_TRUE(is_sound(options_of(100, 7, 6))); }
+TEST(ProceduralTownMap, LargeTownsAreValid) { EXPECT_TRUE(is_valid(options_of(100, 7, 6))); }
 
-TEST(ProceduralTownMap, OverpassesLeaveRoomBelow) {
+TEST(ProceduralTownMap, OverpassesHaveClearanceBelow) {
   TownOptions options = options_of(4, 3, 3);
   options.hills_m = 0;
   const RoadMap map = parse_opendrive(procedural_town(options), "town");
-  float least = 1e9f;
+  float min_clearance_m = 1e9f;
   int crossings = 0;
   for (const Lane& a : map.lanes) {
     for (const Lane& b : map.lanes) {
@@ -385,14 +385,14 @@ TEST(ProceduralTownMap, OverpassesLeaveRoomBelow) {
                               q[j].position_m.xy())) {
             continue;
           }
-          least = min_of(least, std::abs(p[i].position_m.z - q[j].position_m.z));
+          min_clearance_m = min_of(min_clearance_m, std::abs(p[i].position_m.z - q[j].position_m.z));
           ++crossings;
         }
       }
     }
   }
   EXPECT_GT(crossings, 3);
-  EXPECT_GE(least, 5.0f);
+  EXPECT_GE(min_clearance_m, 5.0f);
 }
 
 }  // namespace

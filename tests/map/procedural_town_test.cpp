@@ -1,4 +1,4 @@
-// Procedural towns as text: valid OpenDRIVE whose pieces meet, with as much of each feature as the options say.
+// Procedural towns as text: valid OpenDRIVE whose pieces meet, and the effect of each option.
 #include "pictura/map/procedural/procedural_town.h"
 
 #include <cmath>
@@ -16,10 +16,10 @@
 namespace pictura {
 namespace {
 
-using test::broken_rules;
 using test::is;
 using test::LaneEnd;
 using test::OpenDriveText;
+using test::violated_rules;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
@@ -31,20 +31,20 @@ TownOptions options_of(uint64_t seed, int blocks_x, int blocks_y) {
   return options;
 }
 
-/// Options at their defaults, all at 0, all at their most, and each of them at either end.
+/// Options at their defaults, all at their minimum, all at their maximum, and each one at either end.
 std::vector<TownOptions> extremes(uint64_t seed) {
   std::vector<TownOptions> all{options_of(seed, 3, 3)};
-  TownOptions least = all[0], most = all[0];
+  TownOptions all_low = all[0], all_high = all[0];
   for (const TownFeature& feature : town_features()) {
-    least.*feature.value = feature.low;
-    most.*feature.value = feature.high;
+    all_low.*feature.value = feature.low;
+    all_high.*feature.value = feature.high;
     for (const double value : {feature.low, feature.high}) {
       all.push_back(all[0]);
       all.back().*feature.value = value;
     }
   }
-  all.push_back(least);
-  all.push_back(most);
+  all.push_back(all_low);
+  all.push_back(all_high);
   return all;
 }
 
@@ -67,15 +67,15 @@ std::string describe(const TownOptions& options) {
   return text;
 }
 
-TEST(ProceduralTownText, KeepsTheRulesOfOpenDrive) {
+TEST(ProceduralTownText, FollowsTheRulesOfOpenDrive) {
   for (const TownOptions& options : many_towns()) {
-    ASSERT_THAT(broken_rules(OpenDriveText(procedural_town(options))), IsEmpty()) << describe(options);
+    ASSERT_THAT(violated_rules(OpenDriveText(procedural_town(options))), IsEmpty()) << describe(options);
   }
 }
 
 double angle_between(double a, double b) { return std::abs(std::remainder(a - b, 2 * M_PI)); }
 
-/// Lanes that are linked meet: the same borders, height and direction, and the same grade.
+/// Linked lanes meet: same borders, height, heading and grade.
 void check_lane_links(const OpenDriveText& town, const pugi::xml_node& road, bool at_start, int* links) {
   const char* const direction = at_start ? "predecessor" : "successor";
   const pugi::xml_node joint = road.child("link").child(direction);
@@ -93,7 +93,7 @@ void check_lane_links(const OpenDriveText& town, const pugi::xml_node& road, boo
     }
     const LaneEnd here = test::lane_end(road, lane.attribute("id").as_int(), at_start);
     const LaneEnd there = test::lane_end(other, link.attribute("id").as_int(), other_start);
-    // +s goes on where an end meets a start, and turns back otherwise.
+    // +s continues where an end meets a start, and reverses otherwise.
     const bool turns_back = at_start == other_start;
     const std::string at =
         fmt::format("road {} lane {} {}", road.attribute("id").value(), lane.attribute("id").value(), direction);
@@ -132,7 +132,7 @@ TEST(ProceduralTownText, PiecesAndLanesMeet) {
   EXPECT_GT(links, 50000);
 }
 
-/// The steepest grade and the greatest step in grade between the pieces of a profile.
+/// Checks that a profile is continuous in height and grade, and updates the steepest grade.
 void check_grades(const pugi::xml_node& road, double length, double* steepest) {
   double z = 0, grade = 0;
   pugi::xml_node previous;
@@ -179,9 +179,9 @@ TEST(ProceduralTownText, EqualOptionsGiveEqualBytesAndOthersDiffer) {
   EXPECT_NE(procedural_town(options_of(uint64_t{1} << 40, 2, 2)), procedural_town(options_of(0, 2, 2)));
 }
 
-// ---- what the options do
+// ---- effects of the options
 
-/// What a town has of each feature.
+/// Amounts of each feature in a town.
 struct Counts {
   double streets_m = 0;
   int arcs = 0, five_arms = 0, roundabouts = 0, max_lanes = 0, slips = 0, heights = 0, crosswalks = 0, sidewalks = 0,
@@ -197,7 +197,7 @@ Counts count(const TownOptions& options) {
   counts.parking = town.count("//lane[@type='parking']");
   counts.slips = town.count("//lane[@type='exit']");
   counts.arcs = town.count("//road[@junction='-1']//arc");
-  // Only the circles of roundabouts are one-way outside junctions.
+  // Outside junctions only the circles of roundabouts are one-way.
   counts.roundabouts = town.count("//road[@junction='-1'][not(.//left)]");
   for (int lanes = 1; lanes <= 3; ++lanes) {
     if (town.count(fmt::format("//road[@junction='-1']//right/lane[@id='{}'][@type='driving']", -lanes).c_str()) > 0) {
@@ -227,7 +227,7 @@ Counts count_with(double TownOptions::* feature, double value) {
   return count(options);
 }
 
-TEST(ProceduralTownOptions, NothingOfAFeatureAtZero) {
+TEST(ProceduralTownOptions, NoFeatureAtZero) {
   EXPECT_EQ(count_with(&TownOptions::five_arms, 0).five_arms, 0);
   EXPECT_EQ(count_with(&TownOptions::roundabouts, 0).roundabouts, 0);
   EXPECT_EQ(count_with(&TownOptions::slip_lanes, 0).slips, 0);
@@ -244,17 +244,17 @@ TEST(ProceduralTownOptions, NothingOfAFeatureAtZero) {
   EXPECT_EQ(count(options).heights, 1);
 }
 
-TEST(ProceduralTownOptions, AFewOfAFeatureAtTheLeastShare) {
-  constexpr double kLittle = 1e-6;
-  EXPECT_GE(count_with(&TownOptions::five_arms, kLittle).five_arms, 1);
-  EXPECT_EQ(count_with(&TownOptions::roundabouts, kLittle).roundabouts, 4);
-  EXPECT_EQ(count_with(&TownOptions::slip_lanes, kLittle).slips, 1);
-  EXPECT_EQ(count_with(&TownOptions::parking, kLittle).parking, 1);
-  EXPECT_GT(count_with(&TownOptions::lights, kLittle).lights, 2);
-  EXPECT_LT(count_with(&TownOptions::lights, kLittle).lights, 6);
+TEST(ProceduralTownOptions, AtLeastOneOfAFeatureAboveZero) {
+  constexpr double kTiny = 1e-6;
+  EXPECT_GE(count_with(&TownOptions::five_arms, kTiny).five_arms, 1);
+  EXPECT_EQ(count_with(&TownOptions::roundabouts, kTiny).roundabouts, 4);
+  EXPECT_EQ(count_with(&TownOptions::slip_lanes, kTiny).slips, 1);
+  EXPECT_EQ(count_with(&TownOptions::parking, kTiny).parking, 1);
+  EXPECT_GT(count_with(&TownOptions::lights, kTiny).lights, 2);
+  EXPECT_LT(count_with(&TownOptions::lights, kTiny).lights, 6);
 }
 
-TEST(ProceduralTownOptions, MoreOfAFeatureTheMoreIsAskedFor) {
+TEST(ProceduralTownOptions, MoreOfAFeatureWithALargerValue) {
   const Counts usual = count(options_of(5, 5, 5));
   EXPECT_GT(count_with(&TownOptions::five_arms, 1).five_arms, usual.five_arms);
   EXPECT_GT(count_with(&TownOptions::roundabouts, 1).roundabouts, usual.roundabouts);
@@ -293,7 +293,7 @@ TEST(ProceduralTownOptions, TheDefaultTownHasEverything) {
   }
 }
 
-TEST(ProceduralTownOptions, RefusesWhatIsOutOfRange) {
+TEST(ProceduralTownOptions, RejectsValuesOutOfRange) {
   const auto message_of = [](const TownOptions& options) -> std::string {
     return test::message_of<UsageError>([&] { procedural_town(options); });
   };

@@ -1,4 +1,5 @@
-// Outlines of hand-made surfaces: lengths, sides, mouths, levels, cracks; and a brute-force check on random ones.
+// Outlines of hand-made surfaces: lengths, orientation, open ends, levels, gaps; and a brute-force check on random
+// bands.
 #include "pictura/map/road_edges.h"
 
 #include <cmath>
@@ -11,7 +12,7 @@
 namespace pictura {
 namespace {
 
-/// A straight band from (x0, y0), `length` long under `heading`, `width` to both sides together.
+/// A straight band from (x0, y0), `length` long, with the given heading and total width.
 SurfaceBand band_of(double x0, double y0, double heading, double length, double width, double z = 0) {
   SurfaceBand band;
   const double c = std::cos(heading), s = std::sin(heading), half = 0.5 * width;
@@ -37,7 +38,7 @@ double distance_to(const RoadEdge& edge, Vec2 p) {
   return length(r - d * u);
 }
 
-TEST(RoadEdges, ABandIsFramedWithItselfOnTheRight) {
+TEST(RoadEdges, ABandIsOnTheRightOfItsOutline) {
   const std::vector<RoadEdge> edges = outline({band_of(0, 0, 0.3, 40, 4)});
   EXPECT_NEAR(total_length(edges), 88, 0.01);
   const Vec2 middle{20 * std::cos(0.3f), 20 * std::sin(0.3f)};
@@ -71,7 +72,7 @@ TEST(RoadEdges, ABridgeKeepsItsEdgesAndSoDoesTheRoadBelow) {
   EXPECT_NEAR(total_length(outline({band_of(-20, 0, 0, 40, 4), band_of(0, -20, M_PI / 2, 40, 4, 1)})), 160, 0.1);
 }
 
-TEST(RoadEdges, CracksAreClosedAndGapsAreNot) {
+TEST(RoadEdges, SmallGapsAreClosedAndLargeOnesAreNot) {
   EXPECT_NEAR(total_length(outline({band_of(0, 2.01, 0, 40, 4), band_of(0, -2.01, 0, 40, 4)})), 96, 0.2);
   EXPECT_NEAR(total_length(outline({band_of(0, 2.2, 0, 40, 4), band_of(0, -2.2, 0, 40, 4)})), 176, 0.2);
 }
@@ -110,7 +111,7 @@ TEST(RoadEdges, RandomBandsHaveAnEdgeExactlyWhereTheirUnionEnds) {
       EXPECT_TRUE(covered(middle.x, middle.y, 0.03));
       EXPECT_FALSE(covered(middle.x + 0.03 * left.x, middle.y + 0.03 * left.y, -0.03));
     }
-    // Along every side of every box: no cover just outside means that there is an edge.
+    // Along every side of every box: if nothing covers the ground just outside, there is an edge.
     for (const Box& box : boxes) {
       const double c = std::cos(box.heading), s = std::sin(box.heading);
       for (double u = 0.05; u < box.length; u += 0.3) {

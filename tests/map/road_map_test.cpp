@@ -1,4 +1,4 @@
-// validate() against maps that are damaged in one place each, and load_map() against names that mean nothing.
+// validate() on maps with one invalid value each, and load_map() with invalid names.
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -18,16 +18,16 @@ namespace {
 using ::testing::HasSubstr;
 
 TEST(RoadMap, EveryDamageIsFoundAndNamed) {
-  RoadMap sound = *load_map("procedural:2");
-  sound.sign_lanes = {0};
-  sound.signs = {{"1", "206", "-1", "OpenDRIVE", {1, 2, 3}, 0, {0, 1}}};
-  sound.stop_lines = {{{1, 2, 3}, {4, 5, 6}, 0.3f}};
-  sound.provenance.signs = {{0, 7}};
-  ASSERT_NO_THROW(validate(sound));
-  ASSERT_FALSE(sound.lights.empty());
-  ASSERT_FALSE(sound.markings.empty());
+  RoadMap valid_map = *load_map("procedural:2");
+  valid_map.sign_lanes = {0};
+  valid_map.signs = {{"1", "206", "-1", "OpenDRIVE", {1, 2, 3}, 0, {0, 1}}};
+  valid_map.stop_lines = {{{1, 2, 3}, {4, 5, 6}, 0.3f}};
+  valid_map.provenance.signs = {{0, 7}};
+  ASSERT_NO_THROW(validate(valid_map));
+  ASSERT_FALSE(valid_map.lights.empty());
+  ASSERT_FALSE(valid_map.markings.empty());
   std::size_t linked = 0;
-  while (sound.lanes[linked].successors.size() == 0) ++linked;
+  while (valid_map.lanes[linked].successors.size() == 0) ++linked;
   const float nan = std::nanf("");
   const std::vector<std::pair<const char*, std::function<void(RoadMap*)>>> damages = {
       {"points", [](RoadMap* map) { map->lanes[0].points.end = 1 << 30; }},
@@ -64,7 +64,7 @@ TEST(RoadMap, EveryDamageIsFoundAndNamed) {
       {"sign 0: source line", [](RoadMap* map) { map->provenance.signs[0].line = -1; }},
   };
   for (const auto& [expected, damage] : damages) {
-    RoadMap map = sound;
+    RoadMap map = valid_map;
     damage(&map);
     try {
       validate(map);
@@ -99,7 +99,7 @@ class LoadMapFiles : public ::testing::Test {
   test::EnvironmentVariable data_{"PICTURA_DATA", folder_.path()};
 };
 
-TEST_F(LoadMapFiles, UnknownNamesListWhatThereIs) {
+TEST_F(LoadMapFiles, UnknownNamesListTheKnownMaps) {
   EXPECT_THROW(load_map("Nowhere"), UsageError);
   EXPECT_THAT(message_of("Nowhere"), HasSubstr("Here, There"));
   EXPECT_THAT(message_of("Nowhere"), HasSubstr("procedural"));

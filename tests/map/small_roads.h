@@ -1,4 +1,4 @@
-// Small OpenDRIVE files for tests, put together from text.
+// Small OpenDRIVE files for tests.
 #pragma once
 
 #include <stdexcept>
@@ -24,7 +24,7 @@ inline std::string line_at(double s, double x, double y, double heading, double 
                      s, x, y, heading, length);
 }
 
-/// A lane with a constant width; `more` goes into the element.
+/// A lane with a constant width; `more` is inserted into the element.
 inline std::string lane_of(int id, const std::string& type, double width, const std::string& more = "") {
   return fmt::format(R"(<lane id="{}" type="{}">{}<width sOffset="0" a="{}" b="0" c="0" d="0"/></lane>)"
                      "\n",
@@ -43,8 +43,8 @@ struct RoadText {
   std::string lateral;      // contents of <lateralProfile>
   std::string lane_offset;  // whole <laneOffset> elements
   std::string center_mark;  // whole <roadMark> elements
-  std::string left, right;  // whole <lane> elements of the one section
-  std::string sections;     // instead: whole <laneSection> elements
+  std::string left, right;  // whole <lane> elements of the only section
+  std::string sections;     // whole <laneSection> elements, instead of `left` and `right`
   std::string rest;         // objects and signals
 
   std::string text() const {
@@ -65,7 +65,7 @@ struct RoadText {
   }
 };
 
-/// Roads 1 (along x to 100), 3 (from 120 on) and 2 between them in junction 7; road 1 has no limit on its way back.
+/// Roads 1 (along x to 100), 3 (from 120 on) and 2 between them in junction 7; only road 1 has a speed limit.
 inline std::string three_roads(const std::string& rest_of_2 = "", const std::string& junction_more = "",
                                const std::string& rest_of_1 = "") {
   RoadText a, b, c;
@@ -112,7 +112,7 @@ inline std::vector<int32_t> list(const RoadMap& map, IndexRange range) {
   return {links.begin(), links.end()};
 }
 
-/// File coordinates of a point.
+/// Checks the file coordinates of a point.
 inline void expect_at(const RoadMap& map, Vec3 p, double x, double y, double z = 0) {
   EXPECT_NEAR(p.x + map.origin_m[0], x, 1e-4);
   EXPECT_NEAR(p.y + map.origin_m[1], y, 1e-4);
