@@ -98,7 +98,7 @@ void run_map(const Arguments& arguments) {
   Json object = facts_of(*map);
   add_blind_approaches(*map, &object);
   object["cached"] = report.cached;
-  if (!report.cache_refusal.empty()) object["cache_refused"] = report.cache_refusal;
+  if (!report.cache_rejection.empty()) object["cache_refused"] = report.cache_rejection;
   object["load_ms"] = load_ms;
   if (arguments.lenient) object["warnings"] = report.warnings.size();
   if (arguments.full) return print_listing(object, *map);

@@ -89,7 +89,7 @@ LaneGraph::Search LaneGraph::search(LanePosition from) const {
 std::optional<LaneRoute> LaneGraph::route(LanePosition from, LanePosition to) const {
   check(to);
   const Search result = search(from);
-  // The goal is either ahead of the start position, by lane changes alone, or reached through the start of its lane.
+  // The goal is either ahead of the start position, by lane changes only, or reached through the start of its lane.
   int32_t node = to.lane;
   double last_m = to.s_m;
   const int32_t start_node = num_lanes() + to.lane;

@@ -26,7 +26,7 @@ struct LaneRoute {
 /// Strongly connected components: from each lane all others of its component can be reached.
 struct LaneComponents {
   int32_t count = 0;
-  std::vector<int32_t> of_lane;  // edges never lead to a higher component
+  std::vector<int32_t> of_lane;  // [lanes] in [0, count); edges never lead to a higher component
 };
 
 /// Copies what it needs of the map. A lane change goes to a neighbour, at the same fraction of both lanes' lengths, and
@@ -59,12 +59,12 @@ class LaneGraph {
     bool is_change = false;
   };
   /// Node n < lanes is the start of lane n; node lanes + n is the position on lane n next to the one where the search
-  /// began, reached by lane changes alone.
+  /// began, reached by lane changes only.
   struct Search {
     double begin_fraction = 0;            // of the start position, of its lane's length
     std::vector<double> cost_m;           // [nodes] least costs
-    std::vector<int32_t> previous;        // the previous node on the path, or -1
-    std::vector<uint8_t> is_lane_change;  // whether that step is a lane change
+    std::vector<int32_t> previous;        // [nodes] the previous node on the path, or -1
+    std::vector<uint8_t> is_lane_change;  // [nodes] whether that step is a lane change
   };
 
   Span<const Edge> edges_of(int32_t lane) const;

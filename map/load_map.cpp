@@ -59,8 +59,8 @@ RoadMap load_file(const std::string& path, const OpenDriveOptions& options, Load
       RoadMap map = decode_map(read_file(cache_path), key, cache_path);
       report->cached = true;
       return map;
-    } catch (const Error& refusal) {
-      report->cache_refusal = refusal.what();
+    } catch (const Error& rejection) {
+      report->cache_rejection = rejection.what();
     }
   }
   RoadMap map = parse_opendrive(text, path, options, &report->warnings);

@@ -13,7 +13,7 @@ namespace pictura {
 /// How a map was loaded.
 struct LoadReport {
   bool cached = false;                // the map was read from the cache
-  std::string cache_refusal;          // why an existing cached file was not used, or empty
+  std::string cache_rejection;        // why an existing cached file was not used, or empty
   std::vector<std::string> warnings;  // what a lenient import skipped
 };
 

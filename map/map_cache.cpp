@@ -120,7 +120,7 @@ class Reader {
     } else if constexpr (std::is_same_v<T, bool>) {
       uint8_t byte = 0;
       get(&byte);
-      PICTURA_CHECK(byte <= 1, "damaged: expected 0 or 1 for a truth value, got {}", byte);
+      PICTURA_CHECK(byte <= 1, "damaged: expected 0 or 1 for a bool, got {}", byte);
       *value_out = byte != 0;
     } else if constexpr (std::is_enum_v<T>) {
       get_bytes(value_out, sizeof(T));
@@ -165,7 +165,7 @@ std::string_view checked_payload(std::string_view bytes, const MapCacheKey& key)
   const std::size_t magic_bytes = std::min(bytes.size(), kMagic.size());
   PICTURA_CHECK(bytes.substr(0, magic_bytes) == std::string_view(kMagic.data(), magic_bytes),
                 "foreign: expected it to begin with {}", std::string_view(kMagic.data(), kMagic.size()));
-  PICTURA_CHECK(bytes.size() >= sizeof header, "truncated: {} bytes, of which its header takes {}", bytes.size(),
+  PICTURA_CHECK(bytes.size() >= sizeof header, "truncated: {} bytes, expected at least {} for the header", bytes.size(),
                 sizeof header);
   std::memcpy(&header, bytes.data(), sizeof header);
   PICTURA_CHECK(header.byte_order == kByteOrder, "written on a machine of another byte order");

@@ -36,7 +36,7 @@ class SampleBudget {
  public:
   explicit SampleBudget(std::int64_t max_samples) : remaining_(max_samples) {}
   void count_sample() {
-    if (--remaining_ < 0) fail("the map's curves need more samples than a map may have");
+    if (--remaining_ < 0) fail("the map's curves need more samples than are allowed");
   }
 
  private:

@@ -118,7 +118,7 @@ struct Junction {
   int32_t num_phases = 0;  // 0: no lights
 };
 
-/// A straight piece of a building line behind the sidewalk, where walls may stand.
+/// A straight piece of a building line behind the sidewalk, along which walls may be placed.
 struct BuildingLine {
   Vec3 a_m, b_m;  // the road lies to the right of a -> b
 };

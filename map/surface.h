@@ -53,7 +53,7 @@ class Surface {
   bool contains(const Quad& quad, const Point2& p, double z) const;
   void count_lookups(int64_t count) const {
     remaining_lookups_ -= count;
-    if (remaining_lookups_ < 0) fail("too many lanes lie upon each other");
+    if (remaining_lookups_ < 0) fail("too many overlapping lanes");
   }
 
   double level_m_ = 0;

@@ -49,8 +49,8 @@ void check_position(const FileRoad& road, const FileSection& section, int border
   }
   const double z = point_at(road, s, t).z;
   if (!(std::abs(t) <= kMaxOffset_m && std::abs(z) <= kMaxHeight_m)) {
-    road.where.fail("at s {:.3f} something lies {} m beside it at a height of {} m; expected at most {} and {} m", s, t,
-                    z, kMaxOffset_m, kMaxHeight_m);
+    road.where.fail("at s {:.3f} a lane border is {} m to its side at a height of {} m; expected at most {} and {} m",
+                    s, t, z, kMaxOffset_m, kMaxHeight_m);
   }
 }
 

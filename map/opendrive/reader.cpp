@@ -119,7 +119,7 @@ void read_network(std::string_view text, const std::string& source_name, Faults*
       append(read_road(road, offset, faults), road, &network.roads, &network.road_index);
     });
   });
-  if (network.roads.empty()) root.fail("expected at least one sound <road> in it, found none");
+  if (network.roads.empty()) root.fail("expected at least one valid <road> in it, found none");
   root.each("junction", [&](const Element& element) {
     faults->attempt([&] {
       const Element junction = owned(element);

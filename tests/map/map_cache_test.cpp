@@ -193,7 +193,7 @@ TEST(MapCache, ContentWithAValidHashIsStillValidated) {
   map.lanes[0].is_endless = !map.lanes[0].is_endless;
   const std::string other = encode_map(map, kKey);
   *std::mismatch(bytes.begin() + kHeaderBytes, bytes.end(), other.begin() + kHeaderBytes).first = 2;
-  EXPECT_THAT(reason_of(with_header(bytes.substr(kHeaderBytes))), HasSubstr("expected 0 or 1 for a truth value, got 2"));
+  EXPECT_THAT(reason_of(with_header(bytes.substr(kHeaderBytes))), HasSubstr("expected 0 or 1 for a bool, got 2"));
   // Damaged content with a valid hash gives a map or an Error.
   const std::string payload = encode_map(full_map(), kKey).substr(kHeaderBytes);
   std::mt19937 random(2);
@@ -214,7 +214,7 @@ class MapCacheFolder : public ::testing::Test {
   std::string outcome(const OpenDriveOptions& options = {}) {
     LoadReport report;
     map_ = load_map(source_, options, &report);
-    return report.cached ? "cached" : report.cache_refusal.empty() ? "imported" : report.cache_refusal;
+    return report.cached ? "cached" : report.cache_rejection.empty() ? "imported" : report.cache_rejection;
   }
 
   ScratchFolder folder_;
@@ -349,7 +349,7 @@ TEST_F(MapCacheFolder, CarlaTownsLoadInLessThan50Ms) {
     double cache_ms = std::numeric_limits<double>::infinity();
     for (int i = 0; i < 5; ++i) {
       cache_ms = std::min(cache_ms, load_ms(town, &report));
-      EXPECT_TRUE(report.cached) << report.cache_refusal;
+      EXPECT_TRUE(report.cached) << report.cache_rejection;
     }
     fmt::print("{:10} {:10.1f} {:10.1f}\n", town, import_ms, cache_ms);
     EXPECT_LT(cache_ms, PICTURA_IS_SANITIZED ? 1000 : 50) << town;

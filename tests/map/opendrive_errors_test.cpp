@@ -90,7 +90,7 @@ TEST(OpenDriveErrors, AttributesAreCheckedAndNamedWithTheirLine) {
            {"<lanes>",
             "<lateralProfile><superelevation s=\"0\" a=\"0.6\" b=\"0\" c=\"0\" d=\"0\"/></lateralProfile><lanes>",
             "it is banked by 0.6 rad; expected at most 0.5"},
-           {"<lanes>", "<lanes><laneOffset s=\"0\" a=\"1e300\" b=\"0\" c=\"0\" d=\"0\"/>", "beside it"},
+           {"<lanes>", "<lanes><laneOffset s=\"0\" a=\"1e300\" b=\"0\" c=\"0\" d=\"0\"/>", "to its side"},
        }) {
     EXPECT_THAT(message_of(replaced(text, from, to)), HasSubstr(expected)) << from << " -> " << to;
   }
