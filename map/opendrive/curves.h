@@ -43,7 +43,7 @@ struct Border {
 };
 
 /// Border 0 is the center line, border k (-k) the outer border of lane k (-k). Negative widths count as 0; a border
-/// that would lie clamp_inside the previous one coincides with it.
+/// that would lie inside the previous one coincides with it.
 Border border_at(const FileRoad& road, const FileSection& section, int border, double s);
 
 /// Width of a lane at s, measured along the banked surface.

@@ -83,7 +83,8 @@ class Linker {
     return end == ContactPoint::start ? road.predecessor : road.successor;
   }
 
-  /// Checks that a road link's target exists and that the target's own link there is not to another road end.
+  /// Checks that a road link's target exists and that, if the target is linked to a road there, it is linked back to
+  /// this road end.
   void check_road_link(const FileRoad& road, ContactPoint end) const {
     const RoadLink& link = link_at(road, end);
     if (link.kind == RoadLink::Kind::junction && !build_.network.junction_index.contains(link.id)) {

@@ -50,8 +50,8 @@ void set_speed_limits(Build* build) {
 
 void find_endless_lanes(Build* build) {
   RoadMap& map = *build->map;
-  // Lanes connected by lane changes form a group, named by its leftmost lane. A group is a dead_ends end when none of
-  // its lanes leads to another group that is not; dead_ends ends are removed repeatedly.
+  // Lanes connected by lane changes form a group, named by its leftmost lane. A group without successor groups is a
+  // dead end; dead ends are removed repeatedly, since this may leave their predecessors without successors.
   std::vector<std::size_t> group(map.lanes.size());
   std::vector<std::vector<std::size_t>> members(map.lanes.size());
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {

@@ -1,4 +1,4 @@
-// Procedural towns after import: one connected network that can be driven_lane without obstacles.
+// Procedural towns after import: one connected network that can be driven without obstacles.
 #include <array>
 #include <cmath>
 #include <cstdlib>
