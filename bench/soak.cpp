@@ -69,7 +69,7 @@ Settings draw_settings(const SoakOptions& options, int64_t scene, const std::vec
   return settings;
 }
 
-// The views of a scene, and the list of agents of which each view hides a range.
+// The views of a scene, and the list of agents; each view hides a range of it.
 struct ViewsOfScene {
   std::vector<View> views;
   std::vector<int32_t> hidden_agents;

@@ -444,7 +444,7 @@ TEST_F(CpuRendererErrors, GeometryThatIsFaulty) {
   EXPECT_NO_THROW(renderer_->upload(0, sound));
   constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
   struct Case {
-    const char* told;
+    const char* expected_message;
     void (*spoil)(StaticGeometry*);
   };
   const Case cases[] = {
@@ -463,7 +463,7 @@ TEST_F(CpuRendererErrors, GeometryThatIsFaulty) {
   for (const Case& each : cases) {
     StaticGeometry geometry = sound;
     each.spoil(&geometry);
-    EXPECT_THAT(test::message_of([&] { renderer_->upload(0, geometry); }), HasSubstr(each.told));
+    EXPECT_THAT(test::message_of([&] { renderer_->upload(0, geometry); }), HasSubstr(each.expected_message));
   }
 }
 

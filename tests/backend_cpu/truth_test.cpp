@@ -1,4 +1,5 @@
-// The oracle against the truth besides colours of towns: planes, visibility, the floor on widths, and difficult scenes.
+// The oracle against the truth, other than colours of towns: planes, visibility, the floor on widths, and difficult
+// scenes.
 #include <algorithm>
 #include <cmath>
 
