@@ -85,11 +85,7 @@ std::unique_ptr<RenderTarget> make_target(const DrivenWorlds& worlds, const Rend
 }
 
 std::size_t image_bytes_of(const RenderCase& render_case) {
-  std::size_t values = 0;
-  for (const Camera& camera : render_case.config.rig.cameras) {
-    values += static_cast<std::size_t>(3 * camera.width_px * camera.height_px);
-  }
-  return values * bytes_per_value(render_case.format) * static_cast<std::size_t>(render_case.num_views);
+  return image_layout(render_case.config.rig, render_case.num_views, render_case.format).bytes();
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 #include "pictura/common/image.h"
 
-#include <map>
+#include <algorithm>
 
 #include <png.h>
 
@@ -17,70 +17,101 @@ std::size_t bytes_per_value(PixelFormat format) {
   }
 }
 
-HostImages::HostImages(const Rig& rig, int num_views, PixelFormat format, Planes planes)
-    : format_(format), num_views_(num_views) {
-  validate(rig);
-  PICTURA_CHECK(num_views >= 0, "images: expected a number of views of 0 or more, got {}", num_views);
+std::string_view name_of(ChannelOrder order) { return order == ChannelOrder::planar ? "planar" : "interleaved"; }
 
-  // One block [views, cameras of this size, 3, height, width] per distinct size.
-  std::map<std::pair<int, int>, int64_t> cameras_of_size;
-  for (const Camera& camera : rig.cameras) ++cameras_of_size[{camera.width_px, camera.height_px}];
-  struct Block {
-    std::size_t begin_bytes = 0;
-    int64_t next_camera = 0;
-  };
-  std::map<std::pair<int, int>, Block> blocks;
-  std::size_t total_bytes = 0;
-  for (const Camera& camera : rig.cameras) {
-    const std::pair<int, int> size{camera.width_px, camera.height_px};
-    if (blocks.contains(size)) continue;
-    blocks[size].begin_bytes = total_bytes;
-    total_bytes += static_cast<std::size_t>(num_views) * static_cast<std::size_t>(cameras_of_size[size]) * 3 *
-                   static_cast<std::size_t>(size.first) * static_cast<std::size_t>(size.second) *
-                   bytes_per_value(format);
+ImageLayout image_layout(Span<const ImageSize> sizes, int64_t num_views, PixelFormat format, ChannelOrder order) {
+  PICTURA_CHECK(num_views >= 0, "images: expected 0 views or more, got {}", num_views);
+  ImageLayout layout;
+  layout.format = format;
+  layout.order = order;
+  layout.num_views = num_views;
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    const auto block = std::find_if(layout.blocks.begin(), layout.blocks.end(),
+                                    [&](const BlockLayout& each) { return each.size == sizes[i]; });
+    CameraLayout camera{.size = sizes[i], .block = static_cast<int>(block - layout.blocks.begin())};
+    layout.cameras.push_back(camera);
+    if (block == layout.blocks.end()) layout.blocks.push_back({.size = sizes[i]});
+    layout.blocks[static_cast<std::size_t>(camera.block)].cameras.push_back(static_cast<int>(i));
   }
-  bytes_.resize(total_bytes);
-  for (const Camera& camera : rig.cameras) {
-    const std::pair<int, int> size{camera.width_px, camera.height_px};
-    const int64_t image_values = int64_t{3} * size.first * size.second;
-    Block& block = blocks[size];
-    CameraImages images;
-    images.width_px = size.first;
-    images.height_px = size.second;
-    images.data = bytes_.data() + block.begin_bytes +
-                  static_cast<std::size_t>(block.next_camera++ * image_values) * bytes_per_value(format);
-    images.view_stride = cameras_of_size[size] * image_values;
-    cameras_.push_back(images);
+  constexpr int64_t kChannels = 3;
+  const bool is_planar = order == ChannelOrder::planar;
+  for (BlockLayout& block : layout.blocks) {
+    block.offset = layout.num_values;
+    const int64_t image_values = kChannels * block.size.pixels();
+    for (std::size_t i = 0; i < block.cameras.size(); ++i) {
+      CameraLayout& camera = layout.cameras[static_cast<std::size_t>(block.cameras[i])];
+      camera.offset = block.offset + static_cast<int64_t>(i) * image_values;
+      camera.view_stride = static_cast<int64_t>(block.cameras.size()) * image_values;
+      camera.camera_stride = image_values;
+      camera.channel_stride = is_planar ? block.size.pixels() : 1;
+      camera.pixel_stride = is_planar ? 1 : kChannels;
+      camera.row_stride = block.size.width_px * camera.pixel_stride;
+    }
+    layout.num_values += num_views * static_cast<int64_t>(block.cameras.size()) * image_values;
+  }
+  return layout;
+}
+
+ImageLayout image_layout(const Rig& rig, int64_t num_views, PixelFormat format, ChannelOrder order) {
+  validate(rig);
+  std::vector<ImageSize> sizes;
+  for (const Camera& camera : rig.cameras) sizes.push_back({camera.width_px, camera.height_px});
+  return image_layout(sizes, num_views, format, order);
+}
+
+CameraImages camera_images(const ImageLayout& layout, int camera, void* first) {
+  const CameraLayout& its = layout.cameras[static_cast<std::size_t>(camera)];
+  CameraImages images;
+  images.width_px = its.size.width_px;
+  images.height_px = its.size.height_px;
+  images.data = static_cast<std::byte*>(first) + its.offset * static_cast<int64_t>(bytes_per_value(layout.format));
+  images.view_stride = its.view_stride;
+  return images;
+}
+
+HostImages::HostImages(const Rig& rig, int num_views, PixelFormat format, Planes planes)
+    : layout_(image_layout(rig, num_views, format)), bytes_(layout_.bytes()) {
+  for (int i = 0; i < static_cast<int>(layout_.cameras.size()); ++i) {
+    cameras_.push_back(camera_images(layout_, i, bytes_.data()));
   }
   if (planes == Planes::none) return;
   std::size_t pixels = 0;
-  auto pixels_of = [&](const CameraImages& camera) {
-    return static_cast<std::size_t>(num_views) * static_cast<std::size_t>(camera.width_px) *
-           static_cast<std::size_t>(camera.height_px);
+  auto pixels_of = [&](const CameraLayout& camera) {
+    return static_cast<std::size_t>(num_views) * static_cast<std::size_t>(camera.size.pixels());
   };
-  for (const CameraImages& camera : cameras_) pixels += pixels_of(camera);
+  for (const CameraLayout& camera : layout_.cameras) pixels += pixels_of(camera);
   depth_m_.resize(pixels);
   class_id_.resize(pixels);
   instance_id_.resize(pixels);
   pixels = 0;
-  for (CameraImages& camera : cameras_) {
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    CameraImages& camera = cameras_[i];
     camera.depth_m = depth_m_.data() + pixels;
     camera.class_id = class_id_.data() + pixels;
     camera.instance_id = instance_id_.data() + pixels;
-    pixels += pixels_of(camera);
+    pixels += pixels_of(layout_.cameras[i]);
   }
 }
 
-ImageBatch HostImages::batch() { return {Device{}, format_, num_views_, cameras_}; }
+ImageBatch HostImages::batch() {
+  return {Device{}, layout_.format, static_cast<int>(layout_.num_views), cameras_, layout_.order};
+}
 
 std::vector<uint8_t> HostImages::interleaved(int view, int camera_index) const {
-  PICTURA_CHECK(format_ == PixelFormat::u8, "images: expected the u8 format");
-  const CameraImages& images = camera(camera_index);
-  const auto pixels = static_cast<std::size_t>(images.width_px) * static_cast<std::size_t>(images.height_px);
-  const auto* planes = static_cast<const uint8_t*>(images.data) + view * images.view_stride;
-  std::vector<uint8_t> rgb(3 * pixels);
-  for (std::size_t i = 0; i < pixels; ++i) {
-    for (std::size_t channel = 0; channel < 3; ++channel) rgb[3 * i + channel] = planes[channel * pixels + i];
+  PICTURA_CHECK(layout_.format == PixelFormat::u8, "images: expected the format u8");
+  const CameraLayout& from = layout_.cameras[static_cast<std::size_t>(camera_index)];
+  const ImageLayout one =
+      image_layout(Span<const ImageSize>(&from.size, 1), 1, PixelFormat::u8, ChannelOrder::interleaved);
+  const CameraLayout& to = one.cameras[0];
+  const uint8_t* const image = bytes_.data() + from.offset + view * from.view_stride;
+  std::vector<uint8_t> rgb(one.bytes());
+  for (int y = 0; y < from.size.height_px; ++y) {
+    for (int x = 0; x < from.size.width_px; ++x) {
+      for (int channel = 0; channel < 3; ++channel) {
+        rgb[static_cast<std::size_t>(y * to.row_stride + x * to.pixel_stride + channel * to.channel_stride)] =
+            image[y * from.row_stride + x * from.pixel_stride + channel * from.channel_stride];
+      }
+    }
   }
   return rgb;
 }

@@ -1,9 +1,10 @@
-// Batches of images in memory that somebody else owns (ImageBatch) and an owner for the host (HostImages). Colour is
-// planar, [views, cameras, 3, height, width] for each distinct camera size of the rig; nothing is padded.
+// Batches of images in memory that somebody else owns (ImageBatch), an owner for the host (HostImages), and the one
+// place that computes where images lie (image_layout). Nothing is padded.
 #pragma once
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "pictura/common/camera.h"
@@ -16,28 +17,72 @@ namespace pictura {
 /// Size of one channel of one pixel.
 std::size_t bytes_per_value(PixelFormat format);
 
-/// Where one camera's images lie: pixel (view, channel, y, x) is element
-/// view * view_stride + (channel * height + y) * width + x of `data`.
+/// How the channels of an image are stored: [3, height, width], or [height, width, 3].
+enum class ChannelOrder : uint8_t { planar, interleaved };
+std::string_view name_of(ChannelOrder order);
+
+struct ImageSize {
+  int width_px = 0, height_px = 0;
+  bool operator==(const ImageSize&) const = default;
+  int64_t pixels() const { return int64_t{width_px} * height_px; }
+};
+
+/// Where one camera's images lie in the memory of a layout. Channel c of pixel (x, y) of a view is the value
+/// offset + view * view_stride + c * channel_stride + y * row_stride + x * pixel_stride; all of these count values.
+struct CameraLayout {
+  ImageSize size;
+  int block = 0;  // index into ImageLayout::blocks
+  int64_t offset = 0;
+  int64_t view_stride = 0, camera_stride = 0, channel_stride = 0, row_stride = 0, pixel_stride = 0;
+};
+/// Images of one size: [views, cameras of the block, channels, rows, pixels], or with the channels last.
+struct BlockLayout {
+  ImageSize size;
+  std::vector<int> cameras;  // of the rig, in ascending order
+  int64_t offset = 0;        // in values
+};
+struct ImageLayout {
+  std::vector<CameraLayout> cameras;  // [cameras of the rig]
+  std::vector<BlockLayout> blocks;    // one per distinct size, in the order of first appearance, without gaps
+  PixelFormat format = PixelFormat::u8;
+  ChannelOrder order = ChannelOrder::planar;
+  int64_t num_views = 0, num_values = 0;
+  std::size_t bytes() const { return static_cast<std::size_t>(num_values) * bytes_per_value(format); }
+};
+
+/// Throws Error unless there are 0 views or more.
+ImageLayout image_layout(Span<const ImageSize> sizes, int64_t num_views, PixelFormat format,
+                         ChannelOrder order = ChannelOrder::planar);
+/// Throws Error as validate(rig) does, too.
+ImageLayout image_layout(const Rig& rig, int64_t num_views, PixelFormat format,
+                         ChannelOrder order = ChannelOrder::planar);
+
+/// Memory of one camera's images. Value (view, channel, y, x) is element
+/// view * view_stride + (channel * height + y) * width + x of `data`: images are planar and have no gaps within.
 struct CameraImages {
   int width_px = 0, height_px = 0;
   void* data = nullptr;             // colour, of ImageBatch::format
   int64_t view_stride = 0;          // elements from one view's image to the next
-  float* depth_m = nullptr;         // optional [views, height, width]; infinity where nothing is
-  uint8_t* class_id = nullptr;      // optional, class of the front surface at the pixel centre; 0 nothing
-  uint16_t* instance_id = nullptr;  // optional, 1 + index of the agent in its world; 0 none
+  float* depth_m = nullptr;         // optional [views, height, width]; infinity where nothing is drawn
+  uint8_t* class_id = nullptr;      // optional, class of the front surface at the pixel centre; 0: nothing
+  uint16_t* instance_id = nullptr;  // optional, 1 + index of the agent in its world; 0: no agent
 };
 
-/// What render() fills.
+/// A camera's images in the memory of a whole layout, without planes.
+CameraImages camera_images(const ImageLayout& layout, int camera, void* first);
+
+/// What render() fills. Renderers draw planar images, and refuse an order that they do not draw.
 struct ImageBatch {
   Device device;  // of all that follows
   PixelFormat format = PixelFormat::u8;
   int num_views = 0;
   Span<const CameraImages> cameras;  // [cameras of the rig]
+  ChannelOrder order = ChannelOrder::planar;
 };
 
 enum class Planes : uint8_t { none, all };  // depth, class and instance
 
-/// Host memory for the images of a rig. Colour: one block per distinct size, in the order of first appearance.
+/// Host memory for the images of a rig: colour as image_layout says, planar.
 class HostImages {
  public:
   HostImages(const Rig& rig, int num_views, PixelFormat format = PixelFormat::u8, Planes planes = Planes::none);
@@ -47,16 +92,16 @@ class HostImages {
   HostImages(HostImages&&) = default;
   HostImages& operator=(HostImages&&) = default;
   ImageBatch batch();
-  /// The bytes of all blocks of colour in order: what image_hash is taken over.
+  const ImageLayout& layout() const { return layout_; }
+  /// The bytes of all blocks of colour in order: what image_hash is computed from.
   Span<const uint8_t> bytes() const { return bytes_; }
   Span<uint8_t> bytes() { return bytes_; }
   const CameraImages& camera(int index) const { return cameras_[static_cast<size_t>(index)]; }
-  /// u8 colour of one image as interleaved rows, [height, width, 3]. Throws unless the format is u8.
+  /// u8 colour of one image as [height, width, 3]. Throws unless the format is u8.
   std::vector<uint8_t> interleaved(int view, int camera) const;
 
  private:
-  PixelFormat format_;
-  int num_views_;
+  ImageLayout layout_;
   std::vector<uint8_t> bytes_;
   std::vector<float> depth_m_;  // of each plane [cameras][views, height, width], or empty
   std::vector<uint8_t> class_id_;
@@ -64,8 +109,8 @@ class HostImages {
   std::vector<CameraImages> cameras_;
 };
 
-/// Writes an 8-bit RGB image, rows interleaved [height, width, 3], as PNG: beside, then renamed. Throws Error naming
-/// the path.
+/// Writes an 8-bit RGB image, [height, width, 3], as PNG: to a temporary file, which is then renamed. Throws Error
+/// naming the path.
 void write_png(const std::string& path, int width_px, int height_px, Span<const uint8_t> rgb);
 struct RgbImage {
   int width_px = 0, height_px = 0;

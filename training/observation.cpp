@@ -16,23 +16,12 @@ at::Tensor wrap(Span<T> span, at::IntArrayRef shape) {
   return at::from_blob(const_cast<std::remove_const_t<T>*>(span.data()), shape, at::TensorOptions(kType));
 }
 
-// Distinct sizes in the order of first appearance, as HostImages has them.
 std::vector<ImageBlock> image_blocks(const Rig& rig, int64_t rows, int64_t slots) {
   std::vector<ImageBlock> blocks;
-  std::vector<std::pair<int, int>> sizes;
-  for (size_t c = 0; c < rig.cameras.size(); ++c) {
-    const std::pair size{rig.cameras[c].height_px, rig.cameras[c].width_px};
-    size_t block = 0;
-    while (block < sizes.size() && sizes[block] != size) ++block;
-    if (block == sizes.size()) {
-      sizes.push_back(size);
-      blocks.emplace_back();
-    }
-    blocks[block].cameras.push_back(static_cast<int64_t>(c));
-  }
-  for (size_t b = 0; b < blocks.size(); ++b) {
-    blocks[b].pixels = at::empty(
-        {rows, slots, static_cast<int64_t>(blocks[b].cameras.size()), 3, sizes[b].first, sizes[b].second}, at::kByte);
+  for (const BlockLayout& block : image_layout(rig, slots, PixelFormat::u8).blocks) {
+    const auto cameras = static_cast<int64_t>(block.cameras.size());
+    blocks.push_back({at::empty({rows, slots, cameras, 3, block.size.height_px, block.size.width_px}, at::kByte),
+                      {block.cameras.begin(), block.cameras.end()}});
   }
   return blocks;
 }
@@ -116,16 +105,14 @@ void Observer::observe(const Observation& out) {
   }
 
   const auto start = std::chrono::steady_clock::now();
-  std::vector<CameraImages> cameras(renderer_->config().rig.cameras.size());
-  for (const ImageBlock& block : out.images) {
-    const int64_t height = block.pixels.size(3), width = block.pixels.size(4), image = 3 * height * width;
-    for (size_t i = 0; i < block.cameras.size(); ++i) {
-      CameraImages& images = cameras[static_cast<size_t>(block.cameras[i])];
-      images.width_px = static_cast<int>(width);
-      images.height_px = static_cast<int>(height);
-      images.data = block.pixels.data_ptr<uint8_t>() + static_cast<int64_t>(i) * image;
-      images.view_stride = block.pixels.size(1) * image;
-    }
+  const ImageLayout layout = image_layout(renderer_->config().rig, simulator_.num_slots(), PixelFormat::u8);
+  std::vector<CameraImages> cameras;
+  for (size_t i = 0; i < layout.cameras.size(); ++i) {
+    // Each block is a tensor of its own.
+    const CameraLayout& camera = layout.cameras[i];
+    const auto block = static_cast<size_t>(camera.block);
+    uint8_t* const first = out.images[block].pixels.data_ptr<uint8_t>() + (camera.offset - layout.blocks[block].offset);
+    cameras.push_back({camera.size.width_px, camera.size.height_px, first, camera.view_stride});
   }
   const std::vector<int64_t> seeing = active_slots(simulator_);
   std::vector<View> views;

@@ -86,11 +86,11 @@ void GeometryTable::upload(GeometryHandle handle, const StaticGeometry& geometry
   map.entry.strips = packed_strips.in(memory);
   map.entry.walls = packed_walls.in(memory);
   PICTURA_CUDA(cudaMemcpyAsync(map.memory.data(), bytes.data(), bytes.size(), cudaMemcpyHostToDevice, stream));
-  PICTURA_CUDA(
-      cudaMemcpyAsync(table_.data() + index, &map.entry, sizeof(DeviceGeometry), cudaMemcpyHostToDevice, stream));
-  PICTURA_CUDA(cudaStreamSynchronize(stream));
   std::swap(maps_[index], map);
+  PICTURA_CUDA(cudaMemcpyAsync(table_.data() + index, &maps_[index].entry, sizeof(DeviceGeometry),
+                               cudaMemcpyHostToDevice, stream));
   retire(std::move(map.memory), stream);
+  PICTURA_CUDA(cudaStreamSynchronize(stream));
 }
 
 void GeometryTable::release(GeometryHandle handle, cudaStream_t stream) {

@@ -23,7 +23,7 @@ class DeviceCopy {
     }
     return {buffer_.data(), host.size()};
   }
-  /// Room for so many elements, with undefined contents.
+  /// Makes it hold this many elements, with undefined contents.
   Span<T> resize(std::size_t size) {
     if (buffer_.size() < size) buffer_ = DeviceBuffer<T>(size);
     return {buffer_.data(), size};
@@ -57,28 +57,35 @@ class DeviceScene {
   DeviceCopy<LightState> light_states_;
 };
 
-/// Room on the device for images that lie on the host: colour packed as [views, 3, height, width] for each camera, and
-/// the planes that the host has.
+/// Device memory for images that lie on the host: colour as image_layout says, and the planes that the host has.
 class DeviceImages {
  public:
+  /// On the current device.
   ImageBatch like(const ImageBatch& host) {
-    const auto views = static_cast<std::size_t>(host.num_views);
-    staged_.resize(host.cameras.size());
+    std::vector<ImageSize> sizes;
+    for (const CameraImages& camera : host.cameras) sizes.push_back({camera.width_px, camera.height_px});
+    layout_ = image_layout(sizes, host.num_views, host.format, host.order);
+    const Span<uint8_t> color = color_.resize(layout_.bytes());
+    planes_.resize(sizes.size());
     cameras_.assign(host.cameras.begin(), host.cameras.end());
     for (std::size_t k = 0; k < cameras_.size(); ++k) {
       CameraImages& camera = cameras_[k];
-      Staged& staged = staged_[k];
-      const std::size_t pixels = pixels_of(camera);
-      camera.view_stride = static_cast<int64_t>(3 * pixels);
-      camera.data = staged.color.resize(3 * pixels * views * bytes_per_value(host.format)).data();
-      if (camera.depth_m) camera.depth_m = staged.depth_m.resize(pixels * views).data();
-      if (camera.class_id) camera.class_id = staged.class_id.resize(pixels * views).data();
-      if (camera.instance_id) camera.instance_id = staged.instance_id.resize(pixels * views).data();
+      const CameraImages placed = camera_images(layout_, static_cast<int>(k), color.data());
+      camera.data = placed.data;
+      camera.view_stride = placed.view_stride;
+      const std::size_t pixels = pixels_of(k, host.num_views);
+      if (camera.depth_m) camera.depth_m = planes_[k].depth_m.resize(pixels).data();
+      if (camera.class_id) camera.class_id = planes_[k].class_id.resize(pixels).data();
+      if (camera.instance_id) camera.instance_id = planes_[k].instance_id.resize(pixels).data();
     }
-    return {current_device(), host.format, host.num_views, cameras_};
+    color_bytes_ = color;
+    return {current_device(), host.format, host.num_views, cameras_, host.order};
   }
 
-  /// Copies what like(host) made back into the host's images, on the stream.
+  /// All colour of what like() made.
+  Span<uint8_t> color_bytes() const { return color_bytes_; }
+
+  /// Copies what like() made back into such images on the host, of as many views or fewer, on the stream.
   void copy_to_host(const ImageBatch& host, cudaStream_t stream = nullptr) const {
     const auto views = static_cast<std::size_t>(host.num_views);
     auto copy = [&](void* to, const void* from, std::size_t bytes) {
@@ -86,29 +93,35 @@ class DeviceImages {
     };
     for (std::size_t k = 0; k < cameras_.size(); ++k) {
       const CameraImages &to = host.cameras[k], &from = cameras_[k];
-      const std::size_t pixels = pixels_of(to), value_bytes = bytes_per_value(host.format);
-      const std::size_t image_bytes = 3 * pixels * value_bytes;
-      const std::size_t stride_bytes = static_cast<std::size_t>(to.view_stride) * value_bytes;
+      const std::size_t value_bytes = bytes_per_value(host.format), pixels = pixels_of(k, host.num_views);
+      const std::size_t image_bytes = static_cast<std::size_t>(layout_.cameras[k].camera_stride) * value_bytes;
+      auto pitch = [&](int64_t view_stride) {
+        // A single image may have any stride; CUDA takes no pitch below a row.
+        return views > 1 ? static_cast<std::size_t>(view_stride) * value_bytes : image_bytes;
+      };
       if (views > 0 && image_bytes > 0) {
-        PICTURA_CUDA(cudaMemcpy2DAsync(to.data, views > 1 ? stride_bytes : image_bytes, from.data, image_bytes,
-                                       image_bytes, views, cudaMemcpyDeviceToHost, stream));
+        PICTURA_CUDA(cudaMemcpy2DAsync(to.data, pitch(to.view_stride), from.data, pitch(from.view_stride), image_bytes,
+                                       views, cudaMemcpyDeviceToHost, stream));
       }
-      if (to.depth_m) copy(to.depth_m, from.depth_m, pixels * views * sizeof(float));
-      if (to.class_id) copy(to.class_id, from.class_id, pixels * views);
-      if (to.instance_id) copy(to.instance_id, from.instance_id, pixels * views * sizeof(uint16_t));
+      if (to.depth_m) copy(to.depth_m, from.depth_m, pixels * sizeof(float));
+      if (to.class_id) copy(to.class_id, from.class_id, pixels);
+      if (to.instance_id) copy(to.instance_id, from.instance_id, pixels * sizeof(uint16_t));
     }
   }
 
  private:
-  struct Staged {
-    DeviceCopy<uint8_t> color, class_id;
+  struct CameraPlanes {
     DeviceCopy<float> depth_m;
+    DeviceCopy<uint8_t> class_id;
     DeviceCopy<uint16_t> instance_id;
   };
-  static std::size_t pixels_of(const CameraImages& camera) {
-    return static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
+  std::size_t pixels_of(std::size_t camera, int num_views) const {
+    return static_cast<std::size_t>(num_views * layout_.cameras[camera].size.pixels());
   }
-  std::vector<Staged> staged_;
+  ImageLayout layout_;
+  DeviceCopy<uint8_t> color_;
+  Span<uint8_t> color_bytes_;
+  std::vector<CameraPlanes> planes_;
   std::vector<CameraImages> cameras_;
 };
 

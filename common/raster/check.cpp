@@ -46,6 +46,8 @@ void check_images(std::string_view renderer, const Rig& rig, Device device, std:
   check_device(renderer, "images", device, images.device);
   PICTURA_CHECK(draws_f16 || images.format != PixelFormat::f16,
                 "renderer {}: images: expected the format u8 or f32, got f16", renderer);
+  PICTURA_CHECK(images.order == ChannelOrder::planar, "renderer {}: images: expected planar channels, got {} ones",
+                renderer, name_of(images.order));
   PICTURA_CHECK(images.num_views >= 0 && static_cast<std::size_t>(images.num_views) == num_views,
                 "renderer {}: images: expected room for {} views, got {}", renderer, num_views, images.num_views);
   PICTURA_CHECK(images.cameras.size() == rig.cameras.size(), "renderer {}: images: expected {} cameras, got {}",
@@ -58,7 +60,7 @@ void check_images(std::string_view renderer, const Rig& rig, Device device, std:
                   wanted.height_px, camera.width_px, camera.height_px);
     PICTURA_CHECK(num_views == 0 || camera.data != nullptr, "renderer {}: images: camera {}: no memory for colour",
                   renderer, i);
-    const int64_t image_values = int64_t{3} * camera.width_px * camera.height_px;
+    const int64_t image_values = 3 * ImageSize{camera.width_px, camera.height_px}.pixels();
     PICTURA_CHECK(num_views < 2 || camera.view_stride >= image_values,
                   "renderer {}: images: camera {}: expected a view stride of at least {} values, got {}", renderer, i,
                   image_values, camera.view_stride);

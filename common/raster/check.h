@@ -12,8 +12,8 @@ namespace pictura {
 /// Throws Error unless `what`, "scene" or "images", lies on the device that the renderer draws from and to.
 void check_device(std::string_view renderer, std::string_view what, Device expected, Device device);
 
-/// Throws Error unless the images lie on `device`, fit the rig and the number of views, and have a format that the
-/// renderer draws: u8, f32 and, where it says so, f16.
+/// Throws Error unless the images lie on `device`, fit the rig and the number of views, and have an order and a
+/// format that the renderer draws: planar; u8, f32 and, where it says so, f16.
 void check_images(std::string_view renderer, const Rig& rig, Device device, std::size_t num_views,
                   const ImageBatch& images, bool draws_f16 = false);
 

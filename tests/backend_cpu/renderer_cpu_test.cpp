@@ -337,6 +337,7 @@ std::unique_ptr<Renderer> make_cpu(const Rig& rig) { return make_renderer("cpu",
 TEST(CpuRenderer, KeepsMapsByHandle) {
   test::expect_maps_by_handle(make_cpu);
   test::expect_refused_handles(make_cpu);
+  test::expect_refused_order(make_cpu);
 }
 
 TEST(CpuRenderer, DrawsAsManyViewsAsItsCountSays) {

@@ -279,6 +279,7 @@ test::MakeForRig maker(const std::string& backend) {
 TEST_P(GlRenderer, KeepsMapsByHandle) {
   test::expect_maps_by_handle(maker(GetParam()));
   test::expect_refused_handles(maker(GetParam()));
+  test::expect_refused_order(maker(GetParam()));
 }
 
 TEST_P(GlRenderer, DrawsAsManyViewsAsItsCountSays) { test::expect_counted_views(maker(GetParam())); }

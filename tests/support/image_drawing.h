@@ -15,10 +15,12 @@ namespace pictura {
 struct Drawn {
   std::vector<float> rgb;
   int width_px, height_px;
-  Rgb at(int x, int y, int image = 0) const {
-    const auto plane = static_cast<std::size_t>(width_px * height_px);
-    const std::size_t i = 3 * plane * static_cast<std::size_t>(image) + static_cast<std::size_t>(y * width_px + x);
-    return {rgb[i], rgb[i + plane], rgb[i + 2 * plane]};
+  ImageLayout layout;
+  Rgb at(int x, int y, int view = 0) const {
+    const CameraLayout& camera = layout.cameras[0];
+    const int64_t first = camera.offset + view * camera.view_stride + y * camera.row_stride + x * camera.pixel_stride;
+    auto channel = [&](int c) { return rgb[static_cast<std::size_t>(first + c * camera.channel_stride)]; };
+    return {channel(0), channel(1), channel(2)};
   }
 };
 
@@ -31,7 +33,7 @@ inline Drawn draw(const StaticGeometry& geometry, const SceneOwner& scene, const
   const auto bytes = images.bytes();
   std::vector<float> rgb(bytes.size() / sizeof(float));
   std::memcpy(rgb.data(), bytes.data(), bytes.size());
-  return {rgb, config.rig.cameras[0].width_px, config.rig.cameras[0].height_px};
+  return {rgb, config.rig.cameras[0].width_px, config.rig.cameras[0].height_px, images.layout()};
 }
 
 inline StaticGeometry no_geometry() {

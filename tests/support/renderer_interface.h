@@ -85,6 +85,17 @@ inline void expect_refused_handles(const MakeForRig& make) {
   }
 }
 
+/// Renderers draw planar images and refuse others by name.
+inline void expect_refused_order(const MakeForRig& make) {
+  const Rig rig = front_rig(8, 8);
+  HostImages images(rig, 1);
+  ImageBatch batch = images.batch();
+  batch.order = ChannelOrder::interleaved;
+  const std::vector<View> views(1);
+  EXPECT_THAT(message_of([&] { make(rig)->render({}, views, batch); }),
+              testing::HasSubstr("images: expected planar channels, got interleaved ones"));
+}
+
 /// Drawing a compacted list with its count equals drawing exactly those views; the images of others are not written,
 /// and what lies beyond the count is not read.
 inline void expect_counted_views(const MakeForRig& make) {

@@ -89,10 +89,7 @@ TEST_F(CudaRendererTest, FaultsOfTheDeviceAreThrownByTheNextCall) {
   HostImages shape(config.rig, 1);
   DeviceBuffer<uint8_t> memory(shape.bytes().size());
   std::vector<CameraImages> cameras;
-  for (std::size_t k = 0; k < 4; ++k) {
-    cameras.push_back(shape.camera(static_cast<int>(k)));
-    cameras[k].data = memory.data() + 3 * 64 * k;
-  }
+  for (int k = 0; k < 4; ++k) cameras.push_back(camera_images(shape.layout(), k, memory.data()));
   const ImageBatch images{config.device, PixelFormat::u8, 1, cameras};
   std::vector<View> bad = town.views;
   bad[0].world = 9;
@@ -177,6 +174,7 @@ std::unique_ptr<Renderer> make_for_host(const Rig& rig) { return make_renderer("
 TEST_F(CudaRendererTest, KeepsMapsByHandle) {
   test::expect_maps_by_handle(make_for_host);
   test::expect_refused_handles(make_for_host);
+  test::expect_refused_order(make_for_host);
 }
 
 TEST_F(CudaRendererTest, DrawsAsManyViewsAsItsCountSays) {

@@ -1,8 +1,11 @@
 // The CUDA renderer in a training loop, on a device: formats, what it writes and what it leaves alone, streams, graphs,
 // allocations, and a bound on its memory.
+#include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstring>
+#include <functional>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -221,9 +224,8 @@ TEST_F(CudaStreamTest, IsCapturedIntoAGraph) {
   PICTURA_CUDA(cudaGraphInstantiate(&executable, graph, 0));
 
   auto replay = [&] {
-    for (const CameraImages& camera : batch.cameras) {
-      PICTURA_CUDA(cudaMemset(camera.data, 0x5A, static_cast<std::size_t>(camera.view_stride) * 7));
-    }
+    const Span<uint8_t> colors = stage.images.color_bytes();
+    PICTURA_CUDA(cudaMemset(colors.data(), 0x5A, colors.size()));
     PICTURA_CUDA(cudaDeviceSynchronize());
     PICTURA_CUDA(cudaGraphLaunch(executable, stream));
     PICTURA_CUDA(cudaStreamSynchronize(stream));
@@ -244,6 +246,201 @@ TEST_F(CudaStreamTest, IsCapturedIntoAGraph) {
   PICTURA_CUDA(cudaGraphExecDestroy(executable));
   PICTURA_CUDA(cudaGraphDestroy(graph));
   PICTURA_CUDA(cudaStreamDestroy(stream));
+}
+
+struct CapturedGraph {
+  cudaGraph_t graph = nullptr;
+  cudaGraphExec_t executable = nullptr;
+  CapturedGraph(cudaStream_t stream, const std::function<void()>& work) {
+    PICTURA_CUDA(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal));
+    EXPECT_NO_THROW(work());
+    PICTURA_CUDA(cudaStreamEndCapture(stream, &graph));
+    PICTURA_CUDA(cudaGraphInstantiate(&executable, graph, 0));
+  }
+  ~CapturedGraph() {
+    cudaGraphExecDestroy(executable);
+    cudaGraphDestroy(graph);
+  }
+  CapturedGraph(const CapturedGraph&) = delete;
+  CapturedGraph& operator=(const CapturedGraph&) = delete;
+};
+
+struct OwnStream {
+  cudaStream_t stream = nullptr;
+  OwnStream() { PICTURA_CUDA(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking)); }
+  ~OwnStream() { cudaStreamDestroy(stream); }
+  OwnStream(const OwnStream&) = delete;
+  OwnStream& operator=(const OwnStream&) = delete;
+};
+
+TEST_F(CudaStreamTest, ACaptureAfterReserveNeedsNoCallBefore) {
+  const std::vector<uint8_t> expected = bytes_of(Stage(60, 7, {.rig = paper_rig()}).draw());
+  Stage stage(60, 7, {.rig = paper_rig()});
+  const int boxes = static_cast<int>(stage.town.scene.agents.size());
+  stage.renderer->reserve(7, boxes);
+  const uint64_t generation = stage.renderer->generation();
+  HostImages host = stage.host_images();
+  const ImageBatch batch = stage.images.like(host.batch());
+  DeviceCopy<VisibilityQuery> query_copy;
+  const std::vector<VisibilityQuery> host_queries{{0, 1}, {2, 3}};
+  const Span<const VisibilityQuery> queries = query_copy.assign(Span<const VisibilityQuery>(host_queries), nullptr);
+  DeviceBuffer<float> answers(host_queries.size());
+  PICTURA_CUDA(cudaDeviceSynchronize());
+  const OwnStream own;
+  const CapturedGraph graph(own.stream, [&] {
+    stage.renderer->render(stage.scene.batch(), stage.views, batch, {own.stream});
+    stage.renderer->visibility(stage.scene.batch(), stage.views, queries, {answers.data(), answers.size()},
+                               {own.stream});
+  });
+  EXPECT_EQ(stage.renderer->generation(), generation);
+  PICTURA_CUDA(cudaGraphLaunch(graph.executable, own.stream));
+  stage.renderer->check({own.stream});
+  stage.images.copy_to_host(host.batch());
+  PICTURA_CUDA(cudaDeviceSynchronize());
+  EXPECT_EQ(bytes_of(host), expected);
+  // Within the sizes nothing moves; beyond them graphs become stale.
+  stage.renderer->reserve(3, boxes / 2);
+  EXPECT_EQ(stage.renderer->generation(), generation);
+  stage.renderer->reserve(8, boxes);
+  EXPECT_GT(stage.renderer->generation(), generation);
+  const uint64_t grown = stage.renderer->generation();
+  stage.renderer->upload(40'000, stage.town.geometry);
+  EXPECT_GT(stage.renderer->generation(), grown);
+  EXPECT_THAT(test::message_of([&] { stage.renderer->reserve(-1, 0); }), HasSubstr("reserve: expected 0 views"));
+}
+
+TEST_F(CudaStreamTest, PollDoesNotWaitAndCheckWaitsForItsStreamAlone) {
+  Stage stage(20, 2, {.rig = paper_rig(16, 9)});
+  stage.draw();
+  stage.town.views[1].world = 9;
+  stage.views = stage.view_copy.assign(Span<const View>(stage.town.views), nullptr);
+  HostImages host = stage.host_images();
+  const ImageBatch batch = stage.images.like(host.batch());
+  PICTURA_CUDA(cudaDeviceSynchronize());
+  const OwnStream own, other;
+  Blocker blocker(own.stream);
+  stage.renderer->render(stage.scene.batch(), stage.views, batch, {own.stream});
+  EXPECT_NO_THROW(stage.renderer->poll());
+  EXPECT_EQ(cudaStreamQuery(own.stream), cudaErrorNotReady);
+  blocker.release();
+  Blocker busy(other.stream);
+  EXPECT_THAT(test::message_of([&] { stage.renderer->check({own.stream}); }), HasSubstr("view 1: no such world"));
+  EXPECT_EQ(cudaStreamQuery(other.stream), cudaErrorNotReady) << "check() waited for another stream";
+  EXPECT_NO_THROW(stage.renderer->poll());
+  busy.release();
+  PICTURA_CUDA(cudaStreamSynchronize(other.stream));
+  EXPECT_TRUE(busy.was_released());
+}
+
+// A captured graph, which cannot ask the host, draws as many views as the device says when it is replayed.
+TEST_F(CudaStreamTest, TheNumberOfViewsIsReadOnTheDevice) {
+  RendererConfig tight{.rig = paper_rig(24, 14)};
+  tight.max_scratch_bytes = min_scratch_bytes(30, 5, tight) + 40;  // a view at a time
+  for (const RendererConfig& config : {RendererConfig{.rig = paper_rig(24, 14)}, tight}) {
+    Stage stage(30, 5, config);
+    const std::vector<uint8_t> all = bytes_of(stage.draw());
+    HostImages host = stage.host_images();
+    const ImageBatch batch = stage.images.like(host.batch());
+    DeviceBuffer<int32_t> count(1);
+    PICTURA_CUDA(cudaDeviceSynchronize());
+    const OwnStream own;
+    const CapturedGraph graph(own.stream, [&] {
+      stage.renderer->render(stage.scene.batch(), {stage.views, count.data()}, batch, {own.stream});
+    });
+    const Span<uint8_t> colors = stage.images.color_bytes();
+    const std::size_t view_bytes = colors.size() / 5;
+    for (const int32_t drawn : {2, 5, 0, 3, -1, 6}) {
+      SCOPED_TRACE(drawn);
+      count.copy_from_host(&drawn);
+      PICTURA_CUDA(cudaMemset(colors.data(), 0x5A, colors.size()));
+      PICTURA_CUDA(cudaDeviceSynchronize());
+      PICTURA_CUDA(cudaGraphLaunch(graph.executable, own.stream));
+      const std::string told = test::message_of([&] { stage.renderer->check({own.stream}); });
+      if (drawn < 0 || drawn > 5) {
+        EXPECT_THAT(told, HasSubstr("number of views " + std::to_string(drawn) + ": expected 0 or more"));
+      } else {
+        EXPECT_EQ(told, test::kNoError);
+      }
+      stage.images.copy_to_host(host.batch());
+      PICTURA_CUDA(cudaDeviceSynchronize());
+      const std::size_t written = static_cast<std::size_t>(std::clamp(drawn, 0, 5)) * view_bytes;
+      const std::vector<uint8_t> bytes = bytes_of(host);
+      const auto border = bytes.begin() + static_cast<std::ptrdiff_t>(written);
+      EXPECT_TRUE(std::equal(bytes.begin(), border, all.begin()));
+      EXPECT_TRUE(std::all_of(border, bytes.end(), [](uint8_t byte) { return byte == 0x5A; }));
+    }
+    // Queries of views that are not drawn are answered with NaN.
+    DeviceCopy<VisibilityQuery> query_copy;
+    std::vector<VisibilityQuery> host_queries;
+    for (int32_t agent = 0; agent < 30; ++agent) host_queries.insert(host_queries.end(), {{1, agent}, {3, agent}});
+    const Span<const VisibilityQuery> queries = query_copy.assign(Span<const VisibilityQuery>(host_queries), nullptr);
+    DeviceBuffer<float> answers(host_queries.size());
+    const int32_t two = 2;
+    count.copy_from_host(&two);
+    std::vector<float> whole(host_queries.size()), counted(host_queries.size());
+    stage.renderer->visibility(stage.scene.batch(), stage.views, queries, {answers.data(), answers.size()});
+    answers.copy_to_host(whole.data());
+    stage.renderer->visibility(stage.scene.batch(), {stage.views, count.data()}, queries,
+                               {answers.data(), answers.size()});
+    answers.copy_to_host(counted.data());
+    stage.renderer->check();
+    for (std::size_t i = 0; i < counted.size(); ++i) {
+      EXPECT_EQ(std::isnan(counted[i]), host_queries[i].view == 3 || std::isnan(whole[i])) << i;
+      if (!std::isnan(counted[i])) {
+        EXPECT_EQ(counted[i], whole[i]) << i;
+      }
+    }
+  }
+}
+
+TEST_F(CudaStreamTest, MapsAreReplacedWithoutWaitingForTheDevice) {
+  Stage stage(60, 4, {.rig = paper_rig()});
+  const std::vector<uint8_t> expected = bytes_of(stage.draw());
+  const StaticGeometry other = make_synthetic_town(8, 60).geometry;
+  const OwnStream own, busy_stream;
+  const Stream stream{own.stream};
+  auto replace = [&] {
+    stage.renderer->upload(1, other, stream);
+    stage.renderer->release(1, stream);
+    stage.renderer->check(stream);
+    stage.renderer->upload(1, stage.town.geometry, stream);
+    stage.renderer->upload(1, other, stream);
+  };
+  replace();
+  replace();  // all memory that it needs at a time is there now
+  const uint64_t generation = stage.renderer->generation();
+  std::size_t free_before = 0, free_after = 0, total = 0;
+  PICTURA_CUDA(cudaMemGetInfo(&free_before, &total));
+  Blocker busy(busy_stream.stream);
+  for (int repeat = 0; repeat < 5; ++repeat) replace();
+  EXPECT_EQ(cudaStreamQuery(busy_stream.stream), cudaErrorNotReady) << "waited for another stream";
+  busy.release();
+  PICTURA_CUDA(cudaDeviceSynchronize());
+  EXPECT_TRUE(busy.was_released());
+  PICTURA_CUDA(cudaMemGetInfo(&free_after, &total));
+  EXPECT_EQ(free_after, free_before);
+  EXPECT_EQ(stage.renderer->generation(), generation);
+
+  // A captured graph draws the map that the handle holds when it is replayed.
+  HostImages host = stage.host_images();
+  const ImageBatch batch = stage.images.like(host.batch());
+  PICTURA_CUDA(cudaDeviceSynchronize());
+  const CapturedGraph graph(own.stream,
+                            [&] { stage.renderer->render(stage.scene.batch(), stage.views, batch, stream); });
+  auto replay = [&] {
+    PICTURA_CUDA(cudaGraphLaunch(graph.executable, own.stream));
+    stage.renderer->check(stream);
+    stage.images.copy_to_host(host.batch());
+    PICTURA_CUDA(cudaDeviceSynchronize());
+    return bytes_of(host);
+  };
+  EXPECT_EQ(replay(), expected);
+  stage.renderer->upload(0, other, stream);
+  EXPECT_NE(replay(), expected);
+  stage.renderer->release(0, stream);
+  EXPECT_THAT(test::message_of(replay), HasSubstr("its world has no such geometry"));
+  stage.renderer->upload(0, stage.town.geometry, stream);
+  EXPECT_EQ(replay(), expected);
 }
 
 TEST_F(CudaStreamTest, DrawsTheSameInPartsUnderATightBound) {

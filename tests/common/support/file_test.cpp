@@ -107,17 +107,5 @@ TEST(Hash, IsFnv1a) {
   EXPECT_EQ(hash.hex(), "af63dc4c8601ec8c");  // published test vector of FNV-1a, 64 bits
 }
 
-TEST(HostImages, MixedSizesGetOneBlockEach) {
-  Rig rig = paper_rig(8, 4);
-  rig.cameras[2].width_px = 5;
-  HostImages images(rig, 3);
-  EXPECT_EQ(images.bytes().size(), 3u * 3 * (3 * 8 * 4 + 5 * 4));
-  EXPECT_EQ(images.camera(0).view_stride, 3 * 3 * 8 * 4);
-  EXPECT_EQ(images.camera(2).view_stride, 3 * 5 * 4);
-  const auto* first = static_cast<const uint8_t*>(images.camera(0).data);
-  EXPECT_EQ(static_cast<const uint8_t*>(images.camera(3).data) - first, 2 * 3 * 8 * 4)
-      << "camera 3 is the third of its size";
-}
-
 }  // namespace
 }  // namespace pictura
