@@ -30,7 +30,7 @@ struct Functions {
   PICTURA_GL_FUNCTIONS(PICTURA_GL_DECLARE)
 #undef PICTURA_GL_DECLARE
 
-  /// Looks every name up. Throws Error naming one that the context lacks.
+  /// Loads every function. Throws Error naming one that the context lacks.
   explicit Functions(const Context& context);
 
   int integer(GLenum name) const {

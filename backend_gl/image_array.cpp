@@ -144,7 +144,7 @@ void ImageArray::make_storage() {
   gl_.NamedBufferStorage(output_, static_cast<GLsizeiptr>(3 * plane_bytes() * static_cast<std::size_t>(layers_)),
                          nullptr, interop_ ? 0 : GL_MAP_READ_BIT);
   const std::string where =
-      fmt::format("renderer {}: room for {} images of {}x{} pixels", renderer_, layers_, width_px_, height_px_);
+      fmt::format("renderer {}: allocating {} images of {}x{} pixels", renderer_, layers_, width_px_, height_px_);
   check_errors(gl_, where);
   const GLenum status = gl_.CheckNamedFramebufferStatus(framebuffer_, GL_FRAMEBUFFER);
   PICTURA_CHECK(status == GL_FRAMEBUFFER_COMPLETE, "{}: OpenGL framebuffer status {:#x}", where, status);

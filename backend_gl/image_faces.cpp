@@ -27,8 +27,8 @@ Vec3 compared_plane(const FacePlane& plane, const PinholeCamera& camera, float o
 
 }  // namespace
 
-void ImageFaces::gather(const ImageSetting& setting, const StaticGeometryView& geometry, const SceneBatch& scene,
-                        const View& view, int32_t layer) {
+void ImageFaces::build(const ImageSetting& setting, const StaticGeometryView& geometry, const SceneBatch& scene,
+                       const View& view, int32_t layer) {
   faces_.clear();
   strips_.clear();
   // A convex polygon as a fan of quadrilaterals; with an odd number of corners the last one is a triangle.

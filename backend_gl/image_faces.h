@@ -11,7 +11,7 @@ namespace pictura::gl {
 
 /// Bounds on the ratio of a strip corner's depth to that of its compared plane there: practically infinitely far,
 /// beyond the plane's horizon, and as near as the oracle allows.
-constexpr float kMinNearness = 1e-4f, kMaxNearness = kWidenedDepth;
+constexpr float kMinInverseDepth = 1e-4f, kMaxInverseDepth = kWidenedDepth;
 
 /// One instance of the draw call: a flat quadrilateral, in camera coordinates.
 struct FaceInstance {
@@ -25,8 +25,8 @@ struct FaceInstance {
 class ImageFaces {
  public:
   /// Replaces the faces by those of the view. `scene` is in host memory.
-  void gather(const ImageSetting& setting, const StaticGeometryView& geometry, const SceneBatch& scene,
-              const View& view, int32_t layer);
+  void build(const ImageSetting& setting, const StaticGeometryView& geometry, const SceneBatch& scene, const View& view,
+             int32_t layer);
   Span<const FaceInstance> faces() const { return faces_; }
 
  private:

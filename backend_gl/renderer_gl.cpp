@@ -1,5 +1,5 @@
-// The baseline: the same scene through a graphics pipeline. Faces are made on the host by the shared rules and drawn as
-// instances into array textures, one layer an image; OpenGL projects, clips, and decides what is visible by depth.
+// The graphics-pipeline baseline. Faces are built on the host by the shared rules and drawn as instances into array
+// textures, one layer per image; OpenGL projects, clips, and decides visibility by depth.
 #include <algorithm>
 #include <cstring>
 
@@ -109,8 +109,8 @@ class GlRenderer final : public Renderer {
     positions_ = gl_->GetUniformLocation(program_, "positions");
     positions_per_px_ = static_cast<float>(config_.samples.grid << gl_->integer(GL_SUBPIXEL_BITS));
     gl_->ProgramUniform1f(program_, gl_->GetUniformLocation(program_, "near_m"), kNear_m);
-    gl_->ProgramUniform2f(program_, gl_->GetUniformLocation(program_, "inverse_depth"), gl::kMinNearness,
-                          gl::kMaxNearness);
+    gl_->ProgramUniform2f(program_, gl_->GetUniformLocation(program_, "inverse_depth"), gl::kMinInverseDepth,
+                          gl::kMaxInverseDepth);
     gl_->CreateBuffers(1, &instances_);
     gl_->CreateVertexArrays(1, &vertex_array_);
     gl_->VertexArrayVertexBuffer(vertex_array_, 0, instances_, 0, sizeof(FaceInstance));
@@ -165,9 +165,9 @@ class GlRenderer final : public Renderer {
     for (SizeGroup& group : groups_) {
       // Images are ordered by camera, so that each camera's views are consecutive.
       const int64_t total = static_cast<int64_t>(views.size() * group.cameras.size());
-      const int room = group.array->reserve(total, images_out.format);
-      for (int64_t begin = 0; begin < total; begin += room) {
-        draw_images(group, begin, std::min(total, begin + room), scene, views, images_out, stream);
+      const int layers = group.array->reserve(total, images_out.format);
+      for (int64_t begin = 0; begin < total; begin += layers) {
+        draw_images(group, begin, std::min(total, begin + layers), scene, views, images_out, stream);
       }
     }
     gl::check_errors(*gl_, fmt::format("renderer {}: drawing", name_));
@@ -181,7 +181,7 @@ class GlRenderer final : public Renderer {
     if (faces_.size() < count) faces_.resize(count);
     parallel_for(config_.num_threads, end - begin, [&](int64_t i) {
       const PinholeCamera& camera = cameras_[group.cameras[static_cast<std::size_t>((begin + i) / num_views)]];
-      gather(camera, scene, views[static_cast<std::size_t>((begin + i) % num_views)], static_cast<int32_t>(i));
+      build_faces(camera, scene, views[static_cast<std::size_t>((begin + i) % num_views)], static_cast<int32_t>(i));
     });
     upload_faces(count);
 
@@ -208,10 +208,10 @@ class GlRenderer final : public Renderer {
     group.array->copy(copies_planned_, stream);
   }
 
-  void gather(const PinholeCamera& in_ego, const SceneBatch& scene, const View& view, int32_t layer) {
+  void build_faces(const PinholeCamera& in_ego, const SceneBatch& scene, const View& view, int32_t layer) {
     const PinholeCamera camera = place_camera(in_ego, view);
     const GeometryHandle handle = scene.geometry[static_cast<std::size_t>(view.world)];
-    faces_[static_cast<std::size_t>(layer)].gather(
+    faces_[static_cast<std::size_t>(layer)].build(
         {camera, make_frustum(camera), config_.line_floor_px, config_.debug_palette}, *geometries_.find(handle), scene,
         view, layer);
   }
@@ -226,7 +226,7 @@ class GlRenderer final : public Renderer {
     gl_->NamedBufferData(instances_, static_cast<GLsizeiptr>(bytes), nullptr, GL_STREAM_DRAW);
     auto* const mapped = static_cast<FaceInstance*>(
         gl_->MapNamedBufferRange(instances_, 0, static_cast<GLsizeiptr>(bytes), GL_MAP_WRITE_BIT));
-    gl::check_errors(*gl_, fmt::format("renderer {}: room for {} faces", name_, first_face_[count]));
+    gl::check_errors(*gl_, fmt::format("renderer {}: allocating {} faces", name_, first_face_[count]));
     for (std::size_t i = 0; i < count; ++i) {
       std::copy(faces_[i].faces().begin(), faces_[i].faces().end(), mapped + first_face_[i]);
     }

@@ -8,7 +8,7 @@
 
 namespace pictura {
 
-// Each backend's one public symbol; declared here so that nothing else sees them.
+// Each backend's one public symbol; declared here so that no other file can call them.
 std::unique_ptr<Renderer> make_cpu_renderer(const RendererConfig& config);
 #ifdef PICTURA_HAS_CUDA
 /// *origin_out receives where the kernels come from.
@@ -25,7 +25,7 @@ std::unique_ptr<Renderer> make_gl_renderer(const std::string& name, const Render
 
 namespace {
 
-// Draws black, so that everything around a renderer can run without one.
+// Draws black: for running everything but a renderer.
 class NullRenderer final : public Renderer {
  public:
   explicit NullRenderer(const RendererConfig& config) : config_(check_config("null", config)) {}

@@ -1,4 +1,4 @@
-// Renderers by name: the one place that knows every backend.
+// Renderers by name: the one file that knows every backend.
 #pragma once
 
 #include <memory>

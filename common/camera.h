@@ -28,7 +28,7 @@ struct Rig {
 };
 
 /// The paper's four cameras (appendix, table of the camera rig): front, front-left, front-right and back, focal length
-/// 1545 px at 1920x1080, scaled to the size asked for. Throws unless both sizes are in [1, 8192].
+/// 1545 px at 1920x1080, scaled to the given size. Throws unless both sizes are in [1, 8192].
 Rig paper_rig(int width_px = 96, int height_px = 54);
 
 /// Reads a rig from a TOML file (docs/image.md shows one). Throws Error naming the file, the camera and the key.

@@ -1,6 +1,5 @@
-// The scene: the only currency between simulator and renderer. StaticGeometry is what a map looks like and is uploaded
-// once; SceneBatch is what moves and is written every step; View says from where, and whose, a set of images is. The
-// plain data of all three stand in scene_types.h.
+// The scene: all that a simulator and a renderer exchange. StaticGeometry is what is drawn of a map, uploaded once;
+// SceneBatch is what moves, written in every step; a View places a rig. The plain data types are in scene_types.h.
 #pragma once
 
 #include <vector>
@@ -10,7 +9,7 @@
 
 namespace pictura {
 
-/// A map's looks; one per map, shared by every world on it.
+/// What is drawn of a map; shared by every world on it.
 struct StaticGeometry {
   std::vector<Strip> strips;
   std::vector<WallFace> walls;
@@ -35,7 +34,7 @@ struct SceneOwner {
   SceneBatch batch() const {
     return {Device{}, world_begin, agents, geometry, light_begin, light_states, hidden_agents};
   }
-  /// Closes a world: agents and lights added since the last call belong to it.
+  /// Ends a world: agents and lights added since the last call belong to it.
   void end_world(GeometryHandle handle) {
     world_begin.push_back(static_cast<int32_t>(agents.size()));
     light_begin.push_back(static_cast<int32_t>(light_states.size()));
@@ -43,10 +42,10 @@ struct SceneOwner {
   }
 };
 
-/// A drawn box of the class's colours; size_m is its length, width and height.
+/// A drawn box in the colours of its class; size_m is its length, width and height.
 AgentBox make_box(AgentClass agent_class, Vec3 center_m, float heading_rad, Vec3 size_m);
 
-/// A view at a pose, with nobody left out.
+/// A view at a pose that hides no agent.
 View make_view(Vec3 origin_m, float heading_rad);
 
 /// The views of a call. Where num_views is given, it lies with the views, on their device, and only views
@@ -62,7 +61,7 @@ struct ViewBatch {
   std::size_t size() const { return views.size(); }
 };
 
-/// Points of a polyline that are closer to the one before than this, in plan, count as that.
+/// A point of a polyline that is closer than this to the one before, in plan, is dropped.
 constexpr float kRepeatedPoint_m = 1e-4f;
 /// Cuts polylines (at least two points each) into mitred strips of at most kMaxPiece_m and appends them.
 void append_strips(Span<const Vec3> points_m, float width_m, Rgb color, StripKind kind, std::vector<Strip>* strips_out);

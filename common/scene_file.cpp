@@ -69,7 +69,7 @@ std::vector<std::vector<Vec3>> dashes_of(const std::vector<Vec3>& points_m, floa
   return dashes;
 }
 
-// A line beside the one that the strips are, mitred as it is.
+// A line parallel to the one that the strips form, mitred as they are.
 std::vector<Strip> moved_aside(std::vector<Strip> strips, float left_m) {
   auto move = [&](Vec3* point, Vec2 side) { *point = *point + Vec3{left_m * side.x, left_m * side.y, 0}; };
   for (Strip& strip : strips) {

@@ -9,13 +9,13 @@
 
 namespace pictura {
 
-/// All that a renderer is told to draw a scene; one world of one geometry.
+/// All that a renderer needs to draw a scene of one world on one map.
 struct SceneFile {
   RendererConfig config;  // rig, line floor and palette
   StaticGeometry geometry;
   SceneOwner scene;  // its world's geometry handle is 0
   std::vector<View> views;
-  std::vector<std::string> view_names, view_captions;  // [views]; names may stand in file names
+  std::vector<std::string> view_names, view_captions;  // [views]; names can be used as file names
 };
 
 /// Reads a scene's text. A rig file that it names is looked up relative to `folder`. Throws Error naming source, line,

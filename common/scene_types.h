@@ -1,5 +1,5 @@
-// The plain data that scenes are made of, readable on both devices: what a map's looks consist of, what moves, and from
-// where images are drawn. Right-handed metres, headings in radians counter-clockwise, z up.
+// The plain data of scenes, readable on both devices: the pieces of a map, what moves, and from where images are drawn.
+// Right-handed, in metres, z up; headings in radians, counter-clockwise.
 #pragma once
 
 #include "pictura/common/color.h"
@@ -14,7 +14,7 @@ enum class StripKind : uint8_t { lane_mark, road_edge, crosswalk, stop_line };
 constexpr int kNumStripKinds = 4;
 
 /// One straight piece, at most kMaxPiece_m long, of a polyline painted on the road. Its corners are a -+ side_a * w/2
-/// and b -+ side_b * w/2: the sides are mitred, so that consecutive pieces share an edge and neither overlap nor gape.
+/// and b -+ side_b * w/2: the sides are mitred, so that consecutive pieces share an edge without overlap or gap.
 /// Aligned for devices, which read 16 bytes at once.
 struct alignas(16) Strip {
   Vec3 a_m, b_m;        // the two ends of the centre line
@@ -32,17 +32,17 @@ struct alignas(8) WallFace {
   Rgb color = kWallColor;
 };
 
-/// A disk of kLightRadius_m that shows its signal's state to those in front of it.
+/// A disk of kLightRadius_m in the colour of its signal's state, drawn for cameras in front of it.
 struct LightHead {
   Vec3 position_m;  // centre of the disk
-  Vec2 facing;      // unit vector, towards those it is meant for
+  Vec2 facing;      // unit vector, towards the traffic that it controls
   float cos_half_angle = 0.5f;
   int32_t signal = 0;  // index into the world's light states: the stop line that it governs
 };
 constexpr float kLightRadius_m = 0.5f;
 
-/// What the uniform grids file a piece under. Of a strip, the box around its four corners: where it is mitred they lie
-/// up to four half-widths from its centre line.
+/// The box by which the uniform grids store a piece. Of a strip, the box around its four corners: where it is mitred
+/// they lie up to four half-widths from its centre line.
 PICTURA_HD inline Aabb2 ground_box(const Strip& strip) {
   const Vec2 a = strip.a_m.xy(), b = strip.b_m.xy();
   const Vec2 at_a = strip.side_a * (0.5f * strip.width_m), at_b = strip.side_b * (0.5f * strip.width_m);
@@ -54,7 +54,7 @@ PICTURA_HD inline Aabb2 ground_box(const WallFace& wall) {
           {max_of(wall.a_m.x, wall.b_m.x), max_of(wall.a_m.y, wall.b_m.y)}};
 }
 
-/// What both devices read of a map's looks.
+/// A StaticGeometry as both devices read it.
 struct StaticGeometryView {
   Span<const Strip> strips;
   Span<const WallFace> walls;
@@ -74,11 +74,11 @@ struct AgentBox {
   uint8_t padding = 0;
 };
 
-/// Names a StaticGeometry in renderers; chosen by whoever uploads it, in [0, kNumGeometryHandles).
+/// Names a StaticGeometry in renderers; chosen by the caller of upload(), in [0, kNumGeometryHandles).
 using GeometryHandle = int32_t;
 constexpr GeometryHandle kNumGeometryHandles = 1 << 16;
 
-/// Agents of one world that a scene may hold: as many as a simulator steps, and as many parked cars.
+/// Upper bound on the agents of one world of a scene: 4,096 that a simulator steps, and as many parked cars.
 constexpr int kMaxBoxesPerWorld = 8192;
 
 /// Everything that moves, for all worlds, of one step.
@@ -92,15 +92,15 @@ struct SceneBatch {
   Span<const int32_t> hidden_agents;    // lists that views point into; usually empty
 };
 
-/// Whether as many of a world's lights have states as the map's signals want: all, or none, which leaves them out.
+/// Whether a world has a light state for each of its map's signals, or none at all: then no light is drawn.
 PICTURA_HD constexpr bool has_enough_lights(int32_t lights, int32_t signals) {
   return lights == 0 || lights >= signals;
 }
 
-/// Where a rig stands. The ego's own box is left out of its images.
+/// The pose of a rig. The ego's own box is left out of its images.
 struct View {
   int32_t world = 0;
-  int32_t ego_agent = -1;  // index into SceneBatch::agents, or -1: nobody is left out
+  int32_t ego_agent = -1;  // index into SceneBatch::agents, or -1: no agent is left out
   Vec3 origin_m;           // the rig's origin, on the ground
   float cos_heading = 1, sin_heading = 0;
   float body_length_m = kRigBodyLength_m;    // shrinks the x offsets of the cameras of short bodies
@@ -109,7 +109,7 @@ struct View {
   static constexpr float kRigBodyLength_m = 4.5f;
 };
 
-/// A direction given by its cosine and sine; headings are computed in float, so a little drift is no fault.
+/// A direction given by its cosine and sine; headings are computed in float, so a small drift is accepted.
 PICTURA_HD inline bool is_direction(float cosine, float sine) {
   return fabsf(cosine * cosine + sine * sine - 1.0f) < 1e-2f;
 }
@@ -123,7 +123,7 @@ PICTURA_HD inline bool hides_within(const View& view, size_t hidden_agents) {
          static_cast<size_t>(view.hidden_end) <= hidden_agents;
 }
 
-/// Asks how much of an agent a view sees.
+/// How much of an agent does a view see?
 struct VisibilityQuery {
   int32_t view = 0;
   int32_t agent = 0;  // index into SceneBatch::agents

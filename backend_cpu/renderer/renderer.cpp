@@ -1,4 +1,5 @@
-// The oracle: the CPU renderer. It checks its input, places the cameras, and spreads images over OpenMP threads.
+// The CPU renderer, which is the reference of all others (the oracle): checks its input, places the cameras, and
+// distributes images over OpenMP threads.
 #include <cstddef>
 #include <memory>
 
@@ -63,9 +64,9 @@ class CpuRenderer final : public Renderer {
       VisibilitySum seen;
       const bool is_drawn = static_cast<std::size_t>(query.view) < views.size();
       for (std::size_t camera = 0; is_drawn && camera < cameras_.size(); ++camera) {
-        ImageRequest asked = request(scene, views[static_cast<std::size_t>(query.view)], camera);
-        asked.culls_occluded = false;  // occluded faces count when the agent is drawn alone
-        drawer.prepare(asked);
+        ImageRequest image = request(scene, views[static_cast<std::size_t>(query.view)], camera);
+        image.culls_occluded = false;  // occluded faces count when the agent is drawn alone
+        drawer.prepare(image);
         drawer.accumulate_visibility(query.agent, &seen);
       }
       visibility_out[static_cast<std::size_t>(i)] = seen.share();

@@ -1,4 +1,4 @@
-// What the kernels are told, from what a renderer is asked for: what does not depend on where memory lies.
+// The kernels' arguments from those of a call, and maps sorted for culling: what does not depend on device memory.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace pictura::cuda {
 
-/// Pieces of one kind by the cell of their middle, in host memory.
+/// Pieces of one kind, sorted by the grid cell of their centre, in host memory.
 class SortedPieces {
  public:
   explicit SortedPieces(const std::vector<Strip>& strips);
@@ -25,16 +25,16 @@ class SortedPieces {
   float largest_radius_m_ = 0;
 };
 
-/// Everything of a task but what lies in the renderer's own memory: geometries, pool, counters, lists of images and
-/// fault. images may be null.
+/// All of a task but the pointers to the renderer's own memory: geometries, pool, counters, lists of images and fault.
+/// `images` may be null.
 DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeCamera>& cameras,
                         const SceneBatch& scene, const ViewBatch& views, const ImageBatch* images);
 
-/// Room, for a block of the last launch, for all that a world can hold of a map with so many pieces, heads among them,
-/// and so many agents.
+/// Sizes of the scratch memory of a block of the last launch: for all primitives of a world with so many agents on a
+/// map of so many pieces, light heads among them.
 Scratch large_sizes(int pieces, int heads, std::size_t agents);
 
-/// What was wrong, for people. Of a fault that is one.
+/// The text of a fault, which must not be `none`.
 std::string message_of(const Fault& fault);
 
 }  // namespace pictura::cuda

@@ -1,5 +1,5 @@
-// The CUDA renderer for callers whose scenes and images lie in host memory: it stages them through the device and
-// waits. What the device would only notice later is checked on the host, with the oracle's checks.
+// The CUDA renderer for callers whose scenes and images lie in host memory: copies them to and from the device and
+// waits. The host makes the CPU renderer's checks, so that errors are thrown by the call that causes them.
 #include <memory>
 
 #include "pictura/common/cuda/device_guard.h"

@@ -1,4 +1,4 @@
-// The drawing kernels compiled ahead of time, and the launches of whatever kernels the renderer has.
+// The drawing kernels compiled ahead of time, and the launches of these or of kernels compiled at run time.
 #include <utility>
 
 #include "pictura/backend_cuda/renderer/kernels.cuh"
@@ -13,7 +13,7 @@ struct LaunchShape {
   std::size_t shared_bytes;
 };
 
-// Where launches go, and whether one may begin while the one before it ends.
+// The stream of launches, and whether a launch may begin while the one before it ends.
 struct LaunchPlace {
   cudaStream_t stream;
   bool may_begin_early;
@@ -55,7 +55,7 @@ cudaError_t prepare_kernels(KernelSet* kernels) {
     const cudaError_t status = cudaFuncGetAttributes(&attributes, kernel);
     if (status != cudaSuccess) return status;
   }
-  // From there on kernels wait for the launch before theirs, see wait_for_earlier_launch.
+  // Kernels of compute capability 9.0 or newer wait for the launch before theirs, see wait_for_earlier_launch.
   kernels->may_begin_early = attributes.ptxVersion >= 90;
   const cudaError_t allowed = allow_shared(kernels->handle[kDraw], draw_bytes());
   return allowed != cudaSuccess ? allowed : allow_shared(kernels->handle[kDrawDeferred], deferred_bytes());

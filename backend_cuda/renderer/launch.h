@@ -1,5 +1,5 @@
-// The drawing kernels as the host sees them: where they come from, how much memory they want, and their launches. All
-// launches are put on a stream and wait for nothing.
+// The drawing kernels as the host sees them: their handles, their memory, and their launches, which are put on a stream
+// and do not wait.
 #pragma once
 
 #include <array>
@@ -15,12 +15,13 @@ namespace pictura::cuda {
 /// The kernels' handles: symbols of this program, or cudaKernel_t of code that was loaded.
 struct KernelSet {
   std::array<const void*, kNumKernels> handle{};
-  bool may_begin_early = false;  // a launch of theirs, while the one before it ends
+  bool may_begin_early = false;  // whether a launch may begin while the one before it ends
 };
 
-/// Those that were compiled with this program, for any rig.
+/// The kernels that were compiled with this program, for any rig.
 KernelSet ahead_of_time_kernels();
-/// What is to be done once before the first launch; fails where the kernels do not run on the device.
+/// Must be called once before the first launch: loads the kernels and sets their attributes. Fails where they do not
+/// run on the device.
 cudaError_t prepare_kernels(KernelSet* kernels);
 
 /// Bytes that a block of the last launch needs besides faces and edges.

@@ -1,5 +1,5 @@
-// The CUDA renderer's host side: checks, uploads, scratch memory and launches. Scenes, views, queries and images lie in
-// device memory; calls that draw wait for nothing once there is room for them.
+// The CUDA renderer's host side: checks, maps, scratch memory and launches. Scenes, views, queries and images lie in
+// device memory; calls that draw neither allocate nor wait once their sizes have been reserved.
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -22,13 +22,13 @@ std::string cuda_unavailable();
 
 namespace {
 
-// Of the last launch.
+// Blocks of the last launch.
 constexpr int kLargeBlocks = 8;
-// Views that are drawn at once, at most: enough that the last images of a launch, for which few blocks are left to
-// work, do not count.
+// Upper bound on the views that are drawn at once: enough that the end of a launch, when few blocks still work, takes a
+// negligible share of it.
 constexpr std::size_t kViewsAtOnce = 2048;
 
-// Scratch memory, and the largest calls that it is for.
+// Scratch memory, and the sizes of the largest calls that it serves.
 struct ScratchMemory {
   std::size_t agents = 0, views = 0;
   int pieces = 0, heads = 0;
@@ -46,10 +46,10 @@ class CudaRenderer final : public Renderer {
         library_(config.rig, config.device.index) {
     PICTURA_CUDA(cudaDeviceGetAttribute(&processors_, cudaDevAttrMultiProcessorCount, config.device.index));
     *origin_out = library_.origin();
-    ensure_capacity(0, 1);  // what is too little for any scene is told at once
+    ensure_capacity(0, 1);  // throws where the bound is too low for any scene
     *fault_.host() = cuda::kNoFault;
     counters_.fill(0);
-    PICTURA_CUDA(cudaDeviceSynchronize());  // for whatever stream the first call is on
+    PICTURA_CUDA(cudaDeviceSynchronize());  // the first call may be on any stream
   }
   std::string_view name() const override { return "cuda"; }
   Device device() const override { return config_.device; }
@@ -81,7 +81,7 @@ class CudaRenderer final : public Renderer {
     cuda::DrawTask task = draw_task(scene, views, &images_out);
     const auto on_stream = static_cast<cudaStream_t>(stream.handle);
     clear_counters(on_stream);
-    // In as few parts as there is room for, of one size.
+    // In as few parts as the scratch memory allows, of equal size.
     const std::size_t max_views = scratch_.plan.views, parts = (views.size() + max_views - 1) / max_views;
     const auto views_at_once = static_cast<int32_t>((views.size() + parts - 1) / std::max(parts, std::size_t{1}));
     for (int32_t left = task.num_views; left > 0; left -= task.num_views, task.first_view += task.num_views) {
@@ -111,7 +111,7 @@ class CudaRenderer final : public Renderer {
   }
 
  private:
-  // What the host can see of a call.
+  // Checks what the host can see of a call.
   void check_call(const SceneBatch& scene) {
     throw_fault();
     check_device(name(), "scene", device(), scene.device);
@@ -142,9 +142,9 @@ class CudaRenderer final : public Renderer {
     counters_are_clear_ = true;
   }
 
-  // Memory for as many views as the bound allows, and in the last launch for all that a world can hold: after this
-  // nothing is cut off. Allocates nothing where an earlier call needed as much. Where it throws, the next call makes
-  // room anew.
+  // Allocates for as many views as the bound allows, and in the last launch for all primitives that a world can hold,
+  // so that nothing is cut off. Does nothing where an earlier call needed as much. Where it throws for want of memory,
+  // the next call allocates anew.
   void ensure_capacity(std::size_t agents, std::size_t views) {
     agents = std::max(scratch_.agents, std::min(agents, static_cast<std::size_t>(kMaxBoxesPerWorld)));
     views = std::max({scratch_.views, std::size_t{1}, std::min(views, kViewsAtOnce)});
@@ -162,7 +162,7 @@ class CudaRenderer final : public Renderer {
                             .pool_bytes = cuda::kMinPoolBytes},
                            config_.max_scratch_bytes);
     large.blocks = plan.large_blocks;
-    // Released before it is replaced, or both would count.
+    // Freed before it is replaced, so that the two are never allocated at once.
     scratch_ = ScratchMemory();
     ++scratch_generation_;
     ScratchMemory larger{agents, views, pieces, heads, plan, {}, {}};

@@ -12,7 +12,7 @@ namespace pictura::cuda {
 constexpr std::size_t kPoolFaces = 200, kPoolEdges = 928;
 /// Additional images' worth of capacity, for batches of few images that may all have many faces.
 constexpr std::size_t kMinPoolImages = 4 * kMaxEntries / kPoolFaces + 1;
-static_assert(kMinPoolImages * kPoolFaces >= kMaxEntries, "an image that is deferred finds room");
+static_assert(kMinPoolImages * kPoolFaces >= kMaxEntries, "a deferred image fits into the pool");
 
 /// Capacities of a pool.
 struct PoolSizes {

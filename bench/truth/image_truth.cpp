@@ -72,7 +72,7 @@ struct PaintedStrip {
   uint32_t rank = 0;
   uint8_t class_id = 0;
   Rgb color;
-  std::vector<int> carries;  // solids that stand on it
+  std::vector<int> carries;  // indices of the solids on it
   bool covers(Point ray) const {
     for (const Point& normal : edge_normal) {
       if (dot(normal, ray) < 0) return false;
@@ -311,7 +311,7 @@ struct Surface {
 };
 
 // The nearest surface: the facet or strip of least depth, but of strips whose planes are within kSameLevel_m of each
-// other there the one of lowest rank, and never a strip before a solid that stands on it.
+// other there the one of lowest rank, and never a strip before a solid on it.
 Surface first_hit(const Candidates& candidates, Point ray) {
   Surface front;
   for (const Facet* facet : candidates.facets) {

@@ -9,7 +9,7 @@ namespace pictura {
 
 inline void check_cuda(cudaError_t status, const char* what) {
   if (status == cudaSuccess) return;
-  cudaGetLastError();  // the error is told here, and not again to whoever asks next
+  cudaGetLastError();  // reported here; a later call must not report it again
   fail("cuda: {}: {}", what, cudaGetErrorString(status));
 }
 
@@ -20,7 +20,7 @@ inline void check_cuda(cudaError_t status, const char* what) {
 
 namespace pictura {
 
-/// The device that was current when it was made: what works there works nowhere else.
+/// The CUDA device that was current when this object was made.
 class CurrentDevice {
  public:
   CurrentDevice() { PICTURA_CUDA(cudaGetDevice(&number_)); }

@@ -1,4 +1,4 @@
-// An owner of device memory, and of host memory that the device can write.
+// Owners of device memory, and of host memory that the device can write.
 #pragma once
 
 #include <memory>

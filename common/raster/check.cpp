@@ -49,7 +49,7 @@ void check_images(std::string_view renderer, const Rig& rig, Device device, std:
   PICTURA_CHECK(images.order == ChannelOrder::planar, "renderer {}: images: expected planar channels, got {} ones",
                 renderer, name_of(images.order));
   PICTURA_CHECK(images.num_views >= 0 && static_cast<std::size_t>(images.num_views) == num_views,
-                "renderer {}: images: expected room for {} views, got {}", renderer, num_views, images.num_views);
+                "renderer {}: images: expected images of {} views, got {}", renderer, num_views, images.num_views);
   PICTURA_CHECK(images.cameras.size() == rig.cameras.size(), "renderer {}: images: expected {} cameras, got {}",
                 renderer, rig.cameras.size(), images.cameras.size());
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
@@ -147,7 +147,7 @@ Span<const View> counted_views(std::string_view renderer, const ViewBatch& views
 }
 
 void check_answers(std::string_view renderer, std::size_t num_queries, std::size_t num_answers) {
-  PICTURA_CHECK(num_answers == num_queries, "renderer {}: visibility: expected room for {} values, got {}", renderer,
+  PICTURA_CHECK(num_answers == num_queries, "renderer {}: visibility: expected {} values, got {}", renderer,
                 num_queries, num_answers);
 }
 

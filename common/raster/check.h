@@ -1,4 +1,4 @@
-// What every renderer checks at its door before it draws: the images it is to fill, and scenes that lie on the host.
+// Checks that every renderer makes before it draws: of the images that it is to fill, and of scenes on the host.
 #pragma once
 
 #include <string_view>
@@ -31,11 +31,11 @@ void check_views(std::string_view renderer, const SceneBatch& scene, Span<const 
 /// The views of a batch on the host that its count includes. Throws Error unless that is 0 to the number of views.
 Span<const View> counted_views(std::string_view renderer, const ViewBatch& views);
 
-/// Throws Error unless there is room for as many answers as there are visibility queries.
+/// Throws Error unless there are as many answers as visibility queries.
 void check_answers(std::string_view renderer, std::size_t num_queries, std::size_t num_answers);
 
 /// Throws Error unless each query's view is one of max_views, its agent, where the view is one of `views`, which
-/// check_views passed, is of that view's world, and there is room for as many answers.
+/// check_views passed, is of that view's world, and there are as many answers as queries.
 void check_queries(std::string_view renderer, const SceneBatch& scene, Span<const View> views, std::size_t max_views,
                    Span<const VisibilityQuery> queries, std::size_t num_answers);
 
