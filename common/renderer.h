@@ -60,7 +60,8 @@ class Renderer {
   /// Allocates what calls of up to so many views, of scenes of up to so many boxes in all worlds, need with the maps
   /// that are uploaded now. May wait for the device. Renderers on the host allocate as they draw.
   virtual void reserve(int /*max_views*/, int /*max_boxes*/) {}
-  /// How often memory that calls use has moved; captured graphs of an earlier generation are stale. 0 on the host.
+  /// How often captured graphs have become stale: memory that calls use has moved, or a map was uploaded that is larger
+  /// than those of earlier calls. 0 on the host.
   virtual uint64_t generation() const { return 0; }
 
   /// Draws every camera of the rig for every view and writes each pixel of their images. Views at and beyond

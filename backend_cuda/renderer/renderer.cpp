@@ -60,6 +60,8 @@ class CudaRenderer final : public Renderer {
     check_handle(name(), handle);
     check_geometry(name(), geometry);
     geometries_.upload(handle, geometry, static_cast<cudaStream_t>(stream.handle));
+    // The next call allocates more; graphs that were captured before have too little for this map.
+    if (geometries_.max_pieces() > scratch_.pieces || geometries_.max_heads() > scratch_.heads) ++scratch_generation_;
   }
   void release(GeometryHandle handle, Stream stream) override {
     const DeviceGuard guard(device());

@@ -305,7 +305,15 @@ TEST_F(CudaStreamTest, ACaptureAfterReserveNeedsNoCallBefore) {
   EXPECT_GT(stage.renderer->generation(), generation);
   const uint64_t grown = stage.renderer->generation();
   stage.renderer->upload(40'000, stage.town.geometry);
-  EXPECT_GT(stage.renderer->generation(), grown);
+  EXPECT_GT(stage.renderer->generation(), grown) << "the table of maps has moved";
+  StaticGeometry larger = stage.town.geometry;
+  larger.walls.push_back(larger.walls.front());
+  larger.build_grids();
+  const uint64_t before_larger = stage.renderer->generation();
+  stage.renderer->upload(1, stage.town.geometry);
+  EXPECT_EQ(stage.renderer->generation(), before_larger);
+  stage.renderer->upload(1, larger);
+  EXPECT_GT(stage.renderer->generation(), before_larger);
   EXPECT_THAT(test::message_of([&] { stage.renderer->reserve(-1, 0); }), HasSubstr("reserve: expected 0 views"));
 }
 
@@ -408,6 +416,7 @@ TEST_F(CudaStreamTest, MapsAreReplacedWithoutWaitingForTheDevice) {
   };
   replace();
   replace();  // all memory that it needs at a time is there now
+  stage.renderer->reserve(4, static_cast<int>(stage.town.scene.agents.size()));
   const uint64_t generation = stage.renderer->generation();
   std::size_t free_before = 0, free_after = 0, total = 0;
   PICTURA_CUDA(cudaMemGetInfo(&free_before, &total));
