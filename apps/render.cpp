@@ -142,7 +142,7 @@ void render_world(const Arguments& arguments) {
     world.step();
   }
 
-  Subject subject{simulator->geometries(),
+  Subject subject{{simulator->maps()[0]->geometry},
                   simulator->scene(),
                   simulator->views().subspan(0, static_cast<size_t>(arguments.views)),
                   {},

@@ -62,7 +62,7 @@ void run(const Arguments& arguments) {
 
   const SimulatorTotals& totals = simulator->totals();
   const Json object{{"backend", simulator->name()},
-                    {"map", simulator->maps()[0]->name},
+                    {"map", simulator->maps()[0]->road->name},
                     {"asked", spawned.asked},
                     {"spawned", spawned.spawned},
                     {"refused", spawned.refused},

@@ -1,17 +1,14 @@
 #include "pictura/backends/make_simulator.h"
 
 #include "pictura/common/error.h"
+#include "pictura/simulator/simulator_setup.h"
 
 namespace pictura {
 
 // Each executor's one public symbol; declared here so that nothing else sees them.
-std::unique_ptr<Simulator> make_cpu_simulator(const SimulatorConfig& config,
-                                              std::vector<std::shared_ptr<const RoadMap>> maps,
-                                              std::vector<WorldSpec> worlds);
+std::unique_ptr<Simulator> make_cpu_simulator(SimulatorSetup setup);
 #ifdef PICTURA_HAS_CUDA
-std::unique_ptr<Simulator> make_cuda_simulator(const SimulatorConfig& config,
-                                               std::vector<std::shared_ptr<const RoadMap>> maps,
-                                               std::vector<WorldSpec> worlds);
+std::unique_ptr<Simulator> make_cuda_simulator(SimulatorSetup setup);
 /// Empty where a CUDA device can be used, else why not.
 std::string cuda_unavailable();
 #endif
@@ -24,29 +21,36 @@ std::vector<std::string> simulator_names() {
 #endif
 }
 
-std::unique_ptr<Simulator> make_simulator(const std::string& name, const SimulatorConfig& config,
-                                          std::vector<std::shared_ptr<const RoadMap>> maps,
+std::unique_ptr<Simulator> make_simulator(const std::string& name, const SimulatorConfig& config, CompiledMaps maps,
                                           std::vector<WorldSpec> worlds, std::string* choice_out) {
   const auto chosen = [choice_out](std::string choice) {
     if (choice_out) *choice_out = std::move(choice);
   };
-  const auto make_cpu = [&] { return make_cpu_simulator(config, std::move(maps), std::move(worlds)); };
+  const auto setup = [&] { return SimulatorSetup(config, std::move(maps), {}, std::move(worlds)); };
+  const auto make_cpu = [&] { return make_cpu_simulator(setup()); };
   if (name == "cpu") return chosen("cpu: asked for"), make_cpu();
 #ifdef PICTURA_HAS_CUDA
-  const auto make_cuda = [&] { return make_cuda_simulator(config, std::move(maps), std::move(worlds)); };
+  const auto make_cuda = [&] { return make_cuda_simulator(setup()); };
   if (name == "cuda") {
     const std::string unavailable = cuda_unavailable();
     PICTURA_CHECK(unavailable.empty(), "simulator cuda: {}", unavailable);
     return chosen("cuda: asked for"), make_cuda();
   }
   const std::string why_not_cuda =
-      config.space == MemorySpace::cuda ? cuda_unavailable() : "observations are wanted in host memory";
+      !config.device.is_host() ? cuda_unavailable() : "observations are wanted in host memory";
   if (name == "auto" && why_not_cuda.empty()) return chosen("cuda: a device was found"), make_cuda();
 #else
   const std::string why_not_cuda = "this build has no CUDA";
 #endif
   if (name == "auto") return chosen(fmt::format("cpu: {}", why_not_cuda)), make_cpu();
   fail_usage("simulator: expected one of {}; got '{}'", fmt::join(simulator_names(), ", "), name);
+}
+
+std::unique_ptr<Simulator> make_simulator(const std::string& name, const SimulatorConfig& config,
+                                          const std::vector<std::shared_ptr<const RoadMap>>& maps,
+                                          std::vector<WorldSpec> worlds, std::string* choice_out) {
+  return make_simulator(name, config, compile_maps(maps, map_options(config), config.num_threads), std::move(worlds),
+                        choice_out);
 }
 
 }  // namespace pictura

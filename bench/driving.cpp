@@ -41,7 +41,6 @@ DrivenWorlds drive_worlds(const DrivenOptions& options) {
 
   DrivenWorlds worlds;
   worlds.simulator = make_simulator("cpu", config, maps, specs);
-  worlds.geometries = worlds.simulator->geometries();
   step_randomly(worlds.simulator.get(), options.seed, options.steps);
   const uint8_t* refusal = worlds.simulator->state().refusal;
   const Span<const View> views = worlds.simulator->views();

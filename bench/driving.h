@@ -25,9 +25,8 @@ struct DrivenOptions {
 };
 
 struct DrivenWorlds {
-  std::unique_ptr<Simulator> simulator;  // owns the scene
-  std::vector<StaticGeometry> geometries;
-  std::vector<View> views;  // of agents that found a place: one of each world, then the next of each
+  std::unique_ptr<Simulator> simulator;  // owns the scene and its maps
+  std::vector<View> views;               // of agents that found a place: one of each world, then the next of each
 };
 
 /// As many worlds as the views need, on the maps in turn. Throws Error when a map cannot be read, or too few agents

@@ -23,7 +23,7 @@ Snapshot drive_snapshot(const SnapshotOptions& options) {
                                       .num_threads = options.num_threads});
   const SceneBatch scene = worlds.simulator->scene();
   Snapshot snapshot;
-  snapshot.geometry = std::move(worlds.geometries[0]);
+  snapshot.geometry = worlds.simulator->maps()[0]->geometry;
   snapshot.scene.agents.assign(scene.agents.begin(), scene.agents.end());
   snapshot.scene.light_states.assign(scene.light_states.begin(), scene.light_states.end());
   snapshot.scene.end_world(0);

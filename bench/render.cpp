@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "pictura/backends/make_renderer.h"
+#include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #ifdef PICTURA_HAS_CUDA
@@ -47,7 +48,7 @@ class OracleCheck {
         expected_(render_case.config.rig, num_views_, render_case.format, render_case.planes) {
     const RendererConfig config{.rig = render_case.config.rig, .line_floor_px = render_case.config.line_floor_px};
     const auto oracle = make_renderer("cpu", config);
-    upload_geometries(worlds.geometries, oracle.get());
+    upload_maps(*worlds.simulator, oracle.get());
     oracle->render(worlds.simulator->scene(),
                    Span<const View>(worlds.views.data(), static_cast<std::size_t>(num_views_)), expected_.batch());
   }
@@ -106,7 +107,7 @@ RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& r
   if (render_case.measures_memory) meter = std::make_unique<DeviceMemoryMeter>();
 #endif
   const auto renderer = make_renderer(render_case.backend, render_case.config, &result.choice);
-  upload_geometries(worlds.geometries, renderer.get());
+  upload_maps(*worlds.simulator, renderer.get());
 #ifdef PICTURA_HAS_CUDA
   if (meter) result.up_front_bytes = meter->used_bytes();
 #endif

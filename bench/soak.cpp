@@ -1,11 +1,13 @@
 #include "pictura/bench/soak.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 
 #include "pictura/backends/make_renderer.h"
 #include "pictura/backends/make_simulator.h"
+#include "pictura/backends/upload_maps.h"
 #include "pictura/bench/driving.h"
 #include "pictura/common/error.h"
 #include "pictura/common/raster/camera.h"
@@ -81,6 +83,7 @@ class Scenes {
  public:
   explicit Scenes(const SoakOptions& options) : options_(options) {
     for (const std::string& map : options.maps) maps_.push_back(load_map(map));
+    for (CompiledMaps& maps : compiled_) maps.resize(maps_.size());
   }
 
   void drive(int64_t scene) {
@@ -93,7 +96,9 @@ class Scenes {
     config.vector_observations = false;
     const auto map = static_cast<std::size_t>(random.below(static_cast<int>(maps_.size())));
     const WorldSpec world{0, 1 + random.below(options_.agents), static_cast<uint32_t>(scene)};
-    simulator_ = make_simulator("cpu", config, {maps_[map]}, {world});
+    std::shared_ptr<const CompiledMap>& compiled = compiled_[config.walls][map];
+    if (!compiled) compiled = compile_map(maps_[map], map_options(config));
+    simulator_ = make_simulator("cpu", config, CompiledMaps{compiled}, {world});
     step_randomly(simulator_.get(), config.seed, 1 + random.below(30));
   }
 
@@ -132,7 +137,7 @@ class Scenes {
     return queries;
   }
 
-  std::vector<StaticGeometry> geometries() const { return simulator_->geometries(); }
+  void upload(Renderer* renderer_out) const { upload_maps(*simulator_, renderer_out); }
 
  private:
   int num_agents() const { return static_cast<int>(simulator_->scene().agents.size()); }
@@ -150,6 +155,7 @@ class Scenes {
 
   SoakOptions options_;
   std::vector<std::shared_ptr<const RoadMap>> maps_;
+  std::array<CompiledMaps, 2> compiled_;  // without walls, and with
   std::unique_ptr<Simulator> simulator_;
 };
 
@@ -207,8 +213,8 @@ void compare_scene(const SoakOptions& options, const MakeRenderer& make, int64_t
   const Settings settings = draw_settings(options, scene, rigs);
   const auto renderer = make(settings.config, &result_out->choice);
   const auto oracle = make_renderer("cpu", settings.config);
-  upload_geometries(scenes->geometries(), renderer.get());
-  upload_geometries(scenes->geometries(), oracle.get());
+  scenes->upload(renderer.get());
+  scenes->upload(oracle.get());
   const ViewsOfScene views = scenes->views(scene);
   const SceneBatch batch = scenes->batch(views);
   compare_images(scene, batch, views.views, settings, renderer.get(), oracle.get(), result_out);

@@ -40,7 +40,7 @@ StepBench::StepBench(Simulator* simulator, uint64_t seed)
     actions_->host.push_back(draw_actions(seed, simulator->worlds(), step));
   }
   for (const std::vector<int32_t>& set : actions_->host) {
-    if (simulator->space() == MemorySpace::host) {
+    if (simulator->device().is_host()) {
       actions_->sets.push_back(set);
       continue;
     }

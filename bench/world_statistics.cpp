@@ -11,7 +11,7 @@
 #include "pictura/common/support/interrupt.h"
 #include "pictura/simulator/controllers/goal_places.h"
 #include "pictura/simulator/controllers/lane_keeping.h"
-#include "pictura/simulator/world_batch.h"
+#include "pictura/simulator/host_worlds.h"
 
 namespace pictura {
 
@@ -35,11 +35,11 @@ class Counts {
 };
 
 /// Who was placed, who was not and why, and which goals are out of reach.
-void count_population(WorldBatch& batch, const LaneGraph& graph, Counts* counts_inout) {
+void count_population(HostWorlds& worlds, const LaneGraph& graph, Counts* counts_inout) {
   constexpr const char* kClasses[kNumAgentClasses] = {"vehicles", "cyclists", "pedestrians"};
   static_assert(static_cast<int>(AgentClass::cyclist) == 1 && static_cast<int>(AgentClass::pedestrian) == 2);
-  for (int w = 0; w < batch.num_worlds(); ++w) {
-    const WorldView world = batch.world(w);
+  for (int w = 0; w < worlds.setup.num_worlds(); ++w) {
+    const WorldView world = worlds.world(w);
     const auto episode = static_cast<size_t>(w);
     const auto count = [&](const char* name, const char* unit, double value) {
       counts_inout->of(name, unit, episode) += value;
@@ -131,9 +131,9 @@ std::vector<EpisodeValues> measure_worlds(const std::shared_ptr<const RoadMap>& 
   const auto simulator = make_simulator("cpu", config, {map}, worlds);
   Counts counts(options.episodes);
   say("goals");
-  WorldBatch batch(config, {map}, worlds);
-  batch.restore(simulator->save());
-  count_population(batch, LaneGraph(*map), &counts);
+  HostWorlds first_step(SimulatorSetup(config, simulator->maps(), {}, worlds));
+  first_step.state.restore(first_step.setup, simulator->save());
+  count_population(first_step, LaneGraph(*map), &counts);
   count_random_policy(*simulator, options, &counts);
   say("lane driver");
   config.cyclist_fraction = 0;

@@ -5,6 +5,7 @@
 #include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_renderer.h"
 #include "pictura/backends/make_simulator.h"
+#include "pictura/backends/upload_maps.h"
 #include "pictura/cli/finite_range.h"
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
@@ -70,7 +71,7 @@ class PolicyController final : public Controller {
   void enter(Simulator* simulator) {
     simulator_ = simulator;
     actions_.resize(static_cast<size_t>(simulator->num_slots()));
-    if (renderer_) upload_geometries(simulator->geometries(), renderer_.get());
+    if (renderer_) upload_maps(*simulator, renderer_.get());
   }
   void act(const ControllerInput&, Span<const uint8_t> mask, Span<Command> commands_out, Stream) override {
     driver_->act(*simulator_, renderer_.get(), /*argmax=*/true, actions_);

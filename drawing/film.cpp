@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "pictura/backends/make_renderer.h"
+#include "pictura/backends/upload_maps.h"
 #include "pictura/drawing/drawing.h"
 #include "pictura/drawing/video.h"
 #include "pictura/drawing/world.h"
@@ -29,7 +30,8 @@ void paste(const RgbImage& picture, int left_px, int top_px, RgbImage* image_out
 
 std::vector<WallFace> walls_of(const Simulator& simulator) {
   const SimulatorConfig& config = simulator.config();
-  return config.walls ? make_walls(*simulator.maps()[0], {.wall_seed = config.wall_seed}) : std::vector<WallFace>{};
+  return config.walls ? make_walls(*simulator.maps()[0]->road, {.wall_seed = config.wall_seed})
+                      : std::vector<WallFace>{};
 }
 
 }  // namespace
@@ -38,14 +40,14 @@ struct Film::Parts {
   Parts(const std::string& path, const Simulator& simulator, int followed_agent, float shown_width_m, int num_threads)
       : agent(followed_agent),
         width_m(shown_width_m),
-        painter(*simulator.maps()[0], kTopWidth_px, kTopHeight_px, walls_of(simulator)),
+        painter(*simulator.maps()[0]->road, kTopWidth_px, kTopHeight_px, walls_of(simulator)),
         renderer(
             make_renderer("cpu", {.rig = paper_rig(kCameraWidth_px, kCameraHeight_px), .num_threads = num_threads})),
         images(renderer->config().rig, 1),
         frame{kTopWidth_px, kTopHeight_px + kGap_px + captioned(images, 0, 0, "").height_px, {}},
         video(path, frame.width_px, frame.height_px, kFramesPerSecond) {
     frame.rgb.assign(static_cast<size_t>(frame.width_px) * static_cast<size_t>(frame.height_px) * 3, kGapGrey);
-    upload_geometries(simulator.geometries(), renderer.get());
+    upload_maps(simulator, renderer.get());
   }
 
   int agent;
@@ -65,7 +67,7 @@ Film::~Film() = default;
 void Film::add_frame(Simulator& simulator) {
   Parts& parts = *parts_;
   const std::string caption =
-      fmt::format("{}  episode {}  {:.1f} s  agent {}", simulator.maps()[0]->name, simulator.episode_index()[0],
+      fmt::format("{}  episode {}  {:.1f} s  agent {}", simulator.maps()[0]->road->name, simulator.episode_index()[0],
                   simulator.config().dt_s * static_cast<float>(simulator.episode_step()[0]), parts.agent);
   const RgbImage top = draw_world(parts.painter, simulator, 0, parts.agent, parts.width_m, caption);
   paste(top, 0, 0, &parts.frame);

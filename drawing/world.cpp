@@ -321,8 +321,8 @@ RgbImage draw_world(WorldPainter& painter, Simulator& simulator, int world, int 
   const auto num_worlds = static_cast<int>(simulator.worlds().size());
   PICTURA_CHECK(world >= 0 && world < num_worlds, "picture of a world: expected a world in [0, {}), got {}", num_worlds,
                 world);
-  PICTURA_CHECK(simulator.space() == MemorySpace::host,
-                "picture of a world: expected a simulator in host memory, got {}", simulator.name());
+  PICTURA_CHECK(simulator.device().is_host(), "picture of a world: expected a simulator in host memory, got {}",
+                simulator.name());
   size_t first_slot = 0;
   for (int w = 0; w < world; ++w)
     first_slot += static_cast<size_t>(simulator.worlds()[static_cast<size_t>(w)].num_agents);

@@ -4,8 +4,14 @@
 
 namespace pictura {
 
-AgentState::AgentState(size_t num_agents){
+void AgentState::resize(size_t num_agents) {
 #define X(name, type, per_agent, first, comment) name.assign(num_agents*(per_agent), static_cast<type>(first));
+  PICTURA_AGENT_FIELDS(X)
+#undef X
+}
+
+void AgentState::reserve(size_t num_agents){
+#define X(name, type, per_agent, first, comment) name.reserve(num_agents*(per_agent));
     PICTURA_AGENT_FIELDS(X)
 #undef X
 }

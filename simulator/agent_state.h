@@ -14,7 +14,9 @@ struct AgentState {
 #undef X
 
   /// Gives every field of num_agents agents its first value.
-  explicit AgentState(size_t num_agents = 0);
+  explicit AgentState(size_t num_agents = 0) { resize(num_agents); }
+  void resize(size_t num_agents);
+  void reserve(size_t num_agents);
   AgentStateView view();
   /// Adds the bytes of every field, in the order of the list.
   void add_to(Hash64* hash_inout) const;

@@ -376,6 +376,16 @@ MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool obs
   return out;
 }
 
+int64_t MapRules::size_bytes() const {
+  MapView arrays = view();
+  size_t sum = 0;
+  visit_arrays(&arrays, [&sum](const auto* span) {
+    const size_t bytes = span->size() * sizeof(*span->data());
+    sum += (bytes + kMapAlignment_bytes - 1) / kMapAlignment_bytes * kMapAlignment_bytes;
+  });
+  return static_cast<int64_t>(sum);
+}
+
 MapView MapRules::view() const {
   MapView view;
   view.segments = segments;

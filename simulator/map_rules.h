@@ -39,7 +39,10 @@ struct MapRules {
   Vec2 low_m, high_m;
 
   MapView view() const;
+  /// Of all arrays of the view in one piece of memory, each aligned to kMapAlignment_bytes.
+  int64_t size_bytes() const;
 };
+constexpr size_t kMapAlignment_bytes = 256;
 
 /// Walls can be observed on it if `observe_walls`. Throws Error naming the map when it has no drivable lane.
 MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool observe_walls = false);

@@ -1,6 +1,6 @@
 // The interface of the simulator: many worlds, each on one map, stepped together. Executors (`cpu`, `cuda`) are made by
 // name and give bit-identical state. All arrays are indexed by slot: the controlled agents of world 0, then those of
-// world 1, and so on. Spans lie in the memory of space(): what `cuda` returns is written by work on a stream.
+// world 1, and so on. Spans lie in the memory of device(): what `cuda` returns is written by work on a stream.
 #pragma once
 
 #include <array>
@@ -10,10 +10,9 @@
 #include <vector>
 
 #include "pictura/common/scene.h"
-#include "pictura/map/map_geometry.h"
-#include "pictura/map/road_map.h"
 #include "pictura/simulator/actions.h"
 #include "pictura/simulator/command.h"
+#include "pictura/simulator/compiled_map.h"
 #include "pictura/simulator/conditioning.h"
 #include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/fields.h"
@@ -30,9 +29,9 @@ constexpr int kMaxBoxes = 1 << 24;  // controlled agents and parked cars of one 
 /// The defaults are the paper's training world.
 struct SimulatorConfig {
   uint64_t seed = 0;
-  MemorySpace space = MemorySpace::host;  // where the caller wants observations and scenes; `auto` chooses by it
-  int num_threads = 0;                    // host threads; 0: all
-  float dt_s = 0.1f;                      // in [0.01, 0.1]
+  Device device;        // where the caller wants observations and scenes; `auto` chooses by it
+  int num_threads = 0;  // host threads; 0: all
+  float dt_s = 0.1f;    // in [0.01, 0.1]
   int episode_steps = 1280;
   float reset_inactive_fraction = 0.4f;  // a world resets when this part of its agents is inactive; > 1: never
   float pedestrian_fraction = 0.1f, cyclist_fraction = 0.1f;  // of the agents; the rest are vehicles
@@ -63,7 +62,35 @@ struct WorldSpec {
 /// are taken in turn. Throws UsageError unless 1 <= min <= max <= 4096 and num_slots >= 1.
 std::vector<WorldSpec> draw_worlds(uint64_t seed, int num_slots, int min_agents, int max_agents, int num_maps);
 
-/// What step() returns besides observations. Spans stay at one address for the life of the simulator.
+/// How much a simulator has memory for.
+struct SimulatorCapacity {
+  int64_t worlds = 0, slots = 0;
+  int64_t lights = 0;     // traffic lights of all worlds
+  int64_t maps = 0;       // at once
+  int64_t map_bytes = 0;  // of all maps' rules
+
+  /// Controlled agents and parked cars.
+  int64_t boxes(const SimulatorConfig& config) const { return slots + worlds * config.parked_cars; }
+  bool holds(const SimulatorCapacity& other) const {
+    return worlds >= other.worlds && slots >= other.slots && lights >= other.lights && maps >= other.maps &&
+           map_bytes >= other.map_bytes;
+  }
+  /// The larger of both in everything.
+  SimulatorCapacity joined(const SimulatorCapacity& other) const;
+};
+
+using CompiledMaps = std::vector<std::shared_ptr<const CompiledMap>>;
+
+/// What these worlds on these maps take; the capacities of several batches of worlds can be joined.
+SimulatorCapacity capacity_of(const CompiledMaps& maps, const std::vector<WorldSpec>& worlds);
+
+/// A simulator's state, kept in its memory; made by Simulator::snapshot.
+class StateSnapshot {
+ public:
+  virtual ~StateSnapshot() = default;
+};
+
+/// What step() returns besides observations. Spans last as the simulator's addresses do.
 struct StepResult {
   Span<const float> reward;        // [slots]
   Span<const uint8_t> terminated;  // [slots] 1: an infraction ended the agent's episode in this step
@@ -79,6 +106,14 @@ struct SpawnReport {
   int64_t parked_asked = 0, parked_placed = 0;
 };
 
+/// An object serves one thread at a time; distinct objects are independent.
+///
+/// Addresses that a simulator gives last until reserve() or set_worlds() must grow what lies there; generation() counts
+/// that. Lengths change with set_worlds().
+///
+/// A simulator on a CUDA device makes that device current in each call and restores the caller's. Its calls put work on
+/// a stream and share the simulator's memory: put them on one stream, or make each wait for the one before. What is
+/// wrong with commands is latched there: poll(), check() or the next call throws it.
 class Simulator {
  public:
   virtual ~Simulator() = default;
@@ -87,40 +122,54 @@ class Simulator {
   Simulator& operator=(const Simulator&) = delete;
 
   virtual std::string_view name() const = 0;
-  /// Where actions are read from, and where results, observations, scenes and state lie.
-  virtual MemorySpace space() const = 0;
+  /// Where commands are read from, and where results, observations, scenes and state lie.
+  virtual Device device() const = 0;
   virtual const SimulatorConfig& config() const = 0;
-  virtual const std::vector<std::shared_ptr<const RoadMap>>& maps() const = 0;
+  virtual const CompiledMaps& maps() const = 0;
+  /// [maps] by which the scene's worlds name them: what maps()[i]->geometry is uploaded to in renderers.
+  virtual const std::vector<GeometryHandle>& handles() const = 0;
   virtual const std::vector<WorldSpec>& worlds() const = 0;
   virtual int num_slots() const = 0;
+
+  /// Other worlds on other maps, at the start of their first episodes of `seed`: bit for bit what a new simulator of
+  /// this configuration, seed, maps and worlds is. handles [maps], or empty for 0, 1, ... Memory is reused; on a device
+  /// nothing is allocated where the capacity suffices, and maps that are there already are not copied again. Captured
+  /// graphs and controllers of the worlds before are stale. May wait for the stream. Throws as make_simulator does,
+  /// and then leaves everything as it was.
+  virtual void set_worlds(CompiledMaps maps, std::vector<GeometryHandle> handles, std::vector<WorldSpec> worlds,
+                          uint64_t seed, Stream stream = {}) = 0;
+  /// Allocates for set_worlds() calls up to this capacity. The present state goes on. May wait for the device.
+  virtual void reserve(const SimulatorCapacity& capacity) = 0;
+  /// How often memory that callers hold addresses of has moved.
+  virtual uint64_t generation() const = 0;
 
   /// Starts a new episode in every world (episode 0 of the seed) and writes observations and scene.
   virtual void reset(Stream stream = {}) = 0;
 
   /// Advances every world by one step. actions: [slots], each in [0, kNumActions); those of inactive agents are
   /// ignored. A world whose last step ended its episode is reset instead, and its slots are not valid in that step
-  /// (next-step autoreset). Throws Error on an action out of range, which leaves the state as it was; on a device the
-  /// next call, or check(), throws it. There a step allocates nothing and waits for nothing, and a CUDA graph can
-  /// capture it.
+  /// (next-step autoreset). Throws Error on an action out of range, which leaves the state as it was; on a device this
+  /// is latched. There a step allocates nothing and waits for nothing, and a CUDA graph can capture it.
   virtual StepResult step(Span<const int32_t> actions, Stream stream = {}) = 0;
   /// The same by commands, [slots], see command.h: what a Controller writes. A step of actions alone gives the bits
   /// that the simple form gives.
   virtual StepResult step(Span<const Command> commands, Stream stream = {}) = 0;
 
-  /// Waits until everything asked for is done; throws Error when a step was refused since the last call that threw.
-  virtual void check() = 0;
+  /// Throws Error when a step was rejected since the last call that threw, as far as the host knows; does not wait.
+  virtual void poll() {}
+  /// Waits for the work on this stream, then polls.
+  virtual void check(Stream /*stream*/ = {}) {}
 
   /// Of the state after the last reset() or step().
   virtual ObservationView observations() = 0;
   /// The scene of all worlds: controlled agents in slot order, each world's parked cars after its controlled agents.
   virtual const SceneBatch& scene() = 0;
-  /// One view per slot. That of an absent agent (one that found no place to spawn) stands at its map's origin and
-  /// leaves nobody out: it can be drawn like any other, its images mean nothing, and its slot is never valid.
+  /// One view per slot. That of an absent agent (one that found no place to spawn) is at its map's origin and leaves
+  /// nobody out: it can be drawn like any other, its images mean nothing, and its slot is never valid.
   virtual Span<const View> views() = 0;
-  /// One per map, in the order of maps(), for Renderer::upload; its handle must equal the map's index.
-  virtual std::vector<StaticGeometry> geometries() const = 0;
-
-  /// What controllers read: all of the above, and which agent each slot is.
+  /// Which agent of which world each slot is.
+  virtual SlotTable slots() const = 0;
+  /// What controllers read: all of the above and the state.
   virtual ControllerInput controller_input() = 0;
 
   virtual AgentStateView state() = 0;
@@ -128,15 +177,20 @@ class Simulator {
   virtual Span<const int32_t> episode_step() const = 0;
   virtual Span<const int32_t> episode_index() const = 0;
 
-  // On a device each of the following waits until everything asked for is done, and copies to the host.
-  virtual SpawnReport spawn_report() const = 0;
-  virtual const SimulatorTotals& totals() const = 0;
+  // On a device each of the following waits for the work on its stream and copies to the host.
+  virtual SpawnReport spawn_report(Stream stream = {}) const = 0;
+  virtual const SimulatorTotals& totals(Stream stream = {}) const = 0;
   /// Over every field of the state, the light states and the parked cars, in documented order; equal on every executor.
-  virtual uint64_t state_hash() const = 0;
+  virtual uint64_t state_hash(Stream stream = {}) const = 0;
 
   /// The whole state as bytes, for exact resume, and back. Throws Error when the bytes are of another configuration.
-  virtual std::vector<uint8_t> save() const = 0;
-  virtual void restore(Span<const uint8_t> bytes) = 0;
+  virtual std::vector<uint8_t> save(Stream stream = {}) const = 0;
+  virtual void restore(Span<const uint8_t> bytes, Stream stream = {}) = 0;
+
+  /// A copy of the state in the simulator's own memory, and back: on a device restore() waits for nothing. Throws Error
+  /// when the snapshot is of other worlds or another simulator.
+  virtual std::unique_ptr<StateSnapshot> snapshot(Stream stream = {}) const = 0;
+  virtual void restore(const StateSnapshot& snapshot, Stream stream = {}) = 0;
 };
 
 }  // namespace pictura

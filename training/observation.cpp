@@ -54,7 +54,7 @@ std::vector<int64_t> active_slots(Simulator& simulator) {
 }
 
 Observer::Observer(Simulator* simulator, Renderer* renderer) : simulator_(*simulator), renderer_(renderer) {
-  const bool on_host = simulator->space() == MemorySpace::host && (!renderer || renderer->device().is_host());
+  const bool on_host = simulator->device().is_host() && (!renderer || renderer->device().is_host());
   PICTURA_CHECK(on_host,
                 "training: simulator '{}' keeps its arrays on a CUDA device, and this build trains on the host: "
                 "set run.backend to \"cpu\"",

@@ -2,6 +2,7 @@
 
 #include "pictura/backends/make_renderer.h"
 #include "pictura/backends/make_simulator.h"
+#include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
 
@@ -15,7 +16,7 @@ std::unique_ptr<Renderer> make_policy_renderer(const Config& config, const Rig& 
   renderer_config.num_threads = config.run.num_threads;
   renderer_config.line_floor_px = static_cast<float>(config.render.line_floor_px);
   std::unique_ptr<Renderer> renderer = make_renderer(config.run.backend, renderer_config);
-  upload_geometries(simulator.geometries(), renderer.get());
+  upload_maps(simulator, renderer.get());
   return renderer;
 }
 

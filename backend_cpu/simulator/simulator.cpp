@@ -7,10 +7,10 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/parallel_for.h"
+#include "pictura/simulator/host_worlds.h"
 #include "pictura/simulator/rules/episode.h"
 #include "pictura/simulator/rules/observe.h"
 #include "pictura/simulator/rules/spawn.h"
-#include "pictura/simulator/world_batch.h"
 
 namespace pictura {
 namespace {
@@ -36,24 +36,43 @@ void sort_into_cells(const WorldView& world, CellLists* cells_inout) {
   }
 }
 
+struct HostSnapshot final : StateSnapshot {
+  uint64_t worlds_id;
+  SimulatorState state;
+};
+
 class SimulatorCpu final : public Simulator {
  public:
-  SimulatorCpu(const SimulatorConfig& config, std::vector<std::shared_ptr<const RoadMap>> maps,
-               std::vector<WorldSpec> worlds)
-      : batch_(config, std::move(maps), std::move(worlds)), results_(static_cast<size_t>(batch_.num_slots()), config) {
-    reset({});
-  }
+  explicit SimulatorCpu(SimulatorSetup setup) : worlds_(std::move(setup)), capacity_(worlds_.setup.needs()) { begin(); }
 
   std::string_view name() const override { return "cpu"; }
-  MemorySpace space() const override { return MemorySpace::host; }
-  const SimulatorConfig& config() const override { return batch_.config; }
-  const std::vector<std::shared_ptr<const RoadMap>>& maps() const override { return batch_.maps; }
-  const std::vector<WorldSpec>& worlds() const override { return batch_.worlds; }
-  int num_slots() const override { return batch_.num_slots(); }
+  Device device() const override { return {}; }
+  const SimulatorConfig& config() const override { return worlds_.setup.config; }
+  const CompiledMaps& maps() const override { return worlds_.setup.maps; }
+  const std::vector<GeometryHandle>& handles() const override { return worlds_.setup.handles; }
+  const std::vector<WorldSpec>& worlds() const override { return worlds_.setup.worlds; }
+  int num_slots() const override { return worlds_.setup.num_slots(); }
+
+  void set_worlds(CompiledMaps maps, std::vector<GeometryHandle> handles, std::vector<WorldSpec> worlds, uint64_t seed,
+                  Stream) override {
+    const SimulatorSetup next = worlds_.setup.with(std::move(maps), std::move(handles), std::move(worlds), seed);
+    reserve(next.needs());
+    worlds_.assign(next);
+    begin();
+  }
+  void reserve(const SimulatorCapacity& capacity) override {
+    if (capacity_.holds(capacity)) return;
+    capacity_ = capacity_.joined(capacity);
+    worlds_.reserve(capacity_);
+    results_.reserve(static_cast<size_t>(capacity_.slots), config());
+    ++generation_;
+    for_each_world([this](int w) { sort_into_cells(worlds_.world(w), &worlds_.box_cells[static_cast<size_t>(w)]); });
+  }
+  uint64_t generation() const override { return generation_; }
 
   void reset(Stream) override {
     for_each_world([this](int w) {
-      batch_.episode_index[static_cast<size_t>(w)] = 0;
+      worlds_.state.episode_index[static_cast<size_t>(w)] = 0;
       begin_episode(w);
       show(w);
     });
@@ -61,41 +80,70 @@ class SimulatorCpu final : public Simulator {
 
   StepResult step(Span<const int32_t> actions, Stream) override { return step_all(actions); }
   StepResult step(Span<const Command> commands, Stream) override { return step_all(commands); }
-  void check() override {}
 
   ObservationView observations() override { return results_.observation_view(); }
-  const SceneBatch& scene() override { return batch_.scene; }
+  const SceneBatch& scene() override { return worlds_.scene; }
   Span<const View> views() override { return results_.views; }
-  std::vector<StaticGeometry> geometries() const override { return batch_.geometries(); }
+  SlotTable slots() const override { return worlds_.setup.slot_table(); }
 
   ControllerInput controller_input() override {
-    return {Device{},           batch_.slot_table(),  results_.observation_view(), batch_.scene,
-            results_.views,     batch_.agents.view(), batch_.episode_step,         batch_.episode_index,
-            batch_.world_totals};
+    return {Device{},
+            slots(),
+            results_.observation_view(),
+            worlds_.scene,
+            results_.views,
+            worlds_.state.agents.view(),
+            worlds_.state.episode_step,
+            worlds_.state.episode_index,
+            worlds_.state.world_totals};
   }
 
-  AgentStateView state() override { return batch_.agents.view(); }
-  Span<const int32_t> episode_step() const override { return batch_.episode_step; }
-  Span<const int32_t> episode_index() const override { return batch_.episode_index; }
-  SpawnReport spawn_report() const override { return batch_.spawn_report(); }
-  const SimulatorTotals& totals() const override { return totals_; }
-  uint64_t state_hash() const override { return batch_.state_hash(); }
+  AgentStateView state() override { return worlds_.state.agents.view(); }
+  Span<const int32_t> episode_step() const override { return worlds_.state.episode_step; }
+  Span<const int32_t> episode_index() const override { return worlds_.state.episode_index; }
+  SpawnReport spawn_report(Stream) const override { return worlds_.state.spawn_report(worlds_.setup); }
+  const SimulatorTotals& totals(Stream) const override { return totals_; }
+  uint64_t state_hash(Stream) const override { return worlds_.state.hash(worlds_.setup); }
 
-  std::vector<uint8_t> save() const override { return batch_.save(); }
-  void restore(Span<const uint8_t> bytes) override {
-    batch_.restore(bytes);
-    totals_ = batch_.totals();
+  std::vector<uint8_t> save(Stream) const override { return worlds_.state.save(worlds_.setup); }
+  void restore(Span<const uint8_t> bytes, Stream) override {
+    worlds_.state.restore(worlds_.setup, bytes);
+    show_restored();
+  }
+  std::unique_ptr<StateSnapshot> snapshot(Stream) const override {
+    auto copy = std::make_unique<HostSnapshot>();
+    copy->worlds_id = worlds_id_;
+    copy->state = worlds_.state;
+    return copy;
+  }
+  void restore(const StateSnapshot& snapshot, Stream) override {
+    const auto* copy = dynamic_cast<const HostSnapshot*>(&snapshot);
+    PICTURA_CHECK(copy && copy->worlds_id == worlds_id_,
+                  "restore: expected a snapshot of these worlds of this simulator");
+    worlds_.state = copy->state;  // copied, so that arrays keep their memory
+    show_restored();
+  }
+
+ private:
+  void begin() {
+    worlds_id_ = next_worlds_id();
+    results_.resize(static_cast<size_t>(num_slots()), config());
+    totals_ = {};
+    reset({});
+  }
+
+  void show_restored() {
+    totals_ = worlds_.state.totals();
     for_each_world([this](int w) {
       clear_results(w);
-      sort_into_cells(batch_.world(w), &batch_.box_cells[static_cast<size_t>(w)]);
+      sort_into_cells(worlds_.world(w), &worlds_.box_cells[static_cast<size_t>(w)]);
       show(w);
     });
   }
 
- private:
   template <typename Body>
   void for_each_world(Body&& body) {
-    parallel_for(batch_.config.num_threads, batch_.num_worlds(), [&body](int64_t w) { body(static_cast<int>(w)); });
+    parallel_for(config().num_threads, worlds_.setup.num_worlds(), [&body](int64_t w) { body(static_cast<int>(w)); });
   }
 
   template <typename CommandType>
@@ -103,19 +151,19 @@ class SimulatorCpu final : public Simulator {
     check_commands(commands);
     for_each_world([this, commands](int w) {
       const auto index = static_cast<size_t>(w);
-      if (batch_.episode_over[index]) {
+      if (worlds_.state.episode_over[index]) {
         clear_results(w);
-        ++batch_.episode_index[index];
-        ++batch_.world_totals[index].episodes;
+        ++worlds_.state.episode_index[index];
+        ++worlds_.state.world_totals[index].episodes;
         begin_episode(w);
       } else {
         step_world(w, commands);
       }
-      batch_.world_totals[index].slot_steps += batch_.worlds[index].num_agents;
+      worlds_.state.world_totals[index].slot_steps += worlds_.setup.worlds[index].num_agents;
       show(w);
     });
-    totals_ = batch_.totals();
-    return {results_.reward, results_.terminated, results_.truncated, results_.valid, batch_.agents.refusal};
+    totals_ = worlds_.state.totals();
+    return {results_.reward, results_.terminated, results_.truncated, results_.valid, worlds_.state.agents.refusal};
   }
 
   /// Before anything changes, so that a refused step leaves the state as it was.
@@ -123,9 +171,9 @@ class SimulatorCpu final : public Simulator {
   void check_commands(Span<const CommandType> commands) {
     PICTURA_CHECK(commands.size() == static_cast<size_t>(num_slots()), "step: expected {} {}, got {}", num_slots(),
                   std::is_same_v<CommandType, Command> ? "commands" : "actions", commands.size());
-    for (int w = 0; w < batch_.num_worlds(); ++w) {
-      if (batch_.episode_over[static_cast<size_t>(w)]) continue;
-      const WorldView world = batch_.world(w);
+    for (int w = 0; w < worlds_.setup.num_worlds(); ++w) {
+      if (worlds_.state.episode_over[static_cast<size_t>(w)]) continue;
+      const WorldView world = worlds_.world(w);
       for (int agent = 0; agent < world.num_agents; ++agent) {
         const int slot = world.first_slot + agent;
         const CommandType& command = commands[static_cast<size_t>(slot)];
@@ -135,7 +183,7 @@ class SimulatorCpu final : public Simulator {
   }
 
   void clear_results(int w) {
-    const WorldView world = batch_.world(w);
+    const WorldView world = worlds_.world(w);
     for (int agent = 0; agent < world.num_agents; ++agent) {
       clear_result(results_.step_arrays(), world.first_slot + agent);
     }
@@ -143,9 +191,9 @@ class SimulatorCpu final : public Simulator {
 
   void begin_episode(int w) {
     const auto index = static_cast<size_t>(w);
-    batch_.episode_step[index] = 0;
-    batch_.episode_over[index] = 0;
-    const WorldView world = batch_.world(w);
+    worlds_.state.episode_step[index] = 0;
+    worlds_.state.episode_over[index] = 0;
+    const WorldView world = worlds_.world(w);
     for (int light = 0; light < static_cast<int>(world.map.stop_lines.size()); ++light) begin_light(world, light);
     const int num_parked = world.num_boxes - world.num_agents;
     for (int car = 0; car < num_parked; ++car) {
@@ -167,8 +215,8 @@ class SimulatorCpu final : public Simulator {
       place_agent(world, agent, chosen);
       spawned += chosen >= 0;
     }
-    batch_.spawned[index] = spawned;
-    sort_into_cells(world, &batch_.box_cells[index]);
+    worlds_.state.spawned[index] = spawned;
+    sort_into_cells(world, &worlds_.box_cells[index]);
   }
 
   /// The first try that succeeds; -1: none, or nothing to try.
@@ -183,16 +231,16 @@ class SimulatorCpu final : public Simulator {
   template <typename CommandType>
   void step_world(int w, Span<const CommandType> commands) {
     const auto index = static_cast<size_t>(w);
-    const WorldView world = batch_.world(w);
+    const WorldView world = worlds_.world(w);
     const StepArrays results = results_.step_arrays();
-    const int steps = ++batch_.episode_step[index];
+    const int steps = ++worlds_.state.episode_step[index];
 
     for (int agent = 0; agent < world.num_agents; ++agent) {
       const auto slot = static_cast<size_t>(world.first_slot + agent);
       results.valid[slot] = takes_part(world, agent, commands[slot]);
       advance(world, agent, commands[slot]);
     }
-    sort_into_cells(world, &batch_.box_cells[index]);
+    sort_into_cells(world, &worlds_.box_cells[index]);
     for (int agent = 0; agent < world.num_agents; ++agent) find_collisions(world, agent);
 
     std::array<SimulatorTotals, kTotalsBins> bins{};
@@ -206,35 +254,35 @@ class SimulatorCpu final : public Simulator {
     for (int light = 0; light < static_cast<int>(world.map.stop_lines.size()); ++light) {
       world.lights[light] = light_state(world.light_plans[light], steps);
     }
-    const bool ends = episode_ends(world.options, steps, batch_.spawned[index], active);
-    batch_.episode_over[index] = ends;
+    const bool ends = episode_ends(world.options, steps, worlds_.state.spawned[index], active);
+    worlds_.state.episode_over[index] = ends;
     for (int agent = 0; agent < world.num_agents; ++agent) finish_agent(world, agent, ends, results, bin_of(agent));
     SimulatorTotals sum;
     for (const SimulatorTotals& bin : bins) sum.add(bin);
-    batch_.world_totals[index].add(sum);
+    worlds_.state.world_totals[index].add(sum);
   }
 
   /// Writes what the world's agents observe and where their cameras stand.
   void show(int w) {
-    const WorldView world = batch_.world(w);
+    const WorldView world = worlds_.world(w);
     const ObservationView observations = results_.observation_view();
     for (int agent = 0; agent < world.num_agents; ++agent) {
-      observe(world, agent, batch_.config.vector_observations, observations);
+      observe(world, agent, worlds_.setup.config.vector_observations, observations);
       results_.views[static_cast<size_t>(world.first_slot + agent)] = view_of(world, agent);
     }
   }
 
-  WorldBatch batch_;
+  HostWorlds worlds_;
+  SimulatorCapacity capacity_;
+  uint64_t generation_ = 0, worlds_id_ = 0;
   HostResults results_;
   SimulatorTotals totals_;
 };
 
 }  // namespace
 
-std::unique_ptr<Simulator> make_cpu_simulator(const SimulatorConfig& config,
-                                              std::vector<std::shared_ptr<const RoadMap>> maps,
-                                              std::vector<WorldSpec> worlds) {
-  return std::make_unique<SimulatorCpu>(config, std::move(maps), std::move(worlds));
+std::unique_ptr<Simulator> make_cpu_simulator(SimulatorSetup setup) {
+  return std::make_unique<SimulatorCpu>(std::move(setup));
 }
 
 }  // namespace pictura

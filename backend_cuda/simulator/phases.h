@@ -40,7 +40,7 @@ struct SimulatorArrays {
   int32_t num_worlds = 0, num_slots = 0;
   // Of all worlds, as in their views; and here, where no store can change them.
   AgentStateView agents{}, next_agents{};
-  // State, as in WorldBatch.
+  // State, as in SimulatorState.
   int32_t* episode_step = nullptr;
   int32_t* episode_index = nullptr;
   uint8_t* episode_over = nullptr;
@@ -483,9 +483,25 @@ void launch_reset(const Launch& launch, const SimulatorArrays& arrays) {
   launch_write_observations(launch, arrays);
 }
 
+/// Tells the worlds which episode a state that was put there is in.
+struct TakeEpisode {
+  SimulatorArrays arrays;
+  template <typename Atomics>
+  PICTURA_HD void operator()(const Atomics&, int w) const {
+    arrays.worlds[w].episode = static_cast<uint32_t>(arrays.episode_index[w]);
+    arrays.next_worlds[w].episode = arrays.worlds[w].episode + 1;
+  }
+};
+
 /// Shows a state that was put there.
 template <typename Launch>
 void launch_restored(const Launch& launch, const SimulatorArrays& arrays) {
+  const auto num_slots = static_cast<size_t>(arrays.num_slots);
+  launch.fill(arrays.results.reward, num_slots * sizeof(float), 0);
+  for (uint8_t* flags : {arrays.results.terminated, arrays.results.truncated, arrays.results.valid}) {
+    launch.fill(flags, num_slots, 0);
+  }
+  launch.threads(arrays.num_worlds, TakeEpisode{arrays});
   launch.fill(arrays.began, static_cast<size_t>(arrays.num_worlds), 0);
   launch.fill(arrays.prepares, static_cast<size_t>(arrays.num_worlds), 1);
   launch.teams(arrays.num_worlds, PrepareEpisode{arrays});

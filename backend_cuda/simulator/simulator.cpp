@@ -1,224 +1,75 @@
-// The simulator in device memory: WorldBatch checks, describes and saves it on the host, kernels step its copy. Nothing
-// here waits for the device but what copies to or from the host.
+// The simulator in device memory: SimulatorSetup checks and describes it on the host, kernels step the state. Steps and
+// snapshots neither wait nor allocate; what copies to or from the host waits for its stream.
 #include "pictura/simulator/simulator.h"
 
 #include <memory>
 #include <numeric>
-#include <type_traits>
 
-#include "pictura/backend_cuda/simulator/kernels.h"
+#include "pictura/backend_cuda/simulator/device_memory.h"
 #include "pictura/common/cuda/check.h"
-#include "pictura/common/cuda/device_buffer.h"
+#include "pictura/common/cuda/device_guard.h"
 #include "pictura/common/error.h"
-#include "pictura/simulator/world_batch.h"
+#include "pictura/simulator/simulator_state.h"
 
 namespace pictura {
 
-std::unique_ptr<Simulator> make_cuda_simulator(const SimulatorConfig& config,
-                                               std::vector<std::shared_ptr<const RoadMap>> maps,
-                                               std::vector<WorldSpec> worlds);
+std::unique_ptr<Simulator> make_cuda_simulator(SimulatorSetup setup);
 
 namespace {
 
-/// The agents' fields, by their names.
-struct DeviceAgents {
-#define X(name, type, per_agent, first, comment) DeviceBuffer<type> name;
-  PICTURA_AGENT_FIELDS(X)
-#undef X
+cudaStream_t handle_of(Stream stream) { return static_cast<cudaStream_t>(stream.handle); }
 
-  explicit DeviceAgents(size_t num_agents){
-#define X(name, type, per_agent, first, comment) name = DeviceBuffer<type>(num_agents * (per_agent));
-      PICTURA_AGENT_FIELDS(X)
-#undef X
-  } AgentStateView view() const {
-#define X(name, type, per_agent, first, comment) name.data(),
-    return {PICTURA_AGENT_FIELDS(X)};
-#undef X
-  }
-  void copy_from(const AgentState& host) {
-#define X(name, type, per_agent, first, comment) name.copy_from_host(host.name.data());
-    PICTURA_AGENT_FIELDS(X)
-#undef X
-  }
-  void copy_to(AgentState* host_out) const {
-#define X(name, type, per_agent, first, comment) name.copy_to_host(host_out->name.data());
-    PICTURA_AGENT_FIELDS(X)
-#undef X
-  }
-};
-
-/// The rest of the state, by the names of WorldBatch.
-struct DeviceState {
-  DeviceBuffer<AgentBox> boxes, boxes_before;
-  DeviceBuffer<LightPlan> light_plans;
-  DeviceBuffer<LightState> lights;
-  DeviceBuffer<int32_t> episode_step, episode_index;
-  DeviceBuffer<uint8_t> episode_over;
-  DeviceBuffer<int32_t> spawned;
-  DeviceBuffer<SimulatorTotals> world_totals;
-};
-
-/// A SlotTable's arrays.
-struct DeviceSlots {
-  DeviceBuffer<int32_t> world_of_slot, agent_of_slot, slot_begin;
-  DeviceBuffer<uint32_t> global_world;
-
-  SlotTable table() const {
-    return {world_of_slot.span(), agent_of_slot.span(), slot_begin.span(), global_world.span()};
-  }
-};
-
-/// A map's arrays.
-class DeviceMap {
- public:
-  explicit DeviceMap(const MapView& host) : view_(host) {
-    visit_arrays(&view_, [this](auto* span) {
-      using Element = std::remove_reference_t<decltype((*span)[0])>;
-      buffers_.emplace_back(
-          Span<const uint8_t>(reinterpret_cast<const uint8_t*>(span->data()), span->size() * sizeof(Element)));
-      *span = {reinterpret_cast<Element*>(buffers_.back().data()), span->size()};
-    });
-    in_device_ = DeviceBuffer<MapView>(Span<const MapView>(&view_, 1));
-  }
-  /// In device memory.
-  const MapView& view() const { return *in_device_.data(); }
-
- private:
-  MapView view_;
-  std::vector<DeviceBuffer<uint8_t>> buffers_;
-  DeviceBuffer<MapView> in_device_;
-};
-
-struct DeviceResults {
-  DeviceBuffer<float> reward;
-  DeviceBuffer<uint8_t> terminated, truncated, valid;
-  DeviceBuffer<View> views;
-#define X(name, type, per_slot, part, comment) DeviceBuffer<type> name;
-  PICTURA_OBSERVATION_ARRAYS(X)
-#undef X
-
-  DeviceResults(size_t slots, const SimulatorConfig& config)
-      : reward(slots), terminated(slots), truncated(slots), valid(slots), views(slots) {
-    // Zeroed, since of a set's rows only those up to its last count are zeroed later.
-#define X(name, type, per_slot, part, comment)                                                 \
-  if (config.observes(part)) name = DeviceBuffer<type>(slots * static_cast<size_t>(per_slot)); \
-  name.fill(0);
-    PICTURA_OBSERVATION_ARRAYS(X)
-#undef X
-    clear();
-  }
-  void clear() {
-    reward.fill(0);
-    for (DeviceBuffer<uint8_t>* flags : {&terminated, &truncated, &valid}) flags->fill(0);
-  }
-  StepArrays step_arrays() const { return {reward.data(), terminated.data(), truncated.data(), valid.data()}; }
-  ObservationView observations() const {
-#define X(name, type, per_slot, part, comment) Span<type>(name.data(), name.size()),
-    return {PICTURA_OBSERVATION_ARRAYS(X)};
-#undef X
-  }
-};
-
-/// What the phases need besides state and results.
-struct DeviceScratch {
-  DeviceBuffer<RuleOptions> options;
-  DeviceBuffer<WorldView> worlds, next_worlds;
-  DeviceBuffer<cuda::WorldScratch> of_worlds;
-  DeviceBuffer<int32_t> cell_begin, cell_items;  // each world's one cell: {0, boxes}; and 0, 1, 2, ...
-  DeviceBuffer<Vec2> cell_centers;
-  DeviceBuffer<AgentBox> try_boxes;
-  DeviceBuffer<uint32_t> free_tries;
-  DeviceBuffer<int32_t> known_tries, chosen_try, next_try;
-  DeviceBuffer<float> step_m;
-  DeviceBuffer<uint8_t> began, prepares;
-  DeviceBuffer<int32_t> rejected_slot;
-  MappedValue<int64_t> rejected_command;
-};
-
-/// The part of the state that an episode begins with, for the next one.
-struct DeviceNext {
-  DeviceAgents agents;
-  DeviceBuffer<AgentBox> boxes;
-  DeviceBuffer<LightPlan> light_plans;
-  DeviceBuffer<LightState> lights;
-  DeviceBuffer<int32_t> spawned;
-
-  explicit DeviceNext(const WorldBatch& batch)
-      : agents(static_cast<size_t>(batch.num_slots())),
-        boxes(batch.boxes.size()),
-        light_plans(batch.light_plans.size()),
-        lights(batch.lights.size()),
-        spawned(batch.worlds.size()) {}
-};
-
-/// A stream beside the caller's, and what ties them together.
-class SideStream {
- public:
-  SideStream() {
-    // Of a higher priority: what is put there is little, and everybody waits for its end.
-    int lowest = 0, highest = 0;
-    PICTURA_CUDA(cudaDeviceGetStreamPriorityRange(&lowest, &highest));
-    cudaStream_t side = nullptr;
-    PICTURA_CUDA(cudaStreamCreateWithPriority(&side, cudaStreamNonBlocking, highest));
-    side_.reset(side);
-    for (Event* event : {&forked_, &joined_}) {
-      cudaEvent_t made = nullptr;
-      PICTURA_CUDA(cudaEventCreateWithFlags(&made, cudaEventDisableTiming));
-      event->reset(made);
-    }
-  }
-  cuda::StepStreams streams_from(Stream stream) const {
-    return {static_cast<cudaStream_t>(stream.handle), side_.get(), forked_.get(), joined_.get()};
-  }
-
- private:
-  struct Destroy {
-    void operator()(cudaStream_t stream) const { cudaStreamDestroy(stream); }
-    void operator()(cudaEvent_t event) const { cudaEventDestroy(event); }
-  };
-  using Event = std::unique_ptr<std::remove_pointer_t<cudaEvent_t>, Destroy>;
-  std::unique_ptr<std::remove_pointer_t<cudaStream_t>, Destroy> side_;
-  Event forked_, joined_;
+struct DeviceSnapshot final : StateSnapshot {
+  uint64_t worlds_id = 0;
+  DeviceState state;
 };
 
 class SimulatorCuda final : public Simulator {
  public:
-  SimulatorCuda(const SimulatorConfig& config, std::vector<std::shared_ptr<const RoadMap>> maps,
-                std::vector<WorldSpec> worlds)
-      : batch_(std::make_unique<WorldBatch>(config, std::move(maps), std::move(worlds))),
-        agents_(static_cast<size_t>(batch_->num_slots())),
-        next_(*batch_),
-        results_(static_cast<size_t>(batch_->num_slots()), config) {
-    for (const MapView& map : batch_->map_views) maps_.emplace_back(map);
-    WorldBatch::visit_state(*batch_, state_, [](const auto& host, auto& device) { device = device_copy(host); });
-    world_begin_ = device_copy(batch_->box_begin);
-    light_begin_ = device_copy(batch_->light_begin);
-    geometry_ = device_copy(batch_->geometry);
-    slots_ = {device_copy(batch_->world_of_slot), device_copy(batch_->agent_of_slot), device_copy(batch_->slot_begin),
-              device_copy(batch_->global_world)};
-    scene_.device = {MemorySpace::cuda, device_.number()};
-    scene_.world_begin = world_begin_.span();
-    scene_.agents = state_.boxes.span();
-    scene_.geometry = geometry_.span();
-    scene_.light_begin = light_begin_.span();
-    scene_.light_states = state_.lights.span();
-    allocate_scratch();
-    upload_worlds();
-    reset({});
-    synchronize();
+  SimulatorCuda(SimulatorSetup setup, Device device) : device_(device), setup_(std::move(setup)) {
+    const DeviceGuard guard(device_);
+    side_ = std::make_unique<SideStream>();
+    rejected_command_ = std::make_unique<MappedValue<int64_t>>();
+    *rejected_command_->host() = kNothingRejected;
+    allocate(setup_.needs());
+    begin(nullptr);
+    PICTURA_CUDA(cudaDeviceSynchronize());  // so that it can be used on any stream
   }
 
   std::string_view name() const override { return "cuda"; }
-  MemorySpace space() const override { return MemorySpace::cuda; }
-  const SimulatorConfig& config() const override { return batch_->config; }
-  const std::vector<std::shared_ptr<const RoadMap>>& maps() const override { return batch_->maps; }
-  const std::vector<WorldSpec>& worlds() const override { return batch_->worlds; }
-  int num_slots() const override { return batch_->num_slots(); }
+  Device device() const override { return device_; }
+  const SimulatorConfig& config() const override { return setup_.config; }
+  const CompiledMaps& maps() const override { return setup_.maps; }
+  const std::vector<GeometryHandle>& handles() const override { return setup_.handles; }
+  const std::vector<WorldSpec>& worlds() const override { return setup_.worlds; }
+  int num_slots() const override { return setup_.num_slots(); }
+
+  void set_worlds(CompiledMaps maps, std::vector<GeometryHandle> handles, std::vector<WorldSpec> worlds, uint64_t seed,
+                  Stream stream) override {
+    const DeviceGuard guard(device_);
+    throw_rejected();
+    SimulatorSetup next = setup_.with(std::move(maps), std::move(handles), std::move(worlds), seed);
+    if (!capacity_.holds(next.needs())) grow(next.needs());
+    setup_ = std::move(next);
+    begin(handle_of(stream));
+  }
+  void reserve(const SimulatorCapacity& capacity) override {
+    if (capacity_.holds(capacity)) return;
+    const DeviceGuard guard(device_);
+    PICTURA_CUDA(cudaDeviceSynchronize());
+    state_.get_to(&host_, nullptr);
+    PICTURA_CUDA(cudaStreamSynchronize(nullptr));
+    grow(capacity);
+    put_setup(nullptr);
+    put_state(nullptr);
+    PICTURA_CUDA(cudaDeviceSynchronize());
+  }
+  uint64_t generation() const override { return generation_; }
 
   void reset(Stream stream) override {
-    device_.check_current("simulator cuda");
+    const DeviceGuard guard(device_);
     throw_rejected();
-    cuda::launch_reset(arrays(), side_.streams_from(stream));
+    cuda::launch_reset(arrays(), side_->streams_from(handle_of(stream)));
     PICTURA_CUDA(cudaGetLastError());
   }
 
@@ -226,142 +77,188 @@ class SimulatorCuda final : public Simulator {
   StepResult step(Span<const Command> commands, Stream stream) override {
     return step_all(commands, "commands", stream);
   }
-  void check() override {
-    synchronize();
+  void poll() override { throw_rejected(); }
+  void check(Stream stream) override {
+    const DeviceGuard guard(device_);
+    PICTURA_CUDA(cudaStreamSynchronize(handle_of(stream)));
     throw_rejected();
   }
 
-  ObservationView observations() override { return results_.observations(); }
+  ObservationView observations() override { return results_.observations(slot_count(), config()); }
   const SceneBatch& scene() override { return scene_; }
-  Span<const View> views() override { return results_.views.span(); }
-  std::vector<StaticGeometry> geometries() const override { return batch_->geometries(); }
-
+  Span<const View> views() override { return {results_.views.data(), slot_count()}; }
+  SlotTable slots() const override {
+    const size_t num_worlds = setup_.worlds.size();
+    return {{tables_.world_of_slot.data(), slot_count()},
+            {tables_.agent_of_slot.data(), slot_count()},
+            {tables_.slot_begin.data(), num_worlds + 1},
+            {tables_.global_world.data(), num_worlds}};
+  }
   ControllerInput controller_input() override {
-    return {Device{MemorySpace::cuda, device_.number()},
-            slots_.table(),
-            results_.observations(),
-            scene_,
-            results_.views.span(),
-            agents_.view(),
-            state_.episode_step.span(),
-            state_.episode_index.span(),
-            state_.world_totals.span()};
+    return {device_,        slots(),         observations(),
+            scene_,         views(),         state(),
+            episode_step(), episode_index(), {state_.world_totals.data(), setup_.worlds.size()}};
   }
 
-  AgentStateView state() override { return agents_.view(); }
-  Span<const int32_t> episode_step() const override { return state_.episode_step.span(); }
-  Span<const int32_t> episode_index() const override { return state_.episode_index.span(); }
+  AgentStateView state() override { return state_.agents.view(); }
+  Span<const int32_t> episode_step() const override { return {state_.episode_step.data(), setup_.worlds.size()}; }
+  Span<const int32_t> episode_index() const override { return {state_.episode_index.data(), setup_.worlds.size()}; }
 
-  SpawnReport spawn_report() const override {
-    synchronize();
-    state_.boxes.copy_to_host(batch_->boxes.data());
-    state_.spawned.copy_to_host(batch_->spawned.data());
-    agents_.refusal.copy_to_host(batch_->agents.refusal.data());
-    return batch_->spawn_report();
+  SpawnReport spawn_report(Stream stream) const override {
+    const DeviceGuard guard(device_);
+    get(state_.boxes, &host_.boxes, handle_of(stream));
+    get(state_.spawned, &host_.spawned, handle_of(stream));
+    get(state_.agents.refusal, &host_.agents.refusal, handle_of(stream));
+    PICTURA_CUDA(cudaStreamSynchronize(handle_of(stream)));
+    return host_.spawn_report(setup_);
   }
-  const SimulatorTotals& totals() const override {
-    synchronize();
-    state_.world_totals.copy_to_host(batch_->world_totals.data());
-    totals_ = batch_->totals();
+  const SimulatorTotals& totals(Stream stream) const override {
+    const DeviceGuard guard(device_);
+    get(state_.world_totals, &host_.world_totals, handle_of(stream));
+    PICTURA_CUDA(cudaStreamSynchronize(handle_of(stream)));
+    totals_ = host_.totals();
     return totals_;
   }
-  uint64_t state_hash() const override {
-    download();
-    return batch_->state_hash();
+  uint64_t state_hash(Stream stream) const override {
+    download(stream);
+    return host_.hash(setup_);
   }
 
-  std::vector<uint8_t> save() const override {
-    download();
-    return batch_->save();
+  std::vector<uint8_t> save(Stream stream) const override {
+    download(stream);
+    return host_.save(setup_);
   }
-  void restore(Span<const uint8_t> bytes) override {
-    download();  // what a refused restore leaves as it was
-    batch_->restore(bytes);
-    agents_.copy_from(batch_->agents);
-    WorldBatch::visit_state(*batch_, state_, [](auto& host, auto& device) { device.copy_from_host(host.data()); });
-    upload_worlds();
-    results_.clear();
-    cuda::launch_restored(arrays(), side_.streams_from({}));
-    PICTURA_CUDA(cudaGetLastError());
-    synchronize();
+  void restore(Span<const uint8_t> bytes, Stream stream) override {
+    const DeviceGuard guard(device_);
+    host_.restore(setup_, bytes);
+    put_state(handle_of(stream));
+  }
+  std::unique_ptr<StateSnapshot> snapshot(Stream stream) const override {
+    const DeviceGuard guard(device_);
+    auto copy = std::make_unique<DeviceSnapshot>();
+    copy->worlds_id = worlds_id_;
+    copy->state = DeviceState(slot_count(), setup_.num_boxes(), setup_.num_lights(), setup_.worlds.size());
+    state_.copy_to(copy->state, setup_, handle_of(stream));
+    return copy;
+  }
+  void restore(const StateSnapshot& snapshot, Stream stream) override {
+    const auto* copy = dynamic_cast<const DeviceSnapshot*>(&snapshot);
+    PICTURA_CHECK(copy && copy->worlds_id == worlds_id_,
+                  "restore: expected a snapshot of these worlds of this simulator");
+    const DeviceGuard guard(device_);
+    copy->state.copy_to(state_, setup_, handle_of(stream));
+    show_restored(handle_of(stream));
   }
 
  private:
-  void synchronize() const {
-    device_.check_current("simulator cuda");
+  size_t slot_count() const { return static_cast<size_t>(num_slots()); }
+
+  /// Memory for this capacity and no less than before; whatever was there is lost.
+  void grow(const SimulatorCapacity& capacity) {
     PICTURA_CUDA(cudaDeviceSynchronize());
+    allocate(capacity_.joined(capacity));
+    ++generation_;
   }
-  template <typename T>
-  static DeviceBuffer<T> device_copy(const std::vector<T>& host) {
-    return DeviceBuffer<T>(Span<const T>(host));
+  void allocate(const SimulatorCapacity& capacity) {
+    const auto num_slots = static_cast<size_t>(capacity.slots), num_worlds = static_cast<size_t>(capacity.worlds);
+    const auto num_boxes = static_cast<size_t>(capacity.boxes(config()));
+    const auto num_lights = static_cast<size_t>(capacity.lights);
+    state_ = DeviceState(num_slots, num_boxes, num_lights, num_worlds);
+    results_ = DeviceResults(num_slots, config());
+    scratch_ = DeviceScratch(num_slots, num_boxes, num_lights, num_worlds);
+    tables_ = DeviceSetup(num_slots, num_worlds);
+    maps_ = DeviceMaps(static_cast<size_t>(capacity.maps), static_cast<size_t>(capacity.map_bytes));
+    capacity_ = capacity;
   }
 
-  /// The state to the host, once all streams are done with it.
-  void download() const {
-    synchronize();
-    agents_.copy_to(&batch_->agents);
-    WorldBatch::visit_state(*batch_, state_, [](auto& host, const auto& device) { device.copy_to_host(host.data()); });
+  /// The setup's worlds from their first episodes on.
+  void begin(cudaStream_t stream) {
+    worlds_id_ = next_worlds_id();
+    host_.resize(setup_);
+    put_setup(stream);
+    state_.put_from(host_, stream);
+    results_.clear(stream);
+    cuda::launch_reset(arrays(), side_->streams_from(stream));
+    PICTURA_CUDA(cudaGetLastError());
+  }
+
+  void put_setup(cudaStream_t stream) {
+    maps_.load(setup_.maps, stream);
+    tables_.put_from(setup_, stream);
+    put_scratch(stream);
+    put_worlds(stream);
+    const size_t num_worlds = setup_.worlds.size();
+    scene_.device = device_;
+    scene_.world_begin = {tables_.box_begin.data(), num_worlds + 1};
+    scene_.agents = {state_.boxes.data(), setup_.num_boxes()};
+    scene_.geometry = {tables_.geometry.data(), num_worlds};
+    scene_.light_begin = {tables_.light_begin.data(), num_worlds + 1};
+    scene_.light_states = {state_.lights.data(), setup_.num_lights()};
+  }
+
+  /// The host's state to the device.
+  void put_state(cudaStream_t stream) {
+    state_.put_from(host_, stream);
+    show_restored(stream);
+  }
+  void show_restored(cudaStream_t stream) {
+    cuda::launch_restored(arrays(), side_->streams_from(stream));
+    PICTURA_CUDA(cudaGetLastError());
+  }
+
+  /// The state to the host, once the stream has done its work.
+  void download(Stream stream) const {
+    const DeviceGuard guard(device_);
+    state_.get_to(&host_, handle_of(stream));
+    PICTURA_CUDA(cudaStreamSynchronize(handle_of(stream)));
   }
 
   template <typename CommandType>
   StepResult step_all(Span<const CommandType> commands, const char* what, Stream stream) {
-    device_.check_current("simulator cuda");
+    const DeviceGuard guard(device_);
     throw_rejected();
-    PICTURA_CHECK(commands.size() == static_cast<size_t>(num_slots()), "step: expected {} {}, got {}", num_slots(),
-                  what, commands.size());
-    cuda::launch_step(arrays(), commands.data(), side_.streams_from(stream));
+    PICTURA_CHECK(commands.size() == slot_count(), "step: expected {} {}, got {}", num_slots(), what, commands.size());
+    cuda::launch_step(arrays(), commands.data(), side_->streams_from(handle_of(stream)));
     PICTURA_CUDA(cudaGetLastError());
-    return {results_.reward.span(), results_.terminated.span(), results_.truncated.span(), results_.valid.span(),
-            agents_.refusal.span()};
+    return {{results_.reward.data(), slot_count()},
+            {results_.terminated.data(), slot_count()},
+            {results_.truncated.data(), slot_count()},
+            {results_.valid.data(), slot_count()},
+            {state_.agents.refusal.data(), slot_count()}};
   }
 
   void throw_rejected() {
-    const int64_t rejected = *scratch_.rejected_command.host();
+    const int64_t rejected = *rejected_command_->host();
     if (rejected == kNothingRejected) return;
-    *scratch_.rejected_command.host() = kNothingRejected;
+    *rejected_command_->host() = kNothingRejected;
     fail("step: in an earlier call: {}", rejection_text(rejected));
   }
 
-  void allocate_scratch() {
-    const size_t num_worlds = batch_->worlds.size(), num_boxes = batch_->boxes.size();
+  void put_scratch(cudaStream_t stream) {
     std::vector<int32_t> cell_begin;
     int32_t max_boxes = 0;
-    for (size_t w = 0; w < num_worlds; ++w) {
-      const int32_t boxes = batch_->box_begin[w + 1] - batch_->box_begin[w];
+    for (size_t w = 0; w < setup_.worlds.size(); ++w) {
+      const int32_t boxes = setup_.box_begin[w + 1] - setup_.box_begin[w];
       cell_begin.insert(cell_begin.end(), {0, boxes});
       max_boxes = std::max(max_boxes, boxes);
     }
     std::vector<int32_t> cell_items(static_cast<size_t>(max_boxes));
     std::iota(cell_items.begin(), cell_items.end(), 0);
-    scratch_.options = DeviceBuffer<RuleOptions>(Span<const RuleOptions>(&batch_->options, 1));
-    scratch_.worlds = DeviceBuffer<WorldView>(num_worlds);
-    scratch_.next_worlds = DeviceBuffer<WorldView>(num_worlds);
-    scratch_.of_worlds = DeviceBuffer<cuda::WorldScratch>(num_worlds);
-    scratch_.cell_begin = device_copy(cell_begin);
-    scratch_.cell_items = device_copy(cell_items);
-    scratch_.cell_centers = DeviceBuffer<Vec2>(num_boxes);
-    scratch_.try_boxes = DeviceBuffer<AgentBox>(num_boxes * kSpawnTries);
-    scratch_.free_tries = DeviceBuffer<uint32_t>(num_boxes);
-    scratch_.known_tries = DeviceBuffer<int32_t>(num_boxes);
-    scratch_.chosen_try = DeviceBuffer<int32_t>(num_boxes);
-    scratch_.next_try = DeviceBuffer<int32_t>(num_boxes);
-    scratch_.step_m = DeviceBuffer<float>(static_cast<size_t>(num_slots()));
-    scratch_.began = DeviceBuffer<uint8_t>(num_worlds);
-    scratch_.prepares = DeviceBuffer<uint8_t>(num_worlds);
-    scratch_.rejected_slot = DeviceBuffer<int32_t>(1);
-    *scratch_.rejected_command.host() = kNothingRejected;
+    put(cell_begin, scratch_.cell_begin, stream);
+    put(cell_items, scratch_.cell_items, stream);
+    put(std::vector<RuleOptions>{setup_.options}, scratch_.options, stream);
   }
 
-  /// The worlds as the rules see them, at the episodes that the host's state is in, over device memory.
-  void upload_worlds() {
+  /// The worlds as the rules see them, over device memory.
+  void put_worlds(cudaStream_t stream) {
     std::vector<WorldView> worlds, next_worlds;
     std::vector<cuda::WorldScratch> of_worlds;
-    for (int w = 0; w < batch_->num_worlds(); ++w) {
+    for (int w = 0; w < setup_.num_worlds(); ++w) {
       const auto index = static_cast<size_t>(w);
-      const int32_t first_box = batch_->box_begin[index], first_light = batch_->light_begin[index];
-      WorldView view =
-          batch_->world(w, maps_[static_cast<size_t>(batch_->worlds[index].map)].view(), *scratch_.options.data());
-      view.agents = agents_.view();
+      const int32_t first_box = setup_.box_begin[index], first_light = setup_.light_begin[index];
+      const auto& map = setup_.maps[static_cast<size_t>(setup_.worlds[index].map)];
+      WorldView view = setup_.view(w, maps_.view(map), *scratch_.options.data());
+      view.agents = state_.agents.view();
       view.boxes = state_.boxes.data() + first_box;
       view.boxes_before = state_.boxes_before.data() + first_box;
       view.box_cells = cuda::one_cell({scratch_.cell_begin.data() + 2 * w, 2},
@@ -370,19 +267,18 @@ class SimulatorCuda final : public Simulator {
       view.light_plans = state_.light_plans.data() + first_light;
       view.lights = state_.lights.data() + first_light;
       worlds.push_back(view);
-      ++view.episode;
-      view.agents = next_.agents.view();
-      view.boxes = view.boxes_before = next_.boxes.data() + first_box;
-      view.light_plans = next_.light_plans.data() + first_light;
-      view.lights = next_.lights.data() + first_light;
+      view.agents = scratch_.next_agents.view();
+      view.boxes = view.boxes_before = scratch_.next_boxes.data() + first_box;
+      view.light_plans = scratch_.next_light_plans.data() + first_light;
+      view.lights = scratch_.next_lights.data() + first_light;
       next_worlds.push_back(view);
       of_worlds.push_back({scratch_.try_boxes.data() + first_box * kSpawnTries, scratch_.free_tries.data() + first_box,
                            scratch_.known_tries.data() + first_box, scratch_.chosen_try.data() + first_box,
                            scratch_.next_try.data() + first_box});
     }
-    scratch_.worlds.copy_from_host(worlds.data());
-    scratch_.next_worlds.copy_from_host(next_worlds.data());
-    scratch_.of_worlds.copy_from_host(of_worlds.data());
+    put(worlds, scratch_.worlds, stream);
+    put(next_worlds, scratch_.next_worlds, stream);
+    put(of_worlds, scratch_.of_worlds, stream);
   }
 
   cuda::SimulatorArrays arrays() {
@@ -390,11 +286,11 @@ class SimulatorCuda final : public Simulator {
     arrays.worlds = scratch_.worlds.data();
     arrays.next_worlds = scratch_.next_worlds.data();
     arrays.scratch = scratch_.of_worlds.data();
-    arrays.world_of_slot = slots_.world_of_slot.data();
-    arrays.agents = agents_.view();
-    arrays.next_agents = next_.agents.view();
-    arrays.num_worlds = batch_->num_worlds();
-    arrays.num_slots = batch_->num_slots();
+    arrays.world_of_slot = tables_.world_of_slot.data();
+    arrays.agents = state_.agents.view();
+    arrays.next_agents = scratch_.next_agents.view();
+    arrays.num_worlds = setup_.num_worlds();
+    arrays.num_slots = num_slots();
     arrays.episode_step = state_.episode_step.data();
     arrays.episode_index = state_.episode_index.data();
     arrays.episode_over = state_.episode_over.data();
@@ -402,40 +298,38 @@ class SimulatorCuda final : public Simulator {
     arrays.world_totals = state_.world_totals.data();
     arrays.results = results_.step_arrays();
     arrays.views = results_.views.data();
-    arrays.observations = results_.observations();
-    arrays.entity_sets = batch_->config.vector_observations;
+    arrays.observations = observations();
+    arrays.entity_sets = config().vector_observations;
     arrays.step_m = scratch_.step_m.data();
     arrays.began = scratch_.began.data();
     arrays.prepares = scratch_.prepares.data();
-    arrays.next_spawned = next_.spawned.data();
+    arrays.next_spawned = scratch_.next_spawned.data();
     arrays.rejected_slot = scratch_.rejected_slot.data();
-    arrays.rejected_command = scratch_.rejected_command.device();
+    arrays.rejected_command = rejected_command_->device();
     return arrays;
   }
 
-  CurrentDevice device_;
-  // Checks and describes; its state is the device's only once download() has copied it.
-  std::unique_ptr<WorldBatch> batch_;
-  std::vector<DeviceMap> maps_;
-  DeviceAgents agents_;
+  const Device device_;
+  SimulatorSetup setup_;
+  SimulatorCapacity capacity_;
+  uint64_t generation_ = 0, worlds_id_ = 0;
+  mutable SimulatorState host_;  // the state only once it has been copied there
+  mutable SimulatorTotals totals_;
+  DeviceMaps maps_;
+  DeviceSetup tables_;
   DeviceState state_;
-  DeviceNext next_;
   DeviceResults results_;
   DeviceScratch scratch_;
-  DeviceSlots slots_;
-  SideStream side_;
-  DeviceBuffer<int32_t> world_begin_, light_begin_;
-  DeviceBuffer<GeometryHandle> geometry_;
+  std::unique_ptr<SideStream> side_;
+  std::unique_ptr<MappedValue<int64_t>> rejected_command_;
   SceneBatch scene_;
-  mutable SimulatorTotals totals_;
 };
 
 }  // namespace
 
-std::unique_ptr<Simulator> make_cuda_simulator(const SimulatorConfig& config,
-                                               std::vector<std::shared_ptr<const RoadMap>> maps,
-                                               std::vector<WorldSpec> worlds) {
-  return std::make_unique<SimulatorCuda>(config, std::move(maps), std::move(worlds));
+std::unique_ptr<Simulator> make_cuda_simulator(SimulatorSetup setup) {
+  const Device device = setup.config.device.is_host() ? current_device() : setup.config.device;
+  return std::make_unique<SimulatorCuda>(std::move(setup), device);
 }
 
 }  // namespace pictura

@@ -72,8 +72,7 @@ std::vector<Case> cases_of(const Arguments& arguments) {
   return cases;
 }
 
-void measure(const Arguments& arguments, const std::string& backend,
-             const std::vector<std::shared_ptr<const RoadMap>>& maps, const Case& measured,
+void measure(const Arguments& arguments, const std::string& backend, const CompiledMaps& maps, const Case& measured,
              std::vector<BenchResult>* results_out) {
   const WorldOptions& world = arguments.world;
   SimulatorConfig config;
@@ -128,6 +127,7 @@ void run(Arguments arguments) {
   arguments.maps = named_maps(arguments.maps);
   std::vector<std::shared_ptr<const RoadMap>> maps;
   for (const std::string& name : arguments.maps) maps.push_back(load_map(name));
+  const CompiledMaps compiled = compile_maps(maps, {.walls = arguments.world.walls}, arguments.world.num_threads);
   std::vector<BenchResult> results;
   ProgressLine progress;
   bool on_device = false;
@@ -135,7 +135,7 @@ void run(Arguments arguments) {
     on_device = on_device || backend == "cuda";
     for (const Case& measured : cases_of(arguments)) {
       progress.update(fmt::format("{}, {}", backend, measured.name));
-      measure(arguments, backend, maps, measured, &results);
+      measure(arguments, backend, compiled, measured, &results);
     }
   }
   progress.finish();

@@ -6,7 +6,7 @@
 #include "pictura/common/error.h"
 #include "pictura/simulator/controllers/goal_places.h"
 #include "pictura/simulator/controllers/host_controllers.h"
-#include "pictura/simulator/world_batch.h"
+#include "pictura/simulator/simulator_setup.h"
 
 namespace pictura {
 
@@ -244,10 +244,11 @@ bool LaneKeepingAgent::has_way(int other) const {
 }
 
 LaneKeepingController::LaneKeepingController(const Simulator& simulator) {
-  PICTURA_CHECK(simulator.space() == MemorySpace::host,
-                "controller lane_keeping: expected a simulator in host memory, got {}", simulator.name());
-  batch_ = std::make_unique<WorldBatch>(simulator.config(), simulator.maps(), simulator.worlds());
-  for (const auto& map : simulator.maps()) graphs_.push_back(std::make_unique<LaneGraph>(*map));
+  PICTURA_CHECK(simulator.device().is_host(), "controller lane_keeping: expected a simulator in host memory, got {}",
+                simulator.name());
+  setup_ =
+      std::make_unique<SimulatorSetup>(simulator.config(), simulator.maps(), simulator.handles(), simulator.worlds());
+  for (const auto& map : simulator.maps()) graphs_.push_back(std::make_unique<LaneGraph>(*map->road));
   episode_.assign(simulator.worlds().size(), -1);
   agents_.resize(static_cast<size_t>(simulator.num_slots()));
 }
@@ -273,13 +274,14 @@ void LaneKeepingController::act(const ControllerInput& input, Span<const uint8_t
 }
 
 void LaneKeepingController::begin_episode(const ControllerInput& input, size_t world) {
-  // The batch's maps and options, over the simulator's agents, boxes and lights, which nothing here writes.
-  WorldView view = batch_->world(static_cast<int>(world));
+  // Over the simulator's agents, boxes and lights, which nothing here writes.
+  const auto map = static_cast<size_t>(setup_->worlds[world].map);
+  WorldView view = setup_->view(static_cast<int>(world), setup_->map_views[map], setup_->options);
   view.episode = static_cast<uint32_t>(input.episode_index[world]);
   view.agents = input.state;
   view.boxes = view.boxes_before = const_cast<AgentBox*>(input.scene.agents.data()) + view.first_box;
   view.lights = const_cast<LightState*>(input.scene.light_states.data()) + input.scene.light_begin[world];
-  const LaneGraph& graph = *graphs_[static_cast<size_t>(batch_->worlds[world].map)];
+  const LaneGraph& graph = *graphs_[map];
   for (int agent = 0; agent < view.num_agents; ++agent) {
     const bool drives = is_active(view, agent) && !walks(view, agent);
     agents_[static_cast<size_t>(view.first_slot + agent)] =

@@ -15,7 +15,7 @@
 
 namespace pictura {
 
-struct WorldBatch;
+struct SimulatorSetup;
 
 /// Drives one vehicle or cyclist of a world through one episode.
 class LaneKeepingAgent {
@@ -78,7 +78,7 @@ class LaneKeepingController final : public Controller {
  private:
   void begin_episode(const ControllerInput& input, size_t world);
 
-  std::unique_ptr<WorldBatch> batch_;                      // maps and rule options
+  std::unique_ptr<SimulatorSetup> setup_;                  // a copy, for its maps and rule options
   std::vector<std::unique_ptr<LaneGraph>> graphs_;         // [maps]
   std::vector<int32_t> episode_;                           // [worlds] the one that agents_ drive, or -1
   std::vector<std::unique_ptr<LaneKeepingAgent>> agents_;  // [slots]

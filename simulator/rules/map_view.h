@@ -138,7 +138,7 @@ PICTURA_HD inline Span<const int32_t> list_of(const GridView& lists, size_t inde
 }
 
 /// Cells in rows; the items of those of a row follow one another.
-struct CellRange {
+struct CellRows {
   int x0 = 0, x1 = 0, y0 = 0, y1 = 0;
   PICTURA_HD int32_t begin(const GridView& cells, int y) const {
     return cells.begin[static_cast<size_t>(y * cells.num_x + x0)];
@@ -149,7 +149,7 @@ struct CellRange {
 };
 
 /// The cells that a square of half-width reach_m about p touches.
-PICTURA_HD inline CellRange cells_around(const GridView& cells, Vec2 p, float reach_m) {
+PICTURA_HD inline CellRows cells_around(const GridView& cells, Vec2 p, float reach_m) {
   if (cells.num_x == 1 && cells.num_y == 1) return {};  // without dividing
   return {cells.cell_x(p.x - reach_m), cells.cell_x(p.x + reach_m), cells.cell_y(p.y - reach_m),
           cells.cell_y(p.y + reach_m)};

@@ -82,7 +82,7 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
   using Nearest = typename ThreadGroup::template Nearest<kMaxPartners>;
   const GridView& cells = world.box_cells;
   for (float reach = cells.cell_m;; reach = kPartnerRange_m) {
-    const CellRange range = cells_around(cells, origin, reach);
+    const CellRows range = cells_around(cells, origin, reach);
     const bool is_near = reach < kPartnerRange_m;
     int found = 0;
     for (int y = range.y0; y <= range.y1 && is_near; ++y) found += range.end(cells, y) - range.begin(cells, y);

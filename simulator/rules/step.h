@@ -184,7 +184,7 @@ PICTURA_HD void find_collisions(const WorldView& world, int agent, const ThreadG
   const GridView& cells = world.box_cells;
   const int slot = world.first_slot + agent;
   const float own_reach = radius(own) + kMaxBoxRadius_m + 2.0f * kMaxSpeed_mps * world.options.dt_s;
-  const CellRange range = cells_around(cells, own.center_m.xy(), own_reach);
+  const CellRows range = cells_around(cells, own.center_m.xy(), own_reach);
   bool collides = false, is_at_fault = false;
   for (int y = range.y0; y <= range.y1; ++y) {
     const int32_t end = range.end(cells, y);

@@ -282,33 +282,41 @@ class StillSimulator final : public Simulator {
     scene_.light_states = lights_;
   }
   std::string_view name() const override { return "still"; }
-  MemorySpace space() const override { return space_; }
+  Device device() const override { return device_; }
   const SimulatorConfig& config() const override { return config_; }
-  const std::vector<std::shared_ptr<const RoadMap>>& maps() const override { return maps_; }
+  const CompiledMaps& maps() const override { return maps_; }
+  const std::vector<GeometryHandle>& handles() const override { return handles_; }
   const std::vector<WorldSpec>& worlds() const override { return worlds_; }
   int num_slots() const override { return 4; }
   void reset(Stream) override {}
   StepResult step(Span<const int32_t>, Stream) override { return {}; }
-  void check() override {}
+  StepResult step(Span<const Command>, Stream) override { return {}; }
+  void set_worlds(CompiledMaps, std::vector<GeometryHandle>, std::vector<WorldSpec>, uint64_t, Stream) override {}
+  void reserve(const SimulatorCapacity&) override {}
+  uint64_t generation() const override { return 0; }
   ObservationView observations() override { return {}; }
   const SceneBatch& scene() override { return scene_; }
   Span<const View> views() override { return {}; }
-  std::vector<StaticGeometry> geometries() const override { return {}; }
+  SlotTable slots() const override { return {}; }
+  ControllerInput controller_input() override { return {}; }
   AgentStateView state() override { return state_; }
-  SpawnReport spawn_report() const override { return {}; }
-  const SimulatorTotals& totals() const override { return totals_; }
+  SpawnReport spawn_report(Stream) const override { return {}; }
+  const SimulatorTotals& totals(Stream) const override { return totals_; }
   Span<const int32_t> episode_step() const override { return {}; }
   Span<const int32_t> episode_index() const override { return {}; }
-  uint64_t state_hash() const override { return 0; }
-  std::vector<uint8_t> save() const override { return {}; }
-  void restore(Span<const uint8_t>) override {}
+  uint64_t state_hash(Stream) const override { return 0; }
+  std::vector<uint8_t> save(Stream) const override { return {}; }
+  void restore(Span<const uint8_t>, Stream) override {}
+  std::unique_ptr<StateSnapshot> snapshot(Stream) const override { return nullptr; }
+  void restore(const StateSnapshot&, Stream) override {}
 
-  MemorySpace space_ = MemorySpace::host;
+  Device device_;
 
  private:
   SimulatorConfig config_;
   SimulatorTotals totals_;
-  std::vector<std::shared_ptr<const RoadMap>> maps_;
+  CompiledMaps maps_;
+  std::vector<GeometryHandle> handles_;
   std::vector<WorldSpec> worlds_{{0, 2, 0}, {0, 2, 1}};
   std::vector<AgentBox> agents_;
   std::vector<int32_t> world_begin_, light_begin_;
@@ -342,7 +350,7 @@ TEST(DrawWorld, ShowsTheAgentsOfOneWorldAndFollowsOne) {
   EXPECT_EQ(count(draw_world(painter, simulator, 0), halo), 0);
   EXPECT_THAT(test::message_of([&] { draw_world(painter, simulator, 2); }), HasSubstr("[0, 2), got 2"));
   EXPECT_THAT(test::message_of([&] { draw_world(painter, simulator, 1, 2); }), HasSubstr("below 2, got 2"));
-  simulator.space_ = MemorySpace::cuda;
+  simulator.device_ = {MemorySpace::cuda, 0};
   EXPECT_THAT(test::message_of([&] { draw_world(painter, simulator, 1); }), HasSubstr("host memory"));
 }
 

@@ -140,8 +140,8 @@ TEST(Collision, ARearEndAtSpeedIsTheRammersFaultAlone) {
 
 TEST(Collision, ACyclistAtTheRearCornerIsAtFaultAlone) {
   testing::Stage stage(testing::stadium(200, 2), 2);
-  stage.batch.agents.length_m[0] = 1.7f;
-  stage.batch.agents.width_m[0] = 0.6f;
+  stage.worlds.state.agents.length_m[0] = 1.7f;
+  stage.worlds.state.agents.width_m[0] = 0.6f;
   stage.put(0, {52.05f, 1.2f}, 0, 8);  // front at 53.41, the other's rear at 53.45
   stage.put(1, {54.25f, 0}, 0, 3);
   stage.step();
@@ -165,7 +165,7 @@ struct At20MetresPerSecond : ::testing::Test {
 TEST_F(At20MetresPerSecond, NothingIsPassedUnnoticed) {
   auto map = testing::stadium(200, 1);
   testing::Stage free_road(map, 1), walker(map, 2);
-  walker.batch.agents.length_m[1] = walker.batch.agents.width_m[1] = 0.4f;
+  walker.worlds.state.agents.length_m[1] = walker.worlds.state.agents.width_m[1] = 0.4f;
   map = testing::stadium(200, 1);
   map->building_lines = {{{100, 1, 0}, {100, -1, 0}}};  // across the road; the first piece always stands
   testing::Stage wall(map, 1);
@@ -175,7 +175,7 @@ TEST_F(At20MetresPerSecond, NothingIsPassedUnnoticed) {
   map = testing::stadium(200, 1);
   testing::add_light(map.get(), 100, 4, 1, {0});
   testing::Stage light(map, 1), waypoint(testing::stadium(200, 1), 1);
-  light.batch.lights[0] = LightState::red;
+  light.worlds.state.lights[0] = LightState::red;
   waypoint.set(0, Conditioning::delta_goal_m, 0.5f);
   for (float phase_m = 0; phase_m < 2; phase_m += 0.1f) {
     SCOPED_TRACE(phase_m);
@@ -185,9 +185,9 @@ TEST_F(At20MetresPerSecond, NothingIsPassedUnnoticed) {
     EXPECT_EQ(meets(&wall, phase_m), kEventWall);
     EXPECT_EQ(meets(&edge, phase_m), kEventOffRoad);
     EXPECT_EQ(meets(&light, phase_m), kEventRedLight);
-    waypoint.batch.agents.waypoint_x_m[0] = 100;
-    waypoint.batch.agents.waypoint_y_m[0] = 0.45f;
-    waypoint.batch.agents.next_waypoint[0] = 0;
+    waypoint.worlds.state.agents.waypoint_x_m[0] = 100;
+    waypoint.worlds.state.agents.waypoint_y_m[0] = 0.45f;
+    waypoint.worlds.state.agents.next_waypoint[0] = 0;
     EXPECT_EQ(meets(&waypoint, phase_m), kEventWaypoint);
   }
 }
@@ -211,9 +211,9 @@ TEST(Collision, BothHaltAndOnlyTheRammerIsAtFault) {
   EXPECT_EQ(stage.events(0), kEventCollision | kEventAtFault);
   EXPECT_EQ(stage.events(1), kEventCollision);
   EXPECT_EQ(stage.events(2), kEventNone);
-  EXPECT_EQ(stage.batch.agents.status[0], static_cast<uint8_t>(AgentStatus::halted));
-  EXPECT_EQ(stage.batch.agents.status[1], static_cast<uint8_t>(AgentStatus::halted));
-  EXPECT_EQ(stage.batch.agents.speed_mps[0], 0);
+  EXPECT_EQ(stage.worlds.state.agents.status[0], static_cast<uint8_t>(AgentStatus::halted));
+  EXPECT_EQ(stage.worlds.state.agents.status[1], static_cast<uint8_t>(AgentStatus::halted));
+  EXPECT_EQ(stage.worlds.state.agents.speed_mps[0], 0);
   EXPECT_NEAR(rewards[0], -3, 0.01);
   EXPECT_NEAR(rewards[1], -0.5, 0.01);
   // Halted agents stay in the way and earn nothing more.

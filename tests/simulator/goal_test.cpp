@@ -81,7 +81,7 @@ struct GoalChain : ::testing::Test {
     set_waypoints({60, 90, 120});
   }
   void set_waypoints(std::array<float, 3> x_m) {
-    AgentState& agents = stage.batch.agents;
+    AgentState& agents = stage.worlds.state.agents;
     for (size_t i = 0; i < 3; ++i) {
       agents.waypoint_x_m[i] = x_m[i];
       agents.waypoint_y_m[i] = agents.waypoint_z_m[i] = 0;
@@ -94,7 +94,7 @@ struct GoalChain : ::testing::Test {
   float drive_until(int bit) {
     for (int i = 0; i < 200; ++i) {
       reward = stage.step()[0];
-      if (stage.events(0) & bit) return stage.batch.agents.x_m[0];
+      if (stage.events(0) & bit) return stage.worlds.state.agents.x_m[0];
     }
     return NAN;
   }
@@ -106,19 +106,19 @@ struct GoalChain : ::testing::Test {
 TEST_F(GoalChain, AdvancesAndRenews) {
   EXPECT_NEAR(drive_until(kEventWaypoint), 59, 0.01);
   EXPECT_NEAR(reward, 1, 1e-3);
-  EXPECT_EQ(stage.batch.agents.next_waypoint[0], 1);
+  EXPECT_EQ(stage.worlds.state.agents.next_waypoint[0], 1);
   EXPECT_NEAR(drive_until(kEventWaypoint), 89, 0.01);
-  EXPECT_EQ(stage.batch.agents.goal_x_m[0], 120);
+  EXPECT_EQ(stage.worlds.state.agents.goal_x_m[0], 120);
   EXPECT_NEAR(drive_until(kEventGoal), 119, 0.01);
   EXPECT_NEAR(reward, 1, 1e-3);
   EXPECT_EQ(stage.events(0), kEventGoal | kEventMetricGoal);
-  EXPECT_EQ(stage.batch.agents.goals_reached[0], 1);
-  EXPECT_EQ(stage.batch.agents.waypoints_reached[0], 3);
-  EXPECT_EQ(stage.batch.agents.next_waypoint[0], 0);
+  EXPECT_EQ(stage.worlds.state.agents.goals_reached[0], 1);
+  EXPECT_EQ(stage.worlds.state.agents.waypoints_reached[0], 3);
+  EXPECT_EQ(stage.worlds.state.agents.next_waypoint[0], 0);
   // The new chain starts where the old one ended, at x = 120.
-  EXPECT_GE(stage.batch.agents.waypoint_x_m[0], 140 - 0.01);
-  EXPECT_LE(stage.batch.agents.waypoint_x_m[0], 180 + 0.01);
-  EXPECT_NEAR(stage.batch.agents.waypoint_y_m[0], 0, 1e-4);
+  EXPECT_GE(stage.worlds.state.agents.waypoint_x_m[0], 140 - 0.01);
+  EXPECT_LE(stage.worlds.state.agents.waypoint_x_m[0], 180 + 0.01);
+  EXPECT_NEAR(stage.worlds.state.agents.waypoint_y_m[0], 0, 1e-4);
 }
 
 TEST_F(GoalChain, TheLastWaypointPaysOnlyBelowItsSpeedButAdvances) {
@@ -127,7 +127,7 @@ TEST_F(GoalChain, TheLastWaypointPaysOnlyBelowItsSpeedButAdvances) {
   drive_until(kEventWaypoint);
   EXPECT_NEAR(drive_until(kEventGoal), 119, 0.01);
   EXPECT_NEAR(reward, 0, 1e-3);
-  EXPECT_EQ(stage.batch.agents.goals_reached[0], 1);
+  EXPECT_EQ(stage.worlds.state.agents.goals_reached[0], 1);
 }
 
 TEST_F(GoalChain, AWideRadiusDoesNotHideTheGoalFromTheMetric) {
@@ -135,10 +135,10 @@ TEST_F(GoalChain, AWideRadiusDoesNotHideTheGoalFromTheMetric) {
   drive_until(kEventWaypoint);
   drive_until(kEventWaypoint);
   EXPECT_NEAR(drive_until(kEventGoal), 109, 0.01);  // paid 12 m ahead: the chain is renewed
-  EXPECT_EQ(stage.batch.agents.goals_reached[0], 0);
+  EXPECT_EQ(stage.worlds.state.agents.goals_reached[0], 0);
   EXPECT_NEAR(drive_until(kEventMetricGoal), 119, 0.01);  // counted when it gets there
-  EXPECT_EQ(stage.batch.agents.goals_reached[0], 1);
-  EXPECT_EQ(stage.batch.agents.goal_open[0], 0);
+  EXPECT_EQ(stage.worlds.state.agents.goals_reached[0], 1);
+  EXPECT_EQ(stage.worlds.state.agents.goal_open[0], 0);
 }
 
 TEST_F(GoalChain, TheMetricCountsAChainOnce) {
@@ -148,7 +148,7 @@ TEST_F(GoalChain, TheMetricCountsAChainOnce) {
   drive_until(kEventMetricGoal);
   drive_until(kEventGoal);
   for (int i = 0; i < 5; ++i) stage.step();
-  EXPECT_EQ(stage.batch.agents.goals_reached[0], 1);
+  EXPECT_EQ(stage.worlds.state.agents.goals_reached[0], 1);
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ struct Observation : ::testing::Test {
 };
 
 TEST_F(Observation, Ego) {
-  AgentState& agents = stage.batch.agents;
+  AgentState& agents = stage.worlds.state.agents;
   agents.steer_rad[0] = 0.22f;
   agents.accel_long_mps2[0] = -2;
   agents.accel_lat_mps2[0] = 1;
@@ -69,7 +69,7 @@ TEST(ObservationOfParkedCars, IsThatOfPartnersAtRest) {
   SimulatorConfig config = testing::cars();
   config.parked_cars = 1;
   testing::Stage parking(testing::stadium(200, 2), 2, config);
-  AgentBox& car = parking.batch.boxes[2];
+  AgentBox& car = parking.worlds.state.boxes[2];
   car.center_m = {95, -3.5f, 0.5f};
   car.cos_heading = 0;
   car.sin_heading = 1;
@@ -90,7 +90,7 @@ TEST(ObservationOfParkedCars, IsThatOfPartnersAtRest) {
 }
 
 TEST_F(Observation, AuxiliarySlotsCanBeZero) {
-  stage.batch.options.auxiliary_observations = false;
+  stage.worlds.setup.options.auxiliary_observations = false;
   look();
   const ObservationView out = stage.results.observation_view();
   EXPECT_EQ(out.ego[7], 0);
@@ -100,17 +100,17 @@ TEST_F(Observation, AuxiliarySlotsCanBeZero) {
 }
 
 TEST_F(Observation, ControlsAreStopLinesWithStateAndWhetherTheyHoldTheEgo) {
-  stage.batch.lights[0] = LightState::red;
+  stage.worlds.state.lights[0] = LightState::red;
   look();
   const ObservationView out = stage.results.observation_view();
   ASSERT_EQ(out.set_counts[3], 1);
   const Vec2 left = local(120, 6), right = local(120, -2);
   const float expected[kControlFeatures] = {left.x / 120, left.y / 120, right.x / 120, right.y / 120, 0, 1, 1};
   for (size_t i = 0; i < kControlFeatures; ++i) EXPECT_NEAR(out.controls[i], expected[i], 1e-5) << i;
-  stage.batch.lights[0] = LightState::green;
+  stage.worlds.state.lights[0] = LightState::green;
   look();
   EXPECT_EQ(out.controls[5], -1);
-  stage.batch.lights[0] = LightState::yellow;
+  stage.worlds.state.lights[0] = LightState::yellow;
   look();
   EXPECT_EQ(out.controls[5], 0.5f);
   for (size_t i = kControlFeatures; i < kMaxControls * kControlFeatures; ++i) EXPECT_EQ(out.controls[i], 0);
@@ -123,8 +123,8 @@ float rounded_dot(Vec2 a, Vec2 b) {
 }
 
 TEST_F(Observation, ProductsAreRoundedBeforeTheyAreAdded) {
-  const StopLine& line = stage.batch.map_rules[0].stop_lines[0];
-  const AgentState& agents = stage.batch.agents;
+  const StopLine& line = stage.worlds.setup.maps[0]->rules.stop_lines[0];
+  const AgentState& agents = stage.worlds.state.agents;
   for (int i = 0; i < 100; ++i) {
     const auto k = static_cast<float>(i);
     stage.put(0, {100 + 0.1f * k, 0.01f * k}, 0.03f * k, 8);
@@ -141,7 +141,7 @@ TEST_F(Observation, ProductsAreRoundedBeforeTheyAreAdded) {
 }
 
 TEST_F(Observation, WaypointsStartWithTheActiveOne) {
-  AgentState& agents = stage.batch.agents;
+  AgentState& agents = stage.worlds.state.agents;
   for (size_t i = 0; i < 3; ++i) {
     agents.waypoint_x_m[i] = 110 + 30 * static_cast<float>(i);
     agents.waypoint_y_m[i] = 4 * static_cast<float>(i);
@@ -200,7 +200,7 @@ TEST_F(Observation, EveryCoefficientHasThePapersRange) {
 /// What is listed must be what is in sight: checked against all pieces of the map, from many places and headings.
 TEST_F(Observation, LanesBoundariesAndWallsAreAllThatIsInSight) {
   RandomStream random({.seed = 5, .purpose = Purpose::town});
-  const MapRules& map = stage.batch.map_rules[0];
+  const MapRules& map = stage.worlds.setup.maps[0]->rules;
   for (int i = 0; i < 300; ++i) {
     const float heading = random.uniform(-kPi, kPi);
     const Vec2 at{random.uniform(0, 200), random.uniform(-1, 5)};
@@ -240,7 +240,7 @@ TEST_F(Observation, LanesBoundariesAndWallsAreAllThatIsInSight) {
 }
 
 TEST_F(Observation, PiecesAreAtMostTenMetresLong) {
-  const MapRules& map = stage.batch.map_rules[0];
+  const MapRules& map = stage.worlds.setup.maps[0]->rules;
   const auto total_of = [](const std::vector<ObservedPiece>& pieces) {
     double total = 0;
     for (const ObservedPiece& piece : pieces) {
@@ -279,7 +279,7 @@ TEST_F(Observation, PiecesOfTheStraightRoad) {
 TEST_F(Observation, WallsAreTheirPiecesWithTheirHeights) {
   look();
   const ObservationView out = stage.results.observation_view();
-  const std::vector<WallFace> walls = make_walls(*stage.batch.maps[0], {.wall_seed = 0});
+  const std::vector<WallFace> walls = make_walls(*stage.worlds.setup.maps[0]->road, {.wall_seed = 0});
   ASSERT_GT(walls.size(), 2u);
   ASSERT_EQ(walls[0].a_m.x, 120);
   ASSERT_EQ(walls[0].b_m.x, 108);
@@ -318,7 +318,7 @@ TEST_F(Observation, WallsAreThereOnlyWhereTheyAreAskedFor) {
 }
 
 TEST_F(Observation, HaltedAndAbsentAgentsObserveNothingButTheyAreSeen) {
-  AgentState& agents = stage.batch.agents;
+  AgentState& agents = stage.worlds.state.agents;
   agents.status[1] = static_cast<uint8_t>(AgentStatus::halted);
   agents.events[1] = kEventNone;
   look();

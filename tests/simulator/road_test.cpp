@@ -72,7 +72,7 @@ TEST(Road, OffRoadWhenTheBoxTouchesAnEdge) {
   EXPECT_EQ(stage.events(0), kEventNone);
   EXPECT_EQ(stage.events(1), kEventOffRoad);
   EXPECT_NEAR(rewards[1], -1.5, 0.01);
-  EXPECT_EQ(stage.batch.agents.halt_reason[1], kEventOffRoad);
+  EXPECT_EQ(stage.worlds.state.agents.halt_reason[1], kEventOffRoad);
 }
 
 TEST(Road, OffRoadWhenTheCenterLeavesTheSurface) {
@@ -87,8 +87,8 @@ TEST(Road, WallsHaltAndAreCountedApart) {
   const auto map = testing::stadium(200, 1);
   testing::Stage stage(map, 2);
   const std::vector<WallFace> walls{{{60, -1, 0}, {60, 1, 0}, 3}, {{160, -1, 8}, {160, 1, 8}, 3}};
-  stage.batch.map_rules[0] = make_map_rules(*map, walls);
-  stage.batch.map_views[0] = stage.batch.map_rules[0].view();
+  const MapRules with_walls = make_map_rules(*map, walls);
+  stage.worlds.setup.map_views[0] = with_walls.view();
   stage.set(0, Conditioning::off_road, 2);
   stage.put(0, {56.3f, 0}, 0, 10);   // bumper at 59.5
   stage.put(1, {156.3f, 0}, 0, 10);  // that wall is on a bridge

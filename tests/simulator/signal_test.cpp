@@ -79,7 +79,7 @@ struct RedLight : ::testing::Test {
     stage.put(0, Vec2{x_m, y_m} - forward * 3.2f, heading_rad, speed_mps);
   }
   int step_with(LightState state) {
-    stage.batch.lights[0] = state;
+    stage.worlds.state.lights[0] = state;
     stage.step();
     return stage.events(0);
   }
@@ -90,10 +90,10 @@ struct RedLight : ::testing::Test {
 TEST_F(RedLight, CrossingOnRedIsAnEvent) {
   stage.set(0, Conditioning::stop_line, 0.75f);
   put_bumper(99.5f, 0, 0, 10);
-  stage.batch.lights[0] = LightState::red;
+  stage.worlds.state.lights[0] = LightState::red;
   EXPECT_NEAR(stage.step()[0], -0.75, 0.01);
   EXPECT_EQ(stage.events(0), kEventRedLight);
-  EXPECT_EQ(stage.batch.agents.status[0], static_cast<uint8_t>(AgentStatus::halted));
+  EXPECT_EQ(stage.worlds.state.agents.status[0], static_cast<uint8_t>(AgentStatus::halted));
 }
 
 TEST_F(RedLight, OtherColoursAreNone) {
@@ -134,35 +134,35 @@ TEST_F(RedLight, ChangingIntoTheLanePastTheLineIsAnEvent) {
   // From the free lane, its bumper 3 m past the line, it turns into the held one: associated with it once its rear axle
   // is nearer to that one by more than the hysteresis.
   put_bumper(103, 0.8f, -0.3f, 5);
-  stage.batch.agents.lane[0] = 4;
+  stage.worlds.state.agents.lane[0] = 4;
   EXPECT_EQ(step_with(LightState::red), kEventRedLight);
   put_bumper(103, 0.8f, -0.3f, 5);
-  stage.batch.agents.lane[0] = 4;
+  stage.worlds.state.agents.lane[0] = 4;
   EXPECT_EQ(step_with(LightState::green), kEventNone);
 }
 
 TEST_F(RedLight, ChangingIntoTheLaneBeforeTheLineIsNone) {
   put_bumper(95, 0.8f, -0.3f, 5);
-  stage.batch.agents.lane[0] = 4;
+  stage.worlds.state.agents.lane[0] = 4;
   EXPECT_EQ(step_with(LightState::red), kEventNone);
-  EXPECT_EQ(stage.batch.agents.lane[0], 0);
+  EXPECT_EQ(stage.worlds.state.agents.lane[0], 0);
 }
 
 TEST_F(RedLight, ChangingIntoTheLaneFarPastTheLineIsNone) {
   put_bumper(111, 0.8f, -0.3f, 5);
-  stage.batch.agents.lane[0] = 4;
+  stage.worlds.state.agents.lane[0] = 4;
   EXPECT_EQ(step_with(LightState::red), kEventNone);
-  EXPECT_EQ(stage.batch.agents.lane[0], 0);
+  EXPECT_EQ(stage.worlds.state.agents.lane[0], 0);
 }
 
 TEST_F(RedLight, TurningRightIntoTheHeldLaneIsNone) {
   // From the left across the road into the held lane, past the line: still 60 degrees off its direction.
   put_bumper(103, 0.3f, -1.05f, 5);
-  stage.batch.agents.lane[0] = 4;
+  stage.worlds.state.agents.lane[0] = 4;
   EXPECT_EQ(step_with(LightState::red), kEventNone);
   // And before the line, well aligned.
   put_bumper(97, 0.3f, -0.5f, 3);
-  stage.batch.agents.lane[0] = 4;
+  stage.worlds.state.agents.lane[0] = 4;
   EXPECT_EQ(step_with(LightState::red), kEventNone);
 }
 
@@ -195,16 +195,16 @@ TEST(RedLightSection, DrivingOnToTheNextLaneIsNone) {
   for (const bool is_endless : {true, false}) {
     testing::Stage stage(short_section(is_endless), 1);
     stage.put(0, {99.8f, 0}, 0, 10);  // its bumper is a metre past the line: it crossed on yellow
-    ASSERT_EQ(stage.batch.agents.lane[0], 0);
-    stage.batch.lights[0] = LightState::red;
+    ASSERT_EQ(stage.worlds.state.agents.lane[0], 0);
+    stage.worlds.state.lights[0] = LightState::red;
     stage.step();
-    EXPECT_EQ(stage.batch.agents.lane[0], 4);
+    EXPECT_EQ(stage.worlds.state.agents.lane[0], 4);
     EXPECT_EQ(stage.events(0), kEventNone);
     // So fast that the short lane is left out.
     stage.put(0, {100.2f, 0}, 0, 20);
-    stage.batch.agents.lane[0] = 0;
+    stage.worlds.state.agents.lane[0] = 0;
     stage.step();
-    EXPECT_EQ(stage.batch.agents.lane[0], 5);
+    EXPECT_EQ(stage.worlds.state.agents.lane[0], 5);
     EXPECT_EQ(stage.events(0), kEventNone);
     // But the bumper's crossing is an event whatever the lanes.
     stage.put(0, {98.3f, 0}, 0, 10);
@@ -232,7 +232,7 @@ TEST_F(RedLight, AnotherLevelIsNone) {
   map->lights[0].stop_a_m.z = map->lights[0].stop_b_m.z = 6;
   testing::Stage bridge(map, 1);
   bridge.put(0, {96.3f, 0}, 0, 10);
-  bridge.batch.lights[0] = LightState::red;
+  bridge.worlds.state.lights[0] = LightState::red;
   bridge.step();
   EXPECT_EQ(bridge.events(0), kEventNone);
 }

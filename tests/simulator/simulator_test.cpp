@@ -67,7 +67,7 @@ TEST(Simulator, RefusesWhatCannotBeAskedFor) {
   EXPECT_THROW(make({}, map, {{1, 1, 0}}), UsageError);
   EXPECT_THROW(make({}, map, {}), UsageError);
   EXPECT_THROW(make({}, nullptr, {{0, 1, 0}}), UsageError);
-  EXPECT_THROW(make_simulator("cpu", {}, {}, {{0, 1, 0}}), UsageError);
+  EXPECT_THROW(make_simulator("cpu", {}, CompiledMaps{}, {{0, 1, 0}}), UsageError);
   EXPECT_THROW(make({.dt_s = 0}, map, {{0, 1, 0}}), UsageError);
   EXPECT_THROW(make({.dt_s = NAN}, map, {{0, 1, 0}}), UsageError);
   EXPECT_THROW(make({.dt_s = 0.11f}, map, {{0, 1, 0}}), UsageError);  // cars would jump over what is in their way
@@ -322,13 +322,119 @@ TEST(Simulator, SaveAndRestoreContinueIdentically) {
   run(copy.get(), 100, 100);
   equal();
 
-  EXPECT_THROW(copy->restore({}), Error);
+  EXPECT_THROW(copy->restore(std::vector<uint8_t>{}), Error);
   EXPECT_THROW(copy->restore(Span<const uint8_t>(bytes).subspan(0, bytes.size() - 1)), Error);
   std::vector<uint8_t> broken = bytes;
   broken[0] ^= 1;
   EXPECT_THROW(copy->restore(broken), Error);
   EXPECT_THROW(make(testing::cars({.seed = 5, .episode_steps = 70}), map, worlds)->restore(bytes), Error);
   equal();
+}
+
+/// The same bits in all that users see.
+void expect_equal(Simulator* a, Simulator* b) {
+  EXPECT_EQ(a->save(), b->save());
+  EXPECT_EQ(testing::first_difference(a->observations(), b->observations()), "");
+  EXPECT_TRUE(testing::same_bits(a->views(), b->views()));
+  EXPECT_TRUE(testing::same_bits(a->scene().agents, b->scene().agents));
+  EXPECT_TRUE(testing::same_bits(a->scene().world_begin, b->scene().world_begin));
+  EXPECT_TRUE(testing::same_bits(a->slots().world_of_slot, b->slots().world_of_slot));
+  EXPECT_TRUE(testing::same_bits(a->slots().agent_of_slot, b->slots().agent_of_slot));
+}
+
+TEST(Simulator, OtherWorldsAreThoseOfANewSimulator) {
+  SimulatorConfig config{.episode_steps = 25, .parked_cars = 5};
+  const CompiledMaps maps =
+      compile_maps({testing::stadium(200, 2), testing::ring_road(40), load_map("procedural:1")}, map_options(config));
+  const auto simulator = make_simulator("cpu", config, maps, draw_worlds(2, 120, 1, 40, 3));
+  run(simulator.get(), 30);
+  const auto expect_fresh = [&](const CompiledMaps& other_maps, const std::vector<WorldSpec>& worlds, uint64_t seed) {
+    simulator->set_worlds(other_maps, {}, worlds, seed);
+    config.seed = seed;
+    const auto fresh = make_simulator("cpu", config, other_maps, worlds);
+    for (const uint32_t first_step : {0u, 30u}) {
+      expect_equal(simulator.get(), fresh.get());
+      EXPECT_EQ(simulator->totals().slot_steps, fresh->totals().slot_steps);
+      run(simulator.get(), 30, first_step);
+      run(fresh.get(), 30, first_step);
+    }
+    expect_equal(simulator.get(), fresh.get());
+  };
+  const AgentBox* const boxes = simulator->scene().agents.data();
+  const float* const lanes = simulator->observations().lanes.data();
+  expect_fresh({maps[1]}, {{0, 7, 3}, {0, 60, 1}}, 5);
+  expect_fresh({maps[2], maps[0]}, {{1, 50, 3}, {0, 60, 1}}, 0);
+  EXPECT_EQ(simulator->generation(), 0);
+  EXPECT_EQ(simulator->scene().agents.data(), boxes);
+  EXPECT_EQ(simulator->observations().lanes.data(), lanes);
+  expect_fresh({maps[2]}, {{0, 300, 1}}, 0);
+  EXPECT_EQ(simulator->generation(), 1);
+}
+
+TEST(Simulator, AddressesLastWithinWhatIsReserved) {
+  const SimulatorConfig config = testing::cars();
+  const CompiledMaps maps = compile_maps({testing::stadium(200, 2)}, map_options(config));
+  const auto simulator = make_simulator("cpu", config, maps, {{0, 10, 0}});
+  const std::vector<WorldSpec> few{{0, 3, 0}}, many{{0, 100, 0}, {0, 40, 1}};
+  run(simulator.get(), 5);
+  const std::vector<uint8_t> before = simulator->save();
+  simulator->reserve(capacity_of(maps, many));
+  EXPECT_EQ(simulator->save(), before);
+  const uint64_t generation = simulator->generation();
+  const float* const x_m = simulator->state().x_m;
+  const View* const views = simulator->views().data();
+  const int32_t* const world_begin = simulator->scene().world_begin.data();
+  for (const auto& worlds : {many, few, many}) {
+    simulator->set_worlds(maps, {}, worlds, 1);
+    run(simulator.get(), 5);
+    EXPECT_EQ(simulator->state().x_m, x_m);
+    EXPECT_EQ(simulator->views().data(), views);
+    EXPECT_EQ(simulator->scene().world_begin.data(), world_begin);
+  }
+  EXPECT_EQ(simulator->generation(), generation);
+}
+
+TEST(Simulator, MapsAreSharedAndNamedByHandles) {
+  const SimulatorConfig config = testing::cars();
+  const CompiledMaps maps = compile_maps({testing::stadium(200, 2), testing::ring_road(40)}, map_options(config));
+  const auto a = make_simulator("cpu", config, maps, {{0, 2, 0}, {1, 2, 1}});
+  const auto b = make_simulator("cpu", config, maps, {{1, 2, 0}});
+  EXPECT_EQ(a->maps()[1], b->maps()[1]);
+  EXPECT_EQ(a->scene().geometry[1], 1);
+  a->set_worlds(maps, {40, 7}, {{0, 2, 0}, {1, 2, 1}, {0, 1, 2}}, 0);
+  const Span<const GeometryHandle> geometry = a->scene().geometry;
+  EXPECT_EQ(std::vector<GeometryHandle>(geometry.begin(), geometry.end()), (std::vector<GeometryHandle>{40, 7, 40}));
+  const auto refusal = [&](const CompiledMaps& other, std::vector<GeometryHandle> handles) {
+    const std::vector<uint8_t> before = a->save();
+    const std::string message =
+        test::message_of<UsageError>([&] { a->set_worlds(other, std::move(handles), {{0, 2, 0}}, 0); });
+    EXPECT_EQ(a->save(), before);
+    return message;
+  };
+  using ::testing::HasSubstr;
+  EXPECT_THAT(refusal(maps, {1}), HasSubstr("expected a handle for each of 2 maps, got 1"));
+  EXPECT_THAT(refusal(maps, {1, -1}), HasSubstr("expected handles in [0, 65536), got -1"));
+  EXPECT_THAT(refusal({nullptr}, {}), HasSubstr("got a null pointer"));
+  EXPECT_THAT(refusal({compile_map(testing::ring_road(40), {.walls = !config.walls})}, {}),
+              HasSubstr("map ring: expected one compiled with walls"));
+}
+
+TEST(Simulator, ASnapshotIsTheStateThatWas) {
+  const SimulatorConfig config = testing::cars({.episode_steps = 20});
+  const auto simulator = make(config, testing::stadium(200, 2), draw_worlds(2, 60, 1, 40, 1));
+  run(simulator.get(), 35);
+  const auto snapshot = simulator->snapshot();
+  const std::vector<uint8_t> bytes = simulator->save();
+  run(simulator.get(), 30, 35);
+  const std::vector<uint8_t> later = simulator->save();
+  simulator->restore(*snapshot);
+  EXPECT_EQ(simulator->save(), bytes);
+  run(simulator.get(), 30, 35);
+  EXPECT_EQ(simulator->save(), later);
+  const auto other = make(config, testing::stadium(200, 2), draw_worlds(2, 60, 1, 40, 1));
+  EXPECT_THROW(other->restore(*snapshot), Error);
+  simulator->set_worlds(simulator->maps(), {}, simulator->worlds(), 0);
+  EXPECT_THROW(simulator->restore(*snapshot), Error);
 }
 
 TEST(Simulator, RestoreSaysWhatDiffers) {

@@ -3,25 +3,26 @@
 namespace pictura::testing {
 
 Stage::Stage(std::shared_ptr<const RoadMap> map, int num_agents, const SimulatorConfig& config)
-    : batch(config, {std::move(map)}, {WorldSpec{0, num_agents, 0}}), results(static_cast<size_t>(num_agents), config) {
+    : worlds(SimulatorSetup(config, {compile_map(std::move(map), map_options(config))}, {}, {{0, num_agents, 0}})),
+      results(static_cast<size_t>(num_agents), config) {
   for (int agent = 0; agent < num_agents; ++agent) {
     const auto i = static_cast<size_t>(agent);
-    batch.agents.length_m[i] = 4;
-    batch.agents.width_m[i] = 2;
-    batch.agents.height_m[i] = 1.5f;
+    worlds.state.agents.length_m[i] = 4;
+    worlds.state.agents.width_m[i] = 2;
+    worlds.state.agents.height_m[i] = 1.5f;
     for (int c = 0; c < kNumConditioning; ++c) {
       set(agent, static_cast<Conditioning>(c), c < kNumRewardConditioning ? kPaperConditioning[c].low : 1.0f);
     }
-    batch.boxes[i] = batch.boxes_before[i] = box_of(batch.agents.view(), agent);
+    worlds.state.boxes[i] = worlds.state.boxes_before[i] = box_of(worlds.state.agents.view(), agent);
     // Out of everybody's way until a test sets other ones.
-    for (size_t k = 0; k < kNumWaypoints; ++k) batch.agents.waypoint_x_m[i * kNumWaypoints + k] = 1e6f;
+    for (size_t k = 0; k < kNumWaypoints; ++k) worlds.state.agents.waypoint_x_m[i * kNumWaypoints + k] = 1e6f;
   }
-  for (LightState& light : batch.lights) light = LightState::green;
+  for (LightState& light : worlds.state.lights) light = LightState::green;
   sort_boxes();
 }
 
 void Stage::set(int agent, Conditioning which, float value) {
-  batch.agents.conditioning[static_cast<size_t>(agent * kNumConditioning + static_cast<int>(which))] = value;
+  worlds.state.agents.conditioning[static_cast<size_t>(agent * kNumConditioning + static_cast<int>(which))] = value;
 }
 
 void Stage::put(int agent, Vec2 position_m, float heading_rad, float speed_mps) {
@@ -40,15 +41,15 @@ void Stage::put(int agent, Vec2 position_m, float heading_rad, float speed_mps) 
 
 void Stage::sort_boxes() {
   // Everybody into one list per cell, by brute force.
-  CellLists& cells = batch.box_cells[0];
+  CellLists& cells = worlds.box_cells[0];
   const GridView view = cells.view();
   cells.items.clear();
   for (int cell = 0; cell < cells.num_x * cells.num_y; ++cell) {
     cells.begin[static_cast<size_t>(cell)] = static_cast<int32_t>(cells.items.size());
-    for (size_t i = 0; i < batch.boxes.size(); ++i) {
-      const Vec3 at = batch.boxes[i].center_m;
-      if (batch.boxes[i].drawn && view.cell_y(at.y) * cells.num_x + view.cell_x(at.x) == cell) {
-        batch.cell_centers[cells.items.size()] = at.xy();
+    for (size_t i = 0; i < worlds.state.boxes.size(); ++i) {
+      const Vec3 at = worlds.state.boxes[i].center_m;
+      if (worlds.state.boxes[i].drawn && view.cell_y(at.y) * cells.num_x + view.cell_x(at.x) == cell) {
+        worlds.cell_centers[cells.items.size()] = at.xy();
         cells.items.push_back(static_cast<int32_t>(i));
       }
     }

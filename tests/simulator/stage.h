@@ -3,10 +3,10 @@
 
 #include <memory>
 
+#include "pictura/simulator/host_worlds.h"
 #include "pictura/simulator/rules/observe.h"
 #include "pictura/simulator/rules/spawn.h"
 #include "pictura/simulator/rules/step.h"
-#include "pictura/simulator/world_batch.h"
 #include "pictura/tests/simulator/test_maps.h"
 
 namespace pictura::testing {
@@ -24,10 +24,10 @@ class Stage {
   void set(int agent, Conditioning which, float value);
   /// The same action for everybody. Returns the rewards.
   std::vector<float> step(int32_t action = kCoast);
-  int events(int agent) const { return batch.agents.events[static_cast<size_t>(agent)]; }
-  WorldView world() { return batch.world(0); }
+  int events(int agent) const { return worlds.state.agents.events[static_cast<size_t>(agent)]; }
+  WorldView world() { return worlds.world(0); }
 
-  WorldBatch batch;
+  HostWorlds worlds;
   HostResults results;
 
  private:

@@ -8,10 +8,10 @@
 #include "pictura/map/lane_graph.h"
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/controllers/goal_places.h"
+#include "pictura/simulator/host_worlds.h"
 #include "pictura/simulator/rules/observe.h"
 #include "pictura/simulator/rules/spawn.h"
 #include "pictura/simulator/simulator.h"
-#include "pictura/simulator/world_batch.h"
 #include "pictura/tests/simulator/test_maps.h"
 
 namespace pictura {
@@ -21,6 +21,14 @@ SimulatorConfig whole_world() {
   SimulatorConfig config;
   config.vector_observations = false;
   return config;
+}
+
+/// A world at the start of its first episode, as the rules see it.
+std::unique_ptr<HostWorlds> first_step(const SimulatorConfig& config, std::shared_ptr<const RoadMap> map, int agents) {
+  const auto simulator = make_simulator("cpu", config, {std::move(map)}, {{0, agents, 0}});
+  auto worlds = std::make_unique<HostWorlds>(SimulatorSetup(config, simulator->maps(), {}, simulator->worlds()));
+  worlds->state.restore(worlds->setup, simulator->save());
+  return worlds;
 }
 
 /// The eight CARLA towns where they are, and procedural ones everywhere.
@@ -69,8 +77,8 @@ std::vector<Vec2> points_of(const AgentBox& box) {
 TEST(Towns, ParkedCarsLeaveTheLanesFree) {
   for (const std::string& town : all_towns()) {
     SCOPED_TRACE(town);
-    WorldBatch batch(whole_world(), {load_map(town)}, {{0, 1, 0}});
-    const WorldView view = batch.world(0);
+    const auto worlds = first_step(whole_world(), load_map(town), 1);
+    const WorldView view = worlds->world(0);
     int placed = 0;
     for (int car = 0; car < 32; ++car) {
       for (int i = 0; i < kSpawnTries && !view.map.parking_spots.empty(); ++i) {
@@ -100,9 +108,8 @@ TEST(Towns, EveryGoalCanBeReached) {
   for (const std::string& town : all_towns()) {
     SCOPED_TRACE(town);
     const auto map = load_map(town);
-    WorldBatch batch(whole_world(), {map}, {{0, 150, 0}});
-    batch.restore(make_simulator("cpu", whole_world(), {map}, {{0, 150, 0}})->save());
-    const WorldView world = batch.world(0);
+    const auto worlds = first_step(whole_world(), map, 150);
+    const WorldView world = worlds->world(0);
     // What is drawn again is what the agents were given.
     for (int agent = 0; agent < 150; ++agent) {
       if (!is_active(world, agent)) continue;
@@ -130,9 +137,8 @@ TEST(Towns, GoalsBeyondAWallCannotBeReached) {
   SimulatorConfig config = testing::cars();
   config.pedestrian_fraction = 1;
   const auto unreachable = [&] {
-    WorldBatch batch(config, {map}, {{0, 20, 0}});
-    batch.restore(make_simulator("cpu", config, {map}, {{0, 20, 0}})->save());
-    const auto [on_roads, on_walkways] = follow_goals(batch.world(0), LaneGraph(*map), 4);
+    const auto worlds = first_step(config, map, 20);
+    const auto [on_roads, on_walkways] = follow_goals(worlds->world(0), LaneGraph(*map), 4);
     EXPECT_EQ(on_roads.waypoints, 0);
     EXPECT_GT(on_walkways.waypoints, 100);
     return on_walkways.unreachable;

@@ -133,17 +133,17 @@ TEST(Pedestrians, StandAndAimOnWalkwaysAndAreToldOfGoalsAndCollisionsAlone) {
     draw_agent(world, agent);
     place_agent(world, agent, 0);
     const auto i = static_cast<size_t>(agent);
-    EXPECT_EQ(stage.batch.agents.agent_class[i], static_cast<uint8_t>(AgentClass::pedestrian));
+    EXPECT_EQ(stage.worlds.state.agents.agent_class[i], static_cast<uint8_t>(AgentClass::pedestrian));
     const auto on_walk = [&](float x, float y) {
       return std::fabs(std::fabs(y) - 5) < 1e-3f || std::fabs(x - 50) < 1e-3f;
     };
-    EXPECT_TRUE(on_walk(stage.batch.agents.x_m[i], stage.batch.agents.y_m[i]));
-    on_crosswalk += std::fabs(stage.batch.agents.y_m[i]) < 4.9f;
+    EXPECT_TRUE(on_walk(stage.worlds.state.agents.x_m[i], stage.worlds.state.agents.y_m[i]));
+    on_crosswalk += std::fabs(stage.worlds.state.agents.y_m[i]) < 4.9f;
     for (size_t k = 0; k < kNumWaypoints; ++k) {
-      EXPECT_TRUE(on_walk(stage.batch.agents.waypoint_x_m[i * kNumWaypoints + k],
-                          stage.batch.agents.waypoint_y_m[i * kNumWaypoints + k]));
+      EXPECT_TRUE(on_walk(stage.worlds.state.agents.waypoint_x_m[i * kNumWaypoints + k],
+                          stage.worlds.state.agents.waypoint_y_m[i * kNumWaypoints + k]));
     }
-    const float* conditioning = &stage.batch.agents.conditioning[i * kNumConditioning];
+    const float* conditioning = &stage.worlds.state.agents.conditioning[i * kNumConditioning];
     for (int c = 0; c < kNumRewardConditioning; ++c) {
       const auto which = static_cast<Conditioning>(c);
       const bool counts =
@@ -161,9 +161,9 @@ TEST(Pedestrians, MayStandOnTheRoadAndPassRedLights) {
   auto map = street();
   testing::add_light(map.get(), 100, 4, 2, {0});
   testing::Stage stage(map, 1);
-  stage.batch.agents.agent_class[0] = static_cast<uint8_t>(AgentClass::pedestrian);
-  stage.batch.agents.length_m[0] = stage.batch.agents.width_m[0] = 0.5f;
-  stage.batch.lights[0] = LightState::red;
+  stage.worlds.state.agents.agent_class[0] = static_cast<uint8_t>(AgentClass::pedestrian);
+  stage.worlds.state.agents.length_m[0] = stage.worlds.state.agents.width_m[0] = 0.5f;
+  stage.worlds.state.lights[0] = LightState::red;
   // Along the road over the line, then off the road: a car would halt at either.
   stage.put(0, {99.9f, 0}, 0, 2);
   stage.step();
@@ -171,7 +171,7 @@ TEST(Pedestrians, MayStandOnTheRoadAndPassRedLights) {
   stage.put(0, {80, 2.05f}, kHalfPi, 2);
   stage.step();
   EXPECT_EQ(stage.events(0), kEventNone);
-  stage.batch.agents.agent_class[0] = static_cast<uint8_t>(AgentClass::vehicle);
+  stage.worlds.state.agents.agent_class[0] = static_cast<uint8_t>(AgentClass::vehicle);
   stage.put(0, {80, 2.05f}, kHalfPi, 2);
   stage.step();
   EXPECT_EQ(stage.events(0), kEventOffRoad);

@@ -94,8 +94,9 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
   const std::unique_ptr<Driver> driver = load_driver(options.checkpoint, options.num_threads);
   SimulatorConfig simulator_config = evaluation_simulator_config(checkpoint.config, options.steps);
   simulator_config.seed = options.seed;
-  std::vector<std::shared_ptr<const RoadMap>> maps;
-  for (const std::string& name : options.maps) maps.push_back(load_map(name));
+  std::vector<std::shared_ptr<const RoadMap>> roads;
+  for (const std::string& name : options.maps) roads.push_back(load_map(name));
+  const CompiledMaps maps = compile_maps(roads, map_options(simulator_config), options.num_threads);
 
   std::vector<DensityOf> densities;
   if (options.agents_per_world > 0)

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/common/cuda/device_buffer.h"
 #include "pictura/common/error.h"
@@ -251,6 +252,90 @@ TEST_F(CudaSimulatorTest, AGraphReplaysSteps) {
   }
   expect_same_view(cpu.get(), cuda.get(), 200);
   EXPECT_GT(cuda->totals().episodes, 0) << "resets are part of the graph";
+  PICTURA_CUDA(cudaGraphExecDestroy(executable));
+  PICTURA_CUDA(cudaGraphDestroy(graph));
+  PICTURA_CUDA(cudaStreamDestroy(stream));
+}
+
+TEST_F(CudaSimulatorTest, OtherWorldsAreThoseOfANewSimulatorAndAllocateNothing) {
+  const SimulatorConfig config{.episode_steps = 25, .parked_cars = 5};
+  const CompiledMaps maps =
+      compile_maps({load_map("procedural:1"), load_map("procedural:2"), load_map("procedural:3")}, map_options(config));
+  const std::vector<WorldSpec> many = draw_worlds(2, 400, 1, 120, 3);
+  const auto cuda = make_simulator("cuda", config, maps, {{0, 10, 0}});
+  run_same(make_simulator("cpu", config, maps, {{0, 10, 0}}).get(), cuda.get(), 10, 10);
+  const std::vector<uint8_t> before = cuda->save();
+  cuda->reserve(capacity_of(maps, many));
+  EXPECT_EQ(cuda->save(), before);
+  const uint64_t generation = cuda->generation();
+  const AgentBox* const boxes = cuda->scene().agents.data();
+  size_t free_bytes = 0, total_bytes = 0, free_after_bytes = 0;
+  PICTURA_CUDA(cudaMemGetInfo(&free_bytes, &total_bytes));
+  const std::vector<std::pair<CompiledMaps, std::vector<WorldSpec>>> batches{
+      {maps, many}, {{maps[1]}, {{0, 30, 7}}}, {{maps[2], maps[0]}, {{1, 30, 7}, {0, 120, 8}}}, {maps, many}};
+  for (uint64_t seed = 0; seed < batches.size(); ++seed) {
+    const auto& [its_maps, worlds] = batches[seed];
+    cuda->set_worlds(its_maps, {}, worlds, seed);
+    SimulatorConfig same = config;
+    same.seed = seed;
+    run_same(make_simulator("cpu", same, its_maps, worlds).get(), cuda.get(), 60, 20);
+  }
+  PICTURA_CUDA(cudaMemGetInfo(&free_after_bytes, &total_bytes));
+  EXPECT_EQ(free_after_bytes, free_bytes);
+  EXPECT_EQ(cuda->generation(), generation);
+  EXPECT_EQ(cuda->scene().agents.data(), boxes);
+}
+
+TEST_F(CudaSimulatorTest, ASnapshotIsTheStateThatWas) {
+  SimulatorConfig config = whole_world();
+  config.episode_steps = 30;
+  const Maps maps{load_map("procedural:1")};
+  const std::vector<WorldSpec> worlds = draw_worlds(3, 300, 1, 60, 1);
+  const auto cpu = make_simulator("cpu", config, maps, worlds);
+  const auto cuda = make_simulator("cuda", config, maps, worlds);
+  run_same(cpu.get(), cuda.get(), 40, 40);
+  const auto on_host = cpu->snapshot(), on_device = cuda->snapshot();
+  run_same(cpu.get(), cuda.get(), 40, 40, 40);
+  cpu->restore(*on_host);
+  cuda->restore(*on_device);
+  run_same(cpu.get(), cuda.get(), 60, 20, 40);
+  EXPECT_THROW(cuda->restore(*on_host), Error);
+}
+
+TEST_F(CudaSimulatorTest, TakesCommandsAndControllersInAGraph) {
+  SimulatorConfig config = whole_world();
+  config.episode_steps = 50;
+  const Maps maps{load_map("procedural:1")};
+  const std::vector<WorldSpec> worlds = draw_worlds(3, 300, 1, 60, 1);
+  const auto cpu = make_simulator("cpu", config, maps, worlds);
+  const auto cuda = make_simulator("cuda", config, maps, worlds);
+  for (uint32_t step = 0; step < 100; ++step) {
+    const std::vector<Command> commands = testing::mixed_commands(cpu->state(), 300, step);
+    const DeviceBuffer<Command> on_device{Span<const Command>(commands)};
+    cpu->step(commands);
+    cuda->step(on_device.span());
+    cuda->check();
+  }
+  expect_same_view(cpu.get(), cuda.get(), 100);
+  const auto cpu_controller = make_controller("random", *cpu, 5), cuda_controller = make_controller("random", *cuda, 5);
+  std::vector<Command> host_commands(300);
+  DeviceBuffer<Command> commands(300);
+  cudaStream_t stream = nullptr;
+  PICTURA_CUDA(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
+  cudaGraph_t graph = nullptr;
+  PICTURA_CUDA(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal));
+  cuda_controller->act(cuda->controller_input(), {}, {commands.data(), 300}, {stream});
+  cuda->step(commands.span(), {stream});
+  PICTURA_CUDA(cudaStreamEndCapture(stream, &graph));
+  cudaGraphExec_t executable = nullptr;
+  PICTURA_CUDA(cudaGraphInstantiate(&executable, graph, 0));
+  for (int step = 0; step < 100; ++step) {
+    PICTURA_CUDA(cudaGraphLaunch(executable, stream));
+    cpu_controller->act(cpu->controller_input(), {}, host_commands);
+    cpu->step(host_commands);
+  }
+  cuda->check({stream});
+  expect_same_view(cpu.get(), cuda.get(), 200);
   PICTURA_CUDA(cudaGraphExecDestroy(executable));
   PICTURA_CUDA(cudaGraphDestroy(graph));
   PICTURA_CUDA(cudaStreamDestroy(stream));

@@ -19,10 +19,11 @@ void expect_same(const SimulatorConfig& config, const std::vector<std::shared_pt
   const auto cpu = make_simulator("cpu", config, maps, worlds);
   testing::ShuffledExecutor other(config, maps, worlds, shuffle_seed);
   for (int step = 0; step <= steps; ++step) {
-    ASSERT_EQ(cpu->state_hash(), other.batch.state_hash()) << "step " << step;
+    ASSERT_EQ(cpu->state_hash(), other.hash()) << "step " << step;
     ASSERT_EQ(testing::first_difference(cpu->observations(), other.results.observation_view()), "") << "step " << step;
     ASSERT_TRUE(testing::same_bits(cpu->views(), Span<const View>(other.results.views))) << "step " << step;
-    ASSERT_TRUE(testing::same_bits(cpu->scene().agents, Span<const AgentBox>(other.batch.boxes))) << "step " << step;
+    ASSERT_TRUE(testing::same_bits(cpu->scene().agents, Span<const AgentBox>(other.host.state.boxes)))
+        << "step " << step;
     if (step == steps) break;
     const auto step_both = [&](const auto& commands) {
       other.step(commands);
@@ -36,7 +37,7 @@ void expect_same(const SimulatorConfig& config, const std::vector<std::shared_pt
     ASSERT_TRUE(testing::same_bits(result.truncated, Span<const uint8_t>(other.results.truncated)));
     ASSERT_TRUE(testing::same_bits(result.valid, Span<const uint8_t>(other.results.valid)));
   }
-  EXPECT_EQ(cpu->save(), other.batch.save());
+  EXPECT_EQ(cpu->save(), other.save());
   EXPECT_EQ(other.rejected(), kNothingRejected);
 }
 
@@ -73,34 +74,34 @@ TEST(Phases, RefuseAnActionOutOfRangeAndChangeNothing) {
   testing::ShuffledExecutor executor(testing::cars(), {map}, {{0, 30, 0}, {0, 10, 1}}, 4);
   std::vector<int32_t> actions = testing::mixed_actions(40, 0);
   executor.step(actions);
-  const std::vector<uint8_t> before = executor.batch.save();
+  const std::vector<uint8_t> before = executor.save();
   actions[31] = kNumActions;
   actions[35] = -1;
   executor.step(actions);
-  EXPECT_EQ(executor.batch.save(), before);
+  EXPECT_EQ(executor.save(), before);
   EXPECT_EQ(executor.rejected(), rejected_command(31, kNumActions));
   actions[31] = 0;
   executor.step(actions);
-  EXPECT_EQ(executor.batch.save(), before);
+  EXPECT_EQ(executor.save(), before);
   EXPECT_EQ(executor.rejected(), rejected_command(31, kNumActions)) << "the first one stands";
   actions[35] = 0;
   executor.step(actions);
-  EXPECT_NE(executor.batch.save(), before);
+  EXPECT_NE(executor.save(), before);
 }
 
 TEST(Phases, RefuseACommandOutOfRangeAndChangeNothing) {
   testing::ShuffledExecutor executor(testing::cars(), {testing::stadium(200, 2)}, {{0, 30, 0}, {0, 10, 1}}, 4);
   std::vector<Command> commands(40);
-  const std::vector<uint8_t> before = executor.batch.save();
+  const std::vector<uint8_t> before = executor.save();
   commands[31].kind = CommandKind::kinematic_state;
   commands[31].speed_mps = NAN;
   executor.step(commands);
-  EXPECT_EQ(executor.batch.save(), before);
+  EXPECT_EQ(executor.save(), before);
   EXPECT_EQ(executor.rejected(), rejected_command(31, commands[31]));
   EXPECT_THAT(rejection_text(executor.rejected()), ::testing::HasSubstr("slot 31: expected a kinematic state"));
   commands[31].speed_mps = 0;
   executor.step(commands);
-  EXPECT_NE(executor.batch.save(), before);
+  EXPECT_NE(executor.save(), before);
 }
 
 TEST(Phases, CarlaTowns) {

@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "pictura/backend_cuda/simulator/phases.h"
-#include "pictura/simulator/world_batch.h"
+#include "pictura/simulator/host_worlds.h"
 
 namespace pictura::testing {
 
@@ -99,33 +99,33 @@ struct ShuffledLaunch {
 /// Steps worlds by the phases, from episode 0.
 class ShuffledExecutor {
  public:
-  ShuffledExecutor(const SimulatorConfig& config, std::vector<std::shared_ptr<const RoadMap>> maps,
+  ShuffledExecutor(const SimulatorConfig& config, const std::vector<std::shared_ptr<const RoadMap>>& maps,
                    std::vector<WorldSpec> worlds, unsigned shuffle_seed)
-      : batch(config, std::move(maps), std::move(worlds)),
-        results(static_cast<size_t>(batch.num_slots()), config),
+      : host(SimulatorSetup(config, compile_maps(maps, map_options(config)), {}, std::move(worlds))),
+        results(static_cast<size_t>(host.setup.num_slots()), config),
         random_(shuffle_seed),
-        next_agents_(static_cast<size_t>(batch.num_slots())),
-        next_boxes_(batch.boxes.size()),
-        next_light_plans_(batch.light_plans.size()),
-        next_lights_(batch.lights.size()),
-        next_spawned_(batch.worlds.size()),
-        cell_items_(batch.boxes.size()),
-        try_boxes_(batch.boxes.size() * kSpawnTries),
-        free_tries_(batch.boxes.size()),
-        known_tries_(batch.boxes.size()),
-        chosen_try_(batch.boxes.size()),
-        next_try_(batch.boxes.size()),
-        step_m_(static_cast<size_t>(batch.num_slots())),
-        began_(batch.worlds.size()),
-        prepares_(batch.worlds.size()) {
+        next_agents_(static_cast<size_t>(host.setup.num_slots())),
+        next_boxes_(host.state.boxes.size()),
+        next_light_plans_(host.state.light_plans.size()),
+        next_lights_(host.state.lights.size()),
+        next_spawned_(host.setup.worlds.size()),
+        cell_items_(host.state.boxes.size()),
+        try_boxes_(host.state.boxes.size() * kSpawnTries),
+        free_tries_(host.state.boxes.size()),
+        known_tries_(host.state.boxes.size()),
+        chosen_try_(host.state.boxes.size()),
+        next_try_(host.state.boxes.size()),
+        step_m_(static_cast<size_t>(host.setup.num_slots())),
+        began_(host.setup.worlds.size()),
+        prepares_(host.setup.worlds.size()) {
     std::iota(cell_items_.begin(), cell_items_.end(), 0);
-    for (int w = 0; w < batch.num_worlds(); ++w) {
-      cell_begin_.insert(cell_begin_.end(), {0, batch.world(w).num_boxes});
+    for (int w = 0; w < host.setup.num_worlds(); ++w) {
+      cell_begin_.insert(cell_begin_.end(), {0, host.world(w).num_boxes});
     }
-    for (int w = 0; w < batch.num_worlds(); ++w) {
-      const auto first_box = static_cast<size_t>(batch.box_begin[static_cast<size_t>(w)]);
-      WorldView view = batch.world(w);
-      const auto first_light = static_cast<size_t>(batch.light_begin[static_cast<size_t>(w)]);
+    for (int w = 0; w < host.setup.num_worlds(); ++w) {
+      const auto first_box = static_cast<size_t>(host.setup.box_begin[static_cast<size_t>(w)]);
+      WorldView view = host.world(w);
+      const auto first_light = static_cast<size_t>(host.setup.light_begin[static_cast<size_t>(w)]);
       view.box_cells =
           cuda::one_cell({cell_begin_.data() + 2 * w, 2}, {cell_items_.data(), static_cast<size_t>(view.num_boxes)});
       scratch_.push_back({try_boxes_.data() + first_box * kSpawnTries, free_tries_.data() + first_box,
@@ -147,7 +147,10 @@ class ShuffledExecutor {
   }
   int64_t rejected() const { return rejected_command_; }
 
-  WorldBatch batch;
+  uint64_t hash() const { return host.state.hash(host.setup); }
+  std::vector<uint8_t> save() const { return host.state.save(host.setup); }
+
+  HostWorlds host;
   HostResults results;
 
  private:
@@ -156,20 +159,20 @@ class ShuffledExecutor {
     arrays.worlds = worlds_.data();
     arrays.next_worlds = next_worlds_.data();
     arrays.scratch = scratch_.data();
-    arrays.world_of_slot = batch.world_of_slot.data();
-    arrays.agents = batch.agents.view();
+    arrays.world_of_slot = host.setup.world_of_slot.data();
+    arrays.agents = host.state.agents.view();
     arrays.next_agents = next_agents_.view();
-    arrays.num_worlds = batch.num_worlds();
-    arrays.num_slots = batch.num_slots();
-    arrays.episode_step = batch.episode_step.data();
-    arrays.episode_index = batch.episode_index.data();
-    arrays.episode_over = batch.episode_over.data();
-    arrays.spawned = batch.spawned.data();
-    arrays.world_totals = batch.world_totals.data();
+    arrays.num_worlds = host.setup.num_worlds();
+    arrays.num_slots = host.setup.num_slots();
+    arrays.episode_step = host.state.episode_step.data();
+    arrays.episode_index = host.state.episode_index.data();
+    arrays.episode_over = host.state.episode_over.data();
+    arrays.spawned = host.state.spawned.data();
+    arrays.world_totals = host.state.world_totals.data();
     arrays.results = results.step_arrays();
     arrays.views = results.views.data();
     arrays.observations = results.observation_view();
-    arrays.entity_sets = batch.config.vector_observations;
+    arrays.entity_sets = host.setup.config.vector_observations;
     arrays.step_m = step_m_.data();
     arrays.began = began_.data();
     arrays.prepares = prepares_.data();

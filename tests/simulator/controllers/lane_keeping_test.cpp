@@ -111,12 +111,12 @@ TEST(LanePath, SlowsDownBeforeCurves) {
 struct LongCarOnARing {
   explicit LongCarOnARing(float ring_m, float axle_m)
       : map(testing::ring_road(ring_m)), stage(map, 1), graph(*map), view(stage.world().map) {
-    stage.batch.agents.length_m[0] = 5.5f;
-    stage.batch.agents.width_m[0] = 2.2f;
+    stage.worlds.state.agents.length_m[0] = 5.5f;
+    stage.worlds.state.agents.width_m[0] = 2.2f;
     stage.put(0, {axle_m, 0}, kHalfPi, kPlannedSpeed_mps);
     const float curvature = std::min(1 / axle_m, std::tan(0.55f) / 3.3f);
-    stage.batch.agents.steer_rad[0] = std::atan(3.3f * curvature);
-    stage.batch.agents.accel_lat_mps2[0] = square(kPlannedSpeed_mps) * curvature;
+    stage.worlds.state.agents.steer_rad[0] = std::atan(3.3f * curvature);
+    stage.worlds.state.agents.accel_lat_mps2[0] = square(kPlannedSpeed_mps) * curvature;
     path.emplace(view, graph, RoutePoint{0, 0});
     path->go_on(60);
     path->limit_speeds(0, INFINITY);
@@ -144,7 +144,7 @@ TEST(SteeringSearch, FindsTheWayRoundThatTheMiddleOfTheLaneIsNot) {
     car.stage.step(action);
     ASSERT_EQ(car.stage.events(0) & kInfractions, 0);
   }
-  EXPECT_GT(car.stage.batch.agents.distance_m[0], 20);
+  EXPECT_GT(car.stage.worlds.state.agents.distance_m[0], 20);
 }
 
 TEST(SteeringSearch, SaysHowFarItGetsWhereNoCarCan) {

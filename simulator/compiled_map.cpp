@@ -1,0 +1,73 @@
+#include "pictura/simulator/compiled_map.h"
+
+#include "pictura/common/error.h"
+#include "pictura/common/support/parallel_for.h"
+#include "pictura/map/map_geometry.h"
+#include "pictura/simulator/hash_values.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+namespace {
+
+void add_range(Hash64* hash_inout, IndexRange range) { add_values(hash_inout, range.begin, range.end); }
+
+/// Of everything in a map that the simulator reads.
+uint64_t fingerprint_of(const RoadMap& map) {
+  static_assert(sizeof(LanePoint) == 6 * sizeof(float) && sizeof(RoadEdge) == 6 * sizeof(float));
+  static_assert(sizeof(ParkingSpace) == 6 * sizeof(float) && sizeof(BuildingLine) == 6 * sizeof(float));
+  Hash64 hash;
+  add_name(&hash, map.name);
+  for (const Lane& lane : map.lanes) {
+    add_values(&hash, lane.type, lane.in_junction, lane.is_endless, lane.left_neighbor, lane.right_neighbor,
+               lane.speed_limit_mps);
+    add_range(&hash, lane.points);
+    add_range(&hash, lane.successors);
+  }
+  hash.add(Span<const LanePoint>(map.lane_points));
+  hash.add(Span<const int32_t>(map.lane_links));
+  hash.add(Span<const RoadEdge>(map.road_edges));
+  hash.add(Span<const ParkingSpace>(map.parking_spaces));
+  hash.add(Span<const BuildingLine>(map.building_lines));
+  for (const Crosswalk& crosswalk : map.crosswalks) add_range(&hash, crosswalk.outline);
+  hash.add(Span<const Vec3>(map.outline_points));
+  for (const TrafficLight& light : map.lights) {
+    add_values(&hash, light.stop_a_m, light.stop_b_m, light.stop_heading_rad, light.junction, light.phase);
+    add_range(&hash, light.lanes);
+  }
+  hash.add(Span<const int32_t>(map.light_lanes));
+  for (const Junction& junction : map.junctions) add_values(&hash, junction.num_phases);
+  return hash.value();
+}
+
+}  // namespace
+
+std::shared_ptr<const CompiledMap> compile_map(std::shared_ptr<const RoadMap> road, const MapOptions& options) {
+  if (!road) fail_usage("simulator: expected maps, got a null pointer");
+  auto map = std::make_shared<CompiledMap>();
+  const MapGeometryOptions geometry_options{.walls = options.walls, .wall_seed = options.wall_seed};
+  const std::vector<WallFace> walls = options.walls ? make_walls(*road, geometry_options) : std::vector<WallFace>{};
+  map->rules = make_map_rules(*road, walls, options.observe_walls);
+  PICTURA_CHECK(!map->rules.spawn_lanes.empty(),
+                "map {}: expected a lane outside junctions from which a route goes on for ever, got none", road->name);
+  map->geometry = make_static_geometry(*road, geometry_options);
+  map->fingerprint = fingerprint_of(*road);
+  map->options = options;
+  map->road = std::move(road);
+  return map;
+}
+
+std::vector<std::shared_ptr<const CompiledMap>> compile_maps(const std::vector<std::shared_ptr<const RoadMap>>& roads,
+                                                             const MapOptions& options, int num_threads) {
+  std::vector<std::shared_ptr<const CompiledMap>> maps(roads.size());
+  parallel_for(num_threads, static_cast<int64_t>(roads.size()), [&](int64_t index) {
+    const auto i = static_cast<size_t>(index);
+    maps[i] = compile_map(roads[i], options);
+  });
+  return maps;
+}
+
+MapOptions map_options(const SimulatorConfig& config) {
+  return {config.walls, config.wall_seed, config.observes(ObservationPart::walls)};
+}
+
+}  // namespace pictura

@@ -1,0 +1,40 @@
+// A road map in all the forms that simulators and renderers read, compiled once and shared by all of them.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "pictura/common/scene.h"
+#include "pictura/map/road_map.h"
+#include "pictura/simulator/map_rules.h"
+
+namespace pictura {
+
+struct SimulatorConfig;
+
+struct MapOptions {
+  bool walls = true;  // along the building lines
+  uint64_t wall_seed = 0;
+  bool observe_walls = false;  // rules.near_wall_pieces is made
+  bool operator==(const MapOptions&) const = default;
+};
+
+struct CompiledMap {
+  std::shared_ptr<const RoadMap> road;
+  MapOptions options;
+  MapRules rules;            // what the simulator's rules read
+  StaticGeometry geometry;   // what renderers draw
+  uint64_t fingerprint = 0;  // of everything in the road map that the simulator reads
+};
+
+/// Throws Error naming the map when agents cannot drive on it, or can nowhere spawn; UsageError for a null pointer.
+std::shared_ptr<const CompiledMap> compile_map(std::shared_ptr<const RoadMap> road, const MapOptions& options = {});
+
+/// Several, by num_threads host threads (0: all).
+std::vector<std::shared_ptr<const CompiledMap>> compile_maps(const std::vector<std::shared_ptr<const RoadMap>>& roads,
+                                                             const MapOptions& options, int num_threads = 0);
+
+/// Those that a simulator of this configuration needs.
+MapOptions map_options(const SimulatorConfig& config);
+
+}  // namespace pictura

@@ -1,0 +1,52 @@
+// The worlds of an executor on the host: setup and state as WorldViews, which the rules run over, and what it writes
+// for its users besides the state.
+#pragma once
+
+#include <vector>
+
+#include "pictura/simulator/rules/episode.h"
+#include "pictura/simulator/simulator_state.h"
+
+namespace pictura {
+
+struct HostWorlds {
+  explicit HostWorlds(SimulatorSetup its_setup);
+  HostWorlds(const HostWorlds&) = delete;
+  HostWorlds& operator=(const HostWorlds&) = delete;
+  /// Other worlds, at their first values. Arrays move only where the capacity is too small for them.
+  void assign(const SimulatorSetup& other);
+  void reserve(const SimulatorCapacity& capacity);
+
+  WorldView world(int index);
+
+  SimulatorSetup setup;
+  SimulatorState state;
+  // Made anew by every step: the boxes by the cells of their centres.
+  std::vector<CellLists> box_cells;  // [worlds]
+  std::vector<Vec2> cell_centers;    // as boxes, in the order of each world's box_cells
+  SceneBatch scene;
+
+ private:
+  void make_cells_and_scene();
+};
+
+/// What an executor on the host writes for its users, besides the state.
+struct HostResults {
+  HostResults() = default;
+  HostResults(size_t num_slots, const SimulatorConfig& config) { resize(num_slots, config); }
+  void resize(size_t num_slots, const SimulatorConfig& config);
+  void reserve(size_t num_slots, const SimulatorConfig& config);
+  ObservationView observation_view();
+  StepArrays step_arrays() { return {reward.data(), terminated.data(), truncated.data(), valid.data()}; }
+
+  std::vector<float> reward;  // [slots], as the following
+  std::vector<uint8_t> terminated, truncated, valid;
+  std::vector<View> views;
+
+ private:
+#define X(name, type, per_slot, part, comment) std::vector<type> name##_;
+  PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
+};
+
+}  // namespace pictura

@@ -1,0 +1,208 @@
+#include "pictura/simulator/simulator_setup.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <numeric>
+
+#include "pictura/common/error.h"
+#include "pictura/simulator/rules/limits.h"
+
+namespace pictura {
+namespace {
+
+void check(const SimulatorConfig& config) {
+  const auto in = [](float value, float low, float high) { return value >= low && value <= high; };
+  if (config.num_threads < 0) fail_usage("simulator: threads: expected 0 (all) or more, got {}", config.num_threads);
+  // Contact is looked for on the assumption that nothing drives farther in a step than it is long.
+  if (!in(config.dt_s, 0.01f, kMaxStep_s)) {
+    fail_usage("simulator: dt_s: expected 0.01 to {}, got {}", kMaxStep_s, config.dt_s);
+  }
+  if (config.episode_steps < 1)
+    fail_usage("simulator: episode_steps: expected at least 1, got {}", config.episode_steps);
+  if (!(config.reset_inactive_fraction > 0)) {
+    fail_usage("simulator: reset_inactive_fraction: expected more than 0, got {}", config.reset_inactive_fraction);
+  }
+  if (!in(config.pedestrian_fraction, 0, 1) || !in(config.cyclist_fraction, 0, 1) ||
+      config.pedestrian_fraction + config.cyclist_fraction > 1) {
+    fail_usage("simulator: pedestrian and cyclist fractions: expected shares that sum to at most 1, got {} and {}",
+               config.pedestrian_fraction, config.cyclist_fraction);
+  }
+  if (config.parked_cars < 0 || config.parked_cars > kMaxAgentsPerWorld) {
+    fail_usage("simulator: parked_cars: expected 0 to {}, got {}", kMaxAgentsPerWorld, config.parked_cars);
+  }
+  for (int i = 0; i < kNumConditioning; ++i) {
+    const ConditioningRange& range = config.conditioning[static_cast<size_t>(i)];
+    const bool is_positive = i == static_cast<int>(Conditioning::delta_goal_m) || i >= kNumRewardConditioning;
+    if (!std::isfinite(range.low) || !std::isfinite(range.high) || range.low > range.high ||
+        (is_positive && range.low <= 0) ||
+        (range.mixture && range.low != range.high && (range.low > 1 || range.high < 1))) {
+      fail_usage("simulator: conditioning {}: expected finite low <= high{}{}, got {} and {}", kConditioningNames[i],
+                 is_positive ? ", above 0" : "", range.mixture ? ", around 1" : "", range.low, range.high);
+    }
+  }
+}
+
+void check(const SimulatorConfig& config, const CompiledMaps& maps, const std::vector<GeometryHandle>& handles,
+           const std::vector<WorldSpec>& worlds) {
+  if (maps.empty()) fail_usage("simulator: expected at least one map");
+  for (const auto& map : maps) {
+    if (!map) fail_usage("simulator: expected maps, got a null pointer");
+    const MapOptions expected = map_options(config);
+    if (map->options.walls != expected.walls || (expected.walls && map->options.wall_seed != expected.wall_seed)) {
+      fail_usage("simulator: map {}: expected one compiled with walls {}, wall seed {}; got walls {}, wall seed {}",
+                 map->road->name, expected.walls, expected.wall_seed, map->options.walls, map->options.wall_seed);
+    }
+    if (expected.observe_walls && !map->options.observe_walls) {
+      fail_usage("simulator: map {}: expected one compiled with observe_walls, since walls are observed",
+                 map->road->name);
+    }
+  }
+  if (handles.size() != maps.size()) {
+    fail_usage("simulator: expected a handle for each of {} maps, got {}", maps.size(), handles.size());
+  }
+  for (const GeometryHandle handle : handles) {
+    if (handle < 0 || handle >= kNumGeometryHandles) {
+      fail_usage("simulator: expected handles in [0, {}), got {}", kNumGeometryHandles, handle);
+    }
+  }
+  if (worlds.empty()) fail_usage("simulator: expected at least one world");
+  int64_t slots = 0, lights = 0;
+  for (const WorldSpec& world : worlds) {
+    if (world.map < 0 || world.map >= static_cast<int>(maps.size())) {
+      fail_usage("simulator: world {}: expected a map in [0, {}), got {}", world.global_world, maps.size(), world.map);
+    }
+    if (world.num_agents < 1 || world.num_agents > kMaxAgentsPerWorld) {
+      fail_usage("simulator: world {}: expected 1 to {} agents, got {}", world.global_world, kMaxAgentsPerWorld,
+                 world.num_agents);
+    }
+    slots += world.num_agents;
+    lights += static_cast<int64_t>(maps[static_cast<size_t>(world.map)]->rules.stop_lines.size());
+  }
+  if (slots > kMaxSlots) fail_usage("simulator: expected at most {} agents in all, got {}", kMaxSlots, slots);
+  const auto num_worlds = static_cast<int64_t>(worlds.size());
+  const int64_t boxes = slots + num_worlds * config.parked_cars;
+  if (boxes > kMaxBoxes) {
+    fail_usage(
+        "simulator: expected at most {} boxes in all, got {} ({} bytes): {} agents, and {} parked cars in each of {} "
+        "worlds",
+        kMaxBoxes, boxes, boxes * static_cast<int64_t>(2 * sizeof(AgentBox)), slots, config.parked_cars, num_worlds);
+  }
+  if (lights > kMaxBoxes) {
+    fail_usage("simulator: expected at most {} traffic lights in all, got {} ({} bytes) in {} worlds", kMaxBoxes,
+               lights, lights * static_cast<int64_t>(sizeof(LightPlan) + sizeof(LightState)), num_worlds);
+  }
+}
+
+RuleOptions rule_options(const SimulatorConfig& config) {
+  RuleOptions options;
+  options.dt_s = config.dt_s;
+  options.episode_steps = config.episode_steps;
+  options.reset_inactive_fraction = config.reset_inactive_fraction;
+  options.pedestrian_fraction = config.pedestrian_fraction;
+  options.cyclist_fraction = config.cyclist_fraction;
+  options.fixed_lights = config.fixed_lights;
+  options.auxiliary_observations = config.auxiliary_observations;
+  std::copy(config.conditioning.begin(), config.conditioning.end(), options.conditioning);
+  std::copy(std::begin(kPaperConditioning), std::end(kPaperConditioning), options.conditioning_scale);
+  return options;
+}
+
+/// Throws UsageError when the worlds' box cells would take more than a gigabyte: each world has its own.
+void check_box_cells(const CompiledMaps& maps, const std::vector<WorldSpec>& worlds) {
+  constexpr int64_t kMaxCells = int64_t{1} << 28;
+  std::vector<int64_t> cells_of_map;
+  for (const auto& map : maps) {
+    const MapRules& rules = map->rules;
+    const auto num_x = static_cast<int64_t>((rules.high_m.x - rules.low_m.x) / kBoxCell_m) + 1;
+    const auto num_y = static_cast<int64_t>((rules.high_m.y - rules.low_m.y) / kBoxCell_m) + 1;
+    cells_of_map.push_back(num_x * num_y + 1);
+  }
+  int64_t cells = 0;
+  for (const WorldSpec& world : worlds) cells += cells_of_map[static_cast<size_t>(world.map)];
+  if (cells > kMaxCells) {
+    fail_usage("simulator: expected worlds of at most {} cells of {} m in all, got {} ({} bytes) in {} worlds",
+               kMaxCells, kBoxCell_m, cells, cells * static_cast<int64_t>(sizeof(int32_t)), worlds.size());
+  }
+}
+
+}  // namespace
+
+SimulatorCapacity SimulatorCapacity::joined(const SimulatorCapacity& other) const {
+  return {std::max(worlds, other.worlds), std::max(slots, other.slots), std::max(lights, other.lights),
+          std::max(maps, other.maps), std::max(map_bytes, other.map_bytes)};
+}
+
+SimulatorCapacity capacity_of(const CompiledMaps& maps, const std::vector<WorldSpec>& worlds) {
+  SimulatorCapacity needs;
+  needs.worlds = static_cast<int64_t>(worlds.size());
+  needs.maps = static_cast<int64_t>(maps.size());
+  for (const WorldSpec& world : worlds) {
+    needs.slots += world.num_agents;
+    needs.lights += static_cast<int64_t>(maps[static_cast<size_t>(world.map)]->rules.stop_lines.size());
+  }
+  for (const auto& map : maps) needs.map_bytes += map->rules.size_bytes();
+  return needs;
+}
+
+SimulatorSetup::SimulatorSetup(const SimulatorConfig& config_in, CompiledMaps maps_in,
+                               std::vector<GeometryHandle> handles_in, std::vector<WorldSpec> worlds_in)
+    : config(config_in), maps(std::move(maps_in)), handles(std::move(handles_in)), worlds(std::move(worlds_in)) {
+  check(config);
+  if (handles.empty()) {
+    handles.resize(maps.size());
+    std::iota(handles.begin(), handles.end(), 0);
+  }
+  check(config, maps, handles, worlds);
+  check_box_cells(maps, worlds);
+  options = rule_options(config);
+  for (const auto& map : maps) map_views.push_back(map->rules.view());
+  slot_begin = box_begin = light_begin = {0};
+  for (const WorldSpec& world : worlds) {
+    const auto map = static_cast<size_t>(world.map);
+    for (int agent = 0; agent < world.num_agents; ++agent) {
+      world_of_slot.push_back(static_cast<int32_t>(global_world.size()));
+      agent_of_slot.push_back(agent);
+    }
+    global_world.push_back(world.global_world);
+    slot_begin.push_back(slot_begin.back() + world.num_agents);
+    box_begin.push_back(box_begin.back() + world.num_agents + config.parked_cars);
+    light_begin.push_back(light_begin.back() + static_cast<int32_t>(maps[map]->rules.stop_lines.size()));
+    geometry.push_back(handles[map]);
+  }
+}
+
+SimulatorSetup SimulatorSetup::with(CompiledMaps other_maps, std::vector<GeometryHandle> other_handles,
+                                    std::vector<WorldSpec> other_worlds, uint64_t seed) const {
+  SimulatorConfig other = config;
+  other.seed = seed;
+  return {other, std::move(other_maps), std::move(other_handles), std::move(other_worlds)};
+}
+
+uint64_t next_worlds_id() {
+  static std::atomic<uint64_t> id{0};
+  return ++id;
+}
+
+void SimulatorSetup::reserve(const SimulatorCapacity& capacity) {
+  for (auto* begins : {&slot_begin, &box_begin, &light_begin})
+    begins->reserve(static_cast<size_t>(capacity.worlds) + 1);
+  for (auto* of_slot : {&world_of_slot, &agent_of_slot}) of_slot->reserve(static_cast<size_t>(capacity.slots));
+  global_world.reserve(static_cast<size_t>(capacity.worlds));
+  geometry.reserve(static_cast<size_t>(capacity.worlds));
+}
+
+WorldView SimulatorSetup::view(int world, const MapView& map, const RuleOptions& its_options) const {
+  const auto w = static_cast<size_t>(world);
+  WorldView view{map, its_options};
+  view.index = world;
+  view.seed = config.seed;
+  view.global_world = worlds[w].global_world;
+  view.first_slot = slot_begin[w];
+  view.num_agents = worlds[w].num_agents;
+  view.first_box = box_begin[w];
+  view.num_boxes = box_begin[w + 1] - box_begin[w];
+  return view;
+}
+
+}  // namespace pictura

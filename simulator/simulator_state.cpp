@@ -1,0 +1,289 @@
+#include "pictura/simulator/simulator_state.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <numeric>
+
+#include "pictura/common/error.h"
+#include "pictura/simulator/hash_values.h"
+#include "pictura/simulator/rules/collision.h"
+#include "pictura/simulator/rules/episode.h"
+#include "pictura/simulator/rules/limits.h"
+
+namespace pictura {
+namespace {
+
+struct SavedHeader {
+  std::array<char, 8> magic{'P', 'I', 'C', 'S', 'T', 'A', 'T', 'E'};
+  uint32_t version = 3;
+  uint32_t byte_order = 0x01020304;
+  uint64_t num_fingerprints = 0;  // that follow: what saver and restorer must have in common
+};
+
+/// What a saved state must have in common with the simulator that restores it, by the names that a mismatch is told by.
+struct Fingerprint {
+  std::string name;
+  uint64_t value = 0;
+};
+
+std::vector<Fingerprint> fingerprints(const SimulatorSetup& setup) {
+  std::vector<Fingerprint> prints;
+  const auto add = [&prints](std::string name, const auto&... values) {
+    Hash64 hash;
+    add_values(&hash, values...);
+    prints.push_back({std::move(name), hash.value()});
+  };
+  const SimulatorConfig& config = setup.config;
+  add("seed", config.seed);
+  add("time (dt_s, episode_steps, reset_inactive_fraction)", config.dt_s, config.episode_steps,
+      config.reset_inactive_fraction);
+  add("population (pedestrian_fraction, cyclist_fraction, parked_cars)", config.pedestrian_fraction,
+      config.cyclist_fraction, config.parked_cars);
+  add("walls (walls, wall_seed)", config.walls, config.wall_seed);
+  add("fixed_lights", config.fixed_lights);
+  Hash64 conditioning, worlds;
+  for (const ConditioningRange& range : config.conditioning) {
+    add_values(&conditioning, range.low, range.high, range.mixture);
+  }
+  prints.push_back({"conditioning", conditioning.value()});
+  for (const WorldSpec& world : setup.worlds) add_values(&worlds, world.map, world.num_agents, world.global_world);
+  prints.push_back({"worlds", worlds.value()});
+  add("number of maps", setup.maps.size());
+  for (const auto& map : setup.maps) prints.push_back({fmt::format("map {}", map->road->name), map->fingerprint});
+  return prints;
+}
+
+bool all_finite(const std::vector<float>& values) {
+  return std::all_of(values.begin(), values.end(), [](float value) { return std::isfinite(value); });
+}
+template <typename Integer>
+bool all_finite(const std::vector<Integer>&) {
+  return true;
+}
+
+/// Throws Error naming the field unless every value can be stepped on: indices exist and numbers are finite.
+void check_restored(const SimulatorSetup& setup, const SimulatorState& state) {
+  constexpr float kMaxCoordinate_m = 1e6f;
+  const AgentState& agents = state.agents;
+#define X(name, type, per_agent, first, comment) \
+  PICTURA_CHECK(all_finite(agents.name), "simulator state: {}: expected finite numbers", #name);
+  PICTURA_AGENT_FIELDS(X)
+#undef X
+  const auto expect = [](bool is_sound, size_t slot, const char* field, auto value) {
+    PICTURA_CHECK(is_sound, "simulator state: agent {}: {}: {} is out of range", slot, field, value);
+  };
+  for (size_t w = 0; w < setup.worlds.size(); ++w) {
+    const MapRules& map = setup.map_of(static_cast<int>(w)).rules;
+    const std::vector<MapLane>& lanes = map.lanes;
+    const auto num_walk_pieces = static_cast<int32_t>(map.walkways.pieces.size());
+    const auto is_lane = [&lanes](int32_t lane) {
+      return lane >= 0 && static_cast<size_t>(lane) < lanes.size() && lanes[static_cast<size_t>(lane)].num_segments > 0;
+    };
+    for (auto slot = static_cast<size_t>(setup.slot_begin[w]); slot < static_cast<size_t>(setup.slot_begin[w + 1]);
+         ++slot) {
+      const auto status = static_cast<AgentStatus>(agents.status[slot]);
+      expect(status == AgentStatus::active || status == AgentStatus::halted || status == AgentStatus::absent, slot,
+             "status", static_cast<int>(status));
+      expect(agents.agent_class[slot] < kNumAgentClasses, slot, "agent_class",
+             static_cast<int>(agents.agent_class[slot]));
+      expect(agents.lane[slot] == -1 || is_lane(agents.lane[slot]), slot, "lane", agents.lane[slot]);
+      const int32_t goal_lane = agents.goal_lane[slot];
+      const bool is_way = agents.agent_class[slot] == static_cast<uint8_t>(AgentClass::pedestrian)
+                              ? goal_lane >= 0 && goal_lane < num_walk_pieces
+                              : is_lane(goal_lane);
+      expect(is_way || (goal_lane == -1 && status == AgentStatus::absent), slot, "goal_lane", goal_lane);
+      expect(agents.next_waypoint[slot] >= 0 && agents.next_waypoint[slot] < kNumWaypoints, slot, "next_waypoint",
+             agents.next_waypoint[slot]);
+      expect(agents.goal_chains[slot] >= 0, slot, "goal_chains", agents.goal_chains[slot]);
+      expect(std::fabs(agents.x_m[slot]) <= kMaxCoordinate_m, slot, "x_m", agents.x_m[slot]);
+      expect(std::fabs(agents.y_m[slot]) <= kMaxCoordinate_m, slot, "y_m", agents.y_m[slot]);
+    }
+    PICTURA_CHECK(state.spawned[w] >= 0 && state.spawned[w] <= setup.worlds[w].num_agents,
+                  "simulator state: world {}: spawned: {} is out of range", w, state.spawned[w]);
+    PICTURA_CHECK(state.episode_step[w] >= 0 && state.episode_step[w] <= setup.config.episode_steps,
+                  "simulator state: world {}: episode_step: {} is out of range", w, state.episode_step[w]);
+    PICTURA_CHECK(state.episode_index[w] >= 0, "simulator state: world {}: episode_index: {} is out of range", w,
+                  state.episode_index[w]);
+  }
+  for (const std::vector<AgentBox>* boxes : {&state.boxes, &state.boxes_before}) {
+    for (size_t i = 0; i < boxes->size(); ++i) {
+      const AgentBox& box = (*boxes)[i];
+      const Vec3 at = box.center_m;
+      // Comparisons are false for what is not a number.
+      PICTURA_CHECK(std::fabs(at.x) <= kMaxCoordinate_m && std::fabs(at.y) <= kMaxCoordinate_m &&
+                        std::fabs(at.z) <= kMaxCoordinate_m && std::fabs(box.cos_heading) <= 1.001f &&
+                        std::fabs(box.sin_heading) <= 1.001f && box.length_m >= 0 && box.width_m >= 0 &&
+                        box.height_m >= 0 && radius(box) <= kMaxBoxRadius_m && box.height_m <= kMaxCoordinate_m &&
+                        static_cast<int>(box.agent_class) < kNumAgentClasses,
+                    "simulator state: boxes: box {}: pose, size or class is out of range", i);
+    }
+  }
+  for (size_t i = 0; i < state.light_plans.size(); ++i) {
+    const LightPlan& plan = state.light_plans[i];
+    const int64_t slot_steps = int64_t{plan.green_steps} + plan.yellow_steps + plan.red_steps;
+    PICTURA_CHECK(plan.green_steps >= 0 && plan.yellow_steps >= 0 && plan.red_steps >= 0 && slot_steps >= 1 &&
+                      plan.num_phases >= 1 && plan.phase >= 0 && plan.offset_steps >= 0 &&
+                      plan.offset_steps < slot_steps * plan.num_phases && slot_steps * plan.num_phases <= INT32_MAX / 2,
+                  "simulator state: light_plans: light {}: the plan is out of range", i);
+    PICTURA_CHECK(state.lights[i] <= LightState::green, "simulator state: lights: light {}: {} is out of range", i,
+                  static_cast<int>(state.lights[i]));
+  }
+}
+
+}  // namespace
+
+void SimulatorState::resize(const SimulatorSetup& setup) {
+  agents.resize(static_cast<size_t>(setup.num_slots()));
+  boxes.assign(setup.num_boxes(), {});
+  boxes_before.assign(setup.num_boxes(), {});
+  light_plans.assign(setup.num_lights(), {});
+  lights.assign(setup.num_lights(), {});
+  const size_t num_worlds = setup.worlds.size();
+  episode_step.assign(num_worlds, 0);
+  episode_index.assign(num_worlds, 0);
+  episode_over.assign(num_worlds, 0);
+  spawned.assign(num_worlds, 0);
+  world_totals.assign(num_worlds, {});
+}
+
+void SimulatorState::reserve(const SimulatorCapacity& capacity, const SimulatorConfig& config) {
+  const auto num_worlds = static_cast<size_t>(capacity.worlds), num_lights = static_cast<size_t>(capacity.lights);
+  agents.reserve(static_cast<size_t>(capacity.slots));
+  for (auto* its : {&boxes, &boxes_before}) its->reserve(static_cast<size_t>(capacity.boxes(config)));
+  light_plans.reserve(num_lights);
+  lights.reserve(num_lights);
+  for (auto* of_world : {&episode_step, &episode_index, &spawned}) of_world->reserve(num_worlds);
+  episode_over.reserve(num_worlds);
+  world_totals.reserve(num_worlds);
+}
+
+SpawnReport SimulatorState::spawn_report(const SimulatorSetup& setup) const {
+  SpawnReport report;
+  report.asked = setup.num_slots();
+  report.spawned = std::accumulate(spawned.begin(), spawned.end(), int64_t{0});
+  const auto refused_for = [this](SpawnFailure reason) {
+    return std::count(agents.refusal.begin(), agents.refusal.end(), static_cast<uint8_t>(reason));
+  };
+  report.refused_no_place = refused_for(SpawnFailure::no_place);
+  report.refused_taken = refused_for(SpawnFailure::taken);
+  report.refused = report.refused_no_place + report.refused_taken;
+  report.parked_asked = int64_t{setup.num_worlds()} * setup.config.parked_cars;
+  for (size_t w = 0; w < setup.worlds.size(); ++w) {
+    report.parked_placed +=
+        std::count_if(boxes.begin() + setup.box_begin[w] + setup.worlds[w].num_agents,
+                      boxes.begin() + setup.box_begin[w + 1], [](const AgentBox& box) { return box.drawn != 0; });
+  }
+  return report;
+}
+
+uint64_t SimulatorState::hash(const SimulatorSetup& setup) const {
+  Hash64 hash;
+  agents.add_to(&hash);
+  hash.add(Span<const LightState>(lights));
+  for (size_t w = 0; w < setup.worlds.size(); ++w) {
+    const int first_parked = setup.box_begin[w] + setup.worlds[w].num_agents;
+    hash.add(
+        Span<const AgentBox>(boxes.data() + first_parked, static_cast<size_t>(setup.box_begin[w + 1] - first_parked)));
+  }
+  return hash.value();
+}
+
+SimulatorTotals SimulatorState::totals() const {
+  SimulatorTotals sum;
+  for (const SimulatorTotals& part : world_totals) sum.add(part);
+  return sum;
+}
+
+size_t SimulatorState::saved_bytes() const {
+  size_t sum = agents.size_bytes();
+  visit_arrays(*this, *this, [&sum](const auto& array, const auto&) { sum += array.size() * sizeof(*array.data()); });
+  return sum;
+}
+
+void SimulatorState::assign_from(const uint8_t* bytes) {
+  agents.assign_from(bytes);
+  bytes += agents.size_bytes();
+  visit_arrays(*this, *this, [&bytes](auto& array, auto&) {
+    const size_t size = array.size() * sizeof(*array.data());
+    if (size > 0) std::memcpy(array.data(), bytes, size);
+    bytes += size;
+  });
+}
+
+void SimulatorState::copy_to(uint8_t* bytes_out) const {
+  agents.copy_to(bytes_out);
+  bytes_out += agents.size_bytes();
+  visit_arrays(*this, *this, [&bytes_out](const auto& array, const auto&) {
+    const size_t size = array.size() * sizeof(*array.data());
+    if (size > 0) std::memcpy(bytes_out, array.data(), size);
+    bytes_out += size;
+  });
+}
+
+std::vector<uint8_t> SimulatorState::save(const SimulatorSetup& setup) const {
+  const std::vector<Fingerprint> prints = fingerprints(setup);
+  SavedHeader header;
+  header.num_fingerprints = prints.size();
+  const size_t prints_bytes = prints.size() * sizeof(uint64_t);
+  std::vector<uint8_t> bytes(sizeof(header) + prints_bytes + saved_bytes());
+  std::memcpy(bytes.data(), &header, sizeof(header));
+  for (size_t i = 0; i < prints.size(); ++i) {
+    std::memcpy(bytes.data() + sizeof(header) + i * sizeof(uint64_t), &prints[i].value, sizeof(uint64_t));
+  }
+  copy_to(bytes.data() + sizeof(header) + prints_bytes);
+  return bytes;
+}
+
+void SimulatorState::restore(const SimulatorSetup& setup, Span<const uint8_t> bytes) {
+  const SavedHeader expected;
+  SavedHeader header;
+  PICTURA_CHECK(bytes.size() >= sizeof(header), "simulator state: expected at least {} bytes, got {}", sizeof(header),
+                bytes.size());
+  std::memcpy(&header, bytes.data(), sizeof(header));
+  PICTURA_CHECK(header.magic == expected.magic, "simulator state: these bytes are something else");
+  PICTURA_CHECK(header.byte_order == expected.byte_order,
+                "simulator state: written by a machine of another byte order");
+  PICTURA_CHECK(header.version == expected.version, "simulator state: expected version {}, got {}", expected.version,
+                header.version);
+  const std::vector<Fingerprint> prints = fingerprints(setup);
+  for (size_t i = 0; i < prints.size(); ++i) {
+    const size_t at = sizeof(header) + i * sizeof(uint64_t);
+    PICTURA_CHECK(bytes.size() >= at + sizeof(uint64_t),
+                  "simulator state: ends within its fingerprints, after {} bytes", bytes.size());
+    uint64_t saved = 0;
+    std::memcpy(&saved, bytes.data() + at, sizeof(saved));
+    PICTURA_CHECK(saved == prints[i].value, "simulator state: saved with another {}", prints[i].name);
+  }
+  PICTURA_CHECK(header.num_fingerprints == prints.size(), "simulator state: expected {} fingerprints, got {}",
+                prints.size(), header.num_fingerprints);
+  const size_t begin = sizeof(header) + prints.size() * sizeof(uint64_t);
+  PICTURA_CHECK(bytes.size() == begin + saved_bytes(), "simulator state: expected {} bytes, got {}",
+                begin + saved_bytes(), bytes.size());
+
+  std::vector<uint8_t> present(saved_bytes());
+  copy_to(present.data());
+  assign_from(bytes.data() + begin);
+  try {
+    check_restored(setup, *this);
+  } catch (const Error&) {
+    assign_from(present.data());
+    throw;
+  }
+}
+
+std::string rejection_text(int64_t rejected) {
+  const int64_t slot = rejected >> 32 & 0x0FFFFFFF;
+  switch (static_cast<CommandKind>(rejected >> 60)) {
+    case CommandKind::action:
+      return fmt::format("slot {}: expected an action in [0, {}), got {}", slot, kNumActions,
+                         static_cast<int32_t>(rejected));
+    case CommandKind::kinematic_state:
+      return fmt::format("slot {}: expected a kinematic state within {} m, {} rad and {} m/s, got one beyond", slot,
+                         kMaxCommanded_m, kMaxCommanded_rad, kMaxCommanded_mps);
+    default: return fmt::format("slot {}: expected a command that is an action, a kinematic state or absence", slot);
+  }
+}
+
+}  // namespace pictura

@@ -1,0 +1,65 @@
+// The state of a simulator on the host: everything that is saved. An executor on the host steps it; one on a device
+// mirrors it there. Saving, restoring, hashing and counting are the same for all.
+#pragma once
+
+#include <vector>
+
+#include "pictura/simulator/agent_state.h"
+#include "pictura/simulator/rules/signal.h"
+#include "pictura/simulator/simulator_setup.h"
+
+namespace pictura {
+
+struct SimulatorState {
+  SimulatorState() = default;
+  explicit SimulatorState(const SimulatorSetup& setup) { resize(setup); }
+  /// Gives everything the setup's size and its first value.
+  void resize(const SimulatorSetup& setup);
+  /// Makes room, so that a resize within it moves no array; boxes as the setup's configuration has them.
+  void reserve(const SimulatorCapacity& capacity, const SimulatorConfig& config);
+
+  SpawnReport spawn_report(const SimulatorSetup& setup) const;
+  SimulatorTotals totals() const;
+  /// Over every field of the agents, the light states and the parked cars, in the documented order.
+  uint64_t hash(const SimulatorSetup& setup) const;
+
+  std::vector<uint8_t> save(const SimulatorSetup& setup) const;
+  /// Throws Error, and leaves everything as it was, when the bytes are of another simulator, naming what differs, or
+  /// when a field holds what no simulator saved.
+  void restore(const SimulatorSetup& setup, Span<const uint8_t> bytes);
+
+  AgentState agents;
+  std::vector<AgentBox> boxes, boxes_before;  // the scene's agents
+  std::vector<LightPlan> light_plans;
+  std::vector<LightState> lights;
+  std::vector<int32_t> episode_step, episode_index;  // [worlds]
+  std::vector<uint8_t> episode_over;                 // [worlds] the next step resets
+  std::vector<int32_t> spawned;                      // [worlds] in the current episode
+  std::vector<SimulatorTotals> world_totals;         // [worlds]
+
+  /// Calls visit(array of a, array of b) for every array of the state but the agents' fields, in the order in which
+  /// they are saved. a and b have members of the same names.
+  template <typename A, typename B, typename Visit>
+  static void visit_arrays(A& a, B& b, Visit&& visit) {
+    visit(a.boxes, b.boxes);
+    visit(a.boxes_before, b.boxes_before);
+    visit(a.light_plans, b.light_plans);
+    visit(a.lights, b.lights);
+    visit(a.episode_step, b.episode_step);
+    visit(a.episode_index, b.episode_index);
+    visit(a.episode_over, b.episode_over);
+    visit(a.spawned, b.spawned);
+    visit(a.world_totals, b.world_totals);
+  }
+
+ private:
+  /// Bytes of the state without its header, and the state to and from so many.
+  size_t saved_bytes() const;
+  void copy_to(uint8_t* bytes_out) const;
+  void assign_from(const uint8_t* bytes);
+};
+
+/// What an Error says of a command that a step rejected, see rejected_command().
+std::string rejection_text(int64_t rejected);
+
+}  // namespace pictura
