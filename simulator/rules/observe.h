@@ -11,6 +11,7 @@ namespace pictura {
 constexpr float kScalePosition_m = 120.0f, kScaleHeight_m = 10.0f, kScaleSpeed_mps = 20.0f;
 constexpr float kScaleLength_m = 6.0f, kScaleWidth_m = 3.0f, kScaleHalfPiece_m = 5.0f, kScaleLaneWidth_m = 5.0f;
 constexpr float kScaleWallHeight_m = 12.0f;
+constexpr float kMinConditioning = -2.0f;  // no observed coefficient is lower
 constexpr float kScaleSteer_rad = 0.55f, kScaleAccelLong_mps2 = 5.0f, kScaleAccelLat_mps2 = 4.0f;
 
 /// What to multiply by: every observation scales by a constant, and dividing would take ten times as long.
@@ -51,14 +52,16 @@ PICTURA_HD inline void observe_ego(const WorldView& world, int slot, float* out)
 }
 
 /// Scaled by the paper's training ranges, whatever the run's own are, so that a policy reads the same number for the
-/// same coefficient everywhere; fixed coefficients read 0.
+/// same coefficient everywhere; fixed coefficients read 0. Values below the range, as pedestrians have them, are told
+/// apart down to -2.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void observe_conditioning(const WorldView& world, int slot, float* out, const ThreadGroup& group = {}) {
   for (int i = group.rank(); i < kNumConditioning; i += group.size()) {
     const ConditioningRange range = world.options.conditioning_scale[i];
     const float value = world.agents.conditioning[slot * kNumConditioning + i];
-    out[i] = range.high > range.low ? clamp(2.0f * (value - range.low) / (range.high - range.low) - 1.0f, -1.0f, 1.0f)
-                                    : 0.0f;
+    out[i] = range.high > range.low
+                 ? clamp(2.0f * (value - range.low) / (range.high - range.low) - 1.0f, kMinConditioning, 1.0f)
+                 : 0.0f;
   }
 }
 

@@ -191,10 +191,13 @@ TEST_F(Observation, EveryCoefficientHasThePapersRange) {
       EXPECT_NEAR(out.conditioning[i], is_fixed ? 0 : 2 * share - 1, 1e-5) << kConditioningNames[i];
     }
   }
-  // Beyond the range, as a pedestrian's goal radius, it is clamped.
+  // A pedestrian's goal radius is below the range, and not to be mistaken for a vehicle's of 2 m.
   stage.set(0, Conditioning::delta_goal_m, 0.5f);
   look();
-  EXPECT_EQ(stage.results.observation_view().conditioning[0], -1);
+  EXPECT_NEAR(stage.results.observation_view().conditioning[0], -1.3, 1e-6);
+  stage.set(0, Conditioning::delta_goal_m, -50);
+  look();
+  EXPECT_EQ(stage.results.observation_view().conditioning[0], -2);
 }
 
 /// What is listed must be what is in sight: checked against all pieces of the map, from many places and headings.
