@@ -128,6 +128,7 @@ class SimulatorCpu final : public Simulator {
   void begin() {
     worlds_id_ = next_worlds_id();
     results_.resize(static_cast<size_t>(num_slots()), config());
+    chosen_try_.assign(static_cast<size_t>(num_slots()), -1);
     totals_ = {};
     reset({});
   }
@@ -204,7 +205,7 @@ class SimulatorCpu final : public Simulator {
                               is_clear(world, box, world.num_agents, world.num_agents + car);
                      }));
     }
-    int spawned = 0;
+    // All choose before any is placed, since who is placed takes the height of its road.
     for (int agent = 0; agent < world.num_agents; ++agent) {
       draw_agent(world, agent);
       const int chosen = first_try(has_places(world, agent), [&](int i) {
@@ -212,6 +213,13 @@ class SimulatorCpu final : public Simulator {
         return may_spawn(world.map, box) && is_clear(world, box, 0, agent) &&
                is_clear(world, box, world.num_agents, world.num_boxes);
       });
+      if (chosen >= 0) world.boxes[agent] = spawn_box(world, agent, chosen);
+      world.boxes[agent].drawn = chosen >= 0;
+      chosen_try_[static_cast<size_t>(world.first_slot + agent)] = chosen;
+    }
+    int spawned = 0;
+    for (int agent = 0; agent < world.num_agents; ++agent) {
+      const int chosen = chosen_try_[static_cast<size_t>(world.first_slot + agent)];
       place_agent(world, agent, chosen);
       spawned += chosen >= 0;
     }
@@ -276,6 +284,7 @@ class SimulatorCpu final : public Simulator {
   SimulatorCapacity capacity_;
   uint64_t generation_ = 0, worlds_id_ = 0;
   HostResults results_;
+  std::vector<int32_t> chosen_try_;  // [slots] while an episode begins
   SimulatorTotals totals_;
 };
 

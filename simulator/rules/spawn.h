@@ -266,19 +266,21 @@ PICTURA_HD void place_agent(const WorldView& world, int agent, int i, const Thre
   }
   const RoutePoint at = spawn_point(world, agent, i);
   const LanePose pose = pose_of(world, agent, at);
-  const LaneFit fit = fit_lane(world.map, pose.position_m.xy(), pose.position_m.z, pose.heading_rad, at.lane, group);
+  // A pedestrian's place is on a walkway: no lane is its own yet.
+  const int32_t own_lane = walks(world, agent) ? -1 : at.lane;
+  const LaneFit fit =
+      fit_agent(world, agent, pose.position_m.xy(), pose.position_m.z, pose.heading_rad, own_lane, group);
   if (is_writer) {
     Motion motion;
     motion.x_m = pose.position_m.x;
     motion.y_m = pose.position_m.y;
     motion.heading_rad = pose.heading_rad;
     store_motion(agents, slot, motion);
-    agents.z_m[slot] = pose.position_m.z;
+    store_fit(agents, slot, fit);
     agents.status[slot] = static_cast<uint8_t>(AgentStatus::active);
     agents.goal_lane[slot] = at.lane;
     agents.goal_lane_s_m[slot] = at.s_m;
     world.boxes[agent] = world.boxes_before[agent] = box_of(agents, slot);
-    store_fit(agents, slot, fit);
   }
   group.sync();
   draw_goal_chain(world, agent, group);

@@ -189,6 +189,24 @@ TEST(Pedestrians, AreAtTheHeightOfTheirWalkway) {
   EXPECT_EQ(fit_walk(world.view(), {100, -30}, 0.6f, 0, -1).z_m, 0.6f) << "near neither";
 }
 
+TEST(Pedestrians, SpawnAtTheHeightOfTheirWalkwayWithTheirBoxes) {
+  auto map = testing::stadium(200, 1);
+  std::vector<Vec3> kerb = straight({0, -4}, {200, -4}, 20);  // within reach of the lane, at height 0
+  for (Vec3& point : kerb) point.z = 0.5f;
+  testing::add_side_lane(map.get(), LaneType::sidewalk, kerb);
+  const auto simulator = make_simulator("cpu", walkers_only(), {map}, {{0, 30, 0}});
+  const AgentStateView state = simulator->state();
+  int present = 0;
+  for (size_t i = 0; i < 30; ++i) {
+    if (state.status[i] != static_cast<uint8_t>(AgentStatus::active)) continue;
+    ++present;
+    EXPECT_NEAR(state.z_m[i], 0.5f, 1e-4f);
+    EXPECT_EQ(simulator->scene().agents[i].center_m.z, state.z_m[i]);
+    EXPECT_EQ(state.lane[i], 0) << "the nearest lane, not the one with the number of its piece of walkway";
+  }
+  EXPECT_GT(present, 20);
+}
+
 TEST(Pedestrians, DoNotAimAtPlacesUnderParkedCars) {
   auto map = street();
   for (int i = 0; i < 20; ++i) {
