@@ -54,7 +54,7 @@ AgentBox DrivenAgent::box(Vec3 axle_m, float heading_rad, float margin_m) const 
 }
 
 bool DrivenAgent::leaves_road(const Motion& at, float z_m, float margin_m) const {
-  return !may_spawn(world_.map, box({at.x_m, at.y_m, z_m}, at.heading_rad, margin_m));
+  return !fits_map(world_.map, box({at.x_m, at.y_m, z_m}, at.heading_rad, margin_m));
 }
 
 float DrivenAgent::to_bumper_m() const {

@@ -20,6 +20,11 @@ PICTURA_HD inline OrientedBox footprint(const AgentBox& box) {
   return {box.center_m.xy(), {box.cos_heading, box.sin_heading}, 0.5f * box.length_m, 0.5f * box.width_m};
 }
 
+/// The middle of it.
+PICTURA_HD inline Vec2 front_bumper(const AgentBox& box) {
+  return box.center_m.xy() + Vec2{box.cos_heading, box.sin_heading} * (0.5f * box.length_m);
+}
+
 PICTURA_HD inline float radius(const AgentBox& box) { return 0.5f * sqrtf(square(box.length_m) + square(box.width_m)); }
 
 /// Half of the extent of `box` along the unit vector `axis`.

@@ -67,6 +67,9 @@ PICTURA_HD inline LightState light_state(const LightPlan& plan, int step) {
   return in_slot < plan.green_steps + plan.yellow_steps ? LightState::yellow : LightState::red;
 }
 
+/// A stop line holds those who head within 45 degrees of its traffic, and reaches a little beyond its ends.
+constexpr float kStopLineCosine = 0.70710678f, kStopLineSideTolerance_m = 0.5f;
+
 /// An agent's step, as far as red lights are concerned.
 struct Crossing {
   Vec2 bumper_before, bumper_after;  // middle of the front bumper
@@ -105,12 +108,10 @@ PICTURA_HD inline bool is_lane_change(const MapView& map, int32_t before, int32_
 /// within 45 degrees of its traffic and within 10 m of its middle. Standing on a line that turns red, clearing the
 /// junction behind it, or entering the next lane of the route is none.
 PICTURA_HD inline bool violates(const MapView& map, int32_t light, const Crossing& crossing, LightState state) {
-  constexpr float kCos45 = 0.70710678f;
-  constexpr float kSideTolerance_m = 0.5f;
   if (state != LightState::red) return false;
   const StopLine& line = map.stop_lines[static_cast<size_t>(light)];
   const Vec2 past = crossing.bumper_after - line.middle_m.xy();
-  if (dot(past, past) > square(kStopLineReach_m) || dot(crossing.forward, line.direction) < kCos45 ||
+  if (dot(past, past) > square(kStopLineReach_m) || dot(crossing.forward, line.direction) < kStopLineCosine ||
       fabsf(line.middle_m.z - crossing.z_m) >= kLevel_m) {
     return false;
   }
@@ -120,7 +121,8 @@ PICTURA_HD inline bool violates(const MapView& map, int32_t light, const Crossin
   if (along_before < 0.0f) {
     const float fraction = along_before / (along_before - along_after);
     const Vec2 at = crossing.bumper_before + (crossing.bumper_after - crossing.bumper_before) * fraction;
-    if (fabsf(cross(line.direction, at - line.middle_m.xy())) <= line.half_length_m + kSideTolerance_m) return true;
+    if (fabsf(cross(line.direction, at - line.middle_m.xy())) <= line.half_length_m + kStopLineSideTolerance_m)
+      return true;
   }
   return is_lane_change(map, crossing.lane_before, crossing.lane_after) &&
          map.lanes[static_cast<size_t>(crossing.lane_before)].light < 0 &&

@@ -246,9 +246,33 @@ PICTURA_HD inline AgentBox spawn_box(const WorldView& world, int agent, int i) {
 /// Whether the map permits an agent's box there: clear of barriers, its centre on the road. Pedestrians need only keep
 /// clear of walls.
 template <typename ThreadGroup = SingleThread>
-PICTURA_HD bool may_spawn(const MapView& map, const AgentBox& box, const ThreadGroup& group = {}) {
+PICTURA_HD bool fits_map(const MapView& map, const AgentBox& box, const ThreadGroup& group = {}) {
   if (box.agent_class == AgentClass::pedestrian) return !touches_wall(map, box, group);
   return !touches_barrier(map, box, group) && is_on_road(map, box.center_m.xy(), box.center_m.z, group);
+}
+
+/// Whether a vehicle or cyclist has its reference point before a stop line of its way and its front bumper past it.
+PICTURA_HD inline bool straddles_stop_line(const MapView& map, const AgentBox& box) {
+  const Vec2 forward{box.cos_heading, box.sin_heading};
+  const Vec2 bumper = front_bumper(box);
+  const Vec2 reference = box.center_m.xy() - forward * reference_to_center(box.agent_class, box.length_m);
+  const Span<const int32_t> lights = items_at(map.stop_line_cells, bumper);
+  for (size_t i = 0; i < lights.size(); ++i) {
+    const StopLine& line = map.stop_lines[static_cast<size_t>(lights[i])];
+    if (dot(forward, line.direction) < kStopLineCosine || fabsf(line.middle_m.z - box.center_m.z) >= kLevel_m) continue;
+    const Vec2 past = bumper - line.middle_m.xy();
+    const bool is_across =
+        dot(past, line.direction) >= 0.0f && dot(reference - line.middle_m.xy(), line.direction) < 0.0f;
+    if (is_across && fabsf(cross(line.direction, past)) <= line.half_length_m + kStopLineSideTolerance_m) return true;
+  }
+  return false;
+}
+
+/// Whether an agent may start its episode there. Nobody starts across a stop line, whatever its light shows: driving on
+/// from there would not be crossing it.
+template <typename ThreadGroup = SingleThread>
+PICTURA_HD bool may_spawn(const MapView& map, const AgentBox& box, const ThreadGroup& group = {}) {
+  return fits_map(map, box, group) && (box.agent_class == AgentClass::pedestrian || !straddles_stop_line(map, box));
 }
 
 /// Puts the agent at the place of its try `i`, standing still, and draws its first goals; with -1 it stays absent.

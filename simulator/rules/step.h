@@ -14,10 +14,6 @@ PICTURA_HD inline bool is_active(const WorldView& world, int agent) {
   return world.agents.status[world.first_slot + agent] == static_cast<uint8_t>(AgentStatus::active);
 }
 
-PICTURA_HD inline Vec2 front_bumper(const AgentBox& box) {
-  return box.center_m.xy() + Vec2{box.cos_heading, box.sin_heading} * (0.5f * box.length_m);
-}
-
 PICTURA_HD inline bool runs_red_light(const WorldView& world, const AgentBox& before, const AgentBox& after,
                                       int32_t lane_before, int32_t lane_after) {
   const Crossing crossing{front_bumper(before), front_bumper(after), {after.cos_heading, after.sin_heading},

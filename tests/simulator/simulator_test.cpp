@@ -615,6 +615,39 @@ TEST(Simulator, ParkedCarsStandOffTheRoadAndInTheWay) {
   EXPECT_EQ(simulator->state_hash(), hash);
 }
 
+TEST(Simulator, NobodySpawnsAcrossAStopLine) {
+  auto map = testing::stadium(200, 1);
+  for (const float x_m : {40.0f, 80.0f, 120.0f, 160.0f}) testing::add_light(map.get(), x_m, 4, 1, {0});
+  const auto simulator = make(testing::cars(), map, draw_worlds(1, 2000, 4, 4, 1));
+  const AgentStateView state = simulator->state();
+  int on_straight = 0;
+  for (size_t i = 0; i < 2000; ++i) {
+    const AgentBox& box = simulator->scene().agents[i];
+    if (!box.drawn || box.center_m.y > 1 || box.center_m.x < 10 || box.center_m.x > 190) continue;
+    ++on_straight;
+    const float bumper_m = box.center_m.x + 0.5f * box.length_m;
+    for (const float line_m : {40.0f, 80.0f, 120.0f, 160.0f}) {
+      EXPECT_FALSE(state.x_m[i] < line_m && bumper_m >= line_m) << "agent " << i << " at " << state.x_m[i];
+    }
+  }
+  EXPECT_GT(on_straight, 400);
+}
+
+TEST(Simulator, AWorldWithNobodyEndsAfterOneStep) {
+  SimulatorConfig config = testing::cars();
+  config.pedestrian_fraction = 1;  // and there is no walkway
+  const auto simulator = make(config, testing::ring_road(40), {{0, 5, 0}});
+  EXPECT_EQ(simulator->spawn_report().refused_no_place, 5);
+  const std::vector<int32_t> actions(5, kCoast);
+  for (int episode = 0; episode < 3; ++episode) {
+    EXPECT_EQ(simulator->episode_index()[0], episode);
+    simulator->step(actions);
+    EXPECT_EQ(simulator->episode_index()[0], episode);
+    simulator->step(actions);
+  }
+  EXPECT_EQ(simulator->totals().agent_steps, 0);
+}
+
 /// On a real town: long enough for every event to happen, the counts must fit together.
 TEST(Simulator, Town01HoldsTogether) {
   const char* data = std::getenv("PICTURA_DATA");
