@@ -82,11 +82,12 @@ PICTURA_HD inline void count_agent(const WorldView& world, int agent, const Step
   count_events(world.agents.events[slot], totals_inout);
 }
 
-/// After `steps` steps, with `spawned` agents of which `active` still drive: time is up, or too many are inactive.
+/// After `steps` steps, with `spawned` agents of which `active` still drive: time is up, too many are inactive, or
+/// there is nobody.
 PICTURA_HD inline bool episode_ends(const RuleOptions& options, int steps, int spawned, int active) {
-  if (steps >= options.episode_steps) return true;
+  if (steps >= options.episode_steps || spawned == 0) return true;
   const float inactive = static_cast<float>(spawned - active);
-  return spawned > 0 && inactive >= options.reset_inactive_fraction * static_cast<float>(spawned);
+  return inactive >= options.reset_inactive_fraction * static_cast<float>(spawned);
 }
 
 /// Once it is known whether the world's episode ends with this step: cuts off who still drives, and counts whose

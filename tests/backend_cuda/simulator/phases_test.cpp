@@ -60,6 +60,12 @@ TEST(Phases, PlaceCrowdsAsOneAfterTheOtherWould) {
   expect_same(config, {testing::ring_road(40)}, {{0, 300, 0}, {0, 37, 1}, {0, 1, 2}}, 12, 3);
 }
 
+TEST(Phases, BeginWorldsThatNobodyFindsAPlaceIn) {
+  SimulatorConfig config = testing::cars({.episode_steps = 30});
+  config.pedestrian_fraction = 0.9f;  // and there is no walkway
+  expect_same(config, {testing::ring_road(40)}, {{0, 2, 0}, {0, 1, 1}, {0, 1, 2}, {0, 30, 3}}, 40, 7);
+}
+
 TEST(Phases, TakeCommandsOfAllKinds) {
   SimulatorConfig config;
   config.episode_steps = 60;
