@@ -63,8 +63,9 @@ StepTiming StepBench::run(int64_t steps) {
   for (int64_t step = 0; step < steps; ++step) simulator_->step(actions_->sets[next_++ % kActionSets]);
   simulator_->check();
   const double elapsed_s = std::chrono::duration<double>(Clock::now() - begin).count();
-  const SimulatorTotals after = simulator_->totals();
-  return {steps, elapsed_s, after.agent_steps - before.agent_steps, after.slot_steps - before.slot_steps};
+  SimulatorTotals done = simulator_->totals();
+  done.subtract(before);
+  return {steps, elapsed_s, done.agent_steps, done.slot_steps};
 }
 
 StepTiming StepBench::run_for(double duration_s, int64_t steps_between_looks) {

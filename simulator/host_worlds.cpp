@@ -67,8 +67,8 @@ void HostResults::resize(size_t num_slots, const SimulatorConfig& config) {
   reward.assign(num_slots, 0);
   for (auto* flags : {&terminated, &truncated, &valid}) flags->assign(num_slots, 0);
   views.assign(num_slots, {});
-#define X(name, type, per_slot, part, comment) \
-  name##_.assign(config.observes(part) ? num_slots* static_cast<size_t>(per_slot) : 0, 0);
+#define X(name, type, rows, features, part, comment) \
+  name##_.assign(config.observes(part) ? num_slots* static_cast<size_t>((rows) * (features)) : 0, 0);
   PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
 }
@@ -77,14 +77,14 @@ void HostResults::reserve(size_t num_slots, const SimulatorConfig& config) {
   reward.reserve(num_slots);
   for (auto* flags : {&terminated, &truncated, &valid}) flags->reserve(num_slots);
   views.reserve(num_slots);
-#define X(name, type, per_slot, part, comment) \
-  if (config.observes(part)) name##_.reserve(num_slots* static_cast<size_t>(per_slot));
+#define X(name, type, rows, features, part, comment) \
+  if (config.observes(part)) name##_.reserve(num_slots* static_cast<size_t>((rows) * (features)));
   PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
 }
 
 ObservationView HostResults::observation_view() {
-#define X(name, type, per_slot, part, comment) name##_,
+#define X(name, type, rows, features, part, comment) name##_,
   return {PICTURA_OBSERVATION_ARRAYS(X)};
 #undef X
 }

@@ -44,7 +44,7 @@ struct HostResults {
   std::vector<View> views;
 
  private:
-#define X(name, type, per_slot, part, comment) std::vector<type> name##_;
+#define X(name, type, rows, features, part, comment) std::vector<type> name##_;
   PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
 };

@@ -21,25 +21,27 @@ enum class EntitySet : int32_t { partners, lanes, boundaries, controls, walls };
 constexpr int kNumEntitySets = 5;
 
 /// Which arrays are there: what is no set always, sets with SimulatorConfig::vector_observations, walls if they are
-/// asked for besides.
+/// requested as well.
 enum class ObservationPart : uint8_t { own, sets, walls };
 
-// X(name, type, per slot, part, comment): the arrays of an observation, [slots, per slot].
-#define PICTURA_OBSERVATION_ARRAYS(X)                                                                   \
-  X(ego, float, kEgoFeatures, ObservationPart::own, "")                                                 \
-  X(partners, float, kMaxPartners* kPartnerFeatures, ObservationPart::sets, "[kMaxPartners, features]") \
-  X(lanes, float, kMaxLanes* kLaneFeatures, ObservationPart::sets, "")                                  \
-  X(boundaries, float, kMaxBoundaries* kBoundaryFeatures, ObservationPart::sets, "")                    \
-  X(controls, float, kMaxControls* kControlFeatures, ObservationPart::sets, "")                         \
-  X(walls, float, kMaxWalls* kWallFeatures, ObservationPart::walls, "")                                 \
-  X(set_counts, int32_t, kNumEntitySets, ObservationPart::sets, "filled rows of each EntitySet")        \
-  X(conditioning, float, kNumConditioning, ObservationPart::own, "scaled to [-1, 1]")                   \
-  X(waypoints, float, kNumWaypoints* kWaypointFeatures, ObservationPart::own, "ego frame")
+// X(name, type, rows, features, part, comment): the arrays of an observation, [slots, rows, features]. Everything that
+// knows them comes from this list: their layout here and in executors, observation_arrays(), and what readers of
+// observations make of those, as schemas and encoders.
+#define PICTURA_OBSERVATION_ARRAYS(X)                                                                  \
+  X(ego, float, 1, kEgoFeatures, ObservationPart::own, "")                                             \
+  X(partners, float, kMaxPartners, kPartnerFeatures, ObservationPart::sets, "")                        \
+  X(lanes, float, kMaxLanes, kLaneFeatures, ObservationPart::sets, "")                                 \
+  X(boundaries, float, kMaxBoundaries, kBoundaryFeatures, ObservationPart::sets, "")                   \
+  X(controls, float, kMaxControls, kControlFeatures, ObservationPart::sets, "")                        \
+  X(walls, float, kMaxWalls, kWallFeatures, ObservationPart::walls, "")                                \
+  X(set_counts, int32_t, 1, kNumEntitySets, ObservationPart::sets, "filled rows of each EntitySet")    \
+  X(conditioning, float, 1, kNumConditioning, ObservationPart::own, "scaled; see docs/observation.md") \
+  X(waypoints, float, kNumWaypoints, kWaypointFeatures, ObservationPart::own, "ego frame")
 
-/// Observations of all slots; entity sets are padded with zeros up to their counts, and empty where they are not asked
-/// for.
+/// Observations of all slots; entity sets are padded with zeros up to their counts, and empty where they are not
+/// computed.
 struct ObservationView {
-#define X(name, type, per_slot, part, comment) Span<type> name;
+#define X(name, type, rows, features, part, comment) Span<type> name;
   PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
 };

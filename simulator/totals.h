@@ -46,8 +46,19 @@ struct SimulatorTotals {
     visit_counts(*this, part, Add{});
     visit_sums(*this, part, Add{});
   }
+  /// What has happened since `before`.
+  PICTURA_HD void subtract(const SimulatorTotals& before) {
+    visit_counts(*this, before, Subtract{});
+    visit_sums(*this, before, Subtract{});
+  }
 
  private:
+  struct Subtract {
+    template <typename T>
+    PICTURA_HD void operator()(T& difference, T value) const {
+      difference -= value;
+    }
+  };
   struct Add {
     template <typename T>
     PICTURA_HD void operator()(T& sum, T value) const {

@@ -194,15 +194,15 @@ struct DeviceResults {
   DeviceBuffer<float> reward;
   DeviceBuffer<uint8_t> terminated, truncated, valid;
   DeviceBuffer<View> views;
-#define X(name, type, per_slot, part, comment) DeviceBuffer<type> name;
+#define X(name, type, rows, features, part, comment) DeviceBuffer<type> name;
   PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
 
   DeviceResults() = default;
   DeviceResults(size_t num_slots, const SimulatorConfig& config)
       : reward(num_slots), terminated(num_slots), truncated(num_slots), valid(num_slots), views(num_slots) {
-#define X(name, type, per_slot, part, comment) \
-  if (config.observes(part)) name = DeviceBuffer<type>(num_slots * static_cast<size_t>(per_slot));
+#define X(name, type, rows, features, part, comment) \
+  if (config.observes(part)) name = DeviceBuffer<type>(num_slots * static_cast<size_t>((rows) * (features)));
     PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
   }
@@ -214,14 +214,14 @@ struct DeviceResults {
     };
     clear_one(reward);
     for (const DeviceBuffer<uint8_t>* flags : {&terminated, &truncated, &valid}) clear_one(*flags);
-#define X(name, type, per_slot, part, comment) clear_one(name);
+#define X(name, type, rows, features, part, comment) clear_one(name);
     PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
   }
   StepArrays step_arrays() const { return {reward.data(), terminated.data(), truncated.data(), valid.data()}; }
   ObservationView observations(size_t num_slots, const SimulatorConfig& config) const {
-#define X(name, type, per_slot, part, comment) \
-  Span<type>(name.data(), config.observes(part) ? num_slots * static_cast<size_t>(per_slot) : 0),
+#define X(name, type, rows, features, part, comment) \
+  Span<type>(name.data(), config.observes(part) ? num_slots * static_cast<size_t>((rows) * (features)) : 0),
     return {PICTURA_OBSERVATION_ARRAYS(X)};
 #undef X
   }

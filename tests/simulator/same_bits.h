@@ -19,12 +19,13 @@ bool same_bits(Span<T> a, Span<T> b) {
 
 /// Name of the first array and element that differ; empty where all bits are equal.
 inline std::string first_difference(const ObservationView& a, const ObservationView& b) {
-#define X(name, type, per_slot, part, comment)                                                                    \
-  if (!same_bits(a.name, b.name)) {                                                                               \
-    for (size_t i = 0; i < a.name.size(); ++i) {                                                                  \
-      if (!same_bits(a.name.subspan(i, 1), b.name.subspan(i, 1)))                                                 \
-        return fmt::format("{}[{}], {}: {} and {}", #name, i / (per_slot), i % (per_slot), a.name[i], b.name[i]); \
-    }                                                                                                             \
+#define X(name, type, rows, features, part, comment)                                                             \
+  if (!same_bits(a.name, b.name)) {                                                                              \
+    for (size_t i = 0; i < a.name.size(); ++i) {                                                                 \
+      if (!same_bits(a.name.subspan(i, 1), b.name.subspan(i, 1)))                                                \
+        return fmt::format("{}[{}], {}: {} and {}", #name, i / ((rows) * (features)), i % ((rows) * (features)), \
+                           a.name[i], b.name[i]);                                                                \
+    }                                                                                                            \
   }
   PICTURA_OBSERVATION_ARRAYS(X)
 #undef X

@@ -12,6 +12,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/raster/check.h"
 #include "pictura/map/load_map.h"
+#include "pictura/simulator/observation_arrays.h"
 #include "pictura/simulator/rules/limits.h"
 #include "pictura/tests/simulator/same_bits.h"
 #include "pictura/tests/simulator/test_maps.h"
@@ -536,6 +537,43 @@ TEST(Simulator, WithoutVectorObservationsTheRestIsTheSame) {
   EXPECT_TRUE(without->observations().lanes.empty());
   const Span<float> a = with->observations().ego, b = without->observations().ego;
   EXPECT_TRUE(std::equal(a.begin(), a.end(), b.begin()));
+}
+
+TEST(Simulator, ObservationsAreNamedArraysOfOneList) {
+  SimulatorConfig config = testing::cars();
+  config.wall_observations = true;
+  const auto all = make(config, testing::ring_road(40), {{0, 8, 0}});
+  const std::vector<NamedArray> arrays = observation_arrays(all->observations(), 8, all->device());
+  size_t expected = 0;
+  for (const ObservationArray& listed : kObservationArrays) {
+    // Nothing is there of walls on a map without any.
+    if (listed.name == "walls" && all->observations().walls.empty()) continue;
+    ASSERT_LT(expected, arrays.size());
+    const NamedArray& named = arrays[expected++];
+    EXPECT_EQ(named.name, listed.name);
+    EXPECT_EQ(named.array.type, listed.type);
+    EXPECT_EQ(named.array.shape, (Dims{8, listed.rows, listed.features}));
+    EXPECT_TRUE(named.array.device.is_host());
+  }
+  EXPECT_EQ(arrays.size(), expected);
+  EXPECT_EQ(arrays[1].array.checked<float>("partners", {8, 16, 8}, {}).data(), all->observations().partners.data());
+  config.vector_observations = false;
+  const auto own = make(config, testing::ring_road(40), {{0, 8, 0}});
+  std::vector<std::string> names;
+  for (const NamedArray& named : observation_arrays(own->observations(), 8, {})) names.emplace_back(named.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"ego", "conditioning", "waypoints"}));
+}
+
+TEST(Simulator, TotalsAreSubtractedFieldByField) {
+  const auto simulator = make(testing::cars(), testing::ring_road(40), {{0, 8, 0}});
+  run(simulator.get(), 20);
+  const SimulatorTotals before = simulator->totals();
+  run(simulator.get(), 30, 20);
+  SimulatorTotals since = simulator->totals();
+  since.subtract(before);
+  EXPECT_EQ(since.slot_steps, 8 * 30);
+  EXPECT_EQ(since.agent_steps, simulator->totals().agent_steps - before.agent_steps);
+  EXPECT_EQ(since.distance_m, simulator->totals().distance_m - before.distance_m);
 }
 
 TEST(Simulator, ClassesComeInThePapersSharesEachWithItsSizes) {

@@ -42,15 +42,15 @@ bool same(Span<T> host, Span<T> device) {
 
 /// A device observation's copy.
 struct HostObservation {
-#define X(name, type, per_slot, part, comment) std::vector<type> name;
+#define X(name, type, rows, features, part, comment) std::vector<type> name;
   PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
   explicit HostObservation(const ObservationView& device){
-#define X(name, type, per_slot, part, comment) name = on_host(device.name);
+#define X(name, type, rows, features, part, comment) name = on_host(device.name);
       PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
   } ObservationView view() {
-#define X(name, type, per_slot, part, comment) name,
+#define X(name, type, rows, features, part, comment) name,
     return {PICTURA_OBSERVATION_ARRAYS(X)};
 #undef X
   }

@@ -1,0 +1,35 @@
+// The arrays of an observation by name, type and shape, generated from the list in observation.h.
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "pictura/common/array.h"
+#include "pictura/simulator/observation.h"
+
+namespace pictura {
+
+/// One array of every slot's observation.
+struct ObservationArray {
+  std::string_view name;
+  ElementType type;
+  int rows = 1, features = 0;
+  ObservationPart part;
+};
+
+/// All that an observation can have, in the order of the list.
+constexpr ObservationArray kObservationArrays[] = {
+#define X(name, type, rows, features, part, comment) {#name, element_type<type>(), rows, features, part},
+    PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
+};
+
+struct NamedArray {
+  std::string_view name;
+  Array array;  // [slots, rows, features]
+};
+
+/// Those that are there, in the order of the list.
+std::vector<NamedArray> observation_arrays(const ObservationView& observations, int num_slots, Device device);
+
+}  // namespace pictura
