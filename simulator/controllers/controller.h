@@ -7,16 +7,10 @@
 #include "pictura/simulator/command.h"
 #include "pictura/simulator/fields.h"
 #include "pictura/simulator/observation.h"
+#include "pictura/simulator/slot_table.h"
 #include "pictura/simulator/totals.h"
 
 namespace pictura {
-
-/// Which agent of which world a slot is.
-struct SlotTable {
-  Span<const int32_t> world_of_slot, agent_of_slot;  // [slots] index of the world; of the agent in its world
-  Span<const int32_t> slot_begin;                    // [worlds + 1] the first slot of each world
-  Span<const uint32_t> global_world;                 // [worlds] WorldSpec::global_world
-};
 
 /// What a simulator shows its controllers, of the state after its last reset() or step(). Everything lies in its
 /// memory, at addresses that last as long as the simulator's.

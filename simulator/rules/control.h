@@ -3,7 +3,8 @@
 
 #include "pictura/common/rng.h"
 #include "pictura/simulator/command.h"
-#include "pictura/simulator/controllers/controller.h"
+#include "pictura/simulator/slot_table.h"
+#include "pictura/simulator/totals.h"
 
 namespace pictura {
 
