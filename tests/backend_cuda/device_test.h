@@ -5,7 +5,10 @@
 #include <cstdlib>
 #include <string>
 
+#include <cuda_runtime_api.h>
 #include <gtest/gtest.h>
+
+#include "pictura/common/cuda/check.h"
 
 namespace pictura {
 
@@ -22,6 +25,26 @@ class DeviceTest : public testing::Test {
     if (required && std::string(required) == "1") FAIL() << "PICTURA_REQUIRE_GPU=1, but " << why;
     GTEST_SKIP() << "no CUDA device: " << why;
   }
+};
+
+/// While it lives, allocations and device-wide waits of this thread are errors: CUDA forbids them during a capture.
+class ForbidAllocations {
+ public:
+  ForbidAllocations() {
+    PICTURA_CUDA(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking));
+    PICTURA_CUDA(cudaStreamBeginCapture(stream_, cudaStreamCaptureModeThreadLocal));
+  }
+  ~ForbidAllocations() {
+    cudaGraph_t nothing = nullptr;
+    cudaStreamEndCapture(stream_, &nothing);
+    cudaGraphDestroy(nothing);
+    cudaStreamDestroy(stream_);
+  }
+  ForbidAllocations(const ForbidAllocations&) = delete;
+  ForbidAllocations& operator=(const ForbidAllocations&) = delete;
+
+ private:
+  cudaStream_t stream_ = nullptr;
 };
 
 }  // namespace test

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "pictura/map/map_geometry.h"
 #include "pictura/simulator/rules/observe.h"
 #include "pictura/tests/simulator/stage.h"
 #include "pictura/tests/simulator/test_maps.h"
