@@ -57,8 +57,10 @@ class HostRendererCuda final : public Renderer {
     check_queries(name(), scene, views, batch.size(), queries, visibility_out.size());
     const auto queue = static_cast<cudaStream_t>(stream.handle);
     const Span<float> result = visibility_.resize(queries.size());
-    renderer_->visibility(scene_.assign(scene, queue), views_.assign(views, queue), queries_.assign(queries, queue),
-                          result, stream);
+    // All views, so that queries about those beyond the count are answered.
+    const auto count = static_cast<int32_t>(views.size());
+    const ViewBatch counted{views_.assign(batch.views, queue), count_.assign({&count, 1}, queue).data()};
+    renderer_->visibility(scene_.assign(scene, queue), counted, queries_.assign(queries, queue), result, stream);
     if (!queries.empty()) {
       PICTURA_CUDA(cudaMemcpyAsync(visibility_out.data(), result.data(), result.size() * sizeof(float),
                                    cudaMemcpyDeviceToHost, queue));
@@ -83,6 +85,7 @@ class HostRendererCuda final : public Renderer {
   DeviceScene scene_;
   DeviceImages images_;
   DeviceCopy<View> views_;
+  DeviceCopy<int32_t> count_;
   DeviceCopy<VisibilityQuery> queries_;
   DeviceCopy<float> visibility_;
 };

@@ -25,7 +25,7 @@ std::size_t bytes_of(const ScratchPlan& plan, const ScratchNeeds& needs) {
 ScratchPlan plan_scratch(const ScratchNeeds& needs, std::size_t max_bytes) {
   ScratchPlan plan{1, 1};
   const std::size_t min_bytes = bytes_of(plan, needs);
-  PICTURA_CHECK(min_bytes <= max_bytes, "renderer cuda: max_scratch_bytes: expected at min_bytes {}, got {}", min_bytes,
+  PICTURA_CHECK(min_bytes <= max_bytes, "renderer cuda: max_scratch_bytes: expected at least {}, got {}", min_bytes,
                 max_bytes);
   std::size_t left = max_bytes - min_bytes;
   plan.views += take(needs.views - 1, needs.view_bytes, &left);
