@@ -28,19 +28,13 @@ void paste(const RgbImage& picture, int left_px, int top_px, RgbImage* image_out
   }
 }
 
-std::vector<WallFace> walls_of(const Simulator& simulator) {
-  const SimulatorConfig& config = simulator.config();
-  return config.walls ? make_walls(*simulator.maps()[0]->road, {.wall_seed = config.wall_seed})
-                      : std::vector<WallFace>{};
-}
-
 }  // namespace
 
 struct Film::Parts {
   Parts(const std::string& path, const Simulator& simulator, int followed_agent, float shown_width_m, int num_threads)
       : agent(followed_agent),
         width_m(shown_width_m),
-        painter(*simulator.maps()[0]->road, kTopWidth_px, kTopHeight_px, walls_of(simulator)),
+        painter(*simulator.maps()[0]->road, kTopWidth_px, kTopHeight_px, simulator.maps()[0]->geometry.walls),
         renderer(
             make_renderer("cpu", {.rig = paper_rig(kCameraWidth_px, kCameraHeight_px), .num_threads = num_threads})),
         images(renderer->config().rig, 1),
