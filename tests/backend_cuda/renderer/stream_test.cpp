@@ -317,7 +317,7 @@ TEST_F(CudaStreamTest, ACaptureAfterReserveNeedsNoCallBefore) {
   EXPECT_THAT(test::message_of([&] { stage.renderer->reserve(-1, 0); }), HasSubstr("reserve: expected 0 views"));
 }
 
-TEST_F(CudaStreamTest, PollDoesNotWaitAndCheckWaitsForItsStreamAlone) {
+TEST_F(CudaStreamTest, PollsWithoutWaitingAndChecksItsStreamAlone) {
   Stage stage(20, 2, {.rig = paper_rig(16, 9)});
   stage.draw();
   stage.town.views[1].world = 9;
