@@ -8,7 +8,7 @@
 
 namespace pictura {
 
-/// What became of a lane driver.
+/// What became of a lane-keeping agent.
 struct DrivenEpisode {
   int goals = 0;  // last waypoints passed within 2 m
   int halt_reason = kEventNone;
@@ -17,7 +17,7 @@ struct DrivenEpisode {
   Vec2 end_m;
 };
 
-/// Drives for `steps` steps, or until an infraction, in so many worlds on the map, so many drivers in each among parked
+/// Drives for `steps` steps, or until an infraction, in so many worlds on the map, so many agents in each among parked
 /// cars, from the first episode of config.seed on. The share of cyclists is config.cyclist_fraction; the rest is as in
 /// evaluation: waypoints of 2 m, lights with fixed timing, no multipliers.
 std::vector<DrivenEpisode> drive_lane_keeping_episodes(const std::shared_ptr<const RoadMap>& map,

@@ -160,7 +160,7 @@ void add_stop_lines(const RoadMap& map, MapRules* out) {
 }
 
 /// The spot outside the kerb nearest to p, if that is within reach_m. Right-hand traffic: the kerb is to the right of
-/// the cars beside it, and a road edge has the road on its own right, so the cars point against it.
+/// the cars next to it, and a road edge has the road on its own right, so the cars point against it.
 void add_kerb_spot(Vec3 p, float reach_m, MapRules* out) {
   const Barrier* nearest = nullptr;
   float best_m = reach_m;
@@ -180,7 +180,7 @@ void add_kerb_spot(Vec3 p, float reach_m, MapRules* out) {
   out->parking_spots.push_back({{at.x, at.y, p.z}, std::atan2(-along.y, -along.x), left_normal(along)});
 }
 
-/// Parking spaces, and outside junctions a spot every few metres of parking lanes and of the kerbs beside shoulders and
+/// Parking spaces, and outside junctions a spot every few metres of parking lanes and of the kerbs along shoulders and
 /// sidewalks.
 void add_parking_spots(const RoadMap& map, MapRules* out) {
   constexpr float kSpacing_m = 7.0f;
@@ -263,7 +263,7 @@ CellLists lists_by_distance(const MapRules& map, const std::string& map_name, co
       std::sort(found.begin(), found.end(), [](const Neighbor& a, const Neighbor& b) {
         return a.distance_m < b.distance_m || (a.distance_m == b.distance_m && a.item < b.item);
       });
-      // Before they are made, since one cell may ask for all.
+      // Before they are made, since one cell may need all of them.
       PICTURA_CHECK(lists.items.size() + found.size() * static_cast<size_t>(lists_per_cell) <= kMaxItems,
                     "map {}: expected lists of what is near of at most {} entries in all, got more: too much lies "
                     "within {} m of ({}, {})",

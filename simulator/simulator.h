@@ -51,7 +51,7 @@ struct SimulatorConfig {
   }
 };
 
-/// One world: which of the simulator's maps it is on, and how many controlled agents it asks for.
+/// One world: which of the simulator's maps it is on, and how many controlled agents are requested.
 struct WorldSpec {
   int map = 0;
   int num_agents = 0;
@@ -99,7 +99,7 @@ struct StepResult {
   Span<const uint8_t> refusal;     // [slots] SpawnFailure: why the agent is absent from this episode, 0 where it is not
 };
 
-/// What became of the agents that were asked for, over all worlds, in their current episodes.
+/// What became of the agents that were requested, over all worlds, in their current episodes.
 struct SpawnReport {
   int64_t asked = 0, spawned = 0, refused = 0;      // asked == spawned + refused
   int64_t refused_no_place = 0, refused_taken = 0;  // the reasons: SpawnFailure of each absent agent

@@ -30,7 +30,7 @@ struct SimulatorSetup {
     return *maps[static_cast<size_t>(worlds[static_cast<size_t>(world)].map)];
   }
   SimulatorCapacity needs() const { return capacity_of(maps, worlds); }
-  /// Makes room for as many worlds, slots and so on, so that assigning another setup within it moves no array.
+  /// Allocates for as many worlds, slots and so on, so that assigning another setup within it moves no array.
   void reserve(const SimulatorCapacity& capacity);
 
   /// A view of a world without state: its map, its place in the arrays and the keys of its random numbers.

@@ -15,7 +15,7 @@ struct SimulatorState {
   explicit SimulatorState(const SimulatorSetup& setup) { resize(setup); }
   /// Gives everything the setup's size and its first value.
   void resize(const SimulatorSetup& setup);
-  /// Makes room, so that a resize within it moves no array; boxes as the setup's configuration has them.
+  /// Allocates, so that a resize within it moves no array; boxes as the setup's configuration has them.
   void reserve(const SimulatorCapacity& capacity, const SimulatorConfig& config);
 
   SpawnReport spawn_report(const SimulatorSetup& setup) const;

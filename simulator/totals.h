@@ -1,5 +1,5 @@
 // What a simulator counts. Sums of floating-point numbers have one order on every executor: agent i of a world adds to
-// lane i mod kTotalsBins, and the lanes are added up in order.
+// bin i mod kTotalsBins, and the bins are added up in order.
 #pragma once
 
 #include "pictura/common/portable/hd.h"

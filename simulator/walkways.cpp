@@ -31,7 +31,7 @@ struct Network {
 
 bool same_place(Vec3 a, Vec3 b) { return length((a - b).xy()) < kSamePlace_m && std::fabs(a.z - b.z) < kLevel_m; }
 
-/// The lines along which one walks beside the road.
+/// The lines along which one walks next to the road.
 void add_lanes(const RoadMap& map, Network* out) {
   const auto is_sidewalk = [](const Lane& lane) { return lane.type == LaneType::sidewalk; };
   const bool has_sidewalks = std::any_of(map.lanes.begin(), map.lanes.end(), is_sidewalk);
@@ -106,7 +106,7 @@ void add_middle_line(Span<const Vec3> outline, Vec3* a_out, Vec3* b_out) {
   }
 }
 
-/// The node nearest to p beside the road, made by cutting an edge where it lies between nodes; -1 where none is within
+/// The node nearest to p next to the road, made by cutting an edge where it lies between nodes; -1 where none is within
 /// reach.
 int32_t node_near(Vec3 p, Network* network_inout) {
   const size_t num_edges = network_inout->edges.size();

@@ -272,7 +272,7 @@ struct DeviceScratch {
         next_spawned(num_worlds) {}
 };
 
-/// A stream beside the caller's, and what ties them together.
+/// A stream that runs in parallel to the caller's, and the events that order them.
 class SideStream {
  public:
   SideStream() {

@@ -1,4 +1,4 @@
-// How the simulator's phases are started on a device: a thread or a group of lanes per item, or a block per world.
+// How the simulator's phases are started on a device: a thread or a group of threads per item, or a block per world.
 // Kernels of a stream follow one another, which is the barrier between phases.
 #include <type_traits>
 
@@ -18,7 +18,7 @@ struct DeviceAtomics {
   __device__ void lower(int32_t* value, int32_t bound) const { atomicMin(value, bound); }
 };
 
-/// The nearest of the things offered by a warp's lanes: the lane of rank k holds the k-th, as squared distance and
+/// The nearest of the items offered by a warp's threads: the thread of rank k holds the k-th, as squared distance and
 /// item.
 template <int capacity>
 class NearestOfWarp {
@@ -47,7 +47,7 @@ class NearestOfWarp {
   uint64_t key_ = kNone;
 };
 
-/// A group of a warp's lanes, beside other groups.
+/// Some consecutive threads of a warp; the rest of it are other groups.
 template <int kGroup>
 struct DeviceThreadGroup {
   static constexpr int kSize = kGroup;
@@ -60,7 +60,7 @@ struct DeviceThreadGroup {
   __device__ void sync() const { __syncwarp(mask()); }
   __device__ bool any(bool value) const { return __any_sync(mask(), value); }
   __device__ uint32_t ballot(bool value) const { return __ballot_sync(mask(), value) >> first(); }
-  __device__ int count_before(uint32_t lanes) const { return __popc(lanes & ((1u << rank()) - 1u)); }
+  __device__ int count_before(uint32_t threads) const { return __popc(threads & ((1u << rank()) - 1u)); }
   __device__ int sum(int value) const { return __reduce_add_sync(mask(), value); }
   template <typename T>
   __device__ T from(int rank, const T& value) const {
@@ -91,7 +91,7 @@ struct DeviceThreadGroup {
     memcpy(&result, words, sizeof(T));
     return result;
   }
-  /// Room for WriteObservation::kStaging floats.
+  /// Memory for WriteObservation::kStaging floats.
   __device__ float* staging() const { return rows; }
   /// Writes the first `filled` of staging(), then zeros up to `end` or a little beyond, but not beyond `capacity`.
   __device__ void write(const float* values, int filled, int end, int capacity, float* out) const {
@@ -148,7 +148,7 @@ __global__ void __launch_bounds__(kThreads, kGroupBlocks) run_groups(int32_t cou
   if (item < count) phase(DeviceThreadGroup<kGroup>{}, static_cast<int32_t>(item));
 }
 
-/// Lanes with memory of their own. Small blocks, since the last of its warps holds a block's place.
+/// Groups with memory of their own. Small blocks, since the last of its warps holds a block's place.
 constexpr int kObserveThreads = 64;
 __global__ void __launch_bounds__(kObserveThreads, kObserveBlocks)
     run_write_observation(int32_t count, WriteObservation phase) {
@@ -170,7 +170,7 @@ __global__ void __launch_bounds__(kTeamThreads) run_teams(int32_t count, Phase p
   }
 }
 
-/// Errors stay with the runtime until the caller asks for the last one.
+/// Errors stay with the runtime until the caller reads the last one.
 struct DeviceLaunch {
   StepStreams streams;
 
@@ -201,7 +201,7 @@ struct DeviceLaunch {
     constexpr int32_t kMaxTeams = 128;
     run_teams<<<static_cast<unsigned>(min(count, kMaxTeams)), kTeamThreads, 0, streams.main>>>(count, phase);
   }
-  /// Both at once: what `aside` starts on the launch that it is given, beside what `here` starts on this one. What
+  /// Both in parallel: what `side` starts on the launch that it is given, and what `main` starts on this one. What
   /// follows waits for both.
   template <typename Side, typename Main>
   void fork_join(const Side& side, const Main& main) const {

@@ -1,5 +1,5 @@
-// What the simulator's host side asks of its kernels. All of it is put on a stream and waits for nothing; what goes
-// wrong, cudaGetLastError() tells.
+// The kernels that the simulator's host side starts. All are put on a stream and nothing waits; errors are left to
+// cudaGetLastError().
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -9,7 +9,7 @@
 
 namespace pictura::cuda {
 
-/// The caller's stream, and one beside it for what may overlap, which the events tie to it; a graph captures both.
+/// The caller's stream, and a second one for what may overlap, ordered by the events; a graph captures both.
 struct StepStreams {
   cudaStream_t main = nullptr, side = nullptr;
   cudaEvent_t forked = nullptr, joined = nullptr;

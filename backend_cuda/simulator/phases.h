@@ -1,7 +1,7 @@
-// The CUDA executor's step as phases over agents and worlds, each of which reads only what an earlier one has finished.
+// The CUDA executor's step as phases over agents and worlds, which read only what an earlier phase has finished.
 // They say what every thread does and not how threads are started, so that a host can run them too, in any order:
 //   threads  one thread per item: phase(atomics, item)
-//   lanes    lanes in lockstep (simulator/rules/thread_group.h), a group of them per item: phase(group, item)
+//   groups   threads in lockstep (simulator/rules/thread_group.h), a group of them per item: phase(group, item)
 //   teams    threads that wait for each other, one team per world: phase(team, world)
 // backend_cuda/simulator/kernels.cu starts them on a device; tests/backend_cuda/simulator/shuffled_executor.h on a
 // host.
@@ -14,7 +14,7 @@
 
 namespace pictura::cuda {
 
-/// How many lanes share an agent: about as many as there are lane segments, barriers and boxes to look at.
+/// How many threads share an agent: about as many as there are lane segments, barriers and boxes to test.
 constexpr int kThreadsPerAgent = 8, kWarp = 32;
 /// How many boxes of a world look for a place at once.
 constexpr int kTurn = 128;
@@ -72,13 +72,13 @@ struct SimulatorArrays {
   PICTURA_HD bool has_rejected_command() const { return *rejected_slot != kNoSlot; }
 };
 
-/// A world's boxes as one cell: with a warp to look at them, all are looked at sooner than they are sorted.
+/// A world's boxes as one cell: a warp tests all of them sooner than they could be sorted.
 PICTURA_HD inline GridView one_cell(Span<const int32_t> begin, Span<const int32_t> items) {
   constexpr float kWhole_m = 1e9f;
   return {{}, kWhole_m, 1, 1, begin, items};
 }
 
-/// Where a box is looked for in that cell: what stands nowhere is far from everything.
+/// The centre of a box for that cell: a box that is not drawn is far from everything.
 PICTURA_HD inline Vec2 center_of(const AgentBox& box) {
   constexpr float kNowhere_m = 1e9f;
   return box.drawn ? box.center_m.xy() : Vec2{kNowhere_m, kNowhere_m};
@@ -92,8 +92,8 @@ struct TeamMemory {
 /// Finds for each of `count` boxes, which are the world's from first_box on, the first of its tries that the map
 /// permits and that is clear of the boxes before it: what placing them one after the other would find. As many as the
 /// team has groups for choose at once, given what the others chose last, until nobody changes: then everybody's choice
-/// agrees with the choices before it, which only the sequential result does. Every round settles at least the lowest
-/// one that changed. Those of an earlier turn stand.
+/// agrees with the choices before it, which only the sequential result does. Every round fixes at least the lowest one
+/// that changed. Choices of an earlier turn do not change.
 ///   box_of_try(i, try), permits(group, i, try, box)
 template <typename Team, typename BoxOfTry, typename Permits>
 PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const WorldScratch& scratch, int first_box,
@@ -350,7 +350,8 @@ struct FinishStep {
   PICTURA_HD bool count(const ThreadGroup& group, int w, SimulatorTotals* totals_out) const {
     const WorldView world = arrays.world(w);
     const int steps = arrays.episode_step[w] + 1;
-    constexpr int kParts = kTotalsBins / ThreadGroup::kSize;  // of the totals' lanes, that one of these sums up
+    constexpr int kParts =
+        kTotalsBins / ThreadGroup::kSize;  // of the totals' bins, that one thread of the group sums up
     SimulatorTotals parts[kParts];
     const auto for_each_agent = [&](const auto& body) {
       for (int part = 0; part < kParts; ++part) {
@@ -373,7 +374,7 @@ struct FinishStep {
     return ends;
   }
 
-  /// Counts in any order; the rest in that of the totals' lanes, see simulator/totals.h.
+  /// Counts in any order; sums in that of the totals' bins, see simulator/totals.h.
   template <typename ThreadGroup, int kParts>
   PICTURA_HD static void add_up(const ThreadGroup& group, SimulatorTotals (&parts)[kParts], SimulatorTotals* sum_out) {
     for (SimulatorTotals& part : parts) {
@@ -407,7 +408,7 @@ struct WriteObservation {
   }
 
  private:
-  /// The rows are put together in the lanes' own memory, so that they are written whole and in order.
+  /// The rows are put together in the group's own memory, so that they are written whole and in order.
   template <typename ThreadGroup>
   PICTURA_HD void write_set(const ThreadGroup& group, const WorldView& world, int agent, EntitySet set) const {
     const int slot = world.first_slot + agent;
@@ -431,7 +432,7 @@ struct WriteObservation {
     group.sync();
   }
 
-  /// observe_pieces() by several pieces a lane at a time, whose loads are under way together.
+  /// observe_pieces() by several pieces a thread at a time, whose loads overlap.
   template <typename ThreadGroup>
   PICTURA_HD static int collect_pieces(const ThreadGroup& group, const PieceList& near, const EgoFrame& frame,
                                        int capacity, float* rows) {

@@ -33,7 +33,7 @@ int32_t DrivenAgent::speed_action(const Motion& from, float wanted_mps) const {
   return best;
 }
 
-/// Jerks are too coarse to come to rest by ever smaller accelerations: looks so many steps ahead.
+/// Jerks are too coarse to come to rest by ever smaller accelerations: searches so many steps ahead.
 DrivenAgent::Halt DrivenAgent::halt(const Motion& from, int steps) const {
   constexpr float kPerAcceleration_s = 0.3f;
   if (steps == 0) return {kStraight, kPerAcceleration_s * std::fabs(from.accel_long_mps2)};

@@ -1,4 +1,5 @@
-// The agent that a driver drives, by its world's own rules: where its actions lead, and whether that leaves the road.
+// An agent that a controller drives, by its world's own rules: where its actions lead, and whether that leaves the
+// road.
 #pragma once
 
 #include "pictura/simulator/rules/step.h"

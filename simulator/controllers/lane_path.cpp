@@ -62,9 +62,9 @@ std::vector<int32_t> LanePath::route_to(RoutePoint to) const {
     is_done = true;
     for (size_t i = 1; i + 1 < lanes.size(); ++i) {
       if (is_change(lanes[i - 1], lanes[i]) || !is_change(lanes[i], lanes[i + 1])) continue;
-      for (const int32_t beside : {lane(lanes[i - 1]).left, lane(lanes[i - 1]).right}) {
-        if (beside < 0 || !contains(successors_of(beside), lanes[i + 1])) continue;
-        lanes[i] = beside;
+      for (const int32_t neighbor : {lane(lanes[i - 1]).left, lane(lanes[i - 1]).right}) {
+        if (neighbor < 0 || !contains(successors_of(neighbor), lanes[i + 1])) continue;
+        lanes[i] = neighbor;
         is_done = false;
         break;
       }
@@ -73,9 +73,9 @@ std::vector<int32_t> LanePath::route_to(RoutePoint to) const {
   return lanes;
 }
 
-/// False, and goes no further, where a lane change has too little room and need not be made.
+/// False, and goes no further, where there is too little length for a lane change that need not be made.
 bool LanePath::follow_route(const std::vector<int32_t>& lanes, RoutePoint to) {
-  constexpr float kMinRoom_m = 12;  // for one change
+  constexpr float kMinChange_m = 12;  // for one change
   for (size_t i = 1; i < lanes.size(); ++i) {
     if (!is_change(at_.lane, lanes[i])) {
       follow(lane(at_.lane).length_m);
@@ -85,10 +85,10 @@ bool LanePath::follow_route(const std::vector<int32_t>& lanes, RoutePoint to) {
     const size_t first = i;
     while (i + 1 < lanes.size() && is_change(lanes[i], lanes[i + 1])) ++i;
     const float length_m = lane(lanes[i]).length_m;
-    const float room_m = (i + 1 == lanes.size() ? to.s_m : length_m) - length_m * (at_.s_m / lane(at_.lane).length_m);
-    const bool fits = room_m >= kMinRoom_m * static_cast<float>(i + 1 - first);
+    const float left_m = (i + 1 == lanes.size() ? to.s_m : length_m) - length_m * (at_.s_m / lane(at_.lane).length_m);
+    const bool fits = left_m >= kMinChange_m * static_cast<float>(i + 1 - first);
     if (!fits && lane(at_.lane).num_successors > 0) return false;
-    change_to(lanes[i], room_m);
+    change_to(lanes[i], left_m);
   }
   follow(to.s_m);
   return true;
@@ -130,8 +130,8 @@ int32_t LanePath::best_successor(RoutePoint to) const {
   return best;
 }
 
-/// Begins to draw nearer to a lane beside, within room_m where that can be driven.
-void LanePath::change_to(int32_t to, float room_m) {
+/// Begins to move to a neighbouring lane, within length_m where that can be driven.
+void LanePath::change_to(int32_t to, float length_m) {
   constexpr float kMin_m = 8, kPerMetreAside = 7;
   const Vec2 here = end().position_m.xy();
   Foot best;
@@ -144,7 +144,7 @@ void LanePath::change_to(int32_t to, float room_m) {
     at_ = {to, segment.s_m + foot.along_m};
   }
   const float aside_m = std::copysign(best.distance_m, best.side);
-  change_ = {aside_m, std::max(kMin_m, std::min(room_m, kPerMetreAside * best.distance_m)), 0};
+  change_ = {aside_m, std::max(kMin_m, std::min(length_m, kPerMetreAside * best.distance_m)), 0};
 }
 
 void LanePath::follow(float to_s_m) {

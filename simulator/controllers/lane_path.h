@@ -1,5 +1,5 @@
-// The way of a lane driver: the centre lines of the lanes through its waypoints, lane changes drawn out, and how fast
-// its curves can be driven.
+// The path of a lane-keeping agent: the centre lines of the lanes through its waypoints, lane changes drawn out, and
+// how fast its curves can be driven.
 #pragma once
 
 #include <cstddef>
@@ -43,7 +43,7 @@ class LanePath {
 
   /// Forgets what comes after point `last`.
   void cut(size_t last);
-  /// Goes on to a place from which a route goes on for ever; false where that has too little room for lane changes,
+  /// Goes on to a place from which a route goes on for ever; false where that is too short for lane changes,
   /// also after detours: then it has gone on somewhere. Throws Error where no route leads there.
   bool go_to(RoutePoint to);
   /// Goes on for so long as lanes do, at forks the straightest way.
@@ -62,7 +62,7 @@ class LanePath {
   Span<const int32_t> successors_of(int32_t index) const;
   float turn_of(int32_t index) const;
   int32_t best_successor(RoutePoint to) const;
-  void change_to(int32_t to, float room_m);
+  void change_to(int32_t to, float length_m);
   void follow(float to_s_m);
   void enter(int32_t next) { at_ = {next, 0}; }
   PathPoint end() const;

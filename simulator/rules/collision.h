@@ -58,7 +58,7 @@ PICTURA_HD inline OrientedBox between(const AgentBox& from, const AgentBox& to, 
 }
 
 /// Whether two boxes that move during a step touch at its end or on the way. The way is cut so finely that the boxes
-/// approach each other by less than the narrower one's width between two looks.
+/// approach each other by less than the narrower one's width between two tests.
 PICTURA_HD inline bool collide(const AgentBox& a_from, const AgentBox& a_to, const AgentBox& b_from,
                                const AgentBox& b_to) {
   const Vec2 a_path = (a_to.center_m - a_from.center_m).xy();

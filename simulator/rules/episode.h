@@ -62,7 +62,7 @@ PICTURA_HD inline void count_events(int events, SimulatorTotals* totals_inout) {
   totals_inout->wall_contacts += (events & kEventWall) != 0;
 }
 
-/// Settles one agent (phase 3) and writes its reward and end. Returns how far it drove in the step, in metres.
+/// Phase 3 of one agent, whose reward and end it writes. Returns how far it drove in the step, in metres.
 PICTURA_HD inline float apply_reward_and_halt(const WorldView& world, int agent, const StepArrays& results) {
   const int slot = world.first_slot + agent;
   const float step_m = driven_m(world.agents.speed_mps[slot], world.options.dt_s);
@@ -71,7 +71,7 @@ PICTURA_HD inline float apply_reward_and_halt(const WorldView& world, int agent,
   return step_m;
 }
 
-/// Counts the step of an agent that has been settled and drove step_m in it.
+/// Counts the step of an agent after phase 3, in which it drove step_m.
 PICTURA_HD inline void count_agent(const WorldView& world, int agent, const StepArrays& results, float step_m,
                                    SimulatorTotals* totals_inout) {
   const int slot = world.first_slot + agent;

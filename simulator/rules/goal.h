@@ -16,7 +16,7 @@ constexpr float kMetricGoalRadius_m = 2.0f;
 
 /// The neighbour of a point, `side` < 0 left, else right, at the same fraction of its lane; the point itself where
 /// there is none.
-PICTURA_HD inline RoutePoint beside(const MapView& map, RoutePoint at, int side) {
+PICTURA_HD inline RoutePoint neighbor_of(const MapView& map, RoutePoint at, int side) {
   const MapLane& lane = map.lanes[static_cast<size_t>(at.lane)];
   const int32_t neighbor = side < 0 ? lane.left : lane.right;
   if (neighbor < 0) return at;
@@ -32,7 +32,7 @@ PICTURA_HD inline RoutePoint walk(const MapView& map, RoutePoint at, float dista
     const float left_m = lane->length_m - at.s_m;
     if (distance_m <= left_m) return {at.lane, at.s_m + distance_m};
     for (int side = -1; side <= 1 && lane->num_successors == 0; side += 2) {
-      const RoutePoint changed = beside(map, at, side);
+      const RoutePoint changed = neighbor_of(map, at, side);
       if (map.lanes[static_cast<size_t>(changed.lane)].num_successors == 0) continue;
       at = changed;
       lane = &map.lanes[static_cast<size_t>(at.lane)];
@@ -49,7 +49,7 @@ PICTURA_HD inline RoutePoint walk(const MapView& map, RoutePoint at, float dista
 PICTURA_HD inline RoutePoint next_waypoint(const MapView& map, RoutePoint at, RandomStream* random_inout) {
   const float gap_m = random_inout->uniform(kMinWaypointGap_m, kMaxWaypointGap_m);
   const float change = random_inout->uniform();
-  if (change < kLaneChangeChance) at = beside(map, at, change < 0.5f * kLaneChangeChance ? -1 : 1);
+  if (change < kLaneChangeChance) at = neighbor_of(map, at, change < 0.5f * kLaneChangeChance ? -1 : 1);
   return walk(map, at, gap_m, random_inout);
 }
 

@@ -47,7 +47,7 @@ struct Barrier {
 };
 
 /// A straight piece of a way for pedestrians, in one direction; the one of the other direction has the index next to
-/// it, 2k beside 2k + 1.
+/// it: 2k and 2k + 1.
 struct WalkPiece {
   Vec3 a_m;
   Vec2 direction;  // unit vector
@@ -160,7 +160,7 @@ PICTURA_HD inline Span<const int32_t> items_at(const GridView& cells, Vec2 p) {
   return list_of(cells, static_cast<size_t>(cells.cell_y(p.y) * cells.num_x + cells.cell_x(p.x)));
 }
 
-/// What there is to observe depends on where one looks: pieces are listed per cell and per eighth of a turn.
+/// What there is to observe depends on the heading: pieces are listed per cell and per eighth of a turn.
 constexpr int kSectors = 8;
 
 /// The list of the cell that holds p and of the sector that holds the heading, in [-pi, pi].

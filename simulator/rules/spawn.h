@@ -29,7 +29,7 @@ PICTURA_HD inline RandomStream agent_stream(const WorldView& world, int agent, u
                        .purpose = purpose});
 }
 
-/// Clears the agent's fields and draws its class, size and conditioning. It is absent until place_agent finds room.
+/// Clears the agent's fields and draws its class, size and conditioning. It is absent until place_agent finds a place.
 PICTURA_HD inline void draw_agent(const WorldView& world, int agent) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
@@ -189,7 +189,7 @@ PICTURA_HD bool covers_driven_lane(const MapView& map, const AgentBox& box, cons
 }
 
 /// Whether the map permits the box on its spot: clear of barriers and of lanes that are driven on, and off the road
-/// where that is beside a kerb.
+/// where that is at a kerb.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool may_park(const MapView& map, const AgentBox& box, const ParkingSpot& spot,
                          const ThreadGroup& group = {}) {

@@ -1,6 +1,6 @@
 // One step of one agent, in three phases with a barrier between them, so that every phase reads only what an earlier
-// one has finished: advance (own motion, road, lights, goals), collisions (everybody's boxes), settle (reward,
-// halting).
+// one has finished: advance (own motion, road, lights, goals), collisions (everybody's boxes), reward and
+// halt.
 #pragma once
 
 #include "pictura/simulator/command.h"

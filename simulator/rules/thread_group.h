@@ -1,14 +1,14 @@
-// How the loops of one agent's rules are shared out: rules that look at many things take `lanes`, threads in lockstep
-// that all call the rule with the same arguments, each take every size()-th thing, and all return the same. A host
-// calls them with SingleThread. Only what does not depend on the order of things is shared out: whether any of them is
-// so, and the least of them.
+// How several threads share the loops of one agent's rules. Rules that loop over many items take a thread group, whose
+// threads run in lockstep, call the rule with the same arguments, take every size()-th item each, and all return the
+// same. A host passes SingleThread. Only results that do not depend on the order of items are shared: whether any item
+// satisfies a condition, and the smallest one.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
 
 namespace pictura {
 
-/// The nearest of the things offered, in ascending order of squared distance, then item.
+/// The nearest of the items offered, in ascending order of squared distance, then item.
 template <int capacity>
 class NearestOfOneThread {
  public:
@@ -36,7 +36,7 @@ class NearestOfOneThread {
   int count_ = 0;
 };
 
-/// A thread alone.
+/// A group of one thread.
 struct SingleThread {
   static constexpr int kSize = 1;
   template <int capacity>
@@ -44,16 +44,16 @@ struct SingleThread {
 
   PICTURA_HD static constexpr int size() { return kSize; }
   PICTURA_HD int rank() const { return 0; }
-  /// What each lane wrote before, every lane sees after.
+  /// What each thread of the group wrote before, all of them see after.
   PICTURA_HD void sync() const {}
   PICTURA_HD bool any(bool value) const { return value; }
   PICTURA_HD int sum(int value) const { return value; }
-  /// The value of the lane with the lowest (score, index); scores are not negative.
+  /// The value of the thread with the lowest (score, index); scores are not negative.
   template <typename T>
   PICTURA_HD T of_lowest(float, int, const T& value) const {
     return value;
   }
-  /// The value of the lane of that rank.
+  /// The value of the thread of that rank.
   template <typename T>
   PICTURA_HD T from(int, const T& value) const {
     return value;

@@ -116,7 +116,7 @@ TEST(Collision, FaultIsJudgedByTheRearPlaneBeforeTheStep) {
   // Head on, both are at fault.
   EXPECT_TRUE(at_fault(own, 5, make_box(4.1f, 0.5f, kPi)));
   EXPECT_TRUE(at_fault(make_box(4.1f, 0.5f, kPi), 5, own));
-  // From the side into the door, and from the side behind the bumper.
+  // From the side into the middle, and from the side behind the bumper.
   EXPECT_TRUE(at_fault(own, 5, make_box(-1, 3.1f, -kHalfPi)));
   EXPECT_FALSE(at_fault(own, 5, make_box(-2.5f, 3.1f, -kHalfPi)));
   // Who backs into the tail comes from behind too.

@@ -100,7 +100,7 @@ TEST(Towns, ParkedCarsLeaveTheLanesFree) {
         }
       }
     }
-    EXPECT_GT(placed, 32) << "room for 32 cars";
+    EXPECT_GT(placed, 32) << "places for 32 cars";
   }
 }
 

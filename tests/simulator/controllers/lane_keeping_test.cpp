@@ -1,5 +1,5 @@
-// The lane driver, and in every town: keeping one's lane and stopping at red lights causes no infraction, and reaches
-// goals.
+// The lane-keeping controller, and in every town: keeping one's lane and stopping at red lights causes no infraction,
+// and reaches goals.
 #include "pictura/simulator/controllers/lane_keeping.h"
 
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 namespace pictura {
 namespace {
 
-/// Nothing may halt a driver, who seldom leaves the middle of the lane.
+/// Nothing may halt an agent, and it seldom leaves the middle of the lane.
 void drive_everywhere(float cyclist_fraction, int drivers, int drivers_each, int steps) {
   std::vector<std::string> towns = known_towns();
   for (const char* town : {"procedural:1", "procedural:2"}) towns.emplace_back(town);
