@@ -138,7 +138,8 @@ class Simulator {
   /// and then leaves everything as it was.
   virtual void set_worlds(CompiledMaps maps, std::vector<GeometryHandle> handles, std::vector<WorldSpec> worlds,
                           uint64_t seed, Stream stream = {}) = 0;
-  /// Allocates for set_worlds() calls up to this capacity. The present state goes on. May wait for the device.
+  /// Allocates for set_worlds() calls up to this capacity. The present state goes on, as after a
+  /// restore(). May wait for the device.
   virtual void reserve(const SimulatorCapacity& capacity) = 0;
   /// How often memory that callers hold addresses of has moved.
   virtual uint64_t generation() const = 0;

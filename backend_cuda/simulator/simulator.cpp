@@ -61,6 +61,7 @@ class SimulatorCuda final : public Simulator {
     PICTURA_CUDA(cudaStreamSynchronize(nullptr));
     grow(capacity);
     put_setup(nullptr);
+    results_.clear(nullptr);
     put_state(nullptr);
     PICTURA_CUDA(cudaDeviceSynchronize());
   }
@@ -160,6 +161,12 @@ class SimulatorCuda final : public Simulator {
     ++generation_;
   }
   void allocate(const SimulatorCapacity& capacity) {
+    // First freed, so that old and new need not fit together.
+    state_ = {};
+    results_ = {};
+    scratch_ = {};
+    tables_ = {};
+    maps_ = {};
     const auto num_slots = static_cast<size_t>(capacity.slots), num_worlds = static_cast<size_t>(capacity.worlds);
     const auto num_boxes = static_cast<size_t>(capacity.boxes(config()));
     const auto num_lights = static_cast<size_t>(capacity.lights);

@@ -250,6 +250,7 @@ TEST_F(CudaSimulatorTest, AGraphReplaysSteps) {
     PICTURA_CUDA(cudaGraphLaunch(executable, stream));
     cpu->step(host);
   }
+  cuda->check({stream});
   expect_same_view(cpu.get(), cuda.get(), 200);
   EXPECT_GT(cuda->totals().episodes, 0) << "resets are part of the graph";
   PICTURA_CUDA(cudaGraphExecDestroy(executable));
