@@ -152,7 +152,7 @@ void render_world(const Arguments& arguments) {
   draw_and_report(arguments, subject, renderer.get());
 }
 
-// A scene file says these things itself.
+// A scene file says these itself.
 void refuse_world_options(const CLI::App& command) {
   for (const char* option : {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--steps",
                              "--views", "--size", "--rig", "--line-floor"}) {

@@ -37,7 +37,7 @@ template <typename... Args>
   throw UsageError(fmt::format(format, std::forward<Args>(args)...));
 }
 
-/// Guards the door of a public function: throws Error with the formatted message unless `condition` holds.
+/// Checks an argument of a public function: throws Error with the formatted message unless `condition` holds.
 #define PICTURA_CHECK(condition, ...)               \
   do {                                              \
     if (!(condition)) ::pictura::fail(__VA_ARGS__); \

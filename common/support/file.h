@@ -1,4 +1,4 @@
-// Files that are read whole and written beside their name, then renamed: a reader never sees half a file, and a full
+// Files that are read whole and written under a temporary name, then renamed: a reader never sees half a file, and a full
 // disk or a killed process leaves the old one.
 #pragma once
 
@@ -16,7 +16,7 @@ std::string read_file(const std::string& path, std::size_t max_bytes = std::size
 /// Throws Error naming the path and the reason.
 void write_renamed(const std::string& path, const std::function<void(const std::string& temporary_path)>& write);
 
-/// Writes the bytes beside path and renames.
+/// Writes the bytes under a temporary name and renames.
 void write_file(const std::string& path, std::string_view bytes);
 
 /// The folder for what can be made again: $XDG_CACHE_HOME/pictura/NAME, or ~/.cache/pictura/NAME. Empty when there is

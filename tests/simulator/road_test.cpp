@@ -24,7 +24,7 @@ TEST(Road, FitsTheLaneUnderIt) {
 
 TEST(Road, KeepsItsLaneNearTheBorder) {
   const MapRules map = make_map_rules(*testing::stadium(200, 2), {});
-  // 2.1 m is nearer to lane 4 by 0.2 m, which weighs 0.035: less than the 0.05 for leaving.
+  // 2.1 m is nearer to lane 4 by 0.2 m, which scores 0.035: less than the 0.05 for leaving.
   EXPECT_EQ(fit_lane(map.view(), {55, 2.1f}, 0, 0, 0).lane, 0);
   EXPECT_EQ(fit_lane(map.view(), {55, 2.1f}, 0, 0, 4).lane, 4);
   EXPECT_EQ(fit_lane(map.view(), {55, 2.3f}, 0, 0, 0).lane, 4);
