@@ -2,6 +2,7 @@
 #include "pictura/training/evaluation/evaluate.h"
 
 #include "pictura/apps/commands.h"
+#include "pictura/cli/backend_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/simulator/simulator.h"
@@ -51,6 +52,7 @@ void print_report(const EvaluateOptions& options, const EvaluateReport& report) 
 void add_evaluate_command(CLI::App& app) {
   struct Arguments {
     EvaluateOptions evaluate;
+    BackendOptions backends;
     std::vector<std::string> densities{"light", "medium", "dense"};
     bool sampled = false, json = false;
   };
@@ -73,8 +75,7 @@ void add_evaluate_command(CLI::App& app) {
       ->capture_default_str();
   command->add_flag("--sampled", arguments->sampled, "Draw actions from the policy instead of taking the most likely");
   command->add_option("--seed", options.seed, "Scenarios are drawn from it")->capture_default_str();
-  command->add_option("--backend", options.backend, "Renderer for policies that see: cpu, cuda or auto")
-      ->capture_default_str();
+  add_policy_backend_options(command, "auto, and drawn as in training", &arguments->backends);
   command->add_option("--threads", options.num_threads, "Host threads; 0: all")->capture_default_str();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
@@ -83,6 +84,11 @@ void add_evaluate_command(CLI::App& app) {
   command->callback([arguments] {
     EvaluateOptions& evaluation = arguments->evaluate;
     evaluation.argmax = !arguments->sampled;
+    const BackendOptions& backends = arguments->backends;
+    if (!backends.device.empty()) evaluation.device = backends.device;
+    if (!backends.simulator.empty()) evaluation.simulator = backends.simulator;
+    evaluation.renderer = backends.renderer;
+    evaluation.samples = backends.samples;
     evaluation.densities.clear();
     for (const std::string& name : arguments->densities) evaluation.densities.push_back(kDensities.at(name));
     if (evaluation.agents_per_world > 0) evaluation.densities.resize(1);

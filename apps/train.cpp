@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "pictura/apps/commands.h"
+#include "pictura/cli/backend_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/drawing/learning_curve.h"
@@ -12,6 +13,7 @@ namespace pictura {
 void add_train_command(CLI::App& app) {
   struct Arguments {
     TrainOptions train;
+    BackendOptions backends;
     bool json = false;
   };
   auto arguments = std::make_shared<Arguments>();
@@ -22,6 +24,7 @@ void add_train_command(CLI::App& app) {
   command
       ->add_option("--set", arguments->train.overrides, "Override a key, as train.updates=2; may be given many times")
       ->allow_extra_args(false);
+  add_policy_backend_options(command, "as the configuration says", &arguments->backends);
   command->add_option("--out", arguments->train.out_folder, "Folder for checkpoints, curves and logs")->required();
   command->add_flag("--resume", arguments->train.resume, "Go on from the checkpoint in --out");
   command->add_flag("--json", arguments->json, "Print one JSON object");
@@ -40,6 +43,7 @@ void add_train_command(CLI::App& app) {
                               format_count(progress.agent_steps_per_s), episode_return, progress.goals_per_km,
                               format_duration(progress.eta_s)));
     };
+    for (const std::string& text : overrides_of(arguments->backends)) arguments->train.overrides.push_back(text);
     const TrainReport report = train(arguments->train);
     line.finish();
     const std::string curve = draw_learning_curve(arguments->train.out_folder);
@@ -51,6 +55,9 @@ void add_train_command(CLI::App& app) {
                   {"km_driven", report.km_driven},
                   {"checkpoint", report.checkpoint},
                   {"policy_hash", report.policy_hash},
+                  {"device", report.device},
+                  {"simulator", report.simulator},
+                  {"renderer", report.renderer.empty() ? Json(nullptr) : Json(report.renderer)},
                   {"learning_curve", curve}});
     } else {
       fmt::print("{} agent-steps in {} updates, {:.1f} km driven; checkpoint {}, policy hash {}, curve {}\n",

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "pictura/common/error.h"
+#include "pictura/common/pixel_samples.h"
 
 namespace pictura {
 
@@ -70,19 +71,9 @@ Pair parse_pair(const std::string& option, const std::string& text, int max) {
 }
 
 PixelSamples parse_samples(const std::string& option, const std::string& text) {
-  constexpr int kMaxCount = 64;
-  if (text.find('x') != std::string::npos) {
-    const Pair grid = parse_pair(option, text, kMaxCount);
-    if (grid.first != grid.second) fail_usage("{}: expected as many samples across as down, got '{}'", option, text);
-    return {.grid = grid.first};
-  }
-  PixelSamples samples;
-  const char* const end = text.data() + text.size();
-  const auto parsed = std::from_chars(text.data(), end, samples.multisample);
-  if (parsed.ec != std::errc() || parsed.ptr != end || samples.multisample < 1 || samples.multisample > kMaxCount) {
-    fail_usage("{}: expected 1 to {} samples like 4, or a grid of them like 4x4, got '{}'", option, kMaxCount, text);
-  }
-  return samples;
+  const std::optional<PixelSamples> samples = parse_pixel_samples(text);
+  if (!samples) fail_usage("{}: expected {}, got '{}'", option, kPixelSamplesExpected, text);
+  return *samples;
 }
 
 }  // namespace pictura

@@ -198,7 +198,7 @@ Checkpoint read_checkpoint(const std::string& path) {
           {json.at("goals"), json.at("finished"), json.at("distance_m"), json.at("finished_return")});
     }
     result.rig = rig_from_json(header.at("rig"));
-    result.config = parse_config(header.at("config").get<std::string>(), path + ": config");
+    result.config = parse_saved_config(header.at("config").get<std::string>(), path + ": config");
   } catch (const nlohmann::json::exception& error) {
     fail("{}: its header cannot be read: {}", path, error.what());
   }

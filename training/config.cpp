@@ -1,14 +1,19 @@
 #include "pictura/training/config.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <set>
 
 #include <fmt/ranges.h>
 #include <toml++/toml.h>
 
+#include "pictura/backends/make_renderer.h"
+#include "pictura/backends/make_simulator.h"
 #include "pictura/common/error.h"
+#include "pictura/common/pixel_samples.h"
 #include "pictura/common/support/file.h"
 
 namespace pictura {
@@ -22,8 +27,9 @@ void visit(AnyConfig& c, Visitor&& v) {
   const double inf = std::numeric_limits<double>::infinity();
   v.integer("run.seed", c.run.seed, 0, std::numeric_limits<int64_t>::max());
   v.integer("run.num_threads", c.run.num_threads, 0, 4096);
-  v.text("run.backend", c.run.backend);
+  v.device("run.device", c.run.device);
 
+  v.name("simulator.backend", c.simulator.backend, simulator_names());
   v.texts("simulator.maps", c.simulator.maps);
   v.integer("simulator.num_slots", c.simulator.num_slots, 1, 1 << 22);
   v.integer("simulator.min_agents", c.simulator.min_agents, 1, kMaxAgentsPerWorld);
@@ -35,10 +41,13 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.integer("simulator.parked_cars", c.simulator.parked_cars, 0, kMaxAgentsPerWorld);
   v.flag("simulator.walls", c.simulator.walls);
   v.integer("simulator.wall_seed", c.simulator.wall_seed, 0, std::numeric_limits<int64_t>::max());
+  v.flag("simulator.wall_observations", c.simulator.wall_observations);
   for (int i = 0; i < kNumConditioning; ++i) {
     v.range(std::string("simulator.conditioning.") + kConditioningNames[i], c.simulator.conditioning[size_t(i)]);
   }
 
+  v.name("render.backend", c.render.backend, renderer_names());
+  v.samples("render.samples", c.render.samples);
   v.text("render.rig", c.render.rig);
   v.integer_unless("render.rig", !c.render.rig.empty(), "render.width_px", c.render.width_px, 1, 8192);
   v.integer_unless("render.rig", !c.render.rig.empty(), "render.height_px", c.render.height_px, 1, 8192);
@@ -93,8 +102,9 @@ std::string shortest(double value) {
 
 class Reader {
  public:
-  Reader(const toml::table& table, std::string source, const std::set<std::string>& overridden)
-      : table_(table), source_(std::move(source)), overridden_(overridden) {}
+  /// With `any_name`, names of backends are taken as they are.
+  Reader(const toml::table& table, std::string source, const std::set<std::string>& overridden, bool any_name)
+      : table_(table), source_(std::move(source)), overridden_(overridden), any_name_(any_name) {}
 
   template <typename Int>
   void integer(const std::string& key, Int& value, int64_t low, int64_t high) {
@@ -125,6 +135,45 @@ class Reader {
 
   void text(const std::string& key, std::string& value) {
     if (const toml::node* node = find(key)) value = text_of(key, *node);
+  }
+
+  void name(const std::string& key, std::string& value, const std::vector<std::string>& known) {
+    const toml::node* node = find(key);
+    if (!node) return;
+    value = text_of(key, *node);
+    if (any_name_ || std::find(known.begin(), known.end(), value) != known.end()) return;
+    refuse(key, *node, fmt::format("expected one of {}", fmt::join(known, ", ")));
+  }
+
+  void device(const std::string& key, std::string& value) {
+    if (const toml::node* node = find(key)) {
+      value = text_of(key, *node);
+      if (!is_device(value)) refuse(key, *node, "expected one of cpu, cuda, cuda:N, auto");
+    }
+  }
+
+  void samples(const std::string& key, PixelSamples& value) {
+    if (const toml::node* node = find(key)) {
+      const std::string text = node->is_integer() ? fmt::format("{}", node->as_integer()->get()) : text_of(key, *node);
+      const std::optional<PixelSamples> parsed = parse_pixel_samples(text);
+      if (!parsed) refuse(key, *node, fmt::format("expected {}", kPixelSamplesExpected));
+      value = *parsed;
+    }
+  }
+
+  /// The old name of two keys: fills in whichever is absent.
+  void old_backend(const std::string& key, std::string& simulator, std::string& renderer) {
+    const toml::node* node = find(key);
+    if (!node) return;
+    const toml::node *new_simulator = find("simulator.backend"), *new_renderer = find("render.backend");
+    if (new_simulator && new_renderer) {
+      refuse(key, "has no effect together with simulator.backend and render.backend: leave it out");
+    }
+    std::string its_name;
+    name(key, its_name, renderer_names());
+    if (!new_renderer) renderer = its_name;
+    // Renderers that are no simulators went with the simulator `cpu`.
+    if (!new_simulator) simulator = its_name == "cuda" || its_name == "auto" ? its_name : "cpu";
   }
 
   void texts(const std::string& key, std::vector<std::string>& value) {
@@ -169,7 +218,7 @@ class Reader {
     }
   }
 
-  /// Throws for the first key of the table that no call asked for.
+  /// Throws for the first key of the table that no call read.
   void refuse_unknown(const toml::table& table, const std::string& prefix = "") const {
     for (const auto& [name, node] : table) {
       const std::string key = prefix + std::string(name.str());
@@ -219,6 +268,14 @@ class Reader {
     return *number;
   }
 
+  static bool is_device(const std::string& text) {
+    if (text == "cpu" || text == "cuda" || text == "auto") return true;
+    constexpr std::string_view kPrefix = "cuda:";
+    constexpr size_t kMaxDigits = 3;
+    return text.starts_with(kPrefix) && text.size() > kPrefix.size() && text.size() <= kPrefix.size() + kMaxDigits &&
+           text.find_first_not_of("0123456789", kPrefix.size()) == std::string::npos;
+  }
+
   std::string text_of(const std::string& key, const toml::node& node) const {
     if (!node.is_string()) refuse(key, node, "expected a string");
     return node.as_string()->get();
@@ -241,6 +298,7 @@ class Reader {
   const toml::table& table_;
   std::string source_;
   const std::set<std::string>& overridden_;
+  bool any_name_;
   std::set<std::string> known_, sections_;
 };
 
@@ -258,6 +316,9 @@ class Writer {
   void number(const std::string& key, const double& value, double, double) { line(key, shortest(value)); }
   void flag(const std::string& key, const bool& value) { line(key, value ? "true" : "false"); }
   void text(const std::string& key, const std::string& value) { line(key, quoted(value)); }
+  void name(const std::string& key, const std::string& value, const std::vector<std::string>&) { text(key, value); }
+  void device(const std::string& key, const std::string& value) { text(key, value); }
+  void samples(const std::string& key, const PixelSamples& value) { text(key, text_of(value)); }
   void texts(const std::string& key, const std::vector<std::string>& values) {
     std::vector<std::string> all;
     for (const std::string& value : values) all.push_back(quoted(value));
@@ -295,7 +356,7 @@ class Writer {
   std::string section_;
 };
 
-// "train.updates=2" into the table; a value that is no TOML is taken as a string, so that run.backend=cpu works.
+// "train.updates=2" into the table; a value that is no TOML is taken as a string, so that run.device=cpu works.
 std::string apply_override(const std::string& text, toml::table* table_inout) {
   const size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0) fail_usage("--set {}: expected section.key=value", text);
@@ -348,6 +409,15 @@ void check_contradictions(const Config& c, const Reader& reader) {
   if (c.policy.auxiliary && c.policy.modality == Modality::perspective) {
     reader.refuse("policy.auxiliary", "has no effect with the modality \"perspective\": images have no such slots");
   }
+  if (c.simulator.wall_observations && c.policy.modality == Modality::perspective) {
+    reader.refuse("simulator.wall_observations",
+                  "has no effect with the modality \"perspective\": such a policy sees walls in its images");
+  }
+  if (c.render.samples != PixelSamples{} && !c.render.backend.starts_with("gl")) {
+    reader.refuse("render.samples", fmt::format("expected one sample with render.backend \"{}\", got {}: only gl takes "
+                                                "samples; the others compute exact coverage",
+                                                c.render.backend, text_of(c.render.samples)));
+  }
 }
 
 }  // namespace
@@ -376,7 +446,10 @@ std::array<double, kNumConditioning> Config::Evaluate::default_conditioning() {
   return values;
 }
 
-Config parse_config(const std::string& text, const std::string& source, const std::vector<std::string>& overrides) {
+namespace {
+
+Config parse(const std::string& text, const std::string& source, const std::vector<std::string>& overrides,
+             bool any_name) {
   toml::table table;
   try {
     table = toml::parse(text, source);
@@ -387,11 +460,22 @@ Config parse_config(const std::string& text, const std::string& source, const st
   for (const std::string& text_of_one : overrides) overridden.insert(apply_override(text_of_one, &table));
 
   Config config;
-  Reader reader(table, source, overridden);
+  Reader reader(table, source, overridden, any_name);
   visit(config, reader);
+  reader.old_backend("run.backend", config.simulator.backend, config.render.backend);
   reader.refuse_unknown(table);
   check_contradictions(config, reader);
   return config;
+}
+
+}  // namespace
+
+Config parse_config(const std::string& text, const std::string& source, const std::vector<std::string>& overrides) {
+  return parse(text, source, overrides, /*any_name=*/false);
+}
+
+Config parse_saved_config(const std::string& text, const std::string& source) {
+  return parse(text, source, {}, /*any_name=*/true);
 }
 
 Config load_config(const std::string& path, const std::vector<std::string>& overrides) {
@@ -408,21 +492,64 @@ std::string to_toml(const Config& config) {
   return writer.toml;
 }
 
+namespace {
+
+// Renderers whose images are the same by contract have one name here.
+std::string drawn_by(const std::string& backend) {
+  if (backend.starts_with("gl")) return "gl";
+  return backend == "null" ? "null" : "exact coverage";
+}
+
+bool may_differ(const std::string& key, const Config& saved, const Config& now) {
+  static const std::set<std::string> kHarmless{
+      "train.updates", "train.checkpoint_every", "train.forward_chunk", "run.num_threads",  "run.device",
+      "render.rig",    "render.width_px",        "render.height_px",    "simulator.backend"};
+  if (kHarmless.count(key) || key.starts_with("evaluate.")) return true;
+  if (key == "render.backend" && drawn_by(saved.render.backend) == drawn_by(now.render.backend)) return true;
+  // The vector policy reads nothing of it, before and now, since the modality may not differ.
+  return !saved.reads_images() && key.starts_with("render.");
+}
+
+}  // namespace
+
 std::string first_difference(const Config& saved, const Config& now) {
   Writer before, after;
   visit(saved, before);
   visit(now, after);
-  for (size_t i = 0; i < before.lines.size(); ++i) {
-    const auto& [key, value] = before.lines[i];
-    if (key == "train.updates" || key == "train.checkpoint_every" || key == "run.num_threads") continue;
-    if (value != after.lines[i].second) return fmt::format("{}: {} became {}", key, value, after.lines[i].second);
+  const std::map<std::string, std::string> values(after.lines.begin(), after.lines.end());
+  for (const auto& [key, value] : before.lines) {
+    if (may_differ(key, saved, now)) continue;
+    if (values.at(key) != value) return fmt::format("{}: {} became {}", key, value, values.at(key));
   }
   return "";
+}
+
+bool Config::reads(ObservationPart part) const {
+  return part == ObservationPart::own ||
+         (policy.modality == Modality::vector && (part != ObservationPart::walls || simulator.wall_observations));
 }
 
 Rig rig_of(const Config& config) {
   return config.render.rig.empty() ? paper_rig(config.render.width_px, config.render.height_px)
                                    : load_rig(config.render.rig);
+}
+
+RendererConfig renderer_config(const Config& config, const Rig& rig) {
+  RendererConfig result;
+  result.rig = rig;
+  result.num_threads = config.run.num_threads;
+  result.line_floor_px = static_cast<float>(config.render.line_floor_px);
+  result.samples = config.render.samples;
+  return result;
+}
+
+void check_devices(const Config& config) {
+  PICTURA_CHECK(!config.run.device.starts_with("cuda"),
+                "run.device: \"{}\": learning on a CUDA device is missing from this version: set it to \"cpu\"",
+                config.run.device);
+  PICTURA_CHECK(config.simulator.backend != "cuda",
+                "simulator.backend: \"cuda\" keeps observations on the device, and learning there is missing from this "
+                "version: set it to \"cpu\"; render.backend may be \"cuda\"");
 }
 
 SimulatorConfig simulator_config(const Config& config) {
@@ -438,6 +565,7 @@ SimulatorConfig simulator_config(const Config& config) {
   result.wall_seed = config.simulator.wall_seed;
   result.auxiliary_observations = config.policy.modality == Modality::vector && config.policy.auxiliary;
   result.vector_observations = config.policy.modality == Modality::vector;
+  result.wall_observations = config.simulator.wall_observations;
   result.conditioning = config.simulator.conditioning;
   return result;
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pictura/common/camera.h"
+#include "pictura/common/renderer.h"
 #include "pictura/simulator/simulator.h"
 
 namespace pictura {
@@ -15,12 +16,13 @@ enum class Modality { perspective, vector };
 
 struct Config {
   struct Run {
-    uint64_t seed = 1;             // names the whole run
-    int num_threads = 0;           // of simulator, renderer and torch; 0: all
-    std::string backend = "auto";  // cpu, cuda, auto, or null (cpu simulator, black images)
+    uint64_t seed = 1;            // names the whole run
+    int num_threads = 0;          // of simulator, renderer and torch; 0: all
+    std::string device = "auto";  // what learns: cpu, cuda, cuda:N or auto
   } run;
 
   struct SimulatorSection {
+    std::string backend = "auto";  // cpu, cuda or auto
     std::vector<std::string> maps{"Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07", "Town10HD"};
     int num_slots = 20480;                 // concurrent agents, over all worlds
     int min_agents = 1, max_agents = 120;  // agents per world ~ U{min, max}
@@ -30,14 +32,17 @@ struct Config {
     int parked_cars = 32;  // per episode and world
     bool walls = true;
     uint64_t wall_seed = 0;
+    bool wall_observations = false;  // the vector policy also reads the set of walls
     /// Training distributions: [simulator.conditioning] NAME = [low, high]; see simulator/conditioning.h for the names.
     std::array<ConditioningRange, kNumConditioning> conditioning = SimulatorConfig::default_conditioning();
   } simulator;
 
   struct Render {
+    std::string backend = "auto";       // as make_renderer takes it
+    PixelSamples samples;               // of gl; the others compute exact coverage
     std::string rig;                    // a rig file (docs/image.md); relative to the configuration's folder
     int width_px = 96, height_px = 54;  // without one: of each camera of the paper's rig
-    double line_floor_px = 0.35;
+    double line_floor_px = 0.35;        // least width of a line on screen
   } render;
 
   struct PolicySection {
@@ -77,11 +82,20 @@ struct Config {
     std::array<double, kNumConditioning> conditioning = default_conditioning();
     static std::array<double, kNumConditioning> default_conditioning();
   } evaluate;
+
+  /// Whether the policy reads such arrays of an observation.
+  bool reads(ObservationPart part) const;
+  /// Whether it reads images.
+  bool reads_images() const { return policy.modality == Modality::perspective; }
 };
 
-/// Reads a TOML text. `overrides` are "section.key=value" and win. Throws Error naming source:line and key for unknown
-/// keys, wrong types, values out of range and contradictions.
+/// Reads a TOML text. `overrides` are "section.key=value" and win. run.backend, the old name of simulator.backend and
+/// render.backend, fills in whichever of the two is absent. Throws Error naming source:line and key for unknown keys,
+/// wrong types, values out of range, contradictions, and backends that this build does not know, whose names it lists.
 Config parse_config(const std::string& text, const std::string& source, const std::vector<std::string>& overrides = {});
+
+/// Reads what a run saved, perhaps with another build: its backends may be any.
+Config parse_saved_config(const std::string& text, const std::string& source);
 
 /// Reads a file; render.rig becomes relative to the caller's folder.
 Config load_config(const std::string& path, const std::vector<std::string>& overrides = {});
@@ -89,12 +103,21 @@ Config load_config(const std::string& path, const std::vector<std::string>& over
 /// Every key with its value, as TOML that parse_config reads back to an equal Config.
 std::string to_toml(const Config& config);
 
-/// Key of the first setting in which the two differ, with both values, or empty. Settings that say when to stop, how
-/// often to save and on how many threads (train.updates, train.checkpoint_every, run.num_threads) may differ.
+/// Key of the first setting that changes what a run means and in which the two differ, with both values, or empty. What
+/// may differ: when to stop and how often to save; where and on how many threads it runs, as long as images are drawn
+/// by the same rules; how many transitions go through the network at once; what is evaluated; how cameras are described
+/// (compare the rigs themselves), and all of [render] where the policy reads no images.
 std::string first_difference(const Config& saved, const Config& now);
 
 /// The rig that render describes.
 Rig rig_of(const Config& config);
+
+/// What the renderer is told: everything about an image that the policy depends on, with a rig of its run.
+RendererConfig renderer_config(const Config& config, const Rig& rig);
+
+/// Throws Error naming the key and what is missing for what this build cannot compute: learning on a device, or a
+/// simulator there while learning is on the host.
+void check_devices(const Config& config);
 
 /// What the simulator is told for training: entity sets only for the vector modality.
 SimulatorConfig simulator_config(const Config& config);

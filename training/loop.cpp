@@ -58,12 +58,16 @@ UpdateStats improve(Run* run) {
 
 TrainReport train(const TrainOptions& options) {
   const Config config = load_config(options.config_path, options.overrides);
+  check_devices(config);
   make_output_folder(options.out_folder);
   at::set_num_threads(resolve_num_threads(config.run.num_threads));
 
   TrainReport report;
   report.checkpoint = options.out_folder + "/checkpoint.ckpt";
   Run run(config);
+  report.device = "cpu";
+  report.simulator = run.simulator->name();
+  if (run.renderer) report.renderer = run.renderer->name();
   std::vector<RecentUpdate> recent;
   if (options.resume) {
     const Checkpoint saved = read_checkpoint(report.checkpoint);

@@ -32,6 +32,7 @@ struct TrainReport {
   double agent_steps_per_s = 0, episode_return = 0, km_driven = 0;
   bool interrupted = false;
   std::string checkpoint, policy_hash;
+  std::string device, simulator, renderer;  // what learnt, simulated and drew; no renderer where there are no images
 };
 
 /// Trains as the configuration says and writes into out_folder: config.toml (resolved), untrained.ckpt (the policy

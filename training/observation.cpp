@@ -57,7 +57,7 @@ Observer::Observer(Simulator* simulator, Renderer* renderer) : simulator_(*simul
   const bool on_host = simulator->device().is_host() && (!renderer || renderer->device().is_host());
   PICTURA_CHECK(on_host,
                 "training: simulator '{}' keeps its arrays on a CUDA device, and this build trains on the host: "
-                "set run.backend to \"cpu\"",
+                "set simulator.backend to \"cpu\"",
                 simulator->name());
 }
 

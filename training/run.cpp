@@ -8,18 +8,6 @@
 
 namespace pictura {
 
-std::string simulator_name(const std::string& backend) { return backend == "null" ? "cpu" : backend; }
-
-std::unique_ptr<Renderer> make_policy_renderer(const Config& config, const Rig& rig, const Simulator& simulator) {
-  RendererConfig renderer_config;
-  renderer_config.rig = rig;
-  renderer_config.num_threads = config.run.num_threads;
-  renderer_config.line_floor_px = static_cast<float>(config.render.line_floor_px);
-  std::unique_ptr<Renderer> renderer = make_renderer(config.run.backend, renderer_config);
-  upload_maps(simulator, renderer.get());
-  return renderer;
-}
-
 namespace {
 
 std::unique_ptr<Simulator> make_training_simulator(const Config& config) {
@@ -28,13 +16,15 @@ std::unique_ptr<Simulator> make_training_simulator(const Config& config) {
   for (const std::string& name : section.maps) maps.push_back(load_map(name));
   const int num_maps = static_cast<int>(maps.size());
   return make_simulator(
-      simulator_name(config.run.backend), simulator_config(config), std::move(maps),
+      config.simulator.backend, simulator_config(config), std::move(maps),
       draw_worlds(config.run.seed, section.num_slots, section.min_agents, section.max_agents, num_maps));
 }
 
 std::unique_ptr<Renderer> make_training_renderer(const Config& config, const Rig& rig, const Simulator& simulator) {
-  if (config.policy.modality == Modality::vector) return nullptr;
-  return make_policy_renderer(config, rig, simulator);
+  if (!config.reads_images()) return nullptr;
+  std::unique_ptr<Renderer> renderer = make_renderer(config.render.backend, renderer_config(config, rig));
+  upload_maps(simulator, renderer.get());
+  return renderer;
 }
 
 }  // namespace
@@ -71,7 +61,7 @@ void Run::save(const std::string& path, const std::vector<RecentUpdate>& recent,
 void Run::restore(const Checkpoint& saved) {
   const std::string difference = first_difference(saved.config, config);
   PICTURA_CHECK(difference.empty(), "{}: saved under another configuration: {}", saved.path, difference);
-  const std::string rig_difference = first_difference(saved.rig, rig);
+  const std::string rig_difference = config.reads_images() ? first_difference(saved.rig, rig) : "";
   PICTURA_CHECK(rig_difference.empty(), "{}: saved with other cameras than {} has: {}", saved.path,
                 config.render.rig.empty() ? "the paper's rig" : config.render.rig, rig_difference);
   restore_tensors(saved, saved.parameters, policy.parameters());

@@ -6,12 +6,6 @@
 
 namespace pictura {
 
-/// Makes the renderer that a policy with images needs, holding the simulator's geometries.
-std::unique_ptr<Renderer> make_policy_renderer(const Config& config, const Rig& rig, const Simulator& simulator);
-
-/// Name of the simulator's executor for run.backend ("null" is a renderer alone).
-std::string simulator_name(const std::string& backend);
-
 struct Run {
   /// Throws Error naming file and key for maps, cameras and sizes that cannot be trained with.
   explicit Run(const Config& config);

@@ -9,6 +9,7 @@
 
 #include <fmt/ranges.h>
 
+#include "pictura/cli/backend_options.h"
 #include "pictura/cli/drive.h"
 #include "pictura/cli/report.h"
 #include "pictura/commit.h"
@@ -110,13 +111,16 @@ double seconds_since(Clock::time_point begin) { return std::chrono::duration<dou
 
 struct TrainArguments {
   std::string config = "configs/smoke.toml";
+  std::vector<std::string> overrides;
+  BackendOptions backends;
   bool json = false;
 };
 
 void bench_train(const TrainArguments& arguments) {
   const std::string folder = std::filesystem::temp_directory_path() / fmt::format("pictura-bench-{}", getpid());
   BenchResult rate{"train, one update", "agent_steps_per_s", {}};
-  TrainOptions options{.config_path = arguments.config, .out_folder = folder};
+  TrainOptions options{.config_path = arguments.config, .overrides = arguments.overrides, .out_folder = folder};
+  for (const std::string& text : overrides_of(arguments.backends)) options.overrides.push_back(text);
   int64_t steps_before = 0;
   auto begin = Clock::now();
   options.on_progress = [&](const TrainProgress& progress) {
@@ -148,6 +152,10 @@ void add_bench_command(CLI::App& app) {
   auto arguments = std::make_shared<TrainArguments>();
   CLI::App* train_command = command->add_subcommand("train", "Rollouts and updates of a configuration");
   train_command->add_option("--config", arguments->config, "TOML file")->capture_default_str();
+  train_command
+      ->add_option("--set", arguments->overrides, "Override a key, as train.updates=2; may be given many times")
+      ->allow_extra_args(false);
+  add_policy_backend_options(train_command, "as the configuration says", &arguments->backends);
   train_command->add_flag("--json", arguments->json, "Print one JSON object");
   train_command->callback([arguments] { bench_train(*arguments); });
 #endif

@@ -58,9 +58,9 @@ TEST(Config, WrittenTextReadsBackEqual) {
 TEST(Config, OverridesWinAndMayNameNewKeysAndBareWords) {
   const Config c = parse_config(
       "[train]\nupdates = 5\n", "a.toml",
-      {"train.updates=2", "run.backend=cpu", "simulator.conditioning.collision=[1, 2]", "simulator.maps=[\"Town01\"]"});
+      {"train.updates=2", "run.device=cpu", "simulator.conditioning.collision=[1, 2]", "simulator.maps=[\"Town01\"]"});
   EXPECT_EQ(c.train.updates, 2);
-  EXPECT_EQ(c.run.backend, "cpu");
+  EXPECT_EQ(c.run.device, "cpu");
   EXPECT_EQ(c.simulator.conditioning[static_cast<size_t>(Conditioning::collision)].low, 1.0f);
   EXPECT_EQ(c.simulator.maps.size(), 1u);
 }
@@ -96,6 +96,8 @@ TEST(Config, KeysWithoutEffectAreRefused) {
   EXPECT_THAT(message_of("[policy]\nmodality = \"perspective\"\nauxiliary = true\n"),
               AllOf(HasSubstr("a.toml:3: policy.auxiliary"), HasSubstr("no effect")));
   EXPECT_EQ(message_of("[policy]\nmodality = \"vector\"\nauxiliary = true\n"), test::kNoError);
+  EXPECT_THAT(message_of("[simulator]\nwall_observations = true\n"),
+              AllOf(HasSubstr("a.toml:2: simulator.wall_observations"), HasSubstr("no effect")));
   EXPECT_THAT(message_of("[render]\nwidth_px = 96\nrig = \"r.toml\"\n"),
               AllOf(HasSubstr("a.toml:2: render.width_px"), HasSubstr("render.rig")));
   EXPECT_THAT(message_of("[render]\nrig = \"r.toml\"\n", {"render.height_px=9"}),
@@ -103,17 +105,103 @@ TEST(Config, KeysWithoutEffectAreRefused) {
   // What is written for a run with a rig file can be read again.
   const Config c = parse_config("[render]\nrig = \"r.toml\"\n", "a.toml");
   EXPECT_EQ(to_toml(parse_config(to_toml(c), "b.toml")), to_toml(c));
-  EXPECT_THAT(first_difference(c, Config{}), HasSubstr("render.rig"));
-  EXPECT_THAT(first_difference(Config{}, c), HasSubstr("render.rig"));
 }
 
-TEST(Config, DifferencesAreNamedExceptForThoseThatMayDiffer) {
+TEST(Config, BackendsAreCheckedWhereTheyAreRead) {
+  const std::string text = "[run]\ndevice = \"cuda:1\"\n[simulator]\nbackend = \"cpu\"\n[render]\nbackend = \"null\"\n";
+  const Config c = parse_config(text, "a.toml");
+  EXPECT_EQ(c.run.device, "cuda:1");
+  EXPECT_EQ(c.simulator.backend, "cpu");
+  EXPECT_EQ(c.render.backend, "null");
+  EXPECT_EQ(to_toml(parse_config(to_toml(c), "b.toml")), to_toml(c));
+  EXPECT_THAT(message_of("[run]\ndevice = \"gpu\"\n"),
+              AllOf(HasSubstr("a.toml:2: run.device"), HasSubstr("cpu, cuda, cuda:N, auto"), HasSubstr("got gpu")));
+  EXPECT_THAT(message_of("[run]\ndevice = \"cuda:\"\n"), HasSubstr("got cuda:"));
+  EXPECT_THAT(message_of("[simulator]\nbackend = \"null\"\n"),
+              AllOf(HasSubstr("simulator.backend: expected one of cpu, "), HasSubstr("got null")));
+  EXPECT_THAT(message_of("[render]\nbackend = \"vulkan\"\n"),
+              AllOf(HasSubstr("render.backend: expected one of cpu, "), HasSubstr("got vulkan")));
+  // A run that another build saved is read whatever drew it.
+  EXPECT_EQ(parse_saved_config("[render]\nbackend = \"vulkan\"\n", "a.ckpt").render.backend, "vulkan");
+}
+
+TEST(Config, SamplesAreNumbersOrGridsAndOfGlAlone) {
+  const std::vector<std::string> gl{"render.backend=gl"};
+  auto samples_of = [&](const std::string& value) {
+    return parse_saved_config("[render]\nbackend = \"gl\"\nsamples = " + value + "\n", "a.toml").render.samples;
+  };
+  EXPECT_EQ(samples_of("4"), (PixelSamples{.grid = 1, .multisample = 4}));
+  EXPECT_EQ(samples_of("\"4x4\""), (PixelSamples{.grid = 4, .multisample = 1}));
+  EXPECT_THAT(message_of("[render]\nsamples = \"4x3\"\n"),
+              AllOf(HasSubstr("a.toml:2: render.samples"), HasSubstr("4x3")));
+  EXPECT_THAT(message_of("[render]\nsamples = 65\n"), HasSubstr("got 65"));
+  EXPECT_THAT(message_of("[render]\nbackend = \"cpu\"\nsamples = 4\n"),
+              AllOf(HasSubstr("a.toml:3: render.samples"), HasSubstr("only gl")));
+}
+
+TEST(Config, TheOldNameOfTheBackendsFillsInWhichIsAbsent) {
+  auto backends = [](const std::string& text) {
+    const Config c = parse_saved_config(text, "a.toml");
+    return c.simulator.backend + " " + c.render.backend;
+  };
+  EXPECT_EQ(backends("[run]\nbackend = \"cuda\"\n"), "cuda cuda");
+  EXPECT_EQ(backends("[run]\nbackend = \"auto\"\n"), "auto auto");
+  EXPECT_EQ(backends("[run]\nbackend = \"null\"\n"), "cpu null");
+  EXPECT_EQ(backends("[run]\nbackend = \"null\"\n[render]\nbackend = \"cpu\"\n"), "cpu cpu");
+  EXPECT_EQ(backends("[run]\nbackend = \"cpu\"\n[simulator]\nbackend = \"auto\"\n"), "auto cpu");
+  EXPECT_THAT(message_of("[run]\nbackend = \"vulkan\"\n"),
+              AllOf(HasSubstr("a.toml:2: run.backend"), HasSubstr("vulkan")));
+  EXPECT_THAT(message_of("[run]\nbackend = \"cpu\"\n", {"simulator.backend=cpu", "render.backend=null"}),
+              AllOf(HasSubstr("a.toml:2: run.backend"), HasSubstr("no effect")));
+}
+
+TEST(Config, WhatNeedsALoopOnTheDeviceIsRefusedByName) {
+  Config c;
+  c.render.backend = "cuda";  // draws for host memory
+  EXPECT_NO_THROW(check_devices(c));
+  c.run.device = "cuda:0";
+  EXPECT_THAT(test::message_of([&] { check_devices(c); }), AllOf(HasSubstr("run.device"), HasSubstr("missing")));
+  c.run.device = "auto";
+  c.simulator.backend = "cuda";
+  EXPECT_THAT(test::message_of([&] { check_devices(c); }), AllOf(HasSubstr("simulator.backend"), HasSubstr("missing")));
+}
+
+TEST(Config, DifferencesThatChangeTheRunAreNamed) {
+  Config a, b;
+  b.policy.backbone_width = 256;
+  EXPECT_EQ(first_difference(a, b), "policy.backbone_width: 512 became 256");
+  b = a;
+  b.render.backend = "gl:egl";
+  EXPECT_EQ(first_difference(a, b), "render.backend: \"auto\" became \"gl:egl\"");
+  b = a;
+  b.render.line_floor_px = 1;
+  EXPECT_EQ(first_difference(a, b), "render.line_floor_px: 0.35 became 1.0");
+  b = a;
+  b.train.schedule_updates = 3;
+  EXPECT_THAT(first_difference(a, b), HasSubstr("train.schedule_updates"));
+  b = a;
+  b.simulator.wall_seed = 3;
+  EXPECT_THAT(first_difference(a, b), HasSubstr("simulator.wall_seed"));
+}
+
+TEST(Config, HarmlessDifferencesAreNone) {
   Config a, b;
   b.train.updates = 3;
+  b.train.checkpoint_every = 7;
+  b.train.forward_chunk = 64;
   b.run.num_threads = 9;
+  b.run.device = "cpu";
+  b.simulator.backend = "cpu";
+  b.render.backend = "cuda";
+  b.render.rig = "the/same/cameras.toml";
+  b.evaluate.conditioning[0] = 5;
   EXPECT_EQ(first_difference(a, b), "");
-  b.policy.backbone_width = 256;
-  EXPECT_THAT(first_difference(a, b), AllOf(HasSubstr("policy.backbone_width"), HasSubstr("512"), HasSubstr("256")));
+  EXPECT_EQ(first_difference(b, a), "");
+  // The vector policy reads no image.
+  a.policy.modality = b.policy.modality = Modality::vector;
+  b.render.backend = "null";
+  b.render.line_floor_px = 1;
+  EXPECT_EQ(first_difference(a, b), "");
 }
 
 TEST(Config, EvaluationFixesConditioningAndLightsAndEndsNothingEarly) {

@@ -9,7 +9,9 @@
 
 #include <gmock/gmock.h>
 
+#include "pictura/backends/make_renderer.h"
 #include "pictura/backends/make_simulator.h"
+#include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/interrupt.h"
@@ -35,10 +37,9 @@ class Training : public ::testing::Test {
     TrainOptions o;
     o.config_path = PICTURA_SOURCE_DIR "/configs/smoke.toml";
     o.out_folder = folder_ / run;
-    o.overrides = {
-        "run.num_threads=1",         "run.backend=cpu",    "render.width_px=16",          "render.height_px=9",
-        "simulator.num_slots=8",     "train.num_steps=12", "policy.conv_channels=[4, 8]", "policy.conv_kernels=[3, 3]",
-        "policy.conv_strides=[2, 2]"};
+    o.overrides = {"run.num_threads=1",           "render.backend=cpu",         "render.width_px=16",
+                   "render.height_px=9",          "simulator.num_slots=8",      "train.num_steps=12",
+                   "policy.conv_channels=[4, 8]", "policy.conv_kernels=[3, 3]", "policy.conv_strides=[2, 2]"};
     o.overrides.insert(o.overrides.end(), more.begin(), more.end());
     return o;
   }
@@ -113,6 +114,56 @@ TEST_F(Training, RefusesToResumeWithOtherCamerasByName) {
   EXPECT_EQ(train(o).updates, 2);
 }
 
+TEST_F(Training, ResumesUnderAnotherNameOfTheSameCamerasAndOtherHarmlessSettings) {
+  const std::string camera =
+      "[[camera]]\nname = \"ahead\"\nwidth_px = 16\nheight_px = 9\nfocal_px = 8\nx_m = 1\nz_m = 1.5\n";
+  auto write_config = [&](const std::string& rig) {
+    write_file(folder_ / rig, camera);
+    write_file(folder_ / "config.toml",
+               fmt::format("[simulator]\nmaps = [\"procedural\"]\nmax_agents = 8\nwalls = false\nparked_cars = 0\n"
+                           "[render]\nrig = \"{}\"\n[policy]\nbackbone_width = 32\n"
+                           "[train]\nminibatch_size = 64\nforward_chunk = 64\n",
+                           rig));
+  };
+  write_config("rig.toml");
+  TrainOptions o = options("run", {"train.updates=1"});
+  o.config_path = folder_ / "config.toml";
+  std::erase_if(o.overrides, [](const std::string& text) { return text.starts_with("render."); });
+  train(o);
+  write_config("renamed.toml");
+  o.resume = true;
+  for (const char* text : {"train.updates=2", "run.device=cpu", "simulator.backend=cpu", "render.backend=cpu",
+                           "evaluate.conditioning.delta_goal_m=3"}) {
+    o.overrides.push_back(text);
+  }
+  EXPECT_EQ(train(o).updates, 2);
+}
+
+TEST_F(Training, EachRendererWorksWithTheSimulatorOnTheCpu) {
+  const TrainReport black = train(options("null", {"train.updates=1", "render.backend=null"}));
+  EXPECT_EQ(black.renderer, "null");
+  EXPECT_EQ(black.simulator, "cpu");
+  EXPECT_EQ(black.device, "cpu");
+  const TrainReport drawn = train(options("cpu", {"train.updates=1"}));
+  EXPECT_NE(black.policy_hash, drawn.policy_hash);
+  // The old key says the same.
+  TrainOptions old = options("old", {"train.updates=1", "run.backend=null"});
+  std::erase(old.overrides, "render.backend=cpu");
+  EXPECT_EQ(train(old).policy_hash, black.policy_hash);
+  const std::vector<std::string> known = renderer_names();
+  if (std::find(known.begin(), known.end(), "gl:osmesa") == known.end()) GTEST_SKIP() << "this build has no OpenGL";
+  const TrainReport gl = train(options("gl", {"train.updates=1", "render.backend=gl:osmesa", "render.samples=2x2"}));
+  EXPECT_THAT(gl.renderer, HasSubstr("gl"));
+  EvaluateOptions o;
+  o.checkpoint = gl.checkpoint;
+  o.maps = {"procedural"};
+  o.agents_per_world = 4;
+  o.scenarios = 1;
+  o.steps = 3;
+  o.num_threads = 1;
+  EXPECT_GT(evaluate(o).rows.at(0).km_driven, 0);
+}
+
 TEST_F(Training, RolloutsThatCannotFitAreRefused) {
   // 65,537 rows of 8,000 observations: with the vector ones 2.8 TB or so, with large images far more.
   const std::vector<std::string> huge = {"train.num_steps=65536", "simulator.num_slots=8000"};
@@ -126,11 +177,13 @@ TEST_F(Training, RolloutsThatCannotFitAreRefused) {
 }
 
 TEST_F(Training, ImagesAreDrawnForActiveAgentsAlone) {
-  const Config config = load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml", {"run.num_threads=1", "run.backend=cpu"});
+  const Config config =
+      load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml", {"run.num_threads=1", "render.backend=cpu"});
   const std::unique_ptr<Simulator> simulator =
       make_simulator("cpu", simulator_config(config), {load_map("procedural")}, draw_worlds(1, 24, 8, 8, 1));
   const Rig rig = rig_of(config);
-  const std::unique_ptr<Renderer> renderer = make_policy_renderer(config, rig, *simulator);
+  const std::unique_ptr<Renderer> renderer = make_renderer("cpu", renderer_config(config, rig));
+  upload_maps(*simulator, renderer.get());
   Observer observer(simulator.get(), renderer.get());
   const Observation storage = observer.allocate(1), row = row_of(storage, 0);
   EXPECT_EQ(observer.bytes_per_row(),
@@ -227,7 +280,7 @@ TEST_F(Training, VectorPolicyTrainsAndIsEvaluated) {
   o.scenarios = 3;
   o.steps = 25;
   o.num_threads = 1;
-  o.backend = "cpu";
+  o.renderer = "cpu";
   double done = 0;
   o.on_progress = [&](double fraction, double) { done = fraction; };
   const EvaluateReport evaluated = evaluate(o);
@@ -259,7 +312,7 @@ TEST_F(Training, InterruptedEvaluationKeepsWhatItFinished) {
   o.scenarios = 1;
   o.steps = 5;
   o.num_threads = 1;
-  o.backend = "cpu";
+  o.renderer = "cpu";
   // Of 60, 120 and 150 agents the first 60 are done at 18 %.
   o.on_progress = [](double fraction, double) {
     if (fraction > 0.2) std::raise(SIGINT);
@@ -285,7 +338,7 @@ TEST_F(Training, EvaluationRepeatsNoWorldOfTraining) {
   o.scenarios = 1;
   o.steps = 10;
   o.num_threads = 1;
-  o.backend = "cpu";
+  o.renderer = "cpu";
   // The same drive by hand, in the world of that number.
   auto return_per_vehicle = [&](uint32_t global_world) {
     SimulatorConfig config = evaluation_simulator_config(load_config(folder_ / "run/config.toml"), o.steps);
@@ -317,7 +370,7 @@ TEST_F(Training, PerspectivePolicyIsEvaluatedFromItsImages) {
   o.scenarios = 1;
   o.steps = 3;
   o.num_threads = 1;
-  o.backend = "cpu";
+  o.renderer = "cpu";
   const std::vector<EvaluateRow> rows = evaluate(o).rows;
   ASSERT_EQ(rows.size(), 1u);
   EXPECT_EQ(rows[0].density, "light");

@@ -3,8 +3,11 @@
 #include <chrono>
 #include <limits>
 
+#include "pictura/backends/make_renderer.h"
 #include "pictura/backends/make_simulator.h"
+#include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
+#include "pictura/common/pixel_samples.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/map/load_map.h"
 #include "pictura/training/checkpoint.h"
@@ -90,7 +93,17 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
   }
   Checkpoint checkpoint = read_checkpoint(options.checkpoint);
   checkpoint.config.run.num_threads = options.num_threads;
-  checkpoint.config.run.backend = options.backend;
+  checkpoint.config.run.device = options.device;
+  checkpoint.config.simulator.backend = options.simulator;
+  if (!options.renderer.empty()) checkpoint.config.render.backend = options.renderer;
+  if (!options.samples.empty()) {
+    const std::optional<PixelSamples> samples = parse_pixel_samples(options.samples);
+    if (!samples) fail_usage("samples: expected {}, got '{}'", kPixelSamplesExpected, options.samples);
+    checkpoint.config.render.samples = *samples;
+  } else if (!checkpoint.config.render.backend.starts_with("gl")) {
+    checkpoint.config.render.samples = {};
+  }
+  check_devices(checkpoint.config);
   const std::unique_ptr<Driver> driver = load_driver(options.checkpoint, options.num_threads);
   SimulatorConfig simulator_config = evaluation_simulator_config(checkpoint.config, options.steps);
   simulator_config.seed = options.seed;
@@ -118,10 +131,11 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
         worlds.push_back({scenario % static_cast<int>(maps.size()), density.agents,
                           kFirstEvaluationWorld + static_cast<uint32_t>(scenario)});
       }
-      const std::unique_ptr<Simulator> simulator =
-          make_simulator(simulator_name(options.backend), simulator_config, maps, worlds);
-      if (driver->needs_images() && !renderer)
-        renderer = make_policy_renderer(checkpoint.config, driver->rig(), *simulator);
+      const std::unique_ptr<Simulator> simulator = make_simulator(options.simulator, simulator_config, maps, worlds);
+      if (driver->needs_images() && !renderer) {
+        renderer = make_renderer(checkpoint.config.render.backend, renderer_config(checkpoint.config, driver->rig()));
+        upload_maps(*simulator, renderer.get());
+      }
       simulator->reset();
       std::vector<int32_t> actions(static_cast<size_t>(simulator->num_slots()));
       // Halted agents stay as they are, so a batch is over when nobody is left to drive.

@@ -23,7 +23,9 @@ struct EvaluateOptions {
   bool argmax = true;
   uint64_t seed = 1;
   int num_threads = 0;
-  std::string backend = "auto";
+  std::string device = "auto", simulator = "auto";  // as run.device and simulator.backend of a configuration
+  // As render.backend and render.samples; empty: as the policy was trained.
+  std::string renderer, samples;
   std::function<void(double done_fraction, double eta_s)> on_progress;
 };
 

@@ -1,0 +1,28 @@
+// Options that name what computes: simulators, renderers, devices.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+namespace pictura {
+
+/// Takes these names alone; the complaint lists them.
+CLI::Validator one_of(const std::vector<std::string>& names);
+
+/// Empty where an option was not given.
+struct BackendOptions {
+  std::string device, simulator, renderer, samples;
+};
+
+/// Adds --simulator, --renderer (or --backend) and --samples, whose help names `otherwise` as what counts without them.
+void add_backend_options(CLI::App* command, const std::string& otherwise, BackendOptions* options_out);
+
+/// Adds --device as well: what a policy runs on.
+void add_policy_backend_options(CLI::App* command, const std::string& otherwise, BackendOptions* options_out);
+
+/// The options that were given as overrides of a training configuration.
+std::vector<std::string> overrides_of(const BackendOptions& options);
+
+}  // namespace pictura
