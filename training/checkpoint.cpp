@@ -22,16 +22,19 @@ constexpr uint32_t kVersion = 1;
 constexpr uint32_t kByteOrder = 0x01020304;
 constexpr size_t kPreamble = sizeof(kMagic) + 2 * sizeof(uint32_t) + sizeof(uint64_t);
 
-// What a policy's numbers mean; it cannot drive where this differs.
-ordered_json schema() {
-  return {{"ego", {kEgoFeatures}},
-          {"partners", {kMaxPartners, kPartnerFeatures}},
-          {"lanes", {kMaxLanes, kLaneFeatures}},
-          {"boundaries", {kMaxBoundaries, kBoundaryFeatures}},
-          {"controls", {kMaxControls, kControlFeatures}},
-          {"conditioning", {kNumConditioning}},
-          {"waypoints", {kNumWaypoints, kWaypointFeatures}},
-          {"actions", {kNumLongActions, kNumLatActions}}};
+// What the numbers that a policy reads and gives mean: the shapes of its arrays. It cannot drive where these differ.
+ordered_json schema(const Config& config) {
+  ordered_json result;
+  for (const ObservationArray& array : kObservationArrays) {
+    if (array.type != ElementType::f32 || !config.reads(array.part)) continue;
+    ordered_json& shape = result[std::string(array.name)];
+    if (array.rows > 1)
+      shape = {array.rows, array.features};
+    else
+      shape = {array.features};
+  }
+  result["actions"] = {kNumLongActions, kNumLatActions};
+  return result;
 }
 
 ordered_json rig_to_json(const Rig& rig) {
@@ -101,7 +104,7 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
   };
   ordered_json header;
   header["config"] = to_toml(checkpoint.config);
-  header["schema"] = schema();
+  header["schema"] = schema(checkpoint.config);
   header["rig"] = rig_to_json(checkpoint.rig);
   header["counters"] = {{"update", checkpoint.update},
                         {"agent_steps", checkpoint.agent_steps},
@@ -146,9 +149,12 @@ Checkpoint read_checkpoint(const std::string& path) {
   result.path = path;
   try {
     const ordered_json header = ordered_json::parse(file.substr(kPreamble, header_bytes));
-    const ordered_json expected_schema = schema();
+    result.config = parse_saved_config(header.at("config").get<std::string>(), path + ": config");
+    const ordered_json expected_schema = schema(result.config), &saved_schema = header.at("schema");
     for (const auto& [name, shape] : expected_schema.items()) {
-      const ordered_json& saved = header.at("schema").at(name);
+      PICTURA_CHECK(saved_schema.contains(name), "{}: observation schema: {}: expected {}, got nothing", path, name,
+                    shape.dump());
+      const ordered_json& saved = saved_schema.at(name);
       PICTURA_CHECK(saved == shape, "{}: observation schema: {}: expected {}, got {}", path, name, shape.dump(),
                     saved.dump());
     }
@@ -192,13 +198,12 @@ Checkpoint read_checkpoint(const std::string& path) {
     result.distance_m = counters.at("distance_m");
     result.adam_steps = counters.at("adam_steps");
     result.filter_average = counters.at("filter_average");
-    // A run saved without it goes on as exactly; its averages alone begin anew.
+    // A run saved without it continues exactly; only its averages start again.
     for (const ordered_json& json : header.value("recent", ordered_json::array())) {
       result.recent.push_back(
           {json.at("goals"), json.at("finished"), json.at("distance_m"), json.at("finished_return")});
     }
     result.rig = rig_from_json(header.at("rig"));
-    result.config = parse_saved_config(header.at("config").get<std::string>(), path + ": config");
   } catch (const nlohmann::json::exception& error) {
     fail("{}: its header cannot be read: {}", path, error.what());
   }

@@ -26,7 +26,7 @@ struct Checkpoint {
   std::vector<uint8_t> simulator;  // Simulator::save(), at the start of update `update`
 };
 
-/// Writes beside path and renames.
+/// Writes the file under another name and renames it to path. Throws Error naming the path.
 void write_checkpoint(const std::string& path, const Checkpoint& checkpoint);
 
 /// Throws Error naming the file when it is no checkpoint, truncated, damaged, of another version or byte order, or of

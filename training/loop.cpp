@@ -28,7 +28,7 @@ bool collect(Run* run, PhaseTimes* times_out) {
     watch.restart();
     const Decision decision = decide(run->policy, row_of(rollout.observation, step), config.train.forward_chunk);
     const Span<int32_t> actions = rollout.actions_at(step);
-    choose_actions(decision.log_probs, *run->simulator, config.run.seed, /*argmax=*/false, actions);
+    choose_actions(decision.log_probs, run->simulator->controller_input(), config.run.seed, /*argmax=*/false, actions);
     const at::Tensor chosen = rollout.actions.select(0, step).to(at::kLong).unsqueeze(1);
     rollout.values.select(0, step).copy_(decision.value);
     rollout.log_probs.select(0, step).copy_(decision.log_probs.gather(1, chosen).squeeze(1));

@@ -14,8 +14,8 @@ struct TrainProgress {
   int64_t update = 0, updates = 0;
   int64_t agent_steps = 0;
   double agent_steps_per_s = 0;
-  double episode_return = 0;  // mean over agent episodes that ended lately; NaN before the first
-  double goals_per_km = 0;    // goals per km driven, lately
+  double episode_return = 0;  // mean over agent episodes that ended in the last updates; NaN before the first
+  double goals_per_km = 0;    // goals per km driven in the last updates
   double eta_s = 0;
 };
 

@@ -9,11 +9,16 @@ namespace pictura {
 
 namespace {
 
-// Without a copy; the caller copies at once.
+// Copies an array in host memory to a tensor of as many elements, if it is defined.
 template <typename T>
-at::Tensor wrap(Span<T> span, at::IntArrayRef shape) {
+void copy_array(const char* name, Span<T> array, const at::Tensor& out) {
+  if (!out.defined()) return;
+  PICTURA_CHECK(array.size() == static_cast<size_t>(out.numel()),
+                "observation: {}: expected {} numbers, for {} agents, got {}", name, out.numel(), out.size(0),
+                array.size());
   constexpr at::ScalarType kType = std::is_same_v<std::remove_const_t<T>, float> ? at::kFloat : at::kInt;
-  return at::from_blob(const_cast<std::remove_const_t<T>*>(span.data()), shape, at::TensorOptions(kType));
+  // from_blob takes no pointer to const; the copy reads alone.
+  out.copy_(at::from_blob(const_cast<std::remove_const_t<T>*>(array.data()), out.sizes(), at::TensorOptions(kType)));
 }
 
 std::vector<ImageBlock> image_blocks(const Rig& rig, int64_t rows, int64_t slots) {
@@ -44,39 +49,66 @@ void spread(const std::vector<int64_t>& slots, const at::Tensor& pixels) {
 
 }  // namespace
 
-std::vector<int64_t> active_slots(Simulator& simulator) {
-  const AgentStateView state = simulator.state();
+Observation allocate_observations(const Config& config, const Rig& rig, int64_t rows, int64_t slots) {
+  Observation result;
+  for (size_t i = 0; i < std::size(kObservationArrays); ++i) {
+    const ObservationArray& array = kObservationArrays[i];
+    if (!config.reads(array.part)) continue;
+    const at::ScalarType type = array.type == ElementType::f32 ? at::kFloat : at::kInt;
+    result.*kObservationTensors[i] = is_set(array) ? at::empty({rows, slots, array.rows, array.features}, type)
+                                                    : at::empty({rows, slots, array.rows * array.features}, type);
+  }
+  if (config.reads_images()) result.images = image_blocks(rig, rows, slots);
+  return result;
+}
+
+Observation row_of(const Observation& rows, int64_t row) {
+  return rows.map([row](const at::Tensor& t) { return t.select(0, row); });
+}
+
+void copy_arrays(const ObservationView& view, const Observation& out) {
+#define X(name, type, rows, features, part, comment) copy_array(#name, view.name, out.name);
+  PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
+}
+
+void draw_images(const SceneBatch& scene, Span<const View> views, const std::vector<int64_t>& slots, Renderer* renderer,
+                 const Observation& out) {
+  const ImageLayout layout = image_layout(renderer->config().rig, out.ego.size(0), PixelFormat::u8);
+  std::vector<CameraImages> cameras;
+  for (const CameraLayout& camera : layout.cameras) {
+    // Each block is a tensor of its own.
+    const auto block = static_cast<size_t>(camera.block);
+    uint8_t* const first = out.images[block].pixels.data_ptr<uint8_t>() + (camera.offset - layout.blocks[block].offset);
+    cameras.push_back({camera.size.width_px, camera.size.height_px, first, camera.view_stride});
+  }
+  std::vector<View> drawn;
+  for (const int64_t slot : slots) drawn.push_back(views[static_cast<size_t>(slot)]);
+  renderer->render(scene, drawn, {Device{}, PixelFormat::u8, static_cast<int>(drawn.size()), cameras});
+  for (const ImageBlock& block : out.images) spread(slots, block.pixels);
+}
+
+std::vector<int64_t> active_slots(const ControllerInput& input, Span<const uint8_t> mask) {
   std::vector<int64_t> slots;
-  for (int slot = 0; slot < simulator.num_slots(); ++slot) {
-    if (static_cast<AgentStatus>(state.status[slot]) == AgentStatus::active) slots.push_back(slot);
+  for (size_t slot = 0; slot < input.slots.world_of_slot.size(); ++slot) {
+    const bool is_active = static_cast<AgentStatus>(input.state.status[slot]) == AgentStatus::active;
+    if (is_active && (mask.empty() || mask[slot])) slots.push_back(static_cast<int64_t>(slot));
   }
   return slots;
 }
 
-Observer::Observer(Simulator* simulator, Renderer* renderer) : simulator_(*simulator), renderer_(renderer) {
-  const bool on_host = simulator->device().is_host() && (!renderer || renderer->device().is_host());
-  PICTURA_CHECK(on_host,
-                "training: simulator '{}' keeps its arrays on a CUDA device, and this build trains on the host: "
-                "set simulator.backend to \"cpu\"",
-                simulator->name());
+Observer::Observer(const Config& config, Simulator* simulator, Renderer* renderer)
+    : config_(config), simulator_(*simulator), renderer_(renderer) {
+  PICTURA_CHECK(!config.reads_images() || renderer, "training: a policy that reads images needs a renderer");
+  const Device device = simulator->controller_input().device;
+  PICTURA_CHECK(
+      device.is_host() && (!renderer || renderer->device().is_host()),
+      "training: simulator '{}' works on {} and this build learns on the host: set simulator.backend to \"cpu\"",
+      simulator->name(), name_of(device));
 }
 
 Observation Observer::allocate(int64_t rows) const {
-  const int64_t slots = simulator_.num_slots();
-  Observation o;
-  o.ego = at::empty({rows, slots, kEgoFeatures}, at::kFloat);
-  o.conditioning = at::empty({rows, slots, kNumConditioning}, at::kFloat);
-  o.waypoints = at::empty({rows, slots, kNumWaypoints * kWaypointFeatures}, at::kFloat);
-  if (renderer_) {
-    o.images = image_blocks(renderer_->config().rig, rows, slots);
-    return o;
-  }
-  o.partners = at::empty({rows, slots, kMaxPartners, kPartnerFeatures}, at::kFloat);
-  o.lanes = at::empty({rows, slots, kMaxLanes, kLaneFeatures}, at::kFloat);
-  o.boundaries = at::empty({rows, slots, kMaxBoundaries, kBoundaryFeatures}, at::kFloat);
-  o.controls = at::empty({rows, slots, kMaxControls, kControlFeatures}, at::kFloat);
-  o.set_counts = at::empty({rows, slots, kNumEntitySets}, at::kInt);
-  return o;
+  return allocate_observations(config_, renderer_ ? renderer_->config().rig : Rig{}, rows, simulator_.num_slots());
 }
 
 double Observer::bytes_per_row() const {
@@ -91,39 +123,12 @@ double Observer::bytes_per_row() const {
 }
 
 void Observer::observe(const Observation& out) {
-  const ObservationView view = simulator_.observations();
-  out.ego.copy_(wrap(view.ego, out.ego.sizes()));
-  out.conditioning.copy_(wrap(view.conditioning, out.conditioning.sizes()));
-  out.waypoints.copy_(wrap(view.waypoints, out.waypoints.sizes()));
-  if (!renderer_) {
-    out.partners.copy_(wrap(view.partners, out.partners.sizes()));
-    out.lanes.copy_(wrap(view.lanes, out.lanes.sizes()));
-    out.boundaries.copy_(wrap(view.boundaries, out.boundaries.sizes()));
-    out.controls.copy_(wrap(view.controls, out.controls.sizes()));
-    out.set_counts.copy_(wrap(view.set_counts, out.set_counts.sizes()));
-    return;
-  }
-
+  const ControllerInput input = simulator_.controller_input();
+  copy_arrays(input.observations, out);
+  if (!config_.reads_images()) return;
   const auto start = std::chrono::steady_clock::now();
-  const ImageLayout layout = image_layout(renderer_->config().rig, simulator_.num_slots(), PixelFormat::u8);
-  std::vector<CameraImages> cameras;
-  for (size_t i = 0; i < layout.cameras.size(); ++i) {
-    // Each block is a tensor of its own.
-    const CameraLayout& camera = layout.cameras[i];
-    const auto block = static_cast<size_t>(camera.block);
-    uint8_t* const first = out.images[block].pixels.data_ptr<uint8_t>() + (camera.offset - layout.blocks[block].offset);
-    cameras.push_back({camera.size.width_px, camera.size.height_px, first, camera.view_stride});
-  }
-  const std::vector<int64_t> seeing = active_slots(simulator_);
-  std::vector<View> views;
-  for (const int64_t slot : seeing) views.push_back(simulator_.views()[static_cast<size_t>(slot)]);
-  renderer_->render(simulator_.scene(), views, {Device{}, PixelFormat::u8, static_cast<int>(views.size()), cameras});
-  for (const ImageBlock& block : out.images) spread(seeing, block.pixels);
+  draw_images(input.scene, input.views, active_slots(input), renderer_, out);
   render_s_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-Observation row_of(const Observation& rows, int64_t row) {
-  return rows.map([row](const at::Tensor& t) { return t.select(0, row); });
 }
 
 }  // namespace pictura

@@ -12,7 +12,7 @@
 
 namespace pictura {
 
-/// Draws parameters in the order in which they are asked for and remembers them by name.
+/// Draws parameters in the order of the calls and keeps them by name.
 class ParameterMaker {
  public:
   ParameterMaker(uint64_t seed, at::ScalarType type, std::vector<NamedTensor>* parameters_out)
@@ -82,28 +82,37 @@ at::Tensor masked_max(const at::Tensor& members, const at::Tensor& counts) {
   return largest.masked_fill((counts == 0).unsqueeze(1), 0);
 }
 
-/// Four entity sets, each through its own MLP and a masked max over its members.
+/// The entity sets of simulator/observation.h, each through its own MLP and a masked max over its members.
 class VectorEncoder final : public SceneEncoder {
  public:
-  VectorEncoder(const Config::PolicySection& config, ParameterMaker* make) {
-    const std::pair<const char*, int> groups[] = {{"partners", kPartnerFeatures},
-                                                  {"lanes", kLaneFeatures},
-                                                  {"boundaries", kBoundaryFeatures},
-                                                  {"controls", kControlFeatures}};
-    for (const auto& [name, features] : groups) groups_.push_back(make->group(name, features, config.embedding_width));
+  VectorEncoder(const Config::PolicySection& config, bool reads_walls, ParameterMaker* make)
+      : embedding_width_(config.embedding_width) {
+    for (size_t i = 0; i < std::size(kObservationArrays); ++i) {
+      const ObservationArray& array = kObservationArrays[i];
+      if (!is_set(array) || (array.part == ObservationPart::walls && !reads_walls)) continue;
+      groups_.push_back(
+          {make->group(std::string(array.name), array.features, embedding_width_), kObservationTensors[i], entity_set_of(i)});
+    }
   }
 
   at::Tensor forward(const Observation& o) const override {
-    const at::Tensor* sets[] = {&o.partners, &o.lanes, &o.boundaries, &o.controls};
     std::vector<at::Tensor> embeddings;
-    for (size_t i = 0; i < groups_.size(); ++i) {
-      embeddings.push_back(masked_max(encode(groups_[i], *sets[i]), o.set_counts.select(1, static_cast<int64_t>(i))));
+    for (const Group& group : groups_) {
+      embeddings.push_back(masked_max(encode(group.encoder, o.*group.members), o.set_counts.select(1, group.set)));
     }
     return at::cat(embeddings, 1);
   }
 
+  int64_t width() const override { return static_cast<int64_t>(groups_.size()) * embedding_width_; }
+
  private:
-  std::vector<Policy::GroupEncoder> groups_;
+  struct Group {
+    Policy::GroupEncoder encoder;
+    at::Tensor Observation::* members;
+    int64_t set;  // its column of set_counts
+  };
+  int64_t embedding_width_;
+  std::vector<Group> groups_;
 };
 
 /// A convolutional stack shared by all cameras; per camera, learned queries that cross-attend over its feature map and
@@ -133,8 +142,10 @@ class PerspectiveEncoder final : public SceneEncoder {
       mlp_hidden_ = make->linear("attention.mlp_hidden", width_, config.attention_mlp, std::numbers::sqrt2);
       mlp_out_ = make->linear("attention.mlp_out", config.attention_mlp, width_, 1.0);
     }
-    project_ = make->linear("project", num_cameras * width_, 4 * config.embedding_width, 1.0);
+    project_ = make->linear("project", num_cameras * width_, width(), 1.0);
   }
+
+  int64_t width() const override { return 4 * int64_t{config_.embedding_width}; }
 
   at::Tensor forward(const Observation& o) const override {
     std::vector<at::Tensor> per_camera(static_cast<size_t>(num_cameras_));
@@ -148,7 +159,7 @@ class PerspectiveEncoder final : public SceneEncoder {
   }
 
  private:
-  // Sines and cosines of the pixel's place in the image, so that attention knows where a token stands whatever the
+  // Sines and cosines of the pixel's position in the image, so that attention knows where a token is whatever the
   // image's size.
   static constexpr int64_t kPositionFeatures = 8;
 
@@ -205,18 +216,20 @@ class PerspectiveEncoder final : public SceneEncoder {
   Policy::Linear position_, query_, key_, value_, out_, mlp_hidden_, mlp_out_, project_;
 };
 
-Policy::Policy(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type) : type_(type) {
+Policy::Policy(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type,
+               bool reads_walls)
+    : type_(type) {
   ParameterMaker make(seed, type, &parameters_);
   const bool sees_images = config.modality == Modality::perspective;
   if (sees_images)
     scene_ = std::make_unique<PerspectiveEncoder>(config, num_cameras, &make);
   else
-    scene_ = std::make_unique<VectorEncoder>(config, &make);
+    scene_ = std::make_unique<VectorEncoder>(config, reads_walls, &make);
   ego_features_ = sees_images ? kEgoFeatures - 2 : kEgoFeatures;
   const int64_t width = config.embedding_width;
   ego_ = make.group("ego", ego_features_, width);
   conditioning_ = make.group("conditioning", kNumConditioning + kNumWaypoints * kWaypointFeatures, width);
-  int64_t in = 6 * width;
+  int64_t in = scene_->width() + 2 * width;
   for (int i = 0; i < config.backbone_layers; ++i) {
     backbone_.push_back(make.linear(fmt::format("backbone.{}", i), in, config.backbone_width, std::numbers::sqrt2));
     in = config.backbone_width;
@@ -249,32 +262,37 @@ std::string Policy::hash() const {
   return hash.hex();
 }
 
+Policy make_policy(const Config& config, const Rig& rig) {
+  return Policy(config.policy, static_cast<int>(rig.cameras.size()), config.run.seed, at::kFloat,
+                config.reads(ObservationPart::walls));
+}
+
 Decision decide(const Policy& policy, const Observation& observation, int64_t chunk) {
   const at::NoGradGuard no_grad;
   const int64_t batch = observation.ego.size(0);
-  std::vector<at::Tensor> log_probs, values;
+  std::vector<at::Tensor> logits, values;
   for (int64_t begin = 0; begin < batch; begin += chunk) {
     const int64_t count = std::min(chunk, batch - begin);
     const Policy::Output output =
         policy.forward(observation.map([&](const at::Tensor& t) { return t.narrow(0, begin, count); }));
-    log_probs.push_back(at::log_softmax(output.logits, 1));
+    logits.push_back(output.logits);
     values.push_back(output.value);
   }
-  return {at::cat(log_probs), at::cat(values)};
+  Decision decision{at::cat(logits), {}, at::cat(values)};
+  decision.log_probs = at::log_softmax(decision.logits, 1);
+  return decision;
 }
 
-void choose_actions(const at::Tensor& log_probs, const Simulator& simulator, uint64_t seed, bool argmax,
+void choose_actions(const at::Tensor& log_probs, const ControllerInput& input, uint64_t seed, bool argmax,
                     Span<int32_t> actions_out) {
   const at::Tensor host = log_probs.contiguous();
   const float* row = host.const_data_ptr<float>();
-  size_t slot = 0;
-  for (size_t w = 0; w < simulator.worlds().size(); ++w) {
-    const WorldSpec& world = simulator.worlds()[w];
-    ActionKey key{seed, world.global_world, 0, static_cast<uint32_t>(simulator.episode_index()[w]),
-                  static_cast<uint32_t>(simulator.episode_step()[w])};
-    for (; key.agent < static_cast<uint32_t>(world.num_agents); ++key.agent, ++slot, row += kNumActions) {
-      actions_out[slot] = argmax ? most_likely_action(row, kNumActions) : draw_action(row, kNumActions, key);
-    }
+  for (size_t slot = 0; slot < actions_out.size(); ++slot, row += kNumActions) {
+    const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
+    const ActionKey key{seed, input.slots.global_world[world], static_cast<uint32_t>(input.slots.agent_of_slot[slot]),
+                        static_cast<uint32_t>(input.episode_index[world]),
+                        static_cast<uint32_t>(input.episode_step[world])};
+    actions_out[slot] = argmax ? most_likely_action(row, kNumActions) : draw_action(row, kNumActions, key);
   }
 }
 

@@ -1,5 +1,6 @@
 // The two policies of the paper (appendix, table of the policy architecture): one trunk with actor and critic, behind
-// either four entity-set encoders or one image branch of the same width. Plain tensors and functions: ATen alone.
+// either encoders of four entity sets, or five with walls, or one image branch as wide as four. Plain tensors and
+// functions: ATen alone.
 #pragma once
 
 #include <memory>
@@ -19,17 +20,21 @@ struct NamedTensor {
   at::Tensor value;
 };
 
-/// Turns what is around an agent into one embedding of 4 * policy.embedding_width.
+/// Turns what is around an agent into one embedding.
 class SceneEncoder {
  public:
   virtual ~SceneEncoder() = default;
   virtual at::Tensor forward(const Observation& observation) const = 0;
+  /// Of the embedding.
+  virtual int64_t width() const = 0;
 };
 
 class Policy {
  public:
-  /// Parameters are drawn from (seed, index of the parameter, index of the element) alone.
-  Policy(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type = at::kFloat);
+  /// Parameters are drawn from (seed, index of the parameter, index of the element) alone. With `reads_walls` the
+  /// vector policy has a fifth set.
+  Policy(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type = at::kFloat,
+         bool reads_walls = false);
 
   struct Output {
     at::Tensor logits;  // [batch, kNumActions]
@@ -63,15 +68,18 @@ class Policy {
   friend class PerspectiveEncoder;
 };
 
-/// Policy outputs for a whole batch without gradients, `chunk` agents at a time: log-probabilities [batch, actions] and
-/// values [batch].
+/// The policy of a configuration, for cameras of this rig.
+Policy make_policy(const Config& config, const Rig& rig);
+
+/// Policy outputs for a whole batch without gradients, `chunk` agents at a time: logits and log-probabilities
+/// [batch, actions], and values [batch].
 struct Decision {
-  at::Tensor log_probs, value;
+  at::Tensor logits, log_probs, value;
 };
 Decision decide(const Policy& policy, const Observation& observation, int64_t chunk);
 
 /// Chooses one action per slot: the most likely one, or a draw keyed by (seed, global world, agent, episode, step).
-void choose_actions(const at::Tensor& log_probs, const Simulator& simulator, uint64_t seed, bool argmax,
+void choose_actions(const at::Tensor& log_probs, const ControllerInput& input, uint64_t seed, bool argmax,
                     Span<int32_t> actions_out);
 
 /// Largest value over the members of each set, [batch, members, width] -> [batch, width]; members at and beyond

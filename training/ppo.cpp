@@ -88,7 +88,7 @@ at::Tensor kept_transitions(const at::Tensor& advantages, const at::Tensor& vali
 UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Config::Train& config, uint64_t seed,
                        int64_t update, AdamW* optimizer, AdvantageFilter* filter) {
   UpdateStats stats;
-  // The batch: transitions of all agents and steps, flattened; the row after the last step belongs to nobody.
+  // The batch: transitions of all agents and steps, flattened; the row after the last step is no transition.
   const Observation observation =
       rollout.observation.map([&](const at::Tensor& t) { return t.narrow(0, 0, rollout.num_steps()).flatten(0, 1); });
   const at::Tensor actions = rollout.actions.flatten().to(at::kLong), old_log_probs = rollout.log_probs.flatten();

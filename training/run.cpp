@@ -34,8 +34,8 @@ Run::Run(const Config& its_config)
       rig(rig_of(config)),
       simulator(make_training_simulator(config)),
       renderer(make_training_renderer(config, rig, *simulator)),
-      observer(simulator.get(), renderer.get()),
-      policy(config.policy, static_cast<int>(rig.cameras.size()), config.run.seed),
+      observer(config, simulator.get(), renderer.get()),
+      policy(make_policy(config, rig)),
       optimizer(policy, config.train),
       rollout(allocate_rollout(observer, simulator->num_slots(), config.train.num_steps), config.train.num_steps,
               simulator->num_slots()) {}

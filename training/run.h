@@ -10,7 +10,8 @@ struct Run {
   /// Throws Error naming file and key for maps, cameras and sizes that cannot be trained with.
   explicit Run(const Config& config);
 
-  /// Writes a checkpoint beside path and renames. `simulator_bytes` is Simulator::save() at the start of an update.
+  /// Writes a checkpoint under another name and renames it to path. `simulator_bytes` is Simulator::save() at the start
+  /// of an update.
   void save(const std::string& path, const std::vector<RecentUpdate>& recent,
             std::vector<uint8_t> simulator_bytes) const;
   /// Goes on from a checkpoint. Throws Error naming what differs when it was saved under another configuration or with

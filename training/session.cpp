@@ -16,7 +16,7 @@ class PolicyDriver final : public Driver {
   PolicyDriver(const Checkpoint& checkpoint, int num_threads)
       : config_(checkpoint.config),
         rig_(checkpoint.rig),
-        policy_(config_.policy, static_cast<int>(rig_.cameras.size()), config_.run.seed),
+        policy_(make_policy(config_, rig_)),
         num_threads_(num_threads) {
     restore_tensors(checkpoint, checkpoint.parameters, policy_.parameters());
   }
@@ -32,12 +32,12 @@ class PolicyDriver final : public Driver {
     PICTURA_CHECK(actions_out.size() == static_cast<size_t>(simulator.num_slots()),
                   "driver: expected room for {} actions, got {}", simulator.num_slots(), actions_out.size());
     at::set_num_threads(resolve_num_threads(num_threads_));
-    Observer observer(&simulator, needs_images() ? renderer : nullptr);
+    Observer observer(config_, &simulator, renderer);
     if (!storage_.ego.defined() || storage_.ego.size(1) != simulator.num_slots()) storage_ = observer.allocate(1);
     const Observation row = row_of(storage_, 0);
     observer.observe(row);
     const Decision decision = decide(policy_, row, config_.train.forward_chunk);
-    choose_actions(decision.log_probs, simulator, simulator.config().seed, argmax, actions_out);
+    choose_actions(decision.log_probs, simulator.controller_input(), simulator.config().seed, argmax, actions_out);
   }
 
  private:

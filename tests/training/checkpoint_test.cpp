@@ -164,6 +164,60 @@ TEST_F(CheckpointFile, BrokenFilesAreRefused) {
   EXPECT_THAT(message_of([&] { load_driver(folder_ / "none.ckpt", 1); }), HasSubstr("no such file"));
 }
 
+TEST_F(CheckpointFile, TheSchemaIsThatOfTheArraysThatThePolicyReads) {
+  Config config = small_config();
+  const std::string path = folder_ / "a.ckpt";
+  auto schema_of = [&] {
+    write_checkpoint(path, small_checkpoint(make_policy(config, paper_rig(16, 9)), config));
+    const std::string bytes = read_file(path);
+    uint64_t header_bytes = 0;
+    std::memcpy(&header_bytes, bytes.data() + 16, 8);
+    return nlohmann::json::parse(bytes.substr(24, header_bytes)).at("schema");
+  };
+  const nlohmann::json without_walls = schema_of();
+  EXPECT_EQ(without_walls.at("partners"), nlohmann::json({16, 8}));
+  EXPECT_EQ(without_walls.at("waypoints"), nlohmann::json({3, 3}));
+  EXPECT_EQ(without_walls.at("ego"), nlohmann::json::array({9}));
+  EXPECT_EQ(without_walls.at("actions"), nlohmann::json({4, 3}));
+  EXPECT_EQ(without_walls.size(), 8u);
+  config.simulator.wall_observations = true;
+  const nlohmann::json with_walls = schema_of();
+  EXPECT_EQ(with_walls.size(), 9u);
+  EXPECT_EQ(with_walls.at("walls"), nlohmann::json({80, 7}));
+
+  // One that lacks the array is refused by its name.
+  std::string changed = read_file(path);
+  changed.replace(changed.find("\"walls\":[80,7]"), 7, "\"wells\"");
+  write_file(path, changed);
+  EXPECT_THAT(
+      message_of([&] { read_checkpoint(path); }),
+      ::testing::AllOf(HasSubstr("a.ckpt: observation schema: walls"), HasSubstr("[80,7]"), HasSubstr("nothing")));
+}
+
+TEST_F(CheckpointFile, SavedUnderTheOldNameOfTheBackendsItReadsAsBefore) {
+  const Config config = small_config();
+  const Policy policy(config.policy, 4, 1);
+  const std::string path = folder_ / "a.ckpt";
+  write_checkpoint(path, small_checkpoint(policy, config));
+  std::string bytes = read_file(path);
+  // The configuration of a run that knew run.backend alone.
+  const auto replace = [&](const std::string& from, std::string to) {
+    const size_t at = bytes.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    ASSERT_LE(to.size(), from.size());
+    to.resize(from.size(), ' ');
+    bytes.replace(at, from.size(), to);
+  };
+  replace(R"(device = \"auto\")", R"(backend=\"null\")");
+  replace(R"([simulator]\nbackend = \"auto\")", R"([simulator])");
+  replace(R"([render]\nbackend = \"auto\"\nsamples = \"1\")", R"([render])");
+  write_file(path, bytes);
+  const Checkpoint saved = read_checkpoint(path);
+  EXPECT_EQ(saved.config.simulator.backend, "cpu");
+  EXPECT_EQ(saved.config.render.backend, "null");
+  EXPECT_EQ(saved.config.run.device, "auto");
+}
+
 TEST_F(CheckpointFile, SafetensorsHoldEveryParameter) {
   const Config config = small_config();
   const Policy policy(config.policy, 4, 1);

@@ -42,8 +42,9 @@ Observation observation(Modality modality, int64_t batch) {
     o.lanes = numbers({batch, kMaxLanes, kLaneFeatures}, 4);
     o.boundaries = numbers({batch, kMaxBoundaries, kBoundaryFeatures}, 5);
     o.controls = numbers({batch, kMaxControls, kControlFeatures}, 6);
-    o.set_counts = at::tensor({3, 80, 5, 0, 0, 7, 80, 10}, at::kInt)
-                       .reshape({2, 4})
+    o.walls = numbers({batch, kMaxWalls, kWallFeatures}, 7);
+    o.set_counts = at::tensor({3, 80, 5, 0, 4, 0, 7, 80, 10, 80}, at::kInt)
+                       .reshape({2, kNumEntitySets})
                        .repeat({(batch + 1) / 2, 1})
                        .narrow(0, 0, batch);
   } else {
@@ -114,6 +115,38 @@ TEST_P(BothModalities, HasThePapersShapes) {
     EXPECT_EQ(shape_of("lanes.hidden.weight"), (std::vector<int64_t>{64, 7}));
     EXPECT_EQ(shape_of("ego.hidden.weight"), (std::vector<int64_t>{64, 9}));
   }
+}
+
+TEST(Policy, WallsAreAFifthGroupOfTheVectorPolicy) {
+  Config::PolicySection config;
+  config.modality = Modality::vector;
+  const Policy without(config, 4, 1), with(config, 4, 1, at::kFloat, /*reads_walls=*/true);
+  auto names_of = [](const Policy& policy) {
+    std::vector<std::string> names;
+    for (const NamedTensor& p : policy.parameters()) names.push_back(p.name);
+    return names;
+  };
+  auto shape_of = [](const Policy& policy, const std::string& name) {
+    for (const NamedTensor& p : policy.parameters()) {
+      if (p.name == name) return p.value.sizes().vec();
+    }
+    return std::vector<int64_t>{};
+  };
+  EXPECT_EQ(shape_of(with, "backbone.0.weight"), (std::vector<int64_t>{512, 448}));
+  EXPECT_EQ(shape_of(with, "walls.hidden.weight"), (std::vector<int64_t>{64, 7}));
+  // Checkpoints without walls keep their tensors' names and order.
+  const std::vector<std::string> names = names_of(without);
+  const std::vector<std::string> groups{"partners.hidden.weight", "lanes.hidden.weight", "boundaries.hidden.weight",
+                                        "controls.hidden.weight", "ego.hidden.weight"};
+  for (size_t i = 0; i < groups.size(); ++i) EXPECT_EQ(names.at(4 * i), groups[i]);
+  EXPECT_EQ(names_of(with).at(16), "walls.hidden.weight");
+
+  const at::NoGradGuard no_grad;
+  const Observation o = observation(Modality::vector, 2);
+  Observation changed = o.map([](const at::Tensor& t) { return t.clone(); });
+  changed.walls.fill_(9);
+  EXPECT_TRUE(at::equal(without.forward(o).logits, without.forward(changed).logits));
+  EXPECT_FALSE(at::equal(with.forward(o).logits, with.forward(changed).logits));
 }
 
 TEST_P(BothModalities, FirstPolicyIsNearlyUniformAndDoesNotDependOnThreads) {

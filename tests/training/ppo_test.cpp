@@ -16,7 +16,7 @@
 namespace pictura {
 namespace {
 
-// One agent, written as the recursion stands in the literature.
+// One agent, the recursion as in the literature.
 std::vector<float> plain_gae(const std::vector<float>& rewards, const std::vector<float>& values,
                              const std::vector<uint8_t>& terminated, const std::vector<uint8_t>& truncated,
                              const std::vector<uint8_t>& valid, float gamma, float gae_lambda) {
@@ -79,7 +79,7 @@ TEST(Gae, EqualsThePlainRecursionExactly) {
 }
 
 TEST(Gae, TruncationBootstrapsTerminationDoesNotAndResetsAreMasked) {
-  // One slot, gamma 0.5, lambda 1. Step 1 ends the episode, step 2 is the reset, step 3 begins anew.
+  // One slot, gamma 0.5, lambda 1. Step 1 ends the episode, step 2 is the reset, step 3 begins the next episode.
   const std::vector<float> rewards{1, 2, 100, 4}, values{10, 20, 40, 80, 160};
   const std::vector<uint8_t> never{0, 0, 0, 0}, end{0, 1, 0, 0}, valid{1, 1, 0, 1};
   std::vector<float> advantages = advantages_of(4, 1, rewards, values, never, end, valid, 0.5, 1.0);
@@ -172,7 +172,7 @@ struct Corridor {
     o.lanes = at::zeros({rows, kSlots, 1, kLaneFeatures}, at::kFloat);
     o.boundaries = at::zeros({rows, kSlots, 1, kBoundaryFeatures}, at::kFloat);
     o.controls = at::zeros({rows, kSlots, 1, kControlFeatures}, at::kFloat);
-    o.set_counts = at::zeros({rows, kSlots, 4}, at::kInt);
+    o.set_counts = at::zeros({rows, kSlots, kNumEntitySets}, at::kInt);
     return o;
   }
 

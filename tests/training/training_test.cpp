@@ -184,7 +184,7 @@ TEST_F(Training, ImagesAreDrawnForActiveAgentsAlone) {
   const Rig rig = rig_of(config);
   const std::unique_ptr<Renderer> renderer = make_renderer("cpu", renderer_config(config, rig));
   upload_maps(*simulator, renderer.get());
-  Observer observer(simulator.get(), renderer.get());
+  Observer observer(config, simulator.get(), renderer.get());
   const Observation storage = observer.allocate(1), row = row_of(storage, 0);
   EXPECT_EQ(observer.bytes_per_row(),
             24 * (4.0 * (kEgoFeatures + kNumConditioning + kNumWaypoints * kWaypointFeatures) +
@@ -196,7 +196,7 @@ TEST_F(Training, ImagesAreDrawnForActiveAgentsAlone) {
   size_t halted = 0;
   for (int step = 0; step < 60 && halted < 6; ++step) {
     simulator->step(Span<const int32_t>(actions));
-    halted = 24 - active_slots(*simulator).size();
+    halted = 24 - active_slots(simulator->controller_input()).size();
   }
   ASSERT_GT(halted, 0u);
   ASSERT_LT(halted, 24u);
@@ -207,7 +207,7 @@ TEST_F(Training, ImagesAreDrawnForActiveAgentsAlone) {
   renderer->render(simulator->scene(), simulator->views(), all.batch());
   const auto image_bytes = static_cast<size_t>(row.images[0].pixels.stride(0));
   ASSERT_EQ(all.bytes().size(), 24 * image_bytes);
-  const std::vector<int64_t> seeing = active_slots(*simulator);
+  const std::vector<int64_t> seeing = active_slots(simulator->controller_input());
   const std::vector<uint8_t> black(image_bytes, 0);
   for (int64_t slot = 0; slot < 24; ++slot) {
     const bool sees = std::find(seeing.begin(), seeing.end(), slot) != seeing.end();

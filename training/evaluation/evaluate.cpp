@@ -139,7 +139,7 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
       simulator->reset();
       std::vector<int32_t> actions(static_cast<size_t>(simulator->num_slots()));
       // Halted agents stay as they are, so a batch is over when nobody is left to drive.
-      for (int step = 0; step < options.steps && !active_slots(*simulator).empty(); ++step) {
+      for (int step = 0; step < options.steps && !active_slots(simulator->controller_input()).empty(); ++step) {
         if (interrupted()) {
           report.interrupted = true;
           return report;
