@@ -23,7 +23,8 @@ namespace {
 struct Arguments {
   WorldOptions world;
   int steps = 50, views = 4;
-  std::string size = "96x54", backend = "auto", samples = "1", rig, out;
+  BackendOptions backends;
+  std::string size = "96x54", rig, out;
   std::vector<std::string> planes;
   float line_floor_px = RendererConfig{}.line_floor_px;
   bool size_given = false, figure = false, json = false;
@@ -41,12 +42,13 @@ bool is_scene_file(const std::string& map) { return std::filesystem::path(map).e
 
 std::unique_ptr<Renderer> open_renderer(const Arguments& arguments, RendererConfig config) {
   config.num_threads = arguments.world.num_threads;
-  config.samples = parse_samples("--samples", arguments.samples);
+  if (!arguments.backends.samples.empty()) config.samples = parse_samples("--samples", arguments.backends.samples);
+  const std::string name = arguments.backends.renderer.empty() ? "auto" : arguments.backends.renderer;
   std::string choice;
-  auto renderer = make_renderer(arguments.backend, config, &choice);
-  PICTURA_CHECK(renderer->device().is_host(), "--backend {}: pictures are written from host memory; choose cpu",
+  auto renderer = make_renderer(name, config, &choice);
+  PICTURA_CHECK(renderer->device().is_host(), "--renderer {}: pictures are written from host memory; choose cpu",
                 renderer->name());
-  if (arguments.backend == "auto") fmt::print(stderr, "backend {}\n", choice);
+  if (name == "auto") fmt::print(stderr, "backend {}\n", choice);
   make_output_folder(arguments.out);
   return renderer;
 }
@@ -134,7 +136,7 @@ void render_world(const Arguments& arguments) {
   config.line_floor_px = arguments.line_floor_px;
   const auto renderer = open_renderer(arguments, config);
 
-  DrivenWorld world = make_world(arguments.world, "random", arguments.backend);
+  DrivenWorld world = make_world(arguments.world, "random", arguments.backends);
   Simulator* const simulator = world.simulator.get();
   for (int step = 0; step < arguments.steps; ++step) {
     if (interrupted()) throw Interrupted(fmt::format("interrupted at step {} of {}", step, arguments.steps));
@@ -155,7 +157,7 @@ void render_world(const Arguments& arguments) {
 // A scene file says these itself.
 void refuse_world_options(const CLI::App& command) {
   for (const char* option : {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--steps",
-                             "--views", "--size", "--rig", "--line-floor"}) {
+                             "--views", "--size", "--rig", "--line-floor", "--simulator"}) {
     if (command.count(option) > 0) fail_usage("{}: has no effect on a scene file, which says that itself", option);
   }
 }
@@ -178,12 +180,7 @@ void add_render_command(CLI::App& app) {
       ->capture_default_str();
   CLI::Option* size =
       command->add_option("--size", arguments->size, "Image size in pixels, WxH")->capture_default_str();
-  command->add_option("--backend", arguments->backend, "cpu, cuda, gl, gl:egl, gl:osmesa, null or auto")
-      ->capture_default_str();
-  command
-      ->add_option("--samples", arguments->samples,
-                   "Of a pixel, for gl: 1, N (MSAA) or NxN (supersampling); the others compute exact coverage")
-      ->capture_default_str();
+  add_backend_options(command, "auto", &arguments->backends);
   command->add_option("--rig", arguments->rig, "TOML file with [[camera]] tables instead of the paper's four cameras");
   command
       ->add_option("--line-floor", arguments->line_floor_px,

@@ -20,7 +20,8 @@ namespace {
 struct Arguments {
   WorldOptions world;
   int steps = 300;
-  std::string policy = "random", backend = "auto", video;
+  BackendOptions backends;
+  std::string policy = "random", video;
   int film_agent = 0;
   float film_width_m = 150;
   bool json = false;
@@ -36,14 +37,17 @@ std::array<int64_t, kNumAgentClasses> spawned_by_class(Simulator& simulator) {
 }
 
 void run(const Arguments& arguments) {
-  DrivenWorld world = make_world(arguments.world, arguments.policy, arguments.backend);
+  DrivenWorld world = make_world(arguments.world, arguments.policy, arguments.backends);
   Simulator* const simulator = world.simulator.get();
   const SpawnReport spawned = simulator->spawn_report();
   const auto of_class = spawned_by_class(*simulator);
   std::unique_ptr<Film> film;
   if (!arguments.video.empty()) {
-    film = std::make_unique<Film>(arguments.video, *simulator, arguments.film_agent, arguments.film_width_m,
-                                  arguments.world.num_threads);
+    film = std::make_unique<Film>(arguments.video, *simulator,
+                                  FilmOptions{.agent = arguments.film_agent,
+                                              .width_m = arguments.film_width_m,
+                                              .trained_view = world.trained_view,
+                                              .num_threads = arguments.world.num_threads});
   }
 
   ProgressLine line;
@@ -62,7 +66,9 @@ void run(const Arguments& arguments) {
 
   const SimulatorTotals& totals = simulator->totals();
   const Json object{{"backend", simulator->name()},
+                    {"renderer", world.renderer ? Json(world.renderer->name()) : Json(nullptr)},
                     {"map", simulator->maps()[0]->road->name},
+                    {"wall_seed", simulator->config().walls ? Json(simulator->config().wall_seed) : Json(nullptr)},
                     {"asked", spawned.asked},
                     {"spawned", spawned.spawned},
                     {"refused", spawned.refused},
@@ -107,8 +113,7 @@ void add_simulate_command(CLI::App& app) {
   command->add_option("--steps", arguments->steps, "Steps of 0.1 s")->check(CLI::PositiveNumber)->capture_default_str();
   command->add_option("--policy", arguments->policy, "random, idle, lane_keeping, or a checkpoint that train wrote")
       ->capture_default_str();
-  command->add_option("--backend", arguments->backend, "Renderer for policies that see: cpu, cuda or auto")
-      ->capture_default_str();
+  add_policy_backend_options(command, "auto, and drawn as in training", &arguments->backends);
   command->add_option(
       "--video", arguments->video,
       "Film it into this .mp4 or .gif: from above, with goals, lights and why agents halted, and from one "

@@ -8,6 +8,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "pictura/cli/backend_options.h"
 #include "pictura/common/renderer.h"
 #include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/simulator.h"
@@ -30,9 +31,15 @@ struct WorldOptions {
 /// Adds --agents, --pedestrians, --cyclists, --parked, --seed, --threads and --no-walls, which fill *options_out.
 void add_world_options(CLI::App* command, WorldOptions* options_out);
 
+class PolicySession;
+
 /// One world and who drives in it.
 struct DrivenWorld {
   std::unique_ptr<Simulator> simulator;
+  // Of a trained policy: itself and, where it reads images, what draws them and with which settings.
+  std::shared_ptr<PolicySession> session;
+  std::unique_ptr<Renderer> renderer;
+  std::optional<RendererConfig> trained_view;
   std::unique_ptr<Controller> controller;
   std::vector<Command> commands;
 
@@ -42,8 +49,10 @@ struct DrivenWorld {
 };
 
 /// A world of options.agents agents on the map, at the start of its first episode, with evaluation's light timing.
-/// `policy` drives: a controller's name (random, idle, lane_keeping), or a checkpoint's path (argmax; needs torch),
-/// whose world it is then and whose images `backend` draws.
-DrivenWorld make_world(const WorldOptions& options, const std::string& policy, const std::string& backend);
+/// `policy` drives: a controller's name (random, idle, lane_keeping), or a checkpoint's path (argmax; needs torch).
+/// Then the world is the one that the policy was trained in, with its walls, population, observations and evaluation's
+/// conditioning, and its images are drawn as they were in training; `backends` and options say otherwise. Throws
+/// UsageError for a simulator that does not work in host memory.
+DrivenWorld make_world(const WorldOptions& options, const std::string& policy, const BackendOptions& backends);
 
 }  // namespace pictura

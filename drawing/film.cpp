@@ -1,11 +1,16 @@
 #include "pictura/drawing/film.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
 
 #include <fmt/format.h>
 
 #include "pictura/backends/make_renderer.h"
 #include "pictura/backends/upload_maps.h"
+#include "pictura/common/math.h"
+#include "pictura/common/raster/camera.h"
 #include "pictura/drawing/drawing.h"
 #include "pictura/drawing/video.h"
 #include "pictura/drawing/world.h"
@@ -14,13 +19,10 @@ namespace pictura {
 
 namespace {
 
-constexpr int kCameraWidth_px = 250, kCameraHeight_px = 140, kGap_px = 8;
-constexpr int kTopWidth_px = 4 * kCameraWidth_px + 3 * kGap_px, kTopHeight_px = 512;
+constexpr int kColumns = 4, kCameraWidth_px = 250, kCameraHeight_px = 140, kGap_px = 8;
+constexpr int kTopWidth_px = kColumns * kCameraWidth_px + (kColumns - 1) * kGap_px, kTopHeight_px = 512;
 constexpr uint8_t kGapGrey = 40;
 constexpr double kFramesPerSecond = 20;  // twice the pace of the world
-// From left to right as a driver would look, then back: cameras of the paper's rig.
-constexpr int kCameraOrder[4] = {1, 0, 2, 3};
-
 void paste(const RgbImage& picture, int left_px, int top_px, RgbImage* image_out) {
   for (int y = 0; y < picture.height_px; ++y) {
     std::copy_n(picture.rgb.begin() + y * picture.width_px * 3, picture.width_px * 3,
@@ -28,17 +30,65 @@ void paste(const RgbImage& picture, int left_px, int top_px, RgbImage* image_out
   }
 }
 
+RendererConfig view_of(const FilmOptions& options) {
+  RendererConfig view{.rig = paper_rig(kCameraWidth_px, kCameraHeight_px)};
+  if (options.trained_view) view = film_view(*options.trained_view);
+  view.num_threads = options.num_threads;
+  return view;
+}
+
+// The tallest picture of a camera, with its caption.
+int row_height_px(const HostImages& images, const Rig& rig) {
+  int height_px = 0;
+  for (size_t camera = 0; camera < rig.cameras.size(); ++camera) {
+    height_px = std::max(height_px, captioned(images, 0, static_cast<int>(camera), "").height_px);
+  }
+  return height_px;
+}
+
 }  // namespace
 
+RendererConfig film_view(const RendererConfig& trained_view) {
+  RendererConfig view = trained_view;
+  view.samples = {};  // films are drawn with exact coverage
+  float line_scale = std::numeric_limits<float>::infinity();
+  for (Camera& camera : view.rig.cameras) {
+    const float scale = static_cast<float>(kCameraWidth_px) / static_cast<float>(camera.width_px);
+    const int height_px = std::max(1, static_cast<int>(std::lround(scale * static_cast<float>(camera.height_px))));
+    const float scale_y = static_cast<float>(height_px) / static_cast<float>(camera.height_px);
+    camera.width_px = kCameraWidth_px;
+    camera.height_px = height_px;
+    camera.focal_x_px *= scale;
+    camera.center_x_px *= scale;
+    camera.focal_y_px *= scale_y;
+    camera.center_y_px *= scale_y;
+    line_scale = std::min(line_scale, scale);
+  }
+  // One width for all cameras: that of the widest.
+  view.line_floor_px = std::min(view.line_floor_px * line_scale, static_cast<float>(kGuardBand_px));
+  return view;
+}
+
+std::vector<int> film_order(const Rig& rig) {
+  std::vector<int> order(rig.cameras.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto yaw = [&rig](int camera) { return wrap_angle(rig.cameras[static_cast<size_t>(camera)].yaw_rad); };
+  const auto looks_back = [&yaw](int camera) { return std::abs(yaw(camera)) > 0.75f * kPi; };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int a, int b) { return looks_back(a) != looks_back(b) ? looks_back(b) : yaw(a) > yaw(b); });
+  return order;
+}
+
 struct Film::Parts {
-  Parts(const std::string& path, const Simulator& simulator, int followed_agent, float shown_width_m, int num_threads)
-      : agent(followed_agent),
-        width_m(shown_width_m),
+  Parts(const std::string& path, const Simulator& simulator, const FilmOptions& options)
+      : agent(options.agent),
+        width_m(options.width_m),
         painter(*simulator.maps()[0]->road, kTopWidth_px, kTopHeight_px, simulator.maps()[0]->geometry.walls),
-        renderer(
-            make_renderer("cpu", {.rig = paper_rig(kCameraWidth_px, kCameraHeight_px), .num_threads = num_threads})),
+        renderer(make_renderer("cpu", view_of(options))),
+        order(film_order(renderer->config().rig)),
         images(renderer->config().rig, 1),
-        frame{kTopWidth_px, kTopHeight_px + kGap_px + captioned(images, 0, 0, "").height_px, {}},
+        row_px(kGap_px + row_height_px(images, renderer->config().rig)),
+        frame{kTopWidth_px, kTopHeight_px + (static_cast<int>(order.size()) + kColumns - 1) / kColumns * row_px, {}},
         video(path, frame.width_px, frame.height_px, kFramesPerSecond) {
     frame.rgb.assign(static_cast<size_t>(frame.width_px) * static_cast<size_t>(frame.height_px) * 3, kGapGrey);
     upload_maps(simulator, renderer.get());
@@ -48,13 +98,15 @@ struct Film::Parts {
   float width_m;
   WorldPainter painter;
   std::unique_ptr<Renderer> renderer;
+  std::vector<int> order;  // of the cameras
   HostImages images;
+  int row_px;  // height of a row of cameras and of the gap above it
   RgbImage frame;
   VideoWriter video;
 };
 
-Film::Film(const std::string& path, const Simulator& simulator, int agent, float width_m, int num_threads)
-    : parts_(std::make_unique<Parts>(path, simulator, agent, width_m, num_threads)) {}
+Film::Film(const std::string& path, const Simulator& simulator, const FilmOptions& options)
+    : parts_(std::make_unique<Parts>(path, simulator, options)) {}
 
 Film::~Film() = default;
 
@@ -67,11 +119,11 @@ void Film::add_frame(Simulator& simulator) {
   paste(top, 0, 0, &parts.frame);
   parts.renderer->render(simulator.scene(), simulator.views().subspan(static_cast<size_t>(parts.agent), 1),
                          parts.images.batch());
-  for (int column = 0; column < 4; ++column) {
-    const int camera = kCameraOrder[column];
+  for (size_t i = 0; i < parts.order.size(); ++i) {
+    const int camera = parts.order[i], column = static_cast<int>(i) % kColumns, row = static_cast<int>(i) / kColumns;
     const std::string& name = parts.renderer->config().rig.cameras[static_cast<size_t>(camera)].name;
-    paste(captioned(parts.images, 0, camera, name), column * (kCameraWidth_px + kGap_px), kTopHeight_px + kGap_px,
-          &parts.frame);
+    paste(captioned(parts.images, 0, camera, name), column * (kCameraWidth_px + kGap_px),
+          kTopHeight_px + kGap_px + row * parts.row_px, &parts.frame);
   }
   parts.video.add(parts.frame);
 }

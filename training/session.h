@@ -1,29 +1,69 @@
-// A saved policy, without torch headers.
+// A saved policy: what it makes of scenes and observations, and everything about its images and its world that it was
+// trained with. Without torch headers.
 #pragma once
 
 #include <memory>
 #include <string>
 
 #include "pictura/common/renderer.h"
+#include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/simulator.h"
 
 namespace pictura {
 
-/// A trained policy that chooses actions for every slot of a simulator.
-class Driver {
- public:
-  virtual ~Driver() = default;
-  /// Whether it needs images; then `renderer` below must have been made with rig().
-  virtual bool needs_images() const = 0;
-  virtual const Rig& rig() const = 0;
-  /// The world that the policy is evaluated in: fixed conditioning and lights, the observations that it was trained on.
-  virtual SimulatorConfig evaluation_world() const = 0;
-  /// Fills actions_out [slots] from the simulator's present observations and, where needed, images drawn by `renderer`,
-  /// which holds the simulator's geometries. argmax, or a draw from the policy (keyed as in training).
-  virtual void act(Simulator& simulator, Renderer* renderer, bool argmax, Span<int32_t> actions_out) = 0;
+struct SessionOptions {
+  int num_threads = 0;            // of torch and renderers; 0: all
+  std::string device = "auto";    // as run.device of a configuration
+  std::string renderer, samples;  // as render.backend and render.samples; empty: as the policy was trained
 };
 
-/// Throws Error naming the file when it is no checkpoint, truncated, or of another observation schema.
-std::unique_ptr<Driver> load_driver(const std::string& checkpoint_path, int num_threads);
+/// What a batch of agents sees, in host memory.
+struct PolicyInput {
+  ObservationView observations;       // [batch]; arrays that the policy does not read may be empty
+  const SceneBatch* scene = nullptr;  // with views, for a policy that reads images
+  Span<const View> views;             // [batch]
+  Span<const uint8_t> is_drawn;       // [batch] 0: its images are black; empty: all are drawn
+};
+
+/// Serves one thread at a time.
+class PolicySession {
+ public:
+  /// Throws Error naming the file when it is no checkpoint, truncated, of another observation schema or architecture,
+  /// or when it cannot run on this device.
+  explicit PolicySession(const std::string& checkpoint_path, const SessionOptions& options = {});
+  ~PolicySession();
+  PolicySession(const PolicySession&) = delete;
+  PolicySession& operator=(const PolicySession&) = delete;
+
+  bool reads_images() const;
+  const Rig& rig() const;
+
+  /// What its images are drawn with: rig, line floor, palette and samples of training.
+  RendererConfig renderer_config() const;
+  /// A renderer for its images, for scenes and images in host memory; the caller uploads the maps. Null where it reads
+  /// no images. Throws Error when the renderer cannot run here.
+  std::unique_ptr<Renderer> make_renderer() const;
+
+  /// The world that it was trained in: walls and their seed, population, conditioning, episodes, and the observations
+  /// that it reads.
+  SimulatorConfig training_world() const;
+  /// The same for the paper's evaluation: episodes of `steps` that nothing ends early, fixed conditioning and lights.
+  SimulatorConfig evaluation_world(int steps) const;
+
+  /// Writes logits [batch, kNumActions] and values [batch]. `renderer` holds the scene's maps under the handles that
+  /// the scene names, and has renderer_config(); policies without images need none. Throws Error naming the array where
+  /// a size does not fit the batch, which is that of values_out.
+  void evaluate(const PolicyInput& input, Renderer* renderer, Span<float> logits_out, Span<float> values_out);
+
+  /// Drives in a simulator's host memory: the most likely action, or a draw keyed by (seed, global world, agent,
+  /// episode, step) as in training. Session and renderer, which is as for evaluate(), must outlive it. Images are drawn
+  /// for active agents alone.
+  std::unique_ptr<Controller> make_controller(Renderer* renderer, bool argmax, uint64_t seed);
+
+ private:
+  friend class PolicyController;
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
 
 }  // namespace pictura

@@ -503,6 +503,37 @@ class Training(CommandCase):
                 checkpoint.write_bytes(content)
                 self.assert_refused(1, "checkpoint.ckpt", "evaluate", checkpoint, *evaluate)
 
+    def test_backends_are_named_and_checked(self):
+        one = ["train", *TINY, "--set", "train.updates=1"]
+        black = self.json_of(*one, "--renderer", "null", "--out", self.folder / "black")
+        self.assertEqual((black["simulator"], black["renderer"], black["device"]), ("cpu", "null", "cpu"))
+        old = self.json_of(*one, "--set", "run.backend=null", "--out", self.folder / "old")
+        self.assertEqual(old["policy_hash"], black["policy_hash"])
+        out = ["--out", self.folder / "run"]
+        self.assert_refused(2, "expected one of cpu, ", *one, *out, "--renderer", "vulkan")
+        self.assert_refused(2, "expected one of cpu, ", *one, *out, "--simulator", "null")
+        self.assert_refused(1, "run.device: expected one of cpu, cuda, cuda:N, auto", *one, *out, "--device", "gpu")
+        self.assert_refused(1, "learning on a CUDA device is missing", *one, *out, "--device", "cuda")
+        self.assert_refused(1, "only gl takes samples", *one, *out, "--renderer", "cpu", "--samples", "4x4")
+        self.assert_refused(1, "render.backend: expected one of cpu, ", *one, *out, "--set", "render.backend=vulkan")
+        evaluate = ["evaluate", self.folder / "black" / "checkpoint.ckpt", "--map", "procedural:1", "--agents", 2,
+                    "--scenarios", 1, "--steps", 2]  # fmt: skip
+        self.json_of(*evaluate, "--renderer", "cpu", "--simulator", "cpu", "--device", "cpu")
+        self.assert_refused(1, "learning on a CUDA device is missing", *evaluate, "--device", "cuda")
+
+    def test_a_policy_is_driven_in_the_world_that_it_was_trained_in(self):
+        out = self.folder / "run"
+        self.json_of("train", *TINY, "--set", "train.updates=1", "--set", "simulator.walls=true",
+                     "--set", "simulator.wall_seed=9", "--set", "simulator.parked_cars=2", "--out", out)  # fmt: skip
+        drive = ["simulate", "procedural:1", "--agents", 4, "--steps", 5, "--policy", out / "checkpoint.ckpt"]
+        driven = self.json_of(*drive)
+        self.assertEqual((driven["wall_seed"], driven["parked_asked"]), (9, 2))
+        self.assertEqual(self.json_of(*drive, "--no-walls")["wall_seed"], None)
+        self.assertEqual(self.json_of(*drive, "--renderer", "null")["renderer"], "null")
+        if shutil.which("ffmpeg"):
+            self.json_of(*drive, "--video", self.folder / "drive.mp4")
+            self.assertGreater((self.folder / "drive.mp4").stat().st_size, 2000)
+
     def test_an_interrupt_leaves_a_checkpoint_to_go_on_from(self):
         out = self.folder / "run"
         arguments = [PICTURA, "train", *TINY, "--set", "train.updates=100000", "--set", "train.checkpoint_every=1"]

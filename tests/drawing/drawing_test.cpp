@@ -17,6 +17,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/drawing/film.h"
 #include "pictura/drawing/planes.h"
 #include "pictura/drawing/plot.h"
 #include "pictura/drawing/video.h"
@@ -717,6 +718,22 @@ TEST(Video, ReportsFfmpegsLastLine) {
   EXPECT_EQ(message, file + ": ffmpeg ended with status 3: Unknown encoder");
   EXPECT_EQ(folder.num_entries(), 0u);
   EXPECT_FALSE(has_children());
+}
+
+TEST(Film, ShowsTheCamerasOfAPolicyEnlargedWithTheirLines) {
+  RendererConfig trained{.rig = paper_rig(50, 30), .line_floor_px = 0.5f};
+  const RendererConfig view = film_view(trained);
+  ASSERT_EQ(view.rig.cameras.size(), trained.rig.cameras.size());
+  for (std::size_t c = 0; c < view.rig.cameras.size(); ++c) {
+    const Camera &shown = view.rig.cameras[c], &seen = trained.rig.cameras[c];
+    EXPECT_EQ(shown.width_px, 250);
+    EXPECT_EQ(shown.height_px, 150);
+    EXPECT_FLOAT_EQ(shown.focal_x_px, 5 * seen.focal_x_px);
+    EXPECT_FLOAT_EQ(shown.center_y_px, 5 * seen.center_y_px);
+    EXPECT_EQ(shown.yaw_rad, seen.yaw_rad);
+  }
+  EXPECT_FLOAT_EQ(view.line_floor_px, 2.5f);
+  EXPECT_EQ(film_order(paper_rig()), (std::vector<int>{1, 0, 2, 3}));
 }
 
 }  // namespace

@@ -111,7 +111,7 @@ TEST_F(CheckpointFile, WeightsThatAreNotFiniteAreRefusedByName) {
     weight.flatten()[1] = bad;
     write_checkpoint(folder_ / "a.ckpt", small_checkpoint(policy, config));
     EXPECT_THAT(
-        message_of([&] { load_driver(folder_ / "a.ckpt", 1); }),
+        message_of([&] { PolicySession(folder_ / "a.ckpt"); }),
         ::testing::AllOf(HasSubstr("a.ckpt"), HasSubstr("'" + policy.parameters()[3].name + "'"), HasSubstr("finite")));
   }
 }
@@ -161,7 +161,7 @@ TEST_F(CheckpointFile, BrokenFilesAreRefused) {
   changed = whole;
   changed[30] = '}';
   EXPECT_THAT(refuse(changed), HasSubstr("header"));
-  EXPECT_THAT(message_of([&] { load_driver(folder_ / "none.ckpt", 1); }), HasSubstr("no such file"));
+  EXPECT_THAT(message_of([&] { PolicySession(folder_ / "none.ckpt"); }), HasSubstr("no such file"));
 }
 
 TEST_F(CheckpointFile, TheSchemaIsThatOfTheArraysThatThePolicyReads) {
@@ -208,9 +208,9 @@ TEST_F(CheckpointFile, SavedUnderTheOldNameOfTheBackendsItReadsAsBefore) {
     to.resize(from.size(), ' ');
     bytes.replace(at, from.size(), to);
   };
-  replace(R"(device = \"auto\")", R"(backend=\"null\")");
-  replace(R"([simulator]\nbackend = \"auto\")", R"([simulator])");
-  replace(R"([render]\nbackend = \"auto\"\nsamples = \"1\")", R"([render])");
+  replace("device = 'auto'", "backend='null'");
+  replace(R"([simulator]\nbackend = 'auto')", "[simulator]");
+  replace(R"([render]\nbackend = 'auto'\nsamples = '1')", "[render]");
   write_file(path, bytes);
   const Checkpoint saved = read_checkpoint(path);
   EXPECT_EQ(saved.config.simulator.backend, "cpu");

@@ -115,12 +115,12 @@ TEST(Config, BackendsAreCheckedWhereTheyAreRead) {
   EXPECT_EQ(c.render.backend, "null");
   EXPECT_EQ(to_toml(parse_config(to_toml(c), "b.toml")), to_toml(c));
   EXPECT_THAT(message_of("[run]\ndevice = \"gpu\"\n"),
-              AllOf(HasSubstr("a.toml:2: run.device"), HasSubstr("cpu, cuda, cuda:N, auto"), HasSubstr("got gpu")));
-  EXPECT_THAT(message_of("[run]\ndevice = \"cuda:\"\n"), HasSubstr("got cuda:"));
+              AllOf(HasSubstr("a.toml:2: run.device"), HasSubstr("cpu, cuda, cuda:N, auto"), HasSubstr("got 'gpu'")));
+  EXPECT_THAT(message_of("[run]\ndevice = \"cuda:\"\n"), HasSubstr("got 'cuda:'"));
   EXPECT_THAT(message_of("[simulator]\nbackend = \"null\"\n"),
-              AllOf(HasSubstr("simulator.backend: expected one of cpu, "), HasSubstr("got null")));
+              AllOf(HasSubstr("simulator.backend: expected one of cpu, "), HasSubstr("got 'null'")));
   EXPECT_THAT(message_of("[render]\nbackend = \"vulkan\"\n"),
-              AllOf(HasSubstr("render.backend: expected one of cpu, "), HasSubstr("got vulkan")));
+              AllOf(HasSubstr("render.backend: expected one of cpu, "), HasSubstr("got 'vulkan'")));
   // A run that another build saved is read whatever drew it.
   EXPECT_EQ(parse_saved_config("[render]\nbackend = \"vulkan\"\n", "a.ckpt").render.backend, "vulkan");
 }
@@ -172,7 +172,7 @@ TEST(Config, DifferencesThatChangeTheRunAreNamed) {
   EXPECT_EQ(first_difference(a, b), "policy.backbone_width: 512 became 256");
   b = a;
   b.render.backend = "gl:egl";
-  EXPECT_EQ(first_difference(a, b), "render.backend: \"auto\" became \"gl:egl\"");
+  EXPECT_EQ(first_difference(a, b), "render.backend: 'auto' became 'gl:egl'");
   b = a;
   b.render.line_floor_px = 1;
   EXPECT_EQ(first_difference(a, b), "render.line_floor_px: 0.35 became 1.0");

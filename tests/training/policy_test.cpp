@@ -142,7 +142,9 @@ TEST(Policy, WallsAreAFifthGroupOfTheVectorPolicy) {
   EXPECT_EQ(names_of(with).at(16), "walls.hidden.weight");
 
   const at::NoGradGuard no_grad;
-  const Observation o = observation(Modality::vector, 2);
+  const Observation o = observation(Modality::vector, 2).map([](const at::Tensor& t) {
+    return t.is_floating_point() ? t.to(at::kFloat) : t;
+  });
   Observation changed = o.map([](const at::Tensor& t) { return t.clone(); });
   changed.walls.fill_(9);
   EXPECT_TRUE(at::equal(without.forward(o).logits, without.forward(changed).logits));

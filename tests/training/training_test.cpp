@@ -12,6 +12,7 @@
 #include "pictura/backends/make_renderer.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
+#include "pictura/cli/drive.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/interrupt.h"
@@ -345,12 +346,13 @@ TEST_F(Training, EvaluationRepeatsNoWorldOfTraining) {
     config.seed = o.seed;
     const std::unique_ptr<Simulator> simulator =
         make_simulator("cpu", config, {load_map("procedural")}, {WorldSpec{0, 6, global_world}});
-    const std::unique_ptr<Driver> driver = load_driver(o.checkpoint, 1);
+    PolicySession session(o.checkpoint, {.num_threads = 1});
+    const std::unique_ptr<Controller> controller = session.make_controller(nullptr, /*argmax=*/true, o.seed);
     simulator->reset();
-    std::vector<int32_t> actions(6);
+    std::vector<Command> commands(6);
     for (int step = 0; step < o.steps; ++step) {
-      driver->act(*simulator, nullptr, /*argmax=*/true, actions);
-      simulator->step(Span<const int32_t>(actions));
+      controller->act(simulator->controller_input(), {}, commands);
+      simulator->step(commands);
     }
     double sum = 0;
     for (int slot = 0; slot < 6; ++slot) sum += static_cast<double>(simulator->state().episode_return[slot]);
@@ -359,6 +361,142 @@ TEST_F(Training, EvaluationRepeatsNoWorldOfTraining) {
   const double evaluated = evaluate(o).rows.at(0).return_per_vehicle;
   EXPECT_EQ(evaluated, return_per_vehicle(kFirstEvaluationWorld));
   EXPECT_NE(evaluated, return_per_vehicle(0));
+}
+
+// A rig of one camera, unlike the paper's.
+std::string one_camera(const std::string& path) {
+  write_file(path, "[[camera]]\nname = \"ahead\"\nwidth_px = 20\nheight_px = 12\nfocal_px = 11\nx_m = 1\nz_m = 1.5\n");
+  return path;
+}
+
+TEST_F(Training, PoliciesDriveInTheWorldAndSeeTheImagesThatTheyWereTrainedOn) {
+  const std::string rig = one_camera(folder_ / "rig.toml");
+  write_file(
+      folder_ / "config.toml",
+      fmt::format("[simulator]\nmaps = [\"procedural\"]\nmax_agents = 8\nwalls = true\nwall_seed = 77\nparked_cars "
+                  "= 3\npedestrian_fraction = 0.25\n[render]\nrig = \"{}\"\nline_floor_px = 1.5\n"
+                  "[policy]\nbackbone_width = 32\n[train]\nminibatch_size = 64\nforward_chunk = 64\n",
+                  rig));
+  TrainOptions o = options("run", {"train.updates=1"});
+  o.config_path = folder_ / "config.toml";
+  std::erase_if(o.overrides, [](const std::string& text) { return text.starts_with("render."); });
+  const std::string checkpoint = train(o).checkpoint;
+
+  const PolicySession session(checkpoint, {.num_threads = 1});
+  EXPECT_TRUE(session.reads_images());
+  EXPECT_EQ(session.renderer_config().line_floor_px, 1.5f);
+  EXPECT_EQ(session.renderer_config().rig.cameras.at(0).name, "ahead");
+  EXPECT_EQ(session.evaluation_world(9).wall_seed, 77u);
+  EXPECT_EQ(session.evaluation_world(9).episode_steps, 9);
+  EXPECT_EQ(session.training_world().conditioning[0].high,
+            simulator_config(load_config(o.config_path)).conditioning[0].high);
+  EXPECT_EQ(session.make_renderer()->config().rig.cameras.size(), 1u);
+
+  // What `pictura simulate` drives in, and films.
+  WorldOptions world_options;
+  world_options.map = "procedural";
+  world_options.agents = 4;
+  DrivenWorld world = make_world(world_options, checkpoint, {});
+  EXPECT_EQ(world.simulator->config().wall_seed, 77u);
+  EXPECT_EQ(world.simulator->config().parked_cars, 3);
+  EXPECT_EQ(world.simulator->config().pedestrian_fraction, 0.25f);
+  EXPECT_FALSE(world.simulator->config().vector_observations);
+  ASSERT_TRUE(world.renderer && world.trained_view);
+  EXPECT_EQ(world.renderer->config().line_floor_px, 1.5f);
+  EXPECT_EQ(world.renderer->config().rig.cameras.size(), 1u);
+  EXPECT_EQ(world.trained_view->line_floor_px, 1.5f);
+  EXPECT_EQ(world.trained_view->rig.cameras.at(0).name, "ahead");
+  world.act();
+  world.step();
+  // What is said on the command line wins.
+  world_options.walls = false;
+  world_options.parked_cars = 1;
+  world = make_world(world_options, checkpoint, {.renderer = "null"});
+  EXPECT_FALSE(world.simulator->config().walls);
+  EXPECT_EQ(world.simulator->config().parked_cars, 1);
+  EXPECT_EQ(world.renderer->name(), "null");
+  EXPECT_THROW(make_world(world_options, checkpoint, {.simulator = "cuda"}), UsageError);
+  EXPECT_THAT(message_of([&] { make_world(world_options, checkpoint, {.device = "cuda"}); }),
+              AllOf(HasSubstr("run.device"), HasSubstr("missing")));
+}
+
+TEST_F(Training, ASessionGivesLogitsAndValuesOfAnyScene) {
+  const std::string checkpoint = train(options("run", {"train.updates=1"})).checkpoint;
+  PolicySession session(checkpoint, {.num_threads = 1});
+  const std::unique_ptr<Renderer> renderer = session.make_renderer();
+  const std::unique_ptr<Simulator> simulator =
+      make_simulator("cpu", session.training_world(), {load_map("procedural")}, {WorldSpec{0, 6, 5}});
+  upload_maps(*simulator, renderer.get());
+  simulator->reset();
+  const ControllerInput input = simulator->controller_input();
+  std::vector<float> logits(6 * kNumActions), values(6);
+  session.evaluate({input.observations, &input.scene, input.views, {}}, renderer.get(), logits, values);
+  EXPECT_NE(values[0], values[1]);
+
+  // The controller takes the most likely of them.
+  std::vector<Command> commands(6);
+  session.make_controller(renderer.get(), /*argmax=*/true, 1)->act(input, {}, commands);
+  for (size_t agent = 0; agent < 6; ++agent) {
+    const auto first = logits.begin() + static_cast<std::ptrdiff_t>(agent * kNumActions);
+    EXPECT_EQ(commands[agent].action, std::max_element(first, first + kNumActions) - first) << agent;
+  }
+  // A mask leaves the others' commands alone.
+  std::vector<Command> some(6, Command{.kind = CommandKind::absent});
+  const std::vector<uint8_t> mask{0, 1, 0, 0, 1, 0};
+  session.make_controller(renderer.get(), /*argmax=*/true, 1)->act(input, mask, some);
+  for (size_t agent = 0; agent < 6; ++agent) {
+    EXPECT_EQ(some[agent].kind, mask[agent] ? CommandKind::action : CommandKind::absent) << agent;
+  }
+
+  // A batch need not be a simulator's slots: agents 4 and 1 alone, the same numbers.
+  std::vector<float> two_logits(2 * kNumActions), two_values(2);
+  const std::vector<View> views{input.views[4], input.views[1]};
+  std::vector<float> ego, conditioning, waypoints;
+  for (const size_t agent : {size_t{4}, size_t{1}}) {
+    const auto append = [agent](Span<float> all, size_t per_slot, std::vector<float>* out) {
+      out->insert(out->end(), all.begin() + agent * per_slot, all.begin() + (agent + 1) * per_slot);
+    };
+    append(input.observations.ego, kEgoFeatures, &ego);
+    append(input.observations.conditioning, kNumConditioning, &conditioning);
+    append(input.observations.waypoints, kNumWaypoints * kWaypointFeatures, &waypoints);
+  }
+  ObservationView two;
+  two.ego = ego;
+  two.conditioning = conditioning;
+  two.waypoints = waypoints;
+  session.evaluate({two, &input.scene, views, {}}, renderer.get(), two_logits, two_values);
+  EXPECT_NEAR(two_values[0], values[4], 1e-5);
+  EXPECT_NEAR(two_values[1], values[1], 1e-5);
+  EXPECT_NEAR(two_logits[3], logits[4 * kNumActions + 3], 1e-5);
+
+  EXPECT_THAT(message_of([&] {
+                session.evaluate({input.observations, &input.scene, views, {}}, renderer.get(), two_logits, two_values);
+              }),
+              AllOf(HasSubstr("ego"), HasSubstr("18"), HasSubstr("54")));
+  EXPECT_THAT(
+      message_of([&] { session.evaluate({two, &input.scene, {}, {}}, renderer.get(), two_logits, two_values); }),
+      HasSubstr("expected 2 views, got 0"));
+  EXPECT_THAT(message_of([&] { session.evaluate({two, nullptr, {}, {}}, nullptr, two_logits, two_values); }),
+              HasSubstr("renderer"));
+}
+
+TEST_F(Training, TheVectorPolicyLearnsFromWallsWhereItObservesThem) {
+  const std::vector<std::string> walls{"train.updates=1", "policy.modality=vector", "simulator.walls=true",
+                                       "simulator.wall_observations=true"};
+  const TrainReport report = train(options("run", walls));
+  EXPECT_EQ(report.renderer, "");
+  EvaluateOptions o;
+  o.checkpoint = report.checkpoint;
+  o.maps = {"procedural"};
+  o.agents_per_world = 6;
+  o.scenarios = 1;
+  o.steps = 5;
+  o.num_threads = 1;
+  EXPECT_GT(evaluate(o).rows.at(0).km_driven, 0);
+  EXPECT_TRUE(PolicySession(report.checkpoint).evaluation_world(5).wall_observations);
+  TrainOptions without = options("run", {"train.updates=2", "policy.modality=vector", "simulator.walls=true"});
+  without.resume = true;
+  EXPECT_THAT(message_of([&] { train(without); }), HasSubstr("simulator.wall_observations: true became false"));
 }
 
 TEST_F(Training, PerspectivePolicyIsEvaluatedFromItsImages) {

@@ -1,18 +1,15 @@
 #include "pictura/training/evaluation/evaluate.h"
 
+#include <algorithm>
 #include <chrono>
 #include <limits>
 
-#include "pictura/backends/make_renderer.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
-#include "pictura/common/pixel_samples.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/map/load_map.h"
-#include "pictura/training/checkpoint.h"
-#include "pictura/training/observation.h"
-#include "pictura/training/run.h"
+#include "pictura/training/config.h"
 #include "pictura/training/session.h"
 
 namespace pictura {
@@ -32,14 +29,19 @@ DensityOf density_of(Density density) {
 }
 
 // Worlds that are simulated and drawn together: bounded by what their images take, or a few thousand agents.
-int worlds_per_batch(const Checkpoint& checkpoint, int agents_per_world) {
+int worlds_per_batch(const Rig& rig, int agents_per_world) {
   constexpr int64_t kMaxImageBytes = int64_t{256} << 20;
   constexpr int64_t kMaxAgents = 4096;
   int64_t bytes_per_agent = 1;
-  for (const Camera& camera : checkpoint.rig.cameras)
-    bytes_per_agent += 3 * int64_t{camera.width_px} * camera.height_px;
+  for (const Camera& camera : rig.cameras) bytes_per_agent += 3 * int64_t{camera.width_px} * camera.height_px;
   return static_cast<int>(
       std::max<int64_t>(1, std::min(kMaxAgents, kMaxImageBytes / bytes_per_agent) / agents_per_world));
+}
+
+bool has_active_agents(Simulator& simulator) {
+  const uint8_t* const status = simulator.state().status;
+  return std::any_of(status, status + simulator.num_slots(),
+                     [](uint8_t s) { return static_cast<AgentStatus>(s) == AgentStatus::active; });
 }
 
 // Sums over vehicle episodes.
@@ -91,21 +93,15 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
   if (options.agents_per_world < 0 || options.agents_per_world > kMaxAgentsPerWorld) {
     fail_usage("evaluate: expected 1 to {} agents per world, got {}", kMaxAgentsPerWorld, options.agents_per_world);
   }
-  Checkpoint checkpoint = read_checkpoint(options.checkpoint);
-  checkpoint.config.run.num_threads = options.num_threads;
-  checkpoint.config.run.device = options.device;
-  checkpoint.config.simulator.backend = options.simulator;
-  if (!options.renderer.empty()) checkpoint.config.render.backend = options.renderer;
-  if (!options.samples.empty()) {
-    const std::optional<PixelSamples> samples = parse_pixel_samples(options.samples);
-    if (!samples) fail_usage("samples: expected {}, got '{}'", kPixelSamplesExpected, options.samples);
-    checkpoint.config.render.samples = *samples;
-  } else if (!checkpoint.config.render.backend.starts_with("gl")) {
-    checkpoint.config.render.samples = {};
-  }
-  check_devices(checkpoint.config);
-  const std::unique_ptr<Driver> driver = load_driver(options.checkpoint, options.num_threads);
-  SimulatorConfig simulator_config = evaluation_simulator_config(checkpoint.config, options.steps);
+  Config devices;
+  devices.run.device = options.device;
+  devices.simulator.backend = options.simulator;
+  check_devices(devices);
+  PolicySession session(options.checkpoint, {.num_threads = options.num_threads,
+                                             .device = options.device,
+                                             .renderer = options.renderer,
+                                             .samples = options.samples});
+  SimulatorConfig simulator_config = session.evaluation_world(options.steps);
   simulator_config.seed = options.seed;
   std::vector<std::shared_ptr<const RoadMap>> roads;
   for (const std::string& name : options.maps) roads.push_back(load_map(name));
@@ -120,11 +116,11 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
   for (const DensityOf& density : densities) work += double(density.agents) * options.scenarios * options.steps;
 
   const auto start = std::chrono::steady_clock::now();
-  std::unique_ptr<Renderer> renderer;
+  const std::unique_ptr<Renderer> renderer = session.make_renderer();
   EvaluateReport report;
   for (const DensityOf& density : densities) {
     Tally tally;
-    const int per_batch = worlds_per_batch(checkpoint, density.agents);
+    const int per_batch = worlds_per_batch(session.rig(), density.agents);
     for (int first = 0; first < options.scenarios; first += per_batch) {
       std::vector<WorldSpec> worlds;
       for (int scenario = first; scenario < std::min(first + per_batch, options.scenarios); ++scenario) {
@@ -132,20 +128,19 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
                           kFirstEvaluationWorld + static_cast<uint32_t>(scenario)});
       }
       const std::unique_ptr<Simulator> simulator = make_simulator(options.simulator, simulator_config, maps, worlds);
-      if (driver->needs_images() && !renderer) {
-        renderer = make_renderer(checkpoint.config.render.backend, renderer_config(checkpoint.config, driver->rig()));
-        upload_maps(*simulator, renderer.get());
-      }
+      if (renderer) upload_maps(*simulator, renderer.get());
+      const std::unique_ptr<Controller> controller =
+          session.make_controller(renderer.get(), options.argmax, options.seed);
       simulator->reset();
-      std::vector<int32_t> actions(static_cast<size_t>(simulator->num_slots()));
-      // Halted agents stay as they are, so a batch is over when nobody is left to drive.
-      for (int step = 0; step < options.steps && !active_slots(simulator->controller_input()).empty(); ++step) {
+      std::vector<Command> commands(static_cast<size_t>(simulator->num_slots()));
+      // Halted agents stay as they are, so a batch is over when no agent is active.
+      for (int step = 0; step < options.steps && has_active_agents(*simulator); ++step) {
         if (interrupted()) {
           report.interrupted = true;
           return report;
         }
-        driver->act(*simulator, renderer.get(), options.argmax, actions);
-        simulator->step(actions);
+        controller->act(simulator->controller_input(), {}, commands);
+        simulator->step(commands);
         if (options.on_progress && step % 10 == 0) {
           const double fraction = (done + double(simulator->num_slots()) * (step + 1)) / work;
           const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
