@@ -134,7 +134,11 @@ void bench_train(const TrainArguments& arguments) {
   std::filesystem::remove_all(folder);
   if (trained.interrupted) throw Interrupted("interrupted");
   PICTURA_CHECK(!rate.values.empty(), "bench train: {}: expected at least 2 updates", arguments.config);
-  report_benchmark(arguments.json, {fmt::format("train: {}, rollout and update", arguments.config), "cpu"}, {rate});
+  const BenchContext context{
+      .workload = fmt::format("train: {}, rollout and update", arguments.config),
+      .backend = fmt::format("simulator {}, renderer {}, learning on {}", trained.simulator,
+                             trained.renderer.empty() ? "none" : trained.renderer, trained.device)};
+  report_benchmark(arguments.json, context, {rate});
 }
 
 }  // namespace

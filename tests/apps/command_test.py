@@ -534,6 +534,11 @@ class Training(CommandCase):
             self.json_of(*drive, "--video", self.folder / "drive.mp4")
             self.assertGreater((self.folder / "drive.mp4").stat().st_size, 2000)
 
+    def test_bench_train_says_what_simulated_drew_and_learnt(self):
+        facts = self.json_of("bench", "train", "--set", "train.updates=2", "--config", CONFIGS / "smoke.toml",
+                             "--renderer", "null")  # fmt: skip
+        self.assertEqual(facts["backend"], "simulator cpu, renderer null, learning on cpu")
+
     def test_an_interrupt_leaves_a_checkpoint_to_go_on_from(self):
         out = self.folder / "run"
         arguments = [PICTURA, "train", *TINY, "--set", "train.updates=100000", "--set", "train.checkpoint_every=1"]
