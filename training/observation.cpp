@@ -56,7 +56,7 @@ Observation allocate_observations(const Config& config, const Rig& rig, int64_t 
     if (!config.reads(array.part)) continue;
     const at::ScalarType type = array.type == ElementType::f32 ? at::kFloat : at::kInt;
     result.*kObservationTensors[i] = is_set(array) ? at::empty({rows, slots, array.rows, array.features}, type)
-                                                    : at::empty({rows, slots, array.rows * array.features}, type);
+                                                   : at::empty({rows, slots, array.rows * array.features}, type);
   }
   if (config.reads_images()) result.images = image_blocks(rig, rows, slots);
   return result;

@@ -90,8 +90,8 @@ class VectorEncoder final : public SceneEncoder {
     for (size_t i = 0; i < std::size(kObservationArrays); ++i) {
       const ObservationArray& array = kObservationArrays[i];
       if (!is_set(array) || (array.part == ObservationPart::walls && !reads_walls)) continue;
-      groups_.push_back(
-          {make->group(std::string(array.name), array.features, embedding_width_), kObservationTensors[i], entity_set_of(i)});
+      groups_.push_back({make->group(std::string(array.name), array.features, embedding_width_), kObservationTensors[i],
+                         entity_set_of(i)});
     }
   }
 

@@ -1,5 +1,5 @@
-// Files that are read whole and written under a temporary name, then renamed: a reader never sees half a file, and a full
-// disk or a killed process leaves the old one.
+// Files that are read whole and written under a temporary name, then renamed: a reader never sees half a file, and a
+// full disk or a killed process leaves the old one.
 #pragma once
 
 #include <functional>
