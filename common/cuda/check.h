@@ -17,22 +17,3 @@ inline void check_cuda(cudaError_t status, const char* what) {
 
 /// Throws Error naming the call when it fails.
 #define PICTURA_CUDA(call) ::pictura::check_cuda((call), #call)
-
-namespace pictura {
-
-/// The CUDA device that was current when this object was made.
-class CurrentDevice {
- public:
-  CurrentDevice() { PICTURA_CUDA(cudaGetDevice(&number_)); }
-  int number() const { return number_; }
-  /// Throws Error where another device is current now.
-  void check_current(const char* who) const {
-    const int current = CurrentDevice().number_;
-    PICTURA_CHECK(current == number_, "{}: made for device {}, called with device {} current", who, number_, current);
-  }
-
- private:
-  int number_ = 0;
-};
-
-}  // namespace pictura

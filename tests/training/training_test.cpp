@@ -18,6 +18,7 @@
 #include "pictura/common/support/interrupt.h"
 #include "pictura/map/load_map.h"
 #include "pictura/tests/support/error_message.h"
+#include "pictura/tests/support/missing_renderer.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/training/evaluation/evaluate.h"
 #include "pictura/training/loop.h"
@@ -151,8 +152,7 @@ TEST_F(Training, EachRendererWorksWithTheSimulatorOnTheCpu) {
   TrainOptions old = options("old", {"train.updates=1", "run.backend=null"});
   std::erase(old.overrides, "render.backend=cpu");
   EXPECT_EQ(train(old).policy_hash, black.policy_hash);
-  const std::vector<std::string> known = renderer_names();
-  if (std::find(known.begin(), known.end(), "gl:osmesa") == known.end()) GTEST_SKIP() << "this build has no OpenGL";
+  if (const std::string why = missing("gl:osmesa"); !why.empty()) GTEST_SKIP() << why;
   const TrainReport gl = train(options("gl", {"train.updates=1", "render.backend=gl:osmesa", "render.samples=2x2"}));
   EXPECT_THAT(gl.renderer, HasSubstr("gl"));
   EvaluateOptions o;
