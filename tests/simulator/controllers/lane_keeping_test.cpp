@@ -38,11 +38,11 @@ void drive_everywhere(float cyclist_fraction, int drivers, int drivers_each, int
   }
 }
 
-TEST(Driver, OfABicycleKeepsItsLaneAndStopsAtRedLightsInEveryTown) { drive_everywhere(1, 16, 1, 600); }
+TEST(LaneKeeping, OfABicycleKeepsItsLaneAndStopsAtRedLightsInEveryTown) { drive_everywhere(1, 16, 1, 600); }
 
-TEST(Driver, OfACarKeepsItsLaneAndStopsAtRedLightsInEveryTown) { drive_everywhere(0, 24, 1, 1280); }
+TEST(LaneKeeping, OfACarKeepsItsLaneAndStopsAtRedLightsInEveryTown) { drive_everywhere(0, 24, 1, 1280); }
 
-TEST(Driver, OfThreeTouchesNoOtherInEveryTown) { drive_everywhere(0.2f, 48, 3, 600); }
+TEST(LaneKeeping, OfThreeTouchesNoOtherInEveryTown) { drive_everywhere(0.2f, 48, 3, 600); }
 
 /// Paths advance evenly, and in the direction that they say.
 void expect_smooth(const std::vector<PathPoint>& points) {
