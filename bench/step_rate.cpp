@@ -31,7 +31,7 @@ struct StepBench::Actions {
 #ifdef PICTURA_HAS_CUDA
   std::vector<DeviceBuffer<int32_t>> device;
 #endif
-  std::vector<Span<const int32_t>> sets;  // where the simulator reads them
+  std::vector<Array> sets;  // where the simulator reads them
 };
 
 StepBench::StepBench(Simulator* simulator, uint64_t seed)
@@ -45,8 +45,8 @@ StepBench::StepBench(Simulator* simulator, uint64_t seed)
       continue;
     }
 #ifdef PICTURA_HAS_CUDA
-    actions_->device.emplace_back(Span<const int32_t>(set));
-    actions_->sets.push_back(actions_->device.back().span());
+    const DeviceBuffer<int32_t>& uploaded = actions_->device.emplace_back(Span<const int32_t>(set));
+    actions_->sets.emplace_back(uploaded.data(), Dims{simulator->num_slots()}, simulator->device());
 #else
     fail("step bench: simulator {}: this build reaches no device memory", simulator->name());
 #endif

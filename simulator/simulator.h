@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "pictura/common/array.h"
 #include "pictura/common/scene.h"
 #include "pictura/simulator/actions.h"
 #include "pictura/simulator/command.h"
@@ -90,7 +91,7 @@ class StateSnapshot {
   virtual ~StateSnapshot() = default;
 };
 
-/// What step() returns besides observations. Spans last as the simulator's addresses do.
+/// What step() returns besides observations. Spans lie on device() and last as the simulator's addresses do.
 struct StepResult {
   Span<const float> reward;        // [slots]
   Span<const uint8_t> terminated;  // [slots] 1: an infraction ended the agent's episode in this step
@@ -147,14 +148,15 @@ class Simulator {
   /// Starts a new episode in every world (episode 0 of the seed) and writes observations and scene.
   virtual void reset(Stream stream = {}) = 0;
 
-  /// Advances every world by one step. actions: [slots], each in [0, kNumActions); those of inactive agents are
-  /// ignored. A world whose last step ended its episode is reset instead, and its slots are not valid in that step
-  /// (next-step autoreset). Throws Error on an action out of range, which leaves the state as it was; on a device this
-  /// is latched. There a step allocates nothing and waits for nothing, and a CUDA graph can capture it.
-  virtual StepResult step(Span<const int32_t> actions, Stream stream = {}) = 0;
+  /// Advances every world by one step. actions: i32 [slots] on device(), each in [0, kNumActions); those of inactive
+  /// agents are ignored. A world whose last step ended its episode is reset instead, and its slots are not valid in
+  /// that step (next-step autoreset). Throws Error, which leaves the state as it was, for another array, and for an
+  /// action out of range; on a device the latter is latched. There a step allocates nothing and waits for nothing, and
+  /// a CUDA graph can capture it.
+  StepResult step(const Array& actions, Stream stream = {});
   /// The same by commands, [slots], see command.h: what a Controller writes. A step of actions alone gives the bits
   /// that the simple form gives.
-  virtual StepResult step(Span<const Command> commands, Stream stream = {}) = 0;
+  StepResult step(Span<const Command> commands, Stream stream = {});
 
   /// Throws Error when a step was rejected since the last call that threw, as far as the host knows; does not wait.
   virtual void poll() {}
@@ -192,6 +194,11 @@ class Simulator {
   /// when the snapshot is of other worlds or another simulator.
   virtual std::unique_ptr<StateSnapshot> snapshot(Stream stream = {}) const = 0;
   virtual void restore(const StateSnapshot& snapshot, Stream stream = {}) = 0;
+
+ private:
+  // step() once it has checked everything but the values.
+  virtual StepResult step_actions(Span<const int32_t> actions, Stream stream) = 0;
+  virtual StepResult step_commands(Span<const Command> commands, Stream stream) = 0;
 };
 
 }  // namespace pictura

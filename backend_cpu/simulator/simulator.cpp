@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <type_traits>
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/parallel_for.h"
@@ -78,9 +77,6 @@ class SimulatorCpu final : public Simulator {
     });
   }
 
-  StepResult step(Span<const int32_t> actions, Stream) override { return step_all(actions); }
-  StepResult step(Span<const Command> commands, Stream) override { return step_all(commands); }
-
   ObservationView observations() override { return results_.observation_view(); }
   const SceneBatch& scene() override { return worlds_.scene; }
   Span<const View> views() override { return results_.views; }
@@ -125,6 +121,9 @@ class SimulatorCpu final : public Simulator {
   }
 
  private:
+  StepResult step_actions(Span<const int32_t> actions, Stream) override { return step_all(actions); }
+  StepResult step_commands(Span<const Command> commands, Stream) override { return step_all(commands); }
+
   void begin() {
     worlds_id_ = next_worlds_id();
     results_.resize(static_cast<size_t>(num_slots()), config());
@@ -170,8 +169,6 @@ class SimulatorCpu final : public Simulator {
   /// Before anything changes, so that a refused step leaves the state as it was.
   template <typename CommandType>
   void check_commands(Span<const CommandType> commands) {
-    PICTURA_CHECK(commands.size() == static_cast<size_t>(num_slots()), "step: expected {} {}, got {}", num_slots(),
-                  std::is_same_v<CommandType, Command> ? "commands" : "actions", commands.size());
     for (int w = 0; w < worlds_.setup.num_worlds(); ++w) {
       if (worlds_.state.episode_over[static_cast<size_t>(w)]) continue;
       const WorldView world = worlds_.world(w);

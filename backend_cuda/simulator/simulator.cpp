@@ -74,10 +74,6 @@ class SimulatorCuda final : public Simulator {
     PICTURA_CUDA(cudaGetLastError());
   }
 
-  StepResult step(Span<const int32_t> actions, Stream stream) override { return step_all(actions, "actions", stream); }
-  StepResult step(Span<const Command> commands, Stream stream) override {
-    return step_all(commands, "commands", stream);
-  }
   void poll() override { throw_rejected(); }
   void check(Stream stream) override {
     const DeviceGuard guard(device_);
@@ -152,6 +148,9 @@ class SimulatorCuda final : public Simulator {
   }
 
  private:
+  StepResult step_actions(Span<const int32_t> actions, Stream stream) override { return step_all(actions, stream); }
+  StepResult step_commands(Span<const Command> commands, Stream stream) override { return step_all(commands, stream); }
+
   size_t slot_count() const { return static_cast<size_t>(num_slots()); }
 
   /// Memory for this capacity and no less than before; whatever was there is lost.
@@ -221,10 +220,9 @@ class SimulatorCuda final : public Simulator {
   }
 
   template <typename CommandType>
-  StepResult step_all(Span<const CommandType> commands, const char* what, Stream stream) {
+  StepResult step_all(Span<const CommandType> commands, Stream stream) {
     const DeviceGuard guard(device_);
     throw_rejected();
-    PICTURA_CHECK(commands.size() == slot_count(), "step: expected {} {}, got {}", num_slots(), what, commands.size());
     cuda::launch_step(arrays(), commands.data(), side_->streams_from(handle_of(stream)));
     PICTURA_CUDA(cudaGetLastError());
     return {{results_.reward.data(), slot_count()},

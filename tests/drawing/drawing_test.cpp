@@ -290,8 +290,6 @@ class StillSimulator final : public Simulator {
   const std::vector<WorldSpec>& worlds() const override { return worlds_; }
   int num_slots() const override { return 4; }
   void reset(Stream) override {}
-  StepResult step(Span<const int32_t>, Stream) override { return {}; }
-  StepResult step(Span<const Command>, Stream) override { return {}; }
   void set_worlds(CompiledMaps, std::vector<GeometryHandle>, std::vector<WorldSpec>, uint64_t, Stream) override {}
   void reserve(const SimulatorCapacity&) override {}
   uint64_t generation() const override { return 0; }
@@ -314,6 +312,9 @@ class StillSimulator final : public Simulator {
   Device device_;
 
  private:
+  StepResult step_actions(Span<const int32_t>, Stream) override { return {}; }
+  StepResult step_commands(Span<const Command>, Stream) override { return {}; }
+
   SimulatorConfig config_;
   SimulatorTotals totals_;
   CompiledMaps maps_;

@@ -120,7 +120,22 @@ TEST(Simulator, RefusesActionsOutOfRangeAndStaysAsItWas) {
     actions[3] = bad;
     EXPECT_THROW(simulator->step(actions), Error);
   }
-  EXPECT_THROW(simulator->step(Span<const int32_t>(actions).subspan(0, 3)), Error);
+  EXPECT_EQ(simulator->state_hash(), before);
+}
+
+TEST(Simulator, RefusesActionsThatAreNotTheArrayThatItExpects) {
+  const auto simulator = make(testing::cars(), testing::ring_road(40), {{0, 4, 0}});
+  const uint64_t before = simulator->state_hash();
+  std::vector<int32_t> actions(8, kCoast);
+  const auto refusal = [&](const Array& array) { return test::message_of([&] { simulator->step(array); }); };
+  EXPECT_EQ(refusal(std::vector<float>(4)), "step: actions: expected i32 [4] on cpu, got f32 [4] on cpu");
+  EXPECT_EQ(refusal({actions.data(), {3}, {}}), "step: actions: expected i32 [4] on cpu, got i32 [3] on cpu");
+  EXPECT_EQ(refusal({actions.data(), {4, 1}, {}}), "step: actions: expected i32 [4] on cpu, got i32 [4, 1] on cpu");
+  EXPECT_EQ(refusal({actions.data(), {4}, {MemorySpace::cuda, 1}}),
+            "step: actions: expected i32 [4] on cpu, got i32 [4] on cuda:1");
+  Array every_second(actions.data(), {4}, {});
+  every_second.strides = {2};
+  EXPECT_EQ(refusal(every_second), "step: actions: expected i32 [4] on cpu, got i32 [4] on cpu with strides [2]");
   EXPECT_EQ(simulator->state_hash(), before);
 }
 

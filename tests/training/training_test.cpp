@@ -196,7 +196,7 @@ TEST_F(Training, ImagesAreDrawnForActiveAgentsAlone) {
   for (size_t i = 0; i < actions.size(); ++i) actions[i] = static_cast<int32_t>(i) % kNumActions;
   size_t halted = 0;
   for (int step = 0; step < 60 && halted < 6; ++step) {
-    simulator->step(Span<const int32_t>(actions));
+    simulator->step(actions);
     halted = 24 - active_slots(simulator->controller_input()).size();
   }
   ASSERT_GT(halted, 0u);

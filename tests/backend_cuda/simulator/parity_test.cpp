@@ -13,6 +13,7 @@
 #include "pictura/map/load_map.h"
 #include "pictura/tests/backend_cuda/device_test.h"
 #include "pictura/tests/simulator/same_bits.h"
+#include "pictura/tests/support/error_message.h"
 
 namespace pictura {
 
@@ -38,6 +39,11 @@ template <typename T>
 bool same(Span<T> host, Span<T> device) {
   const auto copy = on_host(device);
   return testing::same_bits(Span<const T>(host), Span<const T>(copy));
+}
+
+/// Of actions in the memory of a simulator.
+Array array_of(const DeviceBuffer<int32_t>& actions, const Simulator& simulator) {
+  return {actions.data(), {simulator.num_slots()}, simulator.device()};
 }
 
 /// A device observation's copy.
@@ -116,20 +122,20 @@ class StepLog {
 /// Steps both with the same actions and compares what every step returns. The device runs ahead: with a wait for each
 /// step, tests that share a device take turns at it thousands of times.
 void step_same(Simulator* cpu, Simulator* cuda, int steps, uint32_t first_step) {
-  const auto slots = static_cast<size_t>(cpu->num_slots());
+  const int slots = cpu->num_slots();
   std::vector<int32_t> actions;
   for (int i = 0; i < steps; ++i) {
-    const std::vector<int32_t> drawn = testing::mixed_actions(cpu->num_slots(), first_step + static_cast<uint32_t>(i));
+    const std::vector<int32_t> drawn = testing::mixed_actions(slots, first_step + static_cast<uint32_t>(i));
     actions.insert(actions.end(), drawn.begin(), drawn.end());
   }
   const DeviceBuffer<int32_t> device_actions{Span<const int32_t>(actions)};
-  StepLog log(steps, cpu->num_slots());
-  for (size_t i = 0; i < static_cast<size_t>(steps); ++i) {
-    log.append(cuda->step({device_actions.data() + i * slots, slots}));
+  StepLog log(steps, slots);
+  for (int i = 0; i < steps; ++i) {
+    log.append(cuda->step(Array(device_actions.data() + int64_t{i} * slots, {slots}, cuda->device())));
   }
   log.copy_to_host();
   for (int i = 0; i < steps; ++i) {
-    const StepResult a = cpu->step({actions.data() + static_cast<size_t>(i) * slots, slots});
+    const StepResult a = cpu->step(Array(actions.data() + int64_t{i} * slots, {slots}, cpu->device()));
     const StepResult b = log.of_step(i);
     ASSERT_TRUE(testing::same_bits(a.reward, b.reward)) << "step " << first_step + static_cast<uint32_t>(i);
     ASSERT_TRUE(testing::same_bits(a.terminated, b.terminated) && testing::same_bits(a.truncated, b.truncated) &&
@@ -239,7 +245,7 @@ TEST_F(CudaSimulatorTest, AGraphReplaysSteps) {
   PICTURA_CUDA(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
   cudaGraph_t graph = nullptr;
   PICTURA_CUDA(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal));
-  cuda->step(actions.span(), {stream});
+  cuda->step(array_of(actions, *cuda), {stream});
   PICTURA_CUDA(cudaStreamEndCapture(stream, &graph));
   cudaGraphExec_t executable = nullptr;
   PICTURA_CUDA(cudaGraphInstantiate(&executable, graph, 0));
@@ -347,7 +353,7 @@ TEST_F(CudaSimulatorTest, AnActionOutOfRangeChangesNothingAndIsThrownLater) {
   actions[33] = kNumActions;
   const uint64_t before = cuda->state_hash();
   const DeviceBuffer<int32_t> bad{Span<const int32_t>(actions)};
-  EXPECT_NO_THROW(cuda->step(bad.span()));
+  EXPECT_NO_THROW(cuda->step(array_of(bad, *cuda)));
   EXPECT_EQ(cuda->state_hash(), before);
   try {
     cuda->check();
@@ -357,9 +363,31 @@ TEST_F(CudaSimulatorTest, AnActionOutOfRangeChangesNothingAndIsThrownLater) {
   }
   actions[33] = 0;
   const DeviceBuffer<int32_t> good{Span<const int32_t>(actions)};
-  cuda->step(good.span());
+  cuda->step(array_of(good, *cuda));
   EXPECT_NO_THROW(cuda->check());
   EXPECT_NE(cuda->state_hash(), before);
+}
+
+TEST_F(CudaSimulatorTest, ActionsThatAreNotTheArrayThatItExpectsAreRefusedAtOnce) {
+  const auto cuda = make_simulator("cuda", {}, {load_map("procedural:1")}, {{0, 40, 0}});
+  const uint64_t before = cuda->state_hash();
+  const Device device = cuda->device();
+  const DeviceBuffer<int32_t> actions(80);
+  const DeviceBuffer<float> floats(40);
+  const std::string expected = fmt::format("step: actions: expected i32 [40] on {}, got ", name_of(device));
+  const auto refusal = [&](const Array& array) { return test::message_of([&] { cuda->step(array); }); };
+  EXPECT_EQ(refusal({floats.data(), {40}, device}), expected + "f32 [40] on " + name_of(device));
+  EXPECT_EQ(refusal({actions.data(), {39}, device}), expected + "i32 [39] on " + name_of(device));
+  EXPECT_EQ(refusal(std::vector<int32_t>(40)), expected + "i32 [40] on cpu");
+  const Device other{MemorySpace::cuda, device.index + 1};
+  EXPECT_EQ(refusal({actions.data(), {40}, other}), expected + "i32 [40] on " + name_of(other));
+  Array every_second = array_of(actions, *cuda);
+  every_second.strides = {2};
+  EXPECT_EQ(refusal(every_second), expected + "i32 [40] on " + name_of(device) + " with strides [2]");
+  EXPECT_EQ(test::message_of([&] { cuda->step(Span<const Command>(nullptr, 39)); }),
+            "step: expected 40 commands, got 39");
+  EXPECT_NO_THROW(cuda->check());
+  EXPECT_EQ(cuda->state_hash(), before);
 }
 
 // Printed, not judged: the paper's number of agents, with and without entity sets.
@@ -375,7 +403,7 @@ TEST_F(CudaSimulatorTest, RateOf20480Agents) {
       actions.emplace_back(Span<const int32_t>(host));
     }
     const auto run = [&](size_t steps) {
-      for (size_t step = 0; step < steps; ++step) cuda->step(actions[step % actions.size()].span());
+      for (size_t step = 0; step < steps; ++step) cuda->step(array_of(actions[step % actions.size()], *cuda));
       cuda->check();
     };
     run(200);
