@@ -95,7 +95,8 @@ TrainReport train(const TrainOptions& options) {
     }
     record.times.rollout_s = watch.restart();
     record.times.render_s = run.observer.render_s() - render_before_s;
-    record.totals = difference(run.simulator->totals(), totals_before);
+    record.totals = run.simulator->totals();
+    record.totals.subtract(totals_before);
 
     record.stats = improve(&run);
     record.times.optimize_s = watch.restart();

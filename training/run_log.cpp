@@ -79,13 +79,6 @@ void ProgressCsv::write(int64_t update, const Scalars& scalars) {
   PICTURA_CHECK(out_, "{}: writing failed", path_);
 }
 
-SimulatorTotals difference(SimulatorTotals after, const SimulatorTotals& before) {
-  auto subtract = [](auto& sum, auto value) { sum -= value; };
-  SimulatorTotals::visit_counts(after, before, subtract);
-  SimulatorTotals::visit_sums(after, before, subtract);
-  return after;
-}
-
 RunLog::RunLog(const std::string& folder, const Config& config, int64_t updates_done, int64_t agent_steps,
                const std::vector<RecentUpdate>& recent)
     : config_(config),

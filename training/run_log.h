@@ -43,9 +43,6 @@ class ProgressCsv {
   bool needs_head_ = true;
 };
 
-/// What was counted between two readings of a simulator's totals.
-SimulatorTotals difference(SimulatorTotals after, const SimulatorTotals& before);
-
 /// What one update did.
 struct UpdateRecord {
   SimulatorTotals totals;  // counted in its rollout
