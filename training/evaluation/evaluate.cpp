@@ -117,6 +117,7 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
 
   const auto start = std::chrono::steady_clock::now();
   const std::unique_ptr<Renderer> renderer = session.make_renderer();
+  std::unique_ptr<Simulator> simulator;  // made with the first batch
   EvaluateReport report;
   for (const DensityOf& density : densities) {
     Tally tally;
@@ -127,11 +128,14 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
         worlds.push_back({scenario % static_cast<int>(maps.size()), density.agents,
                           kFirstEvaluationWorld + static_cast<uint32_t>(scenario)});
       }
-      const std::unique_ptr<Simulator> simulator = make_simulator(options.simulator, simulator_config, maps, worlds);
-      if (renderer) upload_maps(*simulator, renderer.get());
+      if (simulator) {
+        simulator->set_worlds(maps, {}, worlds, options.seed);
+      } else {
+        simulator = make_simulator(options.simulator, simulator_config, maps, worlds);
+        if (renderer) upload_maps(*simulator, renderer.get());
+      }
       const std::unique_ptr<Controller> controller =
           session.make_controller(renderer.get(), options.argmax, options.seed);
-      simulator->reset();
       std::vector<Command> commands(static_cast<size_t>(simulator->num_slots()));
       // Halted agents stay as they are, so a batch is over when no agent is active.
       for (int step = 0; step < options.steps && has_active_agents(*simulator); ++step) {
