@@ -67,7 +67,6 @@ void check(const SimulatorConfig& config, const CompiledMaps& maps, const std::v
     }
   }
   if (worlds.empty()) fail_usage("simulator: expected at least one world");
-  int64_t slots = 0, lights = 0;
   for (const WorldSpec& world : worlds) {
     if (world.map < 0 || world.map >= static_cast<int>(maps.size())) {
       fail_usage("simulator: world {}: expected a map in [0, {}), got {}", world.global_world, maps.size(), world.map);
@@ -76,21 +75,22 @@ void check(const SimulatorConfig& config, const CompiledMaps& maps, const std::v
       fail_usage("simulator: world {}: expected 1 to {} agents, got {}", world.global_world, kMaxAgentsPerWorld,
                  world.num_agents);
     }
-    slots += world.num_agents;
-    lights += static_cast<int64_t>(maps[static_cast<size_t>(world.map)]->rules.stop_lines.size());
   }
-  if (slots > kMaxSlots) fail_usage("simulator: expected at most {} agents in all, got {}", kMaxSlots, slots);
-  const auto num_worlds = static_cast<int64_t>(worlds.size());
-  const int64_t boxes = slots + num_worlds * config.parked_cars;
+  const SimulatorCapacity needs = capacity_of(maps, worlds);
+  if (needs.slots > kMaxSlots) {
+    fail_usage("simulator: expected at most {} agents in all, got {}", kMaxSlots, needs.slots);
+  }
+  const int64_t boxes = needs.boxes(config);
   if (boxes > kMaxBoxes) {
     fail_usage(
         "simulator: expected at most {} boxes in all, got {} ({} bytes): {} agents, and {} parked cars in each of {} "
         "worlds",
-        kMaxBoxes, boxes, boxes * static_cast<int64_t>(2 * sizeof(AgentBox)), slots, config.parked_cars, num_worlds);
+        kMaxBoxes, boxes, boxes * static_cast<int64_t>(2 * sizeof(AgentBox)), needs.slots, config.parked_cars,
+        needs.worlds);
   }
-  if (lights > kMaxBoxes) {
+  if (needs.lights > kMaxBoxes) {
     fail_usage("simulator: expected at most {} traffic lights in all, got {} ({} bytes) in {} worlds", kMaxBoxes,
-               lights, lights * static_cast<int64_t>(sizeof(LightPlan) + sizeof(LightState)), num_worlds);
+               needs.lights, needs.lights * static_cast<int64_t>(sizeof(LightPlan) + sizeof(LightState)), needs.worlds);
   }
 }
 
