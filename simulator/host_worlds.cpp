@@ -9,9 +9,10 @@ CellLists empty_box_cells(const MapRules& map, size_t num_boxes) {
   CellLists cells;
   cells.origin_m = map.low_m;
   cells.cell_m = kBoxCell_m;
-  cells.num_x = static_cast<int>((map.high_m.x - map.low_m.x) / kBoxCell_m) + 1;
-  cells.num_y = static_cast<int>((map.high_m.y - map.low_m.y) / kBoxCell_m) + 1;
-  cells.begin.assign(static_cast<size_t>(cells.num_x) * static_cast<size_t>(cells.num_y) + 1, 0);
+  const BoxCellCounts counts = count_box_cells(map);
+  cells.num_x = static_cast<int>(counts.num_x);
+  cells.num_y = static_cast<int>(counts.num_y);
+  cells.begin.assign(static_cast<size_t>(counts.num_x * counts.num_y) + 1, 0);
   cells.items.assign(num_boxes, 0);
   return cells;
 }

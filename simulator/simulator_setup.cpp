@@ -113,10 +113,8 @@ void check_box_cells(const CompiledMaps& maps, const std::vector<WorldSpec>& wor
   constexpr int64_t kMaxCells = int64_t{1} << 28;
   std::vector<int64_t> cells_of_map;
   for (const auto& map : maps) {
-    const MapRules& rules = map->rules;
-    const auto num_x = static_cast<int64_t>((rules.high_m.x - rules.low_m.x) / kBoxCell_m) + 1;
-    const auto num_y = static_cast<int64_t>((rules.high_m.y - rules.low_m.y) / kBoxCell_m) + 1;
-    cells_of_map.push_back(num_x * num_y + 1);
+    const BoxCellCounts cells = count_box_cells(map->rules);
+    cells_of_map.push_back(cells.num_x * cells.num_y + 1);
   }
   int64_t cells = 0;
   for (const WorldSpec& world : worlds) cells += cells_of_map[static_cast<size_t>(world.map)];
@@ -131,6 +129,11 @@ void check_box_cells(const CompiledMaps& maps, const std::vector<WorldSpec>& wor
 SimulatorCapacity SimulatorCapacity::joined(const SimulatorCapacity& other) const {
   return {std::max(worlds, other.worlds), std::max(slots, other.slots), std::max(lights, other.lights),
           std::max(maps, other.maps), std::max(map_bytes, other.map_bytes)};
+}
+
+BoxCellCounts count_box_cells(const MapRules& map) {
+  return {static_cast<int64_t>((map.high_m.x - map.low_m.x) / kBoxCell_m) + 1,
+          static_cast<int64_t>((map.high_m.y - map.low_m.y) / kBoxCell_m) + 1};
 }
 
 SimulatorCapacity capacity_of(const CompiledMaps& maps, const std::vector<WorldSpec>& worlds) {

@@ -53,5 +53,10 @@ uint64_t next_worlds_id();
 
 /// Sides of the cells that hosts sort a world's boxes into; see HostWorlds.
 constexpr float kBoxCell_m = 25.0f;
+/// How many cells cover a map. Of 64 bits, since a map that is too large to be simulated is counted too.
+struct BoxCellCounts {
+  int64_t num_x, num_y;
+};
+BoxCellCounts count_box_cells(const MapRules& map);
 
 }  // namespace pictura
