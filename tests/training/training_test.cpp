@@ -48,6 +48,17 @@ class Training : public ::testing::Test {
   test::ScratchFolder folder_;
 };
 
+/// One short evaluation on the procedural map.
+EvaluateOptions one_scenario(const std::string& checkpoint, int steps) {
+  EvaluateOptions o;
+  o.checkpoint = checkpoint;
+  o.maps = {"procedural"};
+  o.scenarios = 1;
+  o.steps = steps;
+  o.num_threads = 1;
+  return o;
+}
+
 std::vector<std::vector<std::string>> read_table(const std::string& path) {
   std::vector<std::vector<std::string>> rows;
   std::istringstream lines(read_file(path));
@@ -155,13 +166,8 @@ TEST_F(Training, EachRendererWorksWithTheSimulatorOnTheCpu) {
   if (const std::string why = missing("gl:osmesa"); !why.empty()) GTEST_SKIP() << why;
   const TrainReport gl = train(options("gl", {"train.updates=1", "render.backend=gl:osmesa", "render.samples=2x2"}));
   EXPECT_THAT(gl.renderer, HasSubstr("gl"));
-  EvaluateOptions o;
-  o.checkpoint = gl.checkpoint;
-  o.maps = {"procedural"};
+  EvaluateOptions o = one_scenario(gl.checkpoint, 3);
   o.agents_per_world = 4;
-  o.scenarios = 1;
-  o.steps = 3;
-  o.num_threads = 1;
   EXPECT_GT(evaluate(o).rows.at(0).km_driven, 0);
 }
 
@@ -485,13 +491,8 @@ TEST_F(Training, TheVectorPolicyLearnsFromWallsWhereItObservesThem) {
                                        "simulator.wall_observations=true"};
   const TrainReport report = train(options("run", walls));
   EXPECT_EQ(report.renderer, "");
-  EvaluateOptions o;
-  o.checkpoint = report.checkpoint;
-  o.maps = {"procedural"};
+  EvaluateOptions o = one_scenario(report.checkpoint, 5);
   o.agents_per_world = 6;
-  o.scenarios = 1;
-  o.steps = 5;
-  o.num_threads = 1;
   EXPECT_GT(evaluate(o).rows.at(0).km_driven, 0);
   EXPECT_TRUE(PolicySession(report.checkpoint).evaluation_world(5).wall_observations);
   TrainOptions without = options("run", {"train.updates=2", "policy.modality=vector", "simulator.walls=true"});
@@ -501,13 +502,8 @@ TEST_F(Training, TheVectorPolicyLearnsFromWallsWhereItObservesThem) {
 
 TEST_F(Training, PerspectivePolicyIsEvaluatedFromItsImages) {
   const TrainReport report = train(options("run", {"train.updates=1"}));
-  EvaluateOptions o;
-  o.checkpoint = report.checkpoint;
-  o.maps = {"procedural"};
+  EvaluateOptions o = one_scenario(report.checkpoint, 3);
   o.densities = {Density::light};
-  o.scenarios = 1;
-  o.steps = 3;
-  o.num_threads = 1;
   o.renderer = "cpu";
   const std::vector<EvaluateRow> rows = evaluate(o).rows;
   ASSERT_EQ(rows.size(), 1u);
