@@ -86,7 +86,7 @@ void GeometryTable::upload(GeometryHandle handle, const StaticGeometry& geometry
   map.entry.strips = packed_strips.in(memory);
   map.entry.walls = packed_walls.in(memory);
   PICTURA_CUDA(cudaMemcpyAsync(map.memory.data(), bytes.data(), bytes.size(), cudaMemcpyHostToDevice, stream));
-  std::swap(maps_[index], map);
+  swap_map(index, &map);
   PICTURA_CUDA(cudaMemcpyAsync(table_.data() + index, &maps_[index].entry, sizeof(DeviceGeometry),
                                cudaMemcpyHostToDevice, stream));
   retire(std::move(map.memory), stream);
@@ -99,20 +99,22 @@ void GeometryTable::release(GeometryHandle handle, cudaStream_t stream) {
   // An entry of set bits is empty, see is_held().
   PICTURA_CUDA(cudaMemsetAsync(table_.data() + index, 0xFF, sizeof(DeviceGeometry), stream));
   Map released;
-  std::swap(maps_[index], released);
+  swap_map(index, &released);
   retire(std::move(released.memory), stream);
 }
 
-int GeometryTable::max_pieces() const {
-  int most = 0;
-  for (const Map& map : maps_) most = std::max(most, map.pieces);
-  return most;
-}
-
-int GeometryTable::max_heads() const {
-  int most = 0;
-  for (const Map& map : maps_) most = std::max(most, map.heads);
-  return most;
+void GeometryTable::swap_map(std::size_t index, Map* map_inout) {
+  std::swap(maps_[index], *map_inout);
+  const auto update = [&](int Map::* count, int* max_inout) {
+    const int gone = map_inout->*count, here = maps_[index].*count;
+    if (here < *max_inout && gone < *max_inout) return;
+    *max_inout = here;
+    if (here >= gone) return;
+    // A largest one is gone: only now all are looked at.
+    for (const Map& map : maps_) *max_inout = std::max(*max_inout, map.*count);
+  };
+  update(&Map::pieces, &max_pieces_);
+  update(&Map::heads, &max_heads_);
 }
 
 void GeometryTable::grow(std::size_t entries, cudaStream_t stream) {

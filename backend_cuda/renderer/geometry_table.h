@@ -29,8 +29,8 @@ class GeometryTable {
   /// How often the table has moved.
   uint64_t generation() const { return generation_; }
   /// The largest numbers of pieces of a map that is held, and of light heads among them.
-  int max_pieces() const;
-  int max_heads() const;
+  int max_pieces() const { return max_pieces_; }
+  int max_heads() const { return max_heads_; }
 
  private:
   static constexpr std::size_t kMinEntries = 16;
@@ -51,12 +51,15 @@ class GeometryTable {
   };
 
   void grow(std::size_t entries, cudaStream_t stream);
+  /// Swaps a map with that of an entry on the host.
+  void swap_map(std::size_t index, Map* map_inout);
   void retire(DeviceBuffer<std::byte> memory, cudaStream_t stream);
   DeviceBuffer<std::byte> allocate(std::size_t bytes);
 
   std::vector<Map> maps_;  // [handle], as many as the table has entries
   DeviceBuffer<DeviceGeometry> table_;
   std::vector<Retired> retired_;
+  int max_pieces_ = 0, max_heads_ = 0;  // asked for in every call that draws, of up to kNumGeometryHandles maps
   uint64_t generation_ = 0;
 };
 
