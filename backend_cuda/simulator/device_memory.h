@@ -2,6 +2,7 @@
 // within it need no allocation; copies are put on a stream.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <type_traits>
 #include <vector>
@@ -25,9 +26,10 @@ void get(const DeviceBuffer<T>& device, std::vector<T>* host_out, cudaStream_t s
   PICTURA_CUDA(
       cudaMemcpyAsync(host_out->data(), device.data(), host_out->size() * sizeof(T), cudaMemcpyDeviceToHost, stream));
 }
-/// Within the device.
+/// Within the device, as many as both hold.
 template <typename T>
-void copy(const DeviceBuffer<T>& from, const DeviceBuffer<T>& to, size_t count, cudaStream_t stream) {
+void copy(const DeviceBuffer<T>& from, const DeviceBuffer<T>& to, cudaStream_t stream) {
+  const size_t count = std::min(from.size(), to.size());
   if (count == 0) return;
   PICTURA_CUDA(cudaMemcpyAsync(to.data(), from.data(), count * sizeof(T), cudaMemcpyDeviceToDevice, stream));
 }
@@ -58,8 +60,8 @@ struct DeviceAgents {
     PICTURA_AGENT_FIELDS(X)
 #undef X
   }
-  void copy_to(const DeviceAgents& other, size_t num_agents, cudaStream_t stream) const {
-#define X(name, type, per_agent, first, comment) copy(name, other.name, num_agents*(per_agent), stream);
+  void copy_to(const DeviceAgents& other, cudaStream_t stream) const {
+#define X(name, type, per_agent, first, comment) copy(name, other.name, stream);
     PICTURA_AGENT_FIELDS(X)
 #undef X
   }
@@ -97,18 +99,10 @@ struct DeviceState {
     agents.get_to(&host_out->agents, stream);
     SimulatorState::visit_arrays(*this, *host_out, [stream](const auto& from, auto& to) { get(from, &to, stream); });
   }
-  void copy_to(const DeviceState& other, const SimulatorSetup& setup, cudaStream_t stream) const {
-    agents.copy_to(other.agents, static_cast<size_t>(setup.num_slots()), stream);
-    const size_t num_worlds = setup.worlds.size();
-    copy(boxes, other.boxes, setup.num_boxes(), stream);
-    copy(boxes_before, other.boxes_before, setup.num_boxes(), stream);
-    copy(light_plans, other.light_plans, setup.num_lights(), stream);
-    copy(lights, other.lights, setup.num_lights(), stream);
-    copy(episode_step, other.episode_step, num_worlds, stream);
-    copy(episode_index, other.episode_index, num_worlds, stream);
-    copy(episode_over, other.episode_over, num_worlds, stream);
-    copy(spawned, other.spawned, num_worlds, stream);
-    copy(world_totals, other.world_totals, num_worlds, stream);
+  /// As much as both hold: a copy is as long as its worlds need, the simulator's own state as its capacity.
+  void copy_to(const DeviceState& other, cudaStream_t stream) const {
+    agents.copy_to(other.agents, stream);
+    SimulatorState::visit_arrays(*this, other, [stream](const auto& from, const auto& to) { copy(from, to, stream); });
   }
 };
 

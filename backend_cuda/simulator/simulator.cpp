@@ -135,7 +135,7 @@ class SimulatorCuda final : public Simulator {
     auto copy = std::make_unique<DeviceSnapshot>();
     copy->worlds_id = worlds_id_;
     copy->state = DeviceState(slot_count(), setup_.num_boxes(), setup_.num_lights(), setup_.worlds.size());
-    state_.copy_to(copy->state, setup_, handle_of(stream));
+    state_.copy_to(copy->state, handle_of(stream));
     return copy;
   }
   void restore(const StateSnapshot& snapshot, Stream stream) override {
@@ -143,7 +143,7 @@ class SimulatorCuda final : public Simulator {
     PICTURA_CHECK(copy && copy->worlds_id == worlds_id_,
                   "restore: expected a snapshot of these worlds of this simulator");
     const DeviceGuard guard(device_);
-    copy->state.copy_to(state_, setup_, handle_of(stream));
+    copy->state.copy_to(state_, handle_of(stream));
     show_restored(handle_of(stream));
   }
 
