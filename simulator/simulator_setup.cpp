@@ -1,7 +1,6 @@
 #include "pictura/simulator/simulator_setup.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <numeric>
 
@@ -180,11 +179,6 @@ SimulatorSetup SimulatorSetup::with(CompiledMaps other_maps, std::vector<Geometr
   SimulatorConfig other = config;
   other.seed = seed;
   return {other, std::move(other_maps), std::move(other_handles), std::move(other_worlds)};
-}
-
-uint64_t next_worlds_id() {
-  static std::atomic<uint64_t> id{0};
-  return ++id;
 }
 
 void SimulatorSetup::reserve(const SimulatorCapacity& capacity) {

@@ -48,8 +48,10 @@ struct SimulatorSetup {
   std::vector<GeometryHandle> geometry;                     // [worlds] the handle of its map
 };
 
-/// A number that no worlds of this process had before, to tell whose a snapshot is.
-uint64_t next_worlds_id();
+/// Tells whose a snapshot is: a simulator with its present worlds and their snapshots hold the same one, and nobody
+/// else.
+using WorldsToken = std::shared_ptr<const char>;
+inline WorldsToken new_worlds_token() { return std::make_shared<const char>(); }
 
 /// Sides of the cells that hosts sort a world's boxes into; see HostWorlds.
 constexpr float kBoxCell_m = 25.0f;

@@ -36,7 +36,7 @@ void sort_into_cells(const WorldView& world, CellLists* cells_inout) {
 }
 
 struct HostSnapshot final : StateSnapshot {
-  uint64_t worlds_id;
+  WorldsToken worlds;
   SimulatorState state;
 };
 
@@ -108,13 +108,13 @@ class SimulatorCpu final : public Simulator {
   }
   std::unique_ptr<StateSnapshot> snapshot(Stream) const override {
     auto copy = std::make_unique<HostSnapshot>();
-    copy->worlds_id = worlds_id_;
+    copy->worlds = worlds_token_;
     copy->state = worlds_.state;
     return copy;
   }
   void restore(const StateSnapshot& snapshot, Stream) override {
     const auto* copy = dynamic_cast<const HostSnapshot*>(&snapshot);
-    PICTURA_CHECK(copy && copy->worlds_id == worlds_id_,
+    PICTURA_CHECK(copy && copy->worlds == worlds_token_,
                   "restore: expected a snapshot of these worlds of this simulator");
     worlds_.state = copy->state;  // copied, so that arrays keep their memory
     show_restored();
@@ -125,7 +125,7 @@ class SimulatorCpu final : public Simulator {
   StepResult step_commands(Span<const Command> commands, Stream) override { return step_all(commands); }
 
   void begin() {
-    worlds_id_ = next_worlds_id();
+    worlds_token_ = new_worlds_token();
     results_.resize(static_cast<size_t>(num_slots()), config());
     chosen_try_.assign(static_cast<size_t>(num_slots()), -1);
     totals_ = {};
@@ -279,7 +279,8 @@ class SimulatorCpu final : public Simulator {
 
   HostWorlds worlds_;
   SimulatorCapacity capacity_;
-  uint64_t generation_ = 0, worlds_id_ = 0;
+  uint64_t generation_ = 0;
+  WorldsToken worlds_token_;
   HostResults results_;
   std::vector<int32_t> chosen_try_;  // [slots] while an episode begins
   SimulatorTotals totals_;

@@ -20,7 +20,7 @@ namespace {
 cudaStream_t handle_of(Stream stream) { return static_cast<cudaStream_t>(stream.handle); }
 
 struct DeviceSnapshot final : StateSnapshot {
-  uint64_t worlds_id = 0;
+  WorldsToken worlds;
   DeviceState state;
 };
 
@@ -133,14 +133,14 @@ class SimulatorCuda final : public Simulator {
   std::unique_ptr<StateSnapshot> snapshot(Stream stream) const override {
     const DeviceGuard guard(device_);
     auto copy = std::make_unique<DeviceSnapshot>();
-    copy->worlds_id = worlds_id_;
+    copy->worlds = worlds_token_;
     copy->state = DeviceState(slot_count(), setup_.num_boxes(), setup_.num_lights(), setup_.worlds.size());
     state_.copy_to(copy->state, handle_of(stream));
     return copy;
   }
   void restore(const StateSnapshot& snapshot, Stream stream) override {
     const auto* copy = dynamic_cast<const DeviceSnapshot*>(&snapshot);
-    PICTURA_CHECK(copy && copy->worlds_id == worlds_id_,
+    PICTURA_CHECK(copy && copy->worlds == worlds_token_,
                   "restore: expected a snapshot of these worlds of this simulator");
     const DeviceGuard guard(device_);
     copy->state.copy_to(state_, handle_of(stream));
@@ -179,7 +179,7 @@ class SimulatorCuda final : public Simulator {
 
   /// The setup's worlds from their first episodes on.
   void begin(cudaStream_t stream) {
-    worlds_id_ = next_worlds_id();
+    worlds_token_ = new_worlds_token();
     host_.resize(setup_);
     put_setup(stream);
     state_.put_from(host_, stream);
@@ -317,7 +317,8 @@ class SimulatorCuda final : public Simulator {
   const Device device_;
   SimulatorSetup setup_;
   SimulatorCapacity capacity_;
-  uint64_t generation_ = 0, worlds_id_ = 0;
+  uint64_t generation_ = 0;
+  WorldsToken worlds_token_;
   mutable SimulatorState host_;  // the state only once it has been copied there
   mutable SimulatorTotals totals_;
   DeviceMaps maps_;
