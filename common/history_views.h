@@ -1,0 +1,28 @@
+// How a row of a SceneHistory becomes a view of its scene: the rule that both devices follow.
+#pragma once
+
+#include "pictura/common/scene_types.h"
+
+namespace pictura {
+
+struct HistoryViews {
+  const View* views = nullptr;  // [steps, views_per_step], as they were put
+  int64_t views_per_step = 0;
+  int32_t num_steps = 0, worlds_per_step = 0, agents_per_step = 0;
+
+  PICTURA_HD View at(int64_t row) const {
+    View view;
+    if (row < 0 || row >= num_steps * views_per_step) {
+      view.world = -1;
+      return view;
+    }
+    const auto step = static_cast<int32_t>(row / views_per_step);
+    view = views[row];
+    view.world += step * worlds_per_step;
+    if (view.ego_agent >= 0) view.ego_agent += step * agents_per_step;
+    view.hidden_begin = view.hidden_end = 0;
+    return view;
+  }
+};
+
+}  // namespace pictura

@@ -1,0 +1,66 @@
+// The scenes of many steps as one scene, so that the images of any agents at any of those steps are drawn again by one
+// call: minibatches, films and replays read it instead of stored images.
+#pragma once
+
+#include <memory>
+
+#include "pictura/common/array.h"
+#include "pictura/common/history_views.h"
+#include "pictura/common/scene.h"
+
+namespace pictura {
+
+/// How much a history has room for; every step has as many of each.
+struct SceneHistorySize {
+  int num_steps = 0;
+  std::size_t worlds = 0, agents = 0, lights = 0, views = 0;  // of one step
+};
+
+/// World w of step s is world s * worlds + w of the history, and so on for agents and lights. Works in the memory of
+/// one device, by the rules of Renderer for devices, streams and waiting: put() and gather() neither allocate nor wait.
+class SceneHistory {
+ public:
+  /// Throws Error where there are more agents or lights than a scene can have.
+  explicit SceneHistory(const SceneHistorySize& size);
+  virtual ~SceneHistory() = default;
+  SceneHistory(const SceneHistory&) = delete;
+  SceneHistory& operator=(const SceneHistory&) = delete;
+
+  virtual Device device() const = 0;
+  const SceneHistorySize& size() const { return size_; }
+
+  /// Keeps a scene and the views of its agents as those of `step`, instead of what the step held before. Steps are put
+  /// in order first. Throws Error where the scene is of another device or size, hides agents, or a step is left out.
+  void put(int step, const SceneBatch& scene, Span<const View> views, Stream stream = {});
+
+  /// All steps that have been put.
+  virtual SceneBatch scene() const = 0;
+
+  /// The views, in scene(), of rows step * size().views + view. Rows of steps that have not been put give a view that
+  /// renderers refuse. Throws Error where there are not as many rows as views_out.
+  void gather(Span<const int64_t> rows, Span<View> views_out, Stream stream = {}) const;
+
+ protected:
+  /// Steps that have been put.
+  int num_steps() const { return num_steps_; }
+  /// The rule of gather(), for views in the order of put().
+  HistoryViews history_views(const View* views) const {
+    return {views, static_cast<int64_t>(size_.views), num_steps_, static_cast<int32_t>(size_.worlds),
+            static_cast<int32_t>(size_.agents)};
+  }
+
+ private:
+  virtual void copy_step(int step, const SceneBatch& scene, Span<const View> views, Stream stream) = 0;
+  virtual void copy_views(Span<const int64_t> rows, Span<View> views_out, Stream stream) const = 0;
+
+  SceneHistorySize size_;
+  int num_steps_ = 0;
+};
+
+/// In host memory.
+std::unique_ptr<SceneHistory> make_host_scene_history(const SceneHistorySize& size);
+
+/// Bytes that a history takes.
+int64_t bytes_of(const SceneHistorySize& size);
+
+}  // namespace pictura
