@@ -14,7 +14,7 @@ install(TARGETS pictura RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 foreach(folder backends common map simulator)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/pictura/${folder}
     FILES_MATCHING PATTERN "*.h" PATTERN "cuda" EXCLUDE PATTERN "controllers" EXCLUDE
-    PATTERN "toml_fields.h" EXCLUDE)
+    PATTERN "toml_fields.h" EXCLUDE PATTERN "make_learner.h" EXCLUDE)
 endforeach()
 install(FILES ${PICTURA_INCLUDE_DIR}/pictura/version.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/pictura)
 install(EXPORT pictura NAMESPACE pictura:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/pictura)

@@ -4,6 +4,7 @@
 
 #include "pictura/common/math.h"
 #include "pictura/common/rng.h"
+#include "pictura/simulator/controllers/controller.h"
 
 namespace pictura {
 
@@ -40,6 +41,46 @@ PICTURA_HD inline int32_t draw_action(const float* log_probs, int num_actions, c
                        .step = key.step,
                        .purpose = Purpose::action});
   return draw_action(log_probs, num_actions, stream.uniform());
+}
+
+/// How actions are chosen from their log-probabilities.
+struct ActionChoice {
+  bool argmax = false;  // the most likely one; else a draw
+  uint64_t seed = 0;    // of the draws
+};
+
+/// Chooses the action of the agent in a slot, for both devices.
+struct ActionRule {
+  SlotTable slots;
+  Span<const int32_t> episode_index, episode_step;  // [worlds]
+  ActionChoice choice;
+
+  ActionRule(const ControllerInput& input, const ActionChoice& its_choice)
+      : slots(input.slots), episode_index(input.episode_index), episode_step(input.episode_step), choice(its_choice) {}
+
+  /// log_probs: [kNumActions].
+  PICTURA_HD int32_t operator()(int64_t slot, const float* log_probs) const {
+    if (choice.argmax) return most_likely_action(log_probs, kNumActions);
+    const auto world = static_cast<size_t>(slots.world_of_slot[static_cast<size_t>(slot)]);
+    const ActionKey key{choice.seed, slots.global_world[world],
+                        static_cast<uint32_t>(slots.agent_of_slot[static_cast<size_t>(slot)]),
+                        static_cast<uint32_t>(episode_index[world]), static_cast<uint32_t>(episode_step[world])};
+    return draw_action(log_probs, kNumActions, key);
+  }
+};
+
+/// The command of an action, for the slots that a mask has.
+PICTURA_HD inline void write_command(const int32_t* actions, Span<const uint8_t> mask, int64_t slot,
+                                     Command* commands_out) {
+  if (!mask.empty() && !mask[static_cast<size_t>(slot)]) return;
+  commands_out[slot] = {};
+  commands_out[slot].action = actions[slot];
+}
+
+/// Whether a slot's agent is to be drawn, encoded and commanded.
+PICTURA_HD inline bool takes_actions(const uint8_t* status, Span<const uint8_t> mask, int64_t slot) {
+  return static_cast<AgentStatus>(status[slot]) == AgentStatus::active &&
+         (mask.empty() || mask[static_cast<size_t>(slot)]);
 }
 
 }  // namespace pictura

@@ -2,7 +2,7 @@
 // its last step to its first. Callers loop over slots and steps.
 #pragma once
 
-#include "pictura/common/portable/hd.h"
+#include "pictura/common/span.h"
 
 namespace pictura {
 
@@ -25,5 +25,18 @@ PICTURA_HD inline float gae_advantage(const GaeTransition& transition, float nex
   const float advantage = delta + gamma * gae_lambda * (goes_on ? next_advantage : 0.0f);
   return transition.is_valid ? advantage : 0.0f;
 }
+
+/// A rollout's transitions, [steps, slots] each, but for `values`, which has one step more.
+struct TransitionArrays {
+  Span<const float> rewards, values;
+  Span<const uint8_t> terminated, truncated, valid;
+  int64_t num_steps = 0, num_slots = 0;
+
+  PICTURA_HD GaeTransition at(int64_t step, int64_t slot) const {
+    const auto i = static_cast<size_t>(step * num_slots + slot);
+    return {rewards[i],         values[i],         values[i + static_cast<size_t>(num_slots)],
+            terminated[i] != 0, truncated[i] != 0, valid[i] != 0};
+  }
+};
 
 }  // namespace pictura

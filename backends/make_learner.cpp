@@ -1,0 +1,45 @@
+#include "pictura/backends/make_learner.h"
+
+#include "pictura/common/error.h"
+
+namespace pictura {
+
+// Each executor's one public symbol; declared here so that nothing else sees them.
+std::unique_ptr<LearnerExecutor> make_cpu_learner_executor();
+#ifdef PICTURA_HAS_CUDA
+std::unique_ptr<LearnerExecutor> make_cuda_learner_executor(Device device);
+std::unique_ptr<SceneHistory> make_cuda_scene_history(const SceneHistorySize& size, Device device);
+std::string cuda_unavailable();
+
+std::string why_no_cuda_device() { return cuda_unavailable(); }
+#else
+std::string why_no_cuda_device() { return "this build has no CUDA"; }
+#endif
+
+namespace {
+
+void check_device(Device device) {
+  if (device.is_host()) return;
+  const std::string why_not = why_no_cuda_device();
+  PICTURA_CHECK(why_not.empty(), "learner: {}: {}", name_of(device), why_not);
+}
+
+}  // namespace
+
+std::unique_ptr<LearnerExecutor> make_learner_executor(Device device) {
+  check_device(device);
+#ifdef PICTURA_HAS_CUDA
+  if (!device.is_host()) return make_cuda_learner_executor(device);
+#endif
+  return make_cpu_learner_executor();
+}
+
+std::unique_ptr<SceneHistory> make_scene_history(Device device, const SceneHistorySize& size) {
+  check_device(device);
+#ifdef PICTURA_HAS_CUDA
+  if (!device.is_host()) return make_cuda_scene_history(size, device);
+#endif
+  return make_host_scene_history(size);
+}
+
+}  // namespace pictura

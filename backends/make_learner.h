@@ -1,0 +1,19 @@
+// What a learner needs besides its network, for the memory of a device.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "pictura/common/scene_history.h"
+#include "pictura/training/rules/learner_executor.h"
+
+namespace pictura {
+
+/// Empty where this build and this machine have a CUDA device, else why not.
+std::string why_no_cuda_device();
+
+/// Throws Error where the device is a CUDA device that there is not.
+std::unique_ptr<LearnerExecutor> make_learner_executor(Device device);
+std::unique_ptr<SceneHistory> make_scene_history(Device device, const SceneHistorySize& size);
+
+}  // namespace pictura
