@@ -27,11 +27,15 @@ void add_train_command(CLI::App& app) {
   add_policy_backend_options(command, "as the configuration says", &arguments->backends);
   command->add_option("--out", arguments->train.out_folder, "Folder for checkpoints, curves and logs")->required();
   command->add_flag("--resume", arguments->train.resume, "Go on from the checkpoint in --out");
+  command
+      ->add_option("--minutes", arguments->train.minutes,
+                   "Save and end before this much wall time has passed; go on with --resume")
+      ->check(CLI::PositiveNumber);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Examples:\n  pictura train --config configs/demo.toml --out runs/demo\n"
       "  pictura train --config configs/town01.toml --set run.seed=3 --set train.updates=50 --out runs/town01\n"
-      "  pictura train --config configs/town01.toml --out runs/town01 --resume");
+      "  pictura train --config configs/town01.toml --out runs/town01 --resume --minutes 25");
   command->callback([arguments] {
     ProgressLine line;
     arguments->train.on_progress = [&line](const TrainProgress& progress) {
@@ -43,6 +47,7 @@ void add_train_command(CLI::App& app) {
                               format_count(progress.agent_steps_per_s), episode_return, progress.goals_per_km,
                               format_duration(progress.eta_s)));
     };
+    arguments->train.on_notice = [](const std::string& notice) { fmt::print(stderr, "notice: {}\n", notice); };
     for (const std::string& text : overrides_of(arguments->backends)) arguments->train.overrides.push_back(text);
     const TrainReport report = train(arguments->train);
     line.finish();
@@ -58,6 +63,7 @@ void add_train_command(CLI::App& app) {
                   {"device", report.device},
                   {"simulator", report.simulator},
                   {"renderer", report.renderer.empty() ? Json(nullptr) : Json(report.renderer)},
+                  {"out_of_time", report.out_of_time},
                   {"learning_curve", curve}});
     } else {
       fmt::print("{} agent-steps in {} updates, {:.1f} km driven; checkpoint {}, policy hash {}, curve {}\n",

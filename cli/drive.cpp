@@ -60,6 +60,7 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy, c
     world.session = std::make_shared<PolicySession>(
         policy, SessionOptions{.num_threads = options.num_threads,
                                .device = backends.device.empty() ? "auto" : backends.device,
+                               .simulator = "cpu",
                                .renderer = backends.renderer,
                                .samples = backends.samples});
     world.renderer = world.session->make_renderer();

@@ -20,6 +20,11 @@ namespace pictura {
 
 namespace {
 
+template <typename Enum>
+using Choices = std::vector<std::pair<std::string, Enum>>;
+const Choices<Modality> kModalities{{"perspective", Modality::perspective}, {"vector", Modality::vector}};
+const Choices<Precision> kPrecisions{{"fp32", Precision::fp32}, {"tf32", Precision::tf32}, {"bf16", Precision::bf16}};
+
 // The list of keys, in the order in which they are written. Reader and writer both walk it, so no key can be read and
 // not written. A visitor takes (key, value, range...).
 template <typename AnyConfig, typename Visitor>
@@ -53,7 +58,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.integer_unless("render.rig", !c.render.rig.empty(), "render.height_px", c.render.height_px, 1, 8192);
   v.number("render.line_floor_px", c.render.line_floor_px, 0, 16);
 
-  v.modality("policy.modality", c.policy.modality);
+  v.choice("policy.modality", c.policy.modality, kModalities);
   v.flag("policy.auxiliary", c.policy.auxiliary);
   v.integers("policy.conv_channels", c.policy.conv_channels, 1, 4096);
   v.integers("policy.conv_kernels", c.policy.conv_kernels, 1, 31);
@@ -86,6 +91,9 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.number("train.adv_filter_threshold", c.train.adv_filter_threshold, 0, 1);
   v.number("train.adv_filter_ema", c.train.adv_filter_ema, 1e-6, 1);
   v.integer("train.checkpoint_every", c.train.checkpoint_every, 1, int64_t{1} << 40);
+  v.number("train.checkpoint_minutes", c.train.checkpoint_minutes, 0.01, 1e6);
+  v.choice("train.precision", c.train.precision, kPrecisions);
+  v.name("train.images", c.train.images, {"auto", "kept", "redrawn"});
 
   for (int i = 0; i < kNumConditioning; ++i) {
     v.number(std::string("evaluate.conditioning.") + kConditioningNames[i], c.evaluate.conditioning[size_t(i)], -1e6,
@@ -192,16 +200,17 @@ class Reader {
     }
   }
 
-  void modality(const std::string& key, Modality& value) {
-    if (const toml::node* node = find(key)) {
-      const std::string name = text_of(key, *node);
-      if (name == "perspective")
-        value = Modality::perspective;
-      else if (name == "vector")
-        value = Modality::vector;
-      else
-        refuse(key, *node, "expected \"perspective\" or \"vector\"");
+  template <typename Enum>
+  void choice(const std::string& key, Enum& value, const Choices<Enum>& choices) {
+    const toml::node* node = find(key);
+    if (!node) return;
+    const std::string text = text_of(key, *node);
+    std::vector<std::string> known;
+    for (const auto& [name, chosen] : choices) {
+      if (text == name) return void(value = chosen);
+      known.push_back(name);
     }
+    refuse(key, *node, fmt::format("expected one of {}", fmt::join(known, ", ")));
   }
 
   void range(const std::string& key, ConditioningRange& value) {
@@ -327,8 +336,11 @@ class Writer {
   void integers(const std::string& key, const std::vector<int>& values, int64_t, int64_t) {
     line(key, fmt::format("[{}]", fmt::join(values, ", ")));
   }
-  void modality(const std::string& key, const Modality& value) {
-    line(key, value == Modality::perspective ? "\"perspective\"" : "\"vector\"");
+  template <typename Enum>
+  void choice(const std::string& key, const Enum& value, const Choices<Enum>& choices) {
+    for (const auto& [name, chosen] : choices) {
+      if (chosen == value) text(key, name);
+    }
   }
   void range(const std::string& key, const ConditioningRange& value) {
     line(key, fmt::format("[{}, {}]", shortest(value.low), shortest(value.high)));
@@ -501,9 +513,17 @@ std::string drawn_by(const std::string& backend) {
 }
 
 bool may_differ(const std::string& key, const Config& saved, const Config& now) {
-  static const std::set<std::string> kHarmless{
-      "train.updates", "train.checkpoint_every", "train.forward_chunk", "run.num_threads",  "run.device",
-      "render.rig",    "render.width_px",        "render.height_px",    "simulator.backend"};
+  static const std::set<std::string> kHarmless{"train.updates",
+                                               "train.checkpoint_every",
+                                               "train.checkpoint_minutes",
+                                               "train.forward_chunk",
+                                               "train.images",
+                                               "run.num_threads",
+                                               "run.device",
+                                               "render.rig",
+                                               "render.width_px",
+                                               "render.height_px",
+                                               "simulator.backend"};
   if (kHarmless.count(key) || key.starts_with("evaluate.")) return true;
   if (key == "render.backend" && drawn_by(saved.render.backend) == drawn_by(now.render.backend)) return true;
   // The vector policy reads nothing of it, before and now, since the modality may not differ.
@@ -534,8 +554,9 @@ Rig rig_of(const Config& config) {
                                    : load_rig(config.render.rig);
 }
 
-RendererConfig renderer_config(const Config& config, const Rig& rig) {
+RendererConfig renderer_config(const Config& config, const Rig& rig, Device device) {
   RendererConfig result;
+  result.device = device;
   result.rig = rig;
   result.num_threads = config.run.num_threads;
   result.line_floor_px = static_cast<float>(config.render.line_floor_px);
@@ -543,17 +564,9 @@ RendererConfig renderer_config(const Config& config, const Rig& rig) {
   return result;
 }
 
-void check_devices(const Config& config) {
-  PICTURA_CHECK(!config.run.device.starts_with("cuda"),
-                "run.device: \"{}\": learning on a CUDA device is missing from this version: set it to \"cpu\"",
-                config.run.device);
-  PICTURA_CHECK(config.simulator.backend != "cuda",
-                "simulator.backend: \"cuda\" keeps observations on the device, and learning there is missing from this "
-                "version: set it to \"cpu\"; render.backend may be \"cuda\"");
-}
-
-SimulatorConfig simulator_config(const Config& config) {
+SimulatorConfig simulator_config(const Config& config, Device device) {
   SimulatorConfig result;
+  result.device = device;
   result.seed = config.run.seed;
   result.num_threads = config.run.num_threads;
   result.episode_steps = config.simulator.episode_steps;
@@ -570,8 +583,8 @@ SimulatorConfig simulator_config(const Config& config) {
   return result;
 }
 
-SimulatorConfig evaluation_simulator_config(const Config& config, int steps) {
-  SimulatorConfig result = simulator_config(config);
+SimulatorConfig evaluation_simulator_config(const Config& config, int steps, Device device) {
+  SimulatorConfig result = simulator_config(config, device);
   result.episode_steps = steps;
   result.reset_inactive_fraction = 2;
   result.fixed_lights = true;

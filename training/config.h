@@ -14,6 +14,9 @@ namespace pictura {
 
 enum class Modality { perspective, vector };
 
+/// Of the network on a CUDA device: IEEE fp32; products in TF32; layers in bf16. See training/precision.h.
+enum class Precision { fp32, tf32, bf16 };
+
 struct Config {
   struct Run {
     uint64_t seed = 1;            // names the whole run
@@ -75,6 +78,10 @@ struct Config {
     double adv_filter_threshold = 0.01;  // of the running max |advantage|; 0: keep everything
     double adv_filter_ema = 0.25;        // weight of the newest rollout in the running max
     int64_t checkpoint_every = 20;       // updates
+    double checkpoint_minutes = 2;       // or as soon as these have passed
+    Precision precision = Precision::bf16;
+    /// Of a rollout: kept, or redrawn from its scenes where they are read; auto: kept on the host, redrawn on a device.
+    std::string images = "auto";
   } train;
 
   struct Evaluate {
@@ -112,18 +119,15 @@ std::string first_difference(const Config& saved, const Config& now);
 /// The rig that render describes.
 Rig rig_of(const Config& config);
 
-/// What the renderer is told: everything about an image that the policy depends on, with a rig of its run.
-RendererConfig renderer_config(const Config& config, const Rig& rig);
-
-/// Throws Error naming the key and what is missing for what this build cannot compute: learning on a device, or a
-/// simulator there while learning is on the host.
-void check_devices(const Config& config);
+/// What the renderer is told: everything about an image that the policy depends on, with a rig of its run. `device` is
+/// where the network computes.
+RendererConfig renderer_config(const Config& config, const Rig& rig, Device device = {});
 
 /// What the simulator is told for training: entity sets only for the vector modality.
-SimulatorConfig simulator_config(const Config& config);
+SimulatorConfig simulator_config(const Config& config, Device device = {});
 
 /// The same for evaluation (paper, appendix, evaluation protocol): episodes of `steps` that nothing ends early, fixed
 /// conditioning, fixed lights.
-SimulatorConfig evaluation_simulator_config(const Config& config, int steps);
+SimulatorConfig evaluation_simulator_config(const Config& config, int steps, Device device = {});
 
 }  // namespace pictura

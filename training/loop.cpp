@@ -1,105 +1,133 @@
 // The training loop: collect a rollout, improve the policy on it, log and save.
 #include "pictura/training/loop.h"
 
+#include <algorithm>
+
 #include <ATen/Parallel.h>
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/parallel_for.h"
+#include "pictura/training/precision.h"
 #include "pictura/training/run.h"
 #include "pictura/training/run_log.h"
+#include "pictura/training/torch_device.h"
 
 namespace pictura {
 
 namespace {
 
+// What the policy makes of some active slots at a step that has been recorded.
+Decision decide(Run* run, int64_t step, const at::Tensor& slots) {
+  const at::Tensor rows = run->rollout.rows_of(step, slots);
+  const auto observe = [&](int64_t begin, int64_t count) {
+    return run->rollout.observations.gather(rows.narrow(0, begin, count));
+  };
+  return decide(run->policy, rows.size(0), run->config.train.forward_chunk, observe, &run->timer);
+}
+
 // Fills the rollout from the policy's own driving; false when ^C came.
-bool collect(Run* run, PhaseTimes* times_out) {
-  const Config& config = run->config;
+bool collect(Run* run) {
   Rollout& rollout = run->rollout;
-  const int64_t num_steps = rollout.num_steps();
-  Stopwatch watch;
-  rollout.begin();
-  for (int64_t step = 0; step < num_steps; ++step) {
+  Simulator& simulator = *run->simulator;
+  const auto record = [&](int64_t step) {
+    const at::Tensor slots = active_slots(simulator.controller_input(), {}, run->executor.get());
+    rollout.observations.record(step, slots);
+    return slots;
+  };
+  rollout.values.zero_();
+  for (int64_t step = 0; step < rollout.num_steps(); ++step) {
     if (interrupted()) return false;
 
     // Act.
-    watch.restart();
-    const Decision decision = decide(run->policy, row_of(rollout.observation, step), config.train.forward_chunk);
+    const at::Tensor slots = record(step);
+    const Decision decision = decide(run, step, slots);
     const Span<int32_t> actions = rollout.actions_at(step);
-    choose_actions(decision.log_probs, run->simulator->controller_input(), config.run.seed, /*argmax=*/false, actions);
-    const at::Tensor chosen = rollout.actions.select(0, step).to(at::kLong).unsqueeze(1);
-    rollout.values.select(0, step).copy_(decision.value);
-    rollout.log_probs.select(0, step).copy_(decision.log_probs.gather(1, chosen).squeeze(1));
-    times_out->forward_s += watch.restart();
+    run->executor->choose_actions(simulator.controller_input(), span_of<const int64_t>(slots),
+                                  span_of<const float>(decision.log_probs),
+                                  {.argmax = false, .seed = run->config.run.seed}, actions);
+    const at::Tensor chosen = rollout.actions.select(0, step).index_select(0, slots).to(at::kLong).unsqueeze(1);
+    rollout.values.select(0, step).index_copy_(0, slots, decision.value);
+    rollout.log_probs.select(0, step).index_copy_(0, slots, decision.log_probs.gather(1, chosen).squeeze(1));
 
-    // Step, and observe.
-    const StepResult result = run->simulator->step(Span<const int32_t>(actions));
-    times_out->simulate_s += watch.restart();
-    rollout.set_result(step, result);
-    run->observer.observe(row_of(rollout.observation, step + 1));
+    // Step.
+    const PhaseTimer::Scope timed(&run->timer, Phase::simulate);
+    rollout.set_result(step, simulator.step(Array(actions.data(), {rollout.num_slots()}, run->device)), run->device);
   }
   // The value of what is seen last, from which the last transitions bootstrap.
-  const Decision last = decide(run->policy, row_of(rollout.observation, num_steps), config.train.forward_chunk);
-  rollout.values.select(0, num_steps).copy_(last.value);
+  const at::Tensor slots = record(rollout.num_steps());
+  const Decision last = decide(run, rollout.num_steps(), slots);
+  rollout.values.select(0, rollout.num_steps()).index_copy_(0, slots, last.value);
+  simulator.check();
   return true;
 }
 
 // Improves the policy on the rollout.
 UpdateStats improve(Run* run) {
-  const Config& config = run->config;
-  run->rollout.compute_advantages(config.train.gamma, config.train.gae_lambda);
-  return ppo_update(run->policy, run->rollout, config.train, config.run.seed, run->update, &run->optimizer,
-                    &run->filter);
+  const Config::Train& config = run->config.train;
+  run->rollout.compute_advantages(config.gamma, config.gae_lambda, run->executor.get());
+  return ppo_update(run->policy, run->rollout, config, run->config.run.seed, run->update, run->executor.get(),
+                    &run->optimizer, &run->filter, &run->timer);
 }
 
 }  // namespace
 
 TrainReport train(const TrainOptions& options) {
+  const Stopwatch since_start;
   const Config config = load_config(options.config_path, options.overrides);
-  check_devices(config);
+  const Device device = open_learning_device(config);
   make_output_folder(options.out_folder);
   at::set_num_threads(resolve_num_threads(config.run.num_threads));
+  set_float32_products(config.train.precision);
 
   TrainReport report;
   report.checkpoint = options.out_folder + "/checkpoint.ckpt";
-  Run run(config);
-  report.device = "cpu";
+  Run run(config, device);
+  report.device = name_of(device);
   report.simulator = run.simulator->name();
   if (run.renderer) report.renderer = run.renderer->name();
   std::vector<RecentUpdate> recent;
   if (options.resume) {
     const Checkpoint saved = read_checkpoint(report.checkpoint);
-    run.restore(saved);
+    const std::string why_new_episodes = run.restore(saved);
+    if (!why_new_episodes.empty() && options.on_notice) {
+      options.on_notice("the saved episodes cannot go on, new ones begin: " + why_new_episodes);
+    }
     recent = saved.recent;
   } else {
     run.simulator->reset();
-    run.save(options.out_folder + "/untrained.ckpt", recent, run.simulator->save());
+    run.save(options.out_folder + "/untrained.ckpt", recent);
   }
   write_file(options.out_folder + "/config.toml", to_toml(config));
   RunLog log(options.out_folder, config, run.update, run.agent_steps, recent);
 
-  run.observer.observe(row_of(run.rollout.observation, config.train.num_steps));
+  Stopwatch since_saved;
+  double longest_update_s = 0;
   while (run.update < config.train.updates && !report.interrupted) {
-    const std::vector<uint8_t> simulator_before = run.simulator->save();
+    // A fifth more, for updates that take longer than those before, and for saving.
+    if (options.minutes > 0 && since_start.seconds() + 1.2 * longest_update_s > 60 * options.minutes) {
+      report.out_of_time = true;
+      break;
+    }
+    const std::unique_ptr<StateSnapshot> before = run.simulator->snapshot();
     const SimulatorTotals totals_before = run.simulator->totals();
-    const double render_before_s = run.observer.render_s();
     UpdateRecord record;
     Stopwatch watch;
-    if (!collect(&run, &record.times)) {
+    if (!collect(&run)) {
       // ^C within a rollout: what is saved is the state at its start, from which resuming is exact.
-      run.save(report.checkpoint, log.recent(), simulator_before);
+      run.simulator->restore(*before);
       report.interrupted = true;
       break;
     }
-    record.times.rollout_s = watch.restart();
-    record.times.render_s = run.observer.render_s() - render_before_s;
     record.totals = run.simulator->totals();
     record.totals.subtract(totals_before);
+    record.rollout_s = watch.restart();
 
     record.stats = improve(&run);
-    record.times.optimize_s = watch.restart();
+    record.update_s = watch.restart();
+    record.phases_s = run.timer.take();
+    longest_update_s = std::max(longest_update_s, record.rollout_s + record.update_s);
 
     ++run.update;
     run.agent_steps += record.totals.agent_steps;
@@ -107,12 +135,15 @@ TrainReport train(const TrainOptions& options) {
     const TrainProgress progress = log.add(run.update, run.agent_steps, record);
     report.agent_steps_per_s = progress.agent_steps_per_s;
     report.interrupted = interrupted();
-    if (report.interrupted || run.update == config.train.updates || run.update % config.train.checkpoint_every == 0) {
-      run.save(report.checkpoint, log.recent(), run.simulator->save());
+    if (run.update % config.train.checkpoint_every == 0 ||
+        since_saved.seconds() > 60 * config.train.checkpoint_minutes) {
+      run.save(report.checkpoint, log.recent());
+      since_saved.restart();
     }
     if (options.on_progress) options.on_progress(progress);
   }
 
+  run.save(report.checkpoint, log.recent());
   write_safetensors(options.out_folder + "/policy.safetensors", run.policy.parameters(), to_toml(config));
   report.agent_steps = run.agent_steps;
   report.updates = run.update;

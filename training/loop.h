@@ -24,21 +24,23 @@ struct TrainOptions {
   std::vector<std::string> overrides;  // "train.updates=2"
   std::string out_folder;
   bool resume = false;  // go on from out_folder's checkpoint
+  double minutes = 0;   // of wall time, start-up included, after which no update is begun; 0: no limit
   std::function<void(const TrainProgress&)> on_progress;
+  std::function<void(const std::string&)> on_notice;  // what a person should know, and no error is
 };
 
 struct TrainReport {
   int64_t agent_steps = 0, updates = 0;
   double agent_steps_per_s = 0, episode_return = 0, km_driven = 0;
-  bool interrupted = false;
+  bool interrupted = false, out_of_time = false;
   std::string checkpoint, policy_hash;
   std::string device, simulator, renderer;  // what learnt, simulated and drew; no renderer where there are no images
 };
 
 /// Trains as the configuration says and writes into out_folder: config.toml (resolved), untrained.ckpt (the policy
 /// before its first update), checkpoint.ckpt, policy.safetensors, progress.csv and TensorBoard events. After ^C
-/// (common/support/interrupt.h) it saves and returns with `interrupted`. Throws Error naming file and key for bad
-/// input.
+/// (common/support/interrupt.h) it saves and returns with `interrupted`; where another update, as long as the longest
+/// so far, would not end within `minutes`, with `out_of_time`. Throws Error naming file and key for bad input.
 TrainReport train(const TrainOptions& options);
 
 }  // namespace pictura

@@ -1,64 +1,40 @@
 #include "pictura/training/observation.h"
 
-#include <chrono>
-#include <cstring>
-
 #include "pictura/common/error.h"
+#include "pictura/training/torch_device.h"
 
 namespace pictura {
 
 namespace {
 
-// Copies an array in host memory to a tensor of as many elements, if it is defined.
+// An array of the view as a tensor of that shape. Throws Error naming the array where it has another size.
 template <typename T>
-void copy_array(const char* name, Span<T> array, const at::Tensor& out) {
-  if (!out.defined()) return;
-  PICTURA_CHECK(array.size() == static_cast<size_t>(out.numel()),
-                "observation: {}: expected {} numbers, for {} agents, got {}", name, out.numel(), out.size(0),
-                array.size());
-  constexpr at::ScalarType kType = std::is_same_v<std::remove_const_t<T>, float> ? at::kFloat : at::kInt;
-  // from_blob takes no pointer to const; the copy reads alone.
-  out.copy_(at::from_blob(const_cast<std::remove_const_t<T>*>(array.data()), out.sizes(), at::TensorOptions(kType)));
+at::Tensor checked_tensor(const char* name, Span<T> array, Device device, at::IntArrayRef shape) {
+  PICTURA_CHECK(array.size() == static_cast<size_t>(c10::multiply_integers(shape)),
+                "observation: {}: expected {} numbers, for {} agents, got {}", name, c10::multiply_integers(shape),
+                shape[0], array.size());
+  return tensor_over(array, device, shape);
 }
 
-std::vector<ImageBlock> image_blocks(const Rig& rig, int64_t rows, int64_t slots) {
-  std::vector<ImageBlock> blocks;
-  for (const BlockLayout& block : image_layout(rig, slots, PixelFormat::u8).blocks) {
-    const auto cameras = static_cast<int64_t>(block.cameras.size());
-    blocks.push_back({at::empty({rows, slots, cameras, 3, block.size.height_px, block.size.width_px}, at::kByte),
-                      {block.cameras.begin(), block.cameras.end()}});
-  }
-  return blocks;
-}
-
-// Moves element i of `pixels` [slots, ...] to slots[i], which ascend, and blackens all others. From the end, so that
-// nothing is overwritten before it has moved.
-void spread(const std::vector<int64_t>& slots, const at::Tensor& pixels) {
-  const auto bytes = static_cast<size_t>(pixels.stride(0));
-  uint8_t* const first = pixels.data_ptr<uint8_t>();
-  auto element = [&](int64_t i) { return first + static_cast<size_t>(i) * bytes; };
-  int64_t end = pixels.size(0);
-  for (auto i = static_cast<int64_t>(slots.size()); i-- > 0;) {
-    const int64_t slot = slots[static_cast<size_t>(i)];
-    if (slot != i) std::memcpy(element(slot), element(i), bytes);
-    std::memset(element(slot + 1), 0, static_cast<size_t>(end - slot - 1) * bytes);
-    end = slot;
-  }
-  std::memset(first, 0, static_cast<size_t>(end) * bytes);
+std::vector<int64_t> shape_of(const ObservationArray& array, std::vector<int64_t> batch) {
+  if (is_set(array))
+    batch.insert(batch.end(), {array.rows, array.features});
+  else
+    batch.push_back(array.rows * array.features);
+  return batch;
 }
 
 }  // namespace
 
-Observation allocate_observations(const Config& config, const Rig& rig, int64_t rows, int64_t slots) {
+Observation allocate_observations(const Config& config, int64_t rows, int64_t slots, Device device) {
   Observation result;
   for (size_t i = 0; i < std::size(kObservationArrays); ++i) {
     const ObservationArray& array = kObservationArrays[i];
     if (!config.reads(array.part)) continue;
-    const at::ScalarType type = array.type == ElementType::f32 ? at::kFloat : at::kInt;
-    result.*kObservationTensors[i] = is_set(array) ? at::empty({rows, slots, array.rows, array.features}, type)
-                                                   : at::empty({rows, slots, array.rows * array.features}, type);
+    const at::TensorOptions options =
+        at::TensorOptions(array.type == ElementType::f32 ? at::kFloat : at::kInt).device(torch_device(device));
+    result.*kObservationTensors[i] = at::empty(shape_of(array, {rows, slots}), options);
   }
-  if (config.reads_images()) result.images = image_blocks(rig, rows, slots);
   return result;
 }
 
@@ -66,69 +42,75 @@ Observation row_of(const Observation& rows, int64_t row) {
   return rows.map([row](const at::Tensor& t) { return t.select(0, row); });
 }
 
-void copy_arrays(const ObservationView& view, const Observation& out) {
-#define X(name, type, rows, features, part, comment) copy_array(#name, view.name, out.name);
-  PICTURA_OBSERVATION_ARRAYS(X)
+void copy_arrays(const ObservationView& view, Device device, const Observation& out){
+#define X(name, type, rows, features, part, comment) \
+  if (out.name.defined()) out.name.copy_(checked_tensor(#name, view.name, device, out.name.sizes()));
+    PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
 }
 
-void draw_images(const SceneBatch& scene, Span<const View> views, const std::vector<int64_t>& slots, Renderer* renderer,
-                 const Observation& out) {
-  const ImageLayout layout = image_layout(renderer->config().rig, out.ego.size(0), PixelFormat::u8);
+Observation select_arrays(const Config& config, const ObservationView& view, Device device, int64_t batch,
+                          const at::Tensor& indices) {
+  Observation result;
+  const ObservationArray* array = kObservationArrays;
+#define X(name, type, rows, features, part, comment)                                                            \
+  if (config.reads(part)) {                                                                                     \
+    result.name = checked_tensor(#name, view.name, device, shape_of(*array, {batch})).index_select(0, indices); \
+  }                                                                                                             \
+  ++array;
+  PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
+  return result;
+}
+
+std::vector<ImageBlock> allocate_images(const Rig& rig, std::vector<int64_t> batch, Device device) {
+  std::vector<ImageBlock> blocks;
+  for (const BlockLayout& block : image_layout(rig, 1, PixelFormat::u8).blocks) {
+    std::vector<int64_t> shape = batch;
+    shape.insert(shape.end(),
+                 {static_cast<int64_t>(block.cameras.size()), 3, block.size.height_px, block.size.width_px});
+    blocks.push_back({at::empty(shape, at::TensorOptions(at::kByte).device(torch_device(device))),
+                      {block.cameras.begin(), block.cameras.end()}});
+  }
+  return blocks;
+}
+
+std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> views, Renderer* renderer) {
+  const Rig& rig = renderer->config().rig;
+  const auto num_views = static_cast<int64_t>(views.size());
+  const ImageLayout layout = image_layout(rig, num_views, PixelFormat::u8);
+  std::vector<ImageBlock> blocks = allocate_images(rig, {num_views}, renderer->device());
   std::vector<CameraImages> cameras;
   for (const CameraLayout& camera : layout.cameras) {
     // Each block is a tensor of its own.
     const auto block = static_cast<size_t>(camera.block);
-    uint8_t* const first = out.images[block].pixels.data_ptr<uint8_t>() + (camera.offset - layout.blocks[block].offset);
+    uint8_t* const first = blocks[block].pixels.data_ptr<uint8_t>() + (camera.offset - layout.blocks[block].offset);
     cameras.push_back({camera.size.width_px, camera.size.height_px, first, camera.view_stride});
   }
-  std::vector<View> drawn;
-  for (const int64_t slot : slots) drawn.push_back(views[static_cast<size_t>(slot)]);
-  renderer->render(scene, drawn, {Device{}, PixelFormat::u8, static_cast<int>(drawn.size()), cameras});
-  for (const ImageBlock& block : out.images) spread(slots, block.pixels);
+  renderer->render(scene, views, {renderer->device(), PixelFormat::u8, static_cast<int>(num_views), cameras});
+  return blocks;
 }
 
-std::vector<int64_t> active_slots(const ControllerInput& input, Span<const uint8_t> mask) {
-  std::vector<int64_t> slots;
-  for (size_t slot = 0; slot < input.slots.world_of_slot.size(); ++slot) {
-    const bool is_active = static_cast<AgentStatus>(input.state.status[slot]) == AgentStatus::active;
-    if (is_active && (mask.empty() || mask[slot])) slots.push_back(static_cast<int64_t>(slot));
-  }
-  return slots;
+at::Tensor active_slots(const ControllerInput& input, Span<const uint8_t> mask, LearnerExecutor* executor) {
+  const auto num_slots = static_cast<int64_t>(input.slots.world_of_slot.size());
+  const at::Tensor slots = at::empty({num_slots}, at::TensorOptions(at::kLong).device(torch_device(input.device)));
+  return slots.narrow(0, 0, executor->select_active(input, mask, span_of<int64_t>(slots)));
 }
 
-Observer::Observer(const Config& config, Simulator* simulator, Renderer* renderer)
-    : config_(config), simulator_(*simulator), renderer_(renderer) {
-  PICTURA_CHECK(!config.reads_images() || renderer, "training: a policy that reads images needs a renderer");
-  const Device device = simulator->controller_input().device;
-  PICTURA_CHECK(
-      device.is_host() && (!renderer || renderer->device().is_host()),
-      "training: simulator '{}' works on {} and this build learns on the host: set simulator.backend to \"cpu\"",
-      simulator->name(), name_of(device));
+constexpr auto kViewBytes = static_cast<int64_t>(sizeof(View));
+
+SelectedViews::SelectedViews(int64_t size, Device device)
+    : bytes_(at::empty({size, kViewBytes}, at::TensorOptions(at::kByte).device(torch_device(device)))) {}
+
+SelectedViews::SelectedViews(Span<const View> views, Device device, const at::Tensor& indices)
+    : SelectedViews(indices.size(0), device) {
+  const Span<const uint8_t> bytes(reinterpret_cast<const uint8_t*>(views.data()), views.size() * sizeof(View));
+  at::index_select_out(bytes_, tensor_over(bytes, device, {static_cast<int64_t>(views.size()), kViewBytes}), 0,
+                       indices);
 }
 
-Observation Observer::allocate(int64_t rows) const {
-  return allocate_observations(config_, renderer_ ? renderer_->config().rig : Rig{}, rows, simulator_.num_slots());
-}
-
-double Observer::bytes_per_row() const {
-  double bytes = 0;
-  allocate(0).map([&](const at::Tensor& t) {
-    double row = static_cast<double>(t.element_size());
-    for (const int64_t size : t.sizes().slice(1)) row *= static_cast<double>(size);
-    bytes += row;
-    return t;
-  });
-  return bytes;
-}
-
-void Observer::observe(const Observation& out) {
-  const ControllerInput input = simulator_.controller_input();
-  copy_arrays(input.observations, out);
-  if (!config_.reads_images()) return;
-  const auto start = std::chrono::steady_clock::now();
-  draw_images(input.scene, input.views, active_slots(input), renderer_, out);
-  render_s_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+Span<View> SelectedViews::views() const {
+  return {reinterpret_cast<View*>(bytes_.data_ptr<uint8_t>()), static_cast<size_t>(bytes_.size(0))};
 }
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// What a policy sees, as tensors: the simulator's arrays and images that are drawn in place.
+// What a policy sees, as tensors: the simulator's arrays, and images.
 #pragma once
 
 #include <memory>
@@ -10,6 +10,7 @@
 #include "pictura/simulator/observation_arrays.h"
 #include "pictura/simulator/simulator.h"
 #include "pictura/training/config.h"
+#include "pictura/training/rules/learner_executor.h"
 
 namespace pictura {
 
@@ -59,48 +60,40 @@ constexpr int entity_set_of(size_t array_index) {
 }
 static_assert(entity_set_of(std::size(kObservationArrays)) == kNumEntitySets, "the list and EntitySet have equal sets");
 
-/// Uninitialised storage, [rows, slots, ...], for what this configuration's policy reads; images are of the rig.
-Observation allocate_observations(const Config& config, const Rig& rig, int64_t rows, int64_t slots);
+/// Uninitialised storage for the arrays that this configuration's policy reads, [rows, slots, ...].
+Observation allocate_observations(const Config& config, int64_t rows, int64_t slots, Device device);
 
 /// One row of storage whose tensors are [rows, ...].
 Observation row_of(const Observation& rows, int64_t row);
 
-/// Copies arrays in host memory to the defined tensors, [slots, ...]. Throws Error naming an array of another size.
-void copy_arrays(const ObservationView& view, const Observation& out);
+/// Copies arrays that lie on `device` to the defined tensors, [slots, ...], which lie there too. Throws Error naming an
+/// array of another size.
+void copy_arrays(const ObservationView& view, Device device, const Observation& out);
 
-/// Draws the images of some slots, in ascending order, into out.images, [slots, ...]; those of all others are black.
-void draw_images(const SceneBatch& scene, Span<const View> views, const std::vector<int64_t>& slots, Renderer* renderer,
-                 const Observation& out);
+/// Some agents' part of arrays that lie on `device`: those that this configuration's policy reads. indices: i64 [n], in
+/// [0, batch). Throws Error naming an array that is not one of `batch` agents.
+Observation select_arrays(const Config& config, const ObservationView& view, Device device, int64_t batch,
+                          const at::Tensor& indices);
 
-/// Slots whose agents are neither halted nor absent and that the mask has (empty: all), in ascending order.
-std::vector<int64_t> active_slots(const ControllerInput& input, Span<const uint8_t> mask = {});
+/// Uninitialised memory for images of a rig, [batch..., cameras of one size, 3, height, width].
+std::vector<ImageBlock> allocate_images(const Rig& rig, std::vector<int64_t> batch, Device device);
 
-/// From a simulator's present state to the tensors that a policy reads.
-class Observer {
+/// The images of these views, [views, ...], in the renderer's memory.
+std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> views, Renderer* renderer);
+
+/// The slots whose agents are active and that the mask [slots] has (empty: all), i64 [n], in ascending order.
+at::Tensor active_slots(const ControllerInput& input, Span<const uint8_t> mask, LearnerExecutor* executor);
+
+/// Views in the memory of a device.
+class SelectedViews {
  public:
-  /// Both must outlive it; policies without images need no renderer. Throws Error when either is on a device that this
-  /// build's torch cannot reach.
-  Observer(const Config& config, Simulator* simulator, Renderer* renderer);
-
-  /// Uninitialised storage for `rows` observations of all slots, [rows, slots, ...].
-  Observation allocate(int64_t rows) const;
-
-  /// Of one such row.
-  double bytes_per_row() const;
-
-  /// Writes what every slot sees now into one row of such storage. Images are drawn in place, those of active agents
-  /// alone: transitions of the others are not learnt from, and their images are black. (An agent whose episode is cut
-  /// off is still active in its final observation, from which its value is bootstrapped.)
-  void observe(const Observation& row_out);
-
-  /// Seconds spent drawing so far.
-  double render_s() const { return render_s_; }
+  SelectedViews(int64_t size, Device device);
+  /// Those of `views` that `indices`, i64 [n], name.
+  SelectedViews(Span<const View> views, Device device, const at::Tensor& indices);
+  Span<View> views() const;
 
  private:
-  const Config config_;
-  Simulator& simulator_;
-  Renderer* renderer_;
-  double render_s_ = 0;
+  at::Tensor bytes_;  // u8 [n, sizeof(View)]
 };
 
 }  // namespace pictura

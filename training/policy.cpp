@@ -8,15 +8,16 @@
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
 #include "pictura/common/support/hash.h"
-#include "pictura/training/rules/choose_action.h"
+#include "pictura/training/precision.h"
+#include "pictura/training/torch_device.h"
 
 namespace pictura {
 
 /// Draws parameters in the order of the calls and keeps them by name.
 class ParameterMaker {
  public:
-  ParameterMaker(uint64_t seed, at::ScalarType type, std::vector<NamedTensor>* parameters_out)
-      : seed_(seed), type_(type), parameters_(parameters_out) {}
+  ParameterMaker(uint64_t seed, const at::TensorOptions& options, std::vector<NamedTensor>* parameters_out)
+      : seed_(seed), options_(options), parameters_(parameters_out) {}
 
   /// Normal with standard deviation gain / sqrt(fan_in), fan_in being all dimensions but the first.
   at::Tensor normal(const std::string& name, at::IntArrayRef shape, double gain) {
@@ -49,14 +50,14 @@ class ParameterMaker {
 
  private:
   at::Tensor add(const std::string& name, const at::Tensor& drawn) {
-    at::Tensor parameter = drawn.to(type_);
+    at::Tensor parameter = drawn.to(options_);
     parameter.requires_grad_();
     parameters_->push_back({name, parameter});
     return parameter;
   }
 
   uint64_t seed_;
-  at::ScalarType type_;
+  at::TensorOptions options_;  // type and device of what is kept
   std::vector<NamedTensor>* parameters_;
 };
 
@@ -119,8 +120,10 @@ class VectorEncoder final : public SceneEncoder {
 /// are averaged; all cameras concatenated and projected to the width of the four sets that they replace.
 class PerspectiveEncoder final : public SceneEncoder {
  public:
-  PerspectiveEncoder(const Config::PolicySection& config, int num_cameras, ParameterMaker* make)
-      : config_(config), num_cameras_(num_cameras), width_(config.conv_channels.back()) {
+  /// Images are converted to `image_type`.
+  PerspectiveEncoder(const Config::PolicySection& config, int num_cameras, at::ScalarType image_type,
+                     ParameterMaker* make)
+      : config_(config), num_cameras_(num_cameras), image_type_(image_type), width_(config.conv_channels.back()) {
     int64_t in = 3;
     for (size_t i = 0; i < config.conv_channels.size(); ++i) {
       const int64_t out = config.conv_channels[i], kernel = config.conv_kernels[i];
@@ -183,18 +186,21 @@ class PerspectiveEncoder final : public SceneEncoder {
 
   at::Tensor pool(const ImageBlock& block) const {
     const int64_t batch = block.pixels.size(0), cameras = block.pixels.size(1), heads = config_.attention_heads;
-    at::Tensor x =
-        block.pixels.flatten(0, 1).to(queries_.scalar_type()).div(255.0).contiguous(at::MemoryFormat::ChannelsLast);
+    at::Tensor x = block.pixels.flatten(0, 1).to(image_type_, /*non_blocking=*/false, /*copy=*/false,
+                                                 at::MemoryFormat::ChannelsLast);
     for (size_t i = 0; i < convolutions_.size(); ++i) {
-      x = gelu(at::conv2d(x, convolutions_[i].weight, convolutions_[i].bias, {config_.conv_strides[i]},
-                          {config_.conv_kernels[i] / 2}));
+      // Pixels are 0 to 255. Scaling a few weights is cheaper than scaling them.
+      const at::Tensor weight = i == 0 ? convolutions_[i].weight / 255.0 : convolutions_[i].weight;
+      x = gelu(at::conv2d(x, weight, convolutions_[i].bias, {config_.conv_strides[i]}, {config_.conv_kernels[i] / 2}));
     }
     const at::Tensor where = apply(position_, position_features(x.size(2), x.size(3), queries_.options()));
     const at::Tensor tokens = apply_norm(token_norm_, x.flatten(2).transpose(1, 2) + where);  // [images, h w, width]
 
     // [.., n, width] -> [.., heads, n, width / heads]
     auto split = [&](const at::Tensor& t) { return t.unflatten(-1, {heads, width_ / heads}).transpose(-3, -2); };
-    const at::Tensor queries = queries_.index_select(0, at::tensor(block.cameras, at::kLong));
+    std::vector<at::Tensor> of_cameras;
+    for (const int64_t camera : block.cameras) of_cameras.push_back(queries_.select(0, camera));
+    const at::Tensor queries = at::stack(of_cameras);
     const at::Tensor q = split(apply(query_, apply_norm(query_norm_, queries)))
                              .unsqueeze(0)
                              .expand({batch, cameras, heads, config_.num_queries, width_ / heads})
@@ -209,6 +215,7 @@ class PerspectiveEncoder final : public SceneEncoder {
 
   const Config::PolicySection config_;
   const int num_cameras_;
+  const at::ScalarType image_type_;
   const int64_t width_;
   std::vector<Policy::Linear> convolutions_;  // weights [out, in, kernel, kernel]
   at::Tensor queries_;
@@ -217,12 +224,13 @@ class PerspectiveEncoder final : public SceneEncoder {
 };
 
 Policy::Policy(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type,
-               bool reads_walls)
-    : type_(type) {
-  ParameterMaker make(seed, type, &parameters_);
+               bool reads_walls, Device device, Precision precision)
+    : type_(type), precision_(precision) {
+  ParameterMaker make(seed, at::TensorOptions(type).device(torch_device(device)), &parameters_);
   const bool sees_images = config.modality == Modality::perspective;
   if (sees_images)
-    scene_ = std::make_unique<PerspectiveEncoder>(config, num_cameras, &make);
+    scene_ = std::make_unique<PerspectiveEncoder>(config, num_cameras,
+                                                  precision == Precision::bf16 ? at::kBFloat16 : type, &make);
   else
     scene_ = std::make_unique<VectorEncoder>(config, reads_walls, &make);
   ego_features_ = sees_images ? kEgoFeatures - 2 : kEgoFeatures;
@@ -240,10 +248,15 @@ Policy::Policy(const Config::PolicySection& config, int num_cameras, uint64_t se
 }
 
 Policy::Output Policy::forward(const Observation& o) const {
-  at::Tensor x = at::cat({scene_->forward(o), encode(ego_, o.ego.narrow(1, 0, ego_features_)),
-                          encode(conditioning_, at::cat({o.conditioning, o.waypoints}, 1))},
-                         1);
-  for (const Linear& layer : backbone_) x = gelu(apply(layer, x));
+  at::Tensor x;
+  {
+    const LayerPrecision precision(precision_);
+    x = at::cat({scene_->forward(o), encode(ego_, o.ego.narrow(1, 0, ego_features_)),
+                 encode(conditioning_, at::cat({o.conditioning, o.waypoints}, 1))},
+                1);
+    for (const Linear& layer : backbone_) x = gelu(apply(layer, x));
+  }
+  x = x.to(type_);
   return {apply(actor_, x), apply(critic_, x).squeeze(1)};
 }
 
@@ -262,38 +275,33 @@ std::string Policy::hash() const {
   return hash.hex();
 }
 
-Policy make_policy(const Config& config, const Rig& rig) {
+Policy make_policy(const Config& config, const Rig& rig, Device device) {
   return Policy(config.policy, static_cast<int>(rig.cameras.size()), config.run.seed, at::kFloat,
-                config.reads(ObservationPart::walls));
+                config.reads(ObservationPart::walls), device,
+                device.is_host() ? Precision::fp32 : config.train.precision);
 }
 
-Decision decide(const Policy& policy, const Observation& observation, int64_t chunk) {
+Decision decide(const Policy& policy, int64_t batch, int64_t chunk,
+                const std::function<Observation(int64_t begin, int64_t count)>& observe, PhaseTimer* timer) {
   const at::NoGradGuard no_grad;
-  const int64_t batch = observation.ego.size(0);
-  std::vector<at::Tensor> logits, values;
+  const at::TensorOptions options = policy.parameters().front().value.options().requires_grad(false);
+  Decision decision{at::empty({batch, kNumActions}, options), {}, at::empty({batch}, options)};
   for (int64_t begin = 0; begin < batch; begin += chunk) {
     const int64_t count = std::min(chunk, batch - begin);
-    const Policy::Output output =
-        policy.forward(observation.map([&](const at::Tensor& t) { return t.narrow(0, begin, count); }));
-    logits.push_back(output.logits);
-    values.push_back(output.value);
+    const Observation observation = observe(begin, count);
+    const PhaseTimer::Scope timed(timer, Phase::forward);
+    const Policy::Output output = policy.forward(observation);
+    decision.logits.narrow(0, begin, count).copy_(output.logits);
+    decision.value.narrow(0, begin, count).copy_(output.value);
   }
-  Decision decision{at::cat(logits), {}, at::cat(values)};
   decision.log_probs = at::log_softmax(decision.logits, 1);
   return decision;
 }
 
-void choose_actions(const at::Tensor& log_probs, const ControllerInput& input, uint64_t seed, bool argmax,
-                    Span<int32_t> actions_out) {
-  const at::Tensor host = log_probs.contiguous();
-  const float* row = host.const_data_ptr<float>();
-  for (size_t slot = 0; slot < actions_out.size(); ++slot, row += kNumActions) {
-    const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
-    const ActionKey key{seed, input.slots.global_world[world], static_cast<uint32_t>(input.slots.agent_of_slot[slot]),
-                        static_cast<uint32_t>(input.episode_index[world]),
-                        static_cast<uint32_t>(input.episode_step[world])};
-    actions_out[slot] = argmax ? most_likely_action(row, kNumActions) : draw_action(row, kNumActions, key);
-  }
+void set_float32_products(Precision precision) {
+  at::globalContext().setFloat32Precision(
+      at::Float32Backend::CUDA, at::Float32Op::ALL,
+      precision == Precision::tf32 ? at::Float32Precision::TF32 : at::Float32Precision::IEEE);
 }
 
 }  // namespace pictura

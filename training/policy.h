@@ -3,6 +3,7 @@
 // functions: ATen alone.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 
 #include "pictura/training/config.h"
 #include "pictura/training/observation.h"
+#include "pictura/training/phase_timer.h"
 
 namespace pictura {
 
@@ -32,9 +34,9 @@ class SceneEncoder {
 class Policy {
  public:
   /// Parameters are drawn from (seed, index of the parameter, index of the element) alone. With `reads_walls` the
-  /// vector policy has a fifth set.
+  /// vector policy has a fifth set. `precision` is for CUDA devices.
   Policy(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type = at::kFloat,
-         bool reads_walls = false);
+         bool reads_walls = false, Device device = {}, Precision precision = Precision::fp32);
 
   struct Output {
     at::Tensor logits;  // [batch, kNumActions]
@@ -51,6 +53,7 @@ class Policy {
   std::vector<NamedTensor> parameters_;
   std::unique_ptr<SceneEncoder> scene_;
   at::ScalarType type_;
+  Precision precision_;
   int64_t ego_features_;  // the image branch comes without the auxiliary slots
 
   struct Linear {
@@ -68,19 +71,16 @@ class Policy {
   friend class PerspectiveEncoder;
 };
 
-/// The policy of a configuration, for cameras of this rig.
-Policy make_policy(const Config& config, const Rig& rig);
+/// The policy of a configuration, for cameras of this rig. The host computes in fp32.
+Policy make_policy(const Config& config, const Rig& rig, Device device);
 
-/// Policy outputs for a whole batch without gradients, `chunk` agents at a time: logits and log-probabilities
-/// [batch, actions], and values [batch].
+/// Policy outputs for a whole batch without gradients: logits and log-probabilities [batch, actions], values [batch].
 struct Decision {
   at::Tensor logits, log_probs, value;
 };
-Decision decide(const Policy& policy, const Observation& observation, int64_t chunk);
-
-/// Chooses one action per slot: the most likely one, or a draw keyed by (seed, global world, agent, episode, step).
-void choose_actions(const at::Tensor& log_probs, const ControllerInput& input, uint64_t seed, bool argmax,
-                    Span<int32_t> actions_out);
+/// `chunk` agents at a time; observe(begin, count) gives what agents [begin, begin + count) of the batch see.
+Decision decide(const Policy& policy, int64_t batch, int64_t chunk,
+                const std::function<Observation(int64_t begin, int64_t count)>& observe, PhaseTimer* timer = nullptr);
 
 /// Largest value over the members of each set, [batch, members, width] -> [batch, width]; members at and beyond
 /// counts [batch] are padding; an empty set gives zeros.

@@ -6,8 +6,8 @@
 #include <ATen/core/grad_mode.h>
 
 #include "pictura/common/error.h"
-#include "pictura/common/rng.h"
 #include "pictura/training/rules/advantage_filter.h"
+#include "pictura/training/torch_device.h"
 
 namespace pictura {
 
@@ -23,7 +23,7 @@ AdamW::AdamW(const Policy& policy, const Config::Train& config) : parameters_(po
   }
 }
 
-double AdamW::step(double learning_rate) {
+at::Tensor AdamW::step(double learning_rate) {
   const at::NoGradGuard no_grad;
   std::vector<at::Tensor> values, gradients, first, second;
   for (size_t i = 0; i < parameters_.size(); ++i) {
@@ -35,10 +35,10 @@ double AdamW::step(double learning_rate) {
     first.push_back(first_moments[i].value);
     second.push_back(second_moments[i].value);
   }
-  const double norm = at::stack(at::_foreach_norm(gradients, 2)).norm().item<double>();
-  at::_foreach_mul_(gradients, std::min(1.0, config_.max_grad_norm / (norm + 1e-6)));
+  const at::Tensor norm = at::stack(at::_foreach_norm(gradients, 2)).norm();
+  at::_foreach_mul_(gradients, (config_.max_grad_norm / (norm + 1e-6)).clamp_max(1.0));
   ++steps;
-  const std::vector<at::Tensor> counts(values.size(), at::full({}, static_cast<double>(steps), at::kFloat));
+  const std::vector<at::Tensor> counts(values.size(), at::full({}, static_cast<double>(steps), norm.options()));
   at::_fused_adamw_(values, gradients, first, second, {}, counts, learning_rate, config_.adam_beta1, config_.adam_beta2,
                     config_.weight_decay, config_.adam_eps, /*amsgrad=*/false, /*maximize=*/false);
   for (const NamedTensor& parameter : parameters_) parameter.value.mutable_grad().reset();
@@ -50,20 +50,6 @@ double cosine_rate(double learning_rate, int64_t update, int64_t schedule_update
   return learning_rate * 0.5 * (1.0 + std::cos(std::numbers::pi * done));
 }
 
-std::vector<int64_t> shuffled(int64_t n, uint64_t seed, int64_t update, int64_t epoch) {
-  std::vector<int64_t> order(static_cast<size_t>(n));
-  for (int64_t i = 0; i < n; ++i) order[static_cast<size_t>(i)] = i;
-  for (int64_t i = n - 1; i > 0; --i) {
-    RandomStream stream({.seed = seed,
-                         .world = static_cast<uint32_t>(i),
-                         .episode = static_cast<uint32_t>(update),
-                         .step = static_cast<uint32_t>(epoch),
-                         .purpose = Purpose::minibatch});
-    std::swap(order[static_cast<size_t>(i)], order[static_cast<size_t>(stream.below(static_cast<int>(i + 1)))]);
-  }
-  return order;
-}
-
 namespace {
 
 // 1 - Var(returns - values) / Var(returns): 1 is a perfect critic, 0 one that says a constant.
@@ -72,25 +58,13 @@ double explained_variance(const at::Tensor& values, const at::Tensor& returns) {
   return variance > 0 ? 1 - (returns - values).var().item<double>() / variance : 0;
 }
 
-// Indices of the transitions that the filter keeps, in ascending order.
-at::Tensor kept_transitions(const at::Tensor& advantages, const at::Tensor& valid, float threshold) {
-  const float* const advantage = advantages.const_data_ptr<float>();
-  const uint8_t* const is_valid = valid.const_data_ptr<uint8_t>();
-  std::vector<int64_t> kept;
-  for (int64_t i = 0; i < advantages.numel(); ++i) {
-    if (filter_keeps(advantage[i], is_valid[i] != 0, threshold)) kept.push_back(i);
-  }
-  return at::tensor(kept, at::kLong);
-}
-
 }  // namespace
 
 UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Config::Train& config, uint64_t seed,
-                       int64_t update, AdamW* optimizer, AdvantageFilter* filter) {
+                       int64_t update, LearnerExecutor* executor, AdamW* optimizer, AdvantageFilter* filter,
+                       PhaseTimer* timer) {
   UpdateStats stats;
-  // The batch: transitions of all agents and steps, flattened; the row after the last step is no transition.
-  const Observation observation =
-      rollout.observation.map([&](const at::Tensor& t) { return t.narrow(0, 0, rollout.num_steps()).flatten(0, 1); });
+  // The batch: transitions of all agents and steps, flattened.
   const at::Tensor actions = rollout.actions.flatten().to(at::kLong), old_log_probs = rollout.log_probs.flatten();
   const at::Tensor advantages = rollout.advantages.flatten();
   const at::Tensor values = rollout.values.narrow(0, 0, rollout.num_steps()).flatten();
@@ -102,22 +76,25 @@ UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Confi
   const float threshold = filter->threshold(max_advantage, config.adv_filter_ema, config.adv_filter_threshold);
   stats.adv_threshold = static_cast<double>(threshold);
   const at::Tensor valid = rollout.valid.flatten();
-  const at::Tensor kept = kept_transitions(advantages, valid, threshold);
-  const int64_t num_valid = valid.sum().item<int64_t>(), num_kept = kept.size(0);
+  const at::Tensor kept_and_unused = at::empty_like(advantages, at::kLong);
+  const int64_t num_kept = executor->select_kept(span_of<const float>(advantages), span_of<const uint8_t>(valid),
+                                                 threshold, span_of<int64_t>(kept_and_unused));
+  const at::Tensor kept = kept_and_unused.narrow(0, 0, num_kept), shuffled = at::empty_like(kept);
+  const int64_t num_valid = valid.sum().item<int64_t>();
   if (num_kept == 0) return stats;
   stats.kept_fraction = static_cast<double>(num_kept) / static_cast<double>(num_valid);
   stats.explained_variance = explained_variance(values.index_select(0, kept), returns.index_select(0, kept));
 
   const double rate = cosine_rate(config.learning_rate, update, config.schedule_updates);
   const int64_t num_minibatches = (num_kept + config.minibatch_size - 1) / config.minibatch_size;
-  at::Tensor sums = at::zeros({5}, at::kDouble);
+  at::Tensor sums = at::zeros({6}, advantages.options().dtype(at::kDouble));
   for (int epoch = 0; epoch < config.update_epochs; ++epoch) {
-    const std::vector<int64_t> order = shuffled(num_kept, seed, update, epoch);
-    const at::Tensor shuffled_kept = kept.index_select(0, at::tensor(order, at::kLong));
+    executor->permute(Permutation(seed, update, epoch, num_kept), span_of<const int64_t>(kept),
+                      span_of<int64_t>(shuffled));
     for (int64_t m = 0; m < num_minibatches; ++m) {
       // Minibatches of equal size, to one transition.
       const int64_t begin = num_kept * m / num_minibatches, end = num_kept * (m + 1) / num_minibatches;
-      const at::Tensor minibatch = shuffled_kept.narrow(0, begin, end - begin);
+      const at::Tensor minibatch = shuffled.narrow(0, begin, end - begin);
       at::Tensor minibatch_advantages = advantages.index_select(0, minibatch);
       if (config.norm_adv && end - begin > 1) {
         minibatch_advantages =
@@ -130,8 +107,9 @@ UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Confi
         const at::Tensor rows = minibatch.narrow(0, chunk, size);
         const at::Tensor advantage = minibatch_advantages.narrow(0, chunk, size);
 
-        const Policy::Output output =
-            policy.forward(observation.map([&](const at::Tensor& t) { return t.index_select(0, rows); }));
+        const Observation observation = rollout.observations.gather(rows);
+        const PhaseTimer::Scope timed(timer, Phase::learn);
+        const Policy::Output output = policy.forward(observation);
         const at::Tensor all_log_probs = at::log_softmax(output.logits, 1);
         const at::Tensor log_prob = all_log_probs.gather(1, actions.index_select(0, rows).unsqueeze(1)).squeeze(1);
         const at::Tensor log_ratio = log_prob - old_log_probs.index_select(0, rows);
@@ -148,19 +126,19 @@ UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Confi
         // Schulman's estimator of the KL divergence, (ratio - 1) - log ratio: unbiased and never negative.
         const at::Tensor approx_kl = (ratio - 1 - log_ratio).mean();
         const at::Tensor clip_fraction = ((ratio - 1).abs() > config.clip_coef).to(at::kFloat).mean();
-        sums +=
+        sums.narrow(0, 0, 5) +=
             weight * at::stack({policy_loss, value_loss, entropy, approx_kl, clip_fraction}).detach().to(at::kDouble);
       }
-      stats.grad_norm += optimizer->step(rate);
+      const PhaseTimer::Scope timed(timer, Phase::optimize);
+      sums[5] += optimizer->step(rate);
       ++stats.minibatches;
     }
   }
 
-  const auto count = static_cast<double>(stats.minibatches);
-  double* const means[] = {&stats.policy_loss, &stats.value_loss, &stats.entropy, &stats.approx_kl,
-                           &stats.clip_fraction};
-  for (int64_t i = 0; i < 5; ++i) *means[i] = sums[i].item<double>() / count;
-  stats.grad_norm /= count;
+  double* const means[] = {&stats.policy_loss, &stats.value_loss,    &stats.entropy,
+                           &stats.approx_kl,   &stats.clip_fraction, &stats.grad_norm};
+  const at::Tensor all = (sums / static_cast<double>(stats.minibatches)).cpu();
+  for (int64_t i = 0; i < 6; ++i) *means[i] = all[i].item<double>();
   PICTURA_CHECK(std::isfinite(stats.policy_loss + stats.value_loss + stats.entropy) && std::isfinite(stats.grad_norm),
                 "update {}: the loss is not finite (policy {}, value {}, entropy {}, gradient norm {})", update + 1,
                 stats.policy_loss, stats.value_loss, stats.entropy, stats.grad_norm);

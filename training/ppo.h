@@ -18,8 +18,9 @@ class AdvantageFilter {
 class AdamW {
  public:
   AdamW(const Policy& policy, const Config::Train& config);
-  /// One step along the parameters' gradients, scaled down to max_grad_norm; clears them. Returns their norm before.
-  double step(double learning_rate);
+  /// One step along the parameters' gradients, scaled down to max_grad_norm; clears them. Returns their norm before, a
+  /// scalar on the parameters' device, without waiting for it.
+  at::Tensor step(double learning_rate);
 
   std::vector<NamedTensor> first_moments, second_moments;  // in the order of the policy's parameters
   int64_t steps = 0;
@@ -32,9 +33,6 @@ class AdamW {
 /// Cosine from learning_rate at update 0 to 0 at schedule_updates and beyond.
 double cosine_rate(double learning_rate, int64_t update, int64_t schedule_updates);
 
-/// A permutation of [0, n), a function of its arguments alone.
-std::vector<int64_t> shuffled(int64_t n, uint64_t seed, int64_t update, int64_t epoch);
-
 /// Means over the update's minibatches; docs/training.md defines them.
 struct UpdateStats {
   double policy_loss = 0, value_loss = 0, entropy = 0, approx_kl = 0, clip_fraction = 0, grad_norm = 0;
@@ -42,8 +40,10 @@ struct UpdateStats {
   int64_t minibatches = 0;
 };
 
-/// Improves the policy on a rollout with advantages. Throws Error when a loss is not finite.
+/// Improves the policy on a rollout with advantages; `update` and `seed` name the order of the transitions. Throws
+/// Error when a loss is not finite.
 UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Config::Train& config, uint64_t seed,
-                       int64_t update, AdamW* optimizer_inout, AdvantageFilter* filter_inout);
+                       int64_t update, LearnerExecutor* executor, AdamW* optimizer_inout, AdvantageFilter* filter_inout,
+                       PhaseTimer* timer = nullptr);
 
 }  // namespace pictura

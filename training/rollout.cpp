@@ -1,85 +1,116 @@
 #include "pictura/training/rollout.h"
 
-#include <unistd.h>
-
+#include "pictura/backends/make_learner.h"
 #include "pictura/common/error.h"
-#include "pictura/training/rules/gae.h"
+#include "pictura/training/torch_device.h"
 
 namespace pictura {
 
 namespace {
 
-double physical_memory_bytes() {
-  return static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+bool keeps_images(const Config& config, Device device) {
+  return config.train.images == "kept" || (config.train.images == "auto" && device.is_host());
 }
 
-template <typename T>
-void copy_row(Span<const T> row, int64_t index, const at::Tensor& tensor_out) {
-  std::copy(row.begin(), row.end(), tensor_out.data_ptr<T>() + index * tensor_out.size(1));
+SceneHistorySize history_size(Simulator& simulator, int num_steps) {
+  const SceneBatch& scene = simulator.scene();
+  return {num_steps, scene.geometry.size(), scene.agents.size(), scene.light_states.size(), simulator.views().size()};
+}
+
+double bytes_of_row(const Observation& arrays) {
+  double bytes = 0;
+  arrays.map([&bytes](const at::Tensor& t) {
+    double row = static_cast<double>(t.element_size());
+    for (const int64_t size : t.sizes().slice(1)) row *= static_cast<double>(size);
+    bytes += row;
+    return t;
+  });
+  return bytes;
 }
 
 }  // namespace
 
-Rollout::Rollout(Observation storage, int64_t num_steps, int64_t num_slots)
-    : observation(std::move(storage)),
-      values(at::zeros({num_steps + 1, num_slots}, at::kFloat)),
-      actions(at::zeros({num_steps, num_slots}, at::kInt)),
-      log_probs(at::zeros({num_steps, num_slots}, at::kFloat)),
-      rewards(at::zeros({num_steps, num_slots}, at::kFloat)),
-      terminated(at::zeros({num_steps, num_slots}, at::kByte)),
-      truncated(at::zeros({num_steps, num_slots}, at::kByte)),
-      valid(at::zeros({num_steps, num_slots}, at::kByte)),
-      advantages(at::zeros({num_steps, num_slots}, at::kFloat)) {}
-
-void Rollout::begin() {
-  std::vector<at::Tensor> last;
-  row_of(observation, num_steps()).map([&](const at::Tensor& t) { return last.emplace_back(t); });
-  size_t i = 0;
-  row_of(observation, 0).map([&](at::Tensor t) { return t.copy_(last[i++]); });
-}
-
-Span<int32_t> Rollout::actions_at(int64_t step) {
-  return {actions.data_ptr<int32_t>() + step * num_slots(), static_cast<size_t>(num_slots())};
-}
-
-void Rollout::set_result(int64_t step, const StepResult& result) {
-  copy_row(result.reward, step, rewards);
-  copy_row(result.terminated, step, terminated);
-  copy_row(result.truncated, step, truncated);
-  copy_row(result.valid, step, valid);
-}
-
-void Rollout::compute_advantages(double gamma, double gae_lambda) {
-  const float* const reward = rewards.const_data_ptr<float>();
-  const float* const value = values.const_data_ptr<float>();
-  const uint8_t* const is_terminated = terminated.const_data_ptr<uint8_t>();
-  const uint8_t* const is_truncated = truncated.const_data_ptr<uint8_t>();
-  const uint8_t* const is_valid = valid.const_data_ptr<uint8_t>();
-  float* const advantage_out = advantages.data_ptr<float>();
-  const int64_t slots = num_slots();
-  // Steps are walked backwards and slots forwards: the inner loop runs over consecutive memory.
-  std::vector<float> next(static_cast<size_t>(slots), 0.0f);
-  for (int64_t step = num_steps() - 1; step >= 0; --step) {
-    for (int64_t slot = 0; slot < slots; ++slot) {
-      const int64_t i = step * slots + slot;
-      const GaeTransition transition{
-          reward[i], value[i], value[i + slots], is_terminated[i] != 0, is_truncated[i] != 0, is_valid[i] != 0};
-      float& advantage = next[static_cast<size_t>(slot)];
-      advantage = gae_advantage(transition, advantage, static_cast<float>(gamma), static_cast<float>(gae_lambda));
-      advantage_out[i] = advantage;
-    }
+RolloutObservations::RolloutObservations(const Config& config, Simulator* simulator, Renderer* renderer,
+                                         PhaseTimer* timer, int64_t memory_bytes)
+    : simulator_(simulator), renderer_(renderer), timer_(timer) {
+  const Device device = simulator->device();
+  PICTURA_CHECK(!config.reads_images() || renderer, "training: a policy that reads images needs a renderer");
+  PICTURA_CHECK(!renderer || renderer->device() == device,
+                "training: simulator '{}' works on {}, renderer '{}' on {}: expected both on one", simulator->name(),
+                name_of(device), renderer->name(), name_of(renderer->device()));
+  const int num_slots = simulator->num_slots(), num_steps = config.train.num_steps + 1;
+  const bool keeps = config.reads_images() && keeps_images(config, device);
+  const SceneHistorySize scenes = history_size(*simulator, num_steps);
+  double bytes = bytes_of_row(allocate_observations(config, 0, num_slots, device)) * num_steps;
+  if (keeps)
+    bytes += static_cast<double>(image_layout(renderer->config().rig, num_slots, PixelFormat::u8).bytes()) * num_steps;
+  if (config.reads_images() && !keeps) bytes += static_cast<double>(bytes_of(scenes));
+  PICTURA_CHECK(
+      bytes <= static_cast<double>(memory_bytes),
+      "train: a rollout of {} agents (simulator.num_slots) and {} steps (train.num_steps) needs {:.1f} GB for "
+      "observations; {} has {:.1f} GB",
+      num_slots, config.train.num_steps, bytes / 1e9, name_of(device), static_cast<double>(memory_bytes) / 1e9);
+  arrays_ = allocate_observations(config, num_steps, num_slots, device);
+  if (keeps) {
+    arrays_.images = allocate_images(renderer->config().rig, {num_steps, num_slots}, device);
+  } else if (config.reads_images()) {
+    scenes_ = make_scene_history(device, scenes);
   }
 }
 
-Observation allocate_rollout(const Observer& observer, int num_slots, int num_steps) {
-  const int64_t rows = int64_t{num_steps} + 1;
-  const double row_bytes = observer.bytes_per_row(), bytes = static_cast<double>(rows) * row_bytes;
-  PICTURA_CHECK(
-      bytes <= physical_memory_bytes(),
-      "train: a rollout of {} agents (simulator.num_slots) and {} steps (train.num_steps) needs {:.1f} GB for "
-      "observations of {:.0f} bytes; this machine has {:.1f} GB",
-      num_slots, num_steps, bytes / 1e9, row_bytes / num_slots, physical_memory_bytes() / 1e9);
-  return observer.allocate(rows);
+void RolloutObservations::record(int64_t step, const at::Tensor& slots) {
+  const ControllerInput input = simulator_->controller_input();
+  const Observation row = row_of(arrays_, step);
+  copy_arrays(input.observations, input.device, row);
+  if (scenes_) {
+    scenes_->put(static_cast<int>(step), input.scene, input.views);
+  } else if (!arrays_.images.empty()) {
+    const PhaseTimer::Scope timed(timer_, Phase::render);
+    const SelectedViews selected(input.views, input.device, slots);
+    const std::vector<ImageBlock> drawn = draw_images(input.scene, selected.views(), renderer_);
+    for (size_t i = 0; i < drawn.size(); ++i) row.images[i].pixels.index_copy_(0, slots, drawn[i].pixels);
+  }
+}
+
+Observation RolloutObservations::gather(const at::Tensor& rows) const {
+  Observation result = arrays_.map([&rows](const at::Tensor& t) { return t.flatten(0, 1).index_select(0, rows); });
+  if (scenes_) {
+    const PhaseTimer::Scope timed(timer_, Phase::render);
+    SelectedViews selected(rows.size(0), scenes_->device());
+    scenes_->gather(span_of<const int64_t>(rows), selected.views());
+    result.images = draw_images(scenes_->scene(), selected.views(), renderer_);
+  }
+  return result;
+}
+
+Rollout::Rollout(RolloutObservations its_observations, int64_t num_steps, int64_t num_slots, Device device)
+    : observations(std::move(its_observations)) {
+  const auto zeros = [&](at::ScalarType type, int64_t steps) {
+    return at::zeros({steps, num_slots}, at::TensorOptions(type).device(torch_device(device)));
+  };
+  values = zeros(at::kFloat, num_steps + 1);
+  actions = zeros(at::kInt, num_steps);
+  for (at::Tensor* t : {&log_probs, &rewards, &advantages}) *t = zeros(at::kFloat, num_steps);
+  for (at::Tensor* t : {&terminated, &truncated, &valid}) *t = zeros(at::kByte, num_steps);
+}
+
+Span<int32_t> Rollout::actions_at(int64_t step) { return span_of<int32_t>(actions.select(0, step)); }
+
+void Rollout::set_result(int64_t step, const StepResult& result, Device device) {
+  const auto copy = [&](auto array, const at::Tensor& to) {
+    to.select(0, step).copy_(tensor_over(array, device, {num_slots()}));
+  };
+  copy(result.reward, rewards);
+  copy(result.terminated, terminated);
+  copy(result.truncated, truncated);
+  copy(result.valid, valid);
+}
+
+void Rollout::compute_advantages(double gamma, double gae_lambda, LearnerExecutor* executor) {
+  executor->compute_advantages(
+      {span_of<const float>(rewards), span_of<const float>(values), span_of<const uint8_t>(terminated),
+       span_of<const uint8_t>(truncated), span_of<const uint8_t>(valid), num_steps(), num_slots()},
+      static_cast<float>(gamma), static_cast<float>(gae_lambda), span_of<float>(advantages));
 }
 
 }  // namespace pictura

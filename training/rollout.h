@@ -1,35 +1,63 @@
-// What all slots of a simulator saw, did and got in one rollout, as tensors; time first.
+// What all slots of a simulator saw, did and got in one rollout, as tensors on the device that learns; time first.
 #pragma once
 
+#include "pictura/common/scene_history.h"
 #include "pictura/training/observation.h"
+#include "pictura/training/phase_timer.h"
+#include "pictura/training/rules/learner_executor.h"
 
 namespace pictura {
 
+/// What the slots saw at each step. Images are kept, or drawn again from the scenes whenever they are read: those of
+/// the paper's rollout would take 163 GB, its scenes 0.4 GB.
+class RolloutObservations {
+ public:
+  /// For `num_steps` + 1 steps of this simulator, which must outlive it, as must the renderer and the timer. Policies
+  /// without images need no renderer. Memory is handed out before it is there, so a rollout that can never fit is
+  /// refused: throws Error naming the settings that decide its size.
+  RolloutObservations(const Config& config, Simulator* simulator, Renderer* renderer, PhaseTimer* timer,
+                      int64_t memory_bytes);
+  /// Of arrays alone, [num_steps + 1, slots, ...].
+  explicit RolloutObservations(Observation arrays) : arrays_(std::move(arrays)) {}
+
+  /// Keeps what the simulator shows now as what was seen at `step`. slots: i64 [n], those of active agents, the only
+  /// ones whose images are kept. Steps are recorded in order first.
+  void record(int64_t step, const at::Tensor& slots);
+
+  /// What some agents saw. rows: i64 [batch] of step * slots + slot, of agents that were active at those steps.
+  Observation gather(const at::Tensor& rows) const;
+
+  const Observation& arrays() const { return arrays_; }
+
+ private:
+  Observation arrays_;  // with the images that are kept
+  Simulator* simulator_ = nullptr;
+  Renderer* renderer_ = nullptr;
+  PhaseTimer* timer_ = nullptr;
+  std::unique_ptr<SceneHistory> scenes_;  // where images are drawn again
+};
+
 struct Rollout {
-  Observation observation;                  // [num_steps + 1, num_slots, ...]; the last row is seen after the last step
-  at::Tensor values;                        // f32 [num_steps + 1, num_slots]
+  RolloutObservations observations;         // of num_steps + 1 steps; the last is seen after the last action
+  at::Tensor values;                        // f32 [num_steps + 1, num_slots]; 0 for agents that were not active
   at::Tensor actions;                       // i32 [num_steps, num_slots], as all below
   at::Tensor log_probs;                     // f32, of the chosen actions
   at::Tensor rewards;                       // f32
   at::Tensor terminated, truncated, valid;  // u8, as StepResult defines them
   at::Tensor advantages;                    // f32, see rules/gae.h
 
-  Rollout(Observation storage, int64_t num_steps, int64_t num_slots);
+  Rollout(RolloutObservations its_observations, int64_t num_steps, int64_t num_slots, Device device);
   int64_t num_steps() const { return actions.size(0); }
   int64_t num_slots() const { return actions.size(1); }
 
-  /// Begins the next rollout: what was seen after the last step becomes the first row.
-  void begin();
+  /// The row of each of these slots, i64 [n], at a step.
+  at::Tensor rows_of(int64_t step, const at::Tensor& slots) const { return slots + step * num_slots(); }
   /// The actions of one step, to be filled. [num_slots]
   Span<int32_t> actions_at(int64_t step);
-  /// Keeps what the step with these actions returned.
-  void set_result(int64_t step, const StepResult& result);
+  /// Keeps what a step with these actions returned, in the memory of `device`.
+  void set_result(int64_t step, const StepResult& result, Device device);
   /// Fills `advantages` from rewards, values and flags.
-  void compute_advantages(double gamma, double gae_lambda);
+  void compute_advantages(double gamma, double gae_lambda, LearnerExecutor* executor);
 };
-
-/// Storage for the observations of a rollout of `num_steps` steps. Memory is handed out before it is there, so one that
-/// can never fit this machine is refused: throws Error naming the settings that decide its size.
-Observation allocate_rollout(const Observer& observer, int num_slots, int num_steps);
 
 }  // namespace pictura

@@ -1,5 +1,6 @@
 #include "pictura/training/run.h"
 
+#include "pictura/backends/make_learner.h"
 #include "pictura/backends/make_renderer.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
@@ -10,38 +11,40 @@ namespace pictura {
 
 namespace {
 
-std::unique_ptr<Simulator> make_training_simulator(const Config& config) {
+std::unique_ptr<Simulator> make_training_simulator(const Config& config, Device device) {
   const Config::SimulatorSection& section = config.simulator;
   std::vector<std::shared_ptr<const RoadMap>> maps;
   for (const std::string& name : section.maps) maps.push_back(load_map(name));
   const int num_maps = static_cast<int>(maps.size());
   return make_simulator(
-      config.simulator.backend, simulator_config(config), std::move(maps),
+      config.simulator.backend, simulator_config(config, device), std::move(maps),
       draw_worlds(config.run.seed, section.num_slots, section.min_agents, section.max_agents, num_maps));
 }
 
 std::unique_ptr<Renderer> make_training_renderer(const Config& config, const Rig& rig, const Simulator& simulator) {
   if (!config.reads_images()) return nullptr;
-  std::unique_ptr<Renderer> renderer = make_renderer(config.render.backend, renderer_config(config, rig));
+  std::unique_ptr<Renderer> renderer =
+      make_renderer(config.render.backend, renderer_config(config, rig, simulator.device()));
   upload_maps(simulator, renderer.get());
   return renderer;
 }
 
 }  // namespace
 
-Run::Run(const Config& its_config)
+Run::Run(const Config& its_config, Device its_device)
     : config(its_config),
+      device(its_device),
       rig(rig_of(config)),
-      simulator(make_training_simulator(config)),
+      simulator(make_training_simulator(config, device)),
       renderer(make_training_renderer(config, rig, *simulator)),
-      observer(config, simulator.get(), renderer.get()),
-      policy(make_policy(config, rig)),
+      executor(make_learner_executor(device)),
+      timer(device),
+      policy(make_policy(config, rig, device)),
       optimizer(policy, config.train),
-      rollout(allocate_rollout(observer, simulator->num_slots(), config.train.num_steps), config.train.num_steps,
-              simulator->num_slots()) {}
+      rollout(RolloutObservations(config, simulator.get(), renderer.get(), &timer, executor->memory_bytes()),
+              config.train.num_steps, simulator->num_slots(), device) {}
 
-void Run::save(const std::string& path, const std::vector<RecentUpdate>& recent,
-               std::vector<uint8_t> simulator_bytes) const {
+void Run::save(const std::string& path, const std::vector<RecentUpdate>& recent) const {
   Checkpoint checkpoint;
   checkpoint.config = config;
   checkpoint.rig = rig;
@@ -54,11 +57,11 @@ void Run::save(const std::string& path, const std::vector<RecentUpdate>& recent,
   checkpoint.parameters = policy.parameters();
   checkpoint.first_moments = optimizer.first_moments;
   checkpoint.second_moments = optimizer.second_moments;
-  checkpoint.simulator = std::move(simulator_bytes);
+  checkpoint.simulator = simulator->save();
   write_checkpoint(path, checkpoint);
 }
 
-void Run::restore(const Checkpoint& saved) {
+std::string Run::restore(const Checkpoint& saved) {
   const std::string difference = first_difference(saved.config, config);
   PICTURA_CHECK(difference.empty(), "{}: saved under another configuration: {}", saved.path, difference);
   const std::string rig_difference = config.reads_images() ? first_difference(saved.rig, rig) : "";
@@ -69,10 +72,16 @@ void Run::restore(const Checkpoint& saved) {
   restore_tensors(saved, saved.second_moments, optimizer.second_moments);
   optimizer.steps = saved.adam_steps;
   filter.average = saved.filter_average;
-  simulator->restore(saved.simulator);
   update = saved.update;
   agent_steps = saved.agent_steps;
   distance_m = saved.distance_m;
+  try {
+    simulator->restore(saved.simulator);
+  } catch (const Error& error) {
+    simulator->reset();
+    return error.what();
+  }
+  return "";
 }
 
 }  // namespace pictura

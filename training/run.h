@@ -7,22 +7,24 @@
 namespace pictura {
 
 struct Run {
-  /// Throws Error naming file and key for maps, cameras and sizes that cannot be trained with.
-  explicit Run(const Config& config);
+  /// Learns on `device`, where simulator and renderer work too. Throws Error naming file and key for maps, cameras and
+  /// sizes that cannot be trained with.
+  Run(const Config& config, Device device);
 
-  /// Writes a checkpoint under another name and renames it to path. `simulator_bytes` is Simulator::save() at the start
-  /// of an update.
-  void save(const std::string& path, const std::vector<RecentUpdate>& recent,
-            std::vector<uint8_t> simulator_bytes) const;
-  /// Goes on from a checkpoint. Throws Error naming what differs when it was saved under another configuration or with
-  /// other cameras.
-  void restore(const Checkpoint& saved);
+  /// Writes a checkpoint under another name and renames it to path, at the start of an update.
+  void save(const std::string& path, const std::vector<RecentUpdate>& recent) const;
+  /// Goes on from a checkpoint. Where the simulator cannot read its saved state, because its rules or maps have
+  /// changed since, new episodes begin; the return value says why, else it is empty. Throws Error naming what differs
+  /// when the checkpoint was saved under another configuration or with other cameras.
+  std::string restore(const Checkpoint& saved);
 
   const Config config;
+  const Device device;
   const Rig rig;
   const std::unique_ptr<Simulator> simulator;
   const std::unique_ptr<Renderer> renderer;  // of policies with images
-  Observer observer;
+  const std::unique_ptr<LearnerExecutor> executor;
+  PhaseTimer timer;
   const Policy policy;
   AdamW optimizer;
   AdvantageFilter filter;

@@ -19,36 +19,38 @@ Scalars scalars_of(const Config& config, const TrainProgress& progress, const Up
   const auto steps = static_cast<double>(totals.agent_steps);
   const double km = totals.distance_m / 1000;
   auto per_km = [km](int64_t count) { return static_cast<double>(count) / km; };
-  return {{"charts/agent_steps", static_cast<double>(progress.agent_steps)},
-          {"charts/agent_steps_per_s", progress.agent_steps_per_s},
-          {"charts/learning_rate",
-           cosine_rate(config.train.learning_rate, progress.update - 1, config.train.schedule_updates)},
-          {"charts/episode_return", progress.episode_return},
-          {"charts/reward_per_step", totals.reward / steps},
-          {"charts/live_share", steps / static_cast<double>(totals.slot_steps)},
-          {"driving/mean_speed_mps", totals.distance_m / (static_cast<double>(simulator_config(config).dt_s) * steps)},
-          {"driving/goals_per_km", per_km(totals.goals_reached)},
-          {"driving/waypoints_per_km", per_km(totals.waypoints_reached)},
-          {"driving/waypoints_per_1000_steps", 1000 * static_cast<double>(totals.waypoints_reached) / steps},
-          {"driving/collisions_per_km", per_km(totals.collisions)},
-          {"driving/at_fault_collisions_per_km", per_km(totals.at_fault_collisions)},
-          {"driving/off_road_per_km", per_km(totals.off_road)},
-          {"driving/red_light_per_km", per_km(totals.red_light)},
-          {"driving/wall_contacts_per_km", per_km(totals.wall_contacts)},
-          {"losses/policy_loss", stats.policy_loss},
-          {"losses/value_loss", stats.value_loss},
-          {"losses/entropy", stats.entropy},
-          {"losses/approx_kl", stats.approx_kl},
-          {"losses/clip_fraction", stats.clip_fraction},
-          {"losses/explained_variance", stats.explained_variance},
-          {"losses/grad_norm", stats.grad_norm},
-          {"losses/kept_fraction", stats.kept_fraction},
-          {"losses/adv_threshold", stats.adv_threshold},
-          {"time/rollout_s", record.times.rollout_s},
-          {"time/forward_s", record.times.forward_s},
-          {"time/simulate_s", record.times.simulate_s},
-          {"time/render_s", record.times.render_s},
-          {"time/optimize_s", record.times.optimize_s}};
+  Scalars scalars{
+      {"charts/agent_steps", static_cast<double>(progress.agent_steps)},
+      {"charts/agent_steps_per_s", progress.agent_steps_per_s},
+      {"charts/learning_rate",
+       cosine_rate(config.train.learning_rate, progress.update - 1, config.train.schedule_updates)},
+      {"charts/episode_return", progress.episode_return},
+      {"charts/reward_per_step", totals.reward / steps},
+      {"charts/live_share", steps / static_cast<double>(totals.slot_steps)},
+      {"driving/mean_speed_mps", totals.distance_m / (static_cast<double>(simulator_config(config).dt_s) * steps)},
+      {"driving/goals_per_km", per_km(totals.goals_reached)},
+      {"driving/waypoints_per_km", per_km(totals.waypoints_reached)},
+      {"driving/waypoints_per_1000_steps", 1000 * static_cast<double>(totals.waypoints_reached) / steps},
+      {"driving/collisions_per_km", per_km(totals.collisions)},
+      {"driving/at_fault_collisions_per_km", per_km(totals.at_fault_collisions)},
+      {"driving/off_road_per_km", per_km(totals.off_road)},
+      {"driving/red_light_per_km", per_km(totals.red_light)},
+      {"driving/wall_contacts_per_km", per_km(totals.wall_contacts)},
+      {"losses/policy_loss", stats.policy_loss},
+      {"losses/value_loss", stats.value_loss},
+      {"losses/entropy", stats.entropy},
+      {"losses/approx_kl", stats.approx_kl},
+      {"losses/clip_fraction", stats.clip_fraction},
+      {"losses/explained_variance", stats.explained_variance},
+      {"losses/grad_norm", stats.grad_norm},
+      {"losses/kept_fraction", stats.kept_fraction},
+      {"losses/adv_threshold", stats.adv_threshold},
+      {"time/rollout_s", record.rollout_s},
+      {"time/update_s", record.update_s}};
+  for (size_t i = 0; i < kNumPhases; ++i) {
+    scalars.emplace_back(fmt::format("time/{}_s", kPhaseNames[i]), record.phases_s[i]);
+  }
+  return scalars;
 }
 
 }  // namespace

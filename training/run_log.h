@@ -1,35 +1,15 @@
 // What a run reports after each update: a row of progress.csv, a TensorBoard event, and the progress line's numbers.
 #pragma once
 
-#include <chrono>
 #include <deque>
 
 #include "pictura/training/checkpoint.h"
 #include "pictura/training/event_file.h"
 #include "pictura/training/loop.h"
+#include "pictura/training/phase_timer.h"
 #include "pictura/training/ppo.h"
 
 namespace pictura {
-
-/// Time since it was made or last restarted.
-class Stopwatch {
- public:
-  /// Seconds since then; starts again.
-  double restart() {
-    const auto now = Clock::now();
-    return std::chrono::duration<double>(now - std::exchange(start_, now)).count();
-  }
-  double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  Clock::time_point start_ = Clock::now();
-};
-
-/// Where the time of one update went.
-struct PhaseTimes {
-  double rollout_s = 0, forward_s = 0, simulate_s = 0, render_s = 0, optimize_s = 0;
-};
 
 /// One CSV per run. On resume the rows of updates that the checkpoint does not hold are dropped.
 class ProgressCsv {
@@ -47,7 +27,8 @@ class ProgressCsv {
 struct UpdateRecord {
   SimulatorTotals totals;  // counted in its rollout
   UpdateStats stats;
-  PhaseTimes times;
+  double rollout_s = 0, update_s = 0;  // wall time of collecting, and of improving
+  PhaseSeconds phases_s{};             // in both
 };
 
 class RunLog {

@@ -2,6 +2,7 @@
 
 #include <ATen/Parallel.h>
 
+#include "pictura/backends/make_learner.h"
 #include "pictura/backends/make_renderer.h"
 #include "pictura/common/error.h"
 #include "pictura/common/pixel_samples.h"
@@ -9,6 +10,8 @@
 #include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/training/checkpoint.h"
 #include "pictura/training/observation.h"
+#include "pictura/training/precision.h"
+#include "pictura/training/torch_device.h"
 
 namespace pictura {
 
@@ -19,7 +22,7 @@ namespace {
 Config adapted(Config config, const SessionOptions& options) {
   config.run.num_threads = options.num_threads;
   config.run.device = options.device;
-  config.simulator.backend = "auto";
+  config.simulator.backend = options.simulator;
   std::string& renderer = config.render.backend;
   if (!options.renderer.empty())
     renderer = options.renderer;
@@ -32,7 +35,6 @@ Config adapted(Config config, const SessionOptions& options) {
   } else if (!renderer.starts_with("gl")) {
     config.render.samples = {};  // exact coverage
   }
-  check_devices(config);
   return config;
 }
 
@@ -40,72 +42,86 @@ Config adapted(Config config, const SessionOptions& options) {
 
 struct PolicySession::Parts {
   Parts(const Checkpoint& checkpoint, const SessionOptions& options)
-      : config(adapted(checkpoint.config, options)), rig(checkpoint.rig), policy(make_policy(config, rig)) {
+      : config(adapted(checkpoint.config, options)),
+        device(open_learning_device(config)),
+        rig(checkpoint.rig),
+        executor(make_learner_executor(device)),
+        policy(make_policy(config, rig, device)) {
     restore_tensors(checkpoint, checkpoint.parameters, policy.parameters());
   }
 
-  Decision decide(const PolicyInput& input, int64_t batch, Renderer* renderer) {
+  /// For the agents of a batch that `indices`, i64 [n], name.
+  Decision decide(const PolicyInput& input, int64_t batch, const at::Tensor& indices, Renderer* renderer) const {
     at::set_num_threads(resolve_num_threads(config.run.num_threads));
-    if (!storage.ego.defined() || storage.ego.size(1) != batch) storage = allocate_observations(config, rig, 1, batch);
-    const Observation observation = row_of(storage, 0);
-    copy_arrays(input.observations, observation);
-    if (config.reads_images()) draw(input, batch, renderer, observation);
-    return pictura::decide(policy, observation, config.train.forward_chunk);
+    set_float32_products(config.train.precision);
+    if (config.reads_images()) check_images(input, static_cast<size_t>(batch), renderer);
+    return pictura::decide(policy, indices.size(0), config.train.forward_chunk, [&](int64_t begin, int64_t count) {
+      const at::Tensor some = indices.narrow(0, begin, count);
+      Observation observation = select_arrays(config, input.observations, device, batch, some);
+      if (config.reads_images()) observation.images = draw(input, some, renderer);
+      return observation;
+    });
   }
 
   const Config config;
+  const Device device;
   const Rig rig;
+  const std::unique_ptr<LearnerExecutor> executor;
   const Policy policy;
-  Observation storage;  // [1, batch, ...]
 
  private:
-  static void draw(const PolicyInput& input, int64_t batch, Renderer* renderer, const Observation& out) {
+  void check_images(const PolicyInput& input, size_t batch, const Renderer* renderer) const {
     PICTURA_CHECK(renderer && input.scene, "policy: it reads images: expected a renderer and a scene");
-    PICTURA_CHECK(renderer->device().is_host(), "policy: expected a renderer for host memory, got one for {}",
-                  name_of(renderer->device()));
-    const auto size = static_cast<size_t>(batch);
-    PICTURA_CHECK(input.views.size() == size, "policy: expected {} views, got {}", size, input.views.size());
-    PICTURA_CHECK(input.is_drawn.empty() || input.is_drawn.size() == size,
-                  "policy: is_drawn: expected {} flags, got {}", size, input.is_drawn.size());
-    std::vector<int64_t> drawn;
-    for (size_t i = 0; i < size; ++i) {
-      if (input.is_drawn.empty() || input.is_drawn[i]) drawn.push_back(static_cast<int64_t>(i));
+    PICTURA_CHECK(renderer->device() == device, "policy: expected a renderer for memory of {}, got one for {}",
+                  name_of(device), name_of(renderer->device()));
+    PICTURA_CHECK(input.views.size() == batch, "policy: expected {} views, got {}", batch, input.views.size());
+    PICTURA_CHECK(input.is_drawn.empty() || input.is_drawn.size() == batch,
+                  "policy: is_drawn: expected {} flags, got {}", batch, input.is_drawn.size());
+  }
+
+  std::vector<ImageBlock> draw(const PolicyInput& input, const at::Tensor& indices, Renderer* renderer) const {
+    if (input.is_drawn.empty()) {
+      return draw_images(*input.scene, SelectedViews(input.views, device, indices).views(), renderer);
     }
-    draw_images(*input.scene, input.views, drawn, renderer, out);
+    const auto batch = static_cast<int64_t>(input.is_drawn.size());
+    const at::Tensor drawn =
+        at::nonzero(tensor_over(input.is_drawn, device, {batch}).index_select(0, indices)).squeeze(1);
+    const std::vector<ImageBlock> some =
+        draw_images(*input.scene, SelectedViews(input.views, device, indices.index_select(0, drawn)).views(), renderer);
+    std::vector<ImageBlock> all = allocate_images(rig, {indices.size(0)}, device);
+    for (size_t i = 0; i < all.size(); ++i) all[i].pixels.zero_().index_copy_(0, drawn, some[i].pixels);
+    return all;
   }
 };
 
 /// A policy for one simulator.
 class PolicyController final : public Controller {
  public:
-  PolicyController(PolicySession::Parts* parts, Renderer* renderer, bool argmax, uint64_t seed)
-      : parts_(*parts), renderer_(renderer), argmax_(argmax), seed_(seed) {}
+  PolicyController(const PolicySession::Parts* parts, Renderer* renderer, const ActionChoice& choice)
+      : parts_(*parts), renderer_(renderer), choice_(choice) {}
 
   std::string_view name() const override { return "policy"; }
 
   void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream) override {
-    check_controller_arrays(name(), input, Device{}, mask, commands_out);
-    const size_t num_slots = commands_out.size();
-    is_drawn_.assign(num_slots, 0);
-    for (const int64_t slot : active_slots(input, mask)) is_drawn_[static_cast<size_t>(slot)] = 1;
-    const Decision decision = parts_.decide({input.observations, &input.scene, input.views, is_drawn_},
-                                            static_cast<int64_t>(num_slots), renderer_);
-    actions_.resize(num_slots);
-    choose_actions(decision.log_probs, input, seed_, argmax_, actions_);
-    for (size_t slot = 0; slot < num_slots; ++slot) {
-      if (!mask.empty() && !mask[slot]) continue;
-      commands_out[slot] = {};
-      commands_out[slot].action = actions_[slot];
+    check_controller_arrays(name(), input, parts_.device, mask, commands_out);
+    const auto num_slots = static_cast<int64_t>(commands_out.size());
+    if (!actions_.defined() || actions_.size(0) != num_slots) {
+      actions_ = at::zeros({num_slots}, at::TensorOptions(at::kInt).device(torch_device(parts_.device)));
     }
+    const at::Tensor slots = active_slots(input, mask, parts_.executor.get());
+    const Decision decision =
+        parts_.decide({input.observations, &input.scene, input.views, {}}, num_slots, slots, renderer_);
+    const Span<int32_t> actions = span_of<int32_t>(actions_);
+    parts_.executor->choose_actions(input, span_of<const int64_t>(slots), span_of<const float>(decision.log_probs),
+                                    choice_, actions);
+    parts_.executor->write_commands(actions, mask, commands_out);
   }
 
  private:
-  PolicySession::Parts& parts_;
+  const PolicySession::Parts& parts_;
   Renderer* renderer_;
-  bool argmax_;
-  uint64_t seed_;
-  std::vector<uint8_t> is_drawn_;
-  std::vector<int32_t> actions_;
+  ActionChoice choice_;
+  at::Tensor actions_;  // i32 [slots]
 };
 
 PolicySession::PolicySession(const std::string& checkpoint_path, const SessionOptions& options)
@@ -117,16 +133,20 @@ bool PolicySession::reads_images() const { return parts_->config.reads_images();
 
 const Rig& PolicySession::rig() const { return parts_->rig; }
 
-RendererConfig PolicySession::renderer_config() const { return pictura::renderer_config(parts_->config, parts_->rig); }
+Device PolicySession::device() const { return parts_->device; }
+
+RendererConfig PolicySession::renderer_config() const {
+  return pictura::renderer_config(parts_->config, parts_->rig, parts_->device);
+}
 
 std::unique_ptr<Renderer> PolicySession::make_renderer() const {
   return reads_images() ? pictura::make_renderer(parts_->config.render.backend, renderer_config()) : nullptr;
 }
 
-SimulatorConfig PolicySession::training_world() const { return simulator_config(parts_->config); }
+SimulatorConfig PolicySession::training_world() const { return simulator_config(parts_->config, parts_->device); }
 
 SimulatorConfig PolicySession::evaluation_world(int steps) const {
-  return evaluation_simulator_config(parts_->config, steps);
+  return evaluation_simulator_config(parts_->config, steps, parts_->device);
 }
 
 void PolicySession::evaluate(const PolicyInput& input, Renderer* renderer, Span<float> logits_out,
@@ -135,15 +155,16 @@ void PolicySession::evaluate(const PolicyInput& input, Renderer* renderer, Span<
                 "policy: expected memory for {} logits, {} for each value, got {}", values_out.size() * kNumActions,
                 kNumActions, logits_out.size());
   if (values_out.empty()) return;
-  const Decision decision = parts_->decide(input, static_cast<int64_t>(values_out.size()), renderer);
-  const at::Tensor logits = decision.logits.contiguous(), values = decision.value.contiguous();
-  std::copy_n(logits.const_data_ptr<float>(), logits_out.size(), logits_out.begin());
-  std::copy_n(values.const_data_ptr<float>(), values_out.size(), values_out.begin());
+  const auto batch = static_cast<int64_t>(values_out.size());
+  const at::Tensor all = at::arange(batch, at::TensorOptions(at::kLong).device(torch_device(parts_->device)));
+  const Decision decision = parts_->decide(input, batch, all, renderer);
+  tensor_over(logits_out, parts_->device, {batch, kNumActions}).copy_(decision.logits);
+  tensor_over(values_out, parts_->device, {batch}).copy_(decision.value);
 }
 
 std::unique_ptr<Controller> PolicySession::make_controller(Renderer* renderer, bool argmax, uint64_t seed) {
   PICTURA_CHECK(!reads_images() || renderer, "policy: it reads images: expected a renderer");
-  return std::make_unique<PolicyController>(parts_.get(), renderer, argmax, seed);
+  return std::make_unique<PolicyController>(parts_.get(), renderer, ActionChoice{argmax, seed});
 }
 
 }  // namespace pictura

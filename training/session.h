@@ -14,10 +14,11 @@ namespace pictura {
 struct SessionOptions {
   int num_threads = 0;            // of torch and renderers; 0: all
   std::string device = "auto";    // as run.device of a configuration
+  std::string simulator = "cpu";  // as simulator.backend: of the simulators that it drives in
   std::string renderer, samples;  // as render.backend and render.samples; empty: as the policy was trained
 };
 
-/// What a batch of agents sees, in host memory.
+/// What a batch of agents sees, in the memory of the session's device.
 struct PolicyInput {
   ObservationView observations;       // [batch]; arrays that the policy does not read may be empty
   const SceneBatch* scene = nullptr;  // with views, for a policy that reads images
@@ -37,11 +38,13 @@ class PolicySession {
 
   bool reads_images() const;
   const Rig& rig() const;
+  /// Where it computes. Simulators, renderers and all arrays that it is given work there too.
+  Device device() const;
 
   /// What its images are drawn with: rig, line floor, palette and samples of training.
   RendererConfig renderer_config() const;
-  /// A renderer for its images, for scenes and images in host memory; the caller uploads the maps. Null where it reads
-  /// no images. Throws Error when the renderer cannot run here.
+  /// A renderer for its images, in the memory of device(); the caller uploads the maps. Null where it reads no images.
+  /// Throws Error when the renderer cannot run here.
   std::unique_ptr<Renderer> make_renderer() const;
 
   /// The world that it was trained in: walls and their seed, population, conditioning, episodes, and the observations
@@ -55,7 +58,7 @@ class PolicySession {
   /// a size does not fit the batch, which is that of values_out.
   void evaluate(const PolicyInput& input, Renderer* renderer, Span<float> logits_out, Span<float> values_out);
 
-  /// Drives in a simulator's host memory: the most likely action, or a draw keyed by (seed, global world, agent,
+  /// Drives in a simulator on device(): the most likely action, or a draw keyed by (seed, global world, agent,
   /// episode, step) as in training. Session and renderer, which is as for evaluate(), must outlive it. Images are drawn
   /// for active agents alone.
   std::unique_ptr<Controller> make_controller(Renderer* renderer, bool argmax, uint64_t seed);

@@ -168,7 +168,7 @@ TEST_F(CheckpointFile, TheSchemaIsThatOfTheArraysThatThePolicyReads) {
   Config config = small_config();
   const std::string path = folder_ / "a.ckpt";
   auto schema_of = [&] {
-    write_checkpoint(path, small_checkpoint(make_policy(config, paper_rig(16, 9)), config));
+    write_checkpoint(path, small_checkpoint(make_policy(config, paper_rig(16, 9), Device{}), config));
     const std::string bytes = read_file(path);
     uint64_t header_bytes = 0;
     std::memcpy(&header_bytes, bytes.data() + 16, 8);

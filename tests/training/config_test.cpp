@@ -3,9 +3,11 @@
 
 #include <gmock/gmock.h>
 
+#include "pictura/backends/make_learner.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/tests/support/error_message.h"
+#include "pictura/training/torch_device.h"
 
 namespace pictura {
 namespace {
@@ -155,15 +157,31 @@ TEST(Config, TheOldNameOfTheBackendsFillsInWhichIsAbsent) {
               AllOf(HasSubstr("a.toml:2: run.backend"), HasSubstr("no effect")));
 }
 
-TEST(Config, WhatNeedsALoopOnTheDeviceIsRefusedByName) {
+TEST(Config, WhatCannotWorkInOneMemoryIsRefusedByName) {
+  const auto message = [](const char* device, const char* simulator, const char* renderer) {
+    Config c;
+    c.run.device = device;
+    c.simulator.backend = simulator;
+    c.render.backend = renderer;
+    return test::message_of([&] { open_learning_device(c); });
+  };
+  EXPECT_THAT(message("cpu", "cuda", "cpu"), AllOf(HasSubstr("simulator.backend"), HasSubstr("run.device is \"cpu\"")));
+  EXPECT_THAT(message("auto", "cuda", "cpu"), AllOf(HasSubstr("simulator.backend"), HasSubstr("render.backend")));
+  EXPECT_THAT(message("cuda:0", "cpu", "cuda"), AllOf(HasSubstr("simulator.backend"), HasSubstr("\"cuda:0\"")));
+  EXPECT_THAT(message("cuda", "auto", "null"), AllOf(HasSubstr("render.backend"), HasSubstr("\"null\"")));
+  // With one renderer or simulator in host memory, auto is the host; nothing is asked of a device.
   Config c;
+  c.render.backend = "cpu";
+  EXPECT_TRUE(open_learning_device(c).is_host());
+  c = {};
+  c.simulator.backend = "cpu";
   c.render.backend = "cuda";  // draws for host memory
-  EXPECT_NO_THROW(check_devices(c));
-  c.run.device = "cuda:0";
-  EXPECT_THAT(test::message_of([&] { check_devices(c); }), AllOf(HasSubstr("run.device"), HasSubstr("missing")));
-  c.run.device = "auto";
-  c.simulator.backend = "cuda";
-  EXPECT_THAT(test::message_of([&] { check_devices(c); }), AllOf(HasSubstr("simulator.backend"), HasSubstr("missing")));
+  EXPECT_TRUE(open_learning_device(c).is_host());
+  if (!why_no_cuda_device().empty()) {
+    EXPECT_TRUE(open_learning_device({}).is_host());
+    EXPECT_THAT(message("cuda", "auto", "auto"), AllOf(HasSubstr("run.device: cuda"), HasSubstr(why_no_cuda_device())));
+    EXPECT_THAT(message("auto", "cuda", "auto"), HasSubstr("simulator.backend"));
+  }
 }
 
 TEST(Config, DifferencesThatChangeTheRunAreNamed) {

@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include <ATen/Parallel.h>
 #include <ATen/core/grad_mode.h>
 #include <gmock/gmock.h>
 
+#include "pictura/backends/make_learner.h"
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
 #include "pictura/training/rules/choose_action.h"
@@ -42,13 +42,13 @@ std::vector<float> advantages_of(int64_t num_steps, int64_t num_slots, const std
                                  const std::vector<float>& values, const std::vector<uint8_t>& terminated,
                                  const std::vector<uint8_t>& truncated, const std::vector<uint8_t>& valid, double gamma,
                                  double gae_lambda) {
-  Rollout rollout({}, num_steps, num_slots);
+  Rollout rollout(RolloutObservations(Observation{}), num_steps, num_slots, Device{});
   std::copy(rewards.begin(), rewards.end(), rollout.rewards.data_ptr<float>());
   std::copy(values.begin(), values.end(), rollout.values.data_ptr<float>());
   std::copy(terminated.begin(), terminated.end(), rollout.terminated.data_ptr<uint8_t>());
   std::copy(truncated.begin(), truncated.end(), rollout.truncated.data_ptr<uint8_t>());
   std::copy(valid.begin(), valid.end(), rollout.valid.data_ptr<uint8_t>());
-  rollout.compute_advantages(gamma, gae_lambda);
+  rollout.compute_advantages(gamma, gae_lambda, make_learner_executor(Device{}).get());
   const float* first = rollout.advantages.const_data_ptr<float>();
   return {first, first + num_steps * num_slots};
 }
@@ -107,13 +107,44 @@ TEST(Schedule, IsACosineThatEndsAtZero) {
   EXPECT_NEAR(cosine_rate(2.0, 150, 100), 0.0, 1e-12);
 }
 
-TEST(Shuffle, IsAPermutationThatOnlyItsArgumentsDecide) {
-  const std::vector<int64_t> a = shuffled(1000, 1, 2, 3);
-  EXPECT_EQ(a, shuffled(1000, 1, 2, 3));
-  EXPECT_NE(a, shuffled(1000, 1, 2, 4));
-  EXPECT_NE(a, shuffled(1000, 1, 3, 3));
-  EXPECT_EQ(std::set<int64_t>(a.begin(), a.end()).size(), 1000u);
-  EXPECT_EQ(*std::max_element(a.begin(), a.end()), 999);
+TEST(Permutation, TakesEveryElementOnceAndOnlyItsArgumentsDecide) {
+  for (const int64_t size : {1, 2, 3, 4, 5, 17, 1000, 4096, 70001}) {
+    std::vector<int64_t> taken;
+    const Permutation permutation(1, 2, 3, size);
+    for (int64_t i = 0; i < size; ++i) taken.push_back(permutation(i));
+    std::sort(taken.begin(), taken.end());
+    for (int64_t i = 0; i < size; ++i) ASSERT_EQ(taken[static_cast<size_t>(i)], i) << "of " << size;
+  }
+  const auto order = [](uint64_t seed, int64_t update, int64_t epoch) {
+    const Permutation permutation(seed, update, epoch, 1000);
+    std::vector<int64_t> taken;
+    for (int64_t i = 0; i < 1000; ++i) taken.push_back(permutation(i));
+    return taken;
+  };
+  const std::vector<int64_t> a = order(1, 2, 3);
+  EXPECT_EQ(a, order(1, 2, 3));
+  EXPECT_NE(a, order(1, 2, 4));
+  EXPECT_NE(a, order(1, 3, 3));
+  EXPECT_NE(a, order(2, 2, 3));
+}
+
+TEST(Permutation, MixesWell) {
+  // Neighbours go to places that have nothing to do with each other, and every place is as likely as any other.
+  constexpr int64_t kSize = 5000, kParts = 10;
+  int64_t neighbours = 0, counts[kParts] = {};
+  double distance = 0;
+  for (int64_t epoch = 0; epoch < 20; ++epoch) {
+    const Permutation permutation(7, 0, epoch, kSize);
+    ++counts[permutation(0) * kParts / kSize];
+    for (int64_t i = 0; i + 1 < kSize; ++i) {
+      const int64_t step = std::abs(permutation(i + 1) - permutation(i));
+      neighbours += step == 1;
+      distance += static_cast<double>(step) / static_cast<double>(20 * (kSize - 1));
+    }
+  }
+  EXPECT_LT(neighbours, 100);                                            // 40 expected
+  EXPECT_NEAR(distance, static_cast<double>(kSize) / 3, kSize / 100.0);  // of two independent uniform places
+  EXPECT_LT(*std::max_element(counts, counts + kParts), 9);              // 2 expected
 }
 
 TEST(DrawAction, FollowsTheCumulativeProbabilities) {
@@ -160,7 +191,17 @@ struct Corridor {
   Rollout rollout;
   at::Tensor open = at::zeros({kSlots}, at::kFloat), sign = at::ones({kSlots}, at::kFloat);
 
-  Corridor() : rollout(storage(), kSteps, kSlots) {}
+  const std::unique_ptr<LearnerExecutor> executor = make_learner_executor(Device{});
+
+  Corridor() : rollout(RolloutObservations(storage()), kSteps, kSlots, Device{}) {}
+
+  void compute_advantages(double gamma, double gae_lambda) {
+    rollout.compute_advantages(gamma, gae_lambda, executor.get());
+  }
+  UpdateStats update(const Policy& policy, const Config::Train& train, int64_t number, AdamW* optimizer,
+                     AdvantageFilter* filter) {
+    return ppo_update(policy, rollout, train, 1, number, executor.get(), optimizer, filter);
+  }
 
   static Observation storage() {
     const int64_t rows = kSteps + 1;
@@ -179,11 +220,13 @@ struct Corridor {
   // Mean reward per step of one rollout.
   double play(const Policy& policy, int64_t update) {
     for (int64_t t = 0; t <= kSteps; ++t) {
-      const Observation row = row_of(rollout.observation, t);
+      const Observation row = row_of(rollout.observations.arrays(), t);
       at::Tensor ego = row.ego;
       ego.select(1, 0).copy_(sign);
       ego.select(1, 1).copy_(open);
-      const Decision decision = decide(policy, row, 50);
+      const Decision decision = decide(policy, kSlots, 50, [&row](int64_t begin, int64_t count) {
+        return row.map([&](const at::Tensor& all) { return all.narrow(0, begin, count); });
+      });
       rollout.values.select(0, t).copy_(decision.value);
       if (t == kSteps) break;
       for (int64_t slot = 0; slot < kSlots; ++slot) {
@@ -232,8 +275,8 @@ TEST(Ppo, LearnsATaskWithDelayedReward) {
   for (int64_t update = 0; update < 40; ++update) {
     last = corridor.play(policy, update);
     if (update == 0) first = last;
-    corridor.rollout.compute_advantages(train.gamma, train.gae_lambda);
-    stats = ppo_update(policy, corridor.rollout, train, 1, update, &optimizer, &filter);
+    corridor.compute_advantages(train.gamma, train.gae_lambda);
+    stats = corridor.update(policy, train, update, &optimizer, &filter);
   }
   // Chance is 1/12 of 1/13; perfect play is paid every other step.
   EXPECT_LT(first, 0.05);
@@ -257,10 +300,10 @@ TEST(Ppo, ChunksChangeNothingButRounding) {
     corridor.play(*policy, 0);
     corridor.rollout.rewards.copy_(
         at::arange(corridor.rollout.rewards.numel(), at::kFloat).sin().reshape_as(corridor.rollout.rewards));
-    corridor.rollout.compute_advantages(0.9, 0.9);
+    corridor.compute_advantages(0.9, 0.9);
     AdamW optimizer(*policy, train);
     AdvantageFilter filter;
-    ppo_update(*policy, corridor.rollout, train, 1, 0, &optimizer, &filter);
+    corridor.update(*policy, train, 0, &optimizer, &filter);
   }
   for (size_t i = 0; i < whole.parameters().size(); ++i) {
     const at::NoGradGuard no_grad;
@@ -283,10 +326,10 @@ TEST(Ppo, InvalidTransitionsTeachNothing) {
         at::arange(corridor.rollout.rewards.numel(), at::kFloat).sin().reshape_as(corridor.rollout.rewards));
     corridor.rollout.valid.narrow(1, 0, 40).zero_();
     if (policy == &b) corridor.rollout.rewards.narrow(1, 0, 40).fill_(50);
-    corridor.rollout.compute_advantages(0.9, 0.9);
+    corridor.compute_advantages(0.9, 0.9);
     AdamW optimizer(*policy, train);
     AdvantageFilter filter;
-    const UpdateStats stats = ppo_update(*policy, corridor.rollout, train, 1, 0, &optimizer, &filter);
+    const UpdateStats stats = corridor.update(*policy, train, 0, &optimizer, &filter);
     EXPECT_LT(stats.kept_fraction, 1.0001);
   }
   EXPECT_EQ(a.hash(), b.hash());
@@ -301,7 +344,7 @@ TEST(Ppo, NanIsAnError) {
   Corridor corridor;
   corridor.play(policy, 0);
   corridor.rollout.rewards.fill_(1);
-  corridor.rollout.compute_advantages(0.9, 0.9);
+  corridor.compute_advantages(0.9, 0.9);
   {
     const at::NoGradGuard no_grad;
     at::Tensor bias = policy.parameters().back().value;
@@ -310,7 +353,7 @@ TEST(Ppo, NanIsAnError) {
   AdamW optimizer(policy, train);
   AdvantageFilter filter;
   try {
-    ppo_update(policy, corridor.rollout, train, 1, 4, &optimizer, &filter);
+    corridor.update(policy, train, 4, &optimizer, &filter);
     FAIL() << "expected an Error";
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), ::testing::HasSubstr("update 5: the loss is not finite"));

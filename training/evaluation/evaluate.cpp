@@ -1,7 +1,6 @@
 #include "pictura/training/evaluation/evaluate.h"
 
 #include <algorithm>
-#include <chrono>
 #include <limits>
 
 #include "pictura/backends/make_simulator.h"
@@ -9,8 +8,11 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/map/load_map.h"
+#include "pictura/simulator/agent_state.h"
 #include "pictura/training/config.h"
+#include "pictura/training/phase_timer.h"
 #include "pictura/training/session.h"
+#include "pictura/training/torch_device.h"
 
 namespace pictura {
 
@@ -28,20 +30,31 @@ DensityOf density_of(Density density) {
   }
 }
 
-// Worlds that are simulated and drawn together: bounded by what their images take, or a few thousand agents.
-int worlds_per_batch(const Rig& rig, int agents_per_world) {
-  constexpr int64_t kMaxImageBytes = int64_t{256} << 20;
-  constexpr int64_t kMaxAgents = 4096;
-  int64_t bytes_per_agent = 1;
-  for (const Camera& camera : rig.cameras) bytes_per_agent += 3 * int64_t{camera.width_px} * camera.height_px;
-  return static_cast<int>(
-      std::max<int64_t>(1, std::min(kMaxAgents, kMaxImageBytes / bytes_per_agent) / agents_per_world));
+// A scan waits for the device.
+constexpr int kStepsBetweenScans = 16;
+
+// Worlds that are simulated together: enough to keep a device busy. Images are drawn for parts of them.
+int worlds_per_batch(Device device, int agents_per_world) {
+  const int max_agents = device.is_host() ? 4096 : 32768;
+  return std::max(1, max_agents / agents_per_world);
+}
+
+// All agents' fields on the host.
+AgentState host_state(Simulator& simulator) {
+  const auto num_slots = static_cast<size_t>(simulator.num_slots());
+  const AgentStateView state = simulator.state();
+  AgentState host;
+#define X(name, type, per_agent, first, comment) \
+  host.name = host_copy(Span<const type>(state.name, num_slots * (per_agent)), simulator.device());
+  PICTURA_AGENT_FIELDS(X)
+#undef X
+  return host;
 }
 
 bool has_active_agents(Simulator& simulator) {
-  const uint8_t* const status = simulator.state().status;
-  return std::any_of(status, status + simulator.num_slots(),
-                     [](uint8_t s) { return static_cast<AgentStatus>(s) == AgentStatus::active; });
+  const Span<const uint8_t> status(simulator.state().status, static_cast<size_t>(simulator.num_slots()));
+  const std::vector<uint8_t> all = host_copy(status, simulator.device());
+  return std::count(all.begin(), all.end(), static_cast<uint8_t>(AgentStatus::active)) > 0;
 }
 
 // Sums over vehicle episodes.
@@ -93,12 +106,9 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
   if (options.agents_per_world < 0 || options.agents_per_world > kMaxAgentsPerWorld) {
     fail_usage("evaluate: expected 1 to {} agents per world, got {}", kMaxAgentsPerWorld, options.agents_per_world);
   }
-  Config devices;
-  devices.run.device = options.device;
-  devices.simulator.backend = options.simulator;
-  check_devices(devices);
   PolicySession session(options.checkpoint, {.num_threads = options.num_threads,
                                              .device = options.device,
+                                             .simulator = options.simulator,
                                              .renderer = options.renderer,
                                              .samples = options.samples});
   SimulatorConfig simulator_config = session.evaluation_world(options.steps);
@@ -115,13 +125,13 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
   double work = 0, done = 0;  // in agents times steps
   for (const DensityOf& density : densities) work += double(density.agents) * options.scenarios * options.steps;
 
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch since_start;
   const std::unique_ptr<Renderer> renderer = session.make_renderer();
   std::unique_ptr<Simulator> simulator;  // made with the first batch
   EvaluateReport report;
   for (const DensityOf& density : densities) {
     Tally tally;
-    const int per_batch = worlds_per_batch(session.rig(), density.agents);
+    const int per_batch = worlds_per_batch(session.device(), density.agents);
     for (int first = 0; first < options.scenarios; first += per_batch) {
       std::vector<WorldSpec> worlds;
       for (int scenario = first; scenario < std::min(first + per_batch, options.scenarios); ++scenario) {
@@ -136,24 +146,27 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
       }
       const std::unique_ptr<Controller> controller =
           session.make_controller(renderer.get(), options.argmax, options.seed);
-      std::vector<Command> commands(static_cast<size_t>(simulator->num_slots()));
-      // Halted agents stay as they are, so a batch is over when no agent is active.
-      for (int step = 0; step < options.steps && has_active_agents(*simulator); ++step) {
+      const auto num_slots = static_cast<size_t>(simulator->num_slots());
+      const at::Tensor command_bytes = at::zeros({static_cast<int64_t>(num_slots * sizeof(Command))},
+                                                 at::TensorOptions(at::kByte).device(torch_device(session.device())));
+      const Span<Command> commands(reinterpret_cast<Command*>(command_bytes.data_ptr<uint8_t>()), num_slots);
+      for (int step = 0; step < options.steps; ++step) {
+        // Halted agents stay as they are, so a batch is over when no agent is active.
+        if (step % kStepsBetweenScans == 0 && !has_active_agents(*simulator)) break;
         if (interrupted()) {
           report.interrupted = true;
           return report;
         }
         controller->act(simulator->controller_input(), {}, commands);
-        simulator->step(commands);
+        simulator->step(Span<const Command>(commands));
         if (options.on_progress && step % 10 == 0) {
           const double fraction = (done + double(simulator->num_slots()) * (step + 1)) / work;
-          const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-          options.on_progress(fraction, elapsed_s * (1 - fraction) / fraction);
+          options.on_progress(fraction, since_start.seconds() * (1 - fraction) / fraction);
         }
       }
       done += double(simulator->num_slots()) * options.steps;
-      const AgentStateView state = simulator->state();
-      for (int slot = 0; slot < simulator->num_slots(); ++slot) tally.add(state, slot);
+      AgentState state = host_state(*simulator);
+      for (int slot = 0; slot < simulator->num_slots(); ++slot) tally.add(state.view(), slot);
     }
     report.rows.push_back(tally.row(density.name, options.scenarios, options.steps));
   }

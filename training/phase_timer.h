@@ -1,0 +1,74 @@
+// Where the time of an update goes, by named phase: a clock on the host, events on a device, which wait for nothing.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <memory>
+#include <vector>
+
+#include <c10/core/Event.h>
+
+#include "pictura/common/device.h"
+
+namespace pictura {
+
+/// Time since it was made or last restarted.
+class Stopwatch {
+ public:
+  /// Seconds since then; starts again.
+  double restart() {
+    const auto now = Clock::now();
+    return std::chrono::duration<double>(now - std::exchange(start_, now)).count();
+  }
+  double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start_ = Clock::now();
+};
+
+/// render: images, wherever they are needed; forward: the network in rollouts; learn: the network, its losses and
+/// gradients in updates; optimize: the optimizer's steps.
+enum class Phase : uint8_t { simulate, render, forward, learn, optimize };
+constexpr size_t kNumPhases = 5;
+constexpr const char* kPhaseNames[kNumPhases] = {"simulate", "render", "forward", "learn", "optimize"};
+using PhaseSeconds = std::array<double, kNumPhases>;
+
+class PhaseTimer {
+ public:
+  explicit PhaseTimer(Device device) : device_(device) {}
+
+  /// What its lifetime took belongs to a phase; none is measured where there is no timer. Scopes do not nest.
+  class Scope {
+   public:
+    Scope(PhaseTimer* timer, Phase phase);
+    ~Scope();
+    Scope(const Scope&) = delete;
+    Scope& operator=(const Scope&) = delete;
+
+   private:
+    PhaseTimer* timer_;
+    Phase phase_;
+    size_t begin_ = 0;  // on a device: index of its event
+    Stopwatch watch_;
+  };
+
+  /// Seconds of each phase since the last call. Waits for the device.
+  PhaseSeconds take();
+
+ private:
+  struct Interval {
+    Phase phase;
+    size_t begin, end;
+  };
+  /// Records an event and returns its index.
+  size_t record();
+
+  Device device_;
+  PhaseSeconds seconds_{};
+  std::vector<c10::Event> events_;  // reused
+  size_t num_events_ = 0;
+  std::vector<Interval> intervals_;
+};
+
+}  // namespace pictura

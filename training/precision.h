@@ -1,0 +1,36 @@
+// In which arithmetic the network computes on a CUDA device. Parameters, the optimizer, heads, log-probabilities and
+// losses are fp32 in all.
+#pragma once
+
+#include <ATen/autocast_mode.h>
+
+#include "pictura/training/config.h"
+
+namespace pictura {
+
+/// Sets what torch does with products of fp32 numbers, for the whole process: IEEE arithmetic, or TF32.
+void set_float32_products(Precision precision);
+
+/// While it lives, layers compute in bf16 where that is the precision, and as they are where it is another.
+class LayerPrecision {
+ public:
+  explicit LayerPrecision(Precision precision) : is_bf16_(precision == Precision::bf16) {
+    if (!is_bf16_) return;
+    at::autocast::set_autocast_dtype(at::kCUDA, at::kBFloat16);
+    at::autocast::set_autocast_enabled(at::kCUDA, true);
+    at::autocast::increment_nesting();
+  }
+  ~LayerPrecision() {
+    if (!is_bf16_) return;
+    // Weights are cast once in the scope, and again in the next: the optimizer changes them in between.
+    if (at::autocast::decrement_nesting() == 0) at::autocast::clear_cache();
+    at::autocast::set_autocast_enabled(at::kCUDA, false);
+  }
+  LayerPrecision(const LayerPrecision&) = delete;
+  LayerPrecision& operator=(const LayerPrecision&) = delete;
+
+ private:
+  bool is_bf16_;
+};
+
+}  // namespace pictura

@@ -1,0 +1,65 @@
+#include "pictura/training/torch_device.h"
+
+#include <dlfcn.h>
+
+#include "pictura/backends/make_learner.h"
+#include "pictura/common/error.h"
+
+namespace pictura {
+
+namespace {
+
+// Empty where torch can compute on CUDA devices, else why not. Its CUDA library is opened here rather than linked, so
+// that programs start quickly and on machines without it; this must come before torch is first asked for CUDA.
+std::string why_torch_has_no_cuda() {
+  static const void* const library = dlopen("libtorch_cuda.so", RTLD_NOW | RTLD_GLOBAL | RTLD_NODELETE);
+  if (!library) return "this torch has no CUDA (libtorch_cuda.so cannot be opened): install a torch with CUDA";
+  if (!at::globalContext().hasCUDA()) return "torch finds no CUDA device: its CUDA may be newer than the driver";
+  return "";
+}
+
+std::string why_not_on_cuda() {
+  const std::string no_device = why_no_cuda_device();
+  return no_device.empty() ? why_torch_has_no_cuda() : no_device;
+}
+
+}  // namespace
+
+Device open_learning_device(const Config& config) {
+  const std::string &wanted = config.run.device, &simulator = config.simulator.backend,
+                    &renderer = config.render.backend;
+  const bool draws_on_host =
+      config.reads_images() && (renderer == "cpu" || renderer == "null" || renderer == "gl:osmesa");
+  const auto refuse_on_device = [&wanted](const char* key, const std::string& value, const char* instead) {
+    fail("{}: \"{}\" works in host memory, but run.device is \"{}\": set it to {}", key, value, wanted, instead);
+  };
+  if (wanted.starts_with("cuda")) {
+    if (simulator == "cpu") refuse_on_device("simulator.backend", simulator, "\"cuda\" or \"auto\"");
+    if (draws_on_host) refuse_on_device("render.backend", renderer, "\"cuda\", \"gl:egl\" or \"auto\"");
+  }
+  if (wanted == "cpu" || simulator == "cpu" || draws_on_host) {
+    PICTURA_CHECK(
+        simulator != "cuda",
+        "simulator.backend: \"cuda\" works in the device's memory, but run.device is \"{}\" and render.backend "
+        "\"{}\": set it to \"cpu\" or \"auto\"",
+        wanted, renderer);
+    return {};
+  }
+  const std::string why_not = why_not_on_cuda();
+  if (wanted == "auto" && simulator == "auto" && !why_not.empty()) return {};
+  PICTURA_CHECK(why_not.empty(), "{}: {}", wanted == "auto" ? "simulator.backend: \"cuda\"" : "run.device: " + wanted,
+                why_not);
+  Device device{MemorySpace::cuda, 0};
+  if (const size_t colon = wanted.find(':'); colon != std::string::npos) {
+    device.index = std::stoi(wanted.substr(colon + 1));
+  }
+  const int count = at::detail::getCUDAHooks().deviceCount();
+  PICTURA_CHECK(device.index < count, "run.device: expected cuda:0 to cuda:{}, got \"{}\"", count - 1, wanted);
+  return device;
+}
+
+at::Device torch_device(Device device) {
+  return device.is_host() ? at::Device(at::kCPU) : at::Device(at::kCUDA, static_cast<c10::DeviceIndex>(device.index));
+}
+
+}  // namespace pictura

@@ -1,0 +1,41 @@
+// Where the network computes, and pictura's memory as torch's tensors. Training works on torch's default stream, which
+// is CUDA's legacy one: a null Stream.
+#pragma once
+
+#include <ATen/ATen.h>
+
+#include "pictura/common/array.h"
+#include "pictura/training/config.h"
+
+namespace pictura {
+
+/// Where this configuration learns. Opens torch's CUDA library if that is a CUDA device. Throws Error naming the key
+/// and the reason where it cannot learn there, or where the simulator or the renderer works in other memory.
+Device open_learning_device(const Config& config);
+
+at::Device torch_device(Device device);
+
+/// The elements of a tensor without gaps. Throws Error where its type is another one.
+template <typename T>
+Span<T> span_of(const at::Tensor& tensor) {
+  return {tensor.data_ptr<std::remove_const_t<T>>(), static_cast<size_t>(tensor.numel())};
+}
+/// An array as a tensor over the same memory, which must not be written where the array is read-only.
+template <typename T>
+at::Tensor tensor_over(Span<T> array, Device device, at::IntArrayRef shape) {
+  using Element = std::remove_const_t<T>;
+  // from_blob takes no pointer to const.
+  return at::from_blob(const_cast<Element*>(array.data()), shape,
+                       at::TensorOptions(c10::CppTypeToScalarType<Element>::value).device(torch_device(device)));
+}
+
+/// A copy of an array in the memory of `device` on the host.
+template <typename T>
+std::vector<T> host_copy(Span<const T> array, Device device) {
+  std::vector<T> copy(array.size());
+  const auto size = static_cast<int64_t>(array.size());
+  tensor_over(Span<T>(copy), Device{}, {size}).copy_(tensor_over(array, device, {size}));
+  return copy;
+}
+
+}  // namespace pictura
