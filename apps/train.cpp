@@ -28,6 +28,10 @@ void add_train_command(CLI::App& app) {
   command->add_option("--out", arguments->train.out_folder, "Folder for checkpoints, curves and logs")->required();
   command->add_flag("--resume", arguments->train.resume, "Go on from the checkpoint in --out");
   command
+      ->add_option("--init-from", arguments->train.init_from,
+                   "Begin with the weights of this checkpoint, of the same network at any image size")
+      ->excludes("--resume");
+  command
       ->add_option("--minutes", arguments->train.minutes,
                    "Save and end before this much wall time has passed; go on with --resume")
       ->check(CLI::PositiveNumber);

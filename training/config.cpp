@@ -24,6 +24,8 @@ template <typename Enum>
 using Choices = std::vector<std::pair<std::string, Enum>>;
 const Choices<Modality> kModalities{{"perspective", Modality::perspective}, {"vector", Modality::vector}};
 const Choices<Precision> kPrecisions{{"fp32", Precision::fp32}, {"tf32", Precision::tf32}, {"bf16", Precision::bf16}};
+const Choices<Schedule> kSchedules{
+    {"constant", Schedule::constant}, {"linear", Schedule::linear}, {"cosine", Schedule::cosine}};
 
 // The list of keys, in the order in which they are written. Reader and writer both walk it, so no key can be read and
 // not written. A visitor takes (key, value, range...).
@@ -71,7 +73,10 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.integer("policy.backbone_width", c.policy.backbone_width, 1, 1 << 14);
 
   v.integer("train.updates", c.train.updates, 1, int64_t{1} << 40);
-  v.integer("train.schedule_updates", c.train.schedule_updates, 1, int64_t{1} << 40);
+  v.choice("train.schedule", c.train.schedule, kSchedules);
+  v.integer("train.schedule_agent_steps", c.train.schedule_agent_steps, 1, int64_t{1} << 60);
+  v.integer("train.decay_agent_steps", c.train.decay_agent_steps, 0, int64_t{1} << 60);
+  v.integer("train.warm_up_agent_steps", c.train.warm_up_agent_steps, 0, int64_t{1} << 60);
   v.integer("train.num_steps", c.train.num_steps, 1, 1 << 16);
   v.integer("train.minibatch_size", c.train.minibatch_size, 1, int64_t{1} << 32);
   v.integer("train.update_epochs", c.train.update_epochs, 1, 1000);
@@ -182,6 +187,16 @@ class Reader {
     if (!new_renderer) renderer = its_name;
     // Renderers that are no simulators went with the simulator `cpu`.
     if (!new_simulator) simulator = its_name == "cuda" || its_name == "auto" ? its_name : "cpu";
+  }
+
+  /// The old measure of the schedule, in updates, each of at most so many agent-steps.
+  void old_schedule(const std::string& key, int64_t agent_steps_per_update, int64_t& schedule_agent_steps) {
+    if (!find(key)) return;
+    if (find("train.schedule_agent_steps")) refuse(key, "has no effect together with train.schedule_agent_steps");
+    constexpr int64_t kMost = int64_t{1} << 60;
+    int64_t updates = 0;
+    integer(key, updates, 1, int64_t{1} << 40);
+    schedule_agent_steps = updates > kMost / agent_steps_per_update ? kMost : updates * agent_steps_per_update;
   }
 
   void texts(const std::string& key, std::vector<std::string>& value) {
@@ -425,6 +440,10 @@ void check_contradictions(const Config& c, const Reader& reader) {
     reader.refuse("simulator.wall_observations",
                   "has no effect with the modality \"perspective\": such a policy sees walls in its images");
   }
+  if (c.train.decay_agent_steps > c.train.schedule_agent_steps) {
+    reader.refuse("train.decay_agent_steps", fmt::format("expected at most train.schedule_agent_steps ({}), got {}",
+                                                         c.train.schedule_agent_steps, c.train.decay_agent_steps));
+  }
   if (c.render.samples != PixelSamples{} && !c.render.backend.starts_with("gl")) {
     reader.refuse("render.samples", fmt::format("expected one sample with render.backend \"{}\", got {}: only gl takes "
                                                 "samples; the others compute exact coverage",
@@ -475,6 +494,8 @@ Config parse(const std::string& text, const std::string& source, const std::vect
   Reader reader(table, source, overridden, any_name);
   visit(config, reader);
   reader.old_backend("run.backend", config.simulator.backend, config.render.backend);
+  reader.old_schedule("train.schedule_updates", int64_t{config.simulator.num_slots} * config.train.num_steps,
+                      config.train.schedule_agent_steps);
   reader.refuse_unknown(table);
   check_contradictions(config, reader);
   return config;
@@ -512,6 +533,11 @@ std::string drawn_by(const std::string& backend) {
   return backend == "null" ? "null" : "exact coverage";
 }
 
+bool is_of_schedule(const std::string& key) {
+  return key.starts_with("train.schedule") || key == "train.decay_agent_steps" || key == "train.warm_up_agent_steps" ||
+         key == "train.learning_rate";
+}
+
 bool may_differ(const std::string& key, const Config& saved, const Config& now) {
   static const std::set<std::string> kHarmless{"train.updates",
                                                "train.checkpoint_every",
@@ -524,7 +550,7 @@ bool may_differ(const std::string& key, const Config& saved, const Config& now) 
                                                "render.width_px",
                                                "render.height_px",
                                                "simulator.backend"};
-  if (kHarmless.count(key) || key.starts_with("evaluate.")) return true;
+  if (kHarmless.count(key) || key.starts_with("evaluate.") || is_of_schedule(key)) return true;
   if (key == "render.backend" && drawn_by(saved.render.backend) == drawn_by(now.render.backend)) return true;
   // The vector policy reads nothing of it, before and now, since the modality may not differ.
   return !saved.reads_images() && key.starts_with("render.");
@@ -532,16 +558,34 @@ bool may_differ(const std::string& key, const Config& saved, const Config& now) 
 
 }  // namespace
 
-std::string first_difference(const Config& saved, const Config& now) {
+namespace {
+
+// "KEY: OLD became NEW" of each key that the predicate has and in which the two differ.
+template <typename Predicate>
+std::vector<std::string> differences(const Config& saved, const Config& now, const Predicate& counts) {
   Writer before, after;
   visit(saved, before);
   visit(now, after);
   const std::map<std::string, std::string> values(after.lines.begin(), after.lines.end());
+  std::vector<std::string> result;
   for (const auto& [key, value] : before.lines) {
-    if (may_differ(key, saved, now)) continue;
-    if (values.at(key) != value) return fmt::format("{}: {} became {}", key, value, values.at(key));
+    if (counts(key) && values.at(key) != value) {
+      result.push_back(fmt::format("{}: {} became {}", key, value, values.at(key)));
+    }
   }
-  return "";
+  return result;
+}
+
+}  // namespace
+
+std::string first_difference(const Config& saved, const Config& now) {
+  const std::vector<std::string> all =
+      differences(saved, now, [&](const std::string& key) { return !may_differ(key, saved, now); });
+  return all.empty() ? "" : all.front();
+}
+
+std::vector<std::string> schedule_differences(const Config& saved, const Config& now) {
+  return differences(saved, now, is_of_schedule);
 }
 
 bool Config::reads(ObservationPart part) const {

@@ -17,6 +17,9 @@ enum class Modality { perspective, vector };
 /// Of the network on a CUDA device: IEEE fp32; products in TF32; layers in bf16. See training/precision.h.
 enum class Precision { fp32, tf32, bf16 };
 
+/// How the learning rate falls to 0, or not.
+enum class Schedule { constant, linear, cosine };
+
 struct Config {
   struct Run {
     uint64_t seed = 1;            // names the whole run
@@ -62,9 +65,13 @@ struct Config {
   } policy;
 
   struct Train {
-    int64_t updates = 19074;           // when to stop
-    int64_t schedule_updates = 19074;  // horizon of the cosine schedule; 50 B agent steps
-    int num_steps = 128;               // steps of a rollout
+    int64_t updates = 19074;  // when to stop
+    // The learning rate, see training/schedule.h.
+    Schedule schedule = Schedule::cosine;
+    int64_t schedule_agent_steps = 50'000'000'000;
+    int64_t decay_agent_steps = 0;  // 0: all of them
+    int64_t warm_up_agent_steps = 0;
+    int num_steps = 128;  // steps of a rollout
     int64_t minibatch_size = 65536;
     int update_epochs = 2;
     int64_t forward_chunk = 2048;  // transitions that go through the network at once; gradients accumulate
@@ -111,10 +118,15 @@ Config load_config(const std::string& path, const std::vector<std::string>& over
 std::string to_toml(const Config& config);
 
 /// Key of the first setting that changes what a run means and in which the two differ, with both values, or empty. What
-/// may differ: when to stop and how often to save; where and on how many threads it runs, as long as images are drawn
-/// by the same rules; how many transitions go through the network at once; what is evaluated; how cameras are described
-/// (compare the rigs themselves), and all of [render] where the policy reads no images.
+/// may differ: when to stop and how often to save; the schedule of the learning rate; where and on how many threads it
+/// runs, as long as images are drawn by the same rules; how many transitions go through the network at once; what is
+/// evaluated; how cameras are described (compare the rigs themselves), and all of [render] where the policy reads no
+/// images.
 std::string first_difference(const Config& saved, const Config& now);
+
+/// The settings of the learning rate in which the two differ, as "KEY: OLD became NEW": a run that goes on may change
+/// them.
+std::vector<std::string> schedule_differences(const Config& saved, const Config& now);
 
 /// The rig that render describes.
 Rig rig_of(const Config& config);

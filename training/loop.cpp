@@ -9,9 +9,11 @@
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/parallel_for.h"
+#include "pictura/training/diagnosis.h"
 #include "pictura/training/precision.h"
 #include "pictura/training/run.h"
 #include "pictura/training/run_log.h"
+#include "pictura/training/schedule.h"
 #include "pictura/training/torch_device.h"
 
 namespace pictura {
@@ -67,8 +69,9 @@ bool collect(Run* run) {
 UpdateStats improve(Run* run) {
   const Config::Train& config = run->config.train;
   run->rollout.compute_advantages(config.gamma, config.gae_lambda, run->executor.get());
-  return ppo_update(run->policy, run->rollout, config, run->config.run.seed, run->update, run->executor.get(),
-                    &run->optimizer, &run->filter, &run->timer);
+  const UpdateKey key{run->config.run.seed, run->update, learning_rate_at(config, run->agent_steps)};
+  return ppo_update(run->policy, run->rollout, config, key, run->executor.get(), &run->optimizer, &run->filter,
+                    &run->timer);
 }
 
 }  // namespace
@@ -81,6 +84,9 @@ TrainReport train(const TrainOptions& options) {
   at::set_num_threads(resolve_num_threads(config.run.num_threads));
   set_float32_products(config.train.precision);
 
+  const auto notify = [&options](const std::string& notice) {
+    if (options.on_notice) options.on_notice(notice);
+  };
   TrainReport report;
   report.checkpoint = options.out_folder + "/checkpoint.ckpt";
   Run run(config, device);
@@ -91,11 +97,14 @@ TrainReport train(const TrainOptions& options) {
   if (options.resume) {
     const Checkpoint saved = read_checkpoint(report.checkpoint);
     const std::string why_new_episodes = run.restore(saved);
-    if (!why_new_episodes.empty() && options.on_notice) {
-      options.on_notice("the saved episodes cannot go on, new ones begin: " + why_new_episodes);
-    }
+    if (!why_new_episodes.empty()) notify("the saved episodes cannot go on, new ones begin: " + why_new_episodes);
+    for (const std::string& change : schedule_differences(saved.config, config)) notify(change);
     recent = saved.recent;
   } else {
+    if (!options.init_from.empty()) {
+      const Checkpoint other = read_checkpoint(options.init_from);
+      restore_tensors(other, other.parameters, run.policy.parameters());
+    }
     run.simulator->reset();
     run.save(options.out_folder + "/untrained.ckpt", recent);
   }
@@ -104,7 +113,8 @@ TrainReport train(const TrainOptions& options) {
 
   Stopwatch since_saved;
   double longest_update_s = 0;
-  while (run.update < config.train.updates && !report.interrupted) {
+  while (run.update < config.train.updates && !schedule_has_ended(config.train, run.agent_steps) &&
+         !report.interrupted) {
     // A fifth more, for updates that take longer than those before, and for saving.
     if (options.minutes > 0 && since_start.seconds() + 1.2 * longest_update_s > 60 * options.minutes) {
       report.out_of_time = true;
@@ -127,6 +137,7 @@ TrainReport train(const TrainOptions& options) {
     record.stats = improve(&run);
     record.update_s = watch.restart();
     record.phases_s = run.timer.take();
+    record.diagnosis = diagnose(run.rollout, record.stats.adv_threshold);
     longest_update_s = std::max(longest_update_s, record.rollout_s + record.update_s);
 
     ++run.update;

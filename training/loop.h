@@ -23,8 +23,9 @@ struct TrainOptions {
   std::string config_path;             // TOML, see configs/paper.toml for every field
   std::vector<std::string> overrides;  // "train.updates=2"
   std::string out_folder;
-  bool resume = false;  // go on from out_folder's checkpoint
-  double minutes = 0;   // of wall time, start-up included, after which no update is begun; 0: no limit
+  bool resume = false;    // go on from out_folder's checkpoint
+  std::string init_from;  // begin with the weights of this checkpoint, of the same network, and with nothing else of it
+  double minutes = 0;     // of wall time, start-up included, after which no update is begun; 0: no limit
   std::function<void(const TrainProgress&)> on_progress;
   std::function<void(const std::string&)> on_notice;  // what a person should know, and no error is
 };

@@ -1,7 +1,6 @@
 #include "pictura/training/ppo.h"
 
 #include <cmath>
-#include <numbers>
 
 #include <ATen/core/grad_mode.h>
 
@@ -45,11 +44,6 @@ at::Tensor AdamW::step(double learning_rate) {
   return norm;
 }
 
-double cosine_rate(double learning_rate, int64_t update, int64_t schedule_updates) {
-  const double done = std::min(1.0, static_cast<double>(update) / static_cast<double>(schedule_updates));
-  return learning_rate * 0.5 * (1.0 + std::cos(std::numbers::pi * done));
-}
-
 namespace {
 
 // 1 - Var(returns - values) / Var(returns): 1 is a perfect critic, 0 one that says a constant.
@@ -58,90 +52,148 @@ double explained_variance(const at::Tensor& values, const at::Tensor& returns) {
   return variance > 0 ? 1 - (returns - values).var().item<double>() / variance : 0;
 }
 
+// The transitions of a rollout, flattened: [steps * slots].
+struct Batch {
+  at::Tensor actions, old_log_probs, advantages, values, returns, valid;
+
+  explicit Batch(const Rollout& rollout)
+      : actions(rollout.actions.flatten().to(at::kLong)),
+        old_log_probs(rollout.log_probs.flatten()),
+        advantages(rollout.advantages.flatten()),
+        values(rollout.values.narrow(0, 0, rollout.num_steps()).flatten()),
+        returns(advantages + values),
+        valid(rollout.valid.flatten()) {}
+};
+
+// What the losses of some transitions are made of.
+struct Losses {
+  at::Tensor policy, value, entropy;  // with gradients
+  at::Tensor stats;                   // f64 [6], in the order of LossStats
+};
+
+Losses losses_of(const Policy::Output& output, const Batch& batch, const at::Tensor& rows, const at::Tensor& advantage,
+                 double clip_coef) {
+  const at::Tensor all_log_probs = at::log_softmax(output.logits, 1);
+  const at::Tensor log_prob = all_log_probs.gather(1, batch.actions.index_select(0, rows).unsqueeze(1)).squeeze(1);
+  const at::Tensor log_ratio = log_prob - batch.old_log_probs.index_select(0, rows);
+  const at::Tensor ratio = log_ratio.exp();
+  const at::Tensor clipped = ratio.clamp(1 - clip_coef, 1 + clip_coef);
+  Losses losses;
+  losses.policy = -at::minimum(advantage * ratio, advantage * clipped).mean();
+  losses.value = 0.5 * (output.value - batch.returns.index_select(0, rows)).square().mean();
+  losses.entropy = -(all_log_probs.exp() * all_log_probs).sum(1).mean();
+  const at::NoGradGuard no_grad;
+  // Schulman's estimator of the KL divergence, (ratio - 1) - log ratio: unbiased and never negative.
+  const at::Tensor approx_kl = (ratio - 1 - log_ratio).mean();
+  const at::Tensor clip_fraction = ((ratio - 1).abs() > clip_coef).to(at::kFloat).mean();
+  losses.stats =
+      at::stack({losses.policy, losses.value, losses.entropy, approx_kl, clip_fraction, log_ratio.abs().mean()})
+          .detach()
+          .to(at::kDouble);
+  return losses;
+}
+
+// The norm of a loss's gradient over all parameters.
+at::Tensor gradient_norm(const at::Tensor& loss, const Policy& policy) {
+  for (const NamedTensor& parameter : policy.parameters()) parameter.value.mutable_grad().reset();
+  loss.backward(/*gradient=*/{}, /*retain_graph=*/true);
+  std::vector<at::Tensor> gradients;
+  for (const NamedTensor& parameter : policy.parameters()) {
+    if (parameter.value.grad().defined()) gradients.push_back(parameter.value.grad());
+    parameter.value.mutable_grad().reset();
+  }
+  return at::stack(at::_foreach_norm(gradients, 2)).norm();
+}
+
+constexpr int64_t kNumStats = 7;  // of LossStats
+
+LossStats loss_stats(const at::Tensor& row) {
+  const double* const values = row.const_data_ptr<double>();
+  return {values[0], values[1], values[2], values[3], values[4], values[5], values[6]};
+}
+
 }  // namespace
 
-UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Config::Train& config, uint64_t seed,
-                       int64_t update, LearnerExecutor* executor, AdamW* optimizer, AdvantageFilter* filter,
-                       PhaseTimer* timer) {
+UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Config::Train& config, const UpdateKey& key,
+                       LearnerExecutor* executor, AdamW* optimizer, AdvantageFilter* filter, PhaseTimer* timer) {
   UpdateStats stats;
-  // The batch: transitions of all agents and steps, flattened.
-  const at::Tensor actions = rollout.actions.flatten().to(at::kLong), old_log_probs = rollout.log_probs.flatten();
-  const at::Tensor advantages = rollout.advantages.flatten();
-  const at::Tensor values = rollout.values.narrow(0, 0, rollout.num_steps()).flatten();
-  const at::Tensor returns = advantages + values;
+  stats.learning_rate = key.learning_rate;
+  const Batch batch(rollout);
 
   // Filter, once per rollout.
-  const float max_advantage = advantages.abs().max().item<float>();
-  PICTURA_CHECK(std::isfinite(max_advantage), "update {}: an advantage is not finite", update + 1);
+  const float max_advantage = batch.advantages.abs().max().item<float>();
+  PICTURA_CHECK(std::isfinite(max_advantage), "update {}: an advantage is not finite", key.update + 1);
   const float threshold = filter->threshold(max_advantage, config.adv_filter_ema, config.adv_filter_threshold);
   stats.adv_threshold = static_cast<double>(threshold);
-  const at::Tensor valid = rollout.valid.flatten();
-  const at::Tensor kept_and_unused = at::empty_like(advantages, at::kLong);
-  const int64_t num_kept = executor->select_kept(span_of<const float>(advantages), span_of<const uint8_t>(valid),
-                                                 threshold, span_of<int64_t>(kept_and_unused));
+  const at::Tensor kept_and_unused = at::empty_like(batch.advantages, at::kLong);
+  const int64_t num_kept =
+      executor->select_kept(span_of<const float>(batch.advantages), span_of<const uint8_t>(batch.valid), threshold,
+                            span_of<int64_t>(kept_and_unused));
   const at::Tensor kept = kept_and_unused.narrow(0, 0, num_kept), shuffled = at::empty_like(kept);
-  const int64_t num_valid = valid.sum().item<int64_t>();
   if (num_kept == 0) return stats;
-  stats.kept_fraction = static_cast<double>(num_kept) / static_cast<double>(num_valid);
-  stats.explained_variance = explained_variance(values.index_select(0, kept), returns.index_select(0, kept));
+  const at::Tensor valid = at::nonzero(batch.valid).squeeze(1);
+  stats.kept_fraction = static_cast<double>(num_kept) / static_cast<double>(valid.size(0));
+  stats.explained_variance =
+      explained_variance(batch.values.index_select(0, valid), batch.returns.index_select(0, valid));
 
-  const double rate = cosine_rate(config.learning_rate, update, config.schedule_updates);
   const int64_t num_minibatches = (num_kept + config.minibatch_size - 1) / config.minibatch_size;
-  at::Tensor sums = at::zeros({6}, advantages.options().dtype(at::kDouble));
+  // Sums over the minibatches of each epoch; the last row is the first minibatch.
+  const at::Tensor sums =
+      at::zeros({config.update_epochs + 1, kNumStats}, batch.advantages.options().dtype(at::kDouble));
+  std::vector<at::Tensor> first_norms;
   for (int epoch = 0; epoch < config.update_epochs; ++epoch) {
-    executor->permute(Permutation(seed, update, epoch, num_kept), span_of<const int64_t>(kept),
+    executor->permute(Permutation(key.seed, key.update, epoch, num_kept), span_of<const int64_t>(kept),
                       span_of<int64_t>(shuffled));
     for (int64_t m = 0; m < num_minibatches; ++m) {
       // Minibatches of equal size, to one transition.
       const int64_t begin = num_kept * m / num_minibatches, end = num_kept * (m + 1) / num_minibatches;
       const at::Tensor minibatch = shuffled.narrow(0, begin, end - begin);
-      at::Tensor minibatch_advantages = advantages.index_select(0, minibatch);
+      at::Tensor advantages = batch.advantages.index_select(0, minibatch);
       if (config.norm_adv && end - begin > 1) {
-        minibatch_advantages =
-            (minibatch_advantages - minibatch_advantages.mean()) / (minibatch_advantages.std() + 1e-8);
+        advantages = (advantages - advantages.mean()) / (advantages.std() + 1e-8);
       }
 
+      const at::Tensor minibatch_stats = at::zeros({kNumStats}, sums.options());
       for (int64_t chunk = 0; chunk < end - begin; chunk += config.forward_chunk) {
         const int64_t size = std::min(config.forward_chunk, end - begin - chunk);
         const double weight = static_cast<double>(size) / static_cast<double>(end - begin);
         const at::Tensor rows = minibatch.narrow(0, chunk, size);
-        const at::Tensor advantage = minibatch_advantages.narrow(0, chunk, size);
-
         const Observation observation = rollout.observations.gather(rows);
         const PhaseTimer::Scope timed(timer, Phase::learn);
-        const Policy::Output output = policy.forward(observation);
-        const at::Tensor all_log_probs = at::log_softmax(output.logits, 1);
-        const at::Tensor log_prob = all_log_probs.gather(1, actions.index_select(0, rows).unsqueeze(1)).squeeze(1);
-        const at::Tensor log_ratio = log_prob - old_log_probs.index_select(0, rows);
-        const at::Tensor ratio = log_ratio.exp();
-        const at::Tensor clipped = ratio.clamp(1 - config.clip_coef, 1 + config.clip_coef);
-
-        const at::Tensor policy_loss = -at::minimum(advantage * ratio, advantage * clipped).mean();
-        const at::Tensor value_loss = 0.5 * (output.value - returns.index_select(0, rows)).square().mean();
-        const at::Tensor entropy = -(all_log_probs.exp() * all_log_probs).sum(1).mean();
-        const at::Tensor loss = policy_loss + config.vf_coef * value_loss - config.ent_coef * entropy;
+        const Losses losses =
+            losses_of(policy.forward(observation), batch, rows, advantages.narrow(0, chunk, size), config.clip_coef);
+        if (stats.minibatches == 0 && chunk == 0) {
+          for (const at::Tensor& loss :
+               {losses.policy, config.vf_coef * losses.value, config.ent_coef * losses.entropy}) {
+            first_norms.push_back(gradient_norm(loss, policy));
+          }
+        }
+        const at::Tensor loss = losses.policy + config.vf_coef * losses.value - config.ent_coef * losses.entropy;
         (loss * weight).backward();
-
-        const at::NoGradGuard no_grad;
-        // Schulman's estimator of the KL divergence, (ratio - 1) - log ratio: unbiased and never negative.
-        const at::Tensor approx_kl = (ratio - 1 - log_ratio).mean();
-        const at::Tensor clip_fraction = ((ratio - 1).abs() > config.clip_coef).to(at::kFloat).mean();
-        sums.narrow(0, 0, 5) +=
-            weight * at::stack({policy_loss, value_loss, entropy, approx_kl, clip_fraction}).detach().to(at::kDouble);
+        minibatch_stats.narrow(0, 0, kNumStats - 1) += weight * losses.stats;
       }
       const PhaseTimer::Scope timed(timer, Phase::optimize);
-      sums[5] += optimizer->step(rate);
+      minibatch_stats[kNumStats - 1] = optimizer->step(key.learning_rate);
+      sums[epoch] += minibatch_stats;
+      if (stats.minibatches == 0) sums[config.update_epochs] += minibatch_stats;
       ++stats.minibatches;
     }
   }
 
-  double* const means[] = {&stats.policy_loss, &stats.value_loss,    &stats.entropy,
-                           &stats.approx_kl,   &stats.clip_fraction, &stats.grad_norm};
-  const at::Tensor all = (sums / static_cast<double>(stats.minibatches)).cpu();
-  for (int64_t i = 0; i < 6; ++i) *means[i] = all[i].item<double>();
-  PICTURA_CHECK(std::isfinite(stats.policy_loss + stats.value_loss + stats.entropy) && std::isfinite(stats.grad_norm),
-                "update {}: the loss is not finite (policy {}, value {}, entropy {}, gradient norm {})", update + 1,
-                stats.policy_loss, stats.value_loss, stats.entropy, stats.grad_norm);
+  const at::Tensor all = sums.cpu(), epochs = all.narrow(0, 0, config.update_epochs);
+  stats.all = loss_stats(epochs.sum(0) / static_cast<double>(stats.minibatches));
+  stats.first = loss_stats(all[config.update_epochs]);
+  for (int epoch = 0; epoch < config.update_epochs; ++epoch) {
+    stats.epochs.push_back(loss_stats(epochs[epoch] / static_cast<double>(num_minibatches)));
+  }
+  const at::Tensor norms = at::stack(first_norms).cpu();
+  stats.policy_grad_norm = norms[0].item<double>();
+  stats.value_grad_norm = norms[1].item<double>();
+  stats.entropy_grad_norm = norms[2].item<double>();
+  const LossStats& means = stats.all;
+  PICTURA_CHECK(std::isfinite(means.policy_loss + means.value_loss + means.entropy) && std::isfinite(means.grad_norm),
+                "update {}: the loss is not finite (policy {}, value {}, entropy {}, gradient norm {})", key.update + 1,
+                means.policy_loss, means.value_loss, means.entropy, means.grad_norm);
   return stats;
 }
 

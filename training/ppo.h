@@ -30,20 +30,34 @@ class AdamW {
   Config::Train config_;
 };
 
-/// Cosine from learning_rate at update 0 to 0 at schedule_updates and beyond.
-double cosine_rate(double learning_rate, int64_t update, int64_t schedule_updates);
+/// Means over minibatches; docs/training.md defines them.
+struct LossStats {
+  double policy_loss = 0, value_loss = 0, entropy = 0, approx_kl = 0, clip_fraction = 0, abs_log_ratio = 0;
+  double grad_norm = 0;
+};
 
-/// Means over the update's minibatches; docs/training.md defines them.
 struct UpdateStats {
-  double policy_loss = 0, value_loss = 0, entropy = 0, approx_kl = 0, clip_fraction = 0, grad_norm = 0;
-  double explained_variance = 0, kept_fraction = 0, adv_threshold = 0;
+  LossStats all;                  // of the whole update
+  LossStats first;                // of its first minibatch, before the parameters change
+  std::vector<LossStats> epochs;  // of each
+  /// Of the first minibatch's gradient by each loss alone, with its coefficient.
+  double policy_grad_norm = 0, value_grad_norm = 0, entropy_grad_norm = 0;
+  double learning_rate = 0;
+  double explained_variance = 0;  // over all valid transitions
+  double kept_fraction = 0, adv_threshold = 0;
   int64_t minibatches = 0;
 };
 
-/// Improves the policy on a rollout with advantages; `update` and `seed` name the order of the transitions. Throws
-/// Error when a loss is not finite.
-UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Config::Train& config, uint64_t seed,
-                       int64_t update, LearnerExecutor* executor, AdamW* optimizer_inout, AdvantageFilter* filter_inout,
+/// What names an update: its transitions' order, and its rate.
+struct UpdateKey {
+  uint64_t seed = 0;
+  int64_t update = 0;
+  double learning_rate = 0;
+};
+
+/// Improves the policy on a rollout with advantages. Throws Error when a loss is not finite.
+UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Config::Train& config, const UpdateKey& key,
+                       LearnerExecutor* executor, AdamW* optimizer_inout, AdvantageFilter* filter_inout,
                        PhaseTimer* timer = nullptr);
 
 }  // namespace pictura

@@ -18,38 +18,51 @@ Scalars scalars_of(const Config& config, const TrainProgress& progress, const Up
   const UpdateStats& stats = record.stats;
   const auto steps = static_cast<double>(totals.agent_steps);
   const double km = totals.distance_m / 1000;
-  auto per_km = [km](int64_t count) { return static_cast<double>(count) / km; };
   Scalars scalars{
       {"charts/agent_steps", static_cast<double>(progress.agent_steps)},
       {"charts/agent_steps_per_s", progress.agent_steps_per_s},
-      {"charts/learning_rate",
-       cosine_rate(config.train.learning_rate, progress.update - 1, config.train.schedule_updates)},
+      {"charts/learning_rate", stats.learning_rate},
       {"charts/episode_return", progress.episode_return},
       {"charts/reward_per_step", totals.reward / steps},
       {"charts/live_share", steps / static_cast<double>(totals.slot_steps)},
-      {"driving/mean_speed_mps", totals.distance_m / (static_cast<double>(simulator_config(config).dt_s) * steps)},
-      {"driving/goals_per_km", per_km(totals.goals_reached)},
-      {"driving/waypoints_per_km", per_km(totals.waypoints_reached)},
-      {"driving/waypoints_per_1000_steps", 1000 * static_cast<double>(totals.waypoints_reached) / steps},
-      {"driving/collisions_per_km", per_km(totals.collisions)},
-      {"driving/at_fault_collisions_per_km", per_km(totals.at_fault_collisions)},
-      {"driving/off_road_per_km", per_km(totals.off_road)},
-      {"driving/red_light_per_km", per_km(totals.red_light)},
-      {"driving/wall_contacts_per_km", per_km(totals.wall_contacts)},
-      {"losses/policy_loss", stats.policy_loss},
-      {"losses/value_loss", stats.value_loss},
-      {"losses/entropy", stats.entropy},
-      {"losses/approx_kl", stats.approx_kl},
-      {"losses/clip_fraction", stats.clip_fraction},
-      {"losses/explained_variance", stats.explained_variance},
-      {"losses/grad_norm", stats.grad_norm},
-      {"losses/kept_fraction", stats.kept_fraction},
-      {"losses/adv_threshold", stats.adv_threshold},
-      {"time/rollout_s", record.rollout_s},
-      {"time/update_s", record.update_s}};
+      {"driving/mean_speed_mps", totals.distance_m / (static_cast<double>(simulator_config(config).dt_s) * steps)}};
+  for (const auto& [name, count] :
+       {std::pair{"goals", totals.goals_reached}, std::pair{"waypoints", totals.waypoints_reached},
+        std::pair{"collisions", totals.collisions}, std::pair{"at_fault_collisions", totals.at_fault_collisions},
+        std::pair{"off_road", totals.off_road}, std::pair{"red_light", totals.red_light},
+        std::pair{"wall_contacts", totals.wall_contacts}}) {
+    scalars.emplace_back(fmt::format("driving/{}_per_km", name), static_cast<double>(count) / km);
+    scalars.emplace_back(fmt::format("driving/{}_per_1000_steps", name), 1000 * static_cast<double>(count) / steps);
+  }
+  const auto add_losses = [&scalars](const std::string& suffix, const LossStats& losses) {
+    for (const auto& [name, value] :
+         {std::pair{"entropy", losses.entropy}, std::pair{"approx_kl", losses.approx_kl},
+          std::pair{"clip_fraction", losses.clip_fraction}, std::pair{"abs_log_ratio", losses.abs_log_ratio}}) {
+      scalars.emplace_back(fmt::format("losses/{}{}", name, suffix), value);
+    }
+  };
+  scalars.emplace_back("losses/policy_loss", stats.all.policy_loss);
+  scalars.emplace_back("losses/value_loss", stats.all.value_loss);
+  add_losses("", stats.all);
+  add_losses("_first", stats.first);
+  for (int epoch = 0; epoch < config.train.update_epochs; ++epoch) {
+    const auto index = static_cast<size_t>(epoch);
+    add_losses(fmt::format("_epoch_{}", epoch + 1), index < stats.epochs.size() ? stats.epochs[index] : LossStats{});
+  }
+  for (const auto& [name, value] :
+       {std::pair{"losses/explained_variance", stats.explained_variance},
+        std::pair{"losses/grad_norm", stats.all.grad_norm},
+        std::pair{"losses/policy_grad_norm", stats.policy_grad_norm},
+        std::pair{"losses/value_grad_norm", stats.value_grad_norm},
+        std::pair{"losses/entropy_grad_norm", stats.entropy_grad_norm},
+        std::pair{"losses/kept_fraction", stats.kept_fraction}, std::pair{"losses/adv_threshold", stats.adv_threshold},
+        std::pair{"time/rollout_s", record.rollout_s}, std::pair{"time/update_s", record.update_s}}) {
+    scalars.emplace_back(name, value);
+  }
   for (size_t i = 0; i < kNumPhases; ++i) {
     scalars.emplace_back(fmt::format("time/{}_s", kPhaseNames[i]), record.phases_s[i]);
   }
+  scalars.insert(scalars.end(), record.diagnosis.begin(), record.diagnosis.end());
   return scalars;
 }
 
@@ -103,8 +116,14 @@ TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecor
   progress.agent_steps_per_s = static_cast<double>(agent_steps - first_agent_steps_) / elapsed_s;
   progress.episode_return = episode_return();
   progress.goals_per_km = goals_per_km();
-  progress.eta_s =
-      elapsed_s / static_cast<double>(update - first_update_) * static_cast<double>(config_.train.updates - update);
+  // To the last update, or to the end of the schedule, whichever comes first.
+  const auto done = static_cast<double>(update - first_update_),
+             steps_done = static_cast<double>(agent_steps - first_agent_steps_);
+  progress.eta_s = elapsed_s / done * static_cast<double>(config_.train.updates - update);
+  if (config_.train.schedule != Schedule::constant) {
+    const auto steps_left = static_cast<double>(std::max<int64_t>(0, config_.train.schedule_agent_steps - agent_steps));
+    progress.eta_s = std::min(progress.eta_s, elapsed_s / steps_done * steps_left);
+  }
 
   const Scalars scalars = scalars_of(config_, progress, record);
   csv_.write(update, scalars);

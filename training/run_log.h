@@ -27,6 +27,7 @@ class ProgressCsv {
 struct UpdateRecord {
   SimulatorTotals totals;  // counted in its rollout
   UpdateStats stats;
+  Scalars diagnosis;                   // see diagnosis.h
   double rollout_s = 0, update_s = 0;  // wall time of collecting, and of improving
   PhaseSeconds phases_s{};             // in both
 };

@@ -23,7 +23,7 @@ SCENES = pathlib.Path(__file__).resolve().parents[1] / "golden"
 TINY = [
     "--config", str(CONFIGS / "smoke.toml"),
     "--set", "simulator.num_slots=6", "--set", "simulator.min_agents=3", "--set", "simulator.max_agents=3",
-    "--set", "train.num_steps=8", "--set", "train.minibatch_size=48", "--set", "train.schedule_updates=4",
+    "--set", "train.num_steps=8", "--set", "train.minibatch_size=48", "--set", "train.schedule_agent_steps=1000000",
     "--set", "render.width_px=16", "--set", "render.height_px=9", "--set", "run.num_threads=2",
 ]  # fmt: skip
 

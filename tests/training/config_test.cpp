@@ -13,6 +13,7 @@ namespace pictura {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 std::string message_of(const std::string& text, const std::vector<std::string>& overrides = {}) {
@@ -195,8 +196,11 @@ TEST(Config, DifferencesThatChangeTheRunAreNamed) {
   b.render.line_floor_px = 1;
   EXPECT_EQ(first_difference(a, b), "render.line_floor_px: 0.35 became 1.0");
   b = a;
-  b.train.schedule_updates = 3;
-  EXPECT_THAT(first_difference(a, b), HasSubstr("train.schedule_updates"));
+  b.train.schedule_agent_steps = 3;
+  b.train.learning_rate = 1;
+  EXPECT_EQ(first_difference(a, b), "");
+  EXPECT_THAT(schedule_differences(a, b), ElementsAre("train.schedule_agent_steps: 50000000000 became 3",
+                                                      "train.learning_rate: 0.0005 became 1.0"));
   b = a;
   b.simulator.wall_seed = 3;
   EXPECT_THAT(first_difference(a, b), HasSubstr("simulator.wall_seed"));

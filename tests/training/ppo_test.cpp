@@ -12,6 +12,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
 #include "pictura/training/rules/choose_action.h"
+#include "pictura/training/schedule.h"
 
 namespace pictura {
 namespace {
@@ -99,12 +100,33 @@ TEST(AdvantageFilter, FollowsTheExponentialAverageOfTheMaxima) {
   EXPECT_FLOAT_EQ(filter.threshold(0, 0.25, 0.01), 0.0525f);
 }
 
-TEST(Schedule, IsACosineThatEndsAtZero) {
-  EXPECT_DOUBLE_EQ(cosine_rate(2.0, 0, 100), 2.0);
-  EXPECT_NEAR(cosine_rate(2.0, 25, 100), 1 + std::sqrt(0.5), 1e-12);
-  EXPECT_NEAR(cosine_rate(2.0, 50, 100), 1.0, 1e-12);
-  EXPECT_NEAR(cosine_rate(2.0, 100, 100), 0.0, 1e-12);
-  EXPECT_NEAR(cosine_rate(2.0, 150, 100), 0.0, 1e-12);
+TEST(Schedule, FallsToZeroOverItsLastPart) {
+  Config::Train train;
+  train.learning_rate = 2;
+  train.schedule_agent_steps = 100;
+  EXPECT_DOUBLE_EQ(learning_rate_at(train, 0), 2);
+  EXPECT_NEAR(learning_rate_at(train, 25), 1 + std::sqrt(0.5), 1e-12);
+  EXPECT_NEAR(learning_rate_at(train, 100), 0, 1e-12);
+  EXPECT_NEAR(learning_rate_at(train, 150), 0, 1e-12);
+  train.schedule = Schedule::linear;
+  train.decay_agent_steps = 20;
+  EXPECT_DOUBLE_EQ(learning_rate_at(train, 80), 2);
+  EXPECT_DOUBLE_EQ(learning_rate_at(train, 95), 0.5);
+  EXPECT_FALSE(schedule_has_ended(train, 99));
+  EXPECT_TRUE(schedule_has_ended(train, 100));
+  train.schedule = Schedule::constant;
+  EXPECT_DOUBLE_EQ(learning_rate_at(train, 1000), 2);
+  EXPECT_FALSE(schedule_has_ended(train, 1000));
+}
+
+TEST(Schedule, RisesFromATenth) {
+  Config::Train train;
+  train.learning_rate = 2;
+  train.schedule = Schedule::constant;
+  train.warm_up_agent_steps = 10;
+  EXPECT_DOUBLE_EQ(learning_rate_at(train, 0), 0.2);
+  EXPECT_DOUBLE_EQ(learning_rate_at(train, 5), 1.1);
+  EXPECT_DOUBLE_EQ(learning_rate_at(train, 10), 2);
 }
 
 TEST(Permutation, TakesEveryElementOnceAndOnlyItsArgumentsDecide) {
@@ -200,7 +222,8 @@ struct Corridor {
   }
   UpdateStats update(const Policy& policy, const Config::Train& train, int64_t number, AdamW* optimizer,
                      AdvantageFilter* filter) {
-    return ppo_update(policy, rollout, train, 1, number, executor.get(), optimizer, filter);
+    const UpdateKey key{1, number, learning_rate_at(train, 0)};
+    return ppo_update(policy, rollout, train, key, executor.get(), optimizer, filter);
   }
 
   static Observation storage() {
@@ -264,7 +287,7 @@ TEST(Ppo, LearnsATaskWithDelayedReward) {
   train.minibatch_size = 256;
   train.forward_chunk = 100;
   train.learning_rate = 3e-3;
-  train.schedule_updates = 60;
+  train.schedule = Schedule::constant;
   train.gamma = 0.9;
   train.update_epochs = 4;
   AdamW optimizer(policy, train);

@@ -1,0 +1,27 @@
+#include "pictura/training/schedule.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace pictura {
+
+double learning_rate_at(const Config::Train& config, int64_t agent_steps) {
+  const auto done = static_cast<double>(agent_steps);
+  double rate = config.learning_rate;
+  if (config.warm_up_agent_steps > 0) {
+    constexpr double kFirst = 0.1;
+    rate *= kFirst + (1 - kFirst) * std::min(1.0, done / static_cast<double>(config.warm_up_agent_steps));
+  }
+  if (config.schedule == Schedule::constant) return rate;
+  const auto end = static_cast<double>(config.schedule_agent_steps);
+  const double length = config.decay_agent_steps > 0 ? static_cast<double>(config.decay_agent_steps) : end;
+  const double fallen = std::clamp((done - (end - length)) / length, 0.0, 1.0);
+  return rate * (config.schedule == Schedule::linear ? 1 - fallen : 0.5 * (1 + std::cos(std::numbers::pi * fallen)));
+}
+
+bool schedule_has_ended(const Config::Train& config, int64_t agent_steps) {
+  return config.schedule != Schedule::constant && agent_steps >= config.schedule_agent_steps;
+}
+
+}  // namespace pictura
