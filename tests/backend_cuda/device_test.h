@@ -1,8 +1,9 @@
-// The fixture of tests that need a CUDA device. Without one they are skipped, unless PICTURA_REQUIRE_GPU=1 says that
-// there must be one.
+// The fixture of tests that need a CUDA device, and what they capture work with. Without a device they are skipped,
+// unless PICTURA_REQUIRE_GPU=1 says that there must be one.
 #pragma once
 
 #include <cstdlib>
+#include <functional>
 #include <string>
 
 #include <cuda_runtime_api.h>
@@ -25,6 +26,33 @@ class DeviceTest : public testing::Test {
     if (required && std::string(required) == "1") FAIL() << "PICTURA_REQUIRE_GPU=1, but " << why;
     GTEST_SKIP() << "no CUDA device: " << why;
   }
+};
+
+/// A stream that waits for no other.
+struct OwnStream {
+  cudaStream_t stream = nullptr;
+  OwnStream() { PICTURA_CUDA(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking)); }
+  ~OwnStream() { cudaStreamDestroy(stream); }
+  OwnStream(const OwnStream&) = delete;
+  OwnStream& operator=(const OwnStream&) = delete;
+};
+
+/// What work puts on a stream, as a graph: captures refuse every call that allocates or waits.
+struct CapturedGraph {
+  cudaGraph_t graph = nullptr;
+  cudaGraphExec_t executable = nullptr;
+  CapturedGraph(cudaStream_t stream, const std::function<void()>& work) {
+    PICTURA_CUDA(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal));
+    EXPECT_NO_THROW(work());
+    PICTURA_CUDA(cudaStreamEndCapture(stream, &graph));
+    PICTURA_CUDA(cudaGraphInstantiate(&executable, graph, 0));
+  }
+  ~CapturedGraph() {
+    cudaGraphExecDestroy(executable);
+    cudaGraphDestroy(graph);
+  }
+  CapturedGraph(const CapturedGraph&) = delete;
+  CapturedGraph& operator=(const CapturedGraph&) = delete;
 };
 
 /// While it lives, allocations and device-wide waits of this thread are errors: CUDA forbids them during a capture.

@@ -23,6 +23,8 @@
 namespace pictura {
 namespace {
 
+using test::CapturedGraph;
+using test::OwnStream;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -247,31 +249,6 @@ TEST_F(CudaStreamTest, IsCapturedIntoAGraph) {
   PICTURA_CUDA(cudaGraphDestroy(graph));
   PICTURA_CUDA(cudaStreamDestroy(stream));
 }
-
-struct CapturedGraph {
-  cudaGraph_t graph = nullptr;
-  cudaGraphExec_t executable = nullptr;
-  CapturedGraph(cudaStream_t stream, const std::function<void()>& work) {
-    PICTURA_CUDA(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal));
-    EXPECT_NO_THROW(work());
-    PICTURA_CUDA(cudaStreamEndCapture(stream, &graph));
-    PICTURA_CUDA(cudaGraphInstantiate(&executable, graph, 0));
-  }
-  ~CapturedGraph() {
-    cudaGraphExecDestroy(executable);
-    cudaGraphDestroy(graph);
-  }
-  CapturedGraph(const CapturedGraph&) = delete;
-  CapturedGraph& operator=(const CapturedGraph&) = delete;
-};
-
-struct OwnStream {
-  cudaStream_t stream = nullptr;
-  OwnStream() { PICTURA_CUDA(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking)); }
-  ~OwnStream() { cudaStreamDestroy(stream); }
-  OwnStream(const OwnStream&) = delete;
-  OwnStream& operator=(const OwnStream&) = delete;
-};
 
 TEST_F(CudaStreamTest, ACaptureAfterReserveNeedsNoCallBefore) {
   const std::vector<uint8_t> expected = bytes_of(Stage(60, 7, {.rig = paper_rig()}).draw());

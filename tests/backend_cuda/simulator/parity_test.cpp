@@ -12,6 +12,7 @@
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
 #include "pictura/tests/backend_cuda/device_test.h"
+#include "pictura/tests/backend_cuda/on_host.h"
 #include "pictura/tests/simulator/same_bits.h"
 #include "pictura/tests/support/error_message.h"
 
@@ -19,27 +20,12 @@ namespace pictura {
 
 namespace {
 
+using test::on_host;
+using test::same;
 using ::testing::HasSubstr;
 using Maps = std::vector<std::shared_ptr<const RoadMap>>;
 
 class CudaSimulatorTest : public test::DeviceTest {};
-
-/// Of device memory, once the device has written it.
-template <typename T>
-std::vector<std::remove_const_t<T>> on_host(Span<T> device) {
-  std::vector<std::remove_const_t<T>> host(device.size());
-  PICTURA_CUDA(cudaDeviceSynchronize());
-  if (!host.empty()) {
-    PICTURA_CUDA(cudaMemcpy(host.data(), device.data(), host.size() * sizeof(T), cudaMemcpyDeviceToHost));
-  }
-  return host;
-}
-
-template <typename T>
-bool same(Span<T> host, Span<T> device) {
-  const auto copy = on_host(device);
-  return testing::same_bits(Span<const T>(host), Span<const T>(copy));
-}
 
 /// Of actions in the memory of a simulator.
 Array array_of(const DeviceBuffer<int32_t>& actions, const Simulator& simulator) {

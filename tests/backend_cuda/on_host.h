@@ -1,0 +1,31 @@
+// Device memory as tests look at it.
+#pragma once
+
+#include <type_traits>
+#include <vector>
+
+#include "pictura/common/cuda/check.h"
+#include "pictura/common/span.h"
+#include "pictura/tests/simulator/same_bits.h"
+
+namespace pictura::test {
+
+/// Of device memory, once the device has written it.
+template <typename T>
+std::vector<std::remove_const_t<T>> on_host(Span<T> device) {
+  std::vector<std::remove_const_t<T>> host(device.size());
+  PICTURA_CUDA(cudaDeviceSynchronize());
+  if (!host.empty()) {
+    PICTURA_CUDA(cudaMemcpy(host.data(), device.data(), host.size() * sizeof(T), cudaMemcpyDeviceToHost));
+  }
+  return host;
+}
+
+/// Whether host and device memory hold the same bits.
+template <typename T>
+bool same(Span<T> host, Span<T> device) {
+  const auto copy = on_host(device);
+  return pictura::testing::same_bits(Span<const T>(host), Span<const T>(copy));
+}
+
+}  // namespace pictura::test
