@@ -11,16 +11,15 @@ struct HistoryViews {
   int32_t num_steps = 0, worlds_per_step = 0, agents_per_step = 0;
 
   PICTURA_HD View at(int64_t row) const {
-    View view;
-    if (row < 0 || row >= num_steps * views_per_step) {
-      view.world = -1;
-      return view;
-    }
+    View nowhere;
+    nowhere.world = -1;
+    if (row < 0 || row >= num_steps * views_per_step) return nowhere;
+    View view = views[row];
+    // Shifted, what is no world or agent of its own step could be one of another.
+    if (view.world < 0 || view.world >= worlds_per_step || view.ego_agent >= agents_per_step) return nowhere;
     const auto step = static_cast<int32_t>(row / views_per_step);
-    view = views[row];
     view.world += step * worlds_per_step;
     if (view.ego_agent >= 0) view.ego_agent += step * agents_per_step;
-    view.hidden_begin = view.hidden_end = 0;
     return view;
   }
 };

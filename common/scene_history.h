@@ -36,8 +36,9 @@ class SceneHistory {
   /// All steps that have been put.
   virtual SceneBatch scene() const = 0;
 
-  /// The views, in scene(), of rows step * size().views + view. Rows of steps that have not been put give a view that
-  /// renderers refuse. Throws Error where there are not as many rows as views_out.
+  /// The views, in scene(), of rows step * size().views + view. Rows of steps that have not been put, and views that
+  /// renderers would refuse of their own step, give a view that they refuse. Throws Error where there are not as many
+  /// rows as views_out.
   void gather(Span<const int64_t> rows, Span<View> views_out, Stream stream = {}) const;
 
  protected:

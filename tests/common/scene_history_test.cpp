@@ -210,6 +210,22 @@ TEST(SceneHistory, RowsOfStepsThatWereNotPutAreRefusedByRenderers) {
   }
 }
 
+TEST(SceneHistory, ViewsThatAreRefusedOfTheirStepAreRefusedOfTheHistory) {
+  const std::vector<std::function<void(View*)>> damages{
+      [](View* view) { view->world = -1; }, [](View* view) { view->world = kWorlds; },
+      [](View* view) { view->ego_agent = kAgents; }, [](View* view) { view->ego_agent = -2; },
+      [](View* view) { view->hidden_end = 1; }};
+  for (std::size_t i = 0; i < damages.size(); ++i) {
+    const std::unique_ptr<SceneHistory> history = history_of(kSteps);
+    Step damaged = make_step(1);
+    damages[i](&damaged.views[4]);
+    ASSERT_NE(message_of([&] { draw(damaged.scene.batch(), damaged.views); }), test::kNoError) << i;
+    history->put(1, damaged.scene.batch(), damaged.views);
+    EXPECT_NE(message_of([&] { draw(history->scene(), gathered(*history, {kViews + 4})); }), test::kNoError) << i;
+    EXPECT_NO_THROW(draw(history->scene(), gathered(*history, {kViews + 3, kViews + 5}))) << i;
+  }
+}
+
 TEST(SceneHistory, ScenesOfAnotherDeviceOrSizeAreRefusedByName) {
   const std::unique_ptr<SceneHistory> history = history_of(1);
   const Step step = make_step(1);
