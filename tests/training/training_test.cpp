@@ -5,7 +5,6 @@
 #include <cstring>
 #include <filesystem>
 #include <functional>
-#include <sstream>
 
 #include <gmock/gmock.h>
 
@@ -21,8 +20,7 @@
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/missing_renderer.h"
 #include "pictura/tests/support/scratch_folder.h"
-#include "pictura/training/evaluation/evaluate.h"
-#include "pictura/training/loop.h"
+#include "pictura/tests/training/small_runs.h"
 #include "pictura/training/observation.h"
 #include "pictura/training/run.h"
 #include "pictura/training/session.h"
@@ -31,53 +29,18 @@ namespace pictura {
 namespace {
 
 using test::message_of;
+using test::one_scenario;
+using test::read_table;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 class Training : public ::testing::Test {
  protected:
   TrainOptions options(const std::string& run, const std::vector<std::string>& more = {}) const {
-    TrainOptions o;
-    o.config_path = PICTURA_SOURCE_DIR "/configs/smoke.toml";
-    o.out_folder = folder_ / run;
-    o.overrides = {"run.device=cpu",
-                   "run.num_threads=1",
-                   "render.backend=cpu",
-                   "render.width_px=16",
-                   "render.height_px=9",
-                   "simulator.num_slots=8",
-                   "train.num_steps=12",
-                   "policy.conv_channels=[4, 8]",
-                   "policy.conv_kernels=[3, 3]",
-                   "policy.conv_strides=[2, 2]"};
-    o.overrides.insert(o.overrides.end(), more.begin(), more.end());
-    return o;
+    return test::small_run(folder_ / run, "cpu", more);
   }
   test::ScratchFolder folder_;
 };
-
-/// One short evaluation on the procedural map.
-EvaluateOptions one_scenario(const std::string& checkpoint, int steps) {
-  EvaluateOptions o;
-  o.device = "cpu";
-  o.checkpoint = checkpoint;
-  o.maps = {"procedural"};
-  o.scenarios = 1;
-  o.steps = steps;
-  o.num_threads = 1;
-  return o;
-}
-
-std::vector<std::vector<std::string>> read_table(const std::string& path) {
-  std::vector<std::vector<std::string>> rows;
-  std::istringstream lines(read_file(path));
-  for (std::string line; std::getline(lines, line);) {
-    std::istringstream cells(line);
-    rows.emplace_back();
-    for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(cell);
-  }
-  return rows;
-}
 
 TEST_F(Training, ResumesExactly) {
   const TrainReport whole = train(options("whole"));
@@ -109,6 +72,89 @@ TEST_F(Training, ResumesExactly) {
       EXPECT_EQ(parts[row][column], all[row][column]) << name << " of row " << row;
     }
   }
+}
+
+TEST_F(Training, EndsWhenItsMinutesAreOverAndGoesOnExactly) {
+  const TrainReport half = train(options("parts", {"train.updates=2"}));
+  EXPECT_FALSE(half.out_of_time);
+  // Over before the first update that is left.
+  TrainOptions rest = options("parts");
+  rest.resume = true;
+  rest.minutes = 1e-9;
+  bool has_begun = false;
+  rest.on_progress = [&has_begun](const TrainProgress&) { has_begun = true; };
+  const TrainReport stopped = train(rest);
+  EXPECT_TRUE(stopped.out_of_time);
+  EXPECT_FALSE(stopped.interrupted);
+  EXPECT_FALSE(has_begun);
+  EXPECT_EQ(stopped.updates, 2);
+  EXPECT_EQ(stopped.agent_steps, half.agent_steps);
+  EXPECT_EQ(stopped.policy_hash, half.policy_hash);
+  rest.minutes = 60;
+  const TrainReport resumed = train(rest), whole = train(options("whole"));
+  EXPECT_FALSE(resumed.out_of_time);
+  EXPECT_EQ(resumed.updates, 4);
+  EXPECT_EQ(resumed.policy_hash, whole.policy_hash);
+  EXPECT_EQ(resumed.agent_steps, whole.agent_steps);
+  EXPECT_EQ(read_table(folder_ / "parts/progress.csv").size(), 5u);
+}
+
+TEST_F(Training, ARunWithoutTimeForItsFirstUpdateIsSavedAndGoesOn) {
+  TrainOptions none = options("run", {"train.updates=1"});
+  none.minutes = 1e-9;
+  const TrainReport stopped = train(none);
+  EXPECT_TRUE(stopped.out_of_time);
+  EXPECT_EQ(stopped.updates, 0);
+  EXPECT_EQ(stopped.agent_steps, 0);
+  for (const char* name : {"config.toml", "untrained.ckpt", "checkpoint.ckpt", "policy.safetensors"}) {
+    EXPECT_TRUE(std::filesystem::exists(folder_ / (std::string("run/") + name))) << name;
+  }
+  TrainOptions rest = options("run", {"train.updates=1"});
+  rest.resume = true;
+  EXPECT_EQ(train(rest).policy_hash, train(options("whole", {"train.updates=1"})).policy_hash);
+}
+
+TEST_F(Training, NewEpisodesBeginWhereTheSavedOnesCannotGoOn) {
+  const TrainReport half = train(options("run", {"train.updates=2"}));
+  const Checkpoint saved = read_checkpoint(half.checkpoint);
+  const auto resume = [&](std::vector<uint8_t> simulator, const char* updates, std::vector<std::string>* notices) {
+    Checkpoint changed = saved;
+    changed.simulator = std::move(simulator);
+    write_checkpoint(half.checkpoint, changed);
+    TrainOptions o = options("run", {updates});
+    o.resume = true;
+    o.on_notice = [notices](const std::string& notice) { notices->push_back(notice); };
+    return train(o);
+  };
+  std::vector<uint8_t> truncated = saved.simulator, of_other_kind = saved.simulator;
+  truncated.resize(truncated.size() / 2);
+  of_other_kind[0] ^= 0xFF;
+  for (const std::vector<uint8_t>& simulator : {truncated, of_other_kind, std::vector<uint8_t>{}}) {
+    std::vector<std::string> notices;
+    const TrainReport nothing_more = resume(simulator, "train.updates=2", &notices);
+    ASSERT_EQ(notices.size(), 1u);
+    EXPECT_THAT(notices[0], AllOf(HasSubstr("new ones begin"), HasSubstr("simulator state: ")));
+    EXPECT_EQ(nothing_more.policy_hash, half.policy_hash);
+    EXPECT_EQ(nothing_more.updates, 2);
+    EXPECT_EQ(nothing_more.agent_steps, half.agent_steps);
+    EXPECT_EQ(nothing_more.km_driven, half.km_driven);
+    const Checkpoint kept = read_checkpoint(half.checkpoint);
+    EXPECT_EQ(kept.adam_steps, saved.adam_steps);
+    EXPECT_EQ(kept.filter_average, saved.filter_average);
+    EXPECT_EQ(kept.recent.size(), saved.recent.size());
+    EXPECT_NE(kept.simulator, saved.simulator);
+  }
+  std::vector<std::string> notices;
+  const TrainReport resumed = resume(truncated, "train.updates=4", &notices);
+  EXPECT_EQ(notices.size(), 1u);
+  EXPECT_EQ(resumed.updates, 4);
+  EXPECT_GT(resumed.agent_steps, half.agent_steps);
+  EXPECT_GT(resumed.km_driven, half.km_driven);
+  EXPECT_EQ(read_table(folder_ / "run/progress.csv").size(), 5u);
+  // Episodes that can go on do so without a word.
+  notices.clear();
+  resume(saved.simulator, "train.updates=2", &notices);
+  EXPECT_TRUE(notices.empty());
 }
 
 TEST_F(Training, RefusesToResumeWithOtherCamerasByName) {

@@ -1,0 +1,58 @@
+// Runs of a few vehicles on the procedural town, and what they write.
+#pragma once
+
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "pictura/common/support/file.h"
+#include "pictura/training/evaluation/evaluate.h"
+#include "pictura/training/loop.h"
+
+namespace pictura::test {
+
+/// Four updates of configs/smoke.toml, made smaller, on a device: run.device.
+inline TrainOptions small_run(const std::string& out_folder, const std::string& device,
+                              const std::vector<std::string>& more = {}) {
+  TrainOptions o;
+  o.config_path = PICTURA_SOURCE_DIR "/configs/smoke.toml";
+  o.out_folder = out_folder;
+  o.overrides = {"run.device=" + device,
+                 "run.num_threads=1",
+                 device == "cpu" ? "render.backend=cpu" : "render.backend=auto",
+                 "render.width_px=16",
+                 "render.height_px=9",
+                 "simulator.num_slots=8",
+                 "train.num_steps=12",
+                 "policy.conv_channels=[4, 8]",
+                 "policy.conv_kernels=[3, 3]",
+                 "policy.conv_strides=[2, 2]"};
+  o.overrides.insert(o.overrides.end(), more.begin(), more.end());
+  return o;
+}
+
+/// One short evaluation on the procedural map.
+inline EvaluateOptions one_scenario(const std::string& checkpoint, int steps) {
+  EvaluateOptions o;
+  o.device = "cpu";
+  o.checkpoint = checkpoint;
+  o.maps = {"procedural"};
+  o.scenarios = 1;
+  o.steps = steps;
+  o.num_threads = 1;
+  return o;
+}
+
+/// The cells of a progress.csv; the first row is the head.
+inline std::vector<std::vector<std::string>> read_table(const std::string& path) {
+  std::vector<std::vector<std::string>> rows;
+  std::istringstream lines(read_file(path));
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream cells(line);
+    rows.emplace_back();
+    for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(cell);
+  }
+  return rows;
+}
+
+}  // namespace pictura::test
