@@ -1,0 +1,288 @@
+// Training on a CUDA device: it learns there in every precision, and agrees with the host where it should. Without a
+// device these tests are skipped, unless PICTURA_REQUIRE_GPU=1 says that there must be one.
+#include "pictura/tests/backend_cuda/device_test.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include <gmock/gmock.h>
+
+#include "pictura/backends/make_learner.h"
+#include "pictura/backends/make_renderer.h"
+#include "pictura/backends/make_simulator.h"
+#include "pictura/backends/upload_maps.h"
+#include "pictura/map/load_map.h"
+#include "pictura/tests/support/error_message.h"
+#include "pictura/tests/support/scratch_folder.h"
+#include "pictura/tests/training/small_runs.h"
+#include "pictura/training/run.h"
+#include "pictura/training/torch_device.h"
+
+namespace pictura {
+namespace {
+
+using test::message_of;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class DeviceTraining : public test::DeviceTest {
+ protected:
+  TrainOptions options(const std::string& run, const std::string& device, std::vector<std::string> more) const {
+    return test::small_run(folder_ / run, device, std::move(more));
+  }
+  test::ScratchFolder folder_;
+};
+
+/// The rows of a progress.csv, by the names of their columns.
+class Progress {
+ public:
+  explicit Progress(const std::string& path) : table_(test::read_table(path)) {}
+
+  const std::vector<std::string>& names() const { return table_.at(0); }
+  size_t num_updates() const { return table_.size() - 1; }
+  /// update: 1 is the first.
+  double at(size_t update, const std::string& name) const {
+    const auto column = std::find(names().begin(), names().end(), name) - names().begin();
+    return std::stod(table_.at(update).at(static_cast<size_t>(column)));
+  }
+
+ private:
+  std::vector<std::vector<std::string>> table_;
+};
+
+/// That the first updates of two runs did the same: in simulation to `tolerance`, in learning to `loss_tolerance`, both
+/// of 1 + |value|. Clocks are left out.
+void expect_same_first_update(const std::string& run, const std::string& other, double tolerance,
+                              double loss_tolerance) {
+  const Progress a(run + "/progress.csv"), b(other + "/progress.csv");
+  ASSERT_EQ(a.names(), b.names());
+  for (const std::string& name : a.names()) {
+    if (name.starts_with("time/") || name == "charts/agent_steps_per_s") continue;
+    const double x = a.at(1, name), y = b.at(1, name);
+    if (!std::isfinite(x)) {
+      EXPECT_FALSE(std::isfinite(y)) << name;  // per km, where nobody moved; of episodes, where none has ended
+      continue;
+    }
+    EXPECT_NEAR(x, y, (name.starts_with("losses/") ? loss_tolerance : tolerance) * (1 + std::abs(x))) << name;
+  }
+  EXPECT_GT(a.at(1, "charts/agent_steps"), 0);
+}
+
+class EachModality : public DeviceTraining, public testing::WithParamInterface<const char*> {
+ protected:
+  static std::string modality() { return std::string("policy.modality=") + GetParam(); }
+};
+INSTANTIATE_TEST_SUITE_P(All, EachModality, testing::Values("vector", "perspective"),
+                         [](const auto& modality) { return std::string(modality.param); });
+
+TEST_P(EachModality, LearnsInEachPrecision) {
+  for (const char* precision : {"fp32", "tf32", "bf16"}) {
+    SCOPED_TRACE(precision);
+    const TrainReport report =
+        train(options(precision, "cuda", {modality(), std::string("train.precision=") + precision, "train.updates=2"}));
+    EXPECT_EQ(report.updates, 2);
+    EXPECT_EQ(report.device, "cuda:0");
+    EXPECT_EQ(report.simulator, "cuda");
+    EXPECT_EQ(report.renderer, std::string(GetParam()) == "perspective" ? "cuda" : "");
+    const Progress progress(folder_ / (std::string(precision) + "/progress.csv"));
+    ASSERT_EQ(progress.num_updates(), 2u);
+    for (const size_t update : {1, 2}) {
+      double phases_s = 0;
+      for (const std::string& name : progress.names()) {
+        const double value = progress.at(update, name);
+        EXPECT_TRUE(std::isfinite(value) || !name.starts_with("losses/")) << name << ": " << value;
+        if (!name.starts_with("time/") || name == "time/rollout_s" || name == "time/update_s") continue;
+        phases_s += value;
+        // Images are drawn by the perspective policy alone.
+        EXPECT_EQ(value > 0, name != "time/render_s" || !report.renderer.empty()) << name << ": " << value;
+      }
+      EXPECT_LT(phases_s, 1.01 * (progress.at(update, "time/rollout_s") + progress.at(update, "time/update_s")));
+      EXPECT_GT(progress.at(update, "losses/grad_norm"), 0);
+      EXPECT_GT(progress.at(update, "losses/kept_fraction"), 0);
+    }
+  }
+}
+
+// The same actions are drawn in the same worlds, but where a rounding error decides: one draw in a million or so. Then
+// what the simulators count is the same. Losses are means over minibatches between which roundings add up.
+TEST_P(EachModality, TheFirstUpdateIsTheHosts) {
+  const std::vector<std::string> more{modality(), "train.precision=fp32", "train.updates=1", "train.num_steps=30"};
+  train(options("host", "cpu", more));
+  train(options("device", "cuda", more));
+  expect_same_first_update(folder_ / "host", folder_ / "device", 1e-6, 2e-2);
+}
+
+TEST_P(EachModality, EvaluationAgreesWithTheHosts) {
+  EvaluateOptions o = test::one_scenario(
+      train(options("run", "cpu", {modality(), "train.precision=fp32", "train.updates=1"})).checkpoint, 20);
+  o.densities = {Density::light, Density::medium};
+  o.scenarios = 2;
+  o.num_threads = 0;
+  const std::vector<EvaluateRow> on_host = evaluate(o).rows;
+  o.device = "cuda";
+  const std::vector<EvaluateRow> on_device = evaluate(o).rows;
+  ASSERT_EQ(on_host.size(), 2u);
+  ASSERT_EQ(on_device.size(), 2u);
+  for (size_t i = 0; i < 2; ++i) {
+    const EvaluateRow &a = on_host[i], &b = on_device[i];
+    SCOPED_TRACE(a.density);
+    EXPECT_EQ(b.density, a.density);
+    EXPECT_EQ(b.vehicle_episodes, a.vehicle_episodes);
+    EXPECT_GT(b.vehicle_episodes, 60);
+    // An action that a rounding error decides may change the fate of a few vehicles.
+    EXPECT_NEAR(b.at_fault_collision_rate, a.at_fault_collision_rate, 0.05);
+    EXPECT_NEAR(b.off_road_rate, a.off_road_rate, 0.05);
+    EXPECT_NEAR(b.red_light_rate, a.red_light_rate, 0.05);
+    EXPECT_NEAR(b.goals_per_vehicle, a.goals_per_vehicle, 0.05);
+    EXPECT_NEAR(b.waypoints_per_vehicle, a.waypoints_per_vehicle, 0.05 * (1 + a.waypoints_per_vehicle));
+    EXPECT_NEAR(b.km_driven, a.km_driven, 0.05 * a.km_driven);
+    EXPECT_NEAR(b.return_per_vehicle, a.return_per_vehicle, 0.05 * (1 + std::abs(a.return_per_vehicle)));
+  }
+}
+
+bool equal(const std::vector<NamedTensor>& a, const std::vector<NamedTensor>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const NamedTensor& x, const NamedTensor& y) {
+    return x.name == y.name && x.value.equal(y.value);
+  });
+}
+
+TEST_P(EachModality, WhatOneDeviceSavesTheOtherGoesOnFrom) {
+  for (const auto& [first, second] : {std::pair{"cuda", "cpu"}, {"cpu", "cuda"}}) {
+    const std::string run = std::string("from_") + first;
+    SCOPED_TRACE(run);
+    const auto resumed = [&](const char* updates) {
+      TrainOptions o = options(run, second, {modality(), updates});
+      o.resume = true;
+      o.on_notice = [](const std::string& notice) { ADD_FAILURE() << notice; };
+      return train(o);
+    };
+    const TrainReport half = train(options(run, first, {modality(), "train.updates=2"}));
+    const Checkpoint saved = read_checkpoint(half.checkpoint);
+    // With nothing left to do it saves what it read.
+    const TrainReport same = resumed("train.updates=2");
+    EXPECT_EQ(same.updates, 2);
+    EXPECT_EQ(same.policy_hash, half.policy_hash);
+    EXPECT_EQ(same.agent_steps, half.agent_steps);
+    EXPECT_EQ(same.km_driven, half.km_driven);
+    const Checkpoint again = read_checkpoint(half.checkpoint);
+    EXPECT_TRUE(equal(again.parameters, saved.parameters));
+    EXPECT_TRUE(equal(again.first_moments, saved.first_moments));
+    EXPECT_TRUE(equal(again.second_moments, saved.second_moments));
+    EXPECT_EQ(again.simulator, saved.simulator);
+    EXPECT_EQ(again.adam_steps, saved.adam_steps);
+    EXPECT_EQ(again.filter_average, saved.filter_average);
+
+    const TrainReport whole = resumed("train.updates=4");
+    EXPECT_EQ(whole.updates, 4);
+    EXPECT_NE(whole.policy_hash, half.policy_hash);
+    EXPECT_GT(read_checkpoint(whole.checkpoint).adam_steps, saved.adam_steps);
+    const Progress progress(folder_ / (run + "/progress.csv"));
+    ASSERT_EQ(progress.num_updates(), 4u);
+    for (size_t update = 1; update <= 4; ++update) {
+      EXPECT_EQ(progress.at(update, "update"), static_cast<double>(update));
+      if (update > 1) {
+        EXPECT_GT(progress.at(update, "charts/agent_steps"), progress.at(update - 1, "charts/agent_steps"));
+      }
+    }
+    EXPECT_EQ(progress.at(2, "charts/agent_steps"), static_cast<double>(half.agent_steps));
+    EXPECT_EQ(progress.at(4, "charts/agent_steps"), static_cast<double>(whole.agent_steps));
+  }
+}
+
+// Gradients are summed in an order that changes from run to run.
+TEST_F(DeviceTraining, KeptAndRedrawnImagesTeachTheSame) {
+  const std::vector<std::string> more{"train.precision=fp32", "train.updates=1"};
+  for (const char* images : {"kept", "redrawn"}) {
+    TrainOptions o = options(images, "cuda", more);
+    o.overrides.push_back(std::string("train.images=") + images);
+    train(o);
+  }
+  expect_same_first_update(folder_ / "kept", folder_ / "redrawn", 1e-9, 1e-3);
+}
+
+TEST_F(DeviceTraining, WhatARolloutKeepsIsWhatItKeepsOnTheHost) {
+  constexpr int kSlots = 24;
+  constexpr int64_t kSteps = 4;
+  struct Kept {
+    at::Tensor rows;
+    std::vector<Observation> saw;  // kept and redrawn
+  };
+  const auto config_of = [](const std::string& device, const std::string& images) {
+    return load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml",
+                       {"run.device=" + device, "train.num_steps=3", "train.images=" + images});
+  };
+  const auto keep = [&](const std::string& name) {
+    const Config kept = config_of(name, "kept"), redrawn = config_of(name, "redrawn");
+    const Device device = open_learning_device(kept);
+    EXPECT_EQ(device.is_host(), name == "cpu");
+    const std::unique_ptr<Simulator> simulator =
+        make_simulator(name, simulator_config(kept, device), {load_map("procedural")}, draw_worlds(1, kSlots, 8, 8, 1));
+    const std::unique_ptr<Renderer> renderer = make_renderer(name, renderer_config(kept, rig_of(kept), device));
+    upload_maps(*simulator, renderer.get());
+    const std::unique_ptr<LearnerExecutor> executor = make_learner_executor(device);
+    RolloutObservations all[] = {{kept, simulator.get(), renderer.get(), nullptr, executor->memory_bytes()},
+                                 {redrawn, simulator.get(), renderer.get(), nullptr, executor->memory_bytes()}};
+    simulator->reset();
+    at::Tensor actions = at::arange(kSlots, at::kInt).remainder(kNumActions).to(torch_device(device));
+    std::vector<at::Tensor> rows;
+    for (int64_t step = 0; step < kSteps; ++step) {
+      const at::Tensor slots = active_slots(simulator->controller_input(), {}, executor.get());
+      for (RolloutObservations& observations : all) observations.record(step, slots);
+      rows.push_back(slots + step * kSlots);
+      for (int i = 0; i < 20; ++i) simulator->step(Array(actions.data_ptr<int32_t>(), {kSlots}, device));
+    }
+    simulator->check();
+    Kept result;
+    result.rows = at::cat(rows).flip(0);
+    for (const RolloutObservations& observations : all) {
+      result.saw.push_back(observations.gather(result.rows).map([](const at::Tensor& t) { return t.cpu(); }));
+    }
+    renderer->check();
+    result.rows = result.rows.cpu();
+    return result;
+  };
+  const Kept host = keep("cpu"), device = keep("cuda");
+  ASSERT_TRUE(device.rows.equal(host.rows));
+  ASSERT_LT(host.rows.size(0), kSlots * kSteps) << "some have halted";
+  ASSERT_GT(host.rows.size(0), 0);
+  EXPECT_GT(host.saw[0].images.at(0).pixels.count_nonzero().item<int64_t>(), 1000);
+  for (const Observation& saw : device.saw) {
+    EXPECT_TRUE(saw.images.at(0).pixels.equal(host.saw[0].images.at(0).pixels));
+    EXPECT_TRUE(saw.ego.equal(host.saw[0].ego));
+    EXPECT_TRUE(saw.waypoints.equal(host.saw[0].waypoints));
+  }
+}
+
+TEST_F(DeviceTraining, EndsWhenItsMinutesAreOverAndGoesOn) {
+  TrainOptions o = options("run", "cuda", {"train.updates=2"});
+  o.minutes = 1e-9;
+  bool has_begun = false;
+  o.on_progress = [&has_begun](const TrainProgress&) { has_begun = true; };
+  const TrainReport stopped = train(o);
+  EXPECT_TRUE(stopped.out_of_time);
+  EXPECT_FALSE(has_begun);
+  EXPECT_EQ(stopped.updates, 0);
+  for (const char* name : {"config.toml", "untrained.ckpt", "checkpoint.ckpt", "policy.safetensors"}) {
+    EXPECT_TRUE(std::filesystem::exists(folder_ / (std::string("run/") + name))) << name;
+  }
+  o.resume = true;
+  o.minutes = 60;
+  const TrainReport resumed = train(o);
+  EXPECT_FALSE(resumed.out_of_time);
+  EXPECT_EQ(resumed.updates, 2);
+  EXPECT_GT(resumed.agent_steps, 0);
+  EXPECT_EQ(Progress(folder_ / "run/progress.csv").num_updates(), 2u);
+}
+
+TEST_F(DeviceTraining, AutoIsTheDeviceAndOneThatThereIsNotIsRefusedByName) {
+  const TrainReport report = train(options("auto", "auto", {"train.updates=1"}));
+  EXPECT_EQ(report.device, "cuda:0");
+  EXPECT_EQ(report.simulator, "cuda");
+  EXPECT_EQ(report.renderer, "cuda");
+  EXPECT_THAT(message_of([&] { train(options("beyond", "cuda:99", {})); }),
+              AllOf(HasSubstr("run.device: expected cuda:0 to cuda:"), HasSubstr("got \"cuda:99\"")));
+}
+
+}  // namespace
+}  // namespace pictura
