@@ -19,12 +19,13 @@ import unittest.mock
 PICTURA = ""
 CONFIGS = pathlib.Path(__file__).resolve().parents[2] / "configs"
 SCENES = pathlib.Path(__file__).resolve().parents[1] / "golden"
-# A policy and a world so small that an update takes well under a second.
+# A policy and a world so small that an update takes well under a second. On the host, whose runs are exact.
 TINY = [
     "--config", str(CONFIGS / "smoke.toml"),
     "--set", "simulator.num_slots=6", "--set", "simulator.min_agents=3", "--set", "simulator.max_agents=3",
     "--set", "train.num_steps=8", "--set", "train.minibatch_size=48", "--set", "train.schedule_agent_steps=1000000",
     "--set", "render.width_px=16", "--set", "render.height_px=9", "--set", "run.num_threads=2",
+    "--set", "run.device=cpu",
 ]  # fmt: skip
 
 
@@ -513,13 +514,26 @@ class Training(CommandCase):
         self.assert_refused(2, "expected one of cpu, ", *one, *out, "--renderer", "vulkan")
         self.assert_refused(2, "expected one of cpu, ", *one, *out, "--simulator", "null")
         self.assert_refused(1, "run.device: expected one of cpu, cuda, cuda:N, auto", *one, *out, "--device", "gpu")
-        self.assert_refused(1, "learning on a CUDA device is missing", *one, *out, "--device", "cuda")
+        on_host = 'render.backend: "null" works in host memory, but run.device is "cuda"'
+        self.assert_refused(1, on_host, *one, *out, "--renderer", "null", "--device", "cuda")
+        if not pathlib.Path("/dev/nvidia0").exists():
+            self.assert_refused(1, "run.device: cuda: ", *one, *out, "--device", "cuda")
         self.assert_refused(1, "only gl takes samples", *one, *out, "--renderer", "cpu", "--samples", "4x4")
         self.assert_refused(1, "render.backend: expected one of cpu, ", *one, *out, "--set", "render.backend=vulkan")
         evaluate = ["evaluate", self.folder / "black" / "checkpoint.ckpt", "--map", "procedural:1", "--agents", 2,
                     "--scenarios", 1, "--steps", 2]  # fmt: skip
         self.json_of(*evaluate, "--renderer", "cpu", "--simulator", "cpu", "--device", "cpu")
-        self.assert_refused(1, "learning on a CUDA device is missing", *evaluate, "--device", "cuda")
+        self.assert_refused(1, on_host, *evaluate, "--device", "cuda")
+
+    def test_training_on_a_device_says_so(self):
+        if os.environ.get("PICTURA_REQUIRE_GPU") != "1":
+            self.skipTest("PICTURA_REQUIRE_GPU is not 1")
+        out = self.folder / "run"
+        report = self.json_of("train", *TINY, "--set", "train.updates=1", "--device", "cuda", "--out", out)
+        self.assertEqual((report["simulator"], report["renderer"], report["device"]), ("cuda", "cuda", "cuda:0"))
+        rows = self.json_of("evaluate", out / "checkpoint.ckpt", "--map", "procedural:1", "--agents", 8, "--scenarios", 2,
+                            "--steps", 40, "--device", "cuda")["rows"]  # fmt: skip
+        self.assertGreater(rows[0]["km_driven"], 0)
 
     def test_a_policy_is_driven_in_the_world_that_it_was_trained_in(self):
         out = self.folder / "run"
@@ -551,14 +565,14 @@ class Training(CommandCase):
         self.assertEqual(process.returncode, 130, errors)
         self.assertIn(b"error: interrupted", errors)
         result = self.json_of("evaluate", out / "checkpoint.ckpt", "--map", "procedural:1", "--agents", 2, "--scenarios", 1,
-                              "--steps", 2)  # fmt: skip
+                              "--steps", 2, "--device", "cpu")  # fmt: skip
         self.assertEqual(result["rows"][0]["scenarios"], 1)
 
     def test_evaluation_has_its_keys(self):
         out = self.folder / "run"
         self.json_of("train", *TINY, "--set", "train.updates=1", "--out", out)
         result = self.json_of("evaluate", out / "checkpoint.ckpt", "--map", "procedural:1", "--density", "light", "--agents", 8,
-                              "--scenarios", 2, "--steps", 40)  # fmt: skip
+                              "--scenarios", 2, "--steps", 40, "--device", "cpu")  # fmt: skip
         keys = """density scenarios steps at_fault_collision_rate off_road_rate red_light_rate goals_per_vehicle
                   km_per_infraction km_driven""".split()
         self.assertEqual([key for key in keys if key not in result["rows"][0]], [])
