@@ -535,6 +535,15 @@ class Training(CommandCase):
                             "--steps", 40, "--device", "cuda")["rows"]  # fmt: skip
         self.assertGreater(rows[0]["km_driven"], 0)
 
+    def test_minutes_end_a_run_that_can_go_on(self):
+        train = ["train", *TINY, "--set", "train.updates=1", "--out", self.folder / "run"]
+        self.assert_refused(2, "--minutes", *train, "--minutes", 0)
+        stopped = self.json_of(*train, "--minutes", 1e-9)
+        self.assertEqual((stopped["out_of_time"], stopped["updates"], stopped["episode_return"]), (True, 0, None))
+        self.assertIsNone(stopped["learning_curve"])
+        resumed = self.json_of(*train, "--resume", "--minutes", 60)
+        self.assertEqual((resumed["out_of_time"], resumed["updates"]), (False, 1))
+
     def test_a_policy_is_driven_in_the_world_that_it_was_trained_in(self):
         out = self.folder / "run"
         self.json_of("train", *TINY, "--set", "train.updates=1", "--set", "simulator.walls=true",
