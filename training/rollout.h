@@ -9,7 +9,7 @@
 namespace pictura {
 
 /// What the slots saw at each step. Images are kept, or drawn again from the scenes whenever they are read: those of
-/// the paper's rollout would take 163 GB, its scenes 0.4 GB.
+/// the paper's rollout would take 163 GB, its scenes 0.25 GB.
 class RolloutObservations {
  public:
   /// For `num_steps` + 1 steps of this simulator, which must outlive it, as must the renderer and the timer. Policies
