@@ -10,7 +10,7 @@ namespace pictura {
 namespace {
 
 // Empty where torch can compute on CUDA devices, else why not. Its CUDA library is opened here rather than linked, so
-// that programs start quickly and on machines without it; this must come before torch is first asked for CUDA.
+// that programs start on machines without it.
 std::string why_torch_has_no_cuda() {
   static const void* const library = dlopen("libtorch_cuda.so", RTLD_NOW | RTLD_GLOBAL | RTLD_NODELETE);
   if (!library) return "this torch has no CUDA (libtorch_cuda.so cannot be opened): install a torch with CUDA";
@@ -28,6 +28,9 @@ std::string why_not_on_cuda() {
 Device open_learning_device(const Config& config) {
   const std::string &wanted = config.run.device, &simulator = config.simulator.backend,
                     &renderer = config.render.backend;
+  // Before anything is computed, wherever that will be: torch looks for its CUDA library once, and a process that
+  // learns on the host may do so on a device later.
+  const std::string why_not = why_not_on_cuda();
   const bool draws_on_host =
       config.reads_images() && (renderer == "cpu" || renderer == "null" || renderer == "gl:osmesa");
   const auto refuse_on_device = [&wanted](const char* key, const std::string& value, const char* instead) {
@@ -45,7 +48,6 @@ Device open_learning_device(const Config& config) {
         wanted, renderer);
     return {};
   }
-  const std::string why_not = why_not_on_cuda();
   if (wanted == "auto" && simulator == "auto" && !why_not.empty()) return {};
   PICTURA_CHECK(why_not.empty(), "{}: {}", wanted == "auto" ? "simulator.backend: \"cuda\"" : "run.device: " + wanted,
                 why_not);

@@ -320,12 +320,16 @@ TEST_F(CudaLearnerTest, SelectingAllocatesNothingAfterTheFirstCallOfASize) {
   const DeviceBuffer<float> advantage_copy = on_device(advantages);
   const DeviceBuffer<uint8_t> valid_copy = on_device(valid);
   const DeviceBuffer<int64_t> selected(kMany);
+  // CUDA's default stream cannot be waited for during a capture.
+  PICTURA_CUDA(cudaDeviceSynchronize());
+  const OwnStream own;
+  const Stream stream{own.stream};
   const auto select = [&](size_t size) {
     return executors.device->select_kept(advantage_copy.span().subspan(0, size), valid_copy.span().subspan(0, size),
-                                         0.5f, room_in(selected));
+                                         0.5f, room_in(selected), stream);
   };
   const auto select_active = [&] {
-    return executors.device->select_active(worlds.cuda->controller_input(), {}, {selected.data(), kSlots});
+    return executors.device->select_active(worlds.cuda->controller_input(), {}, {selected.data(), kSlots}, stream);
   };
   const int64_t all = select(kMany), some = select(1000), active = select_active();
   const ForbidAllocations forbidden;
