@@ -62,6 +62,7 @@ void visit(AnyConfig& c, Visitor&& v) {
 
   v.choice("policy.modality", c.policy.modality, kModalities);
   v.flag("policy.auxiliary", c.policy.auxiliary);
+  v.integer("policy.patch_px", c.policy.patch_px, 1, 16);
   v.integers("policy.conv_channels", c.policy.conv_channels, 1, 4096);
   v.integers("policy.conv_kernels", c.policy.conv_kernels, 1, 31);
   v.integers("policy.conv_strides", c.policy.conv_strides, 1, 16);

@@ -54,6 +54,7 @@ struct Config {
   struct PolicySection {
     Modality modality = Modality::perspective;
     bool auxiliary = false;  // vector: fill the slots that no camera could (the paper's Vectorized)
+    int patch_px = 1;        // space to depth: a patch of so many pixels squared becomes one with as many channels
     std::vector<int> conv_channels{32, 64, 64, 128, 128};
     std::vector<int> conv_kernels{5, 3, 3, 3, 3};
     std::vector<int> conv_strides{2, 2, 2, 1, 1};

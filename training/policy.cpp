@@ -116,6 +116,18 @@ class VectorEncoder final : public SceneEncoder {
   std::vector<Group> groups_;
 };
 
+at::Tensor space_to_depth(const at::Tensor& images, int64_t patch_px) {
+  if (patch_px == 1) return images;
+  const int64_t channels = images.size(1), height = images.size(2), width = images.size(3);
+  const int64_t rows = (height + patch_px - 1) / patch_px, columns = (width + patch_px - 1) / patch_px;
+  // [n, c, rows, patch, columns, patch] -> [n, rows, columns, c, patch, patch]: in memory, channels last.
+  return at::constant_pad_nd(images, {0, columns * patch_px - width, 0, rows * patch_px - height})
+      .view({-1, channels, rows, patch_px, columns, patch_px})
+      .permute({0, 2, 4, 1, 3, 5})
+      .reshape({-1, rows, columns, channels * patch_px * patch_px})
+      .permute({0, 3, 1, 2});
+}
+
 /// A convolutional stack shared by all cameras; per camera, learned queries that cross-attend over its feature map and
 /// are averaged; all cameras concatenated and projected to the width of the four sets that they replace.
 class PerspectiveEncoder final : public SceneEncoder {
@@ -124,7 +136,7 @@ class PerspectiveEncoder final : public SceneEncoder {
   PerspectiveEncoder(const Config::PolicySection& config, int num_cameras, at::ScalarType image_type,
                      ParameterMaker* make)
       : config_(config), num_cameras_(num_cameras), image_type_(image_type), width_(config.conv_channels.back()) {
-    int64_t in = 3;
+    int64_t in = 3 * int64_t{config.patch_px} * config.patch_px;
     for (size_t i = 0; i < config.conv_channels.size(); ++i) {
       const int64_t out = config.conv_channels[i], kernel = config.conv_kernels[i];
       const std::string name = fmt::format("conv.{}", i);
@@ -186,8 +198,8 @@ class PerspectiveEncoder final : public SceneEncoder {
 
   at::Tensor pool(const ImageBlock& block) const {
     const int64_t batch = block.pixels.size(0), cameras = block.pixels.size(1), heads = config_.attention_heads;
-    at::Tensor x = block.pixels.flatten(0, 1).to(image_type_, /*non_blocking=*/false, /*copy=*/false,
-                                                 at::MemoryFormat::ChannelsLast);
+    at::Tensor x = space_to_depth(block.pixels.flatten(0, 1), config_.patch_px)
+                       .to(image_type_, /*non_blocking=*/false, /*copy=*/false, at::MemoryFormat::ChannelsLast);
     for (size_t i = 0; i < convolutions_.size(); ++i) {
       // Pixels are 0 to 255. Scaling a few weights is cheaper than scaling them.
       const at::Tensor weight = i == 0 ? convolutions_[i].weight / 255.0 : convolutions_[i].weight;
