@@ -18,7 +18,8 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr char kMagic[8] = {'P', 'I', 'C', 'T', 'C', 'K', 'P', 'T'};
-constexpr uint32_t kVersion = 1;
+constexpr uint32_t kVersion = 2;
+constexpr uint32_t kVersionHashingDataAlone = 1;
 constexpr uint32_t kByteOrder = 0x01020304;
 constexpr size_t kPreamble = sizeof(kMagic) + 2 * sizeof(uint32_t) + sizeof(uint64_t);
 
@@ -123,14 +124,17 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
   header["second_moments"] = describe(checkpoint.second_moments);
   header["simulator"] = {{"offset", data.size()}, {"bytes", checkpoint.simulator.size()}};
   data.append(reinterpret_cast<const char*>(checkpoint.simulator.data()), checkpoint.simulator.size());
-  header["data"] = {{"bytes", data.size()}, {"hash", hash_text(data)}};
+  header["data"] = {{"bytes", data.size()}};
 
   const std::string text = header.dump();
   std::string file(kMagic, sizeof kMagic);
   append(&file, kVersion);
   append(&file, kByteOrder);
   append(&file, static_cast<uint64_t>(text.size()));
-  write_file(path, file + text + data);
+  file += text;
+  file += data;
+  append(&file, hash_of(file));
+  write_file(path, file);
 }
 
 Checkpoint read_checkpoint(const std::string& path) {
@@ -140,15 +144,23 @@ Checkpoint read_checkpoint(const std::string& path) {
   PICTURA_CHECK(file.size() >= kPreamble, "{}: truncated: {} bytes", path, file.size());
   PICTURA_CHECK(at_offset<uint32_t>(file, 12) == kByteOrder, "{}: written on a machine of another byte order", path);
   const auto version = at_offset<uint32_t>(file, 8);
-  PICTURA_CHECK(version == kVersion, "{}: expected checkpoint version {}, got {}", path, kVersion, version);
+  PICTURA_CHECK(version == kVersion || version == kVersionHashingDataAlone,
+                "{}: expected checkpoint version {} or {}, got {}", path, kVersionHashingDataAlone, kVersion, version);
+  std::string_view content = file;  // without the hash
+  if (version == kVersion) {
+    PICTURA_CHECK(file.size() >= kPreamble + sizeof(uint64_t), "{}: truncated: {} bytes", path, file.size());
+    content.remove_suffix(sizeof(uint64_t));
+    PICTURA_CHECK(hash_of(content) == at_offset<uint64_t>(file, content.size()),
+                  "{}: damaged or truncated: its bytes do not have the hash that it ends with", path);
+  }
   const auto header_bytes = at_offset<uint64_t>(file, 16);
-  PICTURA_CHECK(header_bytes <= file.size() - kPreamble, "{}: truncated: its header has {} bytes, the file {}", path,
+  PICTURA_CHECK(header_bytes <= content.size() - kPreamble, "{}: truncated: its header has {} bytes, the file {}", path,
                 header_bytes, file.size());
 
   Checkpoint result;
   result.path = path;
   try {
-    const ordered_json header = ordered_json::parse(file.substr(kPreamble, header_bytes));
+    const ordered_json header = ordered_json::parse(content.substr(kPreamble, header_bytes));
     result.config = parse_saved_config(header.at("config").get<std::string>(), path + ": config");
     const ordered_json expected_schema = schema(result.config), &saved_schema = header.at("schema");
     for (const auto& [name, shape] : expected_schema.items()) {
@@ -158,11 +170,11 @@ Checkpoint read_checkpoint(const std::string& path) {
       PICTURA_CHECK(saved == shape, "{}: observation schema: {}: expected {}, got {}", path, name, shape.dump(),
                     saved.dump());
     }
-    const std::string_view data = std::string_view(file).substr(kPreamble + header_bytes);
+    const std::string_view data = content.substr(kPreamble + header_bytes);
     const auto data_bytes = header.at("data").at("bytes").get<uint64_t>();
     PICTURA_CHECK(data.size() == data_bytes, "{}: truncated: expected {} bytes of data, got {}", path, data_bytes,
                   data.size());
-    PICTURA_CHECK(hash_text(data) == header.at("data").at("hash").get<std::string>(),
+    PICTURA_CHECK(version == kVersion || hash_text(data) == header.at("data").at("hash").get<std::string>(),
                   "{}: damaged: its data do not have the hash that its header names", path);
 
     auto tensors = [&](const char* list) {
@@ -187,10 +199,10 @@ Checkpoint read_checkpoint(const std::string& path) {
     result.first_moments = tensors("first_moments");
     result.second_moments = tensors("second_moments");
     const auto offset = header.at("simulator").at("offset").get<uint64_t>();
-    const auto bytes = header.at("simulator").at("bytes").get<uint64_t>();
-    PICTURA_CHECK(bytes <= data.size() && offset <= data.size() - bytes, "{}: simulator: bad offset", path);
+    const auto size = header.at("simulator").at("bytes").get<uint64_t>();
+    PICTURA_CHECK(size <= data.size() && offset <= data.size() - size, "{}: simulator: bad offset", path);
     const auto* first = reinterpret_cast<const uint8_t*>(data.data()) + offset;
-    result.simulator.assign(first, first + bytes);
+    result.simulator.assign(first, first + size);
 
     const ordered_json& counters = header.at("counters");
     result.update = counters.at("update");

@@ -1,5 +1,6 @@
 // What a run saves: one file from which training goes on exactly and a policy can be loaded. Layout: the eight bytes
-// PICTCKPT, u32 version, u32 byte order mark, u64 length of a JSON header, the header, the data that it describes.
+// PICTCKPT, u32 version, u32 byte order mark, u64 length of a JSON header, the header, the data that it describes, u64
+// hash (FNV-1a) of all bytes before. Version 1 has no such hash: its header names one of the data.
 #pragma once
 
 #include "pictura/training/policy.h"

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 
 #include <gmock/gmock.h>
@@ -11,6 +12,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/hash.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/training/event_file.h"
@@ -55,6 +57,36 @@ Checkpoint small_checkpoint(const Policy& policy, const Config& config) {
 }
 
 using CheckpointFile = Folder;
+
+constexpr size_t kPreamble = 24, kHashBytes = 8;
+
+size_t header_bytes_of(const std::string& file) {
+  uint64_t header_bytes = 0;
+  std::memcpy(&header_bytes, file.data() + 16, sizeof header_bytes);
+  return header_bytes;
+}
+
+// The same file with a hash that fits its bytes.
+std::string sealed(std::string file) {
+  const uint64_t hash = hash_of(std::string_view(file).substr(0, file.size() - kHashBytes));
+  std::memcpy(file.data() + file.size() - kHashBytes, &hash, kHashBytes);
+  return file;
+}
+
+// The same checkpoint as version 1 wrote it: the hash in the header, of the data alone.
+std::string as_version_1(const std::string& file) {
+  const size_t header_bytes = header_bytes_of(file), data_begin = kPreamble + header_bytes;
+  const std::string data = file.substr(data_begin, file.size() - data_begin - kHashBytes);
+  auto header = nlohmann::ordered_json::parse(file.substr(kPreamble, header_bytes));
+  header["data"]["hash"] = fmt::format("{:016x}", hash_of(data));
+  const std::string text = header.dump();
+  const uint32_t version = 1;
+  const uint64_t size = text.size();
+  std::string preamble = file.substr(0, kPreamble);
+  std::memcpy(preamble.data() + 8, &version, sizeof version);
+  std::memcpy(preamble.data() + 16, &size, sizeof size);
+  return preamble + text + data;
+}
 
 TEST_F(CheckpointFile, ComesBackWhole) {
   const Config config = small_config();
@@ -148,6 +180,10 @@ TEST_F(CheckpointFile, BrokenFilesAreRefused) {
   std::string changed = whole;
   changed[whole.size() - 20] = static_cast<char>(changed[whole.size() - 20] ^ 1);
   EXPECT_THAT(refuse(changed), HasSubstr("damaged"));
+  changed = as_version_1(whole);
+  changed[changed.size() - 20] = static_cast<char>(changed[changed.size() - 20] ^ 1);
+  EXPECT_THAT(refuse(changed), HasSubstr("damaged"));
+  EXPECT_THAT(refuse(as_version_1(whole).substr(0, whole.size() - 100)), HasSubstr("truncated"));
   changed = whole;
   changed[8] = 9;
   EXPECT_THAT(refuse(changed), HasSubstr("version"));
@@ -156,12 +192,49 @@ TEST_F(CheckpointFile, BrokenFilesAreRefused) {
   EXPECT_THAT(refuse(changed), HasSubstr("byte order"));
   changed = whole;
   changed.replace(changed.find("\"lanes\":[80,7]"), 14, "\"lanes\":[80,8]");
-  EXPECT_THAT(refuse(changed),
+  EXPECT_THAT(refuse(sealed(changed)),
               ::testing::AllOf(HasSubstr("observation schema: lanes"), HasSubstr("[80,7]"), HasSubstr("[80,8]")));
   changed = whole;
   changed[30] = '}';
-  EXPECT_THAT(refuse(changed), HasSubstr("header"));
+  EXPECT_THAT(refuse(sealed(changed)), HasSubstr("header"));
   EXPECT_THAT(message_of([&] { PolicySession(folder_ / "none.ckpt"); }), HasSubstr("no such file"));
+}
+
+TEST_F(CheckpointFile, AnyFlippedBitIsRefused) {
+  const Config config = small_config();
+  const Policy policy(config.policy, 4, 1);
+  const std::string path = folder_ / "a.ckpt";
+  write_checkpoint(path, small_checkpoint(policy, config));
+  const std::string whole = read_file(path);
+  const size_t data_begin = kPreamble + header_bytes_of(whole), end = whole.size() - kHashBytes;
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  const auto put = [&](size_t byte, char value) { file.seekp(static_cast<std::streamoff>(byte)).put(value).flush(); };
+  const auto refuse = [&](size_t byte, int bit) {
+    put(byte, static_cast<char>(whole[byte] ^ (1 << bit)));
+    EXPECT_THAT(message_of([&] { read_checkpoint(path); }), HasSubstr("a.ckpt")) << "bit " << bit << " of " << byte;
+    put(byte, whole[byte]);
+  };
+  for (size_t byte = 0; byte < kPreamble; ++byte) {
+    for (int bit = 0; bit < 8; ++bit) refuse(byte, bit);
+  }
+  for (size_t byte = kPreamble; byte < data_begin; byte += 7) refuse(byte, static_cast<int>(byte % 8));
+  for (size_t byte = data_begin; byte < end; byte += 211) refuse(byte, static_cast<int>(byte % 8));
+  for (size_t byte = end; byte < whole.size(); ++byte) refuse(byte, static_cast<int>(byte % 8));
+  EXPECT_NO_THROW(read_checkpoint(path));
+}
+
+TEST_F(CheckpointFile, Version1ReadsAsBefore) {
+  const Config config = small_config();
+  const Policy policy(config.policy, 4, 1);
+  const std::string path = folder_ / "a.ckpt";
+  write_checkpoint(path, small_checkpoint(policy, config));
+  write_file(path, as_version_1(read_file(path)));
+  const Checkpoint back = read_checkpoint(path);
+  EXPECT_EQ(back.update, 12);
+  EXPECT_EQ(back.simulator, (std::vector<uint8_t>{1, 2, 3, 255}));
+  const Policy other(config.policy, 4, 2);
+  restore_tensors(back, back.parameters, other.parameters());
+  EXPECT_EQ(other.hash(), policy.hash());
 }
 
 TEST_F(CheckpointFile, TheSchemaIsThatOfTheArraysThatThePolicyReads) {
@@ -170,9 +243,7 @@ TEST_F(CheckpointFile, TheSchemaIsThatOfTheArraysThatThePolicyReads) {
   auto schema_of = [&] {
     write_checkpoint(path, small_checkpoint(make_policy(config, paper_rig(16, 9), Device{}), config));
     const std::string bytes = read_file(path);
-    uint64_t header_bytes = 0;
-    std::memcpy(&header_bytes, bytes.data() + 16, 8);
-    return nlohmann::json::parse(bytes.substr(24, header_bytes)).at("schema");
+    return nlohmann::json::parse(bytes.substr(kPreamble, header_bytes_of(bytes))).at("schema");
   };
   const nlohmann::json without_walls = schema_of();
   EXPECT_EQ(without_walls.at("partners"), nlohmann::json({16, 8}));
@@ -188,7 +259,7 @@ TEST_F(CheckpointFile, TheSchemaIsThatOfTheArraysThatThePolicyReads) {
   // One that lacks the array is refused by its name.
   std::string changed = read_file(path);
   changed.replace(changed.find("\"walls\":[80,7]"), 7, "\"wells\"");
-  write_file(path, changed);
+  write_file(path, sealed(changed));
   EXPECT_THAT(
       message_of([&] { read_checkpoint(path); }),
       ::testing::AllOf(HasSubstr("a.ckpt: observation schema: walls"), HasSubstr("[80,7]"), HasSubstr("nothing")));
@@ -211,7 +282,7 @@ TEST_F(CheckpointFile, SavedUnderTheOldNameOfTheBackendsItReadsAsBefore) {
   replace("device = 'auto'", "backend='null'");
   replace(R"([simulator]\nbackend = 'auto')", "[simulator]");
   replace(R"([render]\nbackend = 'auto'\nsamples = '1')", "[render]");
-  write_file(path, bytes);
+  write_file(path, sealed(bytes));
   const Checkpoint saved = read_checkpoint(path);
   EXPECT_EQ(saved.config.simulator.backend, "cpu");
   EXPECT_EQ(saved.config.render.backend, "null");
