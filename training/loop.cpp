@@ -7,6 +7,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/folder_lock.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/training/diagnosis.h"
@@ -81,6 +82,7 @@ TrainReport train(const TrainOptions& options) {
   const Config config = load_config(options.config_path, options.overrides);
   const Device device = open_learning_device(config);
   make_output_folder(options.out_folder);
+  const FolderLock lock(options.out_folder);
   at::set_num_threads(resolve_num_threads(config.run.num_threads));
   set_float32_products(config.train.precision);
 

@@ -7,6 +7,7 @@
 #include <functional>
 
 #include <gmock/gmock.h>
+#include <unistd.h>
 
 #include "pictura/backends/make_learner.h"
 #include "pictura/backends/make_renderer.h"
@@ -332,6 +333,22 @@ TEST_F(Training, InterruptedRunSavesAndGoesOnExactly) {
   TrainOptions rest = options("stopped");
   rest.resume = true;
   EXPECT_EQ(train(rest).policy_hash, train(options("whole")).policy_hash);
+}
+
+TEST_F(Training, ASecondRunIntoAFolderInUseIsRefusedAndTheFirstGoesOn) {
+  std::vector<std::string> refusals;
+  TrainOptions first = options("run", {"train.updates=2"});
+  first.on_progress = [&](const TrainProgress&) {
+    TrainOptions second = options("run");
+    refusals.push_back(message_of([&] { train(second); }));
+    second.resume = true;
+    refusals.push_back(message_of([&] { train(second); }));
+  };
+  const TrainReport report = train(first);
+  EXPECT_EQ(report.updates, 2);
+  EXPECT_THAT(refusals, ::testing::ElementsAreArray(std::vector<std::string>(
+                            4, fmt::format("{}: in use by process {}", folder_ / "run", getpid()))));
+  EXPECT_EQ(train(options("alone", {"train.updates=2"})).policy_hash, report.policy_hash);
 }
 
 TEST_F(Training, RefusesToResumeUnderAnotherConfigurationByName) {
