@@ -14,7 +14,7 @@ void add_train_command(CLI::App& app) {
   struct Arguments {
     TrainOptions train;
     BackendOptions backends;
-    bool json = false;
+    bool resume = false, overwrite = false, json = false;
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("train", "Train a policy by self-play (PPO)");
@@ -26,11 +26,13 @@ void add_train_command(CLI::App& app) {
       ->allow_extra_args(false);
   add_policy_backend_options(command, "as the configuration says", &arguments->backends);
   command->add_option("--out", arguments->train.out_folder, "Folder for checkpoints, curves and logs")->required();
-  command->add_flag("--resume", arguments->train.resume, "Go on from the checkpoint in --out");
+  CLI::Option* const resume = command->add_flag("--resume", arguments->resume, "Go on from the checkpoint in --out");
+  command->add_flag("--overwrite", arguments->overwrite, "Remove the run that lies in --out, and begin anew")
+      ->excludes(resume);
   command
       ->add_option("--init-from", arguments->train.init_from,
                    "Begin with the weights of this checkpoint, of the same network at any image size")
-      ->excludes("--resume");
+      ->excludes(resume);
   command
       ->add_option("--minutes", arguments->train.minutes,
                    "Save and end before this much wall time has passed; go on with --resume")
@@ -52,6 +54,8 @@ void add_train_command(CLI::App& app) {
                               format_duration(progress.eta_s)));
     };
     arguments->train.on_notice = [](const std::string& notice) { fmt::print(stderr, "notice: {}\n", notice); };
+    if (arguments->resume) arguments->train.old_run = OldRun::resume;
+    if (arguments->overwrite) arguments->train.old_run = OldRun::overwrite;
     for (const std::string& text : overrides_of(arguments->backends)) arguments->train.overrides.push_back(text);
     const TrainReport report = train(arguments->train);
     line.finish();

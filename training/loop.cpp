@@ -2,8 +2,10 @@
 #include "pictura/training/loop.h"
 
 #include <algorithm>
+#include <filesystem>
 
 #include <ATen/Parallel.h>
+#include <fmt/ranges.h>
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
@@ -13,6 +15,7 @@
 #include "pictura/training/diagnosis.h"
 #include "pictura/training/precision.h"
 #include "pictura/training/run.h"
+#include "pictura/training/run_folder.h"
 #include "pictura/training/run_log.h"
 #include "pictura/training/schedule.h"
 #include "pictura/training/torch_device.h"
@@ -83,6 +86,10 @@ TrainReport train(const TrainOptions& options) {
   const Device device = open_learning_device(config);
   make_output_folder(options.out_folder);
   const FolderLock lock(options.out_folder);
+  const std::vector<std::string> old_files = run_files(options.out_folder);
+  PICTURA_CHECK(old_files.empty() || options.old_run != OldRun::refuse,
+                "{}: holds a run already ({}): resume it, overwrite it, or name another folder", options.out_folder,
+                fmt::join(old_files, ", "));
   at::set_num_threads(resolve_num_threads(config.run.num_threads));
   set_float32_products(config.train.precision);
 
@@ -96,7 +103,7 @@ TrainReport train(const TrainOptions& options) {
   report.simulator = run.simulator->name();
   if (run.renderer) report.renderer = run.renderer->name();
   std::vector<RecentUpdate> recent;
-  if (options.resume) {
+  if (options.old_run == OldRun::resume) {
     const Checkpoint saved = read_checkpoint(report.checkpoint);
     const std::string why_new_episodes = run.restore(saved);
     if (!why_new_episodes.empty()) notify("the saved episodes cannot go on, new ones begin: " + why_new_episodes);
@@ -107,6 +114,7 @@ TrainReport train(const TrainOptions& options) {
       const Checkpoint other = read_checkpoint(options.init_from);
       restore_tensors(other, other.parameters, run.policy.parameters());
     }
+    for (const std::string& name : old_files) std::filesystem::remove(options.out_folder + "/" + name);
     run.simulator->reset();
     run.save(options.out_folder + "/untrained.ckpt", recent);
   }

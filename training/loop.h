@@ -19,11 +19,18 @@ struct TrainProgress {
   double eta_s = 0;
 };
 
+/// What happens to a run that lies in the folder already.
+enum class OldRun {
+  refuse,
+  resume,     // goes on from its checkpoint
+  overwrite,  // its files are removed; others stay
+};
+
 struct TrainOptions {
   std::string config_path;             // TOML, see configs/paper.toml for every field
   std::vector<std::string> overrides;  // "train.updates=2"
   std::string out_folder;
-  bool resume = false;    // go on from out_folder's checkpoint
+  OldRun old_run = OldRun::refuse;
   std::string init_from;  // begin with the weights of this checkpoint, of the same network, and with nothing else of it
   double minutes = 0;     // of wall time, start-up included, after which no update is begun; 0: no limit
   std::function<void(const TrainProgress&)> on_progress;
@@ -41,7 +48,8 @@ struct TrainReport {
 /// Trains as the configuration says and writes into out_folder: config.toml (resolved), untrained.ckpt (the policy
 /// before its first update), checkpoint.ckpt, policy.safetensors, progress.csv and TensorBoard events. After ^C
 /// (common/support/interrupt.h) it saves and returns with `interrupted`; where another update, as long as the longest
-/// so far, would not end within `minutes`, with `out_of_time`. Throws Error naming file and key for bad input.
+/// so far, would not end within `minutes`, with `out_of_time`. Throws Error naming file and key for bad input, and
+/// naming the folder where another run is at work, and where one lies that old_run does not speak of.
 TrainReport train(const TrainOptions& options);
 
 }  // namespace pictura

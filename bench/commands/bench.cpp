@@ -119,7 +119,10 @@ struct TrainArguments {
 void bench_train(const TrainArguments& arguments) {
   const std::string folder = std::filesystem::temp_directory_path() / fmt::format("pictura-bench-{}", getpid());
   BenchResult rate{"train, one update", "agent_steps_per_s", {}};
-  TrainOptions options{.config_path = arguments.config, .overrides = arguments.overrides, .out_folder = folder};
+  TrainOptions options{.config_path = arguments.config,
+                       .overrides = arguments.overrides,
+                       .out_folder = folder,
+                       .old_run = OldRun::overwrite};
   for (const std::string& text : overrides_of(arguments.backends)) options.overrides.push_back(text);
   int64_t steps_before = 0;
   auto begin = Clock::now();

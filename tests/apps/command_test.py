@@ -482,6 +482,13 @@ class Training(CommandCase):
         for name in ("checkpoint.ckpt", "untrained.ckpt", "policy.safetensors", "progress.csv", "learning_curve.png"):
             self.assertTrue((self.folder / "whole" / name).exists(), name)
 
+    def test_a_folder_with_a_run_asks_what_to_do_with_it(self):
+        one = ["train", *TINY, "--set", "train.updates=1", "--out", self.folder / "run"]
+        first = self.json_of(*one)
+        self.assert_refused(1, f"{self.folder}/run: holds a run already (checkpoint.ckpt, ", *one)
+        self.assert_refused(2, "excludes", *one, "--overwrite", "--resume")
+        self.assertEqual(self.json_of(*one, "--overwrite")["policy_hash"], first["policy_hash"])
+
     def test_bad_input_is_refused_by_name(self):
         out = ["--out", self.folder / "run"]
         self.assert_refused(1, "train.speed", "train", *TINY, "--set", "train.speed=3", *out)

@@ -1,4 +1,5 @@
-"""The scripts: their help from any folder, what scripts/setup links, and the results of scripts/gpu_check_record.py.
+"""The scripts: their help from any folder, what scripts/setup links, what they do with a run that is there, and the
+results of scripts/gpu_check_record.py.
 
 Run by ctest: python3 scripts_test.py [unittest arguments].
 """
@@ -69,6 +70,48 @@ class Setup(unittest.TestCase):
         self.assertEqual(base["cacheVariables"]["CMAKE_EXPORT_COMPILE_COMMANDS"], "ON")
         self.assertTrue(all(preset.get("inherits") == "base" for preset in presets if preset is not base))
         self.assertIn("/compile_commands.json", (SCRIPTS.parent / ".gitignore").read_text().split())
+
+
+class Runs(unittest.TestCase):
+    """Copies of the scripts that train, with a `pictura` that keeps what it is asked for, and fails."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="pictura-test-")
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name)
+        for name in ("demo", "gpu_train"):
+            (self.root / "scripts").mkdir(exist_ok=True)
+            shutil.copy(SCRIPTS / name, self.root / "scripts" / name)
+        for name in ("scripts/setup", "scripts/gpu_env", "venv/bin/cmake"):
+            self.write_program(name, "true")
+        for build in ("cpu", "cuda"):
+            self.write_program(f"build/{build}/apps/pictura", f'echo "$*" >{self.root}/asked; exit 3')
+
+    def write_program(self, name, script):
+        path = self.root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"#!/bin/sh\n{script}\n")
+        path.chmod(0o755)
+
+    def asked(self, name, *arguments):
+        environment = {**os.environ, "PICTURA_VENV": "venv", "PATH": f"{self.root}/venv/bin:/usr/bin:/bin"}
+        result = subprocess.run([self.root / "scripts" / name, *arguments], env=environment, capture_output=True, text=True,
+                                timeout=60)  # fmt: skip
+        self.assertEqual(result.returncode, 3, result.stderr)
+        return (self.root / "asked").read_text().split()
+
+    def test_the_demo_begins_anew(self):
+        self.assertIn("--overwrite", self.asked("demo"))
+
+    def test_training_goes_on_exactly_where_there_is_a_checkpoint(self):
+        train = ("gpu_train", "run", "--minutes", "8")
+        self.assertEqual(self.asked(*train), ["train", "--out", "runs/run", "--minutes", "8", "--json"])
+        self.assertNotIn("--resume", self.asked(*train))
+        (self.root / "runs/run/checkpoint.ckpt").write_text("")
+        self.assertIn("--resume", self.asked(*train))
+        self.assertEqual(self.asked(*train, "--resume").count("--resume"), 1)
+        self.assertNotIn("--resume", self.asked(*train, "--overwrite"))
+        self.assertNotIn("--resume", self.asked("gpu_train", "other"))
 
 
 class Profile(unittest.TestCase):

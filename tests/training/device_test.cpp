@@ -153,7 +153,7 @@ TEST_P(EachModality, WhatOneDeviceSavesTheOtherGoesOnFrom) {
     SCOPED_TRACE(run);
     const auto resumed = [&](const char* updates) {
       TrainOptions o = options(run, second, {modality(), updates});
-      o.resume = true;
+      o.old_run = OldRun::resume;
       o.on_notice = [](const std::string& notice) { ADD_FAILURE() << notice; };
       return train(o);
     };
@@ -266,7 +266,7 @@ TEST_F(DeviceTraining, EndsWhenItsMinutesAreOverAndGoesOn) {
   for (const char* name : {"config.toml", "untrained.ckpt", "checkpoint.ckpt", "policy.safetensors"}) {
     EXPECT_TRUE(std::filesystem::exists(folder_ / (std::string("run/") + name))) << name;
   }
-  o.resume = true;
+  o.old_run = OldRun::resume;
   o.minutes = 60;
   const TrainReport resumed = train(o);
   EXPECT_FALSE(resumed.out_of_time);

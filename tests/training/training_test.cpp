@@ -51,7 +51,7 @@ TEST_F(Training, ResumesExactly) {
   const TrainReport half = train(options("parts", {"train.updates=2"}));
   EXPECT_NE(half.policy_hash, whole.policy_hash);
   TrainOptions rest = options("parts");
-  rest.resume = true;
+  rest.old_run = OldRun::resume;
   const TrainReport resumed = train(rest);
   EXPECT_EQ(resumed.policy_hash, whole.policy_hash);
   EXPECT_EQ(resumed.agent_steps, whole.agent_steps);
@@ -80,7 +80,7 @@ TEST_F(Training, EndsWhenItsMinutesAreOverAndGoesOnExactly) {
   EXPECT_FALSE(half.out_of_time);
   // Over before the first update that is left.
   TrainOptions rest = options("parts");
-  rest.resume = true;
+  rest.old_run = OldRun::resume;
   rest.minutes = 1e-9;
   bool has_begun = false;
   rest.on_progress = [&has_begun](const TrainProgress&) { has_begun = true; };
@@ -111,7 +111,7 @@ TEST_F(Training, ARunWithoutTimeForItsFirstUpdateIsSavedAndGoesOn) {
     EXPECT_TRUE(std::filesystem::exists(folder_ / (std::string("run/") + name))) << name;
   }
   TrainOptions rest = options("run", {"train.updates=1"});
-  rest.resume = true;
+  rest.old_run = OldRun::resume;
   EXPECT_EQ(train(rest).policy_hash, train(options("whole", {"train.updates=1"})).policy_hash);
 }
 
@@ -123,7 +123,7 @@ TEST_F(Training, NewEpisodesBeginWhereTheSavedOnesCannotGoOn) {
     changed.simulator = std::move(simulator);
     write_checkpoint(half.checkpoint, changed);
     TrainOptions o = options("run", {updates});
-    o.resume = true;
+    o.old_run = OldRun::resume;
     o.on_notice = [notices](const std::string& notice) { notices->push_back(notice); };
     return train(o);
   };
@@ -175,7 +175,7 @@ TEST_F(Training, RefusesToResumeWithOtherCamerasByName) {
   std::erase_if(o.overrides, [](const std::string& text) { return text.starts_with("render."); });
   train(o);
   write_rig(10);
-  o.resume = true;
+  o.old_run = OldRun::resume;
   o.overrides.push_back("train.updates=2");
   EXPECT_THAT(message_of([&] { train(o); }), AllOf(HasSubstr("checkpoint.ckpt"), HasSubstr("rig.toml"),
                                                    HasSubstr("'ahead'"), HasSubstr("yaw_pitch_roll_rad")));
@@ -200,7 +200,7 @@ TEST_F(Training, ResumesUnderAnotherNameOfTheSameCamerasAndOtherHarmlessSettings
   std::erase_if(o.overrides, [](const std::string& text) { return text.starts_with("render."); });
   train(o);
   write_config("renamed.toml");
-  o.resume = true;
+  o.old_run = OldRun::resume;
   for (const char* text : {"train.updates=2", "run.device=cpu", "simulator.backend=cpu", "render.backend=cpu",
                            "evaluate.conditioning.delta_goal_m=3"}) {
     o.overrides.push_back(text);
@@ -331,8 +331,50 @@ TEST_F(Training, InterruptedRunSavesAndGoesOnExactly) {
       },
       ::testing::ExitedWithCode(0), "");
   TrainOptions rest = options("stopped");
-  rest.resume = true;
+  rest.old_run = OldRun::resume;
   EXPECT_EQ(train(rest).policy_hash, train(options("whole")).policy_hash);
+}
+
+TEST_F(Training, ARunInTheFolderIsNeitherOverwrittenNorMixedWithUnlessAskedFor) {
+  const auto entries = [&] {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_ / "run")) {
+      names.push_back(entry.path().filename().string());
+    }
+    return names;
+  };
+  const auto count_events = [&] {
+    const std::vector<std::string> names = entries();
+    return std::count_if(names.begin(), names.end(), [](const auto& name) { return name.starts_with("events.out."); });
+  };
+  train(options("run", {"train.updates=2"}));
+  const std::vector<std::string> files = entries();
+  const std::string events =
+      *std::find_if(files.begin(), files.end(), [](const auto& name) { return name.starts_with("events."); });
+  // Of an earlier process, and another program's; and what is no run's.
+  write_file(folder_ / "run/events.out.tfevents.17.5", "old");
+  write_file(folder_ / "run/.checkpoint.17.tmp.ckpt", "left by a killed process");
+  write_file(folder_ / "run/notes.txt", "mine");
+  write_file(folder_ / "run/events.out.tfevents.17.host", "another program's");
+
+  const std::string checkpoint = read_file(folder_ / "run/checkpoint.ckpt");
+  EXPECT_THAT(message_of([&] { train(options("run", {"train.updates=1"})); }),
+              AllOf(HasSubstr((folder_ / "run") + ": holds a run already"), HasSubstr("checkpoint.ckpt, config.toml"),
+                    HasSubstr(events), HasSubstr("progress.csv"), ::testing::Not(HasSubstr("notes.txt"))));
+  EXPECT_EQ(read_file(folder_ / "run/checkpoint.ckpt"), checkpoint);
+
+  TrainOptions over = options("run", {"train.updates=1", "train.speed=1"});
+  over.old_run = OldRun::overwrite;
+  EXPECT_THAT(message_of([&] { train(over); }), HasSubstr("train.speed"));
+  EXPECT_EQ(read_file(folder_ / "run/checkpoint.ckpt"), checkpoint) << "what cannot begin removes nothing";
+  over.overrides.pop_back();
+  EXPECT_EQ(train(over).updates, 1);
+  EXPECT_EQ(read_table(folder_ / "run/progress.csv").size(), 2u);
+  EXPECT_EQ(count_events(), 2);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "run/events.out.tfevents.17.5"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "run/.checkpoint.17.tmp.ckpt"));
+  EXPECT_EQ(read_file(folder_ / "run/notes.txt"), "mine");
+  EXPECT_EQ(read_file(folder_ / "run/events.out.tfevents.17.host"), "another program's");
 }
 
 TEST_F(Training, ASecondRunIntoAFolderInUseIsRefusedAndTheFirstGoesOn) {
@@ -341,7 +383,7 @@ TEST_F(Training, ASecondRunIntoAFolderInUseIsRefusedAndTheFirstGoesOn) {
   first.on_progress = [&](const TrainProgress&) {
     TrainOptions second = options("run");
     refusals.push_back(message_of([&] { train(second); }));
-    second.resume = true;
+    second.old_run = OldRun::resume;
     refusals.push_back(message_of([&] { train(second); }));
   };
   const TrainReport report = train(first);
@@ -354,7 +396,7 @@ TEST_F(Training, ASecondRunIntoAFolderInUseIsRefusedAndTheFirstGoesOn) {
 TEST_F(Training, RefusesToResumeUnderAnotherConfigurationByName) {
   train(options("run", {"train.updates=1"}));
   TrainOptions changed = options("run", {"policy.backbone_width=64"});
-  changed.resume = true;
+  changed.old_run = OldRun::resume;
   try {
     train(changed);
     FAIL() << "expected an Error";
@@ -362,7 +404,7 @@ TEST_F(Training, RefusesToResumeUnderAnotherConfigurationByName) {
     EXPECT_THAT(error.what(), AllOf(HasSubstr("checkpoint.ckpt"), HasSubstr("policy.backbone_width: 128 became 64")));
   }
   TrainOptions nothing = options("nowhere");
-  nothing.resume = true;
+  nothing.old_run = OldRun::resume;
   EXPECT_THROW(train(nothing), Error);
 }
 
@@ -586,7 +628,7 @@ TEST_F(Training, TheVectorPolicyLearnsFromWallsWhereItObservesThem) {
   EXPECT_GT(evaluate(o).rows.at(0).km_driven, 0);
   EXPECT_TRUE(PolicySession(report.checkpoint).evaluation_world(5).wall_observations);
   TrainOptions without = options("run", {"train.updates=2", "policy.modality=vector", "simulator.walls=true"});
-  without.resume = true;
+  without.old_run = OldRun::resume;
   EXPECT_THAT(message_of([&] { train(without); }), HasSubstr("simulator.wall_observations: true became false"));
 }
 
