@@ -408,6 +408,24 @@ TEST_F(Training, RefusesToResumeUnderAnotherConfigurationByName) {
   EXPECT_THROW(train(nothing), Error);
 }
 
+TEST_F(Training, BeginsWithTheWeightsOfAnotherRunAtAnyImageSize) {
+  const std::string first = train(options("first", {"train.updates=1"})).checkpoint;
+  TrainOptions o = options("second", {"train.updates=1", "render.width_px=20", "run.seed=5"});
+  o.init_from = first;
+  train(o);
+  const Checkpoint other = read_checkpoint(first), begun = read_checkpoint(folder_ / "second/untrained.ckpt");
+  EXPECT_EQ(begun.agent_steps, 0);
+  EXPECT_EQ(begun.update, 0);
+  EXPECT_EQ(begun.adam_steps, 0);
+  ASSERT_EQ(begun.parameters.size(), other.parameters.size());
+  for (size_t i = 0; i < other.parameters.size(); ++i) {
+    EXPECT_TRUE(begun.parameters[i].value.equal(other.parameters[i].value)) << other.parameters[i].name;
+  }
+  TrainOptions wider = options("wider", {"policy.backbone_width=64"});
+  wider.init_from = first;
+  EXPECT_THAT(message_of([&] { train(wider); }), AllOf(HasSubstr(first), HasSubstr("another architecture")));
+}
+
 TEST_F(Training, VectorPolicyTrainsAndIsEvaluated) {
   const TrainReport report = train(options("run", {"train.updates=1", "policy.modality=vector"}));
   EvaluateOptions o;
