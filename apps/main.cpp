@@ -1,6 +1,9 @@
-// The `pictura` command: subcommands, exit statuses (0 success, 1 failure, 2 wrong usage, 130 after ^C) and one-line
+// The `pictura` command: subcommands, exit statuses (0 success, 1 failure, 2 wrong usage, 130 after ^C, 143 after
+// SIGTERM, 129 after a hang-up) and one-line
 // error messages.
+#include <csignal>
 #include <cstdio>
+#include <system_error>
 
 #include "pictura/apps/commands.h"
 #include "pictura/bench/commands/bench.h"
@@ -48,7 +51,12 @@ int main(int argc, char** argv) {
     return 2;
   } catch (const Interrupted& error) {
     std::fprintf(stderr, "error: %s\n", error.what());
-    return 130;
+    return 128 + interrupting_signal();
+  } catch (const std::system_error& error) {
+    // A terminal that has hung up takes no report of what was saved.
+    if (interrupting_signal() == SIGHUP) return 128 + SIGHUP;
+    std::fprintf(stderr, "error: %s\n", error.what());
+    return 1;
   } catch (const std::bad_alloc&) {
     std::fprintf(stderr, "error: out of memory\n");
     return 1;

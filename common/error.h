@@ -21,7 +21,8 @@ class UsageError : public Error {
   using Error::Error;
 };
 
-/// The user pressed ^C; what was finished is saved, and the command exits with 130.
+/// The user pressed ^C, or the process was told to end; what was finished is saved, and the command exits with 128 +
+/// the signal's number.
 class Interrupted : public Error {
  public:
   using Error::Error;

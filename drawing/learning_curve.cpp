@@ -40,6 +40,7 @@ std::map<std::string, std::vector<double>> read_columns(const std::string& path)
 std::string draw_learning_curve(const std::string& run_folder) {
   const std::string csv = run_folder + "/progress.csv", picture = run_folder + "/learning_curve.png";
   const auto columns = read_columns(csv);
+  if (columns.empty()) return "";
   auto column = [&](const std::string& name) {
     const auto found = columns.find(name);
     PICTURA_CHECK(found != columns.end(), "{}: expected a column '{}'", csv, name);

@@ -1,27 +1,42 @@
 #include "pictura/common/support/interrupt.h"
 
 #include <csignal>
+#include <ctime>
+
+#include <unistd.h>
 
 namespace pictura {
 
 namespace {
-// The one process-wide variable of the library: a signal handler can reach nothing else.
-volatile std::sig_atomic_t interrupt_seen = 0;
+// The process-wide variables of the library: a signal handler can reach nothing else.
+volatile std::sig_atomic_t first_signal = 0;
+volatile std::time_t first_came_ms = 0;
+
+std::time_t now_ms() {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
 
 extern "C" void on_interrupt(int signal) {
-  if (interrupt_seen) {
-    std::signal(signal, SIG_DFL);
-    std::raise(signal);
+  if (!first_signal) {
+    first_came_ms = now_ms();
+    first_signal = signal;
+    return;
   }
-  interrupt_seen = 1;
+  // One request may come twice: timeout(1) signals its child and then the child's group, and a terminal that hangs up
+  // is told of by the shell and by the kernel.
+  constexpr std::time_t kSameRequest_ms = 100;
+  if (signal != SIGHUP && now_ms() - first_came_ms > kSameRequest_ms) _exit(128 + signal);
 }
 }  // namespace
 
 void catch_interrupts() {
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);
+  if (std::signal(SIGHUP, on_interrupt) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
 }
 
-bool interrupted() { return interrupt_seen != 0; }
+int interrupting_signal() { return first_signal; }
 
 }  // namespace pictura

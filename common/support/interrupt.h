@@ -1,12 +1,16 @@
-// ^C as a question that long work asks between its steps, instead of a sudden death.
+// ^C, and what else asks a process to end, as a question that long work asks between its steps, instead of a sudden
+// death.
 #pragma once
 
 namespace pictura {
 
-/// From now on SIGINT and SIGTERM set a flag; a second one ends the process at once.
+/// From now on the first SIGINT, SIGTERM or SIGHUP is kept; a second SIGINT or SIGTERM ends the process at once with
+/// the status 128 + its number. SIGHUP stays ignored where it is (nohup).
 void catch_interrupts();
 
-/// Whether one came. Never true unless catch_interrupts() was called.
-bool interrupted();
+/// The signal that came first, or 0. Never another unless catch_interrupts() was called.
+int interrupting_signal();
+
+inline bool interrupted() { return interrupting_signal() != 0; }
 
 }  // namespace pictura

@@ -6,6 +6,7 @@ Run by ctest, one entry per class: python3 command_test.py PICTURA [unittest arg
 import json
 import os
 import pathlib
+import pty
 import re
 import shutil
 import signal
@@ -583,6 +584,90 @@ class Training(CommandCase):
         result = self.json_of("evaluate", out / "checkpoint.ckpt", "--map", "procedural:1", "--agents", 2, "--scenarios", 1,
                               "--steps", 2, "--device", "cpu")  # fmt: skip
         self.assertEqual(result["rows"][0]["scenarios"], 1)
+
+    # Rollouts that take long, and updates that take far longer.
+    LONG = ["train", *TINY, "--set", "train.num_steps=4000"]
+    LONG_UPDATES = ["train", *TINY, "--set", "train.update_epochs=1000", "--set", "train.minibatch_size=1"]
+
+    def start(self, *arguments, until, **options):
+        """The process of a command that has written a file."""
+        command = [PICTURA, *map(str, arguments)]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+        self.addCleanup(process.kill)
+        self.wait_for(until.exists)
+        return process
+
+    def wait_for(self, is_there):
+        deadline = time.monotonic() + 120
+        while not is_there() and time.monotonic() < deadline:
+            time.sleep(0.02)
+
+    def test_each_signal_saves_what_there_is_and_has_its_status(self):
+        for name, status in [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)]:
+            with self.subTest(name):
+                out = self.folder / name
+                process = self.start(*self.LONG, "--out", out, until=out / "untrained.ckpt")
+                process.send_signal(getattr(signal, name))
+                _, errors = process.communicate(timeout=120)
+                self.assertEqual(process.returncode, status, errors)
+                self.assertEqual(errors.splitlines()[-1], f"error: interrupted; go on with --resume --out {out}")
+                for file in ("checkpoint.ckpt", "policy.safetensors"):
+                    self.assertTrue((out / file).exists(), file)
+                result = run(*self.LONG, "--out", out, "--resume", "--minutes", 0.0001, "--json")
+                self.assertEqual(json.loads(result.stdout)["updates"], 0, result.stderr)
+
+    def test_other_commands_have_the_statuses_of_signals_too(self):
+        for name, status in [("SIGTERM", 143), ("SIGHUP", 129)]:
+            process = subprocess.Popen([PICTURA, "simulate", "procedural:1", "--agents", "8", "--steps", "10000000"],
+                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)  # fmt: skip
+            self.addCleanup(process.kill)
+            time.sleep(2)
+            process.send_signal(getattr(signal, name))
+            _, errors = process.communicate(timeout=120)
+            self.assertEqual((process.returncode, "error: interrupted at step" in errors), (status, True), errors)
+
+    def test_a_second_signal_ends_it_at_once_unless_it_is_the_first_sent_twice(self):
+        out = self.folder / "impatient"
+        process = self.start(*self.LONG_UPDATES, "--out", out, until=out / "untrained.ckpt")
+        time.sleep(2)
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.5)
+        self.assertIsNone(process.poll(), "an update is not interrupted")
+        process.send_signal(signal.SIGHUP)
+        time.sleep(0.5)
+        self.assertIsNone(process.poll(), "a hang-up is no impatience")
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=10)
+        self.assertEqual(process.returncode, 143)
+        self.assertFalse((out / "checkpoint.ckpt").exists())
+        out = self.folder / "twice"
+        process = self.start(*self.LONG, "--out", out, until=out / "untrained.ckpt")
+        process.send_signal(signal.SIGTERM)
+        time.sleep(0.002)
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=120)
+        self.assertEqual((process.returncode, (out / "checkpoint.ckpt").exists()), (143, True))
+
+    def test_a_terminal_that_hangs_up_takes_nothing_with_it(self):
+        out = self.folder / "run"
+        child, terminal = pty.fork()
+        if child == 0:
+            os.execv(PICTURA, [PICTURA, *self.LONG, "--out", str(out)])
+        self.wait_for((out / "untrained.ckpt").exists)
+        os.close(terminal)
+        self.assertEqual(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), 129)
+        self.assertTrue((out / "policy.safetensors").exists())
+
+    def test_under_nohup_a_hang_up_changes_nothing(self):
+        out = self.folder / "run"
+        process = self.start(*self.LONG, "--out", out, until=out / "untrained.ckpt",
+                             preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))  # fmt: skip
+        process.send_signal(signal.SIGHUP)
+        time.sleep(0.5)
+        self.assertIsNone(process.poll())
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=120)
+        self.assertEqual(process.returncode, 143)
 
     def test_evaluation_has_its_keys(self):
         out = self.folder / "run"
