@@ -119,7 +119,7 @@ TrainReport train(const TrainOptions& options) {
     run.save(options.out_folder + "/untrained.ckpt", recent);
   }
   write_file(options.out_folder + "/config.toml", to_toml(config));
-  RunLog log(options.out_folder, config, run.update, run.agent_steps, recent);
+  RunLog log(options.out_folder, config, run.update, run.agent_steps, recent, options.on_notice);
 
   Stopwatch since_saved;
   double longest_update_s = 0;

@@ -1,5 +1,7 @@
 #include "pictura/training/run_log.h"
 
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <sstream>
 
@@ -66,41 +68,72 @@ Scalars scalars_of(const Config& config, const TrainProgress& progress, const Up
   return scalars;
 }
 
+std::vector<std::string_view> whole_lines(std::string_view text) {
+  std::vector<std::string_view> lines;
+  for (size_t end = text.find('\n'); end != text.npos; end = text.find('\n')) {
+    lines.push_back(text.substr(0, end));
+    text.remove_prefix(end + 1);
+  }
+  return lines;
+}
+
+// Whether a line is that many numbers, the first of an update that is done.
+bool is_row(std::string_view line, size_t num_columns, int64_t updates_done) {
+  std::istringstream cells{std::string(line)};
+  size_t columns = 0;
+  for (std::string cell; std::getline(cells, cell, ','); ++columns) {
+    char* end = nullptr;
+    const double value = std::strtod(cell.c_str(), &end);
+    if (end == cell.c_str() || end != cell.c_str() + cell.size()) return false;
+    if (columns == 0 && value > static_cast<double>(updates_done)) return false;
+  }
+  return columns == num_columns;
+}
+
+std::string next_free_name(const std::string& path) {
+  int number = 1;
+  while (std::filesystem::exists(fmt::format("{}.{}", path, number))) ++number;
+  return fmt::format("{}.{}", path, number);
+}
+
 }  // namespace
 
-ProgressCsv::ProgressCsv(const std::string& path, int64_t updates_done) : path_(path) {
-  std::string kept;
-  if (updates_done > 0 && std::filesystem::exists(path)) {
-    std::istringstream lines(read_file(path));
-    for (std::string line; std::getline(lines, line);) {
-      if (kept.empty() || std::atoll(line.c_str()) <= updates_done) kept += line + '\n';
+ProgressCsv::ProgressCsv(const std::string& path, const Scalars& columns, int64_t updates_done,
+                         const std::function<void(const std::string&)>& on_notice)
+    : path_(path) {
+  std::string head = "update", kept;
+  for (const auto& [name, value] : columns) head += ',' + name;
+  if (std::filesystem::exists(path)) {
+    const std::string old = read_file(path);
+    const std::vector<std::string_view> lines = whole_lines(old);
+    if (!lines.empty() && lines[0] != head) {
+      const std::string aside = next_free_name(path);
+      std::filesystem::rename(path, aside);
+      if (on_notice) on_notice(fmt::format("{}: had other columns, and is now {}", path, aside));
+    } else {
+      for (size_t i = 1; i < lines.size(); ++i) {
+        if (is_row(lines[i], columns.size() + 1, updates_done)) kept.append(lines[i]) += '\n';
+      }
     }
   }
-  write_file(path, kept);
+  write_file(path, head + '\n' + kept);
   out_.open(path, std::ios::app);
-  needs_head_ = kept.empty();
 }
 
 void ProgressCsv::write(int64_t update, const Scalars& scalars) {
-  if (needs_head_) {
-    out_ << "update";
-    for (const auto& [name, value] : scalars) out_ << ',' << name;
-    out_ << '\n';
-    needs_head_ = false;
-  }
   out_ << update;
   for (const auto& [name, value] : scalars) out_ << ',' << fmt::format("{:.9g}", value);
   out_ << '\n' << std::flush;
-  PICTURA_CHECK(out_, "{}: writing failed", path_);
+  PICTURA_CHECK(out_, "{}: writing failed: {}", path_, std::strerror(errno));
 }
 
 RunLog::RunLog(const std::string& folder, const Config& config, int64_t updates_done, int64_t agent_steps,
-               const std::vector<RecentUpdate>& recent)
+               const std::vector<RecentUpdate>& recent, const std::function<void(const std::string&)>& on_notice)
     : config_(config),
       first_update_(updates_done),
       first_agent_steps_(agent_steps),
       events_(folder),
-      csv_(folder + "/progress.csv", updates_done),
+      csv_(folder + "/progress.csv", scalars_of(config, {}, {}), updates_done, on_notice),
       recent_(recent.begin(), recent.end()) {}
 
 TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecord& record) {

@@ -11,16 +11,19 @@
 
 namespace pictura {
 
-/// One CSV per run. On resume the rows of updates that the checkpoint does not hold are dropped.
+/// One CSV per run. Of the rows of an older file it keeps those that are whole and of updates that are done: a process
+/// may have been killed, or a disk full, within one. A file with other columns is renamed to PATH.1 (or the next free
+/// number), with a notice.
 class ProgressCsv {
  public:
-  ProgressCsv(const std::string& path, int64_t updates_done);
+  ProgressCsv(const std::string& path, const Scalars& columns, int64_t updates_done,
+              const std::function<void(const std::string&)>& on_notice);
+  /// Appends a row and flushes. Throws Error naming the path when the disk is full.
   void write(int64_t update, const Scalars& scalars);
 
  private:
   std::string path_;
   std::ofstream out_;
-  bool needs_head_ = true;
 };
 
 /// What one update did.
@@ -37,7 +40,7 @@ class RunLog {
   /// Opens the files of a run that has done `updates_done` updates and `agent_steps` in them. Throws Error naming the
   /// path.
   RunLog(const std::string& folder, const Config& config, int64_t updates_done, int64_t agent_steps,
-         const std::vector<RecentUpdate>& recent);
+         const std::vector<RecentUpdate>& recent, const std::function<void(const std::string&)>& on_notice);
 
   /// Writes the row and the event of an update, after which the run has done `update` updates and `agent_steps`.
   TrainProgress add(int64_t update, int64_t agent_steps, const UpdateRecord& record);
