@@ -2,6 +2,7 @@
 
 #include <array>
 #include <bit>
+#include <cerrno>
 #include <chrono>
 #include <cstring>
 
@@ -75,7 +76,7 @@ void EventFile::write(int64_t step, const Scalars& scalars) {
 void EventFile::write_record(const std::string& event) {
   const std::string length = raw(static_cast<uint64_t>(event.size()));
   out_ << length << raw(masked_crc(length)) << event << raw(masked_crc(event)) << std::flush;
-  PICTURA_CHECK(out_, "{}: writing failed", path_);
+  PICTURA_CHECK(out_, "{}: writing failed: {}", path_, std::strerror(errno));
 }
 
 }  // namespace pictura

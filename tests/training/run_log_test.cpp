@@ -1,14 +1,20 @@
-// progress.csv: what it keeps of an older file.
+// progress.csv: what it keeps of an older file, and what a full disk does to a run's files.
 #include "pictura/training/run_log.h"
 
+#include <csignal>
+#include <filesystem>
+
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 
 #include "pictura/common/support/file.h"
+#include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 
 namespace pictura {
 namespace {
 
+using test::message_of;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
@@ -52,6 +58,77 @@ TEST_F(ProgressCsvFile, OtherColumnsGoOnInANewFile) {
   EXPECT_EQ(after(older, 1), "update,a,b\n9,0.5,7\n");
   EXPECT_EQ(read_file(path_ + ".1"), old);
   EXPECT_EQ(read_file(path_ + ".2"), older);
+}
+
+// For its lifetime no file grows beyond a size, as on a disk that is full by then.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t bytes) : old_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &old_);
+    const rlimit limit{bytes, old_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FullDisk() {
+    setrlimit(RLIMIT_FSIZE, &old_);
+    std::signal(SIGXFSZ, old_handler_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  rlimit old_{};
+  void (*old_handler_)(int);
+};
+
+using FullDisks = ProgressCsvFile;
+
+TEST_F(FullDisks, AreErrorsOfTheCsvAndOfEventsThatNameFileAndReason) {
+  const auto fill = [](const auto& write) {
+    const FullDisk full(2000);
+    return message_of([&] {
+      for (int64_t i = 0; i < 1000; ++i) write(i);
+    });
+  };
+  ProgressCsv csv(path_, columns_, 0, {});
+  EXPECT_EQ(fill([&](int64_t i) { csv.write(i, columns_); }), path_ + ": writing failed: File too large");
+  EventFile events(folder_.path());
+  EXPECT_THAT(fill([&](int64_t i) { events.write(i, columns_); }),
+              AllOf(HasSubstr(folder_ / "events.out.tfevents."), HasSubstr(": writing failed: File too large")));
+  // The torn row goes when the run goes on.
+  ProgressCsv again(path_, columns_, 2000, {});
+  const std::string rows = read_file(path_);
+  EXPECT_EQ(rows.back(), '\n');
+  EXPECT_GT(rows.size(), 1900u);
+}
+
+TEST_F(FullDisks, KeepTheOldFileWhole) {
+  const std::string old = "update,a,b\n1,2,3\n" + std::string(3000, '9');
+  write_file(path_, old);
+  {
+    const FullDisk full(5);
+    EXPECT_THAT(message_of([&] { ProgressCsv(path_, columns_, 1, {}); }),
+                AllOf(HasSubstr(path_), HasSubstr("File too large")));
+  }
+  EXPECT_EQ(read_file(path_), old);
+  EXPECT_EQ(folder_.num_entries(), 1u);
+}
+
+TEST_F(FullDisks, KeepTheLastCheckpointOfARun) {
+  TrainOptions run{.config_path = PICTURA_SOURCE_DIR "/configs/smoke.toml", .out_folder = folder_ / "run"};
+  run.overrides = {"run.device=cpu",           "run.num_threads=1",  "policy.modality=vector",
+                   "simulator.num_slots=8",    "train.num_steps=12", "train.checkpoint_every=2",
+                   "policy.backbone_width=64", "train.updates=2"};
+  const TrainReport first = train(run);
+  const std::string checkpoint = read_file(first.checkpoint);
+  run.old_run = OldRun::resume;
+  run.overrides.back() = "train.updates=4";
+  {
+    const FullDisk full(checkpoint.size() / 2);
+    EXPECT_THAT(message_of([&] { train(run); }), AllOf(HasSubstr(first.checkpoint), HasSubstr("File too large")));
+  }
+  EXPECT_EQ(read_file(first.checkpoint), checkpoint);
+  run.overrides.push_back("train.checkpoint_every=1");
+  EXPECT_EQ(train(run).updates, 4) << "from where it was, when there is room again";
 }
 
 }  // namespace
