@@ -98,6 +98,8 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.number("train.adv_filter_ema", c.train.adv_filter_ema, 1e-6, 1);
   v.integer("train.checkpoint_every", c.train.checkpoint_every, 1, int64_t{1} << 40);
   v.number("train.checkpoint_minutes", c.train.checkpoint_minutes, 0.01, 1e6);
+  v.integer("train.keep_checkpoints", c.train.keep_checkpoints, 1, 1000);
+  v.integer("train.milestone_agent_steps", c.train.milestone_agent_steps, 0, int64_t{1} << 50);
   v.choice("train.precision", c.train.precision, kPrecisions);
   v.name("train.images", c.train.images, {"auto", "kept", "redrawn"});
 
@@ -543,6 +545,8 @@ bool may_differ(const std::string& key, const Config& saved, const Config& now) 
   static const std::set<std::string> kHarmless{"train.updates",
                                                "train.checkpoint_every",
                                                "train.checkpoint_minutes",
+                                               "train.keep_checkpoints",
+                                               "train.milestone_agent_steps",
                                                "train.forward_chunk",
                                                "train.images",
                                                "run.num_threads",

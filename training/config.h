@@ -87,6 +87,8 @@ struct Config {
     double adv_filter_ema = 0.25;        // weight of the newest rollout in the running max
     int64_t checkpoint_every = 20;       // updates
     double checkpoint_minutes = 2;       // or as soon as these have passed
+    int64_t keep_checkpoints = 1;        // the newest and those before it, as checkpoint.1.ckpt, ...
+    int64_t milestone_agent_steps = 0;   // distance of checkpoints that are kept for ever; 0: none
     Precision precision = Precision::bf16;
     /// Of a rollout: kept, or redrawn from its scenes where they are read; auto: kept on the host, redrawn on a device.
     std::string images = "auto";

@@ -122,6 +122,15 @@ TrainReport train(const TrainOptions& options) {
   RunLog log(options.out_folder, config, run.update, run.agent_steps, recent, options.on_notice);
 
   Stopwatch since_saved;
+  int64_t saved_update = options.old_run == OldRun::resume ? run.update : -1;
+  const auto save = [&] {
+    // A second time it would be the same, in the place of an older one.
+    if (run.update == saved_update) return;
+    save_checkpoint(options.out_folder, config.train.keep_checkpoints,
+                    [&](const std::string& path) { run.save(path, log.recent()); });
+    saved_update = run.update;
+    since_saved.restart();
+  };
   double longest_update_s = 0;
   while (run.update < config.train.updates && !schedule_has_ended(config.train, run.agent_steps) &&
          !report.interrupted) {
@@ -151,6 +160,8 @@ TrainReport train(const TrainOptions& options) {
     longest_update_s = std::max(longest_update_s, record.rollout_s + record.update_s);
 
     ++run.update;
+    const std::string milestone = milestone_name(run.agent_steps, run.agent_steps + record.totals.agent_steps,
+                                                 config.train.milestone_agent_steps);
     run.agent_steps += record.totals.agent_steps;
     run.distance_m += record.totals.distance_m;
     const TrainProgress progress = log.add(run.update, run.agent_steps, record);
@@ -158,13 +169,13 @@ TrainReport train(const TrainOptions& options) {
     report.interrupted = interrupted();
     if (run.update % config.train.checkpoint_every == 0 ||
         since_saved.seconds() > 60 * config.train.checkpoint_minutes) {
-      run.save(report.checkpoint, log.recent());
-      since_saved.restart();
+      save();
     }
+    if (!milestone.empty()) run.save(options.out_folder + "/" + milestone, log.recent());
     if (options.on_progress) options.on_progress(progress);
   }
 
-  run.save(report.checkpoint, log.recent());
+  save();
   write_safetensors(options.out_folder + "/policy.safetensors", run.policy.parameters(), to_toml(config));
   report.agent_steps = run.agent_steps;
   report.updates = run.update;

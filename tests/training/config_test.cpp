@@ -210,6 +210,8 @@ TEST(Config, HarmlessDifferencesAreNone) {
   Config a, b;
   b.train.updates = 3;
   b.train.checkpoint_every = 7;
+  b.train.keep_checkpoints = 4;
+  b.train.milestone_agent_steps = 1000;
   b.train.forward_chunk = 64;
   b.run.num_threads = 9;
   b.run.device = "cpu";

@@ -124,7 +124,8 @@ TEST_F(FullDisks, KeepTheLastCheckpointOfARun) {
   run.overrides.back() = "train.updates=4";
   {
     const FullDisk full(checkpoint.size() / 2);
-    EXPECT_THAT(message_of([&] { train(run); }), AllOf(HasSubstr(first.checkpoint), HasSubstr("File too large")));
+    EXPECT_THAT(message_of([&] { train(run); }),
+                AllOf(HasSubstr(folder_ / "run/checkpoint."), HasSubstr("File too large")));
   }
   EXPECT_EQ(read_file(first.checkpoint), checkpoint);
   run.overrides.push_back("train.checkpoint_every=1");

@@ -24,6 +24,7 @@
 #include "pictura/tests/training/small_runs.h"
 #include "pictura/training/observation.h"
 #include "pictura/training/run.h"
+#include "pictura/training/run_folder.h"
 #include "pictura/training/session.h"
 
 namespace pictura {
@@ -375,6 +376,71 @@ TEST_F(Training, ARunInTheFolderIsNeitherOverwrittenNorMixedWithUnlessAskedFor) 
   EXPECT_FALSE(std::filesystem::exists(folder_ / "run/.checkpoint.17.tmp.ckpt"));
   EXPECT_EQ(read_file(folder_ / "run/notes.txt"), "mine");
   EXPECT_EQ(read_file(folder_ / "run/events.out.tfevents.17.host"), "another program's");
+}
+
+TEST_F(Training, TheLastCheckpointsAreKept) {
+  const auto update_of = [&](const std::string& name) -> int64_t {
+    const std::string path = folder_ / ("run/" + name);
+    return std::filesystem::exists(path) ? read_checkpoint(path).update : -1;
+  };
+  const auto updates = [&] {
+    return std::vector<int64_t>{update_of("checkpoint.ckpt"), update_of("checkpoint.1.ckpt"),
+                                update_of("checkpoint.2.ckpt"), update_of("checkpoint.3.ckpt")};
+  };
+  using Updates = std::vector<int64_t>;
+  TrainOptions o = options("run", {"train.checkpoint_every=1", "train.updates=2", "train.keep_checkpoints=3"});
+  train(o);
+  EXPECT_EQ(updates(), (Updates{2, 1, -1, -1}));
+  o.old_run = OldRun::resume;
+  train(o);
+  EXPECT_EQ(updates(), (Updates{2, 1, -1, -1})) << "nothing was done";
+  o.overrides.push_back("train.updates=4");
+  train(o);
+  EXPECT_EQ(updates(), (Updates{4, 3, 2, -1}));
+  // With fewer kept, those that are too many go.
+  const std::string newest = read_file(folder_ / "run/checkpoint.ckpt");
+  save_checkpoint(folder_ / "run", 2, [&](const std::string& path) { write_file(path, "next"); });
+  EXPECT_EQ(read_file(folder_ / "run/checkpoint.ckpt"), "next");
+  EXPECT_EQ(read_file(folder_ / "run/checkpoint.1.ckpt"), newest);
+  EXPECT_EQ(update_of("checkpoint.2.ckpt"), -1);
+  EXPECT_THROW(save_checkpoint(folder_ / "run", 2, [](const std::string&) { throw Error("disk full"); }), Error);
+  EXPECT_EQ(read_file(folder_ / "run/checkpoint.ckpt"), "next");
+  EXPECT_EQ(read_file(folder_ / "run/checkpoint.1.ckpt"), newest);
+}
+
+TEST(Milestones, AreNamedByTheLastMultipleThatAnUpdatePasses) {
+  EXPECT_EQ(milestone_name(0, 249999999, 250000000), "");
+  EXPECT_EQ(milestone_name(249999999, 250000000, 250000000), "milestone_250M.ckpt");
+  EXPECT_EQ(milestone_name(250000000, 251000000, 250000000), "");
+  EXPECT_EQ(milestone_name(251000000, 1300000000, 250000000), "milestone_1250M.ckpt");
+  EXPECT_EQ(milestone_name(1400000, 1600000, 1500000), "milestone_1500k.ckpt");
+  EXPECT_EQ(milestone_name(90, 110, 50), "milestone_100.ckpt");
+  EXPECT_EQ(milestone_name(90, 110, 0), "");
+}
+
+TEST_F(Training, MilestonesAreKeptAndTheSameAfterResuming) {
+  const std::vector<std::string> settings{"train.milestone_agent_steps=50", "train.checkpoint_every=1"};
+  const auto milestones = [&](const std::string& run) {
+    std::vector<std::pair<std::string, int64_t>> all;
+    for (const std::string& name : run_files(folder_ / run)) {
+      if (!name.starts_with("milestone_")) continue;
+      const Checkpoint saved = read_checkpoint(folder_ / (run + "/" + name));
+      const int64_t steps = std::stoll(name.substr(std::strlen("milestone_")));
+      EXPECT_GE(saved.agent_steps, steps);
+      EXPECT_LT(saved.agent_steps, steps + 50) << "the last multiple";
+      all.emplace_back(name, saved.agent_steps);
+    }
+    return all;
+  };
+  train(options("whole", settings));
+  TrainOptions part = options("parts", settings);
+  part.overrides.push_back("train.updates=2");
+  train(part);
+  EXPECT_LT(milestones("parts").size(), milestones("whole").size());
+  part.overrides.back() = "train.updates=4";
+  part.old_run = OldRun::resume;
+  train(part);
+  EXPECT_EQ(milestones("parts"), milestones("whole"));
 }
 
 TEST_F(Training, ASecondRunIntoAFolderInUseIsRefusedAndTheFirstGoesOn) {
