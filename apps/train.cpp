@@ -59,8 +59,7 @@ void add_train_command(CLI::App& app) {
     for (const std::string& text : overrides_of(arguments->backends)) arguments->train.overrides.push_back(text);
     const TrainReport report = train(arguments->train);
     line.finish();
-    // Of a run that ended before its first update there is none.
-    const std::string curve = report.updates > 0 ? draw_learning_curve(arguments->train.out_folder) : "";
+    const std::string curve = draw_learning_curve(arguments->train.out_folder);
     if (arguments->json) {
       print_json({{"agent_steps", report.agent_steps},
                   {"agent_steps_per_s", report.agent_steps_per_s},
@@ -78,6 +77,7 @@ void add_train_command(CLI::App& app) {
       fmt::print("{} agent-steps in {} updates, {:.1f} km driven; checkpoint {}, policy hash {}{}\n",
                  format_count(static_cast<double>(report.agent_steps)), report.updates, report.km_driven,
                  report.checkpoint, report.policy_hash, curve.empty() ? "" : ", curve " + curve);
+      if (report.out_of_time) fmt::print("out of time: go on with --resume --out {}\n", arguments->train.out_folder);
     }
     if (report.interrupted)
       throw Interrupted(fmt::format("interrupted; go on with --resume --out {}", arguments->train.out_folder));
