@@ -1,13 +1,10 @@
 #include "pictura/training/diagnosis.h"
 
 #include <ATen/core/grad_mode.h>
-#include <fmt/format.h>
-
-#include "pictura/simulator/actions.h"
 
 namespace pictura {
 
-Scalars diagnose(const Rollout& rollout, double adv_threshold) {
+Diagnosis diagnose(const Rollout& rollout, double adv_threshold) {
   const at::NoGradGuard no_grad;
   constexpr double kSpeedScale_mps = 20;  // of ego 0, see docs/observation.md
   const at::Tensor speed_mps =
@@ -25,19 +22,14 @@ Scalars diagnose(const Rollout& rollout, double adv_threshold) {
     groups.push_back(at::stack(sums));
   }
   const at::Tensor host = at::stack(groups).cpu();
-  const auto at = [&host](int64_t group, int64_t i) { return host[group][i].item<double>(); };
-
-  Scalars scalars{{"agents/rest_share", at(0, 0) / (at(0, 0) + at(1, 0))}};
-  const char* const names[] = {"rest", "moving"};
-  for (int64_t group = 0; group < 2; ++group) {
-    const auto add = [&](const std::string& name, double sum) { scalars.emplace_back(name, sum / at(group, 0)); };
-    add(fmt::format("agents/kept_{}", names[group]), at(group, 1));
-    add(fmt::format("agents/advantage_{}", names[group]), at(group, 2));
-    for (int action = 0; action < kNumActions; ++action) {
-      add(fmt::format("actions/{}_{}", names[group], action), at(group, 3 + action));
-    }
-  }
-  return scalars;
+  const auto group = [&host](int64_t index) {
+    const double* const sums = host.const_data_ptr<double>() + index * host.size(1);
+    AgentGroup result{sums[1] / sums[0], sums[2] / sums[0], {}};
+    for (size_t action = 0; action < kNumActions; ++action) result.action_shares[action] = sums[3 + action] / sums[0];
+    return result;
+  };
+  const double resting = host[0][0].item<double>(), moving = host[1][0].item<double>();
+  return {resting / (resting + moving), group(0), group(1)};
 }
 
 }  // namespace pictura

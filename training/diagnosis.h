@@ -2,15 +2,29 @@
 // still looks like one that has learnt to drive safely, unless the two are told apart.
 #pragma once
 
-#include "pictura/training/event_file.h"
+#include <array>
+
+#include "pictura/simulator/actions.h"
 #include "pictura/training/rollout.h"
 
 namespace pictura {
 
 constexpr double kRest_mps = 0.3;  // agents slower than this are at rest
 
-/// Over the valid transitions: share of agents at rest; and of those at rest and those that move, the share that an
-/// advantage filter with this threshold keeps, the mean advantage, and how often each action was chosen.
-Scalars diagnose(const Rollout& rollout, double adv_threshold);
+/// Of the valid transitions of some agents.
+struct AgentGroup {
+  double kept_share = 0;      // that the advantage filter keeps
+  double mean_advantage = 0;  // before it is normalised
+  std::array<double, kNumActions> action_shares{};
+};
+
+struct Diagnosis {
+  double rest_share = 0;  // valid transitions of agents at rest over all
+  AgentGroup rest, moving;
+};
+
+/// Of a rollout with advantages, under a filter that keeps those of at least adv_threshold. A group without agents has
+/// NaN.
+Diagnosis diagnose(const Rollout& rollout, double adv_threshold);
 
 }  // namespace pictura

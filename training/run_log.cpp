@@ -64,7 +64,15 @@ Scalars scalars_of(const Config& config, const TrainProgress& progress, const Up
   for (size_t i = 0; i < kNumPhases; ++i) {
     scalars.emplace_back(fmt::format("time/{}_s", kPhaseNames[i]), record.phases_s[i]);
   }
-  scalars.insert(scalars.end(), record.diagnosis.begin(), record.diagnosis.end());
+  scalars.emplace_back("agents/rest_share", record.diagnosis.rest_share);
+  for (const auto& [name, group] :
+       {std::pair{"rest", &record.diagnosis.rest}, std::pair{"moving", &record.diagnosis.moving}}) {
+    scalars.emplace_back(fmt::format("agents/kept_{}", name), group->kept_share);
+    scalars.emplace_back(fmt::format("agents/advantage_{}", name), group->mean_advantage);
+    for (size_t action = 0; action < group->action_shares.size(); ++action) {
+      scalars.emplace_back(fmt::format("actions/{}_{}", name, action), group->action_shares[action]);
+    }
+  }
   return scalars;
 }
 

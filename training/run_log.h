@@ -4,6 +4,7 @@
 #include <deque>
 
 #include "pictura/training/checkpoint.h"
+#include "pictura/training/diagnosis.h"
 #include "pictura/training/event_file.h"
 #include "pictura/training/loop.h"
 #include "pictura/training/phase_timer.h"
@@ -30,7 +31,7 @@ class ProgressCsv {
 struct UpdateRecord {
   SimulatorTotals totals;  // counted in its rollout
   UpdateStats stats;
-  Scalars diagnosis;                   // see diagnosis.h
+  Diagnosis diagnosis;
   double rollout_s = 0, update_s = 0;  // wall time of collecting, and of improving
   PhaseSeconds phases_s{};             // in both
 };

@@ -79,10 +79,10 @@ class Runs(unittest.TestCase):
         folder = tempfile.TemporaryDirectory(prefix="pictura-test-")
         self.addCleanup(folder.cleanup)
         self.root = pathlib.Path(folder.name)
-        for name in ("demo", "gpu_train"):
+        for name in ("demo", "gpu_env", "gpu_train"):
             (self.root / "scripts").mkdir(exist_ok=True)
             shutil.copy(SCRIPTS / name, self.root / "scripts" / name)
-        for name in ("scripts/setup", "scripts/gpu_env", "venv/bin/cmake"):
+        for name in ("scripts/setup", "venv/bin/cmake"):
             self.write_program(name, "true")
         for build in ("cpu", "cuda"):
             self.write_program(f"build/{build}/apps/pictura", f'echo "$*" >{self.root}/asked; exit 3')
