@@ -56,56 +56,26 @@ namespace {
 
 class HostSceneHistory final : public SceneHistory {
  public:
-  explicit HostSceneHistory(const SceneHistorySize& s)
-      : SceneHistory(s),
-        agents_(steps() * s.agents),
-        geometry_(steps() * s.worlds),
-        light_states_(steps() * s.lights),
-        world_begin_(steps() * s.worlds + 1),
-        light_begin_(steps() * s.worlds + 1),
-        views_(steps() * s.views) {}
+  explicit HostSceneHistory(const SceneHistorySize& s) : SceneHistory(s), arrays_(s) {}
 
   Device device() const override { return {}; }
-
-  SceneBatch scene() const override {
-    const auto done = static_cast<std::size_t>(num_steps());
-    return {Device{},
-            {world_begin_.data(), done * size().worlds + 1},
-            {agents_.data(), done * size().agents},
-            {geometry_.data(), done * size().worlds},
-            {light_begin_.data(), done * size().worlds + 1},
-            {light_states_.data(), done * size().lights},
-            {}};
-  }
+  SceneBatch scene() const override { return arrays_.scene(device(), num_steps()); }
 
  private:
-  std::size_t steps() const { return static_cast<std::size_t>(size().num_steps); }
-
   void copy_step(int step, const SceneBatch& scene, Span<const View> views, Stream) override {
-    const auto before = static_cast<std::size_t>(step);
     const auto copy = [](const auto& from, auto* first) { std::copy(from.begin(), from.end(), first); };
-    const auto copy_ranges = [](Span<const int32_t> from, std::size_t added, int32_t* first) {
-      std::transform(from.begin(), from.end(), first,
-                     [added](int32_t begin) { return begin + static_cast<int32_t>(added); });
+    const auto shift = [](Span<const int32_t> from, int32_t added, int32_t* first) {
+      std::transform(from.begin(), from.end(), first, [added](int32_t begin) { return begin + added; });
     };
-    copy(scene.agents, agents_.data() + before * size().agents);
-    copy(scene.geometry, geometry_.data() + before * size().worlds);
-    copy(scene.light_states, light_states_.data() + before * size().lights);
-    copy(views, views_.data() + before * size().views);
-    copy_ranges(scene.world_begin, before * size().agents, world_begin_.data() + before * size().worlds);
-    copy_ranges(scene.light_begin, before * size().lights, light_begin_.data() + before * size().worlds);
+    arrays_.write_step(step, scene, views, copy, shift);
   }
 
   void copy_views(Span<const int64_t> rows, Span<View> views_out, Stream) const override {
-    const HistoryViews history = history_views(views_.data());
+    const HistoryViews history = history_views(arrays_.views.data());
     std::transform(rows.begin(), rows.end(), views_out.begin(), [&history](int64_t row) { return history.at(row); });
   }
 
-  std::vector<AgentBox> agents_;
-  std::vector<GeometryHandle> geometry_;
-  std::vector<LightState> light_states_;
-  std::vector<int32_t> world_begin_, light_begin_;
-  std::vector<View> views_;
+  SceneHistoryArrays<std::vector> arrays_;
 };
 
 }  // namespace

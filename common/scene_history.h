@@ -58,6 +58,53 @@ class SceneHistory {
   int num_steps_ = 0;
 };
 
+/// The memory of a history, for both devices: Buffer<T>(n) holds n elements at data().
+template <template <typename...> class Buffer>
+struct SceneHistoryArrays {
+  SceneHistorySize size;
+  Buffer<AgentBox> agents;
+  Buffer<GeometryHandle> geometry;
+  Buffer<LightState> light_states;
+  Buffer<int32_t> world_begin, light_begin;
+  Buffer<View> views;
+
+  explicit SceneHistoryArrays(const SceneHistorySize& s)
+      : size(s),
+        agents(count(s.num_steps, s.agents)),
+        geometry(count(s.num_steps, s.worlds)),
+        light_states(count(s.num_steps, s.lights)),
+        world_begin(count(s.num_steps, s.worlds) + 1),
+        light_begin(count(s.num_steps, s.worlds) + 1),
+        views(count(s.num_steps, s.views)) {}
+
+  /// The first steps of it.
+  SceneBatch scene(Device device, int num_steps) const {
+    const std::size_t worlds = count(num_steps, size.worlds);
+    return {device,
+            {world_begin.data(), worlds + 1},
+            {agents.data(), count(num_steps, size.agents)},
+            {geometry.data(), worlds},
+            {light_begin.data(), worlds + 1},
+            {light_states.data(), count(num_steps, size.lights)},
+            {}};
+  }
+
+  /// Writes a step: copy(from, first) copies elements, shift(from, added, first) adds a number to each.
+  template <typename Copy, typename Shift>
+  void write_step(int step, const SceneBatch& scene, Span<const View> step_views, Copy&& copy, Shift&& shift) {
+    const std::size_t worlds = count(step, size.worlds);
+    copy(scene.agents, agents.data() + count(step, size.agents));
+    copy(scene.geometry, geometry.data() + worlds);
+    copy(scene.light_states, light_states.data() + count(step, size.lights));
+    copy(step_views, views.data() + count(step, size.views));
+    shift(scene.world_begin, static_cast<int32_t>(count(step, size.agents)), world_begin.data() + worlds);
+    shift(scene.light_begin, static_cast<int32_t>(count(step, size.lights)), light_begin.data() + worlds);
+  }
+
+ private:
+  static std::size_t count(int steps, std::size_t of_step) { return static_cast<std::size_t>(steps) * of_step; }
+};
+
 /// In host memory.
 std::unique_ptr<SceneHistory> make_host_scene_history(const SceneHistorySize& size);
 
