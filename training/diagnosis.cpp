@@ -2,13 +2,14 @@
 
 #include <ATen/core/grad_mode.h>
 
+#include "pictura/simulator/rules/observe.h"
+
 namespace pictura {
 
 Diagnosis diagnose(const Rollout& rollout, double adv_threshold) {
   const at::NoGradGuard no_grad;
-  constexpr double kSpeedScale_mps = 20;  // of ego 0, see docs/observation.md
   const at::Tensor speed_mps =
-      rollout.observations.arrays().ego.narrow(0, 0, rollout.num_steps()).select(2, 0) * kSpeedScale_mps;
+      rollout.observations.arrays().ego.narrow(0, 0, rollout.num_steps()).select(2, 0) * kScaleSpeed_mps;
   const at::Tensor valid = rollout.valid.to(at::kBool), rests = speed_mps.abs() < kRest_mps;
   const at::Tensor is_kept = rollout.advantages.abs() >= adv_threshold;
 
