@@ -1,6 +1,8 @@
 // Owners of device memory, and of host memory that the device can write.
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <memory>
 #include <type_traits>
 #include <utility>
@@ -12,6 +14,9 @@
 
 namespace pictura {
 
+/// How many arrays this process has allocated in device memory; a loop that has stopped allocating leaves it as it is.
+inline std::atomic<int64_t> device_allocations{0};
+
 /// An array in device memory; its contents are undefined until they are written. Moves, does not copy.
 template <typename T>
 class DeviceBuffer {
@@ -20,7 +25,9 @@ class DeviceBuffer {
  public:
   DeviceBuffer() = default;
   explicit DeviceBuffer(std::size_t size) : size_(size) {
-    if (size > 0) PICTURA_CUDA(cudaMalloc(reinterpret_cast<void**>(&data_), size * sizeof(T)));
+    if (size == 0) return;
+    PICTURA_CUDA(cudaMalloc(reinterpret_cast<void**>(&data_), size * sizeof(T)));
+    ++device_allocations;
   }
   /// A copy of host memory; returns when it is made.
   explicit DeviceBuffer(Span<const T> host) : DeviceBuffer(host.size()) {
