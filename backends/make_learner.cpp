@@ -9,6 +9,7 @@ std::unique_ptr<LearnerExecutor> make_cpu_learner_executor();
 #ifdef PICTURA_HAS_CUDA
 std::unique_ptr<LearnerExecutor> make_cuda_learner_executor(Device device);
 std::unique_ptr<SceneHistory> make_cuda_scene_history(const SceneHistorySize& size, Device device);
+std::unique_ptr<NetworkPasses> make_cuda_network_passes(Device device);
 std::string cuda_unavailable();
 
 std::string why_no_cuda_device() { return cuda_unavailable(); }
@@ -40,6 +41,13 @@ std::unique_ptr<SceneHistory> make_scene_history(Device device, const SceneHisto
   if (!device.is_host()) return make_cuda_scene_history(size, device);
 #endif
   return make_host_scene_history(size);
+}
+
+std::unique_ptr<NetworkPasses> make_network_passes(Device device) {
+#ifdef PICTURA_HAS_CUDA
+  if (!device.is_host()) return make_cuda_network_passes(device);
+#endif
+  fail("network passes: none for {}", name_of(device));
 }
 
 }  // namespace pictura

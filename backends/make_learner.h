@@ -6,6 +6,7 @@
 
 #include "pictura/common/scene_history.h"
 #include "pictura/training/rules/learner_executor.h"
+#include "pictura/training/rules/network_passes.h"
 
 namespace pictura {
 
@@ -15,5 +16,8 @@ std::string why_no_cuda_device();
 /// Throws Error where the device is a CUDA device that there is not.
 std::unique_ptr<LearnerExecutor> make_learner_executor(Device device);
 std::unique_ptr<SceneHistory> make_scene_history(Device device, const SceneHistorySize& size);
+
+/// Throws Error for the host, where there are none.
+std::unique_ptr<NetworkPasses> make_network_passes(Device device);
 
 }  // namespace pictura

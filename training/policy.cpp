@@ -8,6 +8,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
 #include "pictura/common/support/hash.h"
+#include "pictura/training/layers.h"
 #include "pictura/training/precision.h"
 #include "pictura/training/torch_device.h"
 
@@ -67,10 +68,14 @@ template <typename Linear>
 at::Tensor apply(const Linear& layer, const at::Tensor& x) {
   return at::linear(x, layer.weight, layer.bias);
 }
+template <typename Linear>
+at::Tensor apply_gelu(const Linear& layer, const at::Tensor& x) {
+  return linear_gelu(x, layer.weight, layer.bias);
+}
 
 template <typename GroupEncoder>
 at::Tensor encode(const GroupEncoder& group, const at::Tensor& x) {
-  return apply(group.out, gelu(apply(group.hidden, x)));
+  return apply(group.out, apply_gelu(group.hidden, x));
 }
 
 }  // namespace
@@ -116,18 +121,6 @@ class VectorEncoder final : public SceneEncoder {
   std::vector<Group> groups_;
 };
 
-at::Tensor space_to_depth(const at::Tensor& images, int64_t patch_px) {
-  if (patch_px == 1) return images;
-  const int64_t channels = images.size(1), height = images.size(2), width = images.size(3);
-  const int64_t rows = (height + patch_px - 1) / patch_px, columns = (width + patch_px - 1) / patch_px;
-  // [n, c, rows, patch, columns, patch] -> [n, rows, columns, c, patch, patch]: in memory, channels last.
-  return at::constant_pad_nd(images, {0, columns * patch_px - width, 0, rows * patch_px - height})
-      .view({-1, channels, rows, patch_px, columns, patch_px})
-      .permute({0, 2, 4, 1, 3, 5})
-      .reshape({-1, rows, columns, channels * patch_px * patch_px})
-      .permute({0, 3, 1, 2});
-}
-
 /// A convolutional stack shared by all cameras; per camera, learned queries that cross-attend over its feature map and
 /// are averaged; all cameras concatenated and projected to the width of the four sets that they replace.
 class PerspectiveEncoder final : public SceneEncoder {
@@ -145,15 +138,15 @@ class PerspectiveEncoder final : public SceneEncoder {
       in = out;
     }
     position_ = make->linear("attention.position", kPositionFeatures, width_, 0.5);
-    token_norm_ = norm("attention.token_norm", make);
+    token_norm_ = make_norm("attention.token_norm", make);
     queries_ = make->normal("attention.queries", {num_cameras, config.num_queries, width_}, std::sqrt(double(width_)));
-    query_norm_ = norm("attention.query_norm", make);
+    query_norm_ = make_norm("attention.query_norm", make);
     query_ = make->linear("attention.query", width_, width_, 1.0);
-    key_ = make->linear("attention.key", width_, width_, 1.0);
+    key_ = make->normal("attention.key.weight", {width_, width_}, 1.0);
     value_ = make->linear("attention.value", width_, width_, 1.0);
     out_ = make->linear("attention.out", width_, width_, 1.0);
     if (config.attention_mlp > 0) {
-      mlp_norm_ = norm("attention.mlp_norm", make);
+      mlp_norm_ = make_norm("attention.mlp_norm", make);
       mlp_hidden_ = make->linear("attention.mlp_hidden", width_, config.attention_mlp, std::numbers::sqrt2);
       mlp_out_ = make->linear("attention.mlp_out", config.attention_mlp, width_, 1.0);
     }
@@ -165,9 +158,9 @@ class PerspectiveEncoder final : public SceneEncoder {
   at::Tensor forward(const Observation& o) const override {
     std::vector<at::Tensor> per_camera(static_cast<size_t>(num_cameras_));
     for (const ImageBlock& block : o.images) {
-      const at::Tensor pooled = pool(block);  // [batch, cameras, width]
+      const at::Tensor pooled = pool(block);
       for (size_t i = 0; i < block.cameras.size(); ++i) {
-        per_camera[static_cast<size_t>(block.cameras[i])] = pooled.select(1, static_cast<int64_t>(i));
+        per_camera[static_cast<size_t>(block.cameras[i])] = pooled.select(0, static_cast<int64_t>(i));
       }
     }
     return apply(project_, at::cat(per_camera, 1));
@@ -181,11 +174,11 @@ class PerspectiveEncoder final : public SceneEncoder {
   struct Norm {
     at::Tensor weight, bias;
   };
-  Norm norm(const std::string& name, ParameterMaker* make) const {
+  Norm make_norm(const std::string& name, ParameterMaker* make) const {
     return {make->constant(name + ".weight", {width_}, 1), make->constant(name + ".bias", {width_}, 0)};
   }
-  at::Tensor apply_norm(const Norm& n, const at::Tensor& x) const {
-    return at::layer_norm(x, {width_}, n.weight, n.bias);
+  static at::Tensor apply_norm(const Norm& n, const at::Tensor& x, const at::Tensor& position) {
+    return norm(x, position, n.weight, n.bias);
   }
 
   static at::Tensor position_features(int64_t height, int64_t width, const at::TensorOptions& options) {
@@ -196,33 +189,47 @@ class PerspectiveEncoder final : public SceneEncoder {
                      1);
   }
 
+  // The features of a block's cameras, [cameras, batch, width].
   at::Tensor pool(const ImageBlock& block) const {
-    const int64_t batch = block.pixels.size(0), cameras = block.pixels.size(1), heads = config_.attention_heads;
-    at::Tensor x = space_to_depth(block.pixels.flatten(0, 1), config_.patch_px)
-                       .to(image_type_, /*non_blocking=*/false, /*copy=*/false, at::MemoryFormat::ChannelsLast);
+    const int64_t batch = block.pixels.size(0), cameras = block.pixels.size(1);
+    at::Tensor x = image_patches(block.pixels, config_.patch_px, image_type_);
     for (size_t i = 0; i < convolutions_.size(); ++i) {
       // Pixels are 0 to 255. Scaling a few weights is cheaper than scaling them.
       const at::Tensor weight = i == 0 ? convolutions_[i].weight / 255.0 : convolutions_[i].weight;
-      x = gelu(at::conv2d(x, weight, convolutions_[i].bias, {config_.conv_strides[i]}, {config_.conv_kernels[i] / 2}));
+      x = convolve_gelu(x, weight, convolutions_[i].bias, config_.conv_strides[i]);
     }
     const at::Tensor where = apply(position_, position_features(x.size(2), x.size(3), queries_.options()));
-    const at::Tensor tokens = apply_norm(token_norm_, x.flatten(2).transpose(1, 2) + where);  // [images, h w, width]
+    const at::Tensor tokens = apply_norm(token_norm_, x.permute({0, 2, 3, 1}).flatten(1, 2), where);
 
-    // [.., n, width] -> [.., heads, n, width / heads]
-    auto split = [&](const at::Tensor& t) { return t.unflatten(-1, {heads, width_ / heads}).transpose(-3, -2); };
     std::vector<at::Tensor> of_cameras;
     for (const int64_t camera : block.cameras) of_cameras.push_back(queries_.select(0, camera));
     const at::Tensor queries = at::stack(of_cameras);
-    const at::Tensor q = split(apply(query_, apply_norm(query_norm_, queries)))
-                             .unsqueeze(0)
-                             .expand({batch, cameras, heads, config_.num_queries, width_ / heads})
-                             .flatten(0, 1);
-    at::Tensor pooled = at::scaled_dot_product_attention(q, split(apply(key_, tokens)), split(apply(value_, tokens)));
-    pooled = apply(out_, pooled.transpose(1, 2).flatten(2)).unflatten(0, {batch, cameras}) + queries;
+    at::Tensor pooled = attend(queries, tokens).unflatten(0, {cameras, batch});
+    pooled = pooled + queries.unsqueeze(1).to(pooled.scalar_type());
     if (config_.attention_mlp > 0) {
-      pooled = pooled + apply(mlp_out_, gelu(apply(mlp_hidden_, apply_norm(mlp_norm_, pooled))));
+      pooled = pooled + apply(mlp_out_, apply_gelu(mlp_hidden_, apply_norm(mlp_norm_, pooled, {})));
     }
     return pooled.mean(2);
+  }
+
+  // Attention of each camera's queries [cameras, queries, width] over the tokens of its images [cameras * batch,
+  // tokens, width]; [cameras * batch, queries, width]. Queries are parameters, the same for all images: so keys and
+  // values need not be computed for each token. What a query asks of its keys is asked of the tokens, q (W t) = (q W)
+  // t; values and output are one product with the weighted sums of tokens. A bias of keys adds the same to all scores
+  // of a query, which softmax does not see, and the bias of values is in the sum once, since weights add up to 1.
+  at::Tensor attend(const at::Tensor& queries, const at::Tensor& tokens) const {
+    const int64_t cameras = queries.size(0), heads = config_.attention_heads, head_width = width_ / heads;
+    const at::Tensor key = key_.unflatten(0, {heads, head_width});
+    const at::Tensor value = value_.weight.unflatten(0, {heads, head_width});
+    const at::Tensor out = out_.weight.unflatten(1, {heads, head_width}).transpose(0, 1);
+
+    const at::Tensor q = apply(query_, apply_norm(query_norm_, queries, {})).unflatten(-1, {heads, 1, head_width});
+    const at::Tensor asked = (at::matmul(q, key) / std::sqrt(double(head_width))).flatten(1, 3);
+    const at::Tensor scores = at::bmm(tokens.view({cameras, -1, width_}), asked.transpose(1, 2))
+                                  .view({tokens.size(0), tokens.size(1), config_.num_queries * heads});
+    const at::Tensor sums = at::bmm(token_softmax(scores).transpose(1, 2), tokens)
+                                .view({tokens.size(0), config_.num_queries, heads * width_});
+    return at::linear(sums, at::matmul(out, value).transpose(0, 1).flatten(1), apply(out_, value_.bias));
   }
 
   const Config::PolicySection config_;
@@ -230,9 +237,9 @@ class PerspectiveEncoder final : public SceneEncoder {
   const at::ScalarType image_type_;
   const int64_t width_;
   std::vector<Policy::Linear> convolutions_;  // weights [out, in, kernel, kernel]
-  at::Tensor queries_;
+  at::Tensor queries_, key_;
   Norm token_norm_, query_norm_, mlp_norm_;
-  Policy::Linear position_, query_, key_, value_, out_, mlp_hidden_, mlp_out_, project_;
+  Policy::Linear position_, query_, value_, out_, mlp_hidden_, mlp_out_, project_;
 };
 
 Policy::Policy(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type,
@@ -266,7 +273,7 @@ Policy::Output Policy::forward(const Observation& o) const {
     x = at::cat({scene_->forward(o), encode(ego_, o.ego.narrow(1, 0, ego_features_)),
                  encode(conditioning_, at::cat({o.conditioning, o.waypoints}, 1))},
                 1);
-    for (const Linear& layer : backbone_) x = gelu(apply(layer, x));
+    for (const Linear& layer : backbone_) x = apply_gelu(layer, x);
   }
   x = x.to(type_);
   return {apply(actor_, x), apply(critic_, x).squeeze(1)};

@@ -86,9 +86,4 @@ Decision decide(const Policy& policy, int64_t batch, int64_t chunk,
 /// counts [batch] are padding; an empty set gives zeros.
 at::Tensor masked_max(const at::Tensor& members, const at::Tensor& counts);
 
-/// Patches of images [batch, channels, height, width] as pixels of [batch, channels * patch_px^2, height / patch_px,
-/// width / patch_px], rounded up with black: channel (c * patch_px + y) * patch_px + x is channel c of pixel (x, y) of
-/// the patch.
-at::Tensor space_to_depth(const at::Tensor& images, int64_t patch_px);
-
 }  // namespace pictura

@@ -95,32 +95,6 @@ TEST_P(BothModalities, GradientsEqualDifferenceQuotients) {
   expect_gradients(Policy(tiny(GetParam()), 3, 5, at::kDouble), observation(GetParam(), 2));
 }
 
-TEST(SpaceToDepth, PutsEachPixelIntoAChannelAndPadsWithBlack) {
-  const at::Tensor images = at::arange(2 * 3 * 5 * 6, at::kByte).reshape({2, 3, 5, 6});
-  const at::Tensor patches = space_to_depth(images, 4);
-  ASSERT_EQ(patches.sizes().vec(), (std::vector<int64_t>{2, 48, 2, 2}));
-  EXPECT_TRUE(patches.is_contiguous(at::MemoryFormat::ChannelsLast));
-  for (int64_t n = 0; n < 2; ++n) {
-    for (int64_t c = 0; c < 3; ++c) {
-      for (int64_t y = 0; y < 8; ++y) {
-        for (int64_t x = 0; x < 8; ++x) {
-          const int expected = y < 5 && x < 6 ? images[n][c][y][x].item<int>() : 0;
-          EXPECT_EQ(patches[n][(c * 4 + y % 4) * 4 + x % 4][y / 4][x / 4].item<int>(), expected) << c << y << x;
-        }
-      }
-    }
-  }
-  EXPECT_TRUE(space_to_depth(images, 1).equal(images));
-}
-
-TEST(SpaceToDepth, AOneByOneConvolutionOfPatchesIsOneOfTheImageWithTheirStride) {
-  const at::Tensor images = numbers({2, 3, 6, 8}, 1);
-  const at::Tensor weight = numbers({4, 3, 2, 2}, 2);
-  const at::Tensor expected = at::conv2d(images, weight, at::Tensor(), at::IntArrayRef({2, 2}));
-  const at::Tensor features = at::conv2d(space_to_depth(images, 2), weight.reshape({4, 12, 1, 1}));
-  EXPECT_TRUE(at::allclose(features, expected));
-}
-
 TEST(Policy, GradientsOfPatchesEqualDifferenceQuotients) {
   Config::PolicySection section = tiny(Modality::perspective);
   section.patch_px = 2;

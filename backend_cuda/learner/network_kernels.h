@@ -1,0 +1,25 @@
+// The kernels of network_passes.h, which says what they compute. All are put on a stream and nothing waits; errors are
+// left to cudaGetLastError().
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include "pictura/training/rules/network_passes.h"
+
+namespace pictura::cuda {
+
+void launch_bias_gelu(const ActivationSize& size, const void* x, const float* bias, void* out, cudaStream_t stream);
+void launch_bias_gelu_backward(const ActivationSize& size, const void* x, const float* bias, const void* grad_out,
+                               void* grad_x_out, float* grad_bias_sums_out, cudaStream_t stream);
+void launch_norm(const ActivationSize& size, const void* x, const void* position, int64_t period, const float* weight,
+                 const float* bias, void* out, cudaStream_t stream);
+void launch_norm_backward(const ActivationSize& size, const void* x, const void* position, int64_t period,
+                          const float* weight, const void* grad_out, void* grad_x_out, float* sums_out,
+                          cudaStream_t stream);
+void launch_patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, cudaStream_t stream);
+
+void launch_token_softmax(const TokenSize& size, const void* scores, void* out, cudaStream_t stream);
+void launch_token_softmax_backward(const TokenSize& size, const void* out, const void* grad_out, void* grad_scores_out,
+                                   cudaStream_t stream);
+
+}  // namespace pictura::cuda

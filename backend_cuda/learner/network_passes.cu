@@ -1,0 +1,408 @@
+// A network's passes over its activations on a CUDA device: vectors of 16 bytes, sums in fp32 and in a fixed order.
+#include <type_traits>
+
+#include <cuda_bf16.h>
+
+#include "pictura/backend_cuda/learner/network_kernels.h"
+
+namespace pictura::cuda {
+
+namespace {
+
+constexpr int kThreads = 256;
+constexpr int kWarp = 32;
+constexpr float kNormEpsilon = 1e-5f;
+
+__device__ float to_float(float x) { return x; }
+__device__ float to_float(__nv_bfloat16 x) { return __bfloat162float(x); }
+template <typename T>
+__device__ T from_float(float x) {
+  if constexpr (std::is_same_v<T, float>)
+    return x;
+  else
+    return __float2bfloat16(x);
+}
+
+/// kSize neighbouring elements, loaded and stored as one.
+template <typename T, int kSize>
+struct alignas(sizeof(T) * kSize) Vector {
+  T values[kSize];
+};
+
+__device__ float gelu(float x) { return 0.5f * x * (1.0f + erff(x * 0.70710678f)); }
+// Phi(x) + x phi(x).
+__device__ float gelu_derivative(float x) {
+  return 0.5f * (1.0f + erff(x * 0.70710678f)) + x * 0.39894228f * __expf(-0.5f * x * x);
+}
+
+template <typename T>
+__global__ void __launch_bounds__(kThreads)
+    bias_gelu(int64_t num_vectors, int vectors_a_row, const T* x, const float* bias, T* out) {
+  constexpr int kWidth = 16 / sizeof(T);
+  using Vector = Vector<T, kWidth>;
+  const int64_t i = blockIdx.x * int64_t{kThreads} + threadIdx.x;
+  if (i >= num_vectors) return;
+  const float* const its_bias = bias + i % vectors_a_row * kWidth;
+  Vector v = reinterpret_cast<const Vector*>(x)[i];
+#pragma unroll
+  for (int k = 0; k < kWidth; ++k) v.values[k] = from_float<T>(gelu(to_float(v.values[k]) + its_bias[k]));
+  reinterpret_cast<Vector*>(out)[i] = v;
+}
+
+// A thread has a vector's channels of every so many rows; the sums of a block's threads are added in shared memory.
+template <typename T>
+__global__ void __launch_bounds__(kThreads)
+    bias_gelu_backward(int64_t rows, int channels, const T* x, const float* bias, const T* grad_out, T* grad_x_out,
+                       float* sums_out) {
+  constexpr int kWidth = 16 / sizeof(T);
+  using Vector = Vector<T, kWidth>;
+  __shared__ float shared[kThreads][kWidth];
+  const int vectors_a_row = channels / kWidth, rows_a_block = kThreads / vectors_a_row;
+  const int column = static_cast<int>(threadIdx.x) % vectors_a_row;
+  const int row_in_block = static_cast<int>(threadIdx.x) / vectors_a_row;
+  float its_bias[kWidth], sums[kWidth];
+#pragma unroll
+  for (int k = 0; k < kWidth; ++k) {
+    its_bias[k] = bias[column * kWidth + k];
+    sums[k] = 0;
+  }
+  if (row_in_block < rows_a_block) {
+    for (int64_t row = blockIdx.x * int64_t{rows_a_block} + row_in_block; row < rows;
+         row += gridDim.x * int64_t{rows_a_block}) {
+      const int64_t i = row * vectors_a_row + column;
+      const Vector before = reinterpret_cast<const Vector*>(x)[i];
+      Vector grad = reinterpret_cast<const Vector*>(grad_out)[i];
+#pragma unroll
+      for (int k = 0; k < kWidth; ++k) {
+        const float g = to_float(grad.values[k]) * gelu_derivative(to_float(before.values[k]) + its_bias[k]);
+        grad.values[k] = from_float<T>(g);
+        sums[k] += g;
+      }
+      reinterpret_cast<Vector*>(grad_x_out)[i] = grad;
+    }
+  }
+#pragma unroll
+  for (int k = 0; k < kWidth; ++k) shared[threadIdx.x][k] = sums[k];
+  __syncthreads();
+  for (int c = static_cast<int>(threadIdx.x); c < channels; c += kThreads) {
+    float sum = 0;
+    for (int r = 0; r < rows_a_block; ++r) sum += shared[r * vectors_a_row + c / kWidth][c % kWidth];
+    sums_out[blockIdx.x * int64_t{channels} + c] = sum;
+  }
+}
+
+__device__ float warp_sum(float x) {
+#pragma unroll
+  for (int distance = kWarp / 2; distance > 0; distance /= 2) x += __shfl_xor_sync(0xffffffffu, x, distance);
+  return x;
+}
+
+/// A row as a warp holds it: lane l has channels 2 (l + 32 k) and the next, for k < kPairs.
+template <int kPairs>
+struct WarpRow {
+  static constexpr int kChannels = 2 * kWarp * kPairs;
+  float values[2 * kPairs];
+
+  template <typename T>
+  __device__ void load(const T* row) {
+#pragma unroll
+    for (int k = 0; k < kPairs; ++k) {
+      const auto pair = reinterpret_cast<const Vector<T, 2>*>(row)[threadIdx.x % kWarp + kWarp * k];
+      values[2 * k] = to_float(pair.values[0]);
+      values[2 * k + 1] = to_float(pair.values[1]);
+    }
+  }
+  template <typename T>
+  __device__ void store(T* row) const {
+#pragma unroll
+    for (int k = 0; k < kPairs; ++k) {
+      reinterpret_cast<Vector<T, 2>*>(row)[threadIdx.x % kWarp + kWarp * k] = {from_float<T>(values[2 * k]),
+                                                                               from_float<T>(values[2 * k + 1])};
+    }
+  }
+  __device__ float mean() const {
+    float sum = 0;
+#pragma unroll
+    for (int k = 0; k < 2 * kPairs; ++k) sum += values[k];
+    return warp_sum(sum) / kChannels;
+  }
+  template <typename F>
+  __device__ void each(F&& f) {
+#pragma unroll
+    for (int k = 0; k < 2 * kPairs; ++k) values[k] = f(k, values[k]);
+  }
+};
+
+/// Loads x + position and makes its mean 0 and its variance 1; returns 1 / its deviation.
+template <typename T, int kPairs>
+__device__ float load_normalized(const T* x, const T* position, WarpRow<kPairs>* row_out) {
+  WarpRow<kPairs>& row = *row_out;
+  row.load(x);
+  if (position) {
+    WarpRow<kPairs> added;
+    added.load(position);
+    // Rounded as the sum is that ATen stores.
+    row.each([&](int k, float v) { return to_float(from_float<T>(v + added.values[k])); });
+  }
+  const float mean = row.mean();
+  row.each([&](int, float v) { return v - mean; });
+  WarpRow<kPairs> squares = row;
+  squares.each([](int, float v) { return v * v; });
+  const float inverse_deviation = rsqrtf(squares.mean() + kNormEpsilon);
+  row.each([&](int, float v) { return v * inverse_deviation; });
+  return inverse_deviation;
+}
+
+template <typename T, int kPairs>
+__global__ void __launch_bounds__(kThreads)
+    norm(int64_t rows, const T* x, const T* position, int64_t period, const float* weight, const float* bias, T* out) {
+  const int64_t row = (blockIdx.x * int64_t{kThreads} + threadIdx.x) / kWarp;
+  if (row >= rows) return;
+  constexpr int kChannels = WarpRow<kPairs>::kChannels;
+  WarpRow<kPairs> values, weights, biases;
+  load_normalized(x + row * kChannels, position ? position + row % period * kChannels : nullptr, &values);
+  weights.load(weight);
+  biases.load(bias);
+  values.each([&](int k, float v) { return v * weights.values[k] + biases.values[k]; });
+  values.store(out + row * kChannels);
+}
+
+// A warp has the rows of one position, every so many repetitions of the period.
+template <typename T, int kPairs>
+__global__ void __launch_bounds__(kThreads)
+    norm_backward(int64_t rows, const T* x, const T* position, int64_t period, int64_t num_sums, const float* weight,
+                  const T* grad_out, T* grad_x_out, float* sums_out) {
+  const int64_t warp = (blockIdx.x * int64_t{kThreads} + threadIdx.x) / kWarp;
+  if (warp >= period * num_sums) return;
+  constexpr int kChannels = WarpRow<kPairs>::kChannels;
+  WarpRow<kPairs> weights;
+  weights.load(weight);
+  WarpRow<kPairs> position_sums{}, weight_sums{}, bias_sums{};
+  for (int64_t row = warp; row < rows; row += period * num_sums) {
+    WarpRow<kPairs> normalized, grad;
+    const float inverse_deviation =
+        load_normalized(x + row * kChannels, position ? position + row % period * kChannels : nullptr, &normalized);
+    grad.load(grad_out + row * kChannels);
+    weight_sums.each([&](int k, float sum) { return sum + grad.values[k] * normalized.values[k]; });
+    bias_sums.each([&](int k, float sum) { return sum + grad.values[k]; });
+    grad.each([&](int k, float g) { return g * weights.values[k]; });
+    WarpRow<kPairs> products = grad;
+    products.each([&](int k, float g) { return g * normalized.values[k]; });
+    const float mean = grad.mean(), product_mean = products.mean();
+    grad.each([&](int k, float g) { return (g - mean - normalized.values[k] * product_mean) * inverse_deviation; });
+    position_sums.each([&](int k, float sum) { return sum + grad.values[k]; });
+    grad.store(grad_x_out + row * kChannels);
+  }
+  // Warp number = (sum, position), since the stride is a multiple of the period.
+  float* const sums = sums_out + warp * 3 * kChannels;
+  position_sums.store(sums);
+  weight_sums.store(sums + kChannels);
+  bias_sums.store(sums + 2 * kChannels);
+}
+
+// A thread writes all channels of a position. Its numbers fit into 32 bits but for the offset of the image.
+template <typename T>
+__global__ void __launch_bounds__(kThreads) patches(PatchSize size, int num_positions, const uint8_t* images, T* out) {
+  constexpr int kWidth = 16 / sizeof(T);
+  const int image_index = static_cast<int>(blockIdx.x);
+  const int position = static_cast<int>(blockIdx.y) * kThreads + static_cast<int>(threadIdx.x);
+  if (position >= num_positions) return;
+  const auto columns = static_cast<int>(size.columns()), patch = static_cast<int>(size.patch_px),
+             channels = static_cast<int>(size.channels), height = static_cast<int>(size.height_px),
+             width = static_cast<int>(size.width_px), views = static_cast<int>(size.views);
+  const int camera = image_index / views, view = image_index % views;
+  const uint8_t* const image = images + (view * size.cameras + camera) * 3 * static_cast<int64_t>(height) * width;
+  T* const its_out = out + (image_index * int64_t{num_positions} + position) * channels;
+  const int first_y = position / columns * patch, first_x = position % columns * patch;
+  int color = 0, y = 0, x = 0;  // of the next channel
+  for (int channel = 0; channel < channels; channel += kWidth) {
+    Vector<T, kWidth> result;
+#pragma unroll
+    for (int k = 0; k < kWidth; ++k) {
+      float value = 0;
+      if (color < 3 && first_y + y < height && first_x + x < width)
+        value = image[(color * height + first_y + y) * width + first_x + x];
+      result.values[k] = from_float<T>(value);
+      if (++x == patch) {
+        x = 0;
+        if (++y == patch) {
+          y = 0;
+          ++color;
+        }
+      }
+    }
+    reinterpret_cast<Vector<T, kWidth>*>(its_out + channel)[0] = result;
+  }
+}
+
+// A thread has a pair of columns of a matrix [tokens, columns]; neighbouring threads read neighbouring memory. What is
+// read twice comes from the cache.
+template <typename T>
+__global__ void __launch_bounds__(kThreads)
+    token_softmax(int64_t num_pairs, int tokens, int columns, const T* scores, T* out) {
+  using Pair = Vector<T, 2>;
+  const int64_t i = blockIdx.x * int64_t{kThreads} + threadIdx.x;
+  if (i >= num_pairs) return;
+  const int pairs_a_row = columns / 2;
+  const int64_t first = i / pairs_a_row * tokens * pairs_a_row + i % pairs_a_row;
+  const Pair* const its_scores = reinterpret_cast<const Pair*>(scores) + first;
+  Pair* const its_out = reinterpret_cast<Pair*>(out) + first;
+  // The largest so far, and the sum of the exponentials of what is below it.
+  float largest[2] = {-INFINITY, -INFINITY}, sums[2] = {0, 0};
+  for (int t = 0; t < tokens; ++t) {
+    const Pair pair = its_scores[t * pairs_a_row];
+#pragma unroll
+    for (int k = 0; k < 2; ++k) {
+      const float score = to_float(pair.values[k]), larger = fmaxf(largest[k], score);
+      sums[k] = sums[k] * __expf(largest[k] - larger) + __expf(score - larger);
+      largest[k] = larger;
+    }
+  }
+  const float factors[2] = {1 / sums[0], 1 / sums[1]};
+  for (int t = 0; t < tokens; ++t) {
+    Pair pair = its_scores[t * pairs_a_row];
+#pragma unroll
+    for (int k = 0; k < 2; ++k)
+      pair.values[k] = from_float<T>(__expf(to_float(pair.values[k]) - largest[k]) * factors[k]);
+    its_out[t * pairs_a_row] = pair;
+  }
+}
+
+// grad_scores = out * (grad_out - sum over tokens of out * grad_out)
+template <typename T>
+__global__ void __launch_bounds__(kThreads)
+    token_softmax_backward(int64_t num_pairs, int tokens, int columns, const T* out, const T* grad_out,
+                           T* grad_scores_out) {
+  using Pair = Vector<T, 2>;
+  const int64_t i = blockIdx.x * int64_t{kThreads} + threadIdx.x;
+  if (i >= num_pairs) return;
+  const int pairs_a_row = columns / 2;
+  const int64_t first = i / pairs_a_row * tokens * pairs_a_row + i % pairs_a_row;
+  const Pair *const its_out = reinterpret_cast<const Pair*>(out) + first, *const its_grad =
+                                                                              reinterpret_cast<const Pair*>(grad_out) +
+                                                                              first;
+  Pair* const its_result = reinterpret_cast<Pair*>(grad_scores_out) + first;
+  float sums[2] = {0, 0};
+  for (int t = 0; t < tokens; ++t) {
+    const Pair p = its_out[t * pairs_a_row], g = its_grad[t * pairs_a_row];
+#pragma unroll
+    for (int k = 0; k < 2; ++k) sums[k] += to_float(p.values[k]) * to_float(g.values[k]);
+  }
+  for (int t = 0; t < tokens; ++t) {
+    const Pair p = its_out[t * pairs_a_row];
+    Pair g = its_grad[t * pairs_a_row];
+#pragma unroll
+    for (int k = 0; k < 2; ++k) g.values[k] = from_float<T>(to_float(p.values[k]) * (to_float(g.values[k]) - sums[k]));
+    its_result[t * pairs_a_row] = g;
+  }
+}
+
+template <typename Kernel, typename... Arguments>
+void launch(int64_t num_threads, cudaStream_t stream, Kernel kernel, const Arguments&... arguments) {
+  if (num_threads == 0) return;
+  kernel<<<static_cast<unsigned>((num_threads + kThreads - 1) / kThreads), kThreads, 0, stream>>>(arguments...);
+}
+
+/// f(T{}) with the C++ type of an element type.
+template <typename F>
+void with_type(ActivationType type, F&& f) {
+  if (type == ActivationType::f32)
+    f(float{});
+  else
+    f(__nv_bfloat16{});
+}
+
+/// f of an integral constant n for rows of 64 n channels.
+template <typename F>
+void with_pairs(int64_t channels, F&& f) {
+  switch (channels) {
+    case 64: return f(std::integral_constant<int, 1>{});
+    case 128: return f(std::integral_constant<int, 2>{});
+    case 192: return f(std::integral_constant<int, 3>{});
+    case 256: return f(std::integral_constant<int, 4>{});
+    case 384: return f(std::integral_constant<int, 6>{});
+    case 512: return f(std::integral_constant<int, 8>{});
+    default: return;
+  }
+}
+
+}  // namespace
+
+void launch_bias_gelu(const ActivationSize& size, const void* x, const float* bias, void* out, cudaStream_t stream) {
+  with_type(size.type, [&](auto type) {
+    using T = decltype(type);
+    const int64_t vectors_a_row = size.channels * static_cast<int64_t>(sizeof(T)) / 16;
+    const int64_t num_vectors = size.rows * vectors_a_row;
+    launch(num_vectors, stream, bias_gelu<T>, num_vectors, static_cast<int>(vectors_a_row), static_cast<const T*>(x),
+           bias, static_cast<T*>(out));
+  });
+}
+
+void launch_bias_gelu_backward(const ActivationSize& size, const void* x, const float* bias, const void* grad_out,
+                               void* grad_x_out, float* grad_bias_sums_out, cudaStream_t stream) {
+  with_type(size.type, [&](auto type) {
+    using T = decltype(type);
+    launch(NetworkPasses::kBiasSums * kThreads, stream, bias_gelu_backward<T>, size.rows,
+           static_cast<int>(size.channels), static_cast<const T*>(x), bias, static_cast<const T*>(grad_out),
+           static_cast<T*>(grad_x_out), grad_bias_sums_out);
+  });
+}
+
+void launch_norm(const ActivationSize& size, const void* x, const void* position, int64_t period, const float* weight,
+                 const float* bias, void* out, cudaStream_t stream) {
+  with_type(size.type, [&](auto type) {
+    with_pairs(size.channels, [&](auto pairs) {
+      using T = decltype(type);
+      launch(size.rows * kWarp, stream, norm<T, decltype(pairs)::value>, size.rows, static_cast<const T*>(x),
+             static_cast<const T*>(position), period, weight, bias, static_cast<T*>(out));
+    });
+  });
+}
+
+void launch_norm_backward(const ActivationSize& size, const void* x, const void* position, int64_t period,
+                          const float* weight, const void* grad_out, void* grad_x_out, float* sums_out,
+                          cudaStream_t stream) {
+  const int64_t num_sums = NetworkPasses::num_norm_sums(size.rows, period);
+  with_type(size.type, [&](auto type) {
+    with_pairs(size.channels, [&](auto pairs) {
+      using T = decltype(type);
+      launch(num_sums * period * kWarp, stream, norm_backward<T, decltype(pairs)::value>, size.rows,
+             static_cast<const T*>(x), static_cast<const T*>(position), period, num_sums, weight,
+             static_cast<const T*>(grad_out), static_cast<T*>(grad_x_out), sums_out);
+    });
+  });
+}
+
+void launch_patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, cudaStream_t stream) {
+  const int64_t num_images = size.views * size.cameras, num_positions = size.rows() * size.columns();
+  if (num_images == 0) return;
+  // Images along the side that may be long.
+  const dim3 blocks(static_cast<unsigned>(num_images),
+                    static_cast<unsigned>((num_positions + kThreads - 1) / kThreads));
+  with_type(type, [&](auto element) {
+    using T = decltype(element);
+    patches<T><<<blocks, kThreads, 0, stream>>>(size, static_cast<int>(num_positions), images, static_cast<T*>(out));
+  });
+}
+
+void launch_token_softmax(const TokenSize& size, const void* scores, void* out, cudaStream_t stream) {
+  with_type(size.type, [&](auto type) {
+    using T = decltype(type);
+    const int64_t num_pairs = size.matrices * size.columns / 2;
+    launch(num_pairs, stream, token_softmax<T>, num_pairs, static_cast<int>(size.tokens),
+           static_cast<int>(size.columns), static_cast<const T*>(scores), static_cast<T*>(out));
+  });
+}
+
+void launch_token_softmax_backward(const TokenSize& size, const void* out, const void* grad_out, void* grad_scores_out,
+                                   cudaStream_t stream) {
+  with_type(size.type, [&](auto type) {
+    using T = decltype(type);
+    const int64_t num_pairs = size.matrices * size.columns / 2;
+    launch(num_pairs, stream, token_softmax_backward<T>, num_pairs, static_cast<int>(size.tokens),
+           static_cast<int>(size.columns), static_cast<const T*>(out), static_cast<const T*>(grad_out),
+           static_cast<T*>(grad_scores_out));
+  });
+}
+
+}  // namespace pictura::cuda

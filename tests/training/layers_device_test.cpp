@@ -1,0 +1,143 @@
+// Layers on a CUDA device against the same layers in double precision on the host: values and every gradient are about
+// as near as those of ATen's own layers on the device.
+#include <gtest/gtest.h>
+
+#include "pictura/tests/backend_cuda/device_test.h"
+#include "pictura/training/layers.h"
+#include "pictura/training/precision.h"
+#include "pictura/training/torch_device.h"
+
+namespace pictura {
+namespace {
+
+using Layer = std::function<at::Tensor(const std::vector<at::Tensor>& inputs)>;
+
+class DeviceLayers : public test::DeviceTest, public testing::WithParamInterface<Precision> {
+ protected:
+  static void SetUpTestSuite() {
+    Config config;
+    config.policy.modality = Modality::vector;
+    config.run.device = "cuda";
+    open_learning_device(config);
+  }
+
+  // Numbers without a pattern, which the type of activations holds exactly, so that rounding inputs is no difference.
+  static at::Tensor numbers(at::IntArrayRef shape, double phase) {
+    const at::Tensor drawn = (at::arange(at::empty(shape).numel(), at::kDouble) * 1.7 + phase).sin().reshape(shape);
+    return drawn.to(at::kBFloat16).to(at::kDouble);
+  }
+  at::ScalarType activations() const { return GetParam() == Precision::bf16 ? at::kBFloat16 : at::kFloat; }
+
+  /// The value and the gradients of all inputs, on the host.
+  static std::vector<at::Tensor> results(const Layer& layer, const std::vector<at::Tensor>& inputs) {
+    const at::Tensor value = layer(inputs);
+    std::vector<at::Tensor> all{value};
+    value.backward(numbers(value.sizes(), 0.3).to(value.device(), value.scalar_type()));
+    for (const at::Tensor& input : inputs) all.push_back(input.grad());
+    for (at::Tensor& result : all) result = result.detach().to(at::kCPU, at::kDouble);
+    return all;
+  }
+
+  /// The first `num_activations` inputs are activations, all others parameters. `plain` is the layer in ATen's words.
+  void expect_as_on_the_host(const Layer& layer, const Layer& plain, const std::vector<at::Tensor>& inputs,
+                             size_t num_activations) {
+    set_float32_products(GetParam());
+    const auto copies = [&](at::Device device, at::ScalarType of_activations, at::ScalarType of_parameters) {
+      std::vector<at::Tensor> result;
+      for (size_t i = 0; i < inputs.size(); ++i) {
+        const at::ScalarType type = i < num_activations ? of_activations : of_parameters;
+        result.push_back(inputs[i].detach().to(device, type, /*non_blocking=*/false, /*copy=*/true).requires_grad_());
+      }
+      return result;
+    };
+    const auto on_device = [&](const Layer& some) {
+      const LayerPrecision precision(GetParam());
+      return results(some, copies(at::kCUDA, activations(), at::kFloat));
+    };
+    const std::vector<at::Tensor> expected = results(layer, copies(at::kCPU, at::kDouble, at::kDouble)),
+                                  got = on_device(layer), atens = on_device(plain);
+    const double precision = GetParam() == Precision::bf16 ? 1.0 / 128 : GetParam() == Precision::tf32 ? 1e-3 : 1e-6;
+    for (size_t i = 0; i < expected.size(); ++i) {
+      ASSERT_EQ(got[i].sizes(), expected[i].sizes());
+      const auto error = [&](const at::Tensor& t) { return (t - expected[i]).abs().max().item<double>(); };
+      const double largest = expected[i].abs().max().item<double>();
+      EXPECT_LE(error(got[i]), 2 * error(atens[i]) + precision * (0.1 + largest))
+          << (i == 0 ? "value" : "gradient " + std::to_string(i - 1)) << ", up to " << largest;
+    }
+  }
+};
+INSTANTIATE_TEST_SUITE_P(All, DeviceLayers, testing::Values(Precision::fp32, Precision::tf32, Precision::bf16),
+                         [](const auto& precision) {
+                           return std::string(precision.param == Precision::fp32   ? "fp32"
+                                              : precision.param == Precision::tf32 ? "tf32"
+                                                                                   : "bf16");
+                         });
+
+TEST_P(DeviceLayers, LinearGelu) {
+  // 24 and 40: not a power of two of vectors; 6: no vectors at all.
+  for (const int64_t out : {512, 64, 40, 24, 6}) {
+    for (const int64_t rows : {1, 7, 3000}) {
+      expect_as_on_the_host([](const auto& in) { return linear_gelu(in[0], in[1], in[2]); },
+                            [](const auto& in) { return gelu(at::linear(in[0], in[1], in[2])); },
+                            {numbers({rows, 16}, 1), 0.3 * numbers({out, 16}, 2), numbers({out}, 3)}, 1);
+    }
+  }
+}
+
+TEST_P(DeviceLayers, ConvolveGelu) {
+  for (const int64_t stride : {1, 2}) {
+    const auto layer = [stride](const auto& in) {
+      return convolve_gelu(in[0].contiguous(at::MemoryFormat::ChannelsLast), in[1], in[2], stride);
+    };
+    const auto plain = [stride](const auto& in) {
+      return gelu(at::conv2d(in[0].narrow(1, 0, 12), in[1], in[2], {stride}, {1}));
+    };
+    expect_as_on_the_host(layer, plain,
+                          {numbers({5, 16, 9, 12}, 1), 0.1 * numbers({32, 12, 3, 3}, 2), numbers({32}, 3)}, 1);
+  }
+}
+
+TEST_P(DeviceLayers, Norm) {
+  const Layer with_position = [](const auto& in) { return norm(in[0], in[1], in[2], in[3]).to(in[0].scalar_type()); };
+  const Layer plain_with_position = [](const auto& in) {
+    return at::layer_norm(in[0] + in[1], {in[0].size(-1)}, in[2], in[3]).to(in[0].scalar_type());
+  };
+  const Layer without = [](const auto& in) { return norm(in[0], {}, in[1], in[2]).to(in[0].scalar_type()); };
+  const Layer plain_without = [](const auto& in) {
+    return at::layer_norm(in[0], {in[0].size(-1)}, in[1], in[2]).to(in[0].scalar_type());
+  };
+  // 36: ATen's own.
+  for (const int64_t channels : {64, 128, 192, 256, 384, 512, 36}) {
+    const at::Tensor weight = numbers({channels}, 2), bias = numbers({channels}, 3);
+    for (const int64_t repetitions : {1, 300}) {
+      expect_as_on_the_host(with_position, plain_with_position,
+                            {numbers({repetitions, 7, channels}, 1), numbers({7, channels}, 4), weight, bias}, 2);
+    }
+    expect_as_on_the_host(without, plain_without, {numbers({2, 50, channels}, 1), weight, bias}, 1);
+  }
+}
+
+TEST_P(DeviceLayers, TokenSoftmax) {
+  // 5: ATen's own.
+  for (const int64_t columns : {2, 64, 5}) {
+    expect_as_on_the_host([](const auto& in) { return token_softmax(in[0]); },
+                          [](const auto& in) { return at::_softmax(in[0], 1, /*half_to_float=*/false); },
+                          {8 * numbers({30, 84, columns}, 1)}, 1);
+  }
+}
+
+TEST_P(DeviceLayers, ImagePatchesAreTheHostsWithChannelsOfZeros) {
+  const at::Tensor images =
+      at::arange(3 * 2 * 3 * 10 * 13, at::kInt).remainder(251).to(at::kByte).reshape({3, 2, 3, 10, 13});
+  for (const int64_t patch_px : {1, 2, 3, 4}) {
+    const at::Tensor expected = image_patches(images, patch_px, activations());
+    const at::Tensor got = image_patches(images.to(at::kCUDA), patch_px, activations()).to(at::kCPU);
+    EXPECT_TRUE(got.narrow(1, 0, expected.size(1)).equal(expected)) << patch_px;
+    EXPECT_EQ(got.size(1) % 8, 0);
+    EXPECT_EQ(got.slice(1, expected.size(1)).abs().sum().item<float>(), 0);
+    EXPECT_TRUE(got.is_contiguous(at::MemoryFormat::ChannelsLast));
+  }
+}
+
+}  // namespace
+}  // namespace pictura

@@ -1,0 +1,28 @@
+// The layers that the policies are made of, each with what follows it. On a CUDA device what follows is one pass over
+// memory (rules/network_passes.h) where the sizes allow it; elsewhere it is what ATen does. All are differentiable.
+#pragma once
+
+#include <ATen/ATen.h>
+
+namespace pictura {
+
+/// GELU of a linear layer. x: [..., in]; weight: [out, in]; bias: [out].
+at::Tensor linear_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias);
+
+/// GELU of a convolution whose input is padded by half the kernel. x: [n, in, height, width]; weight: [out, in, kernel,
+/// kernel], or with fewer inputs where the last channels of x are 0; bias: [out].
+at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride);
+
+/// Layer norm of x + position over the last dimension. x: [..., period, channels]; position: [period, channels], or
+/// undefined for none; weight, bias: [channels].
+at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tensor& weight, const at::Tensor& bias);
+
+/// Softmax over tokens. scores: [matrices, tokens, columns].
+at::Tensor token_softmax(const at::Tensor& scores);
+
+/// Patches of images, u8 [views, cameras, 3, height, width], as pixels of [cameras * views, channels, height /
+/// patch_px, width / patch_px] of `type`, rounded up with black, channels last in memory: channel (c * patch_px + y) *
+/// patch_px + x is color c, 0 to 255, of pixel (x, y) of the patch; channels beyond those are 0. Without gradient.
+at::Tensor image_patches(const at::Tensor& images, int64_t patch_px, at::ScalarType type);
+
+}  // namespace pictura

@@ -1,0 +1,80 @@
+// What a network does to its activations between matrix products, each in one pass over memory where ATen takes
+// several. For CUDA devices: on the host, training/layers.cpp says the same in ATen.
+#pragma once
+
+#include <algorithm>
+
+#include "pictura/common/device.h"
+#include "pictura/common/portable/hd.h"
+
+namespace pictura {
+
+enum class ActivationType : uint8_t { f32, bf16 };
+
+/// Activations of `rows` positions without gaps; `type` is that of all arrays of a call but parameters and their
+/// gradients, which are f32. The memory begins at a multiple of 16 bytes.
+struct ActivationSize {
+  ActivationType type = ActivationType::f32;
+  int64_t rows = 0, channels = 0;
+};
+
+/// How images become what the first convolution reads: a patch of patch_px^2 pixels, rounded up with black, becomes one
+/// position whose channel (c * patch_px + y) * patch_px + x is color c of pixel (x, y) of the patch; channels beyond
+/// those of the image are 0. From u8 [views, cameras, 3, height_px, width_px] to
+/// [cameras, views, rows, columns, channels], the colors from 0 to 255.
+struct PatchSize {
+  int64_t views = 0, cameras = 0, height_px = 0, width_px = 0, patch_px = 1;
+  int64_t channels = 0;  // of a position; at least 3 * patch_px^2
+  PICTURA_HD int64_t rows() const { return (height_px + patch_px - 1) / patch_px; }
+  PICTURA_HD int64_t columns() const { return (width_px + patch_px - 1) / patch_px; }
+};
+
+/// Matrices [matrices, tokens, columns] of scores; `columns` is even.
+struct TokenSize {
+  ActivationType type = ActivationType::f32;
+  int64_t matrices = 0, tokens = 0, columns = 0;
+};
+
+/// Holds no state. Work is put on the stream, all memory is the device's. Sums over rows are in a fixed order.
+class NetworkPasses {
+ public:
+  NetworkPasses() = default;
+  virtual ~NetworkPasses() = default;
+  NetworkPasses(const NetworkPasses&) = delete;
+  NetworkPasses& operator=(const NetworkPasses&) = delete;
+
+  /// Whether bias_gelu() and norm() take rows of so many channels.
+  static constexpr bool gelu_takes(int64_t channels) { return channels % 8 == 0 && channels <= 1024; }
+  static constexpr bool norm_takes(int64_t channels) {
+    return channels % 64 == 0 && channels <= 512 && channels != 320 && channels != 448;
+  }
+
+  /// out = GELU(x + bias), by the error function. bias: [channels].
+  virtual void bias_gelu(const ActivationSize& size, const void* x, const float* bias, void* out, Stream stream) = 0;
+  /// The gradients of x and, as partial sums [kBiasSums, channels], of the bias.
+  virtual void bias_gelu_backward(const ActivationSize& size, const void* x, const float* bias, const void* grad_out,
+                                  void* grad_x_out, float* grad_bias_sums_out, Stream stream) = 0;
+  static constexpr int64_t kBiasSums = 528;
+
+  /// out = layer norm of x + position, over channels, with an epsilon of 1e-5. weight, bias: [channels]; position
+  /// [period, channels] is that of row r in r % period, null for none (then period is 1).
+  virtual void norm(const ActivationSize& size, const void* x, const void* position, int64_t period,
+                    const float* weight, const float* bias, void* out, Stream stream) = 0;
+  /// The gradients of x and, as partial sums [num_norm_sums(rows, period), period, 3, channels], of position, weight
+  /// and bias.
+  virtual void norm_backward(const ActivationSize& size, const void* x, const void* position, int64_t period,
+                             const float* weight, const void* grad_out, void* grad_x_out, float* sums_out,
+                             Stream stream) = 0;
+  static constexpr int64_t num_norm_sums(int64_t rows, int64_t period) {
+    return std::clamp<int64_t>((8448 + period - 1) / period, 1, std::max<int64_t>(1, rows / period));
+  }
+
+  virtual void patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, Stream stream) = 0;
+
+  /// out = softmax over tokens; and the gradient of scores by way of `out`.
+  virtual void token_softmax(const TokenSize& size, const void* scores, void* out, Stream stream) = 0;
+  virtual void token_softmax_backward(const TokenSize& size, const void* out, const void* grad_out,
+                                      void* grad_scores_out, Stream stream) = 0;
+};
+
+}  // namespace pictura
