@@ -26,6 +26,7 @@ const Choices<Modality> kModalities{{"perspective", Modality::perspective}, {"ve
 const Choices<Precision> kPrecisions{{"fp32", Precision::fp32}, {"tf32", Precision::tf32}, {"bf16", Precision::bf16}};
 const Choices<Schedule> kSchedules{
     {"constant", Schedule::constant}, {"linear", Schedule::linear}, {"cosine", Schedule::cosine}};
+const Choices<HaltedSlots> kHaltedSlots{{"skip", HaltedSlots::skip}, {"draw", HaltedSlots::draw}};
 
 // The list of keys, in the order in which they are written. Reader and writer both walk it, so no key can be read and
 // not written. A visitor takes (key, value, range...).
@@ -102,6 +103,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.integer("train.milestone_agent_steps", c.train.milestone_agent_steps, 0, int64_t{1} << 50);
   v.choice("train.precision", c.train.precision, kPrecisions);
   v.name("train.images", c.train.images, {"auto", "kept", "redrawn"});
+  v.choice("train.halted_slots", c.train.halted_slots, kHaltedSlots);
 
   for (int i = 0; i < kNumConditioning; ++i) {
     v.number(std::string("evaluate.conditioning.") + kConditioningNames[i], c.evaluate.conditioning[size_t(i)], -1e6,
@@ -447,6 +449,11 @@ void check_contradictions(const Config& c, const Reader& reader) {
     reader.refuse("train.decay_agent_steps", fmt::format("expected at most train.schedule_agent_steps ({}), got {}",
                                                          c.train.schedule_agent_steps, c.train.decay_agent_steps));
   }
+  if (c.train.halted_slots == HaltedSlots::draw && c.train.adv_filter_threshold > 0) {
+    reader.refuse("train.halted_slots",
+                  fmt::format("\"draw\" takes every transition: expected train.adv_filter_threshold = 0, got {}",
+                              shortest(c.train.adv_filter_threshold)));
+  }
   if (c.render.samples != PixelSamples{} && !c.render.backend.starts_with("gl")) {
     reader.refuse("render.samples", fmt::format("expected one sample with render.backend \"{}\", got {}: only gl takes "
                                                 "samples; the others compute exact coverage",
@@ -549,6 +556,7 @@ bool may_differ(const std::string& key, const Config& saved, const Config& now) 
                                                "train.milestone_agent_steps",
                                                "train.forward_chunk",
                                                "train.images",
+                                               "train.halted_slots",
                                                "run.num_threads",
                                                "run.device",
                                                "render.rig",

@@ -17,6 +17,10 @@ enum class Modality { perspective, vector };
 /// Of the network on a CUDA device: IEEE fp32; products in TF32; layers in bf16. See training/precision.h.
 enum class Precision { fp32, tf32, bf16 };
 
+/// What becomes of agents that are halted or absent: they are neither drawn nor encoded; or they are, in rollouts and
+/// updates, and nothing is learnt from them.
+enum class HaltedSlots { skip, draw };
+
 /// How the learning rate falls to 0, or not.
 enum class Schedule { constant, linear, cosine };
 
@@ -92,6 +96,7 @@ struct Config {
     Precision precision = Precision::bf16;
     /// Of a rollout: kept, or redrawn from its scenes where they are read; auto: kept on the host, redrawn on a device.
     std::string images = "auto";
+    HaltedSlots halted_slots = HaltedSlots::skip;  // draw: for measuring alone, with every slot at every step
   } train;
 
   struct Evaluate {

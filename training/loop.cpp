@@ -24,13 +24,23 @@ namespace pictura {
 
 namespace {
 
-// What the policy makes of some active slots at a step that has been recorded.
-Decision decide(Run* run, int64_t step, const at::Tensor& slots) {
-  const at::Tensor rows = run->rollout.rows_of(step, slots);
+// The slots that are drawn and encoded where these are active: all, where halted ones are to cost as much.
+at::Tensor seen_slots(const Run& run, const at::Tensor& active) {
+  return run.config.train.halted_slots == HaltedSlots::skip ? active
+                                                            : at::arange(run.rollout.num_slots(), active.options());
+}
+
+// What the policy makes of the active slots at a step that has been recorded.
+Decision decide(Run* run, int64_t step, const at::Tensor& active) {
+  const at::Tensor rows = run->rollout.rows_of(step, seen_slots(*run, active));
   const auto observe = [&](int64_t begin, int64_t count) {
     return run->rollout.observations.gather(rows.narrow(0, begin, count));
   };
-  return decide(run->policy, rows.size(0), run->config.train.forward_chunk, observe, &run->timer);
+  Decision decision = decide(run->policy, rows.size(0), run->config.train.forward_chunk, observe, &run->timer);
+  if (rows.size(0) > active.size(0)) {
+    for (at::Tensor* t : {&decision.logits, &decision.log_probs, &decision.value}) *t = t->index_select(0, active);
+  }
+  return decision;
 }
 
 // Fills the rollout from the policy's own driving; false when ^C came.
@@ -39,7 +49,7 @@ bool collect(Run* run) {
   Simulator& simulator = *run->simulator;
   const auto record = [&](int64_t step) {
     const at::Tensor slots = active_slots(simulator.controller_input(), {}, run->executor.get());
-    rollout.observations.record(step, slots);
+    rollout.observations.record(step, seen_slots(*run, slots));
     return slots;
   };
   rollout.values.zero_();
@@ -80,7 +90,9 @@ UpdateStats improve(Run* run) {
 
 }  // namespace
 
-TrainReport train(const TrainOptions& options) {
+namespace {
+
+TrainReport train_on_its_device(const TrainOptions& options) {
   const Stopwatch since_start;
   const Config config = load_config(options.config_path, options.overrides);
   const Device device = open_learning_device(config);
@@ -92,6 +104,7 @@ TrainReport train(const TrainOptions& options) {
                 fmt::join(old_files, ", "));
   at::set_num_threads(resolve_num_threads(config.run.num_threads));
   set_float32_products(config.train.precision);
+  release_unused_memory(device);  // of an earlier run
 
   const auto notify = [&options](const std::string& notice) {
     if (options.on_notice) options.on_notice(notice);
@@ -175,6 +188,9 @@ TrainReport train(const TrainOptions& options) {
     if (options.on_progress) options.on_progress(progress);
   }
 
+  const DeviceMemory memory = memory_of(device);
+  report.device_bytes = memory.used_bytes;
+  report.peak_tensor_bytes = memory.peak_tensor_bytes;
   save();
   write_safetensors(options.out_folder + "/policy.safetensors", run.policy.parameters(), to_toml(config));
   report.agent_steps = run.agent_steps;
@@ -183,6 +199,18 @@ TrainReport train(const TrainOptions& options) {
   report.km_driven = run.distance_m / 1000;
   report.policy_hash = run.policy.hash();
   return report;
+}
+
+}  // namespace
+
+TrainReport train(const TrainOptions& options) {
+  try {
+    return train_on_its_device(options);
+  } catch (const c10::OutOfMemoryError& error) {
+    const std::string text = error.what_without_backtrace();
+    throw OutOfMemory("train: " + text.substr(0, text.find('\n')) +
+                      " A smaller train.forward_chunk or simulator.num_slots takes less.");
+  }
 }
 
 }  // namespace pictura

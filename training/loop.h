@@ -5,9 +5,21 @@
 #include <string>
 #include <vector>
 
+#include "pictura/common/error.h"
 #include "pictura/common/portable/hd.h"
+#include "pictura/training/phases.h"
 
 namespace pictura {
+
+/// What one update did and took.
+struct UpdateCost {
+  int64_t agent_steps = 0, slot_steps = 0;  // of its rollout
+  double kept_fraction = 0;                 // of valid transitions, by the filter
+  int64_t minibatches = 0;
+  double first_kl = 0;                 // of the first minibatch, before parameters change: what arithmetic differs by
+  double rollout_s = 0, update_s = 0;  // wall time of collecting, and of improving
+  PhaseSeconds phases_s{};             // in both
+};
 
 /// What a run has done so far; given to on_progress after every update.
 struct TrainProgress {
@@ -17,6 +29,7 @@ struct TrainProgress {
   double episode_return = 0;  // mean over agent episodes that ended in the last updates; NaN before the first
   double goals_per_km = 0;    // goals per km driven in the last updates
   double eta_s = 0;
+  UpdateCost cost;  // of the last update
 };
 
 /// What happens to a run that lies in the folder already.
@@ -42,7 +55,16 @@ struct TrainReport {
   double agent_steps_per_s = 0, episode_return = 0, km_driven = 0;
   bool interrupted = false, out_of_time = false;
   std::string checkpoint, policy_hash;
+  // Of a CUDA device, else 0: what all processes had in use after the last update, when torch still keeps what it has
+  // ever taken; and the most that tensors took at once.
+  int64_t device_bytes = 0, peak_tensor_bytes = 0;
   std::string device, simulator, renderer;  // what learnt, simulated and drew; no renderer where there are no images
+};
+
+/// The tensors of a run do not fit into the device's memory; a smaller train.forward_chunk may.
+class OutOfMemory : public Error {
+ public:
+  using Error::Error;
 };
 
 /// Trains as the configuration says and writes into out_folder: config.toml (resolved), untrained.ckpt (the policy
@@ -50,7 +72,8 @@ struct TrainReport {
 /// train.keep_checkpoints and milestone_agent_steps say, policy.safetensors, progress.csv and TensorBoard events. After
 /// ^C or the like (common/support/interrupt.h) it saves and returns with `interrupted`; where another update, as long
 /// as the longest so far, would not end within `minutes`, with `out_of_time`. Throws Error naming file and key for bad
-/// input, and naming the folder where another run is at work, and where one lies that old_run does not speak of.
+/// input, and naming the folder where another run is at work, and where one lies that old_run does not speak of;
+/// OutOfMemory where the device's memory is too small.
 TrainReport train(const TrainOptions& options);
 
 }  // namespace pictura

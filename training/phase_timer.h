@@ -1,7 +1,6 @@
 // Where the time of an update goes, by named phase: a clock on the host, events on a device, which wait for nothing.
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <memory>
 #include <vector>
@@ -9,6 +8,7 @@
 #include <c10/core/Event.h>
 
 #include "pictura/common/device.h"
+#include "pictura/training/phases.h"
 
 namespace pictura {
 
@@ -26,13 +26,6 @@ class Stopwatch {
   using Clock = std::chrono::steady_clock;
   Clock::time_point start_ = Clock::now();
 };
-
-/// render: images, wherever they are needed; forward: the network in rollouts; learn: the network, its losses and
-/// gradients in updates; optimize: the optimizer's steps.
-enum class Phase : uint8_t { simulate, render, forward, learn, optimize };
-constexpr size_t kNumPhases = 5;
-constexpr const char* kPhaseNames[kNumPhases] = {"simulate", "render", "forward", "learn", "optimize"};
-using PhaseSeconds = std::array<double, kNumPhases>;
 
 class PhaseTimer {
  public:

@@ -65,6 +65,25 @@ struct Batch {
         valid(rollout.valid.flatten()) {}
 };
 
+// What each of some transitions counts in their mean: its share of the valid ones, or undefined where all are valid.
+at::Tensor shares_of(const at::Tensor& valid) {
+  const at::Tensor counts = valid.to(at::kFloat);
+  return counts / counts.mean().clamp_min(1.0 / static_cast<double>(counts.size(0)));
+}
+
+at::Tensor mean_of(const at::Tensor& values, const at::Tensor& shares) {
+  return shares.defined() ? (values * shares).mean() : values.mean();
+}
+
+// Advantages of a minibatch with mean 0 and deviation 1 over its valid transitions.
+at::Tensor normalised(const at::Tensor& advantages, const at::Tensor& shares) {
+  const at::Tensor centered = advantages - mean_of(advantages, shares);
+  if (!shares.defined()) return centered / (advantages.std() + 1e-8);
+  const at::Tensor count = shares.gt(0).sum();
+  const at::Tensor variance = mean_of(centered.square(), shares) * count / (count - 1).clamp_min(1);
+  return centered / (variance.sqrt() + 1e-8);
+}
+
 // What the losses of some transitions are made of.
 struct Losses {
   at::Tensor policy, value, entropy;  // with gradients
@@ -72,24 +91,24 @@ struct Losses {
 };
 
 Losses losses_of(const Policy::Output& output, const Batch& batch, const at::Tensor& rows, const at::Tensor& advantage,
-                 double clip_coef) {
+                 const at::Tensor& shares, double clip_coef) {
   const at::Tensor all_log_probs = at::log_softmax(output.logits, 1);
   const at::Tensor log_prob = all_log_probs.gather(1, batch.actions.index_select(0, rows).unsqueeze(1)).squeeze(1);
   const at::Tensor log_ratio = log_prob - batch.old_log_probs.index_select(0, rows);
   const at::Tensor ratio = log_ratio.exp();
   const at::Tensor clipped = ratio.clamp(1 - clip_coef, 1 + clip_coef);
   Losses losses;
-  losses.policy = -at::minimum(advantage * ratio, advantage * clipped).mean();
-  losses.value = 0.5 * (output.value - batch.returns.index_select(0, rows)).square().mean();
-  losses.entropy = -(all_log_probs.exp() * all_log_probs).sum(1).mean();
+  losses.policy = -mean_of(at::minimum(advantage * ratio, advantage * clipped), shares);
+  losses.value = 0.5 * mean_of((output.value - batch.returns.index_select(0, rows)).square(), shares);
+  losses.entropy = -mean_of((all_log_probs.exp() * all_log_probs).sum(1), shares);
   const at::NoGradGuard no_grad;
   // Schulman's estimator of the KL divergence, (ratio - 1) - log ratio: unbiased and never negative.
-  const at::Tensor approx_kl = (ratio - 1 - log_ratio).mean();
-  const at::Tensor clip_fraction = ((ratio - 1).abs() > clip_coef).to(at::kFloat).mean();
-  losses.stats =
-      at::stack({losses.policy, losses.value, losses.entropy, approx_kl, clip_fraction, log_ratio.abs().mean()})
-          .detach()
-          .to(at::kDouble);
+  const at::Tensor approx_kl = mean_of(ratio - 1 - log_ratio, shares);
+  const at::Tensor clip_fraction = mean_of(((ratio - 1).abs() > clip_coef).to(at::kFloat), shares);
+  losses.stats = at::stack({losses.policy, losses.value, losses.entropy, approx_kl, clip_fraction,
+                            mean_of(log_ratio.abs(), shares)})
+                     .detach()
+                     .to(at::kDouble);
   return losses;
 }
 
@@ -129,29 +148,32 @@ UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Confi
   const int64_t num_kept =
       executor->select_kept(span_of<const float>(batch.advantages), span_of<const uint8_t>(batch.valid), threshold,
                             span_of<int64_t>(kept_and_unused));
-  const at::Tensor kept = kept_and_unused.narrow(0, 0, num_kept), shuffled = at::empty_like(kept);
   if (num_kept == 0) return stats;
+  const bool takes_all = config.halted_slots == HaltedSlots::draw;  // those that are not valid without a share
+  const int64_t num_rows = takes_all ? batch.valid.size(0) : num_kept;
+  const at::Tensor taken = takes_all ? at::arange(num_rows, kept_and_unused.options())
+                                     : kept_and_unused.narrow(0, 0, num_rows),
+                   shuffled = at::empty_like(taken);
   const at::Tensor valid = at::nonzero(batch.valid).squeeze(1);
   stats.kept_fraction = static_cast<double>(num_kept) / static_cast<double>(valid.size(0));
   stats.explained_variance =
       explained_variance(batch.values.index_select(0, valid), batch.returns.index_select(0, valid));
 
-  const int64_t num_minibatches = (num_kept + config.minibatch_size - 1) / config.minibatch_size;
+  const int64_t num_minibatches = (num_rows + config.minibatch_size - 1) / config.minibatch_size;
   // Sums over the minibatches of each epoch; the last row is the first minibatch.
   const at::Tensor sums =
       at::zeros({config.update_epochs + 1, kNumStats}, batch.advantages.options().dtype(at::kDouble));
   std::vector<at::Tensor> first_norms;
   for (int epoch = 0; epoch < config.update_epochs; ++epoch) {
-    executor->permute(Permutation(key.seed, key.update, epoch, num_kept), span_of<const int64_t>(kept),
+    executor->permute(Permutation(key.seed, key.update, epoch, num_rows), span_of<const int64_t>(taken),
                       span_of<int64_t>(shuffled));
     for (int64_t m = 0; m < num_minibatches; ++m) {
       // Minibatches of equal size, to one transition.
-      const int64_t begin = num_kept * m / num_minibatches, end = num_kept * (m + 1) / num_minibatches;
+      const int64_t begin = num_rows * m / num_minibatches, end = num_rows * (m + 1) / num_minibatches;
       const at::Tensor minibatch = shuffled.narrow(0, begin, end - begin);
+      const at::Tensor shares = takes_all ? shares_of(batch.valid.index_select(0, minibatch)) : at::Tensor();
       at::Tensor advantages = batch.advantages.index_select(0, minibatch);
-      if (config.norm_adv && end - begin > 1) {
-        advantages = (advantages - advantages.mean()) / (advantages.std() + 1e-8);
-      }
+      if (config.norm_adv && end - begin > 1) advantages = normalised(advantages, shares);
 
       const at::Tensor minibatch_stats = at::zeros({kNumStats}, sums.options());
       for (int64_t chunk = 0; chunk < end - begin; chunk += config.forward_chunk) {
@@ -159,15 +181,20 @@ UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Confi
         const double weight = static_cast<double>(size) / static_cast<double>(end - begin);
         const at::Tensor rows = minibatch.narrow(0, chunk, size);
         const Observation observation = rollout.observations.gather(rows);
-        const PhaseTimer::Scope timed(timer, Phase::learn);
-        const Losses losses =
-            losses_of(policy.forward(observation), batch, rows, advantages.narrow(0, chunk, size), config.clip_coef);
+        const auto look = [&] {
+          const PhaseTimer::Scope timed(timer, Phase::learn);
+          return losses_of(policy.forward(observation), batch, rows, advantages.narrow(0, chunk, size),
+                           takes_all ? shares.narrow(0, chunk, size) : shares, config.clip_coef);
+        };
+        const Losses losses = look();
         if (stats.minibatches == 0 && chunk == 0) {
+          const PhaseTimer::Scope timed(timer, Phase::diagnose);
           for (const at::Tensor& loss :
                {losses.policy, config.vf_coef * losses.value, config.ent_coef * losses.entropy}) {
             first_norms.push_back(gradient_norm(loss, policy));
           }
         }
+        const PhaseTimer::Scope timed(timer, Phase::backward);
         const at::Tensor loss = losses.policy + config.vf_coef * losses.value - config.ent_coef * losses.entropy;
         (loss * weight).backward();
         minibatch_stats.narrow(0, 0, kNumStats - 1) += weight * losses.stats;

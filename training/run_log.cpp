@@ -166,6 +166,15 @@ TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecor
     progress.eta_s = std::min(progress.eta_s, elapsed_s / steps_done * steps_left);
   }
 
+  progress.cost = {totals.agent_steps,
+                   totals.slot_steps,
+                   record.stats.kept_fraction,
+                   record.stats.minibatches,
+                   record.stats.first.approx_kl,
+                   record.rollout_s,
+                   record.update_s,
+                   record.phases_s};
+
   const Scalars scalars = scalars_of(config_, progress, record);
   csv_.write(update, scalars);
   events_.write(agent_steps, scalars);

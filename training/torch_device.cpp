@@ -1,5 +1,6 @@
 #include "pictura/training/torch_device.h"
 
+#include <c10/core/CachingDeviceAllocator.h>
 #include <dlfcn.h>
 
 #include "pictura/backends/make_learner.h"
@@ -58,6 +59,34 @@ Device open_learning_device(const Config& config) {
   const int count = at::detail::getCUDAHooks().deviceCount();
   PICTURA_CHECK(device.index < count, "run.device: expected cuda:0 to cuda:{}, got \"{}\"", count - 1, wanted);
   return device;
+}
+
+namespace {
+
+// Torch's allocator of a device, or null where it has not been used.
+at::DeviceAllocator* allocator_of(Device device) {
+  if (device.is_host()) return nullptr;
+  at::DeviceAllocator* const allocator = at::getDeviceAllocator(torch_device(device).type());
+  return allocator->initialized() ? allocator : nullptr;
+}
+
+}  // namespace
+
+void release_unused_memory(Device device) {
+  at::DeviceAllocator* const allocator = allocator_of(device);
+  if (!allocator) return;
+  allocator->emptyCache();
+  allocator->resetPeakStats(torch_device(device).index());
+}
+
+DeviceMemory memory_of(Device device) {
+  at::DeviceAllocator* const allocator = allocator_of(device);
+  if (!allocator) return {};
+  const c10::DeviceIndex index = torch_device(device).index();
+  const auto [free, total] = allocator->getMemoryInfo(index);
+  constexpr auto kAll = static_cast<size_t>(c10::CachingAllocator::StatType::AGGREGATE);
+  return {static_cast<int64_t>(total) - static_cast<int64_t>(free),
+          allocator->getDeviceStats(index).allocated_bytes[kAll].peak};
 }
 
 at::Device torch_device(Device device) {

@@ -15,6 +15,16 @@ Device open_learning_device(const Config& config);
 
 at::Device torch_device(Device device);
 
+/// Gives back what torch keeps of a device's memory for later tensors, so that renderers can have it, and begins a new
+/// peak of DeviceMemory. Nothing happens on the host.
+void release_unused_memory(Device device);
+
+/// Of a CUDA device: bytes that all processes have in use, and the most that tensors took at once. 0 on the host.
+struct DeviceMemory {
+  int64_t used_bytes = 0, peak_tensor_bytes = 0;
+};
+DeviceMemory memory_of(Device device);
+
 /// The elements of a tensor without gaps. Throws Error where its type is another one.
 template <typename T>
 Span<T> span_of(const at::Tensor& tensor) {

@@ -105,6 +105,9 @@ TEST(Config, KeysWithoutEffectAreRefused) {
               AllOf(HasSubstr("a.toml:2: render.width_px"), HasSubstr("render.rig")));
   EXPECT_THAT(message_of("[render]\nrig = \"r.toml\"\n", {"render.height_px=9"}),
               AllOf(HasSubstr("--set render.height_px"), HasSubstr("render.rig")));
+  EXPECT_THAT(message_of("[train]\nhalted_slots = \"draw\"\n"),
+              AllOf(HasSubstr("a.toml:2: train.halted_slots"), HasSubstr("train.adv_filter_threshold = 0, got 0.01")));
+  EXPECT_EQ(message_of("[train]\nhalted_slots = \"draw\"\nadv_filter_threshold = 0\n"), test::kNoError);
   // What is written for a run with a rig file can be read again.
   const Config c = parse_config("[render]\nrig = \"r.toml\"\n", "a.toml");
   EXPECT_EQ(to_toml(parse_config(to_toml(c), "b.toml")), to_toml(c));
@@ -213,6 +216,7 @@ TEST(Config, HarmlessDifferencesAreNone) {
   b.train.keep_checkpoints = 4;
   b.train.milestone_agent_steps = 1000;
   b.train.forward_chunk = 64;
+  b.train.halted_slots = HaltedSlots::draw;
   b.run.num_threads = 9;
   b.run.device = "cpu";
   b.simulator.backend = "cpu";

@@ -298,6 +298,58 @@ TEST_F(Training, KeptAndRedrawnImagesTeachTheSame) {
   EXPECT_EQ(train(options("redrawn", {"train.images=redrawn"})).policy_hash, kept.policy_hash);
 }
 
+TEST_F(Training, NothingIsLearntFromHaltedSlotsThatAreDrawn) {
+  // Gradients alone change parameters, by as much.
+  const std::vector<std::string> settings = {
+      "train.updates=1",  "train.num_steps=60",    "train.adv_filter_threshold=0", "simulator.num_slots=24",
+      "train.adam_eps=1", "train.learning_rate=1", "train.update_epochs=1",        "train.schedule=constant"};
+  const auto learn = [&](const std::string& halted_slots, int64_t minibatch_size, UpdateCost* cost_out) {
+    TrainOptions o = options(fmt::format("{} {}", halted_slots, minibatch_size), settings);
+    o.overrides.push_back("train.halted_slots=" + halted_slots);
+    o.overrides.push_back(fmt::format("train.minibatch_size={}", minibatch_size));
+    o.on_progress = [cost_out](const TrainProgress& progress) { *cost_out = progress.cost; };
+    return read_checkpoint(train(o).checkpoint).parameters;
+  };
+  UpdateCost skipped, drawn, in_minibatches;
+  const std::vector<NamedTensor> without = learn("skip", 4096, &skipped), with = learn("draw", 4096, &drawn);
+  ASSERT_LT(skipped.agent_steps, skipped.slot_steps) << "some have halted";
+  EXPECT_EQ(drawn.agent_steps, skipped.agent_steps);
+  EXPECT_EQ(drawn.kept_fraction, 1);
+  const std::vector<NamedTensor> before = read_checkpoint(folder_ / "skip 4096/untrained.ckpt").parameters;
+  double learnt = 0;
+  ASSERT_EQ(with.size(), without.size());
+  for (size_t i = 0; i < with.size(); ++i) {
+    EXPECT_LT((with[i].value - without[i].value).abs().max().item<double>(), 1e-5) << with[i].name;
+    learnt = std::max(learnt, (with[i].value - before[i].value).abs().max().item<double>());
+  }
+  EXPECT_GT(learnt, 1e-3);
+  // They take their part of the minibatches.
+  learn("draw", 64, &in_minibatches);
+  EXPECT_EQ(in_minibatches.minibatches, (24 * 60 + 63) / 64);
+}
+
+TEST_F(Training, AnUpdateSaysWhatItCost) {
+  TrainOptions o = options("run", {"train.updates=2"});
+  std::vector<UpdateCost> costs;
+  o.on_progress = [&costs](const TrainProgress& progress) { costs.push_back(progress.cost); };
+  const TrainReport report = train(o);
+  ASSERT_EQ(costs.size(), 2u);
+  EXPECT_EQ(costs[0].agent_steps + costs[1].agent_steps, report.agent_steps);
+  for (const UpdateCost& cost : costs) {
+    EXPECT_EQ(cost.slot_steps, 8 * 12);
+    EXPECT_GT(cost.kept_fraction, 0);
+    EXPECT_GT(cost.minibatches, 0);
+    EXPECT_LT(std::abs(cost.first_kl), 1e-5) << "images and observations are those of the rollout";
+    double phases_s = 0;
+    for (size_t i = 0; i < kNumPhases; ++i) {
+      EXPECT_GT(cost.phases_s[i], 0) << kPhaseNames[i];
+      phases_s += cost.phases_s[i];
+    }
+    EXPECT_LT(phases_s, cost.rollout_s + cost.update_s);
+  }
+  EXPECT_EQ(report.device_bytes, 0) << "there is no device";
+}
+
 TEST_F(Training, WritesWhatItPromisesAndStartsFromItsSeed) {
   const TrainReport report = train(options("run", {"train.updates=1"}));
   for (const char* name : {"config.toml", "untrained.ckpt", "checkpoint.ckpt", "policy.safetensors", "progress.csv"}) {

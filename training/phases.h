@@ -1,0 +1,19 @@
+// The phases that the time of an update is divided into.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace pictura {
+
+/// render: images, wherever they are needed; forward: the network in rollouts; learn: the network and its losses in
+/// updates; diagnose: gradients of single losses, for the log alone; backward: the gradients that are learnt from;
+/// optimize: the optimizer's steps. What is in no phase is the rest of the wall time.
+enum class Phase : uint8_t { simulate, render, forward, learn, diagnose, backward, optimize };
+constexpr size_t kNumPhases = 7;
+constexpr const char* kPhaseNames[kNumPhases] = {"simulate", "render",   "forward", "learn",
+                                                 "diagnose", "backward", "optimize"};
+using PhaseSeconds = std::array<double, kNumPhases>;
+
+}  // namespace pictura
