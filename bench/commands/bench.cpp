@@ -150,8 +150,8 @@ void bench_train(const TrainArguments& arguments) {
 void add_bench_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "bench",
-      "Measure rates, quality and worlds: bench render, bench simulate, bench train, bench quality, bench worlds, "
-      "bench soak");
+      "Measure rates, quality and worlds: bench render, bench history, bench simulate, bench train, bench quality, "
+      "bench worlds, bench soak");
   command->require_subcommand(1);
   command->footer(
       "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n  pictura bench render --size 192x108");
@@ -172,6 +172,7 @@ void add_bench_command(CLI::App& app) {
   add_render_benchmark(*command);
   add_worlds_benchmark(*command);
   add_soak_benchmark(*command);
+  add_history_benchmark(*command);
 #endif
 }
 

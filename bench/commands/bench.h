@@ -48,10 +48,11 @@ void report_benchmark(bool json, const BenchContext& context, std::vector<BenchR
 /// Adds the subcommand `bench`.
 void add_bench_command(CLI::App& app);
 
-/// Add `bench simulate`, `bench quality`, `bench render`, `bench worlds` and `bench soak`.
+/// Add `bench simulate`, `bench quality`, `bench render`, `bench history`, `bench worlds` and `bench soak`.
 void add_simulate_benchmark(CLI::App& bench);
 void add_quality_benchmark(CLI::App& bench);
 void add_render_benchmark(CLI::App& bench);
+void add_history_benchmark(CLI::App& bench);
 void add_worlds_benchmark(CLI::App& bench);
 void add_soak_benchmark(CLI::App& bench);
 

@@ -14,13 +14,17 @@ bool wants_plot(const PlotArguments& arguments) {
   return !arguments.results.empty();
 }
 
-void add_rate_options(CLI::App* command, RateArguments* arguments) {
+void add_repeat_options(CLI::App* command, RateArguments* arguments) {
   command->add_option("--repeats", arguments->repeats)->check(CLI::PositiveNumber)->capture_default_str();
   command->add_option("--repeat-seconds", arguments->repeat_s)->check(finite_range(1e-3, 3600))->capture_default_str();
+  command->add_flag("--json", arguments->json, "Print one JSON object");
+}
+
+void add_rate_options(CLI::App* command, RateArguments* arguments) {
+  add_repeat_options(command, arguments);
   command->add_option("--plot", arguments->plot.results, "Plot the sweeps of these results instead of measuring")
       ->delimiter(',');
   command->add_option("--figure", arguments->plot.figure, "PNG file for --plot");
-  command->add_flag("--json", arguments->json, "Print one JSON object");
 }
 
 std::vector<PlottedResult> read_results(const std::vector<std::string>& paths) {

@@ -25,7 +25,9 @@ struct RateArguments {
   PlotArguments plot;
   bool json = false;
 };
-/// Adds the options --repeats, --repeat-seconds, --plot, --figure and --json.
+/// Adds the options --repeats, --repeat-seconds and --json.
+void add_repeat_options(CLI::App* command, RateArguments* arguments);
+/// Adds these and --plot and --figure.
 void add_rate_options(CLI::App* command, RateArguments* arguments);
 
 struct PlottedResult {

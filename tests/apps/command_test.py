@@ -342,6 +342,8 @@ class Benchmarks(CommandCase):
             ("bench", "render", "--egos"),
             ("bench", "simulate", "--repeat-seconds"),
             ("bench", "simulate", "--slots"),
+            ("bench", "history", "--views"),
+            ("bench", "history", "--repeat-seconds"),
         )
 
     def test_rendering_is_measured_for_each_backend_size_and_number_of_egos(self):
@@ -360,6 +362,27 @@ class Benchmarks(CommandCase):
             rate, call, image = (rows[case + of]["value"] for of in ["", ", one call", ", one image"])
             self.assertAlmostEqual(rate * call / 1e3 / egos, 1, places=6)
             self.assertAlmostEqual(image * 4 * egos / call, 1, places=6)
+
+    def test_a_history_is_drawn_as_it_was_seen_and_its_rate_measured_against_the_present(self):
+        small = [*self.QUICK, "--slots", 12, "--steps", 4, "--views", 10, "--size", "8x8"]
+        facts = self.json_of("bench", "history", *small, "--check", 5)
+        self.assertIn("images of 5 agents out of the history equal those drawn at the time", facts["workload"])
+        self.assertIn("12 agents", facts["workload"])
+        rows = {row["name"].removeprefix("cpu 8x8 10 views, "): row for row in facts["results"]}
+        present, history, ratio, call = (
+            rows[name] for name in ("present scene", "history of 4 steps", "history over present", "one call of the history")
+        )
+        for row in (present, history, ratio, call):
+            self.assertEqual(row["repeats"], 3)
+        self.assertAlmostEqual(history["value"] * call["value"] / 1e3 / 10, 1, places=6)
+        # Images of either take about as long.
+        self.assertTrue(0.1 < ratio["value"] < 10, ratio)
+        self.assertTrue(ratio["min"] <= history["max"] / present["min"])
+        self.assertGreater(rows["memory of the history"]["value"], 0)
+        self.assert_refused(2, "vulkan", "bench", "history", *small, "--backend", "vulkan")
+        self.assert_refused(2, "--views", "bench", "history", "--views", 0)
+        if os.environ.get("PICTURA_REQUIRE_GPU") == "1":
+            self.assertIn("NVIDIA", self.json_of("bench", "history", *small, "--backend", "cuda")["device"])
 
     def test_rendering_on_a_device_names_it_and_its_driver(self):
         if os.environ.get("PICTURA_REQUIRE_GPU") != "1":
