@@ -3,22 +3,16 @@
 #include "pictura/bench/commands/bench.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <fstream>
 #include <numeric>
 
 #include <fmt/ranges.h>
 
-#include "pictura/cli/backend_options.h"
 #include "pictura/cli/drive.h"
 #include "pictura/cli/report.h"
 #include "pictura/commit.h"
 #include "pictura/common/error.h"
-#include "pictura/common/support/interrupt.h"
 #include "pictura/map/load_map.h"
-#ifdef PICTURA_HAS_TORCH
-#include "pictura/training/loop.h"
-#endif
 
 namespace pictura {
 
@@ -72,28 +66,32 @@ Json BenchContext::json() const {
   return object;
 }
 
-void report_benchmark(bool json, const BenchContext& context, std::vector<BenchResult> results) {
+Json summary_of(BenchResult result) {
+  std::sort(result.values.begin(), result.values.end());
+  const size_t n = result.values.size();
+  return {{"name", result.name},
+          {"value", 0.5 * (result.values[(n - 1) / 2] + result.values[n / 2])},
+          {"unit", result.unit},
+          {"mean", std::accumulate(result.values.begin(), result.values.end(), 0.0) / static_cast<double>(n)},
+          {"min", result.values.front()},
+          {"max", result.values.back()},
+          {"repeats", n}};
+}
+
+void print_heading(const BenchContext& context) {
+  fmt::print("{}\nbackend {} on {}{}, commit {}\n", context.workload, context.backend, context.device,
+             context.driver.empty() ? "" : ", driver " + context.driver, PICTURA_COMMIT);
+}
+
+void report_benchmark(bool json, const BenchContext& context, const std::vector<BenchResult>& results) {
   Json rows = Json::array();
-  for (BenchResult& result : results) {
-    std::sort(result.values.begin(), result.values.end());
-    const size_t n = result.values.size();
-    const double median = 0.5 * (result.values[(n - 1) / 2] + result.values[n / 2]);
-    const double mean = std::accumulate(result.values.begin(), result.values.end(), 0.0) / static_cast<double>(n);
-    rows.push_back({{"name", result.name},
-                    {"value", median},
-                    {"unit", result.unit},
-                    {"mean", mean},
-                    {"min", result.values.front()},
-                    {"max", result.values.back()},
-                    {"repeats", n}});
-  }
+  for (const BenchResult& result : results) rows.push_back(summary_of(result));
   if (json) {
     Json object = context.json();
     object["results"] = rows;
     return print_json(object);
   }
-  fmt::print("{}\nbackend {} on {}{}, commit {}\n", context.workload, context.backend, context.device,
-             context.driver.empty() ? "" : ", driver " + context.driver, PICTURA_COMMIT);
+  print_heading(context);
   for (const Json& row : rows) {
     fmt::print("{:50} {:>14.6g} {:18} (mean {:.6g}, min {:.6g}, max {:.6g}, {} repeats)\n",
                row["name"].get<std::string>(), row["value"].get<double>(), row["unit"].get<std::string>(),
@@ -102,69 +100,16 @@ void report_benchmark(bool json, const BenchContext& context, std::vector<BenchR
   }
 }
 
-#ifdef PICTURA_HAS_TORCH
-namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
-
-struct TrainArguments {
-  std::string config = "configs/smoke.toml";
-  std::vector<std::string> overrides;
-  BackendOptions backends;
-  bool json = false;
-};
-
-void bench_train(const TrainArguments& arguments) {
-  const std::string folder = std::filesystem::temp_directory_path() / fmt::format("pictura-bench-{}", getpid());
-  BenchResult rate{"train, one update", "agent_steps_per_s", {}};
-  TrainOptions options{.config_path = arguments.config,
-                       .overrides = arguments.overrides,
-                       .out_folder = folder,
-                       .old_run = OldRun::overwrite};
-  for (const std::string& text : overrides_of(arguments.backends)) options.overrides.push_back(text);
-  int64_t steps_before = 0;
-  auto begin = Clock::now();
-  options.on_progress = [&](const TrainProgress& progress) {
-    // The first update warms up caches and allocators.
-    if (progress.update > 1)
-      rate.values.push_back(static_cast<double>(progress.agent_steps - steps_before) / seconds_since(begin));
-    steps_before = progress.agent_steps;
-    begin = Clock::now();
-  };
-  const TrainReport trained = train(options);
-  std::filesystem::remove_all(folder);
-  if (trained.interrupted) throw Interrupted("interrupted");
-  PICTURA_CHECK(!rate.values.empty(), "bench train: {}: expected at least 2 updates", arguments.config);
-  const BenchContext context{
-      .workload = fmt::format("train: {}, rollout and update", arguments.config),
-      .backend = fmt::format("simulator {}, renderer {}, learning on {}", trained.simulator,
-                             trained.renderer.empty() ? "none" : trained.renderer, trained.device)};
-  report_benchmark(arguments.json, context, {rate});
-}
-
-}  // namespace
-#endif
-
 void add_bench_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "bench",
-      "Measure rates, quality and worlds: bench render, bench history, bench simulate, bench train, bench quality, "
-      "bench worlds, bench soak");
+      "Measure rates, quality and worlds: bench render, bench history, bench simulate, bench train, bench breakdown, "
+      "bench quality, bench worlds, bench soak");
   command->require_subcommand(1);
   command->footer(
       "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n  pictura bench render --size 192x108");
 #ifdef PICTURA_HAS_TORCH
-  auto arguments = std::make_shared<TrainArguments>();
-  CLI::App* train_command = command->add_subcommand("train", "Rollouts and updates of a configuration");
-  train_command->add_option("--config", arguments->config, "TOML file")->capture_default_str();
-  train_command
-      ->add_option("--set", arguments->overrides, "Override a key, as train.updates=2; may be given many times")
-      ->allow_extra_args(false);
-  add_policy_backend_options(train_command, "as the configuration says", &arguments->backends);
-  train_command->add_flag("--json", arguments->json, "Print one JSON object");
-  train_command->callback([arguments] { bench_train(*arguments); });
+  add_train_benchmark(*command);
 #endif
 #ifdef PICTURA_HAS_BENCH
   add_simulate_benchmark(*command);
@@ -173,6 +118,9 @@ void add_bench_command(CLI::App& app) {
   add_worlds_benchmark(*command);
   add_soak_benchmark(*command);
   add_history_benchmark(*command);
+#ifdef PICTURA_HAS_TORCH
+  add_breakdown_benchmark(*command);
+#endif
 #endif
 }
 

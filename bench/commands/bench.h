@@ -42,13 +42,22 @@ struct BenchResult {
   std::vector<double> values;  // one per repeat
 };
 
+/// Name, median (value), unit, mean, min, max and number of repeats.
+Json summary_of(BenchResult result);
+
+/// Prints workload, backend, device and commit for people.
+void print_heading(const BenchContext& context);
+
 /// Prints medians and means with minimum and maximum.
-void report_benchmark(bool json, const BenchContext& context, std::vector<BenchResult> results);
+void report_benchmark(bool json, const BenchContext& context, const std::vector<BenchResult>& results);
 
 /// Adds the subcommand `bench`.
 void add_bench_command(CLI::App& app);
 
-/// Add `bench simulate`, `bench quality`, `bench render`, `bench history`, `bench worlds` and `bench soak`.
+/// Add `bench train`, `bench breakdown`, `bench simulate`, `bench quality`, `bench render`, `bench history`, `bench
+/// worlds` and `bench soak`.
+void add_train_benchmark(CLI::App& bench);
+void add_breakdown_benchmark(CLI::App& bench);
 void add_simulate_benchmark(CLI::App& bench);
 void add_quality_benchmark(CLI::App& bench);
 void add_render_benchmark(CLI::App& bench);

@@ -589,9 +589,57 @@ class Training(CommandCase):
             self.assertGreater((self.folder / "drive.mp4").stat().st_size, 2000)
 
     def test_bench_train_says_what_simulated_drew_and_learnt(self):
-        facts = self.json_of("bench", "train", "--set", "train.updates=2", "--config", CONFIGS / "smoke.toml",
-                             "--renderer", "null")  # fmt: skip
+        facts = self.json_of("bench", "train", "--updates", 2, "--config", CONFIGS / "smoke.toml", "--renderer", "null",
+                             "--device", "cpu")  # fmt: skip
         self.assertEqual(facts["backend"], "simulator cpu, renderer null, learning on cpu")
+        rows = {row["name"].removeprefix("train, "): row for row in facts["results"]}
+        self.assertEqual({row["repeats"] for row in rows.values()}, {2})
+        self.assertAlmostEqual(rows["slots"]["max"] * rows["one update"]["min"], 16 * 16, places=3)
+        self.assertTrue(0 < rows["active agents"]["value"] <= rows["slots"]["value"])
+        self.assertTrue(0 < rows["live share of slot-steps"]["value"] <= 100)
+        self.assertTrue(0 < rows["kept share of transitions"]["value"] <= 100)
+        parts = sum(row["mean"] for name, row in rows.items() if name.startswith("phase ") or name == "in no phase")
+        self.assertAlmostEqual(parts, rows["one update"]["mean"], places=6)
+        self.assertAlmostEqual(rows["collecting"]["mean"] + rows["improving"]["mean"], rows["one update"]["mean"], places=6)
+
+    def test_bench_train_begins_with_the_weights_of_a_checkpoint(self):
+        self.json_of("train", *TINY, "--set", "train.updates=1", "--out", self.folder / "run")
+        bench = ["bench", "train", "--updates", 1, *TINY]
+        facts = self.json_of(*bench, "--init-from", self.folder / "run" / "checkpoint.ckpt")
+        self.assertIn("weights of", facts["workload"])
+        self.assert_refused(1, "no.ckpt", *bench, "--init-from", self.folder / "no.ckpt")
+
+    def test_where_the_time_of_an_update_goes_is_measured_by_size_and_renderer(self):
+        if run("bench", "breakdown", "--help").returncode != 0:
+            self.skipTest("built without benchmarks")
+        small = ["--config", CONFIGS / "smoke.toml", "--device", "cpu", "--updates", 2, "--check", 2,
+                 "--set", "simulator.maps=[\"procedural:1\"]", "--set", "train.num_steps=8"]  # fmt: skip
+        facts = self.json_of("bench", "breakdown", *small, "--backend", "cpu,null", "--size", "16x9,32x18", "--agents", 4,
+                             "--host-steps")  # fmt: skip
+        self.assertIn("8 steps, 1 epochs, one minibatch, every slot drawn", facts["workload"])
+        self.assertEqual(facts["backend"], "simulator cpu, renderer cpu,null, learning on cpu")
+        rows = {row["name"]: row for row in facts["results"]}
+        for case in (f"{b} {s} 4 agents a world" for b in ("cpu", "null") for s in ("16x9", "32x18")):
+            columns = ("env", "rendering", "forward", "optimisation", "diagnosis", "other")
+            for column in (*columns, "total"):
+                self.assertEqual(rows[f"{case}, {column}"]["repeats"], 2)
+                self.assertGreater(rows[f"{case}, {column}"]["min"], 0)
+            parts = sum(rows[f"{case}, {column}"]["mean"] for column in columns)
+            self.assertAlmostEqual(parts, rows[f"{case}, total"]["mean"], places=6)
+            self.assertEqual(rows[f"{case}, chunk"]["value"], 2048)
+        # Black images are not the oracle's; the oracle is not compared with itself.
+        self.assertNotIn("cpu 16x9 4 agents a world, values unlike the oracle's", rows)
+        self.assertGreater(rows["simulator on the host, 4 agents a world, env"]["value"], 0)
+        table = run("bench", "breakdown", *small, "--backend", "null", "--size", "32x18", "--agents", 4).stdout
+        self.assertRegex(table, r"null 32x18 4 agents a world .* \|\s+0\.84\s+9\.17\n")
+        results, figure = self.folder / "results.json", self.folder / "breakdown.png"
+        results.write_text(json.dumps(facts))
+        run("bench", "breakdown", "--plot", results, "--figure", figure)
+        self.assertGreater(figure.stat().st_size, 5000)
+        results.write_text(json.dumps({"results": [{"name": "cpu 8x8 3 egos", "value": 1}]}))
+        self.assert_refused(1, "bench breakdown", "bench", "breakdown", "--plot", results, "--figure", figure)
+        self.assert_refused(1, "vulkan", "bench", "breakdown", *small, "--backend", "vulkan")
+        self.assert_refused(2, "'8'", "bench", "breakdown", *small, "--backend", "cpu", "--size", "9x5,8")
 
     def test_an_interrupt_leaves_a_checkpoint_to_go_on_from(self):
         out = self.folder / "run"

@@ -1,0 +1,333 @@
+// `pictura bench breakdown`: where the time of one update goes, by size and renderer, as the paper breaks it down
+// (section 4, figure and appendix "Training-Step Time Breakdown"), and its figure.
+#include <algorithm>
+#include <optional>
+#include <regex>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "pictura/backends/make_simulator.h"
+#include "pictura/bench/commands/bench.h"
+#include "pictura/bench/commands/measure_training.h"
+#include "pictura/bench/commands/plot_results.h"
+#include "pictura/bench/render.h"
+#include "pictura/bench/step_rate.h"
+#include "pictura/cli/report.h"
+#include "pictura/common/error.h"
+#include "pictura/map/load_map.h"
+#include "pictura/training/config.h"
+
+namespace pictura {
+
+namespace {
+
+constexpr int kNumWorlds = 2;
+
+struct Arguments {
+  TrainingCase measured{.config_path = "configs/paper.toml"};
+  std::vector<std::string> backends = {"cuda"}, samples = {"1"},
+                           sizes = {"32x18", "64x36", "96x54", "192x108", "384x216"};
+  // The paper's text has two readings: 256 agents in each world fill one minibatch of 65,536; 256 in all half of it.
+  std::vector<int> agents = {256, 128};
+  std::string device = "auto", simulator = "auto";
+  int chunk = 2048, checked_views = 8;
+  bool host_steps = false, json = false;
+  PlotArguments plot;
+};
+
+// Seconds of an update, on the paper's H100 NVL.
+struct PaperRow {
+  const char* size;
+  double env, rendering, forward, optimisation, other, total;
+};
+constexpr PaperRow kPaperRows[] = {{"32x18", 6.93, 0.84, 0.60, 0.53, 0.28, 9.17},
+                                   {"64x36", 6.90, 0.94, 0.75, 0.80, 0.27, 9.65},
+                                   {"96x54", 6.89, 1.06, 0.98, 1.15, 0.27, 10.35},
+                                   {"192x108", 6.93, 1.99, 2.68, 3.57, 0.28, 15.45},
+                                   {"384x216", 6.92, 3.88, 9.44, 14.08, 0.30, 34.61}};
+
+// The paper's columns. Its "policy forward" is every pass through the network, in the rollout and in learning; what
+// remains of learning is its "optimization": gradients and the optimizer's steps.
+struct Column {
+  const char* name;
+  double (*value)(const UpdateCost& cost);
+};
+constexpr Column kColumns[] = {
+    {"env", [](const UpdateCost& cost) { return phase_s(cost, Phase::simulate); }},
+    {"rendering", [](const UpdateCost& cost) { return phase_s(cost, Phase::render); }},
+    {"forward", [](const UpdateCost& cost) { return phase_s(cost, Phase::forward) + phase_s(cost, Phase::learn); }},
+    {"optimisation",
+     [](const UpdateCost& cost) { return phase_s(cost, Phase::backward) + phase_s(cost, Phase::optimize); }},
+    {"diagnosis", [](const UpdateCost& cost) { return phase_s(cost, Phase::diagnose); }},
+    {"other", other_s},
+    {"total", wall_s}};
+
+struct Case {
+  std::string backend, samples, size;
+  int agents = 0;
+  // gl with its samples, the others without.
+  std::string renderer() const { return backend.starts_with("gl") ? backend + " " + samples : backend; }
+  std::string name() const { return fmt::format("{} {} {} agents a world", renderer(), size, agents); }
+};
+
+// One update of everything in one minibatch: one epoch, no filter, every slot at every step.
+std::vector<std::string> recipe_of(const Arguments& arguments) {
+  std::vector<std::string> texts{"train.num_steps=128",
+                                 "train.update_epochs=1",
+                                 "train.minibatch_size=4294967296",
+                                 "train.adv_filter_threshold=0",
+                                 "train.halted_slots=draw",
+                                 "simulator.maps=[\"Town01\", \"Town02\"]",
+                                 "run.device=" + arguments.device,
+                                 "simulator.backend=" + arguments.simulator};
+  texts.insert(texts.end(), arguments.measured.overrides.begin(), arguments.measured.overrides.end());
+  return texts;
+}
+
+std::vector<std::string> overrides_of(const Arguments& arguments, const Case& c, int64_t chunk) {
+  const Pair pixels = parse_pair("--size", c.size, 8192);
+  std::vector<std::string> texts = recipe_of(arguments);
+  for (const std::string& text :
+       {fmt::format("simulator.num_slots={}", kNumWorlds * c.agents), fmt::format("simulator.min_agents={}", c.agents),
+        fmt::format("simulator.max_agents={}", c.agents), fmt::format("render.width_px={}", pixels.first),
+        fmt::format("render.height_px={}", pixels.second), fmt::format("render.backend=\"{}\"", c.backend),
+        fmt::format("render.samples=\"{}\"", c.backend.starts_with("gl") ? c.samples : "1"),
+        fmt::format("train.forward_chunk={}", chunk)}) {
+    texts.push_back(text);
+  }
+  return texts;
+}
+
+// All cases at once, so that errors in any arguments are reported before the first case is measured.
+std::vector<Case> cases_of(const Arguments& arguments) {
+  std::vector<Case> cases;
+  for (const std::string& backend : arguments.backends) {
+    for (const std::string& samples : arguments.samples) {
+      if (!backend.starts_with("gl") && samples != arguments.samples.front()) continue;
+      parse_samples("--samples", samples);
+      for (const int agents : arguments.agents) {
+        for (const std::string& size : arguments.sizes) {
+          cases.push_back({backend, samples, size, agents});
+          load_config(arguments.measured.config_path, overrides_of(arguments, cases.back(), arguments.chunk));
+        }
+      }
+    }
+  }
+  return cases;
+}
+
+// Compares images of this renderer and size with the oracle's, see measure_render().
+ImageError check_images(const Arguments& arguments, const Config& config, const DrivenWorlds& worlds) {
+  RenderCase checked{.backend = config.render.backend,
+                     .num_views = static_cast<int>(worlds.views.size()),
+                     .checked_views = arguments.checked_views,
+                     .repeats = 0};
+  checked.num_views = std::min(checked.num_views, arguments.checked_views);
+  checked.config = renderer_config(config, rig_of(config));
+  const bool is_on_device = (checked.backend == "cuda" || checked.backend == "gl:egl") && config.run.device != "cpu" &&
+                            !cuda_device_name().empty();
+  if (is_on_device) checked.config.device = {MemorySpace::cuda, 0};
+  return measure_render(worlds, checked).error;
+}
+
+// With the largest chunk that fits into the device's memory: this one, or a half, a quarter, ... of it.
+TrainingMeasurement measure_with_largest_chunk(const Arguments& arguments, const Case& c, int64_t* chunk_out) {
+  for (int64_t chunk = arguments.chunk;; chunk /= 2) {
+    TrainingCase measured = arguments.measured;
+    measured.overrides = overrides_of(arguments, c, chunk);
+    *chunk_out = chunk;
+    try {
+      return measure_training(measured);
+    } catch (const OutOfMemory&) {
+      if (chunk == 1) throw;
+    }
+  }
+}
+
+// The steps of an update by the simulator on the host, on their own: random actions, no copies to a device.
+BenchResult measure_host_steps(const Arguments& arguments, const Case& c) {
+  const Config config = load_config(arguments.measured.config_path, overrides_of(arguments, c, arguments.chunk));
+  std::vector<std::shared_ptr<const RoadMap>> maps;
+  for (const std::string& map : config.simulator.maps) maps.push_back(load_map(map));
+  const auto simulator = make_simulator(
+      "cpu", simulator_config(config), maps,
+      draw_worlds(config.run.seed, kNumWorlds * c.agents, c.agents, c.agents, static_cast<int>(maps.size())));
+  StepBench bench(simulator.get(), config.run.seed);
+  bench.run(config.train.num_steps);
+  BenchResult result{fmt::format("simulator on the host, {} agents a world, env", c.agents), "s", {}};
+  for (int i = 0; i < arguments.measured.updates; ++i) {
+    result.values.push_back(bench.run(config.train.num_steps).elapsed_s);
+  }
+  return result;
+}
+
+void print_table_head() {
+  fmt::print("Seconds, medians; the paper's, on an H100 NVL, after |.\n{:36}", "");
+  for (const Column& column : kColumns) fmt::print(" {:>12}", column.name);
+  fmt::print("  {:^20} {:>7} | {:>9} {:>7}\n", "(min to max)", "chunk", "rendering", "total");
+}
+
+void print_table_row(const Case& c, const std::vector<BenchResult>& columns, int64_t chunk) {
+  fmt::print("{:36}", c.name());
+  for (const BenchResult& column : columns) fmt::print(" {:>12.4g}", summary_of(column)["value"].get<double>());
+  const Json total = summary_of(columns.back());
+  fmt::print("  {:^20} {:>7}",
+             fmt::format("({:.4g} to {:.4g})", total["min"].get<double>(), total["max"].get<double>()), chunk);
+  for (const PaperRow& row : kPaperRows) {
+    if (c.size == row.size) fmt::print(" | {:>9} {:>7}", row.rendering, row.total);
+  }
+  fmt::print("\n");
+}
+
+/// Plots seconds by size from earlier results, beside the paper's.
+void draw_breakdown(const PlotArguments& plot) {
+  const std::regex measured(R"((.+) (\d+)x\d+ (\d+) agents a world, (\w+))");
+  const char *width = "width in pixels, 16:9", *seconds = "seconds of an update";
+  PlotPanel total = sweep_panel("Whole update", width, seconds), rendering = sweep_panel("Rendering", width, seconds),
+            parts = sweep_panel("", width, seconds);
+  for (const PlottedResult& result : read_results(plot.results)) {
+    std::smatch match;
+    if (!std::regex_match(result.name, match, measured)) continue;
+    const double width_px = std::stod(match[2]);
+    const std::string series = fmt::format("{}, {} agents a world", match[1].str(), match[3].str());
+    if (match[4] == "total") add_point(&total, series, width_px, result.value);
+    if (match[4] == "rendering") add_point(&rendering, series, width_px, result.value);
+    // The parts of the first case.
+    if (parts.title.empty()) parts.title = series;
+    const bool is_column = std::any_of(std::begin(kColumns), std::end(kColumns),
+                                       [&](const Column& column) { return match[4] == column.name; });
+    if (parts.title == series && is_column) add_point(&parts, match[4], width_px, result.value);
+  }
+  for (const PaperRow& row : kPaperRows) {
+    const double width_px = parse_pair("size", row.size, 8192).first;
+    add_point(&total, "the paper, H100 NVL", width_px, row.total);
+    add_point(&rendering, "the paper, H100 NVL", width_px, row.rendering);
+  }
+  PICTURA_CHECK(!parts.title.empty(), "--plot: expected results of bench breakdown");
+  draw_plots_png({total, rendering, parts}, plot.figure, {.columns = 3, .title = "Where the time of an update goes"});
+}
+
+void run(const Arguments& arguments) {
+  if (wants_plot(arguments.plot)) return draw_breakdown(arguments.plot);
+  const std::vector<Case> cases = cases_of(arguments);
+  const Config first =
+      load_config(arguments.measured.config_path, overrides_of(arguments, cases.front(), arguments.chunk));
+  std::vector<std::string> maps = first.simulator.maps;
+  maps.resize(std::min<std::size_t>(maps.size(), kNumWorlds));
+  ProgressLine progress;
+  progress.update("driving");
+  std::optional<DrivenWorlds> worlds;
+  if (arguments.checked_views > 0) worlds = drive_worlds({.maps = maps, .agents = 60, .seed = first.run.seed});
+
+  BenchContext context;
+  std::vector<BenchResult> results;
+  const std::string workload = fmt::format(
+      "breakdown: {}, {} worlds on {}, {} steps, {} epochs, one minibatch, every slot drawn and encoded at every step, "
+      "after a warm-up of {}{}",
+      arguments.measured.config_path, kNumWorlds, fmt::join(maps, " "), first.train.num_steps,
+      first.train.update_epochs, arguments.measured.warm_up,
+      arguments.measured.overrides.empty() ? ""
+                                           : fmt::format("; --set {}", fmt::join(arguments.measured.overrides, " ")));
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    const Case& c = cases[i];
+    progress.update(c.name(), static_cast<double>(i) / static_cast<double>(cases.size()));
+    ImageError error;
+    if (worlds) {
+      const Config config = load_config(arguments.measured.config_path, overrides_of(arguments, c, arguments.chunk));
+      error = check_images(arguments, config, *worlds);
+    }
+    int64_t chunk = 0;
+    const TrainingMeasurement measurement = measure_with_largest_chunk(arguments, c, &chunk);
+    if (i == 0) {
+      TrainReport report = measurement.report;
+      report.renderer = fmt::format("{}", fmt::join(arguments.backends, ","));
+      context = training_context(workload, report);
+    }
+    std::vector<BenchResult> columns;
+    for (const Column& column : kColumns) {
+      columns.push_back(result_of(measurement, fmt::format("{}, {}", c.name(), column.name), "s", column.value));
+    }
+    if (!arguments.json) {
+      progress.finish();
+      if (i == 0) print_heading(context), print_table_head();
+      print_table_row(c, columns, chunk);
+    }
+    results.insert(results.end(), columns.begin(), columns.end());
+    results.push_back({c.name() + ", chunk", "transitions", {static_cast<double>(chunk)}});
+    if (measurement.report.device_bytes > 0) {
+      results.push_back(
+          {c.name() + ", device memory in use", "GB", {static_cast<double>(measurement.report.device_bytes) / 1e9}});
+    }
+    if (error.values > 0) {
+      const double share = static_cast<double>(error.differing) / static_cast<double>(error.values);
+      results.push_back({c.name() + ", values unlike the oracle's", "%", {100 * share}});
+    }
+  }
+  if (arguments.host_steps) {
+    for (const int agents : arguments.agents) {
+      Case c = cases.front();
+      c.agents = agents;
+      results.push_back(measure_host_steps(arguments, c));
+      const Json row = summary_of(results.back());
+      if (!arguments.json) {
+        fmt::print("{:36} {:>12.4g}  ({:.4g} to {:.4g})\n", results.back().name, row["value"].get<double>(),
+                   row["min"].get<double>(), row["max"].get<double>());
+      }
+    }
+  }
+  progress.finish();
+  if (arguments.json) report_benchmark(true, context, results);
+}
+
+}  // namespace
+
+void add_breakdown_benchmark(CLI::App& bench) {
+  auto arguments = std::make_shared<Arguments>();
+  TrainingCase& measured = arguments->measured;
+  CLI::App* command = bench.add_subcommand(
+      "breakdown", "Where the time of an update goes, by size and renderer, beside the paper's table");
+  command->add_option("--config", measured.config_path, "TOML file")->capture_default_str();
+  command->add_option("--set", measured.overrides, "Override a key, as simulator.maps=[\"Town02\"]; may be given often")
+      ->allow_extra_args(false);
+  command->add_option("--backend", arguments->backends, "Renderers: cpu, cuda, gl:egl, gl:osmesa, null")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->add_option("--samples", arguments->samples, "Samples of a pixel, for gl: 1, N (MSAA) or NxN (supersampling)")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->add_option("--size", arguments->sizes, "Sizes in pixels, WxH; default: the paper's five")->delimiter(',');
+  command->add_option("--agents", arguments->agents, "Of each of the two worlds; default: both readings of the paper")
+      ->delimiter(',')
+      ->check(CLI::Range(1, kMaxAgentsPerWorld))
+      ->capture_default_str();
+  command
+      ->add_option("--chunk", arguments->chunk, "Transitions through the network at once, or less where memory lacks")
+      ->check(CLI::Range(1, 1 << 30))
+      ->capture_default_str();
+  command->add_option("--device", arguments->device, "What learns: cpu, cuda, cuda:N, auto")->capture_default_str();
+  command->add_option("--simulator", arguments->simulator, "cpu, cuda, auto")->capture_default_str();
+  command->add_flag("--host-steps", arguments->host_steps,
+                    "Also time the steps of an update by the simulator on the host, on their own");
+  command->add_option("--warm-up", measured.warm_up, "Updates before those that are measured, in each case")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_option("--updates", measured.updates, "Updates that are measured")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command
+      ->add_option("--check", arguments->checked_views,
+                   "Number of egos whose images are compared with the oracle's before each case")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--plot", arguments->plot.results, "Plot these results instead of measuring")->delimiter(',');
+  command->add_option("--figure", arguments->plot.figure, "PNG file for --plot");
+  command->add_flag("--json", arguments->json, "Print one JSON object");
+  command->footer(
+      "Examples:\n  pictura bench breakdown --host-steps --json\n"
+      "  pictura bench breakdown --backend gl:egl --samples 1,2x2 --size 96x54 --agents 256 --updates 1\n"
+      "  pictura bench breakdown --plot RESULTS.json --figure breakdown.png");
+  command->callback([arguments] { run(*arguments); });
+}
+
+}  // namespace pictura

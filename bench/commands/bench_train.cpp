@@ -1,0 +1,84 @@
+// `pictura bench train`: whole updates of a configuration: rates, shares, seconds by phase, device memory.
+#include <fmt/format.h>
+
+#include "pictura/bench/commands/bench.h"
+#include "pictura/bench/commands/measure_training.h"
+#include "pictura/cli/backend_options.h"
+
+namespace pictura {
+
+namespace {
+
+struct Arguments {
+  TrainingCase measured{.config_path = "configs/smoke.toml"};
+  BackendOptions backends;
+  bool json = false;
+};
+
+void run(Arguments arguments) {
+  TrainingCase& measured = arguments.measured;
+  for (const std::string& text : overrides_of(arguments.backends)) measured.overrides.push_back(text);
+  const TrainingMeasurement measurement = measure_training(measured);
+
+  const auto row = [&measurement](const std::string& name, const std::string& unit, auto value) {
+    return result_of(measurement, "train, " + name, unit, value);
+  };
+  std::vector<BenchResult> results{
+      row("active agents", "agent_steps_per_s",
+          [](const UpdateCost& cost) { return static_cast<double>(cost.agent_steps) / wall_s(cost); }),
+      row("slots", "slot_steps_per_s",
+          [](const UpdateCost& cost) { return static_cast<double>(cost.slot_steps) / wall_s(cost); }),
+      row("live share of slot-steps", "%",
+          [](const UpdateCost& cost) {
+            return 100 * static_cast<double>(cost.agent_steps) / static_cast<double>(cost.slot_steps);
+          }),
+      row("kept share of transitions", "%", [](const UpdateCost& cost) { return 100 * cost.kept_fraction; }),
+      row("minibatches", "1", [](const UpdateCost& cost) { return static_cast<double>(cost.minibatches); }),
+      row("one update", "s", wall_s),
+      row("collecting", "s", [](const UpdateCost& cost) { return cost.rollout_s; }),
+      row("improving", "s", [](const UpdateCost& cost) { return cost.update_s; })};
+  for (std::size_t i = 0; i < kNumPhases; ++i) {
+    results.push_back(
+        row(std::string("phase ") + kPhaseNames[i], "s", [i](const UpdateCost& cost) { return cost.phases_s[i]; }));
+  }
+  results.push_back(row("in no phase", "s", other_s));
+  if (measurement.report.device_bytes > 0) {
+    results.push_back(
+        {"train, device memory in use", "GB", {static_cast<double>(measurement.report.device_bytes) / 1e9}});
+    results.push_back(
+        {"train, peak of tensors", "GB", {static_cast<double>(measurement.report.peak_tensor_bytes) / 1e9}});
+  }
+  std::string workload = fmt::format("train: {}", measured.config_path);
+  for (const std::string& text : measured.overrides) workload += " --set " + text;
+  if (!measured.init_from.empty()) workload += ", weights of " + measured.init_from;
+  workload += fmt::format("; whole updates after a warm-up of {}", measured.warm_up);
+  report_benchmark(arguments.json, training_context(workload, measurement.report), results);
+}
+
+}  // namespace
+
+void add_train_benchmark(CLI::App& bench) {
+  auto arguments = std::make_shared<Arguments>();
+  TrainingCase& measured = arguments->measured;
+  CLI::App* command = bench.add_subcommand("train", "Whole updates of a configuration");
+  command->add_option("--config", measured.config_path, "TOML file")->capture_default_str();
+  command
+      ->add_option("--set", measured.overrides, "Override a key, as simulator.num_slots=4096; may be given many times")
+      ->allow_extra_args(false);
+  add_policy_backend_options(command, "as the configuration says", &arguments->backends);
+  command->add_option("--init-from", measured.init_from, "Begin with the weights of this checkpoint");
+  command->add_option("--warm-up", measured.warm_up, "Updates before those that are measured")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_option("--updates", measured.updates, "Updates that are measured, whatever train.updates says")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_flag("--json", arguments->json, "Print one JSON object");
+  command->footer(
+      "Examples:\n  pictura bench train --updates 5\n"
+      "  pictura bench train --config configs/paper.toml --set train.forward_chunk=8192 --init-from policy.ckpt "
+      "--json");
+  command->callback([arguments] { run(*arguments); });
+}
+
+}  // namespace pictura
