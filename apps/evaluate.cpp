@@ -54,6 +54,7 @@ void add_evaluate_command(CLI::App& app) {
     EvaluateOptions evaluate;
     BackendOptions backends;
     std::vector<std::string> densities{"light", "medium", "dense"};
+    std::string size;
     bool sampled = false, json = false;
   };
   auto arguments = std::make_shared<Arguments>();
@@ -76,6 +77,10 @@ void add_evaluate_command(CLI::App& app) {
   command->add_flag("--sampled", arguments->sampled, "Draw actions from the policy instead of taking the most likely");
   command->add_option("--seed", options.seed, "Scenarios are drawn from it")->capture_default_str();
   add_policy_backend_options(command, "auto, and drawn as in training", &arguments->backends);
+  CLI::Option* const rig = command->add_option(
+      "--rig", options.rig, "A rig file with as many cameras as in training, instead of those of training");
+  command->add_option("--size", arguments->size, "Pixels of an image, WxH, of the paper's rig; default: as in training")
+      ->excludes(rig);
   command->add_option("--threads", options.num_threads, "Host threads; 0: all")->capture_default_str();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
@@ -88,6 +93,11 @@ void add_evaluate_command(CLI::App& app) {
     if (!backends.device.empty()) evaluation.device = backends.device;
     if (!backends.simulator.empty()) evaluation.simulator = backends.simulator;
     evaluation.renderer = backends.renderer;
+    if (!arguments->size.empty()) {
+      const Pair pixels = parse_pair("--size", arguments->size, 8192);
+      evaluation.width_px = pixels.first;
+      evaluation.height_px = pixels.second;
+    }
     evaluation.samples = backends.samples;
     evaluation.densities.clear();
     for (const std::string& name : arguments->densities) evaluation.densities.push_back(kDensities.at(name));

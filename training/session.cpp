@@ -38,13 +38,35 @@ Config adapted(Config config, const SessionOptions& options) {
   return config;
 }
 
+// The cameras that the options ask for, else those of training. No weight depends on sizes or poses.
+Rig chosen_rig(const Checkpoint& checkpoint, const SessionOptions& options) {
+  const bool is_resized = options.width_px != 0 || options.height_px != 0;
+  if (options.rig.empty() && !is_resized) return checkpoint.rig;
+  if (!checkpoint.config.reads_images()) fail_usage("{}: its policy reads no images: no rig or size", checkpoint.path);
+  if (is_resized) {
+    if (!options.rig.empty()) fail_usage("rig: has sizes of its own: expected a rig or a size, got both");
+    if (!checkpoint.config.render.rig.empty()) {
+      fail_usage("{}: trained with the cameras of {}: expected a rig file with other sizes instead of a size",
+                 checkpoint.path, checkpoint.config.render.rig);
+    }
+    return paper_rig(options.width_px, options.height_px);
+  }
+  Rig rig = load_rig(options.rig);
+  const size_t expected = checkpoint.rig.cameras.size();
+  if (rig.cameras.size() != expected) {
+    fail_usage("{}: expected {} cameras, as the policy was trained with, got {}", options.rig, expected,
+               rig.cameras.size());
+  }
+  return rig;
+}
+
 }  // namespace
 
 struct PolicySession::Parts {
   Parts(const Checkpoint& checkpoint, const SessionOptions& options)
       : config(adapted(checkpoint.config, options)),
         device(open_learning_device(config)),
-        rig(checkpoint.rig),
+        rig(chosen_rig(checkpoint, options)),
         executor(make_learner_executor(device)),
         policy(make_policy(config, rig, device)) {
     restore_tensors(checkpoint, checkpoint.parameters, policy.parameters());

@@ -16,6 +16,9 @@ struct SessionOptions {
   std::string device = "auto";    // as run.device of a configuration
   std::string simulator = "cpu";  // as simulator.backend: of the simulators that it drives in
   std::string renderer, samples;  // as render.backend and render.samples; empty: as the policy was trained
+  // Cameras other than those of training, as many: a rig file, or the paper's at another size (0: as trained).
+  std::string rig;
+  int width_px = 0, height_px = 0;
 };
 
 /// What a batch of agents sees, in the memory of the session's device.
@@ -30,7 +33,7 @@ struct PolicyInput {
 class PolicySession {
  public:
   /// Throws Error naming the file when it is no checkpoint, truncated, of another observation schema or architecture,
-  /// or when it cannot run on this device.
+  /// or when it cannot run on this device. UsageError where it cannot see through the cameras of the options.
   explicit PolicySession(const std::string& checkpoint_path, const SessionOptions& options = {});
   ~PolicySession();
   PolicySession(const PolicySession&) = delete;

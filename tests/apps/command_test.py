@@ -521,6 +521,8 @@ class Training(CommandCase):
         self.assert_refused(1, "render.width_px", "train", *TINY, "--set", "render.width_px=0", *out)
         self.assert_refused(1, "/proc/nowhere", "train", *TINY, "--out", "/proc/nowhere")
         self.assert_refused(1, "no/such.toml", "train", "--config", "no/such.toml", *out)
+        self.assert_refused(2, "'8'", "evaluate", "no.ckpt", "--size", "8")
+        self.assert_refused(2, "excludes", "evaluate", "no.ckpt", "--size", "8x8", "--rig", "rig.toml")
 
     def test_broken_and_foreign_checkpoints_are_refused(self):
         out = self.folder / "run"

@@ -781,5 +781,37 @@ TEST_F(Training, PerspectivePolicyIsEvaluatedFromItsImages) {
   EXPECT_GT(rows[0].km_driven, 0);
 }
 
+TEST_F(Training, APolicyIsEvaluatedThroughOtherCameras) {
+  const TrainReport report = train(options("run", {"train.updates=1"}));
+  const PolicySession larger(report.checkpoint, {.device = "cpu", .width_px = 40, .height_px = 20});
+  EXPECT_EQ(first_difference(larger.rig(), paper_rig(40, 20)), "");
+  EXPECT_NE(first_difference(PolicySession(report.checkpoint, {.device = "cpu"}).rig(), paper_rig(40, 20)), "");
+  EvaluateOptions o = one_scenario(report.checkpoint, 3);
+  o.agents_per_world = 4;
+  o.width_px = 40;
+  o.height_px = 20;
+  EXPECT_GT(evaluate(o).rows.at(0).vehicle_episodes, 0);
+  // As many cameras as in training, of any kind.
+  const auto write_rig = [&](int cameras) {
+    std::string text;
+    for (int i = 0; i < cameras; ++i) {
+      text +=
+          fmt::format("[[camera]]\nname = \"c{}\"\nwidth_px = {}\nheight_px = 9\nfocal_px = 8\nx_m = 1\n", i, 16 + i);
+    }
+    write_file(folder_ / "rig.toml", text);
+  };
+  o.rig = folder_ / "rig.toml";
+  write_rig(4);
+  EXPECT_THAT(message_of([&] { evaluate(o); }), HasSubstr("a rig or a size, got both"));
+  o.width_px = o.height_px = 0;
+  EXPECT_GT(evaluate(o).rows.at(0).vehicle_episodes, 0);
+  write_rig(3);
+  EXPECT_THAT(message_of([&] { evaluate(o); }),
+              AllOf(HasSubstr("rig.toml"), HasSubstr("expected 4 cameras"), HasSubstr("got 3")));
+  const TrainReport vector = train(options("vector", {"train.updates=1", "policy.modality=vector"}));
+  o.checkpoint = vector.checkpoint;
+  EXPECT_THAT(message_of([&] { evaluate(o); }), HasSubstr("reads no images"));
+}
+
 }  // namespace
 }  // namespace pictura

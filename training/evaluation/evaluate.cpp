@@ -110,7 +110,10 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
                                              .device = options.device,
                                              .simulator = options.simulator,
                                              .renderer = options.renderer,
-                                             .samples = options.samples});
+                                             .samples = options.samples,
+                                             .rig = options.rig,
+                                             .width_px = options.width_px,
+                                             .height_px = options.height_px});
   SimulatorConfig simulator_config = session.evaluation_world(options.steps);
   simulator_config.seed = options.seed;
   std::vector<std::shared_ptr<const RoadMap>> roads;

@@ -26,6 +26,9 @@ struct EvaluateOptions {
   std::string device = "auto", simulator = "auto";  // as run.device and simulator.backend of a configuration
   // As render.backend and render.samples; empty: as the policy was trained.
   std::string renderer, samples;
+  // Cameras other than those of training, see SessionOptions.
+  std::string rig;
+  int width_px = 0, height_px = 0;
   std::function<void(double done_fraction, double eta_s)> on_progress;
 };
 
