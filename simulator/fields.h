@@ -75,6 +75,7 @@ constexpr int kNumWaypoints = 3;
   X(goals_reached, int32_t, 1, 0, "last waypoints passed within 2 m in this episode")                            \
   X(waypoints_reached, int32_t, 1, 0, "waypoints of any kind that paid or passed in this episode")               \
   X(distance_m, float, 1, 0, "sum of |speed| dt in this episode")                                                \
+  X(first_motion_step, int32_t, 1, 0, "first step of this episode above kRest_mps, from 1; 0: none yet")         \
   X(episode_events, uint8_t, 1, 0, "union of the episode's event bits")                                          \
   X(episode_return, float, 1, 0, "sum of rewards in this episode")
 

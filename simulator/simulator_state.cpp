@@ -17,7 +17,7 @@ namespace {
 
 struct SavedHeader {
   std::array<char, 8> magic{'P', 'I', 'C', 'S', 'T', 'A', 'T', 'E'};
-  uint32_t version = 3;
+  uint32_t version = 4;
   uint32_t byte_order = 0x01020304;
   uint64_t num_fingerprints = 0;  // that follow: what saver and restorer must have in common
 };
@@ -97,6 +97,8 @@ void check_restored(const SimulatorSetup& setup, const SimulatorState& state) {
       expect(agents.next_waypoint[slot] >= 0 && agents.next_waypoint[slot] < kNumWaypoints, slot, "next_waypoint",
              agents.next_waypoint[slot]);
       expect(agents.goal_chains[slot] >= 0, slot, "goal_chains", agents.goal_chains[slot]);
+      expect(agents.first_motion_step[slot] >= 0 && agents.first_motion_step[slot] <= setup.config.episode_steps, slot,
+             "first_motion_step", agents.first_motion_step[slot]);
       expect(std::fabs(agents.x_m[slot]) <= kMaxCoordinate_m, slot, "x_m", agents.x_m[slot]);
       expect(std::fabs(agents.y_m[slot]) <= kMaxCoordinate_m, slot, "y_m", agents.y_m[slot]);
     }

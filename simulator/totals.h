@@ -3,10 +3,13 @@
 #pragma once
 
 #include "pictura/common/portable/hd.h"
+#include "pictura/simulator/reward_terms.h"
 
 namespace pictura {
 
 constexpr int kTotalsBins = 32;
+
+constexpr float kRest_mps = 0.3f;  // agents up to this speed are at rest
 
 /// Totals since construction; counts are of controlled agents.
 struct SimulatorTotals {
@@ -17,8 +20,12 @@ struct SimulatorTotals {
   int64_t collisions = 0, at_fault_collisions = 0, off_road = 0, red_light = 0, wall_contacts = 0;
   double distance_m = 0;
   double reward = 0;
-  int64_t finished_agent_episodes = 0;  // agents whose episode ended
-  double finished_return = 0;           // sum of their returns
+  RewardTermsOf<double> reward_terms;    // of which `reward` is made, but for rounding
+  int64_t finished_agent_episodes = 0;   // agents whose episode ended
+  double finished_return = 0;            // sum of their returns
+  int64_t finished_passed_waypoint = 0;  // of these agents, those that passed a waypoint
+  int64_t finished_moved = 0;            // ... and those that were faster than kRest_mps in some step
+  double finished_first_motion_s = 0;    // sum over the latter of the time from their start to the end of that step
 
   /// Calls visit(member of a, member of b) for all counts, and for all sums of floating-point numbers.
   template <typename Other, typename Visit>
@@ -34,12 +41,18 @@ struct SimulatorTotals {
     visit(a.red_light, b.red_light);
     visit(a.wall_contacts, b.wall_contacts);
     visit(a.finished_agent_episodes, b.finished_agent_episodes);
+    visit(a.finished_passed_waypoint, b.finished_passed_waypoint);
+    visit(a.finished_moved, b.finished_moved);
   }
   template <typename Other, typename Visit>
   PICTURA_HD static void visit_sums(SimulatorTotals& a, Other& b, Visit&& visit) {
     visit(a.distance_m, b.distance_m);
     visit(a.reward, b.reward);
+#define X(name) visit(a.reward_terms.name, b.reward_terms.name);
+    PICTURA_REWARD_TERMS(X)
+#undef X
     visit(a.finished_return, b.finished_return);
+    visit(a.finished_first_motion_s, b.finished_first_motion_s);
   }
 
   PICTURA_HD void add(const SimulatorTotals& part) {

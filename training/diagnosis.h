@@ -9,8 +9,6 @@
 
 namespace pictura {
 
-constexpr double kRest_mps = 0.3;  // agents slower than this are at rest
-
 /// Of the valid transitions of some agents.
 struct AgentGroup {
   double kept_share = 0;      // that the advantage filter keeps

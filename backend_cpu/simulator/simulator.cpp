@@ -252,8 +252,8 @@ class SimulatorCpu final : public Simulator {
     const auto bin_of = [&bins](int agent) { return &bins[static_cast<size_t>(agent % kTotalsBins)]; };
     int active = 0;
     for (int agent = 0; agent < world.num_agents; ++agent) {
-      const float step_m = apply_reward_and_halt(world, agent, results);
-      count_agent(world, agent, results, step_m, bin_of(agent));
+      const StepSums sums = apply_reward_and_halt(world, agent, steps, results);
+      count_agent(world, agent, results, sums, bin_of(agent));
       active += is_active(world, agent);
     }
     for (int light = 0; light < static_cast<int>(world.map.stop_lines.size()); ++light) {

@@ -231,7 +231,7 @@ struct DeviceScratch {
   DeviceBuffer<AgentBox> try_boxes;
   DeviceBuffer<uint32_t> free_tries;
   DeviceBuffer<int32_t> known_tries, chosen_try, next_try;
-  DeviceBuffer<float> step_m;
+  DeviceBuffer<StepSums> step_sums;
   DeviceBuffer<uint8_t> began, prepares;
   DeviceBuffer<int32_t> rejected_slot;
   // The part of the state that an episode begins with, for the next one.
@@ -255,7 +255,7 @@ struct DeviceScratch {
         known_tries(num_boxes),
         chosen_try(num_boxes),
         next_try(num_boxes),
-        step_m(num_slots),
+        step_sums(num_slots),
         began(num_worlds),
         prepares(num_worlds),
         rejected_slot(1),

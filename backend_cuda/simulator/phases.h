@@ -52,7 +52,7 @@ struct SimulatorArrays {
   ObservationView observations;
   uint8_t entity_sets = 0;
   // Between phases and steps.
-  float* step_m = nullptr;           // [num_slots] driven in the present step
+  StepSums* step_sums = nullptr;     // [num_slots] of the present step
   uint8_t* began = nullptr;          // [num_worlds] an episode began in the last step: the one after it is to be made
   uint8_t* prepares = nullptr;       // [num_worlds] it is made in the present step
   int32_t* next_spawned = nullptr;   // [num_worlds] in the next episode
@@ -288,7 +288,8 @@ struct ApplyRewardAndHalt {
     const WorldView world = arrays.world(w);
     const int agent = slot - world.first_slot;
     find_collisions(world, agent, group);
-    if (group.rank() == 0) arrays.step_m[slot] = apply_reward_and_halt(world, agent, arrays.results);
+    if (group.rank() > 0) return;
+    arrays.step_sums[slot] = apply_reward_and_halt(world, agent, arrays.episode_step[w] + 1, arrays.results);
   }
 };
 
@@ -362,7 +363,7 @@ struct FinishStep {
     };
     int active = 0;
     for_each_agent([&](int agent, SimulatorTotals* part) {
-      count_agent(world, agent, arrays.results, arrays.step_m[world.first_slot + agent], part);
+      count_agent(world, agent, arrays.results, arrays.step_sums[world.first_slot + agent], part);
       active += is_active(world, agent);
     });
     const bool ends = episode_ends(world.options, steps, arrays.spawned[w], group.sum(active));

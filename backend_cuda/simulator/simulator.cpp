@@ -305,7 +305,7 @@ class SimulatorCuda final : public Simulator {
     arrays.views = results_.views.data();
     arrays.observations = observations();
     arrays.entity_sets = config().vector_observations;
-    arrays.step_m = scratch_.step_m.data();
+    arrays.step_sums = scratch_.step_sums.data();
     arrays.began = scratch_.began.data();
     arrays.prepares = scratch_.prepares.data();
     arrays.next_spawned = scratch_.next_spawned.data();

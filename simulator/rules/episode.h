@@ -62,23 +62,36 @@ PICTURA_HD inline void count_events(int events, SimulatorTotals* totals_inout) {
   totals_inout->wall_contacts += (events & kEventWall) != 0;
 }
 
-/// Phase 3 of one agent, whose reward and end it writes. Returns how far it drove in the step, in metres.
-PICTURA_HD inline float apply_reward_and_halt(const WorldView& world, int agent, const StepArrays& results) {
+/// What totals sum of an agent's step; as words of 16 bytes, which devices move whole.
+struct alignas(16) StepSums {
+  float distance_m = 0;
+  RewardTerms reward_terms;
+};
+
+/// Phase 3 of one agent in the episode's step of this number, from 1: writes its reward and its end.
+PICTURA_HD inline StepSums apply_reward_and_halt(const WorldView& world, int agent, int step,
+                                                 const StepArrays& results) {
   const int slot = world.first_slot + agent;
-  const float step_m = driven_m(world.agents.speed_mps[slot], world.options.dt_s);
-  results.reward[slot] = apply_reward_and_halt(world, agent);
+  const float speed_mps = world.agents.speed_mps[slot];
+  int32_t& first_motion_step = world.agents.first_motion_step[slot];
+  if (results.valid[slot] && first_motion_step == 0 && fabsf(speed_mps) > kRest_mps) first_motion_step = step;
+  const StepSums sums{driven_m(speed_mps, world.options.dt_s), apply_reward_and_halt(world, agent)};
+  results.reward[slot] = sums.reward_terms.total();
   results.terminated[slot] = results.valid[slot] && !is_active(world, agent);
-  return step_m;
+  return sums;
 }
 
-/// Counts the step of an agent after phase 3, in which it drove step_m.
-PICTURA_HD inline void count_agent(const WorldView& world, int agent, const StepArrays& results, float step_m,
+/// Counts the step of an agent after phase 3.
+PICTURA_HD inline void count_agent(const WorldView& world, int agent, const StepArrays& results, const StepSums& sums,
                                    SimulatorTotals* totals_inout) {
   const int slot = world.first_slot + agent;
   if (!results.valid[slot]) return;
   ++totals_inout->agent_steps;
   totals_inout->reward += static_cast<double>(results.reward[slot]);
-  totals_inout->distance_m += static_cast<double>(step_m);
+#define X(name) totals_inout->reward_terms.name += static_cast<double>(sums.reward_terms.name);
+  PICTURA_REWARD_TERMS(X)
+#undef X
+  totals_inout->distance_m += static_cast<double>(sums.distance_m);
   count_events(world.agents.events[slot], totals_inout);
 }
 
@@ -99,6 +112,10 @@ PICTURA_HD inline void finish_agent(const WorldView& world, int agent, bool ends
   if (!results.terminated[slot] && !results.truncated[slot]) return;
   ++totals_inout->finished_agent_episodes;
   totals_inout->finished_return += static_cast<double>(world.agents.episode_return[slot]);
+  totals_inout->finished_passed_waypoint += world.agents.waypoints_reached[slot] > 0;
+  const int first_motion_step = world.agents.first_motion_step[slot];
+  totals_inout->finished_moved += first_motion_step > 0;
+  totals_inout->finished_first_motion_s += first_motion_step * static_cast<double>(world.options.dt_s);
 }
 
 }  // namespace pictura

@@ -1,8 +1,9 @@
-// The eleven reward terms (paper, appendix, equation of the reward terms).
+// What the eleven reward terms pay (paper, appendix, equation of the reward terms).
 #pragma once
 
 #include "pictura/common/math.h"
 #include "pictura/simulator/conditioning.h"
+#include "pictura/simulator/reward_terms.h"
 #include "pictura/simulator/rules/dynamics.h"
 #include "pictura/simulator/rules/road.h"
 
@@ -17,15 +18,7 @@ struct StepFacts {
   bool collision = false, off_road = false, red_light = false;  // off_road includes contact with a wall
 };
 
-struct RewardTerms {
-  float goal = 0, collision = 0, off_road = 0, stop_line = 0, comfort = 0, lane_align = 0, lane_center = 0,
-        velocity = 0, overspeed = 0, reverse = 0, timestep = 0;
-
-  PICTURA_HD float total() const {
-    return goal + collision + off_road + stop_line + comfort + lane_align + lane_center + velocity + overspeed +
-           reverse + timestep;
-  }
-};
+using RewardTerms = RewardTermsOf<float>;
 
 /// coefficients: the agent's conditioning, in the order of Conditioning.
 PICTURA_HD inline RewardTerms reward_terms(const StepFacts& facts, const float* coefficients, float dt_s) {

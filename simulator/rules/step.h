@@ -200,10 +200,10 @@ PICTURA_HD void find_collisions(const WorldView& world, int agent, const ThreadG
   events = static_cast<uint8_t>(events | kEventCollision | (is_at_fault ? kEventAtFault : kEventNone));
 }
 
-/// Phase 3: the reward of an active agent, and its halt after an infraction. Returns the reward. Nothing that it writes
-/// is read by another agent's phase 2.
-PICTURA_HD inline float apply_reward_and_halt(const WorldView& world, int agent) {
-  if (!is_active(world, agent)) return 0.0f;
+/// Phase 3: the reward of an active agent, and its halt after an infraction. Returns the reward's terms. Nothing that
+/// it writes is read by another agent's phase 2.
+PICTURA_HD inline RewardTerms apply_reward_and_halt(const WorldView& world, int agent) {
+  if (!is_active(world, agent)) return {};
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
   const int events = agents.events[slot];
@@ -215,18 +215,18 @@ PICTURA_HD inline float apply_reward_and_halt(const WorldView& world, int agent)
   facts.collision = (events & kEventCollision) != 0;
   facts.off_road = (events & (kEventOffRoad | kEventWall)) != 0;
   facts.red_light = (events & kEventRedLight) != 0;
-  const float reward = reward_terms(facts, agents.conditioning + slot * kNumConditioning, world.options.dt_s).total();
-  agents.episode_return[slot] += reward;
+  const RewardTerms terms = reward_terms(facts, agents.conditioning + slot * kNumConditioning, world.options.dt_s);
+  agents.episode_return[slot] += terms.total();
   agents.episode_events[slot] = static_cast<uint8_t>(agents.episode_events[slot] | events);
 
   const int infractions = events & kInfractions;
-  if (infractions == 0) return reward;
+  if (infractions == 0) return terms;
   agents.halt_reason[slot] = static_cast<uint8_t>(infractions);
   agents.status[slot] = static_cast<uint8_t>(AgentStatus::halted);
   agents.speed_mps[slot] = agents.accel_long_mps2[slot] = agents.accel_lat_mps2[slot] = 0.0f;
   agents.steer_rad[slot] = agents.jerk_long_mps3[slot] = agents.jerk_lat_mps3[slot] = 0.0f;
   world.boxes[agent].palette = kHaltedPalette;
-  return reward;
+  return terms;
 }
 
 }  // namespace pictura

@@ -331,6 +331,8 @@ TEST(Simulator, SaveAndRestoreContinueIdentically) {
     EXPECT_TRUE(std::equal(a.controls.begin(), a.controls.end(), b.controls.begin()));
     EXPECT_EQ(original->totals().agent_steps, copy->totals().agent_steps);
     EXPECT_EQ(original->totals().distance_m, copy->totals().distance_m);
+    EXPECT_EQ(original->totals().finished_first_motion_s, copy->totals().finished_first_motion_s);
+    EXPECT_EQ(original->totals().reward_terms.goal, copy->totals().reward_terms.goal);
     EXPECT_EQ(original->views()[7].origin_m.x, copy->views()[7].origin_m.x);
   };
   equal();
@@ -511,6 +513,7 @@ TEST(Simulator, RestoreRefusesFieldsOutOfRangeAndStaysAsItWas) {
   EXPECT_THAT(refusal([](AgentStateView state) { state.lane[3] = -2; }), HasSubstr("agent 3: lane: -2"));
   EXPECT_THAT(refusal([](AgentStateView state) { state.goal_lane[1] = -1; }), HasSubstr("agent 1: goal_lane: -1"));
   EXPECT_THAT(refusal([](AgentStateView state) { state.next_waypoint[0] = 3; }), HasSubstr("next_waypoint: 3"));
+  EXPECT_THAT(refusal([](AgentStateView state) { state.first_motion_step[0] = -1; }), HasSubstr("first_motion_step"));
   EXPECT_THAT(refusal([](AgentStateView state) { state.agent_class[2] = 3; }), HasSubstr("agent_class: 3"));
   EXPECT_THAT(refusal([](AgentStateView state) { state.status[2] = 4; }), HasSubstr("status: 4"));
   EXPECT_THAT(refusal([](AgentStateView state) { state.status[2] = 2; }), HasSubstr("status: 2"));
@@ -589,6 +592,72 @@ TEST(Simulator, TotalsAreSubtractedFieldByField) {
   EXPECT_EQ(since.slot_steps, 8 * 30);
   EXPECT_EQ(since.agent_steps, simulator->totals().agent_steps - before.agent_steps);
   EXPECT_EQ(since.distance_m, simulator->totals().distance_m - before.distance_m);
+}
+
+constexpr int32_t kFullThrottle = 3 * kNumLatActions + 1;
+
+TEST(Simulator, TotalsHaveEachRewardTermOfLiveAgents) {
+  // On straights all pass waypoints, in the first curve all leave the road.
+  SimulatorConfig config = testing::cars({.walls = false});
+  const auto fix = [&config](Conditioning which, float value) {
+    config.conditioning[static_cast<size_t>(which)] = {value, value, false};
+  };
+  fix(Conditioning::v_goal_mps, 30);
+  fix(Conditioning::off_road, 2);
+  fix(Conditioning::stop_line, 0.5f);
+  const auto simulator = make(config, testing::stadium(200, 2), {{0, 12, 0}, {0, 7, 1}});
+  for (int step = 0; step < 400; ++step) simulator->step(std::vector<int32_t>(19, kFullThrottle));
+  const SimulatorTotals& totals = simulator->totals();
+  const RewardTermsOf<double>& terms = totals.reward_terms;
+  ASSERT_GT(totals.waypoints_reached, 10);
+  ASSERT_GT(totals.off_road, 10);
+  EXPECT_EQ(terms.goal, static_cast<double>(totals.waypoints_reached));
+  EXPECT_EQ(terms.off_road, -2.0 * static_cast<double>(totals.off_road));
+  EXPECT_EQ(terms.stop_line, -0.5 * static_cast<double>(totals.red_light));
+  EXPECT_EQ(terms.collision == 0, totals.collisions == 0);
+  EXPECT_NEAR(terms.timestep, -2.5e-6 * static_cast<double>(totals.agent_steps), 1e-6) << "all accelerate or drive";
+  EXPECT_GT(terms.velocity, 0);
+  EXPECT_EQ(terms.reverse, 0);
+  EXPECT_LT(terms.comfort, 0);
+  EXPECT_NEAR(terms.total(), totals.reward, 1e-4);
+}
+
+TEST(Simulator, TotalsSayWhenAgentsBeganToMoveAndWhoPassedAWaypoint) {
+  const auto simulator = make(testing::cars({.episode_steps = 60}), testing::stadium(400, 2), {{0, 10, 0}});
+  const AgentStateView state = simulator->state();
+  std::vector<int32_t> actions(10, kCoast);
+  // Agent i of the first half rests for 3 i steps; the others stay where they are.
+  std::vector<int> first_motion(10, 0);
+  for (int step = 1; step <= 60; ++step) {
+    for (int i = 0; i < 5; ++i) actions[static_cast<size_t>(i)] = step > 3 * i ? kFullThrottle : kCoast;
+    simulator->step(actions);
+    for (size_t i = 0; i < 10; ++i) {
+      if (first_motion[i] == 0 && std::fabs(state.speed_mps[i]) > kRest_mps) first_motion[i] = step;
+      ASSERT_EQ(state.first_motion_step[i], first_motion[i]) << "step " << step << ", agent " << i;
+    }
+  }
+  ASSERT_EQ(simulator->totals().collisions, 0) << "a halted agent shows no speed";
+  double expected_s = 0;
+  int64_t passed = 0;
+  for (size_t i = 0; i < 10; ++i) {
+    EXPECT_EQ(first_motion[i] > static_cast<int>(3 * i), i < 5) << i;
+    expected_s += first_motion[i] * static_cast<double>(simulator->config().dt_s);
+    passed += state.waypoints_reached[i] > 0;
+  }
+  const SimulatorTotals first = simulator->totals();
+  EXPECT_EQ(first.finished_agent_episodes, 10);
+  EXPECT_EQ(first.finished_moved, 5);
+  EXPECT_DOUBLE_EQ(first.finished_first_motion_s, expected_s);
+  ASSERT_GT(passed, 0);
+  EXPECT_EQ(first.finished_passed_waypoint, passed);
+
+  // In the next episode nobody moves.
+  for (int step = 0; step <= 60; ++step) simulator->step(std::vector<int32_t>(10, kCoast));
+  const SimulatorTotals& both = simulator->totals();
+  EXPECT_EQ(both.finished_agent_episodes, 20);
+  EXPECT_EQ(both.finished_moved, first.finished_moved);
+  EXPECT_EQ(both.finished_first_motion_s, first.finished_first_motion_s);
+  EXPECT_EQ(both.finished_passed_waypoint, first.finished_passed_waypoint);
 }
 
 TEST(Simulator, ClassesComeInThePapersSharesEachWithItsSizes) {

@@ -64,7 +64,7 @@ std::vector<float> Stage::step(int32_t action) {
   const WorldView sorted = world();
   for (int agent = 0; agent < view.num_agents; ++agent) find_collisions(sorted, agent);
   std::vector<float> rewards;
-  for (int agent = 0; agent < view.num_agents; ++agent) rewards.push_back(apply_reward_and_halt(sorted, agent));
+  for (int agent = 0; agent < view.num_agents; ++agent) rewards.push_back(apply_reward_and_halt(sorted, agent).total());
   return rewards;
 }
 
