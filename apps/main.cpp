@@ -26,6 +26,7 @@ int main(int argc, char** argv) {
       "  pictura render procedural --agents 40 --steps 50 --views 4 --out images\n"
       "  pictura simulate procedural --agents 40 --steps 300 --video drive.mp4\n"
       "  pictura train --config configs/demo.toml --out runs/demo\n"
+      "  pictura plot runs/demo --out curves.png\n"
       "Every subcommand has its own help: pictura render --help");
   add_town_command(app);
   add_map_command(app);
@@ -35,6 +36,7 @@ int main(int argc, char** argv) {
   add_train_command(app);
   add_evaluate_command(app);
 #endif
+  add_plot_command(app);
   add_bench_command(app);
 
   catch_interrupts();

@@ -17,6 +17,7 @@ namespace {
 constexpr Rgb kAxisColor = hex(0x3A3F46), kGridColor = hex(0xE3E5E8), kLabelColor = hex(0x5A6068);
 constexpr std::array<Rgb, 7> kSeriesColors{hex(0x1F6FEB), hex(0xE8590C), hex(0x2B8A3E), hex(0x9C36B5),
                                            hex(0xC92A2A), hex(0x0B7285), hex(0x846358)};
+constexpr double kBandAlpha = 0.18;
 constexpr double kLeft_px = 74, kRight_px = 18, kTop_px = 40, kBottom_px = 50;
 
 struct Range {
@@ -156,7 +157,52 @@ void draw_legend(Canvas& canvas, const PlotPanel& panel, const std::vector<Point
   }
 }
 
-void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, double width_px, double height_px) {
+constexpr double kNameRow_px = 22, kNameLine_px = 24;
+
+/// Where the names of series go, from the picture's corner, in rows as wide as it.
+std::vector<Point> lay_out_names(const Canvas& canvas, const std::vector<PlotSeries>& all, const TextStyle& style,
+                                 double width_px) {
+  constexpr double kMargin_px = kLeft_px + 6, kGap_px = 28;
+  std::vector<Point> places;
+  Point at{kMargin_px, 0};
+  for (const PlotSeries& series : all) {
+    const double entry_px = kNameLine_px + 8 + canvas.text_width(series.name, style);
+    if (at.x > kMargin_px && at.x + entry_px > width_px - kRight_px) at = {kMargin_px, at.y + kNameRow_px};
+    places.push_back(at);
+    at.x += entry_px + kGap_px;
+  }
+  return places;
+}
+
+void draw_names(Canvas& canvas, const std::vector<PlotSeries>& all, const std::vector<Point>& places,
+                const TextStyle& style, double top) {
+  for (size_t s = 0; s < all.size(); ++s) {
+    const Rgb color = kSeriesColors[s % kSeriesColors.size()];
+    const double x = places[s].x, middle = top + places[s].y + 0.5 * kNameRow_px;
+    if (!all[s].low.empty()) canvas.fill_rectangle(x, middle - 6, kNameLine_px, 12, color, kBandAlpha);
+    canvas.fill_rectangle(x, middle - 1.25, kNameLine_px, 2.5, color);
+    canvas.text(x + kNameLine_px + 8, middle + 4.5, all[s].name, style);
+  }
+}
+
+/// Fills what lies between the band's bounds, from gap to gap.
+void fill_band(Canvas& canvas, const PlotSeries& series, const Axis& x_axis, const Axis& y_axis, Rgb color) {
+  cairo_t* context = canvas.context();
+  const auto drawable = [&](size_t i) {
+    return x_axis.shows(series.x[i]) && y_axis.shows(series.low[i]) && y_axis.shows(series.high[i]);
+  };
+  canvas.set_color(color, kBandAlpha);
+  for (size_t begin = 0, end = 0; begin < series.low.size(); begin = end + 1) {
+    for (end = begin; end < series.low.size() && drawable(end);) ++end;
+    for (size_t i = begin; i < end; ++i)
+      cairo_line_to(context, x_axis.at_px(series.x[i]), y_axis.at_px(series.high[i]));
+    for (size_t i = end; i-- > begin;) cairo_line_to(context, x_axis.at_px(series.x[i]), y_axis.at_px(series.low[i]));
+    cairo_fill(context);
+  }
+}
+
+void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, double width_px, double height_px,
+                bool with_legend) {
   Axis x_axis(panel.x_scale), y_axis(panel.y_scale);
   const auto drawable = [&](const PlotSeries& series, size_t i) {
     return x_axis.shows(series.x[i]) && y_axis.shows(series.y[i]);
@@ -166,6 +212,11 @@ void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, do
       if (!drawable(series, i)) continue;
       x_axis.add(series.x[i]);
       y_axis.add(series.y[i]);
+    }
+    for (const std::vector<double>* bound : {&series.low, &series.high}) {
+      for (const double y : *bound) {
+        if (y_axis.shows(y)) y_axis.add(y);
+      }
     }
   }
   const double left = x0 + kLeft_px, top = y0 + kTop_px;
@@ -200,6 +251,9 @@ void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, do
   cairo_set_line_width(context, 2);
   cairo_set_line_join(context, CAIRO_LINE_JOIN_ROUND);
   cairo_set_line_cap(context, CAIRO_LINE_CAP_ROUND);
+  for (size_t s = 0; s < panel.series.size(); ++s) {
+    fill_band(canvas, panel.series[s], x_axis, y_axis, kSeriesColors[s % kSeriesColors.size()]);
+  }
   std::vector<Point> along;
   for (size_t s = 0; s < panel.series.size(); ++s) {
     const PlotSeries& series = panel.series[s];
@@ -228,7 +282,7 @@ void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, do
     cairo_stroke(context);
   }
   cairo_restore(context);
-  if (panel.series.size() > 1) draw_legend(canvas, panel, along, {left, top}, width, height);
+  if (with_legend) draw_legend(canvas, panel, along, {left, top}, width, height);
 }
 
 }  // namespace
@@ -284,18 +338,31 @@ RgbImage draw_plots(const std::vector<PlotPanel>& panels, const PlotOptions& opt
       PICTURA_CHECK(series.x.size() == series.y.size(),
                     "plot '{}', series '{}': expected equally many x and y, got {} and {}", panel.title, series.name,
                     series.x.size(), series.y.size());
+      PICTURA_CHECK(
+          series.low.size() == series.high.size() && (series.low.empty() || series.low.size() == series.x.size()),
+          "plot '{}', series '{}': expected a band of {} points or none, got {} and {}", panel.title, series.name,
+          series.x.size(), series.low.size(), series.high.size());
     }
   }
   const int num_panels = static_cast<int>(panels.size());
   const int columns = std::min(options.columns, num_panels), rows = (num_panels + columns - 1) / columns;
-  const int top = options.title.empty() ? 6 : 44;
-  Canvas canvas(columns * options.panel_width_px + 12, top + rows * options.panel_height_px + 6, hex(0xFFFFFF));
+  const int width_px = columns * options.panel_width_px + 12, title_px = options.title.empty() ? 6 : 44;
+  int top = title_px;
+  const TextStyle name_style{.size_px = 13};
+  std::vector<Point> names;
+  if (options.one_legend && !panels[0].series.empty()) {
+    names = lay_out_names(Canvas(1, 1, hex(0xFFFFFF)), panels[0].series, name_style, width_px);
+    top += static_cast<int>(names.back().y + kNameRow_px);
+  }
+  Canvas canvas(width_px, top + rows * options.panel_height_px + 6, hex(0xFFFFFF));
+  if (!names.empty()) draw_names(canvas, panels[0].series, names, name_style, title_px);
   if (!options.title.empty()) {
     canvas.text(0.5 * canvas.width_px(), 31, options.title, {.size_px = 19, .bold = true, .align = Align::center});
   }
   for (int i = 0; i < num_panels; ++i) {
-    draw_panel(canvas, panels[static_cast<size_t>(i)], 6 + i % columns * options.panel_width_px,
-               top + i / columns * options.panel_height_px, options.panel_width_px, options.panel_height_px);
+    const PlotPanel& panel = panels[static_cast<size_t>(i)];
+    draw_panel(canvas, panel, 6 + i % columns * options.panel_width_px, top + i / columns * options.panel_height_px,
+               options.panel_width_px, options.panel_height_px, !options.one_legend && panel.series.size() > 1);
   }
   return canvas.image();
 }

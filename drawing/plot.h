@@ -14,7 +14,8 @@ enum class AxisScale { linear, binary, decimal };
 /// One line; points that are not finite, or not above 0 on a logarithmic axis, leave a gap.
 struct PlotSeries {
   std::string name;
-  std::vector<double> x, y;  // of equal length
+  std::vector<double> x, y;       // of equal length
+  std::vector<double> low, high;  // of a band behind the line: as long, or empty where there is none
 };
 
 struct PlotPanel {
@@ -27,11 +28,12 @@ struct PlotOptions {
   int panel_width_px = 560, panel_height_px = 360;
   int columns = 2;
   std::string title;
+  bool one_legend = false;  // of the first panel's series, above all panels, instead of one in each panel
 };
 
 /// Panels in rows of options.columns, with axes, ticks at round numbers, a grid and a legend if there is more than one
-/// series. Throws Error if there is no panel, a series has unequal x and y, or a panel is not of 160x140 to 8192x8192
-/// px.
+/// series, or above them. Throws Error if there is no panel, a series' lists are of unequal length, or a panel is not
+/// of 160x140 to 8192x8192 px.
 RgbImage draw_plots(const std::vector<PlotPanel>& panels, const PlotOptions& options = {});
 
 /// draw_plots() as a PNG file. Throws Error naming the path.

@@ -83,7 +83,7 @@ class CommandCase(unittest.TestCase):
 
 class Usage(CommandCase):
     def test_help_teaches_by_example(self):
-        for command in ["town", "map", "render", "simulate", "bench", *(["train", "evaluate"] if has_torch() else [])]:
+        for command in ["town", "map", "render", "simulate", "plot", "bench", *(["train", "evaluate"] if has_torch() else [])]:
             result = run(command, "--help")
             self.assertEqual(result.returncode, 0, result.stderr)
             self.assertIn(f"pictura {command}", result.stdout)
@@ -496,7 +496,59 @@ class Benchmarks(CommandCase):
             refused(1, "CUDA", "--memory", "--egos", 3)
 
 
+class Plots(CommandCase):
+    def run_folder(self, name, seed, goals, settings="a = 1"):
+        """A folder as pictura train leaves one, of updates with so many goals per 1,000 steps."""
+        folder = self.folder / name
+        folder.mkdir()
+        (folder / "config.toml").write_text(f"[run]\nseed = {seed}\n[train]\n{settings}\n")
+        head = "update,charts/agent_steps,driving/goals_per_1000_steps,time/rollout_s,time/update_s\n"
+        rows = [f"{i + 1},{1000 * (i + 1)},{value},1800,1800\n" for i, value in enumerate(goals)]
+        (folder / "progress.csv").write_text(head + "".join(rows))
+        return folder
+
+    def test_seeds_are_one_line_and_the_picture_is_drawn(self):
+        a = self.run_folder("town_s1", 1, [1, 2, 3])
+        b = self.run_folder("town_s2", 2, [3, 4, 7])
+        c = self.run_folder("wide", 1, [0, 1], "a = 2")
+        picture = self.folder / "curves.png"
+        facts = self.json_of("plot", a, b, c, "--metrics", "goals_per_1000_steps", "--out", picture)
+        self.assertGreater(picture.stat().st_size, 5000)
+        self.assertEqual((facts["out"], facts["x"]), (str(picture), "agent_steps"))
+        self.assertEqual(facts["metrics"], ["driving/goals_per_1000_steps"])
+        self.assertEqual([line["name"] for line in facts["lines"]], ["town_s*, 2 seeds", "wide"])
+        town, wide = facts["lines"]
+        self.assertEqual((town["runs"], town["seeds"]), ([str(a), str(b)], [1, 2]))
+        self.assertEqual((town["points"], town["x_first"], town["x_last"]), (3, 1000, 3000))
+        self.assertEqual(town["last"], {"driving/goals_per_1000_steps": 5})
+        self.assertEqual(wide["last"], {"driving/goals_per_1000_steps": 1})
+        apart = self.json_of("plot", "--metrics", "goals_per_1000_steps,update", a, b, "--group", "none", "--x", "hours",
+                             "--out", picture)  # fmt: skip
+        self.assertEqual([(line["name"], line["x_last"]) for line in apart["lines"]], [("town_s1", 3), ("town_s2", 3)])
+        self.assertIn("curves.png: runs 3, lines 2, panels 1",
+                      run("plot", a, b, c, "--metrics", "goals_per_1000_steps", "--out", picture).stdout)  # fmt: skip
+
+    def test_what_is_missing_is_named(self):
+        a = self.run_folder("a", 1, [1, 2])
+        out = ["--out", self.folder / "curves.png"]
+        self.assert_refused(1, "nowhere: expected the folder of a training run", "plot", self.folder / "nowhere", *out)
+        self.assert_refused(1, "a/progress.csv: expected a column 'charts/episode_return'", "plot", a, *out)
+        self.assert_refused(1, "/proc/nowhere", "plot", a, "--metrics", "update", "--out", "/proc/nowhere/curves.png")
+        self.assert_refused(2, "--x", "plot", a, "--x", "days", *out)
+        self.assert_refused(2, "RUN", "plot", *out)
+        self.assertFalse((self.folder / "curves.png").exists())
+
+
 class Training(CommandCase):
+    def test_runs_are_plotted_by_seed(self):
+        folders = [self.folder / f"seed{seed}" for seed in (1, 2)]
+        for seed, out in enumerate(folders, 1):
+            self.json_of("train", *TINY, "--set", "train.updates=3", "--set", f"run.seed={seed}", "--out", out)
+        facts = self.json_of("plot", *folders, "--out", self.folder / "curves.png")
+        self.assertEqual([(line["name"], line["seeds"]) for line in facts["lines"]], [("seed*, 2 seeds", [1, 2])])
+        self.assertEqual(len(facts["metrics"]), 6)
+        self.assertTrue((self.folder / "curves.png").exists())
+
     def test_resume_is_exact(self):
         whole = self.json_of("train", *TINY, "--set", "train.updates=4", "--out", self.folder / "whole")
         self.json_of("train", *TINY, "--set", "train.updates=2", "--out", self.folder / "parts")

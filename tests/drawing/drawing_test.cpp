@@ -611,6 +611,35 @@ TEST(Plots, DrawSeriesWithGapsInPanels) {
   EXPECT_THROW(draw_plots_png({PlotPanel{}}, "/nonexistent/a/plot.png"), Error);
 }
 
+TEST(Plots, BandsLieBehindTheirLinesAndCountForTheAxis) {
+  PlotPanel panel{"return", "agent-steps", "return", {{"a", {0, 1, 2, 3}, {5, 5, 5, 5}}}};
+  const RgbImage without = draw_plots({panel});
+  panel.series[0].low = {4, 4, 4, 4};
+  panel.series[0].high = {6, 6, 6, 6};
+  const Pixel band = at(draw_plots({panel}), 300, 100);  // between two lines of the grid
+  EXPECT_LE(distance(band, {215, 229, 251}), 2) << "the first colour, thin on white";
+  EXPECT_EQ(count(without, band), 0);
+  const int whole = count(draw_plots({panel}), band);
+  EXPECT_GT(whole, 50'000) << "most of the panel, since the axis is as long as the band is wide";
+  EXPECT_GT(count(draw_plots({panel}), Pixel{31, 111, 235}), 300);
+  panel.series[0].high[1] = std::nan("");
+  EXPECT_NEAR(count(draw_plots({panel}), band), whole / 3, whole / 30) << "a gap up to both neighbours";
+  panel.series[0].low.pop_back();
+  EXPECT_THAT(test::message_of([&] { draw_plots({panel}); }), HasSubstr("expected a band of 4 points or none, got 3"));
+}
+
+TEST(Plots, OneLegendStandsAboveAllPanels) {
+  const PlotPanel panel{"a", "x", "y", {{"first", {0, 1}, {0, 1}}, {"second", {0, 1}, {1, 0}}}};
+  const RgbImage in_panels = draw_plots({panel, panel}), above = draw_plots({panel, panel}, {.one_legend = true});
+  EXPECT_GT(above.height_px, in_panels.height_px);
+  const Pixel blue{31, 111, 235};
+  EXPECT_EQ(at(above, 90, 6 + 11), blue) << "the first name's line";
+  // Names that need more than a row get one.
+  PlotPanel wide = panel;
+  wide.series[1].name = std::string(200, 'x');
+  EXPECT_GT(draw_plots({wide}, {.one_legend = true}).height_px, draw_plots({panel}, {.one_legend = true}).height_px);
+}
+
 // ---- video
 
 RgbImage solid(int width, int height, Pixel color) {

@@ -1,0 +1,84 @@
+// `pictura plot`: curves of training runs as one picture.
+#include <cmath>
+
+#include "pictura/apps/commands.h"
+#include "pictura/cli/report.h"
+#include "pictura/drawing/run_plot.h"
+
+namespace pictura {
+
+namespace {
+
+Json facts_of(const RunPlot& plot, const std::string& picture, const std::string& x) {
+  Json lines = Json::array();
+  for (size_t i = 0; i < plot.lines.size(); ++i) {
+    const PlotSeries& first = plot.panels[0].series[i];
+    Json last;
+    for (size_t panel = 0; panel < plot.panels.size(); ++panel) {
+      last[plot.columns[panel]] = finite_or_null(plot.panels[panel].series[i].y.back());
+    }
+    lines.push_back({{"name", plot.lines[i].name},
+                     {"runs", plot.lines[i].runs},
+                     {"seeds", plot.lines[i].seeds},
+                     {"points", first.x.size()},
+                     {"x_first", first.x.front()},
+                     {"x_last", first.x.back()},
+                     {"last", last}});
+  }
+  return {{"out", picture}, {"x", x}, {"metrics", plot.columns}, {"band", "lowest to highest seed"}, {"lines", lines}};
+}
+
+}  // namespace
+
+void add_plot_command(CLI::App& app) {
+  struct Arguments {
+    std::vector<std::string> runs;
+    RunPlotOptions plot;
+    std::string out = "plot.png", x = "agent_steps", group = "seeds";
+    bool json = false;
+  };
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("plot", "Draw curves of training runs");
+  command->add_option("RUN", arguments->runs, "Folders that pictura train wrote (--out)")->required();
+  command->add_option("--out", arguments->out, "The PNG file to write")->capture_default_str();
+  command->add_option("--x", arguments->x, "Over agent-steps, or hours of collecting and improving")
+      ->check(CLI::IsMember({"agent_steps", "hours"}))
+      ->capture_default_str();
+  command
+      ->add_option("--metrics", arguments->plot.metrics,
+                   "Columns of progress.csv, a panel each; what follows the slash is enough where one column has it")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--group", arguments->group,
+          "seeds: runs whose config.toml differ in run.seed alone are one line, their mean, with a band from the "
+          "lowest to the highest; none: a line each")
+      ->check(CLI::IsMember({"seeds", "none"}))
+      ->capture_default_str();
+  command->add_flag("--json", arguments->json, "Print one JSON object");
+  command->footer(
+      "docs/training.md says what the columns are. Of many updates, points are means of consecutive ones. A mean ends\n"
+      "where the first of its runs does.\n"
+      "Examples:\n"
+      "  pictura plot runs/a runs/b --out curves.png\n"
+      "  pictura plot runs/town01_seed* --x hours --metrics episode_return,off_road_per_km\n"
+      "  pictura plot runs/a --metrics rewards/goal_per_1000_steps,rewards/collision_per_1000_steps,entropy");
+  command->callback([arguments] {
+    arguments->plot.x = arguments->x == "hours" ? RunAxis::hours : RunAxis::agent_steps;
+    arguments->plot.group_seeds = arguments->group == "seeds";
+    const RunPlot plot = plot_runs(arguments->runs, arguments->plot);
+    const int columns = plot.panels.size() == 4 ? 2 : 3;
+    draw_plots_png(plot.panels, arguments->out,
+                   {.panel_width_px = 480, .panel_height_px = 320, .columns = columns, .one_legend = true});
+    if (arguments->json) {
+      print_json(facts_of(plot, arguments->out, arguments->x));
+    } else {
+      fmt::print("{}: runs {}, lines {}, panels {}\n", arguments->out, arguments->runs.size(), plot.lines.size(),
+                 plot.panels.size());
+    }
+  });
+}
+
+}  // namespace pictura
