@@ -36,6 +36,9 @@ Scalars scalars_of(const Config& config, const TrainProgress& progress, const Up
     scalars.emplace_back(fmt::format("driving/{}_per_km", name), static_cast<double>(count) / km);
     scalars.emplace_back(fmt::format("driving/{}_per_1000_steps", name), 1000 * static_cast<double>(count) / steps);
   }
+#define X(name) scalars.emplace_back("rewards/" #name "_per_1000_steps", 1000 * totals.reward_terms.name / steps);
+  PICTURA_REWARD_TERMS(X)
+#undef X
   const auto add_losses = [&scalars](const std::string& suffix, const LossStats& losses) {
     for (const auto& [name, value] :
          {std::pair{"entropy", losses.entropy}, std::pair{"approx_kl", losses.approx_kl},
@@ -64,6 +67,12 @@ Scalars scalars_of(const Config& config, const TrainProgress& progress, const Up
   for (size_t i = 0; i < kNumPhases; ++i) {
     scalars.emplace_back(fmt::format("time/{}_s", kPhaseNames[i]), record.phases_s[i]);
   }
+  // Of the agents whose episode ended; NaN where there are none.
+  const auto finished = static_cast<double>(totals.finished_agent_episodes),
+             moved = static_cast<double>(totals.finished_moved);
+  scalars.emplace_back("agents/first_motion_s", totals.finished_first_motion_s / moved);
+  scalars.emplace_back("agents/never_moved_share", 1 - moved / finished);
+  scalars.emplace_back("agents/first_waypoint_share", static_cast<double>(totals.finished_passed_waypoint) / finished);
   scalars.emplace_back("agents/rest_share", record.diagnosis.rest_share);
   for (const auto& [name, group] :
        {std::pair{"rest", &record.diagnosis.rest}, std::pair{"moving", &record.diagnosis.moving}}) {

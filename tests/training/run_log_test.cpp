@@ -1,4 +1,5 @@
-// progress.csv: what it keeps of an older file, and what a full disk does to a run's files.
+// progress.csv: what it keeps of an older file, what is logged, and what a full disk does to a run's
+// files.
 #include "pictura/training/run_log.h"
 
 #include <csignal>
@@ -10,6 +11,7 @@
 #include "pictura/common/support/file.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
+#include "pictura/tests/training/small_runs.h"
 
 namespace pictura {
 namespace {
@@ -58,6 +60,42 @@ TEST_F(ProgressCsvFile, OtherColumnsGoOnInANewFile) {
   EXPECT_EQ(after(older, 1), "update,a,b\n9,0.5,7\n");
   EXPECT_EQ(read_file(path_ + ".1"), old);
   EXPECT_EQ(read_file(path_ + ".2"), older);
+}
+
+class LoggedRun : public ::testing::Test {
+ protected:
+  test::ScratchFolder folder_;
+};
+
+// The number behind a name in the last row of a run's progress.csv.
+double logged(const std::string& folder, const std::string& name) {
+  const std::vector<std::vector<std::string>> table = test::read_table(folder + "/progress.csv");
+  const auto column = std::find(table[0].begin(), table[0].end(), name) - table[0].begin();
+  EXPECT_LT(static_cast<size_t>(column), table[0].size()) << name;
+  return std::stod(table.back().at(static_cast<size_t>(column)));
+}
+
+TEST_F(LoggedRun, LogsReturnByTermAndWhenAgentsBeganToMove) {
+  // Episodes as long as the rollout, so that all end in it.
+  const TrainReport report =
+      train(test::small_run(folder_ / "run", "cpu", {"train.updates=1", "simulator.episode_steps=12"}));
+  const std::string run = folder_ / "run";
+  double sum = 0;
+#define X(name) sum += logged(run, "rewards/" #name "_per_1000_steps");
+  PICTURA_REWARD_TERMS(X)
+#undef X
+  EXPECT_NEAR(sum, 1000 * logged(run, "charts/reward_per_step"), 1e-3);
+  EXPECT_NE(sum, 0);
+  EXPECT_GE(logged(run, "rewards/goal_per_1000_steps"), 0);
+  EXPECT_LT(logged(run, "rewards/timestep_per_1000_steps"), 0);
+  // Jerks of 4 m/s^3 make 0.3 m/s in 0.4 s at the earliest, and 12 steps are 1.2 s.
+  EXPECT_GT(logged(run, "agents/first_motion_s"), 0.15);
+  EXPECT_LT(logged(run, "agents/first_motion_s"), 1.21);
+  EXPECT_LT(logged(run, "agents/never_moved_share"), 1);
+  EXPECT_GE(logged(run, "agents/never_moved_share"), 0);
+  EXPECT_GE(logged(run, "agents/first_waypoint_share"), 0);
+  EXPECT_LT(logged(run, "agents/first_waypoint_share"), 1);
+  EXPECT_EQ(report.updates, 1);
 }
 
 // For its lifetime no file grows beyond a size, as on a disk that is full by then.
