@@ -1,9 +1,8 @@
 // `pictura train`: self-play PPO from a configuration file, with a progress line, and the learning curve as a picture.
-#include <cmath>
-
 #include "pictura/apps/commands.h"
 #include "pictura/cli/backend_options.h"
 #include "pictura/cli/report.h"
+#include "pictura/cli/train_progress.h"
 #include "pictura/common/error.h"
 #include "pictura/drawing/learning_curve.h"
 #include "pictura/training/loop.h"
@@ -44,15 +43,7 @@ void add_train_command(CLI::App& app) {
       "  pictura train --config configs/town01.toml --out runs/town01 --resume --minutes 25");
   command->callback([arguments] {
     ProgressLine line;
-    arguments->train.on_progress = [&line](const TrainProgress& progress) {
-      const std::string episode_return =
-          std::isfinite(progress.episode_return) ? fmt::format("{:.2f}", progress.episode_return) : "-";
-      line.update(fmt::format("update {}/{}  {} agent-steps  {} agent-steps/s  return {}  goals/km {:.2f}  ETA {}",
-                              progress.update, progress.updates,
-                              format_count(static_cast<double>(progress.agent_steps)),
-                              format_count(progress.agent_steps_per_s), episode_return, progress.goals_per_km,
-                              format_duration(progress.eta_s)));
-    };
+    arguments->train.on_progress = [&line](const TrainProgress& progress) { line.update(progress_text(progress)); };
     arguments->train.on_notice = [](const std::string& notice) { fmt::print(stderr, "notice: {}\n", notice); };
     if (arguments->resume) arguments->train.old_run = OldRun::resume;
     if (arguments->overwrite) arguments->train.old_run = OldRun::overwrite;

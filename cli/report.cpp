@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include "pictura/common/error.h"
@@ -33,6 +34,17 @@ std::string format_count(double value) {
   return fmt::format("{:.0f}", value);
 }
 
+namespace {
+
+/// As much of a line as can be rewritten in place: what wraps stays. All of it where stderr has no width.
+std::string shown(const std::string& line) {
+  winsize size{};
+  const bool has_width = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1;
+  return has_width ? line.substr(0, size.ws_col - 1u) : line;
+}
+
+}  // namespace
+
 ProgressLine::~ProgressLine() { finish(); }
 
 void ProgressLine::update(const std::string& text) {
@@ -42,7 +54,7 @@ void ProgressLine::update(const std::string& text) {
   const bool terminal = isatty(STDERR_FILENO) != 0;
   if (now - last_print_ < std::chrono::milliseconds(terminal ? 200 : 10000)) return;
   last_print_ = now;
-  std::fprintf(stderr, terminal ? "\r\033[K%s" : "%s\n", text_.c_str());
+  std::fprintf(stderr, terminal ? "\r\033[K%s" : "%s\n", shown(text_).c_str());
   dirty_ = terminal;
 }
 

@@ -25,7 +25,7 @@ std::string format_duration(double seconds);
 /// "1.2 M", "34.5 K" or "678".
 std::string format_count(double value);
 
-/// One line on stderr, rewritten in place on a terminal and printed every ten seconds elsewhere.
+/// One line on stderr, on a terminal rewritten in place and cut off at its width, elsewhere printed every ten seconds.
 class ProgressLine {
  public:
   ~ProgressLine();

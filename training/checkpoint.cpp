@@ -114,10 +114,7 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
                         {"filter_average", checkpoint.filter_average}};
   header["recent"] = ordered_json::array();
   for (const RecentUpdate& r : checkpoint.recent) {
-    header["recent"].push_back({{"goals", r.goals},
-                                {"finished", r.finished},
-                                {"distance_m", r.distance_m},
-                                {"finished_return", r.finished_return}});
+    header["recent"].push_back({{"finished", r.finished}, {"finished_return", r.finished_return}});
   }
   header["parameters"] = describe(checkpoint.parameters);
   header["first_moments"] = describe(checkpoint.first_moments);
@@ -212,8 +209,7 @@ Checkpoint read_checkpoint(const std::string& path) {
     result.filter_average = counters.at("filter_average");
     // A run saved without it continues exactly; only its averages start again.
     for (const ordered_json& json : header.value("recent", ordered_json::array())) {
-      result.recent.push_back(
-          {json.at("goals"), json.at("finished"), json.at("distance_m"), json.at("finished_return")});
+      result.recent.push_back({json.at("finished"), json.at("finished_return")});
     }
     result.rig = rig_from_json(header.at("rig"));
   } catch (const nlohmann::json::exception& error) {

@@ -7,10 +7,10 @@
 
 namespace pictura {
 
-/// What the progress line averages over: one update's part of it.
+/// What the mean return is taken over: one update's part of it.
 struct RecentUpdate {
-  int64_t goals = 0, finished = 0;  // finished: agent episodes that ended
-  double distance_m = 0, finished_return = 0;
+  int64_t finished = 0;  // agent episodes that ended
+  double finished_return = 0;
 };
 
 struct Checkpoint {

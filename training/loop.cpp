@@ -177,7 +177,12 @@ TrainReport train_on_its_device(const TrainOptions& options) {
                                                  config.train.milestone_agent_steps);
     run.agent_steps += record.totals.agent_steps;
     run.distance_m += record.totals.distance_m;
-    const TrainProgress progress = log.add(run.update, run.agent_steps, record);
+    TrainProgress progress = log.add(run.update, run.agent_steps, record);
+    const double left_s = 60 * options.minutes - since_start.seconds();
+    if (options.minutes > 0 && left_s < progress.eta_s) {
+      progress.eta_s = std::max(0.0, left_s);
+      progress.ends_by_minutes = true;
+    }
     report.agent_steps_per_s = progress.agent_steps_per_s;
     report.interrupted = interrupted();
     if (run.update % config.train.checkpoint_every == 0 ||

@@ -7,6 +7,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/portable/hd.h"
+#include "pictura/training/event_file.h"
 #include "pictura/training/phases.h"
 
 namespace pictura {
@@ -26,10 +27,11 @@ struct TrainProgress {
   int64_t update = 0, updates = 0;
   int64_t agent_steps = 0;
   double agent_steps_per_s = 0;
-  double episode_return = 0;  // mean over agent episodes that ended in the last updates; NaN before the first
-  double goals_per_km = 0;    // goals per km driven in the last updates
-  double eta_s = 0;
-  UpdateCost cost;  // of the last update
+  double episode_return = 0;     // mean over agent episodes that ended in the last updates; NaN before the first
+  double eta_s = 0;              // to the last update, the end of the schedule or of `minutes`, whichever comes first
+  bool ends_by_minutes = false;  // it is the end of `minutes`: a bound
+  Scalars scalars;               // what is logged of this update, as in progress.csv
+  UpdateCost cost;               // of the last update
 };
 
 /// What happens to a run that lies in the folder already.
@@ -45,7 +47,7 @@ struct TrainOptions {
   std::string out_folder;
   OldRun old_run = OldRun::refuse;
   std::string init_from;  // begin with the weights of this checkpoint, of the same network, and with nothing else of it
-  double minutes = 0;     // of wall time, start-up included, after which no update is begun; 0: no limit
+  double minutes = 0;     // of wall time, start-up included, within which the last update ends; 0: no limit
   std::function<void(const TrainProgress&)> on_progress;
   std::function<void(const std::string&)> on_notice;  // what a person should know, and no error is
 };

@@ -12,7 +12,7 @@ namespace pictura {
 
 namespace {
 
-// The progress line averages over this many updates.
+// The mean return is taken over this many updates.
 constexpr size_t kRecentUpdates = 10;
 
 Scalars scalars_of(const Config& config, const TrainProgress& progress, const UpdateRecord& record) {
@@ -155,7 +155,7 @@ RunLog::RunLog(const std::string& folder, const Config& config, int64_t updates_
 
 TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecord& record) {
   const SimulatorTotals& totals = record.totals;
-  recent_.push_back({totals.goals_reached, totals.finished_agent_episodes, totals.distance_m, totals.finished_return});
+  recent_.push_back({totals.finished_agent_episodes, totals.finished_return});
   if (recent_.size() > kRecentUpdates) recent_.pop_front();
 
   const double elapsed_s = since_start_.seconds();
@@ -165,7 +165,6 @@ TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecor
   progress.agent_steps = agent_steps;
   progress.agent_steps_per_s = static_cast<double>(agent_steps - first_agent_steps_) / elapsed_s;
   progress.episode_return = episode_return();
-  progress.goals_per_km = goals_per_km();
   // To the last update, or to the end of the schedule, whichever comes first.
   const auto done = static_cast<double>(update - first_update_),
              steps_done = static_cast<double>(agent_steps - first_agent_steps_);
@@ -184,9 +183,9 @@ TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecor
                    record.update_s,
                    record.phases_s};
 
-  const Scalars scalars = scalars_of(config_, progress, record);
-  csv_.write(update, scalars);
-  events_.write(agent_steps, scalars);
+  progress.scalars = scalars_of(config_, progress, record);
+  csv_.write(update, progress.scalars);
+  events_.write(agent_steps, progress.scalars);
   return progress;
 }
 
@@ -195,13 +194,6 @@ double RunLog::episode_return() const {
   int64_t finished = 0;
   for (const RecentUpdate& update : recent_) sum += update.finished_return, finished += update.finished;
   return sum / static_cast<double>(finished);
-}
-
-double RunLog::goals_per_km() const {
-  double km = 0;
-  int64_t goals = 0;
-  for (const RecentUpdate& update : recent_) km += update.distance_m / 1000, goals += update.goals;
-  return static_cast<double>(goals) / km;
 }
 
 }  // namespace pictura

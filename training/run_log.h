@@ -46,14 +46,12 @@ class RunLog {
   /// Writes the row and the event of an update, after which the run has done `update` updates and `agent_steps`.
   TrainProgress add(int64_t update, int64_t agent_steps, const UpdateRecord& record);
 
-  /// What the averages over the last updates are made of.
+  /// What the mean return of the last updates is made of.
   std::vector<RecentUpdate> recent() const { return {recent_.begin(), recent_.end()}; }
   /// Mean over agent episodes that ended in the last updates; NaN before the first.
   double episode_return() const;
 
  private:
-  double goals_per_km() const;
-
   const Config config_;
   const int64_t first_update_, first_agent_steps_;
   EventFile events_;

@@ -3,6 +3,7 @@
 Run by ctest, one entry per class: python3 command_test.py PICTURA [unittest arguments].
 """
 
+import fcntl
 import json
 import os
 import pathlib
@@ -10,9 +11,11 @@ import pty
 import re
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
+import termios
 import time
 import unittest
 import unittest.mock
@@ -548,6 +551,30 @@ class Training(CommandCase):
         self.assertEqual([(line["name"], line["seeds"]) for line in facts["lines"]], [("seed*, 2 seeds", [1, 2])])
         self.assertEqual(len(facts["metrics"]), 6)
         self.assertTrue((self.folder / "curves.png").exists())
+
+    def test_progress_is_one_line_in_place_on_a_terminal_and_few_lines_elsewhere(self):
+        train = ["train", *TINY, "--set", "train.updates=4"]
+        lines = run(*train, "--out", self.folder / "plain").stderr.splitlines()
+        self.assertEqual((lines[0][:12], lines[-1][:12]), ("update 1/4  ", "update 4/4  "))
+        self.assertRegex(lines[-1], r"ETA .* agent-steps .*/s .* goals, .* at fault, .* m/s  simulate \d+ %, render")
+        self.assertNotIn("\r", "".join(lines))
+        child, terminal = pty.fork()
+        if child == 0:
+            # 50 columns.
+            fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 50, 0, 0))
+            os.execv(PICTURA, [PICTURA, *train, "--set", "train.num_steps=64", "--out", str(self.folder / "shown")])
+        shown = b""
+        try:
+            while part := os.read(terminal, 4096):
+                shown += part
+        except OSError:  # the terminal's end
+            pass
+        self.assertEqual(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), 0, shown)
+        begin, *updates, last = shown.decode().split("\r\033[K")
+        self.assertEqual(begin, "")
+        self.assertEqual([len(line) for line in updates], [49] * len(updates))
+        self.assertTrue(updates[0].startswith("update 1/4  ETA "), updates)
+        self.assertRegex(last, r"^update 4/4  .* m/s  simulate \d+ %, .*\r\n.* agent-steps in 4 updates")
 
     def test_resume_is_exact(self):
         whole = self.json_of("train", *TINY, "--set", "train.updates=4", "--out", self.folder / "whole")

@@ -1,4 +1,4 @@
-// progress.csv: what it keeps of an older file, what is logged, and what a full disk does to a run's
+// progress.csv: what it keeps of an older file, what is logged, the progress line, and what a full disk does to a run's
 // files.
 #include "pictura/training/run_log.h"
 
@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
+#include "pictura/cli/train_progress.h"
 #include "pictura/common/support/file.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
@@ -96,6 +97,36 @@ TEST_F(LoggedRun, LogsReturnByTermAndWhenAgentsBeganToMove) {
   EXPECT_GE(logged(run, "agents/first_waypoint_share"), 0);
   EXPECT_LT(logged(run, "agents/first_waypoint_share"), 1);
   EXPECT_EQ(report.updates, 1);
+}
+
+TEST_F(LoggedRun, TheProgressLineShowsRateTimeLeftMetricsAndPhases) {
+  std::vector<TrainProgress> seen;
+  TrainOptions o = test::small_run(folder_ / "run", "cpu", {"train.updates=2"});
+  o.on_progress = [&seen](const TrainProgress& progress) { seen.push_back(progress); };
+  o.minutes = 1e6;
+  train(o);
+  ASSERT_EQ(seen.size(), 2u);
+  EXPECT_FALSE(seen[0].ends_by_minutes);
+  EXPECT_THAT(progress_text(seen[0]),
+              ::testing::MatchesRegex("update 1/2  ETA [0-9]+ s  [0-9]+ agent-steps  [0-9.]+[ K]*/s  return [-0-9.]+  "
+                                      "in 1,000 steps [0-9.]+ goals, [0-9.]+ at fault, [0-9.]+ off-road, [0-9.]+ red "
+                                      "lights  [0-9.]+ m/s  simulate [0-9]+ %, render [0-9]+ %, forward [0-9]+ %, "
+                                      "learn [0-9]+ %, optimize [0-9]+ %, other [0-9]+ %"));
+  const std::string last = progress_text(seen[1]);
+  EXPECT_THAT(last, HasSubstr("update 2/2  ETA 0 s  "));
+  EXPECT_THAT(last,
+              HasSubstr(fmt::format("{:.2f} off-road", logged(folder_ / "run", "driving/off_road_per_1000_steps"))));
+  EXPECT_THAT(last, HasSubstr(fmt::format("{:.1f} m/s", logged(folder_ / "run", "driving/mean_speed_mps"))));
+
+  // Of a hundred million updates the minutes end the run first.
+  o = test::small_run(folder_ / "other", "cpu", {"train.updates=100000000"});
+  o.on_progress = [&seen](const TrainProgress& progress) { seen.push_back(progress); };
+  o.minutes = 0.05;
+  EXPECT_TRUE(train(o).out_of_time);
+  ASSERT_GT(seen.size(), 2u);
+  EXPECT_TRUE(seen[2].ends_by_minutes);
+  EXPECT_LT(seen[2].eta_s, 3);
+  EXPECT_THAT(progress_text(seen[2]), HasSubstr("ETA at most "));
 }
 
 // For its lifetime no file grows beyond a size, as on a disk that is full by then.

@@ -1,0 +1,49 @@
+#include "pictura/cli/train_progress.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pictura/cli/report.h"
+#include "pictura/common/error.h"
+
+namespace pictura {
+namespace {
+
+double scalar(const TrainProgress& progress, std::string_view name) {
+  const auto found = std::find_if(progress.scalars.begin(), progress.scalars.end(),
+                                  [name](const auto& scalar) { return scalar.first == name; });
+  PICTURA_CHECK(found != progress.scalars.end(), "progress of training: expected a scalar '{}'", name);
+  return found->second;
+}
+
+/// "simulate 4 %, render 31 %, forward 9 %, learn 50 %, optimize 2 %, other 4 %", of an update's wall time.
+std::string phase_shares(const TrainProgress& progress) {
+  const double whole_s = scalar(progress, "time/rollout_s") + scalar(progress, "time/update_s");
+  std::string text;
+  double other = 1;
+  for (const char* phase : {"simulate", "render", "forward", "learn", "optimize"}) {
+    const double share = scalar(progress, fmt::format("time/{}_s", phase)) / whole_s;
+    text += fmt::format("{} {:.0f} %, ", phase, 100 * share);
+    other -= share;
+  }
+  return text + fmt::format("other {:.0f} %", 100 * std::max(0.0, other));
+}
+
+}  // namespace
+
+std::string progress_text(const TrainProgress& progress) {
+  const std::string episode_return =
+      std::isfinite(progress.episode_return) ? fmt::format("{:.2f}", progress.episode_return) : "-";
+  const auto per_1000_steps = [&progress](const char* event) {
+    return fmt::format("{:.2f}", scalar(progress, fmt::format("driving/{}_per_1000_steps", event)));
+  };
+  return fmt::format(
+      "update {}/{}  ETA {}{}  {} agent-steps  {}/s  return {}  in 1,000 steps {} goals, {} at fault, {} off-road, {} "
+      "red lights  {:.1f} m/s  {}",
+      progress.update, progress.updates, progress.ends_by_minutes ? "at most " : "", format_duration(progress.eta_s),
+      format_count(static_cast<double>(progress.agent_steps)), format_count(progress.agent_steps_per_s), episode_return,
+      per_1000_steps("goals"), per_1000_steps("at_fault_collisions"), per_1000_steps("off_road"),
+      per_1000_steps("red_light"), scalar(progress, "driving/mean_speed_mps"), phase_shares(progress));
+}
+
+}  // namespace pictura
