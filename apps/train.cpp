@@ -34,7 +34,8 @@ void add_train_command(CLI::App& app) {
       ->excludes(resume);
   command
       ->add_option("--minutes", arguments->train.minutes,
-                   "Save and end before this much wall time has passed; go on with --resume")
+                   "Save and end before this much wall time has passed, as far as the longest update until now tells; "
+                   "go on with --resume")
       ->check(CLI::PositiveNumber);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(

@@ -11,6 +11,7 @@ std::unique_ptr<LearnerExecutor> make_cuda_learner_executor(Device device);
 std::unique_ptr<SceneHistory> make_cuda_scene_history(const SceneHistorySize& size, Device device);
 std::unique_ptr<NetworkPasses> make_cuda_network_passes(Device device);
 std::string cuda_unavailable();
+std::string cuda_product_name(Device device);
 
 std::string why_no_cuda_device() { return cuda_unavailable(); }
 #else
@@ -26,6 +27,14 @@ void check_device(Device device) {
 }
 
 }  // namespace
+
+std::string product_name(Device device) {
+  check_device(device);
+#ifdef PICTURA_HAS_CUDA
+  if (!device.is_host()) return cuda_product_name(device);
+#endif
+  return "host";
+}
 
 std::unique_ptr<LearnerExecutor> make_learner_executor(Device device) {
   check_device(device);

@@ -13,6 +13,10 @@ namespace pictura {
 /// Empty where this build and this machine have a CUDA device, else why not.
 std::string why_no_cuda_device();
 
+/// What a device is called by its maker, as "NVIDIA H100 80GB HBM3"; "host" for the host. Throws Error where there is
+/// no such device.
+std::string product_name(Device device);
+
 /// Throws Error where the device is a CUDA device that there is not.
 std::unique_ptr<LearnerExecutor> make_learner_executor(Device device);
 std::unique_ptr<SceneHistory> make_scene_history(Device device, const SceneHistorySize& size);

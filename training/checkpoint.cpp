@@ -116,6 +116,7 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
   for (const RecentUpdate& r : checkpoint.recent) {
     header["recent"].push_back({{"finished", r.finished}, {"finished_return", r.finished_return}});
   }
+  header["longest_update_s"] = checkpoint.longest_update_s;
   header["parameters"] = describe(checkpoint.parameters);
   header["first_moments"] = describe(checkpoint.first_moments);
   header["second_moments"] = describe(checkpoint.second_moments);
@@ -211,6 +212,7 @@ Checkpoint read_checkpoint(const std::string& path) {
     for (const ordered_json& json : header.value("recent", ordered_json::array())) {
       result.recent.push_back({json.at("finished"), json.at("finished_return")});
     }
+    result.longest_update_s = header.value("longest_update_s", result.longest_update_s);
     result.rig = rig_from_json(header.at("rig"));
   } catch (const nlohmann::json::exception& error) {
     fail("{}: its header cannot be read: {}", path, error.what());

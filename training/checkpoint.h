@@ -3,6 +3,8 @@
 // hash (FNV-1a) of all bytes before. Version 1 has no such hash: its header names one of the data.
 #pragma once
 
+#include <map>
+
 #include "pictura/training/policy.h"
 
 namespace pictura {
@@ -23,6 +25,7 @@ struct Checkpoint {
   int64_t adam_steps = 0;
   double filter_average = -1;  // of AdvantageFilter
   std::vector<RecentUpdate> recent;
+  std::map<std::string, double> longest_update_s;  // see Run
   std::vector<NamedTensor> parameters, first_moments, second_moments;
   std::vector<uint8_t> simulator;  // Simulator::save(), at the start of update `update`
 };

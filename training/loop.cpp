@@ -7,6 +7,7 @@
 #include <ATen/Parallel.h>
 #include <fmt/ranges.h>
 
+#include "pictura/backends/make_learner.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/folder_lock.h"
@@ -144,11 +145,15 @@ TrainReport train_on_its_device(const TrainOptions& options) {
     saved_update = run.update;
     since_saved.restart();
   };
-  double longest_update_s = 0;
+  // Before the first update of this process it is that of an earlier one, where the run was on such a device before.
+  const std::string machine = fmt::format("{}, {} agents", product_name(device), run.simulator->num_slots());
+  double own_longest_s = 0;
   while (run.update < config.train.updates && !schedule_has_ended(config.train, run.agent_steps) &&
          !report.interrupted) {
     // A fifth more, for updates that take longer than those before, and for saving.
-    if (options.minutes > 0 && since_start.seconds() + 1.2 * longest_update_s > 60 * options.minutes) {
+    const auto longest = run.longest_update_s.find(machine);
+    const double expected_s = longest == run.longest_update_s.end() ? 0 : 1.2 * longest->second;
+    if (options.minutes > 0 && since_start.seconds() + expected_s > 60 * options.minutes) {
       report.out_of_time = true;
       break;
     }
@@ -170,7 +175,8 @@ TrainReport train_on_its_device(const TrainOptions& options) {
     record.update_s = watch.restart();
     record.phases_s = run.timer.take();
     record.diagnosis = diagnose(run.rollout, record.stats.adv_threshold);
-    longest_update_s = std::max(longest_update_s, record.rollout_s + record.update_s);
+    own_longest_s = std::max(own_longest_s, record.rollout_s + record.update_s);
+    run.longest_update_s[machine] = own_longest_s;
 
     ++run.update;
     const std::string milestone = milestone_name(run.agent_steps, run.agent_steps + record.totals.agent_steps,

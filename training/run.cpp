@@ -54,6 +54,7 @@ void Run::save(const std::string& path, const std::vector<RecentUpdate>& recent)
   checkpoint.adam_steps = optimizer.steps;
   checkpoint.filter_average = filter.average;
   checkpoint.recent = recent;
+  checkpoint.longest_update_s = longest_update_s;
   checkpoint.parameters = policy.parameters();
   checkpoint.first_moments = optimizer.first_moments;
   checkpoint.second_moments = optimizer.second_moments;
@@ -75,6 +76,7 @@ std::string Run::restore(const Checkpoint& saved) {
   update = saved.update;
   agent_steps = saved.agent_steps;
   distance_m = saved.distance_m;
+  longest_update_s = saved.longest_update_s;
   try {
     simulator->restore(saved.simulator);
   } catch (const Error& error) {

@@ -32,6 +32,9 @@ struct Run {
   int64_t update = 0;       // updates done
   int64_t agent_steps = 0;  // in these
   double distance_m = 0;    // driven by all agents in these
+  // By device and agents, as "NVIDIA H100 80GB HBM3, 20480 agents": wall time of the longest update of the last process
+  // that made one there.
+  std::map<std::string, double> longest_update_s;
 };
 
 }  // namespace pictura

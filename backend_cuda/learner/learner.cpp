@@ -1,5 +1,6 @@
 // The learner's rules on a CUDA device: launches, and the counts that the host needs.
 #include <memory>
+#include <string>
 
 #include "pictura/backend_cuda/learner/kernels.h"
 #include "pictura/common/cuda/device_buffer.h"
@@ -9,6 +10,7 @@
 namespace pictura {
 
 std::unique_ptr<LearnerExecutor> make_cuda_learner_executor(Device device);
+std::string cuda_product_name(Device device);
 
 namespace {
 
@@ -85,6 +87,12 @@ class LearnerExecutorCuda final : public LearnerExecutor {
 };
 
 }  // namespace
+
+std::string cuda_product_name(Device device) {
+  cudaDeviceProp properties{};
+  PICTURA_CUDA(cudaGetDeviceProperties(&properties, device.index));
+  return properties.name;
+}
 
 std::unique_ptr<LearnerExecutor> make_cuda_learner_executor(Device device) {
   const DeviceGuard guard(device);

@@ -47,6 +47,7 @@ Checkpoint small_checkpoint(const Policy& policy, const Config& config) {
   c.adam_steps = 24;
   c.filter_average = 0.1234567890123;
   c.recent = {{2, -4.123456789012345}, {6, 8}};
+  c.longest_update_s = {{"host, 8 agents", 0.123456789012345}};
   c.parameters = policy.parameters();
   for (const NamedTensor& p : policy.parameters()) {
     c.first_moments.push_back({p.name, at::full_like(p.value, 1.5)});
@@ -103,6 +104,7 @@ TEST_F(CheckpointFile, ComesBackWhole) {
   EXPECT_EQ(back.recent[0].finished, 2);
   EXPECT_EQ(back.recent[0].finished_return, -4.123456789012345);
   EXPECT_EQ(back.recent[1].finished_return, 8);
+  EXPECT_EQ(back.longest_update_s, (std::map<std::string, double>{{"host, 8 agents", 0.123456789012345}}));
   EXPECT_EQ(first_difference(back.rig, paper_rig(16, 9)), "");
   EXPECT_EQ(back.simulator, (std::vector<uint8_t>{1, 2, 3, 255}));
   ASSERT_EQ(back.rig.cameras.size(), 4u);

@@ -101,6 +101,37 @@ TEST_F(Training, EndsWhenItsMinutesAreOverAndGoesOnExactly) {
   EXPECT_EQ(read_table(folder_ / "parts/progress.csv").size(), 5u);
 }
 
+TEST_F(Training, KnowsBeforeItsFirstUpdateHowLongOneTakesOnThisDeviceWithAsManyAgents) {
+  const TrainReport first = train(options("run", {"train.updates=1"}));
+  Checkpoint saved = read_checkpoint(first.checkpoint);
+  ASSERT_EQ(saved.longest_update_s.size(), 1u);
+  EXPECT_EQ(saved.longest_update_s.begin()->first, "host, 8 agents");
+  EXPECT_GT(saved.longest_update_s.begin()->second, 0);
+  const auto resume = [&](const char* updates) {
+    TrainOptions rest = options("run", {updates});
+    rest.old_run = OldRun::resume;
+    rest.minutes = 60;
+    return train(rest);
+  };
+  // An update of an hour does not end within an hour; elsewhere, or with more agents, it says nothing.
+  const std::map<std::string, double> elsewhere{{"NVIDIA H100, 8 agents", 3600}, {"host, 80 agents", 3600}};
+  saved.longest_update_s = elsewhere;
+  saved.longest_update_s["host, 8 agents"] = 3600;
+  write_checkpoint(first.checkpoint, saved);
+  const TrainReport stopped = resume("train.updates=2");
+  EXPECT_TRUE(stopped.out_of_time);
+  EXPECT_EQ(stopped.updates, 1);
+  EXPECT_EQ(read_checkpoint(first.checkpoint).longest_update_s, saved.longest_update_s);
+  saved.longest_update_s = elsewhere;
+  write_checkpoint(first.checkpoint, saved);
+  EXPECT_EQ(resume("train.updates=2").updates, 2);
+  std::map<std::string, double> measured = read_checkpoint(first.checkpoint).longest_update_s;
+  EXPECT_GT(measured["host, 8 agents"], 0);
+  EXPECT_LT(measured["host, 8 agents"], 3600);
+  measured.erase("host, 8 agents");
+  EXPECT_EQ(measured, elsewhere);
+}
+
 TEST_F(Training, ARunWithoutTimeForItsFirstUpdateIsSavedAndGoesOn) {
   TrainOptions none = options("run", {"train.updates=1"});
   none.minutes = 1e-9;
