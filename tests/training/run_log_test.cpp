@@ -118,8 +118,8 @@ TEST_F(LoggedRun, TheProgressLineShowsRateTimeLeftMetricsAndPhases) {
               HasSubstr(fmt::format("{:.2f} off-road", logged(folder_ / "run", "driving/off_road_per_1000_steps"))));
   EXPECT_THAT(last, HasSubstr(fmt::format("{:.1f} m/s", logged(folder_ / "run", "driving/mean_speed_mps"))));
 
-  // Of a hundred million updates the minutes end the run first.
-  o = test::small_run(folder_ / "other", "cpu", {"train.updates=100000000"});
+  // Before a hundred million updates, and before the schedule's end, the minutes end the run.
+  o = test::small_run(folder_ / "other", "cpu", {"train.updates=100000000", "train.schedule_agent_steps=1000000000"});
   o.on_progress = [&seen](const TrainProgress& progress) { seen.push_back(progress); };
   o.minutes = 0.05;
   EXPECT_TRUE(train(o).out_of_time);
