@@ -15,36 +15,74 @@ const std::map<std::string, Density> kDensities{
     {"light", Density::light}, {"medium", Density::medium}, {"dense", Density::dense}};
 
 void print_table(const std::vector<EvaluateRow>& rows) {
-  fmt::print("{:10} {:>9} {:>6} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "density", "scenarios", "steps",
-             "vehicles", "at-fault", "off-road", "red light", "goals", "km/infr.", "km");
+  fmt::print("{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>17} {:>9}\n", "density", "scenarios", "steps",
+             "vehicles", "at-fault", "off-road", "red light", "goals", "km/infraction", "km");
+  const auto text = [](const Estimate& e) { return fmt::format("{:.3f} +- {:.3f}", e.value, e.half_width_95); };
   for (const EvaluateRow& row : rows) {
-    fmt::print("{:10} {:>9} {:>6} {:>9} {:>9.4f} {:>9.4f} {:>9.4f} {:>9.3f} {:>9.3f} {:>9.2f}\n", row.density,
-               row.scenarios, row.steps, row.vehicle_episodes, row.at_fault_collision_rate, row.off_road_rate,
-               row.red_light_rate, row.goals_per_vehicle, row.km_per_infraction, row.km_driven);
+    fmt::print("{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>17} {:>9.2f}\n", row.density, row.scenarios,
+               row.steps, row.vehicle_episodes, text(row.at_fault_collision_rate), text(row.off_road_rate),
+               text(row.red_light_rate), text(row.goals_per_vehicle), text(row.km_per_infraction), row.km_driven);
   }
+  fmt::print("+- is the half width of a 95 % confidence interval over scenarios\n");
 }
 
-void print_report(const EvaluateOptions& options, const EvaluateReport& report) {
+void print_report(const std::string& policy, const EvaluateReport& report) {
   Json table = Json::array();
   for (const EvaluateRow& row : report.rows) {
-    table.push_back({{"density", row.density},
-                     {"scenarios", row.scenarios},
-                     {"steps", row.steps},
-                     {"vehicle_episodes", row.vehicle_episodes},
-                     {"at_fault_collision_rate", finite_or_null(row.at_fault_collision_rate)},
-                     {"off_road_rate", finite_or_null(row.off_road_rate)},
-                     {"red_light_rate", finite_or_null(row.red_light_rate)},
-                     {"goals_per_vehicle", finite_or_null(row.goals_per_vehicle)},
-                     {"km_per_infraction", finite_or_null(row.km_per_infraction)},
-                     {"km_driven", row.km_driven},
-                     {"waypoints_per_vehicle", finite_or_null(row.waypoints_per_vehicle)},
-                     {"return_per_vehicle", finite_or_null(row.return_per_vehicle)}});
+    Json json = {{"density", row.density},
+                 {"scenarios", row.scenarios},
+                 {"steps", row.steps},
+                 {"vehicle_episodes", row.vehicle_episodes},
+                 {"km_driven", row.km_driven}};
+    for (const auto& [name, estimate] :
+         {std::pair{"at_fault_collision_rate", row.at_fault_collision_rate},
+          std::pair{"off_road_rate", row.off_road_rate}, std::pair{"red_light_rate", row.red_light_rate},
+          std::pair{"goals_per_vehicle", row.goals_per_vehicle}, std::pair{"km_per_infraction", row.km_per_infraction},
+          std::pair{"km_per_vehicle", row.km_per_vehicle},
+          std::pair{"waypoints_per_vehicle", row.waypoints_per_vehicle},
+          std::pair{"return_per_vehicle", row.return_per_vehicle},
+          std::pair{"active_at_end_share", row.active_at_end_share}}) {
+      json[name] = finite_or_null(estimate.value);
+      json[fmt::format("{}_half_width_95", name)] = finite_or_null(estimate.half_width_95);
+    }
+    table.push_back(std::move(json));
   }
-  print_json({{"checkpoint", options.checkpoint},
-              {"argmax", options.argmax},
-              {"seed", options.seed},
+  const EvaluationSetting& setting = report.results.setting;
+  print_json({{"checkpoint", policy},
+              {"policy_hash", setting.policy_hash},
+              {"argmax", setting.argmax},
+              {"seed", setting.seed},
+              {"device", setting.device},
+              {"precision", setting.precision},
               {"interrupted", report.interrupted},
               {"rows", table}});
+}
+
+// "N": the scenarios 0 to N - 1; "A:B": A to B - 1.
+void parse_scenarios(const std::string& text, EvaluateOptions* options) {
+  int first = 0, end = 0;
+  char rest = 0;
+  const bool is_range = std::sscanf(text.c_str(), "%d:%d%c", &first, &end, &rest) == 2;
+  if (!is_range) {
+    first = 0;
+    if (std::sscanf(text.c_str(), "%d%c", &end, &rest) != 1) end = 0;
+  }
+  if (first < 0 || end <= first) {
+    fail_usage("--scenarios: expected a number of them, or A:B with 0 <= A < B, got '{}'", text);
+  }
+  options->first_scenario = first;
+  options->scenarios = end - first;
+}
+
+EvaluateReport merged(const std::vector<std::string>& paths) {
+  std::vector<EvaluationResults> parts;
+  for (const std::string& path : paths) parts.push_back(read_results(path));
+  EvaluateReport report;
+  report.results = merge(parts, paths);
+  for (const DensityResult& density : report.results.densities) {
+    report.rows.push_back(row_of(density, report.results.setting.steps));
+  }
+  return report;
 }
 
 }  // namespace
@@ -54,22 +92,29 @@ void add_evaluate_command(CLI::App& app) {
     EvaluateOptions evaluate;
     BackendOptions backends;
     std::vector<std::string> densities{"light", "medium", "dense"};
-    std::string size;
+    std::vector<std::string> parts;
+    std::string size, scenarios = "200", out;
     bool sampled = false, json = false;
   };
   auto arguments = std::make_shared<Arguments>();
   EvaluateOptions& options = arguments->evaluate;
   options.maps = {"Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07", "Town10HD"};
   CLI::App* command = app.add_subcommand("evaluate", "Measure a policy's driving (the paper's in-domain protocol)");
-  command->add_option("CHECKPOINT", options.checkpoint, "A checkpoint that train wrote")->required();
+  CLI::Option* const checkpoint =
+      command->add_option("CHECKPOINT", options.checkpoint, "A checkpoint that train wrote");
+  command
+      ->add_option("--merge", arguments->parts,
+                   "Instead of evaluating: join parts of one evaluation, which --out wrote, exactly")
+      ->excludes(checkpoint);
   command->add_option("--map", options.maps, "Maps that the scenarios are spread over")->capture_default_str();
   command->add_option("--density", arguments->densities, "light, medium, dense: 60, 120, 150 agents a world")
       ->check(CLI::IsMember({"light", "medium", "dense"}))
       ->capture_default_str();
   command->add_option("--agents", options.agents_per_world, "Agents a world, instead of the densities' own numbers")
       ->check(CLI::Range(1, kMaxAgentsPerWorld));
-  command->add_option("--scenarios", options.scenarios, "Scenarios per density")
-      ->check(CLI::PositiveNumber)
+  command
+      ->add_option("--scenarios", arguments->scenarios,
+                   "Scenarios per density: N, or A:B for the part of them from A up to but not including B")
       ->capture_default_str();
   command->add_option("--steps", options.steps, "Steps of 0.1 s per scenario")
       ->check(CLI::PositiveNumber)
@@ -82,10 +127,15 @@ void add_evaluate_command(CLI::App& app) {
   command->add_option("--size", arguments->size, "Pixels of an image, WxH, of the paper's rig; default: as in training")
       ->excludes(rig);
   command->add_option("--threads", options.num_threads, "Host threads; 0: all")->capture_default_str();
+  command->add_option("--out", arguments->out, "A file for the counts of each scenario, which --merge reads");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Example:\n  pictura evaluate runs/town01/checkpoint.ckpt --map Town01 --density light --scenarios 4 --steps "
-      "600");
+      "600\n"
+      "In parts, on several machines or after one another:\n"
+      "  pictura evaluate run.ckpt --scenarios 0:100 --out a.json\n"
+      "  pictura evaluate run.ckpt --scenarios 100:200 --out b.json\n"
+      "  pictura evaluate --merge a.json b.json");
   command->callback([arguments] {
     EvaluateOptions& evaluation = arguments->evaluate;
     evaluation.argmax = !arguments->sampled;
@@ -102,14 +152,19 @@ void add_evaluate_command(CLI::App& app) {
     evaluation.densities.clear();
     for (const std::string& name : arguments->densities) evaluation.densities.push_back(kDensities.at(name));
     if (evaluation.agents_per_world > 0) evaluation.densities.resize(1);
+    parse_scenarios(arguments->scenarios, &evaluation);
+    if (evaluation.checkpoint.empty() && arguments->parts.empty()) {
+      fail_usage("evaluate: expected a CHECKPOINT, or --merge and the parts of an evaluation");
+    }
     ProgressLine line;
     evaluation.on_progress = [&line](double done, double eta_s) {
       line.update(fmt::format("evaluating: {:.0f} %  ETA {}", 100 * done, format_duration(eta_s)));
     };
-    const EvaluateReport report = evaluate(evaluation);
+    const EvaluateReport report = arguments->parts.empty() ? evaluate(evaluation) : merged(arguments->parts);
     line.finish();
+    if (!arguments->out.empty()) write_results(arguments->out, report.results);
     if (arguments->json)
-      print_report(evaluation, report);
+      print_report(evaluation.checkpoint, report);
     else
       print_table(report.rows);
     if (report.interrupted) {

@@ -606,6 +606,11 @@ bool Config::reads(ObservationPart part) const {
          (policy.modality == Modality::vector && (part != ObservationPart::walls || simulator.wall_observations));
 }
 
+std::string name_of(Precision precision) {
+  return std::find_if(kPrecisions.begin(), kPrecisions.end(), [&](const auto& p) { return p.second == precision; })
+      ->first;
+}
+
 Rig rig_of(const Config& config) {
   return config.render.rig.empty() ? paper_rig(config.render.width_px, config.render.height_px)
                                    : load_rig(config.render.rig);

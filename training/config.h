@@ -136,6 +136,9 @@ std::string first_difference(const Config& saved, const Config& now);
 /// them.
 std::vector<std::string> schedule_differences(const Config& saved, const Config& now);
 
+/// As in a configuration.
+std::string name_of(Precision precision);
+
 /// The rig that render describes.
 Rig rig_of(const Config& config);
 

@@ -147,7 +147,10 @@ class PolicyController final : public Controller {
 };
 
 PolicySession::PolicySession(const std::string& checkpoint_path, const SessionOptions& options)
-    : parts_(std::make_unique<Parts>(read_checkpoint(checkpoint_path), options)) {}
+    : PolicySession(read_checkpoint(checkpoint_path), options) {}
+
+PolicySession::PolicySession(const Checkpoint& checkpoint, const SessionOptions& options)
+    : parts_(std::make_unique<Parts>(checkpoint, options)) {}
 
 PolicySession::~PolicySession() = default;
 
@@ -169,6 +172,21 @@ SimulatorConfig PolicySession::training_world() const { return simulator_config(
 
 SimulatorConfig PolicySession::evaluation_world(int steps) const {
   return evaluation_simulator_config(parts_->config, steps, parts_->device);
+}
+
+EvaluationSetting PolicySession::evaluation_setting() const {
+  const Config& config = parts_->config;
+  EvaluationSetting setting;
+  setting.policy_hash = parts_->policy.hash();
+  setting.device = parts_->device.is_host() ? "cpu" : "cuda";
+  setting.precision = parts_->device.is_host() ? "fp32" : name_of(config.train.precision);
+  if (!reads_images()) return setting;
+  setting.renderer = config.render.backend;
+  setting.samples = text_of(config.render.samples);
+  for (const Camera& camera : rig().cameras) {
+    setting.image_sizes.push_back(fmt::format("{}x{}", camera.width_px, camera.height_px));
+  }
+  return setting;
 }
 
 void PolicySession::evaluate(const PolicyInput& input, Renderer* renderer, Span<float> logits_out,

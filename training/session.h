@@ -8,8 +8,11 @@
 #include "pictura/common/renderer.h"
 #include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/simulator.h"
+#include "pictura/training/evaluation/results.h"
 
 namespace pictura {
+
+struct Checkpoint;
 
 struct SessionOptions {
   int num_threads = 0;            // of torch and renderers; 0: all
@@ -35,6 +38,8 @@ class PolicySession {
   /// Throws Error naming the file when it is no checkpoint, truncated, of another observation schema or architecture,
   /// or when it cannot run on this device. UsageError where it cannot see through the cameras of the options.
   explicit PolicySession(const std::string& checkpoint_path, const SessionOptions& options = {});
+  /// The policy of a run that goes on; of the checkpoint it reads configuration, rig and parameters.
+  PolicySession(const Checkpoint& checkpoint, const SessionOptions& options);
   ~PolicySession();
   PolicySession(const PolicySession&) = delete;
   PolicySession& operator=(const PolicySession&) = delete;
@@ -55,6 +60,8 @@ class PolicySession {
   SimulatorConfig training_world() const;
   /// The same for the paper's evaluation: episodes of `steps` that nothing ends early, fixed conditioning and lights.
   SimulatorConfig evaluation_world(int steps) const;
+  /// What of an evaluation's setting is the policy's and the session's: policy, precision, device and images.
+  EvaluationSetting evaluation_setting() const;
 
   /// Writes logits [batch, kNumActions] and values [batch]. `renderer` holds the scene's maps under the handles that
   /// the scene names, and has renderer_config(); policies without images need none. Throws Error naming the array where

@@ -637,6 +637,22 @@ class Training(CommandCase):
         self.json_of(*evaluate, "--renderer", "cpu", "--simulator", "cpu", "--device", "cpu")
         self.assert_refused(1, on_host, *evaluate, "--device", "cuda")
 
+    def test_an_evaluation_in_parts_is_merged_exactly(self):
+        out = self.folder / "run"
+        self.json_of("train", *TINY, "--set", "train.updates=1", "--out", out)
+        evaluate = ["evaluate", out / "checkpoint.ckpt", "--map", "procedural:1", "--agents", 4, "--density", "light",
+                    "--steps", 5, "--out"]  # fmt: skip
+        paths = {name: self.folder / f"{name}.json" for name in ["whole", "a", "b", "merged"]}
+        whole = self.json_of(*evaluate, paths["whole"], "--scenarios", 3)["rows"]
+        self.json_of(*evaluate, paths["a"], "--scenarios", 1)
+        self.json_of(*evaluate, paths["b"], "--scenarios", "1:3")
+        merged = self.json_of("evaluate", "--merge", paths["b"], paths["a"], "--out", paths["merged"])["rows"]
+        self.assertEqual(merged, whole)
+        self.assertEqual(paths["merged"].read_bytes(), paths["whole"].read_bytes())
+        self.assertIn("goals_per_vehicle_half_width_95", whole[0])
+        self.assert_refused(1, "expected 3", "evaluate", "--merge", paths["whole"], paths["b"])
+        self.assert_refused(2, "--scenarios", *evaluate, paths["a"], "--scenarios", "3:3")
+
     def test_training_on_a_device_says_so(self):
         if os.environ.get("PICTURA_REQUIRE_GPU") != "1":
             self.skipTest("PICTURA_REQUIRE_GPU is not 1")

@@ -131,13 +131,15 @@ TEST_P(EachModality, EvaluationAgreesWithTheHosts) {
     EXPECT_EQ(b.vehicle_episodes, a.vehicle_episodes);
     EXPECT_GT(b.vehicle_episodes, 60);
     // An action that a rounding error decides may change the fate of a few vehicles.
-    EXPECT_NEAR(b.at_fault_collision_rate, a.at_fault_collision_rate, 0.05);
-    EXPECT_NEAR(b.off_road_rate, a.off_road_rate, 0.05);
-    EXPECT_NEAR(b.red_light_rate, a.red_light_rate, 0.05);
-    EXPECT_NEAR(b.goals_per_vehicle, a.goals_per_vehicle, 0.05);
-    EXPECT_NEAR(b.waypoints_per_vehicle, a.waypoints_per_vehicle, 0.05 * (1 + a.waypoints_per_vehicle));
+    EXPECT_NEAR(b.at_fault_collision_rate.value, a.at_fault_collision_rate.value, 0.05);
+    EXPECT_NEAR(b.off_road_rate.value, a.off_road_rate.value, 0.05);
+    EXPECT_NEAR(b.red_light_rate.value, a.red_light_rate.value, 0.05);
+    EXPECT_NEAR(b.goals_per_vehicle.value, a.goals_per_vehicle.value, 0.05);
+    EXPECT_NEAR(b.waypoints_per_vehicle.value, a.waypoints_per_vehicle.value,
+                0.05 * (1 + a.waypoints_per_vehicle.value));
     EXPECT_NEAR(b.km_driven, a.km_driven, 0.05 * a.km_driven);
-    EXPECT_NEAR(b.return_per_vehicle, a.return_per_vehicle, 0.05 * (1 + std::abs(a.return_per_vehicle)));
+    EXPECT_NEAR(b.return_per_vehicle.value, a.return_per_vehicle.value,
+                0.05 * (1 + std::abs(a.return_per_vehicle.value)));
   }
 }
 

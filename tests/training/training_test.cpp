@@ -22,6 +22,7 @@
 #include "pictura/tests/support/missing_renderer.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/small_runs.h"
+#include "pictura/training/evaluation/evaluate.h"
 #include "pictura/training/observation.h"
 #include "pictura/training/run.h"
 #include "pictura/training/run_folder.h"
@@ -596,13 +597,29 @@ TEST_F(Training, VectorPolicyTrainsAndIsEvaluated) {
   EXPECT_LE(rows[0].vehicle_episodes, 18);
   EXPECT_GT(rows[0].vehicle_episodes, 0);
   EXPECT_EQ(done, 1);
-  for (const double rate : {rows[0].at_fault_collision_rate, rows[0].off_road_rate, rows[0].red_light_rate}) {
+  for (const double rate :
+       {rows[0].at_fault_collision_rate.value, rows[0].off_road_rate.value, rows[0].red_light_rate.value}) {
     EXPECT_GE(rate, 0);
     EXPECT_LE(rate, 1);
   }
   // The same again, and drawn actions are something else.
   const std::vector<EvaluateRow> again = evaluate(o).rows;
   EXPECT_EQ(again[0].km_driven, rows[0].km_driven);
+  // In parts, also of a session that is kept.
+  o.scenarios = 2;
+  const EvaluationResults first = evaluate(o).results;
+  o.first_scenario = 2;
+  o.scenarios = 1;
+  SessionOptions session_options;
+  session_options.device = "cpu";
+  session_options.num_threads = 1;
+  PolicySession session(report.checkpoint, session_options);
+  const EvaluationResults second = evaluate(&session, o).results;
+  write_results(folder_ / "merged.json", merge({second, first}, {"second", "first"}));
+  write_results(folder_ / "whole.json", evaluated.results);
+  EXPECT_EQ(read_file(folder_ / "merged.json"), read_file(folder_ / "whole.json"));
+  o.first_scenario = 0;
+  o.scenarios = 3;
   o.argmax = false;
   EXPECT_NE(evaluate(o).rows[0].km_driven, rows[0].km_driven);
   o.scenarios = 0;
@@ -664,7 +681,7 @@ TEST_F(Training, EvaluationRepeatsNoWorldOfTraining) {
     for (int slot = 0; slot < 6; ++slot) sum += static_cast<double>(simulator->state().episode_return[slot]);
     return sum / 6;
   };
-  const double evaluated = evaluate(o).rows.at(0).return_per_vehicle;
+  const double evaluated = evaluate(o).rows.at(0).return_per_vehicle.value;
   EXPECT_EQ(evaluated, return_per_vehicle(kFirstEvaluationWorld));
   EXPECT_NE(evaluated, return_per_vehicle(0));
 }

@@ -1,7 +1,6 @@
 #include "pictura/training/evaluation/evaluate.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
@@ -57,55 +56,26 @@ bool has_active_agents(Simulator& simulator) {
   return std::count(all.begin(), all.end(), static_cast<uint8_t>(AgentStatus::active)) > 0;
 }
 
-// Sums over vehicle episodes.
-struct Tally {
-  int64_t episodes = 0, at_fault = 0, off_road = 0, red_light = 0, infractions = 0, goals = 0, waypoints = 0;
-  double distance_m = 0, returns = 0;
-
-  void add(const AgentStateView& state, int64_t slot) {
-    if (static_cast<AgentStatus>(state.status[slot]) == AgentStatus::absent) return;
-    if (static_cast<AgentClass>(state.agent_class[slot]) != AgentClass::vehicle) return;
-    const uint8_t events = state.episode_events[slot];
-    ++episodes;
-    at_fault += (events & kEventAtFault) != 0;
-    off_road += (events & kEventOffRoad) != 0;
-    red_light += (events & kEventRedLight) != 0;
-    infractions += (events & (kEventAtFault | kEventOffRoad | kEventRedLight)) != 0;
-    goals += state.goals_reached[slot];
-    waypoints += state.waypoints_reached[slot];
-    distance_m += static_cast<double>(state.distance_m[slot]);
-    returns += static_cast<double>(state.episode_return[slot]);
-  }
-
-  EvaluateRow row(const std::string& density, int scenarios, int steps) const {
-    const auto vehicles = static_cast<double>(episodes);
-    EvaluateRow result;
-    result.density = density;
-    result.scenarios = scenarios;
-    result.steps = steps;
-    result.vehicle_episodes = episodes;
-    result.at_fault_collision_rate = static_cast<double>(at_fault) / vehicles;
-    result.off_road_rate = static_cast<double>(off_road) / vehicles;
-    result.red_light_rate = static_cast<double>(red_light) / vehicles;
-    result.goals_per_vehicle = static_cast<double>(goals) / vehicles;
-    result.waypoints_per_vehicle = static_cast<double>(waypoints) / vehicles;
-    result.return_per_vehicle = returns / vehicles;
-    result.km_driven = distance_m / 1000;
-    result.km_per_infraction =
-        infractions > 0 ? result.km_driven / static_cast<double>(infractions) : std::numeric_limits<double>::infinity();
-    return result;
-  }
-};
+void add(const AgentStateView& state, int64_t slot, ScenarioCounts* counts) {
+  const auto status = static_cast<AgentStatus>(state.status[slot]);
+  if (status == AgentStatus::absent) return;
+  if (static_cast<AgentClass>(state.agent_class[slot]) != AgentClass::vehicle) return;
+  const uint8_t events = state.episode_events[slot];
+  ++counts->vehicles;
+  counts->at_fault += (events & kEventAtFault) != 0;
+  counts->off_road += (events & kEventOffRoad) != 0;
+  counts->red_light += (events & kEventRedLight) != 0;
+  counts->infractions += (events & (kEventAtFault | kEventOffRoad | kEventRedLight)) != 0;
+  counts->active_at_end += status == AgentStatus::active;
+  counts->goals += state.goals_reached[slot];
+  counts->waypoints += state.waypoints_reached[slot];
+  counts->distance_m += static_cast<double>(state.distance_m[slot]);
+  counts->returns += static_cast<double>(state.episode_return[slot]);
+}
 
 }  // namespace
 
 EvaluateReport evaluate(const EvaluateOptions& options) {
-  if (options.scenarios < 1) fail_usage("evaluate: expected one scenario or more, got {}", options.scenarios);
-  if (options.steps < 1) fail_usage("evaluate: expected one step or more, got {}", options.steps);
-  if (options.maps.empty()) fail_usage("evaluate: expected one map or more");
-  if (options.agents_per_world < 0 || options.agents_per_world > kMaxAgentsPerWorld) {
-    fail_usage("evaluate: expected 1 to {} agents per world, got {}", kMaxAgentsPerWorld, options.agents_per_world);
-  }
   PolicySession session(options.checkpoint, {.num_threads = options.num_threads,
                                              .device = options.device,
                                              .simulator = options.simulator,
@@ -114,7 +84,18 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
                                              .rig = options.rig,
                                              .width_px = options.width_px,
                                              .height_px = options.height_px});
-  SimulatorConfig simulator_config = session.evaluation_world(options.steps);
+  return evaluate(&session, options);
+}
+
+EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options) {
+  if (options.first_scenario < 0) fail_usage("evaluate: expected a scenario from 0, got {}", options.first_scenario);
+  if (options.scenarios < 1) fail_usage("evaluate: expected one scenario or more, got {}", options.scenarios);
+  if (options.steps < 1) fail_usage("evaluate: expected one step or more, got {}", options.steps);
+  if (options.maps.empty()) fail_usage("evaluate: expected one map or more");
+  if (options.agents_per_world < 0 || options.agents_per_world > kMaxAgentsPerWorld) {
+    fail_usage("evaluate: expected 1 to {} agents per world, got {}", kMaxAgentsPerWorld, options.agents_per_world);
+  }
+  SimulatorConfig simulator_config = session->evaluation_world(options.steps);
   simulator_config.seed = options.seed;
   std::vector<std::shared_ptr<const RoadMap>> roads;
   for (const std::string& name : options.maps) roads.push_back(load_map(name));
@@ -129,15 +110,23 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
   for (const DensityOf& density : densities) work += double(density.agents) * options.scenarios * options.steps;
 
   const Stopwatch since_start;
-  const std::unique_ptr<Renderer> renderer = session.make_renderer();
+  const std::unique_ptr<Renderer> renderer = session->make_renderer();
   std::unique_ptr<Simulator> simulator;  // made with the first batch
   EvaluateReport report;
+  report.results.setting = session->evaluation_setting();
+  EvaluationSetting& setting = report.results.setting;
+  setting.maps = options.maps;
+  setting.steps = options.steps;
+  setting.argmax = options.argmax;
+  setting.seed = options.seed;
   for (const DensityOf& density : densities) {
-    Tally tally;
-    const int per_batch = worlds_per_batch(session.device(), density.agents);
+    DensityResult result{density.name, density.agents, options.first_scenario, {}};
+    result.scenarios.resize(static_cast<size_t>(options.scenarios));
+    const int per_batch = worlds_per_batch(session->device(), density.agents);
     for (int first = 0; first < options.scenarios; first += per_batch) {
       std::vector<WorldSpec> worlds;
-      for (int scenario = first; scenario < std::min(first + per_batch, options.scenarios); ++scenario) {
+      for (int i = first; i < std::min(first + per_batch, options.scenarios); ++i) {
+        const int scenario = options.first_scenario + i;
         worlds.push_back({scenario % static_cast<int>(maps.size()), density.agents,
                           kFirstEvaluationWorld + static_cast<uint32_t>(scenario)});
       }
@@ -148,10 +137,10 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
         if (renderer) upload_maps(*simulator, renderer.get());
       }
       const std::unique_ptr<Controller> controller =
-          session.make_controller(renderer.get(), options.argmax, options.seed);
+          session->make_controller(renderer.get(), options.argmax, options.seed);
       const auto num_slots = static_cast<size_t>(simulator->num_slots());
       const at::Tensor command_bytes = at::zeros({static_cast<int64_t>(num_slots * sizeof(Command))},
-                                                 at::TensorOptions(at::kByte).device(torch_device(session.device())));
+                                                 at::TensorOptions(at::kByte).device(torch_device(session->device())));
       const Span<Command> commands(reinterpret_cast<Command*>(command_bytes.data_ptr<uint8_t>()), num_slots);
       for (int step = 0; step < options.steps; ++step) {
         // Halted agents stay as they are, so a batch is over when no agent is active.
@@ -169,9 +158,12 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
       }
       done += double(simulator->num_slots()) * options.steps;
       AgentState state = host_state(*simulator);
-      for (int slot = 0; slot < simulator->num_slots(); ++slot) tally.add(state.view(), slot);
+      for (int slot = 0; slot < simulator->num_slots(); ++slot) {
+        add(state.view(), slot, &result.scenarios[static_cast<size_t>(first + slot / density.agents)]);
+      }
     }
-    report.rows.push_back(tally.row(density.name, options.scenarios, options.steps));
+    report.rows.push_back(row_of(result, options.steps));
+    report.results.densities.push_back(std::move(result));
   }
   if (options.on_progress) options.on_progress(1, 0);
   return report;

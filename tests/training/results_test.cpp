@@ -1,0 +1,101 @@
+// Results of an evaluation: ratios and their confidence intervals, files, and merging of parts.
+#include "pictura/training/evaluation/results.h"
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/common/support/file.h"
+#include "pictura/tests/support/error_message.h"
+#include "pictura/tests/support/scratch_folder.h"
+
+namespace pictura {
+namespace {
+
+using test::message_of;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+ScenarioCounts counts(int64_t vehicles, int64_t at_fault, double distance_m) {
+  ScenarioCounts c;
+  c.vehicles = vehicles;
+  c.at_fault = c.infractions = at_fault;
+  c.distance_m = distance_m;
+  return c;
+}
+
+EvaluationResults part(int first_scenario, std::vector<ScenarioCounts> scenarios) {
+  EvaluationResults results;
+  results.setting.policy_hash = "0123456789abcdef";
+  results.setting.maps = {"procedural:1"};
+  results.setting.steps = 100;
+  results.densities.push_back({"light", 8, first_scenario, std::move(scenarios)});
+  return results;
+}
+
+std::string merged_message(const EvaluationResults& a, const EvaluationResults& b) {
+  return message_of([&] { merge({a, b}, {"a.json", "b.json"}); });
+}
+
+TEST(Results, RatesAreOverVehiclesAndIntervalsOverScenarios) {
+  const EvaluateRow row = row_of(part(0, {counts(4, 1, 1000), counts(4, 3, 3000)}).densities[0], 100);
+  EXPECT_EQ(row.scenarios, 2);
+  EXPECT_EQ(row.vehicle_episodes, 8);
+  EXPECT_DOUBLE_EQ(row.km_driven, 4);
+  EXPECT_DOUBLE_EQ(row.at_fault_collision_rate.value, 0.5);
+  // Equal sizes: the interval of the mean of .25 and .75, whose standard error is .25.
+  EXPECT_DOUBLE_EQ(row.at_fault_collision_rate.half_width_95, 1.96 * 0.25);
+  EXPECT_DOUBLE_EQ(row.km_per_infraction.value, 1);
+  EXPECT_DOUBLE_EQ(row.km_per_infraction.half_width_95, 0);
+  EXPECT_DOUBLE_EQ(row.off_road_rate.value, 0);
+}
+
+TEST(Results, WhatCannotBeKnownIsInfinite) {
+  const EvaluateRow one = row_of(part(0, {counts(4, 1, 1000)}).densities[0], 100);
+  EXPECT_DOUBLE_EQ(one.at_fault_collision_rate.value, 0.25);
+  EXPECT_TRUE(std::isinf(one.at_fault_collision_rate.half_width_95));
+  const EvaluateRow clean = row_of(part(0, {counts(4, 0, 1000), counts(4, 0, 1)}).densities[0], 100);
+  EXPECT_TRUE(std::isinf(clean.km_per_infraction.value));
+}
+
+TEST(Results, PartsInAnyOrderMakeTheWhole) {
+  const EvaluationResults whole = part(3, {counts(4, 1, 10.25), counts(5, 2, 0.1), counts(6, 0, 1e9 / 3)});
+  const EvaluationResults first = part(3, {whole.densities[0].scenarios[0]});
+  const EvaluationResults rest = part(4, {whole.densities[0].scenarios[1], whole.densities[0].scenarios[2]});
+  test::ScratchFolder folder;
+  const std::string whole_path = folder / "whole.json", merged_path = folder / "merged.json";
+  write_results(whole_path, whole);
+  write_results(folder / "first.json", first);
+  write_results(folder / "rest.json", rest);
+  write_results(merged_path,
+                merge({read_results(folder / "rest.json"), read_results(folder / "first.json")}, {"rest", "first"}));
+  EXPECT_EQ(read_file(merged_path), read_file(whole_path));
+}
+
+TEST(Results, PartsThatDoNotFitAreRefusedByName) {
+  const EvaluationResults first = part(0, {counts(4, 1, 10), counts(4, 1, 10)});
+  EXPECT_THAT(merged_message(first, part(1, {counts(4, 1, 10)})),
+              AllOf(HasSubstr("b.json: light: begins with scenario 1: expected 2"), HasSubstr("a.json")));
+  EXPECT_THAT(merged_message(first, part(3, {counts(4, 1, 10)})), HasSubstr("begins with scenario 3: expected 2"));
+  EvaluationResults other = part(2, {counts(4, 1, 10)});
+  other.setting.steps = 99;
+  EXPECT_THAT(merged_message(first, other), HasSubstr("b.json: steps is 99, in a.json 100"));
+  EvaluationResults crowd = part(2, {counts(4, 1, 10)});
+  crowd.densities[0].agents_per_world = 9;
+  EXPECT_THAT(merged_message(first, crowd), HasSubstr("has 9 agents a world, a.json has 8"));
+  EXPECT_THAT(message_of([] { merge({}, {}); }), HasSubstr("one part or more"));
+}
+
+TEST(Results, OtherFilesAreRefusedByName) {
+  test::ScratchFolder folder;
+  const std::string path = folder / "x.json";
+  for (const char* text : {"", "[1]", "{}", R"({"format": "pictura evaluation 1"})"}) {
+    write_file(path, text);
+    EXPECT_THAT(message_of([&] { read_results(path); }), AllOf(HasSubstr("x.json"), HasSubstr("evaluate --out")))
+        << text;
+  }
+}
+
+}  // namespace
+}  // namespace pictura

@@ -1,0 +1,201 @@
+#include "pictura/training/evaluation/results.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include <nlohmann/json.hpp>
+
+#include "pictura/common/error.h"
+#include "pictura/common/support/file.h"
+
+namespace pictura {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// The names of all fields of a ScenarioCounts, in files.
+#define PICTURA_SCENARIO_COUNTS(X) \
+  X(vehicles)                      \
+  X(at_fault)                      \
+  X(off_road)                      \
+  X(red_light)                     \
+  X(infractions)                   \
+  X(active_at_end)                 \
+  X(goals)                         \
+  X(waypoints)                     \
+  X(distance_m)                    \
+  X(returns)
+
+constexpr const char* kFormat = "pictura evaluation 1";
+
+template <typename Part, typename Whole>
+Estimate ratio(const std::vector<ScenarioCounts>& scenarios, const Part& part_of, const Whole& whole_of) {
+  double part = 0, whole = 0;
+  for (const ScenarioCounts& scenario : scenarios) {
+    part += static_cast<double>(part_of(scenario));
+    whole += static_cast<double>(whole_of(scenario));
+  }
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  if (whole == 0) return {kInfinity, kInfinity};
+  const double value = part / whole;
+  double squares = 0;
+  for (const ScenarioCounts& scenario : scenarios) {
+    const double residual = static_cast<double>(part_of(scenario)) - value * static_cast<double>(whole_of(scenario));
+    squares += residual * residual;
+  }
+  const auto n = static_cast<double>(scenarios.size());
+  if (n < 2) return {value, kInfinity};
+  return {value, 1.96 * std::sqrt(n / (n - 1) * squares) / whole};
+}
+
+Json to_json(const EvaluationSetting& s) {
+  return {{"policy_hash", s.policy_hash}, {"maps", s.maps},         {"steps", s.steps},
+          {"argmax", s.argmax},           {"seed", s.seed},         {"precision", s.precision},
+          {"device", s.device},           {"renderer", s.renderer}, {"samples", s.samples},
+          {"image_sizes", s.image_sizes}};
+}
+
+EvaluationSetting setting_from(const Json& json) {
+  EvaluationSetting s;
+  json.at("policy_hash").get_to(s.policy_hash);
+  json.at("maps").get_to(s.maps);
+  json.at("steps").get_to(s.steps);
+  json.at("argmax").get_to(s.argmax);
+  json.at("seed").get_to(s.seed);
+  json.at("precision").get_to(s.precision);
+  json.at("device").get_to(s.device);
+  json.at("renderer").get_to(s.renderer);
+  json.at("samples").get_to(s.samples);
+  json.at("image_sizes").get_to(s.image_sizes);
+  return s;
+}
+
+Json to_json(const ScenarioCounts& counts) {
+  Json json;
+#define X(name) json[#name] = counts.name;
+  PICTURA_SCENARIO_COUNTS(X)
+#undef X
+  return json;
+}
+
+ScenarioCounts counts_from(const Json& json) {
+  ScenarioCounts counts;
+#define X(name) json.at(#name).get_to(counts.name);
+  PICTURA_SCENARIO_COUNTS(X)
+#undef X
+  return counts;
+}
+
+struct Part {
+  const DensityResult* result;
+  const std::string* name;
+};
+
+// Of one density.
+DensityResult joined(std::vector<Part> parts) {
+  std::sort(parts.begin(), parts.end(),
+            [](const Part& a, const Part& b) { return a.result->first_scenario < b.result->first_scenario; });
+  DensityResult all = *parts[0].result;
+  for (size_t i = 1; i < parts.size(); ++i) {
+    const DensityResult& next = *parts[i].result;
+    const auto end = all.first_scenario + static_cast<int>(all.scenarios.size());
+    PICTURA_CHECK(next.agents_per_world == all.agents_per_world, "{}: {}: has {} agents a world, {} has {}",
+                  *parts[i].name, next.density, next.agents_per_world, *parts[0].name, all.agents_per_world);
+    PICTURA_CHECK(next.first_scenario == end,
+                  "{}: {}: begins with scenario {}: expected {}, the next after those of {}", *parts[i].name,
+                  next.density, next.first_scenario, end, *parts[i - 1].name);
+    all.scenarios.insert(all.scenarios.end(), next.scenarios.begin(), next.scenarios.end());
+  }
+  return all;
+}
+
+}  // namespace
+
+EvaluateRow row_of(const DensityResult& result, int steps) {
+  using Counts = ScenarioCounts;
+  const std::vector<Counts>& all = result.scenarios;
+  const auto per_vehicle = [&all](const auto& part_of) {
+    return ratio(all, part_of, [](const Counts& c) { return c.vehicles; });
+  };
+  const auto km_of = [](const Counts& c) { return c.distance_m / 1000; };
+
+  EvaluateRow row;
+  row.density = result.density;
+  row.scenarios = static_cast<int>(all.size());
+  row.steps = steps;
+  for (const Counts& counts : all) {
+    row.vehicle_episodes += counts.vehicles;
+    row.km_driven += km_of(counts);
+  }
+  row.at_fault_collision_rate = per_vehicle([](const Counts& c) { return c.at_fault; });
+  row.off_road_rate = per_vehicle([](const Counts& c) { return c.off_road; });
+  row.red_light_rate = per_vehicle([](const Counts& c) { return c.red_light; });
+  row.goals_per_vehicle = per_vehicle([](const Counts& c) { return c.goals; });
+  row.km_per_infraction = ratio(all, km_of, [](const Counts& c) { return c.infractions; });
+  row.km_per_vehicle = per_vehicle(km_of);
+  row.waypoints_per_vehicle = per_vehicle([](const Counts& c) { return c.waypoints; });
+  row.return_per_vehicle = per_vehicle([](const Counts& c) { return c.returns; });
+  row.active_at_end_share = per_vehicle([](const Counts& c) { return c.active_at_end; });
+  return row;
+}
+
+EvaluationResults merge(const std::vector<EvaluationResults>& parts, const std::vector<std::string>& names) {
+  PICTURA_CHECK(!parts.empty(), "merge: expected one part or more");
+  std::vector<std::string> order;
+  std::map<std::string, std::vector<Part>> by_density;
+  for (size_t i = 0; i < parts.size(); ++i) {
+    if (parts[i].setting != parts[0].setting) {
+      const Json first = to_json(parts[0].setting), other = to_json(parts[i].setting);
+      for (const auto& [key, value] : first.items()) {
+        PICTURA_CHECK(other[key] == value, "{}: {} is {}, in {} {}", names[i], key, other[key].dump(), names[0],
+                      value.dump());
+      }
+    }
+    for (const DensityResult& density : parts[i].densities) {
+      if (!by_density.contains(density.density)) order.push_back(density.density);
+      by_density[density.density].push_back({&density, &names[i]});
+    }
+  }
+  EvaluationResults all{parts[0].setting, {}};
+  for (const std::string& density : order) all.densities.push_back(joined(by_density[density]));
+  return all;
+}
+
+void write_results(const std::string& path, const EvaluationResults& results) {
+  Json densities = Json::array();
+  for (const DensityResult& density : results.densities) {
+    Json scenarios = Json::array();
+    for (const ScenarioCounts& counts : density.scenarios) scenarios.push_back(to_json(counts));
+    densities.push_back({{"density", density.density},
+                         {"agents_per_world", density.agents_per_world},
+                         {"first_scenario", density.first_scenario},
+                         {"scenarios", scenarios}});
+  }
+  const Json json = {{"format", kFormat}, {"setting", to_json(results.setting)}, {"densities", densities}};
+  write_file(path, json.dump(1) + "\n");
+}
+
+EvaluationResults read_results(const std::string& path) {
+  EvaluationResults results;
+  try {
+    const Json json = Json::parse(read_file(path));
+    PICTURA_CHECK(json.value("format", "") == kFormat, "expected \"format\": \"{}\"", kFormat);
+    results.setting = setting_from(json.at("setting"));
+    for (const Json& density : json.at("densities")) {
+      DensityResult result;
+      density.at("density").get_to(result.density);
+      density.at("agents_per_world").get_to(result.agents_per_world);
+      density.at("first_scenario").get_to(result.first_scenario);
+      for (const Json& counts : density.at("scenarios")) result.scenarios.push_back(counts_from(counts));
+      results.densities.push_back(std::move(result));
+    }
+  } catch (const std::exception& error) {
+    fail("{}: expected the results that pictura evaluate --out writes: {}", path, error.what());
+  }
+  return results;
+}
+
+}  // namespace pictura

@@ -1,0 +1,75 @@
+// What evaluated vehicles did, by scenario; the paper's metrics over them; and the file by which parts of an evaluation
+// are merged. Without torch headers.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace pictura {
+
+/// Of the vehicles of one scenario.
+struct ScenarioCounts {
+  int64_t vehicles = 0;
+  int64_t at_fault = 0, off_road = 0, red_light = 0;  // that did so at least once
+  int64_t infractions = 0;                            // that did any of the three
+  int64_t active_at_end = 0;                          // that have not halted by the last step
+  int64_t goals = 0, waypoints = 0;
+  double distance_m = 0, returns = 0;
+};
+
+/// The scenarios first, first + 1, ... of one density.
+struct DensityResult {
+  std::string density;
+  int agents_per_world = 0;
+  int first_scenario = 0;
+  std::vector<ScenarioCounts> scenarios;
+};
+
+/// What decides an evaluation's numbers. Parts are merged where all of it is the same.
+struct EvaluationSetting {
+  std::string policy_hash;
+  std::vector<std::string> maps;
+  int steps = 0;
+  bool argmax = true;
+  uint64_t seed = 0;
+  std::string precision, device;         // of the network; "cpu" or "cuda"
+  std::string renderer, samples;         // empty for policies without images
+  std::vector<std::string> image_sizes;  // "96x54", of each camera
+  friend bool operator==(const EvaluationSetting&, const EvaluationSetting&) = default;
+};
+
+struct EvaluationResults {
+  EvaluationSetting setting;
+  std::vector<DensityResult> densities;
+};
+
+/// A ratio of sums over scenarios. 95 % of such intervals, value +- half_width_95, hold the ratio over all scenarios
+/// that could be drawn, by the linearised variance between scenarios; infinite for one scenario.
+struct Estimate {
+  double value = 0, half_width_95 = 0;
+};
+
+/// The paper's five metrics (appendix, metric definitions) over the vehicles of one density, and more.
+struct EvaluateRow {
+  std::string density;
+  int scenarios = 0, steps = 0;
+  int64_t vehicle_episodes = 0;
+  Estimate at_fault_collision_rate, off_road_rate, red_light_rate, goals_per_vehicle;
+  Estimate km_per_infraction;  // infinite when there was none
+  double km_driven = 0;
+  Estimate km_per_vehicle, waypoints_per_vehicle, return_per_vehicle;
+  Estimate active_at_end_share;
+};
+
+EvaluateRow row_of(const DensityResult& result, int steps);
+
+/// Joins the parts of each density, which must be of one setting and together scenarios without gap or overlap. Throws
+/// Error naming the parts, by the names given, and what differs.
+EvaluationResults merge(const std::vector<EvaluationResults>& parts, const std::vector<std::string>& names);
+
+/// As one JSON object, exactly. read_results throws Error naming the file and what it lacks.
+void write_results(const std::string& path, const EvaluationResults& results);
+EvaluationResults read_results(const std::string& path);
+
+}  // namespace pictura
