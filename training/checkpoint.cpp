@@ -72,8 +72,11 @@ Rig rig_from_json(const ordered_json& cameras) {
   return rig;
 }
 
+bool is_integer(const at::Tensor& tensor) { return at::isIntegralType(tensor.scalar_type(), /*includeBool=*/true); }
+
+// In f32, or i64 where they are integers.
 std::string bytes_of(const at::Tensor& tensor) {
-  const at::Tensor host = tensor.detach().to(at::kCPU, at::kFloat).contiguous();
+  const at::Tensor host = tensor.detach().to(at::kCPU, is_integer(tensor) ? at::kLong : at::kFloat).contiguous();
   return {static_cast<const char*>(host.const_data_ptr()), host.nbytes()};
 }
 
@@ -267,8 +270,9 @@ void write_safetensors(const std::string& path, const std::vector<NamedTensor>& 
   for (const NamedTensor& tensor : tensors) {
     const size_t begin = data.size();
     data += bytes_of(tensor.value);
-    header[tensor.name] = {
-        {"dtype", "F32"}, {"shape", tensor.value.sizes().vec()}, {"data_offsets", {begin, data.size()}}};
+    header[tensor.name] = {{"dtype", is_integer(tensor.value) ? "I64" : "F32"},
+                           {"shape", tensor.value.sizes().vec()},
+                           {"data_offsets", {begin, data.size()}}};
   }
   std::string text = header.dump();
   text.append((8 - text.size() % 8) % 8, ' ');  // data begin on a multiple of eight bytes

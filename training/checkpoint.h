@@ -45,7 +45,7 @@ std::string first_difference(const Rig& saved, const Rig& now);
 void restore_tensors(const Checkpoint& checkpoint, const std::vector<NamedTensor>& saved,
                      const std::vector<NamedTensor>& parameters);
 
-/// The policy's weights as safetensors, which other tools read: u64 length, JSON, raw data.
+/// Tensors, as a policy's weights, as safetensors, which other tools read: u64 length, JSON, raw data in F32 or I64.
 void write_safetensors(const std::string& path, const std::vector<NamedTensor>& tensors,
                        const std::string& config_toml);
 

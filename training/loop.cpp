@@ -80,13 +80,19 @@ bool collect(Run* run) {
   return true;
 }
 
-// Improves the policy on the rollout.
-UpdateStats improve(Run* run) {
+// Improves the policy on the rollout. What stops it for a number that is not finite is kept in the folder for study.
+UpdateStats improve(const std::string& folder, Run* run) {
   const Config::Train& config = run->config.train;
   run->rollout.compute_advantages(config.gamma, config.gae_lambda, run->executor.get());
   const UpdateKey key{run->config.run.seed, run->update, learning_rate_at(config, run->agent_steps)};
-  return ppo_update(run->policy, run->rollout, config, key, run->executor.get(), &run->optimizer, &run->filter,
-                    &run->timer);
+  try {
+    return ppo_update(run->policy, run->rollout, config, key, run->executor.get(), &run->optimizer, &run->filter,
+                      &run->timer);
+  } catch (const NotFinite& error) {
+    const std::string path = folder + "/failed_minibatch.safetensors";
+    write_safetensors(path, error.minibatch, to_toml(run->config));
+    fail("{}; see {}", error.what(), path);
+  }
 }
 
 }  // namespace
@@ -171,7 +177,7 @@ TrainReport train_on_its_device(const TrainOptions& options) {
     record.totals.subtract(totals_before);
     record.rollout_s = watch.restart();
 
-    record.stats = improve(&run);
+    record.stats = improve(options.out_folder, &run);
     record.update_s = watch.restart();
     record.phases_s = run.timer.take();
     record.diagnosis = diagnose(run.rollout, record.stats.adv_threshold);

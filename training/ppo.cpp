@@ -22,7 +22,16 @@ AdamW::AdamW(const Policy& policy, const Config::Train& config) : parameters_(po
   }
 }
 
-at::Tensor AdamW::step(double learning_rate) {
+namespace {
+
+// Of all gradients as one vector.
+at::Tensor norm_of(const std::vector<at::Tensor>& gradients) {
+  return at::stack(at::_foreach_norm(gradients, 2)).norm();
+}
+
+}  // namespace
+
+AdamW::Step AdamW::step(double learning_rate, const at::Tensor& loss) {
   const at::NoGradGuard no_grad;
   std::vector<at::Tensor> values, gradients, first, second;
   for (size_t i = 0; i < parameters_.size(); ++i) {
@@ -34,14 +43,16 @@ at::Tensor AdamW::step(double learning_rate) {
     first.push_back(first_moments[i].value);
     second.push_back(second_moments[i].value);
   }
-  const at::Tensor norm = at::stack(at::_foreach_norm(gradients, 2)).norm();
+  const at::Tensor norm = norm_of(gradients);
+  const at::Tensor failed = (norm + loss).isfinite().logical_not().to(at::kFloat);
   at::_foreach_mul_(gradients, (config_.max_grad_norm / (norm + 1e-6)).clamp_max(1.0));
   ++steps;
   const std::vector<at::Tensor> counts(values.size(), at::full({}, static_cast<double>(steps), norm.options()));
   at::_fused_adamw_(values, gradients, first, second, {}, counts, learning_rate, config_.adam_beta1, config_.adam_beta2,
-                    config_.weight_decay, config_.adam_eps, /*amsgrad=*/false, /*maximize=*/false);
+                    config_.weight_decay, config_.adam_eps, /*amsgrad=*/false, /*maximize=*/false, /*grad_scale=*/{},
+                    failed);
   for (const NamedTensor& parameter : parameters_) parameter.value.mutable_grad().reset();
-  return norm;
+  return {norm, failed};
 }
 
 namespace {
@@ -121,7 +132,7 @@ at::Tensor gradient_norm(const at::Tensor& loss, const Policy& policy) {
     if (parameter.value.grad().defined()) gradients.push_back(parameter.value.grad());
     parameter.value.mutable_grad().reset();
   }
-  return at::stack(at::_foreach_norm(gradients, 2)).norm();
+  return norm_of(gradients);
 }
 
 constexpr int64_t kNumStats = 7;  // of LossStats
@@ -131,6 +142,111 @@ LossStats loss_stats(const at::Tensor& row) {
   return {values[0], values[1], values[2], values[3], values[4], values[5], values[6]};
 }
 
+bool takes_all(const Config::Train& config) { return config.halted_slots == HaltedSlots::draw; }
+
+// The rows of the transitions that are learned from, i64 [n]: those that the filter keeps, or all, of which those that
+// are not valid have no share. Says in the stats what the filter did.
+at::Tensor taken_rows(const Batch& batch, const Config::Train& config, int64_t update, LearnerExecutor* executor,
+                      AdvantageFilter* filter, UpdateStats* stats) {
+  const float max_advantage = batch.advantages.abs().max().item<float>();
+  PICTURA_CHECK(std::isfinite(max_advantage), "update {}: an advantage is not finite", update + 1);
+  const float threshold = filter->threshold(max_advantage, config.adv_filter_ema, config.adv_filter_threshold);
+  stats->adv_threshold = static_cast<double>(threshold);
+  const at::Tensor kept_and_unused = at::empty_like(batch.advantages, at::kLong);
+  const int64_t num_kept =
+      executor->select_kept(span_of<const float>(batch.advantages), span_of<const uint8_t>(batch.valid), threshold,
+                            span_of<int64_t>(kept_and_unused));
+  if (num_kept == 0) return kept_and_unused.narrow(0, 0, 0);
+  const at::Tensor valid = at::nonzero(batch.valid).squeeze(1);
+  stats->kept_fraction = static_cast<double>(num_kept) / static_cast<double>(valid.size(0));
+  stats->explained_variance =
+      explained_variance(batch.values.index_select(0, valid), batch.returns.index_select(0, valid));
+  return takes_all(config) ? at::arange(batch.valid.size(0), kept_and_unused.options())
+                           : kept_and_unused.narrow(0, 0, num_kept);
+}
+
+// The transitions of some rows in the order of an epoch, cut into minibatches of equal size, to one transition.
+class Minibatches {
+ public:
+  Minibatches(const at::Tensor& taken, int64_t most, const UpdateKey& key, LearnerExecutor* executor)
+      : taken_(taken),
+        shuffled_(at::empty_like(taken)),
+        count_((taken.size(0) + most - 1) / most),
+        key_(key),
+        executor_(executor) {}
+
+  /// Of an epoch.
+  int64_t count() const { return count_; }
+
+  void shuffle(int64_t epoch) {
+    executor_->permute(Permutation(key_.seed, key_.update, epoch, taken_.size(0)), span_of<const int64_t>(taken_),
+                       span_of<int64_t>(shuffled_));
+  }
+
+  /// The rows of one, as the last shuffle() left them.
+  at::Tensor rows(int64_t m) const {
+    const int64_t begin = taken_.size(0) * m / count_, end = taken_.size(0) * (m + 1) / count_;
+    return shuffled_.narrow(0, begin, end - begin);
+  }
+
+ private:
+  const at::Tensor taken_, shuffled_;
+  const int64_t count_;
+  const UpdateKey key_;
+  LearnerExecutor* const executor_;
+};
+
+// Adds a minibatch's gradients to those of the parameters, `forward_chunk` transitions at a time. Returns its LossStats
+// without the norm, f64 [kNumStats]. With `norms`, appends the norms of the first chunk's gradient by each loss alone.
+at::Tensor add_gradients(const Policy& policy, const Rollout& rollout, const Batch& batch, const at::Tensor& minibatch,
+                         const Config::Train& config, PhaseTimer* timer, std::vector<at::Tensor>* norms) {
+  const int64_t size_of_all = minibatch.size(0);
+  at::Tensor advantages = batch.advantages.index_select(0, minibatch);
+  const at::Tensor shares = takes_all(config) ? shares_of(batch.valid.index_select(0, minibatch)) : at::Tensor();
+  if (config.norm_adv && size_of_all > 1) advantages = normalised(advantages, shares);
+  const at::Tensor stats = at::zeros({kNumStats}, advantages.options().dtype(at::kDouble));
+  for (int64_t chunk = 0; chunk < size_of_all; chunk += config.forward_chunk) {
+    const int64_t size = std::min(config.forward_chunk, size_of_all - chunk);
+    const double weight = static_cast<double>(size) / static_cast<double>(size_of_all);
+    const at::Tensor rows = minibatch.narrow(0, chunk, size);
+    const Observation observation = rollout.observations.gather(rows);
+    const auto look = [&] {
+      const PhaseTimer::Scope timed(timer, Phase::learn);
+      return losses_of(policy.forward(observation), batch, rows, advantages.narrow(0, chunk, size),
+                       shares.defined() ? shares.narrow(0, chunk, size) : shares, config.clip_coef);
+    };
+    const Losses losses = look();
+    if (norms && chunk == 0) {
+      const PhaseTimer::Scope timed(timer, Phase::diagnose);
+      for (const at::Tensor& loss : {losses.policy, config.vf_coef * losses.value, config.ent_coef * losses.entropy}) {
+        norms->push_back(gradient_norm(loss, policy));
+      }
+    }
+    const PhaseTimer::Scope timed(timer, Phase::backward);
+    const at::Tensor loss = losses.policy + config.vf_coef * losses.value - config.ent_coef * losses.entropy;
+    (loss * weight).backward();
+    stats.narrow(0, 0, kNumStats - 1) += weight * losses.stats;
+  }
+  return stats;
+}
+
+// All that a minibatch was made of but its images, as NotFinite names it.
+std::vector<NamedTensor> contents_of(const at::Tensor& minibatch, const Batch& batch, const Rollout& rollout) {
+  std::vector<NamedTensor> contents{{"rows", minibatch}};
+  const auto add = [&](std::string_view name, const at::Tensor& all) {
+    contents.push_back({std::string(name), all.index_select(0, minibatch)});
+  };
+  add("actions", batch.actions);
+  add("advantages", batch.advantages);
+  add("log_probs", batch.old_log_probs);
+  add("returns", batch.returns);
+  for (size_t i = 0; i < std::size(kObservationArrays); ++i) {
+    const at::Tensor& array = rollout.observations.arrays().*kObservationTensors[i];
+    if (array.defined()) add(kObservationArrays[i].name, array.flatten(0, 1));
+  }
+  return contents;
+}
+
 }  // namespace
 
 UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Config::Train& config, const UpdateKey& key,
@@ -138,89 +254,54 @@ UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Confi
   UpdateStats stats;
   stats.learning_rate = key.learning_rate;
   const Batch batch(rollout);
+  const at::Tensor taken = taken_rows(batch, config, key.update, executor, filter, &stats);
+  if (taken.size(0) == 0) return stats;
+  Minibatches minibatches(taken, config.minibatch_size, key, executor);
 
-  // Filter, once per rollout.
-  const float max_advantage = batch.advantages.abs().max().item<float>();
-  PICTURA_CHECK(std::isfinite(max_advantage), "update {}: an advantage is not finite", key.update + 1);
-  const float threshold = filter->threshold(max_advantage, config.adv_filter_ema, config.adv_filter_threshold);
-  stats.adv_threshold = static_cast<double>(threshold);
-  const at::Tensor kept_and_unused = at::empty_like(batch.advantages, at::kLong);
-  const int64_t num_kept =
-      executor->select_kept(span_of<const float>(batch.advantages), span_of<const uint8_t>(batch.valid), threshold,
-                            span_of<int64_t>(kept_and_unused));
-  if (num_kept == 0) return stats;
-  const bool takes_all = config.halted_slots == HaltedSlots::draw;  // those that are not valid without a share
-  const int64_t num_rows = takes_all ? batch.valid.size(0) : num_kept;
-  const at::Tensor taken = takes_all ? at::arange(num_rows, kept_and_unused.options())
-                                     : kept_and_unused.narrow(0, 0, num_rows),
-                   shuffled = at::empty_like(taken);
-  const at::Tensor valid = at::nonzero(batch.valid).squeeze(1);
-  stats.kept_fraction = static_cast<double>(num_kept) / static_cast<double>(valid.size(0));
-  stats.explained_variance =
-      explained_variance(batch.values.index_select(0, valid), batch.returns.index_select(0, valid));
-
-  const int64_t num_minibatches = (num_rows + config.minibatch_size - 1) / config.minibatch_size;
-  // Sums over the minibatches of each epoch; the last row is the first minibatch.
+  // Sums over the minibatches of each epoch; the last row is the first minibatch. What is not finite stays in them, so
+  // no minibatch takes a step after the first that fails.
   const at::Tensor sums =
       at::zeros({config.update_epochs + 1, kNumStats}, batch.advantages.options().dtype(at::kDouble));
+  at::Tensor num_failed = at::zeros({}, batch.advantages.options());
+  const auto check = [&] {
+    const auto failed = static_cast<int64_t>(num_failed.item<float>());
+    if (failed == 0) return;
+    const int64_t number = stats.minibatches - failed, epoch = number / minibatches.count(),
+                  m = number % minibatches.count();
+    minibatches.shuffle(epoch);
+    throw NotFinite(fmt::format("update {}, epoch {}, minibatch {}: the loss or its gradient is not finite",
+                                key.update + 1, epoch + 1, m + 1),
+                    contents_of(minibatches.rows(m), batch, rollout));
+  };
   std::vector<at::Tensor> first_norms;
   for (int epoch = 0; epoch < config.update_epochs; ++epoch) {
-    executor->permute(Permutation(key.seed, key.update, epoch, num_rows), span_of<const int64_t>(taken),
-                      span_of<int64_t>(shuffled));
-    for (int64_t m = 0; m < num_minibatches; ++m) {
-      // Minibatches of equal size, to one transition.
-      const int64_t begin = num_rows * m / num_minibatches, end = num_rows * (m + 1) / num_minibatches;
-      const at::Tensor minibatch = shuffled.narrow(0, begin, end - begin);
-      const at::Tensor shares = takes_all ? shares_of(batch.valid.index_select(0, minibatch)) : at::Tensor();
-      at::Tensor advantages = batch.advantages.index_select(0, minibatch);
-      if (config.norm_adv && end - begin > 1) advantages = normalised(advantages, shares);
-
-      const at::Tensor minibatch_stats = at::zeros({kNumStats}, sums.options());
-      for (int64_t chunk = 0; chunk < end - begin; chunk += config.forward_chunk) {
-        const int64_t size = std::min(config.forward_chunk, end - begin - chunk);
-        const double weight = static_cast<double>(size) / static_cast<double>(end - begin);
-        const at::Tensor rows = minibatch.narrow(0, chunk, size);
-        const Observation observation = rollout.observations.gather(rows);
-        const auto look = [&] {
-          const PhaseTimer::Scope timed(timer, Phase::learn);
-          return losses_of(policy.forward(observation), batch, rows, advantages.narrow(0, chunk, size),
-                           takes_all ? shares.narrow(0, chunk, size) : shares, config.clip_coef);
-        };
-        const Losses losses = look();
-        if (stats.minibatches == 0 && chunk == 0) {
-          const PhaseTimer::Scope timed(timer, Phase::diagnose);
-          for (const at::Tensor& loss :
-               {losses.policy, config.vf_coef * losses.value, config.ent_coef * losses.entropy}) {
-            first_norms.push_back(gradient_norm(loss, policy));
-          }
-        }
-        const PhaseTimer::Scope timed(timer, Phase::backward);
-        const at::Tensor loss = losses.policy + config.vf_coef * losses.value - config.ent_coef * losses.entropy;
-        (loss * weight).backward();
-        minibatch_stats.narrow(0, 0, kNumStats - 1) += weight * losses.stats;
-      }
+    minibatches.shuffle(epoch);
+    for (int64_t m = 0; m < minibatches.count(); ++m) {
+      const bool is_first = stats.minibatches == 0;
+      const at::Tensor minibatch_stats =
+          add_gradients(policy, rollout, batch, minibatches.rows(m), config, timer, is_first ? &first_norms : nullptr);
       const PhaseTimer::Scope timed(timer, Phase::optimize);
-      minibatch_stats[kNumStats - 1] = optimizer->step(key.learning_rate);
+      const AdamW::Step step = optimizer->step(key.learning_rate, sums.sum() + minibatch_stats.sum());
+      minibatch_stats[kNumStats - 1] = step.norm;
       sums[epoch] += minibatch_stats;
-      if (stats.minibatches == 0) sums[config.update_epochs] += minibatch_stats;
+      if (is_first) sums[config.update_epochs] += minibatch_stats;
+      num_failed += step.failed;
       ++stats.minibatches;
+      if (num_failed.is_cpu()) check();  // a device is not waited for
     }
   }
+  check();
 
   const at::Tensor all = sums.cpu(), epochs = all.narrow(0, 0, config.update_epochs);
   stats.all = loss_stats(epochs.sum(0) / static_cast<double>(stats.minibatches));
   stats.first = loss_stats(all[config.update_epochs]);
   for (int epoch = 0; epoch < config.update_epochs; ++epoch) {
-    stats.epochs.push_back(loss_stats(epochs[epoch] / static_cast<double>(num_minibatches)));
+    stats.epochs.push_back(loss_stats(epochs[epoch] / static_cast<double>(minibatches.count())));
   }
   const at::Tensor norms = at::stack(first_norms).cpu();
   stats.policy_grad_norm = norms[0].item<double>();
   stats.value_grad_norm = norms[1].item<double>();
   stats.entropy_grad_norm = norms[2].item<double>();
-  const LossStats& means = stats.all;
-  PICTURA_CHECK(std::isfinite(means.policy_loss + means.value_loss + means.entropy) && std::isfinite(means.grad_norm),
-                "update {}: the loss is not finite (policy {}, value {}, entropy {}, gradient norm {})", key.update + 1,
-                means.policy_loss, means.value_loss, means.entropy, means.grad_norm);
   return stats;
 }
 

@@ -2,6 +2,7 @@
 // entropy bonus, advantages filtered per rollout and normalised per minibatch, AdamW under a cosine schedule.
 #pragma once
 
+#include "pictura/common/error.h"
 #include "pictura/training/policy.h"
 #include "pictura/training/rollout.h"
 
@@ -18,9 +19,13 @@ class AdvantageFilter {
 class AdamW {
  public:
   AdamW(const Policy& policy, const Config::Train& config);
-  /// One step along the parameters' gradients, scaled down to max_grad_norm; clears them. Returns their norm before, a
-  /// scalar on the parameters' device, without waiting for it.
-  at::Tensor step(double learning_rate);
+  /// Scalars on the parameters' device, which nothing has waited for.
+  struct Step {
+    at::Tensor norm;    // of the gradients before they were scaled
+    at::Tensor failed;  // f32: 1 where it or the loss is not finite, and no step was taken
+  };
+  /// One step along the parameters' gradients, scaled down to max_grad_norm; clears them.
+  Step step(double learning_rate, const at::Tensor& loss);
 
   std::vector<NamedTensor> first_moments, second_moments;  // in the order of the policy's parameters
   int64_t steps = 0;
@@ -55,7 +60,17 @@ struct UpdateKey {
   double learning_rate = 0;
 };
 
-/// Improves the policy on a rollout with advantages. Throws Error when a loss is not finite.
+/// A loss or a gradient was not finite; names update, epoch and minibatch, counted from 1.
+class NotFinite : public Error {
+ public:
+  NotFinite(const std::string& message, std::vector<NamedTensor> its_minibatch)
+      : Error(message), minibatch(std::move(its_minibatch)) {}
+  /// rows (of the rollout), actions, advantages, log_probs, returns, and the observation's arrays but images.
+  std::vector<NamedTensor> minibatch;
+};
+
+/// Improves the policy on a rollout with advantages. Throws NotFinite, with the policy as it was before that minibatch:
+/// in it on the host, at the end on a device.
 UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Config::Train& config, const UpdateKey& key,
                        LearnerExecutor* executor, AdamW* optimizer_inout, AdvantageFilter* filter_inout,
                        PhaseTimer* timer = nullptr);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include <ATen/Parallel.h>
 #include <ATen/core/grad_mode.h>
@@ -193,7 +194,7 @@ TEST(AdamW, StepsAsLoshchilovAndHutterDefineIt) {
   double expected = start, m = 0, v = 0;
   for (size_t t = 0; t < gradients.size(); ++t) {
     weight.mutable_grad() = at::full_like(weight, gradients[t]);
-    optimizer.step(0.01);
+    optimizer.step(0.01, at::zeros({}));
     m = 0.9 * m + 0.1 * gradients[t];
     v = 0.999 * v + 0.001 * gradients[t] * gradients[t];
     const double power = static_cast<double>(t) + 1;
@@ -358,6 +359,68 @@ TEST(Ppo, InvalidTransitionsTeachNothing) {
   EXPECT_EQ(a.hash(), b.hash());
 }
 
+TEST(AdamW, TakesNoStepWhereTheLossOrAGradientIsNotFinite) {
+  Config::PolicySection section;
+  section.modality = Modality::vector;
+  section.embedding_width = section.backbone_width = section.backbone_layers = 1;
+  const Policy policy(section, 1, 3);
+  const std::string before = policy.hash();
+  AdamW optimizer(policy, Config::Train{});
+  at::Tensor weight = policy.parameters()[0].value;
+  for (const auto& [gradient, loss] : {std::pair{1.0, std::nan("")}, std::pair{HUGE_VAL, 1.0}}) {
+    weight.mutable_grad() = at::full_like(weight, gradient);
+    EXPECT_EQ(optimizer.step(0.01, at::full({}, loss)).failed.item<float>(), 1);
+    EXPECT_EQ(policy.hash(), before);
+    EXPECT_EQ(optimizer.first_moments[0].value.abs().sum().item<float>(), 0);
+  }
+  weight.mutable_grad() = at::full_like(weight, 1.0);
+  EXPECT_EQ(optimizer.step(0.01, at::ones({})).failed.item<float>(), 0);
+  EXPECT_NE(policy.hash(), before);
+}
+
+TEST(Ppo, StopsBeforeTheStepOfAMinibatchThatIsNotFinite) {
+  Config::PolicySection section;
+  section.modality = Modality::vector;
+  section.embedding_width = section.backbone_width = 8;
+  const Policy policy(section, 1, 7);
+  const std::string before = policy.hash();
+  Corridor corridor;
+  corridor.play(policy, 0);
+  corridor.rollout.rewards.copy_(
+      at::arange(corridor.rollout.rewards.numel(), at::kFloat).sin().reshape_as(corridor.rollout.rewards));
+  corridor.compute_advantages(0.9, 0.9);
+  corridor.rollout.log_probs[3][5] = std::nan("");
+  const int64_t bad_row = 3 * Corridor::kSlots + 5;
+  for (const int64_t minibatch_size : {100000, 100}) {
+    Config::Train train;
+    train.minibatch_size = minibatch_size;
+    AdamW optimizer(policy, train);
+    AdvantageFilter filter;
+    try {
+      corridor.update(policy, train, 0, &optimizer, &filter);
+      FAIL() << "expected an Error";
+    } catch (const NotFinite& error) {
+      EXPECT_THAT(error.what(), ::testing::HasSubstr("update 1, epoch 1, minibatch "));
+      std::map<std::string, at::Tensor> kept;
+      for (const NamedTensor& tensor : error.minibatch) kept[tensor.name] = tensor.value;
+      const at::Tensor at_bad_row = kept.at("rows") == bad_row;
+      EXPECT_EQ(at_bad_row.sum().item<int64_t>(), 1);
+      EXPECT_TRUE(kept.at("log_probs").isnan().equal(at_bad_row));
+      EXPECT_TRUE(kept.at("ego").equal(
+          corridor.rollout.observations.arrays().ego.flatten(0, 1).index_select(0, kept.at("rows"))));
+      for (const char* name : {"actions", "advantages", "returns", "waypoints", "lanes"}) {
+        EXPECT_EQ(kept.at(name).size(0), at_bad_row.size(0)) << name;
+      }
+    }
+    if (minibatch_size > bad_row) {
+      EXPECT_EQ(policy.hash(), before);
+    }
+    for (const NamedTensor& parameter : policy.parameters()) {
+      EXPECT_TRUE(parameter.value.isfinite().all().item<bool>()) << parameter.name;
+    }
+  }
+}
+
 TEST(Ppo, NanIsAnError) {
   Config::PolicySection section;
   section.modality = Modality::vector;
@@ -379,7 +442,8 @@ TEST(Ppo, NanIsAnError) {
     corridor.update(policy, train, 4, &optimizer, &filter);
     FAIL() << "expected an Error";
   } catch (const Error& error) {
-    EXPECT_THAT(error.what(), ::testing::HasSubstr("update 5: the loss is not finite"));
+    EXPECT_THAT(error.what(),
+                ::testing::HasSubstr("update 5, epoch 1, minibatch 1: the loss or its gradient is not finite"));
   }
 }
 

@@ -527,6 +527,16 @@ TEST_F(Training, MilestonesAreKeptAndTheSameAfterResuming) {
   EXPECT_EQ(milestones("parts"), milestones("whole"));
 }
 
+TEST_F(Training, ARunThatDivergesStopsAndKeepsTheMinibatch) {
+  TrainOptions o = options("run", {"policy.modality=vector", "train.learning_rate=100"});
+  EXPECT_THAT(message_of([&] { train(o); }), AllOf(HasSubstr("update 1, epoch "), HasSubstr("not finite"),
+                                                   HasSubstr(folder_ / "run/failed_minibatch.safetensors")));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "run/checkpoint.ckpt")) << "the last good policy is the untrained one";
+  EXPECT_EQ(read_checkpoint(folder_ / "run/untrained.ckpt").update, 0);
+  const std::string kept = read_file(folder_ / "run/failed_minibatch.safetensors");
+  EXPECT_THAT(kept, AllOf(HasSubstr(R"("rows":{"dtype":"I64")"), HasSubstr(R"("lanes":{"dtype":"F32")")));
+}
+
 TEST_F(Training, ASecondRunIntoAFolderInUseIsRefusedAndTheFirstGoesOn) {
   std::vector<std::string> refusals;
   TrainOptions first = options("run", {"train.updates=2"});
