@@ -277,6 +277,14 @@ TEST_F(DeviceTraining, EndsWhenItsMinutesAreOverAndGoesOn) {
   EXPECT_EQ(Progress(folder_ / "run/progress.csv").num_updates(), 2u);
 }
 
+TEST_F(DeviceTraining, ARunThatDivergesStopsAndKeepsTheMinibatch) {
+  const std::string run = folder_ / "run";
+  EXPECT_THAT(
+      message_of([&] { train(options("run", "cuda", {"policy.modality=vector", "train.learning_rate=100"})); }),
+      AllOf(HasSubstr("update 1, epoch "), HasSubstr("not finite"), HasSubstr(run + "/failed_minibatch.safetensors")));
+  EXPECT_TRUE(std::filesystem::exists(run + "/failed_minibatch.safetensors"));
+}
+
 TEST_F(DeviceTraining, AutoIsTheDeviceAndOneThatThereIsNotIsRefusedByName) {
   const TrainReport report = train(options("auto", "auto", {"train.updates=1"}));
   EXPECT_EQ(report.device, "cuda:0");
