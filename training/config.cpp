@@ -102,6 +102,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.integer("train.keep_checkpoints", c.train.keep_checkpoints, 1, 1000);
   v.integer("train.milestone_agent_steps", c.train.milestone_agent_steps, 0, int64_t{1} << 50);
   v.choice("train.precision", c.train.precision, kPrecisions);
+  v.flag("train.reproducible", c.train.reproducible);
   v.name("train.images", c.train.images, {"auto", "kept", "redrawn"});
   v.choice("train.halted_slots", c.train.halted_slots, kHaltedSlots);
 
@@ -548,6 +549,8 @@ bool is_of_schedule(const std::string& key) {
          key == "train.learning_rate";
 }
 
+bool is_reported(const std::string& key) { return is_of_schedule(key) || key == "train.reproducible"; }
+
 bool may_differ(const std::string& key, const Config& saved, const Config& now) {
   static const std::set<std::string> kHarmless{"train.updates",
                                                "train.checkpoint_every",
@@ -563,7 +566,7 @@ bool may_differ(const std::string& key, const Config& saved, const Config& now) 
                                                "render.width_px",
                                                "render.height_px",
                                                "simulator.backend"};
-  if (kHarmless.count(key) || key.starts_with("evaluate.") || is_of_schedule(key)) return true;
+  if (kHarmless.count(key) || key.starts_with("evaluate.") || is_reported(key)) return true;
   if (key == "render.backend" && drawn_by(saved.render.backend) == drawn_by(now.render.backend)) return true;
   // The vector policy reads nothing of it, before and now, since the modality may not differ.
   return !saved.reads_images() && key.starts_with("render.");
@@ -597,8 +600,8 @@ std::string first_difference(const Config& saved, const Config& now) {
   return all.empty() ? "" : all.front();
 }
 
-std::vector<std::string> schedule_differences(const Config& saved, const Config& now) {
-  return differences(saved, now, is_of_schedule);
+std::vector<std::string> differences_to_report(const Config& saved, const Config& now) {
+  return differences(saved, now, is_reported);
 }
 
 bool Config::reads(ObservationPart part) const {

@@ -94,6 +94,7 @@ struct Config {
     int64_t keep_checkpoints = 1;        // the newest and those before it, as checkpoint.1.ckpt, ...
     int64_t milestone_agent_steps = 0;   // distance of checkpoints that are kept for ever; 0: none
     Precision precision = Precision::bf16;
+    bool reproducible = false;  // the same bits in every run on a device, see training/precision.h
     /// Of a rollout: kept, or redrawn from its scenes where they are read; auto: kept on the host, redrawn on a device.
     std::string images = "auto";
     HaltedSlots halted_slots = HaltedSlots::skip;  // draw: for measuring alone, with every slot at every step
@@ -132,9 +133,9 @@ std::string to_toml(const Config& config);
 /// images.
 std::string first_difference(const Config& saved, const Config& now);
 
-/// The settings of the learning rate in which the two differ, as "KEY: OLD became NEW": a run that goes on may change
-/// them.
-std::vector<std::string> schedule_differences(const Config& saved, const Config& now);
+/// The settings in which the two differ of those that a run that goes on may change and should say so, the schedule and
+/// train.reproducible, as "KEY: OLD became NEW".
+std::vector<std::string> differences_to_report(const Config& saved, const Config& now);
 
 /// As in a configuration.
 std::string name_of(Precision precision);

@@ -111,6 +111,7 @@ TrainReport train_on_its_device(const TrainOptions& options) {
                 fmt::join(old_files, ", "));
   at::set_num_threads(resolve_num_threads(config.run.num_threads));
   set_float32_products(config.train.precision);
+  set_reproducible(config.train.reproducible);
   release_unused_memory(device);  // of an earlier run
 
   const auto notify = [&options](const std::string& notice) {
@@ -127,7 +128,7 @@ TrainReport train_on_its_device(const TrainOptions& options) {
     const Checkpoint saved = read_checkpoint(report.checkpoint);
     const std::string why_new_episodes = run.restore(saved);
     if (!why_new_episodes.empty()) notify("the saved episodes cannot go on, new ones begin: " + why_new_episodes);
-    for (const std::string& change : schedule_differences(saved.config, config)) notify(change);
+    for (const std::string& change : differences_to_report(saved.config, config)) notify(change);
     recent = saved.recent;
   } else {
     if (!options.init_from.empty()) {

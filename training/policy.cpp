@@ -317,13 +317,4 @@ Decision decide(const Policy& policy, int64_t batch, int64_t chunk,
   return decision;
 }
 
-void set_float32_products(Precision precision) {
-  // One by one: what is set for all does not change convolutions, which have TF32 by default.
-  for (const at::Float32Op operation : {at::Float32Op::CONV, at::Float32Op::MATMUL}) {
-    at::globalContext().setFloat32Precision(
-        at::Float32Backend::CUDA, operation,
-        precision == Precision::tf32 ? at::Float32Precision::TF32 : at::Float32Precision::IEEE);
-  }
-}
-
 }  // namespace pictura

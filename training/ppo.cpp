@@ -5,6 +5,7 @@
 #include <ATen/core/grad_mode.h>
 
 #include "pictura/common/error.h"
+#include "pictura/training/precision.h"
 #include "pictura/training/rules/advantage_filter.h"
 #include "pictura/training/torch_device.h"
 
@@ -257,6 +258,7 @@ UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Confi
   const at::Tensor taken = taken_rows(batch, config, key.update, executor, filter, &stats);
   if (taken.size(0) == 0) return stats;
   Minibatches minibatches(taken, config.minibatch_size, key, executor);
+  const Autotuner autotuner;
 
   // Sums over the minibatches of each epoch; the last row is the first minibatch. What is not finite stays in them, so
   // no minibatch takes a step after the first that fails.

@@ -76,6 +76,7 @@ struct PolicySession::Parts {
   Decision decide(const PolicyInput& input, int64_t batch, const at::Tensor& indices, Renderer* renderer) const {
     at::set_num_threads(resolve_num_threads(config.run.num_threads));
     set_float32_products(config.train.precision);
+    set_reproducible(config.train.reproducible);
     if (config.reads_images()) check_images(input, static_cast<size_t>(batch), renderer);
     return pictura::decide(policy, indices.size(0), config.train.forward_chunk, [&](int64_t begin, int64_t count) {
       const at::Tensor some = indices.narrow(0, begin, count);

@@ -104,6 +104,17 @@ TEST_P(EachModality, LearnsInEachPrecision) {
   }
 }
 
+TEST_P(EachModality, AReproducibleRunGivesTheSamePolicyInEachPrecision) {
+  for (const char* precision : {"fp32", "tf32", "bf16"}) {
+    SCOPED_TRACE(precision);
+    const auto [whole, again, resumed] = test::policies_of_equal_runs(
+        folder_ / precision, "cuda",
+        {modality(), std::string("train.precision=") + precision, "train.reproducible=true"});
+    EXPECT_EQ(again, whole);
+    EXPECT_EQ(resumed, whole);
+  }
+}
+
 // The same actions are drawn in the same worlds, but where a rounding error decides: one draw in a million or so. Then
 // what the simulators count is the same. Losses are means over minibatches between which roundings add up.
 TEST_P(EachModality, TheFirstUpdateIsTheHosts) {

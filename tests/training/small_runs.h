@@ -1,6 +1,7 @@
 // Runs of a few vehicles on the procedural town, and what they write.
 #pragma once
 
+#include <array>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -29,6 +30,20 @@ inline TrainOptions small_run(const std::string& out_folder, const std::string& 
                  "policy.conv_strides=[2, 2]"};
   o.overrides.insert(o.overrides.end(), more.begin(), more.end());
   return o;
+}
+
+/// The hashes of the policies of three runs of two updates: one, the same again, and one that is resumed in between.
+inline std::array<std::string, 3> policies_of_equal_runs(const std::string& folder, const std::string& device,
+                                                         std::vector<std::string> more) {
+  more.push_back("train.updates=2");
+  const std::string whole = train(small_run(folder + "/whole", device, more)).policy_hash,
+                    again = train(small_run(folder + "/again", device, more)).policy_hash;
+  TrainOptions parts = small_run(folder + "/parts", device, more);
+  parts.overrides.back() = "train.updates=1";
+  train(parts);
+  parts.overrides.back() = "train.updates=2";
+  parts.old_run = OldRun::resume;
+  return {whole, again, train(parts).policy_hash};
 }
 
 /// One short evaluation on the procedural map.

@@ -1,0 +1,93 @@
+// One seed gives one policy: in two runs, in one that is resumed, and in every setting that promises it.
+#include <cstdlib>
+#include <set>
+
+#include <ATen/Context.h>
+#include <gmock/gmock.h>
+
+#include "pictura/tests/support/error_message.h"
+#include "pictura/tests/support/scratch_folder.h"
+#include "pictura/tests/training/small_runs.h"
+#include "pictura/training/precision.h"
+
+namespace pictura {
+namespace {
+
+using test::message_of;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class Reproducible : public ::testing::Test {
+ protected:
+  ~Reproducible() override {
+    unsetenv("CUBLAS_WORKSPACE_CONFIG");
+    set_reproducible(false);
+  }
+  test::ScratchFolder folder_;
+};
+
+class EachModality : public Reproducible, public testing::WithParamInterface<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Reproducible, EachModality, testing::Values("vector", "perspective"),
+                         [](const auto& modality) { return std::string(modality.param); });
+
+// On the host precision and train.reproducible change nothing.
+TEST_P(EachModality, TheHostGivesOnePolicyInEverySetting) {
+  std::set<std::string> policies;
+  for (const auto& [precision, reproducible] : {std::pair{"fp32", "false"}, {"tf32", "false"}, {"bf16", "true"}}) {
+    for (const std::string& policy : test::policies_of_equal_runs(
+             folder_ / (std::string(precision) + reproducible), "cpu",
+             {std::string("policy.modality=") + GetParam(), std::string("train.precision=") + precision,
+              std::string("train.reproducible=") + reproducible, "train.num_steps=6"})) {
+      policies.insert(policy);
+    }
+  }
+  EXPECT_EQ(policies.size(), 1u);
+  const TrainReport other = train(test::small_run(
+      folder_ / "other", "cpu", {std::string("policy.modality=") + GetParam(), "train.updates=2", "run.seed=2"}));
+  EXPECT_EQ(policies.count(other.policy_hash), 0u) << "the seed counts";
+}
+
+TEST_F(Reproducible, MeansDeterministicAlgorithmsAndNoAutotuner) {
+  const at::Context& torch = at::globalContext();
+  set_reproducible(true);
+  EXPECT_TRUE(torch.deterministicAlgorithms());
+  EXPECT_FALSE(torch.deterministicAlgorithmsWarnOnly());
+  EXPECT_TRUE(torch.deterministicCuDNN());
+  EXPECT_STREQ(std::getenv("CUBLAS_WORKSPACE_CONFIG"), ":4096:8");
+  {
+    const Autotuner autotuner;
+    EXPECT_FALSE(torch.benchmarkCuDNN());
+  }
+  set_reproducible(false);
+  EXPECT_FALSE(torch.deterministicAlgorithms());
+  EXPECT_FALSE(torch.deterministicCuDNN());
+  EXPECT_FALSE(torch.benchmarkCuDNN()) << "rollouts go without";
+  {
+    const Autotuner autotuner;
+    EXPECT_TRUE(torch.benchmarkCuDNN());
+  }
+  EXPECT_FALSE(torch.benchmarkCuDNN());
+}
+
+TEST_F(Reproducible, AWorkspaceOfCublasThatIsNotIsRefused) {
+  setenv("CUBLAS_WORKSPACE_CONFIG", ":0:0", 1);
+  EXPECT_THAT(message_of([] { set_reproducible(true); }),
+              AllOf(HasSubstr("train.reproducible"), HasSubstr("CUBLAS_WORKSPACE_CONFIG"), HasSubstr("got \":0:0\"")));
+  setenv("CUBLAS_WORKSPACE_CONFIG", ":16:8", 1);
+  set_reproducible(true);
+  EXPECT_STREQ(std::getenv("CUBLAS_WORKSPACE_CONFIG"), ":16:8");
+}
+
+TEST_F(Reproducible, MayChangeWhenARunGoesOnAndIsSaid) {
+  TrainOptions run = test::small_run(folder_ / "run", "cpu", {"policy.modality=vector", "train.updates=1"});
+  train(run);
+  run.old_run = OldRun::resume;
+  run.overrides.push_back("train.reproducible=true");
+  std::vector<std::string> notices;
+  run.on_notice = [&notices](const std::string& notice) { notices.push_back(notice); };
+  train(run);
+  EXPECT_THAT(notices, testing::ElementsAre("train.reproducible: false became true"));
+}
+
+}  // namespace
+}  // namespace pictura
