@@ -25,6 +25,10 @@ AdamW::AdamW(const Policy& policy, const Config::Train& config) : parameters_(po
 
 namespace {
 
+void clear_gradients(const std::vector<NamedTensor>& parameters) {
+  for (const NamedTensor& parameter : parameters) parameter.value.mutable_grad().reset();
+}
+
 // Of all gradients as one vector.
 at::Tensor norm_of(const std::vector<at::Tensor>& gradients) {
   return at::stack(at::_foreach_norm(gradients, 2)).norm();
@@ -52,7 +56,7 @@ AdamW::Step AdamW::step(double learning_rate, const at::Tensor& loss) {
   at::_fused_adamw_(values, gradients, first, second, {}, counts, learning_rate, config_.adam_beta1, config_.adam_beta2,
                     config_.weight_decay, config_.adam_eps, /*amsgrad=*/false, /*maximize=*/false, /*grad_scale=*/{},
                     failed);
-  for (const NamedTensor& parameter : parameters_) parameter.value.mutable_grad().reset();
+  clear_gradients(parameters_);
   return {norm, failed};
 }
 
@@ -102,10 +106,15 @@ struct Losses {
   at::Tensor stats;                   // f64 [6], in the order of LossStats
 };
 
+// Of the chosen actions.
+at::Tensor log_probs_of(const at::Tensor& all_log_probs, const Batch& batch, const at::Tensor& rows) {
+  return all_log_probs.gather(1, batch.actions.index_select(0, rows).unsqueeze(1)).squeeze(1);
+}
+
 Losses losses_of(const Policy::Output& output, const Batch& batch, const at::Tensor& rows, const at::Tensor& advantage,
                  const at::Tensor& shares, double clip_coef) {
   const at::Tensor all_log_probs = at::log_softmax(output.logits, 1);
-  const at::Tensor log_prob = all_log_probs.gather(1, batch.actions.index_select(0, rows).unsqueeze(1)).squeeze(1);
+  const at::Tensor log_prob = log_probs_of(all_log_probs, batch, rows);
   const at::Tensor log_ratio = log_prob - batch.old_log_probs.index_select(0, rows);
   const at::Tensor ratio = log_ratio.exp();
   const at::Tensor clipped = ratio.clamp(1 - clip_coef, 1 + clip_coef);
@@ -126,13 +135,13 @@ Losses losses_of(const Policy::Output& output, const Batch& batch, const at::Ten
 
 // The norm of a loss's gradient over all parameters.
 at::Tensor gradient_norm(const at::Tensor& loss, const Policy& policy) {
-  for (const NamedTensor& parameter : policy.parameters()) parameter.value.mutable_grad().reset();
+  clear_gradients(policy.parameters());
   loss.backward(/*gradient=*/{}, /*retain_graph=*/true);
   std::vector<at::Tensor> gradients;
   for (const NamedTensor& parameter : policy.parameters()) {
     if (parameter.value.grad().defined()) gradients.push_back(parameter.value.grad());
-    parameter.value.mutable_grad().reset();
   }
+  clear_gradients(policy.parameters());
   return norm_of(gradients);
 }
 
@@ -197,6 +206,15 @@ class Minibatches {
   LearnerExecutor* const executor_;
 };
 
+// Calls f(rows of a chunk, its first place in the minibatch, what its agents saw) for all chunks.
+template <typename F>
+void for_each_chunk(const at::Tensor& minibatch, int64_t most, const Rollout& rollout, const F& f) {
+  for (int64_t begin = 0; begin < minibatch.size(0); begin += most) {
+    const at::Tensor rows = minibatch.narrow(0, begin, std::min(most, minibatch.size(0) - begin));
+    f(rows, begin, rollout.observations.gather(rows));
+  }
+}
+
 // Adds a minibatch's gradients to those of the parameters, `forward_chunk` transitions at a time. Returns its LossStats
 // without the norm, f64 [kNumStats]. With `norms`, appends the norms of the first chunk's gradient by each loss alone.
 at::Tensor add_gradients(const Policy& policy, const Rollout& rollout, const Batch& batch, const at::Tensor& minibatch,
@@ -206,29 +224,53 @@ at::Tensor add_gradients(const Policy& policy, const Rollout& rollout, const Bat
   const at::Tensor shares = takes_all(config) ? shares_of(batch.valid.index_select(0, minibatch)) : at::Tensor();
   if (config.norm_adv && size_of_all > 1) advantages = normalised(advantages, shares);
   const at::Tensor stats = at::zeros({kNumStats}, advantages.options().dtype(at::kDouble));
-  for (int64_t chunk = 0; chunk < size_of_all; chunk += config.forward_chunk) {
-    const int64_t size = std::min(config.forward_chunk, size_of_all - chunk);
-    const double weight = static_cast<double>(size) / static_cast<double>(size_of_all);
-    const at::Tensor rows = minibatch.narrow(0, chunk, size);
-    const Observation observation = rollout.observations.gather(rows);
-    const auto look = [&] {
-      const PhaseTimer::Scope timed(timer, Phase::learn);
-      return losses_of(policy.forward(observation), batch, rows, advantages.narrow(0, chunk, size),
-                       shares.defined() ? shares.narrow(0, chunk, size) : shares, config.clip_coef);
-    };
-    const Losses losses = look();
-    if (norms && chunk == 0) {
-      const PhaseTimer::Scope timed(timer, Phase::diagnose);
-      for (const at::Tensor& loss : {losses.policy, config.vf_coef * losses.value, config.ent_coef * losses.entropy}) {
-        norms->push_back(gradient_norm(loss, policy));
-      }
-    }
-    const PhaseTimer::Scope timed(timer, Phase::backward);
-    const at::Tensor loss = losses.policy + config.vf_coef * losses.value - config.ent_coef * losses.entropy;
-    (loss * weight).backward();
-    stats.narrow(0, 0, kNumStats - 1) += weight * losses.stats;
-  }
+  for_each_chunk(
+      minibatch, config.forward_chunk, rollout,
+      [&](const at::Tensor& rows, int64_t begin, const Observation& observation) {
+        const double weight = static_cast<double>(rows.size(0)) / static_cast<double>(size_of_all);
+        const auto look = [&] {
+          const PhaseTimer::Scope timed(timer, Phase::learn);
+          return losses_of(policy.forward(observation), batch, rows, advantages.narrow(0, begin, rows.size(0)),
+                           shares.defined() ? shares.narrow(0, begin, rows.size(0)) : shares, config.clip_coef);
+        };
+        const Losses losses = look();
+        if (norms && begin == 0) {
+          const PhaseTimer::Scope timed(timer, Phase::diagnose);
+          for (const at::Tensor& loss :
+               {losses.policy, config.vf_coef * losses.value, config.ent_coef * losses.entropy}) {
+            norms->push_back(gradient_norm(loss, policy));
+          }
+        }
+        const PhaseTimer::Scope timed(timer, Phase::backward);
+        const at::Tensor loss = losses.policy + config.vf_coef * losses.value - config.ent_coef * losses.entropy;
+        (loss * weight).backward();
+        stats.narrow(0, 0, kNumStats - 1) += weight * losses.stats;
+      });
   return stats;
+}
+
+// Whether the rollout's log-probabilities differ from the learner's by more than rounding. What is not finite is no
+// matter of arithmetic, and fails.
+bool must_be_recomputed(const LossStats& first) {
+  return std::isfinite(first.abs_log_ratio) &&
+         (first.abs_log_ratio >= kMostAbsLogRatio || first.clip_fraction >= kMostClipFraction);
+}
+
+// The log-probabilities of all chosen actions [steps * slots], for kept transitions by the learner's forward pass: in
+// the minibatches and chunks in which they are learned from next, so that not even the batch's size differs.
+at::Tensor recomputed_log_probs(const Policy& policy, const Rollout& rollout, const Batch& batch,
+                                const Minibatches& minibatches, int64_t forward_chunk, PhaseTimer* timer) {
+  const at::NoGradGuard no_grad;
+  at::Tensor log_probs = batch.old_log_probs.clone();
+  for (int64_t m = 0; m < minibatches.count(); ++m) {
+    for_each_chunk(minibatches.rows(m), forward_chunk, rollout,
+                   [&](const at::Tensor& rows, int64_t, const Observation& observation) {
+                     const PhaseTimer::Scope timed(timer, Phase::learn);
+                     const at::Tensor all = at::log_softmax(policy.forward(observation).logits, 1);
+                     log_probs.index_copy_(0, rows, log_probs_of(all, batch, rows));
+                   });
+  }
+  return log_probs;
 }
 
 // All that a minibatch was made of but its images, as NotFinite names it.
@@ -254,7 +296,7 @@ UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Confi
                        LearnerExecutor* executor, AdamW* optimizer, AdvantageFilter* filter, PhaseTimer* timer) {
   UpdateStats stats;
   stats.learning_rate = key.learning_rate;
-  const Batch batch(rollout);
+  Batch batch(rollout);
   const at::Tensor taken = taken_rows(batch, config, key.update, executor, filter, &stats);
   if (taken.size(0) == 0) return stats;
   Minibatches minibatches(taken, config.minibatch_size, key, executor);
@@ -280,8 +322,21 @@ UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Confi
     minibatches.shuffle(epoch);
     for (int64_t m = 0; m < minibatches.count(); ++m) {
       const bool is_first = stats.minibatches == 0;
-      const at::Tensor minibatch_stats =
-          add_gradients(policy, rollout, batch, minibatches.rows(m), config, timer, is_first ? &first_norms : nullptr);
+      const auto add_its_gradients = [&] {
+        return add_gradients(policy, rollout, batch, minibatches.rows(m), config, timer,
+                             is_first ? &first_norms : nullptr);
+      };
+      at::Tensor minibatch_stats = add_its_gradients();
+      if (is_first) {
+        const LossStats first = loss_stats(minibatch_stats.cpu());
+        if (must_be_recomputed(first)) {
+          stats.rejected = first;
+          batch.old_log_probs = recomputed_log_probs(policy, rollout, batch, minibatches, config.forward_chunk, timer);
+          clear_gradients(policy.parameters());
+          first_norms.clear();
+          minibatch_stats = add_its_gradients();
+        }
+      }
       const PhaseTimer::Scope timed(timer, Phase::optimize);
       const AdamW::Step step = optimizer->step(key.learning_rate, sums.sum() + minibatch_stats.sum());
       minibatch_stats[kNumStats - 1] = step.norm;

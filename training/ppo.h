@@ -2,6 +2,8 @@
 // entropy bonus, advantages filtered per rollout and normalised per minibatch, AdamW under a cosine schedule.
 #pragma once
 
+#include <optional>
+
 #include "pictura/common/error.h"
 #include "pictura/training/policy.h"
 #include "pictura/training/rollout.h"
@@ -41,9 +43,16 @@ struct LossStats {
   double grad_norm = 0;
 };
 
+/// What the log-probabilities that a rollout kept must be to the learner's before the first step, when the two differ
+/// by rounding alone: the mean of their absolute differences, and the share of ratios beyond the clip range, are below
+/// this.
+constexpr double kMostAbsLogRatio = 1e-3, kMostClipFraction = 1e-3;
+
 struct UpdateStats {
-  LossStats all;                  // of the whole update
-  LossStats first;                // of its first minibatch, before the parameters change
+  LossStats all;    // of the whole update
+  LossStats first;  // of its first minibatch, before the parameters change
+  /// The same by the rollout's log-probabilities, where these were not the learner's and were computed again.
+  std::optional<LossStats> rejected;
   std::vector<LossStats> epochs;  // of each
   /// Of the first minibatch's gradient by each loss alone, with its coefficient.
   double policy_grad_norm = 0, value_grad_norm = 0, entropy_grad_norm = 0;

@@ -56,7 +56,7 @@ Scalars scalars_of(const Config& config, const TrainProgress& progress, const Up
   }
   for (const auto& [name, value] :
        {std::pair{"losses/explained_variance", stats.explained_variance},
-        std::pair{"losses/grad_norm", stats.all.grad_norm},
+        std::pair{"losses/recomputed", stats.rejected ? 1.0 : 0.0}, std::pair{"losses/grad_norm", stats.all.grad_norm},
         std::pair{"losses/policy_grad_norm", stats.policy_grad_norm},
         std::pair{"losses/value_grad_norm", stats.value_grad_norm},
         std::pair{"losses/entropy_grad_norm", stats.entropy_grad_norm},
@@ -149,6 +149,7 @@ RunLog::RunLog(const std::string& folder, const Config& config, int64_t updates_
     : config_(config),
       first_update_(updates_done),
       first_agent_steps_(agent_steps),
+      on_notice_(on_notice),
       events_(folder),
       csv_(folder + "/progress.csv", scalars_of(config, {}, {}), updates_done, on_notice),
       recent_(recent.begin(), recent.end()) {}
@@ -172,6 +173,15 @@ TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecor
   if (config_.train.schedule != Schedule::constant) {
     const auto steps_left = static_cast<double>(std::max<int64_t>(0, config_.train.schedule_agent_steps - agent_steps));
     progress.eta_s = std::min(progress.eta_s, elapsed_s / steps_done * steps_left);
+  }
+
+  if (const std::optional<LossStats>& rejected = record.stats.rejected; rejected && !has_said_rejected_ && on_notice_) {
+    has_said_rejected_ = true;
+    on_notice_(fmt::format(
+        "update {}: before its first step the learner's log-probabilities differ by {:.2g} in the mean from the "
+        "rollout's (expected less than {}), and {:.2g} of the ratios are clipped (less than {}): they are computed "
+        "again, here and wherever losses/recomputed is 1",
+        update, rejected->abs_log_ratio, kMostAbsLogRatio, rejected->clip_fraction, kMostClipFraction));
   }
 
   progress.cost = {totals.agent_steps,

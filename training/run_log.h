@@ -43,7 +43,8 @@ class RunLog {
   RunLog(const std::string& folder, const Config& config, int64_t updates_done, int64_t agent_steps,
          const std::vector<RecentUpdate>& recent, const std::function<void(const std::string&)>& on_notice);
 
-  /// Writes the row and the event of an update, after which the run has done `update` updates and `agent_steps`.
+  /// Writes the row and the event of an update, after which the run has done `update` updates and `agent_steps`. Gives
+  /// notice of the first one whose log-probabilities were computed again.
   TrainProgress add(int64_t update, int64_t agent_steps, const UpdateRecord& record);
 
   /// What the mean return of the last updates is made of.
@@ -54,6 +55,8 @@ class RunLog {
  private:
   const Config config_;
   const int64_t first_update_, first_agent_steps_;
+  const std::function<void(const std::string&)> on_notice_;
+  bool has_said_rejected_ = false;
   EventFile events_;
   ProgressCsv csv_;
   std::deque<RecentUpdate> recent_;

@@ -12,11 +12,14 @@
 #include "pictura/backends/make_learner.h"
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
+#include "pictura/tests/training/corridor.h"
 #include "pictura/training/rules/choose_action.h"
 #include "pictura/training/schedule.h"
 
 namespace pictura {
 namespace {
+
+using test::Corridor;
 
 // One agent, the recursion as in the literature.
 std::vector<float> plain_gae(const std::vector<float>& rewards, const std::vector<float>& values,
@@ -205,76 +208,6 @@ TEST(AdamW, StepsAsLoshchilovAndHutterDefineIt) {
   EXPECT_GT(std::abs(expected - start), 1e-3);
 }
 
-// A task for PPO without a simulator. The agent sees a sign s in its ego vector; "go" pays nothing at once but makes
-// the next step's right action pay: credit has to travel over one step.
-struct Corridor {
-  static constexpr int64_t kSlots = 128, kSteps = 8;
-  static constexpr int kGo = 7;
-
-  Rollout rollout;
-  at::Tensor open = at::zeros({kSlots}, at::kFloat), sign = at::ones({kSlots}, at::kFloat);
-
-  const std::unique_ptr<LearnerExecutor> executor = make_learner_executor(Device{});
-
-  Corridor() : rollout(RolloutObservations(storage()), kSteps, kSlots, Device{}) {}
-
-  void compute_advantages(double gamma, double gae_lambda) {
-    rollout.compute_advantages(gamma, gae_lambda, executor.get());
-  }
-  UpdateStats update(const Policy& policy, const Config::Train& train, int64_t number, AdamW* optimizer,
-                     AdvantageFilter* filter) {
-    const UpdateKey key{1, number, learning_rate_at(train, 0)};
-    return ppo_update(policy, rollout, train, key, executor.get(), optimizer, filter);
-  }
-
-  static Observation storage() {
-    const int64_t rows = kSteps + 1;
-    Observation o;
-    o.ego = at::zeros({rows, kSlots, kEgoFeatures}, at::kFloat);
-    o.conditioning = at::zeros({rows, kSlots, kNumConditioning}, at::kFloat);
-    o.waypoints = at::zeros({rows, kSlots, kNumWaypoints * kWaypointFeatures}, at::kFloat);
-    o.partners = at::zeros({rows, kSlots, 1, kPartnerFeatures}, at::kFloat);
-    o.lanes = at::zeros({rows, kSlots, 1, kLaneFeatures}, at::kFloat);
-    o.boundaries = at::zeros({rows, kSlots, 1, kBoundaryFeatures}, at::kFloat);
-    o.controls = at::zeros({rows, kSlots, 1, kControlFeatures}, at::kFloat);
-    o.set_counts = at::zeros({rows, kSlots, kNumEntitySets}, at::kInt);
-    return o;
-  }
-
-  // Mean reward per step of one rollout.
-  double play(const Policy& policy, int64_t update) {
-    for (int64_t t = 0; t <= kSteps; ++t) {
-      const Observation row = row_of(rollout.observations.arrays(), t);
-      at::Tensor ego = row.ego;
-      ego.select(1, 0).copy_(sign);
-      ego.select(1, 1).copy_(open);
-      const Decision decision = decide(policy, kSlots, 50, [&row](int64_t begin, int64_t count) {
-        return row.map([&](const at::Tensor& all) { return all.narrow(0, begin, count); });
-      });
-      rollout.values.select(0, t).copy_(decision.value);
-      if (t == kSteps) break;
-      for (int64_t slot = 0; slot < kSlots; ++slot) {
-        RandomStream stream({.seed = 9,
-                             .agent = static_cast<uint32_t>(slot),
-                             .episode = static_cast<uint32_t>(update),
-                             .step = static_cast<uint32_t>(t),
-                             .purpose = Purpose::action});
-        const float* log_probs = decision.log_probs.const_data_ptr<float>() + slot * kNumActions;
-        const int action = draw_action(log_probs, kNumActions, stream.uniform());
-        const bool was_open = open[slot].item<float>() > 0;
-        const int right = sign[slot].item<float>() > 0 ? 2 : 10;
-        rollout.actions[t][slot] = action;
-        rollout.log_probs[t][slot] = log_probs[action];
-        rollout.rewards[t][slot] = was_open && action == right ? 1.0f : 0.0f;
-        rollout.valid[t][slot] = 1;
-        open[slot] = !was_open && action == kGo ? 1.0f : 0.0f;
-        sign[slot] = stream.below(2) ? 1.0f : -1.0f;
-      }
-    }
-    return rollout.rewards.mean().item<double>();
-  }
-};
-
 TEST(Ppo, LearnsATaskWithDelayedReward) {
   at::set_num_threads(1);
   const at::AutoGradMode mode(true);
@@ -419,6 +352,47 @@ TEST(Ppo, StopsBeforeTheStepOfAMinibatchThatIsNotFinite) {
       EXPECT_TRUE(parameter.value.isfinite().all().item<bool>()) << parameter.name;
     }
   }
+}
+
+// Both rollouts kept log-probabilities that are not the policy's: the update takes the policy's own.
+TEST(Ppo, LogProbabilitiesThatAreNotTheLearnersAreComputedAgain) {
+  at::set_num_threads(1);
+  Config::PolicySection section;
+  section.modality = Modality::vector;
+  section.embedding_width = section.backbone_width = 8;
+  section.backbone_layers = 1;
+  Config::Train train;
+  train.minibatch_size = 200;
+  train.forward_chunk = 60;
+  std::vector<std::string> policies;
+  for (const double error : {0.0, 5e-4, 2e-3, 0.5}) {
+    SCOPED_TRACE(error);
+    const Policy policy(section, 1, 7);
+    Corridor corridor;
+    corridor.play(policy, 0);
+    corridor.rollout.rewards.copy_(
+        at::arange(corridor.rollout.rewards.numel(), at::kFloat).sin().reshape_as(corridor.rollout.rewards));
+    corridor.compute_advantages(0.9, 0.9);
+    corridor.rollout.log_probs += error;
+    const at::Tensor kept = corridor.rollout.log_probs.clone();
+    AdamW optimizer(policy, train);
+    AdvantageFilter filter;
+    const UpdateStats stats = corridor.update(policy, train, 0, &optimizer, &filter);
+    EXPECT_TRUE(corridor.rollout.log_probs.equal(kept)) << "the rollout stays as it was";
+    EXPECT_EQ(stats.rejected.has_value(), error > kMostAbsLogRatio);
+    if (!stats.rejected) {
+      EXPECT_NEAR(stats.first.abs_log_ratio, error, 1e-5);
+      continue;
+    }
+    EXPECT_NEAR(stats.rejected->abs_log_ratio, error, 1e-5);
+    EXPECT_EQ(stats.rejected->clip_fraction, error > 0.2 ? 1 : 0);
+    EXPECT_EQ(stats.first.abs_log_ratio, 0);
+    EXPECT_EQ(stats.first.clip_fraction, 0);
+    EXPECT_GT(stats.policy_grad_norm, 0);
+    policies.push_back(policy.hash());
+  }
+  ASSERT_EQ(policies.size(), 2u);
+  EXPECT_EQ(policies[0], policies[1]);
 }
 
 TEST(Ppo, NanIsAnError) {

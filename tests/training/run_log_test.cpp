@@ -1,7 +1,8 @@
-// progress.csv: what it keeps of an older file, what is logged, the progress line, and what a full disk does to a run's
-// files.
+// progress.csv: what it keeps of an older file, what is logged, its notices, the progress line, and what a full disk
+// does to a run's files.
 #include "pictura/training/run_log.h"
 
+#include <algorithm>
 #include <csignal>
 #include <filesystem>
 
@@ -127,6 +128,24 @@ TEST_F(LoggedRun, TheProgressLineShowsRateTimeLeftMetricsAndPhases) {
   EXPECT_TRUE(seen[2].ends_by_minutes);
   EXPECT_LT(seen[2].eta_s, 3);
   EXPECT_THAT(progress_text(seen[2]), HasSubstr("ETA at most "));
+}
+
+TEST_F(ProgressCsvFile, TheFirstUpdateWithOtherLogProbabilitiesThanTheLearnersIsSaid) {
+  RunLog log(folder_.path(), Config{}, 0, 0, {}, [this](const std::string& text) { notices_.push_back(text); });
+  UpdateRecord record;
+  for (const bool is_rejected : {false, true, true, false}) {
+    record.stats.rejected.reset();
+    if (is_rejected) record.stats.rejected = LossStats{.clip_fraction = 0.25, .abs_log_ratio = 0.0625};
+    log.add(5, 1, record);
+  }
+  ASSERT_EQ(notices_.size(), 1u);
+  EXPECT_THAT(notices_[0], AllOf(HasSubstr("update 5: "), HasSubstr("0.062"), HasSubstr("0.25 of the ratios"),
+                                 HasSubstr("losses/recomputed")));
+  std::vector<std::string> column;
+  const auto rows = test::read_table(folder_ / "progress.csv");
+  const auto at = static_cast<size_t>(std::find(rows[0].begin(), rows[0].end(), "losses/recomputed") - rows[0].begin());
+  for (const auto& row : rows) column.push_back(row.at(at));
+  EXPECT_THAT(column, ::testing::ElementsAre("losses/recomputed", "0", "1", "1", "0"));
 }
 
 // For its lifetime no file grows beyond a size, as on a disk that is full by then.
