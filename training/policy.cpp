@@ -269,7 +269,7 @@ Policy::Policy(const Config::PolicySection& config, int num_cameras, uint64_t se
 Policy::Output Policy::forward(const Observation& o) const {
   at::Tensor x;
   {
-    const LayerPrecision precision(precision_);
+    const LayerPrecision precision(precision_, o.ego.device().type());
     x = at::cat({scene_->forward(o), encode(ego_, o.ego.narrow(1, 0, ego_features_)),
                  encode(conditioning_, at::cat({o.conditioning, o.waypoints}, 1))},
                 1);

@@ -34,7 +34,7 @@ class SceneEncoder {
 class Policy {
  public:
   /// Parameters are drawn from (seed, index of the parameter, index of the element) alone. With `reads_walls` the
-  /// vector policy has a fifth set. `precision` is for CUDA devices.
+  /// vector policy has a fifth set. The host has bf16 too, slowly, but no tf32: there it is fp32.
   Policy(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type = at::kFloat,
          bool reads_walls = false, Device device = {}, Precision precision = Precision::fp32);
 

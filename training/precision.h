@@ -30,23 +30,24 @@ class Autotuner {
 /// While it lives, layers compute in bf16 where that is the precision, and as they are where it is another.
 class LayerPrecision {
  public:
-  explicit LayerPrecision(Precision precision) : is_bf16_(precision == Precision::bf16) {
+  LayerPrecision(Precision precision, at::DeviceType device) : is_bf16_(precision == Precision::bf16), device_(device) {
     if (!is_bf16_) return;
-    at::autocast::set_autocast_dtype(at::kCUDA, at::kBFloat16);
-    at::autocast::set_autocast_enabled(at::kCUDA, true);
+    at::autocast::set_autocast_dtype(device_, at::kBFloat16);
+    at::autocast::set_autocast_enabled(device_, true);
     at::autocast::increment_nesting();
   }
   ~LayerPrecision() {
     if (!is_bf16_) return;
     // Weights are cast once in the scope, and again in the next: the optimizer changes them in between.
     if (at::autocast::decrement_nesting() == 0) at::autocast::clear_cache();
-    at::autocast::set_autocast_enabled(at::kCUDA, false);
+    at::autocast::set_autocast_enabled(device_, false);
   }
   LayerPrecision(const LayerPrecision&) = delete;
   LayerPrecision& operator=(const LayerPrecision&) = delete;
 
  private:
   bool is_bf16_;
+  at::DeviceType device_;
 };
 
 }  // namespace pictura
