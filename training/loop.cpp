@@ -14,6 +14,7 @@
 #include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/training/diagnosis.h"
+#include "pictura/training/memory.h"
 #include "pictura/training/precision.h"
 #include "pictura/training/run.h"
 #include "pictura/training/run_folder.h"
@@ -103,6 +104,7 @@ TrainReport train_on_its_device(const TrainOptions& options) {
   const Stopwatch since_start;
   const Config config = load_config(options.config_path, options.overrides);
   const Device device = open_learning_device(config);
+  check_memory(config, device, available_bytes(device));
   make_output_folder(options.out_folder);
   const FolderLock lock(options.out_folder);
   const std::vector<std::string> old_files = run_files(options.out_folder);

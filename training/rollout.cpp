@@ -8,30 +8,19 @@ namespace pictura {
 
 namespace {
 
-bool keeps_images(const Config& config, Device device) {
-  return config.train.images == "kept" || (config.train.images == "auto" && device.is_host());
-}
-
 SceneHistorySize history_size(Simulator& simulator, int num_steps) {
   const SceneBatch& scene = simulator.scene();
   return {num_steps, scene.geometry.size(), scene.agents.size(), scene.light_states.size(), simulator.views().size()};
 }
 
-double bytes_of_row(const Observation& arrays) {
-  double bytes = 0;
-  arrays.map([&bytes](const at::Tensor& t) {
-    double row = static_cast<double>(t.element_size());
-    for (const int64_t size : t.sizes().slice(1)) row *= static_cast<double>(size);
-    bytes += row;
-    return t;
-  });
-  return bytes;
-}
-
 }  // namespace
 
+bool keeps_images(const Config& config, Device device) {
+  return config.train.images == "kept" || (config.train.images == "auto" && device.is_host());
+}
+
 RolloutObservations::RolloutObservations(const Config& config, Simulator* simulator, Renderer* renderer,
-                                         PhaseTimer* timer, int64_t memory_bytes)
+                                         PhaseTimer* timer)
     : simulator_(simulator), renderer_(renderer), timer_(timer) {
   const Device device = simulator->device();
   PICTURA_CHECK(!config.reads_images() || renderer, "training: a policy that reads images needs a renderer");
@@ -39,22 +28,11 @@ RolloutObservations::RolloutObservations(const Config& config, Simulator* simula
                 "training: simulator '{}' works on {}, renderer '{}' on {}: expected both on one", simulator->name(),
                 name_of(device), renderer->name(), name_of(renderer->device()));
   const int num_slots = simulator->num_slots(), num_steps = config.train.num_steps + 1;
-  const bool keeps = config.reads_images() && keeps_images(config, device);
-  const SceneHistorySize scenes = history_size(*simulator, num_steps);
-  double bytes = bytes_of_row(allocate_observations(config, 0, num_slots, device)) * num_steps;
-  if (keeps)
-    bytes += static_cast<double>(image_layout(renderer->config().rig, num_slots, PixelFormat::u8).bytes()) * num_steps;
-  if (config.reads_images() && !keeps) bytes += static_cast<double>(bytes_of(scenes));
-  PICTURA_CHECK(
-      bytes <= static_cast<double>(memory_bytes),
-      "train: a rollout of {} agents (simulator.num_slots) and {} steps (train.num_steps) needs {:.1f} GB for "
-      "observations; {} has {:.1f} GB",
-      num_slots, config.train.num_steps, bytes / 1e9, name_of(device), static_cast<double>(memory_bytes) / 1e9);
   arrays_ = allocate_observations(config, num_steps, num_slots, device);
-  if (keeps) {
+  if (config.reads_images() && keeps_images(config, device)) {
     arrays_.images = allocate_images(renderer->config().rig, {num_steps, num_slots}, device);
   } else if (config.reads_images()) {
-    scenes_ = make_scene_history(device, scenes);
+    scenes_ = make_scene_history(device, history_size(*simulator, num_steps));
   }
 }
 

@@ -8,15 +8,16 @@
 
 namespace pictura {
 
+/// Whether a rollout keeps images where the policy reads some, rather than drawing them again.
+bool keeps_images(const Config& config, Device device);
+
 /// What the slots saw at each step. Images are kept, or drawn again from the scenes whenever they are read: those of
 /// the paper's rollout would take 163 GB, its scenes 0.25 GB.
 class RolloutObservations {
  public:
   /// For `num_steps` + 1 steps of this simulator, which must outlive it, as must the renderer and the timer. Policies
-  /// without images need no renderer. Memory is handed out before it is there, so a rollout that can never fit is
-  /// refused: throws Error naming the settings that decide its size.
-  RolloutObservations(const Config& config, Simulator* simulator, Renderer* renderer, PhaseTimer* timer,
-                      int64_t memory_bytes);
+  /// without images need no renderer. training/memory.h says whether there is memory for it.
+  RolloutObservations(const Config& config, Simulator* simulator, Renderer* renderer, PhaseTimer* timer);
   /// Of arrays alone, [num_steps + 1, slots, ...].
   explicit RolloutObservations(Observation arrays) : arrays_(std::move(arrays)) {}
 

@@ -41,8 +41,8 @@ Run::Run(const Config& its_config, Device its_device)
       timer(device),
       policy(make_policy(config, rig, device)),
       optimizer(policy, config.train),
-      rollout(RolloutObservations(config, simulator.get(), renderer.get(), &timer, executor->memory_bytes()),
-              config.train.num_steps, simulator->num_slots(), device) {}
+      rollout(RolloutObservations(config, simulator.get(), renderer.get(), &timer), config.train.num_steps,
+              simulator->num_slots(), device) {}
 
 void Run::save(const std::string& path, const std::vector<RecentUpdate>& recent) const {
   Checkpoint checkpoint;

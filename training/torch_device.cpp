@@ -89,6 +89,11 @@ DeviceMemory memory_of(Device device) {
           allocator->getDeviceStats(index).allocated_bytes[kAll].peak};
 }
 
+int64_t available_bytes(Device device) {
+  release_unused_memory(device);
+  return make_learner_executor(device)->memory_bytes();
+}
+
 at::Device torch_device(Device device) {
   return device.is_host() ? at::Device(at::kCPU) : at::Device(at::kCUDA, static_cast<c10::DeviceIndex>(device.index));
 }

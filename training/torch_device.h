@@ -25,6 +25,9 @@ struct DeviceMemory {
 };
 DeviceMemory memory_of(Device device);
 
+/// Bytes that can be had there: of a device, what is free when torch has given back what it caches; of the host, all.
+int64_t available_bytes(Device device);
+
 /// The elements of a tensor without gaps. Throws Error where its type is another one.
 template <typename T>
 Span<T> span_of(const at::Tensor& tensor) {

@@ -26,7 +26,7 @@ class LearnerExecutorCuda final : public LearnerExecutor {
     const DeviceGuard guard(device_);
     size_t free_bytes = 0, total_bytes = 0;
     PICTURA_CUDA(cudaMemGetInfo(&free_bytes, &total_bytes));
-    return static_cast<int64_t>(total_bytes);
+    return static_cast<int64_t>(free_bytes);
   }
 
   int64_t select_active(const ControllerInput& input, Span<const uint8_t> mask, Span<int64_t> slots_out,

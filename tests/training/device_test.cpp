@@ -234,8 +234,8 @@ TEST_F(DeviceTraining, WhatARolloutKeepsIsWhatItKeepsOnTheHost) {
     const std::unique_ptr<Renderer> renderer = make_renderer(name, renderer_config(kept, rig_of(kept), device));
     upload_maps(*simulator, renderer.get());
     const std::unique_ptr<LearnerExecutor> executor = make_learner_executor(device);
-    RolloutObservations all[] = {{kept, simulator.get(), renderer.get(), nullptr, executor->memory_bytes()},
-                                 {redrawn, simulator.get(), renderer.get(), nullptr, executor->memory_bytes()}};
+    RolloutObservations all[] = {{kept, simulator.get(), renderer.get(), nullptr},
+                                 {redrawn, simulator.get(), renderer.get(), nullptr}};
     simulator->reset();
     at::Tensor actions = at::arange(kSlots, at::kInt).remainder(kNumActions).to(torch_device(device));
     std::vector<at::Tensor> rows;

@@ -285,8 +285,8 @@ TEST_F(Training, WhatARolloutKeepsIsWhatTheActiveAgentsSaw) {
   const std::unique_ptr<Renderer> renderer = make_renderer("cpu", renderer_config(kept, rig));
   upload_maps(*simulator, renderer.get());
   const std::unique_ptr<LearnerExecutor> executor = make_learner_executor(Device{});
-  RolloutObservations all[] = {{kept, simulator.get(), renderer.get(), nullptr, executor->memory_bytes()},
-                               {redrawn, simulator.get(), renderer.get(), nullptr, executor->memory_bytes()}};
+  RolloutObservations all[] = {{kept, simulator.get(), renderer.get(), nullptr},
+                               {redrawn, simulator.get(), renderer.get(), nullptr}};
   simulator->reset();
   // Full throttle and full lock: some leave the road, and some do so before the others.
   std::vector<int32_t> actions(24);

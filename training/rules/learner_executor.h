@@ -19,7 +19,7 @@ class LearnerExecutor {
   LearnerExecutor& operator=(const LearnerExecutor&) = delete;
 
   virtual Device device() const = 0;
-  /// Of the device, in all.
+  /// That can be had: of a device, what is free; of the host, all, since what caches files is as good as free.
   virtual int64_t memory_bytes() const = 0;
 
   /// The slots whose agents are neither halted nor absent and that the mask [slots] has (empty: all), in ascending
