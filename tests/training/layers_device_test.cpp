@@ -51,7 +51,7 @@ class DeviceLayers : public test::DeviceTest, public testing::WithParamInterface
       return result;
     };
     const auto on_device = [&](const Layer& some) {
-      const LayerPrecision precision(GetParam());
+      const LayerPrecision precision(GetParam(), at::kCUDA);
       return results(some, copies(at::kCUDA, activations(), at::kFloat));
     };
     const std::vector<at::Tensor> expected = results(layer, copies(at::kCPU, at::kDouble, at::kDouble)),
