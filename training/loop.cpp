@@ -35,10 +35,8 @@ at::Tensor seen_slots(const Run& run, const at::Tensor& active) {
 // What the policy makes of the active slots at a step that has been recorded.
 Decision decide(Run* run, int64_t step, const at::Tensor& active) {
   const at::Tensor rows = run->rollout.rows_of(step, seen_slots(*run, active));
-  const auto observe = [&](int64_t begin, int64_t count) {
-    return run->rollout.observations.gather(rows.narrow(0, begin, count));
-  };
-  Decision decision = decide(run->policy, rows.size(0), run->config.train.forward_chunk, observe, &run->timer);
+  const auto observe = [&](const at::Tensor& some) { return run->rollout.observations.gather(some); };
+  Decision decision = decide(run->policy, rows, run->config.train.forward_chunk, observe, &run->timer);
   if (rows.size(0) > active.size(0)) {
     for (at::Tensor* t : {&decision.logits, &decision.log_probs, &decision.value}) *t = t->index_select(0, active);
   }

@@ -8,6 +8,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
 #include "pictura/common/support/hash.h"
+#include "pictura/training/chunks.h"
 #include "pictura/training/layers.h"
 #include "pictura/training/precision.h"
 #include "pictura/training/torch_device.h"
@@ -300,19 +301,18 @@ Policy make_policy(const Config& config, const Rig& rig, Device device) {
                 device.is_host() ? Precision::fp32 : config.train.precision);
 }
 
-Decision decide(const Policy& policy, int64_t batch, int64_t chunk,
-                const std::function<Observation(int64_t begin, int64_t count)>& observe, PhaseTimer* timer) {
+Decision decide(const Policy& policy, const at::Tensor& rows, int64_t chunk,
+                const std::function<Observation(const at::Tensor& rows)>& observe, PhaseTimer* timer) {
   const at::NoGradGuard no_grad;
   const at::TensorOptions options = policy.parameters().front().value.options().requires_grad(false);
-  Decision decision{at::empty({batch, kNumActions}, options), {}, at::empty({batch}, options)};
-  for (int64_t begin = 0; begin < batch; begin += chunk) {
-    const int64_t count = std::min(chunk, batch - begin);
-    const Observation observation = observe(begin, count);
+  Decision decision{at::empty({rows.size(0), kNumActions}, options), {}, at::empty({rows.size(0)}, options)};
+  for_each_chunk(rows, chunk, [&](const Chunk& c) {
+    const Observation observation = observe(c.rows);
     const PhaseTimer::Scope timed(timer, Phase::forward);
     const Policy::Output output = policy.forward(observation);
-    decision.logits.narrow(0, begin, count).copy_(output.logits);
-    decision.value.narrow(0, begin, count).copy_(output.value);
-  }
+    decision.logits.narrow(0, c.begin, c.count).copy_(output.logits.narrow(0, 0, c.count));
+    decision.value.narrow(0, c.begin, c.count).copy_(output.value.narrow(0, 0, c.count));
+  });
   decision.log_probs = at::log_softmax(decision.logits, 1);
   return decision;
 }

@@ -78,9 +78,10 @@ Policy make_policy(const Config& config, const Rig& rig, Device device);
 struct Decision {
   at::Tensor logits, log_probs, value;
 };
-/// `chunk` agents at a time; observe(begin, count) gives what agents [begin, begin + count) of the batch see.
-Decision decide(const Policy& policy, int64_t batch, int64_t chunk,
-                const std::function<Observation(int64_t begin, int64_t count)>& observe, PhaseTimer* timer = nullptr);
+/// For the agents in some rows, i64 [batch], at most `chunk` at a time (chunks.h); observe(rows) gives what those of a
+/// chunk see.
+Decision decide(const Policy& policy, const at::Tensor& rows, int64_t chunk,
+                const std::function<Observation(const at::Tensor& rows)>& observe, PhaseTimer* timer = nullptr);
 
 /// Largest value over the members of each set, [batch, members, width] -> [batch, width]; members at and beyond
 /// counts [batch] are padding; an empty set gives zeros.

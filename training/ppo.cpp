@@ -5,6 +5,7 @@
 #include <ATen/core/grad_mode.h>
 
 #include "pictura/common/error.h"
+#include "pictura/training/chunks.h"
 #include "pictura/training/precision.h"
 #include "pictura/training/rules/advantage_filter.h"
 #include "pictura/training/torch_device.h"
@@ -206,13 +207,14 @@ class Minibatches {
   LearnerExecutor* const executor_;
 };
 
-// Calls f(rows of a chunk, its first place in the minibatch, what its agents saw) for all chunks.
-template <typename F>
-void for_each_chunk(const at::Tensor& minibatch, int64_t most, const Rollout& rollout, const F& f) {
-  for (int64_t begin = 0; begin < minibatch.size(0); begin += most) {
-    const at::Tensor rows = minibatch.narrow(0, begin, std::min(most, minibatch.size(0) - begin));
-    f(rows, begin, rollout.observations.gather(rows));
-  }
+// What each row of a chunk counts in the chunk's means: undefined where each counts as one. `shares` are those of the
+// whole minibatch, or undefined. What fills the chunk up counts nothing.
+at::Tensor shares_in(const Chunk& chunk, const at::Tensor& shares, const at::TensorOptions& options) {
+  if (chunk.count == chunk.size()) return shares.defined() ? chunk.take(shares) : shares;
+  const at::Tensor padded =
+      shares.defined() ? chunk.take(shares)
+                       : at::constant_pad_nd(at::ones({chunk.count}, options), {0, chunk.size() - chunk.count});
+  return padded * (static_cast<double>(chunk.size()) / static_cast<double>(chunk.count));
 }
 
 // Adds a minibatch's gradients to those of the parameters, `forward_chunk` transitions at a time. Returns its LossStats
@@ -224,28 +226,26 @@ at::Tensor add_gradients(const Policy& policy, const Rollout& rollout, const Bat
   const at::Tensor shares = takes_all(config) ? shares_of(batch.valid.index_select(0, minibatch)) : at::Tensor();
   if (config.norm_adv && size_of_all > 1) advantages = normalised(advantages, shares);
   const at::Tensor stats = at::zeros({kNumStats}, advantages.options().dtype(at::kDouble));
-  for_each_chunk(
-      minibatch, config.forward_chunk, rollout,
-      [&](const at::Tensor& rows, int64_t begin, const Observation& observation) {
-        const double weight = static_cast<double>(rows.size(0)) / static_cast<double>(size_of_all);
-        const auto look = [&] {
-          const PhaseTimer::Scope timed(timer, Phase::learn);
-          return losses_of(policy.forward(observation), batch, rows, advantages.narrow(0, begin, rows.size(0)),
-                           shares.defined() ? shares.narrow(0, begin, rows.size(0)) : shares, config.clip_coef);
-        };
-        const Losses losses = look();
-        if (norms && begin == 0) {
-          const PhaseTimer::Scope timed(timer, Phase::diagnose);
-          for (const at::Tensor& loss :
-               {losses.policy, config.vf_coef * losses.value, config.ent_coef * losses.entropy}) {
-            norms->push_back(gradient_norm(loss, policy));
-          }
-        }
-        const PhaseTimer::Scope timed(timer, Phase::backward);
-        const at::Tensor loss = losses.policy + config.vf_coef * losses.value - config.ent_coef * losses.entropy;
-        (loss * weight).backward();
-        stats.narrow(0, 0, kNumStats - 1) += weight * losses.stats;
-      });
+  for_each_chunk(minibatch, config.forward_chunk, [&](const Chunk& chunk) {
+    const double weight = static_cast<double>(chunk.count) / static_cast<double>(size_of_all);
+    const Observation observation = rollout.observations.gather(chunk.rows);
+    const auto look = [&] {
+      const PhaseTimer::Scope timed(timer, Phase::learn);
+      return losses_of(policy.forward(observation), batch, chunk.rows, chunk.take(advantages),
+                       shares_in(chunk, shares, advantages.options()), config.clip_coef);
+    };
+    const Losses losses = look();
+    if (norms && chunk.begin == 0) {
+      const PhaseTimer::Scope timed(timer, Phase::diagnose);
+      for (const at::Tensor& loss : {losses.policy, config.vf_coef * losses.value, config.ent_coef * losses.entropy}) {
+        norms->push_back(gradient_norm(loss, policy));
+      }
+    }
+    const PhaseTimer::Scope timed(timer, Phase::backward);
+    const at::Tensor loss = losses.policy + config.vf_coef * losses.value - config.ent_coef * losses.entropy;
+    (loss * weight).backward();
+    stats.narrow(0, 0, kNumStats - 1) += weight * losses.stats;
+  });
   return stats;
 }
 
@@ -263,12 +263,13 @@ at::Tensor recomputed_log_probs(const Policy& policy, const Rollout& rollout, co
   const at::NoGradGuard no_grad;
   at::Tensor log_probs = batch.old_log_probs.clone();
   for (int64_t m = 0; m < minibatches.count(); ++m) {
-    for_each_chunk(minibatches.rows(m), forward_chunk, rollout,
-                   [&](const at::Tensor& rows, int64_t, const Observation& observation) {
-                     const PhaseTimer::Scope timed(timer, Phase::learn);
-                     const at::Tensor all = at::log_softmax(policy.forward(observation).logits, 1);
-                     log_probs.index_copy_(0, rows, log_probs_of(all, batch, rows));
-                   });
+    for_each_chunk(minibatches.rows(m), forward_chunk, [&](const Chunk& chunk) {
+      const Observation observation = rollout.observations.gather(chunk.rows);
+      const PhaseTimer::Scope timed(timer, Phase::learn);
+      const at::Tensor all = at::log_softmax(policy.forward(observation).logits, 1).narrow(0, 0, chunk.count);
+      const at::Tensor rows = chunk.rows.narrow(0, 0, chunk.count);
+      log_probs.index_copy_(0, rows, log_probs_of(all, batch, rows));
+    });
   }
   return log_probs;
 }

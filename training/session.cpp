@@ -78,8 +78,7 @@ struct PolicySession::Parts {
     set_float32_products(config.train.precision);
     set_reproducible(config.train.reproducible);
     if (config.reads_images()) check_images(input, static_cast<size_t>(batch), renderer);
-    return pictura::decide(policy, indices.size(0), config.train.forward_chunk, [&](int64_t begin, int64_t count) {
-      const at::Tensor some = indices.narrow(0, begin, count);
+    return pictura::decide(policy, indices, config.train.forward_chunk, [&](const at::Tensor& some) {
       Observation observation = select_arrays(config, input.observations, device, batch, some);
       if (config.reads_images()) observation.images = draw(input, some, renderer);
       return observation;

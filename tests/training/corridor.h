@@ -54,8 +54,8 @@ struct Corridor {
       at::Tensor ego = row.ego;
       ego.select(1, 0).copy_(sign);
       ego.select(1, 1).copy_(open);
-      const Decision decision = decide(policy, kSlots, 50, [&row](int64_t begin, int64_t count) {
-        return row.map([&](const at::Tensor& all) { return all.narrow(0, begin, count); });
+      const Decision decision = decide(policy, at::arange(kSlots), 50, [&row](const at::Tensor& slots) {
+        return row.map([&](const at::Tensor& all) { return all.index_select(0, slots); });
       });
       rollout.values.select(0, t).copy_(decision.value);
       if (t == kSteps) break;
