@@ -15,6 +15,27 @@ struct Arguments {
   bool json = false;
 };
 
+// Of the profiled update: the time of all kernels and copies, what of the wall time none of them ran in, and the
+// longest kernels. They run one after the other, on one stream.
+void add_kernels(const TrainingMeasurement& measurement, std::vector<BenchResult>* results_inout) {
+  double all_s = 0;
+  int64_t launches = 0;
+  for (const KernelTime& kernel : measurement.kernels) {
+    all_s += kernel.seconds;
+    launches += kernel.launches;
+  }
+  const double update_s = wall_s(measurement.profiled);
+  results_inout->push_back({"train, kernels of one update", "s", {all_s}});
+  results_inout->push_back({"train, launches of one update", "1", {static_cast<double>(launches)}});
+  results_inout->push_back({"train, launch overhead", "%", {100 * (update_s - all_s) / update_s}});
+  constexpr std::size_t kShown = 40;
+  for (std::size_t i = 0; i < std::min(kShown, measurement.kernels.size()); ++i) {
+    const KernelTime& kernel = measurement.kernels[i];
+    results_inout->push_back(
+        {fmt::format("train, kernel, {} x {}", kernel.launches, kernel.name.substr(0, 160)), "s", {kernel.seconds}});
+  }
+}
+
 void run(Arguments arguments) {
   TrainingCase& measured = arguments.measured;
   for (const std::string& text : overrides_of(arguments.backends)) measured.overrides.push_back(text);
@@ -48,6 +69,7 @@ void run(Arguments arguments) {
     results.push_back(
         {"train, peak of tensors", "GB", {static_cast<double>(measurement.report.peak_tensor_bytes) / 1e9}});
   }
+  if (measured.profiles_kernels) add_kernels(measurement, &results);
   std::string workload = fmt::format("train: {}", measured.config_path);
   for (const std::string& text : measured.overrides) workload += " --set " + text;
   if (!measured.init_from.empty()) workload += ", weights of " + measured.init_from;
@@ -73,6 +95,8 @@ void add_train_benchmark(CLI::App& bench) {
   command->add_option("--updates", measured.updates, "Updates that are measured, whatever train.updates says")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  command->add_flag("--kernels", measured.profiles_kernels,
+                    "Time each kernel in one update more: the longest, and the share of the wall time without any");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Examples:\n  pictura bench train --updates 5\n"

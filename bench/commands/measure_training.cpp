@@ -50,14 +50,21 @@ TrainingMeasurement measure_training(const TrainingCase& training_case) {
                        .out_folder = folder.path,
                        .old_run = OldRun::overwrite,
                        .init_from = training_case.init_from};
-  const int updates = training_case.warm_up + training_case.updates;
+  const int profiled = training_case.warm_up + training_case.updates + 1,
+            updates = training_case.profiles_kernels ? profiled : profiled - 1;
   for (const std::string& text : {fmt::format("train.updates={}", updates), std::string("train.schedule=constant"),
                                   fmt::format("train.checkpoint_every={}", updates)}) {
     options.overrides.push_back(text);
   }
   options.on_progress = [&](const TrainProgress& progress) {
     check_update(progress);
-    if (progress.update > training_case.warm_up) result.updates.push_back(progress.cost);
+    if (progress.update == profiled) {
+      result.profiled = progress.cost;
+      result.kernels = KernelProfile::end();
+    } else if (progress.update > training_case.warm_up) {
+      result.updates.push_back(progress.cost);
+    }
+    if (progress.update + 1 == updates && training_case.profiles_kernels) KernelProfile::begin();
   };
   result.report = train(options);
   if (result.report.interrupted) throw Interrupted("interrupted");

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pictura/bench/commands/bench.h"
+#include "pictura/training/kernel_profile.h"
 #include "pictura/training/loop.h"
 
 namespace pictura {
@@ -14,10 +15,13 @@ struct TrainingCase {
   std::vector<std::string> overrides;
   std::string init_from;  // a checkpoint, or empty
   int warm_up = 1, updates = 3;
+  bool profiles_kernels = false;  // in one update more
 };
 
 struct TrainingMeasurement {
   std::vector<UpdateCost> updates;  // after the warm-up
+  UpdateCost profiled;              // the update in which kernels were timed, and their times
+  std::vector<KernelTime> kernels;
   TrainReport report;
 };
 
