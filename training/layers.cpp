@@ -179,14 +179,14 @@ at::Tensor token_softmax(const at::Tensor& scores) {
 }
 
 at::Tensor image_patches(const at::Tensor& images, int64_t patch_px, at::ScalarType type) {
-  if (!images.is_cuda()) {
+  if (!images.is_cuda() || !PatchSize::takes(patch_px)) {
     return space_to_depth(by_camera(images), patch_px)
         .to(type, /*non_blocking=*/false, /*copy=*/false, at::MemoryFormat::ChannelsLast);
   }
-  const int64_t channels = (3 * patch_px * patch_px + 7) / 8 * 8;  // whole vectors, which matrix units want
-  const PatchSize size{images.size(0), images.size(1), images.size(3), images.size(4), patch_px, channels};
+  const PatchSize size{images.size(0), images.size(1), images.size(3), images.size(4), patch_px};
   const at::Tensor out =
-      at::empty({size.cameras * size.views, size.rows(), size.columns(), channels}, images.options().dtype(type));
+      at::empty({size.cameras * size.views, size.rows(), size.columns(), PatchSize::channels_of(patch_px)},
+                images.options().dtype(type));
   passes_on(images.device())
       .patches(size, images.contiguous().const_data_ptr<uint8_t>(), activation_type_of(type), out.mutable_data_ptr(),
                stream_on(images.device()));

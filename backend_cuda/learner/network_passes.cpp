@@ -41,8 +41,7 @@ class NetworkPassesCuda final : public NetworkPasses {
   }
 
   void patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, Stream stream) override {
-    PICTURA_CHECK(size.channels % 8 == 0 && size.channels >= 3 * size.patch_px * size.patch_px,
-                  "patches: {} channels for patches of {} pixels squared", size.channels, size.patch_px);
+    PICTURA_CHECK(PatchSize::takes(size.patch_px), "patches: of {} pixels squared", size.patch_px);
     launch(cuda::launch_patches, stream, size, images, type, out);
   }
 

@@ -200,39 +200,53 @@ __global__ void __launch_bounds__(kThreads)
   bias_sums.store(sums + 2 * kChannels);
 }
 
+// The row of a patch, of which `count` pixels lie in the image; the others are black. Read at once where whole patches
+// lie side by side, so that rows begin at multiples of their size.
+template <int kPatch>
+__device__ void load_patch_row(const uint8_t* from, int count, bool is_aligned, uint8_t (&pixels_out)[kPatch]) {
+  struct alignas(kPatch == 3 ? 1 : kPatch) Row {
+    uint8_t pixels[kPatch];
+  };
+  Row row{};
+  if (is_aligned && count == kPatch) {
+    row = *reinterpret_cast<const Row*>(from);
+  } else {
+#pragma unroll
+    for (int x = 0; x < kPatch; ++x) row.pixels[x] = x < count ? from[x] : 0;
+  }
+#pragma unroll
+  for (int x = 0; x < kPatch; ++x) pixels_out[x] = row.pixels[x];
+}
+
 // A thread writes all channels of a position. Its numbers fit into 32 bits but for the offset of the image.
-template <typename T>
+template <typename T, int kPatch>
 __global__ void __launch_bounds__(kThreads) patches(PatchSize size, int num_positions, const uint8_t* images, T* out) {
-  constexpr int kWidth = 16 / sizeof(T);
+  constexpr int kWidth = 16 / sizeof(T), kChannels = static_cast<int>(PatchSize::channels_of(kPatch));
   const int image_index = static_cast<int>(blockIdx.x);
   const int position = static_cast<int>(blockIdx.y) * kThreads + static_cast<int>(threadIdx.x);
   if (position >= num_positions) return;
-  const auto columns = static_cast<int>(size.columns()), patch = static_cast<int>(size.patch_px),
-             channels = static_cast<int>(size.channels), height = static_cast<int>(size.height_px),
+  const auto columns = static_cast<int>(size.columns()), height = static_cast<int>(size.height_px),
              width = static_cast<int>(size.width_px), views = static_cast<int>(size.views);
   const int camera = image_index / views, view = image_index % views;
   const uint8_t* const image = images + (view * size.cameras + camera) * 3 * static_cast<int64_t>(height) * width;
-  T* const its_out = out + (image_index * int64_t{num_positions} + position) * channels;
-  const int first_y = position / columns * patch, first_x = position % columns * patch;
-  int color = 0, y = 0, x = 0;  // of the next channel
-  for (int channel = 0; channel < channels; channel += kWidth) {
-    Vector<T, kWidth> result;
+  const int first_y = position / columns * kPatch, first_x = position % columns * kPatch;
+  const bool is_aligned = width % kPatch == 0;
+
+  alignas(16) T values[kChannels] = {};
 #pragma unroll
-    for (int k = 0; k < kWidth; ++k) {
-      float value = 0;
-      if (color < 3 && first_y + y < height && first_x + x < width)
-        value = image[(color * height + first_y + y) * width + first_x + x];
-      result.values[k] = from_float<T>(value);
-      if (++x == patch) {
-        x = 0;
-        if (++y == patch) {
-          y = 0;
-          ++color;
-        }
-      }
-    }
-    reinterpret_cast<Vector<T, kWidth>*>(its_out + channel)[0] = result;
+  for (int row = 0; row < 3 * kPatch; ++row) {
+    const int color = row / kPatch, y = first_y + row % kPatch;
+    uint8_t pixels[kPatch];
+    load_patch_row<kPatch>(image + (color * height + y) * width + first_x,
+                           y < height ? min(kPatch, width - first_x) : 0, is_aligned, pixels);
+#pragma unroll
+    for (int x = 0; x < kPatch; ++x) values[row * kPatch + x] = from_float<T>(static_cast<float>(pixels[x]));
   }
+  using Part = Vector<T, kWidth>;
+  Part* const its_out =
+      reinterpret_cast<Part*>(out + (image_index * int64_t{num_positions} + position) * int64_t{kChannels});
+#pragma unroll
+  for (int i = 0; i < kChannels / kWidth; ++i) its_out[i] = reinterpret_cast<const Part*>(values)[i];
 }
 
 // A thread has a pair of columns of a matrix [tokens, columns]; neighbouring threads read neighbouring memory. What is
@@ -326,6 +340,18 @@ void with_pairs(int64_t channels, F&& f) {
   }
 }
 
+/// f of an integral constant, the side of a patch; nothing for sides that PatchSize::takes() refuses.
+template <typename F>
+void with_patch(int64_t patch_px, F&& f) {
+  switch (patch_px) {
+    case 1: return f(std::integral_constant<int, 1>{});
+    case 2: return f(std::integral_constant<int, 2>{});
+    case 3: return f(std::integral_constant<int, 3>{});
+    case 4: return f(std::integral_constant<int, 4>{});
+    default: return;
+  }
+}
+
 }  // namespace
 
 void launch_bias_gelu(const ActivationSize& size, const void* x, const float* bias, void* out, cudaStream_t stream) {
@@ -380,8 +406,11 @@ void launch_patches(const PatchSize& size, const uint8_t* images, ActivationType
   const dim3 blocks(static_cast<unsigned>(num_images),
                     static_cast<unsigned>((num_positions + kThreads - 1) / kThreads));
   with_type(type, [&](auto element) {
-    using T = decltype(element);
-    patches<T><<<blocks, kThreads, 0, stream>>>(size, static_cast<int>(num_positions), images, static_cast<T*>(out));
+    with_patch(size.patch_px, [&](auto patch) {
+      using T = decltype(element);
+      patches<T, decltype(patch)::value>
+          <<<blocks, kThreads, 0, stream>>>(size, static_cast<int>(num_positions), images, static_cast<T*>(out));
+    });
   });
 }
 

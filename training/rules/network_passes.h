@@ -24,7 +24,9 @@ struct ActivationSize {
 /// [cameras, views, rows, columns, channels], the colors from 0 to 255.
 struct PatchSize {
   int64_t views = 0, cameras = 0, height_px = 0, width_px = 0, patch_px = 1;
-  int64_t channels = 0;  // of a position; at least 3 * patch_px^2
+  static constexpr bool takes(int64_t patch_px) { return patch_px >= 1 && patch_px <= 4; }
+  /// Of a position: whole vectors of 8, which matrix units want.
+  PICTURA_HD static constexpr int64_t channels_of(int64_t patch_px) { return (3 * patch_px * patch_px + 7) / 8 * 8; }
   PICTURA_HD int64_t rows() const { return (height_px + patch_px - 1) / patch_px; }
   PICTURA_HD int64_t columns() const { return (width_px + patch_px - 1) / patch_px; }
 };
