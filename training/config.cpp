@@ -71,6 +71,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.integer("policy.attention_heads", c.policy.attention_heads, 1, 64);
   v.integer("policy.attention_mlp", c.policy.attention_mlp, 0, 1 << 16);
   v.integer("policy.embedding_width", c.policy.embedding_width, 1, 1 << 14);
+  v.flag("policy.point_features", c.policy.point_features);
   v.integer("policy.backbone_layers", c.policy.backbone_layers, 1, 64);
   v.integer("policy.backbone_width", c.policy.backbone_width, 1, 1 << 14);
 

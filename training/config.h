@@ -64,8 +64,9 @@ struct Config {
     std::vector<int> conv_strides{2, 2, 2, 1, 1};
     int num_queries = 16;  // learned queries per camera
     int attention_heads = 4;
-    int attention_mlp = 256;   // hidden width of the block's MLP; 0: none
-    int embedding_width = 64;  // of every group
+    int attention_mlp = 256;     // hidden width of the block's MLP; 0: none
+    int embedding_width = 64;    // of every group
+    bool point_features = true;  // encoders read points near the agent apart, see training/point_features.h
     int backbone_layers = 4, backbone_width = 512;
   } policy;
 

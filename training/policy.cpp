@@ -10,6 +10,7 @@
 #include "pictura/common/support/hash.h"
 #include "pictura/training/chunks.h"
 #include "pictura/training/layers.h"
+#include "pictura/training/point_features.h"
 #include "pictura/training/precision.h"
 #include "pictura/training/torch_device.h"
 
@@ -93,19 +94,23 @@ at::Tensor masked_max(const at::Tensor& members, const at::Tensor& counts) {
 class VectorEncoder final : public SceneEncoder {
  public:
   VectorEncoder(const Config::PolicySection& config, bool reads_walls, ParameterMaker* make)
-      : embedding_width_(config.embedding_width) {
+      : embedding_width_(config.embedding_width), point_features_(config.point_features) {
     for (size_t i = 0; i < std::size(kObservationArrays); ++i) {
       const ObservationArray& array = kObservationArrays[i];
       if (!is_set(array) || (array.part == ObservationPart::walls && !reads_walls)) continue;
-      groups_.push_back({make->group(std::string(array.name), array.features, embedding_width_), kObservationTensors[i],
-                         entity_set_of(i)});
+      const int64_t points = kObservationTensors[i] == &Observation::controls ? 2 : 1;  // a stop line has two ends
+      const int64_t features = array.features + (point_features_ ? points * kPointFeatures : 0);
+      groups_.push_back({make->group(std::string(array.name), features, embedding_width_), kObservationTensors[i],
+                         entity_set_of(i), points});
     }
   }
 
   at::Tensor forward(const Observation& o) const override {
     std::vector<at::Tensor> embeddings;
     for (const Group& group : groups_) {
-      embeddings.push_back(masked_max(encode(group.encoder, o.*group.members), o.set_counts.select(1, group.set)));
+      at::Tensor members = o.*group.members;
+      if (point_features_) members = at::cat({members, point_features(members, group.points)}, 2);
+      embeddings.push_back(masked_max(encode(group.encoder, members), o.set_counts.select(1, group.set)));
     }
     return at::cat(embeddings, 1);
   }
@@ -117,8 +122,10 @@ class VectorEncoder final : public SceneEncoder {
     Policy::GroupEncoder encoder;
     at::Tensor Observation::* members;
     int64_t set;  // its column of set_counts
+    int64_t points;
   };
   int64_t embedding_width_;
+  bool point_features_;
   std::vector<Group> groups_;
 };
 
@@ -245,7 +252,7 @@ class PerspectiveEncoder final : public SceneEncoder {
 
 Policy::Policy(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type,
                bool reads_walls, Device device, Precision precision)
-    : type_(type), precision_(precision) {
+    : type_(type), precision_(precision), point_features_(config.point_features) {
   ParameterMaker make(seed, at::TensorOptions(type).device(torch_device(device)), &parameters_);
   const bool sees_images = config.modality == Modality::perspective;
   if (sees_images)
@@ -256,7 +263,9 @@ Policy::Policy(const Config::PolicySection& config, int num_cameras, uint64_t se
   ego_features_ = sees_images ? kEgoFeatures - 2 : kEgoFeatures;
   const int64_t width = config.embedding_width;
   ego_ = make.group("ego", ego_features_, width);
-  conditioning_ = make.group("conditioning", kNumConditioning + kNumWaypoints * kWaypointFeatures, width);
+  conditioning_ = make.group(
+      "conditioning", kNumConditioning + kNumWaypoints * (kWaypointFeatures + (point_features_ ? kPointFeatures : 0)),
+      width);
   int64_t in = scene_->width() + 2 * width;
   for (int i = 0; i < config.backbone_layers; ++i) {
     backbone_.push_back(make.linear(fmt::format("backbone.{}", i), in, config.backbone_width, std::numbers::sqrt2));
@@ -268,12 +277,16 @@ Policy::Policy(const Config::PolicySection& config, int num_cameras, uint64_t se
 }
 
 Policy::Output Policy::forward(const Observation& o) const {
+  std::vector<at::Tensor> own{o.conditioning, o.waypoints};
+  if (point_features_) {
+    own.push_back(point_features(o.waypoints.unflatten(1, {kNumWaypoints, kWaypointFeatures}), 1).flatten(1));
+  }
   at::Tensor x;
   {
     const LayerPrecision precision(precision_, o.ego.device().type());
-    x = at::cat({scene_->forward(o), encode(ego_, o.ego.narrow(1, 0, ego_features_)),
-                 encode(conditioning_, at::cat({o.conditioning, o.waypoints}, 1))},
-                1);
+    x = at::cat(
+        {scene_->forward(o), encode(ego_, o.ego.narrow(1, 0, ego_features_)), encode(conditioning_, at::cat(own, 1))},
+        1);
     for (const Linear& layer : backbone_) x = apply_gelu(layer, x);
   }
   x = x.to(type_);

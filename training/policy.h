@@ -55,6 +55,7 @@ class Policy {
   at::ScalarType type_;
   Precision precision_;
   int64_t ego_features_;  // the image branch comes without the auxiliary slots
+  bool point_features_;
 
   struct Linear {
     at::Tensor weight, bias;

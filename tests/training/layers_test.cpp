@@ -1,7 +1,9 @@
-// Layers on the host: patches of images, and what padding of channels means.
+// Layers on the host: patches of images, what padding of channels means, and features of points.
 #include "pictura/training/layers.h"
 
 #include <gtest/gtest.h>
+
+#include "pictura/training/point_features.h"
 
 namespace pictura {
 namespace {
@@ -33,6 +35,24 @@ TEST(ImagePatches, AOneByOneConvolutionOfThemIsOneOfTheImageWithTheirStride) {
       at::conv2d(images.flatten(0, 1).to(at::kDouble), weight, at::Tensor(), at::IntArrayRef({2, 2}));
   const at::Tensor features = at::conv2d(image_patches(images, 2, at::kDouble), weight.reshape({4, 12, 1, 1}));
   EXPECT_TRUE(at::allclose(features, expected));
+}
+
+TEST(PointFeatures, AreNearCoordinatesAndTheBearingOfEachPoint) {
+  // A row with two points, (3, -4) m and (0, 20) m, and a number that is none. 120 m are 1.
+  const at::Tensor row = at::tensor({3.0 / 120, -4.0 / 120, 0.0, 20.0 / 120, 0.5}, at::kDouble).unsqueeze(0);
+  const at::Tensor features = point_features(row, 2);
+  const std::vector<double> expected{3.0 / 7, -4.0 / 8,  3.0 / 23, -4.0 / 24, 3.0 / 6, -4.0 / 6,
+                                     0.0,     20.0 / 24, 0.0,      20.0 / 40, 0.0,     20.0 / 21};
+  ASSERT_EQ(features.sizes().vec(), (std::vector<int64_t>{1, 2 * kPointFeatures}));
+  for (int64_t i = 0; i < features.numel(); ++i) {
+    EXPECT_NEAR(features[0][i].item<double>(), expected[static_cast<size_t>(i)], 1e-6) << i;
+  }
+}
+
+TEST(PointFeatures, TellAMetreApartNearAndStayWithinOneFar) {
+  const at::Tensor features = point_features(at::tensor({0.0f, 1.0f / 120, 100.0f, -100.0f}).view({2, 2}), 1);
+  EXPECT_GT(features[0][1].item<float>(), 0.19f);
+  EXPECT_LE(features.abs().max().item<float>(), 1.0f);
 }
 
 TEST(ConvolveGelu, ReadsNothingFromChannelsBeyondThoseOfItsWeight) {

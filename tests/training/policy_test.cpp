@@ -7,6 +7,8 @@
 #include <ATen/core/grad_mode.h>
 #include <gtest/gtest.h>
 
+#include "pictura/training/point_features.h"
+
 namespace pictura {
 namespace {
 
@@ -106,6 +108,7 @@ TEST(Policy, GradientsOfPatchesEqualDifferenceQuotients) {
 TEST_P(BothModalities, HasThePapersShapes) {
   Config::PolicySection config;
   config.modality = GetParam();
+  config.point_features = false;
   const Policy policy(config, 4, 1);
   auto shape_of = [&](const std::string& name) {
     for (const NamedTensor& p : policy.parameters()) {
@@ -127,8 +130,27 @@ TEST_P(BothModalities, HasThePapersShapes) {
   }
 }
 
+TEST_P(BothModalities, ReadsFeaturesOfPointsBesideTheirCoordinates) {
+  Config::PolicySection config;
+  config.modality = GetParam();
+  const Policy policy(config, 4, 1);
+  const auto inputs_of = [&](const std::string& name) {
+    for (const NamedTensor& p : policy.parameters()) {
+      if (p.name == name + ".hidden.weight") return p.value.size(1);
+    }
+    return int64_t{-1};
+  };
+  EXPECT_EQ(inputs_of("conditioning"), kNumConditioning + kNumWaypoints * (kWaypointFeatures + kPointFeatures));
+  if (GetParam() == Modality::vector) {
+    EXPECT_EQ(inputs_of("partners"), kPartnerFeatures + kPointFeatures);
+    EXPECT_EQ(inputs_of("boundaries"), kBoundaryFeatures + kPointFeatures);
+    EXPECT_EQ(inputs_of("controls"), kControlFeatures + 2 * kPointFeatures);  // a stop line has two ends
+  }
+}
+
 TEST(Policy, WallsAreAFifthGroupOfTheVectorPolicy) {
   Config::PolicySection config;
+  config.point_features = false;
   config.modality = Modality::vector;
   const Policy without(config, 4, 1), with(config, 4, 1, at::kFloat, /*reads_walls=*/true);
   auto names_of = [](const Policy& policy) {
