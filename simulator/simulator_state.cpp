@@ -198,6 +198,25 @@ SimulatorTotals SimulatorState::totals() const {
   return sum;
 }
 
+void SimulatorState::copy_worlds(const SimulatorSetup& setup, int world, const SimulatorState& from,
+                                 const SimulatorSetup& from_setup, int from_world, int count) {
+  // Arrays have `per` elements for each of what begins[world] counts.
+  const auto copy = [&](auto& to_array, const auto& from_array, const std::vector<int32_t>& begins,
+                        const std::vector<int32_t>& from_begins, int per) {
+    const auto first = from_array.begin() + int64_t{from_begins[static_cast<size_t>(from_world)]} * per,
+               last = from_array.begin() + int64_t{from_begins[static_cast<size_t>(from_world + count)]} * per;
+    std::copy(first, last, to_array.begin() + int64_t{begins[static_cast<size_t>(world)]} * per);
+  };
+#define X(name, type, per_agent, first, comment) \
+  copy(agents.name, from.agents.name, setup.slot_begin, from_setup.slot_begin, per_agent);
+  PICTURA_AGENT_FIELDS(X)
+#undef X
+  visit_arrays_by_kind(
+      *this, from, [&](auto& to, const auto& of) { copy(to, of, setup.box_begin, from_setup.box_begin, 1); },
+      [&](auto& to, const auto& of) { copy(to, of, setup.light_begin, from_setup.light_begin, 1); },
+      [&](auto& to, const auto& of) { std::copy_n(of.begin() + from_world, count, to.begin() + world); });
+}
+
 size_t SimulatorState::saved_bytes() const {
   size_t sum = agents.size_bytes();
   visit_arrays(*this, *this, [&sum](const auto& array, const auto&) { sum += array.size() * sizeof(*array.data()); });

@@ -23,6 +23,10 @@ struct SimulatorState {
   /// Over every field of the agents, the light states and the parked cars, in the documented order.
   uint64_t hash(const SimulatorSetup& setup) const;
 
+  /// Copies the state of `count` worlds, which must be as large in both, from world `from_world` of another simulator.
+  void copy_worlds(const SimulatorSetup& setup, int world, const SimulatorState& from, const SimulatorSetup& from_setup,
+                   int from_world, int count);
+
   std::vector<uint8_t> save(const SimulatorSetup& setup) const;
   /// Throws Error, and leaves everything as it was, when the bytes are of another simulator, naming what differs, or
   /// when a field holds what no simulator saved.
@@ -41,15 +45,20 @@ struct SimulatorState {
   /// they are saved. a and b have members of the same names.
   template <typename A, typename B, typename Visit>
   static void visit_arrays(A& a, B& b, Visit&& visit) {
-    visit(a.boxes, b.boxes);
-    visit(a.boxes_before, b.boxes_before);
-    visit(a.light_plans, b.light_plans);
-    visit(a.lights, b.lights);
-    visit(a.episode_step, b.episode_step);
-    visit(a.episode_index, b.episode_index);
-    visit(a.episode_over, b.episode_over);
-    visit(a.spawned, b.spawned);
-    visit(a.world_totals, b.world_totals);
+    visit_arrays_by_kind(a, b, visit, visit, visit);
+  }
+  /// The same with a visitor each for what there is of each box, of each light and of each world.
+  template <typename A, typename B, typename OfBoxes, typename OfLights, typename OfWorlds>
+  static void visit_arrays_by_kind(A& a, B& b, OfBoxes&& of_boxes, OfLights&& of_lights, OfWorlds&& of_worlds) {
+    of_boxes(a.boxes, b.boxes);
+    of_boxes(a.boxes_before, b.boxes_before);
+    of_lights(a.light_plans, b.light_plans);
+    of_lights(a.lights, b.lights);
+    of_worlds(a.episode_step, b.episode_step);
+    of_worlds(a.episode_index, b.episode_index);
+    of_worlds(a.episode_over, b.episode_over);
+    of_worlds(a.spawned, b.spawned);
+    of_worlds(a.world_totals, b.world_totals);
   }
 
  private:

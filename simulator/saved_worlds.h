@@ -1,0 +1,25 @@
+// The worlds of one run divided among simulators: which each has, and their saved states as one and apart, so that what
+// some number of simulators saved another number can restore.
+#pragma once
+
+#include <vector>
+
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+/// The worlds of part `part` of `num_parts`: consecutive ones, at least one each, with about as many agents as those of
+/// every other part. Throws UsageError where there are fewer worlds than parts.
+std::vector<WorldSpec> worlds_of_part(const std::vector<WorldSpec>& all, int part, int num_parts);
+
+/// What a simulator of all these worlds would have saved, from what simulators of their parts, in order, did. The
+/// simulator is one of them: it lends configuration and maps. Throws Error as Simulator::restore does.
+std::vector<uint8_t> join_saved_states(const Simulator& simulator, const std::vector<WorldSpec>& all,
+                                       const std::vector<std::vector<uint8_t>>& parts);
+
+/// What the simulator would have saved, from what one of all these worlds, of which it has part `part` of `num_parts`,
+/// did. Throws Error as Simulator::restore does.
+std::vector<uint8_t> part_of_saved_state(const Simulator& simulator, const std::vector<WorldSpec>& all,
+                                         Span<const uint8_t> saved, int part, int num_parts);
+
+}  // namespace pictura
