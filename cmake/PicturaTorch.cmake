@@ -2,6 +2,7 @@
 # The wheel's own CMake package is not used: it requires nvcc for CPU targets and links CUDA into everything.
 
 set(PICTURA_HAS_TORCH OFF)
+set(PICTURA_HAS_GLOO OFF)
 if(NOT PICTURA_WITH_TORCH STREQUAL OFF)
   set(pictura_pythons)
   foreach(venv ${PICTURA_VENV} $ENV{PICTURA_VENV} ${PROJECT_SOURCE_DIR}/.venv)
@@ -27,7 +28,12 @@ if(NOT PICTURA_WITH_TORCH STREQUAL OFF)
       ${torch_root}/include ${torch_root}/include/torch/csrc/api/include)
     # By name, not by path: the wheel's folder also contains a libgomp, which the program then loads.
     target_link_libraries(pictura_torch INTERFACE -L${torch_root}/lib -ltorch_cpu -lc10 -Wl,-rpath,${torch_root}/lib)
-    message(STATUS "torch: ${torch_root}")
+    # Torch brings Gloo along, for several processes on the host, but not its headers (libgloo-dev).
+    find_path(PICTURA_GLOO_INCLUDE gloo/context.h)
+    if(PICTURA_GLOO_INCLUDE)
+      set(PICTURA_HAS_GLOO ON)
+    endif()
+    message(STATUS "torch: ${torch_root}, Gloo ${PICTURA_HAS_GLOO}")
   elseif(PICTURA_WITH_TORCH STREQUAL ON)
     message(FATAL_ERROR "PICTURA_WITH_TORCH=ON, but no torch 2.9 or later: run scripts/setup, or set PICTURA_VENV")
   endif()

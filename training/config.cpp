@@ -579,15 +579,18 @@ namespace {
 
 // "KEY: OLD became NEW" of each key that the predicate has and in which the two differ.
 template <typename Predicate>
-std::vector<std::string> differences(const Config& saved, const Config& now, const Predicate& counts) {
+std::vector<std::string> differences(const Config& saved, const Config& now, const Predicate& counts,
+                                     const char* between = "became") {
   Writer before, after;
   visit(saved, before);
   visit(now, after);
   const std::map<std::string, std::string> values(after.lines.begin(), after.lines.end());
   std::vector<std::string> result;
   for (const auto& [key, value] : before.lines) {
-    if (counts(key) && values.at(key) != value) {
-      result.push_back(fmt::format("{}: {} became {}", key, value, values.at(key)));
+    // Some keys are only written where others are not set.
+    const auto other = values.find(key);
+    if (counts(key) && other != values.end() && other->second != value) {
+      result.push_back(fmt::format("{}: {} {} {}", key, value, between, other->second));
     }
   }
   return result;
@@ -598,6 +601,12 @@ std::vector<std::string> differences(const Config& saved, const Config& now, con
 std::string first_difference(const Config& saved, const Config& now) {
   const std::vector<std::string> all =
       differences(saved, now, [&](const std::string& key) { return !may_differ(key, saved, now); });
+  return all.empty() ? "" : all.front();
+}
+
+std::string first_difference_of_ranks(const Config& first, const Config& other) {
+  const auto counts = [](const std::string& key) { return key != "run.num_threads" && key != "run.device"; };
+  const std::vector<std::string> all = differences(first, other, counts, "and");
   return all.empty() ? "" : all.front();
 }
 

@@ -134,6 +134,10 @@ std::string to_toml(const Config& config);
 /// images.
 std::string first_difference(const Config& saved, const Config& now);
 
+/// Key of the first setting in which two ranks of a run differ, with both values, or empty. Where each runs, and on how
+/// many threads, may differ.
+std::string first_difference_of_ranks(const Config& first, const Config& other);
+
 /// The settings in which the two differ of those that a run that goes on may change and should say so, the schedule and
 /// train.reproducible, as "KEY: OLD became NEW".
 std::vector<std::string> differences_to_report(const Config& saved, const Config& now);

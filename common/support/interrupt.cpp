@@ -37,6 +37,10 @@ void catch_interrupts() {
   if (std::signal(SIGHUP, on_interrupt) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
 }
 
+void take_interrupt(int signal) {
+  if (!first_signal) first_signal = signal;
+}
+
 int interrupting_signal() { return first_signal; }
 
 }  // namespace pictura

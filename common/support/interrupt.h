@@ -11,6 +11,9 @@ void catch_interrupts();
 /// The signal that came first, or 0. Never another unless catch_interrupts() was called.
 int interrupting_signal();
 
+/// As if this signal had come, where none has: another process that this one works with got it.
+void take_interrupt(int signal);
+
 inline bool interrupted() { return interrupting_signal() != 0; }
 
 }  // namespace pictura

@@ -1,0 +1,258 @@
+#include "pictura/training/ranks/ranks.h"
+
+#include <chrono>
+#include <optional>
+#include <sstream>
+
+#include <fmt/ranges.h>
+#include <torch/csrc/distributed/c10d/PrefixStore.hpp>
+#include <torch/csrc/distributed/c10d/TCPStore.hpp>
+
+namespace pictura {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+constexpr milliseconds kBetweenBeats{500};
+// Of one request to the store, once all have met there.
+constexpr milliseconds kStoreTimeout{20000};
+constexpr milliseconds kFarewell{5000};  // for the others to leave before the store does
+
+milliseconds milliseconds_of(double seconds) { return milliseconds(static_cast<int64_t>(1000 * seconds)); }
+
+std::string first_line(const c10::Error& error) {
+  const std::string text = error.what_without_backtrace();
+  return text.substr(0, text.find('\n'));
+}
+
+std::vector<std::string> keys_of_ranks(const std::string& name, int size) {
+  std::vector<std::string> keys;
+  for (int rank = 0; rank < size; ++rank) keys.push_back(fmt::format("{}/{}", name, rank));
+  return keys;
+}
+
+// What a rank says of itself twice a second.
+struct Beat {
+  int64_t number = 0, steps = 0;
+  bool is_busy = false, has_left = false;
+
+  std::string text() const { return fmt::format("{} {} {} {}", number, steps, int{is_busy}, int{has_left}); }
+  static Beat of(const std::vector<uint8_t>& bytes) {
+    Beat beat;
+    std::istringstream(std::string(bytes.begin(), bytes.end())) >> beat.number >> beat.steps >> beat.is_busy >>
+        beat.has_left;
+    return beat;
+  }
+};
+
+const std::string kFault = "fault";
+
+}  // namespace
+
+Ranks::Ranks(const Launch& launch, const Patience& patience) : launch_(launch), patience_(patience) {
+  if (size() == 1) return;
+  join();
+  watcher_ = std::thread([this] { watch(); });
+}
+
+void Ranks::join() {
+  const std::string meeting = fmt::format("{}:{} (MASTER_ADDR:MASTER_PORT)", launch_.address, launch_.port);
+  c10d::TCPStoreOptions options;
+  options.port = static_cast<uint16_t>(launch_.port);
+  options.isServer = rank() == 0 && !launch_.is_served;
+  options.waitWorkers = false;
+  options.timeout = milliseconds_of(patience_.join_s);
+  try {
+    const auto tcp = c10::make_intrusive<c10d::TCPStore>(launch_.address, options);
+    store_ = c10::make_intrusive<c10d::PrefixStore>(fmt::format("pictura/{}", launch_.attempt), tcp);
+    watch_store_ = store_->clone();
+  } catch (const c10::Error& error) {
+    if (options.isServer) fail("rank 0: cannot listen at {}: {}", meeting, first_line(error));
+    fail("rank {}: cannot reach {}: {}", rank(), meeting, first_line(error));
+  }
+  try {
+    if (rank() == 0) store_->set(kFault, "");
+    store_->set(fmt::format("beat/{}", rank()), Beat{}.text());
+    PICTURA_CHECK(
+        store_->add(fmt::format("joined/{}", rank()), 1) == 1,
+        "rank {}: another process at {} has this rank already: give every process its own RANK, and every run "
+        "its own MASTER_PORT",
+        rank(), meeting);
+    const Clock::time_point end = Clock::now() + milliseconds_of(patience_.join_s);
+    std::vector<int> missing;
+    do {
+      missing.clear();
+      for (int other = 0; other < size(); ++other) {
+        if (!store_->check({fmt::format("joined/{}", other)})) missing.push_back(other);
+      }
+      std::this_thread::sleep_for(milliseconds(missing.empty() ? 0 : 50));
+    } while (!missing.empty() && Clock::now() < end);
+    PICTURA_CHECK(missing.empty(), "rank {}: {} of {} ranks did not come to {} within {:.0f} s: {}", rank(),
+                  missing.size(), size(), meeting, patience_.join_s, fmt::join(missing, ", "));
+    for (const auto& store : {store_, watch_store_}) store->setTimeout(kStoreTimeout);
+  } catch (const c10::Error& error) {
+    fail("rank {}: lost {}: {}", rank(), meeting, first_line(error));
+  }
+}
+
+Ranks::~Ranks() {
+  if (!watcher_.joinable()) return;
+  {
+    const std::lock_guard lock(mutex_);
+    ends_ = true;
+  }
+  changed_.notify_all();
+  watcher_.join();
+  if (rank() != 0 || launch_.is_served) return;
+  // The others lose the store with this process.
+  try {
+    const Clock::time_point end = Clock::now() + kFarewell;
+    while (store_->add("left", 0) < size() && Clock::now() < end) std::this_thread::sleep_for(milliseconds(20));
+  } catch (const c10::Error&) {
+    // It is gone already, which is no matter any more.
+  }
+}
+
+void Ranks::step() {
+  ++steps_;
+  check();
+}
+
+void Ranks::check() const {
+  if (!is_lost_) return;
+  const std::lock_guard lock(mutex_);
+  throw RankLost(why_lost_);
+}
+
+void Ranks::find_lost() const {
+  if (size() == 1) return;
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, milliseconds_of(patience_.silent_s) + 4 * kBetweenBeats, [this] { return is_lost_.load(); });
+  lock.unlock();
+  check();
+}
+
+void Ranks::announce(const std::string& why) noexcept {
+  if (size() == 1) return;
+  try {
+    store_->compareSet(kFault, "", fmt::format("rank {} ended: {}", rank(), why));
+  } catch (const std::exception&) {
+    // Those that cannot be told find out.
+  }
+}
+
+std::vector<std::string> Ranks::texts(const std::string& key, const std::string& own) {
+  if (size() == 1) return {own};
+  const std::vector<std::string> keys = keys_of_ranks(key, size());
+  try {
+    store_->set(keys[static_cast<size_t>(rank())], own);
+    while (!store_->check(keys)) {
+      check();
+      std::this_thread::sleep_for(milliseconds(20));
+    }
+    std::vector<std::string> all;
+    for (const std::vector<uint8_t>& bytes : store_->multiGet(keys)) all.emplace_back(bytes.begin(), bytes.end());
+    return all;
+  } catch (const c10::Error& error) {
+    find_lost();
+    fail("rank {}: the ranks cannot exchange {}: {}", rank(), key, first_line(error));
+  }
+}
+
+void Ranks::on_lost(std::function<void()> abort) {
+  const std::lock_guard lock(mutex_);
+  abort_ = std::move(abort);
+}
+
+void Ranks::lose(const std::string& why) {
+  const std::lock_guard lock(mutex_);
+  why_lost_ = why;
+  is_lost_ = true;
+  if (abort_) abort_();
+  changed_.notify_all();
+}
+
+void Ranks::watch() {
+  struct Seen {
+    Beat beat;
+    Clock::time_point changed = Clock::now();  // its number
+  };
+  std::vector<Seen> seen(static_cast<size_t>(size()));
+  int64_t least_steps = -1;
+  Clock::time_point progressed = Clock::now();  // when the least number of steps changed
+  std::vector<std::string> keys = keys_of_ranks("beat", size());
+  keys.push_back(kFault);
+  const std::string own_key = keys[static_cast<size_t>(rank())];
+  const auto seconds_since = [](Clock::time_point time) {
+    return std::chrono::duration<double>(Clock::now() - time).count();
+  };
+  Beat own;
+  // Why a rank is lost, as far as is known.
+  const auto look = [&]() -> std::string {
+    std::vector<std::vector<uint8_t>> values;
+    try {
+      ++own.number;
+      own.steps = steps_;
+      own.is_busy = busy_ > 0;
+      watch_store_->set(own_key, own.text());
+      values = watch_store_->multiGet(keys);
+    } catch (const c10::Error& error) {
+      return fmt::format(
+          "{}: {}:{}, where the ranks meet, cannot be reached: it was killed or stopped, or its host is "
+          "gone ({})",
+          launch_.is_served ? "the launcher" : "rank 0", launch_.address, launch_.port, first_line(error));
+    }
+    if (const std::string fault(values.back().begin(), values.back().end());
+        !fault.empty() && !fault.starts_with(fmt::format("rank {} ", rank()))) {
+      return fault;
+    }
+    bool may_hang = true;
+    std::optional<int64_t> least;
+    for (size_t r = 0; r < seen.size(); ++r) {
+      const Beat beat = Beat::of(values[r]);
+      if (beat.number != seen[r].beat.number) seen[r].changed = Clock::now();
+      seen[r].beat = beat;
+      may_hang = may_hang && !beat.is_busy && beat.steps > 0;
+      if (beat.has_left) continue;
+      least = std::min(least.value_or(beat.steps), beat.steps);
+      if (seconds_since(seen[r].changed) > patience_.silent_s) {
+        return fmt::format("rank {}: no sign of life for {:.0f} s: it was killed or stopped, or its host is gone", r,
+                           patience_.silent_s);
+      }
+    }
+    if (!may_hang || least.value_or(-1) != least_steps) {
+      least_steps = least.value_or(-1);
+      progressed = Clock::now();
+    }
+    if (seconds_since(progressed) > patience_.no_progress_s) {
+      std::vector<size_t> behind;
+      for (size_t r = 0; r < seen.size(); ++r) {
+        if (!seen[r].beat.has_left && seen[r].beat.steps == least_steps) behind.push_back(r);
+      }
+      return fmt::format("rank {}: alive, but not a step further for {:.0f} s: it hangs", fmt::join(behind, ", "),
+                         patience_.no_progress_s);
+    }
+    return "";
+  };
+
+  std::unique_lock lock(mutex_);
+  while (!ends_) {
+    lock.unlock();
+    const std::string why = is_lost_ ? "" : look();
+    if (!why.empty()) lose(why);
+    lock.lock();
+    changed_.wait_for(lock, kBetweenBeats, [this] { return ends_; });
+  }
+  lock.unlock();
+  try {
+    own.has_left = true;
+    watch_store_->set(own_key, own.text());
+    watch_store_->add("left", 1);
+  } catch (const c10::Error&) {
+    // Nobody is there to be told.
+  }
+}
+
+}  // namespace pictura
