@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-Diagnosis diagnose(const Rollout& rollout, double adv_threshold) {
+Diagnosis diagnose(const Rollout& rollout, double adv_threshold, Communicator* communicator) {
   const at::NoGradGuard no_grad;
   const at::Tensor speed_mps =
       rollout.observations.arrays().ego.narrow(0, 0, rollout.num_steps()).select(2, 0) * kScaleSpeed_mps;
@@ -22,7 +22,9 @@ Diagnosis diagnose(const Rollout& rollout, double adv_threshold) {
     for (at::Tensor& sum : sums) sum = sum.to(at::kDouble);
     groups.push_back(at::stack(sums));
   }
-  const at::Tensor host = at::stack(groups).cpu();
+  const at::Tensor of_all = at::stack(groups);
+  communicator->sum(of_all);
+  const at::Tensor host = of_all.cpu();
   const auto group = [&host](int64_t index) {
     const double* const sums = host.const_data_ptr<double>() + index * host.size(1);
     AgentGroup result{sums[1] / sums[0], sums[2] / sums[0], {}};

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "pictura/simulator/actions.h"
+#include "pictura/training/ranks/communicator.h"
 #include "pictura/training/rollout.h"
 
 namespace pictura {
@@ -21,8 +22,8 @@ struct Diagnosis {
   AgentGroup rest, moving;
 };
 
-/// Of a rollout with advantages, under a filter that keeps those of at least adv_threshold. A group without agents has
-/// NaN.
-Diagnosis diagnose(const Rollout& rollout, double adv_threshold);
+/// Of a rollout with advantages, of all ranks, under a filter that keeps those of at least adv_threshold. A group
+/// without agents has NaN.
+Diagnosis diagnose(const Rollout& rollout, double adv_threshold, Communicator* communicator = alone());
 
 }  // namespace pictura

@@ -1,6 +1,7 @@
 #include "pictura/training/ppo.h"
 
 #include <cmath>
+#include <limits>
 
 #include <ATen/core/grad_mode.h>
 
@@ -30,28 +31,36 @@ void clear_gradients(const std::vector<NamedTensor>& parameters) {
   for (const NamedTensor& parameter : parameters) parameter.value.mutable_grad().reset();
 }
 
-// Of all gradients as one vector.
-at::Tensor norm_of(const std::vector<at::Tensor>& gradients) {
-  return at::stack(at::_foreach_norm(gradients, 2)).norm();
+// All gradients as one vector. Those of parameters that no loss depended on are zero.
+at::Tensor flat_gradients(const std::vector<NamedTensor>& parameters) {
+  std::vector<at::Tensor> flat;
+  for (const NamedTensor& parameter : parameters) {
+    const at::Tensor& gradient = parameter.value.grad();
+    flat.push_back((gradient.defined() ? gradient : at::zeros_like(parameter.value)).flatten().detach());
+  }
+  return at::cat(flat);
 }
 
 }  // namespace
 
-AdamW::Step AdamW::step(double learning_rate, const at::Tensor& loss) {
+AdamW::Step AdamW::step(double learning_rate, const at::Tensor& loss, Communicator* communicator) {
   const at::NoGradGuard no_grad;
+  // Summed over the ranks and only then scaled down: every rank takes the same step, to the bit.
+  const at::Tensor flat = flat_gradients(parameters_);
+  communicator->sum(flat);
   std::vector<at::Tensor> values, gradients, first, second;
+  int64_t begin = 0;
   for (size_t i = 0; i < parameters_.size(); ++i) {
-    // Those that no loss depended on (an unused camera, say) have none.
-    at::Tensor gradient = parameters_[i].value.mutable_grad();
-    if (!gradient.defined()) continue;
-    values.push_back(parameters_[i].value);
-    gradients.push_back(gradient);
+    const at::Tensor& value = parameters_[i].value;
+    values.push_back(value);
+    gradients.push_back(flat.narrow(0, begin, value.numel()).view(value.sizes()));
     first.push_back(first_moments[i].value);
     second.push_back(second_moments[i].value);
+    begin += value.numel();
   }
-  const at::Tensor norm = norm_of(gradients);
+  const at::Tensor norm = flat.norm();
   const at::Tensor failed = (norm + loss).isfinite().logical_not().to(at::kFloat);
-  at::_foreach_mul_(gradients, (config_.max_grad_norm / (norm + 1e-6)).clamp_max(1.0));
+  flat.mul_((config_.max_grad_norm / (norm + 1e-6)).clamp_max(1.0));
   ++steps;
   const std::vector<at::Tensor> counts(values.size(), at::full({}, static_cast<double>(steps), norm.options()));
   at::_fused_adamw_(values, gradients, first, second, {}, counts, learning_rate, config_.adam_beta1, config_.adam_beta2,
@@ -63,10 +72,9 @@ AdamW::Step AdamW::step(double learning_rate, const at::Tensor& loss) {
 
 namespace {
 
-// 1 - Var(returns - values) / Var(returns): 1 is a perfect critic, 0 one that says a constant.
-double explained_variance(const at::Tensor& values, const at::Tensor& returns) {
-  const double variance = returns.var().item<double>();
-  return variance > 0 ? 1 - (returns - values).var().item<double>() / variance : 0;
+// The variance of n numbers, from their sum and that of their squares.
+double variance_of(double n, double sum, double sum_of_squares) {
+  return std::max(0.0, (sum_of_squares - sum * sum / n) / std::max(1.0, n - 1));
 }
 
 // The transitions of a rollout, flattened: [steps * slots].
@@ -82,23 +90,8 @@ struct Batch {
         valid(rollout.valid.flatten()) {}
 };
 
-// What each of some transitions counts in their mean: its share of the valid ones, or undefined where all are valid.
-at::Tensor shares_of(const at::Tensor& valid) {
-  const at::Tensor counts = valid.to(at::kFloat);
-  return counts / counts.mean().clamp_min(1.0 / static_cast<double>(counts.size(0)));
-}
-
 at::Tensor mean_of(const at::Tensor& values, const at::Tensor& shares) {
   return shares.defined() ? (values * shares).mean() : values.mean();
-}
-
-// Advantages of a minibatch with mean 0 and deviation 1 over its valid transitions.
-at::Tensor normalised(const at::Tensor& advantages, const at::Tensor& shares) {
-  const at::Tensor centered = advantages - mean_of(advantages, shares);
-  if (!shares.defined()) return centered / (advantages.std() + 1e-8);
-  const at::Tensor count = shares.gt(0).sum();
-  const at::Tensor variance = mean_of(centered.square(), shares) * count / (count - 1).clamp_min(1);
-  return centered / (variance.sqrt() + 1e-8);
 }
 
 // What the losses of some transitions are made of.
@@ -134,16 +127,13 @@ Losses losses_of(const Policy::Output& output, const Batch& batch, const at::Ten
   return losses;
 }
 
-// The norm of a loss's gradient over all parameters.
-at::Tensor gradient_norm(const at::Tensor& loss, const Policy& policy) {
+// A loss's gradient over all parameters, as one vector.
+at::Tensor gradient_of(const at::Tensor& loss, const Policy& policy) {
   clear_gradients(policy.parameters());
   loss.backward(/*gradient=*/{}, /*retain_graph=*/true);
-  std::vector<at::Tensor> gradients;
-  for (const NamedTensor& parameter : policy.parameters()) {
-    if (parameter.value.grad().defined()) gradients.push_back(parameter.value.grad());
-  }
+  const at::Tensor flat = flat_gradients(policy.parameters());
   clear_gradients(policy.parameters());
-  return norm_of(gradients);
+  return flat;
 }
 
 constexpr int64_t kNumStats = 7;  // of LossStats
@@ -155,11 +145,14 @@ LossStats loss_stats(const at::Tensor& row) {
 
 bool takes_all(const Config::Train& config) { return config.halted_slots == HaltedSlots::draw; }
 
-// The rows of the transitions that are learned from, i64 [n]: those that the filter keeps, or all, of which those that
-// are not valid have no share. Says in the stats what the filter did.
+// The rows of this rank's transitions that are learned from, i64 [n]: those that the filter keeps, or all, of which
+// those that are not valid have no share. Says in the stats what the filter did on all ranks.
 at::Tensor taken_rows(const Batch& batch, const Config::Train& config, int64_t update, LearnerExecutor* executor,
-                      AdvantageFilter* filter, UpdateStats* stats) {
-  const float max_advantage = batch.advantages.abs().max().item<float>();
+                      AdvantageFilter* filter, Communicator* communicator, UpdateStats* stats) {
+  // Not every communicator's maximum knows NaN.
+  const at::Tensor max = batch.advantages.abs().max().nan_to_num(std::numeric_limits<double>::infinity());
+  communicator->max(max);
+  const float max_advantage = max.item<float>();
   PICTURA_CHECK(std::isfinite(max_advantage), "update {}: an advantage is not finite", update + 1);
   const float threshold = filter->threshold(max_advantage, config.adv_filter_ema, config.adv_filter_threshold);
   stats->adv_threshold = static_cast<double>(threshold);
@@ -167,44 +160,80 @@ at::Tensor taken_rows(const Batch& batch, const Config::Train& config, int64_t u
   const int64_t num_kept =
       executor->select_kept(span_of<const float>(batch.advantages), span_of<const uint8_t>(batch.valid), threshold,
                             span_of<int64_t>(kept_and_unused));
-  if (num_kept == 0) return kept_and_unused.narrow(0, 0, 0);
-  const at::Tensor valid = at::nonzero(batch.valid).squeeze(1);
-  stats->kept_fraction = static_cast<double>(num_kept) / static_cast<double>(valid.size(0));
-  stats->explained_variance =
-      explained_variance(batch.values.index_select(0, valid), batch.returns.index_select(0, valid));
+  const at::Tensor valid = at::nonzero(batch.valid).squeeze(1),
+                   returns = batch.returns.index_select(0, valid).to(at::kDouble),
+                   errors = returns - batch.values.index_select(0, valid);
+  const at::Tensor sums = at::stack({at::full({}, num_kept, returns.options()), at::ones_like(returns).sum(),
+                                     returns.sum(), returns.square().sum(), errors.sum(), errors.square().sum()});
+  communicator->sum(sums);
+  const at::Tensor host = sums.cpu();
+  const double* const of_all = host.const_data_ptr<double>();
+  const double kept = of_all[0], n = of_all[1];
+  if (kept == 0) return kept_and_unused.narrow(0, 0, 0);
+  stats->kept_fraction = kept / n;
+  // 1 is a perfect critic, 0 one that says a constant.
+  const double variance = variance_of(n, of_all[2], of_all[3]);
+  stats->explained_variance = variance > 0 ? 1 - variance_of(n, of_all[4], of_all[5]) / variance : 0;
   return takes_all(config) ? at::arange(batch.valid.size(0), kept_and_unused.options())
                            : kept_and_unused.narrow(0, 0, num_kept);
 }
 
-// The transitions of some rows in the order of an epoch, cut into minibatches of equal size, to one transition.
+// The transitions of some rows in the order of an epoch, cut into minibatches of equal size, to one transition. Rows,
+// order and minibatches are those of all ranks together, as one rank alone would have them; of each minibatch a rank
+// takes those that are its own.
 class Minibatches {
  public:
-  Minibatches(const at::Tensor& taken, int64_t most, const UpdateKey& key, LearnerExecutor* executor)
-      : taken_(taken),
-        shuffled_(at::empty_like(taken)),
-        count_((taken.size(0) + most - 1) / most),
-        key_(key),
-        executor_(executor) {}
+  /// taken: this rank's rows, ascending.
+  Minibatches(const at::Tensor& taken, const Rollout& rollout, int64_t most, const UpdateKey& key,
+              LearnerExecutor* executor, Communicator* communicator)
+      : key_(key), executor_(executor) {
+    // Over all ranks they are numbered by step, then by slot, of which each rank has consecutive ones.
+    const int64_t num_steps = rollout.num_steps(), num_slots = rollout.num_slots();
+    const at::Tensor begins = at::searchsorted(taken, at::arange(num_steps + 1, taken.options()) * num_slots);
+    const at::Tensor counts = at::zeros({num_steps, communicator->size()}, taken.options());
+    counts.select(1, communicator->rank()).copy_(begins.diff());
+    communicator->sum(counts);
+    const at::Tensor first_numbers =
+        (counts.flatten().cumsum(0).view_as(counts) - counts).select(1, communicator->rank());
+    const at::Tensor step = taken.div(num_slots, "floor");
+    const at::Tensor numbers = (first_numbers - begins.narrow(0, 0, num_steps)).index_select(0, step) +
+                               at::arange(taken.size(0), taken.options());
+    size_ = counts.sum().item<int64_t>();
+    count_ = (size_ + most - 1) / most;
+    own_ = at::full({size_}, kOfAnotherRank, taken.options()).index_copy_(0, numbers, taken);
+  }
 
+  /// Of all ranks' transitions.
+  int64_t size() const { return size_; }
   /// Of an epoch.
   int64_t count() const { return count_; }
 
   void shuffle(int64_t epoch) {
-    executor_->permute(Permutation(key_.seed, key_.update, epoch, taken_.size(0)), span_of<const int64_t>(taken_),
-                       span_of<int64_t>(shuffled_));
+    const at::Tensor shuffled = at::empty_like(own_);
+    executor_->permute(Permutation(key_.seed, key_.update, epoch, size_), span_of<const int64_t>(own_),
+                       span_of<int64_t>(shuffled));
+    const at::Tensor places = at::nonzero(shuffled != kOfAnotherRank).squeeze(1);
+    rows_ = shuffled.index_select(0, places);
+    const at::Tensor begins = (at::arange(count_ + 1, places.options()) * size_).div(count_, "floor");
+    begins_ = at::searchsorted(places, begins).cpu();
   }
 
-  /// The rows of one, as the last shuffle() left them.
+  /// This rank's rows of one, as the last shuffle() left them.
   at::Tensor rows(int64_t m) const {
-    const int64_t begin = taken_.size(0) * m / count_, end = taken_.size(0) * (m + 1) / count_;
-    return shuffled_.narrow(0, begin, end - begin);
+    const int64_t* const begins = begins_.const_data_ptr<int64_t>();
+    return rows_.narrow(0, begins[m], begins[m + 1] - begins[m]);
   }
+  /// Of one, over all ranks.
+  int64_t size(int64_t m) const { return size_ * (m + 1) / count_ - size_ * m / count_; }
 
  private:
-  const at::Tensor taken_, shuffled_;
-  const int64_t count_;
+  static constexpr int64_t kOfAnotherRank = -1;
+
   const UpdateKey key_;
   LearnerExecutor* const executor_;
+  int64_t size_ = 0, count_ = 0;
+  at::Tensor own_;            // [size_] the row of each of all ranks' transitions, as they are numbered
+  at::Tensor rows_, begins_;  // in the order of the epoch; [count_ + 1] where each minibatch begins in it
 };
 
 // What each row of a chunk counts in the chunk's means: undefined where each counts as one. `shares` are those of the
@@ -217,15 +246,36 @@ at::Tensor shares_in(const Chunk& chunk, const at::Tensor& shares, const at::Ten
   return padded * (static_cast<double>(chunk.size()) / static_cast<double>(chunk.count));
 }
 
-// Adds a minibatch's gradients to those of the parameters, `forward_chunk` transitions at a time. Returns its LossStats
-// without the norm, f64 [kNumStats]. With `norms`, appends the norms of the first chunk's gradient by each loss alone.
+// The norms of the gradient of the first chunk, or of those of all ranks, by each loss alone: f64 [3].
+at::Tensor norms_over_ranks(std::vector<at::Tensor> gradients, int64_t num_rows, const Policy& policy,
+                            Communicator* communicator) {
+  constexpr int64_t kNumLosses = 3;
+  if (gradients.empty()) gradients.resize(kNumLosses, at::zeros_like(flat_gradients(policy.parameters())));
+  const at::Tensor sums = at::constant_pad_nd(at::stack(gradients), {0, 1}, 1) * num_rows;
+  communicator->sum(sums);
+  return (sums.slice(1, 0, -1).norm(2, {1}) / sums.select(1, -1)).to(at::kDouble);
+}
+
+// Adds this rank's part of a minibatch's gradients, which has `size_of_all` transitions over all ranks, to those of the
+// parameters, `forward_chunk` transitions at a time. Returns the minibatch's LossStats without the norm, f64
+// [kNumStats]. With `norms`, sets them as norms_over_ranks does.
 at::Tensor add_gradients(const Policy& policy, const Rollout& rollout, const Batch& batch, const at::Tensor& minibatch,
-                         const Config::Train& config, PhaseTimer* timer, std::vector<at::Tensor>* norms) {
-  const int64_t size_of_all = minibatch.size(0);
-  at::Tensor advantages = batch.advantages.index_select(0, minibatch);
-  const at::Tensor shares = takes_all(config) ? shares_of(batch.valid.index_select(0, minibatch)) : at::Tensor();
-  if (config.norm_adv && size_of_all > 1) advantages = normalised(advantages, shares);
+                         int64_t size_of_all, const Config::Train& config, PhaseTimer* timer,
+                         Communicator* communicator, at::Tensor* norms) {
+  at::Tensor advantages = batch.advantages.index_select(0, minibatch), shares;
+  const at::Tensor valid = takes_all(config) ? batch.valid.index_select(0, minibatch).to(at::kDouble)
+                                             : at::ones_like(advantages, at::kDouble);
+  const at::Tensor sums = at::stack({valid.sum(), (valid * advantages).sum(), (valid * advantages.square()).sum()});
+  communicator->sum(sums);
+  const at::Tensor count = sums[0].clamp_min(1), mean = sums[1] / count;
+  if (config.norm_adv && size_of_all > 1) {
+    const at::Tensor variance = ((sums[2] - sums[1] * mean) / (count - 1).clamp_min(1)).clamp_min(0);
+    advantages = (advantages - mean) / (variance.sqrt() + 1e-8);
+  }
+  if (takes_all(config)) shares = (valid * (static_cast<double>(size_of_all) / count)).to(at::kFloat);
   const at::Tensor stats = at::zeros({kNumStats}, advantages.options().dtype(at::kDouble));
+  std::vector<at::Tensor> by_loss;
+  int64_t num_rows_by_loss = 0;
   for_each_chunk(minibatch, config.forward_chunk, [&](const Chunk& chunk) {
     const double weight = static_cast<double>(chunk.count) / static_cast<double>(size_of_all);
     const Observation observation = rollout.observations.gather(chunk.rows);
@@ -238,14 +288,17 @@ at::Tensor add_gradients(const Policy& policy, const Rollout& rollout, const Bat
     if (norms && chunk.begin == 0) {
       const PhaseTimer::Scope timed(timer, Phase::diagnose);
       for (const at::Tensor& loss : {losses.policy, config.vf_coef * losses.value, config.ent_coef * losses.entropy}) {
-        norms->push_back(gradient_norm(loss, policy));
+        by_loss.push_back(gradient_of(loss, policy));
       }
+      num_rows_by_loss = chunk.count;
     }
     const PhaseTimer::Scope timed(timer, Phase::backward);
     const at::Tensor loss = losses.policy + config.vf_coef * losses.value - config.ent_coef * losses.entropy;
     (loss * weight).backward();
     stats.narrow(0, 0, kNumStats - 1) += weight * losses.stats;
   });
+  communicator->sum(stats);
+  if (norms) *norms = norms_over_ranks(std::move(by_loss), num_rows_by_loss, policy, communicator);
   return stats;
 }
 
@@ -294,13 +347,14 @@ std::vector<NamedTensor> contents_of(const at::Tensor& minibatch, const Batch& b
 }  // namespace
 
 UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Config::Train& config, const UpdateKey& key,
-                       LearnerExecutor* executor, AdamW* optimizer, AdvantageFilter* filter, PhaseTimer* timer) {
+                       LearnerExecutor* executor, AdamW* optimizer, AdvantageFilter* filter, PhaseTimer* timer,
+                       Communicator* communicator) {
   UpdateStats stats;
   stats.learning_rate = key.learning_rate;
   Batch batch(rollout);
-  const at::Tensor taken = taken_rows(batch, config, key.update, executor, filter, &stats);
-  if (taken.size(0) == 0) return stats;
-  Minibatches minibatches(taken, config.minibatch_size, key, executor);
+  const at::Tensor taken = taken_rows(batch, config, key.update, executor, filter, communicator, &stats);
+  Minibatches minibatches(taken, rollout, config.minibatch_size, key, executor, communicator);
+  if (minibatches.size() == 0) return stats;
   const Autotuner autotuner;
 
   // Sums over the minibatches of each epoch; the last row is the first minibatch. What is not finite stays in them, so
@@ -318,14 +372,14 @@ UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Confi
                                 key.update + 1, epoch + 1, m + 1),
                     contents_of(minibatches.rows(m), batch, rollout));
   };
-  std::vector<at::Tensor> first_norms;
+  at::Tensor first_norms;
   for (int epoch = 0; epoch < config.update_epochs; ++epoch) {
     minibatches.shuffle(epoch);
     for (int64_t m = 0; m < minibatches.count(); ++m) {
       const bool is_first = stats.minibatches == 0;
       const auto add_its_gradients = [&] {
-        return add_gradients(policy, rollout, batch, minibatches.rows(m), config, timer,
-                             is_first ? &first_norms : nullptr);
+        return add_gradients(policy, rollout, batch, minibatches.rows(m), minibatches.size(m), config, timer,
+                             communicator, is_first ? &first_norms : nullptr);
       };
       at::Tensor minibatch_stats = add_its_gradients();
       if (is_first) {
@@ -334,12 +388,11 @@ UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Confi
           stats.rejected = first;
           batch.old_log_probs = recomputed_log_probs(policy, rollout, batch, minibatches, config.forward_chunk, timer);
           clear_gradients(policy.parameters());
-          first_norms.clear();
           minibatch_stats = add_its_gradients();
         }
       }
       const PhaseTimer::Scope timed(timer, Phase::optimize);
-      const AdamW::Step step = optimizer->step(key.learning_rate, sums.sum() + minibatch_stats.sum());
+      const AdamW::Step step = optimizer->step(key.learning_rate, sums.sum() + minibatch_stats.sum(), communicator);
       minibatch_stats[kNumStats - 1] = step.norm;
       sums[epoch] += minibatch_stats;
       if (is_first) sums[config.update_epochs] += minibatch_stats;
@@ -356,7 +409,7 @@ UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Confi
   for (int epoch = 0; epoch < config.update_epochs; ++epoch) {
     stats.epochs.push_back(loss_stats(epochs[epoch] / static_cast<double>(minibatches.count())));
   }
-  const at::Tensor norms = at::stack(first_norms).cpu();
+  const at::Tensor norms = first_norms.cpu();
   stats.policy_grad_norm = norms[0].item<double>();
   stats.value_grad_norm = norms[1].item<double>();
   stats.entropy_grad_norm = norms[2].item<double>();

@@ -6,6 +6,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/training/policy.h"
+#include "pictura/training/ranks/communicator.h"
 #include "pictura/training/rollout.h"
 
 namespace pictura {
@@ -26,8 +27,9 @@ class AdamW {
     at::Tensor norm;    // of the gradients before they were scaled
     at::Tensor failed;  // f32: 1 where it or the loss is not finite, and no step was taken
   };
-  /// One step along the parameters' gradients, scaled down to max_grad_norm; clears them.
-  Step step(double learning_rate, const at::Tensor& loss);
+  /// One step along the parameters' gradients, summed over all ranks and then scaled down to max_grad_norm; clears
+  /// them. The loss must be that of all ranks.
+  Step step(double learning_rate, const at::Tensor& loss, Communicator* communicator = alone());
 
   std::vector<NamedTensor> first_moments, second_moments;  // in the order of the policy's parameters
   int64_t steps = 0;
@@ -54,7 +56,7 @@ struct UpdateStats {
   /// The same by the rollout's log-probabilities, where these were not the learner's and were computed again.
   std::optional<LossStats> rejected;
   std::vector<LossStats> epochs;  // of each
-  /// Of the first minibatch's gradient by each loss alone, with its coefficient.
+  /// Of the gradient of the first minibatch's first chunk by each loss alone, with its coefficient.
   double policy_grad_norm = 0, value_grad_norm = 0, entropy_grad_norm = 0;
   double learning_rate = 0;
   double explained_variance = 0;  // over all valid transitions
@@ -78,10 +80,11 @@ class NotFinite : public Error {
   std::vector<NamedTensor> minibatch;
 };
 
-/// Improves the policy on a rollout with advantages. Throws NotFinite, with the policy as it was before that minibatch:
-/// in it on the host, at the end on a device.
+/// Improves the policy on a rollout with advantages. Ranks have consecutive slots each of one rollout, of equally many
+/// steps; all improve one policy on all of it, and get the same parameters to the bit and the same stats. Throws
+/// NotFinite, with the policy as it was before that minibatch: in it on the host, at the end on a device.
 UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Config::Train& config, const UpdateKey& key,
                        LearnerExecutor* executor, AdamW* optimizer_inout, AdvantageFilter* filter_inout,
-                       PhaseTimer* timer = nullptr);
+                       PhaseTimer* timer = nullptr, Communicator* communicator = alone());
 
 }  // namespace pictura
