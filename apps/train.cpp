@@ -39,9 +39,13 @@ void add_train_command(CLI::App& app) {
       ->check(CLI::PositiveNumber);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
+      "Several processes train one policy, each on its GPU, where torchrun, srun or the variables RANK, WORLD_SIZE,\n"
+      "LOCAL_RANK, MASTER_ADDR and MASTER_PORT say so; sizes are those of all together, and rank 0 reports and "
+      "writes.\n"
       "Examples:\n  pictura train --config configs/demo.toml --out runs/demo\n"
       "  pictura train --config configs/town01.toml --set run.seed=3 --set train.updates=50 --out runs/town01\n"
-      "  pictura train --config configs/town01.toml --out runs/town01 --resume --minutes 25");
+      "  pictura train --config configs/town01.toml --out runs/town01 --resume --minutes 25\n"
+      "  torchrun --nproc-per-node 2 --no-python pictura train --config configs/paper.toml --out runs/paper");
   command->callback([arguments] {
     ProgressLine line;
     arguments->train.on_progress = [&line](const TrainProgress& progress) { line.update(progress_text(progress)); };
@@ -49,8 +53,15 @@ void add_train_command(CLI::App& app) {
     if (arguments->resume) arguments->train.old_run = OldRun::resume;
     if (arguments->overwrite) arguments->train.old_run = OldRun::overwrite;
     for (const std::string& text : overrides_of(arguments->backends)) arguments->train.overrides.push_back(text);
+    arguments->train.launch = launch_from_environment();
     const TrainReport report = train(arguments->train);
     line.finish();
+    const auto end_as_asked = [&] {
+      if (report.interrupted) {
+        throw Interrupted(fmt::format("interrupted; go on with --resume --out {}", arguments->train.out_folder));
+      }
+    };
+    if (arguments->train.launch.rank > 0) return end_as_asked();
     const std::string curve = draw_learning_curve(arguments->train.out_folder);
     if (arguments->json) {
       print_json({{"agent_steps", report.agent_steps},
@@ -60,6 +71,7 @@ void add_train_command(CLI::App& app) {
                   {"km_driven", report.km_driven},
                   {"checkpoint", report.checkpoint},
                   {"policy_hash", report.policy_hash},
+                  {"ranks", report.ranks},
                   {"device", report.device},
                   {"simulator", report.simulator},
                   {"renderer", report.renderer.empty() ? Json(nullptr) : Json(report.renderer)},
@@ -71,8 +83,7 @@ void add_train_command(CLI::App& app) {
                  report.checkpoint, report.policy_hash, curve.empty() ? "" : ", curve " + curve);
       if (report.out_of_time) fmt::print("out of time: go on with --resume --out {}\n", arguments->train.out_folder);
     }
-    if (report.interrupted)
-      throw Interrupted(fmt::format("interrupted; go on with --resume --out {}", arguments->train.out_folder));
+    end_as_asked();
   });
 }
 

@@ -138,8 +138,11 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
   write_file(path, file);
 }
 
-Checkpoint read_checkpoint(const std::string& path) {
-  const std::string file = read_file(path, size_t{1} << 36);
+std::string read_checkpoint_file(const std::string& path) { return read_file(path, size_t{1} << 36); }
+
+Checkpoint read_checkpoint(const std::string& path) { return parse_checkpoint(read_checkpoint_file(path), path); }
+
+Checkpoint parse_checkpoint(const std::string& file, const std::string& path) {
   PICTURA_CHECK(file.size() >= sizeof kMagic && std::memcmp(file.data(), kMagic, sizeof kMagic) == 0,
                 "{}: not a checkpoint: expected it to begin with PICTCKPT", path);
   PICTURA_CHECK(file.size() >= kPreamble, "{}: truncated: {} bytes", path, file.size());

@@ -36,6 +36,9 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint);
 /// Throws Error naming the file when it is no checkpoint, truncated, damaged, of another version or byte order, or of
 /// another observation schema (naming the entry that differs).
 Checkpoint read_checkpoint(const std::string& path);
+/// The bytes of such a file, and what they say.
+std::string read_checkpoint_file(const std::string& path);
+Checkpoint parse_checkpoint(const std::string& file, const std::string& path);
 
 /// Camera and property in which the two rigs first differ, with both values, or empty.
 std::string first_difference(const Rig& saved, const Rig& now);

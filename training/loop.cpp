@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 
 #include <ATen/Parallel.h>
 #include <fmt/ranges.h>
@@ -16,6 +17,8 @@
 #include "pictura/training/diagnosis.h"
 #include "pictura/training/memory.h"
 #include "pictura/training/precision.h"
+#include "pictura/training/ranks/agree.h"
+#include "pictura/training/ranks/ranks.h"
 #include "pictura/training/run.h"
 #include "pictura/training/run_folder.h"
 #include "pictura/training/run_log.h"
@@ -34,16 +37,24 @@ at::Tensor seen_slots(const Run& run, const at::Tensor& active) {
 
 // What the policy makes of the active slots at a step that has been recorded.
 Decision decide(Run* run, int64_t step, const at::Tensor& active) {
-  const at::Tensor rows = run->rollout.rows_of(step, seen_slots(*run, active));
+  at::Tensor rows = run->rollout.rows_of(step, seen_slots(*run, active));
+  const int64_t num_rows = rows.size(0);
+  if (run->config.train.reproducible && num_rows > 0) {
+    // In batches of another size products may be rounded otherwise. Filled up, all have one, over however many ranks
+    // the agents are divided.
+    const int64_t most = run->config.train.forward_chunk, missing = (most - num_rows % most) % most;
+    rows = at::cat({rows, rows.narrow(0, 0, 1).expand({missing})});
+  }
   const auto observe = [&](const at::Tensor& some) { return run->rollout.observations.gather(some); };
   Decision decision = decide(run->policy, rows, run->config.train.forward_chunk, observe, &run->timer);
-  if (rows.size(0) > active.size(0)) {
-    for (at::Tensor* t : {&decision.logits, &decision.log_probs, &decision.value}) *t = t->index_select(0, active);
+  for (at::Tensor* t : {&decision.logits, &decision.log_probs, &decision.value}) {
+    *t = t->narrow(0, 0, num_rows);
+    if (num_rows > active.size(0)) *t = t->index_select(0, active);
   }
   return decision;
 }
 
-// Fills the rollout from the policy's own driving; false when ^C came.
+// Fills the rollout from the policy's own driving; false when ^C came. Several ranks hear of it after the update.
 bool collect(Run* run) {
   Rollout& rollout = run->rollout;
   Simulator& simulator = *run->simulator;
@@ -54,7 +65,8 @@ bool collect(Run* run) {
   };
   rollout.values.zero_();
   for (int64_t step = 0; step < rollout.num_steps(); ++step) {
-    if (interrupted()) return false;
+    if (run->communicator->size() == 1 && interrupted()) return false;
+    run->communicator->step();
 
     // Act.
     const at::Tensor slots = record(step);
@@ -86,8 +98,10 @@ UpdateStats improve(const std::string& folder, Run* run) {
   const UpdateKey key{run->config.run.seed, run->update, learning_rate_at(config, run->agent_steps)};
   try {
     return ppo_update(run->policy, run->rollout, config, key, run->executor.get(), &run->optimizer, &run->filter,
-                      &run->timer);
+                      &run->timer, run->communicator);
   } catch (const NotFinite& error) {
+    run->communicator->step();  // throws where a rank is lost, which leaves numbers that mean nothing
+    if (!run->communicator->is_first()) throw;
     const std::string path = folder + "/failed_minibatch.safetensors";
     write_safetensors(path, error.minibatch, to_toml(run->config));
     fail("{}; see {}", error.what(), path);
@@ -98,17 +112,25 @@ UpdateStats improve(const std::string& folder, Run* run) {
 
 namespace {
 
-TrainReport train_on_its_device(const TrainOptions& options) {
+TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
   const Stopwatch since_start;
   const Config config = load_config(options.config_path, options.overrides);
-  const Device device = open_learning_device(config);
-  check_memory(config, device, available_bytes(device));
-  make_output_folder(options.out_folder);
-  const FolderLock lock(options.out_folder);
-  const std::vector<std::string> old_files = run_files(options.out_folder);
-  PICTURA_CHECK(old_files.empty() || options.old_run != OldRun::refuse,
-                "{}: holds a run already ({}): resume it, overwrite it, or name another folder", options.out_folder,
-                fmt::join(old_files, ", "));
+  check_equal_settings(
+      config, fmt::format("old_run {}, init_from '{}'", static_cast<int>(options.old_run), options.init_from), ranks);
+  const Device device = open_learning_device(config, options.launch.local_rank);
+  check_memory(config, device, available_bytes(device), ranks->size());
+  const std::unique_ptr<Communicator> communicator = make_communicator(ranks, device);
+  const bool is_first = communicator->is_first();
+  std::optional<FolderLock> lock;
+  std::vector<std::string> old_files;
+  if (is_first) {
+    make_output_folder(options.out_folder);
+    lock.emplace(options.out_folder);
+    old_files = run_files(options.out_folder);
+    PICTURA_CHECK(old_files.empty() || options.old_run != OldRun::refuse,
+                  "{}: holds a run already ({}): resume it, overwrite it, or name another folder", options.out_folder,
+                  fmt::join(old_files, ", "));
+  }
   at::set_num_threads(resolve_num_threads(config.run.num_threads));
   set_float32_products(config.train.precision);
   set_reproducible(config.train.reproducible);
@@ -119,36 +141,49 @@ TrainReport train_on_its_device(const TrainOptions& options) {
   };
   TrainReport report;
   report.checkpoint = options.out_folder + "/checkpoint.ckpt";
-  Run run(config, device);
+  report.ranks = communicator->size();
+  Run run(config, device, communicator.get());
   report.device = name_of(device);
   report.simulator = run.simulator->name();
   if (run.renderer) report.renderer = run.renderer->name();
   std::vector<RecentUpdate> recent;
+  const auto read_everywhere = [&](const std::string& path) {
+    return parse_checkpoint(communicator->from_first(is_first ? read_checkpoint_file(path) : ""), path);
+  };
+  const auto save_as = [&](const std::string& name, const std::vector<RecentUpdate>& its_recent) {
+    const Checkpoint checkpoint = run.checkpoint(its_recent);
+    const Ranks::LongWork writes(ranks);  // disks may be slow
+    if (is_first) write_checkpoint(options.out_folder + "/" + name, checkpoint);
+  };
   if (options.old_run == OldRun::resume) {
-    const Checkpoint saved = read_checkpoint(report.checkpoint);
+    const Checkpoint saved = read_everywhere(report.checkpoint);
     const std::string why_new_episodes = run.restore(saved);
     if (!why_new_episodes.empty()) notify("the saved episodes cannot go on, new ones begin: " + why_new_episodes);
     for (const std::string& change : differences_to_report(saved.config, config)) notify(change);
     recent = saved.recent;
   } else {
     if (!options.init_from.empty()) {
-      const Checkpoint other = read_checkpoint(options.init_from);
+      const Checkpoint other = read_everywhere(options.init_from);
       restore_tensors(other, other.parameters, run.policy.parameters());
     }
     for (const std::string& name : old_files) std::filesystem::remove(options.out_folder + "/" + name);
     run.simulator->reset();
-    run.save(options.out_folder + "/untrained.ckpt", recent);
+    save_as("untrained.ckpt", recent);
   }
-  write_file(options.out_folder + "/config.toml", to_toml(config));
-  RunLog log(options.out_folder, config, run.update, run.agent_steps, recent, options.on_notice);
+  if (is_first) write_file(options.out_folder + "/config.toml", to_toml(config));
+  RunLog log(is_first ? options.out_folder : "", config, run.update, run.agent_steps, recent, options.on_notice);
 
   Stopwatch since_saved;
   int64_t saved_update = options.old_run == OldRun::resume ? run.update : -1;
   const auto save = [&] {
     // A second time it would be the same, in the place of an older one.
     if (run.update == saved_update) return;
-    save_checkpoint(options.out_folder, config.train.keep_checkpoints,
-                    [&](const std::string& path) { run.save(path, log.recent()); });
+    const Checkpoint checkpoint = run.checkpoint(log.recent());
+    const Ranks::LongWork writes(ranks);
+    if (is_first) {
+      save_checkpoint(options.out_folder, config.train.keep_checkpoints,
+                      [&](const std::string& path) { write_checkpoint(path, checkpoint); });
+    }
     saved_update = run.update;
     since_saved.restart();
   };
@@ -160,10 +195,9 @@ TrainReport train_on_its_device(const TrainOptions& options) {
     // A fifth more, for updates that take longer than those before, and for saving.
     const auto longest = run.longest_update_s.find(machine);
     const double expected_s = longest == run.longest_update_s.end() ? 0 : 1.2 * longest->second;
-    if (options.minutes > 0 && since_start.seconds() + expected_s > 60 * options.minutes) {
-      report.out_of_time = true;
-      break;
-    }
+    report.out_of_time =
+        any_rank(options.minutes > 0 && since_start.seconds() + expected_s > 60 * options.minutes, communicator.get());
+    if (report.out_of_time) break;
     const std::unique_ptr<StateSnapshot> before = run.simulator->snapshot();
     const SimulatorTotals totals_before = run.simulator->totals();
     UpdateRecord record;
@@ -176,16 +210,18 @@ TrainReport train_on_its_device(const TrainOptions& options) {
     }
     record.totals = run.simulator->totals();
     record.totals.subtract(totals_before);
+    record.totals = totals_of_all(record.totals, communicator.get());
     record.rollout_s = watch.restart();
 
     record.stats = improve(options.out_folder, &run);
     record.update_s = watch.restart();
     record.phases_s = run.timer.take();
-    record.diagnosis = diagnose(run.rollout, record.stats.adv_threshold);
+    record.diagnosis = diagnose(run.rollout, record.stats.adv_threshold, communicator.get());
     own_longest_s = std::max(own_longest_s, record.rollout_s + record.update_s);
     run.longest_update_s[machine] = own_longest_s;
 
     ++run.update;
+    run.check_ranks_agree();
     const std::string milestone = milestone_name(run.agent_steps, run.agent_steps + record.totals.agent_steps,
                                                  config.train.milestone_agent_steps);
     run.agent_steps += record.totals.agent_steps;
@@ -197,12 +233,12 @@ TrainReport train_on_its_device(const TrainOptions& options) {
       progress.ends_by_minutes = true;
     }
     report.agent_steps_per_s = progress.agent_steps_per_s;
-    report.interrupted = interrupted();
+    report.interrupted = any_rank_interrupted(communicator.get());
     if (run.update % config.train.checkpoint_every == 0 ||
-        since_saved.seconds() > 60 * config.train.checkpoint_minutes) {
+        any_rank(since_saved.seconds() > 60 * config.train.checkpoint_minutes, communicator.get())) {
       save();
     }
-    if (!milestone.empty()) run.save(options.out_folder + "/" + milestone, log.recent());
+    if (!milestone.empty()) save_as(milestone, log.recent());
     if (options.on_progress) options.on_progress(progress);
   }
 
@@ -210,7 +246,9 @@ TrainReport train_on_its_device(const TrainOptions& options) {
   report.device_bytes = memory.used_bytes;
   report.peak_tensor_bytes = memory.peak_tensor_bytes;
   save();
-  write_safetensors(options.out_folder + "/policy.safetensors", run.policy.parameters(), to_toml(config));
+  if (is_first) {
+    write_safetensors(options.out_folder + "/policy.safetensors", run.policy.parameters(), to_toml(config));
+  }
   report.agent_steps = run.agent_steps;
   report.updates = run.update;
   report.episode_return = log.episode_return();
@@ -222,12 +260,20 @@ TrainReport train_on_its_device(const TrainOptions& options) {
 }  // namespace
 
 TrainReport train(const TrainOptions& options) {
+  Ranks ranks(options.launch);
+  TrainOptions of_rank = options;
+  if (ranks.rank() > 0) of_rank.on_progress = {}, of_rank.on_notice = {};
   try {
-    return train_on_its_device(options);
+    return train_on_its_device(of_rank, &ranks);
   } catch (const c10::OutOfMemoryError& error) {
     const std::string text = error.what_without_backtrace();
-    throw OutOfMemory("train: " + text.substr(0, text.find('\n')) +
-                      " A smaller train.forward_chunk or simulator.num_slots takes less.");
+    const std::string why = "train: " + text.substr(0, text.find('\n')) +
+                            " A smaller train.forward_chunk or simulator.num_slots takes less.";
+    ranks.announce(why);
+    throw OutOfMemory(why);
+  } catch (const std::exception& error) {
+    ranks.announce(error.what());
+    throw;
   }
 }
 

@@ -9,6 +9,7 @@
 #include "pictura/common/portable/hd.h"
 #include "pictura/training/event_file.h"
 #include "pictura/training/phases.h"
+#include "pictura/training/ranks/launch.h"
 
 namespace pictura {
 
@@ -48,13 +49,15 @@ struct TrainOptions {
   OldRun old_run = OldRun::refuse;
   std::string init_from;  // begin with the weights of this checkpoint, of the same network, and with nothing else of it
   double minutes = 0;     // of wall time, start-up included, within which the last update ends; 0: no limit
-  std::function<void(const TrainProgress&)> on_progress;
-  std::function<void(const std::string&)> on_notice;  // what a person should know, and no error is
+  Launch launch;          // which of the processes that train together this one is
+  std::function<void(const TrainProgress&)> on_progress;  // as all that reports, of rank 0 alone
+  std::function<void(const std::string&)> on_notice;      // what a person should know, and no error is
 };
 
 struct TrainReport {
-  int64_t agent_steps = 0, updates = 0;
+  int64_t agent_steps = 0, updates = 0;  // of all ranks, as all below but what is of a device
   double agent_steps_per_s = 0, episode_return = 0, km_driven = 0;
+  int ranks = 1;
   bool interrupted = false, out_of_time = false;
   std::string checkpoint, policy_hash;
   // Of a CUDA device, else 0: what all processes had in use after the last update, when torch still keeps what it has
@@ -76,6 +79,10 @@ class OutOfMemory : public Error {
 /// of this process (before its first one: of an earlier one on such a device), would not end within `minutes`, with
 /// `out_of_time`. Throws Error naming file and key for bad input, and naming the folder where another run is at work,
 /// and where one lies that old_run does not speak of; OutOfMemory where the device's memory is too small.
+///
+/// Several processes train one policy where each calls this with its `launch` and equal settings. Rank 0 alone reads
+/// and writes files. What asks one of them to end ends all after the same update. Throws Error in all naming the rank
+/// where one fails, ends or hangs.
 TrainReport train(const TrainOptions& options);
 
 }  // namespace pictura

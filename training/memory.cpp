@@ -27,8 +27,8 @@ double image_bytes(const Config& config) {
 constexpr double kSimulatorBytesPerBox = 700;
 
 // Of a transition: the scalars of a rollout (values, actions, log-probabilities, rewards, advantages, three flags), and
-// those that an update makes of them (returns, actions and three lists of rows as i64).
-constexpr double kTransitionBytes = 5 * 4 + 3 + 4 + 4 * 8;
+// those that an update makes of them (returns, actions and five lists of rows as i64).
+constexpr double kTransitionBytes = 5 * 4 + 3 + 4 + 6 * 8;
 
 }  // namespace
 
@@ -47,13 +47,15 @@ double estimated_bytes(const Config& config, Device device) {
   return bytes + static_cast<double>(bytes_of(scenes));
 }
 
-void check_memory(const Config& config, Device device, int64_t memory_bytes) {
-  const double needed = estimated_bytes(config, device), available = static_cast<double>(memory_bytes);
+void check_memory(const Config& config, Device device, int64_t memory_bytes, int num_ranks) {
+  const double needed = estimated_bytes(config, device) / num_ranks, available = static_cast<double>(memory_bytes);
   if (needed <= available) return;
   fail(
-      "train: {} agents (simulator.num_slots) with rollouts of {} steps (train.num_steps) need {:.3g} GB by estimate, "
+      "train: {} agents (simulator.num_slots) with rollouts of {} steps (train.num_steps) need {:.3g} GB {}by "
+      "estimate, "
       "the network not counted; {} has {:.3g} GB: about {} agents would fit",
-      config.simulator.num_slots, config.train.num_steps, needed / 1e9, name_of(device), available / 1e9,
+      config.simulator.num_slots, config.train.num_steps, needed / 1e9,
+      num_ranks > 1 ? fmt::format("on each of {} ranks ", num_ranks) : "", name_of(device), available / 1e9,
       static_cast<int64_t>(config.simulator.num_slots * (available / needed)));
 }
 

@@ -10,7 +10,7 @@ namespace pictura {
 double estimated_bytes(const Config& config, Device device);
 
 /// Throws Error naming the settings that decide, and how many agents would fit, where the estimate exceeds
-/// `memory_bytes` of the device.
-void check_memory(const Config& config, Device device, int64_t memory_bytes);
+/// `memory_bytes` of the device; with several ranks, for each one's part.
+void check_memory(const Config& config, Device device, int64_t memory_bytes, int num_ranks = 1);
 
 }  // namespace pictura

@@ -6,19 +6,22 @@
 #include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
+#include "pictura/simulator/saved_worlds.h"
 
 namespace pictura {
 
 namespace {
 
-std::unique_ptr<Simulator> make_training_simulator(const Config& config, Device device) {
+std::vector<WorldSpec> draw_training_worlds(const Config& config) {
   const Config::SimulatorSection& section = config.simulator;
+  return draw_worlds(config.run.seed, section.num_slots, section.min_agents, section.max_agents,
+                     static_cast<int>(section.maps.size()));
+}
+
+std::unique_ptr<Simulator> make_training_simulator(const Config& config, Device device, std::vector<WorldSpec> worlds) {
   std::vector<std::shared_ptr<const RoadMap>> maps;
-  for (const std::string& name : section.maps) maps.push_back(load_map(name));
-  const int num_maps = static_cast<int>(maps.size());
-  return make_simulator(
-      config.simulator.backend, simulator_config(config, device), std::move(maps),
-      draw_worlds(config.run.seed, section.num_slots, section.min_agents, section.max_agents, num_maps));
+  for (const std::string& name : config.simulator.maps) maps.push_back(load_map(name));
+  return make_simulator(config.simulator.backend, simulator_config(config, device), std::move(maps), std::move(worlds));
 }
 
 std::unique_ptr<Renderer> make_training_renderer(const Config& config, const Rig& rig, const Simulator& simulator) {
@@ -31,11 +34,14 @@ std::unique_ptr<Renderer> make_training_renderer(const Config& config, const Rig
 
 }  // namespace
 
-Run::Run(const Config& its_config, Device its_device)
+Run::Run(const Config& its_config, Device its_device, Communicator* its_communicator)
     : config(its_config),
       device(its_device),
+      communicator(its_communicator),
+      all_worlds(draw_training_worlds(config)),
       rig(rig_of(config)),
-      simulator(make_training_simulator(config, device)),
+      simulator(make_training_simulator(config, device,
+                                        worlds_of_part(all_worlds, communicator->rank(), communicator->size()))),
       renderer(make_training_renderer(config, rig, *simulator)),
       executor(make_learner_executor(device)),
       timer(device),
@@ -44,7 +50,7 @@ Run::Run(const Config& its_config, Device its_device)
       rollout(RolloutObservations(config, simulator.get(), renderer.get(), &timer), config.train.num_steps,
               simulator->num_slots(), device) {}
 
-void Run::save(const std::string& path, const std::vector<RecentUpdate>& recent) const {
+Checkpoint Run::checkpoint(const std::vector<RecentUpdate>& recent) const {
   Checkpoint checkpoint;
   checkpoint.config = config;
   checkpoint.rig = rig;
@@ -59,7 +65,12 @@ void Run::save(const std::string& path, const std::vector<RecentUpdate>& recent)
   checkpoint.first_moments = optimizer.first_moments;
   checkpoint.second_moments = optimizer.second_moments;
   checkpoint.simulator = simulator->save();
-  write_checkpoint(path, checkpoint);
+  if (communicator->size() > 1) {
+    const std::vector<std::vector<uint8_t>> parts = communicator->gather(checkpoint.simulator);
+    checkpoint.simulator.clear();
+    if (communicator->is_first()) checkpoint.simulator = join_saved_states(*simulator, all_worlds, parts);
+  }
+  return checkpoint;
 }
 
 std::string Run::restore(const Checkpoint& saved) {
@@ -77,13 +88,36 @@ std::string Run::restore(const Checkpoint& saved) {
   agent_steps = saved.agent_steps;
   distance_m = saved.distance_m;
   longest_update_s = saved.longest_update_s;
+  std::string why_new_episodes;
   try {
-    simulator->restore(saved.simulator);
+    if (communicator->size() == 1) {
+      simulator->restore(saved.simulator);
+    } else {
+      simulator->restore(
+          part_of_saved_state(*simulator, all_worlds, saved.simulator, communicator->rank(), communicator->size()));
+    }
   } catch (const Error& error) {
-    simulator->reset();
-    return error.what();
+    why_new_episodes = error.what();
   }
-  return "";
+  if (communicator->max_of(why_new_episodes.empty() ? 0 : 1) > 0) {
+    simulator->reset();
+    if (why_new_episodes.empty()) why_new_episodes = "another rank cannot read its part";
+  }
+  return why_new_episodes;
+}
+
+void Run::check_ranks_agree() const {
+  if (communicator->size() == 1) return;
+  // A sum of each parameter's bits is least and largest on every rank alike where all are equal.
+  std::vector<at::Tensor> sums;
+  for (const NamedTensor& parameter : policy.parameters()) {
+    sums.push_back(parameter.value.detach().view(at::kInt).sum(at::kLong));
+  }
+  const at::Tensor own = at::stack(sums), extremes = at::stack({own, -own});
+  communicator->max(extremes);
+  const at::Tensor differs = at::nonzero(extremes[0] + extremes[1]).cpu();
+  PICTURA_CHECK(differs.size(0) == 0, "update {}: the ranks' policies differ: parameter '{}'", update,
+                policy.parameters()[static_cast<size_t>(differs[0].item<int64_t>())].name);
 }
 
 }  // namespace pictura

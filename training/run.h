@@ -1,25 +1,31 @@
 // Everything that a training run consists of: made from a configuration, saved to a checkpoint and restored from one.
+// Of a run of several ranks each has its part of the worlds, and all of the rest.
 #pragma once
 
 #include "pictura/training/checkpoint.h"
 #include "pictura/training/ppo.h"
+#include "pictura/training/ranks/communicator.h"
 
 namespace pictura {
 
 struct Run {
   /// Learns on `device`, where simulator and renderer work too. Throws Error naming file and key for maps, cameras and
   /// sizes that cannot be trained with.
-  Run(const Config& config, Device device);
+  Run(const Config& config, Device device, Communicator* communicator = alone());
 
-  /// Writes a checkpoint under another name and renames it to path, at the start of an update.
-  void save(const std::string& path, const std::vector<RecentUpdate>& recent) const;
-  /// Goes on from a checkpoint. Where the simulator cannot read its saved state, because its rules or maps have
-  /// changed since, new episodes begin; the return value says why, else it is empty. Throws Error naming what differs
-  /// when the checkpoint was saved under another configuration or with other cameras.
+  /// What is to be saved, at the start of an update: of all ranks, for rank 0 to write; the others' has no simulator.
+  Checkpoint checkpoint(const std::vector<RecentUpdate>& recent) const;
+  /// Goes on from a checkpoint, of any number of ranks. Where the simulator cannot read its saved state, because its
+  /// rules or maps have changed since, new episodes begin; the return value says why, else it is empty. Throws Error
+  /// naming what differs when the checkpoint was saved under another configuration or with other cameras.
   std::string restore(const Checkpoint& saved);
+  /// Throws Error naming a parameter in which the ranks' policies differ by a bit.
+  void check_ranks_agree() const;
 
   const Config config;
   const Device device;
+  Communicator* const communicator;
+  const std::vector<WorldSpec> all_worlds;  // of all ranks
   const Rig rig;
   const std::unique_ptr<Simulator> simulator;
   const std::unique_ptr<Renderer> renderer;  // of policies with images

@@ -150,9 +150,11 @@ RunLog::RunLog(const std::string& folder, const Config& config, int64_t updates_
       first_update_(updates_done),
       first_agent_steps_(agent_steps),
       on_notice_(on_notice),
-      events_(folder),
-      csv_(folder + "/progress.csv", scalars_of(config, {}, {}), updates_done, on_notice),
-      recent_(recent.begin(), recent.end()) {}
+      recent_(recent.begin(), recent.end()) {
+  if (folder.empty()) return;
+  events_.emplace(folder);
+  csv_.emplace(folder + "/progress.csv", scalars_of(config, {}, {}), updates_done, on_notice);
+}
 
 TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecord& record) {
   const SimulatorTotals& totals = record.totals;
@@ -194,8 +196,8 @@ TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecor
                    record.phases_s};
 
   progress.scalars = scalars_of(config_, progress, record);
-  csv_.write(update, progress.scalars);
-  events_.write(agent_steps, progress.scalars);
+  if (csv_) csv_->write(update, progress.scalars);
+  if (events_) events_->write(agent_steps, progress.scalars);
   return progress;
 }
 

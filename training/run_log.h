@@ -2,6 +2,7 @@
 #pragma once
 
 #include <deque>
+#include <optional>
 
 #include "pictura/training/checkpoint.h"
 #include "pictura/training/diagnosis.h"
@@ -38,8 +39,8 @@ struct UpdateRecord {
 
 class RunLog {
  public:
-  /// Opens the files of a run that has done `updates_done` updates and `agent_steps` in them. Throws Error naming the
-  /// path.
+  /// Opens the files of a run that has done `updates_done` updates and `agent_steps` in them; with an empty folder it
+  /// writes none. Throws Error naming the path.
   RunLog(const std::string& folder, const Config& config, int64_t updates_done, int64_t agent_steps,
          const std::vector<RecentUpdate>& recent, const std::function<void(const std::string&)>& on_notice);
 
@@ -57,8 +58,8 @@ class RunLog {
   const int64_t first_update_, first_agent_steps_;
   const std::function<void(const std::string&)> on_notice_;
   bool has_said_rejected_ = false;
-  EventFile events_;
-  ProgressCsv csv_;
+  std::optional<EventFile> events_;
+  std::optional<ProgressCsv> csv_;
   std::deque<RecentUpdate> recent_;
   Stopwatch since_start_;
 };

@@ -26,7 +26,7 @@ std::string why_not_on_cuda() {
 
 }  // namespace
 
-Device open_learning_device(const Config& config) {
+Device open_learning_device(const Config& config, int local_rank) {
   const std::string &wanted = config.run.device, &simulator = config.simulator.backend,
                     &renderer = config.render.backend;
   // Before anything is computed, wherever that will be: torch looks for its CUDA library once, and a process that
@@ -52,12 +52,15 @@ Device open_learning_device(const Config& config) {
   if (wanted == "auto" && simulator == "auto" && !why_not.empty()) return {};
   PICTURA_CHECK(why_not.empty(), "{}: {}", wanted == "auto" ? "simulator.backend: \"cuda\"" : "run.device: " + wanted,
                 why_not);
-  Device device{MemorySpace::cuda, 0};
+  const int count = at::detail::getCUDAHooks().deviceCount();
+  // A launcher may have left each process only its own.
+  Device device{MemorySpace::cuda, count == 1 ? 0 : local_rank};
   if (const size_t colon = wanted.find(':'); colon != std::string::npos) {
     device.index = std::stoi(wanted.substr(colon + 1));
+    PICTURA_CHECK(device.index < count, "run.device: expected cuda:0 to cuda:{}, got \"{}\"", count - 1, wanted);
   }
-  const int count = at::detail::getCUDAHooks().deviceCount();
-  PICTURA_CHECK(device.index < count, "run.device: expected cuda:0 to cuda:{}, got \"{}\"", count - 1, wanted);
+  PICTURA_CHECK(device.index < count, "run.device: \"{}\" is cuda:{} for LOCAL_RANK {}, but this host has {} devices",
+                wanted, device.index, local_rank, count);
   return device;
 }
 

@@ -9,9 +9,11 @@
 
 namespace pictura {
 
-/// Where this configuration learns. Opens torch's CUDA library if that is a CUDA device. Throws Error naming the key
-/// and the reason where it cannot learn there, or where the simulator or the renderer works in other memory.
-Device open_learning_device(const Config& config);
+/// Where this configuration learns, in the process of this number on its host: on the device of that number, where the
+/// configuration leaves it open and there is more than one. Opens torch's CUDA library if that is a CUDA device. Throws
+/// Error naming the key and the reason where it cannot learn there, or where the simulator or the renderer works in
+/// other memory.
+Device open_learning_device(const Config& config, int local_rank = 0);
 
 at::Device torch_device(Device device);
 

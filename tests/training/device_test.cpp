@@ -16,6 +16,7 @@
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/small_runs.h"
+#include "pictura/training/ranks/ranks.h"
 #include "pictura/training/run.h"
 #include "pictura/training/torch_device.h"
 
@@ -294,6 +295,29 @@ TEST_F(DeviceTraining, ARunThatDivergesStopsAndKeepsTheMinibatch) {
       message_of([&] { train(options("run", "cuda", {"policy.modality=vector", "train.learning_rate=100"})); }),
       AllOf(HasSubstr("update 1, epoch "), HasSubstr("not finite"), HasSubstr(run + "/failed_minibatch.safetensors")));
   EXPECT_TRUE(std::filesystem::exists(run + "/failed_minibatch.safetensors"));
+}
+
+TEST_F(DeviceTraining, AWorldOfOneRankComputesThroughNccl) {
+  const Device device = open_learning_device(
+      load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml", {"run.device=cuda", "render.backend=auto"}));
+  Ranks ranks{Launch{}};
+  const std::unique_ptr<Communicator> communicator = make_nccl_communicator(&ranks, device);
+  EXPECT_EQ(communicator->name(), "nccl");
+  EXPECT_EQ(communicator->rank(), 0);
+  EXPECT_EQ(communicator->size(), 1);
+  for (const at::Device where : {torch_device(device), at::Device(at::kCPU)}) {
+    for (const at::ScalarType type : {at::kByte, at::kInt, at::kLong, at::kFloat, at::kDouble}) {
+      const at::Tensor numbers = at::arange(1, 1002, at::TensorOptions(type).device(where)), before = numbers.clone();
+      communicator->sum(numbers);
+      communicator->max(numbers);
+      communicator->broadcast(numbers, 0);
+      EXPECT_TRUE(numbers.equal(before)) << type << " on " << where;
+    }
+  }
+  EXPECT_EQ(communicator->max_of(-2.5), -2.5);
+  EXPECT_EQ(communicator->gather({1, 2, 3}), (std::vector<std::vector<uint8_t>>{{1, 2, 3}}));
+  EXPECT_EQ(communicator->from_first("said"), "said");
+  EXPECT_THAT(message_of([&] { communicator->sum(at::zeros({2}, at::kHalf)); }), HasSubstr("f64"));
 }
 
 TEST_F(DeviceTraining, AutoIsTheDeviceAndOneThatThereIsNotIsRefusedByName) {

@@ -1,0 +1,383 @@
+// Ranks: who is which, how they meet and lose each other, what they compute together, and that they learn what one
+// would. Ranks are threads here; tests/apps/command_test.py has them as processes.
+#include "pictura/training/ranks/ranks.h"
+
+#include <cstdlib>
+#include <functional>
+#include <map>
+
+#include <ATen/Parallel.h>
+#include <gmock/gmock.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "pictura/tests/support/error_message.h"
+#include "pictura/tests/training/corridor.h"
+#include "pictura/training/ranks/communicator.h"
+#include "pictura/training/run.h"
+
+namespace pictura {
+namespace {
+
+using test::message_of;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+// A socket that listens at a free port of this host.
+struct Listener {
+  int fd = socket(AF_INET, SOCK_STREAM, 0);
+  int port = 0;
+
+  Listener() {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_ANY);
+    auto* const any = reinterpret_cast<sockaddr*>(&address);
+    socklen_t size = sizeof address;
+    EXPECT_EQ(bind(fd, any, size), 0);
+    EXPECT_EQ(listen(fd, 1), 0);
+    EXPECT_EQ(getsockname(fd, any, &size), 0);
+    port = ntohs(address.sin_port);
+  }
+  ~Listener() { close(fd); }
+};
+
+int free_port() { return Listener().port; }
+
+Launch place(int rank, int size, int port) {
+  Launch launch;
+  launch.rank = rank, launch.size = size, launch.port = port;
+  return launch;
+}
+
+// Runs f(its ranks) in a thread each, and returns what each threw.
+std::vector<std::string> run_ranks(int size, const std::function<void(Ranks&)>& f, const Patience& patience = {}) {
+  const int port = free_port();
+  std::vector<std::string> errors(static_cast<size_t>(size));
+  std::vector<std::thread> threads;
+  for (int rank = 0; rank < size; ++rank) {
+    threads.emplace_back([&, rank] {
+      errors[static_cast<size_t>(rank)] = message_of([&] {
+        Ranks ranks(place(rank, size, port), patience);
+        f(ranks);
+      });
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  return errors;
+}
+
+class LaunchVariables : public ::testing::Test {
+ protected:
+  // Those that are not given are unset.
+  static Launch launch(const std::map<std::string, std::string>& variables) {
+    for (const char* name :
+         {"RANK", "WORLD_SIZE", "LOCAL_RANK", "MASTER_ADDR", "MASTER_PORT", "SLURM_PROCID", "SLURM_STEP_NUM_TASKS",
+          "SLURM_LOCALID", "SLURM_STEP_NODELIST", "TORCHELASTIC_USE_AGENT_STORE", "TORCHELASTIC_RESTART_COUNT"}) {
+      const auto found = variables.find(name);
+      found == variables.end() ? unsetenv(name) : setenv(name, found->second.c_str(), 1);
+    }
+    return launch_from_environment();
+  }
+  void TearDown() override { launch({}); }
+};
+
+TEST_F(LaunchVariables, SayNothingOfOneProcess) {
+  EXPECT_EQ(launch({}).size, 1);
+  // A batch script of several tasks is one process; srun starts the others.
+  EXPECT_EQ(launch({{"SLURM_PROCID", "0"}, {"SLURM_LOCALID", "0"}}).size, 1);
+}
+
+TEST_F(LaunchVariables, AreThoseOfTorchrunOrPlainOnes) {
+  const Launch plain = launch({{"RANK", "3"}, {"WORLD_SIZE", "8"}});
+  EXPECT_EQ(plain.rank, 3);
+  EXPECT_EQ(plain.size, 8);
+  EXPECT_EQ(plain.local_rank, 3);
+  EXPECT_EQ(plain.address, "127.0.0.1");
+  EXPECT_EQ(plain.port, 29500);
+  EXPECT_FALSE(plain.is_served);
+  const Launch torchrun = launch({{"RANK", "9"},
+                                  {"WORLD_SIZE", "16"},
+                                  {"LOCAL_RANK", "1"},
+                                  {"MASTER_ADDR", "head"},
+                                  {"MASTER_PORT", "1234"},
+                                  {"TORCHELASTIC_USE_AGENT_STORE", "True"},
+                                  {"TORCHELASTIC_RESTART_COUNT", "2"}});
+  EXPECT_EQ(torchrun.local_rank, 1);
+  EXPECT_EQ(torchrun.address, "head");
+  EXPECT_EQ(torchrun.port, 1234);
+  EXPECT_TRUE(torchrun.is_served);
+  EXPECT_EQ(torchrun.attempt, "2");
+}
+
+TEST_F(LaunchVariables, AreThoseOfSlurm) {
+  const Launch slurm = launch({{"SLURM_PROCID", "5"},
+                               {"SLURM_STEP_NUM_TASKS", "8"},
+                               {"SLURM_LOCALID", "1"},
+                               {"SLURM_STEP_NODELIST", "gpu[07-08,11],other"}});
+  EXPECT_EQ(slurm.rank, 5);
+  EXPECT_EQ(slurm.size, 8);
+  EXPECT_EQ(slurm.local_rank, 1);
+  EXPECT_EQ(slurm.address, "gpu07");
+  EXPECT_EQ(first_slurm_host("one,two"), "one");
+  EXPECT_EQ(first_slurm_host("one"), "one");
+  EXPECT_EQ(first_slurm_host("one,two[1-2]"), "one");
+}
+
+TEST_F(LaunchVariables, AreRefusedByName) {
+  const auto refusal = [](const std::map<std::string, std::string>& variables) {
+    return message_of([&] { launch(variables); });
+  };
+  EXPECT_THAT(refusal({{"RANK", "1"}}), HasSubstr("WORLD_SIZE"));
+  EXPECT_THAT(refusal({{"WORLD_SIZE", "2"}}), HasSubstr("RANK"));
+  EXPECT_THAT(refusal({{"RANK", "2"}, {"WORLD_SIZE", "2"}}), AllOf(HasSubstr("RANK"), HasSubstr("[0, 1]")));
+  EXPECT_THAT(refusal({{"RANK", "0"}, {"WORLD_SIZE", "two"}}), AllOf(HasSubstr("WORLD_SIZE"), HasSubstr("'two'")));
+  EXPECT_THAT(refusal({{"MASTER_PORT", "70000"}}), HasSubstr("MASTER_PORT"));
+}
+
+TEST(RanksMeet, OrSayWhoDidNotCome) {
+  const int port = free_port();
+  EXPECT_THAT(message_of([&] { Ranks ranks(place(0, 3, port), {.join_s = 0.2}); }),
+              AllOf(HasSubstr("2 of 3 ranks did not come"), HasSubstr(std::to_string(port)), HasSubstr("1, 2")));
+}
+
+TEST(RanksMeet, OnlyAtAPortThatIsFree) {
+  const Listener other;
+  EXPECT_THAT(
+      message_of([&] { Ranks ranks(place(0, 2, other.port), {.join_s = 1}); }),
+      AllOf(HasSubstr("rank 0"), HasSubstr("MASTER_PORT"), HasSubstr(std::to_string(other.port)), HasSubstr("in use")));
+}
+
+TEST(RanksMeet, EachUnderItsOwnNumber) {
+  const std::vector<std::string> errors = run_ranks(2, [](Ranks& ranks) {
+    if (ranks.rank() == 0) {
+      EXPECT_THAT(message_of([&] { Ranks again(place(1, 2, ranks.launch().port), {.join_s = 1}); }),
+                  HasSubstr("another process"));
+    }
+  });
+  EXPECT_THAT(errors, ::testing::Each(test::kNoError));
+}
+
+TEST(RanksLoseEachOther, WhenOneFailsForItsReason) {
+  const std::vector<std::string> errors = run_ranks(3, [](Ranks& ranks) {
+    if (ranks.rank() == 2) {
+      ranks.announce("no space left");
+      fail("no space left");
+    }
+    while (true) {
+      ranks.step();
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+  });
+  EXPECT_EQ(errors[2], "no space left");
+  for (size_t rank : {0, 1}) EXPECT_EQ(errors[rank], "rank 2 ended: no space left");
+}
+
+TEST(RanksLoseEachOther, WhenOneHangsButNotWhenItWorksForLong) {
+  const std::vector<std::string> errors = run_ranks(2,
+                                                    [](Ranks& ranks) {
+                                                      ranks.step();
+                                                      if (ranks.rank() == 1) {
+                                                        {
+                                                          const Ranks::LongWork work(&ranks);
+                                                          std::this_thread::sleep_for(std::chrono::seconds(3));
+                                                        }
+                                                        ranks.check();
+                                                        std::this_thread::sleep_for(std::chrono::seconds(5));
+                                                        ranks.check();
+                                                      } else {
+                                                        ranks.step();
+                                                        ranks.find_lost();
+                                                      }
+                                                    },
+                                                    {.silent_s = 10, .no_progress_s = 1.5});
+  EXPECT_THAT(errors[0], AllOf(HasSubstr("rank 1: alive"), HasSubstr("hangs")));
+  EXPECT_THAT(errors[1], HasSubstr("rank 1: alive"));
+}
+
+TEST(Communicators, GiveEveryRankTheSameBits) {
+  std::vector<at::Tensor> sums(3);
+  const std::vector<std::string> errors = run_ranks(3, [&](Ranks& ranks) {
+    const std::unique_ptr<Communicator> communicator = make_communicator(&ranks, Device{});
+    EXPECT_EQ(communicator->name(), "gloo");
+    EXPECT_EQ(communicator->size(), 3);
+    const int rank = communicator->rank();
+    const at::Tensor sum = (at::arange(1001, at::kFloat) * (0.1 + rank)).sin();
+    communicator->sum(sum);
+    sums[static_cast<size_t>(rank)] = sum;
+    EXPECT_EQ(communicator->max_of(rank == 1 ? 7 : -rank), 7);
+    const at::Tensor copied = at::full({4}, rank, at::kByte);
+    communicator->broadcast(copied, 2);
+    EXPECT_TRUE(copied.equal(at::full({4}, 2, at::kByte)));
+    const std::vector<uint8_t> own(static_cast<size_t>(rank), uint8_t(rank));  // rank 0 has none
+    EXPECT_EQ(communicator->gather(own), (std::vector<std::vector<uint8_t>>{{}, {1}, {2, 2}}));
+    EXPECT_EQ(communicator->from_first(rank == 0 ? "said" : ""), "said");
+    SimulatorTotals totals;
+    totals.agent_steps = 10 + rank;
+    totals.finished_first_motion_s = 0.5;
+    totals = totals_of_all(totals, communicator.get());
+    EXPECT_EQ(totals.agent_steps, 33);
+    EXPECT_EQ(totals.finished_first_motion_s, 1.5);
+    EXPECT_EQ(totals.episodes, 0);
+  });
+  EXPECT_THAT(errors, ::testing::Each(test::kNoError));
+  const at::Tensor expected = (at::arange(1001, at::kFloat) * 0.1).sin() + (at::arange(1001, at::kFloat) * 1.1).sin() +
+                              (at::arange(1001, at::kFloat) * 2.1).sin();
+  EXPECT_TRUE(sums[0].allclose(expected, 1e-5, 1e-6));
+  EXPECT_TRUE(sums[1].equal(sums[0]));
+  EXPECT_TRUE(sums[2].equal(sums[0]));
+}
+
+Config::PolicySection tiny_policy() {
+  Config::PolicySection policy;
+  policy.modality = Modality::vector;
+  policy.embedding_width = 8;
+  policy.backbone_layers = 1;
+  policy.backbone_width = 16;
+  return policy;
+}
+
+// The slots [begin, end) of a rollout.
+Rollout part_of(const Rollout& whole, int64_t begin, int64_t end) {
+  const auto part = [&](const at::Tensor& t) { return t.narrow(1, begin, end - begin).contiguous(); };
+  Rollout result(RolloutObservations(whole.observations.arrays().map(part)), whole.num_steps(), end - begin, Device{});
+  for (at::Tensor Rollout::* t : {&Rollout::values, &Rollout::actions, &Rollout::log_probs, &Rollout::rewards,
+                                  &Rollout::terminated, &Rollout::truncated, &Rollout::valid, &Rollout::advantages}) {
+    result.*t = part(whole.*t);
+  }
+  return result;
+}
+
+struct Learnt {
+  std::vector<std::string> hashes;  // after each update
+  std::vector<at::Tensor> steps;    // of each parameter, in the first update
+  UpdateStats last;
+};
+
+// Three updates on the corridor by ranks that have its slots up to each of these ends, in which each plays all of it.
+std::vector<Learnt> learn(const std::vector<int64_t>& ends, const Config::Train& train) {
+  std::vector<Learnt> of_ranks(ends.size());
+  const std::vector<std::string> errors = run_ranks(static_cast<int>(ends.size()), [&](Ranks& ranks) {
+    at::set_num_threads(1);
+    const std::unique_ptr<Communicator> communicator = make_communicator(&ranks, Device{});
+    const auto rank = static_cast<size_t>(ranks.rank());
+    Learnt& learnt = of_ranks[rank];
+    const Policy policy(tiny_policy(), 4, 3);
+    std::vector<at::Tensor> before;
+    for (const NamedTensor& parameter : policy.parameters()) before.push_back(parameter.value.detach().clone());
+    test::Corridor corridor;
+    AdamW optimizer(policy, train);
+    AdvantageFilter filter;
+    for (int64_t update = 0; update < 3; ++update) {
+      corridor.play(policy, update);
+      // Of the last slots nothing is valid in the second update: the last rank has nothing to learn from.
+      if (update == 1) corridor.rollout.valid.narrow(1, 100, test::Corridor::kSlots - 100).fill_(0);
+      corridor.compute_advantages(0.9, 0.9);
+      const Rollout own = part_of(corridor.rollout, rank == 0 ? 0 : ends[rank - 1], ends[rank]);
+      learnt.last = ppo_update(policy, own, train, {9, update, train.learning_rate}, corridor.executor.get(),
+                               &optimizer, &filter, nullptr, communicator.get());
+      learnt.hashes.push_back(policy.hash());
+      if (update > 0) continue;
+      for (size_t i = 0; i < before.size(); ++i) {
+        learnt.steps.push_back(policy.parameters()[i].value.detach() - before[i]);
+      }
+    }
+  });
+  EXPECT_THAT(errors, ::testing::Each(test::kNoError));
+  return of_ranks;
+}
+
+// Parameters step along the gradient itself, whose size nothing hides.
+Config::Train plain_steps() {
+  Config::Train train;
+  train.schedule = Schedule::constant;
+  train.learning_rate = 0.01;
+  train.adam_eps = 1;
+  train.weight_decay = 0;
+  train.max_grad_norm = 1e6;
+  train.update_epochs = 2;
+  train.minibatch_size = 60;
+  train.forward_chunk = 32;
+  train.adv_filter_threshold = 0.02;
+  return train;
+}
+
+TEST(RanksLearn, WhatOneWouldHaveLearntAndTheSameToTheBit) {
+  const Config::Train train = plain_steps();
+  const Learnt one = learn({test::Corridor::kSlots}, train).front();
+  ASSERT_GT(one.last.minibatches, 6);
+  ASSERT_LT(one.last.kept_fraction, 0.95);
+  for (const std::vector<int64_t>& ends : {std::vector<int64_t>{48, 128}, std::vector<int64_t>{10, 100, 128}}) {
+    const std::vector<Learnt> ranks = learn(ends, train);
+    for (const Learnt& rank : ranks) {
+      ASSERT_EQ(rank.hashes.size(), 3u);
+      EXPECT_EQ(rank.hashes, ranks[0].hashes);
+      EXPECT_EQ(rank.last.minibatches, one.last.minibatches);
+      EXPECT_NEAR(rank.last.kept_fraction, one.last.kept_fraction, 0.01);
+      EXPECT_EQ(rank.last.all.value_loss, ranks[0].last.all.value_loss);
+    }
+    EXPECT_NEAR(ranks[0].last.all.value_loss, one.last.all.value_loss, 1e-4 * one.last.all.value_loss);
+    EXPECT_NEAR(ranks[0].last.explained_variance, one.last.explained_variance, 1e-3);
+    EXPECT_NEAR(ranks[0].last.all.grad_norm, one.last.all.grad_norm, 1e-3 * one.last.all.grad_norm);
+    // The sum of the gradients of all minibatches of the first update: fp32 sums in another order.
+    for (size_t i = 0; i < one.steps.size(); ++i) {
+      const double largest = one.steps[i].abs().max().item<double>();
+      EXPECT_LE((ranks[0].steps[i] - one.steps[i]).abs().max().item<double>(), 1e-4 * largest + 1e-9) << i;
+    }
+  }
+}
+
+TEST(RanksLearn, FromSlotsThatCountNothingToo) {
+  Config::Train train = plain_steps();
+  train.adv_filter_threshold = 0;
+  train.halted_slots = HaltedSlots::draw;
+  const Learnt one = learn({test::Corridor::kSlots}, train).front();
+  const std::vector<Learnt> ranks = learn({48, 128}, train);
+  EXPECT_EQ(ranks[0].hashes, ranks[1].hashes);
+  for (size_t i = 0; i < one.steps.size(); ++i) {
+    const double largest = one.steps[i].abs().max().item<double>();
+    EXPECT_LE((ranks[0].steps[i] - one.steps[i]).abs().max().item<double>(), 1e-4 * largest + 1e-9) << i;
+  }
+}
+
+TEST(RanksLearn, AndNoticeWhenTheirPoliciesDifferByABit) {
+  const Config config =
+      load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml",
+                  {"run.device=cpu", "run.num_threads=1", "policy.modality=vector", "train.num_steps=2",
+                   "simulator.num_slots=6", "simulator.min_agents=3", "simulator.max_agents=3"});
+  const std::vector<std::string> errors = run_ranks(2, [&](Ranks& ranks) {
+    const std::unique_ptr<Communicator> communicator = make_communicator(&ranks, Device{});
+    const Run run(config, Device{}, communicator.get());
+    EXPECT_EQ(run.simulator->num_slots(), 3);
+    run.check_ranks_agree();
+    const NamedTensor& parameter = run.policy.parameters()[5];
+    if (ranks.rank() == 1) parameter.value.detach().view(at::kInt).flatten().narrow(0, 0, 1).bitwise_xor_(1);
+    EXPECT_THAT(message_of([&] { run.check_ranks_agree(); }), HasSubstr("'" + parameter.name + "'"));
+  });
+  EXPECT_THAT(errors, ::testing::Each(test::kNoError));
+}
+
+TEST(RanksLearn, AndStopTogetherWhenOneMeetsNaN) {
+  const std::vector<std::string> errors = run_ranks(2, [&](Ranks& ranks) {
+    const std::unique_ptr<Communicator> communicator = make_communicator(&ranks, Device{});
+    const Config::Train train = plain_steps();
+    const Policy policy(tiny_policy(), 4, 3);
+    const std::string before = policy.hash();
+    test::Corridor corridor;
+    AdamW optimizer(policy, train);
+    AdvantageFilter filter;
+    corridor.play(policy, 0);
+    corridor.compute_advantages(0.9, 0.9);
+    Rollout own = part_of(corridor.rollout, 64 * ranks.rank(), 64 * ranks.rank() + 64);
+    if (ranks.rank() == 1) own.log_probs.fill_(std::numeric_limits<float>::quiet_NaN());
+    EXPECT_THROW(ppo_update(policy, own, train, {9, 0, 0.01}, corridor.executor.get(), &optimizer, &filter, nullptr,
+                            communicator.get()),
+                 NotFinite);
+    EXPECT_EQ(policy.hash(), before);
+  });
+  EXPECT_THAT(errors, ::testing::Each(test::kNoError));
+}
+
+}  // namespace
+}  // namespace pictura
