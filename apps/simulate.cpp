@@ -111,7 +111,7 @@ void add_simulate_command(CLI::App& app) {
   command->add_option("MAP", arguments->world.map, "A .xodr file, a town's name, or procedural[:SEED]")->required();
   add_world_options(command, &arguments->world);
   command->add_option("--steps", arguments->steps, "Steps of 0.1 s")->check(CLI::PositiveNumber)->capture_default_str();
-  command->add_option("--policy", arguments->policy, "random, idle, lane_keeping, or a checkpoint that train wrote")
+  command->add_option("--policy", arguments->policy, "random, idle, lane, or a checkpoint that train wrote")
       ->capture_default_str();
   add_policy_backend_options(command, "auto, and drawn as in training", &arguments->backends);
   command->add_option(

@@ -6,13 +6,12 @@
 namespace pictura {
 
 #ifdef PICTURA_HAS_CUDA
-std::unique_ptr<Controller> make_cuda_controller(const std::string& name, Device device, uint64_t seed);
+std::unique_ptr<Controller> make_cuda_controller(const std::string& name, const Simulator& simulator, uint64_t seed);
 #endif
 
 std::unique_ptr<Controller> make_controller(const std::string& name, Simulator& simulator, uint64_t seed) {
 #ifdef PICTURA_HAS_CUDA
-  const Device device = simulator.controller_input().device;
-  if (!device.is_host()) return make_cuda_controller(name, device, seed);
+  if (!simulator.device().is_host()) return make_cuda_controller(name, simulator, seed);
 #endif
   return make_host_controller(name, simulator, seed);
 }

@@ -49,7 +49,7 @@ struct DrivenWorld {
 };
 
 /// A world of options.agents agents on the map, at the start of its first episode, with evaluation's light timing.
-/// `policy` drives: a controller's name (random, idle, lane_keeping), or a checkpoint's path (argmax; needs torch).
+/// `policy` drives: a controller's name (random, idle, lane), or a checkpoint's path (argmax; needs torch).
 /// Then the world is the one that the policy was trained in, with its walls, population, observations and evaluation's
 /// conditioning, and its images are drawn as they were in training; `backends` and options say otherwise. Throws
 /// UsageError for a simulator that does not work in host memory.

@@ -1,15 +1,22 @@
-// Controllers in device memory: the rules of simulator/rules/control.h, a thread a slot.
+// Controllers in device memory: the rules of simulator/rules/control.h, a thread a slot; and the lane keeper, which
+// drives on the host.
 #include <memory>
 #include <string>
+#include <type_traits>
+#include <vector>
 
 #include "pictura/backend_cuda/simulator/kernels.h"
 #include "pictura/common/cuda/check.h"
+#include "pictura/common/cuda/device_guard.h"
 #include "pictura/common/error.h"
+#include "pictura/simulator/agent_state.h"
 #include "pictura/simulator/controllers/host_controllers.h"
+#include "pictura/simulator/controllers/lane_keeping.h"
+#include "pictura/simulator/simulator_setup.h"
 
 namespace pictura {
 
-std::unique_ptr<Controller> make_cuda_controller(const std::string& name, Device device, uint64_t seed);
+std::unique_ptr<Controller> make_cuda_controller(const std::string& name, const Simulator& simulator, uint64_t seed);
 
 namespace {
 
@@ -46,12 +53,73 @@ class CudaIdleController final : public Controller {
   Device device_;
 };
 
+template <typename T>
+void read(Span<T> device, std::vector<std::remove_const_t<T>>* host_out, cudaStream_t stream) {
+  host_out->resize(device.size());
+  if (device.empty()) return;
+  PICTURA_CUDA(
+      cudaMemcpyAsync(host_out->data(), device.data(), device.size() * sizeof(T), cudaMemcpyDeviceToHost, stream));
+}
+
+/// Copies what the lane keeper looks at to the host and its commands back, in every step.
+class CudaLaneController final : public Controller {
+ public:
+  explicit CudaLaneController(const Simulator& simulator)
+      : device_(simulator.device()),
+        setup_(simulator.config(), simulator.maps(), simulator.handles(), simulator.worlds()),
+        agents_(static_cast<size_t>(setup_.num_slots())),
+        keeper_(simulator) {}
+  std::string_view name() const override { return "lane, on the host"; }
+  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
+    check_controller_arrays(name(), input, device_, mask, commands_out);
+    const DeviceGuard guard(device_);
+    const auto cuda_stream = static_cast<cudaStream_t>(stream.handle);
+#define X(name, type, per_agent, first, comment) \
+  read(Span<const type>(input.state.name, agents_.name.size()), &agents_.name, cuda_stream);
+    PICTURA_AGENT_FIELDS(X)
+#undef X
+    read(input.scene.agents, &boxes_, cuda_stream);
+    read(input.scene.light_states, &lights_, cuda_stream);
+    read(input.episode_step, &episode_step_, cuda_stream);
+    read(input.episode_index, &episode_index_, cuda_stream);
+    read(mask, &mask_, cuda_stream);
+    read(commands_out, &commands_, cuda_stream);
+    PICTURA_CUDA(cudaStreamSynchronize(cuda_stream));
+
+    ControllerInput on_host;
+    on_host.slots = setup_.slot_table();
+    on_host.scene.agents = boxes_;
+    on_host.scene.light_begin = setup_.light_begin;
+    on_host.scene.light_states = lights_;
+    on_host.state = agents_.view();
+    on_host.episode_step = episode_step_;
+    on_host.episode_index = episode_index_;
+    keeper_.act(on_host, mask_, commands_);
+    PICTURA_CUDA(cudaMemcpyAsync(commands_out.data(), commands_.data(), commands_.size() * sizeof(Command),
+                                 cudaMemcpyHostToDevice, cuda_stream));
+    PICTURA_CUDA(cudaStreamSynchronize(cuda_stream));
+  }
+
+ private:
+  Device device_;
+  SimulatorSetup setup_;
+  // Copies, at addresses that last as long as this does: the keeper's agents look at them.
+  AgentState agents_;
+  std::vector<AgentBox> boxes_;
+  std::vector<LightState> lights_;
+  std::vector<int32_t> episode_step_, episode_index_;
+  std::vector<uint8_t> mask_;
+  std::vector<Command> commands_;
+  LaneKeepingController keeper_;
+};
+
 }  // namespace
 
-std::unique_ptr<Controller> make_cuda_controller(const std::string& name, Device device, uint64_t seed) {
-  if (name == "random") return std::make_unique<CudaRandomController>(device, seed);
-  if (name == "idle") return std::make_unique<CudaIdleController>(device);
-  fail_usage("controller: expected random or idle in device memory; got '{}'", name);
+std::unique_ptr<Controller> make_cuda_controller(const std::string& name, const Simulator& simulator, uint64_t seed) {
+  if (name == "random") return std::make_unique<CudaRandomController>(simulator.device(), seed);
+  if (name == "idle") return std::make_unique<CudaIdleController>(simulator.device());
+  if (name == "lane") return std::make_unique<CudaLaneController>(simulator);
+  fail_usage("controller: expected one of {}; got '{}'", fmt::join(host_controller_names(), ", "), name);
 }
 
 }  // namespace pictura

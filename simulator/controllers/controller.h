@@ -35,11 +35,11 @@ class Controller {
 
   virtual std::string_view name() const = 0;
 
-  /// Writes commands_out [slots] for the step after the state that `input` shows. mask [slots] says which slots it
-  /// commands, 1 or 0: the others' commands stay as they are, so that several controllers can share a simulator; an
-  /// empty mask commands all. Commands of inactive agents mean nothing. On a device all three lie there, the work is
-  /// put on the stream without waiting for it or allocating, and a CUDA graph can capture it; on the host it is done
-  /// on return. Throws Error when an array is of another size than the simulator's slots.
+  /// Writes commands_out [slots] for the step after the state that `input` shows, but where mask [slots] is 0: those
+  /// stay as they are, so that controllers can share a simulator; an empty mask commands all. Commands of inactive
+  /// agents mean nothing. On a device all lie there, the work is put on the stream without waiting or allocating, and a
+  /// CUDA graph can capture it, unless the name ends in "on the host"; on the host it is done on return. Throws Error
+  /// when an array is of another size than the simulator's slots.
   virtual void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out,
                    Stream stream = {}) = 0;
 };

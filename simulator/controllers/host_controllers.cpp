@@ -51,12 +51,12 @@ class IdleController final : public Controller {
 
 }  // namespace
 
-std::vector<std::string> host_controller_names() { return {"random", "idle", "lane_keeping"}; }
+std::vector<std::string> host_controller_names() { return {"random", "idle", "lane"}; }
 
 std::unique_ptr<Controller> make_host_controller(const std::string& name, const Simulator& simulator, uint64_t seed) {
   if (name == "random") return std::make_unique<RandomController>(seed);
   if (name == "idle") return std::make_unique<IdleController>();
-  if (name == "lane_keeping") return std::make_unique<LaneKeepingController>(simulator);
+  if (name == "lane") return std::make_unique<LaneKeepingController>(simulator);
   fail_usage("controller: expected one of {}; got '{}'", fmt::join(host_controller_names(), ", "), name);
 }
 

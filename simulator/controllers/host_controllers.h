@@ -10,7 +10,7 @@
 
 namespace pictura {
 
-/// "random", "idle" (no jerk) or "lane_keeping".
+/// "random", "idle" (no jerk), or "lane": the lane keeper, see lane_keeping.h.
 std::vector<std::string> host_controller_names();
 
 /// Throws UsageError listing the known names, or Error where the simulator's memory is not the host's.

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "pictura/common/error.h"
+#include "pictura/common/support/parallel_for.h"
 #include "pictura/simulator/controllers/goal_places.h"
 #include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/simulator/simulator_setup.h"
@@ -207,11 +208,15 @@ float LaneKeepingAgent::to_closed_line(float speed_mps) const {
   return 1000;
 }
 
-/// The speed from which it can stop before it would touch another agent on its path, now or, if that has the right of
-/// way, where that will soon be.
+/// The speed from which it can stop before it would touch another agent on its path, now or, if it gives way to that,
+/// where that will soon be.
 float LaneKeepingAgent::speed_behind_others() const {
-  constexpr float kLook_m = 40, kMargin_m = 0.4f, kGap_m = 2, kBraking_mps2 = 1.5f;
+  constexpr float kLook_m = 40, kMargin_m = 0.4f, kGap_m = 2;
+  // Others may halt where they are at any time, then it brakes hard.
+  constexpr float kBraking_mps2 = 1.5f, kHardBraking_mps2 = 3;
   constexpr float kForesight_s = 4, kStep_s = 0.5f;
+  const Motion now = agent_.now();
+  const bool changes_lane = is_changing_lane();
   float max_mps = INFINITY;
   std::vector<AgentBox> way;
   for (int other = 0; other < world_.num_agents; ++other) {
@@ -223,15 +228,21 @@ float LaneKeepingAgent::speed_behind_others() const {
       way.push_back(agent_.box(points()[i].position_m, points()[i].heading_rad, kMargin_m));
     }
     const Vec2 velocity = Vec2{box.cos_heading, box.sin_heading} * world_.agents.speed_mps[slot];
-    for (float soon_s = 0; soon_s <= (has_way(other) ? kForesight_s : 0); soon_s += kStep_s) {
+    const bool crosses = has_way(other), merges = changes_lane && !follows(box);
+    for (float soon_s = 0; soon_s <= (crosses || merges ? kForesight_s : 0); soon_s += kStep_s) {
       AgentBox there = box;
       there.center_m = box.center_m + Vec3{velocity.x, velocity.y, 0} * soon_s;
+      if (soon_s > 0 && !crosses) {
+        const size_t then = ahead(0, std::max(now.speed_mps, 2.0f) * soon_s);
+        if (then >= way.size() || first_touching({way[then]}, there) == 1) continue;
+      }
       const size_t first = first_touching(way, there);
       if (first == way.size()) continue;
       const float gap_m = std::max(LanePath::kSpacing_m * static_cast<float>(first) - kGap_m, 0.0f);
       const float along_mps = dot(velocity, {way[first].cos_heading, way[first].sin_heading});
       const float then_mps = soon_s > 0 ? 0 : std::max(along_mps, 0.0f);
-      max_mps = std::min(max_mps, std::sqrt(square(then_mps) + 2 * kBraking_mps2 * gap_m));
+      max_mps = std::min(
+          {max_mps, std::sqrt(square(then_mps) + 2 * kBraking_mps2 * gap_m), std::sqrt(2 * kHardBraking_mps2 * gap_m)});
     }
   }
   return max_mps;
@@ -243,9 +254,24 @@ bool LaneKeepingAgent::has_way(int other) const {
   return other < self_ && std::fabs(turned) > 0.5f;
 }
 
+/// Whether its path is, or soon will be, on its way from one lane to another.
+bool LaneKeepingAgent::is_changing_lane() const {
+  constexpr float kSoon_m = 20, kAside_m = 0.3f;
+  for (size_t i = place_; i <= ahead(place_, kSoon_m); ++i) {
+    if (std::fabs(points()[i].change.aside_now_m()) > kAside_m) return true;
+  }
+  return false;
+}
+
+/// Whether another one is behind it and on its own lane.
+bool LaneKeepingAgent::follows(const AgentBox& other) const {
+  const Motion now = agent_.now();
+  const SinCos heading = sincos_of(now.heading_rad);
+  const Vec2 forward{heading.cos, heading.sin}, apart = other.center_m.xy() - Vec2{now.x_m, now.y_m};
+  return dot(forward, apart) < 0 && std::fabs(cross(forward, apart)) < 1.5f;
+}
+
 LaneKeepingController::LaneKeepingController(const Simulator& simulator) {
-  PICTURA_CHECK(simulator.device().is_host(), "controller lane_keeping: expected a simulator in host memory, got {}",
-                simulator.name());
   setup_ =
       std::make_unique<SimulatorSetup>(simulator.config(), simulator.maps(), simulator.handles(), simulator.worlds());
   for (const auto& map : simulator.maps()) graphs_.push_back(std::make_unique<LaneGraph>(*map->road));
@@ -260,17 +286,21 @@ void LaneKeepingController::act(const ControllerInput& input, Span<const uint8_t
   check_controller_arrays(name(), input, Device{}, mask, commands_out);
   for (size_t w = 0; w < episode_.size(); ++w) {
     if (input.episode_step[w] == 0) begin_episode(input, w);
-    PICTURA_CHECK(
-        episode_[w] == input.episode_index[w],
-        "controller lane_keeping: world {}: expected to act from the first step of episode {} on, got step {}", w,
-        input.episode_index[w], input.episode_step[w]);
+    PICTURA_CHECK(episode_[w] == input.episode_index[w],
+                  "controller lane: world {}: expected to act from the first step of episode {} on, got step {}", w,
+                  input.episode_index[w], input.episode_step[w]);
   }
-  for (size_t slot = 0; slot < agents_.size(); ++slot) {
-    if (!mask.empty() && !mask[slot]) continue;
-    commands_out[slot] = {};
-    const bool is_active = input.state.status[slot] == static_cast<uint8_t>(AgentStatus::active);
-    if (agents_[slot] && is_active) commands_out[slot].action = agents_[slot]->act();
-  }
+  // Agents look at the state and write nothing but their own commands.
+  parallel_for(setup_->config.num_threads, static_cast<int64_t>(episode_.size()), [&](int64_t world) {
+    const auto w = static_cast<size_t>(world);
+    const auto end = static_cast<size_t>(setup_->slot_begin[w + 1]);
+    for (auto slot = static_cast<size_t>(setup_->slot_begin[w]); slot < end; ++slot) {
+      if (!mask.empty() && !mask[slot]) continue;
+      commands_out[slot] = {};
+      const bool is_active = input.state.status[slot] == static_cast<uint8_t>(AgentStatus::active);
+      if (agents_[slot] && is_active) commands_out[slot].action = agents_[slot]->act();
+    }
+  });
 }
 
 void LaneKeepingController::begin_episode(const ControllerInput& input, size_t world) {

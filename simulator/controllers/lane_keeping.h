@@ -1,6 +1,7 @@
-// A controller that keeps its lane, goes where its waypoints lead, and stops at red lights and behind others: what the
-// rules demand can be driven with the jerk actions. It pursues the path of its lanes, and where that would leave the
-// road, since long cars cut corners, it follows a plan that does not. On the host only.
+// The lane keeper: a controller for vehicles and cyclists among others. It goes where its waypoints lead, stops at red
+// lights and behind others, even if those halt at once, and gives way where it changes lanes. It pursues the path of
+// its lanes, and where that would leave the road, since long cars cut corners, it follows a plan that does not. On the
+// host only.
 #pragma once
 
 #include <array>
@@ -46,6 +47,8 @@ class LaneKeepingAgent {
   float to_closed_line(float speed_mps) const;
   float speed_behind_others() const;
   bool has_way(int other) const;
+  bool is_changing_lane() const;
+  bool follows(const AgentBox& other) const;
   const std::vector<PathPoint>& points() const { return path_.points(); }
 
   const WorldView world_;
@@ -64,11 +67,11 @@ class LaneKeepingAgent {
 /// Drives all vehicles and cyclists of a simulator; pedestrians stand still.
 class LaneKeepingController final : public Controller {
  public:
-  /// The simulator must outlive this. Throws Error unless it works in host memory.
+  /// Of the simulator it reads configuration, maps and worlds, wherever that computes. act() takes host memory.
   explicit LaneKeepingController(const Simulator& simulator);
   ~LaneKeepingController() override;
 
-  std::string_view name() const override { return "lane_keeping"; }
+  std::string_view name() const override { return "lane"; }
   /// Throws Error besides where a world is in the middle of an episode whose first step this has not seen.
   void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out,
            Stream stream = {}) override;

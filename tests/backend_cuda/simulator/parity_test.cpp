@@ -333,6 +333,33 @@ TEST_F(CudaSimulatorTest, TakesCommandsAndControllersInAGraph) {
   PICTURA_CUDA(cudaStreamDestroy(stream));
 }
 
+TEST_F(CudaSimulatorTest, IsDrivenByTheLaneKeeperOnTheHost) {
+  SimulatorConfig config = whole_world();
+  config.episode_steps = 60;
+  const Maps maps{load_map("procedural:1")};
+  const std::vector<WorldSpec> worlds = draw_worlds(3, 200, 1, 60, 1);
+  const auto cpu = make_simulator("cpu", config, maps, worlds);
+  const auto cuda = make_simulator("cuda", config, maps, worlds);
+  const auto cpu_controller = make_controller("lane", *cpu, 0), cuda_controller = make_controller("lane", *cuda, 0);
+  EXPECT_EQ(cpu_controller->name(), "lane");
+  EXPECT_EQ(cuda_controller->name(), "lane, on the host");
+  // The others' commands stay.
+  std::vector<uint8_t> mask(200, 1);
+  mask[7] = 0;
+  const DeviceBuffer<uint8_t> device_mask{Span<const uint8_t>(mask)};
+  std::vector<Command> commands(200);
+  DeviceBuffer<Command> device_commands{Span<const Command>(commands)};
+  for (int step = 0; step < 150; ++step) {
+    cpu_controller->act(cpu->controller_input(), mask, commands);
+    cuda_controller->act(cuda->controller_input(), device_mask.span(), {device_commands.data(), 200});
+    cpu->step(commands);
+    cuda->step(device_commands.span());
+  }
+  cuda->check();
+  expect_same_view(cpu.get(), cuda.get(), 150);
+  EXPECT_GT(cpu->totals().goals_reached, 0);
+}
+
 TEST_F(CudaSimulatorTest, AnActionOutOfRangeChangesNothingAndIsThrownLater) {
   const auto cuda = make_simulator("cuda", {}, {load_map("procedural:1")}, {{0, 30, 0}, {0, 10, 1}});
   std::vector<int32_t> actions(40, 7);

@@ -117,19 +117,19 @@ TEST(Controller, RefusesArraysOfAnotherSizeAndUnknownNames) {
       test::message_of([&] { controller->act(simulator->controller_input(), std::vector<uint8_t>(5, 1), commands); }),
       HasSubstr("expected a mask of 4 slots, got 5"));
   EXPECT_THAT(test::message_of<UsageError>([&] { make_controller("pilot", *simulator, 0); }),
-              HasSubstr("expected one of random, idle, lane_keeping; got 'pilot'"));
+              HasSubstr("expected one of random, idle, lane; got 'pilot'"));
 }
 
 TEST(Controller, LaneKeepingNeedsTheEpisodesFirstStep) {
   const auto simulator = make(testing::cars({.episode_steps = 20}), testing::stadium(200, 2), {{0, 3, 0}});
-  const auto controller = make_controller("lane_keeping", *simulator, 0);
+  const auto controller = make_controller("lane", *simulator, 0);
   std::vector<Command> commands(3);
   for (int step = 0; step < 50; ++step) {  // over two ends of episodes
     controller->act(simulator->controller_input(), {}, commands);
     simulator->step(commands);
   }
   EXPECT_EQ(simulator->totals().collisions + simulator->totals().off_road, 0);
-  const auto late = make_controller("lane_keeping", *simulator, 0);
+  const auto late = make_controller("lane", *simulator, 0);
   EXPECT_THAT(test::message_of([&] { late->act(simulator->controller_input(), {}, commands); }),
               HasSubstr("expected to act from the first step of episode"));
 }
