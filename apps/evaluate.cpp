@@ -1,10 +1,11 @@
-// `pictura evaluate`: the paper's five driving metrics of a checkpoint, by traffic density.
+// `pictura evaluate`: the paper's five driving metrics of a checkpoint or a controller, by traffic density.
 #include "pictura/training/evaluation/evaluate.h"
 
 #include "pictura/apps/commands.h"
 #include "pictura/cli/backend_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
+#include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/simulator/simulator.h"
 
 namespace pictura {
@@ -26,7 +27,8 @@ void print_table(const std::vector<EvaluateRow>& rows) {
   fmt::print("+- is the half width of a 95 % confidence interval over scenarios\n");
 }
 
-void print_report(const std::string& policy, const EvaluateReport& report) {
+void print_report(const EvaluateOptions& options, const EvaluateReport& report) {
+  const auto text_or_null = [](const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); };
   Json table = Json::array();
   for (const EvaluateRow& row : report.rows) {
     Json json = {{"density", row.density},
@@ -48,7 +50,8 @@ void print_report(const std::string& policy, const EvaluateReport& report) {
     table.push_back(std::move(json));
   }
   const EvaluationSetting& setting = report.results.setting;
-  print_json({{"checkpoint", policy},
+  print_json({{"checkpoint", text_or_null(options.checkpoint)},
+              {"controller", text_or_null(options.controller)},
               {"policy_hash", setting.policy_hash},
               {"argmax", setting.argmax},
               {"seed", setting.seed},
@@ -102,10 +105,18 @@ void add_evaluate_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("evaluate", "Measure a policy's driving (the paper's in-domain protocol)");
   CLI::Option* const checkpoint =
       command->add_option("CHECKPOINT", options.checkpoint, "A checkpoint that train wrote");
+  CLI::Option* const policy =
+      command
+          ->add_option("--policy", options.controller,
+                       fmt::format("Who drives instead of the checkpoint's policy, in its world, or, without a "
+                                   "checkpoint, in the paper's: {}",
+                                   fmt::join(host_controller_names(), ", ")))
+          ->check(one_of(host_controller_names()));
   command
       ->add_option("--merge", arguments->parts,
                    "Instead of evaluating: join parts of one evaluation, which --out wrote, exactly")
-      ->excludes(checkpoint);
+      ->excludes(checkpoint)
+      ->excludes(policy);
   command->add_option("--map", options.maps, "Maps that the scenarios are spread over")->capture_default_str();
   command->add_option("--density", arguments->densities, "light, medium, dense: 60, 120, 150 agents a world")
       ->check(CLI::IsMember({"light", "medium", "dense"}))
@@ -119,19 +130,23 @@ void add_evaluate_command(CLI::App& app) {
   command->add_option("--steps", options.steps, "Steps of 0.1 s per scenario")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  command->add_flag("--sampled", arguments->sampled, "Draw actions from the policy instead of taking the most likely");
+  command->add_flag("--sampled", arguments->sampled, "Draw actions from the policy instead of taking the most likely")
+      ->excludes(policy);
   command->add_option("--seed", options.seed, "Scenarios are drawn from it")->capture_default_str();
   add_policy_backend_options(command, "auto, and drawn as in training", &arguments->backends);
   CLI::Option* const rig = command->add_option(
       "--rig", options.rig, "A rig file with as many cameras as in training, instead of those of training");
+  rig->excludes(policy);
   command->add_option("--size", arguments->size, "Pixels of an image, WxH, of the paper's rig; default: as in training")
-      ->excludes(rig);
+      ->excludes(rig)
+      ->excludes(policy);
   command->add_option("--threads", options.num_threads, "Host threads; 0: all")->capture_default_str();
   command->add_option("--out", arguments->out, "A file for the counts of each scenario, which --merge reads");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
-      "Example:\n  pictura evaluate runs/town01/checkpoint.ckpt --map Town01 --density light --scenarios 4 --steps "
+      "Examples:\n  pictura evaluate runs/town01/checkpoint.ckpt --map Town01 --density light --scenarios 4 --steps "
       "600\n"
+      "  pictura evaluate --policy lane --density medium --scenarios 8\n"
       "In parts, on several machines or after one another:\n"
       "  pictura evaluate run.ckpt --scenarios 0:100 --out a.json\n"
       "  pictura evaluate run.ckpt --scenarios 100:200 --out b.json\n"
@@ -153,8 +168,11 @@ void add_evaluate_command(CLI::App& app) {
     for (const std::string& name : arguments->densities) evaluation.densities.push_back(kDensities.at(name));
     if (evaluation.agents_per_world > 0) evaluation.densities.resize(1);
     parse_scenarios(arguments->scenarios, &evaluation);
-    if (evaluation.checkpoint.empty() && arguments->parts.empty()) {
-      fail_usage("evaluate: expected a CHECKPOINT, or --merge and the parts of an evaluation");
+    if (evaluation.checkpoint.empty() && evaluation.controller.empty() && arguments->parts.empty()) {
+      fail_usage("evaluate: expected a CHECKPOINT, --policy, or --merge and the parts of an evaluation");
+    }
+    if (!evaluation.controller.empty() && !(backends.renderer.empty() && backends.samples.empty())) {
+      fail_usage("--renderer, --samples: {} sees no images", evaluation.controller);
     }
     ProgressLine line;
     evaluation.on_progress = [&line](double done, double eta_s) {
@@ -164,7 +182,7 @@ void add_evaluate_command(CLI::App& app) {
     line.finish();
     if (!arguments->out.empty()) write_results(arguments->out, report.results);
     if (arguments->json)
-      print_report(evaluation.checkpoint, report);
+      print_report(evaluation, report);
     else
       print_table(report.rows);
     if (report.interrupted) {

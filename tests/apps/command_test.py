@@ -837,6 +837,29 @@ class Training(CommandCase):
         self.assert_refused(1, "expected 3", "evaluate", "--merge", paths["whole"], paths["b"])
         self.assert_refused(2, "--scenarios", *evaluate, paths["a"], "--scenarios", "3:3")
 
+    def test_controllers_are_evaluated_like_policies(self):
+        evaluate = ["evaluate", "--map", "procedural:1", "--agents", 12, "--scenarios", 2, "--steps", 300]
+        lane = self.json_of(*evaluate, "--policy", "lane")
+        self.assertEqual((lane["checkpoint"], lane["controller"], lane["device"]), (None, "lane", "cpu"))
+        self.assertGreater(lane["rows"][0]["goals_per_vehicle"], 0)
+        self.assertEqual(lane["rows"][0]["red_light_rate"], 0)
+        idle = self.json_of(*evaluate, "--policy", "idle", "--device", "cpu")
+        self.assertEqual(idle["rows"][0]["km_driven"], 0)
+        # In parts, and in the world of a checkpoint, here without cyclists and pedestrians.
+        out = self.folder / "run"
+        self.json_of("train", *TINY, "--set", "train.updates=1", "--set", "simulator.pedestrian_fraction=0", "--set",
+                     "simulator.cyclist_fraction=0", "--out", out)  # fmt: skip
+        parts = [self.folder / "a.json", self.folder / "b.json"]
+        for path, scenarios in zip(parts, ["0:1", "1:2"]):
+            self.json_of("evaluate", out / "checkpoint.ckpt", *evaluate[1:-4], "--steps", 300, "--policy", "lane",
+                         "--scenarios", scenarios, "--out", path)  # fmt: skip
+        merged = self.json_of("evaluate", "--merge", *parts)
+        self.assertEqual(merged["rows"][0]["vehicle_episodes"], 24)
+        self.assert_refused(2, "random, idle, lane; got 'pilot'", *evaluate, "--policy", "pilot")
+        self.assert_refused(2, "excludes", *evaluate, "--policy", "lane", "--sampled")
+        self.assert_refused(2, "lane sees no images", *evaluate, "--policy", "lane", "--renderer", "cpu")
+        self.assert_refused(2, "expected a CHECKPOINT, --policy, or --merge", *evaluate)
+
     def test_training_on_a_device_says_so(self):
         if os.environ.get("PICTURA_REQUIRE_GPU") != "1":
             self.skipTest("PICTURA_REQUIRE_GPU is not 1")

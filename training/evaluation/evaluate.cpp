@@ -2,12 +2,14 @@
 
 #include <algorithm>
 
+#include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/agent_state.h"
+#include "pictura/training/checkpoint.h"
 #include "pictura/training/config.h"
 #include "pictura/training/phase_timer.h"
 #include "pictura/training/session.h"
@@ -73,21 +75,44 @@ void add(const AgentStateView& state, int64_t slot, ScenarioCounts* counts) {
   counts->returns += static_cast<double>(state.episode_return[slot]);
 }
 
-}  // namespace
+// Who is evaluated, and where.
+struct Driver {
+  SimulatorConfig world;
+  EvaluationSetting setting;  // what of it is the driver's
+  Device device;
+  std::unique_ptr<Renderer> renderer;  // of its images, or null
+  std::function<std::unique_ptr<Controller>(Simulator&, Renderer*)> make_controller;
+};
 
-EvaluateReport evaluate(const EvaluateOptions& options) {
-  PolicySession session(options.checkpoint, {.num_threads = options.num_threads,
-                                             .device = options.device,
-                                             .simulator = options.simulator,
-                                             .renderer = options.renderer,
-                                             .samples = options.samples,
-                                             .rig = options.rig,
-                                             .width_px = options.width_px,
-                                             .height_px = options.height_px});
-  return evaluate(&session, options);
+Driver driver_of(PolicySession* session, const EvaluateOptions& options) {
+  return {session->evaluation_world(options.steps), session->evaluation_setting(), session->device(),
+          session->make_renderer(), [session, &options](Simulator&, Renderer* renderer) {
+            return session->make_controller(renderer, options.argmax, options.seed);
+          }};
 }
 
-EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options) {
+// One that needs no policy.
+Driver driver_of(const std::string& controller, const EvaluateOptions& options) {
+  Config config = options.checkpoint.empty() ? Config() : read_checkpoint(options.checkpoint).config;
+  config.policy.modality = Modality::perspective;  // nobody reads vectors,
+  config.render.backend = "auto";                  // and nothing is drawn
+  config.run.num_threads = options.num_threads;
+  config.run.device = options.device;
+  config.simulator.backend = options.simulator;
+  const bool drives_on_host = controller == "lane";
+  if (drives_on_host && options.device == "auto" && options.simulator == "auto") config.run.device = "cpu";
+  Driver driver;
+  driver.device = open_learning_device(config);
+  driver.world = evaluation_simulator_config(config, options.steps, driver.device);
+  driver.setting.policy_hash = controller;
+  driver.setting.device = driver.device.is_host() ? "cpu" : drives_on_host ? "cuda, driven from the host" : "cuda";
+  driver.make_controller = [controller, &options](Simulator& simulator, Renderer*) {
+    return make_controller(controller, simulator, options.seed);
+  };
+  return driver;
+}
+
+EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options) {
   if (options.first_scenario < 0) fail_usage("evaluate: expected a scenario from 0, got {}", options.first_scenario);
   if (options.scenarios < 1) fail_usage("evaluate: expected one scenario or more, got {}", options.scenarios);
   if (options.steps < 1) fail_usage("evaluate: expected one step or more, got {}", options.steps);
@@ -95,7 +120,7 @@ EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options) 
   if (options.agents_per_world < 0 || options.agents_per_world > kMaxAgentsPerWorld) {
     fail_usage("evaluate: expected 1 to {} agents per world, got {}", kMaxAgentsPerWorld, options.agents_per_world);
   }
-  SimulatorConfig simulator_config = session->evaluation_world(options.steps);
+  SimulatorConfig simulator_config = driver.world;
   simulator_config.seed = options.seed;
   std::vector<std::shared_ptr<const RoadMap>> roads;
   for (const std::string& name : options.maps) roads.push_back(load_map(name));
@@ -110,10 +135,9 @@ EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options) 
   for (const DensityOf& density : densities) work += double(density.agents) * options.scenarios * options.steps;
 
   const Stopwatch since_start;
-  const std::unique_ptr<Renderer> renderer = session->make_renderer();
   std::unique_ptr<Simulator> simulator;  // made with the first batch
   EvaluateReport report;
-  report.results.setting = session->evaluation_setting();
+  report.results.setting = driver.setting;
   EvaluationSetting& setting = report.results.setting;
   setting.maps = options.maps;
   setting.steps = options.steps;
@@ -122,7 +146,7 @@ EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options) 
   for (const DensityOf& density : densities) {
     DensityResult result{density.name, density.agents, options.first_scenario, {}};
     result.scenarios.resize(static_cast<size_t>(options.scenarios));
-    const int per_batch = worlds_per_batch(session->device(), density.agents);
+    const int per_batch = worlds_per_batch(driver.device, density.agents);
     for (int first = 0; first < options.scenarios; first += per_batch) {
       std::vector<WorldSpec> worlds;
       for (int i = first; i < std::min(first + per_batch, options.scenarios); ++i) {
@@ -134,13 +158,12 @@ EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options) 
         simulator->set_worlds(maps, {}, worlds, options.seed);
       } else {
         simulator = make_simulator(options.simulator, simulator_config, maps, worlds);
-        if (renderer) upload_maps(*simulator, renderer.get());
+        if (driver.renderer) upload_maps(*simulator, driver.renderer.get());
       }
-      const std::unique_ptr<Controller> controller =
-          session->make_controller(renderer.get(), options.argmax, options.seed);
+      const std::unique_ptr<Controller> controller = driver.make_controller(*simulator, driver.renderer.get());
       const auto num_slots = static_cast<size_t>(simulator->num_slots());
       const at::Tensor command_bytes = at::zeros({static_cast<int64_t>(num_slots * sizeof(Command))},
-                                                 at::TensorOptions(at::kByte).device(torch_device(session->device())));
+                                                 at::TensorOptions(at::kByte).device(torch_device(driver.device)));
       const Span<Command> commands(reinterpret_cast<Command*>(command_bytes.data_ptr<uint8_t>()), num_slots);
       for (int step = 0; step < options.steps; ++step) {
         // Halted agents stay as they are, so a batch is over when no agent is active.
@@ -167,6 +190,25 @@ EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options) 
   }
   if (options.on_progress) options.on_progress(1, 0);
   return report;
+}
+
+}  // namespace
+
+EvaluateReport evaluate(const EvaluateOptions& options) {
+  if (!options.controller.empty()) return evaluate(driver_of(options.controller, options), options);
+  PolicySession session(options.checkpoint, {.num_threads = options.num_threads,
+                                             .device = options.device,
+                                             .simulator = options.simulator,
+                                             .renderer = options.renderer,
+                                             .samples = options.samples,
+                                             .rig = options.rig,
+                                             .width_px = options.width_px,
+                                             .height_px = options.height_px});
+  return evaluate(&session, options);
+}
+
+EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options) {
+  return evaluate(driver_of(session, options), options);
 }
 
 }  // namespace pictura

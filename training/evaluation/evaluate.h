@@ -19,6 +19,9 @@ constexpr uint32_t kFirstEvaluationWorld = 0x80000000u;
 
 struct EvaluateOptions {
   std::string checkpoint;
+  // A controller of make_controller, "lane" for one, that drives instead of the checkpoint's policy, in its world, or
+  // in the paper's if there is no checkpoint.
+  std::string controller;
   std::vector<std::string> maps;  // as load_map takes them; the paper's eight towns
   std::vector<Density> densities{Density::light, Density::medium, Density::dense};
   int agents_per_world = 0;  // > 0: instead of the densities' own numbers
