@@ -17,10 +17,9 @@ if(NOT PICTURA_WITH_CUDA STREQUAL OFF)
     find_package(CUDAToolkit 12.8 REQUIRED)
     set(PICTURA_HAS_CUDA ON)
     # Device code keeps the host's arithmetic contract.
-    add_library(pictura_cuda_flags INTERFACE)
-    target_compile_options(pictura_cuda_flags INTERFACE
-      $<$<COMPILE_LANGUAGE:CUDA>:--fmad=false -Xcompiler=-Wall,-Wextra,-ffp-contract=off>
-      $<$<AND:$<COMPILE_LANGUAGE:CUDA>,$<BOOL:${PICTURA_WERROR}>>:-Werror=all-warnings -Xcompiler=-Werror>)
+    add_compile_options(
+      "$<$<COMPILE_LANGUAGE:CUDA>:--fmad=false;-Xcompiler=-Wall,-Wextra,-ffp-contract=off>"
+      "$<$<AND:$<COMPILE_LANGUAGE:CUDA>,$<BOOL:${PICTURA_WERROR}>>:-Werror=all-warnings;-Xcompiler=-Werror>")
   elseif(PICTURA_WITH_CUDA STREQUAL ON)
     message(FATAL_ERROR "PICTURA_WITH_CUDA=ON needs nvcc 12.8 and CMake 3.26 or later (have CMake ${CMAKE_VERSION}, "
                         "nvcc '${CMAKE_CUDA_COMPILER}'): install the CUDA toolkit, and use .venv/bin/cmake")

@@ -1,25 +1,53 @@
-# install(EXPORT): find_package(pictura) defines pictura::common, pictura::map, pictura::simulator, pictura::renderer ...
+# install(EXPORT): find_package(pictura COMPONENTS renderer) defines pictura::renderer and pictura::common; `simulator` adds
+# pictura::map, pictura::simulator and pictura::make_simulator. `command` is the program.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
-set(installed pictura_flags pictura_common pictura_map pictura_simulator pictura_backend_cpu pictura_simulator_cpu
-              pictura_renderer pictura_make_simulator)
+set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/pictura)
+set(header_folder ${CMAKE_INSTALL_INCLUDEDIR}/pictura)
+
+# pictura_install_component(NAME TARGETS...): the libraries of a component, with usage requirements only.
+function(pictura_install_component name)
+  install(TARGETS ${ARGN} EXPORT pictura-${name} COMPONENT ${name}
+    ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${name}
+    INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+  install(EXPORT pictura-${name} NAMESPACE pictura:: DESTINATION ${package_folder} COMPONENT ${name})
+endfunction()
+# pictura_install_headers(COMPONENT FOLDER [pattern options...])
+function(pictura_install_headers component folder)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/ DESTINATION ${header_folder}/${folder} COMPONENT ${component}
+    FILES_MATCHING PATTERN "*.h" ${ARGN})
+endfunction()
+
+set(renderer_libraries pictura_common pictura_backend_cpu pictura_renderer)
 if(PICTURA_HAS_CUDA)
-  list(APPEND installed pictura_cuda_flags pictura_backend_cuda pictura_simulator_cuda)
+  list(APPEND renderer_libraries pictura_backend_cuda)
 endif()
 if(PICTURA_HAS_GL)
-  list(APPEND installed pictura_backend_gl)
+  list(APPEND renderer_libraries pictura_backend_gl)
 endif()
-install(TARGETS ${installed} EXPORT pictura ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(TARGETS pictura RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-foreach(folder backends common map simulator)
-  install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/pictura/${folder}
-    FILES_MATCHING PATTERN "*.h" PATTERN "cuda" EXCLUDE PATTERN "controllers" EXCLUDE
-    PATTERN "toml_fields.h" EXCLUDE PATTERN "make_learner.h" EXCLUDE)
-endforeach()
-install(FILES ${PICTURA_INCLUDE_DIR}/pictura/version.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/pictura)
-install(EXPORT pictura NAMESPACE pictura:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/pictura)
+pictura_install_component(renderer ${renderer_libraries})
+pictura_install_headers(renderer common PATTERN "cuda" EXCLUDE PATTERN "toml_fields.h" EXCLUDE)
+install(FILES ${PROJECT_SOURCE_DIR}/backends/make_renderer.h DESTINATION ${header_folder}/backends COMPONENT renderer)
+install(FILES ${PICTURA_INCLUDE_DIR}/pictura/version.h DESTINATION ${header_folder} COMPONENT renderer)
+
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/picturaConfig.cmake.in
-  ${PROJECT_BINARY_DIR}/picturaConfig.cmake INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/pictura)
+  ${PROJECT_BINARY_DIR}/picturaConfig.cmake INSTALL_DESTINATION ${package_folder})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/picturaConfigVersion.cmake COMPATIBILITY SameMajorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/picturaConfig.cmake ${PROJECT_BINARY_DIR}/picturaConfigVersion.cmake
-  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/pictura)
+  DESTINATION ${package_folder} COMPONENT renderer)
+
+if(PICTURA_ONLY_RENDERER)
+  return()
+endif()
+set(simulator_libraries pictura_map pictura_simulator pictura_simulator_cpu pictura_make_simulator)
+if(PICTURA_HAS_CUDA)
+  list(APPEND simulator_libraries pictura_simulator_cuda)
+endif()
+pictura_install_component(simulator ${simulator_libraries})
+# Headers with pugixml's in them are the importer's own.
+pictura_install_headers(simulator map PATTERN "document.h" EXCLUDE PATTERN "element.h" EXCLUDE
+  PATTERN "read_parts.h" EXCLUDE PATTERN "reader.h" EXCLUDE)
+pictura_install_headers(simulator simulator)
+install(FILES ${PROJECT_SOURCE_DIR}/backends/make_controller.h ${PROJECT_SOURCE_DIR}/backends/make_simulator.h
+              ${PROJECT_SOURCE_DIR}/backends/upload_maps.h DESTINATION ${header_folder}/backends COMPONENT simulator)
+install(TARGETS pictura RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)

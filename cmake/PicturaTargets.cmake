@@ -1,4 +1,4 @@
-# Settings of every target: flags through one interface target, includes as `pictura/FOLDER/FILE.h` in the tree as when
+# Settings of every target: flags of this build, includes as `pictura/FOLDER/FILE.h` in the tree as when
 # installed, and tests with their environment.
 
 set(CMAKE_CXX_STANDARD 20)
@@ -26,28 +26,31 @@ include(CheckCXXCompilerFlag)
 check_cxx_compiler_flag(-Wdangling-reference PICTURA_HAS_WDANGLING_REFERENCE)
 check_cxx_compiler_flag(-mno-fma PICTURA_HAS_MNO_FMA)
 
-add_library(pictura_flags INTERFACE)
-target_include_directories(pictura_flags INTERFACE
-  $<BUILD_INTERFACE:${PICTURA_INCLUDE_DIR}> $<INSTALL_INTERFACE:include>)
-target_compile_options(pictura_flags INTERFACE
-  $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wpedantic -Wshadow>
+# Flags of this build, which nothing that is installed passes on.
+add_compile_options(
+  "$<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wpedantic;-Wshadow>"
   # Designated initializers leave the other members at their defaults, on purpose.
   $<$<COMPILE_LANGUAGE:CXX>:-Wno-missing-field-initializers>
   # g++ 13 assumes that every returned reference refers to a temporary argument.
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_HAS_WDANGLING_REFERENCE}>>:-Wno-dangling-reference>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_WERROR}>>:-Werror>
   # The arithmetic contract: no fused multiply-add and no reordering, on every device.
-  $<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off -fno-math-errno -fno-trapping-math>
+  "$<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off;-fno-math-errno;-fno-trapping-math>"
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_CPU_ARCH}>>:-march=${PICTURA_CPU_ARCH}>)
 set(PICTURA_IS_SANITIZED 0)  # for tests with time limits
 if(PICTURA_SANITIZE)
   set(PICTURA_IS_SANITIZED 1)
-  target_compile_options(pictura_flags INTERFACE -fsanitize=${PICTURA_SANITIZE} -fno-omit-frame-pointer -g
-    -fno-sanitize-recover=all
+  add_compile_options(-fsanitize=${PICTURA_SANITIZE} -fno-omit-frame-pointer -g -fno-sanitize-recover=all
     # With the checks g++ 13 does not know the length of initializer lists.
     "$<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>>:-Wno-array-bounds;-Wno-stringop-overread>")
-  target_link_options(pictura_flags INTERFACE -fsanitize=${PICTURA_SANITIZE})
+  add_link_options(-fsanitize=${PICTURA_SANITIZE})
 endif()
+
+# pictura_use_headers(TARGET SCOPE): what every user of the headers needs, here and when installed.
+function(pictura_use_headers target scope)
+  target_compile_features(${target} ${scope} cxx_std_20)
+  target_include_directories(${target} ${scope} $<BUILD_INTERFACE:${PICTURA_INCLUDE_DIR}>)
+endfunction()
 
 # pictura_add_library(NAME SOURCES... [PUBLIC libs...] [PRIVATE libs...]): static library pictura_NAME, alias
 # pictura::NAME.
@@ -56,7 +59,8 @@ function(pictura_add_library name)
   add_library(pictura_${name} STATIC ${arg_SOURCES})
   add_library(pictura::${name} ALIAS pictura_${name})
   set_target_properties(pictura_${name} PROPERTIES EXPORT_NAME ${name})
-  target_link_libraries(pictura_${name} PUBLIC pictura_flags ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
+  pictura_use_headers(pictura_${name} PUBLIC)
+  target_link_libraries(pictura_${name} PUBLIC ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
 endfunction()
 
 # pictura_forbid_fma(TARGET): for code that must equal a device bit for bit, because g++ 12 ignores -ffp-contract where it
@@ -94,7 +98,8 @@ function(pictura_add_test name)
   find_package(GTest REQUIRED)
   include(GoogleTest)
   add_executable(${name}_test ${arg_SOURCES})
-  target_link_libraries(${name}_test PRIVATE pictura_flags ${arg_LINK} GTest::gmock GTest::gtest_main)
+  pictura_use_headers(${name}_test PRIVATE)
+  target_link_libraries(${name}_test PRIVATE ${arg_LINK} GTest::gmock GTest::gtest_main)
   pictura_test_properties(properties 900 "${arg_LABELS}")
   gtest_discover_tests(${name}_test DISCOVERY_TIMEOUT 120 PROPERTIES ${properties})
 endfunction()

@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-/// Colour with channels in [0, 1].
+/// Colour with channels in [0, 1]; files (color_rgb of scenes, PNG) have 0 to 255, see rgb8().
 struct Rgb {
   float r = 0, g = 0, b = 0;
 };
