@@ -44,9 +44,13 @@ if(PICTURA_HAS_CUDA)
   list(APPEND simulator_libraries pictura_simulator_cuda)
 endif()
 pictura_install_component(simulator ${simulator_libraries})
-# Headers with pugixml's in them are the importer's own.
-pictura_install_headers(simulator map PATTERN "document.h" EXCLUDE PATTERN "element.h" EXCLUDE
-  PATTERN "read_parts.h" EXCLUDE PATTERN "reader.h" EXCLUDE)
+# Of the importers only what calls them: the rest has pugixml and Eigen in it.
+install(FILES ${PROJECT_SOURCE_DIR}/map/opendrive/opendrive.h DESTINATION ${header_folder}/map/opendrive
+  COMPONENT simulator)
+install(FILES ${PROJECT_SOURCE_DIR}/map/procedural/procedural_town.h ${PROJECT_SOURCE_DIR}/map/procedural/town_options.h
+  DESTINATION ${header_folder}/map/procedural COMPONENT simulator)
+pictura_install_headers(simulator map PATTERN "opendrive" EXCLUDE PATTERN "procedural" EXCLUDE
+  PATTERN "polyline.h" EXCLUDE PATTERN "road_edges.h" EXCLUDE PATTERN "surface.h" EXCLUDE)
 pictura_install_headers(simulator simulator)
 install(FILES ${PROJECT_SOURCE_DIR}/backends/make_controller.h ${PROJECT_SOURCE_DIR}/backends/make_simulator.h
               ${PROJECT_SOURCE_DIR}/backends/upload_maps.h DESTINATION ${header_folder}/backends COMPONENT simulator)

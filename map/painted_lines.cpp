@@ -257,7 +257,7 @@ class LineJoiner {
 /// Removes points within kThinningTolerance_m of the chords between the remaining ones.
 void thin(PaintedLine* line) {
   std::vector<CurvePoint> points;
-  for (const Vec3 point : line->points_m) points.push_back({0, point.x, point.y, point.z, 0});
+  for (const Vec3 point : line->points_m) points.push_back({0, Eigen::Vector3d{point.x, point.y, point.z}, 0});
   std::vector<Vec3> thinned;
   for (const std::size_t i : thin_polyline(points, kThinningTolerance_m, kMaxChord_m))
     thinned.push_back(line->points_m[i]);

@@ -5,13 +5,16 @@
 namespace pictura {
 
 double chord_error(const CurvePoint& a, const CurvePoint& b, const CurvePoint& p) {
-  const double dx = b.x - a.x, dy = b.y - a.y, dz = b.z - a.z;
-  const double length2 = dx * dx + dy * dy + dz * dz;
+  // Sums in plan first: maps keep their bits.
+  const auto dot = [](const Eigen::Vector3d& v, const Eigen::Vector3d& w) {
+    return v.head<2>().dot(w.head<2>()) + v.z() * w.z();
+  };
+  const Eigen::Vector3d chord = b.position_m - a.position_m;
+  const double length2 = dot(chord, chord);
   double u = 0;
-  if (length2 > 0) u = std::clamp(((p.x - a.x) * dx + (p.y - a.y) * dy + (p.z - a.z) * dz) / length2, 0.0, 1.0);
-  const double ex = p.x - (a.x + u * dx), ey = p.y - (a.y + u * dy), ez = p.z - (a.z + u * dz);
-  return std::max(std::sqrt(ex * ex + ey * ey + ez * ez),
-                  0.5 * std::abs(p.width - (a.width + u * (b.width - a.width))));
+  if (length2 > 0) u = std::clamp(dot(p.position_m - a.position_m, chord) / length2, 0.0, 1.0);
+  const Eigen::Vector3d error = p.position_m - (a.position_m + u * chord);
+  return std::max(std::sqrt(dot(error, error)), 0.5 * std::abs(p.width - (a.width + u * (b.width - a.width))));
 }
 
 std::vector<std::size_t> thin_polyline(const std::vector<CurvePoint>& points, double tolerance_m, double max_piece_m) {
@@ -21,7 +24,7 @@ std::vector<std::size_t> thin_polyline(const std::vector<CurvePoint>& points, do
     std::size_t last = first + 1;
     for (std::size_t next = last + 1; next < points.size(); ++next) {
       const CurvePoint &a = points[first], &b = points[next];
-      if (std::hypot(b.x - a.x, b.y - a.y) > max_piece_m + kPieceRounding) break;
+      if (plan_distance_m(a.position_m, b.position_m) > max_piece_m + kPieceRounding) break;
       bool close = true;
       for (std::size_t i = first + 1; i < next && close; ++i) close = chord_error(a, b, points[i]) <= tolerance_m;
       if (!close) break;

@@ -6,22 +6,32 @@
 #include <cstdint>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "pictura/common/error.h"
+#include "pictura/common/math.h"
 
 namespace pictura {
 
 /// Rounding may make pieces longer than the maximum by this much.
 constexpr double kPieceRounding = 1e-6;
 
-/// A position in file or map coordinates, before rounding to float.
-struct Point3 {
-  double x = 0, y = 0, z = 0;
+/// A sample of a curve: its parameter, its position, and a width (0 for a plain line) that is approximated too.
+/// Positions are in file or map coordinates, before rounding to float.
+struct CurvePoint {
+  double s = 0;
+  Eigen::Vector3d position_m{0, 0, 0};
+  double width = 0;
 };
 
-/// A sample of a curve: its parameter, its position, and a width (0 for a plain line) that is approximated too.
-struct CurvePoint {
-  double s = 0, x = 0, y = 0, z = 0, width = 0;
-};
+/// Distance in plan.
+inline double plan_distance_m(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::hypot(b.x() - a.x(), b.y() - a.y());
+}
+
+inline Vec3 to_vec3(const Eigen::Vector3d& p) {
+  return {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())};
+}
 
 /// The deviation of `p` from the chord a-b: its distance in space, or half the error in width if that is larger.
 double chord_error(const CurvePoint& a, const CurvePoint& b, const CurvePoint& p);
@@ -55,7 +65,7 @@ std::vector<CurvePoint> sample_curve(const std::vector<double>& breaks, double t
   auto refine = [&](auto&& self, const CurvePoint& a, const CurvePoint& b, int depth) -> void {
     budget->count_sample();
     if (depth < kMaxDepth) {
-      bool is_fine = std::hypot(b.x - a.x, b.y - a.y) <= max_piece_m + kPieceRounding;
+      bool is_fine = plan_distance_m(a.position_m, b.position_m) <= max_piece_m + kPieceRounding;
       CurvePoint middle = eval(0.5 * (a.s + b.s));
       is_fine = is_fine && chord_error(a, b, middle) <= kDenseShare * tolerance_m;
       for (const double fraction : {0.25, 0.75}) {

@@ -19,15 +19,12 @@ constexpr double kMaxJoinGap_m = 0.06;           // maximum distance of outline 
 constexpr double kMinOutline_m = 0.3;
 
 /// A point on an outline and the band whose border it lies on.
-struct OutlinePoint : Point3 {
+struct OutlinePoint {
+  Eigen::Vector3d position_m;
   int32_t band = 0;
 };
 
-Point3 lerp(const Point3& a, const Point3& b, double u) {
-  return {a.x + u * (b.x - a.x), a.y + u * (b.y - a.y), a.z + u * (b.z - a.z)};
-}
-
-double plan_distance(const Point3& a, const Point3& b) { return std::hypot(b.x - a.x, b.y - a.y); }
+Eigen::Vector3d lerp(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double u) { return a + u * (b - a); }
 
 /// Traverses the four sides of each band clockwise, surface to the right, and collects the parts on the outline.
 class Tracer {
@@ -38,7 +35,7 @@ class Tracer {
     for (std::size_t band = 0; band < bands_.size(); ++band) {
       const SurfaceBand& sides = bands_[band];
       band_ = static_cast<int32_t>(band);
-      auto is_narrow = [&](std::size_t i) { return plan_distance(sides.left[i], sides.right[i]) < kMaxGap_m; };
+      auto is_narrow = [&](std::size_t i) { return plan_distance_m(sides.left[i], sides.right[i]) < kMaxGap_m; };
       const std::size_t last = sides.left.size() - 1;
       for (std::size_t i = 0; i < last; ++i) {
         trace_side(sides.left[i], sides.left[i + 1], is_narrow(i) && is_narrow(i + 1));
@@ -55,11 +52,11 @@ class Tracer {
 
  private:
   /// One straight segment of a band's side.
-  void trace_side(const Point3& a, const Point3& b, bool is_skipped) {
-    const double length_m = plan_distance(a, b);
+  void trace_side(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool is_skipped) {
+    const double length_m = plan_distance_m(a, b);
     if (is_skipped) finish_run();
     if (is_skipped || length_m < 1e-9) return;
-    const Point2 outward{-(b.y - a.y) / length_m, (b.x - a.x) / length_m};
+    const Eigen::Vector2d outward{-(b.y() - a.y()) / length_m, (b.x() - a.x()) / length_m};
     const int steps = std::max(1, static_cast<int>(std::ceil(length_m / kSampleStep_m)));
     // Stay off the ends, where the adjacent segment decides.
     const double margin = std::min(0.25, 1e-4 / length_m);
@@ -91,13 +88,13 @@ class Tracer {
   /// Whether no other band covers the point just outside `p` on the border of `band`, and no band of a lower index
   /// emits the same shared border. Bands that share a border within kSharedBorder_m may each extend slightly beyond the
   /// other, so the test recurses to check that the lower band really emits it: one of them always does.
-  bool is_outline(const Point3& p, const Point2& outward, int32_t band) const {
-    auto at = [&](double distance) { return Point2{p.x + distance * outward.x, p.y + distance * outward.y}; };
+  bool is_outline(const Eigen::Vector3d& p, const Eigen::Vector2d& outward, int32_t band) const {
+    auto at = [&](double distance_m) -> Eigen::Vector2d { return p.head<2>() + distance_m * outward; };
     auto is_other = [&](int32_t other) { return other != band; };
-    if (surface_.any_band_at(at(kSharedBorder_m), p.z, is_other)) return false;
-    if (surface_.any_band_at(at(kMaxGap_m), p.z, is_other)) return false;
+    if (surface_.any_band_at(at(kSharedBorder_m), p.z(), is_other)) return false;
+    if (surface_.any_band_at(at(kMaxGap_m), p.z(), is_other)) return false;
     std::vector<int32_t> adjacent_bands;
-    surface_.any_band_at(at(-kSharedBorder_m), p.z, [&](int32_t other) {
+    surface_.any_band_at(at(-kSharedBorder_m), p.z(), [&](int32_t other) {
       if (other < band && (adjacent_bands.empty() || adjacent_bands.back() != other)) adjacent_bands.push_back(other);
       return false;
     });
@@ -105,17 +102,17 @@ class Tracer {
       double inside = -kSharedBorder_m, outside = kSharedBorder_m;
       for (int iteration = 0; iteration < 6; ++iteration) {
         const double middle = 0.5 * (inside + outside);
-        const bool covered = surface_.any_band_at(at(middle), p.z, [&](int32_t other) { return other == adjacent; });
+        const bool covered = surface_.any_band_at(at(middle), p.z(), [&](int32_t other) { return other == adjacent; });
         (covered ? inside : outside) = middle;
       }
-      const Point2 border = at(inside);
-      if (is_outline({border.x, border.y, p.z}, outward, adjacent)) return false;
+      const Eigen::Vector2d border = at(inside);
+      if (is_outline({border.x(), border.y(), p.z()}, outward, adjacent)) return false;
     }
     return true;
   }
 
-  void append(const Point3& p) {
-    if (run_.empty() || plan_distance(run_.back(), p) > 1e-6) run_.push_back({p, band_});
+  void append(const Eigen::Vector3d& p) {
+    if (run_.empty() || plan_distance_m(run_.back().position_m, p) > 1e-6) run_.push_back({p, band_});
   }
   void finish_run() {
     if (run_.size() >= 2) runs_.push_back(std::move(run_));
@@ -161,13 +158,14 @@ class Joiner {
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
   using Buckets = std::unordered_map<int64_t, std::vector<std::size_t>>;
 
-  static int64_t key(const Point3& p, int dx, int dy) {
-    const int64_t x = static_cast<int64_t>(std::floor(p.x)) + dx, y = static_cast<int64_t>(std::floor(p.y)) + dy;
+  static int64_t key(const OutlinePoint& p, int dx, int dy) {
+    const int64_t x = static_cast<int64_t>(std::floor(p.position_m.x())) + dx;
+    const int64_t y = static_cast<int64_t>(std::floor(p.position_m.y())) + dy;
     return x * 4'000'037 + y;
   }
 
   template <typename Visit>
-  static void visit_near(const Buckets& buckets, const Point3& p, Visit&& visit) {
+  static void visit_near(const Buckets& buckets, const OutlinePoint& p, Visit&& visit) {
     for (int dy = -1; dy <= 1; ++dy) {
       for (int dx = -1; dx <= 1; ++dx) {
         const auto bucket = buckets.find(key(p, dx, dy));
@@ -177,11 +175,12 @@ class Joiner {
     }
   }
 
-  static double gap(const Point3& a, const Point3& b) {
-    return std::abs(a.z - b.z) < kLevel_m ? plan_distance(a, b) : 1e300;
+  static double gap(const OutlinePoint& a, const OutlinePoint& b) {
+    const bool is_level = std::abs(a.position_m.z() - b.position_m.z()) < kLevel_m;
+    return is_level ? plan_distance_m(a.position_m, b.position_m) : 1e300;
   }
 
-  std::size_t next_of(const Point3& end) const {
+  std::size_t next_of(const OutlinePoint& end) const {
     std::size_t best = kNone;
     double best_gap = kMaxJoinGap_m;
     visit_near(starts_, end, [&](std::size_t i) {
@@ -219,20 +218,17 @@ std::vector<RoadEdge> outline_of(const std::vector<SurfaceBand>& bands, double c
     double length_m = 0;
     for (const OutlinePoint& p : outline) {
       if (!points.empty()) {
-        const double step_m = std::hypot(p.x - points.back().x, p.y - points.back().y);
+        const double step_m = plan_distance_m(points.back().position_m, p.position_m);
         if (step_m < 1e-3) continue;
         length_m += step_m;
       }
-      points.push_back({length_m, p.x, p.y, p.z, 0});
+      points.push_back({length_m, p.position_m, 0});
       bands_of_points.push_back(p.band);
     }
     if (length_m < kMinOutline_m) continue;
     const std::vector<std::size_t> indices = thin_polyline(points, chord_error_m, kMaxPiece_m);
-    auto to_vec3 = [](const CurvePoint& p) {
-      return Vec3{static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
-    };
     for (std::size_t i = 1; i < indices.size(); ++i) {
-      edges.push_back({to_vec3(points[indices[i - 1]]), to_vec3(points[indices[i]])});
+      edges.push_back({to_vec3(points[indices[i - 1]].position_m), to_vec3(points[indices[i]].position_m)});
       if (bands_out) bands_out->push_back(bands_of_points[indices[i - 1]]);
     }
   }

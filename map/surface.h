@@ -10,14 +10,10 @@
 
 namespace pictura {
 
-struct Point2 {
-  double x = 0, y = 0;
-};
-
 /// A piece of surface between two borders with equally many points; left is on the left in their direction. The surface
 /// is bounded by straight segments between the points, so they must be dense enough.
 struct SurfaceBand {
-  std::vector<Point3> left, right;
+  std::vector<Eigen::Vector3d> left, right;
 };
 
 /// All quads of all bands in a grid. Bands at least `level_m` above or below a position do not cover it. The total
@@ -30,9 +26,9 @@ class Surface {
   /// Calls visit(band) for every band that covers `p` at about height `z`, until it returns true; returns whether any
   /// call did.
   template <typename Visit>
-  bool any_band_at(const Point2& p, double z, Visit&& visit) const {
+  bool any_band_at(const Eigen::Vector2d& p, double z, Visit&& visit) const {
     const GridView grid = grid_.view();
-    const Vec2 position{static_cast<float>(p.x), static_cast<float>(p.y)};
+    const Vec2 position{static_cast<float>(p.x()), static_cast<float>(p.y())};
     if (!grid.contains(position)) return false;
     const std::size_t cell = static_cast<std::size_t>(grid.cell_y(position.y)) * static_cast<std::size_t>(grid.num_x) +
                              static_cast<std::size_t>(grid.cell_x(position.x));
@@ -46,11 +42,11 @@ class Surface {
 
  private:
   struct Quad {
-    Point3 corners[4];  // counter-clockwise: left, right, next right, next left
+    Eigen::Vector3d corners[4];  // counter-clockwise: left, right, next right, next left
     int32_t band = 0;
   };
 
-  bool contains(const Quad& quad, const Point2& p, double z) const;
+  bool contains(const Quad& quad, const Eigen::Vector2d& p, double z) const;
   void count_lookups(int64_t count) const {
     remaining_lookups_ -= count;
     if (remaining_lookups_ < 0) fail("too many overlapping lanes");

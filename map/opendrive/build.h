@@ -39,11 +39,11 @@ struct Build {
   std::vector<LaneSource> file_lanes;  // parallel to RoadMap::lanes
 
   /// Converts file coordinates to map coordinates.
-  Vec3 to_map(double x, double y, double z) const {
-    return {static_cast<float>(x - map->origin_m[0]), static_cast<float>(y - map->origin_m[1]),
-            static_cast<float>(z - map->origin_m[2])};
+  Vec3 to_map(const Eigen::Vector3d& p) const { return to_vec3(from_origin(p)); }
+  /// The same before rounding.
+  Eigen::Vector3d from_origin(const Eigen::Vector3d& p) const {
+    return p - Eigen::Vector3d{map->origin_m[0], map->origin_m[1], map->origin_m[2]};
   }
-  Vec3 to_map(const Point3& p) const { return to_map(p.x, p.y, p.z); }
 };
 
 /// Lane types of which routes are made.

@@ -71,14 +71,20 @@ double parameter_at(const PlaneCubic& cubic, double fraction) {
   return p;
 }
 
+/// A point in the frame of the piece's start.
+Eigen::Vector2d in_file(const GeometryPiece& piece, const Eigen::Vector2d& p) {
+  const double c = std::cos(piece.heading), s = std::sin(piece.heading);
+  // Added from left to right: maps keep their bits.
+  return Eigen::Vector2d{piece.x, piece.y} + p.x() * Eigen::Vector2d{c, s} + p.y() * Eigen::Vector2d{-s, c};
+}
+
 Pose pose_on_cubic(const GeometryPiece& piece, double ds) {
   const PlaneCubic& cubic = *piece.cubic;
   const double p = parameter_at(cubic, ds / piece.length);
   const double u = value_of(cubic.u, p), v = value_of(cubic.v, p);
   const double du = derivative_of(cubic.u, p), dv = derivative_of(cubic.v, p);
   const double speed = std::max(speed_of(cubic, p), 1e-9);
-  const double c = std::cos(piece.heading), s = std::sin(piece.heading);
-  return {piece.x + u * c - v * s, piece.y + u * s + v * c, piece.heading + std::atan2(dv, du),
+  return {in_file(piece, {u, v}), piece.heading + std::atan2(dv, du),
           (du * second_derivative_of(cubic.v, p) - dv * second_derivative_of(cubic.u, p)) / (speed * speed * speed)};
 }
 
@@ -115,14 +121,13 @@ double spiral_turn(const GeometryPiece& piece, double ds) {
 }
 
 /// The displacement between two positions on a spiral within one panel, in the frame of the spiral's start.
-std::array<double, 2> spiral_step(const GeometryPiece& piece, double from, double to) {
-  double x = 0, y = 0;
+Eigen::Vector2d spiral_step(const GeometryPiece& piece, double from, double to) {
+  Eigen::Vector2d sum{0, 0};
   for (const GaussPoint& gauss : kGauss) {
     const double turn = spiral_turn(piece, from + gauss.position * (to - from));
-    x += gauss.weight * std::cos(turn);
-    y += gauss.weight * std::sin(turn);
+    sum += gauss.weight * Eigen::Vector2d{std::cos(turn), std::sin(turn)};
   }
-  return {x * (to - from), y * (to - from)};
+  return sum * (to - from);
 }
 
 }  // namespace
@@ -132,11 +137,10 @@ void measure(GeometryPiece* piece) {
   if (piece->cubic || piece->start_curvature == piece->end_curvature) return;
   const double turn = std::max(std::abs(piece->start_curvature), std::abs(piece->end_curvature)) * piece->length;
   const int count = 1 + static_cast<int>(turn / kPanelTurn_rad);
-  std::array<double, 2> position{};
+  Eigen::Vector2d position{0, 0};
   for (int i = 0; i < count; ++i) {
-    piece->panels.push_back(position);
-    const auto [dx, dy] = spiral_step(*piece, i * piece->length / count, (i + 1) * piece->length / count);
-    position = {position[0] + dx, position[1] + dy};
+    piece->panels.push_back({position.x(), position.y()});
+    position += spiral_step(*piece, i * piece->length / count, (i + 1) * piece->length / count);
   }
 }
 
@@ -171,15 +175,16 @@ Pose pose_on(const GeometryPiece& piece, double ds) {
     // The heading of an arc's chord is the mean of the end headings.
     const double half_turn = 0.5 * k0 * ds;
     const double chord = ds * sinc(half_turn);
-    return {piece.x + chord * std::cos(piece.heading + half_turn),
-            piece.y + chord * std::sin(piece.heading + half_turn), piece.heading + k0 * ds, k0};
+    const double heading = piece.heading + half_turn;
+    return {Eigen::Vector2d{piece.x, piece.y} + chord * Eigen::Vector2d{std::cos(heading), std::sin(heading)},
+            piece.heading + k0 * ds, k0};
   }
   const auto last = static_cast<double>(piece.panels.size() - 1);
   const double panel = std::min(last, std::floor(ds / piece.length * (last + 1)));
   const auto& [begin_x, begin_y] = piece.panels[static_cast<std::size_t>(panel)];
-  const auto [dx, dy] = spiral_step(piece, panel * piece.length / (last + 1), ds);
-  const double x = begin_x + dx, y = begin_y + dy, c = std::cos(piece.heading), s = std::sin(piece.heading);
-  return {piece.x + x * c - y * s, piece.y + x * s + y * c, piece.heading + spiral_turn(piece, ds), k0 + rate * ds};
+  const Eigen::Vector2d in_frame =
+      Eigen::Vector2d{begin_x, begin_y} + spiral_step(piece, panel * piece.length / (last + 1), ds);
+  return {in_file(piece, in_frame), piece.heading + spiral_turn(piece, ds), k0 + rate * ds};
 }
 
 Pose pose_at(const FileRoad& road, double s) {
@@ -187,7 +192,7 @@ Pose pose_at(const FileRoad& road, double s) {
   return pose_on(piece, std::clamp(s - piece.s, 0.0, piece.length));
 }
 
-Point3 point_at(const FileRoad& road, double s, double t) {
+Eigen::Vector3d point_at(const FileRoad& road, double s, double t) {
   s = std::clamp(s, 0.0, road.length);
   const Pose pose = pose_at(road, s);
   double lateral = t, z = road.elevation.value(s);
@@ -198,18 +203,19 @@ Point3 point_at(const FileRoad& road, double s, double t) {
     lateral = t - banked + banked * std::cos(roll);
     z += banked * std::sin(roll) - std::abs(banked) * std::tan(fall) + shape_height(road.shape, s, banked);
   }
-  return {pose.x - lateral * std::sin(pose.heading), pose.y + lateral * std::cos(pose.heading), z};
+  const Eigen::Vector2d left{-std::sin(pose.heading), std::cos(pose.heading)}, p = pose.position_m + lateral * left;
+  return {p.x(), p.y(), z};
 }
 
-Point3 point_on_lane(const FileRoad& road, const FileSection& section, const FileLane& lane, double s,
-                     double outer_fraction) {
+Eigen::Vector3d point_on_lane(const FileRoad& road, const FileSection& section, const FileLane& lane, double s,
+                              double outer_fraction) {
   const double outer = border_at(road, section, lane.id, s).t;
   double t = outer;
   if (lane.id != 0) t -= (1 - outer_fraction) * (outer - border_at(road, section, inner_border(lane.id), s).t);
-  Point3 point = point_at(road, s, t);
+  Eigen::Vector3d point = point_at(road, s, t);
   if (!lane.inner_height.cubics.empty()) {
     const double ds = clamp_inside(section, s) - section.s;
-    point.z += (1 - outer_fraction) * lane.inner_height.value(ds) + outer_fraction * lane.outer_height.value(ds);
+    point.z() += (1 - outer_fraction) * lane.inner_height.value(ds) + outer_fraction * lane.outer_height.value(ds);
   }
   return point;
 }

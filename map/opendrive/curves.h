@@ -8,7 +8,8 @@
 namespace pictura::opendrive {
 
 struct Pose {
-  double x = 0, y = 0, heading = 0, curvature = 0;
+  Eigen::Vector2d position_m{0, 0};
+  double heading = 0, curvature = 0;
 };
 
 /// Fills the table of arc lengths of a cubic up to its p_end.
@@ -27,12 +28,12 @@ Pose pose_at(const FileRoad& road, double s);
 
 /// The point `t` metres to the left of the reference line at s, measured along the banked road surface, with its
 /// height. s is clamped to the road.
-Point3 point_at(const FileRoad& road, double s, double t);
+Eigen::Vector3d point_at(const FileRoad& road, double s, double t);
 
 /// The point on a lane at s: `outer_fraction` is 0 on the inner border and 1 on the outer one. Includes the lane's
 /// <height>.
-Point3 point_on_lane(const FileRoad& road, const FileSection& section, const FileLane& lane, double s,
-                     double outer_fraction);
+Eigen::Vector3d point_on_lane(const FileRoad& road, const FileSection& section, const FileLane& lane, double s,
+                              double outer_fraction);
 
 /// Heading of the line midway between two borders, in the direction of growing s.
 double heading_between(const FileRoad& road, const FileSection& section, int inner, int outer, double s);

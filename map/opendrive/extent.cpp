@@ -47,7 +47,7 @@ void check_position(const FileRoad& road, const FileSection& section, int border
     road.where.fail("at s {:.3f} it is banked by {} rad; expected at most {}", s, std::max(std::abs(roll), fall),
                     kMaxBanking_rad);
   }
-  const double z = point_at(road, s, t).z;
+  const double z = point_at(road, s, t).z();
   if (!(std::abs(t) <= kMaxOffset_m && std::abs(z) <= kMaxHeight_m)) {
     road.where.fail("at s {:.3f} a lane border is {} m to its side at a height of {} m; expected at most {} and {} m",
                     s, t, z, kMaxOffset_m, kMaxHeight_m);

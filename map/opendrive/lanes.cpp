@@ -14,12 +14,11 @@ constexpr double kMaxMapRadius_m = 1e5;
 
 Lane make_lane(Build* build, const FileRoad& road, const FileSection& section, const FileLane& lane) {
   const bool forward = travels_forward(road, lane);
-  std::vector<CurvePoint> points =
-      sample_curve(formula_changes(road, section, lane.id, section.s, section.end), build->options.chord_error_m,
-                   kMaxPiece_m, &build->budget, [&](double s) {
-                     const Point3 p = point_on_lane(road, section, lane, s, 0.5);
-                     return CurvePoint{s, p.x, p.y, p.z, lane_width(road, section, lane, s)};
-                   });
+  std::vector<CurvePoint> points = sample_curve(
+      formula_changes(road, section, lane.id, section.s, section.end), build->options.chord_error_m, kMaxPiece_m,
+      &build->budget, [&](double s) {
+        return CurvePoint{s, point_on_lane(road, section, lane, s, 0.5), lane_width(road, section, lane, s)};
+      });
   if (!forward) std::reverse(points.begin(), points.end());
 
   Lane result;
@@ -28,11 +27,11 @@ Lane make_lane(Build* build, const FileRoad& road, const FileSection& section, c
   double length_m = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const CurvePoint& point = points[i];
-    if (i > 0) length_m += std::hypot(point.x - points[i - 1].x, point.y - points[i - 1].y);
+    if (i > 0) length_m += plan_distance_m(points[i - 1].position_m, point.position_m);
     const double heading = std::remainder(
         heading_between(road, section, inner_border(lane.id), lane.id, point.s) + (forward ? 0.0 : std::numbers::pi),
         2 * std::numbers::pi);
-    build->map->lane_points.push_back({build->to_map(point.x, point.y, point.z), static_cast<float>(heading),
+    build->map->lane_points.push_back({build->to_map(point.position_m), static_cast<float>(heading),
                                        static_cast<float>(point.width), static_cast<float>(length_m)});
   }
   result.points.end = static_cast<int32_t>(build->map->lane_points.size());

@@ -109,13 +109,13 @@ class MarkPainter {
     const std::vector<CurvePoint> points =
         sample_curve(breaks, build_.options.chord_error_m, kMaxPiece_m, &build_.budget, [&](double s) {
           const double t = border_at(road_, section_, lane_.id, s).t + stripe.left + mark.sway.value(s - mark_begin);
-          const Point3 p = point_at(road_, s, t);
+          Eigen::Vector3d p = point_at(road_, s, t);
           // On a raised lane the mark is at the height of the lane's outer border.
-          const bool is_raised = !lane_.inner_height.cubics.empty();
-          return CurvePoint{s, p.x, p.y, is_raised ? point_on_lane(road_, section_, lane_, s, 1).z : p.z, 0};
+          if (!lane_.inner_height.cubics.empty()) p.z() = point_on_lane(road_, section_, lane_, s, 1).z();
+          return CurvePoint{s, p, 0};
         });
     const int32_t first = static_cast<int32_t>(map.marking_points.size());
-    for (const CurvePoint& point : points) map.marking_points.push_back(build_.to_map(point.x, point.y, point.z));
+    for (const CurvePoint& point : points) map.marking_points.push_back(build_.to_map(point.position_m));
     map.markings.push_back({{first, static_cast<int32_t>(map.marking_points.size())},
                             static_cast<float>(stripe.width),
                             stripe.color,
@@ -137,18 +137,18 @@ std::vector<Vec3> corners_of(Build* build, const FileRoad& road, const FileObjec
     const double u = 0.5 * object.length, v = 0.5 * object.width;
     corners = {{u, v}, {-u, v}, {-u, -v}, {u, -v}};
   }
-  const Point3 origin = point_at(road, object.s, object.t);
+  const Eigen::Vector3d origin = point_at(road, object.s, object.t);
   const double heading = pose_at(road, object.s).heading + object.heading;
   std::vector<Vec3> points;
   for (const FileObject::Corner& corner : corners) {
-    Point3 p;
+    Eigen::Vector3d p;
     if (corner.along_road) {
       p = point_at(road, corner.u, corner.v);
-      p.z += corner.z;
+      p.z() += corner.z;
     } else {
-      p = {origin.x + corner.u * std::cos(heading) - corner.v * std::sin(heading),
-           origin.y + corner.u * std::sin(heading) + corner.v * std::cos(heading),
-           origin.z + object.z_offset + corner.z};
+      const Eigen::Vector2d forward{std::cos(heading), std::sin(heading)}, left{-forward.y(), forward.x()};
+      p.head<2>() = origin.head<2>() + corner.u * forward + corner.v * left;
+      p.z() = origin.z() + object.z_offset + corner.z;
     }
     const Vec3 point = build->to_map(p);
     if (points.empty() || length(point - points.back()) > kSamePoint_m) points.push_back(point);
@@ -214,8 +214,8 @@ void add_stop_line(Build* build, std::size_t road, const FileObject& object) {
 void add_parking_space(Build* build, std::size_t road_index, const FileObject& object) {
   const FileRoad& road = build->network.roads[road_index];
   ParkingSpace space;
-  Point3 center = point_at(road, object.s, object.t);
-  center.z += object.z_offset;
+  Eigen::Vector3d center = point_at(road, object.s, object.t);
+  center.z() += object.z_offset;
   space.center_m = build->to_map(center);
   double heading = pose_at(road, object.s).heading + object.heading;
   double length_m = object.length, width_m = object.width;

@@ -95,11 +95,11 @@ void check_geometry(const std::vector<Element>& elements, const FileRoad& road) 
       elements[i].fail("attribute s: expected {}, where the one before it ends, got {}", before.s + before.length,
                        piece.s);
     }
-    const Pose end = pose_on(before, before.length);
-    const double gap_m = std::hypot(piece.x - end.x, piece.y - end.y);
+    const Eigen::Vector2d end = pose_on(before, before.length).position_m;
+    const double gap_m = std::hypot(piece.x - end.x(), piece.y - end.y());
     if (gap_m > kMaxGap_m) {
       elements[i].fail("begins {:.3f} m from the end of the one before it, at ({}, {}); expected at most {} m", gap_m,
-                       end.x, end.y, kMaxGap_m);
+                       end.x(), end.y(), kMaxGap_m);
     }
   }
   const GeometryPiece& last = road.geometry.back();

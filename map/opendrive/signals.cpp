@@ -206,10 +206,10 @@ class SignalBuilder {
     approach.connecting.insert(approach.connecting.end(), connecting.begin(), connecting.end());
   }
 
-  Point3 position_of(std::size_t signal_index) const {
+  Eigen::Vector3d position_of(std::size_t signal_index) const {
     const FileSignal& signal = *placed_signals_[signal_index].signal;
-    Point3 position = point_at(build_.network.roads[placed_signals_[signal_index].road], signal.s, signal.t);
-    position.z += signal.z_offset;
+    Eigen::Vector3d position = point_at(build_.network.roads[placed_signals_[signal_index].road], signal.s, signal.t);
+    position.z() += signal.z_offset;
     return position;
   }
 
@@ -277,10 +277,10 @@ class SignalBuilder {
     light.stop_heading_rad = reference.heading_rad;
     light.head_facing = Vec2{-direction.cos, -direction.sin};
 
-    Point3 head = position_of(signal_index);
+    Eigen::Vector3d head = position_of(signal_index);
     const Vec2 middle = (light.stop_a_m.xy() + light.stop_b_m.xy()) * 0.5f;
     const float ahead_m = -dot(build_.to_map(head).xy() - middle, light.head_facing);
-    head.z += (ahead_m > kFarHead_m ? kFarHeadHeight_m : kNearHeadHeight_m);
+    head.z() += (ahead_m > kFarHead_m ? kFarHeadHeight_m : kNearHeadHeight_m);
     light.head_m = build_.to_map(head);
 
     light.lanes.begin = static_cast<int32_t>(map_.light_lanes.size());

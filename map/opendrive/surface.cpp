@@ -27,18 +27,14 @@ SurfaceBand lane_band(Build* build, const FileRoad& road, const FileSection& sec
                       double chord_error_m) {
   const double left = lane.id > 0 ? 1 : 0, right = 1 - left;  // 0: inner border, 1: outer border
   auto border = [&](double outer_fraction, double s) {
-    const Point3 p = point_on_lane(road, section, lane, s, outer_fraction);
-    return Point3{p.x - build->map->origin_m[0], p.y - build->map->origin_m[1], p.z - build->map->origin_m[2]};
+    return build->from_origin(point_on_lane(road, section, lane, s, outer_fraction));
   };
   // Both borders are sampled at the same stations, the union of those that either needs.
   const std::vector<double> breaks = formula_changes(road, section, lane.id, section.s, section.end);
   std::vector<double> stations;
   for (const double side : {left, right}) {
-    const std::vector<CurvePoint> points =
-        sample_curve(breaks, chord_error_m, kBandPiece_m, &build->budget, [&](double s) {
-          const Point3 p = border(side, s);
-          return CurvePoint{s, p.x, p.y, p.z, 0};
-        });
+    const std::vector<CurvePoint> points = sample_curve(breaks, chord_error_m, kBandPiece_m, &build->budget,
+                                                        [&](double s) { return CurvePoint{s, border(side, s), 0}; });
     for (const CurvePoint& point : points) stations.push_back(point.s);
   }
   std::sort(stations.begin(), stations.end());
@@ -81,14 +77,14 @@ int outermost_lane(const std::vector<FileLane>& side) {
 
 /// Whether the ground for a building along a-b is free: no surface on, near or closely behind it. The road is on the
 /// right of a-b.
-bool is_free(const Surface& surface, const Point3& a, const Point3& b) {
-  const double length_m = std::hypot(b.x - a.x, b.y - a.y);
-  const Point2 along{(b.x - a.x) / length_m, (b.y - a.y) / length_m};
+bool is_free(const Surface& surface, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  const double length_m = plan_distance_m(a, b);
+  const Eigen::Vector2d along = (b - a).head<2>() / length_m, left{-along.y(), along.x()};
   const int steps = static_cast<int>(std::ceil((length_m + 2 * kClearance_m) / kProbeStep_m));
   for (int i = 0; i <= steps; ++i) {
     const double u = -kClearance_m + (length_m + 2 * kClearance_m) * i / steps;
     for (double depth = -kClearance_m; depth <= kLotDepth_m; depth += kProbeStep_m) {
-      const Point2 probe{a.x + u * along.x - depth * along.y, a.y + u * along.y + depth * along.x};
+      const Eigen::Vector2d probe = a.head<2>() + u * along + depth * left;
       if (surface.any_band_at(probe, 0, [](int32_t) { return true; })) return false;
     }
   }
@@ -118,8 +114,7 @@ void build_building_lines(Build* build) {
         const int outermost = outermost_lane(sign > 0 ? section.left : section.right);
         if (outermost == 0) continue;
         auto at = [&](double s) {
-          const Point3 p = point_at(road, s, border_at(road, section, outermost, s).t + sign * kSetback_m);
-          return Point3{p.x - build->map->origin_m[0], p.y - build->map->origin_m[1], p.z - build->map->origin_m[2]};
+          return build->from_origin(point_at(road, s, border_at(road, section, outermost, s).t + sign * kSetback_m));
         };
         const int pieces = std::max(1, static_cast<int>(std::round((section.end - section.s) / kBuildingPiece_m)));
         const double step = (section.end - section.s) / pieces;
@@ -127,15 +122,13 @@ void build_building_lines(Build* build) {
           build->budget.count_sample();
           // Directed so that the road is on the right.
           const double low = section.s + i * step, high = i + 1 == pieces ? section.end : section.s + (i + 1) * step;
-          const Point3 a = at(sign > 0 ? low : high), b = at(sign > 0 ? high : low);
-          const double length_m = std::hypot(b.x - a.x, b.y - a.y);
+          const Eigen::Vector3d a = at(sign > 0 ? low : high), b = at(sign > 0 ? high : low);
+          const double length_m = plan_distance_m(a, b);
           if (length_m < 2 * kClearance_m || length_m > kMaxPiece_m || !is_free(surface, a, b)) continue;
           // On the inside of a bend tighter than the offset the line reverses direction.
           const double heading = pose_at(road, 0.5 * (low + high)).heading;
-          if (sign * ((b.x - a.x) * std::cos(heading) + (b.y - a.y) * std::sin(heading)) < 0.5 * length_m) continue;
-          auto to_vec3 = [](const Point3& p) {
-            return Vec3{static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
-          };
+          const Eigen::Vector2d forward{std::cos(heading), std::sin(heading)};
+          if (sign * (b - a).head<2>().dot(forward) < 0.5 * length_m) continue;
           build->map->building_lines.push_back({to_vec3(a), to_vec3(b)});
           build->map->provenance.building_lines.push_back({static_cast<int32_t>(r), 0});
         }

@@ -84,8 +84,8 @@ void Layout::place_nodes() {
     for (int i = 0; i <= options_.blocks_x; ++i) {
       RandomStream jitter = draw(kJitter, static_cast<int>(nodes_.size()));
       Node node;
-      node.x = columns[i] + kJitter_m * static_cast<double>(jitter.uniform(-1, 1));
-      node.y = rows[j] + kJitter_m * static_cast<double>(jitter.uniform(-1, 1));
+      node.position_m.x() = columns[i] + kJitter_m * static_cast<double>(jitter.uniform(-1, 1));
+      node.position_m.y() = rows[j] + kJitter_m * static_cast<double>(jitter.uniform(-1, 1));
       node.on_border = i == 0 || j == 0 || i == options_.blocks_x || j == options_.blocks_y;
       nodes_.push_back(node);
     }

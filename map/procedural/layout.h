@@ -30,7 +30,7 @@ struct Arm {
 enum class NodeKind { crossing, roundabout, overpass };
 
 struct Node {
-  double x = 0, y = 0;
+  Eigen::Vector2d position_m{0, 0};
   double z = 0;        // height of the junction; of the lower street of an overpass
   double upper_z = 0;  // of the upper street of an overpass
   NodeKind kind = NodeKind::crossing;

@@ -44,7 +44,8 @@ void Layout::set_arm_heading(int street, bool at_start, double heading) {
 void Layout::set_headings() {
   for (int s = 0; s < static_cast<int>(streets_.size()); ++s) {
     const Node &from = nodes_[streets_[s].from], &to = nodes_[streets_[s].to];
-    const double heading = std::atan2(to.y - from.y, to.x - from.x);
+    const Eigen::Vector2d apart = to.position_m - from.position_m;
+    const double heading = std::atan2(apart.y(), apart.x());
     set_arm_heading(s, true, heading);
     set_arm_heading(s, false, heading + kPi_rad);
   }
@@ -158,8 +159,8 @@ Curve Layout::curve_of(const Street& street) const {
     return mouth_distance_m(node, index);
   };
   const Node &from = nodes_[street.from], &to = nodes_[street.to];
-  return biarc(moved_forward({from.x, from.y, street.leave}, mouth(street.from)),
-               moved_forward({to.x, to.y, street.arrive}, -mouth(street.to)));
+  return biarc(moved_forward({from.position_m, street.leave}, mouth(street.from)),
+               moved_forward({to.position_m, street.arrive}, -mouth(street.to)));
 }
 
 /// Chooses right turns at lights, where both streets are long enough for the larger corner.

@@ -30,7 +30,8 @@ void Layout::set_heights() {
   }
   for (Node& node : nodes_) {
     double sum = 0;
-    for (const Wave& wave : waves) sum += std::sin(wave.x * node.x + wave.y * node.y + wave.phase);
+    for (const Wave& wave : waves)
+      sum += std::sin(wave.x * node.position_m.x() + wave.y * node.position_m.y() + wave.phase);
     node.z = node.upper_z = options_.hills_m * 0.5 * (1 + sum / kWaves);
   }
   // Relaxation: repeatedly moves the ends of every street that is too steep towards each other, and the streets of

@@ -13,8 +13,7 @@ constexpr Side kBareLane{.driving = 1, .has_shoulder = false, .has_sidewalk = fa
 
 /// A pose on the circle's inner edge, in the direction of traffic.
 Pose on_circle(const Node& node, double angle) {
-  return {node.x + kCircleRadius_m * std::cos(angle), node.y + kCircleRadius_m * std::sin(angle),
-          angle + 0.5 * kPi_rad};
+  return {node.position_m + kCircleRadius_m * direction_of(angle), angle + 0.5 * kPi_rad};
 }
 
 Curve circle_piece(const Node& node, double from_angle, double turn) {

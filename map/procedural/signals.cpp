@@ -14,15 +14,16 @@ constexpr double kPostSetback_m = 0.8;  // distance of a post from the kerb
 constexpr double kNearPost_m = 3, kNearArm_m = 4, kArmRise_m = 2;
 
 struct SignalPosition {
-  double x = 0, y = 0, z_offset_m = 0;
+  Eigen::Vector2d position_m;
+  double z_offset_m = 0;
 };
 
 double behind_kerb_m(int lanes) { return lanes * kLaneWidth_m + kShoulderWidth_m + kPostSetback_m; }
 
-SignalPosition position_at(Pose pose, double z_offset_m = 0) { return {pose.x, pose.y, z_offset_m}; }
+SignalPosition position_at(const Pose& pose, double z_offset_m = 0) { return {pose.position_m, z_offset_m}; }
 
 /// Just beyond the stop line: next to a single lane, above several.
-SignalPosition near_side(Pose arriving, int lanes, bool has_slip) {
+SignalPosition near_side(const Pose& arriving, int lanes, bool has_slip) {
   if (lanes == 1 && !has_slip) return position_at(moved_forward(offset_right(arriving, behind_kerb_m(1)), kNearPost_m));
   return position_at(moved_forward(offset_right(arriving, 0.5 * lanes * kLaneWidth_m), kNearArm_m), kArmRise_m);
 }
@@ -37,7 +38,7 @@ SignalPosition far_side_between(const Layout& layout, const Node& node, int arm)
     nearest = std::min(nearest, std::abs(wrap_to_pi(node.arm(i).heading - forward)));
     max_lanes = std::max(max_lanes, layout.streets()[node.arm(i).street].lanes);
   }
-  return position_at(moved_forward({node.x, node.y, forward}, behind_kerb_m(max_lanes) / std::sin(nearest)));
+  return position_at(moved_forward({node.position_m, forward}, behind_kerb_m(max_lanes) / std::sin(nearest)));
 }
 
 /// Road coordinates of a point: its projection onto the reference line and its distance to the left.
@@ -53,9 +54,9 @@ RoadPosition project_onto(const opendrive::FileRoad& road, const SignalPosition&
     double s = road.length * start / kStarts;
     for (int step = 0; step < kSteps; ++step) {
       const opendrive::Pose pose = opendrive::pose_at(road, s);
-      const double dx = position.x - pose.x, dy = position.y - pose.y;
-      const double along = dx * std::cos(pose.heading) + dy * std::sin(pose.heading);
-      const double left = dy * std::cos(pose.heading) - dx * std::sin(pose.heading);
+      const Eigen::Vector2d apart = position.position_m - pose.position_m, forward = direction_of(pose.heading);
+      const double along = apart.dot(forward);
+      const double left = cross_of(forward, apart);
       if (std::abs(along) < kConverged_m && std::abs(left) < std::abs(best.t)) best = {s, left};
       s = std::clamp(s + along / std::max(0.2, 1 - pose.curvature * left), 0.0, road.length);
     }

@@ -45,7 +45,7 @@ class TownBuilder {
   /// The first roads are the streets, in their order.
   static RoadEnd end_of(const Arm& arm) { return {arm.street, arm.at_start}; }
   static Pose mouth_of(const Node& node, const Arm& arm) {
-    return moved_forward({node.x, node.y, arm.heading}, arm.mouth_m);
+    return moved_forward({node.position_m, arm.heading}, arm.mouth_m);
   }
 
   /// Adds a road with one section; the left side is ignored for one-way roads. Returns its index.

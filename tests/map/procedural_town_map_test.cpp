@@ -17,6 +17,7 @@
 #include "pictura/map/opendrive/opendrive.h"
 #include "pictura/map/procedural/procedural_town.h"
 #include "pictura/map/surface.h"
+#include "pictura/tests/map/town_options.h"
 
 namespace pictura {
 namespace {
@@ -68,9 +69,9 @@ class LaneSurface {
     for (const Lane& lane : map.lanes) {
       SurfaceBand& band = bands.emplace_back();
       along(map, lane, 1, [&](const LanePoint& pose) {
-        const auto add = [&](std::vector<Point3>* border, float left_m) {
+        const auto add = [&](std::vector<Eigen::Vector3d>* border, float left_m) {
           const Vec3 p = offset_left(pose, left_m);
-          border->push_back({static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)});
+          border->emplace_back(static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z));
         };
         add(&band.left, 0.5f * pose.width_m);
         add(&band.right, -0.5f * pose.width_m);
@@ -322,14 +323,6 @@ bool is_valid(const TownOptions& options) {
   return !testing::Test::HasFailure();
 }
 
-TownOptions options_of(uint64_t seed, int blocks_x, int blocks_y) {
-  TownOptions options;
-  options.seed = seed;
-  options.blocks_x = blocks_x;
-  options.blocks_y = blocks_y;
-  return options;
-}
-
 /// The number of seeds: PICTURA_TOWN_SEEDS, or fifty.
 uint64_t num_seeds() {
   const char* const requested = std::getenv("PICTURA_TOWN_SEEDS");
@@ -340,13 +333,13 @@ TEST(ProceduralTownMap, SmallTownsAreValid) {
   constexpr std::array<std::array<int, 2>, 5> kSizes{{{1, 1}, {1, 2}, {2, 2}, {3, 1}, {3, 3}}};
   for (uint64_t seed = 0; seed < num_seeds(); ++seed) {
     const auto& [x, y] = kSizes[seed % kSizes.size()];
-    if (!is_valid(options_of(seed, x, y))) return;
+    if (!is_valid(test::options_of(seed, x, y))) return;
   }
 }
 
 TEST(ProceduralTownMap, TownsWithRandomOptionsAreValid) {
   for (uint64_t seed = 0; seed < num_seeds() / 2; ++seed) {
-    TownOptions options = options_of(seed, 2, 2);
+    TownOptions options = test::options_of(seed, 2, 2);
     RandomStream stream({.seed = seed, .purpose = Purpose::town});
     for (const TownFeature& feature : town_features()) {
       const double value = feature.low + (feature.high - feature.low) * static_cast<double>(stream.uniform());
@@ -360,17 +353,17 @@ TEST(ProceduralTownMap, TownsWithOneFeatureAtItsMinimumOrMaximumAreValid) {
   uint64_t seed = 1000;
   for (const TownFeature& feature : town_features()) {
     for (const double value : {feature.low, feature.high}) {
-      TownOptions options = options_of(seed++, 3, 2);
+      TownOptions options = test::options_of(seed++, 3, 2);
       options.*feature.value = value;
       if (!is_valid(options)) return;
     }
   }
 }
 
-TEST(ProceduralTownMap, LargeTownsAreValid) { EXPECT_TRUE(is_valid(options_of(100, 7, 6))); }
+TEST(ProceduralTownMap, LargeTownsAreValid) { EXPECT_TRUE(is_valid(test::options_of(100, 7, 6))); }
 
 TEST(ProceduralTownMap, OverpassesHaveClearanceBelow) {
-  TownOptions options = options_of(4, 3, 3);
+  TownOptions options = test::options_of(4, 3, 3);
   options.hills_m = 0;
   const RoadMap map = parse_opendrive(procedural_town(options), "town");
   float min_clearance_m = 1e9f;

@@ -11,6 +11,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/tests/map/opendrive_text.h"
+#include "pictura/tests/map/town_options.h"
 #include "pictura/tests/support/error_message.h"
 
 namespace pictura {
@@ -23,17 +24,9 @@ using test::violated_rules;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-TownOptions options_of(uint64_t seed, int blocks_x, int blocks_y) {
-  TownOptions options;
-  options.seed = seed;
-  options.blocks_x = blocks_x;
-  options.blocks_y = blocks_y;
-  return options;
-}
-
 /// Options at their defaults, all at their minimum, all at their maximum, and each one at either end.
 std::vector<TownOptions> extremes(uint64_t seed) {
-  std::vector<TownOptions> all{options_of(seed, 3, 3)};
+  std::vector<TownOptions> all{test::options_of(seed, 3, 3)};
   TownOptions all_low = all[0], all_high = all[0];
   for (const TownFeature& feature : town_features()) {
     all_low.*feature.value = feature.low;
@@ -51,7 +44,8 @@ std::vector<TownOptions> extremes(uint64_t seed) {
 std::vector<TownOptions> many_towns() {
   std::vector<TownOptions> all;
   for (uint64_t seed = 0; seed < 20; ++seed) {
-    for (const auto& [x, y] : {std::pair{1, 1}, {1, 2}, {2, 2}, {3, 3}, {4, 2}}) all.push_back(options_of(seed, x, y));
+    for (const auto& [x, y] : {std::pair{1, 1}, {1, 2}, {2, 2}, {3, 3}, {4, 2}})
+      all.push_back(test::options_of(seed, x, y));
   }
   for (uint64_t seed = 0; seed < 3; ++seed) {
     for (const TownOptions& options : extremes(seed)) all.push_back(options);
@@ -155,7 +149,7 @@ void check_grades(const pugi::xml_node& road, double length, double* steepest) {
 TEST(ProceduralTownText, HillsAndRampsAreGentleAndSmooth) {
   double steepest = 0;
   for (uint64_t seed = 0; seed < 30; ++seed) {
-    TownOptions options = options_of(seed, 4, 4);
+    TownOptions options = test::options_of(seed, 4, 4);
     options.hills_m = 50;
     options.overpasses = 1;
     const OpenDriveText town(procedural_town(options));
@@ -171,12 +165,12 @@ TEST(ProceduralTownText, HillsAndRampsAreGentleAndSmooth) {
 TEST(ProceduralTownText, EqualOptionsGiveEqualBytesAndOthersDiffer) {
   std::set<std::string> texts;
   for (uint64_t seed = 0; seed < 20; ++seed) {
-    const std::string text = procedural_town(options_of(seed, 3, 2));
-    EXPECT_EQ(text, procedural_town(options_of(seed, 3, 2)));
+    const std::string text = procedural_town(test::options_of(seed, 3, 2));
+    EXPECT_EQ(text, procedural_town(test::options_of(seed, 3, 2)));
     texts.insert(text);
   }
   EXPECT_EQ(texts.size(), 20u);
-  EXPECT_NE(procedural_town(options_of(uint64_t{1} << 40, 2, 2)), procedural_town(options_of(0, 2, 2)));
+  EXPECT_NE(procedural_town(test::options_of(uint64_t{1} << 40, 2, 2)), procedural_town(test::options_of(0, 2, 2)));
 }
 
 // ---- effects of the options
@@ -222,7 +216,7 @@ Counts count(const TownOptions& options) {
 }
 
 Counts count_with(double TownOptions::* feature, double value) {
-  TownOptions options = options_of(5, 5, 5);
+  TownOptions options = test::options_of(5, 5, 5);
   options.*feature = value;
   return count(options);
 }
@@ -237,7 +231,7 @@ TEST(ProceduralTownOptions, NoFeatureAtZero) {
   EXPECT_EQ(count_with(&TownOptions::lights, 0).lights, 0);
   EXPECT_EQ(count_with(&TownOptions::max_lanes, 1).max_lanes, 1);
   EXPECT_EQ(count_with(&TownOptions::max_lanes, 2).max_lanes, 2);
-  TownOptions options = options_of(5, 5, 5);
+  TownOptions options = test::options_of(5, 5, 5);
   options.avenues = options.ring_road = 0;
   EXPECT_EQ(count(options).max_lanes, 1);
   options.hills_m = options.overpasses = 0;
@@ -255,7 +249,7 @@ TEST(ProceduralTownOptions, AtLeastOneOfAFeatureAboveZero) {
 }
 
 TEST(ProceduralTownOptions, MoreOfAFeatureWithALargerValue) {
-  const Counts usual = count(options_of(5, 5, 5));
+  const Counts usual = count(test::options_of(5, 5, 5));
   EXPECT_GT(count_with(&TownOptions::five_arms, 1).five_arms, usual.five_arms);
   EXPECT_GT(count_with(&TownOptions::roundabouts, 1).roundabouts, usual.roundabouts);
   EXPECT_GT(count_with(&TownOptions::slip_lanes, 1).slips, usual.slips);
@@ -270,7 +264,7 @@ TEST(ProceduralTownOptions, MoreOfAFeatureWithALargerValue) {
 }
 
 TEST(ProceduralTownOptions, RoundaboutsAndLightsEverywhere) {
-  TownOptions options = options_of(3, 4, 4);
+  TownOptions options = test::options_of(3, 4, 4);
   options.density = 1;
   options.avenues = options.ring_road = options.five_arms = options.overpasses = 0;
   options.roundabouts = 1;
@@ -285,7 +279,7 @@ TEST(ProceduralTownOptions, RoundaboutsAndLightsEverywhere) {
 
 TEST(ProceduralTownOptions, TheDefaultTownHasEverything) {
   for (uint64_t seed = 0; seed < 10; ++seed) {
-    const Counts counts = count(options_of(seed, 3, 3));
+    const Counts counts = count(test::options_of(seed, 3, 3));
     for (const int feature : {counts.roundabouts, counts.slips, counts.heights - 1, counts.crosswalks, counts.sidewalks,
                               counts.parking, counts.lights, counts.max_lanes - 1, counts.arcs, counts.five_arms}) {
       EXPECT_GT(feature, 0) << "seed " << seed;
@@ -298,7 +292,7 @@ TEST(ProceduralTownOptions, RejectsValuesOutOfRange) {
     return test::message_of<UsageError>([&] { procedural_town(options); });
   };
   for (const auto& [x, y] : {std::pair{0, 3}, {3, 0}, {33, 1}, {1, 33}, {-1, 2}}) {
-    EXPECT_THAT(message_of(options_of(0, x, y)),
+    EXPECT_THAT(message_of(test::options_of(0, x, y)),
                 HasSubstr(fmt::format("blocks: expected 1 to 32 each way, got {} x {}", x, y)));
   }
   for (const TownFeature& feature : town_features()) {
@@ -309,7 +303,7 @@ TEST(ProceduralTownOptions, RejectsValuesOutOfRange) {
                                                              feature.high, value)));
     }
   }
-  EXPECT_NO_THROW(procedural_town(options_of(0, 32, 1)));
+  EXPECT_NO_THROW(procedural_town(test::options_of(0, 32, 1)));
   TownOptions options;
   options.max_lanes = 1.5;
   EXPECT_THAT(message_of(options), HasSubstr("max-lanes: expected a whole number, got 1.5"));

@@ -18,8 +18,8 @@ SurfaceBand band_of(double x0, double y0, double heading, double length, double 
   const double c = std::cos(heading), s = std::sin(heading), half = 0.5 * width;
   for (int i = 0; i <= 10; ++i) {
     const double u = length * i / 10;
-    band.left.push_back({x0 + u * c - half * s, y0 + u * s + half * c, z});
-    band.right.push_back({x0 + u * c + half * s, y0 + u * s - half * c, z});
+    band.left.emplace_back(x0 + u * c - half * s, y0 + u * s + half * c, z);
+    band.right.emplace_back(x0 + u * c + half * s, y0 + u * s - half * c, z);
   }
   return band;
 }
