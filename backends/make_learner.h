@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "pictura/common/error.h"
 #include "pictura/common/scene_history.h"
 #include "pictura/training/rules/learner_executor.h"
 #include "pictura/training/rules/network_passes.h"

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pictura/common/error.h"
 #include "pictura/simulator/simulator.h"
 
 namespace pictura {

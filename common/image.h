@@ -10,6 +10,7 @@
 #include "pictura/common/camera.h"
 #include "pictura/common/color.h"
 #include "pictura/common/device.h"
+#include "pictura/common/error.h"
 #include "pictura/common/span.h"
 
 namespace pictura {

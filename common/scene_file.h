@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pictura/common/error.h"
 #include "pictura/common/renderer.h"
 
 namespace pictura {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "pictura/common/error.h"
 #include "pictura/map/road_map.h"
 
 namespace pictura {

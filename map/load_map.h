@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pictura/common/error.h"
 #include "pictura/map/opendrive/opendrive.h"
 #include "pictura/map/road_map.h"
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "pictura/common/error.h"
 #include "pictura/map/opendrive/opendrive.h"
 #include "pictura/map/road_map.h"
 

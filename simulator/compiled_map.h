@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "pictura/common/error.h"
 #include "pictura/common/scene.h"
 #include "pictura/map/road_map.h"
 #include "pictura/simulator/map_rules.h"

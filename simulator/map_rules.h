@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "pictura/common/error.h"
 #include "pictura/common/scene.h"
 #include "pictura/map/road_map.h"
 #include "pictura/simulator/rules/map_view.h"

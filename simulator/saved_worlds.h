@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "pictura/common/error.h"
 #include "pictura/simulator/simulator.h"
 
 namespace pictura {

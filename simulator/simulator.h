@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "pictura/common/array.h"
+#include "pictura/common/error.h"
 #include "pictura/common/scene.h"
 #include "pictura/simulator/actions.h"
 #include "pictura/simulator/command.h"

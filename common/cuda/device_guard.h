@@ -5,6 +5,7 @@
 
 #include "pictura/common/array.h"
 #include "pictura/common/cuda/check.h"
+#include "pictura/common/error.h"
 
 namespace pictura {
 

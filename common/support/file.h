@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "pictura/common/error.h"
+
 namespace pictura {
 
 /// The bytes of a file. Throws Error naming the path and the reason; refuses folders, files above max_bytes, and files

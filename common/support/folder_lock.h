@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include "pictura/common/error.h"
+
 namespace pictura {
 
 /// A lock on a folder for as long as this object and its process live, however the process ends: it is on the file

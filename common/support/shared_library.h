@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include "pictura/common/error.h"
+
 namespace pictura {
 
 /// A library opened for the rest of the process: drivers do not survive being unloaded.

@@ -10,6 +10,7 @@
 #include <toml++/toml.h>
 
 #include "pictura/common/camera.h"
+#include "pictura/common/error.h"
 #include "pictura/common/span.h"
 
 namespace pictura {

@@ -5,6 +5,7 @@
 
 #include <pugixml.hpp>
 
+#include "pictura/common/error.h"
 #include "pictura/map/opendrive/model.h"
 
 namespace pictura::opendrive {

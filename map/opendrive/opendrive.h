@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "pictura/common/error.h"
 #include "pictura/map/road_map.h"
 
 namespace pictura {

@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "pictura/common/error.h"
 #include "pictura/map/procedural/town_options.h"
 
 namespace pictura {

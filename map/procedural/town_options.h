@@ -5,6 +5,8 @@
 #include <string_view>
 #include <vector>
 
+#include "pictura/common/error.h"
+
 namespace pictura {
 
 /// Fractions lie in [0, 1]. A fraction of some elements selects at least one of them unless it is 0.

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pictura/common/error.h"
 #include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/simulator.h"
 

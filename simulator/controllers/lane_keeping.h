@@ -8,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "pictura/common/error.h"
 #include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/controllers/lane_path.h"
 #include "pictura/simulator/controllers/steering_search.h"

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "pictura/common/error.h"
 #include "pictura/map/lane_graph.h"
 #include "pictura/simulator/rules/goal.h"
 

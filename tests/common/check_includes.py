@@ -52,6 +52,13 @@ COMPILER_TESTS = re.compile(r"^(common/portable|tests|bench)/")
 WRITTEN = {"version.h", "commit.h", "map_fingerprint.h"}
 
 
+# Headers that users may include and that document an Error include it. Kernels include controller.h, and no nvcc
+# compiles error.h.
+ERROR_HEADER = "pictura/common/error.h"
+DOCUMENTS_ERRORS = re.compile(r"\b(Usage)?Error\b")
+MAY_THROW = re.compile(r"^(common|map|simulator|backends)/(?!error\.h|controllers/controller\.h).*\.h$")
+
+
 def folder_of(name: str) -> str | None:
     """The folder whose rule applies to a file, or None."""
     parts = name.split("/")[:-1]
@@ -73,7 +80,10 @@ def faults_in(root: pathlib.Path) -> list[str]:
                 faults.append(f"{name}:1: no rule for its folder")
             continue
         allowed = MAY_INCLUDE[folder]
-        for number, line in enumerate(path.read_text().splitlines(), 1):
+        text = path.read_text()
+        if MAY_THROW.match(name) and DOCUMENTS_ERRORS.search(text) and f'"{ERROR_HEADER}"' not in text:
+            faults.append(f"{name}:1: documents an Error: expected #include \"{ERROR_HEADER}\"")
+        for number, line in enumerate(text.splitlines(), 1):
             where = f"{name}:{number}:"
             if COMPILER_TEST.search(line) and not COMPILER_TESTS.match(name):
                 faults.append(f"{where} only common/portable/ may test for a compiler")
@@ -107,6 +117,8 @@ def self_test() -> None:
         "map/c.cpp": '#include "road_map.h"\n',
         "map/polyline.h": "#include <Eigen/Core>\n",
         "simulator/l.h": "#include <Eigen/Core>\n",
+        "simulator/m.h": "/// Throws UsageError.\nvoid f();\n",
+        "map/n.h": '#include "pictura/common/error.h"\n/// Throws Error.\nvoid f();\n',
         "map/d.cpp": "#ifdef __CUDACC__\n#endif\n",
         "common/portable/hd.h": "#ifdef __CUDACC__\n#endif\n",
         "backend_gl/f.cpp": "#include <GL/glcorearb.h>\n#include <cuda_runtime_api.h>\n",
@@ -119,7 +131,7 @@ def self_test() -> None:
         "tests/k.cpp": '#include "pictura/bench/render.h"\n',
     }
     expected = {"common/a.h", "backend_cpu/renderer/renderer.cpp", "backend_cpu/elsewhere.cpp", "simulator/b.cpp",
-                "simulator/h.cpp", "simulator/l.h", "map/c.cpp", "map/d.cpp", "backend_gl/f.cpp", "common/g.h", "apps/i.cpp", "bench/j.cpp"}
+                "simulator/h.cpp", "simulator/l.h", "simulator/m.h", "map/c.cpp", "map/d.cpp", "backend_gl/f.cpp", "common/g.h", "apps/i.cpp", "bench/j.cpp"}
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)
         for name, text in cases.items():
