@@ -662,7 +662,9 @@ class Ranks(CommandCase):
         return processes
 
     def test_a_rank_that_is_killed_or_stopped_ends_the_others_by_name(self):
-        for victim, how in ((1, signal.SIGKILL), (0, signal.SIGKILL), (1, signal.SIGSTOP)):
+        for victim, how in (
+            (1, signal.SIGKILL), (0, signal.SIGKILL), (1, signal.SIGSTOP), (0, signal.SIGSTOP),
+        ):  # fmt: skip
             out = self.folder / f"{victim}-{how}"
             processes = self.long_run(out)
             processes[victim].send_signal(how)

@@ -348,7 +348,7 @@ TEST(RanksLearn, AndNoticeWhenTheirPoliciesDifferByABit) {
                    "simulator.num_slots=6", "simulator.min_agents=3", "simulator.max_agents=3"});
   const std::vector<std::string> errors = run_ranks(2, [&](Ranks& ranks) {
     const std::unique_ptr<Communicator> communicator = make_communicator(&ranks, Device{});
-    const Run run(config, Device{}, communicator.get());
+    const pictura::Run run(config, Device{}, communicator.get());
     EXPECT_EQ(run.simulator->num_slots(), 3);
     run.check_ranks_agree();
     const NamedTensor& parameter = run.policy.parameters()[5];

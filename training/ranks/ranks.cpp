@@ -1,6 +1,7 @@
 #include "pictura/training/ranks/ranks.h"
 
 #include <chrono>
+#include <memory>
 #include <optional>
 #include <sstream>
 
@@ -91,7 +92,7 @@ void Ranks::join() {
     } while (!missing.empty() && Clock::now() < end);
     PICTURA_CHECK(missing.empty(), "rank {}: {} of {} ranks did not come to {} within {:.0f} s: {}", rank(),
                   missing.size(), size(), meeting, patience_.join_s, fmt::join(missing, ", "));
-    for (const auto& store : {store_, watch_store_}) store->setTimeout(kStoreTimeout);
+    store_->setTimeout(kStoreTimeout);
   } catch (const c10::Error& error) {
     fail("rank {}: lost {}: {}", rank(), meeting, first_line(error));
   }
@@ -135,7 +136,8 @@ void Ranks::find_lost() const {
 }
 
 void Ranks::announce(const std::string& why) noexcept {
-  if (size() == 1) return;
+  // Where one is lost the store may be, and the others know.
+  if (size() == 1 || is_lost_) return;
   try {
     store_->compareSet(kFault, "", fmt::format("rank {} ended: {}", rank(), why));
   } catch (const std::exception&) {
@@ -174,6 +176,50 @@ void Ranks::lose(const std::string& why) {
   changed_.notify_all();
 }
 
+namespace {
+
+// The exchange of beats through the store. A request to a store whose process was stopped never returns, so it has a
+// thread of its own, which is left behind then.
+struct Exchange {
+  std::mutex mutex;  // of all below
+  std::condition_variable changed;
+  Beat own;
+  bool ends = false, has_ended = false;
+  std::vector<std::vector<uint8_t>> values;  // of the last round; empty before the first
+  Clock::time_point last_round = Clock::now();
+  std::string error;  // why there are no more rounds
+
+  void run(c10d::Store* store, const std::string& own_key, const std::vector<std::string>& keys) {
+    std::unique_lock lock(mutex);
+    try {
+      while (!ends) {
+        ++own.number;
+        const std::string text = own.text();
+        lock.unlock();
+        store->set(own_key, text);
+        std::vector<std::vector<uint8_t>> all = store->multiGet(keys);
+        lock.lock();
+        values = std::move(all);
+        last_round = Clock::now();
+        changed.wait_for(lock, kBetweenBeats, [this] { return ends; });
+      }
+      own.has_left = true;
+      const std::string text = own.text();
+      lock.unlock();
+      store->set(own_key, text);
+      store->add("left", 1);
+      lock.lock();
+    } catch (const c10::Error& failed) {
+      if (!lock.owns_lock()) lock.lock();
+      error = first_line(failed);
+    }
+    has_ended = true;
+    changed.notify_all();
+  }
+};
+
+}  // namespace
+
 void Ranks::watch() {
   struct Seen {
     Beat beat;
@@ -184,26 +230,30 @@ void Ranks::watch() {
   Clock::time_point progressed = Clock::now();  // when the least number of steps changed
   std::vector<std::string> keys = keys_of_ranks("beat", size());
   keys.push_back(kFault);
-  const std::string own_key = keys[static_cast<size_t>(rank())];
+  const auto exchange = std::make_shared<Exchange>();
+  std::thread exchanges([exchange, keys, own_key = keys[static_cast<size_t>(rank())], store = watch_store_] {
+    exchange->run(store.get(), own_key, keys);
+  });
   const auto seconds_since = [](Clock::time_point time) {
     return std::chrono::duration<double>(Clock::now() - time).count();
   };
-  Beat own;
   // Why a rank is lost, as far as is known.
   const auto look = [&]() -> std::string {
     std::vector<std::vector<uint8_t>> values;
-    try {
-      ++own.number;
-      own.steps = steps_;
-      own.is_busy = busy_ > 0;
-      watch_store_->set(own_key, own.text());
-      values = watch_store_->multiGet(keys);
-    } catch (const c10::Error& error) {
-      return fmt::format(
-          "{}: {}:{}, where the ranks meet, cannot be reached: it was killed or stopped, or its host is "
-          "gone ({})",
-          launch_.is_served ? "the launcher" : "rank 0", launch_.address, launch_.port, first_line(error));
+    {
+      const std::lock_guard lock(exchange->mutex);
+      exchange->own.steps = steps_;
+      exchange->own.is_busy = busy_ > 0;
+      values = exchange->values;
+      if (!exchange->error.empty() || seconds_since(exchange->last_round) > patience_.silent_s) {
+        return fmt::format(
+            "{}: {}:{}, where the ranks meet, does not answer: it was killed or stopped, or its host is "
+            "gone{}{}",
+            launch_.is_served ? "the launcher" : "rank 0", launch_.address, launch_.port,
+            exchange->error.empty() ? "" : ": ", exchange->error);
+      }
     }
+    if (values.empty()) return "";
     if (const std::string fault(values.back().begin(), values.back().end());
         !fault.empty() && !fault.starts_with(fmt::format("rank {} ", rank()))) {
       return fault;
@@ -246,12 +296,17 @@ void Ranks::watch() {
     changed_.wait_for(lock, kBetweenBeats, [this] { return ends_; });
   }
   lock.unlock();
-  try {
-    own.has_left = true;
-    watch_store_->set(own_key, own.text());
-    watch_store_->add("left", 1);
-  } catch (const c10::Error&) {
-    // Nobody is there to be told.
+
+  std::unique_lock of_exchange(exchange->mutex);
+  exchange->ends = true;
+  exchange->changed.notify_all();
+  const bool has_ended =
+      exchange->changed.wait_for(of_exchange, 2 * kBetweenBeats, [&] { return exchange->has_ended; });
+  of_exchange.unlock();
+  if (has_ended || !is_lost_) {
+    exchanges.join();
+  } else {
+    exchanges.detach();
   }
 }
 
