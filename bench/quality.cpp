@@ -65,6 +65,16 @@ std::vector<float> composite_areas(ImageDrawer* drawer, std::size_t pixels) {
   return rgb;
 }
 
+// The oracle's faces of one image, ready to be drawn.
+ImageDrawer prepared_drawer(const StaticGeometryView& pieces, const SceneBatch& scene, const View& view,
+                            const Camera& camera, float line_floor_px) {
+  Rig rig;
+  rig.cameras = {camera};
+  ImageDrawer drawer;
+  drawer.prepare({&pieces, &scene, &view, place_camera(pinhole_cameras(rig)[0], view), line_floor_px, false});
+  return drawer;
+}
+
 MethodImages draw_all_methods(const StaticGeometry& geometry, const SceneBatch& scene, const View& view,
                               const Camera& camera, float line_floor_px) {
   auto trace = [&](TruthSamples samples) { return trace_image(geometry, scene, view, camera, line_floor_px, samples); };
@@ -75,10 +85,7 @@ MethodImages draw_all_methods(const StaticGeometry& geometry, const SceneBatch& 
                      {}};
   const StaticGeometryView pieces = geometry.view();
   const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
-  Rig rig;
-  rig.cameras = {camera};
-  ImageDrawer drawer;
-  drawer.prepare({&pieces, &scene, &view, place_camera(pinhole_cameras(rig)[0], view), line_floor_px, false});
+  ImageDrawer drawer = prepared_drawer(pieces, scene, view, camera, line_floor_px);
   drawn.oracle.resize(3 * pixels);
   drawer.draw({PixelFormat::f32, drawn.oracle.data()});
   drawn.area = composite_areas(&drawer, pixels);
@@ -111,6 +118,18 @@ Quality measure_quality(const StaticGeometry& geometry, const SceneBatch& scene,
     ++quality.images;
   }
   return quality;
+}
+
+PooledError measure_random_scene(RandomKind kind, uint64_t seed) {
+  const auto [town, config] = make_random_scene(kind, seed);
+  const SceneBatch scene = town.scene.batch();
+  const View& view = town.views.at(0);
+  const Camera& camera = config.rig.cameras.at(0);
+  const TruthImage truth = trace_image(town.geometry, scene, view, camera, config.line_floor_px);
+  const StaticGeometryView pieces = town.geometry.view();
+  std::vector<float> oracle(truth.rgb.size());
+  prepared_drawer(pieces, scene, view, camera, config.line_floor_px).draw({PixelFormat::f32, oracle.data()});
+  return {oracle, truth.rgb};
 }
 
 namespace {

@@ -8,6 +8,7 @@
 
 #include "pictura/bench/truth/image_scenes.h"
 #include "pictura/bench/truth/image_truth.h"
+#include "pictura/bench/truth/random_scenes.h"
 
 namespace pictura {
 
@@ -48,6 +49,9 @@ struct Quality {
 /// Draws all views with every camera of config.rig, on config.num_threads threads.
 Quality measure_quality(const StaticGeometry& geometry, const SceneBatch& scene, Span<const View> views,
                         const RendererConfig& config);
+
+/// Error of the CPU renderer against the truth in one random scene.
+PooledError measure_random_scene(RandomKind kind, uint64_t seed);
 
 /// Writes one picture with a row for each snapshot: of its first view's first camera the crop with the largest error
 /// of the simpler methods, in the truth, the oracle, area coverage, 2x2 samples and one sample, enlarged without

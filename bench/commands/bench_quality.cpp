@@ -1,5 +1,7 @@
 // `pictura bench quality`: PSNR of images against the truth, a ray caster with 1,024 samples a pixel, at the paper's
 // five sizes: of the oracle, of a z-buffer with one sample and 2x2 samples, and of exact coverage used as alpha.
+#include <algorithm>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -10,6 +12,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/raster/camera.h"
 #include "pictura/common/support/interrupt.h"
+#include "pictura/common/support/parallel_for.h"
 #include "pictura/map/load_map.h"
 
 namespace pictura {
@@ -22,6 +25,7 @@ struct Arguments {
   SnapshotOptions world{.views = 2};
   float line_floor_px = RendererConfig{}.line_floor_px;
   std::string figure;
+  int random = 0;
   bool json = false;
 };
 
@@ -37,7 +41,37 @@ std::vector<Snapshot> drive_all(const Arguments& arguments, ProgressLine* progre
   return snapshots;
 }
 
+// PSNR of each of the random scenes of each kind.
+void run_random(const Arguments& arguments) {
+  ProgressLine progress;
+  std::vector<BenchResult> results;
+  for (int kind = 0; kind < kNumRandomKinds; ++kind) {
+    const char* name = kRandomKindNames[kind];
+    std::vector<double> psnr_db(static_cast<std::size_t>(arguments.random));
+    parallel_for(resolve_num_threads(arguments.world.num_threads), arguments.random, [&](int64_t i) {
+      if (interrupted()) throw Interrupted("interrupted");
+      const auto seed = arguments.world.seed + static_cast<uint64_t>(i);
+      // Infinite where nothing is in the image.
+      constexpr double kMost_db = 99;
+      psnr_db[static_cast<std::size_t>(i)] =
+          std::min(measure_random_scene(static_cast<RandomKind>(kind), seed).psnr_db(), kMost_db);
+    });
+    progress.update(name);
+    const auto worst = std::min_element(psnr_db.begin(), psnr_db.end()) - psnr_db.begin();
+    results.push_back(
+        {fmt::format("{} (worst: seed {})", name, arguments.world.seed + static_cast<uint64_t>(worst)), "dB", psnr_db});
+  }
+  progress.finish();
+  report_benchmark(
+      arguments.json,
+      {fmt::format("quality: PSNR of the oracle against 1,024 samples a pixel, {} random scenes of each kind",
+                   arguments.random),
+       "cpu"},
+      results);
+}
+
 void run(Arguments arguments) {
+  if (arguments.random > 0) return run_random(arguments);
   if (arguments.maps.empty()) {
     arguments.maps = known_towns();
     arguments.maps.insert(arguments.maps.end(), {"procedural:1", "procedural:2"});
@@ -111,6 +145,10 @@ void add_quality_benchmark(CLI::App& bench) {
   command->add_option("--line-floor", arguments->line_floor_px, "Minimum width of a line on screen in pixels")
       ->check(finite_range(0, kGuardBand_px))
       ->capture_default_str();
+  command
+      ->add_option("--random", arguments->random,
+                   "Measure this many random scenes of each kind (bench/truth/random_scenes.h) instead, from --seed on")
+      ->check(CLI::PositiveNumber);
   command->add_option("--figure", arguments->figure, "Write crops of all methods to this PNG file");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer("Example:\n  pictura bench quality --map Town03 --size 96x54 --views 10 --figure quality.png");

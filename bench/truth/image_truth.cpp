@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "pictura/bench/truth/tolerances.h"
-#include "pictura/common/raster/check.h"
+#include "pictura/common/raster/shapes.h"
 
 namespace pictura {
 
@@ -63,10 +63,22 @@ struct Solid {
   }
 };
 
-// A strip as drawn: the cone of directions through its four corners, and its plane.
+// Depth at which a ray (x, y, 1) meets a triangle, or kFar.
+double triangle_depth(Point ray, Point a, Point b, Point c) {
+  const Point normal = cross(b - a, c - a);
+  const double depth = dot(normal, a) / dot(normal, ray);
+  const Point hit = ray * depth;
+  const bool is_inside = dot(normal, cross(b - a, hit - a)) >= 0 && dot(normal, cross(c - b, hit - b)) >= 0 &&
+                         dot(normal, cross(a - c, hit - c)) >= 0;
+  return is_inside ? depth : kFar;
+}
+
+// A strip as drawn: its four corners, the cone of directions through them, and the strip's plane.
 struct PaintedStrip {
-  Point edge_normal[4];  // inwards
-  Point plane;           // unit normal
+  Point corner[4];
+  Point edge_normal[4];       // inwards
+  bool crosses_near = false;  // the near plane: where it is drawn, each ray decides
+  Point plane;                // unit normal
   double offset = 0;
   double nearest_m = 0, farthest_m = 0;  // depths of its corners
   uint32_t rank = 0;
@@ -77,7 +89,10 @@ struct PaintedStrip {
     for (const Point& normal : edge_normal) {
       if (dot(normal, ray) < 0) return false;
     }
-    return true;
+    if (!crosses_near) return true;
+    const double first = triangle_depth(ray, corner[0], corner[1], corner[2]),
+                 second = triangle_depth(ray, corner[0], corner[2], corner[3]);
+    return (first >= kNear_m && first < kFar) || (second >= kNear_m && second < kFar);
   }
   // Depth of its plane; infinite beyond the horizon.
   double plane_depth(Point ray) const {
@@ -247,18 +262,34 @@ std::vector<int> solids_on(const Tracer& tracer, const Vec3* strip_corners, Poin
   return standing;
 }
 
-void add_strip(Tracer* tracer, const Eye& eye, const PinholeCamera& pinhole, const Cone& image, float floor_px,
+// Moves the sides of a strip apart until its width on screen, across its centre line, is floor_px at each end that is
+// in front of the near plane. Depths do not change. Corners: left and right of one end, right and left of the other.
+void widen(const Camera& camera, double floor_px, Point* corners) {
+  // The normal of the plane through the eye and the centre line, which is a line on screen with this normal.
+  const Point through_eye = cross(corners[0] + corners[1], corners[2] + corners[3]);
+  const double normal_x = through_eye.x / camera.focal_x_px, normal_y = through_eye.y / camera.focal_y_px;
+  const double size = std::hypot(normal_x, normal_y);
+  if (size == 0) return;
+  const double across_x = normal_x / size, across_y = normal_y / size;
+  for (const auto& [left, right] : {std::pair{&corners[0], &corners[1]}, std::pair{&corners[3], &corners[2]}}) {
+    if (left->z < kNear_m || right->z < kNear_m) continue;
+    const double width_px = across_x * camera.focal_x_px * (left->x / left->z - right->x / right->z) +
+                            across_y * camera.focal_y_px * (left->y / left->z - right->y / right->z);
+    const double push_px = std::copysign(0.5 * std::max(0.0, floor_px - std::abs(width_px)), width_px);
+    const Point push{push_px * across_x / camera.focal_x_px, push_px * across_y / camera.focal_y_px, 0};
+    *left = *left + push * left->z;
+    *right = *right - push * right->z;
+  }
+}
+
+void add_strip(Tracer* tracer, const Eye& eye, const Camera& camera, const Cone& image, float floor_px,
                const Strip& strip, uint32_t index) {
   Vec3 world[4];
   strip_corners(strip, world);
   Point corners[4];
-  Vec3 widened[4];
-  for (int i = 0; i < 4; ++i) {
-    corners[i] = eye(point(world[i]));
-    widened[i] = {static_cast<float>(corners[i].x), static_cast<float>(corners[i].y), static_cast<float>(corners[i].z)};
-  }
+  for (int i = 0; i < 4; ++i) corners[i] = eye(point(world[i]));
   const double fade = brightness(corners, 4);
-  if (fade <= 0 || !widen_strip(pinhole, floor_px, widened)) return;
+  if (fade <= 0) return;
   PaintedStrip painted;
   painted.plane = cross(corners[2] - corners[0], corners[3] - corners[1]);
   painted.plane = painted.plane * (1 / std::max(1e-30, std::sqrt(dot(painted.plane, painted.plane))));
@@ -266,15 +297,18 @@ void add_strip(Tracer* tracer, const Eye& eye, const PinholeCamera& pinhole, con
   painted.class_id = static_cast<uint8_t>(kClassOfStrip + static_cast<int>(strip.kind));
   painted.rank = static_cast<uint32_t>(strip_rank(strip.kind)) << 28 | index;
   painted.color = strip.color * static_cast<float>(fade);
-  Point as_drawn[4];
-  for (int i = 0; i < 4; ++i) as_drawn[i] = point(widened[i]);
-  const double side = dot(cross(as_drawn[2] - as_drawn[0], as_drawn[3] - as_drawn[1]), as_drawn[0]) > 0 ? 1 : -1;
-  for (int i = 0; i < 4; ++i) painted.edge_normal[i] = cross(as_drawn[i], as_drawn[(i + 1) % 4]) * side;
+  widen(camera, floor_px, corners);
+  std::copy(corners, corners + 4, painted.corner);
+  auto by_depth = [](Point a, Point b) { return a.z < b.z; };
+  const auto [nearest, farthest] = std::minmax_element(corners, corners + 4, by_depth);
+  if (farthest->z < kNear_m) return;
+  painted.crosses_near = nearest->z < kNear_m;
+  painted.nearest_m = std::max(nearest->z, double{kNear_m});
+  painted.farthest_m = farthest->z;
+  const double side = dot(cross(corners[2] - corners[0], corners[3] - corners[1]), corners[0]) > 0 ? 1 : -1;
+  for (int i = 0; i < 4; ++i) painted.edge_normal[i] = cross(corners[i], corners[(i + 1) % 4]) * side;
   if (!image.may_intersect(painted)) return;
   painted.carries = solids_on(*tracer, world, eye.position());
-  auto by_depth = [](Point a, Point b) { return a.z < b.z; };
-  painted.nearest_m = std::min_element(as_drawn, as_drawn + 4, by_depth)->z;
-  painted.farthest_m = std::max_element(as_drawn, as_drawn + 4, by_depth)->z;
   tracer->strips.push_back(painted);
 }
 
@@ -374,11 +408,8 @@ class ImageSampler {
         add_light(&tracer_, eye, head, scene.light_states[lights + static_cast<std::size_t>(head.signal)]);
       }
     }
-    Rig rig;
-    rig.cameras = {camera};
-    const PinholeCamera pinhole = pinhole_cameras(rig)[0];
     for (std::size_t i = 0; i < geometry.strips.size(); ++i) {
-      add_strip(&tracer_, eye, pinhole, whole_, line_floor_px, geometry.strips[i], static_cast<uint32_t>(i));
+      add_strip(&tracer_, eye, camera, whole_, line_floor_px, geometry.strips[i], static_cast<uint32_t>(i));
     }
   }
 

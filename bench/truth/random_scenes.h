@@ -1,0 +1,33 @@
+// Random small scenes in which two surfaces are nearly equally far, or a rule of drawing has an exception: one kind for
+// each such rule. `pictura bench quality --random` and tests measure the oracle on them.
+#pragma once
+
+#include <iterator>
+
+#include "pictura/bench/truth/image_scenes.h"
+
+namespace pictura {
+
+enum class RandomKind {
+  near_plane,          // strips that cross the near plane, beside and below an eye close to the road
+  bridge_from_below,   // cars and walls on the strips of a bridge or a ramp, seen from the road below
+  crashed_boxes,       // boxes driven into each other, with faces in one plane
+  intersecting_walls,  // walls that cross each other, partly behind boxes
+  wide_strips,         // strips widened by 2 to 8 px up to the horizon and beyond
+  walls_on_strips,     // walls whose foot is up to 40 cm below the strips that they stand on
+  level_edges,         // level edges of walls and boxes, one close above the other
+};
+constexpr const char* kRandomKindNames[] = {
+    "strips across the near plane", "bridges from below", "crashed boxes", "intersecting walls",
+    "strips wider than 2 px",       "walls on strips",    "level edges"};
+constexpr int kNumRandomKinds = static_cast<int>(std::size(kRandomKindNames));
+
+/// A scene with one view, and how it is drawn: by one camera of the paper's size and focal length in the view's origin.
+struct RandomScene {
+  SyntheticTown town;
+  RendererConfig config;
+};
+/// Depends on its arguments alone.
+RandomScene make_random_scene(RandomKind kind, uint64_t seed);
+
+}  // namespace pictura
