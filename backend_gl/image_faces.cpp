@@ -53,7 +53,7 @@ void ImageFaces::build(const ImageSetting& setting, const StaticGeometryView& ge
     auto emit_strip = [&](const CameraFace& face) {
       Vec3 corners[4];
       std::copy_n(face.corners, 4, corners);
-      if (!widen_strip(setting.camera, face.floor_px, corners)) return;
+      if (face.floor_px > 0) widen_strip(setting.camera, face.floor_px, corners);
       add(corners, 4, compared_plane(face.plane, setting.camera, order), face.color);
     };
     strip_faces(*strips_[i].strip, setting.camera, setting.line_floor_px, emit_strip);

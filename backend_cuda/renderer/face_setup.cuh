@@ -204,8 +204,8 @@ __device__ inline bool clip_quads(const FaceSetupContext* contexts, ClipShared* 
   Quad& quad = *quad_out;
   int kept = 0;
   auto strip_of = [&](int32_t index) { return context.strips[index]; };
-  if (is_active && make_quad(context, primitive.entry, &quad, strip_of) &&
-      (quad.floor_px <= 0.0f || widen_strip(camera, quad.floor_px, quad.in_camera.corner))) {
+  if (is_active && make_quad(context, primitive.entry, &quad, strip_of)) {
+    if (quad.floor_px > 0.0f) widen_strip(camera, quad.floor_px, quad.in_camera.corner);
     const Frustum frustum = context.setting.frustum;
     for (int i = 0; i < 4; ++i) corners.set(i, quad.in_camera.corner[i]);
     kept = clip(frustum, planes_crossed(frustum, quad.in_camera.corner, 4), corners);

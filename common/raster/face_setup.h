@@ -92,7 +92,7 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primi
   } else {
     Vec3 corners[kMaxFaceCorners], polygon[kMaxPolygonCorners];
     for (int i = 0; i < face.count; ++i) corners[i] = face.corners[i];
-    if (face.floor_px > 0.0f && !widen_strip(setting.camera, face.floor_px, corners)) return false;
+    if (face.floor_px > 0.0f) widen_strip(setting.camera, face.floor_px, corners);
     const int kept = clip_face(setting.frustum, corners, face.count, polygon);
     if (kept < 3) return false;
     edge_begin = pool.take(kept);

@@ -232,17 +232,19 @@ struct Widening {
   }
 };
 
-/// The widening of a strip whose centre line runs from a to b, in camera coordinates and in front of the near plane;
-/// both may be scaled by the same factor.
+/// The widening of a strip whose centre line runs from a to b, in camera coordinates; both may be scaled by the same
+/// factor. One of them may be behind the camera: the line on screen is the same, and its direction does not matter.
 PICTURA_HD inline Widening widening_of(const PinholeCamera& camera, float floor_px, Vec3 a, Vec3 b) {
   // The direction on screen, times the product of both depths.
   const Vec2 ahead{camera.focal_x_px * (b.x * a.z - a.x * b.z), camera.focal_y_px * (b.y * a.z - a.y * b.z)};
-  const float length2 = dot(ahead, ahead), min_length = 1e-6f * (a.z * b.z);
+  constexpr float kLeast = 1e-12f;  // its square has a reciprocal
+  const float length2 = dot(ahead, ahead), min_length = max_no_nan(1e-6f * fabsf(a.z * b.z), kLeast);
   if (!(length2 > min_length * min_length)) return {};
   return {left_normal(ahead) * sqrt_in_range(reciprocal_in_range(length2)), floor_px};
 }
 
-/// Moves the two corners of one end of a strip apart until it has its minimum width on screen. Depths do not change.
+/// Moves the two corners of one end of a strip apart until it has its minimum width on screen, unless one of them is
+/// before the near plane. Depths do not change.
 PICTURA_HD inline void widen_strip_end(const PinholeCamera& camera, const Widening& widening, Vec3* left, Vec3* right) {
   if (left->z < kNear_m || right->z < kNear_m) return;
   const float of_left = reciprocal_in_range(left->z), of_right = reciprocal_in_range(right->z);
@@ -256,36 +258,11 @@ PICTURA_HD inline void widen_strip_end(const PinholeCamera& camera, const Wideni
   right->y -= push.y * right->z;
 }
 
-/// Widens a strip to its minimum width on screen; `corners` are in camera coordinates. The part of its centre line
-/// behind the near plane is cut off first, so that the width is measured where the strip is visible. False if nothing
-/// is left.
-PICTURA_HD inline bool widen_strip(const PinholeCamera& camera, float floor_px, Vec3* corners) {
-  Vec3 a = (corners[0] + corners[1]) * 0.5f, b = (corners[3] + corners[2]) * 0.5f;
-  if (a.z < kNear_m && b.z < kNear_m) {
-    // Only a corner may still be in front of the near plane, and there the strip needs no widening.
-    return corners[0].z > kNear_m || corners[1].z > kNear_m || corners[2].z > kNear_m || corners[3].z > kNear_m;
-  }
-  if (floor_px <= 0.0f) return true;
-  // Cut the centre line at the near plane.
-  const float a_in = a.z - kNear_m, b_in = b.z - kNear_m;
-  const bool cut_a = a_in < 0.0f, cut_b = b_in < 0.0f;
-  if (cut_a || cut_b) {
-    const float t = (cut_a ? a_in : b_in) * reciprocal_in_range(cut_a ? a_in - b_in : b_in - a_in);
-    const Vec3 left = (corners[3] - corners[0]) * t, right = (corners[2] - corners[1]) * t, middle = (b - a) * t;
-    if (cut_a) {
-      corners[0] = corners[0] + left;
-      corners[1] = corners[1] + right;
-      a = a + middle;
-    } else {
-      corners[3] = corners[3] - left;
-      corners[2] = corners[2] - right;
-      b = b - middle;
-    }
-  }
-  const Widening widening = widening_of(camera, floor_px, a, b);
-  if (!cut_a) widen_strip_end(camera, widening, &corners[0], &corners[1]);
-  if (!cut_b) widen_strip_end(camera, widening, &corners[3], &corners[2]);
-  return true;
+/// Widens a strip to its minimum width on screen; `corners` are in camera coordinates and not yet clipped.
+PICTURA_HD inline void widen_strip(const PinholeCamera& camera, float floor_px, Vec3* corners) {
+  const Widening widening = widening_of(camera, floor_px, corners[0] + corners[1], corners[3] + corners[2]);
+  widen_strip_end(camera, widening, &corners[0], &corners[1]);
+  widen_strip_end(camera, widening, &corners[3], &corners[2]);
 }
 
 PICTURA_HD inline WorldQuad strip_quad(const Strip& strip) {

@@ -122,6 +122,23 @@ TEST(CpuRenderer, TheFloorIsMeasuredAcrossTheStripOnScreen) {
   EXPECT_NEAR(covered, 0.35f, 1e-3);
 }
 
+TEST(CpuRenderer, StripsAreClippedWhereTheyCrossTheNearPlaneNotTheirCentreLines) {
+  // An eye 3 cm above a mark 2 m wide that passes it at 45 degrees: its centre line crosses the near plane 1.1 m to the
+  // left. Straight ahead the mark reaches from behind the near plane, 15 px below the centre, to 0.41 m ahead.
+  StaticGeometry geometry;
+  add_polyline(&geometry, {{-2, -1, 0}, {2, 3, 0}}, 2.0f, StripKind::stop_line);
+  geometry.build_grids();
+  for (const float floor_px : {0.0f, 0.35f}) {
+    const Drawn image = draw(geometry, scene_of({}), {make_view({0, 0, -1.47f}, 0)},
+                             {.rig = simple_rig(), .num_threads = 1, .line_floor_px = floor_px});
+    // Its two corners ahead are 2.71 and 1.29 m away.
+    const Rgb color = kStopLineColor * (1 - 1.0f / 120);
+    for (const int y : {54, 60, 64}) expect_color(image.at(50, y), color, 1e-4f);
+    expect_color(image.at(50, 52), {});
+    expect_color(image.at(50, 66), {});
+  }
+}
+
 TEST(CpuRenderer, LightsShowTheirStateOnlyToTheFront) {
   StaticGeometry geometry = no_geometry();
   LightHead head;
