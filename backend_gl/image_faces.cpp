@@ -11,7 +11,8 @@ namespace {
 // Strips of one level are nearly coplanar, and rank decides which is in front. Each is therefore depth-tested with an
 // offset away from the camera that grows with its rank: seen from above by up to kMaxPush_m, several times the distance
 // between strips of one level and little compared with that between two levels of road. Seen from below, objects on a
-// strip are just behind it and must stay behind: by up to kMaxPushShare of the distance of its plane.
+// strip are behind it or in its plane, and must be behind: there strips come nearer, by one to two times kMaxPushShare
+// of the distance of their planes.
 constexpr float kMaxPush_m = 4 * kSameLevel_m, kMaxPushShare = 0.01f;
 
 // The plane whose depth is tested for a strip of rank `order`, 0 to 1, among those of the image. Below the camera it is
@@ -21,7 +22,7 @@ Vec3 compared_plane(const FacePlane& plane, const PinholeCamera& camera, float o
   const float above = dot(plane.normal, up);  // also the scale of the offset: above * height of the plane
   const bool camera_above = plane.offset * above <= 0.0f;
   const float offset = camera_above ? plane.offset - (kStanding_m + order * kMaxPush_m) * above
-                                    : plane.offset * (1.0f + order * kMaxPushShare);
+                                    : plane.offset * (1.0f - (2.0f - order) * kMaxPushShare);
   return offset == 0.0f ? Vec3{} : plane.normal * (1.0f / offset);
 }
 

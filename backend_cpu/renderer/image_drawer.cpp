@@ -80,7 +80,7 @@ void ImageDrawer::find_occluders() {
 bool ImageDrawer::stands(uint32_t solid, uint32_t strip) const {
   const StaticGeometryView& pieces = *request_.geometry;
   const AgentBox* agents = request_.scene->agents.data() + world_begin();
-  return stands_on(extent_of(solid, pieces, agents), extent_of(strip, pieces, agents), setting_.camera.position_m);
+  return stands_on(extent_of(solid, pieces, agents), extent_of(strip, pieces, agents));
 }
 
 // Calls visit(y, pixel, span) for each row of a face within `rows`; pixel is the index of the row's first pixel.
@@ -257,22 +257,22 @@ void ImageDrawer::visit_fragments(const std::function<void(int, const PixelCover
 void ImageDrawer::draw_planes(const ImageTarget& target) const {
   const int width = setting_.camera.width_px, height = setting_.camera.height_px;
   std::vector<FrontFace> fronts(static_cast<std::size_t>(width));
-  auto offer = [&](int y, bool strips_again) {
+  auto offer = [&](int y, bool is_again) {
     for (const ScreenFace& face : faces_) {
-      if (y < face.box.y_begin || y >= face.box.y_end || (strips_again && !is_strip(face))) continue;
+      if (y < face.box.y_begin || y >= face.box.y_end) continue;
       for (int x = face.box.x_begin; x < face.box.x_end; ++x) {
         const Vec2 center = pixel_center(x, y);
         FrontFace& front = fronts[static_cast<std::size_t>(x)];
-        if (strips_again && !front.wants_strips_again()) continue;
+        if (is_again && !front.wants_again()) continue;
         if (!covers_point(edges_.at(face.edge_begin), face.edge_count, center.x, center.y)) continue;
-        strips_again ? front.offer_again(face, center) : front.offer(face, center);
+        is_again ? front.offer_again(face, center) : front.offer(face, center);
       }
     }
   };
   for (int y = 0; y < height; ++y) {
     std::fill(fronts.begin(), fronts.end(), FrontFace{});
-    offer(y, /*strips_again=*/false);
-    offer(y, /*strips_again=*/true);
+    offer(y, /*is_again=*/false);
+    offer(y, /*is_again=*/true);
     for (int x = 0; x < width; ++x) {
       const Vec2 center = pixel_center(x, y);
       const ScreenFace* face = fronts[static_cast<std::size_t>(x)].front(

@@ -144,8 +144,8 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
   ScreenQuad on_screen;
   bool is_clockwise = false;
   const ClipClass clip_class = project_quad(camera, quad.in_camera.corner, quad.floor_px, &on_screen);
-  const bool passes_culling =
-                 is_quad_visible(context.setting, on_screen, quad.in_camera.color, quad.primitive, &is_clockwise),
+  const bool passes_culling = is_quad_visible(context.setting, on_screen, quad.in_camera.plane, quad.in_camera.color,
+                                              quad.primitive, &is_clockwise),
              is_wanted = is_quad && is_not_black;
   const bool is_visible = is_wanted && clip_class == ClipClass::inside && passes_culling,
              is_clipped = is_wanted && clip_class == ClipClass::crossing;
@@ -413,7 +413,7 @@ __device__ inline void find_occluders(FaceSetupContext* context, const uint32_t*
 
 // The description of an image for drawing.
 __device__ inline PreparedImage image_of(const BlockState& state, int32_t face_begin, int32_t face_count) {
-  return {state.view.geometry, state.context.agents, state.context.setting.camera.position_m, face_begin, face_count};
+  return {state.view.geometry, state.context.agents, face_begin, face_count};
 }
 
 /// Memory in which a block sets up an image of its own.

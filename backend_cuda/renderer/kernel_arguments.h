@@ -106,12 +106,12 @@ constexpr int32_t kNotPrepared = -(1 << 30);
 /// words, so it has no padding.
 struct PreparedImage {
   const DeviceGeometry* geometry = nullptr;
-  const AgentBox* agents = nullptr;  // of its world
-  Vec3 eye_m;
+  const AgentBox* agents = nullptr;        // of its world
   int32_t face_begin = 0, face_count = 0;  // face_count: or kNotPrepared
   int32_t has_overflowed = 0;              // 1: exceeded a block's memory while it was drawn
+  int32_t filler = 0;                      // up to whole words
 };
-static_assert(sizeof(PreparedImage) == 2 * sizeof(void*) + 6 * sizeof(int32_t));
+static_assert(sizeof(PreparedImage) == 2 * sizeof(void*) + 4 * sizeof(int32_t));
 
 /// A face of four corners and its primitive.
 struct alignas(16) Quad {

@@ -9,7 +9,7 @@ namespace pictura::cuda {
 __device__ __noinline__ inline bool stands(uint32_t solid, uint32_t strip) {
   const PreparedImage& image = block_state()->current;
   const StaticGeometryView& pieces = image.geometry->pieces;
-  return stands_on(extent_of(solid, pieces, image.agents), extent_of(strip, pieces, image.agents), image.eye_m);
+  return stands_on(extent_of(solid, pieces, image.agents), extent_of(strip, pieces, image.agents));
 }
 
 // Removes samples from those of a fragment that are visible.

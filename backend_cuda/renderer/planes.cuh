@@ -29,9 +29,8 @@ __device__ __noinline__ void draw_planes(CameraPlanes planes, int width_px, int6
     if (x >= part.x_end) continue;
     const Vec2 center = pixel_center(x, y);
     FrontFace front;
-    auto each = [&](auto&& is_wanted, auto&& take) {
+    auto each = [&](auto&& take) {
       auto ask = [&](const ScreenFace& face) {
-        if (!is_wanted(face)) return;
         if (x < face.box.x_begin || x >= face.box.x_end || y < face.box.y_begin || y >= face.box.y_end) return;
         if (covers_point(memory.edges + face.edge_begin, face.edge_count, center.x, center.y)) take(face);
       };
@@ -45,11 +44,8 @@ __device__ __noinline__ void draw_planes(CameraPlanes planes, int width_px, int6
         for (int i = 0; i < num_faces; ++i) ask(memory.faces[i]);
       }
     };
-    each([](const ScreenFace&) { return true; }, [&](const ScreenFace& face) { front.offer(face, center); });
-    if (front.wants_strips_again()) {
-      each([](const ScreenFace& face) { return is_strip(face); },
-           [&](const ScreenFace& face) { front.offer_again(face, center); });
-    }
+    each([&](const ScreenFace& face) { front.offer(face, center); });
+    if (front.wants_again()) each([&](const ScreenFace& face) { front.offer_again(face, center); });
     const ScreenFace* face = front.front(center, [](uint32_t solid, uint32_t strip) { return stands(solid, strip); });
     const int64_t at = first_pixel + static_cast<int64_t>(y) * width_px + x;
     const float infinity = __uint_as_float(0x7F800000u);

@@ -84,7 +84,11 @@ struct PaintedStrip {
   uint32_t rank = 0;
   uint8_t class_id = 0;
   Rgb color;
+  bool from_below = false;   // the eye is below its plane
   std::vector<int> carries;  // indices of the solids on it
+  bool carries_solid_of(const Facet& facet) const {
+    return std::find(carries.begin(), carries.end(), facet.solid) != carries.end();
+  }
   bool covers(Point ray) const {
     for (const Point& normal : edge_normal) {
       if (dot(normal, ray) < 0) return false;
@@ -244,17 +248,18 @@ bool overlap_on_ground(const std::vector<Point>& a, const std::vector<Point>& b)
   return true;
 }
 
-// Solids whose footprint overlaps the strip and whose footprint's centre is at most kStanding_m above or below the
-// strip's plane; none if the strip is seen from below.
-std::vector<int> solids_on(const Tracer& tracer, const Vec3* strip_corners, Point eye) {
-  std::vector<Point> outline;
-  for (int i = 0; i < 4; ++i) outline.push_back(point(strip_corners[i]));
+// Height of a point above the plane of an outline, along z.
+double height_above(const std::vector<Point>& outline, Point p) {
   const Point normal = cross(outline[2] - outline[0], outline[3] - outline[1]);
-  if (normal.z == 0 || dot(normal, eye - outline[0]) / normal.z <= 0) return {};
+  return dot(normal, p - outline[0]) / normal.z;
+}
+
+// Solids whose footprint overlaps the strip and whose footprint's centre is at most kStanding_m above or below the
+// strip's plane.
+std::vector<int> solids_on(const Tracer& tracer, const std::vector<Point>& outline) {
   std::vector<int> standing;
   for (std::size_t i = 0; i < tracer.solids.size(); ++i) {
-    const Point above = tracer.solids[i].middle() - outline[0];
-    const double height_m = dot(normal, above) / normal.z;
+    const double height_m = height_above(outline, tracer.solids[i].middle());
     if (std::abs(height_m) <= kStanding_m && overlap_on_ground(tracer.solids[i].footprint, outline)) {
       standing.push_back(static_cast<int>(i));
     }
@@ -308,7 +313,10 @@ void add_strip(Tracer* tracer, const Eye& eye, const Camera& camera, const Cone&
   const double side = dot(cross(corners[2] - corners[0], corners[3] - corners[1]), corners[0]) > 0 ? 1 : -1;
   for (int i = 0; i < 4; ++i) painted.edge_normal[i] = cross(corners[i], corners[(i + 1) % 4]) * side;
   if (!image.may_intersect(painted)) return;
-  painted.carries = solids_on(*tracer, world, eye.position());
+  std::vector<Point> outline;
+  for (const Vec3& corner : world) outline.push_back(point(corner));
+  painted.from_below = height_above(outline, eye.position()) < 0;
+  painted.carries = solids_on(*tracer, outline);
   tracer->strips.push_back(painted);
 }
 
@@ -344,14 +352,33 @@ struct Surface {
   double depth = kFar;
 };
 
-// The nearest surface: the facet or strip of least depth, but of strips whose planes are within kSameLevel_m of each
-// other there the one of lowest rank, and never a strip before a solid on it.
-Surface first_hit(const Candidates& candidates, Point ray) {
+bool are_equal(double depth, double other) { return std::abs(depth - other) < kEqualDepth * std::min(depth, other); }
+
+// The nearest solid; of equally near ones the first.
+Surface first_solid(const Candidates& candidates, Point ray) {
   Surface front;
+  bool is_tie = false;
   for (const Facet* facet : candidates.facets) {
     const double at = facet->hit(ray);
+    if (at == kFar) continue;
+    is_tie |= front.facet && are_equal(at, front.depth);
     if (at < front.depth) front = {&facet->color, facet, nullptr, at};
   }
+  if (!is_tie) return front;
+  const double nearest = front.depth;
+  for (const Facet* facet : candidates.facets) {
+    const double at = facet->hit(ray);
+    if (at < kFar && are_equal(at, nearest) && facet->solid < front.facet->solid) {
+      front = {&facet->color, facet, nullptr, at};
+    }
+  }
+  return front;
+}
+
+// The nearest surface: the solid or strip of least depth, but of strips whose planes are within kSameLevel_m of each
+// other there the one of lowest rank, and a strip is behind the solids on it seen from above, before them from below.
+Surface first_hit(const Candidates& candidates, Point ray) {
+  Surface front = first_solid(candidates, ray);
   const PaintedStrip* painted = nullptr;
   double painted_depth = kFar, painted_plane = kFar;
   for (const PaintedStrip* strip : candidates.strips) {
@@ -359,7 +386,7 @@ Surface first_hit(const Candidates& candidates, Point ray) {
     const double plane = strip->plane_depth(ray),
                  at = std::clamp(plane, strip->nearest_m / kWidenedDepth, strip->farthest_m * kWidenedDepth);
     if (at < kNear_m) continue;
-    if (front.facet && std::count(strip->carries.begin(), strip->carries.end(), front.facet->solid)) continue;
+    if (front.facet && !strip->from_below && strip->carries_solid_of(*front.facet)) continue;
     bool comes_first = !painted || at < painted_depth;
     if (painted && std::max(plane, painted_plane) < kFar) {
       const double gap_m =
@@ -372,7 +399,9 @@ Surface first_hit(const Candidates& candidates, Point ray) {
       painted_plane = plane;
     }
   }
-  if (painted && (!front.facet || painted_depth < front.depth)) {
+  if (!painted) return front;
+  const bool is_nearer = painted_depth < front.depth && !are_equal(painted_depth, front.depth);
+  if (!front.facet || is_nearer || (painted->from_below && painted->carries_solid_of(*front.facet))) {
     front = {&painted->color, nullptr, painted, std::clamp(painted_depth, painted->nearest_m, painted->farthest_m)};
   }
   return front;

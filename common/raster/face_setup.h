@@ -55,10 +55,11 @@ PICTURA_HD inline float min_area_of(Rgb color, PrimitiveRef primitive) {
 }
 
 /// Whether a face that needs no clipping is large enough and not behind an occluder. Sets its winding.
-PICTURA_HD inline bool is_quad_visible(const ImageSetting& setting, const ScreenQuad& quad, Rgb color,
-                                       PrimitiveRef primitive, bool* is_clockwise_out) {
+PICTURA_HD inline bool is_quad_visible(const ImageSetting& setting, const ScreenQuad& quad, const FacePlane& plane,
+                                       Rgb color, PrimitiveRef primitive, bool* is_clockwise_out) {
+  const bool is_from_below = kind_of(primitive.object_id) == kStripKind && plane.offset > 0.0f;
   return find_winding(quad, 2.0f * min_area_of(color, primitive), is_clockwise_out) &&
-         !setting.occluders.occludes(setting.camera, quad.bounds);
+         (is_from_below || !setting.occluders.occludes(setting.camera, quad.bounds));
 }
 
 /// Completes a face with the fields that make_screen_face and make_quad_face leave unset.
@@ -85,7 +86,7 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primi
   if (clip_class == ClipClass::outside) return false;
   if (clip_class == ClipClass::inside) {
     bool is_clockwise = false;
-    if (!is_quad_visible(setting, quad, face.color, primitive, &is_clockwise)) return false;
+    if (!is_quad_visible(setting, quad, face.plane, face.color, primitive, &is_clockwise)) return false;
     edge_begin = pool.take(4);
     if (edge_begin < 0) return false;
     make_quad_face(setting.camera, setting.frustum, quad, is_clockwise, face.plane, face.color, store_edge, face_out);
@@ -106,27 +107,37 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primi
 }
 
 /// The front surface at a screen point: faces that cover it are offered in any order, and front() returns the one in
-/// front of all, or null. Strips on the level of the nearest strip that rank before it replace it, and it is behind a
-/// solid that stands on it.
+/// front of all, or null. Solids that are as near as the nearest one and strips on the level of the nearest strip
+/// replace it if their object ids are lower; the order of the two is that of is_in_front().
 class FrontFace {
  public:
   PICTURA_HD void offer(const ScreenFace& face, Vec2 at_px) {
-    const ScreenFace*& best = is_strip(face) ? strip_ : solid_;
-    if (!best || nearer(face, *best, at_px)) best = &face;
-    num_strips_ += is_strip(face) ? 1 : 0;
+    const bool is_of_strip = is_strip(face);
+    const ScreenFace*& best = is_of_strip ? strip_ : solid_;
+    const ScreenFace* const before = best;
+    if (!before || nearer(face, *before, at_px)) best = &face;
+    wants_again_ = wants_again_ || (before && (is_of_strip || are_equally_near(face, *before, at_px)));
   }
-  /// Whether all strips must be offered once more, after all faces have been, because several may be on one level.
-  PICTURA_HD bool wants_strips_again() const { return num_strips_ > 1; }
+  /// Whether all faces must be offered once more, after all have been, because several may be on one level or equally
+  /// near.
+  PICTURA_HD bool wants_again() const { return wants_again_; }
   PICTURA_HD void offer_again(const ScreenFace& face, Vec2 at_px) {
-    if (!of_one_level(face, *strip_, at_px)) return;
-    if (!painted_ || face.object_id < painted_->object_id) painted_ = &face;
+    if (is_strip(face)) {
+      if (!of_one_level(face, *strip_, at_px)) return;
+      if (!painted_ || face.object_id < painted_->object_id) painted_ = &face;
+    } else if (are_equally_near(face, *solid_, at_px)) {
+      const bool is_of_one = first_solid_ && face.object_id == first_solid_->object_id;
+      const bool is_before =
+          is_of_one ? nearer(face, *first_solid_, at_px) : !first_solid_ || face.object_id < first_solid_->object_id;
+      if (is_before) first_solid_ = &face;
+    }
   }
   template <typename Stands>
   PICTURA_HD const ScreenFace* front(Vec2 at_px, Stands&& stands) const {
     // A widened strip may be visible where its plane is behind the camera; no strip is on one level with it there.
-    const ScreenFace* const strip = painted_ ? painted_ : strip_;
-    if (!solid_ || !strip) return solid_ ? solid_ : strip;
-    return is_in_front(*solid_, *strip, at_px, stands) ? solid_ : strip;
+    const ScreenFace *const strip = painted_ ? painted_ : strip_, *const solid = first_solid_ ? first_solid_ : solid_;
+    if (!solid || !strip) return solid ? solid : strip;
+    return is_in_front(*solid, *strip, at_px, stands) ? solid : strip;
   }
 
  private:
@@ -134,10 +145,13 @@ class FrontFace {
     const float inverse_depth_a = clamped_inverse_depth(a, at_px), inverse_depth_b = clamped_inverse_depth(b, at_px);
     return inverse_depth_a != inverse_depth_b ? inverse_depth_a > inverse_depth_b : a.object_id < b.object_id;
   }
-  const ScreenFace* solid_ = nullptr;
-  const ScreenFace* strip_ = nullptr;    // the nearest strip
-  const ScreenFace* painted_ = nullptr;  // the strip of its level with the lowest rank
-  int32_t num_strips_ = 0;
+  PICTURA_HD static bool are_equally_near(const ScreenFace& a, const ScreenFace& b, Vec2 at_px) {
+    return are_equal_depths(clamped_inverse_depth(a, at_px), clamped_inverse_depth(b, at_px));
+  }
+  const ScreenFace *solid_ = nullptr, *strip_ = nullptr;  // the nearest ones
+  const ScreenFace* first_solid_ = nullptr;               // of the solids that are equally near, the lowest object id
+  const ScreenFace* painted_ = nullptr;                   // the strip of its level with the lowest rank
+  bool wants_again_ = false;
 };
 
 }  // namespace pictura

@@ -32,7 +32,7 @@ struct alignas(16) ScreenFace {
   uint32_t object_id = 0;  // of its primitive, see common/raster/visibility.h
   // Range of the inverse depth over the face's corners.
   float inverse_depth_low = 0, inverse_depth_high = 0;
-  float plane_distance_m = 0;  // from the camera to the face's plane
+  float plane_distance_m = 0;  // from the camera to the face's plane, along its normal: upwards for strips
   uint32_t color_bytes = 0;    // to_bytes(color), used by devices
   Rgb color;
 
@@ -108,10 +108,9 @@ PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f,
   face_out->inverse_depth_x = inverse_depth.x;
   face_out->inverse_depth_y = inverse_depth.y;
   face_out->inverse_depth_0 = inverse_depth.z;
-  face_out->plane_distance_m =
-      has_inverse_depth(plane)
-          ? fabsf(plane.offset) * reciprocal_in_range(sqrt_in_range(dot(plane.normal, plane.normal)))
-          : 0.0f;
+  face_out->plane_distance_m = has_inverse_depth(plane)
+                                   ? plane.offset * reciprocal_in_range(sqrt_in_range(dot(plane.normal, plane.normal)))
+                                   : 0.0f;
 }
 
 /// Projects a clipped face (camera coordinates) of at most kMaxCorners corners, which lies in `plane`. Calls store_edge

@@ -283,6 +283,8 @@ constexpr float kSameLevel_m = 0.05f;
 /// The depth of a widened strip is clamped to the depths of its corners, times or divided by this factor: when the
 /// camera is close to its plane, the plane's depth varies without bound within a pixel.
 constexpr float kWidenedDepth = 2.0f;
+/// Depths that differ by less than this share of them are equal: rounding must not decide between faces in one plane.
+constexpr float kEqualDepth = 1e-4f;
 /// A solid stands on a strip if their outlines overlap on the ground plane and the centre of its base is at most this
 /// far from the strip's plane: upright boxes cut into slopes.
 constexpr float kStanding_m = 0.5f;

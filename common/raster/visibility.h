@@ -123,20 +123,27 @@ PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
   return true;
 }
 
-/// Whether a solid stands on a strip (see kStanding_m) that is visible from above; then the strip is behind the solid.
-PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip, Vec3 eye_m) {
+/// Whether a solid stands on a strip (see kStanding_m). Then it is above the strip: in front of it seen from above,
+/// behind it seen from below.
+PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip) {
   Vec3 sum{};
   for (const Vec3 corner : solid.corner) sum = sum + (corner - strip.corner[0]);
   const Vec3 middle = sum * 0.25f;
   const Vec3 normal = cross(strip.corner[2] - strip.corner[0], strip.corner[3] - strip.corner[1]);
-  if (dot(normal, eye_m - strip.corner[0]) * normal.z <= 0.0f) return false;
   return fabsf(dot(normal, middle)) <= kStanding_m * fabsf(normal.z) && overlap_on_ground(solid, strip);
+}
+
+/// Whether a face is a strip that is seen from below. It may be in front of solids that are nearer, because they stand
+/// on it, so none hides it without being asked.
+PICTURA_HD inline bool is_strip_from_below(const ScreenFace& face) {
+  return is_strip(face) && face.plane_distance_m > 0.0f;
 }
 
 /// Whether two strips are on one level where a ray meets their planes: the nearer point is close to the other plane.
 PICTURA_HD inline bool of_one_level(const ScreenFace& a, const ScreenFace& b, Vec2 at_px) {
   const float inverse_a = inverse_depth(a, at_px), inverse_b = inverse_depth(b, at_px);
-  const float gap_m = fabsf(inverse_a - inverse_b) * (inverse_a < inverse_b ? a.plane_distance_m : b.plane_distance_m);
+  const float gap_m =
+      fabsf((inverse_a - inverse_b) * (inverse_a < inverse_b ? a.plane_distance_m : b.plane_distance_m));
   return gap_m < kSameLevel_m * max_of(inverse_a, inverse_b);
 }
 
@@ -148,16 +155,24 @@ PICTURA_HD inline float clamped_inverse_depth(const ScreenFace& face, Vec2 at_px
   return clamp(inverse_depth(face, at_px), face.inverse_depth_low * inverse_factor, face.inverse_depth_high * factor);
 }
 
-/// Whether face a is in front of face b at a screen point that both cover. `stands(solid, strip)` is stands_on() of
-/// their object ids.
+/// Whether two inverse depths are equal, see kEqualDepth.
+PICTURA_HD inline bool are_equal_depths(float inverse_depth_a, float inverse_depth_b) {
+  return fabsf(inverse_depth_a - inverse_depth_b) < kEqualDepth * max_of(inverse_depth_a, inverse_depth_b);
+}
+
+/// Whether face a is in front of face b at a screen point that both cover: the nearer one, at equal depths that of the
+/// lower object id. `stands(solid, strip)` is stands_on() of their object ids.
 template <typename Stands>
 PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec2 at_px, Stands&& stands) {
   const bool strip_a = is_strip(a), strip_b = is_strip(b);
   if (strip_a && strip_b && of_one_level(a, b, at_px)) return a.object_id < b.object_id;
   const float inverse_depth_a = clamped_inverse_depth(a, at_px), inverse_depth_b = clamped_inverse_depth(b, at_px);
-  const bool first = inverse_depth_a != inverse_depth_b ? inverse_depth_a > inverse_depth_b : a.object_id < b.object_id;
-  if (strip_a == strip_b || first != strip_a) return first;
-  // The strip is nearer, but a solid that stands on it cuts into the road: then the solid is in front.
+  const bool first = are_equal_depths(inverse_depth_a, inverse_depth_b) ? a.object_id < b.object_id
+                                                                        : inverse_depth_a > inverse_depth_b;
+  if (strip_a == strip_b) return first;
+  // Depth puts the solid under the strip: one that stands on it only cuts into the road.
+  const bool is_strip_first = first == strip_a, is_from_below = is_strip_from_below(strip_a ? a : b);
+  if (is_strip_first == is_from_below) return first;
   return stands(strip_a ? b.object_id : a.object_id, strip_a ? a.object_id : b.object_id) ? !first : first;
 }
 
@@ -207,20 +222,21 @@ PICTURA_HD inline float inverse_depth_half_range(const ScreenFace& face) {
 constexpr int kOccluderBoundBits = 21;
 /// Lower bound of the inverse depth, over a pixel, of a face that covers it fully. Faces with a smaller inverse depth
 /// everywhere in the pixel are fully occluded. 0 for strips, which occlude nothing here: others are painted over them,
-/// and a solid behind one may stand on it. Never negative or NaN, because kernels sort by its bits. Rounded down, so
-/// that no face occludes itself.
+/// and a solid behind one may stand on it. Never negative or NaN, because kernels sort by its bits. Lower by more than
+/// kEqualDepth, so that no face occludes itself nor one that is equally near.
 PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
   if (is_strip(face)) return 0.0f;
   const float lowest =
       max_of(face.inverse_depth_low, center_inverse_depth(face, x, y) - inverse_depth_half_range(face));
-  return float_from_bits(bits_from_float(lowest) & ~((1u << (32 - kOccluderBoundBits)) - 1));
+  constexpr float kLower = 1.0f - 2.0f * kEqualDepth;
+  return float_from_bits(bits_from_float(lowest * kLower) & ~((1u << (32 - kOccluderBoundBits)) - 1));
 }
 
 /// True unless the face lies entirely behind the occluder bound of pixel (x, y). If false, it gets no fragment: the
 /// face of the largest bound would occlude it. A device may test against other full faces' bounds first, in any order:
 /// they are smaller, so what they reject the largest rejects too.
 PICTURA_HD inline bool passes_occluder_bound(const ScreenFace& face, float bound, int x, int y) {
-  return !(center_inverse_depth(face, x, y) + inverse_depth_half_range(face) < bound);
+  return !(center_inverse_depth(face, x, y) + inverse_depth_half_range(face) < bound) || is_strip_from_below(face);
 }
 
 /// Order of fragments, independent of their list: nearer first, then by object id.
@@ -248,18 +264,22 @@ PICTURA_HD inline uint64_t samples_where_positive(float value, Vec2 gradient, Ve
 
 /// Of the samples that faces a and b of two primitives share, those at which a is in front: all or none, decided at
 /// their centroid. Only where the planes of two solids intersect within a pixel of it, and all_or_none is false, each
-/// sample is decided by the nearer plane. At all others, b is in front.
+/// sample is decided by the nearer plane, unless they are equally near in all of the pixel. At all others, b is in
+/// front.
 template <typename Stands>
 PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFace& b, uint64_t shared, Vec2 corner,
                                             bool all_or_none, Stands&& stands) {
   const Vec2 middle = centroid_of(shared), at = corner + middle;
   // Always the lower object id first, so that swapping a and b gives the same arithmetic.
   const bool swapped = b.object_id < a.object_id;
-  const float sign = swapped ? -1.0f : 1.0f, lead = sign * (inverse_depth(a, at) - inverse_depth(b, at));
+  const float inverse_depth_a = inverse_depth(a, at), inverse_depth_b = inverse_depth(b, at);
+  const float sign = swapped ? -1.0f : 1.0f, lead = sign * (inverse_depth_a - inverse_depth_b);
   const Vec2 gradient{sign * (a.inverse_depth_x - b.inverse_depth_x), sign * (a.inverse_depth_y - b.inverse_depth_y)};
   // No sample is further than a pixel from the centroid along either axis.
-  const bool intersect =
-      fabsf(lead) < fabsf(gradient.x) + fabsf(gradient.y) && !is_strip(a) && !is_strip(b) && !all_or_none;
+  const float reach = fabsf(gradient.x) + fabsf(gradient.y);
+  const bool intersect = fabsf(lead) < reach &&
+                         fabsf(lead) + reach >= kEqualDepth * max_of(inverse_depth_a, inverse_depth_b) &&
+                         !is_strip(a) && !is_strip(b) && !all_or_none;
   if (!intersect) return is_in_front(a, b, at, stands) ? shared : 0;
   const uint64_t low_first = samples_where_positive(lead, gradient, middle);
   return shared & (swapped ? ~low_first : low_first);

@@ -11,7 +11,9 @@ namespace pictura {
 namespace {
 
 class RandomScenes : public testing::TestWithParam<RandomKind> {};
-INSTANTIATE_TEST_SUITE_P(All, RandomScenes, testing::Values(RandomKind::near_plane, RandomKind::level_edges));
+INSTANTIATE_TEST_SUITE_P(All, RandomScenes,
+                         testing::Values(RandomKind::near_plane, RandomKind::bridge_from_below,
+                                         RandomKind::crashed_boxes, RandomKind::level_edges));
 
 TEST_P(RandomScenes, AreWithinThePromisedError) {
   for (uint64_t seed = 0; seed < 6; ++seed) {

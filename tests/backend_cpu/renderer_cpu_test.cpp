@@ -139,6 +139,50 @@ TEST(CpuRenderer, StripsAreClippedWhereTheyCrossTheNearPlaneNotTheirCentreLines)
   }
 }
 
+TEST(CpuRenderer, FacesInOnePlaneLookTheSameInAMirroredScene) {
+  // Three cars of one height, driven into each other: their tops are in one plane.
+  auto crash = [](float sign) {
+    SyntheticTown town;
+    const Vec3 size{4.4f, 1.9f, 1.5f};
+    town.scene = scene_of({make_box(AgentClass::vehicle, {9, sign * 0.3f, 0}, sign * 0.2f, size),
+                           make_box(AgentClass::vehicle, {10, sign * -0.5f, 0}, sign * 1.1f, size),
+                           make_box(AgentClass::vehicle, {11, sign * 0.9f, 0}, sign * -0.7f, size)});
+    town.geometry = no_geometry();
+    town.views = {make_view({0, 0, 2}, 0)};
+    return town;
+  };
+  const auto renderer = make_renderer("cpu", {.rig = simple_rig(), .num_threads = 1});
+  const SyntheticTown town = crash(1), mirrored = crash(-1);
+  const std::vector<uint16_t> seen = draw_outputs(renderer.get(), town, Planes::all).instance_id,
+                              seen_mirrored = draw_outputs(renderer.get(), mirrored, Planes::all).instance_id;
+  int differing = 0, tops = 0;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    tops += seen[i] != 0;
+    differing += seen[i] != seen_mirrored[i / 100 * 100 + 99 - i % 100];
+  }
+  EXPECT_GT(tops, 300);
+  EXPECT_EQ(differing, 0);
+  const std::vector<VisibilityQuery> queries{{0, 0}, {0, 1}, {0, 2}};
+  std::vector<float> visible(3), visible_mirrored(3);
+  renderer->visibility(town.scene.batch(), town.views, queries, visible);
+  renderer->visibility(mirrored.scene.batch(), mirrored.views, queries, visible_mirrored);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(visible[i], visible_mirrored[i], 0.01f) << i;
+}
+
+TEST(CpuRenderer, AMarkIsInFrontOfTheCarOnItWhenSeenFromBelow) {
+  // On a bridge 4 m above the eye; the car's underside and the mark are in one plane.
+  StaticGeometry geometry;
+  add_polyline(&geometry, {{2, 0, 4}, {30, 0, 4}}, 0.8f, StripKind::stop_line);
+  geometry.build_grids();
+  const SceneOwner scene = scene_of({make_box(AgentClass::vehicle, {10, 0, 4}, 0.3f, {4, 2, 1})});
+  const Drawn image = draw(geometry, scene, {make_view({0, 0, -1.5f}, 0)}, {.rig = simple_rig(), .num_threads = 1});
+  for (const float ahead_m : {8.5f, 9.5f, 10.5f, 11.5f}) {
+    const Rgb color = image.at(50, static_cast<int>(50 - 50 * 4 / ahead_m));
+    EXPECT_LT(color.r, 0.6f * color.b) << ahead_m;
+    EXPECT_GT(color.g, 0.5f * color.b) << ahead_m;
+  }
+}
+
 TEST(CpuRenderer, LightsShowTheirStateOnlyToTheFront) {
   StaticGeometry geometry = no_geometry();
   LightHead head;

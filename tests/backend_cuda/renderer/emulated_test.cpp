@@ -13,6 +13,7 @@
 #include "pictura/backends/make_renderer.h"
 #include "pictura/bench/soak.h"
 #include "pictura/bench/truth/image_scenes.h"
+#include "pictura/bench/truth/random_scenes.h"
 #include "pictura/common/scene_file.h"
 #include "pictura/tests/backend_cuda/renderer/emulated_renderer.h"
 #include "pictura/tests/backend_cuda/renderer/equal_outputs.h"
@@ -321,6 +322,16 @@ INSTANTIATE_TEST_SUITE_P(All, EmulatedHardScenes, testing::ValuesIn(hard_scenes(
 TEST_P(EmulatedHardScenes, LookLikeTheOracle) {
   EmulatedRenderer renderer(config_of(GetParam().rig), 21);
   expect_oracles(&renderer, GetParam().town, Planes::all);
+}
+
+TEST(EmulatedKernels, DrawTheOraclesRandomScenes) {
+  for (int kind = 0; kind < kNumRandomKinds; ++kind) {
+    for (uint64_t seed = 0; seed < 4; ++seed) {
+      const auto [town, config] = make_random_scene(static_cast<RandomKind>(kind), seed);
+      EmulatedRenderer renderer(config, 70 + seed);
+      expect_oracles(&renderer, town, Planes::all);
+    }
+  }
 }
 
 class EmulatedGoldenScenes : public testing::TestWithParam<std::string> {};

@@ -59,9 +59,8 @@ class TestView {
     }
   }
   bool in_front(const ScreenFace& a, const ScreenFace& b, Vec2 at) const {
-    return is_in_front(a, b, at, [&](uint32_t solid, uint32_t strip) {
-      return stands_on(extent(solid), extent(strip), setting_.camera.position_m);
-    });
+    return is_in_front(a, b, at,
+                       [&](uint32_t solid, uint32_t strip) { return stands_on(extent(solid), extent(strip)); });
   }
   // -1: the first is in front wherever both overlap, 1: the second, 0: they do not overlap, 2: it depends on the point.
   int order(const Faces& a, const Faces& b) const {
@@ -204,17 +203,53 @@ TEST(Order, WhatStandsOnAStripIsInFrontOfItEvenWhereItDipsIn) {
   TestView view({0, 0, 1});
   EXPECT_EQ(view.order(view.set_up(mark), view.set_up(car)), 1);
   EXPECT_EQ(view.order(view.set_up(car), view.set_up(mark)), -1);
+  // From below the road, the mark is in front of the car, even where the car reaches below it.
+  TestView from_below({0, 0, -4}, 0.15f);
+  EXPECT_EQ(from_below.order(from_below.set_up(mark), from_below.set_up(car)), -1);
   // The same car beyond the end of the strip does not stand on it, and neither does one on a road 2 m below.
-  const Vec3 eye{0, 0, 1};
-  EXPECT_TRUE(stands_on(extent_of(car), extent_of(mark), eye));
-  // From below the road, the mark is in front of the car.
-  EXPECT_FALSE(stands_on(extent_of(car), extent_of(mark), {0, 0, -4}));
+  EXPECT_TRUE(stands_on(extent_of(car), extent_of(mark)));
   AgentBox beyond = car;
   beyond.center_m.x = 23;
-  EXPECT_FALSE(stands_on(extent_of(beyond), extent_of(mark), eye));
+  EXPECT_FALSE(stands_on(extent_of(beyond), extent_of(mark)));
   AgentBox below = car;
   below.center_m.z -= 2;
-  EXPECT_FALSE(stands_on(extent_of(below), extent_of(mark), eye));
+  EXPECT_FALSE(stands_on(extent_of(below), extent_of(mark)));
+}
+
+// A face without edges, seen from above, whose plane has the given inverse depth at a pixel's corner and the given
+// gradient.
+ScreenFace plane_face(uint32_t object_id, float inverse_depth_0, Vec2 gradient = {}) {
+  ScreenFace face;
+  face.object_id = object_id;
+  face.plane_distance_m = -1.5f;
+  face.inverse_depth_0 = inverse_depth_0;
+  face.inverse_depth_x = gradient.x;
+  face.inverse_depth_y = gradient.y;
+  face.inverse_depth_low = 1e-3f;
+  face.inverse_depth_high = 10;
+  return face;
+}
+
+TEST(Order, FacesInOnePlaneAreOrderedByObject) {
+  // The two planes differ by rounding alone, in either direction.
+  auto never = [](uint32_t, uint32_t) { return false; };
+  for (const float noise : {0.0f, 1e-7f, -1e-7f}) {
+    for (const Vec2 tilt : {Vec2{}, Vec2{0.01f, 0.002f}}) {
+      const ScreenFace first = plane_face(make_object_id(kAgentKind, 3), 0.1f, tilt),
+                       second = plane_face(make_object_id(kAgentKind, 7), 0.1f + noise, {tilt.x - noise, tilt.y});
+      EXPECT_EQ(samples_in_front(first, second, kAllSamples, {}, false, never), kAllSamples);
+      EXPECT_EQ(samples_in_front(second, first, kAllSamples, {}, false, never), 0u);
+      EXPECT_TRUE(passes_occluder_bound(first, occluder_bound(second, 0, 0), 0, 0));
+      for (const bool swapped : {false, true}) {
+        FrontFace front;
+        const ScreenFace *const one = swapped ? &second : &first, *const other = swapped ? &first : &second;
+        for (const ScreenFace* face : {one, other}) front.offer(*face, {0.5f, 0.5f});
+        ASSERT_TRUE(front.wants_again());
+        for (const ScreenFace* face : {one, other}) front.offer_again(*face, {0.5f, 0.5f});
+        EXPECT_EQ(front.front({0.5f, 0.5f}, never), &first);
+      }
+    }
+  }
 }
 
 TEST(Order, StripsInFrontOfAWallOrBehindIt) {
@@ -262,19 +297,6 @@ TEST(Order, ComparesAtTheCentroidOfTheSharedSamples) {
   EXPECT_EQ(centroid_of(kAllSamples).x, 0.5f);
   EXPECT_EQ(centroid_of(kAllSamples).y, 0.5f);
   EXPECT_EQ(centroid_of(0).x, 0.5f);
-}
-
-// A face without edges whose plane has the given inverse depth at a pixel's corner and the given gradient.
-ScreenFace plane_face(uint32_t object_id, float inverse_depth_0, Vec2 gradient = {}) {
-  ScreenFace face;
-  face.object_id = object_id;
-  face.plane_distance_m = 1.5f;
-  face.inverse_depth_0 = inverse_depth_0;
-  face.inverse_depth_x = gradient.x;
-  face.inverse_depth_y = gradient.y;
-  face.inverse_depth_low = 1e-3f;
-  face.inverse_depth_high = 10;
-  return face;
 }
 
 TEST(Order, SolidsThatIntersectShareSamplesByWhichIsNearer) {
