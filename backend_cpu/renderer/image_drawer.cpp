@@ -158,6 +158,9 @@ void ImageDrawer::resolve_occlusion(int x, int y) {
       visible_[j] &= ~occluded.of_b;
     }
   }
+  divide_remainder([this](auto&& visit) {
+    for (std::size_t i = 0; i < pixel_.size(); ++i) visit(pixel_[i].coverage, &visible_[i]);
+  });
 }
 
 template <typename Visit, typename Finish>

@@ -275,6 +275,7 @@ __device__ void finish_fragments(const Memory& memory, int count) {
     if (i >= count) continue;
     set_all_visible(i);
     if (!memory.coverage(i).is_full()) continue;
+    atomicAdd(&memory.state->num_full, 1);
     const int pixel = memory.pixel[i];
     const Word full = full_of_word<Memory>(atomicAnd(&memory.pixels[pixel], ~PixelWord<Word>::kFace));
     if (full == Memory::kNone) continue;

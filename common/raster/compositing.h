@@ -12,8 +12,8 @@ namespace pictura {
 class PixelAccumulator {
  public:
   /// kWhole: entirely visible, weighted by its exact area. kPartial: partly occluded, weighted by its area times the
-  /// visible fraction of its samples. kRemainder: covers the whole pixel, weighted by its visible fraction of what the
-  /// others leave.
+  /// visible fraction of its samples. kRemainder: covers the whole pixel, weighted by its share of what the others
+  /// leave: in proportion to its visible samples.
   enum Kind : uint8_t { kWhole, kPartial, kRemainder, kNumKinds };
   struct Weight {
     float area = 0;
@@ -61,7 +61,9 @@ class PixelAccumulator {
     Shares shares;
     if (whole > 1.0f) shares.of_kind[kWhole] = 1.0f / whole;
     if (partial > for_partial) shares.of_kind[kPartial] = for_partial / partial;
-    shares.of_kind[kRemainder] = max_of(for_partial - partial, 0.0f);
+    const float remainder = area_of(kRemainder), left = max_of(for_partial - partial, 0.0f);
+    // Less than 1 where other fragments hide some of their samples (divide_remainder).
+    shares.of_kind[kRemainder] = remainder > 0.0f && remainder < 1.0f ? left / remainder : left;
     return shares;
   }
 
@@ -84,6 +86,27 @@ class PixelAccumulator {
 
   Part part_[kNumKinds];
 };
+
+/// Of the fragments of a pixel, those that cover it fully divide what the others leave by the samples that are left of
+/// each, or, if none is, as among themselves. for_each(visit) calls visit(coverage, &visible) for each fragment, where
+/// `visible` are the samples that occlude_pair left of it; for fragments that cover the pixel this function removes
+/// those that are visible of others. Without two such fragments there is nothing to divide, and nothing changes.
+template <typename ForEach>
+PICTURA_HD inline void divide_remainder(ForEach&& for_each) {
+  uint64_t hidden = 0, left = 0;
+  int num_full = 0;
+  for_each([&](const PixelCoverage& coverage, uint64_t* visible) {
+    const bool is_full = coverage.is_full();
+    num_full += is_full ? 1 : 0;
+    hidden |= is_full || coverage.samples == 0 ? 0 : *visible;  // slivers hide nothing
+    left |= is_full ? *visible : 0;
+  });
+  left &= ~hidden;
+  if (num_full < 2 || hidden == 0 || left == 0) return;
+  for_each([&](const PixelCoverage& coverage, uint64_t* visible) {
+    if (coverage.is_full()) *visible &= left;
+  });
+}
 
 /// A channel as an IEEE half, rounded to nearest even.
 PICTURA_HD inline uint16_t to_half(float channel) {

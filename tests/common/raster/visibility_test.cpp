@@ -341,6 +341,30 @@ TEST(Order, TwoFacesThatFillAPixelAndIntersectFillItTogether) {
   EXPECT_NEAR(sum.color().g, 3.0 / 8, 1e-5);
 }
 
+TEST(Order, FacesThatFillAPixelAndIntersectDivideWhatAThirdLeavesOfEach) {
+  // The first of the two is in front in the left 5/8 of the pixel; a third face hides the left half.
+  const ScreenFace first = plane_face(make_object_id(kAgentKind, 0), 0.2f, {-0.08f, 0}),
+                   second = plane_face(make_object_id(kAgentKind, 1), 0.15f);
+  const PixelCoverage full{1, kAllSamples};
+  const OccludedSamples occluded =
+      occlude_pair(full, full, first, second, {}, [](uint32_t, uint32_t) { return false; });
+  for (const bool hides_all : {false, true}) {
+    // All samples may be hidden although some of the area is left.
+    const PixelCoverage third = hides_all ? PixelCoverage{0.99f, kAllSamples} : PixelCoverage{0.5f, 0xFFFFFFFF};
+    const PixelCoverage coverage[] = {full, third, full};
+    uint64_t visible[] = {~occluded.of_a, third.samples, ~occluded.of_b};
+    divide_remainder([&](auto&& visit) {
+      for (int i = 0; i < 3; ++i) visit(coverage[i], &visible[i]);
+    });
+    PixelAccumulator sum;
+    const Rgb colors[] = {{1, 0, 0}, {0, 0, 1}, {0, 1, 0}};
+    for (int i = 0; i < 3; ++i) sum.add(PixelAccumulator::weight_of(coverage[i], visible[i]), colors[i]);
+    EXPECT_NEAR(sum.color().r, hides_all ? 0.01 * 5 / 8 : 1.0 / 8, 1e-5);
+    EXPECT_NEAR(sum.color().g, hides_all ? 0.01 * 3 / 8 : 3.0 / 8, 1e-5);
+    EXPECT_NEAR(sum.color().b, third.area, 1e-5);
+  }
+}
+
 TEST(Order, VisibleSamplesDoNotDependOnTheOrderOfFragments) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<float> unit(0, 1);
