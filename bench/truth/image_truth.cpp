@@ -230,13 +230,14 @@ void add_light(Tracer* tracer, const Eye& eye, const LightHead& head, LightState
                             static_cast<int>(tracer->solids.size()) - 1});
 }
 
-// Whether two convex outlines overlap on the ground: by more than a millimetre along the normal of every side.
+// Whether two convex outlines overlap on the ground: to part them along the normal of any side, one would have to move
+// by more than a millimetre.
 bool overlap_on_ground(const std::vector<Point>& a, const std::vector<Point>& b) {
   auto separates = [&](Point normal) {
     double low_a = kFar, high_a = -kFar, low_b = kFar, high_b = -kFar;
     for (Point p : a) low_a = std::min(low_a, dot(normal, p)), high_a = std::max(high_a, dot(normal, p));
     for (Point p : b) low_b = std::min(low_b, dot(normal, p)), high_b = std::max(high_b, dot(normal, p));
-    return std::min(high_a, high_b) - std::max(low_a, low_b) <= 1e-3;
+    return std::min(high_a - low_b, high_b - low_a) <= 1e-3;
   };
   for (const std::vector<Point>* outline : {&a, &b}) {
     for (std::size_t i = 0; i < outline->size(); ++i) {

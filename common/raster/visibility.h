@@ -100,8 +100,9 @@ PICTURA_HD inline bool first_side_separates(const GroundQuad& a, const GroundQua
     return interval;
   };
   const Interval of_a = project(a), of_b = project(b);
-  // The overlap along the axis, times the side's length.
-  const float overlap = min_no_nan(of_a.high, of_b.high) - max_no_nan(of_a.low, of_b.low);
+  // How far one has to move along the axis until they touch, times the side's length: more than nothing also for a
+  // wall, whose interval may be a point, within the other's.
+  const float overlap = min_no_nan(of_a.high - of_b.low, of_b.high - of_a.low);
   const float length2_m2 = dot(side, side);
   return length2_m2 > 1e-12f && (overlap <= 0.0f || overlap * overlap <= kTouching_m * kTouching_m * length2_m2);
 }
