@@ -98,12 +98,13 @@ struct PaintedStrip {
                  second = triangle_depth(ray, corner[0], corner[2], corner[3]);
     return (first >= kNear_m && first < kFar) || (second >= kNear_m && second < kFar);
   }
-  // Depth of its plane; infinite beyond the horizon.
-  double plane_depth(Point ray) const {
-    const double depth = offset / dot(plane, ray);
-    return depth > 0 ? depth : kFar;
+  // Depth of its plane, within half and twice the depths of its corners; the largest beyond the horizon.
+  double depth(Point ray) const {
+    const double of_plane = offset / dot(plane, ray);
+    const double highest = farthest_m * kWidenedDepth;
+    return of_plane > 0 ? std::clamp(of_plane, nearest_m / kWidenedDepth, highest) : highest;
   }
-  double distance_to(Point p) const { return std::abs(dot(plane, p) - offset); }
+  double height_of(Point p) const { return dot(plane, p) - offset; }
 };
 
 struct Tracer {
@@ -380,27 +381,27 @@ Surface first_solid(const Candidates& candidates, Point ray) {
 // other there the one of lowest rank, and a strip is behind the solids on it seen from above, before them from below.
 Surface first_hit(const Candidates& candidates, Point ray) {
   Surface front = first_solid(candidates, ray);
-  const PaintedStrip* painted = nullptr;
-  double painted_depth = kFar, painted_plane = kFar;
+  struct Candidate {
+    const PaintedStrip* strip;
+    double depth;
+  };
+  std::vector<Candidate> strips;
+  const Candidate* nearest = nullptr;
+  strips.reserve(candidates.strips.size());
   for (const PaintedStrip* strip : candidates.strips) {
     if (!strip->covers(ray)) continue;
-    const double plane = strip->plane_depth(ray),
-                 at = std::clamp(plane, strip->nearest_m / kWidenedDepth, strip->farthest_m * kWidenedDepth);
-    if (at < kNear_m) continue;
     if (front.facet && !strip->from_below && strip->carries_solid_of(*front.facet)) continue;
-    bool comes_first = !painted || at < painted_depth;
-    if (painted && std::max(plane, painted_plane) < kFar) {
-      const double gap_m =
-          plane < painted_plane ? painted->distance_to(ray * plane) : strip->distance_to(ray * painted_plane);
-      if (gap_m < kSameLevel_m) comes_first = strip->rank < painted->rank;
-    }
-    if (comes_first) {
-      painted = strip;
-      painted_depth = at;
-      painted_plane = plane;
-    }
+    strips.push_back({strip, strip->depth(ray)});
+    if (!nearest || strips.back().depth < nearest->depth) nearest = &strips.back();
   }
-  if (!painted) return front;
+  if (!nearest) return front;
+  const PaintedStrip* painted = nearest->strip;
+  double painted_depth = nearest->depth;
+  const Point there = ray * nearest->depth;
+  for (const auto& [strip, depth] : strips) {
+    const double gap_m = std::abs(strip->height_of(there) - nearest->strip->height_of(there));
+    if (gap_m < kSameLevel_m && strip->rank < painted->rank) painted = strip, painted_depth = depth;
+  }
   const bool is_nearer = painted_depth < front.depth && !are_equal(painted_depth, front.depth);
   if (!front.facet || is_nearer || (painted->from_below && painted->carries_solid_of(*front.facet))) {
     front = {&painted->color, nullptr, painted, std::clamp(painted_depth, painted->nearest_m, painted->farthest_m)};

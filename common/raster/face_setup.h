@@ -134,7 +134,6 @@ class FrontFace {
   }
   template <typename Stands>
   PICTURA_HD const ScreenFace* front(Vec2 at_px, Stands&& stands) const {
-    // A widened strip may be visible where its plane is behind the camera; no strip is on one level with it there.
     const ScreenFace *const strip = painted_ ? painted_ : strip_, *const solid = first_solid_ ? first_solid_ : solid_;
     if (!solid || !strip) return solid ? solid : strip;
     return is_in_front(*solid, *strip, at_px, stands) ? solid : strip;

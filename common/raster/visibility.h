@@ -140,20 +140,22 @@ PICTURA_HD inline bool is_strip_from_below(const ScreenFace& face) {
   return is_strip(face) && face.plane_distance_m > 0.0f;
 }
 
-/// Whether two strips are on one level where a ray meets their planes: the nearer point is close to the other plane.
-PICTURA_HD inline bool of_one_level(const ScreenFace& a, const ScreenFace& b, Vec2 at_px) {
-  const float inverse_a = inverse_depth(a, at_px), inverse_b = inverse_depth(b, at_px);
-  const float gap_m =
-      fabsf((inverse_a - inverse_b) * (inverse_a < inverse_b ? a.plane_distance_m : b.plane_distance_m));
-  return gap_m < kSameLevel_m * max_of(inverse_a, inverse_b);
-}
-
 /// 1 / depth of a face at a screen point, clamped to the depths of its corners; for strips that range is widened by
 /// kWidenedDepth. Used to compare faces.
 PICTURA_HD inline float clamped_inverse_depth(const ScreenFace& face, Vec2 at_px) {
   const float factor = is_strip(face) ? kWidenedDepth : 1.0f,
               inverse_factor = is_strip(face) ? 1.0f / kWidenedDepth : 1.0f;
   return clamp(inverse_depth(face, at_px), face.inverse_depth_low * inverse_factor, face.inverse_depth_high * factor);
+}
+
+/// Whether two strips are on one level at a screen point: at the nearer one's depth, their planes are at nearly the
+/// same height. A strip that is wider on screen than its plane reaches, beyond the horizon, has a depth there too.
+PICTURA_HD inline bool of_one_level(const ScreenFace& a, const ScreenFace& b, Vec2 at_px) {
+  const float nearest = max_of(clamped_inverse_depth(a, at_px), clamped_inverse_depth(b, at_px));
+  // Heights above the two planes, times the inverse depth.
+  const float above_a = (inverse_depth(a, at_px) - nearest) * a.plane_distance_m,
+              above_b = (inverse_depth(b, at_px) - nearest) * b.plane_distance_m;
+  return fabsf(above_a - above_b) < kSameLevel_m * nearest;
 }
 
 /// Whether two inverse depths are equal, see kEqualDepth.

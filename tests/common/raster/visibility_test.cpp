@@ -22,7 +22,7 @@ class TestView {
   // Faces of a primitive.
   using Faces = std::vector<ScreenFace>;
 
-  explicit TestView(Vec3 eye_m, float pitch_rad = 0) {
+  explicit TestView(Vec3 eye_m, float pitch_rad = 0, float line_floor_px = 0.35f) {
     Camera camera;
     camera.width_px = camera.height_px = kSize;
     camera.focal_x_px = camera.focal_y_px = 60;
@@ -31,7 +31,7 @@ class TestView {
     camera.pitch_rad = pitch_rad;
     setting_.camera = place_camera(pinhole_cameras({{camera}})[0], View{});
     setting_.frustum = make_frustum(setting_.camera);
-    setting_.line_floor_px = 0.35f;
+    setting_.line_floor_px = line_floor_px;
   }
   Faces set_up(const AgentBox& box, int32_t index = 0) {
     return keep(agent_ref(box, index), extent_of(box),
@@ -261,6 +261,31 @@ TEST(Order, StripsInFrontOfAWallOrBehindIt) {
   TestView view({0, 0, 1.5f});
   EXPECT_EQ(view.order(view.set_up(before), view.set_up(wall)), -1);
   EXPECT_EQ(view.order(view.set_up(wall), view.set_up(beyond)), -1);
+}
+
+TEST(Order, AWallStandsOnTheStripsThatItCrosses) {
+  const Strip mark = strip_between({5, 0, 0}, {15, 0, 0});
+  // Its foot is 0.3 m below the road, along, across and oblique to the mark.
+  for (const Vec3 reach : {Vec3{3, 0, 0}, Vec3{0, 3, 0}, Vec3{2, -3, 0}}) {
+    const Vec3 middle{10, 0, -0.3f};
+    const WallFace wall{middle - reach, middle + reach, 2, {1, 1, 1}};
+    EXPECT_TRUE(stands_on(extent_of(wall), extent_of(mark))) << reach.y;
+    WallFace beside = wall;
+    beside.a_m.y += 4;
+    beside.b_m.y += 4;
+    EXPECT_FALSE(stands_on(extent_of(beside), extent_of(mark))) << reach.y;
+  }
+  const WallFace across{{10, 3, -0.3f}, {10, -3, -0.3f}, 2, {1, 1, 1}};
+  TestView view({0, 0, 1.5f});
+  EXPECT_EQ(view.order(view.set_up(across), view.set_up(mark)), -1);
+}
+
+TEST(Order, StripsOfOneLevelAreOrderedByRankBeyondTheirHorizonToo) {
+  // Drawn 8 px wide, they reach above the horizon; the edge is nearer.
+  const Strip edge = strip_between({20, 6, 0}, {20, -6, 0}, StripKind::road_edge),
+              stop = strip_between({45, 6, 0}, {45, -6, 0}, StripKind::stop_line);
+  TestView view({0, 0, 0.3f}, 0, 8);
+  EXPECT_EQ(view.order(view.set_up(stop), view.set_up(edge)), -1);
 }
 
 TEST(Order, AStripDrawnWiderThanItIsStaysAtItsDepth) {
