@@ -1,4 +1,5 @@
 // `pictura render`: writes what cameras see, of a scene file or of a world that was driven with random actions.
+#include <cctype>
 #include <chrono>
 #include <filesystem>
 
@@ -27,7 +28,7 @@ struct Arguments {
   std::string size = "96x54", rig, out;
   std::vector<std::string> planes;
   float line_floor_px = RendererConfig{}.line_floor_px;
-  bool size_given = false, figure = false, json = false;
+  bool size_given = false, square_pixels = false, figure = false, json = false;
 };
 
 /// What is drawn, and under which names, whether a world was driven there or a file says so.
@@ -38,7 +39,11 @@ struct Subject {
   std::vector<std::string> names, captions;  // [views]
 };
 
-bool is_scene_file(const std::string& map) { return std::filesystem::path(map).extension() == ".toml"; }
+bool is_scene_file(const std::string& map) {
+  std::string extension = std::filesystem::path(map).extension().string();
+  for (char& letter : extension) letter = static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
+  return extension == ".toml";
+}
 
 std::unique_ptr<Renderer> open_renderer(const Arguments& arguments, RendererConfig config) {
   config.num_threads = arguments.world.num_threads;
@@ -128,11 +133,13 @@ void render_scene_file(const Arguments& arguments) {
 void render_world(const Arguments& arguments) {
   const Pair size = parse_pair("--size", arguments.size, 8192);
   if (!arguments.rig.empty() && arguments.size_given) fail_usage("--size: the rig of --rig has sizes of its own");
+  if (!arguments.rig.empty() && arguments.square_pixels) fail_usage("--square-pixels: has no effect beside --rig");
   if (arguments.views > arguments.world.agents) {
     fail_usage("--views: expected 1 to {} (one per agent), got {}", arguments.world.agents, arguments.views);
   }
   RendererConfig config;
-  config.rig = arguments.rig.empty() ? paper_rig(size.first, size.second) : load_rig(arguments.rig);
+  config.rig =
+      arguments.rig.empty() ? paper_rig(size.first, size.second, arguments.square_pixels) : load_rig(arguments.rig);
   config.line_floor_px = arguments.line_floor_px;
   const auto renderer = open_renderer(arguments, config);
 
@@ -157,7 +164,7 @@ void render_world(const Arguments& arguments) {
 // A scene file says these itself.
 void refuse_world_options(const CLI::App& command) {
   for (const char* option : {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--steps",
-                             "--views", "--size", "--rig", "--line-floor", "--simulator"}) {
+                             "--views", "--size", "--square-pixels", "--rig", "--line-floor", "--simulator"}) {
     if (command.count(option) > 0) fail_usage("{}: has no effect on a scene file, which says that itself", option);
   }
 }
@@ -180,6 +187,8 @@ void add_render_command(CLI::App& app) {
       ->capture_default_str();
   CLI::Option* size =
       command->add_option("--size", arguments->size, "Image size in pixels, WxH")->capture_default_str();
+  command->add_flag("--square-pixels", arguments->square_pixels,
+                    "At sizes that are not 16:9, keep pixels square and the horizontal field of view");
   add_backend_options(command, "auto", &arguments->backends);
   command->add_option("--rig", arguments->rig, "TOML file with [[camera]] tables instead of the paper's four cameras");
   command

@@ -6,6 +6,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/raster/camera.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/regular_file.h"
 #include "pictura/common/support/toml_fields.h"
 
 namespace pictura {
@@ -16,7 +17,7 @@ constexpr int kMaxSize_px = 8192;
 
 }  // namespace
 
-Rig paper_rig(int width_px, int height_px) {
+Rig paper_rig(int width_px, int height_px, bool square_pixels) {
   struct Row {
     const char* name;
     Vec3 position_m;
@@ -33,7 +34,7 @@ Rig paper_rig(int width_px, int height_px) {
     camera.width_px = width_px;
     camera.height_px = height_px;
     camera.focal_x_px = 1545.0f * static_cast<float>(width_px) / 1920.0f;
-    camera.focal_y_px = 1545.0f * static_cast<float>(height_px) / 1080.0f;
+    camera.focal_y_px = square_pixels ? camera.focal_x_px : 1545.0f * static_cast<float>(height_px) / 1080.0f;
     camera.center_x_px = 0.5f * static_cast<float>(width_px);
     camera.center_y_px = 0.5f * static_cast<float>(height_px);
     camera.position_m = row.position_m;
@@ -88,6 +89,7 @@ Rig read_cameras(TomlFields* fields_inout) {
 }
 
 Rig load_rig(const std::string& path) {
+  require_regular_file(path);
   const toml::table table = parse_toml(read_file(path, 1 << 20), path);
   TomlFields fields(table, path);
   const Rig rig = read_cameras(&fields);

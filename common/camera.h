@@ -29,8 +29,9 @@ struct Rig {
 };
 
 /// The paper's four cameras (appendix, table of the camera rig): front, front-left, front-right and back, focal length
-/// 1545 px at 1920x1080, scaled to the given size. Throws unless both sizes are in [1, 8192].
-Rig paper_rig(int width_px = 96, int height_px = 54);
+/// 1545 px at 1920x1080, scaled to the given size: at sizes that are not 16:9 their fields of view stay, so that pixels
+/// stretch, or, with square_pixels, the horizontal one alone. Throws unless both sizes are in [1, 8192].
+Rig paper_rig(int width_px = 96, int height_px = 54, bool square_pixels = false);
 
 /// Reads a rig from a TOML file (docs/image.md shows one). Throws Error naming the file, the camera and the key.
 Rig load_rig(const std::string& path);

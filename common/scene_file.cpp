@@ -6,6 +6,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/regular_file.h"
 #include "pictura/common/support/toml_fields.h"
 
 namespace pictura {
@@ -13,7 +14,8 @@ namespace pictura {
 namespace {
 
 using Range = TomlFields::Range;
-constexpr Range kCoordinate_m{-1e4, 1e4}, kSize_m{0, 1e3}, kHeading_deg{-360, 360};
+// Sizes of 0 and half-angles of 0 would draw nothing.
+constexpr Range kCoordinate_m{-1e4, 1e4}, kSize_m{1e-3, 1e3}, kHeading_deg{-360, 360}, kHalfAngle_deg{0.1, 180};
 constexpr std::size_t kMaxAgents = 4096, kMaxViews = 4096, kMaxStrips = std::size_t{1} << 18;
 constexpr float kMaxLine_m = 1e5f;
 
@@ -100,6 +102,10 @@ void read_line(TomlFields* row, std::vector<Strip>* strips_out) {
   for (std::size_t i = 1; i < points_m.size(); ++i) length_m += length(points_m[i] - points_m[i - 1]);
   if (length_m > kMaxLine_m) row->refuse("points_m", fmt::format("expected at most {} m of line", kMaxLine_m));
   const int style = row->choice("style", kStyles, solid);
+  for (const char* key : {"dash_m", "gap_m"}) {
+    if (row->has(key) && style != broken) row->refuse(key, "is for broken lines");
+  }
+  if (row->has("spacing_m") && style != twofold) row->refuse("spacing_m", "is for double lines");
   std::vector<Strip> strips;
   if (style == broken) {
     const float dash_m = row->number("dash_m", {0.1, 1e3}), gap_m = row->number("gap_m", {0.1, 1e3});
@@ -107,6 +113,7 @@ void read_line(TomlFields* row, std::vector<Strip>* strips_out) {
   } else {
     append_strips(points_m, width_m, color, kind, &strips);
   }
+  if (strips.empty()) row->refuse("points_m", "expected points at different places");
   if (style == twofold) {
     const float aside_m = 0.5f * row->number("spacing_m", kSize_m);
     const std::vector<Strip> right = moved_aside(strips, -aside_m);
@@ -124,6 +131,9 @@ void read_wall(TomlFields* row, std::vector<WallFace>* walls_out) {
   const float height_m = row->number("height_m", kSize_m);
   const Rgb color = color_of(row, kWallColor);
   for (std::size_t i = 1; i < points_m.size(); ++i) {
+    if (length(points_m[i].xy() - points_m[i - 1].xy()) < 1e-3f) {
+      row->refuse("points_m", fmt::format("points {} and {} are at the same place", i - 1, i));
+    }
     walls_out->push_back({points_m[i - 1], points_m[i], height_m, color});
   }
 }
@@ -134,7 +144,7 @@ void read_light(TomlFields* row, SceneFile* out) {
   head.position_m = position_of(row);
   const SinCos facing = sincos_of(radians_of(row->number("facing_deg", kHeading_deg)));
   head.facing = {facing.cos, facing.sin};
-  head.cos_half_angle = cos_of(radians_of(row->number("half_angle_deg", {0, 180}, 60)));
+  head.cos_half_angle = cos_of(radians_of(row->number("half_angle_deg", kHalfAngle_deg, 60)));
   head.signal = out->geometry.num_signals++;
   out->geometry.heads.push_back(head);
   out->scene.light_states.push_back(static_cast<LightState>(row->choice("state", kStates)));
@@ -153,7 +163,11 @@ View read_view(TomlFields* row, SceneOwner* scene_inout) {
   view.hidden_begin = static_cast<int32_t>(scene_inout->hidden_agents.size());
   if (row->has("hidden")) {
     if (scene_inout->agents.empty()) row->refuse("hidden", "the scene has no agents");
-    for (const int agent : row->integers("hidden", agent_index, {})) scene_inout->hidden_agents.push_back(agent);
+    std::set<int> hidden;
+    for (const int agent : row->integers("hidden", agent_index, {})) {
+      if (!hidden.insert(agent).second) row->refuse("hidden", fmt::format("agent {} is listed twice", agent));
+      scene_inout->hidden_agents.push_back(agent);
+    }
   }
   view.hidden_end = static_cast<int32_t>(scene_inout->hidden_agents.size());
   return view;
@@ -173,15 +187,27 @@ void read_views(TomlFields* root, SceneFile* out) {
   if (out->views.size() > kMaxViews) root->refuse("view", fmt::format("expected at most {} views", kMaxViews));
 }
 
-Rig read_rig(TomlFields* root, const std::string& folder) {
+Rig read_rig(TomlFields* root, const std::string& source, const std::string& folder) {
   const Rig rig = read_cameras(root);
-  const bool in_file = root->has("rig");
-  if (in_file && !rig.cameras.empty()) root->refuse("rig", "has no effect beside [[camera]] tables");
-  if (in_file) return load_rig((std::filesystem::path(folder) / root->text("rig", "")).string());
-  if (!rig.cameras.empty()) return rig;
+  const bool has_cameras = root->has("camera"), in_file = root->has("rig");
+  if (has_cameras && rig.cameras.empty()) root->refuse("camera", "expected one or more [[camera]] tables");
+  if (in_file && has_cameras) root->refuse("rig", "has no effect beside [[camera]] tables");
+  for (const char* key : {"size_px", "square_pixels"}) {
+    if (root->has(key) && (has_cameras || in_file)) root->refuse(key, "is for the paper's cameras alone");
+  }
+  if (in_file) {
+    const std::string path = (std::filesystem::path(folder) / root->text("rig", "")).string();
+    try {
+      return load_rig(path);
+    } catch (const Error& error) {
+      fail("{}: rig: {}", source, error.what());
+    }
+  }
+  if (has_cameras) return rig;
+  const bool square_pixels = root->flag("square_pixels", false);
   const std::vector<int> size_px = root->integers("size_px", {1, 8192}, {96, 54});
   if (size_px.size() != 2) root->refuse("size_px", "expected [width, height]");
-  return paper_rig(size_px[0], size_px[1]);
+  return paper_rig(size_px[0], size_px[1], square_pixels);
 }
 
 }  // namespace
@@ -190,7 +216,7 @@ SceneFile parse_scene(const std::string& text, const std::string& source, const 
   const toml::table table = parse_toml(text, source);
   TomlFields root(table, source);
   SceneFile out;
-  out.config.rig = read_rig(&root, folder);
+  out.config.rig = read_rig(&root, source, folder);
   out.config.line_floor_px = root.number("line_floor_px", {0, 8}, out.config.line_floor_px);
   out.config.debug_palette = root.flag("debug_palette", false);
   for (TomlFields& row : root.tables("agent")) {
@@ -223,6 +249,7 @@ SceneFile parse_scene(const std::string& text, const std::string& source, const 
 }
 
 SceneFile load_scene(const std::string& path) {
+  require_regular_file(path);
   return parse_scene(read_file(path, 1 << 20), path, std::filesystem::path(path).parent_path().string());
 }
 

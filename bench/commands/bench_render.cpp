@@ -66,7 +66,7 @@ RenderCase case_of(const Arguments& arguments, const std::string& backend, const
                    const std::string& samples, int egos) {
   const Pair pixels = parse_pair("--size", size, 8192);
   RenderCase result{.backend = backend, .num_views = egos};
-  result.config.rig = paper_rig(pixels.first, pixels.second);
+  result.config.rig = paper_rig(pixels.first, pixels.second, /*square_pixels=*/arguments.sweep == "squares");
   const bool in_device_memory =
       draws_in_device_memory(backend) && !arguments.host_memory && !cuda_device_name().empty();
   if (in_device_memory) result.config.device = {MemorySpace::cuda, 0};

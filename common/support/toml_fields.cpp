@@ -21,7 +21,7 @@ TomlFields::TomlFields(const toml::table& table, std::string source, std::string
     : table_(&table), source_(std::move(source)), name_(std::move(name)) {}
 
 const toml::node* TomlFields::find(std::string_view key) {
-  known_.emplace_back(key);
+  if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.emplace_back(key);
   return table_->get(key);
 }
 
@@ -38,10 +38,15 @@ void TomlFields::refuse(std::string_view key, std::string_view message) const {
 }
 
 void TomlFields::refuse(std::string_view key, const toml::node& node, std::string_view expected) const {
-  std::ostringstream got;
-  node.visit([&](const auto& value) { got << value; });
+  std::ostringstream value;
+  node.visit([&](const auto& its) { value << its; });
+  // Tables have many lines.
+  std::string got = node.is_table() ? "a table" : value.str();
+  constexpr std::size_t kMostShown = 60;
+  if (got.size() > kMostShown) got = got.substr(0, kMostShown) + "...";
+  std::replace(got.begin(), got.end(), '\n', ' ');
   fail("{}:{}: {}{}{}: expected {}, got {}", source_, node.source().begin.line, name_, name_.empty() ? "" : ": ", key,
-       expected, got.str());
+       expected, got);
 }
 
 float TomlFields::number_of(std::string_view key, const toml::node& node, Range range) const {
@@ -146,6 +151,7 @@ std::vector<TomlFields> TomlFields::tables(std::string_view key) {
   std::vector<TomlFields> tables;
   const toml::node* node = find(key);
   if (!node) return tables;
+  if (node->is_table()) refuse(key, fmt::format("expected [[{}]] tables, got one [{}]", key, key));
   for (const toml::node& element : list_of(key, *node)) {
     if (!element.is_table()) refuse(key, element, "a table");
     tables.emplace_back(*element.as_table(), source_, fmt::format("{} {}", key, tables.size()));

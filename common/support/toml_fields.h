@@ -31,7 +31,7 @@ class TomlFields {
 
   /// What messages call the table from now on.
   void rename(std::string name) { name_ = std::move(name); }
-  bool has(std::string_view key) const { return table_->contains(key); }
+  bool has(std::string_view key) { return find(key) != nullptr; }
   float number(std::string_view key, Range range);
   float number(std::string_view key, Range range, float fallback);
   int integer(std::string_view key, Range range);
@@ -56,7 +56,7 @@ class TomlFields {
   [[noreturn]] void refuse(std::string_view key, std::string_view message) const;
 
  private:
-  const toml::node* find(std::string_view key);
+  const toml::node* find(std::string_view key);  // and remembers that the key is known
   const toml::node& need(std::string_view key);
   int integer_of(std::string_view key, const toml::node& node, Range range) const;
   float number_of(std::string_view key, const toml::node& node, Range range) const;

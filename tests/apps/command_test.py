@@ -250,7 +250,7 @@ class Images(CommandCase):
         bad = self.folder / "bad.toml"
         render = ["render", bad, "--backend", "cpu", "--out", self.folder / "images"]
         bad.write_text(text.replace("length_m = 4.4", "length_m = -1.0"))
-        self.assert_refused(1, "bad.toml:22: agent 0: length_m: expected a number in [0, 1000], got -1", *render)
+        self.assert_refused(1, "bad.toml:22: agent 0: length_m: expected a number in [0.001, 1000], got -1", *render)
         bad.write_text(text)
         self.assert_refused(2, "--agents: has no effect on a scene file", *render, "--agents", 4)
         self.assert_refused(2, "colour", *render, "--planes", "colour")

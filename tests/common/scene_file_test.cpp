@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
@@ -154,7 +155,8 @@ TEST(SceneFile, BadFilesAreRejectedWithTheirLine) {
   EXPECT_THAT(message_of(wall + "[[0, 0], [1, 1]]\ncolor_rgb = [1, 2]\n"), HasSubstr("color_rgb: expected 3 numbers"));
   EXPECT_THAT(message_of(wall + "[[0, 0], [1, 1]]\ncolor_rgb = [1, 2, 256]\n"), HasSubstr("got 256"));
   const std::string mark = kView + "[[line]]\nkind = 'lane_mark'\nwidth_m = 0.1\npoints_m = [[0, 0], [9, 0]]\n";
-  EXPECT_THAT(message_of(mark + "dash_m = 1\n"), HasSubstr("unknown key 'dash_m'"));
+  EXPECT_THAT(message_of(mark + "dash_m = 1\n"), HasSubstr("dash_m: is for broken lines"));
+  EXPECT_THAT(message_of(mark + "spacing_m = 1\n"), HasSubstr("spacing_m: is for double lines"));
   EXPECT_THAT(message_of(mark + "style = 'broken'\ndash_m = 1\n"), HasSubstr("gap_m: is missing"));
   EXPECT_THAT(message_of(mark + "style = 'broken'\ndash_m = 0.0\ngap_m = 0.0\n"), HasSubstr("dash_m: expected"));
   EXPECT_THAT(message_of(mark + "color = 'white'\ncolor_rgb = [1, 2, 3]\n"), HasSubstr("color: is for"));
@@ -168,6 +170,51 @@ TEST(SceneFile, BadFilesAreRejectedWithTheirLine) {
   std::string zigzag = kView + "[[line]]\nkind = 'lane_mark'\nwidth_m = 0.1\npoints_m = [";
   for (int i = 0; i < 50; ++i) zigzag += "[-9000, 0], [9000, 0], ";
   EXPECT_THAT(message_of(zigzag + "]\n"), HasSubstr("points_m: expected at most 100000 m of line"));
+}
+
+TEST(SceneFile, WhatWouldDrawNothingIsRefused) {
+  EXPECT_THAT(message_of("camera = []\n" + kView),
+              HasSubstr("s.toml:1: camera: expected one or more [[camera]] tables"));
+  EXPECT_THAT(message_of(kAgent + kView + "hidden = [0, 0]\n"), HasSubstr("hidden: agent 0 is listed twice"));
+  EXPECT_THAT(message_of(kView + "[[agent]]\nclass = 'vehicle'\nx_m = 1\ny_m = 1\nlength_m = 0\n"),
+              HasSubstr("length_m: expected a number in [0.001, 1000], got 0"));
+  const std::string wall = kView + "[[wall]]\npoints_m = [[0, 0], [1, 0], [1, 0, 2]]\nheight_m = ";
+  EXPECT_THAT(message_of(wall + "0\n"), HasSubstr("height_m: expected a number in [0.001, 1000], got 0"));
+  EXPECT_THAT(message_of(wall + "2\n"), HasSubstr("points_m: points 1 and 2 are at the same place"));
+  const std::string line = kView + "[[line]]\nkind = 'lane_mark'\npoints_m = [[1, 1], [1, 1]]\nwidth_m = ";
+  EXPECT_THAT(message_of(line + "0\n"), HasSubstr("width_m: expected a number"));
+  EXPECT_THAT(message_of(line + "0.1\n"), HasSubstr("points_m: expected points at different places"));
+  EXPECT_THAT(message_of(kView + "[[light]]\nx_m = 1\ny_m = 1\nfacing_deg = 0\nhalf_angle_deg = 0\n"),
+              HasSubstr("half_angle_deg: expected a number in [0.1, 180], got 0"));
+}
+
+TEST(SceneFile, MessagesAreOneLineAndNameWhatWasMeant) {
+  const std::string one_table = message_of("[view]\nx_m = 1.0\ny_m = 2.0\nheading_deg = 3.0\n");
+  EXPECT_THAT(one_table, HasSubstr("s.toml:1: view: expected [[view]] tables, got one [view]"));
+  EXPECT_THAT(message_of(kView + "x = 1\n"), HasSubstr("heading_deg, ego, body_length_m, hidden"));
+  const std::string table = message_of("line_floor_px = {a = 1, b = 2}\n" + kView);
+  EXPECT_THAT(table, HasSubstr("line_floor_px: expected a number in [0, 8], got a table"));
+  EXPECT_THAT(message_of("size_px = [8, 4]\n[[camera]]\nwidth_px = 8\nheight_px = 8\nfocal_px = 9\n" + kView),
+              HasSubstr("s.toml:1: size_px: is for the paper's cameras alone"));
+  EXPECT_THAT(message_of("sky = 1\n" + kView),
+              HasSubstr("known here: camera, rig, size_px, square_pixels, line_floor_px"));
+  EXPECT_THAT(message_of("rig = 'no/such.toml'\n" + kView), HasSubstr("s.toml: rig: "));
+}
+
+TEST(SceneFile, PixelsOfThePapersCamerasCanBeSquareAtAnySize) {
+  const Camera stretched = parse_scene("size_px = [64, 64]\n" + kView, "s").config.rig.cameras[0],
+               square = parse_scene("size_px = [64, 64]\nsquare_pixels = true\n" + kView, "s").config.rig.cameras[0];
+  EXPECT_EQ(square.focal_x_px, stretched.focal_x_px);
+  EXPECT_EQ(square.focal_y_px, square.focal_x_px);
+  EXPECT_GT(stretched.focal_y_px, 1.7f * stretched.focal_x_px);
+}
+
+TEST(SceneFile, APipeIsRefusedInsteadOfWaitedFor) {
+  const test::ScratchFolder folder;
+  const std::string pipe = folder / "pipe.toml";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_THAT(test::message_of([&] { load_scene(pipe); }), HasSubstr("pipe.toml: expected a regular file, got a pipe"));
+  EXPECT_THAT(test::message_of([&] { load_rig(pipe); }), HasSubstr("pipe.toml: expected a regular file, got a pipe"));
 }
 
 TEST(SceneFile, ARigFileIsFoundInTheScenesFolder) {
