@@ -15,16 +15,21 @@ namespace {
 const std::map<std::string, Density> kDensities{
     {"light", Density::light}, {"medium", Density::medium}, {"dense", Density::dense}};
 
-void print_table(const std::vector<EvaluateRow>& rows) {
+void print_table(const EvaluateReport& report) {
   fmt::print("{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>17} {:>9}\n", "density", "scenarios", "steps",
              "vehicles", "at-fault", "off-road", "red light", "goals", "km/infraction", "km");
   const auto text = [](const Estimate& e) { return fmt::format("{:.3f} +- {:.3f}", e.value, e.half_width_95); };
-  for (const EvaluateRow& row : rows) {
+  for (const EvaluateRow& row : report.rows) {
     fmt::print("{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>17} {:>9.2f}\n", row.density, row.scenarios,
                row.steps, row.vehicle_episodes, text(row.at_fault_collision_rate), text(row.off_road_rate),
                text(row.red_light_rate), text(row.goals_per_vehicle), text(row.km_per_infraction), row.km_driven);
   }
   fmt::print("+- is the half width of a 95 % confidence interval over scenarios\n");
+  if (report.agent_steps > 0) {
+    const auto steps = static_cast<double>(report.agent_steps);
+    fmt::print("{} agent-steps in {}: {}/s\n", format_count(steps), format_duration(report.seconds),
+               format_count(steps / report.seconds));
+  }
 }
 
 void print_report(const EvaluateOptions& options, const EvaluateReport& report) {
@@ -58,6 +63,8 @@ void print_report(const EvaluateOptions& options, const EvaluateReport& report) 
               {"device", setting.device},
               {"precision", setting.precision},
               {"interrupted", report.interrupted},
+              {"agent_steps", report.agent_steps > 0 ? Json(report.agent_steps) : Json(nullptr)},
+              {"seconds", report.agent_steps > 0 ? Json(report.seconds) : Json(nullptr)},
               {"rows", table}});
 }
 
@@ -184,7 +191,7 @@ void add_evaluate_command(CLI::App& app) {
     if (arguments->json)
       print_report(evaluation, report);
     else
-      print_table(report.rows);
+      print_table(report);
     if (report.interrupted) {
       throw Interrupted(fmt::format("interrupted; {} of {} densities are finished", report.rows.size(),
                                     evaluation.agents_per_world > 0 ? 1 : evaluation.densities.size()));

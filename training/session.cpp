@@ -68,9 +68,16 @@ struct PolicySession::Parts {
         device(open_learning_device(config)),
         rig(chosen_rig(checkpoint, options)),
         executor(make_learner_executor(device)),
-        policy(make_policy(config, rig, device)) {
+        own_policy(std::make_unique<Policy>(make_policy(config, rig, device))),
+        policy(*own_policy) {
     restore_tensors(checkpoint, checkpoint.parameters, policy.parameters());
   }
+  Parts(const Config& its_config, const Rig& its_rig, Device its_device, const Policy& its_policy)
+      : config(its_config),
+        device(its_device),
+        rig(its_rig),
+        executor(make_learner_executor(device)),
+        policy(its_policy) {}
 
   /// For the agents of a batch that `indices`, i64 [n], name.
   Decision decide(const PolicyInput& input, int64_t batch, const at::Tensor& indices, Renderer* renderer) const {
@@ -89,7 +96,8 @@ struct PolicySession::Parts {
   const Device device;
   const Rig rig;
   const std::unique_ptr<LearnerExecutor> executor;
-  const Policy policy;
+  const std::unique_ptr<const Policy> own_policy;  // null where it is another's
+  const Policy& policy;
 
  private:
   void check_images(const PolicyInput& input, size_t batch, const Renderer* renderer) const {
@@ -117,9 +125,9 @@ struct PolicySession::Parts {
 };
 
 /// A policy for one simulator.
-class PolicyController final : public Controller {
+class SessionController final : public PolicyController {
  public:
-  PolicyController(const PolicySession::Parts* parts, Renderer* renderer, const ActionChoice& choice)
+  SessionController(const PolicySession::Parts* parts, Renderer* renderer, const ActionChoice& choice)
       : parts_(*parts), renderer_(renderer), choice_(choice) {}
 
   std::string_view name() const override { return "policy"; }
@@ -131,6 +139,7 @@ class PolicyController final : public Controller {
       actions_ = at::zeros({num_slots}, at::TensorOptions(at::kInt).device(torch_device(parts_.device)));
     }
     const at::Tensor slots = active_slots(input, mask, parts_.executor.get());
+    num_driven_ = slots.size(0);
     const Decision decision =
         parts_.decide({input.observations, &input.scene, input.views, {}}, num_slots, slots, renderer_);
     const Span<int32_t> actions = span_of<int32_t>(actions_);
@@ -139,18 +148,21 @@ class PolicyController final : public Controller {
     parts_.executor->write_commands(actions, mask, commands_out);
   }
 
+  int64_t num_driven() const override { return num_driven_; }
+
  private:
   const PolicySession::Parts& parts_;
   Renderer* renderer_;
   ActionChoice choice_;
   at::Tensor actions_;  // i32 [slots]
+  int64_t num_driven_ = 0;
 };
 
 PolicySession::PolicySession(const std::string& checkpoint_path, const SessionOptions& options)
-    : PolicySession(read_checkpoint(checkpoint_path), options) {}
+    : parts_(std::make_unique<Parts>(read_checkpoint(checkpoint_path), options)) {}
 
-PolicySession::PolicySession(const Checkpoint& checkpoint, const SessionOptions& options)
-    : parts_(std::make_unique<Parts>(checkpoint, options)) {}
+PolicySession::PolicySession(const Config& config, const Rig& rig, Device device, const Policy& policy)
+    : parts_(std::make_unique<Parts>(config, rig, device, policy)) {}
 
 PolicySession::~PolicySession() = default;
 
@@ -202,9 +214,9 @@ void PolicySession::evaluate(const PolicyInput& input, Renderer* renderer, Span<
   tensor_over(values_out, parts_->device, {batch}).copy_(decision.value);
 }
 
-std::unique_ptr<Controller> PolicySession::make_controller(Renderer* renderer, bool argmax, uint64_t seed) {
+std::unique_ptr<PolicyController> PolicySession::make_controller(Renderer* renderer, bool argmax, uint64_t seed) {
   PICTURA_CHECK(!reads_images() || renderer, "policy: it reads images: expected a renderer");
-  return std::make_unique<PolicyController>(parts_.get(), renderer, ActionChoice{argmax, seed});
+  return std::make_unique<SessionController>(parts_.get(), renderer, ActionChoice{argmax, seed});
 }
 
 }  // namespace pictura

@@ -12,7 +12,8 @@
 
 namespace pictura {
 
-struct Checkpoint;
+class Policy;
+struct Config;
 
 struct SessionOptions {
   int num_threads = 0;            // of torch and renderers; 0: all
@@ -32,14 +33,21 @@ struct PolicyInput {
   Span<const uint8_t> is_drawn;       // [batch] 0: its images are black; empty: all are drawn
 };
 
+/// A policy that drives. On a device act() waits for one number: how many agents it drives.
+class PolicyController : public Controller {
+ public:
+  /// How many agents the last act() chose actions for: those of its mask that were active.
+  virtual int64_t num_driven() const = 0;
+};
+
 /// Serves one thread at a time.
 class PolicySession {
  public:
   /// Throws Error naming the file when it is no checkpoint, truncated, of another observation schema or architecture,
   /// or when it cannot run on this device. UsageError where it cannot see through the cameras of the options.
   explicit PolicySession(const std::string& checkpoint_path, const SessionOptions& options = {});
-  /// The policy of a run that goes on; of the checkpoint it reads configuration, rig and parameters.
-  PolicySession(const Checkpoint& checkpoint, const SessionOptions& options);
+  /// The policy of a configuration with cameras of `rig`, as it is when it is asked; it must outlive the session.
+  PolicySession(const Config& config, const Rig& rig, Device device, const Policy& policy);
   ~PolicySession();
   PolicySession(const PolicySession&) = delete;
   PolicySession& operator=(const PolicySession&) = delete;
@@ -71,10 +79,10 @@ class PolicySession {
   /// Drives in a simulator on device(): the most likely action, or a draw keyed by (seed, global world, agent,
   /// episode, step) as in training. Session and renderer, which is as for evaluate(), must outlive it. Images are drawn
   /// for active agents alone.
-  std::unique_ptr<Controller> make_controller(Renderer* renderer, bool argmax, uint64_t seed);
+  std::unique_ptr<PolicyController> make_controller(Renderer* renderer, bool argmax, uint64_t seed);
 
  private:
-  friend class PolicyController;
+  friend class SessionController;
   struct Parts;
   std::unique_ptr<Parts> parts_;
 };

@@ -607,6 +607,9 @@ TEST_F(Training, VectorPolicyTrainsAndIsEvaluated) {
   EXPECT_LE(rows[0].vehicle_episodes, 18);
   EXPECT_GT(rows[0].vehicle_episodes, 0);
   EXPECT_EQ(done, 1);
+  EXPECT_GT(evaluated.seconds, 0);
+  EXPECT_GT(evaluated.agent_steps, 0);
+  EXPECT_LE(evaluated.agent_steps, 3 * 6 * 25);
   for (const double rate :
        {rows[0].at_fault_collision_rate.value, rows[0].off_road_rate.value, rows[0].red_light_rate.value}) {
     EXPECT_GE(rate, 0);
@@ -767,7 +770,9 @@ TEST_F(Training, ASessionGivesLogitsAndValuesOfAnyScene) {
 
   // The controller takes the most likely of them.
   std::vector<Command> commands(6);
-  session.make_controller(renderer.get(), /*argmax=*/true, 1)->act(input, {}, commands);
+  const std::unique_ptr<PolicyController> controller = session.make_controller(renderer.get(), /*argmax=*/true, 1);
+  controller->act(input, {}, commands);
+  EXPECT_EQ(controller->num_driven(), 6);
   for (size_t agent = 0; agent < 6; ++agent) {
     const auto first = logits.begin() + static_cast<std::ptrdiff_t>(agent * kNumActions);
     EXPECT_EQ(commands[agent].action, std::max_element(first, first + kNumActions) - first) << agent;
@@ -775,7 +780,8 @@ TEST_F(Training, ASessionGivesLogitsAndValuesOfAnyScene) {
   // A mask leaves the others' commands alone.
   std::vector<Command> some(6, Command{.kind = CommandKind::absent});
   const std::vector<uint8_t> mask{0, 1, 0, 0, 1, 0};
-  session.make_controller(renderer.get(), /*argmax=*/true, 1)->act(input, mask, some);
+  controller->act(input, mask, some);
+  EXPECT_EQ(controller->num_driven(), 2);
   for (size_t agent = 0; agent < 6; ++agent) {
     EXPECT_EQ(some[agent].kind, mask[agent] ? CommandKind::action : CommandKind::absent) << agent;
   }

@@ -4,7 +4,6 @@
 
 #include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_simulator.h"
-#include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/map/load_map.h"
@@ -31,31 +30,28 @@ DensityOf density_of(Density density) {
   }
 }
 
-// A scan waits for the device.
-constexpr int kStepsBetweenScans = 16;
-
-// Worlds that are simulated together: enough to keep a device busy. Images are drawn for parts of them.
+// Worlds that are simulated together: on a device all 200 of the paper's densities, which keep it busy. Images take no
+// part in it: they are drawn for train.forward_chunk agents at a time.
 int worlds_per_batch(Device device, int agents_per_world) {
   const int max_agents = device.is_host() ? 4096 : 32768;
   return std::max(1, max_agents / agents_per_world);
 }
 
-// All agents' fields on the host.
-AgentState host_state(Simulator& simulator) {
-  const auto num_slots = static_cast<size_t>(simulator.num_slots());
+// The agents' fields that are counted, on the host; all others are empty.
+AgentState counted_state(Simulator& simulator) {
   const AgentStateView state = simulator.state();
-  AgentState host;
-#define X(name, type, per_agent, first, comment) \
-  host.name = host_copy(Span<const type>(state.name, num_slots * (per_agent)), simulator.device());
-  PICTURA_AGENT_FIELDS(X)
-#undef X
+  AgentState host(0);
+  const auto copy = [&simulator](const auto* field, auto* out) {
+    *out = host_copy(Span(field, static_cast<size_t>(simulator.num_slots())), simulator.device());
+  };
+  copy(state.status, &host.status);
+  copy(state.agent_class, &host.agent_class);
+  copy(state.episode_events, &host.episode_events);
+  copy(state.goals_reached, &host.goals_reached);
+  copy(state.waypoints_reached, &host.waypoints_reached);
+  copy(state.distance_m, &host.distance_m);
+  copy(state.episode_return, &host.episode_return);
   return host;
-}
-
-bool has_active_agents(Simulator& simulator) {
-  const Span<const uint8_t> status(simulator.state().status, static_cast<size_t>(simulator.num_slots()));
-  const std::vector<uint8_t> all = host_copy(status, simulator.device());
-  return std::count(all.begin(), all.end(), static_cast<uint8_t>(AgentStatus::active)) > 0;
 }
 
 void add(const AgentStateView& state, int64_t slot, ScenarioCounts* counts) {
@@ -75,20 +71,44 @@ void add(const AgentStateView& state, int64_t slot, ScenarioCounts* counts) {
   counts->returns += static_cast<double>(state.episode_return[slot]);
 }
 
+void check(const EvaluateOptions& options) {
+  if (options.first_scenario < 0) fail_usage("evaluate: expected a scenario from 0, got {}", options.first_scenario);
+  if (options.scenarios < 1) fail_usage("evaluate: expected one scenario or more, got {}", options.scenarios);
+  if (options.steps < 1) fail_usage("evaluate: expected one step or more, got {}", options.steps);
+  if (options.maps.empty()) fail_usage("evaluate: expected one map or more");
+  if (options.agents_per_world < 0 || options.agents_per_world > kMaxAgentsPerWorld) {
+    fail_usage("evaluate: expected 1 to {} agents per world, got {}", kMaxAgentsPerWorld, options.agents_per_world);
+  }
+}
+
+// What drives the agents of a batch of worlds, and how many it drove when it last acted.
+struct Driving {
+  std::unique_ptr<Controller> controller;
+  std::function<int64_t()> num_driven;
+};
+
 // Who is evaluated, and where.
 struct Driver {
   SimulatorConfig world;
   EvaluationSetting setting;  // what of it is the driver's
   Device device;
-  std::unique_ptr<Renderer> renderer;  // of its images, or null
-  std::function<std::unique_ptr<Controller>(Simulator&, Renderer*)> make_controller;
+  std::function<Driving(Simulator&)> drive;
 };
 
-Driver driver_of(PolicySession* session, const EvaluateOptions& options) {
+Driver driver_of(PolicySession* session, Renderer* renderer, const EvaluateOptions& options) {
   return {session->evaluation_world(options.steps), session->evaluation_setting(), session->device(),
-          session->make_renderer(), [session, &options](Simulator&, Renderer* renderer) {
-            return session->make_controller(renderer, options.argmax, options.seed);
+          [session, renderer, &options](Simulator&) {
+            std::unique_ptr<PolicyController> controller =
+                session->make_controller(renderer, options.argmax, options.seed);
+            const PolicyController* const policy = controller.get();
+            return Driving{std::move(controller), [policy] { return policy->num_driven(); }};
           }};
+}
+
+int64_t count_active(Simulator& simulator) {
+  const Span<const uint8_t> status(simulator.state().status, static_cast<size_t>(simulator.num_slots()));
+  const std::vector<uint8_t> all = host_copy(status, simulator.device());
+  return std::count(all.begin(), all.end(), static_cast<uint8_t>(AgentStatus::active));
 }
 
 // One that needs no policy.
@@ -106,26 +126,23 @@ Driver driver_of(const std::string& controller, const EvaluateOptions& options) 
   driver.world = evaluation_simulator_config(config, options.steps, driver.device);
   driver.setting.policy_hash = controller;
   driver.setting.device = driver.device.is_host() ? "cpu" : drives_on_host ? "cuda, driven from the host" : "cuda";
-  driver.make_controller = [controller, &options](Simulator& simulator, Renderer*) {
-    return make_controller(controller, simulator, options.seed);
+  driver.drive = [controller, &options](Simulator& simulator) {
+    return Driving{make_controller(controller, simulator, options.seed),
+                   [&simulator] { return count_active(simulator); }};
   };
   return driver;
 }
 
-EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options) {
-  if (options.first_scenario < 0) fail_usage("evaluate: expected a scenario from 0, got {}", options.first_scenario);
-  if (options.scenarios < 1) fail_usage("evaluate: expected one scenario or more, got {}", options.scenarios);
-  if (options.steps < 1) fail_usage("evaluate: expected one step or more, got {}", options.steps);
-  if (options.maps.empty()) fail_usage("evaluate: expected one map or more");
-  if (options.agents_per_world < 0 || options.agents_per_world > kMaxAgentsPerWorld) {
-    fail_usage("evaluate: expected 1 to {} agents per world, got {}", kMaxAgentsPerWorld, options.agents_per_world);
-  }
-  SimulatorConfig simulator_config = driver.world;
-  simulator_config.seed = options.seed;
+CompiledMaps compile_maps_of(const EvaluateOptions& options, const SimulatorConfig& world) {
   std::vector<std::shared_ptr<const RoadMap>> roads;
   for (const std::string& name : options.maps) roads.push_back(load_map(name));
-  const CompiledMaps maps = compile_maps(roads, map_options(simulator_config), options.num_threads);
+  return compile_maps(roads, map_options(world), options.num_threads);
+}
 
+EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options, EvaluationWorlds* shared) {
+  const CompiledMaps& maps = shared->maps;
+  SimulatorConfig simulator_config = driver.world;
+  simulator_config.seed = options.seed;
   std::vector<DensityOf> densities;
   if (options.agents_per_world > 0)
     densities.push_back({"custom", options.agents_per_world});
@@ -135,7 +152,6 @@ EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options) {
   for (const DensityOf& density : densities) work += double(density.agents) * options.scenarios * options.steps;
 
   const Stopwatch since_start;
-  std::unique_ptr<Simulator> simulator;  // made with the first batch
   EvaluateReport report;
   report.results.setting = driver.setting;
   EvaluationSetting& setting = report.results.setting;
@@ -154,25 +170,26 @@ EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options) {
         worlds.push_back({scenario % static_cast<int>(maps.size()), density.agents,
                           kFirstEvaluationWorld + static_cast<uint32_t>(scenario)});
       }
-      if (simulator) {
+      std::unique_ptr<Simulator>& simulator = shared->simulator;
+      if (simulator)
         simulator->set_worlds(maps, {}, worlds, options.seed);
-      } else {
+      else
         simulator = make_simulator(options.simulator, simulator_config, maps, worlds);
-        if (driver.renderer) upload_maps(*simulator, driver.renderer.get());
-      }
-      const std::unique_ptr<Controller> controller = driver.make_controller(*simulator, driver.renderer.get());
+      const Driving driving = driver.drive(*simulator);
       const auto num_slots = static_cast<size_t>(simulator->num_slots());
       const at::Tensor command_bytes = at::zeros({static_cast<int64_t>(num_slots * sizeof(Command))},
                                                  at::TensorOptions(at::kByte).device(torch_device(driver.device)));
       const Span<Command> commands(reinterpret_cast<Command*>(command_bytes.data_ptr<uint8_t>()), num_slots);
       for (int step = 0; step < options.steps; ++step) {
-        // Halted agents stay as they are, so a batch is over when no agent is active.
-        if (step % kStepsBetweenScans == 0 && !has_active_agents(*simulator)) break;
         if (interrupted()) {
           report.interrupted = true;
           return report;
         }
-        controller->act(simulator->controller_input(), {}, commands);
+        driving.controller->act(simulator->controller_input(), {}, commands);
+        // Halted agents stay as they are, so a batch is over when no agent is active.
+        const int64_t num_driven = driving.num_driven();
+        if (num_driven == 0) break;
+        report.agent_steps += num_driven;
         simulator->step(Span<const Command>(commands));
         if (options.on_progress && step % 10 == 0) {
           const double fraction = (done + double(simulator->num_slots()) * (step + 1)) / work;
@@ -180,7 +197,7 @@ EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options) {
         }
       }
       done += double(simulator->num_slots()) * options.steps;
-      AgentState state = host_state(*simulator);
+      AgentState state = counted_state(*simulator);
       for (int slot = 0; slot < simulator->num_slots(); ++slot) {
         add(state.view(), slot, &result.scenarios[static_cast<size_t>(first + slot / density.agents)]);
       }
@@ -188,6 +205,7 @@ EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options) {
     report.rows.push_back(row_of(result, options.steps));
     report.results.densities.push_back(std::move(result));
   }
+  report.seconds = since_start.seconds();
   if (options.on_progress) options.on_progress(1, 0);
   return report;
 }
@@ -195,20 +213,40 @@ EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options) {
 }  // namespace
 
 EvaluateReport evaluate(const EvaluateOptions& options) {
-  if (!options.controller.empty()) return evaluate(driver_of(options.controller, options), options);
-  PolicySession session(options.checkpoint, {.num_threads = options.num_threads,
-                                             .device = options.device,
-                                             .simulator = options.simulator,
-                                             .renderer = options.renderer,
-                                             .samples = options.samples,
-                                             .rig = options.rig,
-                                             .width_px = options.width_px,
-                                             .height_px = options.height_px});
-  return evaluate(&session, options);
+  if (options.controller.empty()) {
+    PolicySession session(options.checkpoint, {.num_threads = options.num_threads,
+                                               .device = options.device,
+                                               .simulator = options.simulator,
+                                               .renderer = options.renderer,
+                                               .samples = options.samples,
+                                               .rig = options.rig,
+                                               .width_px = options.width_px,
+                                               .height_px = options.height_px});
+    return evaluate(&session, options);
+  }
+  check(options);
+  const Driver driver = driver_of(options.controller, options);
+  EvaluationWorlds worlds;
+  worlds.maps = compile_maps_of(options, driver.world);
+  return evaluate(driver, options, &worlds);
 }
 
 EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options) {
-  return evaluate(driver_of(session, options), options);
+  check(options);
+  EvaluationWorlds worlds;
+  worlds.maps = compile_maps_of(options, session->evaluation_world(options.steps));
+  const std::unique_ptr<Renderer> renderer = session->make_renderer();
+  worlds.renderer = renderer.get();
+  // Under the handles that a new simulator gives them.
+  for (size_t i = 0; renderer && i < worlds.maps.size(); ++i) {
+    renderer->upload(static_cast<GeometryHandle>(i), worlds.maps[i]->geometry);
+  }
+  return evaluate(session, options, &worlds);
+}
+
+EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options, EvaluationWorlds* shared) {
+  check(options);
+  return evaluate(driver_of(session, shared->renderer, options), options, shared);
 }
 
 }  // namespace pictura

@@ -6,11 +6,13 @@
 #include <vector>
 
 #include "pictura/common/portable/hd.h"
+#include "pictura/simulator/simulator.h"
 #include "pictura/training/evaluation/results.h"
 
 namespace pictura {
 
 class PolicySession;
+class Renderer;
 
 enum class Density { light, medium, dense };  // 60, 120 and 150 agents a world
 
@@ -42,6 +44,17 @@ struct EvaluateReport {
   EvaluationResults results;      // of the densities that were finished, in the order of options.densities
   std::vector<EvaluateRow> rows;  // of each
   bool interrupted = false;       // ^C came (common/support/interrupt.h) before the last one was
+  // Without the making of maps and renderer, and 0 where parts were merged. Agent-steps are of active agents of all
+  // classes.
+  double seconds = 0;
+  int64_t agent_steps = 0;
+};
+
+/// What evaluations in the same worlds share.
+struct EvaluationWorlds {
+  CompiledMaps maps;                     // of EvaluateOptions::maps, compiled with those options of the session's world
+  Renderer* renderer = nullptr;          // of the session's images, with the maps as 0, 1, ...; null without images
+  std::unique_ptr<Simulator> simulator;  // made by the first of them
 };
 
 /// Scenario k is on map k modulo the number of maps and draws its random numbers as world kFirstEvaluationWorld + k, so
@@ -49,5 +62,7 @@ struct EvaluateReport {
 EvaluateReport evaluate(const EvaluateOptions& options);
 /// The same of a session's policy, whose own device, renderer and cameras it keeps.
 EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options);
+/// One of several in the same worlds, with an equal number of steps.
+EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options, EvaluationWorlds* worlds);
 
 }  // namespace pictura
