@@ -41,14 +41,7 @@ void print_report(const EvaluateOptions& options, const EvaluateReport& report) 
                  {"steps", row.steps},
                  {"vehicle_episodes", row.vehicle_episodes},
                  {"km_driven", row.km_driven}};
-    for (const auto& [name, estimate] :
-         {std::pair{"at_fault_collision_rate", row.at_fault_collision_rate},
-          std::pair{"off_road_rate", row.off_road_rate}, std::pair{"red_light_rate", row.red_light_rate},
-          std::pair{"goals_per_vehicle", row.goals_per_vehicle}, std::pair{"km_per_infraction", row.km_per_infraction},
-          std::pair{"km_per_vehicle", row.km_per_vehicle},
-          std::pair{"waypoints_per_vehicle", row.waypoints_per_vehicle},
-          std::pair{"return_per_vehicle", row.return_per_vehicle},
-          std::pair{"active_at_end_share", row.active_at_end_share}}) {
+    for (const auto& [name, estimate] : metrics_of(row)) {
       json[name] = finite_or_null(estimate.value);
       json[fmt::format("{}_half_width_95", name)] = finite_or_null(estimate.half_width_95);
     }

@@ -69,6 +69,7 @@ void add_train_command(CLI::App& app) {
                   {"updates", report.updates},
                   {"episode_return", finite_or_null(report.episode_return)},
                   {"km_driven", report.km_driven},
+                  {"evaluation_s", report.evaluation_s},
                   {"checkpoint", report.checkpoint},
                   {"policy_hash", report.policy_hash},
                   {"ranks", report.ranks},

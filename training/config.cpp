@@ -102,6 +102,10 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.number("train.checkpoint_minutes", c.train.checkpoint_minutes, 0.01, 1e6);
   v.integer("train.keep_checkpoints", c.train.keep_checkpoints, 1, 1000);
   v.integer("train.milestone_agent_steps", c.train.milestone_agent_steps, 0, int64_t{1} << 50);
+  v.integer("train.evaluate_every", c.train.evaluate_every, 0, int64_t{1} << 40);
+  v.integer("train.evaluate_scenarios", c.train.evaluate_scenarios, 1, 1 << 20);
+  v.integer("train.evaluate_agents", c.train.evaluate_agents, 1, kMaxAgentsPerWorld);
+  v.integer("train.evaluate_steps", c.train.evaluate_steps, 1, 1 << 24);
   v.choice("train.precision", c.train.precision, kPrecisions);
   v.flag("train.reproducible", c.train.reproducible);
   v.name("train.images", c.train.images, {"auto", "kept", "redrawn"});
@@ -567,7 +571,9 @@ bool may_differ(const std::string& key, const Config& saved, const Config& now) 
                                                "render.width_px",
                                                "render.height_px",
                                                "simulator.backend"};
-  if (kHarmless.count(key) || key.starts_with("evaluate.") || is_reported(key)) return true;
+  if (kHarmless.count(key) || key.starts_with("evaluate.") || key.starts_with("train.evaluate_") || is_reported(key)) {
+    return true;
+  }
   if (key == "render.backend" && drawn_by(saved.render.backend) == drawn_by(now.render.backend)) return true;
   // The vector policy reads nothing of it, before and now, since the modality may not differ.
   return !saved.reads_images() && key.starts_with("render.");

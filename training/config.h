@@ -94,6 +94,9 @@ struct Config {
     double checkpoint_minutes = 2;       // or as soon as these have passed
     int64_t keep_checkpoints = 1;        // the newest and those before it, as checkpoint.1.ckpt, ...
     int64_t milestone_agent_steps = 0;   // distance of checkpoints that are kept for ever; 0: none
+    // Small evaluations within a run, see training/run_evaluation.h.
+    int64_t evaluate_every = 0;  // updates; 0: never
+    int evaluate_scenarios = 16, evaluate_agents = 120, evaluate_steps = 600;
     Precision precision = Precision::bf16;
     bool reproducible = false;  // the same bits in every run on a device, see training/precision.h
     /// Of a rollout: kept, or redrawn from its scenes where they are read; auto: kept on the host, redrawn on a device.

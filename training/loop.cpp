@@ -20,6 +20,7 @@
 #include "pictura/training/ranks/agree.h"
 #include "pictura/training/ranks/ranks.h"
 #include "pictura/training/run.h"
+#include "pictura/training/run_evaluation.h"
 #include "pictura/training/run_folder.h"
 #include "pictura/training/run_log.h"
 #include "pictura/training/schedule.h"
@@ -190,13 +191,29 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
   // Before the first update of this process it is that of an earlier one, where the run was on such a device before.
   const std::string machine = fmt::format("{}, {} agents", product_name(device), run.simulator->num_slots());
   double own_longest_s = 0;
-  while (run.update < config.train.updates && !schedule_has_ended(config.train, run.agent_steps) &&
-         !report.interrupted) {
-    // A fifth more, for updates that take longer than those before, and for saving.
-    const auto longest = run.longest_update_s.find(machine);
+  const auto ends_too_late = [&](const std::string& work) {
+    // A fifth more, for what takes longer than the longest before, and for saving.
+    const auto longest = run.longest_update_s.find(work);
     const double expected_s = longest == run.longest_update_s.end() ? 0 : 1.2 * longest->second;
-    report.out_of_time =
-        any_rank(options.minutes > 0 && since_start.seconds() + expected_s > 60 * options.minutes, communicator.get());
+    return any_rank(options.minutes > 0 && since_start.seconds() + expected_s > 60 * options.minutes, communicator.get());
+  };
+  // One that there is no time for, or that was interrupted, is made when the run goes on. All ranks make the same one.
+  RunEvaluation evaluation(run);
+  const std::string evaluation_on_machine = machine + ", evaluation";
+  const auto evaluate_if_due = [&] {
+    if (!any_rank(evaluation.is_due() && log.lacks_evaluation(run.update), communicator.get())) return;
+    report.out_of_time = ends_too_late(evaluation_on_machine);
+    if (report.out_of_time) return;
+    const std::optional<EvaluationRecord> record = evaluation.evaluate();
+    if (!record) return;
+    log.add_evaluation(run.update, run.agent_steps, *record);
+    double& longest_s = run.longest_update_s[evaluation_on_machine];
+    longest_s = std::max(longest_s, record->seconds);
+  };
+  evaluate_if_due();
+  while (run.update < config.train.updates && !schedule_has_ended(config.train, run.agent_steps) &&
+         !report.interrupted && !report.out_of_time) {
+    report.out_of_time = ends_too_late(machine);
     if (report.out_of_time) break;
     const std::unique_ptr<StateSnapshot> before = run.simulator->snapshot();
     const SimulatorTotals totals_before = run.simulator->totals();
@@ -233,6 +250,7 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
       progress.ends_by_minutes = true;
     }
     report.agent_steps_per_s = progress.agent_steps_per_s;
+    evaluate_if_due();
     report.interrupted = any_rank_interrupted(communicator.get());
     if (run.update % config.train.checkpoint_every == 0 ||
         any_rank(since_saved.seconds() > 60 * config.train.checkpoint_minutes, communicator.get())) {
@@ -253,6 +271,7 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
   report.updates = run.update;
   report.episode_return = log.episode_return();
   report.km_driven = run.distance_m / 1000;
+  report.evaluation_s = log.evaluation_s();
   report.policy_hash = run.policy.hash();
   return report;
 }

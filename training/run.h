@@ -39,7 +39,7 @@ struct Run {
   int64_t agent_steps = 0;  // in these
   double distance_m = 0;    // driven by all agents in these
   // By device and agents, as "NVIDIA H100 80GB HBM3, 20480 agents": wall time of the longest update of the last process
-  // that made one there.
+  // that made one there; and with ", evaluation" after it, of the longest evaluation of itself.
   std::map<std::string, double> longest_update_s;
 };
 

@@ -15,7 +15,7 @@ std::vector<std::string> run_files(const std::string& folder) {
   // The last are what a killed process leaves of common/support/file.h.
   static const std::regex kNames(
       R"(config\.toml|(untrained|checkpoint(\.(\d+|next))?|milestone_\d+[kM]?)\.ckpt|(policy|failed_minibatch)\.safetensors|)"
-      R"(progress\.csv(\.\d+)?|)"
+      R"((progress|evaluation)\.csv(\.\d+)?|)"
       R"(events\.out\.tfevents\.\d+\.\d+|learning_curve\.png|\.[\w.]+\.\d+\.tmp\.\w+)");
   std::vector<std::string> names;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {

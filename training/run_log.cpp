@@ -85,6 +85,18 @@ Scalars scalars_of(const Config& config, const TrainProgress& progress, const Up
   return scalars;
 }
 
+Scalars scalars_of_evaluation(int64_t agent_steps, const EvaluationRecord& record) {
+  Scalars scalars{{"charts/agent_steps", static_cast<double>(agent_steps)}};
+  for (const auto& [name, estimate] : metrics_of(record.row)) {
+    scalars.emplace_back("evaluation/" + name, estimate.value);
+    scalars.emplace_back(fmt::format("evaluation/{}_half_width_95", name), estimate.half_width_95);
+  }
+  scalars.emplace_back("evaluation/vehicle_episodes", static_cast<double>(record.row.vehicle_episodes));
+  scalars.emplace_back("evaluation/km_driven", record.row.km_driven);
+  scalars.emplace_back("time/evaluation_s", record.seconds);
+  return scalars;
+}
+
 std::vector<std::string_view> whole_lines(std::string_view text) {
   std::vector<std::string_view> lines;
   for (size_t end = text.find('\n'); end != text.npos; end = text.find('\n')) {
@@ -129,7 +141,9 @@ ProgressCsv::ProgressCsv(const std::string& path, const Scalars& columns, int64_
       if (on_notice) on_notice(fmt::format("{}: had other columns, and is now {}", path, aside));
     } else {
       for (size_t i = 1; i < lines.size(); ++i) {
-        if (is_row(lines[i], columns.size() + 1, updates_done)) kept.append(lines[i]) += '\n';
+        if (!is_row(lines[i], columns.size() + 1, updates_done)) continue;
+        kept.append(lines[i]) += '\n';
+        last_update_ = std::atoll(lines[i].data());
       }
     }
   }
@@ -142,6 +156,7 @@ void ProgressCsv::write(int64_t update, const Scalars& scalars) {
   for (const auto& [name, value] : scalars) out_ << ',' << fmt::format("{:.9g}", value);
   out_ << '\n' << std::flush;
   PICTURA_CHECK(out_, "{}: writing failed: {}", path_, std::strerror(errno));
+  last_update_ = update;
 }
 
 RunLog::RunLog(const std::string& folder, const Config& config, int64_t updates_done, int64_t agent_steps,
@@ -154,6 +169,9 @@ RunLog::RunLog(const std::string& folder, const Config& config, int64_t updates_
   if (folder.empty()) return;
   events_.emplace(folder);
   csv_.emplace(folder + "/progress.csv", scalars_of(config, {}, {}), updates_done, on_notice);
+  if (config_.train.evaluate_every > 0) {
+    evaluation_csv_.emplace(folder + "/evaluation.csv", scalars_of_evaluation(0, {}), updates_done, on_notice);
+  }
 }
 
 TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecord& record) {
@@ -166,7 +184,7 @@ TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecor
   progress.update = update;
   progress.updates = config_.train.updates;
   progress.agent_steps = agent_steps;
-  progress.agent_steps_per_s = static_cast<double>(agent_steps - first_agent_steps_) / elapsed_s;
+  progress.agent_steps_per_s = static_cast<double>(agent_steps - first_agent_steps_) / (elapsed_s - evaluation_s_);
   progress.episode_return = episode_return();
   // To the last update, or to the end of the schedule, whichever comes first.
   const auto done = static_cast<double>(update - first_update_),
@@ -199,6 +217,15 @@ TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecor
   if (csv_) csv_->write(update, progress.scalars);
   if (events_) events_->write(agent_steps, progress.scalars);
   return progress;
+}
+
+void RunLog::add_evaluation(int64_t update, int64_t agent_steps, const EvaluationRecord& record) {
+  const Scalars scalars = scalars_of_evaluation(agent_steps, record);
+  if (evaluation_csv_) {
+    evaluation_csv_->write(update, scalars);
+    events_->write(agent_steps, scalars);
+  }
+  evaluation_s_ += record.seconds;
 }
 
 double RunLog::episode_return() const {

@@ -1,4 +1,5 @@
-// What a run reports after each update: a row of progress.csv, a TensorBoard event, and the progress line's numbers.
+// What a run reports after each update: a row of progress.csv, a TensorBoard event, and the progress line's numbers;
+// and after each evaluation a row of evaluation.csv and an event.
 #pragma once
 
 #include <deque>
@@ -6,6 +7,7 @@
 
 #include "pictura/training/checkpoint.h"
 #include "pictura/training/diagnosis.h"
+#include "pictura/training/evaluation/results.h"
 #include "pictura/training/event_file.h"
 #include "pictura/training/loop.h"
 #include "pictura/training/phase_timer.h"
@@ -13,19 +15,22 @@
 
 namespace pictura {
 
-/// One CSV per run. Of the rows of an older file it keeps those that are whole and of updates that are done: a process
-/// may have been killed, or a disk full, within one. A file with other columns is renamed to PATH.1 (or the next free
-/// number), with a notice.
+/// A file of a run with a row for an update. Of the rows of an older file it keeps those that are whole and of updates
+/// that are done: a process may have been killed, or a disk full, within one. A file with other columns is renamed to
+/// PATH.1 (or the next free number), with a notice.
 class ProgressCsv {
  public:
   ProgressCsv(const std::string& path, const Scalars& columns, int64_t updates_done,
               const std::function<void(const std::string&)>& on_notice);
   /// Appends a row and flushes. Throws Error naming the path when the disk is full.
   void write(int64_t update, const Scalars& scalars);
+  /// That of the last row; 0 where there is none.
+  int64_t last_update() const { return last_update_; }
 
  private:
   std::string path_;
   std::ofstream out_;
+  int64_t last_update_ = 0;
 };
 
 /// What one update did.
@@ -35,6 +40,12 @@ struct UpdateRecord {
   Diagnosis diagnosis;
   double rollout_s = 0, update_s = 0;  // wall time of collecting, and of improving
   PhaseSeconds phases_s{};             // in both
+};
+
+/// What an evaluation within a run gave.
+struct EvaluationRecord {
+  EvaluateRow row;
+  double seconds = 0;  // wall time
 };
 
 class RunLog {
@@ -48,6 +59,13 @@ class RunLog {
   /// notice of the first one whose log-probabilities were computed again.
   TrainProgress add(int64_t update, int64_t agent_steps, const UpdateRecord& record);
 
+  /// Writes the row and the event of an evaluation after `update` updates. Its time counts in no rate.
+  void add_evaluation(int64_t update, int64_t agent_steps, const EvaluationRecord& record);
+  /// Whether its file has no row of one after `update` updates; false where it writes none.
+  bool lacks_evaluation(int64_t update) const { return evaluation_csv_ && evaluation_csv_->last_update() != update; }
+  /// What those of this process took.
+  double evaluation_s() const { return evaluation_s_; }
+
   /// What the mean return of the last updates is made of.
   std::vector<RecentUpdate> recent() const { return {recent_.begin(), recent_.end()}; }
   /// Mean over agent episodes that ended in the last updates; NaN before the first.
@@ -60,6 +78,8 @@ class RunLog {
   bool has_said_rejected_ = false;
   std::optional<EventFile> events_;
   std::optional<ProgressCsv> csv_;
+  std::optional<ProgressCsv> evaluation_csv_;  // where the run evaluates
+  double evaluation_s_ = 0;
   std::deque<RecentUpdate> recent_;
   Stopwatch since_start_;
 };

@@ -219,6 +219,8 @@ TEST(Config, HarmlessDifferencesAreNone) {
   b.train.milestone_agent_steps = 1000;
   b.train.forward_chunk = 64;
   b.train.halted_slots = HaltedSlots::draw;
+  b.train.evaluate_every = 3;
+  b.train.evaluate_steps = 5;
   b.run.num_threads = 9;
   b.run.device = "cpu";
   b.simulator.backend = "cpu";

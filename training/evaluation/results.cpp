@@ -142,6 +142,18 @@ EvaluateRow row_of(const DensityResult& result, int steps) {
   return row;
 }
 
+std::vector<std::pair<std::string, Estimate>> metrics_of(const EvaluateRow& row) {
+  return {{"at_fault_collision_rate", row.at_fault_collision_rate},
+          {"off_road_rate", row.off_road_rate},
+          {"red_light_rate", row.red_light_rate},
+          {"goals_per_vehicle", row.goals_per_vehicle},
+          {"km_per_infraction", row.km_per_infraction},
+          {"km_per_vehicle", row.km_per_vehicle},
+          {"waypoints_per_vehicle", row.waypoints_per_vehicle},
+          {"return_per_vehicle", row.return_per_vehicle},
+          {"active_at_end_share", row.active_at_end_share}};
+}
+
 EvaluationResults merge(const std::vector<EvaluationResults>& parts, const std::vector<std::string>& names) {
   PICTURA_CHECK(!parts.empty(), "merge: expected one part or more");
   std::vector<std::string> order;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace pictura {
@@ -61,6 +62,9 @@ struct EvaluateRow {
   Estimate km_per_vehicle, waypoints_per_vehicle, return_per_vehicle;
   Estimate active_at_end_share;
 };
+
+/// Its metrics with the names that they have in files.
+std::vector<std::pair<std::string, Estimate>> metrics_of(const EvaluateRow& row);
 
 EvaluateRow row_of(const DensityResult& result, int steps);
 

@@ -1,0 +1,32 @@
+#include "pictura/training/run_evaluation.h"
+
+#include "pictura/training/session.h"
+
+namespace pictura {
+
+RunEvaluation::RunEvaluation(const Run& run) : run_(run) { worlds_.maps = run.simulator->maps(); }
+
+bool RunEvaluation::is_due() const {
+  const int64_t every = run_.config.train.evaluate_every;
+  return every > 0 && run_.update > 0 && run_.update % every == 0;
+}
+
+std::optional<EvaluationRecord> RunEvaluation::evaluate() {
+  const Stopwatch watch;
+  const Config& config = run_.config;
+  EvaluateOptions options;
+  options.maps = config.simulator.maps;
+  options.scenarios = config.train.evaluate_scenarios;
+  options.agents_per_world = config.train.evaluate_agents;
+  options.steps = config.train.evaluate_steps;
+  options.num_threads = config.run.num_threads;
+  options.simulator = run_.simulator->name();
+  // Both simulators name the maps 0, 1, ..., so this one's scenes are drawn with the maps that training uploaded.
+  worlds_.renderer = run_.renderer.get();
+  PolicySession session(config, run_.rig, run_.device, run_.policy);
+  const EvaluateReport report = pictura::evaluate(&session, options, &worlds_);
+  if (report.interrupted) return std::nullopt;
+  return EvaluationRecord{report.rows.at(0), watch.seconds()};
+}
+
+}  // namespace pictura

@@ -1,0 +1,29 @@
+// The small evaluation that a run makes of itself: the protocol of evaluation/ in a few worlds on the maps of training,
+// with the run's own renderer. It shares no state with training, which goes on as if there had been none.
+#pragma once
+
+#include <optional>
+
+#include "pictura/training/evaluation/evaluate.h"
+#include "pictura/training/run.h"
+#include "pictura/training/run_log.h"
+
+namespace pictura {
+
+class RunEvaluation {
+ public:
+  /// Of a run, which must outlive it.
+  explicit RunEvaluation(const Run& run);
+
+  /// Whether one is made after as many updates as the run has done.
+  bool is_due() const;
+  /// train.evaluate_scenarios worlds of train.evaluate_agents agents for train.evaluate_steps steps: what `pictura
+  /// evaluate --scenarios --agents --steps` measures of the checkpoint. Nothing when ^C came.
+  std::optional<EvaluationRecord> evaluate();
+
+ private:
+  const Run& run_;
+  EvaluationWorlds worlds_;  // kept from one to the next
+};
+
+}  // namespace pictura
