@@ -59,6 +59,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.text("render.rig", c.render.rig);
   v.integer_unless("render.rig", !c.render.rig.empty(), "render.width_px", c.render.width_px, 1, 8192);
   v.integer_unless("render.rig", !c.render.rig.empty(), "render.height_px", c.render.height_px, 1, 8192);
+  v.size_changes("render.schedule", c.render.schedule);
   v.number("render.line_floor_px", c.render.line_floor_px, 0, 16);
 
   v.choice("policy.modality", c.policy.modality, kModalities);
@@ -226,6 +227,25 @@ class Reader {
     }
   }
 
+  /// [[agent_steps, width_px, height_px], ...]
+  void size_changes(const std::string& key, std::vector<Config::Render::SizeChange>& value) {
+    const toml::node* node = find(key);
+    if (!node) return;
+    if (!node->is_array()) refuse(key, *node, "expected a list of [agent_steps, width_px, height_px]");
+    value.clear();
+    for (const toml::node& element : *node->as_array()) {
+      const toml::array* const change = element.as_array();
+      if (!change || change->size() != 3) refuse(key, *node, "expected a list of [agent_steps, width_px, height_px]");
+      constexpr int64_t kMostPixels = 8192;
+      value.push_back({integer_of(key, (*change)[0], 1, int64_t{1} << 60),
+                       static_cast<int>(integer_of(key, (*change)[1], 1, kMostPixels)),
+                       static_cast<int>(integer_of(key, (*change)[2], 1, kMostPixels))});
+      if (value.size() > 1 && value.back().agent_steps <= value[value.size() - 2].agent_steps) {
+        refuse(key, *node, "expected ascending agent_steps");
+      }
+    }
+  }
+
   template <typename Enum>
   void choice(const std::string& key, Enum& value, const Choices<Enum>& choices) {
     const toml::node* node = find(key);
@@ -362,6 +382,13 @@ class Writer {
   void integers(const std::string& key, const std::vector<int>& values, int64_t, int64_t) {
     line(key, fmt::format("[{}]", fmt::join(values, ", ")));
   }
+  void size_changes(const std::string& key, const std::vector<Config::Render::SizeChange>& values) {
+    std::vector<std::string> all;
+    for (const auto& change : values) {
+      all.push_back(fmt::format("[{}, {}, {}]", change.agent_steps, change.width_px, change.height_px));
+    }
+    line(key, fmt::format("[{}]", fmt::join(all, ", ")));
+  }
   template <typename Enum>
   void choice(const std::string& key, const Enum& value, const Choices<Enum>& choices) {
     for (const auto& [name, chosen] : choices) {
@@ -438,6 +465,12 @@ void check_contradictions(const Config& c, const Reader& reader) {
   }
   for (const int kernel : c.policy.conv_kernels) {
     if (kernel % 2 == 0) reader.refuse("policy.conv_kernels", fmt::format("expected odd sizes, got {}", kernel));
+  }
+  if (!c.render.schedule.empty() && !c.render.rig.empty()) {
+    reader.refuse("render.schedule", "has no effect together with render.rig, whose file gives the sizes");
+  }
+  if (!c.render.schedule.empty() && !c.reads_images()) {
+    reader.refuse("render.schedule", "has no effect with the modality \"vector\", which reads no images");
   }
   if (c.policy.conv_channels.back() % c.policy.attention_heads != 0) {
     reader.refuse("policy.attention_heads",
@@ -554,7 +587,9 @@ bool is_of_schedule(const std::string& key) {
          key == "train.learning_rate";
 }
 
-bool is_reported(const std::string& key) { return is_of_schedule(key) || key == "train.reproducible"; }
+bool is_reported(const std::string& key) {
+  return is_of_schedule(key) || key == "train.reproducible" || key == "render.schedule";
+}
 
 bool may_differ(const std::string& key, const Config& saved, const Config& now) {
   static const std::set<std::string> kHarmless{"train.updates",
@@ -630,9 +665,13 @@ std::string name_of(Precision precision) {
       ->first;
 }
 
-Rig rig_of(const Config& config) {
-  return config.render.rig.empty() ? paper_rig(config.render.width_px, config.render.height_px)
-                                   : load_rig(config.render.rig);
+Rig rig_of(const Config& config, int64_t agent_steps) {
+  if (!config.render.rig.empty()) return load_rig(config.render.rig);
+  int width_px = config.render.width_px, height_px = config.render.height_px;
+  for (const Config::Render::SizeChange& change : config.render.schedule) {
+    if (change.agent_steps <= agent_steps) width_px = change.width_px, height_px = change.height_px;
+  }
+  return paper_rig(width_px, height_px);
 }
 
 RendererConfig renderer_config(const Config& config, const Rig& rig, Device device) {

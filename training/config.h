@@ -52,7 +52,13 @@ struct Config {
     PixelSamples samples;               // of gl; the others compute exact coverage
     std::string rig;                    // a rig file (docs/image.md); relative to the configuration's folder
     int width_px = 96, height_px = 54;  // without one: of each camera of the paper's rig
-    double line_floor_px = 0.35;        // least width of a line on screen
+    /// Other sizes, each from so many agent-steps of the run on, in ascending order; not with a rig file.
+    struct SizeChange {
+      int64_t agent_steps = 0;
+      int width_px = 0, height_px = 0;
+    };
+    std::vector<SizeChange> schedule;
+    double line_floor_px = 0.35;  // least width of a line on screen
   } render;
 
   struct PolicySection {
@@ -141,15 +147,15 @@ std::string first_difference(const Config& saved, const Config& now);
 /// many threads, may differ.
 std::string first_difference_of_ranks(const Config& first, const Config& other);
 
-/// The settings in which the two differ of those that a run that goes on may change and should say so, the schedule and
-/// train.reproducible, as "KEY: OLD became NEW".
+/// The settings in which the two differ of those that a run that goes on may change and should say so, the schedules of
+/// learning rate and image size and train.reproducible, as "KEY: OLD became NEW".
 std::vector<std::string> differences_to_report(const Config& saved, const Config& now);
 
 /// As in a configuration.
 std::string name_of(Precision precision);
 
-/// The rig that render describes.
-Rig rig_of(const Config& config);
+/// The rig that render describes for a run that has done `agent_steps`.
+Rig rig_of(const Config& config, int64_t agent_steps = 0);
 
 /// What the renderer is told: everything about an image that the policy depends on, with a rig of its run. `device` is
 /// where the network computes.

@@ -164,8 +164,7 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
     recent = saved.recent;
   } else {
     if (!options.init_from.empty()) {
-      const Checkpoint other = read_everywhere(options.init_from);
-      restore_tensors(other, other.parameters, run.policy.parameters());
+      run.begin_with(read_everywhere(options.init_from));
     }
     for (const std::string& name : old_files) std::filesystem::remove(options.out_folder + "/" + name);
     run.simulator->reset();
@@ -229,6 +228,7 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
     record.totals.subtract(totals_before);
     record.totals = totals_of_all(record.totals, communicator.get());
     record.rollout_s = watch.restart();
+    record.image_size = run.image_size();
 
     record.stats = improve(options.out_folder, &run);
     record.update_s = watch.restart();
@@ -250,6 +250,16 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
       progress.ends_by_minutes = true;
     }
     report.agent_steps_per_s = progress.agent_steps_per_s;
+    const auto pixels = static_cast<double>(run.image_size().pixels());
+    if (const std::string change = run.update_image_size(); !change.empty()) {
+      notify(change);
+      // Until an update of that size is measured: as much longer as there are more pixels.
+      own_longest_s = 0;
+      const double growth = std::max(1.0, static_cast<double>(run.image_size().pixels()) / pixels);
+      for (const std::string& work : {machine, evaluation_on_machine}) {
+        if (run.longest_update_s.contains(work)) run.longest_update_s[work] *= growth;
+      }
+    }
     evaluate_if_due();
     report.interrupted = any_rank_interrupted(communicator.get());
     if (run.update % config.train.checkpoint_every == 0 ||

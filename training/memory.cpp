@@ -1,5 +1,7 @@
 #include "pictura/training/memory.h"
 
+#include <algorithm>
+
 #include "pictura/common/error.h"
 #include "pictura/common/image.h"
 #include "pictura/common/scene_history.h"
@@ -19,8 +21,14 @@ double observation_bytes(const Config& config) {
   return bytes;
 }
 
+// Of the largest that the run will draw.
 double image_bytes(const Config& config) {
-  return static_cast<double>(image_layout(rig_of(config), 1, PixelFormat::u8).bytes());
+  const auto bytes_at = [&config](int64_t agent_steps) {
+    return static_cast<double>(image_layout(rig_of(config, agent_steps), 1, PixelFormat::u8).bytes());
+  };
+  double most = bytes_at(0);
+  for (const auto& change : config.render.schedule) most = std::max(most, bytes_at(change.agent_steps));
+  return most;
 }
 
 // State and its snapshot, box, view and what a step needs, without observations: 690 were measured on the host.

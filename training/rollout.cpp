@@ -29,11 +29,18 @@ RolloutObservations::RolloutObservations(const Config& config, Simulator* simula
                 name_of(device), renderer->name(), name_of(renderer->device()));
   const int num_slots = simulator->num_slots(), num_steps = config.train.num_steps + 1;
   arrays_ = allocate_observations(config, num_steps, num_slots, device);
-  if (config.reads_images() && keeps_images(config, device)) {
-    arrays_.images = allocate_images(renderer->config().rig, {num_steps, num_slots}, device);
-  } else if (config.reads_images()) {
-    scenes_ = make_scene_history(device, history_size(*simulator, num_steps));
-  }
+  if (!config.reads_images()) return;
+  keeps_images_ = keeps_images(config, device);
+  if (!keeps_images_) scenes_ = make_scene_history(device, history_size(*simulator, num_steps));
+  set_renderer(renderer);
+}
+
+void RolloutObservations::set_renderer(Renderer* renderer) {
+  renderer_ = renderer;
+  if (!keeps_images_) return;
+  arrays_.images.clear();  // before there are others
+  arrays_.images =
+      allocate_images(renderer->config().rig, {arrays_.ego.size(0), arrays_.ego.size(1)}, renderer->device());
 }
 
 void RolloutObservations::record(int64_t step, const at::Tensor& slots) {

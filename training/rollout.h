@@ -21,6 +21,9 @@ class RolloutObservations {
   /// Of arrays alone, [num_steps + 1, slots, ...].
   explicit RolloutObservations(Observation arrays) : arrays_(std::move(arrays)) {}
 
+  /// Draws with another renderer from now on, whose rig has as many cameras. What was kept is lost.
+  void set_renderer(Renderer* renderer);
+
   /// Keeps what the simulator shows now as what was seen at `step`. slots: i64 [n], those of active agents, the only
   /// ones whose images are kept. Steps are recorded in order first.
   void record(int64_t step, const at::Tensor& slots);
@@ -35,6 +38,7 @@ class RolloutObservations {
   Simulator* simulator_ = nullptr;
   Renderer* renderer_ = nullptr;
   PhaseTimer* timer_ = nullptr;
+  bool keeps_images_ = false;
   std::unique_ptr<SceneHistory> scenes_;  // where images are drawn again
 };
 

@@ -73,9 +73,36 @@ Checkpoint Run::checkpoint(const std::vector<RecentUpdate>& recent) const {
   return checkpoint;
 }
 
+std::string Run::update_image_size() {
+  if (config.render.schedule.empty()) return "";
+  const Rig now = rig_of(config, agent_steps);
+  const ImageSize before = image_size(), after{now.cameras[0].width_px, now.cameras[0].height_px};
+  if (before == after) return "";
+  rig = now;
+  renderer.reset();  // its memory goes before another's comes
+  renderer = make_training_renderer(config, rig, *simulator);
+  rollout.observations.set_renderer(renderer.get());
+  return fmt::format("from {} agent-steps on images are {}x{} instead of {}x{}", agent_steps, after.width_px,
+                     after.height_px, before.width_px, before.height_px);
+}
+
+ImageSize Run::image_size() const {
+  return renderer ? ImageSize{rig.cameras[0].width_px, rig.cameras[0].height_px} : ImageSize{};
+}
+
+void Run::begin_with(const Checkpoint& other) {
+  PICTURA_CHECK(
+      !config.reads_images() || !other.config.reads_images() || other.rig.cameras.size() == rig.cameras.size(),
+      "{}: its policy sees through {} cameras, expected {}, as {} has", other.path, other.rig.cameras.size(),
+      rig.cameras.size(), config.render.rig.empty() ? "the paper's rig" : config.render.rig);
+  restore_tensors(other, other.parameters, policy.parameters());
+}
+
 std::string Run::restore(const Checkpoint& saved) {
   const std::string difference = first_difference(saved.config, config);
   PICTURA_CHECK(difference.empty(), "{}: saved under another configuration: {}", saved.path, difference);
+  agent_steps = saved.agent_steps;
+  update_image_size();
   const std::string rig_difference = config.reads_images() ? first_difference(saved.rig, rig) : "";
   PICTURA_CHECK(rig_difference.empty(), "{}: saved with other cameras than {} has: {}", saved.path,
                 config.render.rig.empty() ? "the paper's rig" : config.render.rig, rig_difference);
@@ -85,7 +112,6 @@ std::string Run::restore(const Checkpoint& saved) {
   optimizer.steps = saved.adam_steps;
   filter.average = saved.filter_average;
   update = saved.update;
-  agent_steps = saved.agent_steps;
   distance_m = saved.distance_m;
   longest_update_s = saved.longest_update_s;
   std::string why_new_episodes;

@@ -13,6 +13,9 @@ struct Run {
   /// sizes that cannot be trained with.
   Run(const Config& config, Device device, Communicator* communicator = alone());
 
+  /// Begins with the weights of another run's checkpoint. Throws Error naming what differs where it is of another
+  /// network.
+  void begin_with(const Checkpoint& other);
   /// What is to be saved, at the start of an update: of all ranks, for rank 0 to write; the others' has no simulator.
   Checkpoint checkpoint(const std::vector<RecentUpdate>& recent) const;
   /// Goes on from a checkpoint, of any number of ranks. Where the simulator cannot read its saved state, because its
@@ -22,13 +25,18 @@ struct Run {
   /// Throws Error naming a parameter in which the ranks' policies differ by a bit.
   void check_ranks_agree() const;
 
+  /// Draws images of the size that render.schedule has for the agent-steps done. Says which, where it changes.
+  std::string update_image_size();
+  /// Of the first camera, as images are drawn now; 0 without images.
+  ImageSize image_size() const;
+
   const Config config;
   const Device device;
   Communicator* const communicator;
   const std::vector<WorldSpec> all_worlds;  // of all ranks
-  const Rig rig;
+  Rig rig;  // as it is now
   const std::unique_ptr<Simulator> simulator;
-  const std::unique_ptr<Renderer> renderer;  // of policies with images
+  std::unique_ptr<Renderer> renderer;  // of policies with images
   const std::unique_ptr<LearnerExecutor> executor;
   PhaseTimer timer;
   const Policy policy;

@@ -26,7 +26,7 @@ std::optional<EvaluationRecord> RunEvaluation::evaluate() {
   PolicySession session(config, run_.rig, run_.device, run_.policy);
   const EvaluateReport report = pictura::evaluate(&session, options, &worlds_);
   if (report.interrupted) return std::nullopt;
-  return EvaluationRecord{report.rows.at(0), watch.seconds()};
+  return EvaluationRecord{report.rows.at(0), watch.seconds(), run_.image_size()};
 }
 
 }  // namespace pictura

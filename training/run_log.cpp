@@ -24,6 +24,8 @@ Scalars scalars_of(const Config& config, const TrainProgress& progress, const Up
       {"charts/agent_steps", static_cast<double>(progress.agent_steps)},
       {"charts/agent_steps_per_s", progress.agent_steps_per_s},
       {"charts/learning_rate", stats.learning_rate},
+      {"charts/image_width_px", record.image_size.width_px},
+      {"charts/image_height_px", record.image_size.height_px},
       {"charts/episode_return", progress.episode_return},
       {"charts/reward_per_step", totals.reward / steps},
       {"charts/live_share", steps / static_cast<double>(totals.slot_steps)},
@@ -86,7 +88,9 @@ Scalars scalars_of(const Config& config, const TrainProgress& progress, const Up
 }
 
 Scalars scalars_of_evaluation(int64_t agent_steps, const EvaluationRecord& record) {
-  Scalars scalars{{"charts/agent_steps", static_cast<double>(agent_steps)}};
+  Scalars scalars{{"charts/agent_steps", static_cast<double>(agent_steps)},
+                  {"evaluation/image_width_px", record.image_size.width_px},
+                  {"evaluation/image_height_px", record.image_size.height_px}};
   for (const auto& [name, estimate] : metrics_of(record.row)) {
     scalars.emplace_back("evaluation/" + name, estimate.value);
     scalars.emplace_back(fmt::format("evaluation/{}_half_width_95", name), estimate.half_width_95);

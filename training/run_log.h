@@ -40,12 +40,14 @@ struct UpdateRecord {
   Diagnosis diagnosis;
   double rollout_s = 0, update_s = 0;  // wall time of collecting, and of improving
   PhaseSeconds phases_s{};             // in both
+  ImageSize image_size;                // of the first camera; 0 without images
 };
 
 /// What an evaluation within a run gave.
 struct EvaluationRecord {
   EvaluateRow row;
-  double seconds = 0;  // wall time
+  double seconds = 0;    // wall time
+  ImageSize image_size;  // of the first camera; 0 without images
 };
 
 class RunLog {

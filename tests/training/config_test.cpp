@@ -48,13 +48,15 @@ TEST(Config, WrittenTextReadsBackEqual) {
   c.run.seed = 77;
   c.simulator.maps = {"a \"quoted\" name", "b"};
   c.simulator.conditioning[0] = {3.3f, 4.7f, false};
-  c.policy.modality = Modality::vector;
   c.train.learning_rate = 1.0 / 3.0;
   c.train.ent_coef = 0;
+  c.policy.modality = Modality::perspective;
+  c.render.schedule = {{800, 20, 12}, {900, 40, 20}};
   const Config back = parse_config(to_toml(c), "b.toml");
   EXPECT_EQ(to_toml(back), to_toml(c));
   EXPECT_EQ(back.simulator.maps, c.simulator.maps);
   EXPECT_EQ(back.train.learning_rate, c.train.learning_rate);
+  EXPECT_EQ(back.render.schedule.at(1).width_px, 40);
   EXPECT_EQ(back.simulator.conditioning[0].low, 3.3f);
 }
 
@@ -78,6 +80,10 @@ TEST(Config, ErrorsNameFileLineAndKey) {
   EXPECT_THAT(message_of("[simulator]\nnum_slots = 100000000\n"), HasSubstr("got 100000000"));
   EXPECT_THAT(message_of("[simulator]\nnum_slots = 1.5\n"), HasSubstr("expected an integer"));
   EXPECT_THAT(message_of("[render]\nwidth_px = 0\nheight_px = 0\n"), HasSubstr("render.width_px"));
+  for (const char* bad : {"5", "[5]", "[[5, 6]]", "[[5, 6, 7], [5, 8, 9]]", "[[0, 6, 7]]", "[[5, 0, 7]]"}) {
+    EXPECT_THAT(message_of(fmt::format("[render]\nschedule = {}\n", bad)),
+                AllOf(HasSubstr("a.toml:2: render.schedule"), HasSubstr("expected")));
+  }
   EXPECT_THAT(message_of("[train]\ngamma = nan\n"), HasSubstr("train.gamma"));
   EXPECT_THAT(message_of("[train]\ngamma = \"a\"\n"), HasSubstr("expected a number"));
   EXPECT_THAT(message_of("[policy]\nmodality = \"sonar\"\n"), HasSubstr("perspective"));
@@ -103,6 +109,10 @@ TEST(Config, KeysWithoutEffectAreRefused) {
               AllOf(HasSubstr("a.toml:2: simulator.wall_observations"), HasSubstr("no effect")));
   EXPECT_THAT(message_of("[render]\nwidth_px = 96\nrig = \"r.toml\"\n"),
               AllOf(HasSubstr("a.toml:2: render.width_px"), HasSubstr("render.rig")));
+  EXPECT_THAT(message_of("[render]\nrig = \"r.toml\"\nschedule = [[5, 6, 7]]\n"),
+              AllOf(HasSubstr("a.toml:3: render.schedule"), HasSubstr("render.rig")));
+  EXPECT_THAT(message_of("[render]\nschedule = [[5, 6, 7]]\n[policy]\nmodality = \"vector\"\n"),
+              AllOf(HasSubstr("a.toml:2: render.schedule"), HasSubstr("vector")));
   EXPECT_THAT(message_of("[render]\nrig = \"r.toml\"\n", {"render.height_px=9"}),
               AllOf(HasSubstr("--set render.height_px"), HasSubstr("render.rig")));
   EXPECT_THAT(message_of("[train]\nhalted_slots = \"draw\"\n"),
@@ -202,10 +212,11 @@ TEST(Config, DifferencesThatChangeTheRunAreNamed) {
   b.train.schedule_agent_steps = 3;
   b.train.learning_rate = 1;
   b.train.reproducible = true;
+  b.render.schedule = {{5, 6, 7}};
   EXPECT_EQ(first_difference(a, b), "");
   EXPECT_THAT(differences_to_report(a, b),
-              ElementsAre("train.schedule_agent_steps: 50000000000 became 3", "train.learning_rate: 0.0005 became 1.0",
-                          "train.reproducible: false became true"));
+              ElementsAre("render.schedule: [] became [[5, 6, 7]]", "train.schedule_agent_steps: 50000000000 became 3",
+                          "train.learning_rate: 0.0005 became 1.0", "train.reproducible: false became true"));
   b = a;
   b.simulator.wall_seed = 3;
   EXPECT_THAT(first_difference(a, b), HasSubstr("simulator.wall_seed"));

@@ -1,10 +1,12 @@
-// Small evaluations that a run makes of itself.
+// What a run does besides learning: small evaluations of itself, and other image sizes as it goes on.
 #include <algorithm>
 #include <filesystem>
 
 #include <gmock/gmock.h>
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/small_runs.h"
 #include "pictura/training/checkpoint.h"
@@ -12,8 +14,11 @@
 namespace pictura {
 namespace {
 
+using test::message_of;
 using test::read_table;
+using ::testing::AllOf;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using Table = std::vector<std::vector<std::string>>;
 
 // The cells below a name.
@@ -97,6 +102,96 @@ TEST_F(RunWithEvaluations, IsOutOfTimeBeforeAnEvaluationThatWouldNotEndAndMakesI
   rest.minutes = 0;
   EXPECT_EQ(train(rest).updates, 4);
   EXPECT_THAT(column(read_table(evaluations("run")), "update"), ElementsAre("2", "4"));
+}
+
+class RunWithImageSizes : public RunWithEvaluations {
+ protected:
+  TrainOptions scheduled(const std::string& run, const std::string& schedule, int updates) {
+    TrainOptions o = evaluating(run, 1, updates);
+    o.overrides.push_back("render.schedule=" + schedule);
+    o.on_notice = [this](const std::string& notice) { notices_.push_back(notice); };
+    return o;
+  }
+  std::vector<std::string> notices_;
+};
+
+TEST_F(RunWithImageSizes, ChangesThemBetweenUpdatesAndGoesOnExactly) {
+  const TrainReport whole = train(scheduled("whole", "[[100, 20, 12], [100000, 40, 20]]", 4));
+  const Table progress = read_table(folder_ / "whole/progress.csv"), evaluated = read_table(evaluations("whole"));
+  const std::vector<std::string> agent_steps = column(progress, "charts/agent_steps"),
+                                 width_px = column(progress, "charts/image_width_px"),
+                                 evaluated_px = column(evaluated, "evaluation/image_width_px");
+  ASSERT_EQ(width_px.size(), 4u);
+  ASSERT_EQ(evaluated_px.size(), 4u);
+  int64_t changed_after = 0;
+  for (size_t row = 0; row < 4; ++row) {
+    const bool is_past = std::stoll(agent_steps[row]) >= 100;
+    EXPECT_EQ(width_px[row], row > 0 && std::stoll(agent_steps[row - 1]) >= 100 ? "20" : "16");
+    EXPECT_EQ(evaluated_px[row], is_past ? "20" : "16");
+    if (is_past && changed_after == 0) changed_after = static_cast<int64_t>(row) + 1;
+  }
+  ASSERT_GT(changed_after, 1);
+  ASSERT_LT(changed_after, 4);
+  ASSERT_EQ(notices_.size(), 1u);
+  EXPECT_EQ(notices_[0], fmt::format("from {} agent-steps on images are 20x12 instead of 16x9",
+                                     agent_steps[static_cast<size_t>(changed_after) - 1]));
+  EXPECT_EQ(first_difference(read_checkpoint(whole.checkpoint).rig, paper_rig(20, 12)), "");
+
+  // Saved before, right after, and with the new size.
+  for (const int64_t updates : {changed_after - 1, changed_after, changed_after + 1}) {
+    const std::string run = fmt::format("parts {}", updates);
+    train(scheduled(run, "[[100, 20, 12], [100000, 40, 20]]", static_cast<int>(updates)));
+    TrainOptions rest = scheduled(run, "[[100, 20, 12], [100000, 40, 20]]", 4);
+    rest.old_run = OldRun::resume;
+    EXPECT_EQ(train(rest).policy_hash, whole.policy_hash) << updates;
+    EXPECT_EQ(column(read_table(folder_ / (run + "/progress.csv")), "charts/image_width_px"), width_px);
+  }
+  EXPECT_NE(train(options("small", {})).policy_hash, whole.policy_hash);
+}
+
+TEST_F(RunWithImageSizes, MayChangeTheirFutureOnResumeButNotTheirPast) {
+  train(scheduled("run", "[]", 2));
+  TrainOptions rest = scheduled("run", "[[100, 20, 12]]", 4);
+  rest.old_run = OldRun::resume;
+  EXPECT_THAT(message_of([&] { train(rest); }), AllOf(HasSubstr("checkpoint.ckpt"), HasSubstr("size_px")));
+  notices_.clear();
+  rest.overrides.back() = "render.schedule=[[200, 20, 12]]";
+  train(rest);
+  ASSERT_EQ(notices_.size(), 2u);
+  EXPECT_EQ(notices_[0], "render.schedule: [] became [[200, 20, 12]]");
+  EXPECT_THAT(notices_[1], HasSubstr("images are 20x12 instead of 16x9"));
+}
+
+TEST_F(RunWithImageSizes, BeginsWithWeightsOfOtherCamerasOfTheSameNumber) {
+  const std::string first = train(options("first", {"train.updates=1"})).checkpoint;
+  std::string config;
+  std::istringstream lines(read_file(PICTURA_SOURCE_DIR "/configs/smoke.toml"));
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with("width_px") && !line.starts_with("height_px")) config += line + '\n';
+    if (line == "[render]") config += "rig = \"rig.toml\"\n";
+  }
+  write_file(folder_ / "config.toml", config);
+  const auto with_cameras = [&](int cameras) {
+    std::string rig;
+    for (int i = 0; i < cameras; ++i) {
+      rig +=
+          fmt::format("[[camera]]\nname = \"c{}\"\nwidth_px = {}\nheight_px = 9\nfocal_px = 8\nx_m = 1\n", i, 16 + i);
+    }
+    write_file(folder_ / "rig.toml", rig);
+    TrainOptions o = options(fmt::format("with {}", cameras), {"train.updates=1"});
+    o.config_path = folder_ / "config.toml";
+    std::erase_if(o.overrides, [](const std::string& text) {
+      return text.starts_with("render.width_px") || text.starts_with("render.height_px");
+    });
+    o.init_from = first;
+    return o;
+  };
+  EXPECT_EQ(train(with_cameras(4)).updates, 1);
+  const std::vector<NamedTensor> begun = read_checkpoint(folder_ / "with 4/untrained.ckpt").parameters,
+                                 other = read_checkpoint(first).parameters;
+  for (size_t i = 0; i < other.size(); ++i) EXPECT_TRUE(begun.at(i).value.equal(other[i].value)) << other[i].name;
+  EXPECT_THAT(message_of([&] { train(with_cameras(3)); }), AllOf(HasSubstr(first), HasSubstr("sees through 4 cameras"),
+                                                                 HasSubstr("expected 3"), HasSubstr("rig.toml")));
 }
 
 }  // namespace
