@@ -140,6 +140,8 @@ void add_evaluate_command(CLI::App& app) {
   command->add_option("--size", arguments->size, "Pixels of an image, WxH, of the paper's rig; default: as in training")
       ->excludes(rig)
       ->excludes(policy);
+  command->add_option("--backbone", options.backbone,
+                      "The program of policy.backbone, where it does not lie where it did in training");
   command->add_option("--threads", options.num_threads, "Host threads; 0: all")->capture_default_str();
   command->add_option("--out", arguments->out, "A file for the counts of each scenario, which --merge reads");
   command->add_flag("--json", arguments->json, "Print one JSON object");

@@ -110,6 +110,7 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
   header["config"] = to_toml(checkpoint.config);
   header["schema"] = schema(checkpoint.config);
   header["rig"] = rig_to_json(checkpoint.rig);
+  if (!checkpoint.backbone_hash.empty()) header["backbone"] = {{"hash", checkpoint.backbone_hash}};
   header["counters"] = {{"update", checkpoint.update},
                         {"agent_steps", checkpoint.agent_steps},
                         {"distance_m", checkpoint.distance_m},
@@ -220,6 +221,7 @@ Checkpoint parse_checkpoint(const std::string& file, const std::string& path) {
     }
     result.longest_update_s = header.value("longest_update_s", result.longest_update_s);
     result.rig = rig_from_json(header.at("rig"));
+    if (header.contains("backbone")) result.backbone_hash = header["backbone"].at("hash");
   } catch (const nlohmann::json::exception& error) {
     fail("{}: its header cannot be read: {}", path, error.what());
   }
@@ -262,6 +264,14 @@ void restore_tensors(const Checkpoint& checkpoint, const std::vector<NamedTensor
   }
   PICTURA_CHECK(saved.size() == parameters.size(), "{}: of another architecture: expected {} parameters, got {}",
                 checkpoint.path, parameters.size(), saved.size());
+}
+
+void restore_policy(const Checkpoint& checkpoint, const Policy& policy) {
+  const auto backbone = [](const std::string& hash) { return hash.empty() ? "\"conv\"" : "a program of hash " + hash; };
+  PICTURA_CHECK(policy.backbone_hash() == checkpoint.backbone_hash,
+                "{}: policy.backbone: its policy has {}, expected {}", checkpoint.path,
+                backbone(checkpoint.backbone_hash), backbone(policy.backbone_hash()));
+  restore_tensors(checkpoint, checkpoint.parameters, policy.parameters());
 }
 
 void write_safetensors(const std::string& path, const std::vector<NamedTensor>& tensors,

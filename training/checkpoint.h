@@ -19,7 +19,8 @@ struct Checkpoint {
   std::string path;  // where it was read from, for messages
   Config config;
   Rig rig;
-  int64_t update = 0;  // updates done
+  std::string backbone_hash;  // Policy::backbone_hash; the program itself is not in the checkpoint
+  int64_t update = 0;         // updates done
   int64_t agent_steps = 0;
   double distance_m = 0;  // driven by all agents
   int64_t adam_steps = 0;
@@ -47,6 +48,10 @@ std::string first_difference(const Rig& saved, const Rig& now);
 /// of another shape, or holds a number that is not finite: such a policy would still choose actions.
 void restore_tensors(const Checkpoint& checkpoint, const std::vector<NamedTensor>& saved,
                      const std::vector<NamedTensor>& parameters);
+
+/// Gives a policy the parameters of a checkpoint. Throws Error as restore_tensors does, and where the programs of their
+/// backbones differ.
+void restore_policy(const Checkpoint& checkpoint, const Policy& policy);
 
 /// Tensors, as a policy's weights, as safetensors, which other tools read: u64 length, JSON, raw data in F32 or I64.
 void write_safetensors(const std::string& path, const std::vector<NamedTensor>& tensors,

@@ -64,6 +64,8 @@ void visit(AnyConfig& c, Visitor&& v) {
 
   v.choice("policy.modality", c.policy.modality, kModalities);
   v.flag("policy.auxiliary", c.policy.auxiliary);
+  v.text("policy.backbone", c.policy.backbone);
+  v.flag("policy.backbone_frozen", c.policy.backbone_frozen);
   v.integer("policy.patch_px", c.policy.patch_px, 1, 16);
   v.integers("policy.conv_channels", c.policy.conv_channels, 1, 4096);
   v.integers("policy.conv_kernels", c.policy.conv_kernels, 1, 31);
@@ -472,7 +474,10 @@ void check_contradictions(const Config& c, const Reader& reader) {
   if (!c.render.schedule.empty() && !c.reads_images()) {
     reader.refuse("render.schedule", "has no effect with the modality \"vector\", which reads no images");
   }
-  if (c.policy.conv_channels.back() % c.policy.attention_heads != 0) {
+  if (c.policy.backbone != "conv" && !c.reads_images()) {
+    reader.refuse("policy.backbone", "has no effect with the modality \"vector\", which reads no images");
+  }
+  if (c.policy.backbone == "conv" && c.policy.conv_channels.back() % c.policy.attention_heads != 0) {
     reader.refuse("policy.attention_heads",
                   fmt::format("expected a divisor of the last of policy.conv_channels ({}), got {}",
                               c.policy.conv_channels.back(), c.policy.attention_heads));
@@ -562,9 +567,12 @@ Config parse_saved_config(const std::string& text, const std::string& source) {
 
 Config load_config(const std::string& path, const std::vector<std::string>& overrides) {
   Config config = parse_config(read_file(path, 1 << 20), path, overrides);
-  if (std::filesystem::path rig = config.render.rig; !rig.empty() && rig.is_relative()) {
-    config.render.rig = (std::filesystem::path(path).parent_path() / rig).string();
-  }
+  const auto from_callers_folder = [&path](std::string* name) {
+    if (std::filesystem::path(*name).is_relative())
+      *name = (std::filesystem::path(path).parent_path() / *name).string();
+  };
+  if (!config.render.rig.empty()) from_callers_folder(&config.render.rig);
+  if (config.policy.backbone != "conv") from_callers_folder(&config.policy.backbone);
   return config;
 }
 
@@ -602,6 +610,7 @@ bool may_differ(const std::string& key, const Config& saved, const Config& now) 
                                                "train.halted_slots",
                                                "run.num_threads",
                                                "run.device",
+                                               "policy.backbone",
                                                "render.rig",
                                                "render.width_px",
                                                "render.height_px",

@@ -73,6 +73,10 @@ struct Config {
     int attention_mlp = 256;     // hidden width of the block's MLP; 0: none
     int embedding_width = 64;    // of every group
     bool point_features = true;  // encoders read points near the agent apart, see training/point_features.h
+    /// "conv": the convolutions; or the path of a program of scripts/export_backbone, relative to the configuration's
+    /// folder.
+    std::string backbone = "conv";
+    bool backbone_frozen = true;  // the program's weights stay as they are
     int backbone_layers = 4, backbone_width = 512;
   } policy;
 
@@ -130,7 +134,7 @@ Config parse_config(const std::string& text, const std::string& source, const st
 /// Reads what a run saved, perhaps with another build: its backends may be any.
 Config parse_saved_config(const std::string& text, const std::string& source);
 
-/// Reads a file; render.rig becomes relative to the caller's folder.
+/// Reads a file; render.rig and a path as policy.backbone become relative to the caller's folder.
 Config load_config(const std::string& path, const std::vector<std::string>& overrides = {});
 
 /// Every key with its value, as TOML that parse_config reads back to an equal Config.
@@ -139,8 +143,8 @@ std::string to_toml(const Config& config);
 /// Key of the first setting that changes what a run means and in which the two differ, with both values, or empty. What
 /// may differ: when to stop and how often to save; the schedule of the learning rate; where and on how many threads it
 /// runs, as long as images are drawn by the same rules; how many transitions go through the network at once; what is
-/// evaluated; how cameras are described (compare the rigs themselves), and all of [render] where the policy reads no
-/// images.
+/// evaluated; how cameras and backbones are described (compare the rigs and the programs' hashes), and all of [render]
+/// where the policy reads no images.
 std::string first_difference(const Config& saved, const Config& now);
 
 /// Key of the first setting in which two ranks of a run differ, with both values, or empty. Where each runs, and on how

@@ -9,6 +9,7 @@
 #include "pictura/common/rng.h"
 #include "pictura/common/support/hash.h"
 #include "pictura/training/chunks.h"
+#include "pictura/training/image_backbone.h"
 #include "pictura/training/layers.h"
 #include "pictura/training/point_features.h"
 #include "pictura/training/precision.h"
@@ -41,6 +42,13 @@ class ParameterMaker {
   }
   at::Tensor constant(const std::string& name, at::IntArrayRef shape, double value) {
     return add(name, at::full(shape, value, at::kFloat));
+  }
+
+  /// Of the type and on the device of all others.
+  const at::TensorOptions& options() const { return options_; }
+  /// Keeps parameters that are not drawn.
+  void adopt(const std::vector<NamedTensor>& parameters) {
+    parameters_->insert(parameters_->end(), parameters.begin(), parameters.end());
   }
 
   Policy::Linear linear(const std::string& name, int64_t in, int64_t out, double gain) {
@@ -129,16 +137,22 @@ class VectorEncoder final : public SceneEncoder {
   std::vector<Group> groups_;
 };
 
-/// A convolutional stack shared by all cameras; per camera, learned queries that cross-attend over its feature map and
-/// are averaged; all cameras concatenated and projected to the width of the four sets that they replace.
+/// A convolutional stack or a pretrained program, shared by all cameras; per camera, learned queries that cross-attend
+/// over its feature map and are averaged; all cameras concatenated and projected to the width of the four sets that
+/// they replace.
 class PerspectiveEncoder final : public SceneEncoder {
  public:
   /// Images are converted to `image_type`.
   PerspectiveEncoder(const Config::PolicySection& config, int num_cameras, at::ScalarType image_type,
                      ParameterMaker* make)
-      : config_(config), num_cameras_(num_cameras), image_type_(image_type), width_(config.conv_channels.back()) {
+      : config_(config),
+        num_cameras_(num_cameras),
+        image_type_(image_type),
+        backbone_(load_backbone(config, make->options())),
+        width_(backbone_ ? backbone_->channels() : config.conv_channels.back()) {
+    if (backbone_) make->adopt(backbone_->parameters());
     int64_t in = 3 * int64_t{config.patch_px} * config.patch_px;
-    for (size_t i = 0; i < config.conv_channels.size(); ++i) {
+    for (size_t i = 0; i < config.conv_channels.size() && !backbone_; ++i) {
       const int64_t out = config.conv_channels[i], kernel = config.conv_kernels[i];
       const std::string name = fmt::format("conv.{}", i);
       convolutions_.push_back({make->normal(name + ".weight", {out, in, kernel, kernel}, std::numbers::sqrt2),
@@ -162,6 +176,7 @@ class PerspectiveEncoder final : public SceneEncoder {
   }
 
   int64_t width() const override { return 4 * int64_t{config_.embedding_width}; }
+  const ImageBackbone* image_backbone() const override { return backbone_.get(); }
 
   at::Tensor forward(const Observation& o) const override {
     std::vector<at::Tensor> per_camera(static_cast<size_t>(num_cameras_));
@@ -197,15 +212,31 @@ class PerspectiveEncoder final : public SceneEncoder {
                      1);
   }
 
-  // The features of a block's cameras, [cameras, batch, width].
-  at::Tensor pool(const ImageBlock& block) const {
-    const int64_t batch = block.pixels.size(0), cameras = block.pixels.size(1);
-    at::Tensor x = image_patches(block.pixels, config_.patch_px, image_type_);
+  static std::unique_ptr<ImageBackbone> load_backbone(const Config::PolicySection& config,
+                                                      const at::TensorOptions& options) {
+    if (config.backbone == "conv") return nullptr;
+    auto backbone = std::make_unique<ImageBackbone>(config.backbone, options, config.backbone_frozen);
+    PICTURA_CHECK(backbone->channels() % config.attention_heads == 0,
+                  "{}: has {} channels: expected a multiple of policy.attention_heads ({})", config.backbone,
+                  backbone->channels(), config.attention_heads);
+    return backbone;
+  }
+
+  // [cameras * batch, width, rows, columns], channels last in memory.
+  at::Tensor convolve(const at::Tensor& images) const {
+    at::Tensor x = image_patches(images, config_.patch_px, image_type_);
     for (size_t i = 0; i < convolutions_.size(); ++i) {
       // Pixels are 0 to 255. Scaling a few weights is cheaper than scaling them.
       const at::Tensor weight = i == 0 ? convolutions_[i].weight / 255.0 : convolutions_[i].weight;
       x = convolve_gelu(x, weight, convolutions_[i].bias, config_.conv_strides[i]);
     }
+    return x;
+  }
+
+  // The features of a block's cameras, [cameras, batch, width].
+  at::Tensor pool(const ImageBlock& block) const {
+    const int64_t batch = block.pixels.size(0), cameras = block.pixels.size(1);
+    const at::Tensor x = backbone_ ? backbone_->forward(block.pixels) : convolve(block.pixels);
     const at::Tensor where = apply(position_, position_features(x.size(2), x.size(3), queries_.options()));
     const at::Tensor tokens = apply_norm(token_norm_, x.permute({0, 2, 3, 1}).flatten(1, 2), where);
 
@@ -243,6 +274,7 @@ class PerspectiveEncoder final : public SceneEncoder {
   const Config::PolicySection config_;
   const int num_cameras_;
   const at::ScalarType image_type_;
+  const std::unique_ptr<ImageBackbone> backbone_;  // null: the convolutions
   const int64_t width_;
   std::vector<Policy::Linear> convolutions_;  // weights [out, in, kernel, kernel]
   at::Tensor queries_, key_;
@@ -308,10 +340,18 @@ std::string Policy::hash() const {
   return hash.hex();
 }
 
+std::string Policy::backbone_hash() const { return scene_->image_backbone() ? scene_->image_backbone()->hash() : ""; }
+
+void Policy::check_images(const Rig& rig) const {
+  if (scene_->image_backbone()) scene_->image_backbone()->check_images(rig);
+}
+
 Policy make_policy(const Config& config, const Rig& rig, Device device) {
-  return Policy(config.policy, static_cast<int>(rig.cameras.size()), config.run.seed, at::kFloat,
+  Policy policy(config.policy, static_cast<int>(rig.cameras.size()), config.run.seed, at::kFloat,
                 config.reads(ObservationPart::walls), device,
                 device.is_host() ? Precision::fp32 : config.train.precision);
+  policy.check_images(rig);
+  return policy;
 }
 
 Decision decide(const Policy& policy, const at::Tensor& rows, int64_t chunk,

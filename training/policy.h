@@ -22,6 +22,8 @@ struct NamedTensor {
   at::Tensor value;
 };
 
+class ImageBackbone;
+
 /// Turns what is around an agent into one embedding.
 class SceneEncoder {
  public:
@@ -29,11 +31,14 @@ class SceneEncoder {
   virtual at::Tensor forward(const Observation& observation) const = 0;
   /// Of the embedding.
   virtual int64_t width() const = 0;
+  /// The program in the place of its convolutions, or null.
+  virtual const ImageBackbone* image_backbone() const { return nullptr; }
 };
 
 class Policy {
  public:
-  /// Parameters are drawn from (seed, index of the parameter, index of the element) alone. With `reads_walls` the
+  /// Parameters are drawn from (seed, index of the parameter, index of the element) alone, but for those of a program
+  /// (policy.backbone), which begin as they are in its file. With `reads_walls` the
   /// vector policy has a fifth set. The host has bf16 too, slowly, but no tf32: there it is fp32.
   Policy(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type = at::kFloat,
          bool reads_walls = false, Device device = {}, Precision precision = Precision::fp32);
@@ -48,6 +53,10 @@ class Policy {
   int64_t num_parameters() const;
   /// 16 hexadecimal digits over the parameters' bytes, in the order of parameters().
   std::string hash() const;
+  /// Of the file of policy.backbone; empty where that is "conv" and for vector policies.
+  std::string backbone_hash() const;
+  /// Throws Error naming camera and file where the program of policy.backbone does not take such images.
+  void check_images(const Rig& rig) const;
 
  private:
   std::vector<NamedTensor> parameters_;
@@ -72,7 +81,8 @@ class Policy {
   friend class PerspectiveEncoder;
 };
 
-/// The policy of a configuration, for cameras of this rig. The host computes in fp32.
+/// The policy of a configuration, for cameras of this rig. The host computes in fp32. Throws Error naming the file
+/// where policy.backbone names one that cannot serve.
 Policy make_policy(const Config& config, const Rig& rig, Device device);
 
 /// Policy outputs for a whole batch without gradients: logits and log-probabilities [batch, actions], values [batch].

@@ -48,12 +48,15 @@ Run::Run(const Config& its_config, Device its_device, Communicator* its_communic
       policy(make_policy(config, rig, device)),
       optimizer(policy, config.train),
       rollout(RolloutObservations(config, simulator.get(), renderer.get(), &timer), config.train.num_steps,
-              simulator->num_slots(), device) {}
+              simulator->num_slots(), device) {
+  for (const auto& change : config.render.schedule) policy.check_images(rig_of(config, change.agent_steps));
+}
 
 Checkpoint Run::checkpoint(const std::vector<RecentUpdate>& recent) const {
   Checkpoint checkpoint;
   checkpoint.config = config;
   checkpoint.rig = rig;
+  checkpoint.backbone_hash = policy.backbone_hash();
   checkpoint.update = update;
   checkpoint.agent_steps = agent_steps;
   checkpoint.distance_m = distance_m;
@@ -95,7 +98,7 @@ void Run::begin_with(const Checkpoint& other) {
       !config.reads_images() || !other.config.reads_images() || other.rig.cameras.size() == rig.cameras.size(),
       "{}: its policy sees through {} cameras, expected {}, as {} has", other.path, other.rig.cameras.size(),
       rig.cameras.size(), config.render.rig.empty() ? "the paper's rig" : config.render.rig);
-  restore_tensors(other, other.parameters, policy.parameters());
+  restore_policy(other, policy);
 }
 
 std::string Run::restore(const Checkpoint& saved) {
@@ -106,7 +109,7 @@ std::string Run::restore(const Checkpoint& saved) {
   const std::string rig_difference = config.reads_images() ? first_difference(saved.rig, rig) : "";
   PICTURA_CHECK(rig_difference.empty(), "{}: saved with other cameras than {} has: {}", saved.path,
                 config.render.rig.empty() ? "the paper's rig" : config.render.rig, rig_difference);
-  restore_tensors(saved, saved.parameters, policy.parameters());
+  restore_policy(saved, policy);
   restore_tensors(saved, saved.first_moments, optimizer.first_moments);
   restore_tensors(saved, saved.second_moments, optimizer.second_moments);
   optimizer.steps = saved.adam_steps;

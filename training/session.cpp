@@ -23,6 +23,7 @@ Config adapted(Config config, const SessionOptions& options) {
   config.run.num_threads = options.num_threads;
   config.run.device = options.device;
   config.simulator.backend = options.simulator;
+  if (!options.backbone.empty()) config.policy.backbone = options.backbone;
   std::string& renderer = config.render.backend;
   if (!options.renderer.empty())
     renderer = options.renderer;
@@ -70,7 +71,7 @@ struct PolicySession::Parts {
         executor(make_learner_executor(device)),
         own_policy(std::make_unique<Policy>(make_policy(config, rig, device))),
         policy(*own_policy) {
-    restore_tensors(checkpoint, checkpoint.parameters, policy.parameters());
+    restore_policy(checkpoint, policy);
   }
   Parts(const Config& its_config, const Rig& its_rig, Device its_device, const Policy& its_policy)
       : config(its_config),

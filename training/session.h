@@ -23,6 +23,7 @@ struct SessionOptions {
   // Cameras other than those of training, as many: a rig file, or the paper's at another size (0: as trained).
   std::string rig;
   int width_px = 0, height_px = 0;
+  std::string backbone;  // where the program of policy.backbone lies now; empty: where it did
 };
 
 /// What a batch of agents sees, in the memory of the session's device.

@@ -83,7 +83,8 @@ TEST_F(RunWithEvaluations, GoesOnWithTornAndMissingRows) {
   const Table parts = read_table(path), all = read_table(evaluations("whole"));
   ASSERT_THAT(column(parts, "update"), ElementsAre("1", "2", "3", "4"));
   for (const std::string& name : all[0]) {
-    if (name != "time/evaluation_s") EXPECT_EQ(column(parts, name), column(all, name)) << name;
+    if (name == "time/evaluation_s") continue;
+    EXPECT_EQ(column(parts, name), column(all, name)) << name;
   }
 }
 

@@ -221,7 +221,8 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
                                                .samples = options.samples,
                                                .rig = options.rig,
                                                .width_px = options.width_px,
-                                               .height_px = options.height_px});
+                                               .height_px = options.height_px,
+                                               .backbone = options.backbone});
     return evaluate(&session, options);
   }
   check(options);

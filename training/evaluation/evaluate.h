@@ -37,6 +37,7 @@ struct EvaluateOptions {
   // Cameras other than those of training, see SessionOptions.
   std::string rig;
   int width_px = 0, height_px = 0;
+  std::string backbone;  // as in SessionOptions
   std::function<void(double done_fraction, double eta_s)> on_progress;
 };
 
