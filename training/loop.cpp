@@ -194,7 +194,8 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
     // A fifth more, for what takes longer than the longest before, and for saving.
     const auto longest = run.longest_update_s.find(work);
     const double expected_s = longest == run.longest_update_s.end() ? 0 : 1.2 * longest->second;
-    return any_rank(options.minutes > 0 && since_start.seconds() + expected_s > 60 * options.minutes, communicator.get());
+    return any_rank(options.minutes > 0 && since_start.seconds() + expected_s > 60 * options.minutes,
+                    communicator.get());
   };
   // One that there is no time for, or that was interrupted, is made when the run goes on. All ranks make the same one.
   RunEvaluation evaluation(run);

@@ -34,7 +34,7 @@ struct Run {
   const Device device;
   Communicator* const communicator;
   const std::vector<WorldSpec> all_worlds;  // of all ranks
-  Rig rig;  // as it is now
+  Rig rig;                                  // as it is now
   const std::unique_ptr<Simulator> simulator;
   std::unique_ptr<Renderer> renderer;  // of policies with images
   const std::unique_ptr<LearnerExecutor> executor;
