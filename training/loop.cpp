@@ -204,6 +204,7 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
     if (!any_rank(evaluation.is_due() && log.lacks_evaluation(run.update), communicator.get())) return;
     report.out_of_time = ends_too_late(evaluation_on_machine);
     if (report.out_of_time) return;
+    const Ranks::LongWork evaluates(ranks);
     const std::optional<EvaluationRecord> record = evaluation.evaluate();
     if (!record) return;
     log.add_evaluation(run.update, run.agent_steps, *record);
