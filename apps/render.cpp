@@ -3,10 +3,12 @@
 #include <chrono>
 #include <filesystem>
 
+#include <fmt/ranges.h>
+
 #include "pictura/apps/commands.h"
 #include "pictura/backends/make_renderer.h"
 #include "pictura/cli/drive.h"
-#include "pictura/cli/finite_range.h"
+#include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/raster/camera.h"
@@ -60,10 +62,12 @@ std::unique_ptr<Renderer> open_renderer(const Arguments& arguments, RendererConf
 
 /// Draws the subject. Returns views per second: the median of five calls after one that warms up.
 double draw(const Subject& subject, Renderer* renderer, HostImages* images_out) {
+  const InterruptibleWork work("interrupted while images were drawn");
   upload_geometries(subject.geometries, renderer);
   renderer->render(subject.scene, subject.views, images_out->batch());
   std::vector<double> seconds;
   for (int repeat = 0; repeat < 5; ++repeat) {
+    work.check();
     const auto begin = std::chrono::steady_clock::now();
     renderer->render(subject.scene, subject.views, images_out->batch());
     seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
@@ -72,9 +76,13 @@ double draw(const Subject& subject, Renderer* renderer, HostImages* images_out) 
   return static_cast<double>(subject.views.size()) / seconds[2];
 }
 
-void write_pictures(const Arguments& arguments, const Subject& subject, const Rig& rig, const HostImages& images) {
+/// Returns the paths of the contact sheets.
+std::vector<std::string> write_pictures(const Arguments& arguments, const Subject& subject, const Rig& rig,
+                                        const HostImages& images) {
+  const InterruptibleWork work("interrupted while pictures were written");
   const int num_views = static_cast<int>(subject.views.size());
   for (int view = 0; view < num_views; ++view) {
+    work.check();
     for (int camera = 0; camera < static_cast<int>(rig.cameras.size()); ++camera) {
       const CameraImages& image = images.camera(camera);
       const std::string stem = fmt::format("{}/{}_{}", arguments.out, subject.names[static_cast<size_t>(view)],
@@ -86,10 +94,12 @@ void write_pictures(const Arguments& arguments, const Subject& subject, const Ri
       }
     }
   }
-  draw_contact_sheet(images, rig, subject.names, arguments.out + "/contact_sheet.png");
-  if (!arguments.figure) return;
+  const std::vector<std::string> sheets =
+      draw_contact_sheets(images, rig, subject.names, arguments.out + "/contact_sheet");
+  if (!arguments.figure) return sheets;
   std::vector<RgbImage> panels;
   for (int view = 0; view < num_views; ++view) {
+    work.check();
     panels.push_back(captioned(images, view, 0, subject.captions[static_cast<size_t>(view)]));
     const RgbImage& panel = panels.back();
     write_png(fmt::format("{}/{}.png", arguments.out, subject.names[static_cast<size_t>(view)]), panel.width_px,
@@ -97,6 +107,7 @@ void write_pictures(const Arguments& arguments, const Subject& subject, const Ri
   }
   const RgbImage all = assembled(panels);
   write_png(arguments.out + "/figure.png", all.width_px, all.height_px, all.rgb);
+  return sheets;
 }
 
 void draw_and_report(const Arguments& arguments, const Subject& subject, Renderer* renderer) {
@@ -104,11 +115,10 @@ void draw_and_report(const Arguments& arguments, const Subject& subject, Rendere
   const int num_views = static_cast<int>(subject.views.size()), num_cameras = static_cast<int>(rig.cameras.size());
   HostImages images(rig, num_views, PixelFormat::u8, arguments.planes.empty() ? Planes::none : Planes::all);
   const double rate = draw(subject, renderer, &images);
-  write_pictures(arguments, subject, rig, images);
+  const std::vector<std::string> sheets = write_pictures(arguments, subject, rig, images);
 
   Hash64 hash;
   hash.add(Span<const uint8_t>(images.bytes()));
-  const std::string sheet = arguments.out + "/contact_sheet.png";
   if (arguments.json) {
     print_json({{"backend", renderer->name()},
                 {"images", num_views * num_cameras},
@@ -116,10 +126,12 @@ void draw_and_report(const Arguments& arguments, const Subject& subject, Rendere
                 {"agent_steps_per_s", rate},
                 {"image_hash", hash.hex()},
                 {"out", arguments.out},
-                {"contact_sheet", sheet}});
+                {"contact_sheet", sheets[0]},
+                {"contact_sheets", sheets}});
   } else {
     fmt::print("{} images in {}, contact sheet {}; {} agent-steps/s drawn by {}; image hash {}\n",
-               num_views * num_cameras, arguments.out, sheet, format_count(rate), renderer->name(), hash.hex());
+               num_views * num_cameras, arguments.out, fmt::join(sheets, ", "), format_count(rate), renderer->name(),
+               hash.hex());
   }
 }
 
@@ -180,10 +192,10 @@ void add_render_command(CLI::App& app) {
       ->required();
   add_world_options(command, &arguments->world);
   command->add_option("--steps", arguments->steps, "Steps of random actions before the pictures")
-      ->check(CLI::NonNegativeNumber)
+      ->transform(whole_number(0))
       ->capture_default_str();
   command->add_option("--views", arguments->views, "Draw the cameras of the first so many agents")
-      ->check(CLI::PositiveNumber)
+      ->transform(whole_number(1))
       ->capture_default_str();
   CLI::Option* size =
       command->add_option("--size", arguments->size, "Image size in pixels, WxH")->capture_default_str();
@@ -194,11 +206,12 @@ void add_render_command(CLI::App& app) {
   command
       ->add_option("--line-floor", arguments->line_floor_px,
                    "Least width of a line on screen in pixels; 0 turns it off")
-      ->check(finite_range(0, kGuardBand_px))
+      ->transform(number(0, kGuardBand_px))
       ->capture_default_str();
   command->add_option("--planes", arguments->planes, "Also write these planes as pictures: depth, class, instance")
       ->delimiter(',')
-      ->check(CLI::IsMember({"depth", "class", "instance"}));
+      ->allow_extra_args(false)
+      ->check(one_of({"depth", "class", "instance"}));
   command->add_flag("--figure", arguments->figure,
                     "Also write VIEW.png, its first camera enlarged with a caption, and figure.png with all of them");
   command->add_option("--out", arguments->out, "Folder for the pictures")->required();

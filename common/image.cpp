@@ -1,11 +1,15 @@
 #include "pictura/common/image.h"
 
 #include <algorithm>
+#include <csetjmp>
+#include <new>
+#include <utility>
 
 #include <png.h>
 
 #include "pictura/common/error.h"
-#include "pictura/common/support/file.h"
+#include "pictura/common/support/interrupt.h"
+#include "pictura/common/support/output_file.h"
 
 namespace pictura {
 
@@ -116,20 +120,98 @@ std::vector<uint8_t> HostImages::interleaved(int view, int camera_index) const {
   return rgb;
 }
 
+namespace {
+
+// What libpng's callbacks reach. They are C: they report by longjmp, and nothing may be thrown through them.
+struct PngOutput {
+  std::string bytes, complaint;
+};
+
+void append_png_bytes(png_structp png, png_bytep data, std::size_t size) {
+  auto* output = static_cast<PngOutput*>(png_get_io_ptr(png));
+  bool has_room = true;
+  try {
+    output->bytes.append(reinterpret_cast<const char*>(data), size);
+  } catch (const std::bad_alloc&) {
+    has_room = false;
+  }
+  if (!has_room) png_error(png, "out of memory");
+}
+
+void keep_png_complaint(png_structp png, png_const_charp message) {
+  auto* output = static_cast<PngOutput*>(png_get_error_ptr(png));
+  try {
+    output->complaint = message;
+  } catch (const std::bad_alloc&) {
+    output->complaint.clear();
+  }
+  png_longjmp(png, 1);
+}
+
+void ignore_png_warning(png_structp, png_const_charp) {}
+
+// A PNG that is compressed row by row.
+class PngEncoder {
+ public:
+  PngEncoder()
+      : png_(png_create_write_struct(PNG_LIBPNG_VER_STRING, &output_, keep_png_complaint, ignore_png_warning)),
+        info_(png_ ? png_create_info_struct(png_) : nullptr) {}
+  ~PngEncoder() { png_destroy_write_struct(&png_, &info_); }
+  PngEncoder(const PngEncoder&) = delete;
+  PngEncoder& operator=(const PngEncoder&) = delete;
+
+  bool begin(int width_px, int height_px) {
+    if (!info_ || setjmp(png_jmpbuf(png_))) return false;
+    png_set_write_fn(png_, &output_, append_png_bytes, nullptr);
+    png_set_IHDR(png_, info_, static_cast<png_uint_32>(width_px), static_cast<png_uint_32>(height_px), 8,
+                 PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    png_set_sRGB(png_, info_, PNG_sRGB_INTENT_PERCEPTUAL);
+    png_write_info(png_, info_);
+    return true;
+  }
+  bool add_row(const uint8_t* rgb) {
+    if (setjmp(png_jmpbuf(png_))) return false;
+    png_write_row(png_, rgb);
+    return true;
+  }
+  bool end() {
+    if (setjmp(png_jmpbuf(png_))) return false;
+    png_write_end(png_, info_);
+    return true;
+  }
+  /// What was encoded since the last call.
+  std::string take() { return std::exchange(output_.bytes, {}); }
+  const std::string& complaint() const { return output_.complaint; }
+
+ private:
+  PngOutput output_;
+  png_structp png_;
+  png_infop info_;
+};
+
+}  // namespace
+
 void write_png(const std::string& path, int width_px, int height_px, Span<const uint8_t> rgb) {
   PICTURA_CHECK(
       width_px > 0 && height_px > 0 &&
           rgb.size() == std::size_t{3} * static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px),
       "{}: expected {}x{} RGB pixels, got {} bytes", path, width_px, height_px, rgb.size());
-  write_renamed(path, [&](const std::string& temporary) {
-    png_image image{};
-    image.version = PNG_IMAGE_VERSION;
-    image.width = static_cast<png_uint_32>(width_px);
-    image.height = static_cast<png_uint_32>(height_px);
-    image.format = PNG_FORMAT_RGB;
-    const int written = png_image_write_to_file(&image, temporary.c_str(), 0, rgb.data(), 0, nullptr);
-    PICTURA_CHECK(written, "{}: cannot be written: {}", path, image.message);
-  });
+  const InterruptibleWork work(fmt::format("{}: interrupted while it was written", path));
+  OutputFile out(path);
+  PngEncoder encoder;
+  const auto check = [&](bool encoded) {
+    PICTURA_CHECK(encoded, "{}: cannot be written: {}", path,
+                  encoder.complaint().empty() ? "out of memory" : encoder.complaint());
+    out.write(encoder.take());
+  };
+  check(encoder.begin(width_px, height_px));
+  for (int y = 0; y < height_px; ++y) {
+    work.check();
+    check(encoder.add_row(rgb.data() +
+                          std::size_t{3} * static_cast<std::size_t>(width_px) * static_cast<std::size_t>(y)));
+  }
+  check(encoder.end());
+  out.commit();
 }
 
 RgbImage read_png(const std::string& path) {

@@ -110,8 +110,8 @@ class HostImages {
   std::vector<CameraImages> cameras_;
 };
 
-/// Writes an 8-bit RGB image, [height, width, 3], as PNG: to a temporary file, which is then renamed. Throws Error
-/// naming the path.
+/// Writes an 8-bit RGB image, [height, width, 3], as PNG, whole or not at all. Throws Error naming the path,
+/// Interrupted at ^C.
 void write_png(const std::string& path, int width_px, int height_px, Span<const uint8_t> rgb);
 struct RgbImage {
   int width_px = 0, height_px = 0;

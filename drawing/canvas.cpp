@@ -1,13 +1,31 @@
 #include "pictura/drawing/canvas.h"
 
+#include <new>
+#include <utility>
+
 #include <cairo-svg.h>
 
 #include "pictura/common/error.h"
 
 namespace pictura {
 
-Canvas::Canvas(cairo_surface_t* surface, const std::string& name, int width_px, int height_px, Rgb background)
+namespace {
+
+cairo_status_t append_svg_bytes(void* text, const unsigned char* data, unsigned int size) {
+  try {
+    static_cast<std::string*>(text)->append(reinterpret_cast<const char*>(data), size);
+  } catch (const std::bad_alloc&) {
+    return CAIRO_STATUS_NO_MEMORY;
+  }
+  return CAIRO_STATUS_SUCCESS;
+}
+
+}  // namespace
+
+Canvas::Canvas(cairo_surface_t* surface, std::unique_ptr<std::string> svg, const std::string& name, int width_px,
+               int height_px, Rgb background)
     : name_(name),
+      svg_(std::move(svg)),
       width_px_(width_px),
       height_px_(height_px),
       surface_(surface),
@@ -18,18 +36,24 @@ Canvas::Canvas(cairo_surface_t* surface, const std::string& name, int width_px, 
 }
 
 Canvas::Canvas(int width_px, int height_px, Rgb background)
-    : Canvas(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width_px, height_px),
+    : Canvas(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width_px, height_px), nullptr,
              fmt::format("picture of {}x{} px", width_px, height_px), width_px, height_px, background) {}
 
-Canvas::Canvas(const std::string& svg_path, int width_px, int height_px, Rgb background)
-    : Canvas(cairo_svg_surface_create(svg_path.c_str(), width_px, height_px), svg_path, width_px, height_px,
-             background) {}
+Canvas::Canvas(const std::string& name, int width_px, int height_px, Rgb background)
+    : Canvas(std::make_unique<std::string>(), name, width_px, height_px, background) {}
+
+Canvas::Canvas(std::unique_ptr<std::string> svg, const std::string& name, int width_px, int height_px, Rgb background)
+    : Canvas(cairo_svg_surface_create_for_stream(append_svg_bytes, svg.get(), width_px, height_px), std::move(svg),
+             name, width_px, height_px, background) {}
 
 void Canvas::check(cairo_status_t status) const {
   PICTURA_CHECK(status == CAIRO_STATUS_SUCCESS, "{}: {}", name_, cairo_status_to_string(status));
 }
 
-void Canvas::set_color(Rgb color, double alpha) { cairo_set_source_rgba(context(), color.r, color.g, color.b, alpha); }
+void Canvas::set_color(Rgb color, double alpha) {
+  if (work_) work_->check();
+  cairo_set_source_rgba(context(), color.r, color.g, color.b, alpha);
+}
 
 void Canvas::fill_rectangle(double x, double y, double width, double height, Rgb color, double alpha) {
   set_color(color, alpha);
@@ -91,10 +115,11 @@ RgbImage Canvas::image() const {
   return image;
 }
 
-void Canvas::finish() {
+const std::string& Canvas::svg() {
   check(cairo_status(context()));
   cairo_surface_finish(surface());
   check(cairo_surface_status(surface()));
+  return *svg_;
 }
 
 }  // namespace pictura

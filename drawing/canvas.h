@@ -2,12 +2,14 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <cairo.h>
 
 #include "pictura/common/color.h"
 #include "pictura/common/image.h"
+#include "pictura/common/support/interrupt.h"
 
 namespace pictura {
 
@@ -26,18 +28,21 @@ struct TextStyle {
   Rgb color = hex(0x22262B);
 };
 
-/// An opaque drawing surface, an image or an SVG file; user space is pixels until the matrix is changed.
+/// An opaque drawing surface, an image or an SVG document; user space is pixels until the matrix is changed.
 class Canvas {
  public:
   /// An image filled with one colour. Throws Error when the surface cannot be created.
   Canvas(int width_px, int height_px, Rgb background);
-  /// An SVG file, complete after finish(). Throws Error naming the path.
-  Canvas(const std::string& svg_path, int width_px, int height_px, Rgb background);
+  /// An SVG document, which `name` stands for in messages; complete after svg().
+  Canvas(const std::string& name, int width_px, int height_px, Rgb background);
 
   int width_px() const { return width_px_; }
   int height_px() const { return height_px_; }
   cairo_t* context() const { return context_.get(); }
   cairo_surface_t* surface() const { return surface_.get(); }
+
+  /// From now on ^C ends the drawing: set_color(), which every shape begins with, throws Interrupted with this message.
+  void stop_when_interrupted(const std::string& message) { work_.emplace(message); }
 
   void set_color(Rgb color, double alpha = 1);
   void fill_rectangle(double x, double y, double width, double height, Rgb color, double alpha = 1);
@@ -49,19 +54,23 @@ class Canvas {
 
   /// The image. Throws Error with Cairo's reason if any call since the constructor failed.
   RgbImage image() const;
-  /// Ends the SVG file. Throws Error as image() does.
-  void finish();
+  /// Ends the SVG document and returns it. Throws Error as image() does.
+  const std::string& svg();
 
  private:
   struct Free {
     void operator()(cairo_t* context) const { cairo_destroy(context); }
     void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
   };
-  Canvas(cairo_surface_t* surface, const std::string& name, int width_px, int height_px, Rgb background);
+  Canvas(std::unique_ptr<std::string> svg, const std::string& name, int width_px, int height_px, Rgb background);
+  Canvas(cairo_surface_t* surface, std::unique_ptr<std::string> svg, const std::string& name, int width_px,
+         int height_px, Rgb background);
   void check(cairo_status_t status) const;
   void select_font(const TextStyle& style) const;
 
-  std::string name_;  // in messages
+  std::string name_;                  // in messages
+  std::unique_ptr<std::string> svg_;  // where Cairo writes the document to, at an address that stays
+  std::optional<InterruptibleWork> work_;
   int width_px_, height_px_;
   std::unique_ptr<cairo_surface_t, Free> surface_;
   std::unique_ptr<cairo_t, Free> context_;

@@ -14,7 +14,11 @@ namespace {
 
 constexpr int kGap_px = 6, kTop_px = 30, kLeft_px = 64;
 constexpr int kPanelWidth_px = 480, kPanelColumns = 3;
+constexpr int kWantedWidth_px = 1600;
+// Of a page, beside what its first camera or its first row takes: Cairo draws 32,767 px a side at most.
+constexpr int kMaxPageWidth_px = 16384, kMaxPageHeight_px = 8192;
 constexpr Rgb kSheetColor = hex(0x24272C), kLabelColor = hex(0xD8DCE2);
+const TextStyle kViewStyle{.size_px = 15, .align = Align::right, .color = kLabelColor};
 
 void paste(Canvas& canvas, const HostImages& images, int view, int camera, int x0, int y0, int enlargement) {
   const std::vector<uint8_t> rgb = images.interleaved(view, camera);
@@ -33,52 +37,118 @@ void paste(Canvas& canvas, const HostImages& images, int view, int camera, int x
   cairo_surface_mark_dirty(canvas.surface());
 }
 
-}  // namespace
+// Cameras of one view, side by side.
+struct SheetRow {
+  int view, first_camera, end_camera;
+};
 
-RgbImage contact_sheet(const HostImages& images, const Rig& rig, const std::vector<std::string>& view_names,
-                       int enlargement) {
-  const int num_cameras = static_cast<int>(rig.cameras.size()), num_views = static_cast<int>(view_names.size());
-  PICTURA_CHECK(num_views >= 1 && num_cameras >= 1, "contact sheet: expected views and cameras, got {} of {}",
-                num_views, num_cameras);
-  int images_width = 0, row_height = 0;
-  for (const Camera& camera : rig.cameras) {
-    images_width += camera.width_px;
-    row_height = std::max(row_height, camera.height_px);
+// Rows and sizes of all pages; a rig too wide for one row continues in the next.
+struct SheetLayout {
+  int enlargement = 1, left_px = kLeft_px, row_px = 0, width_px = 0;
+  std::vector<SheetRow> rows;
+
+  /// Whether camera names stand above it: where a page begins, and where the cameras are others than in the row above.
+  bool has_names(const SheetRow* row, const SheetRow* first) const {
+    return row == first || row->first_camera != row[-1].first_camera;
   }
-  constexpr int kWantedWidth_px = 1600;
-  if (enlargement <= 0) enlargement = std::max(1, kWantedWidth_px / images_width);
-  const TextStyle view_style{.size_px = 15, .align = Align::right, .color = kLabelColor};
-  int left_px = kLeft_px;
-  {
-    const Canvas ruler(1, 1, kSheetColor);
-    for (const std::string& name : view_names) {
-      left_px = std::max(left_px, 20 + static_cast<int>(ruler.text_width(name, view_style)));
+  /// The rows of each page, one at least.
+  std::vector<Span<const SheetRow>> pages() const {
+    std::vector<Span<const SheetRow>> result;
+    for (const SheetRow *first = rows.data(), *const last = first + rows.size(); first != last;) {
+      const SheetRow* row = first;
+      for (int height_px = 0; row != last; ++row) {
+        height_px += row_px + (has_names(row, first) ? kTop_px : 0);
+        if (row != first && height_px > kMaxPageHeight_px) break;
+      }
+      result.emplace_back(first, static_cast<std::size_t>(row - first));
+      first = row;
+    }
+    return result;
+  }
+};
+
+SheetLayout layout_of(const Rig& rig, const std::vector<std::string>& view_names, int enlargement) {
+  PICTURA_CHECK(!view_names.empty() && !rig.cameras.empty(), "contact sheet: expected views and cameras, got {} of {}",
+                view_names.size(), rig.cameras.size());
+  SheetLayout layout;
+  int images_width_px = 0, image_height_px = 0;
+  for (const Camera& camera : rig.cameras) {
+    images_width_px += camera.width_px;
+    image_height_px = std::max(image_height_px, camera.height_px);
+  }
+  layout.enlargement = enlargement > 0 ? enlargement : std::max(1, kWantedWidth_px / images_width_px);
+  layout.row_px = image_height_px * layout.enlargement + kGap_px;
+  const Canvas ruler(1, 1, kSheetColor);
+  for (const std::string& name : view_names) {
+    layout.left_px = std::max(layout.left_px, 20 + static_cast<int>(ruler.text_width(name, kViewStyle)));
+  }
+  layout.left_px = std::min(layout.left_px, kMaxPageWidth_px);
+  const int num_cameras = static_cast<int>(rig.cameras.size());
+  for (int view = 0; view < static_cast<int>(view_names.size()); ++view) {
+    for (int first = 0; first < num_cameras;) {
+      int end = first, row_width_px = 0;
+      for (; end < num_cameras; ++end) {
+        const int width_px = rig.cameras[static_cast<std::size_t>(end)].width_px * layout.enlargement + kGap_px;
+        if (end > first && row_width_px + width_px > kMaxPageWidth_px) break;
+        row_width_px += width_px;
+      }
+      layout.rows.push_back({view, first, end});
+      layout.width_px = std::max(layout.width_px, layout.left_px + row_width_px);
+      first = end;
     }
   }
-  Canvas canvas(left_px + images_width * enlargement + num_cameras * kGap_px,
-                kTop_px + num_views * (row_height * enlargement + kGap_px), kSheetColor);
-  for (int view = 0; view < num_views; ++view) {
-    int x = left_px;
-    const int y = kTop_px + view * (row_height * enlargement + kGap_px);
-    canvas.text(left_px - 10, y + 0.5 * row_height * enlargement + 5, view_names[static_cast<size_t>(view)],
-                view_style);
-    for (int camera = 0; camera < num_cameras; ++camera) {
-      const Camera& each = rig.cameras[static_cast<size_t>(camera)];
-      paste(canvas, images, view, camera, x, y, enlargement);
-      if (view == 0) {
-        canvas.text(x + 0.5 * each.width_px * enlargement, kTop_px - 10, each.name,
+  return layout;
+}
+
+RgbImage page_of(const HostImages& images, const Rig& rig, const std::vector<std::string>& view_names,
+                 const SheetLayout& layout, Span<const SheetRow> rows) {
+  int height_px = 0;
+  for (const SheetRow& row : rows) height_px += layout.row_px + (layout.has_names(&row, rows.data()) ? kTop_px : 0);
+  Canvas canvas(layout.width_px, height_px, kSheetColor);
+  canvas.stop_when_interrupted("contact sheet: interrupted while it was drawn");
+  int y = 0;
+  for (const SheetRow& row : rows) {
+    const bool has_names = layout.has_names(&row, rows.data());
+    if (has_names) y += kTop_px;
+    canvas.text(layout.left_px - 10, y + 0.5 * (layout.row_px - kGap_px) + 5,
+                view_names[static_cast<std::size_t>(row.view)], kViewStyle);
+    int x = layout.left_px;
+    for (int camera = row.first_camera; camera < row.end_camera; ++camera) {
+      const Camera& each = rig.cameras[static_cast<std::size_t>(camera)];
+      const int width_px = each.width_px * layout.enlargement;
+      paste(canvas, images, row.view, camera, x, y, layout.enlargement);
+      if (has_names) {
+        canvas.text(x + 0.5 * width_px, y - 10, each.name,
                     {.size_px = 14, .align = Align::center, .color = kLabelColor});
       }
-      x += each.width_px * enlargement + kGap_px;
+      x += width_px + kGap_px;
     }
+    y += layout.row_px;
   }
   return canvas.image();
 }
 
-void draw_contact_sheet(const HostImages& images, const Rig& rig, const std::vector<std::string>& view_names,
-                        const std::string& path) {
-  const RgbImage sheet = contact_sheet(images, rig, view_names);
-  write_png(path, sheet.width_px, sheet.height_px, sheet.rgb);
+}  // namespace
+
+std::vector<RgbImage> contact_sheets(const HostImages& images, const Rig& rig,
+                                     const std::vector<std::string>& view_names, int enlargement) {
+  const SheetLayout layout = layout_of(rig, view_names, enlargement);
+  std::vector<RgbImage> pages;
+  for (const Span<const SheetRow> rows : layout.pages())
+    pages.push_back(page_of(images, rig, view_names, layout, rows));
+  return pages;
+}
+
+std::vector<std::string> draw_contact_sheets(const HostImages& images, const Rig& rig,
+                                             const std::vector<std::string>& view_names, const std::string& stem) {
+  const SheetLayout layout = layout_of(rig, view_names, 0);
+  std::vector<std::string> paths;
+  for (const Span<const SheetRow> rows : layout.pages()) {
+    paths.push_back(paths.empty() ? stem + ".png" : fmt::format("{}_{}.png", stem, paths.size() + 1));
+    const RgbImage page = page_of(images, rig, view_names, layout, rows);
+    write_png(paths.back(), page.width_px, page.height_px, page.rgb);
+  }
+  return paths;
 }
 
 RgbImage captioned(const HostImages& images, int view, int camera, const std::string& caption) {
@@ -96,8 +166,10 @@ RgbImage assembled(const std::vector<RgbImage>& pictures) {
   const int width_px = pictures[0].width_px, height_px = pictures[0].height_px;
   const int columns = std::min(kPanelColumns, static_cast<int>(pictures.size()));
   const int rows = (static_cast<int>(pictures.size()) + columns - 1) / columns;
-  Canvas canvas(columns * (width_px + kGap_px) - kGap_px, rows * (height_px + kGap_px) - kGap_px, hex(0xFFFFFF));
-  RgbImage all = canvas.image();
+  RgbImage all{columns * (width_px + kGap_px) - kGap_px, rows * (height_px + kGap_px) - kGap_px, {}};
+  constexpr uint8_t kWhite = 255;
+  all.rgb.assign(std::size_t{3} * static_cast<std::size_t>(all.width_px) * static_cast<std::size_t>(all.height_px),
+                 kWhite);
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     const RgbImage& picture = pictures[i];
     PICTURA_CHECK(picture.width_px == width_px && picture.height_px == height_px,
@@ -107,7 +179,7 @@ RgbImage assembled(const std::vector<RgbImage>& pictures) {
     const int top_px = static_cast<int>(i) / columns * (height_px + kGap_px);
     for (int y = 0; y < height_px; ++y) {
       std::copy_n(picture.rgb.begin() + std::ptrdiff_t{3} * y * width_px, 3 * width_px,
-                  all.rgb.begin() + std::ptrdiff_t{3} * ((top_px + y) * all.width_px + left_px));
+                  all.rgb.begin() + std::ptrdiff_t{3} * (std::ptrdiff_t{top_px + y} * all.width_px + left_px));
     }
   }
   return all;

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "pictura/common/image.h"
 #include "pictura/map/road_map.h"
@@ -23,23 +24,25 @@ struct MapPictureOptions {
 /// Draws lanes by type, markings, road edges, crosswalks, parking spaces, building lines, signs, painted stop lines,
 /// and lights with their stop lines, phases, and the angle within which their heads are visible; a legend, the map's
 /// properties, file coordinates along two sides and a scale bar. Throws Error for a size out of range, a box that is
-/// not finite or not between 1 m and 1000 km wide and high, or a map with nothing to draw.
+/// not finite or not between 1 m and 1000 km wide and high, or a map with nothing to draw; Interrupted at ^C.
 RgbImage draw_map(const RoadMap& map, const MapPictureOptions& options = {});
 
-/// draw_map() as a PNG file, written under a temporary name and renamed. Throws Error naming the path.
+/// draw_map() as a PNG file. Throws Error naming the path.
 void draw_map_png(const RoadMap& map, const std::string& path, const MapPictureOptions& options = {});
 
 /// The same picture as vector graphics; size_px is its nominal size.
 void draw_map_svg(const RoadMap& map, const std::string& path, const MapPictureOptions& options = {});
 
-/// Rows of views, columns of cameras, every image enlarged by one integer factor without smoothing (0: chosen so that
-/// the sheet is about 1600 px wide), labelled with camera and view names. Images must be u8 images of the rig.
-RgbImage contact_sheet(const HostImages& images, const Rig& rig, const std::vector<std::string>& view_names,
-                       int enlargement = 0);
+/// Pages of contact sheets, of as many rows as make about 8,192 px: a view a row (more where the rig is too wide for
+/// one), a camera a column, every image enlarged by one integer factor without smoothing (0: chosen so that a row is
+/// about 1600 px wide), labelled with camera and view names. Images must be u8 images of the rig. Throws Interrupted at
+/// ^C.
+std::vector<RgbImage> contact_sheets(const HostImages& images, const Rig& rig,
+                                     const std::vector<std::string>& view_names, int enlargement = 0);
 
-/// contact_sheet() as a PNG file. Throws Error naming the path.
-void draw_contact_sheet(const HostImages& images, const Rig& rig, const std::vector<std::string>& view_names,
-                        const std::string& path);
+/// The same as PNG files STEM.png, STEM_2.png, ..., whose paths it returns. Throws Error naming the path.
+std::vector<std::string> draw_contact_sheets(const HostImages& images, const Rig& rig,
+                                             const std::vector<std::string>& view_names, const std::string& stem);
 
 /// One image, enlarged by an integer factor without smoothing to about 480 px, above its caption.
 RgbImage captioned(const HostImages& images, int view, int camera, const std::string& caption);

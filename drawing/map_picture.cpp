@@ -8,6 +8,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/interrupt.h"
 #include "pictura/drawing/drawing.h"
 #include "pictura/drawing/map_details.h"
 #include "pictura/drawing/plot.h"
@@ -262,6 +263,7 @@ void draw_band(Canvas& canvas, const Layout& layout, const RoadMap& map) {
 }
 
 void draw_on(Canvas& canvas, const Layout& layout, const RoadMap& map) {
+  canvas.stop_when_interrupted(fmt::format("map {}: interrupted while it was drawn", map.name));
   MapLayers(map).paint(canvas, layout.left_top_m, layout.px_per_m);
   paint_details(map, canvas, layout.left_top_m, layout.px_per_m);
   draw_band(canvas, layout, map);
@@ -279,17 +281,17 @@ RgbImage draw_map(const RoadMap& map, const MapPictureOptions& options) {
 }
 
 void draw_map_png(const RoadMap& map, const std::string& path, const MapPictureOptions& options) {
+  const InterruptibleWork work(fmt::format("{}: interrupted while it was drawn", path));
   const RgbImage image = draw_map(map, options);
+  work.check();
   write_png(path, image.width_px, image.height_px, image.rgb);
 }
 
 void draw_map_svg(const RoadMap& map, const std::string& path, const MapPictureOptions& options) {
   const Layout layout = layout_of(map, options);
-  write_renamed(path, [&](const std::string& temporary) {
-    Canvas canvas(temporary, layout.width_px, layout.height_px, kGroundColor);
-    draw_on(canvas, layout, map);
-    canvas.finish();
-  });
+  Canvas canvas(path, layout.width_px, layout.height_px, kGroundColor);
+  draw_on(canvas, layout, map);
+  write_file(path, canvas.svg());
 }
 
 }  // namespace pictura

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -16,7 +17,7 @@
 #include <unistd.h>
 
 #include "pictura/common/error.h"
-#include "pictura/common/support/file.h"
+#include "pictura/common/support/output_file.h"
 
 extern char** environ;
 
@@ -26,23 +27,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// A file descriptor that closes itself.
-class Descriptor {
- public:
-  Descriptor() = default;
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() { reset(); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return fd_; }
-  void reset(int fd = -1) {
-    if (fd_ >= 0) ::close(fd_);
-    fd_ = fd;
-  }
-
- private:
-  int fd_ = -1;
-};
+// Where ffmpeg finds the film that it writes.
+constexpr int kFilmInChild = 3;
 
 std::string last_line(std::FILE* file) {
   std::rewind(file);
@@ -60,7 +46,8 @@ std::string last_line(std::FILE* file) {
 }  // namespace
 
 struct VideoWriter::Impl {
-  std::string path, temporary;
+  std::string path;
+  std::optional<OutputFile> film;
   int width_px = 0, height_px = 0;
   int64_t num_frames = 0;
   pid_t child = -1;
@@ -74,8 +61,6 @@ struct VideoWriter::Impl {
       ::kill(child, SIGKILL);
       reap();
     }
-    std::error_code ignored;
-    fs::remove(temporary, ignored);
   }
 
   void start(std::vector<std::string> arguments);
@@ -111,6 +96,7 @@ void VideoWriter::Impl::start(std::vector<std::string> arguments) {
   posix_spawn_file_actions_adddup2(&actions, child_end.get(), STDIN_FILENO);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, ::fileno(messages.get()), STDERR_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, film->fd(), kFilmInChild);
   // In its own process group, so that ^C in a terminal does not end ffmpeg before this process has finished the video.
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
@@ -140,13 +126,7 @@ VideoWriter::VideoWriter(const std::string& path, int width_px, int height_px, d
   impl_->path = path;
   impl_->width_px = width_px;
   impl_->height_px = height_px;
-  const std::string temporary =
-      (target.parent_path() / fmt::format(".{}.{}.film{}", target.stem().string(), ::getpid(), ending)).string();
-  {
-    const Descriptor probe(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
-    PICTURA_CHECK(probe.get() >= 0, "{}: cannot be written: {}", path, std::strerror(errno));
-    impl_->temporary = temporary;
-  }
+  impl_->film.emplace(path);
   std::vector<std::string> arguments{"ffmpeg",
                                      "-hide_banner",
                                      "-loglevel",
@@ -164,18 +144,19 @@ VideoWriter::VideoWriter(const std::string& path, int width_px, int height_px, d
                                      "-i",
                                      "pipe:0"};
   const std::vector<std::string> format =
-      ending == ".mp4"
-          ? std::vector<std::string>{"-vf",       "crop=trunc(iw/2)*2:trunc(ih/2)*2:0:0",
-                                     "-c:v",      "libx264",
-                                     "-preset",   "veryfast",
-                                     "-crf",      "20",
-                                     "-pix_fmt",  "yuv420p",
-                                     "-movflags", "+faststart"}
-          : std::vector<std::string>{"-filter_complex",
-                                     "split[a][b];[a]palettegen[p];[b][p]paletteuse=dither=bayer:bayer_scale=4"};
+      ending == ".mp4" ? std::vector<std::string>{"-vf",       "crop=trunc(iw/2)*2:trunc(ih/2)*2:0:0",
+                                                  "-c:v",      "libx264",
+                                                  "-preset",   "veryfast",
+                                                  "-crf",      "20",
+                                                  "-pix_fmt",  "yuv420p",
+                                                  "-movflags", "+faststart",
+                                                  "-f",        "mp4"}
+                       : std::vector<std::string>{
+                             "-filter_complex",
+                             "split[a][b];[a]palettegen[p];[b][p]paletteuse=dither=bayer:bayer_scale=4", "-f", "gif"};
   arguments.insert(arguments.end(), format.begin(), format.end());
-  // A relative name that starts with '-' or contains ':' must not be read as an option or a protocol.
-  arguments.push_back("file:" + temporary);
+  // A file that may have no name yet, and that ffmpeg can read again to move its index to the front.
+  arguments.push_back(fmt::format("file:/proc/self/fd/{}", kFilmInChild));
   impl_->start(std::move(arguments));
 }
 
@@ -206,10 +187,7 @@ void VideoWriter::finish() {
   impl_->frames.reset();
   const int status = impl_->reap();
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) impl_->fail_with_message(status);
-  write_renamed(impl_->path, [&](const std::string& renamed) {
-    PICTURA_CHECK(std::rename(impl_->temporary.c_str(), renamed.c_str()) == 0, "{}: cannot be written: {}", impl_->path,
-                  std::strerror(errno));
-  });
+  impl_->film->commit();
 }
 
 }  // namespace pictura

@@ -4,13 +4,15 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "pictura/common/error.h"
+#include "pictura/common/support/interrupt.h"
+#include "pictura/common/support/output_file.h"
 
 namespace pictura {
 
@@ -18,22 +20,20 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// An open file that closes itself.
-class OpenFile {
+/// A file open for reading. Opening a FIFO does not wait for its writer: reading does, and can be interrupted.
+class InputFile {
  public:
-  explicit OpenFile(const std::string& path) : path_(path), fd_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
-    PICTURA_CHECK(fd_ >= 0 || errno != ENOENT, "{}: no such file", path_);
-    PICTURA_CHECK(fd_ >= 0, "{}: cannot be opened: {}", path_, std::strerror(errno));
+  explicit InputFile(const std::string& path)
+      : path_(path), file_(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC)) {
+    PICTURA_CHECK(!path.empty(), "expected the name of a file to read, got an empty one");
+    PICTURA_CHECK(file_.get() >= 0 || errno != ENOENT, "{}: no such file", path_);
+    PICTURA_CHECK(file_.get() >= 0, "{}: cannot be opened: {}", path_, std::strerror(errno));
   }
-  ~OpenFile() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  OpenFile(const OpenFile&) = delete;
-  OpenFile& operator=(const OpenFile&) = delete;
 
   struct stat status() const {
     struct stat result{};
-    PICTURA_CHECK(::fstat(fd_, &result) == 0, "{}: cannot be asked for its size: {}", path_, std::strerror(errno));
+    PICTURA_CHECK(::fstat(file_.get(), &result) == 0, "{}: cannot be asked for its size: {}", path_,
+                  std::strerror(errno));
     return result;
   }
 
@@ -43,16 +43,26 @@ class OpenFile {
     bytes->resize(before + count);
     ssize_t got = 0;
     do {
-      got = ::read(fd_, bytes->data() + before, count);
-    } while (got < 0 && errno == EINTR);
+      wait_for_bytes();
+      got = ::read(file_.get(), bytes->data() + before, count);
+    } while (got < 0 && (errno == EINTR || errno == EAGAIN));
     PICTURA_CHECK(got >= 0, "{}: reading failed: {}", path_, std::strerror(errno));
     bytes->resize(before + static_cast<std::size_t>(got));
     return static_cast<std::size_t>(got);
   }
 
  private:
+  // Until there are bytes or nobody is left to write them; at once for regular files.
+  void wait_for_bytes() const {
+    constexpr int kPoll_ms = 100;
+    pollfd slot{.fd = file_.get(), .events = POLLIN, .revents = 0};
+    while (::poll(&slot, 1, kPoll_ms) <= 0) {
+      if (interrupted()) throw Interrupted(fmt::format("{}: interrupted while it was read", path_));
+    }
+  }
+
   const std::string& path_;
-  int fd_;
+  Descriptor file_;
 };
 
 bool is_same_version(const struct stat& a, const struct stat& b) {
@@ -62,7 +72,7 @@ bool is_same_version(const struct stat& a, const struct stat& b) {
 }  // namespace
 
 std::string read_file(const std::string& path, std::size_t max_bytes) {
-  const OpenFile file(path);
+  const InputFile file(path);
   const struct stat before = file.status();
   PICTURA_CHECK(!S_ISDIR(before.st_mode), "{}: expected a file, got a folder", path);
   // Pipes and the like have no size to be asked for beforehand.
@@ -83,36 +93,10 @@ std::string read_file(const std::string& path, std::size_t max_bytes) {
   return bytes;
 }
 
-void write_renamed(const std::string& path, const std::function<void(const std::string&)>& write) {
-  // The ending stays, for writers that choose a format by it.
-  const fs::path target(path);
-  const std::string temporary = (target.parent_path() / fmt::format(".{}.{}.tmp{}", target.stem().string(), getpid(),
-                                                                    target.extension().string()))
-                                    .string();
-  try {
-    write(temporary);
-    // On disk before the rename, so that a crash never leaves an empty file under the final name.
-    const int fd = ::open(temporary.c_str(), O_RDONLY | O_CLOEXEC);
-    PICTURA_CHECK(fd >= 0, "{}: cannot be written: {}", path, std::strerror(errno));
-    const bool synced = ::fsync(fd) == 0;
-    ::close(fd);
-    PICTURA_CHECK(synced, "{}: cannot be written: {}", path, std::strerror(errno));
-    PICTURA_CHECK(std::rename(temporary.c_str(), path.c_str()) == 0, "{}: cannot be replaced: {}", path,
-                  std::strerror(errno));
-  } catch (...) {
-    std::error_code ignored;
-    fs::remove(temporary, ignored);
-    throw;
-  }
-}
-
 void write_file(const std::string& path, std::string_view bytes) {
-  write_renamed(path, [&](const std::string& temporary) {
-    std::ofstream out(temporary, std::ios::binary);
-    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    out.close();
-    PICTURA_CHECK(out, "{}: cannot be written: {}", path, std::strerror(errno));
-  });
+  OutputFile out(path);
+  out.write(bytes);
+  out.commit();
 }
 
 std::string cache_folder(const std::string& name) {
@@ -146,14 +130,13 @@ void make_output_folder(const std::string& path) {
                 making   ? making.message()
                 : asking ? asking.message()
                          : "it is a file");
+  PICTURA_CHECK(!path.empty() || is_folder, "expected the name of a folder to write into, got an empty one");
   // Ask by trying: permission bits say nothing of read-only mounts, and a superuser passes access().
-  const std::string probe = (fs::path(path) / fmt::format(".probe.{}", getpid())).string();
-  {
-    std::ofstream out(probe);
-    PICTURA_CHECK(out, "{}: cannot be written to: {}", path, std::strerror(errno));
+  try {
+    const OutputFile probe((fs::path(path) / ".probe").string());
+  } catch (const Error&) {
+    fail("{}: cannot be written to: {}", path, std::strerror(errno));
   }
-  std::error_code ignored;
-  fs::remove(probe, ignored);
 }
 
 }  // namespace pictura

@@ -1,8 +1,6 @@
-// Files that are read whole and written under a temporary name, then renamed: a reader never sees half a file, and a
-// full disk or a killed process leaves the old one.
+// Files that are read and written whole.
 #pragma once
 
-#include <functional>
 #include <string>
 #include <string_view>
 
@@ -11,14 +9,10 @@
 namespace pictura {
 
 /// The bytes of a file. Throws Error naming the path and the reason; refuses folders, files above max_bytes, and files
-/// whose size or time of change differ before and after reading.
+/// whose size or time of change differ before and after reading. Throws Interrupted while it waits for a FIFO's writer.
 std::string read_file(const std::string& path, std::size_t max_bytes = std::size_t{1} << 30);
 
-/// Calls write(temporary_path), then renames the temporary file to path. Whatever happens, no temporary file is left.
-/// Throws Error naming the path and the reason.
-void write_renamed(const std::string& path, const std::function<void(const std::string& temporary_path)>& write);
-
-/// Writes the bytes under a temporary name and renames.
+/// Writes the bytes as OutputFile does (output_file.h): whole, or not at all.
 void write_file(const std::string& path, std::string_view bytes);
 
 /// The folder for what can be made again: $XDG_CACHE_HOME/pictura/NAME, or ~/.cache/pictura/NAME. Empty when there is

@@ -5,6 +5,8 @@
 
 #include <unistd.h>
 
+#include "pictura/common/error.h"
+
 namespace pictura {
 
 namespace {
@@ -42,5 +44,9 @@ void take_interrupt(int signal) {
 }
 
 int interrupting_signal() { return first_signal; }
+
+void InterruptibleWork::check() const {
+  if (!began_after_ && interrupted()) throw Interrupted(message_);
+}
 
 }  // namespace pictura

@@ -2,6 +2,9 @@
 // death.
 #pragma once
 
+#include <string>
+#include <utility>
+
 namespace pictura {
 
 /// From now on the first SIGINT, SIGTERM or SIGHUP is kept; a second SIGINT or SIGTERM ends the process at once with
@@ -15,5 +18,19 @@ int interrupting_signal();
 void take_interrupt(int signal);
 
 inline bool interrupted() { return interrupting_signal() != 0; }
+
+/// A piece of work that a signal stops. One that came before the work began does not: then the work is part of an
+/// orderly end, such as the curve of what was learnt until now.
+class InterruptibleWork {
+ public:
+  /// `message` says what was interrupted.
+  explicit InterruptibleWork(std::string message) : message_(std::move(message)) {}
+  /// Throws Interrupted.
+  void check() const;
+
+ private:
+  std::string message_;
+  bool began_after_ = interrupted();
+};
 
 }  // namespace pictura

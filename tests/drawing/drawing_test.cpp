@@ -3,12 +3,15 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,6 +20,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/interrupt.h"
 #include "pictura/drawing/film.h"
 #include "pictura/drawing/planes.h"
 #include "pictura/drawing/plot.h"
@@ -496,7 +500,7 @@ TEST(ContactSheet, EnlargesEveryPixelWithoutSmoothing) {
   const CameraImages& camera = images.camera(1);
   auto* data = static_cast<uint8_t*>(camera.data) + 2 * camera.view_stride;
   data[3 * 8 + 5] = 255;
-  const RgbImage sheet = contact_sheet(images, rig, {"0", "1", "2"}, 4);
+  const RgbImage sheet = contact_sheets(images, rig, {"0", "1", "2"}, 4).front();
   EXPECT_EQ(count(sheet, {255, 0, 0}), 16);
   int x0 = -1, y0 = -1;
   for (int y = 0; y < sheet.height_px && y0 < 0; ++y) {
@@ -511,8 +515,54 @@ TEST(ContactSheet, EnlargesEveryPixelWithoutSmoothing) {
   EXPECT_NE(at(sheet, x0 - 5 * 4 - 1, y0), (Pixel{0, 0, 0}));
   EXPECT_EQ(at(sheet, x0 + 3 * 4 - 1, y0 + 3 * 4 - 1), (Pixel{0, 0, 0}));
   EXPECT_NE(at(sheet, x0 + 3 * 4, y0), (Pixel{0, 0, 0}));
-  EXPECT_GT(contact_sheet(images, rig, {"0"}).width_px, 1500);
-  EXPECT_THROW(contact_sheet(images, rig, {}), Error);
+  EXPECT_GT(contact_sheets(images, rig, {"0"}).front().width_px, 1500);
+  EXPECT_THROW(contact_sheets(images, rig, {}), Error);
+}
+
+TEST(ContactSheet, GoesOnOnFurtherPagesAndRowsWhereThereIsNoRoom) {
+  const Rig rig = paper_rig(96, 54);
+  std::vector<std::string> names;
+  for (int view = 0; view < 80; ++view) names.push_back(std::to_string(view));
+  HostImages images(rig, 80);
+  // The first pixel of the first and the last view.
+  for (const int view : {0, 79}) {
+    static_cast<uint8_t*>(images.camera(0).data)[view * images.camera(0).view_stride] = 255;
+  }
+  const std::vector<RgbImage> pages = contact_sheets(images, rig, names);
+  ASSERT_EQ(pages.size(), 3u);
+  EXPECT_EQ(count(pages[0], {255, 0, 0}), 4 * 4);
+  EXPECT_EQ(count(pages[1], {255, 0, 0}), 0);
+  EXPECT_EQ(count(pages[2], {255, 0, 0}), 4 * 4);
+  for (const RgbImage& page : pages) EXPECT_LE(page.height_px, 8192);
+  const ScratchFolder folder;
+  EXPECT_EQ(draw_contact_sheets(images, rig, names, folder / "sheet"),
+            (std::vector<std::string>{folder / "sheet.png", folder / "sheet_2.png", folder / "sheet_3.png"}));
+  EXPECT_EQ(read_png(folder / "sheet_3.png").rgb, pages[2].rgb);
+  // Five cameras of 8,000 px: two a row.
+  Rig wide{.cameras = std::vector<Camera>(5, paper_rig(8000, 2).cameras[0])};
+  const std::vector<RgbImage> sheet = contact_sheets(HostImages(wide, 1), wide, {"0"});
+  ASSERT_EQ(sheet.size(), 1u);
+  EXPECT_LT(sheet[0].width_px, 16500);
+  EXPECT_GT(sheet[0].height_px, 3 * 2);
+}
+
+TEST(Interrupts, EndDrawingsButNotThoseThatBeginAfterwards) {
+  EXPECT_EXIT(
+      {
+        catch_interrupts();
+        std::thread soon([] {
+          std::this_thread::sleep_for(std::chrono::milliseconds(100));
+          ::kill(::getpid(), SIGTERM);
+        });
+        const std::vector<uint8_t> rgb(size_t{3} * 12000 * 12000);
+        std::string message = test::message_of<Interrupted>([&] { write_png("/dev/null", 12000, 12000, rgb); });
+        soon.join();
+        write_png("/dev/null", 1, 1, Span<const uint8_t>(rgb.data(), 3));
+        draw_map(town(), {.size_px = 100});
+        std::fputs(message.c_str(), stderr);
+        std::exit(0);
+      },
+      testing::ExitedWithCode(0), "/dev/null: interrupted while it was written");
 }
 
 TEST(Figure, PanelsAreInRowsOfThreeAboveTheirCaptions) {
@@ -719,6 +769,16 @@ TEST(Video, RejectsBadPathsAndFrames) {
     video.add(solid(64, 48, {0, 0, 0}));
   }
   EXPECT_EQ(folder.num_entries(), 0u) << "an unfinished film leaves nothing";
+  const pid_t child = ::fork();
+  if (child == 0) {
+    VideoWriter video(folder / "film.mp4", 64, 48, 10);
+    video.add({64, 48, std::vector<uint8_t>(64 * 48 * 3)});
+    ::raise(SIGKILL);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFSIGNALED(status));
+  EXPECT_EQ(folder.num_entries(), 0u) << "nor does a killed process";
   EXPECT_FALSE(has_children());
 }
 

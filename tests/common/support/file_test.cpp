@@ -1,17 +1,22 @@
-// Files written under a temporary name and renamed; PNG and hash.
+// Files that are read whole; PNG and hash. output_file_test.cpp has how they are written.
 #include "pictura/common/support/file.h"
 
 #include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "pictura/common/error.h"
 #include "pictura/common/image.h"
 #include "pictura/common/support/hash.h"
+#include "pictura/common/support/interrupt.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 
@@ -22,19 +27,6 @@ class FileTest : public testing::Test {
  protected:
   test::ScratchFolder folder_;
 };
-
-TEST_F(FileTest, AFailedWriteKeepsTheOldFileAndLeavesNoOther) {
-  const std::string path = folder_ / "a.txt";
-  write_file(path, "old");
-  EXPECT_THROW(write_renamed(path,
-                             [](const std::string& temporary) {
-                               std::ofstream(temporary) << "half";
-                               throw Error("disk full");
-                             }),
-               Error);
-  EXPECT_EQ(read_file(path), "old");
-  EXPECT_EQ(folder_.num_entries(), 1u);
-}
 
 TEST_F(FileTest, ErrorsNameThePath) {
   EXPECT_THROW(read_file(folder_ / "missing"), Error);
@@ -99,6 +91,22 @@ TEST_F(FileTest, PngKeepsEveryPixel) {
   EXPECT_EQ(image.height_px, 3);
   EXPECT_EQ(image.rgb, rgb);
   EXPECT_THROW(write_png(folder_ / "b.png", 5, 4, rgb), Error);
+}
+
+TEST_F(FileTest, AFifoIsReadToItsEndAndWaitingForItsWriterCanBeInterrupted) {
+  const std::string path = folder_ / "fifo";
+  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+  std::thread writer([&] { std::ofstream(path) << std::string(200'000, 'x'); });
+  EXPECT_EQ(read_file(path).size(), 200'000u);
+  writer.join();
+  EXPECT_EXIT(
+      {
+        catch_interrupts();
+        ::raise(SIGTERM);
+        std::fputs(test::message_of<Interrupted>([&] { read_file(path); }).c_str(), stderr);
+        std::exit(0);
+      },
+      testing::ExitedWithCode(0), "fifo: interrupted while it was read");
 }
 
 TEST(Hash, IsFnv1a) {

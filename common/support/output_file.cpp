@@ -1,0 +1,183 @@
+#include "pictura/common/support/output_file.h"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "pictura/common/error.h"
+#include "pictura/common/support/interrupt.h"
+
+namespace pictura {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int kPoll_ms = 100;
+
+[[noreturn]] void fail_to_write(const std::string& path) {
+  fail("{}: cannot be written: {}", path, std::strerror(errno));
+}
+
+std::string folder_of(const std::string& path) {
+  const std::string folder = fs::path(path).parent_path().string();
+  return folder.empty() ? "." : folder;
+}
+
+// The name that a chain of links ends with, whether or not there is a file.
+std::string without_links(const std::string& path) {
+  constexpr int kMaxLinks = 40;
+  fs::path target(path);
+  std::error_code error;
+  for (int i = 0; fs::is_symlink(target, error); ++i) {
+    PICTURA_CHECK(i < kMaxLinks, "{}: cannot be written: {}", path, std::strerror(ELOOP));
+    const fs::path next = fs::read_symlink(target, error);
+    PICTURA_CHECK(!error, "{}: cannot be written: {}", path, error.message());
+    target = next.is_absolute() ? next : target.parent_path() / next;
+  }
+  return target.string();
+}
+
+// "/folder/.NAME.": how the hidden files of a target begin.
+std::string hidden_prefix(const std::string& target) {
+  return folder_of(target) + "/." + fs::path(target).filename().string() + '.';
+}
+constexpr std::string_view kHiddenEnding = ".tmp";
+
+// Hidden files of the target that nobody writes any more: a writer holds a lock, which ends with its process.
+void remove_abandoned(const std::string& target) {
+  const std::string prefix = hidden_prefix(target);
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_of(target), error)) {
+    const std::string name = entry.path().string();
+    const bool is_hidden = name.size() > prefix.size() + kHiddenEnding.size() && name.starts_with(prefix) &&
+                           name.ends_with(kHiddenEnding) && entry.is_regular_file(error);
+    if (!is_hidden) continue;
+    const Descriptor file(::open(name.c_str(), O_RDONLY | O_CLOEXEC));
+    if (file.get() >= 0 && ::flock(file.get(), LOCK_EX | LOCK_NB) == 0) ::unlink(name.c_str());
+  }
+}
+
+void write_all(int fd, std::string_view bytes, const std::string& path) {
+  while (!bytes.empty()) {
+    const ssize_t count = ::write(fd, bytes.data(), bytes.size());
+    if (count > 0) {
+      bytes.remove_prefix(static_cast<std::size_t>(count));
+    } else if (count < 0 && errno == EAGAIN) {
+      pollfd slot{.fd = fd, .events = POLLOUT, .revents = 0};
+      ::poll(&slot, 1, kPoll_ms);
+      if (interrupted()) throw Interrupted(fmt::format("{}: interrupted while it was written", path));
+    } else if (count == 0 || errno != EINTR) {
+      fail_to_write(path);
+    }
+  }
+}
+
+// Opens what is no regular file. A FIFO has no writers before it has a reader, which a person may start later.
+int open_through(const std::string& target, const std::string& path) {
+  for (;;) {
+    const int fd = ::open(target.c_str(), O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    if (fd >= 0) return fd;
+    if (errno != ENXIO && errno != EINTR) fail_to_write(path);
+    if (interrupted()) throw Interrupted(fmt::format("{}: interrupted while it waited for a reader", path));
+    ::poll(nullptr, 0, kPoll_ms);
+  }
+}
+
+}  // namespace
+
+void Descriptor::reset(int fd) {
+  if (fd_ >= 0) ::close(fd_);
+  fd_ = fd;
+}
+
+OutputFile::OutputFile(const std::string& path, Staging staging) : path_(path) {
+  PICTURA_CHECK(!path.empty(), "expected the name of a file to write, got an empty one");
+  struct stat status{};
+  const bool exists = ::stat(path.c_str(), &status) == 0;
+  PICTURA_CHECK(!exists || !S_ISDIR(status.st_mode), "{}: cannot be written: expected a file, got a folder", path);
+  is_through_ = exists && !S_ISREG(status.st_mode);
+  // What a device will take waits with the temporary files, for want of a folder of its own.
+  target_ = is_through_ ? path : without_links(path);
+  if (!is_through_) remove_abandoned(target_);
+  if (staging == Staging::unnamed) stage_unnamed();
+  if (staged_.get() < 0) stage_named();
+}
+
+OutputFile::~OutputFile() {
+  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+}
+
+void OutputFile::stage_unnamed() {
+#ifdef O_TMPFILE
+  constexpr const char* kNames = "/proc/self/fd";  // by which replace() finds it again
+  if (::access(kNames, X_OK) != 0) return;
+  const std::string folder = is_through_ ? fs::temp_directory_path().string() : folder_of(target_);
+  staged_.reset(::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0666));
+  if (staged_.get() >= 0) ::flock(staged_.get(), LOCK_EX | LOCK_NB);
+#endif
+}
+
+void OutputFile::stage_named() {
+  const std::string near = is_through_ ? (fs::temp_directory_path() / fs::path(target_).filename()).string() : target_;
+  for (int number = 0; staged_.get() < 0; ++number) {
+    const std::string name = fmt::format("{}{}.{}{}", hidden_prefix(near), ::getpid(), number, kHiddenEnding);
+    const Descriptor file(::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+    if (file.get() < 0 && errno == EEXIST) continue;
+    if (file.get() < 0) fail_to_write(path_);
+    // Another writer may have taken it for an abandoned one before it was locked.
+    ::flock(file.get(), LOCK_EX | LOCK_NB);
+    struct stat status{};
+    if (::fstat(file.get(), &status) != 0 || status.st_nlink == 0) continue;
+    staged_.reset(::fcntl(file.get(), F_DUPFD_CLOEXEC, 0));
+    if (staged_.get() < 0) fail_to_write(path_);
+    temporary_ = name;
+  }
+}
+
+void OutputFile::write(std::string_view bytes) { write_all(staged_.get(), bytes, path_); }
+
+void OutputFile::commit() { is_through_ ? pour() : replace(); }
+
+void OutputFile::pour() {
+  const Descriptor through(open_through(target_, path_));
+  std::string chunk(std::size_t{1} << 16, '\0');
+  for (off_t offset = 0;;) {
+    const ssize_t count = ::pread(staged_.get(), chunk.data(), chunk.size(), offset);
+    if (count < 0) fail_to_write(path_);
+    if (count == 0) return;
+    write_all(through.get(), std::string_view(chunk).substr(0, static_cast<std::size_t>(count)), path_);
+    offset += count;
+  }
+}
+
+void OutputFile::replace() {
+  // On disk before the rename, so that a crash never leaves an empty file under the final name.
+  if (::fsync(staged_.get()) != 0) fail_to_write(path_);
+  if (temporary_.empty()) {
+    // A link takes no name that there is already, a rename takes no file without a name: so from none to a hidden one
+    // to the final one.
+    const std::string unnamed = fmt::format("/proc/self/fd/{}", staged_.get());
+    for (int number = 0; temporary_.empty(); ++number) {
+      const std::string name = fmt::format("{}{}.{}{}", hidden_prefix(target_), ::getpid(), number, kHiddenEnding);
+      if (::linkat(AT_FDCWD, unnamed.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0) {
+        temporary_ = name;
+      } else if (errno != EEXIST) {
+        fail_to_write(path_);
+      }
+    }
+  }
+  if (std::rename(temporary_.c_str(), target_.c_str()) != 0) {
+    fail("{}: cannot be replaced: {}", path_, std::strerror(errno));
+  }
+  temporary_.clear();
+}
+
+}  // namespace pictura
