@@ -1,19 +1,18 @@
 #include "pictura/common/pixel_samples.h"
 
-#include <charconv>
-
 #include <fmt/format.h>
+
+#include "pictura/common/support/numbers.h"
 
 namespace pictura {
 
 namespace {
 
 std::optional<int> parse_count(std::string_view text) {
-  constexpr int kMaxCount = 64;
-  int count = 0;
-  const auto parsed = std::from_chars(text.data(), text.data() + text.size(), count);
-  if (parsed.ec != std::errc() || parsed.ptr != text.data() + text.size() || count < 1 || count > kMaxCount) return {};
-  return count;
+  constexpr uint64_t kMaxCount = 64;
+  const std::optional<uint64_t> count = parse_unsigned(text);
+  if (!count || *count < 1 || *count > kMaxCount) return {};
+  return static_cast<int>(*count);
 }
 
 }  // namespace
