@@ -8,6 +8,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/suggestion.h"
 #include "pictura/map/map_cache.h"
 #include "pictura/map/procedural/procedural_town.h"
 
@@ -33,7 +34,7 @@ std::optional<TownOptions> procedural_options(std::string_view name) {
 /// The file of a name that is not procedural. Throws UsageError when there is none.
 std::string file_path_of(const std::string& name) {
   std::error_code error;
-  if (name.ends_with(kExtension)) return name;
+  if (is_map_file(name)) return name;
   if (fs::exists(name, error) && !fs::is_directory(name, error)) {
     fail_usage("map '{}': expected a file that ends in {}", name, kExtension);
   }
@@ -44,8 +45,11 @@ std::string file_path_of(const std::string& name) {
     }
   }
   const std::vector<std::string> towns = known_towns();
-  fail_usage("map '{}': expected an {} file, procedural[:SEED[:OPTIONS]], or a town in {}, which has {}", name,
-             kExtension, map_folder(), towns.empty() ? "none" : fmt::format("{}", fmt::join(towns, ", ")));
+  std::vector<std::string> known = towns;
+  known.emplace_back(kProcedural);
+  fail_usage("map '{}': expected an {} file, procedural[:SEED[:OPTIONS]], or a town in {}, which has {}{}", name,
+             kExtension, map_folder(), towns.empty() ? "none" : fmt::format("{}", fmt::join(towns, ", ")),
+             suggestion(name, known));
 }
 
 RoadMap load_file(const std::string& path, const OpenDriveOptions& options, LoadReport* report) {
@@ -69,6 +73,10 @@ RoadMap load_file(const std::string& path, const OpenDriveOptions& options, Load
 }
 
 }  // namespace
+
+bool is_map_file(std::string_view name) {
+  return !name.starts_with(fmt::format("{}:", kProcedural)) && name.ends_with(kExtension);
+}
 
 std::vector<std::string> known_towns() {
   std::vector<std::string> names;

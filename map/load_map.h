@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "pictura/common/error.h"
@@ -31,6 +32,9 @@ struct MapText {
 
 /// The text that load_map() would import for this name. Throws as load_map() does.
 MapText map_text(const std::string& name);
+
+/// Whether a name is a file's, rather than a town's or a procedural map's.
+bool is_map_file(std::string_view name);
 
 /// $PICTURA_DATA, or $XDG_DATA_HOME/pictura/maps, or ~/.local/share/pictura/maps. CARLA's towns are looked up here and
 /// in its subfolder `carla`.

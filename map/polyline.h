@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <cstdint>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -44,13 +46,18 @@ std::vector<std::size_t> thin_polyline(const std::vector<CurvePoint>& points, do
 /// Limits the number of samples, so that no input can exhaust memory.
 class SampleBudget {
  public:
-  explicit SampleBudget(std::int64_t max_samples) : remaining_(max_samples) {}
+  /// `source` names the map in messages.
+  SampleBudget(std::int64_t max_samples, std::string source)
+      : max_samples_(max_samples), remaining_(max_samples), source_(std::move(source)) {}
   void count_sample() {
-    if (--remaining_ < 0) fail("the map's curves need more samples than are allowed");
+    if (--remaining_ < 0) {
+      fail("{}: its curves need more than the {} samples that a file of its size may take", source_, max_samples_);
+    }
   }
 
  private:
-  std::int64_t remaining_;
+  std::int64_t max_samples_, remaining_;
+  std::string source_;
 };
 
 /// Samples eval(s) -> CurvePoint over [breaks.front(), breaks.back()]; the curve is smooth between breaks.

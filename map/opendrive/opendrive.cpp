@@ -11,11 +11,11 @@ namespace pictura {
 
 namespace {
 
-/// Bounds the import time of small files: CARLA's towns need 0.2 samples per byte, and a straight road of 100 km half a
-/// million.
-SampleBudget budget_for(std::size_t text_bytes) {
-  constexpr std::int64_t kBaseSamples = 500'000, kSamplesPerByte = 10, kMaxSamples = 10'000'000;
-  return SampleBudget(std::min(kMaxSamples, kBaseSamples + kSamplesPerByte * static_cast<std::int64_t>(text_bytes)));
+/// Bounds the import time of small files and the memory of large ones: CARLA's towns need 0.2 samples per byte,
+/// procedural ones 0.7, of which the largest has 35 MB, and a straight road of 100 km half a million.
+SampleBudget budget_for(std::size_t text_bytes, const std::string& source) {
+  constexpr std::int64_t kBaseSamples = 500'000, kSamplesPerByte = 10, kMaxSamples = 60'000'000;
+  return {std::min(kMaxSamples, kBaseSamples + kSamplesPerByte * static_cast<std::int64_t>(text_bytes)), source};
 }
 
 }  // namespace
@@ -32,7 +32,7 @@ RoadMap parse_opendrive(std::string_view text, const std::string& source, const 
   RoadMap map;
   map.name = std::filesystem::path(source).stem().string();
   map.geo_reference = network.geo_reference;
-  opendrive::Build build{network, options, &faults, &map, budget_for(text.size()), {}, {}};
+  opendrive::Build build{network, options, &faults, &map, budget_for(text.size(), source), {}, {}};
   opendrive::choose_origin(&build);
   opendrive::build_lanes(&build);
   opendrive::link_lanes(&build);

@@ -1,47 +1,53 @@
 #include "pictura/map/procedural/town_options.h"
 
-#include <charconv>
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <string>
 
-#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "pictura/common/error.h"
+#include "pictura/common/support/numbers.h"
+#include "pictura/common/support/suggestion.h"
 
 namespace pictura {
 
 namespace {
 
-/// Removes the number at the start of `text`; false if there is none.
-template <typename Number>
-bool take_number(std::string_view* text, Number* number_out) {
-  const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), *number_out);
-  if (error != std::errc()) return false;
-  text->remove_prefix(static_cast<std::size_t>(end - text->data()));
-  return true;
-}
-
-std::string feature_names() {
-  std::string names = "blocks";
-  for (const TownFeature& feature : town_features()) names += fmt::format(", {}", feature.name);
+std::vector<std::string> option_names() {
+  std::vector<std::string> names{"blocks"};
+  for (const TownFeature& feature : town_features()) names.emplace_back(feature.name);
   return names;
 }
 
+int take_blocks(std::string_view count, std::string_view value, std::string_view map_name) {
+  const std::optional<uint64_t> number = parse_unsigned(count);
+  if (!number || *number < 1 || *number > uint64_t{kMaxTownBlocks}) {
+    fail_usage("map '{}': blocks: expected AxB, as 4x3, with 1 to {} each, got '{}'", map_name, kMaxTownBlocks, value);
+  }
+  return static_cast<int>(*number);
+}
+
 void set_option(std::string_view name, std::string_view value, std::string_view map_name, TownOptions* options) {
-  std::string_view rest = value;
   if (name == "blocks") {
-    const bool is_pair = take_number(&rest, &options->blocks_x) && rest.starts_with('x') &&
-                         (rest.remove_prefix(1), take_number(&rest, &options->blocks_y)) && rest.empty();
-    if (!is_pair) fail_usage("map '{}': blocks: expected AxB, as 4x3, got '{}'", map_name, value);
+    const std::size_t cross = std::min(value.find('x'), value.size());
+    options->blocks_x = take_blocks(value.substr(0, cross), value, map_name);
+    options->blocks_y = take_blocks(value.substr(std::min(cross + 1, value.size())), value, map_name);
     return;
   }
   for (const TownFeature& feature : town_features()) {
     if (name != feature.name) continue;
-    if (!take_number(&rest, &(options->*feature.value)) || !rest.empty()) {
-      fail_usage("map '{}': {}: expected a number, got '{}'", map_name, name, value);
+    const std::optional<double> number = parse_number(value);
+    if (!number) {
+      fail_usage("map '{}': {}: expected a number of {} to {}, got '{}'", map_name, name, feature.low, feature.high,
+                 value);
     }
+    options->*feature.value = *number;
     return;
   }
-  fail_usage("map '{}': expected one of {}, got '{}'", map_name, feature_names(), name);
+  fail_usage("map '{}': unknown option '{}'; expected one of {}{}", map_name, name, fmt::join(option_names(), ", "),
+             suggestion(name, option_names()));
 }
 
 }  // namespace
@@ -90,18 +96,28 @@ void check_town_options(const TownOptions& options) {
 
 TownOptions parse_town_options(std::string_view text, std::string_view map_name) {
   TownOptions options;
-  std::string_view rest = text;
-  if (!take_number(&rest, &options.seed) || !(rest.empty() || rest.starts_with(':'))) {
-    fail_usage("map '{}': expected procedural or procedural:SEED with an integer from 0, got '{}'", map_name, text);
+  const std::size_t colon = std::min(text.find(':'), text.size());
+  const std::optional<uint64_t> seed = parse_unsigned(text.substr(0, colon));
+  if (!seed) {
+    fail_usage("map '{}': expected procedural or procedural:SEED with an integer of 0 to {}, got '{}'", map_name,
+               std::numeric_limits<uint64_t>::max(), text);
   }
-  while (!rest.empty()) {
+  options.seed = *seed;
+  std::vector<std::string_view> given;
+  for (std::string_view rest = text.substr(colon); !rest.empty();) {
     rest.remove_prefix(1);
     const std::string_view pair = rest.substr(0, rest.find(','));
     const std::size_t equals = pair.find('=');
     if (equals == std::string_view::npos) {
-      fail_usage("map '{}': expected NAME=VALUE, got '{}'; names are {}", map_name, pair, feature_names());
+      fail_usage("map '{}': expected NAME=VALUE, got '{}'; names are {}", map_name, pair,
+                 fmt::join(option_names(), ", "));
     }
-    set_option(pair.substr(0, equals), pair.substr(equals + 1), map_name, &options);
+    const std::string_view name = pair.substr(0, equals);
+    if (std::find(given.begin(), given.end(), name) != given.end()) {
+      fail_usage("map '{}': {}: given twice", map_name, name);
+    }
+    given.push_back(name);
+    set_option(name, pair.substr(equals + 1), map_name, &options);
     rest.remove_prefix(pair.size());
   }
   check_town_options(options);

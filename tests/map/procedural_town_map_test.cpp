@@ -360,6 +360,12 @@ TEST(ProceduralTownMap, TownsWithOneFeatureAtItsMinimumOrMaximumAreValid) {
   }
 }
 
+// One, for it takes long: half a minute of a core.
+TEST(ProceduralTownMap, TheLargestTownIsRead) {
+  const std::string text = procedural_town(test::options_of(0, kMaxTownBlocks, kMaxTownBlocks));
+  EXPECT_GT(parse_opendrive(text, "largest").lanes.size(), 10'000u);
+}
+
 TEST(ProceduralTownMap, LargeTownsAreValid) { EXPECT_TRUE(is_valid(test::options_of(100, 7, 6))); }
 
 TEST(ProceduralTownMap, OverpassesHaveClearanceBelow) {

@@ -317,6 +317,8 @@ TEST(ProceduralTownOptions, AreReadFromMapNames) {
   EXPECT_EQ(options.roundabouts, 0.5);
   EXPECT_EQ(options.hills_m, 0);
   EXPECT_EQ(options.parking, TownOptions().parking);
+  EXPECT_EQ(parse_town_options("010", "procedural").seed, 10u);
+  EXPECT_EQ(parse_town_options("1e3:blocks=1e1x2", "procedural").seed, 1000u);
   const auto message_of = [](const char* text) -> std::string {
     return test::message_of<UsageError>([&] { parse_town_options(text, "the map"); });
   };
@@ -325,9 +327,11 @@ TEST(ProceduralTownOptions, AreReadFromMapNames) {
   }
   EXPECT_THAT(message_of("1:"), HasSubstr("expected NAME=VALUE, got ''"));
   EXPECT_THAT(message_of("1:hills-m=2,"), HasSubstr("expected NAME=VALUE, got ''"));
-  EXPECT_THAT(message_of("1:rivers=2"), HasSubstr("the map': expected one of blocks, block-m, density"));
-  EXPECT_THAT(message_of("1:hills-m=2m"), HasSubstr("hills-m: expected a number, got '2m'"));
-  EXPECT_THAT(message_of("1:blocks=4"), HasSubstr("blocks: expected AxB, as 4x3, got '4'"));
+  EXPECT_THAT(message_of("1:rivers=2"), HasSubstr("unknown option 'rivers'; expected one of blocks, block-m, density"));
+  EXPECT_THAT(message_of("1:parkin=1"), HasSubstr("did you mean 'parking'?"));
+  EXPECT_THAT(message_of("1:parking=1,parking=0"), HasSubstr("parking: given twice"));
+  EXPECT_THAT(message_of("1:hills-m=2m"), HasSubstr("hills-m: expected a number of 0 to 50, got '2m'"));
+  EXPECT_THAT(message_of("1:blocks=4"), HasSubstr("blocks: expected AxB, as 4x3, with 1 to 32 each, got '4'"));
   EXPECT_THAT(message_of("1:blocks=4x3x2"), HasSubstr("blocks: expected AxB"));
   EXPECT_THAT(message_of("1:roundabouts=2"), HasSubstr("roundabouts: expected 0 to 1, got 2"));
 }
