@@ -15,6 +15,10 @@
 #include "pictura/common/error.h"
 #include "pictura/common/pixel_samples.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/numbers.h"
+#include "pictura/common/support/parallel_for.h"
+#include "pictura/common/support/suggestion.h"
+#include "pictura/map/load_map.h"
 
 namespace pictura {
 
@@ -28,13 +32,15 @@ const Choices<Schedule> kSchedules{
     {"constant", Schedule::constant}, {"linear", Schedule::linear}, {"cosine", Schedule::cosine}};
 const Choices<HaltedSlots> kHaltedSlots{{"skip", HaltedSlots::skip}, {"draw", HaltedSlots::draw}};
 
+constexpr const char* kDevices = "cpu, cuda, cuda:N, auto";
+
 // The list of keys, in the order in which they are written. Reader and writer both walk it, so no key can be read and
 // not written. A visitor takes (key, value, range...).
 template <typename AnyConfig, typename Visitor>
 void visit(AnyConfig& c, Visitor&& v) {
   const double inf = std::numeric_limits<double>::infinity();
   v.integer("run.seed", c.run.seed, 0, std::numeric_limits<int64_t>::max());
-  v.integer("run.num_threads", c.run.num_threads, 0, 4096);
+  v.integer("run.num_threads", c.run.num_threads, 0, kMaxThreads);
   v.device("run.device", c.run.device);
 
   v.name("simulator.backend", c.simulator.backend, simulator_names());
@@ -175,7 +181,7 @@ class Reader {
   void device(const std::string& key, std::string& value) {
     if (const toml::node* node = find(key)) {
       value = text_of(key, *node);
-      if (!is_device(value)) refuse(key, *node, "expected one of cpu, cuda, cuda:N, auto");
+      if (!is_device(value)) refuse(key, *node, fmt::format("expected one of {}", kDevices));
     }
   }
 
@@ -282,7 +288,7 @@ class Reader {
       if (const toml::table* inner = node.as_table(); inner && sections_.count(key))
         refuse_unknown(*inner, key + ".");
       else if (!known_.count(key))
-        fail("{}: unknown key '{}'{}", where(key, node), key, suggestion(key));
+        fail("{}: unknown key '{}'{}", where(key, node), key, suggestion_for(key));
     }
   }
 
@@ -311,16 +317,27 @@ class Reader {
   }
 
   int64_t integer_of(const std::string& key, const toml::node& node, int64_t low, int64_t high) const {
-    if (!node.is_integer() || node.as_integer()->get() < low || node.as_integer()->get() > high) {
+    const std::optional<int64_t> number = whole_number(node);
+    if (!number || *number < low || *number > high) {
       refuse(key, node, fmt::format("expected an integer in [{}, {}]", low, high));
     }
-    return node.as_integer()->get();
+    return *number;
+  }
+
+  // Of 1e3 as well as of 1000.
+  static std::optional<int64_t> whole_number(const toml::node& node) {
+    if (node.is_integer()) return node.as_integer()->get();
+    if (!node.is_floating_point()) return std::nullopt;
+    const double number = node.as_floating_point()->get();
+    constexpr double kExact = 9007199254740992;  // beyond, a double stands for several
+    if (!(std::abs(number) <= kExact) || number != std::floor(number)) return std::nullopt;
+    return static_cast<int64_t>(number);
   }
 
   double number_of(const std::string& key, const toml::node& node, double low, double high) const {
     const auto number = node.value<double>();
     if (!number || !(*number >= low && *number <= high)) {
-      refuse(key, node, fmt::format("expected a number in [{}, {}]", low, high));
+      refuse(key, node, fmt::format("expected a number in [{}, {}]", text_of_number(low), text_of_number(high)));
     }
     return *number;
   }
@@ -343,13 +360,15 @@ class Reader {
     return *node.as_array();
   }
 
-  // The known key that ends alike, for those who forgot or confused the section.
-  std::string suggestion(const std::string& key) const {
+  // The known key that is nearest, or ends alike, for those who forgot or confused the section.
+  std::string suggestion_for(const std::string& key) const {
+    const std::vector<std::string> known(known_.begin(), known_.end());
     const std::string last = key.substr(key.rfind('.') + 1);
-    for (const std::string& known : known_) {
-      if (known.substr(known.rfind('.') + 1) == last) return fmt::format("; did you mean '{}'?", known);
+    for (const std::string& each : known) {
+      if (each.substr(each.rfind('.') + 1) == last) return fmt::format("; did you mean '{}'?", each);
     }
-    return "; configs/paper.toml names every key";
+    const std::string nearest = suggestion(key, known);
+    return nearest.empty() ? "; docs/configuration.md names every key" : nearest;
   }
 
   const toml::table& table_;
@@ -423,18 +442,83 @@ class Writer {
   std::string section_;
 };
 
-// "train.updates=2" into the table; a value that is no TOML is taken as a string, so that run.device=cpu works.
+// What each key takes and its default, for documents.
+class Describer {
+ public:
+  explicit Describer(const Config& defaults) { visit(defaults, writer_); }
+
+  template <typename Int>
+  void integer(const std::string& key, const Int&, int64_t low, int64_t high) {
+    add(key, fmt::format("{} to {}", low, high));
+  }
+  template <typename Int>
+  void integer_unless(const std::string& other, bool, const std::string& key, const Int&, int64_t low, int64_t high) {
+    add(key, fmt::format("{} to {}, without `{}`", low, high, other));
+  }
+  void number(const std::string& key, const double&, double low, double high) {
+    add(key, std::isinf(high) ? fmt::format("{} or more", text_of_number(low))
+                              : fmt::format("{} to {}", text_of_number(low), text_of_number(high)));
+  }
+  void flag(const std::string& key, const bool&) { add(key, "true, false"); }
+  void text(const std::string& key, const std::string&) { add(key, "a text"); }
+  void name(const std::string& key, const std::string&, const std::vector<std::string>& known) {
+    // Which backends there are depends on the build.
+    add(key, key.ends_with(".backend") ? "a backend" : fmt::format("{}", fmt::join(known, ", ")));
+  }
+  void device(const std::string& key, const std::string&) { add(key, kDevices); }
+  void samples(const std::string& key, const PixelSamples&) { add(key, kPixelSamplesExpected); }
+  void texts(const std::string& key, const std::vector<std::string>&) { add(key, "a list of texts"); }
+  void integers(const std::string& key, const std::vector<int>&, int64_t low, int64_t high) {
+    add(key, fmt::format("a list of {} to {}", low, high));
+  }
+  template <typename Enum>
+  void choice(const std::string& key, const Enum&, const Choices<Enum>& choices) {
+    std::vector<std::string> names;
+    for (const auto& [each, chosen] : choices) names.push_back(each);
+    add(key, fmt::format("{}", fmt::join(names, ", ")));
+  }
+  void range(const std::string& key, const ConditioningRange& value) {
+    add(key, value.mixture ? "0 < low <= 1 <= high, or low = high > 0" : "low <= high, of -1000000 to 1000000");
+  }
+
+  std::vector<ConfigKey> keys;
+
+ private:
+  void add(const std::string& key, const std::string& values) {
+    const auto line = std::find_if(writer_.lines.begin(), writer_.lines.end(),
+                                   [&key](const auto& each) { return each.first == key; });
+    keys.push_back({key, line->second, values});
+  }
+  Writer writer_;
+};
+
+// A value of --set: TOML, but numbers as everywhere in the command; what is no TOML is a string, so that run.device=cpu
+// works.
+toml::table parse_override(const std::string& value) {
+  toml::table parsed;
+  const std::optional<int64_t> whole = parse_integer(value);
+  const std::optional<double> number = parse_number(value);
+  if (whole) {
+    parsed.insert("value", *whole);
+  } else if (number) {
+    parsed.insert("value", *number);
+  } else if (looks_like_number(value)) {
+    parsed.insert("value", value);
+  } else {
+    try {
+      parsed = toml::parse("value = " + value);
+    } catch (const toml::parse_error&) {
+      parsed.insert("value", value);
+    }
+  }
+  return parsed;
+}
+
+// "train.updates=2" into the table; "train.updates=" takes the key out of it. Returns the key.
 std::string apply_override(const std::string& text, toml::table* table_inout) {
   const size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0) fail_usage("--set {}: expected section.key=value", text);
   const std::string key = text.substr(0, equals), value = text.substr(equals + 1);
-  toml::table parsed;
-  try {
-    parsed = toml::parse("value = " + value);
-  } catch (const toml::parse_error&) {
-    parsed.insert("value", value);
-  }
-  if (parsed.size() != 1) fail_usage("--set {}: expected one value", text);
   toml::table* section = table_inout;
   size_t begin = 0;
   for (size_t dot = key.find('.'); dot != std::string::npos; begin = dot + 1, dot = key.find('.', begin)) {
@@ -443,8 +527,23 @@ std::string apply_override(const std::string& text, toml::table* table_inout) {
     section = section->get(name)->as_table();
     if (!section) fail_usage("--set {}: '{}' is no section", text, key.substr(0, dot));
   }
+  if (value.empty()) {
+    section->erase(key.substr(begin));
+    return key;
+  }
+  toml::table parsed = parse_override(value);
+  if (parsed.size() != 1) fail_usage("--set {}: expected one value", text);
   parsed.get("value")->visit([&](auto& node) { section->insert_or_assign(key.substr(begin), std::move(node)); });
   return key;
+}
+
+// A rig has sizes of its own: named by an override, it takes those of the file out.
+void drop_sizes_beside_rig(const std::set<std::string>& overridden, toml::table* table_inout) {
+  toml::table* const render = table_inout->get_as<toml::table>("render");
+  if (!render || !overridden.count("render.rig") || (*render)["rig"].value_or(std::string()).empty()) return;
+  for (const char* key : {"width_px", "height_px"}) {
+    if (!overridden.count(fmt::format("render.{}", key))) render->erase(key);
+  }
 }
 
 void check_contradictions(const Config& c, const Reader& reader) {
@@ -543,6 +642,7 @@ Config parse(const std::string& text, const std::string& source, const std::vect
   }
   std::set<std::string> overridden;
   for (const std::string& text_of_one : overrides) overridden.insert(apply_override(text_of_one, &table));
+  drop_sizes_beside_rig(overridden, &table);
 
   Config config;
   Reader reader(table, source, overridden, any_name);
@@ -552,6 +652,11 @@ Config parse(const std::string& text, const std::string& source, const std::vect
                       config.train.schedule_agent_steps);
   reader.refuse_unknown(table);
   check_contradictions(config, reader);
+  // Earlier versions took it without a word, so what they saved may hold it.
+  if (!any_name && config.simulator.min_agents > config.simulator.num_slots) {
+    reader.refuse("simulator.min_agents", fmt::format("expected at most simulator.num_slots ({}), got {}",
+                                                      config.simulator.num_slots, config.simulator.min_agents));
+  }
   return config;
 }
 
@@ -567,13 +672,54 @@ Config parse_saved_config(const std::string& text, const std::string& source) {
 
 Config load_config(const std::string& path, const std::vector<std::string>& overrides) {
   Config config = parse_config(read_file(path, 1 << 20), path, overrides);
-  const auto from_callers_folder = [&path](std::string* name) {
-    if (std::filesystem::path(*name).is_relative())
-      *name = (std::filesystem::path(path).parent_path() / *name).string();
+  const auto is_overridden = [&overrides](std::string_view key) {
+    return std::any_of(overrides.begin(), overrides.end(), [key](const std::string& text) {
+      return text.starts_with(key) && text.substr(key.size()).starts_with('=');
+    });
   };
-  if (!config.render.rig.empty()) from_callers_folder(&config.render.rig);
-  if (config.policy.backbone != "conv") from_callers_folder(&config.policy.backbone);
+  const auto beside_config = [&path](std::string* file_inout) {
+    const std::filesystem::path file(*file_inout);
+    if (file.empty() || file.is_absolute()) return;
+    *file_inout = (std::filesystem::path(path).parent_path() / file).lexically_normal().string();
+  };
+  if (!is_overridden("render.rig")) beside_config(&config.render.rig);
+  if (config.policy.backbone != "conv" && !is_overridden("policy.backbone")) beside_config(&config.policy.backbone);
+  if (!is_overridden("simulator.maps")) {
+    for (std::string& map : config.simulator.maps) {
+      if (is_map_file(map)) beside_config(&map);
+    }
+  }
   return config;
+}
+
+Config with_absolute_paths(Config config) {
+  const auto make_absolute = [](std::string* file_inout) {
+    *file_inout = std::filesystem::absolute(*file_inout).lexically_normal().string();
+  };
+  if (!config.render.rig.empty()) make_absolute(&config.render.rig);
+  for (std::string& map : config.simulator.maps) {
+    if (is_map_file(map)) make_absolute(&map);
+  }
+  return config;
+}
+
+std::vector<ConfigKey> config_keys() {
+  const Config defaults;
+  Describer describer(defaults);
+  visit(defaults, describer);
+  return describer.keys;
+}
+
+std::vector<std::string> idle_settings(const Config& config) {
+  std::vector<std::string> notices;
+  const int64_t rollout = int64_t{config.simulator.num_slots} * config.train.num_steps;
+  if (config.train.minibatch_size > rollout) {
+    notices.push_back(
+        fmt::format("train.minibatch_size: {} are more than the transitions of a rollout (simulator."
+                    "num_slots x train.num_steps = {}): each epoch is one minibatch",
+                    config.train.minibatch_size, rollout));
+  }
+  return notices;
 }
 
 std::string to_toml(const Config& config) {

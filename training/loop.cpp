@@ -140,6 +140,7 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
   const auto notify = [&options](const std::string& notice) {
     if (options.on_notice) options.on_notice(notice);
   };
+  for (const std::string& notice : idle_settings(config)) notify(notice);
   TrainReport report;
   report.checkpoint = options.out_folder + "/checkpoint.ckpt";
   report.ranks = communicator->size();
@@ -170,7 +171,7 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
     run.simulator->reset();
     save_as("untrained.ckpt", recent);
   }
-  if (is_first) write_file(options.out_folder + "/config.toml", to_toml(config));
+  if (is_first) write_file(options.out_folder + "/config.toml", to_toml(with_absolute_paths(config)));
   RunLog log(is_first ? options.out_folder : "", config, run.update, run.agent_steps, recent, options.on_notice);
 
   Stopwatch since_saved;

@@ -1,12 +1,15 @@
 // The configuration: reading, refusing, writing back.
 #include "pictura/training/config.h"
 
+#include <filesystem>
+
 #include <gmock/gmock.h>
 
 #include "pictura/backends/make_learner.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/tests/support/error_message.h"
+#include "pictura/tests/support/scratch_folder.h"
 #include "pictura/training/torch_device.h"
 
 namespace pictura {
@@ -35,6 +38,74 @@ TEST(Config, PaperFileSaysNothingElseThanTheDefaults) {
   const Config paper = load_config(PICTURA_SOURCE_DIR "/configs/paper.toml");
   EXPECT_EQ(first_difference(Config{}, paper), "");
   EXPECT_EQ(to_toml(paper), to_toml(Config{}));
+}
+
+// Rows are "| `key` | default | values | meaning |"; the first three come from the list of keys.
+TEST(Config, TheDocumentNamesEveryKeyWithItsDefaultAndRangeAndNoOther) {
+  const std::string document = read_file(PICTURA_SOURCE_DIR "/docs/configuration.md");
+  size_t rows = 0;
+  for (const ConfigKey& key : config_keys()) {
+    EXPECT_THAT(document, HasSubstr(fmt::format("\n| `{}` | `{}` | {} | ", key.key, key.default_value, key.values)));
+    ++rows;
+  }
+  size_t written = 0;
+  for (size_t at = document.find("\n| `"); at != std::string::npos; at = document.find("\n| `", at + 1)) ++written;
+  EXPECT_EQ(written, rows) << "docs/configuration.md has rows of keys that no configuration has";
+}
+
+TEST(Config, NumbersMayBeWrittenInAnyDecimalNotation) {
+  const auto updates = [](const std::string& text) {
+    return parse_config("", "a.toml", {"train.updates=" + text}).train.updates;
+  };
+  EXPECT_EQ(updates("1e3"), 1000);
+  EXPECT_EQ(updates("010"), 10);
+  EXPECT_EQ(updates("2000.0"), 2000);
+  EXPECT_EQ(parse_config("[train]\nupdates = 1e3\n", "a.toml").train.updates, 1000);
+  EXPECT_EQ(parse_config("", "a.toml", {"train.gamma=.5"}).train.gamma, 0.5);
+  for (const std::string text : {"1.5", "0x10", "1_000", "-1", "1e30", "18446744073709551616"}) {
+    EXPECT_THAT(message_of("", {"train.updates=" + text}),
+                AllOf(HasSubstr("--set train.updates: train.updates: expected an integer in [1, 1099511627776]"),
+                      HasSubstr("got ")));
+  }
+}
+
+TEST(Config, UnknownKeysSuggestTheNearest) {
+  EXPECT_THAT(message_of("", {"train.updats=1"}), HasSubstr("did you mean 'train.updates'?"));
+  EXPECT_THAT(message_of("", {"trian.updates=1"}), HasSubstr("did you mean 'train.updates'?"));
+  EXPECT_THAT(message_of("", {"train.zebra=1"}), HasSubstr("docs/configuration.md names every key"));
+}
+
+TEST(Config, KeysCanBeUnsetAndARigReplacesTheSizesOfTheFile) {
+  const std::string text = "[render]\nwidth_px = 32\nheight_px = 18\n[train]\nupdates = 5\n";
+  EXPECT_EQ(parse_config(text, "a.toml", {"train.updates="}).train.updates, Config{}.train.updates);
+  const Config with_rig = parse_config(text, "a.toml", {"render.rig=a.toml"});
+  EXPECT_EQ(with_rig.render.rig, "a.toml");
+  EXPECT_EQ(parse_config(text, "a.toml", {"render.rig="}).render.width_px, 32);
+  EXPECT_THAT(message_of(text, {"render.rig=a.toml", "render.width_px=8"}), HasSubstr("has no effect together"));
+}
+
+TEST(Config, PathsAreRelativeToWhereTheyAreTyped) {
+  const test::ScratchFolder folder;
+  const std::string path = folder / "a.toml";
+  write_file(path, "[simulator]\nmaps = [\"towns/a.xodr\", \"Town01\"]\n[render]\nrig = \"../rig.toml\"\n");
+  const Config typed_there = load_config(path);
+  EXPECT_EQ(typed_there.simulator.maps, (std::vector<std::string>{folder / "towns/a.xodr", "Town01"}));
+  EXPECT_EQ(std::filesystem::path(typed_there.render.rig),
+            (std::filesystem::path(folder.path()) / "../rig.toml").lexically_normal());
+  const Config typed_here = load_config(path, {"simulator.maps=[\"b.xodr\"]", "render.rig=b.toml"});
+  EXPECT_EQ(typed_here.simulator.maps, std::vector<std::string>{"b.xodr"});
+  EXPECT_EQ(typed_here.render.rig, "b.toml");
+  const Config anywhere = with_absolute_paths(typed_here);
+  EXPECT_EQ(anywhere.render.rig, (std::filesystem::current_path() / "b.toml").string());
+}
+
+TEST(Config, SettingsWithoutEffectAreSaid) {
+  EXPECT_THAT(message_of("[simulator]\nnum_slots = 4\nmin_agents = 8\nmax_agents = 8\n"),
+              HasSubstr("simulator.min_agents: expected at most simulator.num_slots (4), got 8"));
+  Config config;
+  EXPECT_EQ(idle_settings(config).size(), 0u);
+  config.simulator.num_slots = 4;
+  EXPECT_THAT(idle_settings(config), ElementsAre(HasSubstr("train.minibatch_size: 65536 are more than")));
 }
 
 TEST(Config, EveryFileInConfigsReads) {

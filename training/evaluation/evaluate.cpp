@@ -183,6 +183,12 @@ EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options, Ev
       for (int step = 0; step < options.steps; ++step) {
         if (interrupted()) {
           report.interrupted = true;
+          // The scenarios of this batch are not finished, those before are.
+          if (first > 0) {
+            result.scenarios.resize(static_cast<size_t>(first));
+            report.rows.push_back(row_of(result, options.steps));
+            report.results.densities.push_back(std::move(result));
+          }
           return report;
         }
         driving.controller->act(simulator->controller_input(), {}, commands);

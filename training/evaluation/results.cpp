@@ -191,9 +191,11 @@ void write_results(const std::string& path, const EvaluationResults& results) {
 }
 
 EvaluationResults read_results(const std::string& path) {
+  constexpr const char* kExpected = "expected the results that pictura evaluate --out writes";
+  const std::string text = read_file(path);
   EvaluationResults results;
   try {
-    const Json json = Json::parse(read_file(path));
+    const Json json = Json::parse(text);
     PICTURA_CHECK(json.value("format", "") == kFormat, "expected \"format\": \"{}\"", kFormat);
     results.setting = setting_from(json.at("setting"));
     for (const Json& density : json.at("densities")) {
@@ -204,8 +206,12 @@ EvaluationResults read_results(const std::string& path) {
       for (const Json& counts : density.at("scenarios")) result.scenarios.push_back(counts_from(counts));
       results.densities.push_back(std::move(result));
     }
-  } catch (const std::exception& error) {
-    fail("{}: expected the results that pictura evaluate --out writes: {}", path, error.what());
+  } catch (const Json::parse_error& error) {
+    fail("{}: {}, got no JSON from byte {}", path, kExpected, error.byte);
+  } catch (const Json::exception&) {
+    fail("{}: {}, got JSON in which a value is missing or of another type", path, kExpected);
+  } catch (const Error& error) {
+    fail("{}: {}: {}", path, kExpected, error.what());
   }
   return results;
 }
