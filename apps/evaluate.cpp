@@ -1,10 +1,16 @@
 // `pictura evaluate`: the paper's five driving metrics of a checkpoint or a controller, by traffic density.
 #include "pictura/training/evaluation/evaluate.h"
 
+#include <chrono>
+#include <map>
+
 #include "pictura/apps/commands.h"
 #include "pictura/cli/backend_options.h"
+#include "pictura/cli/map_options.h"
+#include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
+#include "pictura/common/support/numbers.h"
 #include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/simulator/simulator.h"
 
@@ -12,17 +18,23 @@ namespace pictura {
 
 namespace {
 
+// A notice says how long it takes when that is long, as soon as a few seconds tell.
+constexpr double kEstimateAfter_s = 5, kLong_s = 600;
+
 const std::map<std::string, Density> kDensities{
     {"light", Density::light}, {"medium", Density::medium}, {"dense", Density::dense}};
 
 void print_table(const EvaluateReport& report) {
-  fmt::print("{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>17} {:>9}\n", "density", "scenarios", "steps",
-             "vehicles", "at-fault", "off-road", "red light", "goals", "km/infraction", "km");
+  fmt::print("{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>17} {:>9}\n", "density", "scenarios",
+             "steps", "vehicles", "return", "at-fault", "off-road", "red light", "goals", "waypoints", "km/infraction",
+             "km");
   const auto text = [](const Estimate& e) { return fmt::format("{:.3f} +- {:.3f}", e.value, e.half_width_95); };
   for (const EvaluateRow& row : report.rows) {
-    fmt::print("{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>17} {:>9.2f}\n", row.density, row.scenarios,
-               row.steps, row.vehicle_episodes, text(row.at_fault_collision_rate), text(row.off_road_rate),
-               text(row.red_light_rate), text(row.goals_per_vehicle), text(row.km_per_infraction), row.km_driven);
+    fmt::print("{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>17} {:>9.2f}\n", row.density,
+               row.scenarios, row.steps, row.vehicle_episodes, text(row.return_per_vehicle),
+               text(row.at_fault_collision_rate), text(row.off_road_rate), text(row.red_light_rate),
+               text(row.goals_per_vehicle), text(row.waypoints_per_vehicle), text(row.km_per_infraction),
+               row.km_driven);
   }
   fmt::print("+- is the half width of a 95 % confidence interval over scenarios\n");
   if (report.agent_steps > 0) {
@@ -63,18 +75,15 @@ void print_report(const EvaluateOptions& options, const EvaluateReport& report) 
 
 // "N": the scenarios 0 to N - 1; "A:B": A to B - 1.
 void parse_scenarios(const std::string& text, EvaluateOptions* options) {
-  int first = 0, end = 0;
-  char rest = 0;
-  const bool is_range = std::sscanf(text.c_str(), "%d:%d%c", &first, &end, &rest) == 2;
-  if (!is_range) {
-    first = 0;
-    if (std::sscanf(text.c_str(), "%d%c", &end, &rest) != 1) end = 0;
+  const size_t colon = text.find(':');
+  const std::string_view all = text;
+  const std::optional<uint64_t> first = colon == std::string::npos ? 0 : parse_unsigned(all.substr(0, colon));
+  const std::optional<uint64_t> end = parse_unsigned(colon == std::string::npos ? all : all.substr(colon + 1));
+  if (!first || !end || *end <= *first || *end > kMaxCount) {
+    fail_usage("--scenarios: expected a number of 1 to {}, or A:B with 0 <= A < B, got '{}'", kMaxCount, text);
   }
-  if (first < 0 || end <= first) {
-    fail_usage("--scenarios: expected a number of them, or A:B with 0 <= A < B, got '{}'", text);
-  }
-  options->first_scenario = first;
-  options->scenarios = end - first;
+  options->first_scenario = static_cast<int>(*first);
+  options->scenarios = static_cast<int>(*end - *first);
 }
 
 EvaluateReport merged(const std::vector<std::string>& paths) {
@@ -117,22 +126,24 @@ void add_evaluate_command(CLI::App& app) {
                    "Instead of evaluating: join parts of one evaluation, which --out wrote, exactly")
       ->excludes(checkpoint)
       ->excludes(policy);
-  command->add_option("--map", options.maps, "Maps that the scenarios are spread over")->capture_default_str();
+  add_map_list_option(command, &options.maps, "Maps that the scenarios are spread over, with commas between them");
   command->add_option("--density", arguments->densities, "light, medium, dense: 60, 120, 150 agents a world")
-      ->check(CLI::IsMember({"light", "medium", "dense"}))
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(one_of({"light", "medium", "dense"}))
       ->capture_default_str();
   command->add_option("--agents", options.agents_per_world, "Agents a world, instead of the densities' own numbers")
-      ->check(CLI::Range(1, kMaxAgentsPerWorld));
+      ->transform(whole_number(1, kMaxAgentsPerWorld));
   command
       ->add_option("--scenarios", arguments->scenarios,
                    "Scenarios per density: N, or A:B for the part of them from A up to but not including B")
       ->capture_default_str();
   command->add_option("--steps", options.steps, "Steps of 0.1 s per scenario")
-      ->check(CLI::PositiveNumber)
+      ->transform(whole_number(1))
       ->capture_default_str();
   command->add_flag("--sampled", arguments->sampled, "Draw actions from the policy instead of taking the most likely")
       ->excludes(policy);
-  command->add_option("--seed", options.seed, "Scenarios are drawn from it")->capture_default_str();
+  add_seed_option(command, &options.seed, "Scenarios are drawn from it");
   add_policy_backend_options(command, "auto, and drawn as in training", &arguments->backends);
   CLI::Option* const rig = command->add_option(
       "--rig", options.rig, "A rig file with as many cameras as in training, instead of those of training");
@@ -142,7 +153,7 @@ void add_evaluate_command(CLI::App& app) {
       ->excludes(policy);
   command->add_option("--backbone", options.backbone,
                       "The program of policy.backbone, where it does not lie where it did in training");
-  command->add_option("--threads", options.num_threads, "Host threads; 0: all")->capture_default_str();
+  add_threads_option(command, &options.num_threads);
   command->add_option("--out", arguments->out, "A file for the counts of each scenario, which --merge reads");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
@@ -177,7 +188,20 @@ void add_evaluate_command(CLI::App& app) {
       fail_usage("--renderer, --samples: {} sees no images", evaluation.controller);
     }
     ProgressLine line;
-    evaluation.on_progress = [&line](double done, double eta_s) {
+    const auto begin = std::chrono::steady_clock::now();
+    bool has_estimate = false;
+    evaluation.on_progress = [&](double done, double eta_s) {
+      const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+      if (!has_estimate && elapsed_s >= kEstimateAfter_s) {
+        has_estimate = true;
+        if (elapsed_s + eta_s > kLong_s) {
+          line.finish();
+          fmt::print(stderr,
+                     "notice: this takes {} at most; ^C reports the scenarios that are finished, and --scenarios A:B "
+                     "evaluates a part\n",
+                     format_duration(elapsed_s + eta_s));
+        }
+      }
       line.update(fmt::format("evaluating: {:.0f} %  ETA {}", 100 * done, format_duration(eta_s)));
     };
     const EvaluateReport report = arguments->parts.empty() ? evaluate(evaluation) : merged(arguments->parts);
@@ -188,8 +212,11 @@ void add_evaluate_command(CLI::App& app) {
     else
       print_table(report);
     if (report.interrupted) {
-      throw Interrupted(fmt::format("interrupted; {} of {} densities are finished", report.rows.size(),
-                                    evaluation.agents_per_world > 0 ? 1 : evaluation.densities.size()));
+      int finished = 0;
+      for (const EvaluateRow& row : report.rows) finished += row.scenarios;
+      const size_t num_densities = evaluation.agents_per_world > 0 ? 1 : evaluation.densities.size();
+      throw Interrupted(fmt::format("interrupted; {} of {} scenarios are finished, and counted above", finished,
+                                    num_densities * static_cast<size_t>(evaluation.scenarios)));
     }
   });
 }

@@ -1,12 +1,15 @@
 // The `pictura` command: subcommands, exit statuses (0 success, 1 failure, 2 wrong usage, 130 after ^C, 143 after
-// SIGTERM, 129 after a hang-up) and one-line
-// error messages.
+// SIGTERM, 129 after a hang-up) and one-line error messages.
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <system_error>
 
 #include "pictura/apps/commands.h"
+#include "pictura/apps/usage_error.h"
 #include "pictura/bench/commands/bench.h"
+#include "pictura/cli/file_options.h"
+#include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/version.h"
@@ -38,32 +41,54 @@ int main(int argc, char** argv) {
 #endif
   add_plot_command(app);
   add_bench_command(app);
+  refuse_empty_values(&app);
 
   catch_interrupts();
+  // A file that would pass the limit on its size (ulimit -f) is an error of writing instead of a sudden death.
+  std::signal(SIGXFSZ, SIG_IGN);
+  const auto complain = [](const std::string& message) {
+    std::fprintf(stderr, "error: %s\n", printable(message).c_str());
+  };
   try {
     app.parse(argc, argv);
+    close_stdout();
     return 0;
   } catch (const CLI::Success& success) {  // --help, --version
-    return app.exit(success);
+    app.exit(success);
   } catch (const CLI::ParseError& error) {
-    std::fprintf(stderr, "error: %s (see pictura --help)\n", error.what());
+    complain(usage_error(app, error));
     return 2;
   } catch (const UsageError& error) {
-    std::fprintf(stderr, "error: %s\n", error.what());
+    complain(error.what());
     return 2;
   } catch (const Interrupted& error) {
-    std::fprintf(stderr, "error: %s\n", error.what());
+    complain(error.what());
     return 128 + interrupting_signal();
+  } catch (const Error& error) {
+    complain(error.what());
+    return 1;
   } catch (const std::system_error& error) {
     // A terminal that has hung up takes no report of what was saved.
     if (interrupting_signal() == SIGHUP) return 128 + SIGHUP;
-    std::fprintf(stderr, "error: %s\n", error.what());
+    complain(error.what());
     return 1;
   } catch (const std::bad_alloc&) {
-    std::fprintf(stderr, "error: out of memory\n");
+    complain("out of memory");
     return 1;
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "error: %s\n", error.what());
+    // Of a library: what follows the first line is where in its own code.
+    std::string message = error.what();
+    message.erase(std::min(message.find('\n'), message.size()));
+    const bool lacks_memory =
+        message.find("out of memory") != std::string::npos || message.find("allocate memory") != std::string::npos;
+    complain(lacks_memory ? "out of memory: " + message : message);
     return 1;
   }
+  try {
+    close_stdout();  // of the help
+  } catch (const Error& error) {
+    complain(error.what());
+    return 1;
+  }
+  return 0;
 }

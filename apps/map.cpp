@@ -3,10 +3,13 @@
 #include <chrono>
 
 #include "pictura/apps/commands.h"
+#include "pictura/cli/file_options.h"
 #include "pictura/cli/map_listing.h"
+#include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/interrupt.h"
 #include "pictura/drawing/drawing.h"
 #include "pictura/map/blind_approaches.h"
 #include "pictura/map/load_map.h"
@@ -81,15 +84,23 @@ void print_warnings(const std::vector<std::string>& warnings) {
   }
 }
 
-void run_map(const Arguments& arguments) {
+void run_map(const CLI::App& command, const Arguments& arguments) {
+  if (arguments.png.empty() && arguments.svg.empty()) {
+    for (const char* option : {"--at", "--box", "--size"}) {
+      if (command.count(option) > 0) fail_usage("{}: has no effect without --png or --svg", option);
+    }
+  }
   if (arguments.full && !arguments.json) fail_usage("--full: lists elements as JSON; expected --json with it");
+  const InterruptibleWork work("interrupted");
   LoadReport report;
   const auto begin = std::chrono::steady_clock::now();
   const std::shared_ptr<const RoadMap> map = load_map(arguments.map, {.lenient = arguments.lenient}, &report);
   const double load_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  work.check();
   print_warnings(report.warnings);
   const MapPictureOptions picture{.size_px = arguments.size_px, .box = shown_box(arguments)};
   if (!arguments.png.empty()) draw_map_png(*map, arguments.png, picture);
+  work.check();
   if (!arguments.svg.empty()) draw_map_svg(*map, arguments.svg, picture);
   if (!arguments.xodr.empty()) {
     const MapText text = map_text(arguments.map);
@@ -113,29 +124,35 @@ void run_map(const Arguments& arguments) {
 }  // namespace
 
 void add_map_command(CLI::App& app) {
+  constexpr double kFarthest_m = 1e8;  // from the origin of a map projection
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("map", "Print a map's properties, list its elements, draw it from above");
   command->add_option("MAP", arguments->map, "A .xodr file, a town's name, or procedural[:SEED]")->required();
-  command->add_option(
-      "--png", arguments->png,
-      "Draw lanes, markings, edges, lights, signs, crosswalks, parking and building lines into this file");
-  command->add_option("--svg", arguments->svg, "Draw the same as vector graphics");
+  command
+      ->add_option("--png", arguments->png,
+                   "Draw lanes, markings, edges, lights, signs, crosswalks, parking and building lines into this file")
+      ->check(file_ending(".png"));
+  command->add_option("--svg", arguments->svg, "Draw the same as vector graphics")->check(file_ending(".svg"));
   command->add_option("--size", arguments->size_px, "Longer side of the picture in pixels")
-      ->check(CLI::Range(64, 16384))
+      ->transform(whole_number(64, 16384))
       ->capture_default_str();
   CLI::Option* box =
       command->add_option("--box", arguments->box, "Draw only this part: two corners, in the file's metres")
           ->expected(4)
+          ->transform(number(-kFarthest_m, kFarthest_m))
           ->type_name("X0 Y0 X1 Y1");
   CLI::Option* at =
       command->add_option("--at", arguments->at, "Draw the surroundings of this point, in the file's metres")
           ->expected(2)
+          ->transform(number(-kFarthest_m, kFarthest_m))
           ->type_name("X Y")
           ->excludes(box);
   command->add_option("--radius", arguments->radius_m, "How far to draw around --at, in metres")
       ->needs(at)
+      ->transform(number(0.5, kFarthest_m))
       ->capture_default_str();
-  command->add_option("--xodr", arguments->xodr, "Write the map as OpenDRIVE, with only what the importer uses");
+  command->add_option("--xodr", arguments->xodr, "Write the map as OpenDRIVE, with only what the importer uses")
+      ->check(file_ending(".xodr"));
   command->add_flag("--lenient", arguments->lenient,
                     "Leave out faulty parts of the file, each with a warning on stderr");
   command->add_flag("--json", arguments->json, "Print one JSON object");
@@ -143,7 +160,7 @@ void add_map_command(CLI::App& app) {
   command->footer(
       "Examples:\n  pictura map Town01 --json\n  pictura map procedural:7 --png town.png\n"
       "  pictura map Town03 --svg crossing.svg --at 0 0 --radius 40");
-  command->callback([arguments] { run_map(*arguments); });
+  command->callback([arguments, command] { run_map(*command, *arguments); });
 }
 
 }  // namespace pictura

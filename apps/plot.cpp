@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "pictura/apps/commands.h"
+#include "pictura/cli/file_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/drawing/run_plot.h"
 
@@ -40,7 +41,9 @@ void add_plot_command(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("plot", "Draw curves of training runs");
   command->add_option("RUN", arguments->runs, "Folders that pictura train wrote (--out)")->required();
-  command->add_option("--out", arguments->out, "The PNG file to write")->capture_default_str();
+  command->add_option("--out", arguments->out, "The PNG file to write")
+      ->check(file_ending(".png"))
+      ->capture_default_str();
   command->add_option("--x", arguments->x, "Over agent-steps, or hours of collecting and improving")
       ->check(CLI::IsMember({"agent_steps", "hours"}))
       ->capture_default_str();

@@ -5,7 +5,7 @@
 
 #include "pictura/apps/commands.h"
 #include "pictura/cli/drive.h"
-#include "pictura/cli/finite_range.h"
+#include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
@@ -27,6 +27,10 @@ struct Arguments {
   bool json = false;
 };
 
+double seconds_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
 std::array<int64_t, kNumAgentClasses> spawned_by_class(Simulator& simulator) {
   const AgentStateView state = simulator.state();
   std::array<int64_t, kNumAgentClasses> counts{};
@@ -34,6 +38,21 @@ std::array<int64_t, kNumAgentClasses> spawned_by_class(Simulator& simulator) {
     counts[state.agent_class[slot]] += state.status[slot] != static_cast<uint8_t>(AgentStatus::absent);
   }
   return counts;
+}
+
+// Options that would change nothing.
+void refuse_idle_options(const CLI::App& command, const Arguments& arguments) {
+  if (arguments.video.empty()) {
+    for (const char* option : {"--film-width", "--film-agent"}) {
+      if (command.count(option) > 0) fail_usage("{}: has no effect without --video", option);
+    }
+  }
+  if (!is_host_controller(arguments.policy)) return;
+  for (const char* option : {"--device", "--renderer", "--samples"}) {
+    if (command.count(option) > 0) {
+      fail_usage("{}: has no effect with the policy '{}', which computes and draws nothing", option, arguments.policy);
+    }
+  }
 }
 
 void run(const Arguments& arguments) {
@@ -51,48 +70,54 @@ void run(const Arguments& arguments) {
   }
 
   ProgressLine line;
-  double simulate_s = 0;
+  double simulate_s = 0, film_s = 0;
+  const auto begin_of_all = std::chrono::steady_clock::now();
   int step = 0;
   for (; step < arguments.steps && !interrupted(); ++step) {
+    const auto begin_of_frame = std::chrono::steady_clock::now();
     if (film) film->add_frame(*simulator);
+    film_s += seconds_since(begin_of_frame);
     world.act();
     const auto begin = std::chrono::steady_clock::now();
     world.step();
-    simulate_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    simulate_s += seconds_since(begin);
     line.update(fmt::format("step {}/{}", step + 1, arguments.steps), static_cast<double>(step + 1) / arguments.steps);
   }
+  const double drive_s = seconds_since(begin_of_all) - film_s;
   line.finish();
   if (film) film->close();
 
   const SimulatorTotals& totals = simulator->totals();
-  const Json object{{"backend", simulator->name()},
-                    {"renderer", world.renderer ? Json(world.renderer->name()) : Json(nullptr)},
-                    {"map", simulator->maps()[0]->road->name},
-                    {"wall_seed", simulator->config().walls ? Json(simulator->config().wall_seed) : Json(nullptr)},
-                    {"asked", spawned.asked},
-                    {"spawned", spawned.spawned},
-                    {"refused", spawned.refused},
-                    {"refused_no_place", spawned.refused_no_place},
-                    {"refused_taken", spawned.refused_taken},
-                    {"vehicles", of_class[static_cast<size_t>(AgentClass::vehicle)]},
-                    {"cyclists", of_class[static_cast<size_t>(AgentClass::cyclist)]},
-                    {"pedestrians", of_class[static_cast<size_t>(AgentClass::pedestrian)]},
-                    {"parked_asked", spawned.parked_asked},
-                    {"parked_placed", spawned.parked_placed},
-                    {"steps", step},
-                    {"agent_steps", totals.agent_steps},
-                    {"agent_steps_per_s", finite_or_null(static_cast<double>(totals.agent_steps) / simulate_s)},
-                    {"slot_steps_per_s", finite_or_null(static_cast<double>(totals.slot_steps) / simulate_s)},
-                    {"episodes", totals.episodes},
-                    {"goals_reached", totals.goals_reached},
-                    {"waypoints_reached", totals.waypoints_reached},
-                    {"collisions", totals.collisions},
-                    {"at_fault_collisions", totals.at_fault_collisions},
-                    {"off_road", totals.off_road},
-                    {"red_light", totals.red_light},
-                    {"wall_contacts", totals.wall_contacts},
-                    {"km_driven", totals.distance_m / 1000},
-                    {"state_hash", fmt::format("{:016x}", simulator->state_hash())}};
+  const Json object{
+      {"backend", simulator->name()},
+      {"renderer", world.renderer ? Json(world.renderer->name()) : Json(nullptr)},
+      {"map", simulator->maps()[0]->road->name},
+      {"wall_seed", simulator->config().walls ? Json(simulator->config().wall_seed) : Json(nullptr)},
+      {"asked", spawned.asked},
+      {"spawned", spawned.spawned},
+      {"refused", spawned.refused},
+      {"refused_no_place", spawned.refused_no_place},
+      {"refused_taken", spawned.refused_taken},
+      {"vehicles", of_class[static_cast<size_t>(AgentClass::vehicle)]},
+      {"cyclists", of_class[static_cast<size_t>(AgentClass::cyclist)]},
+      {"pedestrians", of_class[static_cast<size_t>(AgentClass::pedestrian)]},
+      {"parked_asked", spawned.parked_asked},
+      {"parked_placed", spawned.parked_placed},
+      {"steps", step},
+      {"agent_steps", totals.agent_steps},
+      {"agent_steps_per_s", finite_or_null(static_cast<double>(totals.agent_steps) / drive_s)},
+      {"slot_steps_per_s", finite_or_null(static_cast<double>(totals.slot_steps) / drive_s)},
+      {"simulator_agent_steps_per_s", finite_or_null(static_cast<double>(totals.agent_steps) / simulate_s)},
+      {"episodes", totals.episodes},
+      {"goals_reached", totals.goals_reached},
+      {"waypoints_reached", totals.waypoints_reached},
+      {"collisions", totals.collisions},
+      {"at_fault_collisions", totals.at_fault_collisions},
+      {"off_road", totals.off_road},
+      {"red_light", totals.red_light},
+      {"wall_contacts", totals.wall_contacts},
+      {"km_driven", totals.distance_m / 1000},
+      {"state_hash", fmt::format("{:016x}", simulator->state_hash())}};
   if (arguments.json) {
     print_json(object);
   } else {
@@ -110,7 +135,7 @@ void add_simulate_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("simulate", "Drive a world and count what happens");
   command->add_option("MAP", arguments->world.map, "A .xodr file, a town's name, or procedural[:SEED]")->required();
   add_world_options(command, &arguments->world);
-  command->add_option("--steps", arguments->steps, "Steps of 0.1 s")->check(CLI::PositiveNumber)->capture_default_str();
+  command->add_option("--steps", arguments->steps, "Steps of 0.1 s")->transform(whole_number(1))->capture_default_str();
   command->add_option("--policy", arguments->policy, "random, idle, lane, or a checkpoint that train wrote")
       ->capture_default_str();
   add_policy_backend_options(command, "auto, and drawn as in training", &arguments->backends);
@@ -119,16 +144,19 @@ void add_simulate_command(CLI::App& app) {
       "Film it into this .mp4 or .gif: from above, with goals, lights and why agents halted, and from one "
       "agent's cameras");
   command->add_option("--film-width", arguments->film_width_m, "Metres that it shows from above; 0: the whole map")
-      ->check(finite_range(0, 1e5))
+      ->transform(number(0, 1e5))
       ->capture_default_str();
   command->add_option("--film-agent", arguments->film_agent, "The agent that the film follows")
-      ->check(CLI::NonNegativeNumber)
+      ->transform(whole_number(0))
       ->capture_default_str();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
+      "agent_steps_per_s counts the whole loop, policy and its images included, without the film;\n"
+      "simulator_agent_steps_per_s counts the simulator alone.\n"
       "Examples:\n  pictura simulate Town01 --agents 80 --steps 600 --policy random --json\n"
       "  pictura simulate procedural:1 --policy runs/demo/checkpoint.ckpt --video drive.mp4");
-  command->callback([arguments] {
+  command->callback([arguments, command] {
+    refuse_idle_options(*command, *arguments);
     if (arguments->film_agent >= arguments->world.agents) {
       fail_usage("--film-agent: expected 0 to {}, got {}", arguments->world.agents - 1, arguments->film_agent);
     }

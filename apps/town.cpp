@@ -1,6 +1,7 @@
 // `pictura town`: writes a procedural town as OpenDRIVE.
 #include "pictura/apps/commands.h"
-#include "pictura/cli/finite_range.h"
+#include "pictura/cli/file_options.h"
+#include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
@@ -16,14 +17,14 @@ void add_town_command(CLI::App& app) {
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("town", "Write a procedural town as an OpenDRIVE file");
-  command->add_option("--seed", arguments->town.seed, "Equal seeds give equal files")->capture_default_str();
+  add_seed_option(command, &arguments->town.seed, "Equal seeds give equal files");
   command->add_option("--blocks", arguments->blocks, "Blocks of houses along x and y, as AxB")->capture_default_str();
   for (const TownFeature& feature : town_features()) {
     command->add_option(fmt::format("--{}", feature.name), arguments->town.*feature.value, feature.help)
-        ->check(finite_range(feature.low, feature.high))
+        ->transform(number(feature.low, feature.high))
         ->capture_default_str();
   }
-  command->add_option("--out", arguments->out, "The .xodr file to write")->required();
+  command->add_option("--out", arguments->out, "The .xodr file to write")->check(file_ending(".xodr"))->required();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "A share above 0 selects at least one.\n"

@@ -1,6 +1,7 @@
 // `pictura train`: self-play PPO from a configuration file, with a progress line, and the learning curve as a picture.
 #include "pictura/apps/commands.h"
 #include "pictura/cli/backend_options.h"
+#include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/cli/train_progress.h"
 #include "pictura/common/error.h"
@@ -36,7 +37,7 @@ void add_train_command(CLI::App& app) {
       ->add_option("--minutes", arguments->train.minutes,
                    "Save and end before this much wall time has passed, as far as the longest update until now tells; "
                    "go on with --resume")
-      ->check(CLI::PositiveNumber);
+      ->transform(number(1e-6, 1e9));
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Several processes train one policy, each on its GPU, where torchrun, srun or the variables RANK, WORLD_SIZE,\n"

@@ -7,13 +7,14 @@
 #include "pictura/backends/make_renderer.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/common/pixel_samples.h"
+#include "pictura/common/support/suggestion.h"
 
 namespace pictura {
 
 CLI::Validator one_of(const std::vector<std::string>& names) {
   auto complaint = [names](const std::string& text) -> std::string {
     if (std::find(names.begin(), names.end(), text) != names.end()) return "";
-    return fmt::format("expected one of {}; got '{}'", fmt::join(names, ", "), text);
+    return fmt::format("expected one of {}; got '{}'{}", fmt::join(names, ", "), text, suggestion(text, names));
   };
   return {complaint, ""};
 }

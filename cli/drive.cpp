@@ -5,8 +5,9 @@
 #include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
-#include "pictura/cli/finite_range.h"
+#include "pictura/cli/number_options.h"
 #include "pictura/common/error.h"
+#include "pictura/common/support/suggestion.h"
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/controllers/host_controllers.h"
 #ifdef PICTURA_HAS_TORCH
@@ -17,7 +18,7 @@ namespace pictura {
 
 void add_world_options(CLI::App* command, WorldOptions* options_out) {
   command->add_option("--agents", options_out->agents, "Vehicles, cyclists and pedestrians in the world")
-      ->check(CLI::Range(1, kMaxAgentsPerWorld))
+      ->transform(whole_number(1, kMaxAgentsPerWorld))
       ->capture_default_str();
   // What a command sets beforehand is its default; else the policy decides, or the simulator.
   const SimulatorConfig simulator;
@@ -28,20 +29,35 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
   command
       ->add_option("--pedestrians", options_out->pedestrian_fraction,
                    with_default("Share of the agents", options_out->pedestrian_fraction, simulator.pedestrian_fraction))
-      ->check(finite_range(0, 1));
+      ->transform(number(0, 1));
   command
       ->add_option("--cyclists", options_out->cyclist_fraction,
                    with_default("Share of the agents", options_out->cyclist_fraction, simulator.cyclist_fraction))
-      ->check(finite_range(0, 1));
+      ->transform(number(0, 1));
   command
       ->add_option("--parked", options_out->parked_cars,
                    with_default("Parked cars", options_out->parked_cars, simulator.parked_cars))
-      ->check(CLI::Range(0, kMaxAgentsPerWorld));
-  command->add_option("--seed", options_out->seed, "Places, sizes, goals and actions")->capture_default_str();
-  command->add_option("--threads", options_out->num_threads, "Host threads; 0: all")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+      ->transform(whole_number(0, kMaxAgentsPerWorld));
+  add_seed_option(command, &options_out->seed, "Places, sizes, goals and actions");
+  add_threads_option(command, &options_out->num_threads);
   command->add_flag("!--no-walls", options_out->walls, "Leave out the walls along the building lines");
+}
+
+bool is_host_controller(const std::string& policy) {
+  const std::vector<std::string> names = host_controller_names();
+  return std::find(names.begin(), names.end(), policy) != names.end();
+}
+
+void set_population(const WorldOptions& options, SimulatorConfig* config_inout) {
+  float& pedestrians = config_inout->pedestrian_fraction;
+  float& cyclists = config_inout->cyclist_fraction;
+  pedestrians = options.pedestrian_fraction.value_or(pedestrians);
+  cyclists = options.cyclist_fraction.value_or(cyclists);
+  if (pedestrians + cyclists <= 1) return;
+  if (options.pedestrian_fraction && options.cyclist_fraction) {
+    fail_usage("--pedestrians and --cyclists: expected at most 1 together, got {} + {}", pedestrians, cyclists);
+  }
+  (options.pedestrian_fraction ? cyclists : pedestrians) = 1 - (options.pedestrian_fraction ? pedestrians : cyclists);
 }
 
 DrivenWorld make_world(const WorldOptions& options, const std::string& policy, const BackendOptions& backends) {
@@ -52,8 +68,7 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy, c
   }
   SimulatorConfig config;
   DrivenWorld world;
-  const std::vector<std::string> names = host_controller_names();
-  const bool is_trained = std::find(names.begin(), names.end(), policy) == names.end();
+  const bool is_trained = !is_host_controller(policy);
   config.vector_observations = options.vector_observations;
   if (is_trained) {
 #ifdef PICTURA_HAS_TORCH
@@ -69,16 +84,16 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy, c
     config = world.session->evaluation_world(defaults.episode_steps);
     config.reset_inactive_fraction = defaults.reset_inactive_fraction;
 #else
-    fail_usage("--policy: expected {} (this build has no torch for checkpoints), got '{}'", fmt::join(names, ", "),
-               policy);
+    const std::vector<std::string> names = host_controller_names();
+    fail_usage("--policy: expected {} (this build has no torch for checkpoints), got '{}'{}", fmt::join(names, ", "),
+               policy, suggestion(policy, names));
 #endif
   }
   config.seed = options.seed;
   config.num_threads = options.num_threads;
   config.walls = config.walls && options.walls;
   config.fixed_lights = true;
-  config.pedestrian_fraction = options.pedestrian_fraction.value_or(config.pedestrian_fraction);
-  config.cyclist_fraction = options.cyclist_fraction.value_or(config.cyclist_fraction);
+  set_population(options, &config);
   config.parked_cars = options.parked_cars.value_or(config.parked_cars);
   world.simulator = make_simulator(backends.simulator.empty() ? "cpu" : backends.simulator, config,
                                    {load_map(options.map)}, {{0, options.agents, 0}});

@@ -31,6 +31,13 @@ struct WorldOptions {
 /// Adds --agents, --pedestrians, --cyclists, --parked, --seed, --threads and --no-walls, which fill *options_out.
 void add_world_options(CLI::App* command, WorldOptions* options_out);
 
+/// Sets the shares of pedestrians and cyclists that were given; a share that was not gives way to one that was. Throws
+/// UsageError where both were given and are more than 1.
+void set_population(const WorldOptions& options, SimulatorConfig* config_inout);
+
+/// Whether a policy is the name of a controller that needs no checkpoint.
+bool is_host_controller(const std::string& policy);
+
 class PolicySession;
 
 /// One world and who drives in it.

@@ -41,7 +41,6 @@ class Listing {
   void print() {
     text_ += "\n  }\n}\n";
     std::fwrite(text_.data(), 1, text_.size(), stdout);
-    if (std::fflush(stdout) != 0) fail("stdout: cannot be written");
   }
 
  private:

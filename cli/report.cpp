@@ -1,14 +1,17 @@
 #include "pictura/cli/report.h"
 
-#include <charconv>
+#include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 
 #include <sys/ioctl.h>
 #include <unistd.h>
 
 #include "pictura/common/error.h"
 #include "pictura/common/pixel_samples.h"
+#include "pictura/common/support/numbers.h"
 
 namespace pictura {
 
@@ -17,7 +20,29 @@ Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : 
 void print_json(const Json& object) {
   const std::string text = object.dump(2) + "\n";
   std::fwrite(text.data(), 1, text.size(), stdout);
-  if (std::fflush(stdout) != 0) fail("stdout: cannot be written");
+}
+
+void close_stdout() {
+  // A flush says nothing of bytes that an earlier call lost.
+  errno = 0;
+  const bool lost = std::ferror(stdout) != 0;
+  const bool closed = std::fclose(stdout) == 0;
+  PICTURA_CHECK(!lost && closed, "stdout: cannot be written{}{}", errno ? ": " : "", errno ? std::strerror(errno) : "");
+}
+
+std::string printable(std::string_view message) {
+  std::string text;
+  for (const char c : message) {
+    constexpr unsigned char kFirstPrintable = 0x20, kDelete = 0x7F;
+    const auto code = static_cast<unsigned char>(c);
+    if (c == '\n')
+      text += "\\n";
+    else if (code < kFirstPrintable || code == kDelete)
+      text += fmt::format("\\x{:02x}", code);
+    else
+      text += c;
+  }
+  return text;
 }
 
 std::string format_duration(double seconds) {
@@ -70,13 +95,14 @@ void ProgressLine::finish() {
 }
 
 Pair parse_pair(const std::string& option, const std::string& text, int max) {
-  Pair pair{};
-  const char* const end = text.data() + text.size();
-  const auto first = std::from_chars(text.data(), end, pair.first);
-  const bool crossed = first.ec == std::errc() && first.ptr != end && *first.ptr == 'x';
-  const auto second = crossed ? std::from_chars(first.ptr + 1, end, pair.second) : first;
-  if (!crossed || second.ec != std::errc() || second.ptr != end || pair.first < 1 || pair.second < 1 ||
-      pair.first > max || pair.second > max) {
+  const std::size_t cross = std::min(text.find('x'), text.size());
+  const auto count = [max](std::string_view part) {
+    const std::optional<uint64_t> value = parse_unsigned(part);
+    return value && *value >= 1 && *value <= static_cast<uint64_t>(max) ? static_cast<int>(*value) : 0;
+  };
+  const Pair pair{count(std::string_view(text).substr(0, cross)),
+                  cross < text.size() ? count(std::string_view(text).substr(cross + 1)) : 0};
+  if (pair.first < 1 || pair.second < 1) {
     fail_usage("{}: expected two numbers of 1 to {} like 4x3, got '{}'", option, max, text);
   }
   return pair;

@@ -16,8 +16,14 @@ using Json = nlohmann::ordered_json;
 /// The number, or null where it is infinite or NaN.
 Json finite_or_null(double value);
 
-/// Prints one object and a newline on stdout.
+/// Prints one object and a newline on stdout. close_stdout() says whether all of it was taken.
 void print_json(const Json& object);
+
+/// Ends stdout. Throws Error unless everything that was printed since the start was taken: a disk may be full.
+void close_stdout();
+
+/// A message in one line, in which control characters of names are escaped: "a\nb".
+std::string printable(std::string_view message);
 
 /// "1 h 02 min", "3 min 05 s" or "12 s".
 std::string format_duration(double seconds);

@@ -9,6 +9,7 @@
 #include <fmt/ranges.h>
 
 #include "pictura/cli/drive.h"
+#include "pictura/cli/map_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/commit.h"
 #include "pictura/common/error.h"
@@ -33,8 +34,9 @@ std::string population_of(const WorldOptions& world) {
 }
 
 void add_maps_option(CLI::App* command, std::vector<std::string>* maps, const std::string& default_maps) {
-  command->add_option("--map", *maps, "Maps, in turn; towns: all of the map folder; default: " + default_maps)
-      ->delimiter(',');
+  add_map_list_option(
+      command, maps,
+      fmt::format("Maps, with commas between them, in turn; towns: all of the map folder; default: {}", default_maps));
 }
 
 std::vector<std::string> named_maps(const std::vector<std::string>& maps) {

@@ -13,6 +13,8 @@
 #include "pictura/bench/commands/plot_results.h"
 #include "pictura/bench/render.h"
 #include "pictura/bench/step_rate.h"
+#include "pictura/cli/file_options.h"
+#include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
@@ -299,29 +301,29 @@ void add_breakdown_benchmark(CLI::App& bench) {
   command->add_option("--size", arguments->sizes, "Sizes in pixels, WxH; default: the paper's five")->delimiter(',');
   command->add_option("--agents", arguments->agents, "Of each of the two worlds; default: both readings of the paper")
       ->delimiter(',')
-      ->check(CLI::Range(1, kMaxAgentsPerWorld))
+      ->transform(whole_number(1, kMaxAgentsPerWorld))
       ->capture_default_str();
   command
       ->add_option("--chunk", arguments->chunk, "Transitions through the network at once, or less where memory lacks")
-      ->check(CLI::Range(1, 1 << 30))
+      ->transform(whole_number(1, 1 << 30))
       ->capture_default_str();
   command->add_option("--device", arguments->device, "What learns: cpu, cuda, cuda:N, auto")->capture_default_str();
   command->add_option("--simulator", arguments->simulator, "cpu, cuda, auto")->capture_default_str();
   command->add_flag("--host-steps", arguments->host_steps,
                     "Also time the steps of an update by the simulator on the host, on their own");
   command->add_option("--warm-up", measured.warm_up, "Updates before those that are measured, in each case")
-      ->check(CLI::PositiveNumber)
+      ->transform(whole_number(1))
       ->capture_default_str();
   command->add_option("--updates", measured.updates, "Updates that are measured")
-      ->check(CLI::PositiveNumber)
+      ->transform(whole_number(1))
       ->capture_default_str();
   command
       ->add_option("--check", arguments->checked_views,
                    "Number of egos whose images are compared with the oracle's before each case")
-      ->check(CLI::NonNegativeNumber)
+      ->transform(whole_number(0))
       ->capture_default_str();
   command->add_option("--plot", arguments->plot.results, "Plot these results instead of measuring")->delimiter(',');
-  command->add_option("--figure", arguments->plot.figure, "PNG file for --plot");
+  command->add_option("--figure", arguments->plot.figure, "PNG file for --plot")->check(file_ending(".png"));
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Examples:\n  pictura bench breakdown --host-steps --json\n"

@@ -8,6 +8,7 @@
 #include "pictura/bench/history.h"
 #include "pictura/bench/render.h"
 #include "pictura/cli/drive.h"
+#include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
@@ -87,22 +88,22 @@ void add_history_benchmark(CLI::App& bench) {
   command->add_option("--backend", measured.backend, "cpu or cuda: simulator, history and renderer")
       ->capture_default_str();
   command->add_option("--slots", arguments->slots, "So many agents in worlds of 1 to --agents")
-      ->check(CLI::Range(1, kMaxSlots))
+      ->transform(whole_number(1, kMaxSlots))
       ->capture_default_str();
   command->add_option("--steps", measured.num_steps, "Of the history")
-      ->check(CLI::Range(1, 1 << 16))
+      ->transform(whole_number(1, 1 << 16))
       ->capture_default_str();
   command->add_option("--warm-up", measured.warm_up_steps, "Steps before the history begins")
-      ->check(CLI::NonNegativeNumber)
+      ->transform(whole_number(0))
       ->capture_default_str();
   command->add_option("--views", measured.num_views, "Agents drawn in one call")
-      ->check(CLI::Range(1, kMaxSlots))
+      ->transform(whole_number(1, kMaxSlots))
       ->capture_default_str();
   command->add_option("--size", arguments->size, "Pixels of an image, WxH")->capture_default_str();
   command
       ->add_option("--check", measured.checked_images,
                    "Number of agents whose images are compared with those drawn at the time")
-      ->check(CLI::Range(1, 1 << 16))
+      ->transform(whole_number(1, 1 << 16))
       ->capture_default_str();
   add_repeat_options(command, &arguments->rate);
   command->footer(

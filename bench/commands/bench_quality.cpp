@@ -7,7 +7,8 @@
 
 #include "pictura/bench/commands/bench.h"
 #include "pictura/bench/quality.h"
-#include "pictura/cli/finite_range.h"
+#include "pictura/cli/file_options.h"
+#include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/raster/camera.h"
@@ -129,27 +130,26 @@ void add_quality_benchmark(CLI::App& bench) {
   add_maps_option(command, &arguments->maps, "all towns of the map folder and two procedural ones");
   command->add_option("--size", arguments->sizes, "Sizes, WxH; default: the paper's five")->delimiter(',');
   command->add_option("--agents", arguments->world.agents, "Agents in each world")
-      ->check(CLI::Range(1, kMaxAgentsPerWorld))
+      ->transform(whole_number(1, kMaxAgentsPerWorld))
       ->capture_default_str();
   command->add_option("--views", arguments->world.views, "Agents whose cameras are drawn, of each world")
-      ->check(CLI::PositiveNumber)
+      ->transform(whole_number(1))
       ->capture_default_str();
   command->add_option("--steps", arguments->world.steps, "Steps of random actions before the images")
-      ->check(CLI::NonNegativeNumber)
+      ->transform(whole_number(0))
       ->capture_default_str();
-  command->add_option("--seed", arguments->world.seed)->capture_default_str();
-  command->add_option("--threads", arguments->world.num_threads, "Host threads; 0: all")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+  add_seed_option(command, &arguments->world.seed, "Worlds are drawn from it");
+  add_threads_option(command, &arguments->world.num_threads);
   command->add_flag("!--no-walls", arguments->world.walls, "Leave out the walls along the building lines");
   command->add_option("--line-floor", arguments->line_floor_px, "Minimum width of a line on screen in pixels")
-      ->check(finite_range(0, kGuardBand_px))
+      ->transform(number(0, kGuardBand_px))
       ->capture_default_str();
   command
       ->add_option("--random", arguments->random,
                    "Measure this many random scenes of each kind (bench/truth/random_scenes.h) instead, from --seed on")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--figure", arguments->figure, "Write crops of all methods to this PNG file");
+      ->transform(whole_number(1));
+  command->add_option("--figure", arguments->figure, "Write crops of all methods to this PNG file")
+      ->check(file_ending(".png"));
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer("Example:\n  pictura bench quality --map Town03 --size 96x54 --views 10 --figure quality.png");
   command->callback([arguments] { run(*arguments); });

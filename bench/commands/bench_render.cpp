@@ -11,6 +11,7 @@
 #include "pictura/bench/commands/plot_results.h"
 #include "pictura/bench/render.h"
 #include "pictura/cli/drive.h"
+#include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 
@@ -217,7 +218,7 @@ void add_render_benchmark(CLI::App& bench) {
   add_world_options(command, &arguments->world);
   command->add_option("--egos", arguments->egos, "Agents drawn in one call; default: all of one world for each map")
       ->delimiter(',')
-      ->check(CLI::Range(1, kMaxSlots));
+      ->transform(whole_number(1, kMaxSlots));
   command->add_option("--backend", arguments->backends, "cpu, cuda, gl, gl:egl, gl:osmesa")
       ->delimiter(',')
       ->capture_default_str();
@@ -237,7 +238,7 @@ void add_render_benchmark(CLI::App& bench) {
   command
       ->add_option("--check", arguments->checked_views,
                    "Number of egos compared with the oracle, before and after timing")
-      ->check(CLI::NonNegativeNumber)
+      ->transform(whole_number(0))
       ->capture_default_str();
   add_rate_options(command, &arguments->rate);
   command->footer(

@@ -11,6 +11,7 @@
 #include "pictura/bench/commands/plot_results.h"
 #include "pictura/bench/render.h"
 #include "pictura/bench/step_rate.h"
+#include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
@@ -156,11 +157,11 @@ void add_simulate_benchmark(CLI::App& bench) {
   add_world_options(command, &arguments->world);
   command->add_option("--backend", arguments->backends, "cpu, cuda")->delimiter(',')->capture_default_str();
   auto* worlds = command->add_option("--worlds", arguments->num_worlds, "Default: one for each map")
-                     ->check(CLI::Range(1, kMaxSlots));
+                     ->transform(whole_number(1, kMaxSlots));
   auto* slots = command
                     ->add_option("--slots", arguments->slots,
                                  "So many agents in worlds of 1 to --agents, as in training, instead of equal worlds")
-                    ->check(CLI::Range(1, kMaxSlots))
+                    ->transform(whole_number(1, kMaxSlots))
                     ->excludes(worlds);
   command
       ->add_option(
@@ -170,7 +171,7 @@ void add_simulate_benchmark(CLI::App& bench) {
       ->excludes(worlds)
       ->excludes(slots);
   command->add_option("--warm-up", arguments->warm_up_steps, "Steps before timing")
-      ->check(CLI::PositiveNumber)
+      ->transform(whole_number(1))
       ->capture_default_str();
   add_rate_options(command, &arguments->rate);
   command->footer(

@@ -8,7 +8,7 @@
 #include "pictura/bench/commands/bench.h"
 #include "pictura/bench/render.h"
 #include "pictura/bench/soak.h"
-#include "pictura/cli/finite_range.h"
+#include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 
@@ -119,23 +119,23 @@ void add_soak_benchmark(CLI::App& bench) {
   command->add_option("--backend", arguments->backend, "The renderer")->capture_default_str();
   add_maps_option(command, &soak.maps);
   command->add_option("--minutes", arguments->minutes, "Time limit")
-      ->check(finite_range(1e-3, 1e5))
+      ->transform(number(1e-3, 1e5))
       ->capture_default_str();
   command->add_option("--scenes", soak.max_scenes, "Maximum number of scenes; 0: limited by time only")
-      ->check(CLI::NonNegativeNumber)
+      ->transform(whole_number(0))
       ->capture_default_str();
   command
       ->add_option("--first", soak.first_scene, "Number of the first scene; a number gives the same scene in every run")
-      ->check(CLI::NonNegativeNumber)
+      ->transform(whole_number(0))
       ->capture_default_str();
   command->add_option("--agents", soak.agents, "Maximum number of agents of a world")
-      ->check(CLI::Range(1, kMaxAgentsPerWorld))
+      ->transform(whole_number(1, kMaxAgentsPerWorld))
       ->capture_default_str();
-  command->add_option("--views", soak.views, "Views of a scene")->check(CLI::Range(1, 4096))->capture_default_str();
-  command->add_option("--seed", soak.seed)->capture_default_str();
-  command->add_option("--threads", soak.num_threads, "Host threads; 0: all")
-      ->check(CLI::NonNegativeNumber)
+  command->add_option("--views", soak.views, "Views of a scene")
+      ->transform(whole_number(1, 4096))
       ->capture_default_str();
+  add_seed_option(command, &soak.seed, "Worlds are drawn from it");
+  add_threads_option(command, &soak.num_threads);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Exits with status 1 if an image differs from the oracle's by more than kernels may: by more than 1/255 at one\n"

@@ -4,6 +4,7 @@
 #include "pictura/bench/commands/bench.h"
 #include "pictura/bench/commands/measure_training.h"
 #include "pictura/cli/backend_options.h"
+#include "pictura/cli/number_options.h"
 
 namespace pictura {
 
@@ -90,10 +91,10 @@ void add_train_benchmark(CLI::App& bench) {
   add_policy_backend_options(command, "as the configuration says", &arguments->backends);
   command->add_option("--init-from", measured.init_from, "Begin with the weights of this checkpoint");
   command->add_option("--warm-up", measured.warm_up, "Updates before those that are measured")
-      ->check(CLI::PositiveNumber)
+      ->transform(whole_number(1))
       ->capture_default_str();
   command->add_option("--updates", measured.updates, "Updates that are measured, whatever train.updates says")
-      ->check(CLI::PositiveNumber)
+      ->transform(whole_number(1))
       ->capture_default_str();
   command->add_flag("--kernels", measured.profiles_kernels,
                     "Time each kernel in one update more: the longest, and the share of the wall time without any");

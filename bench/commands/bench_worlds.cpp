@@ -4,6 +4,7 @@
 
 #include "pictura/bench/commands/bench.h"
 #include "pictura/bench/world_statistics.h"
+#include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/simulator.h"
@@ -49,14 +50,14 @@ void add_worlds_benchmark(CLI::App& bench) {
   CLI::App* command =
       bench.add_subcommand("worlds", "Distributions over many episodes: who is there, what befalls them");
   add_maps_option(command, &arguments->maps, "all towns of the map folder, else procedural:1");
-  command->add_option("--episodes", arguments->options.episodes)->check(CLI::Range(1, 10'000))->capture_default_str();
+  command->add_option("--episodes", arguments->options.episodes)
+      ->transform(whole_number(1, 10'000))
+      ->capture_default_str();
   command->add_option("--agents", arguments->options.agents, "Asked for in each world")
-      ->check(CLI::Range(1, kMaxAgentsPerWorld))
+      ->transform(whole_number(1, kMaxAgentsPerWorld))
       ->capture_default_str();
-  command->add_option("--seed", arguments->options.seed)->capture_default_str();
-  command->add_option("--threads", arguments->options.num_threads, "Host threads; 0: all")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+  add_seed_option(command, &arguments->options.seed, "Worlds are drawn from it");
+  add_threads_option(command, &arguments->options.num_threads);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer("Example:\n  pictura bench worlds --map Town03 --episodes 100 --json");
   command->callback([arguments] { run(*arguments); });

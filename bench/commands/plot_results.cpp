@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <fstream>
 
-#include "pictura/cli/finite_range.h"
+#include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 
@@ -15,8 +15,8 @@ bool wants_plot(const PlotArguments& arguments) {
 }
 
 void add_repeat_options(CLI::App* command, RateArguments* arguments) {
-  command->add_option("--repeats", arguments->repeats)->check(CLI::PositiveNumber)->capture_default_str();
-  command->add_option("--repeat-seconds", arguments->repeat_s)->check(finite_range(1e-3, 3600))->capture_default_str();
+  command->add_option("--repeats", arguments->repeats)->transform(whole_number(1))->capture_default_str();
+  command->add_option("--repeat-seconds", arguments->repeat_s)->transform(number(1e-3, 3600))->capture_default_str();
   command->add_flag("--json", arguments->json, "Print one JSON object");
 }
 

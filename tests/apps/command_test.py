@@ -10,6 +10,7 @@ import os
 import pathlib
 import pty
 import re
+import resource
 import shutil
 import signal
 import socket
@@ -110,6 +111,123 @@ class Usage(CommandCase):
         self.assert_refused(2, "--blocks", "town", "--blocks", "0x2", "--out", self.folder / "t.xodr")
         self.assertEqual(run("fly").returncode, 2)
         self.assertEqual(run().returncode, 2)
+
+
+class Typing(CommandCase):
+    """What people type: numbers, misspelt words, options that are wrong together."""
+
+    COMMANDS = [
+        ("town",), ("map",), ("render",), ("simulate",), ("train",), ("evaluate",), ("plot",), ("bench", "render"),
+        ("bench", "simulate"), ("bench", "history"), ("bench", "quality"), ("bench", "soak"), ("bench", "worlds"),
+        ("bench", "train"), ("bench", "breakdown"),
+    ]  # fmt: skip
+
+    def test_numbers_are_decimal_in_any_notation(self):
+        def town(seed):
+            path = self.folder / "town.xodr"
+            self.assertEqual(run("town", "--blocks", "1x1", "--seed", seed, "--out", path).returncode, 0, seed)
+            return path.read_bytes()
+
+        self.assertEqual(town("010"), town("10"))
+        self.assertEqual(town("1e3"), town("1000"))
+        for seed in ("-1", "0x10", "1.5", "18446744073709551616", "1e20"):
+            self.assert_refused(2, f"--seed: expected a whole number of 0 to 18446744073709551615, got '{seed}'",
+                                "town", "--out", self.folder / "town.xodr", "--seed", seed)  # fmt: skip
+
+    def test_every_option_that_takes_a_number_reads_it_alike(self):
+        for command in self.COMMANDS:
+            page = run(*command, "--help")
+            if page.returncode != 0:
+                continue  # this build lacks it
+            options = re.findall(r"^ +(--[a-z-]+)(?:,--[a-z-]+)* +(?:INT|UINT|FLOAT)", page.stdout, re.MULTILINE)
+            for option in options:
+                if option == "--at":
+                    continue  # two of them
+                with self.subTest(command=command, option=option):
+                    count = 4 if option == "--box" else 1
+                    self.assert_refused(2, "number", *command, option, *["0x1"] * count)
+
+    def test_one_bound_on_threads(self):
+        commands = [("render", "procedural:1", "--out", self.folder), ("simulate", "procedural:1")]
+        if has_torch():
+            commands.append(("evaluate", "no.ckpt"))
+        for command in commands:
+            for threads in ("33000", "100000", "-1"):
+                self.assert_refused(2, f"--threads: expected a whole number of 0 to 1024, got '{threads}'", *command,
+                                    "--threads", threads)  # fmt: skip
+
+    def test_unknown_words_suggest_the_nearest(self):
+        self.assert_refused(2, "unknown subcommand 'simulat'; did you mean 'simulate'?", "simulat")
+        self.assert_refused(2, "unknown option '--sede'; did you mean '--seed'?", "town", "--sede", 3)
+        self.assert_refused(2, "unexpected argument 'b'", "map", "a", "b")
+        self.assert_refused(2, "did you mean 'null'?", "simulate", "procedural:1", "--renderer", "nul")
+        (self.folder / "Town01.xodr").write_text("")
+        with unittest.mock.patch.dict(os.environ, {"PICTURA_DATA": str(self.folder)}):
+            self.assert_refused(2, "did you mean 'Town01'?", "map", "town01")
+        if has_torch():
+            self.assert_refused(2, "unknown subcommand 'trian'; did you mean 'train'?", "trian")
+            self.assert_refused(2, "unknown option '--confg'; did you mean '--config'?", "train", "--confg", "a.toml")
+        else:
+            self.assert_refused(2, "pictura train: this build has no torch", "train", "--config", "a.toml")
+
+    def test_values_that_would_be_ignored_are_refused(self):
+        town = self.town(blocks="1x1")
+        self.assert_refused(2, "--png: expected a value, got an empty text", "map", town, "--png", "")
+        self.assert_refused(2, "--at: has no effect without --png or --svg", "map", town, "--at", 0, 0)
+        self.assert_refused(2, "expected a name that ends in .png, got 'x.jpg'", "map", town, "--png", "x.jpg")
+        self.assert_refused(2, "parking: given twice", "map", "procedural:1:parking=0,parking=1")
+        self.assert_refused(2, "--renderer: has no effect with the policy 'random'", "simulate", town, "--renderer", "null")
+        self.assert_refused(2, "--film-width: has no effect without --video", "simulate", town, "--film-width", 9)
+        self.assert_refused(2, "expected at most 1 together", "simulate", town, "--pedestrians", 1, "--cyclists", 1)
+
+    def test_a_share_that_was_not_given_gives_way(self):
+        facts = self.json_of("simulate", self.town(), "--agents", 6, "--steps", 1, "--pedestrians", 1)
+        self.assertEqual((facts["vehicles"], facts["cyclists"]), (0, 0))
+
+    def test_messages_are_one_line_whatever_a_name_holds(self):
+        self.assert_refused(2, "map 'a\\nb\\x1b': expected", "map", "a\nb\x1b")
+        if has_torch():
+            self.assert_refused(1, "no.toml: no such file", "train", "--config", "no.toml", "--out", self.folder / "run")
+
+
+class Files(CommandCase):
+    """What output files do to what is there, and what a full disk and a closed end get."""
+
+    def test_devices_links_and_fifos_stay_what_they_are(self):
+        town, link, fifo = self.town(blocks="1x1"), self.folder / "link", self.folder / "fifo"
+        self.assert_refused(1, "/dev/full: cannot be written: No space left on device", "map", town, "--png", "/dev/full")
+        self.assertTrue(pathlib.Path("/dev/full").is_char_device())
+        link.symlink_to("picture.png")
+        self.json_of("map", town, "--png", link, "--size", 64)
+        self.assertTrue(link.is_symlink())
+        self.assertEqual((self.folder / "picture.png").read_bytes()[:4], b"\x89PNG")
+        os.mkfifo(fifo)
+        reader = subprocess.Popen(["cat", str(fifo)], stdout=subprocess.PIPE)
+        self.json_of("map", town, "--png", fifo, "--size", 64)
+        self.assertEqual(reader.communicate(timeout=60)[0], (self.folder / "picture.png").read_bytes())
+        self.assertTrue(fifo.is_fifo())
+        self.assert_refused(1, "expected a file, got a folder", "map", town, "--png", self.folder)
+
+    def test_every_byte_of_stdout_counts(self):
+        town = self.town()
+        listing = [PICTURA, "map", str(town), "--full", "--json"]
+        self.assertGreater(len(subprocess.run(listing, capture_output=True).stdout), 1 << 16)
+        limit = (1 << 16, 1 << 16)
+        with open(self.folder / "out.json", "wb") as out:
+            result = subprocess.run(listing, stdout=out, stderr=subprocess.PIPE, text=True,
+                                    preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit))  # fmt: skip
+        self.assertEqual((result.returncode, "error: stdout: cannot be written" in result.stderr), (1, True), result.stderr)
+        for arguments in (["--help"], ["town", "--help"], ["map", str(town)], ["map", str(town), "--json"]):
+            with self.subTest(arguments), open("/dev/full", "wb") as full:
+                result = subprocess.run([PICTURA, *arguments], stdout=full, stderr=subprocess.PIPE, text=True)
+                self.assertEqual((result.returncode, "No space left on device" in result.stderr), (1, True), result.stderr)
+
+    def test_the_contact_sheet_of_many_views_has_pages(self):
+        out = self.folder / "images"
+        facts = self.json_of("render", self.town(), "--agents", 80, "--steps", 0, "--views", 80, "--backend", "null",
+                             "--size", "96x54", "--out", out)  # fmt: skip
+        self.assertEqual([pathlib.Path(path).name for path in facts["contact_sheets"]],
+                         ["contact_sheet.png", "contact_sheet_2.png", "contact_sheet_3.png"])  # fmt: skip
 
 
 class Maps(CommandCase):
@@ -1049,7 +1167,7 @@ class Training(CommandCase):
     def test_evaluation_has_its_keys(self):
         out = self.folder / "run"
         self.json_of("train", *TINY, "--set", "train.updates=1", "--out", out)
-        result = self.json_of("evaluate", out / "checkpoint.ckpt", "--map", "procedural:1", "--density", "light", "--agents", 8,
+        result = self.json_of("evaluate", "--map", "procedural:1", out / "checkpoint.ckpt", "--density", "light", "--agents", 8,
                               "--scenarios", 2, "--steps", 40, "--device", "cpu")  # fmt: skip
         keys = """density scenarios steps at_fault_collision_rate off_road_rate red_light_rate goals_per_vehicle
                   km_per_infraction km_driven""".split()

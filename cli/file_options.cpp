@@ -1,0 +1,28 @@
+#include "pictura/cli/file_options.h"
+
+#include <filesystem>
+
+#include <fmt/format.h>
+
+namespace pictura {
+
+CLI::Validator file_ending(const std::string& ending) {
+  auto complaint = [ending](const std::string& text) -> std::string {
+    const std::string own = std::filesystem::path(text).extension().string();
+    if (own.empty() || own == ending) return "";
+    return fmt::format("expected a name that ends in {}, got '{}'", ending, text);
+  };
+  return {complaint, ""};
+}
+
+void refuse_empty_values(CLI::App* command) {
+  const auto complaint = [](const std::string& text) -> std::string {
+    return text.empty() ? "expected a value, got an empty text" : "";
+  };
+  for (CLI::Option* option : command->get_options()) {
+    if (option->get_items_expected_max() > 0) option->check(CLI::Validator(complaint, ""));
+  }
+  for (CLI::App* each : command->get_subcommands([](CLI::App*) { return true; })) refuse_empty_values(each);
+}
+
+}  // namespace pictura

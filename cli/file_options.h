@@ -1,0 +1,17 @@
+// Options that name files to write.
+#pragma once
+
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+namespace pictura {
+
+/// Takes names that end in `ending`, as .png, or in none at all, as devices do: no other format is written under a name
+/// that promises it.
+CLI::Validator file_ending(const std::string& ending);
+
+/// Lets no option of a command and its subcommands take an empty text, which would count as not given.
+void refuse_empty_values(CLI::App* command);
+
+}  // namespace pictura

@@ -1,0 +1,16 @@
+// Options that name several maps, and shares of their agents.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+namespace pictura {
+
+/// Adds --map, which takes names with commas between them, and may be given several times. The commas within
+/// procedural:7:blocks=4x3,roundabouts=1 separate its options. It takes one word, so that what follows is left to
+/// others.
+CLI::Option* add_map_list_option(CLI::App* command, std::vector<std::string>* maps, const std::string& help);
+
+}  // namespace pictura
