@@ -19,6 +19,7 @@
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/common/support/suggestion.h"
 #include "pictura/map/load_map.h"
+#include "pictura/training/config_keys.h"
 
 namespace pictura {
 

@@ -126,33 +126,17 @@ struct Config {
   bool reads_images() const { return policy.modality == Modality::perspective; }
 };
 
-/// Reads a TOML text. `overrides` are "section.key=value" and win; "section.key=" unsets what the text says, and
-/// "render.rig=..." its sizes of images. Whole numbers may be written in any decimal notation. run.backend, the old
-/// name of simulator.backend and render.backend, fills in whichever of the two is absent. Throws Error naming
-/// source:line and key for unknown keys, wrong types, values out of range, contradictions, and backends that this build
-/// does not know, whose names it lists.
+/// Reads a TOML text. `overrides` are "section.key=value" and win. run.backend, the old name of simulator.backend and
+/// render.backend, fills in whichever of the two is absent. Throws Error naming source:line and key for unknown keys,
+/// wrong types, values out of range, contradictions, and backends that this build does not know, whose names it lists.
 Config parse_config(const std::string& text, const std::string& source, const std::vector<std::string>& overrides = {});
 
 /// Reads what a run saved, perhaps with another build: its backends may be any.
 Config parse_saved_config(const std::string& text, const std::string& source);
 
-/// Reads a file. Paths of rigs, map files and policy.backbone are relative to where they are typed: those in the file to its folder,
-/// those of overrides to the caller's. In the result, all are relative to the caller's.
+/// Reads a file. Paths of rigs, map files and policy.backbone are relative to where they are typed: those in the file to
+/// its folder, those of overrides to the caller's. In the result, all are relative to the caller's.
 Config load_config(const std::string& path, const std::vector<std::string>& overrides = {});
-
-/// The same for readers in any folder.
-Config with_absolute_paths(Config config);
-
-/// A key of the configuration, as documents say it.
-struct ConfigKey {
-  std::string key, default_value, values;  // "train.gamma", "0.999", "0 to 1"
-};
-
-/// Every key, in the order of the file that to_toml() writes.
-std::vector<ConfigKey> config_keys();
-
-/// What of a configuration has no effect though it is no contradiction, a sentence each.
-std::vector<std::string> idle_settings(const Config& config);
 
 /// Every key with its value, as TOML that parse_config reads back to an equal Config.
 std::string to_toml(const Config& config);

@@ -14,6 +14,7 @@
 #include "pictura/common/support/folder_lock.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/parallel_for.h"
+#include "pictura/training/config_keys.h"
 #include "pictura/training/diagnosis.h"
 #include "pictura/training/memory.h"
 #include "pictura/training/precision.h"

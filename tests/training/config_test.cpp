@@ -10,6 +10,7 @@
 #include "pictura/common/support/file.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
+#include "pictura/training/config_keys.h"
 #include "pictura/training/torch_device.h"
 
 namespace pictura {
