@@ -286,7 +286,8 @@ class Reader {
   void refuse_unknown(const toml::table& table, const std::string& prefix = "") const {
     for (const auto& [name, node] : table) {
       const std::string key = prefix + std::string(name.str());
-      if (const toml::table* inner = node.as_table(); inner && sections_.count(key))
+      // Of a section that is unknown, its first key is named.
+      if (const toml::table* inner = node.as_table(); inner && (sections_.count(key) || !inner->empty()))
         refuse_unknown(*inner, key + ".");
       else if (!known_.count(key))
         fail("{}: unknown key '{}'{}", where(key, node), key, suggestion_for(key));
