@@ -127,9 +127,10 @@ struct Config {
 };
 
 /// Reads a TOML text. `overrides` are "section.key=value" and win; "section.key=" unsets what the text says, and
-/// "render.rig=..." its sizes of images. Whole numbers may be written in any decimal notation. run.backend, the old name of simulator.backend and
-/// render.backend, fills in whichever of the two is absent. Throws Error naming source:line and key for unknown keys,
-/// wrong types, values out of range, contradictions, and backends that this build does not know, whose names it lists.
+/// "render.rig=..." its sizes of images. Whole numbers may be written in any decimal notation. run.backend, the old
+/// name of simulator.backend and render.backend, fills in whichever of the two is absent. Throws Error naming
+/// source:line and key for unknown keys, wrong types, values out of range, contradictions, and backends that this build
+/// does not know, whose names it lists.
 Config parse_config(const std::string& text, const std::string& source, const std::vector<std::string>& overrides = {});
 
 /// Reads what a run saved, perhaps with another build: its backends may be any.
