@@ -473,6 +473,9 @@ class Describer {
   void integers(const std::string& key, const std::vector<int>&, int64_t low, int64_t high) {
     add(key, fmt::format("a list of {} to {}", low, high));
   }
+  void size_changes(const std::string& key, const std::vector<Config::Render::SizeChange>&) {
+    add(key, "a list of [agent_steps, width_px, height_px], in ascending order");
+  }
   template <typename Enum>
   void choice(const std::string& key, const Enum&, const Choices<Enum>& choices) {
     std::vector<std::string> names;
@@ -699,6 +702,7 @@ Config with_absolute_paths(Config config) {
     *file_inout = std::filesystem::absolute(*file_inout).lexically_normal().string();
   };
   if (!config.render.rig.empty()) make_absolute(&config.render.rig);
+  if (config.policy.backbone != "conv") make_absolute(&config.policy.backbone);
   for (std::string& map : config.simulator.maps) {
     if (is_map_file(map)) make_absolute(&map);
   }
