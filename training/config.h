@@ -136,8 +136,8 @@ Config parse_config(const std::string& text, const std::string& source, const st
 /// Reads what a run saved, perhaps with another build: its backends may be any.
 Config parse_saved_config(const std::string& text, const std::string& source);
 
-/// Reads a file. Paths of rigs, map files and policy.backbone are relative to where they are typed: those in the file to
-/// its folder, those of overrides to the caller's. In the result, all are relative to the caller's.
+/// Reads a file. Paths of rigs, map files and policy.backbone are relative to where they are typed: those in the file
+/// to its folder, those of overrides to the caller's. In the result, all are relative to the caller's.
 Config load_config(const std::string& path, const std::vector<std::string>& overrides = {});
 
 /// Every key with its value, as TOML that parse_config reads back to an equal Config.
