@@ -37,7 +37,7 @@ void add_train_command(CLI::App& app) {
       ->add_option("--minutes", arguments->train.minutes,
                    "Save and end before this much wall time has passed, as far as the longest update until now tells; "
                    "go on with --resume")
-      ->transform(number(1e-6, 1e9));
+      ->transform(number(1e-9, 1e9));
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Several processes train one policy, each on its GPU, where torchrun, srun or the variables RANK, WORLD_SIZE,\n"

@@ -22,7 +22,7 @@ cairo_status_t append_svg_bytes(void* text, const unsigned char* data, unsigned 
 
 }  // namespace
 
-Canvas::Canvas(cairo_surface_t* surface, std::unique_ptr<std::string> svg, const std::string& name, int width_px,
+Canvas::Canvas(cairo_surface_t* surface, std::unique_ptr<std::string>&& svg, const std::string& name, int width_px,
                int height_px, Rgb background)
     : name_(name),
       svg_(std::move(svg)),

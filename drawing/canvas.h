@@ -63,7 +63,8 @@ class Canvas {
     void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
   };
   Canvas(std::unique_ptr<std::string> svg, const std::string& name, int width_px, int height_px, Rgb background);
-  Canvas(cairo_surface_t* surface, std::unique_ptr<std::string> svg, const std::string& name, int width_px,
+  // By reference: whoever makes the surface reads the pointer in the same call, in no order.
+  Canvas(cairo_surface_t* surface, std::unique_ptr<std::string>&& svg, const std::string& name, int width_px,
          int height_px, Rgb background);
   void check(cairo_status_t status) const;
   void select_font(const TextStyle& style) const;

@@ -5,6 +5,8 @@
 #include <string>
 #include <string_view>
 
+#include "pictura/common/error.h"
+
 namespace pictura {
 
 /// A file descriptor that closes itself.

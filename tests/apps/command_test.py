@@ -431,7 +431,7 @@ class Simulation(CommandCase):
         self.assertEqual((result["vehicles"], result["cyclists"], result["pedestrians"]), (0, result["spawned"], 0))
         self.assertEqual(result["parked_asked"], 3)
         self.assertLessEqual(result["parked_placed"], 3)
-        self.assert_refused(2, "fractions", "simulate", town, "--pedestrians", 0.7, "--cyclists", 0.7)
+        self.assert_refused(2, "at most 1 together", "simulate", town, "--pedestrians", 0.7, "--cyclists", 0.7)
         self.assert_refused(2, "--parked", "simulate", town, "--parked", -1)
 
     @unittest.skipUnless(shutil.which("ffmpeg"), "no ffmpeg on this machine")

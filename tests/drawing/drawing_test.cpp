@@ -550,11 +550,12 @@ TEST(Interrupts, EndDrawingsButNotThoseThatBeginAfterwards) {
   EXPECT_EXIT(
       {
         catch_interrupts();
+        // Seconds of work, which the signal finds begun.
+        const std::vector<uint8_t> rgb(size_t{3} * 12000 * 12000);
         std::thread soon([] {
-          std::this_thread::sleep_for(std::chrono::milliseconds(100));
+          std::this_thread::sleep_for(std::chrono::milliseconds(300));
           ::kill(::getpid(), SIGTERM);
         });
-        const std::vector<uint8_t> rgb(size_t{3} * 12000 * 12000);
         std::string message = test::message_of<Interrupted>([&] { write_png("/dev/null", 12000, 12000, rgb); });
         soon.join();
         write_png("/dev/null", 1, 1, Span<const uint8_t>(rgb.data(), 3));
