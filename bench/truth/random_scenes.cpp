@@ -6,7 +6,8 @@ namespace pictura {
 
 namespace {
 
-// A scene under construction, and its random numbers.
+// A scene under construction, and its random numbers. Numbers are drawn one a statement or within braces: compilers
+// evaluate arguments in different orders, and a seed must give one scene.
 class Maker {
  public:
   explicit Maker(uint64_t seed) : random_(seed) {}
@@ -25,7 +26,8 @@ class Maker {
     add_polyline(&scene_.town.geometry, {a_m, b_m}, width_m, kind);
   }
   void add_line(Vec3 a_m, Vec3 b_m) {
-    add_line(a_m, b_m, one_of({0.15f, 0.3f, 0.5f}), static_cast<StripKind>(below(4)));
+    const auto kind = static_cast<StripKind>(below(4));
+    add_line(a_m, b_m, one_of({0.15f, 0.3f, 0.5f}), kind);
   }
   void add_wall(Vec3 a_m, Vec3 b_m, float height_m) {
     const Rgb color{between(0.2f, 1), between(0.2f, 1), between(0.2f, 1)};
@@ -60,13 +62,15 @@ RandomScene make_near_plane(Maker m) {
   for (int i = 0; i < 6; ++i) {
     const float heading = m.between(0, kPi), ahead_m = m.between(0.3f, 6), behind_m = m.between(0.3f, 6);
     const Vec2 along{cos_of(heading), sin_of(heading)}, middle{m.between(-0.6f, 1.5f), m.between(-1, 1)};
+    const auto kind = static_cast<StripKind>(m.below(4));
     m.add_line(road(middle.x - along.x * behind_m, middle.y - along.y * behind_m),
-               road(middle.x + along.x * ahead_m, middle.y + along.y * ahead_m), width_m(),
-               static_cast<StripKind>(m.below(4)));
+               road(middle.x + along.x * ahead_m, middle.y + along.y * ahead_m), width_m(), kind);
   }
-  m.add_box(road(m.between(3, 9), m.between(-2, 2)), m.between(0, kTwoPi), {4.2f, 1.8f, 1.5f});
-  return m.finish({0, 0, m.one_of({0.03f, 0.1f, 0.4f, 1.5f})}, m.between(-0.5f, 0.5f), m.between(-0.7f, 0.1f),
-                  m.one_of({0.0f, 0.35f, 0.35f, 2.0f}));
+  const float box_heading = m.between(0, kTwoPi), left_m = m.between(-2, 2), ahead_m = m.between(3, 9);
+  m.add_box(road(ahead_m, left_m), box_heading, {4.2f, 1.8f, 1.5f});
+  const float line_floor_px = m.one_of({0.0f, 0.35f, 0.35f, 2.0f}), pitch = m.between(-0.7f, 0.1f),
+              heading = m.between(-0.5f, 0.5f);
+  return m.finish({0, 0, m.one_of({0.03f, 0.1f, 0.4f, 1.5f})}, heading, pitch, line_floor_px);
 }
 
 RandomScene make_bridge_from_below(Maker m) {
@@ -84,12 +88,14 @@ RandomScene make_bridge_from_below(Maker m) {
   m.add_line(deck(line_at, -3.5f), deck(line_at, 0), 0.4f, StripKind::stop_line);
   m.add_line(deck(line_at + 1.5f, -3.5f), deck(line_at + 1.5f, 3.5f), 0.3f, StripKind::crosswalk);
   for (int i = 0; i < 3; ++i) {
-    m.add_box(deck(-9 + 7 * static_cast<float>(i) + m.between(0, 2), m.between(-3, 3)), turn + m.between(-0.4f, 0.4f),
-              {4.4f, 1.9f, m.between(1.3f, 1.9f)});
+    const float box_height_m = m.between(1.3f, 1.9f), heading = turn + m.between(-0.4f, 0.4f),
+                left_m = m.between(-3, 3), along_m = -9 + 7 * static_cast<float>(i) + m.between(0, 2);
+    m.add_box(deck(along_m, left_m), heading, {4.4f, 1.9f, box_height_m});
   }
   if (m.one_in(3)) m.add_wall(deck(-15, 3.5f), deck(15, 3.5f), 1);
   m.add_line({0, 3, 0}, {30, 3, 0});
-  return m.finish({0, 0, 1.5f}, m.between(-0.3f, 0.3f), m.between(0, 0.6f), 0.35f);
+  const float pitch = m.between(0, 0.6f), heading = m.between(-0.3f, 0.3f);
+  return m.finish({0, 0, 1.5f}, heading, pitch, 0.35f);
 }
 
 RandomScene make_crashed_boxes(Maker m) {
@@ -101,9 +107,13 @@ RandomScene make_crashed_boxes(Maker m) {
     const float along = m.between(-3, 3), left = is_aligned ? 0 : m.between(-2, 2);
     const Vec3 at{middle.x + along * cos_of(heading) - left * sin_of(heading),
                   middle.y + along * sin_of(heading) + left * cos_of(heading), 0};
-    m.add_box(at, is_aligned ? heading : m.between(0, kTwoPi), {m.between(3.8f, 5), 1.9f, m.one_of(heights_m)});
+    const Vec3 size_m{m.between(3.8f, 5), 1.9f, m.one_of(heights_m)};
+    m.add_box(at, is_aligned ? heading : m.between(0, kTwoPi), size_m);
   }
-  for (int i = 0; i < 2; ++i) m.add_line({2, m.between(-3, 3), 0}, {25, m.between(-3, 3), 0});
+  for (int i = 0; i < 2; ++i) {
+    const float end_y = m.between(-3, 3), begin_y = m.between(-3, 3);
+    m.add_line({2, begin_y, 0}, {25, end_y, 0});
+  }
   const float eye_m = m.between(1.2f, 5);
   return m.finish({0, 0, eye_m}, m.between(-0.2f, 0.2f), -0.05f * eye_m, 0.35f);
 }
@@ -115,9 +125,11 @@ RandomScene make_intersecting_walls(Maker m) {
     m.add_wall(foot - along, foot + along, m.between(2, 6));
   }
   for (int i = 0; i < 6; ++i) {
-    m.add_box({m.between(3, 14), m.between(-5, 5), 0}, m.between(0, kTwoPi), {0.6f, 0.6f, m.between(1, 2)});
+    const float height_m = m.between(1, 2), heading = m.between(0, kTwoPi);
+    m.add_box({m.between(3, 14), m.between(-5, 5), 0}, heading, {0.6f, 0.6f, height_m});
   }
-  m.add_box({m.between(5, 16), m.between(-5, 5), 0}, m.between(0, kTwoPi), {4.4f, 1.9f, 1.5f});
+  const float heading = m.between(0, kTwoPi);
+  m.add_box({m.between(5, 16), m.between(-5, 5), 0}, heading, {4.4f, 1.9f, 1.5f});
   return m.finish({0, 0, 1.5f}, m.between(-0.4f, 0.4f), 0, 0.35f);
 }
 
@@ -128,8 +140,9 @@ RandomScene make_wide_strips(Maker m) {
     const Vec3 along{20 * cos_of(turn), 20 * sin_of(turn), 0};
     m.add_line(Vec3{x, y, 0} - along, Vec3{x, y, 0} + along);
   }
-  return m.finish({0, 0, m.one_of({0.3f, 0.8f, 1.5f})}, m.between(-0.2f, 0.2f), m.between(-0.05f, 0.05f),
-                  m.one_of({2.0f, 4.0f, 8.0f}));
+  const float line_floor_px = m.one_of({2.0f, 4.0f, 8.0f}), pitch = m.between(-0.05f, 0.05f),
+              heading = m.between(-0.2f, 0.2f);
+  return m.finish({0, 0, m.one_of({0.3f, 0.8f, 1.5f})}, heading, pitch, line_floor_px);
 }
 
 RandomScene make_walls_on_strips(Maker m) {
@@ -145,8 +158,10 @@ RandomScene make_walls_on_strips(Maker m) {
     const Vec3 middle{m.between(10, 14), 2.5f * (static_cast<float>(i) - 2.5f), 0};
     m.add_line(middle - along, middle + along);
   }
-  m.add_box({m.between(5, 20), m.between(-5, 5), m.between(-0.2f, 0)}, m.between(0, kTwoPi), {4.4f, 1.9f, 1.5f});
-  return m.finish({0, 0, m.between(1, 4)}, m.between(-0.2f, 0.2f), m.between(-0.3f, 0), 0.35f);
+  const float box_heading = m.between(0, kTwoPi);
+  m.add_box({m.between(5, 20), m.between(-5, 5), m.between(-0.2f, 0)}, box_heading, {4.4f, 1.9f, 1.5f});
+  const float pitch = m.between(-0.3f, 0), heading = m.between(-0.2f, 0.2f);
+  return m.finish({0, 0, m.between(1, 4)}, heading, pitch, 0.35f);
 }
 
 RandomScene make_level_edges(Maker m) {
@@ -158,7 +173,8 @@ RandomScene make_level_edges(Maker m) {
     m.add_wall({x, y - half_m, 0}, {x, y + half_m, 0}, top_m);
   }
   for (int i = 0; i < 3; ++i) {
-    m.add_box({m.between(5, 20), m.between(-4, 4), 0}, m.one_of({0.0f, kHalfPi}), {4.4f, 1.9f, m.between(1.3f, 2.5f)});
+    const float height_m = m.between(1.3f, 2.5f), heading = m.one_of({0.0f, kHalfPi});
+    m.add_box({m.between(5, 20), m.between(-4, 4), 0}, heading, {4.4f, 1.9f, height_m});
   }
   for (int i = 0; i < 4; ++i) {
     const float x = m.between(4, 30);
