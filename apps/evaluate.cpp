@@ -153,6 +153,11 @@ void add_evaluate_command(CLI::App& app) {
       ->excludes(policy);
   command->add_option("--backbone", options.backbone,
                       "The program of policy.backbone, where it does not lie where it did in training");
+  command
+      ->add_option("--conditioning", options.conditioning,
+                   "What every agent is told, as collision=1, in place of a value of the configuration's "
+                   "[evaluate.conditioning]; may be given many times")
+      ->allow_extra_args(false);
   add_threads_option(command, &options.num_threads);
   command->add_option("--out", arguments->out, "A file for the counts of each scenario, which --merge reads");
   command->add_flag("--json", arguments->json, "Print one JSON object");

@@ -675,6 +675,14 @@ Config parse_saved_config(const std::string& text, const std::string& source) {
   return parse(text, source, {}, /*any_name=*/true);
 }
 
+Config with_evaluate_conditioning(const Config& config, const std::vector<std::string>& values) {
+  std::vector<std::string> overrides;
+  for (const std::string& value : values) overrides.push_back("evaluate.conditioning." + value);
+  Config result = config;
+  result.evaluate = parse(to_toml(config), "evaluate", overrides, /*any_name=*/true).evaluate;
+  return result;
+}
+
 Config load_config(const std::string& path, const std::vector<std::string>& overrides) {
   Config config = parse_config(read_file(path, 1 << 20), path, overrides);
   const auto is_overridden = [&overrides](std::string_view key) {

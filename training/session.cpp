@@ -19,7 +19,8 @@ namespace {
 
 // The settings of training with what the options change. Those of devices are of the machine that trained it: here
 // whatever draws the same images will do.
-Config adapted(Config config, const SessionOptions& options) {
+Config adapted(const Config& trained, const SessionOptions& options) {
+  Config config = with_evaluate_conditioning(trained, options.conditioning);
   config.run.num_threads = options.num_threads;
   config.run.device = options.device;
   config.simulator.backend = options.simulator;
@@ -191,6 +192,7 @@ EvaluationSetting PolicySession::evaluation_setting() const {
   const Config& config = parts_->config;
   EvaluationSetting setting;
   setting.policy_hash = parts_->policy.hash();
+  setting.conditioning = config.evaluate.conditioning;
   setting.device = parts_->device.is_host() ? "cpu" : "cuda";
   setting.precision = parts_->device.is_host() ? "fp32" : name_of(config.train.precision);
   if (!reads_images()) return setting;

@@ -24,6 +24,8 @@ struct SessionOptions {
   std::string rig;
   int width_px = 0, height_px = 0;
   std::string backbone;  // where the program of policy.backbone lies now; empty: where it did
+  // Of [evaluate.conditioning], in place of the policy's own: "name=value".
+  std::vector<std::string> conditioning;
 };
 
 /// What a batch of agents sees, in the memory of the session's device.

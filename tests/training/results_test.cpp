@@ -81,6 +81,9 @@ TEST(Results, PartsThatDoNotFitAreRefusedByName) {
   EvaluationResults other = part(2, {counts(4, 1, 10)});
   other.setting.steps = 99;
   EXPECT_THAT(merged_message(first, other), HasSubstr("b.json: steps is 99, in a.json 100"));
+  EvaluationResults bold = part(2, {counts(4, 1, 10)});
+  bold.setting.conditioning[static_cast<size_t>(Conditioning::collision)] = 0.5;
+  EXPECT_THAT(merged_message(first, bold), AllOf(HasSubstr("b.json: conditioning is"), HasSubstr("\"collision\":0.5")));
   EvaluationResults crowd = part(2, {counts(4, 1, 10)});
   crowd.densities[0].agents_per_world = 9;
   EXPECT_THAT(merged_message(first, crowd), HasSubstr("has 9 agents a world, a.json has 8"));

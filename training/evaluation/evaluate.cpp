@@ -114,6 +114,7 @@ int64_t count_active(Simulator& simulator) {
 // One that needs no policy.
 Driver driver_of(const std::string& controller, const EvaluateOptions& options) {
   Config config = options.checkpoint.empty() ? Config() : read_checkpoint(options.checkpoint).config;
+  config = with_evaluate_conditioning(config, options.conditioning);
   config.policy.modality = Modality::perspective;  // nobody reads vectors,
   config.render.backend = "auto";                  // and nothing is drawn
   config.run.num_threads = options.num_threads;
@@ -125,6 +126,7 @@ Driver driver_of(const std::string& controller, const EvaluateOptions& options) 
   driver.device = open_learning_device(config);
   driver.world = evaluation_simulator_config(config, options.steps, driver.device);
   driver.setting.policy_hash = controller;
+  driver.setting.conditioning = config.evaluate.conditioning;
   driver.setting.device = driver.device.is_host() ? "cpu" : drives_on_host ? "cuda, driven from the host" : "cuda";
   driver.drive = [controller, &options](Simulator& simulator) {
     return Driving{make_controller(controller, simulator, options.seed),
@@ -228,7 +230,8 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
                                                .rig = options.rig,
                                                .width_px = options.width_px,
                                                .height_px = options.height_px,
-                                               .backbone = options.backbone});
+                                               .backbone = options.backbone,
+                                               .conditioning = options.conditioning});
     return evaluate(&session, options);
   }
   check(options);

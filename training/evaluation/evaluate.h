@@ -37,7 +37,8 @@ struct EvaluateOptions {
   // Cameras other than those of training, see SessionOptions.
   std::string rig;
   int width_px = 0, height_px = 0;
-  std::string backbone;  // as in SessionOptions
+  std::string backbone;                   // as in SessionOptions
+  std::vector<std::string> conditioning;  // as in SessionOptions
   std::function<void(double done_fraction, double eta_s)> on_progress;
 };
 

@@ -52,10 +52,12 @@ Estimate ratio(const std::vector<ScenarioCounts>& scenarios, const Part& part_of
 }
 
 Json to_json(const EvaluationSetting& s) {
+  Json conditioning;
+  for (size_t i = 0; i < kNumConditioning; ++i) conditioning[kConditioningNames[i]] = s.conditioning[i];
   return {{"policy_hash", s.policy_hash}, {"maps", s.maps},         {"steps", s.steps},
           {"argmax", s.argmax},           {"seed", s.seed},         {"precision", s.precision},
           {"device", s.device},           {"renderer", s.renderer}, {"samples", s.samples},
-          {"image_sizes", s.image_sizes}};
+          {"image_sizes", s.image_sizes}, {"conditioning", conditioning}};
 }
 
 EvaluationSetting setting_from(const Json& json) {
@@ -70,6 +72,9 @@ EvaluationSetting setting_from(const Json& json) {
   json.at("renderer").get_to(s.renderer);
   json.at("samples").get_to(s.samples);
   json.at("image_sizes").get_to(s.image_sizes);
+  for (size_t i = 0; i < kNumConditioning; ++i) {
+    json.at("conditioning").at(kConditioningNames[i]).get_to(s.conditioning[i]);
+  }
   return s;
 }
 

@@ -2,10 +2,13 @@
 // are merged. Without torch headers.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "pictura/simulator/conditioning.h"
 
 namespace pictura {
 
@@ -37,6 +40,7 @@ struct EvaluationSetting {
   std::string precision, device;         // of the network; "cpu" or "cuda"
   std::string renderer, samples;         // empty for policies without images
   std::vector<std::string> image_sizes;  // "96x54", of each camera
+  std::array<double, kNumConditioning> conditioning{};  // of every agent, in the order of simulator/conditioning.h
   friend bool operator==(const EvaluationSetting&, const EvaluationSetting&) = default;
 };
 
