@@ -64,10 +64,10 @@ struct Config {
   struct PolicySection {
     Modality modality = Modality::perspective;
     bool auxiliary = false;  // vector: fill the slots that no camera could (the paper's Vectorized)
-    int patch_px = 1;        // space to depth: a patch of so many pixels squared becomes one with as many channels
-    std::vector<int> conv_channels{32, 64, 64, 128, 128};
-    std::vector<int> conv_kernels{5, 3, 3, 3, 3};
-    std::vector<int> conv_strides{2, 2, 2, 1, 1};
+    int patch_px = 4;        // space to depth: a patch of so many pixels squared becomes one with as many channels
+    std::vector<int> conv_channels{64, 64, 128, 128, 128};
+    std::vector<int> conv_kernels{1, 3, 3, 3, 3};
+    std::vector<int> conv_strides{1, 1, 2, 1, 1};
     int num_queries = 16;  // learned queries per camera
     int attention_heads = 4;
     int attention_mlp = 256;     // hidden width of the block's MLP; 0: none

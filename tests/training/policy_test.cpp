@@ -15,6 +15,7 @@ namespace {
 Config::PolicySection tiny(Modality modality) {
   Config::PolicySection c;
   c.modality = modality;
+  c.patch_px = 1;
   c.conv_channels = {3, 4};
   c.conv_kernels = {3, 3};
   c.conv_strides = {2, 1};

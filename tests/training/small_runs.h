@@ -25,6 +25,7 @@ inline TrainOptions small_run(const std::string& out_folder, const std::string& 
                  "render.height_px=9",
                  "simulator.num_slots=8",
                  "train.num_steps=12",
+                 "policy.patch_px=1",
                  "policy.conv_channels=[4, 8]",
                  "policy.conv_kernels=[3, 3]",
                  "policy.conv_strides=[2, 2]"};
