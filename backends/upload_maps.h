@@ -1,4 +1,4 @@
-// From a simulator's maps to the renderers that draw its scenes.
+// From compiled maps to the renderers that draw scenes on them.
 #pragma once
 
 #include "pictura/common/renderer.h"
@@ -6,11 +6,18 @@
 
 namespace pictura {
 
+/// Uploads maps to these handles [maps]; or, where there are none, to 0, 1, ..., by which a simulator that is made of
+/// them names them.
+inline void upload_maps(const CompiledMaps& maps, Span<const GeometryHandle> handles, Renderer* renderer_out,
+                        Stream stream = {}) {
+  for (std::size_t i = 0; i < maps.size(); ++i) {
+    renderer_out->upload(handles.empty() ? static_cast<GeometryHandle>(i) : handles[i], maps[i]->geometry, stream);
+  }
+}
+
 /// Uploads the simulator's maps to the handles that its scene names them by.
 inline void upload_maps(const Simulator& simulator, Renderer* renderer_out, Stream stream = {}) {
-  for (std::size_t i = 0; i < simulator.maps().size(); ++i) {
-    renderer_out->upload(simulator.handles()[i], simulator.maps()[i]->geometry, stream);
-  }
+  upload_maps(simulator.maps(), simulator.handles(), renderer_out, stream);
 }
 
 }  // namespace pictura

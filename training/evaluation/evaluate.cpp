@@ -4,6 +4,7 @@
 
 #include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_simulator.h"
+#include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/map/load_map.h"
@@ -247,10 +248,7 @@ EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options) 
   worlds.maps = compile_maps_of(options, session->evaluation_world(options.steps));
   const std::unique_ptr<Renderer> renderer = session->make_renderer();
   worlds.renderer = renderer.get();
-  // Under the handles that a new simulator gives them.
-  for (size_t i = 0; renderer && i < worlds.maps.size(); ++i) {
-    renderer->upload(static_cast<GeometryHandle>(i), worlds.maps[i]->geometry);
-  }
+  if (renderer) upload_maps(worlds.maps, {}, renderer.get());
   return evaluate(session, options, &worlds);
 }
 
