@@ -10,6 +10,7 @@ std::unique_ptr<LearnerExecutor> make_cpu_learner_executor();
 std::unique_ptr<LearnerExecutor> make_cuda_learner_executor(Device device);
 std::unique_ptr<SceneHistory> make_cuda_scene_history(const SceneHistorySize& size, Device device);
 std::unique_ptr<NetworkPasses> make_cuda_network_passes(Device device);
+std::unique_ptr<DeviceGraph> capture_cuda_graph(Device device, Stream stream, const std::function<void()>& work);
 std::string cuda_unavailable();
 std::string cuda_product_name(Device device);
 
@@ -57,6 +58,14 @@ std::unique_ptr<NetworkPasses> make_network_passes(Device device) {
   if (!device.is_host()) return make_cuda_network_passes(device);
 #endif
   fail("network passes: none for {}", name_of(device));
+}
+
+std::unique_ptr<DeviceGraph> capture_graph(Device device, [[maybe_unused]] Stream stream,
+                                           [[maybe_unused]] const std::function<void()>& work) {
+#ifdef PICTURA_HAS_CUDA
+  if (!device.is_host()) return capture_cuda_graph(device, stream, work);
+#endif
+  fail("graphs: none for {}", name_of(device));
 }
 
 }  // namespace pictura

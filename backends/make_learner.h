@@ -1,11 +1,13 @@
 // What a learner needs besides its network, for the memory of a device.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
 #include "pictura/common/error.h"
 #include "pictura/common/scene_history.h"
+#include "pictura/training/rules/device_graph.h"
 #include "pictura/training/rules/learner_executor.h"
 #include "pictura/training/rules/network_passes.h"
 
@@ -24,5 +26,9 @@ std::unique_ptr<SceneHistory> make_scene_history(Device device, const SceneHisto
 
 /// Throws Error for the host, where there are none.
 std::unique_ptr<NetworkPasses> make_network_passes(Device device);
+
+/// What `work` puts on this stream, which must not be the legacy one, as a graph. Nothing is done before it is
+/// launched. Throws what `work` throws; Error for the host, and where the work allocates or waits.
+std::unique_ptr<DeviceGraph> capture_graph(Device device, Stream stream, const std::function<void()>& work);
 
 }  // namespace pictura

@@ -12,8 +12,17 @@ namespace pictura {
 /// On a device sizes of chunks are multiples of this, where the largest that is allowed is larger.
 constexpr int64_t kChunkGranule = 256;
 
-/// Of each chunk of a batch of `count`, at most `most`.
-inline int64_t chunk_size(int64_t count, int64_t most, bool on_device) {
+/// How large the chunks of a batch are: equal parts of it of at most `most`; or all `most`, so that arithmetic that
+/// depends on a chunk's size does not depend on the batch's.
+struct ChunkSizes {
+  int64_t most = 1;
+  bool are_full = false;
+};
+
+/// Of each chunk of a batch of `count`.
+inline int64_t chunk_size(int64_t count, const ChunkSizes& sizes, bool on_device) {
+  const int64_t most = sizes.most;
+  if (sizes.are_full) return most;
   const int64_t chunks = (count + most - 1) / most, granule = on_device ? kChunkGranule : 1;
   const int64_t equal = (count + chunks - 1) / chunks;
   return std::min(most, (equal + granule - 1) / granule * granule);
@@ -34,10 +43,10 @@ struct Chunk {
 
 /// Calls f(const Chunk&) for all chunks of a batch of rows, i64 [n].
 template <typename F>
-void for_each_chunk(const at::Tensor& batch, int64_t most, const F& f) {
+void for_each_chunk(const at::Tensor& batch, const ChunkSizes& sizes, const F& f) {
   const int64_t total = batch.size(0);
   if (total == 0) return;
-  const int64_t size = chunk_size(total, most, !batch.is_cpu());
+  const int64_t size = chunk_size(total, sizes, !batch.is_cpu());
   for (int64_t begin = 0; begin < total; begin += size) {
     const int64_t count = std::min(size, total - begin);
     const at::Tensor rows = batch.narrow(0, begin, count);

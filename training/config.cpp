@@ -119,6 +119,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.choice("train.precision", c.train.precision, kPrecisions);
   v.flag("train.reproducible", c.train.reproducible);
   v.name("train.images", c.train.images, {"auto", "kept", "redrawn"});
+  v.name("train.graphs", c.train.graphs, {"auto", "off"});
   v.choice("train.halted_slots", c.train.halted_slots, kHaltedSlots);
 
   for (int i = 0; i < kNumConditioning; ++i) {
@@ -767,6 +768,7 @@ bool may_differ(const std::string& key, const Config& saved, const Config& now) 
                                                "train.milestone_agent_steps",
                                                "train.forward_chunk",
                                                "train.images",
+                                               "train.graphs",
                                                "train.halted_slots",
                                                "run.num_threads",
                                                "run.device",

@@ -111,6 +111,7 @@ struct Config {
     bool reproducible = false;  // the same bits in every run on a device, see training/precision.h
     /// Of a rollout: kept, or redrawn from its scenes where they are read; auto: kept on the host, redrawn on a device.
     std::string images = "auto";
+    std::string graphs = "auto";                   // CUDA graphs of a learner's work; off: call by call
     HaltedSlots halted_slots = HaltedSlots::skip;  // draw: for measuring alone, with every slot at every step
   } train;
 

@@ -4,10 +4,10 @@
 #include <mutex>
 #include <optional>
 
-#include <c10/core/impl/VirtualGuardImpl.h>
 #include <torch/csrc/autograd/custom_function.h>
 
 #include "pictura/backends/make_learner.h"
+#include "pictura/training/torch_device.h"
 
 namespace pictura {
 
@@ -39,10 +39,7 @@ NetworkPasses& passes_on(at::Device device) {
   return *passes;
 }
 
-// Torch's current stream, on which autograd also puts the backward pass.
-Stream stream_on(at::Device device) {
-  return {c10::impl::VirtualGuardImpl(device.type()).getStream(device).native_handle()};
-}
+Stream stream_on(at::Device device) { return current_stream({MemorySpace::cuda, device.index()}); }
 
 const float* floats_of(const at::Tensor& parameter) { return parameter.const_data_ptr<float>(); }
 
@@ -176,6 +173,31 @@ at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tenso
 at::Tensor token_softmax(const at::Tensor& scores) {
   if (!is_supported(scores) || scores.size(2) % 2 != 0) return at::_softmax(scores, 1, /*half_to_float=*/false);
   return TokenSoftmax::apply(scores.contiguous());
+}
+
+namespace {
+
+PointSize point_size(const at::Tensor& rows, int64_t points, float unit_m, bool keeps_rows) {
+  const int64_t features = rows.size(-1);
+  return {rows.numel() / features, features, points, unit_m, keeps_rows};
+}
+
+}  // namespace
+
+bool takes_point_rows(const at::Tensor& rows, int64_t points) {
+  return rows.is_cuda() && rows.scalar_type() == at::kFloat &&
+         point_size(rows, points, 1, /*keeps_rows=*/true).width() <= PointSize::kMostWidth;
+}
+
+at::Tensor point_rows(const at::Tensor& rows, int64_t points, float unit_m, bool keeps_rows, at::ScalarType type) {
+  const PointSize size = point_size(rows, points, unit_m, keeps_rows);
+  std::vector<int64_t> shape = rows.sizes().vec();
+  shape.back() = size.width();
+  at::Tensor out = at::empty(shape, rows.options().dtype(type));
+  passes_on(rows.device())
+      .point_features(size, rows.contiguous().const_data_ptr<float>(), activation_type_of(type), out.mutable_data_ptr(),
+                      stream_on(rows.device()));
+  return out;
 }
 
 at::Tensor image_patches(const at::Tensor& images, int64_t patch_px, at::ScalarType type) {

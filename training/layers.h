@@ -20,6 +20,11 @@ at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tenso
 /// Softmax over tokens. scores: [matrices, tokens, columns].
 at::Tensor token_softmax(const at::Tensor& scores);
 
+/// Whether point_rows() takes such rows, [..., features]: f32 on a CUDA device, few enough numbers a row.
+bool takes_point_rows(const at::Tensor& rows, int64_t points);
+/// What PointSize says of rows, [..., features], as `type`. Without gradient.
+at::Tensor point_rows(const at::Tensor& rows, int64_t points, float unit_m, bool keeps_rows, at::ScalarType type);
+
 /// Patches of images, u8 [views, cameras, 3, height, width], as pixels of [cameras * views, channels, height /
 /// patch_px, width / patch_px] of `type`, rounded up with black, channels last in memory: channel (c * patch_px + y) *
 /// patch_px + x is color c, 0 to 255, of pixel (x, y) of the patch; channels beyond those are 0. Without gradient.

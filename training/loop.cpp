@@ -14,6 +14,7 @@
 #include "pictura/common/support/folder_lock.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/common/support/parallel_for.h"
+#include "pictura/training/algorithm.h"
 #include "pictura/training/config_keys.h"
 #include "pictura/training/diagnosis.h"
 #include "pictura/training/memory.h"
@@ -31,76 +32,10 @@ namespace pictura {
 
 namespace {
 
-// The slots that are drawn and encoded where these are active: all, where halted ones are to cost as much.
-at::Tensor seen_slots(const Run& run, const at::Tensor& active) {
-  return run.config.train.halted_slots == HaltedSlots::skip ? active
-                                                            : at::arange(run.rollout.num_slots(), active.options());
-}
-
-// What the policy makes of the active slots at a step that has been recorded.
-Decision decide(Run* run, int64_t step, const at::Tensor& active) {
-  at::Tensor rows = run->rollout.rows_of(step, seen_slots(*run, active));
-  const int64_t num_rows = rows.size(0);
-  if (run->config.train.reproducible && num_rows > 0) {
-    // In batches of another size products may be rounded otherwise. Filled up, all have one, over however many ranks
-    // the agents are divided.
-    const int64_t most = run->config.train.forward_chunk, missing = (most - num_rows % most) % most;
-    rows = at::cat({rows, rows.narrow(0, 0, 1).expand({missing})});
-  }
-  const auto observe = [&](const at::Tensor& some) { return run->rollout.observations.gather(some); };
-  Decision decision = decide(run->policy, rows, run->config.train.forward_chunk, observe, &run->timer);
-  for (at::Tensor* t : {&decision.logits, &decision.log_probs, &decision.value}) {
-    *t = t->narrow(0, 0, num_rows);
-    if (num_rows > active.size(0)) *t = t->index_select(0, active);
-  }
-  return decision;
-}
-
-// Fills the rollout from the policy's own driving; false when ^C came. Several ranks hear of it after the update.
-bool collect(Run* run) {
-  Rollout& rollout = run->rollout;
-  Simulator& simulator = *run->simulator;
-  const auto record = [&](int64_t step) {
-    const at::Tensor slots = active_slots(simulator.controller_input(), {}, run->executor.get());
-    rollout.observations.record(step, seen_slots(*run, slots));
-    return slots;
-  };
-  rollout.values.zero_();
-  for (int64_t step = 0; step < rollout.num_steps(); ++step) {
-    if (run->communicator->size() == 1 && interrupted()) return false;
-    run->communicator->step();
-
-    // Act.
-    const at::Tensor slots = record(step);
-    const Decision decision = decide(run, step, slots);
-    const Span<int32_t> actions = rollout.actions_at(step);
-    run->executor->choose_actions(simulator.controller_input(), span_of<const int64_t>(slots),
-                                  span_of<const float>(decision.log_probs),
-                                  {.argmax = false, .seed = run->config.run.seed}, actions);
-    const at::Tensor chosen = rollout.actions.select(0, step).index_select(0, slots).to(at::kLong).unsqueeze(1);
-    rollout.values.select(0, step).index_copy_(0, slots, decision.value);
-    rollout.log_probs.select(0, step).index_copy_(0, slots, decision.log_probs.gather(1, chosen).squeeze(1));
-
-    // Step.
-    const PhaseTimer::Scope timed(&run->timer, Phase::simulate);
-    rollout.set_result(step, simulator.step(Array(actions.data(), {rollout.num_slots()}, run->device)), run->device);
-  }
-  // The value of what is seen last, from which the last transitions bootstrap.
-  const at::Tensor slots = record(rollout.num_steps());
-  const Decision last = decide(run, rollout.num_steps(), slots);
-  rollout.values.select(0, rollout.num_steps()).index_copy_(0, slots, last.value);
-  simulator.check();
-  return true;
-}
-
 // Improves the policy on the rollout. What stops it for a number that is not finite is kept in the folder for study.
 UpdateStats improve(const std::string& folder, Run* run) {
-  const Config::Train& config = run->config.train;
-  run->rollout.compute_advantages(config.gamma, config.gae_lambda, run->executor.get());
-  const UpdateKey key{run->config.run.seed, run->update, learning_rate_at(config, run->agent_steps)};
   try {
-    return ppo_update(run->policy, run->rollout, config, key, run->executor.get(), &run->optimizer, &run->filter,
-                      &run->timer, run->communicator);
+    return improve(run);
   } catch (const NotFinite& error) {
     run->communicator->step();  // throws where a rank is lost, which leaves numbers that mean nothing
     if (!run->communicator->is_first()) throw;
@@ -109,10 +44,6 @@ UpdateStats improve(const std::string& folder, Run* run) {
     fail("{}; see {}", error.what(), path);
   }
 }
-
-}  // namespace
-
-namespace {
 
 TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
   const Stopwatch since_start;
@@ -149,14 +80,20 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
   report.device = name_of(device);
   report.simulator = run.simulator->name();
   if (run.renderer) report.renderer = run.renderer->name();
+  Collector collector(&run);
   std::vector<RecentUpdate> recent;
   const auto read_everywhere = [&](const std::string& path) {
     return parse_checkpoint(communicator->from_first(is_first ? read_checkpoint_file(path) : ""), path);
   };
-  const auto save_as = [&](const std::string& name, const std::vector<RecentUpdate>& its_recent) {
+  // All ranks take part in a checkpoint; the first one writes it.
+  const auto write_with = [&](const auto& write, const std::vector<RecentUpdate>& its_recent) {
     const Checkpoint checkpoint = run.checkpoint(its_recent);
     const Ranks::LongWork writes(ranks);  // disks may be slow
-    if (is_first) write_checkpoint(options.out_folder + "/" + name, checkpoint);
+    if (is_first) write(checkpoint);
+  };
+  const auto save_as = [&](const std::string& name, const std::vector<RecentUpdate>& its_recent) {
+    write_with([&](const Checkpoint& checkpoint) { write_checkpoint(options.out_folder + "/" + name, checkpoint); },
+               its_recent);
   };
   if (options.old_run == OldRun::resume) {
     const Checkpoint saved = read_everywhere(report.checkpoint);
@@ -180,12 +117,12 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
   const auto save = [&] {
     // A second time it would be the same, in the place of an older one.
     if (run.update == saved_update) return;
-    const Checkpoint checkpoint = run.checkpoint(log.recent());
-    const Ranks::LongWork writes(ranks);
-    if (is_first) {
-      save_checkpoint(options.out_folder, config.train.keep_checkpoints,
-                      [&](const std::string& path) { write_checkpoint(path, checkpoint); });
-    }
+    write_with(
+        [&](const Checkpoint& checkpoint) {
+          save_checkpoint(options.out_folder, config.train.keep_checkpoints,
+                          [&](const std::string& path) { write_checkpoint(path, checkpoint); });
+        },
+        log.recent());
     saved_update = run.update;
     since_saved.restart();
   };
@@ -222,7 +159,7 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
     const SimulatorTotals totals_before = run.simulator->totals();
     UpdateRecord record;
     Stopwatch watch;
-    if (!collect(&run)) {
+    if (!collector.collect()) {
       // ^C within a rollout: what is saved is the state at its start, from which resuming is exact.
       run.simulator->restore(*before);
       report.interrupted = true;
@@ -279,14 +216,14 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
   report.peak_tensor_bytes = memory.peak_tensor_bytes;
   save();
   if (is_first) {
-    write_safetensors(options.out_folder + "/policy.safetensors", run.policy.parameters(), to_toml(config));
+    write_safetensors(options.out_folder + "/policy.safetensors", run.policy->parameters(), to_toml(config));
   }
   report.agent_steps = run.agent_steps;
   report.updates = run.update;
   report.episode_return = log.episode_return();
   report.km_driven = run.distance_m / 1000;
   report.evaluation_s = log.evaluation_s();
-  report.policy_hash = run.policy.hash();
+  report.policy_hash = run.policy->hash();
   return report;
 }
 

@@ -87,14 +87,16 @@ std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> vi
     uint8_t* const first = blocks[block].pixels.data_ptr<uint8_t>() + (camera.offset - layout.blocks[block].offset);
     cameras.push_back({camera.size.width_px, camera.size.height_px, first, camera.view_stride});
   }
-  renderer->render(scene, views, {renderer->device(), PixelFormat::u8, static_cast<int>(num_views), cameras});
+  renderer->render(scene, views, {renderer->device(), PixelFormat::u8, static_cast<int>(num_views), cameras},
+                   current_stream(renderer->device()));
   return blocks;
 }
 
 at::Tensor active_slots(const ControllerInput& input, Span<const uint8_t> mask, LearnerExecutor* executor) {
   const auto num_slots = static_cast<int64_t>(input.slots.world_of_slot.size());
   const at::Tensor slots = at::empty({num_slots}, at::TensorOptions(at::kLong).device(torch_device(input.device)));
-  return slots.narrow(0, 0, executor->select_active(input, mask, span_of<int64_t>(slots)));
+  return slots.narrow(0, 0,
+                      executor->select_active(input, mask, span_of<int64_t>(slots), current_stream(input.device)));
 }
 
 constexpr auto kViewBytes = static_cast<int64_t>(sizeof(View));

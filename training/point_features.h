@@ -5,14 +5,20 @@
 
 #include <ATen/ATen.h>
 
+#include "pictura/training/rules/network_passes.h"
+
 namespace pictura {
 
 /// Of each point.
-constexpr int64_t kPointFeatures = 6;
+constexpr int64_t kPointFeatures = PointSize::kFeatures;
 
 /// rows: [..., features], each of which begins with `points` pairs (x, y) in units of kScalePosition_m. Returns
 /// [..., points * kPointFeatures]: of each point x and y as p / (|p| + 4 m) and as p / (|p| + 20 m), and (x, y) over
 /// its distance plus 1 m; all between -1 and 1.
-at::Tensor point_features(const at::Tensor& rows, int64_t points);
+/// `type`: of the result, which has no gradient. On a CUDA device it is one pass (rules/network_passes.h).
+at::Tensor point_features(const at::Tensor& rows, int64_t points, at::ScalarType type);
+
+/// The rows followed by these.
+at::Tensor with_point_features(const at::Tensor& rows, int64_t points, at::ScalarType type);
 
 }  // namespace pictura

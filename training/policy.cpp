@@ -8,7 +8,6 @@
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
 #include "pictura/common/support/hash.h"
-#include "pictura/training/chunks.h"
 #include "pictura/training/image_backbone.h"
 #include "pictura/training/layers.h"
 #include "pictura/training/point_features.h"
@@ -51,11 +50,11 @@ class ParameterMaker {
     parameters_->insert(parameters_->end(), parameters.begin(), parameters.end());
   }
 
-  Policy::Linear linear(const std::string& name, int64_t in, int64_t out, double gain) {
+  PolicyNetwork::Linear linear(const std::string& name, int64_t in, int64_t out, double gain) {
     return {normal(name + ".weight", {out, in}, gain), constant(name + ".bias", {out}, 0)};
   }
   /// The paper's per-group encoder, a 2-layer MLP.
-  Policy::GroupEncoder group(const std::string& name, int64_t in, int64_t width) {
+  PolicyNetwork::GroupEncoder group(const std::string& name, int64_t in, int64_t width) {
     return {linear(name + ".hidden", in, width, std::numbers::sqrt2), linear(name + ".out", width, width, 1.0)};
   }
 
@@ -101,8 +100,9 @@ at::Tensor masked_max(const at::Tensor& members, const at::Tensor& counts) {
 /// The entity sets of simulator/observation.h, each through its own MLP and a masked max over its members.
 class VectorEncoder final : public SceneEncoder {
  public:
-  VectorEncoder(const Config::PolicySection& config, bool reads_walls, ParameterMaker* make)
-      : embedding_width_(config.embedding_width), point_features_(config.point_features) {
+  /// Members with features of points are converted to `input_type`.
+  VectorEncoder(const Config::PolicySection& config, bool reads_walls, at::ScalarType input_type, ParameterMaker* make)
+      : embedding_width_(config.embedding_width), point_features_(config.point_features), input_type_(input_type) {
     for (size_t i = 0; i < std::size(kObservationArrays); ++i) {
       const ObservationArray& array = kObservationArrays[i];
       if (!is_set(array) || (array.part == ObservationPart::walls && !reads_walls)) continue;
@@ -117,7 +117,7 @@ class VectorEncoder final : public SceneEncoder {
     std::vector<at::Tensor> embeddings;
     for (const Group& group : groups_) {
       at::Tensor members = o.*group.members;
-      if (point_features_) members = at::cat({members, point_features(members, group.points)}, 2);
+      if (point_features_) members = with_point_features(members, group.points, input_type_);
       embeddings.push_back(masked_max(encode(group.encoder, members), o.set_counts.select(1, group.set)));
     }
     return at::cat(embeddings, 1);
@@ -127,13 +127,14 @@ class VectorEncoder final : public SceneEncoder {
 
  private:
   struct Group {
-    Policy::GroupEncoder encoder;
+    PolicyNetwork::GroupEncoder encoder;
     at::Tensor Observation::* members;
     int64_t set;  // its column of set_counts
     int64_t points;
   };
   int64_t embedding_width_;
   bool point_features_;
+  at::ScalarType input_type_;
   std::vector<Group> groups_;
 };
 
@@ -276,22 +277,22 @@ class PerspectiveEncoder final : public SceneEncoder {
   const at::ScalarType image_type_;
   const std::unique_ptr<ImageBackbone> backbone_;  // null: the convolutions
   const int64_t width_;
-  std::vector<Policy::Linear> convolutions_;  // weights [out, in, kernel, kernel]
+  std::vector<PolicyNetwork::Linear> convolutions_;  // weights [out, in, kernel, kernel]
   at::Tensor queries_, key_;
   Norm token_norm_, query_norm_, mlp_norm_;
-  Policy::Linear position_, query_, value_, out_, mlp_hidden_, mlp_out_, project_;
+  PolicyNetwork::Linear position_, query_, value_, out_, mlp_hidden_, mlp_out_, project_;
 };
 
-Policy::Policy(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type,
-               bool reads_walls, Device device, Precision precision)
+PolicyNetwork::PolicyNetwork(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type,
+                             bool reads_walls, Device device, Precision precision)
     : type_(type), precision_(precision), point_features_(config.point_features) {
   ParameterMaker make(seed, at::TensorOptions(type).device(torch_device(device)), &parameters_);
   const bool sees_images = config.modality == Modality::perspective;
+  const at::ScalarType input_type = precision == Precision::bf16 ? at::kBFloat16 : type;
   if (sees_images)
-    scene_ = std::make_unique<PerspectiveEncoder>(config, num_cameras,
-                                                  precision == Precision::bf16 ? at::kBFloat16 : type, &make);
+    scene_ = std::make_unique<PerspectiveEncoder>(config, num_cameras, input_type, &make);
   else
-    scene_ = std::make_unique<VectorEncoder>(config, reads_walls, &make);
+    scene_ = std::make_unique<VectorEncoder>(config, reads_walls, input_type, &make);
   ego_features_ = sees_images ? kEgoFeatures - 2 : kEgoFeatures;
   const int64_t width = config.embedding_width;
   ego_ = make.group("ego", ego_features_, width);
@@ -308,10 +309,12 @@ Policy::Policy(const Config::PolicySection& config, int num_cameras, uint64_t se
   critic_ = make.linear("critic", in, 1, 1.0);
 }
 
-Policy::Output Policy::forward(const Observation& o) const {
+Policy::Output PolicyNetwork::forward(const Observation& o) const {
   std::vector<at::Tensor> own{o.conditioning, o.waypoints};
   if (point_features_) {
-    own.push_back(point_features(o.waypoints.unflatten(1, {kNumWaypoints, kWaypointFeatures}), 1).flatten(1));
+    own.push_back(
+        point_features(o.waypoints.unflatten(1, {kNumWaypoints, kWaypointFeatures}), 1, o.waypoints.scalar_type())
+            .flatten(1));
   }
   at::Tensor x;
   {
@@ -340,31 +343,31 @@ std::string Policy::hash() const {
   return hash.hex();
 }
 
-std::string Policy::backbone_hash() const { return scene_->image_backbone() ? scene_->image_backbone()->hash() : ""; }
+std::string PolicyNetwork::backbone_hash() const {
+  return scene_->image_backbone() ? scene_->image_backbone()->hash() : "";
+}
 
-void Policy::check_images(const Rig& rig) const {
+void PolicyNetwork::check_images(const Rig& rig) const {
   if (scene_->image_backbone()) scene_->image_backbone()->check_images(rig);
 }
 
-Policy make_policy(const Config& config, const Rig& rig, Device device) {
-  Policy policy(config.policy, static_cast<int>(rig.cameras.size()), config.run.seed, at::kFloat,
-                config.reads(ObservationPart::walls), device,
-                device.is_host() ? Precision::fp32 : config.train.precision);
-  policy.check_images(rig);
+std::unique_ptr<const Policy> make_policy(const Config& config, const Rig& rig, Device device) {
+  auto policy = std::make_unique<PolicyNetwork>(config.policy, static_cast<int>(rig.cameras.size()), config.run.seed,
+                                                at::kFloat, config.reads(ObservationPart::walls), device,
+                                                device.is_host() ? Precision::fp32 : config.train.precision);
+  policy->check_images(rig);
   return policy;
 }
 
-Decision decide(const Policy& policy, const at::Tensor& rows, int64_t chunk,
-                const std::function<Observation(const at::Tensor& rows)>& observe, PhaseTimer* timer) {
+Decision decide(const at::Tensor& rows, const ChunkSizes& chunks,
+                const std::function<Policy::Output(const at::Tensor& rows)>& act) {
   const at::NoGradGuard no_grad;
-  const at::TensorOptions options = policy.parameters().front().value.options().requires_grad(false);
+  const at::TensorOptions options = rows.options().dtype(at::kFloat);
   Decision decision{at::empty({rows.size(0), kNumActions}, options), {}, at::empty({rows.size(0)}, options)};
-  for_each_chunk(rows, chunk, [&](const Chunk& c) {
-    const Observation observation = observe(c.rows);
-    const PhaseTimer::Scope timed(timer, Phase::forward);
-    const Policy::Output output = policy.forward(observation);
-    decision.logits.narrow(0, c.begin, c.count).copy_(output.logits.narrow(0, 0, c.count));
-    decision.value.narrow(0, c.begin, c.count).copy_(output.value.narrow(0, 0, c.count));
+  for_each_chunk(rows, chunks, [&](const Chunk& chunk) {
+    const Policy::Output output = act(chunk.rows);
+    decision.logits.narrow(0, chunk.begin, chunk.count).copy_(output.logits.narrow(0, 0, chunk.count));
+    decision.value.narrow(0, chunk.begin, chunk.count).copy_(output.value.narrow(0, 0, chunk.count));
   });
   decision.log_probs = at::log_softmax(decision.logits, 1);
   return decision;

@@ -10,9 +10,9 @@
 
 #include <ATen/ATen.h>
 
+#include "pictura/training/chunks.h"
 #include "pictura/training/config.h"
 #include "pictura/training/observation.h"
-#include "pictura/training/phase_timer.h"
 
 namespace pictura {
 
@@ -35,31 +35,47 @@ class SceneEncoder {
   virtual const ImageBackbone* image_backbone() const { return nullptr; }
 };
 
+/// What learning asks of a policy.
 class Policy {
  public:
-  /// Parameters are drawn from (seed, index of the parameter, index of the element) alone, but for those of a program
-  /// (policy.backbone), which begin as they are in its file. With `reads_walls` the
-  /// vector policy has a fifth set. The host has bf16 too, slowly, but no tf32: there it is fp32.
-  Policy(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type = at::kFloat,
-         bool reads_walls = false, Device device = {}, Precision precision = Precision::fp32);
+  Policy() = default;
+  virtual ~Policy() = default;
+  Policy(const Policy&) = delete;
+  Policy& operator=(const Policy&) = delete;
 
   struct Output {
     at::Tensor logits;  // [batch, kNumActions]
     at::Tensor value;   // [batch]
   };
-  Output forward(const Observation& observation) const;
+  virtual Output forward(const Observation& observation) const = 0;
 
   const std::vector<NamedTensor>& parameters() const { return parameters_; }
   int64_t num_parameters() const;
   /// 16 hexadecimal digits over the parameters' bytes, in the order of parameters().
   std::string hash() const;
   /// Of the file of policy.backbone; empty where that is "conv" and for vector policies.
-  std::string backbone_hash() const;
+  virtual std::string backbone_hash() const { return ""; }
   /// Throws Error naming camera and file where the program of policy.backbone does not take such images.
-  void check_images(const Rig& rig) const;
+  virtual void check_images(const Rig& /*rig*/) const {}
+
+ protected:
+  std::vector<NamedTensor> parameters_;
+};
+
+/// The paper's.
+class PolicyNetwork final : public Policy {
+ public:
+  /// Parameters are drawn from (seed, index of the parameter, index of the element) alone, but for those of a program
+  /// (policy.backbone), which begin as they are in its file. With `reads_walls` the
+  /// vector policy has a fifth set. The host has bf16 too, slowly, but no tf32: there it is fp32.
+  PolicyNetwork(const Config::PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type = at::kFloat,
+                bool reads_walls = false, Device device = {}, Precision precision = Precision::fp32);
+
+  Output forward(const Observation& observation) const override;
+  std::string backbone_hash() const override;
+  void check_images(const Rig& rig) const override;
 
  private:
-  std::vector<NamedTensor> parameters_;
   std::unique_ptr<SceneEncoder> scene_;
   at::ScalarType type_;
   Precision precision_;
@@ -83,16 +99,16 @@ class Policy {
 
 /// The policy of a configuration, for cameras of this rig. The host computes in fp32. Throws Error naming the file
 /// where policy.backbone names one that cannot serve.
-Policy make_policy(const Config& config, const Rig& rig, Device device);
+std::unique_ptr<const Policy> make_policy(const Config& config, const Rig& rig, Device device);
 
 /// Policy outputs for a whole batch without gradients: logits and log-probabilities [batch, actions], values [batch].
 struct Decision {
   at::Tensor logits, log_probs, value;
 };
-/// For the agents in some rows, i64 [batch], at most `chunk` at a time (chunks.h); observe(rows) gives what those of a
-/// chunk see.
-Decision decide(const Policy& policy, const at::Tensor& rows, int64_t chunk,
-                const std::function<Observation(const at::Tensor& rows)>& observe, PhaseTimer* timer = nullptr);
+/// For the agents in some rows, i64 [batch], a chunk at a time: act(rows) gives what the policy makes of those of a
+/// chunk, which need not outlast the next call.
+Decision decide(const at::Tensor& rows, const ChunkSizes& chunks,
+                const std::function<Policy::Output(const at::Tensor& rows)>& act);
 
 /// Largest value over the members of each set, [batch, members, width] -> [batch, width]; members at and beyond
 /// counts [batch] are padding; an empty set gives zeros.

@@ -19,54 +19,39 @@ float AdvantageFilter::threshold(float max_advantage, double ema, double fractio
 }
 
 AdamW::AdamW(const Policy& policy, const Config::Train& config) : parameters_(policy.parameters()), config_(config) {
+  gradients_ = at::zeros({policy.num_parameters()}, parameters_.front().value.options().requires_grad(false));
+  int64_t begin = 0;
   for (const NamedTensor& parameter : parameters_) {
-    first_moments.push_back({parameter.name, at::zeros_like(parameter.value)});
-    second_moments.push_back({parameter.name, at::zeros_like(parameter.value)});
+    const at::Tensor& value = parameter.value;
+    first_moments.push_back({parameter.name, at::zeros_like(value)});
+    second_moments.push_back({parameter.name, at::zeros_like(value)});
+    value.mutable_grad() = gradients_.narrow(0, begin, value.numel()).view(value.sizes());
+    begin += value.numel();
   }
 }
 
-namespace {
-
-void clear_gradients(const std::vector<NamedTensor>& parameters) {
-  for (const NamedTensor& parameter : parameters) parameter.value.mutable_grad().reset();
-}
-
-// All gradients as one vector. Those of parameters that no loss depended on are zero.
-at::Tensor flat_gradients(const std::vector<NamedTensor>& parameters) {
-  std::vector<at::Tensor> flat;
-  for (const NamedTensor& parameter : parameters) {
-    const at::Tensor& gradient = parameter.value.grad();
-    flat.push_back((gradient.defined() ? gradient : at::zeros_like(parameter.value)).flatten().detach());
-  }
-  return at::cat(flat);
-}
-
-}  // namespace
+void AdamW::clear_gradients() { gradients_.zero_(); }
 
 AdamW::Step AdamW::step(double learning_rate, const at::Tensor& loss, Communicator* communicator) {
   const at::NoGradGuard no_grad;
   // Summed over the ranks and only then scaled down: every rank takes the same step, to the bit.
-  const at::Tensor flat = flat_gradients(parameters_);
-  communicator->sum(flat);
+  communicator->sum(gradients_);
   std::vector<at::Tensor> values, gradients, first, second;
-  int64_t begin = 0;
   for (size_t i = 0; i < parameters_.size(); ++i) {
-    const at::Tensor& value = parameters_[i].value;
-    values.push_back(value);
-    gradients.push_back(flat.narrow(0, begin, value.numel()).view(value.sizes()));
+    values.push_back(parameters_[i].value);
+    gradients.push_back(parameters_[i].value.grad());
     first.push_back(first_moments[i].value);
     second.push_back(second_moments[i].value);
-    begin += value.numel();
   }
-  const at::Tensor norm = flat.norm();
+  const at::Tensor norm = gradients_.norm();
   const at::Tensor failed = (norm + loss).isfinite().logical_not().to(at::kFloat);
-  flat.mul_((config_.max_grad_norm / (norm + 1e-6)).clamp_max(1.0));
+  gradients_.mul_((config_.max_grad_norm / (norm + 1e-6)).clamp_max(1.0));
   ++steps;
   const std::vector<at::Tensor> counts(values.size(), at::full({}, static_cast<double>(steps), norm.options()));
   at::_fused_adamw_(values, gradients, first, second, {}, counts, learning_rate, config_.adam_beta1, config_.adam_beta2,
                     config_.weight_decay, config_.adam_eps, /*amsgrad=*/false, /*maximize=*/false, /*grad_scale=*/{},
                     failed);
-  clear_gradients(parameters_);
+  clear_gradients();
   return {norm, failed};
 }
 
@@ -79,64 +64,25 @@ double variance_of(double n, double sum, double sum_of_squares) {
 
 // The transitions of a rollout, flattened: [steps * slots].
 struct Batch {
-  at::Tensor actions, old_log_probs, advantages, values, returns, valid;
+  at::Tensor advantages, values, valid;
+  Targets targets;
 
   explicit Batch(const Rollout& rollout)
-      : actions(rollout.actions.flatten().to(at::kLong)),
-        old_log_probs(rollout.log_probs.flatten()),
-        advantages(rollout.advantages.flatten()),
+      : advantages(rollout.advantages.flatten()),
         values(rollout.values.narrow(0, 0, rollout.num_steps()).flatten()),
-        returns(advantages + values),
-        valid(rollout.valid.flatten()) {}
+        valid(rollout.valid.flatten()),
+        targets{rollout.actions.flatten().to(at::kLong), rollout.log_probs.flatten(), advantages + values} {}
 };
 
-at::Tensor mean_of(const at::Tensor& values, const at::Tensor& shares) {
-  return shares.defined() ? (values * shares).mean() : values.mean();
-}
-
-// What the losses of some transitions are made of.
-struct Losses {
-  at::Tensor policy, value, entropy;  // with gradients
-  at::Tensor stats;                   // f64 [6], in the order of LossStats
-};
-
-// Of the chosen actions.
-at::Tensor log_probs_of(const at::Tensor& all_log_probs, const Batch& batch, const at::Tensor& rows) {
-  return all_log_probs.gather(1, batch.actions.index_select(0, rows).unsqueeze(1)).squeeze(1);
-}
-
-Losses losses_of(const Policy::Output& output, const Batch& batch, const at::Tensor& rows, const at::Tensor& advantage,
-                 const at::Tensor& shares, double clip_coef) {
-  const at::Tensor all_log_probs = at::log_softmax(output.logits, 1);
-  const at::Tensor log_prob = log_probs_of(all_log_probs, batch, rows);
-  const at::Tensor log_ratio = log_prob - batch.old_log_probs.index_select(0, rows);
-  const at::Tensor ratio = log_ratio.exp();
-  const at::Tensor clipped = ratio.clamp(1 - clip_coef, 1 + clip_coef);
-  Losses losses;
-  losses.policy = -mean_of(at::minimum(advantage * ratio, advantage * clipped), shares);
-  losses.value = 0.5 * mean_of((output.value - batch.returns.index_select(0, rows)).square(), shares);
-  losses.entropy = -mean_of((all_log_probs.exp() * all_log_probs).sum(1), shares);
-  const at::NoGradGuard no_grad;
-  // Schulman's estimator of the KL divergence, (ratio - 1) - log ratio: unbiased and never negative.
-  const at::Tensor approx_kl = mean_of(ratio - 1 - log_ratio, shares);
-  const at::Tensor clip_fraction = mean_of(((ratio - 1).abs() > clip_coef).to(at::kFloat), shares);
-  losses.stats = at::stack({losses.policy, losses.value, losses.entropy, approx_kl, clip_fraction,
-                            mean_of(log_ratio.abs(), shares)})
-                     .detach()
-                     .to(at::kDouble);
-  return losses;
-}
-
-// A loss's gradient over all parameters, as one vector.
-at::Tensor gradient_of(const at::Tensor& loss, const Policy& policy) {
-  clear_gradients(policy.parameters());
+// A loss's gradient over all parameters, as one vector. Before and after there is none.
+at::Tensor gradient_of(const at::Tensor& loss, AdamW* optimizer) {
   loss.backward(/*gradient=*/{}, /*retain_graph=*/true);
-  const at::Tensor flat = flat_gradients(policy.parameters());
-  clear_gradients(policy.parameters());
-  return flat;
+  const at::Tensor gradient = optimizer->gradients().clone();
+  optimizer->clear_gradients();
+  return gradient;
 }
 
-constexpr int64_t kNumStats = 7;  // of LossStats
+constexpr int64_t kNumStats = ChunkRunner::kNumStats;
 
 LossStats loss_stats(const at::Tensor& row) {
   const double* const values = row.const_data_ptr<double>();
@@ -159,9 +105,9 @@ at::Tensor taken_rows(const Batch& batch, const Config::Train& config, int64_t u
   const at::Tensor kept_and_unused = at::empty_like(batch.advantages, at::kLong);
   const int64_t num_kept =
       executor->select_kept(span_of<const float>(batch.advantages), span_of<const uint8_t>(batch.valid), threshold,
-                            span_of<int64_t>(kept_and_unused));
+                            span_of<int64_t>(kept_and_unused), current_stream(executor->device()));
   const at::Tensor valid = at::nonzero(batch.valid).squeeze(1),
-                   returns = batch.returns.index_select(0, valid).to(at::kDouble),
+                   returns = batch.targets.returns.index_select(0, valid).to(at::kDouble),
                    errors = returns - batch.values.index_select(0, valid);
   const at::Tensor sums = at::stack({at::full({}, num_kept, returns.options()), at::ones_like(returns).sum(),
                                      returns.sum(), returns.square().sum(), errors.sum(), errors.square().sum()});
@@ -211,7 +157,7 @@ class Minibatches {
   void shuffle(int64_t epoch) {
     const at::Tensor shuffled = at::empty_like(own_);
     executor_->permute(Permutation(key_.seed, key_.update, epoch, size_), span_of<const int64_t>(own_),
-                       span_of<int64_t>(shuffled));
+                       span_of<int64_t>(shuffled), current_stream(executor_->device()));
     const at::Tensor places = at::nonzero(shuffled != kOfAnotherRank).squeeze(1);
     rows_ = shuffled.index_select(0, places);
     const at::Tensor begins = (at::arange(count_ + 1, places.options()) * size_).div(count_, "floor");
@@ -247,10 +193,10 @@ at::Tensor shares_in(const Chunk& chunk, const at::Tensor& shares, const at::Ten
 }
 
 // The norms of the gradient of the first chunk, or of those of all ranks, by each loss alone: f64 [3].
-at::Tensor norms_over_ranks(std::vector<at::Tensor> gradients, int64_t num_rows, const Policy& policy,
+at::Tensor norms_over_ranks(std::vector<at::Tensor> gradients, int64_t num_rows, const AdamW& optimizer,
                             Communicator* communicator) {
   constexpr int64_t kNumLosses = 3;
-  if (gradients.empty()) gradients.resize(kNumLosses, at::zeros_like(flat_gradients(policy.parameters())));
+  if (gradients.empty()) gradients.resize(kNumLosses, at::zeros_like(optimizer.gradients()));
   const at::Tensor sums = at::constant_pad_nd(at::stack(gradients), {0, 1}, 1) * num_rows;
   communicator->sum(sums);
   return (sums.slice(1, 0, -1).norm(2, {1}) / sums.select(1, -1)).to(at::kDouble);
@@ -258,10 +204,10 @@ at::Tensor norms_over_ranks(std::vector<at::Tensor> gradients, int64_t num_rows,
 
 // Adds this rank's part of a minibatch's gradients, which has `size_of_all` transitions over all ranks, to those of the
 // parameters, `forward_chunk` transitions at a time. Returns the minibatch's LossStats without the norm, f64
-// [kNumStats]. With `norms`, sets them as norms_over_ranks does.
-at::Tensor add_gradients(const Policy& policy, const Rollout& rollout, const Batch& batch, const at::Tensor& minibatch,
-                         int64_t size_of_all, const Config::Train& config, PhaseTimer* timer,
-                         Communicator* communicator, at::Tensor* norms) {
+// [kNumStats], until the next minibatch. With `norms`, sets them as norms_over_ranks does.
+at::Tensor add_gradients(ChunkRunner* runner, const Batch& batch, const at::Tensor& minibatch, int64_t size_of_all,
+                         const Config::Train& config, AdamW* optimizer, PhaseTimer* timer, Communicator* communicator,
+                         at::Tensor* norms) {
   at::Tensor advantages = batch.advantages.index_select(0, minibatch), shares;
   const at::Tensor valid = takes_all(config) ? batch.valid.index_select(0, minibatch).to(at::kDouble)
                                              : at::ones_like(advantages, at::kDouble);
@@ -273,33 +219,25 @@ at::Tensor add_gradients(const Policy& policy, const Rollout& rollout, const Bat
     advantages = (advantages - mean) / (variance.sqrt() + 1e-8);
   }
   if (takes_all(config)) shares = (valid * (static_cast<double>(size_of_all) / count)).to(at::kFloat);
-  const at::Tensor stats = at::zeros({kNumStats}, advantages.options().dtype(at::kDouble));
+  runner->begin_minibatch();
   std::vector<at::Tensor> by_loss;
   int64_t num_rows_by_loss = 0;
-  for_each_chunk(minibatch, config.forward_chunk, [&](const Chunk& chunk) {
-    const double weight = static_cast<double>(chunk.count) / static_cast<double>(size_of_all);
-    const Observation observation = rollout.observations.gather(chunk.rows);
-    const auto look = [&] {
-      const PhaseTimer::Scope timed(timer, Phase::learn);
-      return losses_of(policy.forward(observation), batch, chunk.rows, chunk.take(advantages),
-                       shares_in(chunk, shares, advantages.options()), config.clip_coef);
-    };
-    const Losses losses = look();
-    if (norms && chunk.begin == 0) {
-      const PhaseTimer::Scope timed(timer, Phase::diagnose);
-      for (const at::Tensor& loss : {losses.policy, config.vf_coef * losses.value, config.ent_coef * losses.entropy}) {
-        by_loss.push_back(gradient_of(loss, policy));
-      }
-      num_rows_by_loss = chunk.count;
+  const auto diagnose = [&](const Losses& losses) {
+    const PhaseTimer::Scope timed(timer, Phase::diagnose);
+    for (const at::Tensor& loss : {losses.policy, config.vf_coef * losses.value, config.ent_coef * losses.entropy}) {
+      by_loss.push_back(gradient_of(loss, optimizer));
     }
-    const PhaseTimer::Scope timed(timer, Phase::backward);
-    const at::Tensor loss = losses.policy + config.vf_coef * losses.value - config.ent_coef * losses.entropy;
-    (loss * weight).backward();
-    stats.narrow(0, 0, kNumStats - 1) += weight * losses.stats;
+  };
+  for_each_chunk(minibatch, {config.forward_chunk}, [&](const Chunk& chunk) {
+    const double weight = static_cast<double>(chunk.count) / static_cast<double>(size_of_all);
+    const bool is_diagnosed = norms && chunk.begin == 0;
+    if (is_diagnosed) num_rows_by_loss = chunk.count;
+    runner->learn(chunk.rows, chunk.take(advantages), shares_in(chunk, shares, advantages.options()), weight, config,
+                  is_diagnosed ? diagnose : std::function<void(const Losses&)>());
   });
-  communicator->sum(stats);
-  if (norms) *norms = norms_over_ranks(std::move(by_loss), num_rows_by_loss, policy, communicator);
-  return stats;
+  communicator->sum(runner->stats());
+  if (norms) *norms = norms_over_ranks(std::move(by_loss), num_rows_by_loss, *optimizer, communicator);
+  return runner->stats();
 }
 
 // Whether the rollout's log-probabilities differ from the learner's by more than rounding. What is not finite is no
@@ -311,17 +249,15 @@ bool must_be_recomputed(const LossStats& first) {
 
 // The log-probabilities of all chosen actions [steps * slots], for kept transitions by the learner's forward pass: in
 // the minibatches and chunks in which they are learned from next, so that not even the batch's size differs.
-at::Tensor recomputed_log_probs(const Policy& policy, const Rollout& rollout, const Batch& batch,
-                                const Minibatches& minibatches, int64_t forward_chunk, PhaseTimer* timer) {
+at::Tensor recomputed_log_probs(ChunkRunner* runner, const Targets& targets, const Minibatches& minibatches,
+                                int64_t forward_chunk) {
   const at::NoGradGuard no_grad;
-  at::Tensor log_probs = batch.old_log_probs.clone();
+  at::Tensor log_probs = targets.old_log_probs.clone();
   for (int64_t m = 0; m < minibatches.count(); ++m) {
-    for_each_chunk(minibatches.rows(m), forward_chunk, [&](const Chunk& chunk) {
-      const Observation observation = rollout.observations.gather(chunk.rows);
-      const PhaseTimer::Scope timed(timer, Phase::learn);
-      const at::Tensor all = at::log_softmax(policy.forward(observation).logits, 1).narrow(0, 0, chunk.count);
+    for_each_chunk(minibatches.rows(m), {forward_chunk}, [&](const Chunk& chunk) {
+      const at::Tensor all = at::log_softmax(runner->look(chunk.rows).logits, 1).narrow(0, 0, chunk.count);
       const at::Tensor rows = chunk.rows.narrow(0, 0, chunk.count);
-      log_probs.index_copy_(0, rows, log_probs_of(all, batch, rows));
+      log_probs.index_copy_(0, rows, log_probs_of(all, targets, rows));
     });
   }
   return log_probs;
@@ -333,10 +269,10 @@ std::vector<NamedTensor> contents_of(const at::Tensor& minibatch, const Batch& b
   const auto add = [&](std::string_view name, const at::Tensor& all) {
     contents.push_back({std::string(name), all.index_select(0, minibatch)});
   };
-  add("actions", batch.actions);
+  add("actions", batch.targets.actions);
   add("advantages", batch.advantages);
-  add("log_probs", batch.old_log_probs);
-  add("returns", batch.returns);
+  add("log_probs", batch.targets.old_log_probs);
+  add("returns", batch.targets.returns);
   for (size_t i = 0; i < std::size(kObservationArrays); ++i) {
     const at::Tensor& array = rollout.observations.arrays().*kObservationTensors[i];
     if (array.defined()) add(kObservationArrays[i].name, array.flatten(0, 1));
@@ -346,7 +282,7 @@ std::vector<NamedTensor> contents_of(const at::Tensor& minibatch, const Batch& b
 
 }  // namespace
 
-UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Config::Train& config, const UpdateKey& key,
+UpdateStats ppo_update(ChunkRunner* runner, const Rollout& rollout, const Config::Train& config, const UpdateKey& key,
                        LearnerExecutor* executor, AdamW* optimizer, AdvantageFilter* filter, PhaseTimer* timer,
                        Communicator* communicator) {
   UpdateStats stats;
@@ -356,6 +292,7 @@ UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Confi
   Minibatches minibatches(taken, rollout, config.minibatch_size, key, executor, communicator);
   if (minibatches.size() == 0) return stats;
   const Autotuner autotuner;
+  runner->set_targets(batch.targets);
 
   // Sums over the minibatches of each epoch; the last row is the first minibatch. What is not finite stays in them, so
   // no minibatch takes a step after the first that fails.
@@ -378,7 +315,7 @@ UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Confi
     for (int64_t m = 0; m < minibatches.count(); ++m) {
       const bool is_first = stats.minibatches == 0;
       const auto add_its_gradients = [&] {
-        return add_gradients(policy, rollout, batch, minibatches.rows(m), minibatches.size(m), config, timer,
+        return add_gradients(runner, batch, minibatches.rows(m), minibatches.size(m), config, optimizer, timer,
                              communicator, is_first ? &first_norms : nullptr);
       };
       at::Tensor minibatch_stats = add_its_gradients();
@@ -386,8 +323,9 @@ UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Confi
         const LossStats first = loss_stats(minibatch_stats.cpu());
         if (must_be_recomputed(first)) {
           stats.rejected = first;
-          batch.old_log_probs = recomputed_log_probs(policy, rollout, batch, minibatches, config.forward_chunk, timer);
-          clear_gradients(policy.parameters());
+          batch.targets.old_log_probs = recomputed_log_probs(runner, batch.targets, minibatches, config.forward_chunk);
+          runner->set_targets(batch.targets);
+          optimizer->clear_gradients();
           minibatch_stats = add_its_gradients();
         }
       }

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "pictura/common/error.h"
-#include "pictura/training/policy.h"
+#include "pictura/training/chunk_runner.h"
 #include "pictura/training/ranks/communicator.h"
 #include "pictura/training/rollout.h"
 
@@ -21,6 +21,7 @@ class AdvantageFilter {
 
 class AdamW {
  public:
+  /// Gives the parameters gradients of 0, which are parts of one vector and to which backward passes add.
   AdamW(const Policy& policy, const Config::Train& config);
   /// Scalars on the parameters' device, which nothing has waited for.
   struct Step {
@@ -31,12 +32,18 @@ class AdamW {
   /// them. The loss must be that of all ranks.
   Step step(double learning_rate, const at::Tensor& loss, Communicator* communicator = alone());
 
+  /// Of all parameters, in their order: f32 [num_parameters].
+  const at::Tensor& gradients() const { return gradients_; }
+  /// Sets them to 0.
+  void clear_gradients();
+
   std::vector<NamedTensor> first_moments, second_moments;  // in the order of the policy's parameters
   int64_t steps = 0;
 
  private:
   const std::vector<NamedTensor>& parameters_;
   Config::Train config_;
+  at::Tensor gradients_;
 };
 
 /// Means over minibatches; docs/training.md defines them.
@@ -82,8 +89,9 @@ class NotFinite : public Error {
 
 /// Improves the policy on a rollout with advantages. Ranks have consecutive slots each of one rollout, of equally many
 /// steps; all improve one policy on all of it, and get the same parameters to the bit and the same stats. Throws
-/// NotFinite, with the policy as it was before that minibatch: in it on the host, at the end on a device.
-UpdateStats ppo_update(const Policy& policy, const Rollout& rollout, const Config::Train& config, const UpdateKey& key,
+/// NotFinite, with the policy as it was before that minibatch: in it on the host, at the end on a device. `runner` is
+/// of the policy and of the rollout's observations.
+UpdateStats ppo_update(ChunkRunner* runner, const Rollout& rollout, const Config::Train& config, const UpdateKey& key,
                        LearnerExecutor* executor, AdamW* optimizer_inout, AdvantageFilter* filter_inout,
                        PhaseTimer* timer = nullptr, Communicator* communicator = alone());
 

@@ -48,21 +48,21 @@ void RolloutObservations::record(int64_t step, const at::Tensor& slots) {
   const Observation row = row_of(arrays_, step);
   copy_arrays(input.observations, input.device, row);
   if (scenes_) {
-    scenes_->put(static_cast<int>(step), input.scene, input.views);
+    scenes_->put(static_cast<int>(step), input.scene, input.views, current_stream(input.device));
   } else if (!arrays_.images.empty()) {
     const PhaseTimer::Scope timed(timer_, Phase::render);
     const SelectedViews selected(input.views, input.device, slots);
     const std::vector<ImageBlock> drawn = draw_images(input.scene, selected.views(), renderer_);
     for (size_t i = 0; i < drawn.size(); ++i) row.images[i].pixels.index_copy_(0, slots, drawn[i].pixels);
   }
+  are_complete_ = are_complete_ || step + 1 == arrays_.ego.size(0);
 }
 
 Observation RolloutObservations::gather(const at::Tensor& rows) const {
   Observation result = arrays_.map([&rows](const at::Tensor& t) { return t.flatten(0, 1).index_select(0, rows); });
   if (scenes_) {
-    const PhaseTimer::Scope timed(timer_, Phase::render);
     SelectedViews selected(rows.size(0), scenes_->device());
-    scenes_->gather(span_of<const int64_t>(rows), selected.views());
+    scenes_->gather(span_of<const int64_t>(rows), selected.views(), current_stream(scenes_->device()));
     result.images = draw_images(scenes_->scene(), selected.views(), renderer_);
   }
   return result;
@@ -95,7 +95,8 @@ void Rollout::compute_advantages(double gamma, double gae_lambda, LearnerExecuto
   executor->compute_advantages(
       {span_of<const float>(rewards), span_of<const float>(values), span_of<const uint8_t>(terminated),
        span_of<const uint8_t>(truncated), span_of<const uint8_t>(valid), num_steps(), num_slots()},
-      static_cast<float>(gamma), static_cast<float>(gae_lambda), span_of<float>(advantages));
+      static_cast<float>(gamma), static_cast<float>(gae_lambda), span_of<float>(advantages),
+      current_stream(executor->device()));
 }
 
 }  // namespace pictura

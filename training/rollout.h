@@ -15,7 +15,8 @@ bool keeps_images(const Config& config, Device device);
 /// the paper's rollout would take 163 GB, its scenes 0.25 GB.
 class RolloutObservations {
  public:
-  /// For `num_steps` + 1 steps of this simulator, which must outlive it, as must the renderer and the timer. Policies
+  /// For `num_steps` + 1 steps of this simulator, which must outlive it, as must the renderer and the timer (of the
+  /// images that are kept). Policies
   /// without images need no renderer. training/memory.h says whether there is memory for it.
   RolloutObservations(const Config& config, Simulator* simulator, Renderer* renderer, PhaseTimer* timer);
   /// Of arrays alone, [num_steps + 1, slots, ...].
@@ -31,6 +32,14 @@ class RolloutObservations {
   /// What some agents saw. rows: i64 [batch] of step * slots + slot, of agents that were active at those steps.
   Observation gather(const at::Tensor& rows) const;
 
+  /// Whether images are kept as they are seen, or drawn in gather().
+  bool keep_images() const { return keeps_images_; }
+  bool draws_when_gathered() const { return scenes_ != nullptr; }
+  /// Whether every step has been recorded: then gather() always works on the same memory, and so does record() where no
+  /// images are kept, as long as generation() stays.
+  bool are_complete() const { return are_complete_; }
+  uint64_t generation() const { return renderer_ ? renderer_->generation() : 0; }
+
   const Observation& arrays() const { return arrays_; }
 
  private:
@@ -38,7 +47,7 @@ class RolloutObservations {
   Simulator* simulator_ = nullptr;
   Renderer* renderer_ = nullptr;
   PhaseTimer* timer_ = nullptr;
-  bool keeps_images_ = false;
+  bool keeps_images_ = false, are_complete_ = false;
   std::unique_ptr<SceneHistory> scenes_;  // where images are drawn again
 };
 

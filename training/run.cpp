@@ -32,9 +32,16 @@ std::unique_ptr<Renderer> make_training_renderer(const Config& config, const Rig
   return renderer;
 }
 
+// A program in the place of the convolutions may do what no graph can hold; what OpenGL draws is none of CUDA's work.
+bool uses_graphs(const Config& config, Device device, const Renderer* renderer) {
+  return config.train.graphs == "auto" && !device.is_host() && (!renderer || renderer->name() == "cuda") &&
+         config.policy.backbone == "conv";
+}
+
 }  // namespace
 
-Run::Run(const Config& its_config, Device its_device, Communicator* its_communicator)
+Run::Run(const Config& its_config, Device its_device, Communicator* its_communicator,
+         std::unique_ptr<const Policy> its_policy)
     : config(its_config),
       device(its_device),
       communicator(its_communicator),
@@ -45,18 +52,23 @@ Run::Run(const Config& its_config, Device its_device, Communicator* its_communic
       renderer(make_training_renderer(config, rig, *simulator)),
       executor(make_learner_executor(device)),
       timer(device),
-      policy(make_policy(config, rig, device)),
-      optimizer(policy, config.train),
+      policy(its_policy ? std::move(its_policy) : make_policy(config, rig, device)),
+      optimizer(*policy, config.train),
       rollout(RolloutObservations(config, simulator.get(), renderer.get(), &timer), config.train.num_steps,
-              simulator->num_slots(), device) {
-  for (const auto& change : config.render.schedule) policy.check_images(rig_of(config, change.agent_steps));
+              simulator->num_slots(), device),
+      stream(uses_graphs(config, device, renderer.get()) ? std::optional<OwnStream>(device) : std::nullopt),
+      graphs(device, stream.has_value()),
+      chunks(*policy, rollout.observations, &timer, &graphs) {
+  for (const auto& change : config.render.schedule) policy->check_images(rig_of(config, change.agent_steps));
 }
+
+void Run::on_stream(const std::function<void()>& work) const { stream ? stream->run(work) : work(); }
 
 Checkpoint Run::checkpoint(const std::vector<RecentUpdate>& recent) const {
   Checkpoint checkpoint;
   checkpoint.config = config;
   checkpoint.rig = rig;
-  checkpoint.backbone_hash = policy.backbone_hash();
+  checkpoint.backbone_hash = policy->backbone_hash();
   checkpoint.update = update;
   checkpoint.agent_steps = agent_steps;
   checkpoint.distance_m = distance_m;
@@ -64,7 +76,7 @@ Checkpoint Run::checkpoint(const std::vector<RecentUpdate>& recent) const {
   checkpoint.filter_average = filter.average;
   checkpoint.recent = recent;
   checkpoint.longest_update_s = longest_update_s;
-  checkpoint.parameters = policy.parameters();
+  checkpoint.parameters = policy->parameters();
   checkpoint.first_moments = optimizer.first_moments;
   checkpoint.second_moments = optimizer.second_moments;
   checkpoint.simulator = simulator->save();
@@ -85,6 +97,7 @@ std::string Run::update_image_size() {
   renderer.reset();  // its memory goes before another's comes
   renderer = make_training_renderer(config, rig, *simulator);
   rollout.observations.set_renderer(renderer.get());
+  chunks.clear();
   return fmt::format("from {} agent-steps on images are {}x{} instead of {}x{}", agent_steps, after.width_px,
                      after.height_px, before.width_px, before.height_px);
 }
@@ -98,7 +111,7 @@ void Run::begin_with(const Checkpoint& other) {
       !config.reads_images() || !other.config.reads_images() || other.rig.cameras.size() == rig.cameras.size(),
       "{}: its policy sees through {} cameras, expected {}, as {} has", other.path, other.rig.cameras.size(),
       rig.cameras.size(), config.render.rig.empty() ? "the paper's rig" : config.render.rig);
-  restore_policy(other, policy);
+  restore_policy(other, *policy);
 }
 
 std::string Run::restore(const Checkpoint& saved) {
@@ -109,7 +122,7 @@ std::string Run::restore(const Checkpoint& saved) {
   const std::string rig_difference = config.reads_images() ? first_difference(saved.rig, rig) : "";
   PICTURA_CHECK(rig_difference.empty(), "{}: saved with other cameras than {} has: {}", saved.path,
                 config.render.rig.empty() ? "the paper's rig" : config.render.rig, rig_difference);
-  restore_policy(saved, policy);
+  restore_policy(saved, *policy);
   restore_tensors(saved, saved.first_moments, optimizer.first_moments);
   restore_tensors(saved, saved.second_moments, optimizer.second_moments);
   optimizer.steps = saved.adam_steps;
@@ -139,14 +152,14 @@ void Run::check_ranks_agree() const {
   if (communicator->size() == 1) return;
   // A sum of each parameter's bits is least and largest on every rank alike where all are equal.
   std::vector<at::Tensor> sums;
-  for (const NamedTensor& parameter : policy.parameters()) {
+  for (const NamedTensor& parameter : policy->parameters()) {
     sums.push_back(parameter.value.detach().view(at::kInt).sum(at::kLong));
   }
   const at::Tensor own = at::stack(sums), extremes = at::stack({own, -own});
   communicator->max(extremes);
   const at::Tensor differs = at::nonzero(extremes[0] + extremes[1]).cpu();
   PICTURA_CHECK(differs.size(0) == 0, "update {}: the ranks' policies differ: parameter '{}'", update,
-                policy.parameters()[static_cast<size_t>(differs[0].item<int64_t>())].name);
+                policy->parameters()[static_cast<size_t>(differs[0].item<int64_t>())].name);
 }
 
 }  // namespace pictura

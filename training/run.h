@@ -2,16 +2,23 @@
 // Of a run of several ranks each has its part of the worlds, and all of the rest.
 #pragma once
 
+#include <optional>
+
 #include "pictura/training/checkpoint.h"
 #include "pictura/training/ppo.h"
 #include "pictura/training/ranks/communicator.h"
+#include "pictura/training/torch_device.h"
 
 namespace pictura {
 
 struct Run {
   /// Learns on `device`, where simulator and renderer work too. Throws Error naming file and key for maps, cameras and
-  /// sizes that cannot be trained with.
-  Run(const Config& config, Device device, Communicator* communicator = alone());
+  /// sizes that cannot be trained with. Learns the configuration's policy, or `policy` where there is one.
+  Run(const Config& config, Device device, Communicator* communicator = alone(),
+      std::unique_ptr<const Policy> policy = nullptr);
+
+  /// Does some work of an update: where graphs are used, on a stream that they can be captured from.
+  void on_stream(const std::function<void()>& work) const;
 
   /// Begins with the weights of another run's checkpoint. Throws Error naming what differs where it is of another
   /// network.
@@ -39,10 +46,13 @@ struct Run {
   std::unique_ptr<Renderer> renderer;  // of policies with images
   const std::unique_ptr<LearnerExecutor> executor;
   PhaseTimer timer;
-  const Policy policy;
+  const std::unique_ptr<const Policy> policy;
   AdamW optimizer;
   AdvantageFilter filter;
   Rollout rollout;
+  const std::optional<OwnStream> stream;  // where graphs are used
+  Graphs graphs;                          // of `chunks`
+  ChunkRunner chunks;
   int64_t update = 0;       // updates done
   int64_t agent_steps = 0;  // in these
   double distance_m = 0;    // driven by all agents in these

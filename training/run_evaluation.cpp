@@ -23,7 +23,7 @@ std::optional<EvaluationRecord> RunEvaluation::evaluate() {
   options.simulator = run_.simulator->name();
   // Both simulators name the maps 0, 1, ..., so this one's scenes are drawn with the maps that training uploaded.
   worlds_.renderer = run_.renderer.get();
-  PolicySession session(config, run_.rig, run_.device, run_.policy);
+  PolicySession session(config, run_.rig, run_.device, *run_.policy);
   const EvaluateReport report = pictura::evaluate(&session, options, &worlds_);
   if (report.interrupted) return std::nullopt;
   return EvaluationRecord{report.rows.at(0), watch.seconds(), run_.image_size()};

@@ -70,7 +70,7 @@ struct PolicySession::Parts {
         device(open_learning_device(config)),
         rig(chosen_rig(checkpoint, options)),
         executor(make_learner_executor(device)),
-        own_policy(std::make_unique<Policy>(make_policy(config, rig, device))),
+        own_policy(make_policy(config, rig, device)),
         policy(*own_policy) {
     restore_policy(checkpoint, policy);
   }
@@ -87,10 +87,10 @@ struct PolicySession::Parts {
     set_float32_products(config.train.precision);
     set_reproducible(config.train.reproducible);
     if (config.reads_images()) check_images(input, static_cast<size_t>(batch), renderer);
-    return pictura::decide(policy, indices, config.train.forward_chunk, [&](const at::Tensor& some) {
+    return pictura::decide(indices, {config.train.forward_chunk}, [&](const at::Tensor& some) {
       Observation observation = select_arrays(config, input.observations, device, batch, some);
       if (config.reads_images()) observation.images = draw(input, some, renderer);
-      return observation;
+      return policy.forward(observation);
     });
   }
 

@@ -1,6 +1,8 @@
 #include "pictura/training/torch_device.h"
 
 #include <c10/core/CachingDeviceAllocator.h>
+#include <c10/core/StreamGuard.h>
+#include <c10/core/impl/VirtualGuardImpl.h>
 #include <dlfcn.h>
 
 #include "pictura/backends/make_learner.h"
@@ -99,6 +101,34 @@ int64_t available_bytes(Device device) {
 
 at::Device torch_device(Device device) {
   return device.is_host() ? at::Device(at::kCPU) : at::Device(at::kCUDA, static_cast<c10::DeviceIndex>(device.index));
+}
+
+namespace {
+
+c10::Stream torch_stream(Device device) {
+  const at::Device where = torch_device(device);
+  return c10::impl::VirtualGuardImpl(where.type()).getStream(where);
+}
+
+}  // namespace
+
+Stream current_stream(Device device) {
+  return device.is_host() ? Stream{} : Stream{torch_stream(device).native_handle()};
+}
+
+OwnStream::OwnStream(Device device)
+    : stream_(c10::impl::VirtualGuardImpl(torch_device(device).type()).getStreamFromGlobalPool(torch_device(device))) {}
+
+void OwnStream::run(const std::function<void()>& work) const {
+  c10::impl::VirtualGuardImpl(stream_.device_type()).getStream(stream_.device()).synchronize();
+  const c10::StreamGuard guard(stream_);
+  try {
+    work();
+  } catch (...) {
+    stream_.synchronize();  // tensors that whoever catches it reads are complete
+    throw;
+  }
+  stream_.synchronize();
 }
 
 }  // namespace pictura

@@ -1,6 +1,8 @@
-// Where the network computes, and pictura's memory as torch's tensors. Training works on torch's default stream, which
-// is CUDA's legacy one: a null Stream.
+// Where the network computes, and pictura's memory as torch's tensors. Work is put on torch's current stream: by
+// default CUDA's legacy one, a null Stream; in updates with graphs, which it cannot capture, one of their own.
 #pragma once
+
+#include <functional>
 
 #include <ATen/ATen.h>
 
@@ -16,6 +18,21 @@ namespace pictura {
 Device open_learning_device(const Config& config, int local_rank = 0);
 
 at::Device torch_device(Device device);
+
+/// Torch's current stream of a device, on which tensors are computed; autograd puts the backward pass on it too.
+Stream current_stream(Device device);
+
+/// A stream of a device that waits for no other.
+class OwnStream {
+ public:
+  explicit OwnStream(Device device);
+  /// Does some work with this as torch's current stream, after all work on the stream that is the current one now, and
+  /// waits for it.
+  void run(const std::function<void()>& work) const;
+
+ private:
+  c10::Stream stream_;
+};
 
 /// Gives back what torch keeps of a device's memory for later tensors, so that renderers can have it, and begins a new
 /// peak of DeviceMemory. Nothing happens on the host.
@@ -39,9 +56,12 @@ Span<T> span_of(const at::Tensor& tensor) {
 template <typename T>
 at::Tensor tensor_over(Span<T> array, Device device, at::IntArrayRef shape) {
   using Element = std::remove_const_t<T>;
-  // from_blob takes no pointer to const.
-  return at::from_blob(const_cast<Element*>(array.data()), shape,
-                       at::TensorOptions(c10::CppTypeToScalarType<Element>::value).device(torch_device(device)));
+  const at::Device where = torch_device(device);
+  // for_blob takes no pointer to const. Told where the memory is, it does not ask the driver.
+  return at::for_blob(const_cast<Element*>(array.data()), shape)
+      .options(at::TensorOptions(c10::CppTypeToScalarType<Element>::value).device(where))
+      .target_device(where)
+      .make_tensor();
 }
 
 /// A copy of an array in the memory of `device` on the host.

@@ -40,6 +40,12 @@ class NetworkPassesCuda final : public NetworkPasses {
     launch(cuda::launch_norm_backward, stream, size, x, position, period, weight, grad_out, grad_x_out, sums_out);
   }
 
+  void point_features(const PointSize& size, const float* rows, ActivationType type, void* out,
+                      Stream stream) override {
+    PICTURA_CHECK(size.width() <= PointSize::kMostWidth, "point_features: {} numbers a row", size.width());
+    launch(cuda::launch_point_features, stream, size, rows, type, out);
+  }
+
   void patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, Stream stream) override {
     PICTURA_CHECK(PatchSize::takes(size.patch_px), "patches: of {} pixels squared", size.patch_px);
     launch(cuda::launch_patches, stream, size, images, type, out);

@@ -200,6 +200,30 @@ __global__ void __launch_bounds__(kThreads)
   bias_sums.store(sums + 2 * kChannels);
 }
 
+// A thread writes a number. A block has whole rows, so that none is divided by in 64 bits.
+template <typename T>
+__global__ void __launch_bounds__(kThreads)
+    point_features(PointSize size, int width, int rows_a_block, const float* rows, T* out) {
+  const int i = static_cast<int>(threadIdx.x), kept = static_cast<int>(size.kept());
+  const int64_t row = blockIdx.x * int64_t{rows_a_block} + i / width;
+  if (i >= rows_a_block * width || row >= size.rows) return;
+  const float* const its_row = rows + row * size.features;
+  const int column = i % width;
+  float value = 0;
+  if (column < kept) {
+    value = its_row[column];
+  } else {
+    constexpr int kFeatures = static_cast<int>(PointSize::kFeatures);
+    const int feature = (column - kept) % kFeatures, point = (column - kept) / kFeatures;
+    const float x_m = its_row[2 * point] * size.unit_m, y_m = its_row[2 * point + 1] * size.unit_m;
+    const float its_m = feature % 2 == 0 ? x_m : y_m;
+    value = its_m / (feature < 2   ? fabsf(its_m) + 4.0f
+                     : feature < 4 ? fabsf(its_m) + 20.0f
+                                   : sqrtf(x_m * x_m + y_m * y_m) + 1.0f);
+  }
+  out[row * width + column] = from_float<T>(value);
+}
+
 // The row of a patch, of which `count` pixels lie in the image; the others are black. Read at once where whole patches
 // lie side by side, so that rows begin at multiples of their size.
 template <int kPatch>
@@ -396,6 +420,17 @@ void launch_norm_backward(const ActivationSize& size, const void* x, const void*
              static_cast<const T*>(x), static_cast<const T*>(position), period, num_sums, weight,
              static_cast<const T*>(grad_out), static_cast<T*>(grad_x_out), sums_out);
     });
+  });
+}
+
+void launch_point_features(const PointSize& size, const float* rows, ActivationType type, void* out,
+                           cudaStream_t stream) {
+  if (size.rows == 0) return;
+  const int width = static_cast<int>(size.width()), rows_a_block = kThreads / width;
+  const auto blocks = static_cast<unsigned>((size.rows + rows_a_block - 1) / rows_a_block);
+  with_type(type, [&](auto element) {
+    using T = decltype(element);
+    point_features<T><<<blocks, kThreads, 0, stream>>>(size, width, rows_a_block, rows, static_cast<T*>(out));
   });
 }
 

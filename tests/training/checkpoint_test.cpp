@@ -91,7 +91,7 @@ std::string as_version_1(const std::string& file) {
 
 TEST_F(CheckpointFile, ComesBackWhole) {
   const Config config = small_config();
-  const Policy policy(config.policy, 4, 1);
+  const PolicyNetwork policy(config.policy, 4, 1);
   write_checkpoint(folder_ / "a.ckpt", small_checkpoint(policy, config));
   const Checkpoint back = read_checkpoint(folder_ / "a.ckpt");
   EXPECT_EQ(to_toml(back.config), to_toml(config));
@@ -111,7 +111,7 @@ TEST_F(CheckpointFile, ComesBackWhole) {
   EXPECT_EQ(back.rig.cameras[1].yaw_rad, paper_rig(16, 9).cameras[1].yaw_rad);
   EXPECT_EQ(back.rig.cameras[3].focal_y_px, paper_rig(16, 9).cameras[3].focal_y_px);
 
-  const Policy other(config.policy, 4, 2);
+  const PolicyNetwork other(config.policy, 4, 2);
   EXPECT_NE(other.hash(), policy.hash());
   restore_tensors(back, back.parameters, other.parameters());
   EXPECT_EQ(other.hash(), policy.hash());
@@ -120,17 +120,17 @@ TEST_F(CheckpointFile, ComesBackWhole) {
 
 TEST_F(CheckpointFile, OtherArchitecturesAreRefusedByName) {
   Config config = small_config();
-  const Policy policy(config.policy, 4, 1);
+  const PolicyNetwork policy(config.policy, 4, 1);
   write_checkpoint(folder_ / "a.ckpt", small_checkpoint(policy, config));
   const Checkpoint saved = read_checkpoint(folder_ / "a.ckpt");
   config.policy.backbone_width = 16;
-  const Policy wider(config.policy, 4, 1);
+  const PolicyNetwork wider(config.policy, 4, 1);
   const std::string wide = message_of([&] { restore_tensors(saved, saved.parameters, wider.parameters()); });
   EXPECT_THAT(wide, ::testing::AllOf(HasSubstr("a.ckpt"), HasSubstr("backbone.0.weight"), HasSubstr("[16, 24]"),
                                      HasSubstr("[8, 24]")));
   config = small_config();
   config.policy.modality = Modality::perspective;
-  const Policy seeing(config.policy, 4, 1);
+  const PolicyNetwork seeing(config.policy, 4, 1);
   EXPECT_THAT(message_of([&] { restore_tensors(saved, saved.parameters, seeing.parameters()); }),
               HasSubstr("no parameter 'conv.0.weight'"));
 }
@@ -138,7 +138,7 @@ TEST_F(CheckpointFile, OtherArchitecturesAreRefusedByName) {
 TEST_F(CheckpointFile, WeightsThatAreNotFiniteAreRefusedByName) {
   const Config config = small_config();
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
-    const Policy policy(config.policy, 4, 1);
+    const PolicyNetwork policy(config.policy, 4, 1);
     at::Tensor weight = policy.parameters()[3].value.detach();
     weight.flatten()[1] = bad;
     write_checkpoint(folder_ / "a.ckpt", small_checkpoint(policy, config));
@@ -163,7 +163,7 @@ TEST(Rigs, DifferencesAreNamed) {
 
 TEST_F(CheckpointFile, BrokenFilesAreRefused) {
   const Config config = small_config();
-  const Policy policy(config.policy, 4, 1);
+  const PolicyNetwork policy(config.policy, 4, 1);
   const std::string path = folder_ / "a.ckpt", broken = folder_ / "b.ckpt";
   write_checkpoint(path, small_checkpoint(policy, config));
   const std::string whole = read_file(path);
@@ -202,7 +202,7 @@ TEST_F(CheckpointFile, BrokenFilesAreRefused) {
 
 TEST_F(CheckpointFile, AnyFlippedBitIsRefused) {
   const Config config = small_config();
-  const Policy policy(config.policy, 4, 1);
+  const PolicyNetwork policy(config.policy, 4, 1);
   const std::string path = folder_ / "a.ckpt";
   write_checkpoint(path, small_checkpoint(policy, config));
   const std::string whole = read_file(path);
@@ -225,14 +225,14 @@ TEST_F(CheckpointFile, AnyFlippedBitIsRefused) {
 
 TEST_F(CheckpointFile, Version1ReadsAsBefore) {
   const Config config = small_config();
-  const Policy policy(config.policy, 4, 1);
+  const PolicyNetwork policy(config.policy, 4, 1);
   const std::string path = folder_ / "a.ckpt";
   write_checkpoint(path, small_checkpoint(policy, config));
   write_file(path, as_version_1(read_file(path)));
   const Checkpoint back = read_checkpoint(path);
   EXPECT_EQ(back.update, 12);
   EXPECT_EQ(back.simulator, (std::vector<uint8_t>{1, 2, 3, 255}));
-  const Policy other(config.policy, 4, 2);
+  const PolicyNetwork other(config.policy, 4, 2);
   restore_tensors(back, back.parameters, other.parameters());
   EXPECT_EQ(other.hash(), policy.hash());
 }
@@ -241,7 +241,7 @@ TEST_F(CheckpointFile, TheSchemaIsThatOfTheArraysThatThePolicyReads) {
   Config config = small_config();
   const std::string path = folder_ / "a.ckpt";
   auto schema_of = [&] {
-    write_checkpoint(path, small_checkpoint(make_policy(config, paper_rig(16, 9), Device{}), config));
+    write_checkpoint(path, small_checkpoint(*make_policy(config, paper_rig(16, 9), Device{}), config));
     const std::string bytes = read_file(path);
     return nlohmann::json::parse(bytes.substr(kPreamble, header_bytes_of(bytes))).at("schema");
   };
@@ -267,7 +267,7 @@ TEST_F(CheckpointFile, TheSchemaIsThatOfTheArraysThatThePolicyReads) {
 
 TEST_F(CheckpointFile, SavedUnderTheOldNameOfTheBackendsItReadsAsBefore) {
   const Config config = small_config();
-  const Policy policy(config.policy, 4, 1);
+  const PolicyNetwork policy(config.policy, 4, 1);
   const std::string path = folder_ / "a.ckpt";
   write_checkpoint(path, small_checkpoint(policy, config));
   std::string bytes = read_file(path);
@@ -291,7 +291,7 @@ TEST_F(CheckpointFile, SavedUnderTheOldNameOfTheBackendsItReadsAsBefore) {
 
 TEST_F(CheckpointFile, SafetensorsHoldEveryParameter) {
   const Config config = small_config();
-  const Policy policy(config.policy, 4, 1);
+  const PolicyNetwork policy(config.policy, 4, 1);
   write_safetensors(folder_ / "p.safetensors", policy.parameters(), to_toml(config));
   const std::string bytes = read_file(folder_ / "p.safetensors");
   uint64_t header_bytes = 0;

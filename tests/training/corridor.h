@@ -30,7 +30,8 @@ struct Corridor {
   UpdateStats update(const Policy& policy, const Config::Train& train, int64_t number, AdamW* optimizer,
                      AdvantageFilter* filter) {
     const UpdateKey key{seed, number, learning_rate_at(train, 0)};
-    return ppo_update(policy, rollout, train, key, executor.get(), optimizer, filter);
+    ChunkRunner runner(policy, rollout.observations);
+    return ppo_update(&runner, rollout, train, key, executor.get(), optimizer, filter);
   }
 
   static Observation storage() {
@@ -54,8 +55,8 @@ struct Corridor {
       at::Tensor ego = row.ego;
       ego.select(1, 0).copy_(sign);
       ego.select(1, 1).copy_(open);
-      const Decision decision = decide(policy, at::arange(kSlots), 50, [&row](const at::Tensor& slots) {
-        return row.map([&](const at::Tensor& all) { return all.index_select(0, slots); });
+      const Decision decision = decide(at::arange(kSlots), {50}, [&](const at::Tensor& slots) {
+        return policy.forward(row.map([&](const at::Tensor& all) { return all.index_select(0, slots); }));
       });
       rollout.values.select(0, t).copy_(decision.value);
       if (t == kSteps) break;

@@ -4,6 +4,7 @@
 
 #include "pictura/tests/backend_cuda/device_test.h"
 #include "pictura/training/layers.h"
+#include "pictura/training/point_features.h"
 #include "pictura/training/precision.h"
 #include "pictura/training/torch_device.h"
 
@@ -125,6 +126,21 @@ TEST_P(DeviceLayers, TokenSoftmax) {
     expect_as_on_the_host([](const auto& in) { return token_softmax(in[0]); },
                           [](const auto& in) { return at::_softmax(in[0], 1, /*half_to_float=*/false); },
                           {8 * numbers({30, 84, columns}, 1)}, 1);
+  }
+}
+
+TEST_P(DeviceLayers, PointFeatures) {
+  for (const auto& [features, points] : {std::pair<int64_t, int64_t>{7, 1}, {4, 2}, {2, 1}, {40, 20}}) {
+    const at::Tensor rows = numbers({31, 17, features}, 1).to(at::kFloat), on_device = rows.to(at::kCUDA);
+    const at::Tensor expected = with_point_features(rows.to(at::kDouble), points, at::kDouble);
+    const at::Tensor got = with_point_features(on_device, points, activations());
+    ASSERT_EQ(got.sizes(), expected.sizes());
+    EXPECT_EQ(got.scalar_type(), activations());
+    EXPECT_TRUE(got.narrow(-1, 0, features).to(at::kCPU, at::kFloat).equal(rows)) << "bf16 holds these";
+    const double error = (got.to(at::kCPU, at::kDouble) - expected).abs().max().item<double>();
+    EXPECT_LE(error, activations() == at::kBFloat16 ? 1.0 / 500 : 1e-6) << features;
+    EXPECT_TRUE(
+        got.narrow(-1, features, points * kPointFeatures).equal(point_features(on_device, points, activations())));
   }
 }
 

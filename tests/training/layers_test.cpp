@@ -40,7 +40,7 @@ TEST(ImagePatches, AOneByOneConvolutionOfThemIsOneOfTheImageWithTheirStride) {
 TEST(PointFeatures, AreNearCoordinatesAndTheBearingOfEachPoint) {
   // A row with two points, (3, -4) m and (0, 20) m, and a number that is none. 120 m are 1.
   const at::Tensor row = at::tensor({3.0 / 120, -4.0 / 120, 0.0, 20.0 / 120, 0.5}, at::kDouble).unsqueeze(0);
-  const at::Tensor features = point_features(row, 2);
+  const at::Tensor features = point_features(row, 2, at::kDouble);
   const std::vector<double> expected{3.0 / 7, -4.0 / 8,  3.0 / 23, -4.0 / 24, 3.0 / 6, -4.0 / 6,
                                      0.0,     20.0 / 24, 0.0,      20.0 / 40, 0.0,     20.0 / 21};
   ASSERT_EQ(features.sizes().vec(), (std::vector<int64_t>{1, 2 * kPointFeatures}));
@@ -50,7 +50,8 @@ TEST(PointFeatures, AreNearCoordinatesAndTheBearingOfEachPoint) {
 }
 
 TEST(PointFeatures, TellAMetreApartNearAndStayWithinOneFar) {
-  const at::Tensor features = point_features(at::tensor({0.0f, 1.0f / 120, 100.0f, -100.0f}).view({2, 2}), 1);
+  const at::Tensor features =
+      point_features(at::tensor({0.0f, 1.0f / 120, 100.0f, -100.0f}).view({2, 2}), 1, at::kFloat);
   EXPECT_GT(features[0][1].item<float>(), 0.19f);
   EXPECT_LE(features.abs().max().item<float>(), 1.0f);
 }

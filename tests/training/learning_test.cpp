@@ -23,7 +23,7 @@ Curve learn(Precision precision, uint64_t seed) {
   section.embedding_width = 8;
   section.backbone_layers = 2;
   section.backbone_width = 32;
-  const Policy policy(section, 1, seed, at::kFloat, /*reads_walls=*/false, Device{}, precision);
+  const PolicyNetwork policy(section, 1, seed, at::kFloat, /*reads_walls=*/false, Device{}, precision);
   Config::Train train;
   train.minibatch_size = 512;
   train.update_epochs = 1;

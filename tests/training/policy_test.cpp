@@ -95,7 +95,7 @@ void expect_gradients(const Policy& policy, const Observation& o) {
 }
 
 TEST_P(BothModalities, GradientsEqualDifferenceQuotients) {
-  expect_gradients(Policy(tiny(GetParam()), 3, 5, at::kDouble), observation(GetParam(), 2));
+  expect_gradients(PolicyNetwork(tiny(GetParam()), 3, 5, at::kDouble), observation(GetParam(), 2));
 }
 
 TEST(Policy, GradientsOfPatchesEqualDifferenceQuotients) {
@@ -103,14 +103,14 @@ TEST(Policy, GradientsOfPatchesEqualDifferenceQuotients) {
   section.patch_px = 2;
   section.conv_kernels = {1, 3};
   section.conv_strides = {1, 2};
-  expect_gradients(Policy(section, 3, 5, at::kDouble), observation(Modality::perspective, 2));
+  expect_gradients(PolicyNetwork(section, 3, 5, at::kDouble), observation(Modality::perspective, 2));
 }
 
 TEST_P(BothModalities, HasThePapersShapes) {
   Config::PolicySection config;
   config.modality = GetParam();
   config.point_features = false;
-  const Policy policy(config, 4, 1);
+  const PolicyNetwork policy(config, 4, 1);
   auto shape_of = [&](const std::string& name) {
     for (const NamedTensor& p : policy.parameters()) {
       if (p.name == name) return p.value.sizes().vec();
@@ -134,7 +134,7 @@ TEST_P(BothModalities, HasThePapersShapes) {
 TEST_P(BothModalities, ReadsFeaturesOfPointsBesideTheirCoordinates) {
   Config::PolicySection config;
   config.modality = GetParam();
-  const Policy policy(config, 4, 1);
+  const PolicyNetwork policy(config, 4, 1);
   const auto inputs_of = [&](const std::string& name) {
     for (const NamedTensor& p : policy.parameters()) {
       if (p.name == name + ".hidden.weight") return p.value.size(1);
@@ -153,7 +153,7 @@ TEST(Policy, WallsAreAFifthGroupOfTheVectorPolicy) {
   Config::PolicySection config;
   config.point_features = false;
   config.modality = Modality::vector;
-  const Policy without(config, 4, 1), with(config, 4, 1, at::kFloat, /*reads_walls=*/true);
+  const PolicyNetwork without(config, 4, 1), with(config, 4, 1, at::kFloat, /*reads_walls=*/true);
   auto names_of = [](const Policy& policy) {
     std::vector<std::string> names;
     for (const NamedTensor& p : policy.parameters()) names.push_back(p.name);
@@ -187,14 +187,14 @@ TEST(Policy, WallsAreAFifthGroupOfTheVectorPolicy) {
 TEST_P(BothModalities, FirstPolicyIsNearlyUniformAndDoesNotDependOnThreads) {
   Config::PolicySection config = tiny(GetParam());
   at::set_num_threads(1);
-  const Policy one(config, 3, 42);
+  const PolicyNetwork one(config, 3, 42);
   at::set_num_threads(2);
-  const Policy two(config, 3, 42), other(config, 3, 43);
+  const PolicyNetwork two(config, 3, 42), other(config, 3, 43);
   EXPECT_EQ(one.hash(), two.hash());
   EXPECT_NE(one.hash(), other.hash());
 
   const Observation o = observation(GetParam(), 4);
-  const Policy doubles(config, 3, 42, at::kDouble);
+  const PolicyNetwork doubles(config, 3, 42, at::kDouble);
   const at::NoGradGuard no_grad;
   const at::Tensor probabilities = at::softmax(doubles.forward(o).logits, 1);
   EXPECT_GT(probabilities.min().item<double>(), 0.9 / 12);
@@ -202,7 +202,7 @@ TEST_P(BothModalities, FirstPolicyIsNearlyUniformAndDoesNotDependOnThreads) {
 }
 
 TEST(Policy, AgentsOfABatchDoNotMix) {
-  const Policy policy(tiny(Modality::perspective), 3, 5, at::kDouble);
+  const PolicyNetwork policy(tiny(Modality::perspective), 3, 5, at::kDouble);
   const at::NoGradGuard no_grad;
   const Observation o = observation(Modality::perspective, 3);
   const at::Tensor all = policy.forward(o).logits;
@@ -211,7 +211,7 @@ TEST(Policy, AgentsOfABatchDoNotMix) {
 }
 
 TEST(Policy, EveryCameraCounts) {
-  const Policy policy(tiny(Modality::perspective), 3, 5, at::kDouble);
+  const PolicyNetwork policy(tiny(Modality::perspective), 3, 5, at::kDouble);
   const at::NoGradGuard no_grad;
   const Observation o = observation(Modality::perspective, 1);
   const at::Tensor before = policy.forward(o).value;

@@ -186,7 +186,7 @@ TEST(AdamW, StepsAsLoshchilovAndHutterDefineIt) {
   Config::PolicySection section;
   section.modality = Modality::vector;
   section.embedding_width = section.backbone_width = section.backbone_layers = 1;
-  const Policy policy(section, 1, 3);
+  const PolicyNetwork policy(section, 1, 3);
   Config::Train train;
   train.weight_decay = 0.1;
   train.max_grad_norm = 1e9;
@@ -196,7 +196,7 @@ TEST(AdamW, StepsAsLoshchilovAndHutterDefineIt) {
   const double start = weight.flatten()[0].item<double>();
   double expected = start, m = 0, v = 0;
   for (size_t t = 0; t < gradients.size(); ++t) {
-    weight.mutable_grad() = at::full_like(weight, gradients[t]);
+    weight.mutable_grad().fill_(gradients[t]);
     optimizer.step(0.01, at::zeros({}));
     m = 0.9 * m + 0.1 * gradients[t];
     v = 0.999 * v + 0.001 * gradients[t] * gradients[t];
@@ -216,7 +216,7 @@ TEST(Ppo, LearnsATaskWithDelayedReward) {
   section.embedding_width = 8;
   section.backbone_layers = 2;
   section.backbone_width = 32;
-  const Policy policy(section, 1, 7);
+  const PolicyNetwork policy(section, 1, 7);
   Config::Train train;
   train.minibatch_size = 256;
   train.forward_chunk = 100;
@@ -248,7 +248,7 @@ TEST(Ppo, ChunksChangeNothingButRounding) {
   section.embedding_width = 8;
   section.backbone_layers = 1;
   section.backbone_width = 16;
-  const Policy whole(section, 1, 7), chunked(section, 1, 7);
+  const PolicyNetwork whole(section, 1, 7), chunked(section, 1, 7);
   Config::Train train;
   train.minibatch_size = 512;
   for (const Policy* policy : {&whole, &chunked}) {
@@ -274,7 +274,7 @@ TEST(Ppo, InvalidTransitionsTeachNothing) {
   section.modality = Modality::vector;
   section.embedding_width = section.backbone_width = 8;
   section.backbone_layers = 1;
-  const Policy a(section, 1, 7), b(section, 1, 7);
+  const PolicyNetwork a(section, 1, 7), b(section, 1, 7);
   Config::Train train;
   for (const Policy* policy : {&a, &b}) {
     Corridor corridor;
@@ -296,17 +296,17 @@ TEST(AdamW, TakesNoStepWhereTheLossOrAGradientIsNotFinite) {
   Config::PolicySection section;
   section.modality = Modality::vector;
   section.embedding_width = section.backbone_width = section.backbone_layers = 1;
-  const Policy policy(section, 1, 3);
+  const PolicyNetwork policy(section, 1, 3);
   const std::string before = policy.hash();
   AdamW optimizer(policy, Config::Train{});
   at::Tensor weight = policy.parameters()[0].value;
   for (const auto& [gradient, loss] : {std::pair{1.0, std::nan("")}, std::pair{HUGE_VAL, 1.0}}) {
-    weight.mutable_grad() = at::full_like(weight, gradient);
+    weight.mutable_grad().fill_(gradient);
     EXPECT_EQ(optimizer.step(0.01, at::full({}, loss)).failed.item<float>(), 1);
     EXPECT_EQ(policy.hash(), before);
     EXPECT_EQ(optimizer.first_moments[0].value.abs().sum().item<float>(), 0);
   }
-  weight.mutable_grad() = at::full_like(weight, 1.0);
+  weight.mutable_grad().fill_(1.0);
   EXPECT_EQ(optimizer.step(0.01, at::ones({})).failed.item<float>(), 0);
   EXPECT_NE(policy.hash(), before);
 }
@@ -315,7 +315,7 @@ TEST(Ppo, StopsBeforeTheStepOfAMinibatchThatIsNotFinite) {
   Config::PolicySection section;
   section.modality = Modality::vector;
   section.embedding_width = section.backbone_width = 8;
-  const Policy policy(section, 1, 7);
+  const PolicyNetwork policy(section, 1, 7);
   const std::string before = policy.hash();
   Corridor corridor;
   corridor.play(policy, 0);
@@ -367,7 +367,7 @@ TEST(Ppo, LogProbabilitiesThatAreNotTheLearnersAreComputedAgain) {
   std::vector<std::string> policies;
   for (const double error : {0.0, 5e-4, 2e-3, 0.5}) {
     SCOPED_TRACE(error);
-    const Policy policy(section, 1, 7);
+    const PolicyNetwork policy(section, 1, 7);
     Corridor corridor;
     corridor.play(policy, 0);
     corridor.rollout.rewards.copy_(
@@ -399,7 +399,7 @@ TEST(Ppo, NanIsAnError) {
   Config::PolicySection section;
   section.modality = Modality::vector;
   section.embedding_width = section.backbone_width = 8;
-  const Policy policy(section, 1, 7);
+  const PolicyNetwork policy(section, 1, 7);
   Config::Train train;
   Corridor corridor;
   corridor.play(policy, 0);

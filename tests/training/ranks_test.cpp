@@ -263,7 +263,7 @@ std::vector<Learnt> learn(const std::vector<int64_t>& ends, const Config::Train&
     const std::unique_ptr<Communicator> communicator = make_communicator(&ranks, Device{});
     const auto rank = static_cast<size_t>(ranks.rank());
     Learnt& learnt = of_ranks[rank];
-    const Policy policy(tiny_policy(), 4, 3);
+    const PolicyNetwork policy(tiny_policy(), 4, 3);
     std::vector<at::Tensor> before;
     for (const NamedTensor& parameter : policy.parameters()) before.push_back(parameter.value.detach().clone());
     test::Corridor corridor;
@@ -275,7 +275,8 @@ std::vector<Learnt> learn(const std::vector<int64_t>& ends, const Config::Train&
       if (update == 1) corridor.rollout.valid.narrow(1, 100, test::Corridor::kSlots - 100).fill_(0);
       corridor.compute_advantages(0.9, 0.9);
       const Rollout own = part_of(corridor.rollout, rank == 0 ? 0 : ends[rank - 1], ends[rank]);
-      learnt.last = ppo_update(policy, own, train, {9, update, train.learning_rate}, corridor.executor.get(),
+      ChunkRunner runner(policy, own.observations);
+      learnt.last = ppo_update(&runner, own, train, {9, update, train.learning_rate}, corridor.executor.get(),
                                &optimizer, &filter, nullptr, communicator.get());
       learnt.hashes.push_back(policy.hash());
       if (update > 0) continue;
@@ -351,7 +352,7 @@ TEST(RanksLearn, AndNoticeWhenTheirPoliciesDifferByABit) {
     const pictura::Run run(config, Device{}, communicator.get());
     EXPECT_EQ(run.simulator->num_slots(), 3);
     run.check_ranks_agree();
-    const NamedTensor& parameter = run.policy.parameters()[5];
+    const NamedTensor& parameter = run.policy->parameters()[5];
     if (ranks.rank() == 1) parameter.value.detach().view(at::kInt).flatten().narrow(0, 0, 1).bitwise_xor_(1);
     EXPECT_THAT(message_of([&] { run.check_ranks_agree(); }), HasSubstr("'" + parameter.name + "'"));
   });
@@ -362,7 +363,7 @@ TEST(RanksLearn, AndStopTogetherWhenOneMeetsNaN) {
   const std::vector<std::string> errors = run_ranks(2, [&](Ranks& ranks) {
     const std::unique_ptr<Communicator> communicator = make_communicator(&ranks, Device{});
     const Config::Train train = plain_steps();
-    const Policy policy(tiny_policy(), 4, 3);
+    const PolicyNetwork policy(tiny_policy(), 4, 3);
     const std::string before = policy.hash();
     test::Corridor corridor;
     AdamW optimizer(policy, train);
@@ -371,7 +372,8 @@ TEST(RanksLearn, AndStopTogetherWhenOneMeetsNaN) {
     corridor.compute_advantages(0.9, 0.9);
     Rollout own = part_of(corridor.rollout, 64 * ranks.rank(), 64 * ranks.rank() + 64);
     if (ranks.rank() == 1) own.log_probs.fill_(std::numeric_limits<float>::quiet_NaN());
-    EXPECT_THROW(ppo_update(policy, own, train, {9, 0, 0.01}, corridor.executor.get(), &optimizer, &filter, nullptr,
+    ChunkRunner runner(policy, own.observations);
+    EXPECT_THROW(ppo_update(&runner, own, train, {9, 0, 0.01}, corridor.executor.get(), &optimizer, &filter, nullptr,
                             communicator.get()),
                  NotFinite);
     EXPECT_EQ(policy.hash(), before);

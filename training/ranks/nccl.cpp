@@ -108,8 +108,8 @@ class NcclCommunicator final : public Communicator {
     if (tensor.numel() == 0) return;
     const c10::DeviceGuard guard(device_);
     const at::Tensor on_device = tensor.to(device_);
-    // Training works on the device's null stream.
-    check(operation(on_device.data_ptr(), static_cast<size_t>(tensor.numel()), type_of(tensor), nullptr), name);
+    const Stream stream = current_stream({MemorySpace::cuda, device_.index()});
+    check(operation(on_device.data_ptr(), static_cast<size_t>(tensor.numel()), type_of(tensor), stream.handle), name);
     if (tensor.device() == device_) return;
     tensor.copy_(on_device);
     ranks_->check();

@@ -31,6 +31,19 @@ struct PatchSize {
   PICTURA_HD int64_t columns() const { return (width_px + patch_px - 1) / patch_px; }
 };
 
+/// What is read of points. Rows of f32 without gaps, each of which begins with `points` pairs (x, y) in units of
+/// unit_m, become the kFeatures numbers of each of its points (see training/point_features.h), behind the row itself
+/// where keeps_rows says so.
+struct PointSize {
+  int64_t rows = 0, features = 0, points = 1;
+  float unit_m = 1;
+  bool keeps_rows = false;
+  static constexpr int64_t kFeatures = 6;
+  PICTURA_HD int64_t kept() const { return keeps_rows ? features : 0; }
+  PICTURA_HD int64_t width() const { return kept() + points * kFeatures; }
+  static constexpr int64_t kMostWidth = 256;
+};
+
 /// Matrices [matrices, tokens, columns] of scores; `columns` is even.
 struct TokenSize {
   ActivationType type = ActivationType::f32;
@@ -70,6 +83,10 @@ class NetworkPasses {
   static constexpr int64_t num_norm_sums(int64_t rows, int64_t period) {
     return std::clamp<int64_t>((8448 + period - 1) / period, 1, std::max<int64_t>(1, rows / period));
   }
+
+  /// out: [rows, width()], at most kMostWidth wide.
+  virtual void point_features(const PointSize& size, const float* rows, ActivationType type, void* out,
+                              Stream stream) = 0;
 
   virtual void patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, Stream stream) = 0;
 

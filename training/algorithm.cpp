@@ -1,0 +1,105 @@
+#include "pictura/training/algorithm.h"
+
+#include "pictura/common/support/interrupt.h"
+#include "pictura/training/schedule.h"
+
+namespace pictura {
+
+namespace {
+
+// The slots that are drawn and encoded where these are active: all, where halted ones are to cost as much.
+at::Tensor seen_slots(const Run& run, const at::Tensor& active) {
+  return run.config.train.halted_slots == HaltedSlots::skip ? active
+                                                            : at::arange(run.rollout.num_slots(), active.options());
+}
+
+// What the policy makes of the active slots at a step that has been recorded.
+Decision decide(Run* run, int64_t step, const at::Tensor& active) {
+  const Config::Train& config = run->config.train;
+  const at::Tensor rows = run->rollout.rows_of(step, seen_slots(*run, active));
+  // In chunks of another size products may be rounded otherwise. Full ones have one, over however many ranks the agents
+  // are divided.
+  const ChunkSizes chunks{config.forward_chunk, config.reproducible};
+  Decision decision = decide(rows, chunks, [run](const at::Tensor& some) { return run->chunks.act(some); });
+  if (rows.size(0) > active.size(0)) {
+    for (at::Tensor* t : {&decision.logits, &decision.log_probs, &decision.value}) *t = t->index_select(0, active);
+  }
+  return decision;
+}
+
+}  // namespace
+
+Collector::Collector(Run* run)
+    : run_(*run),
+      graphs_(run->device, run->graphs.are_used()),
+      records_(static_cast<size_t>(run->rollout.num_steps()) + 1),
+      simulations_(static_cast<size_t>(run->rollout.num_steps())) {}
+
+bool Collector::collect() {
+  bool is_complete = false;
+  run_.on_stream([&] { is_complete = collect_on_stream(); });
+  return is_complete;
+}
+
+bool Collector::collect_on_stream() {
+  Rollout& rollout = run_.rollout;
+  Simulator& simulator = *run_.simulator;
+  const Stream stream = current_stream(run_.device);
+  rollout.values.zero_();
+  for (int64_t step = 0; step < rollout.num_steps(); ++step) {
+    if (run_.communicator->size() == 1 && interrupted()) return false;
+    run_.communicator->step();
+
+    // Act.
+    const at::Tensor slots = record(step);
+    const Decision decision = decide(&run_, step, slots);
+    run_.executor->choose_actions(simulator.controller_input(), span_of<const int64_t>(slots),
+                                  span_of<const float>(decision.log_probs),
+                                  {.argmax = false, .seed = run_.config.run.seed}, rollout.actions_at(step), stream);
+    const at::Tensor chosen = rollout.actions.select(0, step).index_select(0, slots).to(at::kLong).unsqueeze(1);
+    rollout.values.select(0, step).index_copy_(0, slots, decision.value);
+    rollout.log_probs.select(0, step).index_copy_(0, slots, decision.log_probs.gather(1, chosen).squeeze(1));
+
+    simulate(step);
+  }
+  // The value of what is seen last, from which the last transitions bootstrap.
+  const at::Tensor slots = record(rollout.num_steps());
+  const Decision last = decide(&run_, rollout.num_steps(), slots);
+  rollout.values.select(0, rollout.num_steps()).index_copy_(0, slots, last.value);
+  simulator.check(stream);
+  return true;
+}
+
+at::Tensor Collector::record(int64_t step) {
+  RolloutObservations& observations = run_.rollout.observations;
+  const at::Tensor slots = active_slots(run_.simulator->controller_input(), {}, run_.executor.get());
+  // Those whose images are kept are others every time.
+  if (observations.keep_images())
+    observations.record(step, seen_slots(run_, slots));
+  else
+    records_[static_cast<size_t>(step)].run(&graphs_, [&] { observations.record(step, slots); });
+  return slots;
+}
+
+void Collector::simulate(int64_t step) {
+  const PhaseTimer::Scope timed(&run_.timer, Phase::simulate);
+  Rollout& rollout = run_.rollout;
+  simulations_[static_cast<size_t>(step)].run(&graphs_, [&] {
+    const Array actions(rollout.actions_at(step).data(), {rollout.num_slots()}, run_.device);
+    rollout.set_result(step, run_.simulator->step(actions, current_stream(run_.device)), run_.device);
+  });
+}
+
+UpdateStats improve(Run* run) {
+  const Config::Train& config = run->config.train;
+  const UpdateKey key{run->config.run.seed, run->update, learning_rate_at(config, run->agent_steps)};
+  UpdateStats stats;
+  run->on_stream([&] {
+    run->rollout.compute_advantages(config.gamma, config.gae_lambda, run->executor.get());
+    stats = ppo_update(&run->chunks, run->rollout, config, key, run->executor.get(), &run->optimizer, &run->filter,
+                       &run->timer, run->communicator);
+  });
+  return stats;
+}
+
+}  // namespace pictura

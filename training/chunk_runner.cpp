@@ -1,0 +1,113 @@
+#include "pictura/training/chunk_runner.h"
+
+#include <algorithm>
+
+#include <ATen/core/grad_mode.h>
+
+namespace pictura {
+
+using Mode = RepeatedWork::Mode;
+
+ChunkRunner::ChunkRunner(const Policy& policy, const RolloutObservations& observations, PhaseTimer* timer,
+                         Graphs* graphs)
+    : policy_(policy),
+      observations_(observations),
+      timer_(timer),
+      own_graphs_(Device{}, /*are_used=*/false),
+      graphs_(graphs ? graphs : &own_graphs_),
+      stats_(at::zeros({kNumStats}, observations.arrays().ego.options().dtype(at::kDouble))) {}
+
+void ChunkRunner::clear() {
+  works_.clear();
+  graphs_->release_memory();
+}
+
+// Graphs know addresses, so they are given other numbers there; calls take tensors as they are.
+void ChunkRunner::set(at::Tensor* to, const at::Tensor& value) const {
+  if (!graphs_->are_used())
+    *to = value;
+  else if (to->defined() && to->sizes() == value.sizes())
+    to->copy_(value);
+  else
+    *to = value.clone();
+}
+
+ChunkRunner::Work& ChunkRunner::work_of(int64_t size) {
+  if (!graphs_->are_used()) return works_[0];
+  if (generation_ != observations_.generation()) {
+    clear();
+    generation_ = observations_.generation();
+  }
+  if (works_.size() == kMostSizes && !works_.contains(size)) {
+    works_.erase(std::min_element(works_.begin(), works_.end(),
+                                  [](const auto& a, const auto& b) { return a.second.last_use < b.second.last_use; }));
+  }
+  Work& work = works_[size];
+  work.last_use = ++num_uses_;
+  return work;
+}
+
+ChunkRunner::Work& ChunkRunner::observe(const at::Tensor& rows) {
+  Work& work = work_of(rows.size(0));
+  set(&work.rows, rows);
+  const PhaseTimer::Scope timed(observations_.draws_when_gathered() ? timer_ : nullptr, Phase::render);
+  const Mode mode = work.observe.next_mode(*graphs_, observations_.are_complete());
+  if (mode != Mode::launch) work.observation = {};  // before there is another
+  work.observe.run(mode, graphs_, [&] { work.observation = observations_.gather(work.rows); });
+  return work;
+}
+
+Policy::Output ChunkRunner::act(const at::Tensor& rows) {
+  const at::NoGradGuard no_grad;
+  Work& work = observe(rows);
+  const PhaseTimer::Scope timed(timer_, Phase::forward);
+  const Mode mode = work.act.next_mode(*graphs_, work.observe.is_captured());
+  work.act.run(mode, graphs_, [&] { work.output = policy_.forward(work.observation); });
+  return work.output;
+}
+
+Policy::Output ChunkRunner::look(const at::Tensor& rows) {
+  const at::NoGradGuard no_grad;
+  const Work& work = observe(rows);
+  const PhaseTimer::Scope timed(timer_, Phase::learn);
+  return policy_.forward(work.observation);
+}
+
+void ChunkRunner::set_targets(const Targets& targets) {
+  set(&targets_.actions, targets.actions);
+  set(&targets_.old_log_probs, targets.old_log_probs);
+  set(&targets_.returns, targets.returns);
+}
+
+void ChunkRunner::begin_minibatch() { stats_.zero_(); }
+
+void ChunkRunner::learn(const at::Tensor& rows, const at::Tensor& advantages, const at::Tensor& shares, double weight,
+                        const Config::Train& config, const std::function<void(const Losses&)>& diagnose) {
+  Work& work = observe(rows);
+  set(&work.advantages, advantages);
+  // A product with 1 changes no bit, so one graph serves full chunks and those that are filled up.
+  set(&work.shares, shares.defined() || !graphs_->are_used() ? shares : at::ones_like(advantages));
+  if (!work.weight.defined()) work.weight = at::empty({}, stats_.options());
+  work.weight.fill_(weight);
+
+  // Both halves are done one way: graphs keep nothing from which calls could go on backwards.
+  const Mode mode = work.learn.next_mode(*graphs_, work.observe.is_captured() && !diagnose);
+  {
+    const PhaseTimer::Scope timed(timer_, Phase::learn);
+    work.learn.run(mode, graphs_, [&] {
+      work.losses = losses_of(policy_.forward(work.observation), targets_, work.rows, work.advantages, work.shares,
+                              config.clip_coef);
+    });
+  }
+  if (diagnose) diagnose(work.losses);
+  const PhaseTimer::Scope timed(timer_, Phase::backward);
+  work.backward.run(mode, graphs_, [&] {
+    const Losses& losses = work.losses;
+    const at::Tensor loss = losses.policy + config.vf_coef * losses.value - config.ent_coef * losses.entropy;
+    (loss * work.weight.to(loss.scalar_type())).backward();
+    stats_.narrow(0, 0, kNumStats - 1) += work.weight * losses.stats;
+  });
+  work.losses = {};
+}
+
+}  // namespace pictura

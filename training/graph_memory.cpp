@@ -1,0 +1,72 @@
+// The memory of captured graphs: a private pool of torch's allocator, reached through virtual functions alone, since
+// torch's CUDA library is not linked.
+#include "pictura/training/repeated_work.h"
+
+#ifdef PICTURA_TORCH_HAS_CUDA
+#include <atomic>
+
+#include <c10/cuda/CUDACachingAllocator.h>
+#endif
+
+#include "pictura/common/array.h"
+#include "pictura/common/error.h"
+
+namespace pictura {
+
+#ifdef PICTURA_TORCH_HAS_CUDA
+namespace {
+
+c10::cuda::CUDACachingAllocator::CUDAAllocator* torch_allocator() {
+  return static_cast<c10::cuda::CUDACachingAllocator::CUDAAllocator*>(c10::getDeviceAllocator(c10::kCUDA));
+}
+
+// Torch counts its own pools up from 1.
+uint64_t new_id() {
+  static std::atomic<uint64_t> next{uint64_t{1} << 62};
+  return next++;
+}
+
+c10::MempoolId_t pool_of(uint64_t id) { return {id, 0}; }
+
+}  // namespace
+
+void GraphMemory::serve(Stream stream, const std::function<void()>& work) {
+  if (id_ == 0) id_ = new_id();
+  const auto index = static_cast<c10::DeviceIndex>(device_.index);
+  const auto is_own = [stream](cudaStream_t other) { return other == stream.handle; };
+  torch_allocator()->beginAllocateToPool(index, pool_of(id_), is_own);
+  ++uses_;
+  struct End {
+    c10::DeviceIndex index;
+    c10::MempoolId_t pool;
+    ~End() { torch_allocator()->endAllocateToPool(index, pool); }
+  } const end{index, pool_of(id_)};
+  work();
+}
+
+void GraphMemory::release() {
+  if (id_ == 0) return;
+  for (; uses_ > 0; --uses_) {
+    torch_allocator()->releasePool(static_cast<c10::DeviceIndex>(device_.index), pool_of(id_));
+  }
+  // Renderers and simulators allocate past torch.
+  torch_allocator()->emptyCache(pool_of(id_));
+  id_ = 0;
+}
+
+GraphMemory::~GraphMemory() {
+  try {
+    release();
+  } catch (const std::exception&) {
+    // The device is lost, which whoever waits for it is told.
+  }
+}
+#else
+GraphMemory::~GraphMemory() = default;
+void GraphMemory::serve(Stream, const std::function<void()>&) {
+  fail("graphs: this torch has none for {}", name_of(device_));
+}
+void GraphMemory::release() {}
+#endif
+
+}  // namespace pictura

@@ -1,0 +1,43 @@
+#include "pictura/training/losses.h"
+
+#include <ATen/core/grad_mode.h>
+
+namespace pictura {
+
+namespace {
+
+at::Tensor mean_of(const at::Tensor& values, const at::Tensor& shares) {
+  return shares.defined() ? (values * shares).mean() : values.mean();
+}
+
+}  // namespace
+
+at::Tensor log_probs_of(const at::Tensor& all_log_probs, const Targets& targets, const at::Tensor& rows) {
+  // A sum of which all but one are 0: the gradient of gather() waits for the host where algorithms are deterministic.
+  const at::Tensor actions = targets.actions.index_select(0, rows).unsqueeze(1);
+  return all_log_probs.masked_fill(at::arange(all_log_probs.size(1), actions.options()) != actions, 0).sum(1);
+}
+
+Losses losses_of(const Policy::Output& output, const Targets& targets, const at::Tensor& rows,
+                 const at::Tensor& advantages, const at::Tensor& shares, double clip_coef) {
+  const at::Tensor all_log_probs = at::log_softmax(output.logits, 1);
+  const at::Tensor log_prob = log_probs_of(all_log_probs, targets, rows);
+  const at::Tensor log_ratio = log_prob - targets.old_log_probs.index_select(0, rows);
+  const at::Tensor ratio = log_ratio.exp();
+  const at::Tensor clipped = ratio.clamp(1 - clip_coef, 1 + clip_coef);
+  Losses losses;
+  losses.policy = -mean_of(at::minimum(advantages * ratio, advantages * clipped), shares);
+  losses.value = 0.5 * mean_of((output.value - targets.returns.index_select(0, rows)).square(), shares);
+  losses.entropy = -mean_of((all_log_probs.exp() * all_log_probs).sum(1), shares);
+  const at::NoGradGuard no_grad;
+  // Schulman's estimator of the KL divergence, (ratio - 1) - log ratio: unbiased and never negative.
+  const at::Tensor approx_kl = mean_of(ratio - 1 - log_ratio, shares);
+  const at::Tensor clip_fraction = mean_of(((ratio - 1).abs() > clip_coef).to(at::kFloat), shares);
+  losses.stats = at::stack({losses.policy, losses.value, losses.entropy, approx_kl, clip_fraction,
+                            mean_of(log_ratio.abs(), shares)})
+                     .detach()
+                     .to(at::kDouble);
+  return losses;
+}
+
+}  // namespace pictura
