@@ -17,8 +17,8 @@ class CudaGraph final : public DeviceGraph {
  public:
   CudaGraph(Device device, cudaStream_t stream, const std::function<void()>& work) : device_(device) {
     const DeviceGuard guard(device_);
-    // What allocates or waits meanwhile, in any thread, is an error.
-    PICTURA_CUDA(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal));
+    // What allocates or waits meanwhile in this thread is an error. Other threads, as NCCL's, may do so.
+    PICTURA_CUDA(cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal));
     cudaGraph_t graph = nullptr;
     try {
       work();
