@@ -92,6 +92,7 @@ void ChunkRunner::learn(const at::Tensor& rows, const at::Tensor& advantages, co
 
   // Both halves are done one way: graphs keep nothing from which calls could go on backwards.
   const Mode mode = work.learn.next_mode(*graphs_, work.observe.is_captured() && !diagnose);
+  if (mode == Mode::capture) graphs_->make_room();
   {
     const PhaseTimer::Scope timed(timer_, Phase::learn);
     work.learn.run(mode, graphs_, [&] {

@@ -44,6 +44,8 @@ void GraphMemory::serve(Stream stream, const std::function<void()>& work) {
   work();
 }
 
+void GraphMemory::make_room() const { torch_allocator()->emptyCache(); }
+
 void GraphMemory::release() {
   if (id_ == 0) return;
   for (; uses_ > 0; --uses_) {
@@ -66,6 +68,7 @@ GraphMemory::~GraphMemory() = default;
 void GraphMemory::serve(Stream, const std::function<void()>&) {
   fail("graphs: this torch has none for {}", name_of(device_));
 }
+void GraphMemory::make_room() const {}
 void GraphMemory::release() {}
 #endif
 

@@ -237,8 +237,10 @@ TrainReport train(const TrainOptions& options) {
     return train_on_its_device(of_rank, &ranks);
   } catch (const c10::OutOfMemoryError& error) {
     const std::string text = error.what_without_backtrace();
-    const std::string why = "train: " + text.substr(0, text.find('\n')) +
-                            " A smaller train.forward_chunk or simulator.num_slots takes less.";
+    const std::string why =
+        "train: " + text.substr(0, text.find('\n')) +
+        " A smaller train.forward_chunk or simulator.num_slots takes less, and so does train.graphs = "
+        "\"off\".";
     ranks.announce(why);
     throw OutOfMemory(why);
   } catch (const std::exception& error) {

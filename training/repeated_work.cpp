@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include <c10/util/Exception.h>
+
 #include "pictura/backends/make_learner.h"
 #include "pictura/common/error.h"
 #include "pictura/training/torch_device.h"
@@ -13,6 +15,8 @@ std::unique_ptr<DeviceGraph> Graphs::capture(const std::function<void()>& work) 
   std::unique_ptr<DeviceGraph> graph;
   try {
     memory_.serve(stream, [&] { graph = capture_graph(device_, stream, work); });
+  } catch (const c10::OutOfMemoryError&) {
+    throw;
   } catch (const std::exception& error) {
     fail("train: work could not be captured into a CUDA graph (train.graphs = \"off\" does without): {}", error.what());
   }

@@ -21,6 +21,8 @@ class GraphMemory {
 
   /// Does some work whose tensors on the stream come to lie there.
   void serve(Stream stream, const std::function<void()>& work);
+  /// Gives back what torch keeps for later tensors outside of it: it cannot while work is captured.
+  void make_room() const;
   /// Gives it back once no tensor lies there any more. No graph may be launched that was captured before.
   void release();
 
@@ -36,9 +38,12 @@ class Graphs {
   Graphs(Device device, bool are_used) : device_(device), are_used_(are_used), memory_(device) {}
 
   bool are_used() const { return are_used_; }
-  /// What work puts on torch's current stream, which must be none that waits for others.
+  /// What work puts on torch's current stream, which must be none that waits for others. Throws Error naming the key
+  /// where that cannot be captured; c10::OutOfMemoryError.
   std::unique_ptr<DeviceGraph> capture(const std::function<void()>& work);
   void launch(DeviceGraph* graph);
+  /// Before work is captured that takes much memory.
+  void make_room() const { memory_.make_room(); }
   /// Once no graph is left, gives back what they had taken.
   void release_memory() { memory_.release(); }
 
