@@ -106,7 +106,8 @@ TEST_P(DeviceGraphs, TeachWhatCallsTeachToTheBit) {
   EXPECT_EQ(graphs.losses, calls.losses);
   EXPECT_EQ(calls.collecting, std::vector<int64_t>(6, 0));
   EXPECT_EQ(calls.improving, std::vector<int64_t>(6, 0));
-  EXPECT_EQ(graphs.collecting.front(), 0) << "memory is not settled before the first rollout is complete";
+  // Memory is settled with the last step of the first rollout; after it comes what is seen last.
+  EXPECT_LE(graphs.collecting.front(), 2);
   for (size_t update = 3; update < 6; ++update) {
     // Of each step its record, its simulation, and a chunk or two, each what it sees and what the policy makes of it.
     EXPECT_GE(graphs.collecting[update], 13 + 12 + 13 * 2) << update;

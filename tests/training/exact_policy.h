@@ -7,6 +7,7 @@
 #include <ATen/core/grad_mode.h>
 #include <gtest/gtest.h>
 
+#include "pictura/common/support/parallel_for.h"
 #include "pictura/training/algorithm.h"
 #include "pictura/training/precision.h"
 
@@ -118,7 +119,7 @@ inline Config exact_config(const std::string& device, const std::vector<std::str
 
 inline ExactRun run_exactly(const Config& config) {
   const Device device = open_learning_device(config);
-  at::set_num_threads(config.run.num_threads);
+  at::set_num_threads(resolve_num_threads(config.run.num_threads));
   set_reproducible(config.train.reproducible);
   auto made = std::make_unique<ExactPolicy>(device);
   ExactPolicy* const policy = made.get();
