@@ -52,10 +52,10 @@ void ImageFaces::build(const ImageSetting& setting, const StaticGeometryView& ge
   for (std::size_t i = 0; i < strips_.size(); ++i) {
     const float order = static_cast<float>(i) / static_cast<float>(strips_.size());
     auto emit_strip = [&](const CameraFace& face) {
-      Vec3 corners[4];
-      std::copy_n(face.corners, 4, corners);
-      if (face.floor_px > 0) widen_strip(setting.camera, face.floor_px, corners);
-      add(corners, 4, compared_plane(face.plane, setting.camera, order), face.color);
+      Vec3 corners[kMaxWidenedCorners];
+      const int count =
+          widen_in_front(setting.camera, face.floor_px, face.corners, [&](int k, Vec3 p) { corners[k] = p; });
+      add(corners, count, compared_plane(face.plane, setting.camera, order), face.color);
     };
     strip_faces(*strips_[i].strip, setting.camera, setting.line_floor_px, emit_strip);
   }

@@ -116,13 +116,18 @@ __device__ inline float warp_max(float value) {
   return __int_as_float(sortable_bits(__reduce_max_sync(kAllLanes, sortable_bits(__float_as_int(value)))));
 }
 
-// Broadcasts the quad of lane `owner`.
-__device__ inline WarpFace broadcast_quad(ClipShared* storage, int owner, const Quad& quad) {
+// Broadcasts the quad of lane `owner`, widened.
+__device__ inline WarpFace broadcast_quad(const PinholeCamera& camera, ClipShared* storage, int owner,
+                                          const Quad& quad) {
   __syncwarp();
   if (lane_index() == owner) storage->quad = quad;
   __syncwarp();
   const CameraQuad& quad_of_owner = storage->quad.in_camera;
-  return {quad_of_owner.corner[lane_index() & 3], 4, quad_of_owner.plane, quad_of_owner.color, storage->quad.primitive};
+  WarpFace face{{}, 0, quad_of_owner.plane, quad_of_owner.color, storage->quad.primitive};
+  face.count = widen_in_front(camera, storage->quad.floor_px, quad_of_owner.corner, [&face](int i, Vec3 p) {
+    if (i == lane_index()) face.corner = p;
+  });
+  return face;
 }
 
 // The disk of a lit head; no corners if it has faded to black.
@@ -135,11 +140,11 @@ __device__ inline WarpFace make_light(const FaceSetupContext& context, int32_t i
           light_ref(index)};
 }
 
-// clip_face of a lane's face, in place: at most one corner past the last one read is written. Returns the number of
-// corners, or kTooManyCorners if they do not fit or the face is not quite convex.
+// clip_face of a lane's face of `count` corners, in place: at most one corner past the last one read is written.
+// Returns the number of corners, or kTooManyCorners if they do not fit or the face is not quite convex.
 constexpr int kTooManyCorners = -1;
-__device__ inline int clip(const Frustum& f, unsigned crossed, LaneCorners corners) {
-  int count = crossed == kOutside ? 0 : 4;
+__device__ inline int clip(const Frustum& f, unsigned crossed, int count, LaneCorners corners) {
+  if (crossed == kOutside) return 0;
   // Each lane iterates over its own planes.
   PICTURA_NO_UNROLL
   for (; crossed != 0 && count > 0; crossed &= crossed - 1) {

@@ -205,10 +205,10 @@ __device__ inline bool clip_quads(const FaceSetupContext* contexts, ClipShared* 
   int kept = 0;
   auto strip_of = [&](int32_t index) { return context.strips[index]; };
   if (is_active && make_quad(context, primitive.entry, &quad, strip_of)) {
-    if (quad.floor_px > 0.0f) widen_strip(camera, quad.floor_px, quad.in_camera.corner);
     const Frustum frustum = context.setting.frustum;
-    for (int i = 0; i < 4; ++i) corners.set(i, quad.in_camera.corner[i]);
-    kept = clip(frustum, planes_crossed(frustum, quad.in_camera.corner, 4), corners);
+    const int count =
+        widen_in_front(camera, quad.floor_px, quad.in_camera.corner, [corners](int i, Vec3 p) { corners.set(i, p); });
+    kept = clip(frustum, planes_crossed(frustum, corners, count), count, corners);
   }
   ScreenBounds bounds;
   bool is_clockwise = false;
@@ -259,7 +259,8 @@ __device__ inline bool clip_primitives(const FaceSetupContext* contexts, ClipSha
     const FaceSetupContext& its_context = contexts[__shfl_sync(kAllLanes, primitive.image, owner)];
     const int32_t index = index_of(__shfl_sync(kAllLanes, primitive.entry, owner));
     const bool is_stored = make_warp_face(
-        its_context, storage, are_lights ? make_light(its_context, index) : broadcast_quad(storage, owner, quad));
+        its_context, storage,
+        are_lights ? make_light(its_context, index) : broadcast_quad(its_context.setting.camera, storage, owner, quad));
     if (lane_index() == owner) fits = is_stored;
   }
   return fits;

@@ -63,20 +63,9 @@ struct Solid {
   }
 };
 
-// Depth at which a ray (x, y, 1) meets a triangle, or kFar.
-double triangle_depth(Point ray, Point a, Point b, Point c) {
-  const Point normal = cross(b - a, c - a);
-  const double depth = dot(normal, a) / dot(normal, ray);
-  const Point hit = ray * depth;
-  const bool is_inside = dot(normal, cross(b - a, hit - a)) >= 0 && dot(normal, cross(c - b, hit - b)) >= 0 &&
-                         dot(normal, cross(a - c, hit - c)) >= 0;
-  return is_inside ? depth : kFar;
-}
-
-// A strip as drawn: its four corners, the cone of directions through them, and the strip's plane.
+// A strip as drawn: the cone of directions through its sides and ends, and the strip's plane.
 struct PaintedStrip {
-  Point corner[4];
-  Point edge_normal[4];       // inwards
+  Point edge_normal[4];       // inwards; 0 where it is not bounded
   bool crosses_near = false;  // the near plane: where it is drawn, each ray decides
   Point plane;                // unit normal
   double offset = 0;
@@ -94,9 +83,9 @@ struct PaintedStrip {
       if (dot(normal, ray) < 0) return false;
     }
     if (!crosses_near) return true;
-    const double first = triangle_depth(ray, corner[0], corner[1], corner[2]),
-                 second = triangle_depth(ray, corner[0], corner[2], corner[3]);
-    return (first >= kNear_m && first < kFar) || (second >= kNear_m && second < kFar);
+    // Beyond the horizon, where only widening reaches, the plane is behind the eye.
+    const double of_plane = offset / dot(plane, ray);
+    return of_plane >= kNear_m || of_plane <= 0;
   }
   // Depth of its plane, within half and twice the depths of its corners; the largest beyond the horizon.
   double depth(Point ray) const {
@@ -269,7 +258,10 @@ std::vector<int> solids_on(const Tracer& tracer, const std::vector<Point>& outli
   return standing;
 }
 
-// Moves the sides of a strip apart until its width on screen, across its centre line, is floor_px at each end that is
+// Where the side of a strip between two corners, one of them before the near plane, crosses that.
+Point at_near_plane(Point a, Point b) { return a + (b - a) * ((kNear_m - a.z) / (b.z - a.z)); }
+
+// Moves the corners of a strip apart until its width on screen, across its centre line, is floor_px at each end that is
 // in front of the near plane. Depths do not change. Corners: left and right of one end, right and left of the other.
 void widen(const Camera& camera, double floor_px, Point* corners) {
   // The normal of the plane through the eye and the centre line, which is a line on screen with this normal.
@@ -304,16 +296,28 @@ void add_strip(Tracer* tracer, const Eye& eye, const Camera& camera, const Cone&
   painted.class_id = static_cast<uint8_t>(kClassOfStrip + static_cast<int>(strip.kind));
   painted.rank = static_cast<uint32_t>(strip_rank(strip.kind)) << 28 | index;
   painted.color = strip.color * static_cast<float>(fade);
-  widen(camera, floor_px, corners);
-  std::copy(corners, corners + 4, painted.corner);
+  Point widened[4];
+  std::copy(corners, corners + 4, widened);
+  widen(camera, floor_px, widened);
   auto by_depth = [](Point a, Point b) { return a.z < b.z; };
   const auto [nearest, farthest] = std::minmax_element(corners, corners + 4, by_depth);
   if (farthest->z < kNear_m) return;
   painted.crosses_near = nearest->z < kNear_m;
   painted.nearest_m = std::max(nearest->z, double{kNear_m});
   painted.farthest_m = farthest->z;
-  const double side = dot(cross(corners[2] - corners[0], corners[3] - corners[1]), corners[0]) > 0 ? 1 : -1;
-  for (int i = 0; i < 4; ++i) painted.edge_normal[i] = cross(corners[i], corners[(i + 1) % 4]) * side;
+  // A strip that the eye sees edge on faces it with the sides that widening gives it.
+  const Point* const facing = painted.crosses_near ? corners : widened;
+  const double side = dot(cross(facing[2] - facing[0], facing[3] - facing[1]), facing[0]) > 0 ? 1 : -1;
+  for (int i = 0; i < 4; ++i) {
+    const int next = (i + 1) % 4;
+    Point from = widened[i], to = widened[next];
+    // A side that crosses the near plane leads from there to the widened end; one that is before it bounds nothing.
+    if (from.z < kNear_m && to.z < kNear_m) continue;
+    if (from.z < kNear_m || to.z < kNear_m) {
+      (from.z < kNear_m ? from : to) = at_near_plane(corners[i], corners[next]);
+    }
+    painted.edge_normal[i] = cross(from, to) * side;
+  }
   if (!image.may_intersect(painted)) return;
   std::vector<Point> outline;
   for (const Vec3& corner : world) outline.push_back(point(corner));

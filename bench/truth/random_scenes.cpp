@@ -66,7 +66,9 @@ RandomScene make_near_plane(Maker m) {
     m.add_line(road(middle.x - along.x * behind_m, middle.y - along.y * behind_m),
                road(middle.x + along.x * ahead_m, middle.y + along.y * ahead_m), width_m(), kind);
   }
-  const float box_heading = m.between(0, kTwoPi), left_m = m.between(-2, 2), ahead_m = m.between(3, 9);
+  // On a slope, beyond the strips: a box on one of them and two of several planes may be in a cycle.
+  const float box_heading = m.between(0, kTwoPi), left_m = m.between(-2, 2),
+              ahead_m = m.between(3, 9) + (slope == 0 ? 0.0f : 8.0f);
   m.add_box(road(ahead_m, left_m), box_heading, {4.2f, 1.8f, 1.5f});
   const float line_floor_px = m.one_of({0.0f, 0.35f, 0.35f, 2.0f}), pitch = m.between(-0.7f, 0.1f),
               heading = m.between(-0.5f, 0.5f);

@@ -42,7 +42,8 @@ PICTURA_HD inline unsigned planes_outside(const Frustum& f, Vec3 p) {
 /// Bit mask of the frustum's planes that a face (camera coordinates) crosses; kOutside if it is entirely outside of
 /// one.
 constexpr unsigned kOutside = ~0u;
-PICTURA_HD inline unsigned planes_crossed(const Frustum& f, const Vec3* corners, int count) {
+template <typename Corners>
+PICTURA_HD inline unsigned planes_crossed(const Frustum& f, const Corners& corners, int count) {
   unsigned outside_of_any = 0, outside_of_all = ~0u;
   PICTURA_UNROLL_FOUR
   for (int i = 0; i < count; ++i) {
@@ -60,6 +61,31 @@ PICTURA_HD inline Vec3 cut_between(Vec3 a, float a_inside, Vec3 b, float b_insid
   const Vec3 inner = a_is_inner ? a : b, outer = a_is_inner ? b : a;
   const float inside = a_is_inner ? a_inside : b_inside, outside = a_is_inner ? b_inside : a_inside;
   return inner + (outer - inner) * (inside * reciprocal_in_range(inside - outside));
+}
+
+/// Maximum number of corners that widen_in_front() emits.
+constexpr int kMaxWidenedCorners = 5;
+/// Widens a strip in camera coordinates to floor_px on screen. If it crosses the near plane, what is before that is cut
+/// off first, so that its sides lead from where they cross the near plane to the widened end: a side that was moved as
+/// a whole would be far from the strip near the camera. Calls emit(i, corner) for i = 0, 1, ... and returns their
+/// number; corners of other faces (floor_px of 0) are emitted as they are.
+template <typename Emit>
+PICTURA_HD inline int widen_in_front(const PinholeCamera& camera, float floor_px, const Vec3* corners, Emit&& emit) {
+  Vec3 widened[4];
+  for (int i = 0; i < 4; ++i) widened[i] = corners[i];
+  if (floor_px > 0.0f) widen_strip(camera, floor_px, widened);
+  int count = 0;
+  for (int i = 0; i < 4; ++i) {
+    const Vec3 previous = corners[(i + 3) % 4], current = corners[i];
+    const float previous_inside = previous.z - kNear_m, inside = current.z - kNear_m;
+    if (floor_px > 0.0f && (previous_inside >= 0.0f) != (inside >= 0.0f)) {
+      Vec3 cut = cut_between(previous, previous_inside, current, inside);
+      cut.z = kNear_m;
+      emit(count++, cut);
+    }
+    if (floor_px <= 0.0f || inside >= 0.0f) emit(count++, widened[i]);
+  }
+  return count;
 }
 
 /// Clips a convex face to the near plane and the guard band. Writes at most kMaxPolygonCorners corners (camera

@@ -44,9 +44,11 @@ constexpr float kLevel_px = 1e-6f, kUpright_px = 1e-6f;
 constexpr int kSampleColumns = kInt16x8Size, kSampleRows = 8;
 /// Sample tests use heights as 16-bit integers, kRowUnits to a row, relative to the pixel's centre. In the first column
 /// right of the centre, a line's height is clamped to half of kLines_rows, and it changes by at most kSteepest rows per
-/// column: so it has left the pixel before it is clamped, and 16 bits do not overflow.
+/// column: so it has left the pixel before it is clamped, and 16 bits do not overflow. Steeper lines are turned about
+/// the pixel's centre to kSteepest, so that they cross a column over some 8 rows: upright ones would take all of a
+/// column's samples at once, which counts areas in eighths of the pixel.
 constexpr int kRowUnits = 128;
-constexpr float kLines_rows = 256.0f, kSteepest = 30.0f;
+constexpr float kLines_rows = 256.0f, kSteepest = 9.0f;
 
 PICTURA_HD inline PolygonEdge make_edge(Vec2 from, Vec2 to) {
   const bool downward = from.y < to.y || (from.y == to.y && from.x < to.x);

@@ -92,9 +92,13 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primi
     make_quad_face(setting.camera, setting.frustum, quad, is_clockwise, face.plane, face.color, store_edge, face_out);
   } else {
     Vec3 corners[kMaxFaceCorners], polygon[kMaxPolygonCorners];
-    for (int i = 0; i < face.count; ++i) corners[i] = face.corners[i];
-    if (face.floor_px > 0.0f) widen_strip(setting.camera, face.floor_px, corners);
-    const int kept = clip_face(setting.frustum, corners, face.count, polygon);
+    int count = face.count;
+    if (count == 4) {
+      count = widen_in_front(setting.camera, face.floor_px, face.corners, [&](int i, Vec3 p) { corners[i] = p; });
+    } else {
+      for (int i = 0; i < count; ++i) corners[i] = face.corners[i];
+    }
+    const int kept = clip_face(setting.frustum, corners, count, polygon);
     if (kept < 3) return false;
     edge_begin = pool.take(kept);
     if (edge_begin < 0 || !make_screen_face<kMaxPolygonCorners>(setting.camera, setting.frustum, polygon, kept,

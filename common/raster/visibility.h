@@ -266,9 +266,9 @@ PICTURA_HD inline uint64_t samples_where_positive(float value, Vec2 gradient, Ve
 }
 
 /// Of the samples that faces a and b of two primitives share, those at which a is in front: all or none, decided at
-/// their centroid. Only where the planes of two solids intersect within a pixel of it, and all_or_none is false, each
-/// sample is decided by the nearer plane, unless they are equally near in all of the pixel. At all others, b is in
-/// front.
+/// their centroid. Only where two solids change places within a pixel of it, and all_or_none is false, each sample is
+/// decided, by the rule of is_in_front(): the lower object id is in front unless the other is nearer by more than
+/// kEqualDepth. At all others, b is in front.
 template <typename Stands>
 PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFace& b, uint64_t shared, Vec2 corner,
                                             bool all_or_none, Stands&& stands) {
@@ -276,14 +276,13 @@ PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFac
   // Always the lower object id first, so that swapping a and b gives the same arithmetic.
   const bool swapped = b.object_id < a.object_id;
   const float inverse_depth_a = inverse_depth(a, at), inverse_depth_b = inverse_depth(b, at);
-  const float sign = swapped ? -1.0f : 1.0f, lead = sign * (inverse_depth_a - inverse_depth_b);
+  const float sign = swapped ? -1.0f : 1.0f;
+  const float lead =
+      sign * (inverse_depth_a - inverse_depth_b) + kEqualDepth * max_of(inverse_depth_a, inverse_depth_b);
   const Vec2 gradient{sign * (a.inverse_depth_x - b.inverse_depth_x), sign * (a.inverse_depth_y - b.inverse_depth_y)};
   // No sample is further than a pixel from the centroid along either axis.
-  const float reach = fabsf(gradient.x) + fabsf(gradient.y);
-  const bool intersect = fabsf(lead) < reach &&
-                         fabsf(lead) + reach >= kEqualDepth * max_of(inverse_depth_a, inverse_depth_b) &&
-                         !is_strip(a) && !is_strip(b) && !all_or_none;
-  if (!intersect) return is_in_front(a, b, at, stands) ? shared : 0;
+  const bool change_places = fabsf(lead) < fabsf(gradient.x) + fabsf(gradient.y) && !is_strip(a) && !is_strip(b);
+  if (!change_places || all_or_none) return is_in_front(a, b, at, stands) ? shared : 0;
   const uint64_t low_first = samples_where_positive(lead, gradient, middle);
   return shared & (swapped ? ~low_first : low_first);
 }

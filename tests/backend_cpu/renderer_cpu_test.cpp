@@ -139,6 +139,32 @@ TEST(CpuRenderer, StripsAreClippedWhereTheyCrossTheNearPlaneNotTheirCentreLines)
   }
 }
 
+TEST(CpuRenderer, WideningAnEndFarAwayLeavesAStripAsItIsWhereItCrossesTheNearPlane) {
+  // An eye 3 cm above a mark that passes it at 38 degrees, looking down. Its end ahead is widened by 0.4 px on either
+  // side, 4 m away; moved as a whole, its sides would be lifted by half of the eye's height near the camera.
+  StaticGeometry geometry;
+  add_polyline(&geometry, {{-3, -2.6f, 0}, {4.4f, 3.2f, 0}}, 0.3f, StripKind::stop_line);
+  geometry.build_grids();
+  Rig rig = simple_rig(100, 100, 50);
+  rig.cameras[0].position_m = {};
+  rig.cameras[0].pitch_rad = -0.5f;
+  auto drawn = [&](float floor_px) {
+    return draw(geometry, scene_of({}), {make_view({0, 0, 0.03f}, 0)},
+                {.rig = rig, .num_threads = 1, .line_floor_px = floor_px});
+  };
+  const Drawn as_it_is = drawn(0), widened = drawn(1);
+  double covered = 0, added = 0;
+  for (int y = 0; y < 100; ++y) {
+    for (int x = 0; x < 100; ++x) {
+      covered += as_it_is.at(x, y).b;
+      added += std::abs(widened.at(x, y).b - as_it_is.at(x, y).b);
+      if (y > 40) expect_color(widened.at(x, y), as_it_is.at(x, y), 1e-3f);
+    }
+  }
+  EXPECT_GT(covered, 300);
+  EXPECT_LT(added, 40);
+}
+
 TEST(CpuRenderer, FacesInOnePlaneLookTheSameInAMirroredScene) {
   // Three cars of one height, driven into each other: their tops are in one plane.
   auto crash = [](float sign) {

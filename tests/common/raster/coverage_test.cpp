@@ -160,6 +160,18 @@ TEST(Coverage, HoldsForSteepAndLevelEdges) {
   }
 }
 
+TEST(Coverage, SamplesToTheSideOfAnUprightEdgeAreCountedTo64ths) {
+  // Lines of 8 columns alone would count them to eighths of the pixel.
+  for (const float lean : {0.0f, 0.02f, -0.02f}) {
+    for (int step = 0; step <= 200; ++step) {
+      const float x = 1 + static_cast<float>(step) / 200;
+      const std::vector<PolygonEdge> edges = edges_of({{x + lean, 0}, {4, 0}, {4, 3}, {x - lean, 3}});
+      const uint64_t samples = samples_inside(edges[3], 1 - edges[3].x0, 1 - edges[3].y0);
+      EXPECT_NEAR(popcount(samples) / 64.0, 2 - x, 0.02) << x << ' ' << lean;
+    }
+  }
+}
+
 TEST(Coverage, ASharedEdgeSplitsAreaAndSamplesWithoutGapOrOverlap) {
   std::mt19937 random(2);
   std::uniform_real_distribution<float> unit(0, 8);

@@ -328,10 +328,13 @@ TEST(Order, SolidsThatIntersectShareSamplesByWhichIsNearer) {
   std::mt19937_64 random(8);
   std::uniform_real_distribution<float> unit(0, 1);
   auto never = [](uint32_t, uint32_t) { return false; };
-  int split = 0;
+  int split = 0, tied = 0;
   for (int round = 0; round < 2000; ++round) {
+    // Every second pair is nearly in one plane, so that it is equally near in much of the pixel.
+    const float tilt = round % 2 ? 1.0f : 2e-3f;
     auto plane = [&](uint32_t object_id) {
-      return plane_face(object_id, 0.1f + 0.02f * unit(random), Vec2{unit(random) - 0.5f, unit(random) - 0.5f} * 0.02f);
+      const float inverse_depth = 0.1f + 0.02f * tilt * unit(random);
+      return plane_face(object_id, inverse_depth, Vec2{unit(random) - 0.5f, unit(random) - 0.5f} * (0.02f * tilt));
     };
     const ScreenFace a = plane(make_object_id(kWallKind, 5)), b = plane(make_object_id(kAgentKind, 3));
     const uint64_t shared = random() | random();
@@ -342,14 +345,17 @@ TEST(Order, SolidsThatIntersectShareSamplesByWhichIsNearer) {
     for (int sample = 0; sample < 64; ++sample) {
       if (!(shared >> sample & 1)) continue;
       const Vec2 at = corner + centroid_of(uint64_t{1} << sample);
-      const float lead = inverse_depth(a, at) - inverse_depth(b, at);
+      const float nearest = std::max(inverse_depth(a, at), inverse_depth(b, at));
+      const float lead = inverse_depth(a, at) - inverse_depth(b, at), beyond_tie = lead - kEqualDepth * nearest;
       // Almost upright lines are rotated by up to this much in a pixel (see make_edge).
       const Vec2 gradient{a.inverse_depth_x - b.inverse_depth_x, a.inverse_depth_y - b.inverse_depth_y};
-      if (std::abs(lead) < 0.5f / kSteepest * length(gradient)) continue;
-      ASSERT_EQ(a_first >> sample & 1, lead > 0 ? 1u : 0u) << round;
+      if (std::abs(beyond_tie) < 0.5f / kSteepest * length(gradient)) continue;
+      ASSERT_EQ(a_first >> sample & 1, beyond_tie > 0 ? 1u : 0u) << round;
+      tied += lead > 0 && beyond_tie <= 0;
     }
   }
   EXPECT_GT(split, 200);
+  EXPECT_GT(tied, 2000);
 }
 
 TEST(Order, TwoFacesThatFillAPixelAndIntersectFillItTogether) {
