@@ -170,15 +170,16 @@ bool LaneKeepingAgent::stays_on_road(Motion now) const {
 /// The speed from which it can stop before the next closed line.
 float LaneKeepingAgent::speed_before_light(const Motion& now) {
   constexpr float kMargin_m = 2.0f;
-  const float gap_m = to_closed_line(now.speed_mps) - kMargin_m;
+  const float gap_m = to_closed_line(now) - kMargin_m;
   stops_ += gap_m < 1 && now.speed_mps < 0.1f;
   return std::sqrt(2 * 1.5f * std::max(gap_m, 0.0f));
 }
 
 /// From the bumper along the route to the next line that is red, or yellow and can still be stopped at; 1000 where none
-/// is near.
-float LaneKeepingAgent::to_closed_line(float speed_mps) const {
-  constexpr float kLook_m = 45;
+/// is near. Points of the path are too coarse to say whether the bumper is past a line that it stands at: its own place
+/// does.
+float LaneKeepingAgent::to_closed_line(const Motion& now) const {
+  constexpr float kLook_m = 45, kAt_m = 1;
   const Vec2 here = points()[place_].position_m.xy();
   std::vector<size_t> near;
   for (size_t light = 0; light < world_.map.stop_lines.size(); ++light) {
@@ -187,17 +188,20 @@ float LaneKeepingAgent::to_closed_line(float speed_mps) const {
     if (closes && length(world_.map.stop_lines[light].middle_m.xy() - here) < kLook_m + 10) near.push_back(light);
   }
   if (near.empty()) return 1000;
-  const size_t first = ahead(place_, agent_.to_bumper_m()), last = ahead(place_, kLook_m);
+  const SinCos ahead_of_it = sincos_of(now.heading_rad);
+  const Vec2 bumper = Vec2{now.x_m, now.y_m} + Vec2{ahead_of_it.cos, ahead_of_it.sin} * agent_.to_bumper_m();
+  const size_t first = ahead(place_, agent_.to_bumper_m() - kAt_m), last = ahead(place_, kLook_m);
   for (size_t i = first; i < last; ++i) {
     const PathPoint &a = points()[i], &b = points()[i + 1];
-    const float to_line_m = LanePath::kSpacing_m * static_cast<float>(i - first);
+    const float to_line_m = std::max(LanePath::kSpacing_m * static_cast<float>(i - first) - kAt_m, 0.0f);
     const SinCos heading = sincos_of(b.heading_rad);
     for (const size_t light : near) {
       const StopLine& line = world_.map.stop_lines[light];
-      const bool can_stop = to_line_m > 0.5f * square(speed_mps) / 3.0f;
+      const bool can_stop = to_line_m > 0.5f * square(now.speed_mps) / 3.0f;
       if (world_.lights[light] == LightState::yellow && !can_stop) continue;
       const Vec2 from = a.position_m.xy() - line.middle_m.xy(), to = b.position_m.xy() - line.middle_m.xy();
-      if (dot(from, line.direction) < 0 && dot(to, line.direction) >= 0 &&
+      const bool is_past = to_line_m < kAt_m && dot(bumper - line.middle_m.xy(), line.direction) >= 0;
+      if (!is_past && dot(from, line.direction) < 0 && dot(to, line.direction) >= 0 &&
           std::fabs(cross(line.direction, to)) <= line.half_length_m + 0.5f &&
           heading.cos * line.direction.x + heading.sin * line.direction.y > 0.7f &&
           std::fabs(line.middle_m.z - b.position_m.z) < kLevel_m) {

@@ -45,7 +45,7 @@ class LaneKeepingAgent {
   int32_t pursuing_action(const Motion& now, size_t place, float wanted_mps) const;
   bool stays_on_road(Motion now) const;
   float speed_before_light(const Motion& now);
-  float to_closed_line(float speed_mps) const;
+  float to_closed_line(const Motion& now) const;
   float speed_behind_others() const;
   bool has_way(int other) const;
   bool is_changing_lane() const;

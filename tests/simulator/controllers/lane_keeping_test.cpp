@@ -45,7 +45,8 @@ TEST(LaneKeeping, OfACarKeepsItsLaneAndStopsAtRedLightsInEveryTown) { drive_ever
 TEST(LaneKeeping, OfThreeTouchesNoOtherInEveryTown) { drive_everywhere(0.2f, 48, 3, 600); }
 
 /// As many as in evaluation's medium density. Of these 1,080 agents 277 halted as long as they relied on the one ahead
-/// to brake and did not look beside them before changing lanes; now 18.
+/// to brake and did not look beside them before changing lanes; now 17: five pairs where one changes lanes in a bend,
+/// of which it expects others to go on straight, and seven that leave the road where traffic is too slow for a plan.
 TEST(LaneKeeping, OfATownFullOfTrafficSeldomCollides) {
   std::vector<std::string> towns = known_towns();
   towns.emplace_back("procedural");
@@ -56,10 +57,11 @@ TEST(LaneKeeping, OfATownFullOfTrafficSeldomCollides) {
              load_map(town), {.num_threads = 1, .cyclist_fraction = 0.1f}, 1, kAgents, kSteps)) {
       halted += driven.halt_reason != kEventNone;
       goals += driven.goals;
+      EXPECT_EQ(driven.halt_reason & kEventRedLight, 0) << town << " at " << driven.end_m.x << ' ' << driven.end_m.y;
     }
   }
   const auto agents = static_cast<int>(towns.size()) * kAgents;
-  EXPECT_LT(halted, 0.03 * agents);
+  EXPECT_LT(halted, 0.02 * agents);
   EXPECT_GT(goals, agents / 2);
 }
 
