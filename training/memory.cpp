@@ -1,10 +1,13 @@
 #include "pictura/training/memory.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "pictura/common/error.h"
 #include "pictura/common/image.h"
 #include "pictura/common/scene_history.h"
+#include "pictura/simulator/observation_arrays.h"
+#include "pictura/training/point_features.h"
 #include "pictura/training/rollout.h"
 
 namespace pictura {
@@ -55,16 +58,138 @@ double estimated_bytes(const Config& config, Device device) {
   return bytes + static_cast<double>(bytes_of(scenes));
 }
 
+namespace {
+
+// Adds up the layers of a network.
+class LayerSum {
+ public:
+  /// A linear layer, or a convolution, of `rows` rows of `in` numbers to `out`: of its results so many copies are kept
+  /// for the way back, two where an activation follows.
+  void add(double rows, double in, double out, double kept, double kernel_area = 1) {
+    parameters_ += (in * kernel_area + 1) * out;
+    add_values(rows * out, kept);
+    largest_ = std::max(largest_, rows * (in + out));
+  }
+  void add_group(double rows, double in, double width, double kept = 1) {
+    add(rows, in, width, 2);
+    add(rows, width, width, kept);
+  }
+  void add_parameters(double count) { parameters_ += count; }
+  void add_values(double count, double kept) { kept_ += kept * count; }
+
+  double parameters() const { return parameters_; }
+  /// Numbers of a transition: what is kept of all layers, and the gradients at the largest.
+  double values() const { return kept_ + 2 * largest_; }
+
+ private:
+  double parameters_ = 0, kept_ = 0, largest_ = 0;
+};
+
+void add_entity_sets(const Config& config, LayerSum* sum) {
+  const double width = config.policy.embedding_width;
+  for (const ObservationArray& array : kObservationArrays) {
+    if (!is_set(array) || !config.reads(array.part)) continue;
+    const double points = array.name == "controls" ? 2 : 1;
+    const double features = array.features + (config.policy.point_features ? points * kPointFeatures : 0);
+    sum->add_values(array.rows * features, 2);
+    sum->add_group(array.rows, features, width, 2);
+  }
+}
+
+// Images of the size that the rig of these agent-steps has.
+void add_images(const Config& config, const Rig& rig, LayerSum* sum) {
+  const Config::PolicySection& policy = config.policy;
+  const double cameras = static_cast<double>(rig.cameras.size()), queries = policy.num_queries;
+  const bool is_program = policy.backbone != "conv";
+  double channels = 3.0 * policy.patch_px * policy.patch_px, pixels = 0;
+  for (const Camera& camera : rig.cameras) {
+    pixels +=
+        std::ceil(double(camera.width_px) / policy.patch_px) * std::ceil(double(camera.height_px) / policy.patch_px);
+  }
+  sum->add_values(pixels * channels, 1);
+  for (size_t i = 0; i < policy.conv_channels.size() && !is_program; ++i) {
+    pixels /= policy.conv_strides[i] * policy.conv_strides[i];
+    sum->add(pixels, channels, policy.conv_channels[i], 2, policy.conv_kernels[i] * policy.conv_kernels[i]);
+    channels = policy.conv_channels[i];
+  }
+  const double width = channels, rows = cameras * queries, scores = pixels * queries * policy.attention_heads;
+  sum->add_parameters((8 + 1) * width + 4 * width + rows * width + 4 * width * width + 3 * width);
+  sum->add_values(pixels * width, 2);  // tokens before and after their norm
+  sum->add_values(scores, 2);
+  sum->add_values(rows * policy.attention_heads * width, 1);
+  sum->add_values(rows * width, 3);
+  if (policy.attention_mlp > 0) {
+    sum->add_parameters(2 * width);
+    sum->add(rows, width, policy.attention_mlp, 2);
+    sum->add(rows, policy.attention_mlp, width, 2);
+  }
+  sum->add(1, cameras * width, 4.0 * policy.embedding_width, 1);
+}
+
+LayerSum layers_of(const Config& config, const Rig& rig) {
+  const Config::PolicySection& policy = config.policy;
+  LayerSum sum;
+  double sets = 4;
+  if (config.reads_images()) {
+    add_images(config, rig, &sum);
+  } else {
+    add_entity_sets(config, &sum);
+    sets = config.reads(ObservationPart::walls) ? 5 : 4;
+  }
+  const double width = policy.embedding_width,
+               waypoint = kWaypointFeatures + (policy.point_features ? kPointFeatures : 0);
+  sum.add_group(1, config.reads_images() ? kEgoFeatures - 2 : kEgoFeatures, width);
+  sum.add_group(1, kNumConditioning + kNumWaypoints * waypoint, width);
+  double in = (sets + 2) * width;
+  sum.add_values(in, 1);
+  for (int i = 0; i < policy.backbone_layers; ++i) {
+    sum.add(1, in, policy.backbone_width, 2);
+    in = policy.backbone_width;
+  }
+  sum.add(1, in, kNumActions, 3);
+  sum.add(1, in, 1, 1);
+  return sum;
+}
+
+}  // namespace
+
+NetworkSize network_size(const Config& config, Device device) {
+  NetworkSize size;
+  const double value_bytes = !device.is_host() && config.train.precision == Precision::bf16 ? 2 : 4;
+  const auto add = [&](int64_t agent_steps) {
+    const LayerSum sum = layers_of(config, rig_of(config, agent_steps));
+    size.parameters = sum.parameters();
+    size.transition_bytes = std::max(size.transition_bytes, sum.values() * value_bytes + observation_bytes(config));
+  };
+  add(0);
+  for (const auto& change : config.render.schedule) add(change.agent_steps);
+  return size;
+}
+
 void check_memory(const Config& config, Device device, int64_t memory_bytes, int num_ranks) {
-  const double needed = estimated_bytes(config, device) / num_ranks, available = static_cast<double>(memory_bytes);
-  if (needed <= available) return;
+  const double available = static_cast<double>(memory_bytes);
+  const NetworkSize network = network_size(config, device);
+  const auto chunk = static_cast<double>(std::min(config.train.forward_chunk, config.train.minibatch_size));
+  if (network.bytes(chunk) > available) {
+    const double fitting = std::floor((available - network.bytes(0)) / network.transition_bytes);
+    fail(
+        "train: a network of {:.3g} million parameters needs {:.3g} GB by estimate, {:.3g} GB of them for {} "
+        "transitions "
+        "at once (train.forward_chunk); {} has {:.3g} GB: {}",
+        network.parameters / 1e6, network.bytes(chunk) / 1e9, network.transition_bytes * chunk / 1e9, chunk,
+        name_of(device), available / 1e9,
+        fitting >= 1 ? fmt::format("about {} transitions would fit", fitting)
+                     : "it does not fit, see policy.backbone_width, embedding_width and the convolutions' channels");
+  }
+  const double needed = estimated_bytes(config, device) / num_ranks, left = available - network.bytes(chunk);
+  if (needed <= left) return;
   fail(
       "train: {} agents (simulator.num_slots) with rollouts of {} steps (train.num_steps) need {:.3g} GB {}by "
       "estimate, "
-      "the network not counted; {} has {:.3g} GB: about {} agents would fit",
+      "and the network {:.3g} GB; {} has {:.3g} GB: about {} agents would fit",
       config.simulator.num_slots, config.train.num_steps, needed / 1e9,
-      num_ranks > 1 ? fmt::format("on each of {} ranks ", num_ranks) : "", name_of(device), available / 1e9,
-      static_cast<int64_t>(config.simulator.num_slots * (available / needed)));
+      num_ranks > 1 ? fmt::format("on each of {} ranks ", num_ranks) : "", network.bytes(chunk) / 1e9, name_of(device),
+      available / 1e9, static_cast<int64_t>(config.simulator.num_slots * (left / needed)));
 }
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Whether a configuration's agents fit into memory, before anything is made.
+// Whether a configuration's agents and network fit into memory, before anything is made.
 #pragma once
 
 #include "pictura/training/config.h"
@@ -6,11 +6,24 @@
 namespace pictura {
 
 /// What simulator, rollout and update take for all agents of a configuration, by estimate: what grows with
-/// simulator.num_slots, so neither maps nor the network, whose own grows with train.forward_chunk.
+/// simulator.num_slots, so neither maps nor the network.
 double estimated_bytes(const Config& config, Device device);
 
-/// Throws Error naming the settings that decide, and how many agents would fit, where the estimate exceeds
-/// `memory_bytes` of the device; with several ranks, for each one's part.
+/// What the network of a configuration takes. A program (policy.backbone) is not counted: what it computes is its own.
+struct NetworkSize {
+  double parameters = 0;
+  /// Of each parameter, its gradients and what the optimizer keeps.
+  static constexpr double kBytesPerParameter = 20;
+  /// Of a transition on its way forward and back, by estimate, the largest of render.schedule's images included.
+  double transition_bytes = 0;
+  /// With so many transitions at once.
+  double bytes(double transitions) const { return kBytesPerParameter * parameters + transition_bytes * transitions; }
+};
+NetworkSize network_size(const Config& config, Device device);
+
+/// Throws Error naming the settings that decide, and what would fit, where the estimates exceed `memory_bytes` of the
+/// device: for the network with a chunk of train.forward_chunk, and for it and the agents; with several ranks, for each
+/// one's part.
 void check_memory(const Config& config, Device device, int64_t memory_bytes, int num_ranks = 1);
 
 }  // namespace pictura

@@ -1,5 +1,7 @@
-// The memory that agents take, by estimate: near what they do take, and refused where there is less.
+// The memory that agents and the network take, by estimate: near what they do take, and refused where there is less.
 #include "pictura/training/memory.h"
+
+#include <fstream>
 
 #include <gmock/gmock.h>
 #include <malloc.h>
@@ -13,6 +15,7 @@ namespace {
 using test::message_of;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 Config config_of(const std::string& modality, const std::string& images, int num_slots) {
   return load_config(
@@ -53,12 +56,92 @@ TEST_P(EachRollout, TakesAboutWhatIsEstimated) {
 
 TEST(Memory, MoreAgentsThanFitAreRefusedWithTheNumberThatWould) {
   const auto config = [](int num_slots) { return config_of("perspective", "kept", num_slots); };
-  const auto memory_bytes = static_cast<int64_t>(estimated_bytes(config(250), Device{})) + 1;
+  const Config any = config(250);
+  const double network = network_size(any, Device{}).bytes(static_cast<double>(any.train.forward_chunk));
+  const auto memory_bytes = static_cast<int64_t>(estimated_bytes(config(250), Device{}) + network) + 1;
   EXPECT_NO_THROW(check_memory(config(250), Device{}, memory_bytes));
   EXPECT_ANY_THROW(check_memory(config(251), Device{}, memory_bytes));
   EXPECT_THAT(message_of([&] { check_memory(config(1000), Device{}, memory_bytes); }),
               AllOf(HasSubstr("1000 agents (simulator.num_slots)"), HasSubstr("2 steps (train.num_steps)"),
                     HasSubstr("by estimate"), HasSubstr("cpu has"), HasSubstr("about 250 agents would fit")));
+}
+
+class EachNetwork : public testing::TestWithParam<std::vector<std::string>> {
+ protected:
+  // With an update of one chunk of so many transitions.
+  Config config_of_chunk(int transitions) const {
+    std::vector<std::string> overrides = GetParam();
+    for (const char* key : {"train.forward_chunk", "train.minibatch_size"}) {
+      overrides.push_back(fmt::format("{}={}", key, transitions));
+    }
+    overrides.insert(overrides.end(), {"run.device=cpu", "run.num_threads=1", "render.backend=cpu",
+                                       "simulator.num_slots=512", "train.num_steps=4", "train.update_epochs=1"});
+    return load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml", overrides);
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Memory, EachNetwork,
+                         testing::Values(std::vector<std::string>{"policy.modality=vector"},
+                                         std::vector<std::string>{"policy.modality=vector",
+                                                                  "policy.point_features=false",
+                                                                  "policy.embedding_width=200"},
+                                         std::vector<std::string>{"policy.modality=perspective"},
+                                         std::vector<std::string>{"policy.modality=perspective", "policy.patch_px=4"}));
+
+TEST_P(EachNetwork, HasTheParametersThatAreCounted) {
+  const Config config = config_of_chunk(64);
+  EXPECT_EQ(network_size(config, Device{}).parameters, make_policy(config, rig_of(config), Device{}).num_parameters());
+}
+
+// The most that the process has held since the last call, and from now on counts anew.
+double peak_bytes() {
+  std::ifstream status("/proc/self/status");
+  double peak_kib = 0;
+  for (std::string word; status >> word;) {
+    if (word == "VmHWM:") status >> peak_kib;
+  }
+  std::ofstream("/proc/self/clear_refs") << 5;
+  return 1024 * peak_kib;
+}
+
+TEST_P(EachNetwork, TakesAboutWhatIsEstimatedOnTheWayForwardAndBack) {
+  double taken[2];
+  const int chunks[] = {256, 1024};
+  for (int i = 0; i < 2; ++i) {
+    const Config config = config_of_chunk(chunks[i]);
+    const Policy policy = make_policy(config, rig_of(config), Device{});
+    const Rig rig = rig_of(config);
+    Observation observation = row_of(allocate_observations(config, 1, chunks[i], Device{}), 0);
+    observation = observation.map([](const at::Tensor& t) { return at::zeros_like(t); });
+    if (config.reads_images()) {
+      const int64_t height = rig.cameras[0].height_px, width = rig.cameras[0].width_px;
+      observation.images = {{at::zeros({chunks[i], 4, 3, height, width}, at::kByte), {0, 1, 2, 3}}};
+    }
+    malloc_trim(0);
+    peak_bytes();
+    const double before = peak_bytes();
+    const Policy::Output output = policy.forward(observation);
+    (output.logits.sum() + output.value.sum()).backward();
+    taken[i] = peak_bytes() - before;
+  }
+  const double of_transition = (taken[1] - taken[0]) / (chunks[1] - chunks[0]),
+               by_estimate = network_size(config_of_chunk(64), Device{}).transition_bytes;
+  EXPECT_GT(by_estimate, 0.8 * of_transition) << of_transition << " bytes";
+  EXPECT_LT(by_estimate, 1.6 * of_transition) << of_transition << " bytes";
+}
+
+TEST(Memory, ANetworkThatCannotFitIsRefusedBeforeItIsMade) {
+  const auto complaint = [](const std::vector<std::string>& overrides) {
+    const Config config = load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml", overrides);
+    return message_of([&] { check_memory(config, Device{}, 64'000'000'000); });
+  };
+  EXPECT_EQ(complaint({}), test::kNoError);
+  EXPECT_THAT(complaint({"policy.backbone_width=16384", "policy.backbone_layers=16"}),
+              AllOf(HasSubstr("million parameters"), HasSubstr("cpu has 64 GB"), HasSubstr("it does not fit"),
+                    Not(HasSubstr("\n"))));
+  EXPECT_THAT(complaint({"policy.modality=perspective", "train.forward_chunk=1000000", "train.minibatch_size=1000000",
+                         "policy.patch_px=1"}),
+              AllOf(HasSubstr("1000000 transitions at once (train.forward_chunk)"), HasSubstr("transitions would fit"),
+                    Not(HasSubstr("\n"))));
 }
 
 }  // namespace
