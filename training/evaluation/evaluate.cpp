@@ -186,6 +186,7 @@ EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options, Ev
       for (int step = 0; step < options.steps; ++step) {
         if (interrupted()) {
           report.interrupted = true;
+          report.seconds = since_start.seconds();
           // The scenarios of this batch are not finished, those before are.
           if (first > 0) {
             result.scenarios.resize(static_cast<size_t>(first));
