@@ -12,13 +12,6 @@
 
 namespace pictura {
 
-/// One step of one world on one map, ready to be drawn.
-struct Snapshot {
-  StaticGeometry geometry;
-  SceneOwner scene;         // one world with handle 0
-  std::vector<View> views;  // an even selection of the spawned agents
-};
-
 struct SnapshotOptions {
   std::string map = "procedural:1";
   int agents = 120;
@@ -29,8 +22,8 @@ struct SnapshotOptions {
   int num_threads = 0;  // 0: all
 };
 
-/// Drives a world with random actions; one agent in ten is a cyclist, one a pedestrian. Throws Error if the map
-/// cannot be read or no agent can be spawned.
+/// Drives a world with random actions; its views are an even selection of the spawned agents. One agent in ten is a
+/// cyclist, one a pedestrian. Throws Error if the map cannot be read or no agent can be spawned.
 Snapshot drive_snapshot(const SnapshotOptions& options);
 
 /// Error against the truth, pooled over the images that are not blank.

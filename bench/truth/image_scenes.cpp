@@ -26,12 +26,12 @@ bool apart(const AgentBox& a, const AgentBox& b) {
 
 }  // namespace
 
-SyntheticTown make_synthetic_town(uint64_t seed, int num_agents) {
+Snapshot make_synthetic_town(uint64_t seed, int num_agents) {
   std::mt19937_64 random(seed);
   auto uniform = [&](float low, float high) {
     return low + (high - low) * static_cast<float>(random() >> 40) / static_cast<float>(1 << 24);
   };
-  SyntheticTown town;
+  Snapshot town;
   StaticGeometry& geometry = town.geometry;
 
   // Streets along x and y. at(u, v) is the point u along and v across street `line`.
@@ -123,8 +123,8 @@ SyntheticTown make_synthetic_town(uint64_t seed, int num_agents) {
   return town;
 }
 
-SyntheticTown make_crowd() {
-  SyntheticTown town = make_synthetic_town(3, 0);
+Snapshot make_crowd() {
+  Snapshot town = make_synthetic_town(3, 0);
   town.scene = {};
   for (int i = 0; i < 900; ++i) {
     const float x = 10 + 1.5f * static_cast<float>(i % 45), y = 1.5f * static_cast<float>(i / 45) - 15;
@@ -138,12 +138,12 @@ SyntheticTown make_crowd() {
 }
 
 SyntheticWorlds make_synthetic_worlds() {
-  SyntheticTown towns[] = {make_synthetic_town(11, 50), make_synthetic_town(12, 30)};
+  Snapshot towns[] = {make_synthetic_town(11, 50), make_synthetic_town(12, 30)};
   SyntheticWorlds worlds;
-  for (SyntheticTown& town : towns) worlds.maps.push_back(town.geometry);
+  for (Snapshot& town : towns) worlds.maps.push_back(town.geometry);
   SceneOwner& scene = worlds.scene;
   auto add_world = [&](int map, bool has_lights) {
-    const SyntheticTown& town = towns[map];
+    const Snapshot& town = towns[map];
     const auto world = static_cast<int32_t>(scene.geometry.size()), first = static_cast<int32_t>(scene.agents.size());
     scene.agents.insert(scene.agents.end(), town.scene.agents.begin(), town.scene.agents.end());
     if (has_lights) {
@@ -174,8 +174,8 @@ SyntheticWorlds make_synthetic_worlds() {
   return worlds;
 }
 
-SyntheticTown make_bridge() {
-  SyntheticTown bridge;
+Snapshot make_bridge() {
+  Snapshot bridge;
   for (const float y : {-3.5f, 0.0f, 3.5f}) {
     add_polyline(&bridge.geometry, {{-20, y, 0}, {110, y, 0}}, 0.15f, StripKind::lane_mark);
   }
@@ -193,8 +193,8 @@ SyntheticTown make_bridge() {
   return bridge;
 }
 
-SyntheticTown make_hill() {
-  SyntheticTown hill;
+Snapshot make_hill() {
+  Snapshot hill;
   auto road = [](float x, float y) { return Vec3{x, y, x < 10 ? 0.0f : 0.12f * (x - 10)}; };
   for (const float y : {-3.5f, 0.0f, 3.5f}) {
     add_polyline(&hill.geometry, {road(-20, y), road(10, y), road(40, y), road(80, y)}, 0.15f, StripKind::lane_mark);
@@ -234,8 +234,8 @@ SyntheticTown make_hill() {
   return hill;
 }
 
-SyntheticTown make_crash() {
-  SyntheticTown crash;
+Snapshot make_crash() {
+  Snapshot crash;
   crash.scene.agents = {make_box(AgentClass::vehicle, {11, 0.5f, 0}, 0.3f, {4.4f, 1.9f, 1.5f}),
                         make_box(AgentClass::vehicle, {13, -0.6f, 0}, 1.4f, {4.6f, 2.0f, 1.7f}),
                         make_box(AgentClass::cyclist, {8, 1.5f, 0}, 0.9f, {1.8f, 0.6f, 1.7f}),
@@ -321,7 +321,7 @@ Outputs draw_outputs(Renderer* renderer, const SceneOwner& scene, const std::vec
 }
 }  // namespace
 
-Outputs draw_outputs(Renderer* renderer, const SyntheticTown& town, Planes planes) {
+Outputs draw_outputs(Renderer* renderer, const Snapshot& town, Planes planes) {
   renderer->upload(0, town.geometry);
   return draw_outputs(renderer, town.scene, town.views, planes);
 }

@@ -14,16 +14,16 @@ void add_polyline(StaticGeometry* geometry, std::vector<Vec3> points_m, float wi
 
 /// A town-like scene: a grid of streets 60 m apart, crosswalks and lights at crossings, walls along blocks, and
 /// `num_agents` agents on the streets, none touching another.
-struct SyntheticTown {
+struct Snapshot {
   StaticGeometry geometry;
-  SceneOwner scene;         // one world with handle 0
-  std::vector<View> views;  // one per vehicle, ego left out
+  SceneOwner scene;  // one world with handle 0
+  std::vector<View> views;
 };
-SyntheticTown make_synthetic_town(uint64_t seed, int num_agents);
+Snapshot make_synthetic_town(uint64_t seed, int num_agents);
 
 /// A town of strips and walls with a crowd of 900 people, seen from above and along it: far more than fits into the
 /// kernels' shared memory.
-SyntheticTown make_crowd();
+Snapshot make_crowd();
 
 /// Four worlds on two towns: the second town, the first without agents, the first and, without lights, the second
 /// again. One view of the empty world, three of each other, which alternately hide each other's vehicles.
@@ -36,14 +36,14 @@ SyntheticWorlds make_synthetic_worlds();
 
 /// A bridge across the view, with marks and cars on it, above a road with marks and cars: seen from the road, from the
 /// bridge, and from above both.
-SyntheticTown make_bridge();
+Snapshot make_bridge();
 
 /// A road that climbs by 12 %, with marks, a stop line, a bridge over it, walls along it, lights, and upright agents on
 /// it: seen up the hill, down from it, and across it from the bridge.
-SyntheticTown make_hill();
+Snapshot make_hill();
 
 /// Cars that have driven into others, in front of a wall that one of them has driven into; seen from both sides.
-SyntheticTown make_crash();
+Snapshot make_crash();
 
 /// One camera at the origin of the ego frame, 1.5 m up, looking ahead, with round numbers.
 Rig simple_rig(int width_px = 100, int height_px = 100, float focal_px = 50);
@@ -60,7 +60,7 @@ Rig eight_camera_rig();
 /// Difficult scenes, each with a rig: hills, bridges, solids that intersect, odd sizes, one pixel.
 struct HardScene {
   std::string name;
-  SyntheticTown town;
+  Snapshot town;
   Rig rig;
 };
 std::vector<HardScene> hard_scenes();
@@ -74,7 +74,7 @@ struct Outputs {
   bool operator==(const Outputs&) const = default;
 };
 /// Uploads the maps and draws all views.
-Outputs draw_outputs(Renderer* renderer, const SyntheticTown& town, Planes planes);
+Outputs draw_outputs(Renderer* renderer, const Snapshot& town, Planes planes);
 Outputs draw_outputs(Renderer* renderer, const SyntheticWorlds& worlds, Planes planes);
 
 }  // namespace pictura

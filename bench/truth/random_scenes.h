@@ -24,7 +24,7 @@ constexpr int kNumRandomKinds = static_cast<int>(std::size(kRandomKindNames));
 
 /// A scene with one view, and how it is drawn: by one camera of the paper's size and focal length in the view's origin.
 struct RandomScene {
-  SyntheticTown town;
+  Snapshot town;
   RendererConfig config;
 };
 /// Depends on its arguments alone.

@@ -61,7 +61,7 @@ TEST(Invariance, AWallInFrontHidesAnAgentToTheLastBit) {
 }
 
 TEST(Invariance, ImagesDoNotDependOnTheNumberOfThreads) {
-  const SyntheticTown town = make_synthetic_town(3, 60);
+  const Snapshot town = make_synthetic_town(3, 60);
   std::vector<float> first;
   for (const int threads : {1, 2, 7}) {
     const Drawn images =
@@ -87,7 +87,7 @@ void expect_close(const std::vector<float>& a, const std::vector<float>& b) {
 constexpr SinCos kNoTurn{.sin = 0, .cos = 1};
 
 // The town moved by a rotation about z, a shift, or a mirroring of y.
-SyntheticTown moved(const SyntheticTown& town, SinCos turn, Vec3 shift_m, bool mirror) {
+Snapshot moved(const Snapshot& town, SinCos turn, Vec3 shift_m, bool mirror) {
   auto direction = [&](Vec2 v) {
     if (mirror) v.y = -v.y;
     return Vec2{v.x * turn.cos - v.y * turn.sin, v.x * turn.sin + v.y * turn.cos};
@@ -96,7 +96,7 @@ SyntheticTown moved(const SyntheticTown& town, SinCos turn, Vec3 shift_m, bool m
     const Vec2 turned = direction(p.xy());
     return Vec3{turned.x, turned.y, p.z} + shift_m;
   };
-  SyntheticTown out = town;
+  Snapshot out = town;
   for (Strip& strip : out.geometry.strips) {
     strip.a_m = transformed(strip.a_m);
     strip.b_m = transformed(strip.b_m);
@@ -128,28 +128,28 @@ SyntheticTown moved(const SyntheticTown& town, SinCos turn, Vec3 shift_m, bool m
 }
 
 TEST(Invariance, MovingTheWorldChangesNothing) {
-  SyntheticTown town = make_synthetic_town(4, 80);
+  Snapshot town = make_synthetic_town(4, 80);
   town.views.resize(6);
   const RendererConfig config{.rig = paper_rig(), .num_threads = 1};
   const std::vector<float> here = draw(town.geometry, town.scene, town.views, config).rgb;
-  const SyntheticTown shifted = moved(town, kNoTurn, {256, -512, 32}, false);
+  const Snapshot shifted = moved(town, kNoTurn, {256, -512, 32}, false);
   expect_close(draw(shifted.geometry, shifted.scene, shifted.views, config).rgb, here);
-  const SyntheticTown turned = moved(town, sincos_of(1.1f), {}, false);
+  const Snapshot turned = moved(town, sincos_of(1.1f), {}, false);
   expect_close(draw(turned.geometry, turned.scene, turned.views, config).rgb, here);
 }
 
 TEST(Invariance, AQuarterTurnOfTheWorldChangesNoBit) {
   // Exact, as it only swaps coordinates and their signs.
-  SyntheticTown town = make_synthetic_town(4, 80);
+  Snapshot town = make_synthetic_town(4, 80);
   town.views.resize(6);
   const RendererConfig config{.rig = paper_rig(), .num_threads = 1};
   const std::vector<float> here = draw(town.geometry, town.scene, town.views, config).rgb;
-  const SyntheticTown turned = moved(town, {.sin = 1, .cos = 0}, {}, false);
+  const Snapshot turned = moved(town, {.sin = 1, .cos = 0}, {}, false);
   EXPECT_EQ(draw(turned.geometry, turned.scene, turned.views, config).rgb, here);
 }
 
 TEST(Invariance, AMirroredWorldGivesMirroredImages) {
-  SyntheticTown town = make_synthetic_town(6, 80);
+  Snapshot town = make_synthetic_town(6, 80);
   // Faces to the left and right differ in colour; walls and marks do not.
   town.scene = scene_of({});
   town.scene.light_begin = {0, 0};
@@ -157,7 +157,7 @@ TEST(Invariance, AMirroredWorldGivesMirroredImages) {
   for (View& view : town.views) view.ego_agent = -1;
   RendererConfig config{.rig = simple_rig(96, 54, 77), .num_threads = 1};
   const Drawn here = draw(town.geometry, town.scene, town.views, config);
-  const SyntheticTown mirrored = moved(town, kNoTurn, {}, true);
+  const Snapshot mirrored = moved(town, kNoTurn, {}, true);
   Drawn there = draw(mirrored.geometry, mirrored.scene, mirrored.views, config);
   for (std::size_t row = 0; row < there.rgb.size() / 96; ++row) {
     std::reverse(there.rgb.begin() + static_cast<std::ptrdiff_t>(96 * row),
@@ -172,7 +172,7 @@ TEST(Invariance, AMirroredWorldGivesMirroredImages) {
 }
 
 TEST(Invariance, ImagesDoNotDependOnTheOrderOfTheInput) {
-  SyntheticTown town = make_synthetic_town(8, 100);
+  Snapshot town = make_synthetic_town(8, 100);
   town.views.resize(4);
   for (View& view : town.views) view.ego_agent = -1;
   const RendererConfig config{.rig = paper_rig(), .num_threads = 1};

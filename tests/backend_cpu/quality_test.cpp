@@ -12,7 +12,7 @@ namespace {
 
 TEST(Quality, TownsAreWithinThePromisedError) {
   for (const uint64_t seed : {1, 2, 3}) {
-    SyntheticTown town = make_synthetic_town(seed, 120);
+    Snapshot town = make_synthetic_town(seed, 120);
     town.views.resize(4);
     const Quality quality =
         measure_quality(town.geometry, town.scene.batch(), town.views, {.rig = paper_rig(), .num_threads = 1});
@@ -27,7 +27,7 @@ TEST(Quality, TownsAreWithinThePromisedError) {
 }
 
 TEST(Quality, OddSizesAndMixedRigsToo) {
-  SyntheticTown town = make_synthetic_town(5, 60);
+  Snapshot town = make_synthetic_town(5, 60);
   town.views.resize(2);
   RendererConfig config{.rig = paper_rig(97, 55), .num_threads = 1};
   config.rig.cameras.resize(2);
@@ -96,7 +96,7 @@ TEST(Quality, AWallThroughTheImageAndCarsOnBothSides) {
 }
 
 TEST(Quality, RoadsOnTwoLevels) {
-  const SyntheticTown bridge = make_bridge();
+  const Snapshot bridge = make_bridge();
   EXPECT_GE(measure_quality(bridge.geometry, bridge.scene.batch(), bridge.views, {.rig = paper_rig(), .num_threads = 1})
                 .oracle.psnr_db(),
             kMinOraclePsnr_db);

@@ -168,7 +168,7 @@ TEST(CpuRenderer, WideningAnEndFarAwayLeavesAStripAsItIsWhereItCrossesTheNearPla
 TEST(CpuRenderer, FacesInOnePlaneLookTheSameInAMirroredScene) {
   // Three cars of one height, driven into each other: their tops are in one plane.
   auto crash = [](float sign) {
-    SyntheticTown town;
+    Snapshot town;
     const Vec3 size{4.4f, 1.9f, 1.5f};
     town.scene = scene_of({make_box(AgentClass::vehicle, {9, sign * 0.3f, 0}, sign * 0.2f, size),
                            make_box(AgentClass::vehicle, {10, sign * -0.5f, 0}, sign * 1.1f, size),
@@ -178,7 +178,7 @@ TEST(CpuRenderer, FacesInOnePlaneLookTheSameInAMirroredScene) {
     return town;
   };
   const auto renderer = make_renderer("cpu", {.rig = simple_rig(), .num_threads = 1});
-  const SyntheticTown town = crash(1), mirrored = crash(-1);
+  const Snapshot town = crash(1), mirrored = crash(-1);
   const std::vector<uint16_t> seen = draw_outputs(renderer.get(), town, Planes::all).instance_id,
                               seen_mirrored = draw_outputs(renderer.get(), mirrored, Planes::all).instance_id;
   int differing = 0, tops = 0;
@@ -274,7 +274,7 @@ TEST(CpuRenderer, CamerasOfShortBodiesMoveInward) {
 }
 
 TEST(CpuRenderer, DrawsSizesFromOnePixelAndRigsOfMixedSizes) {
-  SyntheticTown town = make_synthetic_town(7, 40);
+  Snapshot town = make_synthetic_town(7, 40);
   town.views.resize(3);
   Rig rig = paper_rig(1, 1);
   rig.cameras[1] = paper_rig(97, 55).cameras[1];
@@ -335,7 +335,7 @@ TEST(CpuRenderer, HalvesAndBytesAreTheFloatsRounded) {
   }
   EXPECT_EQ(to_half(-1), 0);
   EXPECT_EQ(to_half(7), 0x3C00);
-  SyntheticTown town = make_synthetic_town(9, 60);
+  Snapshot town = make_synthetic_town(9, 60);
   town.views.resize(2);
   const RendererConfig config{.rig = paper_rig(20, 11), .num_threads = 1};
   const auto renderer = make_renderer("cpu", config);
@@ -557,7 +557,7 @@ TEST_F(CpuRendererErrors, GeometryThatIsFaulty) {
 
 // A widened strip may cover pixels at which the strip's plane is behind the camera.
 TEST(CpuRenderer, AWidenedStripIsInThePlanesWhereItsColourIs) {
-  SyntheticTown town;
+  Snapshot town;
   Strip strip = {{60, -6, 1.4999f}, {62, 6, 1.49f}, {0.98f, -0.16f}, {0.98f, -0.16f}, 0.15f, kWhiteMarkColor};
   town.geometry.strips.push_back(strip);
   town.geometry.build_grids();

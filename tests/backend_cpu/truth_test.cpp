@@ -12,7 +12,7 @@
 namespace pictura {
 namespace {
 
-Quality quality_of(const SyntheticTown& town, const Rig& rig, float line_floor_px = 0.35f) {
+Quality quality_of(const Snapshot& town, const Rig& rig, float line_floor_px = 0.35f) {
   return measure_quality(town.geometry, town.scene.batch(), town.views,
                          {.rig = rig, .num_threads = 1, .line_floor_px = line_floor_px});
 }
@@ -24,7 +24,7 @@ TEST(Truth, HillsAndBridges) {
 }
 
 TEST(Truth, OddSizesDownToOnePixelAndEightCamerasOfEightSizes) {
-  const SyntheticTown town = make_hill();
+  const Snapshot town = make_hill();
   EXPECT_GE(quality_of(town, paper_rig(97, 55)).oracle.psnr_db(), kMinOraclePsnr_db);
   // All objects share the one pixel.
   EXPECT_LE(quality_of(town, paper_rig(1, 1)).oracle.max_error(), kWorstOracleError);
@@ -59,7 +59,7 @@ struct PlaneDifference {
   std::size_t pixels = 0, classes = 0, instances = 0, depths = 0;
 };
 
-PlaneDifference compare_planes(const SyntheticTown& town, const Camera& camera) {
+PlaneDifference compare_planes(const Snapshot& town, const Camera& camera) {
   PlaneDifference difference;
   for (const View& view : town.views) {
     const Planes planes = planes_of(town.geometry, town.scene, view, camera);
@@ -79,10 +79,10 @@ PlaneDifference compare_planes(const SyntheticTown& town, const Camera& camera) 
 }
 
 TEST(Truth, PlanesShowTheSameSurfaces) {
-  SyntheticTown town = make_synthetic_town(11, 120);
+  Snapshot town = make_synthetic_town(11, 120);
   town.views.resize(6);
-  const SyntheticTown scenes[] = {town, make_hill()};
-  for (const SyntheticTown& scene : scenes) {
+  const Snapshot scenes[] = {town, make_hill()};
+  for (const Snapshot& scene : scenes) {
     const PlaneDifference difference = compare_planes(scene, paper_rig(192, 108).cameras[0]);
     const double allowed = kPlaneShare * static_cast<double>(difference.pixels);
     EXPECT_LE(static_cast<double>(difference.classes), allowed);
@@ -94,7 +94,7 @@ TEST(Truth, PlanesShowTheSameSurfaces) {
 TEST(Truth, NoSolidIsInFrontOfTheWrongOne) {
   // Disjoint footprints: every pixel centre that is not on an edge must show the truth's solid.
   for (const uint64_t seed : {21, 22, 23}) {
-    SyntheticTown town = make_synthetic_town(seed, 150);
+    Snapshot town = make_synthetic_town(seed, 150);
     town.geometry.strips.clear();
     town.geometry.build_grids();
     town.views.resize(12);
@@ -106,7 +106,7 @@ TEST(Truth, NoSolidIsInFrontOfTheWrongOne) {
 }
 
 TEST(Truth, IntersectingBoxesAreDividedWhereTheyMeet) {
-  const SyntheticTown crash = make_crash();
+  const Snapshot crash = make_crash();
   const Quality quality = quality_of(crash, paper_rig());
   EXPECT_LE(quality.oracle.max_error(), kWorstOracleError);
   const PlaneDifference difference = compare_planes(crash, paper_rig(192, 108).cameras[0]);
@@ -114,11 +114,11 @@ TEST(Truth, IntersectingBoxesAreDividedWhereTheyMeet) {
 }
 
 TEST(Truth, VisibilityAgrees) {
-  SyntheticTown town = make_synthetic_town(13, 120);
+  Snapshot town = make_synthetic_town(13, 120);
   town.views.resize(2);
-  const SyntheticTown scenes[] = {town, make_hill()};
+  const Snapshot scenes[] = {town, make_hill()};
   int compared = 0, partly = 0;
-  for (const SyntheticTown& scene : scenes) {
+  for (const Snapshot& scene : scenes) {
     const RendererConfig config{.rig = paper_rig(), .num_threads = 1};
     const auto renderer = make_renderer("cpu", config);
     renderer->upload(0, scene.geometry);
@@ -145,7 +145,7 @@ TEST(Truth, VisibilityAgrees) {
 }
 
 // An image drawn `factor` times larger, averaged down.
-std::vector<float> drawn_down(const SyntheticTown& town, Camera camera, int factor, float line_floor_px) {
+std::vector<float> drawn_down(const Snapshot& town, Camera camera, int factor, float line_floor_px) {
   const int width = camera.width_px, height = camera.height_px;
   camera.width_px *= factor;
   camera.height_px *= factor;
@@ -173,7 +173,7 @@ std::vector<float> drawn_down(const SyntheticTown& town, Camera camera, int fact
 }
 
 TEST(Truth, WithoutAFloorALargerImageAveragedDownIsTheSmallOne) {
-  SyntheticTown town = make_hill();
+  Snapshot town = make_hill();
   town.views.resize(1);
   const Camera camera = paper_rig().cameras[0];
   const TruthImage bare = trace_image(town.geometry, town.scene.batch(), town.views[0], camera, 0);

@@ -42,7 +42,7 @@ void expect_left_current(gl::Context* outer, const char* file, const char* packa
     const CurrentContext entered(outer);
     const Context ours = current();
     EXPECT_NE(ours, before);
-    const SyntheticTown town = make_synthetic_town(1, 10);
+    const Snapshot town = make_synthetic_town(1, 10);
     EXPECT_FALSE(draw(backend, town.geometry, town.scene, town.views, {.num_threads = 1}).empty());
     EXPECT_EQ(current(), ours);
   }

@@ -41,7 +41,7 @@ struct DeviceImages {
 };
 
 TEST_F(GlInterop, WritesTheSameBytesToDeviceMemoryAsToTheHost) {
-  SyntheticTown town = make_synthetic_town(1, 120);
+  Snapshot town = make_synthetic_town(1, 120);
   town.views.resize(12);
   for (const PixelSamples samples : {PixelSamples{}, PixelSamples{.multisample = 4}, PixelSamples{.grid = 4}}) {
     RendererConfig config{.rig = paper_rig(97, 55), .samples = samples};
@@ -82,7 +82,7 @@ TEST_F(GlInterop, WritesTheSameBytesToDeviceMemoryAsToTheHost) {
 }
 
 TEST_F(GlInterop, ASingleViewMayHaveAnyStride) {
-  SyntheticTown town = make_synthetic_town(1, 60);
+  Snapshot town = make_synthetic_town(1, 60);
   town.views.resize(1);
   RendererConfig config{.rig = front_rig(97, 55)};
   const auto on_host = make_renderer("gl:egl", config);
@@ -104,7 +104,7 @@ TEST_F(GlInterop, ASingleViewMayHaveAnyStride) {
 }
 
 TEST_F(GlInterop, RefusesAHostScene) {
-  SyntheticTown town = make_synthetic_town(1, 10);
+  Snapshot town = make_synthetic_town(1, 10);
   town.views.resize(1);
   const auto renderer = make_renderer("gl:egl", {.device = kGpu});
   renderer->upload(0, town.geometry);

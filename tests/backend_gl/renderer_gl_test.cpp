@@ -37,15 +37,15 @@ constexpr SampledQuality kQualities[] = {{{.grid = 1}, kMinGlPsnr1_db},
                                          {{.grid = 4}, kMinGlPsnr4x4_db},
                                          {{.grid = 8}, kMinGlPsnr8x8_db}};
 
-SyntheticTown town_of(uint64_t seed, int num_views) {
-  SyntheticTown town = make_synthetic_town(seed, 120);
+Snapshot town_of(uint64_t seed, int num_views) {
+  Snapshot town = make_synthetic_town(seed, 120);
   town.views.resize(static_cast<std::size_t>(num_views));
   return town;
 }
 
 TEST_P(GlRenderer, DrawsWhatTheOracleDraws) {
   for (const uint64_t seed : {1, 2, 3}) {
-    const SyntheticTown town = town_of(seed, 8);
+    const Snapshot town = town_of(seed, 8);
     RendererConfig config{.num_threads = 1};
     const std::vector<float> oracle = draw("cpu", town.geometry, town.scene, town.views, config);
     for (const SampledQuality& quality : kQualities) {
@@ -60,7 +60,7 @@ TEST_P(GlRenderer, DrawsWhatTheOracleDraws) {
 }
 
 TEST_P(GlRenderer, TolerancesDetectFaults) {
-  const SyntheticTown town = town_of(1, 8);
+  const Snapshot town = town_of(1, 8);
   const RendererConfig config{.num_threads = 1};
   const std::vector<float> oracle = draw("cpu", town.geometry, town.scene, town.views, config);
   RendererConfig shifted = config, without_floor = config, tinted = config;
@@ -89,7 +89,7 @@ TEST_P(GlRenderer, TolerancesDetectFaults) {
 }
 
 TEST_P(GlRenderer, AnySizeAndMixedRigs) {
-  const SyntheticTown town = town_of(5, 3);
+  const Snapshot town = town_of(5, 3);
   RendererConfig config{.rig = paper_rig(97, 55), .num_threads = 1};
   config.rig.cameras[1] = paper_rig(33, 71).cameras[1];
   config.rig.cameras[1].pitch_rad = -0.2f;
@@ -107,7 +107,7 @@ TEST_P(GlRenderer, AnySizeAndMixedRigs) {
 }
 
 TEST_P(GlRenderer, RoadsOnTwoLevels) {
-  const SyntheticTown bridge = make_bridge();
+  const Snapshot bridge = make_bridge();
   RendererConfig config{.num_threads = 1};
   const std::vector<float> oracle = draw("cpu", bridge.geometry, bridge.scene, bridge.views, config);
   config.samples.grid = 8;
@@ -177,7 +177,7 @@ TEST_P(GlRenderer, StripsOfOneLevelAreOrderedByKindThenIndex) {
 
 TEST_P(GlRenderer, BatchesLargerThanAnArrayAreTheSameImages) {
   // More images of one size than OpenGL's guaranteed layers (2048), in two cameras: arrays end within a camera's views.
-  const SyntheticTown town = town_of(3, 16);
+  const Snapshot town = town_of(3, 16);
   RendererConfig config{.rig = paper_rig(3, 2), .num_threads = 1};
   config.rig.cameras.resize(2);
   const std::vector<float> once = draw(GetParam(), town.geometry, town.scene, town.views, config);
@@ -210,14 +210,14 @@ TEST_P(GlRenderer, ImagesLargerThanTheInvocationLimitAreComplete) {
   }
 }
 
-std::vector<uint8_t> draw_bytes(Renderer* renderer, const SyntheticTown& town, const std::vector<View>& views) {
+std::vector<uint8_t> draw_bytes(Renderer* renderer, const Snapshot& town, const std::vector<View>& views) {
   HostImages images(renderer->config().rig, static_cast<int>(views.size()));
   renderer->render(town.scene.batch(), views, images.batch());
   return {images.bytes().begin(), images.bytes().end()};
 }
 
 TEST_P(GlRenderer, BytesAreTheRoundedColors) {
-  const SyntheticTown town = town_of(4, 4);
+  const Snapshot town = town_of(4, 4);
   for (const PixelSamples samples : {PixelSamples{.grid = 1}, PixelSamples{.grid = 3}}) {
     const RendererConfig config{.rig = paper_rig(97, 55), .num_threads = 1, .samples = samples};
     const std::vector<float> colors = draw(GetParam(), town.geometry, town.scene, town.views, config);
@@ -234,8 +234,8 @@ TEST_P(GlRenderer, BytesAreTheRoundedColors) {
 }
 
 TEST_P(GlRenderer, RenderersAreIndependent) {
-  const SyntheticTown town = town_of(1, 6), other_town = town_of(2, 6);
-  auto alone = [](const std::string& backend, const SyntheticTown& shown, PixelSamples samples) {
+  const Snapshot town = town_of(1, 6), other_town = town_of(2, 6);
+  auto alone = [](const std::string& backend, const Snapshot& shown, PixelSamples samples) {
     const auto renderer = make_renderer(backend, {.num_threads = 1, .samples = samples});
     renderer->upload(0, shown.geometry);
     return draw_bytes(renderer.get(), shown, shown.views);
@@ -257,7 +257,7 @@ TEST_P(GlRenderer, RenderersAreIndependent) {
 }
 
 TEST_P(GlRenderer, CanBeUsedByOneThreadAfterAnother) {
-  const SyntheticTown town = town_of(1, 4);
+  const Snapshot town = town_of(1, 4);
   const auto renderer = make_renderer(GetParam(), {.num_threads = 1});
   renderer->upload(0, town.geometry);
   const std::vector<uint8_t> here = draw_bytes(renderer.get(), town, town.views);
@@ -295,7 +295,7 @@ void expect_error(const std::function<void()>& call, const std::string& part) {
 
 TEST_P(GlRenderer, RejectsUnsupportedFeaturesByName) {
   const std::string name = GetParam();
-  const SyntheticTown town = town_of(1, 1);
+  const Snapshot town = town_of(1, 1);
   const auto renderer = make_renderer(name, {.num_threads = 1});
   renderer->upload(0, town.geometry);
   HostImages images(renderer->config().rig, 1);

@@ -26,8 +26,8 @@ struct Step {
   std::vector<View> views;
 };
 
-const SyntheticTown& town_of(int map) {
-  static const SyntheticTown towns[] = {make_synthetic_town(11, 50), make_synthetic_town(12, 30)};
+const Snapshot& town_of(int map) {
+  static const Snapshot towns[] = {make_synthetic_town(11, 50), make_synthetic_town(12, 30)};
   return towns[map];
 }
 
@@ -42,7 +42,7 @@ Step make_step(int step) {
   Step result;
   for (std::size_t i = 0; i < kWorlds; ++i) {
     const World& world = kOrder[(i + static_cast<std::size_t>(step)) % kWorlds];
-    const SyntheticTown& town = town_of(world.map);
+    const Snapshot& town = town_of(world.map);
     const auto index = static_cast<int32_t>(i), first = static_cast<int32_t>(result.scene.agents.size());
     const float ahead_m = 1.5f * static_cast<float>(step);
     const auto add_view = [&](View view, int32_t ego) {

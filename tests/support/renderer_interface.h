@@ -32,8 +32,8 @@ inline std::vector<uint8_t> draw_town(Renderer* renderer, const SceneOwner& scen
 /// Handles are the caller's choice; maps are replaced and released under them; one scene serves several renderers.
 inline void expect_maps_by_handle(const MakeForRig& make) {
   const Rig rig = front_rig(32, 18);
-  SyntheticTown town = make_synthetic_town(1, 20);
-  const SyntheticTown other = make_synthetic_town(2, 20);
+  Snapshot town = make_synthetic_town(1, 20);
+  const Snapshot other = make_synthetic_town(2, 20);
   town.views.resize(2);
   auto named = [&](GeometryHandle handle) {
     SceneOwner scene = town.scene;
@@ -100,7 +100,7 @@ inline void expect_refused_order(const MakeForRig& make) {
 /// and what lies beyond the count is not read.
 inline void expect_counted_views(const MakeForRig& make) {
   const Rig rig = paper_rig(24, 14);
-  SyntheticTown town = make_synthetic_town(1, 20);
+  Snapshot town = make_synthetic_town(1, 20);
   town.views.resize(5);
   const auto renderer = make(rig);
   renderer->upload(0, town.geometry);
@@ -132,7 +132,7 @@ inline void expect_counted_views(const MakeForRig& make) {
 
 /// ... and so do queries; of a view beyond the count the answer is NaN.
 inline void expect_counted_queries(const MakeForRig& make) {
-  SyntheticTown town = make_synthetic_town(1, 20);
+  Snapshot town = make_synthetic_town(1, 20);
   town.views.resize(2);
   const auto renderer = make(paper_rig(24, 14));
   renderer->upload(0, town.geometry);

@@ -27,7 +27,7 @@ namespace {
 
 using test::EmulatedRenderer;
 
-template <typename Scene>  // SyntheticTown or SyntheticWorlds
+template <typename Scene>  // Snapshot or SyntheticWorlds
 void expect_oracles(EmulatedRenderer* renderer, const Scene& town, Planes planes = Planes::none) {
   const Outputs emulated = draw_outputs(renderer, town, planes);
   renderer->check();
@@ -59,7 +59,7 @@ TEST(EmulatedKernels, DrawWhatASoakDraws) {
 RendererConfig config_of(const Rig& rig) { return {.rig = rig, .num_threads = 1}; }
 
 TEST(EmulatedKernels, DrawTheOraclesTownsInAnyOrderOfThreads) {
-  SyntheticTown town = make_synthetic_town(1, 120);
+  Snapshot town = make_synthetic_town(1, 120);
   town.views.resize(2);
   for (const uint64_t seed : {1, 2}) {
     EmulatedRenderer renderer(config_of(paper_rig()), seed);
@@ -70,7 +70,7 @@ TEST(EmulatedKernels, DrawTheOraclesTownsInAnyOrderOfThreads) {
 
 // Distant lines with the largest allowed minimum width, many to a pixel, which occlude each other in cycles.
 TEST(EmulatedKernels, DrawTheWidestLinesInAnyOrderOfThreads) {
-  SyntheticTown town = make_synthetic_town(1, 120);
+  Snapshot town = make_synthetic_town(1, 120);
   town.views.resize(4);
   RendererConfig config = config_of(paper_rig());
   config.line_floor_px = kGuardBand_px;
@@ -88,7 +88,7 @@ TEST(EmulatedKernels, DrawWorldsOfSeveralMaps) {
 
 TEST(EmulatedKernels, DrawBlackWhereNothingIsVisible) {
   EmulatedRenderer renderer(config_of(mixed_rig()), 14);
-  SyntheticTown town;
+  Snapshot town;
   town.geometry.build_grids();
   town.scene.end_world(0);
   town.views = {make_view({0, 0, 0}, 0)};
@@ -162,7 +162,7 @@ TEST(EmulatedKernels, ReportInvalidQueries) {
 
 // Draws a town with a pool that holds only some of its images.
 void expect_some_deferred(uint64_t seed, const EmulatedRenderer::Pool& pool) {
-  SyntheticTown town = make_synthetic_town(1, 120);
+  Snapshot town = make_synthetic_town(1, 120);
   town.views.resize(2);
   EmulatedRenderer renderer(config_of(paper_rig()), seed, pool);
   expect_oracles(&renderer, town);
@@ -178,7 +178,7 @@ TEST(EmulatedKernels, DeferWhenClippedEdgesDoNotFit) { expect_some_deferred(8, {
 TEST(EmulatedKernels, ClipLightsOnAllSides) {
   // A spiral of light heads around a camera, starting nearer than its near plane; they face the camera and overlap each
   // other's disks and all borders of the image. The batch contains nothing else.
-  SyntheticTown town;
+  Snapshot town;
   for (int i = 0; i < 300; ++i) {
     const float angle = 0.4f * static_cast<float>(i), range_m = 0.05f + 0.02f * static_cast<float>(i);
     const SinCos at = sincos_of(angle);
@@ -200,7 +200,7 @@ TEST(EmulatedKernels, ClipLightsOnAllSides) {
 
 // A strip that crosses itself along a border enters the frame twice, and has more corners than a lane can hold.
 TEST(EmulatedKernels, ClipStripsThatCrossThemselves) {
-  SyntheticTown town;
+  Snapshot town;
   for (int i = 0; i < 60; ++i) {
     const SinCos at = sincos_of(0.1f * static_cast<float>(i));
     const Vec2 ahead{at.cos, at.sin}, left = left_normal(ahead);
@@ -223,14 +223,14 @@ TEST(EmulatedKernels, ClipStripsThatCrossThemselves) {
 }
 
 TEST(EmulatedKernels, DrawOddSizesAndPlanes) {
-  SyntheticTown town = make_synthetic_town(2, 60);
+  Snapshot town = make_synthetic_town(2, 60);
   town.views.resize(2);
   EmulatedRenderer renderer(config_of(mixed_rig()), 3);
   expect_oracles(&renderer, town, Planes::all);
 }
 
 TEST(EmulatedKernels, WriteTheOraclesBytesAndHalves) {
-  SyntheticTown town = make_synthetic_town(3, 60);
+  Snapshot town = make_synthetic_town(3, 60);
   town.views.resize(1);
   const RendererConfig config = config_of(mixed_rig());
   EmulatedRenderer emulated(config, 12);
@@ -257,7 +257,7 @@ TEST(EmulatedKernels, DrawTooManyFragmentsInParts) {
 TEST(EmulatedKernels, DrawImagesHigherThanTheLastLaunchDrawsAtOnce) {
   const Rig rig = front_rig(24, 600);
   EmulatedRenderer renderer(config_of(rig), 17);
-  SyntheticTown crowd = make_crowd();
+  Snapshot crowd = make_crowd();
   crowd.views.resize(1);
   expect_oracles(&renderer, crowd, Planes::all);
   EXPECT_GT(renderer.overflow(), 0);
@@ -265,7 +265,7 @@ TEST(EmulatedKernels, DrawImagesHigherThanTheLastLaunchDrawsAtOnce) {
 
 // Each image has one face more than fills its batches, so the number of batches is the maximum.
 TEST(EmulatedKernels, HaveCapacityForTheBatchesOfManyEqualImages) {
-  SyntheticTown town;
+  Snapshot town;
   for (int i = 0; i < 225; ++i) {
     const float x = 5.0f + 0.1f * static_cast<float>(i);
     town.geometry.walls.push_back({{x, -1, 0}, {x, 1, 0}, 1.0f + 0.02f * static_cast<float>(i)});
@@ -281,7 +281,7 @@ TEST(EmulatedKernels, HaveCapacityForTheBatchesOfManyEqualImages) {
 
 TEST(EmulatedKernels, DrawPlanesOfMoreRowsThanFit) {
   // Walls one behind the other, each covering all rows of a tile.
-  SyntheticTown town;
+  Snapshot town;
   for (int i = 0; i < 100; ++i) {
     const float x = 4.0f + 0.25f * static_cast<float>(i);
     town.geometry.walls.push_back({{x, -x, 0}, {x + 0.1f, x, 0}, 12.0f + static_cast<float>(i)});
@@ -296,7 +296,7 @@ TEST(EmulatedKernels, DrawPlanesOfMoreRowsThanFit) {
 }
 
 TEST(EmulatedKernels, MeasureVisibility) {
-  SyntheticTown town = make_synthetic_town(4, 30);
+  Snapshot town = make_synthetic_town(4, 30);
   town.views.resize(1);
   const RendererConfig config = config_of(paper_rig(48, 27));
   EmulatedRenderer emulated(config, 5);
@@ -342,7 +342,7 @@ TEST_P(EmulatedGoldenScenes, LookLikeTheOracle) {
   RendererConfig config = scene.config;
   config.num_threads = 1;
   EmulatedRenderer renderer(config, 6);
-  expect_oracles(&renderer, SyntheticTown{scene.geometry, scene.scene, scene.views}, Planes::all);
+  expect_oracles(&renderer, Snapshot{scene.geometry, scene.scene, scene.views}, Planes::all);
 }
 
 }  // namespace

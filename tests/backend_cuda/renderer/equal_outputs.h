@@ -20,7 +20,7 @@ inline void expect_equal(const Outputs& actual, const Outputs& oracle) {
 }
 
 /// Queries the visibility of each agent of a world in all views; NaN is a valid answer.
-inline void expect_equal_visibility(Renderer* actual, Renderer* oracle, const SyntheticTown& town) {
+inline void expect_equal_visibility(Renderer* actual, Renderer* oracle, const Snapshot& town) {
   std::vector<VisibilityQuery> queries;
   for (std::size_t view = 0; view < town.views.size(); ++view) {
     for (std::size_t agent = 0; agent < town.scene.agents.size(); ++agent) {

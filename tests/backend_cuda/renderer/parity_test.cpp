@@ -24,13 +24,13 @@ using testing::HasSubstr;
 
 class CudaRendererTest : public test::DeviceTest {};
 
-template <typename Scene>  // SyntheticTown or SyntheticWorlds
+template <typename Scene>  // Snapshot or SyntheticWorlds
 void expect_parity(const Scene& town, const RendererConfig& config) {
   const auto oracle = make_renderer("cpu", config), device = make_renderer("cuda", config);
   test::expect_equal(draw_outputs(device.get(), town, Planes::all), draw_outputs(oracle.get(), town, Planes::all));
 }
 
-void expect_parity_of_visibility(const SyntheticTown& town, const RendererConfig& config) {
+void expect_parity_of_visibility(const Snapshot& town, const RendererConfig& config) {
   const auto oracle = make_renderer("cpu", config), device = make_renderer("cuda", config);
   test::expect_equal_visibility(device.get(), oracle.get(), town);
 }
@@ -38,7 +38,7 @@ void expect_parity_of_visibility(const SyntheticTown& town, const RendererConfig
 TEST_F(CudaRendererTest, TownsLookLikeTheOracle) { expect_parity(make_synthetic_town(1, 120), {.rig = paper_rig()}); }
 
 TEST_F(CudaRendererTest, OddSizesAndMixedRigsDoToo) {
-  SyntheticTown town = make_synthetic_town(2, 60);
+  Snapshot town = make_synthetic_town(2, 60);
   town.views.resize(5);
   expect_parity(town, {.rig = mixed_rig(), .line_floor_px = 0});
 }
@@ -48,7 +48,7 @@ TEST_F(CudaRendererTest, WorldsOfSeveralMapsDoToo) { expect_parity(make_syntheti
 // The paper's sizes, and one that a screen shows; each has kernels of its own to build.
 class CudaRendererSizes : public CudaRendererTest, public testing::WithParamInterface<int> {};
 TEST_P(CudaRendererSizes, DoToo) {
-  SyntheticTown town = make_synthetic_town(6, 80);
+  Snapshot town = make_synthetic_town(6, 80);
   town.views.resize(3);
   expect_parity(town, {.rig = paper_rig(GetParam(), GetParam() * 9 / 16)});
 }
@@ -59,7 +59,7 @@ TEST_F(CudaRendererTest, CrowdsInImagesOfManyRowsDoToo) { expect_parity(make_cro
 TEST_F(CudaRendererTest, NothingIsCutOffInCrowdedImages) { expect_parity(make_crowd(), {.rig = paper_rig()}); }
 
 TEST_F(CudaRendererTest, VisibilityAgrees) {
-  SyntheticTown town = make_synthetic_town(4, 60);
+  Snapshot town = make_synthetic_town(4, 60);
   town.views.resize(3);
   expect_parity_of_visibility(town, {.rig = paper_rig()});
 }
@@ -76,11 +76,11 @@ INSTANTIATE_TEST_SUITE_P(All, CudaGoldenScenes, testing::ValuesIn(golden_names("
                          [](const auto& scene) { return scene.param; });
 TEST_P(CudaGoldenScenes, LookLikeTheOracle) {
   const SceneFile scene = load_scene(scene_path(GetParam()));
-  expect_parity(SyntheticTown{scene.geometry, scene.scene, scene.views}, scene.config);
+  expect_parity(Snapshot{scene.geometry, scene.scene, scene.views}, scene.config);
 }
 
 TEST_F(CudaRendererTest, FaultsOfTheDeviceAreThrownByTheNextCall) {
-  SyntheticTown town = make_synthetic_town(5, 5);
+  Snapshot town = make_synthetic_town(5, 5);
   town.views.resize(1);
   const RendererConfig config{.rig = paper_rig(8, 8), .device = {MemorySpace::cuda, 0}};
   const auto renderer = make_renderer("cuda", config);
@@ -117,7 +117,7 @@ TEST_F(CudaRendererTest, WrongDevicesAreRefusedByName) {
   RendererConfig config{.rig = paper_rig(8, 8), .device = {MemorySpace::cuda, 0}};
   const auto renderer = make_renderer("cuda", config);
   EXPECT_EQ(renderer->device(), config.device);
-  const SyntheticTown town = make_synthetic_town(5, 5);
+  const Snapshot town = make_synthetic_town(5, 5);
   const DeviceScene on_device(town.scene.batch());
   DeviceImages staged;
   HostImages images(config.rig, 0);
@@ -140,7 +140,7 @@ TEST_F(CudaRendererTest, DrawsOnItsDeviceWhateverTheCurrentOneIs) {
   int devices = 0;
   PICTURA_CUDA(cudaGetDeviceCount(&devices));
   if (devices < 2) GTEST_SKIP() << "needs two CUDA devices";
-  SyntheticTown town = make_synthetic_town(1, 20);
+  Snapshot town = make_synthetic_town(1, 20);
   town.views.resize(2);
   const RendererConfig config{.rig = paper_rig(16, 9), .device = {MemorySpace::cuda, 1}};
   const auto renderer = make_renderer("cuda", config);
@@ -184,7 +184,7 @@ TEST_F(CudaRendererTest, DrawsAsManyViewsAsItsCountSays) {
 
 // What lies on the host is checked there, before the device sees it.
 TEST_F(CudaRendererTest, HostCallersLearnAtOnceWhatIsWrong) {
-  SyntheticTown town = make_synthetic_town(5, 5);
+  Snapshot town = make_synthetic_town(5, 5);
   const RendererConfig config{.rig = paper_rig(8, 8)};
   const auto renderer = make_renderer("cuda", config);
   renderer->upload(0, town.geometry);

@@ -32,7 +32,7 @@ class CudaStreamTest : public test::DeviceTest {};
 
 // A scene in device memory, and a renderer for callers there.
 struct Stage {
-  SyntheticTown town;
+  Snapshot town;
   RendererConfig config;
   DeviceScene scene;
   DeviceCopy<View> view_copy;
