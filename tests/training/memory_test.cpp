@@ -85,11 +85,13 @@ INSTANTIATE_TEST_SUITE_P(Memory, EachNetwork,
                                                                   "policy.point_features=false",
                                                                   "policy.embedding_width=200"},
                                          std::vector<std::string>{"policy.modality=perspective"},
-                                         std::vector<std::string>{"policy.modality=perspective", "policy.patch_px=4"}));
+                                         std::vector<std::string>{"policy.modality=perspective", "policy.patch_px=1",
+                                                                  "policy.conv_kernels=[5, 3, 3, 3, 3]",
+                                                                  "policy.conv_strides=[2, 2, 2, 1, 1]"}));
 
 TEST_P(EachNetwork, HasTheParametersThatAreCounted) {
   const Config config = config_of_chunk(64);
-  EXPECT_EQ(network_size(config, Device{}).parameters, make_policy(config, rig_of(config), Device{}).num_parameters());
+  EXPECT_EQ(network_size(config, Device{}).parameters, make_policy(config, rig_of(config), Device{})->num_parameters());
 }
 
 // The most that the process has held since the last call, and from now on counts anew.
@@ -108,7 +110,7 @@ TEST_P(EachNetwork, TakesAboutWhatIsEstimatedOnTheWayForwardAndBack) {
   const int chunks[] = {256, 1024};
   for (int i = 0; i < 2; ++i) {
     const Config config = config_of_chunk(chunks[i]);
-    const Policy policy = make_policy(config, rig_of(config), Device{});
+    const std::unique_ptr<const Policy> policy = make_policy(config, rig_of(config), Device{});
     const Rig rig = rig_of(config);
     Observation observation = row_of(allocate_observations(config, 1, chunks[i], Device{}), 0);
     observation = observation.map([](const at::Tensor& t) { return at::zeros_like(t); });
@@ -119,7 +121,7 @@ TEST_P(EachNetwork, TakesAboutWhatIsEstimatedOnTheWayForwardAndBack) {
     malloc_trim(0);
     peak_bytes();
     const double before = peak_bytes();
-    const Policy::Output output = policy.forward(observation);
+    const Policy::Output output = policy->forward(observation);
     (output.logits.sum() + output.value.sum()).backward();
     taken[i] = peak_bytes() - before;
   }
