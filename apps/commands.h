@@ -10,6 +10,7 @@ void add_town_command(CLI::App& app);
 void add_map_command(CLI::App& app);
 void add_plot_command(CLI::App& app);
 void add_render_command(CLI::App& app);
+void add_replay_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);
 #ifdef PICTURA_HAS_TORCH
 void add_train_command(CLI::App& app);

@@ -28,6 +28,7 @@ int main(int argc, char** argv) {
       "  pictura map procedural:7 --png map.png\n"
       "  pictura render procedural --agents 40 --steps 50 --views 4 --out images\n"
       "  pictura simulate procedural --agents 40 --steps 300 --video drive.mp4\n"
+      "  pictura replay procedural --agents 40 --out drive.html\n"
       "  pictura train --config configs/demo.toml --out runs/demo\n"
       "  pictura plot runs/demo --out curves.png\n"
       "Every subcommand has its own help: pictura render --help");
@@ -35,6 +36,7 @@ int main(int argc, char** argv) {
   add_map_command(app);
   add_render_command(app);
   add_simulate_command(app);
+  add_replay_command(app);
 #ifdef PICTURA_HAS_TORCH
   add_train_command(app);
   add_evaluate_command(app);

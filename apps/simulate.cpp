@@ -5,7 +5,9 @@
 
 #include "pictura/apps/commands.h"
 #include "pictura/cli/drive.h"
+#include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
+#include "pictura/cli/record.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
@@ -21,7 +23,8 @@ struct Arguments {
   WorldOptions world;
   int steps = 300;
   BackendOptions backends;
-  std::string policy = "random", video;
+  std::string policy = "random", video, replay;
+  RecordingOptions recording;
   int film_agent = 0;
   float film_width_m = 150;
   bool json = false;
@@ -47,6 +50,7 @@ void refuse_idle_options(const CLI::App& command, const Arguments& arguments) {
       if (command.count(option) > 0) fail_usage("{}: has no effect without --video", option);
     }
   }
+  if (arguments.replay.empty()) refuse_recording_options(command, "--replay");
   if (!is_host_controller(arguments.policy)) return;
   for (const char* option : {"--device", "--renderer", "--samples"}) {
     if (command.count(option) > 0) {
@@ -69,8 +73,14 @@ void run(const Arguments& arguments) {
                                               .num_threads = arguments.world.num_threads});
   }
 
+  std::unique_ptr<Recording> recording;
+  if (!arguments.replay.empty()) {
+    recording = std::make_unique<Recording>(
+        *simulator, RecordedDriver{arguments.policy, world.session.get(), world.renderer.get()}, arguments.recording);
+  }
+
   ProgressLine line;
-  double simulate_s = 0, film_s = 0;
+  double simulate_s = 0, film_s = 0;  // filming and recording
   const auto begin_of_all = std::chrono::steady_clock::now();
   int step = 0;
   for (; step < arguments.steps && !interrupted(); ++step) {
@@ -78,14 +88,20 @@ void run(const Arguments& arguments) {
     if (film) film->add_frame(*simulator);
     film_s += seconds_since(begin_of_frame);
     world.act();
+    const auto begin_of_recording = std::chrono::steady_clock::now();
+    if (recording) recording->before_step(world.commands);
     const auto begin = std::chrono::steady_clock::now();
-    world.step();
-    simulate_s += seconds_since(begin);
+    const StepResult result = world.step();
+    const auto end = std::chrono::steady_clock::now();
+    if (recording) recording->after_step(result);
+    simulate_s += std::chrono::duration<double>(end - begin).count();
+    film_s += std::chrono::duration<double>(begin - begin_of_recording).count() + seconds_since(end);
     line.update(fmt::format("step {}/{}", step + 1, arguments.steps), static_cast<double>(step + 1) / arguments.steps);
   }
   const double drive_s = seconds_since(begin_of_all) - film_s;
   line.finish();
   if (film) film->close();
+  if (recording) write_replay_and_say_so(arguments.replay, recording->finish());
 
   const SimulatorTotals& totals = simulator->totals();
   const Json object{
@@ -149,9 +165,12 @@ void add_simulate_command(CLI::App& app) {
   command->add_option("--film-agent", arguments->film_agent, "The agent that the film follows")
       ->transform(whole_number(0))
       ->capture_default_str();
+  command->add_option("--replay", arguments->replay, "Record it as a page that a browser plays")
+      ->check(file_ending(".html"));
+  add_recording_options(command, &arguments->recording);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
-      "agent_steps_per_s counts the whole loop, policy and its images included, without the film;\n"
+      "agent_steps_per_s counts the whole loop, policy and its images included, without film and replay;\n"
       "simulator_agent_steps_per_s counts the simulator alone.\n"
       "Examples:\n  pictura simulate Town01 --agents 80 --steps 600 --policy random --json\n"
       "  pictura simulate procedural:1 --policy runs/demo/checkpoint.ckpt --video drive.mp4");
@@ -159,6 +178,9 @@ void add_simulate_command(CLI::App& app) {
     refuse_idle_options(*command, *arguments);
     if (arguments->film_agent >= arguments->world.agents) {
       fail_usage("--film-agent: expected 0 to {}, got {}", arguments->world.agents - 1, arguments->film_agent);
+    }
+    if (arguments->recording.followed >= arguments->world.agents) {
+      fail_usage("--follow: expected 0 to {}, got {}", arguments->world.agents - 1, arguments->recording.followed);
     }
     run(*arguments);
   });

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "pictura/common/error.h"
+#include "pictura/drawing/lane_shapes.h"
 
 namespace pictura {
 
@@ -25,27 +26,6 @@ Aabb2 box_of(Span<const LanePoint> points) {
   Aabb2 box = empty_box();
   for (const LanePoint& point : points) grow(&box, point.position_m.xy(), 0.5f * point.width_m);
   return box;
-}
-
-Vec2 border(const LanePoint& point, float side) {
-  const Vec2 left{-std::sin(point.heading_rad), std::cos(point.heading_rad)};
-  return point.position_m.xy() + left * (side * 0.5f * point.width_m);
-}
-
-/// Later layers cover earlier ones.
-int layer_of(LaneType type) {
-  switch (type) {
-    case LaneType::sidewalk: return 0;
-    case LaneType::border:
-    case LaneType::median:
-    case LaneType::restricted:
-    case LaneType::other: return 1;
-    case LaneType::stop:
-    case LaneType::shoulder: return 2;
-    case LaneType::biking: return 3;
-    case LaneType::parking: return 4;
-    default: return 5;
-  }
 }
 
 }  // namespace
@@ -155,20 +135,8 @@ void GroundPen::label(Vec2 position, const std::string& words, const TextStyle& 
   cairo_restore(context());
 }
 
-MapLayers::MapLayers(const RoadMap& map) : map_(map) {
-  for (size_t i = 0; i < map.lanes.size(); ++i) {
-    lane_boxes_.push_back(box_of(map.points_of(map.lanes[i])));
-    lanes_in_order_.push_back(static_cast<int32_t>(i));
-  }
-  // Higher storeys cover lower ones, so that bridges are drawn above the road that they cross.
-  const auto storey = [&](int32_t lane) {
-    return std::floor((map.points_of(map.lanes[static_cast<size_t>(lane)])[0].position_m.z + 2.0f) / 4.0f);
-  };
-  std::stable_sort(lanes_in_order_.begin(), lanes_in_order_.end(), [&](int32_t a, int32_t b) {
-    const float storey_a = storey(a), storey_b = storey(b);
-    if (storey_a != storey_b) return storey_a < storey_b;
-    return layer_of(map.lanes[static_cast<size_t>(a)].type) < layer_of(map.lanes[static_cast<size_t>(b)].type);
-  });
+MapLayers::MapLayers(const RoadMap& map) : map_(map), lanes_in_order_(lanes_in_drawing_order(map)) {
+  for (const Lane& lane : map.lanes) lane_boxes_.push_back(box_of(map.points_of(lane)));
   for (const Marking& marking : map.markings) {
     Aabb2 box = empty_box();
     for (int32_t i = marking.points.begin; i < marking.points.end; ++i) {
@@ -192,10 +160,8 @@ void MapLayers::paint_lanes(GroundPen& pen) const {
   for (const int32_t index : lanes_in_order_) {
     if (!pen.is_visible(lane_boxes_[static_cast<size_t>(index)])) continue;
     const Lane& lane = map_.lanes[static_cast<size_t>(index)];
-    const Span<const LanePoint> points = map_.points_of(lane);
     cairo_new_path(context);
-    for (const LanePoint& point : points) pen.line_to(border(point, 1));
-    for (size_t i = points.size(); i-- > 0;) pen.line_to(border(points[i], -1));
+    for (const Vec2 corner : outline_of(map_, lane)) pen.line_to(corner);
     cairo_close_path(context);
     pen.canvas().set_color(lane_color(lane.type));
     cairo_fill_preserve(context);

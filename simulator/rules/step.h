@@ -200,6 +200,19 @@ PICTURA_HD void find_collisions(const WorldView& world, int agent, const ThreadG
   events = static_cast<uint8_t>(events | kEventCollision | (is_at_fault ? kEventAtFault : kEventNone));
 }
 
+/// What a step's events say to the reward; `motion` is the one before an infraction halts the agent.
+PICTURA_HD inline StepFacts step_facts(const Motion& motion, const LaneFit& fit, int events) {
+  StepFacts facts;
+  facts.motion = motion;
+  facts.fit = fit;
+  facts.passed_waypoint = (events & kEventWaypoint) != 0;
+  facts.passed_last_waypoint = (events & kEventGoal) != 0;
+  facts.collision = (events & kEventCollision) != 0;
+  facts.off_road = (events & (kEventOffRoad | kEventWall)) != 0;
+  facts.red_light = (events & kEventRedLight) != 0;
+  return facts;
+}
+
 /// Phase 3: the reward of an active agent, and its halt after an infraction. Returns the reward's terms. Nothing that
 /// it writes is read by another agent's phase 2.
 PICTURA_HD inline RewardTerms apply_reward_and_halt(const WorldView& world, int agent) {
@@ -207,14 +220,7 @@ PICTURA_HD inline RewardTerms apply_reward_and_halt(const WorldView& world, int 
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
   const int events = agents.events[slot];
-  StepFacts facts;
-  facts.motion = motion_of(agents, slot);
-  facts.fit = fit_of(agents, slot);
-  facts.passed_waypoint = (events & kEventWaypoint) != 0;
-  facts.passed_last_waypoint = (events & kEventGoal) != 0;
-  facts.collision = (events & kEventCollision) != 0;
-  facts.off_road = (events & (kEventOffRoad | kEventWall)) != 0;
-  facts.red_light = (events & kEventRedLight) != 0;
+  const StepFacts facts = step_facts(motion_of(agents, slot), fit_of(agents, slot), events);
   const RewardTerms terms = reward_terms(facts, agents.conditioning + slot * kNumConditioning, world.options.dt_s);
   agents.episode_return[slot] += terms.total();
   agents.episode_events[slot] = static_cast<uint8_t>(agents.episode_events[slot] | events);

@@ -26,11 +26,12 @@ MAY_INCLUDE = {
     "training": SIMULATION | {"backends", "training/rules"},
     "training/rules": SIMULATION,
     "drawing": SIMULATION | {"backends"},
-    "cli": SIMULATION | {"backends", "training"},
+    "replay": SIMULATION | {"backends", "drawing"},
+    "cli": SIMULATION | {"backends", "replay", "training"},
     "bindings": SIMULATION | {"backends", "training"},
     "bench": SIMULATION | {"backends", "backend_cpu/renderer"},
     "bench/commands": SIMULATION | {"backends", "bench", "cli", "drawing", "training"},
-    "apps": SIMULATION | {"backends", "bench/commands", "cli", "drawing", "training"},
+    "apps": SIMULATION | {"backends", "bench/commands", "cli", "drawing", "replay", "training"},
     "tests": None,  # anything
 }
 # Libraries restricted to folders: pattern of the include -> files that may include it.

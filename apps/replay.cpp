@@ -1,0 +1,110 @@
+// `pictura replay`: records episodes as pages that a browser plays, one as a file, or many with an index.
+#include <filesystem>
+
+#include "pictura/apps/commands.h"
+#include "pictura/cli/drive.h"
+#include "pictura/cli/file_options.h"
+#include "pictura/cli/number_options.h"
+#include "pictura/cli/record.h"
+#include "pictura/cli/report.h"
+#include "pictura/common/error.h"
+#include "pictura/common/support/file.h"
+#include "pictura/common/support/interrupt.h"
+#include "pictura/replay/gallery.h"
+
+namespace pictura {
+
+namespace {
+
+struct Arguments {
+  WorldOptions world;
+  int steps = 600, episodes = 10;
+  BackendOptions backends;
+  RecordingOptions recording;
+  std::string policy = "lane", out, gallery;
+};
+
+Replay record(const Arguments& arguments, uint64_t seed, ProgressLine* line_out) {
+  WorldOptions options = arguments.world;
+  options.seed = seed;
+  DrivenWorld world = make_world(options, arguments.policy, arguments.backends);
+  Recording recording(*world.simulator, {arguments.policy, world.session.get(), world.renderer.get()},
+                      arguments.recording);
+  for (int step = 0; step < arguments.steps; ++step) {
+    if (interrupted()) throw Interrupted(fmt::format("interrupted at step {} of {}", step, arguments.steps));
+    world.act();
+    recording.before_step(world.commands);
+    recording.after_step(world.step());
+    line_out->update(fmt::format("seed {}: step {}/{}", seed, step + 1, arguments.steps));
+  }
+  return recording.finish();
+}
+
+void run(const Arguments& arguments) {
+  ProgressLine line;
+  if (arguments.gallery.empty()) {
+    const Replay replay = record(arguments, arguments.world.seed, &line);
+    line.finish();
+    write_replay_and_say_so(arguments.out, replay);
+    return;
+  }
+  make_output_folder(arguments.gallery);
+  for (int episode = 0; episode < arguments.episodes; ++episode) {
+    const uint64_t seed = arguments.world.seed + static_cast<uint64_t>(episode);
+    const Replay replay = record(arguments, seed, &line);
+    line.finish();
+    write_replay_and_say_so((std::filesystem::path(arguments.gallery) / fmt::format("seed_{}.html", seed)).string(),
+                            replay);
+  }
+  const int count = write_gallery(arguments.gallery);
+  fmt::print(stderr, "{}: {} replays\n", (std::filesystem::path(arguments.gallery) / "index.html").string(), count);
+}
+
+}  // namespace
+
+void add_replay_command(CLI::App& app) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("replay", "Record a world as a page that a browser plays");
+  command->add_option("MAP", arguments->world.map, "A .xodr file, a town's name, or procedural[:SEED]")->required();
+  add_world_options(command, &arguments->world);
+  command->add_option("--steps", arguments->steps, "Steps of 0.1 s")->transform(whole_number(1))->capture_default_str();
+  command->add_option("--policy", arguments->policy, "random, idle, lane, or a checkpoint that train wrote")
+      ->capture_default_str();
+  add_policy_backend_options(command, "auto, and drawn as in training", &arguments->backends);
+  add_recording_options(command, &arguments->recording);
+  CLI::Option* const out =
+      command->add_option("--out", arguments->out, "The page to write")->check(file_ending(".html"));
+  CLI::Option* const gallery =
+      command->add_option("--gallery", arguments->gallery,
+                          "Instead of one page: a folder for pages of several seeds, and an index of all replays in "
+                          "it, worst first");
+  gallery->excludes(out);
+  command->add_option("--episodes", arguments->episodes, "How many seeds, from --seed on, --gallery records")
+      ->transform(whole_number(1, 10000))
+      ->capture_default_str();
+  command->footer(
+      "The page holds everything: it opens from disk, in any browser, without a network.\n"
+      "Examples:\n  pictura replay Town01 --agents 120 --steps 1200 --out lane.html\n"
+      "  pictura replay procedural:1 --policy runs/demo/checkpoint.ckpt --follow 3 --cameras --out demo.html\n"
+      "  pictura replay Town05 --policy random --gallery replays --episodes 20");
+  command->callback([arguments, command] {
+    if (arguments->out.empty() && arguments->gallery.empty()) fail_usage("replay: expected --out or --gallery");
+    if (arguments->gallery.empty() && command->count("--episodes") > 0) {
+      fail_usage("--episodes: has no effect without --gallery");
+    }
+    if (arguments->recording.followed >= arguments->world.agents) {
+      fail_usage("--follow: expected 0 to {}, got {}", arguments->world.agents - 1, arguments->recording.followed);
+    }
+    if (is_host_controller(arguments->policy)) {
+      for (const char* option : {"--device", "--renderer", "--samples"}) {
+        if (command->count(option) > 0) {
+          fail_usage("{}: has no effect with the policy '{}', which computes and draws nothing", option,
+                     arguments->policy);
+        }
+      }
+    }
+    run(*arguments);
+  });
+}
+
+}  // namespace pictura

@@ -1,0 +1,140 @@
+#include "pictura/cli/record.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "pictura/cli/number_options.h"
+#include "pictura/commit.h"
+#include "pictura/common/error.h"
+#include "pictura/common/support/file.h"
+#include "pictura/replay/file.h"
+#include "pictura/replay/recorder.h"
+#include "pictura/version.h"
+#ifdef PICTURA_HAS_TORCH
+#include "pictura/training/session.h"
+#endif
+
+namespace pictura {
+
+namespace {
+
+#ifdef PICTURA_HAS_TORCH
+/// The observations of one slot.
+ObservationView of_slot(const ObservationView& all, size_t slot) {
+  ObservationView one;
+#define X(name, type, rows, features, part, comment) \
+  if (!all.name.empty()) one.name = all.name.subspan(slot * (rows) * (features), (rows) * (features));
+  PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
+  return one;
+}
+#endif
+
+RendererConfig cameras_of(const RecordedDriver& driver) {
+  RendererConfig config;
+#ifdef PICTURA_HAS_TORCH
+  if (driver.session && driver.session->reads_images()) config = driver.session->renderer_config();
+#endif
+  config.device = {};   // by the oracle, which draws on the host
+  config.samples = {};  // with exact coverage
+  return config;
+}
+
+/// A word as shells read it.
+std::string quoted(const std::string& word) {
+  constexpr std::string_view kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-+=.,:/@%";
+  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return text + "'";
+}
+
+}  // namespace
+
+void add_recording_options(CLI::App* command, RecordingOptions* options_out) {
+  command
+      ->add_option("--follow", options_out->followed,
+                   "The agent whose decisions and images the replay holds, and that it opens with")
+      ->transform(whole_number(0, kMaxAgentsPerWorld - 1))
+      ->capture_default_str();
+  command->add_flag("--cameras", options_out->cameras,
+                    "Keep the followed agent's images of every step as well, without loss: as its policy was trained, "
+                    "else the paper's");
+}
+
+void refuse_recording_options(const CLI::App& command, const std::string& needed) {
+  for (const char* option : {"--follow", "--cameras"}) {
+    if (command.count(option) > 0) fail_usage("{}: has no effect without {}", option, needed);
+  }
+}
+
+std::string command_line() {
+  const std::string words = read_file("/proc/self/cmdline");
+  std::string line;
+  for (size_t begin = 0; begin < words.size();) {
+    const size_t end = std::min(words.find('\0', begin), words.size());
+    const std::string word = words.substr(begin, end - begin);
+    line += begin == 0 ? std::filesystem::path(word).filename().string() : " " + quoted(word);
+    begin = end + 1;
+  }
+  return line;
+}
+
+struct Recording::Parts {
+  Parts(Simulator& its_simulator, RecordedDriver its_driver, const RecordingOptions& options)
+      : simulator(its_simulator),
+        driver(std::move(its_driver)),
+        followed(options.followed),
+        recorder(simulator, {.followed = options.followed,
+                             .cameras = options.cameras ? std::optional(cameras_of(driver)) : std::nullopt}) {}
+
+  std::optional<ReplayDecision> decision() const {
+#ifdef PICTURA_HAS_TORCH
+    const auto slot = static_cast<size_t>(followed);
+    if (!driver.session || simulator.state().status[slot] != static_cast<uint8_t>(AgentStatus::active)) return {};
+    std::array<float, kNumActions> logits{};
+    std::array<float, 1> value{};
+    driver.session->evaluate(
+        {of_slot(simulator.observations(), slot), &simulator.scene(), simulator.views().subspan(slot, 1), {}},
+        driver.renderer, logits, value);
+    return decision_of(logits, value[0]);
+#else
+    return {};
+#endif
+  }
+
+  Simulator& simulator;
+  const RecordedDriver driver;
+  const int followed;
+  Recorder recorder;
+};
+
+Recording::Recording(Simulator& simulator, const RecordedDriver& driver, const RecordingOptions& options)
+    : parts_(std::make_unique<Parts>(simulator, driver, options)) {}
+
+Recording::~Recording() = default;
+
+void Recording::before_step(Span<const Command> commands) {
+  parts_->recorder.before_step(commands, parts_->decision());
+}
+
+void Recording::after_step(const StepResult& result) { parts_->recorder.after_step(result); }
+
+Replay Recording::finish() {
+  ReplayOrigin origin{.command = command_line(), .commit = PICTURA_COMMIT, .version = PICTURA_VERSION};
+  origin.policy = origin.policy_hash = parts_->driver.policy;
+#ifdef PICTURA_HAS_TORCH
+  if (parts_->driver.session) origin.policy_hash = parts_->driver.session->evaluation_setting().policy_hash;
+#endif
+  return parts_->recorder.finish(std::move(origin));
+}
+
+void write_replay_and_say_so(const std::string& path, const Replay& replay) {
+  write_replay(path, replay);
+  std::error_code none;  // of a device
+  const auto bytes = std::filesystem::file_size(path, none);
+  fmt::print(stderr, "{}: {} agents, {} steps{}\n", path, replay.num_agents, replay.num_frames - 1,
+             none ? "" : fmt::format(", {:.2f} MB", static_cast<double>(bytes) / 1e6));
+}
+
+}  // namespace pictura

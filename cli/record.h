@@ -1,0 +1,59 @@
+// Recording what drives in a world as replays: the options, and what a policy makes of the followed agent.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "pictura/common/renderer.h"
+#include "pictura/replay/replay.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+class PolicySession;
+
+struct RecordingOptions {
+  int followed = 0;
+  bool cameras = false;
+};
+
+/// Adds --follow and --cameras.
+void add_recording_options(CLI::App* command, RecordingOptions* options_out);
+/// Throws UsageError where the command was given one of them, which has no effect without `needed`.
+void refuse_recording_options(const CLI::App& command, const std::string& needed);
+
+/// Who drives, and what draws. A controller has no session; without it, cameras are the paper's.
+struct RecordedDriver {
+  std::string policy;  // as it was asked for
+  PolicySession* session = nullptr;
+  Renderer* renderer = nullptr;  // of the session's images
+};
+
+/// Records the only world of a simulator in host memory.
+class Recording {
+ public:
+  /// The simulator and what the driver names must outlive it. Throws UsageError where there is no such agent.
+  Recording(Simulator& simulator, const RecordedDriver& driver, const RecordingOptions& options);
+  ~Recording();
+
+  /// Around each step.
+  void before_step(Span<const Command> commands);
+  void after_step(const StepResult& result);
+
+  /// The replay until now, of which nothing more can be recorded.
+  Replay finish();
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+/// Writes a replay under this name, and what was written on stderr.
+void write_replay_and_say_so(const std::string& path, const Replay& replay);
+
+/// This process's command, as a shell would read it; the program without its folder.
+std::string command_line();
+
+}  // namespace pictura

@@ -1,0 +1,374 @@
+#include "pictura/replay/file.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "pictura/common/support/file.h"
+#include "pictura/replay/encoding.h"
+#include "pictura/replay/images.h"
+#include "pictura/replay/page_sources.h"
+#include "pictura/replay/template.h"
+#include "pictura/simulator/conditioning.h"
+
+namespace pictura {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kFormat = "pictura replay";
+// What the reader looks for; the page's own script finds its elements by the same names.
+constexpr std::string_view kHeaderBegin = "<script type=\"application/json\" id=\"replay-header\">";
+constexpr std::string_view kDataBegin = "<script type=\"text/plain\" id=\"replay-data\">";
+constexpr std::string_view kImagesBegin = "<script type=\"text/plain\" id=\"replay-images\">";
+constexpr std::string_view kEnd = "</script>";
+
+size_t size(int32_t count) { return static_cast<size_t>(count); }
+
+// The sections, each as its bytes and back.
+
+std::string map_bytes(const std::vector<ReplayShape>& map) {
+  std::string bytes;
+  put_number(static_cast<int32_t>(map.size()), &bytes);
+  std::array<int32_t, 2> before{};
+  for (const ReplayShape& shape : map) {
+    put_number(static_cast<int32_t>(shape.kind), &bytes);
+    put_number(shape.detail, &bytes);
+    put_number(shape.width_cm, &bytes);
+    put_number(static_cast<int32_t>(shape.points_cm.size()), &bytes);
+    for (const std::array<int32_t, 2>& point : shape.points_cm) {
+      for (size_t i = 0; i < 2; ++i) put_number(point[i] - before[i], &bytes);
+      before = point;
+    }
+  }
+  return bytes;
+}
+
+std::vector<ReplayShape> map_from(NumberReader reader) {
+  std::vector<ReplayShape> map(size(reader.next_count()));
+  std::array<int32_t, 2> at{};
+  for (ReplayShape& shape : map) {
+    const int32_t kind = reader.next();
+    PICTURA_CHECK(kind >= 0 && kind < kNumShapeKinds, "map: expected a kind of 0 to {}, got {}", kNumShapeKinds - 1,
+                  kind);
+    shape.kind = static_cast<ShapeKind>(kind);
+    shape.detail = reader.next();
+    shape.width_cm = reader.next();
+    shape.points_cm.resize(size(reader.next_count()));
+    for (std::array<int32_t, 2>& point : shape.points_cm) {
+      for (size_t i = 0; i < 2; ++i)
+        at[i] = static_cast<int32_t>(static_cast<uint32_t>(at[i]) + static_cast<uint32_t>(reader.next()));
+      point = at;
+    }
+  }
+  return map;
+}
+
+void put_body(const ReplayBody& body, std::string* bytes_inout) {
+  put_number(static_cast<int32_t>(body.agent_class), bytes_inout);
+  for (const int32_t size_cm : {body.length_cm, body.width_cm, body.height_cm}) put_number(size_cm, bytes_inout);
+}
+ReplayBody next_body(NumberReader* reader) {
+  ReplayBody body;
+  const int32_t agent_class = reader->next();
+  PICTURA_CHECK(agent_class >= 0 && agent_class < kNumAgentClasses, "episodes: expected a class of 0 to {}, got {}",
+                kNumAgentClasses - 1, agent_class);
+  body.agent_class = static_cast<AgentClass>(agent_class);
+  for (int32_t* size_cm : {&body.length_cm, &body.width_cm, &body.height_cm}) *size_cm = reader->next();
+  return body;
+}
+
+std::string episode_bytes(const std::vector<ReplayEpisode>& episodes) {
+  std::string bytes;
+  put_number(static_cast<int32_t>(episodes.size()), &bytes);
+  for (const ReplayEpisode& episode : episodes) {
+    for (const int32_t value : {episode.index, episode.first_frame, episode.num_frames}) put_number(value, &bytes);
+    for (const ReplayBody& body : episode.agents) put_body(body, &bytes);
+    put_number(static_cast<int32_t>(episode.parked.size()), &bytes);
+    for (const ReplayParkedCar& car : episode.parked) {
+      put_body(car.body, &bytes);
+      for (const int32_t value : {car.x_cm, car.y_cm, car.z_cm, car.heading_ddeg}) put_number(value, &bytes);
+    }
+    put_number(static_cast<int32_t>(episode.chains.size()), &bytes);
+    for (const ReplayChain& chain : episode.chains) {
+      put_number(chain.frame, &bytes);
+      put_number(chain.agent, &bytes);
+      for (const auto* values : {&chain.x_cm, &chain.y_cm, &chain.z_cm}) {
+        for (const int32_t value : *values) put_number(value, &bytes);
+      }
+    }
+  }
+  return bytes;
+}
+
+std::vector<ReplayEpisode> episodes_from(NumberReader reader, int32_t num_agents) {
+  std::vector<ReplayEpisode> episodes(size(reader.next_count()));
+  for (ReplayEpisode& episode : episodes) {
+    for (int32_t* value : {&episode.index, &episode.first_frame, &episode.num_frames}) *value = reader.next();
+    for (int32_t agent = 0; agent < num_agents; ++agent) episode.agents.push_back(next_body(&reader));
+    episode.parked.resize(size(reader.next_count()));
+    for (ReplayParkedCar& car : episode.parked) {
+      car.body = next_body(&reader);
+      for (int32_t* value : {&car.x_cm, &car.y_cm, &car.z_cm, &car.heading_ddeg}) *value = reader.next();
+    }
+    episode.chains.resize(size(reader.next_count()));
+    for (ReplayChain& chain : episode.chains) {
+      chain.frame = reader.next();
+      chain.agent = reader.next();
+      PICTURA_CHECK(chain.agent >= 0 && chain.agent < num_agents, "episodes: expected an agent of 0 to {}, got {}",
+                    num_agents - 1, chain.agent);
+      for (auto* values : {&chain.x_cm, &chain.y_cm, &chain.z_cm}) {
+        for (int32_t& value : *values) value = reader.next();
+      }
+    }
+  }
+  return episodes;
+}
+
+std::string conditioning_bytes(const std::vector<ReplayEpisode>& episodes) {
+  std::string bytes;
+  for (const ReplayEpisode& episode : episodes) {
+    bytes.append(reinterpret_cast<const char*>(episode.conditioning.data()),
+                 episode.conditioning.size() * sizeof(float));
+  }
+  return bytes;
+}
+
+void conditioning_from(std::string_view bytes, int32_t num_agents, std::vector<ReplayEpisode>* episodes_inout) {
+  const size_t count = size(num_agents) * kNumConditioning;
+  PICTURA_CHECK(bytes.size() == episodes_inout->size() * count * sizeof(float),
+                "conditioning: expected {} numbers an episode, got {} bytes", count, bytes.size());
+  for (size_t i = 0; i < episodes_inout->size(); ++i) {
+    std::vector<float>& conditioning = (*episodes_inout)[i].conditioning;
+    conditioning.resize(count);
+    std::memcpy(conditioning.data(), bytes.data() + i * count * sizeof(float), count * sizeof(float));
+  }
+}
+
+// Entity after entity, each through all frames: columns of [frames, columns].
+std::string column_bytes(const int32_t* first, size_t frames, size_t columns, int order) {
+  std::string bytes;
+  for (size_t column = 0; column < columns; ++column) put_differences(first + column, frames, columns, order, &bytes);
+  return bytes;
+}
+std::vector<int32_t> columns_from(NumberReader reader, size_t frames, size_t columns, int order) {
+  std::vector<int32_t> values(frames * columns);
+  for (size_t column = 0; column < columns; ++column) {
+    read_differences(&reader, frames, columns, order, values.data() + column);
+  }
+  PICTURA_CHECK(reader.is_at_end(), "expected {} numbers, got more", frames * columns);
+  return values;
+}
+
+constexpr int kLightOrder = 1, kDecisionOrder = 1;
+
+struct Section {
+  std::string name;
+  std::string bytes;
+};
+
+std::vector<Section> sections_of(const Replay& replay) {
+  std::vector<Section> sections{{"map", map_bytes(replay.map)},
+                                {"episodes", episode_bytes(replay.episodes)},
+                                {"conditioning", conditioning_bytes(replay.episodes)}};
+  const size_t frames = size(replay.num_frames);
+  const std::vector<int32_t> lights(replay.lights.begin(), replay.lights.end());
+  sections.push_back({"lights", column_bytes(lights.data(), frames, size(replay.num_lights), kLightOrder)});
+  for (size_t i = 0; i < kNumTracks; ++i) {
+    sections.push_back({std::string(kTracks[i].name),
+                        column_bytes(replay.tracks[i].data(), frames, size(replay.num_agents), kTracks[i].order)});
+  }
+  if (!replay.decisions.empty()) {
+    sections.push_back({"decisions", column_bytes(replay.decisions.data(), frames, kDecisionValues, kDecisionOrder)});
+  }
+  return sections;
+}
+
+Json header_of(const Replay& replay, const std::vector<Section>& sections) {
+  const ReplayOrigin& origin = replay.origin;
+  Json metrics;
+#define X(name) metrics[#name] = replay.metrics.name;
+  PICTURA_REPLAY_METRICS(X)
+#undef X
+  Json tracks = Json::array();
+  for (const TrackInfo& track : kTracks) {
+    tracks.push_back({{"name", track.name}, {"unit", track.unit}, {"order", track.order}});
+  }
+  Json list = Json::array();
+  for (const Section& section : sections) list.push_back({{"name", section.name}, {"bytes", section.bytes.size()}});
+  Json images = nullptr;
+  if (!replay.images.cameras.empty()) {
+    images = {{"frames_per_group", replay.images.frames_per_group},
+              {"cameras", Json::array()},
+              {"group_bytes", Json::array()}};
+    for (const ReplayCamera& camera : replay.images.cameras) {
+      images["cameras"].push_back(
+          {{"name", camera.name}, {"width_px", camera.width_px}, {"height_px", camera.height_px}});
+    }
+    for (const std::string& group : replay.images.groups) images["group_bytes"].push_back(group.size());
+  }
+  return {{"format", kFormat},
+          {"version", kReplayVersion},
+          {"command", origin.command},
+          {"program", origin.version},
+          {"commit", origin.commit},
+          {"map", origin.map},
+          {"map_hash", origin.map_hash},
+          {"policy", origin.policy},
+          {"policy_hash", origin.policy_hash},
+          {"seed", fmt::format("{}", origin.seed)},  // exact in readers whose numbers are doubles
+          {"global_world", origin.global_world},
+          {"dt_s", origin.dt_s},
+          {"agents", replay.num_agents},
+          {"frames", replay.num_frames},
+          {"lights", replay.num_lights},
+          {"followed", replay.followed},
+          {"metrics", metrics},
+          {"conditioning", kConditioningNames},
+          {"decision_unit", kDecisionUnit},
+          {"tracks", tracks},
+          {"sections", list},
+          {"images", images}};
+}
+
+// What stands between an element's begin and its end.
+std::string_view element(std::string_view page, std::string_view begin, const char* what) {
+  const size_t at = page.find(begin);
+  PICTURA_CHECK(at != std::string_view::npos, "expected a page of pictura replay, got a file without {}", what);
+  const size_t first = at + begin.size(), end = page.find(kEnd, first);
+  PICTURA_CHECK(end != std::string_view::npos, "ends within {}", what);
+  return page.substr(first, end - first);
+}
+
+Json header_from(std::string_view page) {
+  Json header = Json::parse(element(page, kHeaderBegin, "a replay's header"));
+  PICTURA_CHECK(header.value("format", "") == kFormat, "expected a replay's header");
+  const int version = header.at("version").get<int>();
+  PICTURA_CHECK(version == kReplayVersion, "expected a replay of version {}, got version {}", kReplayVersion, version);
+  return header;
+}
+
+void check_header(const Replay& replay) {
+  for (const auto& [what, value] :
+       {std::pair{"agents", replay.num_agents}, {"frames", replay.num_frames}, {"lights", replay.num_lights}}) {
+    PICTURA_CHECK(value >= 0 && value <= 1 << 24, "header: {}: expected at most {}, got {}", what, 1 << 24, value);
+  }
+  PICTURA_CHECK(replay.followed >= -1 && replay.followed < replay.num_agents,
+                "header: followed: expected an agent below {}, got {}", replay.num_agents, replay.followed);
+}
+
+void read_header_values(const Json& header, Replay* replay_out) {
+  ReplayOrigin& origin = replay_out->origin;
+  header.at("command").get_to(origin.command);
+  header.at("program").get_to(origin.version);
+  header.at("commit").get_to(origin.commit);
+  header.at("map").get_to(origin.map);
+  header.at("map_hash").get_to(origin.map_hash);
+  header.at("policy").get_to(origin.policy);
+  header.at("policy_hash").get_to(origin.policy_hash);
+  origin.seed = std::stoull(header.at("seed").get<std::string>());
+  header.at("global_world").get_to(origin.global_world);
+  header.at("dt_s").get_to(origin.dt_s);
+  header.at("agents").get_to(replay_out->num_agents);
+  header.at("frames").get_to(replay_out->num_frames);
+  header.at("lights").get_to(replay_out->num_lights);
+  header.at("followed").get_to(replay_out->followed);
+#define X(name) header.at("metrics").at(#name).get_to(replay_out->metrics.name);
+  PICTURA_REPLAY_METRICS(X)
+#undef X
+  check_header(*replay_out);
+}
+
+void read_images(const Json& header, std::string_view page, ReplayImages* images_out) {
+  const Json& images = header.at("images");
+  if (images.is_null()) return;
+  images.at("frames_per_group").get_to(images_out->frames_per_group);
+  for (const Json& camera : images.at("cameras")) {
+    images_out->cameras.push_back({camera.at("name").get<std::string>(), camera.at("width_px").get<int32_t>(),
+                                   camera.at("height_px").get<int32_t>()});
+  }
+  const std::string bytes = from_base64(element(page, kImagesBegin, "a replay's images"));
+  size_t at = 0;
+  for (const Json& group : images.at("group_bytes")) {
+    const auto count = group.get<size_t>();
+    PICTURA_CHECK(count <= bytes.size() - at, "images: expected {} bytes more, got {}", count, bytes.size() - at);
+    images_out->groups.push_back(bytes.substr(at, count));
+    at += count;
+  }
+}
+
+Replay replay_from(std::string_view page) {
+  const Json header = header_from(page);
+  Replay replay;
+  read_header_values(header, &replay);
+  size_t total = 0;
+  for (const Json& section : header.at("sections")) total += section.at("bytes").get<size_t>();
+  const std::string bytes = inflate(from_base64(element(page, kDataBegin, "a replay's numbers")), total);
+  const size_t frames = size(replay.num_frames);
+  size_t at = 0;
+  for (const Json& entry : header.at("sections")) {
+    const auto name = entry.at("name").get<std::string>();
+    const std::string_view section = std::string_view(bytes).substr(at, entry.at("bytes").get<size_t>());
+    at += section.size();
+    const NumberReader reader(section);
+    if (name == "map") {
+      replay.map = map_from(reader);
+    } else if (name == "episodes") {
+      replay.episodes = episodes_from(reader, replay.num_agents);
+    } else if (name == "conditioning") {
+      conditioning_from(section, replay.num_agents, &replay.episodes);
+    } else if (name == "lights") {
+      const std::vector<int32_t> lights = columns_from(reader, frames, size(replay.num_lights), kLightOrder);
+      replay.lights.assign(lights.begin(), lights.end());
+    } else if (name == "decisions") {
+      replay.decisions = columns_from(reader, frames, kDecisionValues, kDecisionOrder);
+    } else {
+      const auto* track =
+          std::find_if(kTracks.begin(), kTracks.end(), [&](const TrackInfo& t) { return t.name == name; });
+      PICTURA_CHECK(track != kTracks.end(), "header: sections: unknown section '{}'", name);
+      replay.tracks[static_cast<size_t>(track - kTracks.begin())] =
+          columns_from(reader, frames, size(replay.num_agents), track->order);
+    }
+  }
+  for (size_t i = 0; i < kNumTracks; ++i) {
+    PICTURA_CHECK(replay.tracks[i].size() == frames * size(replay.num_agents), "header: expected a section '{}'",
+                  kTracks[i].name);
+  }
+  read_images(header, page, &replay.images);
+  return replay;
+}
+
+// What `read` makes of a page, with faults that name the file.
+template <typename Read>
+auto of_page(const std::string& path, Read&& read) {
+  const std::string page = read_file(path);
+  try {
+    return read(std::string_view(page));
+  } catch (const Json::exception&) {
+    fail("{}: expected a replay's header, got damaged JSON, or one in which a value is missing", path);
+  } catch (const Error& error) {
+    fail("{}: {}", path, error.what());
+  }
+}
+
+}  // namespace
+
+void write_replay(const std::string& path, const Replay& replay) {
+  const std::vector<Section> sections = sections_of(replay);
+  std::string bytes;
+  for (const Section& section : sections) bytes += section.bytes;
+  std::string images;
+  for (const std::string& group : replay.images.groups) images += group;
+  std::string elements;
+  elements += fmt::format("{}{}{}\n", kHeaderBegin, script_text(header_of(replay, sections)), kEnd);
+  elements += fmt::format("{}{}{}\n", kDataBegin, base64(deflate(bytes)), kEnd);
+  if (!images.empty()) elements += fmt::format("{}{}{}\n", kImagesBegin, base64(images), kEnd);
+  const std::string title = fmt::format("{}, {}, seed {}", replay.origin.map, replay.origin.policy, replay.origin.seed);
+  write_file(path, filled(page::replay_html(), {{"title", html_text(title)}, {"elements", elements}}));
+}
+
+Replay read_replay(const std::string& path) { return of_page(path, replay_from); }
+
+nlohmann::ordered_json read_replay_header(const std::string& path) { return of_page(path, header_from); }
+
+}  // namespace pictura

@@ -1,0 +1,22 @@
+// Replays as files: one HTML page that holds everything, and is read back from.
+#pragma once
+
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "pictura/common/error.h"
+#include "pictura/replay/replay.h"
+
+namespace pictura {
+
+/// Writes the page, whole or not at all. Throws Error naming the path.
+void write_replay(const std::string& path, const Replay& replay);
+
+/// Reads what write_replay() wrote. Throws Error naming the path and what is damaged or missing.
+Replay read_replay(const std::string& path);
+
+/// What stands in a page before its numbers: origin, metrics and sizes, see docs/replay.md. Throws as read_replay().
+nlohmann::ordered_json read_replay_header(const std::string& path);
+
+}  // namespace pictura

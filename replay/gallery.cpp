@@ -1,0 +1,55 @@
+#include "pictura/replay/gallery.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <vector>
+
+#include "pictura/common/support/file.h"
+#include "pictura/replay/file.h"
+#include "pictura/replay/page_sources.h"
+#include "pictura/replay/template.h"
+
+namespace pictura {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kIndex = "index.html";
+
+int64_t infractions_of(const Json& header) {
+  int64_t sum = 0;
+  for (const char* name : {"collisions", "off_road", "red_light", "wall_contacts"}) {
+    sum += header.at("metrics").at(name).get<int64_t>();
+  }
+  return sum;
+}
+
+}  // namespace
+
+int write_gallery(const std::string& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if (entry.path().extension() == ".html" && name != kIndex) names.push_back(name);
+  }
+  std::sort(names.begin(), names.end());
+  std::vector<Json> entries;
+  for (const std::string& name : names) {
+    const Json header = read_replay_header((std::filesystem::path(folder) / name).string());
+    Json entry{{"file", name}};
+    for (const char* key : {"map", "policy", "seed", "global_world", "agents", "frames", "dt_s", "metrics"}) {
+      entry[key] = header.at(key);
+    }
+    entry["infractions"] = infractions_of(header);
+    entries.push_back(std::move(entry));
+  }
+  std::stable_sort(entries.begin(), entries.end(), [](const Json& a, const Json& b) {
+    return a.at("infractions").get<int64_t>() > b.at("infractions").get<int64_t>();
+  });
+  write_file((std::filesystem::path(folder) / kIndex).string(),
+             filled(page::gallery_html(), {{"entries", script_text(Json(entries))}}));
+  return static_cast<int>(entries.size());
+}
+
+}  // namespace pictura

@@ -1,0 +1,260 @@
+// Reading the page's own elements: the header, and the numbers of docs/replay.md.
+
+class Damaged extends Error {}
+
+const STATUS = ["active", "halted", "parked", "absent"];
+const CLASSES = ["vehicle", "cyclist", "pedestrian"];
+const EVENT = { collision: 1, atFault: 2, offRoad: 4, redLight: 8, wall: 16, goal: 32, waypoint: 64, metricGoal: 128 };
+const INFRACTIONS = EVENT.collision | EVENT.offRoad | EVENT.redLight | EVENT.wall;
+const KINDS = [
+  { bit: EVENT.collision, name: "collision", color: "--collision" },
+  { bit: EVENT.offRoad, name: "off road", color: "--off-road" },
+  { bit: EVENT.redLight, name: "red light", color: "--red-light" },
+  { bit: EVENT.wall, name: "wall", color: "--wall-contact" },
+  { bit: EVENT.metricGoal, name: "goal", color: "--goal" },
+];
+const reasonsOf = bits => KINDS.filter(kind => bits & kind.bit & INFRACTIONS);
+const ABSENT = 3, HALTED = 1;
+
+function bytesOfBase64(text) {
+  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
+  const letters = atob(text), bytes = new Uint8Array(letters.length);
+  for (let i = 0; i < letters.length; ++i) bytes[i] = letters.charCodeAt(i);
+  return bytes;
+}
+
+async function inflated(bytes, size) {
+  if (typeof DecompressionStream === "undefined") {
+    throw new Damaged("This browser is too old to read the replay: it lacks DecompressionStream. Any of 2023 or later has it.");
+  }
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const out = new Uint8Array(await new Response(stream).arrayBuffer());
+  if (out.length !== size) throw new Damaged(`expected ${size} bytes, got ${out.length}`);
+  return out;
+}
+
+class NumberReader {
+  constructor(bytes) { this.bytes = bytes; this.at = 0; }
+  next() {
+    let bits = 0, shift = 0, byte;
+    do {
+      if (this.at >= this.bytes.length || shift > 28) throw new Damaged("its numbers end too early");
+      byte = this.bytes[this.at++];
+      bits |= (byte & 127) << shift;
+      shift += 7;
+    } while (byte > 127);
+    return (bits >>> 1) ^ -(bits & 1);
+  }
+  many(count) { return Array.from({ length: count }, () => this.next()); }
+  // Of `columns` columns, one after the other, each through all frames.
+  columns(columns, frames, order) {
+    const values = new Int32Array(columns * frames);
+    for (let column = 0, i = 0; column < columns; ++column) {
+      let value = 0, difference = 0;
+      for (let frame = 0; frame < frames; ++frame, ++i) {
+        const next = this.next();
+        difference = order === 2 ? (difference + next) | 0 : next;
+        value = order === 0 ? next : (value + difference) | 0;
+        values[i] = value;
+      }
+    }
+    return values;
+  }
+}
+
+const SHAPES = ["lane", "crosswalk", "parking_space", "marking", "stop_line", "road_edge", "wall", "light"];
+
+// [{kind, detail, width_m, points: Float32Array of x, y in metres}]
+function mapOf(reader) {
+  const shapes = [];
+  let x = 0, y = 0;
+  for (let left = reader.next(); left > 0; --left) {
+    const kind = SHAPES[reader.next()], detail = reader.next(), width_m = reader.next() / 100, count = reader.next();
+    const points = new Float32Array(2 * count);
+    for (let i = 0; i < count; ++i) {
+      points[2 * i] = (x += reader.next()) / 100;
+      points[2 * i + 1] = (y += reader.next()) / 100;
+    }
+    shapes.push({ kind, detail, width_m, points });
+  }
+  return shapes;
+}
+
+function episodesOf(reader, agents) {
+  const body = () => {
+    const [agentClass, length, width, height] = reader.many(4);
+    return { agentClass, length_m: length / 100, width_m: width / 100, height_m: height / 100 };
+  };
+  return Array.from({ length: reader.next() }, () => {
+    const [index, first, frames] = reader.many(3);
+    const bodies = Array.from({ length: agents }, body);
+    const parked = Array.from({ length: reader.next() }, () => {
+      const car = body(), [x, y, z, heading] = reader.many(4);
+      return { ...car, x_m: x / 100, y_m: y / 100, z_m: z / 100, heading_deg: heading / 10 };
+    });
+    const chains = Array.from({ length: agents }, () => []);
+    for (let left = reader.next(); left > 0; --left) {
+      const [frame, agent] = reader.many(2), metres = reader.many(9).map(cm => cm / 100);
+      chains[agent].push({ frame, x_m: metres.slice(0, 3), y_m: metres.slice(3, 6) });
+    }
+    return { index, first, frames, end: first + frames, bodies, parked, chains };
+  });
+}
+
+// The whole replay: everything of it that views read.
+class Replay {
+  constructor(header, bytes, imageBytes) {
+    this.header = header;
+    const { agents, frames, lights } = header;
+    Object.assign(this, { agents, frames, dt_s: header.dt_s, followed: header.followed, numLights: lights });
+    const orders = new Map(header.tracks.map(track => [track.name, track]));
+    this.tracks = {};
+    this.units = {};
+    let at = 0, conditioning = null;
+    for (const { name, bytes: size } of header.sections) {
+      const part = bytes.subarray(at, at + size), reader = new NumberReader(part);
+      at += size;
+      if (name === "map") this.map = mapOf(reader);
+      else if (name === "episodes") this.episodes = episodesOf(reader, agents);
+      else if (name === "conditioning") conditioning = new Float32Array(part.slice().buffer);
+      else if (name === "lights") this.lights = reader.columns(lights, frames, 1);
+      else if (name === "decisions") this.decisions = reader.columns(13, frames, 1);
+      else {
+        const track = orders.get(name);
+        this.tracks[name] = reader.columns(agents, frames, track.order);
+        this.units[name] = track.unit;
+      }
+    }
+    const perEpisode = agents * header.conditioning.length;
+    this.episodes.forEach((episode, i) => { episode.conditioning = conditioning.subarray(i * perEpisode, (i + 1) * perEpisode); });
+    this.episodeOf = new Uint16Array(frames);
+    this.episodes.forEach((episode, i) => this.episodeOf.fill(i, episode.first, episode.end));
+    this.rewardTerms = header.tracks.filter(track => track.name.startsWith("reward_")).map(track => track.name.slice(7));
+    this.events = this.findEvents();
+    if (header.images) this.images = new Images(header.images, frames, imageBytes);
+  }
+  raw(track, agent, frame) { return this.tracks[track][agent * this.frames + frame]; }
+  get(track, agent, frame) { return this.raw(track, agent, frame) * this.units[track]; }
+  episode(frame) { return this.episodes[this.episodeOf[frame]]; }
+  isAbsent(agent, frame) { return this.raw("status", agent, frame) === ABSENT; }
+  body(agent, frame) { return this.episode(frame).bodies[agent]; }
+  light(light, frame) { return this.lights[light * this.frames + frame]; }
+  // What can be asked of a policy: 12 probabilities and the value; null where it was not.
+  decision(agent, frame) {
+    if (agent !== this.followed || !this.decisions) return null;
+    const values = [];
+    let sum = 0;
+    for (let i = 0; i < 13; ++i) {
+      values.push(this.decisions[i * this.frames + frame] * this.header.decision_unit);
+      if (i < 12) sum += values[i];
+    }
+    return sum > 0.5 ? { probabilities: values.slice(0, 12), value: values[12] } : null;
+  }
+  // The action that is chosen at a frame, or null.
+  action(agent, frame) {
+    const next = frame + 1 < this.frames && this.episodeOf[frame + 1] === this.episodeOf[frame] ? this.raw("action", agent, frame + 1) : 0;
+    return next ? next - 1 : null;
+  }
+  chain(agent, frame) {
+    let found = null;
+    for (const chain of this.episode(frame).chains[agent]) {
+      if (chain.frame > frame) break;
+      found = chain;
+    }
+    return found;
+  }
+  // The pose between two frames.
+  pose(agent, time) {
+    const frame = Math.min(Math.floor(time), this.frames - 1), share = time - frame, next = frame + 1;
+    const a = agent * this.frames + frame, { x_m, y_m, heading_deg } = this.tracks;
+    const goes = share > 0 && next < this.frames && this.episodeOf[next] === this.episodeOf[frame] && !this.isAbsent(agent, next);
+    const mix = track => goes ? track[a] + (track[a + 1] - track[a]) * share : track[a];
+    return { x_m: mix(x_m) * this.units.x_m, y_m: mix(y_m) * this.units.y_m, heading_deg: mix(heading_deg) * this.units.heading_deg };
+  }
+  // Infractions and goals by frame: [{frame, agent, kind}]
+  findEvents() {
+    const found = [], events = this.tracks.events;
+    for (let agent = 0, i = 0; agent < this.agents; ++agent) {
+      for (let frame = 0; frame < this.frames; ++frame, ++i) {
+        if (!events[i]) continue;
+        KINDS.forEach((kind, k) => { if (events[i] & kind.bit) found.push({ frame, agent, kind: k }); });
+      }
+    }
+    return found.sort((a, b) => a.frame - b.frame || a.agent - b.agent);
+  }
+}
+
+// The followed agent's images, group by group.
+class Images {
+  constructor(header, frames, bytes) {
+    Object.assign(this, { cameras: header.cameras, perGroup: header.frames_per_group, frames, bytes });
+    this.begins = [0];
+    for (const size of header.group_bytes) this.begins.push(this.begins.at(-1) + size);
+    if (bytes.length !== this.begins.at(-1)) throw new Damaged(`expected ${this.begins.at(-1)} bytes of images, got ${bytes.length}`);
+    this.frameBytes = this.cameras.reduce((sum, c) => sum + c.width_px * c.height_px * 3, 0);
+    this.groups = new Map();  // group -> promise of its frames; a few are kept
+  }
+  // The bytes of a frame: [height, width, 3] of each camera.
+  async frame(frame) {
+    const group = Math.floor(frame / this.perGroup);
+    if (!this.groups.has(group)) {
+      if (this.groups.size > 3) this.groups.delete(this.groups.keys().next().value);
+      this.groups.set(group, this.unpack(group));
+    }
+    const frames = await this.groups.get(group);
+    return frames.subarray((frame % this.perGroup) * this.frameBytes, (frame % this.perGroup + 1) * this.frameBytes);
+  }
+  async unpack(group) {
+    const count = Math.min(this.perGroup, this.frames - group * this.perGroup);
+    const rows = this.cameras.reduce((sum, c) => sum + c.height_px, 0);
+    const packed = await inflated(this.bytes.subarray(this.begins[group], this.begins[group + 1]), (this.frameBytes + rows) * count);
+    const out = new Uint8Array(this.frameBytes * count);
+    let at = 0, to = 0;
+    for (let frame = 0; frame < count; ++frame) {
+      for (const camera of this.cameras) {
+        const width = 3 * camera.width_px;
+        for (let y = 0; y < camera.height_px; ++y) {
+          const filter = packed[at++];
+          for (let i = 0; i < width; ++i, ++to) {
+            const left = i > 2 ? out[to - 3] : 0, up = y > 0 ? out[to - width] : 0;
+            let guess;
+            if (filter === 0) guess = left;
+            else if (filter === 1) guess = up;
+            else if (filter === 3) guess = frame > 0 ? out[to - this.frameBytes] : 0;
+            else {
+              const corner = y > 0 && i > 2 ? out[to - width - 3] : 0, low = Math.min(left, up), high = Math.max(left, up);
+              guess = corner >= high ? low : corner <= low ? high : left + up - corner;
+            }
+            out[to] = packed[at++] + guess;
+          }
+        }
+      }
+    }
+    return out;
+  }
+}
+
+async function readReplay() {
+  const text = id => {
+    const element = document.getElementById(id);
+    if (!element) throw new Damaged("the file ends too early; was it copied whole?");
+    return element.textContent;
+  };
+  let header;
+  try {
+    header = JSON.parse(text("replay-header"));
+  } catch (error) {
+    if (error instanceof Damaged) throw error;
+    throw new Damaged("its header cannot be read");
+  }
+  if (header.format !== "pictura replay") throw new Damaged("its header is of something else");
+  if (header.version !== 1) throw new Damaged(`it is of version ${header.version}, this page reads version 1`);
+  const whole = header.sections.reduce((sum, section) => sum + section.bytes, 0);
+  try {
+    const bytes = await inflated(bytesOfBase64(text("replay-data")), whole);
+    return new Replay(header, bytes, header.images ? bytesOfBase64(text("replay-images")) : null);
+  } catch (error) {
+    if (error instanceof Damaged) throw error;
+    throw new Damaged(`its numbers cannot be read (${error.message || error.name})`);
+  }
+}

@@ -1,0 +1,109 @@
+// Events over time, one row a kind; a click goes there.
+
+class Timeline {
+  constructor(replay, state, canvas, tip, actions) {
+    Object.assign(this, { replay, state, canvas, tip, actions, kept: null });
+    canvas.addEventListener("pointerdown", event => {
+      canvas.setPointerCapture(event.pointerId);
+      const found = this.eventAt(event);
+      if (found) this.actions.goTo(found);
+      else this.scrub(event);
+      this.isScrubbing = !found;
+    });
+    canvas.addEventListener("pointermove", event => {
+      if (event.buttons && this.isScrubbing) this.scrub(event);
+      this.showTip(event);
+    });
+    canvas.addEventListener("pointerleave", () => { tip.hidden = true; });
+  }
+  get margin() { return 78; }
+  frameAt(event) {
+    const box = this.canvas.getBoundingClientRect();
+    const share = (event.clientX - box.left - this.margin) / (box.width - this.margin - 8);
+    return Math.min(this.replay.frames - 1, Math.max(0, share * (this.replay.frames - 1)));
+  }
+  xOf(frame, width) { return this.margin + frame / Math.max(1, this.replay.frames - 1) * (width - this.margin - 8); }
+  rowOf(event) { return Math.floor((event.clientY - this.canvas.getBoundingClientRect().top) / 11.5); }
+  scrub(event) { this.actions.seek(Math.round(this.frameAt(event))); }
+  shows(event) { return !this.state.onlyAgent || event.agent === this.state.agent; }
+  // The event under the pointer, within 4 pixels.
+  eventAt(pointer) {
+    const box = this.canvas.getBoundingClientRect(), x = pointer.clientX - box.left, row = this.rowOf(pointer);
+    let found = null, nearest = 4.5;
+    for (const event of this.replay.events) {
+      const apart = Math.abs(this.xOf(event.frame, box.width) - x);
+      if (event.kind === row && apart < nearest && this.shows(event)) { nearest = apart; found = event; }
+    }
+    return found;
+  }
+  showTip(pointer) {
+    const { tip, replay } = this, found = this.eventAt(pointer), box = this.canvas.getBoundingClientRect();
+    const frame = found ? found.frame : Math.round(this.frameAt(pointer));
+    tip.textContent = `${(frame * replay.dt_s).toFixed(1)} s` + (found ? `: agent ${found.agent}, ${KINDS[found.kind].name}` : "");
+    tip.hidden = false;
+    tip.style.left = `${Math.min(box.width - tip.offsetWidth, Math.max(0, pointer.clientX - box.left - tip.offsetWidth / 2)) + 12}px`;
+    tip.style.bottom = `${this.canvas.clientHeight + 14}px`;
+  }
+
+  draw(theme, ratio) {
+    const { canvas, replay, state } = this, width = canvas.clientWidth, height = 74;
+    const key = [width, ratio, state.onlyAgent && state.agent, theme];
+    if (!this.kept || key.some((part, i) => part !== this.kept[i])) {
+      this.picture = this.picture || document.createElement("canvas");
+      this.picture.width = canvas.width = Math.round(width * ratio);
+      this.picture.height = canvas.height = Math.round(height * ratio);
+      this.paint(this.picture.getContext("2d"), width, ratio, theme);
+      this.kept = key;
+    }
+    const context = canvas.getContext("2d");
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.clearRect(0, 0, canvas.width, canvas.height);
+    context.drawImage(this.picture, 0, 0);
+    context.scale(ratio, ratio);
+    const x = this.xOf(state.time, width);
+    context.fillStyle = theme["--accent"];
+    context.globalAlpha = 0.13;
+    context.fillRect(this.margin, 0, x - this.margin, 58);
+    context.globalAlpha = 1;
+    context.fillRect(x - 1, 0, 2, 60);
+    context.beginPath();
+    context.arc(x, 60, 4, 0, 2 * Math.PI);
+    context.fill();
+  }
+  paint(context, width, ratio, theme) {
+    const { replay } = this;
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.font = `11px ${theme["--font"]}`;
+    context.textBaseline = "middle";
+    KINDS.forEach((kind, row) => {
+      const y = row * 11.5;
+      context.fillStyle = theme["--raised"];
+      context.fillRect(this.margin, y + 1, width - this.margin - 8, 9.5);
+      context.fillStyle = theme[kind.color];
+      context.textAlign = "left";
+      context.fillText(kind.name, 0, y + 6);
+      const count = replay.events.reduce((sum, event) => sum + (event.kind === row && this.shows(event)), 0);
+      context.textAlign = "right";
+      context.fillStyle = count ? theme["--text"] : theme["--dim"];
+      context.fillText(count, this.margin - 5, y + 6);
+    });
+    for (const event of replay.events) {
+      if (!this.shows(event)) continue;
+      context.fillStyle = theme[KINDS[event.kind].color];
+      context.globalAlpha = event.agent === this.state.agent ? 1 : 0.75;
+      context.fillRect(this.xOf(event.frame, width) - 1, event.kind * 11.5 + 1, event.agent === this.state.agent ? 2.5 : 1.6, 9.5);
+    }
+    context.globalAlpha = 1;
+    context.fillStyle = theme["--dim"];
+    for (const episode of replay.episodes) if (episode.first > 0) context.fillRect(this.xOf(episode.first, width) - 0.5, 0, 1, 60);
+    // Times at round seconds, about 90 pixels apart.
+    const seconds = (replay.frames - 1) * replay.dt_s, wish = seconds / Math.max(1, (width - this.margin) / 90);
+    const step = [0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800, 3600].find(s => s >= wish) || 7200;
+    context.textAlign = "center";
+    for (let t = 0; t <= seconds + 1e-6; t += step) {
+      const x = this.xOf(t / replay.dt_s, width);
+      context.fillRect(x, 58, 1, 3);
+      if (x < width - 14) context.fillText(seconds >= 120 && step >= 30 ? `${Math.floor(t / 60)}:${String(Math.round(t % 60)).padStart(2, "0")}` : `${t} s`, x, 68);
+    }
+  }
+}

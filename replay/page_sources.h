@@ -1,0 +1,11 @@
+// The texts of replay/page/, embedded by the build (cmake/EmbedTexts.cmake).
+#pragma once
+
+#include <string_view>
+
+namespace pictura::page {
+
+std::string_view replay_html();
+std::string_view gallery_html();
+
+}  // namespace pictura::page

@@ -1,0 +1,293 @@
+#include "pictura/replay/recorder.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pictura/backends/make_renderer.h"
+#include "pictura/backends/upload_maps.h"
+#include "pictura/common/error.h"
+#include "pictura/replay/images.h"
+#include "pictura/replay/map_shapes.h"
+#include "pictura/simulator/agent_state.h"
+#include "pictura/simulator/rules/episode.h"
+#include "pictura/simulator/simulator_setup.h"
+
+namespace pictura {
+
+namespace {
+
+// Of all tracks together: 64 million numbers, 256 MB, are 120 agents for 24,000 steps.
+constexpr int64_t kMaxNumbers = int64_t{1} << 26;
+constexpr int32_t kTurn_ddeg = 3600;
+constexpr double kDdegPerRad = 1800.0 / 3.14159265358979323846;
+
+int32_t in_units(double value, double unit) { return static_cast<int32_t>(std::lround(value / unit)); }
+int32_t in_cm(float value_m) { return in_units(static_cast<double>(value_m), 0.01); }
+int32_t in_ddeg(float angle_rad) {
+  return static_cast<int32_t>(std::lround(static_cast<double>(angle_rad) * kDdegPerRad));
+}
+
+/// The same heading, at most half a turn from the one before.
+int32_t near_heading(int32_t heading_ddeg, int32_t before_ddeg) {
+  const int32_t apart = heading_ddeg - before_ddeg;
+  const auto turns = static_cast<int32_t>(std::lround(static_cast<double>(apart) / kTurn_ddeg));
+  return heading_ddeg - turns * kTurn_ddeg;
+}
+
+int32_t heading_of(const AgentBox& box) { return in_ddeg(std::atan2(box.sin_heading, box.cos_heading)); }
+ReplayBody body_of(const AgentBox& box) {
+  return {box.agent_class, in_cm(box.length_m), in_cm(box.width_m), in_cm(box.height_m)};
+}
+
+}  // namespace
+
+ReplayDecision decision_of(Span<const float> logits, float value) {
+  PICTURA_CHECK(logits.size() == kNumActions, "replay: expected {} logits, got {}", kNumActions, logits.size());
+  ReplayDecision decision{.value = value};
+  const float highest = *std::max_element(logits.begin(), logits.end());
+  double sum = 0;
+  for (size_t i = 0; i < kNumActions; ++i) sum += std::exp(static_cast<double>(logits[i] - highest));
+  for (size_t i = 0; i < kNumActions; ++i) {
+    decision.probabilities[i] = static_cast<float>(std::exp(static_cast<double>(logits[i] - highest)) / sum);
+  }
+  return decision;
+}
+
+struct Recorder::Parts {
+  Parts(Simulator& its_simulator, const RecorderOptions& options)
+      : simulator(its_simulator),
+        world(options.world),
+        setup(simulator.config(), simulator.maps(), simulator.handles(), simulator.worlds()),
+        before(static_cast<size_t>(setup.num_slots())) {
+    first_slot = setup.slot_begin[static_cast<size_t>(world)];
+    first_box = setup.box_begin[static_cast<size_t>(world)];
+    num_boxes = setup.box_begin[static_cast<size_t>(world) + 1] - first_box;
+    first_light = setup.light_begin[static_cast<size_t>(world)];
+    replay.num_agents = setup.slot_begin[static_cast<size_t>(world) + 1] - first_slot;
+    replay.num_lights = setup.light_begin[static_cast<size_t>(world) + 1] - first_light;
+    replay.followed = options.followed;
+    replay.map = map_shapes(setup.map_of(world));
+    if (!options.cameras || options.followed < 0) return;
+    renderer = make_renderer("cpu", *options.cameras);
+    upload_maps(simulator, renderer.get());
+    images = std::make_unique<HostImages>(renderer->config().rig, 1);
+    for (const Camera& camera : renderer->config().rig.cameras) {
+      replay.images.cameras.push_back({camera.name, camera.width_px, camera.height_px});
+    }
+    replay.images.frames_per_group = kReplayFramesPerGroup;
+  }
+
+  size_t slot(int32_t agent) const { return static_cast<size_t>(first_slot + agent); }
+  std::vector<int32_t>& track(Track which) { return replay.tracks[static_cast<size_t>(which)]; }
+  ReplayEpisode& episode() { return replay.episodes.back(); }
+  bool is_absent(const AgentStateView& state, int32_t agent) const {
+    return state.status[slot(agent)] == static_cast<uint8_t>(AgentStatus::absent);
+  }
+
+  void begin_episode(const AgentStateView& state, Span<const AgentBox> boxes) {
+    ReplayEpisode next;
+    next.index = simulator.episode_index()[static_cast<size_t>(world)];
+    next.first_frame = replay.num_frames;
+    for (int32_t agent = 0; agent < replay.num_agents; ++agent) {
+      next.agents.push_back(body_of(boxes[static_cast<size_t>(agent)]));
+      const float* conditioning = state.conditioning + slot(agent) * kNumConditioning;
+      next.conditioning.insert(next.conditioning.end(), conditioning, conditioning + kNumConditioning);
+      replay.metrics.spawned += !is_absent(state, agent);
+    }
+    for (size_t i = static_cast<size_t>(replay.num_agents); i < boxes.size(); ++i) {
+      if (!boxes[i].drawn) continue;
+      next.parked.push_back({body_of(boxes[i]), in_cm(boxes[i].center_m.x), in_cm(boxes[i].center_m.y),
+                             in_cm(boxes[i].center_m.z), heading_of(boxes[i])});
+    }
+    replay.episodes.push_back(std::move(next));
+    chains.assign(static_cast<size_t>(replay.num_agents), -1);
+  }
+
+  void add_frame() {
+    const AgentStateView state = simulator.state();
+    const SceneBatch& scene = simulator.scene();
+    const Span<const AgentBox> boxes =
+        scene.agents.subspan(static_cast<size_t>(first_box), static_cast<size_t>(num_boxes));
+    const bool begins =
+        replay.episodes.empty() || episode().index != simulator.episode_index()[static_cast<size_t>(world)];
+    if (begins) begin_episode(state, boxes);
+    for (int32_t agent = 0; agent < replay.num_agents; ++agent) add_agent(state, boxes, agent, begins);
+    const Span<const LightState> lights =
+        scene.light_states.subspan(static_cast<size_t>(first_light), static_cast<size_t>(replay.num_lights));
+    for (const LightState light : lights) replay.lights.push_back(static_cast<uint8_t>(light));
+    ++episode().num_frames;
+    ++replay.num_frames;
+    if (renderer) add_images(scene);
+  }
+
+  void add_agent(const AgentStateView& state, Span<const AgentBox> boxes, int32_t agent, bool begins) {
+    const size_t at = slot(agent);
+    const AgentBox& box = boxes[static_cast<size_t>(agent)];
+    const bool absent = is_absent(state, agent);
+    track(Track::status).push_back(state.status[at]);
+    track(Track::halt_reason).push_back(state.halt_reason[at]);
+    track(Track::next_waypoint).push_back(absent ? 0 : state.next_waypoint[at]);
+    track(Track::events).push_back(begins ? 0 : state.events[at]);
+    track(Track::x_m).push_back(absent ? 0 : in_cm(box.center_m.x));
+    track(Track::y_m).push_back(absent ? 0 : in_cm(box.center_m.y));
+    track(Track::z_m).push_back(absent ? 0 : in_cm(box.center_m.z));
+    std::vector<int32_t>& headings = track(Track::heading_deg);
+    const auto agents = static_cast<size_t>(replay.num_agents);
+    headings.push_back(absent   ? 0
+                       : begins ? heading_of(box)
+                                : near_heading(heading_of(box), headings[headings.size() - agents]));
+    track(Track::speed_mps).push_back(absent ? 0 : in_cm(state.speed_mps[at]));
+    track(Track::steer_deg).push_back(absent ? 0 : in_ddeg(state.steer_rad[at]));
+    if (absent || chains[static_cast<size_t>(agent)] == state.goal_chains[at]) return;
+    chains[static_cast<size_t>(agent)] = state.goal_chains[at];
+    ReplayChain chain{.frame = replay.num_frames, .agent = agent};
+    for (size_t i = 0; i < kNumWaypoints; ++i) {
+      chain.x_cm[i] = in_cm(state.waypoint_x_m[at * kNumWaypoints + i]);
+      chain.y_cm[i] = in_cm(state.waypoint_y_m[at * kNumWaypoints + i]);
+      chain.z_cm[i] = in_cm(state.waypoint_z_m[at * kNumWaypoints + i]);
+    }
+    episode().chains.push_back(chain);
+  }
+
+  void add_images(const SceneBatch& scene) {
+    renderer->render(scene, simulator.views().subspan(slot(replay.followed), 1), images->batch());
+    for (size_t camera = 0; camera < replay.images.cameras.size(); ++camera) {
+      const std::vector<uint8_t> rgb = images->interleaved(0, static_cast<int>(camera));
+      group.append(reinterpret_cast<const char*>(rgb.data()), rgb.size());
+    }
+    if (replay.num_frames % kReplayFramesPerGroup == 0) end_group();
+  }
+  void end_group() {
+    if (!group.empty()) replay.images.groups.push_back(pack_images(replay.images.cameras, group));
+    group.clear();
+  }
+
+  void add_decision(const std::optional<ReplayDecision>& decision) {
+    if (replay.decisions.empty() && !decision) return;
+    replay.decisions.resize(static_cast<size_t>(replay.num_frames) * kDecisionValues);
+    if (!decision) return;
+    int32_t* values = replay.decisions.data() + static_cast<size_t>(replay.num_frames - 1) * kDecisionValues;
+    for (const float probability : decision->probabilities) {
+      *values++ = in_units(static_cast<double>(probability), kDecisionUnit);
+    }
+    *values = in_units(static_cast<double>(decision->value), kDecisionUnit);
+  }
+
+  /// Action and reward of every agent, in the step that has led to the frame that is next.
+  void add_step(const StepResult& result) {
+    const AgentStateView state = simulator.state();
+    WorldView view = setup.view(
+        world, setup.map_views[static_cast<size_t>(setup.worlds[static_cast<size_t>(world)].map)], setup.options);
+    view.agents = before.view();
+    for (int32_t agent = 0; agent < replay.num_agents; ++agent) {
+      const size_t at = slot(agent);
+      RewardTerms terms;
+      if (result.valid[at]) {
+        // An infraction has stopped the agent, but its reward is of how it moved.
+        const Command& command = commands[static_cast<size_t>(agent)];
+        float level_m = before.z_m[at];
+        const Motion motion = commanded_motion(view, agent, command, &level_m);
+        terms = reward_terms(step_facts(motion, fit_of(state, static_cast<int>(at)), state.events[at]),
+                             state.conditioning + at * kNumConditioning, setup.options.dt_s);
+        count(state, at, motion, result.reward[at]);
+      }
+      const bool acts = result.valid[at] && commands[static_cast<size_t>(agent)].kind == CommandKind::action;
+      track(Track::action).push_back(acts ? 1 + commands[static_cast<size_t>(agent)].action : 0);
+#define X(name) track(Track::reward_##name).push_back(in_units(static_cast<double>(terms.name), kRewardUnit));
+      PICTURA_REWARD_TERMS(X)
+#undef X
+    }
+  }
+
+  void count(const AgentStateView& state, size_t at, const Motion& motion, float reward) {
+    SimulatorTotals totals;
+    count_events(state.events[at], &totals);
+    ReplayMetrics& m = replay.metrics;
+    ++m.agent_steps;
+    m.collisions += totals.collisions;
+    m.at_fault_collisions += totals.at_fault_collisions;
+    m.off_road += totals.off_road;
+    m.red_light += totals.red_light;
+    m.wall_contacts += totals.wall_contacts;
+    m.goals_reached += totals.goals_reached;
+    m.waypoints_reached += totals.waypoints_reached;
+    m.km_driven += static_cast<double>(driven_m(motion.speed_mps, setup.options.dt_s)) / 1000;
+    m.reward += static_cast<double>(reward);
+  }
+
+  Simulator& simulator;
+  const int world;
+  const SimulatorSetup setup;
+  AgentState before;  // of the world's slots, before the step
+  std::vector<Command> commands;
+  int32_t first_slot = 0, first_box = 0, num_boxes = 0, first_light = 0;
+  std::vector<int32_t> chains;  // [agents] the number of the chain that was written last
+  std::unique_ptr<Renderer> renderer;
+  std::unique_ptr<HostImages> images;
+  std::string group;  // images that wait to be compressed
+  Replay replay;
+};
+
+Recorder::Recorder(Simulator& simulator, const RecorderOptions& options) {
+  if (!simulator.device().is_host()) {
+    fail_usage("replay: expected a simulator in host memory, got one on {}", name_of(simulator.device()));
+  }
+  const auto num_worlds = static_cast<int>(simulator.worlds().size());
+  if (options.world < 0 || options.world >= num_worlds) {
+    fail_usage("replay: expected a world of 0 to {}, got {}", num_worlds - 1, options.world);
+  }
+  const int num_agents = simulator.worlds()[static_cast<size_t>(options.world)].num_agents;
+  if (options.followed < -1 || options.followed >= num_agents) {
+    fail_usage("replay: expected an agent of 0 to {} to follow, got {}", num_agents - 1, options.followed);
+  }
+  parts_ = std::make_unique<Parts>(simulator, options);
+  // Nothing has led to the first frame.
+  parts_->track(Track::action).assign(static_cast<size_t>(num_agents), 0);
+#define X(name) parts_->track(Track::reward_##name).assign(static_cast<size_t>(num_agents), 0);
+  PICTURA_REWARD_TERMS(X)
+#undef X
+  parts_->add_frame();
+}
+
+Recorder::~Recorder() = default;
+
+void Recorder::before_step(Span<const Command> commands, const std::optional<ReplayDecision>& decision) {
+  Parts& parts = *parts_;
+  PICTURA_CHECK(commands.size() == static_cast<size_t>(parts.simulator.num_slots()),
+                "replay: expected {} commands, got {}", parts.simulator.num_slots(), commands.size());
+  const auto agents = static_cast<size_t>(parts.replay.num_agents);
+  const Span<const Command> of_world = commands.subspan(parts.slot(0), agents);
+  parts.commands.assign(of_world.begin(), of_world.end());
+  const AgentStateView state = parts.simulator.state();
+  for (int32_t agent = 0; agent < parts.replay.num_agents; ++agent) {
+    copy_fields(state, parts.before.view(), static_cast<int>(parts.slot(agent)));
+  }
+  parts.add_decision(decision);
+}
+
+void Recorder::after_step(const StepResult& result) {
+  Parts& parts = *parts_;
+  const int64_t numbers = (int64_t{parts.replay.num_frames} + 1) * parts.replay.num_agents * int64_t{kNumTracks};
+  PICTURA_CHECK(numbers <= kMaxNumbers, "replay: {} agents are too many for more than {} steps: record fewer steps",
+                parts.replay.num_agents, parts.replay.num_frames - 1);
+  parts.add_step(result);
+  parts.add_frame();
+}
+
+Replay Recorder::finish(ReplayOrigin origin) {
+  Parts& parts = *parts_;
+  const CompiledMap& map = parts.setup.map_of(parts.world);
+  origin.map = map.road->name;
+  origin.map_hash = fmt::format("{:016x}", map.fingerprint);
+  origin.seed = parts.setup.config.seed;
+  origin.global_world = parts.setup.worlds[static_cast<size_t>(parts.world)].global_world;
+  origin.dt_s = parts.setup.config.dt_s;
+  parts.replay.origin = std::move(origin);
+  if (!parts.replay.decisions.empty()) {
+    parts.replay.decisions.resize(static_cast<size_t>(parts.replay.num_frames) * kDecisionValues);
+  }
+  if (parts.renderer) parts.end_group();
+  return std::move(parts.replay);
+}
+
+}  // namespace pictura

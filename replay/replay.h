@@ -1,0 +1,188 @@
+// A replay: what happened in one world over many steps, in whole units (1 cm, 0.1 degree), so that it is written and
+// read without loss. A frame is a state; a step leads from each frame to the next. docs/replay.md describes the file.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pictura/common/color.h"
+#include "pictura/simulator/actions.h"
+#include "pictura/simulator/fields.h"
+#include "pictura/simulator/reward_terms.h"
+
+namespace pictura {
+
+/// Of the format; a reader takes no other.
+constexpr int kReplayVersion = 1;
+
+// X(name, unit, order): a quantity of every agent at every frame, as a whole number of units; what is written are its
+// differences of this order from frame to frame. Those of a step belong to the frame that it leads to, and are 0 at the
+// first frame of an episode.
+#define PICTURA_REPLAY_STATE_TRACKS(X) \
+  X(x_m, 0.01, 2)                      \
+  X(y_m, 0.01, 2)                      \
+  X(z_m, 0.01, 1)                      \
+  X(heading_deg, 0.1, 2)               \
+  X(speed_mps, 0.01, 1)                \
+  X(steer_deg, 0.1, 1)                 \
+  X(status, 1, 1)                      \
+  X(halt_reason, 1, 1)                 \
+  X(next_waypoint, 1, 1)               \
+  X(events, 1, 0)                      \
+  X(action, 1, 0)
+
+/// Centre of the box, heading without jumps by a turn, AgentStatus, Event bits, and 1 + action, or 0 where an agent did
+/// nothing of its own.
+enum class Track : int32_t {
+#define X(name, unit, order) name,
+  PICTURA_REPLAY_STATE_TRACKS(X)
+#undef X
+#define X(name) reward_##name,
+      PICTURA_REWARD_TERMS(X)
+#undef X
+          count
+};
+constexpr size_t kNumTracks = static_cast<size_t>(Track::count);
+
+/// The smallest term of a step is the time penalty, 2.5e-6.
+constexpr double kRewardUnit = 1e-7;
+
+struct TrackInfo {
+  std::string_view name;
+  double unit;
+  int order;
+};
+constexpr std::array<TrackInfo, kNumTracks> kTracks{{
+#define X(name, unit, order) {#name, unit, order},
+    PICTURA_REPLAY_STATE_TRACKS(X)
+#undef X
+#define X(name) {"reward_" #name, kRewardUnit, 1},
+        PICTURA_REWARD_TERMS(X)
+#undef X
+}};
+
+struct ReplayBody {
+  AgentClass agent_class = AgentClass::vehicle;
+  int32_t length_cm = 0, width_cm = 0, height_cm = 0;
+  bool operator==(const ReplayBody&) const = default;
+};
+
+/// A car that stands in its place for the whole episode.
+struct ReplayParkedCar {
+  ReplayBody body;
+  int32_t x_cm = 0, y_cm = 0, z_cm = 0, heading_ddeg = 0;  // tenths of a degree
+  bool operator==(const ReplayParkedCar&) const = default;
+};
+
+/// The goal chain of an agent from this frame on.
+struct ReplayChain {
+  int32_t frame = 0, agent = 0;
+  std::array<int32_t, kNumWaypoints> x_cm{}, y_cm{}, z_cm{};
+  bool operator==(const ReplayChain&) const = default;
+};
+
+struct ReplayEpisode {
+  int32_t index = 0;  // of the simulator's
+  int32_t first_frame = 0, num_frames = 0;
+  std::vector<ReplayBody> agents;   // [agents]
+  std::vector<float> conditioning;  // [agents, kNumConditioning]
+  std::vector<ReplayParkedCar> parked;
+  std::vector<ReplayChain> chains;  // by frame
+  bool operator==(const ReplayEpisode&) const = default;
+};
+
+enum class ShapeKind : uint8_t {
+  lane,           // ring; detail: LaneType
+  crosswalk,      // ring
+  parking_space,  // ring
+  marking,        // line; detail: MarkColor
+  stop_line,      // line
+  road_edge,      // line
+  wall,           // line
+  light,          // the stop line's ends, its head, and a point one metre before the head; in the order of the map
+};
+constexpr int kNumShapeKinds = 8;
+
+/// A part of the map from above.
+struct ReplayShape {
+  ShapeKind kind = ShapeKind::lane;
+  int32_t detail = 0, width_cm = 0;
+  std::vector<std::array<int32_t, 2>> points_cm;
+  bool operator==(const ReplayShape&) const = default;
+};
+
+/// What the followed agent's policy made of a frame, in units of kDecisionUnit: the probability of each action, and the
+/// value. All 0 where it was not asked.
+constexpr size_t kDecisionValues = kNumActions + 1;
+constexpr double kDecisionUnit = 1e-4;
+
+struct ReplayCamera {
+  std::string name;
+  int32_t width_px = 0, height_px = 0;
+  bool operator==(const ReplayCamera&) const = default;
+};
+
+/// The followed agent's images, compressed as a whole number of groups of frames.
+struct ReplayImages {
+  std::vector<ReplayCamera> cameras;
+  int32_t frames_per_group = 0;
+  std::vector<std::string> groups;  // each a zlib stream, see images.h
+  bool operator==(const ReplayImages&) const = default;
+};
+
+/// What the replay is of, for people and galleries.
+struct ReplayOrigin {
+  std::string command, commit, version;
+  std::string map, map_hash;
+  std::string policy, policy_hash;
+  uint64_t seed = 0;
+  uint32_t global_world = 0;
+  float dt_s = 0.1f;
+  bool operator==(const ReplayOrigin&) const = default;
+};
+
+/// Of all that was recorded. Counts of events are of agent-steps.
+struct ReplayMetrics {
+  int64_t spawned = 0, agent_steps = 0;
+  int64_t collisions = 0, at_fault_collisions = 0, off_road = 0, red_light = 0, wall_contacts = 0;
+  int64_t goals_reached = 0, waypoints_reached = 0;
+  double km_driven = 0, reward = 0;
+  bool operator==(const ReplayMetrics&) const = default;
+};
+// X(name): the metrics by name.
+#define PICTURA_REPLAY_METRICS(X) \
+  X(spawned)                      \
+  X(agent_steps)                  \
+  X(collisions)                   \
+  X(at_fault_collisions)          \
+  X(off_road)                     \
+  X(red_light)                    \
+  X(wall_contacts)                \
+  X(goals_reached)                \
+  X(waypoints_reached)            \
+  X(km_driven)                    \
+  X(reward)
+
+struct Replay {
+  ReplayOrigin origin;
+  ReplayMetrics metrics;
+  int32_t num_agents = 0, num_frames = 0, num_lights = 0;
+  int32_t followed = -1;  // the agent whose decisions and images there are, or -1
+  std::vector<ReplayShape> map;
+  std::vector<ReplayEpisode> episodes;
+  std::array<std::vector<int32_t>, kNumTracks> tracks;  // [frames, agents]
+  std::vector<uint8_t> lights;                          // [frames, lights] LightState
+  std::vector<int32_t> decisions;                       // [frames, kDecisionValues], or empty
+  ReplayImages images;                                  // without cameras where there are none
+  bool operator==(const Replay&) const = default;
+
+  int32_t at(Track track, int frame, int agent) const {
+    return tracks[static_cast<size_t>(track)]
+                 [static_cast<size_t>(frame) * static_cast<size_t>(num_agents) + static_cast<size_t>(agent)];
+  }
+};
+
+}  // namespace pictura

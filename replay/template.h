@@ -1,0 +1,22 @@
+// Pages from templates: {{name}} is replaced by a text.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+namespace pictura {
+
+/// Text as HTML shows it.
+std::string html_text(std::string_view text);
+
+/// JSON for a script element, which no text in it can end.
+std::string script_text(const nlohmann::ordered_json& json);
+
+/// The template with each {{name}} replaced, which must be in it.
+std::string filled(std::string_view html, const std::vector<std::pair<std::string, std::string>>& values);
+
+}  // namespace pictura

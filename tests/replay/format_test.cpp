@@ -1,0 +1,200 @@
+// The format of replays: what is written is read back, and damage is named.
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/common/support/file.h"
+#include "pictura/replay/encoding.h"
+#include "pictura/replay/file.h"
+#include "pictura/replay/gallery.h"
+#include "pictura/replay/images.h"
+#include "pictura/simulator/conditioning.h"
+#include "pictura/tests/support/error_message.h"
+#include "pictura/tests/support/scratch_folder.h"
+
+namespace pictura {
+namespace {
+
+using test::message_of;
+using test::ScratchFolder;
+using testing::HasSubstr;
+
+/// Numbers of all sizes and both signs.
+int32_t any_number(std::mt19937* random) {
+  const auto bits = static_cast<uint32_t>((*random)());
+  return static_cast<int32_t>(bits) >> (*random)() % 32;
+}
+
+std::string any_frames(const std::vector<ReplayCamera>& cameras, int count, std::mt19937* random) {
+  std::string frames(bytes_of_frame(cameras) * static_cast<size_t>(count), '\0');
+  // Runs, which every filter meets, and noise.
+  for (size_t i = 0; i < frames.size(); ++i) frames[i] = static_cast<char>((*random)() % 8 == 0 ? (*random)() : i / 90);
+  return frames;
+}
+
+Replay any_replay() {
+  std::mt19937 random(7);
+  Replay replay;
+  replay.origin = {.command = "pictura replay '</script><b>'",
+                   .commit = "0123456789ab",
+                   .version = "1.2.3",
+                   .map = "a & b",
+                   .map_hash = "00ff00ff00ff00ff",
+                   .policy = "lane",
+                   .policy_hash = "lane",
+                   .seed = 18446744073709551615u,
+                   .global_world = 3,
+                   .dt_s = 0.05f};
+  replay.metrics.collisions = 3;
+  replay.metrics.km_driven = 1.25;
+  replay.num_agents = 3;
+  replay.num_frames = 50;
+  replay.num_lights = 2;
+  replay.followed = 1;
+  for (int kind = 0; kind < kNumShapeKinds; ++kind) {
+    ReplayShape shape{static_cast<ShapeKind>(kind), kind, 10 * kind, {}};
+    for (int i = 0; i < kind; ++i) shape.points_cm.push_back({any_number(&random) / 4, any_number(&random) / 4});
+    replay.map.push_back(shape);
+  }
+  for (int32_t i = 0; i < 2; ++i) {
+    ReplayEpisode episode{.index = 4 + i, .first_frame = 20 * i, .num_frames = 20 + 10 * i};
+    episode.agents = {{AgentClass::vehicle, 450, 180, 150}, {AgentClass::cyclist, 180, 60, 170}, {}};
+    for (size_t k = 0; k < 3 * kNumConditioning; ++k) episode.conditioning.push_back(0.1f * static_cast<float>(k));
+    episode.parked = {{{AgentClass::vehicle, 400, 170, 140}, -100, 200, 3, 900}};
+    episode.chains = {{20 * i, 2, {1, 2, 3}, {-4, -5, -6}, {7, 8, 9}}};
+    replay.episodes.push_back(episode);
+  }
+  for (std::vector<int32_t>& track : replay.tracks) {
+    for (int i = 0; i < replay.num_frames * replay.num_agents; ++i) track.push_back(any_number(&random));
+  }
+  for (int i = 0; i < replay.num_frames * replay.num_lights; ++i) {
+    replay.lights.push_back(static_cast<uint8_t>(random() % 4));
+  }
+  for (size_t i = 0; i < 50 * kDecisionValues; ++i) replay.decisions.push_back(any_number(&random));
+  replay.images.cameras = {{"front", 16, 9}, {"back", 5, 3}};
+  replay.images.frames_per_group = 40;
+  replay.images.groups = {pack_images(replay.images.cameras, any_frames(replay.images.cameras, 40, &random)),
+                          pack_images(replay.images.cameras, any_frames(replay.images.cameras, 10, &random))};
+  return replay;
+}
+
+TEST(ReplayFormat, NumbersOfAllSizesAreReadBack) {
+  std::mt19937 random(1);
+  std::vector<int32_t> numbers{0, 1, -1, 63, 64, -64, -65, INT32_MAX, INT32_MIN};
+  for (int i = 0; i < 2000; ++i) numbers.push_back(any_number(&random));
+  std::string bytes;
+  for (const int32_t number : numbers) put_number(number, &bytes);
+  NumberReader reader(bytes);
+  for (const int32_t number : numbers) EXPECT_EQ(reader.next(), number);
+  EXPECT_TRUE(reader.is_at_end());
+  EXPECT_THAT(message_of([&] { reader.next(); }), HasSubstr("end too early"));
+  NumberReader too_long("\xff\xff\xff\xff\xff\xff");
+  EXPECT_THAT(message_of([&] { too_long.next(); }), HasSubstr("expected a number of up to five bytes"));
+}
+
+TEST(ReplayFormat, DifferencesOfEachOrderAreReadBackAndSteadyMotionIsShort) {
+  std::mt19937 random(2);
+  for (int order = 0; order < 3; ++order) {
+    std::vector<int32_t> values(300), back(300);
+    for (int32_t& value : values) value = any_number(&random);
+    std::string bytes;
+    for (size_t column = 0; column < 3; ++column) put_differences(values.data() + column, 100, 3, order, &bytes);
+    NumberReader reader(bytes);
+    for (size_t column = 0; column < 3; ++column) read_differences(&reader, 100, 3, order, back.data() + column);
+    EXPECT_EQ(values, back) << "order " << order;
+  }
+  std::vector<int32_t> steady(1000);
+  for (size_t i = 0; i < steady.size(); ++i) steady[i] = 1000000 + 137 * static_cast<int32_t>(i);
+  std::string bytes;
+  put_differences(steady.data(), steady.size(), 1, 2, &bytes);
+  EXPECT_LT(bytes.size(), 1010u);
+}
+
+TEST(ReplayFormat, Base64IsTheStandards) {
+  // RFC 4648, section 10.
+  const std::vector<std::pair<std::string, std::string>> vectors{{"", ""},
+                                                                 {"f", "Zg=="},
+                                                                 {"fo", "Zm8="},
+                                                                 {"foo", "Zm9v"},
+                                                                 {"foob", "Zm9vYg=="},
+                                                                 {"fooba", "Zm9vYmE="},
+                                                                 {"foobar", "Zm9vYmFy"}};
+  for (const auto& [bytes, text] : vectors) {
+    EXPECT_EQ(base64(bytes), text);
+    EXPECT_EQ(from_base64(text), bytes);
+  }
+  std::string all;
+  for (int i = 0; i < 256; ++i) all.push_back(static_cast<char>(i));
+  EXPECT_EQ(from_base64(base64(all)), all);
+  EXPECT_THAT(message_of([] { from_base64("Zm9"); }), HasSubstr("groups of 4"));
+  EXPECT_THAT(message_of([] { from_base64("Zm9*"); }), HasSubstr("at 3"));
+}
+
+TEST(ReplayFormat, ImagesAreReadBackByteForByte) {
+  std::mt19937 random(3);
+  const std::vector<ReplayCamera> cameras{{"a", 33, 7}, {"b", 1, 1}, {"c", 8, 20}};
+  for (const int count : {1, 2, 40}) {
+    const std::string frames = any_frames(cameras, count, &random);
+    EXPECT_EQ(unpack_images(cameras, pack_images(cameras, frames), count), frames);
+  }
+  const std::string packed = pack_images(cameras, any_frames(cameras, 2, &random));
+  EXPECT_THAT(message_of([&] { unpack_images(cameras, packed, 3); }), HasSubstr("damaged"));
+}
+
+TEST(ReplayFormat, AReplayIsReadBackAsItWas) {
+  const ScratchFolder folder;
+  const Replay replay = any_replay();
+  write_replay(folder / "a.html", replay);
+  EXPECT_TRUE(read_replay(folder / "a.html") == replay);
+  const auto header = read_replay_header(folder / "a.html");
+  EXPECT_EQ(header.at("command"), replay.origin.command);
+  EXPECT_EQ(header.at("metrics").at("collisions"), 3);
+}
+
+TEST(ReplayFormat, WhatIsDamagedIsNamed) {
+  const ScratchFolder folder;
+  const std::string path = folder / "a.html";
+  write_replay(path, any_replay());
+  const std::string page = read_file(path);
+  const auto message = [&](const std::string& damaged) {
+    write_file(path, damaged);
+    return message_of([&] { read_replay(path); });
+  };
+  const auto without = [&](const std::string& text, const std::string& other) {
+    std::string damaged = page;
+    damaged.replace(damaged.find(text), text.size(), other);
+    return damaged;
+  };
+  EXPECT_THAT(message("<html>"), HasSubstr("a.html: expected a page of pictura replay, got a file without"));
+  const size_t data = page.find("id=\"replay-data\">") + 17;
+  EXPECT_THAT(message(page.substr(0, data + 200)), HasSubstr("ends within a replay's numbers"));
+  std::string flipped = page;
+  flipped[data + 101] = flipped[data + 101] == 'A' ? 'B' : 'A';
+  EXPECT_THAT(message(flipped), HasSubstr("a damaged one"));
+  EXPECT_THAT(message(without("\"version\":1,", "\"version\":2,")),
+              HasSubstr("expected a replay of version 1, got version 2"));
+  EXPECT_THAT(message(without("\"agents\":3", "\"agents\":4")), HasSubstr("a.html"));
+  EXPECT_THAT(message(without("\"agents\":3", "\"agents\":-1")), HasSubstr("agents: expected"));
+  EXPECT_THAT(message(without("\"map_hash\"", "\"map_mash\"")), HasSubstr("a value is missing"));
+  EXPECT_THAT(message(without("{\"format\"", "{\"format")), HasSubstr("damaged JSON"));
+}
+
+TEST(ReplayFormat, AGalleryListsTheWorstFirst) {
+  const ScratchFolder folder;
+  Replay replay = any_replay();
+  for (const auto& [name, red_lights] : {std::pair{"a.html", 0}, {"b.html", 9}, {"c.html", 4}}) {
+    replay.metrics.red_light = red_lights;
+    write_replay(folder / name, replay);
+  }
+  EXPECT_EQ(write_gallery(folder.path()), 3);
+  const std::string index = read_file(folder / "index.html");
+  EXPECT_LT(index.find("b.html"), index.find("c.html"));
+  EXPECT_LT(index.find("c.html"), index.find("a.html"));
+  EXPECT_EQ(write_gallery(folder.path()), 3);  // the index is none of them
+  write_file(folder / "other.html", "<p>no replay</p>");
+  EXPECT_THAT(message_of([&] { write_gallery(folder.path()); }), HasSubstr("other.html: expected a page of pictura"));
+}
+
+}  // namespace
+}  // namespace pictura

@@ -1,0 +1,218 @@
+// What a recorder keeps of a simulator: places, rewards by term, actions, events, chains, lights and images.
+#include "pictura/replay/recorder.h"
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/backends/make_controller.h"
+#include "pictura/backends/make_renderer.h"
+#include "pictura/backends/make_simulator.h"
+#include "pictura/backends/upload_maps.h"
+#include "pictura/map/load_map.h"
+#include "pictura/replay/images.h"
+#include "pictura/tests/support/error_message.h"
+
+namespace pictura {
+namespace {
+
+using test::message_of;
+using testing::HasSubstr;
+
+std::unique_ptr<Simulator> town(int agents, float reset_inactive_fraction = 0.4f) {
+  SimulatorConfig config;
+  config.seed = 5;
+  config.parked_cars = 4;
+  config.episode_steps = 150;
+  config.reset_inactive_fraction = reset_inactive_fraction;
+  // Of two worlds the second is recorded: its agents, boxes and lights do not begin at 0.
+  return make_simulator("cpu", config, {load_map("procedural:1:blocks=2x2")}, {{0, 7, 0}, {0, agents, 1}});
+}
+
+constexpr int kWorld = 1, kFirstSlot = 7, kAgents = 30;
+
+/// Drives and records; calls visit(frame, result) at each frame, the first with none.
+template <typename Visit>
+Replay record(Simulator& simulator, const std::string& policy, int steps, const RecorderOptions& options,
+              Visit&& visit) {
+  const std::unique_ptr<Controller> controller = make_controller(policy, simulator, 9);
+  Recorder recorder(simulator, options);
+  std::vector<Command> commands(static_cast<size_t>(simulator.num_slots()));
+  visit(0, nullptr, commands);
+  for (int step = 0; step < steps; ++step) {
+    controller->act(simulator.controller_input(), {}, commands);
+    ReplayDecision decision;
+    decision.probabilities[3] = 0.25f;
+    decision.value = -0.5f * static_cast<float>(step);
+    recorder.before_step(commands, decision);
+    const StepResult result = simulator.step(Span<const Command>(commands));
+    recorder.after_step(result);
+    visit(step + 1, &result, commands);
+  }
+  return recorder.finish({.policy = policy});
+}
+
+TEST(Recorder, PlacesAreWithinHalfAUnitOfTheSimulators) {
+  for (const char* policy : {"random", "lane"}) {
+    const std::unique_ptr<Simulator> simulator = town(kAgents);
+    std::vector<std::vector<AgentBox>> boxes;
+    std::vector<std::vector<float>> speeds;
+    const Replay replay =
+        record(*simulator, policy, 200, {.world = kWorld}, [&](int, const StepResult*, const std::vector<Command>&) {
+          const SceneBatch& scene = simulator->scene();
+          const auto first = static_cast<size_t>(scene.world_begin[kWorld]);
+          boxes.emplace_back(scene.agents.begin() + first, scene.agents.begin() + first + kAgents);
+          speeds.emplace_back(simulator->state().speed_mps + kFirstSlot,
+                              simulator->state().speed_mps + kFirstSlot + kAgents);
+        });
+    ASSERT_EQ(replay.num_frames, 201);
+    ASSERT_EQ(replay.num_agents, kAgents);
+    EXPECT_GE(replay.episodes.size(), 2u);  // their first frames are resets
+    int drawn = 0;
+    for (int frame = 0; frame < replay.num_frames; ++frame) {
+      for (int agent = 0; agent < kAgents; ++agent) {
+        const AgentBox& box = boxes[static_cast<size_t>(frame)][static_cast<size_t>(agent)];
+        const bool absent = replay.at(Track::status, frame, agent) == static_cast<int32_t>(AgentStatus::absent);
+        ASSERT_EQ(absent, !box.drawn);
+        if (absent) continue;
+        ++drawn;
+        const auto value = [&](Track track) {
+          return replay.at(track, frame, agent) * kTracks[static_cast<size_t>(track)].unit;
+        };
+        EXPECT_NEAR(value(Track::x_m), static_cast<double>(box.center_m.x), 0.00501);
+        EXPECT_NEAR(value(Track::y_m), static_cast<double>(box.center_m.y), 0.00501);
+        EXPECT_NEAR(value(Track::z_m), static_cast<double>(box.center_m.z), 0.00501);
+        EXPECT_NEAR(value(Track::speed_mps),
+                    static_cast<double>(speeds[static_cast<size_t>(frame)][static_cast<size_t>(agent)]), 0.00501);
+        const double heading = value(Track::heading_deg) * static_cast<double>(kPi) / 180;
+        EXPECT_NEAR(std::cos(heading), static_cast<double>(box.cos_heading), 0.0009);
+        EXPECT_NEAR(std::sin(heading), static_cast<double>(box.sin_heading), 0.0009);
+      }
+    }
+    EXPECT_GT(drawn, 4000);
+  }
+}
+
+TEST(Recorder, RewardTermsAddUpToTheSimulatorsRewardAndMetricsToItsTotals) {
+  for (const char* policy : {"random", "lane"}) {
+    const std::unique_ptr<Simulator> simulator = town(kAgents, /*never*/ 2.0f);
+    std::vector<std::vector<float>> rewards;
+    int infractions = 0;
+    const Replay replay = record(*simulator, policy, 140, {.world = kWorld},
+                                 [&](int, const StepResult* result, const std::vector<Command>&) {
+                                   std::vector<float> of_frame(kAgents);
+                                   for (size_t i = 0; result && i < kAgents; ++i) {
+                                     of_frame[i] = result->reward[kFirstSlot + i];
+                                     infractions += result->terminated[kFirstSlot + i];
+                                   }
+                                   rewards.push_back(of_frame);
+                                 });
+    for (int frame = 0; frame < replay.num_frames; ++frame) {
+      for (int agent = 0; agent < kAgents; ++agent) {
+        double sum = 0;
+#define X(name) sum += replay.at(Track::reward_##name, frame, agent) * kRewardUnit;
+        PICTURA_REWARD_TERMS(X)
+#undef X
+        // Eleven roundings of half a unit, and that of float.
+        EXPECT_NEAR(sum, static_cast<double>(rewards[static_cast<size_t>(frame)][static_cast<size_t>(agent)]), 9e-7);
+      }
+    }
+    // Theirs are the terms of the motion before the halt.
+    EXPECT_GE(infractions, std::string(policy) == "random" ? 10 : 0);
+    const SimulatorTotals& totals = simulator->controller_input().world_totals[kWorld];
+    EXPECT_EQ(replay.metrics.agent_steps, totals.agent_steps);
+    EXPECT_EQ(replay.metrics.collisions, totals.collisions);
+    EXPECT_EQ(replay.metrics.at_fault_collisions, totals.at_fault_collisions);
+    EXPECT_EQ(replay.metrics.off_road, totals.off_road);
+    EXPECT_EQ(replay.metrics.red_light, totals.red_light);
+    EXPECT_EQ(replay.metrics.wall_contacts, totals.wall_contacts);
+    EXPECT_EQ(replay.metrics.goals_reached, totals.goals_reached);
+    EXPECT_EQ(replay.metrics.waypoints_reached, totals.waypoints_reached);
+    EXPECT_NEAR(replay.metrics.reward, totals.reward, 1e-3);
+  }
+}
+
+TEST(Recorder, StepsBelongToTheFrameThatTheyLeadTo) {
+  const std::unique_ptr<Simulator> simulator = town(kAgents);
+  std::vector<std::vector<int32_t>> actions, events;
+  const Replay replay = record(*simulator, "random", 120, {.world = kWorld, .followed = 2},
+                               [&](int, const StepResult* result, const std::vector<Command>& commands) {
+                                 std::vector<int32_t> of_frame(kAgents), events_of_frame(kAgents);
+                                 for (size_t i = 0; result && i < kAgents; ++i) {
+                                   if (result->valid[kFirstSlot + i]) of_frame[i] = 1 + commands[kFirstSlot + i].action;
+                                   if (result->valid[kFirstSlot + i]) {
+                                     events_of_frame[i] = simulator->state().events[kFirstSlot + i];
+                                   }
+                                 }
+                                 actions.push_back(of_frame);
+                                 events.push_back(events_of_frame);
+                               });
+  for (int frame = 0; frame < replay.num_frames; ++frame) {
+    for (int agent = 0; agent < kAgents; ++agent) {
+      EXPECT_EQ(replay.at(Track::action, frame, agent),
+                actions[static_cast<size_t>(frame)][static_cast<size_t>(agent)]);
+      EXPECT_EQ(replay.at(Track::events, frame, agent), events[static_cast<size_t>(frame)][static_cast<size_t>(agent)]);
+    }
+  }
+  // Decisions are of the frame that they were made in; none was made in the last.
+  ASSERT_EQ(replay.decisions.size(), 121 * kDecisionValues);
+  EXPECT_EQ(replay.decisions[10 * kDecisionValues + 3], 2500);
+  EXPECT_EQ(replay.decisions[10 * kDecisionValues + kNumActions], -50000);
+  EXPECT_EQ(replay.decisions[120 * kDecisionValues + 3], 0);
+  // Each agent of each episode has a chain from its first frame on.
+  for (const ReplayEpisode& episode : replay.episodes) {
+    std::vector<int> first(kAgents);
+    for (const ReplayChain& chain : episode.chains) {
+      first[static_cast<size_t>(chain.agent)] += chain.frame == episode.first_frame;
+      EXPECT_GE(chain.frame, episode.first_frame);
+      EXPECT_LT(chain.frame, episode.first_frame + episode.num_frames);
+    }
+    for (int agent = 0; agent < kAgents; ++agent) {
+      const bool absent =
+          replay.at(Track::status, episode.first_frame, agent) == static_cast<int32_t>(AgentStatus::absent);
+      EXPECT_EQ(first[static_cast<size_t>(agent)], absent ? 0 : 1);
+    }
+  }
+}
+
+TEST(Recorder, ImagesAreTheOraclesBytes) {
+  const std::unique_ptr<Simulator> simulator = town(kAgents);
+  const RendererConfig config{.rig = paper_rig(32, 18)};
+  const std::unique_ptr<Renderer> renderer = make_renderer("cpu", config);
+  upload_maps(*simulator, renderer.get());
+  HostImages images(config.rig, 1);
+  constexpr int kFollowed = 3, kSteps = 50;
+  std::vector<std::string> frames;
+  const Replay replay = record(
+      *simulator, "lane", kSteps, {.world = kWorld, .followed = kFollowed, .cameras = config},
+      [&](int, const StepResult*, const std::vector<Command>&) {
+        renderer->render(simulator->scene(), simulator->views().subspan(kFirstSlot + kFollowed, 1), images.batch());
+        std::string frame;
+        for (int camera = 0; camera < 4; ++camera) {
+          const std::vector<uint8_t> rgb = images.interleaved(0, camera);
+          frame.append(rgb.begin(), rgb.end());
+        }
+        frames.push_back(frame);
+      });
+  ASSERT_EQ(replay.images.groups.size(), 2u);
+  std::string all;
+  for (const std::string& frame : frames) all += frame;
+  EXPECT_EQ(unpack_images(replay.images.cameras, replay.images.groups[0], 40) +
+                unpack_images(replay.images.cameras, replay.images.groups[1], 11),
+            all);
+  EXPECT_GT(std::count_if(all.begin(), all.end(), [](char c) { return c != 0; }), 10000);
+}
+
+TEST(Recorder, WhatCannotBeRecordedIsRefused) {
+  const std::unique_ptr<Simulator> simulator = town(kAgents);
+  EXPECT_THAT(message_of([&] { Recorder(*simulator, {.world = 2}); }), HasSubstr("expected a world of 0 to 1, got 2"));
+  EXPECT_THAT(message_of([&] { Recorder(*simulator, {.world = 1, .followed = kAgents}); }),
+              HasSubstr("expected an agent of 0 to 29 to follow, got 30"));
+  Recorder recorder(*simulator, {.world = 1});
+  const std::vector<Command> few(3);
+  EXPECT_THAT(message_of([&] { recorder.before_step(few); }), HasSubstr("expected 37 commands, got 3"));
+}
+
+}  // namespace
+}  // namespace pictura
