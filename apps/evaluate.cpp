@@ -6,8 +6,10 @@
 
 #include "pictura/apps/commands.h"
 #include "pictura/cli/backend_options.h"
+#include "pictura/cli/file_options.h"
 #include "pictura/cli/map_options.h"
 #include "pictura/cli/number_options.h"
+#include "pictura/cli/replay_scenarios.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/numbers.h"
@@ -107,6 +109,9 @@ void add_evaluate_command(CLI::App& app) {
     std::vector<std::string> parts;
     std::string size, scenarios = "200", out;
     bool sampled = false, json = false;
+    std::string replay, gallery;
+    int replays = 0;
+    RecordingOptions recording;
   };
   auto arguments = std::make_shared<Arguments>();
   EvaluateOptions& options = arguments->evaluate;
@@ -160,16 +165,27 @@ void add_evaluate_command(CLI::App& app) {
       ->allow_extra_args(false);
   add_threads_option(command, &options.num_threads);
   command->add_option("--out", arguments->out, "A file for the counts of each scenario, which --merge reads");
+  command->add_option("--replay", arguments->replay, "Record the worst scenario again, as a page that a browser plays")
+      ->check(file_ending(".html"));
+  CLI::Option* const replays =
+      command->add_option("--replays", arguments->replays, "Record the N worst scenarios again, into --gallery")
+          ->transform(whole_number(1));
+  CLI::Option* const gallery =
+      command->add_option("--gallery", arguments->gallery, "A folder for the pages of --replays, and an index of them");
+  replays->needs(gallery);
+  gallery->needs(replays);
+  add_recording_options(command, &arguments->recording);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Examples:\n  pictura evaluate runs/town01/checkpoint.ckpt --map Town01 --density light --scenarios 4 --steps "
       "600\n"
       "  pictura evaluate --policy lane --density medium --scenarios 8\n"
+      "  pictura evaluate run.ckpt --map Town05 --scenarios 50 --replays 10 --gallery replays\n"
       "In parts, on several machines or after one another:\n"
       "  pictura evaluate run.ckpt --scenarios 0:100 --out a.json\n"
       "  pictura evaluate run.ckpt --scenarios 100:200 --out b.json\n"
       "  pictura evaluate --merge a.json b.json");
-  command->callback([arguments] {
+  command->callback([arguments, command] {
     EvaluateOptions& evaluation = arguments->evaluate;
     evaluation.argmax = !arguments->sampled;
     const BackendOptions& backends = arguments->backends;
@@ -192,6 +208,9 @@ void add_evaluate_command(CLI::App& app) {
     if (!evaluation.controller.empty() && !(backends.renderer.empty() && backends.samples.empty())) {
       fail_usage("--renderer, --samples: {} sees no images", evaluation.controller);
     }
+    const bool records = !arguments->replay.empty() || !arguments->gallery.empty();
+    if (!records) refuse_recording_options(*command, "--replay or --gallery");
+    if (records && !arguments->parts.empty()) fail_usage("--replay, --gallery: have no effect with --merge");
     ProgressLine line;
     const auto begin = std::chrono::steady_clock::now();
     bool has_estimate = false;
@@ -216,6 +235,12 @@ void add_evaluate_command(CLI::App& app) {
       print_report(evaluation, report);
     else
       print_table(report);
+    if (!report.interrupted && !arguments->replay.empty()) {
+      write_scenario_replay(evaluation, report.results, arguments->recording, arguments->replay);
+    }
+    if (!report.interrupted && !arguments->gallery.empty()) {
+      write_scenario_replays(evaluation, report.results, arguments->recording, arguments->replays, arguments->gallery);
+    }
     if (report.interrupted) {
       int finished = 0;
       for (const EvaluateRow& row : report.rows) finished += row.scenarios;

@@ -22,7 +22,22 @@ struct Arguments {
   BackendOptions backends;
   RecordingOptions recording;
   std::string policy = "lane", out, gallery;
+  bool json = false;
 };
+
+Json facts_of(const std::string& path, const Replay& replay) {
+  Json metrics;
+#define X(name) metrics[#name] = replay.metrics.name;
+  PICTURA_REPLAY_METRICS(X)
+#undef X
+  return {{"file", path},
+          {"map", replay.origin.map},
+          {"seed", replay.origin.seed},
+          {"agents", replay.num_agents},
+          {"steps", replay.num_frames - 1},
+          {"episodes", replay.episodes.size()},
+          {"metrics", metrics}};
+}
 
 Replay record(const Arguments& arguments, uint64_t seed, ProgressLine* line_out) {
   WorldOptions options = arguments.world;
@@ -46,18 +61,22 @@ void run(const Arguments& arguments) {
     const Replay replay = record(arguments, arguments.world.seed, &line);
     line.finish();
     write_replay_and_say_so(arguments.out, replay);
+    if (arguments.json) print_json(facts_of(arguments.out, replay));
     return;
   }
   make_output_folder(arguments.gallery);
+  Json replays = Json::array();
   for (int episode = 0; episode < arguments.episodes; ++episode) {
     const uint64_t seed = arguments.world.seed + static_cast<uint64_t>(episode);
     const Replay replay = record(arguments, seed, &line);
     line.finish();
-    write_replay_and_say_so((std::filesystem::path(arguments.gallery) / fmt::format("seed_{}.html", seed)).string(),
-                            replay);
+    const std::string path = (std::filesystem::path(arguments.gallery) / fmt::format("seed_{}.html", seed)).string();
+    write_replay_and_say_so(path, replay);
+    replays.push_back(facts_of(path, replay));
   }
   const int count = write_gallery(arguments.gallery);
   fmt::print(stderr, "{}: {} replays\n", (std::filesystem::path(arguments.gallery) / "index.html").string(), count);
+  if (arguments.json) print_json({{"gallery", arguments.gallery}, {"replays", replays}});
 }
 
 }  // namespace
@@ -82,6 +101,7 @@ void add_replay_command(CLI::App& app) {
   command->add_option("--episodes", arguments->episodes, "How many seeds, from --seed on, --gallery records")
       ->transform(whole_number(1, 10000))
       ->capture_default_str();
+  command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "The page holds everything: it opens from disk, in any browser, without a network.\n"
       "Examples:\n  pictura replay Town01 --agents 120 --steps 1200 --out lane.html\n"

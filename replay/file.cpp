@@ -190,6 +190,10 @@ Json header_of(const Replay& replay, const std::vector<Section>& sections) {
 #define X(name) metrics[#name] = replay.metrics.name;
   PICTURA_REPLAY_METRICS(X)
 #undef X
+  Json first_infraction = nullptr;
+  if (replay.first_infraction.frame >= 0) {
+    first_infraction = {{"frame", replay.first_infraction.frame}, {"agent", replay.first_infraction.agent}};
+  }
   Json tracks = Json::array();
   for (const TrackInfo& track : kTracks) {
     tracks.push_back({{"name", track.name}, {"unit", track.unit}, {"order", track.order}});
@@ -200,6 +204,7 @@ Json header_of(const Replay& replay, const std::vector<Section>& sections) {
   if (!replay.images.cameras.empty()) {
     images = {{"frames_per_group", replay.images.frames_per_group},
               {"cameras", Json::array()},
+              {"hues", replay_hues()},
               {"group_bytes", Json::array()}};
     for (const ReplayCamera& camera : replay.images.cameras) {
       images["cameras"].push_back(
@@ -224,6 +229,7 @@ Json header_of(const Replay& replay, const std::vector<Section>& sections) {
           {"lights", replay.num_lights},
           {"followed", replay.followed},
           {"metrics", metrics},
+          {"first_infraction", first_infraction},
           {"conditioning", kConditioningNames},
           {"decision_unit", kDecisionUnit},
           {"tracks", tracks},
@@ -276,6 +282,11 @@ void read_header_values(const Json& header, Replay* replay_out) {
 #define X(name) header.at("metrics").at(#name).get_to(replay_out->metrics.name);
   PICTURA_REPLAY_METRICS(X)
 #undef X
+  const Json& first = header.at("first_infraction");
+  if (!first.is_null()) {
+    first.at("frame").get_to(replay_out->first_infraction.frame);
+    first.at("agent").get_to(replay_out->first_infraction.agent);
+  }
   check_header(*replay_out);
 }
 

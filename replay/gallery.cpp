@@ -38,7 +38,8 @@ int write_gallery(const std::string& folder) {
   for (const std::string& name : names) {
     const Json header = read_replay_header((std::filesystem::path(folder) / name).string());
     Json entry{{"file", name}};
-    for (const char* key : {"map", "policy", "seed", "global_world", "agents", "frames", "dt_s", "metrics"}) {
+    for (const char* key :
+         {"map", "policy", "seed", "global_world", "agents", "frames", "dt_s", "metrics", "first_infraction"}) {
       entry[key] = header.at(key);
     }
     entry["infractions"] = infractions_of(header);

@@ -1,49 +1,225 @@
 #include "pictura/replay/images.h"
 
+#include <algorithm>
 #include <cstdlib>
+#include <cstring>
+#include <memory>
 
-#include "pictura/replay/encoding.h"
+#include <zlib.h>
 
 namespace pictura {
 
 namespace {
 
-// How a row is predicted, the byte before it. Differences are modulo 256.
-enum class RowFilter : uint8_t { left, above, gradient, before };
-constexpr int kNumRowFilters = 4;
-constexpr size_t kChannels = 3;
+// The coder is that of LZMA (Pavlov's specification of 2015) with finer probabilities: carries are kept back in a byte
+// and the 0xFF bytes after it.
 
-struct Rows {
-  const uint8_t* row;
-  const uint8_t* above;   // or null
-  const uint8_t* before;  // the same row of the frame before, or null
-  size_t size;
+/// How likely a bit is 0, in 1/32768, and how often it has been seen.
+struct Chance {
+  uint16_t zero = 16384;
+  uint8_t seen = 0;
 
-  uint8_t predict(RowFilter filter, size_t i) const {
-    const int left = i >= kChannels ? row[i - kChannels] : 0, up = above ? above[i] : 0;
-    switch (filter) {
-      case RowFilter::left: return static_cast<uint8_t>(left);
-      case RowFilter::above: return static_cast<uint8_t>(up);
-      case RowFilter::before: return before ? before[i] : 0;
-      default: break;
-    }
-    const int corner = above && i >= kChannels ? above[i - kChannels] : 0;
-    const int low = std::min(left, up), high = std::max(left, up);
-    return static_cast<uint8_t>(corner >= high ? low : corner <= low ? high : left + up - corner);
+  void learn(int bit) {
+    // The mean of the first few, then one that forgets.
+    constexpr uint8_t kShift[] = {1, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 5};
+    const int shift = kShift[std::min<int>(seen, 15)];
+    if (seen < 15) ++seen;
+    zero = static_cast<uint16_t>(bit ? zero - (zero >> shift) : zero + ((32768 - zero) >> shift));
+    zero = static_cast<uint16_t>(std::clamp<int>(zero, 32, 32736));
   }
 };
+constexpr int kChanceBits = 15;
+constexpr uint32_t kLeastRange = 1u << 24;
 
-/// Calls visit(rows, offset of the row in all frames) for every row of every camera of every frame.
-template <typename Visit>
-void for_each_row(const std::vector<ReplayCamera>& cameras, const uint8_t* first, size_t num_frames, Visit&& visit) {
-  const size_t frame_bytes = bytes_of_frame(cameras);
+class Encoder {
+ public:
+  int bit(Chance* chance, int value) {
+    const uint32_t bound = (range_ >> kChanceBits) * chance->zero;
+    if (value == 0) {
+      range_ = bound;
+    } else {
+      low_ += bound;
+      range_ -= bound;
+    }
+    chance->learn(value);
+    for (; range_ < kLeastRange; range_ <<= 8) shift_low();
+    return value;
+  }
+  std::string finish() {
+    for (int i = 0; i < 5; ++i) shift_low();
+    return std::move(bytes_);
+  }
+
+ private:
+  void shift_low() {
+    if (low_ < 0xFF000000u || low_ > 0xFFFFFFFFu) {
+      const auto carry = static_cast<uint8_t>(low_ >> 32);
+      if (held_ > 0) bytes_.push_back(static_cast<char>(first_ + carry));
+      for (; held_ > 1; --held_) bytes_.push_back(static_cast<char>(0xFF + carry));
+      held_ = 0;
+      first_ = static_cast<uint8_t>(low_ >> 24);
+    }
+    ++held_;
+    low_ = (low_ & 0x00FFFFFFu) << 8;
+  }
+
+  uint64_t low_ = 0;
+  uint32_t range_ = 0xFFFFFFFFu;
+  uint8_t first_ = 0;
+  size_t held_ = 0;
+  std::string bytes_;
+};
+
+class Decoder {
+ public:
+  explicit Decoder(std::string_view bytes) : bytes_(bytes) {
+    for (int i = 0; i < 4; ++i) code_ = code_ << 8 | next();
+  }
+  int bit(Chance* chance, int /*value*/) {
+    const uint32_t bound = (range_ >> kChanceBits) * chance->zero;
+    const int value = code_ < bound ? 0 : 1;
+    if (value == 0) {
+      range_ = bound;
+    } else {
+      code_ -= bound;
+      range_ -= bound;
+    }
+    chance->learn(value);
+    for (; range_ < kLeastRange; range_ <<= 8) code_ = code_ << 8 | next();
+    return value;
+  }
+
+ private:
+  uint8_t next() {
+    PICTURA_CHECK(at_ < bytes_.size(), "images: a group ends too early, after {} bytes", bytes_.size());
+    return static_cast<uint8_t>(bytes_[at_++]);
+  }
+
+  std::string_view bytes_;
+  size_t at_ = 0;
+  uint32_t code_ = 0, range_ = 0xFFFFFFFFu;
+};
+
+/// `bits` bits of a number, the highest first, each by what those before it are.
+template <typename Coder>
+int code_number(Coder* coder, Chance* tree, int bits, int value) {
+  int node = 1;
+  for (int i = bits - 1; i >= 0; --i) node = node << 1 | coder->bit(tree + node, value >> i & 1);
+  return node - (1 << bits);
+}
+
+struct Pixel {
+  uint8_t r = 0, g = 0, b = 0;
+  bool operator==(const Pixel&) const = default;
+  uint8_t highest() const { return std::max({r, g, b}); }
+};
+/// What is known of a pixel that has been coded.
+struct Coded {
+  Pixel pixel;
+  uint8_t how = 0;  // by which candidate; kNew: by none
+  uint8_t hue = 0;  // of which hue; black pixels are of none
+};
+
+constexpr int kCandidates = 4, kNew = kCandidates;  // left, above, in the frame before, above to the right
+constexpr int kHueBits = 5, kNoHue = 30, kFree = 31;
+constexpr int kNumHows = kCandidates + 1, kNumHues = 1 << kHueBits;
+
+/// A hue's pixel of this brightness: its highest channel.
+Pixel shade(const ReplayHue& hue, int brightness) {
+  const int highest = std::max({hue[0], hue[1], hue[2]});
+  const auto channel = [&](int value) {
+    return static_cast<uint8_t>((2 * value * brightness + highest) / (2 * highest));
+  };
+  return {channel(hue[0]), channel(hue[1]), channel(hue[2])};
+}
+
+/// Codes pixel after pixel. With an Encoder it writes what it is given, with a Decoder it returns what was written.
+template <typename Coder>
+class PixelCoder {
+ public:
+  explicit PixelCoder(Coder coder) : coder_(std::move(coder)), hues_(replay_hues()) {}
+  Coder& coder() { return coder_; }
+
+  Coded code(const Coded& left, const Coded& above, const Coded& before, const Coded& right_above, const Coded& corner,
+             Pixel pixel) {
+    const Coded* candidates[kCandidates] = {&left, &above, &before, &right_above};
+    const Pixel w = left.pixel, n = above.pixel, p = before.pixel, ne = right_above.pixel, nw = corner.pixel;
+    const int alike = (w == n) | (w == p) << 1 | (n == p) << 2 | (n == ne) << 3 | (nw == w) << 4 | (nw == n) << 5;
+    const int context = ((alike * kNumHows + left.how) * kNumHows + above.how) * kNumHows + before.how;
+    for (int i = 0; i < kCandidates; ++i) {
+      bool repeats = false;
+      for (int j = 0; j < i; ++j) repeats = repeats || candidates[j]->pixel == candidates[i]->pixel;
+      if (repeats) continue;
+      if (coder_.bit(&is_candidate_[i][context], pixel == candidates[i]->pixel)) {
+        return {candidates[i]->pixel, static_cast<uint8_t>(i), candidates[i]->hue};
+      }
+    }
+    const int hue = code_number(&coder_, hue_[left.hue][above.hue], kHueBits, hue_of(pixel));
+    if (hue >= static_cast<int>(hues_.size())) return {code_free(pixel), kNew, kFree};
+    const int brightness = code_number(&coder_, brightness_[hue][p.highest() >> 5], 8, pixel.highest());
+    const Pixel guess = shade(hues_[static_cast<size_t>(hue)], brightness);
+    const auto near = [&](int channel, uint8_t guessed, uint8_t value) {
+      Chance* chances = rounding_[hue][channel];
+      if (coder_.bit(chances, value != guessed) == 0) return guessed;
+      return static_cast<uint8_t>(coder_.bit(chances + 1, value > guessed) ? guessed + 1 : guessed - 1);
+    };
+    return {{near(0, guess.r, pixel.r), near(1, guess.g, pixel.g), near(2, guess.b, pixel.b)},
+            kNew,
+            static_cast<uint8_t>(hue)};
+  }
+
+ private:
+  /// The first hue of which the pixel is but for rounding, else kFree.
+  int hue_of(Pixel pixel) const {
+    int best = kFree, least = 4;
+    for (size_t i = 0; i < hues_.size(); ++i) {
+      const Pixel guess = shade(hues_[i], pixel.highest());
+      const int r = std::abs(guess.r - pixel.r), g = std::abs(guess.g - pixel.g), b = std::abs(guess.b - pixel.b);
+      if (std::max({r, g, b}) > 1 || r + g + b >= least) continue;
+      best = static_cast<int>(i);
+      least = r + g + b;
+    }
+    return best;
+  }
+  /// A blend of hues: channels by their high bits before them.
+  Pixel code_free(Pixel pixel) {
+    const int r = code_number(&coder_, free_[0][0], 8, pixel.r);
+    const int g = code_number(&coder_, free_[1][r >> 4], 8, pixel.g);
+    const int b = code_number(&coder_, free_[2][g >> 4], 8, pixel.b);
+    return {static_cast<uint8_t>(r), static_cast<uint8_t>(g), static_cast<uint8_t>(b)};
+  }
+
+  Coder coder_;
+  std::vector<ReplayHue> hues_;
+  Chance is_candidate_[kCandidates][64 * kNumHows * kNumHows * kNumHows];
+  Chance hue_[kNumHues][kNumHues][kNumHues];
+  Chance brightness_[kNumHues][8][256];
+  Chance rounding_[kNumHues][3][2];
+  Chance free_[3][16][256];
+};
+
+/// Codes all frames; next(offset) is the pixel to write at a byte, put(offset, pixel) receives it.
+template <typename Coder, typename Next, typename Put>
+void code_frames(const std::vector<ReplayCamera>& cameras, size_t num_frames, PixelCoder<Coder>* coder, Next&& next,
+                 Put&& put) {
+  const Coded black{.pixel = {}, .how = 0, .hue = kNoHue};
+  std::vector<std::vector<Coded>> images;  // of the frame before, and of this one as far as it is coded
+  for (const ReplayCamera& camera : cameras) {
+    images.emplace_back(static_cast<size_t>(camera.width_px) * static_cast<size_t>(camera.height_px), black);
+  }
+  size_t offset = 0;
   for (size_t frame = 0; frame < num_frames; ++frame) {
-    size_t offset = frame * frame_bytes;
-    for (const ReplayCamera& camera : cameras) {
-      const size_t size = static_cast<size_t>(camera.width_px) * kChannels;
-      for (int32_t y = 0; y < camera.height_px; ++y, offset += size) {
-        const uint8_t* row = first + offset;
-        visit(Rows{row, y > 0 ? row - size : nullptr, frame > 0 ? row - frame_bytes : nullptr, size}, offset);
+    for (size_t c = 0; c < cameras.size(); ++c) {
+      const auto width = static_cast<size_t>(cameras[c].width_px), height = static_cast<size_t>(cameras[c].height_px);
+      for (size_t y = 0; y < height; ++y) {
+        Coded* row = images[c].data() + y * width;
+        const Coded* above = row - width;
+        for (size_t x = 0; x < width; ++x, offset += 3) {
+          const Coded& corner = x > 0 && y > 0 ? above[x - 1] : black;
+          row[x] = coder->code(x > 0 ? row[x - 1] : black, y > 0 ? above[x] : black, row[x],
+                               y > 0 && x + 1 < width ? above[x + 1] : black, corner, next(offset));
+          put(offset, row[x].pixel);
+        }
       }
     }
   }
@@ -51,56 +227,67 @@ void for_each_row(const std::vector<ReplayCamera>& cameras, const uint8_t* first
 
 }  // namespace
 
+namespace {
+
+// Of all frames of a group: the coder itself would make something of any bytes.
+constexpr size_t kChecksumBytes = 4;
+uint32_t checksum(std::string_view frames) {
+  const uLong begin = adler32(0, nullptr, 0);
+  return static_cast<uint32_t>(adler32_z(begin, reinterpret_cast<const Bytef*>(frames.data()), frames.size()));
+}
+
+}  // namespace
+
+std::vector<ReplayHue> replay_hues() {
+  std::vector<ReplayHue> hues;
+  const auto add = [&hues](Rgb color) {
+    const auto byte = [](float channel) { return static_cast<uint8_t>(channel * 255 + 0.5f); };
+    hues.push_back({byte(color.r), byte(color.g), byte(color.b)});
+  };
+  for (const Rgb color :
+       {kWhiteMarkColor, kYellowMarkColor, kRoadEdgeColor, kCrosswalkColor, kStopLineColor, kWallColor}) {
+    add(color);
+  }
+  for (int agent_class = 0; agent_class < kNumAgentClasses; ++agent_class) {
+    for (int face = 0; face < kNumBoxFaces; ++face) {
+      add(agent_color(static_cast<AgentClass>(agent_class), static_cast<BoxFace>(face)));
+    }
+  }
+  for (const LightState state : {LightState::red, LightState::yellow, LightState::green}) add(light_color(state));
+  return hues;
+}
+
 size_t bytes_of_frame(const std::vector<ReplayCamera>& cameras) {
   size_t bytes = 0;
   for (const ReplayCamera& camera : cameras) {
-    bytes += static_cast<size_t>(camera.width_px) * static_cast<size_t>(camera.height_px) * kChannels;
+    bytes += static_cast<size_t>(camera.width_px) * static_cast<size_t>(camera.height_px) * 3;
   }
   return bytes;
 }
 
 std::string pack_images(const std::vector<ReplayCamera>& cameras, std::string_view frames) {
-  std::string packed;
-  for_each_row(cameras, reinterpret_cast<const uint8_t*>(frames.data()), frames.size() / bytes_of_frame(cameras),
-               [&packed](const Rows& rows, size_t) {
-                 RowFilter best = RowFilter::left;
-                 size_t least = SIZE_MAX;
-                 for (int f = 0; f < kNumRowFilters; ++f) {
-                   const auto filter = static_cast<RowFilter>(f);
-                   size_t cost = 0;
-                   for (size_t i = 0; i < rows.size; ++i) {
-                     cost += rows.row[i] != rows.predict(filter, i);
-                   }
-                   if (cost < least) {
-                     least = cost;
-                     best = filter;
-                   }
-                 }
-                 packed.push_back(static_cast<char>(best));
-                 for (size_t i = 0; i < rows.size; ++i) {
-                   packed.push_back(static_cast<char>(rows.row[i] - rows.predict(best, i)));
-                 }
-               });
-  return deflate(packed);
+  auto coder = std::make_unique<PixelCoder<Encoder>>(Encoder());
+  const auto* bytes = reinterpret_cast<const uint8_t*>(frames.data());
+  code_frames(
+      cameras, frames.size() / bytes_of_frame(cameras), coder.get(),
+      [bytes](size_t at) { return Pixel{bytes[at], bytes[at + 1], bytes[at + 2]}; }, [](size_t, Pixel) {});
+  std::string group = coder->coder().finish();
+  const uint32_t sum = checksum(frames);
+  for (int shift = 24; shift >= 0; shift -= 8) group.push_back(static_cast<char>(sum >> shift & 0xFF));
+  return group;
 }
 
 std::string unpack_images(const std::vector<ReplayCamera>& cameras, std::string_view group, int count) {
-  size_t num_rows = 0;
-  for (const ReplayCamera& camera : cameras) num_rows += static_cast<size_t>(camera.height_px);
-  const auto num_frames = static_cast<size_t>(count);
-  std::string frames(bytes_of_frame(cameras) * num_frames, '\0');
-  const std::string packed = inflate(group, frames.size() + num_rows * num_frames);
-  auto* const first = reinterpret_cast<uint8_t*>(frames.data());
-  size_t at = 0;
-  for_each_row(cameras, first, num_frames, [&](const Rows& rows, size_t offset) {
-    const auto filter = static_cast<uint8_t>(packed[at++]);
-    PICTURA_CHECK(filter < kNumRowFilters, "images: expected a row's filter of 0 to {}, got {}", kNumRowFilters - 1,
-                  filter);
-    for (size_t i = 0; i < rows.size; ++i) {
-      first[offset + i] =
-          static_cast<uint8_t>(static_cast<uint8_t>(packed[at++]) + rows.predict(static_cast<RowFilter>(filter), i));
-    }
-  });
+  std::string frames(bytes_of_frame(cameras) * static_cast<size_t>(count), '\0');
+  PICTURA_CHECK(group.size() >= kChecksumBytes, "images: a group ends too early, after {} bytes", group.size());
+  const std::string_view coded = group.substr(0, group.size() - kChecksumBytes);
+  auto coder = std::make_unique<PixelCoder<Decoder>>(Decoder(coded));
+  code_frames(
+      cameras, static_cast<size_t>(count), coder.get(), [](size_t) { return Pixel{}; },
+      [&frames](size_t at, Pixel pixel) { std::memcpy(frames.data() + at, &pixel, 3); });
+  uint32_t sum = 0;
+  for (const char byte : group.substr(coded.size())) sum = sum << 8 | static_cast<uint8_t>(byte);
+  PICTURA_CHECK(sum == checksum(frames), "images: a group is damaged: its checksum is another");
   return frames;
 }
 

@@ -1,7 +1,9 @@
-// The images of a replay, without loss: each row of an image by what is nearest to it of the pixels before, above, and
-// in the image before, and all rows of a group of frames as one zlib stream. A group needs no other to be read.
+// The images of a replay, without loss. A pixel is mostly that to its left, above it, or in the image before; where it
+// is none of them, its colour is mostly one of few hues at some brightness. Which of it holds is written by an adaptive
+// arithmetic coder, as docs/replay.md defines it. A group of frames needs no other to be read.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -11,7 +13,11 @@
 
 namespace pictura {
 
-constexpr int kReplayFramesPerGroup = 40;
+constexpr int kReplayFramesPerGroup = 50;
+
+/// The colours that primitives have before they fade, [red, green, blue].
+using ReplayHue = std::array<uint8_t, 3>;
+std::vector<ReplayHue> replay_hues();
 
 /// Bytes of a frame: [height, width, 3] of each camera, one after the other.
 size_t bytes_of_frame(const std::vector<ReplayCamera>& cameras);

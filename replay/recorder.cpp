@@ -190,6 +190,9 @@ struct Recorder::Parts {
         terms = reward_terms(step_facts(motion, fit_of(state, static_cast<int>(at)), state.events[at]),
                              state.conditioning + at * kNumConditioning, setup.options.dt_s);
         count(state, at, motion, result.reward[at]);
+        if (replay.first_infraction.frame < 0 && (state.events[at] & kInfractions) != 0) {
+          replay.first_infraction = {replay.num_frames, agent};
+        }
       }
       const bool acts = result.valid[at] && commands[static_cast<size_t>(agent)].kind == CommandKind::action;
       track(Track::action).push_back(acts ? 1 + commands[static_cast<size_t>(agent)].action : 0);

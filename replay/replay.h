@@ -129,7 +129,7 @@ struct ReplayCamera {
 struct ReplayImages {
   std::vector<ReplayCamera> cameras;
   int32_t frames_per_group = 0;
-  std::vector<std::string> groups;  // each a zlib stream, see images.h
+  std::vector<std::string> groups;  // see images.h
   bool operator==(const ReplayImages&) const = default;
 };
 
@@ -166,9 +166,16 @@ struct ReplayMetrics {
   X(km_driven)                    \
   X(reward)
 
+/// Where galleries begin to look; frame -1: nowhere.
+struct ReplayMoment {
+  int32_t frame = -1, agent = 0;
+  bool operator==(const ReplayMoment&) const = default;
+};
+
 struct Replay {
   ReplayOrigin origin;
   ReplayMetrics metrics;
+  ReplayMoment first_infraction;
   int32_t num_agents = 0, num_frames = 0, num_lights = 0;
   int32_t followed = -1;  // the agent whose decisions and images there are, or -1
   std::vector<ReplayShape> map;

@@ -187,7 +187,7 @@ class Replay {
 // The followed agent's images, group by group.
 class Images {
   constructor(header, frames, bytes) {
-    Object.assign(this, { cameras: header.cameras, perGroup: header.frames_per_group, frames, bytes });
+    Object.assign(this, { cameras: header.cameras, hues: header.hues, perGroup: header.frames_per_group, frames, bytes });
     this.begins = [0];
     for (const size of header.group_bytes) this.begins.push(this.begins.at(-1) + size);
     if (bytes.length !== this.begins.at(-1)) throw new Damaged(`expected ${this.begins.at(-1)} bytes of images, got ${bytes.length}`);
@@ -206,31 +206,7 @@ class Images {
   }
   async unpack(group) {
     const count = Math.min(this.perGroup, this.frames - group * this.perGroup);
-    const rows = this.cameras.reduce((sum, c) => sum + c.height_px, 0);
-    const packed = await inflated(this.bytes.subarray(this.begins[group], this.begins[group + 1]), (this.frameBytes + rows) * count);
-    const out = new Uint8Array(this.frameBytes * count);
-    let at = 0, to = 0;
-    for (let frame = 0; frame < count; ++frame) {
-      for (const camera of this.cameras) {
-        const width = 3 * camera.width_px;
-        for (let y = 0; y < camera.height_px; ++y) {
-          const filter = packed[at++];
-          for (let i = 0; i < width; ++i, ++to) {
-            const left = i > 2 ? out[to - 3] : 0, up = y > 0 ? out[to - width] : 0;
-            let guess;
-            if (filter === 0) guess = left;
-            else if (filter === 1) guess = up;
-            else if (filter === 3) guess = frame > 0 ? out[to - this.frameBytes] : 0;
-            else {
-              const corner = y > 0 && i > 2 ? out[to - width - 3] : 0, low = Math.min(left, up), high = Math.max(left, up);
-              guess = corner >= high ? low : corner <= low ? high : left + up - corner;
-            }
-            out[to] = packed[at++] + guess;
-          }
-        }
-      }
-    }
-    return out;
+    return unpackImages(this.cameras, this.hues, this.bytes.subarray(this.begins[group], this.begins[group + 1]), count, this.frameBytes);
   }
 }
 

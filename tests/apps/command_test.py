@@ -89,7 +89,7 @@ class CommandCase(unittest.TestCase):
 
 class Usage(CommandCase):
     def test_help_teaches_by_example(self):
-        for command in ["town", "map", "render", "simulate", "plot", "bench", *(["train", "evaluate"] if has_torch() else [])]:
+        for command in ["town", "map", "render", "simulate", "replay", "plot", "bench", *(["train", "evaluate"] if has_torch() else [])]:
             result = run(command, "--help")
             self.assertEqual(result.returncode, 0, result.stderr)
             self.assertIn(f"pictura {command}", result.stdout)
@@ -117,7 +117,7 @@ class Typing(CommandCase):
     """What people type: numbers, misspelt words, options that are wrong together."""
 
     COMMANDS = [
-        ("town",), ("map",), ("render",), ("simulate",), ("train",), ("evaluate",), ("plot",), ("bench", "render"),
+        ("town",), ("map",), ("render",), ("simulate",), ("replay",), ("train",), ("evaluate",), ("plot",), ("bench", "render"),
         ("bench", "simulate"), ("bench", "history"), ("bench", "quality"), ("bench", "soak"), ("bench", "worlds"),
         ("bench", "train"), ("bench", "breakdown"),
     ]  # fmt: skip

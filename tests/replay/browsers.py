@@ -88,13 +88,13 @@ class Chromium:
 
     def wait_for(self, expression, timeout_s=60):
         end = time.monotonic() + timeout_s
-        while not self.run(expression):
+        while not self.run(f"!!({expression})"):
             if time.monotonic() > end:
                 raise TimeoutError(f"never became true: {expression}")
             time.sleep(0.05)
 
     def key(self, key, modifiers=0):
-        text = key if len(key) == 1 else ""
+        text = "\r" if key == "Enter" else key if len(key) == 1 else ""
         code = {"ArrowRight": 39, "ArrowLeft": 37, "Home": 36, "End": 35, "Enter": 13}.get(key, ord(key[0].upper()))
         for kind in ("keyDown", "keyUp"):
             self.call("Input.dispatchKeyEvent", type=kind, key=key, text=text if kind == "keyDown" else "", modifiers=modifiers,
@@ -183,7 +183,7 @@ class Firefox:
 
     def wait_for(self, expression, timeout_s=60):
         end = time.monotonic() + timeout_s
-        while not self.run(expression):
+        while not self.run(f"!!({expression})"):
             if time.monotonic() > end:
                 raise TimeoutError(f"never became true: {expression}")
             time.sleep(0.1)

@@ -46,6 +46,7 @@ Replay any_replay() {
                    .seed = 18446744073709551615u,
                    .global_world = 3,
                    .dt_s = 0.05f};
+  replay.first_infraction = {31, 2};
   replay.metrics.collisions = 3;
   replay.metrics.km_driven = 1.25;
   replay.num_agents = 3;
@@ -139,7 +140,30 @@ TEST(ReplayFormat, ImagesAreReadBackByteForByte) {
     EXPECT_EQ(unpack_images(cameras, pack_images(cameras, frames), count), frames);
   }
   const std::string packed = pack_images(cameras, any_frames(cameras, 2, &random));
-  EXPECT_THAT(message_of([&] { unpack_images(cameras, packed, 3); }), HasSubstr("damaged"));
+  EXPECT_THAT(message_of([&] { unpack_images(cameras, packed.substr(0, 40), 2); }), HasSubstr("ends too early"));
+  EXPECT_THAT(message_of([&] { unpack_images(cameras, packed.substr(0, 3), 2); }), HasSubstr("ends too early"));
+  for (const size_t at : {size_t{9}, packed.size() / 2, packed.size() - 1}) {
+    std::string damaged = packed;
+    damaged[at] = static_cast<char>(damaged[at] ^ 4);
+    EXPECT_THAT(message_of([&] { unpack_images(cameras, damaged, 2); }), HasSubstr("images: a group")) << at;
+  }
+}
+
+TEST(ReplayFormat, HuesAtAnyBrightnessTakeLittleMoreThanTheirBrightness) {
+  const std::vector<ReplayCamera> cameras{{"a", 64, 64}};
+  const std::vector<ReplayHue> hues = replay_hues();
+  std::mt19937 random(4);
+  std::string frame;
+  for (int i = 0; i < 64 * 64; ++i) {
+    const ReplayHue& hue = hues[2];
+    const auto brightness = static_cast<int>(random() % 256);
+    const int highest = std::max({hue[0], hue[1], hue[2]});
+    for (const int channel : hue)
+      frame.push_back(static_cast<char>((2 * channel * brightness + highest) / (2 * highest)));
+  }
+  const std::string packed = pack_images(cameras, frame);
+  EXPECT_EQ(unpack_images(cameras, packed, 1), frame);
+  EXPECT_LT(packed.size(), 64 * 64 * 1.35);  // of three times as many bytes
 }
 
 TEST(ReplayFormat, AReplayIsReadBackAsItWas) {

@@ -121,6 +121,12 @@ TEST(Recorder, RewardTermsAddUpToTheSimulatorsRewardAndMetricsToItsTotals) {
     // Theirs are the terms of the motion before the halt.
     EXPECT_GE(infractions, std::string(policy) == "random" ? 10 : 0);
     const SimulatorTotals& totals = simulator->controller_input().world_totals[kWorld];
+    const ReplayMoment first = replay.first_infraction;
+    EXPECT_EQ(first.frame > 0, infractions > 0);
+    if (first.frame > 0) {
+      EXPECT_NE(replay.at(Track::events, first.frame, first.agent) & kInfractions, 0);
+      EXPECT_EQ(replay.at(Track::status, first.frame - 1, first.agent), static_cast<int32_t>(AgentStatus::active));
+    }
     EXPECT_EQ(replay.metrics.agent_steps, totals.agent_steps);
     EXPECT_EQ(replay.metrics.collisions, totals.collisions);
     EXPECT_EQ(replay.metrics.at_fault_collisions, totals.at_fault_collisions);
@@ -182,7 +188,7 @@ TEST(Recorder, ImagesAreTheOraclesBytes) {
   const std::unique_ptr<Renderer> renderer = make_renderer("cpu", config);
   upload_maps(*simulator, renderer.get());
   HostImages images(config.rig, 1);
-  constexpr int kFollowed = 3, kSteps = 50;
+  constexpr int kFollowed = 3, kSteps = kReplayFramesPerGroup + 10;
   std::vector<std::string> frames;
   const Replay replay = record(
       *simulator, "lane", kSteps, {.world = kWorld, .followed = kFollowed, .cameras = config},
@@ -198,7 +204,7 @@ TEST(Recorder, ImagesAreTheOraclesBytes) {
   ASSERT_EQ(replay.images.groups.size(), 2u);
   std::string all;
   for (const std::string& frame : frames) all += frame;
-  EXPECT_EQ(unpack_images(replay.images.cameras, replay.images.groups[0], 40) +
+  EXPECT_EQ(unpack_images(replay.images.cameras, replay.images.groups[0], kReplayFramesPerGroup) +
                 unpack_images(replay.images.cameras, replay.images.groups[1], 11),
             all);
   EXPECT_GT(std::count_if(all.begin(), all.end(), [](char c) { return c != 0; }), 10000);

@@ -179,6 +179,7 @@ EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options, Ev
       else
         simulator = make_simulator(options.simulator, simulator_config, maps, worlds);
       const Driving driving = driver.drive(*simulator);
+      if (options.observer) options.observer->begin(*simulator);
       const auto num_slots = static_cast<size_t>(simulator->num_slots());
       const at::Tensor command_bytes = at::zeros({static_cast<int64_t>(num_slots * sizeof(Command))},
                                                  at::TensorOptions(at::kByte).device(torch_device(driver.device)));
@@ -200,7 +201,9 @@ EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options, Ev
         const int64_t num_driven = driving.num_driven();
         if (num_driven == 0) break;
         report.agent_steps += num_driven;
-        simulator->step(Span<const Command>(commands));
+        if (options.observer) options.observer->before_step(commands);
+        const StepResult taken = simulator->step(Span<const Command>(commands));
+        if (options.observer) options.observer->after_step(taken);
         if (options.on_progress && step % 10 == 0) {
           const double fraction = (done + double(simulator->num_slots()) * (step + 1)) / work;
           options.on_progress(fraction, since_start.seconds() * (1 - fraction) / fraction);

@@ -19,6 +19,16 @@ enum class Density { light, medium, dense };  // 60, 120 and 150 agents a world
 /// Worlds of training are numbered from 0 and are never as many.
 constexpr uint32_t kFirstEvaluationWorld = 0x80000000u;
 
+/// Watches the worlds of an evaluation as they are driven; the simulator is the same object for each batch of worlds.
+class EvaluationObserver {
+ public:
+  virtual ~EvaluationObserver() = default;
+  /// Worlds at the start of their episode.
+  virtual void begin(Simulator& simulator) = 0;
+  virtual void before_step(Span<const Command> commands) = 0;
+  virtual void after_step(const StepResult& result) = 0;
+};
+
 struct EvaluateOptions {
   std::string checkpoint;
   // A controller of make_controller, "lane" for one, that drives instead of the checkpoint's policy, in its world, or
@@ -40,6 +50,7 @@ struct EvaluateOptions {
   std::string backbone;                   // as in SessionOptions
   std::vector<std::string> conditioning;  // as in SessionOptions
   std::function<void(double done_fraction, double eta_s)> on_progress;
+  EvaluationObserver* observer = nullptr;
 };
 
 struct EvaluateReport {

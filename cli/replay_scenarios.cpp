@@ -1,0 +1,125 @@
+#include "pictura/cli/replay_scenarios.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+
+#include "pictura/backends/upload_maps.h"
+#include "pictura/common/error.h"
+#include "pictura/common/support/file.h"
+#include "pictura/common/support/interrupt.h"
+#include "pictura/replay/gallery.h"
+#include "pictura/training/session.h"
+
+namespace pictura {
+
+namespace {
+
+class ScenarioRecorder final : public EvaluationObserver {
+ public:
+  ScenarioRecorder(RecordedDriver driver, const RecordingOptions& options)
+      : driver_(std::move(driver)), options_(options) {}
+
+  void begin(Simulator& simulator) override {
+    if (driver_.renderer) upload_maps(simulator, driver_.renderer);
+    options_.followed = std::min(options_.followed, simulator.num_slots() - 1);
+    recording_.emplace(simulator, driver_, options_);
+  }
+  void before_step(Span<const Command> commands) override { recording_->before_step(commands); }
+  void after_step(const StepResult& result) override { recording_->after_step(result); }
+  Replay finish() { return recording_->finish(); }
+
+ private:
+  const RecordedDriver driver_;
+  RecordingOptions options_;
+  std::optional<Recording> recording_;
+};
+
+double infractions_per_vehicle(const ScenarioCounts& counts) {
+  return static_cast<double>(counts.infractions) / static_cast<double>(std::max<int64_t>(1, counts.vehicles));
+}
+
+const ScenarioCounts& counts_of(const EvaluationResults& results, const ScenarioPlace& place) {
+  const DensityResult& density = results.densities[place.density];
+  return density.scenarios[static_cast<size_t>(place.scenario - density.first_scenario)];
+}
+
+void write(const EvaluateOptions& options, const EvaluationResults& results, const RecordingOptions& recording,
+           const ScenarioPlace& place, const std::string& path) {
+  if (interrupted()) throw Interrupted("interrupted before all replays were written");
+  ScenarioCounts counts;
+  write_replay_and_say_so(path, record_scenario(options, results, place, recording, &counts));
+  const ScenarioCounts& evaluated = counts_of(results, place);
+  if (counts.infractions == evaluated.infractions && counts.goals == evaluated.goals) return;
+  fmt::print(stderr,
+             "notice: {}: {} infractions and {} goals, in the evaluation {} and {}: the policy's numbers differ in "
+             "their last bits where batches or devices differ\n",
+             path, counts.infractions, counts.goals, evaluated.infractions, evaluated.goals);
+}
+
+}  // namespace
+
+std::vector<ScenarioPlace> worst_scenarios(const EvaluationResults& results, int count) {
+  std::vector<ScenarioPlace> places;
+  for (size_t density = 0; density < results.densities.size(); ++density) {
+    const DensityResult& result = results.densities[density];
+    for (size_t i = 0; i < result.scenarios.size(); ++i) {
+      places.push_back({density, result.first_scenario + static_cast<int>(i)});
+    }
+  }
+  std::stable_sort(places.begin(), places.end(), [&](const ScenarioPlace& a, const ScenarioPlace& b) {
+    return infractions_per_vehicle(counts_of(results, a)) > infractions_per_vehicle(counts_of(results, b));
+  });
+  places.resize(std::min(places.size(), static_cast<size_t>(count)));
+  return places;
+}
+
+Replay record_scenario(const EvaluateOptions& options, const EvaluationResults& results, const ScenarioPlace& place,
+                       const RecordingOptions& recording, ScenarioCounts* counts_out) {
+  EvaluateOptions one = options;
+  one.agents_per_world = results.densities[place.density].agents_per_world;
+  one.maps = {options.maps[static_cast<size_t>(place.scenario) % options.maps.size()]};
+  one.first_scenario = place.scenario;
+  one.scenarios = 1;
+  one.device = one.simulator = "cpu";
+  one.on_progress = nullptr;
+  std::unique_ptr<PolicySession> session;
+  if (one.controller.empty()) {
+    session = std::make_unique<PolicySession>(one.checkpoint, SessionOptions{.num_threads = one.num_threads,
+                                                                             .device = one.device,
+                                                                             .simulator = one.simulator,
+                                                                             .renderer = one.renderer,
+                                                                             .samples = one.samples,
+                                                                             .rig = one.rig,
+                                                                             .width_px = one.width_px,
+                                                                             .height_px = one.height_px,
+                                                                             .backbone = one.backbone});
+  }
+  // The followed agent's policy is asked with a renderer of its own, which holds the scenario's map.
+  std::unique_ptr<Renderer> renderer = session ? session->make_renderer() : nullptr;
+  ScenarioRecorder recorder({session ? one.checkpoint : one.controller, session.get(), renderer.get()}, recording);
+  one.observer = &recorder;
+  const EvaluateReport report = session ? evaluate(session.get(), one) : evaluate(one);
+  if (report.interrupted) throw Interrupted("interrupted while a scenario was recorded");
+  *counts_out = report.results.densities[0].scenarios[0];
+  return recorder.finish();
+}
+
+void write_scenario_replays(const EvaluateOptions& options, const EvaluationResults& results,
+                            const RecordingOptions& recording, int count, const std::string& folder) {
+  make_output_folder(folder);
+  const std::filesystem::path root(folder);
+  for (const ScenarioPlace& place : worst_scenarios(results, count)) {
+    write(options, results, recording, place,
+          (root / fmt::format("{}_{}.html", results.densities[place.density].density, place.scenario)).string());
+  }
+  const int replays = write_gallery(folder);
+  fmt::print(stderr, "{}: {} replays\n", (root / "index.html").string(), replays);
+}
+
+void write_scenario_replay(const EvaluateOptions& options, const EvaluationResults& results,
+                           const RecordingOptions& recording, const std::string& path) {
+  for (const ScenarioPlace& place : worst_scenarios(results, 1)) write(options, results, recording, place, path);
+}
+
+}  // namespace pictura

@@ -1,0 +1,33 @@
+// Scenarios of an evaluation driven again, and recorded.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pictura/cli/record.h"
+#include "pictura/training/evaluation/evaluate.h"
+
+namespace pictura {
+
+/// A scenario of an evaluation.
+struct ScenarioPlace {
+  size_t density = 0;  // of the results
+  int scenario = 0;    // its number
+};
+
+/// The scenarios with the most infractions of vehicles a vehicle, worst first; `count` of them, or all.
+std::vector<ScenarioPlace> worst_scenarios(const EvaluationResults& results, int count);
+
+/// Drives a scenario again, on the host, and records it. `counts_out` receives what it counted: floating point gives
+/// other bits in batches of other sizes and on devices, so that a policy may drive it otherwise than it was evaluated.
+Replay record_scenario(const EvaluateOptions& options, const EvaluationResults& results, const ScenarioPlace& place,
+                       const RecordingOptions& recording, ScenarioCounts* counts_out);
+
+/// As record_scenario() does, into files of a folder, with its gallery, or the worst one into one file. Says on stderr
+/// what it writes, and which counts differ from the evaluation's.
+void write_scenario_replays(const EvaluateOptions& options, const EvaluationResults& results,
+                            const RecordingOptions& recording, int count, const std::string& folder);
+void write_scenario_replay(const EvaluateOptions& options, const EvaluationResults& results,
+                           const RecordingOptions& recording, const std::string& path);
+
+}  // namespace pictura

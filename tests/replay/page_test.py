@@ -1,0 +1,297 @@
+"""Replays and galleries in headless browsers: no error, something drawn, what was recorded shown where it was.
+
+Run by ctest, one entry per class: python3 page_test.py PICTURA [unittest arguments]. Classes whose browser is not
+installed are skipped.
+"""
+
+import base64
+import json
+import pathlib
+import re
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+import zlib
+
+import browsers
+
+PICTURA = ""
+
+
+def png_pixels(png):
+    """(width, height, rows of RGB bytes) of an 8-bit RGB or RGBA PNG."""
+    at, parts, width, height, channels = 8, [], 0, 0, 3
+    while at < len(png):
+        size, kind = struct.unpack(">I4s", png[at : at + 8])
+        body = png[at + 8 : at + 8 + size]
+        if kind == b"IHDR":
+            width, height, _, color = struct.unpack(">IIBB", body[:10])
+            channels = {2: 3, 6: 4}[color]
+        elif kind == b"IDAT":
+            parts.append(body)
+        at += 12 + size
+    data, stride, rows, above = zlib.decompress(b"".join(parts)), width * channels, [], bytes(width * channels)
+    for y in range(height):
+        kind, row = data[y * (stride + 1)], bytearray(data[y * (stride + 1) + 1 : (y + 1) * (stride + 1)])
+        for i in range(stride):
+            left, up = row[i - channels] if i >= channels else 0, above[i]
+            corner = above[i - channels] if i >= channels else 0
+            if kind == 4:
+                estimate = left + up - corner
+                guess = min((left, up, corner), key=lambda value: abs(estimate - value))
+            else:
+                guess = (0, left, up, (left + up) // 2)[kind]
+            row[i] = (row[i] + guess) & 255
+        above = bytes(row)
+        rows.append(b"".join(above[i : i + 3] for i in range(0, stride, channels)))
+    return width, height, rows
+
+
+class Recorded:
+    """A replay as this file reads it, by docs/replay.md alone."""
+
+    def __init__(self, path):
+        page = pathlib.Path(path).read_text()
+        self.header = json.loads(re.search(r'id="replay-header">(.*?)</script>', page).group(1))
+        data = zlib.decompress(base64.b64decode(re.search(r'id="replay-data">(.*?)</script>', page).group(1)))
+        orders, at, self.tracks = {track["name"]: track for track in self.header["tracks"]}, 0, {}
+        for section in self.header["sections"]:
+            if section["name"] in orders:
+                track = orders[section["name"]]
+                self.tracks[track["name"]] = self._columns(data[at : at + section["bytes"]], track)
+            at += section["bytes"]
+
+    def _columns(self, data, track):
+        numbers, bits, shift = [], 0, 0
+        for byte in data:
+            bits |= (byte & 127) << shift
+            shift += 7
+            if byte < 128:
+                numbers.append(bits >> 1 if bits % 2 == 0 else -(bits >> 1) - 1)
+                bits = shift = 0
+        frames, columns = self.header["frames"], []
+        for begin in range(0, len(numbers), frames):
+            value, difference, column = 0, 0, []
+            for number in numbers[begin : begin + frames]:
+                difference = difference + number if track["order"] == 2 else number
+                value = number if track["order"] == 0 else value + difference
+                column.append(value * track["unit"])
+            columns.append(column)
+        return columns
+
+
+class PageCase(unittest.TestCase):
+    BROWSER = "chromium"
+
+    @classmethod
+    def setUpClass(cls):
+        if shutil.which(cls.BROWSER) is None:
+            raise unittest.SkipTest(f"needs {cls.BROWSER}: scripts/setup --browsers installs it")
+        cls._folder = tempfile.TemporaryDirectory(prefix="pictura-test-")
+        cls.folder = pathlib.Path(cls._folder.name)
+        cls.path = cls.folder / "replay.html"
+        cls.pictura("replay", "procedural:1:blocks=2x2", "--agents", 24, "--steps", 90, "--policy", "random", "--follow", 4, "--cameras",
+                    "--seed", 3, "--out", cls.path)  # fmt: skip
+        cls.recorded = Recorded(cls.path)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls._folder.cleanup()
+
+    @staticmethod
+    def pictura(*arguments):
+        result = subprocess.run([PICTURA, *map(str, arguments)], capture_output=True, text=True, timeout=600)
+        assert result.returncode == 0, result.stderr
+        return result
+
+
+class Chromium(PageCase):
+    def setUp(self):
+        self.browser = browsers.Chromium()
+        self.addCleanup(self.browser.close)
+
+    def open(self, path=None, fragment=""):
+        self.browser.open(path or self.path, fragment)
+        self.browser.wait_for("window.pictura && !document.getElementById('app').hidden")
+
+    def state(self):
+        return self.browser.run("({...pictura.state})")
+
+    def assert_places(self, step):
+        drawn = {agent["agent"]: agent for agent in self.browser.run("pictura.drawn()")}
+        tracks = self.recorded.tracks
+        there = [a for a in range(24) if round(tracks["status"][a][step]) != 3]
+        self.assertEqual(sorted(drawn), there)
+        for agent in there:
+            for name in ("x_m", "y_m", "heading_deg"):
+                self.assertAlmostEqual(drawn[agent][name], tracks[name][agent][step], 6, f"agent {agent}, {name}, step {step}")
+
+    def test_it_opens_without_errors_and_draws(self):
+        self.open()
+        width, height, rows = png_pixels(self.browser.screenshot())
+        self.assertEqual((width, height), (1280, 720))
+        stage = {rows[y][3 * x : 3 * x + 3] for y in range(60, 580) for x in range(180, 900)}
+        self.assertGreater(len(stage), 30)  # colours
+        self.assertEqual(self.browser.run("document.getElementById('map-name').textContent"), self.recorded.header["map"])
+        self.assertEqual(self.browser.errors, [])
+
+    def test_seeking_shows_the_recorded_places(self):
+        self.open()
+        halted = next(step for column in self.recorded.tracks["status"] for step, status in enumerate(column) if round(status) == 1)
+        for step in (0, 37, halted, 90):
+            self.browser.run(f"pictura.actions.seek({step})")
+            self.assertEqual(self.state()["time"], step)
+            self.assert_places(step)
+        # Between two steps of an episode, in the middle.
+        x = self.recorded.tracks["x_m"]
+        ends = {e["frame"] for e in self.browser.run("pictura.replay.episodes.map(e => ({frame: e.end - 1}))")}
+        self.browser.run("pictura.actions.seek(20.5)")
+        for agent in self.browser.run("pictura.drawn()"):
+            if 20 not in ends:
+                a = x[agent["agent"]]
+                self.assertAlmostEqual(agent["x_m"], (a[20] + a[21]) / 2, 6)
+
+    def test_an_agent_is_painted_where_it_stands(self):
+        self.open()
+        self.browser.run("pictura.actions.seek(60); pictura.actions.select(23); pictura.state.zoom = 8; void 0")
+        agent = next(a for a in range(23) if round(self.recorded.tracks["status"][a][60]) == 0)
+        x, y = self.recorded.tracks["x_m"][agent][60], self.recorded.tracks["y_m"][agent][60]
+        self.browser.run(f"pictura.state.x = {x}; pictura.state.y = {y}; void 0")
+        drawn = next(a for a in self.browser.run("pictura.drawn()") if a["agent"] == agent)
+        left, top = self.browser.run("(r => [r.left, r.top])(document.getElementById('world').getBoundingClientRect())")
+        shown = [self.browser.run("pictura.drawn() && getComputedStyle(document.documentElement).getPropertyValue('--" + name + "')").strip()
+                 for name in ("vehicle", "cyclist", "pedestrian")]  # fmt: skip
+        colors = [bytes.fromhex(color[1:]) for color in shown]
+        _, _, rows = png_pixels(self.browser.screenshot())
+        px, py = round(left + drawn["px"]), round(top + drawn["py"])
+        # Of the class's colour at its centre, which a number or a windscreen may cover in places.
+        near = {rows[py + dy][3 * (px + dx) : 3 * (px + dx) + 3] for dy in range(-2, 3) for dx in range(-2, 3)}
+        self.assertTrue(near & set(colors), (near, colors))
+
+    def test_keys_play_step_jump_and_choose(self):
+        self.open()
+        for key, modifiers, step in [("ArrowRight", 0, 1), ("ArrowRight", 8, 11), ("ArrowLeft", 0, 10), ("End", 0, 90), ("Home", 0, 0)]:
+            self.browser.key(key, modifiers)
+            self.assertEqual(self.state()["time"], step, key)
+        self.browser.key("]")
+        self.assertEqual(self.state()["speed"], 2)
+        self.browser.key(" ")
+        self.assertTrue(self.state()["playing"])
+        self.browser.wait_for("pictura.state.time > 3")
+        self.browser.key(" ")
+        self.assertFalse(self.state()["playing"])
+        self.browser.key("Home")
+        self.browser.key("n")
+        events = [(f, a) for a in range(24) for f, bits in enumerate(self.recorded.tracks["events"][a]) if int(bits) & (1 | 4 | 8 | 16 | 128)]
+        first = min(events)
+        self.assertEqual((self.state()["time"], self.state()["agent"]), first)
+        self.browser.key(".")
+        self.assertEqual(self.state()["agent"], (first[1] + 1) % 24)
+        self.browser.key("f")
+        self.assertTrue(self.state()["follow"])
+        self.browser.key("/")
+        for letter in "17":
+            self.browser.key(letter)
+        self.browser.key("Enter")
+        self.browser.wait_for("pictura.state.agent === 17")
+        self.assertEqual(self.browser.errors, [])
+
+    def test_clicks_choose_agents_and_events(self):
+        self.open()
+        self.browser.run("pictura.actions.seek(10)")
+        left, top = self.browser.run("(r => [r.left, r.top])(document.getElementById('world').getBoundingClientRect())")
+        agents = self.browser.run("pictura.drawn()")
+        alone = next(a for a in agents if a["px"] > 220 and a["py"] > 20 and all(b is a or abs(a["px"] - b["px"]) + abs(a["py"] - b["py"]) > 40 for b in agents))
+        self.browser.click(left + alone["px"], top + alone["py"])
+        self.browser.wait_for(f"pictura.state.agent === {alone['agent']}")
+        event = self.browser.run("pictura.replay.events.find(e => e.kind === 1)")
+        place = self.browser.run(
+            "(r => ({left: r.left, top: r.top, width: r.width}))(document.getElementById('timeline').getBoundingClientRect())")
+        x = place["left"] + 78 + event["frame"] / 90 * (place["width"] - 78 - 8)
+        self.browser.click(x, place["top"] + 1.5 * 11.5)
+        self.browser.wait_for(f"pictura.state.time === {event['frame']}")
+
+    def test_the_address_holds_the_view(self):
+        self.open(fragment="#step=42&agent=7&speed=4&zoom=6&follow=1")
+        state = self.state()
+        self.assertEqual([state[k] for k in ("time", "agent", "speed", "zoom", "follow")], [42, 7, 4, 6, True])
+        self.browser.key("ArrowRight")
+        self.browser.wait_for("location.hash.includes('step=43')")
+        self.browser.call("Page.reload")
+        self.browser.wait_for("window.pictura && pictura.state.time === 43 && pictura.state.follow")
+        self.browser.run("location.hash = '#step=5&agent=2'")
+        self.browser.wait_for("pictura.state.time === 5 && pictura.state.agent === 2")
+
+    def test_the_followed_agents_images_are_those_of_the_file(self):
+        self.open(fragment="#step=50&agent=4")
+        self.browser.wait_for("pictura.pictured() === 50")
+        shown = self.browser.run("""[...document.querySelectorAll('.pictures canvas')].map(c => {
+            const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+            return [...d].filter((_, i) => i % 4 < 3);
+        })""")
+        kept = self.browser.run("pictura.replay.images.frame(50).then(bytes => [...bytes])")
+        self.assertEqual([value for image in shown for value in image], kept)
+        self.assertEqual(len(kept), 4 * 96 * 54 * 3)
+        self.assertGreater(sum(value > 0 for value in kept), 1000)
+
+    def test_what_is_damaged_says_so(self):
+        page = self.path.read_text()
+        data = page.index('id="replay-data">') + 17
+        flipped = "B" if page[data + 5000] == "A" else "A"
+        damaged = {
+            "cut in the numbers": page[: data + 3000],
+            "cut before the header": page[: page.index('<script type="application/json"')],
+            "a letter of the numbers": page[: data + 5000] + flipped + page[data + 5001 :],
+            "the header": page.replace('{"format"', '{"format', 1),
+            "a newer version": page.replace('"version":1,', '"version":9,', 1),
+        }
+        for name, text in damaged.items():
+            with self.subTest(name):
+                path = self.folder / "damaged.html"
+                path.write_text(text)
+                self.browser.open(path)
+                self.browser.wait_for("document.querySelector('#message.error')")
+                message = self.browser.run("document.getElementById('message').innerText")
+                self.assertIn("This replay is damaged", message)
+                self.assertTrue(self.browser.run("document.getElementById('app').hidden"))
+
+    def test_the_gallery_filters_and_leads_to_replays(self):
+        folder = self.folder / "gallery"
+        self.pictura("replay", "procedural:1:blocks=2x2", "--agents", 8, "--steps", 40, "--policy", "random", "--gallery", folder, "--episodes", 3)
+        self.pictura("replay", "procedural:1:blocks=2x2", "--agents", 2, "--steps", 3, "--policy", "idle", "--out", folder / "still.html")
+        self.pictura("replay", "procedural:1:blocks=2x2", "--agents", 8, "--steps", 40, "--policy", "random", "--gallery", folder, "--episodes", 3)
+        self.browser.open(folder / "index.html")
+        cards = "[...document.querySelectorAll('#list a')].map(a => a.getAttribute('href'))"
+        self.assertEqual(len(self.browser.run(cards)), 4)
+        self.assertIn("still.html", self.browser.run(cards)[-1])
+        self.browser.run("[...document.querySelectorAll('#filters button')].find(b => b.textContent === 'Off road').click()")
+        filtered = self.browser.run(cards)
+        self.assertEqual(len(filtered), 3)
+        name, _, fragment = filtered[0].partition("#")
+        self.open(folder / name, "#" + fragment)
+        self.assertRegex(fragment, r"step=\d+&agent=\d+")
+        self.assertEqual(self.state()["agent"], int(re.search(r"agent=(\d+)", fragment).group(1)))
+        self.assertEqual(self.browser.errors, [])
+
+
+class Firefox(PageCase):
+    BROWSER = "firefox-esr"
+
+    def test_it_opens_draws_and_shows_the_recorded_places(self):
+        browser = browsers.Firefox()
+        self.addCleanup(browser.close)
+        browser.open(self.path)
+        browser.wait_for("!!window.pictura && !document.getElementById('app').hidden")
+        drawn = browser.run("pictura.actions.seek(37); JSON.stringify(pictura.drawn())")
+        for agent in json.loads(drawn):
+            self.assertAlmostEqual(agent["x_m"], self.recorded.tracks["x_m"][agent["agent"]][37], 6)
+        _, _, rows = png_pixels(browser.screenshot())
+        self.assertGreater(len({row[3 * x : 3 * x + 3] for row in rows for x in range(0, len(row) // 3)}), 30)
+
+
+if __name__ == "__main__":
+    PICTURA = sys.argv.pop(1)
+    unittest.main()
