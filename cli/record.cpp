@@ -30,7 +30,7 @@ ObservationView of_slot(const ObservationView& all, size_t slot) {
 }
 #endif
 
-RendererConfig cameras_of(const RecordedDriver& driver) {
+RendererConfig cameras_of([[maybe_unused]] const RecordedDriver& driver) {
   RendererConfig config;
 #ifdef PICTURA_HAS_TORCH
   if (driver.session && driver.session->reads_images()) config = driver.session->renderer_config();

@@ -3,7 +3,9 @@
 Run by ctest, one entry per class: python3 command_test.py PICTURA [unittest arguments].
 """
 
+import base64
 import fcntl
+import itertools
 import json
 import math
 import os
@@ -22,6 +24,7 @@ import termios
 import time
 import unittest
 import unittest.mock
+import zlib
 
 PICTURA = ""
 CONFIGS = pathlib.Path(__file__).resolve().parents[2] / "configs"
@@ -844,6 +847,110 @@ class Ranks(CommandCase):
         )  # fmt: skip
         self.assertEqual(result.returncode, 1)
         self.assertIn("RANK is set and WORLD_SIZE is not", result.stderr)
+
+
+class Replays(CommandCase):
+    """What the pages hold is tested with replay/, what browsers make of them in tests/replay/page_test.py."""
+
+    WORLD = ["procedural:1:blocks=2x2", "--agents", 12, "--seed", 4]
+
+    def header(self, path):
+        return json.loads(re.search('id="replay-header">(.*?)</script>', path.read_text()).group(1))
+
+    def test_simulate_records_what_it_counts_and_drives_alike(self):
+        path = self.folder / "a.html"
+        simulate = ["simulate", *self.WORLD, "--steps", 60, "--policy", "random"]
+        facts = self.json_of(*simulate, "--replay", path, "--follow", 3)
+        self.assertEqual(facts["state_hash"], self.json_of(*simulate)["state_hash"])
+        header = self.header(path)
+        for name in ("collisions", "at_fault_collisions", "off_road", "red_light", "wall_contacts", "agent_steps", "goals_reached"):
+            self.assertEqual(header["metrics"][name], facts[name], name)
+        self.assertGreater(facts["off_road"], 0)
+        self.assertEqual((header["frames"], header["agents"], header["followed"], header["seed"]), (61, 12, 3, "4"))
+        self.assertTrue(header["command"].startswith("pictura simulate procedural:1:blocks=2x2 --agents 12"), header["command"])
+        self.assertRegex(header["map_hash"], "^[0-9a-f]{16}$")
+
+    def test_the_same_command_writes_the_same_bytes(self):
+        pages = []
+        for _ in range(2):
+            self.json_of("replay", *self.WORLD, "--steps", 30, "--cameras", "--out", self.folder / "a.html")
+            pages.append((self.folder / "a.html").read_bytes())
+        self.assertEqual(*pages)
+
+    def test_a_hundred_and_twenty_agents_for_three_thousand_steps_fit_in_five_megabytes(self):
+        path = self.folder / "large.html"
+        # Random actions are the hardest to compress; a tenth of the steps take a tenth, and the map.
+        facts = self.json_of("replay", "procedural:1", "--agents", 120, "--steps", 300, "--policy", "random", "--out", path)
+        self.assertEqual((facts["agents"], facts["steps"]), (120, 300))
+        self.assertLess(path.stat().st_size, 0.5e6 + 0.1e6)
+
+    def test_options_without_effect_or_out_of_range_are_refused(self):
+        replay = ["replay", *self.WORLD]
+        out = ["--out", self.folder / "a.html"]
+        self.assert_refused(2, "expected --out or --gallery", *replay)
+        self.assert_refused(2, "--episodes: has no effect without --gallery", *replay, *out, "--episodes", 2)
+        self.assert_refused(2, "--follow: expected 0 to 11, got 12", *replay, *out, "--follow", 12)
+        self.assert_refused(2, "ends in .html", *replay, "--out", self.folder / "a.mp4")
+        self.assert_refused(2, "--device: has no effect", *replay, *out, "--device", "cpu")
+        self.assert_refused(2, "--cameras: has no effect without --replay", "simulate", *self.WORLD, "--cameras")
+        self.assertEqual(list(self.folder.iterdir()), [])
+
+    def test_the_worst_scenarios_of_an_evaluation_are_driven_again(self):
+        if not has_torch():
+            self.skipTest("this build has no torch")
+        evaluate = ["evaluate", "--policy", "random", "--map", "procedural:1:blocks=2x2,procedural:2:blocks=2x2", "--agents", 10,
+                    "--scenarios", 4, "--steps", 80]  # fmt: skip
+        out, folder = self.folder / "results.json", self.folder / "gallery"
+        result = run(*evaluate, "--out", out, "--replays", 2, "--gallery", folder, "--replay", self.folder / "worst.html")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertNotIn("notice", result.stderr)  # they count what the evaluation did
+        scenarios = json.loads(out.read_text())["densities"][0]["scenarios"]
+        rates = [s["infractions"] / s["vehicles"] for s in scenarios]
+        worst = sorted(range(4), key=lambda i: -rates[i])[:2]
+        self.assertEqual(sorted(p.name for p in folder.iterdir()), sorted(["index.html", *(f"custom_{i}.html" for i in worst)]))
+        self.assertEqual(self.header(self.folder / "worst.html")["map"], f"procedural:{1 + worst[0] % 2}:blocks=2x2")
+        self.assert_refused(2, "--gallery", *evaluate, "--replays", 2)
+        self.assert_refused(2, "--follow: has no effect without --replay", *evaluate, "--follow", 1)
+
+    def test_a_policys_decisions_are_those_that_it_drives_by(self):
+        if not has_torch():
+            self.skipTest("this build has no torch")
+        self.json_of("train", *TINY, "--set", "train.updates=1", "--out", self.folder / "run")
+        path = self.folder / "policy.html"
+        checkpoint = self.folder / "run" / "checkpoint.ckpt"
+        self.json_of("replay", *self.WORLD, "--policy", checkpoint, "--steps", 20, "--follow", 2, "--cameras", "--out", path)
+        header, page = self.header(path), path.read_text()
+        self.assertEqual([(c["width_px"], c["height_px"]) for c in header["images"]["cameras"]], [(16, 9)] * 4)
+        self.assertRegex(header["policy_hash"], "^[0-9a-f]{16}$")
+        data = zlib.decompress(base64.b64decode(re.search('id="replay-data">(.*?)</script>', page).group(1)))
+        at, columns = 0, {}
+        for section in header["sections"]:
+            columns[section["name"]] = data[at : at + section["bytes"]]
+            at += section["bytes"]
+        actions = self.numbers(columns["action"])[2 * 21 : 3 * 21]  # of agent 2, order 0
+        decisions, numbers = [], self.numbers(columns["decisions"])
+        for column in range(13):
+            decisions.append(list(itertools.accumulate(numbers[column * 21 : (column + 1) * 21])))
+        asked = 0
+        for frame in range(20):
+            probabilities = [column[frame] for column in decisions[:12]]
+            if not any(probabilities) or actions[frame + 1] == 0:
+                continue
+            asked += 1
+            self.assertAlmostEqual(sum(probabilities), 10000, delta=6)
+            self.assertGreaterEqual(probabilities[actions[frame + 1] - 1], max(probabilities) - 2)
+        self.assertGreater(asked, 5)
+
+    @staticmethod
+    def numbers(data):
+        found, bits, shift = [], 0, 0
+        for byte in data:
+            bits |= (byte & 127) << shift
+            shift += 7
+            if byte < 128:
+                found.append((bits >> 1) ^ -(bits & 1))
+                bits = shift = 0
+        return found
 
 
 class Training(CommandCase):
