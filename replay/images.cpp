@@ -54,7 +54,7 @@ class Encoder {
   void shift_low() {
     if (low_ < 0xFF000000u || low_ > 0xFFFFFFFFu) {
       const auto carry = static_cast<uint8_t>(low_ >> 32);
-      if (held_ > 0) bytes_.push_back(static_cast<char>(first_ + carry));
+      bytes_.push_back(static_cast<char>(first_ + carry));
       for (; held_ > 1; --held_) bytes_.push_back(static_cast<char>(0xFF + carry));
       held_ = 0;
       first_ = static_cast<uint8_t>(low_ >> 24);
@@ -65,15 +65,16 @@ class Encoder {
 
   uint64_t low_ = 0;
   uint32_t range_ = 0xFFFFFFFFu;
+  // What a carry may still change: a byte, at first one before all others, and `held_ - 1` bytes 0xFF after it.
   uint8_t first_ = 0;
-  size_t held_ = 0;
+  size_t held_ = 1;
   std::string bytes_;
 };
 
 class Decoder {
  public:
   explicit Decoder(std::string_view bytes) : bytes_(bytes) {
-    for (int i = 0; i < 4; ++i) code_ = code_ << 8 | next();
+    for (int i = 0; i < 5; ++i) code_ = code_ << 8 | next();  // the first is 0
   }
   int bit(Chance* chance, int /*value*/) {
     const uint32_t bound = (range_ >> kChanceBits) * chance->zero;

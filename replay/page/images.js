@@ -7,7 +7,7 @@ class BitReader {
     this.bytes = bytes;
     this.at = this.code = 0;
     this.range = 0xffffffff;
-    for (let i = 0; i < 4; ++i) this.code = (this.code * 256 + this.next()) >>> 0;
+    for (let i = 0; i < 5; ++i) this.code = (this.code * 256 + this.next()) >>> 0;  // the first is 0
   }
   next() {
     if (this.at >= this.bytes.length) throw new Error("a group of images ends too early");
