@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cstring>
+#include <optional>
 
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/numbers.h"
 #include "pictura/replay/encoding.h"
 #include "pictura/replay/images.h"
 #include "pictura/replay/page_sources.h"
@@ -161,6 +163,7 @@ std::vector<int32_t> columns_from(NumberReader reader, size_t frames, size_t col
 }
 
 constexpr int kLightOrder = 1, kDecisionOrder = 1;
+constexpr int32_t kMaxImage_px = 8192;  // of a side, as of a rig's cameras
 
 struct Section {
   std::string name;
@@ -259,6 +262,13 @@ void check_header(const Replay& replay) {
        {std::pair{"agents", replay.num_agents}, {"frames", replay.num_frames}, {"lights", replay.num_lights}}) {
     PICTURA_CHECK(value >= 0 && value <= 1 << 24, "header: {}: expected at most {}, got {}", what, 1 << 24, value);
   }
+  const int64_t numbers = int64_t{replay.num_frames} * replay.num_agents;
+  PICTURA_CHECK(numbers <= kMaxReplayNumbers / int64_t{kNumTracks},
+                "header: expected agents times frames of at most {}, got {}", kMaxReplayNumbers / int64_t{kNumTracks},
+                numbers);
+  const int64_t lights = int64_t{replay.num_frames} * replay.num_lights;
+  PICTURA_CHECK(lights <= kMaxReplayNumbers, "header: expected lights times frames of at most {}, got {}",
+                kMaxReplayNumbers, lights);
   PICTURA_CHECK(replay.followed >= -1 && replay.followed < replay.num_agents,
                 "header: followed: expected an agent below {}, got {}", replay.num_agents, replay.followed);
 }
@@ -272,7 +282,9 @@ void read_header_values(const Json& header, Replay* replay_out) {
   header.at("map_hash").get_to(origin.map_hash);
   header.at("policy").get_to(origin.policy);
   header.at("policy_hash").get_to(origin.policy_hash);
-  origin.seed = std::stoull(header.at("seed").get<std::string>());
+  const std::optional<uint64_t> seed = parse_unsigned(header.at("seed").get<std::string>());
+  PICTURA_CHECK(seed, "header: seed: expected a number, got {}", header.at("seed").dump());
+  origin.seed = *seed;
   header.at("global_world").get_to(origin.global_world);
   header.at("dt_s").get_to(origin.dt_s);
   header.at("agents").get_to(replay_out->num_agents);
@@ -297,6 +309,10 @@ void read_images(const Json& header, std::string_view page, ReplayImages* images
   for (const Json& camera : images.at("cameras")) {
     images_out->cameras.push_back({camera.at("name").get<std::string>(), camera.at("width_px").get<int32_t>(),
                                    camera.at("height_px").get<int32_t>()});
+    for (const int32_t size_px : {images_out->cameras.back().width_px, images_out->cameras.back().height_px}) {
+      PICTURA_CHECK(size_px >= 1 && size_px <= kMaxImage_px, "header: images: expected sizes of 1 to {}, got {}",
+                    kMaxImage_px, size_px);
+    }
   }
   const std::string bytes = from_base64(element(page, kImagesBegin, "a replay's images"));
   size_t at = 0;

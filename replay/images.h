@@ -13,7 +13,7 @@
 
 namespace pictura {
 
-constexpr int kReplayFramesPerGroup = 50;
+constexpr int kReplayFramesPerGroup = 25;
 
 /// The colours that primitives have before they fade, [red, green, blue].
 using ReplayHue = std::array<uint8_t, 3>;

@@ -16,8 +16,6 @@ namespace pictura {
 
 namespace {
 
-// Of all tracks together: 64 million numbers, 256 MB, are 120 agents for 24,000 steps.
-constexpr int64_t kMaxNumbers = int64_t{1} << 26;
 constexpr int32_t kTurn_ddeg = 3600;
 constexpr double kDdegPerRad = 1800.0 / 3.14159265358979323846;
 
@@ -271,8 +269,9 @@ void Recorder::before_step(Span<const Command> commands, const std::optional<Rep
 void Recorder::after_step(const StepResult& result) {
   Parts& parts = *parts_;
   const int64_t numbers = (int64_t{parts.replay.num_frames} + 1) * parts.replay.num_agents * int64_t{kNumTracks};
-  PICTURA_CHECK(numbers <= kMaxNumbers, "replay: {} agents are too many for more than {} steps: record fewer steps",
-                parts.replay.num_agents, parts.replay.num_frames - 1);
+  PICTURA_CHECK(numbers <= kMaxReplayNumbers,
+                "replay: {} agents are too many for more than {} steps: record fewer steps", parts.replay.num_agents,
+                parts.replay.num_frames - 1);
   parts.add_step(result);
   parts.add_frame();
 }

@@ -194,19 +194,25 @@ class Images {
     this.frameBytes = this.cameras.reduce((sum, c) => sum + c.width_px * c.height_px * 3, 0);
     this.groups = new Map();  // group -> promise of its frames; a few are kept
   }
-  // The bytes of a frame: [height, width, 3] of each camera.
+  // The bytes of a frame: [height, width, 3] of each camera. The next group is made ready meanwhile.
   async frame(frame) {
-    const group = Math.floor(frame / this.perGroup);
-    if (!this.groups.has(group)) {
-      if (this.groups.size > 3) this.groups.delete(this.groups.keys().next().value);
-      this.groups.set(group, this.unpack(group));
-    }
-    const frames = await this.groups.get(group);
+    const group = Math.floor(frame / this.perGroup), wanted = this.group(group);
+    if (group + 2 < this.begins.length) this.group(group + 1).catch(() => {});
+    const frames = await wanted;
     return frames.subarray((frame % this.perGroup) * this.frameBytes, (frame % this.perGroup + 1) * this.frameBytes);
+  }
+  group(group) {
+    const frames = this.groups.get(group) || this.unpack(group);
+    this.groups.delete(group);
+    this.groups.set(group, frames);  // as the last that was used
+    if (this.groups.size > 4) this.groups.delete(this.groups.keys().next().value);
+    return frames;
   }
   async unpack(group) {
     const count = Math.min(this.perGroup, this.frames - group * this.perGroup);
-    return unpackImages(this.cameras, this.hues, this.bytes.subarray(this.begins[group], this.begins[group + 1]), count, this.frameBytes);
+    const work = [this.cameras, this.hues, this.bytes.slice(this.begins[group], this.begins[group + 1]), count, this.frameBytes];
+    if (this.worker === undefined) this.worker = imageWorker();
+    return this.worker ? this.worker(work) : unpackImages(...work);
   }
 }
 

@@ -125,3 +125,34 @@ function unpackImages(cameras, hues, group, count, frameBytes) {
   if (sum !== adler32(out)) throw new Error("a group of images is damaged");
   return out;
 }
+
+// unpackImages() beside the page's own thread, so that playing does not halt: a function of its arguments that returns a
+// promise, or null where the browser allows no such worker.
+function imageWorker() {
+  const waiting = new Map();
+  let worker, count = 0;
+  try {
+    const parts = [`const SHIFTS = ${JSON.stringify(SHIFTS)};`, BitReader, makeChances, adler32, shadesOf, unpackImages,
+      `onmessage = ({ data: [id, work] }) => {
+        try {
+          const frames = unpackImages(...work);
+          postMessage([id, frames], [frames.buffer]);
+        } catch (error) {
+          postMessage([id, null, error.message]);
+        }
+      };`];
+    worker = new Worker(URL.createObjectURL(new Blob([parts.join("\n")], { type: "text/javascript" })));
+  } catch {
+    return null;
+  }
+  worker.onmessage = ({ data: [id, frames, fault] }) => {
+    const { resolve, reject } = waiting.get(id);
+    waiting.delete(id);
+    if (frames) resolve(frames);
+    else reject(new Error(fault));
+  };
+  return work => new Promise((resolve, reject) => {
+    waiting.set(++count, { resolve, reject });
+    worker.postMessage([count, work]);
+  });
+}

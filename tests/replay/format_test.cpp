@@ -218,6 +218,36 @@ TEST(ReplayFormat, WhatIsDamagedIsNamed) {
   EXPECT_THAT(message(without("{\"format\"", "{\"format")), HasSubstr("damaged JSON"));
 }
 
+TEST(ReplayFormat, NoHeaderMakesTheReaderFailOtherwiseThanByAnError) {
+  const ScratchFolder folder;
+  const std::string path = folder / "a.html";
+  write_replay(path, any_replay());
+  const std::string page = read_file(path);
+  const size_t begin = page.find("id=\"replay-header\">") + 19, end = page.find("</script>", begin);
+  std::mt19937 random(6);
+  int refused = 0;
+  constexpr int kTries = 400;
+  for (int i = 0; i < kTries; ++i) {
+    std::string damaged = page;
+    // Digits, which leave the JSON whole, more often than other letters.
+    for (int k = 0; k < 3;) {
+      const size_t at = begin + random() % (end - begin);
+      const bool is_digit = damaged[at] >= '0' && damaged[at] <= '9';
+      if (!is_digit && random() % 16 != 0) continue;
+      damaged[at] = is_digit ? static_cast<char>('0' + random() % 10) : static_cast<char>(' ' + random() % 95);
+      ++k;
+    }
+    write_file(path, damaged);
+    try {
+      const Replay replay = read_replay(path);
+      for (const std::string& group : replay.images.groups) unpack_images(replay.images.cameras, group, 1);
+    } catch (const Error&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, kTries / 4);
+}
+
 TEST(ReplayFormat, AGalleryListsTheWorstFirst) {
   const ScratchFolder folder;
   Replay replay = any_replay();

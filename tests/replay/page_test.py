@@ -240,10 +240,12 @@ class Chromium(PageCase):
     def test_what_is_damaged_says_so(self):
         page = self.path.read_text()
         data = page.index('id="replay-data">') + 17
+        images = page.index('id="replay-images">') + 19
         flipped = "B" if page[data + 5000] == "A" else "A"
         damaged = {
             "cut in the numbers": page[: data + 3000],
             "cut before the header": page[: page.index('<script type="application/json"')],
+            "a letter of the images": page[: images + 900] + ("B" if page[images + 900] == "A" else "A") + page[images + 901 :],
             "a letter of the numbers": page[: data + 5000] + flipped + page[data + 5001 :],
             "the header": page.replace('{"format"', '{"format', 1),
             "a newer version": page.replace('"version":1,', '"version":9,', 1),
