@@ -221,7 +221,7 @@ class WorldView {
   drawTrail(time, frame, theme) {
     const { context, replay, state } = this, first = Math.max(replay.episode(frame).first, frame - 60);
     context.lineWidth = 2.5 * this.ratio;
-    context.lineCap = "round";
+    context.lineCap = "butt";  // ends that overlap would show
     context.strokeStyle = theme["--accent"];
     for (let at = first; at < frame; at += 6) {
       context.globalAlpha = 0.1 + 0.5 * (at - first) / 60;
