@@ -101,4 +101,9 @@ struct Array {
              Device expected_device) const;
 };
 
+struct NamedArray {
+  std::string_view name;
+  Array array;
+};
+
 }  // namespace pictura

@@ -87,14 +87,14 @@ struct AgentStateView {
 };
 
 /// Copies every field of one agent. All are read before any is written, so that a device need not wait for each.
-PICTURA_HD inline void copy_fields(const AgentStateView& from, const AgentStateView& to, int slot){
+PICTURA_HD inline void copy_fields(const AgentStateView& from, int from_slot, const AgentStateView& to, int to_slot){
 #define X(name, type, per_agent, first, comment) \
   type name[per_agent];                          \
-  for (int i = 0; i < (per_agent); ++i) name[i] = from.name[slot * (per_agent) + i];
+  for (int i = 0; i < (per_agent); ++i) name[i] = from.name[from_slot * (per_agent) + i];
     PICTURA_AGENT_FIELDS(X)
 #undef X
 #define X(name, type, per_agent, first, comment) \
-  for (int i = 0; i < (per_agent); ++i) to.name[slot * (per_agent) + i] = name[i];
+  for (int i = 0; i < (per_agent); ++i) to.name[to_slot * (per_agent) + i] = name[i];
         PICTURA_AGENT_FIELDS(X)
 #undef X
 }

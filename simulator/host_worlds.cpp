@@ -53,6 +53,7 @@ WorldView HostWorlds::world(int index) {
   const auto w = static_cast<size_t>(index);
   const int32_t first_box = setup.box_begin[w], first_light = setup.light_begin[w];
   WorldView view = setup.view(index, setup.map_views[static_cast<size_t>(setup.worlds[w].map)], setup.options);
+  view.seed = state.seed[w];
   view.episode = static_cast<uint32_t>(state.episode_index[w]);
   view.agents = state.agents.view();
   view.boxes = state.boxes.data() + first_box;

@@ -24,12 +24,7 @@ constexpr ObservationArray kObservationArrays[] = {
 #undef X
 };
 
-struct NamedArray {
-  std::string_view name;
-  Array array;  // [slots, rows, features]
-};
-
-/// Those that are there, in the order of the list.
+/// Those that are there, [slots, rows, features], in the order of the list.
 std::vector<NamedArray> observation_arrays(const ObservationView& observations, int num_slots, Device device);
 
 }  // namespace pictura

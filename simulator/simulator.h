@@ -19,6 +19,7 @@
 #include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/fields.h"
 #include "pictura/simulator/observation.h"
+#include "pictura/simulator/state_edit.h"
 #include "pictura/simulator/totals.h"
 
 namespace pictura {
@@ -148,6 +149,20 @@ class Simulator {
 
   /// Starts a new episode in every world (episode 0 of the seed) and writes observations and scene.
   virtual void reset(Stream stream = {}) = 0;
+  /// The same in the worlds whose mask is not 0, which from now on draw their random numbers from `seed`: bit for bit
+  /// what these worlds of a simulator of that seed are. The others stay as they are, and so do totals: episodes that
+  /// are cut off are not counted. world_mask: u8 [worlds] on device(). Throws Error for another array. A CUDA graph can
+  /// capture it.
+  void reset(const Array& world_mask, uint64_t seed, Stream stream = {});
+
+  /// Gives fields of chosen agents other values. slots: i32 [n] on device(), each once. fields: by their names in
+  /// fields.h, of their types, [n] or [n, per agent], on device(). What follows from them is found anew: an agent's
+  /// lane, its height (of the road on the level of z_m), its box, view and observation; an active one has no
+  /// halt_reason, and who is given a place that its world had not found for it counts as spawned. The results of the
+  /// last step stay. Throws Error, which leaves the state as it was, for other arrays, for fields that follow from
+  /// others (see is_derived() in agent_state_arrays.h), and for slots and values that restore() would refuse; on a
+  /// device the last are latched. There nothing waits, and a CUDA graph can capture it.
+  void set_state(const Array& slots, Span<const NamedArray> fields, Stream stream = {});
 
   /// Advances every world by one step. actions: i32 [slots] on device(), each in [0, kNumActions); those of inactive
   /// agents are ignored. A world whose last step ended its episode is reset instead, and its slots are not valid in
@@ -200,6 +215,9 @@ class Simulator {
   // step() once it has checked everything but the values.
   virtual StepResult step_actions(Span<const int32_t> actions, Stream stream) = 0;
   virtual StepResult step_commands(Span<const Command> commands, Stream stream) = 0;
+  // reset() and set_state() likewise.
+  virtual void reset_worlds(Span<const uint8_t> world_mask, uint64_t seed, Stream stream) = 0;
+  virtual void apply_edit(const StateEdit& edit, Stream stream) = 0;
 };
 
 }  // namespace pictura

@@ -7,8 +7,10 @@
 #include <numeric>
 
 #include "pictura/common/error.h"
+#include "pictura/simulator/agent_state_arrays.h"
 #include "pictura/simulator/hash_values.h"
 #include "pictura/simulator/rules/collision.h"
+#include "pictura/simulator/rules/edit_state.h"
 #include "pictura/simulator/rules/episode.h"
 #include "pictura/simulator/rules/limits.h"
 
@@ -17,7 +19,7 @@ namespace {
 
 struct SavedHeader {
   std::array<char, 8> magic{'P', 'I', 'C', 'S', 'T', 'A', 'T', 'E'};
-  uint32_t version = 4;
+  uint32_t version = 5;
   uint32_t byte_order = 0x01020304;
   uint64_t num_fingerprints = 0;  // that follow: what saver and restorer must have in common
 };
@@ -55,52 +57,15 @@ std::vector<Fingerprint> fingerprints(const SimulatorSetup& setup) {
   return prints;
 }
 
-bool all_finite(const std::vector<float>& values) {
-  return std::all_of(values.begin(), values.end(), [](float value) { return std::isfinite(value); });
-}
-template <typename Integer>
-bool all_finite(const std::vector<Integer>&) {
-  return true;
-}
-
 /// Throws Error naming the field unless every value can be stepped on: indices exist and numbers are finite.
-void check_restored(const SimulatorSetup& setup, const SimulatorState& state) {
-  constexpr float kMaxCoordinate_m = 1e6f;
-  const AgentState& agents = state.agents;
-#define X(name, type, per_agent, first, comment) \
-  PICTURA_CHECK(all_finite(agents.name), "simulator state: {}: expected finite numbers", #name);
-  PICTURA_AGENT_FIELDS(X)
-#undef X
-  const auto expect = [](bool is_sound, size_t slot, const char* field, auto value) {
-    PICTURA_CHECK(is_sound, "simulator state: agent {}: {}: {} is out of range", slot, field, value);
-  };
+void check_restored(const SimulatorSetup& setup, const SimulatorState& state, const AgentStateView& agents) {
+  constexpr float kMaxCoordinate_m = kMaxCommanded_m;
   for (size_t w = 0; w < setup.worlds.size(); ++w) {
-    const MapRules& map = setup.map_of(static_cast<int>(w)).rules;
-    const std::vector<MapLane>& lanes = map.lanes;
-    const auto num_walk_pieces = static_cast<int32_t>(map.walkways.pieces.size());
-    const auto is_lane = [&lanes](int32_t lane) {
-      return lane >= 0 && static_cast<size_t>(lane) < lanes.size() && lanes[static_cast<size_t>(lane)].num_segments > 0;
-    };
-    for (auto slot = static_cast<size_t>(setup.slot_begin[w]); slot < static_cast<size_t>(setup.slot_begin[w + 1]);
-         ++slot) {
-      const auto status = static_cast<AgentStatus>(agents.status[slot]);
-      expect(status == AgentStatus::active || status == AgentStatus::halted || status == AgentStatus::absent, slot,
-             "status", static_cast<int>(status));
-      expect(agents.agent_class[slot] < kNumAgentClasses, slot, "agent_class",
-             static_cast<int>(agents.agent_class[slot]));
-      expect(agents.lane[slot] == -1 || is_lane(agents.lane[slot]), slot, "lane", agents.lane[slot]);
-      const int32_t goal_lane = agents.goal_lane[slot];
-      const bool is_way = agents.agent_class[slot] == static_cast<uint8_t>(AgentClass::pedestrian)
-                              ? goal_lane >= 0 && goal_lane < num_walk_pieces
-                              : is_lane(goal_lane);
-      expect(is_way || (goal_lane == -1 && status == AgentStatus::absent), slot, "goal_lane", goal_lane);
-      expect(agents.next_waypoint[slot] >= 0 && agents.next_waypoint[slot] < kNumWaypoints, slot, "next_waypoint",
-             agents.next_waypoint[slot]);
-      expect(agents.goal_chains[slot] >= 0, slot, "goal_chains", agents.goal_chains[slot]);
-      expect(agents.first_motion_step[slot] >= 0 && agents.first_motion_step[slot] <= setup.config.episode_steps, slot,
-             "first_motion_step", agents.first_motion_step[slot]);
-      expect(std::fabs(agents.x_m[slot]) <= kMaxCoordinate_m, slot, "x_m", agents.x_m[slot]);
-      expect(std::fabs(agents.y_m[slot]) <= kMaxCoordinate_m, slot, "y_m", agents.y_m[slot]);
+    const MapView& map = setup.map_views[static_cast<size_t>(setup.worlds[w].map)];
+    for (int slot = setup.slot_begin[w]; slot < setup.slot_begin[w + 1]; ++slot) {
+      const AgentField field = invalid_field(map, setup.options, agents, slot);
+      PICTURA_CHECK(field == AgentField::none, "simulator state: agent {}: {}: {} is out of range", slot,
+                    kAgentFields[static_cast<size_t>(field)].name, field_text(agents, slot, field));
     }
     PICTURA_CHECK(state.spawned[w] >= 0 && state.spawned[w] <= setup.worlds[w].num_agents,
                   "simulator state: world {}: spawned: {} is out of range", w, state.spawned[w]);
@@ -143,6 +108,7 @@ void SimulatorState::resize(const SimulatorSetup& setup) {
   light_plans.assign(setup.num_lights(), {});
   lights.assign(setup.num_lights(), {});
   const size_t num_worlds = setup.worlds.size();
+  seed.assign(num_worlds, setup.config.seed);
   episode_step.assign(num_worlds, 0);
   episode_index.assign(num_worlds, 0);
   episode_over.assign(num_worlds, 0);
@@ -157,6 +123,7 @@ void SimulatorState::reserve(const SimulatorCapacity& capacity, const SimulatorC
   light_plans.reserve(num_lights);
   lights.reserve(num_lights);
   for (auto* of_world : {&episode_step, &episode_index, &spawned}) of_world->reserve(num_worlds);
+  seed.reserve(num_worlds);
   episode_over.reserve(num_worlds);
   world_totals.reserve(num_worlds);
 }
@@ -287,7 +254,7 @@ void SimulatorState::restore(const SimulatorSetup& setup, Span<const uint8_t> by
   copy_to(present.data());
   assign_from(bytes.data() + begin);
   try {
-    check_restored(setup, *this);
+    check_restored(setup, *this, agents.view());
   } catch (const Error&) {
     assign_from(present.data());
     throw;
@@ -305,6 +272,25 @@ std::string rejection_text(int64_t rejected) {
                          kMaxCommanded_m, kMaxCommanded_rad, kMaxCommanded_mps);
     default: return fmt::format("slot {}: expected a command that is an action, a kinematic state or absence", slot);
   }
+}
+
+std::string edit_fault_text(int64_t fault, int num_slots) {
+  const auto what = static_cast<int32_t>(fault >> 56);
+  const int64_t element = fault >> 32 & 0xFFFFFF;
+  const auto slot = static_cast<int32_t>(fault);
+  if (what == kNoSuchSlot) {
+    return fmt::format("slots: element {}: expected a slot in [0, {}), got {}", element, num_slots, slot);
+  }
+  if (what == kSlotAgain) return fmt::format("slots: element {}: expected each slot once, got {} again", element, slot);
+  const auto field = static_cast<AgentField>(what);
+  const std::string_view name = kAgentFields[static_cast<size_t>(what)].name;
+  if (field == AgentField::goal_lane) {
+    return fmt::format(
+        "slot {}: goal_lane: expected a lane of the map, or for pedestrians a piece of a walkway, unless "
+        "the agent is absent",
+        slot);
+  }
+  return fmt::format("slot {}: {}: the value is out of range", slot, name);
 }
 
 }  // namespace pictura

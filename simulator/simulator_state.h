@@ -37,6 +37,7 @@ struct SimulatorState {
   std::vector<AgentBox> boxes, boxes_before;  // the scene's agents
   std::vector<LightPlan> light_plans;
   std::vector<LightState> lights;
+  std::vector<uint64_t> seed;                        // [worlds] of its random numbers
   std::vector<int32_t> episode_step, episode_index;  // [worlds]
   std::vector<uint8_t> episode_over;                 // [worlds] the next step resets
   std::vector<int32_t> spawned;                      // [worlds] in the current episode
@@ -55,6 +56,7 @@ struct SimulatorState {
     of_boxes(a.boxes_before, b.boxes_before);
     of_lights(a.light_plans, b.light_plans);
     of_lights(a.lights, b.lights);
+    of_worlds(a.seed, b.seed);
     of_worlds(a.episode_step, b.episode_step);
     of_worlds(a.episode_index, b.episode_index);
     of_worlds(a.episode_over, b.episode_over);
@@ -71,5 +73,7 @@ struct SimulatorState {
 
 /// What an Error says of a command that a step rejected, see rejected_command().
 std::string rejection_text(int64_t rejected);
+/// What an Error says of an edit in which find_edit_fault() found this.
+std::string edit_fault_text(int64_t fault, int num_slots);
 
 }  // namespace pictura

@@ -7,6 +7,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/simulator/host_worlds.h"
+#include "pictura/simulator/rules/edit_state.h"
 #include "pictura/simulator/rules/episode.h"
 #include "pictura/simulator/rules/observe.h"
 #include "pictura/simulator/rules/spawn.h"
@@ -70,11 +71,7 @@ class SimulatorCpu final : public Simulator {
   uint64_t generation() const override { return generation_; }
 
   void reset(Stream) override {
-    for_each_world([this](int w) {
-      worlds_.state.episode_index[static_cast<size_t>(w)] = 0;
-      begin_episode(w);
-      show(w);
-    });
+    for_each_world([this](int w) { begin_first_episode(w, config().seed); });
   }
 
   ObservationView observations() override { return results_.observation_view(); }
@@ -123,6 +120,44 @@ class SimulatorCpu final : public Simulator {
  private:
   StepResult step_actions(Span<const int32_t> actions, Stream) override { return step_all(actions); }
   StepResult step_commands(Span<const Command> commands, Stream) override { return step_all(commands); }
+
+  void reset_worlds(Span<const uint8_t> world_mask, uint64_t seed, Stream) override {
+    for_each_world([this, world_mask, seed](int w) {
+      if (world_mask[static_cast<size_t>(w)]) begin_first_episode(w, seed);
+    });
+  }
+
+  void apply_edit(const StateEdit& edit, Stream) override {
+    std::vector<int32_t> first_element(static_cast<size_t>(num_slots()), edit.count);
+    for (int i = edit.count - 1; i >= 0; --i) {
+      if (has_slot(edit, i, num_slots())) first_element[static_cast<size_t>(edit.slots[i])] = i;
+    }
+    const auto world_index = [this](int slot) { return worlds_.setup.world_of_slot[static_cast<size_t>(slot)]; };
+    for (int i = 0; i < edit.count; ++i) {
+      const int64_t fault = find_edit_fault(edit, i, num_slots(), first_element.data(),
+                                            [&](int slot) { return worlds_.world(world_index(slot)); });
+      if (fault != kNothingWrong) fail("set_state: {}", edit_fault_text(fault, num_slots()));
+    }
+    std::vector<uint8_t> is_edited(static_cast<size_t>(worlds_.setup.num_worlds()));
+    for (int i = 0; i < edit.count; ++i) {
+      const int w = world_index(edit.slots[i]);
+      worlds_.state.spawned[static_cast<size_t>(w)] += pictura::apply_edit(worlds_.world(w), edit, i);
+      is_edited[static_cast<size_t>(w)] = 1;
+    }
+    for_each_world([this, &is_edited](int w) {
+      if (!is_edited[static_cast<size_t>(w)]) return;
+      sort_into_cells(worlds_.world(w), &worlds_.box_cells[static_cast<size_t>(w)]);
+      show(w);
+    });
+  }
+
+  void begin_first_episode(int w, uint64_t seed) {
+    worlds_.state.seed[static_cast<size_t>(w)] = seed;
+    worlds_.state.episode_index[static_cast<size_t>(w)] = 0;
+    clear_results(w);
+    begin_episode(w);
+    show(w);
+  }
 
   void begin() {
     worlds_token_ = new_worlds_token();

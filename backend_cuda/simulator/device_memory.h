@@ -73,6 +73,7 @@ struct DeviceState {
   DeviceBuffer<AgentBox> boxes, boxes_before;
   DeviceBuffer<LightPlan> light_plans;
   DeviceBuffer<LightState> lights;
+  DeviceBuffer<uint64_t> seed;
   DeviceBuffer<int32_t> episode_step, episode_index;
   DeviceBuffer<uint8_t> episode_over;
   DeviceBuffer<int32_t> spawned;
@@ -85,6 +86,7 @@ struct DeviceState {
         boxes_before(num_boxes),
         light_plans(num_lights),
         lights(num_lights),
+        seed(num_worlds),
         episode_step(num_worlds),
         episode_index(num_worlds),
         episode_over(num_worlds),
@@ -233,7 +235,7 @@ struct DeviceScratch {
   DeviceBuffer<int32_t> known_tries, chosen_try, next_try;
   DeviceBuffer<StepSums> step_sums;
   DeviceBuffer<uint8_t> began, prepares;
-  DeviceBuffer<int32_t> rejected_slot;
+  DeviceBuffer<int32_t> rejected_slot, first_element, wrong_element;
   // The part of the state that an episode begins with, for the next one.
   DeviceAgents next_agents;
   DeviceBuffer<AgentBox> next_boxes;
@@ -259,6 +261,8 @@ struct DeviceScratch {
         began(num_worlds),
         prepares(num_worlds),
         rejected_slot(1),
+        first_element(num_slots),
+        wrong_element(1),
         next_agents(num_slots),
         next_boxes(num_boxes),
         next_light_plans(num_lights),

@@ -218,8 +218,12 @@ struct DeviceLaunch {
 
 }  // namespace
 
-void launch_reset(const SimulatorArrays& arrays, const StepStreams& streams) {
-  launch_reset(DeviceLaunch{streams}, arrays);
+void launch_reset(const SimulatorArrays& arrays, const uint8_t* mask, uint64_t seed, const StepStreams& streams) {
+  launch_reset(DeviceLaunch{streams}, arrays, mask, seed);
+}
+
+void launch_edit(const SimulatorArrays& arrays, const StateEdit& edit, const StepStreams& streams) {
+  launch_edit(DeviceLaunch{streams}, arrays, edit);
 }
 
 void launch_restored(const SimulatorArrays& arrays, const StepStreams& streams) {

@@ -8,6 +8,7 @@
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
+#include "pictura/simulator/rules/edit_state.h"
 #include "pictura/simulator/rules/episode.h"
 #include "pictura/simulator/rules/observe.h"
 #include "pictura/simulator/rules/spawn.h"
@@ -41,6 +42,7 @@ struct SimulatorArrays {
   // Of all worlds, as in their views; and here, where no store can change them.
   AgentStateView agents{}, next_agents{};
   // State, as in SimulatorState.
+  uint64_t* seed = nullptr;
   int32_t* episode_step = nullptr;
   int32_t* episode_index = nullptr;
   uint8_t* episode_over = nullptr;
@@ -58,6 +60,9 @@ struct SimulatorArrays {
   int32_t* next_spawned = nullptr;   // [num_worlds] in the next episode
   int32_t* rejected_slot = nullptr;  // the lowest one with a command out of range, or kNoSlot
   int64_t* rejected_command = nullptr;  // the first since the host looked, or kNothingRejected
+  int32_t* first_element = nullptr;     // [num_slots] the first element of an edit that names each, or kNoSlot
+  int32_t* wrong_element = nullptr;     // the first element of the edit with a fault, or kNoSlot
+  int64_t* wrong_edit = nullptr;        // what the first since the host looked is, or kNothingWrong
 
   PICTURA_HD WorldView world(int w) const {
     WorldView world = worlds[w];
@@ -199,19 +204,25 @@ PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const Wo
   });
 }
 
-/// Begins episode 0 in every world.
+/// Begins episode 0 of `seed` in the worlds of the mask [worlds], or in all where it is null.
 struct BeginFirstEpisode {
   SimulatorArrays arrays;
+  const uint8_t* mask;
+  uint64_t seed;
   template <typename Team>
   PICTURA_HD void operator()(const Team& team, int w) const {
+    if (mask && !mask[w]) return;
     team.for_each(1, [&](int) {
+      arrays.seed[w] = arrays.worlds[w].seed = arrays.next_worlds[w].seed = seed;
       arrays.episode_over[w] = 0;
       arrays.episode_step[w] = arrays.episode_index[w] = 0;
       arrays.worlds[w].episode = 0;
       arrays.next_worlds[w].episode = 1;
       arrays.began[w] = 1;
     });
-    begin_episode(team, arrays.world(w), arrays.scratch[w], &arrays.spawned[w]);
+    const WorldView world = arrays.world(w);
+    team.for_each(world.num_agents, [&](int agent) { clear_result(arrays.results, world.first_slot + agent); });
+    begin_episode(team, world, arrays.scratch[w], &arrays.spawned[w]);
   }
 };
 
@@ -271,7 +282,7 @@ struct Advance {
     } else if (group.rank() == 0) {
       const WorldView next = arrays.next_world(w);
       clear_result(arrays.results, slot);
-      copy_fields(next.agents, world.agents, slot);
+      copy_fields(next.agents, slot, world.agents, slot);
       world.boxes[agent] = world.boxes_before[agent] = next.boxes[agent];
     }
     if (group.rank() == 0) world.cell_centers[agent] = center_of(world.boxes[agent]);
@@ -477,19 +488,73 @@ void launch_write_observations(const Launch& launch, const SimulatorArrays& arra
   launch.template groups<kWarp>(arrays.num_slots, WriteObservation{arrays});
 }
 
-/// Episode 0 of every world.
+/// Notes which element of an edit names a slot first.
+struct MarkEdit {
+  SimulatorArrays arrays;
+  StateEdit edit;
+  template <typename Atomics>
+  PICTURA_HD void operator()(const Atomics& atomics, int i) const {
+    if (has_slot(edit, i, arrays.num_slots)) atomics.lower(&arrays.first_element[edit.slots[i]], i);
+  }
+};
+
+/// Finds the first element of an edit with a fault.
+struct CheckEdit {
+  SimulatorArrays arrays;
+  StateEdit edit;
+  PICTURA_HD int64_t fault(int i) const {
+    return find_edit_fault(edit, i, arrays.num_slots, arrays.first_element,
+                           [this](int slot) { return arrays.world(arrays.world_of_slot[slot]); });
+  }
+  template <typename Atomics>
+  PICTURA_HD void operator()(const Atomics& atomics, int i) const {
+    if (fault(i) != kNothingWrong) atomics.lower(arrays.wrong_element, i);
+  }
+};
+
+/// Puts the agents of an edit without faults into their worlds.
+struct ApplyEdit {
+  CheckEdit check;
+  template <typename Atomics>
+  PICTURA_HD void operator()(const Atomics& atomics, int i) const {
+    const SimulatorArrays& arrays = check.arrays;
+    if (*arrays.wrong_element != kNoSlot) {
+      if (i == 0 && *arrays.wrong_edit == kNothingWrong) *arrays.wrong_edit = check.fault(*arrays.wrong_element);
+      return;
+    }
+    const int slot = check.edit.slots[i], w = arrays.world_of_slot[slot];
+    const WorldView world = arrays.world(w);
+    if (const int joined = apply_edit(world, check.edit, i)) atomics.add(&arrays.spawned[w], joined);
+    const int agent = slot - world.first_slot;
+    world.cell_centers[agent] = center_of(world.boxes[agent]);
+  }
+};
+
 template <typename Launch>
-void launch_reset(const Launch& launch, const SimulatorArrays& arrays) {
-  launch.teams(arrays.num_worlds, BeginFirstEpisode{arrays});
+void launch_edit(const Launch& launch, const SimulatorArrays& arrays, const StateEdit& edit) {
+  if (edit.count == 0) return;
+  launch.fill(arrays.first_element, static_cast<size_t>(arrays.num_slots) * sizeof(int32_t), kNoSlot & 0xFF);
+  launch.fill(arrays.wrong_element, sizeof(int32_t), kNoSlot & 0xFF);
+  launch.threads(edit.count, MarkEdit{arrays, edit});
+  launch.threads(edit.count, CheckEdit{arrays, edit});
+  launch.threads(edit.count, ApplyEdit{{arrays, edit}});
+  launch_write_observations(launch, arrays);
+}
+
+/// Episode 0 of `seed` in the worlds of the mask, or in all where it is null.
+template <typename Launch>
+void launch_reset(const Launch& launch, const SimulatorArrays& arrays, const uint8_t* mask, uint64_t seed) {
+  launch.teams(arrays.num_worlds, BeginFirstEpisode{arrays, mask, seed});
   launch.template groups<kWarp>(arrays.num_worlds, PlaceCenters{arrays});
   launch_write_observations(launch, arrays);
 }
 
-/// Tells the worlds which episode a state that was put there is in.
+/// Tells the worlds which episode of which seed a state that was put there is in.
 struct TakeEpisode {
   SimulatorArrays arrays;
   template <typename Atomics>
   PICTURA_HD void operator()(const Atomics&, int w) const {
+    arrays.worlds[w].seed = arrays.next_worlds[w].seed = arrays.seed[w];
     arrays.worlds[w].episode = static_cast<uint32_t>(arrays.episode_index[w]);
     arrays.next_worlds[w].episode = arrays.worlds[w].episode + 1;
   }

@@ -31,6 +31,8 @@ class SimulatorCuda final : public Simulator {
     side_ = std::make_unique<SideStream>();
     rejected_command_ = std::make_unique<MappedValue<int64_t>>();
     *rejected_command_->host() = kNothingRejected;
+    wrong_edit_ = std::make_unique<MappedValue<int64_t>>();
+    *wrong_edit_->host() = kNothingWrong;
     allocate(setup_.needs());
     begin(nullptr);
     PICTURA_CUDA(cudaDeviceSynchronize());  // so that it can be used on any stream
@@ -67,12 +69,7 @@ class SimulatorCuda final : public Simulator {
   }
   uint64_t generation() const override { return generation_; }
 
-  void reset(Stream stream) override {
-    const DeviceGuard guard(device_);
-    throw_rejected();
-    cuda::launch_reset(arrays(), side_->streams_from(handle_of(stream)));
-    PICTURA_CUDA(cudaGetLastError());
-  }
+  void reset(Stream stream) override { begin_episodes(nullptr, config().seed, stream); }
 
   void poll() override { throw_rejected(); }
   void check(Stream stream) override {
@@ -151,6 +148,22 @@ class SimulatorCuda final : public Simulator {
   StepResult step_actions(Span<const int32_t> actions, Stream stream) override { return step_all(actions, stream); }
   StepResult step_commands(Span<const Command> commands, Stream stream) override { return step_all(commands, stream); }
 
+  void reset_worlds(Span<const uint8_t> world_mask, uint64_t seed, Stream stream) override {
+    begin_episodes(world_mask.data(), seed, stream);
+  }
+  void apply_edit(const StateEdit& edit, Stream stream) override {
+    const DeviceGuard guard(device_);
+    throw_rejected();
+    cuda::launch_edit(arrays(), edit, side_->streams_from(handle_of(stream)));
+    PICTURA_CUDA(cudaGetLastError());
+  }
+  void begin_episodes(const uint8_t* world_mask, uint64_t seed, Stream stream) {
+    const DeviceGuard guard(device_);
+    throw_rejected();
+    cuda::launch_reset(arrays(), world_mask, seed, side_->streams_from(handle_of(stream)));
+    PICTURA_CUDA(cudaGetLastError());
+  }
+
   size_t slot_count() const { return static_cast<size_t>(num_slots()); }
 
   /// Memory for this capacity and no less than before; whatever was there is lost.
@@ -184,7 +197,7 @@ class SimulatorCuda final : public Simulator {
     put_setup(stream);
     state_.put_from(host_, stream);
     results_.clear(stream);
-    cuda::launch_reset(arrays(), side_->streams_from(stream));
+    cuda::launch_reset(arrays(), nullptr, config().seed, side_->streams_from(stream));
     PICTURA_CUDA(cudaGetLastError());
   }
 
@@ -233,10 +246,17 @@ class SimulatorCuda final : public Simulator {
   }
 
   void throw_rejected() {
+    throw_wrong_edit();
     const int64_t rejected = *rejected_command_->host();
     if (rejected == kNothingRejected) return;
     *rejected_command_->host() = kNothingRejected;
     fail("step: in an earlier call: {}", rejection_text(rejected));
+  }
+  void throw_wrong_edit() {
+    const int64_t fault = *wrong_edit_->host();
+    if (fault == kNothingWrong) return;
+    *wrong_edit_->host() = kNothingWrong;
+    fail("set_state: in an earlier call: {}", edit_fault_text(fault, num_slots()));
   }
 
   void put_scratch(cudaStream_t stream) {
@@ -296,6 +316,7 @@ class SimulatorCuda final : public Simulator {
     arrays.next_agents = scratch_.next_agents.view();
     arrays.num_worlds = setup_.num_worlds();
     arrays.num_slots = num_slots();
+    arrays.seed = state_.seed.data();
     arrays.episode_step = state_.episode_step.data();
     arrays.episode_index = state_.episode_index.data();
     arrays.episode_over = state_.episode_over.data();
@@ -311,6 +332,9 @@ class SimulatorCuda final : public Simulator {
     arrays.next_spawned = scratch_.next_spawned.data();
     arrays.rejected_slot = scratch_.rejected_slot.data();
     arrays.rejected_command = rejected_command_->device();
+    arrays.first_element = scratch_.first_element.data();
+    arrays.wrong_element = scratch_.wrong_element.data();
+    arrays.wrong_edit = wrong_edit_->device();
     return arrays;
   }
 
@@ -327,7 +351,7 @@ class SimulatorCuda final : public Simulator {
   DeviceResults results_;
   DeviceScratch scratch_;
   std::unique_ptr<SideStream> side_;
-  std::unique_ptr<MappedValue<int64_t>> rejected_command_;
+  std::unique_ptr<MappedValue<int64_t>> rejected_command_, wrong_edit_;
   SceneBatch scene_;
 };
 

@@ -318,6 +318,8 @@ class StillSimulator final : public Simulator {
  private:
   StepResult step_actions(Span<const int32_t>, Stream) override { return {}; }
   StepResult step_commands(Span<const Command>, Stream) override { return {}; }
+  void reset_worlds(Span<const uint8_t>, uint64_t, Stream) override {}
+  void apply_edit(const StateEdit&, Stream) override {}
 
   SimulatorConfig config_;
   SimulatorTotals totals_;

@@ -13,6 +13,7 @@
 #include "pictura/map/load_map.h"
 #include "pictura/tests/backend_cuda/device_test.h"
 #include "pictura/tests/backend_cuda/on_host.h"
+#include "pictura/tests/simulator/random_edit.h"
 #include "pictura/tests/simulator/same_bits.h"
 #include "pictura/tests/support/error_message.h"
 
@@ -31,6 +32,28 @@ class CudaSimulatorTest : public test::DeviceTest {};
 Array array_of(const DeviceBuffer<int32_t>& actions, const Simulator& simulator) {
   return {actions.data(), {simulator.num_slots()}, simulator.device()};
 }
+
+/// An edit's arrays in device memory.
+class DeviceEdit {
+ public:
+  DeviceEdit(const testing::RandomEdit& edit, Device device) {
+    slots_ = copy_of(edit.slots(), device);
+    for (const NamedArray& field : edit.fields()) fields_.push_back({field.name, copy_of(field.array, device)});
+  }
+  const Array& slots() const { return slots_; }
+  const std::vector<NamedArray>& fields() const { return fields_; }
+
+ private:
+  Array copy_of(const Array& host, Device device) {
+    const auto* const bytes = static_cast<const uint8_t*>(host.data);
+    memory_.emplace_back(Span<const uint8_t>(bytes, static_cast<size_t>(host.shape.count()) * bytes_of(host.type)));
+    return {memory_.back().data(), host.type, host.shape, device};
+  }
+
+  std::vector<DeviceBuffer<uint8_t>> memory_;
+  Array slots_;
+  std::vector<NamedArray> fields_;
+};
 
 /// A device observation's copy.
 struct HostObservation {
@@ -292,6 +315,52 @@ TEST_F(CudaSimulatorTest, ASnapshotIsTheStateThatWas) {
   cuda->restore(*on_device);
   run_same(cpu.get(), cuda.get(), 60, 20, 40);
   EXPECT_THROW(cuda->restore(*on_host), Error);
+}
+
+TEST_F(CudaSimulatorTest, BeginsChosenWorldsAndSetsChosenAgents) {
+  SimulatorConfig config = whole_world();
+  config.episode_steps = 50;
+  const Maps maps{load_map("procedural:1"), load_map("procedural:2")};
+  const std::vector<WorldSpec> worlds = draw_worlds(5, 2000, 1, 60, 2);
+  const auto cpu = make_simulator("cpu", config, maps, worlds);
+  const auto cuda = make_simulator("cuda", config, maps, worlds);
+  const int num_slots = cpu->num_slots();
+  for (uint32_t round = 0; round < 12; ++round) {
+    SCOPED_TRACE(round);
+    const testing::RandomEdit edit(cpu->state(), num_slots, round);
+    cpu->set_state(edit.slots(), edit.fields());
+    const DeviceEdit device_edit(edit, cuda->device());
+    cuda->set_state(device_edit.slots(), device_edit.fields());
+    expect_same_view(cpu.get(), cuda.get(), 0);
+    if (round % 2 == 1) {
+      std::vector<uint8_t> mask(worlds.size());
+      for (size_t w = 0; w < mask.size(); ++w) mask[w] = (w + round) % 3 == 0;
+      const DeviceBuffer<uint8_t> device_mask{Span<const uint8_t>(mask)};
+      cpu->reset(mask, round);
+      cuda->reset(Array(device_mask.data(), {static_cast<int64_t>(mask.size())}, cuda->device()), round);
+    }
+    run_same(cpu.get(), cuda.get(), 20, 10, 20 * round);
+  }
+}
+
+TEST_F(CudaSimulatorTest, RefusesAWrongEditAsTheCpuDoes) {
+  const Maps maps{load_map("procedural:1")};
+  const std::vector<WorldSpec> worlds{{0, 40, 0}};
+  const auto cpu = make_simulator("cpu", {}, maps, worlds);
+  const auto cuda = make_simulator("cuda", {}, maps, worlds);
+  const std::vector<uint8_t> before = cuda->save();
+  const std::vector<int32_t> slots{3, 5, 3};
+  const std::vector<float> x_m{1, NAN, 2};
+  const DeviceBuffer<int32_t> device_slots{Span<const int32_t>(slots)};
+  const DeviceBuffer<float> device_x_m{Span<const float>(x_m)};
+  const std::string expected =
+      test::message_of([&] { cpu->set_state(slots, std::vector<NamedArray>{{"x_m", Array(x_m)}}); });
+  cuda->set_state(Array(device_slots.data(), {3}, cuda->device()),
+                  std::vector<NamedArray>{{"x_m", Array(device_x_m.data(), {3}, cuda->device())}});
+  EXPECT_EQ(test::message_of([&] { cuda->check(); }),
+            "set_state: in an earlier call: " + expected.substr(std::string("set_state: ").size()));
+  EXPECT_EQ(cuda->save(), before);
+  EXPECT_THAT(test::message_of([&] { cuda->set_state(slots, {}); }), HasSubstr("on cuda:0, got i32 [3] on cpu"));
 }
 
 TEST_F(CudaSimulatorTest, TakesCommandsAndControllersInAGraph) {

@@ -6,7 +6,9 @@
 
 #include "pictura/backends/make_simulator.h"
 #include "pictura/map/load_map.h"
+#include "pictura/simulator/agent_state_arrays.h"
 #include "pictura/tests/backend_cuda/simulator/shuffled_executor.h"
+#include "pictura/tests/simulator/random_edit.h"
 #include "pictura/tests/simulator/same_bits.h"
 #include "pictura/tests/simulator/test_maps.h"
 
@@ -107,6 +109,66 @@ TEST(Phases, RefuseACommandOutOfRangeAndChangeNothing) {
   EXPECT_THAT(rejection_text(executor.rejected()), ::testing::HasSubstr("slot 31: expected a kinematic state"));
   commands[31].speed_mps = 0;
   executor.step(commands);
+  EXPECT_NE(executor.save(), before);
+}
+
+/// Everything that users see.
+void expect_same_view(Simulator* cpu, testing::ShuffledExecutor* other) {
+  ASSERT_EQ(cpu->save(), other->save());
+  ASSERT_EQ(testing::first_difference(cpu->observations(), other->results.observation_view()), "");
+  ASSERT_TRUE(testing::same_bits(cpu->views(), Span<const View>(other->results.views)));
+  ASSERT_TRUE(testing::same_bits(cpu->scene().agents, Span<const AgentBox>(other->host.state.boxes)));
+}
+
+TEST(Phases, BeginChosenWorldsAndSetChosenAgents) {
+  SimulatorConfig config;
+  config.episode_steps = 50;
+  config.pedestrian_fraction = config.cyclist_fraction = 0.2f;
+  config.parked_cars = 12;
+  config.wall_observations = true;
+  const std::vector<std::shared_ptr<const RoadMap>> maps{load_map("procedural:1"), testing::stadium(200, 2)};
+  const std::vector<WorldSpec> worlds = draw_worlds(5, 200, 1, 60, 2);
+  const auto cpu = make_simulator("cpu", config, maps, worlds);
+  testing::ShuffledExecutor other(config, maps, worlds, 8);
+  const int num_slots = cpu->num_slots();
+  for (uint32_t round = 0; round < 12; ++round) {
+    SCOPED_TRACE(round);
+    const testing::RandomEdit edit(cpu->state(), num_slots, round);
+    cpu->set_state(edit.slots(), edit.fields());
+    other.set_state(state_edit(edit.slots(), edit.fields(), num_slots, {}));
+    expect_same_view(cpu.get(), &other);
+    std::vector<uint8_t> mask(worlds.size());
+    for (size_t w = 0; w < mask.size(); ++w) mask[w] = (w + round) % 3 == 0;
+    if (round % 2 == 1) {
+      cpu->reset(mask, round);
+      other.reset(mask, round);
+      expect_same_view(cpu.get(), &other);
+    }
+    for (uint32_t step = 0; step < 20; ++step) {
+      const std::vector<int32_t> actions = testing::mixed_actions(num_slots, 20 * round + step);
+      cpu->step(actions);
+      other.step(actions);
+      ASSERT_EQ(cpu->state_hash(), other.hash()) << "step " << step;
+    }
+    expect_same_view(cpu.get(), &other);
+  }
+  EXPECT_EQ(other.wrong_edit(), kNothingWrong);
+}
+
+TEST(Phases, RefuseAWrongEditAndChangeNothing) {
+  testing::ShuffledExecutor executor(testing::cars(), {testing::stadium(200, 2)}, {{0, 30, 0}, {0, 10, 1}}, 4);
+  const std::vector<uint8_t> before = executor.save();
+  const std::vector<int32_t> slots{5, 31, 7, 31};
+  const std::vector<float> x_m{1, NAN, 2, NAN};
+  const std::vector<NamedArray> fields{{"x_m", Array(x_m)}};
+  executor.set_state(state_edit(slots, fields, 40, {}));
+  EXPECT_EQ(executor.save(), before);
+  EXPECT_EQ(edit_fault_text(executor.wrong_edit(), 40), "slot 31: x_m: the value is out of range");
+  const std::vector<int32_t> other_slots{40}, good_slots{5};
+  executor.set_state(state_edit(other_slots, {}, 40, {}));
+  EXPECT_EQ(edit_fault_text(executor.wrong_edit(), 40), "slot 31: x_m: the value is out of range")
+      << "the first one stands";
+  executor.set_state(state_edit(good_slots, std::vector<NamedArray>{{"x_m", Array(x_m.data(), {1}, {})}}, 40, {}));
   EXPECT_NE(executor.save(), before);
 }
 

@@ -117,7 +117,8 @@ class ShuffledExecutor {
         next_try_(host.state.boxes.size()),
         step_sums_(static_cast<size_t>(host.setup.num_slots())),
         began_(host.setup.worlds.size()),
-        prepares_(host.setup.worlds.size()) {
+        prepares_(host.setup.worlds.size()),
+        first_element_(static_cast<size_t>(host.setup.num_slots())) {
     std::iota(cell_items_.begin(), cell_items_.end(), 0);
     for (int w = 0; w < host.setup.num_worlds(); ++w) {
       cell_begin_.insert(cell_begin_.end(), {0, host.world(w).num_boxes});
@@ -138,8 +139,14 @@ class ShuffledExecutor {
       view.lights = next_lights_.data() + first_light;
       next_worlds_.push_back(view);
     }
-    launch_reset(ShuffledLaunch{&random_}, arrays());
+    launch_reset(ShuffledLaunch{&random_}, arrays(), nullptr, config.seed);
   }
+
+  void reset(const std::vector<uint8_t>& mask, uint64_t seed) {
+    launch_reset(ShuffledLaunch{&random_}, arrays(), mask.data(), seed);
+  }
+  void set_state(const StateEdit& edit) { launch_edit(ShuffledLaunch{&random_}, arrays(), edit); }
+  int64_t wrong_edit() const { return wrong_edit_; }
 
   template <typename CommandType>
   void step(const std::vector<CommandType>& commands) {
@@ -164,6 +171,7 @@ class ShuffledExecutor {
     arrays.next_agents = next_agents_.view();
     arrays.num_worlds = host.setup.num_worlds();
     arrays.num_slots = host.setup.num_slots();
+    arrays.seed = host.state.seed.data();
     arrays.episode_step = host.state.episode_step.data();
     arrays.episode_index = host.state.episode_index.data();
     arrays.episode_over = host.state.episode_over.data();
@@ -179,6 +187,9 @@ class ShuffledExecutor {
     arrays.next_spawned = next_spawned_.data();
     arrays.rejected_slot = &rejected_slot_;
     arrays.rejected_command = &rejected_command_;
+    arrays.first_element = first_element_.data();
+    arrays.wrong_element = &wrong_element_;
+    arrays.wrong_edit = &wrong_edit_;
     return arrays;
   }
 
@@ -196,7 +207,9 @@ class ShuffledExecutor {
   std::vector<int32_t> known_tries_, chosen_try_, next_try_;
   std::vector<StepSums> step_sums_;
   std::vector<uint8_t> began_, prepares_;
-  int32_t rejected_slot_ = 0;
+  std::vector<int32_t> first_element_;
+  int32_t rejected_slot_ = 0, wrong_element_ = 0;
+  int64_t wrong_edit_ = kNothingWrong;
   int64_t rejected_command_ = kNothingRejected;
 };
 

@@ -1,0 +1,50 @@
+// The fields of agents by name, type and shape, generated from the list in fields.h.
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "pictura/common/array.h"
+#include "pictura/simulator/state_edit.h"
+
+namespace pictura {
+
+struct AgentFieldInfo {
+  std::string_view name;
+  ElementType type;
+  int per_agent = 1;
+  std::string_view comment;
+};
+
+/// In the order of AgentField.
+constexpr AgentFieldInfo kAgentFields[] = {
+#define X(name, type, per_agent, first, comment) {#name, element_type<type>(), per_agent, comment},
+    PICTURA_AGENT_FIELDS(X)
+#undef X
+};
+
+/// Whether a field follows from others, so that Simulator::set_state does not take it.
+constexpr bool is_derived(AgentField field) {
+  switch (field) {
+    case AgentField::cos_heading:
+    case AgentField::sin_heading:
+    case AgentField::lane:
+    case AgentField::lane_offset_m:
+    case AgentField::lane_angle_rad:
+    case AgentField::speed_limit_mps:
+    case AgentField::refusal: return true;
+    default: return false;
+  }
+}
+
+/// All fields, [slots] or [slots, per agent].
+std::vector<NamedArray> agent_state_arrays(const AgentStateView& state, int num_slots, Device device);
+
+/// The edit that these arrays describe, all of whose values are still to be checked. Throws Error as
+/// Simulator::set_state does.
+StateEdit state_edit(const Array& slots, Span<const NamedArray> fields, int num_slots, Device device);
+
+/// Of a field's values in one slot, in memory of the host: "3", or "[1, 2, 3]".
+std::string field_text(const AgentStateView& agents, int slot, AgentField field);
+
+}  // namespace pictura

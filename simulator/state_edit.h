@@ -1,0 +1,24 @@
+// New values of some fields of some agents: what Simulator::set_state is told. A plain struct that both devices read.
+#pragma once
+
+#include "pictura/simulator/fields.h"
+
+namespace pictura {
+
+enum class AgentField : int32_t {
+#define X(name, type, per_agent, first, comment) name,
+  PICTURA_AGENT_FIELDS(X)
+#undef X
+      none
+};
+
+struct StateEdit {
+  int32_t count = 0;
+  const int32_t* slots = nullptr;  // [count]
+// Each [count, per agent]; null: the field stays.
+#define X(name, type, per_agent, first, comment) const type* name = nullptr;
+  PICTURA_AGENT_FIELDS(X)
+#undef X
+};
+
+}  // namespace pictura
