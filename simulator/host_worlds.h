@@ -37,10 +37,11 @@ struct HostResults {
   void resize(size_t num_slots, const SimulatorConfig& config);
   void reserve(size_t num_slots, const SimulatorConfig& config);
   ObservationView observation_view();
-  StepArrays step_arrays() { return {reward.data(), terminated.data(), truncated.data(), valid.data()}; }
+  StepArrays step_arrays() { return {reward.data(), terminated.data(), truncated.data(), valid.data(), sums.data()}; }
 
   std::vector<float> reward;  // [slots], as the following
   std::vector<uint8_t> terminated, truncated, valid;
+  std::vector<StepSums> sums;
   std::vector<View> views;
 
  private:

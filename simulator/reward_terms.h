@@ -34,4 +34,12 @@ struct RewardTermsOf {
   }
 };
 
+using RewardTerms = RewardTermsOf<float>;
+
+/// What totals sum of an agent's step; as words of 16 bytes, which devices move whole.
+struct alignas(16) StepSums {
+  float distance_m = 0;
+  RewardTerms reward_terms;
+};
+
 }  // namespace pictura

@@ -100,6 +100,7 @@ struct StepResult {
   Span<const uint8_t> truncated;   // [slots] 1: the episode ended for another reason; bootstrap
   Span<const uint8_t> valid;       // [slots] 1: the agent was active when the step began: learn from it
   Span<const uint8_t> refusal;     // [slots] SpawnFailure: why the agent is absent from this episode, 0 where it is not
+  Span<const StepSums> sums;       // [slots] of which the reward is made, and how far the agent drove; 0 if not valid
 };
 
 /// What became of the agents that were requested, over all worlds, in their current episodes.

@@ -198,7 +198,8 @@ class SimulatorCpu final : public Simulator {
       show(w);
     });
     totals_ = worlds_.state.totals();
-    return {results_.reward, results_.terminated, results_.truncated, results_.valid, worlds_.state.agents.refusal};
+    return {results_.reward, results_.terminated,          results_.truncated,
+            results_.valid,  worlds_.state.agents.refusal, results_.sums};
   }
 
   /// Before anything changes, so that a refused step leaves the state as it was.
@@ -287,8 +288,8 @@ class SimulatorCpu final : public Simulator {
     const auto bin_of = [&bins](int agent) { return &bins[static_cast<size_t>(agent % kTotalsBins)]; };
     int active = 0;
     for (int agent = 0; agent < world.num_agents; ++agent) {
-      const StepSums sums = apply_reward_and_halt(world, agent, steps, results);
-      count_agent(world, agent, results, sums, bin_of(agent));
+      apply_reward_and_halt(world, agent, steps, results);
+      count_agent(world, agent, results, bin_of(agent));
       active += is_active(world, agent);
     }
     for (int light = 0; light < static_cast<int>(world.map.stop_lines.size()); ++light) {

@@ -189,6 +189,7 @@ struct DeviceSetup {
 struct DeviceResults {
   DeviceBuffer<float> reward;
   DeviceBuffer<uint8_t> terminated, truncated, valid;
+  DeviceBuffer<StepSums> sums;
   DeviceBuffer<View> views;
 #define X(name, type, rows, features, part, comment) DeviceBuffer<type> name;
   PICTURA_OBSERVATION_ARRAYS(X)
@@ -196,7 +197,12 @@ struct DeviceResults {
 
   DeviceResults() = default;
   DeviceResults(size_t num_slots, const SimulatorConfig& config)
-      : reward(num_slots), terminated(num_slots), truncated(num_slots), valid(num_slots), views(num_slots) {
+      : reward(num_slots),
+        terminated(num_slots),
+        truncated(num_slots),
+        valid(num_slots),
+        sums(num_slots),
+        views(num_slots) {
 #define X(name, type, rows, features, part, comment) \
   if (config.observes(part)) name = DeviceBuffer<type>(num_slots * static_cast<size_t>((rows) * (features)));
     PICTURA_OBSERVATION_ARRAYS(X)
@@ -209,12 +215,15 @@ struct DeviceResults {
       PICTURA_CUDA(cudaMemsetAsync(buffer.data(), 0, buffer.size() * sizeof(*buffer.data()), stream));
     };
     clear_one(reward);
+    clear_one(sums);
     for (const DeviceBuffer<uint8_t>* flags : {&terminated, &truncated, &valid}) clear_one(*flags);
 #define X(name, type, rows, features, part, comment) clear_one(name);
     PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
   }
-  StepArrays step_arrays() const { return {reward.data(), terminated.data(), truncated.data(), valid.data()}; }
+  StepArrays step_arrays() const {
+    return {reward.data(), terminated.data(), truncated.data(), valid.data(), sums.data()};
+  }
   ObservationView observations(size_t num_slots, const SimulatorConfig& config) const {
 #define X(name, type, rows, features, part, comment) \
   Span<type>(name.data(), config.observes(part) ? num_slots * static_cast<size_t>((rows) * (features)) : 0),
@@ -233,7 +242,6 @@ struct DeviceScratch {
   DeviceBuffer<AgentBox> try_boxes;
   DeviceBuffer<uint32_t> free_tries;
   DeviceBuffer<int32_t> known_tries, chosen_try, next_try;
-  DeviceBuffer<StepSums> step_sums;
   DeviceBuffer<uint8_t> began, prepares;
   DeviceBuffer<int32_t> rejected_slot, first_element, wrong_element;
   // The part of the state that an episode begins with, for the next one.
@@ -257,7 +265,6 @@ struct DeviceScratch {
         known_tries(num_boxes),
         chosen_try(num_boxes),
         next_try(num_boxes),
-        step_sums(num_slots),
         began(num_worlds),
         prepares(num_worlds),
         rejected_slot(1),

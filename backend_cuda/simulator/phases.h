@@ -54,7 +54,6 @@ struct SimulatorArrays {
   ObservationView observations;
   uint8_t entity_sets = 0;
   // Between phases and steps.
-  StepSums* step_sums = nullptr;     // [num_slots] of the present step
   uint8_t* began = nullptr;          // [num_worlds] an episode began in the last step: the one after it is to be made
   uint8_t* prepares = nullptr;       // [num_worlds] it is made in the present step
   int32_t* next_spawned = nullptr;   // [num_worlds] in the next episode
@@ -300,7 +299,7 @@ struct ApplyRewardAndHalt {
     const int agent = slot - world.first_slot;
     find_collisions(world, agent, group);
     if (group.rank() > 0) return;
-    arrays.step_sums[slot] = apply_reward_and_halt(world, agent, arrays.episode_step[w] + 1, arrays.results);
+    apply_reward_and_halt(world, agent, arrays.episode_step[w] + 1, arrays.results);
   }
 };
 
@@ -374,7 +373,7 @@ struct FinishStep {
     };
     int active = 0;
     for_each_agent([&](int agent, SimulatorTotals* part) {
-      count_agent(world, agent, arrays.results, arrays.step_sums[world.first_slot + agent], part);
+      count_agent(world, agent, arrays.results, part);
       active += is_active(world, agent);
     });
     const bool ends = episode_ends(world.options, steps, arrays.spawned[w], group.sum(active));
@@ -565,6 +564,7 @@ template <typename Launch>
 void launch_restored(const Launch& launch, const SimulatorArrays& arrays) {
   const auto num_slots = static_cast<size_t>(arrays.num_slots);
   launch.fill(arrays.results.reward, num_slots * sizeof(float), 0);
+  launch.fill(arrays.results.sums, num_slots * sizeof(StepSums), 0);
   for (uint8_t* flags : {arrays.results.terminated, arrays.results.truncated, arrays.results.valid}) {
     launch.fill(flags, num_slots, 0);
   }

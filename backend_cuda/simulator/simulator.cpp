@@ -238,11 +238,9 @@ class SimulatorCuda final : public Simulator {
     throw_rejected();
     cuda::launch_step(arrays(), commands.data(), side_->streams_from(handle_of(stream)));
     PICTURA_CUDA(cudaGetLastError());
-    return {{results_.reward.data(), slot_count()},
-            {results_.terminated.data(), slot_count()},
-            {results_.truncated.data(), slot_count()},
-            {results_.valid.data(), slot_count()},
-            {state_.agents.refusal.data(), slot_count()}};
+    return {{results_.reward.data(), slot_count()},       {results_.terminated.data(), slot_count()},
+            {results_.truncated.data(), slot_count()},    {results_.valid.data(), slot_count()},
+            {state_.agents.refusal.data(), slot_count()}, {results_.sums.data(), slot_count()}};
   }
 
   void throw_rejected() {
@@ -326,7 +324,6 @@ class SimulatorCuda final : public Simulator {
     arrays.views = results_.views.data();
     arrays.observations = observations();
     arrays.entity_sets = config().vector_observations;
-    arrays.step_sums = scratch_.step_sums.data();
     arrays.began = scratch_.began.data();
     arrays.prepares = scratch_.prepares.data();
     arrays.next_spawned = scratch_.next_spawned.data();

@@ -12,11 +12,13 @@ struct StepArrays {
   uint8_t* terminated = nullptr;
   uint8_t* truncated = nullptr;
   uint8_t* valid = nullptr;
+  StepSums* sums = nullptr;
 };
 
 PICTURA_HD inline void clear_result(const StepArrays& results, int slot) {
   results.reward[slot] = 0.0f;
   results.terminated[slot] = results.truncated[slot] = results.valid[slot] = 0;
+  results.sums[slot] = {};
 }
 
 /// Commands to agents that are not active are ignored.
@@ -62,30 +64,25 @@ PICTURA_HD inline void count_events(int events, SimulatorTotals* totals_inout) {
   totals_inout->wall_contacts += (events & kEventWall) != 0;
 }
 
-/// What totals sum of an agent's step; as words of 16 bytes, which devices move whole.
-struct alignas(16) StepSums {
-  float distance_m = 0;
-  RewardTerms reward_terms;
-};
-
 /// Phase 3 of one agent in the episode's step of this number, from 1: writes its reward and its end.
-PICTURA_HD inline StepSums apply_reward_and_halt(const WorldView& world, int agent, int step,
-                                                 const StepArrays& results) {
+PICTURA_HD inline void apply_reward_and_halt(const WorldView& world, int agent, int step, const StepArrays& results) {
   const int slot = world.first_slot + agent;
   const float speed_mps = world.agents.speed_mps[slot];
   int32_t& first_motion_step = world.agents.first_motion_step[slot];
   if (results.valid[slot] && first_motion_step == 0 && fabsf(speed_mps) > kRest_mps) first_motion_step = step;
-  const StepSums sums{driven_m(speed_mps, world.options.dt_s), apply_reward_and_halt(world, agent)};
+  const float distance_m = results.valid[slot] ? driven_m(speed_mps, world.options.dt_s) : 0.0f;
+  const StepSums sums{distance_m, apply_reward_and_halt(world, agent)};
+  results.sums[slot] = sums;
   results.reward[slot] = sums.reward_terms.total();
   results.terminated[slot] = results.valid[slot] && !is_active(world, agent);
-  return sums;
 }
 
 /// Counts the step of an agent after phase 3.
-PICTURA_HD inline void count_agent(const WorldView& world, int agent, const StepArrays& results, const StepSums& sums,
+PICTURA_HD inline void count_agent(const WorldView& world, int agent, const StepArrays& results,
                                    SimulatorTotals* totals_inout) {
   const int slot = world.first_slot + agent;
   if (!results.valid[slot]) return;
+  const StepSums sums = results.sums[slot];
   ++totals_inout->agent_steps;
   totals_inout->reward += static_cast<double>(results.reward[slot]);
 #define X(name) totals_inout->reward_terms.name += static_cast<double>(sums.reward_terms.name);

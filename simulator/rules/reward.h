@@ -18,8 +18,6 @@ struct StepFacts {
   bool collision = false, off_road = false, red_light = false;  // off_road includes contact with a wall
 };
 
-using RewardTerms = RewardTermsOf<float>;
-
 /// coefficients: the agent's conditioning, in the order of Conditioning.
 PICTURA_HD inline RewardTerms reward_terms(const StepFacts& facts, const float* coefficients, float dt_s) {
   const Motion& m = facts.motion;

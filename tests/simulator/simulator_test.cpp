@@ -606,8 +606,20 @@ TEST(Simulator, TotalsHaveEachRewardTermOfLiveAgents) {
   fix(Conditioning::off_road, 2);
   fix(Conditioning::stop_line, 0.5f);
   const auto simulator = make(config, testing::stadium(200, 2), {{0, 12, 0}, {0, 7, 1}});
-  for (int step = 0; step < 400; ++step) simulator->step(std::vector<int32_t>(19, kFullThrottle));
+  RewardTermsOf<double> of_steps;
+  for (int step = 0; step < 400; ++step) {
+    const StepResult result = simulator->step(std::vector<int32_t>(19, kFullThrottle));
+    for (size_t slot = 0; slot < 19; ++slot) {
+      const RewardTerms& its = result.sums[slot].reward_terms;
+      ASSERT_EQ(its.total(), result.reward[slot]);
+#define X(name) of_steps.name += static_cast<double>(its.name);
+      PICTURA_REWARD_TERMS(X)
+#undef X
+    }
+  }
   const SimulatorTotals& totals = simulator->totals();
+  EXPECT_NEAR(of_steps.lane_align, totals.reward_terms.lane_align, 1e-9);
+  EXPECT_EQ(of_steps.goal, totals.reward_terms.goal);
   const RewardTermsOf<double>& terms = totals.reward_terms;
   ASSERT_GT(totals.waypoints_reached, 10);
   ASSERT_GT(totals.off_road, 10);

@@ -91,13 +91,15 @@ class StepLog {
         reward_(static_cast<size_t>(steps) * num_slots_),
         terminated_(reward_.size()),
         truncated_(reward_.size()),
-        valid_(reward_.size()) {}
+        valid_(reward_.size()),
+        sums_(reward_.size()) {}
 
   void append(const StepResult& result) {
     append(result.reward, &reward_);
     append(result.terminated, &terminated_);
     append(result.truncated, &truncated_);
     append(result.valid, &valid_);
+    append(result.sums, &sums_);
     ++num_steps_;
   }
   void copy_to_host() {
@@ -105,13 +107,14 @@ class StepLog {
     host_terminated_ = on_host(terminated_.span());
     host_truncated_ = on_host(truncated_.span());
     host_valid_ = on_host(valid_.span());
+    host_sums_ = on_host(sums_.span());
   }
   /// On the host, but for refusals, which are state.
   StepResult of_step(int step) const {
     const auto part = [&](const auto& log) {
       return Span(log.data() + static_cast<size_t>(step) * num_slots_, num_slots_);
     };
-    return {part(host_reward_), part(host_terminated_), part(host_truncated_), part(host_valid_), {}};
+    return {part(host_reward_), part(host_terminated_), part(host_truncated_), part(host_valid_), {}, part(host_sums_)};
   }
 
  private:
@@ -124,8 +127,10 @@ class StepLog {
   size_t num_slots_, num_steps_ = 0;
   DeviceBuffer<float> reward_;
   DeviceBuffer<uint8_t> terminated_, truncated_, valid_;
+  DeviceBuffer<StepSums> sums_;
   std::vector<float> host_reward_;
   std::vector<uint8_t> host_terminated_, host_truncated_, host_valid_;
+  std::vector<StepSums> host_sums_;
 };
 
 /// Steps both with the same actions and compares what every step returns. The device runs ahead: with a wait for each
@@ -148,7 +153,7 @@ void step_same(Simulator* cpu, Simulator* cuda, int steps, uint32_t first_step) 
     const StepResult b = log.of_step(i);
     ASSERT_TRUE(testing::same_bits(a.reward, b.reward)) << "step " << first_step + static_cast<uint32_t>(i);
     ASSERT_TRUE(testing::same_bits(a.terminated, b.terminated) && testing::same_bits(a.truncated, b.truncated) &&
-                testing::same_bits(a.valid, b.valid))
+                testing::same_bits(a.valid, b.valid) && testing::same_bits(a.sums, b.sums))
         << "step " << first_step + static_cast<uint32_t>(i);
   }
 }

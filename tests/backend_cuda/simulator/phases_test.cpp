@@ -38,6 +38,7 @@ void expect_same(const SimulatorConfig& config, const std::vector<std::shared_pt
     ASSERT_TRUE(testing::same_bits(result.terminated, Span<const uint8_t>(other.results.terminated)));
     ASSERT_TRUE(testing::same_bits(result.truncated, Span<const uint8_t>(other.results.truncated)));
     ASSERT_TRUE(testing::same_bits(result.valid, Span<const uint8_t>(other.results.valid)));
+    ASSERT_TRUE(testing::same_bits(result.sums, Span<const StepSums>(other.results.sums)));
   }
   EXPECT_EQ(cpu->save(), other.save());
   EXPECT_EQ(other.rejected(), kNothingRejected);

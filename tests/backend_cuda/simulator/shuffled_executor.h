@@ -115,7 +115,6 @@ class ShuffledExecutor {
         known_tries_(host.state.boxes.size()),
         chosen_try_(host.state.boxes.size()),
         next_try_(host.state.boxes.size()),
-        step_sums_(static_cast<size_t>(host.setup.num_slots())),
         began_(host.setup.worlds.size()),
         prepares_(host.setup.worlds.size()),
         first_element_(static_cast<size_t>(host.setup.num_slots())) {
@@ -181,7 +180,6 @@ class ShuffledExecutor {
     arrays.views = results.views.data();
     arrays.observations = results.observation_view();
     arrays.entity_sets = host.setup.config.vector_observations;
-    arrays.step_sums = step_sums_.data();
     arrays.began = began_.data();
     arrays.prepares = prepares_.data();
     arrays.next_spawned = next_spawned_.data();
@@ -205,7 +203,6 @@ class ShuffledExecutor {
   std::vector<AgentBox> try_boxes_;
   std::vector<uint32_t> free_tries_;
   std::vector<int32_t> known_tries_, chosen_try_, next_try_;
-  std::vector<StepSums> step_sums_;
   std::vector<uint8_t> began_, prepares_;
   std::vector<int32_t> first_element_;
   int32_t rejected_slot_ = 0, wrong_element_ = 0;
