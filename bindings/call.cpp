@@ -1,0 +1,27 @@
+#include "pictura/bindings/call.h"
+
+#include <unistd.h>
+
+namespace pictura::python {
+
+namespace {
+// The process that first needed threads, or CUDA; 0: none yet. A child inherits the numbers of its parent.
+std::atomic<pid_t> process_of_threads{0}, process_of_cuda{0};
+
+bool is_forked(std::atomic<pid_t>* process) {
+  pid_t nobody = 0;
+  return !process->compare_exchange_strong(nobody, getpid()) && nobody != getpid();
+}
+}  // namespace
+
+void check_process(std::string_view what, int num_threads, Device device) {
+  PICTURA_CHECK(
+      device.is_host() || !is_forked(&process_of_cuda),
+      "{}: this process was forked after CUDA was used, which does not survive that: start processes by spawn", what);
+  PICTURA_CHECK(num_threads == 1 || !is_forked(&process_of_threads),
+                "{}: this process was forked after pictura had used several threads, which do not survive that: pass "
+                "num_threads=1, or start processes by spawn",
+                what);
+}
+
+}  // namespace pictura::python

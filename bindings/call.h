@@ -1,0 +1,74 @@
+// How Python calls the library: without the GIL, one thread at a time for each object, and never in a process that was
+// forked from one whose threads or CUDA it would need.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <future>
+#include <memory>
+#include <string_view>
+#include <thread>
+#include <utility>
+
+#include <pybind11/pybind11.h>
+
+#include "pictura/common/device.h"
+#include "pictura/common/error.h"
+
+namespace pictura::python {
+
+namespace py = pybind11;
+
+/// Throws Error in a child of fork() where the parent had begun threads or used CUDA, and this call needs them: both
+/// are gone in the child, and waiting for them would never end.
+void check_process(std::string_view what, int num_threads, Device device);
+
+/// Of one object of the library. An object serves one thread at a time.
+class Calls {
+ public:
+  /// num_threads as the library takes it; 0: all.
+  Calls(int num_threads, Device device) : num_threads_(num_threads), device_(device) {}
+
+  /// Runs `work` without the GIL. Throws Error where another thread is in a call of the same object.
+  template <typename Work>
+  auto run(std::string_view what, Work&& work) {
+    check_process(what, num_threads_, device_);
+    PICTURA_CHECK(!is_busy_.exchange(true),
+                  "{}: another thread is in a call of this object, which serves one at a time", what);
+    const Free free{&is_busy_};
+    const py::gil_scoped_release no_gil;
+    return std::forward<Work>(work)();
+  }
+
+ private:
+  struct Free {
+    std::atomic<bool>* flag;
+    ~Free() { *flag = false; }
+  };
+  int num_threads_;
+  Device device_;
+  std::atomic<bool> is_busy_{false};
+};
+
+/// Runs long work in a thread of its own and returns its result; the caller's thread meanwhile answers ^C, and then
+/// raises KeyboardInterrupt while the work, whose result nobody takes, ends in the background. The work must own all
+/// that it reads.
+template <typename Work>
+auto run_interruptibly(std::string_view what, int num_threads, Device device, Work work) {
+  using Result = decltype(work());
+  check_process(what, num_threads, device);
+  auto task = std::make_shared<std::packaged_task<Result()>>(std::move(work));
+  std::future<Result> result = task->get_future();
+  std::thread([task = std::move(task)] { (*task)(); }).detach();
+  for (;;) {
+    {
+      const py::gil_scoped_release no_gil;
+      if (result.wait_for(std::chrono::milliseconds(20)) == std::future_status::ready) break;
+    }
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  }
+  return result.get();
+}
+
+}  // namespace pictura::python

@@ -1,0 +1,244 @@
+// Maps in Python.
+#include <algorithm>
+
+#include <pybind11/stl.h>
+
+#include "pictura/bindings/call.h"
+#include "pictura/bindings/objects.h"
+#include "pictura/drawing/world.h"
+#include "pictura/map/load_map.h"
+
+namespace pictura::python {
+
+namespace {
+
+template <typename T>
+py::array_t<T> table(size_t rows, size_t columns, const std::function<void(size_t, T*)>& write) {
+  py::array_t<T> array(columns == 0 ? std::vector<size_t>{rows} : std::vector<size_t>{rows, columns});
+  T* const data = array.mutable_data();
+  const size_t step = std::max<size_t>(columns, 1);
+  for (size_t i = 0; i < rows; ++i) write(i, data + i * step);
+  return array;
+}
+
+void put(Vec3 v, float* out) {
+  out[0] = v.x;
+  out[1] = v.y;
+  out[2] = v.z;
+}
+
+py::array_t<int32_t> ranges(const auto& elements, IndexRange std::decay_t<decltype(elements[0])>::* range) {
+  return table<int32_t>(elements.size(), 2, [&](size_t i, int32_t* out) {
+    out[0] = (elements[i].*range).begin;
+    out[1] = (elements[i].*range).end;
+  });
+}
+
+py::dict facts_of(const MapFacts& facts) {
+  py::dict d;
+  d["roads"] = facts.roads;
+  d["junction_roads"] = facts.junction_roads;
+  d["junctions"] = facts.junctions;
+  d["signal_junctions"] = facts.signal_junctions;
+  d["lanes"] = facts.lanes;
+  d["driving_lanes"] = facts.driving_lanes;
+  d["driving_lane_km"] = facts.driving_lane_km;
+  d["driving_lane_km_in_junctions"] = facts.driving_lane_km_in_junctions;
+  d["traffic_lights"] = facts.traffic_lights;
+  d["stop_lines"] = facts.stop_lines;
+  d["crosswalks"] = facts.crosswalks;
+  d["parking_spaces"] = facts.parking_spaces;
+  d["painted_stop_lines"] = facts.painted_stop_lines;
+  d["signs"] = facts.signs;
+  d["z_min_m"] = facts.z_min_m;
+  d["z_max_m"] = facts.z_max_m;
+  return d;
+}
+
+py::dict arrays_of(const RoadMap& map) {
+  py::dict d;
+  d["lane_points"] = table<float>(map.lane_points.size(), 6, [&](size_t i, float* out) {
+    const LanePoint& point = map.lane_points[i];
+    put(point.position_m, out);
+    out[3] = point.heading_rad;
+    out[4] = point.width_m;
+    out[5] = point.s_m;
+  });
+  d["lane_point_range"] = ranges(map.lanes, &Lane::points);
+  d["lane_type"] = table<uint8_t>(map.lanes.size(), 0,
+                                  [&](size_t i, uint8_t* out) { *out = static_cast<uint8_t>(map.lanes[i].type); });
+  d["lane_speed_limit_mps"] =
+      table<float>(map.lanes.size(), 0, [&](size_t i, float* out) { *out = map.lanes[i].speed_limit_mps; });
+  d["lane_length_m"] = table<float>(map.lanes.size(), 0, [&](size_t i, float* out) { *out = map.lanes[i].length_m; });
+  d["lane_neighbors"] = table<int32_t>(map.lanes.size(), 2, [&](size_t i, int32_t* out) {
+    out[0] = map.lanes[i].left_neighbor;
+    out[1] = map.lanes[i].right_neighbor;
+  });
+  d["lane_successor_range"] = ranges(map.lanes, &Lane::successors);
+  d["lane_predecessor_range"] = ranges(map.lanes, &Lane::predecessors);
+  d["lane_links"] = table<int32_t>(map.lane_links.size(), 0, [&](size_t i, int32_t* out) { *out = map.lane_links[i]; });
+  d["marking_points"] =
+      table<float>(map.marking_points.size(), 3, [&](size_t i, float* out) { put(map.marking_points[i], out); });
+  d["marking_point_range"] = ranges(map.markings, &Marking::points);
+  d["road_edges"] = table<float>(map.road_edges.size(), 6, [&](size_t i, float* out) {
+    put(map.road_edges[i].a_m, out);
+    put(map.road_edges[i].b_m, out + 3);
+  });
+  d["crosswalk_points"] =
+      table<float>(map.outline_points.size(), 3, [&](size_t i, float* out) { put(map.outline_points[i], out); });
+  d["crosswalk_point_range"] = ranges(map.crosswalks, &Crosswalk::outline);
+  d["stop_lines"] = table<float>(map.lights.size(), 6, [&](size_t i, float* out) {
+    put(map.lights[i].stop_a_m, out);
+    put(map.lights[i].stop_b_m, out + 3);
+  });
+  d["light_heads"] = table<float>(map.lights.size(), 3, [&](size_t i, float* out) { put(map.lights[i].head_m, out); });
+  d["building_lines"] = table<float>(map.building_lines.size(), 6, [&](size_t i, float* out) {
+    put(map.building_lines[i].a_m, out);
+    put(map.building_lines[i].b_m, out + 3);
+  });
+  return d;
+}
+
+std::shared_ptr<Map> load(const std::string& name, bool lenient, float chord_error_m) {
+  OpenDriveOptions options;
+  options.lenient = lenient;
+  options.chord_error_m = chord_error_m;
+  return run_interruptibly("load_map", 1, {}, [name, options] {
+    LoadReport report;
+    auto road = load_map(name, options, &report);
+    return std::make_shared<Map>(std::move(road), std::move(report.warnings));
+  });
+}
+
+std::shared_ptr<Map> from_text(const std::string& text, const std::string& source, bool lenient) {
+  return run_interruptibly("Map.from_text", 1, {}, [text, source, lenient] {
+    OpenDriveOptions options;
+    options.lenient = lenient;
+    std::vector<std::string> warnings;
+    auto road = std::make_shared<RoadMap>(parse_opendrive(text, source, options, &warnings));
+    return std::make_shared<Map>(std::move(road), std::move(warnings));
+  });
+}
+
+py::array_t<uint8_t> draw(const Map& map, int width_px, int height_px) {
+  RgbImage image;
+  {
+    const py::gil_scoped_release no_gil;
+    WorldPainter painter(*map.road(), width_px, height_px);
+    const std::vector<LightState> lights(map.road()->lights.size(), LightState::off);
+    WorldFrame frame;
+    frame.lights = lights;
+    image = painter.draw(frame, painter.whole_map());
+  }
+  py::array_t<uint8_t> pixels({image.height_px, image.width_px, 3});
+  std::copy(image.rgb.begin(), image.rgb.end(), pixels.mutable_data());
+  return pixels;
+}
+
+}  // namespace
+
+std::shared_ptr<const CompiledMap> Map::compiled(const MapOptions& options) {
+  for (const auto& made : compiled_) {
+    if (made->options == options) return made;
+  }
+  compiled_.push_back(run_interruptibly("map", 1, {}, [road = road_, options] { return compile_map(road, options); }));
+  return compiled_.back();
+}
+
+void bind_maps(py::module_& module) {
+  py::class_<Geometry>(module, "Geometry", "What renderers draw of a map: strips on the road, walls, heads of lights.")
+      .def(py::init([](const std::vector<std::tuple<py::array_t<float, py::array::c_style | py::array::forcecast>,
+                                                    float, std::array<float, 3>>>& lines,
+                       const py::array_t<float, py::array::c_style | py::array::forcecast>& walls) {
+             auto geometry = std::make_shared<StaticGeometry>();
+             for (const auto& [points, width_m, color] : lines) {
+               PICTURA_CHECK(points.ndim() == 2 && points.shape(1) == 3 && points.shape(0) >= 2,
+                             "Geometry: lines: expected points of shape [n, 3], n at least 2");
+               std::vector<Vec3> line;
+               for (py::ssize_t i = 0; i < points.shape(0); ++i) {
+                 line.push_back({points.at(i, 0), points.at(i, 1), points.at(i, 2)});
+               }
+               append_strips(line, width_m, {color[0], color[1], color[2]}, StripKind::lane_mark, &geometry->strips);
+             }
+             PICTURA_CHECK(walls.size() == 0 || (walls.ndim() == 2 && walls.shape(1) == 7),
+                           "Geometry: walls: expected [n, 7]: both ends of the foot and the height");
+             for (py::ssize_t i = 0; walls.size() > 0 && i < walls.shape(0); ++i) {
+               WallFace wall;
+               wall.a_m = {walls.at(i, 0), walls.at(i, 1), walls.at(i, 2)};
+               wall.b_m = {walls.at(i, 3), walls.at(i, 4), walls.at(i, 5)};
+               wall.height_m = walls.at(i, 6);
+               geometry->walls.push_back(wall);
+             }
+             geometry->build_grids();
+             return Geometry{geometry};
+           }),
+           py::arg("lines") = py::list(), py::arg("walls") = py::array_t<float>(std::vector<size_t>{0, 7}),
+           R"(A geometry of one's own.
+
+lines: of (points [n, 3] in metres, width in metres, colour of three numbers in [0, 1]).
+walls: float [n, 7]: both ends of the foot, in metres, and the height.
+Raises pictura.Error for other shapes; a renderer refuses what is not finite.)")
+      .def_property_readonly(
+          "num_strips", [](const Geometry& self) { return self.geometry->strips.size(); },
+          py::doc("Straight pieces of lines."))
+      .def_property_readonly(
+          "num_walls", [](const Geometry& self) { return self.geometry->walls.size(); }, py::doc("Faces of walls."))
+      .def_property_readonly(
+          "num_lights", [](const Geometry& self) { return self.geometry->num_signals; },
+          py::doc("Light states that a world on it has."));
+
+  py::class_<Map, std::shared_ptr<Map>>(module, "Map", R"(
+A road network: lanes, markings, edges, lights. Immutable; simulators and renderers share it.
+
+Positions are metres in the map's frame, z up; `origin_m` is its place in the file's coordinates.)")
+      .def_static("load", load, py::arg("name"), py::kw_only(), py::arg("lenient") = false,
+                  py::arg("chord_error_m") = OpenDriveOptions{}.chord_error_m,
+                  R"(Loads a map by name: an OpenDRIVE file (.xodr), a town of the map folder, or 'procedural:SEED'.
+
+lenient: leave faulty parts out, and say so in `warnings`. chord_error_m: how far sampled curves may lie from true ones.
+Raises pictura.Error naming file, line and element; pictura.UsageError where there is no such map.)")
+      .def_static("from_text", from_text, py::arg("text"), py::arg("source") = "text", py::kw_only(),
+                  py::arg("lenient") = false,
+                  "Parses the text of an OpenDRIVE file; `source` names it in messages. Raises as load() does.")
+      .def_property_readonly(
+          "name", [](const Map& self) { return self.road()->name; },
+          py::doc("'Town01', 'procedural:7', or the file's stem."))
+      .def_property_readonly("warnings", &Map::warnings, py::doc("What a lenient import left out."))
+      .def_property_readonly(
+          "origin_m", [](const Map& self) { return self.road()->origin_m; },
+          py::doc("File coordinates of the map's origin, three floats in metres."))
+      .def_property_readonly(
+          "geo_reference", [](const Map& self) { return self.road()->geo_reference; },
+          py::doc("Of the file's coordinates, a PROJ string; may be empty."))
+      .def_property_readonly(
+          "facts", [](const Map& self) { return facts_of(self.road()->facts); },
+          py::doc("Counts and lengths by name, as `pictura map` prints them."))
+      .def(
+          "arrays", [](const Map& self) { return arrays_of(*self.road()); },
+          R"(Copies of the network's geometry as NumPy arrays by name.
+
+lane_points float32 [points, 6]: x, y, z, heading in radians, width, arc length; lane_point_range int32 [lanes, 2] says
+whose they are. Ranges are half-open. lane_type uint8 [lanes] counts pictura.LANE_TYPES; lane_links int32 lists successors and
+predecessors; road_edges, stop_lines and building_lines float32 [n, 6] are two ends each. Lengths are metres.)")
+      .def(
+          "geometry",
+          [](Map& self, bool walls, uint64_t wall_seed) {
+            const auto compiled = self.compiled({walls, wall_seed, false});
+            return Geometry{std::shared_ptr<const StaticGeometry>(compiled, &compiled->geometry)};
+          },
+          py::arg("walls") = true, py::arg("wall_seed") = 0,
+          "What renderers draw of it. walls: along the building lines, of heights drawn from wall_seed.")
+      .def("draw", draw, py::arg("width_px") = 1024, py::arg("height_px") = 1024,
+           "A picture from above, uint8 [height, width, 3], north up. Sizes of 16 to 8192 px.")
+      .def("__repr__", [](const Map& self) {
+        return fmt::format("<pictura.Map {}: {} lanes, {:.1f} km>", self.road()->name, self.road()->lanes.size(),
+                           self.road()->facts.driving_lane_km);
+      });
+  module.def("map_folder", map_folder, "Where towns are looked up: $PICTURA_DATA, or the user's data folder.");
+  module.def("known_towns", known_towns, "Names of the towns in the map folder, sorted.");
+  py::list types;
+  for (int i = 0; i <= static_cast<int>(LaneType::other); ++i) types.append(to_string(static_cast<LaneType>(i)));
+  module.attr("LANE_TYPES") = py::tuple(types);
+}
+
+}  // namespace pictura::python

@@ -1,0 +1,40 @@
+// The extension module pictura._pictura: the library without torch.
+#include <pybind11/pybind11.h>
+
+#include "pictura/bindings/objects.h"
+#include "pictura/common/error.h"
+#include "pictura/version.h"
+
+PYBIND11_MODULE(_pictura, module) {
+  namespace py = pybind11;
+  module.doc() =
+      "The pictura library: maps, scenes, renderers and simulators. Import `pictura`, which has these names.";
+  // Never destroyed: statics end after the interpreter.
+  static const py::handle error = py::exception<pictura::Error>(module, "Error", PyExc_RuntimeError).release();
+  static const py::handle usage_error =
+      py::exception<pictura::UsageError>(module, "UsageError", py::make_tuple(error, py::handle(PyExc_ValueError)))
+          .release();
+  error.attr("__doc__") = "The work failed; the message names what was expected and what came.";
+  usage_error.attr("__doc__") = "What was asked for cannot be asked for.";
+  py::register_exception_translator([](std::exception_ptr thrown) {
+    try {
+      if (thrown) std::rethrow_exception(thrown);
+    } catch (const pictura::Interrupted&) {
+      PyErr_SetNone(PyExc_KeyboardInterrupt);
+    } catch (const pictura::UsageError& e) {
+      py::set_error(usage_error, e.what());
+    } catch (const pictura::Error& e) {
+      py::set_error(error, e.what());
+    }
+  });
+  module.attr("__version__") = PICTURA_VERSION;
+#ifdef PICTURA_HAS_CUDA
+  module.attr("HAS_CUDA") = true;
+#else
+  module.attr("HAS_CUDA") = false;
+#endif
+  pictura::python::bind_arrays(module);
+  pictura::python::bind_maps(module);
+  pictura::python::bind_rendering(module);
+  pictura::python::bind_simulator(module);
+}

@@ -1,0 +1,55 @@
+// What the parts of the bindings exchange: maps, geometries, scenes, renderers' images and simulators as Python holds
+// them.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pictura/bindings/arrays.h"
+#include "pictura/common/renderer.h"
+#include "pictura/simulator/compiled_map.h"
+
+namespace pictura::python {
+
+/// A road map, and what has been compiled of it.
+class Map {
+ public:
+  Map(std::shared_ptr<const RoadMap> road, std::vector<std::string> warnings)
+      : road_(std::move(road)), warnings_(std::move(warnings)) {}
+  const std::shared_ptr<const RoadMap>& road() const { return road_; }
+  const std::vector<std::string>& warnings() const { return warnings_; }
+  /// Compiles at the first call with these options. The caller holds the GIL.
+  std::shared_ptr<const CompiledMap> compiled(const MapOptions& options);
+
+ private:
+  std::shared_ptr<const RoadMap> road_;
+  std::vector<std::string> warnings_;
+  std::vector<std::shared_ptr<const CompiledMap>> compiled_;
+};
+
+/// What a renderer draws of a map.
+struct Geometry {
+  std::shared_ptr<const StaticGeometry> geometry;
+};
+
+/// What moves: arrays of a caller, or what a simulator shows, as it is at each call.
+struct Scene {
+  std::shared_ptr<const void> owner;
+  std::function<SceneBatch()> batch;
+  Stream stream;
+};
+
+/// "cpu", "cuda" or "cuda:1". Throws UsageError for others.
+Device device_of(const std::string& name);
+
+/// Of a stream's handle as Python has it, an int; None: CUDA's legacy default stream.
+Stream stream_of(const py::object& handle);
+
+void bind_maps(py::module_& module);
+void bind_rendering(py::module_& module);
+void bind_simulator(py::module_& module);
+
+}  // namespace pictura::python

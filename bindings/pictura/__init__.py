@@ -1,0 +1,42 @@
+"""Driving policies that learn by self-play from what a car's cameras see: maps, simulators and renderers for Python.
+
+The library's objects are here; environments are in pictura.envs, policies as torch modules in pictura.torch.
+"""
+
+from pictura._pictura import (  # noqa: F401
+    AGENT_FIELDS,
+    BOX_DTYPE,
+    COMMAND_DTYPE,
+    CONDITIONING_NAMES,
+    EVENTS,
+    HAS_CUDA,
+    IDLE_ACTION,
+    LANE_TYPES,
+    NUM_ACTIONS,
+    OBSERVATION_ARRAYS,
+    REWARD_TERMS,
+    VIEW_DTYPE,
+    Array,
+    Camera,
+    Controller,
+    Error,
+    Geometry,
+    Images,
+    Map,
+    Renderer,
+    Rig,
+    Scene,
+    SceneFile,
+    Simulator,
+    Snapshot,
+    StepResult,
+    UsageError,
+    __version__,
+    draw_worlds,
+    known_towns,
+    make_views,
+    map_folder,
+    renderer_names,
+    simulator_names,
+)
+

@@ -1,0 +1,561 @@
+// Cameras, rigs, scenes, images and renderers in Python.
+#include <cmath>
+#include <optional>
+
+#include <pybind11/stl.h>
+
+#include "pictura/backends/make_renderer.h"
+#include "pictura/bindings/call.h"
+#include "pictura/bindings/objects.h"
+#include "pictura/common/scene_file.h"
+#ifdef PICTURA_HAS_CUDA
+#include "pictura/common/cuda/device_buffer.h"
+#include "pictura/common/cuda/device_guard.h"
+#endif
+
+namespace pictura::python {
+
+namespace {
+
+using FloatTable = py::array_t<float, py::array::c_style | py::array::forcecast>;
+using IntTable = py::array_t<int32_t, py::array::c_style | py::array::forcecast>;
+
+void check_shape(const py::array& array, std::string_view what, py::ssize_t rows, py::ssize_t columns) {
+  const bool fits = columns == 0 ? array.ndim() == 1 && array.shape(0) == rows
+                                 : array.ndim() == 2 && array.shape(0) == rows && array.shape(1) == columns;
+  PICTURA_CHECK(fits, "{}: expected [{}{}], got {} dimensions, {} elements", what, rows,
+                columns == 0 ? "" : fmt::format(", {}", columns), array.ndim(), array.size());
+}
+
+std::shared_ptr<Scene> scene_of(std::shared_ptr<SceneOwner> owner) {
+  auto scene = std::make_shared<Scene>();
+  scene->batch = [raw = owner.get()] { return raw->batch(); };
+  scene->owner = std::move(owner);
+  return scene;
+}
+
+std::shared_ptr<Scene> make_scene(const FloatTable& center_m, const FloatTable& heading_rad, const FloatTable& size_m,
+                                  const IntTable& agent_class, const std::optional<IntTable>& world_begin,
+                                  const std::optional<IntTable>& geometry, const std::optional<IntTable>& light_states,
+                                  const std::optional<IntTable>& light_begin) {
+  const py::ssize_t n = heading_rad.size();
+  check_shape(center_m, "Scene: center_m", n, 3);
+  check_shape(heading_rad, "Scene: heading_rad", n, 0);
+  check_shape(size_m, "Scene: size_m", n, 3);
+  check_shape(agent_class, "Scene: agent_class", n, 0);
+  auto owner = std::make_shared<SceneOwner>();
+  for (py::ssize_t i = 0; i < n; ++i) {
+    const int32_t its_class = agent_class.at(i);
+    PICTURA_CHECK(its_class >= 0 && its_class < kNumAgentClasses,
+                  "Scene: agent_class: box {}: expected 0 to {}, got {}", i, kNumAgentClasses - 1, its_class);
+    owner->agents.push_back(make_box(static_cast<AgentClass>(its_class),
+                                     {center_m.at(i, 0), center_m.at(i, 1), center_m.at(i, 2)}, heading_rad.at(i),
+                                     {size_m.at(i, 0), size_m.at(i, 1), size_m.at(i, 2)}));
+  }
+  const auto copy = [](const std::optional<IntTable>& from, std::vector<int32_t> otherwise) {
+    return from ? std::vector<int32_t>(from->data(), from->data() + from->size()) : std::move(otherwise);
+  };
+  owner->world_begin = copy(world_begin, {0, static_cast<int32_t>(n)});
+  const size_t num_worlds = owner->world_begin.empty() ? 0 : owner->world_begin.size() - 1;
+  owner->geometry = copy(geometry, std::vector<int32_t>(num_worlds, 0));
+  for (const int32_t state : copy(light_states, {})) {
+    PICTURA_CHECK(state >= 0 && state <= 3, "Scene: light_states: expected 0 (off) to 3 (green), got {}", state);
+    owner->light_states.push_back(static_cast<LightState>(state));
+  }
+  owner->light_begin = copy(light_begin, std::vector<int32_t>(num_worlds + 1, 0));
+  return scene_of(std::move(owner));
+}
+
+py::array view_array(const std::vector<View>& views) {
+  const py::dtype type = py::module_::import("pictura._pictura").attr("VIEW_DTYPE");
+  py::array array(type, static_cast<py::ssize_t>(views.size()));
+  if (!views.empty()) std::memcpy(array.mutable_data(), views.data(), views.size() * sizeof(View));
+  return array;
+}
+
+py::array make_views(const FloatTable& origin_m, const FloatTable& heading_rad, const std::optional<IntTable>& world,
+                     const std::optional<IntTable>& ego_agent, const std::optional<FloatTable>& body_length_m) {
+  const py::ssize_t n = heading_rad.size();
+  check_shape(origin_m, "make_views: origin_m", n, 3);
+  std::vector<View> views;
+  for (py::ssize_t i = 0; i < n; ++i) {
+    View view = make_view({origin_m.at(i, 0), origin_m.at(i, 1), origin_m.at(i, 2)}, heading_rad.at(i));
+    if (world) check_shape(*world, "make_views: world", n, 0), view.world = world->at(i);
+    if (ego_agent) check_shape(*ego_agent, "make_views: ego_agent", n, 0), view.ego_agent = ego_agent->at(i);
+    if (body_length_m) {
+      check_shape(*body_length_m, "make_views: body_length_m", n, 0);
+      view.body_length_m = body_length_m->at(i);
+    }
+    views.push_back(view);
+  }
+  return view_array(views);
+}
+
+PixelFormat format_of(const std::string& name) {
+  if (name == "uint8") return PixelFormat::u8;
+  if (name == "float16") return PixelFormat::f16;
+  if (name == "float32") return PixelFormat::f32;
+  fail_usage("images: dtype: expected 'uint8', 'float16' or 'float32', got '{}'", name);
+}
+ElementType element_of(PixelFormat format) {
+  return format == PixelFormat::u8 ? ElementType::u8 : format == PixelFormat::f16 ? ElementType::f16 : ElementType::f32;
+}
+
+/// Images, and planes where asked for, in one piece of memory of a device.
+class Images {
+ public:
+  Images(const Rig& rig, int64_t num_views, PixelFormat format, bool planes, Device device, Stream stream)
+      : layout_(image_layout(rig, num_views, format)), device_(device), stream_(stream) {
+    size_t plane_pixels = 0;
+    for (const CameraLayout& camera : layout_.cameras) {
+      plane_pixels += static_cast<size_t>(num_views * camera.size.pixels());
+    }
+    if (!planes) plane_pixels = 0;
+    // Of the largest elements first, so that all are aligned.
+    const size_t depth_bytes = plane_pixels * sizeof(float), instance_bytes = plane_pixels * sizeof(uint16_t);
+    const size_t color_bytes = (layout_.bytes() + 7) / 8 * 8;
+    uint8_t* at = allocate(color_bytes + depth_bytes + instance_bytes + plane_pixels);
+    first_ = at;
+    float* depth = reinterpret_cast<float*>(at + color_bytes);
+    auto* instance = reinterpret_cast<uint16_t*>(at + color_bytes + depth_bytes);
+    uint8_t* class_id = at + color_bytes + depth_bytes + instance_bytes;
+    for (size_t i = 0; i < layout_.cameras.size(); ++i) {
+      cameras_.push_back(camera_images(layout_, static_cast<int>(i), first_));
+      if (!planes) continue;
+      const auto pixels = static_cast<size_t>(num_views * layout_.cameras[i].size.pixels());
+      cameras_.back().depth_m = std::exchange(depth, depth + pixels);
+      cameras_.back().instance_id = std::exchange(instance, instance + pixels);
+      cameras_.back().class_id = std::exchange(class_id, class_id + pixels);
+    }
+  }
+
+  ImageBatch batch() const {
+    ImageBatch batch;
+    batch.device = device_;
+    batch.format = layout_.format;
+    batch.num_views = static_cast<int>(layout_.num_views);
+    batch.cameras = cameras_;
+    return batch;
+  }
+  const ImageLayout& layout() const { return layout_; }
+  bool has_planes() const { return !cameras_.empty() && cameras_[0].depth_m; }
+
+  static LentArray block(const std::shared_ptr<Images>& self, size_t index) {
+    const BlockLayout& block = self->layout_.blocks[index];
+    const Dims shape{self->layout_.num_views, static_cast<int64_t>(block.cameras.size()), 3, block.size.height_px,
+                     block.size.width_px};
+    return self->lend(self, self->first_ + block.offset * static_cast<int64_t>(bytes_per_value(self->layout_.format)),
+                      element_of(self->layout_.format), shape, "images");
+  }
+  static LentArray camera(const std::shared_ptr<Images>& self, size_t index) {
+    const CameraLayout& camera = self->layout_.cameras[index];
+    LentArray lent =
+        self->lend(self, self->cameras_[index].data, element_of(self->layout_.format),
+                   {self->layout_.num_views, 3, camera.size.height_px, camera.size.width_px}, "images of a camera");
+    lent.array.strides[0] = camera.view_stride;
+    return lent;
+  }
+  static LentArray plane(const std::shared_ptr<Images>& self, size_t index, ElementType type, void* data,
+                         const char* what) {
+    PICTURA_CHECK(data, "images: made without planes: pass planes=True");
+    const CameraLayout& camera = self->layout_.cameras[index];
+    return self->lend(self, data, type, {self->layout_.num_views, camera.size.height_px, camera.size.width_px}, what);
+  }
+  const CameraImages& memory(size_t camera) const { return cameras_[camera]; }
+
+ private:
+  uint8_t* allocate(size_t bytes) {
+    if (device_.is_host()) {
+      host_.resize(bytes);
+      return host_.data();
+    }
+#ifdef PICTURA_HAS_CUDA
+    const DeviceGuard guard(device_);
+    on_device_ = DeviceBuffer<uint8_t>(bytes);
+    return on_device_.data();
+#else
+    fail("images: this build has no CUDA");
+#endif
+  }
+  LentArray lend(const std::shared_ptr<Images>& self, void* data, ElementType type, Dims shape, const char* what) {
+    return {Array(data, type, shape, device_), self, stream_, false, what};
+  }
+
+  ImageLayout layout_;
+  Device device_;
+  Stream stream_;
+  std::vector<uint8_t> host_;
+#ifdef PICTURA_HAS_CUDA
+  DeviceBuffer<uint8_t> on_device_;
+#endif
+  uint8_t* first_ = nullptr;
+  std::vector<CameraImages> cameras_;
+};
+
+/// A renderer and where its work is put.
+class PyRenderer {
+ public:
+  PyRenderer(const std::string& name, const RendererConfig& config, Stream stream)
+      : renderer_(make_renderer(name, config, &choice_)),
+        calls_(config.num_threads, renderer_->device()),
+        stream_(stream) {}
+
+  Renderer& renderer() { return *renderer_; }
+  Calls& calls() { return calls_; }
+  Stream stream() const { return stream_; }
+  void set_stream(Stream stream) { stream_ = stream; }
+  const std::string& choice() const { return choice_; }
+
+  py::object render(const Scene& scene, const py::object& views, const py::object& out, const std::string& dtype,
+                    bool planes) {
+    const BorrowedArray borrowed = borrow_structs(views, "render: views", sizeof(View), stream_);
+    const Span<const View> span = views_of(borrowed);
+    if (py::isinstance<Images>(out)) {
+      draw(scene, span, py::cast<Images&>(out).batch());
+      return out;
+    }
+    const auto num_views = static_cast<int64_t>(span.size());
+    if (out.is_none()) {
+      auto images = std::make_shared<Images>(renderer_->config().rig, num_views, format_of(dtype), planes,
+                                             renderer_->device(), stream_);
+      draw(scene, span, images->batch());
+      return py::cast(images);
+    }
+    // An array of the caller for a rig of one size.
+    BorrowedArray images = borrow(out, "render: out", stream_);
+    const Array& array = images.array();
+    const PixelFormat format = array.type == ElementType::f32   ? PixelFormat::f32
+                               : array.type == ElementType::f16 ? PixelFormat::f16
+                                                                : PixelFormat::u8;
+    const ImageLayout layout = image_layout(renderer_->config().rig, num_views, format);
+    PICTURA_CHECK(layout.blocks.size() == 1, "render: out: expected pictura.Images, since the cameras have {} sizes",
+                  layout.blocks.size());
+    const ImageSize size = layout.blocks[0].size;
+    const Dims shape{num_views, static_cast<int64_t>(layout.cameras.size()), 3, size.height_px, size.width_px};
+    void* first = nullptr;
+    switch (format) {
+      case PixelFormat::u8: first = array.checked<uint8_t>("render: out", shape, renderer_->device()).data(); break;
+      case PixelFormat::f32: first = array.checked<float>("render: out", shape, renderer_->device()).data(); break;
+      case PixelFormat::f16: {
+        PICTURA_CHECK(
+            array.shape == shape && array.device == renderer_->device() && array.is_contiguous() && !array.is_read_only,
+            "render: out: expected f16 {} on {} that can be written, got {}", shape.text(),
+            name_of(renderer_->device()), array.text());
+        first = array.data;
+      }
+    }
+    std::vector<CameraImages> cameras;
+    for (size_t i = 0; i < layout.cameras.size(); ++i) {
+      cameras.push_back(camera_images(layout, static_cast<int>(i), first));
+    }
+    ImageBatch batch;
+    batch.device = renderer_->device();
+    batch.format = format;
+    batch.num_views = static_cast<int>(num_views);
+    batch.cameras = cameras;
+    draw(scene, span, batch);
+    return out;
+  }
+
+  py::array_t<float> visibility(const Scene& scene, const py::object& views, const IntTable& queries) {
+    PICTURA_CHECK(renderer_->device().is_host(), "visibility: expected a renderer on cpu, got one on {}",
+                  name_of(renderer_->device()));
+    const BorrowedArray borrowed = borrow_structs(views, "visibility: views", sizeof(View), stream_);
+    const Span<const View> span = views_of(borrowed);
+    PICTURA_CHECK(queries.ndim() == 2 && queries.shape(1) == 2,
+                  "visibility: queries: expected [n, 2]: index of the view, index of the agent in the scene");
+    std::vector<VisibilityQuery> list;
+    for (py::ssize_t i = 0; i < queries.shape(0); ++i) list.push_back({queries.at(i, 0), queries.at(i, 1)});
+    py::array_t<float> answers(static_cast<py::ssize_t>(list.size()));
+    const Span<float> out(answers.mutable_data(), list.size());
+    calls_.run("visibility", [&] { renderer_->visibility(scene.batch(), span, list, out, stream_); });
+    return answers;
+  }
+
+ private:
+  Span<const View> views_of(const BorrowedArray& borrowed) const {
+    const Array& array = borrowed.array();
+    PICTURA_CHECK(array.shape.rank() == 2, "views: expected structs of VIEW_DTYPE or u8 [n, {}], got {}", sizeof(View),
+                  array.text());
+    const auto bytes = array.checked<const uint8_t>("views", {array.shape[0], static_cast<int64_t>(sizeof(View))},
+                                                    renderer_->device());
+    PICTURA_CHECK(reinterpret_cast<uintptr_t>(bytes.data()) % alignof(View) == 0, "views: expected aligned memory");
+    return {reinterpret_cast<const View*>(bytes.data()), static_cast<size_t>(array.shape[0])};
+  }
+  void draw(const Scene& scene, Span<const View> views, const ImageBatch& batch) {
+    calls_.run("render", [&] { renderer_->render(scene.batch(), views, batch, stream_); });
+  }
+
+  std::string choice_;
+  std::unique_ptr<Renderer> renderer_;
+  Calls calls_;
+  Stream stream_;
+};
+
+PixelSamples samples_of(const std::string& text) {
+  PixelSamples samples;
+  if (text == "1" || text.empty()) return samples;
+  if (text.size() == 3 && text[1] == 'x' && text[0] == text[2] && text[0] >= '1' && text[0] <= '9') {
+    samples.grid = text[0] - '0';
+    return samples;
+  }
+  if (text.size() <= 2 && text.find_first_not_of("0123456789") == std::string::npos) {
+    samples.multisample = std::stoi(text);
+    return samples;
+  }
+  fail_usage("Renderer: samples: expected a number or KxK, got '{}'", text);
+}
+
+}  // namespace
+
+Device device_of(const std::string& name) {
+  if (name == "cpu") return {};
+  if (name == "cuda") return {MemorySpace::cuda, 0};
+  if (name.rfind("cuda:", 0) == 0 && name.size() > 5 && name.size() < 9 &&
+      name.find_first_not_of("0123456789", 5) == std::string::npos) {
+    return {MemorySpace::cuda, std::stoi(name.substr(5))};
+  }
+  fail_usage("device: expected 'cpu', 'cuda' or 'cuda:INDEX', got '{}'", name);
+}
+
+Stream stream_of(const py::object& handle) {
+  if (handle.is_none()) return {};
+  return {reinterpret_cast<void*>(static_cast<intptr_t>(py::cast<int64_t>(handle)))};
+}
+
+void bind_rendering(py::module_& module) {
+  const py::object dtype = py::module_::import("numpy").attr("dtype");
+  const auto field = [](const char* name, const char* type) { return py::make_tuple(name, type); };
+  py::list fields;
+  fields.append(field("world", "<i4"));
+  fields.append(field("ego_agent", "<i4"));
+  fields.append(py::make_tuple("origin_m", "<f4", py::make_tuple(3)));
+  for (const char* name : {"cos_heading", "sin_heading", "body_length_m"}) fields.append(field(name, "<f4"));
+  for (const char* name : {"hidden_begin", "hidden_end"}) fields.append(field(name, "<i4"));
+  module.attr("VIEW_DTYPE") = dtype(fields);
+  PICTURA_CHECK(py::cast<size_t>(module.attr("VIEW_DTYPE").attr("itemsize")) == sizeof(View), "a view's layout");
+  py::list box;
+  box.append(py::make_tuple("center_m", "<f4", py::make_tuple(3)));
+  for (const char* name : {"cos_heading", "sin_heading", "length_m", "width_m", "height_m"})
+    box.append(field(name, "<f4"));
+  for (const char* name : {"agent_class", "palette", "drawn", "padding"}) box.append(field(name, "u1"));
+  module.attr("BOX_DTYPE") = dtype(box);
+  PICTURA_CHECK(py::cast<size_t>(module.attr("BOX_DTYPE").attr("itemsize")) == sizeof(AgentBox), "a box's layout");
+
+  py::class_<Camera>(module, "Camera", R"(
+A pinhole camera on a body: x forward, y left, z up, in metres from the rig's origin. Angles are radians: yaw is
+counter-clockwise, pitch positive looks up, roll positive turns it clockwise as seen from behind.)")
+      .def(py::init([](const std::string& name, int width_px, int height_px, std::optional<float> focal_px,
+                       std::array<float, 3> position_m, float yaw_rad, float pitch_rad, float roll_rad) {
+             Camera camera;
+             camera.name = name;
+             camera.width_px = width_px;
+             camera.height_px = height_px;
+             camera.focal_x_px = camera.focal_y_px = focal_px.value_or(0.8f * static_cast<float>(width_px));
+             camera.center_x_px = 0.5f * static_cast<float>(width_px);
+             camera.center_y_px = 0.5f * static_cast<float>(height_px);
+             camera.position_m = {position_m[0], position_m[1], position_m[2]};
+             camera.yaw_rad = yaw_rad;
+             camera.pitch_rad = pitch_rad;
+             camera.roll_rad = roll_rad;
+             return camera;
+           }),
+           py::arg("name"), py::arg("width_px"), py::arg("height_px"), py::kw_only(), py::arg("focal_px") = py::none(),
+           py::arg("position_m") = std::array<float, 3>{1.5f, 0, 1.5f}, py::arg("yaw_rad") = 0.0f,
+           py::arg("pitch_rad") = 0.0f, py::arg("roll_rad") = 0.0f,
+           "The principal point is the middle; focal_px defaults to 0.8 times the width, about 64 degrees across.")
+      .def_readwrite("name", &Camera::name)
+      .def_readwrite("width_px", &Camera::width_px)
+      .def_readwrite("height_px", &Camera::height_px)
+      .def_readwrite("focal_x_px", &Camera::focal_x_px)
+      .def_readwrite("focal_y_px", &Camera::focal_y_px)
+      .def_readwrite("center_x_px", &Camera::center_x_px)
+      .def_readwrite("center_y_px", &Camera::center_y_px)
+      .def_property(
+          "position_m",
+          [](const Camera& c) { return std::array<float, 3>{c.position_m.x, c.position_m.y, c.position_m.z}; },
+          [](Camera& c, std::array<float, 3> p) { c.position_m = {p[0], p[1], p[2]}; })
+      .def_readwrite("yaw_rad", &Camera::yaw_rad)
+      .def_readwrite("pitch_rad", &Camera::pitch_rad)
+      .def_readwrite("roll_rad", &Camera::roll_rad)
+      .def("__repr__", [](const Camera& c) {
+        return fmt::format("<pictura.Camera {}: {}x{} px>", c.name, c.width_px, c.height_px);
+      });
+
+  py::class_<Rig>(module, "Rig", "One or more cameras of any sizes on a body; their order is that of images.")
+      .def(py::init([](std::vector<Camera> cameras) {
+             Rig rig{std::move(cameras)};
+             validate(rig);
+             return rig;
+           }),
+           py::arg("cameras"), "Raises pictura.Error unless there are 1 to 64 valid cameras.")
+      .def_static("paper", paper_rig, py::arg("width_px") = 96, py::arg("height_px") = 54,
+                  py::arg("square_pixels") = false,
+                  "The paper's four cameras: front, front left, front right and back. Sizes of 1 to 8192 px.")
+      .def_static("load", load_rig, py::arg("path"),
+                  "Reads a rig from a TOML file. Raises pictura.Error naming file, camera and key.")
+      .def_readonly("cameras", &Rig::cameras)
+      .def("__len__", [](const Rig& rig) { return rig.cameras.size(); });
+
+  py::class_<Scene, std::shared_ptr<Scene>>(module, "Scene", R"(
+What moves: boxes of agents and states of lights, for one or more worlds. A simulator's `scene` is what it shows at each
+call; a scene of arrays is a copy of them.)")
+      .def(
+          py::init(&make_scene), py::arg("center_m"), py::arg("heading_rad"), py::arg("size_m"), py::arg("agent_class"),
+          py::kw_only(), py::arg("world_begin") = py::none(), py::arg("geometry") = py::none(),
+          py::arg("light_states") = py::none(), py::arg("light_begin") = py::none(),
+          R"(center_m [n, 3]: of the box's foot. heading_rad [n]. size_m [n, 3]: length, width, height. agent_class [n]: 0
+vehicle, 1 cyclist, 2 pedestrian. world_begin [worlds + 1]: the first box of each world; all are in one without it.
+geometry [worlds]: the handles that geometries were uploaded to; 0 without it. light_states: 0 off, 1 red, 2 yellow, 3
+green, of all worlds; light_begin [worlds + 1]. Raises pictura.Error for other shapes; render() refuses what does not
+fit together.)")
+      .def_property_readonly(
+          "num_worlds", [](const Scene& self) { return self.batch().geometry.size(); }, py::doc("Worlds."))
+      .def_property_readonly(
+          "boxes",
+          [](const Scene& self) {
+            const SceneBatch batch = self.batch();
+            LentArray lent{Array(reinterpret_cast<const uint8_t*>(batch.agents.data()),
+                                 {static_cast<int64_t>(batch.agents.size()), static_cast<int64_t>(sizeof(AgentBox))},
+                                 batch.device),
+                           self.owner, self.stream, false, "scene boxes"};
+            return lent;
+          },
+          py::doc(
+              "uint8 [boxes, 36], read-only: `numpy.asarray(boxes).view(BOX_DTYPE)[:, 0]` has their fields by name."));
+
+  py::class_<SceneFile>(module, "SceneFile", "A scene of one TOML file: geometry, boxes, rig and views.")
+      .def(py::init(&load_scene), py::arg("path"), "Raises pictura.Error naming file, line, table and key.")
+      .def_property_readonly("rig", [](const SceneFile& self) { return self.config.rig; })
+      .def_property_readonly("line_floor_px", [](const SceneFile& self) { return self.config.line_floor_px; })
+      .def_property_readonly(
+          "geometry",
+          [](const SceneFile& self) { return Geometry{std::make_shared<const StaticGeometry>(self.geometry)}; })
+      .def_property_readonly(
+          "scene", [](const SceneFile& self) { return scene_of(std::make_shared<SceneOwner>(self.scene)); },
+          py::doc("Its world is on geometry 0."))
+      .def_property_readonly(
+          "views", [](const SceneFile& self) { return view_array(self.views); }, py::doc("VIEW_DTYPE [n]."))
+      .def_readonly("view_names", &SceneFile::view_names);
+
+  module.def("make_views", make_views, py::arg("origin_m"), py::arg("heading_rad"), py::kw_only(),
+             py::arg("world") = py::none(), py::arg("ego_agent") = py::none(), py::arg("body_length_m") = py::none(),
+             R"(Poses of a rig, a NumPy array of VIEW_DTYPE [n].
+
+origin_m [n, 3]: of the rig, on the ground. heading_rad [n]. world [n]: 0 without it. ego_agent [n]: the box of the
+scene that is left out, -1 for none. body_length_m [n]: shorter bodies than 4.5 m draw cameras nearer to their origin.)");
+
+  py::class_<Images, std::shared_ptr<Images>>(module, "Images", R"(
+Images of some views by each camera of a rig, in the renderer's memory, and their planes where they were asked for.
+A renderer draws into it as often as wanted.)")
+      .def_property_readonly(
+          "num_views", [](const Images& self) { return self.layout().num_views; },
+          py::doc("Views that it has room for."))
+      .def_property_readonly(
+          "rgb",
+          [](const std::shared_ptr<Images>& self) {
+            PICTURA_CHECK(self->layout().blocks.size() == 1,
+                          "images: rgb: expected cameras of one size, got {} sizes: use blocks or cameras",
+                          self->layout().blocks.size());
+            return Images::block(self, 0);
+          },
+          py::doc("[views, cameras, 3, height, width], for a rig whose cameras have one size."))
+      .def_property_readonly(
+          "blocks",
+          [](const std::shared_ptr<Images>& self) {
+            py::list blocks;
+            for (size_t i = 0; i < self->layout().blocks.size(); ++i) blocks.append(Images::block(self, i));
+            return blocks;
+          },
+          py::doc("One [views, cameras of that size, 3, height, width] for each distinct size."))
+      .def(
+          "camera",
+          [](const std::shared_ptr<Images>& self, size_t index) {
+            PICTURA_CHECK(index < self->layout().cameras.size(), "images: expected a camera in [0, {}), got {}",
+                          self->layout().cameras.size(), index);
+            return Images::camera(self, index);
+          },
+          py::arg("index"), "[views, 3, height, width] of one camera.")
+      .def(
+          "planes",
+          [](const std::shared_ptr<Images>& self, size_t index) {
+            PICTURA_CHECK(index < self->layout().cameras.size(), "images: expected a camera in [0, {}), got {}",
+                          self->layout().cameras.size(), index);
+            const CameraImages& memory = self->memory(index);
+            py::dict planes;
+            planes["depth_m"] = Images::plane(self, index, ElementType::f32, memory.depth_m, "depth");
+            planes["class_id"] = Images::plane(self, index, ElementType::u8, memory.class_id, "class");
+            planes["instance_id"] = Images::plane(self, index, ElementType::u16, memory.instance_id, "instance");
+            return planes;
+          },
+          py::arg("camera"),
+          R"(Of the front surface at each pixel's centre, [views, height, width]: depth_m float32 (infinite where nothing is),
+class_id uint8 (0: nothing), instance_id uint16 (1 + the agent's index in its world, 0: no agent). Raises pictura.Error
+for images without planes.)");
+
+  py::class_<PyRenderer>(module, "Renderer", R"(
+Draws scenes: 'cpu', 'cuda', 'gl' ('gl:egl', 'gl:osmesa'), 'null', or 'auto'. One thread at a time; several renderers are
+independent. On CUDA its work is put on `stream`.)")
+      .def(
+          py::init([](const std::string& name, const std::optional<Rig>& rig, const std::string& device,
+                      int num_threads, float line_floor_px, bool debug_palette, const std::string& samples,
+                      const py::object& stream) {
+            RendererConfig config;
+            if (rig) config.rig = *rig;
+            config.device = device_of(device);
+            config.num_threads = num_threads;
+            config.line_floor_px = line_floor_px;
+            config.debug_palette = debug_palette;
+            config.samples = samples_of(samples);
+            check_process("Renderer", num_threads, config.device);
+            return std::make_unique<PyRenderer>(name, config, stream_of(stream));
+          }),
+          py::arg("name") = "auto", py::arg("rig") = py::none(), py::kw_only(), py::arg("device") = "cpu",
+          py::arg("num_threads") = 0, py::arg("line_floor_px") = RendererConfig{}.line_floor_px,
+          py::arg("debug_palette") = false, py::arg("samples") = "1", py::arg("stream") = py::none(),
+          R"(rig: the paper's without one. device: where scenes, views and images lie, 'cpu' or 'cuda:0'. num_threads: 0 for
+all. line_floor_px: the least width of a line on screen. debug_palette: tint halted and parked agents. samples: for 'gl',
+'4' (MSAA) or '4x4' (supersampling). stream: a cudaStream_t as int; None: the legacy default stream.
+Raises pictura.UsageError listing the names, pictura.Error where the backend cannot run here.)")
+      .def_property_readonly("name", [](PyRenderer& self) { return std::string(self.renderer().name()); })
+      .def_property_readonly("choice", &PyRenderer::choice, py::doc("What was chosen, and why."))
+      .def_property_readonly("device", [](PyRenderer& self) { return name_of(self.renderer().device()); })
+      .def_property_readonly("rig", [](PyRenderer& self) { return self.renderer().config().rig; })
+      .def_property(
+          "stream", [](const PyRenderer& self) { return reinterpret_cast<intptr_t>(self.stream().handle); },
+          [](PyRenderer& self, const py::object& stream) { self.set_stream(stream_of(stream)); },
+          py::doc("The cudaStream_t that work is put on, as int; 0: the legacy default stream."))
+      .def(
+          "upload",
+          [](PyRenderer& self, int handle, const Geometry& geometry) {
+            self.calls().run("upload", [&] { self.renderer().upload(handle, *geometry.geometry, self.stream()); });
+          },
+          py::arg("handle"), py::arg("geometry"),
+          "Copies a geometry; `handle`, 0 to 65535, is what scenes name it by. Raises pictura.Error where it is "
+          "invalid.")
+      .def(
+          "make_images",
+          [](PyRenderer& self, int num_views, const std::string& type, bool planes) {
+            return std::make_shared<Images>(self.renderer().config().rig, num_views, format_of(type), planes,
+                                            self.renderer().device(), self.stream());
+          },
+          py::arg("num_views"), py::kw_only(), py::arg("dtype") = "uint8", py::arg("planes") = false,
+          "Memory for images of so many views: 'uint8' of 0 to 255, or 'float32' or 'float16' (not on all) of 0 to 1.")
+      .def("render", &PyRenderer::render, py::arg("scene"), py::arg("views"), py::arg("out") = py::none(),
+           py::kw_only(), py::arg("dtype") = "uint8", py::arg("planes") = false,
+           R"(Draws every camera for every view. Returns `out`.
+
+views: VIEW_DTYPE [n], or a simulator's. out: Images, or for a rig of one size an array [n, cameras, 3, height, width] of
+uint8, float32 or float16 in the renderer's memory (NumPy, torch, ...); new Images of `dtype` and `planes` without it. On
+CUDA the call returns when the work is on the stream. Raises pictura.Error naming what does not fit.)")
+      .def(
+          "visibility", &PyRenderer::visibility, py::arg("scene"), py::arg("views"), py::arg("queries"),
+          R"(How much of agents can be seen: for each query of (view, box of the scene), int [n, 2], the coverage in the view's
+images over the coverage when drawn alone, float32 [n], NaN where it is in no camera's frame.)")
+      .def(
+          "check", [](PyRenderer& self) { self.calls().run("check", [&] { self.renderer().check(self.stream()); }); },
+          "Waits for the work on the stream; raises pictura.Error for faults that a device found.");
+  module.def("renderer_names", renderer_names, "Names that this build knows.");
+}
+
+}  // namespace pictura::python

@@ -1,0 +1,718 @@
+// Simulators and controllers in Python.
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <optional>
+
+#include <pybind11/stl.h>
+
+#include "pictura/backends/make_controller.h"
+#include "pictura/backends/make_simulator.h"
+#include "pictura/bindings/call.h"
+#include "pictura/bindings/objects.h"
+#include "pictura/common/support/suggestion.h"
+#include "pictura/drawing/world.h"
+#include "pictura/simulator/agent_state_arrays.h"
+#include "pictura/simulator/observation_arrays.h"
+#ifdef PICTURA_HAS_CUDA
+#include "pictura/common/cuda/device_buffer.h"
+#include "pictura/common/cuda/device_guard.h"
+#endif
+
+namespace pictura::python {
+
+namespace {
+
+using WorldTuple = std::tuple<int, int, uint32_t>;  // map, agents, global world
+
+std::vector<WorldSpec> worlds_of(const py::sequence& worlds) {
+  std::vector<WorldSpec> specs;
+  for (const py::handle world : worlds) {
+    const auto entry = py::cast<py::sequence>(world);
+    PICTURA_CHECK(entry.size() == 2 || entry.size() == 3,
+                  "worlds: world {}: expected (map, agents) or (map, agents, global world), got {} numbers",
+                  specs.size(), entry.size());
+    WorldSpec spec{py::cast<int>(entry[0]), py::cast<int>(entry[1]), static_cast<uint32_t>(specs.size())};
+    if (entry.size() == 3) spec.global_world = py::cast<uint32_t>(entry[2]);
+    specs.push_back(spec);
+  }
+  return specs;
+}
+
+void set_conditioning(const py::dict& given, SimulatorConfig* config) {
+  const std::vector<std::string> names(std::begin(kConditioningNames), std::end(kConditioningNames));
+  for (const auto& [key, value] : given) {
+    const auto name = py::cast<std::string>(key);
+    const auto found = std::find(names.begin(), names.end(), name);
+    if (found == names.end()) fail_usage("conditioning: no coefficient '{}'{}", name, suggestion(name, names));
+    ConditioningRange& range = config->conditioning[static_cast<size_t>(found - names.begin())];
+    if (py::isinstance<py::float_>(value) || py::isinstance<py::int_>(value)) {
+      const auto fixed = py::cast<float>(value);
+      range = {fixed, fixed, false};
+    } else {
+      const auto [low, high] = py::cast<std::pair<float, float>>(value);
+      range.low = low;
+      range.high = high;
+    }
+  }
+}
+
+template <typename Terms>
+py::dict dict_of_terms(const Terms& terms) {
+  py::dict d;
+#define X(name) d[#name] = terms.name;
+  PICTURA_REWARD_TERMS(X)
+#undef X
+  return d;
+}
+
+py::dict dict_of(const SimulatorTotals& t) {
+  py::dict d;
+  d["agent_steps"] = t.agent_steps;
+  d["slot_steps"] = t.slot_steps;
+  d["episodes"] = t.episodes;
+  d["goals_reached"] = t.goals_reached;
+  d["waypoints_reached"] = t.waypoints_reached;
+  d["collisions"] = t.collisions;
+  d["at_fault_collisions"] = t.at_fault_collisions;
+  d["off_road"] = t.off_road;
+  d["red_light"] = t.red_light;
+  d["wall_contacts"] = t.wall_contacts;
+  d["distance_m"] = t.distance_m;
+  d["reward"] = t.reward;
+  d["reward_terms"] = dict_of_terms(t.reward_terms);
+  d["finished_agent_episodes"] = t.finished_agent_episodes;
+  d["finished_return"] = t.finished_return;
+  d["finished_passed_waypoint"] = t.finished_passed_waypoint;
+  d["finished_moved"] = t.finished_moved;
+  d["finished_first_motion_s"] = t.finished_first_motion_s;
+  return d;
+}
+
+/// What a step returned, as arrays that the next step writes again.
+struct StepArraysOfPython {
+  py::object reward, terminated, truncated, valid, refusal, reward_terms, distance_m;
+};
+
+/// A state that a simulator keeps.
+struct Snapshot {
+  std::shared_ptr<Simulator> of;
+  std::unique_ptr<StateSnapshot> state;
+};
+
+class PySimulator {
+ public:
+  PySimulator(const std::string& executor, const SimulatorConfig& config, const std::vector<std::shared_ptr<Map>>& maps,
+              std::vector<WorldSpec> worlds, Stream stream)
+      : executor_(executor), config_(config), stream_(stream) {
+    make(compiled(maps), std::move(worlds));
+    calls_ = std::make_unique<Calls>(config.num_threads, simulator_->device());
+  }
+
+  Simulator& simulator() { return *simulator_; }
+  const std::shared_ptr<Simulator>& shared() const { return simulator_; }
+  Calls& calls() { return *calls_; }
+  Stream stream() const { return stream_; }
+  void set_stream(Stream stream) {
+    stream_ = stream;
+    forget_arrays();
+  }
+  const std::string& choice() const { return choice_; }
+  const std::vector<std::shared_ptr<Map>>& maps() const { return maps_; }
+
+  /// Within the memory that there is nothing moves; else arrays of before keep that of the simulator of before.
+  void set_worlds(const std::vector<std::shared_ptr<Map>>& maps, std::vector<WorldSpec> worlds, uint64_t seed) {
+    CompiledMaps next = compiled(maps);
+    const SimulatorCapacity needs = capacity_checked(next, worlds);
+    if (capacity_.holds(needs)) {
+      calls_->run("set_worlds", [&] { simulator_->set_worlds(std::move(next), {}, std::move(worlds), seed, stream_); });
+    } else {
+      const std::unique_ptr<Calls>& calls = calls_;
+      calls->run("set_worlds", [] {});
+      config_.seed = seed;
+      make(std::move(next), std::move(worlds));
+    }
+    maps_ = maps;
+    forget_arrays();
+  }
+
+  void reset(const py::object& world_mask, const std::optional<uint64_t>& seed) {
+    if (world_mask.is_none() && !seed) {
+      calls_->run("reset", [&] { simulator_->reset(stream_); });
+      return;
+    }
+    const uint64_t its_seed = seed.value_or(simulator_->config().seed);
+    if (world_mask.is_none()) {
+      const Array all = all_worlds();
+      calls_->run("reset", [&] { simulator_->reset(all, its_seed, stream_); });
+      return;
+    }
+    BorrowedArray mask = borrow(world_mask, "reset: world_mask", stream_);
+    calls_->run("reset", [&] { simulator_->reset(mask.array(), its_seed, stream_); });
+    keep(std::move(mask));
+  }
+
+  py::object step(const py::object& actions) {
+    BorrowedArray borrowed = borrow(actions, "step: actions", stream_);
+    const StepResult result = calls_->run("step", [&] { return simulator_->step(borrowed.array(), stream_); });
+    keep(std::move(borrowed));
+    return arrays_of(result);
+  }
+  py::object step_commands(const py::object& commands) {
+    BorrowedArray borrowed = borrow_structs(commands, "step_commands: commands", sizeof(Command), stream_);
+    const auto bytes = borrowed.array().checked<const uint8_t>(
+        "step_commands: commands", {simulator_->num_slots(), static_cast<int64_t>(sizeof(Command))},
+        simulator_->device());
+    PICTURA_CHECK(reinterpret_cast<uintptr_t>(bytes.data()) % alignof(Command) == 0,
+                  "step_commands: commands: expected aligned memory");
+    const Span<const Command> span(reinterpret_cast<const Command*>(bytes.data()),
+                                   static_cast<size_t>(simulator_->num_slots()));
+    const StepResult result = calls_->run("step_commands", [&] { return simulator_->step(span, stream_); });
+    keep(std::move(borrowed));
+    return arrays_of(result);
+  }
+
+  void set_state(const py::object& slots, const py::dict& fields) {
+    BorrowedArray borrowed_slots = borrow(slots, "set_state: slots", stream_);
+    std::vector<std::string> names;
+    std::vector<BorrowedArray> borrowed;
+    for (const auto& [name, values] : fields) {
+      names.push_back(py::cast<std::string>(name));
+      borrowed.push_back(borrow(values, "set_state: " + names.back(), stream_));
+    }
+    std::vector<NamedArray> named;
+    for (size_t i = 0; i < names.size(); ++i) named.push_back({names[i], borrowed[i].array()});
+    calls_->run("set_state", [&] { simulator_->set_state(borrowed_slots.array(), named, stream_); });
+    kept_.clear();
+    for (BorrowedArray& array : borrowed) kept_.push_back(std::move(array));
+    kept_.push_back(std::move(borrowed_slots));
+  }
+
+  py::dict observations() {
+    if (!observations_) {
+      py::dict arrays;
+      for (const NamedArray& named :
+           observation_arrays(simulator_->observations(), simulator_->num_slots(), simulator_->device())) {
+        Array array = named.array;
+        // What is no set has one row.
+        if (array.shape[1] == 1) array = Array(array.data, array.type, {array.shape[0], array.shape[2]}, array.device);
+        arrays[py::str(std::string(named.name))] = py::cast(lend(array, std::string(named.name)));
+      }
+      observations_ = arrays;
+    }
+    return *observations_;
+  }
+  py::dict state() {
+    if (!state_) {
+      py::dict arrays;
+      for (const NamedArray& named :
+           agent_state_arrays(simulator_->state(), simulator_->num_slots(), simulator_->device())) {
+        Array array = named.array;
+        array.is_read_only = true;
+        arrays[py::str(std::string(named.name))] = py::cast(lend(array, std::string(named.name)));
+      }
+      state_ = arrays;
+    }
+    return *state_;
+  }
+
+  LentArray lend(const Array& array, std::string what, bool is_bool = false) const {
+    return {array, simulator_, stream_, is_bool, std::move(what)};
+  }
+  template <typename T>
+  LentArray lend_span(Span<T> span, std::string what, bool is_bool = false) const {
+    return lend(Array(span.data(), {static_cast<int64_t>(span.size())}, simulator_->device()), std::move(what),
+                is_bool);
+  }
+  template <typename T>
+  LentArray lend_structs(Span<const T> span, std::string what) const {
+    return lend(Array(reinterpret_cast<const uint8_t*>(span.data()),
+                      {static_cast<int64_t>(span.size()), static_cast<int64_t>(sizeof(T))}, simulator_->device()),
+                std::move(what));
+  }
+
+  std::shared_ptr<Scene> scene() {
+    auto scene = std::make_shared<Scene>();
+    scene->owner = simulator_;
+    scene->stream = stream_;
+    scene->batch = [raw = simulator_.get()] { return raw->scene(); };
+    return scene;
+  }
+
+  py::array_t<uint8_t> draw(int world, int agent, int width_px, int height_px, float width_m) {
+    PICTURA_CHECK(simulator_->device().is_host(), "draw: expected a simulator on cpu, got one on {}",
+                  name_of(simulator_->device()));
+    PICTURA_CHECK(world >= 0 && world < static_cast<int>(simulator_->worlds().size()),
+                  "draw: expected a world in [0, {}), got {}", simulator_->worlds().size(), world);
+    const WorldSpec& spec = simulator_->worlds()[static_cast<size_t>(world)];
+    PICTURA_CHECK(agent >= -1 && agent < spec.num_agents, "draw: expected an agent in [0, {}), or -1, got {}",
+                  spec.num_agents, agent);
+    const CompiledMap& map = *simulator_->maps()[static_cast<size_t>(spec.map)];
+    const RgbImage image = calls_->run("draw", [&] {
+      if (!painter_ || painted_map_ != map.road || painter_->width_px() != width_px ||
+          painter_->height_px() != height_px) {
+        painter_ = std::make_unique<WorldPainter>(*map.road, width_px, height_px, map.geometry.walls);
+        painted_map_ = map.road;
+      }
+      return draw_world(*painter_, *simulator_, world, agent, width_m);
+    });
+    py::array_t<uint8_t> pixels({image.height_px, image.width_px, 3});
+    std::copy(image.rgb.begin(), image.rgb.end(), pixels.mutable_data());
+    return pixels;
+  }
+
+  /// Until a moment ago another thread could be in a call: as in any call.
+  template <typename Work>
+  void run_steps(int64_t steps, const Work& step) {
+    using Clock = std::chrono::steady_clock;
+    for (int64_t done = 0; done < steps;) {
+      calls_->run("run", [&] {
+        const auto begin = Clock::now();
+        do step();
+        while (++done < steps && Clock::now() - begin < std::chrono::milliseconds(50));
+      });
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    }
+  }
+
+ private:
+  CompiledMaps compiled(const std::vector<std::shared_ptr<Map>>& maps) {
+    if (maps.empty()) fail_usage("simulator: expected at least one map");
+    CompiledMaps made;
+    for (const auto& map : maps) {
+      PICTURA_CHECK(map, "simulator: maps: expected maps, got None");
+      made.push_back(map->compiled(map_options(config_)));
+    }
+    maps_ = maps;
+    return made;
+  }
+  static SimulatorCapacity capacity_checked(const CompiledMaps& maps, const std::vector<WorldSpec>& worlds) {
+    for (const WorldSpec& world : worlds) {
+      if (world.map < 0 || world.map >= static_cast<int>(maps.size())) {
+        fail_usage("simulator: world {}: expected a map in [0, {}), got {}", world.global_world, maps.size(),
+                   world.map);
+      }
+    }
+    return capacity_of(maps, worlds);
+  }
+  void make(CompiledMaps maps, std::vector<WorldSpec> worlds) {
+    const SimulatorCapacity needs = capacity_checked(maps, worlds);
+    check_process("Simulator", config_.num_threads, config_.device);
+    {
+      const py::gil_scoped_release no_gil;
+      simulator_ = make_simulator(executor_, config_, std::move(maps), std::move(worlds), &choice_);
+    }
+    capacity_ = needs;
+  }
+  void forget_arrays() {
+    observations_.reset();
+    state_.reset();
+    result_ = {};
+    of_result_ = nullptr;
+  }
+  /// On a device the work that reads it may still be to come.
+  void keep(BorrowedArray array) {
+    kept_.clear();
+    kept_.push_back(std::move(array));
+  }
+  Array all_worlds() {
+    const auto count = static_cast<int64_t>(simulator_->worlds().size());
+    if (simulator_->device().is_host()) {
+      all_on_host_.assign(static_cast<size_t>(count), 1);
+      return {all_on_host_.data(), {count}, Device{}};
+    }
+#ifdef PICTURA_HAS_CUDA
+    const DeviceGuard guard(simulator_->device());
+    if (all_on_device_.size() != static_cast<size_t>(count)) {
+      all_on_device_ = DeviceBuffer<uint8_t>(static_cast<size_t>(count));
+      all_on_device_.fill(1);
+      PICTURA_CUDA(cudaDeviceSynchronize());
+    }
+    return {all_on_device_.data(), {count}, simulator_->device()};
+#else
+    fail("reset: this build has no CUDA");
+#endif
+  }
+
+  py::object arrays_of(const StepResult& result) {
+    if (of_result_ != result.reward.data() || !result_) {
+      StepArraysOfPython arrays;
+      arrays.reward = py::cast(lend_span(result.reward, "reward"));
+      arrays.terminated = py::cast(lend_span(result.terminated, "terminated", true));
+      arrays.truncated = py::cast(lend_span(result.truncated, "truncated", true));
+      arrays.valid = py::cast(lend_span(result.valid, "valid", true));
+      arrays.refusal = py::cast(lend_span(result.refusal, "refusal"));
+      constexpr int64_t kFloats = sizeof(StepSums) / sizeof(float), kTerms = sizeof(RewardTerms) / sizeof(float);
+      const auto num_slots = static_cast<int64_t>(result.sums.size());
+      const auto* const first = reinterpret_cast<const float*>(result.sums.data());
+      Array distance_m(first, {num_slots}, simulator_->device());
+      distance_m.strides[0] = kFloats;
+      Array terms(first + offsetof(StepSums, reward_terms) / sizeof(float), {num_slots, kTerms}, simulator_->device());
+      terms.strides[0] = kFloats;
+      arrays.distance_m = py::cast(lend(distance_m, "distance_m"));
+      arrays.reward_terms = py::cast(lend(terms, "reward_terms"));
+      result_ = py::cast(std::move(arrays));
+      of_result_ = result.reward.data();
+    }
+    return result_;
+  }
+
+  std::string executor_, choice_;
+  SimulatorConfig config_;
+  Stream stream_;
+  std::vector<std::shared_ptr<Map>> maps_;
+  std::shared_ptr<Simulator> simulator_;
+  SimulatorCapacity capacity_;
+  std::unique_ptr<Calls> calls_;
+  std::optional<py::dict> observations_, state_;
+  py::object result_;
+  const float* of_result_ = nullptr;
+  std::vector<BorrowedArray> kept_;  // what the last call was given
+  std::vector<uint8_t> all_on_host_;
+#ifdef PICTURA_HAS_CUDA
+  DeviceBuffer<uint8_t> all_on_device_;
+#endif
+  std::shared_ptr<const RoadMap> painted_map_;
+  std::unique_ptr<WorldPainter> painter_;
+};
+
+/// A controller, its simulator, and the commands that it writes.
+class PyController {
+ public:
+  PyController(const std::string& name, PySimulator& simulator, uint64_t seed)
+      : of_(simulator.shared()), controller_(make_controller(name, *of_, seed)) {
+    PICTURA_CHECK(of_->device().is_host(), "Controller: expected a simulator on cpu, got one on {}",
+                  name_of(of_->device()));
+    commands_ = std::make_shared<std::vector<Command>>(static_cast<size_t>(of_->num_slots()));
+  }
+
+  std::string name() const { return std::string(controller_->name()); }
+  void act(const PySimulator& simulator) {
+    PICTURA_CHECK(simulator.shared() == of_ && of_->num_slots() == static_cast<int>(commands_->size()),
+                  "Controller: expected the simulator, and the worlds, that it was made for");
+    controller_->act(of_->controller_input(), {}, *commands_);
+  }
+  Span<const Command> commands() const { return *commands_; }
+  py::array numpy_commands() const {
+    const py::dtype type = py::module_::import("pictura._pictura").attr("COMMAND_DTYPE");
+    auto* const keep = new std::shared_ptr<std::vector<Command>>(commands_);
+    const py::capsule owner(keep, [](void* p) { delete static_cast<std::shared_ptr<std::vector<Command>>*>(p); });
+    return py::array(type, {static_cast<py::ssize_t>(commands_->size())}, {static_cast<py::ssize_t>(sizeof(Command))},
+                     commands_->data(), owner);
+  }
+
+ private:
+  std::shared_ptr<Simulator> of_;
+  std::unique_ptr<Controller> controller_;
+  std::shared_ptr<std::vector<Command>> commands_;
+};
+
+py::dict report_of(const SpawnReport& report) {
+  py::dict d;
+  d["asked"] = report.asked;
+  d["spawned"] = report.spawned;
+  d["refused"] = report.refused;
+  d["refused_no_place"] = report.refused_no_place;
+  d["refused_taken"] = report.refused_taken;
+  d["parked_asked"] = report.parked_asked;
+  d["parked_placed"] = report.parked_placed;
+  return d;
+}
+
+void bind_names(py::module_& module) {
+  py::list fields;
+  for (size_t i = 0; i < std::size(kAgentFields); ++i) {
+    const AgentFieldInfo& info = kAgentFields[i];
+    fields.append(py::make_tuple(std::string(info.name), std::string(name_of(info.type)), info.per_agent,
+                                 is_derived(static_cast<AgentField>(i)), std::string(info.comment)));
+  }
+  module.attr("AGENT_FIELDS") = py::tuple(fields);
+  py::list observations;
+  for (const ObservationArray& array : kObservationArrays) {
+    observations.append(
+        py::make_tuple(std::string(array.name), std::string(name_of(array.type)), array.rows, array.features));
+  }
+  module.attr("OBSERVATION_ARRAYS") = py::tuple(observations);
+  module.attr("CONDITIONING_NAMES") =
+      py::tuple(py::cast(std::vector<std::string>(std::begin(kConditioningNames), std::end(kConditioningNames))));
+  std::vector<std::string> terms;
+#define X(name) terms.emplace_back(#name);
+  PICTURA_REWARD_TERMS(X)
+#undef X
+  module.attr("REWARD_TERMS") = py::tuple(py::cast(terms));
+  module.attr("NUM_ACTIONS") = kNumActions;
+  module.attr("IDLE_ACTION") = kIdleAction;
+  py::list command;
+  for (const char* name : {"kind", "action"}) command.append(py::make_tuple(name, "<i4"));
+  for (const char* name : {"x_m", "y_m", "z_m", "heading_rad", "speed_mps"})
+    command.append(py::make_tuple(name, "<f4"));
+  module.attr("COMMAND_DTYPE") = py::module_::import("numpy").attr("dtype")(command);
+  PICTURA_CHECK(py::cast<size_t>(module.attr("COMMAND_DTYPE").attr("itemsize")) == sizeof(Command),
+                "a command's layout");
+  py::dict events;
+  events["collision"] = static_cast<int>(kEventCollision);
+  events["at_fault"] = static_cast<int>(kEventAtFault);
+  events["off_road"] = static_cast<int>(kEventOffRoad);
+  events["red_light"] = static_cast<int>(kEventRedLight);
+  events["wall"] = static_cast<int>(kEventWall);
+  events["goal"] = static_cast<int>(kEventGoal);
+  events["waypoint"] = static_cast<int>(kEventWaypoint);
+  events["metric_goal"] = static_cast<int>(kEventMetricGoal);
+  module.attr("EVENTS") = events;
+}
+
+}  // namespace
+
+void bind_simulator(py::module_& module) {
+  bind_names(module);
+  py::class_<StepArraysOfPython>(module, "StepResult", R"(
+What a step returns, one element a slot, in the simulator's memory: every step writes the same arrays again.)")
+      .def_readonly("reward", &StepArraysOfPython::reward, "float32 [slots].")
+      .def_readonly("terminated", &StepArraysOfPython::terminated,
+                    "bool [slots]: an infraction ended the agent's episode in this step.")
+      .def_readonly("truncated", &StepArraysOfPython::truncated,
+                    "bool [slots]: the episode ended for another reason: bootstrap.")
+      .def_readonly("valid", &StepArraysOfPython::valid,
+                    "bool [slots]: the agent was active when the step began: learn from it.")
+      .def_readonly("refusal", &StepArraysOfPython::refusal,
+                    "uint8 [slots]: why the agent is absent from this episode: 1 no place, 2 all taken; 0: it is not.")
+      .def_readonly("reward_terms", &StepArraysOfPython::reward_terms,
+                    "float32 [slots, 11]: of which the reward is made, in the order of pictura.REWARD_TERMS.")
+      .def_readonly("distance_m", &StepArraysOfPython::distance_m, "float32 [slots]: driven in this step.");
+
+  py::class_<Snapshot>(module, "Snapshot", "A state that a simulator keeps in its own memory.");
+
+  py::class_<PySimulator>(module, "Simulator", R"(
+Many worlds, each on one map, stepped together. Arrays have one element a slot: the controlled agents of world 0, then those
+of world 1, and so on. Executors 'cpu' and 'cuda' give the same bits.
+
+One thread at a time; several simulators are independent. The GIL is released while C++ works. On CUDA its work is put on
+`stream`, calls return before it is done, and what is wrong with values is raised by check() or a later call.)")
+      .def(
+          py::init([](const std::vector<std::shared_ptr<Map>>& maps, const py::sequence& worlds,
+                      const std::string& executor, const std::string& device, uint64_t seed, int num_threads,
+                      float dt_s, int episode_steps, float reset_inactive_fraction, float pedestrian_fraction,
+                      float cyclist_fraction, int parked_cars, bool walls, uint64_t wall_seed, bool fixed_lights,
+                      bool auxiliary_observations, bool vector_observations, bool wall_observations,
+                      const py::dict& conditioning, const py::object& stream) {
+            SimulatorConfig config;
+            config.seed = seed;
+            config.device = device_of(device);
+            config.num_threads = num_threads;
+            config.dt_s = dt_s;
+            config.episode_steps = episode_steps;
+            config.reset_inactive_fraction = reset_inactive_fraction;
+            config.pedestrian_fraction = pedestrian_fraction;
+            config.cyclist_fraction = cyclist_fraction;
+            config.parked_cars = parked_cars;
+            config.walls = walls;
+            config.wall_seed = wall_seed;
+            config.fixed_lights = fixed_lights;
+            config.auxiliary_observations = auxiliary_observations;
+            config.vector_observations = vector_observations;
+            config.wall_observations = wall_observations;
+            set_conditioning(conditioning, &config);
+            return std::make_unique<PySimulator>(executor, config, maps, worlds_of(worlds), stream_of(stream));
+          }),
+          py::arg("maps"), py::arg("worlds"), py::kw_only(), py::arg("executor") = "auto", py::arg("device") = "cpu",
+          py::arg("seed") = 0, py::arg("num_threads") = 0, py::arg("dt_s") = SimulatorConfig{}.dt_s,
+          py::arg("episode_steps") = SimulatorConfig{}.episode_steps,
+          py::arg("reset_inactive_fraction") = SimulatorConfig{}.reset_inactive_fraction,
+          py::arg("pedestrian_fraction") = SimulatorConfig{}.pedestrian_fraction,
+          py::arg("cyclist_fraction") = SimulatorConfig{}.cyclist_fraction,
+          py::arg("parked_cars") = SimulatorConfig{}.parked_cars, py::arg("walls") = true, py::arg("wall_seed") = 0,
+          py::arg("fixed_lights") = false, py::arg("auxiliary_observations") = true,
+          py::arg("vector_observations") = true, py::arg("wall_observations") = false,
+          py::arg("conditioning") = py::dict(), py::arg("stream") = py::none(),
+          R"(maps: of pictura.Map. worlds: of (index of the map, agents), or (map, agents, global world), which keys the
+world's random numbers. executor: 'cpu', 'cuda' or 'auto'. device: where observations and scenes are wanted. num_threads: of
+the host, 0 for all. reset_inactive_fraction: a world resets when this part of its agents is inactive; more than 1: never.
+conditioning: a number or (low, high) by name, see CONDITIONING_NAMES; the paper's ranges otherwise. stream: a cudaStream_t
+as int; None: the legacy default stream. The other defaults are the paper's training world.
+Raises pictura.UsageError naming what cannot be simulated, pictura.Error where there is no device.)")
+      .def_property_readonly("name", [](PySimulator& self) { return std::string(self.simulator().name()); })
+      .def_property_readonly("choice", &PySimulator::choice, py::doc("What was chosen for 'auto', and why."))
+      .def_property_readonly("device", [](PySimulator& self) { return name_of(self.simulator().device()); })
+      .def_property_readonly("maps", &PySimulator::maps)
+      .def_property_readonly(
+          "worlds",
+          [](PySimulator& self) {
+            std::vector<WorldTuple> worlds;
+            for (const WorldSpec& world : self.simulator().worlds()) {
+              worlds.emplace_back(world.map, world.num_agents, world.global_world);
+            }
+            return worlds;
+          },
+          py::doc("(map, agents, global world) of each."))
+      .def_property_readonly("num_worlds", [](PySimulator& self) { return self.simulator().worlds().size(); })
+      .def_property_readonly("num_slots", [](PySimulator& self) { return self.simulator().num_slots(); })
+      .def_property_readonly("seed", [](PySimulator& self) { return self.simulator().config().seed; })
+      .def_property_readonly("dt_s", [](PySimulator& self) { return self.simulator().config().dt_s; })
+      .def_property_readonly("episode_steps", [](PySimulator& self) { return self.simulator().config().episode_steps; })
+      .def_property(
+          "stream", [](const PySimulator& self) { return reinterpret_cast<intptr_t>(self.stream().handle); },
+          [](PySimulator& self, const py::object& stream) { self.set_stream(stream_of(stream)); },
+          py::doc("The cudaStream_t that work is put on, as int; 0: the legacy default stream."))
+      .def(
+          "set_worlds",
+          [](PySimulator& self, const std::vector<std::shared_ptr<Map>>& maps, const py::sequence& worlds,
+             uint64_t seed) { self.set_worlds(maps, worlds_of(worlds), seed); },
+          py::arg("maps"), py::arg("worlds"), py::arg("seed") = 0,
+          R"(Other worlds on other maps, at the start of their first episodes: what a new simulator would be. Take the arrays
+anew: those of before stay valid memory and are no longer written. Raises as the constructor does.)")
+      .def(
+          "reset", &PySimulator::reset, py::arg("world_mask") = py::none(), py::arg("seed") = py::none(),
+          R"(Starts new episodes. world_mask: uint8 or bool [worlds] in the simulator's memory, the worlds that start; all without
+it. seed: theirs from now on; the simulator's own without it. Raises pictura.Error for another array.)")
+      .def(
+          "step", &PySimulator::step, py::arg("actions"),
+          R"(Advances every world by one step. actions: int32 [slots] in the simulator's memory, each in [0, 12): 3 times the
+longitudinal jerk's index (-15, -4, 0, 4 m/s3) plus the lateral one's (-4, 0, 4 m/s3, left positive). Those of inactive agents
+are ignored. A world whose last step ended its episode starts the next one instead, and its slots are not valid.
+Returns the StepResult. Raises pictura.Error, which leaves the state as it was, for another array and for actions out of
+range.)")
+      .def(
+          "step_commands", &PySimulator::step_commands, py::arg("commands"),
+          R"(The same by commands, COMMAND_DTYPE [slots]: kind 0 an action, 1 a kinematic state, 2 absence from the episode.)")
+      .def(
+          "set_state", &PySimulator::set_state, py::arg("slots"), py::arg("fields"),
+          R"(Gives fields of chosen agents other values. slots: int32 [n], each once. fields: arrays [n] or [n, per agent] by the
+names of AGENT_FIELDS, of their types, all in the simulator's memory. Lane, height, box, view and observation follow. Raises
+pictura.Error naming what is wrong; on CUDA values are checked as in step().)")
+      .def_property_readonly(
+          "observations", &PySimulator::observations,
+          py::doc("Arrays [slots, ...] by name, of the state after the last call: ego, partners, lanes, "
+                  "boundaries, controls, walls, set_counts, conditioning, waypoints."))
+      .def_property_readonly("state", &PySimulator::state,
+                             py::doc("Every field of the agents by name, read-only, [slots] or [slots, per agent]."))
+      .def_property_readonly("scene", &PySimulator::scene, py::doc("What renderers draw, of all worlds."))
+      .def_property_readonly(
+          "views", [](PySimulator& self) { return self.lend_structs<View>(self.simulator().views(), "views"); },
+          py::doc("One view a slot: uint8 [slots, 40] that render() takes; its fields are VIEW_DTYPE's."))
+      .def_property_readonly(
+          "episode_step",
+          [](PySimulator& self) { return self.lend_span(self.simulator().episode_step(), "episode_step"); },
+          py::doc("int32 [worlds]: steps done in the present episode."))
+      .def_property_readonly(
+          "episode_index",
+          [](PySimulator& self) { return self.lend_span(self.simulator().episode_index(), "episode_index"); },
+          py::doc("int32 [worlds]: the number of the episode."))
+      .def_property_readonly(
+          "world_of_slot",
+          [](PySimulator& self) { return self.lend_span(self.simulator().slots().world_of_slot, "world_of_slot"); },
+          py::doc("int32 [slots]."))
+      .def_property_readonly(
+          "agent_of_slot",
+          [](PySimulator& self) { return self.lend_span(self.simulator().slots().agent_of_slot, "agent_of_slot"); },
+          py::doc("int32 [slots]: the agent's index in its world."))
+      .def(
+          "spawn_report",
+          [](PySimulator& self) {
+            return report_of(
+                self.calls().run("spawn_report", [&] { return self.simulator().spawn_report(self.stream()); }));
+          },
+          "What became of the agents that were asked for: counts by name. Waits for the stream.")
+      .def(
+          "totals",
+          [](PySimulator& self) {
+            return dict_of(
+                self.calls().run("totals", [&] { return SimulatorTotals(self.simulator().totals(self.stream())); }));
+          },
+          "Counts and sums since construction by name; reward_terms is a dict. Waits for the stream.")
+      .def(
+          "state_hash",
+          [](PySimulator& self) {
+            return self.calls().run("state_hash", [&] { return self.simulator().state_hash(self.stream()); });
+          },
+          "64 bits over the whole state, equal on every executor. Waits for the stream.")
+      .def(
+          "save",
+          [](PySimulator& self) {
+            const auto bytes = self.calls().run("save", [&] { return self.simulator().save(self.stream()); });
+            return py::bytes(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+          },
+          "The whole state as bytes, for exact resume on any executor. Waits for the stream.")
+      .def(
+          "restore",
+          [](PySimulator& self, const py::bytes& saved) {
+            const std::string_view bytes = saved;
+            self.calls().run("restore", [&] {
+              self.simulator().restore(
+                  Span<const uint8_t>(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()), self.stream());
+            });
+          },
+          py::arg("saved"), "Back. Raises pictura.Error naming what differs.")
+      .def(
+          "restore",
+          [](PySimulator& self, const Snapshot& snapshot) {
+            PICTURA_CHECK(snapshot.of == self.shared(), "restore: expected a snapshot of this simulator");
+            self.calls().run("restore", [&] { self.simulator().restore(*snapshot.state, self.stream()); });
+          },
+          py::arg("snapshot"), "To a snapshot of these worlds; on CUDA without waiting.")
+      .def(
+          "snapshot",
+          [](PySimulator& self) {
+            return std::make_unique<Snapshot>(Snapshot{
+                self.shared(), self.calls().run("snapshot", [&] { return self.simulator().snapshot(self.stream()); })});
+          },
+          "A copy of the state in the simulator's memory.")
+      .def(
+          "check", [](PySimulator& self) { self.calls().run("check", [&] { self.simulator().check(self.stream()); }); },
+          "Waits for the work on the stream; raises pictura.Error for what a device found wrong.")
+      .def(
+          "draw", &PySimulator::draw, py::arg("world") = 0, py::arg("agent") = -1, py::kw_only(),
+          py::arg("width_px") = 640, py::arg("height_px") = 480, py::arg("width_m") = 150.0f,
+          R"(A world from above, uint8 [height, width, 3], on the CPU. agent: the one of that world in the middle, with its
+waypoints; -1 shows the whole map. width_m: what is shown around it.)")
+      .def(
+          "run",
+          [](PySimulator& self, PyController& controller, int64_t steps) {
+            self.run_steps(steps, [&] {
+              controller.act(self);
+              self.simulator().step(controller.commands(), self.stream());
+            });
+          },
+          py::arg("controller"), py::arg("steps"), "Steps with a controller for all agents. ^C ends it between steps.")
+      .def_property_readonly(
+          "geometries",
+          [](PySimulator& self) {
+            py::dict geometries;
+            for (size_t i = 0; i < self.simulator().maps().size(); ++i) {
+              const auto& map = self.simulator().maps()[i];
+              geometries[py::int_(self.simulator().handles()[i])] =
+                  py::cast(Geometry{std::shared_ptr<const StaticGeometry>(map, &map->geometry)});
+            }
+            return geometries;
+          },
+          py::doc("Of its maps, by the handles that its scene names them by."));
+
+  py::class_<PyController>(module, "Controller", R"(
+Who drives: 'lane' (the lane keeper), 'idle' or 'random', for one simulator on the CPU.)")
+      .def(py::init<const std::string&, PySimulator&, uint64_t>(), py::arg("name"), py::arg("simulator"),
+           py::arg("seed") = 0, "Raises pictura.UsageError listing the names.")
+      .def_property_readonly("name", &PyController::name)
+      .def(
+          "act",
+          [](PyController& self, PySimulator& simulator) {
+            simulator.calls().run("act", [&] { self.act(simulator); });
+            return self.numpy_commands();
+          },
+          py::arg("simulator"),
+          R"(Commands for all slots, COMMAND_DTYPE [slots], which may be changed before step_commands() takes them. The same memory
+at every call.)");
+
+  module.def(
+      "draw_worlds",
+      [](uint64_t seed, int num_slots, int min_agents, int max_agents, int num_maps) {
+        std::vector<WorldTuple> worlds;
+        for (const WorldSpec& world : draw_worlds(seed, num_slots, min_agents, max_agents, num_maps)) {
+          worlds.emplace_back(world.map, world.num_agents, world.global_world);
+        }
+        return worlds;
+      },
+      py::arg("seed"), py::arg("num_slots"), py::arg("min_agents"), py::arg("max_agents"), py::arg("num_maps"),
+      "Worlds of sizes drawn from U{min, max} until they fill the slots; maps are taken in turn.");
+  module.def("simulator_names", simulator_names, "Executors that this build knows.");
+}
+
+}  // namespace pictura::python

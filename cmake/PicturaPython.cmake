@@ -1,0 +1,30 @@
+# Python and pybind11 for bindings/: the Python of PICTURA_PYTHON, of the virtual environment, or of the build that
+# scikit-build-core makes.
+
+set(PICTURA_HAS_PYTHON OFF)
+if(NOT PICTURA_WITH_PYTHON STREQUAL OFF)
+  if(NOT Python_EXECUTABLE)
+    foreach(venv ${PICTURA_VENV} $ENV{PICTURA_VENV} ${PROJECT_SOURCE_DIR}/.venv)
+      if(EXISTS ${venv}/bin/python AND NOT Python_EXECUTABLE)
+        set(Python_EXECUTABLE ${venv}/bin/python)
+      endif()
+    endforeach()
+  endif()
+  find_package(Python 3.11 COMPONENTS Interpreter Development.Module QUIET)
+  if(Python_Development.Module_FOUND)
+    execute_process(COMMAND ${Python_EXECUTABLE} -c "import pybind11; print(pybind11.get_cmake_dir())"
+      OUTPUT_VARIABLE pybind11_folder ERROR_QUIET OUTPUT_STRIP_TRAILING_WHITESPACE)
+    if(pybind11_folder)
+      set(PYBIND11_FINDPYTHON ON)
+      find_package(pybind11 3.0 CONFIG QUIET PATHS ${pybind11_folder} NO_DEFAULT_PATH)
+    endif()
+    if(pybind11_FOUND)
+      set(PICTURA_HAS_PYTHON ON)
+      message(STATUS "python: ${Python_EXECUTABLE} ${Python_VERSION}, pybind11 ${pybind11_VERSION}")
+    endif()
+  endif()
+  if(NOT PICTURA_HAS_PYTHON AND PICTURA_WITH_PYTHON STREQUAL ON)
+    message(FATAL_ERROR "PICTURA_WITH_PYTHON=ON, but '${Python_EXECUTABLE}' has no headers or no pybind11 3: "
+                        "run scripts/setup, or set Python_EXECUTABLE")
+  endif()
+endif()

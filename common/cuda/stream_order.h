@@ -1,0 +1,35 @@
+// Streams in DLPack's numbers, and work on one stream that waits for work on another.
+#pragma once
+
+#include <cstdint>
+
+#include "pictura/common/cuda/device_guard.h"
+
+namespace pictura {
+
+/// Of DLPack's number: 1 is the legacy default stream, 2 the default stream of the calling thread, others are handles.
+inline Stream stream_of_number(int64_t number) {
+  if (number == 1) return {cudaStreamLegacy};
+  if (number == 2) return {cudaStreamPerThread};
+  return {reinterpret_cast<void*>(static_cast<intptr_t>(number))};
+}
+/// Back. The null handle is the legacy default stream.
+inline int64_t number_of_stream(Stream stream) {
+  const auto number = static_cast<int64_t>(reinterpret_cast<intptr_t>(stream.handle));
+  return number == 0 ? 1 : number;
+}
+
+/// Work that is put on `after` from now on waits for what has been put on `before`. Does not wait itself.
+inline void order_streams(Device device, Stream before, Stream after) {
+  if (number_of_stream(before) == number_of_stream(after)) return;
+  const DeviceGuard guard(device);
+  cudaEvent_t event = nullptr;
+  PICTURA_CUDA(cudaEventCreateWithFlags(&event, cudaEventDisableTiming));
+  const cudaError_t recorded = cudaEventRecord(event, static_cast<cudaStream_t>(before.handle));
+  const cudaError_t waits =
+      recorded == cudaSuccess ? cudaStreamWaitEvent(static_cast<cudaStream_t>(after.handle), event, 0) : recorded;
+  cudaEventDestroy(event);  // once it has been recorded
+  PICTURA_CUDA(waits);
+}
+
+}  // namespace pictura
