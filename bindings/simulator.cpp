@@ -598,6 +598,10 @@ pictura.Error naming what is wrong; on CUDA values are checked as in step().)")
           [](PySimulator& self) { return self.lend_span(self.simulator().episode_index(), "episode_index"); },
           py::doc("int32 [worlds]: the number of the episode."))
       .def_property_readonly(
+          "episode_over",
+          [](PySimulator& self) { return self.lend_span(self.simulator().episode_over(), "episode_over", true); },
+          py::doc("bool [worlds]: the episode has ended, and the next step begins the next one."))
+      .def_property_readonly(
           "world_of_slot",
           [](PySimulator& self) { return self.lend_span(self.simulator().slots().world_of_slot, "world_of_slot"); },
           py::doc("int32 [slots]."))

@@ -196,6 +196,8 @@ class Simulator {
   /// Steps done in the current episode of each world, and the number of that episode.
   virtual Span<const int32_t> episode_step() const = 0;
   virtual Span<const int32_t> episode_index() const = 0;
+  /// [worlds] 1: the episode has ended, and the next step begins the next one.
+  virtual Span<const uint8_t> episode_over() const = 0;
 
   // On a device each of the following waits for the work on its stream and copies to the host.
   virtual SpawnReport spawn_report(Stream stream = {}) const = 0;

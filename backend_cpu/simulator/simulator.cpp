@@ -94,6 +94,7 @@ class SimulatorCpu final : public Simulator {
   AgentStateView state() override { return worlds_.state.agents.view(); }
   Span<const int32_t> episode_step() const override { return worlds_.state.episode_step; }
   Span<const int32_t> episode_index() const override { return worlds_.state.episode_index; }
+  Span<const uint8_t> episode_over() const override { return worlds_.state.episode_over; }
   SpawnReport spawn_report(Stream) const override { return worlds_.state.spawn_report(worlds_.setup); }
   const SimulatorTotals& totals(Stream) const override { return totals_; }
   uint64_t state_hash(Stream) const override { return worlds_.state.hash(worlds_.setup); }

@@ -98,6 +98,8 @@ class SimulatorCuda final : public Simulator {
   Span<const int32_t> episode_step() const override { return {state_.episode_step.data(), setup_.worlds.size()}; }
   Span<const int32_t> episode_index() const override { return {state_.episode_index.data(), setup_.worlds.size()}; }
 
+  Span<const uint8_t> episode_over() const override { return {state_.episode_over.data(), setup_.worlds.size()}; }
+
   SpawnReport spawn_report(Stream stream) const override {
     const DeviceGuard guard(device_);
     get(state_.boxes, &host_.boxes, handle_of(stream));

@@ -307,6 +307,7 @@ class StillSimulator final : public Simulator {
   const SimulatorTotals& totals(Stream) const override { return totals_; }
   Span<const int32_t> episode_step() const override { return {}; }
   Span<const int32_t> episode_index() const override { return {}; }
+  Span<const uint8_t> episode_over() const override { return {}; }
   uint64_t state_hash(Stream) const override { return 0; }
   std::vector<uint8_t> save(Stream) const override { return {}; }
   void restore(Span<const uint8_t>, Stream) override {}

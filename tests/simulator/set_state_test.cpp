@@ -79,6 +79,7 @@ TEST(ResetOfWorlds, ClearsTheirResultsAndRefusesAnotherMask) {
   EXPECT_EQ(result.valid[15], 1);
   EXPECT_EQ(simulator->episode_step()[0], 0);
   EXPECT_EQ(simulator->episode_step()[1], 1);
+  EXPECT_EQ(simulator->episode_over()[0], 0);
   EXPECT_EQ(test::message_of([&] { simulator->reset(std::vector<uint8_t>{1}, 5); }),
             "reset: world_mask: expected u8 [2] on cpu, got u8 [1] on cpu");
 }

@@ -203,6 +203,7 @@ TEST(Simulator, EpisodesEndInTimeAndResetInTheNextStep) {
       EXPECT_EQ(result.terminated[i], 0);
       EXPECT_EQ(result.truncated[i], step == 5);
     }
+    EXPECT_EQ(simulator->episode_over()[0], step == 5);
   }
   EXPECT_EQ(simulator->episode_step()[0], 5);
   EXPECT_EQ(simulator->state().x_m[0], first_x_m);                         // nobody moved: still the old episode

@@ -1,0 +1,17 @@
+"""The `pictura` command, as the package brings it along: `python -m pictura`."""
+
+import os
+import pathlib
+import sys
+
+
+def main() -> None:
+    """Becomes the command, with the same arguments."""
+    program = pathlib.Path(__file__).parent / "bin" / "pictura"
+    if not program.exists():
+        sys.exit(f"error: this package was built without the command: expected {program}")
+    os.execv(program, [str(program), *sys.argv[1:]])
+
+
+if __name__ == "__main__":
+    main()
