@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <pybind11/stl.h>
 
 #include "pictura/common/error.h"
 #ifdef PICTURA_HAS_CUDA

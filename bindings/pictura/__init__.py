@@ -40,3 +40,9 @@ from pictura._pictura import (  # noqa: F401
     simulator_names,
 )
 
+
+def make_vec(maps="procedural:3", num_agents: int = 16, **options):
+    """Gymnasium's vector environment of all agents; see pictura.envs.gymnasium_vector.DriveVectorEnv."""
+    from pictura.envs.gymnasium_vector import DriveVectorEnv
+
+    return DriveVectorEnv(maps, num_agents, **options)

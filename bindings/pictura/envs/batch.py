@@ -1,0 +1,226 @@
+"""What all environments share: a simulator, its renderer, and what each slot observes, is told and has done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+import pictura
+
+OBSERVATIONS = ("vector", "flat", "images", "both")
+ACTIONS = ("discrete", "multi_discrete")
+# Of the vector observation, in the order in which "flat" has them.
+VECTOR_KEYS = ("ego", "partners", "lanes", "boundaries", "controls", "walls", "conditioning", "waypoints")
+NUM_LONGITUDINAL, NUM_LATERAL = 4, 3
+STATUS_ACTIVE = 0
+
+
+def load_maps(maps: str | pictura.Map | Sequence[str | pictura.Map]) -> list[pictura.Map]:
+    """Maps by name or as they are, one or several."""
+    if isinstance(maps, (str, pictura.Map)):
+        maps = [maps]
+    return [pictura.Map.load(each) if isinstance(each, str) else each for each in maps]
+
+
+class Batch:
+    """A simulator whose slots are agents to be trained, with images where they are observed.
+
+    maps: names or pictura.Map, taken in turn by the worlds. num_agents: of each world. observation: "vector" (a dict of
+    entity sets), "flat" (the same as one float32 [slots, n]), "images" (uint8 rgb with ego, conditioning and waypoints), or
+    "both". actions: "discrete", 12 of them, or "multi_discrete", [longitudinal 4, lateral 3]. array: "numpy", or "torch" for
+    tensors over the simulator's memory, which is all that a CUDA device has. rig: of the images, the paper's by default.
+    Other options are pictura.Simulator's. Raises pictura.UsageError for what there is not.
+    """
+
+    def __init__(
+        self,
+        maps: str | pictura.Map | Sequence[str | pictura.Map] = "procedural:3",
+        num_agents: int = 16,
+        num_worlds: int = 1,
+        *,
+        observation: str = "vector",
+        actions: str = "discrete",
+        seed: int = 0,
+        device: str = "cpu",
+        array: str | None = None,
+        rig: pictura.Rig | None = None,
+        renderer: str = "auto",
+        num_threads: int = 0,
+        **options: Any,
+    ) -> None:
+        if observation not in OBSERVATIONS:
+            raise pictura.UsageError(f"observation: expected one of {', '.join(OBSERVATIONS)}; got '{observation}'")
+        if actions not in ACTIONS:
+            raise pictura.UsageError(f"actions: expected one of {', '.join(ACTIONS)}; got '{actions}'")
+        array = array or ("numpy" if device == "cpu" else "torch")
+        if array not in ("numpy", "torch") or (array == "numpy" and device != "cpu"):
+            raise pictura.UsageError(f"array: expected 'numpy' (on the CPU alone) or 'torch', got '{array}' on {device}")
+        if num_agents < 1 or num_worlds < 1:
+            raise pictura.UsageError(f"expected at least 1 agent and 1 world, got {num_agents} and {num_worlds}")
+        loaded = load_maps(maps)
+        if observation == "images":
+            options.setdefault("vector_observations", False)
+        self.observation, self.actions, self.array = observation, actions, array
+        self.simulator = pictura.Simulator(
+            loaded,
+            [(world % len(loaded), num_agents, world) for world in range(num_worlds)],
+            device=device,
+            seed=seed,
+            num_threads=num_threads,
+            **options,
+        )
+        self.num_slots = self.simulator.num_slots
+        self.num_worlds, self.num_agents = num_worlds, num_agents
+        self.renderer, self._images = None, None
+        if observation in ("images", "both"):
+            self.renderer = pictura.Renderer(renderer, rig, device=device, num_threads=num_threads)
+            for handle, geometry in self.simulator.geometries.items():
+                self.renderer.upload(handle, geometry)
+            self._images = self.renderer.make_images(self.num_slots)
+            blocks = self._images.blocks
+            self._image_views = {"rgb" if len(blocks) == 1 else f"rgb_{i}": self.view(b) for i, b in enumerate(blocks)}
+        self._own = {key: self.view(array_) for key, array_ in self.simulator.observations.items()}
+        self._state = {key: self.view(array_) for key, array_ in self.simulator.state.items()}
+        self._flat_keys = [key for key in VECTOR_KEYS if key in self._own]
+        self._result_views: dict[str, Any] = {}
+        if array == "torch":
+            import torch
+
+            self._torch = torch
+            self._action_memory = torch.full(
+                (self.num_slots,), pictura.IDLE_ACTION, dtype=torch.int32, device=self._own["ego"].device
+            )
+        else:
+            self._action_memory = np.full(self.num_slots, pictura.IDLE_ACTION, np.int32)
+
+    def view(self, lent: pictura.Array) -> Any:
+        """A NumPy array or torch tensor over memory of the library."""
+        if self.array == "numpy":
+            return lent.numpy()
+        return self._torch_of(lent)
+
+    @staticmethod
+    def _torch_of(lent: pictura.Array) -> Any:
+        import torch
+
+        return torch.from_dlpack(lent)
+
+    # Observations
+
+    def observe(self, copy: bool = True) -> Any:
+        """What every slot observes now: an array or a dict of arrays [slots, ...]; views of the simulator's memory unless
+        copied, but for "flat", which is made anew."""
+        if self.observation == "flat":
+            rows = [self._own[key].reshape(self.num_slots, -1) for key in self._flat_keys]
+            return np.concatenate(rows, axis=1) if self.array == "numpy" else self._torch.cat(rows, dim=1)
+        seen = {}
+        if self.observation in ("vector", "both"):
+            seen.update(self._own)
+        else:
+            seen.update({key: self._own[key] for key in ("ego", "conditioning", "waypoints")})
+        if self.renderer is not None:
+            self.renderer.render(self.simulator.scene, self.simulator.views, self._images)
+            seen.update(self._image_views)
+        return {key: self.copied(value) for key, value in seen.items()} if copy else seen
+
+    def shapes(self) -> dict[str, tuple[tuple[int, ...], str]] | tuple[tuple[int, ...], str]:
+        """Of one slot's observation: (shape, NumPy's name of the type), by name or for "flat" alone."""
+        if self.observation == "flat":
+            return (sum(int(np.prod(self._own[key].shape[1:])) for key in self._flat_keys),), "float32"
+        keys = self._own if self.observation in ("vector", "both") else ("ego", "conditioning", "waypoints")
+        shapes = {key: (tuple(self._own[key].shape[1:]), "int32" if key == "set_counts" else "float32") for key in keys}
+        for key, value in getattr(self, "_image_views", {}).items():
+            shapes[key] = (tuple(value.shape[1:]), "uint8")
+        return shapes
+
+    def copied(self, value: Any) -> Any:
+        return value.copy() if self.array == "numpy" else value.clone()
+
+    # Actions
+
+    def action_indices(self, actions: Any) -> Any:
+        """Actions as a user has them, as int32 [slots] in [0, 12). Raises pictura.Error for other shapes and for numbers that
+        are not integers."""
+        if self.array == "torch":
+            torch = self._torch
+            actions = torch.as_tensor(actions, device=self._action_memory.device)
+            if actions.dtype.is_floating_point or actions.dtype.is_complex:
+                raise pictura.Error(f"actions: expected integers, got {actions.dtype}")
+        else:
+            actions = np.asarray(actions)
+            if actions.dtype.kind not in "iu":
+                raise pictura.Error(f"actions: expected integers, got {actions.dtype}")
+        shape = (self.num_slots,) if self.actions == "discrete" else (self.num_slots, 2)
+        if tuple(actions.shape) != shape:
+            raise pictura.Error(f"actions: expected {list(shape)}, got {list(actions.shape)}")
+        if self.actions == "multi_discrete":
+            if self.array == "numpy" and not (
+                (actions >= 0).all() and (actions[:, 0] < NUM_LONGITUDINAL).all() and (actions[:, 1] < NUM_LATERAL).all()
+            ):
+                raise pictura.Error("actions: expected [longitudinal in [0, 4), lateral in [0, 3)]")
+            actions = actions[:, 0] * NUM_LATERAL + actions[:, 1]
+        self._action_memory[:] = actions
+        return self._action_memory
+
+    # Steps
+
+    def reset(self, seed: int | None = None, world_mask: Any = None) -> None:
+        """New episodes in all worlds, or in those of the mask: of `seed`, or of the simulator's own."""
+        self.simulator.reset(world_mask, seed)
+
+    def step(self, actions: Any) -> dict[str, Any]:
+        """One step; returns its results by name, views that the next step overwrites."""
+        result = self.simulator.step(self.action_indices(actions))
+        return self.results(result)
+
+    def results(self, result: pictura.StepResult) -> dict[str, Any]:
+        if not self._result_views:
+            names = ("reward", "terminated", "truncated", "valid", "refusal", "reward_terms", "distance_m")
+            self._result_views = {name: self.view(getattr(result, name)) for name in names}
+        return self._result_views
+
+    @property
+    def active(self) -> Any:
+        """bool [slots]: who drives now; the others have halted or are absent, and what they are told is ignored."""
+        return self._state["status"] == STATUS_ACTIVE
+
+    def info(self) -> dict[str, Any]:
+        """Of every slot after a step, by name; docs/python.md lists them."""
+        results = self._result_views
+        info = {"active": self.active}
+        for name in ("events", "halt_reason", "goals_reached", "waypoints_reached", "episode_return", "agent_class"):
+            info[name] = self.copied(self._state[name])
+        for name in ("valid", "reward_terms", "distance_m"):
+            if name in results:
+                info[name] = self.copied(results[name])
+        return info
+
+    def draw(self, world: int = 0, agent: int = 0, width_px: int = 640, height_px: int = 480) -> np.ndarray:
+        """From above around an agent of a world, uint8 [height, width, 3]; on the CPU."""
+        return self.simulator.draw(world, agent, width_px=width_px, height_px=height_px)
+
+
+class OtherDrivers:
+    """Who drives the agents of a world that a user does not: "lane", "idle" or "random", or a function of observations.
+
+    A function takes the dict of all slots' observations and returns int32 [slots].
+    """
+
+    def __init__(self, who: str | Callable[[Mapping[str, Any]], Any], batch: Batch, seed: int) -> None:
+        self._batch = batch
+        self._policy = who if callable(who) else None
+        self._controller = None if callable(who) else pictura.Controller(who, batch.simulator, seed)
+
+    def step(self, slot: int, action: int) -> dict[str, Any]:
+        """One step in which the agent of `slot` does `action` and the others do what they do."""
+        batch = self._batch
+        if self._policy is not None:
+            actions = np.array(self._policy(batch.observe(copy=False)), np.int32)
+            actions[slot] = action
+            return batch.results(batch.simulator.step(actions))
+        commands = self._controller.act(batch.simulator)
+        commands["kind"][slot] = 0
+        commands["action"][slot] = action
+        return batch.results(batch.simulator.step_commands(commands))

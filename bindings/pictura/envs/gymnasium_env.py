@@ -1,0 +1,77 @@
+"""Gymnasium's environment of one agent among others: gymnasium.make("pictura/Drive-v0")."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+import pictura
+from pictura.envs.batch import Batch, OtherDrivers
+from pictura.envs.gymnasium_spaces import action_space, observation_space
+
+
+class DriveEnv(gymnasium.Env):
+    """One vehicle of a world, whose other agents keep their lanes ("lane"), stand ("idle"), act at random ("random"), or
+    follow a policy, a function from the observations of all slots to actions int32 [slots].
+
+    An episode ends when the agent's infraction halts it (terminated) or when its world's does (truncated). Other options are
+    pictura.envs.Batch's; it runs on the CPU, by one thread unless num_threads says otherwise, so that processes can be forked.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
+
+    def __init__(
+        self,
+        maps: Any = "procedural:3",
+        num_agents: int = 16,
+        *,
+        others: str | Callable[[Any], Any] = "lane",
+        render_mode: str | None = None,
+        num_threads: int = 1,
+        **options: Any,
+    ) -> None:
+        if render_mode not in (None, "rgb_array"):
+            raise pictura.UsageError(f"render_mode: expected None or 'rgb_array', got '{render_mode}'")
+        self.render_mode = render_mode
+        self.batch = Batch(maps, num_agents, 1, num_threads=num_threads, device="cpu", array="numpy", **options)
+        self.observation_space = observation_space(self.batch)
+        self.action_space = action_space(self.batch)
+        self._others = OtherDrivers(others, self.batch, options.get("seed", 0))
+        self._slot = 0
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        super().reset(seed=seed)
+        for _ in range(100):
+            self.batch.reset(int(self.np_random.integers(2**63)))
+            state = self.batch._state
+            drivers = np.flatnonzero(self.batch.active & (state["agent_class"] == 0))
+            if len(drivers):
+                self._slot = int(drivers[0])
+                return self._observation(), self._info()
+        raise pictura.Error("reset: no vehicle found a place in 100 episodes: expected a map or an option that has room")
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        if not self.action_space.contains(action):
+            raise pictura.Error(f"step: expected an action of {self.action_space}, got {action!r}")
+        if self.batch.actions == "multi_discrete":
+            action = 3 * int(action[0]) + int(action[1])
+        results = self._others.step(self._slot, int(action))
+        terminated, truncated = bool(results["terminated"][self._slot]), bool(results["truncated"][self._slot])
+        return self._observation(), float(results["reward"][self._slot]), terminated, truncated, self._info()
+
+    def render(self) -> np.ndarray | None:
+        if self.render_mode is None:
+            return None
+        return self.batch.draw(0, self._slot)
+
+    def _observation(self) -> Any:
+        seen = self.batch.observe(copy=False)
+        if isinstance(seen, dict):
+            return {key: value[self._slot].copy() for key, value in seen.items()}
+        return seen[self._slot]
+
+    def _info(self) -> dict[str, Any]:
+        return {key: value[self._slot] for key, value in self.batch.info().items()}

@@ -1,0 +1,135 @@
+"""Gymnasium's vector environment of all agents: the "environment" axis is the simulator's slots."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+
+import pictura
+from pictura.envs.batch import Batch
+from pictura.envs.gymnasium_spaces import action_space, observation_space
+
+
+class DriveVectorEnv(gymnasium.vector.VectorEnv):
+    """All agents of all worlds.
+
+    A slot whose agent has halted reports `terminated` once, then reward 0 and info["active"] false until its world resets:
+    agents of a world begin together. autoreset "next_step": the step after a world's end begins its next episode; its
+    rewards are 0. "same_step": the step that ends it begins it, and info["final_obs"] and info["final_info"] have, for the
+    slots that ended in that step, what was last seen.
+
+    num_envs: how many slots there must be; num_agents times num_worlds otherwise. copy: whether observations are copies;
+    without, they are views that the next step overwrites. Other options are pictura.envs.Batch's. On CUDA everything is
+    torch tensors in device memory.
+    """
+
+    def __init__(
+        self,
+        maps: Any = "procedural:3",
+        num_agents: int = 16,
+        num_worlds: int = 1,
+        *,
+        num_envs: int | None = None,
+        autoreset: str = "next_step",
+        render_mode: str | None = None,
+        copy: bool = True,
+        **options: Any,
+    ) -> None:
+        modes = {"next_step": AutoresetMode.NEXT_STEP, "same_step": AutoresetMode.SAME_STEP}
+        if autoreset not in modes:
+            raise pictura.UsageError(f"autoreset: expected one of {', '.join(modes)}; got '{autoreset}'")
+        if render_mode not in (None, "rgb_array"):
+            raise pictura.UsageError(f"render_mode: expected None or 'rgb_array', got '{render_mode}'")
+        if num_envs is not None and num_envs != num_agents * num_worlds:
+            num_worlds, rest = divmod(num_envs, num_agents)
+            if rest or num_worlds < 1:
+                raise pictura.UsageError(f"num_envs: expected a multiple of num_agents {num_agents}, got {num_envs}")
+        self.metadata = {"render_modes": ["rgb_array"], "render_fps": 10, "autoreset_mode": modes[autoreset]}
+        self.render_mode = render_mode
+        self._same_step, self._copy = autoreset == "same_step", copy
+        self.batch = Batch(maps, num_agents, num_worlds, **options)
+        self.num_envs = self.batch.num_slots
+        self.single_observation_space = observation_space(self.batch)
+        self.single_action_space = action_space(self.batch)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._over = self.batch.view(self.batch.simulator.episode_over)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        super().reset(seed=seed)
+        self.batch.reset(self._next_seed())
+        return self.batch.observe(self._copy), self._info()
+
+    def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        batch = self.batch
+        results = batch.step(actions)
+        reward, terminated, truncated = (batch.copied(results[key]) for key in ("reward", "terminated", "truncated"))
+        info = self._info()
+        if self._same_step and bool(self._over.any()):
+            ended = terminated | truncated
+            info["final_obs"], info["_final_obs"] = batch.observe(copy=True), ended
+            info["final_info"], info["_final_info"] = info.copy(), batch.copied(ended)
+            for key in ("final_obs", "_final_obs"):
+                info["final_info"].pop(key)
+            over = batch.copied(self._over)
+            batch.reset(self._next_seed(), over)
+            info["active"] = batch.active
+        return batch.observe(self._copy), reward, terminated, truncated, info
+
+    def render(self) -> np.ndarray | None:
+        """The first world from above."""
+        return None if self.render_mode is None else self.batch.draw(0, 0)
+
+    def _next_seed(self) -> int:
+        return int(self.np_random.integers(2**63))
+
+    def _info(self) -> dict[str, Any]:
+        info = self.batch.info()
+        everybody = self.batch.copied(info["active"])
+        everybody[:] = True
+        return info | {f"_{key}": everybody for key in info}
+
+
+class AgentStatistics(gymnasium.vector.VectorWrapper):
+    """Counts what the agents do, as the simulator's own totals: `statistics`, a dict of numbers since construction.
+
+    Steps of halted agents are not counted. Counts equal pictura.Simulator.totals(); sums do but for rounding.
+    """
+
+    def __init__(self, env: DriveVectorEnv) -> None:
+        super().__init__(env)
+        names = ("agent_steps", "finished_agent_episodes", "goals_reached", "waypoints_reached", "collisions")
+        names += ("at_fault_collisions", "off_road", "red_light", "wall_contacts")
+        self.statistics: dict[str, float] = dict.fromkeys(names, 0) | {"reward": 0.0, "distance_m": 0.0, "finished_return": 0.0}
+
+    def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        observation, reward, terminated, truncated, info = self.env.step(actions)
+        valid, count = info["valid"], self.statistics
+        events = info["events"] * valid
+        ended = terminated | truncated
+        count["agent_steps"] += int(valid.sum())
+        count["finished_agent_episodes"] += int(ended.sum())
+        bits = pictura.EVENTS
+        for name, mask in (
+            ("goals_reached", bits["metric_goal"]),
+            ("waypoints_reached", bits["waypoint"] | bits["goal"]),
+            ("collisions", bits["collision"]),
+            ("at_fault_collisions", bits["at_fault"]),
+            ("off_road", bits["off_road"]),
+            ("red_light", bits["red_light"]),
+            ("wall_contacts", bits["wall"]),
+        ):
+            count[name] += int(((events & mask) != 0).sum())
+        count["reward"] += float(reward.sum())
+        count["distance_m"] += float(info["distance_m"].sum())
+        count["finished_return"] += float(info["episode_return"][ended].sum())
+        return observation, reward, terminated, truncated, info
+
+
+def make_vec(maps: Any = "procedural:3", num_agents: int = 16, **options: Any) -> DriveVectorEnv:
+    """A vector environment of all agents: pictura.make_vec("procedural:3", num_agents=16, num_worlds=64, device="cuda")."""
+    return DriveVectorEnv(maps, num_agents, **options)

@@ -1,0 +1,91 @@
+"""PettingZoo's ParallelEnv of the agents of one world."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pettingzoo import ParallelEnv
+
+import pictura
+from pictura.envs.batch import Batch
+from pictura.envs.gymnasium_spaces import action_space, observation_space
+
+
+class DriveParallelEnv(ParallelEnv):
+    """agent_0, agent_1, ...: those that found a place and still drive are `agents`. An infraction terminates an agent, the
+    end of the world's episode truncates all that are left. infos have what pictura.envs.Batch.info() lists; "active" is
+    whether the agent goes on. Options are Batch's; it runs on the CPU.
+    """
+
+    metadata = {"name": "pictura_drive_v0", "render_modes": ["rgb_array"], "render_fps": 10, "is_parallelizable": True}
+
+    def __init__(
+        self,
+        maps: Any = "procedural:3",
+        num_agents: int = 8,
+        *,
+        render_mode: str | None = None,
+        num_threads: int = 1,
+        **options: Any,
+    ) -> None:
+        self.render_mode = render_mode
+        self.batch = Batch(maps, num_agents, 1, num_threads=num_threads, device="cpu", array="numpy", **options)
+        self.possible_agents = [f"agent_{i}" for i in range(num_agents)]
+        self.agents: list[str] = []
+        # One space object each, so that seeding one does not seed the others.
+        self.observation_spaces = {agent: observation_space(self.batch) for agent in self.possible_agents}
+        self.action_spaces = {agent: action_space(self.batch) for agent in self.possible_agents}
+        self._random = np.random.default_rng(options.get("seed", 0))
+
+    def observation_space(self, agent: str) -> Any:
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> Any:
+        return self.action_spaces[agent]
+
+    def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict, dict]:
+        if seed is not None:
+            self._random = np.random.default_rng(seed)
+        for _ in range(100):
+            self.batch.reset(int(self._random.integers(2**63)))
+            active = self.batch.active
+            self.agents = [agent for i, agent in enumerate(self.possible_agents) if active[i]]
+            if self.agents:
+                return self._observations(self.agents), self._infos(self.agents)
+        raise pictura.Error("reset: no agent found a place in 100 episodes: expected a map or an option that has room")
+
+    def step(self, actions: dict[str, Any]) -> tuple[dict, dict, dict, dict, dict]:
+        acting = self.agents
+        missing = [agent for agent in acting if agent not in actions]
+        if missing:
+            raise pictura.Error(f"step: expected an action of every live agent, got none of {', '.join(missing)}")
+        width = 2 if self.batch.actions == "multi_discrete" else 1
+        idle = divmod(pictura.IDLE_ACTION, 3) if width == 2 else pictura.IDLE_ACTION
+        told = np.array([actions[agent] if agent in acting else idle for agent in self.possible_agents])
+        results = self.batch.step(told)
+        slots = {agent: self._slot(agent) for agent in acting}
+        rewards = {agent: float(results["reward"][slot]) for agent, slot in slots.items()}
+        terminations = {agent: bool(results["terminated"][slot]) for agent, slot in slots.items()}
+        truncations = {agent: bool(results["truncated"][slot]) for agent, slot in slots.items()}
+        self.agents = [agent for agent in acting if not terminations[agent] and not truncations[agent]]
+        return self._observations(acting), rewards, terminations, truncations, self._infos(acting)
+
+    def render(self) -> np.ndarray | None:
+        return None if self.render_mode is None else self.batch.draw(0, 0)
+
+    def close(self) -> None:
+        pass
+
+    def _slot(self, agent: str) -> int:
+        return int(agent.removeprefix("agent_"))
+
+    def _observations(self, agents: list[str]) -> dict[str, Any]:
+        seen = self.batch.observe(copy=True)
+        if isinstance(seen, dict):
+            return {agent: {key: value[self._slot(agent)] for key, value in seen.items()} for agent in agents}
+        return {agent: seen[self._slot(agent)] for agent in agents}
+
+    def _infos(self, agents: list[str]) -> dict[str, Any]:
+        info = self.batch.info()
+        return {agent: {key: value[self._slot(agent)] for key, value in info.items()} for agent in agents}

@@ -1,0 +1,272 @@
+"""Arrays: no copies, lifetimes, DLPack's protocol, and what is refused."""
+
+import gc
+import random
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import pictura
+
+
+def test_numpy_and_dlpack_see_the_simulators_memory(make, idle):
+    simulator = make()
+    ego = simulator.observations["ego"]
+    views = [np.asarray(ego), ego.numpy(), np.from_dlpack(ego)]
+    assert len({view.ctypes.data for view in views}) == 1
+    steps = simulator.episode_step.numpy()
+    before = steps.copy()
+    simulator.step(idle(simulator))
+    assert steps[0] == before[0] + 1
+
+
+def test_what_lends_lives_as_long_as_what_it_lent(make, idle):
+    simulator = make()
+    result = simulator.step(idle(simulator))
+    held = [np.asarray(simulator.observations["lanes"]), np.from_dlpack(simulator.state["x_m"]), result.reward.numpy()]
+    copies = [array.copy() for array in held]
+    capsule = simulator.observations["ego"].__dlpack__(max_version=(1, 0))
+    del simulator, result
+    gc.collect()
+    blocks = [np.ones(1 << 16) for _ in range(20)]
+    assert all((array == copy).all() for array, copy in zip(held, copies)) and blocks
+    del capsule
+
+
+def test_dlpack_speaks_both_versions(make):
+    simulator = make()
+    ego, x_m = simulator.observations["ego"], simulator.state["x_m"]
+    assert ego.__dlpack_device__() == (1, 0)
+    assert "dltensor_versioned" in repr(ego.__dlpack__(max_version=(1, 0)))
+    assert '"dltensor"' in repr(ego.__dlpack__())
+    with pytest.raises(BufferError, match="read-only"):
+        x_m.__dlpack__()
+    assert not np.from_dlpack(x_m).flags.writeable and not np.asarray(x_m).flags.writeable
+    copied = np.from_dlpack(x_m, copy=True)
+    assert copied.ctypes.data != np.asarray(x_m).ctypes.data and (copied == np.asarray(x_m)).all()
+    with pytest.raises(BufferError, match="dl_device"):
+        ego.__dlpack__(dl_device=(2, 0), max_version=(1, 0))
+    with pytest.raises(BufferError, match="stream"):
+        ego.__dlpack__(stream=3)
+    with pytest.raises(TypeError):
+        ego.__dlpack__(color=3)
+
+
+def test_strided_arrays_are_lent_with_their_strides(make, idle):
+    simulator = make()
+    result = simulator.step(idle(simulator))
+    terms = result.reward_terms
+    assert terms.strides == (12, 1)
+    assert (np.from_dlpack(terms) == terms.numpy()).all()
+    assert (np.from_dlpack(terms, copy=True) == terms.numpy()).all()
+    assert result.valid.numpy().dtype == bool
+
+
+def test_torch_takes_and_gives_without_a_copy(make):
+    torch = pytest.importorskip("torch")
+    simulator = make()
+    ego = simulator.observations["ego"].torch()
+    assert ego.data_ptr() == simulator.observations["ego"].numpy().ctypes.data
+    actions = torch.full((12,), pictura.IDLE_ACTION, dtype=torch.int32)
+    simulator.step(actions)
+    other = pictura.Simulator(simulator.maps, simulator.worlds, num_threads=1)
+    other.step(actions.numpy())
+    assert other.state_hash() == simulator.state_hash()
+    valid = torch.from_dlpack(simulator.step(actions).valid)
+    assert valid.dtype == torch.bool and bool(valid.any())
+    renderer = pictura.Renderer("cpu", pictura.Rig.paper(16, 9), num_threads=1)
+    for handle, geometry in simulator.geometries.items():
+        renderer.upload(handle, geometry)
+    out = torch.zeros(12, 4, 3, 9, 16, dtype=torch.float32)
+    assert renderer.render(simulator.scene, simulator.views, out) is out and out.max() > 0
+    with pytest.raises(pictura.Error, match="expected i32"):
+        simulator.step(torch.zeros(12, dtype=torch.int64))
+
+
+def refusal(simulator, actions) -> str:
+    before = simulator.state_hash()
+    with pytest.raises(pictura.Error) as error:
+        simulator.step(actions)
+    assert simulator.state_hash() == before
+    return str(error.value)
+
+
+def test_wrong_actions_are_refused_by_name(make):
+    simulator = make()
+    good = np.zeros(24, np.int32)
+    expected = "step: actions: expected i32 [12] on cpu"
+    assert refusal(simulator, good) == f"{expected}, got i32 [24] on cpu"
+    assert refusal(simulator, good[::2]) == f"{expected}, got i32 [12] on cpu with strides [2]"
+    assert refusal(simulator, good[:12].astype(np.int64)) == f"{expected}, got i64 [12] on cpu"
+    assert refusal(simulator, np.full(12, np.nan, np.float32)) == f"{expected}, got f32 [12] on cpu"
+    assert refusal(simulator, good[:12].reshape(3, 4)) == f"{expected}, got i32 [3, 4] on cpu"
+    assert refusal(simulator, [0] * 12) == "step: actions: expected an array that speaks DLPack (NumPy, torch, ...), got list"
+    assert refusal(simulator, np.full(12, 12, np.int32)).startswith("step: slot 0: expected an action in [0, 12), got 12")
+    assert refusal(simulator, np.full(12, -1, np.int32)).endswith("got -1")
+    assert "DLPack's code 0 with 8 bits" in refusal(simulator, good[:12].astype(np.int8))
+    assert "None" in refusal(simulator, None)
+
+
+def test_an_array_with_one_element_has_any_stride(make):
+    simulator = make(1)
+    simulator.step(np.zeros(8, np.int32)[::8])
+
+
+class Odd:
+    """An array that lies about its tensor in one way."""
+
+    def __init__(self, array, **lies):
+        self.array, self.lies = array, lies
+
+    def __dlpack__(self, **arguments):
+        result = self.lies.get("capsule", "honest")
+        if isinstance(result, Exception):
+            raise result
+        return self.array.__dlpack__(**arguments) if result == "honest" else result
+
+    def __dlpack_device__(self):
+        return self.lies.get("device", (1, 0))
+
+
+def test_liars_are_refused(make):
+    simulator = make()
+    good = np.full(12, pictura.IDLE_ACTION, np.int32)
+    simulator.step(Odd(good))
+    for lies in ({"capsule": None}, {"capsule": 7}, {"capsule": "text"}):
+        with pytest.raises(pictura.Error, match="capsule"):
+            simulator.step(Odd(good, **lies))
+    with pytest.raises(ZeroDivisionError):
+        simulator.step(Odd(good, capsule=ZeroDivisionError()))
+    with pytest.raises((pictura.Error, TypeError, RuntimeError, ValueError)):
+        simulator.step(Odd(good, device="nowhere"))
+    used = good.__dlpack__()
+    np.from_dlpack(Odd(good, capsule=used))
+    with pytest.raises(pictura.Error, match="capsule"):
+        simulator.step(Odd(good, capsule=used))
+
+
+def test_fuzzed_arrays_are_taken_or_refused(make):
+    simulator = make()
+    renderer = pictura.Renderer("cpu", pictura.Rig.paper(8, 8), num_threads=1)
+    for handle, geometry in simulator.geometries.items():
+        renderer.upload(handle, geometry)
+    types = [np.int8, np.uint8, np.int16, np.uint16, np.int32, np.uint32, np.int64, np.uint64, np.float16, np.float32]
+    types += [np.float64, np.complex64, np.bool_, pictura.VIEW_DTYPE, pictura.COMMAND_DTYPE, np.dtype("U3"), np.dtype(object)]
+    draw = random.Random(3)
+    taken = 0
+    for _ in range(3000):
+        shape = tuple(draw.choice([0, 1, 2, 4, 12, 12, 12, 28, 40]) for _ in range(draw.randrange(0, 7)))
+        if np.prod(shape, dtype=float) > 1e6:
+            continue
+        array = np.zeros(shape, draw.choice(types))
+        for _ in range(draw.randrange(3)):
+            if array.ndim:
+                axis = draw.randrange(array.ndim)
+                cut = [slice(None)] * array.ndim
+                cut[axis] = draw.choice([slice(None, None, -1), slice(None, None, 2), slice(1, None), slice(0, 0)])
+                array = array[tuple(cut)]
+                if draw.random() < 0.3:
+                    array = array.T
+        if draw.random() < 0.1:
+            array = np.broadcast_to(array, (12, *array.shape)) if array.ndim < 5 else array
+        calls = [
+            lambda: simulator.step(array),
+            lambda: simulator.step_commands(array),
+            lambda: simulator.reset(array, 3),
+            lambda: simulator.set_state(array, {}),
+            lambda: simulator.set_state(np.array([1], np.int32), {draw.choice(pictura.AGENT_FIELDS)[0]: array}),
+            lambda: renderer.render(simulator.scene, array),
+            lambda: renderer.render(simulator.scene, simulator.views, array),
+        ]
+        try:
+            draw.choice(calls)()
+            taken += 1
+        except (pictura.Error, BufferError, TypeError, ValueError):
+            pass
+    assert 0 < taken < 1000
+    simulator.step(np.zeros(12, np.int32))
+
+
+def test_a_second_call_while_one_runs_is_refused(town):
+    simulator = pictura.Simulator([town], [(0, 60)] * 4, num_threads=1)
+    lane = pictura.Controller("lane", simulator)
+    errors, actions = [], np.zeros(240, np.int32)
+    worker = threading.Thread(target=simulator.run, args=(lane, 60))
+    worker.start()
+    while worker.is_alive():
+        try:
+            simulator.totals()
+        except pictura.Error as error:
+            errors.append(str(error))
+        time.sleep(0.001)
+    worker.join()
+    assert errors and "another thread is in a call of this object" in errors[0]
+    simulator.step(actions)
+
+
+def test_two_threads_use_two_simulators_at_once(town):
+    def run(out):
+        simulator = pictura.Simulator([town], [(0, 16)], num_threads=1, seed=4)
+        for _ in range(40):
+            simulator.step(np.full(16, 10, np.int32))
+        out.append(simulator.state_hash())
+
+    hashes: list[int] = []
+    threads = [threading.Thread(target=run, args=(hashes,)) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(hashes) == 3 and len(set(hashes)) == 1
+
+
+def run_python(code: str, **options) -> subprocess.CompletedProcess:
+    return subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=120, **options)
+
+
+def test_interrupts_reach_long_calls():
+    code = """
+        import os, signal, threading, time
+        import pictura
+        town = pictura.Map.load("procedural:3")
+        simulator = pictura.Simulator([town], [(0, 20)], num_threads=1)
+        threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+        try:
+            simulator.run(pictura.Controller("idle", simulator), 10**9)
+        except KeyboardInterrupt:
+            print("stopped", simulator.totals()["slot_steps"] > 0)
+    """
+    out = run_python(code)
+    assert out.stdout == "stopped True\n", out.stderr
+
+
+def test_forks_are_refused_or_work():
+    code = """
+        import os, sys
+        import numpy as np
+        import pictura
+        town = pictura.Map.load("procedural:3")
+        threads = int(sys.argv[1]) if len(sys.argv) > 1 else {threads}
+        simulator = pictura.Simulator([town], [(0, 20)] * 2, num_threads=threads)
+        simulator.step(np.zeros(40, np.int32))
+        child = os.fork()
+        if child == 0:
+            try:
+                simulator.step(np.zeros(40, np.int32))
+                print("stepped", flush=True)
+            except pictura.Error as error:
+                print(error, flush=True)
+            os._exit(0)
+        os.waitpid(child, 0)
+    """
+    assert run_python(code.format(threads=1)).stdout == "stepped\n"
+    assert "forked" in run_python(code.format(threads=2)).stdout
+
+
+def test_repr_says_what_it_is(make):
+    assert repr(make().observations["ego"]) == "<pictura.Array ego: f32 [12, 9] on cpu>"

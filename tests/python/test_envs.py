@@ -1,0 +1,252 @@
+"""Environments: the checkers of each library, and what those do not check."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import pictura
+
+gymnasium = pytest.importorskip("gymnasium")
+from gymnasium.utils.env_checker import check_env  # noqa: E402
+from gymnasium.vector import AutoresetMode  # noqa: E402
+
+from pictura.envs.gymnasium_vector import AgentStatistics  # noqa: E402
+
+SMALL = {"rig": pictura.Rig.paper(16, 9)}
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"observation": "flat", "actions": "multi_discrete", "others": "idle"},
+        {"observation": "images", "others": "random", **SMALL},
+        {"observation": "both", "others": lambda seen: np.full(len(seen["ego"]), 10), **SMALL},
+    ],
+    ids=["vector", "flat", "images", "both"],
+)
+def test_drive_passes_gymnasiums_checker(options):
+    env = gymnasium.make("pictura/Drive-v0", num_agents=6, **options)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*(infinity|maximum|minimum|flattened).*")
+        check_env(env.unwrapped, skip_render_check=True)
+
+
+def test_drive_renders_and_ends():
+    env = gymnasium.make("pictura/Drive-v0", num_agents=4, render_mode="rgb_array", episode_steps=12)
+    env.reset(seed=1)
+    assert env.render().shape == (480, 640, 3)
+    for step in range(12):
+        _, reward, terminated, truncated, info = env.step(7)
+        if terminated or truncated:
+            break
+    assert (step == 11 and truncated) or terminated
+    with pytest.raises(pictura.Error, match="Discrete"):
+        env.unwrapped.step(12)
+
+
+def test_others_drive_while_the_agent_stands():
+    env = gymnasium.make("pictura/Drive-v0", num_agents=8, pedestrian_fraction=0.0).unwrapped
+    env.reset(seed=3)
+    for _ in range(40):
+        env.step(7)
+    distance = env.batch.simulator.state["distance_m"].numpy()
+    assert distance[env._slot] == 0 and (np.delete(distance, env._slot) > 5).sum() >= 4
+
+
+def vector(autoreset="next_step", **options):
+    options = {"num_agents": 8, "num_worlds": 3, "episode_steps": 25, "num_threads": 1} | options
+    return pictura.make_vec("procedural:3", autoreset=autoreset, **options)
+
+
+@pytest.mark.parametrize("observation", ["vector", "flat", "images", "both"])
+@pytest.mark.parametrize("actions", ["discrete", "multi_discrete"])
+def test_vector_spaces_hold_what_is_returned(observation, actions):
+    env = vector(observation=observation, actions=actions, **(SMALL if observation in ("images", "both") else {}))
+    assert env.num_envs == 24
+    seen, info = env.reset(seed=3)
+    assert env.observation_space.contains(seen)
+    env.action_space.seed(3)
+    for _ in range(5):
+        seen, reward, terminated, truncated, info = env.step(env.action_space.sample())
+        assert env.observation_space.contains(seen)
+        assert reward.shape == terminated.shape == truncated.shape == info["active"].shape == (24,)
+        assert terminated.dtype == truncated.dtype == bool and reward.dtype == np.float32
+
+
+@pytest.mark.parametrize("autoreset", ["next_step", "same_step"])
+def test_vector_seeds_decide_everything(autoreset):
+    runs = []
+    for seed in (5, 5, 6):
+        env = vector(autoreset)
+        seen, _ = env.reset(seed=seed)
+        rewards = []
+        for step in range(60):
+            seen, reward, *_ = env.step(np.full(24, (step * 5) % 12))
+            rewards.append(reward)
+        runs.append((np.array(rewards), seen["ego"]))
+    assert (runs[0][0] == runs[1][0]).all() and (runs[0][1] == runs[1][1]).all()
+    assert not (runs[0][0] == runs[2][0]).all()
+
+
+def test_next_step_worlds_begin_in_the_step_after_their_end():
+    env = vector("next_step")
+    assert env.metadata["autoreset_mode"] == AutoresetMode.NEXT_STEP
+    env.reset(seed=1)
+    halted = np.zeros(24, bool)
+    for step in range(25):
+        _, reward, terminated, truncated, info = env.step(np.full(24, 7))
+        assert not (terminated & halted).any(), "terminated is said once"
+        assert (reward[halted] == 0).all()
+        halted |= terminated
+        assert (info["active"] == ~halted | (info["active"] & ~halted)).all()
+    assert truncated[~halted & info["valid"]].all()
+    seen, reward, terminated, truncated, info = env.step(np.full(24, 7))
+    assert (reward == 0).all() and not terminated.any() and not truncated.any() and not info["valid"].any()
+    assert info["active"].sum() > 12
+    assert env.step(np.full(24, 7))[4]["valid"].sum() > 12
+
+
+def test_same_step_worlds_begin_in_the_step_of_their_end():
+    env = vector("same_step")
+    assert env.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
+    env.reset(seed=1)
+    for _ in range(24):
+        seen, _, _, _, info = env.step(np.full(24, 7))
+        assert "final_obs" not in info
+    last = seen
+    seen, reward, terminated, truncated, info = env.step(np.full(24, 7))
+    assert truncated.sum() > 12 and (info["_final_obs"] == truncated | terminated).all()
+    ended = info["_final_obs"]
+    assert not (seen["waypoints"][ended] == info["final_obs"]["waypoints"][ended]).all()
+    np.testing.assert_allclose(info["final_obs"]["waypoints"][ended], last["waypoints"][ended], atol=0.05)
+    assert (info["final_info"]["valid"] == info["valid"]).all()
+    following = env.step(np.full(24, 7))
+    assert following[4]["valid"].sum() > 12 and not following[3].any()
+
+
+@pytest.mark.parametrize("autoreset", ["next_step", "same_step"])
+def test_statistics_equal_the_simulators_totals(autoreset):
+    env = AgentStatistics(vector(autoreset, num_agents=16))
+    env.reset(seed=2)
+    random = np.random.default_rng(0)
+    for _ in range(120):
+        env.step(random.integers(0, 12, 48))
+    totals = env.unwrapped.batch.simulator.totals()
+    for name, value in env.statistics.items():
+        if isinstance(value, int):
+            assert value == totals[name], name
+        else:
+            assert value == pytest.approx(totals[name], rel=1e-4, abs=1e-3), name
+    assert env.statistics["finished_agent_episodes"] > 50 and env.statistics["off_road"] > 0
+
+
+def test_gymnasiums_wrappers_take_it():
+    from gymnasium.wrappers.vector import DictInfoToList, FlattenObservation, RecordEpisodeStatistics
+
+    for autoreset in ("next_step", "same_step"):
+        env = RecordEpisodeStatistics(vector(autoreset))
+        env.reset(seed=1)
+        total = np.zeros(24)
+        for _ in range(25):
+            _, reward, terminated, truncated, info = env.step(np.full(24, 7))
+            total += reward
+        ended = terminated | truncated
+        assert ended.any()
+        np.testing.assert_allclose(info["episode"]["r"][ended], total[ended], atol=1e-4)
+    flat = FlattenObservation(vector("next_step"))
+    seen, _ = flat.reset(seed=1)
+    assert seen.ndim == 2 and len(seen) == 24
+    listed = DictInfoToList(vector("next_step"))
+    listed.reset(seed=1)
+    assert len(listed.step(np.full(24, 7))[4]) == 24
+
+
+def test_the_vector_form_is_registered():
+    env = gymnasium.make_vec("pictura/Drive-v0", num_envs=12, vectorization_mode="vector_entry_point", num_agents=4)
+    assert env.num_envs == 12 and env.unwrapped.batch.num_worlds == 3
+    forked = gymnasium.make_vec("pictura/Drive-v0", num_envs=2, vectorization_mode="async", num_agents=3)
+    forked.reset(seed=1)
+    forked.step(np.array([7, 7]))
+    forked.close()
+
+
+def test_wrong_options_are_named():
+    for options, name in (
+        ({"observation": "smells"}, "observation"),
+        ({"actions": "continuous"}, "actions"),
+        ({"autoreset": "never"}, "autoreset"),
+        ({"array": "jax"}, "array"),
+        ({"num_envs": 7, "num_agents": 4}, "num_envs"),
+    ):
+        with pytest.raises(pictura.UsageError, match=name):
+            pictura.make_vec("procedural:3", **options)
+    env = vector()
+    for wrong in (np.zeros(24), np.zeros(23, int), np.full(24, 12)):
+        with pytest.raises(pictura.Error):
+            env.step(wrong)
+    with pytest.raises(pictura.Error, match="longitudinal"):
+        vector(actions="multi_discrete").step(np.full((24, 2), 3))
+
+
+def test_views_without_copies_are_the_simulators_memory():
+    env = vector(copy=False)
+    seen, _ = env.reset(seed=1)
+    assert seen["ego"].ctypes.data == env.batch.simulator.observations["ego"].numpy().ctypes.data
+
+
+def test_pettingzoo_passes_its_tests():
+    pytest.importorskip("pettingzoo")
+    from pettingzoo.test import parallel_api_test, parallel_seed_test
+
+    from pictura.envs.pettingzoo_env import DriveParallelEnv
+
+    make = lambda: DriveParallelEnv(num_agents=5, episode_steps=40)  # noqa: E731
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        parallel_api_test(make(), num_cycles=150)
+        parallel_seed_test(make)
+    env = make()
+    seen, infos = env.reset(seed=1)
+    assert set(seen) == set(infos) == set(env.agents)
+    while env.agents:
+        acting = list(env.agents)
+        *_, terminations, truncations, infos = env.step({agent: 11 for agent in acting})
+        assert set(terminations) == set(acting)
+        assert all(infos[agent]["active"] for agent in env.agents)
+    env.reset(seed=1)
+    with pytest.raises(pictura.Error, match="agent_"):
+        env.step({})
+
+
+def test_torchrl_passes_its_check():
+    pytest.importorskip("torchrl")
+    import torch
+    from torchrl.envs.utils import check_env_specs
+
+    from pictura.envs.torchrl_env import DriveTorchRLEnv
+
+    for options in ({}, {"observation": "flat", "actions": "multi_discrete"}, {"observation": "images", **SMALL}):
+        env = DriveTorchRLEnv(num_agents=4, num_worlds=3, episode_steps=20, num_threads=1, **options)
+        check_env_specs(env)
+    rollout = env.rollout(50, break_when_any_done=False)
+    assert rollout.batch_size == torch.Size([3, 50])
+    assert rollout["next", "done"].sum() >= 3 and rollout["agents", "mask"].any()
+
+
+def test_pufferlibs_contract():
+    from pictura.envs.puffer_env import DrivePufferEnv
+
+    env = DrivePufferEnv(num_agents=6, num_worlds=2, episode_steps=20, num_threads=1)
+    assert env.single_observation_space.shape == env.observations.shape[1:] and env.num_agents == 12
+    seen, infos = env.reset(seed=1)
+    buffers = [env.observations, env.rewards, env.terminals, env.truncations]
+    logs = []
+    for step in range(45):
+        seen, rewards, terminals, truncations, infos = env.step(np.full(12, step % 12, np.int32))
+        assert all(a is b for a, b in zip((seen, rewards, terminals, truncations), buffers))
+        assert (env.masks == env.batch.active).all()
+        logs += infos
+    assert sum(log["n"] for log in logs) == env.batch.simulator.totals()["finished_agent_episodes"] > 0
+    assert not env.done

@@ -1,0 +1,216 @@
+"""Maps, rigs, scenes, renderers and simulators: as in C++, by the same names."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from conftest import actions_of
+
+import pictura
+
+
+def test_a_map_has_facts_geometry_and_a_picture(town):
+    assert town.name == "procedural:3"
+    facts, arrays = town.facts, town.arrays()
+    assert facts["lanes"] == len(arrays["lane_type"]) == len(arrays["lane_point_range"])
+    begin, end = arrays["lane_point_range"][0]
+    points = arrays["lane_points"][begin:end]
+    steps = np.linalg.norm(np.diff(points[:, :3], axis=0), axis=1)
+    assert end - begin >= 2 and steps.max() <= 10.01
+    np.testing.assert_allclose(np.diff(points[:, 5]), steps, rtol=0.02)
+    assert town.geometry().num_strips > 1000
+    assert town.geometry(walls=False).num_walls == 0 < town.geometry().num_walls
+    picture = town.draw(200, 150)
+    assert picture.shape == (150, 200, 3) and len(np.unique(picture)) > 10
+
+
+def test_maps_from_text_name_what_is_wrong(tmp_path):
+    with pytest.raises(pictura.Error, match="nowhere.xodr"):
+        pictura.Map.from_text("<OpenDRIVE", "nowhere.xodr")
+    with pytest.raises(pictura.UsageError, match="Town99"):
+        pictura.Map.load("Town99")
+    with pytest.raises(ValueError):
+        pictura.Map.load("Town99")
+
+
+def test_the_papers_rig_and_ones_own():
+    rig = pictura.Rig.paper(48, 27)
+    assert len(rig) == 4 and rig.cameras[0].width_px == 48
+    assert rig.cameras[0].focal_x_px == pytest.approx(1545 * 48 / 1920)
+    with pytest.raises(pictura.Error, match="camera"):
+        pictura.Rig([pictura.Camera("wide", 0, 10)])
+
+
+def test_a_scene_of_arrays_is_drawn_as_it_stands():
+    rig = pictura.Rig([pictura.Camera("front", 64, 48, position_m=(0, 0, 1.5))])
+    renderer = pictura.Renderer("cpu", rig, num_threads=1)
+    renderer.upload(0, pictura.Geometry([([[0, -2, 0], [50, -2, 0]], 0.3, (1, 1, 1))]))
+    scene = pictura.Scene([[15, 0, 0]], [0.0], [[4.5, 2, 1.5]], [0])
+    views = pictura.make_views([[0, 0, 0]], [0.0])
+    images = renderer.render(scene, views, planes=True)
+    rgb, planes = images.rgb.numpy()[0, 0], images.planes(0)
+    instance = planes["instance_id"].numpy()[0]
+    depth = planes["depth_m"].numpy()[0]
+    ys, xs = np.nonzero(instance == 1)
+    assert 28 < xs.mean() < 36, "in the middle"
+    assert depth[instance == 1].min() == pytest.approx(15 - 2.25, abs=0.05)
+    assert np.isinf(depth[0, 0]) and rgb[:, 0, 0].max() == 0
+    assert planes["class_id"].numpy()[0][instance == 1].max() > 0
+    seen = renderer.visibility(scene, views, [[0, 0]])
+    assert seen[0] == pytest.approx(1)
+    floats = np.zeros((1, 1, 3, 48, 64), np.float32)
+    assert renderer.render(scene, views, floats) is floats
+    np.testing.assert_allclose(floats[0, 0] * 255, rgb, atol=0.51)
+
+
+def test_scene_files(tmp_path):
+    path = tmp_path / "car.toml"
+    path.write_text(
+        '[[agents]]\nclass = "vehicle"\ncenter_m = [12, 0, 0]\nheading_deg = 0\nsize_m = [4.5, 1.9, 1.5]\n'
+        "[[views]]\norigin_m = [0, 0, 0]\nheading_deg = 0\n"
+    )
+    try:
+        scene_file = pictura.SceneFile(str(path))
+    except pictura.Error as error:
+        pytest.fail(str(error))
+    renderer = pictura.Renderer("cpu", scene_file.rig, num_threads=1)
+    renderer.upload(0, scene_file.geometry)
+    images = renderer.render(scene_file.scene, scene_file.views)
+    assert images.camera(0).numpy().max() > 0
+
+
+def test_what_does_not_fit_a_renderer_is_named(make):
+    simulator = make(3)
+    renderer = pictura.Renderer("cpu", pictura.Rig.paper(16, 9), num_threads=1)
+    with pytest.raises(pictura.Error, match="geometr"):
+        renderer.render(simulator.scene, simulator.views)
+    for handle, geometry in simulator.geometries.items():
+        renderer.upload(handle, geometry)
+    with pytest.raises(pictura.Error, match=r"render: out: expected u8 \[3, 4, 3, 9, 16\] on cpu"):
+        renderer.render(simulator.scene, simulator.views, np.zeros((3, 4, 3, 9, 15), np.uint8))
+    frozen = np.zeros((3, 4, 3, 9, 16), np.uint8)
+    frozen.setflags(write=False)
+    with pytest.raises(pictura.Error, match="that can be written"):
+        renderer.render(simulator.scene, simulator.views, frozen)
+    with pytest.raises(pictura.UsageError, match="cpu"):
+        pictura.Renderer("cpo")
+    views = pictura.make_views([[0, 0, 0]], [0.0], world=[7])
+    with pytest.raises(pictura.Error, match="world"):
+        renderer.render(simulator.scene, views)
+
+
+def test_images_of_the_simulator_are_those_of_the_command_line_renderer(make):
+    simulator = make(4)
+    renderer = pictura.Renderer("cpu", num_threads=1)
+    for handle, geometry in simulator.geometries.items():
+        renderer.upload(handle, geometry)
+    first = renderer.render(simulator.scene, simulator.views).rgb.numpy()
+    assert first.shape == (4, 4, 3, 54, 96) and first.mean() > 5
+    views = simulator.views.numpy().view(pictura.VIEW_DTYPE)[:, 0]
+    assert views["ego_agent"].tolist() == [0, 1, 2, 3]
+    again = renderer.render(simulator.scene, views.copy()).rgb.numpy()
+    assert (first == again).all()
+
+
+def test_steps_are_deterministic_and_saved(make):
+    a, b = make(seed=5, episode_steps=20), make(seed=5, episode_steps=20)
+    for step in range(30):
+        a.step(actions_of(step, 12))
+        b.step(actions_of(step, 12))
+    assert a.state_hash() == b.state_hash() != make(seed=6).state_hash()
+    saved, kept = a.save(), a.snapshot()
+    for step in range(10):
+        a.step(actions_of(step, 12))
+    later = a.state_hash()
+    for back in (saved, kept):
+        a.restore(back)
+        assert a.state_hash() == b.state_hash()
+        for step in range(10):
+            a.step(actions_of(step, 12))
+        assert a.state_hash() == later
+    with pytest.raises(pictura.Error, match="seed"):
+        make(seed=6, episode_steps=20).restore(saved)
+
+
+def test_chosen_worlds_are_reset(make):
+    simulator, other = make(6, worlds=3, seed=1), make(6, worlds=3, seed=9)
+    for step in range(15):
+        simulator.step(actions_of(step, 18))
+    x = simulator.state["x_m"].numpy().copy()
+    simulator.reset(np.array([0, 1, 0], bool), seed=9)
+    now, fresh = simulator.state["x_m"].numpy(), other.state["x_m"].numpy()
+    assert (now[6:12] == fresh[6:12]).all()
+    assert (now[:6] == x[:6]).all() and (now[12:] == x[12:]).all()
+    simulator.reset(seed=9)
+    assert (simulator.state["x_m"].numpy() == fresh).all()
+
+
+def test_chosen_agents_are_set(make):
+    simulator = make(6)
+    slots = np.array([4, 1], np.int32)
+    before = simulator.state["x_m"].numpy().copy()
+    place = {key: np.ascontiguousarray(simulator.state[key].numpy()[[4, 1]]) for key in ("x_m", "y_m", "z_m", "heading_rad")}
+    place["speed_mps"] = np.array([3, 5], np.float32)
+    simulator.set_state(slots, place)
+    assert (simulator.state["x_m"].numpy() == before).all()
+    assert simulator.state["speed_mps"].numpy()[[4, 1]].tolist() == [3, 5]
+    assert simulator.observations["ego"].numpy()[4, 0] == pytest.approx(3 / 20)
+    with pytest.raises(pictura.Error, match="did you mean 'speed_mps'"):
+        simulator.set_state(slots, {"sped_mps": place["speed_mps"]})
+    with pytest.raises(pictura.Error, match="slot 1: x_m: the value is out of range"):
+        simulator.set_state(slots, {"x_m": np.array([0, np.nan], np.float32)})
+
+
+def test_reward_terms_sum_to_rewards_and_totals(make):
+    simulator = make(20)
+    of_steps = np.zeros(11)
+    for step in range(80):
+        result = simulator.step(actions_of(step, 20))
+        np.testing.assert_allclose(result.reward_terms.numpy().sum(axis=1), result.reward.numpy(), atol=1e-6)
+        of_steps += result.reward_terms.numpy().sum(axis=0, dtype=float)
+    totals = simulator.totals()
+    np.testing.assert_allclose([totals["reward_terms"][name] for name in pictura.REWARD_TERMS], of_steps, atol=1e-6)
+    assert totals["agent_steps"] > 100
+
+
+def test_the_lane_keeper_drives_and_shares(make):
+    simulator = make(8, pedestrian_fraction=0.0)
+    lane = pictura.Controller("lane", simulator)
+    simulator.run(lane, 50)
+    assert simulator.totals()["distance_m"] > 50
+    commands = lane.act(simulator)
+    commands["kind"][3] = 2
+    simulator.step_commands(commands)
+    assert simulator.state["status"].numpy()[3] == 3
+    with pytest.raises(pictura.UsageError, match="lane"):
+        pictura.Controller("nobody", simulator)
+
+
+def test_conditioning_is_set_by_name(town):
+    fixed = pictura.Simulator([town], [(0, 8)], conditioning={"collision": 2.5, "v_goal_mps": (3, 4)}, num_threads=1)
+    values = fixed.state["conditioning"].numpy()
+    vehicles = fixed.state["agent_class"].numpy() < 2
+    assert (values[vehicles, 2] == 2.5).all() and (values[:, 1] >= 3).all() and (values[:, 1] <= 4).all()
+    with pytest.raises(pictura.UsageError, match="did you mean 'collision'"):
+        pictura.Simulator([town], [(0, 8)], conditioning={"colision": 2.5})
+
+
+def test_other_worlds_are_those_of_a_new_simulator(make, town):
+    simulator, expected = make(6, worlds=2), make(9, worlds=4, seed=3)
+    old = simulator.observations["ego"].numpy()
+    kept = old.copy()
+    simulator.set_worlds([town], [(0, 9)] * 4, seed=3)
+    assert simulator.state_hash() == expected.state_hash()
+    assert simulator.observations["ego"].shape == (36, 9)
+    assert (old == kept).all(), "memory of before lives"
+    simulator.set_worlds([town], [(0, 6)], seed=3)
+    assert simulator.num_slots == 6
+
+
+def test_the_command_comes_along():
+    folder = __import__("pathlib").Path(pictura.__file__).parent
+    if not (folder / "bin" / "pictura").exists():
+        pytest.skip("this package was built without the command")
+    out = subprocess.run([sys.executable, "-m", "pictura", "--version"], capture_output=True, text=True, check=True)
+    assert out.stdout.strip() == pictura.__version__
