@@ -3,6 +3,7 @@
 
 #include "pictura/bindings/objects.h"
 #include "pictura/common/error.h"
+#include "pictura/common/support/hash.h"
 #include "pictura/version.h"
 
 PYBIND11_MODULE(_pictura, module) {
@@ -33,6 +34,9 @@ PYBIND11_MODULE(_pictura, module) {
 #else
   module.attr("HAS_CUDA") = false;
 #endif
+  module.def(
+      "_hash64", [](const py::bytes& bytes) { return pictura::hash_of(std::string_view(bytes)); }, py::arg("data"),
+      "FNV-1a, with which files of the library end.");
   pictura::python::bind_arrays(module);
   pictura::python::bind_maps(module);
   pictura::python::bind_rendering(module);

@@ -67,17 +67,18 @@ def test_a_scene_of_arrays_is_drawn_as_it_stands():
 def test_scene_files(tmp_path):
     path = tmp_path / "car.toml"
     path.write_text(
-        '[[agents]]\nclass = "vehicle"\ncenter_m = [12, 0, 0]\nheading_deg = 0\nsize_m = [4.5, 1.9, 1.5]\n'
-        "[[views]]\norigin_m = [0, 0, 0]\nheading_deg = 0\n"
+        '[[view]]\nname = "behind"\nx_m = 0.0\ny_m = 0.0\nheading_deg = 0.0\n'
+        '[[agent]]\nclass = "vehicle"\nx_m = 12.0\ny_m = 0.0\nheading_deg = 0.0\nlength_m = 4.5\nwidth_m = 1.9\nheight_m = 1.5\n'
     )
-    try:
-        scene_file = pictura.SceneFile(str(path))
-    except pictura.Error as error:
-        pytest.fail(str(error))
+    scene_file = pictura.SceneFile(str(path))
+    assert scene_file.view_names == ["behind"]
     renderer = pictura.Renderer("cpu", scene_file.rig, num_threads=1)
     renderer.upload(0, scene_file.geometry)
     images = renderer.render(scene_file.scene, scene_file.views)
     assert images.camera(0).numpy().max() > 0
+    path.write_text("[[view]]\n")
+    with pytest.raises(pictura.Error, match="car.toml"):
+        pictura.SceneFile(str(path))
 
 
 def test_what_does_not_fit_a_renderer_is_named(make):

@@ -1,0 +1,280 @@
+"""Policies of the library as torch modules. docs/network.md states the arithmetic.
+
+load_policy() reads the weights that training writes (policy.safetensors) or a checkpoint; save_policy() writes them back, so
+that weights trained in Python run in the `pictura` command.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import pathlib
+import struct
+import tomllib
+from collections.abc import Mapping
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+import pictura
+from pictura._pictura import _hash64
+
+_SCALE_POSITION_M = 120.0  # of x and y in observations
+_NUM_ACTIONS = 12
+# The entity sets, as the columns of set_counts.
+_SETS = {"partners": (8, 1), "lanes": (7, 1), "boundaries": (7, 1), "controls": (7, 2), "walls": (7, 1)}
+_MAGIC = b"PICTCKPT"
+_PREAMBLE = "<8sIIQ"
+
+
+def point_features(rows: Tensor, points: int) -> Tensor:
+    """Features [..., 6 points] of the first `points` pairs of rows [..., n], which tell points near the agent apart."""
+    xy_m = (rows[..., : 2 * points] * _SCALE_POSITION_M).unflatten(-1, (points, 2))
+    size_m, distance_m = xy_m.abs(), xy_m.norm(dim=-1, keepdim=True)
+    return torch.cat([xy_m / (size_m + 4.0), xy_m / (size_m + 20.0), xy_m / (distance_m + 1.0)], -1).flatten(-2)
+
+
+class _Encoder(nn.Module):
+    def __init__(self, features: int, width: int) -> None:
+        super().__init__()
+        self.hidden, self.out = nn.Linear(features, width), nn.Linear(width, width)
+
+    def forward(self, x: Tensor) -> Tensor:
+        return self.out(functional.gelu(self.hidden(x)))
+
+
+class _Attention(nn.Module):
+    """Learned queries of each camera, which ask the tokens of its feature map."""
+
+    def __init__(self, cameras: int, queries: int, width: int, heads: int, mlp: int) -> None:
+        super().__init__()
+        self.heads = heads
+        self.position = nn.Linear(8, width)
+        self.token_norm, self.query_norm = nn.LayerNorm(width), nn.LayerNorm(width)
+        self.queries = nn.Parameter(torch.randn(cameras, queries, width))
+        self.query, self.value, self.out = (nn.Linear(width, width) for _ in range(3))
+        self.key = nn.Linear(width, width, bias=False)
+        if mlp > 0:
+            self.mlp_norm, self.mlp_hidden, self.mlp_out = nn.LayerNorm(width), nn.Linear(width, mlp), nn.Linear(mlp, width)
+
+    def forward(self, maps: Tensor, camera: int) -> Tensor:
+        """maps [batch, width, rows, columns] of one camera; returns [batch, width]."""
+        rows, columns = maps.shape[-2:]
+        y = (torch.arange(rows, device=maps.device) + 0.5) * (math.pi / rows)
+        x = (torch.arange(columns, device=maps.device) + 0.5) * (math.pi / columns)
+        y, x = (a.flatten().to(maps.dtype) for a in torch.meshgrid(y, x, indexing="ij"))
+        where = torch.stack([x.cos(), y.cos(), x.sin(), y.sin(), (2 * x).cos(), (2 * y).cos(), (2 * x).sin(), (2 * y).sin()], 1)
+        tokens = self.token_norm(maps.flatten(2).transpose(1, 2) + self.position(where))
+        asked = self.query(self.query_norm(self.queries[camera]))
+
+        def split(values: Tensor) -> Tensor:
+            return values.unflatten(-1, (self.heads, -1)).transpose(-3, -2)
+
+        query = split(asked).expand(len(maps), -1, -1, -1)
+        seen = functional.scaled_dot_product_attention(query, split(self.key(tokens)), split(self.value(tokens)))
+        z = self.queries[camera] + self.out(seen.transpose(1, 2).flatten(2))
+        if hasattr(self, "mlp_norm"):
+            z = z + self.mlp_out(functional.gelu(self.mlp_hidden(self.mlp_norm(z))))
+        return z.mean(1)
+
+
+class Policy(nn.Module):
+    """A policy of either modality: forward(observation) gives logits [batch, 12] and values [batch].
+
+    observation: float32 tensors by the names of pictura.Simulator.observations, [batch, ...] on the module's device: `ego`,
+    `conditioning` and `waypoints`; for the vector policy the entity sets and `set_counts`; for the perspective one `rgb` uint8
+    [batch, cameras, 3, height, width], or a list of such for cameras of several sizes in the order of the rig.
+    config: the `policy` table of a configuration (docs/configuration.md). walls: of the vector policy, whether it reads them.
+    """
+
+    def __init__(self, config: Mapping[str, Any], num_cameras: int = 4, walls: bool = False) -> None:
+        super().__init__()
+        if config.get("backbone", "conv") != "conv":
+            raise pictura.UsageError(f"policy.backbone: expected 'conv', got '{config['backbone']}', which is a program of its own")
+        self.config = dict(config)
+        self.modality = config["modality"]
+        self.points = bool(config.get("point_features", False))
+        width = config["embedding_width"]
+        self.num_cameras = num_cameras
+        if self.modality == "perspective":
+            self.patch_px, self.strides = config["patch_px"], list(config["conv_strides"])
+            channels = [3 * self.patch_px**2, *config["conv_channels"]]
+            self.conv = nn.ModuleList(
+                nn.Conv2d(i, o, kernel, stride, kernel // 2)
+                for i, o, kernel, stride in zip(channels, channels[1:], config["conv_kernels"], self.strides)
+            )
+            self.attention = _Attention(
+                num_cameras, config["num_queries"], channels[-1], config["attention_heads"], config["attention_mlp"]
+            )
+            self.project = nn.Linear(num_cameras * channels[-1], 4 * width)
+            around, ego = 4 * width, 7
+        elif self.modality == "vector":
+            self.sets = [name for name in _SETS if name != "walls" or walls]
+            for name in self.sets:
+                features, points = _SETS[name]
+                self.add_module(name, _Encoder(features + 6 * points * self.points, width))
+            around, ego = len(self.sets) * width, 9
+        else:
+            raise pictura.UsageError(f"policy.modality: expected 'perspective' or 'vector', got '{self.modality}'")
+        self.ego_features = ego
+        self.ego = _Encoder(ego, width)
+        self.conditioning = _Encoder(17 + 3 * (3 + 6 * self.points), width)
+        layers, inside = config["backbone_layers"], config["backbone_width"]
+        self.backbone = nn.ModuleList(nn.Linear(around + 2 * width if i == 0 else inside, inside) for i in range(layers))
+        self.actor, self.critic = nn.Linear(inside, _NUM_ACTIONS), nn.Linear(inside, 1)
+
+    def forward(self, observation: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
+        waypoints = observation["waypoints"].flatten(1)
+        own = [observation["conditioning"].flatten(1), waypoints]
+        if self.points:
+            own.append(point_features(waypoints.unflatten(1, (3, 3)), 1).flatten(1))
+        around = self._images(observation["rgb"]) if self.modality == "perspective" else self._entities(observation)
+        ego = observation["ego"].flatten(1)[:, : self.ego_features]
+        x = torch.cat([around, self.ego(ego), self.conditioning(torch.cat(own, 1))], 1)
+        for layer in self.backbone:
+            x = functional.gelu(layer(x))
+        return self.actor(x), self.critic(x).squeeze(1)
+
+    def act(self, observation: Mapping[str, Tensor], argmax: bool = True) -> Tensor:
+        """Actions int32 [batch], which pictura.Simulator.step takes; without gradients."""
+        with torch.no_grad():
+            logits = self(observation)[0]
+            chosen = logits.argmax(1) if argmax else torch.distributions.Categorical(logits=logits).sample()
+        return chosen.to(torch.int32)
+
+    def _entities(self, observation: Mapping[str, Tensor]) -> Tensor:
+        counts = observation["set_counts"].flatten(1)
+        embeddings = []
+        for name in self.sets:
+            members = observation[name]
+            if self.points:
+                members = torch.cat([members, point_features(members, _SETS[name][1])], 2)
+            column = list(_SETS).index(name)
+            there = torch.arange(members.shape[1], device=members.device) < counts[:, column : column + 1]
+            embedded = getattr(self, name)(members).masked_fill(~there.unsqueeze(2), -math.inf)
+            largest = embedded.amax(1)
+            embeddings.append(largest.masked_fill(~there.any(1, keepdim=True), 0.0))
+        return torch.cat(embeddings, 1)
+
+    def _images(self, images: Tensor | list[Tensor]) -> Tensor:
+        blocks = [images] if isinstance(images, Tensor) else images
+        of_cameras = [block[:, i] for block in blocks for i in range(block.shape[1])]
+        if len(of_cameras) != self.num_cameras:
+            raise pictura.Error(f"rgb: expected images of {self.num_cameras} cameras, got {len(of_cameras)}")
+        return self.project(torch.cat([self._camera(pixels, i) for i, pixels in enumerate(of_cameras)], 1))
+
+    def _camera(self, pixels: Tensor, camera: int) -> Tensor:
+        patch = self.patch_px
+        if patch > 1:
+            pixels = functional.pad(pixels, (0, -pixels.shape[3] % patch, 0, -pixels.shape[2] % patch))
+        x = pixels.to(self.actor.weight.dtype)
+        if patch > 1:
+            x = functional.pixel_unshuffle(x, patch)
+        for i, layer in enumerate(self.conv):
+            # Pixels are 0 to 255: the first weight is divided instead of them.
+            weight = layer.weight / 255.0 if i == 0 else layer.weight
+            x = functional.gelu(functional.conv2d(x, weight, layer.bias, layer.stride, layer.padding))
+        return self.attention(x, camera)
+
+
+def _read_safetensors(path: str) -> tuple[dict[str, Any], dict[str, Tensor]]:
+    data = pathlib.Path(path).read_bytes()
+    if len(data) < 8:
+        raise pictura.Error(f"{path}: no safetensors: {len(data)} bytes")
+    (length,) = struct.unpack_from("<Q", data)
+    if length > len(data) - 8:
+        raise pictura.Error(f"{path}: no safetensors, or truncated: its header has {length} bytes, the file {len(data)}")
+    try:
+        header = json.loads(data[8 : 8 + length])
+    except ValueError as error:
+        raise pictura.Error(f"{path}: its header cannot be read: {error}") from error
+    metadata = header.pop("__metadata__", {})
+    types = {"F32": torch.float32, "I64": torch.int64}
+    tensors = {}
+    for name, entry in header.items():
+        begin, end = entry["data_offsets"]
+        if entry["dtype"] not in types or end > len(data) - 8 - length or end < begin:
+            raise pictura.Error(f"{path}: {name}: expected F32 or I64 within the file, got {entry['dtype']} at {begin} to {end}")
+        raw = bytearray(data[8 + length + begin : 8 + length + end])
+        tensors[name] = torch.frombuffer(raw, dtype=types[entry["dtype"]]).reshape(entry["shape"]).clone()
+    return metadata, tensors
+
+
+def _read_checkpoint(path: str) -> tuple[dict[str, Any], bytearray, int]:
+    """Header, the whole file, and where its data begin."""
+    data = bytearray(pathlib.Path(path).read_bytes())
+    size = struct.calcsize(_PREAMBLE)
+    if len(data) < size + 8 or data[:8] != _MAGIC:
+        raise pictura.Error(f"{path}: not a checkpoint: expected it to begin with PICTCKPT")
+    _, version, order, length = struct.unpack_from(_PREAMBLE, data)
+    if version != 2 or order != 0x01020304:
+        raise pictura.Error(f"{path}: expected a checkpoint of version 2 and this byte order, got {version}, {order:#x}")
+    (stored,) = struct.unpack_from("<Q", data, len(data) - 8)
+    if _hash64(bytes(data[:-8])) != stored:
+        raise pictura.Error(f"{path}: damaged or truncated: its bytes do not have the hash that it ends with")
+    return json.loads(data[size : size + length]), data, size + length
+
+
+def _policy_of(config_toml: str, tensors: dict[str, Tensor], path: str) -> Policy:
+    try:
+        config = tomllib.loads(config_toml)["policy"]
+    except (tomllib.TOMLDecodeError, KeyError) as error:
+        raise pictura.Error(f"{path}: expected the configuration of its training, with a table 'policy': {error}") from error
+    queries = tensors.get("attention.queries")
+    policy = Policy(config, 0 if queries is None else len(queries), "walls.hidden.weight" in tensors)
+    missing, unexpected = policy.load_state_dict(tensors, strict=False)
+    if missing or unexpected:
+        raise pictura.Error(f"{path}: of another architecture: expected {sorted(missing)}, got {sorted(unexpected)}")
+    return policy
+
+
+def load_policy(path: str | os.PathLike[str]) -> Policy:
+    """A policy from policy.safetensors or a checkpoint (.ckpt), in fp32 on the CPU.
+
+    Raises pictura.Error naming what is wrong with the file, pictura.UsageError for a backbone that is a program of its own.
+    """
+    path = os.fspath(path)
+    if pathlib.Path(path).suffix != ".ckpt":
+        metadata, tensors = _read_safetensors(path)
+        return _policy_of(metadata.get("config", ""), tensors, path)
+    header, data, begin = _read_checkpoint(path)
+    tensors = {}
+    for entry in header["parameters"]:
+        count = math.prod(entry["shape"])
+        values = torch.frombuffer(data, dtype=torch.float32, count=count, offset=begin + entry["offset"])
+        tensors[entry["name"]] = values.reshape(entry["shape"]).clone()
+    return _policy_of(header["config"], tensors, path)
+
+
+def save_policy(policy: Policy, path: str | os.PathLike[str], like: str | os.PathLike[str]) -> None:
+    """Writes a policy's weights in the place of those of `like`, a checkpoint (.ckpt) or safetensors of the same architecture;
+    everything else in the file stays, so that the `pictura` command takes it. The file is written whole or not at all.
+    Raises pictura.Error where the architectures differ.
+    """
+    path, like = os.fspath(path), os.fspath(like)
+    weights = {name: value.detach().to("cpu", torch.float32).contiguous() for name, value in policy.state_dict().items()}
+    if pathlib.Path(like).suffix == ".ckpt":
+        header, data, begin = _read_checkpoint(like)
+        entries = {entry["name"]: (entry["shape"], begin + entry["offset"]) for entry in header["parameters"]}
+    else:
+        data = bytearray(pathlib.Path(like).read_bytes())
+        (length,) = struct.unpack_from("<Q", data)
+        header = json.loads(data[8 : 8 + length])
+        header.pop("__metadata__", None)
+        entries = {name: (entry["shape"], 8 + length + entry["data_offsets"][0]) for name, entry in header.items()}
+    if {name: shape for name, (shape, _) in entries.items()} != {name: list(value.shape) for name, value in weights.items()}:
+        raise pictura.Error(f"{like}: of another architecture than the policy: expected the same names and shapes of weights")
+    for name, value in weights.items():
+        raw = value.numpy().tobytes()
+        data[entries[name][1] : entries[name][1] + len(raw)] = raw
+    if pathlib.Path(like).suffix == ".ckpt":
+        data[-8:] = struct.pack("<Q", _hash64(bytes(data[:-8])))
+    beside = pathlib.Path(f"{path}.part{os.getpid()}")
+    try:
+        beside.write_bytes(data)
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)

@@ -1,0 +1,138 @@
+"""PPO in one file, in the style of CleanRL, on all agents of many worlds.
+
+A minute on a CPU:   python examples/ppo.py
+A GPU, with images:  python examples/ppo.py --device cuda --observation images --num-worlds 170 --total-timesteps 50000000
+
+Observations, rewards and actions stay in the simulator's memory: the tensors here are views of it, and only a rollout's
+storage is copied. Steps of halted agents are stored, since arrays are rectangular, and masked out of every loss.
+"""
+
+import argparse
+import json
+import time
+
+import torch
+from torch import nn
+
+import pictura
+from pictura.torch import Policy
+
+SETTINGS = {
+    "modality": "vector", "embedding_width": 64, "point_features": True, "backbone_layers": 2, "backbone_width": 256,
+    "patch_px": 4, "conv_channels": [64, 64, 128], "conv_kernels": [1, 3, 3], "conv_strides": [1, 2, 1],
+    "num_queries": 4, "attention_heads": 4, "attention_mlp": 0,
+}  # fmt: skip
+
+
+def parse_args() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--maps", nargs="+", default=["procedural:3"])
+    parser.add_argument("--num-agents", type=int, default=16, help="of each world")
+    parser.add_argument("--num-worlds", type=int, default=4)
+    parser.add_argument("--observation", choices=["vector", "images"], default="vector")
+    parser.add_argument("--image-size", type=int, nargs=2, default=[96, 54], metavar=("WIDTH", "HEIGHT"))
+    parser.add_argument("--device", default="cpu")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--total-timesteps", type=int, default=60_000, help="of slots")
+    parser.add_argument("--learning-rate", type=float, default=5e-4)
+    parser.add_argument("--num-steps", type=int, default=64)
+    parser.add_argument("--gamma", type=float, default=0.99)
+    parser.add_argument("--gae-lambda", type=float, default=0.95)
+    parser.add_argument("--num-minibatches", type=int, default=4)
+    parser.add_argument("--update-epochs", type=int, default=2)
+    parser.add_argument("--clip-coef", type=float, default=0.2)
+    parser.add_argument("--ent-coef", type=float, default=0.01)
+    parser.add_argument("--vf-coef", type=float, default=0.5)
+    parser.add_argument("--max-grad-norm", type=float, default=0.5)
+    parser.add_argument("--save", help="writes the weights to this path (torch.save)")
+    parser.add_argument("--json", action="store_true", help="prints the last line as JSON")
+    return parser.parse_args()
+
+
+def main() -> None:
+    args = parse_args()
+    torch.manual_seed(args.seed)
+    sees_images = args.observation == "images"
+    rig = pictura.Rig.paper(*args.image_size) if sees_images else None
+    envs = pictura.make_vec(
+        args.maps, args.num_agents, num_worlds=args.num_worlds, observation=args.observation, rig=rig,
+        device=args.device, array="torch", seed=args.seed, copy=False,
+    )  # fmt: skip
+    device, n = torch.device(args.device), envs.num_envs
+    agent = Policy(SETTINGS | {"modality": "perspective" if sees_images else "vector"}, num_cameras=len(rig) if rig else 0)
+    agent = agent.to(device)
+    nn.init.normal_(agent.actor.weight, std=0.01)
+    optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
+
+    seen, info = envs.reset(seed=args.seed)
+    shape = (args.num_steps, n)
+    obs = {key: torch.zeros(*shape, *value.shape[1:], dtype=value.dtype, device=device) for key, value in seen.items()}
+    actions = torch.zeros(shape, dtype=torch.int32, device=device)
+    logprobs, rewards, values = (torch.zeros(shape, device=device) for _ in range(3))
+    dones, valids = (torch.zeros(shape, dtype=torch.bool, device=device) for _ in range(2))
+    num_updates = max(1, args.total_timesteps // (args.num_steps * n))
+    start, agent_steps, summary = time.time(), 0, {}
+
+    for update in range(1, num_updates + 1):
+        for step in range(args.num_steps):
+            for key, value in seen.items():
+                obs[key][step] = value
+            with torch.no_grad():
+                logits, values[step] = agent(seen)
+            chosen = torch.distributions.Categorical(logits=logits)
+            action = chosen.sample()
+            actions[step], logprobs[step] = action, chosen.log_prob(action)
+            seen, rewards[step], terminated, truncated, info = envs.step(action)
+            # The step in which a world begins its next episode is not valid, and is not learnt from.
+            dones[step], valids[step] = terminated | truncated, info["valid"]
+            if bool(truncated.any()):
+                with torch.no_grad():
+                    rewards[step] += args.gamma * truncated * agent(seen)[1]
+        with torch.no_grad():
+            next_value = agent(seen)[1]
+            advantages, last = torch.zeros_like(rewards), torch.zeros(n, device=device)
+            for t in reversed(range(args.num_steps)):
+                following = next_value if t == args.num_steps - 1 else values[t + 1]
+                live = (~dones[t]).float()
+                delta = rewards[t] + args.gamma * following * live - values[t]
+                advantages[t] = last = delta + args.gamma * args.gae_lambda * live * last
+            returns = advantages + values
+
+        rows = valids.flatten().nonzero().squeeze(1)
+        agent_steps += len(rows)
+        flat = {key: value.flatten(0, 1) for key, value in obs.items()}
+        for _ in range(args.update_epochs):
+            for batch in rows[torch.randperm(len(rows), device=device)].chunk(args.num_minibatches):
+                logits, value = agent({key: rows_[batch] for key, rows_ in flat.items()})
+                distribution = torch.distributions.Categorical(logits=logits)
+                ratio = (distribution.log_prob(actions.flatten()[batch]) - logprobs.flatten()[batch]).exp()
+                advantage = advantages.flatten()[batch]
+                advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
+                clipped = ratio.clamp(1 - args.clip_coef, 1 + args.clip_coef)
+                policy_loss = -torch.min(ratio * advantage, clipped * advantage).mean()
+                value_loss = 0.5 * (value - returns.flatten()[batch]).square().mean()
+                entropy = distribution.entropy().mean()
+                loss = policy_loss - args.ent_coef * entropy + args.vf_coef * value_loss
+                optimizer.zero_grad()
+                loss.backward()
+                nn.utils.clip_grad_norm_(agent.parameters(), args.max_grad_norm)
+                optimizer.step()
+
+        summary = {
+            "update": update,
+            "agent_steps": agent_steps,
+            "SPS": round(agent_steps / (time.time() - start)),
+            "reward_per_step": rewards[valids].mean().item(),
+            "value_loss": value_loss.item(),
+            "entropy": entropy.item(),
+        }
+        if update == 1 or update % 5 == 0 or update == num_updates:
+            print(" ".join(f"{key} {value:.4g}" for key, value in summary.items()), flush=True)
+    if args.save:
+        torch.save(agent.state_dict(), args.save)
+    if args.json:
+        print(json.dumps(summary))
+
+
+if __name__ == "__main__":
+    main()

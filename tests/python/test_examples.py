@@ -1,0 +1,62 @@
+"""The examples run, and do what they say."""
+
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+import pytest
+
+EXAMPLES = pathlib.Path(__file__).parents[2] / "examples"
+
+
+def run(name: str, *arguments: str, **options) -> str:
+    out = subprocess.run(
+        [sys.executable, str(EXAMPLES / name), *arguments], capture_output=True, text=True, timeout=600, **options
+    )
+    assert out.returncode == 0, out.stderr
+    return out.stdout
+
+
+def test_random_agents():
+    out = run("random_agents.py", "100")
+    assert "128 agents, 100 steps" in out and sum(map(int, re.findall(r"^\w+ +(\d+) \(", out, re.M))) > 10
+
+
+def test_render_a_scene(tmp_path):
+    out = run("render_a_scene.py", str(tmp_path / "scene.png"))
+    assert (tmp_path / "scene.png").stat().st_size > 1000 and float(re.search(r"is ([\d.]+) m away", out)[1]) < 20
+
+
+def test_my_rig():
+    out = run("my_rig.py")
+    assert "wide: images [24, 3, 64, 160]" in out and "mirror: images [24, 3, 64, 64]" in out
+
+
+def test_my_reward():
+    pytest.importorskip("gymnasium")
+    paid = {name: float(value) for name, value in re.findall(r"(\w+): (-?[\d.]+)", run("my_reward.py"))}
+    assert paid["accelerating"] != paid["standing"] == pytest.approx(0, abs=0.1)
+
+
+@pytest.mark.parametrize("observation", ["vector", "images"])
+def test_ppo(observation):
+    pytest.importorskip("torch")
+    pytest.importorskip("gymnasium")
+    sizes = ["--num-agents", "8", "--num-worlds", "2", "--num-steps", "16", "--total-timesteps", "1024", "--image-size", "32", "18"]
+    out = run("ppo.py", "--observation", observation, *sizes, "--json", env=os.environ | {"OMP_NUM_THREADS": "2"})
+    last = json.loads(out.splitlines()[-1])
+    assert last["update"] == 4 and last["agent_steps"] > 300 and 0 < last["entropy"] <= 2.49
+
+
+def test_the_tours_cells_run(tmp_path, monkeypatch):
+    pytest.importorskip("gymnasium")
+    monkeypatch.chdir(tmp_path)
+    notebook = json.loads((EXAMPLES / "tour.ipynb").read_text())
+    names: dict[str, object] = {}
+    cells = ["".join(cell["source"]) for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    for cell in cells:
+        exec(compile(cell, "tour.ipynb", "exec"), names)  # noqa: S102
+    assert names["above"].shape == (480, 640, 3) and len(cells) >= 8

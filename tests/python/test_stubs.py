@@ -1,0 +1,37 @@
+"""The type stubs say what the extension has."""
+
+import pathlib
+import subprocess
+import sys
+
+import pytest
+
+import pictura
+
+STUB = pathlib.Path(__file__).parents[2] / "bindings" / "pictura" / "_pictura.pyi"
+
+
+def test_stubs_are_current(tmp_path):
+    pytest.importorskip("pybind11_stubgen")
+    out = subprocess.run(
+        [sys.executable, "-m", "pybind11_stubgen", "pictura._pictura", "-o", str(tmp_path), "--numpy-array-use-type-var"],
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert out.returncode == 0, out.stderr
+    made = (tmp_path / "pictura" / "_pictura.pyi").read_text()
+    assert STUB.read_text() == made, "run scripts/python_stubs"
+
+
+def test_every_public_name_has_a_docstring():
+    for name in dir(pictura._pictura):
+        value = getattr(pictura._pictura, name)
+        if not isinstance(value, type) or name.startswith("_"):
+            continue
+        assert value.__doc__, name
+        for member, its in vars(value).items():
+            if not member.startswith("_") and callable(its):
+                assert (its.__doc__ or "").count("\n") >= 1, f"{name}.{member}"
+
+
+def test_the_package_is_typed():
+    assert (pathlib.Path(pictura.__file__).parent / "py.typed").exists()

@@ -1,0 +1,103 @@
+"""Policies in Python: the numbers of C++, and weights that the command takes."""
+
+import os
+import pathlib
+import subprocess
+
+import numpy as np
+import pytest
+
+import pictura
+
+torch = pytest.importorskip("torch")
+from pictura.torch import _read_safetensors, load_policy, save_policy  # noqa: E402
+
+NAMES = ("vector", "vector_points", "perspective", "perspective_points", "patches")
+
+
+@pytest.fixture(scope="session")
+def reference(tmp_path_factory) -> pathlib.Path:
+    program = os.environ.get("PICTURA_POLICY_REFERENCE")
+    if not program:
+        pytest.skip("PICTURA_POLICY_REFERENCE names no program: the library was built without torch")
+    folder = tmp_path_factory.mktemp("reference")
+    subprocess.run([program, str(folder)], check=True)
+    return folder
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_logits_and_values_are_those_of_the_library(reference, name):
+    policy = load_policy(reference / f"{name}.safetensors")
+    _, tensors = _read_safetensors(str(reference / f"{name}_io.safetensors"))
+    if "rgb" in tensors:
+        tensors["rgb"] = tensors["rgb"].to(torch.uint8)
+    with torch.no_grad():
+        logits, value = policy(tensors)
+    assert tensors["logits"].std() > 0.01
+    torch.testing.assert_close(logits, tensors["logits"], rtol=0, atol=1e-5)
+    torch.testing.assert_close(value, tensors["value"], rtol=0, atol=1e-5)
+
+
+def test_saved_weights_are_read_back(reference, tmp_path):
+    policy = load_policy(reference / "vector.safetensors")
+    with torch.no_grad():
+        policy.actor.bias += 1
+    save_policy(policy, tmp_path / "mine.safetensors", like=reference / "vector.safetensors")
+    again = load_policy(tmp_path / "mine.safetensors")
+    assert all(torch.equal(a, b) for a, b in zip(policy.state_dict().values(), again.state_dict().values()))
+    other = load_policy(reference / "perspective.safetensors")
+    with pytest.raises(pictura.Error, match="another architecture"):
+        save_policy(other, tmp_path / "x.safetensors", like=reference / "vector.safetensors")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.safetensors"]
+
+
+def test_broken_files_are_named(reference, tmp_path):
+    whole = (reference / "vector.safetensors").read_bytes()
+    for name, data in (("empty", b""), ("short", whole[:1000]), ("text", b"x" * 100), ("cut", whole[:-100])):
+        path = tmp_path / f"{name}.safetensors"
+        path.write_bytes(data)
+        with pytest.raises(pictura.Error, match=name):
+            load_policy(path)
+    path = tmp_path / "wrong.ckpt"
+    path.write_bytes(whole)
+    with pytest.raises(pictura.Error, match="PICTCKPT"):
+        load_policy(path)
+
+
+def test_a_policy_drives_the_simulator(reference, make):
+    simulator = make(6)
+    policy = load_policy(reference / "vector_points.safetensors")
+    seen = {name: array.torch() for name, array in simulator.observations.items()}
+    simulator.step(policy.act(seen))
+    simulator.step(policy.act(seen, argmax=False))
+    assert simulator.totals()["agent_steps"] > 0
+
+
+def test_weights_of_python_run_in_the_command(tmp_path):
+    command = os.environ.get("PICTURA_COMMAND")
+    if not command or "train" not in subprocess.run([command, "--help"], capture_output=True, text=True).stdout:
+        pytest.skip("PICTURA_COMMAND names no command that was built with torch")
+    run = tmp_path / "run"
+    settings = [
+        "policy.modality=vector", "simulator.maps=procedural:1", "simulator.num_slots=8", "simulator.max_agents=8",
+        "train.updates=1", "train.num_steps=4", "train.minibatch_size=16", "policy.backbone_width=32",
+    ]  # fmt: skip
+    sets = [part for setting in settings for part in ("--set", setting)]
+    out = subprocess.run([command, "train", "--out", str(run), *sets], capture_output=True, text=True)
+    assert out.returncode == 0, out.stderr
+    policy = load_policy(run / "checkpoint.ckpt")
+    exported = load_policy(run / "policy.safetensors")
+    assert all(torch.equal(a, b) for a, b in zip(policy.state_dict().values(), exported.state_dict().values()))
+    with torch.no_grad():
+        policy.actor.weight.zero_()
+        policy.actor.bias.copy_(torch.from_numpy(np.eye(12, dtype=np.float32)[10]))
+    save_policy(policy, tmp_path / "throttle.ckpt", like=run / "checkpoint.ckpt")
+    seen = {}
+    for checkpoint in (run / "checkpoint.ckpt", tmp_path / "throttle.ckpt"):
+        out = subprocess.run(
+            [command, "simulate", "--map", "procedural:1", "--agents", "4", "--steps", "20", "--policy", str(checkpoint), "--json"],
+            capture_output=True, text=True,
+        )  # fmt: skip
+        assert out.returncode == 0, out.stderr
+        seen[checkpoint.name] = out.stdout
+    assert seen["checkpoint.ckpt"] != seen["throttle.ckpt"]

@@ -1,0 +1,86 @@
+// Policies and what they compute, for tests of other implementations: policy_reference FOLDER writes for each policy its
+// weights (NAME.safetensors), and inputs with the logits and values of the library's forward pass in fp32
+// (NAME_io.safetensors).
+#include <cstdio>
+#include <string>
+
+#include <ATen/ATen.h>
+
+#include "pictura/training/checkpoint.h"
+
+namespace pictura {
+namespace {
+
+/// Of agents drawn at random; sets are filled to counts from none to all.
+std::vector<NamedTensor> draw_inputs(const Config& config, int64_t batch, Observation* observation_out) {
+  std::vector<NamedTensor> inputs;
+  const auto put = [&inputs](std::string name, at::Tensor* to, const at::Tensor& value) {
+    *to = value;
+    inputs.push_back({std::move(name), value});
+  };
+  for (size_t i = 0; i < std::size(kObservationArrays); ++i) {
+    const ObservationArray& array = kObservationArrays[i];
+    if (array.part == ObservationPart::walls) continue;
+    at::Tensor* const to = &(observation_out->*kObservationTensors[i]);
+    if (array.type == ElementType::i32) {
+      const at::Tensor largest = at::tensor({kMaxPartners, kMaxLanes, kMaxBoundaries, kMaxControls, 0}, at::kInt);
+      put(std::string(array.name), to, (at::rand({batch, kNumEntitySets}) * (largest + 1)).floor().to(at::kInt));
+    } else if (array.rows > 1 && array.name != "waypoints") {
+      put(std::string(array.name), to, at::randn({batch, array.rows, array.features}) * 0.3);
+    } else {
+      put(std::string(array.name), to, at::randn({batch, array.rows * array.features}) * 0.3);
+    }
+  }
+  if (config.policy.modality == Modality::perspective) {
+    const at::Tensor pixels = at::randint(256, {batch, 4, 3, 27, 48}, at::kByte);
+    observation_out->images = {{pixels, {0, 1, 2, 3}}};
+    inputs.push_back({"rgb", pixels.to(at::kLong)});
+  }
+  return inputs;
+}
+
+void write_reference(const std::string& folder, const std::string& name, const Config& config) {
+  const at::NoGradGuard no_grad;
+  const Policy policy(config.policy, 4, 7);
+  for (const NamedTensor& parameter : policy.parameters()) {
+    // Away from the first values, in which biases are zero and norms one.
+    at::Tensor value = parameter.value;
+    value.add_(at::randn_like(value) * 0.05);
+  }
+  Observation observation;
+  std::vector<NamedTensor> tensors = draw_inputs(config, 9, &observation);
+  const Policy::Output output = policy.forward(observation);
+  tensors.push_back({"logits", output.logits});
+  tensors.push_back({"value", output.value});
+  write_safetensors(folder + "/" + name + ".safetensors", policy.parameters(), to_toml(config));
+  write_safetensors(folder + "/" + name + "_io.safetensors", tensors, "");
+}
+
+}  // namespace
+}  // namespace pictura
+
+int main(int argc, char** argv) try {
+  using pictura::Modality;
+  if (argc != 2) return std::fprintf(stderr, "usage: policy_reference FOLDER\n"), 2;
+  at::manual_seed(3);
+  pictura::Config config;
+  for (const bool points : {false, true}) {
+    const std::string suffix = points ? "_points" : "";
+    config.policy.point_features = points;
+    config.policy.modality = Modality::vector;
+    write_reference(argv[1], "vector" + suffix, config);
+    config.policy.modality = Modality::perspective;
+    write_reference(argv[1], "perspective" + suffix, config);
+  }
+  config.policy.patch_px = 4;
+  config.policy.conv_channels = {24, 32};
+  config.policy.conv_kernels = {1, 3};
+  config.policy.conv_strides = {1, 2};
+  config.policy.attention_mlp = 0;
+  config.policy.num_queries = 3;
+  write_reference(argv[1], "patches", config);
+  return 0;
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "error: %s\n", error.what());
+  return 1;
+}
