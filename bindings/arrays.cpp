@@ -415,7 +415,7 @@ contents change with the calls that write it.)")
              return lent.array.shape[0];
            })
       .def(
-          "__getitem__", [](const py::object& self, const py::object& at) { return numpy_of(self)[at]; },
+          "__getitem__", [](const py::object& self, const py::object& at) -> py::object { return numpy_of(self)[at]; },
           "As of the NumPy view.")
       .def("__repr__",
            [](const LentArray& lent) { return fmt::format("<pictura.Array {}: {}>", lent.what, lent.array.text()); });

@@ -1,0 +1,686 @@
+"""
+The pictura library: maps, scenes, renderers and simulators. Import `pictura`, which has these names.
+"""
+from __future__ import annotations
+import collections.abc
+import numpy
+import numpy.dtypes
+import numpy.typing
+import typing
+__all__: list[str] = ['AGENT_FIELDS', 'Array', 'BOX_DTYPE', 'COMMAND_DTYPE', 'CONDITIONING_NAMES', 'Camera', 'Controller', 'EVENTS', 'Error', 'Geometry', 'HAS_CUDA', 'IDLE_ACTION', 'Images', 'LANE_TYPES', 'Map', 'NUM_ACTIONS', 'OBSERVATION_ARRAYS', 'REWARD_TERMS', 'Renderer', 'Rig', 'Scene', 'SceneFile', 'Simulator', 'Snapshot', 'StepResult', 'UsageError', 'VIEW_DTYPE', 'draw_worlds', 'known_towns', 'make_views', 'map_folder', 'renderer_names', 'simulator_names']
+class Error(RuntimeError):
+    """
+    The work failed; the message names what was expected and what came.
+    """
+class UsageError(Error, ValueError):
+    """
+    What was asked for cannot be asked for.
+    """
+class Array:
+    """
+    An array in the library's memory, lent without a copy.
+    
+    NumPy takes it by `numpy.asarray(array)` where it is on the CPU; `numpy.from_dlpack`, `torch.from_dlpack`, JAX and CuPy take
+    it on any device. The memory lives for as long as any of them does, also when its simulator or renderer is gone. Its
+    contents change with the calls that write it.
+    """
+    def __array__(self, dtype: typing.Any = None, copy: typing.Any = None) -> typing.Any:
+        ...
+    def __dlpack__(self, *, stream: typing.Any = None, max_version: typing.Any = None, dl_device: typing.Any = None, copy: typing.Any = None) -> typing.Any:
+        """
+        DLPack's protocol, versioned where max_version is (1, 0) or later. Raises BufferError for what cannot be lent.
+        """
+    def __dlpack_device__(self) -> tuple[int, int]:
+        """
+        DLPack's (device type, index): (1, 0) on the CPU, (2, i) on CUDA device i.
+        """
+    def __getitem__(self, arg0: typing.Any) -> typing.Any:
+        """
+        As of the NumPy view.
+        """
+    def __len__(self) -> int:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def numpy(self) -> numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]:
+        """
+        A NumPy view. Raises TypeError where the array is not on the CPU.
+        """
+    def torch(self) -> typing.Any:
+        """
+        A torch tensor over the same memory. Imports torch.
+        """
+    @property
+    def device(self) -> str:
+        """
+        'cpu' or 'cuda:0'.
+        """
+    @property
+    def dtype(self) -> str:
+        """
+        NumPy's name of the element type, as 'float32'.
+        """
+    @property
+    def read_only(self) -> bool:
+        """
+        Whether it must not be written.
+        """
+    @property
+    def shape(self) -> tuple:
+        """
+        Lengths, a tuple of int.
+        """
+    @property
+    def strides(self) -> tuple:
+        """
+        In elements, a tuple of int.
+        """
+class Geometry:
+    """
+    What renderers draw of a map: strips on the road, walls, heads of lights.
+    """
+    def __init__(self, lines: collections.abc.Sequence[tuple[typing.Annotated[numpy.typing.ArrayLike, numpy.float32], typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]]] = [], walls: typing.Annotated[numpy.typing.ArrayLike, numpy.float32] = ...) -> None:
+        """
+        A geometry of one's own.
+        
+        lines: of (points [n, 3] in metres, width in metres, colour of three numbers in [0, 1]).
+        walls: float [n, 7]: both ends of the foot, in metres, and the height.
+        Raises pictura.Error for other shapes; a renderer refuses what is not finite.
+        """
+    @property
+    def num_lights(self) -> int:
+        """
+        Light states that a world on it has.
+        """
+    @property
+    def num_strips(self) -> int:
+        """
+        Straight pieces of lines.
+        """
+    @property
+    def num_walls(self) -> int:
+        """
+        Faces of walls.
+        """
+class Map:
+    """
+    A road network: lanes, markings, edges, lights. Immutable; simulators and renderers share it.
+    
+    Positions are metres in the map's frame, z up; `origin_m` is its place in the file's coordinates.
+    """
+    @staticmethod
+    def from_text(text: str, source: str = 'text', *, lenient: bool = False) -> Map:
+        """
+        Parses the text of an OpenDRIVE file; `source` names it in messages. Raises as load() does.
+        """
+    @staticmethod
+    def load(name: str, *, lenient: bool = False, chord_error_m: typing.SupportsFloat | typing.SupportsIndex = 0.019999999552965164) -> Map:
+        """
+        Loads a map by name: an OpenDRIVE file (.xodr), a town of the map folder, or 'procedural:SEED'.
+        
+        lenient: leave faulty parts out, and say so in `warnings`. chord_error_m: how far sampled curves may lie from true ones.
+        Raises pictura.Error naming file, line and element; pictura.UsageError where there is no such map.
+        """
+    def __repr__(self) -> str:
+        ...
+    def arrays(self) -> dict:
+        """
+        Copies of the network's geometry as NumPy arrays by name.
+        
+        lane_points float32 [points, 6]: x, y, z, heading in radians, width, arc length; lane_point_range int32 [lanes, 2] says
+        whose they are. Ranges are half-open. lane_type uint8 [lanes] counts pictura.LANE_TYPES; lane_links int32 lists successors and
+        predecessors; road_edges, stop_lines and building_lines float32 [n, 6] are two ends each. Lengths are metres.
+        """
+    def draw(self, width_px: typing.SupportsInt | typing.SupportsIndex = 1024, height_px: typing.SupportsInt | typing.SupportsIndex = 1024) -> numpy.typing.NDArray[numpy.uint8]:
+        """
+        A picture from above, uint8 [height, width, 3], north up. Sizes of 16 to 8192 px.
+        """
+    def geometry(self, walls: bool = True, wall_seed: typing.SupportsInt | typing.SupportsIndex = 0) -> Geometry:
+        """
+        What renderers draw of it. walls: along the building lines, of heights drawn from wall_seed.
+        """
+    @property
+    def facts(self) -> dict:
+        """
+        Counts and lengths by name, as `pictura map` prints them.
+        """
+    @property
+    def geo_reference(self) -> str:
+        """
+        Of the file's coordinates, a PROJ string; may be empty.
+        """
+    @property
+    def name(self) -> str:
+        """
+        'Town01', 'procedural:7', or the file's stem.
+        """
+    @property
+    def origin_m(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
+        """
+        File coordinates of the map's origin, three floats in metres.
+        """
+    @property
+    def warnings(self) -> list[str]:
+        """
+        What a lenient import left out.
+        """
+class Camera:
+    """
+    A pinhole camera on a body: x forward, y left, z up, in metres from the rig's origin. Angles are radians: yaw is
+    counter-clockwise, pitch positive looks up, roll positive turns it clockwise as seen from behind.
+    """
+    name: str
+    def __init__(self, name: str, width_px: typing.SupportsInt | typing.SupportsIndex, height_px: typing.SupportsInt | typing.SupportsIndex, *, focal_px: typing.SupportsFloat | typing.SupportsIndex | None = None, position_m: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"] = [1.5, 0.0, 1.5], yaw_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0, pitch_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0, roll_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        """
+        The principal point is the middle; focal_px defaults to 0.8 times the width, about 64 degrees across.
+        """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def center_x_px(self) -> float:
+        ...
+    @center_x_px.setter
+    def center_x_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def center_y_px(self) -> float:
+        ...
+    @center_y_px.setter
+    def center_y_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def focal_x_px(self) -> float:
+        ...
+    @focal_x_px.setter
+    def focal_x_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def focal_y_px(self) -> float:
+        ...
+    @focal_y_px.setter
+    def focal_y_px(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def height_px(self) -> int:
+        ...
+    @height_px.setter
+    def height_px(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def pitch_rad(self) -> float:
+        ...
+    @pitch_rad.setter
+    def pitch_rad(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_m(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
+        ...
+    @position_m.setter
+    def position_m(self, arg1: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]) -> None:
+        ...
+    @property
+    def roll_rad(self) -> float:
+        ...
+    @roll_rad.setter
+    def roll_rad(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def width_px(self) -> int:
+        ...
+    @width_px.setter
+    def width_px(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def yaw_rad(self) -> float:
+        ...
+    @yaw_rad.setter
+    def yaw_rad(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class Rig:
+    """
+    One or more cameras of any sizes on a body; their order is that of images.
+    """
+    @staticmethod
+    def load(path: str) -> Rig:
+        """
+        Reads a rig from a TOML file. Raises pictura.Error naming file, camera and key.
+        """
+    @staticmethod
+    def paper(width_px: typing.SupportsInt | typing.SupportsIndex = 96, height_px: typing.SupportsInt | typing.SupportsIndex = 54, square_pixels: bool = False) -> Rig:
+        """
+        The paper's four cameras: front, front left, front right and back. Sizes of 1 to 8192 px.
+        """
+    def __init__(self, cameras: collections.abc.Sequence[Camera]) -> None:
+        """
+        Raises pictura.Error unless there are 1 to 64 valid cameras.
+        """
+    def __len__(self) -> int:
+        ...
+    @property
+    def cameras(self) -> list[Camera]:
+        ...
+class Scene:
+    """
+    What moves: boxes of agents and states of lights, for one or more worlds. A simulator's `scene` is what it shows at each
+    call; a scene of arrays is a copy of them.
+    """
+    def __init__(self, center_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], heading_rad: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], size_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], agent_class: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], *, world_begin: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, geometry: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, light_states: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, light_begin: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None) -> None:
+        """
+        center_m [n, 3]: of the box's foot. heading_rad [n]. size_m [n, 3]: length, width, height. agent_class [n]: 0
+        vehicle, 1 cyclist, 2 pedestrian. world_begin [worlds + 1]: the first box of each world; all are in one without it.
+        geometry [worlds]: the handles that geometries were uploaded to; 0 without it. light_states: 0 off, 1 red, 2 yellow, 3
+        green, of all worlds; light_begin [worlds + 1]. Raises pictura.Error for other shapes; render() refuses what does not
+        fit together.
+        """
+    @property
+    def boxes(self) -> Array:
+        """
+        uint8 [boxes, 36], read-only: `numpy.asarray(boxes).view(BOX_DTYPE)[:, 0]` has their fields by name.
+        """
+    @property
+    def num_worlds(self) -> int:
+        """
+        Worlds.
+        """
+class SceneFile:
+    """
+    A scene of one TOML file: geometry, boxes, rig and views.
+    """
+    def __init__(self, path: str) -> None:
+        """
+        Raises pictura.Error naming file, line, table and key.
+        """
+    @property
+    def geometry(self) -> Geometry:
+        ...
+    @property
+    def line_floor_px(self) -> float:
+        ...
+    @property
+    def rig(self) -> Rig:
+        ...
+    @property
+    def scene(self) -> Scene:
+        """
+        Its world is on geometry 0.
+        """
+    @property
+    def view_names(self) -> list[str]:
+        ...
+    @property
+    def views(self) -> numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]:
+        """
+        VIEW_DTYPE [n].
+        """
+class Images:
+    """
+    Images of some views by each camera of a rig, in the renderer's memory, and their planes where they were asked for.
+    A renderer draws into it as often as wanted.
+    """
+    def camera(self, index: typing.SupportsInt | typing.SupportsIndex) -> Array:
+        """
+        [views, 3, height, width] of one camera.
+        """
+    def planes(self, camera: typing.SupportsInt | typing.SupportsIndex) -> dict:
+        """
+        Of the front surface at each pixel's centre, [views, height, width]: depth_m float32 (infinite where nothing is),
+        class_id uint8 (0: nothing), instance_id uint16 (1 + the agent's index in its world, 0: no agent). Raises pictura.Error
+        for images without planes.
+        """
+    @property
+    def blocks(self) -> list:
+        """
+        One [views, cameras of that size, 3, height, width] for each distinct size.
+        """
+    @property
+    def num_views(self) -> int:
+        """
+        Views that it has room for.
+        """
+    @property
+    def rgb(self) -> Array:
+        """
+        [views, cameras, 3, height, width], for a rig whose cameras have one size.
+        """
+class Renderer:
+    """
+    Draws scenes: 'cpu', 'cuda', 'gl' ('gl:egl', 'gl:osmesa'), 'null', or 'auto'. One thread at a time; several renderers are
+    independent. On CUDA its work is put on `stream`.
+    """
+    def __init__(self, name: str = 'auto', rig: Rig | None = None, *, device: str = 'cpu', num_threads: typing.SupportsInt | typing.SupportsIndex = 0, line_floor_px: typing.SupportsFloat | typing.SupportsIndex = 0.3499999940395355, debug_palette: bool = False, samples: str = '1', stream: typing.Any = None) -> None:
+        """
+        rig: the paper's without one. device: where scenes, views and images lie, 'cpu' or 'cuda:0'. num_threads: 0 for
+        all. line_floor_px: the least width of a line on screen. debug_palette: tint halted and parked agents. samples: for 'gl',
+        '4' (MSAA) or '4x4' (supersampling). stream: a cudaStream_t as int; None: the legacy default stream.
+        Raises pictura.UsageError listing the names, pictura.Error where the backend cannot run here.
+        """
+    def check(self) -> None:
+        """
+        Waits for the work on the stream; raises pictura.Error for faults that a device found.
+        """
+    def make_images(self, num_views: typing.SupportsInt | typing.SupportsIndex, *, dtype: str = 'uint8', planes: bool = False) -> Images:
+        """
+        Memory for images of so many views: 'uint8' of 0 to 255, or 'float32' or 'float16' (not on all) of 0 to 1.
+        """
+    def render(self, scene: Scene, views: typing.Any, out: typing.Any = None, *, dtype: str = 'uint8', planes: bool = False) -> typing.Any:
+        """
+        Draws every camera for every view. Returns `out`.
+        
+        views: VIEW_DTYPE [n], or a simulator's. out: Images, or for a rig of one size an array [n, cameras, 3, height, width] of
+        uint8, float32 or float16 in the renderer's memory (NumPy, torch, ...); new Images of `dtype` and `planes` without it. On
+        CUDA the call returns when the work is on the stream. Raises pictura.Error naming what does not fit.
+        """
+    def upload(self, handle: typing.SupportsInt | typing.SupportsIndex, geometry: Geometry) -> None:
+        """
+        Copies a geometry; `handle`, 0 to 65535, is what scenes name it by. Raises pictura.Error where it is invalid.
+        """
+    def visibility(self, scene: Scene, views: typing.Any, queries: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> numpy.typing.NDArray[numpy.float32]:
+        """
+        How much of agents can be seen: for each query of (view, box of the scene), int [n, 2], the coverage in the view's
+        images over the coverage when drawn alone, float32 [n], NaN where it is in no camera's frame.
+        """
+    @property
+    def choice(self) -> str:
+        """
+        What was chosen, and why.
+        """
+    @property
+    def device(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def rig(self) -> Rig:
+        ...
+    @property
+    def stream(self) -> int:
+        """
+        The cudaStream_t that work is put on, as int; 0: the legacy default stream.
+        """
+    @stream.setter
+    def stream(self, arg1: typing.Any) -> None:
+        ...
+class StepResult:
+    """
+    What a step returns, one element a slot, in the simulator's memory: every step writes the same arrays again.
+    """
+    @property
+    def distance_m(self) -> typing.Any:
+        """
+        float32 [slots]: driven in this step.
+        """
+    @property
+    def refusal(self) -> typing.Any:
+        """
+        uint8 [slots]: why the agent is absent from this episode: 1 no place, 2 all taken; 0: it is not.
+        """
+    @property
+    def reward(self) -> typing.Any:
+        """
+        float32 [slots].
+        """
+    @property
+    def reward_terms(self) -> typing.Any:
+        """
+        float32 [slots, 11]: of which the reward is made, in the order of pictura.REWARD_TERMS.
+        """
+    @property
+    def terminated(self) -> typing.Any:
+        """
+        bool [slots]: an infraction ended the agent's episode in this step.
+        """
+    @property
+    def truncated(self) -> typing.Any:
+        """
+        bool [slots]: the episode ended for another reason: bootstrap.
+        """
+    @property
+    def valid(self) -> typing.Any:
+        """
+        bool [slots]: the agent was active when the step began: learn from it.
+        """
+class Snapshot:
+    """
+    A state that a simulator keeps in its own memory.
+    """
+class Simulator:
+    """
+    Many worlds, each on one map, stepped together. Arrays have one element a slot: the controlled agents of world 0, then those
+    of world 1, and so on. Executors 'cpu' and 'cuda' give the same bits.
+    
+    One thread at a time; several simulators are independent. The GIL is released while C++ works. On CUDA its work is put on
+    `stream`, calls return before it is done, and what is wrong with values is raised by check() or a later call.
+    """
+    def __init__(self, maps: collections.abc.Sequence[Map], worlds: collections.abc.Sequence, *, executor: str = 'auto', device: str = 'cpu', seed: typing.SupportsInt | typing.SupportsIndex = 0, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, dt_s: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, episode_steps: typing.SupportsInt | typing.SupportsIndex = 1280, reset_inactive_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.4000000059604645, pedestrian_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, cyclist_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, parked_cars: typing.SupportsInt | typing.SupportsIndex = 32, walls: bool = True, wall_seed: typing.SupportsInt | typing.SupportsIndex = 0, fixed_lights: bool = False, auxiliary_observations: bool = True, vector_observations: bool = True, wall_observations: bool = False, conditioning: dict = {}, stream: typing.Any = None) -> None:
+        """
+        maps: of pictura.Map. worlds: of (index of the map, agents), or (map, agents, global world), which keys the
+        world's random numbers. executor: 'cpu', 'cuda' or 'auto'. device: where observations and scenes are wanted. num_threads: of
+        the host, 0 for all. reset_inactive_fraction: a world resets when this part of its agents is inactive; more than 1: never.
+        conditioning: a number or (low, high) by name, see CONDITIONING_NAMES; the paper's ranges otherwise. stream: a cudaStream_t
+        as int; None: the legacy default stream. The other defaults are the paper's training world.
+        Raises pictura.UsageError naming what cannot be simulated, pictura.Error where there is no device.
+        """
+    def check(self) -> None:
+        """
+        Waits for the work on the stream; raises pictura.Error for what a device found wrong.
+        """
+    def draw(self, world: typing.SupportsInt | typing.SupportsIndex = 0, agent: typing.SupportsInt | typing.SupportsIndex = -1, *, width_px: typing.SupportsInt | typing.SupportsIndex = 640, height_px: typing.SupportsInt | typing.SupportsIndex = 480, width_m: typing.SupportsFloat | typing.SupportsIndex = 150.0) -> numpy.typing.NDArray[numpy.uint8]:
+        """
+        A world from above, uint8 [height, width, 3], on the CPU. agent: the one of that world in the middle, with its
+        waypoints; -1 shows the whole map. width_m: what is shown around it.
+        """
+    def reset(self, world_mask: typing.Any = None, seed: typing.SupportsInt | typing.SupportsIndex | None = None) -> None:
+        """
+        Starts new episodes. world_mask: uint8 or bool [worlds] in the simulator's memory, the worlds that start; all without
+        it. seed: theirs from now on; the simulator's own without it. Raises pictura.Error for another array.
+        """
+    @typing.overload
+    def restore(self, saved: bytes) -> None:
+        """
+        Back. Raises pictura.Error naming what differs.
+        """
+    @typing.overload
+    def restore(self, snapshot: Snapshot) -> None:
+        """
+        To a snapshot of these worlds; on CUDA without waiting.
+        """
+    def run(self, controller: ..., steps: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Steps with a controller for all agents. ^C ends it between steps.
+        """
+    def save(self) -> bytes:
+        """
+        The whole state as bytes, for exact resume on any executor. Waits for the stream.
+        """
+    def set_state(self, slots: typing.Any, fields: dict) -> None:
+        """
+        Gives fields of chosen agents other values. slots: int32 [n], each once. fields: arrays [n] or [n, per agent] by the
+        names of AGENT_FIELDS, of their types, all in the simulator's memory. Lane, height, box, view and observation follow. Raises
+        pictura.Error naming what is wrong; on CUDA values are checked as in step().
+        """
+    def set_worlds(self, maps: collections.abc.Sequence[Map], worlds: collections.abc.Sequence, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        """
+        Other worlds on other maps, at the start of their first episodes: what a new simulator would be. Take the arrays
+        anew: those of before stay valid memory and are no longer written. Raises as the constructor does.
+        """
+    def snapshot(self) -> Snapshot:
+        """
+        A copy of the state in the simulator's memory.
+        """
+    def spawn_report(self) -> dict:
+        """
+        What became of the agents that were asked for: counts by name. Waits for the stream.
+        """
+    def state_hash(self) -> int:
+        """
+        64 bits over the whole state, equal on every executor. Waits for the stream.
+        """
+    def step(self, actions: typing.Any) -> typing.Any:
+        """
+        Advances every world by one step. actions: int32 [slots] in the simulator's memory, each in [0, 12): 3 times the
+        longitudinal jerk's index (-15, -4, 0, 4 m/s3) plus the lateral one's (-4, 0, 4 m/s3, left positive). Those of inactive agents
+        are ignored. A world whose last step ended its episode starts the next one instead, and its slots are not valid.
+        Returns the StepResult. Raises pictura.Error, which leaves the state as it was, for another array and for actions out of
+        range.
+        """
+    def step_commands(self, commands: typing.Any) -> typing.Any:
+        """
+        The same by commands, COMMAND_DTYPE [slots]: kind 0 an action, 1 a kinematic state, 2 absence from the episode.
+        """
+    def totals(self) -> dict:
+        """
+        Counts and sums since construction by name; reward_terms is a dict. Waits for the stream.
+        """
+    @property
+    def agent_of_slot(self) -> Array:
+        """
+        int32 [slots]: the agent's index in its world.
+        """
+    @property
+    def choice(self) -> str:
+        """
+        What was chosen for 'auto', and why.
+        """
+    @property
+    def device(self) -> str:
+        ...
+    @property
+    def dt_s(self) -> float:
+        ...
+    @property
+    def episode_index(self) -> Array:
+        """
+        int32 [worlds]: the number of the episode.
+        """
+    @property
+    def episode_over(self) -> Array:
+        """
+        bool [worlds]: the episode has ended, and the next step begins the next one.
+        """
+    @property
+    def episode_step(self) -> Array:
+        """
+        int32 [worlds]: steps done in the present episode.
+        """
+    @property
+    def episode_steps(self) -> int:
+        ...
+    @property
+    def geometries(self) -> dict:
+        """
+        Of its maps, by the handles that its scene names them by.
+        """
+    @property
+    def maps(self) -> list[Map]:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def num_slots(self) -> int:
+        ...
+    @property
+    def num_worlds(self) -> int:
+        ...
+    @property
+    def observations(self) -> dict:
+        """
+        Arrays [slots, ...] by name, of the state after the last call: ego, partners, lanes, boundaries, controls, walls, set_counts, conditioning, waypoints.
+        """
+    @property
+    def scene(self) -> Scene:
+        """
+        What renderers draw, of all worlds.
+        """
+    @property
+    def seed(self) -> int:
+        ...
+    @property
+    def state(self) -> dict:
+        """
+        Every field of the agents by name, read-only, [slots] or [slots, per agent].
+        """
+    @property
+    def stream(self) -> int:
+        """
+        The cudaStream_t that work is put on, as int; 0: the legacy default stream.
+        """
+    @stream.setter
+    def stream(self, arg1: typing.Any) -> None:
+        ...
+    @property
+    def views(self) -> Array:
+        """
+        One view a slot: uint8 [slots, 40] that render() takes; its fields are VIEW_DTYPE's.
+        """
+    @property
+    def world_of_slot(self) -> Array:
+        """
+        int32 [slots].
+        """
+    @property
+    def worlds(self) -> list[tuple[int, int, int]]:
+        """
+        (map, agents, global world) of each.
+        """
+class Controller:
+    """
+    Who drives: 'lane' (the lane keeper), 'idle' or 'random', for one simulator on the CPU.
+    """
+    def __init__(self, name: str, simulator: Simulator, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        """
+        Raises pictura.UsageError listing the names.
+        """
+    def act(self, simulator: Simulator) -> numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]:
+        """
+        Commands for all slots, COMMAND_DTYPE [slots], which may be changed before step_commands() takes them. The same memory
+        at every call.
+        """
+    @property
+    def name(self) -> str:
+        ...
+def _hash64(data: bytes) -> int:
+    """
+    FNV-1a, with which files of the library end.
+    """
+def draw_worlds(seed: typing.SupportsInt | typing.SupportsIndex, num_slots: typing.SupportsInt | typing.SupportsIndex, min_agents: typing.SupportsInt | typing.SupportsIndex, max_agents: typing.SupportsInt | typing.SupportsIndex, num_maps: typing.SupportsInt | typing.SupportsIndex) -> list[tuple[int, int, int]]:
+    """
+    Worlds of sizes drawn from U{min, max} until they fill the slots; maps are taken in turn.
+    """
+def known_towns() -> list[str]:
+    """
+    Names of the towns in the map folder, sorted.
+    """
+def make_views(origin_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], heading_rad: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], *, world: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, ego_agent: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, body_length_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32] | None = None) -> numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]:
+    """
+    Poses of a rig, a NumPy array of VIEW_DTYPE [n].
+    
+    origin_m [n, 3]: of the rig, on the ground. heading_rad [n]. world [n]: 0 without it. ego_agent [n]: the box of the
+    scene that is left out, -1 for none. body_length_m [n]: shorter bodies than 4.5 m draw cameras nearer to their origin.
+    """
+def map_folder() -> str:
+    """
+    Where towns are looked up: $PICTURA_DATA, or the user's data folder.
+    """
+def renderer_names() -> list[str]:
+    """
+    Names that this build knows.
+    """
+def simulator_names() -> list[str]:
+    """
+    Executors that this build knows.
+    """
+AGENT_FIELDS: tuple = (('x_m', 'f32', 1, False, 'rear axle, or the centre of a pedestrian'), ('y_m', 'f32', 1, False, ''), ('z_m', 'f32', 1, False, 'height of the road under it'), ('heading_rad', 'f32', 1, False, 'counter-clockwise from x, in [-pi, pi]'), ('cos_heading', 'f32', 1, True, ''), ('sin_heading', 'f32', 1, True, ''), ('speed_mps', 'f32', 1, False, 'signed, along the heading'), ('accel_long_mps2', 'f32', 1, False, ''), ('accel_lat_mps2', 'f32', 1, False, 'positive to the left'), ('steer_rad', 'f32', 1, False, 'front wheel angle, positive to the left'), ('jerk_long_mps3', 'f32', 1, False, 'realised in the last step'), ('jerk_lat_mps3', 'f32', 1, False, ''), ('length_m', 'f32', 1, False, 'of the box'), ('width_m', 'f32', 1, False, ''), ('height_m', 'f32', 1, False, ''), ('lane', 'i32', 1, True, 'current lane, -1 none'), ('lane_offset_m', 'f32', 1, True, 'signed, positive to the left of the centre line'), ('lane_angle_rad', 'f32', 1, True, "heading less the lane's direction, in [-pi, pi]"), ('speed_limit_mps', 'f32', 1, True, 'of the current lane'), ('waypoint_x_m', 'f32', 3, False, 'the goal chain; passed ones stay until the chain is renewed'), ('waypoint_y_m', 'f32', 3, False, ''), ('waypoint_z_m', 'f32', 3, False, ''), ('next_waypoint', 'i32', 1, False, 'index of the active one, in [0, 3)'), ('goal_lane', 'i32', 1, False, 'lane (or piece of a walkway) of the last waypoint, where the next chain starts'), ('goal_lane_s_m', 'f32', 1, False, 'arc length of the last waypoint on it'), ('goal_chains', 'i32', 1, False, 'chains drawn in this episode'), ('goal_x_m', 'f32', 1, False, 'last waypoint that the metric Goals waits for, see rules/step.h'), ('goal_y_m', 'f32', 1, False, ''), ('goal_z_m', 'f32', 1, False, ''), ('goal_open', 'u8', 1, False, '1 while the metric waits for it'), ('conditioning', 'f32', 17, False, 'reward coefficients and dynamics multipliers; see simulator/conditioning.h'), ('agent_class', 'u8', 1, False, 'AgentClass'), ('status', 'u8', 1, False, 'AgentStatus'), ('refusal', 'u8', 1, True, 'SpawnFailure, of an absent agent'), ('halt_reason', 'u8', 1, False, 'Event bits that halted it'), ('events', 'u8', 1, False, 'Event bits of the last step'), ('goals_reached', 'i32', 1, False, 'last waypoints passed within 2 m in this episode'), ('waypoints_reached', 'i32', 1, False, 'waypoints of any kind that paid or passed in this episode'), ('distance_m', 'f32', 1, False, 'sum of |speed| dt in this episode'), ('first_motion_step', 'i32', 1, False, 'first step of this episode above kRest_mps, from 1; 0: none yet'), ('episode_events', 'u8', 1, False, "union of the episode's event bits"), ('episode_return', 'f32', 1, False, 'sum of rewards in this episode'))
+BOX_DTYPE: numpy.dtypes.VoidDType
+COMMAND_DTYPE: numpy.dtypes.VoidDType
+CONDITIONING_NAMES: tuple = ('delta_goal_m', 'v_goal_mps', 'collision', 'off_road', 'stop_line', 'comfort', 'lane_align', 'vel_align', 'lane_center', 'center_bias_m', 'velocity', 'reverse', 'overspeed', 'timestep', 'throttle', 'steer', 'acceleration')
+EVENTS: dict = {'collision': 1, 'at_fault': 2, 'off_road': 4, 'red_light': 8, 'wall': 16, 'goal': 32, 'waypoint': 64, 'metric_goal': 128}
+HAS_CUDA: bool = True
+IDLE_ACTION: int = 7
+LANE_TYPES: tuple = ('driving', 'bidirectional', 'parking', 'ramp', 'shoulder', 'sidewalk', 'biking', 'median', 'border', 'stop', 'restricted', 'other')
+NUM_ACTIONS: int = 12
+OBSERVATION_ARRAYS: tuple = (('ego', 'f32', 1, 9), ('partners', 'f32', 16, 8), ('lanes', 'f32', 80, 7), ('boundaries', 'f32', 80, 7), ('controls', 'f32', 10, 7), ('walls', 'f32', 80, 7), ('set_counts', 'i32', 1, 5), ('conditioning', 'f32', 1, 17), ('waypoints', 'f32', 3, 3))
+REWARD_TERMS: tuple = ('goal', 'collision', 'off_road', 'stop_line', 'comfort', 'lane_align', 'lane_center', 'velocity', 'overspeed', 'reverse', 'timestep')
+VIEW_DTYPE: numpy.dtypes.VoidDType
+__version__: str = '0.1.0'
