@@ -482,6 +482,9 @@ What a step returns, one element a slot, in the simulator's memory: every step w
 
   py::class_<Snapshot>(module, "Snapshot", "A state that a simulator keeps in its own memory.");
 
+  // Declared first, so that signatures can name it.
+  py::class_<PyController> controller_class(module, "Controller", R"(
+Who drives: 'lane' (the lane keeper), 'idle' or 'random', for one simulator on the CPU.)");
   py::class_<PySimulator>(module, "Simulator", R"(
 Many worlds, each on one map, stepped together. Arrays have one element a slot: the controlled agents of world 0, then those
 of world 1, and so on. Executors 'cpu' and 'cuda' give the same bits.
@@ -690,8 +693,7 @@ waypoints; -1 shows the whole map. width_m: what is shown around it.)")
           },
           py::doc("Of its maps, by the handles that its scene names them by."));
 
-  py::class_<PyController>(module, "Controller", R"(
-Who drives: 'lane' (the lane keeper), 'idle' or 'random', for one simulator on the CPU.)")
+  controller_class
       .def(py::init<const std::string&, PySimulator&, uint64_t>(), py::arg("name"), py::arg("simulator"),
            py::arg("seed") = 0, "Raises pictura.UsageError listing the names.")
       .def_property_readonly("name", &PyController::name)

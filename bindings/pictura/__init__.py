@@ -46,3 +46,16 @@ def make_vec(maps="procedural:3", num_agents: int = 16, **options):
     from pictura.envs.gymnasium_vector import DriveVectorEnv
 
     return DriveVectorEnv(maps, num_agents, **options)
+
+
+def _register() -> None:
+    import importlib.util
+
+    if importlib.util.find_spec("gymnasium") is None:
+        return
+    from pictura.envs import register
+
+    register()
+
+
+_register()

@@ -444,6 +444,22 @@ class Snapshot:
     """
     A state that a simulator keeps in its own memory.
     """
+class Controller:
+    """
+    Who drives: 'lane' (the lane keeper), 'idle' or 'random', for one simulator on the CPU.
+    """
+    def __init__(self, name: str, simulator: Simulator, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        """
+        Raises pictura.UsageError listing the names.
+        """
+    def act(self, simulator: Simulator) -> numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]:
+        """
+        Commands for all slots, COMMAND_DTYPE [slots], which may be changed before step_commands() takes them. The same memory
+        at every call.
+        """
+    @property
+    def name(self) -> str:
+        ...
 class Simulator:
     """
     Many worlds, each on one map, stepped together. Arrays have one element a slot: the controlled agents of world 0, then those
@@ -485,7 +501,7 @@ class Simulator:
         """
         To a snapshot of these worlds; on CUDA without waiting.
         """
-    def run(self, controller: ..., steps: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def run(self, controller: Controller, steps: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
         Steps with a controller for all agents. ^C ends it between steps.
         """
@@ -624,22 +640,6 @@ class Simulator:
         """
         (map, agents, global world) of each.
         """
-class Controller:
-    """
-    Who drives: 'lane' (the lane keeper), 'idle' or 'random', for one simulator on the CPU.
-    """
-    def __init__(self, name: str, simulator: Simulator, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        """
-        Raises pictura.UsageError listing the names.
-        """
-    def act(self, simulator: Simulator) -> numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]:
-        """
-        Commands for all slots, COMMAND_DTYPE [slots], which may be changed before step_commands() takes them. The same memory
-        at every call.
-        """
-    @property
-    def name(self) -> str:
-        ...
 def _hash64(data: bytes) -> int:
     """
     FNV-1a, with which files of the library end.

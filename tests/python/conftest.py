@@ -5,13 +5,6 @@ import pytest
 
 import pictura
 
-try:
-    import pictura.envs
-
-    pictura.envs.register()  # which an installed package's entry point does
-except ImportError:
-    pass
-
 IDLE = pictura.IDLE_ACTION
 
 

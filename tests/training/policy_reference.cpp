@@ -5,6 +5,7 @@
 #include <string>
 
 #include <ATen/ATen.h>
+#include <ATen/core/grad_mode.h>
 
 #include "pictura/training/checkpoint.h"
 
@@ -45,7 +46,7 @@ void write_reference(const std::string& folder, const std::string& name, const C
   for (const NamedTensor& parameter : policy.parameters()) {
     // Away from the first values, in which biases are zero and norms one.
     at::Tensor value = parameter.value;
-    value.add_(at::randn_like(value) * 0.05);
+    value.add_(at::randn_like(value) * 0.02);
   }
   Observation observation;
   std::vector<NamedTensor> tensors = draw_inputs(config, 9, &observation);
@@ -68,9 +69,9 @@ int main(int argc, char** argv) try {
     const std::string suffix = points ? "_points" : "";
     config.policy.point_features = points;
     config.policy.modality = Modality::vector;
-    write_reference(argv[1], "vector" + suffix, config);
+    pictura::write_reference(argv[1], "vector" + suffix, config);
     config.policy.modality = Modality::perspective;
-    write_reference(argv[1], "perspective" + suffix, config);
+    pictura::write_reference(argv[1], "perspective" + suffix, config);
   }
   config.policy.patch_px = 4;
   config.policy.conv_channels = {24, 32};
@@ -78,7 +79,7 @@ int main(int argc, char** argv) try {
   config.policy.conv_strides = {1, 2};
   config.policy.attention_mlp = 0;
   config.policy.num_queries = 3;
-  write_reference(argv[1], "patches", config);
+  pictura::write_reference(argv[1], "patches", config);
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "error: %s\n", error.what());

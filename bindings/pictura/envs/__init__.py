@@ -7,12 +7,13 @@ from pictura.envs.batch import Batch  # noqa: F401
 
 
 def register() -> None:
-    """Registers pictura/Drive-v0 with Gymnasium, which calls this as a plugin."""
-    import gymnasium
+    """Registers pictura/Drive-v0 with Gymnasium, as `import pictura` does where that is installed."""
+    from gymnasium.envs.registration import register as register_with_gymnasium
+    from gymnasium.envs.registration import registry
 
-    if "pictura/Drive-v0" in gymnasium.registry:
+    if "pictura/Drive-v0" in registry:
         return
-    gymnasium.register(
+    register_with_gymnasium(
         id="pictura/Drive-v0",
         entry_point="pictura.envs.gymnasium_env:DriveEnv",
         vector_entry_point="pictura.envs.gymnasium_vector:DriveVectorEnv",
