@@ -88,7 +88,8 @@ class SimulatorCpu final : public Simulator {
             worlds_.state.agents.view(),
             worlds_.state.episode_step,
             worlds_.state.episode_index,
-            worlds_.state.world_totals};
+            worlds_.state.world_totals,
+            worlds_.state.seed};
   }
 
   AgentStateView state() override { return worlds_.state.agents.view(); }

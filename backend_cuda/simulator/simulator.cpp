@@ -89,9 +89,16 @@ class SimulatorCuda final : public Simulator {
             {tables_.global_world.data(), num_worlds}};
   }
   ControllerInput controller_input() override {
-    return {device_,        slots(),         observations(),
-            scene_,         views(),         state(),
-            episode_step(), episode_index(), {state_.world_totals.data(), setup_.worlds.size()}};
+    return {device_,
+            slots(),
+            observations(),
+            scene_,
+            views(),
+            state(),
+            episode_step(),
+            episode_index(),
+            {state_.world_totals.data(), setup_.worlds.size()},
+            {state_.seed.data(), setup_.worlds.size()}};
   }
 
   AgentStateView state() override { return state_.agents.view(); }

@@ -23,6 +23,7 @@ struct ControllerInput {
   AgentStateView state{};
   Span<const int32_t> episode_step, episode_index;  // [worlds]
   Span<const SimulatorTotals> world_totals;         // [worlds]
+  Span<const uint64_t> seed;                        // [worlds] of its random numbers
 };
 
 /// Chooses a command for every slot. It belongs to one simulator and works in that one's memory.

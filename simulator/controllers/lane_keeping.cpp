@@ -311,6 +311,7 @@ void LaneKeepingController::begin_episode(const ControllerInput& input, size_t w
   // Over the simulator's agents, boxes and lights, which nothing here writes.
   const auto map = static_cast<size_t>(setup_->worlds[world].map);
   WorldView view = setup_->view(static_cast<int>(world), setup_->map_views[map], setup_->options);
+  view.seed = input.seed[world];
   view.episode = static_cast<uint32_t>(input.episode_index[world]);
   view.agents = input.state;
   view.boxes = view.boxes_before = const_cast<AgentBox*>(input.scene.agents.data()) + view.first_box;

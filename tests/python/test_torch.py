@@ -99,5 +99,5 @@ def test_weights_of_python_run_in_the_command(tmp_path):
             capture_output=True, text=True,
         )  # fmt: skip
         assert out.returncode == 0, out.stderr
-        seen[checkpoint.name] = json.loads(out.stdout)["distance_m"]
-    assert seen["throttle.ckpt"] > 2 * seen["checkpoint.ckpt"], "it does nothing but accelerate"
+        seen[checkpoint.name] = json.loads(out.stdout)["km_driven"]
+    assert seen["throttle.ckpt"] > seen["checkpoint.ckpt"] > 0, "it does nothing but accelerate"

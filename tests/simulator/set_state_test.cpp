@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/agent_state_arrays.h"
@@ -68,6 +69,20 @@ TEST(ResetOfWorlds, IsSavedAndUndoneByAResetOfAll) {
   EXPECT_EQ(simulator->save(), copy->save()) << "later episodes are of the seed, too";
   simulator->reset();
   EXPECT_EQ(simulator->state_hash(), first);
+}
+
+TEST(ResetOfWorlds, IsFollowedByTheLaneKeeper) {
+  const auto simulator = make_simulator("cpu", {.pedestrian_fraction = 0}, {load_map("procedural:1")}, {{0, 6, 0}});
+  const auto lane = make_controller("lane", *simulator, 0);
+  std::vector<Command> commands(6);
+  const auto drive = [&] {
+    lane->act(simulator->controller_input(), {}, commands);
+    simulator->step(commands);
+  };
+  drive();
+  simulator->reset(std::vector<uint8_t>{1}, 77);
+  for (int step = 0; step < 30; ++step) drive();
+  EXPECT_GT(simulator->totals().distance_m, 10);
 }
 
 TEST(ResetOfWorlds, ClearsTheirResultsAndRefusesAnotherMask) {
