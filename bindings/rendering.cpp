@@ -378,6 +378,23 @@ counter-clockwise, pitch positive looks up, roll positive turns it clockwise as 
       .def_readwrite("yaw_rad", &Camera::yaw_rad)
       .def_readwrite("pitch_rad", &Camera::pitch_rad)
       .def_readwrite("roll_rad", &Camera::roll_rad)
+      .def(py::pickle(
+          [](const Camera& c) {
+            return py::make_tuple(c.name, c.width_px, c.height_px, c.focal_x_px, c.focal_y_px, c.center_x_px,
+                                  c.center_y_px, c.position_m.x, c.position_m.y, c.position_m.z, c.yaw_rad, c.pitch_rad,
+                                  c.roll_rad);
+          },
+          [](const py::tuple& t) {
+            PICTURA_CHECK(t.size() == 13, "Camera: expected 13 values, got {}", t.size());
+            Camera c;
+            c.name = py::cast<std::string>(t[0]);
+            c.width_px = py::cast<int>(t[1]);
+            c.height_px = py::cast<int>(t[2]);
+            float* const floats[] = {&c.focal_x_px,   &c.focal_y_px,   &c.center_x_px, &c.center_y_px, &c.position_m.x,
+                                     &c.position_m.y, &c.position_m.z, &c.yaw_rad,     &c.pitch_rad,   &c.roll_rad};
+            for (size_t i = 0; i < std::size(floats); ++i) *floats[i] = py::cast<float>(t[i + 3]);
+            return c;
+          }))
       .def("__repr__", [](const Camera& c) {
         return fmt::format("<pictura.Camera {}: {}x{} px>", c.name, c.width_px, c.height_px);
       });
@@ -395,6 +412,8 @@ counter-clockwise, pitch positive looks up, roll positive turns it clockwise as 
       .def_static("load", load_rig, py::arg("path"),
                   "Reads a rig from a TOML file. Raises pictura.Error naming file, camera and key.")
       .def_readonly("cameras", &Rig::cameras)
+      .def(py::pickle([](const Rig& rig) { return py::make_tuple(rig.cameras); },
+                      [](const py::tuple& t) { return Rig{py::cast<std::vector<Camera>>(t[0])}; }))
       .def("__len__", [](const Rig& rig) { return rig.cameras.size(); });
 
   py::class_<Scene, std::shared_ptr<Scene>>(module, "Scene", R"(

@@ -170,11 +170,15 @@ class Camera:
     counter-clockwise, pitch positive looks up, roll positive turns it clockwise as seen from behind.
     """
     name: str
+    def __getstate__(self) -> tuple[str, int, int, float, float, float, float, float, float, float, float, float, float]:
+        ...
     def __init__(self, name: str, width_px: typing.SupportsInt | typing.SupportsIndex, height_px: typing.SupportsInt | typing.SupportsIndex, *, focal_px: typing.SupportsFloat | typing.SupportsIndex | None = None, position_m: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"] = [1.5, 0.0, 1.5], yaw_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0, pitch_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0, roll_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
         The principal point is the middle; focal_px defaults to 0.8 times the width, about 64 degrees across.
         """
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
         ...
     @property
     def center_x_px(self) -> float:
@@ -250,11 +254,15 @@ class Rig:
         """
         The paper's four cameras: front, front left, front right and back. Sizes of 1 to 8192 px.
         """
+    def __getstate__(self) -> tuple[list[Camera]]:
+        ...
     def __init__(self, cameras: collections.abc.Sequence[Camera]) -> None:
         """
         Raises pictura.Error unless there are 1 to 64 valid cameras.
         """
     def __len__(self) -> int:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
         ...
     @property
     def cameras(self) -> list[Camera]:

@@ -1,5 +1,6 @@
 """Maps, rigs, scenes, renderers and simulators: as in C++, by the same names."""
 
+import pickle
 import subprocess
 import sys
 
@@ -38,6 +39,8 @@ def test_the_papers_rig_and_ones_own():
     rig = pictura.Rig.paper(48, 27)
     assert len(rig) == 4 and rig.cameras[0].width_px == 48
     assert rig.cameras[0].focal_x_px == pytest.approx(1545 * 48 / 1920)
+    again = pickle.loads(pickle.dumps(rig))
+    assert [(c.name, c.yaw_rad, c.position_m) for c in again.cameras] == [(c.name, c.yaw_rad, c.position_m) for c in rig.cameras]
     with pytest.raises(pictura.Error, match="camera"):
         pictura.Rig([pictura.Camera("wide", 0, 10)])
 
