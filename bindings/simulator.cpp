@@ -680,6 +680,19 @@ waypoints; -1 shows the whole map. width_m: what is shown around it.)")
             });
           },
           py::arg("controller"), py::arg("steps"), "Steps with a controller for all agents. ^C ends it between steps.")
+      .def(
+          "time_steps",
+          [](PySimulator& self, const py::object& actions, int64_t steps) {
+            using Clock = std::chrono::steady_clock;
+            const BorrowedArray borrowed = borrow(actions, "time_steps: actions", self.stream());
+            const auto begin = Clock::now();
+            self.run_steps(steps, [&] { self.simulator().step(borrowed.array(), self.stream()); });
+            self.calls().run("time_steps", [&] { self.simulator().check(self.stream()); });
+            return std::chrono::duration<double>(Clock::now() - begin).count();
+          },
+          py::arg("actions"), py::arg("steps"),
+          "Seconds that so many steps with the same actions take from C++, for measurements: what step() adds is "
+          "Python's.")
       .def_property_readonly(
           "geometries",
           [](PySimulator& self) {

@@ -552,6 +552,10 @@ class Simulator:
         """
         The same by commands, COMMAND_DTYPE [slots]: kind 0 an action, 1 a kinematic state, 2 absence from the episode.
         """
+    def time_steps(self, actions: typing.Any, steps: typing.SupportsInt | typing.SupportsIndex) -> float:
+        """
+        Seconds that so many steps with the same actions take from C++, for measurements: what step() adds is Python's.
+        """
     def totals(self) -> dict:
         """
         Counts and sums since construction by name; reward_terms is a dict. Waits for the stream.
