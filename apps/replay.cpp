@@ -112,17 +112,8 @@ void add_replay_command(CLI::App& app) {
     if (arguments->gallery.empty() && command->count("--episodes") > 0) {
       fail_usage("--episodes: has no effect without --gallery");
     }
-    if (arguments->recording.followed >= arguments->world.agents) {
-      fail_usage("--follow: expected 0 to {}, got {}", arguments->world.agents - 1, arguments->recording.followed);
-    }
-    if (is_host_controller(arguments->policy)) {
-      for (const char* option : {"--device", "--renderer", "--samples"}) {
-        if (command->count(option) > 0) {
-          fail_usage("{}: has no effect with the policy '{}', which computes and draws nothing", option,
-                     arguments->policy);
-        }
-      }
-    }
+    check_followed(arguments->recording, arguments->world.agents);
+    refuse_idle_backend_options(*command, arguments->policy);
     run(*arguments);
   });
 }

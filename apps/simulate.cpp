@@ -51,12 +51,7 @@ void refuse_idle_options(const CLI::App& command, const Arguments& arguments) {
     }
   }
   if (arguments.replay.empty()) refuse_recording_options(command, "--replay");
-  if (!is_host_controller(arguments.policy)) return;
-  for (const char* option : {"--device", "--renderer", "--samples"}) {
-    if (command.count(option) > 0) {
-      fail_usage("{}: has no effect with the policy '{}', which computes and draws nothing", option, arguments.policy);
-    }
-  }
+  refuse_idle_backend_options(command, arguments.policy);
 }
 
 void run(const Arguments& arguments) {
@@ -179,9 +174,7 @@ void add_simulate_command(CLI::App& app) {
     if (arguments->film_agent >= arguments->world.agents) {
       fail_usage("--film-agent: expected 0 to {}, got {}", arguments->world.agents - 1, arguments->film_agent);
     }
-    if (arguments->recording.followed >= arguments->world.agents) {
-      fail_usage("--follow: expected 0 to {}, got {}", arguments->world.agents - 1, arguments->recording.followed);
-    }
+    check_followed(arguments->recording, arguments->world.agents);
     run(*arguments);
   });
 }

@@ -48,6 +48,15 @@ bool is_host_controller(const std::string& policy) {
   return std::find(names.begin(), names.end(), policy) != names.end();
 }
 
+void refuse_idle_backend_options(const CLI::App& command, const std::string& policy) {
+  if (!is_host_controller(policy)) return;
+  for (const char* option : {"--device", "--renderer", "--samples"}) {
+    if (command.count(option) > 0) {
+      fail_usage("{}: has no effect with the policy '{}', which computes and draws nothing", option, policy);
+    }
+  }
+}
+
 void set_population(const WorldOptions& options, SimulatorConfig* config_inout) {
   float& pedestrians = config_inout->pedestrian_fraction;
   float& cyclists = config_inout->cyclist_fraction;

@@ -38,6 +38,9 @@ void set_population(const WorldOptions& options, SimulatorConfig* config_inout);
 /// Whether a policy is the name of a controller that needs no checkpoint.
 bool is_host_controller(const std::string& policy);
 
+/// Throws UsageError where a policy that computes and draws nothing was given options that say by what.
+void refuse_idle_backend_options(const CLI::App& command, const std::string& policy);
+
 class PolicySession;
 
 /// One world and who drives in it.

@@ -62,6 +62,11 @@ void add_recording_options(CLI::App* command, RecordingOptions* options_out) {
                     "else the paper's");
 }
 
+void check_followed(const RecordingOptions& options, int num_agents) {
+  if (options.followed >= num_agents)
+    fail_usage("--follow: expected 0 to {}, got {}", num_agents - 1, options.followed);
+}
+
 void refuse_recording_options(const CLI::App& command, const std::string& needed) {
   for (const char* option : {"--follow", "--cameras"}) {
     if (command.count(option) > 0) fail_usage("{}: has no effect without {}", option, needed);

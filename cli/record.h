@@ -21,6 +21,8 @@ struct RecordingOptions {
 
 /// Adds --follow and --cameras.
 void add_recording_options(CLI::App* command, RecordingOptions* options_out);
+/// Throws UsageError unless a world of so many agents has the followed one.
+void check_followed(const RecordingOptions& options, int num_agents);
 /// Throws UsageError where the command was given one of them, which has no effect without `needed`.
 void refuse_recording_options(const CLI::App& command, const std::string& needed);
 
