@@ -261,7 +261,8 @@ void Recorder::before_step(Span<const Command> commands, const std::optional<Rep
   parts.commands.assign(of_world.begin(), of_world.end());
   const AgentStateView state = parts.simulator.state();
   for (int32_t agent = 0; agent < parts.replay.num_agents; ++agent) {
-    copy_fields(state, parts.before.view(), static_cast<int>(parts.slot(agent)));
+    const int slot = static_cast<int>(parts.slot(agent));
+    copy_fields(state, slot, parts.before.view(), slot);
   }
   parts.add_decision(decision);
 }

@@ -42,7 +42,7 @@ std::vector<NamedTensor> draw_inputs(const Config& config, int64_t batch, Observ
 
 void write_reference(const std::string& folder, const std::string& name, const Config& config) {
   const at::NoGradGuard no_grad;
-  const Policy policy(config.policy, 4, 7);
+  const PolicyNetwork policy(config.policy, 4, 7);
   for (const NamedTensor& parameter : policy.parameters()) {
     // Away from the first values, in which biases are zero and norms one.
     at::Tensor value = parameter.value;
