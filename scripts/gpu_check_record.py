@@ -124,7 +124,10 @@ class Run:
 
 
 def last_lines(text):
-    return text.splitlines()[-LAST_LINES:]
+    """Those that name an error or what a build failed to make, and the last ones."""
+    lines = text.splitlines()
+    errors = [line for line in lines[:-LAST_LINES] if "error: " in line or line.startswith("FAILED: ")]
+    return errors[:LAST_LINES] + lines[-LAST_LINES:]
 
 
 def say(name, run):
