@@ -54,10 +54,17 @@ Estimate ratio(const std::vector<ScenarioCounts>& scenarios, const Part& part_of
 Json to_json(const EvaluationSetting& s) {
   Json conditioning;
   for (size_t i = 0; i < kNumConditioning; ++i) conditioning[kConditioningNames[i]] = s.conditioning[i];
-  return {{"policy_hash", s.policy_hash}, {"maps", s.maps},         {"steps", s.steps},
-          {"argmax", s.argmax},           {"seed", s.seed},         {"precision", s.precision},
-          {"device", s.device},           {"renderer", s.renderer}, {"samples", s.samples},
-          {"image_sizes", s.image_sizes}, {"conditioning", conditioning}};
+  return {{"policy_hash", s.policy_hash},
+          {"maps", s.maps},
+          {"steps", s.steps},
+          {"argmax", s.argmax},
+          {"seed", s.seed},
+          {"precision", s.precision},
+          {"device", s.device},
+          {"renderer", s.renderer},
+          {"samples", s.samples},
+          {"image_sizes", s.image_sizes},
+          {"conditioning", conditioning}};
 }
 
 EvaluationSetting setting_from(const Json& json) {

@@ -37,9 +37,9 @@ struct EvaluationSetting {
   int steps = 0;
   bool argmax = true;
   uint64_t seed = 0;
-  std::string precision, device;         // of the network; "cpu" or "cuda"
-  std::string renderer, samples;         // empty for policies without images
-  std::vector<std::string> image_sizes;  // "96x54", of each camera
+  std::string precision, device;                        // of the network; "cpu" or "cuda"
+  std::string renderer, samples;                        // empty for policies without images
+  std::vector<std::string> image_sizes;                 // "96x54", of each camera
   std::array<double, kNumConditioning> conditioning{};  // of every agent, in the order of simulator/conditioning.h
   friend bool operator==(const EvaluationSetting&, const EvaluationSetting&) = default;
 };
