@@ -98,7 +98,7 @@ inline Config exact_config(const std::string& device, const std::vector<std::str
                                      "run.seed=8",
                                      "render.width_px=8",
                                      "render.height_px=6",
-                                     "simulator.num_slots=72",
+                                     "simulator.num_slots=144",
                                      "simulator.min_agents=30",
                                      "simulator.max_agents=40",
                                      "simulator.pedestrian_fraction=0.3",
