@@ -119,7 +119,7 @@ struct Lending {
     tensor.strides = lending->strides.data();
     lending->managed.manager_ctx = lending.get();
     // The owner is C++ memory: no GIL is needed to let go of it.
-    lending->managed.deleter = [](Managed* managed) { delete static_cast<Lending*>(managed->manager_ctx); };
+    lending->managed.deleter = [](Managed* self) { delete static_cast<Lending*>(self->manager_ctx); };
     return &lending.release()->managed;
   }
 

@@ -265,7 +265,8 @@ class PySimulator {
   template <typename Work>
   void run_steps(int64_t steps, const Work& step) {
     using Clock = std::chrono::steady_clock;
-    for (int64_t done = 0; done < steps;) {
+    int64_t done = 0;
+    while (done < steps) {
       calls_->run("run", [&] {
         const auto begin = Clock::now();
         do step();
