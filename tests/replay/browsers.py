@@ -15,7 +15,18 @@ import tempfile
 import time
 
 
-class Chromium:
+class Browser:
+    """Whatever runs expressions in a page."""
+
+    def wait_for(self, expression, timeout_s=60):
+        end = time.monotonic() + timeout_s
+        while not self.run(f"!!({expression})"):
+            if time.monotonic() > end:
+                raise TimeoutError(f"never became true: {expression}")
+            time.sleep(0.05)
+
+
+class Chromium(Browser):
     """One page. `errors` collects what it logs as errors and what it throws."""
 
     def __init__(self, width=1280, height=720, scheme="dark", touch=False):
@@ -86,13 +97,6 @@ class Chromium:
             raise RuntimeError(result["exceptionDetails"].get("exception", {}).get("description", "failed"))
         return result["result"].get("value")
 
-    def wait_for(self, expression, timeout_s=60):
-        end = time.monotonic() + timeout_s
-        while not self.run(f"!!({expression})"):
-            if time.monotonic() > end:
-                raise TimeoutError(f"never became true: {expression}")
-            time.sleep(0.05)
-
     def key(self, key, modifiers=0):
         text = "\r" if key == "Enter" else key if len(key) == 1 else ""
         code = {"ArrowRight": 39, "ArrowLeft": 37, "Home": 36, "End": 35, "Enter": 13}.get(key, ord(key[0].upper()))
@@ -126,7 +130,7 @@ class Chromium:
         self.profile.cleanup()
 
 
-class Firefox:
+class Firefox(Browser):
     """One page, by Marionette."""
 
     def __init__(self, width=1280, height=720):
@@ -180,13 +184,6 @@ class Firefox:
         # In the page's own world, not in one that only sees its document.
         return self.call("WebDriver:ExecuteScript", {"script": f"return window.wrappedJSObject ? window.wrappedJSObject.eval({json.dumps(expression)}) : eval({json.dumps(expression)})",
                                                      "args": [], "sandbox": None})["value"]  # fmt: skip
-
-    def wait_for(self, expression, timeout_s=60):
-        end = time.monotonic() + timeout_s
-        while not self.run(f"!!({expression})"):
-            if time.monotonic() > end:
-                raise TimeoutError(f"never became true: {expression}")
-            time.sleep(0.1)
 
     def screenshot(self):
         return base64.b64decode(self.call("WebDriver:TakeScreenshot", {"full": False})["value"])
