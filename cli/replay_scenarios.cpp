@@ -84,17 +84,7 @@ Replay record_scenario(const EvaluateOptions& options, const EvaluationResults& 
   one.device = one.simulator = "cpu";
   one.on_progress = nullptr;
   std::unique_ptr<PolicySession> session;
-  if (one.controller.empty()) {
-    session = std::make_unique<PolicySession>(one.checkpoint, SessionOptions{.num_threads = one.num_threads,
-                                                                             .device = one.device,
-                                                                             .simulator = one.simulator,
-                                                                             .renderer = one.renderer,
-                                                                             .samples = one.samples,
-                                                                             .rig = one.rig,
-                                                                             .width_px = one.width_px,
-                                                                             .height_px = one.height_px,
-                                                                             .backbone = one.backbone});
-  }
+  if (one.controller.empty()) session = std::make_unique<PolicySession>(one.checkpoint, session_options(one));
   // The followed agent's policy is asked with a renderer of its own, which holds the scenario's map.
   std::unique_ptr<Renderer> renderer = session ? session->make_renderer() : nullptr;
   ScenarioRecorder recorder({session ? one.checkpoint : one.controller, session.get(), renderer.get()}, recording);

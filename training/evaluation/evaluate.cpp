@@ -225,18 +225,22 @@ EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options, Ev
 
 }  // namespace
 
+SessionOptions session_options(const EvaluateOptions& options) {
+  return {.num_threads = options.num_threads,
+          .device = options.device,
+          .simulator = options.simulator,
+          .renderer = options.renderer,
+          .samples = options.samples,
+          .rig = options.rig,
+          .width_px = options.width_px,
+          .height_px = options.height_px,
+          .backbone = options.backbone,
+          .conditioning = options.conditioning};
+}
+
 EvaluateReport evaluate(const EvaluateOptions& options) {
   if (options.controller.empty()) {
-    PolicySession session(options.checkpoint, {.num_threads = options.num_threads,
-                                               .device = options.device,
-                                               .simulator = options.simulator,
-                                               .renderer = options.renderer,
-                                               .samples = options.samples,
-                                               .rig = options.rig,
-                                               .width_px = options.width_px,
-                                               .height_px = options.height_px,
-                                               .backbone = options.backbone,
-                                               .conditioning = options.conditioning});
+    PolicySession session(options.checkpoint, session_options(options));
     return evaluate(&session, options);
   }
   check(options);

@@ -13,6 +13,7 @@ namespace pictura {
 
 class PolicySession;
 class Renderer;
+struct SessionOptions;
 
 enum class Density { light, medium, dense };  // 60, 120 and 150 agents a world
 
@@ -69,6 +70,9 @@ struct EvaluationWorlds {
   Renderer* renderer = nullptr;          // of the session's images, with the maps as 0, 1, ...; null without images
   std::unique_ptr<Simulator> simulator;  // made by the first of them
 };
+
+/// With which the checkpoint's policy is opened.
+SessionOptions session_options(const EvaluateOptions& options);
 
 /// Scenario k is on map k modulo the number of maps and draws its random numbers as world kFirstEvaluationWorld + k, so
 /// that it repeats no world of training whatever the seeds. Throws Error naming file and key for bad input.
