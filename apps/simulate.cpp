@@ -144,12 +144,7 @@ void run(const Arguments& arguments) {
 void add_simulate_command(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("simulate", "Drive a world and count what happens");
-  command->add_option("MAP", arguments->world.map, "A .xodr file, a town's name, or procedural[:SEED]")->required();
-  add_world_options(command, &arguments->world);
-  command->add_option("--steps", arguments->steps, "Steps of 0.1 s")->transform(whole_number(1))->capture_default_str();
-  command->add_option("--policy", arguments->policy, "random, idle, lane, or a checkpoint that train wrote")
-      ->capture_default_str();
-  add_policy_backend_options(command, "auto, and drawn as in training", &arguments->backends);
+  add_driving_options(command, &arguments->world, &arguments->steps, &arguments->policy, &arguments->backends);
   command->add_option(
       "--video", arguments->video,
       "Film it into this .mp4 or .gif: from above, with goals, lights and why agents halted, and from one "

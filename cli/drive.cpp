@@ -43,6 +43,16 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
   command->add_flag("!--no-walls", options_out->walls, "Leave out the walls along the building lines");
 }
 
+void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_out, std::string* policy_out,
+                         BackendOptions* backends_out) {
+  command->add_option("MAP", world_out->map, "A .xodr file, a town's name, or procedural[:SEED]")->required();
+  add_world_options(command, world_out);
+  command->add_option("--steps", *steps_out, "Steps of 0.1 s")->transform(whole_number(1))->capture_default_str();
+  command->add_option("--policy", *policy_out, "random, idle, lane, or a checkpoint that train wrote")
+      ->capture_default_str();
+  add_policy_backend_options(command, "auto, and drawn as in training", backends_out);
+}
+
 bool is_host_controller(const std::string& policy) {
   const std::vector<std::string> names = host_controller_names();
   return std::find(names.begin(), names.end(), policy) != names.end();

@@ -31,6 +31,10 @@ struct WorldOptions {
 /// Adds --agents, --pedestrians, --cyclists, --parked, --seed, --threads and --no-walls, which fill *options_out.
 void add_world_options(CLI::App* command, WorldOptions* options_out);
 
+/// Adds MAP, those options, --steps, --policy and where the policy runs.
+void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_out, std::string* policy_out,
+                         BackendOptions* backends_out);
+
 /// Sets the shares of pedestrians and cyclists that were given; a share that was not gives way to one that was. Throws
 /// UsageError where both were given and are more than 1.
 void set_population(const WorldOptions& options, SimulatorConfig* config_inout);
