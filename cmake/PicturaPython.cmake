@@ -1,5 +1,5 @@
-# Python and pybind11 for bindings/: the Python of PICTURA_PYTHON, of the virtual environment, or of the build that
-# scikit-build-core makes.
+# Python and pybind11 for bindings/: the Python that Python_EXECUTABLE names (as scikit-build-core does), of the
+# virtual environment, or python3 where that imports pybind11.
 
 set(PICTURA_HAS_PYTHON OFF)
 if(NOT PICTURA_WITH_PYTHON STREQUAL OFF)
@@ -9,6 +9,13 @@ if(NOT PICTURA_WITH_PYTHON STREQUAL OFF)
         set(Python_EXECUTABLE ${venv}/bin/python)
       endif()
     endforeach()
+  endif()
+  if(NOT Python_EXECUTABLE)
+    execute_process(COMMAND python3 -c "import pybind11, sys; print(sys.executable)"
+      OUTPUT_VARIABLE pictura_python3 ERROR_QUIET OUTPUT_STRIP_TRAILING_WHITESPACE)
+    if(pictura_python3)
+      set(Python_EXECUTABLE ${pictura_python3})
+    endif()
   endif()
   find_package(Python 3.11 COMPONENTS Interpreter Development.Module QUIET)
   if(Python_Development.Module_FOUND)
@@ -23,8 +30,11 @@ if(NOT PICTURA_WITH_PYTHON STREQUAL OFF)
       message(STATUS "python: ${Python_EXECUTABLE} ${Python_VERSION}, pybind11 ${pybind11_VERSION}")
     endif()
   endif()
-  if(NOT PICTURA_HAS_PYTHON AND PICTURA_WITH_PYTHON STREQUAL ON)
-    message(FATAL_ERROR "PICTURA_WITH_PYTHON=ON, but '${Python_EXECUTABLE}' has no headers or no pybind11 3: "
-                        "run scripts/setup, or set Python_EXECUTABLE")
+  if(NOT PICTURA_HAS_PYTHON)
+    set(lacks "'${Python_EXECUTABLE}' is not 3.11 or later, or has no headers or no pybind11 3")
+    if(PICTURA_WITH_PYTHON STREQUAL ON)
+      message(FATAL_ERROR "PICTURA_WITH_PYTHON=ON, but ${lacks}: run scripts/setup, or set Python_EXECUTABLE")
+    endif()
+    message(STATUS "python: bindings/ is not built: ${lacks}")
   endif()
 endif()

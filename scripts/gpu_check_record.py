@@ -21,8 +21,8 @@ import subprocess
 import sys
 import time
 
-SOURCES = ("common map simulator backend_cpu backend_cuda backend_gl backends training drawing cli apps bench tests "
-           "cmake").split()
+SOURCES = ("common map simulator backend_cpu backend_cuda backend_gl backends training drawing replay cli apps bindings "
+           "examples bench tests cmake").split()
 RESULTS = pathlib.Path("bench/results")
 LAST_LINES = 40
 # "  7/353 Test  #12: Suite.Name/4-byte object <00> ....***Failed    0.01 sec"

@@ -9,6 +9,8 @@ from conftest import actions_of
 
 import pictura
 
+# JAX would take three quarters of the device's memory, which other tests use at the same time.
+os.environ.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")
 torch = pytest.importorskip("torch")
 if not (pictura.HAS_CUDA and torch.cuda.is_available()):
     if os.environ.get("PICTURA_REQUIRE_GPU") == "1":
