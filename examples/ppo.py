@@ -45,13 +45,14 @@ def parse_args() -> argparse.Namespace:
     parser.add_argument("--vf-coef", type=float, default=0.5)
     parser.add_argument("--max-grad-norm", type=float, default=0.5)
     parser.add_argument("--save", help="writes the weights to this path (torch.save)")
-    parser.add_argument("--json", action="store_true", help="prints the last line as JSON")
+    parser.add_argument("--json", action="store_true", help="prints the last update as JSON, and nothing else")
     return parser.parse_args()
 
 
 def main() -> None:
     args = parse_args()
     torch.manual_seed(args.seed)
+    torch.set_float32_matmul_precision("high")  # TF32 on CUDA
     sees_images = args.observation == "images"
     rig = pictura.Rig.paper(*args.image_size) if sees_images else None
     envs = pictura.make_vec(
@@ -71,7 +72,7 @@ def main() -> None:
     logprobs, rewards, values = (torch.zeros(shape, device=device) for _ in range(3))
     dones, valids = (torch.zeros(shape, dtype=torch.bool, device=device) for _ in range(2))
     num_updates = max(1, args.total_timesteps // (args.num_steps * n))
-    start, agent_steps, summary = time.time(), 0, {}
+    start, before, agent_steps, summary = time.time(), 0, 0, {}
 
     for update in range(1, num_updates + 1):
         for step in range(args.num_steps):
@@ -121,12 +122,14 @@ def main() -> None:
         summary = {
             "update": update,
             "agent_steps": agent_steps,
-            "SPS": round(agent_steps / (time.time() - start)),
+            "SPS": round((agent_steps - before) / (time.time() - start)),
             "reward_per_step": rewards[valids].mean().item(),
             "value_loss": value_loss.item(),
             "entropy": entropy.item(),
         }
-        if update == 1 or update % 5 == 0 or update == num_updates:
+        if update == 1:  # in which kernels are compiled
+            start, before = time.time(), agent_steps
+        if not args.json and (update == 1 or update % 5 == 0 or update == num_updates):
             print(" ".join(f"{key} {value:.4g}" for key, value in summary.items()), flush=True)
     if args.save:
         torch.save(agent.state_dict(), args.save)
