@@ -21,11 +21,70 @@ SCRIPTS = pathlib.Path(__file__).resolve().parents[2] / "scripts"
 
 class Help(unittest.TestCase):
     def test_it_is_found_from_any_folder(self):
-        for name in ("setup", "format", "test", "demo", "gpu_check", "gpu_ranks", "gpu_train", "gpu_search"):
+        for name in ("setup", "format", "test", "demo", "gpu_check", "gpu_ranks", "gpu_train", "gpu_search", "reproduce_table"):
             with self.subTest(name):
                 result = subprocess.run([f"./{name}", "--help"], cwd=SCRIPTS, capture_output=True, text=True, timeout=60)
                 self.assertEqual((result.returncode, result.stderr), (0, ""))
                 self.assertGreater(len(result.stdout.splitlines()), 1)
+
+
+class ReproduceTable(unittest.TestCase):
+    """With a program in the place of pictura that reports what it was asked."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="pictura-test-")
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name)
+        self.asked = self.root / "asked"
+        program = self.root / "pictura"
+        program.write_text(f"""#!{sys.executable}
+import json, sys
+with open({str(self.asked)!r}, "a") as asked:
+    print(" ".join(sys.argv[1:]), file=asked)
+names = ["at_fault_collision_rate", "off_road_rate", "red_light_rate", "goals_per_vehicle", "km_per_infraction",
+         "km_per_vehicle"]
+row = {{"density": "medium"}}
+for name in names:
+    row[name], row[name + "_half_width_95"] = 0.25, 0.125
+if "idle" in sys.argv:
+    row["km_per_infraction"] = None
+print(json.dumps({{"rows": [row]}}))
+""")
+        program.chmod(0o755)
+        (self.root / "a.safetensors").write_text("")
+
+    def run_script(self, *arguments):
+        return subprocess.run([SCRIPTS / "reproduce_table", "--pictura", self.root / "pictura", "--out", self.root / "out",
+                               "--policies", self.root / "a.safetensors", *arguments], capture_output=True, text=True, timeout=60)  # fmt: skip
+
+    def test_policies_and_baselines_stand_beside_the_papers(self):
+        result = self.run_script("--density", "medium", "--scenarios", "2")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        rows = [line.split(" | ") for line in result.stdout.splitlines()[2:]]
+        self.assertEqual([row[1] for row in rows], ["a", "lane keeper", "idle", "paper: vectorized",
+                                                    "paper: vectorized without auxiliary", "paper: perspective"])  # fmt: skip
+        self.assertEqual(rows[0][2], "0.250 +- 0.125")
+        self.assertEqual(rows[2][6], "none")
+        self.assertEqual(rows[5][2:7], [".060", ".018", ".058", "11.21", "11.61"])
+        asked = self.asked.read_text().splitlines()
+        self.assertEqual(len(asked), 3)
+        self.assertIn("a.safetensors --density medium --scenarios 2 --out ", asked[0])
+        self.assertIn("--policy lane --density medium", asked[1])
+
+    def test_what_was_evaluated_is_not_evaluated_again_unless_it_is_asked_otherwise(self):
+        first = self.run_script("--density", "medium")
+        self.assertEqual(self.run_script("--density", "medium").stdout, first.stdout)
+        self.assertEqual(len(self.asked.read_text().splitlines()), 3)
+        self.run_script("--density", "medium", "--steps", "600")
+        self.assertEqual(len(self.asked.read_text().splitlines()), 6)
+        (self.root / "a.safetensors").write_text("other weights")
+        self.run_script("--density", "medium", "--steps", "600")
+        self.assertEqual(len(self.asked.read_text().splitlines()), 7)
+
+    def test_a_policy_that_is_missing_is_named(self):
+        result = self.run_script("--policies", self.root / "none.safetensors")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("none.safetensors: no such file", result.stderr)
 
 
 class Setup(unittest.TestCase):
