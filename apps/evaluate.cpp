@@ -15,6 +15,7 @@
 #include "pictura/common/support/numbers.h"
 #include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/simulator/simulator.h"
+#include "pictura/training/evaluation/infractions.h"
 
 namespace pictura {
 
@@ -22,6 +23,7 @@ namespace {
 
 // A notice says how long it takes when that is long, as soon as a few seconds tell.
 constexpr double kEstimateAfter_s = 5, kLong_s = 600;
+constexpr size_t kShownGroups = 20;  // of infractions
 
 const std::map<std::string, Density> kDensities{
     {"light", Density::light}, {"medium", Density::medium}, {"dense", Density::dense}};
@@ -46,7 +48,7 @@ void print_table(const EvaluateReport& report) {
   }
 }
 
-void print_report(const EvaluateOptions& options, const EvaluateReport& report) {
+void print_report(const EvaluateOptions& options, const EvaluateReport& report, const Json& infractions) {
   const auto text_or_null = [](const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); };
   Json table = Json::array();
   for (const EvaluateRow& row : report.rows) {
@@ -72,7 +74,27 @@ void print_report(const EvaluateOptions& options, const EvaluateReport& report) 
               {"interrupted", report.interrupted},
               {"agent_steps", report.agent_steps > 0 ? Json(report.agent_steps) : Json(nullptr)},
               {"seconds", report.agent_steps > 0 ? Json(report.seconds) : Json(nullptr)},
-              {"rows", table}});
+              {"rows", table},
+              {"infractions", infractions}});
+}
+
+void print_groups(const std::vector<InfractionGroup>& groups) {
+  fmt::print("{:10} {:>7} {:>7}  {}\n", "infraction", "count", "share", "of vehicles, the commonest");
+  std::map<std::string, int64_t> totals;
+  for (const InfractionGroup& group : groups) totals[group.kind] += group.count;
+  for (size_t i = 0; i < std::min(groups.size(), kShownGroups); ++i) {
+    const InfractionGroup& group = groups[i];
+    fmt::print("{:10} {:>7} {:>5.1f} %  {}\n", group.kind, group.count,
+               100 * static_cast<double>(group.count) / static_cast<double>(totals[group.kind]), group.how);
+  }
+}
+
+Json groups_json(const std::vector<InfractionGroup>& groups) {
+  Json list = Json::array();
+  for (const InfractionGroup& group : groups) {
+    list.push_back({{"kind", group.kind}, {"how", group.how}, {"count", group.count}});
+  }
+  return list;
 }
 
 // "N": the scenarios 0 to N - 1; "A:B": A to B - 1.
@@ -107,7 +129,7 @@ void add_evaluate_command(CLI::App& app) {
     BackendOptions backends;
     std::vector<std::string> densities{"light", "medium", "dense"};
     std::vector<std::string> parts;
-    std::string size, scenarios = "200", out;
+    std::string size, scenarios = "200", out, infractions;
     bool sampled = false, json = false;
     std::string replay, gallery;
     int replays = 0;
@@ -118,7 +140,7 @@ void add_evaluate_command(CLI::App& app) {
   options.maps = {"Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07", "Town10HD"};
   CLI::App* command = app.add_subcommand("evaluate", "Measure a policy's driving (the paper's in-domain protocol)");
   CLI::Option* const checkpoint =
-      command->add_option("CHECKPOINT", options.checkpoint, "A checkpoint that train wrote");
+      command->add_option("CHECKPOINT", options.checkpoint, "A checkpoint that train wrote, or safetensors");
   CLI::Option* const policy =
       command
           ->add_option("--policy", options.controller,
@@ -165,6 +187,10 @@ void add_evaluate_command(CLI::App& app) {
       ->allow_extra_args(false);
   add_threads_option(command, &options.num_threads);
   command->add_option("--out", arguments->out, "A file for the counts of each scenario, which --merge reads");
+  command
+      ->add_option("--infractions", arguments->infractions,
+                   "A file for every infraction: where, with whom, at what speed; and a table of the commonest kinds")
+      ->check(file_ending(".csv"));
   command->add_option("--replay", arguments->replay, "Record the worst scenario again, as a page that a browser plays")
       ->check(file_ending(".html"));
   CLI::Option* const replays =
@@ -181,6 +207,7 @@ void add_evaluate_command(CLI::App& app) {
       "600\n"
       "  pictura evaluate --policy lane --density medium --scenarios 8\n"
       "  pictura evaluate run.ckpt --map Town05 --scenarios 50 --replays 10 --gallery replays\n"
+      "  pictura evaluate run.ckpt --density medium --scenarios 40 --infractions infractions.csv\n"
       "In parts, on several machines or after one another:\n"
       "  pictura evaluate run.ckpt --scenarios 0:100 --out a.json\n"
       "  pictura evaluate run.ckpt --scenarios 100:200 --out b.json\n"
@@ -228,13 +255,21 @@ void add_evaluate_command(CLI::App& app) {
       }
       line.update(fmt::format("evaluating: {:.0f} %  ETA {}", 100 * done, format_duration(eta_s)));
     };
+    const bool lists_infractions = !arguments->infractions.empty();
+    if (lists_infractions && !arguments->parts.empty()) fail_usage("--infractions: has no effect with --merge");
+    InfractionObserver infractions;
+    if (lists_infractions) evaluation.observer = &infractions;
     const EvaluateReport report = arguments->parts.empty() ? evaluate(evaluation) : merged(arguments->parts);
+    evaluation.observer = nullptr;
     line.finish();
+    const std::vector<InfractionGroup> groups = group_infractions(infractions.found());
+    if (lists_infractions) write_infractions_csv(arguments->infractions, infractions.found());
     if (!arguments->out.empty()) write_results(arguments->out, report.results);
     if (arguments->json)
-      print_report(evaluation, report);
+      print_report(evaluation, report, lists_infractions ? groups_json(groups) : Json(nullptr));
     else
       print_table(report);
+    if (lists_infractions && !arguments->json) print_groups(groups);
     if (!report.interrupted && !arguments->replay.empty()) {
       write_scenario_replay(evaluation, report.results, arguments->recording, arguments->replay);
     }

@@ -4,6 +4,7 @@
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/cli/train_progress.h"
+#include "pictura/commit.h"
 #include "pictura/common/error.h"
 #include "pictura/drawing/learning_curve.h"
 #include "pictura/training/loop.h"
@@ -19,7 +20,8 @@ void add_train_command(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("train", "Train a policy by self-play (PPO)");
   command
-      ->add_option("--config", arguments->train.config_path, "TOML file; configs/ holds smoke, demo, town01 and paper")
+      ->add_option("--config", arguments->train.config_path,
+                   "TOML file; configs/ holds smoke, demo, town01, agent and paper")
       ->required();
   command
       ->add_option("--set", arguments->train.overrides, "Override a key, as train.updates=2; may be given many times")
@@ -31,7 +33,7 @@ void add_train_command(CLI::App& app) {
       ->excludes(resume);
   command
       ->add_option("--init-from", arguments->train.init_from,
-                   "Begin with the weights of this checkpoint, of the same network at any image size")
+                   "Begin with the weights of this checkpoint or safetensors, of the same network at any image size")
       ->excludes(resume);
   command
       ->add_option("--minutes", arguments->train.minutes,
@@ -55,6 +57,7 @@ void add_train_command(CLI::App& app) {
     if (arguments->overwrite) arguments->train.old_run = OldRun::overwrite;
     for (const std::string& text : overrides_of(arguments->backends)) arguments->train.overrides.push_back(text);
     arguments->train.launch = launch_from_environment();
+    arguments->train.commit = PICTURA_COMMIT;
     const TrainReport report = train(arguments->train);
     line.finish();
     const auto end_as_asked = [&] {

@@ -48,7 +48,7 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
   command->add_option("MAP", world_out->map, "A .xodr file, a town's name, or procedural[:SEED]")->required();
   add_world_options(command, world_out);
   command->add_option("--steps", *steps_out, "Steps of 0.1 s")->transform(whole_number(1))->capture_default_str();
-  command->add_option("--policy", *policy_out, "random, idle, lane, or a checkpoint that train wrote")
+  command->add_option("--policy", *policy_out, "random, idle, lane, or a checkpoint or safetensors that train wrote")
       ->capture_default_str();
   add_policy_backend_options(command, "auto, and drawn as in training", backends_out);
 }

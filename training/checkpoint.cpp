@@ -1,15 +1,11 @@
 #include "pictura/training/checkpoint.h"
 
-#include <bit>
 #include <cstring>
-
-#include <ATen/core/grad_mode.h>
-#include <fmt/ranges.h>
-#include <nlohmann/json.hpp>
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/hash.h"
+#include "pictura/training/policy_json.h"
 
 namespace pictura {
 
@@ -23,60 +19,8 @@ constexpr uint32_t kVersionHashingDataAlone = 1;
 constexpr uint32_t kByteOrder = 0x01020304;
 constexpr size_t kPreamble = sizeof(kMagic) + 2 * sizeof(uint32_t) + sizeof(uint64_t);
 
-// What the numbers that a policy reads and gives mean: the shapes of its arrays. It cannot drive where these differ.
-ordered_json schema(const Config& config) {
-  ordered_json result;
-  for (const ObservationArray& array : kObservationArrays) {
-    if (array.type != ElementType::f32 || !config.reads(array.part)) continue;
-    ordered_json& shape = result[std::string(array.name)];
-    if (array.rows > 1)
-      shape = {array.rows, array.features};
-    else
-      shape = {array.features};
-  }
-  result["actions"] = {kNumLongActions, kNumLatActions};
-  return result;
-}
-
-ordered_json rig_to_json(const Rig& rig) {
-  ordered_json cameras = ordered_json::array();
-  for (const Camera& c : rig.cameras) {
-    cameras.push_back({{"name", c.name},
-                       {"size_px", {c.width_px, c.height_px}},
-                       {"focal_px", {c.focal_x_px, c.focal_y_px}},
-                       {"center_px", {c.center_x_px, c.center_y_px}},
-                       {"position_m", {c.position_m.x, c.position_m.y, c.position_m.z}},
-                       {"yaw_pitch_roll_rad", {c.yaw_rad, c.pitch_rad, c.roll_rad}}});
-  }
-  return cameras;
-}
-
-Rig rig_from_json(const ordered_json& cameras) {
-  Rig rig;
-  for (const ordered_json& json : cameras) {
-    Camera c;
-    c.name = json.at("name");
-    c.width_px = json.at("size_px").at(0);
-    c.height_px = json.at("size_px").at(1);
-    c.focal_x_px = json.at("focal_px").at(0);
-    c.focal_y_px = json.at("focal_px").at(1);
-    c.center_x_px = json.at("center_px").at(0);
-    c.center_y_px = json.at("center_px").at(1);
-    c.position_m = {json.at("position_m").at(0), json.at("position_m").at(1), json.at("position_m").at(2)};
-    c.yaw_rad = json.at("yaw_pitch_roll_rad").at(0);
-    c.pitch_rad = json.at("yaw_pitch_roll_rad").at(1);
-    c.roll_rad = json.at("yaw_pitch_roll_rad").at(2);
-    rig.cameras.push_back(c);
-  }
-  validate(rig);
-  return rig;
-}
-
-bool is_integer(const at::Tensor& tensor) { return at::isIntegralType(tensor.scalar_type(), /*includeBool=*/true); }
-
-// In f32, or i64 where they are integers.
 std::string bytes_of(const at::Tensor& tensor) {
-  const at::Tensor host = tensor.detach().to(at::kCPU, is_integer(tensor) ? at::kLong : at::kFloat).contiguous();
+  const at::Tensor host = tensor.detach().to(at::kCPU, at::kFloat).contiguous();
   return {static_cast<const char*>(host.const_data_ptr()), host.nbytes()};
 }
 
@@ -108,7 +52,7 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
   };
   ordered_json header;
   header["config"] = to_toml(checkpoint.config);
-  header["schema"] = schema(checkpoint.config);
+  header["schema"] = schema_to_json(checkpoint.config);
   header["rig"] = rig_to_json(checkpoint.rig);
   if (!checkpoint.backbone_hash.empty()) header["backbone"] = {{"hash", checkpoint.backbone_hash}};
   header["counters"] = {{"update", checkpoint.update},
@@ -139,13 +83,14 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
   write_file(path, file);
 }
 
+bool is_checkpoint(std::string_view file) { return file.starts_with(std::string_view(kMagic, sizeof kMagic)); }
+
 std::string read_checkpoint_file(const std::string& path) { return read_file(path, size_t{1} << 36); }
 
 Checkpoint read_checkpoint(const std::string& path) { return parse_checkpoint(read_checkpoint_file(path), path); }
 
 Checkpoint parse_checkpoint(const std::string& file, const std::string& path) {
-  PICTURA_CHECK(file.size() >= sizeof kMagic && std::memcmp(file.data(), kMagic, sizeof kMagic) == 0,
-                "{}: not a checkpoint: expected it to begin with PICTCKPT", path);
+  PICTURA_CHECK(is_checkpoint(file), "{}: not a checkpoint: expected it to begin with PICTCKPT", path);
   PICTURA_CHECK(file.size() >= kPreamble, "{}: truncated: {} bytes", path, file.size());
   PICTURA_CHECK(at_offset<uint32_t>(file, 12) == kByteOrder, "{}: written on a machine of another byte order", path);
   const auto version = at_offset<uint32_t>(file, 8);
@@ -167,14 +112,7 @@ Checkpoint parse_checkpoint(const std::string& file, const std::string& path) {
   try {
     const ordered_json header = ordered_json::parse(content.substr(kPreamble, header_bytes));
     result.config = parse_saved_config(header.at("config").get<std::string>(), path + ": config");
-    const ordered_json expected_schema = schema(result.config), &saved_schema = header.at("schema");
-    for (const auto& [name, shape] : expected_schema.items()) {
-      PICTURA_CHECK(saved_schema.contains(name), "{}: observation schema: {}: expected {}, got nothing", path, name,
-                    shape.dump());
-      const ordered_json& saved = saved_schema.at(name);
-      PICTURA_CHECK(saved == shape, "{}: observation schema: {}: expected {}, got {}", path, name, shape.dump(),
-                    saved.dump());
-    }
+    check_schema(header.at("schema"), result.config, path);
     const std::string_view data = content.substr(kPreamble + header_bytes);
     const auto data_bytes = header.at("data").at("bytes").get<uint64_t>();
     PICTURA_CHECK(data.size() == data_bytes, "{}: truncated: expected {} bytes of data, got {}", path, data_bytes,
@@ -243,55 +181,6 @@ std::string first_difference(const Rig& saved, const Rig& now) {
     }
   }
   return "";
-}
-
-void restore_tensors(const Checkpoint& checkpoint, const std::vector<NamedTensor>& saved,
-                     const std::vector<NamedTensor>& parameters) {
-  const at::NoGradGuard no_grad;
-  for (const NamedTensor& parameter : parameters) {
-    const auto found = std::find_if(saved.begin(), saved.end(),
-                                    [&](const NamedTensor& candidate) { return candidate.name == parameter.name; });
-    PICTURA_CHECK(found != saved.end(), "{}: of another architecture: it has no parameter '{}'", checkpoint.path,
-                  parameter.name);
-    PICTURA_CHECK(found->value.sizes() == parameter.value.sizes(),
-                  "{}: of another architecture: parameter '{}': expected [{}], got [{}]", checkpoint.path,
-                  parameter.name, fmt::join(parameter.value.sizes(), ", "), fmt::join(found->value.sizes(), ", "));
-    PICTURA_CHECK(at::isfinite(found->value).all().item<bool>(),
-                  "{}: parameter '{}': expected finite numbers, got infinities or NaN", checkpoint.path,
-                  parameter.name);
-    at::Tensor target = parameter.value;
-    target.copy_(found->value);
-  }
-  PICTURA_CHECK(saved.size() == parameters.size(), "{}: of another architecture: expected {} parameters, got {}",
-                checkpoint.path, parameters.size(), saved.size());
-}
-
-void restore_policy(const Checkpoint& checkpoint, const Policy& policy) {
-  const auto backbone = [](const std::string& hash) { return hash.empty() ? "\"conv\"" : "a program of hash " + hash; };
-  PICTURA_CHECK(policy.backbone_hash() == checkpoint.backbone_hash,
-                "{}: policy.backbone: its policy has {}, expected {}", checkpoint.path,
-                backbone(checkpoint.backbone_hash), backbone(policy.backbone_hash()));
-  restore_tensors(checkpoint, checkpoint.parameters, policy.parameters());
-}
-
-void write_safetensors(const std::string& path, const std::vector<NamedTensor>& tensors,
-                       const std::string& config_toml) {
-  static_assert(std::endian::native == std::endian::little, "safetensors are little endian");
-  std::string data;
-  ordered_json header;
-  header["__metadata__"] = {{"format", "pt"}, {"config", config_toml}};
-  for (const NamedTensor& tensor : tensors) {
-    const size_t begin = data.size();
-    data += bytes_of(tensor.value);
-    header[tensor.name] = {{"dtype", is_integer(tensor.value) ? "I64" : "F32"},
-                           {"shape", tensor.value.sizes().vec()},
-                           {"data_offsets", {begin, data.size()}}};
-  }
-  std::string text = header.dump();
-  text.append((8 - text.size() % 8) % 8, ' ');  // data begin on a multiple of eight bytes
-  std::string file;
-  append(&file, static_cast<uint64_t>(text.size()));
-  write_file(path, file + text + data);
 }
 
 }  // namespace pictura

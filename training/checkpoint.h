@@ -4,8 +4,9 @@
 #pragma once
 
 #include <map>
+#include <string_view>
 
-#include "pictura/training/policy.h"
+#include "pictura/training/saved_policy.h"
 
 namespace pictura {
 
@@ -15,19 +16,13 @@ struct RecentUpdate {
   double finished_return = 0;
 };
 
-struct Checkpoint {
-  std::string path;  // where it was read from, for messages
-  Config config;
-  Rig rig;
-  std::string backbone_hash;  // Policy::backbone_hash; the program itself is not in the checkpoint
-  int64_t update = 0;         // updates done
-  int64_t agent_steps = 0;
+struct Checkpoint : SavedPolicy {
   double distance_m = 0;  // driven by all agents
   int64_t adam_steps = 0;
   double filter_average = -1;  // of AdvantageFilter
   std::vector<RecentUpdate> recent;
   std::map<std::string, double> longest_update_s;  // see Run
-  std::vector<NamedTensor> parameters, first_moments, second_moments;
+  std::vector<NamedTensor> first_moments, second_moments;
   std::vector<uint8_t> simulator;  // Simulator::save(), at the start of update `update`
 };
 
@@ -37,24 +32,13 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint);
 /// Throws Error naming the file when it is no checkpoint, truncated, damaged, of another version or byte order, or of
 /// another observation schema (naming the entry that differs).
 Checkpoint read_checkpoint(const std::string& path);
+/// Whether the bytes of a file begin as those of a checkpoint do.
+bool is_checkpoint(std::string_view file);
 /// The bytes of such a file, and what they say.
 std::string read_checkpoint_file(const std::string& path);
 Checkpoint parse_checkpoint(const std::string& file, const std::string& path);
 
 /// Camera and property in which the two rigs first differ, with both values, or empty.
 std::string first_difference(const Rig& saved, const Rig& now);
-
-/// Copies `saved` into `parameters` in place. Throws Error naming the checkpoint and the first tensor that is missing,
-/// of another shape, or holds a number that is not finite: such a policy would still choose actions.
-void restore_tensors(const Checkpoint& checkpoint, const std::vector<NamedTensor>& saved,
-                     const std::vector<NamedTensor>& parameters);
-
-/// Gives a policy the parameters of a checkpoint. Throws Error as restore_tensors does, and where the programs of their
-/// backbones differ.
-void restore_policy(const Checkpoint& checkpoint, const Policy& policy);
-
-/// Tensors, as a policy's weights, as safetensors, which other tools read: u64 length, JSON, raw data in F32 or I64.
-void write_safetensors(const std::string& path, const std::vector<NamedTensor>& tensors,
-                       const std::string& config_toml);
 
 }  // namespace pictura

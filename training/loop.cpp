@@ -82,8 +82,8 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
   if (run.renderer) report.renderer = run.renderer->name();
   Collector collector(&run);
   std::vector<RecentUpdate> recent;
-  const auto read_everywhere = [&](const std::string& path) {
-    return parse_checkpoint(communicator->from_first(is_first ? read_checkpoint_file(path) : ""), path);
+  const auto bytes_everywhere = [&](const std::string& path) {
+    return communicator->from_first(is_first ? read_checkpoint_file(path) : "");
   };
   // All ranks take part in a checkpoint; the first one writes it.
   const auto write_with = [&](const auto& write, const std::vector<RecentUpdate>& its_recent) {
@@ -96,14 +96,14 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
                its_recent);
   };
   if (options.old_run == OldRun::resume) {
-    const Checkpoint saved = read_everywhere(report.checkpoint);
+    const Checkpoint saved = parse_checkpoint(bytes_everywhere(report.checkpoint), report.checkpoint);
     const std::string why_new_episodes = run.restore(saved);
     if (!why_new_episodes.empty()) notify("the saved episodes cannot go on, new ones begin: " + why_new_episodes);
     for (const std::string& change : differences_to_report(saved.config, config)) notify(change);
     recent = saved.recent;
   } else {
     if (!options.init_from.empty()) {
-      run.begin_with(read_everywhere(options.init_from));
+      run.begin_with(parse_policy(bytes_everywhere(options.init_from), options.init_from));
     }
     for (const std::string& name : old_files) std::filesystem::remove(options.out_folder + "/" + name);
     run.simulator->reset();
@@ -216,7 +216,7 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
   report.peak_tensor_bytes = memory.peak_tensor_bytes;
   save();
   if (is_first) {
-    write_safetensors(options.out_folder + "/policy.safetensors", run.policy->parameters(), to_toml(config));
+    write_policy(options.out_folder + "/policy.safetensors", run.saved_policy(), WeightType::f32, options.commit);
   }
   report.agent_steps = run.agent_steps;
   report.updates = run.update;

@@ -47,9 +47,11 @@ struct TrainOptions {
   std::vector<std::string> overrides;  // "train.updates=2"
   std::string out_folder;
   OldRun old_run = OldRun::refuse;
-  std::string init_from;  // begin with the weights of this checkpoint, of the same network, and with nothing else of it
-  double minutes = 0;     // of wall time, start-up included, within which the last update ends; 0: no limit
-  Launch launch;          // which of the processes that train together this one is
+  std::string
+      init_from;  // begin with the weights of this checkpoint or safetensors, of the same network, and nothing else
+  double minutes = 0;  // of wall time, start-up included, within which the last update ends; 0: no limit
+  std::string commit;  // of this program, for the metadata of policy.safetensors
+  Launch launch;       // which of the processes that train together this one is
   std::function<void(const TrainProgress&)> on_progress;  // as all that reports, of rank 0 alone
   std::function<void(const std::string&)> on_notice;      // what a person should know, and no error is
 };

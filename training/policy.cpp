@@ -334,14 +334,16 @@ int64_t Policy::num_parameters() const {
   return sum;
 }
 
-std::string Policy::hash() const {
+std::string hash_of_parameters(const std::vector<NamedTensor>& parameters) {
   Hash64 hash;
-  for (const NamedTensor& parameter : parameters_) {
+  for (const NamedTensor& parameter : parameters) {
     const at::Tensor host = parameter.value.detach().cpu().contiguous();
     hash.add_bytes(host.const_data_ptr(), host.nbytes());
   }
   return hash.hex();
 }
+
+std::string Policy::hash() const { return hash_of_parameters(parameters_); }
 
 std::string PolicyNetwork::backbone_hash() const {
   return scene_->image_backbone() ? scene_->image_backbone()->hash() : "";

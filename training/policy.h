@@ -22,6 +22,9 @@ struct NamedTensor {
   at::Tensor value;
 };
 
+/// 16 hexadecimal digits over the parameters' bytes, in their order.
+std::string hash_of_parameters(const std::vector<NamedTensor>& parameters);
+
 class ImageBackbone;
 
 /// Turns what is around an agent into one embedding.
@@ -51,7 +54,7 @@ class Policy {
 
   const std::vector<NamedTensor>& parameters() const { return parameters_; }
   int64_t num_parameters() const;
-  /// 16 hexadecimal digits over the parameters' bytes, in the order of parameters().
+  /// Of parameters(), as hash_of_parameters says.
   std::string hash() const;
   /// Of the file of policy.backbone; empty where that is "conv" and for vector policies.
   virtual std::string backbone_hash() const { return ""; }

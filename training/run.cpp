@@ -64,19 +64,24 @@ Run::Run(const Config& its_config, Device its_device, Communicator* its_communic
 
 void Run::on_stream(const std::function<void()>& work) const { stream ? stream->run(work) : work(); }
 
+SavedPolicy Run::saved_policy() const {
+  SavedPolicy saved;
+  saved.config = config;
+  saved.rig = rig;
+  saved.backbone_hash = policy->backbone_hash();
+  saved.update = update;
+  saved.agent_steps = agent_steps;
+  saved.parameters = policy->parameters();
+  return saved;
+}
+
 Checkpoint Run::checkpoint(const std::vector<RecentUpdate>& recent) const {
-  Checkpoint checkpoint;
-  checkpoint.config = config;
-  checkpoint.rig = rig;
-  checkpoint.backbone_hash = policy->backbone_hash();
-  checkpoint.update = update;
-  checkpoint.agent_steps = agent_steps;
+  Checkpoint checkpoint{saved_policy()};
   checkpoint.distance_m = distance_m;
   checkpoint.adam_steps = optimizer.steps;
   checkpoint.filter_average = filter.average;
   checkpoint.recent = recent;
   checkpoint.longest_update_s = longest_update_s;
-  checkpoint.parameters = policy->parameters();
   checkpoint.first_moments = optimizer.first_moments;
   checkpoint.second_moments = optimizer.second_moments;
   checkpoint.simulator = simulator->save();
@@ -106,7 +111,7 @@ ImageSize Run::image_size() const {
   return renderer ? ImageSize{rig.cameras[0].width_px, rig.cameras[0].height_px} : ImageSize{};
 }
 
-void Run::begin_with(const Checkpoint& other) {
+void Run::begin_with(const SavedPolicy& other) {
   PICTURA_CHECK(
       !config.reads_images() || !other.config.reads_images() || other.rig.cameras.size() == rig.cameras.size(),
       "{}: its policy sees through {} cameras, expected {}, as {} has", other.path, other.rig.cameras.size(),
@@ -123,8 +128,8 @@ std::string Run::restore(const Checkpoint& saved) {
   PICTURA_CHECK(rig_difference.empty(), "{}: saved with other cameras than {} has: {}", saved.path,
                 config.render.rig.empty() ? "the paper's rig" : config.render.rig, rig_difference);
   restore_policy(saved, *policy);
-  restore_tensors(saved, saved.first_moments, optimizer.first_moments);
-  restore_tensors(saved, saved.second_moments, optimizer.second_moments);
+  restore_tensors(saved.path, saved.first_moments, optimizer.first_moments);
+  restore_tensors(saved.path, saved.second_moments, optimizer.second_moments);
   optimizer.steps = saved.adam_steps;
   filter.average = saved.filter_average;
   update = saved.update;

@@ -20,9 +20,11 @@ struct Run {
   /// Does some work of an update: where graphs are used, on a stream that they can be captured from.
   void on_stream(const std::function<void()>& work) const;
 
-  /// Begins with the weights of another run's checkpoint. Throws Error naming what differs where it is of another
+  /// Begins with the weights of another run. Throws Error naming what differs where it is of another
   /// network.
-  void begin_with(const Checkpoint& other);
+  void begin_with(const SavedPolicy& other);
+  /// Its policy as it is now.
+  SavedPolicy saved_policy() const;
   /// What is to be saved, at the start of an update: of all ranks, for rank 0 to write; the others' has no simulator.
   Checkpoint checkpoint(const std::vector<RecentUpdate>& recent) const;
   /// Goes on from a checkpoint, of any number of ranks. Where the simulator cannot read its saved state, because its

@@ -8,9 +8,9 @@
 #include "pictura/common/pixel_samples.h"
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/simulator/controllers/host_controllers.h"
-#include "pictura/training/checkpoint.h"
 #include "pictura/training/observation.h"
 #include "pictura/training/precision.h"
+#include "pictura/training/saved_policy.h"
 #include "pictura/training/torch_device.h"
 
 namespace pictura {
@@ -41,20 +41,20 @@ Config adapted(const Config& trained, const SessionOptions& options) {
 }
 
 // The cameras that the options ask for, else those of training. No weight depends on sizes or poses.
-Rig chosen_rig(const Checkpoint& checkpoint, const SessionOptions& options) {
+Rig chosen_rig(const SavedPolicy& saved, const SessionOptions& options) {
   const bool is_resized = options.width_px != 0 || options.height_px != 0;
-  if (options.rig.empty() && !is_resized) return checkpoint.rig;
-  if (!checkpoint.config.reads_images()) fail_usage("{}: its policy reads no images: no rig or size", checkpoint.path);
+  if (options.rig.empty() && !is_resized) return saved.rig;
+  if (!saved.config.reads_images()) fail_usage("{}: its policy reads no images: no rig or size", saved.path);
   if (is_resized) {
     if (!options.rig.empty()) fail_usage("rig: has sizes of its own: expected a rig or a size, got both");
-    if (!checkpoint.config.render.rig.empty()) {
+    if (!saved.config.render.rig.empty()) {
       fail_usage("{}: trained with the cameras of {}: expected a rig file with other sizes instead of a size",
-                 checkpoint.path, checkpoint.config.render.rig);
+                 saved.path, saved.config.render.rig);
     }
     return paper_rig(options.width_px, options.height_px);
   }
   Rig rig = load_rig(options.rig);
-  const size_t expected = checkpoint.rig.cameras.size();
+  const size_t expected = saved.rig.cameras.size();
   if (rig.cameras.size() != expected) {
     fail_usage("{}: expected {} cameras, as the policy was trained with, got {}", options.rig, expected,
                rig.cameras.size());
@@ -65,14 +65,14 @@ Rig chosen_rig(const Checkpoint& checkpoint, const SessionOptions& options) {
 }  // namespace
 
 struct PolicySession::Parts {
-  Parts(const Checkpoint& checkpoint, const SessionOptions& options)
-      : config(adapted(checkpoint.config, options)),
+  Parts(const SavedPolicy& saved, const SessionOptions& options)
+      : config(adapted(saved.config, options)),
         device(open_learning_device(config)),
-        rig(chosen_rig(checkpoint, options)),
+        rig(chosen_rig(saved, options)),
         executor(make_learner_executor(device)),
         own_policy(make_policy(config, rig, device)),
         policy(*own_policy) {
-    restore_policy(checkpoint, policy);
+    restore_policy(saved, policy);
   }
   Parts(const Config& its_config, const Rig& its_rig, Device its_device, const Policy& its_policy)
       : config(its_config),
@@ -160,8 +160,8 @@ class SessionController final : public PolicyController {
   int64_t num_driven_ = 0;
 };
 
-PolicySession::PolicySession(const std::string& checkpoint_path, const SessionOptions& options)
-    : parts_(std::make_unique<Parts>(read_checkpoint(checkpoint_path), options)) {}
+PolicySession::PolicySession(const std::string& path, const SessionOptions& options)
+    : parts_(std::make_unique<Parts>(read_policy(path), options)) {}
 
 PolicySession::PolicySession(const Config& config, const Rig& rig, Device device, const Policy& policy)
     : parts_(std::make_unique<Parts>(config, rig, device, policy)) {}

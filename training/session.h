@@ -46,9 +46,10 @@ class PolicyController : public Controller {
 /// Serves one thread at a time.
 class PolicySession {
  public:
-  /// Throws Error naming the file when it is no checkpoint, truncated, of another observation schema or architecture,
-  /// or when it cannot run on this device. UsageError where it cannot see through the cameras of the options.
-  explicit PolicySession(const std::string& checkpoint_path, const SessionOptions& options = {});
+  /// The policy of a checkpoint, or of safetensors that training or `pictura export` wrote. Throws Error naming the
+  /// file when it is neither, truncated, of another observation schema or architecture, or when it cannot run on this
+  /// device. UsageError where it cannot see through the cameras of the options.
+  explicit PolicySession(const std::string& path, const SessionOptions& options = {});
   /// The policy of a configuration with cameras of `rig`, as it is when it is asked; it must outlive the session.
   PolicySession(const Config& config, const Rig& rig, Device device, const Policy& policy);
   ~PolicySession();

@@ -180,6 +180,17 @@ class Policy(nn.Module):
         return self.attention(x, camera)
 
 
+_TYPES = {"F32": torch.float32, "BF16": torch.bfloat16, "I64": torch.int64}  # of safetensors
+_NO_HASH = b"0" * 16
+
+
+def _seal(data: bytearray, header_end: int, saved: str) -> None:
+    """Writes the hash of changed safetensors: of the whole file with zeros for the digits of the hash."""
+    place = data.find(f'"hash":"{saved}"'.encode(), 8, header_end) + len('"hash":"')
+    data[place : place + len(_NO_HASH)] = _NO_HASH
+    data[place : place + len(_NO_HASH)] = f"{_hash64(bytes(data)):016x}".encode()
+
+
 def _read_safetensors(path: str) -> tuple[dict[str, Any], dict[str, Tensor]]:
     data = pathlib.Path(path).read_bytes()
     if len(data) < 8:
@@ -192,14 +203,13 @@ def _read_safetensors(path: str) -> tuple[dict[str, Any], dict[str, Tensor]]:
     except ValueError as error:
         raise pictura.Error(f"{path}: its header cannot be read: {error}") from error
     metadata = header.pop("__metadata__", {})
-    types = {"F32": torch.float32, "I64": torch.int64}
     tensors = {}
     for name, entry in header.items():
         begin, end = entry["data_offsets"]
-        if entry["dtype"] not in types or end > len(data) - 8 - length or end < begin:
-            raise pictura.Error(f"{path}: {name}: expected F32 or I64 within the file, got {entry['dtype']} at {begin} to {end}")
+        if entry["dtype"] not in _TYPES or end > len(data) - 8 - length or end < begin:
+            raise pictura.Error(f"{path}: {name}: expected F32, BF16 or I64 within the file, got {entry['dtype']} at {begin} to {end}")
         raw = bytearray(data[8 + length + begin : 8 + length + end])
-        tensors[name] = torch.frombuffer(raw, dtype=types[entry["dtype"]]).reshape(entry["shape"]).clone()
+        tensors[name] = torch.frombuffer(raw, dtype=_TYPES[entry["dtype"]]).reshape(entry["shape"]).clone()
     return metadata, tensors
 
 
@@ -263,15 +273,18 @@ def save_policy(policy: Policy, path: str | os.PathLike[str], like: str | os.Pat
         data = bytearray(pathlib.Path(like).read_bytes())
         (length,) = struct.unpack_from("<Q", data)
         header = json.loads(data[8 : 8 + length])
-        header.pop("__metadata__", None)
+        metadata = header.pop("__metadata__", {})
         entries = {name: (entry["shape"], 8 + length + entry["data_offsets"][0]) for name, entry in header.items()}
+        weights = {name: value.to(_TYPES[header[name]["dtype"]]) if name in header else value for name, value in weights.items()}
     if {name: shape for name, (shape, _) in entries.items()} != {name: list(value.shape) for name, value in weights.items()}:
         raise pictura.Error(f"{like}: of another architecture than the policy: expected the same names and shapes of weights")
     for name, value in weights.items():
-        raw = value.numpy().tobytes()
+        raw = value.view(torch.uint8).numpy().tobytes()
         data[entries[name][1] : entries[name][1] + len(raw)] = raw
     if pathlib.Path(like).suffix == ".ckpt":
         data[-8:] = struct.pack("<Q", _hash64(bytes(data[:-8])))
+    elif "hash" in metadata:
+        _seal(data, 8 + length, metadata["hash"])
     beside = pathlib.Path(f"{path}.part{os.getpid()}")
     try:
         beside.write_bytes(data)

@@ -996,6 +996,24 @@ class Training(CommandCase):
         for name in ("checkpoint.ckpt", "untrained.ckpt", "policy.safetensors", "progress.csv", "learning_curve.png"):
             self.assertTrue((self.folder / "whole" / name).exists(), name)
 
+    def test_exported_weights_drive_as_the_checkpoint_does(self):
+        run_folder, weights = self.folder / "run", self.folder / "weights.safetensors"
+        trained = self.json_of("train", *TINY, "--set", "train.updates=1", "--out", run_folder)
+        whole = self.json_of("export", run_folder / "checkpoint.ckpt", "--weights", "f32", "--out", weights)
+        self.assertEqual(whole["policy_hash"], trained["policy_hash"])
+        self.assertEqual((whole["updates"], whole["agent_steps"]), (1, trained["agent_steps"]))
+        self.assertEqual(weights.stat().st_size, whole["bytes"])
+        drive = ["simulate", "procedural:1", "--agents", 4, "--steps", 20, "--policy"]
+        expected = self.json_of(*drive, run_folder / "checkpoint.ckpt")
+        got = self.json_of(*drive, weights)
+        self.assertEqual(got["state_hash"], expected["state_hash"])
+        half = self.json_of("export", weights, "--out", self.folder / "half.safetensors")
+        self.assertLess(half["bytes"], whole["bytes"] - 1.9 * half["parameters"])
+        self.assert_refused(1, "weights.safetensors", "train", *TINY, "--init-from", weights,
+                            "--set", "policy.backbone_width=8", "--out", self.folder / "other")
+        self.assert_refused(1, "none.ckpt", "export", "none.ckpt", "--out", self.folder / "x.safetensors")
+        self.assert_refused(2, ".safetensors", "export", weights, "--out", self.folder / "x.bin")
+
     def test_a_folder_with_a_run_asks_what_to_do_with_it(self):
         one = ["train", *TINY, "--set", "train.updates=1", "--out", self.folder / "run"]
         first = self.json_of(*one)

@@ -88,12 +88,18 @@ def test_weights_of_python_run_in_the_command(tmp_path):
     policy = load_policy(run / "checkpoint.ckpt")
     exported = load_policy(run / "policy.safetensors")
     assert all(torch.equal(a, b) for a, b in zip(policy.state_dict().values(), exported.state_dict().values()))
+    half = tmp_path / "half.safetensors"
+    out = subprocess.run([command, "export", str(run / "checkpoint.ckpt"), "--out", str(half)], capture_output=True, text=True)
+    assert out.returncode == 0, out.stderr
+    for exact, rounded in zip(policy.state_dict().values(), load_policy(half).state_dict().values()):
+        assert torch.equal(exact.to(torch.bfloat16).to(torch.float32), rounded)
     with torch.no_grad():
         policy.actor.weight.zero_()
         policy.actor.bias.copy_(torch.from_numpy(np.eye(12, dtype=np.float32)[10]))
     save_policy(policy, tmp_path / "throttle.ckpt", like=run / "checkpoint.ckpt")
+    save_policy(policy, tmp_path / "throttle.safetensors", like=half)
     seen = {}
-    for checkpoint in (run / "checkpoint.ckpt", tmp_path / "throttle.ckpt"):
+    for checkpoint in (run / "checkpoint.ckpt", tmp_path / "throttle.ckpt", tmp_path / "throttle.safetensors"):
         out = subprocess.run(
             [command, "simulate", "procedural:1", "--agents", "4", "--steps", "20", "--policy", str(checkpoint), "--json"],
             capture_output=True, text=True,
@@ -101,3 +107,4 @@ def test_weights_of_python_run_in_the_command(tmp_path):
         assert out.returncode == 0, out.stderr
         seen[checkpoint.name] = json.loads(out.stdout)["km_driven"]
     assert seen["throttle.ckpt"] > seen["checkpoint.ckpt"] > 0, "it does nothing but accelerate"
+    assert seen["throttle.safetensors"] == seen["throttle.ckpt"]

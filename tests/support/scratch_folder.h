@@ -17,8 +17,8 @@ class ScratchFolder {
  public:
   ScratchFolder() {
     static int made = 0;
-    const testing::TestInfo* test = testing::UnitTest::GetInstance()->current_test_info();
-    path_ = std::filesystem::path(testing::TempDir()) /
+    const ::testing::TestInfo* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    path_ = std::filesystem::path(::testing::TempDir()) /
             ("pictura_" + std::string(test->test_suite_name()) + "_" + test->name() + "_" + std::to_string(getpid()) +
              "_" + std::to_string(made++));
     std::filesystem::remove_all(path_);

@@ -113,7 +113,7 @@ TEST_F(CheckpointFile, ComesBackWhole) {
 
   const PolicyNetwork other(config.policy, 4, 2);
   EXPECT_NE(other.hash(), policy.hash());
-  restore_tensors(back, back.parameters, other.parameters());
+  restore_tensors("a.ckpt", back.parameters, other.parameters());
   EXPECT_EQ(other.hash(), policy.hash());
   EXPECT_EQ(back.second_moments[3].value.flatten()[0].item<float>(), 2.5f);
 }
@@ -125,13 +125,13 @@ TEST_F(CheckpointFile, OtherArchitecturesAreRefusedByName) {
   const Checkpoint saved = read_checkpoint(folder_ / "a.ckpt");
   config.policy.backbone_width = 16;
   const PolicyNetwork wider(config.policy, 4, 1);
-  const std::string wide = message_of([&] { restore_tensors(saved, saved.parameters, wider.parameters()); });
+  const std::string wide = message_of([&] { restore_tensors(saved.path, saved.parameters, wider.parameters()); });
   EXPECT_THAT(wide, ::testing::AllOf(HasSubstr("a.ckpt"), HasSubstr("backbone.0.weight"), HasSubstr("[16, 24]"),
                                      HasSubstr("[8, 24]")));
   config = small_config();
   config.policy.modality = Modality::perspective;
   const PolicyNetwork seeing(config.policy, 4, 1);
-  EXPECT_THAT(message_of([&] { restore_tensors(saved, saved.parameters, seeing.parameters()); }),
+  EXPECT_THAT(message_of([&] { restore_tensors(saved.path, saved.parameters, seeing.parameters()); }),
               HasSubstr("no parameter 'conv.0.weight'"));
 }
 
@@ -233,7 +233,7 @@ TEST_F(CheckpointFile, Version1ReadsAsBefore) {
   EXPECT_EQ(back.update, 12);
   EXPECT_EQ(back.simulator, (std::vector<uint8_t>{1, 2, 3, 255}));
   const PolicyNetwork other(config.policy, 4, 2);
-  restore_tensors(back, back.parameters, other.parameters());
+  restore_tensors("a.ckpt", back.parameters, other.parameters());
   EXPECT_EQ(other.hash(), policy.hash());
 }
 
@@ -310,6 +310,66 @@ TEST_F(CheckpointFile, SafetensorsHoldEveryParameter) {
     EXPECT_EQ(0, std::memcmp(bytes.data() + 8 + header_bytes + begin, p.value.const_data_ptr(), end - begin)) << p.name;
   }
   EXPECT_EQ(8 + header_bytes + end, bytes.size());
+}
+
+TEST_F(CheckpointFile, APolicyDrivesFromSafetensorsAsFromItsCheckpoint) {
+  const Config config = small_config();
+  const PolicyNetwork policy(config.policy, 4, 1);
+  const Checkpoint checkpoint = small_checkpoint(policy, config);
+  write_checkpoint(folder_ / "a.ckpt", checkpoint);
+  const std::string path = folder_ / "a.safetensors";
+  write_policy(path, checkpoint, WeightType::f32, "abc123");
+  const SavedPolicy back = read_policy(path), from_checkpoint = read_policy(folder_ / "a.ckpt");
+  EXPECT_EQ(to_toml(back.config), to_toml(config));
+  EXPECT_EQ(first_difference(back.rig, checkpoint.rig), "");
+  EXPECT_EQ(back.update, 12);
+  EXPECT_EQ(back.agent_steps, 3456);
+  EXPECT_EQ(hash_of_parameters(back.parameters), policy.hash());
+  EXPECT_EQ(hash_of_parameters(from_checkpoint.parameters), policy.hash());
+  EXPECT_EQ(PolicySession(path).evaluation_setting().policy_hash, policy.hash());
+
+  const ExportedPolicy half = export_policy(path, WeightType::bf16, "abc123", folder_ / "half.safetensors");
+  EXPECT_EQ(half.parameters, policy.num_parameters());
+  EXPECT_LT(half.file_bytes, static_cast<int64_t>(std::filesystem::file_size(path)) - 19 * half.parameters / 10);
+  const SavedPolicy rounded = read_policy(folder_ / "half.safetensors");
+  EXPECT_EQ(half.policy_hash, hash_of_parameters(rounded.parameters));
+  ASSERT_EQ(rounded.parameters.size(), policy.parameters().size());
+  for (size_t i = 0; i < rounded.parameters.size(); ++i) {
+    const NamedTensor &exact = policy.parameters()[i], &got = rounded.parameters[i];
+    EXPECT_EQ(got.name, exact.name);
+    EXPECT_TRUE(at::equal(got.value, exact.value.detach().to(at::kBFloat16).to(at::kFloat))) << got.name;
+  }
+}
+
+TEST_F(CheckpointFile, AnyFlippedBitOfSafetensorsIsRefused) {
+  const Config config = small_config();
+  const PolicyNetwork policy(config.policy, 4, 1);
+  const std::string path = folder_ / "a.safetensors", broken = folder_ / "b.safetensors";
+  write_policy(path, small_checkpoint(policy, config), WeightType::bf16, "");
+  const std::string whole = read_file(path);
+  const auto refuse = [&](const std::string& bytes) {
+    write_file(broken, bytes);
+    return message_of([&] { read_policy(broken); });
+  };
+  uint64_t header_bytes = 0;
+  std::memcpy(&header_bytes, whole.data(), sizeof header_bytes);
+  const auto flip = [&](size_t byte, int bit) {
+    std::string changed = whole;
+    changed[byte] = static_cast<char>(changed[byte] ^ (1 << bit));
+    EXPECT_THAT(refuse(changed), HasSubstr("b.safetensors")) << "bit " << bit << " of " << byte;
+  };
+  for (size_t byte = 0; byte < 8; ++byte) {
+    for (int bit = 0; bit < 8; ++bit) flip(byte, bit);
+  }
+  for (size_t byte = 8; byte < 8 + header_bytes; byte += 11) flip(byte, static_cast<int>(byte % 8));
+  for (size_t byte = 8 + header_bytes; byte < whole.size(); byte += 211) flip(byte, static_cast<int>(byte % 8));
+  for (size_t size = 0; size < whole.size(); size += 97) {
+    EXPECT_THAT(refuse(whole.substr(0, size)), HasSubstr("b.safetensors")) << size;
+  }
+  EXPECT_THAT(refuse("neither of them, but long enough"), HasSubstr("expected a checkpoint"));
+  write_safetensors(broken, policy.parameters(), to_toml(config));
+  EXPECT_THAT(message_of([&] { read_policy(broken); }), HasSubstr("'schema'"));
+  EXPECT_NO_THROW(read_policy(path));
 }
 
 using Events = Folder;

@@ -570,16 +570,20 @@ TEST_F(Training, RefusesToResumeUnderAnotherConfigurationByName) {
 
 TEST_F(Training, BeginsWithTheWeightsOfAnotherRunAtAnyImageSize) {
   const std::string first = train(options("first", {"train.updates=1"})).checkpoint;
-  TrainOptions o = options("second", {"train.updates=1", "render.width_px=20", "run.seed=5"});
-  o.init_from = first;
-  train(o);
-  const Checkpoint other = read_checkpoint(first), begun = read_checkpoint(folder_ / "second/untrained.ckpt");
-  EXPECT_EQ(begun.agent_steps, 0);
-  EXPECT_EQ(begun.update, 0);
-  EXPECT_EQ(begun.adam_steps, 0);
-  ASSERT_EQ(begun.parameters.size(), other.parameters.size());
-  for (size_t i = 0; i < other.parameters.size(); ++i) {
-    EXPECT_TRUE(begun.parameters[i].value.equal(other.parameters[i].value)) << other.parameters[i].name;
+  const std::vector<NamedTensor> other = read_checkpoint(first).parameters;
+  for (const std::string file : {"checkpoint.ckpt", "policy.safetensors"}) {
+    SCOPED_TRACE(file);
+    TrainOptions o = options("second " + file, {"train.updates=1", "render.width_px=20", "run.seed=5"});
+    o.init_from = folder_ / ("first/" + file);
+    train(o);
+    const Checkpoint begun = read_checkpoint(o.out_folder + "/untrained.ckpt");
+    EXPECT_EQ(begun.agent_steps, 0);
+    EXPECT_EQ(begun.update, 0);
+    EXPECT_EQ(begun.adam_steps, 0);
+    ASSERT_EQ(begun.parameters.size(), other.size());
+    for (size_t i = 0; i < other.size(); ++i) {
+      EXPECT_TRUE(begun.parameters[i].value.equal(other[i].value)) << other[i].name;
+    }
   }
   TrainOptions wider = options("wider", {"policy.backbone_width=64"});
   wider.init_from = first;

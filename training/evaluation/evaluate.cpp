@@ -9,9 +9,9 @@
 #include "pictura/common/support/interrupt.h"
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/agent_state.h"
-#include "pictura/training/checkpoint.h"
 #include "pictura/training/config.h"
 #include "pictura/training/phase_timer.h"
+#include "pictura/training/saved_policy.h"
 #include "pictura/training/session.h"
 #include "pictura/training/torch_device.h"
 
@@ -114,7 +114,7 @@ int64_t count_active(Simulator& simulator) {
 
 // One that needs no policy.
 Driver driver_of(const std::string& controller, const EvaluateOptions& options) {
-  Config config = options.checkpoint.empty() ? Config() : read_checkpoint(options.checkpoint).config;
+  Config config = options.checkpoint.empty() ? Config() : read_policy(options.checkpoint).config;
   config = with_evaluate_conditioning(config, options.conditioning);
   config.policy.modality = Modality::perspective;  // nobody reads vectors,
   config.render.backend = "auto";                  // and nothing is drawn

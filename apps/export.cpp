@@ -1,0 +1,52 @@
+// `pictura export`: the weights of a policy without the run that made it, to release them or to read them with other
+// tools.
+#include "pictura/apps/commands.h"
+#include "pictura/cli/file_options.h"
+#include "pictura/cli/report.h"
+#include "pictura/commit.h"
+#include "pictura/training/export_policy.h"
+
+namespace pictura {
+
+void add_export_command(CLI::App& app) {
+  struct Arguments {
+    std::string policy, out, weights = "bf16";
+    bool json = false;
+  };
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("export", "Write the weights of a policy as safetensors");
+  command->add_option("POLICY", arguments->policy, "A checkpoint that train wrote, or safetensors")->required();
+  command->add_option("--out", arguments->out, "The file to write")->check(file_ending(".safetensors"))->required();
+  command
+      ->add_option("--weights", arguments->weights,
+                   "bf16: rounded to 8 significant bits, half the size; f32: as they are")
+      ->check(CLI::IsMember({"bf16", "f32"}))
+      ->capture_default_str();
+  command->add_flag("--json", arguments->json, "Print one JSON object");
+  command->footer(
+      "The file holds what the policy needs to drive: weights, configuration, cameras. simulate, evaluate, replay and\n"
+      "train --init-from take it in the place of a checkpoint; a run cannot go on from it.\n"
+      "Examples:\n"
+      "  pictura export runs/town01/checkpoint.ckpt --out town01.safetensors\n"
+      "  pictura export runs/town01/checkpoint.ckpt --weights f32 --out town01.safetensors\n"
+      "  pictura simulate Town01 --policy town01.safetensors --video drive.mp4");
+  command->callback([arguments] {
+    const WeightType type = arguments->weights == "bf16" ? WeightType::bf16 : WeightType::f32;
+    const ExportedPolicy exported = export_policy(arguments->policy, type, PICTURA_COMMIT, arguments->out);
+    if (arguments->json) {
+      print_json({{"out", arguments->out},
+                  {"weights", arguments->weights},
+                  {"parameters", exported.parameters},
+                  {"bytes", exported.file_bytes},
+                  {"updates", exported.updates},
+                  {"agent_steps", exported.agent_steps},
+                  {"policy_hash", exported.policy_hash}});
+    } else {
+      fmt::print("{}: {} parameters in {}, {} bytes; {} updates, {} agent-steps; policy hash {}\n", arguments->out,
+                 exported.parameters, arguments->weights, exported.file_bytes, exported.updates, exported.agent_steps,
+                 exported.policy_hash);
+    }
+  });
+}
+
+}  // namespace pictura

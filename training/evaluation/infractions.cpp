@@ -1,0 +1,317 @@
+#include "pictura/training/evaluation/infractions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "pictura/common/support/file.h"
+#include "pictura/simulator/rules/collision.h"
+#include "pictura/training/torch_device.h"
+
+namespace pictura {
+
+namespace {
+
+constexpr float kLaneChange_s = 3, kMergeAhead_m = 30;
+constexpr float kCurveRadius_m = 50;       // of a curve: at most
+constexpr float kJunctionTurn_rad = 0.5f;  // a junction's lane that turns less goes straight on
+constexpr float kPi = 3.14159265f;
+constexpr float kJustRed_s = 1, kFarHead_m = 10;
+
+template <typename T>
+std::vector<T> copy_of(const T* values, size_t count, Device device) {
+  return host_copy(Span<const T>(values, count), device);
+}
+
+std::vector<AgentBox> copy_of(Span<const AgentBox> boxes, Device device) {
+  const auto* const bytes = reinterpret_cast<const uint8_t*>(boxes.data());
+  const std::vector<uint8_t> copied = host_copy(Span<const uint8_t>(bytes, boxes.size() * sizeof(AgentBox)), device);
+  std::vector<AgentBox> result(boxes.size());
+  std::copy(copied.begin(), copied.end(), reinterpret_cast<uint8_t*>(result.data()));
+  return result;
+}
+
+// The place on a lane's centre line that is nearest to a position.
+struct LanePlace {
+  float s_m = 0;       // from the lane's start
+  float radius_m = 0;  // of the line there, over 10 m to both sides
+};
+
+LanePlace place_on(const RoadMap& map, const Lane& lane, Vec2 position_m) {
+  const Span<const LanePoint> points = map.points_of(lane);
+  const LanePoint* const nearest = std::min_element(points.begin(), points.end(), [&](const auto& a, const auto& b) {
+    return length(a.position_m.xy() - position_m) < length(b.position_m.xy() - position_m);
+  });
+  const LanePoint *first = nearest, *last = nearest;
+  constexpr float kAround_m = 10;
+  while (first != points.begin() && nearest->s_m - first->s_m < kAround_m) --first;
+  while (last + 1 != points.end() && last->s_m - nearest->s_m < kAround_m) ++last;
+  const float turn = std::fabs(std::remainder(last->heading_rad - first->heading_rad, 2 * kPi));
+  return {nearest->s_m, turn > 0 ? (last->s_m - first->s_m) / turn : std::numeric_limits<float>::infinity()};
+}
+
+RoadShape shape_of(const RoadMap& map, const Lane& lane, const LanePlace& place) {
+  if (!lane.in_junction) return place.radius_m <= kCurveRadius_m ? RoadShape::curve : RoadShape::straight;
+  const Span<const LanePoint> points = map.points_of(lane);
+  const float turn = std::remainder(points[points.size() - 1].heading_rad - points[0].heading_rad, 2 * kPi);
+  if (std::fabs(turn) < kJunctionTurn_rad) return RoadShape::junction_straight;
+  return turn > 0 ? RoadShape::junction_left : RoadShape::junction_right;
+}
+
+bool is_before_merge(const RoadMap& map, const Lane& lane, float s_m) {
+  if (lane.in_junction || lane.length_m - s_m > kMergeAhead_m) return false;
+  const Span<const int32_t> next = map.links(lane.successors);
+  return std::any_of(next.begin(), next.end(), [&](int32_t index) {
+    const Lane& successor = map.lanes[static_cast<size_t>(index)];
+    return !successor.in_junction && successor.predecessors.size() > 1;
+  });
+}
+
+Contact contact_of(const AgentBox& own, const AgentBox& other) {
+  const Vec2 forward{own.cos_heading, own.sin_heading}, other_forward{other.cos_heading, other.sin_heading};
+  const float same = dot(forward, other_forward);
+  constexpr float kCos45 = 0.70710678f;
+  if (same <= -kCos45) return Contact::head_on;
+  if (same < kCos45) return Contact::crossing;
+  // One behind the other along its direction, but for what they overlap by in rounding.
+  constexpr float kTouching_m = 0.2f;
+  const float along = std::fabs(dot((other.center_m - own.center_m).xy(), other_forward));
+  const float reach = 0.5f * other.length_m + half_extent(footprint(own), other_forward);
+  return along >= reach - kTouching_m ? Contact::rear_end : Contact::side_swipe;
+}
+
+CollisionPartner partner_of(AgentClass agent_class) {
+  switch (agent_class) {
+    case AgentClass::vehicle: return CollisionPartner::vehicle;
+    case AgentClass::cyclist: return CollisionPartner::cyclist;
+    case AgentClass::pedestrian: return CollisionPartner::pedestrian;
+  }
+  return CollisionPartner::none;
+}
+
+}  // namespace
+
+const char* to_string(CollisionPartner partner) {
+  constexpr const char* kNames[] = {"", "vehicle", "cyclist", "pedestrian", "parked car"};
+  return kNames[static_cast<size_t>(partner)];
+}
+const char* to_string(PartnerMotion motion) {
+  constexpr const char* kNames[] = {"", "moving", "standing", "halted"};
+  return kNames[static_cast<size_t>(motion)];
+}
+const char* to_string(Contact contact) {
+  constexpr const char* kNames[] = {"", "rear-end", "side-swipe", "crossing", "head-on"};
+  return kNames[static_cast<size_t>(contact)];
+}
+const char* to_string(RoadShape shape) {
+  constexpr const char* kNames[] = {"off lanes",          "straight road",       "curve",
+                                    "junction, straight", "junction, left turn", "junction, right turn"};
+  return kNames[static_cast<size_t>(shape)];
+}
+
+// What is read of all worlds, on the host.
+struct InfractionObserver::Frame {
+  std::vector<uint8_t> status, events, agent_class;
+  std::vector<float> speed_mps, lane_offset_m, lane_angle_rad;
+  std::vector<int32_t> lane;
+  std::vector<AgentBox> boxes;
+  std::vector<uint8_t> lights;  // LightState
+  std::vector<int32_t> box_begin, light_begin, slot_begin;
+
+  explicit Frame(Simulator& simulator) {
+    const Device device = simulator.device();
+    const AgentStateView state = simulator.state();
+    const auto slots = static_cast<size_t>(simulator.num_slots());
+    status = copy_of<uint8_t>(state.status, slots, device);
+    events = copy_of<uint8_t>(state.events, slots, device);
+    agent_class = copy_of<uint8_t>(state.agent_class, slots, device);
+    speed_mps = copy_of<float>(state.speed_mps, slots, device);
+    lane_offset_m = copy_of<float>(state.lane_offset_m, slots, device);
+    lane_angle_rad = copy_of<float>(state.lane_angle_rad, slots, device);
+    lane = copy_of<int32_t>(state.lane, slots, device);
+    const SceneBatch& scene = simulator.scene();
+    boxes = copy_of(scene.agents, device);
+    static_assert(sizeof(LightState) == 1);
+    lights = copy_of(reinterpret_cast<const uint8_t*>(scene.light_states.data()), scene.light_states.size(), device);
+    box_begin = host_copy(scene.world_begin, device);
+    light_begin = host_copy(scene.light_begin, device);
+    slot_begin = host_copy(simulator.slots().slot_begin, device);
+  }
+
+  AgentStatus status_of(size_t slot) const { return static_cast<AgentStatus>(status[slot]); }
+};
+
+InfractionObserver::InfractionObserver() = default;
+InfractionObserver::~InfractionObserver() = default;
+
+void InfractionObserver::begin(Simulator& simulator) {
+  simulator_ = &simulator;
+  step_ = 0;
+  after_ = std::make_unique<Frame>(simulator);
+  lane_change_step_.assign(after_->status.size(), 0);
+  red_since_step_.assign(after_->lights.size(), -1);
+  for (size_t i = 0; i < after_->lights.size(); ++i) {
+    if (after_->lights[i] == static_cast<uint8_t>(LightState::red)) red_since_step_[i] = 0;
+  }
+}
+
+void InfractionObserver::before_step(Span<const Command> /*commands*/) { std::swap(before_, after_); }
+
+void InfractionObserver::after_step(const StepResult& /*result*/) {
+  ++step_;
+  after_ = std::make_unique<Frame>(*simulator_);
+  const Frame &before = *before_, &after = *after_;
+  const float dt_s = simulator_->config().dt_s;
+  for (size_t world = 0; world < simulator_->worlds().size(); ++world) {
+    const WorldSpec& spec = simulator_->worlds()[world];
+    const RoadMap& map = *simulator_->maps()[static_cast<size_t>(spec.map)]->road;
+    const auto first_slot = static_cast<size_t>(after.slot_begin[world]);
+    const auto num_agents = static_cast<size_t>(after.slot_begin[world + 1]) - first_slot;
+    const auto first_box = static_cast<size_t>(after.box_begin[world]);
+    const auto num_boxes = static_cast<size_t>(after.box_begin[world + 1]) - first_box;
+    const auto first_light = static_cast<size_t>(after.light_begin[world]);
+    for (size_t agent = 0; agent < num_agents; ++agent) {
+      const size_t slot = first_slot + agent;
+      if (before.status_of(slot) != AgentStatus::active) continue;
+      const int32_t lane = before.lane[slot];
+      if (lane >= 0 && after.lane[slot] >= 0 && lane != after.lane[slot]) {
+        const Lane& from = map.lanes[static_cast<size_t>(lane)];
+        if (after.lane[slot] == from.left_neighbor || after.lane[slot] == from.right_neighbor) {
+          lane_change_step_[slot] = step_;
+        }
+      }
+      if (after.status_of(slot) != AgentStatus::halted) continue;
+
+      Infraction one;
+      one.agents_per_world = spec.num_agents;
+      one.scenario = static_cast<int>(spec.global_world - kFirstEvaluationWorld);
+      one.map = map.name;
+      one.agent = static_cast<int>(agent);
+      one.step = step_;
+      one.agent_class = static_cast<AgentClass>(before.agent_class[slot]);
+      one.events = after.events[slot] & (kInfractions | kEventAtFault);
+      const AgentBox &own = before.boxes[first_box + agent], &own_after = after.boxes[first_box + agent];
+      one.position_m = own.center_m;
+      one.speed_mps = before.speed_mps[slot];
+      one.lane_offset_m = before.lane_offset_m[slot];
+      one.lane_angle_rad = before.lane_angle_rad[slot];
+      const int changed = lane_change_step_[slot];
+      one.changed_lane = changed > 0 && static_cast<float>(step_ - changed) * dt_s <= kLaneChange_s;
+      if (lane >= 0) {
+        const Lane& on = map.lanes[static_cast<size_t>(lane)];
+        const LanePlace place = place_on(map, on, own.center_m.xy());
+        one.shape = shape_of(map, on, place);
+        one.before_merge = is_before_merge(map, on, place.s_m);
+      }
+      if (one.is(kEventCollision)) {
+        float least_m = std::numeric_limits<float>::infinity();
+        for (size_t other = 0; other < num_boxes; ++other) {
+          const bool is_parked = other >= num_agents;
+          if (other == agent) continue;
+          if (!is_parked && before.status_of(first_slot + other) == AgentStatus::absent) continue;
+          const AgentBox &its = before.boxes[first_box + other], &its_after = after.boxes[first_box + other];
+          const float apart_m = length((its.center_m - own.center_m).xy());
+          if (apart_m >= least_m || !collide(own, own_after, its, its_after)) continue;
+          least_m = apart_m;
+          one.partner_agent = static_cast<int>(other);
+          one.partner = is_parked ? CollisionPartner::parked_car : partner_of(its.agent_class);
+          one.contact = contact_of(own, its);
+          one.partner_speed_mps = is_parked ? 0 : before.speed_mps[first_slot + other];
+          one.partner_motion = PartnerMotion::standing;
+          if (!is_parked && before.status_of(first_slot + other) == AgentStatus::halted)
+            one.partner_motion = PartnerMotion::halted;
+          else if (std::fabs(one.partner_speed_mps) > kRest_mps)
+            one.partner_motion = PartnerMotion::moving;
+        }
+      }
+      if (one.is(kEventRedLight)) {
+        float least_m = std::numeric_limits<float>::infinity();
+        for (size_t i = 0; i < map.lights.size(); ++i) {
+          if (after.lights[first_light + i] != static_cast<uint8_t>(LightState::red)) continue;
+          const TrafficLight& light = map.lights[i];
+          const Vec2 middle_m = (light.stop_a_m.xy() + light.stop_b_m.xy()) * 0.5f;
+          const float apart_m = length(middle_m - front_bumper(own));
+          if (apart_m >= least_m) continue;
+          least_m = apart_m;
+          const int since = red_since_step_[first_light + i];
+          one.red_for_s = since > 0 ? static_cast<float>(step_ - since) * dt_s
+                                    : (since < 0 ? 0.0f : std::numeric_limits<float>::infinity());
+          one.stop_line_to_head_m = length(light.head_m.xy() - middle_m);
+        }
+      }
+      found_.push_back(one);
+    }
+  }
+  for (size_t i = 0; i < after.lights.size(); ++i) {
+    const bool is_red = after.lights[i] == static_cast<uint8_t>(LightState::red);
+    if (!is_red)
+      red_since_step_[i] = -1;
+    else if (red_since_step_[i] < 0)
+      red_since_step_[i] = step_;
+  }
+}
+
+std::vector<InfractionGroup> group_infractions(const std::vector<Infraction>& infractions) {
+  std::map<std::pair<std::string, std::string>, int64_t> counts;
+  for (const Infraction& one : infractions) {
+    if (one.agent_class != AgentClass::vehicle) continue;
+    if (one.is(kEventAtFault)) {
+      ++counts[{"at_fault", fmt::format("{} {}, {}, {}{}{}", to_string(one.partner_motion), to_string(one.partner),
+                                        to_string(one.contact), to_string(one.shape),
+                                        one.changed_lane ? ", after a lane change" : "",
+                                        one.before_merge ? ", before a merge" : "")}];
+    }
+    if (one.is(kEventOffRoad)) {
+      ++counts[{"off_road",
+                fmt::format("{}{}", to_string(one.shape), one.changed_lane ? ", after a lane change" : "")}];
+    }
+    if (one.is(kEventRedLight)) {
+      ++counts[{"red_light", fmt::format("red for {} {} s, head {} {} m from the line",
+                                         one.red_for_s <= kJustRed_s ? "up to" : "more than", kJustRed_s,
+                                         one.stop_line_to_head_m <= kFarHead_m ? "up to" : "more than", kFarHead_m)}];
+    }
+  }
+  std::vector<InfractionGroup> groups;
+  for (const auto& [key, count] : counts) groups.push_back({key.first, key.second, count});
+  std::stable_sort(groups.begin(), groups.end(),
+                   [](const InfractionGroup& a, const InfractionGroup& b) { return a.count > b.count; });
+  return groups;
+}
+
+namespace {
+
+// As a field of CSV (RFC 4180).
+std::string quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) result.append(c == '"' ? 2 : 1, c);
+  return result + '"';
+}
+
+}  // namespace
+
+void write_infractions_csv(const std::string& path, const std::vector<Infraction>& infractions) {
+  std::string text =
+      "agents,scenario,map,agent,class,step,at_fault,collision,off_road,red_light,wall,x_m,y_m,z_m,speed_mps,lane_"
+      "offset_m,"
+      "lane_angle_rad,road_shape,changed_lane,before_merge,partner,partner_motion,contact,partner_agent,partner_speed_"
+      "mps,"
+      "red_for_s,stop_line_to_head_m\n";
+  for (const Infraction& one : infractions) {
+    text += fmt::format(
+        "{},{},{},{},{},{},{:d},{:d},{:d},{:d},{:d},{:.2f},{:.2f},{:.2f},{:.2f},{:.2f},{:.3f},{},{:d},{:d},{},{},{},{},"
+        "{:.2f},"
+        "{:.1f},{:.1f}\n",
+        one.agents_per_world, one.scenario, quoted(one.map), one.agent, to_string(partner_of(one.agent_class)),
+        one.step, one.is(kEventAtFault), one.is(kEventCollision), one.is(kEventOffRoad), one.is(kEventRedLight),
+        one.is(kEventWall), one.position_m.x, one.position_m.y, one.position_m.z, one.speed_mps, one.lane_offset_m,
+        one.lane_angle_rad, quoted(to_string(one.shape)), one.changed_lane, one.before_merge, to_string(one.partner),
+        to_string(one.partner_motion), to_string(one.contact), one.partner_agent, one.partner_speed_mps, one.red_for_s,
+        one.stop_line_to_head_m);
+  }
+  write_file(path, text);
+}
+
+}  // namespace pictura
