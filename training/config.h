@@ -109,7 +109,8 @@ struct Config {
     int evaluate_scenarios = 16, evaluate_agents = 120, evaluate_steps = 600;
     Precision precision = Precision::bf16;
     bool reproducible = false;  // the same bits in every run on a device, see training/precision.h
-    /// Of a rollout: kept, or redrawn from its scenes where they are read; auto: kept on the host, redrawn on a device.
+    /// Of a rollout: kept, or redrawn from its scenes where they are read; auto: kept on the host,
+    /// and on a device where they take at most a quarter of its memory.
     std::string images = "auto";
     std::string graphs = "auto";                   // CUDA graphs of a learner's work; off: call by call
     HaltedSlots halted_slots = HaltedSlots::skip;  // draw: for measuring alone, with every slot at every step

@@ -7,8 +7,8 @@
 #include "pictura/common/image.h"
 #include "pictura/common/scene_history.h"
 #include "pictura/simulator/observation_arrays.h"
+#include "pictura/training/observation.h"
 #include "pictura/training/point_features.h"
-#include "pictura/training/rollout.h"
 
 namespace pictura {
 
@@ -41,9 +41,18 @@ constexpr double kSimulatorBytesPerBox = 700;
 // those that an update makes of them (returns, actions and five lists of rows as i64).
 constexpr double kTransitionBytes = 5 * 4 + 3 + 4 + 6 * 8;
 
+double kept_image_bytes(const Config& config, double agents) {
+  return agents * image_bytes(config) * (config.train.num_steps + 1);
+}
+
 }  // namespace
 
-double estimated_bytes(const Config& config, Device device) {
+bool keeps_images(const Config& config, int num_agents, Device device, int64_t memory_bytes) {
+  if (config.train.images != "auto") return config.train.images == "kept";
+  return device.is_host() || kept_image_bytes(config, num_agents) <= 0.25 * static_cast<double>(memory_bytes);
+}
+
+double estimated_bytes(const Config& config, bool keeps_images) {
   const Config::SimulatorSection& section = config.simulator;
   const double agents = section.num_slots, steps = config.train.num_steps;
   const double worlds = 2 * agents / (section.min_agents + section.max_agents),
@@ -52,7 +61,7 @@ double estimated_bytes(const Config& config, Device device) {
   double bytes =
       boxes * kSimulatorBytesPerBox + agents * (observation_bytes(config) * (steps + 2) + kTransitionBytes * steps);
   if (!config.reads_images()) return bytes;
-  if (keeps_images(config, device)) return bytes + agents * image_bytes(config) * (steps + 1);
+  if (keeps_images) return bytes + kept_image_bytes(config, agents);
   const SceneHistorySize scenes{static_cast<int>(steps) + 1, static_cast<size_t>(worlds), static_cast<size_t>(boxes), 0,
                                 static_cast<size_t>(agents)};
   return bytes + static_cast<double>(bytes_of(scenes));
@@ -181,7 +190,8 @@ void check_memory(const Config& config, Device device, int64_t memory_bytes, int
         fitting >= 1 ? fmt::format("about {} transitions would fit", fitting)
                      : "it does not fit, see policy.backbone_width, embedding_width and the convolutions' channels");
   }
-  const double needed = estimated_bytes(config, device) / num_ranks, left = available - network.bytes(chunk);
+  const bool keeps = keeps_images(config, config.simulator.num_slots / num_ranks, device, memory_bytes);
+  const double needed = estimated_bytes(config, keeps) / num_ranks, left = available - network.bytes(chunk);
   if (needed <= left) return;
   fail(
       "train: {} agents (simulator.num_slots) with rollouts of {} steps (train.num_steps) need {:.3g} GB {}by "

@@ -5,9 +5,14 @@
 
 namespace pictura {
 
+/// Whether rollouts of so many agents keep the images that a policy sees, rather than drawing them again: as
+/// train.images says; with auto on the host, where drawing costs more than memory, and on a device where they take at
+/// most a quarter of its `memory_bytes`.
+bool keeps_images(const Config& config, int num_agents, Device device, int64_t memory_bytes);
+
 /// What simulator, rollout and update take for all agents of a configuration, by estimate: what grows with
 /// simulator.num_slots, so neither maps nor the network.
-double estimated_bytes(const Config& config, Device device);
+double estimated_bytes(const Config& config, bool keeps_images);
 
 /// What the network of a configuration takes. A program (policy.backbone) is not counted: what it computes is its own.
 struct NetworkSize {

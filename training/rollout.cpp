@@ -2,6 +2,7 @@
 
 #include "pictura/backends/make_learner.h"
 #include "pictura/common/error.h"
+#include "pictura/training/memory.h"
 #include "pictura/training/torch_device.h"
 
 namespace pictura {
@@ -15,10 +16,6 @@ SceneHistorySize history_size(Simulator& simulator, int num_steps) {
 
 }  // namespace
 
-bool keeps_images(const Config& config, Device device) {
-  return config.train.images == "kept" || (config.train.images == "auto" && device.is_host());
-}
-
 RolloutObservations::RolloutObservations(const Config& config, Simulator* simulator, Renderer* renderer,
                                          PhaseTimer* timer)
     : simulator_(simulator), renderer_(renderer), timer_(timer) {
@@ -30,7 +27,7 @@ RolloutObservations::RolloutObservations(const Config& config, Simulator* simula
   const int num_slots = simulator->num_slots(), num_steps = config.train.num_steps + 1;
   arrays_ = allocate_observations(config, num_steps, num_slots, device);
   if (!config.reads_images()) return;
-  keeps_images_ = keeps_images(config, device);
+  keeps_images_ = keeps_images(config, num_slots, device, available_bytes(device));
   if (!keeps_images_) scenes_ = make_scene_history(device, history_size(*simulator, num_steps));
   set_renderer(renderer);
 }

@@ -8,9 +8,6 @@
 
 namespace pictura {
 
-/// Whether a rollout keeps images where the policy reads some, rather than drawing them again.
-bool keeps_images(const Config& config, Device device);
-
 /// What the slots saw at each step. Images are kept, or drawn again from the scenes whenever they are read: those of
 /// the paper's rollout would take 163 GB, its scenes 0.25 GB.
 class RolloutObservations {

@@ -49,7 +49,7 @@ TEST_P(EachRollout, TakesAboutWhatIsEstimated) {
   const Config few = config(1000), many = config(3000);
   taken_bytes(few);  // what is made once
   const double per_agent = (taken_bytes(many) - taken_bytes(few)) / 2000,
-               by_estimate = (estimated_bytes(many, Device{}) - estimated_bytes(few, Device{})) / 2000;
+               by_estimate = (estimated_bytes(many, true) - estimated_bytes(few, true)) / 2000;
   EXPECT_GT(by_estimate, 0.95 * per_agent) << per_agent << " bytes";
   EXPECT_LT(by_estimate, 1.2 * per_agent) << per_agent << " bytes";
 }
@@ -58,7 +58,7 @@ TEST(Memory, MoreAgentsThanFitAreRefusedWithTheNumberThatWould) {
   const auto config = [](int num_slots) { return config_of("perspective", "kept", num_slots); };
   const Config any = config(250);
   const double network = network_size(any, Device{}).bytes(static_cast<double>(any.train.forward_chunk));
-  const auto memory_bytes = static_cast<int64_t>(estimated_bytes(config(250), Device{}) + network) + 1;
+  const auto memory_bytes = static_cast<int64_t>(estimated_bytes(config(250), true) + network) + 1;
   EXPECT_NO_THROW(check_memory(config(250), Device{}, memory_bytes));
   EXPECT_ANY_THROW(check_memory(config(251), Device{}, memory_bytes));
   EXPECT_THAT(message_of([&] { check_memory(config(1000), Device{}, memory_bytes); }),
@@ -129,6 +129,23 @@ TEST_P(EachNetwork, TakesAboutWhatIsEstimatedOnTheWayForwardAndBack) {
                by_estimate = network_size(config_of_chunk(64), Device{}).transition_bytes;
   EXPECT_GT(by_estimate, 0.8 * of_transition) << of_transition << " bytes";
   EXPECT_LT(by_estimate, 1.6 * of_transition) << of_transition << " bytes";
+}
+
+TEST(Memory, ImagesAreKeptOnADeviceWhereTheyTakeAQuarterOfItsMemory) {
+  const auto keeps = [](const std::vector<std::string>& overrides, int64_t memory_bytes,
+                        Device device = {MemorySpace::cuda}) {
+    return keeps_images(load_config(PICTURA_SOURCE_DIR "/configs/paper.toml", overrides), 1000, device, memory_bytes);
+  };
+  // 1,000 agents, 129 steps, four images of 96x54 with three channels.
+  const int64_t bytes = int64_t{1000} * 129 * 4 * 96 * 54 * 3;
+  EXPECT_TRUE(keeps({}, 4 * bytes));
+  EXPECT_FALSE(keeps({}, 4 * bytes - 4));
+  EXPECT_TRUE(keeps({}, 1, Device{}));
+  EXPECT_TRUE(keeps({"train.images=kept"}, 1));
+  EXPECT_FALSE(keeps({"train.images=redrawn"}, 100 * bytes));
+  // The largest that the run will draw count.
+  EXPECT_FALSE(keeps({"render.schedule=[[1000, 192, 108]]"}, 4 * bytes));
+  EXPECT_TRUE(keeps({"render.schedule=[[1000, 192, 108]]"}, 16 * bytes));
 }
 
 TEST(Memory, ANetworkThatCannotFitIsRefusedBeforeItIsMade) {
