@@ -110,7 +110,7 @@ TEST(Config, SettingsWithoutEffectAreSaid) {
 }
 
 TEST(Config, EveryFileInConfigsReads) {
-  for (const char* name : {"smoke", "demo", "town01", "paper"}) {
+  for (const char* name : {"smoke", "demo", "town01", "agent", "paper"}) {
     EXPECT_NO_THROW(load_config(fmt::format("{}/configs/{}.toml", PICTURA_SOURCE_DIR, name))) << name;
   }
 }
