@@ -23,7 +23,7 @@ namespace {
 
 // A notice says how long it takes when that is long, as soon as a few seconds tell.
 constexpr double kEstimateAfter_s = 5, kLong_s = 600;
-constexpr size_t kShownGroups = 20;  // of infractions
+constexpr int kShownGroups = 6;  // of each kind of infraction
 
 const std::map<std::string, Density> kDensities{
     {"light", Density::light}, {"medium", Density::medium}, {"dense", Density::dense}};
@@ -82,10 +82,14 @@ void print_groups(const std::vector<InfractionGroup>& groups) {
   fmt::print("{:10} {:>7} {:>7}  {}\n", "infraction", "count", "share", "of vehicles, the commonest");
   std::map<std::string, int64_t> totals;
   for (const InfractionGroup& group : groups) totals[group.kind] += group.count;
-  for (size_t i = 0; i < std::min(groups.size(), kShownGroups); ++i) {
-    const InfractionGroup& group = groups[i];
-    fmt::print("{:10} {:>7} {:>5.1f} %  {}\n", group.kind, group.count,
-               100 * static_cast<double>(group.count) / static_cast<double>(totals[group.kind]), group.how);
+  for (const auto& [kind, total] : totals) {
+    int shown = 0;
+    for (const InfractionGroup& group : groups) {
+      if (group.kind != kind || shown == kShownGroups) continue;
+      ++shown;
+      fmt::print("{:10} {:>7} {:>5.1f} %  {}\n", kind, group.count,
+                 100 * static_cast<double>(group.count) / static_cast<double>(total), group.how);
+    }
   }
 }
 
