@@ -3,6 +3,8 @@
 #include <cmath>
 #include <set>
 
+#include <Eigen/Geometry>
+
 #include "pictura/common/error.h"
 #include "pictura/common/raster/camera.h"
 #include "pictura/common/support/file.h"
@@ -104,11 +106,17 @@ Rig load_rig(const std::string& path) {
 }
 
 CameraAxes camera_axes(const Camera& camera) {
-  const SinCos yaw = sincos_of(camera.yaw_rad), pitch = sincos_of(camera.pitch_rad), roll = sincos_of(camera.roll_rad);
-  const Vec3 forward{yaw.cos * pitch.cos, yaw.sin * pitch.cos, pitch.sin};
-  const Vec3 level_right{yaw.sin, -yaw.cos, 0};
-  const Vec3 level_down = cross(forward, level_right);
-  return {level_right * roll.cos + level_down * roll.sin, level_down * roll.cos - level_right * roll.sin, forward};
+  using Eigen::AngleAxisd, Eigen::Vector3d;
+  // Columns right, down and forward, in a frame with x forward, y left and z up. Turned axis by axis: by a quaternion,
+  // what is level would be level but for rounding.
+  Eigen::Matrix3d axes;
+  axes << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  axes = AngleAxisd(camera.roll_rad, Vector3d::UnitX()).toRotationMatrix() * axes;
+  axes = AngleAxisd(-camera.pitch_rad, Vector3d::UnitY()).toRotationMatrix() * axes;
+  axes = AngleAxisd(camera.yaw_rad, Vector3d::UnitZ()).toRotationMatrix() * axes;
+  const Eigen::Matrix3f rounded = axes.cast<float>();
+  auto column = [&](int i) { return Vec3{rounded(0, i), rounded(1, i), rounded(2, i)}; };
+  return {column(0), column(1), column(2)};
 }
 
 }  // namespace pictura

@@ -4,13 +4,16 @@
 #include <cmath>
 #include <numeric>
 
+#include "pictura/drawing/plan.h"
+
 namespace pictura {
 
 namespace {
 
-Vec2 border(const LanePoint& point, float side) {
-  const Vec2 left{-std::sin(point.heading_rad), std::cos(point.heading_rad)};
-  return point.position_m.xy() + left * (side * 0.5f * point.width_m);
+/// The point half a width to the left (side 1) or to the right (-1).
+Vec2 border(const LanePoint& point, double side) {
+  const Eigen::Isometry2d pose = pose_in_plan(in_plan(point.position_m), point.heading_rad);
+  return rounded(pose * Eigen::Vector2d{0, side * 0.5 * point.width_m});
 }
 
 /// Later layers cover earlier ones.

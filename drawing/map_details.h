@@ -11,7 +11,7 @@ constexpr Rgb kSignInk = hex(0xD6247F);
 
 /// Paints the visible details over MapLayers. Arrows, lane numbers and names of lights and signs appear as the scale
 /// allows; the numbers are those of `pictura map --json --full`.
-void paint_details(const RoadMap& map, Canvas& canvas, Vec2 left_top_m, double px_per_m);
+void paint_details(const RoadMap& map, Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m);
 
 /// A sign's diamond, `radius` in units of the canvas.
 void sign_path(cairo_t* context, double x, double y, double radius);

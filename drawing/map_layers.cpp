@@ -10,6 +10,8 @@
 
 namespace pictura {
 
+using Eigen::Vector2d;
+
 namespace {
 
 Aabb2 empty_box() {
@@ -84,16 +86,17 @@ Rgb phase_color(int phase) {
   return kColors[static_cast<size_t>(phase) % kColors.size()];
 }
 
-GroundPen::GroundPen(Canvas& canvas, Vec2 left_top_m, double px_per_m)
-    : canvas_(canvas), left_top_m_(left_top_m), px_per_m_(px_per_m) {
+GroundPen::GroundPen(Canvas& canvas, const Vector2d& left_top_m, double px_per_m)
+    : canvas_(canvas), to_pixels_(to_pixels(left_top_m, px_per_m)), px_per_m_(px_per_m) {
   constexpr float kMargin_m = 1;  // lines are wider than their boxes
-  const auto width_m = static_cast<float>(canvas.width_px() / px_per_m);
-  const auto height_m = static_cast<float>(canvas.height_px() / px_per_m);
-  visible_ = {{left_top_m.x - kMargin_m, left_top_m.y - height_m - kMargin_m},
-              {left_top_m.x + width_m + kMargin_m, left_top_m.y + kMargin_m}};
+  visible_ = empty_box();
+  for (const Vector2d& corner_px : {Vector2d{0, 0}, Vector2d(canvas.width_px(), canvas.height_px())}) {
+    grow(&visible_, rounded(to_pixels_.inverse() * corner_px), kMargin_m);
+  }
   cairo_save(context());
-  cairo_scale(context(), px_per_m, -px_per_m);
-  cairo_translate(context(), -left_top_m.x, -left_top_m.y);
+  const Eigen::Matrix3d& m = to_pixels_.matrix();
+  const cairo_matrix_t matrix{m(0, 0), m(1, 0), m(0, 1), m(1, 1), m(0, 2), m(1, 2)};
+  cairo_transform(context(), &matrix);
   cairo_set_line_join(context(), CAIRO_LINE_JOIN_ROUND);
 }
 
@@ -106,13 +109,13 @@ bool GroundPen::is_visible(const Aabb2& box) const {
          visible_.low.y <= box.high.y;
 }
 
-bool GroundPen::is_visible(Vec2 position, float margin_m) const {
+bool GroundPen::is_visible(const Vector2d& position, double margin_m) const {
   Aabb2 box = empty_box();
-  grow(&box, position, margin_m);
+  grow(&box, rounded(position), static_cast<float>(margin_m));
   return is_visible(box);
 }
 
-void GroundPen::line(Vec2 a, Vec2 b, double width_m, Rgb color, double alpha) {
+void GroundPen::line(const Vector2d& a, const Vector2d& b, double width_m, Rgb color, double alpha) {
   canvas_.set_color(color, alpha);
   cairo_set_line_width(context(), width_m);
   move_to(a);
@@ -120,18 +123,18 @@ void GroundPen::line(Vec2 a, Vec2 b, double width_m, Rgb color, double alpha) {
   cairo_stroke(context());
 }
 
-void GroundPen::disk(Vec2 center, double radius_m, Rgb color, double alpha) {
+void GroundPen::disk(const Vector2d& center, double radius_m, Rgb color, double alpha) {
   canvas_.set_color(color, alpha);
   cairo_new_sub_path(context());
-  cairo_arc(context(), center.x, center.y, radius_m, 0, kTwoPi);
+  cairo_arc(context(), center.x(), center.y(), radius_m, 0, kTwoPi);
   cairo_fill(context());
 }
 
-void GroundPen::label(Vec2 position, const std::string& words, const TextStyle& style) {
+void GroundPen::label(const Vector2d& position, const std::string& words, const TextStyle& style) {
   cairo_save(context());
   cairo_identity_matrix(context());
-  canvas_.text((position.x - left_top_m_.x) * px_per_m_,
-               (left_top_m_.y - position.y) * px_per_m_ + 0.35 * style.size_px, words, style);
+  const Vector2d at_px = to_pixels_ * position;
+  canvas_.text(at_px.x(), at_px.y() + 0.35 * style.size_px, words, style);
   cairo_restore(context());
 }
 
@@ -146,7 +149,7 @@ MapLayers::MapLayers(const RoadMap& map) : map_(map), lanes_in_order_(lanes_in_d
   }
 }
 
-void MapLayers::paint(Canvas& canvas, Vec2 left_top_m, double px_per_m) const {
+void MapLayers::paint(Canvas& canvas, const Vector2d& left_top_m, double px_per_m) const {
   GroundPen pen(canvas, left_top_m, px_per_m);
   paint_lanes(pen);
   paint_parking_spaces(pen);
@@ -161,7 +164,7 @@ void MapLayers::paint_lanes(GroundPen& pen) const {
     if (!pen.is_visible(lane_boxes_[static_cast<size_t>(index)])) continue;
     const Lane& lane = map_.lanes[static_cast<size_t>(index)];
     cairo_new_path(context);
-    for (const Vec2 corner : outline_of(map_, lane)) pen.line_to(corner);
+    for (const Vec2 corner : outline_of(map_, lane)) pen.line_to(in_plan(corner));
     cairo_close_path(context);
     pen.canvas().set_color(lane_color(lane.type));
     cairo_fill_preserve(context);
@@ -174,7 +177,7 @@ void MapLayers::paint_lanes(GroundPen& pen) const {
 void MapLayers::paint_parking_spaces(GroundPen& pen) const {
   cairo_t* context = pen.context();
   for (const ParkingSpace& space : map_.parking_spaces) {
-    if (!pen.is_visible(space.center_m.xy(), 0.5f * (space.length_m + space.width_m))) continue;
+    if (!pen.is_visible(in_plan(space.center_m), 0.5f * (space.length_m + space.width_m))) continue;
     cairo_save(context);
     cairo_translate(context, space.center_m.x, space.center_m.y);
     cairo_rotate(context, space.heading_rad);
@@ -191,17 +194,16 @@ void MapLayers::paint_crosswalk(GroundPen& pen, const Crosswalk& crosswalk) cons
   cairo_t* context = pen.context();
   const int32_t count = crosswalk.outline.size();
   const auto corner = [&](int32_t i) {
-    return map_.outline_points[static_cast<size_t>(crosswalk.outline.begin + (i + count) % count)].xy();
+    return in_plan(map_.outline_points[static_cast<size_t>(crosswalk.outline.begin + (i + count) % count)]);
   };
-  Vec2 along{1, 0};
-  float longest = 0;
-  Vec2 center;
+  Vector2d along{1, 0}, center{0, 0};
+  double longest = 0;
   for (int32_t i = 0; i < count; ++i) {
-    const Vec2 side = corner(i + 1) - corner(i);
-    center = center + corner(i) * (1.0f / static_cast<float>(count));
-    if (length(side) > longest) {
-      longest = length(side);
-      along = side * (1.0f / longest);
+    const Vector2d side = corner(i + 1) - corner(i);
+    center += corner(i) / count;
+    if (side.norm() > longest) {
+      longest = side.norm();
+      along = side / longest;
     }
   }
   if (!pen.is_visible(center, longest)) return;
@@ -212,12 +214,12 @@ void MapLayers::paint_crosswalk(GroundPen& pen, const Crosswalk& crosswalk) cons
   pen.canvas().set_color(paint_color(MarkColor::white), 0.25);
   cairo_fill_preserve(context);
   cairo_clip(context);
-  const Vec2 across = left_normal(along) * longest;
+  const Vector2d across = longest * along.unitOrthogonal();
   pen.canvas().set_color(paint_color(MarkColor::white), 0.95);
   cairo_set_line_width(context, 0.5);
   cairo_set_line_cap(context, CAIRO_LINE_CAP_BUTT);
-  for (float d = -0.5f * longest; d <= 0.5f * longest; d += 1.0f) {
-    const Vec2 middle = center + along * d;
+  for (double d = -0.5 * longest; d <= 0.5 * longest; d += 1) {
+    const Vector2d middle = center + d * along;
     pen.move_to(middle - across);
     pen.line_to(middle + across);
   }
@@ -232,13 +234,13 @@ void MapLayers::paint_markings(GroundPen& pen) const {
     const Marking& marking = map_.markings[i];
     cairo_new_path(context);
     for (int32_t p = marking.points.begin; p < marking.points.end; ++p)
-      pen.line_to(map_.marking_points[static_cast<size_t>(p)].xy());
+      pen.line_to(in_plan(map_.marking_points[static_cast<size_t>(p)]));
     pen.canvas().set_color(paint_color(marking.color), 0.95);
     cairo_set_line_width(context, pen.at_least(marking.width_m, 0.6));
     cairo_stroke(context);
   }
   for (const PaintedStopLine& line : map_.stop_lines) {
-    pen.line(line.a_m.xy(), line.b_m.xy(), pen.at_least(line.width_m, 1.5), kStopLineInk);
+    pen.line(in_plan(line.a_m), in_plan(line.b_m), pen.at_least(line.width_m, 1.5), kStopLineInk);
   }
 }
 
@@ -252,21 +254,20 @@ void MapLayers::paint_road_edges(GroundPen& pen) const {
     grow(&box, edge.a_m.xy(), 0);
     grow(&box, edge.b_m.xy(), 0);
     if (!pen.is_visible(box)) continue;
-    pen.move_to(edge.a_m.xy());
-    pen.line_to(edge.b_m.xy());
+    pen.move_to(in_plan(edge.a_m));
+    pen.line_to(in_plan(edge.b_m));
   }
   cairo_stroke(context);
 }
 
-void paint_light(Canvas& canvas, const TrafficLight& light, Vec2 left_top_m, double px_per_m, Rgb color) {
+void paint_light(Canvas& canvas, const TrafficLight& light, const Vector2d& left_top_m, double px_per_m, Rgb color) {
   GroundPen pen(canvas, left_top_m, px_per_m);
   cairo_t* context = pen.context();
   cairo_set_line_cap(context, CAIRO_LINE_CAP_BUTT);
-  pen.line(light.stop_a_m.xy(), light.stop_b_m.xy(), pen.at_least(0.7, 2.6), color);
+  pen.line(in_plan(light.stop_a_m), in_plan(light.stop_b_m), pen.at_least(0.7, 2.6), color);
   const double radius = pen.at_least(0.6, 2.2);
-  const Vec2 pointer = light.head_facing * static_cast<float>(2.6 * radius);
-  const Vec2 left = left_normal(light.head_facing) * static_cast<float>(radius);
-  const Vec2 head = light.head_m.xy();
+  const Vector2d facing = in_plan(light.head_facing), head = in_plan(light.head_m);
+  const Vector2d pointer = 2.6 * radius * facing, left = radius * facing.unitOrthogonal();
   const Rgb housing = hex(0x1E2126);
   pen.move_to(head + left);
   pen.line_to(head + pointer);

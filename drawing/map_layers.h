@@ -6,6 +6,7 @@
 
 #include "pictura/common/grid.h"
 #include "pictura/drawing/canvas.h"
+#include "pictura/drawing/plan.h"
 #include "pictura/map/road_map.h"
 
 namespace pictura {
@@ -31,7 +32,7 @@ Rgb phase_color(int phase);
 /// canvas's units.
 class GroundPen {
  public:
-  GroundPen(Canvas& canvas, Vec2 left_top_m, double px_per_m);
+  GroundPen(Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m);
   ~GroundPen();
   GroundPen(const GroundPen&) = delete;
   GroundPen& operator=(const GroundPen&) = delete;
@@ -43,18 +44,18 @@ class GroundPen {
   double at_least(double metres, double min_px) const;
   /// Whether the bounding box touches the canvas.
   bool is_visible(const Aabb2& box) const;
-  bool is_visible(Vec2 position, float margin_m) const;
+  bool is_visible(const Eigen::Vector2d& position, double margin_m) const;
 
-  void move_to(Vec2 p) { cairo_move_to(context(), p.x, p.y); }
-  void line_to(Vec2 p) { cairo_line_to(context(), p.x, p.y); }
-  void line(Vec2 a, Vec2 b, double width_m, Rgb color, double alpha = 1);
-  void disk(Vec2 center, double radius_m, Rgb color, double alpha = 1);
+  void move_to(const Eigen::Vector2d& p) { cairo_move_to(context(), p.x(), p.y()); }
+  void line_to(const Eigen::Vector2d& p) { cairo_line_to(context(), p.x(), p.y()); }
+  void line(const Eigen::Vector2d& a, const Eigen::Vector2d& b, double width_m, Rgb color, double alpha = 1);
+  void disk(const Eigen::Vector2d& center, double radius_m, Rgb color, double alpha = 1);
   /// Text at a position, sized in pixels at any scale.
-  void label(Vec2 position, const std::string& words, const TextStyle& style);
+  void label(const Eigen::Vector2d& position, const std::string& words, const TextStyle& style);
 
  private:
   Canvas& canvas_;
-  Vec2 left_top_m_;
+  Eigen::Affine2d to_pixels_;
   double px_per_m_;
   Aabb2 visible_;
 };
@@ -65,7 +66,7 @@ class MapLayers {
   explicit MapLayers(const RoadMap& map);
 
   /// The top left pixel of the canvas shows left_top_m; layers outside the canvas are skipped.
-  void paint(Canvas& canvas, Vec2 left_top_m, double px_per_m) const;
+  void paint(Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m) const;
 
  private:
   void paint_lanes(GroundPen& pen) const;
@@ -81,6 +82,7 @@ class MapLayers {
 };
 
 /// A light's stop line and head: the line in `color`, the head as a disk with a pointer towards its traffic.
-void paint_light(Canvas& canvas, const TrafficLight& light, Vec2 left_top_m, double px_per_m, Rgb color);
+void paint_light(Canvas& canvas, const TrafficLight& light, const Eigen::Vector2d& left_top_m, double px_per_m,
+                 Rgb color);
 
 }  // namespace pictura

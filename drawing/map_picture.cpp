@@ -149,7 +149,7 @@ struct Layout {
   double band_px = 0;
   int width_px = 0, height_px = 0;
   double px_per_m = 0;
-  Vec2 left_top_m;  // in the map's coordinates
+  Eigen::Vector2d left_top_m{0, 0};  // in the map's coordinates
 };
 
 Aabb2 shown_part(const RoadMap& map, const MapPictureOptions& options) {
@@ -203,8 +203,8 @@ Layout layout_of(const RoadMap& map, const MapPictureOptions& options) {
   layout.width_px = width_at(px_per_m);
   layout.height_px =
       std::clamp(static_cast<int>(std::ceil(height_m * px_per_m + 2 * margin + band + strip)), 1, size_px);
-  layout.left_top_m = {static_cast<float>(0.5 * (shown.low.x + shown.high.x) - 0.5 * layout.width_px / px_per_m),
-                       static_cast<float>(shown.high.y + (margin + band) / px_per_m)};
+  layout.left_top_m = {0.5 * (shown.low.x + shown.high.x) - 0.5 * layout.width_px / px_per_m,
+                       shown.high.y + (margin + band) / px_per_m};
   return layout;
 }
 
@@ -227,7 +227,7 @@ void draw_scale_bar(Canvas& canvas, const Layout& layout) {
 /// The file's coordinates along the upper and the left side, for --box and --at.
 void draw_coordinates(Canvas& canvas, const Layout& layout, const RoadMap& map) {
   const Metrics& m = layout.m;
-  const double left_m = layout.left_top_m.x + map.origin_m[0], top_m = layout.left_top_m.y + map.origin_m[1];
+  const double left_m = layout.left_top_m.x() + map.origin_m[0], top_m = layout.left_top_m.y() + map.origin_m[1];
   const TextStyle style{.size_px = m.px(11), .align = Align::center, .color = kQuietText};
   const double corner_px = m.px(40);  // where labels of both sides would meet
   const double right_m = left_m + canvas.width_px() / layout.px_per_m;

@@ -13,6 +13,8 @@
 
 namespace pictura {
 
+using Eigen::Vector2d;
+
 namespace {
 
 constexpr int kTile_px = 512;
@@ -29,9 +31,7 @@ Corner corner_of(const TopCamera& camera, int width_px, int height_px) {
           static_cast<int>(std::lround(-camera.center_m.y * camera.px_per_m - 0.5 * height_px))};
 }
 
-Vec2 left_top_of(Corner corner, float px_per_m) {
-  return {static_cast<float>(corner.x) / px_per_m, static_cast<float>(-corner.y) / px_per_m};
-}
+Vector2d left_top_of(Corner corner, double px_per_m) { return {corner.x / px_per_m, -corner.y / px_per_m}; }
 
 int floor_div(int a, int b) { return a / b - (a % b < 0); }
 
@@ -51,13 +51,14 @@ AgentColors colors_of(AgentClass agent_class, AgentStatus status) {
   return {body, mark};
 }
 
-void paint_agent(Canvas& canvas, const AgentBox& agent, AgentStatus status, Vec2 center_px, double px_per_m) {
+void paint_agent(Canvas& canvas, const AgentBox& agent, AgentStatus status, const Vector2d& center_px,
+                 double px_per_m) {
   cairo_t* context = canvas.context();
   // Large enough to be visible where a pixel is a metre or more.
   const double length = std::max(agent.length_m * px_per_m, 7.0), width = std::max(agent.width_m * px_per_m, 4.0);
   const AgentColors colors = colors_of(agent.agent_class, status);
   cairo_save(context);
-  cairo_translate(context, center_px.x, center_px.y);
+  cairo_translate(context, center_px.x(), center_px.y());
   // The y axis of pixels points down: a counter-clockwise heading is clockwise here.
   cairo_rotate(context, -std::atan2(agent.sin_heading, agent.cos_heading));
   cairo_rectangle(context, -0.5 * length, -0.5 * width, length, width);
@@ -75,15 +76,8 @@ void paint_agent(Canvas& canvas, const AgentBox& agent, AgentStatus status, Vec2
   cairo_restore(context);
 }
 
-void paint_wall(Canvas& canvas, const WallFace& wall, Vec2 left_top_m, double px_per_m) {
-  cairo_t* context = canvas.context();
-  const auto x = [&](Vec3 p) { return (p.x - left_top_m.x) * px_per_m; };
-  const auto y = [&](Vec3 p) { return (left_top_m.y - p.y) * px_per_m; };
-  cairo_move_to(context, x(wall.a_m), y(wall.a_m));
-  cairo_line_to(context, x(wall.b_m), y(wall.b_m));
-  cairo_set_line_width(context, std::max(0.5 * px_per_m, 1.5));
-  canvas.set_color(hex(0x7A6552));
-  cairo_stroke(context);
+void paint_wall(GroundPen& pen, const WallFace& wall) {
+  pen.line(in_plan(wall.a_m), in_plan(wall.b_m), pen.at_least(0.5, 1.5), hex(0x7A6552));
 }
 
 /// The reasons to halt, in the order of the legend; a ring shows the first that applies.
@@ -104,22 +98,22 @@ const HaltReason* reason_of(int events) {
   return nullptr;
 }
 
-void paint_goal(Canvas& canvas, Vec2 from_px, Vec2 to_px, AgentClass agent_class) {
+void paint_goal(Canvas& canvas, const Vector2d& from_px, const Vector2d& to_px, AgentClass agent_class) {
   constexpr double kDot_px = 2.5;
   cairo_t* context = canvas.context();
   canvas.set_color(agent_color(agent_class, BoxFace::back), 0.55);
   cairo_set_line_width(context, 1);
-  cairo_move_to(context, from_px.x, from_px.y);
-  cairo_line_to(context, to_px.x, to_px.y);
+  cairo_move_to(context, from_px.x(), from_px.y());
+  cairo_line_to(context, to_px.x(), to_px.y());
   cairo_stroke(context);
-  cairo_arc(context, to_px.x, to_px.y, kDot_px, 0, kTwoPi);
+  cairo_arc(context, to_px.x(), to_px.y(), kDot_px, 0, kTwoPi);
   cairo_fill(context);
 }
 
-void paint_halt(Canvas& canvas, const HaltReason& reason, Vec2 center_px, double length_px) {
+void paint_halt(Canvas& canvas, const HaltReason& reason, const Vector2d& center_px, double length_px) {
   cairo_t* context = canvas.context();
   cairo_new_sub_path(context);
-  cairo_arc(context, center_px.x, center_px.y, std::max(0.6 * length_px, 5.0), 0, kTwoPi);
+  cairo_arc(context, center_px.x(), center_px.y(), std::max(0.6 * length_px, 5.0), 0, kTwoPi);
   cairo_set_line_width(context, 2);
   canvas.set_color(reason.color);
   cairo_stroke(context);
@@ -173,9 +167,12 @@ struct WorldPainter::Impl {
     const auto found = tiles.find({column, row});
     if (found != tiles.end()) return found->second;
     Canvas canvas(kTile_px, kTile_px, kGroundColor);
-    const Vec2 left_top = left_top_of({column * kTile_px, row * kTile_px}, px_per_m);
+    const Vector2d left_top = left_top_of({column * kTile_px, row * kTile_px}, px_per_m);
     layers.paint(canvas, left_top, px_per_m);
-    for (const WallFace& wall : walls) paint_wall(canvas, wall, left_top, px_per_m);
+    {
+      GroundPen pen(canvas, left_top, px_per_m);
+      for (const WallFace& wall : walls) paint_wall(pen, wall);
+    }
     cairo_surface_flush(canvas.surface());
     return tiles.emplace(std::pair{column, row}, std::move(canvas)).first->second;
   }
@@ -234,8 +231,7 @@ TopCamera WorldPainter::around(Vec2 center_m, float width_m) const {
 
 Vec2 WorldPainter::pixel_of(const TopCamera& camera, Vec2 position_m) const {
   const Corner corner = corner_of(camera, impl_->width_px, impl_->height_px);
-  return {position_m.x * camera.px_per_m - static_cast<float>(corner.x),
-          -position_m.y * camera.px_per_m - static_cast<float>(corner.y)};
+  return rounded(to_pixels(left_top_of(corner, camera.px_per_m), camera.px_per_m) * in_plan(position_m));
 }
 
 RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
@@ -252,33 +248,35 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
   cairo_t* context = canvas.context();
   const Corner corner = corner_of(camera, impl_->width_px, impl_->height_px);
   impl_->paint_ground(canvas, corner, camera.px_per_m);
-  const Vec2 left_top = left_top_of(corner, camera.px_per_m);
+  const Vector2d left_top = left_top_of(corner, camera.px_per_m);
+  const Eigen::Affine2d map_to_pixels = to_pixels(left_top, camera.px_per_m);
+  const auto pixel_at = [&](auto position_m) -> Vector2d { return map_to_pixels * in_plan(position_m); };
   for (size_t i = 0; i < frame.lights.size(); ++i) {
     paint_light(canvas, impl_->map.lights[i], left_top, camera.px_per_m, lamp_color(frame.lights[i]));
   }
 
   for (const AgentGoal& goal : frame.goals) {
     const AgentBox& agent = frame.agents[static_cast<size_t>(goal.agent)];
-    paint_goal(canvas, pixel_of(camera, agent.center_m.xy()), pixel_of(camera, goal.position_m), agent.agent_class);
+    paint_goal(canvas, pixel_at(agent.center_m), pixel_at(goal.position_m), agent.agent_class);
   }
 
   const bool has_highlight = frame.highlighted >= 0 && static_cast<size_t>(frame.highlighted) < frame.agents.size();
   if (has_highlight) {
-    const Vec2 position = pixel_of(camera, frame.agents[static_cast<size_t>(frame.highlighted)].center_m.xy());
+    const Vector2d position = pixel_at(frame.agents[static_cast<size_t>(frame.highlighted)].center_m);
     const double dashes[] = {6, 5};
     cairo_set_dash(context, dashes, 2, 0);
     cairo_set_line_width(context, 2);
     canvas.set_color(kHaloColor, 0.9);
-    cairo_move_to(context, position.x, position.y);
+    cairo_move_to(context, position.x(), position.y());
     for (const Vec2 waypoint : frame.waypoints_m) {
-      const Vec2 p = pixel_of(camera, waypoint);
-      cairo_line_to(context, p.x, p.y);
+      const Vector2d p = pixel_at(waypoint);
+      cairo_line_to(context, p.x(), p.y());
     }
     cairo_stroke(context);
     cairo_set_dash(context, nullptr, 0, 0);
     for (size_t i = 0; i < frame.waypoints_m.size(); ++i) {
-      const Vec2 p = pixel_of(camera, frame.waypoints_m[i]);
-      cairo_arc(context, p.x, p.y, i == 0 ? 7 : 5, 0, kTwoPi);
+      const Vector2d p = pixel_at(frame.waypoints_m[i]);
+      cairo_arc(context, p.x(), p.y(), i == 0 ? 7 : 5, 0, kTwoPi);
       canvas.set_color(kHaloColor);
       cairo_fill_preserve(context);
       canvas.set_color(hex(0x14161A));
@@ -287,7 +285,7 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
     }
     const double radius =
         std::max(0.75 * frame.agents[static_cast<size_t>(frame.highlighted)].length_m * camera.px_per_m, 9.0);
-    cairo_arc(context, position.x, position.y, radius, 0, kTwoPi);
+    cairo_arc(context, position.x(), position.y(), radius, 0, kTwoPi);
     canvas.set_color(kHaloColor, 0.28);
     cairo_fill_preserve(context);
     canvas.set_color(kHaloColor);
@@ -298,7 +296,7 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
   for (size_t i = 0; i < frame.agents.size(); ++i) {
     const auto status = frame.status.empty() ? AgentStatus::active : static_cast<AgentStatus>(frame.status[i]);
     if (!frame.agents[i].drawn || status == AgentStatus::absent) continue;
-    const Vec2 position = pixel_of(camera, frame.agents[i].center_m.xy());
+    const Vector2d position = pixel_at(frame.agents[i].center_m);
     paint_agent(canvas, frame.agents[i], status, position, camera.px_per_m);
     const HaltReason* reason =
         status != AgentStatus::halted || frame.halt_reason.empty() ? nullptr : reason_of(frame.halt_reason[i]);

@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include <Eigen/Geometry>
+
 #include "pictura/bench/truth/tolerances.h"
 #include "pictura/common/raster/shapes.h"
 
@@ -13,61 +15,55 @@ namespace pictura {
 
 namespace {
 
-struct Point {
-  double x = 0, y = 0, z = 0;
-};
-Point operator+(Point a, Point b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-Point operator-(Point a, Point b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-Point operator*(Point a, double s) { return {a.x * s, a.y * s, a.z * s}; }
-double dot(Point a, Point b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Point cross(Point a, Point b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
-Point point(Vec3 v) { return {v.x, v.y, v.z}; }
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+Vector3d point(Vec3 v) { return {v.x, v.y, v.z}; }
 
 constexpr double kFar = std::numeric_limits<double>::infinity();
 
 // A parallelogram or disk in camera coordinates: a solid's face.
 struct Facet {
-  Point origin, u, v;  // corner and sides; of a disk, centre and two radii
+  Vector3d origin, u, v;  // corner and sides; of a disk, centre and two radii
   bool is_disk = false;
   Rgb color;
   int solid = 0;  // index into Tracer::solids
   // Depth of the hit along the ray (x, y, 1), or kFar.
-  double hit(Point ray) const {
-    const Point normal = cross(u, v);
-    const double along = dot(normal, ray);
+  double hit(const Vector3d& ray) const {
+    const Vector3d normal = u.cross(v);
+    const double along = normal.dot(ray);
     if (along == 0) return kFar;
-    const double depth = dot(normal, origin) / along;
+    const double depth = normal.dot(origin) / along;
     if (!(depth >= kNear_m)) return kFar;
-    const Point p = ray * depth - origin;
+    const Vector3d p = ray * depth - origin;
     // The sides of a wall on a slope are not at right angles.
-    const double area2 = dot(normal, normal);
-    const double at_u = dot(cross(p, v), normal) / area2, at_v = dot(cross(u, p), normal) / area2;
+    const double area2 = normal.squaredNorm();
+    const double at_u = p.cross(v).dot(normal) / area2, at_v = u.cross(p).dot(normal) / area2;
     if (is_disk) return at_u * at_u + at_v * at_v <= 1 ? depth : kFar;
     return at_u >= 0 && at_u <= 1 && at_v >= 0 && at_v <= 1 ? depth : kFar;
   }
-  Point center() const { return is_disk ? origin : origin + (u + v) * 0.5; }
-  double radius() const {
-    return is_disk ? std::sqrt(dot(u, u)) : 0.5 * std::sqrt(std::max(dot(u + v, u + v), dot(u - v, u - v)));
-  }
+  Vector3d center() const { return is_disk ? origin : Vector3d(origin + 0.5 * (u + v)); }
+  double radius() const { return is_disk ? u.norm() : 0.5 * std::max((u + v).norm(), (u - v).norm()); }
 };
 
 // The object of a facet: its footprint in the world, and its values in the planes.
 struct Solid {
-  std::vector<Point> footprint;  // corners
+  std::vector<Vector3d> footprint;  // corners
   uint8_t class_id = 0;
   uint16_t instance_id = 0;
-  Point middle() const {
-    Point sum;
-    for (Point corner : footprint) sum = sum + corner;
-    return sum * (1.0 / static_cast<double>(footprint.size()));
+  Vector3d middle() const {
+    Vector3d sum = Vector3d::Zero();
+    for (const Vector3d& corner : footprint) sum += corner;
+    return sum / static_cast<double>(footprint.size());
   }
 };
 
 // A strip as drawn: the cone of directions through its sides and ends, and the strip's plane.
 struct PaintedStrip {
-  Point edge_normal[4];       // inwards; 0 where it is not bounded
-  bool crosses_near = false;  // the near plane: where it is drawn, each ray decides
-  Point plane;                // unit normal
+  // Inwards; 0 where it is not bounded.
+  Vector3d edge_normal[4] = {Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero()};
+  bool crosses_near = false;          // the near plane: where it is drawn, each ray decides
+  Vector3d plane = Vector3d::Zero();  // unit normal
   double offset = 0;
   double nearest_m = 0, farthest_m = 0;  // depths of its corners
   uint32_t rank = 0;
@@ -78,22 +74,22 @@ struct PaintedStrip {
   bool carries_solid_of(const Facet& facet) const {
     return std::find(carries.begin(), carries.end(), facet.solid) != carries.end();
   }
-  bool covers(Point ray) const {
-    for (const Point& normal : edge_normal) {
-      if (dot(normal, ray) < 0) return false;
+  bool covers(const Vector3d& ray) const {
+    for (const Vector3d& normal : edge_normal) {
+      if (normal.dot(ray) < 0) return false;
     }
     if (!crosses_near) return true;
     // Beyond the horizon, where only widening reaches, the plane is behind the eye.
-    const double of_plane = offset / dot(plane, ray);
+    const double of_plane = offset / plane.dot(ray);
     return of_plane >= kNear_m || of_plane <= 0;
   }
   // Depth of its plane, within half and twice the depths of its corners; the largest beyond the horizon.
-  double depth(Point ray) const {
-    const double of_plane = offset / dot(plane, ray);
+  double depth(const Vector3d& ray) const {
+    const double of_plane = offset / plane.dot(ray);
     const double highest = farthest_m * kWidenedDepth;
     return of_plane > 0 ? std::clamp(of_plane, nearest_m / kWidenedDepth, highest) : highest;
   }
-  double height_of(Point p) const { return dot(plane, p) - offset; }
+  double height_of(const Vector3d& p) const { return plane.dot(p) - offset; }
 };
 
 struct Tracer {
@@ -104,26 +100,27 @@ struct Tracer {
 
 // The rays through a rectangle of the image.
 struct Cone {
-  Point corner[4], middle;
+  Vector3d corner[4], middle;
   double middle2 = 0, spread = 0;
   template <typename RayAt>
   Cone(RayAt&& ray_at, double x_low, double y_low, double x_high, double y_high)
       : corner{ray_at(x_low, y_low), ray_at(x_high, y_low), ray_at(x_low, y_high), ray_at(x_high, y_high)},
         middle(ray_at(0.5 * (x_low + x_high), 0.5 * (y_low + y_high))),
-        middle2(dot(middle, middle)),
-        spread(std::sqrt(dot(corner[3] - corner[0], corner[3] - corner[0]))) {}
+        middle2(middle.squaredNorm()),
+        spread((corner[3] - corner[0]).norm()) {}
   // Whether the ball around the facet touches the cone.
   bool may_intersect(const Facet& facet) const {
-    const Point center = facet.center();
-    const double along = dot(center, middle) / middle2;
-    const Point off = center - middle * along;
+    const Vector3d center = facet.center();
+    const double along = center.dot(middle) / middle2;
+    const Vector3d off = center - middle * along;
     const double reach = facet.radius() + spread * (std::abs(along) + facet.radius());
-    return dot(off, off) <= reach * reach;
+    return off.squaredNorm() <= reach * reach;
   }
   // Whether no edge of the strip has all of the cone on its outer side.
   bool may_intersect(const PaintedStrip& strip) const {
-    return std::none_of(std::begin(strip.edge_normal), std::end(strip.edge_normal), [&](Point normal) {
-      return std::all_of(std::begin(corner), std::end(corner), [&](Point ray) { return dot(normal, ray) < 0; });
+    return std::none_of(std::begin(strip.edge_normal), std::end(strip.edge_normal), [&](const Vector3d& normal) {
+      return std::all_of(std::begin(corner), std::end(corner),
+                         [&](const Vector3d& ray) { return normal.dot(ray) < 0; });
     });
   }
 };
@@ -132,38 +129,40 @@ class Eye {
  public:
   Eye(const Camera& camera, const View& view) {
     const double yaw = camera.yaw_rad, pitch = camera.pitch_rad, roll = camera.roll_rad;
-    const Point ahead{std::cos(yaw) * std::cos(pitch), std::sin(yaw) * std::cos(pitch), std::sin(pitch)};
-    const Point level_right{std::sin(yaw), -std::cos(yaw), 0};
-    const Point level_down = cross(ahead, level_right);
+    const Vector3d ahead{std::cos(yaw) * std::cos(pitch), std::sin(yaw) * std::cos(pitch), std::sin(pitch)};
+    const Vector3d level_right{std::sin(yaw), -std::cos(yaw), 0};
+    const Vector3d level_down = ahead.cross(level_right);
     const double shrink = std::min(1.0, view.body_length_m / 4.5);
-    auto turned = [&](Point p) {
-      return Point{p.x * view.cos_heading - p.y * view.sin_heading, p.x * view.sin_heading + p.y * view.cos_heading,
-                   p.z};
-    };
-    right_ = turned(level_right * std::cos(roll) + level_down * std::sin(roll));
-    down_ = turned(level_down * std::cos(roll) - level_right * std::sin(roll));
-    forward_ = turned(ahead);
-    position_ = point(view.origin_m) + turned({camera.position_m.x * shrink, camera.position_m.y, camera.position_m.z});
+    Matrix3d of_body, axes;
+    of_body << view.cos_heading, -view.sin_heading, 0, view.sin_heading, view.cos_heading, 0, 0, 0, 1;
+    axes << level_right * std::cos(roll) + level_down * std::sin(roll),
+        level_down * std::cos(roll) - level_right * std::sin(roll), ahead;
+    to_camera_ = (of_body * axes).transpose();
+    position_ = point(view.origin_m) +
+                of_body * Vector3d{camera.position_m.x * shrink, camera.position_m.y, camera.position_m.z};
   }
-  Point position() const { return position_; }
-  Point direction(Point d) const { return {dot(right_, d), dot(down_, d), dot(forward_, d)}; }
-  Point operator()(Point world) const { return direction(world - position_); }
+  const Vector3d& position() const { return position_; }
+  Vector3d direction(const Vector3d& d) const { return to_camera_ * d; }
+  Vector3d operator()(const Vector3d& world) const { return direction(world - position_); }
 
  private:
-  Point right_, down_, forward_, position_;
+  Matrix3d to_camera_;  // rows right, down, forward
+  Vector3d position_;
 };
 
 // Brightness by the shared rule, from double-precision corners.
-double brightness(const Point* corners, int count) {
+double brightness(const Vector3d* corners, int count) {
   Vec3 shared[4];
   for (int i = 0; i < count; ++i) {
-    shared[i] = {static_cast<float>(corners[i].x), static_cast<float>(corners[i].y), static_cast<float>(corners[i].z)};
+    const Eigen::Vector3f rounded = corners[i].cast<float>();
+    shared[i] = {rounded.x(), rounded.y(), rounded.z()};
   }
   return face_brightness(shared, count);
 }
 
-void add_rectangle(Tracer* tracer, const Eye& eye, Point origin, Point u, Point v, Rgb color) {
-  const Point corners[4] = {eye(origin), eye(origin + u), eye(origin + u + v), eye(origin + v)};
+void add_rectangle(Tracer* tracer, const Eye& eye, const Vector3d& origin, const Vector3d& u, const Vector3d& v,
+                   Rgb color) {
+  const Vector3d corners[4] = {eye(origin), eye(origin + u), eye(origin + u + v), eye(origin + v)};
   const double fade = brightness(corners, 4);
   if (fade <= 0) return;
   tracer->facets.push_back({corners[0], corners[1] - corners[0], corners[3] - corners[0], false,
@@ -171,48 +170,48 @@ void add_rectangle(Tracer* tracer, const Eye& eye, Point origin, Point u, Point 
 }
 
 void add_agent(Tracer* tracer, const Eye& eye, const AgentBox& box, uint16_t instance_id) {
-  const Point ahead{box.cos_heading, box.sin_heading, 0}, left{-box.sin_heading, box.cos_heading, 0};
-  const Point length = ahead * box.length_m, width = left * box.width_m, height{0, 0, box.height_m};
-  const Point rear_right = point(box.center_m) - length * 0.5 - width * 0.5;
+  const Vector3d ahead{box.cos_heading, box.sin_heading, 0}, left{-box.sin_heading, box.cos_heading, 0};
+  const Vector3d length = ahead * box.length_m, width = left * box.width_m, height{0, 0, box.height_m};
+  const Vector3d rear_right = point(box.center_m) - length * 0.5 - width * 0.5;
   tracer->solids.push_back({{rear_right, rear_right + length, rear_right + length + width, rear_right + width},
                             static_cast<uint8_t>(1 + static_cast<int>(box.agent_class)),
                             instance_id});
-  const Point to_eye = eye.position() - point(box.center_m);
+  const Vector3d to_eye = eye.position() - point(box.center_m);
   auto color = [&](BoxFace face) { return agent_color(box.agent_class, face); };
-  if (dot(to_eye, ahead) > 0.5 * box.length_m) {
+  if (to_eye.dot(ahead) > 0.5 * box.length_m) {
     add_rectangle(tracer, eye, rear_right + length, width, height, color(BoxFace::front));
   }
-  if (dot(to_eye, ahead) < -0.5 * box.length_m) {
+  if (to_eye.dot(ahead) < -0.5 * box.length_m) {
     add_rectangle(tracer, eye, rear_right, width, height, color(BoxFace::back));
   }
-  if (dot(to_eye, left) > 0.5 * box.width_m) {
+  if (to_eye.dot(left) > 0.5 * box.width_m) {
     add_rectangle(tracer, eye, rear_right + width, length, height, color(BoxFace::left));
   }
-  if (dot(to_eye, left) < -0.5 * box.width_m) {
+  if (to_eye.dot(left) < -0.5 * box.width_m) {
     add_rectangle(tracer, eye, rear_right, length, height, color(BoxFace::right));
   }
-  if (to_eye.z > box.height_m) add_rectangle(tracer, eye, rear_right + height, length, width, color(BoxFace::top));
-  if (to_eye.z < 0) add_rectangle(tracer, eye, rear_right, length, width, color(BoxFace::top));
+  if (to_eye.z() > box.height_m) add_rectangle(tracer, eye, rear_right + height, length, width, color(BoxFace::top));
+  if (to_eye.z() < 0) add_rectangle(tracer, eye, rear_right, length, width, color(BoxFace::top));
 }
 
 void add_wall(Tracer* tracer, const Eye& eye, const WallFace& wall) {
-  const Point a = point(wall.a_m), b = point(wall.b_m);
+  const Vector3d a = point(wall.a_m), b = point(wall.b_m);
   tracer->solids.push_back({{a, b}, static_cast<uint8_t>(SurfaceClass::wall), 0});
   add_rectangle(tracer, eye, a, b - a, {0, 0, wall.height_m}, wall.color);
 }
 
 void add_light(Tracer* tracer, const Eye& eye, const LightHead& head, LightState state) {
   if (state == LightState::off) return;
-  const Point center = point(head.position_m), facing{head.facing.x, head.facing.y, 0};
-  Point to_eye = eye.position() - center;
-  to_eye.z = 0;
-  if (dot(to_eye, facing) <= 0 || dot(to_eye, facing) < head.cos_half_angle * std::sqrt(dot(to_eye, to_eye))) return;
-  const Point left{-head.facing.y, head.facing.x, 0};
-  const Point at = eye(center);
+  const Vector3d center = point(head.position_m), facing{head.facing.x, head.facing.y, 0};
+  Vector3d to_eye = eye.position() - center;
+  to_eye.z() = 0;
+  if (to_eye.dot(facing) <= 0 || to_eye.dot(facing) < head.cos_half_angle * to_eye.norm()) return;
+  const Vector3d left{-head.facing.y, head.facing.x, 0};
+  const Vector3d at = eye(center);
   const double fade = brightness(&at, 1);
   if (fade <= 0) return;
-  tracer->solids.push_back({{center - left * kLightRadius_m - Point{0, 0, kLightRadius_m},
-                             center + left * kLightRadius_m - Point{0, 0, kLightRadius_m}},
+  tracer->solids.push_back({{center - left * kLightRadius_m - Vector3d{0, 0, kLightRadius_m},
+                             center + left * kLightRadius_m - Vector3d{0, 0, kLightRadius_m}},
                             static_cast<uint8_t>(SurfaceClass::light),
                             0});
   tracer->facets.push_back({at, eye.direction(left * kLightRadius_m), eye.direction({0, 0, kLightRadius_m}), true,
@@ -222,32 +221,32 @@ void add_light(Tracer* tracer, const Eye& eye, const LightHead& head, LightState
 
 // Whether two convex outlines overlap on the ground: to part them along the normal of any side, one would have to move
 // by more than a millimetre.
-bool overlap_on_ground(const std::vector<Point>& a, const std::vector<Point>& b) {
-  auto separates = [&](Point normal) {
+bool overlap_on_ground(const std::vector<Vector3d>& a, const std::vector<Vector3d>& b) {
+  auto separates = [&](const Vector3d& normal) {
     double low_a = kFar, high_a = -kFar, low_b = kFar, high_b = -kFar;
-    for (Point p : a) low_a = std::min(low_a, dot(normal, p)), high_a = std::max(high_a, dot(normal, p));
-    for (Point p : b) low_b = std::min(low_b, dot(normal, p)), high_b = std::max(high_b, dot(normal, p));
+    for (const Vector3d& p : a) low_a = std::min(low_a, normal.dot(p)), high_a = std::max(high_a, normal.dot(p));
+    for (const Vector3d& p : b) low_b = std::min(low_b, normal.dot(p)), high_b = std::max(high_b, normal.dot(p));
     return std::min(high_a - low_b, high_b - low_a) <= 1e-3;
   };
-  for (const std::vector<Point>* outline : {&a, &b}) {
+  for (const std::vector<Vector3d>* outline : {&a, &b}) {
     for (std::size_t i = 0; i < outline->size(); ++i) {
-      const Point side = (*outline)[(i + 1) % outline->size()] - (*outline)[i];
-      const double length = std::hypot(side.x, side.y);
-      if (length > 1e-6 && separates({-side.y / length, side.x / length, 0})) return false;
+      const Vector3d side = (*outline)[(i + 1) % outline->size()] - (*outline)[i];
+      const double length = side.head<2>().norm();
+      if (length > 1e-6 && separates({-side.y() / length, side.x() / length, 0})) return false;
     }
   }
   return true;
 }
 
 // Height of a point above the plane of an outline, along z.
-double height_above(const std::vector<Point>& outline, Point p) {
-  const Point normal = cross(outline[2] - outline[0], outline[3] - outline[1]);
-  return dot(normal, p - outline[0]) / normal.z;
+double height_above(const std::vector<Vector3d>& outline, const Vector3d& p) {
+  const Vector3d normal = (outline[2] - outline[0]).cross(outline[3] - outline[1]);
+  return normal.dot(p - outline[0]) / normal.z();
 }
 
 // Solids whose footprint overlaps the strip and whose footprint's centre is at most kStanding_m above or below the
 // strip's plane.
-std::vector<int> solids_on(const Tracer& tracer, const std::vector<Point>& outline) {
+std::vector<int> solids_on(const Tracer& tracer, const std::vector<Vector3d>& outline) {
   std::vector<int> standing;
   for (std::size_t i = 0; i < tracer.solids.size(); ++i) {
     const double height_m = height_above(outline, tracer.solids[i].middle());
@@ -259,25 +258,27 @@ std::vector<int> solids_on(const Tracer& tracer, const std::vector<Point>& outli
 }
 
 // Where the side of a strip between two corners, one of them before the near plane, crosses that.
-Point at_near_plane(Point a, Point b) { return a + (b - a) * ((kNear_m - a.z) / (b.z - a.z)); }
+Vector3d at_near_plane(const Vector3d& a, const Vector3d& b) {
+  return a + (b - a) * ((kNear_m - a.z()) / (b.z() - a.z()));
+}
 
 // Moves the corners of a strip apart until its width on screen, across its centre line, is floor_px at each end that is
 // in front of the near plane. Depths do not change. Corners: left and right of one end, right and left of the other.
-void widen(const Camera& camera, double floor_px, Point* corners) {
+void widen(const Camera& camera, double floor_px, Vector3d* corners) {
   // The normal of the plane through the eye and the centre line, which is a line on screen with this normal.
-  const Point through_eye = cross(corners[0] + corners[1], corners[2] + corners[3]);
-  const double normal_x = through_eye.x / camera.focal_x_px, normal_y = through_eye.y / camera.focal_y_px;
-  const double size = std::hypot(normal_x, normal_y);
-  if (size == 0) return;
-  const double across_x = normal_x / size, across_y = normal_y / size;
+  const Vector3d through_eye = (corners[0] + corners[1]).cross(corners[2] + corners[3]);
+  const Eigen::Array2d focal_px{camera.focal_x_px, camera.focal_y_px};
+  Eigen::Vector2d across = through_eye.head<2>().array() / focal_px;
+  if (across.isZero(0)) return;
+  across.normalize();
   for (const auto& [left, right] : {std::pair{&corners[0], &corners[1]}, std::pair{&corners[3], &corners[2]}}) {
-    if (left->z < kNear_m || right->z < kNear_m) continue;
-    const double width_px = across_x * camera.focal_x_px * (left->x / left->z - right->x / right->z) +
-                            across_y * camera.focal_y_px * (left->y / left->z - right->y / right->z);
+    if (left->z() < kNear_m || right->z() < kNear_m) continue;
+    const Eigen::Array2d apart_px = focal_px * (left->hnormalized() - right->hnormalized()).array();
+    const double width_px = across.dot(apart_px.matrix());
     const double push_px = std::copysign(0.5 * std::max(0.0, floor_px - std::abs(width_px)), width_px);
-    const Point push{push_px * across_x / camera.focal_x_px, push_px * across_y / camera.focal_y_px, 0};
-    *left = *left + push * left->z;
-    *right = *right - push * right->z;
+    const Eigen::Vector2d push = push_px * across.array() / focal_px;
+    left->head<2>() += push * left->z();
+    right->head<2>() -= push * right->z();
   }
 }
 
@@ -285,41 +286,41 @@ void add_strip(Tracer* tracer, const Eye& eye, const Camera& camera, const Cone&
                const Strip& strip, uint32_t index) {
   Vec3 world[4];
   strip_corners(strip, world);
-  Point corners[4];
+  Vector3d corners[4];
   for (int i = 0; i < 4; ++i) corners[i] = eye(point(world[i]));
   const double fade = brightness(corners, 4);
   if (fade <= 0) return;
   PaintedStrip painted;
-  painted.plane = cross(corners[2] - corners[0], corners[3] - corners[1]);
-  painted.plane = painted.plane * (1 / std::max(1e-30, std::sqrt(dot(painted.plane, painted.plane))));
-  painted.offset = dot(painted.plane, corners[0]);
+  painted.plane = (corners[2] - corners[0]).cross(corners[3] - corners[1]);
+  painted.plane /= std::max(1e-30, painted.plane.norm());
+  painted.offset = painted.plane.dot(corners[0]);
   painted.class_id = static_cast<uint8_t>(kClassOfStrip + static_cast<int>(strip.kind));
   painted.rank = static_cast<uint32_t>(strip_rank(strip.kind)) << 28 | index;
   painted.color = strip.color * static_cast<float>(fade);
-  Point widened[4];
+  Vector3d widened[4];
   std::copy(corners, corners + 4, widened);
   widen(camera, floor_px, widened);
-  auto by_depth = [](Point a, Point b) { return a.z < b.z; };
+  auto by_depth = [](const Vector3d& a, const Vector3d& b) { return a.z() < b.z(); };
   const auto [nearest, farthest] = std::minmax_element(corners, corners + 4, by_depth);
-  if (farthest->z < kNear_m) return;
-  painted.crosses_near = nearest->z < kNear_m;
-  painted.nearest_m = std::max(nearest->z, double{kNear_m});
-  painted.farthest_m = farthest->z;
+  if (farthest->z() < kNear_m) return;
+  painted.crosses_near = nearest->z() < kNear_m;
+  painted.nearest_m = std::max(nearest->z(), double{kNear_m});
+  painted.farthest_m = farthest->z();
   // A strip that the eye sees edge on faces it with the sides that widening gives it.
-  const Point* const facing = painted.crosses_near ? corners : widened;
-  const double side = dot(cross(facing[2] - facing[0], facing[3] - facing[1]), facing[0]) > 0 ? 1 : -1;
+  const Vector3d* const facing = painted.crosses_near ? corners : widened;
+  const double side = (facing[2] - facing[0]).cross(facing[3] - facing[1]).dot(facing[0]) > 0 ? 1 : -1;
   for (int i = 0; i < 4; ++i) {
     const int next = (i + 1) % 4;
-    Point from = widened[i], to = widened[next];
+    Vector3d from = widened[i], to = widened[next];
     // A side that crosses the near plane leads from there to the widened end; one that is before it bounds nothing.
-    if (from.z < kNear_m && to.z < kNear_m) continue;
-    if (from.z < kNear_m || to.z < kNear_m) {
-      (from.z < kNear_m ? from : to) = at_near_plane(corners[i], corners[next]);
+    if (from.z() < kNear_m && to.z() < kNear_m) continue;
+    if (from.z() < kNear_m || to.z() < kNear_m) {
+      (from.z() < kNear_m ? from : to) = at_near_plane(corners[i], corners[next]);
     }
-    painted.edge_normal[i] = cross(from, to) * side;
+    painted.edge_normal[i] = side * from.cross(to);
   }
   if (!image.may_intersect(painted)) return;
-  std::vector<Point> outline;
+  std::vector<Vector3d> outline;
   for (const Vec3& corner : world) outline.push_back(point(corner));
   painted.from_below = height_above(outline, eye.position()) < 0;
   painted.carries = solids_on(*tracer, outline);
@@ -361,7 +362,7 @@ struct Surface {
 bool are_equal(double depth, double other) { return std::abs(depth - other) < kEqualDepth * std::min(depth, other); }
 
 // The nearest solid; of equally near ones the first.
-Surface first_solid(const Candidates& candidates, Point ray) {
+Surface first_solid(const Candidates& candidates, const Vector3d& ray) {
   Surface front;
   bool is_tie = false;
   for (const Facet* facet : candidates.facets) {
@@ -383,7 +384,7 @@ Surface first_solid(const Candidates& candidates, Point ray) {
 
 // The nearest surface: the solid or strip of least depth, but of strips whose planes are within kSameLevel_m of each
 // other there the one of lowest rank, and a strip is behind the solids on it seen from above, before them from below.
-Surface first_hit(const Candidates& candidates, Point ray) {
+Surface first_hit(const Candidates& candidates, const Vector3d& ray) {
   Surface front = first_solid(candidates, ray);
   struct Candidate {
     const PaintedStrip* strip;
@@ -401,7 +402,7 @@ Surface first_hit(const Candidates& candidates, Point ray) {
   if (!nearest) return front;
   const PaintedStrip* painted = nearest->strip;
   double painted_depth = nearest->depth;
-  const Point there = ray * nearest->depth;
+  const Vector3d there = ray * nearest->depth;
   for (const auto& [strip, depth] : strips) {
     const double gap_m = std::abs(strip->height_of(there) - nearest->strip->height_of(there));
     if (gap_m < kSameLevel_m && strip->rank < painted->rank) painted = strip, painted_depth = depth;
@@ -459,7 +460,7 @@ class ImageSampler {
     }
   }
 
-  Point ray_at(double x, double y) const {
+  Vector3d ray_at(double x, double y) const {
     return {(x - camera_.center_x_px) / camera_.focal_x_px, (y - camera_.center_y_px) / camera_.focal_y_px, 1};
   }
   const Tracer& tracer() const { return tracer_; }
@@ -540,7 +541,7 @@ TruthVisibility trace_visibility(const StaticGeometry& geometry, const SceneBatc
       std::copy_if(in_pixel.facets.begin(), in_pixel.facets.end(), std::back_inserter(wanted.facets), is_wanted);
       if (wanted.facets.empty()) return;
       for (const auto& [dx, dy] : offsets) {
-        const Point ray = sampler.ray_at(x + dx, y + dy);
+        const Vector3d ray = sampler.ray_at(x + dx, y + dy);
         if (!first_hit(wanted, ray).facet) continue;
         const Surface front = first_hit(in_pixel, ray);
         alone += 1;

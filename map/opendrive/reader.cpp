@@ -1,6 +1,6 @@
 #include "pictura/map/opendrive/reader.h"
 
-#include <cmath>
+#include <Eigen/Geometry>
 
 #include "pictura/map/opendrive/document.h"
 #include "pictura/map/opendrive/extent.h"
@@ -27,11 +27,11 @@ Offset read_header(const Element& header, std::string* geo_reference_out) {
 }
 
 void apply(const Offset& offset, FileRoad* road) {
-  const double c = std::cos(offset.heading), s = std::sin(offset.heading);
+  const Eigen::Isometry2d moved = Eigen::Translation2d(offset.x, offset.y) * Eigen::Rotation2Dd(offset.heading);
   for (GeometryPiece& piece : road->geometry) {
-    const double x = piece.x, y = piece.y;
-    piece.x = offset.x + x * c - y * s;
-    piece.y = offset.y + x * s + y * c;
+    const Eigen::Vector2d begin = moved * Eigen::Vector2d{piece.x, piece.y};
+    piece.x = begin.x();
+    piece.y = begin.y();
     piece.heading += offset.heading;
   }
   if (offset.z == 0) return;

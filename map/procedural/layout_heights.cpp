@@ -19,19 +19,18 @@ void Layout::set_heights() {
   // The sum of three waves, between 0 and hills_m.
   constexpr int kWaves = 3;
   struct Wave {
-    double x = 0, y = 0, phase = 0;
+    Eigen::Vector2d number{0, 0};  // radians a metre along both axes
+    double phase = 0;
   } waves[kWaves];
   for (int i = 0; i < kWaves; ++i) {
     RandomStream stream = draw(kHills, i);
     const double direction = static_cast<double>(stream.uniform()) * 2 * kPi_rad;
     const double wavenumber = 2 * kPi_rad / static_cast<double>(stream.uniform(200, 600));
-    waves[i] = {wavenumber * std::cos(direction), wavenumber * std::sin(direction),
-                static_cast<double>(stream.uniform()) * 2 * kPi_rad};
+    waves[i] = {wavenumber * direction_of(direction), static_cast<double>(stream.uniform()) * 2 * kPi_rad};
   }
   for (Node& node : nodes_) {
     double sum = 0;
-    for (const Wave& wave : waves)
-      sum += std::sin(wave.x * node.position_m.x() + wave.y * node.position_m.y() + wave.phase);
+    for (const Wave& wave : waves) sum += std::sin(wave.number.dot(node.position_m) + wave.phase);
     node.z = node.upper_z = options_.hills_m * 0.5 * (1 + sum / kWaves);
   }
   // Relaxation: repeatedly moves the ends of every street that is too steep towards each other, and the streets of

@@ -50,6 +50,46 @@ TEST(Camera, AxesFollowYawAndPitch) {
   EXPECT_NEAR(dot(axes.right, axes.down), 0, 1e-6);
 }
 
+/// Axes by vectors instead of rotations.
+void expect_axes(const Camera& camera) {
+  const double yaw = camera.yaw_rad, pitch = camera.pitch_rad, roll = camera.roll_rad;
+  const double forward[3] = {std::cos(yaw) * std::cos(pitch), std::sin(yaw) * std::cos(pitch), std::sin(pitch)};
+  const double level_right[3] = {std::sin(yaw), -std::cos(yaw), 0};
+  const double level_down[3] = {std::cos(yaw) * std::sin(pitch), std::sin(yaw) * std::sin(pitch), -std::cos(pitch)};
+  const CameraAxes axes = camera_axes(camera);
+  const float actual[3][3] = {{axes.right.x, axes.right.y, axes.right.z},
+                              {axes.down.x, axes.down.y, axes.down.z},
+                              {axes.forward.x, axes.forward.y, axes.forward.z}};
+  for (int i = 0; i < 3; ++i) {
+    constexpr double kRounding = 3e-8;  // half a unit in the last place below 1
+    EXPECT_NEAR(actual[0][i], level_right[i] * std::cos(roll) + level_down[i] * std::sin(roll), kRounding);
+    EXPECT_NEAR(actual[1][i], level_down[i] * std::cos(roll) - level_right[i] * std::sin(roll), kRounding);
+    EXPECT_NEAR(actual[2][i], forward[i], kRounding);
+  }
+}
+
+TEST(Camera, AxesAreRoundedOnce) {
+  for (int i = 0; i < 1000; ++i) {
+    Camera camera;
+    camera.yaw_rad = radians_of(0.71 * i - 355);
+    camera.pitch_rad = radians_of(0.17 * i - 85);
+    camera.roll_rad = radians_of(0.37 * i - 185);
+    expect_axes(camera);
+  }
+}
+
+TEST(Camera, LevelCamerasAreLevelToTheBit) {
+  for (int degrees = -360; degrees <= 360; ++degrees) {
+    Camera camera;
+    camera.yaw_rad = radians_of(degrees);
+    const CameraAxes axes = camera_axes(camera);
+    EXPECT_EQ(axes.right.z, 0) << degrees;
+    EXPECT_EQ(axes.forward.z, 0) << degrees;
+    EXPECT_EQ(axes.down.z, -1) << degrees;
+    EXPECT_EQ(length(axes.down.xy()), 0) << degrees;
+  }
+}
+
 TEST(Rig, ARigFileIsRead) {
   const Rig rig =
       load_rig(written("[[camera]]\nname = \"wide\"\nwidth_px = 64\nheight_px = 32\nfocal_px = 30\nx_m = 1.5\n"

@@ -40,7 +40,7 @@ STAYS_IN = [
     (re.compile(r"^(GL|EGL|GLES\d?)/"), re.compile(r"^(backend_gl|tests/backend_gl)/")),
     (re.compile(r"^(cuda|nvrtc|cub/|nccl)"), re.compile(r"^((tests/)?backend_cuda|common/cuda|backend_gl/cuda|bench)/")),
     (re.compile(r"^pybind11/"), re.compile(r"^bindings/")),
-    (re.compile(r"^(Eigen|unsupported)/"), re.compile(r"^(tests/)?map/")),
+    (re.compile(r"^(Eigen|unsupported)/"), re.compile(r"^((tests/)?map|drawing|bench/truth)/|^common/.*\.cpp$")),
     (re.compile(r"^pugixml"), re.compile(r"^(tests/)?map/")),
     (re.compile(r"^cairo"), re.compile(r"^(tests/)?drawing/")),
     (re.compile(r"^CLI/"), re.compile(r"^(apps|cli|bench/commands)/")),
@@ -118,6 +118,8 @@ def self_test() -> None:
         "map/c.cpp": '#include "road_map.h"\n',
         "map/polyline.h": "#include <Eigen/Core>\n",
         "simulator/l.h": "#include <Eigen/Core>\n",
+        "common/o.h": "#include <Eigen/Core>\n",
+        "common/p.cpp": "#include <Eigen/Core>\n",
         "simulator/m.h": "/// Throws UsageError.\nvoid f();\n",
         "map/n.h": '#include "pictura/common/error.h"\n/// Throws Error.\nvoid f();\n',
         "map/d.cpp": "#ifdef __CUDACC__\n#endif\n",
@@ -132,7 +134,7 @@ def self_test() -> None:
         "tests/k.cpp": '#include "pictura/bench/render.h"\n',
     }
     expected = {"common/a.h", "backend_cpu/renderer/renderer.cpp", "backend_cpu/elsewhere.cpp", "simulator/b.cpp",
-                "simulator/h.cpp", "simulator/l.h", "simulator/m.h", "map/c.cpp", "map/d.cpp", "backend_gl/f.cpp", "common/g.h", "apps/i.cpp", "bench/j.cpp"}
+                "simulator/h.cpp", "simulator/l.h", "common/o.h", "simulator/m.h", "map/c.cpp", "map/d.cpp", "backend_gl/f.cpp", "common/g.h", "apps/i.cpp", "bench/j.cpp"}
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)
         for name, text in cases.items():
