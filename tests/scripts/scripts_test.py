@@ -162,6 +162,30 @@ class Runs(unittest.TestCase):
     def test_the_demo_begins_anew(self):
         self.assertIn("--overwrite", self.asked("demo"))
 
+    def test_the_demo_says_how_far_seeds_spread(self):
+        def demo(*arguments):
+            environment = {**os.environ, "PICTURA_VENV": "venv", "PATH": f"{self.root}/venv/bin:/usr/bin:/bin"}
+            return subprocess.run([self.root / "scripts/demo", *arguments], env=environment, capture_output=True, text=True,
+                                  timeout=60)  # fmt: skip
+
+        # Each run's return is its seed, kept in its folder; every other metric is 2.
+        self.write_program("build/cpu/apps/pictura", """
+            if [ "$1" = train ]; then
+              mkdir -p "$7"; echo "${5#run.seed=}" >"$7/seed"
+            else
+              rate='"at_fault_collision_rate": 2, "off_road_rate": 2, "red_light_rate": 2, "km_driven": 2'
+              echo "{\\"rows\\": [{\\"return_per_vehicle\\": $(cat "$(dirname "$2")/seed"), \\"goals_per_vehicle\\": 2," \\
+                "\\"waypoints_per_vehicle\\": 2, $rate}]}"
+            fi""")  # fmt: skip
+        os.symlink(sys.executable, self.root / "venv/bin/python")
+        result = demo("--seeds", "3", "out/spread")
+        self.assertEqual((result.returncode, result.stderr), (0, ""), result.stdout)
+        trained = next(line for line in result.stdout.splitlines() if line.startswith("trained, argmax"))
+        self.assertEqual(trained.split()[2:8], ["2.00", "+-", "1.00", "2.00", "+-", "0.00"])
+        for bad in ("1", "0", "x", "100"):
+            result = demo("--seeds", bad)
+            self.assertEqual((result.returncode, result.stderr), (2, f"demo: --seeds: expected 2 to 99, got '{bad}'\n"))
+
     def test_training_goes_on_exactly_where_there_is_a_checkpoint(self):
         train = ("gpu_train", "run", "--minutes", "8")
         self.assertEqual(self.asked(*train), ["train", "--out", "runs/run", "--minutes", "8", "--json"])
