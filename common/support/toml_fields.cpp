@@ -1,11 +1,13 @@
 #include "pictura/common/support/toml_fields.h"
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include <fmt/ranges.h>
 
 #include "pictura/common/error.h"
+#include "pictura/common/support/suggestion.h"
 
 namespace pictura {
 
@@ -15,6 +17,26 @@ toml::table parse_toml(const std::string& text, const std::string& source) {
   } catch (const toml::parse_error& error) {
     fail("{}:{}: {}", source, error.source().begin.line, error.description());
   }
+}
+
+std::optional<int64_t> whole_number(const toml::node& node) {
+  if (node.is_integer()) return node.as_integer()->get();
+  if (!node.is_floating_point()) return std::nullopt;
+  const double number = node.as_floating_point()->get();
+  constexpr double kExact = 9007199254740992;  // beyond, a double stands for several
+  if (!(std::abs(number) <= kExact) || number != std::floor(number)) return std::nullopt;
+  return static_cast<int64_t>(number);
+}
+
+std::string shown(const toml::node& node) {
+  std::ostringstream value;
+  node.visit([&](const auto& its) { value << its; });
+  // Tables have many lines.
+  std::string text = node.is_table() ? "a table" : value.str();
+  constexpr std::size_t kMostShown = 60;
+  if (text.size() > kMostShown) text = text.substr(0, kMostShown) + "...";
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
 }
 
 TomlFields::TomlFields(const toml::table& table, std::string source, std::string name)
@@ -38,15 +60,8 @@ void TomlFields::refuse(std::string_view key, std::string_view message) const {
 }
 
 void TomlFields::refuse(std::string_view key, const toml::node& node, std::string_view expected) const {
-  std::ostringstream value;
-  node.visit([&](const auto& its) { value << its; });
-  // Tables have many lines.
-  std::string got = node.is_table() ? "a table" : value.str();
-  constexpr std::size_t kMostShown = 60;
-  if (got.size() > kMostShown) got = got.substr(0, kMostShown) + "...";
-  std::replace(got.begin(), got.end(), '\n', ' ');
   fail("{}:{}: {}{}{}: expected {}, got {}", source_, node.source().begin.line, name_, name_.empty() ? "" : ": ", key,
-       expected, got);
+       expected, shown(node));
 }
 
 float TomlFields::number_of(std::string_view key, const toml::node& node, Range range) const {
@@ -65,11 +80,11 @@ float TomlFields::number(std::string_view key, Range range, float fallback) {
 }
 
 int TomlFields::integer_of(std::string_view key, const toml::node& node, Range range) const {
-  const int64_t value = node.is_integer() ? node.as_integer()->get() : 0;
-  if (!node.is_integer() || static_cast<double>(value) < range.low || static_cast<double>(value) > range.high) {
+  const std::optional<int64_t> value = whole_number(node);
+  if (!value || static_cast<double>(*value) < range.low || static_cast<double>(*value) > range.high) {
     refuse(key, node, fmt::format("an integer in [{}, {}]", range.low, range.high));
   }
-  return static_cast<int>(value);
+  return static_cast<int>(*value);
 }
 
 int TomlFields::integer(std::string_view key, Range range) { return integer_of(key, need(key), range); }
@@ -162,8 +177,8 @@ std::vector<TomlFields> TomlFields::tables(std::string_view key) {
 void TomlFields::refuse_unknown() const {
   for (const auto& [key, node] : *table_) {
     if (std::find(known_.begin(), known_.end(), key.str()) == known_.end()) {
-      fail("{}:{}: {}{}unknown key '{}'; known here: {}", source_, node.source().begin.line, name_,
-           name_.empty() ? "" : ": ", key.str(), fmt::join(known_, ", "));
+      fail("{}:{}: {}{}unknown key '{}'{}; known here: {}", source_, node.source().begin.line, name_,
+           name_.empty() ? "" : ": ", key.str(), suggestion(key.str(), known_), fmt::join(known_, ", "));
     }
   }
 }

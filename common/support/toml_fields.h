@@ -3,6 +3,8 @@
 // users.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,6 +19,12 @@ namespace pictura {
 
 /// Parses a TOML text. Throws Error naming source and line.
 toml::table parse_toml(const std::string& text, const std::string& source);
+
+/// The whole number that a value is, in any notation: 1e3 and 1000.0 are what 1000 is. Nothing for other values.
+std::optional<int64_t> whole_number(const toml::node& node);
+
+/// A value as messages show it, in one short line.
+std::string shown(const toml::node& node);
 
 /// One table. Readers with a fallback return it where the key is missing; the others throw. All throw Error when the
 /// type or the range is wrong. The table must outlive the object.

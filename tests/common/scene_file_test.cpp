@@ -126,10 +126,19 @@ TEST(SceneFile, LinesByStyleAndColor) {
   EXPECT_EQ(line("kind = 'crosswalk'\nclosed = true\npoints_m = [[0, 0], [3, 0], [3, 3]]\n").size(), 3u);
 }
 
+TEST(SceneFile, WholeNumbersHaveAnyNotation) {
+  const SceneFile scene = parse_scene("size_px = [4e1, 30.0]\n" + kAgent + kView + "hidden = [0.0]\n", "s.toml");
+  EXPECT_EQ(scene.config.rig.cameras[0].width_px, 40);
+  EXPECT_EQ(scene.config.rig.cameras[0].height_px, 30);
+  EXPECT_EQ(scene.scene.hidden_agents, std::vector<int32_t>{0});
+}
+
 TEST(SceneFile, BadFilesAreRejectedWithTheirLine) {
   EXPECT_THAT(message_of("[[view\n"), HasSubstr("s.toml:1: "));
   EXPECT_THAT(message_of(""), HasSubstr("expected one or more [[view]] tables"));
-  EXPECT_THAT(message_of("sky = 1\n" + kView), HasSubstr("s.toml:1: unknown key 'sky'"));
+  EXPECT_THAT(message_of("sky = 1\n" + kView), HasSubstr("s.toml:1: unknown key 'sky'; known here: camera, rig"));
+  EXPECT_THAT(message_of(kView + "heading_degs = 1\n"),
+              HasSubstr("s.toml:5: view 0: unknown key 'heading_degs'; did you mean 'heading_deg'?; known here: "));
   EXPECT_THAT(message_of(kView + "speed_mps = 1\n"), HasSubstr("s.toml:5: view 0: unknown key 'speed_mps'"));
   EXPECT_THAT(message_of("[[view]]\nx_m = 1.0\ny_m = 2.0\n"), HasSubstr("s.toml:1: view 0: heading_deg: is missing"));
   EXPECT_THAT(message_of("[[view]]\nx_m = nan\n"), HasSubstr("s.toml:2: view 0: x_m: expected a number in"));
@@ -142,7 +151,9 @@ TEST(SceneFile, BadFilesAreRejectedWithTheirLine) {
               HasSubstr("s.toml:13: view 0: ego: expected an integer in [0, 0]"));
   EXPECT_THAT(message_of(kAgent + kView + "hidden = [0, -1]\n"),
               HasSubstr("hidden: expected an integer in [0, 0], got -1"));
-  EXPECT_THAT(message_of(kAgent + kView + "hidden = [0.0]\n"), HasSubstr("expected an integer"));
+  EXPECT_THAT(message_of(kAgent + kView + "hidden = [0.5]\n"), HasSubstr("expected an integer in [0, 0], got 0.5"));
+  EXPECT_THAT(message_of(kAgent + kView + "hidden = [nan]\n"), HasSubstr("expected an integer"));
+  EXPECT_THAT(message_of("size_px = [1e300, 8]\n" + kView), HasSubstr("expected an integer in [1, 8192], got 1.0"));
   EXPECT_THAT(message_of(kView + "name = '../a'\n"), HasSubstr("got '../a'"));
   EXPECT_THAT(message_of(kView + kView + "name = 'view0'\n"), HasSubstr("'view0' is taken"));
   EXPECT_THAT(message_of(kView + "[[agent]]\nclass = 'tram'\n"),
