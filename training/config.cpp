@@ -18,7 +18,9 @@
 #include "pictura/common/support/numbers.h"
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/common/support/suggestion.h"
+#include "pictura/common/support/toml_fields.h"
 #include "pictura/map/load_map.h"
+#include "pictura/simulator/conditioning_lookup.h"
 #include "pictura/training/config_keys.h"
 
 namespace pictura {
@@ -123,8 +125,8 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.choice("train.halted_slots", c.train.halted_slots, kHaltedSlots);
 
   for (int i = 0; i < kNumConditioning; ++i) {
-    v.number(std::string("evaluate.conditioning.") + kConditioningNames[i], c.evaluate.conditioning[size_t(i)], -1e6,
-             1e6);
+    v.number(std::string("evaluate.conditioning.") + kConditioningNames[i], c.evaluate.conditioning[size_t(i)],
+             -kMaxConditioning, kMaxConditioning);
   }
 }
 
@@ -273,8 +275,8 @@ class Reader {
     if (const toml::node* node = find(key)) {
       const toml::array& pair = elements_of(key, *node);
       if (pair.size() != 2) refuse(key, *node, "expected [low, high]");
-      value.low = static_cast<float>(number_of(key, pair[0], -1e6, 1e6));
-      value.high = static_cast<float>(number_of(key, pair[1], -1e6, 1e6));
+      value.low = static_cast<float>(number_of(key, pair[0], -kMaxConditioning, kMaxConditioning));
+      value.high = static_cast<float>(number_of(key, pair[1], -kMaxConditioning, kMaxConditioning));
       if (value.low > value.high) refuse(key, *node, "expected low <= high");
       const bool is_fixed = value.low == value.high;
       if (value.mixture && !(value.low > 0 && (is_fixed || (value.low <= 1 && value.high >= 1)))) {
@@ -291,18 +293,17 @@ class Reader {
       if (const toml::table* inner = node.as_table(); inner && (sections_.count(key) || !inner->empty()))
         refuse_unknown(*inner, key + ".");
       else if (!known_.count(key))
-        fail("{}: unknown key '{}'{}", where(key, node), key, suggestion_for(key));
+        refuse_unknown_key(key, node);
     }
   }
 
   [[noreturn]] void refuse(const std::string& key, const toml::node& node, const std::string& expected) const {
-    std::ostringstream got;
-    node.visit([&](const auto& value) { got << value; });
-    fail("{}: {}: {}, got {}", where(key, node), key, expected, got.str());
+    refuse(key, fmt::format("{}, got {}", expected, shown(node)));
   }
   [[noreturn]] void refuse(const std::string& key, const std::string& message) const {
+    if (overridden_.count(key)) fail("--set {}: {}", key, message);
     const toml::node* node = table_.at_path(key).node();
-    fail("{}: {}: {}", node ? where(key, *node) : source_, key, message);
+    fail("{}: {}: {}", node ? line_of(*node) : source_, key, message);
   }
 
  private:
@@ -314,9 +315,11 @@ class Reader {
     return table_.at_path(key).node();
   }
 
-  std::string where(const std::string& key, const toml::node& node) const {
-    if (overridden_.count(key)) return "--set " + key;
-    return fmt::format("{}:{}", source_, node.source().begin.line);
+  std::string line_of(const toml::node& node) const { return fmt::format("{}:{}", source_, node.source().begin.line); }
+
+  [[noreturn]] void refuse_unknown_key(const std::string& key, const toml::node& node) const {
+    if (overridden_.count(key)) fail("--set {}: unknown key{}", key, suggestion_for(key));
+    fail("{}: unknown key '{}'{}", line_of(node), key, suggestion_for(key));
   }
 
   int64_t integer_of(const std::string& key, const toml::node& node, int64_t low, int64_t high) const {
@@ -325,16 +328,6 @@ class Reader {
       refuse(key, node, fmt::format("expected an integer in [{}, {}]", low, high));
     }
     return *number;
-  }
-
-  // Of 1e3 as well as of 1000.
-  static std::optional<int64_t> whole_number(const toml::node& node) {
-    if (node.is_integer()) return node.as_integer()->get();
-    if (!node.is_floating_point()) return std::nullopt;
-    const double number = node.as_floating_point()->get();
-    constexpr double kExact = 9007199254740992;  // beyond, a double stands for several
-    if (!(std::abs(number) <= kExact) || number != std::floor(number)) return std::nullopt;
-    return static_cast<int64_t>(number);
   }
 
   double number_of(const std::string& key, const toml::node& node, double low, double high) const {
@@ -484,7 +477,9 @@ class Describer {
     add(key, fmt::format("{}", fmt::join(names, ", ")));
   }
   void range(const std::string& key, const ConditioningRange& value) {
-    add(key, value.mixture ? "0 < low <= 1 <= high, or low = high > 0" : "low <= high, of -1000000 to 1000000");
+    add(key, value.mixture ? "0 < low <= 1 <= high, or low = high > 0"
+                           : fmt::format("low <= high, of {} to {}", text_of_number(-kMaxConditioning),
+                                         text_of_number(kMaxConditioning)));
   }
 
   std::vector<ConfigKey> keys;
@@ -640,12 +635,7 @@ namespace {
 
 Config parse(const std::string& text, const std::string& source, const std::vector<std::string>& overrides,
              bool any_name) {
-  toml::table table;
-  try {
-    table = toml::parse(text, source);
-  } catch (const toml::parse_error& error) {
-    fail("{}:{}: {}", source, error.source().begin.line, error.description());
-  }
+  toml::table table = parse_toml(text, source);
   std::set<std::string> overridden;
   for (const std::string& text_of_one : overrides) overridden.insert(apply_override(text_of_one, &table));
   drop_sizes_beside_rig(overridden, &table);
@@ -677,10 +667,20 @@ Config parse_saved_config(const std::string& text, const std::string& source) {
 }
 
 Config with_evaluate_conditioning(const Config& config, const std::vector<std::string>& values) {
-  std::vector<std::string> overrides;
-  for (const std::string& value : values) overrides.push_back("evaluate.conditioning." + value);
   Config result = config;
-  result.evaluate = parse(to_toml(config), "evaluate", overrides, /*any_name=*/true).evaluate;
+  std::set<size_t> given;
+  for (const std::string& value : values) {
+    const size_t equals = value.find('=');
+    if (equals == std::string::npos) fail_usage("--conditioning: expected NAME=VALUE, got '{}'", value);
+    const size_t index = conditioning_index(value.substr(0, equals), "--conditioning");
+    const std::optional<double> number = parse_number(value.substr(equals + 1));
+    if (!number || !(std::abs(*number) <= kMaxConditioning)) {
+      fail_usage("--conditioning: {}: expected a number in [{}, {}], got '{}'", kConditioningNames[index],
+                 text_of_number(-kMaxConditioning), text_of_number(kMaxConditioning), value.substr(equals + 1));
+    }
+    if (!given.insert(index).second) fail_usage("--conditioning: {} is given twice", kConditioningNames[index]);
+    result.evaluate.conditioning[index] = *number;
+  }
   return result;
 }
 

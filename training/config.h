@@ -142,8 +142,8 @@ Config parse_saved_config(const std::string& text, const std::string& source);
 /// to its folder, those of overrides to the caller's. In the result, all are relative to the caller's.
 Config load_config(const std::string& path, const std::vector<std::string>& overrides = {});
 
-/// The configuration with values of [evaluate.conditioning] replaced; each is "name=value". Throws Error as
-/// parse_config.
+/// The configuration with values of [evaluate.conditioning] replaced; each is "name=value". Throws UsageError that
+/// names the option --conditioning.
 Config with_evaluate_conditioning(const Config& config, const std::vector<std::string>& values);
 
 /// Every key with its value, as TOML that parse_config reads back to an equal Config.

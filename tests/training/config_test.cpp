@@ -19,6 +19,8 @@ namespace {
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
 
 std::string message_of(const std::string& text, const std::vector<std::string>& overrides = {}) {
   return test::message_of([&] { parse_config(text, "a.toml", overrides); });
@@ -65,14 +67,13 @@ TEST(Config, NumbersMayBeWrittenInAnyDecimalNotation) {
   EXPECT_EQ(parse_config("", "a.toml", {"train.gamma=.5"}).train.gamma, 0.5);
   for (const std::string text : {"1.5", "0x10", "1_000", "-1", "1e30", "18446744073709551616"}) {
     EXPECT_THAT(message_of("", {"train.updates=" + text}),
-                AllOf(HasSubstr("--set train.updates: train.updates: expected an integer in [1, 1099511627776]"),
-                      HasSubstr("got ")));
+                StartsWith("--set train.updates: expected an integer in [1, 1099511627776], got "));
   }
 }
 
 TEST(Config, UnknownKeysSuggestTheNearest) {
   EXPECT_THAT(message_of("", {"train.updats=1"}), HasSubstr("did you mean 'train.updates'?"));
-  EXPECT_THAT(message_of("", {"trian.updates=1"}), HasSubstr("did you mean 'train.updates'?"));
+  EXPECT_EQ(message_of("", {"trian.updates=1"}), "--set trian.updates: unknown key; did you mean 'train.updates'?");
   EXPECT_THAT(message_of("", {"train.zebra=1"}), HasSubstr("docs/configuration.md names every key"));
 }
 
@@ -317,6 +318,32 @@ TEST(Config, HarmlessDifferencesAreNone) {
   b.render.backend = "null";
   b.render.line_floor_px = 1;
   EXPECT_EQ(first_difference(a, b), "");
+}
+
+TEST(Config, MessagesShowValuesInOneShortLine) {
+  EXPECT_EQ(message_of("[train]\nupdates = {a = 1,  b = 2}\n"),
+            "a.toml:2: train.updates: expected an integer in [1, 1099511627776], got a table");
+  const std::string message = message_of("[train]\nupdates = \"" + std::string(200, '1') + "\\n\"\n");
+  EXPECT_THAT(message, HasSubstr("got '1111"));
+  EXPECT_THAT(message, Not(HasSubstr("\n")));
+  EXPECT_LT(message.size(), 160u);
+}
+
+TEST(Config, ConditioningOfAnEvaluationIsReadAndRefusedUnderItsOption) {
+  const Config config = with_evaluate_conditioning(Config{}, {"collision=1e0", "center_bias_m=-0.25"});
+  EXPECT_EQ(config.evaluate.conditioning[static_cast<size_t>(Conditioning::collision)], 1);
+  EXPECT_EQ(config.evaluate.conditioning[static_cast<size_t>(Conditioning::center_bias_m)], -0.25);
+  EXPECT_EQ(config.evaluate.conditioning[static_cast<size_t>(Conditioning::off_road)], 3);
+  auto message = [](const std::vector<std::string>& values) {
+    return test::message_of([&] { with_evaluate_conditioning(Config{}, values); });
+  };
+  EXPECT_EQ(message({"collison=1"}), "--conditioning: no coefficient 'collison'; did you mean 'collision'?");
+  EXPECT_EQ(message({"collision"}), "--conditioning: expected NAME=VALUE, got 'collision'");
+  EXPECT_EQ(message({"collision=0x1"}),
+            "--conditioning: collision: expected a number in [-1000000, 1000000], got '0x1'");
+  EXPECT_EQ(message({"collision=2e6"}),
+            "--conditioning: collision: expected a number in [-1000000, 1000000], got '2e6'");
+  EXPECT_EQ(message({"collision=1", "collision=2"}), "--conditioning: collision is given twice");
 }
 
 TEST(Config, EvaluationFixesConditioningAndLightsAndEndsNothingEarly) {
