@@ -1,6 +1,7 @@
 #include "pictura/cli/drive.h"
 
 #include <algorithm>
+#include <filesystem>
 
 #include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_simulator.h"
@@ -91,6 +92,10 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy, c
   config.vector_observations = options.vector_observations;
   if (is_trained) {
 #ifdef PICTURA_HAS_TORCH
+    const std::vector<std::string> names = host_controller_names();
+    if (const std::string near = suggestion(policy, names); !near.empty() && !std::filesystem::exists(policy)) {
+      fail_usage("--policy: expected {}, or a checkpoint's file, got '{}'{}", fmt::join(names, ", "), policy, near);
+    }
     world.session = std::make_shared<PolicySession>(
         policy, SessionOptions{.num_threads = options.num_threads,
                                .device = backends.device.empty() ? "auto" : backends.device,

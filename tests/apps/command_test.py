@@ -453,6 +453,7 @@ class Simulation(CommandCase):
         self.assert_refused(2, "100000000", *simulate, "--agents", 100_000_000)
         self.assert_refused(2, "4097", *simulate, "--agents", 4097)
         self.assert_refused(1 if has_torch() else 2, "no/such.ckpt", *simulate, "--policy", "no/such.ckpt")
+        self.assert_refused(2, "got 'lan'; did you mean 'lane'?", *simulate, "--policy", "lan")
         if shutil.which("ffmpeg"):
             self.assert_refused(1, "/proc/nowhere", *simulate, "--agents", 2, "--steps", 2, "--video", "/proc/nowhere/a.mp4")
 
