@@ -6,7 +6,15 @@ namespace pictura::python {
 
 namespace {
 // The process that first needed threads, or CUDA; 0: none yet. A child inherits the numbers of its parent.
-std::atomic<pid_t> process_of_threads{0}, process_of_cuda{0};
+struct Processes {
+  std::atomic<pid_t> of_threads{0}, of_cuda{0};
+};
+
+// One for all extensions of the package. The caller holds the GIL.
+Processes& processes() {
+  static Processes& shared = py::get_or_create_shared_data<Processes>("pictura: processes");
+  return shared;
+}
 
 bool is_forked(std::atomic<pid_t>* process) {
   pid_t nobody = 0;
@@ -16,9 +24,9 @@ bool is_forked(std::atomic<pid_t>* process) {
 
 void check_process(std::string_view what, int num_threads, Device device) {
   PICTURA_CHECK(
-      device.is_host() || !is_forked(&process_of_cuda),
+      device.is_host() || !is_forked(&processes().of_cuda),
       "{}: this process was forked after CUDA was used, which does not survive that: start processes by spawn", what);
-  PICTURA_CHECK(num_threads == 1 || !is_forked(&process_of_threads),
+  PICTURA_CHECK(num_threads == 1 || !is_forked(&processes().of_threads),
                 "{}: this process was forked after pictura had used several threads, which do not survive that: pass "
                 "num_threads=1, or start processes by spawn",
                 what);

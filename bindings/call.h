@@ -4,6 +4,8 @@
 
 #include <atomic>
 #include <chrono>
+#include <csignal>
+#include <exception>
 #include <functional>
 #include <future>
 #include <memory>
@@ -15,6 +17,7 @@
 
 #include "pictura/common/device.h"
 #include "pictura/common/error.h"
+#include "pictura/common/support/interrupt.h"
 
 namespace pictura::python {
 
@@ -67,6 +70,30 @@ auto run_interruptibly(std::string_view what, int num_threads, Device device, Wo
       if (result.wait_for(std::chrono::milliseconds(20)) == std::future_status::ready) break;
     }
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  }
+  return result.get();
+}
+
+/// Runs long work, which checks interrupted() between its steps, in a thread of its own. ^C ends it in order, as it
+/// ends the command, and then raises KeyboardInterrupt. The work may call back into Python.
+template <typename Work>
+auto run_to_an_orderly_end(std::string_view what, int num_threads, Device device, Work work) {
+  check_process(what, num_threads, device);
+  std::exception_ptr raised;
+  auto result = std::async(std::launch::async, std::move(work));
+  for (;;) {
+    {
+      const py::gil_scoped_release no_gil;
+      if (result.wait_for(std::chrono::milliseconds(20)) == std::future_status::ready) break;
+    }
+    if (!raised && PyErr_CheckSignals() != 0) {
+      raised = std::make_exception_ptr(py::error_already_set());
+      take_interrupt(SIGINT);
+    }
+  }
+  if (raised) {
+    forget_interrupt();
+    std::rethrow_exception(raised);
   }
   return result.get();
 }

@@ -1,5 +1,5 @@
 // What the parts of the bindings exchange: maps, geometries, scenes, renderers' images and simulators as Python holds
-// them.
+// them, and what the extension with torch, a library of its own, takes from and gives to the one without.
 #pragma once
 
 #include <functional>
@@ -9,8 +9,11 @@
 #include <vector>
 
 #include "pictura/bindings/arrays.h"
+#include "pictura/bindings/call.h"
 #include "pictura/common/renderer.h"
 #include "pictura/simulator/compiled_map.h"
+#include "pictura/simulator/controllers/controller.h"
+#include "pictura/simulator/simulator.h"
 
 namespace pictura::python {
 
@@ -40,6 +43,24 @@ struct Scene {
   std::shared_ptr<const void> owner;
   std::function<SceneBatch()> batch;
   Stream stream;
+};
+
+/// What is inside a pictura.Simulator.
+struct SimulatorInside {
+  std::shared_ptr<Simulator> simulator;
+};
+
+/// What is inside a pictura.Renderer, which must live as long as `calls` is used.
+struct RendererInside {
+  std::shared_ptr<Renderer> renderer;
+  Calls* calls;
+};
+
+/// What becomes a pictura.Controller.
+struct ControllerInside {
+  std::shared_ptr<Simulator> of;
+  std::shared_ptr<const void> owner;  // of what the controller reads
+  std::shared_ptr<Controller> controller;
 };
 
 /// "cpu", "cuda" or "cuda:1". Throws UsageError for others.

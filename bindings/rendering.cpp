@@ -192,6 +192,20 @@ class Images {
   std::vector<CameraImages> cameras_;
 };
 
+/// The memory of the views from `first` on.
+std::vector<CameraImages> images_from(const ImageBatch& batch, int64_t first) {
+  std::vector<CameraImages> cameras(batch.cameras.begin(), batch.cameras.end());
+  for (CameraImages& camera : cameras) {
+    const int64_t plane_pixels = first * camera.width_px * camera.height_px;
+    camera.data = static_cast<uint8_t*>(camera.data) +
+                  first * camera.view_stride * static_cast<int64_t>(bytes_per_value(batch.format));
+    if (camera.depth_m) camera.depth_m += plane_pixels;
+    if (camera.class_id) camera.class_id += plane_pixels;
+    if (camera.instance_id) camera.instance_id += plane_pixels;
+  }
+  return cameras;
+}
+
 /// A renderer and where its work is put.
 class PyRenderer {
  public:
@@ -199,7 +213,10 @@ class PyRenderer {
       : renderer_(make_renderer(name, config, &choice_)),
         calls_(config.num_threads, renderer_->device()),
         stream_(stream) {}
+  explicit PyRenderer(std::shared_ptr<Renderer> renderer)
+      : renderer_(std::move(renderer)), calls_(renderer_->config().num_threads, renderer_->device()) {}
 
+  RendererInside inside() { return {renderer_, &calls_}; }
   Renderer& renderer() { return *renderer_; }
   Calls& calls() { return calls_; }
   Stream stream() const { return stream_; }
@@ -282,12 +299,42 @@ class PyRenderer {
     PICTURA_CHECK(reinterpret_cast<uintptr_t>(bytes.data()) % alignof(View) == 0, "views: expected aligned memory");
     return {reinterpret_cast<const View*>(bytes.data()), static_cast<size_t>(array.shape[0])};
   }
+  /// On the host a part of the views at a time, between which ^C is answered: images of one view are no other's.
   void draw(const Scene& scene, Span<const View> views, const ImageBatch& batch) {
-    calls_.run("render", [&] { renderer_->render(scene.batch(), views, batch, stream_); });
+    // Before its first pixel an image costs about as much as so many pixels; the sum is about a tenth of a second of
+    // one core.
+    constexpr int64_t kPixelsOfSetup = 4096, kPixelsAtATime = int64_t{1} << 22;
+    int64_t pixels_per_view = 0;
+    for (const Camera& camera : renderer_->config().rig.cameras) {
+      pixels_per_view += int64_t{camera.width_px} * camera.height_px + kPixelsOfSetup;
+    }
+    const auto all = static_cast<int64_t>(views.size());
+    const int64_t step = batch.device.is_host() ? std::max<int64_t>(1, kPixelsAtATime / pixels_per_view) : all;
+    if (step >= all) {
+      calls_.run("render", [&] { renderer_->render(scene.batch(), views, batch, stream_); });
+      return;
+    }
+    PICTURA_CHECK(batch.num_views == all, "render: expected images of {} views, got {}", all, batch.num_views);
+    for (int64_t begin = 0; begin < all; begin += step) {
+      const int64_t count = std::min(step, all - begin);
+      const std::vector<CameraImages> cameras = images_from(batch, begin);
+      ImageBatch some = batch;
+      some.num_views = static_cast<int>(count);
+      some.cameras = cameras;
+      const Span<const View> span(views.data() + begin, static_cast<size_t>(count));
+      calls_.run("render", [&] {
+        try {
+          renderer_->render(scene.batch(), span, some, stream_);
+        } catch (const Error& error) {
+          fail("of the views {} to {}: {}", begin, begin + count - 1, error.what());
+        }
+      });
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    }
   }
 
   std::string choice_;
-  std::unique_ptr<Renderer> renderer_;
+  std::shared_ptr<Renderer> renderer_;
   Calls calls_;
   Stream stream_;
 };
@@ -512,6 +559,7 @@ A renderer draws into it as often as wanted.)")
 class_id uint8 (0: nothing), instance_id uint16 (1 + the agent's index in its world, 0: no agent). Raises pictura.Error
 for images without planes.)");
 
+  py::class_<RendererInside>(module, "_RendererInside");
   py::class_<PyRenderer>(module, "Renderer", R"(
 Draws scenes: 'cpu', 'cuda', 'gl' ('gl:egl', 'gl:osmesa'), 'null', or 'auto'. One thread at a time; several renderers are
 independent. On CUDA its work is put on `stream`.)")
@@ -536,6 +584,10 @@ independent. On CUDA its work is put on `stream`.)")
 all. line_floor_px: the least width of a line on screen. debug_palette: tint halted and parked agents. samples: for 'gl',
 '4' (MSAA) or '4x4' (supersampling). stream: a cudaStream_t as int; None: the legacy default stream.
 Raises pictura.UsageError listing the names, pictura.Error where the backend cannot run here.)")
+      .def_static(
+          "_of", [](const RendererInside& inside) { return std::make_unique<PyRenderer>(inside.renderer); },
+          py::arg("inside"))
+      .def("_inside", &PyRenderer::inside)
       .def_property_readonly("name", [](PyRenderer& self) { return std::string(self.renderer().name()); })
       .def_property_readonly("choice", &PyRenderer::choice, py::doc("What was chosen, and why."))
       .def_property_readonly("device", [](PyRenderer& self) { return name_of(self.renderer().device()); })
@@ -566,7 +618,8 @@ Raises pictura.UsageError listing the names, pictura.Error where the backend can
 
 views: VIEW_DTYPE [n], or a simulator's. out: Images, or for a rig of one size an array [n, cameras, 3, height, width] of
 uint8, float32 or float16 in the renderer's memory (NumPy, torch, ...); new Images of `dtype` and `planes` without it. On
-CUDA the call returns when the work is on the stream. Raises pictura.Error naming what does not fit.)")
+CUDA the call returns when the work is on the stream; on the CPU ^C ends it between views. Raises pictura.Error naming what
+does not fit.)")
       .def(
           "visibility", &PyRenderer::visibility, py::arg("scene"), py::arg("views"), py::arg("queries"),
           R"(How much of agents can be seen: for each query of (view, box of the scene), int [n, 2], the coverage in the view's

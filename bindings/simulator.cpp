@@ -377,36 +377,63 @@ class PySimulator {
   std::unique_ptr<WorldPainter> painter_;
 };
 
-/// A controller, its simulator, and the commands that it writes.
+/// A controller, its simulator, and the commands that it writes, in the simulator's memory.
 class PyController {
  public:
-  PyController(const std::string& name, PySimulator& simulator, uint64_t seed)
-      : of_(simulator.shared()), controller_(make_controller(name, *of_, seed)) {
-    PICTURA_CHECK(of_->device().is_host(), "Controller: expected a simulator on cpu, got one on {}",
-                  name_of(of_->device()));
-    commands_ = std::make_shared<std::vector<Command>>(static_cast<size_t>(of_->num_slots()));
+  explicit PyController(ControllerInside inside) : inside_(std::move(inside)), commands_(std::make_shared<Commands>()) {
+    const auto count = static_cast<size_t>(of().num_slots());
+#ifdef PICTURA_HAS_CUDA
+    if (!of().device().is_host()) {
+      const DeviceGuard guard(of().device());
+      commands_->on_device = DeviceBuffer<Command>(count);
+      commands_->span = {commands_->on_device.data(), count};
+      return;
+    }
+#endif
+    commands_->on_host.resize(count);
+    commands_->span = commands_->on_host;
   }
 
-  std::string name() const { return std::string(controller_->name()); }
+  std::string name() const { return std::string(inside_.controller->name()); }
+  /// Without the GIL.
   void act(const PySimulator& simulator) {
-    PICTURA_CHECK(simulator.shared() == of_ && of_->num_slots() == static_cast<int>(commands_->size()),
+    PICTURA_CHECK(simulator.shared() == inside_.of && of().num_slots() == static_cast<int>(commands_->span.size()),
                   "Controller: expected the simulator, and the worlds, that it was made for");
-    controller_->act(of_->controller_input(), {}, *commands_);
+    inside_.controller->act(of().controller_input(), {}, commands_->span, simulator.stream());
   }
-  Span<const Command> commands() const { return *commands_; }
-  py::array numpy_commands() const {
-    const py::dtype type = py::module_::import("pictura._pictura").attr("COMMAND_DTYPE");
-    auto* const keep = new std::shared_ptr<std::vector<Command>>(commands_);
-    const py::capsule owner(keep, [](void* p) { delete static_cast<std::shared_ptr<std::vector<Command>>*>(p); });
-    return py::array(type, {static_cast<py::ssize_t>(commands_->size())}, {static_cast<py::ssize_t>(sizeof(Command))},
-                     commands_->data(), owner);
+  Span<const Command> commands() const { return commands_->span; }
+  /// A NumPy array of COMMAND_DTYPE, or u8 [slots, bytes of a command] on a device.
+  py::object lent_commands(Stream stream) const {
+    const auto count = static_cast<int64_t>(commands_->span.size());
+    auto* const bytes = reinterpret_cast<uint8_t*>(commands_->span.data());
+    const LentArray lent{Array(bytes, {count, static_cast<int64_t>(sizeof(Command))}, of().device()), commands_, stream,
+                         false, "commands"};
+    const py::object array = py::cast(lent);
+    if (!of().device().is_host()) return array;
+    const py::object type = py::module_::import("pictura._pictura").attr("COMMAND_DTYPE");
+    return array.attr("numpy")().attr("view")(type).attr("reshape")(count);
   }
 
  private:
-  std::shared_ptr<Simulator> of_;
-  std::unique_ptr<Controller> controller_;
-  std::shared_ptr<std::vector<Command>> commands_;
+  struct Commands {
+    std::vector<Command> on_host;
+#ifdef PICTURA_HAS_CUDA
+    DeviceBuffer<Command> on_device;
+#endif
+    Span<Command> span;
+  };
+  Simulator& of() const { return *inside_.of; }
+
+  ControllerInside inside_;
+  std::shared_ptr<Commands> commands_;
 };
+
+ControllerInside controller_by_name(const std::string& name, const PySimulator& simulator, uint64_t seed) {
+  const std::shared_ptr<Simulator>& of = simulator.shared();
+  PICTURA_CHECK(of->device().is_host(), "Controller: expected a simulator on cpu, got one on {}",
+                name_of(of->device()));
+  return {of, nullptr, make_controller(name, *of, seed)};
+}
 
 py::dict report_of(const SpawnReport& report) {
   py::dict d;
@@ -484,8 +511,11 @@ What a step returns, one element a slot, in the simulator's memory: every step w
   py::class_<Snapshot>(module, "Snapshot", "A state that a simulator keeps in its own memory.");
 
   // Declared first, so that signatures can name it.
+  py::class_<SimulatorInside>(module, "_SimulatorInside");
+  py::class_<ControllerInside>(module, "_ControllerInside");
   py::class_<PyController> controller_class(module, "Controller", R"(
-Who drives: 'lane' (the lane keeper), 'idle' or 'random', for one simulator on the CPU.)");
+Who drives in one simulator: 'lane' (the lane keeper), 'idle' or 'random' on the CPU, or a policy of a
+pictura.PolicySession.)");
   py::class_<PySimulator>(module, "Simulator", R"(
 Many worlds, each on one map, stepped together. Arrays have one element a slot: the controlled agents of world 0, then those
 of world 1, and so on. Executors 'cpu' and 'cuda' give the same bits.
@@ -534,6 +564,7 @@ the host, 0 for all. reset_inactive_fraction: a world resets when this part of i
 conditioning: a number or (low, high) by name, see CONDITIONING_NAMES; the paper's ranges otherwise. stream: a cudaStream_t
 as int; None: the legacy default stream. The other defaults are the paper's training world.
 Raises pictura.UsageError naming what cannot be simulated, pictura.Error where there is no device.)")
+      .def("_inside", [](const PySimulator& self) { return SimulatorInside{self.shared()}; })
       .def_property_readonly("name", [](PySimulator& self) { return std::string(self.simulator().name()); })
       .def_property_readonly("choice", &PySimulator::choice, py::doc("What was chosen for 'auto', and why."))
       .def_property_readonly("device", [](PySimulator& self) { return name_of(self.simulator().device()); })
@@ -708,18 +739,23 @@ waypoints; -1 shows the whole map. width_m: what is shown around it.)")
           py::doc("Of its maps, by the handles that its scene names them by."));
 
   controller_class
-      .def(py::init<const std::string&, PySimulator&, uint64_t>(), py::arg("name"), py::arg("simulator"),
-           py::arg("seed") = 0, "Raises pictura.UsageError listing the names.")
+      .def(py::init([](const std::string& name, const PySimulator& simulator, uint64_t seed) {
+             return std::make_unique<PyController>(controller_by_name(name, simulator, seed));
+           }),
+           py::arg("name"), py::arg("simulator"), py::arg("seed") = 0, "Raises pictura.UsageError listing the names.")
+      .def_static(
+          "_of", [](const ControllerInside& inside) { return std::make_unique<PyController>(inside); },
+          py::arg("inside"))
       .def_property_readonly("name", &PyController::name)
       .def(
           "act",
           [](PyController& self, PySimulator& simulator) {
             simulator.calls().run("act", [&] { self.act(simulator); });
-            return self.numpy_commands();
+            return self.lent_commands(simulator.stream());
           },
           py::arg("simulator"),
-          R"(Commands for all slots, COMMAND_DTYPE [slots], which may be changed before step_commands() takes them. The same memory
-at every call.)");
+          R"(Commands for all slots, which may be changed before step_commands() takes them: NumPy's COMMAND_DTYPE [slots], or uint8
+[slots, 28] on CUDA. The same memory at every call.)");
 
   module.def(
       "draw_worlds",

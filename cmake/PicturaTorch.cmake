@@ -1,10 +1,11 @@
-# libtorch from the torch wheel of the virtual environment (or of python3), as one imported target `pictura_torch`.
+# libtorch from the torch wheel of the Python that Python_EXECUTABLE names (as scikit-build-core does), of the virtual
+# environment, or of python3, as one imported target `pictura_torch`.
 # The wheel's own CMake package is not used: it requires nvcc for CPU targets and links CUDA into everything.
 
 set(PICTURA_HAS_TORCH OFF)
 set(PICTURA_HAS_GLOO OFF)
 if(NOT PICTURA_WITH_TORCH STREQUAL OFF)
-  set(pictura_pythons)
+  set(pictura_pythons ${Python_EXECUTABLE})
   foreach(venv ${PICTURA_VENV} $ENV{PICTURA_VENV} ${PROJECT_SOURCE_DIR}/.venv)
     if(EXISTS ${venv}/bin/python)
       list(APPEND pictura_pythons ${venv}/bin/python)
@@ -24,6 +25,8 @@ if(NOT PICTURA_WITH_TORCH STREQUAL OFF)
     endif()
   endforeach()
   if(PICTURA_HAS_TORCH)
+    file(STRINGS ${torch_root}/version.py PICTURA_TORCH_VERSION REGEX "^__version__ = ")
+    string(REGEX REPLACE "^__version__ = '(.*)'$" "\\1" PICTURA_TORCH_VERSION "${PICTURA_TORCH_VERSION}")
     add_library(pictura_torch INTERFACE)
     target_include_directories(pictura_torch SYSTEM INTERFACE
       ${torch_root}/include ${torch_root}/include/torch/csrc/api/include)
@@ -34,7 +37,7 @@ if(NOT PICTURA_WITH_TORCH STREQUAL OFF)
     if(PICTURA_GLOO_INCLUDE)
       set(PICTURA_HAS_GLOO ON)
     endif()
-    message(STATUS "torch: ${torch_root}, Gloo ${PICTURA_HAS_GLOO}")
+    message(STATUS "torch: ${torch_root} ${PICTURA_TORCH_VERSION}, Gloo ${PICTURA_HAS_GLOO}")
   elseif(PICTURA_WITH_TORCH STREQUAL ON)
     message(FATAL_ERROR "PICTURA_WITH_TORCH=ON, but no torch 2.9 or later: run scripts/setup, or set PICTURA_VENV")
   endif()

@@ -1,7 +1,10 @@
 """Driving policies that learn by self-play from what a car's cameras see: maps, simulators and renderers for Python.
 
-The library's objects are here; environments are in pictura.envs, policies as torch modules in pictura.torch.
+The library's objects are here; environments are in pictura.envs, policies as torch modules in pictura.torch. train, evaluate and
+PolicySession need a package that was built beside torch, and load it on first use.
 """
+
+from typing import TYPE_CHECKING
 
 from pictura._pictura import (  # noqa: F401
     AGENT_FIELDS,
@@ -39,6 +42,18 @@ from pictura._pictura import (  # noqa: F401
     renderer_names,
     simulator_names,
 )
+
+if TYPE_CHECKING:
+    from pictura._training import PolicySession, evaluate, train  # noqa: F401
+
+
+def __getattr__(name: str):
+    if name not in ("PolicySession", "evaluate", "train"):
+        raise AttributeError(f"module 'pictura' has no attribute '{name}'")
+    from pictura._load_training import load
+
+    globals()[name] = value = load(name)
+    return value
 
 
 def make_vec(maps="procedural:3", num_agents: int = 16, **options):

@@ -350,11 +350,16 @@ class Images:
         """
         [views, cameras, 3, height, width], for a rig whose cameras have one size.
         """
+class _RendererInside:
+    pass
 class Renderer:
     """
     Draws scenes: 'cpu', 'cuda', 'gl' ('gl:egl', 'gl:osmesa'), 'null', or 'auto'. One thread at a time; several renderers are
     independent. On CUDA its work is put on `stream`.
     """
+    @staticmethod
+    def _of(inside: _RendererInside) -> Renderer:
+        ...
     def __init__(self, name: str = 'auto', rig: Rig | None = None, *, device: str = 'cpu', num_threads: typing.SupportsInt | typing.SupportsIndex = 0, line_floor_px: typing.SupportsFloat | typing.SupportsIndex = 0.3499999940395355, debug_palette: bool = False, samples: str = '1', stream: typing.Any = None) -> None:
         """
         rig: the paper's without one. device: where scenes, views and images lie, 'cpu' or 'cuda:0'. num_threads: 0 for
@@ -362,6 +367,8 @@ class Renderer:
         '4' (MSAA) or '4x4' (supersampling). stream: a cudaStream_t as int; None: the legacy default stream.
         Raises pictura.UsageError listing the names, pictura.Error where the backend cannot run here.
         """
+    def _inside(self) -> _RendererInside:
+        ...
     def check(self) -> None:
         """
         Waits for the work on the stream; raises pictura.Error for faults that a device found.
@@ -376,7 +383,8 @@ class Renderer:
         
         views: VIEW_DTYPE [n], or a simulator's. out: Images, or for a rig of one size an array [n, cameras, 3, height, width] of
         uint8, float32 or float16 in the renderer's memory (NumPy, torch, ...); new Images of `dtype` and `planes` without it. On
-        CUDA the call returns when the work is on the stream. Raises pictura.Error naming what does not fit.
+        CUDA the call returns when the work is on the stream; on the CPU ^C ends it between views. Raises pictura.Error naming what
+        does not fit.
         """
     def upload(self, handle: typing.SupportsInt | typing.SupportsIndex, geometry: Geometry) -> None:
         """
@@ -452,18 +460,26 @@ class Snapshot:
     """
     A state that a simulator keeps in its own memory.
     """
+class _SimulatorInside:
+    pass
+class _ControllerInside:
+    pass
 class Controller:
     """
-    Who drives: 'lane' (the lane keeper), 'idle' or 'random', for one simulator on the CPU.
+    Who drives in one simulator: 'lane' (the lane keeper), 'idle' or 'random' on the CPU, or a policy of a
+    pictura.PolicySession.
     """
+    @staticmethod
+    def _of(inside: _ControllerInside) -> Controller:
+        ...
     def __init__(self, name: str, simulator: Simulator, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         """
         Raises pictura.UsageError listing the names.
         """
-    def act(self, simulator: Simulator) -> numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]:
+    def act(self, simulator: Simulator) -> typing.Any:
         """
-        Commands for all slots, COMMAND_DTYPE [slots], which may be changed before step_commands() takes them. The same memory
-        at every call.
+        Commands for all slots, which may be changed before step_commands() takes them: NumPy's COMMAND_DTYPE [slots], or uint8
+        [slots, 28] on CUDA. The same memory at every call.
         """
     @property
     def name(self) -> str:
@@ -485,6 +501,8 @@ class Simulator:
         as int; None: the legacy default stream. The other defaults are the paper's training world.
         Raises pictura.UsageError naming what cannot be simulated, pictura.Error where there is no device.
         """
+    def _inside(self) -> _SimulatorInside:
+        ...
     def check(self) -> None:
         """
         Waits for the work on the stream; raises pictura.Error for what a device found wrong.

@@ -43,6 +43,8 @@ void take_interrupt(int signal) {
   if (!first_signal) first_signal = signal;
 }
 
+void forget_interrupt() { first_signal = 0; }
+
 int interrupting_signal() { return first_signal; }
 
 void InterruptibleWork::check() const {

@@ -17,6 +17,9 @@ int interrupting_signal();
 /// As if this signal had come, where none has: another process that this one works with got it.
 void take_interrupt(int signal);
 
+/// For a process that goes on after it has ended what was interrupted.
+void forget_interrupt();
+
 inline bool interrupted() { return interrupting_signal() != 0; }
 
 /// A piece of work that a signal stops. One that came before the work began does not: then the work is part of an

@@ -245,6 +245,29 @@ def test_interrupts_reach_long_calls():
     assert out.stdout == "stopped True\n", out.stderr
 
 
+def test_interrupts_end_a_render_between_views():
+    code = """
+        import os, signal, threading
+        import numpy as np
+        import pictura
+        town = pictura.Map.load("procedural:3")
+        simulator = pictura.Simulator([town], [(0, 20)], num_threads=1)
+        renderer = pictura.Renderer("cpu", pictura.Rig.paper(32, 18), num_threads=1)
+        for handle, geometry in simulator.geometries.items():
+            renderer.upload(handle, geometry)
+        views = np.tile(simulator.views.numpy(), (1000, 1))
+        images = renderer.make_images(len(views))
+        threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+        try:
+            renderer.render(simulator.scene, views, images)
+        except KeyboardInterrupt:
+            print("stopped", images.rgb[0].any(), images.rgb[-1].any())
+        renderer.render(simulator.scene, views[:20])
+    """
+    out = run_python(code)
+    assert out.stdout == "stopped True False\n", out.stderr
+
+
 def test_forks_are_refused_or_work():
     code = """
         import os, sys

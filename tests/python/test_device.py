@@ -2,6 +2,8 @@
 PICTURA_REQUIRE_GPU=1 says that there must be one."""
 
 import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -100,6 +102,27 @@ def test_memory_outlives_the_simulator(town):
     del simulator
     torch.empty(1 << 24, device="cuda").fill_(1)
     assert torch.equal(ego, copy)
+
+
+def test_a_fork_after_cuda_was_used_is_refused():
+    code = """
+import os, pictura, torch
+simulator = pictura.Simulator([pictura.Map.load("procedural:3")], [(0, 4)], device="cuda")
+actions = torch.full((4,), 10, dtype=torch.int32, device="cuda")
+simulator.step(actions)
+simulator.check()
+child = os.fork()
+if child == 0:
+    try:
+        simulator.totals()
+    except pictura.Error as error:
+        print(error, flush=True)
+    os._exit(0)
+os.waitpid(child, 0)
+print(simulator.step(actions).reward.torch().shape)
+"""
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert "forked after CUDA was used" in out.stdout and "torch.Size([4])" in out.stdout, out.stdout + out.stderr
 
 
 def test_others_take_it_too(both):

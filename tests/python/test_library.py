@@ -104,6 +104,26 @@ def test_what_does_not_fit_a_renderer_is_named(make):
         renderer.render(simulator.scene, views)
 
 
+def test_many_views_drawn_in_parts_are_the_same_images(make):
+    simulator = make()
+    renderer = pictura.Renderer("cpu", pictura.Rig.paper(8, 6), num_threads=2)
+    for handle, geometry in simulator.geometries.items():
+        renderer.upload(handle, geometry)
+    views = np.tile(simulator.views.numpy(), (60, 1))  # 720, of which about 250 are drawn at a time
+    one, many = (renderer.render(simulator.scene, some, planes=True) for some in (simulator.views, views))
+    assert one.rgb.numpy().std() > 10
+    assert (many.rgb.numpy().reshape(60, *one.rgb.shape) == one.rgb.numpy()).all()
+    for camera in range(4):
+        for name, plane in many.planes(camera).items():
+            assert (plane.numpy().reshape(60, 12, 6, 8) == one.planes(camera)[name].numpy()).all(), name
+    out = np.empty((720, 4, 3, 6, 8), np.float32)
+    renderer.render(simulator.scene, views, out)
+    assert (np.rint(out * 255) == many.rgb.numpy()).mean() > 0.999
+    views.view(pictura.VIEW_DTYPE)["world"][700] = 9
+    with pytest.raises(pictura.Error, match=r"of the views 5\d\d to 719: .*expected a world below 1, got 9"):
+        renderer.render(simulator.scene, views)
+
+
 def test_images_of_the_simulator_are_those_of_the_command_line_renderer(make):
     simulator = make(4)
     renderer = pictura.Renderer("cpu", num_threads=1)

@@ -8,18 +8,22 @@ import pytest
 
 import pictura
 
-STUB = pathlib.Path(__file__).parents[2] / "bindings" / "pictura" / "_pictura.pyi"
+STUBS = pathlib.Path(__file__).parents[2] / "bindings" / "pictura"
 
 
-def test_stubs_are_current(tmp_path):
+@pytest.mark.parametrize("name", ["_pictura", "_training"])
+def test_stubs_are_current(tmp_path, name):
     pytest.importorskip("pybind11_stubgen")
+    if name == "_training":
+        pytest.importorskip("pictura._built_torch", reason="built without torch")
+        pytest.importorskip("torch")
     out = subprocess.run(
-        [sys.executable, "-m", "pybind11_stubgen", "pictura._pictura", "-o", str(tmp_path), "--numpy-array-use-type-var"],
+        [sys.executable, "-m", "pybind11_stubgen", f"pictura.{name}", "-o", str(tmp_path), "--numpy-array-use-type-var"],
         capture_output=True, text=True,
     )  # fmt: skip
     assert out.returncode == 0, out.stderr
-    made = (tmp_path / "pictura" / "_pictura.pyi").read_text()
-    assert STUB.read_text() == made, "run scripts/python_stubs"
+    made = (tmp_path / "pictura" / f"{name}.pyi").read_text()
+    assert (STUBS / f"{name}.pyi").read_text() == made, "run scripts/python_stubs"
 
 
 def test_every_public_name_has_a_docstring():

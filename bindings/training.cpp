@@ -1,0 +1,417 @@
+// The extension module pictura._training: training, evaluation and saved policies, beside the torch that it was built
+// with. What it takes and gives are objects of pictura._pictura.
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "pictura/bindings/arrays.h"
+#include "pictura/bindings/call.h"
+#include "pictura/bindings/objects.h"
+#include "pictura/common/error.h"
+#include "pictura/simulator/observation_arrays.h"
+#include "pictura/training/evaluation/evaluate.h"
+#include "pictura/training/loop.h"
+#include "pictura/training/session.h"
+#ifdef PICTURA_HAS_CUDA
+#include "pictura/common/cuda/device_buffer.h"
+#include "pictura/common/cuda/device_guard.h"
+#endif
+
+namespace pictura::python {
+
+namespace {
+
+py::dict dict_of(const TrainProgress& progress) {
+  py::dict scalars;
+  for (const auto& [name, value] : progress.scalars) scalars[py::str(std::string(name))] = value;
+  py::dict d;
+  d["update"] = progress.update;
+  d["updates"] = progress.updates;
+  d["agent_steps"] = progress.agent_steps;
+  d["agent_steps_per_s"] = progress.agent_steps_per_s;
+  d["episode_return"] = progress.episode_return;
+  d["eta_s"] = progress.eta_s;
+  d["scalars"] = scalars;
+  return d;
+}
+
+py::dict dict_of(const TrainReport& report) {
+  py::dict d;
+  d["agent_steps"] = report.agent_steps;
+  d["updates"] = report.updates;
+  d["agent_steps_per_s"] = report.agent_steps_per_s;
+  d["episode_return"] = report.episode_return;
+  d["km_driven"] = report.km_driven;
+  d["ranks"] = report.ranks;
+  d["evaluation_s"] = report.evaluation_s;
+  d["out_of_time"] = report.out_of_time;
+  d["checkpoint"] = report.checkpoint;
+  d["policy_hash"] = report.policy_hash;
+  d["device"] = report.device;
+  d["simulator"] = report.simulator;
+  d["renderer"] = report.renderer;
+  return d;
+}
+
+py::dict dict_of(const EvaluateReport& report) {
+  py::list rows;
+  for (const EvaluateRow& row : report.rows) {
+    py::dict d;
+    d["density"] = row.density;
+    d["scenarios"] = row.scenarios;
+    d["steps"] = row.steps;
+    d["vehicle_episodes"] = row.vehicle_episodes;
+    d["km_driven"] = row.km_driven;
+    for (const auto& [name, estimate] : metrics_of(row)) {
+      d[py::str(name)] = py::make_tuple(estimate.value, estimate.half_width_95);
+    }
+    rows.append(d);
+  }
+  py::dict d;
+  d["rows"] = rows;
+  d["seconds"] = report.seconds;
+  d["agent_steps"] = report.agent_steps;
+  d["policy_hash"] = report.results.setting.policy_hash;
+  return d;
+}
+
+/// The options by which pictura.Simulator makes such a world.
+py::dict dict_of(const SimulatorConfig& config) {
+  py::dict conditioning;
+  for (int i = 0; i < kNumConditioning; ++i) {
+    const ConditioningRange& range = config.conditioning[static_cast<size_t>(i)];
+    const py::str name(std::string(kConditioningNames[i]));
+    if (range.low == range.high) {
+      conditioning[name] = range.low;
+    } else {
+      conditioning[name] = py::make_tuple(range.low, range.high);
+    }
+  }
+  py::dict d;
+  d["device"] = name_of(config.device);
+  d["num_threads"] = config.num_threads;
+  d["seed"] = config.seed;
+  d["dt_s"] = config.dt_s;
+  d["episode_steps"] = config.episode_steps;
+  d["reset_inactive_fraction"] = config.reset_inactive_fraction;
+  d["pedestrian_fraction"] = config.pedestrian_fraction;
+  d["cyclist_fraction"] = config.cyclist_fraction;
+  d["parked_cars"] = config.parked_cars;
+  d["walls"] = config.walls;
+  d["wall_seed"] = config.wall_seed;
+  d["fixed_lights"] = config.fixed_lights;
+  d["auxiliary_observations"] = config.auxiliary_observations;
+  d["vector_observations"] = config.vector_observations;
+  d["wall_observations"] = config.wall_observations;
+  d["conditioning"] = conditioning;
+  return d;
+}
+
+std::vector<std::string> texts_of(const py::dict& conditioning) {
+  std::vector<std::string> texts;
+  for (const auto& [name, value] : conditioning) {
+    texts.push_back(fmt::format("{}={}", py::cast<std::string>(name), py::cast<double>(value)));
+  }
+  return texts;
+}
+
+py::dict train_from_python(const std::string& config, const std::string& out, const std::vector<std::string>& overrides,
+                           const std::string& old_run, const std::string& init_from, double minutes,
+                           const py::object& on_progress, const py::object& on_notice) {
+  TrainOptions options;
+  options.config_path = config;
+  options.out_folder = out;
+  options.overrides = overrides;
+  options.init_from = init_from;
+  options.minutes = minutes;
+  options.launch = launch_from_environment();
+  if (old_run == "resume") {
+    options.old_run = OldRun::resume;
+  } else if (old_run == "overwrite") {
+    options.old_run = OldRun::overwrite;
+  } else if (old_run != "refuse") {
+    fail_usage("train: old_run: expected 'refuse', 'resume' or 'overwrite', got '{}'", old_run);
+  }
+  if (!on_progress.is_none()) {
+    options.on_progress = [&on_progress](const TrainProgress& progress) {
+      const py::gil_scoped_acquire gil;
+      on_progress(dict_of(progress));
+    };
+  }
+  if (!on_notice.is_none()) {
+    options.on_notice = [&on_notice](const std::string& notice) {
+      const py::gil_scoped_acquire gil;
+      on_notice(notice);
+    };
+  }
+  return dict_of(run_to_an_orderly_end("train", 0, {}, [&options] { return train(options); }));
+}
+
+std::vector<Density> densities_of(const std::vector<std::string>& names) {
+  std::vector<Density> densities;
+  for (const std::string& name : names) {
+    if (name == "light") {
+      densities.push_back(Density::light);
+    } else if (name == "medium") {
+      densities.push_back(Density::medium);
+    } else if (name == "dense") {
+      densities.push_back(Density::dense);
+    } else {
+      fail_usage("evaluate: densities: expected 'light', 'medium' or 'dense', got '{}'", name);
+    }
+  }
+  return densities;
+}
+
+/// Logits and values of a batch, in the memory of a session's device.
+struct Answers {
+  std::vector<float> on_host;
+#ifdef PICTURA_HAS_CUDA
+  DeviceBuffer<float> on_device;
+#endif
+  Span<float> all;
+
+  Answers(int64_t batch, Device device) {
+    const auto count = static_cast<size_t>(batch * (kNumActions + 1));
+#ifdef PICTURA_HAS_CUDA
+    if (!device.is_host()) {
+      const DeviceGuard guard(device);
+      on_device = DeviceBuffer<float>(count);
+      all = {on_device.data(), count};
+      return;
+    }
+#endif
+    PICTURA_CHECK(device.is_host(), "evaluate: this build has no CUDA");
+    on_host.resize(count);
+    all = on_host;
+  }
+};
+
+class PySession {
+ public:
+  PySession(const std::string& checkpoint, const SessionOptions& options)
+      : session_(std::make_shared<PolicySession>(checkpoint, options)),
+        calls_(options.num_threads, session_->device()) {}
+
+  PolicySession& session() { return *session_; }
+
+  py::object make_renderer() {
+    std::shared_ptr<Renderer> renderer = calls_.run("make_renderer", [&] { return session_->make_renderer(); });
+    if (!renderer) return py::none();
+    return of_main("Renderer")(RendererInside{std::move(renderer), nullptr});
+  }
+
+  py::object make_controller(const py::object& simulator, const py::object& renderer, bool argmax, uint64_t seed) {
+    const auto of = py::cast<SimulatorInside>(simulator.attr("_inside")()).simulator;
+    struct Owner {
+      std::shared_ptr<PolicySession> session;
+      std::shared_ptr<Renderer> renderer;
+    };
+    auto owner = std::make_shared<Owner>(Owner{session_, nullptr});
+    if (!renderer.is_none()) owner->renderer = py::cast<RendererInside>(renderer.attr("_inside")()).renderer;
+    ControllerInside inside;
+    inside.of = of;
+    inside.controller = session_->make_controller(owner->renderer.get(), argmax, seed);
+    inside.owner = std::move(owner);
+    return of_main("Controller")(inside);
+  }
+
+  py::tuple evaluate(const py::dict& observations, const Scene* scene, const py::object& views,
+                     const py::object& renderer, const py::object& is_drawn) {
+    const Device device = session_->device();
+    std::vector<BorrowedArray> borrowed;
+    PolicyInput input;
+    int64_t batch = -1;
+    const auto names = [] {
+      std::vector<std::string> all;
+      for (const ObservationArray& array : kObservationArrays) all.emplace_back(array.name);
+      return all;
+    };
+    for (const auto& [key, value] : observations) {
+      const auto name = py::cast<std::string>(key);
+      borrowed.push_back(borrow(value, "evaluate: " + name, {}));
+      const Array& array = borrowed.back().array();
+      PICTURA_CHECK(array.shape.rank() > 0, "evaluate: {}: expected [batch, ...], got {}", name, array.text());
+      if (batch < 0) batch = array.shape[0];
+      bool is_known = false;
+#define X(its_name, type, rows, features, part, comment)                                                     \
+  if (name == #its_name) {                                                                                   \
+    const Dims shape = rows == 1 && array.shape.rank() == 2 ? Dims{batch, int64_t{features}}                 \
+                                                            : Dims{batch, int64_t{rows}, int64_t{features}}; \
+    const Span<const type> span = array.checked<const type>("evaluate: " #its_name, shape, device);          \
+    input.observations.its_name = {const_cast<type*>(span.data()), span.size()};                             \
+    is_known = true;                                                                                         \
+  }
+      PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
+      PICTURA_CHECK(is_known, "evaluate: expected observations by the names {}, got '{}'", fmt::join(names(), ", "),
+                    name);
+    }
+    PICTURA_CHECK(batch >= 0, "evaluate: expected observations, got none");
+    SceneBatch scene_batch;
+    if (scene) {
+      scene_batch = scene->batch();
+      input.scene = &scene_batch;
+    }
+    if (!views.is_none()) {
+      borrowed.push_back(borrow_structs(views, "evaluate: views", sizeof(View), {}));
+      const auto bytes = borrowed.back().array().checked<const uint8_t>(
+          "evaluate: views", {batch, static_cast<int64_t>(sizeof(View))}, device);
+      PICTURA_CHECK(reinterpret_cast<uintptr_t>(bytes.data()) % alignof(View) == 0,
+                    "evaluate: views: expected aligned memory");
+      input.views = {reinterpret_cast<const View*>(bytes.data()), static_cast<size_t>(batch)};
+    }
+    if (!is_drawn.is_none()) {
+      borrowed.push_back(borrow(is_drawn, "evaluate: is_drawn", {}));
+      input.is_drawn = borrowed.back().array().checked<const uint8_t>("evaluate: is_drawn", {batch}, device);
+    }
+    std::optional<RendererInside> inside;
+    if (!renderer.is_none()) inside = py::cast<RendererInside>(renderer.attr("_inside")());
+
+    const auto answers = std::make_shared<Answers>(batch, device);
+    const auto count = static_cast<size_t>(batch);
+    const Span<float> logits(answers->all.data(), count * kNumActions);
+    const Span<float> values(answers->all.data() + count * kNumActions, count);
+    calls_.run("evaluate",
+               [&] { session_->evaluate(input, inside ? inside->renderer.get() : nullptr, logits, values); });
+    return py::make_tuple(LentArray{Array(logits.data(), {batch, kNumActions}, device), answers, {}, false, "logits"},
+                          LentArray{Array(values.data(), {batch}, device), answers, {}, false, "values"});
+  }
+
+ private:
+  static py::object of_main(const char* type) { return py::module_::import("pictura._pictura").attr(type).attr("_of"); }
+
+  std::shared_ptr<PolicySession> session_;
+  Calls calls_;
+};
+
+}  // namespace
+
+}  // namespace pictura::python
+
+PYBIND11_MODULE(_training, module) {
+  using namespace pictura;          // NOLINT
+  using namespace pictura::python;  // NOLINT
+  // Types and exceptions are that extension's.
+  py::module_::import("pictura._pictura");
+  module.doc() = "Training, evaluation and saved policies, with torch. Use them as names of `pictura`.";
+  module.def("train", &train_from_python, py::arg("config"), py::arg("out"), py::kw_only(),
+             py::arg("overrides") = std::vector<std::string>(), py::arg("old_run") = "refuse",
+             py::arg("init_from") = "", py::arg("minutes") = 0.0, py::arg("on_progress") = py::none(),
+             py::arg("on_notice") = py::none(),
+             R"(Trains by self-play as `pictura train` does, and writes the same files into the folder `out`.
+
+config: a TOML file (docs/configuration.md). overrides: 'train.updates=2'. old_run: of a run that lies in `out`, 'refuse', 'resume'
+or 'overwrite'. init_from: a checkpoint whose weights it begins with. minutes: of wall time; 0: no limit. on_progress: called
+after every update with a dict: update, updates, agent_steps, agent_steps_per_s, episode_return, eta_s, scalars (those of
+progress.csv). on_notice: called with a text. They are called from a thread of training's own, and what they raise ends it.
+Returns a dict: agent_steps, updates, agent_steps_per_s, episode_return, km_driven, checkpoint, policy_hash and more. ^C ends it
+after the present update, saves, and raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
+  module.def(
+      "evaluate",
+      [](const std::string& checkpoint, const std::vector<std::string>& maps, const std::string& controller,
+         const std::vector<std::string>& densities, int agents_per_world, int first_scenario, int scenarios, int steps,
+         bool argmax, uint64_t seed, int num_threads, const std::string& device, const std::string& simulator,
+         const std::string& renderer, const std::string& samples, const std::string& rig, int width_px, int height_px,
+         const py::dict& conditioning, const py::object& on_progress) {
+        EvaluateOptions options;
+        options.checkpoint = checkpoint;
+        options.controller = controller;
+        options.maps = maps;
+        options.densities = densities_of(densities);
+        options.agents_per_world = agents_per_world;
+        options.first_scenario = first_scenario;
+        options.scenarios = scenarios;
+        options.steps = steps;
+        options.argmax = argmax;
+        options.seed = seed;
+        options.num_threads = num_threads;
+        options.device = device;
+        options.simulator = simulator;
+        options.renderer = renderer;
+        options.samples = samples;
+        options.rig = rig;
+        options.width_px = width_px;
+        options.height_px = height_px;
+        options.conditioning = texts_of(conditioning);
+        if (!on_progress.is_none()) {
+          options.on_progress = [&on_progress](double done_fraction, double eta_s) {
+            const py::gil_scoped_acquire gil;
+            on_progress(done_fraction, eta_s);
+          };
+        }
+        return dict_of(
+            run_to_an_orderly_end("evaluate", num_threads, {}, [&options] { return pictura::evaluate(options); }));
+      },
+      py::arg("checkpoint"), py::arg("maps"), py::kw_only(), py::arg("controller") = "",
+      py::arg("densities") = std::vector<std::string>{"light", "medium", "dense"}, py::arg("agents_per_world") = 0,
+      py::arg("first_scenario") = 0, py::arg("scenarios") = 200, py::arg("steps") = 3000, py::arg("argmax") = true,
+      py::arg("seed") = 1, py::arg("num_threads") = 0, py::arg("device") = "auto", py::arg("simulator") = "auto",
+      py::arg("renderer") = "", py::arg("samples") = "", py::arg("rig") = "", py::arg("width_px") = 0,
+      py::arg("height_px") = 0, py::arg("conditioning") = py::dict(), py::arg("on_progress") = py::none(),
+      R"(The paper's evaluation, as `pictura evaluate` does it, in worlds that no training has.
+
+checkpoint: of a policy; '' with a controller of the paper's world. maps: names or files. controller: 'lane', 'random' or 'idle',
+which drives instead. densities: 'light', 'medium' and 'dense', 60, 120 and 150 agents a world, or agents_per_world of them.
+device, simulator, renderer: 'auto' or names; renderer '': as it was trained. rig, or width_px and height_px: other cameras.
+conditioning: numbers by name. on_progress: called with the fraction that is done and the seconds to come, from a thread of its
+own. Returns a dict: rows, one a density: its counts, and each metric as (value, half of its 95 % interval); seconds,
+agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
+  py::class_<PySession>(module, "PolicySession", R"(
+A saved policy: what it makes of scenes and observations, and the world and cameras that it was trained with. One thread at a
+time.)")
+      .def(
+          py::init([](const std::string& checkpoint, int num_threads, const std::string& device,
+                      const std::string& simulator, const std::string& renderer, const std::string& samples,
+                      const std::string& rig, int width_px, int height_px, const std::string& backbone,
+                      const py::dict& conditioning) {
+            SessionOptions options;
+            options.num_threads = num_threads;
+            options.device = device;
+            options.simulator = simulator;
+            options.renderer = renderer;
+            options.samples = samples;
+            options.rig = rig;
+            options.width_px = width_px;
+            options.height_px = height_px;
+            options.backbone = backbone;
+            options.conditioning = texts_of(conditioning);
+            check_process("PolicySession", num_threads, {});
+            return std::make_unique<PySession>(checkpoint, options);
+          }),
+          py::arg("checkpoint"), py::kw_only(), py::arg("num_threads") = 0, py::arg("device") = "auto",
+          py::arg("simulator") = "auto", py::arg("renderer") = "", py::arg("samples") = "", py::arg("rig") = "",
+          py::arg("width_px") = 0, py::arg("height_px") = 0, py::arg("backbone") = "",
+          py::arg("conditioning") = py::dict(),
+          R"(checkpoint: a .ckpt file. num_threads: 0 for all. device: 'auto', 'cpu' or 'cuda', where it computes; simulators, renderers
+and arrays that it is given work there too. The others as in pictura.evaluate(). Raises pictura.Error naming the file, or
+pictura.UsageError where it cannot see through these cameras.)")
+      .def_property_readonly("reads_images", [](PySession& self) { return self.session().reads_images(); })
+      .def_property_readonly("rig", [](PySession& self) { return self.session().rig(); })
+      .def_property_readonly("device", [](PySession& self) { return name_of(self.session().device()); })
+      .def(
+          "training_world", [](PySession& self) { return dict_of(self.session().training_world()); },
+          "Options by which pictura.Simulator(maps, worlds, **options) makes the world that it was trained in.")
+      .def(
+          "evaluation_world",
+          [](PySession& self, int steps) { return dict_of(self.session().evaluation_world(steps)); }, py::arg("steps"),
+          "The same for the paper's evaluation: episodes of so many steps, fixed conditioning and lights.")
+      .def("make_renderer", &PySession::make_renderer,
+           "A pictura.Renderer of its images, to which the maps are to be uploaded; None where it reads no images.")
+      .def("evaluate", &PySession::evaluate, py::arg("observations"), py::kw_only(), py::arg("scene") = nullptr,
+           py::arg("views") = py::none(), py::arg("renderer") = py::none(), py::arg("is_drawn") = py::none(),
+           R"(Logits float32 [batch, 12] and values float32 [batch], on its device.
+
+observations: arrays [batch, ...] by name, as pictura.Simulator.observations. For a policy that reads images also scene, views
+[batch] and renderer, which is of make_renderer(); is_drawn: uint8 [batch], 0 where its images are black. Raises pictura.Error
+naming what is missing or does not fit.)")
+      .def(
+          "make_controller", &PySession::make_controller, py::arg("simulator"), py::arg("renderer") = py::none(),
+          py::arg("argmax") = true, py::arg("seed") = 0,
+          R"(A pictura.Controller that drives in this simulator, which works on the session's device: the most likely action, or draws
+keyed by seed, world, agent, episode and step as in training. renderer: for a policy that reads images, of make_renderer(), with
+the simulator's geometries. Raises pictura.Error where one is missing.)");
+}

@@ -1,0 +1,240 @@
+"""Training, evaluation and saved policies through Python: the numbers of pictura.torch and of the command. Skipped where the
+package was built without torch."""
+
+import json
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import textwrap
+import types
+
+import numpy as np
+import pytest
+
+import pictura
+
+pytest.importorskip("pictura._built_torch", reason="built without torch")
+torch = pytest.importorskip("torch")
+from pictura.torch import load_policy  # noqa: E402
+
+SMOKE = str(pathlib.Path(__file__).parents[2] / "configs" / "smoke.toml")
+# First values are so small that logits say nothing: a high rate for a few updates gives others.
+TRAIN = ["train.updates=3", "train.learning_rate=0.01", "run.device=cpu", "run.num_threads=2"]
+
+
+@pytest.fixture(scope="module", params=["perspective", "vector"])
+def trained(request, tmp_path_factory):
+    """(modality, folder of the run, progress, report)."""
+    out = tmp_path_factory.mktemp(request.param)
+    progress = []
+    report = pictura.train(
+        SMOKE, str(out / "run"), overrides=[*TRAIN, f"policy.modality={request.param}"], on_progress=progress.append
+    )
+    return request.param, out / "run", progress, report
+
+
+@pytest.fixture
+def session(trained):
+    return pictura.PolicySession(str(trained[1] / "checkpoint.ckpt"), device="cpu", num_threads=1)
+
+
+def world_of(session, town, agents: int = 12, **options) -> pictura.Simulator:
+    return pictura.Simulator([town], [(0, agents)], **(session.training_world() | {"num_threads": 1, "seed": 5} | options))
+
+
+def renderer_of(session, simulator):
+    renderer = session.make_renderer()
+    if renderer is not None:
+        for handle, geometry in simulator.geometries.items():
+            renderer.upload(handle, geometry)
+    return renderer
+
+
+def images_of(renderer, simulator) -> dict:
+    return {} if renderer is None else {"rgb": renderer.render(simulator.scene, simulator.views).rgb.torch()}
+
+
+def test_training_reports_and_writes(trained):
+    _, folder, progress, report = trained
+    assert [update["update"] for update in progress] == [1, 2, 3] and progress[0]["updates"] == 3
+    assert report["updates"] == 3 and report["agent_steps"] == progress[-1]["agent_steps"] > 0
+    assert "loss/policy" in progress[0]["scalars"] or len(progress[0]["scalars"]) > 5
+    assert report["checkpoint"] == str(folder / "checkpoint.ckpt")
+    assert {"checkpoint.ckpt", "policy.safetensors", "progress.csv"} <= {path.name for path in folder.iterdir()}
+    first = load_policy(folder / "untrained.ckpt").state_dict()
+    assert any(not torch.equal(first[name], value) for name, value in load_policy(folder / "checkpoint.ckpt").state_dict().items())
+
+
+def test_a_trained_policys_numbers_are_those_of_the_library(trained, session, town):
+    modality, folder, _, _ = trained
+    assert session.reads_images == (modality == "perspective") and session.device == "cpu"
+    simulator = world_of(session, town)
+    renderer = renderer_of(session, simulator)
+    policy = load_policy(folder / "policy.safetensors")
+    for _ in range(5):
+        simulator.step(np.full(12, 10, np.int32))
+        seen = {"scene": simulator.scene, "views": simulator.views, "renderer": renderer} if renderer else {}
+        logits, values = session.evaluate(simulator.observations, **seen)
+        observation = {name: array.torch() for name, array in simulator.observations.items()} | images_of(renderer, simulator)
+        with torch.no_grad():
+            expected, expected_values = policy(observation)
+        assert expected.std() > 0.1
+        torch.testing.assert_close(logits.torch(), expected, rtol=0, atol=1e-5)
+        torch.testing.assert_close(values.torch(), expected_values, rtol=0, atol=1e-5)
+
+
+def test_its_controller_drives_as_the_module_does(trained, session, town):
+    simulator, again = world_of(session, town), world_of(session, town)
+    controller = session.make_controller(simulator, renderer_of(session, simulator))
+    assert controller.name == "policy"
+    simulator.run(controller, 20)
+    policy, renderer = load_policy(trained[1] / "policy.safetensors"), renderer_of(session, again)
+    for _ in range(20):
+        observation = {name: array.torch() for name, array in again.observations.items()} | images_of(renderer, again)
+        again.step(policy.act(observation))
+    assert simulator.state_hash() == again.state_hash() and simulator.totals()["agent_steps"] > 100
+    sampled = session.make_controller(simulator, renderer_of(session, simulator), argmax=False, seed=3)
+    assert (sampled.act(simulator)["kind"] == 0).all() and len(set(sampled.act(simulator)["action"])) > 1
+
+
+def test_worlds_of_its_training_and_of_evaluations(session, town):
+    training, evaluation = session.training_world(), session.evaluation_world(77)
+    assert training["episode_steps"] == 60 and evaluation["episode_steps"] == 77
+    assert set(training["conditioning"]) == set(pictura.CONDITIONING_NAMES)
+    assert all(isinstance(value, float) for value in evaluation["conditioning"].values()) and evaluation["fixed_lights"]
+    simulator = pictura.Simulator([town], [(0, 4)], **evaluation)
+    assert len(np.unique(simulator.observations["conditioning"].numpy(), axis=0)) == 1
+
+
+def test_what_does_not_fit_a_session_is_named(trained, session, town):
+    simulator = world_of(session, town, agents=5)
+    observations = dict(simulator.observations.items())
+    with pytest.raises(pictura.Error, match="evaluate: ego: expected f32"):
+        session.evaluate(observations | {"ego": np.zeros((5, 9))})
+    with pytest.raises(pictura.Error, match="got 'egg'"):
+        session.evaluate({"egg": observations["ego"]})
+    with pytest.raises(pictura.Error, match="got none"):
+        session.evaluate({})
+    del observations["ego"]
+    renderer = renderer_of(session, simulator)
+    seen = {"scene": simulator.scene, "views": simulator.views, "renderer": renderer} if renderer else {}
+    with pytest.raises(pictura.Error, match="ego"):
+        session.evaluate(observations, **seen)
+    if renderer is not None:
+        with pytest.raises(pictura.Error, match="renderer"):
+            session.evaluate(simulator.observations)
+        with pytest.raises(pictura.Error, match="expected a renderer"):
+            session.make_controller(simulator)
+    other = world_of(session, town, agents=5)
+    with pytest.raises(pictura.Error, match="made for"):
+        session.make_controller(simulator, renderer).act(other)
+    with pytest.raises(pictura.Error, match="nowhere.ckpt"):
+        pictura.PolicySession("nowhere.ckpt")
+
+
+def test_a_controller_outlives_its_session(trained, town):
+    session = pictura.PolicySession(str(trained[1] / "checkpoint.ckpt"), device="cpu", num_threads=1)
+    simulator = world_of(session, town, agents=4)
+    controller = session.make_controller(simulator, renderer_of(session, simulator))
+    del session
+    simulator.run(controller, 3)
+
+
+def test_evaluation_gives_the_commands_numbers(trained):
+    command = os.environ.get("PICTURA_COMMAND")
+    folder, done = trained[1], []
+    options = {"scenarios": 2, "steps": 40, "agents_per_world": 6, "num_threads": 2, "device": "cpu"}
+    report = pictura.evaluate(
+        str(folder / "checkpoint.ckpt"), ["procedural:1"], on_progress=lambda fraction, eta_s: done.append(fraction), **options
+    )
+    (row,) = report["rows"]
+    assert row["scenarios"] == 2 and row["vehicle_episodes"] == 12 and done and done[-1] == 1
+    if not command:
+        pytest.skip("PICTURA_COMMAND names no command")
+    arguments = [f"--{name.replace('_', '-').replace('agents-per-world', 'agents')}={value}" for name, value in options.items()]
+    arguments = [part.replace("num-threads", "threads") for part in arguments]
+    out = subprocess.run(
+        [command, "evaluate", str(folder / "checkpoint.ckpt"), "--map", "procedural:1", "--json", *arguments],
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert out.returncode == 0, out.stderr
+    (theirs,) = json.loads(out.stdout)["rows"]
+    assert theirs["km_driven"] == pytest.approx(row["km_driven"], rel=1e-6) and row["km_driven"] > 0
+    assert json.loads(out.stdout)["policy_hash"] == report["policy_hash"]
+
+
+def test_the_documents_code_runs(tmp_path, monkeypatch, town):
+    monkeypatch.chdir(tmp_path)
+    text = (pathlib.Path(__file__).parents[2] / "docs" / "python.md").read_text()
+    (block,) = [each for each in re.findall(r"```python\n(.*?)```", text, re.S) if "pictura.train(" in each]
+    names = {"pictura": pictura, "town": town}
+    exec(compile(block.replace("configs/smoke.toml", SMOKE), "docs/python.md", "exec"), names)  # noqa: S102
+    assert names["logits"].shape == (16, 12) and names["rows"][0]["vehicle_episodes"] > 0
+
+
+def test_a_controller_is_evaluated_without_a_policy():
+    report = pictura.evaluate("", ["procedural:1"], controller="lane", scenarios=1, steps=100, agents_per_world=8, device="cpu")
+    assert report["rows"][0]["km_driven"] > 0.05 and report["policy_hash"] == "lane"
+    with pytest.raises(pictura.UsageError, match="expected one map"):
+        pictura.evaluate("", [], controller="lane")
+    with pytest.raises(pictura.UsageError, match="'light', 'medium' or 'dense', got 'thick'"):
+        pictura.evaluate("", ["procedural:1"], controller="lane", densities=["thick"])
+
+
+def test_what_a_callback_raises_ends_training(tmp_path):
+    def fail(progress):
+        raise ZeroDivisionError(progress["update"])
+
+    with pytest.raises(ZeroDivisionError, match="1"):
+        pictura.train(SMOKE, str(tmp_path / "run"), overrides=TRAIN, on_progress=fail)
+    with pytest.raises(pictura.Error, match="train.updaets"):
+        pictura.train(SMOKE, str(tmp_path / "other"), overrides=["train.updaets=2"])
+    with pytest.raises(pictura.UsageError, match="old_run: expected"):
+        pictura.train(SMOKE, str(tmp_path / "other"), old_run="keep")
+
+
+def test_interrupted_training_saves_and_goes_on(tmp_path):
+    code = f"""
+        import pictura
+        def train(old_run, on_progress):
+            pictura.train({SMOKE!r}, {str(tmp_path / "run")!r}, overrides=["train.updates=100000", "run.num_threads=1"],
+                          old_run=old_run, on_progress=on_progress)
+        try:
+            train("refuse", lambda progress: print(progress["update"], flush=True))
+        except KeyboardInterrupt:
+            print("interrupted", flush=True)
+        def once(progress):
+            print("again", progress["update"], flush=True)
+            raise EOFError
+        try:
+            train("resume", once)
+        except EOFError:
+            print("ended")
+    """
+    with subprocess.Popen([sys.executable, "-c", textwrap.dedent(code)], stdout=subprocess.PIPE, text=True) as process:
+        lines = [process.stdout.readline(), process.stdout.readline()]
+        process.send_signal(signal.SIGINT)
+        lines += process.stdout.read().split("\n")
+        assert process.wait(60) == 0
+    lines = [line.strip() for line in lines if line.strip()]
+    assert lines[:2] == ["1", "2"] and lines[-3:-1] == ["interrupted", f"again {int(lines[-4]) + 1}"] and lines[-1] == "ended"
+    assert len(lines) < 20, "it went on for long after the interrupt"
+
+
+def test_another_torch_or_none_is_named(monkeypatch):
+    from pictura._load_training import load
+
+    monkeypatch.setitem(sys.modules, "pictura._built_torch", types.SimpleNamespace(VERSION="2.9.9"))
+    with pytest.raises(ImportError, match=r"pictura.train: .* built with torch 2.9.9, and torch " + torch.__version__.split("+")[0]):
+        load("train")
+    monkeypatch.setitem(sys.modules, "torch", None)
+    with pytest.raises(ImportError, match="built with torch 2.9.9, and .*torch"):
+        load("train")
+    monkeypatch.setitem(sys.modules, "pictura._built_torch", None)
+    with pytest.raises(ImportError, match="built without pictura._training"):
+        load("evaluate")
+    with pytest.raises(AttributeError, match="no attribute 'trane'"):
+        pictura.trane  # noqa: B018
