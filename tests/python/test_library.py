@@ -1,5 +1,6 @@
 """Maps, rigs, scenes, renderers and simulators: as in C++, by the same names."""
 
+import importlib.util
 import pickle
 import subprocess
 import sys
@@ -238,3 +239,12 @@ def test_the_command_comes_along():
         pytest.skip("this package was built without the command")
     out = subprocess.run([sys.executable, "-m", "pictura", "--version"], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == pictura.__version__
+
+
+def test_a_package_without_training_says_so():
+    if importlib.util.find_spec("pictura._built_torch"):
+        pytest.skip("built beside torch")
+    for name in ("train", "evaluate", "PolicySession"):
+        with pytest.raises(ImportError, match=f"pictura.{name}: this package was built without pictura._training, which needs torch"):
+            getattr(pictura, name)
+    assert not hasattr(pictura._pictura, "train")
