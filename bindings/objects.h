@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "pictura/bindings/arrays.h"
-#include "pictura/bindings/call.h"
 #include "pictura/common/renderer.h"
 #include "pictura/simulator/compiled_map.h"
 #include "pictura/simulator/controllers/controller.h"
@@ -50,10 +49,9 @@ struct SimulatorInside {
   std::shared_ptr<Simulator> simulator;
 };
 
-/// What is inside a pictura.Renderer, which must live as long as `calls` is used.
+/// What is inside a pictura.Renderer.
 struct RendererInside {
   std::shared_ptr<Renderer> renderer;
-  Calls* calls;
 };
 
 /// What becomes a pictura.Controller.

@@ -216,7 +216,7 @@ class PyRenderer {
   explicit PyRenderer(std::shared_ptr<Renderer> renderer)
       : renderer_(std::move(renderer)), calls_(renderer_->config().num_threads, renderer_->device()) {}
 
-  RendererInside inside() { return {renderer_, &calls_}; }
+  RendererInside inside() const { return {renderer_}; }
   Renderer& renderer() { return *renderer_; }
   Calls& calls() { return calls_; }
   Stream stream() const { return stream_; }

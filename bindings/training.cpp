@@ -201,7 +201,7 @@ class PySession {
   py::object make_renderer() {
     std::shared_ptr<Renderer> renderer = calls_.run("make_renderer", [&] { return session_->make_renderer(); });
     if (!renderer) return py::none();
-    return of_main("Renderer")(RendererInside{std::move(renderer), nullptr});
+    return of_main("Renderer")(RendererInside{std::move(renderer)});
   }
 
   py::object make_controller(const py::object& simulator, const py::object& renderer, bool argmax, uint64_t seed) {
@@ -362,7 +362,7 @@ own. Returns a dict: rows, one a density: its counts, and each metric as (value,
 agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
   py::class_<PySession>(module, "PolicySession", R"(
 A saved policy: what it makes of scenes and observations, and the world and cameras that it was trained with. One thread at a
-time.)")
+time, also for a renderer that it is given.)")
       .def(
           py::init([](const std::string& checkpoint, int num_threads, const std::string& device,
                       const std::string& simulator, const std::string& renderer, const std::string& samples,

@@ -9,7 +9,7 @@ __all__: list[str] = ['PolicySession', 'evaluate', 'train']
 class PolicySession:
     """
     A saved policy: what it makes of scenes and observations, and the world and cameras that it was trained with. One thread at a
-    time.
+    time, also for a renderer that it is given.
     """
     def __init__(self, checkpoint: str, *, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}) -> None:
         """
