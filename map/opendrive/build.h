@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pictura/common/scene.h"
+#include "pictura/map/endless_lanes.h"
 #include "pictura/map/opendrive/curves.h"
 #include "pictura/map/opendrive/faults.h"
 #include "pictura/map/opendrive/model.h"
@@ -46,9 +47,6 @@ struct Build {
   }
 };
 
-/// Lane types of which routes are made.
-constexpr bool is_route(LaneType type) { return type == LaneType::driving || type == LaneType::ramp; }
-
 /// Whether traffic on the side of that sign (lane ids' sign) travels towards growing s: on the right of the reference
 /// line under right-hand traffic.
 constexpr bool travels_forward(const FileRoad& road, int side) { return (side < 0) != road.left_hand; }
@@ -64,11 +62,10 @@ inline SourceElement source_of(std::size_t road, const SourceLocation& where) {
   return {static_cast<int32_t>(road), where.line()};
 }
 
-/// Lanes of every type but "none": centre lines and neighbours, links, speed limits, and which are endless.
+/// Lanes of every type but "none": centre lines and neighbours, links, and speed limits.
 void build_lanes(Build* build);
 void link_lanes(Build* build);
 void set_speed_limits(Build* build);
-void find_endless_lanes(Build* build);
 
 /// The outline of the drivable surface.
 void build_road_edges(Build* build);

@@ -37,7 +37,7 @@ RoadMap parse_opendrive(std::string_view text, const std::string& source, const 
   opendrive::build_lanes(&build);
   opendrive::link_lanes(&build);
   opendrive::set_speed_limits(&build);
-  opendrive::find_endless_lanes(&build);
+  find_endless_lanes(&map);
   opendrive::build_road_edges(&build);
   opendrive::build_markings(&build);
   opendrive::build_objects(&build);

@@ -1,0 +1,48 @@
+#include "pictura/map/endless_lanes.h"
+
+#include <cstddef>
+#include <vector>
+
+namespace pictura {
+
+void find_endless_lanes(RoadMap* map_inout) {
+  RoadMap& map = *map_inout;
+  // Lanes connected by lane changes form a group, named by its leftmost lane. A group without successor groups is a
+  // dead end; dead ends are removed repeatedly, since this may leave their predecessors without successors.
+  std::vector<std::size_t> group(map.lanes.size());
+  std::vector<std::vector<std::size_t>> members(map.lanes.size());
+  for (std::size_t i = 0; i < map.lanes.size(); ++i) {
+    std::size_t leftmost = i;
+    while (map.lanes[leftmost].left_neighbor >= 0)
+      leftmost = static_cast<std::size_t>(map.lanes[leftmost].left_neighbor);
+    group[i] = leftmost;
+    members[leftmost].push_back(i);
+  }
+  auto is_route_lane = [&](int32_t lane) { return is_route(map.lanes[static_cast<std::size_t>(lane)].type); };
+  std::vector<int> num_exits(map.lanes.size(), 0);
+  for (std::size_t i = 0; i < map.lanes.size(); ++i) {
+    if (!is_route(map.lanes[i].type)) continue;
+    for (const int32_t next : map.links(map.lanes[i].successors)) num_exits[group[i]] += is_route_lane(next) ? 1 : 0;
+  }
+  std::vector<std::size_t> dead_ends;
+  for (std::size_t i = 0; i < map.lanes.size(); ++i) {
+    if (group[i] == i && num_exits[i] == 0) dead_ends.push_back(i);
+  }
+  while (!dead_ends.empty()) {
+    const std::size_t dead_end = dead_ends.back();
+    dead_ends.pop_back();
+    for (const std::size_t lane : members[dead_end]) {
+      if (!is_route(map.lanes[lane].type)) continue;
+      for (const int32_t before : map.links(map.lanes[lane].predecessors)) {
+        if (!is_route_lane(before)) continue;
+        const std::size_t other = group[static_cast<std::size_t>(before)];
+        if (--num_exits[other] == 0) dead_ends.push_back(other);
+      }
+    }
+  }
+  for (std::size_t i = 0; i < map.lanes.size(); ++i) {
+    map.lanes[i].is_endless = is_route(map.lanes[i].type) && num_exits[group[i]] > 0;
+  }
+}
+
+}  // namespace pictura
