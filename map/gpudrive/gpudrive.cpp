@@ -1,0 +1,281 @@
+#include "pictura/map/gpudrive/gpudrive.h"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <map>
+
+#include <nlohmann/json.hpp>
+
+namespace pictura::gpudrive {
+
+namespace {
+
+using Json = nlohmann::json;
+
+// WOMD's, from which the files are made; they do not say either.
+constexpr double kStep_s = 0.1;
+constexpr int32_t kHistorySteps = 10;
+constexpr int32_t kMaxId = 1'000'000'000;
+constexpr std::size_t kMaxLightStates = 8'000'000;
+
+const Json& member(const Json& object, const char* field) {
+  if (!object.is_object()) fail_field("", "expected an object, got {}", object.type_name());
+  const auto found = object.find(field);
+  if (found == object.end()) fail_field(field, "expected it, got nothing");
+  return *found;
+}
+
+const Json& array_of(const Json& object, const char* field) {
+  const Json& array = member(object, field);
+  if (!array.is_array()) fail_field(field, "expected an array, got {}", array.type_name());
+  return array;
+}
+
+double number_in(const Json& value, const char* field) {
+  if (!value.is_number()) fail_field(field, "expected a number, got {}", value.type_name());
+  return checked_number(field, value.get<double>());
+}
+
+double number_of(const Json& object, const char* field) { return number_in(member(object, field), field); }
+
+int64_t integer_of(const Json& object, const char* field) {
+  const Json& value = member(object, field);
+  if (!value.is_number_integer()) fail_field(field, "expected a whole number, got {}", value.type_name());
+  const auto number = value.get<int64_t>();
+  if (number < -kMaxId || number > kMaxId) {
+    fail_field(field, "expected a number of at most {} in magnitude, got {}", kMaxId, value.dump());
+  }
+  return number;
+}
+
+std::string text_of(const Json& object, const char* field) {
+  const Json& value = member(object, field);
+  if (!value.is_string()) fail_field(field, "expected a text, got {}", value.type_name());
+  const std::string& text = value.get_ref<const std::string&>();
+  constexpr std::size_t kLongest = 256;
+  if (text.size() > kLongest) fail_field(field, "expected at most {} bytes, got {}", kLongest, text.size());
+  for (const char letter : text) {
+    if (static_cast<unsigned char>(letter) < ' ')
+      fail_field(field, "expected no control characters, got {}", int{letter});
+  }
+  return text;
+}
+
+/// Flat geometry has no z.
+Eigen::Vector3d point_of(const Json& object) {
+  return {number_of(object, "x"), number_of(object, "y"), object.contains("z") ? number_of(object, "z") : 0.0};
+}
+
+void read_object(const Json& object, LoggedScene* scene) {
+  constexpr std::array kTypes{"unset", "vehicle", "pedestrian", "cyclist", "other"};
+  LoggedTrack& track = scene->tracks.emplace_back();
+  track.id = integer_of(object, "id");
+  const std::string type = text_of(object, "type");
+  const auto known = std::find(kTypes.begin(), kTypes.end(), type);
+  track.type = known == kTypes.end() ? TrackType::other : static_cast<TrackType>(known - kTypes.begin());
+  if (object.contains("mark_as_expert")) {
+    const Json& mark = object["mark_as_expert"];
+    if (!mark.is_boolean()) fail_field("mark_as_expert", "expected true or false, got {}", mark.type_name());
+    track.control = mark.get<bool>() ? RecordedControl::expert : RecordedControl::controllable;
+  }
+  const Json &position = array_of(object, "position"), &heading = array_of(object, "heading"),
+             &velocity = array_of(object, "velocity"), &valid = array_of(object, "valid");
+  if (scene->num_steps == 0) {
+    if (position.empty() || position.size() > static_cast<std::size_t>(kMaxScenarioSteps)) {
+      fail_field("position", "expected 1 to {} steps, got {}", kMaxScenarioSteps, position.size());
+    }
+    scene->num_steps = static_cast<int32_t>(position.size());
+  }
+  const auto steps = static_cast<std::size_t>(scene->num_steps);
+  for (const auto& [field, array] : {std::pair{"position", &position}, std::pair{"heading", &heading},
+                                     std::pair{"velocity", &velocity}, std::pair{"valid", &valid}}) {
+    if (array->size() != steps) fail_field(field, "expected {} steps, got {}", steps, array->size());
+  }
+  const double length_m = number_of(object, "length"), width_m = number_of(object, "width"),
+               height_m = number_of(object, "height");
+  for (std::size_t i = 0; i < steps; ++i) {
+    LoggedState& state = track.states.emplace_back();
+    within("valid", i, [&] {
+      if (!valid[i].is_boolean()) fail_field("", "expected true or false, got {}", valid[i].type_name());
+    });
+    if (!valid[i].get<bool>()) continue;
+    state.valid = true;
+    state.center_m = within("position", i, [&] { return point_of(position[i]); });
+    state.heading_rad = within("heading", i, [&] { return number_in(heading[i], ""); });
+    within("velocity", i, [&] {
+      state.velocity_x_mps = number_of(velocity[i], "x");
+      state.velocity_y_mps = number_of(velocity[i], "y");
+    });
+    state.length_m = length_m;
+    state.width_m = width_m;
+    state.height_m = height_m;
+  }
+}
+
+void read_road(const Json& road, std::size_t index, LoggedScene* scene) {
+  // Lanes 0 to 3, lines 5 to 13, edges 14 to 16, and one number each for the rest.
+  constexpr int64_t kLastLane = 3, kFirstLine = 5, kLastLine = 13, kLastEdge = 16, kStopSign = 17, kCrosswalk = 18,
+                    kSpeedBump = 19, kDriveway = 20;
+  const int64_t type = integer_of(road, "map_element_id");
+  // Running numbers of some writers repeat; the place in the file does not.
+  const auto id = static_cast<int64_t>(index);
+  const Json& geometry = array_of(road, "geometry");
+  LoggedPoints points;
+  for (std::size_t i = 0; i < geometry.size(); ++i) {
+    points.push_back(within("geometry", i, [&] { return point_of(geometry[i]); }));
+  }
+  if (type >= 0 && type <= kLastLane) {
+    scene->lanes.push_back({.id = id, .type = static_cast<LoggedLaneType>(type), .points = std::move(points)});
+  } else if (type >= kFirstLine && type <= kLastLine) {
+    scene->lines.push_back(
+        {.id = id, .type = static_cast<LoggedLineType>(type - kFirstLine), .points = std::move(points)});
+  } else if (type > kLastLine && type <= kLastEdge) {
+    scene->edges.push_back({.id = id, .points = std::move(points)});
+  } else if (type == kCrosswalk) {
+    scene->crosswalks.push_back({.id = id, .points = std::move(points)});
+  } else if (type == kStopSign) {
+    if (points.empty()) fail_field("geometry", "expected the point of a stop sign, got none");
+    scene->stop_signs.push_back({.id = id, .position_m = points[0]});
+  } else if (type == kSpeedBump || type == kDriveway) {
+    scene->note("speed bumps and driveways, which maps do not have, left out", fmt::format("roads[{}]", index));
+  } else {
+    scene->note("roads of no known kind left out", fmt::format("roads[{}]", index));
+  }
+}
+
+RecordedLightState light_state(const std::string& text) {
+  if (text == "unknown") return RecordedLightState::none;
+  for (int i = 1; i <= static_cast<int>(RecordedLightState::flashing_caution); ++i) {
+    const auto state = static_cast<RecordedLightState>(i);
+    if (text == to_string(state)) return state;
+  }
+  fail_field("", "expected a state such as stop, caution, go or unknown, got '{}'", text);
+}
+
+/// `lane_ids`: the place in the file of each lane, by its id as text.
+void read_light(const std::string& lane, const Json& light, const std::map<std::string, int64_t>& lane_ids,
+                LoggedScene* scene) {
+  const Json& states = array_of(light, "state");
+  const auto steps = static_cast<std::size_t>(scene->num_steps);
+  const auto found = lane_ids.find(lane);
+  if (found == lane_ids.end()) {
+    scene->note("lights of lanes that the map does not have left out", fmt::format("tl_states.{}", lane));
+    return;
+  }
+  LoggedLight logged;
+  logged.lanes = {found->second};
+  logged.states.assign(steps, RecordedLightState::none);
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    std::size_t step = i;
+    if (light.contains("time_index")) {
+      const Json& times = array_of(light, "time_index");
+      if (times.size() != states.size()) {
+        fail_field("time_index", "expected {} of them, got {}", states.size(), times.size());
+      }
+      within("time_index", i, [&] {
+        const int64_t time = times[i].is_number_integer() ? times[i].get<int64_t>() : -1;
+        if (time < 0 || time >= static_cast<int64_t>(steps)) {
+          fail_field("", "expected a step in [0, {}), got {}", steps,
+                     times[i].is_number_integer() ? fmt::format("{}", time) : times[i].type_name());
+        }
+        step = static_cast<std::size_t>(time);
+      });
+    }
+    if (step >= steps) fail_field("state", "expected at most {} steps, got {}", steps, states.size());
+    within("state", i, [&] {
+      if (!states[i].is_string()) fail_field("", "expected a text, got {}", states[i].type_name());
+      logged.states[step] = light_state(states[i].get<std::string>());
+    });
+  }
+  scene->lights.push_back(std::move(logged));
+}
+
+void read_metadata(const Json& metadata, LoggedScene* scene) {
+  const auto tracks = static_cast<int64_t>(scene->tracks.size());
+  // Indices are of the recording's tracks, of which the file may lack some.
+  const auto is_track = [&](int64_t index, const char* what) {
+    if (index >= 0 && index < tracks) return true;
+    scene->note("indices of the recording's tracks that are no object of the file left out", what);
+    return false;
+  };
+  if (metadata.contains("sdc_track_index")) {
+    const int64_t index = integer_of(metadata, "sdc_track_index");
+    if (is_track(index, "sdc_track_index")) scene->sdc_track = static_cast<int32_t>(index);
+  }
+  if (metadata.contains("objects_of_interest")) {
+    for (const Json& id : array_of(metadata, "objects_of_interest")) {
+      if (!id.is_number_integer()) fail_field("objects_of_interest", "expected whole numbers, got {}", id.type_name());
+      scene->objects_of_interest.push_back(id.get<int64_t>());
+    }
+  }
+  if (metadata.contains("tracks_to_predict")) {
+    const Json& predictions = array_of(metadata, "tracks_to_predict");
+    for (std::size_t i = 0; i < predictions.size(); ++i) {
+      within("tracks_to_predict", i, [&] {
+        const int64_t index = integer_of(predictions[i], "track_index");
+        const int64_t difficulty = predictions[i].contains("difficulty") ? integer_of(predictions[i], "difficulty") : 0;
+        if (!is_track(index, "tracks_to_predict")) return;
+        scene->predictions.emplace_back(static_cast<int32_t>(index), static_cast<int32_t>(difficulty));
+      });
+    }
+  }
+}
+
+}  // namespace
+
+LoggedScene parse_scene(std::string_view text, const std::string& source) {
+  LoggedScene scene;
+  scene.source = source;
+  scene.format = "gpudrive";
+  scene.names = {.tracks = "objects", .features = "roads"};
+  scene.has_links = false;
+  scene.dt_s = kStep_s;
+  scene.name = std::filesystem::path(source).stem().string();
+  try {
+    Json json;
+    try {
+      json = Json::parse(text);
+    } catch (const Json::exception& error) {
+      // Of the library: "[json.exception.parse_error.101] parse error at line 1, column 2: ..."
+      std::string reason = error.what();
+      reason.erase(0, reason.find(']') == std::string::npos ? 0 : reason.find(']') + 2);
+      fail_field("", "expected JSON, got a {}", reason);
+    }
+    if (json.is_object() && json.contains("scenario_id")) scene.id = text_of(json, "scenario_id");
+    const Json& objects = array_of(json, "objects");
+    if (objects.size() > static_cast<std::size_t>(kMaxScenarioTracks)) {
+      fail_field("objects", "expected at most {}, got {}", kMaxScenarioTracks, objects.size());
+    }
+    for (std::size_t i = 0; i < objects.size(); ++i) within("objects", i, [&] { read_object(objects[i], &scene); });
+    if (objects.empty()) fail_field("objects", "expected at least one, got none");
+    scene.current_step = std::min(kHistorySteps, scene.num_steps - 1);
+    const Json& roads = array_of(json, "roads");
+    for (std::size_t i = 0; i < roads.size(); ++i) within("roads", i, [&] { read_road(roads[i], i, &scene); });
+    if (json.contains("tl_states")) {
+      const Json& lights = json["tl_states"];
+      if (!lights.is_object()) fail_field("tl_states", "expected an object, got {}", lights.type_name());
+      const auto steps = static_cast<std::size_t>(scene.num_steps);
+      if (lights.size() * steps > kMaxLightStates) {
+        fail_field("tl_states", "expected at most {} lights at {} steps, got {}", kMaxLightStates / steps, steps,
+                   lights.size());
+      }
+      std::map<std::string, int64_t> lane_ids;
+      for (std::size_t i = 0; i < roads.size(); ++i) {
+        if (!roads[i].contains("id") || !roads[i]["id"].is_number_integer()) continue;
+        lane_ids.emplace(std::to_string(roads[i]["id"].get<int64_t>()), static_cast<int64_t>(i));
+      }
+      for (const auto& [lane, light] : lights.items()) {
+        within("tl_states", [&] { within(lane, [&] { read_light(lane, light, lane_ids, &scene); }); });
+      }
+    }
+    if (json.contains("metadata")) within("metadata", [&] { read_metadata(member(json, "metadata"), &scene); });
+  } catch (const FieldError& error) {
+    throw to_error(source, error);
+  } catch (const Json::exception& error) {
+    fail("{}: {}", source, error.what());
+  }
+  return scene;
+}
+
+}  // namespace pictura::gpudrive

@@ -1,0 +1,15 @@
+// GPUDrive's JSON scenes, which PufferDrive's converters read too and ScenarioMax writes.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "pictura/map/scenario/logged_scene.h"
+
+namespace pictura::gpudrive {
+
+/// The scene in a file's text. Throws Error "SOURCE: objects[3].position[17].x: expected ..., got ..." where the text
+/// is no JSON, a field is missing or of another type, or a number in a valid state or a point is not finite.
+LoggedScene parse_scene(std::string_view text, const std::string& source);
+
+}  // namespace pictura::gpudrive

@@ -1,0 +1,69 @@
+// The stages of make_scenario(), in the order in which they run. Each fills its own parts of the scenario and may read
+// those of earlier stages. The rules are those of docs/scenario.md.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "pictura/common/grid.h"
+#include "pictura/map/polyline.h"
+#include "pictura/map/scenario/logged_scene.h"
+#include "pictura/map/scenario/scenario_fields.h"
+
+namespace pictura::conversion {
+
+/// Points nearer than this to the one before are duplicates.
+constexpr double kSamePoint_m = 0.01;
+/// How far polylines may deviate from the file's.
+constexpr double kTolerance_m = 0.02;
+
+struct Conversion {
+  LoggedScene& scene;
+  Scenario* out;
+  Eigen::Vector3d origin{0, 0, 0};
+  std::vector<std::size_t> logged_lane{};             // [map.lanes] index into scene.lanes
+  std::unordered_map<int64_t, int32_t> lane_of_id{};  // index into map.lanes
+  int64_t remaining_work = 400'000'000;               // of all loops whose length a file decides
+
+  /// Counts work, so that no file can take minutes. Throws Error.
+  void count_work(std::size_t amount) {
+    remaining_work -= static_cast<int64_t>(amount);
+    if (remaining_work < 0) fail("{}: its map needs more work than a scene may take", scene.source);
+  }
+  Eigen::Vector3d from_origin(const Eigen::Vector3d& p) const { return p - origin; }
+};
+
+/// The points about the origin, without duplicates, none farther than max_piece_m from the next, and thinned. Throws
+/// Error naming `what` where a point is too far from the origin. Empty if there are fewer than two points.
+std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& points, const std::vector<double>& widths,
+                                  const std::string& what);
+
+/// Lanes in a grid, for what crosses them and for what is near.
+struct LaneSegment {
+  Vec3 a_m, b_m;
+  int32_t lane = 0;
+};
+struct LaneSegments {
+  std::vector<LaneSegment> segments;
+  Grid grid;
+};
+LaneSegments segments_of(const RoadMap& map, bool (*is_wanted)(const Lane&));
+
+/// Whether two segments cross in plan at about one height, other than in an end of either.
+bool cross(Vec3 a, Vec3 b, Vec3 c, Vec3 d);
+
+/// Sets the origin: the centre of the lanes' and edges' bounding box, in whole metres.
+void choose_origin(Conversion* conversion);
+void make_lanes(Conversion* conversion);
+void link_lanes(Conversion* conversion);
+void find_junctions(Conversion* conversion);
+void make_edges(Conversion* conversion);
+void make_markings(Conversion* conversion);
+void make_signs(Conversion* conversion);
+void make_tracks(Conversion* conversion);
+void make_lights(Conversion* conversion);
+void count_facts(RoadMap* map);
+
+}  // namespace pictura::conversion

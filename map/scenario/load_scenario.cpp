@@ -1,0 +1,252 @@
+#include "pictura/map/scenario/load_scenario.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include <sys/stat.h>
+
+#include "pictura/common/support/file.h"
+#include "pictura/common/support/hash.h"
+#include "pictura/common/support/numbers.h"
+#include "pictura/map/field_codec.h"
+#include "pictura/map/gpudrive/gpudrive.h"
+#include "pictura/map/map_fields.h"
+#include "pictura/map/pufferdrive/pufferdrive.h"
+#include "pictura/map/scenario/logged_scene.h"
+#include "pictura/map/scenario/scene_cache.h"
+#include "pictura/map/womd/womd.h"
+
+namespace pictura {
+
+namespace fs = std::filesystem;
+
+/// A record of a TFRecord file as its cached index has it.
+struct IndexedRecord {
+  uint64_t offset = 0, bytes = 0;
+  std::string id;
+};
+struct ShardIndex {
+  std::vector<IndexedRecord> records;
+  std::string fault;
+};
+
+PICTURA_FIELDS(IndexedRecord, offset, bytes, id)
+PICTURA_FIELDS(ShardIndex, records, fault)
+
+namespace {
+
+enum class SceneFormat { none, womd, gpudrive, pufferdrive };
+
+/// What says whether a file is still the same.
+struct FileVersion {
+  uint64_t bytes = 0;
+  int64_t changed_ns = 0;
+};
+
+constexpr std::size_t kMaxJson_bytes = std::size_t{1} << 26, kMaxBinary_bytes = std::size_t{1} << 28;
+constexpr std::string_view kShard = ".tfrecord";
+
+SceneFormat format_of(std::string_view path) {
+  const std::string name = fs::path(path).filename().string();
+  if (name.ends_with(".json")) return SceneFormat::gpudrive;
+  if (name.ends_with(".bin")) return SceneFormat::pufferdrive;
+  // Shards of the dataset are called NAME.tfrecord-00000-of-00150; GPUDrive's names of JSON files begin with tfrecord.
+  if (name.find(kShard) != std::string::npos) return SceneFormat::womd;
+  return SceneFormat::none;
+}
+
+struct SceneName {
+  std::string path, selector;
+};
+
+/// Names with # are files' names where there is such a file.
+SceneName split(std::string_view name) {
+  std::error_code error;
+  const std::size_t mark = name.rfind('#');
+  if (mark == std::string_view::npos || fs::exists(name, error)) return {std::string(name), ""};
+  return {std::string(name.substr(0, mark)), std::string(name.substr(mark + 1))};
+}
+
+FileVersion version_of(const std::string& path) {
+  struct stat status{};
+  PICTURA_CHECK(::stat(path.c_str(), &status) == 0, "{}: no such file", path);
+  return {static_cast<uint64_t>(status.st_size),
+          int64_t{status.st_mtim.tv_sec} * 1'000'000'000 + int64_t{status.st_mtim.tv_nsec}};
+}
+
+uint64_t hash_of_path(const std::string& path) {
+  std::error_code error;
+  return hash_of(fs::weakly_canonical(path, error).string());
+}
+
+/// Of a cached index or scene: of which file in which version.
+uint64_t hash_of_version(const FileVersion& version) {
+  Hash64 hash;
+  hash.add_bytes(&version.bytes, sizeof version.bytes);
+  hash.add_bytes(&version.changed_ns, sizeof version.changed_ns);
+  return hash.value();
+}
+
+ShardIndex scan_shard(const std::string& path) {
+  const womd::FileBytes file(path);
+  womd::RecordList list = womd::list_records(file, path);
+  ShardIndex index{{}, std::move(list.fault)};
+  for (std::size_t k = 0; k < list.records.size(); ++k) {
+    const womd::RecordPlace place = list.records[k];
+    std::string id;
+    try {
+      id = womd::scan_scenario_id(file, place);
+    } catch (const FieldError&) {
+      // Reading the record says what is wrong with it.
+    }
+    index.records.push_back({place.offset, place.bytes, std::move(id)});
+  }
+  return index;
+}
+
+ShardIndex index_shard(const std::string& path) {
+  const std::string folder = cache_folder("scenes");
+  if (folder.empty()) return scan_shard(path);
+  const std::string cached = fmt::format("{}/{:016x}.index", folder, hash_of_path(path));
+  const SceneCacheKey key{.file = hash_of_version(version_of(path)), .record = SceneCacheKey::kIndex};
+  std::error_code error;
+  if (fs::exists(cached, error)) {
+    try {
+      ShardIndex index;
+      decode_cached(read_file(cached), key, cached, [&](FieldReader* reader) { reader->get(&index); });
+      return index;
+    } catch (const Error&) {
+      // Stale or damaged: made again.
+    }
+  }
+  ShardIndex index = scan_shard(path);
+  try_to_cache(cached, encode_cached(key, [&](FieldWriter* writer) { writer->put(index); }));
+  return index;
+}
+
+void append_scenes(const std::string& path, SceneIndex* index_out) {
+  if (format_of(path) != SceneFormat::womd) {
+    index_out->scenes.push_back({.file = path});
+    return;
+  }
+  ShardIndex shard = index_shard(path);
+  for (std::size_t k = 0; k < shard.records.size(); ++k) {
+    IndexedRecord& record = shard.records[k];
+    index_out->scenes.push_back({path, static_cast<int32_t>(k), record.offset, record.bytes, std::move(record.id)});
+  }
+  if (!shard.fault.empty()) index_out->faults.push_back(std::move(shard.fault));
+}
+
+LoggedScene parse(std::string_view bytes, const std::string& name) {
+  switch (format_of(name)) {
+    case SceneFormat::gpudrive: return gpudrive::parse_scene(bytes, name);
+    case SceneFormat::pufferdrive: return pufferdrive::parse_scene(bytes, name);
+    default: break;
+  }
+  fail_usage("{}: expected a scene: FILE.json, FILE.bin or a file with {} in its name", name, kShard);
+}
+
+Scenario import_scene(const SceneRef& scene) {
+  if (scene.record >= 0) {
+    const womd::FileBytes file(scene.file);
+    const auto record = static_cast<std::size_t>(scene.record);
+    const std::string payload = womd::read_record(file, scene.file, record, {scene.offset, scene.bytes});
+    return make_scenario(womd::parse_scenario(payload, fmt::format("{}: record {}", scene.file, record)));
+  }
+  const bool is_json = format_of(scene.file) == SceneFormat::gpudrive;
+  return make_scenario(parse(read_file(scene.file, is_json ? kMaxJson_bytes : kMaxBinary_bytes), scene.file));
+}
+
+}  // namespace
+
+bool is_scene_name(std::string_view name) {
+  const SceneName scene = split(name);
+  std::error_code error;
+  return format_of(scene.path) != SceneFormat::none || fs::is_directory(scene.path, error);
+}
+
+SceneIndex index_scenes(const std::string& path) {
+  SceneIndex index;
+  std::error_code error;
+  if (!fs::is_directory(path, error)) {
+    PICTURA_CHECK(fs::exists(path, error), "{}: no such file or folder", path);
+    append_scenes(path, &index);
+    return index;
+  }
+  std::vector<std::string> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(path, error)) {
+    std::error_code ignored;
+    if (entry.is_directory(ignored)) continue;
+    if (format_of(entry.path().string()) != SceneFormat::none) files.push_back(entry.path().string());
+  }
+  PICTURA_CHECK(!error, "{}: the folder cannot be read: {}", path, error.message());
+  PICTURA_CHECK(!files.empty(), "{}: expected scenes (.json, .bin or {} files) in the folder, got none", path, kShard);
+  std::sort(files.begin(), files.end());
+  for (const std::string& file : files) {
+    try {
+      append_scenes(file, &index);
+    } catch (const Error& fault) {
+      index.faults.emplace_back(fault.what());
+    }
+  }
+  return index;
+}
+
+SceneRef find_scene(const std::string& name) {
+  const SceneName wanted = split(name);
+  SceneIndex index = index_scenes(wanted.path);
+  if (index.scenes.empty()) fail("{}: {}", wanted.path, index.faults.empty() ? "holds no scene" : index.faults.front());
+  if (wanted.selector.empty()) return index.scenes.front();
+  for (const SceneRef& scene : index.scenes) {
+    if (scene.id == wanted.selector) return scene;
+  }
+  if (const std::optional<uint64_t> number = parse_unsigned(wanted.selector)) {
+    if (*number < index.scenes.size()) return index.scenes[static_cast<std::size_t>(*number)];
+  }
+  // What follows the last whole record may have been the one that was asked for.
+  fail_usage("{}: expected #0 to #{} or the id of one of its scenes, got #{}{}", wanted.path, index.scenes.size() - 1,
+             wanted.selector, index.faults.empty() ? "" : fmt::format(" ({})", index.faults.front()));
+}
+
+Scenario load_scenario(const SceneRef& scene, SceneReport* report_out) {
+  SceneReport unused;
+  SceneReport& report = report_out ? *report_out : unused;
+  report = {};
+  const std::string folder = cache_folder("scenes");
+  if (folder.empty()) return import_scene(scene);
+  const std::string cached =
+      fmt::format("{}/{:016x}/{}.scene", folder, hash_of_path(scene.file), std::max(scene.record, 0));
+  const SceneCacheKey key{.file = hash_of_version(version_of(scene.file)), .record = scene.record};
+  std::error_code error;
+  if (fs::exists(cached, error)) {
+    try {
+      Scenario scenario = decode_scenario(read_file(cached), key, cached);
+      report.cached = true;
+      return scenario;
+    } catch (const Error& rejection) {
+      report.cache_rejection = rejection.what();
+    }
+  }
+  Scenario scenario = import_scene(scene);
+  try_to_cache(cached, encode_scenario(scenario, key));
+  return scenario;
+}
+
+Scenario load_scenario(const std::string& name, SceneReport* report_out) {
+  return load_scenario(find_scene(name), report_out);
+}
+
+Scenario parse_scenario_file(std::string_view bytes, const std::string& name, int32_t record) {
+  if (format_of(name) != SceneFormat::womd) return make_scenario(parse(bytes, name));
+  const womd::MemoryBytes file(bytes);
+  const womd::RecordList list = womd::list_records(file, name);
+  const auto k = static_cast<std::size_t>(record);
+  if (k >= list.records.size()) {
+    if (!list.fault.empty()) throw Error(list.fault);
+    fail("{}: expected a record {}, got {} records", name, record, list.records.size());
+  }
+  const std::string payload = womd::read_record(file, name, k, list.records[k]);
+  return make_scenario(womd::parse_scenario(payload, fmt::format("{}: record {}", name, record)));
+}
+
+}  // namespace pictura

@@ -1,0 +1,440 @@
+// Lanes of a scenario: centre lines, widths from borders, types, links, neighbours, junctions.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <numeric>
+#include <optional>
+#include <set>
+
+#include "pictura/common/scene.h"
+#include "pictura/map/scenario/conversion.h"
+#include "pictura/map/speed_limit.h"
+
+namespace pictura::conversion {
+
+namespace {
+
+constexpr double kLaneWidth_m = 3.5, kBikeLaneWidth_m = 1.8;        // where nothing is known
+constexpr double kMinHalfWidth_m = 0.5, kMaxHalfWidth_m = 5.0;      // a border farther away is another lane's
+constexpr int32_t kWidthStride = 5;                                 // points of a lane from one measurement to the next
+constexpr double kMeetingEnds_m = 0.1, kMeetingHeading_rad = 1.05;  // ends of lanes that continue each other
+constexpr double kWideGap_m = 1.0;
+constexpr float kMeetingLevel_m = 1.0f;
+
+std::string place_of(const LoggedLane& lane) { return fmt::format("lane {}", lane.id); }
+
+double distance_to(const Eigen::Vector2d& p, const LoggedPoints& line) {
+  double best = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i + 1 < line.size(); ++i) {
+    const Eigen::Vector2d a = line[i].head<2>(), way = line[i + 1].head<2>() - a;
+    const double length2 = way.squaredNorm();
+    const double t = length2 > 0 ? std::clamp((p - a).dot(way) / length2, 0.0, 1.0) : 0.0;
+    best = std::min(best, (a + t * way - p).norm());
+  }
+  return best;
+}
+
+/// Measures widths from the borders that lanes name.
+class WidthRuler {
+ public:
+  explicit WidthRuler(Conversion* conversion) : conversion_(conversion) {
+    for (const LoggedLine& line : conversion->scene.lines) features_.emplace(line.id, &line.points);
+    for (const LoggedEdge& edge : conversion->scene.edges) features_.emplace(edge.id, &edge.points);
+  }
+
+  /// The width at every point of a lane; nothing where no border is known.
+  std::optional<std::vector<double>> measure(const LoggedLane& lane) {
+    if (!lane.widths_m.empty()) return lane.widths_m;
+    std::map<std::size_t, double> left, right;  // half widths by point
+    measure_side(lane, lane.left_boundaries, &left);
+    measure_side(lane, lane.right_boundaries, &right);
+    std::map<std::size_t, double> known = left;
+    for (auto& [point, half] : known) half *= 2;
+    for (const auto& [point, half] : right) {
+      const auto other = left.find(point);
+      known[point] = other == left.end() ? 2 * half : other->second + half;
+    }
+    if (known.empty()) return std::nullopt;
+    return filled(known, lane.points.size());
+  }
+
+ private:
+  void measure_side(const LoggedLane& lane, const std::vector<LoggedBoundary>& borders,
+                    std::map<std::size_t, double>* halves_out) {
+    for (const LoggedBoundary& border : borders) {
+      const auto feature = features_.find(border.feature);
+      if (feature == features_.end()) {
+        conversion_->scene.note("borders that the map does not have", place_of(lane));
+        continue;
+      }
+      const int32_t last = std::min(border.end, static_cast<int32_t>(lane.points.size()) - 1);
+      for (int32_t i = std::max(border.begin, 0); i <= last;
+           i = i < last ? std::min(i + kWidthStride, last) : last + 1) {
+        conversion_->count_work(feature->second->size());
+        const double half_m = distance_to(lane.points[static_cast<std::size_t>(i)].head<2>(), *feature->second);
+        if (half_m < kMinHalfWidth_m || half_m > kMaxHalfWidth_m) continue;
+        const auto [at, is_new] = halves_out->emplace(static_cast<std::size_t>(i), half_m);
+        if (!is_new) at->second = std::min(at->second, half_m);
+      }
+    }
+  }
+
+  /// Linear between known points, constant beyond them.
+  static std::vector<double> filled(const std::map<std::size_t, double>& known, std::size_t count) {
+    std::vector<double> widths(count);
+    auto next = known.begin();
+    for (std::size_t i = 0; i < count; ++i) {
+      while (next != known.end() && next->first < i) ++next;
+      if (next == known.begin()) {
+        widths[i] = next->second;
+      } else if (next == known.end()) {
+        widths[i] = std::prev(next)->second;
+      } else {
+        const auto before = std::prev(next);
+        const double t = static_cast<double>(i - before->first) / static_cast<double>(next->first - before->first);
+        widths[i] = before->second + t * (next->second - before->second);
+      }
+    }
+    return widths;
+  }
+
+  Conversion* conversion_;
+  std::unordered_map<int64_t, const LoggedPoints*> features_;
+};
+
+double mean_of(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+/// Gives lanes without borders the mean width of neighbours, else the widths of the lanes before and after, else a
+/// constant.
+void complete_widths(Conversion* conversion, std::vector<std::optional<std::vector<double>>>* widths_inout) {
+  const LoggedScene& scene = conversion->scene;
+  std::unordered_map<int64_t, const std::vector<double>*> measured;
+  for (std::size_t i = 0; i < scene.lanes.size(); ++i) {
+    if ((*widths_inout)[i]) measured.emplace(scene.lanes[i].id, &*(*widths_inout)[i]);
+  }
+  std::vector<std::vector<double>> completed(scene.lanes.size());
+  for (std::size_t i = 0; i < scene.lanes.size(); ++i) {
+    if ((*widths_inout)[i]) continue;
+    const LoggedLane& lane = scene.lanes[i];
+    std::vector<double> beside, at_begin, at_end;
+    for (const auto* neighbors : {&lane.left_neighbors, &lane.right_neighbors}) {
+      conversion->count_work(neighbors->size());
+      for (const LoggedNeighbor& neighbor : *neighbors) {
+        if (const auto found = measured.find(neighbor.lane); found != measured.end()) {
+          conversion->count_work(found->second->size());
+          beside.push_back(mean_of(*found->second));
+        }
+      }
+    }
+    conversion->count_work(lane.entries.size() + lane.exits.size());
+    for (const int64_t id : lane.entries) {
+      if (const auto found = measured.find(id); found != measured.end()) at_begin.push_back(found->second->back());
+    }
+    for (const int64_t id : lane.exits) {
+      if (const auto found = measured.find(id); found != measured.end()) at_end.push_back(found->second->front());
+    }
+    double begin_m = lane.type == LoggedLaneType::bike ? kBikeLaneWidth_m : kLaneWidth_m, end_m = begin_m;
+    if (!beside.empty()) {
+      begin_m = end_m = mean_of(beside);
+    } else if (!at_begin.empty() || !at_end.empty()) {
+      begin_m = mean_of(at_begin.empty() ? at_end : at_begin);
+      end_m = mean_of(at_end.empty() ? at_begin : at_end);
+    }
+    const std::size_t count = lane.points.size();
+    for (std::size_t k = 0; k < count; ++k) {
+      const double t = count > 1 ? static_cast<double>(k) / static_cast<double>(count - 1) : 0;
+      completed[i].push_back(begin_m + t * (end_m - begin_m));
+    }
+  }
+  for (std::size_t i = 0; i < scene.lanes.size(); ++i) {
+    if (!(*widths_inout)[i]) (*widths_inout)[i] = std::move(completed[i]);
+  }
+}
+
+LaneType type_of(LoggedLaneType type) {
+  switch (type) {
+    case LoggedLaneType::freeway:
+    case LoggedLaneType::surface:
+    case LoggedLaneType::bus: return LaneType::driving;
+    case LoggedLaneType::bike: return LaneType::biking;
+    case LoggedLaneType::undefined: break;
+  }
+  return LaneType::other;
+}
+
+void append_points(const std::vector<CurvePoint>& points, RoadMap* map, Lane* lane) {
+  lane->points.begin = static_cast<int32_t>(map->lane_points.size());
+  const auto heading_of = [&](std::size_t i) {
+    const Eigen::Vector2d before =
+        (points[std::min(i + 1, points.size() - 1)].position_m - points[i + 1 < points.size() ? i : i - 1].position_m)
+            .head<2>();
+    return std::atan2(before.y(), before.x());
+  };
+  double s_m = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (i > 0) s_m += plan_distance_m(points[i - 1].position_m, points[i].position_m);
+    double heading = heading_of(i);
+    if (i > 0 && i + 1 < points.size()) {
+      // Between the directions of the chords that meet here.
+      heading = heading_of(i - 1) + 0.5 * std::remainder(heading - heading_of(i - 1), 2 * std::numbers::pi);
+    }
+    map->lane_points.push_back({to_vec3(points[i].position_m),
+                                static_cast<float>(std::remainder(heading, 2 * std::numbers::pi)),
+                                static_cast<float>(points[i].width), static_cast<float>(s_m)});
+  }
+  lane->points.end = static_cast<int32_t>(map->lane_points.size());
+  lane->length_m = static_cast<float>(s_m);
+}
+
+const LanePoint& start_of(const RoadMap& map, int32_t lane) {
+  return map.points_of(map.lanes[static_cast<std::size_t>(lane)])[0];
+}
+const LanePoint& end_of(const RoadMap& map, int32_t lane) {
+  const Span<const LanePoint> points = map.points_of(map.lanes[static_cast<std::size_t>(lane)]);
+  return points[points.size() - 1];
+}
+
+using Links = std::set<std::pair<int32_t, int32_t>>;
+
+/// The links that the file states, from either side.
+Links stated_links(Conversion* conversion) {
+  LoggedScene& scene = conversion->scene;
+  const RoadMap& map = conversion->out->map;
+  Links links;
+  const auto add = [&](int64_t from_id, int64_t to_id, const LoggedLane& stated_by) {
+    const auto from = conversion->lane_of_id.find(from_id), to = conversion->lane_of_id.find(to_id);
+    if (from == conversion->lane_of_id.end() || to == conversion->lane_of_id.end()) {
+      scene.note("links to lanes that the map does not have left out", place_of(stated_by));
+      return;
+    }
+    if (from->second == to->second) {
+      scene.note("links of a lane to itself left out", place_of(stated_by));
+      return;
+    }
+    const int32_t a = from->second, b = to->second;
+    const float gap_m = length(end_of(map, a).position_m - start_of(map, b).position_m);
+    const float other_m = length(end_of(map, b).position_m - start_of(map, a).position_m);
+    if (gap_m > kWideGap_m && other_m < kMeetingEnds_m) {
+      if (links.emplace(b, a).second)
+        scene.note("links whose lanes meet the other way round swapped", place_of(stated_by));
+      return;
+    }
+    if (links.emplace(a, b).second && gap_m > kWideGap_m) {
+      scene.note("links over a gap of more than 1 m kept", place_of(stated_by));
+    }
+  };
+  for (const std::size_t index : conversion->logged_lane) {
+    const LoggedLane& lane = scene.lanes[index];
+    conversion->count_work(20 * (lane.entries.size() + lane.exits.size()));
+    for (const int64_t other : lane.entries) add(other, lane.id, lane);
+    for (const int64_t other : lane.exits) add(lane.id, other, lane);
+  }
+  return links;
+}
+
+/// Links between lanes of which one ends where the other starts, in about its direction.
+Links meeting_links(Conversion* conversion) {
+  const RoadMap& map = conversion->out->map;
+  std::vector<Aabb2> starts;
+  constexpr float kReach_m = static_cast<float>(kMeetingEnds_m);
+  const auto box_around = [](Vec3 p) {
+    return Aabb2{{p.x - kReach_m, p.y - kReach_m}, {p.x + kReach_m, p.y + kReach_m}};
+  };
+  for (std::size_t i = 0; i < map.lanes.size(); ++i) {
+    starts.push_back(box_around(start_of(map, static_cast<int32_t>(i)).position_m));
+  }
+  const Grid grid(starts, 10.0f);
+  Links links;
+  for (std::size_t i = 0; i < map.lanes.size(); ++i) {
+    const LanePoint& end = end_of(map, static_cast<int32_t>(i));
+    visit_items(grid.view(), box_around(end.position_m), [&](std::size_t other) {
+      conversion->count_work(20);
+      const LanePoint& start = start_of(map, static_cast<int32_t>(other));
+      const Vec3 gap = start.position_m - end.position_m;
+      if (other == i || length(gap.xy()) > kReach_m || std::abs(gap.z) > kMeetingLevel_m) return;
+      if (std::abs(wrap_angle(start.heading_rad - end.heading_rad)) > static_cast<float>(kMeetingHeading_rad)) return;
+      links.emplace(static_cast<int32_t>(i), static_cast<int32_t>(other));
+    });
+  }
+  return links;
+}
+
+void set_links(const Links& links, RoadMap* map) {
+  std::vector<std::vector<int32_t>> after(map->lanes.size()), before(map->lanes.size());
+  for (const auto& [from, to] : links) {
+    after[static_cast<std::size_t>(from)].push_back(to);
+    before[static_cast<std::size_t>(to)].push_back(from);
+  }
+  const auto append = [&](const std::vector<int32_t>& lanes) {
+    IndexRange range{static_cast<int32_t>(map->lane_links.size()), 0};
+    map->lane_links.insert(map->lane_links.end(), lanes.begin(), lanes.end());
+    range.end = static_cast<int32_t>(map->lane_links.size());
+    return range;
+  };
+  for (std::size_t i = 0; i < map->lanes.size(); ++i) {
+    map->lanes[i].successors = append(after[i]);
+    map->lanes[i].predecessors = append(before[i]);
+  }
+}
+
+/// The neighbour beside which the lane runs longest, or -1.
+int32_t longest_neighbor(Conversion* conversion, const std::vector<LoggedNeighbor>& neighbors, int32_t own) {
+  std::map<int32_t, int64_t> lengths;
+  conversion->count_work(10 * neighbors.size());
+  for (const LoggedNeighbor& neighbor : neighbors) {
+    const auto found = conversion->lane_of_id.find(neighbor.lane);
+    if (found == conversion->lane_of_id.end() || found->second == own) continue;
+    lengths[found->second] += std::max<int64_t>(0, int64_t{neighbor.end} - neighbor.begin) + 1;
+  }
+  int32_t best = -1;
+  for (const auto& [lane, points] : lengths) {
+    if (best < 0 || points > lengths[best]) best = lane;
+  }
+  return best;
+}
+
+/// Neighbours that name each other.
+void set_neighbors(Conversion* conversion) {
+  RoadMap& map = conversion->out->map;
+  std::vector<int32_t> left(map.lanes.size()), right(map.lanes.size());
+  for (std::size_t i = 0; i < map.lanes.size(); ++i) {
+    const LoggedLane& lane = conversion->scene.lanes[conversion->logged_lane[i]];
+    left[i] = longest_neighbor(conversion, lane.left_neighbors, static_cast<int32_t>(i));
+    right[i] = longest_neighbor(conversion, lane.right_neighbors, static_cast<int32_t>(i));
+  }
+  for (std::size_t i = 0; i < map.lanes.size(); ++i) {
+    const int32_t other = left[i];
+    if (other < 0 || right[static_cast<std::size_t>(other)] != static_cast<int32_t>(i)) continue;
+    if (map.lanes[i].type != map.lanes[static_cast<std::size_t>(other)].type) continue;
+    // A ring of neighbours has no leftmost lane.
+    int32_t leftmost = other;
+    while (leftmost >= 0 && leftmost != static_cast<int32_t>(i)) {
+      leftmost = map.lanes[static_cast<std::size_t>(leftmost)].left_neighbor;
+      conversion->count_work(1);
+    }
+    if (leftmost >= 0) continue;
+    map.lanes[i].left_neighbor = other;
+    map.lanes[static_cast<std::size_t>(other)].right_neighbor = static_cast<int32_t>(i);
+  }
+}
+
+/// Lanes of no stated type take that of the lanes that they are linked with, where all agree.
+void infer_types(RoadMap* map) {
+  std::vector<LaneType> types;
+  for (const Lane& lane : map->lanes) {
+    std::set<LaneType> linked;
+    if (lane.type == LaneType::other) {
+      for (const IndexRange range : {lane.successors, lane.predecessors}) {
+        for (const int32_t other : map->links(range)) linked.insert(map->lanes[static_cast<std::size_t>(other)].type);
+      }
+    }
+    linked.erase(LaneType::other);
+    types.push_back(linked.size() == 1 ? *linked.begin() : lane.type);
+  }
+  for (std::size_t i = 0; i < types.size(); ++i) map->lanes[i].type = types[i];
+}
+
+}  // namespace
+
+void make_lanes(Conversion* conversion) {
+  LoggedScene& scene = conversion->scene;
+  RoadMap& map = conversion->out->map;
+  WidthRuler ruler(conversion);
+  std::vector<std::optional<std::vector<double>>> widths;
+  for (const LoggedLane& lane : scene.lanes) widths.push_back(ruler.measure(lane));
+  complete_widths(conversion, &widths);
+  for (std::size_t i = 0; i < scene.lanes.size(); ++i) {
+    const LoggedLane& logged = scene.lanes[i];
+    const std::vector<CurvePoint> points = resampled(conversion, logged.points, *widths[i], place_of(logged));
+    if (points.empty()) {
+      scene.note("lanes of fewer than two points left out", place_of(logged));
+      continue;
+    }
+    const int32_t index = static_cast<int32_t>(map.lanes.size());
+    PICTURA_CHECK(conversion->lane_of_id.emplace(logged.id, index).second, "{}: lane {}: expected an id of its own",
+                  scene.source, logged.id);
+    Lane lane;
+    lane.type = type_of(logged.type);
+    lane.in_junction = logged.interpolating;
+    lane.speed_limit_mps =
+        logged.speed_limit_mps > 0 ? static_cast<float>(logged.speed_limit_mps) : kDefaultSpeedLimit_mps;
+    lane.source_road = index;
+    append_points(points, &map, &lane);
+    map.road_names.push_back(std::to_string(logged.id));
+    map.lanes.push_back(lane);
+    conversion->logged_lane.push_back(i);
+  }
+  PICTURA_CHECK(!map.lanes.empty(), "{}: {}: expected a lane of two points, got none", scene.source,
+                scene.names.features);
+}
+
+void link_lanes(Conversion* conversion) {
+  RoadMap& map = conversion->out->map;
+  set_links(conversion->scene.has_links ? stated_links(conversion) : meeting_links(conversion), &map);
+  infer_types(&map);
+  set_neighbors(conversion);
+}
+
+void find_junctions(Conversion* conversion) {
+  RoadMap& map = conversion->out->map;
+  const LaneSegments driven =
+      segments_of(map, [](const Lane& lane) { return lane.type == LaneType::driving || lane.type == LaneType::other; });
+  std::vector<std::pair<int32_t, int32_t>> crossings;
+  for (const LaneSegment& segment : driven.segments) {
+    const Aabb2 box{{min_of(segment.a_m.x, segment.b_m.x), min_of(segment.a_m.y, segment.b_m.y)},
+                    {max_of(segment.a_m.x, segment.b_m.x), max_of(segment.a_m.y, segment.b_m.y)}};
+    visit_items(driven.grid.view(), box, [&](std::size_t item) {
+      conversion->count_work(4);
+      const LaneSegment& other = driven.segments[item];
+      if (other.lane > segment.lane && cross(segment.a_m, segment.b_m, other.a_m, other.b_m)) {
+        crossings.emplace_back(segment.lane, other.lane);
+      }
+    });
+  }
+  for (const auto& [a, b] : crossings) {
+    for (const int32_t lane : {a, b}) map.lanes[static_cast<std::size_t>(lane)].in_junction = true;
+  }
+  // Lanes that cross are of one junction.
+  std::vector<int32_t> group(map.lanes.size());
+  std::iota(group.begin(), group.end(), 0);
+  const auto first_of = [&](int32_t lane) {
+    while (group[static_cast<std::size_t>(lane)] != lane) {
+      int32_t& parent = group[static_cast<std::size_t>(lane)];
+      parent = group[static_cast<std::size_t>(parent)];
+      lane = parent;
+    }
+    return lane;
+  };
+  const auto join = [&](int32_t a, int32_t b) {
+    a = first_of(a);
+    b = first_of(b);
+    group[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+  };
+  for (const auto& [a, b] : crossings) join(a, b);
+  // So are those that fork or merge.
+  for (const Lane& lane : map.lanes) {
+    for (const IndexRange range : {lane.successors, lane.predecessors}) {
+      int32_t before = -1;
+      for (const int32_t other : map.links(range)) {
+        if (!map.lanes[static_cast<std::size_t>(other)].in_junction) continue;
+        if (before >= 0) join(before, other);
+        before = other;
+      }
+    }
+  }
+  std::map<int32_t, int32_t> junctions;
+  for (std::size_t i = 0; i < map.lanes.size(); ++i) {
+    Lane& lane = map.lanes[i];
+    if (!lane.in_junction) continue;
+    const int32_t first = first_of(static_cast<int32_t>(i));
+    const auto [junction, is_new] = junctions.emplace(first, static_cast<int32_t>(map.junctions.size()));
+    if (is_new) map.junctions.push_back({.name = map.road_names[static_cast<std::size_t>(first)]});
+    lane.junction = junction->second;
+  }
+}
+
+}  // namespace pictura::conversion

@@ -1,0 +1,314 @@
+// The stages' order, and the parts that all stages share; then tracks and lights.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "pictura/common/scene.h"
+#include "pictura/map/endless_lanes.h"
+#include "pictura/map/scenario/conversion.h"
+
+namespace pictura {
+
+namespace conversion {
+
+namespace {
+
+constexpr float kLevel_m = 2.0f;  // lanes whose heights differ by more do not meet
+constexpr float kSegmentCell_m = 10.0f;
+// Stop points this near, of lanes that start in about one direction, are one light's.
+constexpr double kSameStopPoint_m = 0.5, kSameHeading_rad = 0.5;
+
+float wrapped(double heading_rad) { return static_cast<float>(std::remainder(heading_rad, 2 * std::numbers::pi)); }
+
+void check_radius(const Conversion& conversion, const std::string& what, const Eigen::Vector3d& p) {
+  PICTURA_CHECK(
+      p.cwiseAbs().maxCoeff() <= kMaxScenarioRadius_m,
+      "{}: {}: expected coordinates within {} m of the map's centre ({:.0f}, {:.0f}, {:.0f}), got ({}, {}, {})",
+      conversion.scene.source, what, kMaxScenarioRadius_m, conversion.origin.x(), conversion.origin.y(),
+      conversion.origin.z(), p.x() + conversion.origin.x(), p.y() + conversion.origin.y(),
+      p.z() + conversion.origin.z());
+}
+
+}  // namespace
+
+std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& points, const std::vector<double>& widths,
+                                  const std::string& what) {
+  std::vector<CurvePoint> dense;
+  conversion->count_work(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const CurvePoint next{0, conversion->from_origin(points[i]), widths.empty() ? 0 : widths[i]};
+    check_radius(*conversion, what, next.position_m);
+    if (!dense.empty()) {
+      const CurvePoint last = dense.back();
+      const double way_m = plan_distance_m(last.position_m, next.position_m);
+      if (way_m < kSamePoint_m) {
+        conversion->scene.note("points that repeat the one before left out", what);
+        continue;
+      }
+      const int pieces = static_cast<int>(std::ceil(way_m / kMaxPiece_m - kPieceRounding));
+      conversion->count_work(static_cast<std::size_t>(pieces));
+      for (int k = 1; k < pieces; ++k) {
+        const double t = static_cast<double>(k) / pieces;
+        dense.push_back(
+            {0, last.position_m + t * (next.position_m - last.position_m), last.width + t * (next.width - last.width)});
+      }
+    }
+    dense.push_back(next);
+  }
+  if (dense.size() < 2) return {};
+  std::vector<CurvePoint> thinned;
+  // Thinning tests each point against at most the points of a piece, which are at least kSamePoint_m apart.
+  conversion->count_work(dense.size() * 20);
+  for (const std::size_t index : thin_polyline(dense, kTolerance_m, kMaxPiece_m)) thinned.push_back(dense[index]);
+  return thinned;
+}
+
+LaneSegments segments_of(const RoadMap& map, bool (*is_wanted)(const Lane&)) {
+  LaneSegments result;
+  std::vector<Aabb2> boxes;
+  for (std::size_t lane = 0; lane < map.lanes.size(); ++lane) {
+    if (!is_wanted(map.lanes[lane])) continue;
+    const Span<const LanePoint> points = map.points_of(map.lanes[lane]);
+    for (std::size_t i = 1; i < points.size(); ++i) {
+      const Vec3 a = points[i - 1].position_m, b = points[i].position_m;
+      result.segments.push_back({a, b, static_cast<int32_t>(lane)});
+      boxes.push_back({{min_of(a.x, b.x), min_of(a.y, b.y)}, {max_of(a.x, b.x), max_of(a.y, b.y)}});
+    }
+  }
+  result.grid = Grid(boxes, kSegmentCell_m);
+  return result;
+}
+
+bool cross(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
+  constexpr double kEnd_m = 0.05;  // lanes that fork or merge share an end
+  const Eigen::Vector2d u(b.x - a.x, b.y - a.y), v(d.x - c.x, d.y - c.y), w(c.x - a.x, c.y - a.y);
+  const double det = u.x() * v.y() - u.y() * v.x();
+  const double scale = u.norm() * v.norm();
+  if (std::abs(det) <= 1e-9 * scale || scale <= 0) return false;
+  const double s = (w.x() * v.y() - w.y() * v.x()) / det, t = (w.x() * u.y() - w.y() * u.x()) / det;
+  const double end_s = kEnd_m / u.norm(), end_t = kEnd_m / v.norm();
+  if (s < end_s || s > 1 - end_s || t < end_t || t > 1 - end_t) return false;
+  return std::abs((a.z + s * (b.z - a.z)) - (c.z + t * (d.z - c.z))) < kLevel_m;
+}
+
+void choose_origin(Conversion* conversion) {
+  Eigen::Vector3d low, high;
+  bool any = false;
+  const auto add = [&](const LoggedPoints& points) {
+    for (const Eigen::Vector3d& p : points) {
+      low = any ? low.cwiseMin(p).eval() : p;
+      high = any ? high.cwiseMax(p).eval() : p;
+      any = true;
+    }
+  };
+  for (const LoggedLane& lane : conversion->scene.lanes) add(lane.points);
+  for (const LoggedEdge& edge : conversion->scene.edges) add(edge.points);
+  PICTURA_CHECK(any && !conversion->scene.lanes.empty(), "{}: {}: expected at least one lane, got none",
+                conversion->scene.source, conversion->scene.names.features);
+  for (int axis = 0; axis < 3; ++axis) conversion->origin[axis] = std::round(0.5 * (low[axis] + high[axis])) + 0.0;
+  conversion->out->map.origin_m = {conversion->origin.x(), conversion->origin.y(), conversion->origin.z()};
+}
+
+void make_tracks(Conversion* conversion) {
+  LoggedScene& scene = conversion->scene;
+  Scenario& out = *conversion->out;
+  PICTURA_CHECK(scene.num_steps >= 1 && scene.num_steps <= kMaxScenarioSteps, "{}: expected 1 to {} steps, got {}",
+                scene.source, kMaxScenarioSteps, scene.num_steps);
+  PICTURA_CHECK(scene.tracks.size() <= kMaxScenarioTracks, "{}: {}: expected at most {}, got {}", scene.source,
+                scene.names.tracks, kMaxScenarioTracks, scene.tracks.size());
+  const std::size_t steps = static_cast<std::size_t>(scene.num_steps);
+  conversion->count_work(scene.tracks.size() * steps);
+  std::vector<int32_t> kept(scene.tracks.size(), -1);
+  std::unordered_map<int64_t, int32_t> of_id;
+  for (std::size_t i = 0; i < scene.tracks.size(); ++i) {
+    const LoggedTrack& logged = scene.tracks[i];
+    const std::string place = fmt::format("{}[{}]", scene.names.tracks, i);
+    PICTURA_CHECK(logged.states.size() == steps, "{}: {}: expected {} states, got {}", scene.source, place, steps,
+                  logged.states.size());
+    Track track{.id = logged.id, .type = logged.type, .control = logged.control, .first_valid = -1};
+    const LoggedState* last = nullptr;
+    for (std::size_t step = 0; step < steps; ++step) {
+      if (!logged.states[step].valid) continue;
+      last = &logged.states[step];
+      if (track.first_valid < 0) track.first_valid = static_cast<int32_t>(step);
+      track.last_valid = static_cast<int32_t>(step);
+      ++track.num_valid;
+    }
+    if (!last) {
+      scene.note("tracks without a valid state left out", place);
+      continue;
+    }
+    track.length_m = static_cast<float>(last->length_m);
+    track.width_m = static_cast<float>(last->width_m);
+    track.height_m = static_cast<float>(last->height_m);
+    for (const auto& [field, size_m] : {std::pair{"length", track.length_m}, std::pair{"width", track.width_m},
+                                        std::pair{"height", track.height_m}}) {
+      PICTURA_CHECK(size_m > 0 && size_m <= kMaxTrackSize_m,
+                    "{}: {}: {}: expected a number in (0, {}] at its last valid state (step {}), got {}", scene.source,
+                    place, field, kMaxTrackSize_m, track.last_valid, size_m);
+    }
+    for (std::size_t step = 0; step < steps; ++step) {
+      const LoggedState& state = logged.states[step];
+      out.valid.push_back(state.valid ? 1 : 0);
+      if (!state.valid) {
+        out.states.emplace_back();
+        continue;
+      }
+      Eigen::Vector3d p = conversion->from_origin(state.center_m);
+      check_radius(*conversion, fmt::format("{}: step {}", place, step), p);
+      // Recorded sizes vary along a track: the foot is below the centre by half of the height at that step.
+      p.z() -= 0.5 * (state.height_m > 0 ? state.height_m : last->height_m);
+      out.states.push_back({to_vec3(p),
+                            wrapped(state.heading_rad),
+                            {static_cast<float>(state.velocity_x_mps), static_cast<float>(state.velocity_y_mps)}});
+    }
+    kept[i] = static_cast<int32_t>(out.tracks.size());
+    if (!of_id.emplace(track.id, kept[i]).second) scene.note("track ids used twice", place);
+    out.tracks.push_back(track);
+  }
+  PICTURA_CHECK(!out.tracks.empty(), "{}: {}: expected at least one track with a valid state, got none", scene.source,
+                scene.names.tracks);
+  const auto kept_track = [&](const char* what, int32_t index) {
+    PICTURA_CHECK(index >= 0 && index < static_cast<int32_t>(kept.size()),
+                  "{}: {}: expected an index in [0, {}), got {}", scene.source, what, kept.size(), index);
+    const int32_t track = kept[static_cast<std::size_t>(index)];
+    if (track < 0) scene.note("references to tracks that were left out", what);
+    return track;
+  };
+  if (scene.sdc_track >= 0) out.sdc_track = kept_track("sdc_track_index", scene.sdc_track);
+  for (const int64_t id : scene.objects_of_interest) {
+    if (const auto found = of_id.find(id); found != of_id.end()) {
+      out.objects_of_interest.push_back(found->second);
+    } else {
+      scene.note("objects of interest that are no track", fmt::format("object {}", id));
+    }
+  }
+  for (const auto& [index, difficulty] : scene.predictions) {
+    const int32_t track = kept_track("tracks_to_predict", index);
+    if (track >= 0) out.tracks_to_predict.push_back({track, difficulty});
+  }
+}
+
+void make_lights(Conversion* conversion) {
+  LoggedScene& scene = conversion->scene;
+  Scenario& out = *conversion->out;
+  const RoadMap& map = out.map;
+  struct Found {
+    std::vector<int32_t> lanes;
+    const LoggedLight* light;
+    double heading_rad;
+    LanePoint start;  // of its widest lane
+  };
+  std::vector<Found> found;
+  conversion->count_work(scene.lights.size() * static_cast<std::size_t>(scene.num_steps));
+  for (std::size_t i = 0; i < scene.lights.size(); ++i) {
+    const LoggedLight& light = scene.lights[i];
+    std::vector<int32_t> lanes;
+    for (const int64_t id : light.lanes) {
+      const auto lane = conversion->lane_of_id.find(id);
+      if (lane == conversion->lane_of_id.end()) {
+        scene.note("lanes of lights that the map does not have", fmt::format("lane {}", id));
+      } else if (map.lanes[static_cast<std::size_t>(lane->second)].type == LaneType::biking) {
+        scene.note("lights of bike lanes left out", fmt::format("lane {}", id));
+      } else {
+        lanes.push_back(lane->second);
+      }
+    }
+    if (lanes.empty()) continue;
+    // The mean direction in which traffic comes to the line: of the lanes before, else of the lane itself.
+    Eigen::Vector2d direction(0, 0);
+    LanePoint widest{};
+    for (const int32_t index : lanes) {
+      const Lane& lane = map.lanes[static_cast<std::size_t>(index)];
+      const LanePoint start = map.points_of(lane)[0];
+      if (start.width_m > widest.width_m) widest = start;
+      Span<const int32_t> before = map.links(lane.predecessors);
+      for (const int32_t other : before) {
+        const Span<const LanePoint> points = map.points_of(map.lanes[static_cast<std::size_t>(other)]);
+        const double heading = points[points.size() - 1].heading_rad;
+        direction += Eigen::Vector2d(std::cos(heading), std::sin(heading));
+      }
+      if (before.empty()) {
+        direction += Eigen::Vector2d(std::cos(double{start.heading_rad}), std::sin(double{start.heading_rad}));
+      }
+    }
+    const double heading = std::atan2(direction.y(), direction.x());
+    // Lights whose lines coincide and that always show the same are one.
+    conversion->count_work(found.size());
+    const auto same = std::find_if(found.begin(), found.end(), [&](const Found& other) {
+      return !light.has_stop_line && !other.light->has_stop_line && other.light->states == light.states &&
+             length(other.start.position_m - widest.position_m) < kSameStopPoint_m &&
+             std::abs(std::remainder(other.heading_rad - heading, 2 * std::numbers::pi)) < kSameHeading_rad;
+    });
+    if (same == found.end()) {
+      found.push_back({lanes, &light, heading, widest});
+    } else {
+      same->lanes.insert(same->lanes.end(), lanes.begin(), lanes.end());
+      if (widest.width_m > same->start.width_m) same->start = widest;
+    }
+  }
+  for (const Found& light : found) {
+    RecordedLight recorded;
+    recorded.stop_heading_rad = wrapped(light.heading_rad);
+    if (light.light->has_stop_line) {
+      for (const Eigen::Vector3d& p : {light.light->stop_a_m, light.light->stop_b_m}) {
+        check_radius(*conversion, "stop line", conversion->from_origin(p));
+      }
+      recorded.stop_a_m = to_vec3(conversion->from_origin(light.light->stop_a_m));
+      recorded.stop_b_m = to_vec3(conversion->from_origin(light.light->stop_b_m));
+      const Vec3 way = recorded.stop_b_m - recorded.stop_a_m;
+      const double to_right = std::sin(light.heading_rad) * way.x - std::cos(light.heading_rad) * way.y;
+      if (to_right < 0) std::swap(recorded.stop_a_m, recorded.stop_b_m);
+    } else {
+      const float half = 0.5f * light.start.width_m;
+      const Vec3 left{-static_cast<float>(std::sin(light.heading_rad)) * half,
+                      static_cast<float>(std::cos(light.heading_rad)) * half, 0};
+      recorded.stop_a_m = light.start.position_m + left;
+      recorded.stop_b_m = light.start.position_m - left;
+    }
+    recorded.lanes.begin = static_cast<int32_t>(out.light_lanes.size());
+    out.light_lanes.insert(out.light_lanes.end(), light.lanes.begin(), light.lanes.end());
+    recorded.lanes.end = static_cast<int32_t>(out.light_lanes.size());
+    out.lights.push_back(recorded);
+    PICTURA_CHECK(light.light->states.size() == static_cast<std::size_t>(scene.num_steps),
+                  "{}: light: expected {} states, got {}", scene.source, scene.num_steps, light.light->states.size());
+    out.light_states.insert(out.light_states.end(), light.light->states.begin(), light.light->states.end());
+  }
+}
+
+}  // namespace conversion
+
+Scenario make_scenario(LoggedScene scene) {
+  Scenario scenario;
+  scenario.id = scene.id;
+  scenario.format = scene.format;
+  scenario.dt_s = static_cast<float>(scene.dt_s);
+  scenario.num_steps = scene.num_steps;
+  scenario.current_step = scene.current_step;
+  scenario.map.name = scene.name;
+  conversion::Conversion conversion{scene, &scenario};
+  try {
+    conversion::choose_origin(&conversion);
+    conversion::make_lanes(&conversion);
+    conversion::link_lanes(&conversion);
+    conversion::find_junctions(&conversion);
+    find_endless_lanes(&scenario.map);
+    conversion::make_edges(&conversion);
+    conversion::make_markings(&conversion);
+    conversion::make_signs(&conversion);
+    conversion::make_tracks(&conversion);
+    conversion::make_lights(&conversion);
+    conversion::count_facts(&scenario.map);
+    scenario.notes = std::move(scene.notes);
+  } catch (const FieldError& error) {
+    throw to_error(scene.source, error);
+  }
+  try {
+    validate(scenario);
+  } catch (const Error& error) {
+    fail("{}: {}", scene.source, error.what());
+  }
+  return scenario;
+}
+
+}  // namespace pictura

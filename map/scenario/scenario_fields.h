@@ -1,0 +1,23 @@
+// The fields of Scenario and of its elements, listed once for its cache and for comparisons, as map_fields.h lists
+// those of RoadMap; and the bounds that importers share with validate().
+#pragma once
+
+#include "pictura/map/field_difference.h"
+#include "pictura/map/map_fields.h"
+#include "pictura/map/scenario/scenario.h"
+
+namespace pictura {
+
+PICTURA_FIELDS(TrackState, position_m, heading_rad, velocity_mps)
+PICTURA_FIELDS(Track, id, type, control, length_m, width_m, height_m, first_valid, last_valid, num_valid)
+PICTURA_FIELDS(RecordedLight, stop_a_m, stop_b_m, stop_heading_rad, lanes)
+PICTURA_FIELDS(PredictedTrack, track, difficulty)
+PICTURA_FIELDS(ConversionNote, what, count, first)
+PICTURA_FIELDS(Scenario, id, format, dt_s, num_steps, current_step, sdc_track, map, tracks, states, valid,
+               objects_of_interest, tracks_to_predict, lights, light_lanes, light_states, notes)
+
+/// How far anything may lie from a scene's origin: recordings are some hundred metres across.
+constexpr float kMaxScenarioRadius_m = 1e4f;
+constexpr float kMaxTrackSize_m = 100.0f;
+
+}  // namespace pictura

@@ -1,0 +1,83 @@
+#include "pictura/map/scenario/scene_cache.h"
+
+#include <array>
+#include <cstring>
+#include <type_traits>
+
+#include "pictura/common/support/crc32c.h"
+#include "pictura/map/scenario/scenario_fields.h"
+#include "pictura/map_fingerprint.h"
+
+namespace pictura {
+
+namespace {
+
+constexpr std::array<char, 8> kMagic{'P', 'I', 'C', 'T', 'R', 'S', 'C', 'N'};
+constexpr uint32_t kVersion = 1;  // of the header; what follows is covered by the importers' hash
+constexpr uint32_t kByteOrder = 0x01020304;
+
+struct Header {
+  std::array<char, 8> magic = kMagic;
+  uint32_t version = kVersion, byte_order = kByteOrder;
+  uint64_t importer = PICTURA_MAP_FINGERPRINT;
+  uint64_t file = 0;
+  int64_t record = 0;
+  uint64_t payload_bytes = 0, payload_crc = 0;
+};
+static_assert(std::has_unique_object_representations_v<Header>, "the header must have no padding");
+static_assert(is_plain<TrackState>() && is_plain<LanePoint>(), "copied as a whole");
+
+}  // namespace
+
+std::string encode_cached(const SceneCacheKey& key, const std::function<void(FieldWriter*)>& put) {
+  std::string bytes(sizeof(Header), '\0');
+  FieldWriter writer(&bytes);
+  put(&writer);
+  const std::string_view payload = std::string_view(bytes).substr(sizeof(Header));
+  const Header header{
+      .file = key.file, .record = key.record, .payload_bytes = payload.size(), .payload_crc = crc32c(payload)};
+  std::memcpy(bytes.data(), &header, sizeof header);
+  return bytes;
+}
+
+void decode_cached(std::string_view bytes, const SceneCacheKey& key, const std::string& name,
+                   const std::function<void(FieldReader*)>& get) {
+  try {
+    Header header;
+    PICTURA_CHECK(bytes.size() >= sizeof header, "truncated: {} bytes, expected at least {} for the header",
+                  bytes.size(), sizeof header);
+    std::memcpy(&header, bytes.data(), sizeof header);
+    PICTURA_CHECK(header.magic == kMagic, "foreign: expected it to begin with {}",
+                  std::string_view(kMagic.data(), kMagic.size()));
+    PICTURA_CHECK(header.byte_order == kByteOrder, "written on a machine of another byte order");
+    PICTURA_CHECK(header.version == kVersion, "expected version {}, got {}", kVersion, header.version);
+    PICTURA_CHECK(header.importer == PICTURA_MAP_FINGERPRINT, "stale: made by another version of the importer");
+    PICTURA_CHECK(header.file == key.file && header.record == key.record,
+                  "stale: the scene's file has changed, or this is another one's");
+    const std::string_view payload = bytes.substr(sizeof header);
+    PICTURA_CHECK(header.payload_bytes == payload.size(), "{}: expected {} bytes after the header, got {}",
+                  header.payload_bytes > payload.size() ? "truncated" : "damaged", header.payload_bytes,
+                  payload.size());
+    PICTURA_CHECK(header.payload_crc == crc32c(payload), "damaged: its bytes do not have the checksum in its header");
+    FieldReader reader(payload);
+    get(&reader);
+    reader.expect_end();
+  } catch (const Error& error) {
+    fail("{}: {}", name, error.what());
+  }
+}
+
+std::string encode_scenario(const Scenario& scenario, const SceneCacheKey& key) {
+  return encode_cached(key, [&](FieldWriter* writer) { writer->put(scenario); });
+}
+
+Scenario decode_scenario(std::string_view bytes, const SceneCacheKey& key, const std::string& name) {
+  Scenario scenario;
+  decode_cached(bytes, key, name, [&](FieldReader* reader) {
+    reader->get(&scenario);
+    validate(scenario);
+  });
+  return scenario;
+}
+
+}  // namespace pictura

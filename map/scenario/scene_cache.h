@@ -1,0 +1,37 @@
+// Scenes as binary files, so that each is imported only once: a header that identifies their source and what made them,
+// then every field. A stale or damaged file is rejected.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include "pictura/common/error.h"
+#include "pictura/map/field_codec.h"
+#include "pictura/map/scenario/scenario.h"
+
+namespace pictura {
+
+/// What determines a scene, besides this build of the importers. Equal keys mean equal scenes, for as long as files
+/// that change have another size or time of change.
+struct SceneCacheKey {
+  static constexpr int64_t kIndex = -2;
+  uint64_t file = 0;   // hash of the file's size and time of change
+  int64_t record = 0;  // in the file; -1: the file is the scene; kIndex: the list of its records
+};
+
+/// A header of magic, version, byte order, key, size and CRC-32C of what put() writes; then that.
+std::string encode_cached(const SceneCacheKey& key, const std::function<void(FieldWriter*)>& put);
+
+/// Reads it back by get(), which must read all of it. Throws Error "NAME: reason" when the bytes are foreign, of
+/// another byte order or version, truncated, stale or damaged.
+void decode_cached(std::string_view bytes, const SceneCacheKey& key, const std::string& name,
+                   const std::function<void(FieldReader*)>& get);
+
+std::string encode_scenario(const Scenario& scenario, const SceneCacheKey& key);
+
+/// The scenario, validated. Throws as decode_cached() does. Memory is bounded by a few times the bytes.
+Scenario decode_scenario(std::string_view bytes, const SceneCacheKey& key, const std::string& name);
+
+}  // namespace pictura

@@ -1,0 +1,67 @@
+// TFRecord files: records of any bytes, each with its length and two checksums.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pictura/common/error.h"
+#include "pictura/common/support/output_file.h"
+
+namespace pictura::womd {
+
+/// Bytes that are read in any order: of a file, or in memory.
+class ByteSource {
+ public:
+  virtual ~ByteSource() = default;
+  virtual uint64_t size() const = 0;
+  /// The bytes [offset, offset + count), which must be within size(). Throws Error naming the file.
+  virtual std::string read(uint64_t offset, std::size_t count) const = 0;
+};
+
+/// A regular file. Throws Error naming the path for what is none or cannot be opened.
+class FileBytes : public ByteSource {
+ public:
+  explicit FileBytes(const std::string& path);
+  uint64_t size() const override { return size_; }
+  std::string read(uint64_t offset, std::size_t count) const override;
+
+ private:
+  std::string path_;
+  Descriptor file_;
+  uint64_t size_ = 0;
+};
+
+class MemoryBytes : public ByteSource {
+ public:
+  explicit MemoryBytes(std::string_view bytes) : bytes_(bytes) {}
+  uint64_t size() const override { return bytes_.size(); }
+  std::string read(uint64_t offset, std::size_t count) const override {
+    return std::string(bytes_.substr(static_cast<std::size_t>(offset), count));
+  }
+
+ private:
+  std::string_view bytes_;
+};
+
+/// Where a record's payload is.
+struct RecordPlace {
+  uint64_t offset = 0, bytes = 0;
+};
+
+/// Scenes have about 1 MB; what is longer than this is no scene.
+constexpr uint64_t kMaxRecord_bytes = uint64_t{1} << 28;
+
+struct RecordList {
+  std::vector<RecordPlace> records;
+  std::string fault;  // what ended the list before the end of the file, or empty
+};
+
+/// The records of a file, from their lengths, whose checksums are tested. `name` names the file in `fault`.
+RecordList list_records(const ByteSource& source, const std::string& name);
+
+/// The payload of a record. Throws Error "NAME: record K: ..." unless it has its checksum.
+std::string read_record(const ByteSource& source, const std::string& name, std::size_t k, RecordPlace place);
+
+}  // namespace pictura::womd
