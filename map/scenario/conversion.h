@@ -3,10 +3,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
 
+#include "pictura/common/error.h"
 #include "pictura/common/grid.h"
 #include "pictura/map/polyline.h"
 #include "pictura/map/scenario/logged_scene.h"
@@ -51,8 +53,8 @@ struct LaneSegments {
 };
 LaneSegments segments_of(const RoadMap& map, bool (*is_wanted)(const Lane&));
 
-/// Whether two segments cross in plan at about one height, other than in an end of either.
-bool cross(Vec3 a, Vec3 b, Vec3 c, Vec3 d);
+/// Where two segments cross in plan at about one height, ends included; nothing for parallel ones.
+std::optional<Vec2> crossing(Vec3 a, Vec3 b, Vec3 c, Vec3 d);
 
 /// Sets the origin: the centre of the lanes' and edges' bounding box, in whole metres.
 void choose_origin(Conversion* conversion);

@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "pictura/common/error.h"
 #include "pictura/map/scenario/field_error.h"
 #include "pictura/map/scenario/scenario.h"
 

@@ -22,6 +22,7 @@ constexpr int32_t kWidthStride = 5;                                 // points of
 constexpr double kMeetingEnds_m = 0.1, kMeetingHeading_rad = 1.05;  // ends of lanes that continue each other
 constexpr double kWideGap_m = 1.0;
 constexpr float kMeetingLevel_m = 1.0f;
+constexpr float kSharedEnd_m = 0.05f;
 
 std::string place_of(const LoggedLane& lane) { return fmt::format("lane {}", lane.id); }
 
@@ -383,6 +384,11 @@ void find_junctions(Conversion* conversion) {
   RoadMap& map = conversion->out->map;
   const LaneSegments driven =
       segments_of(map, [](const Lane& lane) { return lane.type == LaneType::driving || lane.type == LaneType::other; });
+  // Lanes that fork, merge or continue each other share an end.
+  const auto is_end = [&](int32_t lane, Vec2 p) {
+    return length(start_of(map, lane).position_m.xy() - p) < kSharedEnd_m ||
+           length(end_of(map, lane).position_m.xy() - p) < kSharedEnd_m;
+  };
   std::vector<std::pair<int32_t, int32_t>> crossings;
   for (const LaneSegment& segment : driven.segments) {
     const Aabb2 box{{min_of(segment.a_m.x, segment.b_m.x), min_of(segment.a_m.y, segment.b_m.y)},
@@ -390,7 +396,9 @@ void find_junctions(Conversion* conversion) {
     visit_items(driven.grid.view(), box, [&](std::size_t item) {
       conversion->count_work(4);
       const LaneSegment& other = driven.segments[item];
-      if (other.lane > segment.lane && cross(segment.a_m, segment.b_m, other.a_m, other.b_m)) {
+      if (other.lane <= segment.lane) return;
+      const std::optional<Vec2> place = crossing(segment.a_m, segment.b_m, other.a_m, other.b_m);
+      if (place && !is_end(segment.lane, *place) && !is_end(other.lane, *place)) {
         crossings.emplace_back(segment.lane, other.lane);
       }
     });

@@ -73,7 +73,7 @@ bool crosses_a_lane(Conversion* conversion, const LaneSegments& lanes, Vec3 a, V
   visit_items(lanes.grid.view(), box, [&](std::size_t item) {
     conversion->count_work(4);
     const LaneSegment& segment = lanes.segments[item];
-    crosses = crosses || cross(a, b, segment.a_m, segment.b_m);
+    crosses = crosses || crossing(a, b, segment.a_m, segment.b_m).has_value();
   });
   return crosses;
 }

@@ -79,16 +79,14 @@ LaneSegments segments_of(const RoadMap& map, bool (*is_wanted)(const Lane&)) {
   return result;
 }
 
-bool cross(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
-  constexpr double kEnd_m = 0.05;  // lanes that fork or merge share an end
+std::optional<Vec2> crossing(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
   const Eigen::Vector2d u(b.x - a.x, b.y - a.y), v(d.x - c.x, d.y - c.y), w(c.x - a.x, c.y - a.y);
   const double det = u.x() * v.y() - u.y() * v.x();
-  const double scale = u.norm() * v.norm();
-  if (std::abs(det) <= 1e-9 * scale || scale <= 0) return false;
+  if (std::abs(det) <= 1e-9 * u.norm() * v.norm()) return std::nullopt;
   const double s = (w.x() * v.y() - w.y() * v.x()) / det, t = (w.x() * u.y() - w.y() * u.x()) / det;
-  const double end_s = kEnd_m / u.norm(), end_t = kEnd_m / v.norm();
-  if (s < end_s || s > 1 - end_s || t < end_t || t > 1 - end_t) return false;
-  return std::abs((a.z + s * (b.z - a.z)) - (c.z + t * (d.z - c.z))) < kLevel_m;
+  if (s < 0 || s > 1 || t < 0 || t > 1) return std::nullopt;
+  if (std::abs((a.z + s * (b.z - a.z)) - (c.z + t * (d.z - c.z))) >= double{kLevel_m}) return std::nullopt;
+  return Vec2{static_cast<float>(a.x + s * u.x()), static_cast<float>(a.y + s * u.y())};
 }
 
 void choose_origin(Conversion* conversion) {

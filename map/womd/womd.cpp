@@ -49,12 +49,7 @@ class Decoder {
     finish();
   }
 
- private:
-  void count_item() {
-    if (++num_items_ > kMaxItems)
-      fail_field("", "expected at most {} points and states in a scene, got more", kMaxItems);
-  }
-
+  /// A scenario_id, which may be any printable text of some length.
   static std::string checked_id(std::string_view bytes) {
     constexpr std::size_t kMaxId = 256;
     if (bytes.size() > kMaxId) fail_field("", "expected at most {} bytes, got {}", kMaxId, bytes.size());
@@ -62,6 +57,12 @@ class Decoder {
       if (letter < ' ' || letter > '~') fail_field("", "expected printable letters, got byte {}", int{letter});
     }
     return std::string(bytes);
+  }
+
+ private:
+  void count_item() {
+    if (++num_items_ > kMaxItems)
+      fail_field("", "expected at most {} points and states in a scene, got more", kMaxItems);
   }
 
   void add_timestamp(double value) {
@@ -393,13 +394,28 @@ class Decoder {
   int32_t sdc_index_ = 0;
 };
 
+/// The scenario_id of a record that may be faulty elsewhere, for messages; empty where none is found.
+std::string id_in(std::string_view payload) {
+  std::string id;
+  try {
+    WireReader fields(payload);
+    while (fields.next()) {
+      if (fields.field() == 5) id = Decoder::checked_id(fields.bytes());
+    }
+  } catch (const FieldError&) {
+    // Of what ends the message early, the caller knows already.
+  }
+  return id;
+}
+
 }  // namespace
 
 LoggedScene parse_scenario(std::string_view payload, const std::string& source) {
   LoggedScene scene;
   scene.format = "womd";
   const auto full_source = [&] {
-    return scene.id.empty() ? source : fmt::format("{} (scenario {})", source, scene.id);
+    const std::string id = scene.id.empty() ? id_in(payload) : scene.id;
+    return id.empty() ? source : fmt::format("{} (scenario {})", source, id);
   };
   try {
     Decoder(&scene).decode(payload);

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "pictura/common/error.h"
 #include "pictura/map/scenario/logged_scene.h"
 #include "pictura/map/womd/tfrecord.h"
 

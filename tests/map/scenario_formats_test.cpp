@@ -1,0 +1,184 @@
+// GPUDrive's JSON and PufferDrive's binary layouts: our own writers' files are read as the scene that they were written
+// from, as far as the format goes; faults are named by file and field.
+#include <cmath>
+#include <functional>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/map/gpudrive/gpudrive.h"
+#include "pictura/map/pufferdrive/pufferdrive.h"
+#include "pictura/map/scenario/load_scenario.h"
+#include "pictura/tests/support/error_message.h"
+#include "pictura/tests/support/scene_fixture.h"
+
+namespace pictura {
+namespace {
+
+using test::message_of;
+using test::PufferLayout;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr PufferLayout kLayouts[] = {PufferLayout::v1, PufferLayout::v2, PufferLayout::v2_with_id, PufferLayout::v3c};
+
+Scenario read_json(const std::string& text) { return parse_scenario_file(text, "scene.json"); }
+Scenario read_binary(const std::string& bytes) { return parse_scenario_file(bytes, "scene.bin"); }
+
+/// How far two scenarios' states are apart at most, in the coordinates of their files.
+double largest_distance(const Scenario& a, const Scenario& b) {
+  double largest = 0;
+  for (std::size_t i = 0; i < a.states.size(); ++i) {
+    if (!a.valid[i]) continue;
+    const Vec3 p = a.states[i].position_m, q = b.states[i].position_m;
+    largest = std::max({largest, std::abs(double{p.x} + a.map.origin_m[0] - double{q.x} - b.map.origin_m[0]),
+                        std::abs(double{p.y} + a.map.origin_m[1] - double{q.y} - b.map.origin_m[1]),
+                        std::abs(double{p.z} + a.map.origin_m[2] - double{q.z} - b.map.origin_m[2]),
+                        std::abs(double{a.states[i].heading_rad} - double{b.states[i].heading_rad}),
+                        double{length(a.states[i].velocity_mps - b.states[i].velocity_mps)}});
+  }
+  return largest;
+}
+
+/// The links as pairs of lanes, which both scenes list in one order.
+std::vector<std::vector<int32_t>> successors_of(const RoadMap& map) {
+  std::vector<std::vector<int32_t>> all;
+  for (const Lane& lane : map.lanes) {
+    const Span<const int32_t> links = map.links(lane.successors);
+    all.emplace_back(links.begin(), links.end());
+  }
+  return all;
+}
+
+void expect_same_tracks(const Scenario& read, const Scenario& expected, double tolerance) {
+  ASSERT_EQ(read.tracks.size(), expected.tracks.size());
+  EXPECT_EQ(read.num_steps, expected.num_steps);
+  EXPECT_EQ(read.valid, expected.valid);
+  EXPECT_LE(largest_distance(read, expected), tolerance);
+  for (std::size_t i = 0; i < read.tracks.size(); ++i) {
+    EXPECT_EQ(read.tracks[i].type, expected.tracks[i].type);
+    EXPECT_EQ(read.tracks[i].control, expected.tracks[i].control);
+    EXPECT_EQ(read.tracks[i].length_m, expected.tracks[i].length_m) << i;
+    EXPECT_EQ(read.tracks[i].width_m, expected.tracks[i].width_m) << i;
+  }
+}
+
+TEST(GpuDrive, SceneIsReadAsWritten) {
+  const LoggedScene fixture = test::make_fixture();
+  const Scenario expected = make_scenario(fixture), read = read_json(test::write_gpudrive(fixture));
+  expect_same_tracks(read, expected, 1e-6);
+  EXPECT_EQ(read.id, fixture.id);
+  EXPECT_EQ(read.format, "gpudrive");
+  EXPECT_EQ(read.sdc_track, expected.sdc_track);
+  EXPECT_EQ(read.objects_of_interest, expected.objects_of_interest);
+  EXPECT_EQ(read.tracks_to_predict.size(), 2u);
+  EXPECT_EQ(read.map.lanes.size(), expected.map.lanes.size());
+  EXPECT_EQ(read.map.markings.size(), expected.map.markings.size());
+  EXPECT_EQ(read.map.road_edges.size(), expected.map.road_edges.size());
+  EXPECT_EQ(read.map.crosswalks.size(), 1u);
+  EXPECT_EQ(read.map.signs.size(), 1u);
+  EXPECT_EQ(read.lights.size(), expected.lights.size());
+  EXPECT_EQ(read.light_states, expected.light_states);
+  // The format has no links; lanes meet exactly where the recording links them.
+  EXPECT_EQ(successors_of(read.map), successors_of(expected.map));
+}
+
+TEST(GpuDrive, FaultsAreNamed) {
+  const std::string text = test::write_gpudrive(test::make_fixture({.num_steps = 3, .num_vehicles = 2}));
+  const auto reason = [&](const std::string& from, const std::string& to) {
+    std::string changed = text;
+    const std::size_t at = changed.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    changed.replace(at, from.size(), to);
+    return message_of([&] { read_json(changed); });
+  };
+  EXPECT_EQ(reason("\"objects\"", "\"object\""), "scene.json: objects: expected it, got nothing");
+  EXPECT_EQ(reason("\"valid\":[true", "\"valid\":[1"),
+            "scene.json: objects[0].valid[0]: expected true or false, got number");
+  EXPECT_EQ(reason("\"valid\":[true,", "\"valid\":["), "scene.json: objects[0].valid: expected 3 steps, got 2");
+  EXPECT_EQ(reason("\"heading\":[", "\"heading\":[null,"), "scene.json: objects[0].heading: expected 3 steps, got 4");
+  EXPECT_EQ(reason("\"map_element_id\":2", "\"map_element_id\":\"lane\""),
+            "scene.json: roads[0].map_element_id: expected a whole number, got string");
+  EXPECT_THAT(reason("{\"name\"", "{name"), HasSubstr("scene.json: expected JSON, got a parse error at line 1"));
+  EXPECT_THAT(reason("\"x\":", "\"x\":NaN,\"y\":"), HasSubstr("scene.json: expected JSON"));
+  EXPECT_THAT(reason("\"x\":", "\"x\":1e300,\"u\":"), HasSubstr("scene.json: objects[0].position[0].x: expected"));
+  EXPECT_THAT(message_of([] { read_json(""); }), HasSubstr("scene.json: expected JSON"));
+  EXPECT_THAT(message_of([] { read_json("[]"); }), HasSubstr("scene.json: expected an object, got array"));
+  EXPECT_THAT(message_of([] { read_json(std::string(200'000, '[')); }), HasSubstr("scene.json: expected JSON"));
+}
+
+TEST(GpuDrive, IndicesOfTracksThatWereDroppedAreLeftOut) {
+  LoggedScene scene = test::make_fixture({.num_steps = 3});
+  scene.sdc_track = 80;
+  scene.predictions[1].first = 90;
+  const Scenario read = read_json(test::write_gpudrive(scene));
+  EXPECT_EQ(read.sdc_track, -1);
+  EXPECT_EQ(read.tracks_to_predict.size(), 1u);
+  ASSERT_EQ(read.notes.size(), 1u);
+  EXPECT_EQ(read.notes[0].count, 2);
+  EXPECT_EQ(read.notes[0].first, "sdc_track_index");
+}
+
+TEST(PufferDrive, EveryLayoutIsReadAsWritten) {
+  const LoggedScene fixture = test::make_fixture();
+  const Scenario expected = make_scenario(fixture);
+  for (const PufferLayout layout : kLayouts) {
+    const Scenario read = read_binary(test::write_pufferdrive(fixture, layout));
+    SCOPED_TRACE(read.format);
+    expect_same_tracks(read, expected, 1e-3);  // float kilometres from the origin
+    EXPECT_EQ(read.format, layout == PufferLayout::v1    ? "pufferdrive v1"
+                           : layout == PufferLayout::v3c ? "pufferdrive v3c"
+                                                         : "pufferdrive v2");
+    EXPECT_EQ(read.id, layout == PufferLayout::v1 || layout == PufferLayout::v2 ? "" : fixture.id);
+    EXPECT_EQ(read.sdc_track, layout == PufferLayout::v1 ? -1 : 0);
+    EXPECT_EQ(read.tracks_to_predict.size(), layout == PufferLayout::v1 ? 0u : 2u);
+    EXPECT_EQ(read.map.lanes.size(), expected.map.lanes.size());
+    EXPECT_EQ(read.map.crosswalks.size(), 1u);
+    EXPECT_EQ(read.map.signs.size(), 1u);
+    EXPECT_EQ(successors_of(read.map), successors_of(expected.map));
+    EXPECT_EQ(read.lights.size(), layout == PufferLayout::v3c ? 4u : 0u) << "each with a line of its own";
+  }
+}
+
+TEST(PufferDrive, NewestLayoutHasLimitsLightsAndTails) {
+  const LoggedScene fixture = test::make_fixture();
+  const Scenario plain = read_binary(test::write_pufferdrive(fixture, PufferLayout::v3c));
+  EXPECT_FLOAT_EQ(plain.map.lanes[0].speed_limit_mps, 25 * 0.44704f);
+  EXPECT_FLOAT_EQ(plain.map.lanes[1].speed_limit_mps, 15.0f);
+  EXPECT_FLOAT_EQ(plain.map.lane_points[0].width_m, 3.5f);
+  EXPECT_EQ(plain.states_of_light(0)[0], RecordedLightState::none);
+  EXPECT_EQ(plain.states_of_light(0)[20], RecordedLightState::stop);
+  EXPECT_EQ(plain.states_of_light(0)[90], RecordedLightState::go);
+  const Scenario tails = read_binary(test::write_pufferdrive_tails(fixture, 3.0f));
+  EXPECT_FLOAT_EQ(tails.map.lane_points[0].width_m, 3.0f);
+}
+
+TEST(PufferDrive, BytesBeyondTheEndAndMissingOnesAreRefused) {
+  const LoggedScene fixture = test::make_fixture({.num_steps = 2, .num_vehicles = 1, .num_pedestrians = 1});
+  for (const PufferLayout layout : kLayouts) {
+    const std::string bytes = test::write_pufferdrive(fixture, layout);
+    ASSERT_EQ(message_of([&] { read_binary(bytes); }), test::kNoError);
+    EXPECT_THAT(message_of([&] { read_binary(bytes + "x"); }),
+                AllOf(HasSubstr("scene.bin: expected a PufferDrive scene of layout v1, v2 or v3c"),
+                      HasSubstr("as v1: "), HasSubstr("as v2: "), HasSubstr("as v3c: ")));
+    for (std::size_t length = 0; length < bytes.size(); length += 997) {
+      ASSERT_THAT(message_of([&] { read_binary(bytes.substr(0, length)); }), HasSubstr("scene.bin: expected"))
+          << length;
+    }
+  }
+  EXPECT_THAT(message_of([&] { read_binary(""); }), HasSubstr("as v1: n_objects: expected 4 bytes, got the 0"));
+}
+
+TEST(SceneFiles, TypesOfFilesAreToldByName) {
+  EXPECT_THAT(message_of([] { parse_scenario_file("", "scene.txt"); }),
+              HasSubstr("scene.txt: expected a scene: FILE.json, FILE.bin or a file with .tfrecord in its name"));
+  // A file of another format is refused by the format that its name says.
+  const LoggedScene fixture = test::make_fixture({.num_steps = 2});
+  EXPECT_THAT(message_of([&] { read_binary(test::write_gpudrive(fixture)); }),
+              HasSubstr("scene.bin: expected a Puffer"));
+  EXPECT_THAT(message_of([&] { read_json(test::write_pufferdrive(fixture, PufferLayout::v1)); }),
+              HasSubstr("scene.json: expected JSON"));
+}
+
+}  // namespace
+}  // namespace pictura
