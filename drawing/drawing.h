@@ -8,6 +8,7 @@
 
 #include "pictura/common/image.h"
 #include "pictura/map/road_map.h"
+#include "pictura/map/scenario/scenario.h"
 
 namespace pictura {
 
@@ -17,8 +18,9 @@ struct FileBox {
 };
 
 struct MapPictureOptions {
-  int size_px = 1600;          // the longer side of the picture, in [64, 16384]
-  std::optional<FileBox> box;  // what to show; without it, the whole map
+  int size_px = 1600;                  // the longer side of the picture, in [64, 16384]
+  std::optional<FileBox> box;          // what to show; without it, the whole map
+  const Scenario* scenario = nullptr;  // whose map it is: its tracks are drawn, and their boxes at its current step
 };
 
 /// Draws lanes by type, markings, road edges, crosswalks, parking spaces, building lines, signs, painted stop lines,

@@ -12,6 +12,7 @@
 #include "pictura/drawing/drawing.h"
 #include "pictura/drawing/map_details.h"
 #include "pictura/drawing/plot.h"
+#include "pictura/drawing/tracks.h"
 
 namespace pictura {
 
@@ -40,8 +41,19 @@ bool has_markings_of(const RoadMap& map, MarkColor color) {
   return std::any_of(map.markings.begin(), map.markings.end(), [&](const Marking& m) { return m.color == color; });
 }
 
-/// An entry for each kind of element that the map has.
-std::vector<LegendEntry> legend_of(const RoadMap& map) {
+void add_tracks(const Scenario& scenario, std::vector<LegendEntry>* entries_out) {
+  if (scenario.sdc_track >= 0) entries_out->push_back({"self-driving car", kSdcInk, LegendEntry::area});
+  for (int i = 0; i <= static_cast<int>(TrackType::other); ++i) {
+    const auto type = static_cast<TrackType>(i);
+    const bool has_any = std::any_of(scenario.tracks.begin(), scenario.tracks.end(),
+                                     [&](const RecordedTrack& track) { return track.type == type; });
+    if (has_any)
+      entries_out->push_back({fmt::format("{} track", to_string(type)), track_color(type), LegendEntry::area});
+  }
+}
+
+/// An entry for each kind of element that the map has, and for each kind of track of the scenario, if there is one.
+std::vector<LegendEntry> legend_of(const RoadMap& map, const Scenario* scenario) {
   std::vector<LegendEntry> entries;
   for (int i = 0; i <= static_cast<int>(LaneType::other); ++i) {
     const auto type = static_cast<LaneType>(i);
@@ -66,16 +78,17 @@ std::vector<LegendEntry> legend_of(const RoadMap& map) {
   for (int32_t phase = 0; phase < std::min(phases, 6); ++phase) {
     entries.push_back({fmt::format("light and its line, phase {}", phase), phase_color(phase), LegendEntry::light});
   }
+  if (scenario) add_tracks(*scenario, &entries);
   return entries;
 }
 
 /// The legend in rows that fit a width.
 class Legend {
  public:
-  Legend(const RoadMap& map, const Metrics& m, double width_px) : m_(m) {
+  Legend(const RoadMap& map, const Scenario* scenario, const Metrics& m, double width_px) : m_(m) {
     const Canvas measure(1, 1, kPanelColor);
     double x = m.px(24);
-    for (const LegendEntry& entry : legend_of(map)) {
+    for (const LegendEntry& entry : legend_of(map, scenario)) {
       const double width = m.px(20) + m.px(7) + measure.text_width(entry.label, style());
       if (x + width > width_px - m.px(16) && x > m.px(24)) {
         x = m.px(24);
@@ -192,9 +205,9 @@ Layout layout_of(const RoadMap& map, const MapPictureOptions& options) {
   const auto scale_below = [&](double band) {
     return std::min(available / width_m, (available - band - strip) / height_m);
   };
-  Legend legend(map, m, width_at(scale_below(m.px(96))));
+  Legend legend(map, options.scenario, m, width_at(scale_below(m.px(96))));
   double band = m.px(64) + legend.height_px();
-  legend = Legend(map, m, width_at(scale_below(band)));
+  legend = Legend(map, options.scenario, m, width_at(scale_below(band)));
   band = m.px(64) + legend.height_px();
   const double px_per_m = std::max(scale_below(band), 1e-3);
 
@@ -262,10 +275,11 @@ void draw_band(Canvas& canvas, const Layout& layout, const RoadMap& map) {
   layout.legend.draw(canvas, m.px(76));
 }
 
-void draw_on(Canvas& canvas, const Layout& layout, const RoadMap& map) {
+void draw_on(Canvas& canvas, const Layout& layout, const RoadMap& map, const Scenario* scenario) {
   canvas.stop_when_interrupted(fmt::format("map {}: interrupted while it was drawn", map.name));
   MapLayers(map).paint(canvas, layout.left_top_m, layout.px_per_m);
   paint_details(map, canvas, layout.left_top_m, layout.px_per_m);
+  if (scenario) paint_tracks(*scenario, canvas, layout.left_top_m, layout.px_per_m);
   draw_band(canvas, layout, map);
   draw_coordinates(canvas, layout, map);
   draw_scale_bar(canvas, layout);
@@ -276,7 +290,7 @@ void draw_on(Canvas& canvas, const Layout& layout, const RoadMap& map) {
 RgbImage draw_map(const RoadMap& map, const MapPictureOptions& options) {
   const Layout layout = layout_of(map, options);
   Canvas canvas(layout.width_px, layout.height_px, kGroundColor);
-  draw_on(canvas, layout, map);
+  draw_on(canvas, layout, map, options.scenario);
   return canvas.image();
 }
 
@@ -290,7 +304,7 @@ void draw_map_png(const RoadMap& map, const std::string& path, const MapPictureO
 void draw_map_svg(const RoadMap& map, const std::string& path, const MapPictureOptions& options) {
   const Layout layout = layout_of(map, options);
   Canvas canvas(path, layout.width_px, layout.height_px, kGroundColor);
-  draw_on(canvas, layout, map);
+  draw_on(canvas, layout, map, options.scenario);
   write_file(path, canvas.svg());
 }
 

@@ -5,7 +5,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <string_view>
+#include <type_traits>
+
+#include "pictura/common/portable/crc32c.h"
 
 namespace pictura {
 
@@ -40,6 +44,13 @@ constexpr std::uint32_t crc32c(std::string_view bytes) {
   const auto at = [&](std::size_t i) { return static_cast<std::uint32_t>(static_cast<unsigned char>(bytes[i])); };
   std::uint32_t crc = 0xFFFFFFFFu;
   std::size_t i = 0;
+  if (kHasCrc32cInstruction && !std::is_constant_evaluated()) {
+    for (; i + 8 <= bytes.size(); i += 8) {
+      std::uint64_t word = 0;
+      std::memcpy(&word, bytes.data() + i, sizeof word);
+      crc = crc32c_of_word(crc, word);
+    }
+  }
   for (; i + 8 <= bytes.size(); i += 8) {
     crc ^= at(i) | at(i + 1) << 8 | at(i + 2) << 16 | at(i + 3) << 24;
     crc = tables[7][crc & 0xFF] ^ tables[6][(crc >> 8) & 0xFF] ^ tables[5][(crc >> 16) & 0xFF] ^ tables[4][crc >> 24] ^

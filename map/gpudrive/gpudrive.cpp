@@ -265,8 +265,9 @@ LoggedScene parse_scene(std::string_view text, const std::string& source) {
         if (!roads[i].contains("id") || !roads[i]["id"].is_number_integer()) continue;
         lane_ids.emplace(std::to_string(roads[i]["id"].get<int64_t>()), static_cast<int64_t>(i));
       }
-      for (const auto& [lane, light] : lights.items()) {
-        within("tl_states", [&] { within(lane, [&] { read_light(lane, light, lane_ids, &scene); }); });
+      for (const auto& light : lights.items()) {
+        within("tl_states",
+               [&] { within(light.key(), [&] { read_light(light.key(), light.value(), lane_ids, &scene); }); });
       }
     }
     if (json.contains("metadata")) within("metadata", [&] { read_metadata(member(json, "metadata"), &scene); });

@@ -107,7 +107,7 @@ LoggedDriving logged_driving(const Scenario& scenario) {
   const DrivableArea area(scenario.map);
   LoggedDriving driving;
   for (std::size_t i = 0; i < scenario.tracks.size(); ++i) {
-    const Track& track = scenario.tracks[i];
+    const RecordedTrack& track = scenario.tracks[i];
     const auto index = static_cast<int32_t>(i);
     if (track.type != TrackType::vehicle || !is_moving(scenario, index)) continue;
     const Span<const TrackState> states = scenario.states_of(index);

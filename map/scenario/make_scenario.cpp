@@ -123,7 +123,7 @@ void make_tracks(Conversion* conversion) {
     const std::string place = fmt::format("{}[{}]", scene.names.tracks, i);
     PICTURA_CHECK(logged.states.size() == steps, "{}: {}: expected {} states, got {}", scene.source, place, steps,
                   logged.states.size());
-    Track track{.id = logged.id, .type = logged.type, .control = logged.control, .first_valid = -1};
+    RecordedTrack track{.id = logged.id, .type = logged.type, .control = logged.control, .first_valid = -1};
     const LoggedState* last = nullptr;
     for (std::size_t step = 0; step < steps; ++step) {
       if (!logged.states[step].valid) continue;

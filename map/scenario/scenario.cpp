@@ -10,7 +10,7 @@ namespace pictura {
 namespace {
 
 void check_track(const Scenario& scenario, int32_t index) {
-  const Track& track = scenario.tracks[static_cast<std::size_t>(index)];
+  const RecordedTrack& track = scenario.tracks[static_cast<std::size_t>(index)];
   for (const auto& [field, size_m] : {std::pair{"length_m", track.length_m}, std::pair{"width_m", track.width_m},
                                       std::pair{"height_m", track.height_m}}) {
     PICTURA_CHECK(size_m > 0 && size_m <= kMaxTrackSize_m, "track {}: {}: expected a number in (0, {}], got {}", index,
@@ -146,7 +146,7 @@ void validate(const Scenario& scenario) {
 std::string first_difference(const Scenario& a, const Scenario& b) { return difference_of(a, b); }
 
 bool is_moving(const Scenario& scenario, int32_t track) {
-  const Track& summary = scenario.tracks[static_cast<std::size_t>(track)];
+  const RecordedTrack& summary = scenario.tracks[static_cast<std::size_t>(track)];
   const Span<const TrackState> states = scenario.states_of(track);
   return length(states[static_cast<std::size_t>(summary.last_valid)].position_m -
                 states[static_cast<std::size_t>(summary.first_valid)].position_m) >= kMovingTrack_m;
@@ -155,7 +155,7 @@ bool is_moving(const Scenario& scenario, int32_t track) {
 ScenarioFacts facts_of(const Scenario& scenario) {
   ScenarioFacts facts;
   for (std::size_t i = 0; i < scenario.tracks.size(); ++i) {
-    const Track& track = scenario.tracks[i];
+    const RecordedTrack& track = scenario.tracks[i];
     switch (track.type) {
       case TrackType::vehicle:
         ++facts.vehicles;

@@ -32,7 +32,7 @@ enum class RecordedControl : uint8_t {
 };
 const char* to_string(RecordedControl control);
 
-struct Track {
+struct RecordedTrack {
   int64_t id = 0;  // as in the file
   TrackType type = TrackType::unset;
   RecordedControl control = RecordedControl::unstated;
@@ -83,7 +83,7 @@ struct Scenario {
   int32_t current_step = 0;  // the last step of the history that a predictor is given
   int32_t sdc_track = -1;    // the self-driving car; -1: not known
   RoadMap map;
-  std::vector<Track> tracks;
+  std::vector<RecordedTrack> tracks;
   std::vector<TrackState> states;  // [tracks * num_steps]
   std::vector<uint8_t> valid;      // [tracks * num_steps] 0 or 1
   std::vector<int32_t> objects_of_interest;

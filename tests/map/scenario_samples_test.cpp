@@ -57,7 +57,7 @@ TEST(SceneSamples, GpuDrive) {
   EXPECT_EQ(scenario.sdc_track, 80);
   EXPECT_EQ(scenario.tracks_to_predict.size(), 7u);
   int experts = 0;
-  for (const Track& track : scenario.tracks) experts += track.control == RecordedControl::expert ? 1 : 0;
+  for (const RecordedTrack& track : scenario.tracks) experts += track.control == RecordedControl::expert ? 1 : 0;
   EXPECT_EQ(experts, 41);
   EXPECT_EQ(scenario.map.lanes.size(), 37u);
   expect_on_road(scenario);

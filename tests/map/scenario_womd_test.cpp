@@ -58,6 +58,10 @@ TEST(Crc32c, HasTheKnownValues) {
   EXPECT_EQ(crc32c(""), 0u);
   EXPECT_EQ(crc32c(std::string(32, '\0')), 0x8A9136AAu);  // RFC 3720, B.4
   EXPECT_EQ(crc32c(std::string(32, '\xFF')), 0x62A8AB43u);
+  // By tables, as the compiler computes it, and by the processor's instruction, where it has one.
+  constexpr std::string_view kText = "a text of some length, long enough for both ways";
+  constexpr uint32_t kByTables = crc32c(kText);
+  EXPECT_EQ(crc32c(std::string(kText)), kByTables);
 }
 
 TEST(Womd, EveryFieldIsReadInAnyOrderAndPacking) {

@@ -1,0 +1,72 @@
+#include "pictura/drawing/tracks.h"
+
+#include <array>
+#include <cmath>
+
+namespace pictura {
+
+namespace {
+
+constexpr double kWay_m = 0.25, kMinWay_px = 1.2, kMinOutline_px = 0.6;
+
+void paint_box(GroundPen& pen, const RecordedTrack& track, const TrackState& state, Rgb color) {
+  const Vec2 forward{std::cos(state.heading_rad), std::sin(state.heading_rad)}, left{-forward.y, forward.x};
+  const float front = 0.5f * track.length_m, side = 0.5f * track.width_m;
+  const Vec2 center = state.position_m.xy();
+  const std::array corners{center + forward * front + left * side, center - forward * front + left * side,
+                           center - forward * front - left * side, center + forward * front - left * side};
+  pen.move_to(corners[0]);
+  for (std::size_t i = 1; i < corners.size(); ++i) pen.line_to(corners[i]);
+  cairo_close_path(pen.context());
+  pen.canvas().set_color(color, 0.85);
+  cairo_fill_preserve(pen.context());
+  pen.canvas().set_color(hex(0x22262B));
+  cairo_set_line_width(pen.context(), pen.at_least(0.05, kMinOutline_px));
+  cairo_stroke(pen.context());
+  // Which end is the front.
+  pen.line(center + forward * (0.5f * front), center + forward * front, pen.at_least(0.1, kMinOutline_px),
+           hex(0xFFFFFF));
+}
+
+}  // namespace
+
+Rgb track_color(TrackType type) {
+  switch (type) {
+    case TrackType::vehicle: return hex(0x2F6FDE);
+    case TrackType::pedestrian: return hex(0xD9480F);
+    case TrackType::cyclist: return hex(0x9C36B5);
+    case TrackType::unset:
+    case TrackType::other: break;
+  }
+  return kUnknownTrackInk;
+}
+
+void paint_tracks(const Scenario& scenario, Canvas& canvas, Vec2 left_top_m, double px_per_m) {
+  GroundPen pen(canvas, left_top_m, px_per_m);
+  const auto color_of = [&](std::size_t i) {
+    return static_cast<int32_t>(i) == scenario.sdc_track ? kSdcInk : track_color(scenario.tracks[i].type);
+  };
+  for (std::size_t i = 0; i < scenario.tracks.size(); ++i) {
+    const Span<const TrackState> states = scenario.states_of(static_cast<int32_t>(i));
+    const Span<const uint8_t> valid = scenario.valid_of(static_cast<int32_t>(i));
+    for (std::size_t step = 0; step < states.size(); ++step) {
+      if (!valid[step]) continue;
+      const bool goes_on = step > 0 && valid[step - 1];
+      goes_on ? pen.line_to(states[step].position_m.xy()) : pen.move_to(states[step].position_m.xy());
+    }
+    canvas.set_color(color_of(i), 0.8);
+    cairo_set_line_width(pen.context(), pen.at_least(kWay_m, kMinWay_px));
+    cairo_stroke(pen.context());
+  }
+  const auto step = static_cast<std::size_t>(scenario.current_step);
+  for (std::size_t i = 0; i < scenario.tracks.size(); ++i) {
+    const auto index = static_cast<int32_t>(i);
+    if (!scenario.valid_of(index)[step]) continue;
+    paint_box(pen, scenario.tracks[i], scenario.states_of(index)[step], color_of(i));
+  }
+  for (const RecordedLight& light : scenario.lights) {
+    pen.line(light.stop_a_m.xy(), light.stop_b_m.xy(), pen.at_least(0.4, 1.5), kStopLineInk);
+  }
+}
+
+}  // namespace pictura

@@ -1,0 +1,18 @@
+// Recorded road users from above: their ways and, at one step, their boxes. Private to the drawing library.
+#pragma once
+
+#include "pictura/drawing/map_layers.h"
+#include "pictura/map/scenario/scenario.h"
+
+namespace pictura {
+
+constexpr Rgb kSdcInk = hex(0x0B6E4F), kUnknownTrackInk = hex(0x6B7178);
+
+/// Colour of a track of that type.
+Rgb track_color(TrackType type);
+
+/// Every track as a line through its valid states, broken where there are gaps, and its box at the scenario's current
+/// step where it is valid then.
+void paint_tracks(const Scenario& scenario, Canvas& canvas, Vec2 left_top_m, double px_per_m);
+
+}  // namespace pictura
