@@ -9,6 +9,7 @@
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/record.h"
 #include "pictura/cli/report.h"
+#include "pictura/cli/serve.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/drawing/drawing.h"
@@ -25,6 +26,8 @@ struct Arguments {
   BackendOptions backends;
   std::string policy = "random", video, replay;
   RecordingOptions recording;
+  ServeOptions serve;
+  bool endless = false;  // until it is interrupted
   int film_agent = 0;
   float film_width_m = 150;
   bool json = false;
@@ -50,7 +53,12 @@ void refuse_idle_options(const CLI::App& command, const Arguments& arguments) {
       if (command.count(option) > 0) fail_usage("{}: has no effect without --video", option);
     }
   }
-  if (arguments.replay.empty()) refuse_recording_options(command, "--replay");
+  if (arguments.replay.empty() && !arguments.serve.is_asked) {
+    refuse_recording_options(command, "--replay or --serve");
+  }
+  if (!arguments.serve.is_asked && command.count("--serve-host") > 0) {
+    fail_usage("--serve-host: has no effect without --serve");
+  }
   refuse_idle_backend_options(command, arguments.policy);
 }
 
@@ -69,32 +77,40 @@ void run(const Arguments& arguments) {
   }
 
   std::unique_ptr<Recording> recording;
-  if (!arguments.replay.empty()) {
-    recording = std::make_unique<Recording>(
-        *simulator, RecordedDriver{arguments.policy, world.session.get(), world.renderer.get()}, arguments.recording);
+  const RecordedDriver driver{arguments.policy, world.session.get(), world.renderer.get()};
+  if (!arguments.replay.empty()) recording = std::make_unique<Recording>(*simulator, driver, arguments.recording);
+  std::unique_ptr<Serving> serving;
+  if (arguments.serve.is_asked) {
+    serving = std::make_unique<Serving>(arguments.serve, *simulator, driver, arguments.recording);
   }
 
   ProgressLine line;
-  double simulate_s = 0, film_s = 0;  // filming and recording
+  double simulate_s = 0, film_s = 0;  // filming, recording and serving
   const auto begin_of_all = std::chrono::steady_clock::now();
   int step = 0;
-  for (; step < arguments.steps && !interrupted(); ++step) {
+  for (; (arguments.endless || step < arguments.steps) && !interrupted(); ++step) {
     const auto begin_of_frame = std::chrono::steady_clock::now();
+    if (serving && !serving->await_step()) break;
     if (film) film->add_frame(*simulator);
     film_s += seconds_since(begin_of_frame);
     world.act();
     const auto begin_of_recording = std::chrono::steady_clock::now();
+    if (serving) serving->before_step(world.commands);
     if (recording) recording->before_step(world.commands);
     const auto begin = std::chrono::steady_clock::now();
     const StepResult result = world.step();
     const auto end = std::chrono::steady_clock::now();
     if (recording) recording->after_step(result);
+    if (serving) serving->after_step(result);
     simulate_s += std::chrono::duration<double>(end - begin).count();
     film_s += std::chrono::duration<double>(begin - begin_of_recording).count() + seconds_since(end);
-    line.update(fmt::format("step {}/{}", step + 1, arguments.steps), static_cast<double>(step + 1) / arguments.steps);
+    if (!serving)
+      line.update(fmt::format("step {}/{}", step + 1, arguments.steps),
+                  static_cast<double>(step + 1) / arguments.steps);
   }
   const double drive_s = seconds_since(begin_of_all) - film_s;
   line.finish();
+  if (serving) serving->finish();
   if (film) film->close();
   if (recording) write_replay_and_say_so(arguments.replay, recording->finish());
 
@@ -136,6 +152,7 @@ void run(const Arguments& arguments) {
       fmt::print("{:20} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
     }
   }
+  if (arguments.endless) throw Interrupted(fmt::format("interrupted at step {}", step));
   if (step < arguments.steps) throw Interrupted(fmt::format("interrupted at step {} of {}", step, arguments.steps));
 }
 
@@ -157,19 +174,22 @@ void add_simulate_command(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--replay", arguments->replay, "Record it as a page that a browser plays")
       ->check(file_ending(".html"));
+  add_serve_options(command, &arguments->serve);
   add_recording_options(command, &arguments->recording);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "agent_steps_per_s counts the whole loop, policy and its images included, without film and replay;\n"
       "simulator_agent_steps_per_s counts the simulator alone.\n"
       "Examples:\n  pictura simulate Town01 --agents 80 --steps 600 --policy random --json\n"
-      "  pictura simulate procedural:1 --policy runs/demo/checkpoint.ckpt --video drive.mp4");
+      "  pictura simulate procedural:1 --policy runs/demo/checkpoint.ckpt --video drive.mp4\n"
+      "  pictura simulate Town05 --agents 60 --policy lane --serve --cameras");
   command->callback([arguments, command] {
     refuse_idle_options(*command, *arguments);
     if (arguments->film_agent >= arguments->world.agents) {
       fail_usage("--film-agent: expected 0 to {}, got {}", arguments->world.agents - 1, arguments->film_agent);
     }
     check_followed(arguments->recording, arguments->world.agents);
+    arguments->endless = arguments->serve.is_asked && command->count("--steps") == 0;
     run(*arguments);
   });
 }

@@ -30,16 +30,6 @@ ObservationView of_slot(const ObservationView& all, size_t slot) {
 }
 #endif
 
-RendererConfig cameras_of([[maybe_unused]] const RecordedDriver& driver) {
-  RendererConfig config;
-#ifdef PICTURA_HAS_TORCH
-  if (driver.session && driver.session->reads_images()) config = driver.session->renderer_config();
-#endif
-  config.device = {};   // by the oracle, which draws on the host
-  config.samples = {};  // with exact coverage
-  return config;
-}
-
 /// A word as shells read it.
 std::string quoted(const std::string& word) {
   constexpr std::string_view kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-+=.,:/@%";
@@ -85,6 +75,39 @@ std::string command_line() {
   return line;
 }
 
+RendererConfig cameras_of([[maybe_unused]] const RecordedDriver& driver) {
+#ifdef PICTURA_HAS_TORCH
+  if (driver.session && driver.session->reads_images()) return driver.session->renderer_config();
+#endif
+  return {};
+}
+
+std::optional<ReplayDecision> decision_of_agent([[maybe_unused]] Simulator& simulator,
+                                                [[maybe_unused]] const RecordedDriver& driver,
+                                                [[maybe_unused]] int agent) {
+#ifdef PICTURA_HAS_TORCH
+  const auto slot = static_cast<size_t>(agent);
+  if (!driver.session || simulator.state().status[slot] != static_cast<uint8_t>(AgentStatus::active)) return {};
+  std::array<float, kNumActions> logits{};
+  std::array<float, 1> value{};
+  driver.session->evaluate(
+      {of_slot(simulator.observations(), slot), &simulator.scene(), simulator.views().subspan(slot, 1), {}},
+      driver.renderer, logits, value);
+  return decision_of(logits, value[0]);
+#else
+  return {};
+#endif
+}
+
+ReplayOrigin origin_of(const RecordedDriver& driver) {
+  ReplayOrigin origin{.command = command_line(), .commit = PICTURA_COMMIT, .version = PICTURA_VERSION};
+  origin.policy = origin.policy_hash = driver.policy;
+#ifdef PICTURA_HAS_TORCH
+  if (driver.session) origin.policy_hash = driver.session->evaluation_setting().policy_hash;
+#endif
+  return origin;
+}
+
 struct Recording::Parts {
   Parts(Simulator& its_simulator, RecordedDriver its_driver, const RecordingOptions& options)
       : simulator(its_simulator),
@@ -92,21 +115,6 @@ struct Recording::Parts {
         followed(options.followed),
         recorder(simulator, {.followed = options.followed,
                              .cameras = options.cameras ? std::optional(cameras_of(driver)) : std::nullopt}) {}
-
-  std::optional<ReplayDecision> decision() const {
-#ifdef PICTURA_HAS_TORCH
-    const auto slot = static_cast<size_t>(followed);
-    if (!driver.session || simulator.state().status[slot] != static_cast<uint8_t>(AgentStatus::active)) return {};
-    std::array<float, kNumActions> logits{};
-    std::array<float, 1> value{};
-    driver.session->evaluate(
-        {of_slot(simulator.observations(), slot), &simulator.scene(), simulator.views().subspan(slot, 1), {}},
-        driver.renderer, logits, value);
-    return decision_of(logits, value[0]);
-#else
-    return {};
-#endif
-  }
 
   Simulator& simulator;
   const RecordedDriver driver;
@@ -120,19 +128,12 @@ Recording::Recording(Simulator& simulator, const RecordedDriver& driver, const R
 Recording::~Recording() = default;
 
 void Recording::before_step(Span<const Command> commands) {
-  parts_->recorder.before_step(commands, parts_->decision());
+  parts_->recorder.before_step(commands, decision_of_agent(parts_->simulator, parts_->driver, parts_->followed));
 }
 
 void Recording::after_step(const StepResult& result) { parts_->recorder.after_step(result); }
 
-Replay Recording::finish() {
-  ReplayOrigin origin{.command = command_line(), .commit = PICTURA_COMMIT, .version = PICTURA_VERSION};
-  origin.policy = origin.policy_hash = parts_->driver.policy;
-#ifdef PICTURA_HAS_TORCH
-  if (parts_->driver.session) origin.policy_hash = parts_->driver.session->evaluation_setting().policy_hash;
-#endif
-  return parts_->recorder.finish(std::move(origin));
-}
+Replay Recording::finish() { return parts_->recorder.finish(origin_of(parts_->driver)); }
 
 void write_replay_and_say_so(const std::string& path, const Replay& replay) {
   write_replay(path, replay);

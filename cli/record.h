@@ -2,12 +2,13 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
 
 #include "pictura/common/renderer.h"
-#include "pictura/replay/replay.h"
+#include "pictura/replay/recorder.h"
 #include "pictura/simulator/simulator.h"
 
 namespace pictura {
@@ -32,6 +33,13 @@ struct RecordedDriver {
   PolicySession* session = nullptr;
   Renderer* renderer = nullptr;  // of the session's images
 };
+
+/// What draws the images that its policy sees, else the paper's.
+RendererConfig cameras_of(const RecordedDriver& driver);
+/// What the policy makes of an agent of the only world now; nothing where it is not asked.
+std::optional<ReplayDecision> decision_of_agent(Simulator& simulator, const RecordedDriver& driver, int agent);
+/// This process, its command and who drives.
+ReplayOrigin origin_of(const RecordedDriver& driver);
 
 /// Records the only world of a simulator in host memory.
 class Recording {

@@ -380,15 +380,20 @@ auto of_page(const std::string& path, Read&& read) {
 
 }  // namespace
 
-void write_replay(const std::string& path, const Replay& replay) {
+ReplayText replay_text(const Replay& replay) {
   const std::vector<Section> sections = sections_of(replay);
   std::string bytes;
   for (const Section& section : sections) bytes += section.bytes;
+  return {header_of(replay, sections), base64(deflate(bytes))};
+}
+
+void write_replay(const std::string& path, const Replay& replay) {
+  const ReplayText text = replay_text(replay);
   std::string images;
   for (const std::string& group : replay.images.groups) images += group;
   std::string elements;
-  elements += fmt::format("{}{}{}\n", kHeaderBegin, script_text(header_of(replay, sections)), kEnd);
-  elements += fmt::format("{}{}{}\n", kDataBegin, base64(deflate(bytes)), kEnd);
+  elements += fmt::format("{}{}{}\n", kHeaderBegin, script_text(text.header), kEnd);
+  elements += fmt::format("{}{}{}\n", kDataBegin, text.data, kEnd);
   if (!images.empty()) elements += fmt::format("{}{}{}\n", kImagesBegin, base64(images), kEnd);
   const std::string title = fmt::format("{}, {}, seed {}", replay.origin.map, replay.origin.policy, replay.origin.seed);
   write_file(path, filled(page::replay_html(), {{"title", html_text(title)}, {"elements", elements}}));

@@ -13,6 +13,14 @@ namespace pictura {
 /// Writes the page, whole or not at all. Throws Error naming the path.
 void write_replay(const std::string& path, const Replay& replay);
 
+/// The header, and the bytes of the section that it lists, in base64 of a zlib stream: what a page that is told of a
+/// replay reads (docs/replay.md).
+struct ReplayText {
+  nlohmann::ordered_json header;
+  std::string data;
+};
+ReplayText replay_text(const Replay& replay);
+
 /// Reads what write_replay() wrote. Throws Error naming the path and what is damaged or missing.
 Replay read_replay(const std::string& path);
 

@@ -51,6 +51,29 @@ ReplayDecision decision_of(Span<const float> logits, float value) {
   return decision;
 }
 
+AgentCameras::AgentCameras(Simulator& simulator, RendererConfig config) : simulator_(simulator) {
+  config.device = {};   // by the oracle, which draws on the host
+  config.samples = {};  // with exact coverage
+  renderer_ = make_renderer("cpu", config);
+  upload_maps(simulator, renderer_.get());
+  images_ = std::make_unique<HostImages>(renderer_->config().rig, 1);
+  for (const Camera& camera : renderer_->config().rig.cameras) {
+    cameras_.push_back({camera.name, camera.width_px, camera.height_px});
+  }
+}
+
+AgentCameras::~AgentCameras() = default;
+
+std::string AgentCameras::draw(int slot) {
+  renderer_->render(simulator_.scene(), simulator_.views().subspan(static_cast<size_t>(slot), 1), images_->batch());
+  std::string bytes;
+  for (size_t camera = 0; camera < cameras_.size(); ++camera) {
+    const std::vector<uint8_t> rgb = images_->interleaved(0, static_cast<int>(camera));
+    bytes.append(reinterpret_cast<const char*>(rgb.data()), rgb.size());
+  }
+  return bytes;
+}
+
 struct Recorder::Parts {
   Parts(Simulator& its_simulator, const RecorderOptions& options)
       : simulator(its_simulator),
@@ -66,12 +89,8 @@ struct Recorder::Parts {
     replay.followed = options.followed;
     replay.map = map_shapes(setup.map_of(world));
     if (!options.cameras || options.followed < 0) return;
-    renderer = make_renderer("cpu", *options.cameras);
-    upload_maps(simulator, renderer.get());
-    images = std::make_unique<HostImages>(renderer->config().rig, 1);
-    for (const Camera& camera : renderer->config().rig.cameras) {
-      replay.images.cameras.push_back({camera.name, camera.width_px, camera.height_px});
-    }
+    cameras = std::make_unique<AgentCameras>(simulator, *options.cameras);
+    replay.images.cameras = cameras->cameras();
     replay.images.frames_per_group = kReplayFramesPerGroup;
   }
 
@@ -115,7 +134,7 @@ struct Recorder::Parts {
     for (const LightState light : lights) replay.lights.push_back(static_cast<uint8_t>(light));
     ++episode().num_frames;
     ++replay.num_frames;
-    if (renderer) add_images(scene);
+    if (cameras) add_images();
   }
 
   void add_agent(const AgentStateView& state, Span<const AgentBox> boxes, int32_t agent, bool begins) {
@@ -147,12 +166,8 @@ struct Recorder::Parts {
     episode().chains.push_back(chain);
   }
 
-  void add_images(const SceneBatch& scene) {
-    renderer->render(scene, simulator.views().subspan(slot(replay.followed), 1), images->batch());
-    for (size_t camera = 0; camera < replay.images.cameras.size(); ++camera) {
-      const std::vector<uint8_t> rgb = images->interleaved(0, static_cast<int>(camera));
-      group.append(reinterpret_cast<const char*>(rgb.data()), rgb.size());
-    }
+  void add_images() {
+    group += cameras->draw(static_cast<int>(slot(replay.followed)));
     if (replay.num_frames % kReplayFramesPerGroup == 0) end_group();
   }
   void end_group() {
@@ -223,8 +238,7 @@ struct Recorder::Parts {
   std::vector<Command> commands;
   int32_t first_slot = 0, first_box = 0, num_boxes = 0, first_light = 0;
   std::vector<int32_t> chains;  // [agents] the number of the chain that was written last
-  std::unique_ptr<Renderer> renderer;
-  std::unique_ptr<HostImages> images;
+  std::unique_ptr<AgentCameras> cameras;
   std::string group;  // images that wait to be compressed
   Replay replay;
 };
@@ -277,7 +291,9 @@ void Recorder::after_step(const StepResult& result) {
   parts.add_frame();
 }
 
-Replay Recorder::finish(ReplayOrigin origin) {
+const Replay& Recorder::recorded() const { return parts_->replay; }
+
+void Recorder::set_origin(ReplayOrigin origin) {
   Parts& parts = *parts_;
   const CompiledMap& map = parts.setup.map_of(parts.world);
   origin.map = map.road->name;
@@ -286,10 +302,39 @@ Replay Recorder::finish(ReplayOrigin origin) {
   origin.global_world = parts.setup.worlds[static_cast<size_t>(parts.world)].global_world;
   origin.dt_s = parts.setup.config.dt_s;
   parts.replay.origin = std::move(origin);
+}
+
+void Recorder::forget() {
+  Replay& replay = parts_->replay;
+  PICTURA_CHECK(replay.followed < 0, "replay: frames that hold decisions or images cannot be forgotten");
+  const auto keep_last = [](auto& values, int32_t count) { values.erase(values.begin(), values.end() - count); };
+  for (std::vector<int32_t>& track : replay.tracks) keep_last(track, replay.num_agents);
+  keep_last(replay.lights, replay.num_lights);
+  keep_last(replay.episodes, 1);
+  ReplayEpisode& episode = replay.episodes.back();
+  episode.first_frame = 0;
+  episode.num_frames = 1;
+  // Of each agent its chain of now.
+  std::vector<const ReplayChain*> last(static_cast<size_t>(replay.num_agents), nullptr);
+  for (const ReplayChain& chain : episode.chains) last[static_cast<size_t>(chain.agent)] = &chain;
+  std::vector<ReplayChain> kept;
+  for (const ReplayChain* chain : last) {
+    if (chain == nullptr) continue;
+    kept.push_back(*chain);
+    kept.back().frame = 0;
+  }
+  episode.chains = std::move(kept);
+  replay.first_infraction = {};
+  replay.num_frames = 1;
+}
+
+Replay Recorder::finish(ReplayOrigin origin) {
+  Parts& parts = *parts_;
+  set_origin(std::move(origin));
   if (!parts.replay.decisions.empty()) {
     parts.replay.decisions.resize(static_cast<size_t>(parts.replay.num_frames) * kDecisionValues);
   }
-  if (parts.renderer) parts.end_group();
+  if (parts.cameras) parts.end_group();
   return std::move(parts.replay);
 }
 

@@ -3,7 +3,10 @@
 
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
+#include "pictura/common/image.h"
 #include "pictura/common/renderer.h"
 #include "pictura/replay/replay.h"
 #include "pictura/simulator/simulator.h"
@@ -14,6 +17,24 @@ struct RecorderOptions {
   int world = 0;
   int followed = -1;                      // agent of the world whose decisions and images are kept, or -1
   std::optional<RendererConfig> cameras;  // what its images are drawn with, by the CPU renderer; nothing: no images
+};
+
+/// Draws what one agent sees, by the CPU renderer.
+class AgentCameras {
+ public:
+  /// `config` as a policy's, whatever device and samples it names. The simulator must outlive it.
+  AgentCameras(Simulator& simulator, RendererConfig config);
+  ~AgentCameras();
+
+  const std::vector<ReplayCamera>& cameras() const { return cameras_; }
+  /// [height, width, 3] of each camera, one after the other, of a slot's view now.
+  std::string draw(int slot);
+
+ private:
+  Simulator& simulator_;
+  std::vector<ReplayCamera> cameras_;
+  std::unique_ptr<Renderer> renderer_;
+  std::unique_ptr<HostImages> images_;
 };
 
 /// What a policy makes of the followed agent's state.
@@ -36,7 +57,14 @@ class Recorder {
   /// After it. Throws Error where the replay would take more memory than it may.
   void after_step(const StepResult& result);
 
-  /// All of it. Of `origin`, what the simulator knows (map, seed, world, pace) is filled in. The recorder is spent.
+  /// What was recorded until now, without images that wait to be compressed; its last frame is the simulator's state.
+  const Replay& recorded() const;
+  /// Of `origin`, what the simulator knows (map, seed, world, pace) is filled in.
+  void set_origin(ReplayOrigin origin);
+  /// Keeps nothing but the last frame, as the first of a replay, and the metrics of all. Not with a followed agent.
+  void forget();
+
+  /// All of it, with this origin. The recorder is spent.
   Replay finish(ReplayOrigin origin);
 
  private:

@@ -16,6 +16,12 @@ const KINDS = [
 const reasonsOf = bits => KINDS.filter(kind => bits & kind.bit & INFRACTIONS);
 const ABSENT = 3, HALTED = 1;
 
+function eventsOf(bits, agent, frame) {
+  const found = [];
+  KINDS.forEach((kind, k) => { if (bits & kind.bit) found.push({ frame, agent, kind: k }); });
+  return found;
+}
+
 function bytesOfBase64(text) {
   if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
   const letters = atob(text), bytes = new Uint8Array(letters.length);
@@ -106,7 +112,7 @@ class Replay {
   constructor(header, bytes, imageBytes) {
     this.header = header;
     const { agents, frames, lights } = header;
-    Object.assign(this, { agents, frames, dt_s: header.dt_s, followed: header.followed, numLights: lights });
+    Object.assign(this, { agents, frames, dt_s: header.dt_s, followed: header.followed, numLights: lights, firstStep: 0, version: 0 });
     const orders = new Map(header.tracks.map(track => [track.name, track]));
     this.tracks = {};
     this.units = {};
@@ -127,25 +133,28 @@ class Replay {
     }
     const perEpisode = agents * header.conditioning.length;
     this.episodes.forEach((episode, i) => { episode.conditioning = conditioning.subarray(i * perEpisode, (i + 1) * perEpisode); });
+    this.stride = frames;
     this.episodeOf = new Uint16Array(frames);
     this.episodes.forEach((episode, i) => this.episodeOf.fill(i, episode.first, episode.end));
     this.rewardTerms = header.tracks.filter(track => track.name.startsWith("reward_")).map(track => track.name.slice(7));
     this.events = this.findEvents();
     if (header.images) this.images = new Images(header.images, frames, imageBytes);
   }
-  raw(track, agent, frame) { return this.tracks[track][agent * this.frames + frame]; }
+  // Columns have room for `stride` frames.
+  raw(track, agent, frame) { return this.tracks[track][agent * this.stride + frame]; }
   get(track, agent, frame) { return this.raw(track, agent, frame) * this.units[track]; }
   episode(frame) { return this.episodes[this.episodeOf[frame]]; }
   isAbsent(agent, frame) { return this.raw("status", agent, frame) === ABSENT; }
   body(agent, frame) { return this.episode(frame).bodies[agent]; }
-  light(light, frame) { return this.lights[light * this.frames + frame]; }
+  light(light, frame) { return this.lights[light * this.stride + frame]; }
+  isFollowed(agent) { return agent === this.followed; }
   // What can be asked of a policy: 12 probabilities and the value; null where it was not.
   decision(agent, frame) {
-    if (agent !== this.followed || !this.decisions) return null;
+    if (!this.isFollowed(agent, frame) || !this.decisions) return null;
     const values = [];
     let sum = 0;
     for (let i = 0; i < 13; ++i) {
-      values.push(this.decisions[i * this.frames + frame] * this.header.decision_unit);
+      values.push(this.decisions[i * this.stride + frame] * this.header.decision_unit);
       if (i < 12) sum += values[i];
     }
     return sum > 0.5 ? { probabilities: values.slice(0, 12), value: values[12] } : null;
@@ -166,7 +175,7 @@ class Replay {
   // The pose between two frames.
   pose(agent, time) {
     const frame = Math.min(Math.floor(time), this.frames - 1), share = time - frame, next = frame + 1;
-    const a = agent * this.frames + frame, { x_m, y_m, heading_deg } = this.tracks;
+    const a = agent * this.stride + frame, { x_m, y_m, heading_deg } = this.tracks;
     const goes = share > 0 && next < this.frames && this.episodeOf[next] === this.episodeOf[frame] && !this.isAbsent(agent, next);
     const mix = track => goes ? track[a] + (track[a + 1] - track[a]) * share : track[a];
     return { x_m: mix(x_m) * this.units.x_m, y_m: mix(y_m) * this.units.y_m, heading_deg: mix(heading_deg) * this.units.heading_deg };
@@ -175,10 +184,7 @@ class Replay {
   findEvents() {
     const found = [], events = this.tracks.events;
     for (let agent = 0, i = 0; agent < this.agents; ++agent) {
-      for (let frame = 0; frame < this.frames; ++frame, ++i) {
-        if (!events[i]) continue;
-        KINDS.forEach((kind, k) => { if (events[i] & kind.bit) found.push({ frame, agent, kind: k }); });
-      }
+      for (let frame = 0; frame < this.frames; ++frame, ++i) if (events[i]) found.push(...eventsOf(events[i], agent, frame));
     }
     return found.sort((a, b) => a.frame - b.frame || a.agent - b.agent);
   }

@@ -12,27 +12,36 @@ function fail(message) {
 
 async function main() {
   let replay;
+  // What happens at once, before there are views: nothing.
+  const live = byId("replay-live") && new LiveConnection({ fault: error => { throw error; }, restart() {}, frame() {}, change() {} });
+  if (live) byId("message").firstElementChild.textContent = "Waiting for the simulation ...";
   try {
-    replay = await readReplay();
+    replay = await (live ? live.begin() : readReplay());
   } catch (error) {
     fail(error.message.replace(/\.$/, ""));
     window.pictura = { damaged: error.message };
     return;
   }
-  const header = replay.header, last = replay.frames - 1;
+  const header = replay.header, last = () => replay.frames - 1;
   byId("message").hidden = true;
   byId("app").hidden = false;
 
   const state = { time: 0, agent: Math.max(0, replay.followed), speed: 1, playing: false, follow: false, goals: false, numbers: false,
-    onlyAgent: false, camera: "", x: 0, y: 0, zoom: 1 };
+    onlyAgent: false, camera: "", x: 0, y: 0, zoom: 1, isAtEdge: Boolean(live) };
   let theme = readTheme(), isDirty = true;
   const dirty = () => { isDirty = true; };
-  const clampFrame = frame => Math.min(last, Math.max(0, frame));
+  const clampFrame = frame => Math.min(last(), Math.max(0, frame));
 
   const actions = {
-    seek(frame) { state.time = clampFrame(frame); dirty(); },
+    // In a world that runs, the newest frame is where the page goes on with it.
+    seek(frame) {
+      state.time = clampFrame(frame);
+      if (live) state.isAtEdge = state.time >= last();
+      dirty();
+    },
     select(agent) {
       state.agent = Math.min(replay.agents - 1, Math.max(0, agent));
+      if (live) live.ask({ watch: state.agent });
       dirty();
     },
     // An event: a second before it, so that it is seen to happen, unless it is already on screen.
@@ -51,11 +60,24 @@ async function main() {
     },
     camera(name) { state.camera = name; dirty(); },
     play(playing) {
-      if (playing && state.time >= last) state.time = 0;
+      if (live) {
+        live.ask({ paused: !playing });
+        if (playing) state.isAtEdge = true;
+      } else if (playing && state.time >= last()) state.time = 0;
       state.playing = playing;
       dirty();
     },
-    speed(speed) { state.speed = speed; dirty(); },
+    speed(speed) {
+      state.speed = speed;
+      if (live) live.ask({ pace: live.pace = speed });
+      dirty();
+    },
+    // Of a world that runs: drives the chosen agent by the keys, or gives it back.
+    drive(isDriving) {
+      live.drive(isDriving ? state.agent : -1);
+      if (isDriving) { actions.follow(true); actions.play(true); }
+      dirty();
+    },
     follow(follow) { state.follow = follow; if (follow && state.zoom < 2) state.zoom = 5; dirty(); },
     fail,
   };
@@ -69,9 +91,9 @@ async function main() {
   // Address.
   function readAddress() {
     const values = new URLSearchParams(location.hash.slice(1)), number = name => values.has(name) && Number.isFinite(Number(values.get(name))) ? Number(values.get(name)) : null;
-    if (number("step") !== null) state.time = clampFrame(number("step"));
+    if (!live && number("step") !== null) state.time = clampFrame(number("step"));
     if (number("agent") !== null) state.agent = Math.min(replay.agents - 1, Math.max(0, Math.round(number("agent"))));
-    if (SPEEDS.includes(number("speed"))) state.speed = number("speed");
+    if (!live && SPEEDS.includes(number("speed"))) state.speed = number("speed");
     if (number("zoom") > 0) state.zoom = Math.min(60, Math.max(0.05, number("zoom")));
     if (number("x") !== null && number("y") !== null) { state.x = number("x"); state.y = number("y"); }
     else if (number("zoom") > 0) ({ x_m: state.x, y_m: state.y } = replay.pose(state.agent, state.time));
@@ -95,21 +117,24 @@ async function main() {
   window.addEventListener("hashchange", () => { if (location.hash !== written) { written = location.hash; readAddress(); } });
 
   // Header.
-  function fillHeader() {
-    byId("map-name").textContent = header.map;
-    byId("policy-name").textContent = `${header.policy}, seed ${header.seed}`;
-    const m = header.metrics;
+  function fillMetrics() {
+    const m = replay.header.metrics;
     const shown = [["km", m.km_driven.toFixed(1)], ["goals", m.goals_reached], ["collisions", m.collisions], ["off road", m.off_road], ["red lights", m.red_light], ["walls", m.wall_contacts]];
     byId("metrics").replaceChildren(...shown.map(([name, value]) => {
       const item = make("li");
       item.append(make("b", value), ` ${name}`);
       return item;
     }));
+  }
+  function fillHeader() {
+    byId("map-name").textContent = header.map;
+    byId("policy-name").textContent = `${header.policy}, seed ${header.seed}`;
+    fillMetrics();
     const command = make("code", header.command), about = byId("about").querySelector("dl");
     const facts = [["Command", command], ["Policy", header.policy], ["Policy's hash", header.policy_hash], ["Map", header.map], ["Map's hash", header.map_hash], ["Seed", header.seed],
-      ["World", header.global_world], ["Agents", replay.agents], ["Steps", `${last} of ${header.dt_s.toFixed(2)} s`], ["Episodes", replay.episodes.length],
+      ["World", header.global_world], ["Agents", replay.agents], ["Steps", live ? `of ${header.dt_s.toFixed(2)} s` : `${last()} of ${header.dt_s.toFixed(2)} s`], ...(live ? [] : [["Episodes", replay.episodes.length]]),
       ["Commit", header.commit], ["Program", header.program], ["Quantised to", "1 cm, 0.1 degree, 1 cm/s"],
-      ...Object.entries(m).map(([name, value]) => [name.replace(/_/g, " "), Number(value.toFixed(3))])];
+      ...(live ? [] : Object.entries(header.metrics).map(([name, value]) => [name.replace(/_/g, " "), Number(value.toFixed(3))]))];
     about.replaceChildren(...facts.flatMap(([name, value]) => {
       const text = make("dd");
       text.append(value);
@@ -157,9 +182,19 @@ async function main() {
   function frame(now) {
     const elapsed_s = Math.min(0.25, (now - before) / 1000);
     before = now;
-    if (state.playing) {
-      state.time = Math.min(last, state.time + elapsed_s * state.speed / replay.dt_s);
-      if (state.time >= last) state.playing = false;
+    if (live) {
+      state.speed = live.pace;
+      state.playing = state.isAtEdge && !live.paused && live.state === "live";
+      const lag = last() - state.time;
+      if (state.isAtEdge && lag > 0) {
+        // About a step behind the newest, so that there is something to move towards; far behind, faster.
+        state.time = lag > 6 ? last() - 1 : Math.min(last(), state.time + elapsed_s * state.speed / replay.dt_s * lag);
+        if (!state.playing && lag < 0.02) state.time = last();
+        isDirty = true;
+      }
+    } else if (state.playing) {
+      state.time = Math.min(last(), state.time + elapsed_s * state.speed / replay.dt_s);
+      if (state.time >= last()) state.playing = false;
       isDirty = true;
     }
     if (isDirty) {
@@ -176,7 +211,8 @@ async function main() {
     timeline.draw(theme, world.ratio);
     countAgents(at);
     drawScale();
-    byId("clock").textContent = `${(at * replay.dt_s).toFixed(1)} s, step ${at} of ${last}` + (replay.episodes.length > 1 ? `, episode ${replay.episodeOf[at] + 1} of ${replay.episodes.length}` : "");
+    byId("clock").textContent = `${((replay.firstStep + at) * replay.dt_s).toFixed(1)} s, step ${replay.firstStep + at}` + (live ? `, episode ${replay.episode(at).index + 1}` : ` of ${last()}` + (replay.episodes.length > 1 ? `, episode ${replay.episodeOf[at] + 1} of ${replay.episodes.length}` : ""));
+    if (live) showLive();
     byId("play").textContent = state.playing ? "Pause" : "Play";
     byId("speed").value = String(state.speed);
     byId("follow").setAttribute("aria-pressed", state.follow);
@@ -217,7 +253,11 @@ async function main() {
       byId(`${sheet}-button`).setAttribute("aria-expanded", !hidden);
     }
   }
-  function step(count) { state.playing = false; actions.seek(Math.floor(state.time) + count); }
+  function step(count) {
+    if (live && count > 0 && state.isAtEdge && (live.paused || Math.ceil(state.time) + count > last())) { live.ask({ steps: count }); return; }
+    state.playing = false;
+    actions.seek((live && state.isAtEdge ? last() : Math.floor(state.time)) + count);
+  }
   function step_agent(count) {
     actions.select((state.agent + count + replay.agents) % replay.agents);
     actions.show(state.agent);
@@ -233,7 +273,7 @@ async function main() {
   // Keys.
   const keys = {
     " ": () => actions.play(!state.playing), ArrowLeft: event => step(event.shiftKey ? -10 : -1), ArrowRight: event => step(event.shiftKey ? 10 : 1),
-    Home: () => actions.seek(0), End: () => actions.seek(last),
+    Home: () => actions.seek(0), End: () => actions.seek(last()),
     "[": () => actions.speed(SPEEDS[Math.max(0, SPEEDS.indexOf(state.speed) - 1)]), "]": () => actions.speed(SPEEDS[Math.min(SPEEDS.length - 1, SPEEDS.indexOf(state.speed) + 1)]),
     n: () => jump(1), p: () => jump(-1), ",": () => step_agent(-1), ".": () => step_agent(1), f: () => actions.follow(!state.follow),
     g: () => { state.goals = !state.goals; }, l: () => { state.numbers = !state.numbers; },
@@ -242,18 +282,50 @@ async function main() {
       actions.camera(names[(names.indexOf(state.camera) + 1) % names.length]);
     },
     "+": () => zoom(1.4), "=": () => zoom(1.4), "-": () => zoom(1 / 1.4), 0: fit,
-    "/": () => byId("search-number").focus(), "?": () => toggle("help"), Escape: () => toggle(""),
+    "/": () => byId("search-number").focus(), "?": () => toggle("help"), Escape: () => { toggle(""); if (live && live.mine >= 0) actions.drive(false); },
   };
+  if (live) keys.t = () => actions.drive(live.mine !== state.agent);
   window.addEventListener("keydown", event => {
     const isTyping = event.target.matches("input[inputmode], select");
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (isTyping) { if (event.key === "Escape") event.target.blur(); return; }
+    if (live && live.key(event.key.length === 1 ? event.key.toLowerCase() : event.key, true)) { event.preventDefault(); return; }
     const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!act || (event.key === " " && event.target.matches("button, summary, input"))) return;
     event.preventDefault();
     act(event);
     dirty();
   });
+
+  // A world that runs.
+  const LIVE_TEXTS = { lost: "connection lost, trying again", refused: "this address serves no simulation any more", ended: "the simulation has ended" };
+  function showLive() {
+    byId("live-state").textContent = LIVE_TEXTS[live.state] ?? (live.paused ? "paused" : "live");
+    byId("live-state").className = live.state === "live" && !live.paused ? "on" : "";
+    byId("live").setAttribute("aria-pressed", state.isAtEdge);
+    const isMine = live.mine === state.agent, isElse = live.driven === state.agent && !isMine;
+    byId("drive").setAttribute("aria-pressed", isMine);
+    byId("drive").textContent = isMine ? "Give back" : isElse ? "Driven elsewhere" : "Drive";
+  }
+  if (live) {
+    for (const id of ["live-state", "live", "drive"]) byId(id).hidden = false;
+    for (const element of document.querySelectorAll(".live-only")) element.hidden = false;
+    on("live", () => actions.seek(last()));
+    on("drive", () => { actions.drive(live.mine !== state.agent); byId("drive").blur(); });
+    window.addEventListener("keyup", event => live.key(event.key.length === 1 ? event.key.toLowerCase() : event.key, false));
+    window.addEventListener("blur", () => live.release());
+    live.on = {
+      fault(error) { live.state = "refused"; dirty(); throw error; },
+      restart() { state.time = last(); counted = -1; dirty(); },
+      frame(dropped) {
+        state.time = Math.max(0, state.time - dropped);
+        counted = -1;
+        fillMetrics();
+        dirty();
+      },
+      change: dirty,
+    };
+  }
 
   // Pointers: drag, pinch, wheel, click.
   const canvas = world.canvas, pointers = new Map();
@@ -317,11 +389,12 @@ async function main() {
 
   // For tests, and for those who like to look closer: what is shown now.
   window.pictura = {
-    replay, state, actions,
+    replay, state, actions, live,
     drawn: () => { render(); return world.drawn.map(({ agent, x_m, y_m, heading_deg, px, py }) => ({ agent, x_m, y_m, heading_deg, px, py })); },
     pictured: () => panel.pictured,
   };
   readAddress();
+  if (live) live.ask({ watch: state.agent });
   fillHeader();
   fillLegend();
   requestAnimationFrame(now => { before = now; frame(now); });

@@ -108,7 +108,7 @@ class Panel {
 
   draw(theme, ratio) {
     const { replay, state } = this, frame = Math.floor(state.time), agent = state.agent;
-    const isNew = !this.shown || this.shown.agent !== agent || this.shown.theme !== theme;
+    const isNew = !this.shown || this.shown.agent !== agent || this.shown.theme !== theme || this.shown.version !== replay.version;
     if (isNew || this.shown.width !== this.curves[0].canvas.clientWidth) {
       this.sumRewards(agent);
       this.drawCurves(theme, ratio);
@@ -121,7 +121,7 @@ class Panel {
       this.drawPictures(frame);
       if (isNew || this.shown.episode !== replay.episodeOf[frame]) this.drawConditioning(frame, agent);
     }
-    this.shown = { agent, frame, theme, camera: state.camera, width: this.curves[0].canvas.clientWidth, episode: replay.episodeOf[frame] };
+    this.shown = { agent, frame, theme, version: replay.version, camera: state.camera, width: this.curves[0].canvas.clientWidth, episode: replay.episodeOf[frame] };
   }
 
   drawHead(frame, agent, theme) {
@@ -147,7 +147,7 @@ class Panel {
     set("steer", replay.get("steer_deg", agent, frame), 1, "\u00b0");
     set("acceleration", frame > before ? (replay.get("speed_mps", agent, frame) - replay.get("speed_mps", agent, before)) / replay.dt_s : 0, 1, "m/s\u00b2");
     set("value", decision ? decision.value : NaN, 2, "");
-    this.facts.value.box.hidden = agent !== replay.followed || !replay.decisions;
+    this.facts.value.box.hidden = !replay.isFollowed(agent, frame) || !replay.decisions;
     const reward = replay.rewardTerms.reduce((sum, term) => sum + replay.get(`reward_${term}`, agent, frame), 0);
     this.facts.reward.value.textContent = short(reward);
     set("return", this.returns[frame], 2, "");
@@ -155,7 +155,7 @@ class Panel {
 
   drawActions(frame, agent) {
     const { replay } = this, decision = replay.decision(agent, frame), chosen = replay.action(agent, frame);
-    byId("action-note").textContent = decision ? "probability of each, the chosen one framed" : replay.decisions ? `the policy's probabilities are those of agent ${replay.followed}` : "the chosen one framed";
+    byId("action-note").textContent = decision ? "probability of each, the chosen one framed" : replay.decisions && replay.followed >= 0 ? `the policy's probabilities are those of agent ${replay.followed}` : "the chosen one framed";
     this.cells.forEach((cell, i) => {
       const p = decision ? decision.probabilities[i] : 0;
       cell.classList.toggle("chosen", i === chosen);
@@ -186,7 +186,7 @@ class Panel {
   }
 
   async drawPictures(frame) {
-    const shows = this.pictures.length > 0 && this.state.agent === this.replay.followed;
+    const shows = this.pictures.length > 0 && this.replay.isFollowed(this.state.agent, frame);
     byId("cameras").hidden = !shows;
     if (!shows) return;
     for (const { figure, camera } of this.pictures) figure.classList.toggle("large", camera.name === this.state.camera);
@@ -198,7 +198,7 @@ class Panel {
       this.actions.fail(`its images cannot be read (${error.message})`);
       return;
     }
-    if (wanted !== this.wanted) return;
+    if (wanted !== this.wanted || !bytes) return;
     let at = 0;
     for (const { canvas, pixels } of this.pictures) {
       for (let to = 0; to < pixels.data.length; to += 4, at += 3) {
@@ -215,7 +215,7 @@ class Panel {
   drawCurves(theme, ratio) {
     const { replay, state } = this;
     for (const curve of this.curves) {
-      curve.box.hidden = Boolean(curve.decided) && !(replay.decisions && state.agent === replay.followed);
+      curve.box.hidden = Boolean(curve.decided) && !(replay.decisions && replay.isFollowed(state.agent, Math.floor(state.time)));
       const width = Math.max(1, Math.round(curve.canvas.clientWidth * ratio)), height = Math.round(52 * ratio);
       if (curve.box.hidden) continue;
       const values = Float32Array.from({ length: replay.frames }, (_, frame) => replay.isAbsent(state.agent, frame) ? NaN : curve.of(state.agent, frame));

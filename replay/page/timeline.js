@@ -39,7 +39,7 @@ class Timeline {
   showTip(pointer) {
     const { tip, replay } = this, found = this.eventAt(pointer), box = this.canvas.getBoundingClientRect();
     const frame = found ? found.frame : Math.round(this.frameAt(pointer));
-    tip.textContent = `${(frame * replay.dt_s).toFixed(1)} s` + (found ? `: agent ${found.agent}, ${KINDS[found.kind].name}` : "");
+    tip.textContent = `${((replay.firstStep + frame) * replay.dt_s).toFixed(1)} s` + (found ? `: agent ${found.agent}, ${KINDS[found.kind].name}` : "");
     tip.hidden = false;
     tip.style.left = `${Math.min(box.width - tip.offsetWidth, Math.max(0, pointer.clientX - box.left - tip.offsetWidth / 2)) + 12}px`;
     tip.style.bottom = `${this.canvas.clientHeight + 14}px`;
@@ -47,7 +47,7 @@ class Timeline {
 
   draw(theme, ratio) {
     const { canvas, replay, state } = this, width = canvas.clientWidth, height = 74;
-    const key = [width, ratio, state.onlyAgent && state.agent, theme];
+    const key = [width, ratio, state.onlyAgent && state.agent, theme, replay.version];
     if (!this.kept || key.some((part, i) => part !== this.kept[i])) {
       this.picture = this.picture || document.createElement("canvas");
       this.picture.width = canvas.width = Math.round(width * ratio);
@@ -100,10 +100,11 @@ class Timeline {
     const seconds = (replay.frames - 1) * replay.dt_s, wish = seconds / Math.max(1, (width - this.margin) / 90);
     const step = [0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800, 3600].find(s => s >= wish) || 7200;
     context.textAlign = "center";
-    for (let t = 0; t <= seconds + 1e-6; t += step) {
-      const x = this.xOf(t / replay.dt_s, width);
+    const begin_s = replay.firstStep * replay.dt_s;
+    for (let t = Math.ceil(begin_s / step - 1e-6) * step; t <= begin_s + seconds + 1e-6; t += step) {
+      const x = this.xOf((t - begin_s) / replay.dt_s, width);
       context.fillRect(x, 58, 1, 3);
-      if (x < width - 14) context.fillText(seconds >= 120 && step >= 30 ? `${Math.floor(t / 60)}:${String(Math.round(t % 60)).padStart(2, "0")}` : `${t} s`, x, 68);
+      if (x < width - 14) context.fillText(begin_s + seconds >= 120 && step >= 30 ? `${Math.floor(t / 60)}:${String(Math.round(t % 60)).padStart(2, "0")}` : `${Number(t.toFixed(1))} s`, x, 68);
     }
   }
 }

@@ -86,9 +86,12 @@ class Chromium(Browser):
                 return answer["result"]
 
     def open(self, path, fragment=""):
+        self.open_address(pathlib.Path(path).resolve().as_uri() + fragment)
+
+    def open_address(self, address):
         # A new document each time, though only the fragment differs.
         self.call("Page.navigate", url="about:blank")
-        self.call("Page.navigate", url=pathlib.Path(path).resolve().as_uri() + fragment)
+        self.call("Page.navigate", url=address)
         self.wait_for("document.readyState === 'complete'")
 
     def run(self, expression):

@@ -1,0 +1,62 @@
+// What pages are told of a world while it runs: its state as messages, and what people ask of it.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <nlohmann/json.hpp>
+
+#include "pictura/common/error.h"
+#include "pictura/replay/recorder.h"
+#include "pictura/simulator/controllers/keyboard.h"
+
+namespace pictura {
+
+using LiveJson = nlohmann::ordered_json;
+
+/// Follows the only world of a simulator in host memory, and keeps no more than its newest frame.
+class LiveWorld {
+ public:
+  /// The simulator must outlive it.
+  LiveWorld(Simulator& simulator, ReplayOrigin origin, std::optional<RendererConfig> cameras);
+
+  /// Around each step.
+  void before_step(Span<const Command> commands) { recorder_.before_step(commands); }
+  void after_step(const StepResult& result);
+
+  /// All that a page needs to begin at this frame.
+  LiveJson begin() const;
+  /// The newest frame, to pages that know the one before.
+  LiveJson frame() const;
+  LiveJson look(const std::optional<ReplayDecision>& decision, int agent);
+
+  int num_agents() const { return recorder_.recorded().num_agents; }
+  int64_t step() const { return step_; }
+
+ private:
+  Recorder recorder_;
+  std::unique_ptr<AgentCameras> cameras_;
+  int64_t step_ = 0;
+  bool begins_episode_ = false;
+};
+
+/// What a page asks; what is absent stays as it is.
+struct LiveRequest {
+  std::optional<bool> paused;
+  std::optional<int> steps;  // to take although it is paused
+  std::optional<double> pace;
+  std::optional<int> watched;  // the agent whose images and decisions are sent
+  std::optional<int> driven;   // the agent that the keys drive, or -1
+  std::optional<DrivingKeys> keys;
+};
+
+constexpr int kMaxLiveSteps = 1000;
+constexpr double kMinLivePace = 0.05, kMaxLivePace = 64;
+
+/// Reads {"paused": bool, "steps": 1 to kMaxLiveSteps, "pace": number, "watch": agent, "drive": agent or -1,
+/// "keys": ["forward", "backward", "stop", "left", "right"]}. Throws Error saying which member is wrong.
+LiveRequest parse_live_request(std::string_view text, int num_agents);
+
+}  // namespace pictura

@@ -1,0 +1,323 @@
+"""`pictura simulate --serve`: who is let in, what is sent, that a page which does not read holds nothing up, and a page in
+Chromium that drives an agent.
+
+Run by ctest, one entry per class: python3 live_test.py PICTURA [unittest arguments].
+"""
+
+import http.client
+import json
+import pathlib
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+import unittest
+import urllib.parse
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+import browsers
+
+PICTURA = ""
+WORLD = ["procedural:1:blocks=2x2", "--agents", "12", "--policy", "lane", "--seed", "3"]
+
+
+class Events:
+    """The events of a simulation, as they come."""
+
+    def __init__(self, served):
+        self.connection = http.client.HTTPConnection("127.0.0.1", served.port, timeout=60)
+        self.connection.request("GET", served.path + "events")
+        self.response = self.connection.getresponse()
+        assert self.response.status == 200, self.response.status
+        self.type = self.response.headers["Content-Type"]
+
+    def next(self, *names):
+        """The data of the next event of one of these names."""
+        name = None
+        while True:
+            line = self.response.readline().decode().rstrip("\n")
+            if line.startswith("event: "):
+                name = line[7:]
+            elif line.startswith("data: ") and name in names:
+                return json.loads(line[6:])
+            elif line == "" and self.response.closed:
+                raise EOFError("the events have ended")
+
+    def close(self):
+        self.connection.close()
+        self.response.close()
+
+
+class Served(unittest.TestCase):
+    """Each test has a simulation of its own."""
+
+    def serve(self, *arguments):
+        self.process = subprocess.Popen([PICTURA, "simulate", *WORLD, "--serve", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(self.stop)
+        line = self.process.stderr.readline()
+        self.address = re.search(r"http://127\.0\.0\.1:\d+/[0-9a-f]{32}/", line).group()
+        parts = urllib.parse.urlsplit(self.address)
+        self.port, self.path = parts.port, parts.path
+
+    def stop(self):
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        try:
+            self.process.communicate(timeout=60)
+        finally:
+            if self.process.poll() is None:
+                self.process.kill()
+                self.process.communicate()
+
+    def ask(self, method="GET", path=None, body=None, **headers):
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
+        headers = {name.replace("_", "-"): value for name, value in headers.items()}
+        connection.request(method, self.path if path is None else path, body, headers)
+        response = connection.getresponse()
+        text = response.read().decode()
+        connection.close()
+        return response, text
+
+    def control(self, request, **headers):
+        body = request if isinstance(request, str) else json.dumps(request)
+        return self.ask("POST", self.path + "control", body, **{"Content_Type": "application/json", **headers})
+
+
+class Http(Served):
+    def test_only_who_knows_the_address_is_let_in(self):
+        self.serve()
+        response, text = self.ask()
+        self.assertEqual(response.status, 200)
+        self.assertIn('id="replay-live"', text)
+        self.assertIn("default-src 'none'", response.headers["Content-Security-Policy"])
+        token = self.path.strip("/")
+        wrong = ("0" if token[0] != "0" else "1") + token[1:]
+        for path in ("/", "/events", f"/{wrong}/", f"/{wrong}/events", f"/{token[:-1]}/", f"/x{token}/"):
+            with self.subTest(path):
+                self.assertEqual(self.ask(path=path)[0].status, 404)
+        self.assertEqual(self.ask("POST", f"/{wrong}/control", "{}", Content_Type="application/json")[0].status, 404)
+
+    def test_other_hosts_and_origins_are_refused(self):
+        self.serve()
+        own = f"http://127.0.0.1:{self.port}"
+        for headers, status in [
+            ({"Host": f"localhost:{self.port}"}, 200),
+            ({"Host": f"attacker.example:{self.port}"}, 403),
+            ({"Host": "127.0.0.1"}, 403),
+            ({"Host": f"127.0.0.1:{self.port}", "Origin": own}, 200),
+            ({"Origin": "http://attacker.example"}, 403),
+            ({"Origin": "null"}, 403),
+            ({"Origin": f"http://localhost:{self.port}"}, 403),
+            ({"Sec_Fetch_Site": "cross-site"}, 403),
+            ({"Sec_Fetch_Site": "same-site"}, 403),
+            ({"Sec_Fetch_Site": "none"}, 200),
+        ]:
+            with self.subTest(headers):
+                self.assertEqual(self.ask(**headers)[0].status, status)
+        self.assertEqual(self.control({"paused": True}, Origin="http://attacker.example")[0].status, 403)
+        self.assertEqual(self.control({"paused": True}, Content_Type="text/plain")[0].status, 415)
+        self.assertEqual(self.control({"paused": True}, Origin=own)[0].status, 204)
+
+    def test_it_listens_on_the_loopback_alone(self):
+        self.serve()
+        sockets = pathlib.Path("/proc/net/tcp").read_text().splitlines()[1:]
+        listening = [line.split()[1] for line in sockets if line.split()[3] == "0A"]
+        self.assertEqual([a for a in listening if int(a.split(":")[1], 16) == self.port], [f"0100007F:{self.port:04X}"])
+
+    def test_wrong_requests_are_named(self):
+        self.serve()
+        for request, message in [
+            ("{", "expected JSON"),
+            ([1], "expected an object of JSON, got array"),
+            ({"paused": 1}, "paused: expected true or false, got 1"),
+            ({"steps": 0}, "steps: expected a number of 1 to 1000, got 0"),
+            ({"steps": 1.5}, "steps: expected a number of 1 to 1000, got 1.5"),
+            ({"pace": 1e9}, "pace: expected a number of 0.05 to 64, got 1000000000.0"),
+            ({"watch": 12}, "watch: expected a number of 0 to 11, got 12"),
+            ({"drive": -2}, "drive: expected a number of -1 to 11, got -2"),
+            ({"keys": ["up"]}, 'keys: expected forward, backward, stop, left or right, got "up"'),
+            ({"quit": 1}, 'expected paused, steps, pace, watch, drive or keys, got "quit"'),
+        ]:
+            with self.subTest(message):
+                response, text = self.control(request)
+                self.assertEqual((response.status, text), (400, message + "\n"))
+        self.assertEqual(self.control({"keys": ["left"] * 3000})[0].status, 413)
+
+    def test_it_pauses_steps_and_begins_with_the_first_page(self):
+        self.serve("--cameras")
+        events = Events(self)
+        self.assertEqual(events.type, "text/event-stream")
+        begin = events.next("begin")
+        self.assertEqual(begin["step"], 0)
+        self.assertEqual((begin["header"]["agents"], begin["header"]["frames"]), (12, 1))
+        self.assertEqual(events.next("look")["agent"], 0)
+        self.assertEqual([events.next("frame")["step"] for _ in range(3)], [1, 2, 3])
+        self.control({"paused": True})
+        while not events.next("status")["paused"]:
+            pass
+        self.control({"steps": 2, "watch": 5})
+        looks = [events.next("look") for _ in range(3)]
+        self.assertEqual([look["agent"] for look in looks], [5, 5, 5])
+        self.assertEqual(looks[2]["step"], looks[0]["step"] + 2)
+        self.assertEqual(len(looks[2]["images"]), 4 * (4 * 96 * 54 * 3) // 3)
+        time.sleep(0.5)
+        late = Events(self)
+        self.assertEqual(late.next("begin")["step"], looks[2]["step"])
+        self.assertTrue(late.next("status")["paused"])
+        events.close()
+        late.close()
+
+    def test_keys_drive_one_agent_and_are_let_go(self):
+        self.serve()
+        events = Events(self)
+        tracks = [track["name"] for track in events.next("begin")["header"]["tracks"]]
+        actions, speed = tracks.index("action"), tracks.index("speed_mps")
+        driven = 7
+        self.control({"drive": driven, "keys": ["forward", "left"], "watch": driven})
+        while events.next("status")["driven"] != driven:
+            pass
+        first = events.next("frame")["tracks"]
+        # 4 m/s3 along and to the left, until the acceleration is there: action 11, as 1 + 11.
+        self.assertEqual(first[actions][driven], 12)
+        frames = []
+        for _ in range(8):
+            self.control({"keys": ["forward"]})
+            frames.append(events.next("frame")["tracks"])
+        self.assertGreater(frames[-1][speed][driven], first[speed][driven])
+        # A page that has gone leaves the agent to the policy.
+        begin = time.monotonic()
+        while events.next("status")["driven"] != -1:
+            pass
+        self.assertLess(time.monotonic() - begin, 30)
+        events.close()
+
+    def test_a_page_that_does_not_read_holds_nothing_up(self):
+        self.serve("--cameras")
+        slow = socket.socket()
+        slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        slow.connect(("127.0.0.1", self.port))
+        slow.sendall(f"GET {self.path}events HTTP/1.1\r\nHost: 127.0.0.1:{self.port}\r\n\r\n".encode())
+        quick = Events(self)
+        quick.next("begin")
+        self.control({"pace": 64})
+        # More than what may wait for the slow page, in messages and in the system's buffers.
+        begin, first = time.monotonic(), quick.next("frame")["step"]
+        steps = [quick.next("frame")["step"] for _ in range(200)]
+        self.assertEqual(steps, list(range(first + 1, first + 201)))
+        self.assertLess(time.monotonic() - begin, 60)
+        slow.close()
+        quick.close()
+
+    def test_no_more_pages_than_it_has_threads_for(self):
+        self.serve()
+        pages = [Events(self) for _ in range(8)]
+        self.assertEqual(self.ask(path=self.path + "events")[0].status, 503)
+        self.assertEqual(self.ask()[0].status, 200)
+        for page in pages:
+            page.close()
+
+    def test_it_ends_after_its_steps_and_reports(self):
+        self.serve("--steps", "20", "--json")
+        events = Events(self)
+        self.control({"pace": 64})
+        self.assertEqual(events.next("end")["step"], 20)
+        out, _ = self.process.communicate(timeout=60)
+        self.assertEqual((self.process.returncode, json.loads(out)["steps"]), (0, 20))
+
+
+class Usage(unittest.TestCase):
+    def test_what_makes_no_sense_is_refused(self):
+        for arguments, message in [
+            (["--serve", "99999"], "--serve: expected a port of 1 to 65535, got '99999'"),
+            (["--serve-host", "here"], "--serve-host: has no effect without --serve"),
+        ]:
+            result = subprocess.run([PICTURA, "simulate", *WORLD, *arguments], capture_output=True, text=True, timeout=60)
+            self.assertEqual((result.returncode, result.stderr), (2, f"error: {message}\n"))
+
+    def test_a_port_that_is_taken_is_an_error(self):
+        with socket.socket() as taken:
+            taken.bind(("127.0.0.1", 0))
+            taken.listen()
+            port = taken.getsockname()[1]
+            result = subprocess.run([PICTURA, "simulate", *WORLD, "--serve", str(port)], capture_output=True, text=True, timeout=60)
+        self.assertEqual((result.returncode, result.stderr), (1, f"error: serve: cannot listen on 127.0.0.1:{port}: is the port taken?\n"))
+
+
+class Chromium(Served):
+    @classmethod
+    def setUpClass(cls):
+        if shutil.which("chromium") is None:
+            raise unittest.SkipTest("needs chromium: scripts/setup --browsers installs it")
+
+    def setUp(self):
+        self.serve("--cameras")
+        self.browser = browsers.Chromium()
+        self.addCleanup(self.browser.close)
+        self.browser.open_address(self.address)
+        self.browser.wait_for("window.pictura && !document.getElementById('app').hidden && pictura.replay.frames > 3")
+
+    def hold(self, key, is_down):
+        self.browser.call("Input.dispatchKeyEvent", type="keyDown" if is_down else "keyUp", key=key)
+
+    def test_it_follows_the_newest_step_pauses_and_steps(self):
+        frames = self.browser.run("pictura.replay.frames")
+        self.browser.wait_for(f"pictura.state.time > {frames}")
+        self.browser.key(" ")
+        self.browser.wait_for("pictura.live.paused && pictura.state.time === pictura.replay.frames - 1")
+        paused = self.browser.run("pictura.replay.frames")
+        time.sleep(0.5)
+        self.assertEqual(self.browser.run("pictura.replay.frames"), paused)
+        self.browser.key("ArrowRight")
+        self.browser.wait_for(f"pictura.replay.frames === {paused + 1} && pictura.state.time === {paused}")
+        # Back in what it has seen, while the world stands.
+        self.browser.key("Home")
+        self.assertEqual(self.browser.run("[pictura.state.time, pictura.state.isAtEdge]"), [0, False])
+        self.browser.key(" ")
+        self.browser.wait_for("pictura.state.isAtEdge && !pictura.live.paused")
+        self.assertEqual(self.browser.errors, [])
+
+    def test_another_agent_is_watched_with_its_images(self):
+        self.browser.run("pictura.actions.select(8)")
+        self.browser.wait_for("pictura.replay.isFollowed(8, pictura.replay.frames - 1) && pictura.pictured() > 0")
+        self.browser.wait_for("!document.getElementById('cameras').hidden")
+        shown = self.browser.run("[...document.querySelectorAll('.pictures canvas')].map(c => c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some((v, i) => i % 4 < 3 && v > 0))")
+        self.assertEqual(len(shown), 4)
+        self.assertIn(True, shown)
+
+    def test_a_person_drives(self):
+        active = "[...Array(12).keys()].filter(a => pictura.replay.raw('status', a, pictura.replay.frames - 1) === 0 && pictura.replay.body(a, 0).agentClass === 0)[0]"
+        agent = self.browser.run(active)
+        self.browser.run(f"pictura.actions.select({agent})")
+        self.browser.key("t")
+        self.browser.wait_for(f"pictura.live.driven === {agent} && document.getElementById('drive').getAttribute('aria-pressed') === 'true'")
+        last = "pictura.replay.frames - 1"
+        # Stop first: then whatever moves it is the keys.
+        self.hold(" ", True)
+        self.browser.wait_for(f"Math.abs(pictura.replay.get('speed_mps', {agent}, {last})) < 0.2 || pictura.replay.raw('status', {agent}, {last}) !== 0")
+        self.hold(" ", False)
+        if self.browser.run(f"pictura.replay.raw('status', {agent}, {last})") != 0:
+            self.skipTest("the agent was hit while it stopped")
+        at = self.browser.run(last)
+        self.hold("w", True)
+        self.browser.wait_for(f"pictura.replay.get('speed_mps', {agent}, {last}) > 1.5")
+        self.hold("w", False)
+        actions = self.browser.run(f"pictura.replay.tracks.action.slice({agent} * pictura.replay.stride + {at}, {agent} * pictura.replay.stride + pictura.replay.frames).reduce((all, a) => [...all, a - 1], [])")
+        self.assertIn(10, actions)  # 4 m/s3 along, straight on
+        self.browser.key("t")
+        self.browser.wait_for("pictura.live.driven === -1")
+        self.assertEqual(self.browser.errors, [])
+
+    def test_it_says_that_the_simulation_has_ended(self):
+        self.stop()
+        self.browser.wait_for("document.getElementById('live-state').textContent === 'the simulation has ended'")
+        self.browser.key("Home")
+        self.assertEqual(self.browser.run("pictura.state.time"), 0)
+        self.assertEqual(self.browser.errors, [])
+
+
+if __name__ == "__main__":
+    PICTURA = sys.argv.pop(1)
+    unittest.main()
