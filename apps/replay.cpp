@@ -21,7 +21,7 @@ struct Arguments {
   int steps = 600, episodes = 10;
   BackendOptions backends;
   RecordingOptions recording;
-  std::string policy = "lane", out, gallery;
+  std::string policy = "lane", out, gallery, mcap;
   bool json = false;
 };
 
@@ -60,8 +60,9 @@ void run(const Arguments& arguments) {
   if (arguments.gallery.empty()) {
     const Replay replay = record(arguments, arguments.world.seed, &line);
     line.finish();
-    write_replay_and_say_so(arguments.out, replay);
-    if (arguments.json) print_json(facts_of(arguments.out, replay));
+    if (!arguments.out.empty()) write_replay_and_say_so(arguments.out, replay);
+    if (!arguments.mcap.empty()) write_mcap_and_say_so(arguments.mcap, replay);
+    if (arguments.json) print_json(facts_of(arguments.out.empty() ? arguments.mcap : arguments.out, replay));
     return;
   }
   make_output_folder(arguments.gallery);
@@ -93,6 +94,9 @@ void add_replay_command(CLI::App& app) {
                           "Instead of one page: a folder for pages of several seeds, and an index of all replays in "
                           "it, worst first");
   gallery->excludes(out);
+  command->add_option("--mcap", arguments->mcap, "The same as an MCAP file, for Foxglove; with or without a page")
+      ->check(file_ending(".mcap"))
+      ->excludes(gallery);
   command->add_option("--episodes", arguments->episodes, "How many seeds, from --seed on, --gallery records")
       ->transform(whole_number(1, 10000))
       ->capture_default_str();
@@ -101,9 +105,12 @@ void add_replay_command(CLI::App& app) {
       "The page holds everything: it opens from disk, in any browser, without a network.\n"
       "Examples:\n  pictura replay Town01 --agents 120 --steps 1200 --out lane.html\n"
       "  pictura replay procedural:1 --policy runs/demo/checkpoint.ckpt --follow 3 --cameras --out demo.html\n"
+      "  pictura replay Town01 --steps 300 --cameras --mcap drive.mcap\n"
       "  pictura replay Town05 --policy random --gallery replays --episodes 20");
   command->callback([arguments, command] {
-    if (arguments->out.empty() && arguments->gallery.empty()) fail_usage("replay: expected --out or --gallery");
+    if (arguments->out.empty() && arguments->gallery.empty() && arguments->mcap.empty()) {
+      fail_usage("replay: expected --out, --mcap or --gallery");
+    }
     if (arguments->gallery.empty() && command->count("--episodes") > 0) {
       fail_usage("--episodes: has no effect without --gallery");
     }

@@ -24,7 +24,7 @@ struct Arguments {
   WorldOptions world;
   int steps = 300;
   BackendOptions backends;
-  std::string policy = "random", video, replay;
+  std::string policy = "random", video, replay, mcap;
   RecordingOptions recording;
   ServeOptions serve;
   bool endless = false;  // until it is interrupted
@@ -53,8 +53,8 @@ void refuse_idle_options(const CLI::App& command, const Arguments& arguments) {
       if (command.count(option) > 0) fail_usage("{}: has no effect without --video", option);
     }
   }
-  if (arguments.replay.empty() && !arguments.serve.is_asked) {
-    refuse_recording_options(command, "--replay or --serve");
+  if (arguments.replay.empty() && arguments.mcap.empty() && !arguments.serve.is_asked) {
+    refuse_recording_options(command, "--replay, --mcap or --serve");
   }
   if (!arguments.serve.is_asked && command.count("--serve-host") > 0) {
     fail_usage("--serve-host: has no effect without --serve");
@@ -78,7 +78,8 @@ void run(const Arguments& arguments) {
 
   std::unique_ptr<Recording> recording;
   const RecordedDriver driver{arguments.policy, world.session.get(), world.renderer.get()};
-  if (!arguments.replay.empty()) recording = std::make_unique<Recording>(*simulator, driver, arguments.recording);
+  if (!arguments.replay.empty() || !arguments.mcap.empty())
+    recording = std::make_unique<Recording>(*simulator, driver, arguments.recording);
   std::unique_ptr<Serving> serving;
   if (arguments.serve.is_asked) {
     serving = std::make_unique<Serving>(arguments.serve, *simulator, driver, arguments.recording);
@@ -112,7 +113,11 @@ void run(const Arguments& arguments) {
   line.finish();
   if (serving) serving->finish();
   if (film) film->close();
-  if (recording) write_replay_and_say_so(arguments.replay, recording->finish());
+  if (recording) {
+    const Replay replay = recording->finish();
+    if (!arguments.replay.empty()) write_replay_and_say_so(arguments.replay, replay);
+    if (!arguments.mcap.empty()) write_mcap_and_say_so(arguments.mcap, replay);
+  }
 
   const SimulatorTotals& totals = simulator->totals();
   const Json object{
@@ -174,6 +179,7 @@ void add_simulate_command(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--replay", arguments->replay, "Record it as a page that a browser plays")
       ->check(file_ending(".html"));
+  command->add_option("--mcap", arguments->mcap, "The same as an MCAP file, for Foxglove")->check(file_ending(".mcap"));
   add_serve_options(command, &arguments->serve);
   add_recording_options(command, &arguments->recording);
   command->add_flag("--json", arguments->json, "Print one JSON object");

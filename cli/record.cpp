@@ -8,6 +8,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/replay/file.h"
+#include "pictura/replay/mcap.h"
 #include "pictura/replay/recorder.h"
 #include "pictura/version.h"
 #ifdef PICTURA_HAS_TORCH
@@ -37,6 +38,13 @@ std::string quoted(const std::string& word) {
   std::string text = "'";
   for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
   return text + "'";
+}
+
+void say_what_was_written(const std::string& path, const Replay& replay) {
+  std::error_code none;  // of a device
+  const auto bytes = std::filesystem::file_size(path, none);
+  fmt::print(stderr, "{}: {} agents, {} steps{}\n", path, replay.num_agents, replay.num_frames - 1,
+             none ? "" : fmt::format(", {:.2f} MB", static_cast<double>(bytes) / 1e6));
 }
 
 }  // namespace
@@ -137,10 +145,12 @@ Replay Recording::finish() { return parts_->recorder.finish(origin_of(parts_->dr
 
 void write_replay_and_say_so(const std::string& path, const Replay& replay) {
   write_replay(path, replay);
-  std::error_code none;  // of a device
-  const auto bytes = std::filesystem::file_size(path, none);
-  fmt::print(stderr, "{}: {} agents, {} steps{}\n", path, replay.num_agents, replay.num_frames - 1,
-             none ? "" : fmt::format(", {:.2f} MB", static_cast<double>(bytes) / 1e6));
+  say_what_was_written(path, replay);
+}
+
+void write_mcap_and_say_so(const std::string& path, const Replay& replay) {
+  write_mcap(path, replay);
+  say_what_was_written(path, replay);
 }
 
 }  // namespace pictura

@@ -62,6 +62,7 @@ class Recording {
 
 /// Writes a replay under this name, and what was written on stderr.
 void write_replay_and_say_so(const std::string& path, const Replay& replay);
+void write_mcap_and_say_so(const std::string& path, const Replay& replay);
 
 /// This process's command, as a shell would read it; the program without its folder.
 std::string command_line();

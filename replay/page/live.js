@@ -9,7 +9,7 @@ class LiveReplay extends Replay {
   }
   constructor(header, bytes, step, cameras) {
     super(header, bytes, null);
-    Object.assign(this, { firstStep: step, looks: new Map(), version: 0 });
+    Object.assign(this, { firstStep: step, looks: new Map(), version: 0, watched: -1 });
     if (cameras) this.images = { cameras, frame: async frame => this.looks.get(frame)?.images ?? null };
     this.grow(512);
   }
@@ -88,10 +88,15 @@ class LiveReplay extends Replay {
     this.looks.set(frame, { agent, decision, images: images && bytesOfBase64(images) });
     if (this.looks.has(frame - LIVE_PICTURES)) this.looks.get(frame - LIVE_PICTURES).images = null;
     if (decision) this.decisions = true;
+    this.watched = agent;
     ++this.version;
   }
-  isFollowed(agent, frame) { return this.looks.get(frame)?.agent === agent; }
-  decision(agent, frame) { return this.isFollowed(agent, frame) ? this.looks.get(frame).decision : null; }
+  // A frame whose look has not come yet is taken for the watched agent's.
+  isFollowed(agent, frame) { return (this.looks.get(frame)?.agent ?? this.watched) === agent; }
+  decision(agent, frame) {
+    const look = this.looks.get(frame);
+    return look?.agent === agent ? look.decision : null;
+  }
 }
 
 const DRIVING_KEYS = { w: "forward", s: "backward", a: "left", d: "right", " ": "stop",
