@@ -9,6 +9,7 @@ namespace pictura {
 void add_town_command(CLI::App& app);
 void add_map_command(CLI::App& app);
 void add_plot_command(CLI::App& app);
+void add_completion_command(CLI::App& app);
 void add_render_command(CLI::App& app);
 void add_replay_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);

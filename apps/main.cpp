@@ -43,6 +43,7 @@ int main(int argc, char** argv) {
   add_export_command(app);
 #endif
   add_plot_command(app);
+  add_completion_command(app);
   add_bench_command(app);
   refuse_empty_values(&app);
 

@@ -218,6 +218,7 @@ void add_render_command(CLI::App& app) {
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Examples:\n  pictura render Town01 --agents 80 --steps 100 --views 6 --size 192x108 --out images\n"
+      "  pictura render procedural:1 --agents 40 --steps 20 --views 2 --out images\n"
       "  pictura render tests/golden/crossing.toml --backend cpu --planes depth,class --out images");
   command->callback([arguments, size, command] {
     if (is_scene_file(arguments->world.map)) {

@@ -31,6 +31,7 @@ void add_town_command(CLI::App& app) {
       "Examples:\n"
       "  pictura town --seed 7 --blocks 4x3 --out town.xodr && pictura map town.xodr --png town.png\n"
       "  pictura town --roundabouts 1 --ring-road 0 --hills-m 0 --out roundabouts.xodr\n"
+      "  pictura town --blocks 6x6 --lights 1 --hills-m 0 --out lights.xodr\n"
       "Maps with options need no file: pictura map procedural:7:blocks=4x3,roundabouts=1");
   command->callback([arguments] {
     const Pair blocks = parse_pair("--blocks", arguments->blocks, kMaxTownBlocks);

@@ -109,7 +109,8 @@ void add_bench_command(CLI::App& app) {
       "bench quality, bench worlds, bench soak");
   command->require_subcommand(1);
   command->footer(
-      "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n  pictura bench render --size 192x108");
+      "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n  pictura bench render --size 192x108\n"
+      "  pictura bench worlds --map procedural:1 --episodes 5");
 #ifdef PICTURA_HAS_TORCH
   add_train_benchmark(*command);
 #endif

@@ -108,6 +108,7 @@ void add_history_benchmark(CLI::App& bench) {
   add_repeat_options(command, &arguments->rate);
   command->footer(
       "Examples:\n  pictura bench history --slots 240 --views 64 --repeats 3\n"
+      "  pictura bench history --size 32x18\n"
       "  pictura bench history --backend cuda --map towns --json");
   command->callback([arguments] { run(*arguments); });
 }

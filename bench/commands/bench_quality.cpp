@@ -151,7 +151,10 @@ void add_quality_benchmark(CLI::App& bench) {
   command->add_option("--figure", arguments->figure, "Write crops of all methods to this PNG file")
       ->check(file_ending(".png"));
   command->add_flag("--json", arguments->json, "Print one JSON object");
-  command->footer("Example:\n  pictura bench quality --map Town03 --size 96x54 --views 10 --figure quality.png");
+  command->footer(
+      "Examples:\n  pictura bench quality --map Town03 --size 96x54 --views 10 --figure quality.png\n"
+      "  pictura bench quality --map procedural:1 --views 4 --json\n"
+      "  pictura bench quality --random 20 --seed 5");
   command->callback([arguments] { run(*arguments); });
 }
 

@@ -243,6 +243,7 @@ void add_render_benchmark(CLI::App& bench) {
   add_rate_options(command, &arguments->rate);
   command->footer(
       "Examples:\n  pictura bench render --size 192x108 --threads 0\n"
+      "  pictura bench render --sweep sizes --json\n"
       "  pictura bench render --backend cuda,gl:egl --samples 1,4,2x2 --map towns --parked 32 --egos 2048,256 --json");
   command->callback([arguments] { run(*arguments); });
 }

@@ -176,6 +176,7 @@ void add_simulate_benchmark(CLI::App& bench) {
   add_rate_options(command, &arguments->rate);
   command->footer(
       "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n"
+      "  pictura bench simulate --map procedural:1 --pedestrians 0.1 --cyclists 0.1\n"
       "  pictura bench simulate --backend cuda --map towns --slots 20480 --pedestrians 0.1 --cyclists 0.1 --parked 32");
   command->callback([arguments] { run(*arguments); });
 }

@@ -141,7 +141,9 @@ void add_soak_benchmark(CLI::App& bench) {
       "Exits with status 1 if an image differs from the oracle's by more than kernels may: by more than 1/255 at one\n"
       "value in 10,000, by more than 4/255 anywhere, or in the planes of one pixel in 10,000; or if the visibility of\n"
       "an agent differs.\n"
-      "Example:\n  pictura bench soak --map towns --minutes 8");
+      "Examples:\n  pictura bench soak --map towns --minutes 8\n"
+      "  pictura bench soak --backend cuda --minutes 1 --json\n"
+      "  pictura bench soak --first 17 --scenes 1");
   command->callback([arguments] { run(*arguments); });
 }
 

@@ -101,6 +101,7 @@ void add_train_benchmark(CLI::App& bench) {
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Examples:\n  pictura bench train --updates 5\n"
+      "  pictura bench train --config configs/smoke.toml --json\n"
       "  pictura bench train --config configs/paper.toml --set train.forward_chunk=8192 --init-from policy.ckpt "
       "--json");
   command->callback([arguments] { run(*arguments); });

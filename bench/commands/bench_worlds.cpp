@@ -59,7 +59,10 @@ void add_worlds_benchmark(CLI::App& bench) {
   add_seed_option(command, &arguments->options.seed, "Worlds are drawn from it");
   add_threads_option(command, &arguments->options.num_threads);
   command->add_flag("--json", arguments->json, "Print one JSON object");
-  command->footer("Example:\n  pictura bench worlds --map Town03 --episodes 100 --json");
+  command->footer(
+      "Examples:\n  pictura bench worlds --map Town03 --episodes 100 --json\n"
+      "  pictura bench worlds --map procedural:1 --episodes 5\n"
+      "  pictura bench worlds --map towns --agents 60");
   command->callback([arguments] { run(*arguments); });
 }
 

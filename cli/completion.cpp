@@ -1,0 +1,175 @@
+#include "pictura/cli/completion.h"
+
+#include <vector>
+
+#include "pictura/common/error.h"
+#include "pictura/common/support/suggestion.h"
+
+namespace pictura {
+
+namespace {
+
+struct Word {
+  std::string text, help;
+  bool takes_value = false;
+};
+
+/// One command of the tree: what can follow it.
+struct Place {
+  std::string path;  // as "pictura bench render"
+  std::vector<Word> commands, options;
+};
+
+std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+
+void add_places(const CLI::App& command, const std::string& path, std::vector<Place>* places_out) {
+  const std::vector<const CLI::App*> children = command.get_subcommands([](const CLI::App*) { return true; });
+  Place place{path, {}, {}};
+  for (const CLI::App* child : children) {
+    place.commands.push_back({child->get_name(), first_line(child->get_description()), false});
+  }
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) {
+      place.options.push_back(
+          {"--" + name, first_line(option->get_description()), option->get_items_expected_max() > 0});
+    }
+  }
+  places_out->push_back(std::move(place));
+  for (const CLI::App* child : children) add_places(*child, path + " " + child->get_name(), places_out);
+}
+
+/// A text that the shell takes as it is.
+std::string in_quotes(const std::string& text) {
+  std::string result = "'";
+  for (const char c : text) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return result + "'";
+}
+/// The same for fish, which knows \' between quotes.
+std::string in_fish_quotes(const std::string& text) {
+  std::string result = "'";
+  for (const char c : text) result += c == '\'' || c == '\\' ? std::string("\\") + c : std::string(1, c);
+  return result + "'";
+}
+
+/// `case` patterns of all commands below the program.
+std::string known_paths(const std::vector<Place>& places) {
+  std::string paths;
+  for (size_t i = 1; i < places.size(); ++i) paths += (i > 1 ? " | " : "") + in_quotes(places[i].path);
+  return paths;
+}
+
+std::string bash_script(const std::string& name, const std::vector<Place>& places) {
+  std::string cases;
+  for (const Place& place : places) {
+    std::string commands, options;
+    for (const Word& word : place.commands) commands += (commands.empty() ? "" : " ") + word.text;
+    for (const Word& word : place.options) options += (options.empty() ? "" : " ") + word.text;
+    cases += fmt::format("    {}) commands={} options={} ;;\n", in_quotes(place.path), in_quotes(commands),
+                         in_quotes(options));
+  }
+  return fmt::format(
+      R"(# Completion of {0} for bash: source it, or put it into ~/.local/share/bash-completion/completions/{0}.
+_{0}() {{
+  local word=${{COMP_WORDS[COMP_CWORD]}} place={0} commands='' options='' i
+  for ((i = 1; i < COMP_CWORD; ++i)); do
+    case "$place ${{COMP_WORDS[i]}}" in
+      {1}) place="$place ${{COMP_WORDS[i]}}" ;;
+    esac
+  done
+  case $place in
+{2}  esac
+  if [[ $word == -* ]]; then
+    mapfile -t COMPREPLY < <(compgen -W "$options" -- "$word")
+  elif [[ -n $commands ]]; then
+    mapfile -t COMPREPLY < <(compgen -W "$commands" -- "$word")
+  fi
+}}
+complete -o default -F _{0} {0}
+)",
+      name, known_paths(places), cases);
+}
+
+std::string zsh_script(const std::string& name, const std::vector<Place>& places) {
+  // A colon ends the word.
+  const auto entries = [](const std::vector<Word>& words) {
+    std::string list;
+    for (const Word& word : words) list += " " + in_quotes(word.text + ":" + word.help);
+    return list;
+  };
+  std::string cases;
+  for (const Place& place : places) {
+    cases += fmt::format("    {}) commands=({} ) options=({} ) ;;\n", in_quotes(place.path), entries(place.commands),
+                         entries(place.options));
+  }
+  return fmt::format(R"(#compdef {0}
+# Completion of {0} for zsh: put it as _{0} into a folder of $fpath.
+_{0}() {{
+  local place={0} word
+  local -a commands options
+  for word in "${{(@)words[2,CURRENT-1]}}"; do
+    case "$place $word" in
+      {1}) place="$place $word" ;;
+    esac
+  done
+  case $place in
+{2}  esac
+  if [[ $words[CURRENT] == -* ]]; then
+    _describe option options
+  elif (( $#commands )); then
+    _describe command commands
+  else
+    _files
+  fi
+}}
+compdef _{0} {0}
+)",
+                     name, known_paths(places), cases);
+}
+
+std::string fish_script(const std::string& name, const std::vector<Place>& places) {
+  std::string script = fmt::format(R"(# Completion of {0} for fish: put it into ~/.config/fish/completions/{0}.fish.
+function __{0}_is_at
+  set -l place {0}
+  for word in (commandline -opc)[2..-1]
+    switch "$place $word"
+      case {1}
+        set place "$place $word"
+    end
+  end
+  test "$place" = "$argv"
+end
+)",
+                                   name, [&places] {
+                                     std::string paths;
+                                     for (size_t i = 1; i < places.size(); ++i) {
+                                       paths += (i > 1 ? " " : "") + in_fish_quotes(places[i].path);
+                                     }
+                                     return paths;
+                                   }());
+  for (const Place& place : places) {
+    const std::string here =
+        fmt::format("complete -c {} -n {}", name, in_fish_quotes(fmt::format("__{}_is_at {}", name, place.path)));
+    for (const Word& word : place.commands) {
+      script += fmt::format("{} -f -a {} -d {}\n", here, word.text, in_fish_quotes(word.help));
+    }
+    for (const Word& word : place.options) {
+      script += fmt::format("{} -l {}{} -d {}\n", here, word.text.substr(2), word.takes_value ? " -r" : "",
+                            in_fish_quotes(word.help));
+    }
+  }
+  return script;
+}
+
+}  // namespace
+
+std::string completion_script(const CLI::App& app, const std::string& shell) {
+  std::vector<Place> places;
+  add_places(app, app.get_name(), &places);
+  if (shell == "bash") return bash_script(app.get_name(), places);
+  if (shell == "zsh") return zsh_script(app.get_name(), places);
+  if (shell == "fish") return fish_script(app.get_name(), places);
+  const std::vector<std::string> known{"bash", "zsh", "fish"};
+  fail_usage("completion: expected bash, zsh or fish, got '{}'{}", shell, suggestion(shell, known));
+}
+
+}  // namespace pictura

@@ -1,0 +1,175 @@
+"""The documents against the program: the reference of commands, examples, links, and completion.
+
+Run by ctest: python3 documents_test.py PICTURA [unittest arguments].
+"""
+
+import os
+import pathlib
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import commands
+
+PICTURA = ""
+ROOT = commands.ROOT
+
+
+def documents():
+    found = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "bench/README.md")]
+    return found + sorted((ROOT / "docs").rglob("*.md"))
+
+
+def without_code(text):
+    text = re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE)
+    return re.sub(r"`[^`\n]*`", lambda code: "x" * len(code.group()), text)
+
+
+def anchors(path):
+    """The anchors of a page's headings, as GitHub and mkdocs make them."""
+    text = re.sub(r"^```.*?^```", "", path.read_text(), flags=re.DOTALL | re.MULTILINE)
+    found, seen = set(), {}
+    for heading in re.findall(r"^#+ (.*)$", text, re.MULTILINE):
+        heading = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading)
+        slug = re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-")
+        count = seen.get(slug, 0)
+        seen[slug] = count + 1
+        found.add(slug if count == 0 else f"{slug}-{count}")
+    return found
+
+
+def command_lines(text):
+    """Commands of pictura in a page's blocks, without continuation lines."""
+    blocks = re.findall(r"^```(?:sh|bash|console)?\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    blocks += re.findall(r"(?:^    .*\n)+", text, re.MULTILINE)
+    for block in blocks:
+        for line in block.replace("\\\n", " ").splitlines():
+            for part in re.split(r"&&|\||;|<\(", line):
+                match = re.match(r"\s*(?:[A-Z_]+=\S+ )*(?:torchrun .*?--no-python )?(?:\S*/)?pictura ((?!.*\.\.\.).*)", part)
+                if match:
+                    yield match.group(1).split(" # ")[0].split(" > ")[0].rstrip(" )")
+
+
+class Documents(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.helps = dict(commands.tree(PICTURA))
+        cls.is_whole = ("train",) in cls.helps and ("bench", "render") in cls.helps
+
+    def options(self, command):
+        return set(re.findall(r"(?<![\w-])(--?[a-z][\w-]*)", self.helps[command].split("Examples:")[0]))
+
+    def check_command(self, line):
+        words = shlex.split(line, comments=True)
+        command = ()
+        while words and (*command, words[0]) in self.helps:
+            command = (*command, words.pop(0))
+        if not command and words and not words[0].startswith("-"):
+            if not self.is_whole and words[0] in ("train", "evaluate"):
+                return
+            self.fail(f"pictura {line}: no such command")
+        for word in words:
+            if word.startswith("--"):
+                self.assertIn(word.split("=")[0], self.options(command) | {"--help", "--version"}, f"pictura {line}")
+
+    def test_the_reference_of_commands_is_what_help_prints(self):
+        if not self.is_whole:
+            self.skipTest("this build lacks commands")
+        self.assertEqual(commands.PAGE.read_text(), commands.page(self.helps.items()), "run scripts/docs --update")
+
+    def test_every_command_has_three_examples_that_name_what_there_is(self):
+        for command, text in self.helps.items():
+            with self.subTest(" ".join(command)):
+                examples = [line for line in text.splitlines() if re.match(r"  (.* )?(\w+=\S+ )?\S*pictura |  source <\(pictura ", line)]
+                self.assertGreaterEqual(len(examples), 3)
+                for example in examples:
+                    for line in command_lines("    " + example.strip() + "\n"):
+                        self.check_command(line)
+
+    def test_commands_in_documents_exist(self):
+        count = 0
+        for path in documents():
+            if path.name == "CHANGELOG.md":
+                continue
+            for line in command_lines(path.read_text()):
+                with self.subTest(f"{path.relative_to(ROOT)}: {line}"):
+                    self.check_command(line)
+                count += 1
+        self.assertGreater(count, 40)
+
+    def test_keys_that_documents_set_are_keys(self):
+        known = set(re.findall(r"^\| `([\w.]+)`", (ROOT / "docs/configuration.md").read_text(), re.MULTILINE))
+        count = 0
+        for path in documents():
+            if path.name == "CHANGELOG.md":
+                continue
+            for key in re.findall(r"--set '?([a-z_.]+)=", path.read_text()):
+                with self.subTest(f"{path.relative_to(ROOT)}: {key}"):
+                    self.assertIn(key, known)
+                count += 1
+        self.assertGreater(count, 10)
+
+    def test_links_lead_somewhere(self):
+        count = 0
+        for path in documents():
+            for target in re.findall(r"\]\(([^)\s]+)\)", without_code(path.read_text())):
+                if re.match(r"[a-z]+:", target):
+                    continue
+                with self.subTest(f"{path.relative_to(ROOT)}: {target}"):
+                    file, _, anchor = target.partition("#")
+                    there = (path.parent / file).resolve() if file else path
+                    self.assertTrue(there.exists())
+                    if anchor and there.suffix == ".md":
+                        self.assertIn(anchor, anchors(there))
+                count += 1
+        self.assertGreater(count, 100)
+
+    def test_every_page_is_in_the_navigation(self):
+        navigation = set(re.findall(r"[\w/]+\.md", (ROOT / "mkdocs.yml").read_text()))
+        pages = {str(path.relative_to(ROOT / "docs")) for path in (ROOT / "docs").rglob("*.md")}
+        self.assertEqual(navigation, pages)
+
+
+class Completion(unittest.TestCase):
+    def script(self, shell):
+        return subprocess.run([PICTURA, "completion", shell], capture_output=True, text=True, check=True, timeout=60).stdout
+
+    def bash(self, *words):
+        script = self.script("bash") + f'COMP_WORDS=({" ".join(map(shlex.quote, words))}); COMP_CWORD={len(words) - 1}; _pictura; printf "%s\\n" "${{COMPREPLY[@]}}"'
+        return subprocess.run(["bash", "--norc", "-c", script], capture_output=True, text=True, check=True, timeout=60).stdout.split()
+
+    def test_bash_completes_commands_and_options(self):
+        self.assertEqual(self.bash("pictura", "sim"), ["simulate"])
+        self.assertEqual(self.bash("pictura", "simulate", "Town01", "--serve-"), ["--serve-host"])
+        self.assertEqual(self.bash("pictura", "replay", "--gal"), ["--gallery"])
+        self.assertEqual(self.bash("pictura", "completion", ""), [])  # files
+        self.assertIn("town", self.bash("pictura", ""))
+
+    def test_zsh_and_fish_take_their_scripts(self):
+        shells = [shell for shell in ("zsh", "fish") if shutil.which(shell)]
+        if not shells:
+            self.skipTest("needs zsh or fish")
+        for shell in shells:
+            with self.subTest(shell), tempfile.NamedTemporaryFile("w", suffix=f".{shell}") as file:
+                file.write(self.script(shell))
+                file.flush()
+                result = subprocess.run([shell, "-n", file.name], capture_output=True, text=True, timeout=60)
+                self.assertEqual((result.returncode, result.stderr), (0, ""))
+        if "fish" in shells:
+            home = {**os.environ, "HOME": tempfile.gettempdir()}
+            script = self.script("fish") + "complete -C 'pictura simulate --serve-'\n"
+            result = subprocess.run(["fish", "--no-config", "-c", script], capture_output=True, text=True, timeout=60, env=home)
+            self.assertEqual(result.stdout.split("\t")[0], "--serve-host")
+
+    def test_another_shell_is_refused(self):
+        result = subprocess.run([PICTURA, "completion", "fisch"], capture_output=True, text=True, timeout=60)
+        self.assertEqual((result.returncode, result.stderr), (2, "error: completion: expected bash, zsh or fish, got 'fisch'; did you mean 'fish'?\n"))
+
+
+if __name__ == "__main__":
+    PICTURA = sys.argv.pop(1)
+    unittest.main()
