@@ -9,7 +9,7 @@ namespace pictura {
 namespace {
 
 constexpr std::string_view kMagic("\x89MCAP0\r\n", 8);
-constexpr size_t kChunkBytes = size_t{4} << 20;
+constexpr size_t kChunkBytes = size_t{1} << 20;
 
 enum class Op : uint8_t {
   header = 1,
@@ -22,6 +22,7 @@ enum class Op : uint8_t {
   chunk_index = 8,
   statistics = 11,
   metadata = 12,
+  metadata_index = 13,
   data_end = 15,
 };
 
@@ -103,8 +104,14 @@ void McapWriter::add_metadata(std::string_view name, const std::vector<std::pair
   }
   put_text(name, &content);
   put_text(map, &content);
-  put(record(Op::metadata, content));
+  const std::string bytes = record(Op::metadata, content);
+  content.clear();
+  put_fixed(offset_, &content);
+  put_fixed(static_cast<uint64_t>(bytes.size()), &content);
+  put_text(name, &content);
+  metadata_indexes_ += record(Op::metadata_index, content);
   ++num_metadata_;
+  put(bytes);
 }
 
 void McapWriter::add_message(uint16_t channel, uint64_t time_ns, std::string_view json) {
@@ -185,6 +192,7 @@ void McapWriter::finish() {
     put_fixed(chunk.records_bytes, &content);
     summary += record(Op::chunk_index, content);
   }
+  summary += metadata_indexes_;
   put(summary);
   // The sum is over the summary and the footer's first fields.
   content.clear();

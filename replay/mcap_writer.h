@@ -37,6 +37,7 @@ class McapWriter {
   OutputFile file_;
   uint64_t offset_ = 0;
   std::string definitions_;  // the schemas and channels, again in the summary
+  std::string metadata_indexes_;
   uint16_t num_channels_ = 0;
   std::string chunk_;
   uint64_t first_ns_ = 0, last_ns_ = 0;
