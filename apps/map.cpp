@@ -7,6 +7,7 @@
 #include "pictura/cli/map_listing.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
+#include "pictura/cli/reported_map.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/interrupt.h"
@@ -25,7 +26,7 @@ struct Arguments {
   int size_px = 1600;
   std::vector<double> box, at;
   double radius_m = 50;
-  bool json = false, full = false, lenient = false;
+  bool json = false, full = false, strict = false;
 };
 
 std::optional<FileBox> shown_box(const Arguments& arguments) {
@@ -73,15 +74,18 @@ void print_table(const Json& object) {
   }
 }
 
-/// One line each on stderr, and their number.
-void print_warnings(const std::vector<std::string>& warnings) {
-  constexpr std::size_t kMaxLines = 100;
-  for (std::size_t i = 0; i < std::min(warnings.size(), kMaxLines); ++i) {
-    fmt::print(stderr, "warning: {}\n", warnings[i]);
+/// What was mended: how often, where first, and the message of each.
+Json mends_of(const RoadMap& map, const std::string& source) {
+  Json groups = Json::array();
+  for (const MendGroup& group : group_mends(map.mends)) {
+    Json faults = Json::array();
+    for (const Mend* mend : group.mends) faults.push_back(message_of(*mend, source));
+    groups.push_back({{"fault", to_string(group.kind)},
+                      {"done", action_of(group.kind)},
+                      {"count", group.mends.size()},
+                      {"faults", std::move(faults)}});
   }
-  if (!warnings.empty()) {
-    fmt::print(stderr, "{} warning{}: these parts are left out\n", warnings.size(), warnings.size() == 1 ? "" : "s");
-  }
+  return groups;
 }
 
 void run_map(const CLI::App& command, const Arguments& arguments) {
@@ -90,14 +94,18 @@ void run_map(const CLI::App& command, const Arguments& arguments) {
       if (command.count(option) > 0) fail_usage("{}: has no effect without --png or --svg", option);
     }
   }
+  if (command.count("--lenient") > 0) {
+    fail_usage(
+        "--lenient: is gone: faults that have one sensible meaning are mended by default; --strict refuses them");
+  }
   if (arguments.full && !arguments.json) fail_usage("--full: lists elements as JSON; expected --json with it");
   const InterruptibleWork work("interrupted");
   LoadReport report;
   const auto begin = std::chrono::steady_clock::now();
-  const std::shared_ptr<const RoadMap> map = load_map(arguments.map, {.lenient = arguments.lenient}, &report);
+  const std::shared_ptr<const RoadMap> map = load_map(arguments.map, {.strict = arguments.strict}, &report);
   const double load_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
   work.check();
-  print_warnings(report.warnings);
+  print_mends(*map, report.source);
   const MapPictureOptions picture{.size_px = arguments.size_px, .box = shown_box(arguments)};
   if (!arguments.png.empty()) draw_map_png(*map, arguments.png, picture);
   work.check();
@@ -111,9 +119,10 @@ void run_map(const CLI::App& command, const Arguments& arguments) {
   object["cached"] = report.cached;
   if (!report.cache_rejection.empty()) object["cache_refused"] = report.cache_rejection;
   object["load_ms"] = load_ms;
-  if (arguments.lenient) object["warnings"] = report.warnings.size();
+  object["mends"] = mends_of(*map, report.source);
   if (arguments.full) return print_listing(object, *map);
   if (arguments.json) return print_json(object);
+  object.erase("mends");  // said on stderr
   print_table(object);
   for (const std::string& path : {arguments.png, arguments.svg}) {
     if (!path.empty()) fmt::print("drawn into {}\n", path);
@@ -153,9 +162,10 @@ void add_map_command(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--xodr", arguments->xodr, "Write the map as OpenDRIVE, with only what the importer uses")
       ->check(file_ending(".xodr"));
-  command->add_flag("--lenient", arguments->lenient,
-                    "Leave out faulty parts of the file, each with a warning on stderr");
-  command->add_flag("--json", arguments->json, "Print one JSON object");
+  command->add_flag("--strict", arguments->strict,
+                    "Refuse every fault of the file, also those that are mended and counted by default");
+  command->add_flag("--lenient")->group("");  // of earlier versions: refused with what replaces it
+  command->add_flag("--json", arguments->json, "Print one JSON object; its mends list every fault that was mended");
   command->add_flag("--full", arguments->full, "With --json: list every element with its position in the file");
   command->footer(
       "Examples:\n  pictura map Town01 --json\n  pictura map procedural:7 --png town.png\n"

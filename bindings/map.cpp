@@ -1,5 +1,6 @@
 // Maps in Python.
 #include <algorithm>
+#include <tuple>
 
 #include <pybind11/stl.h>
 
@@ -99,24 +100,31 @@ py::dict arrays_of(const RoadMap& map) {
   return d;
 }
 
-std::shared_ptr<Map> load(const std::string& name, bool lenient, float chord_error_m) {
+/// One (kind, what was done, message) for each fault.
+std::vector<std::tuple<std::string, std::string, std::string>> mends_of(const Map& map) {
+  std::vector<std::tuple<std::string, std::string, std::string>> mends;
+  for (const Mend& mend : map.road()->mends) {
+    mends.emplace_back(to_string(mend.kind), action_of(mend.kind), message_of(mend, map.source()));
+  }
+  return mends;
+}
+
+std::shared_ptr<Map> load(const std::string& name, bool strict, float chord_error_m) {
   OpenDriveOptions options;
-  options.lenient = lenient;
+  options.strict = strict;
   options.chord_error_m = chord_error_m;
   return run_interruptibly("load_map", 1, {}, [name, options] {
     LoadReport report;
     auto road = load_map(name, options, &report);
-    return std::make_shared<Map>(std::move(road), std::move(report.warnings));
+    return std::make_shared<Map>(std::move(road), std::move(report.source));
   });
 }
 
-std::shared_ptr<Map> from_text(const std::string& text, const std::string& source, bool lenient) {
-  return run_interruptibly("Map.from_text", 1, {}, [text, source, lenient] {
+std::shared_ptr<Map> from_text(const std::string& text, const std::string& source, bool strict) {
+  return run_interruptibly("Map.from_text", 1, {}, [text, source, strict] {
     OpenDriveOptions options;
-    options.lenient = lenient;
-    std::vector<std::string> warnings;
-    auto road = std::make_shared<RoadMap>(parse_opendrive(text, source, options, &warnings));
-    return std::make_shared<Map>(std::move(road), std::move(warnings));
+    options.strict = strict;
+    return std::make_shared<Map>(std::make_shared<RoadMap>(parse_opendrive(text, source, options)), source);
   });
 }
 
@@ -191,19 +199,21 @@ Raises pictura.Error for other shapes; a renderer refuses what is not finite.)")
 A road network: lanes, markings, edges, lights. Immutable; simulators and renderers share it.
 
 Positions are metres in the map's frame, z up; `origin_m` is its place in the file's coordinates.)")
-      .def_static("load", load, py::arg("name"), py::kw_only(), py::arg("lenient") = false,
+      .def_static("load", load, py::arg("name"), py::kw_only(), py::arg("strict") = false,
                   py::arg("chord_error_m") = OpenDriveOptions{}.chord_error_m,
                   R"(Loads a map by name: an OpenDRIVE file (.xodr), a town of the map folder, or 'procedural:SEED'.
 
-lenient: leave faulty parts out, and say so in `warnings`. chord_error_m: how far sampled curves may lie from true ones.
+Faults that have one sensible meaning are mended, as `mends` says; strict: refuse them too. chord_error_m: how far sampled curves
+may lie from true ones.
 Raises pictura.Error naming file, line and element; pictura.UsageError where there is no such map.)")
       .def_static("from_text", from_text, py::arg("text"), py::arg("source") = "text", py::kw_only(),
-                  py::arg("lenient") = false,
+                  py::arg("strict") = false,
                   "Parses the text of an OpenDRIVE file; `source` names it in messages. Raises as load() does.")
       .def_property_readonly(
           "name", [](const Map& self) { return self.road()->name; },
           py::doc("'Town01', 'procedural:7', or the file's stem."))
-      .def_property_readonly("warnings", &Map::warnings, py::doc("What a lenient import left out."))
+      .def_property_readonly("mends", mends_of,
+                             py::doc("Faults of the file that were mended: (kind, what was done, message) each."))
       .def_property_readonly(
           "origin_m", [](const Map& self) { return self.road()->origin_m; },
           py::doc("File coordinates of the map's origin, three floats in metres."))

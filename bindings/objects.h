@@ -19,16 +19,16 @@ namespace pictura::python {
 /// A road map, and what has been compiled of it.
 class Map {
  public:
-  Map(std::shared_ptr<const RoadMap> road, std::vector<std::string> warnings)
-      : road_(std::move(road)), warnings_(std::move(warnings)) {}
+  /// `source` names its file in messages.
+  Map(std::shared_ptr<const RoadMap> road, std::string source) : road_(std::move(road)), source_(std::move(source)) {}
   const std::shared_ptr<const RoadMap>& road() const { return road_; }
-  const std::vector<std::string>& warnings() const { return warnings_; }
+  const std::string& source() const { return source_; }
   /// Compiles at the first call with these options. The caller holds the GIL.
   std::shared_ptr<const CompiledMap> compiled(const MapOptions& options);
 
  private:
   std::shared_ptr<const RoadMap> road_;
-  std::vector<std::string> warnings_;
+  std::string source_;
   std::vector<std::shared_ptr<const CompiledMap>> compiled_;
 };
 

@@ -7,9 +7,9 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/cli/number_options.h"
+#include "pictura/cli/reported_map.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/suggestion.h"
-#include "pictura/map/load_map.h"
 #include "pictura/simulator/controllers/host_controllers.h"
 #ifdef PICTURA_HAS_TORCH
 #include "pictura/training/session.h"
@@ -120,7 +120,7 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy, c
   set_population(options, &config);
   config.parked_cars = options.parked_cars.value_or(config.parked_cars);
   world.simulator = make_simulator(backends.simulator.empty() ? "cpu" : backends.simulator, config,
-                                   {load_map(options.map)}, {{0, options.agents, 0}});
+                                   {load_reported_map(options.map)}, {{0, options.agents, 0}});
   world.commands.resize(static_cast<size_t>(world.simulator->num_slots()));
 #ifdef PICTURA_HAS_TORCH
   if (is_trained) {

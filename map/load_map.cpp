@@ -53,9 +53,10 @@ std::string file_path_of(const std::string& name) {
 }
 
 RoadMap load_file(const std::string& path, const OpenDriveOptions& options, LoadReport* report) {
+  report->source = path;
   const std::string text = read_file(path, kMaxFile_bytes);
   const std::string cache_path = map_cache_path(path, options);
-  if (cache_path.empty()) return parse_opendrive(text, path, options, &report->warnings);
+  if (cache_path.empty()) return parse_opendrive(text, path, options);
   const MapCacheKey key = map_cache_key(text, options);
   std::error_code error;
   if (fs::exists(cache_path, error)) {
@@ -67,8 +68,8 @@ RoadMap load_file(const std::string& path, const OpenDriveOptions& options, Load
       report->cache_rejection = rejection.what();
     }
   }
-  RoadMap map = parse_opendrive(text, path, options, &report->warnings);
-  if (report->warnings.empty()) try_to_cache(cache_path, encode_map(map, key));
+  RoadMap map = parse_opendrive(text, path, options);
+  try_to_cache(cache_path, encode_map(map, key));
   return map;
 }
 
@@ -107,6 +108,7 @@ std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDrive
   LoadReport& report = report_out ? *report_out : unused;
   report = {};
   if (const std::optional<TownOptions> town = procedural_options(name)) {
+    report.source = name;
     auto map = std::make_shared<RoadMap>(parse_opendrive(procedural_town(*town), name, options));
     map->name = name == kProcedural ? fmt::format("{}:{}", kProcedural, town->seed) : name;
     return map;

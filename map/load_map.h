@@ -14,13 +14,13 @@ namespace pictura {
 
 /// How a map was loaded.
 struct LoadReport {
-  bool cached = false;                // the map was read from the cache
-  std::string cache_rejection;        // why an existing cached file was not used, or empty
-  std::vector<std::string> warnings;  // what a lenient import skipped
+  bool cached = false;          // the map was read from the cache
+  std::string cache_rejection;  // why an existing cached file was not used, or empty
+  std::string source;           // the file, or the procedural town's name: names it in messages
 };
 
 /// Loads `name`: a file (.xodr), a town's name looked up as NAME.xodr in the map folder, or
-/// `procedural[:SEED[:NAME=VALUE,...]]`. Files are imported once and, if that gave no warnings, stored in the cache
+/// `procedural[:SEED[:NAME=VALUE,...]]`. Files are imported once and stored in the cache
 /// (map_cache.h); a cache that cannot be read or written only costs time. Throws Error naming the file and the line or
 /// element; UsageError when there is no such map.
 std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDriveOptions& options = {},

@@ -42,14 +42,15 @@ PICTURA_FIELDS(BuildingLine, a_m, b_m)
 PICTURA_FIELDS(SourceElement, road, line)
 PICTURA_FIELDS(Provenance, lanes, markings, road_edges, crosswalks, parking_spaces, stop_lines, signs, lights,
                junctions, building_lines)
+PICTURA_FIELDS(Mend, kind, line, message)
 PICTURA_FIELDS(MapFacts, roads, junction_roads, junctions, signal_junctions, lanes, driving_lanes, driving_lane_km,
                driving_lane_km_in_junctions, traffic_lights, stop_lines, crosswalks, parking_spaces, painted_stop_lines,
                signs, z_min_m, z_max_m)
 PICTURA_FIELDS(RoadMap, name, origin_m, geo_reference, road_names, lanes, lane_points, lane_links, markings,
                marking_points, road_edges, crosswalks, outline_points, parking_spaces, stop_lines, signs, sign_lanes,
-               lights, light_lanes, junctions, building_lines, facts, provenance)
+               lights, light_lanes, junctions, building_lines, facts, provenance, mends)
 
-PICTURA_FIELDS(OpenDriveOptions, chord_error_m, lenient)
+PICTURA_FIELDS(OpenDriveOptions, chord_error_m, strict)
 
 /// The first bitwise difference of two maps, as a path like "lanes[3].length_m" or "lights: 8 and 9 of them"; empty
 /// when they are equal.

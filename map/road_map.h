@@ -11,6 +11,7 @@
 #include "pictura/common/grid.h"
 #include "pictura/common/math.h"
 #include "pictura/common/span.h"
+#include "pictura/map/mends.h"
 
 namespace pictura {
 
@@ -169,6 +170,7 @@ struct RoadMap {
   std::vector<BuildingLine> building_lines;
   MapFacts facts;
   Provenance provenance;
+  std::vector<Mend> mends;  // faults of the file, and what was made of them
 
   Span<const LanePoint> points_of(const Lane& lane) const {
     return {lane_points.data() + lane.points.begin, static_cast<size_t>(lane.points.size())};

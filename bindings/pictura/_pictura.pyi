@@ -109,16 +109,17 @@ class Map:
     Positions are metres in the map's frame, z up; `origin_m` is its place in the file's coordinates.
     """
     @staticmethod
-    def from_text(text: str, source: str = 'text', *, lenient: bool = False) -> Map:
+    def from_text(text: str, source: str = 'text', *, strict: bool = False) -> Map:
         """
         Parses the text of an OpenDRIVE file; `source` names it in messages. Raises as load() does.
         """
     @staticmethod
-    def load(name: str, *, lenient: bool = False, chord_error_m: typing.SupportsFloat | typing.SupportsIndex = 0.019999999552965164) -> Map:
+    def load(name: str, *, strict: bool = False, chord_error_m: typing.SupportsFloat | typing.SupportsIndex = 0.019999999552965164) -> Map:
         """
         Loads a map by name: an OpenDRIVE file (.xodr), a town of the map folder, or 'procedural:SEED'.
         
-        lenient: leave faulty parts out, and say so in `warnings`. chord_error_m: how far sampled curves may lie from true ones.
+        Faults that have one sensible meaning are mended, as `mends` says; strict: refuse them too. chord_error_m: how far sampled curves
+        may lie from true ones.
         Raises pictura.Error naming file, line and element; pictura.UsageError where there is no such map.
         """
     def __repr__(self) -> str:
@@ -150,6 +151,11 @@ class Map:
         Of the file's coordinates, a PROJ string; may be empty.
         """
     @property
+    def mends(self) -> list[tuple[str, str, str]]:
+        """
+        Faults of the file that were mended: (kind, what was done, message) each.
+        """
+    @property
     def name(self) -> str:
         """
         'Town01', 'procedural:7', or the file's stem.
@@ -158,11 +164,6 @@ class Map:
     def origin_m(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
         """
         File coordinates of the map's origin, three floats in metres.
-        """
-    @property
-    def warnings(self) -> list[str]:
-        """
-        What a lenient import left out.
         """
 class Camera:
     """

@@ -18,7 +18,7 @@ std::string_view trim(std::string_view text) {
 
 }  // namespace
 
-SourceLocation Element::where() const { return {source_, node_.offset_debug(), owner_, node_.name()}; }
+SourceLocation Element::where() const { return {source_, node_.offset_debug(), *owner_, node_.name()}; }
 
 Element Element::required_child(const char* name) const {
   const Element element = child(name);
@@ -36,16 +36,19 @@ std::string Element::text(const char* attribute, const char* fallback) const {
   return node_.attribute(attribute).as_string(fallback);
 }
 
-double Element::number(const char* attribute) const {
-  const std::string value = text(attribute);
-  std::string_view digits = trim(value);
+std::optional<double> Element::finite_number(const char* attribute) const {
+  std::string_view digits = trim(node_.attribute(attribute).value());
   if (digits.starts_with('+')) digits.remove_prefix(1);
   double result = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), result);
-  if (error != std::errc() || end != digits.data() + digits.size() || !std::isfinite(result)) {
-    fail("attribute {}: expected a finite number, got '{}'", attribute, value);
-  }
+  if (error != std::errc() || end != digits.data() + digits.size() || !std::isfinite(result)) return std::nullopt;
   return result;
+}
+
+double Element::number(const char* attribute) const {
+  const std::optional<double> number = finite_number(attribute);
+  if (!number) fail("attribute {}: expected a finite number, got '{}'", attribute, text(attribute));
+  return *number;
 }
 
 double Element::number_in(const char* attribute, double low, double high) const {
@@ -54,6 +57,18 @@ double Element::number_in(const char* attribute, double low, double high) const 
     fail("attribute {}: expected a number in [{}, {}], got {}", attribute, low, high, value);
   }
   return value;
+}
+
+bool Element::has_or_zero(const char* attribute) const {
+  if (has(attribute)) return true;
+  mend(MendKind::missing_zero, "attribute {} is missing", attribute);
+  return false;
+}
+
+double Element::number_or_zero(const char* attribute) const { return has_or_zero(attribute) ? number(attribute) : 0; }
+
+double Element::number_or_zero_in(const char* attribute, double low, double high) const {
+  return has_or_zero(attribute) ? number_in(attribute, low, high) : 0;
 }
 
 bool Element::flag(const char* attribute) const {
@@ -74,27 +89,32 @@ int Element::integer(const char* attribute) const {
   return result;
 }
 
-Cubic read_cubic(const Element& element, const char* station, double length) {
-  return {.s = element.number_in(station, -kStationTolerance_m, length + kStationTolerance_m),
-          .a = element.number("a"),
-          .b = element.number("b"),
-          .c = element.number("c"),
-          .d = element.number("d")};
+std::optional<double> read_station(const Element& record, const char* attribute, double length,
+                                   std::optional<double> fallback) {
+  const double s = fallback ? record.number(attribute, *fallback) : record.number(attribute);
+  if (s >= -kStationTolerance_m && s <= length + kStationTolerance_m) return s;
+  record.mend(s < 0 ? MendKind::record_before_start : MendKind::record_beyond_end,
+              "attribute {}: expected a number in [0, {}], got {}", attribute, length, s);
+  if (s < 0) return s;
+  return std::nullopt;
 }
 
-void append_cubic(const Element& element, const Cubic& cubic, Profile* profile) {
-  if (!profile->cubics.empty() && cubic.s < profile->cubics.back().s) {
-    element.fail("begins at {}; expected at least {}, where the one before it begins", cubic.s,
-                 profile->cubics.back().s);
-  }
-  profile->cubics.push_back(cubic);
+Cubic read_cubic(const Element& element, double s) {
+  return {.s = s,
+          .a = element.number_or_zero("a"),
+          .b = element.number_or_zero("b"),
+          .c = element.number_or_zero("c"),
+          .d = element.number_or_zero("d")};
 }
 
 Profile read_profile(const Element& parent, const char* name, const char* station, double length) {
   Profile profile;
   if (!parent) return profile;
-  parent.each(name,
-              [&](const Element& element) { append_cubic(element, read_cubic(element, station, length), &profile); });
+  parent.each(name, [&](const Element& element) {
+    const std::optional<double> s = read_station(element, station, length);
+    if (s) append_record(element, station, &Cubic::s, read_cubic(element, *s), &profile.cubics);
+  });
+  sort_records(&Cubic::s, &profile.cubics);
   return profile;
 }
 

@@ -12,7 +12,7 @@ namespace {
 // Widths down to minus this count as 0: the rounding that writers leave where a lane tapers off.
 constexpr double kWidthTolerance_m = 0.01;
 constexpr double kMaxWidth_m = 500;
-constexpr double kMaxBanking_rad = 0.5;
+constexpr double kMaxBanking_rad = 1.4;
 // Between stations everything is a cubic of s, which is bounded within a small factor by its values at five points.
 constexpr int kProbes = 4;
 
@@ -23,19 +23,22 @@ void at_probes(const std::vector<double>& stations, Probe&& probe) {
   }
 }
 
-void check_widths(const FileRoad& road, const FileSection& section, const FileLane& lane) {
+/// Below zero widths count as zero, which is noted once a lane.
+void check_widths(const FileRoad& road, const FileSection& section, const FileLane& lane, Faults* faults) {
+  bool is_noted = false;
   at_probes(formula_changes(road, section, lane.id, section.s, section.end), [&](double s) {
     const double ds = std::min(s, section.end - 1e-6) - section.s;
     const double width =
         lane.border.cubics.empty()
             ? lane.width.value(ds)
             : (lane.id > 0 ? 1 : -1) * (lane.border.value(ds) - border_at(road, section, inner_border(lane.id), s).t);
-    if (!(width >= -kWidthTolerance_m)) {
-      lane.where.fail("its width at s {:.3f} is {:.3f} m; expected at least 0", s, width);
-    }
     if (!(width <= kMaxWidth_m)) {
       lane.where.fail("its width at s {:.3f} is {:.3f} m; expected at most {}", s, width, kMaxWidth_m);
     }
+    if (width >= -kWidthTolerance_m || is_noted) return;
+    lane.where.mend(faults, MendKind::negative_width, "its width at s {:.3f} is {:.3f} m; expected at least 0", s,
+                    width);
+    is_noted = true;
   });
 }
 
@@ -56,16 +59,14 @@ void check_position(const FileRoad& road, const FileSection& section, int border
 
 }  // namespace
 
-void check_extent(Faults* faults, FileRoad* road) {
-  for (FileSection& section : road->sections) {
-    for (std::vector<FileLane>* side : {&section.left, &section.right}) {
-      for (FileLane& lane : *side) {
-        if (!faults->attempt([&] { check_widths(*road, section, lane); })) lane.is_void = true;
-      }
+void check_extent(const FileRoad& road, Faults* faults) {
+  for (const FileSection& section : road.sections) {
+    for (const std::vector<FileLane>* side : {&section.left, &section.right}) {
+      for (const FileLane& lane : *side) check_widths(road, section, lane, faults);
     }
     for (const int border : {static_cast<int>(section.left.size()), -static_cast<int>(section.right.size())}) {
-      at_probes(formula_changes(*road, section, border, section.s, section.end),
-                [&](double s) { check_position(*road, section, border, s); });
+      at_probes(formula_changes(road, section, border, section.s, section.end),
+                [&](double s) { check_position(road, section, border, s); });
     }
   }
 }

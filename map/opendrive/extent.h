@@ -7,8 +7,8 @@
 
 namespace pictura::opendrive {
 
-/// Throws Error unless offsets, heights and banking are within limits along the whole road. A lane whose width is below
-/// zero is a fault of the lane; in lenient mode that lane becomes void.
-void check_extent(Faults* faults, FileRoad* road);
+/// Throws Error unless offsets, heights and banking are within limits along the whole road. Mended: widths below zero,
+/// which all that read them count as zero.
+void check_extent(const FileRoad& road, Faults* faults);
 
 }  // namespace pictura::opendrive

@@ -1,4 +1,4 @@
-// Handling of faults in a file: strict mode throws; lenient mode drops the smallest faulty part and records a warning.
+// Faults of a file that have one sensible meaning: they are mended and noted, or, in strict reading, refused.
 #pragma once
 
 #include <string>
@@ -6,43 +6,31 @@
 #include <vector>
 
 #include "pictura/common/error.h"
+#include "pictura/map/mends.h"
 
 namespace pictura::opendrive {
 
 class Faults {
  public:
-  explicit Faults(bool lenient) : lenient_(lenient) {}
+  explicit Faults(bool strict) : strict_(strict) {}
 
-  /// Runs `part()`. Strict: propagates its Error. Lenient: records it as a warning and returns false. Parts must leave
-  /// nothing half done when they throw.
-  template <typename Part>
-  bool attempt(Part&& part) {
-    if (!lenient_) {
-      part();
-      return true;
+  /// Notes a fault that the caller mends as action_of(kind) says. Strict: throws Error with its message instead.
+  void mend(Mend mend, const std::string& source) {
+    if (strict_) throw Error(message_of(mend, source));
+    // Bounds memory.
+    if (mends_.size() >= kMaxMends) {
+      fail("{} (after {} other faults, the most that are mended)", message_of(mend, source), kMaxMends);
     }
-    try {
-      part();
-      return true;
-    } catch (const Error& error) {
-      ++num_faults_;
-      if (warnings_.size() < kMaxWarnings) warnings_.emplace_back(error.what());
-      return false;
-    }
+    mends_.push_back(std::move(mend));
   }
 
-  /// The recorded warnings and, if there were more than the limit, how many more.
-  std::vector<std::string> take_warnings() {
-    if (num_faults_ > warnings_.size()) warnings_.push_back(fmt::format("and {} more", num_faults_ - warnings_.size()));
-    return std::move(warnings_);
-  }
+  std::vector<Mend> take() { return std::move(mends_); }
 
  private:
-  static constexpr std::size_t kMaxWarnings = 10'000;
+  static constexpr std::size_t kMaxMends = 1'000'000;
 
-  bool lenient_;
-  std::size_t num_faults_ = 0;
-  std::vector<std::string> warnings_;
+  bool strict_;
+  std::vector<Mend> mends_;
 };
 
 }  // namespace pictura::opendrive

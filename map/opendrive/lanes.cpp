@@ -58,19 +58,6 @@ void join_neighbors(Build* build, const FileRoad& road, const FileSection& secti
   if (!section.left.empty() && !section.right.empty()) join(section.left[0], section.right[0]);
 }
 
-int32_t junction_of(Build* build, const FileRoad& road) {
-  int32_t junction = -1;
-  if (road.junction.empty()) return junction;
-  build->faults->attempt([&] {
-    const auto found = build->network.junction_index.find(road.junction);
-    if (found == build->network.junction_index.end()) {
-      road.where.fail("belongs to junction {}, which does not exist", road.junction);
-    }
-    junction = found->second;
-  });
-  return junction;
-}
-
 }  // namespace
 
 void choose_origin(Build* build) {
@@ -101,7 +88,7 @@ void build_lanes(Build* build) {
   for (std::size_t r = 0; r < build->network.roads.size(); ++r) {
     const FileRoad& road = build->network.roads[r];
     map.road_names.push_back(road.id);
-    const int32_t junction = junction_of(build, road);
+    const int32_t junction = road.junction.empty() ? -1 : build->network.junction_index.at(road.junction);
     std::vector<SectionLanes>& sections = build->lanes.emplace_back();
     for (const FileSection& section : road.sections) {
       SectionLanes& indices = sections.emplace_back();

@@ -25,9 +25,7 @@ class Linker {
   void link_all() {
     for (std::size_t road = 0; road < build_.network.roads.size(); ++road) link_road(static_cast<int>(road));
     for (const FileJunction& junction : build_.network.junctions) {
-      for (const Connection& connection : junction.connections) {
-        build_.faults->attempt([&] { link_connection(junction, connection); });
-      }
+      for (const Connection& connection : junction.connections) link_connection(connection);
     }
     store();
   }
@@ -35,11 +33,7 @@ class Linker {
  private:
   const FileRoad& road_of(int index) const { return build_.network.roads[static_cast<std::size_t>(index)]; }
 
-  int road_named(const std::string& id, const SourceLocation& where) const {
-    const auto found = build_.network.road_index.find(id);
-    if (found == build_.network.road_index.end()) where.fail("refers to road {}, which does not exist", id);
-    return found->second;
-  }
+  int road_named(const std::string& id) const { return build_.network.road_index.at(id); }
 
   /// The end of lane `id` at one end of a road.
   LaneEnd end_of_road(int road, ContactPoint contact, int id) const {
@@ -51,58 +45,26 @@ class Linker {
     return road_of(end.road).sections[static_cast<std::size_t>(end.section)].lane(end.id);
   }
 
-  bool exists(const LaneEnd& end) const { return file_lane(end) != nullptr; }
-
-  [[noreturn]] void fail_missing(const LaneEnd& end, const SourceLocation& where) const {
-    where.fail("is linked to lane {} of road {}, which does not exist there", end.id, road_of(end.road).id);
+  /// Whether the lane is there; if not, the link to it is mended: left out.
+  bool exists(const LaneEnd& end, const SourceLocation& where) const {
+    if (file_lane(end)) return true;
+    where.mend(build_.faults, MendKind::missing_lane, "is linked to lane {} of road {}, which does not exist there",
+               end.id, road_of(end.road).id);
+    return false;
   }
 
   void link_road(int road) {
     const FileRoad& file_road = road_of(road);
-    const int num_sections = static_cast<int>(file_road.sections.size());
-    const bool start_is_sound = build_.faults->attempt([&] { check_road_link(file_road, ContactPoint::start); });
-    const bool end_is_sound = build_.faults->attempt([&] { check_road_link(file_road, ContactPoint::end); });
-    for (int section = 0; section < num_sections; ++section) {
+    for (int section = 0; section < static_cast<int>(file_road.sections.size()); ++section) {
       const FileSection& file_section = file_road.sections[static_cast<std::size_t>(section)];
       for (const std::vector<FileLane>* side : {&file_section.left, &file_section.right}) {
         for (const FileLane& lane : *side) {
-          for (const int id : lane.successors) {
-            if (section + 1 == num_sections && !end_is_sound) break;
-            build_.faults->attempt([&] { link_lane(road, section, lane, ContactPoint::end, id); });
-          }
-          for (const int id : lane.predecessors) {
-            if (section == 0 && !start_is_sound) break;
-            build_.faults->attempt([&] { link_lane(road, section, lane, ContactPoint::start, id); });
-          }
+          for (const int id : lane.successors) link_lane(road, section, lane, ContactPoint::end, id);
+          for (const int id : lane.predecessors) link_lane(road, section, lane, ContactPoint::start, id);
         }
       }
     }
   }
-
-  static const RoadLink& link_at(const FileRoad& road, ContactPoint end) {
-    return end == ContactPoint::start ? road.predecessor : road.successor;
-  }
-
-  /// Checks that a road link's target exists and that, if the target is linked to a road there, it is linked back to
-  /// this road end.
-  void check_road_link(const FileRoad& road, ContactPoint end) const {
-    const RoadLink& link = link_at(road, end);
-    if (link.kind == RoadLink::Kind::junction && !build_.network.junction_index.contains(link.id)) {
-      link.where.fail("refers to junction {}, which does not exist", link.id);
-    }
-    if (link.kind != RoadLink::Kind::road) return;
-    const RoadLink& back = link_at(road_of(road_named(link.id, link.where)), link.contact);
-    if (link.id == road.id && (link.contact == end || back.kind != RoadLink::Kind::road)) {
-      link.where.fail("its {} is linked to the road's own {}, which is not linked back", name_of(end),
-                      name_of(link.contact));
-    }
-    if (back.kind == RoadLink::Kind::road && (back.id != road.id || back.contact != end)) {
-      link.where.fail("the {} of road {} is linked to the {} of road {} instead of the {} of this one",
-                      name_of(link.contact), link.id, name_of(back.contact), back.id, name_of(end));
-    }
-  }
-
-  static const char* name_of(ContactPoint end) { return end == ContactPoint::start ? "start" : "end"; }
 
   /// Links a lane at one end of its section: to the next section, or across the road's link.
   void link_lane(int road, int section, const FileLane& lane, ContactPoint end, int target_id) {
@@ -111,46 +73,19 @@ class Linker {
     const int next = at_end ? section + 1 : section - 1;
     LaneEnd target{road, next, target_id, at_end ? ContactPoint::start : ContactPoint::end};
     if (next < 0 || next >= static_cast<int>(file_road.sections.size())) {
-      const RoadLink& link = link_at(file_road, end);
+      const RoadLink& link = at_end ? file_road.successor : file_road.predecessor;
       if (link.kind != RoadLink::Kind::road) return;
-      target = end_of_road(road_named(link.id, link.where), link.contact, target_id);
+      target = end_of_road(road_named(link.id), link.contact, target_id);
     }
-    if (exists(target)) {
-      add({road, section, lane.id, end}, target);
-    } else if (is_drivable(lane.type)) {
-      // Only an error on drivable lanes: Town07 has a shoulder whose link target is missing.
-      fail_missing(target, lane.where);
-    }
+    if (exists(target, lane.where)) add({road, section, lane.id, end}, target);
   }
 
-  void link_connection(const FileJunction& junction, const Connection& connection) {
-    const int incoming = road_named(connection.incoming_road, connection.where);
-    const int connecting = road_named(connection.connecting_road, connection.where);
-    const FileRoad& connecting_road = road_of(connecting);
-    const RoadLink& back = link_at(connecting_road, connection.contact);
-    ContactPoint incoming_end = ContactPoint::start;
-    if (back.kind == RoadLink::Kind::road && back.id == connection.incoming_road) {
-      incoming_end = back.contact;
-    } else {
-      const FileRoad& incoming_road = road_of(incoming);
-      auto meets = [&](const RoadLink& link) {
-        return link.kind == RoadLink::Kind::junction && link.id == junction.id;
-      };
-      if (meets(incoming_road.successor)) {
-        incoming_end = ContactPoint::end;
-      } else if (!meets(incoming_road.predecessor)) {
-        connection.where.fail("its incoming road {} has no end at this junction", connection.incoming_road);
-      }
-    }
+  void link_connection(const Connection& connection) {
+    const int incoming = road_named(connection.incoming_road), connecting = road_named(connection.connecting_road);
     for (const LaneLink& link : connection.lane_links) {
-      build_.faults->attempt([&] {
-        const LaneEnd from = end_of_road(incoming, incoming_end, link.from);
-        const LaneEnd to = end_of_road(connecting, connection.contact, link.to);
-        for (const LaneEnd& end : {from, to}) {
-          if (!exists(end)) fail_missing(end, link.where);
-        }
-        add(from, to);
-      });
+      const LaneEnd from = end_of_road(incoming, connection.incoming_end, link.from);
+      const LaneEnd to = end_of_road(connecting, connection.contact, link.to);
+      if (exists(from, link.where) && exists(to, link.where)) add(from, to);
     }
   }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "pictura/common/error.h"
+#include "pictura/map/opendrive/faults.h"
 #include "pictura/map/road_map.h"
 
 namespace pictura::opendrive {
@@ -44,6 +45,14 @@ struct SourceLocation {
   template <typename... Args>
   [[noreturn]] void fail(fmt::format_string<Args...> format, Args&&... args) const {
     fail_with(fmt::format(format, std::forward<Args>(args)...));
+  }
+
+  /// Notes a fault that the caller mends, or throws; see Faults.
+  void mend_with(Faults* faults, MendKind kind, const std::string& message) const;
+
+  template <typename... Args>
+  void mend(Faults* faults, MendKind kind, fmt::format_string<Args...> format, Args&&... args) const {
+    mend_with(faults, kind, fmt::format(format, std::forward<Args>(args)...));
   }
 };
 
@@ -138,6 +147,7 @@ struct RoadLink {
   enum class Kind : uint8_t { none, road, junction } kind = Kind::none;
   std::string id;
   ContactPoint contact = ContactPoint::start;
+  bool has_contact = true;  // false: the file does not say; mend_links() finds it
   SourceLocation where;
 };
 
@@ -209,8 +219,10 @@ struct LaneLink {
 };
 
 struct Connection {
-  std::string incoming_road, connecting_road;  // in direct junctions connecting_road is the linked road
-  ContactPoint contact = ContactPoint::start;  // the end of the connecting road at the incoming one
+  std::string incoming_road, connecting_road;       // in direct junctions connecting_road is the linked road
+  ContactPoint contact = ContactPoint::start;       // the end of the connecting road at the incoming one
+  bool has_contact = true;                          // false: the file does not say; mend_links() finds it
+  ContactPoint incoming_end = ContactPoint::start;  // of the incoming road, at the junction; from mend_links()
   std::vector<LaneLink> lane_links;
   SourceLocation where;
 };

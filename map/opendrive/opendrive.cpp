@@ -20,11 +20,10 @@ SampleBudget budget_for(std::size_t text_bytes, const std::string& source) {
 
 }  // namespace
 
-RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options,
-                        std::vector<std::string>* warnings_out) {
+RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options) {
   PICTURA_CHECK(options.chord_error_m >= 1e-3f && options.chord_error_m <= 10.0f,
                 "OpenDRIVE options: expected a chord error in [0.001, 10] m, got {}", options.chord_error_m);
-  opendrive::Faults faults(options.lenient);
+  opendrive::Faults faults(options.strict);
   opendrive::Network network;
   opendrive::read_network(text, source, &faults, &network);
   opendrive::split_at_speed_changes(&network);
@@ -44,8 +43,8 @@ RoadMap parse_opendrive(std::string_view text, const std::string& source, const 
   opendrive::build_signals(&build);
   opendrive::build_building_lines(&build);
   opendrive::count_facts(&build);
+  map.mends = faults.take();
   validate(map);
-  if (warnings_out) *warnings_out = faults.take_warnings();
   return map;
 }
 

@@ -82,6 +82,7 @@ class MarkPainter {
 
   /// Paints the mark from `begin` to `end`.
   void paint(const RoadMark& mark, double begin, double end) {
+    is_noted_ = false;
     const double mark_begin = section_.s + mark.s_offset;
     for (const Stripe& stripe : stripes_of(mark, lane_.id, mark_begin)) {
       if (!stripe.broken) {
@@ -99,7 +100,6 @@ class MarkPainter {
  private:
   void add(const RoadMark& mark, const Stripe& stripe, double from, double to) {
     if (to - from < kMinMarkLength_m) return;
-    RoadMap& map = *build_.map;
     std::vector<double> breaks = formula_changes(road_, section_, lane_.id, from, to);
     const double mark_begin = section_.s + mark.s_offset;
     for (const Cubic& sway : mark.sway.cubics) {
@@ -114,8 +114,35 @@ class MarkPainter {
           if (!lane_.inner_height.cubics.empty()) p.z() = point_on_lane(road_, section_, lane_, s, 1).z();
           return CurvePoint{s, p, 0};
         });
+    // On the inner side of a bend tighter than its offset a mark would run back, and cross itself.
+    std::size_t begin = 0;
+    for (std::size_t i = 1; i < points.size(); ++i) {
+      if (!runs_back(points[i - 1], points[i])) continue;
+      note_self_crossing(mark, points[i - 1].s);
+      add_marking(mark, stripe, points, begin, i);
+      begin = i;
+    }
+    add_marking(mark, stripe, points, begin, points.size());
+  }
+
+  bool runs_back(const CurvePoint& a, const CurvePoint& b) const {
+    const double heading = pose_at(road_, 0.5 * (a.s + b.s)).heading;
+    return (b.position_m - a.position_m).head<2>().dot(Eigen::Vector2d{std::cos(heading), std::sin(heading)}) < 0;
+  }
+
+  void note_self_crossing(const RoadMark& mark, double s) {
+    if (is_noted_) return;
+    is_noted_ = true;
+    mark.where.mend(build_.faults, MendKind::self_crossing_mark, "at s {:.3f} it runs against the road", s);
+  }
+
+  /// The points in [begin, end), if they make a line.
+  void add_marking(const RoadMark& mark, const Stripe& stripe, const std::vector<CurvePoint>& points, std::size_t begin,
+                   std::size_t end) {
+    if (end - begin < 2) return;
+    RoadMap& map = *build_.map;
     const int32_t first = static_cast<int32_t>(map.marking_points.size());
-    for (const CurvePoint& point : points) map.marking_points.push_back(build_.to_map(point.position_m));
+    for (std::size_t i = begin; i < end; ++i) map.marking_points.push_back(build_.to_map(points[i].position_m));
     map.markings.push_back({{first, static_cast<int32_t>(map.marking_points.size())},
                             static_cast<float>(stripe.width),
                             stripe.color,
@@ -128,6 +155,7 @@ class MarkPainter {
   const FileRoad& road_;
   const FileSection& section_;
   const FileLane& lane_;
+  bool is_noted_ = false;  // whether the mark is known to cross itself
 };
 
 /// The corners of an object: its outline, or its bounding box.
@@ -159,11 +187,13 @@ std::vector<Vec3> corners_of(Build* build, const FileRoad& road, const FileObjec
 
 void add_crosswalk(Build* build, std::size_t road, const FileObject& object) {
   if (object.outline.empty() && !(object.length > 0 && object.width > 0)) {
-    object.where.fail("expected a crosswalk with an outline, or a length and a width");
+    return object.where.mend(build->faults, MendKind::shapeless_object,
+                             "expected a crosswalk with an outline, or a length and a width");
   }
   const std::vector<Vec3> corners = corners_of(build, build->network.roads[road], object);
   if (corners.size() < 3) {
-    object.where.fail("expected a crosswalk with at least three distinct corners, got {}", corners.size());
+    return object.where.mend(build->faults, MendKind::shapeless_object,
+                             "expected a crosswalk with at least three distinct corners, got {}", corners.size());
   }
   RoadMap& map = *build->map;
   const int32_t first = static_cast<int32_t>(map.outline_points.size());
@@ -182,7 +212,8 @@ void add_stop_line(Build* build, std::size_t road, const FileObject& object) {
     }
   }
   if (length(along) < kMinStopLine_m) {
-    object.where.fail("expected a stop line at least {} m long, got {}", kMinStopLine_m, length(along));
+    return object.where.mend(build->faults, MendKind::shapeless_object,
+                             "expected a stop line at least {} m long, got {}", kMinStopLine_m, length(along));
   }
   if (corners.size() >= 4) {
     // The longest extent of a box is its diagonal; use its longest side.
@@ -220,8 +251,9 @@ void add_parking_space(Build* build, std::size_t road_index, const FileObject& o
   double heading = pose_at(road, object.s).heading + object.heading;
   double length_m = object.length, width_m = object.width;
   if (!(length_m >= kMinParking_m && width_m >= kMinParking_m)) {
-    object.where.fail("expected a parking space with a length and a width of at least {} m, got {} and {}",
-                      kMinParking_m, length_m, width_m);
+    return object.where.mend(build->faults, MendKind::shapeless_object,
+                             "expected a parking space with a length and a width of at least {} m, got {} and {}",
+                             kMinParking_m, length_m, width_m);
   }
   // Cars park along the longer side, whichever dimension the file calls length.
   if (width_m > length_m) {
@@ -270,7 +302,7 @@ void build_markings(Build* build) {
 void build_objects(Build* build) {
   for (std::size_t road = 0; road < build->network.roads.size(); ++road) {
     for (const FileObject& object : build->network.roads[road].objects) {
-      build->faults->attempt([&] { add_object(build, road, object); });
+      add_object(build, road, object);
     }
   }
 }

@@ -5,11 +5,17 @@ namespace pictura::opendrive {
 
 namespace {
 
-ContactPoint contact_point(const Element& element) {
-  const std::string text = element.text("contactPoint");
-  if (text == "start") return ContactPoint::start;
-  if (text == "end") return ContactPoint::end;
-  element.fail("attribute contactPoint: expected start or end, got '{}'", text);
+/// Sets the end that a link or connection names. A missing or unknown one is noted and found by mend_links().
+template <typename Link>
+void read_contact(const Element& element, Link* link) {
+  const std::string text = element.text("contactPoint", "");
+  link->contact = text == "end" ? ContactPoint::end : ContactPoint::start;
+  link->has_contact = text == "start" || text == "end";
+  if (!element.has("contactPoint")) {
+    element.mend(MendKind::missing_contact, "attribute contactPoint is missing");
+  } else if (!link->has_contact) {
+    element.mend(MendKind::missing_contact, "attribute contactPoint: expected start or end, got '{}'", text);
+  }
 }
 
 RoadLink read_road_link(const Element& element) {
@@ -22,68 +28,64 @@ RoadLink read_road_link(const Element& element) {
     link.kind = RoadLink::Kind::junction;
   } else if (type == "road") {
     if (element.has("elementS")) {
-      element.fail("attribute elementS: links to the middle of a road (virtual junctions) are not supported");
+      element.mend(MendKind::link_into_road,
+                   "attribute elementS: links to the middle of a road (virtual junctions) are not supported");
+      return link;
     }
     link.kind = RoadLink::Kind::road;
-    link.contact = contact_point(element);
+    read_contact(element, &link);
   } else {
     element.fail("attribute elementType: expected road or junction, got '{}'", type);
   }
   return link;
 }
 
-Connection read_connection(const Element& element, bool is_direct, Faults* faults) {
+Connection read_connection(const Element& element, bool is_direct) {
   Connection connection;
   connection.where = element.where();
   connection.incoming_road = element.text("incomingRoad");
   connection.connecting_road = element.text(is_direct ? "linkedRoad" : "connectingRoad");
-  connection.contact = contact_point(element);
+  read_contact(element, &connection);
   element.each("laneLink", [&](const Element& link) {
-    faults->attempt([&] { connection.lane_links.push_back({link.integer("from"), link.integer("to"), link.where()}); });
+    connection.lane_links.push_back({link.integer("from"), link.integer("to"), link.where()});
   });
   return connection;
 }
 
 }  // namespace
 
-void read_road_links(const Element& road_element, Faults* faults, FileRoad* road) {
+void read_road_links(const Element& road_element, FileRoad* road) {
   const Element link = road_element.child("link");
   if (!link) return;
-  faults->attempt([&] { road->predecessor = read_road_link(link.child("predecessor")); });
-  faults->attempt([&] { road->successor = read_road_link(link.child("successor")); });
+  road->predecessor = read_road_link(link.child("predecessor"));
+  road->successor = read_road_link(link.child("successor"));
 }
 
-FileJunction read_junction(const Element& element, Faults* faults) {
+FileJunction read_junction(const Element& element) {
   FileJunction junction;
   junction.where = element.where();
   junction.id = element.text("id");
   const std::string type = element.text("type", "default");
   junction.is_direct = type == "direct";
-  const bool is_read = faults->attempt([&] {
-    if (type != "default" && !junction.is_direct) {
-      element.fail("attribute type: '{}' junctions are not supported; expected default or direct", type);
-    }
-  });
-  // In lenient mode an unsupported junction is kept without connections, since roads refer to it.
-  if (!is_read) return junction;
+  if (type != "default" && !junction.is_direct) {
+    // Kept without connections, since roads refer to it.
+    element.mend(MendKind::unsupported_junction,
+                 "attribute type: '{}' junctions are not supported; expected default or direct", type);
+    return junction;
+  }
   element.each("connection", [&](const Element& child) {
-    faults->attempt([&] { junction.connections.push_back(read_connection(child, junction.is_direct, faults)); });
+    junction.connections.push_back(read_connection(child, junction.is_direct));
   });
-  element.each("controller", [&](const Element& child) {
-    faults->attempt([&] { junction.controllers.push_back(child.text("id")); });
-  });
+  element.each("controller", [&](const Element& child) { junction.controllers.push_back(child.text("id")); });
   return junction;
 }
 
-FileController read_controller(const Element& element, Faults* faults) {
+FileController read_controller(const Element& element) {
   FileController controller;
   controller.id = element.text("id");
-  const Element owned = element.with_owner(fmt::format("controller {}", controller.id));
-  controller.where = owned.where();
-  controller.sequence = owned.has("sequence") ? owned.integer("sequence") : 0;
-  owned.each("control", [&](const Element& control) {
-    faults->attempt([&] { controller.signals.push_back(control.text("signalId")); });
-  });
+  controller.where = element.where();
+  controller.sequence = element.has("sequence") ? element.integer("sequence") : 0;
+  element.each("control", [&](const Element& control) { controller.signals.push_back(control.text("signalId")); });
   return controller;
 }
 

@@ -1,6 +1,7 @@
 // Reads lane sections: lanes with their widths, links and road marks.
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <unordered_map>
 
 #include "pictura/map/opendrive/read_parts.h"
@@ -14,6 +15,7 @@ namespace {
 constexpr double kMinSection_m = 1e-3;
 constexpr double kMaxLaneWidth_m = 1e3, kMaxLaneHeight_m = 100;
 constexpr int kMaxLanesPerSide = 64;
+constexpr double kMaxLateSection_m = 0.5;  // by which the first section may be late and is mended
 
 LaneType lane_type(const Element& element, const std::string& name) {
   static const std::unordered_map<std::string_view, LaneType> kTypes = {
@@ -51,29 +53,50 @@ LaneType lane_type(const Element& element, const std::string& name) {
       {"shared", LaneType::driving},
   };
   const auto found = kTypes.find(name);
-  if (found == kTypes.end()) element.fail("attribute type: '{}' is not a lane type of OpenDRIVE 1.4 to 1.8", name);
-  return found->second;
+  if (found != kTypes.end()) return found->second;
+  element.mend(MendKind::unknown_lane_type, "attribute type: '{}' is not a lane type of OpenDRIVE 1.4 to 1.8", name);
+  return LaneType::other;
 }
 
-Profile read_constants(const Element& lane, const char* name, double section_length,
-                       double (*value_of)(const Element&)) {
-  Profile profile;
+/// Records of constants, each from its sOffset on: calls read(element, s) in the order of the file.
+template <typename Read>
+void each_record(const Element& lane, const char* name, double section_length, Read&& read) {
   lane.each(name, [&](const Element& element) {
-    const double s = element.number_in("sOffset", 0, section_length + kStationTolerance_m, 0);
-    if (!profile.cubics.empty() && s < profile.cubics.back().s) {
-      element.fail("attribute sOffset: expected at least the previous one's {}, got {}", profile.cubics.back().s, s);
-    }
-    profile.cubics.push_back({.s = s, .a = value_of(element)});
+    if (const std::optional<double> s = read_station(element, "sOffset", section_length, 0)) read(element, *s);
   });
-  return profile;
+}
+
+void read_heights(const Element& element, double section_length, FileLane* lane) {
+  each_record(element, "height", section_length, [&](const Element& height, double s) {
+    const auto limit = [&](const char* side) {
+      return Cubic{.s = s, .a = height.number_or_zero_in(side, -kMaxLaneHeight_m, kMaxLaneHeight_m)};
+    };
+    append_record(height, "sOffset", &Cubic::s, limit("inner"), &lane->inner_height.cubics);
+    lane->outer_height.cubics.push_back(limit("outer"));
+  });
+  for (Profile* heights : {&lane->inner_height, &lane->outer_height}) sort_records(&Cubic::s, &heights->cubics);
+}
+
+Profile read_speed_limits(const Element& element, double section_length) {
+  Profile limits;
+  each_record(element, "speed", section_length, [&](const Element& speed, double s) {
+    if (const std::optional<double> limit = read_speed_mps(speed)) {
+      append_record(speed, "sOffset", &Cubic::s, {.s = s, .a = *limit}, &limits.cubics);
+    }
+  });
+  sort_records(&Cubic::s, &limits.cubics);
+  return limits;
 }
 
 LaneDirection read_direction(const Element& element) {
   const std::string text = element.text("direction", "standard");
-  if (text == "standard") return LaneDirection::standard;
   if (text == "reversed") return LaneDirection::reversed;
   if (text == "both") return LaneDirection::both;
-  element.fail("attribute direction: expected standard, reversed or both, got '{}'", text);
+  if (text != "standard") {
+    element.mend(MendKind::unknown_direction, "attribute direction: expected standard, reversed or both, got '{}'",
+                 text);
+  }
+  return LaneDirection::standard;
 }
 
 void read_type(const Element& element, FileLane* lane) {
@@ -88,76 +111,96 @@ void read_type(const Element& element, FileLane* lane) {
 void read_width(const Element& element, double section_length, FileLane* lane) {
   const bool by_border = !element.child("width") && element.child("border");
   const char* const name = by_border ? "border" : "width";
-  const Profile profile = read_profile(element, name, "sOffset", section_length);
-  if (profile.cubics.empty()) element.fail("expected a <width> or <border> in it, found none");
-  if (std::abs(profile.cubics.front().s) > kStationTolerance_m) {
-    element.fail("expected its first <{}> at sOffset 0, got {}", name, profile.cubics.front().s);
+  Profile profile = read_profile(element, name, "sOffset", section_length);
+  if (profile.cubics.empty()) {
+    element.mend(MendKind::missing_width, "expected a <width> or <border> in it, found none");
+    lane->is_void = true;
+    return;
   }
+  const Cubic first = profile.cubics.front();
+  if (first.s > kStationTolerance_m) {
+    element.mend(MendKind::late_width, "expected its first <{}> at sOffset 0, got {}", name, first.s);
+    profile.cubics.insert(profile.cubics.begin(), Cubic{.s = 0, .a = first.a});
+  }
+  const double limit = by_border ? kMaxOffset_m : kMaxLaneWidth_m;
   for (const Cubic& cubic : profile.cubics) {
-    const double low = by_border ? -kMaxOffset_m : -kStationTolerance_m;
-    const double high = by_border ? kMaxOffset_m : kMaxLaneWidth_m;
-    if (!(cubic.a >= low && cubic.a <= high)) {
-      element.fail("<{}> attribute a: expected a number in [{}, {}] m, got {}", name, low, high, cubic.a);
+    if (!(std::abs(cubic.a) <= limit)) {
+      element.fail("<{}> attribute a: expected a number in [{}, {}] m, got {}", name, -limit, limit, cubic.a);
     }
   }
-  (by_border ? lane->border : lane->width) = profile;
+  (by_border ? lane->border : lane->width) = std::move(profile);
 }
 
-FileLane read_lane(const Element& element, double section_length, Faults* faults) {
+FileLane read_lane(const Element& element, double section_length) {
   FileLane lane;
   lane.where = element.where();
   lane.id = element.integer("id");
-  // A faulty lane keeps its index, without a surface.
-  bool is_sound = faults->attempt([&] { read_type(element, &lane); });
+  read_type(element, &lane);
   if (const Element link = element.child("link")) {
-    link.each("predecessor",
-              [&](const Element& end) { faults->attempt([&] { lane.predecessors.push_back(end.integer("id")); }); });
-    link.each("successor",
-              [&](const Element& end) { faults->attempt([&] { lane.successors.push_back(end.integer("id")); }); });
+    link.each("predecessor", [&](const Element& end) { lane.predecessors.push_back(end.integer("id")); });
+    link.each("successor", [&](const Element& end) { lane.successors.push_back(end.integer("id")); });
   }
-  lane.marks = read_marks(element, section_length, faults);
-  if (lane.id == 0) return lane;
-  is_sound = faults->attempt([&] { read_width(element, section_length, &lane); }) && is_sound;
-  faults->attempt([&] {
-    lane.inner_height = read_constants(element, "height", section_length, [](const Element& e) {
-      return e.number_in("inner", -kMaxLaneHeight_m, kMaxLaneHeight_m);
-    });
-    lane.outer_height = read_constants(element, "height", section_length, [](const Element& e) {
-      return e.number_in("outer", -kMaxLaneHeight_m, kMaxLaneHeight_m);
-    });
-  });
-  faults->attempt([&] { lane.speed_limit_mps = read_constants(element, "speed", section_length, &read_speed_mps); });
-  lane.is_void = lane.is_void || !is_sound;
+  lane.marks = read_marks(element, section_length);
   return lane;
 }
 
-FileLane read_center_lane(const Element& element, double section_length, Faults* faults) {
-  if (const int id = element.integer("id"); id != 0) {
-    element.fail("attribute id: expected 0 for the center lane, got {}", id);
-  }
-  return read_lane(element, section_length, faults);
+FileLane read_side_lane(const Element& element, double section_length) {
+  FileLane lane = read_lane(element, section_length);
+  read_width(element, section_length, &lane);
+  read_heights(element, section_length, &lane);
+  lane.speed_limit_mps = read_speed_limits(element, section_length);
+  return lane;
 }
 
-void read_side(const Element& section, const char* side, int sign, double section_length, Faults* faults,
+FileLane read_center_lane(const Element& element, double section_length) {
+  FileLane lane = read_lane(element, section_length);
+  if (lane.id != 0) {
+    element.mend(MendKind::center_id, "attribute id: expected 0 for the center lane, got {}", lane.id);
+    lane.id = 0;
+  }
+  return lane;
+}
+
+/// Inserts lanes without surface for the ids that are left out between the sorted lanes of a side.
+void fill_gaps(int sign, std::vector<FileLane>* lanes) {
+  std::vector<FileLane> filled;
+  for (FileLane& lane : *lanes) {
+    for (int id = sign * (static_cast<int>(filled.size()) + 1); id != lane.id; id += sign) {
+      FileLane gap;
+      gap.id = id;
+      gap.type_name = "none";
+      gap.is_void = true;
+      gap.where = lane.where;
+      filled.push_back(std::move(gap));
+    }
+    filled.push_back(std::move(lane));
+  }
+  *lanes = std::move(filled);
+}
+
+void read_side(const Element& section, const char* side, int sign, double section_length,
                std::vector<FileLane>* lanes_out) {
   const Element parent = section.child(side);
   if (!parent) return;
   parent.each("lane", [&](const Element& element) {
-    FileLane lane = read_lane(element, section_length, faults);
+    FileLane lane = read_side_lane(element, section_length);
     if (lane.id * sign <= 0) element.fail("attribute id: {} does not belong in <{}>", lane.id, side);
+    if (std::abs(lane.id) > kMaxLanesPerSide) {
+      element.fail("attribute id: expected at most {} lanes beside the center, got {}", kMaxLanesPerSide, lane.id);
+    }
     lanes_out->push_back(std::move(lane));
   });
-  if (lanes_out->size() > static_cast<std::size_t>(kMaxLanesPerSide)) {
-    parent.fail("expected at most {} lanes, got {}", kMaxLanesPerSide, lanes_out->size());
+  std::stable_sort(lanes_out->begin(), lanes_out->end(),
+                   [](const FileLane& a, const FileLane& b) { return std::abs(a.id) < std::abs(b.id); });
+  int before = 0;
+  for (const FileLane& lane : *lanes_out) {
+    const int expected = sign * (std::abs(before) + 1);
+    constexpr const char* kMessage = "attribute id: expected {}, as lanes count from the center without gaps, got {}";
+    if (lane.id == before) lane.where.fail(kMessage, expected, lane.id);
+    if (lane.id != expected) parent.mend(MendKind::lane_gap, kMessage, expected, lane.id);
+    before = lane.id;
   }
-  std::sort(lanes_out->begin(), lanes_out->end(),
-            [](const FileLane& a, const FileLane& b) { return std::abs(a.id) < std::abs(b.id); });
-  for (std::size_t i = 0; i < lanes_out->size(); ++i) {
-    if ((*lanes_out)[i].id != sign * (static_cast<int>(i) + 1)) {
-      (*lanes_out)[i].where.fail("attribute id: expected {}, as lanes count from the center without gaps, got {}",
-                                 sign * (static_cast<int>(i) + 1), (*lanes_out)[i].id);
-    }
-  }
+  if (std::abs(before) != static_cast<int>(lanes_out->size())) fill_gaps(sign, lanes_out);
 }
 
 /// Removes a section from the road and connects its neighbours' lane links across it.
@@ -188,29 +231,48 @@ void bridge_section(std::vector<FileSection>* sections, std::size_t index) {
   sections->erase(sections->begin() + static_cast<std::ptrdiff_t>(index));
 }
 
+/// The <laneSection> elements and where they begin on the road, sorted. One beyond the end is moved there, so that it
+/// has no length and read_lanes() bridges it.
+struct SectionElement {
+  double s = 0;
+  Element element;
+};
+
+std::vector<SectionElement> section_elements(const Element& lanes, double road_length) {
+  std::vector<SectionElement> sections;
+  lanes.each("laneSection", [&](const Element& element) {
+    const double s = read_station(element, "s", road_length).value_or(road_length);
+    append_record(element, "s", &SectionElement::s, {s, element}, &sections);
+  });
+  if (sections.empty()) lanes.fail("expected a <laneSection> in it, found none");
+  sort_records(&SectionElement::s, &sections);
+  SectionElement& first = sections.front();
+  if (first.s > kStationTolerance_m) {
+    constexpr const char* kMessage = "attribute s: expected the first section at 0, got {}";
+    if (first.s > kMaxLateSection_m) first.element.fail(kMessage, first.s);
+    first.element.mend(MendKind::late_section, kMessage, first.s);
+    first.s = 0;
+  }
+  for (SectionElement& section : sections) section.s = std::clamp(section.s, 0.0, road_length);
+  return sections;
+}
+
 /// Reads the sections. A singleSide section gives one side; the lanes of the other side continue.
-std::vector<FileSection> read_sections(const Element& lanes, double road_length, Faults* faults) {
-  std::vector<Element> elements;
-  lanes.each("laneSection", [&](const Element& element) { elements.push_back(element); });
-  if (elements.empty()) lanes.fail("expected a <laneSection> in it, found none");
+std::vector<FileSection> read_sections(const Element& lanes, double road_length) {
+  const std::vector<SectionElement> elements = section_elements(lanes, road_length);
   std::vector<FileSection> sections;
   for (std::size_t i = 0; i < elements.size(); ++i) {
+    const Element& element = elements[i].element;
     FileSection section;
-    section.s = elements[i].number_in("s", 0, road_length);
-    section.end = i + 1 < elements.size() ? elements[i + 1].number_in("s", 0, road_length) : road_length;
-    if (i == 0 && section.s > kStationTolerance_m) {
-      elements[i].fail("attribute s: expected the first section at 0, got {}", section.s);
-    }
-    if (section.end < section.s) {
-      elements[i + 1].fail("attribute s: expected at least the previous section's {}, got {}", section.s, section.end);
-    }
+    section.s = elements[i].s;
+    section.end = i + 1 < elements.size() ? elements[i + 1].s : road_length;
     std::size_t both_sided = i + 1;
-    while (both_sided < elements.size() && elements[both_sided].flag("singleSide")) ++both_sided;
-    const double lanes_end = both_sided < elements.size() ? elements[both_sided].number("s") : road_length;
+    while (both_sided < elements.size() && elements[both_sided].element.flag("singleSide")) ++both_sided;
+    const double lanes_end = both_sided < elements.size() ? elements[both_sided].s : road_length;
     const double length = std::max(lanes_end, section.end) - section.s;
-    read_side(elements[i], "left", 1, length, faults, &section.left);
-    read_side(elements[i], "right", -1, length, faults, &section.right);
-    if (i > 0 && elements[i].flag("singleSide")) {
+    read_side(element, "left", 1, length, &section.left);
+    read_side(element, "right", -1, length, &section.right);
+    if (i > 0 && element.flag("singleSide")) {
       FileSection& before = sections.back();
       if (section.left.empty()) section.left = continue_lanes(&before.left, section.s - before.s);
       if (section.right.empty()) section.right = continue_lanes(&before.right, section.s - before.s);
@@ -218,10 +280,8 @@ std::vector<FileSection> read_sections(const Element& lanes, double road_length,
     for (std::vector<FileLane>* side : {&section.left, &section.right}) {
       for (FileLane& lane : *side) lane.section = lane.is_continued ? lane.section : static_cast<int>(i);
     }
-    if (const Element center = elements[i].child("center")) {
-      if (const Element lane = center.child("lane")) {
-        faults->attempt([&] { section.center = read_center_lane(lane, length, faults); });
-      }
+    if (const Element center = element.child("center")) {
+      if (const Element lane = center.child("lane")) section.center = read_center_lane(lane, length);
     }
     sections.push_back(std::move(section));
   }
@@ -230,10 +290,10 @@ std::vector<FileSection> read_sections(const Element& lanes, double road_length,
 
 }  // namespace
 
-void read_lanes(const Element& road_element, Faults* faults, FileRoad* road) {
+void read_lanes(const Element& road_element, FileRoad* road) {
   const Element lanes = road_element.required_child("lanes");
   road->lane_offset = read_profile(lanes, "laneOffset", "s", road->length);
-  road->sections = read_sections(lanes, road->length, faults);
+  road->sections = read_sections(lanes, road->length);
   for (std::size_t i = road->sections.size(); i-- > 0;) {
     if (road->sections.size() > 1 && road->sections[i].end - road->sections[i].s < kMinSection_m) {
       bridge_section(&road->sections, i);

@@ -19,17 +19,21 @@ MarkColor mark_color(const Element& element, const std::string& name) {
       {"orange", MarkColor::orange},  {"violet", MarkColor::violet}, {"black", MarkColor::black},
   };
   const auto found = kColors.find(name);
-  if (found == kColors.end()) element.fail("attribute color: '{}' is not a mark's color of OpenDRIVE 1.4 to 1.8", name);
-  return found->second;
+  if (found != kColors.end()) return found->second;
+  element.mend(MendKind::unknown_color, "attribute color: '{}' is not a mark's color of OpenDRIVE 1.4 to 1.8", name);
+  return MarkColor::white;
 }
 
 LaneChange lane_change(const Element& element) {
   const std::string text = element.text("laneChange", "both");
-  if (text == "both") return LaneChange::both;
   if (text == "increase") return LaneChange::increase;
   if (text == "decrease") return LaneChange::decrease;
   if (text == "none") return LaneChange::none;
-  element.fail("attribute laneChange: expected both, increase, decrease or none, got '{}'", text);
+  if (text != "both") {
+    element.mend(MendKind::unknown_lane_change,
+                 "attribute laneChange: expected both, increase, decrease or none, got '{}'", text);
+  }
+  return LaneChange::both;
 }
 
 void check_type(const Element& element, const std::string& type) {
@@ -37,23 +41,28 @@ void check_type(const Element& element, const std::string& type) {
       "none",          "solid",      "broken", "solid solid", "solid broken", "broken solid",
       "broken broken", "botts dots", "grass",  "curb",        "custom",       "edge"};
   if (!kTypes.contains(type)) {
-    element.fail("attribute type: '{}' is not a road mark's type of OpenDRIVE 1.4 to 1.8", type);
+    element.mend(MendKind::unknown_mark, "attribute type: '{}' is not a road mark's type of OpenDRIVE 1.4 to 1.8",
+                 type);
   }
 }
 
-MarkLine read_line(const Element& element, bool is_explicit) {
+/// Appends the line of `element`. Lines of no length without gaps are continuous, as several writers mean them.
+void read_line(const Element& element, bool is_explicit, std::vector<MarkLine>* lines_out) {
   MarkLine line;
-  line.length = element.number_in("length", 0, kMaxRoadLength_m);
-  if (!is_explicit) line.space = element.number_in("space", 0, kMaxRoadLength_m);
+  line.length = element.number_or_zero_in("length", 0, kMaxRoadLength_m);
+  if (!is_explicit) line.space = element.number_or_zero_in("space", 0, kMaxRoadLength_m);
   if (line.length + line.space < kMinDashPeriod_m) {
-    element.fail("attribute length: expected at least {} m with the space, got {}", kMinDashPeriod_m,
+    element.mend(is_explicit ? MendKind::empty_line : MendKind::endless_dash,
+                 "attribute length: expected at least {} m with the space, got {}", kMinDashPeriod_m,
                  line.length + line.space);
+    if (is_explicit) return;
+    line.space = 0;
   }
-  line.t_offset = element.number_in("tOffset", -kMaxMarkWidth_m, kMaxMarkWidth_m);
-  line.s_offset = element.number_in("sOffset", -kMaxRoadLength_m, kMaxRoadLength_m);
+  line.t_offset = element.number_or_zero_in("tOffset", -kMaxMarkWidth_m, kMaxMarkWidth_m);
+  line.s_offset = element.number_or_zero_in("sOffset", -kMaxRoadLength_m, kMaxRoadLength_m);
   line.width = element.number_in("width", 0, kMaxMarkWidth_m, 0);
   if (element.has("color")) line.color = mark_color(element, element.text("color"));
-  return line;
+  lines_out->push_back(line);
 }
 
 RoadMark read_mark(const Element& element, double section_length) {
@@ -68,10 +77,10 @@ RoadMark read_mark(const Element& element, double section_length) {
   mark.lane_change = lane_change(element);
   if (const Element type = element.child("type")) {
     if (mark.width == 0) mark.width = type.number_in("width", 0, kMaxMarkWidth_m, 0);
-    type.each("line", [&](const Element& line) { mark.lines.push_back(read_line(line, false)); });
+    type.each("line", [&](const Element& line) { read_line(line, false, &mark.lines); });
   }
   if (const Element lines = element.child("explicit")) {
-    lines.each("line", [&](const Element& line) { mark.explicit_lines.push_back(read_line(line, true)); });
+    lines.each("line", [&](const Element& line) { read_line(line, true, &mark.explicit_lines); });
   }
   mark.sway = read_profile(element, "sway", "ds", section_length);
   return mark;
@@ -79,20 +88,15 @@ RoadMark read_mark(const Element& element, double section_length) {
 
 }  // namespace
 
-std::vector<RoadMark> read_marks(const Element& lane_element, double section_length, Faults* faults) {
+std::vector<RoadMark> read_marks(const Element& lane_element, double section_length) {
   std::vector<RoadMark> marks;
   lane_element.each("roadMark", [&](const Element& element) {
-    faults->attempt([&] {
-      RoadMark mark = read_mark(element, section_length);
-      // Marks that begin after the section's end occur in CARLA's towns; they are invisible.
-      if (mark.s_offset > section_length + kStationTolerance_m) return;
-      if (!marks.empty() && mark.s_offset < marks.back().s_offset) {
-        element.fail("attribute sOffset: expected at least the previous one's {}, got {}", marks.back().s_offset,
-                     mark.s_offset);
-      }
-      marks.push_back(std::move(mark));
-    });
+    RoadMark mark = read_mark(element, section_length);
+    // Marks that begin after the section's end occur in CARLA's towns; they are invisible.
+    if (mark.s_offset > section_length + kStationTolerance_m) return;
+    append_record(element, "sOffset", &RoadMark::s_offset, std::move(mark), &marks);
   });
+  sort_records(&RoadMark::s_offset, &marks);
   return marks;
 }
 

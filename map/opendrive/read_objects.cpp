@@ -1,4 +1,5 @@
 // Reads objects (crosswalks, parking spaces, stop lines), signals and signal references.
+#include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <optional>
@@ -36,8 +37,20 @@ std::optional<FileObject::Kind> kind_of(const Element& element) {
   return std::nullopt;
 }
 
-double read_station(const Element& element, double road_length) {
-  return element.number_in("s", -kMaxOverhang_m, road_length + kMaxOverhang_m);
+/// Whether an object or signal lies beside its road; if not, it is mended: left out.
+bool is_near_road(const Element& element, double road_length) {
+  const double low_s = -kMaxOverhang_m, high_s = road_length + kMaxOverhang_m;
+  const double s = element.number("s"), t = element.number_or_zero("t");
+  if (!(s >= low_s && s <= high_s)) {
+    element.mend(MendKind::misplaced_item, "attribute s: expected a number in [{}, {}], got {}", low_s, high_s, s);
+    return false;
+  }
+  if (!(std::abs(t) <= kMaxOffset_m)) {
+    element.mend(MendKind::misplaced_item, "attribute t: expected a number in [{}, {}], got {}", -kMaxOffset_m,
+                 kMaxOffset_m, t);
+    return false;
+  }
+  return true;
 }
 
 double read_offset(const Element& element, const char* attribute) {
@@ -48,55 +61,83 @@ double read_height(const Element& element, const char* attribute) {
   return element.number_in(attribute, -kMaxHeight_m, kMaxHeight_m, 0);
 }
 
-std::vector<FileObject::Corner> read_outline(const Element& element, double road_length) {
+/// The outer one of an object's outlines; the others are holes or parts of it.
+Element outer_outline(const Element& element) {
   Element outline = element.child("outline");
   if (const Element outlines = element.child("outlines"); !outline && outlines) {
-    // Use the outer one of several outlines; the others are holes or parts of it.
     outlines.each("outline", [&](const Element& candidate) {
       if (!outline || (candidate.flag("outer") && !outline.flag("outer"))) outline = candidate;
     });
   }
+  return outline;
+}
+
+/// Nothing where a corner lies far from the road.
+std::optional<std::vector<FileObject::Corner>> read_outline(const Element& element, double road_length) {
   std::vector<FileObject::Corner> corners;
-  if (!outline) return corners;
-  outline.each_child([&](const Element& corner) {
-    if (corner.name() == "cornerLocal") {
-      corners.push_back({read_offset(corner, "u"), read_offset(corner, "v"), read_height(corner, "z"), false});
-    } else if (corner.name() == "cornerRoad") {
-      corners.push_back({read_station(corner, road_length), read_offset(corner, "t"), read_height(corner, "dz"), true});
-    }
-  });
+  bool is_near = true;
+  if (const Element outline = outer_outline(element)) {
+    outline.each_child([&](const Element& corner) {
+      if (corner.name() == "cornerLocal") {
+        corners.push_back({read_offset(corner, "u"), read_offset(corner, "v"), read_height(corner, "z"), false});
+      } else if (corner.name() == "cornerRoad" && (is_near = is_near && is_near_road(corner, road_length))) {
+        corners.push_back({corner.number("s"), corner.number("t", 0), read_height(corner, "dz"), true});
+      }
+    });
+  }
+  if (!is_near) return std::nullopt;
   return corners;
 }
 
-FileObject read_object(const Element& element, FileObject::Kind kind, double road_length) {
+/// Nothing where the object lies far from its road.
+std::optional<FileObject> read_object(const Element& element, FileObject::Kind kind, double road_length) {
   FileObject object;
   object.where = element.where();
   object.kind = kind;
   object.id = element.text("id", "");
   object.name = element.text("name", "");
-  object.s = read_station(element, road_length);
-  object.t = read_offset(element, "t");
+  if (!is_near_road(element, road_length)) return std::nullopt;
+  object.s = element.number("s");
+  object.t = element.number("t", 0);
   object.z_offset = read_height(element, "zOffset");
   object.heading = element.number_in("hdg", -1e3, 1e3, 0);
   object.length = element.number_in("length", 0, kMaxSize_m, 0);
   object.width = element.number_in("width", 0, kMaxSize_m, 0);
-  object.outline = read_outline(element, road_length);
+  std::optional<std::vector<FileObject::Corner>> outline = read_outline(element, road_length);
+  if (!outline) return std::nullopt;
+  object.outline = std::move(*outline);
   return object;
+}
+
+/// Whether the copies that a <repeat> asks for can be made; if not, that is mended: the object stands once.
+bool can_repeat(const Element& repeat, const FileObject& object) {
+  const double distance = repeat.number_in("distance", 0, kMaxRoadLength_m);
+  if (distance < kMinRepeat_m) {
+    repeat.mend(MendKind::continuous_object,
+                "attribute distance: expected at least {} m (continuous objects are not supported), got {}",
+                kMinRepeat_m, distance);
+    return false;
+  }
+  if (std::any_of(object.outline.begin(), object.outline.end(), [](const auto& c) { return c.along_road; })) {
+    repeat.mend(MendKind::repeated_corners, "objects with <cornerRoad> cannot be repeated");
+    return false;
+  }
+  return true;
 }
 
 /// The object itself, or its copies along each <repeat> element, with linearly interpolated attributes.
 std::vector<FileObject> repeated(const Element& element, const FileObject& object, double road_length) {
   std::vector<FileObject> copies;
   element.each("repeat", [&](const Element& repeat) {
-    const double begin = repeat.number_in("s", 0, road_length);
-    const double length = repeat.number_in("length", 0, road_length + kMaxOverhang_m);
-    const double distance = repeat.number_in("distance", 0, kMaxRoadLength_m);
-    if (distance < kMinRepeat_m) {
-      repeat.fail("attribute distance: expected at least {} m (continuous objects are not supported), got {}",
-                  kMinRepeat_m, distance);
-    }
-    for (const FileObject::Corner& corner : object.outline) {
-      if (corner.along_road) repeat.fail("objects with <cornerRoad> cannot be repeated");
+    if (!can_repeat(repeat, object)) return;
+    const std::optional<double> station = read_station(repeat, "s", road_length);
+    if (!station) return;
+    const double begin = std::max(*station, 0.0), distance = repeat.number("distance");
+    double length = repeat.number_in("length", 0, kMaxRoadLength_m);
+    if (length > road_length + kMaxOverhang_m) {
+      repeat.mend(MendKind::record_beyond_end, "attribute length: expected a number in [0, {}], got {}",
+                  road_length + kMaxOverhang_m, length);
+      length = road_length - begin;
     }
     auto between = [&](const char* start, const char* end, double fallback, double u) {
       const double a = repeat.number_in(start, -kMaxOffset_m, kMaxOffset_m, fallback);
@@ -122,8 +163,10 @@ Orientation read_orientation(const Element& element) {
   const std::string text = element.text("orientation", "none");
   if (text == "+") return Orientation::along;
   if (text == "-") return Orientation::against;
-  if (text == "none") return Orientation::either;
-  element.fail("attribute orientation: expected +, - or none, got '{}'", text);
+  if (text != "none") {
+    element.mend(MendKind::unknown_orientation, "attribute orientation: expected +, - or none, got '{}'", text);
+  }
+  return Orientation::either;
 }
 
 std::vector<LaneRange> read_validity(const Element& element) {
@@ -134,7 +177,7 @@ std::vector<LaneRange> read_validity(const Element& element) {
   return ranges;
 }
 
-FileSignal read_signal(const Element& element, double road_length) {
+FileSignal read_signal(const Element& element) {
   FileSignal signal;
   signal.where = element.where();
   signal.id = element.text("id");
@@ -143,8 +186,8 @@ FileSignal read_signal(const Element& element, double road_length) {
   signal.country = element.text("country", "");
   signal.name = element.text("name", "");
   signal.is_dynamic = element.text("dynamic", "no") == "yes";
-  signal.s = read_station(element, road_length);
-  signal.t = read_offset(element, "t");
+  signal.s = element.number("s");
+  signal.t = element.number("t", 0);
   signal.z_offset = read_height(element, "zOffset");
   signal.heading_offset = element.number_in("hOffset", -1e3, 1e3, 0);
   signal.orientation = read_orientation(element);
@@ -154,32 +197,28 @@ FileSignal read_signal(const Element& element, double road_length) {
 
 }  // namespace
 
-void read_objects(const Element& road_element, Faults* faults, FileRoad* road) {
+void read_objects(const Element& road_element, FileRoad* road) {
   const Element objects = road_element.child("objects");
   if (!objects) return;
   objects.each("object", [&](const Element& element) {
-    faults->attempt([&] {
-      const std::optional<FileObject::Kind> kind = kind_of(element);
-      if (!kind) return;
-      for (FileObject& copy : repeated(element, read_object(element, *kind, road->length), road->length)) {
-        road->objects.push_back(std::move(copy));
-      }
-    });
+    const std::optional<FileObject::Kind> kind = kind_of(element);
+    if (!kind) return;
+    const std::optional<FileObject> object = read_object(element, *kind, road->length);
+    if (!object) return;
+    for (FileObject& copy : repeated(element, *object, road->length)) road->objects.push_back(std::move(copy));
   });
 }
 
-void read_signals(const Element& road_element, Faults* faults, FileRoad* road) {
+void read_signals(const Element& road_element, FileRoad* road) {
   const Element signals = road_element.child("signals");
   if (!signals) return;
   signals.each("signal", [&](const Element& element) {
-    faults->attempt([&] { road->signals.push_back(read_signal(element, road->length)); });
+    if (is_near_road(element, road->length)) road->signals.push_back(read_signal(element));
   });
   signals.each("signalReference", [&](const Element& element) {
-    faults->attempt([&] {
-      road->signal_references.push_back({element.text("id"), read_station(element, road->length),
-                                         element.number("t", 0), read_orientation(element), read_validity(element),
-                                         element.where()});
-    });
+    if (!is_near_road(element, road->length)) return;
+    road->signal_references.push_back({element.text("id"), element.number("s"), element.number("t", 0),
+                                       read_orientation(element), read_validity(element), element.where()});
   });
 }
 

@@ -1,16 +1,20 @@
 #include "pictura/map/opendrive/reader.h"
 
+#include <cmath>
+#include <optional>
+
 #include <Eigen/Geometry>
 
 #include "pictura/map/opendrive/document.h"
 #include "pictura/map/opendrive/extent.h"
+#include "pictura/map/opendrive/mend_links.h"
 #include "pictura/map/opendrive/read_parts.h"
 
 namespace pictura::opendrive {
 
 namespace {
 
-constexpr double kMinRoadLength_m = 1e-3;
+constexpr double kMaxSpeed = 1000;  // in the unit of the file
 
 /// The header's transform of all coordinates: a rotation about the origin, then a translation.
 struct Offset {
@@ -45,31 +49,34 @@ bool is_left_hand(const Element& road_element) {
   return rule == "LHT";
 }
 
-FileRoad read_road(const Element& element, const Offset& offset, Faults* faults) {
+/// The speed limits of <type>, which apply from its s on.
+Profile read_speed_limits(const Element& road_element, double road_length) {
+  Profile limits;
+  road_element.each("type", [&](const Element& type) {
+    const std::optional<double> s = read_station(type, "s", road_length);
+    const Element speed = type.child("speed");
+    const std::optional<double> limit = speed ? read_speed_mps(speed) : 0;
+    if (s && limit) append_record(type, "s", &Cubic::s, {.s = *s, .a = *limit}, &limits.cubics);
+  });
+  sort_records(&Cubic::s, &limits.cubics);
+  return limits;
+}
+
+FileRoad read_road(const Element& element, const Offset& offset) {
   FileRoad road;
   road.where = element.where();
   road.id = element.text("id");
   road.length = element.number_in("length", 0, kMaxRoadLength_m);
-  if (road.length < kMinRoadLength_m) {
-    element.fail("attribute length: expected at least {}, got {}", kMinRoadLength_m, road.length);
-  }
   const std::string junction = element.text("junction", "-1");
   if (junction != "-1") road.junction = junction;
   road.left_hand = is_left_hand(element);
-  read_road_links(element, faults, &road);
-  element.each("type", [&](const Element& type) {
-    faults->attempt([&] {
-      const Element speed = type.child("speed");
-      append_cubic(type, {.s = type.number_in("s", 0, road.length), .a = speed ? read_speed_mps(speed) : 0},
-                   &road.speed_limit_mps);
-    });
-  });
+  read_road_links(element, &road);
   read_reference_line(element, &road);
-  read_lanes(element, faults, &road);
-  read_objects(element, faults, &road);
-  read_signals(element, faults, &road);
+  road.speed_limit_mps = read_speed_limits(element, road.length);
+  read_lanes(element, &road);
+  read_objects(element, &road);
+  read_signals(element, &road);
   apply(offset, &road);
-  check_extent(faults, &road);
   return road;
 }
 
@@ -82,21 +89,24 @@ void append(Item item, const Element& element, std::vector<Item>* items, std::un
   items->push_back(std::move(item));
 }
 
-Element owned(const Element& element) {
-  return element.with_owner(fmt::format("{} {}", element.name(), element.text("id")));
-}
+std::string name_of(const Element& element) { return fmt::format("{} {}", element.name(), element.text("id")); }
 
 }  // namespace
 
-double read_speed_mps(const Element& element) {
-  const std::string max = element.text("max");
+std::optional<double> read_speed_mps(const Element& element) {
+  const std::string max = element.text("max", "");
   if (max == "no limit" || max == "undefined") return 0;
-  const double value = element.number_in("max", 0, 1000);
+  const std::optional<double> value = element.finite_number("max");
+  if (!value || !(*value >= 0 && *value <= kMaxSpeed)) {
+    element.mend(MendKind::unreadable_speed, "attribute max: expected a number in [0, {}], got '{}'", kMaxSpeed, max);
+    return std::nullopt;
+  }
   const std::string unit = element.text("unit", "m/s");
-  if (unit == "m/s") return value;
-  if (unit == "km/h") return value / 3.6;
-  if (unit == "mph") return value * 0.44704;
-  element.fail("attribute unit: expected m/s, km/h or mph, got '{}'", unit);
+  if (unit == "m/s") return *value;
+  if (unit == "km/h") return *value / 3.6;
+  if (unit == "mph") return *value * 0.44704;
+  element.mend(MendKind::unreadable_speed, "attribute unit: expected m/s, km/h or mph, got '{}'", unit);
+  return std::nullopt;
 }
 
 void read_network(std::string_view text, const std::string& source_name, Faults* faults, Network* network_out) {
@@ -105,30 +115,31 @@ void read_network(std::string_view text, const std::string& source_name, Faults*
   network.source = Source(source_name, text);
   pugi::xml_document document;
   read_document(text, network.source, &document);
-  const Element root(document.child("OpenDRIVE"), &network.source, "file");
+  const std::string file = "file";
+  const Element root(document.child("OpenDRIVE"), &network.source, faults, &file);
   if (!root) {
     pictura::fail("{}: expected OpenDRIVE, got an XML file whose root is <{}>", source_name,
                   document.document_element().name());
   }
   if (const Element include = root.child("include")) include.fail("files of several parts are not supported");
-  Offset offset;
-  faults->attempt([&] { offset = read_header(root.child("header"), &network.geo_reference); });
+  const Offset offset = read_header(root.child("header"), &network.geo_reference);
   root.each("road", [&](const Element& element) {
-    faults->attempt([&] {
-      const Element road = owned(element);
-      append(read_road(road, offset, faults), road, &network.roads, &network.road_index);
-    });
+    const std::string name = name_of(element);
+    const Element road = element.with_owner(&name);
+    append(read_road(road, offset), road, &network.roads, &network.road_index);
+    check_extent(network.roads.back(), faults);
   });
-  if (network.roads.empty()) root.fail("expected at least one valid <road> in it, found none");
+  if (network.roads.empty()) root.fail("expected at least one <road> in it, found none");
   root.each("junction", [&](const Element& element) {
-    faults->attempt([&] {
-      const Element junction = owned(element);
-      append(read_junction(junction, faults), junction, &network.junctions, &network.junction_index);
-    });
+    const std::string name = name_of(element);
+    const Element junction = element.with_owner(&name);
+    append(read_junction(junction), junction, &network.junctions, &network.junction_index);
   });
   root.each("controller", [&](const Element& element) {
-    faults->attempt([&] { network.controllers.push_back(read_controller(element, faults)); });
+    const std::string name = name_of(element);
+    network.controllers.push_back(read_controller(element.with_owner(&name)));
   });
+  mend_links(&network, faults);
 }
 
 }  // namespace pictura::opendrive

@@ -48,14 +48,14 @@ class SignalBuilder {
     std::vector<bool> is_referenced(placed_signals_.size(), false);
     for (std::size_t road = 0; road < build_.network.roads.size(); ++road) {
       for (const SignalReference& reference : build_.network.roads[road].signal_references) {
-        build_.faults->attempt([&] {
-          const auto signal = index_by_id_.find(reference.signal);
-          if (signal == index_by_id_.end()) {
-            reference.where.fail("refers to signal {}, which does not exist", reference.signal);
-          }
-          is_referenced[signal->second] = true;
-          collect(signal->second, road, reference.s, reference.orientation, reference.validity);
-        });
+        const auto signal = index_by_id_.find(reference.signal);
+        if (signal == index_by_id_.end()) {
+          reference.where.mend(build_.faults, MendKind::missing_signal, "refers to signal {}, which does not exist",
+                               reference.signal);
+          continue;
+        }
+        is_referenced[signal->second] = true;
+        collect(signal->second, road, reference.s, reference.orientation, reference.validity);
       }
     }
     for (std::size_t signal_index = 0; signal_index < placed_signals_.size(); ++signal_index) {
@@ -79,12 +79,11 @@ class SignalBuilder {
   void find_signals() {
     for (std::size_t road = 0; road < build_.network.roads.size(); ++road) {
       for (const FileSignal& signal : build_.network.roads[road].signals) {
-        build_.faults->attempt([&] {
-          if (!index_by_id_.emplace(signal.id, placed_signals_.size()).second) {
-            signal.where.fail("attribute id: another signal has {} already", signal.id);
-          }
-          placed_signals_.push_back({road, &signal});
-        });
+        if (!index_by_id_.emplace(signal.id, placed_signals_.size()).second) {
+          signal.where.mend(build_.faults, MendKind::repeated_signal, "attribute id: another signal has {} already",
+                            signal.id);
+        }
+        placed_signals_.push_back({road, &signal});
       }
     }
   }
@@ -93,20 +92,17 @@ class SignalBuilder {
   std::unordered_map<std::string, FileController> valid_controllers() {
     std::unordered_map<std::string, FileController> controllers;
     for (const FileController& controller : build_.network.controllers) {
-      build_.faults->attempt([&] {
-        FileController valid = controller;
-        valid.signals.clear();
-        for (const std::string& signal : controller.signals) {
-          build_.faults->attempt([&] {
-            if (!index_by_id_.contains(signal))
-              controller.where.fail("controls signal {}, which does not exist", signal);
-            valid.signals.push_back(signal);
-          });
-        }
-        if (!controllers.emplace(controller.id, std::move(valid)).second) {
-          controller.where.fail("attribute id: another controller has it already");
-        }
+      FileController valid = controller;
+      std::erase_if(valid.signals, [&](const std::string& signal) {
+        if (index_by_id_.contains(signal)) return false;
+        controller.where.mend(build_.faults, MendKind::missing_signal, "controls signal {}, which does not exist",
+                              signal);
+        return true;
       });
+      if (!controllers.emplace(controller.id, std::move(valid)).second) {
+        controller.where.mend(build_.faults, MendKind::repeated_controller,
+                              "attribute id: another controller has it already");
+      }
     }
     return controllers;
   }
@@ -117,16 +113,16 @@ class SignalBuilder {
     for (std::size_t j = 0; j < build_.network.junctions.size(); ++j) {
       std::map<int, std::vector<std::string>> lights_of_sequence;
       for (const std::string& id : build_.network.junctions[j].controllers) {
-        build_.faults->attempt([&] {
-          const auto controller = controllers.find(id);
-          if (controller == controllers.end()) {
-            build_.network.junctions[j].where.fail("refers to controller {}, which does not exist", id);
-          }
-          for (const std::string& signal : controller->second.signals) {
-            if (placed_signals_[index_by_id_.at(signal)].signal->type != kLightType) continue;
-            lights_of_sequence[controller->second.sequence].push_back(signal);
-          }
-        });
+        const auto controller = controllers.find(id);
+        if (controller == controllers.end()) {
+          build_.network.junctions[j].where.mend(build_.faults, MendKind::missing_controller,
+                                                 "refers to controller {}, which does not exist", id);
+          continue;
+        }
+        for (const std::string& signal : controller->second.signals) {
+          if (placed_signals_[index_by_id_.at(signal)].signal->type != kLightType) continue;
+          lights_of_sequence[controller->second.sequence].push_back(signal);
+        }
       }
       int32_t phase = 0;
       for (const auto& [sequence, lights] : lights_of_sequence) {

@@ -306,17 +306,32 @@ class Maps(CommandCase):
         self.assertEqual([facts[key] for key in same], [again[key] for key in same])
         self.assert_refused(1, "/proc/nowhere", "map", first, "--xodr", "/proc/nowhere/out.xodr")
 
-    def test_lenient_imports_say_what_they_left_out(self):
+    def test_mended_faults_are_counted_and_listed(self):
         town = self.town()
         text = town.read_text()
+        town.write_text(text.replace('type="driving"', 'type="canal"', 3).replace('elementId="', 'elementId="no', 1))
+        for cached in (False, True):
+            result = run("map", town, "--json")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            mends = json.loads(result.stdout)["mends"]
+            self.assertEqual(json.loads(result.stdout)["cached"], cached)
+            lanes = next(group for group in mends if group["fault"] == "unknown lane types")
+            self.assertEqual((lanes["count"], len(lanes["faults"])), (3, 3))
+            self.assertEqual(lanes["done"], "counted as special lanes")
+            for message in lanes["faults"]:
+                self.assertRegex(message, r"xodr:\d+: road \S+: <lane>: attribute type: 'canal'")
+            count = sum(group["count"] for group in mends)
+            lines = result.stderr.splitlines()
+            self.assertEqual(len([line for line in lines if line.startswith("mended: ")]), len(mends))
+            self.assertIn(f"mended: 3 x unknown lane types: counted as special lanes; first: {town}:", result.stderr)
+            self.assertIn(f"{count} faults mended", lines[-1])
+        self.assertIn(f"{count} faults mended", run("simulate", town, "--steps", "2").stderr)
+        self.assert_refused(1, ": <lane>: attribute type: 'canal'", "map", town, "--strict")
         town.write_text(text.replace("<signal ", '<signal s="nan" ', 1))
         self.assert_refused(1, "<signal>", "map", town)
-        result = run("map", town, "--lenient", "--json")
-        self.assertEqual(result.returncode, 0, result.stderr)
-        warnings = [line for line in result.stderr.splitlines() if line.startswith("warning: ")]
-        self.assertEqual(len(warnings), json.loads(result.stdout)["warnings"])
-        self.assertGreater(len(warnings), 0)
-        self.assertIn(f"{len(warnings)} warning", result.stderr.splitlines()[-1])
+        town.write_text(text)
+        self.assertEqual(self.json_of("map", town, "--strict")["mends"], [])
+        self.assert_refused(2, "--lenient: is gone", "map", town, "--lenient")
 
     def test_bad_files_are_refused_by_name(self):
         text = self.town().read_text()

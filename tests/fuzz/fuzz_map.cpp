@@ -56,10 +56,10 @@ std::string edited(std::string payload, std::string_view edits) {
 
 bool fuzz_opendrive(std::string_view bytes) {
   bool is_map = false;
-  for (const bool lenient : {true, false}) {
+  for (const bool strict : {false, true}) {
     is_map = false;
     try {
-      exercise(parse_opendrive(bytes, "fuzz.xodr", {.lenient = lenient}));
+      exercise(parse_opendrive(bytes, "fuzz.xodr", {.strict = strict}));
       is_map = true;
     } catch (const Error&) {
     }

@@ -6,7 +6,7 @@
 
 namespace pictura::test {
 
-/// Imports the bytes as an OpenDRIVE file, in strict and lenient mode, and exercises the result: its geometry and a
+/// Imports the bytes as an OpenDRIVE file, strictly and with mends, and exercises the result: its geometry and a
 /// round trip through the cache. Returns whether the strict importer made a map; Error is an accepted outcome. Other
 /// exceptions propagate, and a map that the cache does not restore exactly aborts.
 bool fuzz_opendrive(std::string_view bytes);

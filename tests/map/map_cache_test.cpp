@@ -55,6 +55,7 @@ RoadMap full_map() {
   map.sign_lanes = {0, 1};
   map.signs.push_back({"12", "206", "-1", "OpenDRIVE", {1, 2, 3}, 0.5f, {0, 2}});
   map.facts.signs = 1;
+  map.mends.push_back({MendKind::repeated_signal, 18, "road 1: <signal>: attribute id: another signal has 12 already"});
   map.provenance.stop_lines.assign(map.stop_lines.size(), {0, 17});
   map.provenance.signs.assign(map.signs.size(), {1, 18});
   return map;
@@ -306,22 +307,24 @@ TEST_F(MapCacheFolder, TheCacheCanBeTurnedOffOrBeMissing) {
   EXPECT_EQ(cache_file(), "");
 }
 
-TEST_F(MapCacheFolder, ImportsWithWarningsAreNotCached) {
+TEST_F(MapCacheFolder, MendsAreCachedWithTheMap) {
   // A road linked to a missing one.
   const std::string text = small_file();
   write_source(std::string(text).replace(text.find("<link>"), 6,
                                          R"(<link><successor elementType="road" elementId="9" )"
                                          R"(contactPoint="start"/>)"));
-  EXPECT_THROW(outcome(), Error);
-  for (int i = 0; i < 2; ++i) {
+  for (const bool is_cached : {false, true}) {
     LoadReport report;
-    load_map(source_, {.lenient = true}, &report);
-    EXPECT_FALSE(report.cached);
-    EXPECT_THAT(report.warnings, ::testing::ElementsAre(HasSubstr("small.xodr:5: road 0: <successor>")));
+    const std::shared_ptr<const RoadMap> map = load_map(source_, {}, &report);
+    EXPECT_EQ(report.cached, is_cached);
+    ASSERT_EQ(map->mends.size(), 1u);
+    EXPECT_THAT(message_of(map->mends[0], report.source), HasSubstr("small.xodr:5: road 0: <successor>"));
   }
+  // A mended map in the cache is none for strict reading.
+  EXPECT_THROW(outcome({.strict = true}), Error);
   write_source(text);
-  EXPECT_EQ(outcome({.lenient = true}), "imported");
-  EXPECT_EQ(outcome({.lenient = true}), "cached");
+  EXPECT_EQ(outcome({.strict = true}), "imported");
+  EXPECT_EQ(outcome({.strict = true}), "cached");
 }
 
 TEST_F(MapCacheFolder, ProceduralTownsAreNotCached) {

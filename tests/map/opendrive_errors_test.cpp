@@ -1,4 +1,4 @@
-// Malformed OpenDRIVE files give an Error that names source, line, road and element.
+// Malformed OpenDRIVE files give an Error that names source, line, road and element: in strict reading, all of them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 std::string message_of(const std::string& text) {
-  return test::message_of([&] { parse_opendrive(text, "bad.xodr"); });
+  return test::message_of([&] { parse_opendrive(text, "bad.xodr", {.strict = true}); });
 }
 
 std::string good_file() {
@@ -73,7 +73,7 @@ TEST(OpenDriveErrors, AttributesAreCheckedAndNamedWithTheirLine) {
            {"length=\"100\" junction", "length=\"1e-4\" junction", "attribute length: expected at least 0.001"},
            {"id=\"0\"", "id=\"3\"", "expected 0 for the center lane, got 3"},
            {"type=\"driving\"", "type=\"flying\"", "'flying' is not a lane type"},
-           {"a=\"3\"", "a=\"-3\"", "<width> attribute a: expected a number in"},
+           {"a=\"3\"", "a=\"-3\"", "road 1: <lane>: its width at s 0.000 is -3.000 m; expected at least 0"},
            {"a=\"3\"", "a=\"3\" e=\"0\" x=\"", "bad.xodr"},
            {"b=\"0\"", "b=\"-1\"", "its width at s"},
            {"b=\"0\"", "b=\"1e200\"", "expected at most"},
@@ -88,8 +88,8 @@ TEST(OpenDriveErrors, AttributesAreCheckedAndNamedWithTheirLine) {
             "contactPoint is missing"},
            {"<laneSection s=\"0\">", "<laneSection s=\"5\">", "expected the first section at 0"},
            {"<lanes>",
-            "<lateralProfile><superelevation s=\"0\" a=\"0.6\" b=\"0\" c=\"0\" d=\"0\"/></lateralProfile><lanes>",
-            "it is banked by 0.6 rad; expected at most 0.5"},
+            "<lateralProfile><superelevation s=\"0\" a=\"1.5\" b=\"0\" c=\"0\" d=\"0\"/></lateralProfile><lanes>",
+            "it is banked by 1.5 rad; expected at most 1.4"},
            {"<lanes>", "<lanes><laneOffset s=\"0\" a=\"1e300\" b=\"0\" c=\"0\" d=\"0\"/>", "to its side"},
        }) {
     EXPECT_THAT(message_of(replaced(text, from, to)), HasSubstr(expected)) << from << " -> " << to;
@@ -176,7 +176,7 @@ TEST(OpenDriveErrors, SectionsAreInOrder) {
   };
   road.sections = section(0) + section(60) + section(30);
   EXPECT_THAT(message_of(file_of(road.text())),
-              AllOf(HasSubstr("<laneSection>: attribute s"), HasSubstr("at least the previous section's 60, got 30")));
+              AllOf(HasSubstr("<laneSection>: attribute s"), HasSubstr("at least the previous one's 60, got 30")));
   road.sections = section(0) + section(120);
   EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("<laneSection>: attribute s: expected a number in [0, 100]"));
 }

@@ -1,0 +1,104 @@
+#include "pictura/map/mends.h"
+
+#include <algorithm>
+
+namespace pictura {
+
+namespace {
+
+struct Text {
+  const char *fault, *action;
+};
+
+/// An empty text for numbers that are no kind.
+Text text_of(MendKind kind) {
+  switch (kind) {
+    case MendKind::record_order: return {"records out of order", "sorted by their stations"};
+    case MendKind::record_beyond_end: return {"records beyond the end of their section or road", "left out"};
+    case MendKind::record_before_start:
+      return {"records before the start of their section or road", "they apply from the start"};
+    case MendKind::late_width: return {"first widths after the start of their section", "extended back to the start"};
+    case MendKind::missing_width: return {"lanes without widths", "they have no surface"};
+    case MendKind::negative_width: return {"widths below zero", "counted as zero"};
+    case MendKind::missing_zero: return {"missing coefficients and heights", "counted as zero"};
+    case MendKind::late_section: return {"first sections after the start of their road", "they begin at the start"};
+    case MendKind::lane_gap: return {"lane ids with gaps", "filled by lanes without surface"};
+    case MendKind::center_id: return {"center lanes with another id than 0", "counted as 0"};
+    case MendKind::short_road: return {"roads of no length", "they are 1 mm long"};
+    case MendKind::empty_geometry: return {"geometries of no length", "left out"};
+    case MendKind::line_length: return {"curves of another length than stated", "the curve's own length counts"};
+    case MendKind::geometry_station:
+      return {"geometries that do not begin where the one before ends", "the one before is cut or extended"};
+    case MendKind::geometry_gap: return {"gaps between geometries", "bridged by a straight line"};
+    case MendKind::unknown_lane_type: return {"unknown lane types", "counted as special lanes"};
+    case MendKind::unknown_direction: return {"unknown lane directions", "counted as standard"};
+    case MendKind::unknown_mark: return {"unknown types of road marks", "painted by their lines; without lines, not"};
+    case MendKind::unknown_color: return {"unknown colors of road marks", "painted white"};
+    case MendKind::unknown_lane_change: return {"unknown lane-change rules of road marks", "counted as both"};
+    case MendKind::unknown_orientation: return {"unknown orientations of signals", "they face both ways"};
+    case MendKind::endless_dash: return {"dashes of no length", "painted without gaps"};
+    case MendKind::empty_line: return {"single mark lines of no length", "left out"};
+    case MendKind::self_crossing_mark: return {"road marks that run back on themselves", "that part is left out"};
+    case MendKind::unreadable_speed: return {"speed limits that cannot be read", "left out"};
+    case MendKind::misplaced_item: return {"objects and signals far from their road", "left out"};
+    case MendKind::shapeless_object: return {"objects without the size that they need", "left out"};
+    case MendKind::continuous_object: return {"objects repeated without distance", "they stand once"};
+    case MendKind::repeated_corners: return {"repeated objects with corners along the road", "they stand once"};
+    case MendKind::unsupported_junction: return {"junctions of kinds that are not supported", "they connect nothing"};
+    case MendKind::link_into_road: return {"links to the middle of a road", "left out"};
+    case MendKind::missing_road: return {"references to roads that do not exist", "left out"};
+    case MendKind::missing_lane: return {"links to lanes that do not exist", "left out"};
+    case MendKind::missing_contact: return {"links without a contact point", "the nearest end counts"};
+    case MendKind::wrong_end: return {"links to the wrong end of a road", "the end that touches counts"};
+    case MendKind::one_sided_link: return {"links of roads that are not returned", "made mutual"};
+    case MendKind::unreturned_link: return {"links of roads that are returned elsewhere", "kept, since the ends touch"};
+    case MendKind::contrary_link: return {"links of roads that do not touch and are returned elsewhere", "left out"};
+    case MendKind::missing_junction: return {"references to junctions that do not exist", "left out"};
+    case MendKind::unconnected_road: return {"connections of roads that do not meet the junction", "left out"};
+    case MendKind::repeated_signal: return {"signal ids used twice", "all stand; references mean the first"};
+    case MendKind::missing_signal: return {"references to signals that do not exist", "left out"};
+    case MendKind::repeated_controller: return {"controller ids used twice", "the first counts"};
+    case MendKind::missing_controller: return {"references to controllers that do not exist", "left out"};
+  }
+  return {"unknown", "unknown"};
+}
+
+}  // namespace
+
+const char* to_string(MendKind kind) { return text_of(kind).fault; }
+const char* action_of(MendKind kind) { return text_of(kind).action; }
+
+std::vector<MendKind> mend_kinds() {
+  std::vector<MendKind> kinds;
+  for (int i = 0; i <= static_cast<int>(MendKind::missing_controller); ++i) kinds.push_back(static_cast<MendKind>(i));
+  return kinds;
+}
+
+std::string message_of(const Mend& mend, const std::string& source) {
+  return fmt::format("{}:{}: {}", source, mend.line, mend.message);
+}
+
+std::vector<MendGroup> group_mends(Span<const Mend> mends) {
+  std::vector<MendGroup> groups;
+  for (const MendKind kind : mend_kinds()) groups.push_back({kind, {}});
+  for (const Mend& mend : mends) groups[static_cast<std::size_t>(mend.kind)].mends.push_back(&mend);
+  std::erase_if(groups, [](const MendGroup& group) { return group.mends.empty(); });
+  for (MendGroup& group : groups) {
+    std::stable_sort(group.mends.begin(), group.mends.end(),
+                     [](const Mend* a, const Mend* b) { return a->line < b->line; });
+  }
+  std::stable_sort(groups.begin(), groups.end(),
+                   [](const MendGroup& a, const MendGroup& b) { return a.mends.size() > b.mends.size(); });
+  return groups;
+}
+
+std::vector<std::string> describe_mends(Span<const Mend> mends, const std::string& source) {
+  std::vector<std::string> lines;
+  for (const MendGroup& group : group_mends(mends)) {
+    lines.push_back(fmt::format("{} x {}: {}; first: {}", group.mends.size(), to_string(group.kind),
+                                action_of(group.kind), message_of(*group.mends.front(), source)));
+  }
+  return lines;
+}
+
+}  // namespace pictura

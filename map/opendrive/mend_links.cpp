@@ -1,0 +1,203 @@
+#include "pictura/map/opendrive/mend_links.h"
+
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "pictura/map/opendrive/curves.h"
+
+namespace pictura::opendrive {
+
+namespace {
+
+// Ends of roads closer than this touch: links are mended by it, never taken away where a file agrees with itself.
+constexpr double kTouch_m = 1.0;
+
+const char* name_of(ContactPoint end) { return end == ContactPoint::start ? "start" : "end"; }
+
+ContactPoint other_end(ContactPoint end) {
+  return end == ContactPoint::start ? ContactPoint::end : ContactPoint::start;
+}
+
+const RoadLink& link_at(const FileRoad& road, ContactPoint end) {
+  return end == ContactPoint::start ? road.predecessor : road.successor;
+}
+
+RoadLink* link_at(FileRoad* road, ContactPoint end) {
+  return end == ContactPoint::start ? &road->predecessor : &road->successor;
+}
+
+/// Where the lanes of a road begin or end: its reference line, moved by the lane offset.
+Eigen::Vector3d position_of(const FileRoad& road, ContactPoint end) {
+  const FileSection& section = end == ContactPoint::start ? road.sections.front() : road.sections.back();
+  const double s = end == ContactPoint::start ? 0 : road.length;
+  return point_at(road, s, border_at(road, section, 0, s).t);
+}
+
+double distance_m(const FileRoad& a, ContactPoint end_a, const FileRoad& b, ContactPoint end_b) {
+  return (position_of(a, end_a) - position_of(b, end_b)).norm();
+}
+
+/// The end of `b` that touches an end of `a`; `contact` if both do or neither does.
+ContactPoint touching_end(const FileRoad& a, ContactPoint end, const FileRoad& b, ContactPoint contact) {
+  const bool touches = distance_m(a, end, b, contact) <= kTouch_m;
+  return !touches && distance_m(a, end, b, other_end(contact)) <= kTouch_m ? other_end(contact) : contact;
+}
+
+class LinkMender {
+ public:
+  LinkMender(Network* network, Faults* faults) : network_(*network), faults_(faults) {}
+
+  void mend() {
+    for (FileRoad& road : network_.roads) {
+      if (!road.junction.empty() && !network_.junction_index.contains(road.junction)) {
+        road.where.mend(faults_, MendKind::missing_junction, "belongs to junction {}, which does not exist",
+                        road.junction);
+        road.junction.clear();
+      }
+      for (const ContactPoint end : {ContactPoint::start, ContactPoint::end}) check_target(&road, end);
+    }
+    for (FileRoad& road : network_.roads) {
+      for (const ContactPoint end : {ContactPoint::start, ContactPoint::end}) check_return(&road, end);
+    }
+    for (FileJunction& junction : network_.junctions) {
+      std::erase_if(junction.connections, [&](Connection& c) { return !find_ends(junction, &c); });
+    }
+  }
+
+ private:
+  FileRoad* road_named(const std::string& id) {
+    const auto found = network_.road_index.find(id);
+    return found == network_.road_index.end() ? nullptr : &network_.roads[static_cast<std::size_t>(found->second)];
+  }
+
+  /// What a road's link names exists, and its contact point is the end that lies there.
+  void check_target(FileRoad* road, ContactPoint end) {
+    RoadLink* const link = link_at(road, end);
+    if (link->kind == RoadLink::Kind::junction && !network_.junction_index.contains(link->id)) {
+      link->where.mend(faults_, MendKind::missing_junction, "refers to junction {}, which does not exist", link->id);
+      *link = {};
+    }
+    if (link->kind != RoadLink::Kind::road) return;
+    const FileRoad* const target = road_named(link->id);
+    if (!target) {
+      link->where.mend(faults_, MendKind::missing_road, "refers to road {}, which does not exist", link->id);
+      *link = {};
+      return;
+    }
+    if (!link->has_contact) {
+      const bool is_start =
+          distance_m(*road, end, *target, ContactPoint::start) <= distance_m(*road, end, *target, ContactPoint::end);
+      link->contact = is_start ? ContactPoint::start : ContactPoint::end;
+      link->has_contact = true;
+    } else if (const ContactPoint contact = touching_end(*road, end, *target, link->contact);
+               contact != link->contact && !(target == road && contact == end)) {
+      link->where.mend(faults_, MendKind::wrong_end,
+                       "attribute contactPoint: expected {}, which touches the {} of this road, got {}",
+                       name_of(contact), name_of(end), name_of(link->contact));
+      link->contact = contact;
+    }
+  }
+
+  /// A link between two roads is returned. Where the other road's end names a third road, geometry decides.
+  void check_return(FileRoad* road, ContactPoint end) {
+    RoadLink* const link = link_at(road, end);
+    if (link->kind != RoadLink::Kind::road) return;
+    FileRoad* const target = road_named(link->id);
+    RoadLink* const back = link_at(target, link->contact);
+    if (target == road && (link->contact == end || back->kind != RoadLink::Kind::road)) {
+      link->where.mend(faults_, MendKind::contrary_link,
+                       "its {} is linked to the road's own {}, which is not linked back", name_of(end),
+                       name_of(link->contact));
+      *link = {};
+      return;
+    }
+    if (back->kind == RoadLink::Kind::none) {
+      link->where.mend(faults_, MendKind::one_sided_link, "the {} of road {} is not linked back to the {} of this one",
+                       name_of(link->contact), link->id, name_of(end));
+      *back = {.kind = RoadLink::Kind::road, .id = road->id, .contact = end, .where = target->where};
+      return;
+    }
+    if (back->kind != RoadLink::Kind::road || (back->id == road->id && back->contact == end)) return;
+    const bool touches = distance_m(*road, end, *target, link->contact) <= kTouch_m;
+    link->where.mend(faults_, touches ? MendKind::unreturned_link : MendKind::contrary_link,
+                     "the {} of road {} is linked to the {} of road {} instead of the {} of this one",
+                     name_of(link->contact), link->id, name_of(back->contact), back->id, name_of(end));
+    if (!touches) *link = {};
+  }
+
+  /// Finds both ends of a connection: by the connecting road's link, else by the incoming road's link to the junction,
+  /// else by geometry. False where the roads do not meet, which is mended: the connection is left out.
+  bool find_ends(const FileJunction& junction, Connection* connection) {
+    const FileRoad* const incoming = road_named(connection->incoming_road);
+    const FileRoad* const connecting = road_named(connection->connecting_road);
+    for (const auto& [road, id] :
+         {std::pair(incoming, &connection->incoming_road), std::pair(connecting, &connection->connecting_road)}) {
+      if (road) continue;
+      connection->where.mend(faults_, MendKind::missing_road, "refers to road {}, which does not exist", *id);
+      return false;
+    }
+    const auto is_back = [&](ContactPoint contact) {
+      const RoadLink& back = link_at(*connecting, contact);
+      return back.kind == RoadLink::Kind::road && back.id == connection->incoming_road;
+    };
+    if (!is_back(connection->contact) && is_back(other_end(connection->contact)) &&
+        !touches(*incoming, *connecting, connection->contact)) {
+      note_wrong_end(*connection);
+      connection->contact = other_end(connection->contact);
+    } else if (!connection->has_contact && !touches(*incoming, *connecting, connection->contact) &&
+               touches(*incoming, *connecting, other_end(connection->contact))) {
+      connection->contact = other_end(connection->contact);
+    }
+    connection->has_contact = true;
+    if (is_back(connection->contact)) {
+      connection->incoming_end = link_at(*connecting, connection->contact).contact;
+      return true;
+    }
+    for (const ContactPoint end : {ContactPoint::end, ContactPoint::start}) {
+      const RoadLink& link = link_at(*incoming, end);
+      if (link.kind != RoadLink::Kind::junction || link.id != junction.id) continue;
+      connection->incoming_end = end;
+      return true;
+    }
+    return find_ends_by_geometry(*incoming, *connecting, connection);
+  }
+
+  static bool touches(const FileRoad& incoming, const FileRoad& connecting, ContactPoint contact) {
+    return distance_m(incoming, ContactPoint::start, connecting, contact) <= kTouch_m ||
+           distance_m(incoming, ContactPoint::end, connecting, contact) <= kTouch_m;
+  }
+
+  void note_wrong_end(const Connection& connection) {
+    if (!connection.has_contact) return;  // noted already
+    connection.where.mend(
+        faults_, MendKind::wrong_end, "attribute contactPoint: expected {}, which is linked to road {}, got {}",
+        name_of(other_end(connection.contact)), connection.incoming_road, name_of(connection.contact));
+  }
+
+  bool find_ends_by_geometry(const FileRoad& incoming, const FileRoad& connecting, Connection* connection) {
+    for (const ContactPoint contact : {connection->contact, other_end(connection->contact)}) {
+      for (const ContactPoint end : {ContactPoint::end, ContactPoint::start}) {
+        if (distance_m(incoming, end, connecting, contact) > kTouch_m) continue;
+        connection->where.mend(faults_, MendKind::one_sided_link,
+                               "its incoming road {} has no link to this junction; its {} touches the {} of road {}",
+                               incoming.id, name_of(end), name_of(contact), connecting.id);
+        connection->contact = contact;
+        connection->incoming_end = end;
+        return true;
+      }
+    }
+    connection->where.mend(faults_, MendKind::unconnected_road, "its incoming road {} has no end at this junction",
+                           connection->incoming_road);
+    return false;
+  }
+
+  Network& network_;
+  Faults* faults_;
+};
+
+}  // namespace
+
+void mend_links(Network* network, Faults* faults) { LinkMender(network, faults).mend(); }
+
+}  // namespace pictura::opendrive

@@ -1,0 +1,609 @@
+// Faults that have one sensible meaning: each is mended and noted by default, and refused by strict reading with file,
+// line, owner and element.
+#include <random>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/common/error.h"
+#include "pictura/common/support/file.h"
+#include "pictura/map/map_fields.h"
+#include "pictura/map/mends.h"
+#include "pictura/map/opendrive/opendrive.h"
+#include "pictura/tests/map/small_roads.h"
+#include "pictura/tests/support/error_message.h"
+
+namespace pictura {
+namespace {
+
+using test::file_of;
+using test::index_of;
+using test::lane_named;
+using test::lane_of;
+using test::line_at;
+using test::list;
+using test::RoadText;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+
+/// Imports a file whose faults are all of one kind. Strict reading must refuse the file with the message of a mend.
+RoadMap mended(const std::string& contents, MendKind kind, std::size_t count = 1) {
+  const std::string text = file_of(contents);
+  const RoadMap map = parse_opendrive(text, "bad.xodr");
+  const std::vector<std::string> described = describe_mends(map.mends, "bad.xodr");
+  EXPECT_EQ(described.size(), 1u) << fmt::format("{}", fmt::join(described, "\n"));
+  std::set<std::string> messages;
+  for (const Mend& mend : map.mends) messages.insert(message_of(mend, "bad.xodr"));
+  EXPECT_EQ(map.mends.size(), count) << to_string(kind) << "\n" << fmt::format("{}", fmt::join(messages, "\n"));
+  for (const Mend& mend : map.mends) EXPECT_STREQ(to_string(mend.kind), to_string(kind)) << mend.message;
+  const std::string refusal = test::message_of([&] { parse_opendrive(text, "bad.xodr", {.strict = true}); });
+  EXPECT_TRUE(messages.contains(refusal)) << to_string(kind) << ": " << refusal;
+  EXPECT_THAT(refusal, StartsWith("bad.xodr:"));
+  return map;
+}
+
+/// The message of the only mend.
+std::string said(const RoadMap& map) { return map.mends.empty() ? "" : message_of(map.mends.front(), "bad.xodr"); }
+
+RoadText straight(const std::string& right = lane_of(-1, "driving", 3)) {
+  RoadText road;
+  road.right = right;
+  return road;
+}
+
+/// The map of a road as it should be, without mends.
+RoadMap sound(const std::string& contents) {
+  RoadMap map = parse_opendrive(file_of(contents), "bad.xodr", {.strict = true});
+  EXPECT_THAT(map.mends, IsEmpty());
+  return map;
+}
+
+/// Where two maps differ, sources apart.
+std::string difference(RoadMap a, RoadMap b) {
+  for (RoadMap* map : {&a, &b}) {
+    map->mends.clear();
+    map->provenance = {};
+  }
+  return first_difference(a, b);
+}
+
+LanePoint first_point(const RoadMap& map, const Lane& lane) { return map.points_of(lane)[0]; }
+LanePoint last_point(const RoadMap& map, const Lane& lane) {
+  return map.lane_points[static_cast<std::size_t>(lane.points.end) - 1];
+}
+
+std::string width(double s, double a, double b = 0) {
+  return fmt::format(R"(<width sOffset="{}" a="{}" b="{}" c="0" d="0"/>)", s, a, b);
+}
+
+std::string lane_with(const std::string& contents, int id = -1, const std::string& type = "driving") {
+  return fmt::format("<lane id=\"{}\" type=\"{}\">{}</lane>\n", id, type, contents);
+}
+
+std::string shape(double s, double t, double a, double b = 0) {
+  return fmt::format(R"(<shape s="{}" t="{}" a="{}" b="{}" c="0" d="0"/>)", s, t, a, b);
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  if (at == std::string::npos) throw std::runtime_error("nothing to replace: " + from);
+  return text.replace(at, from.size(), to);
+}
+
+// Records along s.
+
+TEST(OpenDriveMends, ShapesComeInAnyOrderOfT) {
+  RoadText road = straight(lane_of(-1, "driving", 3)), sorted = road;
+  road.left = sorted.left = lane_of(1, "driving", 3);
+  road.lateral = shape(0, 0, 0.2) + shape(0, -9, 0.1) + shape(50, 0, 0.3) + shape(50, -9, 0.5);
+  sorted.lateral = shape(0, -9, 0.1) + shape(0, 0, 0.2) + shape(50, -9, 0.5) + shape(50, 0, 0.3);
+  const RoadMap map = mended(road.text(), MendKind::record_order, 2);
+  EXPECT_THAT(said(map), HasSubstr("road 1: <shape>: attribute t: expected at least the previous one's 0, got -9"));
+  EXPECT_EQ(difference(map, sound(sorted.text())), "");
+}
+
+TEST(OpenDriveMends, RecordsOutOfOrderAreSorted) {
+  const auto map_of = [](const std::string& widths, const std::string& offsets, const std::string& speeds,
+                         const std::string& heights, bool is_mended) {
+    RoadText road = straight(lane_with(widths + heights + speeds));
+    road.lane_offset = offsets;
+    return is_mended ? mended(road.text(), MendKind::record_order, 4) : sound(road.text());
+  };
+  const std::string offset = R"(<laneOffset s="{}" a="{}" b="0" c="0" d="0"/>)";
+  const std::string offset_0 = R"(<laneOffset s="0" a="0.5" b="0" c="0" d="0"/>)";
+  const std::string offset_40 = R"(<laneOffset s="40" a="0.5" b="0.01" c="0" d="0"/>)";
+  const std::string offset_41 = R"(<laneOffset s="40.0000001" a="0.5" b="0" c="0" d="0"/>)";
+  const std::string speed_0 = R"(<speed sOffset="0" max="10"/>)", speed_60 = R"(<speed sOffset="60" max="20"/>)";
+  const std::string height_0 = R"(<height sOffset="0" inner="0" outer="0.1"/>)",
+                    height_30 = R"(<height sOffset="30" inner="0.1" outer="0.2"/>)";
+  const RoadMap map = map_of(width(50, 4) + width(0, 3), offset_0 + offset_41 + offset_40, speed_60 + speed_0,
+                             height_30 + height_0, true);
+  EXPECT_EQ(difference(map, map_of(width(0, 3) + width(50, 4), offset_0 + offset_40 + offset_41, speed_0 + speed_60,
+                                   height_0 + height_30, false)),
+            "");
+}
+
+TEST(OpenDriveMends, RecordsBeyondTheEndAreLeftOut) {
+  RoadText road = straight(lane_with(width(0, 3) + width(130, 9) +
+                                     R"(<speed sOffset="130" max="1"/>)"
+                                     R"(<height sOffset="130" inner="1" outer="1"/>)"));
+  road.lane_offset = R"(<laneOffset s="100.5" a="7" b="0" c="0" d="0"/>)";
+  road.type = R"(<type s="125" type="town"><speed max="3"/></type>)";
+  const RoadMap map = mended(road.text(), MendKind::record_beyond_end, 5);
+  EXPECT_THAT(said(map), HasSubstr("road 1: <type>: attribute s: expected a number in [0, 100], got 125"));
+  EXPECT_EQ(difference(map, sound(straight().text())), "");
+}
+
+TEST(OpenDriveMends, RecordsBeforeTheStartApplyFromThere) {
+  const RoadMap map = mended(straight(lane_with(width(-2, 3) + R"(<speed sOffset="-1" max="9"/>)")).text(),
+                             MendKind::record_before_start, 2);
+  EXPECT_FLOAT_EQ(map.lane_points.front().width_m, 3);
+  EXPECT_FLOAT_EQ(map.lanes.front().speed_limit_mps, 9);
+}
+
+TEST(OpenDriveMends, WidthsBeginWithTheirSection) {
+  const RoadMap map = mended(straight(lane_with(width(4, 3, 0.01))).text(), MendKind::late_width);
+  EXPECT_FLOAT_EQ(map.lane_points.front().width_m, 3);
+  EXPECT_NEAR(map.lane_points.back().width_m, 3.96, 1e-3);
+}
+
+TEST(OpenDriveMends, ALaneWithoutWidthHasNoSurface) {
+  const RoadMap map =
+      mended(straight(lane_of(-1, "driving", 3) + lane_with("", -2, "shoulder")).text(), MendKind::missing_width);
+  EXPECT_EQ(map.lanes.size(), 1u);
+  EXPECT_EQ(map.facts.lanes, 1);
+}
+
+TEST(OpenDriveMends, WidthsBelowZeroCountAsZero) {
+  const RoadMap map = mended(straight(lane_with(width(0, 3) + width(50, 3, -0.1)) + lane_of(-2, "driving", 3)).text(),
+                             MendKind::negative_width);
+  EXPECT_THAT(said(map), HasSubstr("road 1: <lane>: its width at s"));
+  for (const LanePoint& point : map.lane_points) EXPECT_GE(point.width_m, 0);
+  const Lane& inner = lane_named(map, "1", 0, -1);
+  EXPECT_EQ(last_point(map, inner).width_m, 0);
+  EXPECT_FLOAT_EQ(last_point(map, lane_named(map, "1", 0, -2)).width_m, 3);
+}
+
+TEST(OpenDriveMends, MissingCoefficientsAndHeightsAreZero) {
+  RoadText road = straight(lane_with(R"(<width sOffset="0" a="3"/><height sOffset="0" outer="0"/>)"));
+  road.geometry = R"(<geometry s="0" x="0" y="0" hdg="0" length="100"><spiral/></geometry>)";
+  const RoadMap map = mended(road.text(), MendKind::missing_zero, 6);
+  const RoadMap same = sound(straight(lane_with(width(0, 3) + R"(<height sOffset="0" inner="0" outer="0"/>)")).text());
+  EXPECT_EQ(difference(map, same), "");
+}
+
+// Sections and lanes.
+
+TEST(OpenDriveMends, SectionsAreSortedAndBeginWithTheRoad) {
+  const auto section = [](double s, double lane_width) {
+    return fmt::format(
+        "<laneSection s=\"{}\"><center/><right>{}</right></laneSection>\n", s,
+        lane_of(-1, "driving", lane_width, R"(<link><predecessor id="-1"/><successor id="-1"/></link>)"));
+  };
+  RoadText road;
+  road.sections = section(0, 3) + section(60, 5) + section(30, 4);
+  RoadMap map = mended(road.text(), MendKind::record_order);
+  ASSERT_EQ(map.lanes.size(), 3u);
+  EXPECT_FLOAT_EQ(first_point(map, map.lanes[1]).width_m, 4);
+  EXPECT_THAT(list(map, map.lanes[1].successors), ElementsAre(2));
+  road.sections = section(0, 3) + section(120, 4);
+  EXPECT_EQ(mended(road.text(), MendKind::record_beyond_end).lanes.size(), 1u);
+  road.sections = section(0.2, 3);
+  EXPECT_FLOAT_EQ(mended(road.text(), MendKind::late_section).lanes[0].length_m, 100);
+  road.sections = section(5, 3);
+  EXPECT_THAT(test::message_of([&] { parse_opendrive(file_of(road.text()), "bad.xodr"); }),
+              HasSubstr("road 1: <laneSection>: attribute s: expected the first section at 0, got 5"));
+}
+
+TEST(OpenDriveMends, GapsInLaneIdsAreFilled) {
+  const RoadMap map =
+      mended(straight(lane_of(-1, "driving", 3) + lane_of(-4, "driving", 3) + lane_of(-2, "driving", 3)).text(),
+             MendKind::lane_gap);
+  EXPECT_EQ(map.lanes.size(), 3u);
+  EXPECT_FLOAT_EQ(first_point(map, lane_named(map, "1", 0, -4)).position_m.y + static_cast<float>(map.origin_m[1]),
+                  -7.5f);
+}
+
+TEST(OpenDriveMends, TheCenterLaneIsZero) {
+  const RoadMap map = mended(replaced(straight().text(), "<lane id=\"0\"", "<lane id=\"3\""), MendKind::center_id);
+  EXPECT_EQ(difference(map, sound(straight().text())), "");
+}
+
+// Reference lines.
+
+TEST(OpenDriveMends, RoadsOfNoLengthAreAMillimetreLong) {
+  RoadText road = straight();
+  road.length = 1e-5;
+  EXPECT_NEAR(mended(road.text(), MendKind::short_road).lanes[0].length_m, 1e-3, 1e-6);
+  road.length = 0;
+  EXPECT_EQ(mended(road.text(), MendKind::short_road).lanes.size(), 1u);
+}
+
+TEST(OpenDriveMends, GeometriesOfNoLengthAreLeftOut) {
+  RoadText road = straight();
+  road.geometry = line_at(0, 0, 0, 0, 60) + line_at(60, 60, 0, 1, 0) + line_at(60, 60, 0, 0, 40);
+  const RoadMap map = mended(road.text(), MendKind::empty_geometry);
+  EXPECT_THAT(said(map), HasSubstr("bad.xodr:8: road 1: <geometry>: attribute length: expected more than 0"));
+  EXPECT_FLOAT_EQ(map.lanes[0].length_m, 100);
+}
+
+TEST(OpenDriveMends, TheLinesLengthCountsWhereItDiffersALittle) {
+  for (const double length : {99.55, 100.45, 99.05, 100.95}) {
+    RoadText road = straight();
+    road.geometry = line_at(0, 0, 0, 0, length);
+    EXPECT_NEAR(mended(road.text(), MendKind::line_length).lanes[0].length_m, length, 1e-3);
+    EXPECT_NEAR(parse_opendrive(file_of(road.text()), "bad.xodr").facts.driving_lane_km, 1e-3 * length, 1e-9);
+  }
+  for (const double length : {98.9, 101.1, 50.0}) {
+    RoadText road = straight();
+    road.geometry = line_at(0, 0, 0, 0, length);
+    EXPECT_THAT(test::message_of([&] { parse_opendrive(file_of(road.text()), "bad.xodr"); }),
+                HasSubstr(fmt::format("bad.xodr:7: road 1: <geometry>: the reference line ends at {}; expected the "
+                                      "road's length, 100",
+                                      length)));
+  }
+}
+
+TEST(OpenDriveMends, GapsOfGeometriesAreBridged) {
+  RoadText road = straight();
+  road.geometry = line_at(0, 0, 0, 0, 50) + line_at(50, 50, 0.3, 0, 50);
+  const RoadMap map = mended(road.text(), MendKind::geometry_gap);
+  EXPECT_THAT(said(map), HasSubstr("bad.xodr:8: road 1: <geometry>: begins 0.300 m from the end of the one before it"));
+  EXPECT_NEAR(last_point(map, map.lanes[0]).position_m.y - first_point(map, map.lanes[0]).position_m.y, 0.3, 1e-4);
+  road.geometry = line_at(0, 0, 0, 0, 50) + line_at(50.3, 50.3, 0, 0, 49.7);
+  EXPECT_FLOAT_EQ(mended(road.text(), MendKind::geometry_station).lanes[0].length_m, 100);
+  road.geometry = line_at(0, 0, 0, 0, 50) + line_at(50, 50, 0.7, 0, 50);
+  EXPECT_THROW(parse_opendrive(file_of(road.text()), "bad.xodr"), Error);
+  road.geometry = line_at(0, 0, 0, 0, 50) + line_at(53, 53, 0, 0, 47);
+  EXPECT_THROW(parse_opendrive(file_of(road.text()), "bad.xodr"), Error);
+}
+
+// Names.
+
+TEST(OpenDriveMends, UnknownNamesHaveAMeaning) {
+  const RoadMap lanes =
+      mended(straight(lane_of(-1, "driving", 3) + lane_of(-2, "canal", 2)).text(), MendKind::unknown_lane_type);
+  EXPECT_EQ(lane_named(lanes, "1", 0, -2).type, LaneType::other);
+  EXPECT_THAT(said(lanes), HasSubstr("road 1: <lane>: attribute type: 'canal' is not a lane type"));
+  const RoadMap direction = mended(replaced(straight().text(), "type=\"driving\"", "type=\"driving\" direction=\"up\""),
+                                   MendKind::unknown_direction);
+  EXPECT_EQ(difference(direction, sound(straight().text())), "");
+}
+
+std::string with_mark(const std::string& mark) {
+  RoadText road = straight();
+  road.center_mark = mark;
+  return road.text();
+}
+
+TEST(OpenDriveMends, UnknownMarksArePaintedByTheirLines) {
+  EXPECT_EQ(mended(with_mark(R"(<roadMark sOffset="0" type="wavy"/>)"), MendKind::unknown_mark).markings.size(), 0u);
+  const RoadMap lines =
+      mended(with_mark(R"(<roadMark sOffset="0" type="wavy" color="yellow"><type name="" width="0.2">)"
+                       R"(<line length="5" space="5" tOffset="0" sOffset="0" width="0.2"/></type></roadMark>)"),
+             MendKind::unknown_mark);
+  EXPECT_EQ(lines.markings.size(), 10u);
+  const RoadMap pink =
+      mended(with_mark(R"(<roadMark sOffset="0" type="solid" color="pink"/>)"), MendKind::unknown_color);
+  EXPECT_EQ(pink.markings.at(0).color, MarkColor::white);
+  EXPECT_EQ(
+      mended(with_mark(R"(<roadMark sOffset="0" type="solid" laneChange="some"/>)"), MendKind::unknown_lane_change)
+          .markings.size(),
+      1u);
+}
+
+TEST(OpenDriveMends, MarksOutOfOrderAreSorted) {
+  const std::string solid = R"(<roadMark sOffset="0" type="solid"/>)", none = R"(<roadMark sOffset="40" type="none"/>)";
+  EXPECT_EQ(difference(mended(with_mark(none + solid), MendKind::record_order), sound(with_mark(solid + none))), "");
+}
+
+TEST(OpenDriveMends, DashesOfNoLengthAreContinuous) {
+  const auto mark = [](const std::string& kind, const std::string& space) {
+    return with_mark(
+        fmt::format(R"(<roadMark sOffset="0" type="solid"><{}><line length="0" {} tOffset="0" sOffset="0" )"
+                    R"(width="0.15"/></{}></roadMark>)",
+                    kind, space, kind));
+  };
+  const RoadMap map = mended(mark("type", "space=\"0\""), MendKind::endless_dash);
+  ASSERT_EQ(map.markings.size(), 1u);
+  EXPECT_FALSE(map.markings[0].broken);
+  EXPECT_EQ(mended(mark("explicit", ""), MendKind::empty_line).markings.size(), 1u) << "the pattern of the type";
+}
+
+TEST(OpenDriveMends, SpeedsThatCannotBeReadAreLeftOut) {
+  for (const char* speed : {R"(max="fast")", R"(max="-3")", R"(max="50" unit="knots")", "", R"(max="1e9")"}) {
+    const RoadMap map =
+        mended(straight(lane_of(-1, "driving", 3, fmt::format("<speed sOffset=\"0\" {}/>", speed))).text(),
+               MendKind::unreadable_speed);
+    EXPECT_EQ(difference(map, sound(straight().text())), "") << speed;
+  }
+}
+
+// Objects and signals.
+
+std::string with_rest(const std::string& rest) {
+  RoadText road = straight();
+  road.rest = rest;
+  return road.text();
+}
+
+TEST(OpenDriveMends, ObjectsThatCannotStandAreLeftOut) {
+  for (const auto& [kind, object] : std::vector<std::pair<MendKind, std::string>>{
+           {MendKind::misplaced_item, R"(<object id="1" type="crosswalk" s="500" t="0" length="2" width="2"/>)"},
+           {MendKind::misplaced_item,
+            R"(<object id="1" type="crosswalk" s="5" t="0"><outline><cornerRoad s="999" t="0"/>)"
+            R"(</outline></object>)"},
+           {MendKind::shapeless_object, R"(<object id="1" type="crosswalk" s="5" t="0"/>)"},
+           {MendKind::shapeless_object, R"(<object id="1" type="parking" s="5" t="0" length="5"/>)"},
+           {MendKind::shapeless_object, R"(<object id="1" type="stopLine" s="5" t="0"/>)"}}) {
+    const RoadMap map = mended(with_rest("<objects>" + object + "</objects>"), kind);
+    EXPECT_EQ(difference(map, sound(straight().text())), "") << object;
+    EXPECT_THAT(said(map), HasSubstr("road 1: <")) << object;
+  }
+  EXPECT_EQ(mended(with_rest(R"(<signals><signal id="1" s="-57" t="1" orientation="+"/></signals>)"),
+                   MendKind::misplaced_item)
+                .signs.size(),
+            0u);
+}
+
+TEST(OpenDriveMends, RepeatsThatCannotBeDrawnStandOnce) {
+  const auto parking = [](const std::string& contents) {
+    return with_rest(R"(<objects><object id="1" type="parking" s="5" t="-5" length="5" width="2">)" + contents +
+                     "</object></objects>");
+  };
+  EXPECT_EQ(
+      mended(parking(R"(<repeat s="0" length="50" distance="0"/>)"), MendKind::continuous_object).parking_spaces.size(),
+      1u);
+  EXPECT_EQ(mended(parking(R"(<repeat s="0" length="50" distance="5"/><outline><cornerRoad s="1" t="-4"/></outline>)"),
+                   MendKind::repeated_corners)
+                .parking_spaces.size(),
+            1u);
+}
+
+TEST(OpenDriveMends, SignalsOfOneIdAllStand) {
+  const RoadMap map = mended(
+      with_rest(
+          R"(<signals><signal id="5" s="10" t="-4" orientation="+"/><signal id="5" s="20" t="-4" orientation="+"/>)"
+          R"(</signals>)"),
+      MendKind::repeated_signal);
+  EXPECT_EQ(map.signs.size(), 2u);
+  EXPECT_THAT(said(map), HasSubstr("road 1: <signal>: attribute id: another signal has 5 already"));
+  EXPECT_EQ(mended(with_rest(R"(<signals><signal id="5" s="10" t="-4" orientation="left"/></signals>)"),
+                   MendKind::unknown_orientation)
+                .signs.size(),
+            1u);
+}
+
+TEST(OpenDriveMends, ReferencesToWhatIsAbsentAreLeftOut) {
+  const std::string road = straight().text();
+  const std::string control = R"(<controller id="4"><control signalId="6"/></controller>)";
+  EXPECT_EQ(difference(mended(with_rest(R"(<signals><signalReference id="77" s="0" t="0" orientation="+"/></signals>)"),
+                              MendKind::missing_signal),
+                       sound(road)),
+            "");
+  EXPECT_THAT(said(mended(road + control, MendKind::missing_signal)),
+              HasSubstr("controller 4: <controller>: controls signal 6, which does not exist"));
+  mended(road + R"(<junction id="3"><controller id="9"/></junction>)", MendKind::missing_controller);
+  mended(road + R"(<controller id="4"/><controller id="4"/>)", MendKind::repeated_controller);
+  const RoadMap lost = mended(replaced(road, "junction=\"-1\"", "junction=\"5\""), MendKind::missing_junction);
+  EXPECT_EQ(difference(lost, sound(road)), "");
+}
+
+// Links.
+
+std::string link_to(const char* end, const std::string& road, const std::string& contact) {
+  return fmt::format(R"(<{} elementType="road" elementId="{}"{}/>)", end, road,
+                     contact.empty() ? "" : fmt::format(" contactPoint=\"{}\"", contact));
+}
+
+/// Roads 1 and 2, which meet at x = 100, with links as given.
+std::string two_roads(const std::string& link_1, const std::string& link_2, const std::string& lane_link = "-1") {
+  RoadText a = straight(lane_of(-1, "driving", 3, "<link><successor id=\"" + lane_link + "\"/></link>")),
+           b = straight();
+  a.link = link_1;
+  b.id = "2";
+  b.geometry = line_at(0, 100, 0, 0, 100);
+  b.link = link_2;
+  return a.text() + b.text();
+}
+
+int num_links(const RoadMap& map) { return static_cast<int>(map.lane_links.size()) / 2; }
+
+TEST(OpenDriveMends, LinksToWhatIsAbsentAreLeftOut) {
+  const std::string to_2 = link_to("successor", "2", "start"), to_1 = link_to("predecessor", "1", "end");
+  EXPECT_EQ(num_links(sound(two_roads(to_2, to_1))), 1);
+  EXPECT_THAT(said(mended(two_roads(link_to("successor", "9", "start"), ""), MendKind::missing_road)),
+              HasSubstr("bad.xodr:5: road 1: <successor>: refers to road 9, which does not exist"));
+  EXPECT_THAT(
+      said(mended(two_roads(R"(<successor elementType="junction" elementId="9"/>)", ""), MendKind::missing_junction)),
+      HasSubstr("road 1: <successor>: refers to junction 9, which does not exist"));
+  const RoadMap lane = mended(two_roads(to_2, to_1, "-7"), MendKind::missing_lane);
+  EXPECT_THAT(said(lane), HasSubstr("road 1: <lane>: is linked to lane -7 of road 2, which does not exist there"));
+  EXPECT_EQ(num_links(lane), 0);
+  EXPECT_EQ(
+      num_links(mended(two_roads(R"(<successor elementType="road" elementId="2" elementS="5" elementDir="+"/>)", ""),
+                       MendKind::link_into_road)),
+      0);
+}
+
+TEST(OpenDriveMends, OneSidedLinksBecomeMutual) {
+  const std::string to_2 = link_to("successor", "2", "start");
+  const RoadMap map = mended(two_roads(to_2, ""), MendKind::one_sided_link);
+  EXPECT_THAT(said(map),
+              HasSubstr("road 1: <successor>: the start of road 2 is not linked back to the end of this one"));
+  EXPECT_EQ(difference(map, sound(two_roads(to_2, link_to("predecessor", "1", "end")))), "");
+}
+
+TEST(OpenDriveMends, GeometryShowsTheEndOfALink) {
+  const std::string to_2 = link_to("successor", "2", "start"), to_1 = link_to("predecessor", "1", "end");
+  const RoadMap map = mended(two_roads(link_to("successor", "2", "end"), to_1), MendKind::wrong_end);
+  EXPECT_THAT(said(map),
+              HasSubstr("road 1: <successor>: attribute contactPoint: expected start, which touches the end of "
+                        "this road, got end"));
+  EXPECT_EQ(difference(map, sound(two_roads(to_2, to_1))), "");
+  EXPECT_EQ(difference(mended(two_roads(link_to("successor", "2", ""), to_1), MendKind::missing_contact),
+                       sound(two_roads(to_2, to_1))),
+            "");
+  EXPECT_EQ(num_links(mended(two_roads(link_to("successor", "2", "middle"), to_1), MendKind::missing_contact)), 1);
+}
+
+TEST(OpenDriveMends, LinksThatAreReturnedElsewhereAreKeptWhereTheEndsTouch) {
+  RoadText third = straight();
+  third.id = "3";
+  third.geometry = line_at(0, 0, 50, 0, 100);
+  third.link = link_to("successor", "2", "start");
+  third.right = lane_of(-1, "driving", 3, R"(<link><successor id="-1"/></link>)");
+  const std::string to_2 = link_to("successor", "2", "start"), to_1 = link_to("predecessor", "1", "end");
+  const RoadMap apart = mended(two_roads(to_2, to_1) + third.text(), MendKind::contrary_link);
+  EXPECT_EQ(num_links(apart), 1);
+  EXPECT_THAT(said(apart),
+              HasSubstr("road 3: <successor>: the start of road 2 is linked to the end of road 1 instead of "
+                        "the end of this one"));
+  third.geometry = line_at(0, 0, 0, 0, 100);
+  EXPECT_EQ(num_links(mended(two_roads(to_2, to_1) + third.text(), MendKind::unreturned_link)), 2);
+  RoadText ring = straight();
+  ring.link = link_to("predecessor", "1", "start");
+  mended(ring.text(), MendKind::contrary_link);
+}
+
+TEST(OpenDriveMends, ConnectionsFindTheirEnds) {
+  const std::string good = test::three_roads();
+  ASSERT_EQ(num_links(sound(good)), 4);
+  // The connecting road begins at the incoming one; the file names its end.
+  const RoadMap wrong =
+      mended(replaced(good, "connectingRoad=\"2\" contactPoint=\"start\"", "connectingRoad=\"2\" contactPoint=\"end\""),
+             MendKind::wrong_end);
+  EXPECT_EQ(difference(wrong, sound(good)), "");
+  EXPECT_THAT(said(wrong), HasSubstr("junction 7: <connection>: attribute contactPoint"));
+  EXPECT_EQ(difference(mended(replaced(good, "connectingRoad=\"2\" contactPoint=\"start\"", "connectingRoad=\"2\""),
+                              MendKind::missing_contact),
+                       sound(good)),
+            "");
+  const std::string more = R"(<connection id="1" incomingRoad="{}" connectingRoad="{}" contactPoint="start"/>)";
+  for (const auto& [incoming, connecting, kind] : std::vector<std::tuple<const char*, const char*, MendKind>>{
+           {"1", "8", MendKind::missing_road}, {"8", "2", MendKind::missing_road}}) {
+    EXPECT_EQ(num_links(mended(test::three_roads("", fmt::format(fmt::runtime(more), incoming, connecting)), kind)), 4);
+  }
+  // A road that neither leads to the junction nor touches it.
+  RoadText far = straight();
+  far.id = "5";
+  far.geometry = line_at(0, 0, 500, 0, 100);
+  EXPECT_EQ(num_links(mended(far.text() + test::three_roads("", fmt::format(fmt::runtime(more), "5", "2")),
+                             MendKind::unconnected_road)),
+            4);
+  // One that touches it without a link.
+  far.geometry = line_at(0, 0, 0, 0, 100);
+  mended(far.text() + test::three_roads("", fmt::format(fmt::runtime(more), "5", "2")), MendKind::one_sided_link);
+}
+
+TEST(OpenDriveMends, JunctionsOfOtherKindsConnectNothing) {
+  RoadText road = straight();
+  road.link = R"(<successor elementType="junction" elementId="3"/>)";
+  const RoadMap map = mended(road.text() + R"(<junction id="3" type="virtual" mainRoad="2" sStart="1" sEnd="2"/>)",
+                             MendKind::unsupported_junction);
+  EXPECT_THAT(said(map), HasSubstr("junction 3: <junction>: attribute type: 'virtual' junctions are not supported"));
+  EXPECT_EQ(map.junctions.size(), 1u);
+}
+
+TEST(OpenDriveMends, MarksThatRunBackAreCut) {
+  // A right bend of 5 m radius, with a mark 8 m to its inner side.
+  RoadText road;
+  road.length = 15;
+  road.geometry =
+      R"(<geometry s="0" x="0" y="0" hdg="0" length="5"><line/></geometry>)"
+      R"(<geometry s="5" x="5" y="0" hdg="0" length="5"><arc curvature="-0.2"/></geometry>)"
+      R"(<geometry s="10" x="9.2073549240394827" y="-2.2984884706593015" hdg="-1" length="5"><line/></geometry>)";
+  road.right =
+      lane_of(-1, "driving", 3) + lane_of(-2, "driving", 5, R"(<roadMark sOffset="0" type="solid" width="0.1"/>)");
+  const RoadMap map = mended(road.text(), MendKind::self_crossing_mark);
+  EXPECT_THAT(said(map), HasSubstr("road 1: <roadMark>:"));
+  ASSERT_EQ(map.markings.size(), 2u) << "before and after";
+}
+
+// What is said.
+
+TEST(OpenDriveMends, MendsAreGroupedWithTheMostFrequentFirst) {
+  RoadText road = straight();
+  for (int i = 0; i < 3; ++i) road.center_mark += R"(<roadMark sOffset="0" type="solid" color="pink"/>)";
+  road.type = R"(<type s="125" type="town"/>)";
+  const RoadMap map = parse_opendrive(file_of(road.text()), "bad.xodr");
+  EXPECT_THAT(
+      describe_mends(map.mends, "bad.xodr"),
+      ElementsAre(AllOf(StartsWith("3 x unknown colors of road marks: painted white; first: bad.xodr:"),
+                        HasSubstr("road 1: <roadMark>: attribute color: 'pink'")),
+                  StartsWith("1 x records beyond the end of their section or road: left out; first: bad.xodr:")));
+  EXPECT_EQ(map.mends.size(), 4u);
+}
+
+TEST(OpenDriveMends, TooManyFaultsAreRefused) {
+  std::string marks;
+  for (int i = 0; i < 1'000'001; ++i) marks += "<roadMark type='x'/>";
+  RoadText road = straight();
+  road.center_mark = marks;
+  EXPECT_THAT(test::message_of([&] { parse_opendrive(file_of(road.text()), "bad.xodr"); }),
+              HasSubstr("after 1000000 other faults"));
+}
+
+TEST(OpenDriveMends, FaultsWithoutAMeaningAreRefused) {
+  EXPECT_THROW(parse_opendrive("", "bad.xodr"), Error);
+  EXPECT_THROW(parse_opendrive("<OpenDRIVE/>", "bad.xodr"), Error);
+  for (const auto& [from, to] :
+       std::vector<std::pair<std::string, std::string>>{{"x=\"0\"", "x=\"inf\""},
+                                                        {"x=\"0\"", ""},
+                                                        {"<line/>", ""},
+                                                        {"<line/>", "<arc/>"},
+                                                        {"a=\"3\"", "a=\"x\""},
+                                                        {"a=\"3\"", "a=\"2000\""},
+                                                        {"id=\"-1\" type", "id=\"1\" type"},
+                                                        {"road id=\"1\"", "road"},
+                                                        {"junction=\"-1\"", "junction=\"-1\" rule=\"XHT\""}}) {
+    const std::string refusal =
+        test::message_of([&] { parse_opendrive(file_of(replaced(straight().text(), from, to)), "bad.xodr"); });
+    EXPECT_THAT(refusal, StartsWith("bad.xodr:")) << from << " -> " << to;
+  }
+  EXPECT_THAT(test::message_of([&] { parse_opendrive(file_of(straight().text() + straight().text()), "bad.xodr"); }),
+              HasSubstr("road 1: <road>: attribute id: another road has it already"));
+}
+
+TEST(OpenDriveMends, DamagedFilesGiveAValidMapOrAnError) {
+  // parse_opendrive validates its result; anything but a map or an Error ends the test.
+  const std::string valid_text = file_of(test::three_roads());
+  std::mt19937 random(7);
+  const std::string alphabet = "0123456789-.e\"<>/= abcxyz";
+  int maps = 0, mended_maps = 0;
+  for (int trial = 0; trial < 3000; ++trial) {
+    std::string text = valid_text;
+    for (unsigned damage = random() % 3 + 1; damage-- > 0;) {
+      const std::size_t at = random() % text.size();
+      if (random() % 4 == 0) {
+        text.erase(at, random() % 12);
+      } else {
+        text[at] = alphabet[random() % alphabet.size()];
+      }
+    }
+    try {
+      const RoadMap map = parse_opendrive(text, "damaged.xodr");
+      ++maps;
+      mended_maps += map.mends.empty() ? 0 : 1;
+    } catch (const Error&) {
+    }
+  }
+  EXPECT_GT(maps, 150);
+  EXPECT_GT(mended_maps, 60);
+}
+
+TEST(OpenDriveMends, EveryKindStandsInTheTable) {
+  const std::string docs = read_file(PICTURA_OPENDRIVE_DOCS);
+  for (const MendKind kind : mend_kinds()) {
+    EXPECT_THAT(docs, HasSubstr(fmt::format("| {} | {} |", to_string(kind), action_of(kind))));
+  }
+}
+
+}  // namespace
+}  // namespace pictura
