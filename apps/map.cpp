@@ -21,6 +21,8 @@ namespace pictura {
 
 namespace {
 
+constexpr double kQuiet_s = 0.3;  // imports that take less show no progress
+
 struct Arguments {
   std::string map, png, svg, xodr;
   int size_px = 1600;
@@ -88,6 +90,10 @@ Json mends_of(const RoadMap& map, const std::string& source) {
   return groups;
 }
 
+double seconds_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
 void run_map(const CLI::App& command, const Arguments& arguments) {
   if (arguments.png.empty() && arguments.svg.empty()) {
     for (const char* option : {"--at", "--box", "--size"}) {
@@ -101,9 +107,15 @@ void run_map(const CLI::App& command, const Arguments& arguments) {
   if (arguments.full && !arguments.json) fail_usage("--full: lists elements as JSON; expected --json with it");
   const InterruptibleWork work("interrupted");
   LoadReport report;
+  ProgressLine progress;
   const auto begin = std::chrono::steady_clock::now();
-  const std::shared_ptr<const RoadMap> map = load_map(arguments.map, {.strict = arguments.strict}, &report);
-  const double load_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  const std::shared_ptr<const RoadMap> map =
+      load_map(arguments.map, {.strict = arguments.strict}, &report, [&](const char* stage, double done) {
+        work.check();
+        if (seconds_since(begin) > kQuiet_s) progress.update(fmt::format("{}: {}", arguments.map, stage), done);
+      });
+  progress.finish();
+  const double load_ms = 1e3 * seconds_since(begin);
   work.check();
   print_mends(*map, report.source);
   const MapPictureOptions picture{.size_px = arguments.size_px, .box = shown_box(arguments)};

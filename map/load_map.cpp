@@ -52,11 +52,12 @@ std::string file_path_of(const std::string& name) {
              suggestion(name, known));
 }
 
-RoadMap load_file(const std::string& path, const OpenDriveOptions& options, LoadReport* report) {
+RoadMap load_file(const std::string& path, const OpenDriveOptions& options, const ImportProgress& progress,
+                  LoadReport* report) {
   report->source = path;
   const std::string text = read_file(path, kMaxFile_bytes);
   const std::string cache_path = map_cache_path(path, options);
-  if (cache_path.empty()) return parse_opendrive(text, path, options);
+  if (cache_path.empty()) return parse_opendrive(text, path, options, progress);
   const MapCacheKey key = map_cache_key(text, options);
   std::error_code error;
   if (fs::exists(cache_path, error)) {
@@ -68,7 +69,7 @@ RoadMap load_file(const std::string& path, const OpenDriveOptions& options, Load
       report->cache_rejection = rejection.what();
     }
   }
-  RoadMap map = parse_opendrive(text, path, options);
+  RoadMap map = parse_opendrive(text, path, options, progress);
   try_to_cache(cache_path, encode_map(map, key));
   return map;
 }
@@ -103,17 +104,17 @@ std::string map_folder() {
 }
 
 std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDriveOptions& options,
-                                        LoadReport* report_out) {
+                                        LoadReport* report_out, const ImportProgress& progress) {
   LoadReport unused;
   LoadReport& report = report_out ? *report_out : unused;
   report = {};
   if (const std::optional<TownOptions> town = procedural_options(name)) {
     report.source = name;
-    auto map = std::make_shared<RoadMap>(parse_opendrive(procedural_town(*town), name, options));
+    auto map = std::make_shared<RoadMap>(parse_opendrive(procedural_town(*town), name, options, progress));
     map->name = name == kProcedural ? fmt::format("{}:{}", kProcedural, town->seed) : name;
     return map;
   }
-  return std::make_shared<RoadMap>(load_file(file_path_of(name), options, &report));
+  return std::make_shared<RoadMap>(load_file(file_path_of(name), options, progress, &report));
 }
 
 MapText map_text(const std::string& name) {

@@ -24,7 +24,7 @@ struct LoadReport {
 /// (map_cache.h); a cache that cannot be read or written only costs time. Throws Error naming the file and the line or
 /// element; UsageError when there is no such map.
 std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDriveOptions& options = {},
-                                        LoadReport* report_out = nullptr);
+                                        LoadReport* report_out = nullptr, const ImportProgress& progress = {});
 
 struct MapText {
   std::string text, source;  // OpenDRIVE, and its name in messages

@@ -2,8 +2,10 @@
 // pieces of bounded length. Shared by all importers.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,12 +33,29 @@ inline double plan_distance_m(const Eigen::Vector3d& a, const Eigen::Vector3d& b
   return std::hypot(b.x() - a.x(), b.y() - a.y());
 }
 
+/// Whether the distance in plan is at most `limit_m`.
+inline bool is_within(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit_m) {
+  const double dx = b.x() - a.x(), dy = b.y() - a.y();
+  return dx * dx + dy * dy <= limit_m * limit_m;
+}
+
 inline Vec3 to_vec3(const Eigen::Vector3d& p) {
   return {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())};
 }
 
 /// The deviation of `p` from the chord a-b: its distance in space, or half the error in width if that is larger.
-double chord_error(const CurvePoint& a, const CurvePoint& b, const CurvePoint& p);
+inline double chord_error(const CurvePoint& a, const CurvePoint& b, const CurvePoint& p) {
+  // Sums in plan first: maps keep their bits.
+  const auto dot = [](const Eigen::Vector3d& v, const Eigen::Vector3d& w) {
+    return v.head<2>().dot(w.head<2>()) + v.z() * w.z();
+  };
+  const Eigen::Vector3d chord = b.position_m - a.position_m;
+  const double length2 = dot(chord, chord);
+  double u = 0;
+  if (length2 > 0) u = std::clamp(dot(p.position_m - a.position_m, chord) / length2, 0.0, 1.0);
+  const Eigen::Vector3d error = p.position_m - (a.position_m + u * chord);
+  return std::max(std::sqrt(dot(error, error)), 0.5 * std::abs(p.width - (a.width + u * (b.width - a.width))));
+}
 
 /// The indices of a subset of the points, first and last included, so that every point left out is within `tolerance_m`
 /// of the chord that replaces it and no chord is longer (in plan) than `max_piece_m`, unless two neighbouring points
@@ -60,19 +79,37 @@ class SampleBudget {
   std::string source_;
 };
 
-/// Samples eval(s) -> CurvePoint over [breaks.front(), breaks.back()]; the curve is smooth between breaks.
+/// Where a curve is cut for sampling: it is smooth between breaks. Values at the breaks themselves may belong to other
+/// formulae.
+struct CurveBreaks {
+  std::vector<double> s;
+  // [s - 1], or empty: an upper bound of the second derivative by s, of position and of half the width, between two
+  // breaks; infinite where none is known.
+  std::vector<double> bend;
+};
+
+/// Samples eval(s) -> CurvePoint over all intervals between breaks.
 template <typename Eval>
-std::vector<CurvePoint> sample_curve(const std::vector<double>& breaks, double tolerance_m, double max_piece_m,
+std::vector<CurvePoint> sample_curve(const CurveBreaks& curve, double tolerance_m, double max_piece_m,
                                      SampleBudget* budget, Eval&& eval) {
   constexpr int kMaxDepth = 24;
   constexpr double kMinStep = 0.01;
   constexpr double kStepsPerPiece = 4;
   constexpr double kDenseShare = 0.1;  // of the tolerance: for sampling; the rest is for thinning
+  constexpr double kSafety = 0.9;      // far more than rounding
+  const std::vector<double>& breaks = curve.s;
   std::vector<CurvePoint> dense{eval(breaks.front())};
+  double low = 0, high = 0, bend = 0;  // of the present interval
   auto refine = [&](auto&& self, const CurvePoint& a, const CurvePoint& b, int depth) -> void {
     budget->count_sample();
     if (depth < kMaxDepth) {
-      bool is_fine = plan_distance_m(a.position_m, b.position_m) <= max_piece_m + kPieceRounding;
+      bool is_fine = is_within(a.position_m, b.position_m, max_piece_m + kPieceRounding);
+      // A chord over h deviates by at most h^2 / 8 times the second derivative: most need no test.
+      const double h = b.s - a.s;
+      if (is_fine && a.s > low && b.s < high && bend * h * h <= 8 * kSafety * kDenseShare * tolerance_m) {
+        dense.push_back(b);
+        return;
+      }
       CurvePoint middle = eval(0.5 * (a.s + b.s));
       is_fine = is_fine && chord_error(a, b, middle) <= kDenseShare * tolerance_m;
       for (const double fraction : {0.25, 0.75}) {
@@ -91,6 +128,9 @@ std::vector<CurvePoint> sample_curve(const std::vector<double>& breaks, double t
     if (span <= 0) continue;
     // Even steps, several per piece, so that thinned pieces can be nearly as long as allowed.
     const int steps = static_cast<int>(std::ceil(kStepsPerPiece * span / max_piece_m - kPieceRounding));
+    low = begin;
+    high = breaks[i];
+    bend = curve.bend.empty() ? std::numeric_limits<double>::infinity() : curve.bend[i - 1];
     for (int step = 1; step <= steps; ++step) {
       refine(refine, CurvePoint(dense.back()), eval(step == steps ? breaks[i] : begin + span * step / steps), 0);
     }

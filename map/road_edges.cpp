@@ -88,13 +88,21 @@ class Tracer {
   /// Whether no other band covers the point just outside `p` on the border of `band`, and no band of a lower index
   /// emits the same shared border. Bands that share a border within kSharedBorder_m may each extend slightly beyond the
   /// other, so the test recurses to check that the lower band really emits it: one of them always does.
-  bool is_outline(const Eigen::Vector3d& p, const Eigen::Vector2d& outward, int32_t band) const {
+  bool is_outline(const Eigen::Vector3d& p, const Eigen::Vector2d& outward, int32_t band) {
+    surface_.find_near(p.head<2>(), p.z(), &near_);
+    return is_outline_near(p, outward, band, 0);
+  }
+
+  /// The same for a place at most depth times kSharedBorder_m from where near_ was found.
+  bool is_outline_near(const Eigen::Vector3d& p, const Eigen::Vector2d& outward, int32_t band, int depth) const {
+    constexpr int kMaxDepth = static_cast<int>((Surface::kNear_m - kMaxGap_m) / kSharedBorder_m) - 1;
+    const Surface::Candidates& near = depth <= kMaxDepth ? near_ : none_;
     auto at = [&](double distance_m) -> Eigen::Vector2d { return p.head<2>() + distance_m * outward; };
     auto is_other = [&](int32_t other) { return other != band; };
-    if (surface_.any_band_at(at(kSharedBorder_m), p.z(), is_other)) return false;
-    if (surface_.any_band_at(at(kMaxGap_m), p.z(), is_other)) return false;
+    if (surface_.any_near(near, at(kSharedBorder_m), p.z(), is_other)) return false;
+    if (surface_.any_near(near, at(kMaxGap_m), p.z(), is_other)) return false;
     std::vector<int32_t> adjacent_bands;
-    surface_.any_band_at(at(-kSharedBorder_m), p.z(), [&](int32_t other) {
+    surface_.any_near(near, at(-kSharedBorder_m), p.z(), [&](int32_t other) {
       if (other < band && (adjacent_bands.empty() || adjacent_bands.back() != other)) adjacent_bands.push_back(other);
       return false;
     });
@@ -102,11 +110,12 @@ class Tracer {
       double inside = -kSharedBorder_m, outside = kSharedBorder_m;
       for (int iteration = 0; iteration < 6; ++iteration) {
         const double middle = 0.5 * (inside + outside);
-        const bool covered = surface_.any_band_at(at(middle), p.z(), [&](int32_t other) { return other == adjacent; });
+        const bool covered =
+            surface_.any_near(near, at(middle), p.z(), [&](int32_t other) { return other == adjacent; });
         (covered ? inside : outside) = middle;
       }
       const Eigen::Vector2d border = at(inside);
-      if (is_outline({border.x(), border.y(), p.z()}, outward, adjacent)) return false;
+      if (is_outline_near({border.x(), border.y(), p.z()}, outward, adjacent, depth + 1)) return false;
     }
     return true;
   }
@@ -122,6 +131,7 @@ class Tracer {
   const std::vector<SurfaceBand>& bands_;
   const Surface& surface_;
   int32_t band_ = 0;
+  Surface::Candidates near_, none_;  // about the place in question; none, so that quads are looked up anew
   std::vector<OutlinePoint> run_;
   std::vector<std::vector<OutlinePoint>> runs_;
 };
@@ -220,6 +230,14 @@ std::vector<RoadEdge> outline_of(const std::vector<SurfaceBand>& bands, double c
       if (!points.empty()) {
         const double step_m = plan_distance_m(points.back().position_m, p.position_m);
         if (step_m < 1e-3) continue;
+        // The end of a wide road is one straight segment.
+        const Eigen::Vector3d begin = points.back().position_m;
+        const int pieces = std::max(1, static_cast<int>(std::ceil(step_m / kMaxPiece_m - kPieceRounding)));
+        for (int i = 1; i < pieces; ++i) {
+          const double u = static_cast<double>(i) / pieces;
+          points.push_back({length_m + u * step_m, lerp(begin, p.position_m, u), 0});
+          bands_of_points.push_back(p.band);
+        }
         length_m += step_m;
       }
       points.push_back({length_m, p.position_m, 0});

@@ -1,6 +1,8 @@
 #include "pictura/map/surface.h"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace pictura {
 
@@ -21,10 +23,18 @@ bool in_triangle(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen
   return (ab >= 0 && bc >= 0 && ca >= 0) || (ab <= 0 && bc <= 0 && ca <= 0);
 }
 
+double mean_height(const Eigen::Vector3d* corners) {
+  return 0.25 * (corners[0].z() + corners[1].z() + corners[2].z() + corners[3].z());
+}
+
 }  // namespace
 
 Surface::Surface(const std::vector<SurfaceBand>& bands, double level_m) : level_m_(level_m) {
+  std::size_t num_quads = 0;
+  for (const SurfaceBand& band : bands) num_quads += std::max<std::size_t>(band.left.size(), 1) - 1;
   std::vector<Aabb2> boxes;
+  boxes.reserve(num_quads);
+  quads_.reserve(num_quads);
   for (std::size_t band = 0; band < bands.size(); ++band) {
     const auto& [left, right] = bands[band];
     for (std::size_t i = 0; i + 1 < left.size(); ++i) {
@@ -40,14 +50,58 @@ Surface::Surface(const std::vector<SurfaceBand>& bands, double level_m) : level_
     }
   }
   grid_ = Grid(boxes, kCell_m);
+  const GridView grid = grid_.view();
+  bounds_.reserve(grid.items.size());
+  for (const int32_t quad : grid.items) bounds_.push_back(bounds_of(quads_[static_cast<std::size_t>(quad)]));
   remaining_lookups_ = kBaseLookups + kLookupsPerQuad * static_cast<int64_t>(quads_.size());
+}
+
+/// The test of a triangle of almost no area is rounding, which may let it cover points far along its line: such quads
+/// are bounded in height alone.
+Surface::QuadBounds Surface::bounds_of(const Quad& quad) const {
+  constexpr float kMargin_m =
+      static_cast<float>(kNear_m) + 0.05f;  // far more than the rounding of coordinates to float
+  constexpr double kMinArea_m2 = 0.01;
+  const Eigen::Vector3d* c = quad.corners;
+  const double mean_z = mean_height(c);
+  QuadBounds bounds{{-1e30f, -1e30f}, {1e30f, 1e30f}};
+  bounds.low_z = static_cast<float>(mean_z - level_m_) - kMargin_m;
+  bounds.high_z = static_cast<float>(mean_z + level_m_) + kMargin_m;
+  const double area = std::min(std::abs(cross_product(c[0], c[1], c[2].head<2>())),
+                               std::abs(cross_product(c[0], c[2], c[3].head<2>())));
+  if (!(area >= 2 * kMinArea_m2)) return bounds;
+  std::swap(bounds.low, bounds.high);
+  for (int i = 0; i < 4; ++i) {
+    const float x = static_cast<float>(c[i].x()), y = static_cast<float>(c[i].y());
+    bounds.low = {min_of(bounds.low.x, x - kMargin_m), min_of(bounds.low.y, y - kMargin_m)};
+    bounds.high = {max_of(bounds.high.x, x + kMargin_m), max_of(bounds.high.y, y + kMargin_m)};
+  }
+  return bounds;
+}
+
+void Surface::find_near(const Eigen::Vector2d& p, double z, Candidates* out) const {
+  out->quads.clear();
+  const GridView grid = grid_.view();
+  const float margin = static_cast<float>(kNear_m) + 0.01f;
+  const Vec2 position{static_cast<float>(p.x()), static_cast<float>(p.y())};
+  const Vec2 low{position.x - margin, position.y - margin}, high{position.x + margin, position.y + margin};
+  out->are_complete = grid.contains(low) && grid.contains(high) && grid.cell_x(low.x) == grid.cell_x(high.x) &&
+                      grid.cell_y(low.y) == grid.cell_y(high.y);
+  if (!out->are_complete) return;
+  const std::size_t cell = static_cast<std::size_t>(grid.cell_y(position.y)) * static_cast<std::size_t>(grid.num_x) +
+                           static_cast<std::size_t>(grid.cell_x(position.x));
+  count_lookups(grid.begin[cell + 1] - grid.begin[cell]);
+  const float height = static_cast<float>(z);
+  for (int32_t i = grid.begin[cell]; i < grid.begin[cell + 1]; ++i) {
+    if (!bounds_[static_cast<std::size_t>(i)].contains(position, height)) continue;
+    out->quads.push_back(grid.items[static_cast<std::size_t>(i)]);
+  }
 }
 
 /// Two triangles, so that non-convex quads are covered as drawn.
 bool Surface::contains(const Quad& quad, const Eigen::Vector2d& p, double z) const {
   const Eigen::Vector3d* c = quad.corners;
-  const double mean_z = 0.25 * (c[0].z() + c[1].z() + c[2].z() + c[3].z());
-  if (std::abs(z - mean_z) >= level_m_) return false;
+  if (std::abs(z - mean_height(c)) >= level_m_) return false;
   return in_triangle(c[0], c[1], c[2], p) || in_triangle(c[0], c[2], c[3], p);
 }
 

@@ -106,7 +106,7 @@ void add_bench_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "bench",
       "Measure rates, quality and worlds: bench render, bench history, bench simulate, bench train, bench breakdown, "
-      "bench quality, bench worlds, bench soak");
+      "bench quality, bench worlds, bench map, bench soak");
   command->require_subcommand(1);
   command->footer(
       "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n  pictura bench render --size 192x108\n"
@@ -119,6 +119,7 @@ void add_bench_command(CLI::App& app) {
   add_quality_benchmark(*command);
   add_render_benchmark(*command);
   add_worlds_benchmark(*command);
+  add_map_benchmark(*command);
   add_soak_benchmark(*command);
   add_history_benchmark(*command);
 #ifdef PICTURA_HAS_TORCH

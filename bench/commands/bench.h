@@ -55,7 +55,7 @@ void report_benchmark(bool json, const BenchContext& context, const std::vector<
 void add_bench_command(CLI::App& app);
 
 /// Add `bench train`, `bench breakdown`, `bench simulate`, `bench quality`, `bench render`, `bench history`, `bench
-/// worlds` and `bench soak`.
+/// worlds`, `bench map` and `bench soak`.
 void add_train_benchmark(CLI::App& bench);
 void add_breakdown_benchmark(CLI::App& bench);
 void add_simulate_benchmark(CLI::App& bench);
@@ -63,6 +63,7 @@ void add_quality_benchmark(CLI::App& bench);
 void add_render_benchmark(CLI::App& bench);
 void add_history_benchmark(CLI::App& bench);
 void add_worlds_benchmark(CLI::App& bench);
+void add_map_benchmark(CLI::App& bench);
 void add_soak_benchmark(CLI::App& bench);
 
 }  // namespace pictura

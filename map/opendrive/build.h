@@ -38,6 +38,7 @@ struct Build {
     const FileLane* lane;
   };
   std::vector<LaneSource> file_lanes;  // parallel to RoadMap::lanes
+  StationCache stations;
 
   /// Converts file coordinates to map coordinates.
   Vec3 to_map(const Eigen::Vector3d& p) const { return to_vec3(from_origin(p)); }

@@ -1,7 +1,9 @@
 #include "pictura/map/opendrive/curves.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <limits>
 
 namespace pictura::opendrive {
 
@@ -33,6 +35,16 @@ const Item& last_item_at(const std::vector<Item>& items, double s) {
 double clamp_inside(const FileSection& section, double s) {
   const double margin = std::min(kSectionMargin_m, 0.5 * (section.end - section.s));
   return std::clamp(s, section.s + margin, section.end - margin);
+}
+
+/// The t of a lane's outer border; `inner` is that of its inner one.
+double beyond_lane(const FileLane& lane, double ds, double sign, double inner) {
+  if (lane.border.cubics.empty()) {
+    const double width = lane.width.value(ds);
+    return width < 0 ? inner : inner + sign * width;
+  }
+  const double t = lane.border.value(ds);
+  return sign * t < sign * inner ? inner : t;
 }
 
 /// sin(x) / x.
@@ -114,6 +126,85 @@ double banked_t(const FileRoad& road, double s, double t) {
   return t;
 }
 
+Station station_at(const FileRoad& road, double s) {
+  const Pose pose = pose_at(road, s);
+  return {s, pose.position_m, {-std::sin(pose.heading), std::cos(pose.heading)}, road.elevation.value(s)};
+}
+
+Eigen::Vector3d point_beside(const FileRoad& road, const Station& station, double t) {
+  const double s = station.s;
+  double lateral = t, z = station.elevation_m;
+  if (has_banking(road)) {
+    const double banked = banked_t(road, s, t);
+    const double roll = road.superelevation.value(s);
+    const double fall = (t > 0 ? road.left_crossfall : road.right_crossfall).value(s);
+    lateral = t - banked + banked * std::cos(roll);
+    z += banked * std::sin(roll) - std::abs(banked) * std::tan(fall) + shape_height(road.shape, s, banked);
+  }
+  const Eigen::Vector2d p = station.position_m + lateral * station.left;
+  return {p.x(), p.y(), z};
+}
+
+/// Bounds of a cubic and its derivatives over an interval.
+struct Bounds {
+  double low = 0, high = 0, slope = 0, bend = 0;  // of the value; of the magnitudes of its two derivatives
+};
+
+/// From its Bernstein coefficients, which bound a polynomial.
+Bounds bounds_between(const Profile& profile, double begin, double end) {
+  if (profile.cubics.empty()) return {};
+  const Cubic& cubic = last_item_at(profile.cubics, 0.5 * (begin + end));
+  const double x = begin - cubic.s, h = end - begin;
+  const double a = cubic.a + x * (cubic.b + x * (cubic.c + x * cubic.d));
+  const double b = h * (cubic.b + x * (2 * cubic.c + x * 3 * cubic.d)), c = h * h * (cubic.c + x * 3 * cubic.d);
+  const double d = h * h * h * cubic.d;
+  const double points[4] = {a, a + b / 3, a + (2 * b + c) / 3, a + b + c + d};
+  Bounds bounds{.low = points[0], .high = points[0]};
+  for (int i = 0; i < 4; ++i) {
+    bounds.low = std::min(bounds.low, points[i]);
+    bounds.high = std::max(bounds.high, points[i]);
+    if (i > 0) bounds.slope = std::max(bounds.slope, 3 * std::abs(points[i] - points[i - 1]) / h);
+  }
+  bounds.bend = std::max(std::abs(2 * c), std::abs(2 * c + 6 * d)) / (h * h);
+  return bounds;
+}
+
+/// A bound of the second derivative of points on a lane, borders included, or `beyond_m` beside them, between two
+/// breaks. With the curvature k of the reference line and the lateral position t it is that of c + t n: k't + 2kt'
+/// along, and k(1 - kt) + t'' across.
+double bend_between(const FileRoad& road, const FileSection& section, int lane, double beyond_m, double begin,
+                    double end) {
+  constexpr double kUnknown = std::numeric_limits<double>::infinity();
+  constexpr double kZero_m = -1e-9;  // widths below zero count as zero, with a kink
+  const GeometryPiece& piece = last_item_at(road.geometry, 0.5 * (begin + end));
+  if (piece.cubic || end <= begin) return kUnknown;
+  const Bounds offset = bounds_between(road.lane_offset, begin, end);
+  double near = 0, far = 0, slope = offset.slope,
+         bend = offset.bend;  // distances of the lane's borders from the center
+  const std::vector<FileLane>& side = lane > 0 ? section.left : section.right;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(std::abs(lane)); ++i) {
+    if (!side[i].border.cubics.empty()) return kUnknown;
+    const Bounds width = bounds_between(side[i].width, begin - section.s, end - section.s);
+    if (!(width.low >= kZero_m)) return kUnknown;
+    if (i + 1 < static_cast<std::size_t>(std::abs(lane))) near += width.low;
+    far += width.high;
+    slope += width.slope;
+    bend += width.bend;
+  }
+  const double t_low = offset.low + (lane > 0 ? near : -far) - beyond_m;
+  const double t_high = offset.high + (lane > 0 ? far : -near) + beyond_m;
+  double k = 0, across = 0;
+  for (const double curvature : {piece.start_curvature, piece.end_curvature}) {
+    k = std::max(k, std::abs(curvature));
+    for (const double t : {t_low, t_high}) across = std::max(across, std::abs(curvature * (1 - curvature * t)));
+  }
+  const double change = std::abs(piece.end_curvature - piece.start_curvature) / piece.length;
+  // Of a spiral, k(1 - kt) may be largest in between.
+  if (change > 0) across = k * (1 + k * std::max(std::abs(t_low), std::abs(t_high)));
+  return change * std::max(std::abs(t_low), std::abs(t_high)) + 2 * k * slope + across + bend +
+         bounds_between(road.elevation, begin, end).bend;
+}
+
 /// The change of heading of a spiral from its start to ds.
 double spiral_turn(const GeometryPiece& piece, double ds) {
   const double rate = (piece.end_curvature - piece.start_curvature) / piece.length;
@@ -192,29 +283,38 @@ Pose pose_at(const FileRoad& road, double s) {
   return pose_on(piece, std::clamp(s - piece.s, 0.0, piece.length));
 }
 
+const Station& StationCache::at(const FileRoad& road, double s) {
+  if (road_ != &road) {
+    road_ = &road;
+    stations_.assign(std::size_t{1} << kLogSize, {.s = std::numeric_limits<double>::quiet_NaN()});
+  }
+  constexpr std::uint64_t kMultiplier = 0x9e3779b97f4a7c15;  // Fibonacci hashing
+  Station& station = stations_[(std::bit_cast<std::uint64_t>(s) * kMultiplier) >> (64 - kLogSize)];
+  if (station.s != s) station = station_at(road, s);
+  return station;
+}
+
 Eigen::Vector3d point_at(const FileRoad& road, double s, double t) {
   s = std::clamp(s, 0.0, road.length);
-  const Pose pose = pose_at(road, s);
-  double lateral = t, z = road.elevation.value(s);
-  if (has_banking(road)) {
-    const double banked = banked_t(road, s, t);
-    const double roll = road.superelevation.value(s);
-    const double fall = (t > 0 ? road.left_crossfall : road.right_crossfall).value(s);
-    lateral = t - banked + banked * std::cos(roll);
-    z += banked * std::sin(roll) - std::abs(banked) * std::tan(fall) + shape_height(road.shape, s, banked);
-  }
-  const Eigen::Vector2d left{-std::sin(pose.heading), std::cos(pose.heading)}, p = pose.position_m + lateral * left;
-  return {p.x(), p.y(), z};
+  return point_beside(road, station_at(road, s), t);
+}
+
+Eigen::Vector3d point_at(const FileRoad& road, double s, double t, StationCache* cache) {
+  return point_beside(road, cache->at(road, std::clamp(s, 0.0, road.length)), t);
 }
 
 Eigen::Vector3d point_on_lane(const FileRoad& road, const FileSection& section, const FileLane& lane, double s,
-                              double outer_fraction) {
-  const double outer = border_at(road, section, lane.id, s).t;
-  double t = outer;
-  if (lane.id != 0) t -= (1 - outer_fraction) * (outer - border_at(road, section, inner_border(lane.id), s).t);
-  Eigen::Vector3d point = point_at(road, s, t);
+                              double outer_fraction, StationCache* cache) {
+  const double here = clamp_inside(section, s), ds = here - section.s;
+  const double sign = lane.id > 0 ? 1 : -1;
+  const std::vector<FileLane>& side = lane.id > 0 ? section.left : section.right;
+  double outer = road.lane_offset.value(here), inner = outer;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(std::abs(lane.id)); ++i) {
+    inner = outer;
+    outer = beyond_lane(side[i], ds, sign, outer);
+  }
+  Eigen::Vector3d point = point_at(road, s, outer - (1 - outer_fraction) * (outer - inner), cache);
   if (!lane.inner_height.cubics.empty()) {
-    const double ds = clamp_inside(section, s) - section.s;
     point.z() += (1 - outer_fraction) * lane.inner_height.value(ds) + outer_fraction * lane.outer_height.value(ds);
   }
   return point;
@@ -281,6 +381,16 @@ std::vector<double> formula_changes(const FileRoad& road, const FileSection& sec
   std::sort(changes.begin() + 1, changes.end());
   changes.push_back(end);
   return changes;
+}
+
+CurveBreaks breaks_of(const FileRoad& road, const FileSection& section, int lane, double begin, double end,
+                      double beyond_m) {
+  CurveBreaks breaks{formula_changes(road, section, lane, begin, end), {}};
+  if (has_banking(road)) return breaks;
+  for (std::size_t i = 1; i < breaks.s.size(); ++i) {
+    breaks.bend.push_back(bend_between(road, section, lane, beyond_m, breaks.s[i - 1], breaks.s[i]));
+  }
+  return breaks;
 }
 
 }  // namespace pictura::opendrive

@@ -26,14 +26,35 @@ Pose pose_on(const GeometryPiece& piece, double ds);
 /// The pose of the reference line at s; s is clamped to the road.
 Pose pose_at(const FileRoad& road, double s);
 
+/// A place on the reference line: its position, the unit vector to its left, and its elevation.
+struct Station {
+  double s = 0;
+  Eigen::Vector2d position_m{0, 0}, left{0, 1};
+  double elevation_m = 0;
+};
+
+/// The last thousand stations of the road that was asked last: lanes beside each other, and both sides of each, are
+/// sampled at the same ones.
+class StationCache {
+ public:
+  const Station& at(const FileRoad& road, double s);
+
+ private:
+  static constexpr int kLogSize = 10;
+
+  const FileRoad* road_ = nullptr;
+  std::vector<Station> stations_;  // by a hash of s; NaN: free
+};
+
 /// The point `t` metres to the left of the reference line at s, measured along the banked road surface, with its
 /// height. s is clamped to the road.
 Eigen::Vector3d point_at(const FileRoad& road, double s, double t);
+Eigen::Vector3d point_at(const FileRoad& road, double s, double t, StationCache* cache);
 
 /// The point on a lane at s: `outer_fraction` is 0 on the inner border and 1 on the outer one. Includes the lane's
 /// <height>.
 Eigen::Vector3d point_on_lane(const FileRoad& road, const FileSection& section, const FileLane& lane, double s,
-                              double outer_fraction);
+                              double outer_fraction, StationCache* cache);
 
 /// Heading of the line midway between two borders, in the direction of growing s.
 double heading_between(const FileRoad& road, const FileSection& section, int inner, int outer, double s);
@@ -57,5 +78,10 @@ constexpr int inner_border(int lane_id) { return lane_id > 0 ? lane_id - 1 : lan
 /// and the widths and heights of lanes up to `border`. Sorted, including begin and end.
 std::vector<double> formula_changes(const FileRoad& road, const FileSection& section, int border, double begin,
                                     double end);
+
+/// The same breaks, with bounds of the second derivative of the lane's width and of points on it, borders included, or
+/// up to `beyond_m` beside them.
+CurveBreaks breaks_of(const FileRoad& road, const FileSection& section, int lane, double begin, double end,
+                      double beyond_m = 0);
 
 }  // namespace pictura::opendrive

@@ -14,11 +14,12 @@ constexpr double kMaxMapRadius_m = 1e5;
 
 Lane make_lane(Build* build, const FileRoad& road, const FileSection& section, const FileLane& lane) {
   const bool forward = travels_forward(road, lane);
-  std::vector<CurvePoint> points = sample_curve(
-      formula_changes(road, section, lane.id, section.s, section.end), build->options.chord_error_m, kMaxPiece_m,
-      &build->budget, [&](double s) {
-        return CurvePoint{s, point_on_lane(road, section, lane, s, 0.5), lane_width(road, section, lane, s)};
-      });
+  std::vector<CurvePoint> points =
+      sample_curve(breaks_of(road, section, lane.id, section.s, section.end), build->options.chord_error_m, kMaxPiece_m,
+                   &build->budget, [&](double s) {
+                     return CurvePoint{s, point_on_lane(road, section, lane, s, 0.5, &build->stations),
+                                       lane_width(road, section, lane, s)};
+                   });
   if (!forward) std::reverse(points.begin(), points.end());
 
   Lane result;

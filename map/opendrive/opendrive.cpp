@@ -20,9 +20,15 @@ SampleBudget budget_for(std::size_t text_bytes, const std::string& source) {
 
 }  // namespace
 
-RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options) {
+RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options,
+                        const ImportProgress& progress) {
   PICTURA_CHECK(options.chord_error_m >= 1e-3f && options.chord_error_m <= 10.0f,
                 "OpenDRIVE options: expected a chord error in [0.001, 10] m, got {}", options.chord_error_m);
+  // Shares as large networks have them.
+  const auto begin = [&](const char* stage, double done) {
+    if (progress) progress(stage, done);
+  };
+  begin("reading", 0);
   opendrive::Faults faults(options.strict);
   opendrive::Network network;
   opendrive::read_network(text, source, &faults, &network);
@@ -31,16 +37,20 @@ RoadMap parse_opendrive(std::string_view text, const std::string& source, const 
   RoadMap map;
   map.name = std::filesystem::path(source).stem().string();
   map.geo_reference = network.geo_reference;
-  opendrive::Build build{network, options, &faults, &map, budget_for(text.size(), source), {}, {}};
+  opendrive::Build build{network, options, &faults, &map, budget_for(text.size(), source), {}, {}, {}};
+  begin("lanes", 0.1);
   opendrive::choose_origin(&build);
   opendrive::build_lanes(&build);
   opendrive::link_lanes(&build);
   opendrive::set_speed_limits(&build);
   find_endless_lanes(&map);
+  begin("road edges", 0.2);
   opendrive::build_road_edges(&build);
+  begin("markings", 0.8);
   opendrive::build_markings(&build);
   opendrive::build_objects(&build);
   opendrive::build_signals(&build);
+  begin("building lines", 0.85);
   opendrive::build_building_lines(&build);
   opendrive::count_facts(&build);
   map.mends = faults.take();

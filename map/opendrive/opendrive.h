@@ -1,6 +1,7 @@
 // Imports OpenDRIVE (.xodr) files as RoadMaps.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -14,9 +15,13 @@ struct OpenDriveOptions {
   bool strict = false;          // refuse every fault, also those that have one sensible meaning
 };
 
+/// Told before each stage of an import: its name, and the share of the work that is done by then.
+using ImportProgress = std::function<void(const char* stage, double done)>;
+
 /// Parses the text of an OpenDRIVE file. `source` names it in messages. Faults that have one sensible meaning are
 /// mended and noted in RoadMap::mends; throws Error naming source, line, owner and element for all others, and in
 /// strict reading for any fault. docs/opendrive.md lists them.
-RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options = {});
+RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options = {},
+                        const ImportProgress& progress = {});
 
 }  // namespace pictura

@@ -100,18 +100,20 @@ class MarkPainter {
  private:
   void add(const RoadMark& mark, const Stripe& stripe, double from, double to) {
     if (to - from < kMinMarkLength_m) return;
-    std::vector<double> breaks = formula_changes(road_, section_, lane_.id, from, to);
+    CurveBreaks breaks = breaks_of(road_, section_, lane_.id, from, to, std::abs(stripe.left));
+    if (!mark.sway.cubics.empty()) breaks.bend.clear();
     const double mark_begin = section_.s + mark.s_offset;
     for (const Cubic& sway : mark.sway.cubics) {
-      if (mark_begin + sway.s > from && mark_begin + sway.s < to) breaks.push_back(mark_begin + sway.s);
+      if (mark_begin + sway.s > from && mark_begin + sway.s < to) breaks.s.push_back(mark_begin + sway.s);
     }
-    std::sort(breaks.begin(), breaks.end());
+    std::sort(breaks.s.begin(), breaks.s.end());
     const std::vector<CurvePoint> points =
         sample_curve(breaks, build_.options.chord_error_m, kMaxPiece_m, &build_.budget, [&](double s) {
           const double t = border_at(road_, section_, lane_.id, s).t + stripe.left + mark.sway.value(s - mark_begin);
-          Eigen::Vector3d p = point_at(road_, s, t);
+          Eigen::Vector3d p = point_at(road_, s, t, &build_.stations);
           // On a raised lane the mark is at the height of the lane's outer border.
-          if (!lane_.inner_height.cubics.empty()) p.z() = point_on_lane(road_, section_, lane_, s, 1).z();
+          if (!lane_.inner_height.cubics.empty())
+            p.z() = point_on_lane(road_, section_, lane_, s, 1, &build_.stations).z();
           return CurvePoint{s, p, 0};
         });
     // On the inner side of a bend tighter than its offset a mark would run back, and cross itself.

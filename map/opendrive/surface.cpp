@@ -1,6 +1,7 @@
 // The lane surfaces of an OpenDRIVE network as bands: road edges are the outline of the drivable ones, and building
 // lines run on free ground.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "pictura/map/opendrive/build.h"
@@ -27,23 +28,31 @@ SurfaceBand lane_band(Build* build, const FileRoad& road, const FileSection& sec
                       double chord_error_m) {
   const double left = lane.id > 0 ? 1 : 0, right = 1 - left;  // 0: inner border, 1: outer border
   auto border = [&](double outer_fraction, double s) {
-    return build->from_origin(point_on_lane(road, section, lane, s, outer_fraction));
+    return build->from_origin(point_on_lane(road, section, lane, s, outer_fraction, &build->stations));
   };
   // Both borders are sampled at the same stations, the union of those that either needs.
-  const std::vector<double> breaks = formula_changes(road, section, lane.id, section.s, section.end);
+  const CurveBreaks breaks = breaks_of(road, section, lane.id, section.s, section.end);
+  std::array<std::vector<CurvePoint>, 2> sampled;
   std::vector<double> stations;
-  for (const double side : {left, right}) {
-    const std::vector<CurvePoint> points = sample_curve(breaks, chord_error_m, kBandPiece_m, &build->budget,
-                                                        [&](double s) { return CurvePoint{s, border(side, s), 0}; });
-    for (const CurvePoint& point : points) stations.push_back(point.s);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const double side = i == 0 ? left : right;
+    sampled[i] = sample_curve(breaks, chord_error_m, kBandPiece_m, &build->budget,
+                              [&](double s) { return CurvePoint{s, border(side, s), 0}; });
+    for (const CurvePoint& point : sampled[i]) stations.push_back(point.s);
   }
   std::sort(stations.begin(), stations.end());
+  std::array<std::size_t, 2> next{};
+  const auto point_at_station = [&](std::size_t i, double s) {
+    while (next[i] < sampled[i].size() && sampled[i][next[i]].s < s) ++next[i];
+    const bool is_sampled = next[i] < sampled[i].size() && sampled[i][next[i]].s == s;
+    return is_sampled ? sampled[i][next[i]].position_m : border(i == 0 ? left : right, s);
+  };
   SurfaceBand band;
   double previous = -1;
   for (const double s : stations) {
     if (s - previous < 1e-4) continue;
-    band.left.push_back(border(left, s));
-    band.right.push_back(border(right, s));
+    band.left.push_back(point_at_station(0, s));
+    band.right.push_back(point_at_station(1, s));
     previous = s;
   }
   return band;
