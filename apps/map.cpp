@@ -16,6 +16,8 @@
 #include "pictura/map/load_map.h"
 #include "pictura/map/map_geometry.h"
 #include "pictura/map/opendrive/writer.h"
+#include "pictura/map/scenario/drivable_area.h"
+#include "pictura/map/scenario/load_scenario.h"
 
 namespace pictura {
 
@@ -67,6 +69,37 @@ void add_blind_approaches(const RoadMap& map, Json* object_out) {
   (*object_out)["blind_approaches"] = count.blind;
 }
 
+void add_scene_facts(const Scenario& scenario, Json* object_out) {
+  Json& object = *object_out;
+  const ScenarioFacts facts = pictura::facts_of(scenario);
+  const LoggedDriving driving = logged_driving(scenario);
+  object["scenario_id"] = scenario.id;
+  object["format"] = scenario.format;
+  object["steps"] = scenario.num_steps;
+  object["dt_s"] = scenario.dt_s;
+  object["current_step"] = scenario.current_step;
+  object["tracks"] = scenario.tracks.size();
+  object["vehicles"] = facts.vehicles;
+  object["moving_vehicles"] = facts.moving_vehicles;
+  object["pedestrians"] = facts.pedestrians;
+  object["cyclists"] = facts.cyclists;
+  object["others"] = facts.others;
+  object["tracks_with_gaps"] = facts.tracks_with_gaps;
+  object["sdc_track"] = scenario.sdc_track >= 0 ? Json(scenario.sdc_track) : Json(nullptr);
+  object["tracks_to_predict"] = scenario.tracks_to_predict.size();
+  object["objects_of_interest"] = scenario.objects_of_interest.size();
+  object["recorded_lights"] = scenario.lights.size();
+  object["recorded_light_states"] = facts.recorded_light_states;
+  object["moving_vehicle_steps"] = driving.vehicle_steps;
+  object["steps_touching_edge"] = driving.touching;
+  object["steps_off_road"] = driving.off_road;
+  Json notes = Json::array();
+  for (const ConversionNote& note : scenario.notes) {
+    notes.push_back({{"what", note.what}, {"count", note.count}, {"first", note.first}});
+  }
+  object["notes"] = notes;
+}
+
 void print_table(const Json& object) {
   for (const auto& [key, value] : object.items()) {
     fmt::print("{:18} {}\n", key,
@@ -94,6 +127,35 @@ double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
+/// A recorded scene: the facts of its map, its tracks and lights, and how its traffic and its edges agree.
+void run_scene(const Arguments& arguments) {
+  if (!arguments.xodr.empty()) fail_usage("--xodr: {} is a recorded scene, which has no OpenDRIVE", arguments.map);
+  const InterruptibleWork work("interrupted");
+  SceneReport report;
+  const auto begin = std::chrono::steady_clock::now();
+  const Scenario scenario = load_scenario(arguments.map, &report);
+  const double load_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  work.check();
+  const MapPictureOptions picture{.size_px = arguments.size_px, .box = shown_box(arguments), .scenario = &scenario};
+  if (!arguments.png.empty()) draw_map_png(scenario.map, arguments.png, picture);
+  if (!arguments.svg.empty()) draw_map_svg(scenario.map, arguments.svg, picture);
+  Json object = facts_of(scenario.map);
+  add_scene_facts(scenario, &object);
+  object["cached"] = report.cached;
+  if (!report.cache_rejection.empty()) object["cache_refused"] = report.cache_rejection;
+  object["load_ms"] = load_ms;
+  if (arguments.full) return print_listing(object, scenario.map);
+  if (arguments.json) return print_json(object);
+  for (const ConversionNote& note : scenario.notes) {
+    fmt::print(stderr, "note: {} {} (first: {})\n", note.count, note.what, note.first);
+  }
+  object.erase("notes");
+  print_table(object);
+  for (const std::string& path : {arguments.png, arguments.svg}) {
+    if (!path.empty()) fmt::print("drawn into {}\n", path);
+  }
+}
+
 void run_map(const CLI::App& command, const Arguments& arguments) {
   if (arguments.png.empty() && arguments.svg.empty()) {
     for (const char* option : {"--at", "--box", "--size"}) {
@@ -105,6 +167,7 @@ void run_map(const CLI::App& command, const Arguments& arguments) {
         "--lenient: is gone: faults that have one sensible meaning are mended by default; --strict refuses them");
   }
   if (arguments.full && !arguments.json) fail_usage("--full: lists elements as JSON; expected --json with it");
+  if (is_scene_name(arguments.map)) return run_scene(arguments);
   const InterruptibleWork work("interrupted");
   LoadReport report;
   ProgressLine progress;
@@ -148,7 +211,11 @@ void add_map_command(CLI::App& app) {
   constexpr double kFarthest_m = 1e8;  // from the origin of a map projection
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("map", "Print a map's properties, list its elements, draw it from above");
-  command->add_option("MAP", arguments->map, "A .xodr file, a town's name, or procedural[:SEED]")->required();
+  command
+      ->add_option("MAP", arguments->map,
+                   "A .xodr file, a town's name, procedural[:SEED], or a recorded scene: FILE.json, FILE.bin, "
+                   "FILE.tfrecord[#K] or FOLDER[#K], with a number or a scenario's id as K")
+      ->required();
   command
       ->add_option("--png", arguments->png,
                    "Draw lanes, markings, edges, lights, signs, crosswalks, parking and building lines into this file")
@@ -181,7 +248,8 @@ void add_map_command(CLI::App& app) {
   command->add_flag("--full", arguments->full, "With --json: list every element with its position in the file");
   command->footer(
       "Examples:\n  pictura map Town01 --json\n  pictura map procedural:7 --png town.png\n"
-      "  pictura map Town03 --svg crossing.svg --at 0 0 --radius 40");
+      "  pictura map Town03 --svg crossing.svg --at 0 0 --radius 40\n"
+      "  pictura map validation.tfrecord-00000-of-00150#7 --png scene.png");
   command->callback([arguments, command] { run_map(*command, *arguments); });
 }
 
