@@ -13,6 +13,7 @@ import pictura
 torch = pytest.importorskip("torch")
 from pictura.torch import _read_safetensors, load_policy, save_policy  # noqa: E402
 
+MODELS = sorted((pathlib.Path(__file__).parents[2] / "models").glob("*.safetensors"))
 NAMES = ("vector", "vector_points", "perspective", "perspective_points", "patches")
 
 
@@ -50,6 +51,14 @@ def test_saved_weights_are_read_back(reference, tmp_path):
     with pytest.raises(pictura.Error, match="another architecture"):
         save_policy(other, tmp_path / "x.safetensors", like=reference / "vector.safetensors")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.safetensors"]
+
+
+@pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
+def test_released_weights_are_read_and_written(path, tmp_path):
+    policy = load_policy(path)
+    assert all(value.dtype == torch.float32 for value in policy.state_dict().values())
+    save_policy(policy, tmp_path / "again.safetensors", like=path)
+    assert (tmp_path / "again.safetensors").read_bytes() == path.read_bytes()
 
 
 def test_broken_files_are_named(reference, tmp_path):

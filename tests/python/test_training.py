@@ -20,6 +20,7 @@ pytest.importorskip("pictura._built_torch", reason="built without torch")
 torch = pytest.importorskip("torch")
 from pictura.torch import load_policy  # noqa: E402
 
+MODELS = sorted((pathlib.Path(__file__).parents[2] / "models").glob("*.safetensors"))
 SMOKE = str(pathlib.Path(__file__).parents[2] / "configs" / "smoke.toml")
 # First values are so small that logits say nothing: a high rate for a few updates gives others.
 TRAIN = ["train.updates=3", "train.learning_rate=0.01", "run.device=cpu", "run.num_threads=2"]
@@ -84,6 +85,21 @@ def test_a_trained_policys_numbers_are_those_of_the_library(trained, session, to
         assert expected.std() > 0.1
         torch.testing.assert_close(logits.torch(), expected, rtol=0, atol=1e-5)
         torch.testing.assert_close(values.torch(), expected_values, rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
+def test_released_policies_have_the_librarys_numbers(path, town):
+    session = pictura.PolicySession(str(path), device="cpu", num_threads=1)
+    simulator = world_of(session, town)
+    renderer = renderer_of(session, simulator)
+    simulator.run(session.make_controller(simulator, renderer), 10)
+    seen = {"scene": simulator.scene, "views": simulator.views, "renderer": renderer} if renderer else {}
+    logits, values = session.evaluate(simulator.observations, **seen)
+    with torch.no_grad():
+        observation = {name: array.torch() for name, array in simulator.observations.items()} | images_of(renderer, simulator)
+        expected, expected_values = load_policy(path)(observation)
+    torch.testing.assert_close(logits.torch(), expected, rtol=1e-5, atol=1e-5)
+    torch.testing.assert_close(values.torch(), expected_values, rtol=1e-5, atol=1e-5)
 
 
 def test_its_controller_drives_as_the_module_does(trained, session, town):
