@@ -233,6 +233,7 @@ def test_interrupts_reach_long_calls():
     code = """
         import os, signal, threading, time
         import pictura
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # it is ignored where the tests run in the background
         town = pictura.Map.load("procedural:3")
         simulator = pictura.Simulator([town], [(0, 20)], num_threads=1)
         threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
@@ -250,6 +251,7 @@ def test_interrupts_end_a_render_between_views():
         import os, signal, threading
         import numpy as np
         import pictura
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         town = pictura.Map.load("procedural:3")
         simulator = pictura.Simulator([town], [(0, 20)], num_threads=1)
         renderer = pictura.Renderer("cpu", pictura.Rig.paper(32, 18), num_threads=1)

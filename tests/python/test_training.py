@@ -214,7 +214,9 @@ def test_what_a_callback_raises_ends_training(tmp_path):
 
 def test_interrupted_training_saves_and_goes_on(tmp_path):
     code = f"""
+        import signal
         import pictura
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         def train(old_run, on_progress):
             pictura.train({SMOKE!r}, {str(tmp_path / "run")!r}, overrides=["train.updates=100000", "run.num_threads=1"],
                           old_run=old_run, on_progress=on_progress)
