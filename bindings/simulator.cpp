@@ -10,9 +10,9 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/bindings/call.h"
 #include "pictura/bindings/objects.h"
-#include "pictura/common/support/suggestion.h"
 #include "pictura/drawing/world.h"
 #include "pictura/simulator/agent_state_arrays.h"
+#include "pictura/simulator/conditioning_lookup.h"
 #include "pictura/simulator/observation_arrays.h"
 #ifdef PICTURA_HAS_CUDA
 #include "pictura/common/cuda/device_buffer.h"
@@ -40,12 +40,8 @@ std::vector<WorldSpec> worlds_of(const py::sequence& worlds) {
 }
 
 void set_conditioning(const py::dict& given, SimulatorConfig* config) {
-  const std::vector<std::string> names(std::begin(kConditioningNames), std::end(kConditioningNames));
   for (const auto& [key, value] : given) {
-    const auto name = py::cast<std::string>(key);
-    const auto found = std::find(names.begin(), names.end(), name);
-    if (found == names.end()) fail_usage("conditioning: no coefficient '{}'{}", name, suggestion(name, names));
-    ConditioningRange& range = config->conditioning[static_cast<size_t>(found - names.begin())];
+    ConditioningRange& range = config->conditioning[conditioning_index(py::cast<std::string>(key), "conditioning")];
     if (py::isinstance<py::float_>(value) || py::isinstance<py::int_>(value)) {
       const auto fixed = py::cast<float>(value);
       range = {fixed, fixed, false};

@@ -1,7 +1,6 @@
 #include "pictura/drawing/tracks.h"
 
-#include <array>
-#include <cmath>
+#include "pictura/drawing/plan.h"
 
 namespace pictura {
 
@@ -10,13 +9,15 @@ namespace {
 constexpr double kWay_m = 0.25, kMinWay_px = 1.2, kMinOutline_px = 0.6;
 
 void paint_box(GroundPen& pen, const RecordedTrack& track, const TrackState& state, Rgb color) {
-  const Vec2 forward{std::cos(state.heading_rad), std::sin(state.heading_rad)}, left{-forward.y, forward.x};
-  const float front = 0.5f * track.length_m, side = 0.5f * track.width_m;
-  const Vec2 center = state.position_m.xy();
-  const std::array corners{center + forward * front + left * side, center - forward * front + left * side,
-                           center - forward * front - left * side, center + forward * front - left * side};
-  pen.move_to(corners[0]);
-  for (std::size_t i = 1; i < corners.size(); ++i) pen.line_to(corners[i]);
+  const Eigen::Isometry2d pose = pose_in_plan(in_plan(state.position_m), state.heading_rad);
+  const double front = 0.5 * track.length_m, side = 0.5 * track.width_m;
+  const auto at = [&pose](double ahead_m, double left_m) -> Eigen::Vector2d {
+    return pose * Eigen::Vector2d(ahead_m, left_m);
+  };
+  pen.move_to(at(front, side));
+  pen.line_to(at(-front, side));
+  pen.line_to(at(-front, -side));
+  pen.line_to(at(front, -side));
   cairo_close_path(pen.context());
   pen.canvas().set_color(color, 0.85);
   cairo_fill_preserve(pen.context());
@@ -24,8 +25,7 @@ void paint_box(GroundPen& pen, const RecordedTrack& track, const TrackState& sta
   cairo_set_line_width(pen.context(), pen.at_least(0.05, kMinOutline_px));
   cairo_stroke(pen.context());
   // Which end is the front.
-  pen.line(center + forward * (0.5f * front), center + forward * front, pen.at_least(0.1, kMinOutline_px),
-           hex(0xFFFFFF));
+  pen.line(at(0.5 * front, 0), at(front, 0), pen.at_least(0.1, kMinOutline_px), hex(0xFFFFFF));
 }
 
 }  // namespace
@@ -41,7 +41,7 @@ Rgb track_color(TrackType type) {
   return kUnknownTrackInk;
 }
 
-void paint_tracks(const Scenario& scenario, Canvas& canvas, Vec2 left_top_m, double px_per_m) {
+void paint_tracks(const Scenario& scenario, Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m) {
   GroundPen pen(canvas, left_top_m, px_per_m);
   const auto color_of = [&](std::size_t i) {
     return static_cast<int32_t>(i) == scenario.sdc_track ? kSdcInk : track_color(scenario.tracks[i].type);
@@ -52,7 +52,8 @@ void paint_tracks(const Scenario& scenario, Canvas& canvas, Vec2 left_top_m, dou
     for (std::size_t step = 0; step < states.size(); ++step) {
       if (!valid[step]) continue;
       const bool goes_on = step > 0 && valid[step - 1];
-      goes_on ? pen.line_to(states[step].position_m.xy()) : pen.move_to(states[step].position_m.xy());
+      const Eigen::Vector2d position = in_plan(states[step].position_m);
+      goes_on ? pen.line_to(position) : pen.move_to(position);
     }
     canvas.set_color(color_of(i), 0.8);
     cairo_set_line_width(pen.context(), pen.at_least(kWay_m, kMinWay_px));
@@ -65,7 +66,7 @@ void paint_tracks(const Scenario& scenario, Canvas& canvas, Vec2 left_top_m, dou
     paint_box(pen, scenario.tracks[i], scenario.states_of(index)[step], color_of(i));
   }
   for (const RecordedLight& light : scenario.lights) {
-    pen.line(light.stop_a_m.xy(), light.stop_b_m.xy(), pen.at_least(0.4, 1.5), kStopLineInk);
+    pen.line(in_plan(light.stop_a_m), in_plan(light.stop_b_m), pen.at_least(0.4, 1.5), kStopLineInk);
   }
 }
 

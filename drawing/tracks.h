@@ -13,6 +13,6 @@ Rgb track_color(TrackType type);
 
 /// Every track as a line through its valid states, broken where there are gaps, and its box at the scenario's current
 /// step where it is valid then.
-void paint_tracks(const Scenario& scenario, Canvas& canvas, Vec2 left_top_m, double px_per_m);
+void paint_tracks(const Scenario& scenario, Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m);
 
 }  // namespace pictura

@@ -28,7 +28,6 @@ _NUM_ACTIONS = 12
 _SETS = {"partners": (8, 1), "lanes": (7, 1), "boundaries": (7, 1), "controls": (7, 2), "walls": (7, 1)}
 _MAGIC = b"PICTCKPT"
 _PREAMBLE = "<8sIIQ"
-_TYPES = {"F32": torch.float32, "BF16": torch.bfloat16, "I64": torch.int64}  # of safetensors
 
 
 def point_features(rows: Tensor, points: int) -> Tensor:
@@ -262,24 +261,23 @@ def load_policy(path: str | os.PathLike[str]) -> Policy:
 
 def save_policy(policy: Policy, path: str | os.PathLike[str], like: str | os.PathLike[str]) -> None:
     """Writes a policy's weights in the place of those of `like`, a checkpoint (.ckpt) or safetensors of the same architecture;
-    everything else in the file stays, the type of its numbers too, so that the `pictura` command takes it. The file is written whole or not at all.
+    everything else in the file stays, the type of its numbers too, so that the `pictura` command takes it. The file is written
+    whole or not at all.
     Raises pictura.Error where the architectures differ.
     """
     path, like = os.fspath(path), os.fspath(like)
     weights = {name: value.detach().to("cpu", torch.float32).contiguous() for name, value in policy.state_dict().items()}
     if pathlib.Path(like).suffix == ".ckpt":
         header, data, begin = _read_checkpoint(like)
-        entries = {entry["name"]: (entry["shape"], begin + entry["offset"], "F32") for entry in header["parameters"]}
+        entries = {entry["name"]: (entry["shape"], begin + entry["offset"]) for entry in header["parameters"]}
     else:
         data = bytearray(pathlib.Path(like).read_bytes())
         (length,) = struct.unpack_from("<Q", data)
         header = json.loads(data[8 : 8 + length])
         metadata = header.pop("__metadata__", {})
-        entries = {
-            name: (entry["shape"], 8 + length + entry["data_offsets"][0], entry["dtype"]) for name, entry in header.items()
-        }
+        entries = {name: (entry["shape"], 8 + length + entry["data_offsets"][0]) for name, entry in header.items()}
         weights = {name: value.to(_TYPES[header[name]["dtype"]]) if name in header else value for name, value in weights.items()}
-    if {name: shape for name, (shape, *_) in entries.items()} != {name: list(value.shape) for name, value in weights.items()}:
+    if {name: shape for name, (shape, _) in entries.items()} != {name: list(value.shape) for name, value in weights.items()}:
         raise pictura.Error(f"{like}: of another architecture than the policy: expected the same names and shapes of weights")
     for name, value in weights.items():
         raw = value.view(torch.uint8).numpy().tobytes()
