@@ -310,8 +310,10 @@ class Maps(CommandCase):
         town = self.town()
         text = town.read_text()
         town.write_text(text.replace('type="driving"', 'type="canal"', 3).replace('elementId="', 'elementId="no', 1))
+        cache = {"XDG_CACHE_HOME": str(self.folder / "cache"), "PICTURA_CACHE": ""}
         for cached in (False, True):
-            result = run("map", town, "--json")
+            with unittest.mock.patch.dict(os.environ, cache):
+                result = run("map", town, "--json")
             self.assertEqual(result.returncode, 0, result.stderr)
             mends = json.loads(result.stdout)["mends"]
             self.assertEqual(json.loads(result.stdout)["cached"], cached)
@@ -903,7 +905,7 @@ class Replays(CommandCase):
     def test_options_without_effect_or_out_of_range_are_refused(self):
         replay = ["replay", *self.WORLD]
         out = ["--out", self.folder / "a.html"]
-        self.assert_refused(2, "expected --out or --gallery", *replay)
+        self.assert_refused(2, "expected --out, --mcap or --gallery", *replay)
         self.assert_refused(2, "--episodes: has no effect without --gallery", *replay, *out, "--episodes", 2)
         self.assert_refused(2, "--follow: expected 0 to 11, got 12", *replay, *out, "--follow", 12)
         self.assert_refused(2, "ends in .html", *replay, "--out", self.folder / "a.mp4")
