@@ -78,7 +78,11 @@ void add_map_benchmark(CLI::App& bench) {
       ->capture_default_str();
   command->add_option("--repeats", arguments->repeats)->transform(whole_number(1, 1000))->capture_default_str();
   command->add_flag("--json", arguments->json, "Print one JSON object");
-  command->footer("Example:\n  pictura bench map --map Town05 --repeats 3 --json");
+  command->footer(
+      "Examples:\n"
+      "  pictura bench map\n"
+      "  pictura bench map --map Town05 --repeats 3\n"
+      "  pictura bench map --map procedural:2 --json");
   command->callback([arguments] { run(*arguments); });
 }
 

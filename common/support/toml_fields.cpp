@@ -31,8 +31,9 @@ std::optional<int64_t> whole_number(const toml::node& node) {
 std::string shown(const toml::node& node) {
   std::ostringstream value;
   node.visit([&](const auto& its) { value << its; });
-  // Tables have many lines.
+  // Tables have many lines, and texts with line breaks are written in three quotes.
   std::string text = node.is_table() ? "a table" : value.str();
+  if (node.is_string()) text = fmt::format("'{}'", *node.value<std::string>());
   constexpr std::size_t kMostShown = 60;
   if (text.size() > kMostShown) text = text.substr(0, kMostShown) + "...";
   std::replace(text.begin(), text.end(), '\n', ' ');
