@@ -15,7 +15,7 @@ constexpr bool kHasCrc32cInstruction = true;
 inline uint32_t crc32c_of_word(uint32_t crc, uint64_t word) { return static_cast<uint32_t>(_mm_crc32_u64(crc, word)); }
 #else
 constexpr bool kHasCrc32cInstruction = false;
-inline uint32_t crc32c_of_word(uint32_t crc, uint64_t /*word*/) { return crc; }
+PICTURA_HD inline uint32_t crc32c_of_word(uint32_t crc, uint64_t /*word*/) { return crc; }
 #endif
 
 }  // namespace pictura
