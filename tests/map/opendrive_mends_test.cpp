@@ -563,9 +563,9 @@ TEST(OpenDriveMends, FaultsWithoutAMeaningAreRefused) {
                                                         {"id=\"-1\" type", "id=\"1\" type"},
                                                         {"road id=\"1\"", "road"},
                                                         {"junction=\"-1\"", "junction=\"-1\" rule=\"XHT\""}}) {
-    const std::string refusal =
-        test::message_of([&] { parse_opendrive(file_of(replaced(straight().text(), from, to)), "bad.xodr"); });
-    EXPECT_THAT(refusal, StartsWith("bad.xodr:")) << from << " -> " << to;
+    const std::string file = file_of(replaced(straight().text(), from, to));
+    EXPECT_THAT(test::message_of([&] { parse_opendrive(file, "bad.xodr"); }), StartsWith("bad.xodr:"))
+        << from << " -> " << to;
   }
   EXPECT_THAT(test::message_of([&] { parse_opendrive(file_of(straight().text() + straight().text()), "bad.xodr"); }),
               HasSubstr("road 1: <road>: attribute id: another road has it already"));
