@@ -13,6 +13,7 @@ namespace {
 using test::file_of;
 using test::lane_of;
 using test::line_at;
+using test::replaced;
 using test::RoadText;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -25,12 +26,6 @@ std::string good_file() {
   RoadText road;
   road.right = lane_of(-1, "driving", 3);
   return file_of(road.text());
-}
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  if (at == std::string::npos) throw std::runtime_error("nothing to replace: " + from);
-  return text.replace(at, from.size(), to);
 }
 
 TEST(OpenDriveErrors, TheUnchangedFileIsValid) { EXPECT_EQ(message_of(good_file()), test::kNoError); }

@@ -25,6 +25,7 @@ using test::lane_named;
 using test::lane_of;
 using test::line_at;
 using test::list;
+using test::replaced;
 using test::RoadText;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
@@ -88,12 +89,6 @@ std::string lane_with(const std::string& contents, int id = -1, const std::strin
 
 std::string shape(double s, double t, double a, double b = 0) {
   return fmt::format(R"(<shape s="{}" t="{}" a="{}" b="{}" c="0" d="0"/>)", s, t, a, b);
-}
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  if (at == std::string::npos) throw std::runtime_error("nothing to replace: " + from);
-  return text.replace(at, from.size(), to);
 }
 
 // Records along s.

@@ -92,6 +92,13 @@ inline std::string three_roads(const std::string& rest_of_2 = "", const std::str
          junction_more + "</junction>\n";
 }
 
+/// The text with the first `from` in it as `to`.
+inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  if (at == std::string::npos) throw std::runtime_error("nothing to replace: " + from);
+  return text.replace(at, from.size(), to);
+}
+
 /// The map of a file with the given contents of <OpenDRIVE>.
 inline RoadMap parse(const std::string& contents) { return parse_opendrive(file_of(contents), "small.xodr"); }
 
