@@ -1,6 +1,5 @@
 #include "pictura/training/event_file.h"
 
-#include <array>
 #include <bit>
 #include <cerrno>
 #include <chrono>
@@ -9,6 +8,7 @@
 #include <unistd.h>
 
 #include "pictura/common/error.h"
+#include "pictura/common/support/crc32c.h"
 
 namespace pictura {
 
@@ -37,26 +37,7 @@ std::string field_bytes(uint32_t field, std::string_view bytes) {
   return varint(field << 3 | 2) + varint(bytes.size()) + std::string(bytes);
 }
 
-uint32_t masked_crc(std::string_view bytes) {
-  const uint32_t crc = crc32c(bytes);
-  return ((crc >> 15) | (crc << 17)) + 0xA282EAD8u;
-}
-
 }  // namespace
-
-uint32_t crc32c(std::string_view bytes) {
-  static const auto table = [] {
-    std::array<uint32_t, 256> entries{};
-    for (uint32_t i = 0; i < 256; ++i) {
-      entries[i] = i;
-      for (int bit = 0; bit < 8; ++bit) entries[i] = (entries[i] >> 1) ^ ((entries[i] & 1) ? 0x82F63B78u : 0);
-    }
-    return entries;
-  }();
-  uint32_t crc = 0xFFFFFFFFu;
-  for (const char c : bytes) crc = (crc >> 8) ^ table[(crc ^ static_cast<uint8_t>(c)) & 0xFFu];
-  return ~crc;
-}
 
 EventFile::EventFile(const std::string& folder)
     : path_(fmt::format("{}/events.out.tfevents.{:.0f}.{}", folder, wall_time_s(), getpid())),
@@ -75,7 +56,7 @@ void EventFile::write(int64_t step, const Scalars& scalars) {
 
 void EventFile::write_record(const std::string& event) {
   const std::string length = raw(static_cast<uint64_t>(event.size()));
-  out_ << length << raw(masked_crc(length)) << event << raw(masked_crc(event)) << std::flush;
+  out_ << length << raw(masked_crc32c(length)) << event << raw(masked_crc32c(event)) << std::flush;
   PICTURA_CHECK(out_, "{}: writing failed: {}", path_, std::strerror(errno));
 }
 

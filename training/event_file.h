@@ -27,7 +27,4 @@ class EventFile {
   std::ofstream out_;
 };
 
-/// CRC-32C (Castagnoli, reflected polynomial 0x82F63B78).
-uint32_t crc32c(std::string_view bytes);
-
 }  // namespace pictura

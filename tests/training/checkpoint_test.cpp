@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pictura/common/error.h"
+#include "pictura/common/support/crc32c.h"
 #include "pictura/common/support/file.h"
 #include "pictura/common/support/hash.h"
 #include "pictura/tests/support/error_message.h"
