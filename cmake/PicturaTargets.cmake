@@ -1,12 +1,11 @@
 # Settings of every target: flags of this build, includes as `pictura/FOLDER/FILE.h` in the tree as when
-# installed, and tests with their environment.
+# installed, precompiled headers, and tests with their environment.
 
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_CXX_VISIBILITY_PRESET hidden)
 set(CMAKE_VISIBILITY_INLINES_HIDDEN ON)
-set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 if(NOT CMAKE_BUILD_TYPE)
   set(CMAKE_BUILD_TYPE Release)
 endif()
@@ -31,6 +30,8 @@ add_compile_options(
   "$<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wpedantic;-Wshadow>"
   # Designated initializers leave the other members at their defaults, on purpose.
   $<$<COMPILE_LANGUAGE:CXX>:-Wno-missing-field-initializers>
+  # For libraries and programs alike, so that both can read one precompiled header.
+  "$<IF:$<COMPILE_LANGUAGE:CUDA>,-Xcompiler=-fPIC,-fPIC>"
   # g++ 13 assumes that every returned reference refers to a temporary argument, and that fmt's big integers, inlined,
   # copy more than they hold (fmt 9).
   "$<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_HAS_WDANGLING_REFERENCE}>>:-Wno-dangling-reference;-Wno-array-bounds;-Wno-stringop-overflow>"
@@ -41,7 +42,7 @@ add_compile_options(
 set(PICTURA_IS_SANITIZED 0)  # for tests with time limits
 if(PICTURA_SANITIZE)
   set(PICTURA_IS_SANITIZED 1)
-  add_compile_options(-fsanitize=${PICTURA_SANITIZE} -fno-omit-frame-pointer -g -fno-sanitize-recover=all
+  add_compile_options(-fsanitize=${PICTURA_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all
     # With the checks g++ 13 does not know the length of initializer lists.
     "$<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>>:-Wno-array-bounds;-Wno-stringop-overread>")
   add_link_options(-fsanitize=${PICTURA_SANITIZE})
@@ -72,6 +73,27 @@ function(pictura_forbid_fma target)
   endif()
 endfunction()
 
+# pictura_precompile(NAME HEADER [LINK libs...]): a precompiled header of a library's headers, which take a compiler longer
+# than most sources that include them; pictura_use_precompiled(TARGET NAME) reads it. Headers of the project and of the
+# standard are left out, so that a source which lacks one does not compile, as long as HEADER does not bring it along:
+# PICTURA_PRECOMPILE=OFF compiles every source as it stands.
+function(pictura_precompile name header)
+  if(PICTURA_PRECOMPILE)
+    cmake_parse_arguments(PARSE_ARGV 2 arg "" "" "LINK")
+    file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/precompiled/${name}.cpp CONTENT "// A precompiled header belongs to a source.\n")
+    add_library(pictura_precompiled_${name} OBJECT ${PROJECT_BINARY_DIR}/precompiled/${name}.cpp)
+    pictura_use_headers(pictura_precompiled_${name} PRIVATE)
+    target_link_libraries(pictura_precompiled_${name} PRIVATE OpenMP::OpenMP_CXX ${arg_LINK})
+    target_precompile_headers(pictura_precompiled_${name} PRIVATE ${header})
+  endif()
+endfunction()
+
+function(pictura_use_precompiled target name)
+  if(PICTURA_PRECOMPILE)
+    target_precompile_headers(${target} REUSE_FROM pictura_precompiled_${name})
+  endif()
+endfunction()
+
 # pictura_test_properties(OUT SECONDS LABELS): ctest properties with a timeout, labels and the tests' environment.
 function(pictura_test_properties out timeout_s labels)
   set(properties TIMEOUT ${timeout_s})
@@ -92,15 +114,22 @@ function(pictura_test_properties out timeout_s labels)
   set(${out} "${properties}" PARENT_SCOPE)
 endfunction()
 
-# pictura_add_test(NAME SOURCES... LINK libs... [LABELS labels...]): GoogleTest binary NAME_test, every test its own
-# ctest entry, with PICTURA_DATA set to ../shared/data if that exists and the caller has not set it.
+# pictura_add_test(NAME SOURCES... LINK libs... [LABELS labels...] [PRECOMPILED header]): GoogleTest binary NAME_test, every
+# test its own ctest entry, with PICTURA_DATA set to ../shared/data if that exists and the caller has not set it.
 function(pictura_add_test name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;LINK;LABELS")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "PRECOMPILED" "SOURCES;LINK;LABELS")
   find_package(GTest REQUIRED)
   include(GoogleTest)
   add_executable(${name}_test ${arg_SOURCES})
   pictura_use_headers(${name}_test PRIVATE)
   target_link_libraries(${name}_test PRIVATE ${arg_LINK} GTest::gmock GTest::gtest_main)
+  if(arg_PRECOMPILED)
+    pictura_use_precompiled(${name}_test ${arg_PRECOMPILED})
+  else()
+    # Many compute with the rules that both devices share, and one header serves only equal flags.
+    pictura_forbid_fma(${name}_test)
+    pictura_use_precompiled(${name}_test gtest)
+  endif()
   pictura_test_properties(properties 900 "${arg_LABELS}")
   gtest_discover_tests(${name}_test DISCOVERY_TIMEOUT 120 PROPERTIES ${properties})
 endfunction()
