@@ -85,12 +85,14 @@ void print_heading(const BenchContext& context) {
              context.driver.empty() ? "" : ", driver " + context.driver, PICTURA_COMMIT);
 }
 
-void report_benchmark(bool json, const BenchContext& context, const std::vector<BenchResult>& results) {
-  Json rows = Json::array();
+void report_benchmark(bool json, const BenchContext& context, const std::vector<BenchResult>& results,
+                      const EarlierReport* earlier) {
+  Json object = context.json();
+  object["results"] = Json::array();
+  Json& rows = object["results"];
   for (const BenchResult& result : results) rows.push_back(summary_of(result));
   if (json) {
-    Json object = context.json();
-    object["results"] = rows;
+    if (earlier) earlier->add_comparison(&object);
     return print_json(object);
   }
   print_heading(context);
@@ -100,6 +102,13 @@ void report_benchmark(bool json, const BenchContext& context, const std::vector<
                row["mean"].get<double>(), row["min"].get<double>(), row["max"].get<double>(),
                row["repeats"].get<int>());
   }
+  if (earlier) earlier->print_comparison(object);
+}
+
+void add_compare_option(CLI::App* command, std::optional<EarlierReport>* earlier) {
+  command->add_option_function<std::string>(
+      "--compare", [earlier](const std::string& path) { earlier->emplace(path); },
+      "Also print the ratios to an earlier result, a file with what --json printed");
 }
 
 void add_bench_command(CLI::App& app) {

@@ -1,11 +1,13 @@
 // Shared by the benchmarks of `pictura bench`: results and their report.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
+#include "pictura/bench/commands/compare_results.h"
 #include "pictura/cli/drive.h"
 #include "pictura/cli/report.h"
 
@@ -48,8 +50,17 @@ Json summary_of(BenchResult result);
 /// Prints workload, backend, device and commit for people.
 void print_heading(const BenchContext& context);
 
-/// Prints medians and means with minimum and maximum.
-void report_benchmark(bool json, const BenchContext& context, const std::vector<BenchResult>& results);
+/// Prints medians and means with minimum and maximum, and how they stand to an earlier report, if there is one.
+void report_benchmark(bool json, const BenchContext& context, const std::vector<BenchResult>& results,
+                      const EarlierReport* earlier = nullptr);
+
+/// Adds the option --compare, which reads the earlier report: a file that is none is refused before anything is
+/// measured.
+void add_compare_option(CLI::App* command, std::optional<EarlierReport>* earlier);
+/// The report to compare with, or null.
+inline const EarlierReport* pointer_to(const std::optional<EarlierReport>& earlier) {
+  return earlier ? &*earlier : nullptr;
+}
 
 /// Adds the subcommand `bench`.
 void add_bench_command(CLI::App& app);

@@ -28,6 +28,7 @@ struct Arguments {
   int checked_views = 8;
   bool planes = false, host_memory = false, memory = false;
   RateArguments rate;
+  std::optional<EarlierReport> earlier;
 };
 
 // Fixed in sweeps over the other.
@@ -206,7 +207,7 @@ void run(Arguments arguments) {
   if (std::any_of(cases.begin(), cases.end(), is_of_cuda_device)) {
     context.add_gpu(cuda_device_name(), cuda_driver_name());
   }
-  report_benchmark(arguments.rate.json, context, results);
+  report_benchmark(arguments.rate.json, context, results, pointer_to(arguments.earlier));
 }
 
 }  // namespace
@@ -241,6 +242,7 @@ void add_render_benchmark(CLI::App& bench) {
       ->transform(whole_number(0))
       ->capture_default_str();
   add_rate_options(command, &arguments->rate);
+  add_compare_option(command, &arguments->earlier);
   command->footer(
       "Examples:\n  pictura bench render --size 192x108 --threads 0\n"
       "  pictura bench render --sweep sizes --json\n"

@@ -30,6 +30,7 @@ struct Arguments {
   std::string sweep;
   int warm_up_steps = 60;
   RateArguments rate;
+  std::optional<EarlierReport> earlier;
 };
 
 /// Worlds that are measured together.
@@ -145,7 +146,7 @@ void run(Arguments arguments) {
                                                arguments.world.walls ? "on" : "off", arguments.world.num_threads),
                        .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
   if (on_device) context.add_gpu(cuda_device_name(), cuda_driver_name());
-  report_benchmark(arguments.rate.json, context, results);
+  report_benchmark(arguments.rate.json, context, results, pointer_to(arguments.earlier));
 }
 
 }  // namespace
@@ -174,8 +175,10 @@ void add_simulate_benchmark(CLI::App& bench) {
       ->transform(whole_number(1))
       ->capture_default_str();
   add_rate_options(command, &arguments->rate);
+  add_compare_option(command, &arguments->earlier);
   command->footer(
-      "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json\n"
+      "Examples:\n  pictura bench simulate --map Town01 --agents 120 --json > before.json\n"
+      "  pictura bench simulate --map Town01 --agents 120 --compare before.json\n"
       "  pictura bench simulate --map procedural:1 --pedestrians 0.1 --cyclists 0.1\n"
       "  pictura bench simulate --backend cuda --map towns --slots 20480 --pedestrians 0.1 --cyclists 0.1 --parked 32");
   command->callback([arguments] { run(*arguments); });

@@ -14,6 +14,7 @@ struct Arguments {
   TrainingCase measured{.config_path = "configs/smoke.toml"};
   BackendOptions backends;
   bool json = false;
+  std::optional<EarlierReport> earlier;
 };
 
 // Of the profiled update: the time of all kernels and copies, what of the wall time none of them ran in, and the
@@ -75,7 +76,8 @@ void run(Arguments arguments) {
   for (const std::string& text : measured.overrides) workload += " --set " + text;
   if (!measured.init_from.empty()) workload += ", weights of " + measured.init_from;
   workload += fmt::format("; whole updates after a warm-up of {}", measured.warm_up);
-  report_benchmark(arguments.json, training_context(workload, measurement.report), results);
+  report_benchmark(arguments.json, training_context(workload, measurement.report), results,
+                   pointer_to(arguments.earlier));
 }
 
 }  // namespace
@@ -99,6 +101,7 @@ void add_train_benchmark(CLI::App& bench) {
   command->add_flag("--kernels", measured.profiles_kernels,
                     "Time each kernel in one update more: the longest, and the share of the wall time without any");
   command->add_flag("--json", arguments->json, "Print one JSON object");
+  add_compare_option(command, &arguments->earlier);
   command->footer(
       "Examples:\n  pictura bench train --updates 5\n"
       "  pictura bench train --config configs/smoke.toml --json\n"

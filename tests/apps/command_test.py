@@ -551,6 +551,35 @@ class Benchmarks(CommandCase):
         packed = self.json_of("bench", "simulate", *self.QUICK, "--slots", 20)
         self.assertEqual(packed["results"][0]["name"], "cpu, 20 agents in worlds of 1 to 6")
 
+    def test_a_measurement_is_compared_with_an_earlier_one(self):
+        earlier = self.folder / "earlier.json"
+        simulate = ["bench", "simulate", *self.QUICK]
+        facts = self.json_of(*simulate)
+        rate, slots, step = facts["results"][:3]
+        # As if it had been a thousand times slower, a thousand times faster, and anything in between.
+        for row, low, middle, high in ((rate, 1e-3, 1e-3, 1e-3), (slots, 1e3, 1e3, 1e3), (step, 1e-3, 1, 1e3)):
+            row.update(min=row["min"] * low, value=row["value"] * middle, max=row["max"] * high)
+        facts.update(device="Another", commit="0123abcd", results=[rate, slots, step, {**step, "name": "gone"}])
+        earlier.write_text(json.dumps(facts))
+        comparison = self.json_of(*simulate, "--compare", earlier)["comparison"]
+        self.assertEqual((comparison["commit"], comparison["same_workload"], comparison["same_device"]), ("0123abcd", True, False))
+        rows = comparison["results"]
+        self.assertEqual([row["name"] for row in rows], [rate["name"], slots["name"], step["name"]])
+        self.assertEqual([row["change"] for row in rows], ["better", "worse", "within the spread"])
+        for row in rows:
+            self.assertAlmostEqual(row["ratio"] * row["before"] / row["after"], 1)
+            self.assertTrue(row["low"] <= row["ratio"] <= row["high"])
+        # A step that takes longer is worse.
+        step.update(min=step["min"] / 10, value=step["min"] / 10, max=step["min"] / 10)
+        earlier.write_text(json.dumps(facts))
+        printed = run(*simulate, "--compare", earlier).stdout
+        self.assertIn("the device differs: Another", printed)
+        self.assertTrue(printed.endswith("2 worse, 1 better, 0 within the spread\n"), printed)
+        self.assert_refused(1, "none.json", *simulate, "--compare", self.folder / "none.json")
+        for bad in ("{", "[]", '{"results": []}', '{"results": [{"name": "cpu", "value": 1}]}'):
+            earlier.write_text(bad)
+            self.assert_refused(1, "earlier.json: expected what a benchmark printed", "bench", "render", *self.QUICK, "--compare", earlier)
+
     def test_quality_is_measured_on_each_map_and_size(self):
         maps = ["--map", "procedural:1,procedural:2", "--agents", 4, "--steps", 1, "--views", 1]
         facts = self.json_of("bench", "quality", *maps, "--size", "8x8,9x5")
