@@ -80,10 +80,8 @@ void run(const Arguments& arguments) {
   const RecordedDriver driver{arguments.policy, world.session.get(), world.renderer.get()};
   if (!arguments.replay.empty() || !arguments.mcap.empty())
     recording = std::make_unique<Recording>(*simulator, driver, arguments.recording);
-  std::unique_ptr<Serving> serving;
-  if (arguments.serve.is_asked) {
-    serving = std::make_unique<Serving>(arguments.serve, *simulator, driver, arguments.recording);
-  }
+  std::unique_ptr<LiveView> live;
+  if (arguments.serve.is_asked) live = serve(arguments.serve, *simulator, driver, arguments.recording);
 
   ProgressLine line;
   double simulate_s = 0, film_s = 0;  // filming, recording and serving
@@ -91,27 +89,27 @@ void run(const Arguments& arguments) {
   int step = 0;
   for (; (arguments.endless || step < arguments.steps) && !interrupted(); ++step) {
     const auto begin_of_frame = std::chrono::steady_clock::now();
-    if (serving && !serving->await_step()) break;
+    if (live && !await_step(*live)) break;
     if (film) film->add_frame(*simulator);
     film_s += seconds_since(begin_of_frame);
     world.act();
     const auto begin_of_recording = std::chrono::steady_clock::now();
-    if (serving) serving->before_step(world.commands);
+    if (live) live->before_step(world.commands);
     if (recording) recording->before_step(world.commands);
     const auto begin = std::chrono::steady_clock::now();
     const StepResult result = world.step();
     const auto end = std::chrono::steady_clock::now();
     if (recording) recording->after_step(result);
-    if (serving) serving->after_step(result);
+    if (live) live->after_step(result);
     simulate_s += std::chrono::duration<double>(end - begin).count();
     film_s += std::chrono::duration<double>(begin - begin_of_recording).count() + seconds_since(end);
-    if (!serving)
+    if (!live)
       line.update(fmt::format("step {}/{}", step + 1, arguments.steps),
                   static_cast<double>(step + 1) / arguments.steps);
   }
   const double drive_s = seconds_since(begin_of_all) - film_s;
   line.finish();
-  if (serving) serving->finish();
+  if (live) live->finish();
   if (film) film->close();
   if (recording) {
     const Replay replay = recording->finish();

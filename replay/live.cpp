@@ -64,11 +64,21 @@ LiveWorld::LiveWorld(Simulator& simulator, ReplayOrigin origin, std::optional<Re
 }
 
 void LiveWorld::after_step(const StepResult& result) {
-  const int32_t episode = recorder_.recorded().episodes.back().index;
+  const size_t num_episodes = recorder_.recorded().episodes.size();
   recorder_.after_step(result);
-  begins_episode_ = recorder_.recorded().episodes.back().index != episode;
+  keep_newest(num_episodes);
+}
+
+void LiveWorld::after_reset() {
+  const size_t num_episodes = recorder_.recorded().episodes.size();
+  recorder_.after_reset();
+  keep_newest(num_episodes);
+}
+
+void LiveWorld::keep_newest(size_t num_episodes) {
+  begins_episode_ = recorder_.recorded().episodes.size() > num_episodes;
   recorder_.forget();
-  ++step_;
+  ++step_;  // as pages count frames
 }
 
 LiveJson LiveWorld::begin() const {

@@ -25,6 +25,8 @@ class LiveWorld {
   /// Around each step.
   void before_step(Span<const Command> commands) { recorder_.before_step(commands); }
   void after_step(const StepResult& result);
+  /// After a reset by the caller: as Recorder::after_reset().
+  void after_reset();
 
   /// All that a page needs to begin at this frame.
   LiveJson begin() const;
@@ -36,6 +38,9 @@ class LiveWorld {
   int64_t step() const { return step_; }
 
  private:
+  /// After a frame was recorded, of `num_episodes` before.
+  void keep_newest(size_t num_episodes);
+
   Recorder recorder_;
   std::unique_ptr<AgentCameras> cameras_;
   int64_t step_ = 0;

@@ -120,13 +120,23 @@ struct Recorder::Parts {
     chains.assign(static_cast<size_t>(replay.num_agents), -1);
   }
 
-  void add_frame() {
+  // Nothing has led to the next frame.
+  void add_no_step() {
+    const auto count = static_cast<size_t>(replay.num_agents);
+    const auto add_zeros = [count](std::vector<int32_t>& values) { values.insert(values.end(), count, 0); };
+    add_zeros(track(Track::action));
+#define X(name) add_zeros(track(Track::reward_##name));
+    PICTURA_REWARD_TERMS(X)
+#undef X
+  }
+
+  void add_frame(bool begins_anew = false) {
     const AgentStateView state = simulator.state();
     const SceneBatch& scene = simulator.scene();
     const Span<const AgentBox> boxes =
         scene.agents.subspan(static_cast<size_t>(first_box), static_cast<size_t>(num_boxes));
-    const bool begins =
-        replay.episodes.empty() || episode().index != simulator.episode_index()[static_cast<size_t>(world)];
+    const bool begins = begins_anew || replay.episodes.empty() ||
+                        episode().index != simulator.episode_index()[static_cast<size_t>(world)];
     if (begins) begin_episode(state, boxes);
     for (int32_t agent = 0; agent < replay.num_agents; ++agent) add_agent(state, boxes, agent, begins);
     const Span<const LightState> lights =
@@ -164,6 +174,13 @@ struct Recorder::Parts {
       chain.z_cm[i] = in_cm(state.waypoint_z_m[at * kNumWaypoints + i]);
     }
     episode().chains.push_back(chain);
+  }
+
+  void check_room() const {
+    const int64_t numbers = (int64_t{replay.num_frames} + 1) * replay.num_agents * int64_t{kNumTracks};
+    PICTURA_CHECK(numbers <= kMaxReplayNumbers,
+                  "replay: {} agents are too many for more than {} steps: record fewer steps", replay.num_agents,
+                  replay.num_frames - 1);
   }
 
   void add_images() {
@@ -256,11 +273,7 @@ Recorder::Recorder(Simulator& simulator, const RecorderOptions& options) {
     fail_usage("replay: expected an agent of 0 to {} to follow, got {}", num_agents - 1, options.followed);
   }
   parts_ = std::make_unique<Parts>(simulator, options);
-  // Nothing has led to the first frame.
-  parts_->track(Track::action).assign(static_cast<size_t>(num_agents), 0);
-#define X(name) parts_->track(Track::reward_##name).assign(static_cast<size_t>(num_agents), 0);
-  PICTURA_REWARD_TERMS(X)
-#undef X
+  parts_->add_no_step();
   parts_->add_frame();
 }
 
@@ -283,12 +296,17 @@ void Recorder::before_step(Span<const Command> commands, const std::optional<Rep
 
 void Recorder::after_step(const StepResult& result) {
   Parts& parts = *parts_;
-  const int64_t numbers = (int64_t{parts.replay.num_frames} + 1) * parts.replay.num_agents * int64_t{kNumTracks};
-  PICTURA_CHECK(numbers <= kMaxReplayNumbers,
-                "replay: {} agents are too many for more than {} steps: record fewer steps", parts.replay.num_agents,
-                parts.replay.num_frames - 1);
+  parts.check_room();
   parts.add_step(result);
   parts.add_frame();
+}
+
+void Recorder::after_reset() {
+  Parts& parts = *parts_;
+  if (parts.simulator.episode_step()[static_cast<size_t>(parts.world)] != 0) return;
+  parts.check_room();
+  parts.add_no_step();
+  parts.add_frame(/*begins_anew=*/true);
 }
 
 const Replay& Recorder::recorded() const { return parts_->replay; }
