@@ -41,4 +41,5 @@ PYBIND11_MODULE(_pictura, module) {
   pictura::python::bind_maps(module);
   pictura::python::bind_rendering(module);
   pictura::python::bind_simulator(module);
+  pictura::python::bind_replays(module);
 }

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "pictura/bindings/arrays.h"
@@ -44,9 +45,25 @@ struct Scene {
   Stream stream;
 };
 
+/// Who sees every step of a simulator in host memory, and may change what agents do in it.
+class Watcher {
+ public:
+  virtual ~Watcher() = default;
+  /// Whether the next step may be taken; waits for it a little.
+  virtual bool is_due() { return true; }
+  virtual void before_step(Span<Command> commands_inout) = 0;
+  virtual void after_step(const StepResult& result) = 0;
+  /// After new episodes that no step began.
+  virtual void after_reset() = 0;
+};
+
 /// What is inside a pictura.Simulator.
 struct SimulatorInside {
   std::shared_ptr<Simulator> simulator;
+  /// Runs work without the GIL while no other thread is in a call of the simulator.
+  std::function<void(std::string_view what, const std::function<void()>& work)> run;
+  /// Lets a watcher see steps for as long as it lives.
+  std::function<void(const std::shared_ptr<Watcher>&)> watch;
 };
 
 /// What is inside a pictura.Renderer.
@@ -70,5 +87,6 @@ Stream stream_of(const py::object& handle);
 void bind_maps(py::module_& module);
 void bind_rendering(py::module_& module);
 void bind_simulator(py::module_& module);
+void bind_replays(py::module_& module);
 
 }  // namespace pictura::python

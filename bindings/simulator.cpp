@@ -96,6 +96,8 @@ struct Snapshot {
   std::unique_ptr<StateSnapshot> state;
 };
 
+class PyController;
+
 class PySimulator {
  public:
   PySimulator(const std::string& executor, const SimulatorConfig& config, const std::vector<std::shared_ptr<Map>>& maps,
@@ -129,28 +131,20 @@ class PySimulator {
       make(std::move(next), std::move(worlds));
     }
     maps_ = maps;
+    watchers_.clear();  // they saw the worlds before
     forget_arrays();
   }
 
   void reset(const py::object& world_mask, const std::optional<uint64_t>& seed) {
-    if (world_mask.is_none() && !seed) {
-      calls_->run("reset", [&] { simulator_->reset(stream_); });
-      return;
-    }
-    const uint64_t its_seed = seed.value_or(simulator_->config().seed);
-    if (world_mask.is_none()) {
-      const Array all = all_worlds();
-      calls_->run("reset", [&] { simulator_->reset(all, its_seed, stream_); });
-      return;
-    }
-    BorrowedArray mask = borrow(world_mask, "reset: world_mask", stream_);
-    calls_->run("reset", [&] { simulator_->reset(mask.array(), its_seed, stream_); });
-    keep(std::move(mask));
+    reset_unwatched(world_mask, seed);
+    for (const auto& watcher : watchers()) calls_->run("reset", [&] { watcher->after_reset(); });
   }
 
   py::object step(const py::object& actions) {
     BorrowedArray borrowed = borrow(actions, "step: actions", stream_);
-    const StepResult result = calls_->run("step", [&] { return simulator_->step(borrowed.array(), stream_); });
+    const StepResult result = is_watched()
+                                  ? watched_step(borrowed.array())
+                                  : calls_->run("step", [&] { return simulator_->step(borrowed.array(), stream_); });
     keep(std::move(borrowed));
     return arrays_of(result);
   }
@@ -163,9 +157,16 @@ class PySimulator {
                   "step_commands: commands: expected aligned memory");
     const Span<const Command> span(reinterpret_cast<const Command*>(bytes.data()),
                                    static_cast<size_t>(simulator_->num_slots()));
-    const StepResult result = calls_->run("step_commands", [&] { return simulator_->step(span, stream_); });
+    const StepResult result = is_watched()
+                                  ? watched_step({span.begin(), span.end()})
+                                  : calls_->run("step_commands", [&] { return simulator_->step(span, stream_); });
     keep(std::move(borrowed));
     return arrays_of(result);
+  }
+
+  SimulatorInside inside() {
+    return {simulator_, [this](std::string_view what, const std::function<void()>& work) { calls_->run(what, work); },
+            [this](const std::shared_ptr<Watcher>& watcher) { watchers_.push_back(watcher); }};
   }
 
   void set_state(const py::object& slots, const py::dict& fields) {
@@ -257,6 +258,9 @@ class PySimulator {
     return pixels;
   }
 
+  /// Steps by the commands that a controller writes.
+  void run(PyController& controller, int64_t steps);
+
   /// Until a moment ago another thread could be in a call: as in any call.
   template <typename Work>
   void run_steps(int64_t steps, const Work& step) {
@@ -273,6 +277,55 @@ class PySimulator {
   }
 
  private:
+  void reset_unwatched(const py::object& world_mask, const std::optional<uint64_t>& seed) {
+    if (world_mask.is_none() && !seed) {
+      calls_->run("reset", [&] { simulator_->reset(stream_); });
+      return;
+    }
+    const uint64_t its_seed = seed.value_or(simulator_->config().seed);
+    if (world_mask.is_none()) {
+      const Array all = all_worlds();
+      calls_->run("reset", [&] { simulator_->reset(all, its_seed, stream_); });
+      return;
+    }
+    BorrowedArray mask = borrow(world_mask, "reset: world_mask", stream_);
+    calls_->run("reset", [&] { simulator_->reset(mask.array(), its_seed, stream_); });
+    keep(std::move(mask));
+  }
+
+  // Those that are gone see nothing more.
+  std::vector<std::shared_ptr<Watcher>> watchers() {
+    std::erase_if(watchers_, [](const auto& watcher) { return watcher.expired(); });
+    std::vector<std::shared_ptr<Watcher>> watching;
+    for (const auto& watcher : watchers_) {
+      if (auto one = watcher.lock()) watching.push_back(std::move(one));
+    }
+    return watching;
+  }
+  bool is_watched() { return !watchers_.empty() && !watchers().empty(); }
+  StepResult watched_step(const Array& actions) {
+    const auto indices =
+        actions.checked<const int32_t>("step: actions", {simulator_->num_slots()}, simulator_->device());
+    std::vector<Command> commands;
+    for (const int32_t action : indices) commands.push_back({.action = action});
+    return watched_step(std::move(commands));
+  }
+  /// ^C ends the wait.
+  StepResult watched_step(std::vector<Command> commands) {
+    const std::vector<std::shared_ptr<Watcher>> watching = watchers();
+    for (const auto& watcher : watching) {
+      while (!calls_->run("step", [&] { return watcher->is_due(); })) {
+        if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+      }
+    }
+    return calls_->run("step", [&] {
+      for (const auto& watcher : watching) watcher->before_step(commands);
+      const StepResult result = simulator_->step(Span<const Command>(commands), stream_);
+      for (const auto& watcher : watching) watcher->after_step(result);
+      return result;
+    });
+  }
+
   CompiledMaps compiled(const std::vector<std::shared_ptr<Map>>& maps) {
     if (maps.empty()) fail_usage("simulator: expected at least one map");
     CompiledMaps made;
@@ -365,6 +418,7 @@ class PySimulator {
   py::object result_;
   const float* of_result_ = nullptr;
   std::vector<BorrowedArray> kept_;  // what the last call was given
+  std::vector<std::weak_ptr<Watcher>> watchers_;
   std::vector<uint8_t> all_on_host_;
 #ifdef PICTURA_HAS_CUDA
   DeviceBuffer<uint8_t> all_on_device_;
@@ -423,6 +477,20 @@ class PyController {
   ControllerInside inside_;
   std::shared_ptr<Commands> commands_;
 };
+
+void PySimulator::run(PyController& controller, int64_t steps) {
+  if (is_watched()) {
+    for (int64_t step = 0; step < steps; ++step) {
+      calls_->run("run", [&] { controller.act(*this); });
+      watched_step({controller.commands().begin(), controller.commands().end()});
+    }
+    return;
+  }
+  run_steps(steps, [&] {
+    controller.act(*this);
+    simulator_->step(controller.commands(), stream_);
+  });
+}
 
 ControllerInside controller_by_name(const std::string& name, const PySimulator& simulator, uint64_t seed) {
   const std::shared_ptr<Simulator>& of = simulator.shared();
@@ -560,7 +628,7 @@ the host, 0 for all. reset_inactive_fraction: a world resets when this part of i
 conditioning: a number or (low, high) by name, see CONDITIONING_NAMES; the paper's ranges otherwise. stream: a cudaStream_t
 as int; None: the legacy default stream. The other defaults are the paper's training world.
 Raises pictura.UsageError naming what cannot be simulated, pictura.Error where there is no device.)")
-      .def("_inside", [](const PySimulator& self) { return SimulatorInside{self.shared()}; })
+      .def("_inside", &PySimulator::inside, py::keep_alive<0, 1>())
       .def_property_readonly("name", [](PySimulator& self) { return std::string(self.simulator().name()); })
       .def_property_readonly("choice", &PySimulator::choice, py::doc("What was chosen for 'auto', and why."))
       .def_property_readonly("device", [](PySimulator& self) { return name_of(self.simulator().device()); })
@@ -700,13 +768,7 @@ pictura.Error naming what is wrong; on CUDA values are checked as in step().)")
           R"(A world from above, uint8 [height, width, 3], on the CPU. agent: the one of that world in the middle, with its
 waypoints; -1 shows the whole map. width_m: what is shown around it.)")
       .def(
-          "run",
-          [](PySimulator& self, PyController& controller, int64_t steps) {
-            self.run_steps(steps, [&] {
-              controller.act(self);
-              self.simulator().step(controller.commands(), self.stream());
-            });
-          },
+          "run", [](PySimulator& self, PyController& controller, int64_t steps) { self.run(controller, steps); },
           py::arg("controller"), py::arg("steps"), "Steps with a controller for all agents. ^C ends it between steps.")
       .def(
           "time_steps",

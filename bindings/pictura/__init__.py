@@ -25,7 +25,9 @@ from pictura._pictura import (  # noqa: F401
     Error,
     Geometry,
     Images,
+    LiveView,
     Map,
+    Recorder,
     Renderer,
     Rig,
     Scene,
@@ -41,6 +43,7 @@ from pictura._pictura import (  # noqa: F401
     map_folder,
     renderer_names,
     simulator_names,
+    write_gallery,
 )
 
 if TYPE_CHECKING:

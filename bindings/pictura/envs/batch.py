@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import webbrowser
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -15,6 +17,8 @@ ACTIONS = ("discrete", "multi_discrete")
 VECTOR_KEYS = ("ego", "partners", "lanes", "boundaries", "controls", "walls", "conditioning", "waypoints")
 NUM_LONGITUDINAL, NUM_LATERAL = 4, 3
 STATUS_ACTIVE = 0
+# "human": a page in the browser, from the first reset on.
+RENDER_MODES = ["rgb_array", "human"]
 
 
 def load_maps(maps: str | pictura.Map | Sequence[str | pictura.Map]) -> list[pictura.Map]:
@@ -73,6 +77,7 @@ class Batch:
         )
         self.num_slots = self.simulator.num_slots
         self.num_worlds, self.num_agents = num_worlds, num_agents
+        self.live: pictura.LiveView | None = None
         self.renderer, self._images = None, None
         if observation in ("images", "both"):
             self.renderer = pictura.Renderer(renderer, rig, device=device, num_threads=num_threads)
@@ -200,6 +205,28 @@ class Batch:
     def draw(self, world: int = 0, agent: int = 0, width_px: int = 640, height_px: int = 480) -> np.ndarray:
         """From above around an agent of a world, uint8 [height, width, 3]; on the CPU."""
         return self.simulator.draw(world, agent, width_px=width_px, height_px=height_px)
+
+    def show(self, agent: int = 0) -> None:
+        """Opens a page in the browser that shows the only world from now on, and says where on stderr; steps then take real
+        time. On the CPU."""
+        if self.live is None:
+            rig = self.renderer.rig if self.renderer is not None else None
+            self.live = pictura.LiveView(self.simulator, follow=agent, rig=rig, wait_for_page=False)
+            print(f"showing {self.live.address}", file=sys.stderr)
+            webbrowser.open(self.live.address)
+
+    def close(self) -> None:
+        """Ends what show() opened."""
+        if self.live is not None:
+            self.live.close()
+            self.live = None
+
+
+def checked_render_mode(mode: str | None) -> str | None:
+    """Raises pictura.UsageError for what environments of one world cannot do."""
+    if mode not in (None, *RENDER_MODES):
+        raise pictura.UsageError(f"render_mode: expected None, {' or '.join(map(repr, RENDER_MODES))}, got {mode!r}")
+    return mode
 
 
 class OtherDrivers:

@@ -9,19 +9,20 @@ import gymnasium
 import numpy as np
 
 import pictura
-from pictura.envs.batch import Batch, OtherDrivers
+from pictura.envs.batch import RENDER_MODES, Batch, OtherDrivers, checked_render_mode
 from pictura.envs.gymnasium_spaces import action_space, observation_space
 
 
 class DriveEnv(gymnasium.Env):
     """One vehicle of a world, whose other agents keep their lanes ("lane"), stand ("idle"), act at random ("random"), or
-    follow a policy, a function from the observations of all slots to actions int32 [slots].
+    follow a policy, a function from the observations of all slots to actions int32 [slots]. render_mode: "rgb_array", from above,
+    or "human", a live page in the browser.
 
     An episode ends when the agent's infraction halts it (terminated) or when its world's does (truncated). Other options are
     pictura.envs.Batch's; it runs on the CPU, by one thread unless num_threads says otherwise, so that processes can be forked.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
+    metadata = {"render_modes": RENDER_MODES, "render_fps": 10}
 
     def __init__(
         self,
@@ -33,9 +34,7 @@ class DriveEnv(gymnasium.Env):
         num_threads: int = 1,
         **options: Any,
     ) -> None:
-        if render_mode not in (None, "rgb_array"):
-            raise pictura.UsageError(f"render_mode: expected None or 'rgb_array', got '{render_mode}'")
-        self.render_mode = render_mode
+        self.render_mode = checked_render_mode(render_mode)
         self.batch = Batch(maps, num_agents, 1, num_threads=num_threads, device="cpu", array="numpy", **options)
         self.observation_space = observation_space(self.batch)
         self.action_space = action_space(self.batch)
@@ -50,6 +49,8 @@ class DriveEnv(gymnasium.Env):
             drivers = np.flatnonzero(self.batch.active & (state["agent_class"] == 0))
             if len(drivers):
                 self._slot = int(drivers[0])
+                if self.render_mode == "human":
+                    self.batch.show(self._slot)
                 return self._observation(), self._info()
         raise pictura.Error("reset: no vehicle found a place in 100 episodes: expected a map or an option that has room")
 
@@ -63,9 +64,10 @@ class DriveEnv(gymnasium.Env):
         return self._observation(), float(results["reward"][self._slot]), terminated, truncated, self._info()
 
     def render(self) -> np.ndarray | None:
-        if self.render_mode is None:
-            return None
-        return self.batch.draw(0, self._slot)
+        return self.batch.draw(0, self._slot) if self.render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        self.batch.close()
 
     def _observation(self) -> Any:
         seen = self.batch.observe(copy=False)

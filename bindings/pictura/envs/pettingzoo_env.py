@@ -8,7 +8,7 @@ import numpy as np
 from pettingzoo import ParallelEnv
 
 import pictura
-from pictura.envs.batch import Batch
+from pictura.envs.batch import RENDER_MODES, Batch, checked_render_mode
 from pictura.envs.gymnasium_spaces import action_space, observation_space
 
 
@@ -18,7 +18,7 @@ class DriveParallelEnv(ParallelEnv):
     whether the agent goes on. Options are Batch's; it runs on the CPU.
     """
 
-    metadata = {"name": "pictura_drive_v0", "render_modes": ["rgb_array"], "render_fps": 10, "is_parallelizable": True}
+    metadata = {"name": "pictura_drive_v0", "render_modes": RENDER_MODES, "render_fps": 10, "is_parallelizable": True}
 
     def __init__(
         self,
@@ -29,7 +29,7 @@ class DriveParallelEnv(ParallelEnv):
         num_threads: int = 1,
         **options: Any,
     ) -> None:
-        self.render_mode = render_mode
+        self.render_mode = checked_render_mode(render_mode)
         self.batch = Batch(maps, num_agents, 1, num_threads=num_threads, device="cpu", array="numpy", **options)
         self.possible_agents = [f"agent_{i}" for i in range(num_agents)]
         self.agents: list[str] = []
@@ -52,6 +52,8 @@ class DriveParallelEnv(ParallelEnv):
             active = self.batch.active
             self.agents = [agent for i, agent in enumerate(self.possible_agents) if active[i]]
             if self.agents:
+                if self.render_mode == "human":
+                    self.batch.show()
                 return self._observations(self.agents), self._infos(self.agents)
         raise pictura.Error("reset: no agent found a place in 100 episodes: expected a map or an option that has room")
 
@@ -72,10 +74,10 @@ class DriveParallelEnv(ParallelEnv):
         return self._observations(acting), rewards, terminations, truncations, self._infos(acting)
 
     def render(self) -> np.ndarray | None:
-        return None if self.render_mode is None else self.batch.draw(0, 0)
+        return self.batch.draw(0, 0) if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
-        pass
+        self.batch.close()
 
     def _slot(self, agent: str) -> int:
         return int(agent.removeprefix("agent_"))

@@ -1,0 +1,82 @@
+"""Worlds in rerun's viewer (rerun.io), where its package is installed (`pip install rerun-sdk`).
+
+    import rerun, pictura.rerun
+    rerun.init("pictura", spawn=True)
+    pictura.rerun.log_map(town)
+    for step in range(100):
+        simulator.step(actions)
+        pictura.rerun.log_world(simulator, step * simulator.dt_s)
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import pictura
+
+try:
+    import rerun
+except ImportError as error:
+    raise ImportError("pictura.rerun needs rerun: pip install rerun-sdk") from error
+
+_CLASSES = ("vehicle", "cyclist", "pedestrian")
+_COLORS = np.array([[60, 140, 255], [60, 200, 120], [255, 160, 40]], np.uint8)
+_HALTED = np.array([150, 150, 150], np.uint8)
+_STATUS_HALTED, _STATUS_ABSENT = 1, 3
+
+
+def log_map(road: pictura.Map, entity: str = "world/map", recording: Any = None) -> None:
+    """Marks, edges, stop lines, crosswalks and building lines of a map, once for all times. recording: rerun's; the current one
+    without it."""
+    arrays = road.arrays()
+
+    def log(name: str, strips: list[np.ndarray], color: tuple[int, int, int]) -> None:
+        if strips:
+            rerun.log(f"{entity}/{name}", rerun.LineStrips3D(strips, colors=color), static=True, recording=recording)
+
+    def ranges(name: str) -> list[np.ndarray]:
+        return [arrays[f"{name}_points"][begin:end, :3] for begin, end in arrays[f"{name}_point_range"]]
+
+    log("markings", ranges("marking"), (240, 240, 240))
+    log("crosswalks", ranges("crosswalk"), (200, 200, 120))
+    for name, color in (("road_edges", (160, 120, 80)), ("stop_lines", (240, 80, 80)), ("building_lines", (110, 110, 110))):
+        log(name, list(arrays[name].reshape(-1, 2, 3)), color)
+
+
+def log_world(simulator: pictura.Simulator, time_s: float, world: int = 0, entity: str = "world", recording: Any = None) -> None:
+    """The agents of a world of a simulator on the CPU as it is now, as boxes with their speed as an arrow; halted ones are grey. Time
+    is rerun's timeline "simulated", in seconds. Raises pictura.UsageError for a simulator on a device or a world that there is not."""
+    if simulator.device != "cpu" or not 0 <= world < simulator.num_worlds:
+        raise pictura.UsageError(
+            f"log_world: expected a world of 0 to {simulator.num_worlds - 1} on cpu, got {world} on {simulator.device}"
+        )
+    state = {name: array.numpy() for name, array in simulator.state.items()}
+    slots = np.flatnonzero((simulator.world_of_slot.numpy() == world) & (state["status"] != _STATUS_ABSENT))
+    heading = state["heading_rad"][slots]
+    size = np.stack([state[f"{name}_m"][slots] for name in ("length", "width", "height")], axis=1)
+    center = np.stack([state[f"{axis}_m"][slots] for axis in "xyz"], axis=1)
+    center[:, 2] += size[:, 2] / 2
+    turn = np.zeros((len(slots), 4), np.float32)  # x, y, z, w
+    turn[:, 2], turn[:, 3] = np.sin(heading / 2), np.cos(heading / 2)
+    colors = _COLORS[state["agent_class"][slots]]
+    colors[state["status"][slots] == _STATUS_HALTED] = _HALTED
+    labels = [
+        f"{_CLASSES[kind]} {agent}"
+        for kind, agent in zip(state["agent_class"][slots], simulator.agent_of_slot.numpy()[slots], strict=True)
+    ]
+    rerun.set_time("simulated", duration=time_s, recording=recording)
+    boxes = rerun.Boxes3D(centers=center, half_sizes=size / 2, quaternions=turn, colors=colors, labels=labels, show_labels=False)
+    rerun.log(f"{entity}/agents", boxes, recording=recording)
+    velocity = state["speed_mps"][slots, None] * np.stack([np.cos(heading), np.sin(heading), np.zeros_like(heading)], axis=1)
+    rerun.log(f"{entity}/velocities", rerun.Arrows3D(origins=center, vectors=velocity, colors=colors), recording=recording)
+
+
+def log_images(images: pictura.Images, view: int, rig: pictura.Rig, entity: str = "cameras", recording: Any = None) -> None:
+    """What the cameras of one view show, each under its name. images: uint8 or of 0 to 1, on the CPU, of a rig of one size."""
+    for pixels, camera in zip(images.rgb.numpy()[view], rig.cameras, strict=True):
+        rows = np.moveaxis(pixels, 0, -1)
+        if rows.dtype != np.uint8:
+            rows = (255 * rows.astype(np.float32)).round().astype(np.uint8)
+        rerun.log(f"{entity}/{camera.name}", rerun.Image(rows), recording=recording)

@@ -1,0 +1,234 @@
+// What is seen of a simulator: recordings of a world as replays, and live views in a browser.
+#include <optional>
+
+#include <fmt/format.h>
+#include <pybind11/stl.h>
+
+#include "pictura/bindings/objects.h"
+#include "pictura/commit.h"
+#include "pictura/common/error.h"
+#include "pictura/replay/file.h"
+#include "pictura/replay/gallery.h"
+#include "pictura/replay/live_view.h"
+#include "pictura/replay/mcap.h"
+#include "pictura/replay/recorder.h"
+#include "pictura/version.h"
+
+namespace pictura::python {
+
+namespace {
+
+constexpr std::chrono::milliseconds kGlance{50};  // between two looks at whether ^C was pressed
+
+SimulatorInside inside_of(const py::object& simulator) {
+  return py::cast<SimulatorInside>(simulator.attr("_inside")());
+}
+
+std::optional<RendererConfig> cameras_of(const std::optional<Rig>& rig) {
+  if (!rig) return {};
+  RendererConfig config;
+  config.rig = *rig;
+  return config;
+}
+
+/// This process, as Python was called.
+ReplayOrigin origin_of(const std::string& policy) {
+  ReplayOrigin origin{.commit = PICTURA_COMMIT, .version = PICTURA_VERSION, .policy = policy, .policy_hash = policy};
+  for (const py::handle word : py::module_::import("sys").attr("argv")) {
+    origin.command += (origin.command.empty() ? "python " : " ") + std::string(py::str(word));
+  }
+  return origin;
+}
+
+/// Of the followed agent, for the next step: float32 [actions] logits and a value.
+ReplayDecision decision_of_python(const py::array_t<float, py::array::c_style | py::array::forcecast>& logits,
+                                  float value) {
+  PICTURA_CHECK(logits.ndim() == 1 && logits.size() == kNumActions,
+                "decide: logits: expected [{}], got {} numbers in {} dimensions", kNumActions, logits.size(),
+                logits.ndim());
+  return decision_of(Span<const float>(logits.data(), static_cast<size_t>(logits.size())), value);
+}
+
+class PyRecorder final : public Watcher {
+ public:
+  PyRecorder(SimulatorInside inside, const RecorderOptions& options)
+      : inside_(std::move(inside)), followed_(options.followed) {
+    inside_.run("Recorder", [&] { recorder_.emplace(*inside_.simulator, options); });
+  }
+
+  void before_step(Span<Command> commands) override {
+    if (recorder_) recorder_->before_step(commands, decision_);
+  }
+  void after_step(const StepResult& result) override {
+    if (recorder_) recorder_->after_step(result);
+    decision_.reset();
+  }
+  void after_reset() override {
+    if (recorder_) recorder_->after_reset();
+    decision_.reset();
+  }
+
+  void decide(const ReplayDecision& decision) {
+    if (followed_ < 0) fail_usage("decide: the recorder follows no agent");
+    decision_ = decision;
+  }
+  int num_steps() const { return recorded().num_frames - 1; }
+  const ReplayMetrics& metrics() const { return recorded().metrics; }
+
+  void write(const std::string& path, const std::string& policy) {
+    const bool is_html = path.ends_with(".html"), is_mcap = path.ends_with(".mcap");
+    if (!is_html && !is_mcap) fail_usage("write: expected a file *.html or *.mcap, got '{}'", path);
+    if (recorder_) {
+      ReplayOrigin origin = origin_of(policy);
+      inside_.run("write", [&] { finished_ = recorder_->finish(std::move(origin)); });
+      recorder_.reset();
+    }
+    const py::gil_scoped_release no_gil;
+    is_html ? write_replay(path, *finished_) : write_mcap(path, *finished_);
+  }
+
+ private:
+  const Replay& recorded() const { return recorder_ ? recorder_->recorded() : *finished_; }
+
+  SimulatorInside inside_;
+  const int followed_;
+  std::optional<Recorder> recorder_;
+  std::optional<Replay> finished_;
+  std::optional<ReplayDecision> decision_;
+};
+
+class PyLiveView final : public Watcher {
+ public:
+  PyLiveView(SimulatorInside inside, const LiveViewOptions& options) : inside_(std::move(inside)) {
+    const ReplayOrigin origin = origin_of("");
+    inside_.run("LiveView", [&] {
+      view_ = std::make_unique<LiveView>(*inside_.simulator, options, origin,
+                                         [this](int agent) { return agent == decided_ ? decision_ : std::nullopt; });
+    });
+  }
+
+  bool is_due() override { return !view_ || view_->is_due(kGlance); }
+  void before_step(Span<Command> commands_inout) override {
+    if (view_) view_->before_step(commands_inout);
+  }
+  void after_step(const StepResult& result) override {
+    if (view_) view_->after_step(result);
+  }
+  void after_reset() override {
+    if (view_) view_->after_reset();
+  }
+
+  void decide(int agent, const ReplayDecision& decision) {
+    decided_ = agent;
+    decision_ = decision;
+  }
+  std::string address() const { return open().address(); }
+  int num_pages() const { return open().num_pages(); }
+  void close() {
+    if (!view_) return;
+    inside_.run("close", [this] {
+      view_->finish();
+      view_.reset();
+    });
+  }
+
+ private:
+  LiveView& open() const {
+    PICTURA_CHECK(view_, "LiveView: it was closed");
+    return *view_;
+  }
+
+  SimulatorInside inside_;
+  std::unique_ptr<LiveView> view_;
+  int decided_ = -1;
+  std::optional<ReplayDecision> decision_;
+};
+
+py::dict dict_of(const ReplayMetrics& metrics) {
+  py::dict d;
+#define X(name) d[#name] = metrics.name;
+  PICTURA_REPLAY_METRICS(X)
+#undef X
+  return d;
+}
+
+}  // namespace
+
+void bind_replays(py::module_& module) {
+  py::class_<PyRecorder, std::shared_ptr<PyRecorder>>(module, "Recorder", R"(
+Records a world of a simulator on the CPU from now on: every step that the simulator takes, however it is asked to, for as long as
+the recorder lives.)")
+      .def(
+          py::init([](const py::object& simulator, int world, int follow, const std::optional<Rig>& rig) {
+            SimulatorInside inside = inside_of(simulator);
+            const auto watch = inside.watch;
+            auto recorder = std::make_shared<PyRecorder>(
+                std::move(inside), RecorderOptions{.world = world, .followed = follow, .cameras = cameras_of(rig)});
+            watch(recorder);
+            return recorder;
+          }),
+          py::arg("simulator"), py::kw_only(), py::arg("world") = 0, py::arg("follow") = -1,
+          py::arg("rig") = py::none(), py::keep_alive<1, 2>(),
+          R"(follow: the agent of that world that the page opens with, whose decisions are kept; -1: none. rig: keeps that agent's
+images of every step, drawn by the CPU renderer, without loss. Raises pictura.UsageError where there is no such world or agent and
+where the simulator is on a device.)")
+      .def(
+          "decide",
+          [](PyRecorder& self, const py::array_t<float, py::array::c_style | py::array::forcecast>& logits,
+             float value) { self.decide(decision_of_python(logits, value)); },
+          py::arg("logits"), py::arg("value") = 0.0f,
+          "What a policy makes of the followed agent's state, for the next step: logits [12], and its value.")
+      .def_property_readonly("num_steps", &PyRecorder::num_steps, "Steps, and resets, until now.")
+      .def_property_readonly(
+          "metrics", [](const PyRecorder& self) { return dict_of(self.metrics()); },
+          "Counts and sums until now, by name.")
+      .def(
+          "write", &PyRecorder::write, py::arg("path"), py::arg("policy") = "",
+          R"(Ends the recording and writes it, whole or not at all: *.html, a page for any browser, or *.mcap, for Foxglove; as often
+as one likes. policy: its name in the page. Raises pictura.Error naming the file.)");
+
+  py::class_<PyLiveView, std::shared_ptr<PyLiveView>>(module, "LiveView", R"(
+A page in the browser that shows the only world of a simulator on the CPU while it runs: pause, step, pace, and drive an agent by
+the keyboard. The simulator's steps then wait until they are due: in real time, or as the page says.)")
+      .def(
+          py::init([](const py::object& simulator, int port, const std::string& host_name, int follow,
+                      const std::optional<Rig>& rig, bool wait_for_page) {
+            SimulatorInside inside = inside_of(simulator);
+            const auto watch = inside.watch;
+            auto view =
+                std::make_shared<PyLiveView>(std::move(inside), LiveViewOptions{.port = port,
+                                                                                .host_name = host_name,
+                                                                                .watched = follow,
+                                                                                .cameras = cameras_of(rig),
+                                                                                .waits_for_page = wait_for_page});
+            watch(view);
+            return view;
+          }),
+          py::arg("simulator"), py::kw_only(), py::arg("port") = 0, py::arg("host_name") = "", py::arg("follow") = 0,
+          py::arg("rig") = py::none(), py::arg("wait_for_page") = true, py::keep_alive<1, 2>(),
+          R"(port: of the loopback, 0 for a free one. host_name: if given, listens on all addresses, for pages that name this machine so.
+follow: the agent that pages open with. rig: what its images are drawn with; none without it. wait_for_page: no step is taken before
+a page has come. Raises pictura.UsageError where this package cannot serve, pictura.Error where the port is taken.)")
+      .def(
+          "decide",
+          [](PyLiveView& self, int agent, const py::array_t<float, py::array::c_style | py::array::forcecast>& logits,
+             float value) { self.decide(agent, decision_of_python(logits, value)); },
+          py::arg("agent"), py::arg("logits"), py::arg("value") = 0.0f,
+          "What a policy makes of an agent's state: shown while pages follow that agent, until the next call.")
+      .def_property_readonly("address", &PyLiveView::address, "Of the page, with its secret.")
+      .def_property_readonly("num_pages", &PyLiveView::num_pages, "Pages that listen.")
+      .def("close", &PyLiveView::close, "Tells pages that it is over, and lets the simulator run freely.");
+
+  module.def(
+      "write_gallery",
+      [](const std::string& folder) {
+        const py::gil_scoped_release no_gil;
+        return write_gallery(folder);
+      },
+      py::arg("folder"),
+      "Writes FOLDER/index.html over the replays that lie in it, worst first, and returns how many. Raises "
+      "pictura.Error naming a page "
+      "that is none.");
+}
+
+}  // namespace pictura::python
