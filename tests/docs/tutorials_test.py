@@ -1,0 +1,71 @@
+"""The commands of README and the tutorials, run as a reader would, in one folder and one after the other; with fewer updates, steps and
+agents.
+
+Run by ctest: python3 tutorials_test.py PICTURA.
+"""
+
+import pathlib
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import commands
+from documents_test import command_lines
+
+PICTURA = ""
+ROOT = commands.ROOT
+PAGES = [ROOT / "README.md"] + [ROOT / f"docs/tutorials/{name}.md" for name in ("first_run", "reward", "rig", "map", "look")]
+# Of what takes long, less.
+AT_MOST = {"--steps": 20, "--agents": 8, "--scenarios": 2, "--episodes": 1, "--follow": 3}
+# What a page in a browser waits for has tests of its own (tests/replay/live_test.py).
+WAITS = "--serve"
+
+
+def shorter(line):
+    words = shlex.split(line, comments=True)
+    for i, word in enumerate(words[:-1]):
+        if word in AT_MOST:
+            words[i + 1] = str(min(int(words[i + 1]), AT_MOST[word]))
+        if word == "--config":
+            words[i + 1] = "configs/smoke.toml"
+    if words[0] in ("evaluate", "replay") and "--steps" not in words:
+        words += ["--steps", str(AT_MOST["--steps"])]
+    if words[0] == "train":
+        words += ["--set", "train.updates=1", "--set", "simulator.num_slots=8", "--overwrite"]
+    return words
+
+
+class Tutorials(unittest.TestCase):
+    def test_every_command_does_what_it_says(self):
+        folder = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, folder)
+        (folder / "configs").symlink_to(ROOT / "configs")
+        subprocess.run([PICTURA, "town", "--seed", "7", "--blocks", "2x2", "--out", folder / "mytown.xodr"], check=True, capture_output=True)
+        count, written = 0, set()
+        for page in PAGES:
+            text = page.read_text()
+            for block in re.findall(r"`(\w+\.toml)`.*?^```toml\n(.*?)^```", text, re.DOTALL | re.MULTILINE):
+                (folder / block[0]).write_text(block[1])
+            for line in command_lines(text):
+                words = shorter(line)
+                if WAITS in words:
+                    continue
+                with self.subTest(f"{page.relative_to(ROOT)}: pictura {line}"):
+                    result = subprocess.run([PICTURA, *words], cwd=folder, capture_output=True, text=True, timeout=300)
+                    self.assertEqual(result.returncode, 0, f"pictura {shlex.join(words)}\n{result.stderr}")
+                    outputs = [words[i + 1] for i, word in enumerate(words[:-1]) if word in ("--out", "--png", "--svg", "--gallery")]
+                    for output in outputs:
+                        self.assertTrue((folder / output).exists(), f"pictura {shlex.join(words)} wrote no {output}")
+                        written.add(output)
+                    count += 1
+        self.assertGreater(count, 20)
+        self.assertGreater(len(written), 10)
+
+
+if __name__ == "__main__":
+    PICTURA = sys.argv.pop(1)
+    unittest.main()
