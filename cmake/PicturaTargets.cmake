@@ -122,11 +122,12 @@ function(pictura_add_test name)
   include(GoogleTest)
   add_executable(${name}_test ${arg_SOURCES})
   pictura_use_headers(${name}_test PRIVATE)
-  target_link_libraries(${name}_test PRIVATE ${arg_LINK} GTest::gmock GTest::gtest_main)
+  # OpenMP also for tests that need none: a precompiled header serves only equal flags.
+  target_link_libraries(${name}_test PRIVATE ${arg_LINK} OpenMP::OpenMP_CXX GTest::gmock GTest::gtest_main)
   if(arg_PRECOMPILED)
     pictura_use_precompiled(${name}_test ${arg_PRECOMPILED})
   else()
-    # Many compute with the rules that both devices share, and one header serves only equal flags.
+    # Many compute with the rules that both devices share.
     pictura_forbid_fma(${name}_test)
     pictura_use_precompiled(${name}_test gtest)
   endif()
