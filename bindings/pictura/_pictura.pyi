@@ -7,7 +7,7 @@ import numpy
 import numpy.dtypes
 import numpy.typing
 import typing
-__all__: list[str] = ['AGENT_FIELDS', 'Array', 'BOX_DTYPE', 'COMMAND_DTYPE', 'CONDITIONING_NAMES', 'Camera', 'Controller', 'EVENTS', 'Error', 'Geometry', 'HAS_CUDA', 'IDLE_ACTION', 'Images', 'LANE_TYPES', 'Map', 'NUM_ACTIONS', 'OBSERVATION_ARRAYS', 'REWARD_TERMS', 'Renderer', 'Rig', 'Scene', 'SceneFile', 'Simulator', 'Snapshot', 'StepResult', 'UsageError', 'VIEW_DTYPE', 'draw_worlds', 'known_towns', 'make_views', 'map_folder', 'renderer_names', 'simulator_names']
+__all__: list[str] = ['AGENT_FIELDS', 'Array', 'BOX_DTYPE', 'COMMAND_DTYPE', 'CONDITIONING_NAMES', 'Camera', 'Controller', 'EVENTS', 'Error', 'Geometry', 'HAS_CUDA', 'IDLE_ACTION', 'Images', 'LANE_TYPES', 'LiveView', 'Map', 'NUM_ACTIONS', 'OBSERVATION_ARRAYS', 'REWARD_TERMS', 'Recorder', 'Renderer', 'Rig', 'Scene', 'SceneFile', 'Simulator', 'Snapshot', 'StepResult', 'UsageError', 'VIEW_DTYPE', 'draw_worlds', 'known_towns', 'make_views', 'map_folder', 'renderer_names', 'simulator_names', 'write_gallery']
 class Error(RuntimeError):
     """
     The work failed; the message names what was expected and what came.
@@ -671,6 +671,65 @@ class Simulator:
         """
         (map, agents, global world) of each.
         """
+class Recorder:
+    """
+    Records a world of a simulator on the CPU from now on: every step that the simulator takes, however it is asked to, for as long as
+    the recorder lives.
+    """
+    def __init__(self, simulator: typing.Any, *, world: typing.SupportsInt | typing.SupportsIndex = 0, follow: typing.SupportsInt | typing.SupportsIndex = -1, rig: Rig | None = None) -> None:
+        """
+        follow: the agent of that world that the page opens with, whose decisions are kept; -1: none. rig: keeps that agent's
+        images of every step, drawn by the CPU renderer, without loss. Raises pictura.UsageError where there is no such world or agent and
+        where the simulator is on a device.
+        """
+    def decide(self, logits: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], value: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        """
+        What a policy makes of the followed agent's state, for the next step: logits [12], and its value.
+        """
+    def write(self, path: str, policy: str = '') -> None:
+        """
+        Ends the recording and writes it, whole or not at all: *.html, a page for any browser, or *.mcap, for Foxglove; as often
+        as one likes. policy: its name in the page. Raises pictura.Error naming the file.
+        """
+    @property
+    def metrics(self) -> dict:
+        """
+        Counts and sums until now, by name.
+        """
+    @property
+    def num_steps(self) -> int:
+        """
+        Steps, and resets, until now.
+        """
+class LiveView:
+    """
+    A page in the browser that shows the only world of a simulator on the CPU while it runs: pause, step, pace, and drive an agent by
+    the keyboard. The simulator's steps then wait until they are due: in real time, or as the page says.
+    """
+    def __init__(self, simulator: typing.Any, *, port: typing.SupportsInt | typing.SupportsIndex = 0, host_name: str = '', follow: typing.SupportsInt | typing.SupportsIndex = 0, rig: Rig | None = None, wait_for_page: bool = True) -> None:
+        """
+        port: of the loopback, 0 for a free one. host_name: if given, listens on all addresses, for pages that name this machine so.
+        follow: the agent that pages open with. rig: what its images are drawn with; none without it. wait_for_page: no step is taken before
+        a page has come. Raises pictura.UsageError where this package cannot serve, pictura.Error where the port is taken.
+        """
+    def close(self) -> None:
+        """
+        Tells pages that it is over, and lets the simulator run freely.
+        """
+    def decide(self, agent: typing.SupportsInt | typing.SupportsIndex, logits: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], value: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        """
+        What a policy makes of an agent's state: shown while pages follow that agent, until the next call.
+        """
+    @property
+    def address(self) -> str:
+        """
+        Of the page, with its secret.
+        """
+    @property
+    def num_pages(self) -> int:
+        """
+        Pages that listen.
+        """
 def _hash64(data: bytes) -> int:
     """
     FNV-1a, with which files of the library end.
@@ -701,6 +760,10 @@ def renderer_names() -> list[str]:
 def simulator_names() -> list[str]:
     """
     Executors that this build knows.
+    """
+def write_gallery(folder: str) -> int:
+    """
+    Writes FOLDER/index.html over the replays that lie in it, worst first, and returns how many. Raises pictura.Error naming a page that is none.
     """
 AGENT_FIELDS: tuple = (('x_m', 'f32', 1, False, 'rear axle, or the centre of a pedestrian'), ('y_m', 'f32', 1, False, ''), ('z_m', 'f32', 1, False, 'height of the road under it'), ('heading_rad', 'f32', 1, False, 'counter-clockwise from x, in [-pi, pi]'), ('cos_heading', 'f32', 1, True, ''), ('sin_heading', 'f32', 1, True, ''), ('speed_mps', 'f32', 1, False, 'signed, along the heading'), ('accel_long_mps2', 'f32', 1, False, ''), ('accel_lat_mps2', 'f32', 1, False, 'positive to the left'), ('steer_rad', 'f32', 1, False, 'front wheel angle, positive to the left'), ('jerk_long_mps3', 'f32', 1, False, 'realised in the last step'), ('jerk_lat_mps3', 'f32', 1, False, ''), ('length_m', 'f32', 1, False, 'of the box'), ('width_m', 'f32', 1, False, ''), ('height_m', 'f32', 1, False, ''), ('lane', 'i32', 1, True, 'current lane, -1 none'), ('lane_offset_m', 'f32', 1, True, 'signed, positive to the left of the centre line'), ('lane_angle_rad', 'f32', 1, True, "heading less the lane's direction, in [-pi, pi]"), ('speed_limit_mps', 'f32', 1, True, 'of the current lane'), ('waypoint_x_m', 'f32', 3, False, 'the goal chain; passed ones stay until the chain is renewed'), ('waypoint_y_m', 'f32', 3, False, ''), ('waypoint_z_m', 'f32', 3, False, ''), ('next_waypoint', 'i32', 1, False, 'index of the active one, in [0, 3)'), ('goal_lane', 'i32', 1, False, 'lane (or piece of a walkway) of the last waypoint, where the next chain starts'), ('goal_lane_s_m', 'f32', 1, False, 'arc length of the last waypoint on it'), ('goal_chains', 'i32', 1, False, 'chains drawn in this episode'), ('goal_x_m', 'f32', 1, False, 'last waypoint that the metric Goals waits for, see rules/step.h'), ('goal_y_m', 'f32', 1, False, ''), ('goal_z_m', 'f32', 1, False, ''), ('goal_open', 'u8', 1, False, '1 while the metric waits for it'), ('conditioning', 'f32', 17, False, 'reward coefficients and dynamics multipliers; see simulator/conditioning.h'), ('agent_class', 'u8', 1, False, 'AgentClass'), ('status', 'u8', 1, False, 'AgentStatus'), ('refusal', 'u8', 1, True, 'SpawnFailure, of an absent agent'), ('halt_reason', 'u8', 1, False, 'Event bits that halted it'), ('events', 'u8', 1, False, 'Event bits of the last step'), ('goals_reached', 'i32', 1, False, 'last waypoints passed within 2 m in this episode'), ('waypoints_reached', 'i32', 1, False, 'waypoints of any kind that paid or passed in this episode'), ('distance_m', 'f32', 1, False, 'sum of |speed| dt in this episode'), ('first_motion_step', 'i32', 1, False, 'first step of this episode above kRest_mps, from 1; 0: none yet'), ('episode_events', 'u8', 1, False, "union of the episode's event bits"), ('episode_return', 'f32', 1, False, 'sum of rewards in this episode'))
 BOX_DTYPE: numpy.dtypes.VoidDType
