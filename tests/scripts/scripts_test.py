@@ -127,8 +127,11 @@ class Setup(unittest.TestCase):
         presets = json.loads((SCRIPTS.parent / "CMakePresets.json").read_text())["configurePresets"]
         base = next(preset for preset in presets if preset["name"] == "base")
         self.assertEqual(base["cacheVariables"]["CMAKE_EXPORT_COMPILE_COMMANDS"], "ON")
-        names = {preset["name"] for preset in presets}
-        self.assertTrue(all(preset.get("inherits") in names for preset in presets if preset is not base))
+        parents = {preset["name"]: preset.get("inherits") for preset in presets}
+        for name in parents:
+            while name != "base":
+                self.assertIn(name, parents, "a preset that does not lead to base")
+                name = parents[name]
         self.assertIn("/compile_commands.json", (SCRIPTS.parent / ".gitignore").read_text().split())
 
 
