@@ -86,7 +86,7 @@ void print_heading(const BenchContext& context) {
 }
 
 void report_benchmark(bool json, const BenchContext& context, const std::vector<BenchResult>& results,
-                      const EarlierReport* earlier) {
+                      const std::optional<EarlierReport>& earlier) {
   Json object = context.json();
   object["results"] = Json::array();
   Json& rows = object["results"];

@@ -52,15 +52,11 @@ void print_heading(const BenchContext& context);
 
 /// Prints medians and means with minimum and maximum, and how they stand to an earlier report, if there is one.
 void report_benchmark(bool json, const BenchContext& context, const std::vector<BenchResult>& results,
-                      const EarlierReport* earlier = nullptr);
+                      const std::optional<EarlierReport>& earlier = {});
 
 /// Adds the option --compare, which reads the earlier report: a file that is none is refused before anything is
 /// measured.
 void add_compare_option(CLI::App* command, std::optional<EarlierReport>* earlier);
-/// The report to compare with, or null.
-inline const EarlierReport* pointer_to(const std::optional<EarlierReport>& earlier) {
-  return earlier ? &*earlier : nullptr;
-}
 
 /// Adds the subcommand `bench`.
 void add_bench_command(CLI::App& app);

@@ -207,7 +207,7 @@ void run(Arguments arguments) {
   if (std::any_of(cases.begin(), cases.end(), is_of_cuda_device)) {
     context.add_gpu(cuda_device_name(), cuda_driver_name());
   }
-  report_benchmark(arguments.rate.json, context, results, pointer_to(arguments.earlier));
+  report_benchmark(arguments.rate.json, context, results, arguments.earlier);
 }
 
 }  // namespace

@@ -146,7 +146,7 @@ void run(Arguments arguments) {
                                                arguments.world.walls ? "on" : "off", arguments.world.num_threads),
                        .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
   if (on_device) context.add_gpu(cuda_device_name(), cuda_driver_name());
-  report_benchmark(arguments.rate.json, context, results, pointer_to(arguments.earlier));
+  report_benchmark(arguments.rate.json, context, results, arguments.earlier);
 }
 
 }  // namespace

@@ -76,8 +76,7 @@ void run(Arguments arguments) {
   for (const std::string& text : measured.overrides) workload += " --set " + text;
   if (!measured.init_from.empty()) workload += ", weights of " + measured.init_from;
   workload += fmt::format("; whole updates after a warm-up of {}", measured.warm_up);
-  report_benchmark(arguments.json, training_context(workload, measurement.report), results,
-                   pointer_to(arguments.earlier));
+  report_benchmark(arguments.json, training_context(workload, measurement.report), results, arguments.earlier);
 }
 
 }  // namespace

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 
 #include <fmt/format.h>
 
 #include "pictura/common/error.h"
+#include "pictura/common/support/file.h"
 
 namespace pictura {
 
@@ -73,9 +73,7 @@ std::vector<Comparison> compare_results(const Json& before_rows, const Json& aft
 }
 
 EarlierReport::EarlierReport(const std::string& path) : path_(path) {
-  std::ifstream in(path);
-  PICTURA_CHECK(in.good(), "{}: cannot be read", path);
-  report_ = Json::parse(in, nullptr, /*allow_exceptions=*/false);
+  report_ = Json::parse(read_file(path), nullptr, /*allow_exceptions=*/false);
   const bool is_report = report_.is_object() && report_.value("results", Json()).is_array() &&
                          !report_["results"].empty() && std::ranges::all_of(report_["results"], is_row);
   PICTURA_CHECK(is_report, "{}: expected what a benchmark printed with --json, an object with \"results\"", path);

@@ -1,11 +1,11 @@
 #include "pictura/bench/commands/plot_results.h"
 
 #include <algorithm>
-#include <fstream>
 
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
+#include "pictura/common/support/file.h"
 
 namespace pictura {
 
@@ -30,9 +30,7 @@ void add_rate_options(CLI::App* command, RateArguments* arguments) {
 std::vector<PlottedResult> read_results(const std::vector<std::string>& paths) {
   std::vector<PlottedResult> results;
   for (const std::string& path : paths) {
-    std::ifstream in(path);
-    PICTURA_CHECK(in.good(), "{}: cannot be read", path);
-    const Json object = Json::parse(in, nullptr, /*allow_exceptions=*/false);
+    const Json object = Json::parse(read_file(path), nullptr, /*allow_exceptions=*/false);
     const std::size_t before = results.size();
     auto add = [&](const Json& benchmark) {
       if (!benchmark.is_object() || !benchmark.contains("results")) return;
