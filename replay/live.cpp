@@ -69,10 +69,11 @@ void LiveWorld::after_step(const StepResult& result) {
   keep_newest(num_episodes);
 }
 
-void LiveWorld::after_reset() {
+bool LiveWorld::after_reset() {
   const size_t num_episodes = recorder_.recorded().episodes.size();
-  recorder_.after_reset();
+  if (!recorder_.after_reset()) return false;
   keep_newest(num_episodes);
+  return true;
 }
 
 void LiveWorld::keep_newest(size_t num_episodes) {

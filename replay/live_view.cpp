@@ -128,8 +128,7 @@ void LiveView::after_step(const StepResult& result) {
 }
 
 void LiveView::after_reset() {
-  parts_->world.after_reset();
-  parts_->tell_of_frame();
+  if (parts_->world.after_reset()) parts_->tell_of_frame();
 }
 
 void LiveView::finish() {

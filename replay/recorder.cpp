@@ -301,12 +301,13 @@ void Recorder::after_step(const StepResult& result) {
   parts.add_frame();
 }
 
-void Recorder::after_reset() {
+bool Recorder::after_reset() {
   Parts& parts = *parts_;
-  if (parts.simulator.episode_step()[static_cast<size_t>(parts.world)] != 0) return;
+  if (parts.simulator.episode_step()[static_cast<size_t>(parts.world)] != 0) return false;
   parts.check_room();
   parts.add_no_step();
   parts.add_frame(/*begins_anew=*/true);
+  return true;
 }
 
 const Replay& Recorder::recorded() const { return parts_->replay; }

@@ -56,8 +56,9 @@ class Recorder {
   void before_step(Span<const Command> commands, const std::optional<ReplayDecision>& decision = {});
   /// After it. Throws Error where the replay would take more memory than it may.
   void after_step(const StepResult& result);
-  /// After a reset by the caller, not by a step: a new episode begins if the world is at the start of one.
-  void after_reset();
+  /// After a reset by the caller, not by a step: a new episode begins if the world is at the start of one. Whether it
+  /// is.
+  bool after_reset();
 
   /// What was recorded until now, without images that wait to be compressed; its last frame is the simulator's state.
   const Replay& recorded() const;

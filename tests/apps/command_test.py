@@ -26,6 +26,9 @@ import unittest
 import unittest.mock
 import zlib
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
+from replay_pages import header_of
+
 PICTURA = ""
 CONFIGS = pathlib.Path(__file__).resolve().parents[2] / "configs"
 SCENES = pathlib.Path(__file__).resolve().parents[1] / "golden"
@@ -901,15 +904,12 @@ class Replays(CommandCase):
 
     WORLD = ["procedural:1:blocks=2x2", "--agents", 12, "--seed", 4]
 
-    def header(self, path):
-        return json.loads(re.search('id="replay-header">(.*?)</script>', path.read_text()).group(1))
-
     def test_simulate_records_what_it_counts_and_drives_alike(self):
         path = self.folder / "a.html"
         simulate = ["simulate", *self.WORLD, "--steps", 60, "--policy", "random"]
         facts = self.json_of(*simulate, "--replay", path, "--follow", 3)
         self.assertEqual(facts["state_hash"], self.json_of(*simulate)["state_hash"])
-        header = self.header(path)
+        header = header_of(path)
         for name in ("collisions", "at_fault_collisions", "off_road", "red_light", "wall_contacts", "agent_steps", "goals_reached"):
             self.assertEqual(header["metrics"][name], facts[name], name)
         self.assertGreater(facts["off_road"], 0)
@@ -955,7 +955,7 @@ class Replays(CommandCase):
         rates = [s["infractions"] / s["vehicles"] for s in scenarios]
         worst = sorted(range(4), key=lambda i: -rates[i])[:2]
         self.assertEqual(sorted(p.name for p in folder.iterdir()), sorted(["index.html", *(f"custom_{i}.html" for i in worst)]))
-        self.assertEqual(self.header(self.folder / "worst.html")["map"], f"procedural:{1 + worst[0] % 2}:blocks=2x2")
+        self.assertEqual(header_of(self.folder / "worst.html")["map"], f"procedural:{1 + worst[0] % 2}:blocks=2x2")
         self.assert_refused(2, "--gallery", *evaluate, "--replays", 2)
         self.assert_refused(2, "--follow: has no effect without --replay", *evaluate, "--follow", 1)
 
@@ -966,7 +966,7 @@ class Replays(CommandCase):
         path = self.folder / "policy.html"
         checkpoint = self.folder / "run" / "checkpoint.ckpt"
         self.json_of("replay", *self.WORLD, "--policy", checkpoint, "--steps", 20, "--follow", 2, "--cameras", "--out", path)
-        header, page = self.header(path), path.read_text()
+        header, page = header_of(path), path.read_text()
         self.assertEqual([(c["width_px"], c["height_px"]) for c in header["images"]["cameras"]], [(16, 9)] * 4)
         self.assertRegex(header["policy_hash"], "^[0-9a-f]{16}$")
         data = zlib.decompress(base64.b64decode(re.search('id="replay-data">(.*?)</script>', page).group(1)))

@@ -1,9 +1,14 @@
 """Tests of the Python package: the one on PYTHONPATH, or the one that is installed."""
 
+import pathlib
+import sys
+
 import numpy as np
 import pytest
 
 import pictura
+
+sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "support"))  # what other tests share
 
 IDLE = pictura.IDLE_ACTION
 

@@ -11,39 +11,9 @@ import webbrowser
 import numpy as np
 import pytest
 from conftest import actions_of
+from replay_pages import Events, header_of
 
 import pictura
-
-
-def header_of(path):
-    """What a page says before its numbers."""
-    text = path.read_text()
-    begin = text.index(">", text.index('id="replay-header"')) + 1
-    return json.loads(text[begin : text.index("</script>", begin)])
-
-
-class Events:
-    """The events of a live page, as they come."""
-
-    def __init__(self, address):
-        parts = urllib.parse.urlsplit(address)
-        self.connection = http.client.HTTPConnection("127.0.0.1", parts.port, timeout=60)
-        self.connection.request("GET", parts.path + "events")
-        self.response = self.connection.getresponse()
-        assert self.response.status == 200
-
-    def next(self, *names):
-        name = None
-        while True:
-            line = self.response.readline().decode().rstrip("\n")
-            if line.startswith("event: "):
-                name = line[7:]
-            elif line.startswith("data: ") and name in names:
-                return json.loads(line[6:])
-
-    def close(self):
-        self.response.close()
-        self.connection.close()
 
 
 @pytest.fixture
@@ -108,6 +78,16 @@ def test_an_episode_that_a_reset_begins_is_an_episode(make, tmp_path):
     header = header_of(tmp_path / "resets.html")
     assert header["frames"] == 5, "a first one, two steps and two resets"
     assert header["metrics"]["spawned"] > 8, "three episodes of up to four agents"
+
+
+def test_a_reset_of_another_world_is_none_of_the_recorded_one(make):
+    simulator = make(3, 2)
+    recorder = pictura.Recorder(simulator, world=1)
+    simulator.step(actions_of(0, 6))
+    simulator.reset(np.array([1, 0], np.uint8))
+    assert recorder.num_steps == 1
+    simulator.reset(np.array([0, 1], np.uint8))
+    assert recorder.num_steps == 2
 
 
 def test_what_cannot_be_recorded_is_refused_by_name(make, tmp_path):

@@ -17,38 +17,12 @@ import time
 import unittest
 import urllib.parse
 
-sys.path.insert(0, str(pathlib.Path(__file__).parent))
+sys.path[:0] = [str(pathlib.Path(__file__).parent), str(pathlib.Path(__file__).parents[1] / "support")]
 import browsers
+from replay_pages import Events
 
 PICTURA = ""
 WORLD = ["procedural:1:blocks=2x2", "--agents", "12", "--policy", "lane", "--seed", "3"]
-
-
-class Events:
-    """The events of a simulation, as they come."""
-
-    def __init__(self, served):
-        self.connection = http.client.HTTPConnection("127.0.0.1", served.port, timeout=60)
-        self.connection.request("GET", served.path + "events")
-        self.response = self.connection.getresponse()
-        assert self.response.status == 200, self.response.status
-        self.type = self.response.headers["Content-Type"]
-
-    def next(self, *names):
-        """The data of the next event of one of these names."""
-        name = None
-        while True:
-            line = self.response.readline().decode().rstrip("\n")
-            if line.startswith("event: "):
-                name = line[7:]
-            elif line.startswith("data: ") and name in names:
-                return json.loads(line[6:])
-            elif line == "" and self.response.closed:
-                raise EOFError("the events have ended")
-
-    def close(self):
-        self.connection.close()
-        self.response.close()
 
 
 class Served(unittest.TestCase):
@@ -148,7 +122,7 @@ class Http(Served):
 
     def test_it_pauses_steps_and_begins_with_the_first_page(self):
         self.serve("--cameras")
-        events = Events(self)
+        events = Events(self.address)
         self.assertEqual(events.type, "text/event-stream")
         begin = events.next("begin")
         self.assertEqual(begin["step"], 0)
@@ -164,7 +138,7 @@ class Http(Served):
         self.assertEqual(looks[2]["step"], looks[0]["step"] + 2)
         self.assertEqual(len(looks[2]["images"]), 4 * (4 * 96 * 54 * 3) // 3)
         time.sleep(0.5)
-        late = Events(self)
+        late = Events(self.address)
         self.assertEqual(late.next("begin")["step"], looks[2]["step"])
         self.assertTrue(late.next("status")["paused"])
         events.close()
@@ -172,7 +146,7 @@ class Http(Served):
 
     def test_keys_drive_one_agent_and_are_let_go(self):
         self.serve()
-        events = Events(self)
+        events = Events(self.address)
         tracks = [track["name"] for track in events.next("begin")["header"]["tracks"]]
         actions, speed = tracks.index("action"), tracks.index("speed_mps")
         driven = 7
@@ -200,7 +174,7 @@ class Http(Served):
         slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         slow.connect(("127.0.0.1", self.port))
         slow.sendall(f"GET {self.path}events HTTP/1.1\r\nHost: 127.0.0.1:{self.port}\r\n\r\n".encode())
-        quick = Events(self)
+        quick = Events(self.address)
         quick.next("begin")
         self.control({"pace": 64})
         # More than what may wait for the slow page, in messages and in the system's buffers.
@@ -213,7 +187,7 @@ class Http(Served):
 
     def test_no_more_pages_than_it_has_threads_for(self):
         self.serve()
-        pages = [Events(self) for _ in range(8)]
+        pages = [Events(self.address) for _ in range(8)]
         self.assertEqual(self.ask(path=self.path + "events")[0].status, 503)
         self.assertEqual(self.ask()[0].status, 200)
         for page in pages:
@@ -221,7 +195,7 @@ class Http(Served):
 
     def test_it_ends_after_its_steps_and_reports(self):
         self.serve("--steps", "20", "--json")
-        events = Events(self)
+        events = Events(self.address)
         self.control({"pace": 64})
         self.assertEqual(events.next("end")["step"], 20)
         out, _ = self.process.communicate(timeout=60)
