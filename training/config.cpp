@@ -107,6 +107,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.number("train.adam_eps", c.train.adam_eps, 1e-30, 1);
   v.number("train.weight_decay", c.train.weight_decay, 0, 100);
   v.number("train.max_grad_norm", c.train.max_grad_norm, 1e-9, inf);
+  v.integer("train.sharpen_agent_steps", c.train.sharpen_agent_steps, 0, int64_t{1} << 60);
   v.flag("train.norm_adv", c.train.norm_adv);
   v.number("train.adv_filter_threshold", c.train.adv_filter_threshold, 0, 1);
   v.number("train.adv_filter_ema", c.train.adv_filter_ema, 1e-6, 1);
@@ -753,7 +754,7 @@ std::string drawn_by(const std::string& backend) {
 
 bool is_of_schedule(const std::string& key) {
   return key.starts_with("train.schedule") || key == "train.decay_agent_steps" || key == "train.warm_up_agent_steps" ||
-         key == "train.learning_rate";
+         key == "train.learning_rate" || key == "train.sharpen_agent_steps";
 }
 
 bool is_reported(const std::string& key) {

@@ -97,6 +97,7 @@ struct Config {
     double learning_rate = 5e-4;
     double adam_beta1 = 0.9, adam_beta2 = 0.999, adam_eps = 1e-8, weight_decay = 0.01;
     double max_grad_norm = 0.5;
+    int64_t sharpen_agent_steps = 0;     // over so many the policy's logits double, see training/schedule.h; 0: never
     bool norm_adv = true;                // per minibatch
     double adv_filter_threshold = 0.01;  // of the running max |advantage|; 0: keep everything
     double adv_filter_ema = 0.25;        // weight of the newest rollout in the running max

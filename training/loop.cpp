@@ -172,6 +172,7 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
     record.image_size = run.image_size();
 
     record.stats = improve(options.out_folder, &run);
+    run.on_stream([&] { scale_logits(*run.policy, logit_growth(config.train, record.totals.agent_steps)); });
     record.update_s = watch.restart();
     record.phases_s = run.timer.take();
     record.diagnosis = diagnose(run.rollout, record.stats.adv_threshold, communicator.get());

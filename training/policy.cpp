@@ -334,6 +334,15 @@ int64_t Policy::num_parameters() const {
   return sum;
 }
 
+void scale_logits(const Policy& policy, double factor) {
+  if (factor == 1) return;
+  const at::NoGradGuard no_grad;
+  for (const NamedTensor& parameter : policy.parameters()) {
+    at::Tensor value = parameter.value;
+    if (parameter.name.starts_with("actor.")) value.mul_(factor);
+  }
+}
+
 std::string hash_of_parameters(const std::vector<NamedTensor>& parameters) {
   Hash64 hash;
   for (const NamedTensor& parameter : parameters) {

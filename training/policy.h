@@ -104,6 +104,9 @@ class PolicyNetwork final : public Policy {
 /// where policy.backbone names one that cannot serve.
 std::unique_ptr<const Policy> make_policy(const Config& config, const Rig& rig, Device device);
 
+/// Multiplies the logits by a factor, in the parameters of the layer they come from.
+void scale_logits(const Policy& policy, double factor);
+
 /// Policy outputs for a whole batch without gradients: logits and log-probabilities [batch, actions], values [batch].
 struct Decision {
   at::Tensor logits, log_probs, value;

@@ -24,4 +24,9 @@ bool schedule_has_ended(const Config::Train& config, int64_t agent_steps) {
   return config.schedule != Schedule::constant && agent_steps >= config.schedule_agent_steps;
 }
 
+double logit_growth(const Config::Train& config, int64_t agent_steps) {
+  if (config.sharpen_agent_steps == 0) return 1;
+  return std::exp2(static_cast<double>(agent_steps) / static_cast<double>(config.sharpen_agent_steps));
+}
+
 }  // namespace pictura

@@ -1,4 +1,5 @@
-// The learning rate over a run, as a function of the agent-steps done: a rise at the start, a fall to 0 at the end.
+// What changes over a run as agent-steps are done: the learning rate, with a rise at the start and a fall to 0 at the
+// end, and the policy's temperature.
 #pragma once
 
 #include "pictura/training/config.h"
@@ -12,5 +13,10 @@ double learning_rate_at(const Config::Train& config, int64_t agent_steps);
 
 /// Whether the rate has fallen to 0: there is nothing more to learn.
 bool schedule_has_ended(const Config::Train& config, int64_t agent_steps);
+
+/// The factor by which logits grow after an update of so many agent-steps: they double every sharpen_agent_steps, as if
+/// the softmax's temperature halved. So a policy that starts by chance has to learn to start for certain, and its
+/// likeliest actions become what it has learnt by.
+double logit_growth(const Config::Train& config, int64_t agent_steps);
 
 }  // namespace pictura

@@ -201,6 +201,17 @@ TEST_P(BothModalities, FirstPolicyIsNearlyUniformAndDoesNotDependOnThreads) {
   EXPECT_LT(probabilities.max().item<double>(), 1.1 / 12);
 }
 
+TEST(Policy, ScaledLogitsAreTheSameTimesAFactor) {
+  const PolicyNetwork policy(tiny(Modality::vector), 3, 5, at::kDouble);
+  const Observation seen = observation(Modality::vector, 2);
+  const at::NoGradGuard no_grad;
+  const Policy::Output before = policy.forward(seen);
+  scale_logits(policy, 3);
+  const Policy::Output after = policy.forward(seen);
+  EXPECT_TRUE(at::allclose(after.logits, 3 * before.logits));
+  EXPECT_TRUE(after.value.equal(before.value));
+}
+
 TEST(Policy, AgentsOfABatchDoNotMix) {
   const PolicyNetwork policy(tiny(Modality::perspective), 3, 5, at::kDouble);
   const at::NoGradGuard no_grad;

@@ -123,6 +123,14 @@ TEST(Schedule, FallsToZeroOverItsLastPart) {
   EXPECT_FALSE(schedule_has_ended(train, 1000));
 }
 
+TEST(Schedule, DoublesLogitsInSoManyAgentSteps) {
+  Config::Train train;
+  EXPECT_EQ(logit_growth(train, 1000), 1);
+  train.sharpen_agent_steps = 100;
+  EXPECT_DOUBLE_EQ(logit_growth(train, 100), 2);
+  EXPECT_DOUBLE_EQ(logit_growth(train, 30) * logit_growth(train, 70), 2);
+}
+
 TEST(Schedule, RisesFromATenth) {
   Config::Train train;
   train.learning_rate = 2;
