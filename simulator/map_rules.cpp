@@ -293,9 +293,13 @@ bool may_be_seen(Vec2 offset, float distance_m, float sector_middle_rad) {
   return aside <= kRoadAside_m + margin_m || distance_m <= close_m;
 }
 
-CellLists lists_of_pieces(const MapRules& map, const std::string& map_name, const std::vector<ObservedPiece>& pieces) {
+std::vector<Vec2> middles_of(const std::vector<ObservedPiece>& pieces) {
   std::vector<Vec2> middles;
   for (const ObservedPiece& piece : pieces) middles.push_back(piece.middle_m.xy());
+  return middles;
+}
+
+CellLists lists_of_pieces(const MapRules& map, const std::string& map_name, const std::vector<Vec2>& middles) {
   const float sight_m = std::sqrt(square(kRoadAhead_m) + square(kRoadAside_m)) + kNearCell_m;
   return lists_by_distance(
       map, map_name, middles, sight_m, kSectors,
@@ -369,9 +373,12 @@ MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool obs
     return box_of_segment(piece.a_m.xy(), piece.a_m.xy() + piece.direction * piece.length_m, kWalkReach_m);
   });
 
-  out.near_lane_pieces = lists_of_pieces(out, map.name, out.lane_pieces);
-  out.near_boundary_pieces = lists_of_pieces(out, map.name, out.boundary_pieces);
-  if (observe_walls) out.near_wall_pieces = lists_of_pieces(out, map.name, out.wall_pieces);
+  out.lane_middles = middles_of(out.lane_pieces);
+  out.boundary_middles = middles_of(out.boundary_pieces);
+  out.wall_middles = middles_of(out.wall_pieces);
+  out.near_lane_pieces = lists_of_pieces(out, map.name, out.lane_middles);
+  out.near_boundary_pieces = lists_of_pieces(out, map.name, out.boundary_middles);
+  if (observe_walls) out.near_wall_pieces = lists_of_pieces(out, map.name, out.wall_middles);
   out.near_stop_lines = lists_of_stop_lines(out, map.name);
   return out;
 }
@@ -404,6 +411,9 @@ MapView MapRules::view() const {
   view.lane_pieces = lane_pieces;
   view.boundary_pieces = boundary_pieces;
   view.wall_pieces = wall_pieces;
+  view.lane_middles = lane_middles;
+  view.boundary_middles = boundary_middles;
+  view.wall_middles = wall_middles;
   view.segment_cells = segment_cells.view();
   view.edge_cells = edge_cells.view();
   view.wall_cells = wall_cells.view();

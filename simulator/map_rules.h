@@ -35,6 +35,7 @@ struct MapRules {
   Walkways walkways;
   std::vector<ParkingSpot> parking_spots;
   std::vector<ObservedPiece> lane_pieces, boundary_pieces, wall_pieces;
+  std::vector<Vec2> lane_middles, boundary_middles, wall_middles;
   Grid segment_cells, edge_cells, wall_cells, stop_line_cells, walk_cells;
   CellLists near_lane_pieces, near_boundary_pieces, near_wall_pieces, near_stop_lines;
   Vec2 low_m, high_m;

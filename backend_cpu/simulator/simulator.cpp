@@ -310,9 +310,9 @@ class SimulatorCpu final : public Simulator {
     const WorldView world = worlds_.world(w);
     const ObservationView observations = results_.observation_view();
     for (int agent = 0; agent < world.num_agents; ++agent) {
-      observe(world, agent, worlds_.setup.config.vector_observations, observations);
       results_.views[static_cast<size_t>(world.first_slot + agent)] = view_of(world, agent);
     }
+    observe(world, 0, world.num_agents, worlds_.setup.config.vector_observations, observations);
   }
 
   HostWorlds worlds_;

@@ -28,9 +28,6 @@ class NearestOfWarp {
   __device__ int count() const { return min(capacity, __popc(__ballot_sync(~0u, key_ != kNone))); }
   /// at: the caller's own rank.
   __device__ int32_t item(int) const { return static_cast<int32_t>(key_); }
-  __device__ float worst() const {
-    return __uint_as_float(static_cast<uint32_t>(__shfl_sync(~0u, key_, capacity - 1) >> 32));
-  }
   __device__ void offer(bool is_one, float distance2, int32_t item) {
     const uint64_t offered = is_one ? uint64_t{__float_as_uint(distance2)} << 32 | static_cast<uint32_t>(item) : kNone;
     const bool is_first = threadIdx.x % kWarp == 0;
@@ -41,6 +38,7 @@ class NearestOfWarp {
       if (next < key_) key_ = is_first || before < next ? next : before;
     }
   }
+  __device__ void settle() const {}
 
  private:
   static constexpr uint64_t kNone = ~uint64_t{0};

@@ -414,14 +414,18 @@ struct WriteObservation {
     const int agent = slot - world.first_slot;
     observe_own(world, agent, arrays.observations, group);
     if (group.rank() == group.size() - 1) arrays.views[slot] = view_of(world, agent);
-    const int num_sets = arrays.entity_sets ? num_observed_sets(arrays.observations) : 0;
-    for (int set = 0; set < num_sets; ++set) write_set(group, world, agent, static_cast<EntitySet>(set));
+    if (!arrays.entity_sets) return;
+    const NearPlace place = near_place(world, slot);
+    for (int set = 0; set < num_observed_sets(arrays.observations); ++set) {
+      write_set(group, world, agent, place, static_cast<EntitySet>(set));
+    }
   }
 
  private:
   /// The rows are put together in the group's own memory, so that they are written whole and in order.
   template <typename ThreadGroup>
-  PICTURA_HD void write_set(const ThreadGroup& group, const WorldView& world, int agent, EntitySet set) const {
+  PICTURA_HD void write_set(const ThreadGroup& group, const WorldView& world, int agent, const NearPlace& place,
+                            EntitySet set) const {
     const int slot = world.first_slot + agent;
     const SetRows out = set_rows(arrays.observations, slot, set);
     float* rows = group.staging();
@@ -431,9 +435,9 @@ struct WriteObservation {
       if (set == EntitySet::partners) {
         count = observe_partners(world, agent, frame, rows, group);
       } else if (set == EntitySet::controls) {
-        count = observe_controls(world, slot, frame, rows, group);
+        count = observe_controls(world, slot, place, frame, rows, group);
       } else {
-        count = collect_pieces(group, pieces_near(world, slot, set), frame, out.capacity, rows);
+        count = collect_pieces(group, pieces_near(world.map, place, set), frame, out.capacity, rows);
       }
     }
     const int end = max_of(count, *out.count);
@@ -448,6 +452,7 @@ struct WriteObservation {
   PICTURA_HD static int collect_pieces(const ThreadGroup& group, const PieceList& near, const EgoFrame& frame,
                                        int capacity, float* rows) {
     constexpr int kAtOnce = 2;
+    const RowFrame row_frame(frame);
     const int num_items = static_cast<int>(near.items.size());
     int count = 0;
     for (int first = group.rank(); first - group.rank() < num_items && count < capacity;
@@ -458,11 +463,12 @@ struct WriteObservation {
         pieces[k] = group.read(near.pieces[static_cast<size_t>(near.items[static_cast<size_t>(i)])]);
       }
       for (int k = 0; k < kAtOnce; ++k) {
-        float row[kLaneFeatures];
-        const bool in_sight = observe_piece(pieces[k], frame, row) && first + k * group.size() < num_items;
-        const uint32_t seen = group.ballot(in_sight);
+        float row[8];
+        store8(observe_piece(pieces[k], row_frame), row);
+        const bool is_seen = is_in_sight(pieces[k], frame) && first + k * group.size() < num_items;
+        const uint32_t seen = group.ballot(is_seen);
         const int at = count + group.count_before(seen);
-        for (int f = 0; f < kLaneFeatures && in_sight && at < capacity; ++f) rows[at * kLaneFeatures + f] = row[f];
+        for (int f = 0; f < kLaneFeatures && is_seen && at < capacity; ++f) rows[at * kLaneFeatures + f] = row[f];
         count = min_of(capacity, count + popcount(seen));
       }
     }

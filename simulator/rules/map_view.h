@@ -75,14 +75,16 @@ struct ParkingSpot {
   Vec2 outward;  // unit vector away from the road; null on parking lanes and spaces
 };
 
-/// A piece of a lane, boundary or wall as the policy sees it: at most kMaxPiece_m long. Aligned so that a device reads
-/// one in two loads.
+/// A piece of a lane, boundary or wall as the policy sees it: at most kMaxPiece_m long. Eight floats, which a host
+/// reads in one load and a device in two.
 struct alignas(16) ObservedPiece {
   Vec3 middle_m;  // on the ground
   float half_length_m = 0;
   Vec2 direction;
   float extent = 0;  // a lane's width or a wall's height, scaled as it is observed; a boundary has none
+  float zero = 0;
 };
+static_assert(sizeof(ObservedPiece) == 8 * sizeof(float));
 
 struct MapView {
   Span<const LaneSegment> segments;
@@ -98,6 +100,7 @@ struct MapView {
   Span<const int32_t> walk_leaving;
   Span<const ParkingSpot> parking_spots;
   Span<const ObservedPiece> lane_pieces, boundary_pieces, wall_pieces;
+  Span<const Vec2> lane_middles, boundary_middles, wall_middles;  // of those pieces, again: a quarter of the bytes
   GridView segment_cells, edge_cells, wall_cells, stop_line_cells;
   GridView walk_cells;                                                // of pairs of walk_pieces
   GridView near_lane_pieces, near_boundary_pieces, near_wall_pieces;  // per cell and sector
@@ -123,6 +126,9 @@ PICTURA_HD void visit_arrays(MapView* view, Visit&& visit) {
   visit(&view->lane_pieces);
   visit(&view->boundary_pieces);
   visit(&view->wall_pieces);
+  visit(&view->lane_middles);
+  visit(&view->boundary_middles);
+  visit(&view->wall_middles);
   GridView* const lists[] = {&view->segment_cells,        &view->edge_cells,       &view->wall_cells,
                              &view->stop_line_cells,      &view->walk_cells,       &view->near_lane_pieces,
                              &view->near_boundary_pieces, &view->near_wall_pieces, &view->near_stop_lines};
@@ -163,10 +169,17 @@ PICTURA_HD inline Span<const int32_t> items_at(const GridView& cells, Vec2 p) {
 /// What there is to observe depends on the heading: pieces are listed per cell and per eighth of a turn.
 constexpr int kSectors = 8;
 
-/// The list of the cell that holds p and of the sector that holds the heading, in [-pi, pi].
-PICTURA_HD inline Span<const int32_t> items_at(const GridView& cells, Vec2 p, float heading_rad) {
+/// The cell and the sector of an observer; the near_* lists all have the same cells.
+struct NearPlace {
+  size_t cell = 0, sector = 0;
+  PICTURA_HD size_t cell_and_sector() const { return cell * kSectors + sector; }
+};
+
+/// The cell that holds p and the sector that holds the heading, in [-pi, pi].
+PICTURA_HD inline NearPlace near_place(const MapView& map, Vec2 p, float heading_rad) {
+  const GridView& cells = map.near_lane_pieces;
   const int sector = clamp(static_cast<int>((heading_rad + kPi) * (kSectors / kTwoPi)), 0, kSectors - 1);
-  return list_of(cells, static_cast<size_t>((cells.cell_y(p.y) * cells.num_x + cells.cell_x(p.x)) * kSectors + sector));
+  return {static_cast<size_t>(cells.cell_y(p.y) * cells.num_x + cells.cell_x(p.x)), static_cast<size_t>(sector)};
 }
 
 }  // namespace pictura

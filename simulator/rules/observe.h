@@ -2,6 +2,7 @@
 // docs/observation.md is the table of slots, units and scales; the constants here are its source.
 #pragma once
 
+#include "pictura/common/portable/float8.h"
 #include "pictura/simulator/observation.h"
 #include "pictura/simulator/rules/step.h"
 
@@ -78,39 +79,87 @@ PICTURA_HD void observe_waypoints(const WorldView& world, int slot, const EgoFra
   }
 }
 
+/// The ego frame for eight floats that hold a place (0, 1, 2) and a direction (4, 5), or two places.
+struct RowFrame {
+  Float8 minus_origin, cos, sin;
+
+  PICTURA_HD explicit RowFrame(const EgoFrame& frame) : RowFrame(frame, {}) {}
+  PICTURA_HD static RowFrame of_two_places(const EgoFrame& frame) { return {frame, frame.origin_m}; }
+
+  /// EgoFrame::to_local() of the place and turn() of the direction.
+  PICTURA_HD Float8 to_local(const Float8& row) const {
+    const Float8 moved = row + minus_origin;
+    return blend<0b00110011>(moved, moved * cos + swap_pairs(moved) * sin);
+  }
+
+ private:
+  // x + -0 is x, also where x is -0.
+  PICTURA_HD RowFrame(const EgoFrame& frame, Vec3 second_origin_m)
+      : minus_origin(set8(-frame.origin_m.x, -frame.origin_m.y, -frame.origin_m.z, -0.0f, -second_origin_m.x,
+                          -second_origin_m.y, -second_origin_m.z, -0.0f)),
+        cos(set8(frame.forward.x, frame.forward.x, 0, 0, frame.forward.x, frame.forward.x, 0, 0)),
+        sin(set8(frame.forward.y, -frame.forward.y, 0, 0, frame.forward.y, -frame.forward.y, 0, 0)) {}
+};
+
+#ifdef offsetof  // NVRTC has none
+// What is read as eight floats.
+static_assert(offsetof(AgentBox, cos_heading) == 3 * sizeof(float) &&
+              offsetof(AgentBox, height_m) == 7 * sizeof(float));
+static_assert(offsetof(StopLine, right_m) == 3 * sizeof(float) && sizeof(StopLine) >= 8 * sizeof(float));
+#endif
+
+/// The row of a partner, but for the last feature.
+PICTURA_HD inline Float8 observe_box(const AgentBox& box, const RowFrame& frame) {
+  // x, y, z, length, cos, sin, width, height
+  const Float8 turnable = permute<0, 1, 2, 5, 3, 4, 6, 7>(load8(&box.center_m.x));
+  const Float8 scaled =
+      frame.to_local(turnable) * set8(per(kScalePosition_m), per(kScalePosition_m), per(kScaleHeight_m),
+                                      per(kScaleLength_m), 1, 1, per(kScaleWidth_m), 1);
+  return permute<0, 1, 2, 3, 6, 4, 5, 7>(scaled);
+}
+
 /// The partners of `agent` by distance from its reference point to their box centres: from the near cells where enough
 /// stand there, else from all that are in range.
 template <typename ThreadGroup>
 PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin, const ThreadGroup& group) {
   using Nearest = typename ThreadGroup::template Nearest<kMaxPartners>;
   const GridView& cells = world.box_cells;
-  for (float reach = cells.cell_m;; reach = kPartnerRange_m) {
+  // A cell may be wider than what is in sight: a device has but one.
+  for (float reach = min_of(cells.cell_m, kPartnerRange_m);; reach = kPartnerRange_m) {
     const CellRows range = cells_around(cells, origin, reach);
     const bool is_near = reach < kPartnerRange_m;
     int found = 0;
     for (int y = range.y0; y <= range.y1 && is_near; ++y) found += range.end(cells, y) - range.begin(cells, y);
     if (is_near && found <= kMaxPartners) continue;
     Nearest nearest;
-    for (int y = range.y0; y <= range.y1; ++y) {
-      const int32_t begin = range.begin(cells, y), end = range.end(cells, y);
-      constexpr int kAtOnce = ThreadGroup::kSize > 1 ? 4 : 1;  // whose loads are under way together
-      for (int32_t first = begin + group.rank(); first - group.rank() < end; first += kAtOnce * group.size()) {
-        int32_t others[kAtOnce];
-        Vec2 centers[kAtOnce];
-        for (int k = 0; k < kAtOnce; ++k) {
-          const int32_t i = min_of(first + k * group.size(), end - 1);
-          others[k] = cells.items[static_cast<size_t>(i)];
-          centers[k] = world.cell_centers[i];
-        }
-        for (int k = 0; k < kAtOnce; ++k) {
-          const Vec2 apart = centers[k] - origin;
-          const float d2 = dot(apart, apart);
-          const bool is_one = first + k * group.size() < end && others[k] != agent && d2 < square(kPartnerRange_m);
-          nearest.offer(is_one, d2, others[k]);
+    if constexpr (ThreadGroup::kSize == 1) {
+      // Rows follow one another: what stands beside the range is read as well, which costs less than a loop a row.
+      const int32_t begin = range.begin(cells, range.y0), end = range.end(cells, range.y1);
+      nearest.offer_all(world.cell_centers + begin, cells.items.data() + begin, end - begin, agent, origin,
+                        square(reach));
+    } else {
+      for (int y = range.y0; y <= range.y1; ++y) {
+        const int32_t begin = range.begin(cells, y), end = range.end(cells, y);
+        constexpr int kAtOnce = 4;  // whose loads are under way together
+        for (int32_t first = begin + group.rank(); first - group.rank() < end; first += kAtOnce * group.size()) {
+          int32_t others[kAtOnce];
+          Vec2 centers[kAtOnce];
+          for (int k = 0; k < kAtOnce; ++k) {
+            const int32_t i = min_of(first + k * group.size(), end - 1);
+            others[k] = cells.items[static_cast<size_t>(i)];
+            centers[k] = world.cell_centers[i];
+          }
+          for (int k = 0; k < kAtOnce; ++k) {
+            const Vec2 apart = centers[k] - origin;
+            const float d2 = length2(apart.x, apart.y);
+            const bool is_one = first + k * group.size() < end && others[k] != agent && d2 < square(reach);
+            nearest.offer(is_one, d2, others[k]);
+          }
         }
       }
     }
-    if (!is_near || (nearest.count() == kMaxPartners && nearest.worst() <= square(reach))) return nearest;
+    nearest.settle();
+    if (!is_near || nearest.count() == kMaxPartners) return nearest;
   }
 }
 
@@ -119,100 +168,137 @@ PICTURA_HD int observe_partners(const WorldView& world, int agent, const EgoFram
                                 const ThreadGroup& group = {}) {
   const auto nearest = nearest_partners(world, agent, frame.origin_m.xy(), group);
   const int count = nearest.count();
+  const RowFrame row_frame(frame);
   for (int i = group.rank(); i < count; i += group.size()) {
     float* out = rows + i * kPartnerFeatures;
     const int other = nearest.item(i);
-    const AgentBox& box = world.boxes[other];
-    const Vec3 local = frame.to_local(box.center_m);
-    const Vec2 heading = frame.turn({box.cos_heading, box.sin_heading});
     const bool moves = world.options.auxiliary_observations && other < world.num_agents;
-    out[0] = local.x * per(kScalePosition_m);
-    out[1] = local.y * per(kScalePosition_m);
-    out[2] = local.z * per(kScaleHeight_m);
-    out[3] = box.length_m * per(kScaleLength_m);
-    out[4] = box.width_m * per(kScaleWidth_m);
-    out[5] = heading.x;
-    out[6] = heading.y;
+    store8(observe_box(world.boxes[other], row_frame), out);
     out[7] = moves ? world.agents.speed_mps[world.first_slot + other] * per(kScaleSpeed_mps) : 0.0f;
   }
   return count;
 }
 
-/// Writes the row of a piece; returns whether its middle is in sight.
-PICTURA_HD inline bool observe_piece(const ObservedPiece& piece, const EgoFrame& frame, float* row) {
-  constexpr float kMiddle_m = 0.5f * (kRoadAhead_m - kRoadBehind_m), kHalf_m = 0.5f * (kRoadAhead_m + kRoadBehind_m);
-  const Vec3 local = frame.to_local(piece.middle_m);
-  const Vec2 direction = frame.turn(piece.direction);
-  row[0] = local.x * per(kScalePosition_m);
-  row[1] = local.y * per(kScalePosition_m);
-  row[2] = local.z * per(kScaleHeight_m);
-  row[3] = piece.half_length_m * per(kScaleHalfPiece_m);
-  row[4] = direction.x;
-  row[5] = direction.y;
-  row[6] = piece.extent;
-  return static_cast<int>(fabsf(local.x - kMiddle_m) <= kHalf_m) & static_cast<int>(fabsf(local.y) <= kRoadAside_m);
+/// Whether the middles of pieces are in sight, of one or of eight: a bit each.
+template <typename Number>
+PICTURA_HD uint32_t in_sight(Number x_m, Number y_m, Number minus_origin_x_m, Number minus_origin_y_m, Number cos,
+                             Number sin, Number middle_m, Number half_m, Number aside_m) {
+  const Number from_ego_x = x_m + minus_origin_x_m, from_ego_y = y_m + minus_origin_y_m;
+  const Number ahead = from_ego_x * cos + from_ego_y * sin, left = cos * from_ego_y - sin * from_ego_x;
+  return at_most(magnitude(ahead - middle_m), half_m) & at_most(magnitude(left), aside_m);
+}
+constexpr float kRoadMiddle_m = 0.5f * (kRoadAhead_m - kRoadBehind_m);
+constexpr float kRoadHalf_m = 0.5f * (kRoadAhead_m + kRoadBehind_m);
+
+PICTURA_HD inline bool is_in_sight(const ObservedPiece& piece, const EgoFrame& frame) {
+  return in_sight(piece.middle_m.x, piece.middle_m.y, -frame.origin_m.x, -frame.origin_m.y, frame.forward.x,
+                  frame.forward.y, kRoadMiddle_m, kRoadHalf_m, kRoadAside_m) != 0;
+}
+
+/// The row of a piece, and a zero behind it.
+PICTURA_HD inline Float8 observe_piece(const ObservedPiece& piece, const RowFrame& frame) {
+  return frame.to_local(load8(&piece.middle_m.x)) *
+         set8(per(kScalePosition_m), per(kScalePosition_m), per(kScaleHeight_m), per(kScaleHalfPiece_m), 1, 1, 1, 1);
+}
+
+/// The pieces of a map that a set of them shows, and which of them can be seen from where the agent is.
+struct PieceList {
+  Span<const ObservedPiece> pieces;
+  Span<const Vec2> middles;
+  Span<const int32_t> items;
+};
+
+/// Which of the pieces listed are in sight: the first of them, at least `capacity` if there are so many.
+PICTURA_HD inline int find_pieces_in_sight(Span<const Vec2> middles, Span<const int32_t> items, const EgoFrame& frame,
+                                           int capacity, int32_t* found_out) {
+  const Float8 minus_origin_x = fill8(-frame.origin_m.x), minus_origin_y = fill8(-frame.origin_m.y);
+  const Float8 cos = fill8(frame.forward.x), sin = fill8(frame.forward.y);
+  const int num_items = static_cast<int>(items.size());
+  int count = 0;
+  const auto look_at = [&](const int32_t* eight, uint32_t these) {
+    Float8 x, y;
+    gather_pairs(&middles.data()->x, eight, &x, &y);
+    const uint32_t seen = these & in_sight(x, y, minus_origin_x, minus_origin_y, cos, sin, fill8(kRoadMiddle_m),
+                                           fill8(kRoadHalf_m), fill8(kRoadAside_m));
+    copy_chosen(eight, seen, found_out + count);
+    count += popcount(seen);
+  };
+  int i = 0;
+  for (; i + 8 <= num_items && count < capacity; i += 8) look_at(items.data() + i, 0xFF);
+  if (i < num_items && count < capacity) {
+    int32_t last[8];
+    for (int k = 0; k < 8; ++k) last[k] = items[static_cast<size_t>(min_of(i + k, num_items - 1))];
+    look_at(last, (1u << min_of(num_items - i, 8)) - 1);
+  }
+  return count;
 }
 
 /// Lanes, boundaries or walls: of the pieces listed for the ego's cell, the first `capacity` whose middles are in
-/// sight. Rows are written before it is known whether they count, which spares an unpredictable branch; the row after
-/// the last may hold a leftover.
-PICTURA_HD inline int observe_pieces(Span<const ObservedPiece> pieces, Span<const int32_t> items, const EgoFrame& frame,
-                                     int capacity, float* out) {
-  int count = 0;
-  for (size_t i = 0; i < items.size() && count < capacity; ++i) {
-    count += observe_piece(pieces[static_cast<size_t>(items[i])], frame, out + count * kLaneFeatures);
+/// sight.
+PICTURA_HD inline int observe_pieces(const PieceList& near, const EgoFrame& frame, int capacity, float* out) {
+  constexpr int kMaxPieces = max_of(max_of(kMaxLanes, kMaxBoundaries), kMaxWalls);
+  int32_t found[kMaxPieces + 8];
+  const int count = min_of(capacity, find_pieces_in_sight(near.middles, near.items, frame, capacity, found));
+  const RowFrame row_frame(frame);
+  const auto row_of = [&](int i) { return observe_piece(near.pieces[static_cast<size_t>(found[i])], row_frame); };
+  // The zero behind a row lies where the next one begins; only the set's last row has none behind it.
+  const int num_followed = min_of(count, capacity - 1);
+  for (int i = 0; i < num_followed; ++i, out += kLaneFeatures) store8(row_of(i), out);
+  if (num_followed < count) {
+    float row[8];
+    store8(row_of(num_followed), row);
+    for (int f = 0; f < kLaneFeatures; ++f) out[f] = row[f];
   }
   return count;
 }
 static_assert(kLaneFeatures == kBoundaryFeatures && kLaneFeatures == kWallFeatures);
 
+/// Red 1, yellow 0.5, green -1, else 0; without branches, since the lights around an agent differ.
 PICTURA_HD constexpr float light_code(LightState state) {
-  switch (state) {
-    case LightState::red: return 1.0f;
-    case LightState::yellow: return 0.5f;
-    case LightState::green: return -1.0f;
-    default: return 0.0f;
-  }
+  return static_cast<float>(state == LightState::red) + 0.5f * static_cast<float>(state == LightState::yellow) -
+         static_cast<float>(state == LightState::green);
 }
 
 /// The nearest stop lines: left and right end, height, state, and whether it holds the ego's lane.
 template <typename ThreadGroup = SingleThread>
-PICTURA_HD int observe_controls(const WorldView& world, int slot, const EgoFrame& frame, float* rows,
-                                const ThreadGroup& group = {}) {
-  const Span<const int32_t> items = items_at(world.map.near_stop_lines, frame.origin_m.xy());
+PICTURA_HD int observe_controls(const WorldView& world, int slot, const NearPlace& place, const EgoFrame& frame,
+                                float* rows, const ThreadGroup& group = {}) {
+  const Span<const int32_t> items = list_of(world.map.near_stop_lines, place.cell);
   const int num_items = static_cast<int>(items.size());
   typename ThreadGroup::template Nearest<kMaxControls> nearest;
   for (int first = 0; first < num_items; first += group.size()) {
     const int i = first + group.rank();
     const int32_t light = items[static_cast<size_t>(min_of(i, num_items - 1))];
     const Vec2 apart = world.map.stop_lines[static_cast<size_t>(light)].middle_m.xy() - frame.origin_m.xy();
-    const float d2 = dot(apart, apart);
+    const float d2 = length2(apart.x, apart.y);
     nearest.offer(i < num_items && d2 < square(kControlRange_m), d2, light);
   }
+  nearest.settle();
   const int32_t lane = world.agents.lane[slot];
   const int32_t own_light = lane < 0 ? -1 : world.map.lanes[static_cast<size_t>(lane)].light;
   const int count = nearest.count();
+  const RowFrame ends_frame = RowFrame::of_two_places(frame);
   for (int i = group.rank(); i < count; i += group.size()) {
     float* out = rows + i * kControlFeatures;
     const int32_t light = nearest.item(i);
     const StopLine& line = world.map.stop_lines[static_cast<size_t>(light)];
-    const Vec3 left = frame.to_local(line.left_m);
-    const Vec3 right = frame.to_local(line.right_m);
-    out[0] = left.x * per(kScalePosition_m);
-    out[1] = left.y * per(kScalePosition_m);
-    out[2] = right.x * per(kScalePosition_m);
-    out[3] = right.y * per(kScalePosition_m);
-    out[4] = 0.5f * (left.z + right.z) * per(kScaleHeight_m);
+    const Float8 ends = permute<0, 1, 2, 6, 3, 4, 5, 7>(load8(&line.left_m.x));  // left, right
+    float local[8];
+    store8(ends_frame.to_local(ends), local);
+    out[0] = local[0] * per(kScalePosition_m);
+    out[1] = local[1] * per(kScalePosition_m);
+    out[2] = local[4] * per(kScalePosition_m);
+    out[3] = local[5] * per(kScalePosition_m);
+    out[4] = 0.5f * (local[2] + local[6]) * per(kScaleHeight_m);
     out[5] = light_code(world.lights[light]);
     out[6] = light == own_light ? 1.0f : 0.0f;
   }
   return count;
 }
 
-/// Zeros a set's rows from `count` to what the last observation of the slot filled, and one leftover at least.
-PICTURA_HD inline void pad_set(float* out, int features, int capacity, int count, int32_t* filled_inout) {
-  const int end = min_of(capacity, max_of(count + 1, *filled_inout));
-  for (int i = count * features; i < end * features; ++i) out[i] = 0.0f;
+/// Zeros a set's rows from `count` to what the last observation of the slot filled.
+PICTURA_HD inline void pad_set(float* out, int features, int count, int32_t* filled_inout) {
+  for (int i = count * features; i < *filled_inout * features; ++i) out[i] = 0.0f;
   *filled_inout = count;
 }
 
@@ -269,25 +355,25 @@ PICTURA_HD inline SetRows set_rows(const ObservationView& out, int slot, EntityS
   }
 }
 
-/// The pieces of a map that a set of them shows, and which of them can be seen from where the agent is.
-struct PieceList {
-  Span<const ObservedPiece> pieces;
-  Span<const int32_t> items;
-};
+PICTURA_HD inline NearPlace near_place(const WorldView& world, int slot) {
+  const AgentStateView& agents = world.agents;
+  return near_place(world.map, {agents.x_m[slot], agents.y_m[slot]}, agents.heading_rad[slot]);
+}
 
-PICTURA_HD inline PieceList pieces_near(const WorldView& world, int slot, EntitySet set) {
-  const Vec2 at{world.agents.x_m[slot], world.agents.y_m[slot]};
-  const float heading_rad = world.agents.heading_rad[slot];
-  const MapView& map = world.map;
+PICTURA_HD inline PieceList pieces_near(const MapView& map, const NearPlace& place, EntitySet set) {
   switch (set) {
-    case EntitySet::lanes: return {map.lane_pieces, items_at(map.near_lane_pieces, at, heading_rad)};
-    case EntitySet::walls: return {map.wall_pieces, items_at(map.near_wall_pieces, at, heading_rad)};
-    default: return {map.boundary_pieces, items_at(map.near_boundary_pieces, at, heading_rad)};
+    case EntitySet::lanes:
+      return {map.lane_pieces, map.lane_middles, list_of(map.near_lane_pieces, place.cell_and_sector())};
+    case EntitySet::walls:
+      return {map.wall_pieces, map.wall_middles, list_of(map.near_wall_pieces, place.cell_and_sector())};
+    default:
+      return {map.boundary_pieces, map.boundary_middles, list_of(map.near_boundary_pieces, place.cell_and_sector())};
   }
 }
 
 /// One entity set: empty for the absent and for those that halted in an earlier step.
-PICTURA_HD inline void observe_set(const WorldView& world, int agent, EntitySet set, const ObservationView& out) {
+PICTURA_HD inline void observe_set(const WorldView& world, int agent, const NearPlace& place, EntitySet set,
+                                   const ObservationView& out) {
   const int slot = world.first_slot + agent;
   const SetRows rows = set_rows(out, slot, set);
   int count = 0;
@@ -296,20 +382,23 @@ PICTURA_HD inline void observe_set(const WorldView& world, int agent, EntitySet 
     if (set == EntitySet::partners) {
       count = observe_partners(world, agent, frame, rows.rows);
     } else if (set == EntitySet::controls) {
-      count = observe_controls(world, slot, frame, rows.rows);
+      count = observe_controls(world, slot, place, frame, rows.rows);
     } else {
-      const PieceList near = pieces_near(world, slot, set);
-      count = observe_pieces(near.pieces, near.items, frame, rows.capacity, rows.rows);
+      count = observe_pieces(pieces_near(world.map, place, set), frame, rows.capacity, rows.rows);
     }
   }
-  pad_set(rows.rows, rows.features, rows.capacity, count, rows.count);
+  pad_set(rows.rows, rows.features, count, rows.count);
 }
 
-/// Writes the whole observation of one agent. Sets are written if `entity_sets`.
-PICTURA_HD inline void observe(const WorldView& world, int agent, bool entity_sets, const ObservationView& out) {
-  observe_own(world, agent, out);
+/// Writes the whole observations of agents [begin, end) of a world; sets if `entity_sets`. Set by set, so that what one
+/// kind is read from stays in the cache.
+PICTURA_HD inline void observe(const WorldView& world, int begin, int end, bool entity_sets,
+                               const ObservationView& out) {
+  for (int agent = begin; agent < end; ++agent) observe_own(world, agent, out);
   for (int set = 0; entity_sets && set < num_observed_sets(out); ++set) {
-    observe_set(world, agent, static_cast<EntitySet>(set), out);
+    for (int agent = begin; agent < end; ++agent) {
+      observe_set(world, agent, near_place(world, world.first_slot + agent), static_cast<EntitySet>(set), out);
+    }
   }
 }
 

@@ -25,7 +25,7 @@ struct Observation : ::testing::Test {
     for (float x = 120; x > -20; x -= 12) map->building_lines.push_back({{x, -9, 0.5f}, {x - 12, -9, 0.5f}});
     return map;
   }
-  void look() { observe(stage.world(), 0, true, stage.results.observation_view()); }
+  void look() { observe(stage.world(), 0, 1, true, stage.results.observation_view()); }
   /// A point in the ego frame.
   static Vec2 local(float x, float y) {
     const float c = std::cos(0.1f), s = std::sin(0.1f);
@@ -81,7 +81,7 @@ TEST(ObservationOfParkedCars, IsThatOfPartnersAtRest) {
   car.drawn = 1;
   parking.put(1, {130, 4}, kPi, 2);
   parking.put(0, {100, 0.5f}, 0.1f, 6);
-  observe(parking.world(), 0, true, parking.results.observation_view());
+  observe(parking.world(), 0, 1, true, parking.results.observation_view());
   const ObservationView out = parking.results.observation_view();
   ASSERT_EQ(out.set_counts[0], 2);
   const float c = std::cos(0.1f), s = std::sin(0.1f);
@@ -314,7 +314,7 @@ TEST_F(Observation, WallsAreThereOnlyWhereTheyAreAskedFor) {
   SimulatorConfig config = testing::cars({.walls = false, .wall_observations = true});
   testing::Stage without(map, 1, config);
   without.put(0, {100, 0.5f}, 0.1f, 6);
-  observe(without.world(), 0, true, without.results.observation_view());
+  observe(without.world(), 0, 1, true, without.results.observation_view());
   EXPECT_EQ(without.results.observation_view().set_counts[4], 0);
   EXPECT_EQ(without.results.observation_view().walls.size(), size_t{kMaxWalls * kWallFeatures});
   config.vector_observations = false;
@@ -328,11 +328,11 @@ TEST_F(Observation, HaltedAndAbsentAgentsObserveNothingButTheyAreSeen) {
   look();
   const ObservationView out = stage.results.observation_view();
   EXPECT_NEAR(out.partners[0], local(108.8f, 4).x / 120, 1e-5);
-  observe(stage.world(), 1, true, out);
+  observe(stage.world(), 1, 2, true, out);
   for (size_t i = 0; i < kEgoFeatures; ++i) EXPECT_EQ(out.ego[kEgoFeatures + i], 0);
   for (size_t i = 0; i < kMaxLanes * kLaneFeatures; ++i) EXPECT_EQ(out.lanes[kMaxLanes * kLaneFeatures + i], 0);
   agents.events[1] = kEventCollision;  // the step in which it halted: its last observation
-  observe(stage.world(), 1, true, out);
+  observe(stage.world(), 1, 2, true, out);
   EXPECT_NE(out.ego[kEgoFeatures + 1], 0);
 }
 

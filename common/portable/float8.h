@@ -1,0 +1,224 @@
+// SIMD on eight floats: one instruction an operation on a host with AVX2, eight on another host or a device. Elements
+// are rounded as scalars are, so the bits are equal everywhere.
+#pragma once
+
+#include "pictura/common/portable/hd.h"
+#if defined(__AVX2__) && !defined(__CUDACC__)
+#include <immintrin.h>
+#endif
+
+namespace pictura {
+
+// Two types rather than one, since a program may hold code of both: they lie in memory alike, but are passed
+// differently.
+#if defined(__AVX2__) && !defined(__CUDACC__)
+inline namespace float8_in_a_register {
+
+struct Float8 {
+  __m256 value;
+};
+inline Float8 set8(float a, float b, float c, float d, float e, float f, float g, float h) {
+  return {_mm256_setr_ps(a, b, c, d, e, f, g, h)};
+}
+inline Float8 fill8(float a) { return {_mm256_set1_ps(a)}; }
+inline Float8 load8(const float* from) { return {_mm256_loadu_ps(from)}; }
+inline void store8(const Float8& a, float* to) { _mm256_storeu_ps(to, a.value); }
+inline Float8 operator+(const Float8& a, const Float8& b) { return {_mm256_add_ps(a.value, b.value)}; }
+inline Float8 operator-(const Float8& a, const Float8& b) { return {_mm256_sub_ps(a.value, b.value)}; }
+inline Float8 operator*(const Float8& a, const Float8& b) { return {_mm256_mul_ps(a.value, b.value)}; }
+
+/// Elements 2k and 2k + 1 exchanged.
+inline Float8 swap_pairs(const Float8& a) { return {_mm256_permute_ps(a.value, 0xB1)}; }
+
+/// Element k of b where bit k of the mask is set, else of a.
+template <int kMask>
+inline Float8 blend(const Float8& a, const Float8& b) {
+  return {_mm256_blend_ps(a.value, b.value, kMask)};
+}
+
+/// Elements at the given places.
+template <int k0, int k1, int k2, int k3, int k4, int k5, int k6, int k7>
+inline Float8 permute(const Float8& a) {
+  return {_mm256_permutevar8x32_ps(a.value, _mm256_setr_epi32(k0, k1, k2, k3, k4, k5, k6, k7))};
+}
+
+/// Bit k: whether element k of a is below, or at most, that of b.
+inline uint32_t less(const Float8& a, const Float8& b) {
+  return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.value, b.value, _CMP_LT_OQ)));
+}
+inline uint32_t at_most(const Float8& a, const Float8& b) {
+  return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.value, b.value, _CMP_LE_OQ)));
+}
+inline Float8 magnitude(const Float8& a) { return {_mm256_andnot_ps(_mm256_set1_ps(-0.0f), a.value)}; }
+
+/// Eight pairs that follow one another, their first elements and their second ones.
+inline void load_pairs(const float* from, Float8* first_out, Float8* second_out) {
+  const __m256 a = _mm256_loadu_ps(from), b = _mm256_loadu_ps(from + 8);
+  const __m256 low = _mm256_permute2f128_ps(a, b, 0x20), high = _mm256_permute2f128_ps(a, b, 0x31);
+  first_out->value = _mm256_shuffle_ps(low, high, 0x88);
+  second_out->value = _mm256_shuffle_ps(low, high, 0xDD);
+}
+/// As load_pairs(), of the pairs with the given indices.
+inline void gather_pairs(const float* from, const int32_t* indices, Float8* first_out, Float8* second_out) {
+  const auto two = [&](int k) {
+    const auto pair = [&](int i) { return reinterpret_cast<const __m64*>(from + 2 * int64_t{indices[i]}); };
+    return _mm_loadh_pi(_mm_loadl_pi(_mm_setzero_ps(), pair(k)), pair(k + 1));
+  };
+  const __m256 low = _mm256_set_m128(two(4), two(0)), high = _mm256_set_m128(two(6), two(2));
+  first_out->value = _mm256_shuffle_ps(low, high, 0x88);
+  second_out->value = _mm256_shuffle_ps(low, high, 0xDD);
+}
+
+/// The places of the set bits of every byte, in ascending order.
+struct SetBits {
+  alignas(8) uint8_t places[256][8];
+  constexpr SetBits() : places{} {
+    for (int byte = 0; byte < 256; ++byte) {
+      for (int bit = 0, count = 0; bit < 8; ++bit) {
+        if (byte >> bit & 1) places[byte][count++] = static_cast<uint8_t>(bit);
+      }
+    }
+  }
+};
+inline constexpr SetBits kSetBits;
+
+/// Copies the 32-bit elements whose bits are set in the mask; what is behind them, up to eight in all, is overwritten.
+template <typename Word>
+inline void copy_chosen(const Word* from, uint32_t mask, Word* to) {
+  static_assert(sizeof(Word) == sizeof(int32_t));
+  const __m256i places = _mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(kSetBits.places[mask])));
+  const __m256i all = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_permutevar8x32_epi32(all, places));
+}
+/// Bit k: whether integer k is the value.
+inline uint32_t equal8(const int32_t* integers, int32_t value) {
+  const __m256i all = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(integers));
+  const __m256i equal = _mm256_cmpeq_epi32(all, _mm256_set1_epi32(value));
+  return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(equal)));
+}
+
+/// Sixteen 64-bit keys in ascending order, each in [0, 0x7FF0...0): ordered as the doubles of the same bits are.
+struct Keys16 {
+  __m256d keys[4];
+  static constexpr int64_t kNone = 0x7FEFFFFFFFFFFFFF;
+
+  Keys16() {
+    for (__m256d& four : keys) four = _mm256_castsi256_pd(_mm256_set1_epi64x(kNone));
+  }
+  /// Drops the last key, which may be the new one.
+  void insert(int64_t key) {
+    const __m256d all_new = _mm256_castsi256_pd(_mm256_set1_epi64x(key));
+    __m256d carried = _mm256_setzero_pd();  // the element before each four
+    for (__m256d& four : keys) {
+      const __m256d rotated = _mm256_permute4x64_pd(four, 0x93);
+      // Each element becomes the new key or the one before it where that is greater, but at most stays.
+      four = _mm256_max_pd(_mm256_min_pd(four, all_new), _mm256_blend_pd(rotated, carried, 1));
+      carried = rotated;
+    }
+  }
+  void store(int64_t* to) const {
+    for (int k = 0; k < 4; ++k) _mm256_storeu_pd(reinterpret_cast<double*>(to) + 4 * k, keys[k]);
+  }
+};
+}  // namespace float8_in_a_register
+#else
+inline namespace float8_in_memory {
+
+struct alignas(32) Float8 {
+  float value[8];
+};
+/// The elements of(0) to of(7).
+template <typename Of>
+PICTURA_HD inline Float8 make_float8(Of&& of) {
+  return {{of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)}};
+}
+PICTURA_HD inline Float8 set8(float a, float b, float c, float d, float e, float f, float g, float h) {
+  return {{a, b, c, d, e, f, g, h}};
+}
+PICTURA_HD inline Float8 fill8(float a) { return {{a, a, a, a, a, a, a, a}}; }
+PICTURA_HD inline Float8 load8(const float* from) {
+  return make_float8([=](int k) { return from[k]; });
+}
+PICTURA_HD inline void store8(const Float8& a, float* to) {
+  for (int k = 0; k < 8; ++k) to[k] = a.value[k];
+}
+PICTURA_HD inline Float8 operator+(const Float8& a, const Float8& b) {
+  return make_float8([&](int k) { return a.value[k] + b.value[k]; });
+}
+PICTURA_HD inline Float8 operator-(const Float8& a, const Float8& b) {
+  return make_float8([&](int k) { return a.value[k] - b.value[k]; });
+}
+PICTURA_HD inline Float8 operator*(const Float8& a, const Float8& b) {
+  return make_float8([&](int k) { return a.value[k] * b.value[k]; });
+}
+PICTURA_HD inline Float8 swap_pairs(const Float8& a) {
+  return make_float8([&](int k) { return a.value[k ^ 1]; });
+}
+template <int kMask>
+PICTURA_HD inline Float8 blend(const Float8& a, const Float8& b) {
+  return make_float8([&](int k) { return kMask >> k & 1 ? b.value[k] : a.value[k]; });
+}
+template <int k0, int k1, int k2, int k3, int k4, int k5, int k6, int k7>
+PICTURA_HD inline Float8 permute(const Float8& a) {
+  return {{a.value[k0], a.value[k1], a.value[k2], a.value[k3], a.value[k4], a.value[k5], a.value[k6], a.value[k7]}};
+}
+PICTURA_HD inline uint32_t less(const Float8& a, const Float8& b) {
+  uint32_t bits = 0;
+  for (int k = 0; k < 8; ++k) bits |= static_cast<uint32_t>(a.value[k] < b.value[k]) << k;
+  return bits;
+}
+PICTURA_HD inline uint32_t at_most(const Float8& a, const Float8& b) {
+  uint32_t bits = 0;
+  for (int k = 0; k < 8; ++k) bits |= static_cast<uint32_t>(a.value[k] <= b.value[k]) << k;
+  return bits;
+}
+PICTURA_HD inline Float8 magnitude(const Float8& a) {
+  return make_float8([&](int k) { return fabsf(a.value[k]); });
+}
+PICTURA_HD inline void load_pairs(const float* from, Float8* first_out, Float8* second_out) {
+  *first_out = make_float8([=](int k) { return from[2 * k]; });
+  *second_out = make_float8([=](int k) { return from[2 * k + 1]; });
+}
+PICTURA_HD inline void gather_pairs(const float* from, const int32_t* indices, Float8* first_out, Float8* second_out) {
+  *first_out = make_float8([=](int k) { return from[2 * int64_t{indices[k]}]; });
+  *second_out = make_float8([=](int k) { return from[2 * int64_t{indices[k]} + 1]; });
+}
+template <typename Word>
+PICTURA_HD inline void copy_chosen(const Word* from, uint32_t mask, Word* to) {
+  for (int k = 0, count = 0; k < 8; ++k) {
+    to[count] = from[k];
+    count += mask >> k & 1;
+  }
+}
+PICTURA_HD inline uint32_t equal8(const int32_t* integers, int32_t value) {
+  uint32_t bits = 0;
+  for (int k = 0; k < 8; ++k) bits |= static_cast<uint32_t>(integers[k] == value) << k;
+  return bits;
+}
+
+struct alignas(32) Keys16 {
+  int64_t keys[16];
+  static constexpr int64_t kNone = 0x7FEFFFFFFFFFFFFF;
+
+  PICTURA_HD Keys16() {
+    for (int64_t& key : keys) key = kNone;
+  }
+  PICTURA_HD void insert(int64_t key) {
+    for (int k = 15; k >= 0; --k) {
+      const int64_t least = keys[k] < key ? keys[k] : key;
+      keys[k] = k > 0 && keys[k - 1] > least ? keys[k - 1] : least;
+    }
+  }
+  PICTURA_HD void store(int64_t* to) const {
+    for (int k = 0; k < 16; ++k) to[k] = keys[k];
+  }
+};
+}  // namespace float8_in_memory
+#endif
+
+// A single float where a rule is written for both.
+PICTURA_HD inline uint32_t less(float a, float b) { return a < b; }
+PICTURA_HD inline uint32_t at_most(float a, float b) { return a <= b; }
+PICTURA_HD inline float magnitude(float a) { return fabsf(a); }
+
+}  // namespace pictura
