@@ -4,9 +4,13 @@
 #include <mutex>
 #include <optional>
 
+#include <ATen/Parallel.h>
+#include <ATen/core/LegacyTypeDispatch.h>
+#include <ATen/core/grad_mode.h>
 #include <torch/csrc/autograd/custom_function.h>
 
 #include "pictura/backends/make_learner.h"
+#include "pictura/training/host_passes.h"
 #include "pictura/training/torch_device.h"
 
 namespace pictura {
@@ -129,8 +133,324 @@ struct TokenSoftmax : Function<TokenSoftmax> {
   }
 };
 
+PointSize point_size(const at::Tensor& rows, int64_t points, float unit_m, bool keeps_rows) {
+  const int64_t features = rows.size(-1);
+  return {rows.numel() / features, features, points, unit_m, keeps_rows};
+}
+
+// Whether the host's own passes (host_passes.h) take it: those are fp32.
+bool is_on_host(const at::Tensor& x) { return x.is_cpu() && x.scalar_type() == at::kFloat; }
+
+// Whether a gradient will be asked of what these make.
+bool keeps_gradients(std::initializer_list<at::Tensor> inputs) {
+  return at::GradMode::is_enabled() &&
+         std::any_of(inputs.begin(), inputs.end(), [](const at::Tensor& t) { return t.requires_grad(); });
+}
+
+// Work on [0, count) in blocks of at most `block`, in as many parts as torch has threads. What parts add up is summed
+// in their order, so sums depend on the number of threads alone.
+class Blocks {
+ public:
+  Blocks(int64_t count, int64_t block)
+      : count_(count),
+        block_(std::max<int64_t>(1, block)),
+        blocks_((count + block_ - 1) / block_),
+        parts_(std::min<int64_t>(blocks_, at::get_num_threads())) {}
+
+  int64_t parts() const { return parts_; }
+  /// The largest block.
+  int64_t most() const { return std::min(block_, count_); }
+
+  /// Calls make(part), once a part, for a function that is called with (begin, end) of each of its blocks.
+  template <typename Make>
+  void run(const Make& make) const {
+    at::parallel_for(0, parts_, 1, [&](int64_t first, int64_t last) {
+      const at::AutoDispatchBelowAutograd no_autograd;
+      for (int64_t part = first; part < last; ++part) {
+        auto work = make(part);
+        for (int64_t i = part * blocks_ / parts_; i < (part + 1) * blocks_ / parts_; ++i) {
+          work(i * block_, std::min(count_, (i + 1) * block_));
+        }
+      }
+    });
+  }
+
+ private:
+  int64_t count_, block_, blocks_, parts_;
+};
+
+const float* read(const at::Tensor& t, int64_t row = 0) { return t.const_data_ptr<float>() + row * t.stride(0); }
+float* write(const at::Tensor& t, int64_t row = 0) { return t.mutable_data_ptr<float>() + row * t.stride(0); }
+
+// out: [..., channels] without gaps, may be x.
+void add_bias_gelu(const at::Tensor& x, const at::Tensor& bias, const at::Tensor& out) {
+  const int64_t channels = bias.size(0);
+  const at::Tensor rows = x.view({-1, channels}), to = out.view({-1, channels});
+  Blocks(rows.size(0), host::kBlockNumbers / channels).run([&](int64_t) {
+    return [&](int64_t begin, int64_t end) {
+      host::bias_gelu(read(rows, begin), read(bias), end - begin, channels, write(to, begin));
+    };
+  });
+}
+
+// x: [..., channels] without gaps.
+struct HostBiasGelu : Function<HostBiasGelu> {
+  static at::Tensor forward(AutogradContext* context, const at::Tensor& x, const at::Tensor& bias) {
+    context->save_for_backward({x, bias});
+    at::Tensor out = at::empty_like(x);
+    add_bias_gelu(x, bias, out);
+    return out;
+  }
+
+  static variable_list backward(AutogradContext* context, const variable_list& grads) {
+    const variable_list saved = context->get_saved_variables();
+    const at::Tensor &x = saved[0], bias = saved[1].detach(), grad = grads[0].contiguous();
+    const int64_t channels = bias.size(0);
+    at::Tensor grad_x = at::empty_like(x);
+    const at::Tensor rows = x.view({-1, channels}), grad_rows = grad.view({-1, channels}),
+                     grad_x_rows = grad_x.view({-1, channels});
+    const Blocks blocks(rows.size(0), host::kBlockNumbers / channels);
+    const at::Tensor sums = at::zeros({blocks.parts(), channels}, bias.options());
+    blocks.run([&](int64_t part) {
+      return [&, part](int64_t begin, int64_t end) {
+        host::bias_gelu_backward(read(rows, begin), read(bias), read(grad_rows, begin), end - begin, channels,
+                                 write(grad_x_rows, begin), write(sums, part));
+      };
+    });
+    return {grad_x, sums.sum(0)};
+  }
+};
+
+// GELU of x + bias, where nothing else reads x.
+at::Tensor host_bias_gelu(const at::Tensor& x, const at::Tensor& bias) {
+  if (keeps_gradients({x, bias})) return HostBiasGelu::apply(x, bias);
+  add_bias_gelu(x, bias, x);
+  return x;
+}
+
+// A convolution as products of what its outputs read with the weights, a block of images at a time: for few channels
+// two to four times as fast as oneDNN's on the way back.
+struct HostConvolution : Function<HostConvolution> {
+  /// Fewer outputs make products of which a vector unit is mostly idle.
+  static constexpr int64_t kLeastOutputs = 16;
+
+  HostConvolution(const at::Tensor& x, const at::Tensor& w, int64_t stride)
+      : size{x.size(1), x.size(2), x.size(3), w.size(2), stride},
+        outputs(w.size(0)),
+        blocks(x.size(0), host::kBlockNumbers / (size.pixels() * (size.taps() + outputs))),
+        weight(w.detach().permute({0, 2, 3, 1}).reshape({outputs, size.taps()})) {}
+
+  const host::ConvolutionSize size;
+  const int64_t outputs;
+  const Blocks blocks;
+  const at::Tensor weight;  // [outputs, taps]
+
+  bool reads_pixels() const { return size.kernel == 1 && size.stride == 1; }
+  at::Tensor scratch(int64_t columns) const {
+    return at::empty({blocks.most() * size.pixels(), columns}, weight.options());
+  }
+  at::Tensor of_images(const at::Tensor& rows, int64_t begin, int64_t end) const {
+    return rows.narrow(0, begin * size.pixels(), (end - begin) * size.pixels());
+  }
+  /// What the outputs of images [begin, end) read, in `memory` where it is not the images themselves.
+  at::Tensor taps(const at::Tensor& x, const at::Tensor& memory, int64_t begin, int64_t end) const {
+    if (reads_pixels()) return of_images(x.view({-1, size.channels}), begin, end);
+    host::unfold(size, read(x, begin), end - begin, write(memory));
+    return memory.narrow(0, 0, (end - begin) * size.pixels());
+  }
+
+  /// x: [n, height, width, channels]. Returns the products, [n, rows, columns, outputs], without bias and GELU; with
+  /// them where `before_out` is null.
+  static at::Tensor compute(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride,
+                            at::Tensor* before_out) {
+    const HostConvolution c(x, weight, stride);
+    const at::Tensor out = at::empty({x.size(0), c.size.rows(), c.size.columns(), c.outputs}, c.weight.options()),
+                     before = before_out ? at::empty_like(out) : out;
+    const at::Tensor rows = out.view({-1, c.outputs}), before_rows = before.view({-1, c.outputs}),
+                     transposed = c.weight.t();
+    c.blocks.run([&](int64_t) {
+      return [&, memory = c.reads_pixels() ? at::Tensor() : c.scratch(c.size.taps())](int64_t begin, int64_t end) {
+        at::Tensor products = c.of_images(before_rows, begin, end);
+        at::mm_out(products, c.taps(x, memory, begin, end), transposed);
+        host::bias_gelu(read(products), read(bias), products.size(0), c.outputs, write(c.of_images(rows, begin, end)));
+      };
+    });
+    if (before_out) *before_out = before;
+    return out;
+  }
+
+  static at::Tensor forward(AutogradContext* context, const at::Tensor& x, const at::Tensor& weight,
+                            const at::Tensor& bias, int64_t stride) {
+    at::Tensor before;
+    const at::Tensor out = compute(x, weight, bias, stride, &before);
+    context->save_for_backward({x, weight, bias, before});
+    context->saved_data["stride"] = stride;
+    return out;
+  }
+
+  static variable_list backward(AutogradContext* context, const variable_list& grads) {
+    const variable_list saved = context->get_saved_variables();
+    const at::Tensor x = saved[0].detach(), bias = saved[2].detach(), &before = saved[3], grad = grads[0].contiguous();
+    const HostConvolution c(x, saved[1], context->saved_data["stride"].toInt());
+    const at::Tensor before_rows = before.view({-1, c.outputs}), grad_rows = grad.view({-1, c.outputs});
+    const at::Tensor weight_sums = at::zeros({c.blocks.parts(), c.outputs, c.size.taps()}, c.weight.options()),
+                     bias_sums = at::zeros({c.blocks.parts(), c.outputs}, c.weight.options());
+    const at::Tensor grad_x = context->needs_input_grad(0) ? at::empty_like(x) : at::Tensor();
+    c.blocks.run([&](int64_t part) {
+      return [&, part, memory = c.scratch(c.size.taps()), grads_before = c.scratch(c.outputs),
+              weight_sum = weight_sums[part]](int64_t begin, int64_t end) {
+        const at::Tensor some = c.of_images(before_rows, begin, end),
+                         grad_some = grads_before.narrow(0, 0, some.size(0));
+        host::bias_gelu_backward(read(some), read(bias), read(c.of_images(grad_rows, begin, end)), some.size(0),
+                                 c.outputs, write(grad_some), write(bias_sums, part));
+        at::Tensor sum = weight_sum;
+        at::addmm_out(sum, sum, grad_some.t(), c.taps(x, memory, begin, end));
+        if (!grad_x.defined()) return;
+        at::Tensor taps_grad = c.reads_pixels() ? c.of_images(grad_x.view({-1, c.size.channels}), begin, end)
+                                                : memory.narrow(0, 0, some.size(0));
+        at::mm_out(taps_grad, grad_some, c.weight);
+        if (!c.reads_pixels()) host::fold(c.size, read(taps_grad), end - begin, write(grad_x, begin));
+      };
+    });
+    const at::Tensor weight_grad =
+        weight_sums.sum(0).view({c.outputs, c.size.kernel, c.size.kernel, c.size.channels}).permute({0, 3, 1, 2});
+    return {grad_x, weight_grad, bias_sums.sum(0), at::Tensor()};
+  }
+};
+
+// Sets of members in blocks, each member through a layer with GELU and one without; of each set the largest in each
+// channel. That channel's gradient goes to that member alone, so the way back knows these alone: a few of a set.
+struct HostSets : Function<HostSets> {
+  /// Returns {the largest, [sets, channels]; the members that there are with their points' features, [all, features];
+  /// which member of its set is the largest, i32 [sets, channels]}.
+  static variable_list compute(const at::Tensor& members, const at::Tensor& counts, int64_t points, float unit_m,
+                               const at::Tensor& hidden_weight, const at::Tensor& hidden_bias, const at::Tensor& weight,
+                               const at::Tensor& bias) {
+    const int64_t sets = members.size(0), most = members.size(1), hidden = hidden_weight.size(0),
+                  channels = weight.size(0);
+    const PointSize size = point_size(members, points, unit_m, /*keeps_rows=*/true);
+    const std::vector<int64_t> begins = begins_of(counts);
+    const auto options = members.options().requires_grad(false);
+    const at::Tensor rows = at::empty({begins.back(), size.width()}, options),
+                     largest = at::empty({sets, channels}, options),
+                     which = at::empty({sets, channels}, counts.options());
+    const Blocks blocks(sets, host::kBlockNumbers / (most * (hidden + channels)));
+    const at::Tensor hidden_transposed = hidden_weight.detach().t(), transposed = weight.detach().t();
+    blocks.run([&](int64_t) {
+      return [&, hidden_memory = at::empty({blocks.most() * most, hidden}, options),
+              memory = at::empty({blocks.most() * most, channels}, options)](int64_t begin, int64_t end) {
+        const auto first = begins[static_cast<size_t>(begin)], count = begins[static_cast<size_t>(end)] - first;
+        const int32_t* const its_counts = counts.const_data_ptr<int32_t>() + begin;
+        const at::Tensor some = rows.narrow(0, first, count);
+        host::member_rows(read(members, begin), its_counts, end - begin, most, size, write(some));
+        at::Tensor activations = hidden_memory.narrow(0, 0, count), embeddings = memory.narrow(0, 0, count);
+        at::mm_out(activations, some, hidden_transposed);
+        host::bias_gelu(read(activations), read(hidden_bias), count, hidden, write(activations));
+        at::mm_out(embeddings, activations, transposed);
+        host::largest_members(read(embeddings), its_counts, end - begin, channels, write(largest, begin),
+                              which.mutable_data_ptr<int32_t>() + begin * channels);
+      };
+    });
+    // Adding it to all members would change no order.
+    return {largest + bias.detach() * counts.gt(0).unsqueeze(1), rows, which};
+  }
+
+  static at::Tensor forward(AutogradContext* context, const at::Tensor& members, const at::Tensor& counts,
+                            int64_t points, double unit_m, const at::Tensor& hidden_weight,
+                            const at::Tensor& hidden_bias, const at::Tensor& weight, const at::Tensor& bias) {
+    const variable_list made =
+        compute(members, counts, points, static_cast<float>(unit_m), hidden_weight, hidden_bias, weight, bias);
+    context->save_for_backward({made[1], made[2], counts, hidden_weight, hidden_bias, weight});
+    return made[0];
+  }
+
+  static variable_list backward(AutogradContext* context, const variable_list& grads) {
+    const variable_list saved = context->get_saved_variables();
+    const at::Tensor &rows = saved[0], &which = saved[1], &counts = saved[2], hidden_weight = saved[3].detach(),
+                     hidden_bias = saved[4].detach(), weight = saved[5].detach(), grad = grads[0].contiguous();
+    const int64_t sets = which.size(0), channels = which.size(1), hidden = hidden_weight.size(0);
+    const std::vector<int64_t> begins = begins_of(counts);
+    const Blocks blocks(sets, host::kBlockNumbers / (channels * (hidden + channels)));
+    const auto options = weight.options();
+    const at::Tensor hidden_weight_sums = at::zeros({blocks.parts(), hidden, rows.size(1)}, options),
+                     hidden_bias_sums = at::zeros({blocks.parts(), hidden}, options),
+                     weight_sums = at::zeros({blocks.parts(), channels, hidden}, options);
+    const at::Tensor hidden_transposed = hidden_weight.t();
+    blocks.run([&](int64_t part) {
+      return [&, part, numbers = std::vector<int64_t>(), chosen = std::vector<int64_t>(),
+              hidden_weight_sum = hidden_weight_sums[part],
+              weight_sum = weight_sums[part]](int64_t begin, int64_t end) mutable {
+        // The members that are the largest somewhere, as rows, and the gradient of each.
+        chosen.clear();
+        const at::Tensor gradients = at::zeros({(end - begin) * channels, channels}, options);
+        const int32_t* its_which = which.const_data_ptr<int32_t>() + begin * channels;
+        const float* its_grad = read(grad, begin);
+        for (int64_t set = begin; set < end; ++set, its_which += channels, its_grad += channels) {
+          const int64_t first = begins[static_cast<size_t>(set)], count = begins[static_cast<size_t>(set) + 1] - first;
+          if (count == 0) continue;
+          numbers.assign(static_cast<size_t>(count), -1);
+          for (int64_t c = 0; c < channels; ++c) {
+            int64_t& number = numbers[static_cast<size_t>(its_which[c])];
+            if (number < 0) {
+              number = static_cast<int64_t>(chosen.size());
+              chosen.push_back(first + its_which[c]);
+            }
+            write(gradients, number)[c] = its_grad[c];
+          }
+        }
+        const auto count = static_cast<int64_t>(chosen.size());
+        if (count == 0) return;
+        const at::Tensor some = rows.index_select(0, at::from_blob(chosen.data(), {count}, at::kLong)),
+                         its_gradients = gradients.narrow(0, 0, count), before = at::mm(some, hidden_transposed),
+                         activations = at::empty_like(before), activation_grads = at::mm(its_gradients, weight);
+        host::bias_gelu(read(before), read(hidden_bias), count, hidden, write(activations));
+        at::Tensor sum = weight_sum, hidden_sum = hidden_weight_sum;
+        at::addmm_out(sum, sum, its_gradients.t(), activations);
+        host::bias_gelu_backward(read(before), read(hidden_bias), read(activation_grads), count, hidden,
+                                 write(activation_grads), write(hidden_bias_sums, part));
+        at::addmm_out(hidden_sum, hidden_sum, activation_grads.t(), some);
+      };
+    });
+    const at::Tensor none;
+    return {none,
+            none,
+            none,
+            none,
+            hidden_weight_sums.sum(0),
+            hidden_bias_sums.sum(0),
+            weight_sums.sum(0),
+            at::mm(counts.gt(0).to(grad.scalar_type()).unsqueeze(0), grad).squeeze(0)};
+  }
+
+ private:
+  // Where the members of each set begin among those of all, and how many there are.
+  static std::vector<int64_t> begins_of(const at::Tensor& counts) {
+    std::vector<int64_t> begins{0};
+    const int32_t* const its_counts = counts.const_data_ptr<int32_t>();
+    for (int64_t i = 0; i < counts.size(0); ++i) begins.push_back(begins.back() + its_counts[i]);
+    return begins;
+  }
+};
+
 // [views, cameras, 3, ...] -> [cameras * views, 3, ...]
 at::Tensor by_camera(const at::Tensor& images) { return images.transpose(0, 1).flatten(0, 1); }
+
+at::Tensor host_patches(const at::Tensor& images, int64_t patch_px) {
+  const at::Tensor from = images.contiguous();
+  const PatchSize size{from.size(0), from.size(1), from.size(3), from.size(4), patch_px};
+  const at::Tensor out =
+      at::empty({size.cameras * size.views, size.rows(), size.columns(), 3 * patch_px * patch_px}, at::kFloat);
+  const int64_t image_bytes = from.stride(0);
+  for (int64_t camera = 0; camera < size.cameras; ++camera) {
+    Blocks(size.views, host::kBlockNumbers / (size.rows() * size.columns())).run([&](int64_t) {
+      return [&](int64_t begin, int64_t end) {
+        host::patches(from.const_data_ptr<uint8_t>() + begin * image_bytes, end - begin, size.cameras, camera,
+                      size.height_px, size.width_px, patch_px, write(out, camera * size.views + begin));
+      };
+    });
+  }
+  return out.permute({0, 3, 1, 2});
+}
 
 at::Tensor space_to_depth(const at::Tensor& images, int64_t patch_px) {
   if (patch_px == 1) return images;
@@ -147,6 +467,7 @@ at::Tensor space_to_depth(const at::Tensor& images, int64_t patch_px) {
 }  // namespace
 
 at::Tensor linear_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias) {
+  if (is_on_host(x)) return host_bias_gelu(at::linear(x, weight), bias);
   if (!x.is_cuda() || !NetworkPasses::gelu_takes(bias.size(0))) return gelu(at::linear(x, weight, bias));
   return BiasGelu::apply(at::linear(x, weight), bias);
 }
@@ -154,6 +475,17 @@ at::Tensor linear_gelu(const at::Tensor& x, const at::Tensor& weight, const at::
 at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride) {
   const int64_t padding = weight.size(2) / 2, missing = x.size(1) - weight.size(1);
   const at::Tensor padded = missing > 0 ? at::constant_pad_nd(weight, {0, 0, 0, 0, 0, missing}) : weight;
+  if (is_on_host(x)) {
+    const auto channels_last = [](const at::Tensor& t) { return t.permute({0, 2, 3, 1}).contiguous(); };
+    at::Tensor out;
+    if (bias.size(0) < HostConvolution::kLeastOutputs)
+      out = host_bias_gelu(channels_last(at::conv2d(x, padded, {}, {stride}, {padding})), bias);
+    else if (keeps_gradients({x, weight, bias}))
+      out = HostConvolution::apply(channels_last(x), padded, bias, stride);
+    else
+      out = HostConvolution::compute(channels_last(x), padded, bias, stride, /*before_out=*/nullptr);
+    return out.permute({0, 3, 1, 2});
+  }
   if (!x.is_cuda() || !NetworkPasses::gelu_takes(bias.size(0))) {
     return gelu(at::conv2d(x, padded, bias, {stride}, {padding}));
   }
@@ -170,19 +502,21 @@ at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tenso
   return Norm::apply(x.contiguous(), added, weight, bias);
 }
 
+bool takes_sets(const at::Tensor& members) { return is_on_host(members); }
+
+at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& counts, int64_t points, float unit_m,
+                             const at::Tensor& hidden_weight, const at::Tensor& hidden_bias, const at::Tensor& weight,
+                             const at::Tensor& bias) {
+  const at::Tensor all = members.contiguous(), its_counts = counts.contiguous();
+  if (keeps_gradients({hidden_weight, hidden_bias, weight, bias}))
+    return HostSets::apply(all, its_counts, points, double{unit_m}, hidden_weight, hidden_bias, weight, bias);
+  return HostSets::compute(all, its_counts, points, unit_m, hidden_weight, hidden_bias, weight, bias)[0];
+}
+
 at::Tensor token_softmax(const at::Tensor& scores) {
   if (!is_supported(scores) || scores.size(2) % 2 != 0) return at::_softmax(scores, 1, /*half_to_float=*/false);
   return TokenSoftmax::apply(scores.contiguous());
 }
-
-namespace {
-
-PointSize point_size(const at::Tensor& rows, int64_t points, float unit_m, bool keeps_rows) {
-  const int64_t features = rows.size(-1);
-  return {rows.numel() / features, features, points, unit_m, keeps_rows};
-}
-
-}  // namespace
 
 bool takes_point_rows(const at::Tensor& rows, int64_t points) {
   return rows.is_cuda() && rows.scalar_type() == at::kFloat &&
@@ -201,6 +535,7 @@ at::Tensor point_rows(const at::Tensor& rows, int64_t points, float unit_m, bool
 }
 
 at::Tensor image_patches(const at::Tensor& images, int64_t patch_px, at::ScalarType type) {
+  if (images.is_cpu() && type == at::kFloat && PatchSize::takes(patch_px)) return host_patches(images, patch_px);
   if (!images.is_cuda() || !PatchSize::takes(patch_px)) {
     return space_to_depth(by_camera(images), patch_px)
         .to(type, /*non_blocking=*/false, /*copy=*/false, at::MemoryFormat::ChannelsLast);

@@ -1,5 +1,6 @@
 // The layers that the policies are made of, each with what follows it. On a CUDA device what follows is one pass over
-// memory (rules/network_passes.h) where the sizes allow it; elsewhere it is what ATen does. All are differentiable.
+// memory (rules/network_passes.h) where the sizes allow it, on the host in fp32 it is done in blocks that stay in a
+// core's cache (host_passes.h); else it is what ATen does. All are differentiable.
 #pragma once
 
 #include <ATen/ATen.h>
@@ -16,6 +17,16 @@ at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at
 /// Layer norm of x + position over the last dimension. x: [..., period, channels]; position: [period, channels], or
 /// undefined for none; weight, bias: [channels].
 at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tensor& weight, const at::Tensor& bias);
+
+/// Whether largest_embedding() takes such members: f32 on the host.
+bool takes_sets(const at::Tensor& members);
+/// Of sets of members, each of which goes through a linear layer with GELU and a second one, the largest of each
+/// channel: [sets, channels], 0 for an empty set. members: [sets, most, features], without gradient, each followed by
+/// the features of its points, of which it begins with so many (see PointSize); counts: i32 [sets], how many there are
+/// of each.
+at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& counts, int64_t points, float unit_m,
+                             const at::Tensor& hidden_weight, const at::Tensor& hidden_bias, const at::Tensor& weight,
+                             const at::Tensor& bias);
 
 /// Softmax over tokens. scores: [matrices, tokens, columns].
 at::Tensor token_softmax(const at::Tensor& scores);

@@ -8,6 +8,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/rng.h"
 #include "pictura/common/support/hash.h"
+#include "pictura/simulator/rules/observe.h"
 #include "pictura/training/image_backbone.h"
 #include "pictura/training/layers.h"
 #include "pictura/training/point_features.h"
@@ -117,8 +118,15 @@ class VectorEncoder final : public SceneEncoder {
     std::vector<at::Tensor> embeddings;
     for (const Group& group : groups_) {
       at::Tensor members = o.*group.members;
+      const at::Tensor counts = o.set_counts.select(1, group.set);
+      if (takes_sets(members)) {
+        const PolicyNetwork::Linear &hidden = group.encoder.hidden, &out = group.encoder.out;
+        embeddings.push_back(largest_embedding(members, counts, point_features_ ? group.points : 0, kScalePosition_m,
+                                               hidden.weight, hidden.bias, out.weight, out.bias));
+        continue;
+      }
       if (point_features_) members = with_point_features(members, group.points, input_type_);
-      embeddings.push_back(masked_max(encode(group.encoder, members), o.set_counts.select(1, group.set)));
+      embeddings.push_back(masked_max(encode(group.encoder, members), counts));
     }
     return at::cat(embeddings, 1);
   }

@@ -216,10 +216,7 @@ __global__ void __launch_bounds__(kThreads)
     constexpr int kFeatures = static_cast<int>(PointSize::kFeatures);
     const int feature = (column - kept) % kFeatures, point = (column - kept) / kFeatures;
     const float x_m = its_row[2 * point] * size.unit_m, y_m = its_row[2 * point + 1] * size.unit_m;
-    const float its_m = feature % 2 == 0 ? x_m : y_m;
-    value = its_m / (feature < 2   ? fabsf(its_m) + 4.0f
-                     : feature < 4 ? fabsf(its_m) + 20.0f
-                                   : sqrtf(x_m * x_m + y_m * y_m) + 1.0f);
+    value = point_feature(x_m, y_m, feature);
   }
   out[row * width + column] = from_float<T>(value);
 }

@@ -1,9 +1,14 @@
-// Layers on the host: patches of images, what padding of channels means, and features of points.
+// Layers on the host: patches of images, what padding of channels means, features of points, and the host's own passes
+// in single precision against ATen's layers in double.
 #include "pictura/training/layers.h"
 
+#include <ATen/Parallel.h>
+#include <ATen/core/grad_mode.h>
 #include <gtest/gtest.h>
 
+#include "pictura/simulator/rules/observe.h"
 #include "pictura/training/point_features.h"
+#include "pictura/training/policy.h"
 
 namespace pictura {
 namespace {
@@ -61,6 +66,119 @@ TEST(ConvolveGelu, ReadsNothingFromChannelsBeyondThoseOfItsWeight) {
                    weight = at::arange(8 * 3 * 3 * 3, at::kDouble).sin().reshape({8, 3, 3, 3}),
                    bias = at::arange(8, at::kDouble);
   EXPECT_TRUE(at::allclose(convolve_gelu(x, weight, bias, 2), convolve_gelu(x.narrow(1, 0, 3), weight, bias, 2)));
+}
+
+using Layer = std::function<at::Tensor(const std::vector<at::Tensor>& inputs)>;
+
+at::Tensor numbers(at::IntArrayRef shape, double phase) {
+  const at::Tensor drawn = (at::arange(at::empty(shape).numel(), at::kDouble) * 1.7 + phase).sin().reshape(shape);
+  return drawn.to(at::kFloat).to(at::kDouble);
+}
+
+// The value of a layer and the gradients of its inputs, all of this type.
+std::vector<at::Tensor> results(const Layer& layer, const std::vector<at::Tensor>& inputs, at::ScalarType type) {
+  std::vector<at::Tensor> its_inputs;
+  for (const at::Tensor& input : inputs) its_inputs.push_back(input.detach().clone().to(type).requires_grad_());
+  std::vector<at::Tensor> all{layer(its_inputs)};
+  all[0].backward(numbers(all[0].sizes(), 0.3).to(type));
+  for (const at::Tensor& input : its_inputs) all.push_back(input.grad());
+  for (at::Tensor& result : all) result = result.detach().to(at::kDouble);
+  return all;
+}
+
+// In single precision, with and without gradients and with one thread and three, as in double.
+void expect_as_in_double(const Layer& layer, const Layer& plain, const std::vector<at::Tensor>& inputs) {
+  const std::vector<at::Tensor> expected = results(plain, inputs, at::kDouble);
+  const int threads = at::get_num_threads();
+  for (const int some : {1, 3}) {
+    at::set_num_threads(some);
+    const std::vector<at::Tensor> got = results(layer, inputs, at::kFloat);
+    for (size_t i = 0; i < expected.size(); ++i) {
+      ASSERT_EQ(got[i].sizes(), expected[i].sizes()) << i;
+      const double scale = std::max(1.0, expected[i].abs().max().item<double>());
+      EXPECT_LE((got[i] - expected[i]).abs().max().item<double>(), 1e-5 * scale) << i << ", threads " << some;
+    }
+    const at::NoGradGuard no_grad;
+    std::vector<at::Tensor> floats;
+    for (const at::Tensor& input : inputs) floats.push_back(input.to(at::kFloat));
+    EXPECT_TRUE(layer(floats).to(at::kDouble).equal(got[0])) << "threads " << some;
+    for (size_t i = 0; i < inputs.size(); ++i) EXPECT_TRUE(floats[i].equal(inputs[i].to(at::kFloat))) << i;
+  }
+  at::set_num_threads(threads);
+}
+
+TEST(HostLayers, LinearGeluIsAtens) {
+  for (const int64_t out : {5, 64}) {
+    expect_as_in_double([](const auto& in) { return linear_gelu(in[0], in[1], in[2]); },
+                        [](const auto& in) { return at::gelu(at::linear(in[0], in[1], in[2])); },
+                        {3 * numbers({7, 300, 6}, 0), numbers({out, 6}, 1), numbers({out}, 2)});
+  }
+}
+
+TEST(HostLayers, GeluKeepsItsEndsAndWhatIsNotFinite) {
+  const float infinity = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
+  const at::Tensor x = at::tensor({0.0f, 50.0f, -50.0f, 1e30f, infinity, nan, 1e-20f, -1e-20f}).unsqueeze(1);
+  const at::Tensor got = linear_gelu(x, at::ones({1, 1}), at::zeros({1})).squeeze(1);
+  const float* const y = got.const_data_ptr<float>();
+  EXPECT_EQ(y[0], 0);
+  EXPECT_EQ(y[1], 50);
+  EXPECT_NEAR(y[2], 0, 1e-30);
+  EXPECT_EQ(y[3], 1e30f);
+  EXPECT_EQ(y[4], infinity);
+  EXPECT_TRUE(std::isnan(y[5]));
+  EXPECT_NEAR(y[6], 5e-21, 1e-26);
+  EXPECT_NEAR(y[7], -5e-21, 1e-26);
+}
+
+TEST(HostLayers, ConvolveGeluIsAtens) {
+  struct Case {
+    int64_t in, out, kernel, stride, height, width, images;
+  };
+  for (const Case& c : {Case{3, 8, 3, 2, 18, 32, 3}, Case{8, 16, 3, 2, 9, 16, 50}, Case{16, 32, 3, 2, 5, 8, 3},
+                        Case{5, 17, 5, 1, 4, 3, 5}, Case{12, 24, 1, 1, 3, 5, 300}, Case{6, 16, 1, 2, 5, 5, 4}}) {
+    const auto of = [&c](const auto& conv) {
+      return [&c, conv](const std::vector<at::Tensor>& in) {
+        return conv(in[0].to(at::MemoryFormat::ChannelsLast), in[1], in[2], c.stride);
+      };
+    };
+    expect_as_in_double(of(convolve_gelu), of([](const auto& x, const auto& w, const auto& b, int64_t stride) {
+                          return at::gelu(at::conv2d(x, w, b, {stride}, {w.size(2) / 2}));
+                        }),
+                        {numbers({c.images, c.in, c.height, c.width}, 0), numbers({c.out, c.in, c.kernel, c.kernel}, 1),
+                         numbers({c.out}, 2)});
+  }
+}
+
+TEST(HostLayers, LargestEmbeddingIsTheMaximumOverTheMembersThatThereAre) {
+  const int64_t sets = 40, most = 23;
+  const at::Tensor members = numbers({sets, most, 7}, 0.1), counts = at::arange(sets, at::kInt).remainder(most + 1);
+  for (const int64_t points : {0, 1, 2}) {
+    const int64_t features = 7 + 6 * points;
+    const auto plain = [&](const std::vector<at::Tensor>& in) {
+      const at::Tensor rows = points > 0 ? with_point_features(members, points, at::kDouble) : members;
+      return masked_max(at::linear(at::gelu(at::linear(rows, in[0], in[1])), in[2], in[3]), counts);
+    };
+    const at::Tensor floats = members.to(at::kFloat);
+    ASSERT_TRUE(takes_sets(floats));
+    const auto layer = [&](const std::vector<at::Tensor>& in) {
+      return largest_embedding(floats, counts, points, kScalePosition_m, in[0], in[1], in[2], in[3]);
+    };
+    expect_as_in_double(layer, plain,
+                        {numbers({16, features}, 1), numbers({16}, 2), numbers({24, 16}, 3), numbers({24}, 4)});
+  }
+}
+
+TEST(HostLayers, LargestEmbeddingGivesWayToNoNumberThatIsNone) {
+  at::Tensor members = at::zeros({1, 3, 2});
+  members[0][1][0] = std::numeric_limits<float>::quiet_NaN();
+  const at::Tensor one = at::ones({1, 2});
+  const auto largest = [&](int count) {
+    return largest_embedding(members, at::full({1}, count, at::kInt), 0, 1.0f, one, at::zeros({1}), at::ones({1, 1}),
+                             at::zeros({1}))
+        .item<float>();
+  };
+  EXPECT_TRUE(std::isnan(largest(3)));
+  EXPECT_EQ(largest(1), 0);
 }
 
 }  // namespace

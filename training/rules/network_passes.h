@@ -1,5 +1,5 @@
 // What a network does to its activations between matrix products, each in one pass over memory where ATen takes
-// several. For CUDA devices: on the host, training/layers.cpp says the same in ATen.
+// several. For CUDA devices: the host's are in training/host_passes.h.
 #pragma once
 
 #include <algorithm>
@@ -43,6 +43,14 @@ struct PointSize {
   PICTURA_HD int64_t width() const { return kept() + points * kFeatures; }
   static constexpr int64_t kMostWidth = 256;
 };
+
+/// One of the features of a point in metres (see training/point_features.h).
+PICTURA_HD inline float point_feature(float x_m, float y_m, int feature) {
+  const float its_m = feature % 2 == 0 ? x_m : y_m;
+  return its_m / (feature < 2   ? fabsf(its_m) + 4.0f
+                  : feature < 4 ? fabsf(its_m) + 20.0f
+                                : sqrtf(x_m * x_m + y_m * y_m) + 1.0f);
+}
 
 /// Matrices [matrices, tokens, columns] of scores; `columns` is even.
 struct TokenSize {
