@@ -45,28 +45,37 @@ constexpr float kDensityFactor = 0.39894228f;
 
 }  // namespace
 
-void bias_gelu(const float* x, const float* bias, int64_t rows, int64_t channels, float* out) {
+void bias_gelu(const float* x, const float* bias, int64_t rows, int64_t channels, float* out, float* slope_out) {
   for (int64_t row = 0; row < rows; ++row) {
     const float* const from = x + row * channels;
     float* const to = out + row * channels;
+    if (!slope_out) {
 #pragma omp simd
-    for (int64_t c = 0; c < channels; ++c) {
-      const float v = from[c] + bias[c];
-      to[c] = v * normal_at(v).cumulative;
+      for (int64_t c = 0; c < channels; ++c) {
+        const float v = from[c] + bias[c];
+        to[c] = v * normal_at(v).cumulative;
+      }
+      continue;
     }
-  }
-}
-
-void bias_gelu_backward(const float* x, const float* bias, const float* grad_out, int64_t rows, int64_t channels,
-                        float* grad_x_out, float* bias_grad_inout) {
-  for (int64_t row = 0; row < rows; ++row) {
-    const float *const from = x + row * channels, *const grad = grad_out + row * channels;
-    float* const to = grad_x_out + row * channels;
+    float* const slope = slope_out + row * channels;
 #pragma omp simd
     for (int64_t c = 0; c < channels; ++c) {
       const float v = from[c] + bias[c];
       const Normal normal = normal_at(v);
-      const float g = grad[c] * (normal.cumulative + v * kDensityFactor * normal.density);
+      slope[c] = normal.cumulative + v * kDensityFactor * normal.density;
+      to[c] = v * normal.cumulative;
+    }
+  }
+}
+
+void bias_gelu_backward(const float* slope, const float* grad_out, int64_t rows, int64_t channels, float* grad_x_out,
+                        float* bias_grad_inout) {
+  for (int64_t row = 0; row < rows; ++row) {
+    const float *const its_slope = slope + row * channels, *const grad = grad_out + row * channels;
+    float* const to = grad_x_out + row * channels;
+#pragma omp simd
+    for (int64_t c = 0; c < channels; ++c) {
+      const float g = grad[c] * its_slope[c];
       to[c] = g;
       bias_grad_inout[c] += g;
     }

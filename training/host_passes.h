@@ -13,13 +13,14 @@ namespace pictura::host {
 /// on today's processors), beside what is made of it.
 constexpr int64_t kBlockNumbers = 48 * 1024;
 
-/// out = GELU(x + bias), by the error function, within 2e-7 of max(1, |x + bias|). x, out: [rows, channels], may be the
-/// same memory; bias: [channels].
-void bias_gelu(const float* x, const float* bias, int64_t rows, int64_t channels, float* out);
+/// out = GELU(x + bias), by the error function, within 2e-7 of max(1, |x + bias|); and its derivative there, where
+/// slope_out is not null. x, out, slope_out: [rows, channels]; either may be x. bias: [channels].
+void bias_gelu(const float* x, const float* bias, int64_t rows, int64_t channels, float* out, float* slope_out);
 
-/// The gradient of x, and that of the bias added to bias_grad_inout, [channels]. grad_x_out may be grad_out.
-void bias_gelu_backward(const float* x, const float* bias, const float* grad_out, int64_t rows, int64_t channels,
-                        float* grad_x_out, float* bias_grad_inout);
+/// The gradient of x, slope * grad_out, and that of the bias added to bias_grad_inout, [channels]. grad_x_out may be
+/// grad_out.
+void bias_gelu_backward(const float* slope, const float* grad_out, int64_t rows, int64_t channels, float* grad_x_out,
+                        float* bias_grad_inout);
 
 /// A convolution over images whose pixels have their channels together, padded by zeros by half the kernel on all
 /// sides.

@@ -182,49 +182,49 @@ class Blocks {
 const float* read(const at::Tensor& t, int64_t row = 0) { return t.const_data_ptr<float>() + row * t.stride(0); }
 float* write(const at::Tensor& t, int64_t row = 0) { return t.mutable_data_ptr<float>() + row * t.stride(0); }
 
-// out: [..., channels] without gaps, may be x.
-void add_bias_gelu(const at::Tensor& x, const at::Tensor& bias, const at::Tensor& out) {
-  const int64_t channels = bias.size(0);
-  const at::Tensor rows = x.view({-1, channels}), to = out.view({-1, channels});
-  Blocks(rows.size(0), host::kBlockNumbers / channels).run([&](int64_t) {
+// Sets out, and slope where it is defined, see host::bias_gelu. All [..., channels] without gaps.
+void add_bias_gelu(const at::Tensor& x, const at::Tensor& bias, const at::Tensor& out, const at::Tensor& slope) {
+  const int64_t channels = bias.size(0), rows = x.numel() / channels;
+  const float* const from = read(x);
+  float *const to = write(out), *const its_slope = slope.defined() ? write(slope) : nullptr;
+  Blocks(rows, host::kBlockNumbers / channels).run([&](int64_t) {
     return [&](int64_t begin, int64_t end) {
-      host::bias_gelu(read(rows, begin), read(bias), end - begin, channels, write(to, begin));
+      const int64_t first = begin * channels;
+      host::bias_gelu(from + first, read(bias), end - begin, channels, to + first,
+                      its_slope ? its_slope + first : nullptr);
     };
   });
 }
 
-// x: [..., channels] without gaps.
+// GELU of x + bias, [..., channels] without gaps, where nothing else reads x, in whose memory the derivative is kept.
 struct HostBiasGelu : Function<HostBiasGelu> {
   static at::Tensor forward(AutogradContext* context, const at::Tensor& x, const at::Tensor& bias) {
-    context->save_for_backward({x, bias});
-    at::Tensor out = at::empty_like(x);
-    add_bias_gelu(x, bias, out);
+    at::Tensor out = at::empty_like(x), slope = x.detach();
+    add_bias_gelu(x, bias, out, slope);
+    context->save_for_backward({slope});
     return out;
   }
 
   static variable_list backward(AutogradContext* context, const variable_list& grads) {
-    const variable_list saved = context->get_saved_variables();
-    const at::Tensor &x = saved[0], bias = saved[1].detach(), grad = grads[0].contiguous();
-    const int64_t channels = bias.size(0);
-    at::Tensor grad_x = at::empty_like(x);
-    const at::Tensor rows = x.view({-1, channels}), grad_rows = grad.view({-1, channels}),
-                     grad_x_rows = grad_x.view({-1, channels});
-    const Blocks blocks(rows.size(0), host::kBlockNumbers / channels);
-    const at::Tensor sums = at::zeros({blocks.parts(), channels}, bias.options());
+    const at::Tensor slope = context->get_saved_variables()[0], grad = grads[0].contiguous();
+    const int64_t channels = slope.size(-1);
+    at::Tensor grad_x = at::empty_like(slope);
+    const Blocks blocks(slope.numel() / channels, host::kBlockNumbers / channels);
+    const at::Tensor sums = at::zeros({blocks.parts(), channels}, slope.options());
     blocks.run([&](int64_t part) {
       return [&, part](int64_t begin, int64_t end) {
-        host::bias_gelu_backward(read(rows, begin), read(bias), read(grad_rows, begin), end - begin, channels,
-                                 write(grad_x_rows, begin), write(sums, part));
+        const int64_t first = begin * channels;
+        host::bias_gelu_backward(read(slope) + first, read(grad) + first, end - begin, channels, write(grad_x) + first,
+                                 write(sums, part));
       };
     });
     return {grad_x, sums.sum(0)};
   }
 };
 
-// GELU of x + bias, where nothing else reads x.
 at::Tensor host_bias_gelu(const at::Tensor& x, const at::Tensor& bias) {
   if (keeps_gradients({x, bias})) return HostBiasGelu::apply(x, bias);
-  add_bias_gelu(x, bias, x);
+  add_bias_gelu(x, bias, x, {});
   return x;
 }
 
@@ -259,50 +259,51 @@ struct HostConvolution : Function<HostConvolution> {
     return memory.narrow(0, 0, (end - begin) * size.pixels());
   }
 
-  /// x: [n, height, width, channels]. Returns the products, [n, rows, columns, outputs], without bias and GELU; with
-  /// them where `before_out` is null.
+  /// x: [n, height, width, channels]. Returns [n, rows, columns, outputs]; sets the derivatives of the GELUs, of the
+  /// same shape, where `slope_out` is not null.
   static at::Tensor compute(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride,
-                            at::Tensor* before_out) {
+                            at::Tensor* slope_out) {
     const HostConvolution c(x, weight, stride);
     const at::Tensor out = at::empty({x.size(0), c.size.rows(), c.size.columns(), c.outputs}, c.weight.options()),
-                     before = before_out ? at::empty_like(out) : out;
-    const at::Tensor rows = out.view({-1, c.outputs}), before_rows = before.view({-1, c.outputs}),
+                     products = slope_out ? at::empty_like(out) : out;
+    const at::Tensor rows = out.view({-1, c.outputs}), product_rows = products.view({-1, c.outputs}),
                      transposed = c.weight.t();
     c.blocks.run([&](int64_t) {
       return [&, memory = c.reads_pixels() ? at::Tensor() : c.scratch(c.size.taps())](int64_t begin, int64_t end) {
-        at::Tensor products = c.of_images(before_rows, begin, end);
-        at::mm_out(products, c.taps(x, memory, begin, end), transposed);
-        host::bias_gelu(read(products), read(bias), products.size(0), c.outputs, write(c.of_images(rows, begin, end)));
+        at::Tensor some = c.of_images(product_rows, begin, end);
+        at::mm_out(some, c.taps(x, memory, begin, end), transposed);
+        host::bias_gelu(read(some), read(bias), some.size(0), c.outputs, write(c.of_images(rows, begin, end)),
+                        slope_out ? write(some) : nullptr);
       };
     });
-    if (before_out) *before_out = before;
+    if (slope_out) *slope_out = products;
     return out;
   }
 
   static at::Tensor forward(AutogradContext* context, const at::Tensor& x, const at::Tensor& weight,
                             const at::Tensor& bias, int64_t stride) {
-    at::Tensor before;
-    const at::Tensor out = compute(x, weight, bias, stride, &before);
-    context->save_for_backward({x, weight, bias, before});
+    at::Tensor slope;
+    const at::Tensor out = compute(x, weight, bias, stride, &slope);
+    context->save_for_backward({x, weight, slope});
     context->saved_data["stride"] = stride;
     return out;
   }
 
   static variable_list backward(AutogradContext* context, const variable_list& grads) {
     const variable_list saved = context->get_saved_variables();
-    const at::Tensor x = saved[0].detach(), bias = saved[2].detach(), &before = saved[3], grad = grads[0].contiguous();
+    const at::Tensor x = saved[0].detach(), &slope = saved[2], grad = grads[0].contiguous();
     const HostConvolution c(x, saved[1], context->saved_data["stride"].toInt());
-    const at::Tensor before_rows = before.view({-1, c.outputs}), grad_rows = grad.view({-1, c.outputs});
+    const at::Tensor slope_rows = slope.view({-1, c.outputs}), grad_rows = grad.view({-1, c.outputs});
     const at::Tensor weight_sums = at::zeros({c.blocks.parts(), c.outputs, c.size.taps()}, c.weight.options()),
                      bias_sums = at::zeros({c.blocks.parts(), c.outputs}, c.weight.options());
     const at::Tensor grad_x = context->needs_input_grad(0) ? at::empty_like(x) : at::Tensor();
     c.blocks.run([&](int64_t part) {
-      return [&, part, memory = c.scratch(c.size.taps()), grads_before = c.scratch(c.outputs),
+      return [&, part, memory = c.scratch(c.size.taps()), product_grads = c.scratch(c.outputs),
               weight_sum = weight_sums[part]](int64_t begin, int64_t end) {
-        const at::Tensor some = c.of_images(before_rows, begin, end),
-                         grad_some = grads_before.narrow(0, 0, some.size(0));
-        host::bias_gelu_backward(read(some), read(bias), read(c.of_images(grad_rows, begin, end)), some.size(0),
-                                 c.outputs, write(grad_some), write(bias_sums, part));
+        const at::Tensor some = c.of_images(slope_rows, begin, end),
+                         grad_some = product_grads.narrow(0, 0, some.size(0));
+        host::bias_gelu_backward(read(some), read(c.of_images(grad_rows, begin, end)), some.size(0), c.outputs,
+                                 write(grad_some), write(bias_sums, part));
         at::Tensor sum = weight_sum;
         at::addmm_out(sum, sum, grad_some.t(), c.taps(x, memory, begin, end));
         if (!grad_x.defined()) return;
@@ -345,7 +346,7 @@ struct HostSets : Function<HostSets> {
         host::member_rows(read(members, begin), its_counts, end - begin, most, size, write(some));
         at::Tensor activations = hidden_memory.narrow(0, 0, count), embeddings = memory.narrow(0, 0, count);
         at::mm_out(activations, some, hidden_transposed);
-        host::bias_gelu(read(activations), read(hidden_bias), count, hidden, write(activations));
+        host::bias_gelu(read(activations), read(hidden_bias), count, hidden, write(activations), nullptr);
         at::mm_out(embeddings, activations, transposed);
         host::largest_members(read(embeddings), its_counts, end - begin, channels, write(largest, begin),
                               which.mutable_data_ptr<int32_t>() + begin * channels);
@@ -383,6 +384,7 @@ struct HostSets : Function<HostSets> {
         // The members that are the largest somewhere, as rows, and the gradient of each.
         chosen.clear();
         const at::Tensor gradients = at::zeros({(end - begin) * channels, channels}, options);
+        float* const gradient = write(gradients);
         const int32_t* its_which = which.const_data_ptr<int32_t>() + begin * channels;
         const float* its_grad = read(grad, begin);
         for (int64_t set = begin; set < end; ++set, its_which += channels, its_grad += channels) {
@@ -395,19 +397,19 @@ struct HostSets : Function<HostSets> {
               number = static_cast<int64_t>(chosen.size());
               chosen.push_back(first + its_which[c]);
             }
-            write(gradients, number)[c] = its_grad[c];
+            gradient[number * channels + c] = its_grad[c];
           }
         }
         const auto count = static_cast<int64_t>(chosen.size());
         if (count == 0) return;
         const at::Tensor some = rows.index_select(0, at::from_blob(chosen.data(), {count}, at::kLong)),
-                         its_gradients = gradients.narrow(0, 0, count), before = at::mm(some, hidden_transposed),
-                         activations = at::empty_like(before), activation_grads = at::mm(its_gradients, weight);
-        host::bias_gelu(read(before), read(hidden_bias), count, hidden, write(activations));
+                         its_gradients = gradients.narrow(0, 0, count), slope = at::mm(some, hidden_transposed),
+                         activations = at::empty_like(slope), activation_grads = at::mm(its_gradients, weight);
+        host::bias_gelu(read(slope), read(hidden_bias), count, hidden, write(activations), write(slope));
         at::Tensor sum = weight_sum, hidden_sum = hidden_weight_sum;
         at::addmm_out(sum, sum, its_gradients.t(), activations);
-        host::bias_gelu_backward(read(before), read(hidden_bias), read(activation_grads), count, hidden,
-                                 write(activation_grads), write(hidden_bias_sums, part));
+        host::bias_gelu_backward(read(slope), read(activation_grads), count, hidden, write(activation_grads),
+                                 write(hidden_bias_sums, part));
         at::addmm_out(hidden_sum, hidden_sum, activation_grads.t(), some);
       };
     });
