@@ -17,6 +17,7 @@
 #include "pictura/training/algorithm.h"
 #include "pictura/training/config_keys.h"
 #include "pictura/training/diagnosis.h"
+#include "pictura/training/host_memory.h"
 #include "pictura/training/memory.h"
 #include "pictura/training/precision.h"
 #include "pictura/training/ranks/agree.h"
@@ -64,6 +65,7 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
                   "{}: holds a run already ({}): resume it, overwrite it, or name another folder", options.out_folder,
                   fmt::join(old_files, ", "));
   }
+  if (device.is_host()) keep_freed_memory();
   at::set_num_threads(resolve_num_threads(config.run.num_threads));
   set_float32_products(config.train.precision);
   set_reproducible(config.train.reproducible);

@@ -1,0 +1,18 @@
+#include "pictura/training/host_memory.h"
+
+#include <climits>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
+namespace pictura {
+
+void keep_freed_memory() {
+#ifdef __GLIBC__
+  mallopt(M_MMAP_MAX, 0);  // no threshold that glibc takes is above 32 MB
+  mallopt(M_TRIM_THRESHOLD, INT_MAX);
+  mallopt(M_TOP_PAD, 64 << 20);
+#endif
+}
+
+}  // namespace pictura
