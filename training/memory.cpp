@@ -94,12 +94,19 @@ class LayerSum {
   double parameters_ = 0, kept_ = 0, largest_ = 0;
 };
 
-void add_entity_sets(const Config& config, LayerSum* sum) {
+void add_entity_sets(const Config& config, Device device, LayerSum* sum) {
   const double width = config.policy.embedding_width;
   for (const ObservationArray& array : kObservationArrays) {
     if (!is_set(array) || !config.reads(array.part)) continue;
     const double points = array.name == "controls" ? 2 : 1;
     const double features = array.features + (config.policy.point_features ? points * kPointFeatures : 0);
+    if (device.is_host()) {
+      // Of members their features are kept, of a set the largest twice and which they are: see largest_embedding().
+      sum->add_parameters((features + 1) * width + (width + 1) * width);
+      sum->add_values(array.rows * features, 1);
+      sum->add_values(width, 3);
+      continue;
+    }
     sum->add_values(array.rows * features, 2);
     sum->add_group(array.rows, features, width, 2);
   }
@@ -135,14 +142,14 @@ void add_images(const Config& config, const Rig& rig, LayerSum* sum) {
   sum->add(1, cameras * width, 4.0 * policy.embedding_width, 1);
 }
 
-LayerSum layers_of(const Config& config, const Rig& rig) {
+LayerSum layers_of(const Config& config, const Rig& rig, Device device) {
   const Config::PolicySection& policy = config.policy;
   LayerSum sum;
   double sets = 4;
   if (config.reads_images()) {
     add_images(config, rig, &sum);
   } else {
-    add_entity_sets(config, &sum);
+    add_entity_sets(config, device, &sum);
     sets = config.reads(ObservationPart::walls) ? 5 : 4;
   }
   const double width = policy.embedding_width,
@@ -166,7 +173,7 @@ NetworkSize network_size(const Config& config, Device device) {
   NetworkSize size;
   const double value_bytes = !device.is_host() && config.train.precision == Precision::bf16 ? 2 : 4;
   const auto add = [&](int64_t agent_steps) {
-    const LayerSum sum = layers_of(config, rig_of(config, agent_steps));
+    const LayerSum sum = layers_of(config, rig_of(config, agent_steps), device);
     size.parameters = sum.parameters();
     size.transition_bytes = std::max(size.transition_bytes, sum.values() * value_bytes + observation_bytes(config));
   };

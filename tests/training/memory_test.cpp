@@ -115,6 +115,12 @@ TEST_P(EachNetwork, TakesAboutWhatIsEstimatedOnTheWayForwardAndBack) {
     const Rig rig = rig_of(config);
     Observation observation = row_of(allocate_observations(config, 1, chunks[i], Device{}), 0);
     observation = observation.map([](const at::Tensor& t) { return at::zeros_like(t); });
+    for (size_t j = 0; j < std::size(kObservationArrays); ++j) {
+      const ObservationArray& array = kObservationArrays[j];
+      if (is_set(array) && config.reads(array.part)) {
+        observation.set_counts.select(1, static_cast<int64_t>(entity_set_of(j))).fill_(array.rows);
+      }
+    }
     if (config.reads_images()) {
       const int64_t height = rig.cameras[0].height_px, width = rig.cameras[0].width_px;
       observation.images = {{at::zeros({chunks[i], 4, 3, height, width}, at::kByte), {0, 1, 2, 3}}};
