@@ -47,6 +47,14 @@ TEST_P(EachModality, TheHostGivesOnePolicyInEverySetting) {
   EXPECT_EQ(policies.count(other.policy_hash), 0u) << "the seed counts";
 }
 
+// Those of few channels are oneDNN's, others products of their own, whose sums are those of each thread.
+TEST_F(Reproducible, TheHostGivesOnePolicyWithWideConvolutionsAndTwoThreads) {
+  const auto [whole, again, resumed] = test::policies_of_equal_runs(
+      folder_ / "wide", "cpu", {"policy.conv_channels=[16, 24]", "run.num_threads=2", "train.num_steps=6"});
+  EXPECT_EQ(whole, again);
+  EXPECT_EQ(whole, resumed);
+}
+
 TEST_F(Reproducible, MeansDeterministicAlgorithmsAndNoAutotuner) {
   const at::Context& torch = at::globalContext();
   set_reproducible(true);
