@@ -5,6 +5,7 @@
 #include <optional>
 
 #include <ATen/Parallel.h>
+#include <ATen/autocast_mode.h>
 #include <ATen/core/LegacyTypeDispatch.h>
 #include <ATen/core/grad_mode.h>
 #include <torch/csrc/autograd/custom_function.h>
@@ -138,8 +139,10 @@ PointSize point_size(const at::Tensor& rows, int64_t points, float unit_m, bool 
   return {rows.numel() / features, features, points, unit_m, keeps_rows};
 }
 
-// Whether the host's own passes (host_passes.h) take it: those are fp32.
-bool is_on_host(const at::Tensor& x) { return x.is_cpu() && x.scalar_type() == at::kFloat; }
+// Whether the host's own passes (host_passes.h) take it: those are fp32, which layers in bf16 are not.
+bool is_on_host(const at::Tensor& x) {
+  return x.is_cpu() && x.scalar_type() == at::kFloat && !at::autocast::is_autocast_enabled(at::kCPU);
+}
 
 // Whether a gradient will be asked of what these make.
 bool keeps_gradients(std::initializer_list<at::Tensor> inputs) {
