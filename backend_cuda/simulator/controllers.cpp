@@ -82,6 +82,7 @@ class CudaLaneController final : public Controller {
     read(input.scene.light_states, &lights_, cuda_stream);
     read(input.episode_step, &episode_step_, cuda_stream);
     read(input.episode_index, &episode_index_, cuda_stream);
+    read(input.seed, &seed_, cuda_stream);
     read(mask, &mask_, cuda_stream);
     read(commands_out, &commands_, cuda_stream);
     PICTURA_CUDA(cudaStreamSynchronize(cuda_stream));
@@ -94,6 +95,7 @@ class CudaLaneController final : public Controller {
     on_host.state = agents_.view();
     on_host.episode_step = episode_step_;
     on_host.episode_index = episode_index_;
+    on_host.seed = seed_;
     keeper_.act(on_host, mask_, commands_);
     PICTURA_CUDA(cudaMemcpyAsync(commands_out.data(), commands_.data(), commands_.size() * sizeof(Command),
                                  cudaMemcpyHostToDevice, cuda_stream));
@@ -108,6 +110,7 @@ class CudaLaneController final : public Controller {
   std::vector<AgentBox> boxes_;
   std::vector<LightState> lights_;
   std::vector<int32_t> episode_step_, episode_index_;
+  std::vector<uint64_t> seed_;
   std::vector<uint8_t> mask_;
   std::vector<Command> commands_;
   LaneKeepingController keeper_;
