@@ -101,10 +101,10 @@ void add_entity_sets(const Config& config, Device device, LayerSum* sum) {
     const double points = array.name == "controls" ? 2 : 1;
     const double features = array.features + (config.policy.point_features ? points * kPointFeatures : 0);
     if (device.is_host()) {
-      // Of members their features are kept, of a set the largest twice and which they are: see largest_embedding().
+      // Of members their features are kept, of a set which are the largest: see largest_embedding().
       sum->add_parameters((features + 1) * width + (width + 1) * width);
       sum->add_values(array.rows * features, 1);
-      sum->add_values(width, 3);
+      sum->add_values(width, 1);
       continue;
     }
     sum->add_values(array.rows * features, 2);

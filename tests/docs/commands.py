@@ -12,6 +12,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs/commands.md"
+CLI11 = [2, 1]  # Debian 12's
 HEAD = """# Commands
 What `pictura COMMAND --help` prints, written by `scripts/docs --update` and compared by a test. Defaults stand after `=`, ranges
 after `:`; units stand in the texts. `--json` prints one object on stdout and nothing else, and logs go to stderr. Exit status: 0 done, 1

@@ -81,6 +81,10 @@ class Documents(unittest.TestCase):
     def test_the_reference_of_commands_is_what_help_prints(self):
         if not self.is_whole:
             self.skipTest("this build lacks commands")
+        # Later versions lay options out otherwise: `[0]` instead of `=0`.
+        version = os.environ["CLI11_VERSION"]
+        if [int(part) for part in version.split(".")[:2]] != commands.CLI11:
+            self.skipTest(f"the page is as CLI11 {commands.CLI11} lays help out, this build has {version}")
         self.assertEqual(commands.PAGE.read_text(), commands.page(self.helps.items()), "run scripts/docs --update")
 
     def test_every_command_has_three_examples_that_name_what_there_is(self):

@@ -1,8 +1,7 @@
 // The memory that agents and the network take, by estimate: near what they do take, and refused where there is less.
 #include "pictura/training/memory.h"
 
-#include <fstream>
-
+#include <c10/core/CPUAllocator.h>
 #include <gmock/gmock.h>
 #include <malloc.h>
 
@@ -95,24 +94,56 @@ TEST_P(EachNetwork, HasTheParametersThatAreCounted) {
   EXPECT_EQ(network_size(config, Device{}).parameters, make_policy(config, rig_of(config), Device{})->num_parameters());
 }
 
-// The most that the process has held since the last call, and from now on counts anew.
-double peak_bytes() {
-  std::ifstream status("/proc/self/status");
-  double peak_kib = 0;
-  for (std::string word; status >> word;) {
-    if (word == "VmHWM:") status >> peak_kib;
+// While there is one, all that torch allocates on the host is counted. One at a time.
+class CountedTensors final : public c10::Allocator {
+ public:
+  CountedTensors() : before_(c10::GetCPUAllocator()) {
+    live_bytes_ = peak_bytes_ = 0;
+    c10::SetCPUAllocator(this, kPriority);
   }
-  std::ofstream("/proc/self/clear_refs") << 5;
-  return 1024 * peak_kib;
-}
+  ~CountedTensors() override { c10::SetCPUAllocator(before_, kPriority); }
+  CountedTensors(const CountedTensors&) = delete;
+  CountedTensors& operator=(const CountedTensors&) = delete;
+
+  /// The most that there was at once.
+  static double peak_bytes() { return static_cast<double>(peak_bytes_); }
+
+  c10::DataPtr allocate(size_t bytes) override {
+    void* block = nullptr;
+    if (posix_memalign(&block, kHead, kHead + bytes) != 0) throw std::bad_alloc();
+    std::memcpy(block, &bytes, sizeof(bytes));
+    live_bytes_ += static_cast<int64_t>(bytes);
+    peak_bytes_ = std::max(peak_bytes_, live_bytes_);
+    void* const data = static_cast<char*>(block) + kHead;
+    return {data, data, &release, c10::Device(c10::kCPU)};
+  }
+  c10::DeleterFnPtr raw_deleter() const override { return &release; }
+  void copy_data(void* to, const void* from, size_t bytes) const override { default_copy_data(to, from, bytes); }
+
+ private:
+  // What is freed later than this ends knows its size by itself.
+  static void release(void* data) {
+    void* const block = static_cast<char*>(data) - kHead;
+    size_t bytes = 0;
+    std::memcpy(&bytes, block, sizeof(bytes));
+    live_bytes_ -= static_cast<int64_t>(bytes);
+    std::free(block);
+  }
+
+  static constexpr size_t kHead = 64;  // vectors are aligned
+  static constexpr uint8_t kPriority = 1;
+  static inline int64_t live_bytes_ = 0, peak_bytes_ = 0;
+  c10::Allocator* before_;
+};
 
 TEST_P(EachNetwork, TakesAboutWhatIsEstimatedOnTheWayForwardAndBack) {
-  double taken[3];
-  const int chunks[] = {256, 256, 1024};  // the first for what is made once
+  double taken[2];
+  const int chunks[] = {64, 256};
   for (size_t i = 0; i < std::size(chunks); ++i) {
     const Config config = config_of_chunk(chunks[i]);
     const std::unique_ptr<const Policy> policy = make_policy(config, rig_of(config), Device{});
     const Rig rig = rig_of(config);
+    const CountedTensors counted;
     Observation observation = row_of(allocate_observations(config, 1, chunks[i], Device{}), 0);
     observation = observation.map([](const at::Tensor& t) { return at::zeros_like(t); });
     for (size_t j = 0; j < std::size(kObservationArrays); ++j) {
@@ -125,14 +156,11 @@ TEST_P(EachNetwork, TakesAboutWhatIsEstimatedOnTheWayForwardAndBack) {
       const int64_t height = rig.cameras[0].height_px, width = rig.cameras[0].width_px;
       observation.images = {{at::zeros({chunks[i], 4, 3, height, width}, at::kByte), {0, 1, 2, 3}}};
     }
-    malloc_trim(0);
-    peak_bytes();
-    const double before = peak_bytes();
     const Policy::Output output = policy->forward(observation);
     (output.logits.sum() + output.value.sum()).backward();
-    taken[i] = peak_bytes() - before;
+    taken[i] = counted.peak_bytes();
   }
-  const double of_transition = (taken[2] - taken[1]) / (chunks[2] - chunks[1]),
+  const double of_transition = (taken[1] - taken[0]) / (chunks[1] - chunks[0]),
                by_estimate = network_size(config_of_chunk(64), Device{}).transition_bytes;
   EXPECT_GT(by_estimate, 0.8 * of_transition) << of_transition << " bytes";
   EXPECT_LT(by_estimate, 1.6 * of_transition) << of_transition << " bytes";

@@ -1,6 +1,5 @@
 // One seed gives one policy: in two runs, in one that is resumed, and in every setting that promises it.
 #include <cstdlib>
-#include <set>
 
 #include <ATen/Context.h>
 #include <gmock/gmock.h>
@@ -15,6 +14,7 @@ namespace {
 
 using test::message_of;
 using ::testing::AllOf;
+using ::testing::Each;
 using ::testing::HasSubstr;
 
 class Reproducible : public ::testing::Test {
@@ -30,21 +30,21 @@ class EachModality : public Reproducible, public testing::WithParamInterface<con
 INSTANTIATE_TEST_SUITE_P(Reproducible, EachModality, testing::Values("vector", "perspective"),
                          [](const auto& modality) { return std::string(modality.param); });
 
-// On the host precision and train.reproducible change nothing.
-TEST_P(EachModality, TheHostGivesOnePolicyInEverySetting) {
-  std::set<std::string> policies;
-  for (const auto& [precision, reproducible] : {std::pair{"fp32", "false"}, {"tf32", "false"}, {"bf16", "true"}}) {
-    for (const std::string& policy : test::policies_of_equal_runs(
-             folder_ / (std::string(precision) + reproducible), "cpu",
-             {std::string("policy.modality=") + GetParam(), std::string("train.precision=") + precision,
-              std::string("train.reproducible=") + reproducible, "train.num_steps=6"})) {
-      policies.insert(policy);
-    }
-  }
-  EXPECT_EQ(policies.size(), 1u);
+// On the host, which has fp32 alone, a setting gives one policy. train.reproducible may give another one: it fills
+// chunks up, and the rounding of a product may depend on how many rows it has.
+TEST_P(EachModality, TheHostGivesOnePolicyInEachSetting) {
+  const auto policies = [this](const std::string& precision, const std::string& reproducible) {
+    return test::policies_of_equal_runs(folder_ / (precision + reproducible), "cpu",
+                                        {std::string("policy.modality=") + GetParam(), "train.precision=" + precision,
+                                         "train.reproducible=" + reproducible, "train.num_steps=6"});
+  };
+  const auto fp32 = policies("fp32", "false"), tf32 = policies("tf32", "false"), filled = policies("bf16", "true");
+  EXPECT_THAT(fp32, Each(fp32[0]));
+  EXPECT_THAT(tf32, Each(fp32[0]));
+  EXPECT_THAT(filled, Each(filled[0]));
   const TrainReport other = train(test::small_run(
       folder_ / "other", "cpu", {std::string("policy.modality=") + GetParam(), "train.updates=2", "run.seed=2"}));
-  EXPECT_EQ(policies.count(other.policy_hash), 0u) << "the seed counts";
+  EXPECT_NE(other.policy_hash, fp32[0]) << "the seed counts";
 }
 
 // Those of few channels are oneDNN's, others products of their own, whose sums are those of each thread.
