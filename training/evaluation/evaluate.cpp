@@ -155,6 +155,7 @@ EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options, Ev
   for (const DensityOf& density : densities) work += double(density.agents) * options.scenarios * options.steps;
 
   const Stopwatch since_start;
+  double first_s = -1, first_fraction = 0;  // when the first step was done, and what part it was
   EvaluateReport report;
   report.results.setting = driver.setting;
   EvaluationSetting& setting = report.results.setting;
@@ -204,9 +205,16 @@ EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options, Ev
         if (options.observer) options.observer->before_step(commands);
         const StepResult taken = simulator->step(Span<const Command>(commands));
         if (options.observer) options.observer->after_step(taken);
-        if (options.on_progress && step % 10 == 0) {
+        if (options.on_progress && (step % 10 == 0 || step == 1)) {
           const double fraction = (done + double(simulator->num_slots()) * (step + 1)) / work;
-          options.on_progress(fraction, since_start.seconds() * (1 - fraction) / fraction);
+          // The first step compiles and tunes: how long it takes tells nothing of the others.
+          if (first_s < 0) {
+            first_s = since_start.seconds();
+            first_fraction = fraction;
+          } else {
+            options.on_progress(fraction,
+                                (since_start.seconds() - first_s) * (1 - fraction) / (fraction - first_fraction));
+          }
         }
       }
       done += double(simulator->num_slots()) * options.steps;
