@@ -19,6 +19,7 @@
 #include "pictura/simulator/controllers/controller.h"
 #include "pictura/simulator/fields.h"
 #include "pictura/simulator/observation.h"
+#include "pictura/simulator/observation_query.h"
 #include "pictura/simulator/state_edit.h"
 #include "pictura/simulator/totals.h"
 
@@ -165,6 +166,18 @@ class Simulator {
   /// device the last are latched. There nothing waits, and a CUDA graph can capture it.
   void set_state(const Array& slots, Span<const NamedArray> fields, Stream stream = {});
 
+  /// Writes what slots would observe if chosen boxes of their worlds were not there, and others were: a row of `out` a
+  /// query. Partners alone differ; a query that hides and inserts nobody gets the bits of observations(). State,
+  /// observations and results stay as they are. hidden: indices into scene().agents, as in SceneBatch::hidden_agents,
+  /// so that one list serves views as well. out: arrays of [queries, rows, features], which may hold anything before,
+  /// of the parts that the configuration observes; the others are empty. All spans lie on device(). Throws Error, and
+  /// then writes nothing, for arrays of other lengths, more than 2^24 queries, and a query with a slot, ranges, a
+  /// hidden box (one of another world) or an inserted one (numbers that are not finite) that cannot be; on a device
+  /// faults of queries are latched. There partners, lanes, boundaries and walls begin at a multiple of 16 bytes,
+  /// nothing allocates or waits, and a CUDA graph can capture it.
+  void observe(Span<const ObservationQuery> queries, Span<const int32_t> hidden, Span<const InsertedBox> inserted,
+               const ObservationView& out, Stream stream = {});
+
   /// Advances every world by one step. actions: i32 [slots] on device(), each in [0, kNumActions); those of inactive
   /// agents are ignored. A world whose last step ended its episode is reset instead, and its slots are not valid in
   /// that step (next-step autoreset). Throws Error, which leaves the state as it was, for another array, and for an
@@ -175,7 +188,8 @@ class Simulator {
   /// that the simple form gives.
   StepResult step(Span<const Command> commands, Stream stream = {});
 
-  /// Throws Error when a step was rejected since the last call that threw, as far as the host knows; does not wait.
+  /// Throws Error when a step, an edit or a query was rejected since the last call that threw, as far as the host
+  /// knows; does not wait.
   virtual void poll() {}
   /// Waits for the work on this stream, then polls.
   virtual void check(Stream /*stream*/ = {}) {}
@@ -221,6 +235,8 @@ class Simulator {
   // reset() and set_state() likewise.
   virtual void reset_worlds(Span<const uint8_t> world_mask, uint64_t seed, Stream stream) = 0;
   virtual void apply_edit(const StateEdit& edit, Stream stream) = 0;
+  // observe() likewise.
+  virtual void answer_queries(const ObservationQueries& asked, Stream stream) = 0;
 };
 
 }  // namespace pictura

@@ -13,6 +13,7 @@
 #include "pictura/simulator/rules/edit_state.h"
 #include "pictura/simulator/rules/episode.h"
 #include "pictura/simulator/rules/limits.h"
+#include "pictura/simulator/rules/observe_query.h"
 
 namespace pictura {
 namespace {
@@ -291,6 +292,28 @@ std::string edit_fault_text(int64_t fault, int num_slots) {
         slot);
   }
   return fmt::format("slot {}: {}: the value is out of range", slot, name);
+}
+
+std::string query_fault_text(int64_t fault, int num_slots) {
+  const int64_t query = fault >> 32 & 0xFFFFFF;
+  const auto value = static_cast<int32_t>(fault);
+  const auto text = [query](std::string_view what) { return fmt::format("query {}: {}", query, what); };
+  switch (static_cast<QueryFault>(fault >> 56)) {
+    case QueryFault::slot: return text(fmt::format("expected a slot in [0, {}), got {}", num_slots, value));
+    case QueryFault::hidden_begin:
+      return text(fmt::format("hidden_begin: expected 0 to the length of the list of hidden boxes, got {}", value));
+    case QueryFault::hidden_end:
+      return text(
+          fmt::format("hidden_end: expected hidden_begin to the length of the list of hidden boxes, got {}", value));
+    case QueryFault::hidden_box:
+      return text(fmt::format("hidden: expected boxes of the slot's own world, got box {} of the scene", value));
+    case QueryFault::inserted_begin:
+      return text(fmt::format("inserted_begin: expected 0 to the length of the list of inserted boxes, got {}", value));
+    case QueryFault::inserted_end:
+      return text(fmt::format(
+          "inserted_end: expected inserted_begin to the length of the list of inserted boxes, got {}", value));
+    default: return text(fmt::format("inserted: expected finite numbers, got others in box {} of the list", value));
+  }
 }
 
 }  // namespace pictura

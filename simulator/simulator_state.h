@@ -75,5 +75,7 @@ struct SimulatorState {
 std::string rejection_text(int64_t rejected);
 /// What an Error says of an edit in which find_edit_fault() found this.
 std::string edit_fault_text(int64_t fault, int num_slots);
+/// What an Error says of a query in which find_query_fault() found this.
+std::string query_fault_text(int64_t fault, int num_slots);
 
 }  // namespace pictura

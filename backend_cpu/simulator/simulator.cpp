@@ -9,7 +9,7 @@
 #include "pictura/simulator/host_worlds.h"
 #include "pictura/simulator/rules/edit_state.h"
 #include "pictura/simulator/rules/episode.h"
-#include "pictura/simulator/rules/observe.h"
+#include "pictura/simulator/rules/observe_query.h"
 #include "pictura/simulator/rules/spawn.h"
 
 namespace pictura {
@@ -150,6 +150,21 @@ class SimulatorCpu final : public Simulator {
       if (!is_edited[static_cast<size_t>(w)]) return;
       sort_into_cells(worlds_.world(w), &worlds_.box_cells[static_cast<size_t>(w)]);
       show(w);
+    });
+  }
+
+  void answer_queries(const ObservationQueries& asked, Stream) override {
+    const auto world_of = [this](int slot) {
+      return worlds_.world(worlds_.setup.world_of_slot[static_cast<size_t>(slot)]);
+    };
+    const auto count = static_cast<int>(asked.queries.size());
+    for (int i = 0; i < count; ++i) {
+      const int64_t fault = find_query_fault(asked, i, num_slots(), world_of);
+      if (fault != kNoQueryFault) fail("observe: {}", query_fault_text(fault, num_slots()));
+    }
+    parallel_for(config().num_threads, count, [&](int64_t item) {
+      const int i = static_cast<int>(item);
+      answer_query(world_of(asked.queries[static_cast<size_t>(i)].slot), asked, i, config().vector_observations);
     });
   }
 
@@ -312,7 +327,7 @@ class SimulatorCpu final : public Simulator {
     for (int agent = 0; agent < world.num_agents; ++agent) {
       results_.views[static_cast<size_t>(world.first_slot + agent)] = view_of(world, agent);
     }
-    observe(world, 0, world.num_agents, worlds_.setup.config.vector_observations, observations);
+    pictura::observe(world, 0, world.num_agents, worlds_.setup.config.vector_observations, observations);
   }
 
   HostWorlds worlds_;

@@ -89,7 +89,7 @@ struct DeviceThreadGroup {
     memcpy(&result, words, sizeof(T));
     return result;
   }
-  /// Memory for WriteObservation::kStaging floats.
+  /// Memory for the phase's kStaging floats.
   __device__ float* staging() const { return rows; }
   /// Writes the first `filled` of staging(), then zeros up to `end` or a little beyond, but not beyond `capacity`.
   __device__ void write(const float* values, int filled, int end, int capacity, float* out) const {
@@ -148,10 +148,10 @@ __global__ void __launch_bounds__(kThreads, kGroupBlocks) run_groups(int32_t cou
 
 /// Groups with memory of their own. Small blocks, since the last of its warps holds a block's place.
 constexpr int kObserveThreads = 64;
-__global__ void __launch_bounds__(kObserveThreads, kObserveBlocks)
-    run_write_observation(int32_t count, WriteObservation phase) {
-  __shared__ float4 staging[kObserveThreads / kWarp][WriteObservation::kStaging / 4];
-  static_assert(WriteObservation::kStaging % 4 == 0);
+template <typename Phase>
+__global__ void __launch_bounds__(kObserveThreads, kObserveBlocks) run_staged_groups(int32_t count, Phase phase) {
+  __shared__ float4 staging[kObserveThreads / kWarp][Phase::kStaging / 4];
+  static_assert(Phase::kStaging % 4 == 0);
   const int64_t item = (int64_t{blockIdx.x} * kObserveThreads + threadIdx.x) / kWarp;
   DeviceThreadGroup<kWarp> group;
   group.rows = reinterpret_cast<float*>(staging[threadIdx.x / kWarp]);
@@ -185,9 +185,9 @@ struct DeviceLaunch {
   }
   template <int kGroup, typename Phase>
   void groups(int32_t count, const Phase& phase) const {
-    if constexpr (std::is_same_v<Phase, WriteObservation>) {
+    if constexpr (requires { Phase::kStaging; }) {
       static_assert(kGroup == kWarp);
-      run_write_observation<<<blocks_for(int64_t{count} * kGroup, kObserveThreads), kObserveThreads, 0, streams.main>>>(
+      run_staged_groups<<<blocks_for(int64_t{count} * kGroup, kObserveThreads), kObserveThreads, 0, streams.main>>>(
           count, phase);
     } else {
       run_groups<kGroup><<<blocks_for(int64_t{count} * kGroup), kThreads, 0, streams.main>>>(count, phase);
@@ -222,6 +222,10 @@ void launch_reset(const SimulatorArrays& arrays, const uint8_t* mask, uint64_t s
 
 void launch_edit(const SimulatorArrays& arrays, const StateEdit& edit, const StepStreams& streams) {
   launch_edit(DeviceLaunch{streams}, arrays, edit);
+}
+
+void launch_queries(const SimulatorArrays& arrays, const ObservationQueries& asked, const StepStreams& streams) {
+  launch_queries(DeviceLaunch{streams}, arrays, asked);
 }
 
 void launch_restored(const SimulatorArrays& arrays, const StepStreams& streams) {

@@ -18,6 +18,7 @@ struct StepStreams {
 /// In the worlds that `mask` [worlds] names, or in all where it is null.
 void launch_reset(const SimulatorArrays& arrays, const uint8_t* mask, uint64_t seed, const StepStreams& streams);
 void launch_edit(const SimulatorArrays& arrays, const StateEdit& edit, const StepStreams& streams);
+void launch_queries(const SimulatorArrays& arrays, const ObservationQueries& asked, const StepStreams& streams);
 void launch_restored(const SimulatorArrays& arrays, const StepStreams& streams);
 void launch_step(const SimulatorArrays& arrays, const int32_t* actions, const StepStreams& streams);
 void launch_step(const SimulatorArrays& arrays, const Command* commands, const StepStreams& streams);

@@ -10,7 +10,7 @@
 #include "pictura/common/portable/intrinsics.h"
 #include "pictura/simulator/rules/edit_state.h"
 #include "pictura/simulator/rules/episode.h"
-#include "pictura/simulator/rules/observe.h"
+#include "pictura/simulator/rules/observe_query.h"
 #include "pictura/simulator/rules/spawn.h"
 
 namespace pictura::cuda {
@@ -60,8 +60,9 @@ struct SimulatorArrays {
   int32_t* rejected_slot = nullptr;  // the lowest one with a command out of range, or kNoSlot
   int64_t* rejected_command = nullptr;  // the first since the host looked, or kNothingRejected
   int32_t* first_element = nullptr;     // [num_slots] the first element of an edit that names each, or kNoSlot
-  int32_t* wrong_element = nullptr;     // the first element of the edit with a fault, or kNoSlot
+  int32_t* wrong_element = nullptr;     // the first element of the edit, or query, with a fault, or kNoSlot
   int64_t* wrong_edit = nullptr;        // what the first since the host looked is, or kNothingWrong
+  int64_t* wrong_query = nullptr;       // likewise, or kNoQueryFault
 
   PICTURA_HD WorldView world(int w) const {
     WorldView world = worlds[w];
@@ -401,46 +402,43 @@ struct FinishStep {
   }
 };
 
-/// Writes a slot's view and observation.
-struct WriteObservation {
-  SimulatorArrays arrays;
-  /// Floats that the rows of any set need.
+/// Writes what agents observe, a group of threads an observation.
+class ObservationWriter {
+ public:
+  /// Floats that the rows of any set need in the memory of a group.
   static constexpr int kStaging = max_of(max_of(max_of(kMaxLanes, kMaxBoundaries), kMaxWalls) * kLaneFeatures,
                                          max_of(kMaxPartners* kPartnerFeatures, kMaxControls* kControlFeatures));
 
-  template <typename ThreadGroup>
-  PICTURA_HD void operator()(const ThreadGroup& group, int slot) const {
-    const WorldView world = arrays.world(arrays.world_of_slot[slot]);
-    const int agent = slot - world.first_slot;
-    observe_own(world, agent, arrays.observations, group);
-    if (group.rank() == group.size() - 1) arrays.views[slot] = view_of(world, agent);
-    if (!arrays.entity_sets) return;
-    const NearPlace place = near_place(world, slot);
-    for (int set = 0; set < num_observed_sets(arrays.observations); ++set) {
-      write_set(group, world, agent, place, static_cast<EntitySet>(set));
+  /// observe_set() of every set, to that row of `out`.
+  template <typename ThreadGroup, typename Observation>
+  PICTURA_HD static void write_sets(const ThreadGroup& group, const WorldView& world, int agent,
+                                    const Observation& observation, const ObservationView& out, int row) {
+    const NearPlace place = near_place(world, world.first_slot + agent);
+    for (int k = 0; k < num_observed_sets(out); ++k) {
+      const auto set = static_cast<EntitySet>(k);
+      write_set(group, world, agent, place, set, set_rows(out, row, set), observation);
     }
   }
 
  private:
   /// The rows are put together in the group's own memory, so that they are written whole and in order.
-  template <typename ThreadGroup>
-  PICTURA_HD void write_set(const ThreadGroup& group, const WorldView& world, int agent, const NearPlace& place,
-                            EntitySet set) const {
+  template <typename ThreadGroup, typename Observation>
+  PICTURA_HD static void write_set(const ThreadGroup& group, const WorldView& world, int agent, const NearPlace& place,
+                                   EntitySet set, const SetRows& out, const Observation& observation) {
     const int slot = world.first_slot + agent;
-    const SetRows out = set_rows(arrays.observations, slot, set);
     float* rows = group.staging();
     int count = 0;
     if (observes(world, agent)) {
       const EgoFrame frame = ego_frame(world.agents, slot);
       if (set == EntitySet::partners) {
-        count = observe_partners(world, agent, frame, rows, group);
+        count = observation.observe_partners(world, agent, frame, rows, group);
       } else if (set == EntitySet::controls) {
         count = observe_controls(world, slot, place, frame, rows, group);
       } else {
         count = collect_pieces(group, pieces_near(world.map, place, set), frame, out.capacity, rows);
       }
     }
-    const int end = max_of(count, *out.count);
+    const int end = max_of(count, observation.num_filled(out));
     group.sync();
     group.write(rows, count * out.features, end * out.features, out.capacity * out.features, out.rows);
     if (group.rank() == 0) *out.count = count;
@@ -473,6 +471,22 @@ struct WriteObservation {
       }
     }
     return count;
+  }
+};
+
+/// Writes a slot's view and observation.
+struct WriteObservation {
+  SimulatorArrays arrays;
+  static constexpr int kStaging = ObservationWriter::kStaging;
+
+  template <typename ThreadGroup>
+  PICTURA_HD void operator()(const ThreadGroup& group, int slot) const {
+    const WorldView world = arrays.world(arrays.world_of_slot[slot]);
+    const int agent = slot - world.first_slot;
+    observe_own(world, agent, slot, arrays.observations, group);
+    if (group.rank() == group.size() - 1) arrays.views[slot] = view_of(world, agent);
+    if (!arrays.entity_sets) return;
+    ObservationWriter::write_sets(group, world, agent, StepObservation{}, arrays.observations, slot);
   }
 };
 
@@ -544,6 +558,59 @@ void launch_edit(const Launch& launch, const SimulatorArrays& arrays, const Stat
   launch.threads(edit.count, CheckEdit{arrays, edit});
   launch.threads(edit.count, ApplyEdit{{arrays, edit}});
   launch_write_observations(launch, arrays);
+}
+
+/// Finds the first query with a fault.
+struct CheckQueries {
+  SimulatorArrays arrays;
+  ObservationQueries asked;
+  PICTURA_HD int64_t fault(int i) const {
+    return find_query_fault(asked, i, arrays.num_slots,
+                            [this](int slot) { return arrays.world(arrays.world_of_slot[slot]); });
+  }
+  template <typename Atomics>
+  PICTURA_HD void operator()(const Atomics& atomics, int i) const {
+    if (fault(i) != kNoQueryFault) atomics.lower(arrays.wrong_element, i);
+  }
+};
+
+/// Keeps what is wrong with that query until the host looks.
+struct LatchQueryFault {
+  CheckQueries check;
+  template <typename Atomics>
+  PICTURA_HD void operator()(const Atomics&, int) const {
+    const int32_t wrong = *check.arrays.wrong_element;
+    if (wrong != kNoSlot && *check.arrays.wrong_query == kNoQueryFault) *check.arrays.wrong_query = check.fault(wrong);
+  }
+};
+
+/// answer_query(), unless there is a fault in any.
+struct AnswerQueries {
+  SimulatorArrays arrays;
+  ObservationQueries asked;
+  static constexpr int kStaging = ObservationWriter::kStaging;
+
+  template <typename ThreadGroup>
+  PICTURA_HD void operator()(const ThreadGroup& group, int i) const {
+    if (*arrays.wrong_element != kNoSlot) return;
+    const ObservationQuery& query = asked.queries[static_cast<size_t>(i)];
+    const WorldView world = arrays.world(arrays.world_of_slot[query.slot]);
+    const int agent = query.slot - world.first_slot;
+    observe_own(world, agent, i, asked.out, group);
+    if (!arrays.entity_sets) return;
+    ObservationWriter::write_sets(group, world, agent, QueriedObservation(asked, query), asked.out, i);
+    if (group.rank() == 0) clear_other_counts(asked.out, i);
+  }
+};
+
+template <typename Launch>
+void launch_queries(const Launch& launch, const SimulatorArrays& arrays, const ObservationQueries& asked) {
+  const auto count = static_cast<int32_t>(asked.queries.size());
+  if (count == 0) return;
+  launch.fill(arrays.wrong_element, sizeof(int32_t), kNoSlot & 0xFF);
+  launch.threads(count, CheckQueries{arrays, asked});
+  launch.threads(1, LatchQueryFault{{arrays, asked}});
+  launch.template groups<kWarp>(count, AnswerQueries{arrays, asked});
 }
 
 /// Episode 0 of `seed` in the worlds of the mask, or in all where it is null.

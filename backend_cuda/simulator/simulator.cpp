@@ -33,6 +33,8 @@ class SimulatorCuda final : public Simulator {
     *rejected_command_->host() = kNothingRejected;
     wrong_edit_ = std::make_unique<MappedValue<int64_t>>();
     *wrong_edit_->host() = kNothingWrong;
+    wrong_query_ = std::make_unique<MappedValue<int64_t>>();
+    *wrong_query_->host() = kNoQueryFault;
     allocate(setup_.needs());
     begin(nullptr);
     PICTURA_CUDA(cudaDeviceSynchronize());  // so that it can be used on any stream
@@ -166,6 +168,12 @@ class SimulatorCuda final : public Simulator {
     cuda::launch_edit(arrays(), edit, side_->streams_from(handle_of(stream)));
     PICTURA_CUDA(cudaGetLastError());
   }
+  void answer_queries(const ObservationQueries& asked, Stream stream) override {
+    const DeviceGuard guard(device_);
+    throw_rejected();
+    cuda::launch_queries(arrays(), asked, side_->streams_from(handle_of(stream)));
+    PICTURA_CUDA(cudaGetLastError());
+  }
   void begin_episodes(const uint8_t* world_mask, uint64_t seed, Stream stream) {
     const DeviceGuard guard(device_);
     throw_rejected();
@@ -254,6 +262,7 @@ class SimulatorCuda final : public Simulator {
 
   void throw_rejected() {
     throw_wrong_edit();
+    throw_wrong_query();
     const int64_t rejected = *rejected_command_->host();
     if (rejected == kNothingRejected) return;
     *rejected_command_->host() = kNothingRejected;
@@ -264,6 +273,12 @@ class SimulatorCuda final : public Simulator {
     if (fault == kNothingWrong) return;
     *wrong_edit_->host() = kNothingWrong;
     fail("set_state: in an earlier call: {}", edit_fault_text(fault, num_slots()));
+  }
+  void throw_wrong_query() {
+    const int64_t fault = *wrong_query_->host();
+    if (fault == kNoQueryFault) return;
+    *wrong_query_->host() = kNoQueryFault;
+    fail("observe: in an earlier call: {}", query_fault_text(fault, num_slots()));
   }
 
   void put_scratch(cudaStream_t stream) {
@@ -341,6 +356,7 @@ class SimulatorCuda final : public Simulator {
     arrays.first_element = scratch_.first_element.data();
     arrays.wrong_element = scratch_.wrong_element.data();
     arrays.wrong_edit = wrong_edit_->device();
+    arrays.wrong_query = wrong_query_->device();
     return arrays;
   }
 
@@ -357,7 +373,7 @@ class SimulatorCuda final : public Simulator {
   DeviceResults results_;
   DeviceScratch scratch_;
   std::unique_ptr<SideStream> side_;
-  std::unique_ptr<MappedValue<int64_t>> rejected_command_, wrong_edit_;
+  std::unique_ptr<MappedValue<int64_t>> rejected_command_, wrong_edit_, wrong_query_;
   SceneBatch scene_;
 };
 

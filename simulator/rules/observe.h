@@ -163,6 +163,17 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
   }
 }
 
+/// The speed of a world's box as others observe it: parked cars have none.
+PICTURA_HD inline float observed_speed_mps(const WorldView& world, int box) {
+  const bool moves = world.options.auxiliary_observations && box < world.num_agents;
+  return moves ? world.agents.speed_mps[world.first_slot + box] : 0.0f;
+}
+
+PICTURA_HD inline void observe_partner(const AgentBox& box, float speed_mps, const RowFrame& frame, float* out) {
+  store8(observe_box(box, frame), out);
+  out[7] = speed_mps * per(kScaleSpeed_mps);
+}
+
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD int observe_partners(const WorldView& world, int agent, const EgoFrame& frame, float* rows,
                                 const ThreadGroup& group = {}) {
@@ -170,11 +181,8 @@ PICTURA_HD int observe_partners(const WorldView& world, int agent, const EgoFram
   const int count = nearest.count();
   const RowFrame row_frame(frame);
   for (int i = group.rank(); i < count; i += group.size()) {
-    float* out = rows + i * kPartnerFeatures;
     const int other = nearest.item(i);
-    const bool moves = world.options.auxiliary_observations && other < world.num_agents;
-    store8(observe_box(world.boxes[other], row_frame), out);
-    out[7] = moves ? world.agents.speed_mps[world.first_slot + other] * per(kScaleSpeed_mps) : 0.0f;
+    observe_partner(world.boxes[other], observed_speed_mps(world, other), row_frame, rows + i * kPartnerFeatures);
   }
   return count;
 }
@@ -296,26 +304,20 @@ PICTURA_HD int observe_controls(const WorldView& world, int slot, const NearPlac
   return count;
 }
 
-/// Zeros a set's rows from `count` to what the last observation of the slot filled.
-PICTURA_HD inline void pad_set(float* out, int features, int count, int32_t* filled_inout) {
-  for (int i = count * features; i < *filled_inout * features; ++i) out[i] = 0.0f;
-  *filled_inout = count;
-}
-
 /// Whether anybody learns from or acts on the agent's observation: it drives, or this is its last one.
 PICTURA_HD inline bool observes(const WorldView& world, int agent) {
   return is_active(world, agent) || (world.agents.events[world.first_slot + agent] & kInfractions) != 0;
 }
 
-/// What is no set: all zeros for the absent and for those that halted in an earlier step.
+/// What is no set, to that row of `out`: all zeros for the absent and for those that halted in an earlier step.
 template <typename ThreadGroup = SingleThread>
-PICTURA_HD void observe_own(const WorldView& world, int agent, const ObservationView& out,
+PICTURA_HD void observe_own(const WorldView& world, int agent, int row, const ObservationView& out,
                             const ThreadGroup& group = {}) {
   const int slot = world.first_slot + agent;
-  const size_t row = static_cast<size_t>(slot);
-  float* ego = out.ego.data() + row * kEgoFeatures;
-  float* conditioning = out.conditioning.data() + row * kNumConditioning;
-  float* waypoints = out.waypoints.data() + row * kNumWaypoints * kWaypointFeatures;
+  const size_t at = static_cast<size_t>(row);
+  float* ego = out.ego.data() + at * kEgoFeatures;
+  float* conditioning = out.conditioning.data() + at * kNumConditioning;
+  float* waypoints = out.waypoints.data() + at * kNumWaypoints * kWaypointFeatures;
   if (observes(world, agent)) {
     if (group.rank() == 0) observe_ego(world, slot, ego);
     observe_conditioning(world, slot, conditioning, group);
@@ -332,15 +334,15 @@ PICTURA_HD inline int num_observed_sets(const ObservationView& out) {
   return out.walls.empty() ? static_cast<int>(EntitySet::walls) : kNumEntitySets;
 }
 
-/// Where a set of one slot is written.
+/// Where a set of one observation is written.
 struct SetRows {
   float* rows = nullptr;
   int features = 0, capacity = 0;
   int32_t* count = nullptr;
 };
 
-PICTURA_HD inline SetRows set_rows(const ObservationView& out, int slot, EntitySet set) {
-  const size_t row = static_cast<size_t>(slot);
+PICTURA_HD inline SetRows set_rows(const ObservationView& out, int observation, EntitySet set) {
+  const size_t row = static_cast<size_t>(observation);
   int32_t* count = out.set_counts.data() + row * kNumEntitySets + static_cast<int>(set);
   switch (set) {
     case EntitySet::partners:
@@ -371,33 +373,48 @@ PICTURA_HD inline PieceList pieces_near(const MapView& map, const NearPlace& pla
   }
 }
 
+/// The observation that each step writes: of all who are there, over the one of the step before.
+struct StepObservation {
+  /// How many rows may hold more than zeros.
+  PICTURA_HD static int num_filled(const SetRows& set) { return *set.count; }
+  template <typename ThreadGroup>
+  PICTURA_HD static int observe_partners(const WorldView& world, int agent, const EgoFrame& frame, float* rows,
+                                         const ThreadGroup& group) {
+    return pictura::observe_partners(world, agent, frame, rows, group);
+  }
+};
+
 /// One entity set: empty for the absent and for those that halted in an earlier step.
-PICTURA_HD inline void observe_set(const WorldView& world, int agent, const NearPlace& place, EntitySet set,
-                                   const ObservationView& out) {
+template <typename Observation>
+PICTURA_HD void observe_set(const WorldView& world, int agent, const NearPlace& place, EntitySet set,
+                            const SetRows& out, const Observation& observation) {
   const int slot = world.first_slot + agent;
-  const SetRows rows = set_rows(out, slot, set);
   int count = 0;
   if (observes(world, agent)) {
     const EgoFrame frame = ego_frame(world.agents, slot);
     if (set == EntitySet::partners) {
-      count = observe_partners(world, agent, frame, rows.rows);
+      count = observation.observe_partners(world, agent, frame, out.rows, SingleThread{});
     } else if (set == EntitySet::controls) {
-      count = observe_controls(world, slot, place, frame, rows.rows);
+      count = observe_controls(world, slot, place, frame, out.rows);
     } else {
-      count = observe_pieces(pieces_near(world.map, place, set), frame, rows.capacity, rows.rows);
+      count = observe_pieces(pieces_near(world.map, place, set), frame, out.capacity, out.rows);
     }
   }
-  pad_set(rows.rows, rows.features, count, rows.count);
+  const int end = observation.num_filled(out) * out.features;
+  for (int i = count * out.features; i < end; ++i) out.rows[i] = 0.0f;
+  *out.count = count;
 }
 
 /// Writes the whole observations of agents [begin, end) of a world; sets if `entity_sets`. Set by set, so that what one
 /// kind is read from stays in the cache.
 PICTURA_HD inline void observe(const WorldView& world, int begin, int end, bool entity_sets,
                                const ObservationView& out) {
-  for (int agent = begin; agent < end; ++agent) observe_own(world, agent, out);
-  for (int set = 0; entity_sets && set < num_observed_sets(out); ++set) {
+  for (int agent = begin; agent < end; ++agent) observe_own(world, agent, world.first_slot + agent, out);
+  for (int i = 0; entity_sets && i < num_observed_sets(out); ++i) {
+    const auto set = static_cast<EntitySet>(i);
     for (int agent = begin; agent < end; ++agent) {
-      observe_set(world, agent, near_place(world, world.first_slot + agent), static_cast<EntitySet>(set), out);
+      const int slot = world.first_slot + agent;
+      observe_set(world, agent, near_place(world, slot), set, set_rows(out, slot, set), StepObservation{});
     }
   }
 }

@@ -321,6 +321,7 @@ class StillSimulator final : public Simulator {
   StepResult step_commands(Span<const Command>, Stream) override { return {}; }
   void reset_worlds(Span<const uint8_t>, uint64_t, Stream) override {}
   void apply_edit(const StateEdit&, Stream) override {}
+  void answer_queries(const ObservationQueries&, Stream) override {}
 
   SimulatorConfig config_;
   SimulatorTotals totals_;

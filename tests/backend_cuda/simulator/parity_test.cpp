@@ -14,6 +14,7 @@
 #include "pictura/tests/backend_cuda/device_test.h"
 #include "pictura/tests/backend_cuda/on_host.h"
 #include "pictura/tests/simulator/random_edit.h"
+#include "pictura/tests/simulator/random_queries.h"
 #include "pictura/tests/simulator/same_bits.h"
 #include "pictura/tests/support/error_message.h"
 
@@ -366,6 +367,113 @@ TEST_F(CudaSimulatorTest, RefusesAWrongEditAsTheCpuDoes) {
             "set_state: in an earlier call: " + expected.substr(std::string("set_state: ").size()));
   EXPECT_EQ(cuda->save(), before);
   EXPECT_THAT(test::message_of([&] { cuda->set_state(slots, {}); }), HasSubstr("on cuda:0, got i32 [3] on cpu"));
+}
+
+/// Queries in device memory, and arrays for their answers.
+class DeviceQueries {
+ public:
+  DeviceQueries(const testing::RandomQueries& drawn, testing::AnswerMemory* first_values)
+      : queries_(Span<const ObservationQuery>(drawn.queries)),
+        hidden_(Span<const int32_t>(drawn.hidden)),
+        inserted_(Span<const InsertedBox>(drawn.inserted)) {
+#define X(name, type, rows, features, part, comment) \
+  name##_ = DeviceBuffer<type>(Span<const type>(first_values->view().name));
+    PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
+  }
+  void ask(Simulator* cuda, Stream stream = {}) {
+    cuda->observe(queries_.span(), hidden_.span(), inserted_.span(), out(), stream);
+  }
+  ObservationView out() {
+#define X(name, type, rows, features, part, comment) {name##_.data(), name##_.size()},
+    return {PICTURA_OBSERVATION_ARRAYS(X)};
+#undef X
+  }
+
+ private:
+  DeviceBuffer<ObservationQuery> queries_;
+  DeviceBuffer<int32_t> hidden_;
+  DeviceBuffer<InsertedBox> inserted_;
+#define X(name, type, rows, features, part, comment) DeviceBuffer<type> name##_;
+  PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
+};
+
+TEST_F(CudaSimulatorTest, AnswersQueriesAsTheCpuDoes) {
+  const Maps maps{load_map("procedural:1"), load_map("procedural:2")};
+  const std::vector<WorldSpec> worlds = draw_worlds(3, 400, 1, 120, 2);
+  for (uint32_t kind = 0; kind < 4; ++kind) {
+    SCOPED_TRACE(kind);
+    SimulatorConfig config;
+    config.auxiliary_observations = kind % 2 == 0;
+    config.wall_observations = kind < 2;
+    config.vector_observations = kind < 3;
+    const auto cpu = make_simulator("cpu", config, maps, worlds);
+    const auto cuda = make_simulator("cuda", config, maps, worlds);
+    run_same(cpu.get(), cuda.get(), 40, 40);
+    const testing::RandomQueries drawn(cpu.get(), 2000, kind);
+    testing::AnswerMemory answers(drawn.queries.size(), config);
+    DeviceQueries on_device(drawn, &answers);
+    cpu->observe(drawn.queries, drawn.hidden, drawn.inserted, answers.view());
+    on_device.ask(cuda.get());
+    cuda->check();
+    EXPECT_EQ(testing::first_difference(answers.view(), HostObservation(on_device.out()).view()), "");
+    expect_same_view(cpu.get(), cuda.get(), 40);
+  }
+}
+
+TEST_F(CudaSimulatorTest, AGraphAnswersQueries) {
+  const Maps maps{load_map("procedural:1")};
+  const std::vector<WorldSpec> worlds = draw_worlds(3, 100, 1, 60, 1);
+  const auto cpu = make_simulator("cpu", {}, maps, worlds);
+  const auto cuda = make_simulator("cuda", {}, maps, worlds);
+  const testing::RandomQueries drawn(cpu.get(), 100, 1);
+  testing::AnswerMemory answers(drawn.queries.size(), cpu->config());
+  DeviceQueries on_device(drawn, &answers);
+  cudaStream_t stream = nullptr;
+  PICTURA_CUDA(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
+  cudaGraph_t graph = nullptr;
+  PICTURA_CUDA(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal));
+  on_device.ask(cuda.get(), {stream});
+  PICTURA_CUDA(cudaStreamEndCapture(stream, &graph));
+  cudaGraphExec_t executable = nullptr;
+  PICTURA_CUDA(cudaGraphInstantiate(&executable, graph, 0));
+  for (uint32_t round = 0; round < 3; ++round) {
+    step_same(cpu.get(), cuda.get(), 10, 10 * round);
+    PICTURA_CUDA(cudaGraphLaunch(executable, stream));
+    cuda->check({stream});
+    cpu->observe(drawn.queries, drawn.hidden, drawn.inserted, answers.view());
+    EXPECT_EQ(testing::first_difference(answers.view(), HostObservation(on_device.out()).view()), "") << round;
+  }
+  PICTURA_CUDA(cudaGraphExecDestroy(executable));
+  PICTURA_CUDA(cudaGraphDestroy(graph));
+  PICTURA_CUDA(cudaStreamDestroy(stream));
+}
+
+TEST_F(CudaSimulatorTest, RefusesAWrongQueryAsTheCpuDoes) {
+  const Maps maps{load_map("procedural:1")};
+  const std::vector<WorldSpec> worlds{{0, 20, 0}, {0, 20, 1}};
+  const auto cpu = make_simulator("cpu", {}, maps, worlds);
+  const auto cuda = make_simulator("cuda", {}, maps, worlds);
+  testing::RandomQueries drawn(cpu.get(), 30, 1);
+  drawn.queries[7].slot = 3;
+  drawn.queries[7].hidden_begin = 0;
+  drawn.queries[7].hidden_end = static_cast<int32_t>(drawn.hidden.size());
+  drawn.queries[20].slot = -5;
+  testing::AnswerMemory answers(drawn.queries.size(), cpu->config());
+  DeviceQueries on_device(drawn, &answers);
+  const std::string expected =
+      test::message_of([&] { cpu->observe(drawn.queries, drawn.hidden, drawn.inserted, answers.view()); });
+  EXPECT_THAT(expected, HasSubstr("observe: query 7: hidden: expected boxes of the slot's own world"));
+  on_device.ask(cuda.get());
+  EXPECT_EQ(test::message_of([&] { cuda->check(); }),
+            "observe: in an earlier call: " + expected.substr(std::string("observe: ").size()));
+  EXPECT_EQ(testing::first_difference(answers.view(), HostObservation(on_device.out()).view()), "")
+      << "nothing is written";
+  ObservationView out = on_device.out();
+  out.lanes = {out.lanes.data() + 1, out.lanes.size()};
+  EXPECT_EQ(test::message_of([&] { cuda->observe(Span<const ObservationQuery>(nullptr, 30), {}, {}, out); }),
+            "observe: out: lanes: expected an address that is a multiple of 16 bytes");
 }
 
 TEST_F(CudaSimulatorTest, TakesCommandsAndControllersInAGraph) {

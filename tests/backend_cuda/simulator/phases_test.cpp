@@ -9,6 +9,7 @@
 #include "pictura/simulator/agent_state_arrays.h"
 #include "pictura/tests/backend_cuda/simulator/shuffled_executor.h"
 #include "pictura/tests/simulator/random_edit.h"
+#include "pictura/tests/simulator/random_queries.h"
 #include "pictura/tests/simulator/same_bits.h"
 #include "pictura/tests/simulator/test_maps.h"
 
@@ -171,6 +172,56 @@ TEST(Phases, RefuseAWrongEditAndChangeNothing) {
       << "the first one stands";
   executor.set_state(state_edit(good_slots, std::vector<NamedArray>{{"x_m", Array(x_m.data(), {1}, {})}}, 40, {}));
   EXPECT_NE(executor.save(), before);
+}
+
+TEST(Phases, AnswerQueriesAsTheCpuExecutorDoes) {
+  SimulatorConfig config;
+  config.pedestrian_fraction = config.cyclist_fraction = 0.2f;
+  config.parked_cars = 12;
+  const std::vector<std::shared_ptr<const RoadMap>> maps{load_map("procedural:1"), testing::stadium(200, 2)};
+  const std::vector<WorldSpec> worlds = draw_worlds(5, 200, 1, 60, 2);
+  for (uint32_t kind = 0; kind < 4; ++kind) {
+    SCOPED_TRACE(kind);
+    config.auxiliary_observations = kind % 2 == 0;
+    config.wall_observations = kind < 2;
+    config.vector_observations = kind < 3;
+    const auto cpu = make_simulator("cpu", config, maps, worlds);
+    testing::ShuffledExecutor other(config, maps, worlds, 9 + kind);
+    for (uint32_t step = 0; step < 30; ++step) {
+      const std::vector<int32_t> actions = testing::mixed_actions(cpu->num_slots(), step);
+      cpu->step(actions);
+      other.step(actions);
+    }
+    const testing::RandomQueries drawn(cpu.get(), 300, kind);
+    testing::AnswerMemory expected(drawn.queries.size(), config), answers(drawn.queries.size(), config);
+    cpu->observe(drawn.queries, drawn.hidden, drawn.inserted, expected.view());
+    other.observe(drawn.asked(answers.view()));
+    EXPECT_EQ(testing::first_difference(expected.view(), answers.view()), "");
+    EXPECT_EQ(other.wrong_query(), kNoQueryFault);
+    expect_same_view(cpu.get(), &other);
+  }
+}
+
+TEST(Phases, RefuseAWrongQueryAndWriteNothing) {
+  const SimulatorConfig config = testing::cars();
+  testing::ShuffledExecutor executor(config, {testing::stadium(200, 2)}, {{0, 30, 0}, {0, 10, 1}}, 4);
+  std::vector<ObservationQuery> queries(6);
+  const std::vector<int32_t> hidden{1, 35};
+  testing::AnswerMemory answers(queries.size(), config), untouched(queries.size(), config);
+  const auto text_after = [&] {
+    executor.observe({queries, hidden, {}, answers.view()});
+    EXPECT_EQ(testing::first_difference(answers.view(), untouched.view()), "");
+    return query_fault_text(executor.wrong_query(), 40);
+  };
+  queries[4].hidden_end = 2;
+  queries[5].slot = 40;
+  const std::string expected = "query 4: hidden: expected boxes of the slot's own world, got box 35 of the scene";
+  EXPECT_EQ(text_after(), expected);
+  queries[4].hidden_end = 1;
+  EXPECT_EQ(text_after(), expected) << "the first one stands";
+  queries[5].slot = 39;
+  executor.observe({queries, hidden, {}, answers.view()});
+  EXPECT_NE(testing::first_difference(answers.view(), untouched.view()), "");
 }
 
 TEST(Phases, CarlaTowns) {

@@ -81,7 +81,7 @@ struct ShuffledLaunch {
   template <int kGroup, typename Phase>
   void groups(int32_t count, const Phase& phase) const {
     shuffled(random, count, [&phase](int i) {
-      std::array<float, cuda::WriteObservation::kStaging> rows{};
+      std::array<float, cuda::ObservationWriter::kStaging> rows{};
       HostThreadGroup group;
       group.rows = rows.data();
       phase(group, i);
@@ -146,6 +146,8 @@ class ShuffledExecutor {
   }
   void set_state(const StateEdit& edit) { launch_edit(ShuffledLaunch{&random_}, arrays(), edit); }
   int64_t wrong_edit() const { return wrong_edit_; }
+  void observe(const ObservationQueries& asked) { launch_queries(ShuffledLaunch{&random_}, arrays(), asked); }
+  int64_t wrong_query() const { return wrong_query_; }
 
   template <typename CommandType>
   void step(const std::vector<CommandType>& commands) {
@@ -188,6 +190,7 @@ class ShuffledExecutor {
     arrays.first_element = first_element_.data();
     arrays.wrong_element = &wrong_element_;
     arrays.wrong_edit = &wrong_edit_;
+    arrays.wrong_query = &wrong_query_;
     return arrays;
   }
 
@@ -206,7 +209,7 @@ class ShuffledExecutor {
   std::vector<uint8_t> began_, prepares_;
   std::vector<int32_t> first_element_;
   int32_t rejected_slot_ = 0, wrong_element_ = 0;
-  int64_t wrong_edit_ = kNothingWrong;
+  int64_t wrong_edit_ = kNothingWrong, wrong_query_ = kNoQueryFault;
   int64_t rejected_command_ = kNothingRejected;
 };
 

@@ -1,0 +1,153 @@
+// What an agent would observe if some boxes were not there and others were: a world's observation with other partners.
+#pragma once
+
+#include "pictura/simulator/observation_query.h"
+#include "pictura/simulator/rules/observe.h"
+
+namespace pictura {
+
+/// The observation that one query asks for, in a row that may hold anything.
+class QueriedObservation {
+ public:
+  PICTURA_HD QueriedObservation(const ObservationQueries& asked, const ObservationQuery& query)
+      : hidden_(part(asked.hidden, query.hidden_begin, query.hidden_end)),
+        inserted_(part(asked.inserted, query.inserted_begin, query.inserted_end)),
+        leaves_gaps_(query.leaves_gaps != 0) {}
+
+  PICTURA_HD static int num_filled(const SetRows& set) { return set.capacity; }
+
+  template <typename ThreadGroup>
+  PICTURA_HD int observe_partners(const WorldView& world, int agent, const EgoFrame& frame, float* rows,
+                                  const ThreadGroup& group) const {
+    const auto nearest = nearest_partners(world, agent, frame.origin_m.xy(), group);
+    const int count = nearest.count();
+    const RowFrame row_frame(frame);
+    for (int i = group.rank(); i < count; i += group.size()) {
+      float* out = rows + i * kPartnerFeatures;
+      const int item = nearest.item(i);
+      if (item >= world.num_boxes) {
+        const InsertedBox& one = inserted_[static_cast<size_t>(item - world.num_boxes)];
+        observe_partner(one.box, world.options.auxiliary_observations ? one.speed_mps : 0.0f, row_frame, out);
+      } else if (leaves_gaps_ && hides(world, item)) {
+        for (int f = 0; f < kPartnerFeatures; ++f) out[f] = 0.0f;
+      } else {
+        observe_partner(world.boxes[item], observed_speed_mps(world, item), row_frame, out);
+      }
+    }
+    return count;
+  }
+
+ private:
+  template <typename T>
+  PICTURA_HD static Span<T> part(Span<T> list, int32_t begin, int32_t end) {
+    return list.subspan(static_cast<size_t>(begin), static_cast<size_t>(end - begin));
+  }
+  PICTURA_HD bool hides(const WorldView& world, int box) const {
+    for (const int32_t hidden : hidden_) {
+      if (hidden == world.first_box + box) return true;
+    }
+    return false;
+  }
+
+  /// As pictura::nearest_partners(), of all boxes but those left out, and of the inserted ones, whose items follow the
+  /// world's.
+  template <typename ThreadGroup>
+  PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin, const ThreadGroup& group) const {
+    typename ThreadGroup::template Nearest<kMaxPartners> nearest;
+    const int num_items = world.num_boxes + static_cast<int>(inserted_.size());
+    for (int first = 0; first < num_items; first += group.size()) {
+      const int item = min_of(first + group.rank(), num_items - 1);
+      const bool is_inserted = item >= world.num_boxes;
+      const AgentBox& box =
+          is_inserted ? inserted_[static_cast<size_t>(item - world.num_boxes)].box : world.boxes[item];
+      const Vec2 apart = box.center_m.xy() - origin;
+      const float d2 = length2(apart.x, apart.y);
+      const bool is_there = is_inserted || (item != agent && (leaves_gaps_ || !hides(world, item)));
+      nearest.offer(first + group.rank() < num_items && box.drawn && is_there && d2 < square(kPartnerRange_m), d2,
+                    item);
+    }
+    nearest.settle();
+    return nearest;
+  }
+
+  Span<const int32_t> hidden_;
+  Span<const InsertedBox> inserted_;
+  bool leaves_gaps_ = false;
+};
+
+/// The counts of sets that no simulator of this configuration writes.
+PICTURA_HD inline void clear_other_counts(const ObservationView& out, int row) {
+  int32_t* counts = out.set_counts.data() + static_cast<size_t>(row) * kNumEntitySets;
+  for (int set = num_observed_sets(out); set < kNumEntitySets; ++set) counts[set] = 0;
+}
+
+/// Writes the whole observation that a query, in which there is no fault, asks of its slot's world; sets if
+/// `entity_sets`.
+PICTURA_HD inline void answer_query(const WorldView& world, const ObservationQueries& asked, int i, bool entity_sets) {
+  const ObservationQuery& query = asked.queries[static_cast<size_t>(i)];
+  const int agent = query.slot - world.first_slot;
+  const QueriedObservation observation(asked, query);
+  observe_own(world, agent, i, asked.out);
+  if (!entity_sets) return;
+  const NearPlace place = near_place(world, query.slot);
+  for (int k = 0; k < num_observed_sets(asked.out); ++k) {
+    const auto set = static_cast<EntitySet>(k);
+    observe_set(world, agent, place, set, set_rows(asked.out, i, set), observation);
+  }
+  clear_other_counts(asked.out, i);
+}
+
+/// What is wrong with a query, in one word that a host reads whole: what, which query, and the value.
+enum class QueryFault : int32_t {
+  slot,
+  hidden_begin,
+  hidden_end,
+  hidden_box,
+  inserted_begin,
+  inserted_end,
+  inserted_box
+};
+constexpr int64_t kNoQueryFault = -1;
+constexpr int kMaxQueries = 1 << 24;  // of one call
+PICTURA_HD constexpr int64_t query_fault(QueryFault what, int32_t query, int32_t value) {
+  return (int64_t{static_cast<int32_t>(what)} << 56) | (int64_t{query} << 32) | static_cast<uint32_t>(value);
+}
+
+/// Whether all that is observed of a box are numbers.
+PICTURA_HD inline bool is_sound(const InsertedBox& one) {
+  float values[8];
+  store8(load8(&one.box.center_m.x), values);
+  bool sound = is_finite(one.speed_mps);
+  for (const float value : values) sound = sound && is_finite(value);
+  return sound;
+}
+
+/// world_of(slot) is its WorldView.
+template <typename WorldOf>
+PICTURA_HD int64_t find_query_fault(const ObservationQueries& asked, int i, int num_slots, const WorldOf& world_of) {
+  const ObservationQuery& query = asked.queries[static_cast<size_t>(i)];
+  const auto fault = [i](QueryFault what, int32_t value) { return query_fault(what, i, value); };
+  if (query.slot < 0 || query.slot >= num_slots) return fault(QueryFault::slot, query.slot);
+  const auto is_between = [](int32_t value, int32_t low, size_t high) {
+    return value >= low && static_cast<size_t>(value) <= high;
+  };
+  const size_t num_hidden = asked.hidden.size(), num_inserted = asked.inserted.size();
+  const int32_t hidden_begin = query.hidden_begin, inserted_begin = query.inserted_begin;
+  if (!is_between(hidden_begin, 0, num_hidden)) return fault(QueryFault::hidden_begin, hidden_begin);
+  if (!is_between(query.hidden_end, hidden_begin, num_hidden)) return fault(QueryFault::hidden_end, query.hidden_end);
+  if (!is_between(inserted_begin, 0, num_inserted)) return fault(QueryFault::inserted_begin, inserted_begin);
+  if (!is_between(query.inserted_end, inserted_begin, num_inserted)) {
+    return fault(QueryFault::inserted_end, query.inserted_end);
+  }
+  const WorldView world = world_of(query.slot);
+  for (int32_t k = hidden_begin; k < query.hidden_end; ++k) {
+    const int32_t box = asked.hidden[static_cast<size_t>(k)];
+    if (box < world.first_box || box - world.first_box >= world.num_boxes) return fault(QueryFault::hidden_box, box);
+  }
+  for (int32_t k = inserted_begin; k < query.inserted_end; ++k) {
+    if (!is_sound(asked.inserted[static_cast<size_t>(k)])) return fault(QueryFault::inserted_box, k);
+  }
+  return kNoQueryFault;
+}
+
+}  // namespace pictura
