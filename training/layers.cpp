@@ -488,7 +488,7 @@ at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at
     else if (keeps_gradients({x, weight, bias}))
       out = HostConvolution::apply(channels_last(x), padded, bias, stride);
     else
-      out = HostConvolution::compute(channels_last(x), padded, bias, stride, /*before_out=*/nullptr);
+      out = HostConvolution::compute(channels_last(x), padded, bias, stride, /*slope_out=*/nullptr);
     return out.permute({0, 3, 1, 2});
   }
   if (!x.is_cuda() || !NetworkPasses::gelu_takes(bias.size(0))) {
