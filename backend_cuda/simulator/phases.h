@@ -517,14 +517,22 @@ struct MarkEdit {
   }
 };
 
-/// Finds the first element of an edit with a fault.
-struct CheckEdit {
+PICTURA_HD inline int64_t find_fault(const SimulatorArrays& arrays, const StateEdit& edit, int i) {
+  return find_edit_fault(edit, i, arrays.num_slots, arrays.first_element,
+                         [&arrays](int slot) { return arrays.world(arrays.world_of_slot[slot]); });
+}
+PICTURA_HD inline int64_t find_fault(const SimulatorArrays& arrays, const ObservationQueries& asked, int i) {
+  return find_query_fault(asked, i, arrays.num_slots,
+                          [&arrays](int slot) { return arrays.world(arrays.world_of_slot[slot]); });
+}
+static_assert(kNoQueryFault == kNothingWrong);
+
+/// Finds the first element with a fault of an edit, or of queries.
+template <typename Request>
+struct CheckRequest {
   SimulatorArrays arrays;
-  StateEdit edit;
-  PICTURA_HD int64_t fault(int i) const {
-    return find_edit_fault(edit, i, arrays.num_slots, arrays.first_element,
-                           [this](int slot) { return arrays.world(arrays.world_of_slot[slot]); });
-  }
+  Request request;
+  PICTURA_HD int64_t fault(int i) const { return find_fault(arrays, request, i); }
   template <typename Atomics>
   PICTURA_HD void operator()(const Atomics& atomics, int i) const {
     if (fault(i) != kNothingWrong) atomics.lower(arrays.wrong_element, i);
@@ -533,7 +541,7 @@ struct CheckEdit {
 
 /// Puts the agents of an edit without faults into their worlds.
 struct ApplyEdit {
-  CheckEdit check;
+  CheckRequest<StateEdit> check;
   template <typename Atomics>
   PICTURA_HD void operator()(const Atomics& atomics, int i) const {
     const SimulatorArrays& arrays = check.arrays;
@@ -541,9 +549,9 @@ struct ApplyEdit {
       if (i == 0 && *arrays.wrong_edit == kNothingWrong) *arrays.wrong_edit = check.fault(*arrays.wrong_element);
       return;
     }
-    const int slot = check.edit.slots[i], w = arrays.world_of_slot[slot];
+    const int slot = check.request.slots[i], w = arrays.world_of_slot[slot];
     const WorldView world = arrays.world(w);
-    if (const int joined = apply_edit(world, check.edit, i)) atomics.add(&arrays.spawned[w], joined);
+    if (const int joined = apply_edit(world, check.request, i)) atomics.add(&arrays.spawned[w], joined);
     const int agent = slot - world.first_slot;
     world.cell_centers[agent] = center_of(world.boxes[agent]);
   }
@@ -555,28 +563,14 @@ void launch_edit(const Launch& launch, const SimulatorArrays& arrays, const Stat
   launch.fill(arrays.first_element, static_cast<size_t>(arrays.num_slots) * sizeof(int32_t), kNoSlot & 0xFF);
   launch.fill(arrays.wrong_element, sizeof(int32_t), kNoSlot & 0xFF);
   launch.threads(edit.count, MarkEdit{arrays, edit});
-  launch.threads(edit.count, CheckEdit{arrays, edit});
+  launch.threads(edit.count, CheckRequest<StateEdit>{arrays, edit});
   launch.threads(edit.count, ApplyEdit{{arrays, edit}});
   launch_write_observations(launch, arrays);
 }
 
-/// Finds the first query with a fault.
-struct CheckQueries {
-  SimulatorArrays arrays;
-  ObservationQueries asked;
-  PICTURA_HD int64_t fault(int i) const {
-    return find_query_fault(asked, i, arrays.num_slots,
-                            [this](int slot) { return arrays.world(arrays.world_of_slot[slot]); });
-  }
-  template <typename Atomics>
-  PICTURA_HD void operator()(const Atomics& atomics, int i) const {
-    if (fault(i) != kNoQueryFault) atomics.lower(arrays.wrong_element, i);
-  }
-};
-
-/// Keeps what is wrong with that query until the host looks.
+/// Keeps what is wrong with the first query that has a fault until the host looks.
 struct LatchQueryFault {
-  CheckQueries check;
+  CheckRequest<ObservationQueries> check;
   template <typename Atomics>
   PICTURA_HD void operator()(const Atomics&, int) const {
     const int32_t wrong = *check.arrays.wrong_element;
@@ -608,7 +602,7 @@ void launch_queries(const Launch& launch, const SimulatorArrays& arrays, const O
   const auto count = static_cast<int32_t>(asked.queries.size());
   if (count == 0) return;
   launch.fill(arrays.wrong_element, sizeof(int32_t), kNoSlot & 0xFF);
-  launch.threads(count, CheckQueries{arrays, asked});
+  launch.threads(count, CheckRequest<ObservationQueries>{arrays, asked});
   launch.threads(1, LatchQueryFault{{arrays, asked}});
   launch.template groups<kWarp>(count, AnswerQueries{arrays, asked});
 }

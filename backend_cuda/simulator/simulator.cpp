@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <numeric>
+#include <optional>
 
 #include "pictura/backend_cuda/simulator/device_memory.h"
 #include "pictura/common/cuda/check.h"
@@ -261,24 +262,23 @@ class SimulatorCuda final : public Simulator {
   }
 
   void throw_rejected() {
-    throw_wrong_edit();
-    throw_wrong_query();
-    const int64_t rejected = *rejected_command_->host();
-    if (rejected == kNothingRejected) return;
-    *rejected_command_->host() = kNothingRejected;
-    fail("step: in an earlier call: {}", rejection_text(rejected));
+    if (const auto fault = take(wrong_edit_.get())) {
+      fail("set_state: in an earlier call: {}", edit_fault_text(*fault, num_slots()));
+    }
+    if (const auto fault = take(wrong_query_.get())) {
+      fail("observe: in an earlier call: {}", query_fault_text(*fault, num_slots()));
+    }
+    if (const auto rejected = take(rejected_command_.get())) {
+      fail("step: in an earlier call: {}", rejection_text(*rejected));
+    }
   }
-  void throw_wrong_edit() {
-    const int64_t fault = *wrong_edit_->host();
-    if (fault == kNothingWrong) return;
-    *wrong_edit_->host() = kNothingWrong;
-    fail("set_state: in an earlier call: {}", edit_fault_text(fault, num_slots()));
-  }
-  void throw_wrong_query() {
-    const int64_t fault = *wrong_query_->host();
-    if (fault == kNoQueryFault) return;
-    *wrong_query_->host() = kNoQueryFault;
-    fail("observe: in an earlier call: {}", query_fault_text(fault, num_slots()));
+  /// What a device has latched since the last call, if anything.
+  static std::optional<int64_t> take(MappedValue<int64_t>* latched) {
+    static_assert(kNothingRejected == kNothingWrong && kNoQueryFault == kNothingWrong);
+    const int64_t fault = *latched->host();
+    if (fault == kNothingWrong) return {};
+    *latched->host() = kNothingWrong;
+    return fault;
   }
 
   void put_scratch(cudaStream_t stream) {
