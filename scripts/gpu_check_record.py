@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Runs the commands of scripts/gpu_check and keeps their results in one JSON file, which is rewritten after each.
 
-gpu_check_record.py FILE start                         begins FILE: source hash, GPU, driver
+gpu_check_record.py FILE start [--keep]                begins FILE: source hash, GPU, driver; --keep: goes on where these are the same
 gpu_check_record.py FILE run NAME [--limit S] -- COMMAND...    seconds, and its summary or last lines
 gpu_check_record.py FILE bench NAME [--limit S] -- COMMAND...  the JSON object that it prints, even if it fails
 gpu_check_record.py FILE tests -- ctest...             counts, failed, skipped and slowest tests
@@ -64,9 +64,13 @@ def read(file):
     return json.loads(file.read_text())
 
 
-def start(file):
+def start(file, keeps):
     gpu, driver = gpu_and_driver()
-    write(file, {"complete": False, "source_hash": source_hash(), "gpu": gpu, "driver": driver})
+    head = {"source_hash": source_hash(), "gpu": gpu, "driver": driver}
+    earlier = read(file) if keeps and file.exists() else {}
+    if not head.items() <= earlier.items():
+        earlier = {}
+    write(file, {"complete": False} | head | earlier | {"complete": False})
 
 
 def finish(file):
@@ -237,11 +241,12 @@ def main():
     parser.add_argument("verb", choices=["start", "run", "bench", "tests", "finish"])
     parser.add_argument("name", nargs="?")
     parser.add_argument("--limit", type=float, metavar="S")
+    parser.add_argument("--keep", action="store_true")
     words = sys.argv[1:]
     at = words.index("--") if "--" in words else len(words)
     arguments, command = parser.parse_args(words[:at]), words[at + 1:]
     if arguments.verb == "start":
-        return start(arguments.file)
+        return start(arguments.file, arguments.keep)
     if arguments.verb == "finish":
         return finish(arguments.file)
     if arguments.verb == "tests":

@@ -265,6 +265,14 @@ class Record(unittest.TestCase):
                 status, content = self.bench(script)
                 self.assertEqual((status, "measured" in content["failed"][0]), (1, False))
 
+    def test_what_is_kept_is_of_the_same_sources(self):
+        self.bench("echo '{}'")
+        self.assertEqual(len(self.record("start", "--keep")[1]["bench"]), 1)
+        self.assertNotIn("bench", self.record("start")[1])
+        self.bench("echo '{}'")
+        (self.folder / "CMakeLists.txt").write_text("project(something)")
+        self.assertNotIn("bench", self.record("start", "--keep")[1])
+
     def test_the_source_hash_covers_paths_and_excludes_generated_files(self):
         for name in ("common/a.h", "bench/b.h"):
             (self.folder / name).parent.mkdir()
