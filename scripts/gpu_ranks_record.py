@@ -1,90 +1,240 @@
-"""What scripts/gpu_ranks does once the command is built.
+"""What scripts/gpu_ranks does once the command is built; its --help says what the steps are.
 
-Usage: gpu_ranks_record.py PICTURA RESULTS RANKS MINUTES COMMIT [ARGUMENTS of pictura train...]
+Usage: gpu_ranks_record.py --pictura FILE --results FILE [OPTIONS] -- [ARGUMENTS of pictura train...]
 """
 
+import argparse
+import csv
 import json
 import math
 import os
 import pathlib
+import signal
 import socket
+import statistics
 import struct
 import subprocess
 import sys
 import tempfile
+import time
 
 SMALL = ["--set", "simulator.num_slots=2048", "--set", "train.num_steps=32", "--set", "train.minibatch_size=16384",
          "--set", "train.schedule=constant"]  # fmt: skip
+STEPS = ["equal", "updates", "killed", "rate"]
+MINIBATCH_OF_AN_AGENT = 0.8  # transitions: 16,384 with 20,480 agents
+WARM_UP_UPDATES = 3  # kernels are compiled, and algorithms chosen, in the first ones
+GRADIENT_TOLERANCE = 1e-4  # of each parameter's largest
+END_S = 60  # within which ranks end after one was killed
 
 
-def train(pictura, size, out, *arguments):
-    """Trains on `size` GPUs of this machine; the report of rank 0. Throws where a rank fails, with what it said."""
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        port = server.getsockname()[1]
-    place = {"WORLD_SIZE": str(size), "MASTER_ADDR": "127.0.0.1", "MASTER_PORT": str(port)}
-    command = [pictura, "train", "--config", "configs/paper.toml", *arguments, "--out", str(out), "--json"]
-    processes = [
-        subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-            env={**os.environ, **place, "RANK": str(rank), "LOCAL_RANK": str(rank)},
-        )
-        for rank in range(size)
-    ]  # fmt: skip
-    results = [process.communicate() for process in processes]
-    for rank, process in enumerate(processes):
-        if process.returncode != 0:
-            raise SystemExit(f"error: gpu_ranks: rank {rank} of {size}: {results[rank][1][-2000:]}")
-    return json.loads(results[0][0])
+class Ranks:
+    """`size` processes of `pictura train`, each on a GPU of its own."""
+
+    def __init__(self, pictura, size, out, *arguments):
+        self.size, self.out = size, pathlib.Path(out)
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            port = server.getsockname()[1]
+        place = {"WORLD_SIZE": str(size), "MASTER_ADDR": "127.0.0.1", "MASTER_PORT": str(port)}
+        command = [pictura, "train", *arguments, "--out", str(out), "--json"]
+        self.processes = [
+            subprocess.Popen(
+                command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                env={**os.environ, **place, "RANK": str(rank), "LOCAL_RANK": str(rank)},
+            )
+            for rank in range(size)
+        ]  # fmt: skip
+
+    def progress(self):
+        """The whole rows of the run's curve so far."""
+        file = self.out / "progress.csv"
+        if not file.exists():
+            return []
+        with file.open(newline="") as rows:
+            return [row for row in csv.DictReader(rows) if None not in row.values()]
+
+    def report(self):
+        """The report of rank 0 once all have ended. Exits where a rank failed, with what it said."""
+        results = [process.communicate() for process in self.processes]
+        for rank, process in enumerate(self.processes):
+            if process.returncode != 0:
+                raise SystemExit(f"error: gpu_ranks: rank {rank} of {self.size}: {results[rank][1][-2000:]}")
+        return json.loads(results[0][0])
 
 
 def checkpoint_parts(path):
-    """The parameters of a checkpoint, one after the other, and the bytes of its simulator."""
+    """The first moments of a checkpoint by parameter, and the bytes of its simulator."""
     content = pathlib.Path(path).read_bytes()
     header_size = struct.unpack_from("<Q", content, 16)[0]
     header, data = json.loads(content[24 : 24 + header_size]), content[24 + header_size :]
-    parameters = []
-    for entry in header["parameters"]:
-        parameters += struct.unpack_from(f"<{math.prod(entry['shape'])}f", data, entry["offset"])
+    moments = {
+        entry["name"]: struct.unpack_from(f"<{math.prod(entry['shape'])}f", data, entry["offset"])
+        for entry in header["first_moments"]
+    }
     simulator = header["simulator"]
-    return parameters, data[simulator["offset"] : simulator["offset"] + simulator["bytes"]]
+    return moments, data[simulator["offset"] : simulator["offset"] + simulator["bytes"]]
+
+
+def largest_relative_difference(one, other):
+    """Over parameters, the largest difference in relation to the parameter's largest value; and where it is."""
+    differences = {
+        name: max(abs(a - b) for a, b in zip(values, other[name])) / max(1e-30, *map(abs, values))
+        for name, values in one.items()
+    }
+    name = max(differences, key=differences.get)
+    return name, differences[name]
+
+
+def told(report, *more):
+    return {key: report[key] for key in ("updates", "agent_steps", "agent_steps_per_s", "policy_hash", *more)}
+
+
+class Steps:
+    """Each method makes a step and returns what to record of it, and whether all was as it must be."""
+
+    def __init__(self, options, folder):
+        self.options, self.folder, self.sizes = options, folder, [1, options.ranks]
+
+    def start(self, size, name, *more):
+        if self.options.init_from and "--resume" not in more:
+            more = ["--init-from", self.options.init_from, *more]
+        arguments = ["--config", self.options.config, *more, *self.options.arguments]
+        return Ranks(self.options.pictura, size, self.folder / name, *arguments)
+
+    def equal(self):
+        # One step of the optimizer, after which the first moments are a multiple of the clipped gradient.
+        more = [*SMALL, "--set", "train.updates=1", "--set", "train.reproducible=true", "--set", "train.precision=fp32",
+                "--set", "train.update_epochs=1", "--set", "train.minibatch_size=65536"]  # fmt: skip
+        reports = [self.start(size, f"equal{size}", *more).report() for size in self.sizes]
+        (one, one_simulator), (many, many_simulator) = (
+            checkpoint_parts(self.folder / f"equal{size}/checkpoint.ckpt") for size in self.sizes
+        )
+        is_equal = one_simulator == many_simulator
+        name, difference = largest_relative_difference(one, many)
+        return {
+            "device": reports[0]["device"],
+            "simulator_bytes": len(one_simulator),
+            "simulator_equal": is_equal,
+            "gradient_parameters": len(one),
+            "gradient_largest_difference": difference,
+            "gradient_largest_difference_in": name,
+        }, is_equal and difference <= GRADIENT_TOLERANCE
+
+    def updates(self):
+        more = [*SMALL, "--set", "train.updates=50"]
+        reports = {size: self.start(size, f"updates{size}", *more).report() for size in self.sizes}
+        return {size: told(report, "episode_return") for size, report in reports.items()}, True
+
+    def killed(self):
+        run = [*SMALL, "--set", "train.checkpoint_every=2"]
+        ranks = self.start(self.options.ranks, "killed", *run, "--set", "train.updates=100000")
+        while len(ranks.progress()) < 5:
+            if any(process.poll() is not None for process in ranks.processes):
+                ranks.report()
+            time.sleep(0.1)
+        victim = self.options.ranks - 1
+        killed_at = time.monotonic()
+        ranks.processes[victim].send_signal(signal.SIGKILL)
+        others = []
+        for rank, process in enumerate(ranks.processes):
+            if rank == victim:
+                continue
+            try:
+                said = process.communicate(timeout=2 * END_S)[1]
+            except subprocess.TimeoutExpired:
+                process.kill()
+                said = process.communicate()[1]
+            errors = [line for line in said.replace("\r", "\n").splitlines() if "error" in line]
+            others.append({"rank": rank, "seconds": round(time.monotonic() - killed_at, 1), "status": process.returncode,
+                           "error": errors[-1] if errors else ""})  # fmt: skip
+        ranks.processes[victim].communicate()
+        result = {"killed_rank": victim, "others": others, "updates_done": len(ranks.progress())}
+        # The checkpoint holds at least all but the last updates of checkpoint_every.
+        resumed = []
+        for size in (1, self.options.ranks):
+            done = 2 + max([int(report["updates"]) for _, report in resumed], default=result["updates_done"])
+            report = self.start(size, "killed", *run, "--set", f"train.updates={done}", "--resume").report()
+            resumed.append((size, report))
+        result["resumed"] = [{"ranks": size, **told(report)} for size, report in resumed]
+        is_named = all(o["status"] not in (0, -9) and o["seconds"] <= END_S and f"rank {victim}" in o["error"] for o in others)
+        return result, is_named
+
+    def rate(self):
+        agents, ranks = self.options.agents, self.options.ranks
+        cases = {"one": (1, agents), "each": (ranks, ranks * agents), "in_all": (ranks, agents)}
+        result = {}
+        for size in self.options.sizes.split(","):
+            width, height = size.split("x")
+            rows = {}
+            for name, (processes, slots) in cases.items():
+                settings = {
+                    "render.width_px": width, "render.height_px": height, "simulator.num_slots": slots,
+                    "train.num_steps": 32, "train.minibatch_size": round(slots * MINIBATCH_OF_AN_AGENT),
+                    "train.updates": self.options.updates, "train.schedule": "constant", "train.checkpoint_every": 100000, "train.checkpoint_minutes": 1000,
+                }  # fmt: skip
+                more = [word for key, value in settings.items() for word in ("--set", f"{key}={value}")]
+                run = self.start(processes, f"rate_{name}_{size}", *more)
+                run.report()
+                rows[name] = {"gpus": processes, "agents": slots, **self.rates(run.progress())}
+            for name in ("each", "in_all"):
+                rows[f"{name}_over_one"] = rows[name]["agent_steps_per_s"]["median"] / rows["one"]["agent_steps_per_s"]["median"]
+            result[size] = rows
+            print(f"{size}: {json.dumps(rows)}", flush=True)
+        return result, True
+
+    @staticmethod
+    def rates(rows):
+        """Of whole updates after the warm-up: agent-steps a second, the share that the filter keeps, seconds by phase."""
+
+        def summary(values):
+            return {"median": statistics.median(values), "min": min(values), "max": max(values)}
+
+        updates = rows[WARM_UP_UPDATES:]
+        seconds = [float(row["time/rollout_s"]) + float(row["time/update_s"]) for row in updates]
+        done = [float(row["charts/agent_steps"]) for row in rows]
+        steps = [after - before for before, after in zip(done, done[1:])][WARM_UP_UPDATES - 1 :]
+        phases = [key for key in updates[0] if key.startswith("time/") and key.endswith("_s")]
+        return {
+            "agent_steps_per_s": summary([n / s for n, s in zip(steps, seconds)]),
+            "kept": statistics.median(float(row["losses/kept_fraction"]) for row in updates),
+            **{key: statistics.median(float(row[key]) for row in updates) for key in phases},
+        }
 
 
 def main():
-    pictura, results_path, ranks, minutes, commit, *arguments = sys.argv[1:]
-    sizes = [1, int(ranks)]
-    results = {"complete": False, "commit": commit, "arguments": arguments, "ranks": sizes[1]}
+    parser = argparse.ArgumentParser(prog="gpu_ranks")
+    parser.add_argument("--pictura", required=True)
+    parser.add_argument("--results", required=True, type=pathlib.Path)
+    parser.add_argument("--commit", default="")
+    parser.add_argument("--config", default="configs/paper.toml")
+    parser.add_argument("--init-from", default="")
+    parser.add_argument("--ranks", type=int, default=2)
+    parser.add_argument("--steps", default=",".join(STEPS))
+    parser.add_argument("--sizes", default="32x18,96x54")
+    parser.add_argument("--agents", type=int, default=20480)
+    parser.add_argument("--updates", type=int, default=9)
+    parser.add_argument("arguments", nargs="*")
+    options = parser.parse_args()
+    for step in options.steps.split(","):
+        if step not in STEPS:
+            parser.error(f"--steps: expected {', '.join(STEPS)}, got '{step}'")
+    if options.updates <= WARM_UP_UPDATES:
+        parser.error(f"--updates: expected more than {WARM_UP_UPDATES}, got {options.updates}")
 
-    def record(name, value):
-        results[name] = value
-        pathlib.Path(results_path).write_text(json.dumps(results, indent=2) + "\n")
-        print(f"{name}: {json.dumps(value)}", flush=True)
-
+    keys = ("commit", "config", "init_from", "arguments", "ranks")
+    results = {key: getattr(options, key) for key in keys}
+    if options.results.exists():
+        earlier = json.loads(options.results.read_text())
+        if all(earlier.get(key) == value for key, value in results.items()):
+            results = earlier
+    is_good = True
     with tempfile.TemporaryDirectory(prefix="pictura-ranks-") as folder:
-        folder = pathlib.Path(folder)
-
-        def runs(name, *more):
-            return {size: train(pictura, size, folder / f"{name}{size}", *arguments, *more) for size in sizes}
-
-        equal = runs("equal", *SMALL, "--set", "train.updates=1", "--set", "train.reproducible=true")
-        record("device", equal[1]["device"])
-        (one, one_simulator), (many, many_simulator) = (
-            checkpoint_parts(folder / f"equal{size}/checkpoint.ckpt") for size in sizes
-        )
-        is_equal = one_simulator == many_simulator
-        record("equal", {
-            "simulator_bytes": len(one_simulator),
-            "simulator_equal": is_equal,
-            "largest_parameter": max(map(abs, one)),
-            "largest_difference_of_parameters": max(abs(a - b) for a, b in zip(one, many)),
-        })  # fmt: skip
-        keys = ("updates", "agent_steps", "agent_steps_per_s", "episode_return", "policy_hash")
-        updates = runs("updates", *SMALL, "--set", "train.updates=50")
-        record("updates", {size: {key: report[key] for key in keys} for size, report in updates.items()})
-        rate = runs("rate", "--minutes", minutes)
-        record("rate", {size: {key: report[key] for key in keys} for size, report in rate.items()})
-        record("speedup", rate[sizes[1]]["agent_steps_per_s"] / rate[1]["agent_steps_per_s"])
-    record("complete", True)
-    return 0 if is_equal else 1
+        steps = Steps(options, pathlib.Path(folder))
+        for step in options.steps.split(","):
+            results[step], was_good = getattr(steps, step)()
+            is_good = is_good and was_good
+            options.results.write_text(json.dumps(results, indent=2) + "\n")
+            print(f"{step}: {json.dumps(results[step])}", flush=True)
+    return 0 if is_good else 1
 
 
 if __name__ == "__main__":
