@@ -23,7 +23,8 @@ SMALL = ["--set", "simulator.num_slots=2048", "--set", "train.num_steps=32", "--
 STEPS = ["equal", "updates", "killed", "rate"]
 MINIBATCH_OF_AN_AGENT = 0.8  # transitions: 16,384 with 20,480 agents
 WARM_UP_UPDATES = 3  # kernels are compiled, and algorithms chosen, in the first ones
-GRADIENT_TOLERANCE = 1e-4  # of each parameter's largest
+CHUNK = 4096
+GRADIENT_TOLERANCE = 1e-4  # of each parameter's largest; or twice what chunks of another size make on one GPU
 END_S = 60  # within which ranks end after one was killed
 
 
@@ -104,20 +105,24 @@ class Steps:
         # One step of the optimizer, after which the first moments are a multiple of the clipped gradient.
         more = [*SMALL, "--set", "train.updates=1", "--set", "train.reproducible=true", "--set", "train.precision=fp32",
                 "--set", "train.update_epochs=1", "--set", "train.minibatch_size=65536"]  # fmt: skip
-        reports = [self.start(size, f"equal{size}", *more).report() for size in self.sizes]
-        (one, one_simulator), (many, many_simulator) = (
-            checkpoint_parts(self.folder / f"equal{size}/checkpoint.ckpt") for size in self.sizes
-        )
+        cases = {"one": (1, CHUNK), "many": (self.options.ranks, CHUNK), "half": (1, CHUNK // 2)}
+        parts = {}
+        for name, (size, chunk) in cases.items():
+            report = self.start(size, f"equal_{name}", *more, "--set", f"train.forward_chunk={chunk}").report()
+            parts[name] = checkpoint_parts(self.folder / f"equal_{name}/checkpoint.ckpt")
+        (one, one_simulator), (many, many_simulator), (half, _) = parts.values()
         is_equal = one_simulator == many_simulator
         name, difference = largest_relative_difference(one, many)
+        rounding = largest_relative_difference(one, half)[1]
         return {
-            "device": reports[0]["device"],
+            "device": report["device"],
             "simulator_bytes": len(one_simulator),
             "simulator_equal": is_equal,
             "gradient_parameters": len(one),
             "gradient_largest_difference": difference,
             "gradient_largest_difference_in": name,
-        }, is_equal and difference <= GRADIENT_TOLERANCE
+            "gradient_largest_difference_of_half_the_chunk": rounding,
+        }, is_equal and difference <= max(GRADIENT_TOLERANCE, 2 * rounding)
 
     def updates(self):
         more = [*SMALL, "--set", "train.updates=50"]
