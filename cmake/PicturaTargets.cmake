@@ -73,18 +73,24 @@ function(pictura_forbid_fma target)
   endif()
 endfunction()
 
-# pictura_precompile(NAME HEADER [LINK libs...]): a precompiled header of a library's headers, which take a compiler longer
+# pictura_leave_unoptimized(TARGET): for code that calls what is optimized. Optimizing takes a compiler three quarters of
+# its time with a test.
+function(pictura_leave_unoptimized target)
+  target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-O0>)
+endfunction()
+
+# pictura_precompile(NAME HEADERS [LINK libs...]): a precompiled header of libraries' headers, which take a compiler longer
 # than most sources that include them; pictura_use_precompiled(TARGET NAME) reads it. Headers of the project and of the
-# standard are left out, so that a source which lacks one does not compile, as long as HEADER does not bring it along:
+# standard are left out, so that a source which lacks one does not compile, as long as HEADERS do not bring it along:
 # PICTURA_PRECOMPILE=OFF compiles every source as it stands.
-function(pictura_precompile name header)
+function(pictura_precompile name headers)
   if(PICTURA_PRECOMPILE)
     cmake_parse_arguments(PARSE_ARGV 2 arg "" "" "LINK")
     file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/precompiled/${name}.cpp CONTENT "// A precompiled header belongs to a source.\n")
     add_library(pictura_precompiled_${name} OBJECT ${PROJECT_BINARY_DIR}/precompiled/${name}.cpp)
     pictura_use_headers(pictura_precompiled_${name} PRIVATE)
     target_link_libraries(pictura_precompiled_${name} PRIVATE OpenMP::OpenMP_CXX ${arg_LINK})
-    target_precompile_headers(pictura_precompiled_${name} PRIVATE ${header})
+    target_precompile_headers(pictura_precompiled_${name} PRIVATE ${headers})
   endif()
 endfunction()
 
@@ -114,10 +120,11 @@ function(pictura_test_properties out timeout_s labels)
   set(${out} "${properties}" PARENT_SCOPE)
 endfunction()
 
-# pictura_add_test(NAME SOURCES... LINK libs... [LABELS labels...] [PRECOMPILED header]): GoogleTest binary NAME_test, every
-# test its own ctest entry, with PICTURA_DATA set to ../shared/data if that exists and the caller has not set it.
+# pictura_add_test(NAME SOURCES... LINK libs... [LABELS labels...] [PRECOMPILED header] [OPTIMIZED]): GoogleTest binary
+# NAME_test, every test its own ctest entry, with PICTURA_DATA set to ../shared/data if that exists and the caller has not
+# set it. OPTIMIZED: for tests that compute much themselves.
 function(pictura_add_test name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "PRECOMPILED" "SOURCES;LINK;LABELS")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "OPTIMIZED" "PRECOMPILED" "SOURCES;LINK;LABELS")
   find_package(GTest REQUIRED)
   include(GoogleTest)
   add_executable(${name}_test ${arg_SOURCES})
@@ -129,7 +136,12 @@ function(pictura_add_test name)
   else()
     # Many compute with the rules that both devices share.
     pictura_forbid_fma(${name}_test)
-    pictura_use_precompiled(${name}_test gtest)
+    if(NOT arg_OPTIMIZED)
+      pictura_use_precompiled(${name}_test gtest)
+    endif()
+  endif()
+  if(NOT arg_OPTIMIZED)
+    pictura_leave_unoptimized(${name}_test)
   endif()
   pictura_test_properties(properties 900 "${arg_LABELS}")
   gtest_discover_tests(${name}_test DISCOVERY_TIMEOUT 120 PROPERTIES ${properties})
