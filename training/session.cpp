@@ -87,7 +87,9 @@ struct PolicySession::Parts {
     set_float32_products(config.train.precision);
     set_reproducible(config.train.reproducible);
     if (config.reads_images()) check_images(input, static_cast<size_t>(batch), renderer);
-    return pictura::decide(indices, {config.train.forward_chunk}, [&](const at::Tensor& some) {
+    const ChunkSizes chunks =
+        input.full_chunk > 0 ? ChunkSizes{input.full_chunk, true} : ChunkSizes{config.train.forward_chunk};
+    return pictura::decide(indices, chunks, [&](const at::Tensor& some) {
       Observation observation = select_arrays(config, input.observations, device, batch, some);
       if (config.reads_images()) observation.images = draw(input, some, renderer);
       return policy.forward(observation);

@@ -34,6 +34,9 @@ struct PolicyInput {
   const SceneBatch* scene = nullptr;  // with views, for a policy that reads images
   Span<const View> views;             // [batch]
   Span<const uint8_t> is_drawn;       // [batch] 0: its images are black; empty: all are drawn
+  // > 0: so many agents go through the network at once, always, so that what comes out for one depends on its place
+  // among them and not on the batch. 0: at most train.forward_chunk, in equal parts of the batch.
+  int64_t full_chunk = 0;
 };
 
 /// A policy that drives. On a device act() waits for one number: how many agents it drives.

@@ -9,7 +9,8 @@
 
 #include "pictura/common/support/file.h"
 #include "pictura/simulator/rules/collision.h"
-#include "pictura/training/torch_device.h"
+#include "pictura/training/evaluation/csv.h"
+#include "pictura/training/struct_copies.h"
 
 namespace pictura {
 
@@ -24,14 +25,6 @@ constexpr float kJustRed_s = 1, kFarHead_m = 10;
 template <typename T>
 std::vector<T> copy_of(const T* values, size_t count, Device device) {
   return host_copy(Span<const T>(values, count), device);
-}
-
-std::vector<AgentBox> copy_of(Span<const AgentBox> boxes, Device device) {
-  const auto* const bytes = reinterpret_cast<const uint8_t*>(boxes.data());
-  const std::vector<uint8_t> copied = host_copy(Span<const uint8_t>(bytes, boxes.size() * sizeof(AgentBox)), device);
-  std::vector<AgentBox> result(boxes.size());
-  std::copy(copied.begin(), copied.end(), reinterpret_cast<uint8_t*>(result.data()));
-  return result;
 }
 
 // The place on a lane's centre line that is nearest to a position.
@@ -133,7 +126,7 @@ struct InfractionObserver::Frame {
     lane_angle_rad = copy_of<float>(state.lane_angle_rad, slots, device);
     lane = copy_of<int32_t>(state.lane, slots, device);
     const SceneBatch& scene = simulator.scene();
-    boxes = copy_of(scene.agents, device);
+    boxes = host_copy_of_structs(scene.agents, device);
     static_assert(sizeof(LightState) == 1);
     lights = copy_of(reinterpret_cast<const uint8_t*>(scene.light_states.data()), scene.light_states.size(), device);
     box_begin = host_copy(scene.world_begin, device);
@@ -281,17 +274,6 @@ std::vector<InfractionGroup> group_infractions(const std::vector<Infraction>& in
   return groups;
 }
 
-namespace {
-
-// As a field of CSV (RFC 4180).
-std::string quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) result.append(c == '"' ? 2 : 1, c);
-  return result + '"';
-}
-
-}  // namespace
-
 void write_infractions_csv(const std::string& path, const std::vector<Infraction>& infractions) {
   std::string text =
       "agents,scenario,map,agent,class,step,at_fault,collision,off_road,red_light,wall,x_m,y_m,z_m,speed_mps,lane_"
@@ -304,12 +286,12 @@ void write_infractions_csv(const std::string& path, const std::vector<Infraction
         "{},{},{},{},{},{},{:d},{:d},{:d},{:d},{:d},{:.2f},{:.2f},{:.2f},{:.2f},{:.2f},{:.3f},{},{:d},{:d},{},{},{},{},"
         "{:.2f},"
         "{:.1f},{:.1f}\n",
-        one.agents_per_world, one.scenario, quoted(one.map), one.agent, to_string(partner_of(one.agent_class)),
+        one.agents_per_world, one.scenario, csv_quoted(one.map), one.agent, to_string(partner_of(one.agent_class)),
         one.step, one.is(kEventAtFault), one.is(kEventCollision), one.is(kEventOffRoad), one.is(kEventRedLight),
         one.is(kEventWall), one.position_m.x, one.position_m.y, one.position_m.z, one.speed_mps, one.lane_offset_m,
-        one.lane_angle_rad, quoted(to_string(one.shape)), one.changed_lane, one.before_merge, to_string(one.partner),
-        to_string(one.partner_motion), to_string(one.contact), one.partner_agent, one.partner_speed_mps, one.red_for_s,
-        one.stop_line_to_head_m);
+        one.lane_angle_rad, csv_quoted(to_string(one.shape)), one.changed_lane, one.before_merge,
+        to_string(one.partner), to_string(one.partner_motion), to_string(one.contact), one.partner_agent,
+        one.partner_speed_mps, one.red_for_s, one.stop_line_to_head_m);
   }
   write_file(path, text);
 }

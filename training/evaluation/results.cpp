@@ -33,22 +33,11 @@ constexpr const char* kFormat = "pictura evaluation 1";
 
 template <typename Part, typename Whole>
 Estimate ratio(const std::vector<ScenarioCounts>& scenarios, const Part& part_of, const Whole& whole_of) {
-  double part = 0, whole = 0;
+  std::vector<RatioTerm> terms;
   for (const ScenarioCounts& scenario : scenarios) {
-    part += static_cast<double>(part_of(scenario));
-    whole += static_cast<double>(whole_of(scenario));
+    terms.push_back({static_cast<double>(part_of(scenario)), static_cast<double>(whole_of(scenario))});
   }
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  if (whole == 0) return {kInfinity, kInfinity};
-  const double value = part / whole;
-  double squares = 0;
-  for (const ScenarioCounts& scenario : scenarios) {
-    const double residual = static_cast<double>(part_of(scenario)) - value * static_cast<double>(whole_of(scenario));
-    squares += residual * residual;
-  }
-  const auto n = static_cast<double>(scenarios.size());
-  if (n < 2) return {value, kInfinity};
-  return {value, 1.96 * std::sqrt(n / (n - 1) * squares) / whole};
+  return estimate_ratio(terms);
 }
 
 Json to_json(const EvaluationSetting& s) {
@@ -125,6 +114,25 @@ DensityResult joined(std::vector<Part> parts) {
 }
 
 }  // namespace
+
+Estimate estimate_ratio(const std::vector<RatioTerm>& scenarios) {
+  double part = 0, whole = 0;
+  for (const RatioTerm& scenario : scenarios) {
+    part += scenario.part;
+    whole += scenario.whole;
+  }
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  if (whole == 0) return {kInfinity, kInfinity};
+  const double value = part / whole;
+  double squares = 0;
+  for (const RatioTerm& scenario : scenarios) {
+    const double residual = scenario.part - value * scenario.whole;
+    squares += residual * residual;
+  }
+  const auto n = static_cast<double>(scenarios.size());
+  if (n < 2) return {value, kInfinity};
+  return {value, 1.96 * std::sqrt(n / (n - 1) * squares) / whole};
+}
 
 EvaluateRow row_of(const DensityResult& result, int steps) {
   using Counts = ScenarioCounts;

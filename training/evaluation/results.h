@@ -55,6 +55,13 @@ struct Estimate {
   double value = 0, half_width_95 = 0;
 };
 
+/// What a scenario adds to the sums of a ratio.
+struct RatioTerm {
+  double part = 0, whole = 0;
+};
+/// Infinite where there is nothing to divide by. A mean of one number a scenario is the ratio with wholes of 1.
+Estimate estimate_ratio(const std::vector<RatioTerm>& scenarios);
+
 /// The paper's five metrics (appendix, metric definitions) over the vehicles of one density, and more.
 struct EvaluateRow {
   std::string density;
