@@ -187,17 +187,35 @@ class PySimulator {
 
   py::dict observations() {
     if (!observations_) {
-      py::dict arrays;
-      for (const NamedArray& named :
-           observation_arrays(simulator_->observations(), simulator_->num_slots(), simulator_->device())) {
-        Array array = named.array;
-        // What is no set has one row.
-        if (array.shape[1] == 1) array = Array(array.data, array.type, {array.shape[0], array.shape[2]}, array.device);
-        arrays[py::str(std::string(named.name))] = py::cast(lend(array, std::string(named.name)));
-      }
-      observations_ = arrays;
+      observations_ = lent_observations(simulator_->observations(), simulator_->num_slots(), simulator_);
     }
     return *observations_;
+  }
+
+  py::object observe(const py::object& queries, const py::object& hidden, const py::object& inserted,
+                     const py::object& out) {
+    std::vector<BorrowedArray> borrowed;
+    const Span<const ObservationQuery> asked = structs_of<ObservationQuery>(queries, "observe: queries", &borrowed);
+    const Span<const InsertedBox> boxes = structs_of<InsertedBox>(inserted, "observe: inserted", &borrowed);
+    Span<const int32_t> left_out;
+    if (!hidden.is_none()) {
+      borrowed.push_back(borrow(hidden, "observe: hidden", stream_));
+      const Array& array = borrowed.back().array();
+      left_out = array.checked<const int32_t>("observe: hidden", {array.shape.count()}, simulator_->device());
+    }
+    const auto count = static_cast<int64_t>(asked.size());
+    ObservationView view;
+    py::object answers = out;
+    if (out.is_none()) {
+      const auto memory = std::make_shared<AnswerMemory>(count, simulator_->config(), simulator_->device());
+      view = memory->view();
+      answers = lent_observations(view, static_cast<int>(count), memory);
+    } else {
+      view = view_of(py::cast<py::dict>(out), count, &borrowed);
+    }
+    calls_->run("observe", [&] { simulator_->observe(asked, left_out, boxes, view, stream_); });
+    kept_ = std::move(borrowed);
+    return answers;
   }
   py::dict state() {
     if (!state_) {
@@ -215,6 +233,16 @@ class PySimulator {
 
   LentArray lend(const Array& array, std::string what, bool is_bool = false) const {
     return {array, simulator_, stream_, is_bool, std::move(what)};
+  }
+  py::dict lent_observations(const ObservationView& view, int count, const std::shared_ptr<const void>& owner) const {
+    py::dict arrays;
+    for (const NamedArray& named : observation_arrays(view, count, simulator_->device())) {
+      const std::string name(named.name);
+      Array array = named.array;
+      array = Array(array.data, array.type, shape_of(array.shape[0], array.shape[1], array.shape[2]), array.device);
+      arrays[py::str(name)] = py::cast(LentArray{array, owner, stream_, false, name});
+    }
+    return arrays;
   }
   template <typename T>
   LentArray lend_span(Span<T> span, std::string what, bool is_bool = false) const {
@@ -277,6 +305,93 @@ class PySimulator {
   }
 
  private:
+  /// What is no set has one row.
+  static Dims shape_of(int64_t count, int64_t rows, int64_t features) {
+    return rows == 1 ? Dims{count, features} : Dims{count, rows, features};
+  }
+
+  /// Memory for what so many queries are answered, on a device.
+  class AnswerMemory {
+   public:
+    AnswerMemory(int64_t count, const SimulatorConfig& config, Device device) {
+      size_t num_bytes = 0;
+      const auto place = [&](int64_t values, size_t bytes_per_value) {
+        const size_t begin = num_bytes;
+        num_bytes += (static_cast<size_t>(values) * bytes_per_value + kAlignment - 1) / kAlignment * kAlignment;
+        return begin;
+      };
+      std::vector<size_t> begins;
+      for (const ObservationArray& array : kObservationArrays) {
+        const int64_t values = config.observes(array.part) ? count * array.rows * array.features : 0;
+        begins.push_back(place(values, bytes_of(array.type)));
+      }
+      uint8_t* const first = allocate(num_bytes, device);
+      size_t i = 0;
+#define X(name, type, rows, features, part, comment)                                                             \
+  if (config.observes(part)) {                                                                                   \
+    view_.name = {reinterpret_cast<type*>(first + begins[i]), static_cast<size_t>(count * (rows) * (features))}; \
+  }                                                                                                              \
+  ++i;
+      PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
+    }
+    const ObservationView& view() const { return view_; }
+
+   private:
+    static constexpr size_t kAlignment = 64;
+    uint8_t* allocate(size_t num_bytes, Device device) {
+      if (device.is_host()) {
+        on_host_.resize(num_bytes);
+        return on_host_.data();
+      }
+#ifdef PICTURA_HAS_CUDA
+      const DeviceGuard guard(device);
+      on_device_ = DeviceBuffer<uint8_t>(num_bytes);
+      return on_device_.data();
+#else
+      fail("observe: this build has no CUDA");
+#endif
+    }
+    std::vector<uint8_t> on_host_;
+#ifdef PICTURA_HAS_CUDA
+    DeviceBuffer<uint8_t> on_device_;
+#endif
+    ObservationView view_;
+  };
+
+  template <typename T>
+  Span<const T> structs_of(const py::object& object, const std::string& what, std::vector<BorrowedArray>* borrowed) {
+    if (object.is_none()) return {};
+    borrowed->push_back(borrow_structs(object, what, sizeof(T), stream_));
+    const Array& array = borrowed->back().array();
+    const int64_t count = array.shape.rank() == 2 ? array.shape[0] : 0;
+    const auto bytes =
+        array.checked<const uint8_t>(what, {count, static_cast<int64_t>(sizeof(T))}, simulator_->device());
+    PICTURA_CHECK(reinterpret_cast<uintptr_t>(bytes.data()) % alignof(T) == 0, "{}: expected aligned memory", what);
+    return {reinterpret_cast<const T*>(bytes.data()), static_cast<size_t>(count)};
+  }
+
+  /// Arrays of the caller by name, all that this simulator observes.
+  ObservationView view_of(const py::dict& arrays, int64_t count, std::vector<BorrowedArray>* borrowed) {
+    ObservationView view;
+    size_t num_known = 0;
+    const auto take = [&](const char* name, int64_t rows, int64_t features, auto* out) {
+      using T = std::remove_reference_t<decltype((*out)[0])>;
+      const std::string what = fmt::format("observe: out: {}", name);
+      PICTURA_CHECK(arrays.contains(name), "{}: expected an array, got none", what);
+      borrowed->push_back(borrow(arrays[name], what, stream_));
+      *out = borrowed->back().array().template checked<T>(what, shape_of(count, rows, features), simulator_->device());
+      ++num_known;
+    };
+#define X(name, type, rows, features, part, comment) \
+  if (simulator_->config().observes(part)) take(#name, rows, features, &view.name);
+    PICTURA_OBSERVATION_ARRAYS(X)
+#undef X
+    PICTURA_CHECK(arrays.size() == num_known, "observe: out: expected {} arrays, those of observations, got {}",
+                  num_known, arrays.size());
+    return view;
+  }
+
   void reset_unwatched(const py::object& world_mask, const std::optional<uint64_t>& seed) {
     if (world_mask.is_none() && !seed) {
       calls_->run("reset", [&] { simulator_->reset(stream_); });
@@ -538,9 +653,22 @@ void bind_names(py::module_& module) {
   for (const char* name : {"kind", "action"}) command.append(py::make_tuple(name, "<i4"));
   for (const char* name : {"x_m", "y_m", "z_m", "heading_rad", "speed_mps"})
     command.append(py::make_tuple(name, "<f4"));
-  module.attr("COMMAND_DTYPE") = py::module_::import("numpy").attr("dtype")(command);
-  PICTURA_CHECK(py::cast<size_t>(module.attr("COMMAND_DTYPE").attr("itemsize")) == sizeof(Command),
-                "a command's layout");
+  // Fields as NumPy takes them.
+  const auto dtype_of = [](const py::list& members, size_t size, const char* what) {
+    const py::object type = py::module_::import("numpy").attr("dtype")(members);
+    PICTURA_CHECK(py::cast<size_t>(type.attr("itemsize")) == size, "{}'s layout", what);
+    return type;
+  };
+  py::list query;
+  for (const char* name : {"slot", "hidden_begin", "hidden_end", "inserted_begin", "inserted_end", "leaves_gaps"}) {
+    query.append(py::make_tuple(name, "<i4"));
+  }
+  module.attr("COMMAND_DTYPE") = dtype_of(command, sizeof(Command), "a command");
+  module.attr("QUERY_DTYPE") = dtype_of(query, sizeof(ObservationQuery), "a query");
+  py::list inserted;
+  inserted.append(py::make_tuple("box", module.attr("BOX_DTYPE")));
+  inserted.append(py::make_tuple("speed_mps", "<f4"));
+  module.attr("INSERTED_DTYPE") = dtype_of(inserted, sizeof(InsertedBox), "an inserted box");
   py::dict events;
   events["collision"] = static_cast<int>(kEventCollision);
   events["at_fault"] = static_cast<int>(kEventAtFault);
@@ -678,6 +806,17 @@ range.)")
           R"(Gives fields of chosen agents other values. slots: int32 [n], each once. fields: arrays [n] or [n, per agent] by the
 names of AGENT_FIELDS, of their types, all in the simulator's memory. Lane, height, box, view and observation follow. Raises
 pictura.Error naming what is wrong; on CUDA values are checked as in step().)")
+      .def(
+          "observe", &PySimulator::observe, py::arg("queries"), py::arg("hidden") = py::none(),
+          py::arg("inserted") = py::none(), py::kw_only(), py::arg("out") = py::none(),
+          R"(What chosen slots would observe if boxes of their worlds were not there, and others were. Partners alone differ;
+the state stays as it is. pictura.make_queries() makes the arguments:
+queries: QUERY_DTYPE [n], or uint8 [n, 24]: a slot, its ranges [begin, end) of the lists `hidden` and `inserted`, and leaves_gaps:
+0: who was too far to be among the partners comes in for who is hidden; 1: rows of zeros stay in their place.
+hidden: int32 [m], indices into the scene's boxes. inserted: INSERTED_DTYPE [k], or uint8 [k, 40]: a box of BOX_DTYPE and its
+speed_mps. out: arrays of the caller by the names of `observations`, with n in place of the slots; new ones without it. All lie
+in the simulator's memory. Returns out, arrays by name. Raises pictura.Error naming what is wrong with an array or a query, and
+then writes nothing; on CUDA queries are checked as in step().)")
       .def_property_readonly(
           "observations", &PySimulator::observations,
           py::doc("Arrays [slots, ...] by name, of the state after the last call: ego, partners, lanes, "

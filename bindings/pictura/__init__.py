@@ -14,9 +14,11 @@ from pictura._pictura import (  # noqa: F401
     EVENTS,
     HAS_CUDA,
     IDLE_ACTION,
+    INSERTED_DTYPE,
     LANE_TYPES,
     NUM_ACTIONS,
     OBSERVATION_ARRAYS,
+    QUERY_DTYPE,
     REWARD_TERMS,
     VIEW_DTYPE,
     Array,
@@ -45,6 +47,7 @@ from pictura._pictura import (  # noqa: F401
     simulator_names,
     write_gallery,
 )
+from pictura.queries import make_queries  # noqa: F401
 
 if TYPE_CHECKING:
     from pictura._training import PolicySession, evaluate, train  # noqa: F401

@@ -7,7 +7,7 @@ import numpy
 import numpy.dtypes
 import numpy.typing
 import typing
-__all__: list[str] = ['AGENT_FIELDS', 'Array', 'BOX_DTYPE', 'COMMAND_DTYPE', 'CONDITIONING_NAMES', 'Camera', 'Controller', 'EVENTS', 'Error', 'Geometry', 'HAS_CUDA', 'IDLE_ACTION', 'Images', 'LANE_TYPES', 'LiveView', 'Map', 'NUM_ACTIONS', 'OBSERVATION_ARRAYS', 'REWARD_TERMS', 'Recorder', 'Renderer', 'Rig', 'Scene', 'SceneFile', 'Simulator', 'Snapshot', 'StepResult', 'UsageError', 'VIEW_DTYPE', 'draw_worlds', 'known_towns', 'make_views', 'map_folder', 'renderer_names', 'simulator_names', 'write_gallery']
+__all__: list[str] = ['AGENT_FIELDS', 'Array', 'BOX_DTYPE', 'COMMAND_DTYPE', 'CONDITIONING_NAMES', 'Camera', 'Controller', 'EVENTS', 'Error', 'Geometry', 'HAS_CUDA', 'IDLE_ACTION', 'INSERTED_DTYPE', 'Images', 'LANE_TYPES', 'LiveView', 'Map', 'NUM_ACTIONS', 'OBSERVATION_ARRAYS', 'QUERY_DTYPE', 'REWARD_TERMS', 'Recorder', 'Renderer', 'Rig', 'Scene', 'SceneFile', 'Simulator', 'Snapshot', 'StepResult', 'UsageError', 'VIEW_DTYPE', 'draw_worlds', 'known_towns', 'make_views', 'map_folder', 'renderer_names', 'simulator_names', 'write_gallery']
 class Error(RuntimeError):
     """
     The work failed; the message names what was expected and what came.
@@ -513,6 +513,17 @@ class Simulator:
         A world from above, uint8 [height, width, 3], on the CPU. agent: the one of that world in the middle, with its
         waypoints; -1 shows the whole map. width_m: what is shown around it.
         """
+    def observe(self, queries: typing.Any, hidden: typing.Any = None, inserted: typing.Any = None, *, out: typing.Any = None) -> typing.Any:
+        """
+        What chosen slots would observe if boxes of their worlds were not there, and others were. Partners alone differ;
+        the state stays as it is. pictura.make_queries() makes the arguments:
+        queries: QUERY_DTYPE [n], or uint8 [n, 24]: a slot, its ranges [begin, end) of the lists `hidden` and `inserted`, and leaves_gaps:
+        0: who was too far to be among the partners comes in for who is hidden; 1: rows of zeros stay in their place.
+        hidden: int32 [m], indices into the scene's boxes. inserted: INSERTED_DTYPE [k], or uint8 [k, 40]: a box of BOX_DTYPE and its
+        speed_mps. out: arrays of the caller by the names of `observations`, with n in place of the slots; new ones without it. All lie
+        in the simulator's memory. Returns out, arrays by name. Raises pictura.Error naming what is wrong with an array or a query, and
+        then writes nothing; on CUDA queries are checked as in step().
+        """
     def reset(self, world_mask: typing.Any = None, seed: typing.SupportsInt | typing.SupportsIndex | None = None) -> None:
         """
         Starts new episodes. world_mask: uint8 or bool [worlds] in the simulator's memory, the worlds that start; all without
@@ -772,9 +783,11 @@ CONDITIONING_NAMES: tuple = ('delta_goal_m', 'v_goal_mps', 'collision', 'off_roa
 EVENTS: dict = {'collision': 1, 'at_fault': 2, 'off_road': 4, 'red_light': 8, 'wall': 16, 'goal': 32, 'waypoint': 64, 'metric_goal': 128}
 HAS_CUDA: bool = True
 IDLE_ACTION: int = 7
+INSERTED_DTYPE: numpy.dtypes.VoidDType
 LANE_TYPES: tuple = ('driving', 'bidirectional', 'parking', 'ramp', 'shoulder', 'sidewalk', 'biking', 'median', 'border', 'stop', 'restricted', 'other')
 NUM_ACTIONS: int = 12
 OBSERVATION_ARRAYS: tuple = (('ego', 'f32', 1, 9), ('partners', 'f32', 16, 8), ('lanes', 'f32', 80, 7), ('boundaries', 'f32', 80, 7), ('controls', 'f32', 10, 7), ('walls', 'f32', 80, 7), ('set_counts', 'i32', 1, 5), ('conditioning', 'f32', 1, 17), ('waypoints', 'f32', 3, 3))
+QUERY_DTYPE: numpy.dtypes.VoidDType
 REWARD_TERMS: tuple = ('goal', 'collision', 'off_road', 'stop_line', 'comfort', 'lane_align', 'lane_center', 'velocity', 'overspeed', 'reverse', 'timestep')
 VIEW_DTYPE: numpy.dtypes.VoidDType
 __version__: str = '0.1.0'

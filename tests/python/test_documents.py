@@ -34,3 +34,10 @@ def test_the_five_minutes_run(tmp_path, monkeypatch):
     for block in blocks:
         exec(compile(block, "docs/python.md", "exec"), names)  # noqa: S102
     assert (tmp_path / "drive.html").exists()
+
+
+def test_what_is_not_there_is_observed(make):
+    (block,) = re.findall(r"```python\n(.*?)```", TEXT.split("### Of what is not there")[1].split("## Infos")[0], re.S)
+    names: dict[str, object] = {"np": np, "pictura": pictura, "simulator": make(8)}
+    exec(compile(block, "docs/python.md", "exec"), names)  # noqa: S102
+    assert names["answers"]["partners"].shape == (3, 16, 8)

@@ -187,6 +187,76 @@ def test_chosen_agents_are_set(make):
         simulator.set_state(slots, {"x_m": np.array([0, np.nan], np.float32)})
 
 
+def boxes_of(simulator) -> np.ndarray:
+    return np.asarray(simulator.scene.boxes).view(pictura.BOX_DTYPE)[:, 0]
+
+
+def test_observations_without_changes_are_the_simulators(make):
+    simulator = make(12, worlds=2)
+    for step in range(5):
+        simulator.step(actions_of(step, 24))
+    answers = simulator.observe(*pictura.make_queries([23, 4]))
+    assert set(answers) == set(simulator.observations)
+    for name, array in answers.items():
+        expected = simulator.observations[name].numpy()[[23, 4]]
+        assert array.shape == expected.shape and (array.numpy() == expected).all(), name
+    before = simulator.state_hash()
+    del simulator
+    assert before and (answers["ego"].numpy() == answers["ego"].numpy()).all(), "answers keep their memory"
+
+
+def test_boxes_are_hidden_and_inserted(make):
+    simulator = make(12, parked_cars=0)
+    boxes, counts = boxes_of(simulator), simulator.observations["set_counts"].numpy()
+    distance_m = np.hypot(*(boxes["center_m"] - boxes["center_m"][0])[:, :2].T)
+    nearest = int(np.argsort(distance_m)[1])
+    phantom = np.zeros(1, pictura.INSERTED_DTYPE)
+    phantom["box"], phantom["speed_mps"] = boxes[nearest], simulator.state["speed_mps"].numpy()[nearest]
+    answers = simulator.observe(
+        *pictura.make_queries([0, 0, 0, 0], hidden=[[nearest], [nearest], [nearest], []], inserted=[[], phantom, [], phantom],
+                              leaves_gaps=[False, False, True, False]))
+    partners, filled = answers["partners"].numpy(), answers["set_counts"].numpy()[:, 0]
+    seen = simulator.observations["partners"].numpy()[0]
+    assert filled.tolist() == [counts[0, 0] - 1, counts[0, 0], counts[0, 0], min(16, counts[0, 0] + 1)]
+    assert (partners[1] == seen).all(), "a box in the place of itself"
+    row = int(np.argmin(np.abs(seen - partners[2]).sum(1) == 0))
+    assert (partners[2, row] == 0).all() and (seen[row] != 0).any() and (np.delete(partners[2], row, 0) == np.delete(seen, row, 0)).all()
+    assert (partners[0, :-1] == np.delete(seen, row, 0)).all()
+    # The same by one list and where each part of it begins, into arrays of the caller.
+    out = {name: np.full_like(array.numpy(), 7) for name, array in answers.items()}
+    lists = pictura.make_queries(np.zeros(4, int), hidden=([nearest] * 3, [0, 1, 2, 3, 3]),
+                                 inserted=(np.concatenate([phantom, phantom]), [0, 0, 1, 1, 2]), leaves_gaps=[0, 0, 1, 0])
+    assert simulator.observe(*lists, out=out) is out
+    assert all((out[name] == array.numpy()).all() for name, array in answers.items())
+
+
+def test_queries_that_cannot_be_are_named(make):
+    simulator = make(4)
+    for queries, message in [
+        (pictura.make_queries([4]), "slot"),
+        (pictura.make_queries([0], hidden=[[999]]), "999"),
+        (pictura.make_queries([0], inserted=[np.array([(((np.nan, 0, 0), 1, 0, 4, 2, 1, 0, 0, 1, 0), 0)], pictura.INSERTED_DTYPE)]), "finite"),
+    ]:
+        with pytest.raises(pictura.Error, match=message):
+            simulator.observe(*queries)
+    with pytest.raises(pictura.Error, match="hidden: expected 1 lists, got 2"):
+        pictura.make_queries([0], hidden=[[1], [2]])
+    with pytest.raises(pictura.Error, match=r"inserted: expected \(list, begin\) with begin \[2\]"):
+        pictura.make_queries([0], inserted=(np.zeros(0, pictura.INSERTED_DTYPE), [0]))
+    queries, hidden, inserted = pictura.make_queries([0], hidden=[[1]])
+    with pytest.raises(pictura.Error, match=r"observe: hidden: expected i32 \[1\] on cpu, got i64"):
+        simulator.observe(queries, hidden.astype(np.int64))
+    with pytest.raises(pictura.Error, match="observe: queries: expected structs of 24 bytes"):
+        simulator.observe(inserted, hidden)
+    whole = {name: np.empty((1, *array.shape[1:]), array.dtype) for name, array in simulator.observations.items()}
+    with pytest.raises(pictura.Error, match=r"observe: out: ego: expected f32 \[1, 9\]"):
+        simulator.observe(queries, hidden, out=whole | {"ego": np.empty((1, 8), np.float32)})
+    with pytest.raises(pictura.Error, match="observe: out: ego: expected an array, got none"):
+        simulator.observe(queries, hidden, out={name: array for name, array in whole.items() if name != "ego"})
+    with pytest.raises(pictura.Error, match="expected 8 arrays"):
+        simulator.observe(queries, hidden, out=whole | {"walls": np.empty((1, 80, 7), np.float32)})
+
+
 def test_reward_terms_sum_to_rewards_and_totals(make):
     simulator = make(20)
     of_steps = np.zeros(11)

@@ -1,0 +1,34 @@
+"""Arguments of Simulator.observe(): who is asked, who is hidden, who comes in."""
+
+import numpy as np
+from pictura._pictura import INSERTED_DTYPE, QUERY_DTYPE, Error
+
+
+def make_queries(slots, *, hidden=None, inserted=None, leaves_gaps=False):
+    """Queries for Simulator.observe(), on the CPU, as the tuple (queries, hidden, inserted) of NumPy arrays.
+
+    slots: [n] of int. hidden: who is left out for each, n lists of indices into the scene's boxes, or (indices, begin) with the
+    indices of query i from begin[i] up to begin[i + 1]. inserted: who comes in, likewise, of INSERTED_DTYPE. leaves_gaps: bool,
+    or [n] of bool: whether rows of zeros stay where the hidden ones were. Raises pictura.Error naming what does not fit.
+    """
+    queries = np.zeros(len(slots), QUERY_DTYPE)
+    queries["slot"] = slots
+    queries["leaves_gaps"] = leaves_gaps
+    hidden, queries["hidden_begin"], queries["hidden_end"] = _flat(hidden, len(slots), np.dtype(np.int32), "hidden")
+    inserted, queries["inserted_begin"], queries["inserted_end"] = _flat(inserted, len(slots), INSERTED_DTYPE, "inserted")
+    return queries, hidden, inserted
+
+
+def _flat(lists, count: int, dtype: np.dtype, name: str):
+    """One list after the other, and where each begins and ends."""
+    if lists is None:
+        return np.zeros(0, dtype), 0, 0
+    if isinstance(lists, tuple):
+        if len(lists) != 2 or np.shape(lists[1]) != (count + 1,):
+            raise Error(f"make_queries: {name}: expected (list, begin) with begin [{count + 1}], or {count} lists")
+        return np.ascontiguousarray(lists[0], dtype), lists[1][:-1], lists[1][1:]
+    if len(lists) != count:
+        raise Error(f"make_queries: {name}: expected {count} lists, got {len(lists)}")
+    begin = np.cumsum([0, *(len(one) for one in lists)])
+    filled = [np.asarray(one, dtype) for one in lists if len(one)]
+    return np.concatenate(filled) if filled else np.zeros(0, dtype), begin[:-1], begin[1:]
