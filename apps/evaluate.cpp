@@ -5,9 +5,8 @@
 #include <map>
 
 #include "pictura/apps/commands.h"
-#include "pictura/cli/backend_options.h"
+#include "pictura/cli/evaluation_options.h"
 #include "pictura/cli/file_options.h"
-#include "pictura/cli/map_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/replay_scenarios.h"
 #include "pictura/cli/report.h"
@@ -24,9 +23,6 @@ namespace {
 // A notice says how long it takes when that is long, as soon as a few seconds tell.
 constexpr double kEstimateAfter_s = 5, kLong_s = 600;
 constexpr int kShownGroups = 6;  // of each kind of infraction
-
-const std::map<std::string, Density> kDensities{
-    {"light", Density::light}, {"medium", Density::medium}, {"dense", Density::dense}};
 
 void print_table(const EvaluateReport& report) {
   fmt::print("{:10} {:>9} {:>6} {:>9} {:>15} {:>15} {:>15} {:>15} {:>15} {:>15} {:>17} {:>9}\n", "density", "scenarios",
@@ -129,19 +125,17 @@ EvaluateReport merged(const std::vector<std::string>& paths) {
 
 void add_evaluate_command(CLI::App& app) {
   struct Arguments {
-    EvaluateOptions evaluate;
-    BackendOptions backends;
-    std::vector<std::string> densities{"light", "medium", "dense"};
+    EvaluationArguments evaluation;
+    std::vector<std::string> densities{kDensityNames.begin(), kDensityNames.end()};
     std::vector<std::string> parts;
     std::string size, scenarios = "200", out, infractions;
-    bool sampled = false, json = false;
+    bool json = false;
     std::string replay, gallery;
     int replays = 0;
     RecordingOptions recording;
   };
   auto arguments = std::make_shared<Arguments>();
-  EvaluateOptions& options = arguments->evaluate;
-  options.maps = {"Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07", "Town10HD"};
+  EvaluateOptions& options = arguments->evaluation.evaluate;
   CLI::App* command = app.add_subcommand("evaluate", "Measure a policy's driving (the paper's in-domain protocol)");
   CLI::Option* const checkpoint =
       command->add_option("CHECKPOINT", options.checkpoint, "A checkpoint that train wrote, or safetensors");
@@ -157,25 +151,16 @@ void add_evaluate_command(CLI::App& app) {
                    "Instead of evaluating: join parts of one evaluation, which --out wrote, exactly")
       ->excludes(checkpoint)
       ->excludes(policy);
-  add_map_list_option(command, &options.maps, "Maps that the scenarios are spread over, with commas between them");
+  add_evaluation_options(command, &arguments->evaluation)->excludes(policy);
   command->add_option("--density", arguments->densities, "light, medium, dense: 60, 120, 150 agents a world")
       ->delimiter(',')
       ->allow_extra_args(false)
-      ->check(one_of({"light", "medium", "dense"}))
+      ->check(one_of({kDensityNames.begin(), kDensityNames.end()}))
       ->capture_default_str();
-  command->add_option("--agents", options.agents_per_world, "Agents a world, instead of the densities' own numbers")
-      ->transform(whole_number(1, kMaxAgentsPerWorld));
   command
       ->add_option("--scenarios", arguments->scenarios,
                    "Scenarios per density: N, or A:B for the part of them from A up to but not including B")
       ->capture_default_str();
-  command->add_option("--steps", options.steps, "Steps of 0.1 s per scenario")
-      ->transform(whole_number(1))
-      ->capture_default_str();
-  command->add_flag("--sampled", arguments->sampled, "Draw actions from the policy instead of taking the most likely")
-      ->excludes(policy);
-  add_seed_option(command, &options.seed, "Scenarios are drawn from it");
-  add_policy_backend_options(command, "auto, and drawn as in training", &arguments->backends);
   CLI::Option* const rig = command->add_option(
       "--rig", options.rig, "A rig file with as many cameras as in training, instead of those of training");
   rig->excludes(policy);
@@ -184,12 +169,6 @@ void add_evaluate_command(CLI::App& app) {
       ->excludes(policy);
   command->add_option("--backbone", options.backbone,
                       "The program of policy.backbone, where it does not lie where it did in training");
-  command
-      ->add_option("--conditioning", options.conditioning,
-                   "What every agent is told, as collision=1, in place of a value of the configuration's "
-                   "[evaluate.conditioning]; may be given many times")
-      ->allow_extra_args(false);
-  add_threads_option(command, &options.num_threads);
   command->add_option("--out", arguments->out, "A file for the counts of each scenario, which --merge reads");
   command
       ->add_option("--infractions", arguments->infractions,
@@ -217,26 +196,21 @@ void add_evaluate_command(CLI::App& app) {
       "  pictura evaluate run.ckpt --scenarios 100:200 --out b.json\n"
       "  pictura evaluate --merge a.json b.json");
   command->callback([arguments, command] {
-    EvaluateOptions& evaluation = arguments->evaluate;
-    evaluation.argmax = !arguments->sampled;
-    const BackendOptions& backends = arguments->backends;
-    if (!backends.device.empty()) evaluation.device = backends.device;
-    if (!backends.simulator.empty()) evaluation.simulator = backends.simulator;
-    evaluation.renderer = backends.renderer;
+    settle_evaluation_options(&arguments->evaluation);
+    EvaluateOptions& evaluation = arguments->evaluation.evaluate;
     if (!arguments->size.empty()) {
       const Pair pixels = parse_pair("--size", arguments->size, 8192);
       evaluation.width_px = pixels.first;
       evaluation.height_px = pixels.second;
     }
-    evaluation.samples = backends.samples;
     evaluation.densities.clear();
-    for (const std::string& name : arguments->densities) evaluation.densities.push_back(kDensities.at(name));
+    for (const std::string& name : arguments->densities) evaluation.densities.push_back(density_named(name));
     if (evaluation.agents_per_world > 0) evaluation.densities.resize(1);
     parse_scenarios(arguments->scenarios, &evaluation);
     if (evaluation.checkpoint.empty() && evaluation.controller.empty() && arguments->parts.empty()) {
       fail_usage("evaluate: expected a CHECKPOINT, --policy, or --merge and the parts of an evaluation");
     }
-    if (!evaluation.controller.empty() && !(backends.renderer.empty() && backends.samples.empty())) {
+    if (!evaluation.controller.empty() && !(evaluation.renderer.empty() && evaluation.samples.empty())) {
       fail_usage("--renderer, --samples: {} sees no images", evaluation.controller);
     }
     const bool records = !arguments->replay.empty() || !arguments->gallery.empty();

@@ -40,6 +40,7 @@ int main(int argc, char** argv) {
 #ifdef PICTURA_HAS_TORCH
   add_train_command(app);
   add_evaluate_command(app);
+  add_probe_command(app);
   add_export_command(app);
 #endif
   add_plot_command(app);

@@ -14,6 +14,7 @@
 #include "pictura/simulator/observation_arrays.h"
 #include "pictura/training/evaluation/evaluate.h"
 #include "pictura/training/loop.h"
+#include "pictura/training/probes/removal.h"
 #include "pictura/training/session.h"
 #ifdef PICTURA_HAS_CUDA
 #include "pictura/common/cuda/device_buffer.h"
@@ -152,18 +153,17 @@ py::dict train_from_python(const std::string& config, const std::string& out, co
 
 std::vector<Density> densities_of(const std::vector<std::string>& names) {
   std::vector<Density> densities;
-  for (const std::string& name : names) {
-    if (name == "light") {
-      densities.push_back(Density::light);
-    } else if (name == "medium") {
-      densities.push_back(Density::medium);
-    } else if (name == "dense") {
-      densities.push_back(Density::dense);
-    } else {
-      fail_usage("evaluate: densities: expected 'light', 'medium' or 'dense', got '{}'", name);
-    }
-  }
+  for (const std::string& name : names) densities.push_back(density_named(name));
   return densities;
+}
+
+/// Calls a function of Python's, which must outlive it, if there is one.
+std::function<void(double, double)> progress_to(const py::object& on_progress) {
+  if (on_progress.is_none()) return {};
+  return [&on_progress](double done_fraction, double eta_s) {
+    const py::gil_scoped_acquire gil;
+    on_progress(done_fraction, eta_s);
+  };
 }
 
 /// Logits and values of a batch, in the memory of a session's device.
@@ -337,12 +337,7 @@ after the present update, saves, and raises KeyboardInterrupt. Raises pictura.Er
         options.width_px = width_px;
         options.height_px = height_px;
         options.conditioning = texts_of(conditioning);
-        if (!on_progress.is_none()) {
-          options.on_progress = [&on_progress](double done_fraction, double eta_s) {
-            const py::gil_scoped_acquire gil;
-            on_progress(done_fraction, eta_s);
-          };
-        }
+        options.on_progress = progress_to(on_progress);
         return dict_of(
             run_to_an_orderly_end("evaluate", num_threads, {}, [&options] { return pictura::evaluate(options); }));
       },
@@ -360,6 +355,57 @@ device, simulator, renderer: 'auto' or names; renderer '': as it was trained. ri
 conditioning: numbers by name. on_progress: called with the fraction that is done and the seconds to come, from a thread of its
 own. Returns a dict: rows, one a density: its counts, and each metric as (value, half of its 95 % interval); seconds,
 agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
+  module.def(
+      "probe_removal",
+      [](const std::vector<std::string>& policies, const std::vector<std::string>& maps, const std::string& density,
+         int agents_per_world, int first_scene, int scenes, int steps, int64_t removals, int sample_steps,
+         float range_m, const std::string& control, int batch, bool argmax, uint64_t seed, int num_threads,
+         const std::string& device, const std::string& simulator, const std::string& renderer,
+         const std::string& samples, const py::dict& conditioning, const std::string& cases_file,
+         const py::object& on_progress) {
+        RemovalOptions options;
+        options.policies = policies;
+        EvaluateOptions& worlds = options.worlds;
+        worlds.maps = maps;
+        worlds.densities = {density_named(density)};
+        worlds.agents_per_world = agents_per_world;
+        worlds.first_scenario = first_scene;
+        worlds.scenarios = scenes > 0 ? scenes : default_removal_scenes(policies.size(), maps.size());
+        worlds.steps = steps;
+        worlds.argmax = argmax;
+        worlds.seed = seed;
+        worlds.num_threads = num_threads;
+        worlds.device = device;
+        worlds.simulator = simulator;
+        worlds.renderer = renderer;
+        worlds.samples = samples;
+        worlds.conditioning = texts_of(conditioning);
+        worlds.on_progress = progress_to(on_progress);
+        options.removals = removals;
+        options.sample_steps = sample_steps;
+        options.range_m = range_m;
+        options.control = removal_control_named(control);
+        options.batch = batch;
+        const RemovalResults results =
+            run_to_an_orderly_end("probe_removal", num_threads, {}, [&options] { return probe_removal(options); });
+        if (!cases_file.empty()) write_removal_cases(cases_file, results);
+        return py::module_::import("json").attr("loads")(removal_summary_json(results, summarize(results), cases_file));
+      },
+      py::arg("policies"), py::arg("maps"), py::kw_only(), py::arg("density") = "medium",
+      py::arg("agents_per_world") = 0, py::arg("first_scene") = 0, py::arg("scenes") = 0,
+      py::arg("steps") = kRemovalSteps, py::arg("removals") = RemovalOptions{}.removals,
+      py::arg("sample_steps") = RemovalOptions{}.sample_steps, py::arg("range_m") = RemovalOptions{}.range_m,
+      py::arg("control") = "none", py::arg("batch") = RemovalOptions{}.batch, py::arg("argmax") = true,
+      py::arg("seed") = 1, py::arg("num_threads") = 0, py::arg("device") = "auto", py::arg("simulator") = "auto",
+      py::arg("renderer") = "", py::arg("samples") = "", py::arg("conditioning") = py::dict(),
+      py::arg("cases_file") = "", py::arg("on_progress") = py::none(),
+      R"(How policies' value and braking change when one road user is taken away, as `pictura probe removal` asks it.
+
+policies: checkpoints or safetensors; the world is the first one's. maps, density, agents_per_world, steps and what follows
+argmax: as in evaluate(). scenes: how many scenarios are driven, an equal share by each policy; 0: as many on each map for each
+policy, two a map or more. removals: in all. sample_steps: between states. range_m: how far away a user may be. control: 'none',
+'nobody' or 'permuted'. batch: cases in a call. cases_file: a CSV file for every case. Returns a dict, that of the command's
+summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
   py::class_<PySession>(module, "PolicySession", R"(
 A saved policy: what it makes of scenes and observations, and the world and cameras that it was trained with. One thread at a
 time, also for a renderer that it is given.)")

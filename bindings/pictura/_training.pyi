@@ -5,7 +5,7 @@ from __future__ import annotations
 import collections.abc
 import pictura._pictura
 import typing
-__all__: list[str] = ['PolicySession', 'evaluate', 'train']
+__all__: list[str] = ['PolicySession', 'evaluate', 'probe_removal', 'train']
 class PolicySession:
     """
     A saved policy: what it makes of scenes and observations, and the world and cameras that it was trained with. One thread at a
@@ -62,6 +62,16 @@ def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller
     conditioning: numbers by name. on_progress: called with the fraction that is done and the seconds to come, from a thread of its
     own. Returns a dict: rows, one a density: its counts, and each metric as (value, half of its 95 % interval); seconds,
     agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
+    """
+def probe_removal(policies: collections.abc.Sequence[str], maps: collections.abc.Sequence[str], *, density: str = 'medium', agents_per_world: typing.SupportsInt | typing.SupportsIndex = 0, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, scenes: typing.SupportsInt | typing.SupportsIndex = 0, steps: typing.SupportsInt | typing.SupportsIndex = 600, removals: typing.SupportsInt | typing.SupportsIndex = 88000, sample_steps: typing.SupportsInt | typing.SupportsIndex = 10, range_m: typing.SupportsFloat | typing.SupportsIndex = 50.0, control: str = 'none', batch: typing.SupportsInt | typing.SupportsIndex = 4096, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', conditioning: dict = {}, cases_file: str = '', on_progress: typing.Any = None) -> typing.Any:
+    """
+    How policies' value and braking change when one road user is taken away, as `pictura probe removal` asks it.
+    
+    policies: checkpoints or safetensors; the world is the first one's. maps, density, agents_per_world, steps and what follows
+    argmax: as in evaluate(). scenes: how many scenarios are driven, an equal share by each policy; 0: as many on each map for each
+    policy, two a map or more. removals: in all. sample_steps: between states. range_m: how far away a user may be. control: 'none',
+    'nobody' or 'permuted'. batch: cases in a call. cases_file: a CSV file for every case. Returns a dict, that of the command's
+    summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
     """
 def train(config: str, out: str, *, overrides: collections.abc.Sequence[str] = [], old_run: str = 'refuse', init_from: str = '', minutes: typing.SupportsFloat | typing.SupportsIndex = 0.0, on_progress: typing.Any = None, on_notice: typing.Any = None) -> dict:
     """

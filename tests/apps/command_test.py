@@ -95,7 +95,7 @@ class CommandCase(unittest.TestCase):
 
 class Usage(CommandCase):
     def test_help_teaches_by_example(self):
-        for command in ["town", "map", "render", "simulate", "replay", "plot", "bench", *(["train", "evaluate"] if has_torch() else [])]:
+        for command in ["town", "map", "render", "simulate", "replay", "plot", "bench", *(["train", "evaluate", "probe"] if has_torch() else [])]:
             result = run(command, "--help")
             self.assertEqual(result.returncode, 0, result.stderr)
             self.assertIn(f"pictura {command}", result.stdout)
@@ -125,7 +125,7 @@ class Typing(CommandCase):
     COMMANDS = [
         ("town",), ("map",), ("render",), ("simulate",), ("replay",), ("train",), ("evaluate",), ("plot",), ("bench", "render"),
         ("bench", "simulate"), ("bench", "history"), ("bench", "quality"), ("bench", "soak"), ("bench", "worlds"),
-        ("bench", "train"), ("bench", "breakdown"),
+        ("bench", "train"), ("bench", "breakdown"), ("probe", "removal"),
     ]  # fmt: skip
 
     def test_numbers_are_decimal_in_any_notation(self):

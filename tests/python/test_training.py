@@ -182,6 +182,39 @@ def test_evaluation_gives_the_commands_numbers(trained):
     assert json.loads(out.stdout)["policy_hash"] == report["policy_hash"]
 
 
+def test_removal_is_the_commands(trained, tmp_path):
+    modality, folder, _, _ = trained
+    done, cases = [], tmp_path / "cases.csv"
+    options = {"scenes": 2, "steps": 40, "removals": 60, "sample_steps": 2, "agents_per_world": 20, "seed": 3, "num_threads": 2, "device": "cpu"}
+    report = pictura.probe_removal(
+        [str(folder / "checkpoint.ckpt")], ["procedural:1"], cases_file=str(cases), on_progress=lambda fraction, eta_s: done.append(fraction),
+        **options)  # fmt: skip
+    assert report["kind"] == "removal" and report["cases"] == 60 and done[-1] == 1
+    (policy,) = report["policy"]
+    assert policy["reads_images"] == (modality == "perspective") and policy["scenes_driven"] == 2 and policy["cases_driven"] == 60
+    assert sum(row["cases"] for row in report["rows"] if row["distance_from_m"] is None) == 60
+    lines = cases.read_text().splitlines()
+    assert len(lines) == 61 and lines[0].startswith("case,scene,map,driver,step,ego,user,hidden,class")
+    nobody = pictura.probe_removal([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="nobody", **options)
+    assert all(row["abs_d_value"] in (0, None) for row in nobody["rows"])
+    with pytest.raises(pictura.UsageError, match="none, nobody, permuted"):
+        pictura.probe_removal([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="some")
+    command = os.environ.get("PICTURA_COMMAND")
+    if not command:
+        pytest.skip("PICTURA_COMMAND names no command")
+    arguments = [f"--{name.replace('_', '-').replace('agents-per-world', 'agents')}={value}" for name, value in options.items()]
+    arguments = [part.replace("num-threads", "threads").replace("sample-steps", "every") for part in arguments]
+    out = subprocess.run(
+        [command, "probe", "removal", str(folder / "checkpoint.ckpt"), "--map", "procedural:1", "--out", str(tmp_path / "out"), "--json", *arguments],
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert out.returncode == 0, out.stderr
+    theirs = json.loads(out.stdout)
+    assert theirs["rows"] == report["rows"]
+    assert (tmp_path / "out" / "cases.csv").read_text() == cases.read_text()
+    assert (tmp_path / "out" / "removal.png").exists() and json.loads((tmp_path / "out" / "summary.json").read_text()) == theirs
+
+
 def test_the_documents_code_runs(tmp_path, monkeypatch, town):
     monkeypatch.chdir(tmp_path)
     text = (pathlib.Path(__file__).parents[2] / "docs" / "python.md").read_text()
@@ -196,7 +229,7 @@ def test_a_controller_is_evaluated_without_a_policy():
     assert report["rows"][0]["km_driven"] > 0.05 and report["policy_hash"] == "lane"
     with pytest.raises(pictura.UsageError, match="expected one map"):
         pictura.evaluate("", [], controller="lane")
-    with pytest.raises(pictura.UsageError, match="'light', 'medium' or 'dense', got 'thick'"):
+    with pytest.raises(pictura.UsageError, match="densities: expected light, medium, dense, got 'thick'"):
         pictura.evaluate("", ["procedural:1"], controller="lane", densities=["thick"])
 
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include <fmt/ranges.h>
+
 #include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
@@ -24,11 +26,8 @@ struct DensityOf {
   int agents;
 };
 DensityOf density_of(Density density) {
-  switch (density) {
-    case Density::light: return {"light", 60};
-    case Density::medium: return {"medium", 120};
-    default: return {"dense", 150};
-  }
+  const auto index = static_cast<size_t>(density);
+  return {kDensityNames[index], kDensityAgents[index]};
 }
 
 // Worlds that are simulated together: on a device all 200 of the paper's densities, which keep it busy. Images take no
@@ -136,12 +135,6 @@ Driver driver_of(const std::string& controller, const EvaluateOptions& options) 
   return driver;
 }
 
-CompiledMaps compile_maps_of(const EvaluateOptions& options, const SimulatorConfig& world) {
-  std::vector<std::shared_ptr<const RoadMap>> roads;
-  for (const std::string& name : options.maps) roads.push_back(load_map(name));
-  return compile_maps(roads, map_options(world), options.num_threads);
-}
-
 EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options, EvaluationWorlds* shared) {
   const CompiledMaps& maps = shared->maps;
   SimulatorConfig simulator_config = driver.world;
@@ -232,6 +225,19 @@ EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options, Ev
 }
 
 }  // namespace
+
+Density density_named(const std::string& name) {
+  for (size_t i = 0; i < kDensityNames.size(); ++i) {
+    if (name == kDensityNames[i]) return static_cast<Density>(i);
+  }
+  fail_usage("densities: expected {}, got '{}'", fmt::join(kDensityNames, ", "), name);
+}
+
+CompiledMaps compile_maps_of(const EvaluateOptions& options, const SimulatorConfig& world) {
+  std::vector<std::shared_ptr<const RoadMap>> roads;
+  for (const std::string& name : options.maps) roads.push_back(load_map(name));
+  return compile_maps(roads, map_options(world), options.num_threads);
+}
 
 SessionOptions session_options(const EvaluateOptions& options) {
   return {.num_threads = options.num_threads,

@@ -1,6 +1,7 @@
 // The paper's evaluation of a saved policy, without torch headers.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <string>
 #include <vector>
@@ -15,7 +16,12 @@ class PolicySession;
 class Renderer;
 struct SessionOptions;
 
-enum class Density { light, medium, dense };  // 60, 120 and 150 agents a world
+enum class Density { light, medium, dense };
+
+constexpr std::array<const char*, 3> kDensityNames{"light", "medium", "dense"};
+constexpr std::array<int, 3> kDensityAgents{60, 120, 150};
+/// Throws UsageError listing the names.
+Density density_named(const std::string& name);
 
 /// Worlds of training are numbered from 0 and are never as many.
 constexpr uint32_t kFirstEvaluationWorld = 0x80000000u;
@@ -70,6 +76,9 @@ struct EvaluationWorlds {
   Renderer* renderer = nullptr;          // of the session's images, with the maps as 0, 1, ...; null without images
   std::unique_ptr<Simulator> simulator;  // made by the first of them
 };
+
+/// The options' maps as a world of that configuration needs them.
+CompiledMaps compile_maps_of(const EvaluateOptions& options, const SimulatorConfig& world);
 
 /// With which the checkpoint's policy is opened.
 SessionOptions session_options(const EvaluateOptions& options);

@@ -1,0 +1,43 @@
+#include "pictura/cli/evaluation_options.h"
+
+#include "pictura/cli/map_options.h"
+#include "pictura/cli/number_options.h"
+
+namespace pictura {
+
+EvaluationArguments::EvaluationArguments() {
+  evaluate.maps = {"Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07", "Town10HD"};
+}
+
+CLI::Option* add_evaluation_options(CLI::App* command, EvaluationArguments* arguments) {
+  EvaluateOptions& options = arguments->evaluate;
+  add_map_list_option(command, &options.maps, "Maps that the scenarios are spread over, with commas between them");
+  command->add_option("--agents", options.agents_per_world, "Agents a world, instead of the densities' own numbers")
+      ->transform(whole_number(1, kMaxAgentsPerWorld));
+  command->add_option("--steps", options.steps, "Steps of 0.1 s per scenario")
+      ->transform(whole_number(1))
+      ->capture_default_str();
+  CLI::Option* const sampled = command->add_flag("--sampled", arguments->sampled,
+                                                 "Draw actions from the policy instead of taking the most likely");
+  add_seed_option(command, &options.seed, "Scenarios are drawn from it");
+  add_policy_backend_options(command, "auto, and drawn as in training", &arguments->backends);
+  command
+      ->add_option("--conditioning", options.conditioning,
+                   "What every agent is told, as collision=1, in place of a value of the configuration's "
+                   "[evaluate.conditioning]; may be given many times")
+      ->allow_extra_args(false);
+  add_threads_option(command, &options.num_threads);
+  return sampled;
+}
+
+void settle_evaluation_options(EvaluationArguments* arguments) {
+  EvaluateOptions& options = arguments->evaluate;
+  const BackendOptions& backends = arguments->backends;
+  options.argmax = !arguments->sampled;
+  if (!backends.device.empty()) options.device = backends.device;
+  if (!backends.simulator.empty()) options.simulator = backends.simulator;
+  options.renderer = backends.renderer;
+  options.samples = backends.samples;
+}
+
+}  // namespace pictura
