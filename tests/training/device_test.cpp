@@ -16,6 +16,7 @@
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 #include "pictura/tests/training/small_runs.h"
+#include "pictura/training/probes/removal.h"
 #include "pictura/training/ranks/ranks.h"
 #include "pictura/training/run.h"
 #include "pictura/training/torch_device.h"
@@ -153,6 +154,49 @@ TEST_P(EachModality, EvaluationAgreesWithTheHosts) {
     EXPECT_NEAR(b.return_per_vehicle.value, a.return_per_vehicle.value,
                 0.05 * (1 + std::abs(a.return_per_vehicle.value)));
   }
+}
+
+// Where a rounding error decides an action, states differ from then on: few cases may not be those of the host.
+TEST_F(DeviceTraining, RemovalAgreesWithTheHosts) {
+  RemovalOptions o;
+  for (const char* modality : {"perspective", "vector"}) {
+    const std::vector<std::string> more{fmt::format("policy.modality={}", modality), "train.precision=fp32",
+                                        "train.updates=1", "simulator.walls=true"};
+    o.policies.push_back(train(options(modality, "cpu", more)).checkpoint);
+  }
+  o.worlds.maps = {"procedural:1"};
+  o.worlds.agents_per_world = 40;
+  o.worlds.scenarios = 2;
+  o.worlds.steps = 9;
+  o.sample_steps = 4;
+  o.removals = 300;
+  o.worlds.device = "cpu";
+  const RemovalResults on_host = probe_removal(o);
+  o.worlds.device = "cuda";
+  const RemovalResults on_device = probe_removal(o);
+  ASSERT_EQ(on_device.cases.size(), on_host.cases.size());
+  int same = 0, hidden = 0;
+  for (size_t i = 0; i < on_host.cases.size(); ++i) {
+    const RemovalCase &a = on_host.cases[i], &b = on_device.cases[i];
+    const bool is_unseen = !b.is_in_frame() || b.visible_share == 0;
+    hidden += is_unseen;
+    EXPECT_TRUE(!is_unseen || on_device.response(i, 0).is_unchanged()) << i;
+    if (std::tie(a.scene, a.step, a.ego, a.user, a.distance_m) !=
+        std::tie(b.scene, b.step, b.ego, b.user, b.distance_m))
+      continue;
+    ++same;
+    EXPECT_EQ(a.is_in_frame(), b.is_in_frame()) << i;
+    EXPECT_TRUE(!a.is_in_frame() || std::abs(a.visible_share - b.visible_share) < 1e-3f) << i;
+    for (size_t policy = 0; policy < 2; ++policy) {
+      const RemovalResponse &x = on_host.response(i, policy), &y = on_device.response(i, policy);
+      EXPECT_NEAR(x.value, y.value, 1e-3) << i;
+      EXPECT_NEAR(x.value_without, y.value_without, 1e-3) << i;
+      EXPECT_NEAR(x.brake, y.brake, 1e-3) << i;
+      EXPECT_NEAR(x.brake_without, y.brake_without, 1e-3) << i;
+    }
+  }
+  EXPECT_GT(same, 270);
+  EXPECT_GT(hidden, 20);
 }
 
 bool equal(const std::vector<NamedTensor>& a, const std::vector<NamedTensor>& b) {

@@ -237,6 +237,11 @@ class RemovalProbe final : public EvaluationObserver {
     const EvaluateReport report = evaluate(driver.session, worlds, &shared);
     driver.worlds->simulator = std::move(shared.simulator);
     driven_ = nullptr;
+    const uint64_t state = driver.worlds->simulator->state_hash(current_stream(device_));
+    for_each_other([&](Simulator& other) {
+      PICTURA_CHECK(other.state_hash(current_stream(device_)) == state,
+                    "probe: worlds with and without auxiliary observations are in different states");
+    });
     results_.interrupted = report.interrupted;
     if (driver_ == 0) results_.setting = report.results.setting;
   }
@@ -256,8 +261,9 @@ class RemovalProbe final : public EvaluationObserver {
       const WorldSpec& spec = driven_->worlds()[world];
       const auto scene = static_cast<int>(spec.global_world - kFirstEvaluationWorld);
       int64_t& taken = taken_[scene];
-      const std::vector<DrawnCase> pairs = pairs_of(frame, world);
       const int64_t left = wanted(scene) - taken;
+      if (left == 0) continue;
+      const std::vector<DrawnCase> pairs = pairs_of(frame, world);
       const auto count = std::min((left + times_left - 1) / times_left, static_cast<int64_t>(pairs.size()));
       taken += count;
       draw(frame, pairs, static_cast<int>(count), spec.global_world, &drawn);

@@ -16,7 +16,7 @@ namespace pictura {
 enum class RemovalControl : uint8_t {
   none,      // the user that the case is about
   nobody,    // a control: nothing may change
-  permuted,  // a control: another one of the ego's road users, drawn anew for each case
+  permuted,  // a control: another one of the ego's road users, drawn anew for each case; nobody where it has none
 };
 constexpr std::array<const char*, 3> kRemovalControlNames{"none", "nobody", "permuted"};
 /// Throws UsageError listing the names.
