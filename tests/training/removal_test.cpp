@@ -85,6 +85,9 @@ TEST_F(Removal, EachPolicyDrivesAnEqualShareOfTheScenes) {
   const RemovalResults& all = results();
   ASSERT_EQ(all.cases.size(), 600u);
   ASSERT_EQ(all.responses.size(), 3 * all.cases.size());
+  EXPECT_EQ(all.policies[kAgent].name, "agent");
+  EXPECT_EQ(all.policies[kLikeForLike].name, "like_for_like");
+  EXPECT_TRUE(all.policies[kAgent].reads_images);
   std::map<int, int> of_scene;
   std::set<std::tuple<int, int, int, int>> pairs;
   for (const RemovalCase& one : all.cases) {
@@ -201,14 +204,18 @@ TEST_F(Removal, SeedsDecideWhatIsDrawn) {
   EXPECT_FALSE(same_bits(first, other));
 }
 
-TEST_F(Removal, OnePolicyOfVectorsNeedsNoImages) {
+TEST_F(Removal, PoliciesOfVectorsNeedNoImages) {
   RemovalOptions o = options(60);
-  o.policies = {policies_[kLikeForLike]};
-  o.worlds.scenarios = 1;
+  o.policies = {policies_[kLikeForLike], policies_[kLikeForLike]};
+  o.worlds.scenarios = 2;
   o.worlds.steps = 30;
   const RemovalResults one = probe_removal(o);
   EXPECT_EQ(one.cases.size(), 60u);
   EXPECT_FALSE(one.policies[0].reads_images);
+  EXPECT_THAT(one.policies[1].name, ::testing::EndsWith("like_for_like/checkpoint.ckpt (2)"));
+  for (size_t i = 0; i < one.cases.size(); ++i) {
+    EXPECT_EQ(one.response(i, 0).value_without, one.response(i, 1).value_without) << "the same policy";
+  }
   EXPECT_TRUE(std::any_of(one.cases.begin(), one.cases.end(), [](const RemovalCase& c) { return c.is_in_frame(); }));
 }
 

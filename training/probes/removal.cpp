@@ -475,16 +475,23 @@ void check(const RemovalOptions& options, size_t num_policies) {
   }
 }
 
-// Of their files; with folders where those are equal, and numbered where even these are.
+// What the figure calls a policy: its file, or its run, whose files have the same names in all runs.
+std::string short_name(const std::string& path) {
+  const std::filesystem::path absolute = std::filesystem::absolute(path);
+  const std::string stem = absolute.stem().string();
+  return stem == "checkpoint" || stem == "policy" ? absolute.parent_path().filename().string() : stem;
+}
+
+// Paths where short names are equal, and numbered where even these are.
 std::vector<std::string> names_of(const std::vector<std::string>& paths) {
   std::vector<std::string> names;
-  for (const std::string& path : paths) names.push_back(std::filesystem::path(path).stem().string());
+  for (const std::string& path : paths) names.push_back(short_name(path));
   const auto has_twin = [](const std::vector<std::string>& all, size_t i) {
     return std::count(all.begin(), all.end(), all[i]) > 1;
   };
-  const std::vector<std::string> stems = names;
+  const std::vector<std::string> short_names = names;
   for (size_t i = 0; i < names.size(); ++i) {
-    if (has_twin(stems, i)) names[i] = paths[i];
+    if (has_twin(short_names, i)) names[i] = paths[i];
   }
   for (size_t i = 0; i < names.size(); ++i) {
     if (has_twin(paths, i))

@@ -49,7 +49,7 @@ struct RemovalResponse {
 };
 
 struct ProbedPolicy {
-  std::string name;  // of its file, without folder and ending; unique
+  std::string name;  // of its file or run; unique
   std::string path, hash;
   bool reads_images = false;
 };
