@@ -74,9 +74,11 @@ function(pictura_forbid_fma target)
 endfunction()
 
 # pictura_leave_unoptimized(TARGET): for code that calls what is optimized. Optimizing takes a compiler three quarters of
-# its time with a test.
+# its time with a test. Sanitized code is little optimized anyway.
 function(pictura_leave_unoptimized target)
-  target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-O0>)
+  if(NOT PICTURA_SANITIZE)
+    target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-O0>)
+  endif()
 endfunction()
 
 # pictura_precompile(NAME HEADERS [LINK libs...]): a precompiled header of libraries' headers, which take a compiler longer
