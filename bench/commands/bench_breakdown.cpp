@@ -207,7 +207,8 @@ void draw_breakdown(const PlotArguments& plot) {
     add_point(&rendering, "the paper, H100 NVL", width_px, row.rendering);
   }
   PICTURA_CHECK(!parts.title.empty(), "--plot: expected results of bench breakdown");
-  draw_plots_png({total, rendering, parts}, plot.figure, {.panel_height_px = 640, .columns = 3, .title = "Where the time of an update goes"});
+  draw_plots_png({total, rendering, parts}, plot.figure,
+                 {.panel_height_px = 640, .columns = 3, .title = "Where the time of an update goes"});
 }
 
 void run(const Arguments& arguments) {
