@@ -70,7 +70,7 @@ def start(file, keeps):
     earlier = read(file) if keeps and file.exists() else {}
     if not head.items() <= earlier.items():
         earlier = {}
-    write(file, {"complete": False} | head | earlier | {"complete": False})
+    write(file, earlier | {"complete": False} | head)
 
 
 def finish(file):
