@@ -7,11 +7,8 @@
 #include "pictura/backends/make_renderer.h"
 #include "pictura/bindings/call.h"
 #include "pictura/bindings/objects.h"
+#include "pictura/bindings/owned_memory.h"
 #include "pictura/common/scene_file.h"
-#ifdef PICTURA_HAS_CUDA
-#include "pictura/common/cuda/device_buffer.h"
-#include "pictura/common/cuda/device_guard.h"
-#endif
 
 namespace pictura::python {
 
@@ -114,7 +111,7 @@ class Images {
     // Of the largest elements first, so that all are aligned.
     const size_t depth_bytes = plane_pixels * sizeof(float), instance_bytes = plane_pixels * sizeof(uint16_t);
     const size_t color_bytes = (layout_.bytes() + 7) / 8 * 8;
-    uint8_t* at = allocate(color_bytes + depth_bytes + instance_bytes + plane_pixels);
+    uint8_t* at = memory_.allocate(color_bytes + depth_bytes + instance_bytes + plane_pixels, device_, "images");
     first_ = at;
     float* depth = reinterpret_cast<float*>(at + color_bytes);
     auto* instance = reinterpret_cast<uint16_t*>(at + color_bytes + depth_bytes);
@@ -164,19 +161,6 @@ class Images {
   const CameraImages& memory(size_t camera) const { return cameras_[camera]; }
 
  private:
-  uint8_t* allocate(size_t bytes) {
-    if (device_.is_host()) {
-      host_.resize(bytes);
-      return host_.data();
-    }
-#ifdef PICTURA_HAS_CUDA
-    const DeviceGuard guard(device_);
-    on_device_ = DeviceBuffer<uint8_t>(bytes);
-    return on_device_.data();
-#else
-    fail("images: this build has no CUDA");
-#endif
-  }
   LentArray lend(const std::shared_ptr<Images>& self, void* data, ElementType type, Dims shape, const char* what) {
     return {Array(data, type, shape, device_), self, stream_, false, what};
   }
@@ -184,10 +168,7 @@ class Images {
   ImageLayout layout_;
   Device device_;
   Stream stream_;
-  std::vector<uint8_t> host_;
-#ifdef PICTURA_HAS_CUDA
-  DeviceBuffer<uint8_t> on_device_;
-#endif
+  OwnedMemory memory_;
   uint8_t* first_ = nullptr;
   std::vector<CameraImages> cameras_;
 };

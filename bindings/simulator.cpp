@@ -10,6 +10,7 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/bindings/call.h"
 #include "pictura/bindings/objects.h"
+#include "pictura/bindings/owned_memory.h"
 #include "pictura/drawing/world.h"
 #include "pictura/simulator/agent_state_arrays.h"
 #include "pictura/simulator/conditioning_lookup.h"
@@ -325,7 +326,7 @@ class PySimulator {
         const int64_t values = config.observes(array.part) ? count * array.rows * array.features : 0;
         begins.push_back(place(values, bytes_of(array.type)));
       }
-      uint8_t* const first = allocate(num_bytes, device);
+      uint8_t* const first = memory_.allocate(num_bytes, device, "observe");
       size_t i = 0;
 #define X(name, type, rows, features, part, comment)                                                             \
   if (config.observes(part)) {                                                                                   \
@@ -339,23 +340,7 @@ class PySimulator {
 
    private:
     static constexpr size_t kAlignment = 64;
-    uint8_t* allocate(size_t num_bytes, Device device) {
-      if (device.is_host()) {
-        on_host_.resize(num_bytes);
-        return on_host_.data();
-      }
-#ifdef PICTURA_HAS_CUDA
-      const DeviceGuard guard(device);
-      on_device_ = DeviceBuffer<uint8_t>(num_bytes);
-      return on_device_.data();
-#else
-      fail("observe: this build has no CUDA");
-#endif
-    }
-    std::vector<uint8_t> on_host_;
-#ifdef PICTURA_HAS_CUDA
-    DeviceBuffer<uint8_t> on_device_;
-#endif
+    OwnedMemory memory_;
     ObservationView view_;
   };
 
