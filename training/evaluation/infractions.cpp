@@ -91,6 +91,8 @@ const char* to_string(CollisionPartner partner) {
   constexpr const char* kNames[] = {"", "vehicle", "cyclist", "pedestrian", "parked car"};
   return kNames[static_cast<size_t>(partner)];
 }
+const char* to_string(AgentClass agent_class) { return to_string(partner_of(agent_class)); }
+
 const char* to_string(PartnerMotion motion) {
   constexpr const char* kNames[] = {"", "moving", "standing", "halted"};
   return kNames[static_cast<size_t>(motion)];
@@ -286,8 +288,8 @@ void write_infractions_csv(const std::string& path, const std::vector<Infraction
         "{},{},{},{},{},{},{:d},{:d},{:d},{:d},{:d},{:.2f},{:.2f},{:.2f},{:.2f},{:.2f},{:.3f},{},{:d},{:d},{},{},{},{},"
         "{:.2f},"
         "{:.1f},{:.1f}\n",
-        one.agents_per_world, one.scenario, csv_quoted(one.map), one.agent, to_string(partner_of(one.agent_class)),
-        one.step, one.is(kEventAtFault), one.is(kEventCollision), one.is(kEventOffRoad), one.is(kEventRedLight),
+        one.agents_per_world, one.scenario, csv_quoted(one.map), one.agent, to_string(one.agent_class), one.step,
+        one.is(kEventAtFault), one.is(kEventCollision), one.is(kEventOffRoad), one.is(kEventRedLight),
         one.is(kEventWall), one.position_m.x, one.position_m.y, one.position_m.z, one.speed_mps, one.lane_offset_m,
         one.lane_angle_rad, csv_quoted(to_string(one.shape)), one.changed_lane, one.before_merge,
         to_string(one.partner), to_string(one.partner_motion), to_string(one.contact), one.partner_agent,

@@ -20,6 +20,7 @@ enum class Contact : uint8_t { none, rear_end, side_swipe, crossing, head_on };
 enum class RoadShape : uint8_t { no_lane, straight, curve, junction_straight, junction_left, junction_right };
 
 const char* to_string(CollisionPartner partner);
+const char* to_string(AgentClass agent_class);
 const char* to_string(PartnerMotion motion);
 const char* to_string(Contact contact);
 const char* to_string(RoadShape shape);

@@ -11,21 +11,13 @@
 #include "pictura/common/error.h"
 #include "pictura/common/support/output_file.h"
 #include "pictura/training/evaluation/csv.h"
+#include "pictura/training/evaluation/infractions.h"
 
 namespace pictura {
 
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-const char* name_of(AgentClass agent_class) {
-  switch (agent_class) {
-    case AgentClass::vehicle: return "vehicle";
-    case AgentClass::cyclist: return "cyclist";
-    case AgentClass::pedestrian: return "pedestrian";
-  }
-  return "";
-}
 
 int occlusion_bin(const RemovalCase& one) {
   if (!one.is_in_frame()) return -1;
@@ -168,7 +160,7 @@ void write_removal_cases(const std::string& path, const RemovalResults& results)
     fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{},{},{},{:d},{:.3f},{:.3f},{:d},", i, one.scene,
                    csv_quoted(results.setting.maps[static_cast<size_t>(one.map)]),
                    csv_quoted(results.policies[static_cast<size_t>(one.driver)].name), one.step, one.ego, one.user,
-                   one.hidden < 0 ? "" : std::to_string(one.hidden), name_of(one.user_class), one.user_halted,
+                   one.hidden < 0 ? "" : std::to_string(one.hidden), to_string(one.user_class), one.user_halted,
                    one.distance_m, one.ego_speed_mps, one.is_in_frame());
     if (one.is_in_frame()) fmt::format_to(std::back_inserter(text), "{}", one.occlusion());
     for (size_t policy = 0; policy < results.policies.size(); ++policy) {
