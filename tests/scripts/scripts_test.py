@@ -268,6 +268,9 @@ class Record(unittest.TestCase):
     def test_what_is_kept_is_of_the_same_sources(self):
         self.bench("echo '{}'")
         self.assertEqual(len(self.record("start", "--keep")[1]["bench"]), 1)
+        self.assertFalse(self.record("start", "--keep")[1]["complete"])
+        self.record("finish")
+        self.assertTrue(self.record("start", "--keep")[1]["complete"])
         self.assertNotIn("bench", self.record("start")[1])
         self.bench("echo '{}'")
         (self.folder / "CMakeLists.txt").write_text("project(something)")
