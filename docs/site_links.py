@@ -1,28 +1,43 @@
-"""For mkdocs, which reads pages otherwise than GitHub in two ways:
+"""For mkdocs, which reads pages otherwise than GitHub in three ways:
 
 - links to files outside of docs/ become the names of these files, since the site does not hold them;
-- a list or a table needs an empty line before it, which pages that are read as files go without.
+- a list or a table needs an empty line before it, which pages that are read as files go without;
+- what belongs to an item of a list is indented by four columns.
 """
 
 import re
+
+ITEM = re.compile(r" *([-*] |\d+\. )")
 
 
 def on_page_markdown(markdown, page, **_):
     depth = page.file.src_uri.count("/")
     outside = re.compile(r"\[([^\]]*)\]\((?:\.\./){%d}([^)#]*)[^)]*\)" % (depth + 1))
-    return separate_blocks(outside.sub(lambda link: f"{link[1]} (`{link[2]}` in the repository)", markdown))
+    return as_python_markdown(outside.sub(lambda link: f"{link[1]} (`{link[2]}` in the repository)", markdown))
 
 
-def separate_blocks(markdown):
-    lines, in_code, before = [], False, ""
+def as_python_markdown(markdown):
+    lines, in_code = [], False
+    block = ""  # what the lines since the last empty one are: text, an item's text, a table, or code
+    items = []  # of the open items, outermost first: the column at which their text begins
     for line in markdown.split("\n"):
-        if line.startswith("```"):
-            in_code = not in_code
-        kind = "list" if re.match(r"([-*]|\d+\.) ", line) else "table" if line.startswith("|") else "text" if line.strip() else ""
-        if before == "list" and kind == "text" and line.startswith(" "):
-            kind = "list"  # an item goes on
-        if not in_code and kind in ("list", "table") and before not in ("", kind):
-            lines.append("")
-        lines.append(line)
-        before = "" if in_code else kind
+        text = line.lstrip(" ")
+        column = len(line) - len(text)
+        if text and not in_code:
+            while items and column < items[-1]:
+                items.pop()
+        shift = 4 * len(items) - items[-1] if items and text else 0
+        if not in_code and text:
+            item = ITEM.match(line) if column < 4 + (items[-1] if items else 0) else None
+            kind = "item" if item else "table" if text.startswith("|") else block if block in ("item", "table") else "text"
+            if block and kind != block and (kind == "table" or block != "item"):
+                lines.append("")
+            block = kind
+            if item:
+                items.append(item.end())
+        elif not in_code:
+            block = ""
+        lines.append(" " * (column + shift) + text)
+        if text.startswith("```"):
+            in_code, block = not in_code, "code" if in_code else ""
     return "\n".join(lines)
