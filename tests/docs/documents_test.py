@@ -20,7 +20,7 @@ ROOT = commands.ROOT
 
 
 def documents():
-    found = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "bench/README.md")]
+    found = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "bench/README.md", "models/README.md")]
     return found + sorted((ROOT / "docs").rglob("*.md"))
 
 

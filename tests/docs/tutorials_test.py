@@ -1,5 +1,5 @@
-"""The commands of README and the tutorials, run as a reader would, in one folder and one after the other; with fewer updates, steps and
-agents.
+"""The commands of README, the tutorials and some pages of reference, run as a reader would, in one folder and one after the
+other; with fewer updates, steps and agents.
 
 Run by ctest: python3 tutorials_test.py PICTURA.
 """
@@ -18,9 +18,10 @@ from documents_test import command_lines
 
 PICTURA = ""
 ROOT = commands.ROOT
-PAGES = [ROOT / "README.md"] + [ROOT / f"docs/tutorials/{name}.md" for name in ("first_run", "reward", "rig", "map", "look")]
+PAGES = [ROOT / "README.md"] + [ROOT / f"docs/tutorials/{name}.md" for name in ("first_run", "gpu", "reward", "rig", "map", "look")]
+PAGES += [ROOT / "docs/evaluation.md", ROOT / "docs/training.md"]
 # Of what takes long, less.
-AT_MOST = {"--steps": 20, "--agents": 8, "--scenarios": 2, "--episodes": 1, "--follow": 3}
+AT_MOST = {"--steps": 20, "--agents": 8, "--scenarios": 2, "--episodes": 1, "--follow": 3, "--egos": 8, "--slots": 32}
 # What a page in a browser waits for has tests of its own (tests/replay/live_test.py).
 WAITS = "--serve"
 
@@ -32,10 +33,15 @@ def shorter(line):
             words[i + 1] = str(min(int(words[i + 1]), AT_MOST[word]))
         if word == "--config":
             words[i + 1] = "configs/smoke.toml"
+        if word == "--backend":
+            words[i + 1] = "cpu"
     if words[0] in ("evaluate", "replay") and "--steps" not in words:
         words += ["--steps", str(AT_MOST["--steps"])]
     if words[0] == "train":
-        words += ["--set", "train.updates=1", "--set", "simulator.num_slots=8", "--overwrite"]
+        words += ["--set", "train.updates=1", "--set", "simulator.num_slots=8"]
+        words += [] if "--resume" in words else ["--overwrite"]
+    if words[0] == "bench":
+        words += ["--repeats", "1", "--repeat-seconds", "0.1"] if words[1] in ("render", "simulate") else []
     return words
 
 
@@ -43,7 +49,8 @@ class Tutorials(unittest.TestCase):
     def test_every_command_does_what_it_says(self):
         folder = pathlib.Path(tempfile.mkdtemp())
         self.addCleanup(shutil.rmtree, folder)
-        (folder / "configs").symlink_to(ROOT / "configs")
+        for name in ("configs", "models"):
+            (folder / name).symlink_to(ROOT / name)
         subprocess.run([PICTURA, "town", "--seed", "7", "--blocks", "2x2", "--out", folder / "mytown.xodr"], check=True, capture_output=True)
         count, written = 0, set()
         for page in PAGES:
