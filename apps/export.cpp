@@ -1,6 +1,7 @@
 // `pictura export`: the weights of a policy without the run that made it, to release them or to read them with other
 // tools.
 #include "pictura/apps/commands.h"
+#include "pictura/cli/backend_options.h"
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/commit.h"
@@ -20,7 +21,7 @@ void add_export_command(CLI::App& app) {
   command
       ->add_option("--weights", arguments->weights,
                    "bf16: rounded to 8 significant bits, half the size; f32: as they are")
-      ->check(CLI::IsMember({"bf16", "f32"}))
+      ->check(one_of({"bf16", "f32"}).description("{bf16,f32}"))
       ->capture_default_str();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "pictura/apps/commands.h"
+#include "pictura/cli/backend_options.h"
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/drawing/run_plot.h"
@@ -45,7 +46,7 @@ void add_plot_command(CLI::App& app) {
       ->check(file_ending(".png"))
       ->capture_default_str();
   command->add_option("--x", arguments->x, "Over agent-steps, or hours of collecting and improving")
-      ->check(CLI::IsMember({"agent_steps", "hours"}))
+      ->check(one_of({"agent_steps", "hours"}).description("{agent_steps,hours}"))
       ->capture_default_str();
   command
       ->add_option("--metrics", arguments->plot.metrics,
@@ -58,7 +59,7 @@ void add_plot_command(CLI::App& app) {
           "--group", arguments->group,
           "seeds: runs whose config.toml differ in run.seed alone are one line, their mean, with a band from the "
           "lowest to the highest; none: a line each")
-      ->check(CLI::IsMember({"seeds", "none"}))
+      ->check(one_of({"seeds", "none"}).description("{seeds,none}"))
       ->capture_default_str();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(

@@ -46,7 +46,7 @@ void add_train_command(CLI::App& app) {
       "LOCAL_RANK, MASTER_ADDR and MASTER_PORT say so; sizes are those of all together, and rank 0 reports and "
       "writes.\n"
       "Examples:\n  pictura train --config configs/demo.toml --out runs/demo\n"
-      "  pictura train --config configs/town01.toml --set run.seed=3 --set train.updates=50 --out runs/town01\n"
+      "  pictura train --config configs/town01.toml --set run.seed=3 --set train.updates=50 --out runs/seed3\n"
       "  pictura train --config configs/town01.toml --out runs/town01 --resume --minutes 25\n"
       "  torchrun --nproc-per-node 2 --no-python pictura train --config configs/paper.toml --out runs/paper");
   command->callback([arguments] {

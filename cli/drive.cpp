@@ -24,8 +24,8 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
   // What a command sets beforehand is its default; else the policy decides, or the simulator.
   const SimulatorConfig simulator;
   auto with_default = [](const char* what, auto preset, auto simulators) {
-    return fmt::format("{}; default: {}{}", what, preset ? "" : "as the policy was trained, else ",
-                       preset.value_or(simulators));
+    return fmt::format("{}; default: {}{}", what, preset.value_or(simulators),
+                       preset ? "" : ", or, with a trained policy, what it was trained with");
   };
   command
       ->add_option("--pedestrians", options_out->pedestrian_fraction,

@@ -180,7 +180,7 @@ class Reader {
     if (!node) return;
     value = text_of(key, *node);
     if (any_name_ || std::find(known.begin(), known.end(), value) != known.end()) return;
-    refuse(key, *node, fmt::format("expected one of {}", fmt::join(known, ", ")));
+    refuse_name(key, *node, value, known);
   }
 
   void device(const std::string& key, std::string& value) {
@@ -269,7 +269,7 @@ class Reader {
       if (text == name) return void(value = chosen);
       known.push_back(name);
     }
-    refuse(key, *node, fmt::format("expected one of {}", fmt::join(known, ", ")));
+    refuse_name(key, *node, text, known);
   }
 
   void range(const std::string& key, ConditioningRange& value) {
@@ -308,6 +308,12 @@ class Reader {
   }
 
  private:
+  [[noreturn]] void refuse_name(const std::string& key, const toml::node& node, const std::string& name,
+                                const std::vector<std::string>& known) const {
+    refuse(key,
+           fmt::format("expected one of {}, got {}{}", fmt::join(known, ", "), shown(node), suggestion(name, known)));
+  }
+
   const toml::node* find(const std::string& key) {
     known_.insert(key);
     for (size_t dot = key.find('.'); dot != std::string::npos; dot = key.find('.', dot + 1)) {

@@ -13,6 +13,7 @@
 #include "pictura/cli/report.h"
 #include "pictura/commit.h"
 #include "pictura/common/error.h"
+#include "pictura/common/support/suggestion.h"
 #include "pictura/map/load_map.h"
 
 namespace pictura {
@@ -51,7 +52,8 @@ std::vector<std::string> named_maps(const std::vector<std::string>& maps) {
 void check_backends(const std::vector<std::string>& backends, const std::vector<std::string>& known) {
   for (const std::string& backend : backends) {
     if (std::find(known.begin(), known.end(), backend) != known.end()) continue;
-    fail_usage("--backend: expected one of {}; got '{}'", fmt::join(known, ", "), backend);
+    fail_usage("--backend: expected one of {}; got '{}'{}", fmt::join(known, ", "), backend,
+               suggestion(backend, known));
   }
 }
 

@@ -227,14 +227,16 @@ void add_render_benchmark(CLI::App& bench) {
   command->add_option("--samples", arguments->samples, "Samples of a pixel, for gl: 1, N (MSAA) or NxN (supersampling)")
       ->delimiter(',')
       ->capture_default_str();
-  command->add_option("--format", arguments->format)->check(CLI::IsMember({"u8", "f16", "f32"}))->capture_default_str();
+  command->add_option("--format", arguments->format, "Type of a channel's value")
+      ->check(one_of({"u8", "f16", "f32"}).description("{u8,f16,f32}"))
+      ->capture_default_str();
   command->add_flag("--planes", arguments->planes, "Draw depth, class and instance planes too");
   command->add_flag("--host-memory", arguments->host_memory,
                     "Keep scenes and images in host memory for cuda and gl:egl, which otherwise use device memory");
   command
       ->add_option("--sweep", arguments->sweep,
                    "sizes: the paper's five and 768x432; squares: without walls; egos: 64 to 20,480")
-      ->check(CLI::IsMember({"sizes", "squares", "egos"}));
+      ->check(one_of({"sizes", "squares", "egos"}).description("{sizes,squares,egos}"));
   command->add_flag("--memory", arguments->memory, "Measure device memory of a single case instead of rates");
   command
       ->add_option("--check", arguments->checked_views,

@@ -168,7 +168,7 @@ void add_simulate_benchmark(CLI::App& bench) {
       ->add_option(
           "--sweep", arguments->sweep,
           fmt::format("agents: {} worlds of 1 to 1,024; worlds: 1 to 4,096 of {} agents", kSweptWorlds, kSweptAgents))
-      ->check(CLI::IsMember({"agents", "worlds"}))
+      ->check(one_of({"agents", "worlds"}).description("{agents,worlds}"))
       ->excludes(worlds)
       ->excludes(slots);
   command->add_option("--warm-up", arguments->warm_up_steps, "Steps before timing")

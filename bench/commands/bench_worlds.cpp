@@ -50,7 +50,7 @@ void add_worlds_benchmark(CLI::App& bench) {
   CLI::App* command =
       bench.add_subcommand("worlds", "Distributions over many episodes: who is there, what befalls them");
   add_maps_option(command, &arguments->maps, "all towns of the map folder, else procedural:1");
-  command->add_option("--episodes", arguments->options.episodes)
+  command->add_option("--episodes", arguments->options.episodes, "Episodes on each map")
       ->transform(whole_number(1, 10'000))
       ->capture_default_str();
   command->add_option("--agents", arguments->options.agents, "Asked for in each world")

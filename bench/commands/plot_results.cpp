@@ -15,8 +15,12 @@ bool wants_plot(const PlotArguments& arguments) {
 }
 
 void add_repeat_options(CLI::App* command, RateArguments* arguments) {
-  command->add_option("--repeats", arguments->repeats)->transform(whole_number(1))->capture_default_str();
-  command->add_option("--repeat-seconds", arguments->repeat_s)->transform(number(1e-3, 3600))->capture_default_str();
+  command->add_option("--repeats", arguments->repeats, "Measurements of each case; the median is printed")
+      ->transform(whole_number(1))
+      ->capture_default_str();
+  command->add_option("--repeat-seconds", arguments->repeat_s, "Least length of a measurement, s")
+      ->transform(number(1e-3, 3600))
+      ->capture_default_str();
   command->add_flag("--json", arguments->json, "Print one JSON object");
 }
 

@@ -167,12 +167,14 @@ class Typing(CommandCase):
         self.assert_refused(2, "unknown option '--sede'; did you mean '--seed'?", "town", "--sede", 3)
         self.assert_refused(2, "unexpected argument 'b'", "map", "a", "b")
         self.assert_refused(2, "did you mean 'null'?", "simulate", "procedural:1", "--renderer", "nul")
+        self.assert_refused(2, "expected one of seeds, none; got 'seed'; did you mean 'seeds'?", "plot", "runs", "--group", "seed")
         (self.folder / "Town01.xodr").write_text("")
         with unittest.mock.patch.dict(os.environ, {"PICTURA_DATA": str(self.folder)}):
             self.assert_refused(2, "did you mean 'Town01'?", "map", "town01")
         if has_torch():
             self.assert_refused(2, "unknown subcommand 'trian'; did you mean 'train'?", "trian")
             self.assert_refused(2, "unknown option '--confg'; did you mean '--config'?", "train", "--confg", "a.toml")
+            self.assert_refused(1, "got 'bf61'; did you mean 'bf16'?", "train", "--config", CONFIGS / "smoke.toml", "--set", "train.precision=bf61", "--out", "x")
         else:
             self.assert_refused(2, "pictura train: this build has no torch", "train", "--config", "a.toml")
 

@@ -73,6 +73,7 @@ TEST(Config, NumbersMayBeWrittenInAnyDecimalNotation) {
 
 TEST(Config, UnknownKeysSuggestTheNearest) {
   EXPECT_THAT(message_of("", {"train.updats=1"}), HasSubstr("did you mean 'train.updates'?"));
+  EXPECT_THAT(message_of("", {"train.precision=bf61"}), HasSubstr("got 'bf61'; did you mean 'bf16'?"));
   EXPECT_EQ(message_of("", {"trian.updates=1"}), "--set trian.updates: unknown key; did you mean 'train.updates'?");
   EXPECT_THAT(message_of("", {"train.zebra=1"}), HasSubstr("docs/configuration.md names every key"));
 }
