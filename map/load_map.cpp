@@ -48,7 +48,9 @@ std::string file_path_of(const std::string& name) {
   std::vector<std::string> known = towns;
   known.emplace_back(kProcedural);
   fail_usage("map '{}': expected an {} file, procedural[:SEED[:OPTIONS]], or a town in {}, which has {}{}", name,
-             kExtension, map_folder(), towns.empty() ? "none" : fmt::format("{}", fmt::join(towns, ", ")),
+             kExtension, map_folder(),
+             towns.empty() ? "none: CARLA's come with CARLA, as Maps/OpenDrive/*.xodr"
+                           : fmt::format("{}", fmt::join(towns, ", ")),
              suggestion(name, known));
 }
 
