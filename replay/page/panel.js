@@ -36,10 +36,10 @@ class Panel {
   makeActions() {
     const grid = byId("actions"), cells = [];
     grid.append(make("span"));
-    for (const name of ["right", "straight", "left"]) grid.append(make("span", name));
+    for (const name of ["left", "straight", "right"]) grid.append(make("span", name));
     for (let long = 3; long >= 0; --long) {
       grid.append(make("span", LONG_JERKS[long].replace("-", "\u2212")));
-      for (let lat = 0; lat < 3; ++lat) {
+      for (let lat = 2; lat >= 0; --lat) {
         const cell = cells[3 * long + lat] = make("div", "\u00a0");
         cell.title = `jerk ${LONG_JERKS[long]} m/s3 along, ${LAT_JERKS[lat]} m/s3 to the left`;
         grid.append(cell);
