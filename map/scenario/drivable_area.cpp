@@ -8,7 +8,6 @@ namespace pictura {
 
 namespace {
 
-constexpr float kHeightWeight = 3.0f;
 constexpr float kCell_m = 10.0f;
 constexpr float kSameLevel_m = 2.0f;
 constexpr float kMeet_m = 0.01f;   // ends of pieces of one polyline
@@ -22,57 +21,35 @@ Aabb2 box_of(Vec2 a, Vec2 b, float margin_m) {
 
 }  // namespace
 
-DrivableArea::DrivableArea(const RoadMap& map) {
+SideEdges side_edges_of(const RoadMap& map) {
+  SideEdges sides;
+  std::vector<SideEdge>& edges = sides.edges;
   std::vector<Aabb2> boxes;
   std::size_t first = 0;  // of the polyline
   const auto finish = [&](std::size_t end) {
-    if (end - first > 1 && length((edges_[end - 1].b_m - edges_[first].a_m).xy()) <= kClosed_m) {
-      edges_[end - 1].next = static_cast<int32_t>(first);
-      edges_[first].before = static_cast<int32_t>(end - 1);
+    if (end - first > 1 && length((edges[end - 1].b_m - edges[first].a_m).xy()) <= kClosed_m) {
+      edges[end - 1].next = static_cast<int32_t>(first);
+      edges[first].before = static_cast<int32_t>(end - 1);
     }
     first = end;
   };
   for (const RoadEdge& edge : map.road_edges) {
-    const std::size_t index = edges_.size();
+    const std::size_t index = edges.size();
     const Vec2 way = (edge.b_m - edge.a_m).xy();
     const float length_m = length(way);
-    Edge added{edge.a_m, edge.b_m, Vec2{-way.y, way.x} * (1.0f / max_of(length_m, 1e-6f))};
-    if (index > first && length((edges_.back().b_m - edge.a_m).xy()) <= kMeet_m) {
-      edges_.back().next = static_cast<int32_t>(index);
+    SideEdge added{edge.a_m, edge.b_m, Vec2{-way.y, way.x} * (1.0f / max_of(length_m, 1e-6f))};
+    if (index > first && length((edges.back().b_m - edge.a_m).xy()) <= kMeet_m) {
+      edges.back().next = static_cast<int32_t>(index);
       added.before = static_cast<int32_t>(index) - 1;
     } else {
       finish(index);
     }
-    edges_.push_back(added);
+    edges.push_back(added);
     boxes.push_back(box_of(edge.a_m.xy(), edge.b_m.xy(), 0));
   }
-  finish(edges_.size());
-  grid_ = Grid(boxes, kCell_m);
-}
-
-DrivableArea::Side DrivableArea::side_of(Vec3 position_m) const {
-  Side best;
-  best.distance_m = kReach_m;
-  const Vec2 p = position_m.xy();
-  // Most edges are near: wider rings are looked at only where nearer ones hold none.
-  for (const float reach_m : {5.0f, 15.0f, kReach_m}) {
-    visit_items(grid_.view(), box_of(p, p, reach_m), [&](std::size_t index) {
-      const Edge& edge = edges_[index];
-      const Vec2 a = edge.a_m.xy(), way = (edge.b_m - edge.a_m).xy();
-      const float t = clamp(dot(p - a, way) / max_of(dot(way, way), 1e-12f), 0.0f, 1.0f);
-      const Vec2 away = p - (a + way * t);
-      const float dz = kHeightWeight * (position_m.z - (edge.a_m.z + t * (edge.b_m.z - edge.a_m.z)));
-      const float distance_m = std::sqrt(dot(away, away) + dz * dz);
-      if (distance_m >= best.distance_m) return;
-      Vec2 normal = edge.left;
-      const int32_t neighbor = t <= 0 ? edge.before : t >= 1 ? edge.next : -1;
-      if (neighbor >= 0) normal = normal + edges_[static_cast<std::size_t>(neighbor)].left;
-      best = {static_cast<int32_t>(index), distance_m, dot(away, normal) <= 0};
-    });
-    if (best.edge >= 0 && best.distance_m <= reach_m) break;
-  }
-  if (best.edge < 0) best.distance_m = 0;
-  return best;
+  finish(edges.size());
+  sides.cells = Grid(boxes, kCell_m);
+  return sides;
 }
 
 bool DrivableArea::touches_edge(const GroundBox& box) const {
@@ -80,9 +57,9 @@ bool DrivableArea::touches_edge(const GroundBox& box) const {
   const float half_length = 0.5f * box.length_m, half_width = 0.5f * box.width_m;
   const float reach_m = half_length + half_width;
   bool touches = false;
-  visit_items(grid_.view(), box_of(box.center_m.xy(), box.center_m.xy(), reach_m), [&](std::size_t index) {
+  visit_items(sides_.cells.view(), box_of(box.center_m.xy(), box.center_m.xy(), reach_m), [&](std::size_t index) {
     if (touches) return;
-    const Edge& edge = edges_[index];
+    const SideEdge& edge = sides_.edges[index];
     const Vec2 a = (edge.a_m - box.center_m).xy(), way = (edge.b_m - edge.a_m).xy();
     // The part of the edge that is between both pairs of sides.
     float begin = 0, end = 1;

@@ -8,6 +8,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/grid.h"
 #include "pictura/map/road_map.h"
+#include "pictura/map/scenario/road_side.h"
 #include "pictura/map/scenario/scenario.h"
 
 namespace pictura {
@@ -19,33 +20,25 @@ struct GroundBox {
   float length_m = 0, width_m = 0;
 };
 
-/// Copies what it needs of the map. Of two edges that meet, the one is asked in whose direction the place lies: at a
-/// corner the side is that of the sum of both unit normals, which is right for any angle between them (Baerentzen and
-/// Aanaes, Signed distance computation using the angle weighted pseudonormal, 2005). Heights count threefold, so that
-/// the edges of a bridge are not nearest to what passes under it.
+/// The edges of a map, for road_side(), and the cells that they touch.
+struct SideEdges {
+  std::vector<SideEdge> edges;  // as RoadMap::road_edges
+  Grid cells;
+};
+SideEdges side_edges_of(const RoadMap& map);
+
+/// Copies what it needs of the map.
 class DrivableArea {
  public:
-  explicit DrivableArea(const RoadMap& map);
+  explicit DrivableArea(const RoadMap& map) : sides_(side_edges_of(map)) {}
 
-  struct Side {
-    int32_t edge = -1;       // the nearest one of RoadMap::road_edges; -1: none within kReach_m
-    float distance_m = 0;    // to it, heights threefold
-    bool is_on_road = true;  // also where there is no edge
-  };
-  static constexpr float kReach_m = 50.0f;
-  Side side_of(Vec3 position_m) const;
+  RoadSide side_of(Vec3 position_m) const { return road_side(sides_.edges, sides_.cells.view(), position_m); }
 
   /// Whether an edge on the box's level (heights within 2 m) is inside the box or crosses it.
   bool touches_edge(const GroundBox& box) const;
 
  private:
-  struct Edge {
-    Vec3 a_m, b_m;
-    Vec2 left;                       // unit normal, away from the road
-    int32_t before = -1, next = -1;  // the edges that meet it at its ends
-  };
-  std::vector<Edge> edges_;
-  Grid grid_;
+  SideEdges sides_;
 };
 
 /// How well logged traffic and the map's edges agree: over the steps of vehicles that move.

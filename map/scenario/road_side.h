@@ -1,0 +1,79 @@
+// On which side of the road's edges a place is: the rule by which a map that says only where its edges are has a
+// drivable area, the same code on both devices.
+#pragma once
+
+#include "pictura/common/grid_view.h"
+#include "pictura/common/math.h"
+
+namespace pictura {
+
+/// An edge with the road on its right.
+struct SideEdge {
+  Vec3 a_m, b_m;
+  Vec2 left;                       // unit normal, away from the road
+  int32_t before = -1, next = -1;  // the edges that meet it at its ends
+};
+
+struct RoadSide {
+  int32_t edge = -1;       // the nearest one; -1: none within kRoadSideReach_m
+  float distance_m = 0;    // to it, heights threefold
+  bool is_on_road = true;  // also where there is no edge
+};
+constexpr float kRoadSideReach_m = 50.0f;
+
+/// One thread that shares its loops with nobody; the simulator's rules have groups of several.
+struct NoGroup {
+  PICTURA_HD static int rank() { return 0; }
+  PICTURA_HD static int size() { return 1; }
+  template <typename T>
+  PICTURA_HD static T of_lowest(float, int, const T& value) {
+    return value;
+  }
+};
+
+/// The side of the nearest edge, of equally near ones the first. Heights count threefold, so that the edges of a bridge
+/// are not nearest to what passes under it. At a corner the side is that of the sum of both unit normals, which is
+/// right for any angle between them (Baerentzen and Aanaes, Signed distance computation using the angle weighted
+/// pseudonormal, 2005). `cells` lists the edges that touch each.
+template <typename ThreadGroup = NoGroup>
+PICTURA_HD RoadSide road_side(Span<const SideEdge> edges, const GridView& cells, Vec3 position_m,
+                              const ThreadGroup& group = {}) {
+  constexpr float kHeightWeight = 3.0f;
+  RoadSide best;
+  best.distance_m = kRoadSideReach_m;
+  if (edges.empty()) return {};
+  const Vec2 p = position_m.xy();
+  const auto look_at = [&](int32_t index) {
+    const SideEdge& edge = edges[static_cast<size_t>(index)];
+    const Vec2 a = edge.a_m.xy(), way = (edge.b_m - edge.a_m).xy();
+    const float t = clamp(dot(p - a, way) / max_of(dot(way, way), 1e-12f), 0.0f, 1.0f);
+    const Vec2 away = p - (a + way * t);
+    const float dz = kHeightWeight * (position_m.z - (edge.a_m.z + t * (edge.b_m.z - edge.a_m.z)));
+    const float distance_m = sqrtf(dot(away, away) + dz * dz);
+    if (distance_m > best.distance_m || (distance_m == best.distance_m && (best.edge < 0 || index >= best.edge))) {
+      return;
+    }
+    Vec2 normal = edge.left;
+    const int32_t neighbor = t <= 0.0f ? edge.before : t >= 1.0f ? edge.next : -1;
+    if (neighbor >= 0) normal = normal + edges[static_cast<size_t>(neighbor)].left;
+    best = {index, distance_m, dot(away, normal) <= 0.0f};
+  };
+  // Most edges are near: wider rings are looked at only where nearer ones hold none.
+  const float reaches_m[] = {5.0f, 15.0f, kRoadSideReach_m};
+  for (const float reach_m : reaches_m) {
+    const int x0 = cells.cell_x(p.x - reach_m), x1 = cells.cell_x(p.x + reach_m);
+    for (int y = cells.cell_y(p.y - reach_m); y <= cells.cell_y(p.y + reach_m); ++y) {
+      const int32_t end = cells.begin[static_cast<size_t>(y * cells.num_x + x1 + 1)];
+      for (int32_t i = cells.begin[static_cast<size_t>(y * cells.num_x + x0)] + group.rank(); i < end;
+           i += group.size()) {
+        look_at(cells.items[static_cast<size_t>(i)]);
+      }
+    }
+    best = group.of_lowest(best.distance_m, best.edge < 0 ? static_cast<int>(edges.size()) : best.edge, best);
+    if (best.edge >= 0 && best.distance_m <= reach_m) break;
+  }
+  if (best.edge < 0) best.distance_m = 0;
+  return best;
+}
+
+}  // namespace pictura
