@@ -39,18 +39,35 @@ uint64_t fingerprint_of(const RoadMap& map) {
   return hash.value();
 }
 
+/// What is recorded counts as well.
+uint64_t fingerprint_of(const RoadMap& map, const MapRecord& record) {
+  static_assert(sizeof(RecordedAgent) == 7 * sizeof(float) && sizeof(RecordedState) == 6 * sizeof(float));
+  Hash64 hash;
+  add_values(&hash, fingerprint_of(map), record.num_steps);
+  hash.add(Span<const RecordedAgent>(record.agents));
+  hash.add(Span<const RecordedState>(record.states));
+  return hash.value();
+}
+
 }  // namespace
 
 std::shared_ptr<const CompiledMap> compile_map(std::shared_ptr<const RoadMap> road, const MapOptions& options) {
+  std::shared_ptr<CompiledMap> map = compile_map(std::move(road), options, MapRecord{});
+  PICTURA_CHECK(!map->rules.spawn_lanes.empty(),
+                "map {}: expected a lane outside junctions from which a route goes on for ever, got none",
+                map->road->name);
+  return map;
+}
+
+std::shared_ptr<CompiledMap> compile_map(std::shared_ptr<const RoadMap> road, const MapOptions& options,
+                                         MapRecord record) {
   if (!road) fail_usage("simulator: expected maps, got a null pointer");
   auto map = std::make_shared<CompiledMap>();
   const MapGeometryOptions geometry_options{.walls = options.walls, .wall_seed = options.wall_seed};
   const std::vector<WallFace> walls = options.walls ? make_walls(*road, geometry_options) : std::vector<WallFace>{};
-  map->rules = make_map_rules(*road, walls, options.observe_walls);
-  PICTURA_CHECK(!map->rules.spawn_lanes.empty(),
-                "map {}: expected a lane outside junctions from which a route goes on for ever, got none", road->name);
+  map->fingerprint = record.agents.empty() ? fingerprint_of(*road) : fingerprint_of(*road, record);
+  map->rules = make_map_rules(*road, walls, options.observe_walls, std::move(record));
   map->geometry = make_static_geometry(*road, geometry_options);
-  map->fingerprint = fingerprint_of(*road);
   map->options = options;
   map->road = std::move(road);
   return map;

@@ -11,6 +11,7 @@
 
 namespace pictura {
 
+struct Scenario;
 struct SimulatorConfig;
 
 struct MapOptions {
@@ -22,6 +23,8 @@ struct MapOptions {
 
 struct CompiledMap {
   std::shared_ptr<const RoadMap> road;
+  std::shared_ptr<const Scenario> scenario;  // the recorded scene that it is the map of, or null
+  int32_t start_step = 0;                    // of the recording, at which episodes start
   MapOptions options;
   MapRules rules;            // what the simulator's rules read
   StaticGeometry geometry;   // what renderers draw
@@ -30,6 +33,9 @@ struct CompiledMap {
 
 /// Throws Error naming the map when agents cannot drive on it, or can nowhere spawn; UsageError for a null pointer.
 std::shared_ptr<const CompiledMap> compile_map(std::shared_ptr<const RoadMap> road, const MapOptions& options = {});
+/// The same with what was recorded there, so that nobody spawns; see compile_scenario().
+std::shared_ptr<CompiledMap> compile_map(std::shared_ptr<const RoadMap> road, const MapOptions& options,
+                                         MapRecord record);
 
 /// Several, by num_threads host threads (0: all).
 std::vector<std::shared_ptr<const CompiledMap>> compile_maps(const std::vector<std::shared_ptr<const RoadMap>>& roads,

@@ -7,8 +7,15 @@
 
 namespace pictura {
 
-/// How a controlled agent stands in its episode. Halted agents stay where they are, in everybody's way.
-enum class AgentStatus : uint8_t { active, halted, parked, absent };
+/// How a controlled agent stands in its episode. Halted agents stay where they are, in everybody's way. Recorded ones
+/// are where the record of their world's scene has them: they are met and seen, but nothing happens to them, until an
+/// action makes them active.
+enum class AgentStatus : uint8_t { active, halted, parked, absent, recorded };
+
+/// Whether an action would move an agent: it drives, or is where its record has it.
+PICTURA_HD constexpr bool takes_actions(AgentStatus status) {
+  return status == AgentStatus::active || status == AgentStatus::recorded;
+}
 
 /// Why an agent found no place at the start of its episode.
 enum class SpawnFailure : uint8_t {

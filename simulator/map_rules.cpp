@@ -7,6 +7,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/grid.h"
 #include "pictura/simulator/rules/collision.h"
+#include "pictura/simulator/rules/limits.h"
 #include "pictura/simulator/rules/observe.h"
 #include "pictura/simulator/rules/road.h"
 
@@ -208,6 +209,21 @@ void add_parking_spots(const RoadMap& map, MapRules* out) {
   }
 }
 
+/// Takes the record, and with it how large and how fast anything on the map can be.
+void add_record(MapRecord record, MapRules* out) {
+  out->max_box_radius_m = kMaxBoxRadius_m;
+  out->max_speed_mps = kMaxSpeed_mps;
+  for (const RecordedAgent& agent : record.agents) {
+    out->max_box_radius_m = std::max(out->max_box_radius_m, 0.5f * std::hypot(agent.length_m, agent.width_m));
+  }
+  for (size_t i = 1; i < record.states.size(); ++i) {
+    const RecordedState &before = record.states[i - 1], &now = record.states[i];
+    if (i % static_cast<size_t>(record.num_steps) == 0 || !before.is_there || !now.is_there) continue;
+    out->max_speed_mps = std::max(out->max_speed_mps, length((now.position_m - before.position_m).xy()) / record.dt_s);
+  }
+  out->record = std::move(record);
+}
+
 template <typename Item, typename ToBox>
 Grid cells_of(const std::vector<Item>& items, ToBox&& to_box) {
   std::vector<Aabb2> boxes;
@@ -336,8 +352,10 @@ CellLists lists_of_stop_lines(const MapRules& map, const std::string& map_name) 
 
 }  // namespace
 
-MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool observe_walls) {
+MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool observe_walls, MapRecord record) {
   MapRules out;
+  if (!record.agents.empty()) out.sides = side_edges_of(map);
+  add_record(std::move(record), &out);
   add_lanes(map, &out);
   PICTURA_CHECK(!out.segments.empty(), "map {}: expected at least one drivable lane, got none", map.name);
   add_barriers(map, walls, &out);
@@ -357,8 +375,8 @@ MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool obs
     return box_of_segment(a, a + segment.direction * segment.length_m,
                           std::max(kLaneReach_m, segment.half_width_m + kSeamTolerance_m));
   });
-  const auto barrier_box = [](const Barrier& barrier) {
-    return box_of_segment(barrier.a_m, barrier.b_m, kMaxBoxRadius_m);
+  const auto barrier_box = [&out](const Barrier& barrier) {
+    return box_of_segment(barrier.a_m, barrier.b_m, out.max_box_radius_m);
   };
   out.edge_cells = cells_of(out.edges, barrier_box);
   out.wall_cells = cells_of(out.walls, barrier_box);
@@ -423,6 +441,13 @@ MapView MapRules::view() const {
   view.near_boundary_pieces = near_boundary_pieces.view();
   view.near_wall_pieces = near_wall_pieces.view();
   view.near_stop_lines = near_stop_lines.view();
+  view.recorded_agents = record.agents;
+  view.recorded_states = record.states;
+  view.recorded_steps = record.num_steps;
+  view.side_edges = sides.edges;
+  view.side_cells = sides.cells.view();
+  view.max_box_radius_m = max_box_radius_m;
+  view.max_speed_mps = max_speed_mps;
   return view;
 }
 

@@ -8,6 +8,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/scene.h"
 #include "pictura/map/road_map.h"
+#include "pictura/map/scenario/drivable_area.h"
 #include "pictura/simulator/rules/map_view.h"
 #include "pictura/simulator/walkways.h"
 
@@ -22,6 +23,14 @@ struct CellLists {
   std::vector<int32_t> items;
 
   GridView view() const { return {origin_m, cell_m, num_x, num_y, begin, items}; }
+};
+
+/// What a map was recorded with; empty for most maps.
+struct MapRecord {
+  std::vector<RecordedAgent> agents;
+  std::vector<RecordedState> states;  // [agents, steps]
+  int32_t num_steps = 0;
+  float dt_s = 0.1f;
 };
 
 struct MapRules {
@@ -39,6 +48,9 @@ struct MapRules {
   Grid segment_cells, edge_cells, wall_cells, stop_line_cells, walk_cells;
   CellLists near_lane_pieces, near_boundary_pieces, near_wall_pieces, near_stop_lines;
   Vec2 low_m, high_m;
+  MapRecord record;
+  SideEdges sides;  // where there is a record
+  float max_box_radius_m = 0, max_speed_mps = 0;
 
   MapView view() const;
   /// Of all arrays of the view in one piece of memory, each aligned to kMapAlignment_bytes.
@@ -47,6 +59,7 @@ struct MapRules {
 constexpr size_t kMapAlignment_bytes = 256;
 
 /// Walls can be observed on it if `observe_walls`. Throws Error naming the map when it has no drivable lane.
-MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool observe_walls = false);
+MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool observe_walls = false,
+                        MapRecord record = {});
 
 }  // namespace pictura

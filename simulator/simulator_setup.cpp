@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "pictura/common/error.h"
+#include "pictura/map/scenario/scenario.h"
 #include "pictura/simulator/rules/limits.h"
 
 namespace pictura {
@@ -73,6 +74,17 @@ void check(const SimulatorConfig& config, const CompiledMaps& maps, const std::v
     if (world.num_agents < 1 || world.num_agents > kMaxAgentsPerWorld) {
       fail_usage("simulator: world {}: expected 1 to {} agents, got {}", world.global_world, kMaxAgentsPerWorld,
                  world.num_agents);
+    }
+    const CompiledMap& map = *maps[static_cast<size_t>(world.map)];
+    if (!map.scenario) continue;
+    if (static_cast<size_t>(world.num_agents) != map.scenario->tracks.size()) {
+      fail_usage("simulator: world {}: expected as many agents as scene {} has tracks, {}, got {}", world.global_world,
+                 map.scenario->id, map.scenario->tracks.size(), world.num_agents);
+    }
+    constexpr float kSameStep = 0.01f;  // of the recording's: WOMD's steps are of 0.10002 s or so
+    if (std::abs(config.dt_s - map.scenario->dt_s) > kSameStep * map.scenario->dt_s) {
+      fail_usage("simulator: dt_s: expected the {} s of scene {}, got {}", map.scenario->dt_s, map.scenario->id,
+                 config.dt_s);
     }
   }
   const SimulatorCapacity needs = capacity_of(maps, worlds);

@@ -74,18 +74,18 @@ void check_restored(const SimulatorSetup& setup, const SimulatorState& state, co
                   "simulator state: world {}: episode_step: {} is out of range", w, state.episode_step[w]);
     PICTURA_CHECK(state.episode_index[w] >= 0, "simulator state: world {}: episode_index: {} is out of range", w,
                   state.episode_index[w]);
-  }
-  for (const std::vector<AgentBox>* boxes : {&state.boxes, &state.boxes_before}) {
-    for (size_t i = 0; i < boxes->size(); ++i) {
-      const AgentBox& box = (*boxes)[i];
-      const Vec3 at = box.center_m;
-      // Comparisons are false for what is not a number.
-      PICTURA_CHECK(std::fabs(at.x) <= kMaxCoordinate_m && std::fabs(at.y) <= kMaxCoordinate_m &&
-                        std::fabs(at.z) <= kMaxCoordinate_m && std::fabs(box.cos_heading) <= 1.001f &&
-                        std::fabs(box.sin_heading) <= 1.001f && box.length_m >= 0 && box.width_m >= 0 &&
-                        box.height_m >= 0 && radius(box) <= kMaxBoxRadius_m && box.height_m <= kMaxCoordinate_m &&
-                        static_cast<int>(box.agent_class) < kNumAgentClasses,
-                    "simulator state: boxes: box {}: pose, size or class is out of range", i);
+    for (const std::vector<AgentBox>* boxes : {&state.boxes, &state.boxes_before}) {
+      for (auto i = static_cast<size_t>(setup.box_begin[w]); i < static_cast<size_t>(setup.box_begin[w + 1]); ++i) {
+        const AgentBox& box = (*boxes)[i];
+        const Vec3 at = box.center_m;
+        // Comparisons are false for what is not a number.
+        PICTURA_CHECK(std::fabs(at.x) <= kMaxCoordinate_m && std::fabs(at.y) <= kMaxCoordinate_m &&
+                          std::fabs(at.z) <= kMaxCoordinate_m && std::fabs(box.cos_heading) <= 1.001f &&
+                          std::fabs(box.sin_heading) <= 1.001f && box.length_m >= 0 && box.width_m >= 0 &&
+                          box.height_m >= 0 && radius(box) <= map.max_box_radius_m &&
+                          box.height_m <= kMaxCoordinate_m && static_cast<int>(box.agent_class) < kNumAgentClasses,
+                      "simulator state: boxes: box {}: pose, size or class is out of range", i);
+      }
     }
   }
   for (size_t i = 0; i < state.light_plans.size(); ++i) {
@@ -271,7 +271,11 @@ std::string rejection_text(int64_t rejected) {
     case CommandKind::kinematic_state:
       return fmt::format("slot {}: expected a kinematic state within {} m, {} rad and {} m/s, got one beyond", slot,
                          kMaxCommanded_m, kMaxCommanded_rad, kMaxCommanded_mps);
-    default: return fmt::format("slot {}: expected a command that is an action, a kinematic state or absence", slot);
+    case CommandKind::recorded:
+      return fmt::format("slot {}: expected a world on a recorded scene, since it is told to follow the record", slot);
+    default:
+      return fmt::format("slot {}: expected a command that is an action, a kinematic state, absence or the record",
+                         slot);
   }
 }
 

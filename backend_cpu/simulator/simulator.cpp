@@ -271,7 +271,7 @@ class SimulatorCpu final : public Simulator {
     for (int agent = 0; agent < world.num_agents; ++agent) {
       const int chosen = chosen_try_[static_cast<size_t>(world.first_slot + agent)];
       place_agent(world, agent, chosen);
-      spawned += chosen >= 0;
+      spawned += joins_episode(world, chosen);
     }
     worlds_.state.spawned[index] = spawned;
     sort_into_cells(world, &worlds_.box_cells[index]);
@@ -296,7 +296,7 @@ class SimulatorCpu final : public Simulator {
     for (int agent = 0; agent < world.num_agents; ++agent) {
       const auto slot = static_cast<size_t>(world.first_slot + agent);
       results.valid[slot] = takes_part(world, agent, commands[slot]);
-      advance(world, agent, commands[slot]);
+      advance(world, agent, commands[slot], steps);
     }
     sort_into_cells(world, &worlds_.box_cells[index]);
     for (int agent = 0; agent < world.num_agents; ++agent) find_collisions(world, agent);
@@ -307,7 +307,7 @@ class SimulatorCpu final : public Simulator {
     for (int agent = 0; agent < world.num_agents; ++agent) {
       apply_reward_and_halt(world, agent, steps, results);
       count_agent(world, agent, results, bin_of(agent));
-      active += is_active(world, agent);
+      active += keeps_episode(world, agent);
     }
     for (int light = 0; light < static_cast<int>(world.map.stop_lines.size()); ++light) {
       world.lights[light] = light_state(world.light_plans[light], steps);

@@ -53,6 +53,19 @@ class CudaIdleController final : public Controller {
   Device device_;
 };
 
+class CudaLogController final : public Controller {
+ public:
+  explicit CudaLogController(Device device) : device_(device) {}
+  std::string_view name() const override { return "log"; }
+  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
+    check_controller_arrays(name(), input, device_, mask, commands_out);
+    write(RecordedCommands{}, mask, commands_out, stream);
+  }
+
+ private:
+  Device device_;
+};
+
 template <typename T>
 void read(Span<T> device, std::vector<std::remove_const_t<T>>* host_out, cudaStream_t stream) {
   host_out->resize(device.size());
@@ -119,9 +132,11 @@ class CudaLaneController final : public Controller {
 }  // namespace
 
 std::unique_ptr<Controller> make_cuda_controller(const std::string& name, const Simulator& simulator, uint64_t seed) {
+  check_worlds(name, simulator);
   if (name == "random") return std::make_unique<CudaRandomController>(simulator.device(), seed);
   if (name == "idle") return std::make_unique<CudaIdleController>(simulator.device());
   if (name == "lane") return std::make_unique<CudaLaneController>(simulator);
+  if (name == "log") return std::make_unique<CudaLogController>(simulator.device());
   fail_usage("controller: expected one of {}; got '{}'", fmt::join(host_controller_names(), ", "), name);
 }
 

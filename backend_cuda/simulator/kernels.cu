@@ -250,4 +250,9 @@ void launch_commands(const IdleCommands& rule, int32_t num_slots, const uint8_t*
   DeviceLaunch{{stream}}.threads(num_slots, WriteCommands<IdleCommands>{rule, mask, commands_out});
 }
 
+void launch_commands(const RecordedCommands& rule, int32_t num_slots, const uint8_t* mask, Command* commands_out,
+                     cudaStream_t stream) {
+  DeviceLaunch{{stream}}.threads(num_slots, WriteCommands<RecordedCommands>{rule, mask, commands_out});
+}
+
 }  // namespace pictura::cuda

@@ -28,5 +28,7 @@ void launch_commands(const RandomCommands& rule, int32_t num_slots, const uint8_
                      cudaStream_t stream);
 void launch_commands(const IdleCommands& rule, int32_t num_slots, const uint8_t* mask, Command* commands_out,
                      cudaStream_t stream);
+void launch_commands(const RecordedCommands& rule, int32_t num_slots, const uint8_t* mask, Command* commands_out,
+                     cudaStream_t stream);
 
 }  // namespace pictura::cuda

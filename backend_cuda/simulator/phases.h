@@ -200,7 +200,7 @@ PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const Wo
   team.for_each(1, [&](int) { *spawned_out = 0; });
   team.template for_each_by_groups<kThreadsPerAgent>(world.num_agents, [&](const auto& group, int agent) {
     place_agent(world, agent, scratch.chosen_try[agent], group);
-    if (group.rank() == 0 && scratch.chosen_try[agent] >= 0) team.add(spawned_out, 1);
+    if (group.rank() == 0 && joins_episode(world, scratch.chosen_try[agent])) team.add(spawned_out, 1);
   });
 }
 
@@ -278,7 +278,7 @@ struct Advance {
       const CommandType& command = commands[slot];
       const bool drives = takes_part(world, agent, command);
       if (group.rank() == 0) arrays.results.valid[slot] = drives;
-      advance(world, agent, command, group);
+      advance(world, agent, command, arrays.episode_step[w] + 1, group);
     } else if (group.rank() == 0) {
       const WorldView next = arrays.next_world(w);
       clear_result(arrays.results, slot);
@@ -375,7 +375,7 @@ struct FinishStep {
     int active = 0;
     for_each_agent([&](int agent, SimulatorTotals* part) {
       count_agent(world, agent, arrays.results, part);
-      active += is_active(world, agent);
+      active += keeps_episode(world, agent);
     });
     const bool ends = episode_ends(world.options, steps, arrays.spawned[w], group.sum(active));
     for_each_agent([&](int agent, SimulatorTotals* part) { finish_agent(world, agent, ends, arrays.results, part); });

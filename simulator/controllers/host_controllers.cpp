@@ -2,6 +2,7 @@
 
 #include "pictura/common/array.h"
 #include "pictura/common/error.h"
+#include "pictura/map/scenario/scenario.h"
 #include "pictura/simulator/controllers/lane_keeping.h"
 #include "pictura/simulator/rules/control.h"
 
@@ -49,14 +50,39 @@ class IdleController final : public Controller {
   }
 };
 
+class LogController final : public Controller {
+ public:
+  std::string_view name() const override { return "log"; }
+  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream) override {
+    check_controller_arrays(name(), input, Device{}, mask, commands_out);
+    fill(RecordedCommands{}, mask, commands_out);
+  }
+};
+
 }  // namespace
 
-std::vector<std::string> host_controller_names() { return {"random", "idle", "lane"}; }
+std::vector<std::string> host_controller_names() { return {"random", "idle", "lane", "log"}; }
+
+void check_worlds(std::string_view controller, const Simulator& simulator) {
+  for (const WorldSpec& world : simulator.worlds()) {
+    const CompiledMap& map = *simulator.maps()[static_cast<size_t>(world.map)];
+    if (controller == "log" && !map.scenario) {
+      fail_usage("controller log: world {}: expected a recorded scene, got map {}, of which there is no record",
+                 world.global_world, map.road->name);
+    }
+    if (controller == "lane" && map.scenario) {
+      fail_usage("controller lane: world {}: expected a map whose lanes go on for ever, got recorded scene {}",
+                 world.global_world, map.scenario->id);
+    }
+  }
+}
 
 std::unique_ptr<Controller> make_host_controller(const std::string& name, const Simulator& simulator, uint64_t seed) {
+  check_worlds(name, simulator);
   if (name == "random") return std::make_unique<RandomController>(seed);
   if (name == "idle") return std::make_unique<IdleController>();
   if (name == "lane") return std::make_unique<LaneKeepingController>(simulator);
+  if (name == "log") return std::make_unique<LogController>();
   fail_usage("controller: expected one of {}; got '{}'", fmt::join(host_controller_names(), ", "), name);
 }
 

@@ -11,8 +11,12 @@
 
 namespace pictura {
 
-/// "random", "idle" (no jerk), or "lane": the lane keeper, see lane_keeping.h.
+/// "random", "idle" (no jerk), "lane" (the lane keeper, see lane_keeping.h), or "log" (as recorded).
 std::vector<std::string> host_controller_names();
+
+/// Throws UsageError naming the first world on a map without a record, which "log" cannot drive in; or with one, whose
+/// lanes end, which "lane" cannot.
+void check_worlds(std::string_view controller, const Simulator& simulator);
 
 /// Throws UsageError listing the known names, or Error where the simulator's memory is not the host's.
 std::unique_ptr<Controller> make_host_controller(const std::string& name, const Simulator& simulator, uint64_t seed);

@@ -45,4 +45,13 @@ struct IdleCommands {
   PICTURA_HD Command operator()(size_t) const { return {}; }
 };
 
+/// As recorded.
+struct RecordedCommands {
+  PICTURA_HD Command operator()(size_t) const {
+    Command command;
+    command.kind = CommandKind::recorded;
+    return command;
+  }
+};
+
 }  // namespace pictura

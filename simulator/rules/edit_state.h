@@ -17,7 +17,8 @@ PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions
   PICTURA_AGENT_FIELDS(X)
 #undef X
   const auto status = static_cast<AgentStatus>(agents.status[slot]);
-  if (status != AgentStatus::active && status != AgentStatus::halted && status != AgentStatus::absent) {
+  if (status != AgentStatus::active && status != AgentStatus::halted && status != AgentStatus::absent &&
+      !(status == AgentStatus::recorded && has_record(map))) {
     return AgentField::status;
   }
   if (agents.agent_class[slot] >= kNumAgentClasses) return AgentField::agent_class;
@@ -30,7 +31,7 @@ PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions
   const bool is_way = class_of(agents, slot) == AgentClass::pedestrian
                           ? goal_lane >= 0 && static_cast<size_t>(goal_lane) < map.walk_pieces.size()
                           : is_lane(goal_lane);
-  if (!is_way && !(goal_lane == -1 && status == AgentStatus::absent)) return AgentField::goal_lane;
+  if (!is_way && !(goal_lane == -1 && (status == AgentStatus::absent || has_record(map)))) return AgentField::goal_lane;
   if (agents.next_waypoint[slot] < 0 || agents.next_waypoint[slot] >= kNumWaypoints) return AgentField::next_waypoint;
   if (agents.goal_chains[slot] < 0) return AgentField::goal_chains;
   if (agents.first_motion_step[slot] < 0 || agents.first_motion_step[slot] > options.episode_steps) {
@@ -43,7 +44,7 @@ PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions
   if (agents.length_m[slot] < 0) return AgentField::length_m;
   if (agents.width_m[slot] < 0) return AgentField::width_m;
   if (agents.height_m[slot] < 0 || agents.height_m[slot] > kMaxCommanded_m) return AgentField::height_m;
-  if (square(agents.length_m[slot]) + square(agents.width_m[slot]) > square(2.0f * kMaxBoxRadius_m)) {
+  if (square(agents.length_m[slot]) + square(agents.width_m[slot]) > square(2.0f * map.max_box_radius_m)) {
     return AgentField::length_m;
   }
   return AgentField::none;

@@ -21,22 +21,31 @@ PICTURA_HD inline void clear_result(const StepArrays& results, int slot) {
   results.sums[slot] = {};
 }
 
-/// Commands to agents that are not active are ignored.
+/// Commands to agents that take no actions are ignored. Without a record nobody can follow it.
 template <typename CommandType>
 PICTURA_HD bool accepts(const WorldView& world, int agent, const CommandType& command) {
-  return !is_active(world, agent) || is_sound(command);
+  if (!takes_actions(world, agent)) return true;
+  return is_sound(command) && (has_record(world.map) || !tells_to_follow_record(command));
 }
 
-/// Whether a step is one of the agent's own: it was active before and is not told to leave.
+/// Whether a step is one of the agent's own: it drives, or begins to, and is told neither to leave nor to follow its
+/// record.
 template <typename CommandType>
 PICTURA_HD bool takes_part(const WorldView& world, int agent, const CommandType& command) {
-  return is_active(world, agent) && !tells_to_leave(command);
+  return takes_actions(world, agent) && !tells_to_leave(command) && !tells_to_follow_record(command);
+}
+
+/// Whether the agent counts among those that still drive when it is asked whether an episode ends: who follows a
+/// record does, also where that has nothing.
+PICTURA_HD inline bool keeps_episode(const WorldView& world, int agent) {
+  const auto status = static_cast<AgentStatus>(world.agents.status[world.first_slot + agent]);
+  return takes_actions(status) || (status == AgentStatus::absent && has_record(world.map));
 }
 
 /// A command that a step refused, in one word that a host reads whole: slot, kind, and the action of an action.
 constexpr int64_t kNothingRejected = -1;
 PICTURA_HD constexpr int64_t rejected_command(int32_t slot, CommandKind kind, int32_t action) {
-  const auto kind_bits = static_cast<int64_t>(static_cast<uint32_t>(kind) < 3 ? static_cast<uint32_t>(kind) : 3u);
+  const auto kind_bits = static_cast<int64_t>(static_cast<uint32_t>(kind) < 4 ? static_cast<uint32_t>(kind) : 4u);
   return (kind_bits << 60) | (static_cast<int64_t>(slot) << 32) | static_cast<uint32_t>(action);
 }
 PICTURA_HD constexpr int64_t rejected_command(int32_t slot, int32_t action) {

@@ -24,9 +24,9 @@ PICTURA_HD constexpr ClassLimits class_limits(AgentClass agent_class) {
   }
 }
 
-/// No class is faster.
+/// No class is faster. Recorded traffic may be: rules ask the map (MapView::max_speed_mps, max_box_radius_m).
 constexpr float kMaxSpeed_mps = 20.0f;
-/// No box has a longer half-diagonal.
+/// No box of a class has a longer half-diagonal.
 constexpr float kMaxBoxRadius_m = 3.2f;
 /// No step lasts longer: contact with barriers is looked for at its end alone.
 constexpr float kMaxStep_s = 0.1f;

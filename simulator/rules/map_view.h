@@ -6,6 +6,7 @@
 #include "pictura/common/grid_view.h"
 #include "pictura/common/math.h"
 #include "pictura/common/span.h"
+#include "pictura/map/scenario/road_side.h"
 
 namespace pictura {
 
@@ -86,6 +87,21 @@ struct alignas(16) ObservedPiece {
 };
 static_assert(sizeof(ObservedPiece) == 8 * sizeof(float));
 
+/// A road user of the scene that a map was recorded with.
+struct RecordedAgent {
+  int32_t agent_class = 0;  // AgentClass
+  float length_m = 0, width_m = 0, height_m = 0;
+  Vec3 goal_m;  // its reference point at the end of its record
+};
+
+/// Where it is at one step.
+struct RecordedState {
+  Vec3 position_m;  // its reference point
+  float heading_rad = 0;
+  float speed_mps = 0;  // signed, along the heading
+  int32_t is_there = 0;
+};
+
 struct MapView {
   Span<const LaneSegment> segments;
   Span<const MapLane> lanes;
@@ -105,7 +121,16 @@ struct MapView {
   GridView walk_cells;                                                // of pairs of walk_pieces
   GridView near_lane_pieces, near_boundary_pieces, near_wall_pieces;  // per cell and sector
   GridView near_stop_lines;
+  Span<const RecordedAgent> recorded_agents;  // of the scene, in the order of its worlds' agents; or none
+  Span<const RecordedState> recorded_states;  // [recorded_agents, recorded_steps]
+  Span<const SideEdge> side_edges;            // of maps with a record: on which side of them the road is
+  GridView side_cells;
+  int32_t recorded_steps = 0;                     // the first one is where episodes start
+  float max_box_radius_m = 0, max_speed_mps = 0;  // no box has a longer half-diagonal, and nothing is faster
 };
+
+/// Whether the map comes from a recorded scene: all agents of its worlds are the scene's.
+PICTURA_HD inline bool has_record(const MapView& map) { return !map.recorded_agents.empty(); }
 
 /// Calls visit(&span) for every array of the view, so that they can be copied to another memory.
 template <typename Visit>
@@ -129,9 +154,13 @@ PICTURA_HD void visit_arrays(MapView* view, Visit&& visit) {
   visit(&view->lane_middles);
   visit(&view->boundary_middles);
   visit(&view->wall_middles);
-  GridView* const lists[] = {&view->segment_cells,        &view->edge_cells,       &view->wall_cells,
-                             &view->stop_line_cells,      &view->walk_cells,       &view->near_lane_pieces,
-                             &view->near_boundary_pieces, &view->near_wall_pieces, &view->near_stop_lines};
+  visit(&view->recorded_agents);
+  visit(&view->recorded_states);
+  visit(&view->side_edges);
+  GridView* const lists[] = {
+      &view->segment_cells,   &view->edge_cells,       &view->wall_cells,           &view->stop_line_cells,
+      &view->walk_cells,      &view->near_lane_pieces, &view->near_boundary_pieces, &view->near_wall_pieces,
+      &view->near_stop_lines, &view->side_cells};
   for (GridView* cells : lists) {
     visit(&cells->begin);
     visit(&cells->items);

@@ -72,9 +72,11 @@ PICTURA_HD LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float heading
   return group.of_lowest(best_score, best_item, best);
 }
 
-/// Whether a point lies on the drivable surface of its level: within half a width of some drivable lane's centre line.
+/// Whether a point lies on the drivable surface of its level: within half a width of some drivable lane's centre line;
+/// on maps with a record, whose lanes do not say how far the road goes, on the road's side of the nearest edge.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool is_on_road(const MapView& map, Vec2 p, float z_m, const ThreadGroup& group = {}) {
+  if (has_record(map)) return road_side(map.side_edges, map.side_cells, {p.x, p.y, z_m}, group).is_on_road;
   const Span<const int32_t> items = items_at(map.segment_cells, p);
   bool is_on = false;
   for (size_t i = static_cast<size_t>(group.rank()); i < items.size() && !is_on;

@@ -3,7 +3,7 @@
 
 #include "pictura/simulator/rules/collision.h"
 #include "pictura/simulator/rules/goal.h"
-#include "pictura/simulator/rules/walk.h"
+#include "pictura/simulator/rules/record.h"
 #include "pictura/simulator/rules/world_view.h"
 
 namespace pictura {
@@ -29,23 +29,28 @@ PICTURA_HD inline RandomStream agent_stream(const WorldView& world, int agent, u
                        .purpose = purpose});
 }
 
-/// Clears the agent's fields and draws its class, size and conditioning. It is absent until place_agent finds a place.
+/// Clears the agent's fields and draws its class, size and conditioning, or takes class and size from the record. It
+/// is absent until place_agent finds a place.
 PICTURA_HD inline void draw_agent(const WorldView& world, int agent) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
   reset_fields(agents, slot);
   RandomStream class_random = agent_stream(world, agent, 0, Purpose::agent_class);
   const float u = class_random.uniform();
-  const AgentClass agent_class = u < world.options.pedestrian_fraction ? AgentClass::pedestrian
-                                 : u < world.options.pedestrian_fraction + world.options.cyclist_fraction
-                                     ? AgentClass::cyclist
-                                     : AgentClass::vehicle;
+  AgentClass agent_class = u < world.options.pedestrian_fraction ? AgentClass::pedestrian
+                           : u < world.options.pedestrian_fraction + world.options.cyclist_fraction
+                               ? AgentClass::cyclist
+                               : AgentClass::vehicle;
+  if (has_record(world.map)) {
+    agent_class = static_cast<AgentClass>(world.map.recorded_agents[static_cast<size_t>(agent)].agent_class);
+  }
   const ClassLimits limits = class_limits(agent_class);
   RandomStream size_random = agent_stream(world, agent, 0, Purpose::agent_size);
   agents.agent_class[slot] = static_cast<uint8_t>(agent_class);
   agents.length_m[slot] = size_random.uniform(limits.min_length_m, limits.max_length_m);
   agents.width_m[slot] = size_random.uniform(limits.min_width_m, limits.max_width_m);
   agents.height_m[slot] = limits.height_m;
+  if (has_record(world.map)) store_recorded_size(world, agent);
 
   RandomStream conditioning_random = agent_stream(world, agent, 0, Purpose::conditioning);
   float* conditioning = agents.conditioning + slot * kNumConditioning;
@@ -70,7 +75,7 @@ PICTURA_HD bool is_clear(const WorldView& world, const AgentBox& box, int begin,
   for (int i = begin + group.rank(); i < end && !is_taken; i += group.size()) {
     const AgentBox& other = world.boxes[i];
     const Vec2 apart = (other.center_m - box.center_m).xy();
-    if (!other.drawn || dot(apart, apart) > square(radius(inflated) + kMaxBoxRadius_m)) continue;
+    if (!other.drawn || dot(apart, apart) > square(radius(inflated) + world.map.max_box_radius_m)) continue;
     is_taken = same_level(inflated, other) && overlap(footprint(inflated), footprint(other));
   }
   return !group.any(is_taken);
@@ -86,20 +91,8 @@ PICTURA_HD bool touches_barrier(const MapView& map, const AgentBox& box, const T
   return touches_any(footprint(box), box.center_m.z, map.edges, map.edge_cells, group) || touches_wall(map, box, group);
 }
 
-/// Where pedestrians walk, and everybody else drives.
-PICTURA_HD inline bool walks(const WorldView& world, int agent) {
-  return class_of(world.agents, world.first_slot + agent) == AgentClass::pedestrian;
-}
-
 PICTURA_HD inline LanePose pose_of(const WorldView& world, int agent, RoutePoint at) {
   return walks(world, agent) ? pose_on_walk(world.map, at.lane, at.s_m) : pose_on_lane(world.map, at.lane, at.s_m);
-}
-
-template <typename ThreadGroup>
-PICTURA_HD LaneFit fit_agent(const WorldView& world, int agent, Vec2 p, float z_m, float heading_rad,
-                             int32_t current_lane, const ThreadGroup& group) {
-  return walks(world, agent) ? fit_walk(world.map, p, z_m, heading_rad, current_lane, group)
-                             : fit_lane(world.map, p, z_m, heading_rad, current_lane, group);
 }
 
 /// The next waypoint of a pedestrian: the gap, and then on until no parked car stands there.
@@ -118,7 +111,7 @@ PICTURA_HD RoutePoint next_walk_waypoint(const WorldView& world, int agent, Rout
   return at;
 }
 
-/// Draws a new goal chain that starts where the last one ended.
+/// Draws a new goal chain that starts where the last one ended. A record ends with its goal: no chain follows.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void draw_goal_chain(const WorldView& world, int agent, const ThreadGroup& group = {}) {
   const AgentStateView& agents = world.agents;
@@ -127,6 +120,10 @@ PICTURA_HD void draw_goal_chain(const WorldView& world, int agent, const ThreadG
   RandomStream random = agent_stream(world, agent, static_cast<uint32_t>(chain), Purpose::goals);
   RoutePoint at{agents.goal_lane[slot], agents.goal_lane_s_m[slot]};
   group.sync();
+  if (has_record(world.map)) {
+    if (group.rank() == 0) agents.goal_chains[slot] = kRecordedGoalReached;
+    return;
+  }
   for (int i = 0; i < kNumWaypoints; ++i) {
     at = walks(world, agent) ? next_walk_waypoint(world, agent, at, &random, group)
                              : next_waypoint(world.map, at, &random);
@@ -221,8 +218,9 @@ PICTURA_HD inline RoutePoint draw_place(Span<const float> end_m, RandomStream* r
   return {static_cast<int32_t>(low), at_m - (low == 0 ? 0.0f : end_m[low - 1])};
 }
 
-/// Whether the map has any place where the agent could stand.
+/// Whether the map has any place where the agent could be put; who is recorded needs none.
 PICTURA_HD inline bool has_places(const WorldView& world, int agent) {
+  if (has_record(world.map)) return false;
   return walks(world, agent) ? !world.map.walk_pieces.empty() : !world.map.spawn_lanes.empty();
 }
 
@@ -275,12 +273,17 @@ PICTURA_HD bool may_spawn(const MapView& map, const AgentBox& box, const ThreadG
   return fits_map(map, box, group) && (box.agent_class == AgentClass::pedestrian || !straddles_stop_line(map, box));
 }
 
-/// Puts the agent at the place of its try `i`, standing still, and draws its first goals; with -1 it stays absent.
+/// Whether the agent that chose try `i` takes part in the episode: with -1 it found no place.
+PICTURA_HD inline bool joins_episode(const WorldView& world, int i) { return i >= 0 || has_record(world.map); }
+
+/// Puts the agent at the place of its try `i`, standing still, and draws its first goals; with -1 it stays absent. Who
+/// is recorded is put where its record starts.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void place_agent(const WorldView& world, int agent, int i, const ThreadGroup& group = {}) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
   const bool is_writer = group.rank() == 0;
+  if (has_record(world.map)) return begin_record(world, agent, group);
   if (i < 0) {
     if (!is_writer) return;
     world.boxes[agent] = world.boxes_before[agent] = box_of(agents, slot);

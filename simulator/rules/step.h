@@ -14,6 +14,10 @@ PICTURA_HD inline bool is_active(const WorldView& world, int agent) {
   return world.agents.status[world.first_slot + agent] == static_cast<uint8_t>(AgentStatus::active);
 }
 
+PICTURA_HD inline bool takes_actions(const WorldView& world, int agent) {
+  return takes_actions(static_cast<AgentStatus>(world.agents.status[world.first_slot + agent]));
+}
+
 PICTURA_HD inline bool runs_red_light(const WorldView& world, const AgentBox& before, const AgentBox& after,
                                       int32_t lane_before, int32_t lane_after) {
   const Crossing crossing{front_bumper(before), front_bumper(after), {after.cos_heading, after.sin_heading},
@@ -44,7 +48,8 @@ PICTURA_HD int pass_waypoints(const WorldView& world, int agent, Vec3 from, Vec3
       passes(from, to, {agents.goal_x_m[slot], agents.goal_y_m[slot], agents.goal_z_m[slot]}, kMetricGoalRadius_m);
   const int index = agents.next_waypoint[slot];
   const float radius_m = agents.conditioning[slot * kNumConditioning + static_cast<int>(Conditioning::delta_goal_m)];
-  const bool passes_waypoint = passes(from, to, waypoint_of(agents, slot, index), radius_m);
+  const bool has_waypoint = !has_record(world.map) || agents.goal_chains[slot] < kRecordedGoalReached;
+  const bool passes_waypoint = has_waypoint && passes(from, to, waypoint_of(agents, slot, index), radius_m);
   group.sync();
   if (is_writer && reaches_goal) {
     agents.goal_open[slot] = 0;
@@ -89,13 +94,22 @@ PICTURA_HD inline bool is_sound(const Command& command) {
       return fabsf(command.x_m) <= kMaxCommanded_m && fabsf(command.y_m) <= kMaxCommanded_m &&
              fabsf(command.z_m) <= kMaxCommanded_m && fabsf(command.heading_rad) <= kMaxCommanded_rad &&
              fabsf(command.speed_mps) <= kMaxCommanded_mps;
-    case CommandKind::absent: return true;
+    case CommandKind::absent:
+    case CommandKind::recorded: return true;
     default: return false;
   }
 }
 
 PICTURA_HD constexpr bool tells_to_leave(int32_t) { return false; }
 PICTURA_HD inline bool tells_to_leave(const Command& command) { return command.kind == CommandKind::absent; }
+PICTURA_HD constexpr bool tells_to_follow_record(int32_t) { return false; }
+PICTURA_HD inline bool tells_to_follow_record(const Command& command) { return command.kind == CommandKind::recorded; }
+
+/// Whether a command to follow the record has an effect: whoever has not halted follows, the absent too.
+PICTURA_HD inline bool may_follow_record(const WorldView& world, int agent) {
+  return has_record(world.map) &&
+         world.agents.status[world.first_slot + agent] != static_cast<uint8_t>(AgentStatus::halted);
+}
 
 /// Where an agent is told to be after the step. Which level it is then on is looked for around *z_m_inout.
 PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, int32_t action, float*) {
@@ -114,22 +128,19 @@ PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, con
   return motion;
 }
 
-/// Takes an agent out of its world's episode.
-PICTURA_HD inline void leave(const WorldView& world, int agent) {
-  const int slot = world.first_slot + agent;
-  world.agents.status[slot] = static_cast<uint8_t>(AgentStatus::absent);
-  world.agents.events[slot] = kEventNone;
-  world.boxes[agent] = world.boxes_before[agent] = box_of(world.agents, slot);
-}
-
-/// Phase 1: moves an active agent as it is told, by an action or a Command, and finds what the road says about it. The
-/// first thread of its group alone writes, once all have read.
+/// Phase 1 in the episode's step of this number, from 1: moves an agent as it is told, by an action or a Command, and
+/// finds what the road says about it. The first thread of its group alone writes, once all have read.
 template <typename CommandType, typename ThreadGroup = SingleThread>
-PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& command, const ThreadGroup& group = {}) {
+PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& command, int step,
+                        const ThreadGroup& group = {}) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
   const AgentBox before = world.boxes[agent];
-  if (!is_active(world, agent)) {
+  const bool is_recorded = agents.status[slot] == static_cast<uint8_t>(AgentStatus::recorded);
+  if (tells_to_follow_record(command) && may_follow_record(world, agent)) {
+    return follow_record(world, agent, step, group);
+  }
+  if (!takes_actions(world, agent)) {
     if (group.rank() > 0) return;
     world.boxes_before[agent] = before;
     agents.events[slot] = kEventNone;
@@ -163,6 +174,7 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
   }
   events |= pass_waypoints(world, agent, from, {motion.x_m, motion.y_m, fit.z_m}, group);
   if (group.rank() > 0) return;
+  if (is_recorded) agents.status[slot] = static_cast<uint8_t>(AgentStatus::active);
   agents.distance_m[slot] += driven_m(motion.speed_mps, world.options.dt_s);
   world.boxes_before[agent] = before;
   world.boxes[agent] = box;
@@ -179,7 +191,8 @@ PICTURA_HD void find_collisions(const WorldView& world, int agent, const ThreadG
   const AgentBox& own_before = world.boxes_before[agent];
   const GridView& cells = world.box_cells;
   const int slot = world.first_slot + agent;
-  const float own_reach = radius(own) + kMaxBoxRadius_m + 2.0f * kMaxSpeed_mps * world.options.dt_s;
+  const float own_reach =
+      radius(own) + world.map.max_box_radius_m + 2.0f * world.map.max_speed_mps * world.options.dt_s;
   const CellRows range = cells_around(cells, own.center_m.xy(), own_reach);
   bool collides = false, is_at_fault = false;
   for (int y = range.y0; y <= range.y1; ++y) {

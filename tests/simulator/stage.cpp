@@ -59,7 +59,7 @@ void Stage::sort_boxes() {
 
 std::vector<float> Stage::step(int32_t action) {
   const WorldView view = world();
-  for (int agent = 0; agent < view.num_agents; ++agent) advance(view, agent, action);
+  for (int agent = 0; agent < view.num_agents; ++agent) advance(view, agent, action, 1);
   sort_boxes();
   const WorldView sorted = world();
   for (int agent = 0; agent < view.num_agents; ++agent) find_collisions(sorted, agent);

@@ -11,12 +11,14 @@
 #include "pictura/common/cuda/device_buffer.h"
 #include "pictura/common/error.h"
 #include "pictura/map/load_map.h"
+#include "pictura/simulator/recorded_scene.h"
 #include "pictura/tests/backend_cuda/device_test.h"
 #include "pictura/tests/backend_cuda/on_host.h"
 #include "pictura/tests/simulator/random_edit.h"
 #include "pictura/tests/simulator/random_queries.h"
 #include "pictura/tests/simulator/same_bits.h"
 #include "pictura/tests/support/error_message.h"
+#include "pictura/tests/support/recorded_crossing.h"
 
 namespace pictura {
 
@@ -222,6 +224,35 @@ TEST_F(CudaSimulatorTest, CrowdsUpToTheLargestWorld) {
   config.episode_steps = 20;
   config.vector_observations = false;
   expect_parity(config, {load_map("procedural:1")}, {{0, kMaxAgentsPerWorld, 0}, {0, 1000, 1}, {0, 1, 2}}, 45, 5);
+}
+
+TEST_F(CudaSimulatorTest, FollowsRecordsAndTakesOver) {
+  const auto scene = test::crossing({.num_vehicles = 40, .num_pedestrians = 10});
+  SimulatorConfig config = scene_config(*scene);
+  config.episode_steps = 100;  // longer than the record
+  const CompiledMaps maps{compile_scenario(scene, map_options(config)),
+                          compile_scenario(scene, map_options(config), 30)};
+  const std::vector<WorldSpec> worlds{scene_world(*maps[0], 0, 0), scene_world(*maps[1], 1, 1)};
+  const auto cpu = make_simulator("cpu", config, maps, worlds), cuda = make_simulator("cuda", config, maps, worlds);
+  const auto log = make_controller("log", *cuda, 0), random = make_controller("random", *cuda, 5);
+  const auto host_log = make_controller("log", *cpu, 0), host_random = make_controller("random", *cpu, 5);
+  const auto num_slots = static_cast<size_t>(cpu->num_slots());
+  DeviceBuffer<Command> commands(num_slots);
+  std::vector<Command> host_commands(num_slots);
+  for (int step = 0; step < 250; ++step) {
+    expect_same_view(cpu.get(), cuda.get(), step);
+    std::vector<uint8_t> mask(num_slots);
+    for (size_t slot = 0; slot < num_slots; ++slot) mask[slot] = (slot + static_cast<size_t>(step) / 20) % 5 == 0;
+    const DeviceBuffer<uint8_t> device_mask{Span<const uint8_t>(mask)};
+    const Span<Command> device_commands(commands.data(), num_slots);
+    log->act(cuda->controller_input(), {}, device_commands);
+    random->act(cuda->controller_input(), device_mask.span(), device_commands);
+    host_log->act(cpu->controller_input(), {}, host_commands);
+    host_random->act(cpu->controller_input(), mask, host_commands);
+    cuda->step(Span<const Command>(device_commands));
+    cpu->step(host_commands);
+  }
+  ASSERT_EQ(cpu->save(), cuda->save());
 }
 
 TEST_F(CudaSimulatorTest, WhatOneSavesTheOtherRestores) {

@@ -7,18 +7,21 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/agent_state_arrays.h"
+#include "pictura/simulator/recorded_scene.h"
 #include "pictura/tests/backend_cuda/simulator/shuffled_executor.h"
 #include "pictura/tests/simulator/random_edit.h"
 #include "pictura/tests/simulator/random_queries.h"
 #include "pictura/tests/simulator/same_bits.h"
 #include "pictura/tests/simulator/test_maps.h"
+#include "pictura/tests/support/recorded_crossing.h"
 
 namespace pictura {
 namespace {
 
-/// Steps both with the same actions, or commands of all kinds, and compares everything that their users see.
-void expect_same(const SimulatorConfig& config, const std::vector<std::shared_ptr<const RoadMap>>& maps,
-                 const std::vector<WorldSpec>& worlds, int steps, unsigned shuffle_seed, bool by_commands = false) {
+/// Steps both with the same actions, or commands of all kinds, and compares everything that their users see. In worlds
+/// of recorded scenes most commands of all kinds are to follow the record.
+void expect_same(const SimulatorConfig& config, const CompiledMaps& maps, const std::vector<WorldSpec>& worlds,
+                 int steps, unsigned shuffle_seed, bool by_commands = false) {
   const auto cpu = make_simulator("cpu", config, maps, worlds);
   testing::ShuffledExecutor other(config, maps, worlds, shuffle_seed);
   for (int step = 0; step <= steps; ++step) {
@@ -33,8 +36,16 @@ void expect_same(const SimulatorConfig& config, const std::vector<std::shared_pt
       return cpu->step(commands);
     };
     const auto key = static_cast<uint32_t>(step);
-    const StepResult result = by_commands ? step_both(testing::mixed_commands(cpu->state(), cpu->num_slots(), key))
-                                          : step_both(testing::mixed_actions(cpu->num_slots(), key));
+    std::vector<Command> commands;
+    if (by_commands) commands = testing::mixed_commands(cpu->state(), cpu->num_slots(), key);
+    for (size_t slot = 0; slot < commands.size(); ++slot) {
+      const auto world = static_cast<size_t>(cpu->slots().world_of_slot[slot]);
+      const bool is_recorded = maps[static_cast<size_t>(worlds[world].map)]->scenario != nullptr;
+      if (is_recorded && (slot + static_cast<size_t>(step) / 10) % 4 != 0)
+        commands[slot] = {.kind = CommandKind::recorded};
+    }
+    const StepResult result =
+        by_commands ? step_both(commands) : step_both(testing::mixed_actions(cpu->num_slots(), key));
     ASSERT_TRUE(testing::same_bits(result.reward, Span<const float>(other.results.reward))) << "step " << step;
     ASSERT_TRUE(testing::same_bits(result.terminated, Span<const uint8_t>(other.results.terminated)));
     ASSERT_TRUE(testing::same_bits(result.truncated, Span<const uint8_t>(other.results.truncated)));
@@ -43,6 +54,11 @@ void expect_same(const SimulatorConfig& config, const std::vector<std::shared_pt
   }
   EXPECT_EQ(cpu->save(), other.save());
   EXPECT_EQ(other.rejected(), kNothingRejected);
+}
+
+void expect_same(const SimulatorConfig& config, const std::vector<std::shared_ptr<const RoadMap>>& maps,
+                 const std::vector<WorldSpec>& worlds, int steps, unsigned shuffle_seed, bool by_commands = false) {
+  expect_same(config, compile_maps(maps, map_options(config)), worlds, steps, shuffle_seed, by_commands);
 }
 
 TEST(Phases, GiveTheBitsOfTheCpuExecutorInAnyOrderOfThreads) {
@@ -77,6 +93,19 @@ TEST(Phases, TakeCommandsOfAllKinds) {
   config.parked_cars = 12;
   const std::vector<std::shared_ptr<const RoadMap>> maps{load_map("procedural:1"), testing::stadium(200, 2)};
   expect_same(config, maps, draw_worlds(5, 300, 1, 60, 2), 130, 6, /*by_commands=*/true);
+}
+
+TEST(Phases, FollowRecords) {
+  const auto scene = test::crossing({.num_steps = 40, .num_pedestrians = 6});
+  SimulatorConfig config = scene_config(*scene);
+  config.episode_steps = 50;  // longer than the record, and several times
+  const CompiledMaps maps{compile_scenario(scene, map_options(config)),
+                          compile_scenario(scene, map_options(config), 20),
+                          compile_map(testing::stadium(200, 2), map_options(config))};
+  const std::vector<WorldSpec> worlds{
+      scene_world(*maps[0], 0, 0), scene_world(*maps[1], 1, 1), {2, 20, 2}, scene_world(*maps[0], 0, 3)};
+  expect_same(config, maps, worlds, 160, 9, /*by_commands=*/true);
+  expect_same(config, maps, worlds, 60, 10);  // actions alone take everybody over
 }
 
 TEST(Phases, RefuseAnActionOutOfRangeAndChangeNothing) {

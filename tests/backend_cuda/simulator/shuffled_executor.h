@@ -101,7 +101,10 @@ class ShuffledExecutor {
  public:
   ShuffledExecutor(const SimulatorConfig& config, const std::vector<std::shared_ptr<const RoadMap>>& maps,
                    std::vector<WorldSpec> worlds, unsigned shuffle_seed)
-      : host(SimulatorSetup(config, compile_maps(maps, map_options(config)), {}, std::move(worlds))),
+      : ShuffledExecutor(config, compile_maps(maps, map_options(config)), std::move(worlds), shuffle_seed) {}
+  ShuffledExecutor(const SimulatorConfig& config, const CompiledMaps& maps, std::vector<WorldSpec> worlds,
+                   unsigned shuffle_seed)
+      : host(SimulatorSetup(config, maps, {}, std::move(worlds))),
         results(static_cast<size_t>(host.setup.num_slots()), config),
         random_(shuffle_seed),
         next_agents_(static_cast<size_t>(host.setup.num_slots())),

@@ -117,7 +117,7 @@ TEST(Controller, RefusesArraysOfAnotherSizeAndUnknownNames) {
       test::message_of([&] { controller->act(simulator->controller_input(), std::vector<uint8_t>(5, 1), commands); }),
       HasSubstr("expected a mask of 4 slots, got 5"));
   EXPECT_THAT(test::message_of<UsageError>([&] { make_controller("pilot", *simulator, 0); }),
-              HasSubstr("expected one of random, idle, lane; got 'pilot'"));
+              HasSubstr("expected one of random, idle, lane, log; got 'pilot'"));
 }
 
 TEST(Controller, LaneKeepingNeedsTheEpisodesFirstStep) {
@@ -238,7 +238,7 @@ TEST(Commands, OutOfRangeAreRefusedByNameAndChangeNothing) {
   Command unknown;
   unknown.kind = static_cast<CommandKind>(7);
   EXPECT_THAT(refusal(unknown),
-              HasSubstr("slot 3: expected a command that is an action, a kinematic state or absence"));
+              HasSubstr("slot 3: expected a command that is an action, a kinematic state, absence or the record"));
   EXPECT_THAT(test::message_of([&] { simulator->step(std::vector<Command>(3)); }),
               HasSubstr("expected 4 commands, got 3"));
 }

@@ -1,0 +1,132 @@
+#include "pictura/simulator/recorded_scene.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "pictura/simulator/rules/limits.h"
+
+namespace pictura {
+namespace {
+
+/// What is neither pedestrian nor cyclist is met as vehicles are.
+AgentClass class_of(TrackType type) {
+  switch (type) {
+    case TrackType::pedestrian: return AgentClass::pedestrian;
+    case TrackType::cyclist: return AgentClass::cyclist;
+    default: return AgentClass::vehicle;
+  }
+}
+
+/// A recorded box's centre as the reference point of its class.
+RecordedState recorded_state(const RecordedTrack& track, const TrackState& state) {
+  const SinCos heading = sincos_of(state.heading_rad);
+  const float ahead_m = reference_to_center(class_of(track.type), track.length_m);
+  return {{state.position_m.x - ahead_m * heading.cos, state.position_m.y - ahead_m * heading.sin, state.position_m.z},
+          state.heading_rad,
+          state.velocity_mps.x * heading.cos + state.velocity_mps.y * heading.sin,
+          1};
+}
+
+MapRecord record_of(const Scenario& scenario, int32_t start_step) {
+  constexpr float kMaxRecordedRadius_m = 25.0f;  // every barrier so near to a box is looked at
+  MapRecord record{.num_steps = scenario.num_steps - start_step, .dt_s = scenario.dt_s};
+  for (size_t i = 0; i < scenario.tracks.size(); ++i) {
+    const RecordedTrack& track = scenario.tracks[i];
+    PICTURA_CHECK(std::hypot(track.length_m, track.width_m) <= 2 * kMaxRecordedRadius_m,
+                  "scene {}: track {} (id {}): expected a box of at most {} m from corner to corner, got {} m by {} m",
+                  scenario.id, i, track.id, 2 * kMaxRecordedRadius_m, track.length_m, track.width_m);
+    const Span<const TrackState> states = scenario.states_of(static_cast<int32_t>(i));
+    const Span<const uint8_t> valid = scenario.valid_of(static_cast<int32_t>(i));
+    const RecordedState last = recorded_state(track, states[static_cast<size_t>(track.last_valid)]);
+    record.agents.push_back(
+        {static_cast<int32_t>(class_of(track.type)), track.length_m, track.width_m, track.height_m, last.position_m});
+    for (auto step = static_cast<size_t>(start_step); step < states.size(); ++step) {
+      record.states.push_back(valid[step] ? recorded_state(track, states[step]) : RecordedState{});
+    }
+  }
+  return record;
+}
+
+/// What one word names; see tracks_of().
+std::vector<uint8_t> tracks_of_word(const Scenario& scenario, const std::string& word) {
+  std::vector<uint8_t> mask(scenario.tracks.size());
+  const auto choose = [&](auto&& is_chosen) {
+    for (size_t i = 0; i < mask.size(); ++i) mask[i] = is_chosen(static_cast<int32_t>(i), scenario.tracks[i]);
+  };
+  if (word == "self") {
+    choose([&](int32_t i, const RecordedTrack&) { return i == scenario.sdc_track; });
+  } else if (word == "vehicles") {
+    choose([&](int32_t i, const RecordedTrack& track) {
+      return i != scenario.sdc_track && track.type == TrackType::vehicle;
+    });
+  } else if (word == "others") {
+    choose([&](int32_t i, const RecordedTrack& track) {
+      return i != scenario.sdc_track && track.type != TrackType::vehicle;
+    });
+  } else if (word == "all") {
+    choose([](int32_t, const RecordedTrack&) { return true; });
+  } else if (word == "tracks_to_predict") {
+    for (const PredictedTrack& predicted : scenario.tracks_to_predict) mask[static_cast<size_t>(predicted.track)] = 1;
+  } else if (word == "objects_of_interest") {
+    for (const int32_t track : scenario.objects_of_interest) mask[static_cast<size_t>(track)] = 1;
+  } else {
+    int64_t id = 0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), id);
+    if (error != std::errc() || end != word.data() + word.size()) {
+      fail_usage(
+          "expected self, vehicles, others, all, tracks_to_predict, objects_of_interest or the id of a track, got "
+          "'{}'",
+          word);
+    }
+    choose([id](int32_t, const RecordedTrack& track) { return track.id == id; });
+  }
+  if (std::find(mask.begin(), mask.end(), 1) == mask.end()) {
+    fail_usage("scene {}: expected tracks, got '{}', which names none of its {}", scenario.id, word, mask.size());
+  }
+  return mask;
+}
+
+}  // namespace
+
+std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenario> scenario, const MapOptions& options,
+                                                    int32_t start_step) {
+  if (!scenario) fail_usage("simulator: expected a scene, got a null pointer");
+  if (start_step < 0 || start_step >= scenario->num_steps) {
+    fail_usage("scene {}: expected a step of its recording to start at, in [0, {}), got {}", scenario->id,
+               scenario->num_steps, start_step);
+  }
+  PICTURA_CHECK(scenario->tracks.size() <= kMaxAgentsPerWorld, "scene {}: expected at most {} tracks, got {}",
+                scenario->id, kMaxAgentsPerWorld, scenario->tracks.size());
+  const std::shared_ptr<CompiledMap> map =
+      compile_map({scenario, &scenario->map}, options, record_of(*scenario, start_step));
+  map->scenario = std::move(scenario);
+  map->start_step = start_step;
+  return map;
+}
+
+SimulatorConfig scene_config(const Scenario& scenario, int32_t start_step, SimulatorConfig config) {
+  config.dt_s = std::min(scenario.dt_s, kMaxStep_s);  // WOMD's steps are a little longer
+  config.episode_steps = std::max(1, scenario.num_steps - 1 - start_step);
+  config.reset_inactive_fraction = 2;
+  config.parked_cars = 0;
+  config.walls = false;
+  return config;
+}
+
+WorldSpec scene_world(const CompiledMap& map, int index, uint32_t global_world) {
+  return {index, static_cast<int>(map.rules.record.agents.size()), global_world};
+}
+
+std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words) {
+  std::vector<uint8_t> mask(scenario.tracks.size());
+  for (size_t begin = 0; begin <= words.size();) {
+    const size_t end = std::min(words.find(',', begin), words.size());
+    const std::vector<uint8_t> named = tracks_of_word(scenario, words.substr(begin, end - begin));
+    for (size_t i = 0; i < mask.size(); ++i) mask[i] |= named[i];
+    begin = end + 1;
+  }
+  return mask;
+}
+
+}  // namespace pictura

@@ -1,0 +1,34 @@
+// Worlds that come from a recorded scene: its map compiled with what was recorded there, how they are configured, and
+// which of their agents a word names.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pictura/common/error.h"
+#include "pictura/map/scenario/scenario.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+/// The map of a scene, whose worlds' agents are its tracks, in their order: each starts an episode where the recording
+/// has it at start_step, or absent. Throws Error naming scene and track when it has no drivable lane, more than
+/// kMaxAgentsPerWorld tracks, or a track too large to be simulated; UsageError for a null pointer, and for a step that
+/// the recording does not have.
+std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenario> scenario,
+                                                    const MapOptions& options = {}, int32_t start_step = 0);
+
+/// A configuration, but with the recording's time step and its length from start_step on as an episode's, without
+/// walls, without parked cars besides its tracks, and without an early end.
+SimulatorConfig scene_config(const Scenario& scenario, int32_t start_step = 0, SimulatorConfig config = {});
+
+/// The world of a scene's map: all of its tracks.
+WorldSpec scene_world(const CompiledMap& map, int index = 0, uint32_t global_world = 0);
+
+/// [tracks] 1 for those that words with commas between them name: self (the self-driving car), vehicles (the others),
+/// others (who is no vehicle), all, tracks_to_predict, objects_of_interest, and ids of tracks. Throws UsageError for
+/// another word, and for one that names nobody.
+std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words);
+
+}  // namespace pictura

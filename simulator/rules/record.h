@@ -1,0 +1,104 @@
+// Agents that follow the record of their world's scene: who they are, where each step has them, and where they end.
+#pragma once
+
+#include "pictura/simulator/rules/walk.h"
+#include "pictura/simulator/rules/world_view.h"
+
+namespace pictura {
+
+/// Of `goal_chains`: a recorded agent has one goal, where its record ends, and passes it once.
+constexpr int32_t kRecordedGoal = 1, kRecordedGoalReached = 2;
+
+/// Where an agent is so many steps after its episode's start. After the record's end it stands still.
+PICTURA_HD inline RecordedState recorded_state(const MapView& map, int agent, int step) {
+  const int last = map.recorded_steps - 1;
+  RecordedState state = map.recorded_states[static_cast<size_t>(agent) * static_cast<size_t>(map.recorded_steps) +
+                                            static_cast<size_t>(min_of(step, last))];
+  if (step > last) state.speed_mps = 0.0f;
+  return state;
+}
+
+PICTURA_HD inline void store_recorded_size(const WorldView& world, int agent) {
+  const RecordedAgent& recorded = world.map.recorded_agents[static_cast<size_t>(agent)];
+  const int slot = world.first_slot + agent;
+  world.agents.length_m[slot] = recorded.length_m;
+  world.agents.width_m[slot] = recorded.width_m;
+  world.agents.height_m[slot] = recorded.height_m;
+}
+
+/// Where pedestrians walk, and everybody else drives.
+PICTURA_HD inline bool walks(const WorldView& world, int agent) {
+  return class_of(world.agents, world.first_slot + agent) == AgentClass::pedestrian;
+}
+
+template <typename ThreadGroup>
+PICTURA_HD LaneFit fit_agent(const WorldView& world, int agent, Vec2 p, float z_m, float heading_rad,
+                             int32_t current_lane, const ThreadGroup& group) {
+  return walks(world, agent) ? fit_walk(world.map, p, z_m, heading_rad, current_lane, group)
+                             : fit_lane(world.map, p, z_m, heading_rad, current_lane, group);
+}
+
+/// Takes an agent out of its world's episode.
+PICTURA_HD inline void leave(const WorldView& world, int agent) {
+  const int slot = world.first_slot + agent;
+  world.agents.status[slot] = static_cast<uint8_t>(AgentStatus::absent);
+  world.agents.events[slot] = kEventNone;
+  world.boxes[agent] = world.boxes_before[agent] = box_of(world.agents, slot);
+}
+
+/// Puts an agent where its record has it so many steps after the episode's start, or nowhere. Who was not recorded
+/// before is there at once: nobody meets it on the way. The first thread of the group alone writes.
+template <typename ThreadGroup>
+PICTURA_HD void follow_record(const WorldView& world, int agent, int step, const ThreadGroup& group) {
+  const AgentStateView& agents = world.agents;
+  const int slot = world.first_slot + agent;
+  const RecordedState at = recorded_state(world.map, agent, step);
+  const bool goes_on = agents.status[slot] == static_cast<uint8_t>(AgentStatus::recorded);
+  const int32_t lane_before = goes_on ? agents.lane[slot] : -1;
+  const AgentBox before = world.boxes[agent];
+  if (!at.is_there) {
+    group.sync();
+    if (group.rank() == 0) leave(world, agent);
+    return;
+  }
+  const LaneFit fit = fit_agent(world, agent, at.position_m.xy(), at.position_m.z, at.heading_rad, lane_before, group);
+  group.sync();
+  if (group.rank() > 0) return;
+  Motion motion;
+  motion.x_m = at.position_m.x;
+  motion.y_m = at.position_m.y;
+  motion.heading_rad = at.heading_rad;
+  motion.speed_mps = at.speed_mps;
+  store_motion(agents, slot, motion);
+  store_fit(agents, slot, fit);
+  agents.status[slot] = static_cast<uint8_t>(AgentStatus::recorded);
+  agents.events[slot] = kEventNone;
+  world.boxes[agent] = box_of(agents, slot);
+  world.boxes_before[agent] = goes_on ? before : world.boxes[agent];
+}
+
+/// The agent's start of an episode, and its goal: the end of its record, as all of its waypoints, of which it is on
+/// its way to the last.
+template <typename ThreadGroup>
+PICTURA_HD void begin_record(const WorldView& world, int agent, const ThreadGroup& group) {
+  const AgentStateView& agents = world.agents;
+  const int slot = world.first_slot + agent;
+  if (group.rank() == 0) {
+    const Vec3 goal = world.map.recorded_agents[static_cast<size_t>(agent)].goal_m;
+    for (int i = 0; i < kNumWaypoints; ++i) {
+      agents.waypoint_x_m[slot * kNumWaypoints + i] = goal.x;
+      agents.waypoint_y_m[slot * kNumWaypoints + i] = goal.y;
+      agents.waypoint_z_m[slot * kNumWaypoints + i] = goal.z;
+    }
+    agents.next_waypoint[slot] = kNumWaypoints - 1;
+    agents.goal_chains[slot] = kRecordedGoal;
+    agents.goal_x_m[slot] = goal.x;
+    agents.goal_y_m[slot] = goal.y;
+    agents.goal_z_m[slot] = goal.z;
+    agents.goal_open[slot] = 1;
+  }
+  group.sync();
+  follow_record(world, agent, 0, group);
+}
+
+}  // namespace pictura

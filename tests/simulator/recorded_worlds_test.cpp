@@ -1,0 +1,306 @@
+// Worlds of recorded scenes: agents that follow their records, and who takes over from them.
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pictura/backends/make_controller.h"
+#include "pictura/backends/make_simulator.h"
+#include "pictura/map/load_map.h"
+#include "pictura/map/scenario/load_scenario.h"
+#include "pictura/simulator/recorded_scene.h"
+#include "pictura/simulator/simulator_setup.h"
+#include "pictura/tests/support/error_message.h"
+#include "pictura/tests/support/recorded_crossing.h"
+
+namespace pictura {
+namespace {
+
+using test::crossing;
+using ::testing::HasSubstr;
+
+constexpr test::FixtureOptions kNobodyInTheWay{.num_vehicles = 1, .num_pedestrians = 3, .num_cyclists = 0};
+
+std::unique_ptr<Simulator> world_of(const std::shared_ptr<const Scenario>& scene, int32_t start_step = 0,
+                                    SimulatorConfig config = {}) {
+  config = scene_config(*scene, start_step, config);
+  const auto map = compile_scenario(scene, map_options(config), start_step);
+  return make_simulator("cpu", config, CompiledMaps{map}, {scene_world(*map)});
+}
+
+const std::vector<Command>& recorded(const Simulator& simulator) {
+  static std::vector<Command> commands;
+  commands.assign(static_cast<size_t>(simulator.num_slots()), Command{.kind = CommandKind::recorded});
+  return commands;
+}
+
+AgentStatus status_of(Simulator& simulator, int slot) {
+  return static_cast<AgentStatus>(simulator.state().status[slot]);
+}
+
+/// Expects every agent to be where the recording has it at this step, or nowhere.
+void expect_as_recorded(Simulator& simulator, const Scenario& scene, int32_t step) {
+  const Span<const AgentBox> boxes = simulator.scene().agents;
+  for (int32_t track = 0; track < static_cast<int32_t>(scene.tracks.size()); ++track) {
+    SCOPED_TRACE(testing::Message() << "track " << track << ", step " << step);
+    const auto at = static_cast<size_t>(step);
+    const AgentBox& box = boxes[static_cast<size_t>(track)];
+    const bool is_there = scene.valid_of(track)[at] != 0;
+    ASSERT_EQ(box.drawn != 0, is_there);
+    ASSERT_EQ(status_of(simulator, track), is_there ? AgentStatus::recorded : AgentStatus::absent);
+    const RecordedTrack& about = scene.tracks[static_cast<size_t>(track)];
+    ASSERT_EQ(box.length_m, about.length_m);
+    ASSERT_EQ(box.height_m, about.height_m);
+    if (!is_there) continue;
+    const TrackState& state = scene.states_of(track)[at];
+    ASSERT_LT(length((box.center_m - state.position_m).xy()), 1e-3f);
+    ASSERT_LT(std::abs(box.center_m.z - state.position_m.z), 1);  // on the road, where it is near one
+    ASSERT_LT(std::abs(wrap_angle(simulator.state().heading_rad[track] - state.heading_rad)), 1e-5f);
+    ASSERT_EQ(simulator.state().events[track], kEventNone);
+  }
+}
+
+TEST(RecordedWorlds, AgentsAppearMoveAndVanishAsRecorded) {
+  const auto scene = crossing();
+  bool someone_vanishes = false, someone_appears = false;
+  for (int32_t track = 0; track < static_cast<int32_t>(scene->tracks.size()); ++track) {
+    for (size_t step = 1; step < static_cast<size_t>(scene->num_steps); ++step) {
+      const Span<const uint8_t> valid = scene->valid_of(track);
+      someone_vanishes = someone_vanishes || (valid[step - 1] && !valid[step]);
+      someone_appears = someone_appears || (!valid[step - 1] && valid[step]);
+    }
+  }
+  ASSERT_TRUE(someone_vanishes && someone_appears);
+  const auto simulator = world_of(scene);
+  EXPECT_EQ(simulator->spawn_report().spawned, static_cast<int64_t>(scene->tracks.size()));
+  expect_as_recorded(*simulator, *scene, 0);
+  for (int32_t step = 1; step < scene->num_steps; ++step) {
+    const StepResult result = simulator->step(recorded(*simulator));
+    for (const uint8_t valid : result.valid) ASSERT_EQ(valid, 0);
+    expect_as_recorded(*simulator, *scene, step);
+  }
+  EXPECT_EQ(simulator->episode_over()[0], 1);
+  EXPECT_EQ(simulator->totals().agent_steps, 0);
+  EXPECT_EQ(simulator->totals().collisions + simulator->totals().off_road, 0);
+  // The next episode is the same.
+  simulator->step(recorded(*simulator));
+  expect_as_recorded(*simulator, *scene, 0);
+}
+
+TEST(RecordedWorlds, StartAtAChosenStep) {
+  const auto scene = crossing();
+  const auto simulator = world_of(scene, 10);
+  expect_as_recorded(*simulator, *scene, 10);
+  simulator->step(recorded(*simulator));
+  expect_as_recorded(*simulator, *scene, 11);
+  EXPECT_EQ(simulator->config().episode_steps, scene->num_steps - 11);
+  EXPECT_THAT(test::message_of<UsageError>([&] { compile_scenario(scene, {}, scene->num_steps); }),
+              HasSubstr("expected a step of its recording to start at, in [0, 91), got 91"));
+}
+
+TEST(RecordedWorlds, StandStillAfterTheEndOfTheRecord) {
+  const auto scene = crossing();
+  SimulatorConfig config = scene_config(*scene);
+  config.episode_steps = scene->num_steps + 20;
+  const auto map = compile_scenario(scene, map_options(config));
+  const auto simulator = make_simulator("cpu", config, CompiledMaps{map}, {scene_world(*map)});
+  for (int32_t step = 1; step < scene->num_steps + 10; ++step) simulator->step(recorded(*simulator));
+  expect_as_recorded(*simulator, *scene, scene->num_steps - 1);
+  for (int slot = 0; slot < simulator->num_slots(); ++slot) {
+    if (status_of(*simulator, slot) != AgentStatus::recorded) continue;
+    EXPECT_EQ(simulator->state().speed_mps[slot], 0);
+  }
+}
+
+/// The first track that moves and is there from step 0 to `last`.
+int32_t mover(const Scenario& scene, size_t last) {
+  for (int32_t track = 0; track < static_cast<int32_t>(scene.tracks.size()); ++track) {
+    const Span<const uint8_t> valid = scene.valid_of(track);
+    bool is_there = true;
+    for (size_t step = 0; step <= last; ++step) is_there = is_there && valid[step];
+    if (is_there && is_moving(scene, track) && scene.tracks[static_cast<size_t>(track)].type == TrackType::vehicle) {
+      return track;
+    }
+  }
+  return -1;
+}
+
+TEST(RecordedWorlds, AnActionTakesOverFromWhatTheRecordImplies) {
+  const auto scene = crossing(kNobodyInTheWay);
+  const int32_t self = mover(*scene, 40);
+  ASSERT_GE(self, 0);
+  for (const int32_t taken_at : {0, 17}) {
+    const auto simulator = world_of(scene);
+    for (int32_t step = 0; step < taken_at; ++step) simulator->step(recorded(*simulator));
+    std::vector<Command> commands = recorded(*simulator);
+    commands[static_cast<size_t>(self)] = {};  // no jerk
+    const StepResult result = simulator->step(commands);
+    EXPECT_EQ(result.valid[static_cast<size_t>(self)], 1);
+    EXPECT_EQ(status_of(*simulator, self), AgentStatus::active) << int{simulator->state().halt_reason[self]};
+    // It goes on straight at the recorded speed.
+    const TrackState& from = scene->states_of(self)[static_cast<size_t>(taken_at)];
+    const float speed_mps = length(from.velocity_mps);
+    const AgentBox& box = simulator->scene().agents[static_cast<size_t>(self)];
+    EXPECT_NEAR(simulator->state().speed_mps[self], speed_mps, 1e-3);
+    EXPECT_NEAR(length((box.center_m - from.position_m).xy()), speed_mps * 0.1f, 1e-3);
+    EXPECT_EQ(simulator->totals().agent_steps, 1);
+    // Everybody else goes on as recorded, and it can be given back.
+    simulator->step(recorded(*simulator));
+    expect_as_recorded(*simulator, *scene, taken_at + 2);
+  }
+}
+
+TEST(RecordedWorlds, DriversCollideWithTheRecordedAndHalt) {
+  const auto scene = crossing();
+  const int32_t self = mover(*scene, 40);
+  const auto simulator = world_of(scene);
+  // Onto another that is there.
+  int32_t other = 0;
+  while (other == self || !scene->valid_of(other)[1]) ++other;
+  std::vector<Command> commands = recorded(*simulator);
+  Command& onto = commands[static_cast<size_t>(self)];
+  const TrackState& there = scene->states_of(other)[1];
+  onto = {.kind = CommandKind::kinematic_state,
+          .x_m = there.position_m.x,
+          .y_m = there.position_m.y,
+          .z_m = there.position_m.z,
+          .heading_rad = there.heading_rad,
+          .speed_mps = 5};
+  simulator->step(commands);
+  EXPECT_EQ(status_of(*simulator, self), AgentStatus::halted);
+  EXPECT_EQ(status_of(*simulator, other), AgentStatus::recorded);
+  EXPECT_EQ(simulator->totals().collisions, 1);
+  // The halted stay where they are, whoever commands them.
+  const AgentBox before = simulator->scene().agents[static_cast<size_t>(self)];
+  simulator->step(recorded(*simulator));
+  EXPECT_EQ(status_of(*simulator, self), AgentStatus::halted);
+  EXPECT_EQ(simulator->scene().agents[static_cast<size_t>(self)].center_m.x, before.center_m.x);
+}
+
+TEST(RecordedWorlds, TheGoalIsTheEndOfTheRecordAndPassedOnce) {
+  const auto scene = crossing(kNobodyInTheWay);
+  const int32_t self = mover(*scene, 40);
+  const auto simulator = world_of(scene);
+  const AgentStateView state = simulator->state();
+  EXPECT_EQ(state.next_waypoint[self], kNumWaypoints - 1);
+  const RecordedTrack& track = scene->tracks[static_cast<size_t>(self)];
+  const auto follow_by_states = [&](int32_t step) {
+    std::vector<Command> commands = recorded(*simulator);
+    const auto at = static_cast<size_t>(std::min(step, track.last_valid));
+    if (!scene->valid_of(self)[at]) return commands;
+    const TrackState& there = scene->states_of(self)[at];
+    const float ahead_m = reference_to_center(AgentClass::vehicle, track.length_m);
+    commands[static_cast<size_t>(self)] = {.kind = CommandKind::kinematic_state,
+                                           .x_m = there.position_m.x - ahead_m * std::cos(there.heading_rad),
+                                           .y_m = there.position_m.y - ahead_m * std::sin(there.heading_rad),
+                                           .z_m = there.position_m.z,
+                                           .heading_rad = there.heading_rad,
+                                           .speed_mps = length(there.velocity_mps)};
+    return commands;
+  };
+  for (int32_t step = 1; step < scene->num_steps; ++step) simulator->step(follow_by_states(step));
+  EXPECT_EQ(simulator->totals().goals_reached, 1);
+  EXPECT_EQ(simulator->totals().waypoints_reached, 1);
+}
+
+TEST(RecordedWorlds, DriversLeaveTheRoadWhereTheEdgesSaySo) {
+  const auto scene = crossing();
+  const int32_t self = mover(*scene, 40);
+  const auto simulator = world_of(scene);
+  const TrackState& there = scene->states_of(self)[0];
+  std::vector<Command> commands = recorded(*simulator);
+  const SinCos heading = sincos_of(there.heading_rad);
+  Command& aside = commands[static_cast<size_t>(self)];
+  aside = {.kind = CommandKind::kinematic_state,
+           .x_m = there.position_m.x + 8 * heading.sin,
+           .y_m = there.position_m.y - 8 * heading.cos,
+           .z_m = there.position_m.z,
+           .heading_rad = there.heading_rad,
+           .speed_mps = 1};
+  simulator->step(commands);
+  EXPECT_EQ(status_of(*simulator, self), AgentStatus::halted);
+  EXPECT_EQ(simulator->totals().off_road, 1);
+}
+
+TEST(RecordedWorlds, AreSavedAndRestored) {
+  const auto scene = crossing();
+  const auto a = world_of(scene), b = world_of(scene);
+  for (int i = 0; i < 30; ++i) a->step(recorded(*a));
+  b->restore(a->save());
+  EXPECT_EQ(a->state_hash(), b->state_hash());
+  a->step(recorded(*a));
+  b->step(recorded(*b));
+  EXPECT_EQ(a->state_hash(), b->state_hash());
+  // Another start is another record.
+  const auto later = world_of(scene, 1, {});
+  EXPECT_THAT(test::message_of<Error>([&] { later->restore(a->save()); }), HasSubstr("saved with another"));
+}
+
+TEST(RecordedWorlds, ControllersShareThemByMasks) {
+  const auto scene = crossing();
+  const auto simulator = world_of(scene);
+  const auto log = make_controller("log", *simulator, 0), idle = make_controller("idle", *simulator, 0);
+  std::vector<uint8_t> driven(scene->tracks.size());
+  driven[static_cast<size_t>(mover(*scene, 40))] = 1;
+  std::vector<Command> commands(scene->tracks.size());
+  log->act(simulator->controller_input(), {}, commands);
+  idle->act(simulator->controller_input(), driven, commands);
+  simulator->step(commands);
+  EXPECT_EQ(simulator->totals().agent_steps, 1);
+}
+
+TEST(RecordedWorlds, RefuseWhatCannotBe) {
+  const auto scene = crossing();
+  const SimulatorConfig config = scene_config(*scene);
+  const auto map = compile_scenario(scene, map_options(config));
+  EXPECT_THAT(test::message_of<UsageError>([&] { make_simulator("cpu", config, CompiledMaps{map}, {{0, 3, 0}}); }),
+              HasSubstr("expected as many agents as scene"));
+  SimulatorConfig slow = config;
+  slow.dt_s = 0.05f;
+  EXPECT_THAT(
+      test::message_of<UsageError>([&] { make_simulator("cpu", slow, CompiledMaps{map}, {scene_world(*map)}); }),
+      HasSubstr("dt_s: expected the 0.1 s of scene"));
+  const auto town = make_simulator("cpu", {}, {load_map("procedural:1")}, {{0, 2, 0}});
+  EXPECT_THAT(test::message_of<UsageError>([&] { make_controller("log", *town, 0); }),
+              HasSubstr("world 0: expected a recorded scene"));
+  EXPECT_THAT(test::message_of<Error>([&] { town->step(recorded(*town)); }),
+              HasSubstr("slot 0: expected a world on a recorded scene"));
+  const auto simulator = world_of(scene);
+  EXPECT_THAT(test::message_of<UsageError>([&] { make_controller("lane", *simulator, 0); }),
+              HasSubstr("expected a map whose lanes go on for ever"));
+}
+
+TEST(RecordedWorlds, WordsNameTracks) {
+  const auto scene = crossing();
+  const auto count = [&](const std::string& words) {
+    int sum = 0;
+    for (const uint8_t is_in : tracks_of(*scene, words)) sum += is_in;
+    return sum;
+  };
+  EXPECT_EQ(count("self"), 1);
+  EXPECT_EQ(count("self,vehicles,others"), static_cast<int>(scene->tracks.size()));
+  EXPECT_EQ(count("vehicles"), 7);
+  EXPECT_EQ(count("others"), 4);
+  EXPECT_EQ(count(std::to_string(scene->tracks[2].id) + "," + std::to_string(scene->tracks[3].id)), 2);
+  EXPECT_THAT(test::message_of<UsageError>([&] { tracks_of(*scene, "cars"); }), HasSubstr("got 'cars'"));
+  EXPECT_THAT(test::message_of<UsageError>([&] { tracks_of(*scene, "4"); }), HasSubstr("names none of its 12"));
+}
+
+TEST(RecordedWorlds, SamplesAreReplayed) {
+  for (const char* name : {"womd", "gpudrive", "pufferdrive"}) {
+    const std::string folder = map_folder() + "/" + name;
+    if (!std::filesystem::is_directory(folder)) GTEST_SKIP() << folder << " is missing";
+    for (const SceneRef& ref : index_scenes(folder).scenes) {
+      SCOPED_TRACE(ref.file);
+      const auto scene = std::make_shared<const Scenario>(load_scenario(ref));
+      const auto simulator = world_of(scene);
+      for (int32_t step = 1; step < scene->num_steps; ++step) {
+        simulator->step(recorded(*simulator));
+        if (step % 10 == 0) expect_as_recorded(*simulator, *scene, step);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace pictura

@@ -1,0 +1,15 @@
+// The synthetic scene of scene_fixture.h as readers hand it out.
+#pragma once
+
+#include <memory>
+
+#include "pictura/map/scenario/scenario.h"
+#include "pictura/tests/support/scene_fixture.h"
+
+namespace pictura::test {
+
+inline std::shared_ptr<const Scenario> crossing(const FixtureOptions& options = {}) {
+  return std::make_shared<const Scenario>(make_scenario(make_fixture(options)));
+}
+
+}  // namespace pictura::test
