@@ -111,6 +111,9 @@ SimulatorConfig scene_config(const Scenario& scenario, int32_t start_step, Simul
   config.reset_inactive_fraction = 2;
   config.parked_cars = 0;
   config.walls = false;
+  for (const Conditioning which : {Conditioning::throttle, Conditioning::steer, Conditioning::acceleration}) {
+    config.conditioning[static_cast<size_t>(which)] = {1, 1};
+  }
   return config;
 }
 

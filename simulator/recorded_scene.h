@@ -20,7 +20,7 @@ std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenar
                                                     const MapOptions& options = {}, int32_t start_step = 0);
 
 /// A configuration, but with the recording's time step and its length from start_step on as an episode's, without
-/// walls, without parked cars besides its tracks, and without an early end.
+/// walls, without parked cars besides its tracks, without an early end, and with multipliers of the dynamics of 1.
 SimulatorConfig scene_config(const Scenario& scenario, int32_t start_step = 0, SimulatorConfig config = {});
 
 /// The world of a scene's map: all of its tracks.

@@ -137,6 +137,9 @@ std::unique_ptr<Controller> make_cuda_controller(const std::string& name, const 
   if (name == "idle") return std::make_unique<CudaIdleController>(simulator.device());
   if (name == "lane") return std::make_unique<CudaLaneController>(simulator);
   if (name == "log") return std::make_unique<CudaLogController>(simulator.device());
+  if (name == "inverse" || name == "idm") {
+    fail_usage("controller {}: expected a simulator in host memory, got one on {}", name, name_of(simulator.device()));
+  }
   fail_usage("controller: expected one of {}; got '{}'", fmt::join(host_controller_names(), ", "), name);
 }
 

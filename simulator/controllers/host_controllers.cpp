@@ -3,6 +3,8 @@
 #include "pictura/common/array.h"
 #include "pictura/common/error.h"
 #include "pictura/map/scenario/scenario.h"
+#include "pictura/simulator/controllers/idm.h"
+#include "pictura/simulator/controllers/inverse_actions.h"
 #include "pictura/simulator/controllers/lane_keeping.h"
 #include "pictura/simulator/rules/control.h"
 
@@ -61,14 +63,15 @@ class LogController final : public Controller {
 
 }  // namespace
 
-std::vector<std::string> host_controller_names() { return {"random", "idle", "lane", "log"}; }
+std::vector<std::string> host_controller_names() { return {"random", "idle", "lane", "log", "inverse", "idm"}; }
 
 void check_worlds(std::string_view controller, const Simulator& simulator) {
   for (const WorldSpec& world : simulator.worlds()) {
     const CompiledMap& map = *simulator.maps()[static_cast<size_t>(world.map)];
-    if (controller == "log" && !map.scenario) {
-      fail_usage("controller log: world {}: expected a recorded scene, got map {}, of which there is no record",
-                 world.global_world, map.road->name);
+    const bool needs_record = controller == "log" || controller == "inverse" || controller == "idm";
+    if (needs_record && !map.scenario) {
+      fail_usage("controller {}: world {}: expected a recorded scene, got map {}, of which there is no record",
+                 controller, world.global_world, map.road->name);
     }
     if (controller == "lane" && map.scenario) {
       fail_usage("controller lane: world {}: expected a map whose lanes go on for ever, got recorded scene {}",
@@ -83,6 +86,8 @@ std::unique_ptr<Controller> make_host_controller(const std::string& name, const 
   if (name == "idle") return std::make_unique<IdleController>();
   if (name == "lane") return std::make_unique<LaneKeepingController>(simulator);
   if (name == "log") return std::make_unique<LogController>();
+  if (name == "inverse") return std::make_unique<InverseController>(simulator);
+  if (name == "idm") return std::make_unique<IdmController>(simulator);
   fail_usage("controller: expected one of {}; got '{}'", fmt::join(host_controller_names(), ", "), name);
 }
 

@@ -11,11 +11,12 @@
 
 namespace pictura {
 
-/// "random", "idle" (no jerk), "lane" (the lane keeper, see lane_keeping.h), or "log" (as recorded).
+/// "random", "idle" (no jerk), "lane" (the lane keeper, see lane_keeping.h), "log" (as recorded), "inverse" (by the
+/// actions that follow the recording, see inverse_actions.h), or "idm" (along recorded paths, see idm.h).
 std::vector<std::string> host_controller_names();
 
-/// Throws UsageError naming the first world on a map without a record, which "log" cannot drive in; or with one, whose
-/// lanes end, which "lane" cannot.
+/// Throws UsageError naming the first world on a map without a record, which "log", "inverse" and "idm" cannot drive
+/// in; or with one, whose lanes end, which "lane" cannot.
 void check_worlds(std::string_view controller, const Simulator& simulator);
 
 /// Throws UsageError listing the known names, or Error where the simulator's memory is not the host's.

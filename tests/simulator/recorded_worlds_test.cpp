@@ -8,6 +8,9 @@
 #include "pictura/backends/make_simulator.h"
 #include "pictura/map/load_map.h"
 #include "pictura/map/scenario/load_scenario.h"
+#include "pictura/simulator/controllers/idm.h"
+#include "pictura/simulator/controllers/inverse_actions.h"
+#include "pictura/simulator/controllers/shared_control.h"
 #include "pictura/simulator/recorded_scene.h"
 #include "pictura/simulator/simulator_setup.h"
 #include "pictura/tests/support/error_message.h"
@@ -247,6 +250,82 @@ TEST(RecordedWorlds, ControllersShareThemByMasks) {
   idle->act(simulator->controller_input(), driven, commands);
   simulator->step(commands);
   EXPECT_EQ(simulator->totals().agent_steps, 1);
+}
+
+TEST(RecordedWorlds, InverseActionsFollowTheRecord) {
+  const auto scene = crossing(kNobodyInTheWay);
+  const int32_t self = mover(*scene, 40);
+  const auto simulator = world_of(scene);
+  const InverseActions inverse = find_inverse_actions(*simulator->maps()[0], simulator->config().dt_s);
+  std::vector<Driver> drivers;
+  drivers.push_back({.controller = make_controller("log", *simulator, 0)});
+  std::vector<uint8_t> driven(scene->tracks.size());
+  driven[static_cast<size_t>(self)] = 1;
+  drivers.push_back(driver_of(make_controller("inverse", *simulator, 0), driven));
+  SharedControl control(std::move(drivers));
+  EXPECT_EQ(control.name(), "log, inverse");
+  std::vector<Command> commands(scene->tracks.size());
+  const auto first = static_cast<size_t>(self * inverse.num_steps);
+  for (int32_t step = 1; step <= 40; ++step) {
+    control.act(simulator->controller_input(), {}, commands);
+    simulator->step(commands);
+    // The dynamics do what was foreseen, and that is near.
+    const TrackState& there = scene->states_of(self)[static_cast<size_t>(step)];
+    const float error_m =
+        length((simulator->scene().agents[static_cast<size_t>(self)].center_m - there.position_m).xy());
+    const size_t at = first + static_cast<size_t>(step) - 1;
+    ASSERT_EQ(inverse.is_followed[at], 1);
+    EXPECT_NEAR(inverse.error_m[at], error_m, 0.02) << step;
+    EXPECT_LT(error_m, 0.1) << step;
+  }
+  EXPECT_EQ(simulator->totals().agent_steps, 40);
+}
+
+TEST(RecordedWorlds, IdmFollowsThePathAndStopsBehindOthers) {
+  const IdmParameters parameters;
+  EXPECT_FLOAT_EQ(idm_acceleration(parameters, 0, INFINITY, 0), 2);
+  EXPECT_FLOAT_EQ(idm_acceleration(parameters, 0, 2, 0), 0);
+  EXPECT_FLOAT_EQ(idm_acceleration(parameters, 30, INFINITY, 0), 0);
+  EXPECT_LT(idm_acceleration(parameters, 10, 5, 0), -4);
+
+  const auto scene = crossing(kNobodyInTheWay);
+  const int32_t self = mover(*scene, 40), other = self + 1;
+  for (const bool is_blocked : {false, true}) {
+    const auto simulator = world_of(scene);
+    const RecordedState& end =
+        simulator->maps()[0]->rules.record.states[static_cast<size_t>((self + 1) * scene->num_steps - 1)];
+    const TrackState& blocked_at = scene->states_of(self)[60];
+    const auto idm = make_controller("idm", *simulator, 0);
+    std::vector<uint8_t> driven(scene->tracks.size());
+    driven[static_cast<size_t>(self)] = 1;
+    float fastest_mps = 0;
+    for (int32_t step = 1; step < scene->num_steps; ++step) {
+      std::vector<Command> commands = recorded(*simulator);
+      idm->act(simulator->controller_input(), driven, commands);
+      if (is_blocked) {
+        commands[static_cast<size_t>(other)] = {.kind = CommandKind::kinematic_state,
+                                                .x_m = blocked_at.position_m.x,
+                                                .y_m = blocked_at.position_m.y,
+                                                .z_m = blocked_at.position_m.z};
+      }
+      simulator->step(commands);
+      fastest_mps = std::max(fastest_mps, simulator->state().speed_mps[self]);
+      // Never off its path.
+      const TrackState& start = scene->states_of(self)[0];
+      const Vec2 along{std::cos(start.heading_rad), std::sin(start.heading_rad)};
+      const Vec3 center_m = simulator->scene().agents[static_cast<size_t>(self)].center_m;
+      EXPECT_LT(std::abs(cross(along, (center_m - start.position_m).xy())), 0.05f);
+    }
+    EXPECT_EQ(simulator->totals().collisions, 0);
+    EXPECT_LT(simulator->state().speed_mps[self], 0.3f);
+    const float left_m = length(Vec2{simulator->state().x_m[self], simulator->state().y_m[self]} - end.position_m.xy());
+    if (is_blocked) {
+      EXPECT_GT(left_m, 5);
+    } else {
+      EXPECT_GT(fastest_mps, 1.2f * length(scene->states_of(self)[0].velocity_mps));
+      EXPECT_LT(left_m, 0.6f);
+    }
+  }
 }
 
 TEST(RecordedWorlds, RefuseWhatCannotBe) {

@@ -79,8 +79,7 @@ PICTURA_HD inline void write_command(const int32_t* actions, Span<const uint8_t>
 
 /// Whether a slot's agent is to be drawn, encoded and commanded.
 PICTURA_HD inline bool takes_actions(const uint8_t* status, Span<const uint8_t> mask, int64_t slot) {
-  return static_cast<AgentStatus>(status[slot]) == AgentStatus::active &&
-         (mask.empty() || mask[static_cast<size_t>(slot)]);
+  return takes_actions(static_cast<AgentStatus>(status[slot])) && (mask.empty() || mask[static_cast<size_t>(slot)]);
 }
 
 }  // namespace pictura

@@ -1,0 +1,145 @@
+#include "pictura/simulator/controllers/inverse_actions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <tuple>
+
+#include "pictura/common/support/parallel_for.h"
+#include "pictura/map/scenario/scenario.h"
+#include "pictura/simulator/controllers/host_controllers.h"
+#include "pictura/simulator/rules/dynamics.h"
+
+namespace pictura {
+namespace {
+
+/// A sequence of actions: its last one, and the sequence before it in the beam of the step before.
+struct Sequence {
+  Motion motion;
+  double cost = 0;
+  float error_m = 0;
+  int32_t action = 0;
+  int32_t before = -1;
+};
+
+/// Of sequences that lead to about the same motion the cheapest is kept, so that a beam holds different ones.
+auto likeness(const Motion& motion) {
+  const auto rounded = [](float value, float unit) { return static_cast<int32_t>(std::lround(value / unit)); };
+  return std::tuple(rounded(motion.x_m, 0.02f), rounded(motion.y_m, 0.02f), rounded(motion.heading_rad, 0.01f),
+                    rounded(motion.accel_long_mps2, 0.4f), rounded(motion.accel_lat_mps2, 0.4f));
+}
+
+double cost_of(const Motion& motion, const RecordedState& wanted, float* error_m_out) {
+  constexpr double kSpeedWeight = 0.1, kHeadingWeight = 1, kAccelWeight = 0.002;
+  const Vec2 apart = Vec2{motion.x_m, motion.y_m} - wanted.position_m.xy();
+  *error_m_out = length(apart);
+  const auto squared = [](float value) { return static_cast<double>(value) * static_cast<double>(value); };
+  return squared(*error_m_out) + kSpeedWeight * squared(motion.speed_mps - wanted.speed_mps) +
+         kHeadingWeight * squared(wrap_angle(motion.heading_rad - wanted.heading_rad)) +
+         kAccelWeight * (squared(motion.accel_long_mps2) + squared(motion.accel_lat_mps2));
+}
+
+/// The beam of the step after, by all actions.
+std::vector<Sequence> next_beam(const std::vector<Sequence>& beam, const RecordedState& wanted,
+                                const DynamicsParameters& parameters, const ClassLimits& limits, float dt_s) {
+  std::map<decltype(likeness(Motion{})), Sequence> best;
+  for (size_t i = 0; i < beam.size(); ++i) {
+    for (int32_t action = 0; action < kNumActions; ++action) {
+      Sequence next;
+      next.motion = move(beam[i].motion, controls_of_action(action), parameters, limits, dt_s);
+      next.cost = beam[i].cost + cost_of(next.motion, wanted, &next.error_m);
+      next.action = action;
+      next.before = static_cast<int32_t>(i);
+      const auto [found, is_new] = best.emplace(likeness(next.motion), next);
+      if (!is_new && next.cost < found->second.cost) found->second = next;
+    }
+  }
+  std::vector<Sequence> all;
+  for (const auto& [key, sequence] : best) all.push_back(sequence);
+  std::stable_sort(all.begin(), all.end(), [](const Sequence& a, const Sequence& b) { return a.cost < b.cost; });
+  all.resize(std::min<size_t>(all.size(), kBeamWidth));
+  return all;
+}
+
+/// Writes the actions of an unbroken run of states; those are `out`'s elements from `first` on.
+void follow_run(Span<const RecordedState> run, const RecordedAgent& agent, float dt_s, size_t first,
+                InverseActions* out) {
+  DynamicsParameters parameters;
+  parameters.wheelbase_m = kWheelbasePerLength * agent.length_m;
+  const ClassLimits limits = class_limits(static_cast<AgentClass>(agent.agent_class));
+  Sequence start;
+  start.motion.x_m = run[0].position_m.x;
+  start.motion.y_m = run[0].position_m.y;
+  start.motion.heading_rad = run[0].heading_rad;
+  start.motion.speed_mps = run[0].speed_mps;
+  std::vector<std::vector<Sequence>> beams{{start}};
+  for (size_t i = 1; i < run.size(); ++i) {
+    beams.push_back(next_beam(beams.back(), run[i], parameters, limits, dt_s));
+  }
+  int32_t at = 0;
+  for (size_t i = run.size(); i-- > 1;) {
+    const Sequence& sequence = beams[i][static_cast<size_t>(at)];
+    out->actions[first + i - 1] = sequence.action;
+    out->is_followed[first + i - 1] = 1;
+    out->error_m[first + i - 1] = sequence.error_m;
+    at = sequence.before;
+  }
+}
+
+}  // namespace
+
+InverseActions find_inverse_actions(const CompiledMap& scene, float dt_s, int num_threads) {
+  const MapRecord& record = scene.rules.record;
+  if (record.agents.empty()) fail_usage("inverse actions: expected a recorded scene, got map {}", scene.road->name);
+  InverseActions out{.num_steps = record.num_steps};
+  out.actions.assign(record.states.size(), kIdleAction);
+  out.is_followed.assign(record.states.size(), 0);
+  out.error_m.assign(record.states.size(), 0);
+  const auto num_steps = static_cast<size_t>(record.num_steps);
+  parallel_for(num_threads, static_cast<int64_t>(record.agents.size()), [&](int64_t agent) {
+    const size_t first = static_cast<size_t>(agent) * num_steps;
+    const Span<const RecordedState> states(record.states.data() + first, num_steps);
+    for (size_t begin = 0; begin < num_steps;) {
+      size_t end = begin;
+      while (end < num_steps && states[end].is_there) ++end;
+      if (end > begin + 1) {
+        follow_run(states.subspan(begin, end - begin), record.agents[static_cast<size_t>(agent)], dt_s, first + begin,
+                   &out);
+      }
+      begin = end + 1;
+    }
+  });
+  return out;
+}
+
+InverseController::InverseController(const Simulator& simulator) {
+  for (const Conditioning which : {Conditioning::throttle, Conditioning::steer, Conditioning::acceleration}) {
+    const ConditioningRange& range = simulator.config().conditioning[static_cast<size_t>(which)];
+    if (range.low != 1 || range.high != 1) {
+      fail_usage("controller inverse: conditioning {}: expected 1, by which actions were searched, got {} to {}",
+                 kConditioningNames[static_cast<size_t>(which)], range.low, range.high);
+    }
+  }
+  for (const auto& map : simulator.maps()) {
+    of_map_.push_back(find_inverse_actions(*map, simulator.config().dt_s, simulator.config().num_threads));
+  }
+  for (const WorldSpec& world : simulator.worlds()) map_of_world_.push_back(world.map);
+}
+
+void InverseController::act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out,
+                            Stream) {
+  check_controller_arrays(name(), input, Device{}, mask, commands_out);
+  for (size_t slot = 0; slot < commands_out.size(); ++slot) {
+    if (!mask.empty() && !mask[slot]) continue;
+    commands_out[slot] = {};
+    const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
+    const InverseActions& inverse = of_map_[static_cast<size_t>(map_of_world_[world])];
+    const int32_t step = input.episode_step[world];
+    if (step >= inverse.num_steps) continue;
+    commands_out[slot].action =
+        inverse.actions[static_cast<size_t>(input.slots.agent_of_slot[slot]) * static_cast<size_t>(inverse.num_steps) +
+                        static_cast<size_t>(step)];
+  }
+}
+
+}  // namespace pictura

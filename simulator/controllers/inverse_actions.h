@@ -1,0 +1,44 @@
+// The actions by which the simulator's dynamics follow a recording most closely, and how closely that is.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "pictura/common/error.h"
+#include "pictura/simulator/compiled_map.h"
+#include "pictura/simulator/controllers/controller.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+/// Of every track, for the steps after each state of its record.
+struct InverseActions {
+  int32_t num_steps = 0;             // of the record, from its start step
+  std::vector<int32_t> actions;      // [tracks, num_steps] idle where there is nothing to follow
+  std::vector<uint8_t> is_followed;  // [tracks, num_steps] whether there is a state to start from and one to reach
+  std::vector<float> error_m;        // [tracks, num_steps] from the recorded place, after that action
+};
+
+/// Searches each unbroken run of valid states by itself, from the first one, with accelerations and steering angle 0,
+/// as a takeover starts. A beam search keeps the best kBeamWidth sequences of actions; it pays for squared distances
+/// from the recorded places, and a little for speeds and headings that are not the recorded ones, without which it
+/// would weave. Multipliers of the dynamics are 1. Throws UsageError for a map without a record.
+InverseActions find_inverse_actions(const CompiledMap& scene, float dt_s, int num_threads = 0);
+constexpr int kBeamWidth = 48;
+
+/// Drives by them. On the host only.
+class InverseController final : public Controller {
+ public:
+  /// Of one simulator, whose worlds are all recorded scenes.
+  explicit InverseController(const Simulator& simulator);
+  std::string_view name() const override { return "inverse"; }
+  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out,
+           Stream stream = {}) override;
+
+ private:
+  std::vector<InverseActions> of_map_;  // [maps]
+  std::vector<int32_t> map_of_world_;
+};
+
+}  // namespace pictura
