@@ -39,10 +39,12 @@ Json facts_of(const std::string& path, const Replay& replay) {
           {"metrics", metrics}};
 }
 
-Replay record(const Arguments& arguments, uint64_t seed, ProgressLine* line_out) {
+Replay record(Arguments arguments, uint64_t seed, ProgressLine* line_out) {
   WorldOptions options = arguments.world;
   options.seed = seed;
   DrivenWorld world = make_world(options, arguments.policy, arguments.backends);
+  if (arguments.steps == 0) arguments.steps = world.simulator->config().episode_steps;
+  settle_followed(world, &arguments.recording);
   Recording recording(*world.simulator, {arguments.policy, world.session.get(), world.renderer.get()},
                       arguments.recording);
   for (int step = 0; step < arguments.steps; ++step) {
@@ -114,7 +116,7 @@ void add_replay_command(CLI::App& app) {
     if (arguments->gallery.empty() && command->count("--episodes") > 0) {
       fail_usage("--episodes: has no effect without --gallery");
     }
-    check_followed(arguments->recording, arguments->world.agents);
+    settle_driving_options(*command, &arguments->world, &arguments->steps, &arguments->policy);
     refuse_idle_backend_options(*command, arguments->policy);
     run(*arguments);
   });

@@ -1,5 +1,6 @@
 // `pictura simulate`: drives one world with a policy, counts what happens, and films it from above and from the
 // cameras.
+#include <algorithm>
 #include <array>
 #include <chrono>
 
@@ -14,7 +15,7 @@
 #include "pictura/common/support/interrupt.h"
 #include "pictura/drawing/drawing.h"
 #include "pictura/drawing/film.h"
-#include "pictura/map/load_map.h"
+#include "pictura/map/scenario/scenario.h"
 
 namespace pictura {
 
@@ -28,7 +29,7 @@ struct Arguments {
   RecordingOptions recording;
   ServeOptions serve;
   bool endless = false;  // until it is interrupted
-  int film_agent = 0;
+  std::optional<int> film_agent;
   float film_width_m = 150;
   bool json = false;
 };
@@ -46,6 +47,26 @@ std::array<int64_t, kNumAgentClasses> spawned_by_class(Simulator& simulator) {
   return counts;
 }
 
+/// How far those who drive are from where the recording has them, over all their steps that it has.
+struct Displacement {
+  int64_t steps = 0;
+  double sum_m = 0, max_m = 0;
+
+  void add(Simulator& simulator, const Scenario& scene) {
+    const int32_t step = simulator.maps()[0]->start_step + simulator.episode_step()[0];
+    for (int32_t track = 0; track < simulator.num_slots() && step < scene.num_steps; ++track) {
+      const auto at = static_cast<size_t>(step);
+      const bool drives = simulator.state().status[track] == static_cast<uint8_t>(AgentStatus::active);
+      if (!drives || !scene.valid_of(track)[at]) continue;
+      const Vec3 center_m = simulator.scene().agents[static_cast<size_t>(track)].center_m;
+      const double apart_m = length((center_m - scene.states_of(track)[at].position_m).xy());
+      ++steps;
+      sum_m += apart_m;
+      max_m = std::max(max_m, apart_m);
+    }
+  }
+};
+
 // Options that would change nothing.
 void refuse_idle_options(const CLI::App& command, const Arguments& arguments) {
   if (arguments.video.empty()) {
@@ -62,15 +83,22 @@ void refuse_idle_options(const CLI::App& command, const Arguments& arguments) {
   refuse_idle_backend_options(command, arguments.policy);
 }
 
-void run(const Arguments& arguments) {
+void run(Arguments arguments) {
   DrivenWorld world = make_world(arguments.world, arguments.policy, arguments.backends);
   Simulator* const simulator = world.simulator.get();
+  const Scenario* const scene = simulator->maps()[0]->scenario.get();
+  if (arguments.steps == 0) arguments.steps = simulator->config().episode_steps;
+  const int film_agent = arguments.film_agent.value_or(world.first_agent);
+  if (film_agent >= simulator->num_slots()) {
+    fail_usage("--film-agent: expected 0 to {}, got {}", simulator->num_slots() - 1, film_agent);
+  }
+  settle_followed(world, &arguments.recording);
   const SpawnReport spawned = simulator->spawn_report();
   const auto of_class = spawned_by_class(*simulator);
   std::unique_ptr<Film> film;
   if (!arguments.video.empty()) {
     film = std::make_unique<Film>(arguments.video, *simulator,
-                                  FilmOptions{.agent = arguments.film_agent,
+                                  FilmOptions{.agent = film_agent,
                                               .width_m = arguments.film_width_m,
                                               .trained_view = world.trained_view,
                                               .num_threads = arguments.world.num_threads});
@@ -84,6 +112,7 @@ void run(const Arguments& arguments) {
   if (arguments.serve.is_asked) live = serve(arguments.serve, *simulator, driver, arguments.recording);
 
   ProgressLine line;
+  Displacement displacement;          // in a recorded scene
   double simulate_s = 0, film_s = 0;  // filming, recording and serving
   const auto begin_of_all = std::chrono::steady_clock::now();
   int step = 0;
@@ -99,6 +128,7 @@ void run(const Arguments& arguments) {
     const auto begin = std::chrono::steady_clock::now();
     const StepResult result = world.step();
     const auto end = std::chrono::steady_clock::now();
+    if (scene) displacement.add(*simulator, *scene);
     if (recording) recording->after_step(result);
     if (live) live->after_step(result);
     simulate_s += std::chrono::duration<double>(end - begin).count();
@@ -118,36 +148,42 @@ void run(const Arguments& arguments) {
   }
 
   const SimulatorTotals& totals = simulator->totals();
-  const Json object{
-      {"backend", simulator->name()},
-      {"renderer", world.renderer ? Json(world.renderer->name()) : Json(nullptr)},
-      {"map", simulator->maps()[0]->road->name},
-      {"wall_seed", simulator->config().walls ? Json(simulator->config().wall_seed) : Json(nullptr)},
-      {"asked", spawned.asked},
-      {"spawned", spawned.spawned},
-      {"refused", spawned.refused},
-      {"refused_no_place", spawned.refused_no_place},
-      {"refused_taken", spawned.refused_taken},
-      {"vehicles", of_class[static_cast<size_t>(AgentClass::vehicle)]},
-      {"cyclists", of_class[static_cast<size_t>(AgentClass::cyclist)]},
-      {"pedestrians", of_class[static_cast<size_t>(AgentClass::pedestrian)]},
-      {"parked_asked", spawned.parked_asked},
-      {"parked_placed", spawned.parked_placed},
-      {"steps", step},
-      {"agent_steps", totals.agent_steps},
-      {"agent_steps_per_s", finite_or_null(static_cast<double>(totals.agent_steps) / drive_s)},
-      {"slot_steps_per_s", finite_or_null(static_cast<double>(totals.slot_steps) / drive_s)},
-      {"simulator_agent_steps_per_s", finite_or_null(static_cast<double>(totals.agent_steps) / simulate_s)},
-      {"episodes", totals.episodes},
-      {"goals_reached", totals.goals_reached},
-      {"waypoints_reached", totals.waypoints_reached},
-      {"collisions", totals.collisions},
-      {"at_fault_collisions", totals.at_fault_collisions},
-      {"off_road", totals.off_road},
-      {"red_light", totals.red_light},
-      {"wall_contacts", totals.wall_contacts},
-      {"km_driven", totals.distance_m / 1000},
-      {"state_hash", fmt::format("{:016x}", simulator->state_hash())}};
+  Json object{{"backend", simulator->name()},
+              {"renderer", world.renderer ? Json(world.renderer->name()) : Json(nullptr)},
+              {"map", simulator->maps()[0]->road->name},
+              {"wall_seed", simulator->config().walls ? Json(simulator->config().wall_seed) : Json(nullptr)},
+              {"asked", spawned.asked},
+              {"spawned", spawned.spawned},
+              {"refused", spawned.refused},
+              {"refused_no_place", spawned.refused_no_place},
+              {"refused_taken", spawned.refused_taken},
+              {"vehicles", of_class[static_cast<size_t>(AgentClass::vehicle)]},
+              {"cyclists", of_class[static_cast<size_t>(AgentClass::cyclist)]},
+              {"pedestrians", of_class[static_cast<size_t>(AgentClass::pedestrian)]},
+              {"parked_asked", spawned.parked_asked},
+              {"parked_placed", spawned.parked_placed},
+              {"steps", step},
+              {"agent_steps", totals.agent_steps},
+              {"agent_steps_per_s", finite_or_null(static_cast<double>(totals.agent_steps) / drive_s)},
+              {"slot_steps_per_s", finite_or_null(static_cast<double>(totals.slot_steps) / drive_s)},
+              {"simulator_agent_steps_per_s", finite_or_null(static_cast<double>(totals.agent_steps) / simulate_s)},
+              {"episodes", totals.episodes},
+              {"goals_reached", totals.goals_reached},
+              {"waypoints_reached", totals.waypoints_reached},
+              {"collisions", totals.collisions},
+              {"at_fault_collisions", totals.at_fault_collisions},
+              {"off_road", totals.off_road},
+              {"red_light", totals.red_light},
+              {"wall_contacts", totals.wall_contacts},
+              {"km_driven", totals.distance_m / 1000},
+              {"state_hash", fmt::format("{:016x}", simulator->state_hash())}};
+  if (scene) {
+    object["scenario_id"] = scene->id;
+    object["start_step"] = simulator->maps()[0]->start_step;
+    object["displacement_steps"] = displacement.steps;
+    object["displacement_mean_m"] = finite_or_null(displacement.sum_m / static_cast<double>(displacement.steps));
+    object["displacement_max_m"] = displacement.max_m;
+  }
   if (arguments.json) {
     print_json(object);
   } else {
@@ -172,9 +208,10 @@ void add_simulate_command(CLI::App& app) {
   command->add_option("--film-width", arguments->film_width_m, "Metres that it shows from above; 0: the whole map")
       ->transform(number(0, 1e5))
       ->capture_default_str();
-  command->add_option("--film-agent", arguments->film_agent, "The agent that the film follows")
-      ->transform(whole_number(0))
-      ->capture_default_str();
+  command
+      ->add_option("--film-agent", arguments->film_agent,
+                   "The agent that the film follows; default: 0, in recorded scenes the self-driving car")
+      ->transform(whole_number(0));
   command->add_option("--replay", arguments->replay, "Record it as a page that a browser plays")
       ->check(file_ending(".html"));
   command->add_option("--mcap", arguments->mcap, "The same as an MCAP file, for Foxglove")->check(file_ending(".mcap"));
@@ -186,13 +223,11 @@ void add_simulate_command(CLI::App& app) {
       "simulator_agent_steps_per_s counts the simulator alone.\n"
       "Examples:\n  pictura simulate Town01 --agents 80 --steps 600 --policy random --json\n"
       "  pictura simulate procedural:1 --policy runs/demo/checkpoint.ckpt --video drive.mp4\n"
-      "  pictura simulate Town05 --agents 60 --policy lane --serve --cameras");
+      "  pictura simulate Town05 --agents 60 --policy lane --serve --cameras\n"
+      "  pictura simulate validation.tfrecord-00000-of-00150#7 --policy runs/demo/checkpoint.ckpt --control vehicles");
   command->callback([arguments, command] {
+    settle_driving_options(*command, &arguments->world, &arguments->steps, &arguments->policy);
     refuse_idle_options(*command, *arguments);
-    if (arguments->film_agent >= arguments->world.agents) {
-      fail_usage("--film-agent: expected 0 to {}, got {}", arguments->world.agents - 1, arguments->film_agent);
-    }
-    check_followed(arguments->recording, arguments->world.agents);
     arguments->endless = arguments->serve.is_asked && command->count("--steps") == 0;
     run(*arguments);
   });

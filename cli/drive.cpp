@@ -10,7 +10,10 @@
 #include "pictura/cli/reported_map.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/suggestion.h"
+#include "pictura/map/scenario/load_scenario.h"
 #include "pictura/simulator/controllers/host_controllers.h"
+#include "pictura/simulator/controllers/shared_control.h"
+#include "pictura/simulator/recorded_scene.h"
 #ifdef PICTURA_HAS_TORCH
 #include "pictura/training/session.h"
 #endif
@@ -46,12 +49,53 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
 
 void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_out, std::string* policy_out,
                          BackendOptions* backends_out) {
-  command->add_option("MAP", world_out->map, "A .xodr file, a town's name, or procedural[:SEED]")->required();
+  command
+      ->add_option("MAP", world_out->map,
+                   "A .xodr file, a town's name, procedural[:SEED], or a recorded scene: FILE.json, FILE.bin, "
+                   "FILE.tfrecord[#K] or FOLDER[#K], with a number or a scenario's id as K")
+      ->required();
   add_world_options(command, world_out);
-  command->add_option("--steps", *steps_out, "Steps of 0.1 s")->transform(whole_number(1))->capture_default_str();
-  command->add_option("--policy", *policy_out, "random, idle, lane, or a checkpoint or safetensors that train wrote")
+  command
+      ->add_option("--control", world_out->controlled,
+                   "Of a recorded scene, which tracks --policy drives: self, vehicles (the others), others (who is no "
+                   "vehicle), all, tracks_to_predict, objects_of_interest, and ids, with commas between them; whoever "
+                   "is not there at the start follows the recording")
+      ->capture_default_str();
+  command->add_option("--start", world_out->start_step, "The step of a recorded scene to start at")
+      ->transform(whole_number(0, kMaxScenarioSteps - 1))
+      ->capture_default_str();
+  command->add_option("--steps", *steps_out, "Steps of 0.1 s; of a recorded scene by default as many as are recorded")
+      ->transform(whole_number(1))
+      ->capture_default_str();
+  command
+      ->add_option("--policy", *policy_out,
+                   "random, idle, lane, in recorded scenes log (as recorded, the default there), inverse (by the "
+                   "actions that follow the recording) or idm (along recorded paths, behind others), or a checkpoint "
+                   "or safetensors that train wrote")
       ->capture_default_str();
   add_policy_backend_options(command, "auto, and drawn as in training", backends_out);
+}
+
+void settle_driving_options(const CLI::App& command, WorldOptions* world_inout, int* steps_inout,
+                            std::string* policy_inout) {
+  const auto refuse = [&command](std::initializer_list<const char*> options, const std::string& why) {
+    for (const char* option : options) {
+      if (command.count(option) > 0) fail_usage("{}: has no effect {}", option, why);
+    }
+  };
+  if (!is_scene_name(world_inout->map)) {
+    refuse({"--control", "--start"}, fmt::format("on {}, which is no recorded scene", world_inout->map));
+    return;
+  }
+  refuse({"--agents", "--pedestrians", "--cyclists", "--parked", "--no-walls"},
+         "on a recorded scene, which says that itself");
+  if (command.count("--policy") == 0) *policy_inout = "log";
+  if (*policy_inout == "log") refuse({"--control"}, "with the policy log, which drives everybody as recorded");
+  if (command.count("--steps") == 0) {
+    *steps_inout = 0;
+  } else {
+    world_inout->min_episode_steps = *steps_inout;
+  }
 }
 
 bool is_host_controller(const std::string& policy) {
@@ -79,6 +123,27 @@ void set_population(const WorldOptions& options, SimulatorConfig* config_inout) 
   }
   (options.pedestrian_fraction ? cyclists : pedestrians) = 1 - (options.pedestrian_fraction ? pedestrians : cyclists);
 }
+
+namespace {
+
+/// [tracks] those that the policy drives: the controlled ones that are there at the start.
+std::vector<uint8_t> controlled_tracks(const WorldOptions& options, const CompiledMap& map) {
+  std::vector<uint8_t> mask;
+  try {
+    mask = tracks_of(*map.scenario, options.controlled);
+  } catch (const UsageError& error) {
+    fail_usage("--control: {}", error.what());
+  }
+  for (size_t track = 0; track < mask.size(); ++track) {
+    mask[track] &= map.scenario->valid_of(static_cast<int32_t>(track))[static_cast<size_t>(map.start_step)];
+  }
+  if (std::find(mask.begin(), mask.end(), 1) == mask.end()) {
+    fail_usage("--control {}: expected a track that is there at step {}, got none", options.controlled, map.start_step);
+  }
+  return mask;
+}
+
+}  // namespace
 
 DrivenWorld make_world(const WorldOptions& options, const std::string& policy, const BackendOptions& backends) {
   if (backends.simulator == "cuda") {
@@ -119,17 +184,32 @@ DrivenWorld make_world(const WorldOptions& options, const std::string& policy, c
   config.fixed_lights = true;
   set_population(options, &config);
   config.parked_cars = options.parked_cars.value_or(config.parked_cars);
-  world.simulator = make_simulator(backends.simulator.empty() ? "cpu" : backends.simulator, config,
-                                   {load_reported_map(options.map)}, {{0, options.agents, 0}});
+  const std::string simulator = backends.simulator.empty() ? "cpu" : backends.simulator;
+  std::vector<uint8_t> controlled;  // of a recorded scene, by other than the record
+  if (is_scene_name(options.map)) {
+    const auto scene = std::make_shared<const Scenario>(load_scenario(options.map));
+    config = scene_config(*scene, options.start_step, config);
+    config.episode_steps = std::max(config.episode_steps, options.min_episode_steps);
+    const auto map = compile_scenario(scene, map_options(config), options.start_step);
+    if (policy != "log") controlled = controlled_tracks(options, *map);
+    world.simulator = make_simulator(simulator, config, CompiledMaps{map}, {scene_world(*map)});
+    world.first_agent = std::max(scene->sdc_track, 0);
+  } else {
+    world.simulator = make_simulator(simulator, config, {load_reported_map(options.map)}, {{0, options.agents, 0}});
+  }
   world.commands.resize(static_cast<size_t>(world.simulator->num_slots()));
 #ifdef PICTURA_HAS_TORCH
   if (is_trained) {
     if (world.renderer) upload_maps(*world.simulator, world.renderer.get());
     world.controller = world.session->make_controller(world.renderer.get(), /*argmax=*/true, options.seed);
-    return world;
   }
 #endif
-  world.controller = make_controller(policy, *world.simulator, options.seed);
+  if (!world.controller) world.controller = make_controller(policy, *world.simulator, options.seed);
+  if (controlled.empty()) return world;
+  std::vector<Driver> drivers;
+  drivers.push_back({.controller = make_controller("log", *world.simulator, options.seed)});
+  drivers.push_back(driver_of(std::move(world.controller), std::move(controlled)));
+  world.controller = std::make_unique<SharedControl>(std::move(drivers));
   return world;
 }
 

@@ -26,14 +26,26 @@ struct WorldOptions {
   // Where nothing is said, as the policy was trained, or as in the paper.
   std::optional<float> pedestrian_fraction, cyclist_fraction;
   std::optional<int> parked_cars;
+  // Of recorded scenes: which tracks the policy drives, and where the recording starts. An episode is as long as what
+  // is left of the recording, or as so many steps.
+  std::string controlled = "self";
+  int start_step = 0;
+  int min_episode_steps = 1;
 };
 
 /// Adds --agents, --pedestrians, --cyclists, --parked, --seed, --threads and --no-walls, which fill *options_out.
 void add_world_options(CLI::App* command, WorldOptions* options_out);
 
-/// Adds MAP, those options, --steps, --policy and where the policy runs.
+/// Adds MAP, which may be a recorded scene, those options, --control, --start, --steps, --policy and where the policy
+/// runs.
 void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_out, std::string* policy_out,
                          BackendOptions* backends_out);
+
+/// What these options mean for a recorded scene, where MAP is one: everybody is driven as recorded unless a policy was
+/// asked for, for as many steps as are recorded unless --steps was given (else *steps_inout becomes 0). Throws
+/// UsageError for options that have no effect on what MAP is.
+void settle_driving_options(const CLI::App& command, WorldOptions* world_inout, int* steps_inout,
+                            std::string* policy_inout);
 
 /// Sets the shares of pedestrians and cyclists that were given; a share that was not gives way to one that was. Throws
 /// UsageError where both were given and are more than 1.
@@ -56,6 +68,7 @@ struct DrivenWorld {
   std::optional<RendererConfig> trained_view;
   std::unique_ptr<Controller> controller;
   std::vector<Command> commands;
+  int first_agent = 0;  // that films and replays follow unless they are told: in recorded scenes the self-driving car
 
   /// Lets the controller choose the commands of the next step.
   void act() { controller->act(simulator->controller_input(), {}, commands); }
@@ -63,7 +76,9 @@ struct DrivenWorld {
 };
 
 /// A world of options.agents agents on the map, at the start of its first episode, with evaluation's light timing.
-/// `policy` drives: a controller's name (random, idle, lane), or a checkpoint's path (argmax; needs torch).
+/// `policy` drives: a controller's name (random, idle, lane), or a checkpoint's path (argmax; needs torch). In a
+/// recorded scene it drives the controlled tracks that are there at the start; all others, or with the policy log all,
+/// follow the recording.
 /// Then the world is the one that the policy was trained in, with its walls, population, observations and evaluation's
 /// conditioning, and its images are drawn as they were in training; `backends` and options say otherwise. Throws
 /// UsageError for a simulator that does not work in host memory.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "pictura/cli/drive.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/commit.h"
 #include "pictura/common/error.h"
@@ -52,17 +53,18 @@ void say_what_was_written(const std::string& path, const Replay& replay) {
 void add_recording_options(CLI::App* command, RecordingOptions* options_out) {
   command
       ->add_option("--follow", options_out->followed,
-                   "The agent whose decisions and images the replay holds, and that it opens with")
-      ->transform(whole_number(0, kMaxAgentsPerWorld - 1))
-      ->capture_default_str();
+                   "The agent whose decisions and images the replay holds, and that it opens with; default: 0, in "
+                   "recorded scenes the self-driving car")
+      ->transform(whole_number(0, kMaxAgentsPerWorld - 1));
   command->add_flag("--cameras", options_out->cameras,
                     "Keep the followed agent's images of every step as well, without loss: as its policy was trained, "
                     "else the paper's");
 }
 
-void check_followed(const RecordingOptions& options, int num_agents) {
-  if (options.followed >= num_agents)
-    fail_usage("--follow: expected 0 to {}, got {}", num_agents - 1, options.followed);
+void settle_followed(const DrivenWorld& world, RecordingOptions* options_inout) {
+  const int num_agents = world.simulator->num_slots(), followed = options_inout->followed.value_or(world.first_agent);
+  if (followed >= num_agents) fail_usage("--follow: expected 0 to {}, got {}", num_agents - 1, followed);
+  options_inout->followed = followed;
 }
 
 void refuse_recording_options(const CLI::App& command, const std::string& needed) {
@@ -120,8 +122,8 @@ struct Recording::Parts {
   Parts(Simulator& its_simulator, RecordedDriver its_driver, const RecordingOptions& options)
       : simulator(its_simulator),
         driver(std::move(its_driver)),
-        followed(options.followed),
-        recorder(simulator, {.followed = options.followed,
+        followed(options.followed.value_or(0)),
+        recorder(simulator, {.followed = followed,
                              .cameras = options.cameras ? std::optional(cameras_of(driver)) : std::nullopt}) {}
 
   Simulator& simulator;

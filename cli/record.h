@@ -14,16 +14,18 @@
 namespace pictura {
 
 class PolicySession;
+struct DrivenWorld;
 
 struct RecordingOptions {
-  int followed = 0;
+  std::optional<int> followed;  // nothing: settle_followed() chooses
   bool cameras = false;
 };
 
 /// Adds --follow and --cameras.
 void add_recording_options(CLI::App* command, RecordingOptions* options_out);
-/// Throws UsageError unless a world of so many agents has the followed one.
-void check_followed(const RecordingOptions& options, int num_agents);
+/// Follows the world's first agent where nothing was asked for. Throws UsageError unless the world has the followed
+/// one.
+void settle_followed(const DrivenWorld& world, RecordingOptions* options_inout);
 /// Throws UsageError where the command was given one of them, which has no effect without `needed`.
 void refuse_recording_options(const CLI::App& command, const std::string& needed);
 

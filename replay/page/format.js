@@ -2,7 +2,7 @@
 
 class Damaged extends Error {}
 
-const STATUS = ["active", "halted", "parked", "absent"];
+const STATUS = ["active", "halted", "parked", "absent", "recorded"];
 const CLASSES = ["vehicle", "cyclist", "pedestrian"];
 const EVENT = { collision: 1, atFault: 2, offRoad: 4, redLight: 8, wall: 16, goal: 32, waypoint: 64, metricGoal: 128 };
 const INFRACTIONS = EVENT.collision | EVENT.offRoad | EVENT.redLight | EVENT.wall;

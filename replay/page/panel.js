@@ -138,7 +138,7 @@ class Panel {
         word.style.color = theme[reason.color];
         return word;
       }));
-    } else line.textContent = status === "absent" ? `${status}: it found no place in this episode` : `${size}, ${status}, waypoint ${replay.raw("next_waypoint", agent, frame) + 1} of 3`;
+    } else line.textContent = status === "absent" ? `${status}: it found no place in this episode, or the recording does not have it now` : status === "recorded" ? `${size}, where the recording has it` : `${size}, ${status}, waypoint ${replay.raw("next_waypoint", agent, frame) + 1} of 3`;
     const decision = replay.decision(agent, frame), before = Math.max(replay.episode(frame).first, frame - 1);
     const set = (key, value, digits, unit) => {
       this.facts[key].value.replaceChildren(Number.isFinite(value) ? decimals(value, digits) : "\u2013", make("small", ` ${unit}`));

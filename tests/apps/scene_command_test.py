@@ -1,7 +1,8 @@
-"""`pictura map` of recorded scenes, from outside. Usage: scene_command_test.py PICTURA SCENE_FIXTURE."""
+"""`pictura map` and `pictura simulate` of recorded scenes, from outside. Usage: scene_command_test.py PICTURA SCENE_FIXTURE."""
 
 import json
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -9,10 +10,18 @@ import tempfile
 PICTURA, FIXTURE = sys.argv[1:3]
 
 
-def run(*words, status=0):
-    done = subprocess.run([PICTURA, "map", *map(str, words)], capture_output=True, text=True)
+def run(*words, status=0, command="map"):
+    done = subprocess.run([PICTURA, command, *map(str, words)], capture_output=True, text=True)
     assert done.returncode == status, (words, done)
     return done
+
+
+def simulate(*words):
+    return json.loads(run(*words, "--json", command="simulate").stdout)
+
+
+def refusal(*words, command="simulate"):
+    return run(*words, status=2, command=command).stderr
 
 
 def facts(scene):
@@ -50,6 +59,39 @@ with tempfile.TemporaryDirectory() as name:
     elements = json.loads(run(folder / "gpudrive.json", "--json", "--full").stdout)["elements"]
     assert len(elements["lanes"]) == 16
     assert "format" in run(folder / "gpudrive.json").stdout
+
+    # As recorded: all formats, no agent-step, the same bits from each number of threads.
+    for file in ("womd.tfrecord", "gpudrive.json", "pufferdrive_v1.bin", "pufferdrive_v2.bin", "pufferdrive_v3c.bin"):
+        replayed = simulate(folder / file)
+        expected = {"asked": 12, "spawned": 12, "steps": 90, "agent_steps": 0, "collisions": 0, "off_road": 0, "displacement_steps": 0}
+        assert {key: replayed[key] for key in expected} == expected, (file, replayed)
+        assert replayed == simulate(folder / file, "--policy", "log", "--threads", 1) | {
+            key: replayed[key] for key in replayed if key.endswith("_per_s")
+        }
+    scene = folder / "womd.tfrecord"
+    assert simulate(scene, "--start", 30)["steps"] == 60
+    assert simulate(scene, "--steps", 20)["steps"] == 20
+    driven = simulate(scene, "--policy", "idle", "--control", "self", "--steps", 10)
+    assert driven["agent_steps"] == 10 and driven["displacement_max_m"] < 0.1, driven
+    assert simulate(scene, "--policy", "inverse", "--control", "1000,1014", "--steps", 10)["agent_steps"] == 20
+    # Longer than the recording: nobody comes again.
+    assert simulate(scene, "--policy", "random", "--control", "all", "--steps", 120)["episodes"] == 0
+
+    run(scene, "--out", folder / "scene.html", "--mcap", folder / "scene.mcap", command="replay")
+    assert (folder / "scene.html").stat().st_size > 10_000 and (folder / "scene.mcap").stat().st_size > 10_000
+    if shutil.which("ffmpeg"):
+        simulate(scene, "--steps", 4, "--video", folder / "scene.mp4")
+        assert (folder / "scene.mp4").stat().st_size > 2000
+
+    assert "--agents: has no effect on a recorded scene" in refusal(scene, "--agents", 4)
+    assert "--control: has no effect with the policy log" in refusal(scene, "--control", "self")
+    assert "--start: has no effect on procedural:1, which is no recorded scene" in refusal("procedural:1", "--start", 4)
+    assert "--control: expected self, vehicles" in refusal(scene, "--policy", "idle", "--control", "cars")
+    assert "names none of its 12" in refusal(scene, "--policy", "idle", "--control", "3")
+    assert "in [0, 91), got 91" in refusal(scene, "--start", 91)
+    assert "--follow: expected 0 to 11, got 12" in refusal(scene, "--replay", folder / "x.html", "--follow", 12)
+    assert "expected a recorded scene, got map" in refusal("procedural:1", "--agents", 2, "--policy", "log")
+    assert "whose lanes go on for ever" in refusal(scene, "--policy", "lane")
 
     refused = run(f"{folder}#5", status=2).stderr
     assert refused.startswith("error: ") and "expected #0 to #4 or the id of one of its scenes, got #5" in refused, refused
