@@ -294,14 +294,14 @@ CellLists lists_by_distance(const MapRules& map, const std::string& map_name, co
 
 void end_list(CellLists* lists_inout) { lists_inout->begin.push_back(static_cast<int32_t>(lists_inout->items.size())); }
 
-/// Whether a piece at `offset` from a cell's centre may be in the sight of somebody in the cell who heads within a
-/// sector; never wrong about a piece that is.
-bool may_be_seen(Vec2 offset, float distance_m, float sector_middle_rad) {
+/// Whether a piece in this direction from a cell's centre may be in the sight of somebody in the cell who heads within
+/// a sector; never wrong about a piece that is.
+bool may_be_seen(float direction_rad, float distance_m, float sector_middle_rad) {
   const float margin_m = 0.5f * std::sqrt(2.0f) * kNearCell_m + 0.1f;
+  if (distance_m <= kRoadBehind_m + margin_m) return true;  // whatever its direction
   const float half_sector = kPi / kSectors;
   // As seen by the heading of the sector that turns most towards it.
-  const float off_axis =
-      std::max(0.0f, std::fabs(wrap_angle(std::atan2(offset.y, offset.x) - sector_middle_rad)) - half_sector);
+  const float off_axis = std::max(0.0f, std::fabs(wrap_angle(direction_rad - sector_middle_rad)) - half_sector);
   const float ahead = distance_m * std::cos(off_axis), aside = distance_m * std::sin(off_axis);
   if (ahead > kRoadAhead_m + margin_m || ahead < -kRoadBehind_m - margin_m) return false;
   // A piece behind comes into the window sideways too, as the heading turns away from it: keep what is that close.
@@ -317,19 +317,24 @@ std::vector<Vec2> middles_of(const std::vector<ObservedPiece>& pieces) {
 
 CellLists lists_of_pieces(const MapRules& map, const std::string& map_name, const std::vector<Vec2>& middles) {
   const float sight_m = std::sqrt(square(kRoadAhead_m) + square(kRoadAside_m)) + kNearCell_m;
-  return lists_by_distance(
-      map, map_name, middles, sight_m, kSectors,
-      [&](Vec2 center, const std::vector<Neighbor>& neighbors, CellLists* lists) {
-        for (int sector = 0; sector < kSectors; ++sector) {
-          const float heading = -kPi + (static_cast<float>(sector) + 0.5f) * (kTwoPi / kSectors);
-          for (const Neighbor& near : neighbors) {
-            if (may_be_seen(middles[static_cast<size_t>(near.item)] - center, near.distance_m, heading)) {
-              lists->items.push_back(near.item);
-            }
-          }
-          end_list(lists);
-        }
-      });
+  std::vector<float> directions_rad;  // of a cell's neighbours
+  return lists_by_distance(map, map_name, middles, sight_m, kSectors,
+                           [&](Vec2 center, const std::vector<Neighbor>& neighbors, CellLists* lists) {
+                             directions_rad.clear();
+                             for (const Neighbor& near : neighbors) {
+                               const Vec2 offset = middles[static_cast<size_t>(near.item)] - center;
+                               directions_rad.push_back(std::atan2(offset.y, offset.x));
+                             }
+                             for (int sector = 0; sector < kSectors; ++sector) {
+                               const float heading = -kPi + (static_cast<float>(sector) + 0.5f) * (kTwoPi / kSectors);
+                               for (size_t i = 0; i < neighbors.size(); ++i) {
+                                 if (may_be_seen(directions_rad[i], neighbors[i].distance_m, heading)) {
+                                   lists->items.push_back(neighbors[i].item);
+                                 }
+                               }
+                               end_list(lists);
+                             }
+                           });
 }
 
 /// Whatever can be among the nearest kMaxControls from anywhere in the cell: as far from its centre as the last of them
