@@ -63,7 +63,9 @@ with tempfile.TemporaryDirectory() as name:
     # As recorded: all formats, no agent-step, the same bits from each number of threads.
     for file in ("womd.tfrecord", "gpudrive.json", "pufferdrive_v1.bin", "pufferdrive_v2.bin", "pufferdrive_v3c.bin"):
         replayed = simulate(folder / file)
-        expected = {"asked": 12, "spawned": 12, "steps": 90, "agent_steps": 0, "collisions": 0, "off_road": 0, "displacement_steps": 0}
+        expected = {
+            "asked": 12, "spawned": 12, "steps": 90, "agent_steps": 0, "collisions": 0, "off_road": 0, "displacement_steps": 0,
+        }
         assert {key: replayed[key] for key in expected} == expected, (file, replayed)
         assert replayed == simulate(folder / file, "--policy", "log", "--threads", 1) | {
             key: replayed[key] for key in replayed if key.endswith("_per_s")
