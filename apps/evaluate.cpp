@@ -14,6 +14,7 @@
 #include "pictura/common/support/numbers.h"
 #include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/simulator/simulator.h"
+#include "pictura/training/evaluation/estimate_json.h"
 #include "pictura/training/evaluation/infractions.h"
 
 namespace pictura {
@@ -53,10 +54,7 @@ void print_report(const EvaluateOptions& options, const EvaluateReport& report, 
                  {"steps", row.steps},
                  {"vehicle_episodes", row.vehicle_episodes},
                  {"km_driven", row.km_driven}};
-    for (const auto& [name, estimate] : metrics_of(row)) {
-      json[name] = finite_or_null(estimate.value);
-      json[fmt::format("{}_half_width_95", name)] = finite_or_null(estimate.half_width_95);
-    }
+    for (const auto& [name, estimate] : metrics_of(row)) add_estimate(name, estimate, &json);
     table.push_back(std::move(json));
   }
   const EvaluationSetting& setting = report.results.setting;

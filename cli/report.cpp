@@ -15,8 +15,6 @@
 
 namespace pictura {
 
-Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 void print_json(const Json& object) {
   const std::string text = object.dump(2) + "\n";
   std::fwrite(text.data(), 1, text.size(), stdout);

@@ -4,17 +4,10 @@
 #include <chrono>
 #include <string>
 
-#include <nlohmann/json.hpp>
-
 #include "pictura/common/renderer.h"
+#include "pictura/common/support/json.h"
 
 namespace pictura {
-
-/// Keys keep the order in which they were set.
-using Json = nlohmann::ordered_json;
-
-/// The number, or null where it is infinite or NaN.
-Json finite_or_null(double value);
 
 /// Prints one object and a newline on stdout. close_stdout() says whether all of it was taken.
 void print_json(const Json& object);

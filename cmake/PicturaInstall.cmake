@@ -26,7 +26,7 @@ if(PICTURA_HAS_GL)
   list(APPEND renderer_libraries pictura_backend_gl)
 endif()
 pictura_install_component(renderer ${renderer_libraries})
-pictura_install_headers(renderer common PATTERN "cuda" EXCLUDE PATTERN "toml_fields.h" EXCLUDE)
+pictura_install_headers(renderer common PATTERN "cuda" EXCLUDE PATTERN "toml_fields.h" EXCLUDE PATTERN "json.h" EXCLUDE)
 install(FILES ${PROJECT_SOURCE_DIR}/backends/make_renderer.h DESTINATION ${header_folder}/backends COMPONENT renderer)
 install(FILES ${PICTURA_INCLUDE_DIR}/pictura/version.h DESTINATION ${header_folder} COMPONENT renderer)
 
