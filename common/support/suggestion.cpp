@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cctype>
 
-#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace pictura {
 
@@ -53,6 +53,12 @@ std::string nearest_word(std::string_view word, const std::vector<std::string>& 
 std::string suggestion(std::string_view word, const std::vector<std::string>& known) {
   const std::string nearest = nearest_word(word, known);
   return nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest);
+}
+
+std::size_t index_of_word(std::string_view what, std::string_view word, Span<const char* const> known) {
+  const auto* const found = std::find(known.begin(), known.end(), word);
+  if (found == known.end()) fail_usage("{}: expected {}, got '{}'", what, fmt::join(known, ", "), word);
+  return static_cast<std::size_t>(found - known.begin());
 }
 
 }  // namespace pictura

@@ -1,9 +1,12 @@
-// "Did you mean": the known word that is nearest to one that nobody knows.
+// Words that are known: where one stands, and "did you mean", the one that is nearest to one that nobody knows.
 #pragma once
 
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "pictura/common/error.h"
+#include "pictura/common/span.h"
 
 namespace pictura {
 
@@ -13,5 +16,8 @@ std::string nearest_word(std::string_view word, const std::vector<std::string>& 
 
 /// "; did you mean 'NEAREST'?", or nothing where none is near.
 std::string suggestion(std::string_view word, const std::vector<std::string>& known);
+
+/// The index of a word among those that are known. Throws UsageError listing them: "WHAT: expected a, b, got 'c'".
+std::size_t index_of_word(std::string_view what, std::string_view word, Span<const char* const> known);
 
 }  // namespace pictura

@@ -2,13 +2,12 @@
 
 #include <algorithm>
 
-#include <fmt/ranges.h>
-
 #include "pictura/backends/make_controller.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/interrupt.h"
+#include "pictura/common/support/suggestion.h"
 #include "pictura/map/load_map.h"
 #include "pictura/simulator/agent_state.h"
 #include "pictura/training/config.h"
@@ -227,10 +226,7 @@ EvaluateReport evaluate(const Driver& driver, const EvaluateOptions& options, Ev
 }  // namespace
 
 Density density_named(const std::string& name) {
-  for (size_t i = 0; i < kDensityNames.size(); ++i) {
-    if (name == kDensityNames[i]) return static_cast<Density>(i);
-  }
-  fail_usage("densities: expected {}, got '{}'", fmt::join(kDensityNames, ", "), name);
+  return static_cast<Density>(index_of_word("densities", name, kDensityNames));
 }
 
 CompiledMaps compile_maps_of(const EvaluateOptions& options, const SimulatorConfig& world) {
