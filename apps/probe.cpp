@@ -42,7 +42,7 @@ void add_removal_command(CLI::App& probe) {
   auto arguments = std::make_shared<Arguments>();
   RemovalOptions& options = arguments->removal;
   EvaluateOptions& worlds = arguments->evaluation.evaluate;
-  worlds.steps = kRemovalSteps;
+  worlds.steps = kProbeSteps;
   CLI::App* command = probe.add_subcommand(
       "removal", "How value and braking change when one road user is taken away, by how occluded it is");
   command
@@ -96,7 +96,7 @@ void add_removal_command(CLI::App& probe) {
     EvaluateOptions& driven = removal.worlds;
     driven.densities = {density_named(arguments->density)};
     driven.scenarios =
-        arguments->scenes > 0 ? arguments->scenes : default_removal_scenes(removal.policies.size(), driven.maps.size());
+        arguments->scenes > 0 ? arguments->scenes : default_probe_scenes(removal.policies.size(), driven.maps.size());
     removal.control = removal_control_named(arguments->control);
     make_output_folder(arguments->out);
     ProgressLine line;

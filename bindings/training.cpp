@@ -370,7 +370,7 @@ agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error nami
         worlds.densities = {density_named(density)};
         worlds.agents_per_world = agents_per_world;
         worlds.first_scenario = first_scene;
-        worlds.scenarios = scenes > 0 ? scenes : default_removal_scenes(policies.size(), maps.size());
+        worlds.scenarios = scenes > 0 ? scenes : default_probe_scenes(policies.size(), maps.size());
         worlds.steps = steps;
         worlds.argmax = argmax;
         worlds.seed = seed;
@@ -393,7 +393,7 @@ agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error nami
       },
       py::arg("policies"), py::arg("maps"), py::kw_only(), py::arg("density") = "medium",
       py::arg("agents_per_world") = 0, py::arg("first_scene") = 0, py::arg("scenes") = 0,
-      py::arg("steps") = kRemovalSteps, py::arg("removals") = RemovalOptions{}.removals,
+      py::arg("steps") = kProbeSteps, py::arg("removals") = RemovalOptions{}.removals,
       py::arg("sample_steps") = RemovalOptions{}.sample_steps, py::arg("range_m") = RemovalOptions{}.range_m,
       py::arg("control") = "none", py::arg("batch") = RemovalOptions{}.batch, py::arg("argmax") = true,
       py::arg("seed") = 1, py::arg("num_threads") = 0, py::arg("device") = "auto", py::arg("simulator") = "auto",

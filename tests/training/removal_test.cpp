@@ -11,50 +11,28 @@
 #include "pictura/common/support/file.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
-#include "pictura/tests/training/small_runs.h"
+#include "pictura/tests/training/probed_policies.h"
 #include "pictura/training/session.h"
 
 namespace pictura {
 namespace {
 
+using test::kAgent;
+using test::kLikeForLike;
+using test::kVectorized;
 using test::message_of;
 using test::read_table;
+using test::same_bits;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-constexpr size_t kAgent = 0, kVectorized = 1, kLikeForLike = 2;  // the order of Removal::policies()
-
-/// A policy that reads images, and both that read vectors, of one update each on the town with walls.
-class Removal : public ::testing::Test {
+/// Removals by three policies.
+class Removal : public test::ProbedPolicies {
  protected:
-  // For the first test, whose name the folder has.
-  void SetUp() override {
-    if (folder_) return;
-    folder_ = new test::ScratchFolder;
-    const auto trained = [](const std::string& name, std::vector<std::string> more) {
-      more.insert(more.end(), {"train.updates=1", "simulator.walls=true", "simulator.pedestrian_fraction=0.2"});
-      return train(test::small_run(*folder_ / name, "cpu", more)).checkpoint;
-    };
-    policies_ = {trained("agent", {}), trained("vectorized", {"policy.modality=vector", "policy.auxiliary=true"}),
-                 trained("like_for_like", {"policy.modality=vector"})};
-  }
-  static void TearDownTestSuite() {
-    delete folder_;
-    folder_ = nullptr;
-  }
-
   static RemovalOptions options(int64_t removals) {
     RemovalOptions o;
-    o.policies = policies_;
-    o.worlds.maps = {"procedural:1", "procedural:2"};
-    o.worlds.agents_per_world = 40;
-    o.worlds.first_scenario = 3;
-    o.worlds.scenarios = 6;
-    o.worlds.steps = 60;
-    o.worlds.num_threads = 1;
-    o.worlds.device = o.worlds.simulator = "cpu";
+    ask(&o);
     o.removals = removals;
-    o.sample_steps = 4;  // untrained policies soon halt
     return o;
   }
   /// Many cases, of which several tests read.
@@ -62,24 +40,7 @@ class Removal : public ::testing::Test {
     static const RemovalResults all = probe_removal(options(600));
     return all;
   }
-
-  static test::ScratchFolder* folder_;
-  static std::vector<std::string> policies_;
 };
-test::ScratchFolder* Removal::folder_ = nullptr;
-std::vector<std::string> Removal::policies_;
-
-bool same_bits(const RemovalResults& a, const RemovalResults& b) {
-  if (a.cases.size() != b.cases.size() || a.responses.size() != b.responses.size()) return false;
-  for (size_t i = 0; i < a.responses.size(); ++i) {
-    const RemovalResponse &x = a.responses[i], &y = b.responses[i];
-    if (x.value != y.value || x.value_without != y.value_without || x.brake != y.brake ||
-        x.brake_without != y.brake_without) {
-      return false;
-    }
-  }
-  return true;
-}
 
 TEST_F(Removal, EachPolicyDrivesAnEqualShareOfTheScenes) {
   const RemovalResults& all = results();
@@ -104,7 +65,7 @@ TEST_F(Removal, EachPolicyDrivesAnEqualShareOfTheScenes) {
   }
   ASSERT_EQ(of_scene.size(), 6u);
   for (const auto& [scene, count] : of_scene) EXPECT_NEAR(count, 600 / 6.0, 1) << scene;
-  for (const RemovalResponse& one : all.responses) {
+  for (const PairedResponse& one : all.responses) {
     EXPECT_TRUE(std::isfinite(one.value) && std::isfinite(one.value_without));
     EXPECT_TRUE(one.brake > 0 && one.brake < 1 && one.brake_without > 0 && one.brake_without < 1);
   }
@@ -158,7 +119,7 @@ TEST_F(Removal, HidingNobodyChangesNothing) {
   ASSERT_EQ(control.cases.size(), 600u);
   for (const RemovalCase& one : control.cases) EXPECT_EQ(one.hidden, -1);
   for (size_t i = 0; i < control.responses.size(); ++i) {
-    const RemovalResponse &with = results().responses[i], &without = control.responses[i];
+    const PairedResponse &with = results().responses[i], &without = control.responses[i];
     EXPECT_TRUE(without.is_unchanged()) << i;
     EXPECT_EQ(without.value, with.value) << "the states are the same " << i;
   }
@@ -230,9 +191,9 @@ TEST_F(Removal, RefusesWhatCannotBe) {
   o.policies = {*folder_ / "no.ckpt", *folder_ / "no.ckpt"};
   EXPECT_THAT(message_of([&] { probe_removal(o); }), HasSubstr("no.ckpt"));
   EXPECT_THAT(message_of([&] { removal_control_named("some"); }), HasSubstr("none, nobody, permuted"));
-  EXPECT_EQ(default_removal_scenes(3, 8), 24);
-  EXPECT_EQ(default_removal_scenes(2, 8), 16);
-  EXPECT_EQ(default_removal_scenes(1, 8), 16);
+  EXPECT_EQ(default_probe_scenes(3, 8), 24);
+  EXPECT_EQ(default_probe_scenes(2, 8), 16);
+  EXPECT_EQ(default_probe_scenes(1, 8), 16);
 }
 
 /// Cases of two scenes, with changes that are written down here.

@@ -2,22 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <map>
 
 #include <fmt/ranges.h>
-#include <nlohmann/json.hpp>
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/output_file.h"
+#include "pictura/common/support/suggestion.h"
 #include "pictura/training/evaluation/csv.h"
 #include "pictura/training/evaluation/infractions.h"
+#include "pictura/training/probes/probe_json.h"
 
 namespace pictura {
 
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 int occlusion_bin(const RemovalCase& one) {
   if (!one.is_in_frame()) return -1;
@@ -28,46 +25,21 @@ int occlusion_bin(const RemovalCase& one) {
 
 int distance_band(const RemovalCase& one) { return static_cast<int>(one.distance_m / kDistanceBand_m); }
 
-// Sums of the cases of one scene in one group.
-struct SceneSums {
-  int64_t cases = 0;
-  double abs_value_change = 0, abs_brake_change = 0, value_change = 0, brake_change = 0, changed = 0;
-};
-
 // A group's cases, of one policy.
 struct GroupSums {
-  std::map<int32_t, SceneSums> scenes;
+  ResponseSums responses;
   double occlusion = 0;
 
-  void add(const RemovalCase& one, const RemovalResponse& response) {
-    SceneSums& sums = scenes[one.scene];
-    ++sums.cases;
-    sums.value_change += response.value_change();
-    sums.brake_change += response.brake_change();
-    sums.abs_value_change += std::abs(response.value_change());
-    sums.abs_brake_change += std::abs(response.brake_change());
-    sums.changed += !response.is_unchanged();
+  void add(const RemovalCase& one, const PairedResponse& response) {
+    responses.add(one.scene, response);
     occlusion += static_cast<double>(one.occlusion());
   }
-  Estimate mean_of(double SceneSums::* sum) const {
-    std::vector<RatioTerm> means;
-    for (const auto& [scene, sums] : scenes) means.push_back({sums.*sum / static_cast<double>(sums.cases), 1});
-    return estimate_ratio(means);
-  }
   RemovalRow row(int policy, const RemovalGroup& group) const {
-    RemovalRow row{.policy = policy, .group = group, .scenes = static_cast<int>(scenes.size())};
-    for (const auto& [scene, sums] : scenes) row.cases += sums.cases;
+    RemovalRow row{responses.means(), policy, group, 0};
     row.mean_occlusion = occlusion / static_cast<double>(row.cases);
-    row.abs_value_change = mean_of(&SceneSums::abs_value_change);
-    row.abs_brake_change = mean_of(&SceneSums::abs_brake_change);
-    row.value_change = mean_of(&SceneSums::value_change);
-    row.brake_change = mean_of(&SceneSums::brake_change);
-    row.changed_share = mean_of(&SceneSums::changed);
     return row;
   }
 };
-
-Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json to_json(const RemovalRow& row, const RemovalResults& results) {
   const RemovalGroup& group = row.group;
@@ -86,29 +58,15 @@ Json to_json(const RemovalRow& row, const RemovalResults& results) {
                {"occlusion_to", bound(group.occlusion_bin + 1)},
                {"occlusion_mean", finite_or_null(row.mean_occlusion)},
                {"distance_from_m", distance(group.distance_band.value_or(0))},
-               {"distance_to_m", distance(group.distance_band.value_or(0) + 1)},
-               {"cases", row.cases},
-               {"scenes", row.scenes}};
-  const auto add = [&json](const std::string& name, const Estimate& estimate) {
-    json[name] = finite_or_null(estimate.value);
-    json[name + "_half_width_95"] = finite_or_null(estimate.half_width_95);
-  };
-  add("abs_d_value", row.abs_value_change);
-  add("abs_d_p_brake", row.abs_brake_change);
-  add("d_value", row.value_change);
-  add("d_p_brake", row.brake_change);
-  add("changed_share", row.changed_share);
+               {"distance_to_m", distance(group.distance_band.value_or(0) + 1)}};
+  add_means(row, &json);
   return json;
 }
 
 }  // namespace
 
 RemovalControl removal_control_named(const std::string& name) {
-  const auto* const found = std::find(kRemovalControlNames.begin(), kRemovalControlNames.end(), name);
-  if (found == kRemovalControlNames.end()) {
-    fail_usage("control: expected {}, got '{}'", fmt::join(kRemovalControlNames, ", "), name);
-  }
-  return static_cast<RemovalControl>(found - kRemovalControlNames.begin());
+  return static_cast<RemovalControl>(index_of_word("control", name, kRemovalControlNames));
 }
 
 std::string RemovalGroup::occlusion_name() const {
@@ -125,7 +83,7 @@ std::vector<RemovalRow> summarize(const RemovalResults& results) {
     std::vector<GroupSums> all(kBins), by_band(static_cast<size_t>(kBins * num_bands));
     for (size_t i = 0; i < results.cases.size(); ++i) {
       const RemovalCase& one = results.cases[i];
-      const RemovalResponse& response = results.response(i, policy);
+      const PairedResponse& response = results.response(i, policy);
       const int bin = occlusion_bin(one) + 1, band = std::min(distance_band(one), num_bands - 1);
       all[static_cast<size_t>(bin)].add(one, response);
       by_band[static_cast<size_t>(band * kBins + bin)].add(one, response);
@@ -147,12 +105,8 @@ std::vector<RemovalRow> summarize(const RemovalResults& results) {
 void write_removal_cases(const std::string& path, const RemovalResults& results) {
   OutputFile file(path);
   std::string text =
-      "case,scene,map,driver,step,ego,user,hidden,class,halted,distance_m,ego_speed_mps,in_frame,occlusion";
-  for (const ProbedPolicy& policy : results.policies) {
-    for (const char* what : {"value", "d_value", "p_brake", "d_p_brake"}) {
-      text += ',' + csv_quoted(fmt::format("{}/{}", policy.name, what));
-    }
-  }
+      "case,scene,map,driver,step,ego,user,hidden,class,halted,distance_m,ego_speed_mps,in_frame,occlusion" +
+      response_header(results);
   text += '\n';
   constexpr size_t kAtOnce = size_t{1} << 20;
   for (size_t i = 0; i < results.cases.size(); ++i) {
@@ -163,11 +117,7 @@ void write_removal_cases(const std::string& path, const RemovalResults& results)
                    one.hidden < 0 ? "" : std::to_string(one.hidden), to_string(one.user_class), one.user_halted,
                    one.distance_m, one.ego_speed_mps, one.is_in_frame());
     if (one.is_in_frame()) fmt::format_to(std::back_inserter(text), "{}", one.occlusion());
-    for (size_t policy = 0; policy < results.policies.size(); ++policy) {
-      const RemovalResponse& response = results.response(i, policy);
-      fmt::format_to(std::back_inserter(text), ",{},{:.9g},{},{:.9g}", response.value, response.value_change(),
-                     response.brake, response.brake_change());
-    }
+    text += response_fields(results, i);
     text += '\n';
     if (text.size() < kAtOnce) continue;
     file.write(text);
@@ -179,41 +129,19 @@ void write_removal_cases(const std::string& path, const RemovalResults& results)
 
 std::string removal_summary_json(const RemovalResults& results, const std::vector<RemovalRow>& rows,
                                  const std::string& cases_file) {
-  Json policies = Json::array(), table = Json::array(), conditioning;
-  for (size_t p = 0; p < results.policies.size(); ++p) {
-    const ProbedPolicy& policy = results.policies[p];
-    const auto drives = [p](const RemovalCase& one) { return one.driver == static_cast<int32_t>(p); };
-    policies.push_back({{"name", policy.name},
-                        {"file", policy.path},
-                        {"policy_hash", policy.hash},
-                        {"reads_images", policy.reads_images},
-                        {"scenes_driven", results.scenes / static_cast<int>(results.policies.size())},
-                        {"cases_driven", std::count_if(results.cases.begin(), results.cases.end(), drives)}});
-  }
-  for (const RemovalRow& row : rows) table.push_back(to_json(row, results));
-  for (size_t i = 0; i < kNumConditioning; ++i) conditioning[kConditioningNames[i]] = results.setting.conditioning[i];
-  const Json json = {{"kind", "removal"},
-                     {"policy", policies},
-                     {"control", kRemovalControlNames[static_cast<size_t>(results.control)]},
-                     {"cases", results.cases.size()},
-                     {"cases_asked", results.removals_asked},
-                     {"cases_file", cases_file.empty() ? Json(nullptr) : Json(cases_file)},
-                     {"maps", results.setting.maps},
-                     {"density", results.density},
-                     {"agents_per_world", results.agents_per_world},
-                     {"first_scene", results.first_scene},
-                     {"scenes", results.scenes},
-                     {"steps", results.setting.steps},
-                     {"sample_steps", results.sample_steps},
-                     {"range_m", results.range_m},
-                     {"argmax", results.setting.argmax},
-                     {"seed", results.setting.seed},
-                     {"device", results.setting.device},
-                     {"precision", results.setting.precision},
-                     {"conditioning", conditioning},
-                     {"interrupted", results.interrupted},
-                     {"seconds", results.seconds},
-                     {"rows", table}};
+  std::vector<int64_t> driven(results.policies.size());
+  for (const RemovalCase& one : results.cases) ++driven[static_cast<size_t>(one.driver)];
+  Json json = {{"kind", "removal"},
+               {"policy", policies_json(results, driven)},
+               {"control", kRemovalControlNames[static_cast<size_t>(results.control)]},
+               {"cases", results.cases.size()},
+               {"cases_asked", results.removals_asked},
+               {"cases_file", cases_file.empty() ? Json(nullptr) : Json(cases_file)},
+               {"range_m", results.range_m}};
+  add_setting(results, &json);
+  Json rows_json = Json::array();
+  for (const RemovalRow& row : rows) rows_json.push_back(to_json(row, results));
+  json["rows"] = std::move(rows_json);
   return json.dump(1);
 }
 

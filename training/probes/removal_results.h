@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "pictura/common/scene_types.h"
-#include "pictura/training/evaluation/results.h"
+#include "pictura/training/probes/probe_results.h"
 
 namespace pictura {
 
@@ -38,38 +38,11 @@ struct RemovalCase {
   float occlusion() const { return 1 - visible_share; }
 };
 
-/// What a policy makes of a state as it is, V(o) and P(brake | o), and of that without the hidden user, o'.
-struct RemovalResponse {
-  float value = 0, value_without = 0;
-  float brake = 0, brake_without = 0;
-
-  double value_change() const { return double{value} - double{value_without}; }
-  double brake_change() const { return double{brake} - double{brake_without}; }
-  bool is_unchanged() const { return value == value_without && brake == brake_without; }
-};
-
-struct ProbedPolicy {
-  std::string name;  // of its file or run; unique
-  std::string path, hash;
-  bool reads_images = false;
-};
-
-struct RemovalResults {
-  EvaluationSetting setting;  // of the worlds; what of it is a policy's is the first one's
-  std::string density;
-  int agents_per_world = 0;
-  int first_scene = 0, scenes = 0;  // which were driven: an equal share by each policy, in their order
+struct RemovalResults : ProbeResults {
   int64_t removals_asked = 0;
-  int sample_steps = 0;
   float range_m = 0;
   RemovalControl control = RemovalControl::none;
-  std::vector<ProbedPolicy> policies;
-  std::vector<RemovalCase> cases;          // by scene, step, ego and user, for each driver
-  std::vector<RemovalResponse> responses;  // [cases, policies]
-  bool interrupted = false;
-  double seconds = 0;
-
-  const RemovalResponse& response(size_t one, size_t policy) const { return responses[one * policies.size() + policy]; }
+  std::vector<RemovalCase> cases;  // by scene, step, ego and user, for each driver
 };
 
 /// Cases of one kind: how much of the user is occluded, and how far away it is.
@@ -85,17 +58,11 @@ struct RemovalGroup {
 };
 constexpr float kDistanceBand_m = 10;
 
-/// One policy's responses to the cases of one group. Estimates are over scenes: the mean over scenes of the means of
-/// their cases, with its 95 % interval; infinite where there are none.
-struct RemovalRow {
+/// One policy's responses to the cases of one group.
+struct RemovalRow : ResponseMeans {
   int policy = 0;
   RemovalGroup group;
-  int64_t cases = 0;
-  int scenes = 0;             // that have such cases
   double mean_occlusion = 0;  // of the cases; NaN outside frames
-  Estimate abs_value_change, abs_brake_change;
-  Estimate value_change, brake_change;  // signed
-  Estimate changed_share;               // of the cases: in which value or probability are not the same bits
 };
 
 /// For each policy all distances, then each band; of each the bins of occlusion and those in no frame.

@@ -1,0 +1,18 @@
+// What the summaries of all probes have in common, as JSON.
+#pragma once
+
+#include "pictura/training/evaluation/estimate_json.h"
+#include "pictura/training/probes/probe_results.h"
+
+namespace pictura {
+
+/// Adds how many cases and scenes there are, and the estimates.
+void add_means(const ResponseMeans& means, Json* json_out);
+
+/// The policies, each with how many of the cases are of scenes that it drove: `cases_driven` [policies].
+Json policies_json(const ProbeResults& results, const std::vector<int64_t>& cases_driven);
+
+/// Adds the worlds, who drove them and how, and how long it took.
+void add_setting(const ProbeResults& results, Json* json_out);
+
+}  // namespace pictura
