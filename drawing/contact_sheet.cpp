@@ -161,6 +161,14 @@ RgbImage captioned(const HostImages& images, int view, int camera, const std::st
   return canvas.image();
 }
 
+void paste(const RgbImage& picture, int left_px, int top_px, RgbImage* image_out) {
+  for (int y = 0; y < picture.height_px; ++y) {
+    std::copy_n(
+        picture.rgb.begin() + std::ptrdiff_t{3} * y * picture.width_px, 3 * picture.width_px,
+        image_out->rgb.begin() + std::ptrdiff_t{3} * (std::ptrdiff_t{top_px + y} * image_out->width_px + left_px));
+  }
+}
+
 RgbImage assembled(const std::vector<RgbImage>& pictures) {
   PICTURA_CHECK(!pictures.empty(), "figure: expected one or more pictures");
   const int width_px = pictures[0].width_px, height_px = pictures[0].height_px;
@@ -177,10 +185,7 @@ RgbImage assembled(const std::vector<RgbImage>& pictures) {
                   picture.height_px);
     const int left_px = static_cast<int>(i) % columns * (width_px + kGap_px);
     const int top_px = static_cast<int>(i) / columns * (height_px + kGap_px);
-    for (int y = 0; y < height_px; ++y) {
-      std::copy_n(picture.rgb.begin() + std::ptrdiff_t{3} * y * width_px, 3 * width_px,
-                  all.rgb.begin() + std::ptrdiff_t{3} * (std::ptrdiff_t{top_px + y} * all.width_px + left_px));
-    }
+    paste(picture, left_px, top_px, &all);
   }
   return all;
 }

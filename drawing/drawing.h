@@ -49,6 +49,9 @@ std::vector<std::string> draw_contact_sheets(const HostImages& images, const Rig
 /// One image, enlarged by an integer factor without smoothing to about 480 px, above its caption.
 RgbImage captioned(const HostImages& images, int view, int camera, const std::string& caption);
 
+/// Copies a picture into a larger one, which must hold it there.
+void paste(const RgbImage& picture, int left_px, int top_px, RgbImage* image_out);
+
 /// Pictures of one size in rows of three. Throws Error if there is none, or sizes differ.
 RgbImage assembled(const std::vector<RgbImage>& pictures);
 

@@ -23,12 +23,6 @@ constexpr int kColumns = 4, kCameraWidth_px = 250, kCameraHeight_px = 140, kGap_
 constexpr int kTopWidth_px = kColumns * kCameraWidth_px + (kColumns - 1) * kGap_px, kTopHeight_px = 512;
 constexpr uint8_t kGapGrey = 40;
 constexpr double kFramesPerSecond = 20;  // twice the pace of the world
-void paste(const RgbImage& picture, int left_px, int top_px, RgbImage* image_out) {
-  for (int y = 0; y < picture.height_px; ++y) {
-    std::copy_n(picture.rgb.begin() + y * picture.width_px * 3, picture.width_px * 3,
-                image_out->rgb.begin() + ((top_px + y) * image_out->width_px + left_px) * 3);
-  }
-}
 
 RendererConfig view_of(const FilmOptions& options) {
   RendererConfig view{.rig = paper_rig(kCameraWidth_px, kCameraHeight_px)};

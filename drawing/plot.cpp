@@ -185,6 +185,32 @@ void draw_names(Canvas& canvas, const std::vector<PlotSeries>& all, const std::v
   }
 }
 
+void draw_strip(Canvas& canvas, const std::vector<PlotCell>& strip, const Axis& x_axis, double top) {
+  constexpr double kStrip_px = 6;
+  for (size_t i = 0; i < strip.size(); ++i) {
+    const double at = x_axis.at_px(strip[i].x);
+    const double begin = i == 0 ? at : 0.5 * (at + x_axis.at_px(strip[i - 1].x));
+    const double end = i + 1 == strip.size() ? at : 0.5 * (at + x_axis.at_px(strip[i + 1].x));
+    canvas.fill_rectangle(begin, top, end - begin, kStrip_px, strip[i].color);
+  }
+}
+
+void draw_marks(Canvas& canvas, const std::vector<PlotMark>& marks, const Axis& x_axis, double top, double height) {
+  cairo_t* context = canvas.context();
+  const double dashes[] = {4, 4};
+  for (const PlotMark& mark : marks) {
+    const double x = std::round(x_axis.at_px(mark.x)) + 0.5;  // a whole pixel
+    canvas.set_color(kLabelColor);
+    cairo_set_dash(context, dashes, 2, 0);
+    cairo_set_line_width(context, 1);
+    cairo_move_to(context, x, top);
+    cairo_line_to(context, x, top + height);
+    cairo_stroke(context);
+    cairo_set_dash(context, nullptr, 0, 0);
+    canvas.text(x, top - 3, mark.label, {.size_px = 11.5, .align = Align::center, .color = kAxisColor});
+  }
+}
+
 /// Fills what lies between the band's bounds, from gap to gap.
 void fill_band(Canvas& canvas, const PlotSeries& series, const Axis& x_axis, const Axis& y_axis, Rgb color) {
   cairo_t* context = canvas.context();
@@ -241,6 +267,8 @@ void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, do
   }
   canvas.fill_rectangle(left - 1, top, 1, height + 1, kAxisColor);
   canvas.fill_rectangle(left - 1, top + height, width + 1, 1, kAxisColor);
+  draw_strip(canvas, panel.strip, x_axis, top + height + 1);
+  draw_marks(canvas, panel.marks, x_axis, top, height);
   const TextStyle label_style{.size_px = 12.5, .align = Align::center, .color = kAxisColor};
   canvas.text(left + 0.5 * width, y0 + height_px - 12, panel.x_label, label_style);
   canvas.text(x0 + 17, top + 0.5 * height, panel.y_label, label_style, 0.5 * static_cast<double>(kPi));

@@ -18,10 +18,23 @@ struct PlotSeries {
   std::vector<double> low, high;  // of a band behind the line: as long, or empty where there is none
 };
 
+/// A place of the x axis.
+struct PlotMark {
+  double x = 0;
+  std::string label;
+};
+/// A cell of the strip under the x axis; it reaches half way to its neighbours.
+struct PlotCell {
+  double x = 0;
+  Rgb color;
+};
+
 struct PlotPanel {
   std::string title, x_label, y_label;
   std::vector<PlotSeries> series;
   AxisScale x_scale = AxisScale::linear, y_scale = AxisScale::linear;
+  std::vector<PlotMark> marks{};  // dashed lines across the plot, labelled above it
+  std::vector<PlotCell> strip{};  // in ascending order, or empty
 };
 
 struct PlotOptions {

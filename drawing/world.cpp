@@ -119,6 +119,23 @@ void paint_halt(Canvas& canvas, const HaltReason& reason, const Vector2d& center
   cairo_stroke(context);
 }
 
+void paint_mark(Canvas& canvas, const WorldMark& mark, const Vector2d& center_px) {
+  const bool has_label = !mark.label.empty();
+  cairo_t* context = canvas.context();
+  cairo_new_sub_path(context);
+  cairo_arc(context, center_px.x(), center_px.y(), has_label ? 5.5 : 3, 0, kTwoPi);
+  canvas.set_color(mark.color);
+  if (!has_label) {
+    cairo_fill(context);
+    return;
+  }
+  cairo_fill_preserve(context);
+  canvas.set_color(hex(0x14161A));
+  cairo_set_line_width(context, 1.2);
+  cairo_stroke(context);
+  canvas.text(center_px.x() + 8, center_px.y() - 6, mark.label, {.size_px = 15, .bold = true, .color = hex(0x14161A)});
+}
+
 /// The number of active agents, and of halted ones by reason.
 void paint_legend(Canvas& canvas, const WorldFrame& frame) {
   struct Row {
@@ -303,6 +320,7 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
     if (reason) paint_halt(canvas, *reason, position, frame.agents[i].length_m * camera.px_per_m);
   }
 
+  for (const WorldMark& mark : frame.marks) paint_mark(canvas, mark, pixel_at(mark.position_m));
   if (!frame.halt_reason.empty()) paint_legend(canvas, frame);
   if (!frame.caption.empty()) {
     const TextStyle style{.size_px = 15, .bold = true, .color = hex(0xFFFFFF)};

@@ -25,6 +25,13 @@ struct AgentGoal {
   Vec2 position_m;
 };
 
+/// A disk over everything else; one with a label, which stands beside it, is larger.
+struct WorldMark {
+  Vec2 position_m;
+  Rgb color;
+  std::string label;
+};
+
 /// The changing state of one world; spans are read only during draw().
 struct WorldFrame {
   Span<const AgentBox> agents;      // of this world
@@ -34,6 +41,7 @@ struct WorldFrame {
   Span<const AgentGoal> goals;      // a thin line leads to each
   int highlighted = -1;             // index of the agent with a halo and the waypoints below, or -1
   Span<const Vec2> waypoints_m;     // those not yet passed, nearest first
+  Span<const WorldMark> marks;      // the last covers those before
   std::string caption;              // one line at the top left, or empty
 };
 

@@ -105,6 +105,18 @@ TEST(WorldPainter, DrawsABoxAtItsPosition) {
   EXPECT_NEAR(wide_px, 20, 2);
 }
 
+TEST(WorldPainter, MarksCoverWhatIsThere) {
+  WorldPainter painter(town(), 300, 300);
+  const std::vector<AgentBox> agents{box(500, 400, 0)};
+  const std::vector<WorldMark> marks{{{499, 400}, rgb8(1, 2, 3), ""}, {{500, 404}, rgb8(4, 5, 6), "a"}};
+  WorldFrame frame;
+  frame.agents = agents;
+  frame.marks = marks;
+  const RgbImage image = painter.draw(frame, painter.around({500, 400}, 30));
+  EXPECT_EQ(at(image, 140, 150), (Pixel{1, 2, 3}));
+  EXPECT_EQ(at(image, 150, 110), (Pixel{4, 5, 6}));
+}
+
 TEST(WorldPainter, HeadingsAreCounterClockwiseFromEast) {
   WorldPainter painter(town(), 300, 300);
   const std::vector<AgentBox> agents{box(500, 400, kHalfPi)};
@@ -681,6 +693,18 @@ TEST(Plots, BandsLieBehindTheirLinesAndCountForTheAxis) {
   EXPECT_NEAR(count(draw_plots({panel}), band), whole / 3, whole / 30) << "a gap up to both neighbours";
   panel.series[0].low.pop_back();
   EXPECT_THAT(test::message_of([&] { draw_plots({panel}); }), HasSubstr("expected a band of 4 points or none, got 3"));
+}
+
+TEST(Plots, StripsAndMarksStandAtTheirPlaces) {
+  PlotPanel panel{"return", "agent-steps", "return", {{"a", {0, 1, 2, 4}, {5, 5, 5, 5}}}};
+  const Pixel green{0, 128, 0}, red{255, 0, 0}, grey{90, 96, 104};
+  const int labels = count(draw_plots({panel}), grey);
+  panel.strip = {{0, rgb8(0, 128, 0)}, {2, rgb8(255, 0, 0)}, {4, rgb8(0, 128, 0)}};
+  const RgbImage with_strip = draw_plots({panel});
+  EXPECT_NEAR(count(with_strip, red), count(with_strip, green), 30) << "each cell reaches half way to its neighbours";
+  EXPECT_GT(count(with_strip, red), 1000);
+  panel.marks = {{2, "b"}};
+  EXPECT_GT(count(draw_plots({panel}), grey), labels) << "a dashed line";
 }
 
 TEST(Plots, OneLegendStandsAboveAllPanels) {
