@@ -1,52 +1,53 @@
 // `pictura probe`: what policies make of what their cameras see, and of what they do not.
 #include <algorithm>
+#include <array>
+
+#include <fmt/ranges.h>
 
 #include "pictura/apps/commands.h"
+#include "pictura/apps/pedestrian_figure.h"
 #include "pictura/apps/removal_figure.h"
 #include "pictura/cli/evaluation_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/support/file.h"
+#include "pictura/training/probes/pedestrian.h"
 #include "pictura/training/probes/removal.h"
 
 namespace pictura {
 
 namespace {
 
-void print_table(const RemovalResults& results, const std::vector<RemovalRow>& rows) {
-  size_t width = 6;
-  for (const ProbedPolicy& policy : results.policies) width = std::max(width, policy.name.size());
-  fmt::print("{:{}} {:>10} {:>8} {:>7} {:>20} {:>20} {:>8}\n", "policy", width, "occlusion", "cases", "scenes", "|dV|",
-             "|dP(brake)|", "changed");
-  const auto text = [](const Estimate& e) { return fmt::format("{:.4f} +- {:.4f}", e.value, e.half_width_95); };
-  for (const RemovalRow& row : rows) {
-    if (row.group.distance_band || row.cases == 0) continue;
-    fmt::print("{:{}} {:>10} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n",
-               results.policies[static_cast<size_t>(row.policy)].name, width, row.group.occlusion_name(), row.cases,
-               row.scenes, text(row.abs_value_change), text(row.abs_brake_change), 100 * row.changed_share.value);
-  }
-  fmt::print(
-      "means over scenes of the means of their cases; +- is the half width of a 95 % confidence interval over "
-      "scenes\n");
-  fmt::print("{} removals in {}\n", results.cases.size(), format_duration(results.seconds));
+constexpr std::array<const char*, 3> kRemovalExamples{
+    "pictura probe removal agent.safetensors vector.safetensors --out removal",
+    "pictura probe removal runs/a/checkpoint.ckpt --map Town01 --scenes 2 --removals 2000 --steps 300",
+    "pictura probe removal agent.safetensors --map procedural:1 --agents 40 --removals 1000 --control nobody"};
+constexpr std::array<const char*, 3> kPedestrianExamples{
+    "pictura probe pedestrian agent.safetensors vector.safetensors --out pedestrian",
+    "pictura probe pedestrian runs/a/checkpoint.ckpt --map Town01 --scenes 2 --paths 4 --steps 300",
+    "pictura probe pedestrian agent.safetensors --map procedural:1 --agents 40 --paths 8 --control nobody"};
+
+std::string footer(const std::array<const char*, 3>& examples) {
+  return fmt::format(
+      "docs/probes.md says what is asked, how, and what the files hold.\n"
+      "Examples:\n  {}",
+      fmt::join(examples, "\n  "));
 }
 
-void add_removal_command(CLI::App& probe) {
-  struct Arguments {
-    EvaluationArguments evaluation;
-    RemovalOptions removal;
-    std::string density = "medium", control = kRemovalControlNames[0], out = "probe_removal";
-    int scenes = 0;  // 0: not given
-    bool json = false;
-  };
-  auto arguments = std::make_shared<Arguments>();
-  RemovalOptions& options = arguments->removal;
+// What all probes are given.
+struct ProbeArguments {
+  EvaluationArguments evaluation;
+  std::string density = "medium", out;
+  int scenes = 0;  // 0: not given
+  bool json = false;
+};
+
+// The policies, and options that come first in the help.
+void add_world_options(CLI::App* command, ProbeArguments* arguments, ProbeOptions* probe) {
   EvaluateOptions& worlds = arguments->evaluation.evaluate;
   worlds.steps = kProbeSteps;
-  CLI::App* command = probe.add_subcommand(
-      "removal", "How value and braking change when one road user is taken away, by how occluded it is");
   command
-      ->add_option("POLICY", options.policies, "Checkpoints that train wrote, or safetensors; the world is the first's")
+      ->add_option("POLICY", probe->policies, "Checkpoints that train wrote, or safetensors; the world is the first's")
       ->required();
   add_evaluation_options(command, &arguments->evaluation);
   command->add_option("--density", arguments->density, "light, medium or dense: 60, 120 or 150 agents a world")
@@ -60,10 +61,105 @@ void add_removal_command(CLI::App& probe) {
   command->add_option("--first-scene", worlds.first_scenario, "The number of the first scenario")
       ->transform(whole_number(0))
       ->capture_default_str();
-  command->add_option("--removals", options.removals, "Cases in all: one user hidden for one ego in one state")
+  command->add_option("--every", probe->sample_steps, "Steps between sampled states")
       ->transform(whole_number(1))
       ->capture_default_str();
-  command->add_option("--every", options.sample_steps, "Steps between sampled states")
+}
+
+void add_output_options(CLI::App* command, ProbeArguments* arguments, ProbeOptions* probe, const char* out,
+                        const char* files) {
+  arguments->out = out;
+  command
+      ->add_option("--batch", probe->batch,
+                   "Cases in a call, rounded up to whole passes of a network; changes memory and time alone")
+      ->transform(whole_number(1, 1 << 20))
+      ->capture_default_str();
+  command->add_option("--out", arguments->out, fmt::format("The folder for {}", files))->capture_default_str();
+  command->add_flag("--json", arguments->json, "Print one JSON object, that of summary.json");
+}
+
+// Runs a probe with a progress line; makes the folder for its files before.
+template <typename Results, typename Options>
+Results run_probe(Results (*probe)(const Options&), ProbeArguments* arguments, Options* options) {
+  settle_evaluation_options(&arguments->evaluation);
+  options->worlds = arguments->evaluation.evaluate;
+  EvaluateOptions& driven = options->worlds;
+  driven.densities = {density_named(arguments->density)};
+  driven.scenarios =
+      arguments->scenes > 0 ? arguments->scenes : default_probe_scenes(options->policies.size(), driven.maps.size());
+  make_output_folder(arguments->out);
+  ProgressLine line;
+  driven.on_progress = [&line](double done, double eta_s) {
+    line.update(fmt::format("probing: {:.0f} %  ETA {}", 100 * done, format_duration(eta_s)));
+  };
+  Results results = probe(*options);
+  line.finish();
+  return results;
+}
+
+std::string text_of(const Estimate& estimate) {
+  return fmt::format("{:.4f} +- {:.4f}", estimate.value, estimate.half_width_95);
+}
+
+size_t name_width(const ProbeResults& results) {
+  size_t width = 6;
+  for (const ProbedPolicy& policy : results.policies) width = std::max(width, policy.name.size());
+  return width;
+}
+
+constexpr const char* kEstimateNote =
+    "means over scenes of the means of their cases; +- is the half width of a 95 % confidence interval over scenes";
+
+void print_table(const RemovalResults& results, const std::vector<RemovalRow>& rows) {
+  const size_t width = name_width(results);
+  fmt::print("{:{}} {:>10} {:>8} {:>7} {:>20} {:>20} {:>8}\n", "policy", width, "occlusion", "cases", "scenes", "|dV|",
+             "|dP(brake)|", "changed");
+  for (const RemovalRow& row : rows) {
+    if (row.group.distance_band || row.cases == 0) continue;
+    fmt::print("{:{}} {:>10} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n",
+               results.policies[static_cast<size_t>(row.policy)].name, width, row.group.occlusion_name(), row.cases,
+               row.scenes, text_of(row.abs_value_change), text_of(row.abs_brake_change), 100 * row.changed_share.value);
+  }
+  fmt::print("{}\n{} removals in {}\n", kEstimateNote, results.cases.size(), format_duration(results.seconds));
+}
+
+void print_table(const PedestrianResults& results, const std::vector<PedestrianRow>& rows) {
+  const size_t width = name_width(results);
+  fmt::print("{:{}} {:>12} {:>8} {:>7} {:>20} {:>20} {:>8}\n", "policy", width, "pedestrian", "cases", "scenes", "dV",
+             "dP(brake)", "changed");
+  for (const PedestrianRow& row : rows) {
+    if (!row.phase || row.cases == 0) continue;
+    fmt::print("{:{}} {:>12} {:>8} {:>7} {:>20} {:>20} {:>6.1f} %\n",
+               results.policies[static_cast<size_t>(row.policy)].name, width,
+               kPathPhaseNames[static_cast<size_t>(*row.phase)], row.cases, row.scenes, text_of(row.value_change),
+               text_of(row.brake_change), 100 * row.changed_share.value);
+  }
+  fmt::print("{}\n{} of {} paths found, {} cases in {}\n", kEstimateNote, results.paths.size(), results.paths_asked,
+             results.points.size(), format_duration(results.seconds));
+}
+
+// Writes summary.json and prints it, or a table.
+template <typename Results, typename Row>
+void report(const ProbeArguments& arguments, const std::string& summary, const Results& results,
+            const std::vector<Row>& rows) {
+  write_file(arguments.out + "/summary.json", summary + "\n");
+  if (arguments.json)
+    print_json(Json::parse(summary));
+  else
+    print_table(results, rows);
+}
+
+void add_removal_command(CLI::App& probe) {
+  struct Arguments : ProbeArguments {
+    RemovalOptions removal;
+    std::string control = kRemovalControlNames[0];
+  };
+  auto arguments = std::make_shared<Arguments>();
+  RemovalOptions& options = arguments->removal;
+  CLI::App* command = probe.add_subcommand(
+      "removal", "How value and braking change when one road user is taken away, by how occluded it is");
+  add_world_options(command, arguments.get(), &options);
+  command->add_option("--removals", options.removals, "Cases in all: one user hidden for one ego in one state")
       ->transform(whole_number(1))
       ->capture_default_str();
   command->add_option("--range", options.range_m, "How far away a user may be, m")
@@ -75,46 +171,17 @@ void add_removal_command(CLI::App& probe) {
                    "case")
       ->check(one_of({kRemovalControlNames.begin(), kRemovalControlNames.end()}))
       ->capture_default_str();
-  command
-      ->add_option("--batch", options.batch,
-                   "Cases in a call, rounded up to whole passes of a network; changes memory and time alone")
-      ->transform(whole_number(1, 1 << 20))
-      ->capture_default_str();
-  command->add_option("--out", arguments->out, "The folder for cases.csv, summary.json and removal.png")
-      ->capture_default_str();
-  command->add_flag("--json", arguments->json, "Print one JSON object, that of summary.json");
-  command->footer(
-      "docs/probes.md says what is asked, how, and what the files hold.\n"
-      "Examples:\n"
-      "  pictura probe removal agent.safetensors vector.safetensors --out removal\n"
-      "  pictura probe removal runs/a/checkpoint.ckpt --map Town01 --scenes 2 --removals 2000 --steps 300\n"
-      "  pictura probe removal agent.safetensors --map procedural:1 --agents 40 --removals 1000 --control nobody");
+  add_output_options(command, arguments.get(), &options, "probe_removal", "cases.csv, summary.json and removal.png");
+  command->footer(footer(kRemovalExamples));
   command->callback([arguments] {
-    settle_evaluation_options(&arguments->evaluation);
     RemovalOptions& removal = arguments->removal;
-    removal.worlds = arguments->evaluation.evaluate;
-    EvaluateOptions& driven = removal.worlds;
-    driven.densities = {density_named(arguments->density)};
-    driven.scenarios =
-        arguments->scenes > 0 ? arguments->scenes : default_probe_scenes(removal.policies.size(), driven.maps.size());
     removal.control = removal_control_named(arguments->control);
-    make_output_folder(arguments->out);
-    ProgressLine line;
-    driven.on_progress = [&line](double done, double eta_s) {
-      line.update(fmt::format("probing: {:.0f} %  ETA {}", 100 * done, format_duration(eta_s)));
-    };
-    const RemovalResults results = probe_removal(removal);
-    line.finish();
+    const RemovalResults results = run_probe(&probe_removal, arguments.get(), &removal);
     const std::vector<RemovalRow> rows = summarize(results);
-    const std::string folder = arguments->out + "/", cases_file = folder + "cases.csv";
-    const std::string summary = removal_summary_json(results, rows, cases_file);
+    const std::string cases_file = arguments->out + "/cases.csv";
     write_removal_cases(cases_file, results);
-    write_file(folder + "summary.json", summary + "\n");
-    draw_removal_figure(results, rows, folder + "removal.png");
-    if (arguments->json)
-      print_json(Json::parse(summary));
-    else
-      print_table(results, rows);
+    draw_removal_figure(results, rows, arguments->out + "/removal.png");
+    report(*arguments, removal_summary_json(results, rows, cases_file), results, rows);
     if (results.interrupted) {
       throw Interrupted(fmt::format("interrupted; {} of {} removals are done, and written to {}", results.cases.size(),
                                     results.removals_asked, arguments->out));
@@ -122,16 +189,66 @@ void add_removal_command(CLI::App& probe) {
   });
 }
 
+void add_pedestrian_command(CLI::App& probe) {
+  struct Arguments : ProbeArguments {
+    PedestrianOptions pedestrian;
+    std::string control = kPedestrianControlNames[0];
+  };
+  auto arguments = std::make_shared<Arguments>();
+  PedestrianOptions& options = arguments->pedestrian;
+  CLI::App* command = probe.add_subcommand(
+      "pedestrian", "How value and braking change as a pedestrian comes out from behind a vehicle and is hidden again");
+  add_world_options(command, arguments.get(), &options);
+  command->add_option("--paths", options.paths, "Paths in all, each through one state; each has a figure")
+      ->transform(whole_number(1))
+      ->capture_default_str();
+  command->add_option("--range", options.hider_range_m, "How far away the vehicle that a path begins behind may be, m")
+      ->transform(number(6, 1000))
+      ->capture_default_str();
+  command->add_option("--min-speed", options.min_speed_mps, "Of the ego, forwards, m/s")
+      ->transform(number(-100, 100))
+      ->capture_default_str();
+  command->add_option("--height", options.height_m, "Of the pedestrian, m; vehicles are 1.5 m high")
+      ->transform(number(0.1, 3))
+      ->capture_default_str();
+  command->add_option("--control", arguments->control, "A control: nobody puts no pedestrian there")
+      ->check(one_of({kPedestrianControlNames.begin(), kPedestrianControlNames.end()}))
+      ->capture_default_str();
+  add_output_options(command, arguments.get(), &options, "probe_pedestrian",
+                     "cases.csv, summary.json, pedestrian.png and path_000.png, path_001.png, ...");
+  command->footer(footer(kPedestrianExamples));
+  command->callback([arguments] {
+    PedestrianOptions& pedestrian = arguments->pedestrian;
+    pedestrian.control = pedestrian_control_named(arguments->control);
+    const PedestrianResults results = run_probe(&probe_pedestrian, arguments.get(), &pedestrian);
+    const std::vector<PedestrianRow> rows = summarize(results);
+    const std::string cases_file = arguments->out + "/cases.csv";
+    write_pedestrian_cases(cases_file, results);
+    if (!results.interrupted) {
+      ProgressLine line;
+      const size_t all = results.paths.size();
+      draw_pedestrian_figures(results, rows, arguments->out, [&](size_t done) {
+        line.update(fmt::format("drawing: path {} of {}", done, all),
+                    static_cast<double>(done) / static_cast<double>(all));
+      });
+      line.finish();
+    }
+    report(*arguments, pedestrian_summary_json(results, rows, cases_file), results, rows);
+    if (results.interrupted) {
+      throw Interrupted(fmt::format("interrupted; {} of {} paths are done, and written to {} without figures",
+                                    results.paths.size(), results.paths_asked, arguments->out));
+    }
+  });
+}
+
 }  // namespace
 
 void add_probe_command(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("probe", "Ask policies what they see: probe removal");
+  CLI::App* command = app.add_subcommand("probe", "Ask policies what they see: probe removal, probe pedestrian");
   command->require_subcommand(1);
-  command->footer(
-      "Examples:\n  pictura probe removal agent.safetensors vector.safetensors --out removal\n"
-      "  pictura probe removal runs/a/checkpoint.ckpt --map Town01 --scenes 2 --removals 2000 --steps 300\n"
-      "  pictura probe removal agent.safetensors --map procedural:1 --agents 40 --removals 1000 --control nobody");
+  command->footer(footer({kRemovalExamples[0], kPedestrianExamples[0], kRemovalExamples[1]}));
   add_removal_command(*command);
+  add_pedestrian_command(*command);
 }
 
 }  // namespace pictura

@@ -14,6 +14,7 @@
 #include "pictura/simulator/observation_arrays.h"
 #include "pictura/training/evaluation/evaluate.h"
 #include "pictura/training/loop.h"
+#include "pictura/training/probes/pedestrian.h"
 #include "pictura/training/probes/removal.h"
 #include "pictura/training/session.h"
 #ifdef PICTURA_HAS_CUDA
@@ -164,6 +165,33 @@ std::function<void(double, double)> progress_to(const py::object& on_progress) {
     const py::gil_scoped_acquire gil;
     on_progress(done_fraction, eta_s);
   };
+}
+
+/// What all probes are asked.
+void fill_probe(ProbeOptions* options, const std::vector<std::string>& policies, const std::vector<std::string>& maps,
+                const std::string& density, int agents_per_world, int first_scene, int scenes, int steps,
+                int sample_steps, int batch, bool argmax, uint64_t seed, int num_threads, const std::string& device,
+                const std::string& simulator, const std::string& renderer, const std::string& samples,
+                const py::dict& conditioning, const py::object& on_progress) {
+  options->policies = policies;
+  options->sample_steps = sample_steps;
+  options->batch = batch;
+  EvaluateOptions& worlds = options->worlds;
+  worlds.maps = maps;
+  worlds.densities = {density_named(density)};
+  worlds.agents_per_world = agents_per_world;
+  worlds.first_scenario = first_scene;
+  worlds.scenarios = scenes > 0 ? scenes : default_probe_scenes(policies.size(), maps.size());
+  worlds.steps = steps;
+  worlds.argmax = argmax;
+  worlds.seed = seed;
+  worlds.num_threads = num_threads;
+  worlds.device = device;
+  worlds.simulator = simulator;
+  worlds.renderer = renderer;
+  worlds.samples = samples;
+  worlds.conditioning = texts_of(conditioning);
+  worlds.on_progress = progress_to(on_progress);
 }
 
 /// Logits and values of a batch, in the memory of a session's device.
@@ -364,28 +392,11 @@ agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error nami
          const std::string& samples, const py::dict& conditioning, const std::string& cases_file,
          const py::object& on_progress) {
         RemovalOptions options;
-        options.policies = policies;
-        EvaluateOptions& worlds = options.worlds;
-        worlds.maps = maps;
-        worlds.densities = {density_named(density)};
-        worlds.agents_per_world = agents_per_world;
-        worlds.first_scenario = first_scene;
-        worlds.scenarios = scenes > 0 ? scenes : default_probe_scenes(policies.size(), maps.size());
-        worlds.steps = steps;
-        worlds.argmax = argmax;
-        worlds.seed = seed;
-        worlds.num_threads = num_threads;
-        worlds.device = device;
-        worlds.simulator = simulator;
-        worlds.renderer = renderer;
-        worlds.samples = samples;
-        worlds.conditioning = texts_of(conditioning);
-        worlds.on_progress = progress_to(on_progress);
+        fill_probe(&options, policies, maps, density, agents_per_world, first_scene, scenes, steps, sample_steps, batch,
+                   argmax, seed, num_threads, device, simulator, renderer, samples, conditioning, on_progress);
         options.removals = removals;
-        options.sample_steps = sample_steps;
         options.range_m = range_m;
         options.control = removal_control_named(control);
-        options.batch = batch;
         const RemovalResults results =
             run_to_an_orderly_end("probe_removal", num_threads, {}, [&options] { return probe_removal(options); });
         if (!cases_file.empty()) write_removal_cases(cases_file, results);
@@ -406,6 +417,46 @@ argmax: as in evaluate(). scenes: how many scenarios are driven, an equal share 
 policy, two a map or more. removals: in all. sample_steps: between states. range_m: how far away a user may be. control: 'none',
 'nobody' or 'permuted'. batch: cases in a call. cases_file: a CSV file for every case. Returns a dict, that of the command's
 summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
+  module.def(
+      "probe_pedestrian",
+      [](const std::vector<std::string>& policies, const std::vector<std::string>& maps, const std::string& density,
+         int agents_per_world, int first_scene, int scenes, int steps, int64_t paths, int sample_steps,
+         float hider_range_m, float min_speed_mps, float height_m, const std::string& control, int batch, bool argmax,
+         uint64_t seed, int num_threads, const std::string& device, const std::string& simulator,
+         const std::string& renderer, const std::string& samples, const py::dict& conditioning,
+         const std::string& cases_file, const py::object& on_progress) {
+        PedestrianOptions options;
+        fill_probe(&options, policies, maps, density, agents_per_world, first_scene, scenes, steps, sample_steps, batch,
+                   argmax, seed, num_threads, device, simulator, renderer, samples, conditioning, on_progress);
+        options.paths = paths;
+        options.hider_range_m = hider_range_m;
+        options.min_speed_mps = min_speed_mps;
+        options.height_m = height_m;
+        options.control = pedestrian_control_named(control);
+        const PedestrianResults results = run_to_an_orderly_end("probe_pedestrian", num_threads, {},
+                                                                [&options] { return probe_pedestrian(options); });
+        if (!cases_file.empty()) write_pedestrian_cases(cases_file, results);
+        return py::module_::import("json").attr("loads")(
+            pedestrian_summary_json(results, summarize(results), cases_file));
+      },
+      py::arg("policies"), py::arg("maps"), py::kw_only(), py::arg("density") = "medium",
+      py::arg("agents_per_world") = 0, py::arg("first_scene") = 0, py::arg("scenes") = 0,
+      py::arg("steps") = kProbeSteps, py::arg("paths") = PedestrianOptions{}.paths,
+      py::arg("sample_steps") = PedestrianOptions{}.sample_steps,
+      py::arg("hider_range_m") = PedestrianOptions{}.hider_range_m,
+      py::arg("min_speed_mps") = PedestrianOptions{}.min_speed_mps, py::arg("height_m") = PedestrianOptions{}.height_m,
+      py::arg("control") = "none", py::arg("batch") = PedestrianOptions{}.batch, py::arg("argmax") = true,
+      py::arg("seed") = 1, py::arg("num_threads") = 0, py::arg("device") = "auto", py::arg("simulator") = "auto",
+      py::arg("renderer") = "", py::arg("samples") = "", py::arg("conditioning") = py::dict(),
+      py::arg("cases_file") = "", py::arg("on_progress") = py::none(),
+      R"(How policies' value and braking change as a pedestrian comes out from behind a vehicle and is hidden again, as
+`pictura probe pedestrian` asks it.
+
+policies, maps, density, agents_per_world, scenes, steps, sample_steps, batch and what follows argmax: as in probe_removal().
+paths: in all, each through one state. hider_range_m: how far away the vehicle may be that a path begins behind. min_speed_mps:
+of the ego, forwards. height_m: of the pedestrian. control: 'none' or 'nobody'. cases_file: a CSV file for every place of every path. Returns a dict, that of
+the command's summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad
+input.)");
   py::class_<PySession>(module, "PolicySession", R"(
 A saved policy: what it makes of scenes and observations, and the world and cameras that it was trained with. One thread at a
 time, also for a renderer that it is given.)")

@@ -1,7 +1,7 @@
 """Driving policies that learn by self-play from what a car's cameras see: maps, simulators and renderers for Python.
 
 The library's objects are here; environments are in pictura.envs, policies as torch modules in pictura.torch. train, evaluate,
-probe_removal and PolicySession need a package that was built beside torch, and load it on first use.
+the probes and PolicySession need a package that was built beside torch, and load it on first use.
 """
 
 from typing import TYPE_CHECKING
@@ -50,11 +50,11 @@ from pictura._pictura import (  # noqa: F401
 from pictura.queries import make_queries  # noqa: F401
 
 if TYPE_CHECKING:
-    from pictura._training import PolicySession, evaluate, probe_removal, train  # noqa: F401
+    from pictura._training import PolicySession, evaluate, probe_pedestrian, probe_removal, train  # noqa: F401
 
 
 def __getattr__(name: str):
-    if name not in ("PolicySession", "evaluate", "probe_removal", "train"):
+    if name not in ("PolicySession", "evaluate", "probe_pedestrian", "probe_removal", "train"):
         raise AttributeError(f"module 'pictura' has no attribute '{name}'")
     from pictura._load_training import load
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import collections.abc
 import pictura._pictura
 import typing
-__all__: list[str] = ['PolicySession', 'evaluate', 'probe_removal', 'train']
+__all__: list[str] = ['PolicySession', 'evaluate', 'probe_pedestrian', 'probe_removal', 'train']
 class PolicySession:
     """
     A saved policy: what it makes of scenes and observations, and the world and cameras that it was trained with. One thread at a
@@ -62,6 +62,17 @@ def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller
     conditioning: numbers by name. on_progress: called with the fraction that is done and the seconds to come, from a thread of its
     own. Returns a dict: rows, one a density: its counts, and each metric as (value, half of its 95 % interval); seconds,
     agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
+    """
+def probe_pedestrian(policies: collections.abc.Sequence[str], maps: collections.abc.Sequence[str], *, density: str = 'medium', agents_per_world: typing.SupportsInt | typing.SupportsIndex = 0, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, scenes: typing.SupportsInt | typing.SupportsIndex = 0, steps: typing.SupportsInt | typing.SupportsIndex = 600, paths: typing.SupportsInt | typing.SupportsIndex = 32, sample_steps: typing.SupportsInt | typing.SupportsIndex = 10, hider_range_m: typing.SupportsFloat | typing.SupportsIndex = 30.0, min_speed_mps: typing.SupportsFloat | typing.SupportsIndex = 1.0, height_m: typing.SupportsFloat | typing.SupportsIndex = 1.2000000476837158, control: str = 'none', batch: typing.SupportsInt | typing.SupportsIndex = 4096, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', conditioning: dict = {}, cases_file: str = '', on_progress: typing.Any = None) -> typing.Any:
+    """
+    How policies' value and braking change as a pedestrian comes out from behind a vehicle and is hidden again, as
+    `pictura probe pedestrian` asks it.
+    
+    policies, maps, density, agents_per_world, scenes, steps, sample_steps, batch and what follows argmax: as in probe_removal().
+    paths: in all, each through one state. hider_range_m: how far away the vehicle may be that a path begins behind. min_speed_mps:
+    of the ego, forwards. height_m: of the pedestrian. control: 'none' or 'nobody'. cases_file: a CSV file for every place of every path. Returns a dict, that of
+    the command's summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad
+    input.
     """
 def probe_removal(policies: collections.abc.Sequence[str], maps: collections.abc.Sequence[str], *, density: str = 'medium', agents_per_world: typing.SupportsInt | typing.SupportsIndex = 0, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, scenes: typing.SupportsInt | typing.SupportsIndex = 0, steps: typing.SupportsInt | typing.SupportsIndex = 600, removals: typing.SupportsInt | typing.SupportsIndex = 88000, sample_steps: typing.SupportsInt | typing.SupportsIndex = 10, range_m: typing.SupportsFloat | typing.SupportsIndex = 50.0, control: str = 'none', batch: typing.SupportsInt | typing.SupportsIndex = 4096, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', conditioning: dict = {}, cases_file: str = '', on_progress: typing.Any = None) -> typing.Any:
     """

@@ -160,6 +160,12 @@ def test_a_controller_outlives_its_session(trained, town):
     simulator.run(controller, 3)
 
 
+def options_of(arguments):
+    """Of the command, for arguments of the functions."""
+    names = {"agents_per_world": "agents", "num_threads": "threads", "sample_steps": "every"}
+    return [f"--{names.get(name, name.removesuffix('_mps').replace('_', '-'))}={value}" for name, value in arguments.items()]
+
+
 def test_evaluation_gives_the_commands_numbers(trained):
     command = os.environ.get("PICTURA_COMMAND")
     folder, done = trained[1], []
@@ -171,10 +177,8 @@ def test_evaluation_gives_the_commands_numbers(trained):
     assert row["scenarios"] == 2 and row["vehicle_episodes"] == 12 and done and done[-1] == 1
     if not command:
         pytest.skip("PICTURA_COMMAND names no command")
-    arguments = [f"--{name.replace('_', '-').replace('agents-per-world', 'agents')}={value}" for name, value in options.items()]
-    arguments = [part.replace("num-threads", "threads") for part in arguments]
     out = subprocess.run(
-        [command, "evaluate", str(folder / "checkpoint.ckpt"), "--map", "procedural:1", "--json", *arguments],
+        [command, "evaluate", str(folder / "checkpoint.ckpt"), "--map", "procedural:1", "--json", *options_of(options)],
         capture_output=True, text=True,
     )  # fmt: skip
     assert out.returncode == 0, out.stderr
@@ -205,10 +209,8 @@ def test_removal_is_the_commands(trained, tmp_path):
     command = os.environ.get("PICTURA_COMMAND")
     if not command:
         pytest.skip("PICTURA_COMMAND names no command")
-    arguments = [f"--{name.replace('_', '-').replace('agents-per-world', 'agents')}={value}" for name, value in options.items()]
-    arguments = [part.replace("num-threads", "threads").replace("sample-steps", "every") for part in arguments]
     out = subprocess.run(
-        [command, "probe", "removal", str(folder / "checkpoint.ckpt"), "--map", "procedural:1", "--out", str(tmp_path / "out"), "--json", *arguments],
+        [command, "probe", "removal", str(folder / "checkpoint.ckpt"), "--map", "procedural:1", "--out", str(tmp_path / "out"), "--json", *options_of(options)],
         capture_output=True, text=True,
     )  # fmt: skip
     assert out.returncode == 0, out.stderr
@@ -216,6 +218,36 @@ def test_removal_is_the_commands(trained, tmp_path):
     assert theirs["rows"] == report["rows"]
     assert (tmp_path / "out" / "cases.csv").read_text() == cases.read_text()
     assert (tmp_path / "out" / "removal.png").exists() and json.loads((tmp_path / "out" / "summary.json").read_text()) == theirs
+
+
+def test_pedestrian_is_the_commands(trained, tmp_path):
+    _, folder, _, _ = trained
+    done, cases = [], tmp_path / "cases.csv"
+    options = {"scenes": 2, "steps": 60, "paths": 2, "sample_steps": 4, "min_speed_mps": -10, "agents_per_world": 30, "seed": 3, "num_threads": 2, "device": "cpu"}
+    report = pictura.probe_pedestrian(
+        [str(folder / "checkpoint.ckpt")], ["procedural:1"], cases_file=str(cases), on_progress=lambda fraction, eta_s: done.append(fraction),
+        **options)  # fmt: skip
+    assert report["kind"] == "pedestrian" and report["paths"] in (1, 2) and report["paths_asked"] == 2 and done[-1] == 1
+    assert sum(row["cases"] for row in report["rows"] if row["phase"]) == report["cases"]
+    lines = cases.read_text().splitlines()
+    assert len(lines) == 1 + report["cases"] and lines[0].startswith("case,path,scene,map,driver,step,ego")
+    nobody = pictura.probe_pedestrian([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="nobody", **options)
+    assert all(row["abs_d_value"] == 0 for row in nobody["rows"])
+    with pytest.raises(pictura.UsageError, match="none, nobody, got 'some'"):
+        pictura.probe_pedestrian([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="some")
+    command = os.environ.get("PICTURA_COMMAND")
+    if not command:
+        pytest.skip("PICTURA_COMMAND names no command")
+    out = subprocess.run(
+        [command, "probe", "pedestrian", str(folder / "checkpoint.ckpt"), "--map", "procedural:1", "--out", str(tmp_path / "out"), "--json", *options_of(options)],
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert out.returncode == 0, out.stderr
+    theirs = json.loads(out.stdout)
+    assert theirs["rows"] == report["rows"]
+    assert (tmp_path / "out" / "cases.csv").read_text() == cases.read_text()
+    drawn = [f"path_{path:03}.png" for path in range(report["paths"])]
+    assert sorted(each.name for each in (tmp_path / "out").iterdir()) == ["cases.csv", *drawn, "pedestrian.png", "summary.json"]
 
 
 def test_the_documents_code_runs(tmp_path, monkeypatch, town):
