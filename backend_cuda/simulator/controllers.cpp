@@ -40,29 +40,19 @@ class CudaRandomController final : public Controller {
   uint64_t seed_;
 };
 
-class CudaIdleController final : public Controller {
+/// Tells every slot the same, by a rule without settings; `name` is a literal.
+template <typename Rule>
+class CudaRuleController final : public Controller {
  public:
-  explicit CudaIdleController(Device device) : device_(device) {}
-  std::string_view name() const override { return "idle"; }
+  CudaRuleController(std::string_view name, Device device) : name_(name), device_(device) {}
+  std::string_view name() const override { return name_; }
   void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
     check_controller_arrays(name(), input, device_, mask, commands_out);
-    write(IdleCommands{}, mask, commands_out, stream);
+    write(Rule{}, mask, commands_out, stream);
   }
 
  private:
-  Device device_;
-};
-
-class CudaLogController final : public Controller {
- public:
-  explicit CudaLogController(Device device) : device_(device) {}
-  std::string_view name() const override { return "log"; }
-  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
-    check_controller_arrays(name(), input, device_, mask, commands_out);
-    write(RecordedCommands{}, mask, commands_out, stream);
-  }
-
- private:
+  std::string_view name_;
   Device device_;
 };
 
@@ -134,9 +124,9 @@ class CudaLaneController final : public Controller {
 std::unique_ptr<Controller> make_cuda_controller(const std::string& name, const Simulator& simulator, uint64_t seed) {
   check_worlds(name, simulator);
   if (name == "random") return std::make_unique<CudaRandomController>(simulator.device(), seed);
-  if (name == "idle") return std::make_unique<CudaIdleController>(simulator.device());
+  if (name == "idle") return std::make_unique<CudaRuleController<IdleCommands>>("idle", simulator.device());
   if (name == "lane") return std::make_unique<CudaLaneController>(simulator);
-  if (name == "log") return std::make_unique<CudaLogController>(simulator.device());
+  if (name == "log") return std::make_unique<CudaRuleController<RecordedCommands>>("log", simulator.device());
   if (name == "inverse" || name == "idm") {
     fail_usage("controller {}: expected a simulator in host memory, got one on {}", name, name_of(simulator.device()));
   }

@@ -43,22 +43,19 @@ class RandomController final : public Controller {
   uint64_t seed_;
 };
 
-class IdleController final : public Controller {
+/// Tells every slot the same, by a rule without settings; `name` is a literal.
+template <typename Rule>
+class RuleController final : public Controller {
  public:
-  std::string_view name() const override { return "idle"; }
+  explicit RuleController(std::string_view name) : name_(name) {}
+  std::string_view name() const override { return name_; }
   void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream) override {
     check_controller_arrays(name(), input, Device{}, mask, commands_out);
-    fill(IdleCommands{}, mask, commands_out);
+    fill(Rule{}, mask, commands_out);
   }
-};
 
-class LogController final : public Controller {
- public:
-  std::string_view name() const override { return "log"; }
-  void act(const ControllerInput& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream) override {
-    check_controller_arrays(name(), input, Device{}, mask, commands_out);
-    fill(RecordedCommands{}, mask, commands_out);
-  }
+ private:
+  std::string_view name_;
 };
 
 }  // namespace
@@ -83,9 +80,9 @@ void check_worlds(std::string_view controller, const Simulator& simulator) {
 std::unique_ptr<Controller> make_host_controller(const std::string& name, const Simulator& simulator, uint64_t seed) {
   check_worlds(name, simulator);
   if (name == "random") return std::make_unique<RandomController>(seed);
-  if (name == "idle") return std::make_unique<IdleController>();
+  if (name == "idle") return std::make_unique<RuleController<IdleCommands>>("idle");
   if (name == "lane") return std::make_unique<LaneKeepingController>(simulator);
-  if (name == "log") return std::make_unique<LogController>();
+  if (name == "log") return std::make_unique<RuleController<RecordedCommands>>("log");
   if (name == "inverse") return std::make_unique<InverseController>(simulator);
   if (name == "idm") return std::make_unique<IdmController>(simulator);
   fail_usage("controller: expected one of {}; got '{}'", fmt::join(host_controller_names(), ", "), name);
