@@ -188,7 +188,7 @@ TEST_F(DeviceTraining, RemovalAgreesWithTheHosts) {
     EXPECT_EQ(a.is_in_frame(), b.is_in_frame()) << i;
     EXPECT_TRUE(!a.is_in_frame() || std::abs(a.visible_share - b.visible_share) < 1e-3f) << i;
     for (size_t policy = 0; policy < 2; ++policy) {
-      const RemovalResponse &x = on_host.response(i, policy), &y = on_device.response(i, policy);
+      const PairedResponse &x = on_host.response(i, policy), &y = on_device.response(i, policy);
       EXPECT_NEAR(x.value, y.value, 1e-3) << i;
       EXPECT_NEAR(x.value_without, y.value_without, 1e-3) << i;
       EXPECT_NEAR(x.brake, y.brake, 1e-3) << i;
