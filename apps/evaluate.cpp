@@ -142,8 +142,8 @@ void add_evaluate_command(CLI::App& app) {
           ->add_option("--policy", options.controller,
                        fmt::format("Who drives instead of the checkpoint's policy, in its world, or, without a "
                                    "checkpoint, in the paper's: {}",
-                                   fmt::join(host_controller_names(), ", ")))
-          ->check(one_of(host_controller_names()));
+                                   fmt::join(town_controller_names(), ", ")))
+          ->check(one_of(town_controller_names()));
   command
       ->add_option("--merge", arguments->parts,
                    "Instead of evaluating: join parts of one evaluation, which --out wrote, exactly")

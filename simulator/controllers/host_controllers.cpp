@@ -1,5 +1,7 @@
 #include "pictura/simulator/controllers/host_controllers.h"
 
+#include <algorithm>
+
 #include "pictura/common/array.h"
 #include "pictura/common/error.h"
 #include "pictura/map/scenario/scenario.h"
@@ -60,12 +62,19 @@ class RuleController final : public Controller {
 
 }  // namespace
 
-std::vector<std::string> host_controller_names() { return {"random", "idle", "lane", "log", "inverse", "idm"}; }
+std::vector<std::string> town_controller_names() { return {"random", "idle", "lane"}; }
+std::vector<std::string> record_controller_names() { return {"log", "inverse", "idm"}; }
+std::vector<std::string> host_controller_names() {
+  std::vector<std::string> names = town_controller_names();
+  for (const std::string& name : record_controller_names()) names.push_back(name);
+  return names;
+}
 
 void check_worlds(std::string_view controller, const Simulator& simulator) {
+  const std::vector<std::string> followers = record_controller_names();
+  const bool needs_record = std::find(followers.begin(), followers.end(), controller) != followers.end();
   for (const WorldSpec& world : simulator.worlds()) {
     const CompiledMap& map = *simulator.maps()[static_cast<size_t>(world.map)];
-    const bool needs_record = controller == "log" || controller == "inverse" || controller == "idm";
     if (needs_record && !map.scenario) {
       fail_usage("controller {}: world {}: expected a recorded scene, got map {}, of which there is no record",
                  controller, world.global_world, map.road->name);

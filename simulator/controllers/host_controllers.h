@@ -11,8 +11,12 @@
 
 namespace pictura {
 
-/// "random", "idle" (no jerk), "lane" (the lane keeper, see lane_keeping.h), "log" (as recorded), "inverse" (by the
-/// actions that follow the recording, see inverse_actions.h), or "idm" (along recorded paths, see idm.h).
+/// Who drives on towns: "random", "idle" (no jerk), "lane" (the lane keeper, see lane_keeping.h).
+std::vector<std::string> town_controller_names();
+/// Who follows a recorded scene: "log" (as recorded), "inverse" (by the actions that follow the recording, see
+/// inverse_actions.h), "idm" (along recorded paths, see idm.h).
+std::vector<std::string> record_controller_names();
+/// Both.
 std::vector<std::string> host_controller_names();
 
 /// Throws UsageError naming the first world on a map without a record, which "log", "inverse" and "idm" cannot drive
