@@ -279,6 +279,13 @@ async function main() {
     g: () => { state.goals = !state.goals; }, l: () => { state.numbers = !state.numbers; },
     c: () => {
       const names = ["", ...(replay.images?.cameras ?? []).map(camera => camera.name)];
+      // Only one agent's images are recorded: its.
+      if (names.length > 1 && replay.followed >= 0 && !replay.isFollowed(state.agent, Math.floor(state.time))) {
+        actions.select(replay.followed);
+        actions.show(replay.followed);
+        actions.camera(state.camera || names[1]);
+        return;
+      }
       actions.camera(names[(names.indexOf(state.camera) + 1) % names.length]);
     },
     "+": () => zoom(1.4), "=": () => zoom(1.4), "-": () => zoom(1 / 1.4), 0: fit,

@@ -35,13 +35,13 @@ class Panel {
   }
   makeActions() {
     const grid = byId("actions"), cells = [];
-    grid.append(make("span"));
+    grid.append(make("span", "m/s\u00b3"));
     for (const name of ["left", "straight", "right"]) grid.append(make("span", name));
     for (let long = 3; long >= 0; --long) {
       grid.append(make("span", LONG_JERKS[long].replace("-", "\u2212")));
       for (let lat = 2; lat >= 0; --lat) {
         const cell = cells[3 * long + lat] = make("div", "\u00a0");
-        cell.title = `jerk ${LONG_JERKS[long]} m/s3 along, ${LAT_JERKS[lat]} m/s3 to the left`;
+        cell.title = `jerk ${LONG_JERKS[long]} m/s\u00b3 along, ${LAT_JERKS[lat]} m/s\u00b3 to the left`;
         grid.append(cell);
       }
     }
@@ -145,7 +145,8 @@ class Panel {
     };
     set("speed", replay.get("speed_mps", agent, frame) * 3.6, 1, "km/h");
     set("steer", replay.get("steer_deg", agent, frame), 1, "\u00b0");
-    set("acceleration", frame > before ? (replay.get("speed_mps", agent, frame) - replay.get("speed_mps", agent, before)) / replay.dt_s : 0, 1, "m/s\u00b2");
+    // Who halts is put to rest within a step, which is no braking.
+    set("acceleration", status === "halted" ? NaN : frame > before ? (replay.get("speed_mps", agent, frame) - replay.get("speed_mps", agent, before)) / replay.dt_s : 0, 1, "m/s\u00b2");
     set("value", decision ? decision.value : NaN, 2, "");
     this.facts.value.box.hidden = !replay.isFollowed(agent, frame) || !replay.decisions;
     const reward = replay.rewardTerms.reduce((sum, term) => sum + replay.get(`reward_${term}`, agent, frame), 0);

@@ -199,6 +199,23 @@ class Chromium(PageCase):
         self.browser.wait_for("pictura.state.agent === 17")
         self.assertEqual(self.browser.errors, [])
 
+    def test_the_camera_key_goes_to_the_agent_whose_images_are_recorded(self):
+        self.open(fragment="#step=5&agent=7")
+        self.browser.key("c")
+        cameras = [camera["name"] for camera in self.browser.run("pictura.replay.images.cameras.map(({name}) => ({name}))")]
+        self.assertEqual((self.state()["agent"], self.state()["camera"]), (4, cameras[0]))
+        self.browser.key("c")
+        self.assertEqual((self.state()["agent"], self.state()["camera"]), (4, cameras[1]))
+
+    def test_who_halts_is_not_said_to_brake(self):
+        tracks = self.recorded.tracks
+        halts = [(f, a) for a in range(24) for f in range(1, 91) if round(tracks["status"][a][f]) == 1 and round(tracks["status"][a][f - 1]) == 0]
+        frame, agent = max(halts, key=lambda halt: abs(tracks["speed_mps"][halt[1]][halt[0] - 1]))
+        self.open(fragment=f"#step={frame}&agent={agent}")
+        self.browser.wait_for("document.getElementById('agent-status').textContent.includes('halted')")
+        fact = "[...document.querySelectorAll('#facts *')].find(e => e.textContent.startsWith('Acceleration')).textContent"
+        self.assertIn("\u2013", self.browser.run(fact))
+
     def test_clicks_choose_agents_and_events(self):
         self.open()
         self.browser.run("pictura.actions.seek(10)")
