@@ -2,7 +2,7 @@
 // drivable area, the same code on both devices.
 #pragma once
 
-#include "pictura/common/grid_view.h"
+#include "pictura/common/cells_around.h"
 #include "pictura/common/math.h"
 
 namespace pictura {
@@ -61,11 +61,10 @@ PICTURA_HD RoadSide road_side(Span<const SideEdge> edges, const GridView& cells,
   // Most edges are near: wider rings are looked at only where nearer ones hold none.
   const float reaches_m[] = {5.0f, 15.0f, kRoadSideReach_m};
   for (const float reach_m : reaches_m) {
-    const int x0 = cells.cell_x(p.x - reach_m), x1 = cells.cell_x(p.x + reach_m);
-    for (int y = cells.cell_y(p.y - reach_m); y <= cells.cell_y(p.y + reach_m); ++y) {
-      const int32_t end = cells.begin[static_cast<size_t>(y * cells.num_x + x1 + 1)];
-      for (int32_t i = cells.begin[static_cast<size_t>(y * cells.num_x + x0)] + group.rank(); i < end;
-           i += group.size()) {
+    const CellRows range = cells_around(cells, p, reach_m);
+    for (int y = range.y0; y <= range.y1; ++y) {
+      const int32_t end = range.end(cells, y);
+      for (int32_t i = range.begin(cells, y) + group.rank(); i < end; i += group.size()) {
         look_at(cells.items[static_cast<size_t>(i)]);
       }
     }

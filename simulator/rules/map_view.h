@@ -3,7 +3,7 @@
 // point in it; `near_*` list what may be observed from it, nearest to the cell's centre first.
 #pragma once
 
-#include "pictura/common/grid_view.h"
+#include "pictura/common/cells_around.h"
 #include "pictura/common/math.h"
 #include "pictura/common/span.h"
 #include "pictura/map/scenario/road_side.h"
@@ -170,24 +170,6 @@ PICTURA_HD void visit_arrays(MapView* view, Visit&& visit) {
 PICTURA_HD inline Span<const int32_t> list_of(const GridView& lists, size_t index) {
   const int32_t begin = lists.begin[index];
   return lists.items.subspan(static_cast<size_t>(begin), static_cast<size_t>(lists.begin[index + 1] - begin));
-}
-
-/// Cells in rows; the items of those of a row follow one another.
-struct CellRows {
-  int x0 = 0, x1 = 0, y0 = 0, y1 = 0;
-  PICTURA_HD int32_t begin(const GridView& cells, int y) const {
-    return cells.begin[static_cast<size_t>(y * cells.num_x + x0)];
-  }
-  PICTURA_HD int32_t end(const GridView& cells, int y) const {
-    return cells.begin[static_cast<size_t>(y * cells.num_x + x1 + 1)];
-  }
-};
-
-/// The cells that a square of half-width reach_m about p touches.
-PICTURA_HD inline CellRows cells_around(const GridView& cells, Vec2 p, float reach_m) {
-  if (cells.num_x == 1 && cells.num_y == 1) return {};  // without dividing
-  return {cells.cell_x(p.x - reach_m), cells.cell_x(p.x + reach_m), cells.cell_y(p.y - reach_m),
-          cells.cell_y(p.y + reach_m)};
 }
 
 /// The list of the cell that holds p; points outside belong to the nearest cell.
