@@ -240,19 +240,13 @@ void launch_step(const SimulatorArrays& arrays, const Command* commands, const S
   launch_step(DeviceLaunch{streams}, arrays, commands);
 }
 
-void launch_commands(const RandomCommands& rule, int32_t num_slots, const uint8_t* mask, Command* commands_out,
+template <typename Rule>
+void launch_commands(const Rule& rule, int32_t num_slots, const uint8_t* mask, Command* commands_out,
                      cudaStream_t stream) {
-  DeviceLaunch{{stream}}.threads(num_slots, WriteCommands<RandomCommands>{rule, mask, commands_out});
+  DeviceLaunch{{stream}}.threads(num_slots, WriteCommands<Rule>{rule, mask, commands_out});
 }
-
-void launch_commands(const IdleCommands& rule, int32_t num_slots, const uint8_t* mask, Command* commands_out,
-                     cudaStream_t stream) {
-  DeviceLaunch{{stream}}.threads(num_slots, WriteCommands<IdleCommands>{rule, mask, commands_out});
-}
-
-void launch_commands(const RecordedCommands& rule, int32_t num_slots, const uint8_t* mask, Command* commands_out,
-                     cudaStream_t stream) {
-  DeviceLaunch{{stream}}.threads(num_slots, WriteCommands<RecordedCommands>{rule, mask, commands_out});
-}
+template void launch_commands(const RandomCommands&, int32_t, const uint8_t*, Command*, cudaStream_t);
+template void launch_commands(const IdleCommands&, int32_t, const uint8_t*, Command*, cudaStream_t);
+template void launch_commands(const RecordedCommands&, int32_t, const uint8_t*, Command*, cudaStream_t);
 
 }  // namespace pictura::cuda

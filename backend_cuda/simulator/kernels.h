@@ -23,12 +23,9 @@ void launch_restored(const SimulatorArrays& arrays, const StepStreams& streams);
 void launch_step(const SimulatorArrays& arrays, const int32_t* actions, const StepStreams& streams);
 void launch_step(const SimulatorArrays& arrays, const Command* commands, const StepStreams& streams);
 
-/// Commands of the slots that `mask` [slots] names, or of all where it is null.
-void launch_commands(const RandomCommands& rule, int32_t num_slots, const uint8_t* mask, Command* commands_out,
-                     cudaStream_t stream);
-void launch_commands(const IdleCommands& rule, int32_t num_slots, const uint8_t* mask, Command* commands_out,
-                     cudaStream_t stream);
-void launch_commands(const RecordedCommands& rule, int32_t num_slots, const uint8_t* mask, Command* commands_out,
+/// Commands by a rule of simulator/rules/control.h: of the slots that `mask` [slots] names, or of all where it is null.
+template <typename Rule>
+void launch_commands(const Rule& rule, int32_t num_slots, const uint8_t* mask, Command* commands_out,
                      cudaStream_t stream);
 
 }  // namespace pictura::cuda
