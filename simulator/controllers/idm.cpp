@@ -40,10 +40,10 @@ float idm_acceleration(const IdmParameters& parameters, float speed_mps, float g
   return parameters.accel_mps2 * (1 - free - interaction);
 }
 
-float RecordedPath::nearest_m(Vec2 p, float from_s_m, float ahead_m) const {
+float RecordedPath::nearest_m(Vec2 p, float from_s_m) const {
   float best_m = from_s_m, least = INFINITY;
   for (size_t i = 0; i + 1 < points_m.size(); ++i) {
-    if (s_m[i + 1] + kMinPiece_m < from_s_m || s_m[i] > from_s_m + ahead_m) continue;
+    if (s_m[i + 1] + kMinPiece_m < from_s_m) continue;
     const Vec2 a = points_m[i].xy(), way = (points_m[i + 1] - points_m[i]).xy();
     const float t = std::clamp(dot(p - a, way) / dot(way, way), 0.0f, 1.0f);
     const float apart_m = length(p - (a + way * t));
@@ -89,10 +89,8 @@ Command IdmController::command_of(const ControllerInput& input, size_t slot) {
   const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
   const Vec2 here{input.state.x_m[slot], input.state.y_m[slot]};
   const float speed_mps = std::max(0.0f, input.state.speed_mps[slot]);
-  // An agent that was taken elsewhere, or begins anew, is looked for on the whole path.
-  const bool begins = input.episode_step[world] == 0;
-  const float s_m =
-      begins ? path.nearest_m(here, 0, path.length_m()) : path.nearest_m(here, progress_m_[slot], path.length_m());
+  // Nobody goes back on the path but who begins anew.
+  const float s_m = path.nearest_m(here, input.episode_step[world] == 0 ? 0.0f : progress_m_[slot]);
   progress_m_[slot] = s_m;
 
   float gap_m = INFINITY, front_mps = 0;

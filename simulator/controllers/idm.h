@@ -33,8 +33,8 @@ struct RecordedPath {
   std::vector<float> s_m;          // along it
 
   float length_m() const { return s_m.back(); }
-  /// The place nearest to p on the pieces between `from_s_m` less a piece and so far ahead.
-  float nearest_m(Vec2 p, float from_s_m, float ahead_m) const;
+  /// The place nearest to p on the pieces from `from_s_m` on, or that end just before it.
+  float nearest_m(Vec2 p, float from_s_m) const;
   struct Pose {
     Vec3 position_m;
     float heading_rad = 0;
