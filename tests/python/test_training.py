@@ -166,6 +166,19 @@ def options_of(arguments):
     return [f"--{names.get(name, name.removesuffix('_mps').replace('_', '-'))}={value}" for name, value in arguments.items()]
 
 
+def probed_by_command(probe, folder, out, arguments):
+    """What `pictura probe` prints as JSON, of the same arguments as the function's; its files go to `out`."""
+    command = os.environ.get("PICTURA_COMMAND")
+    if not command:
+        pytest.skip("PICTURA_COMMAND names no command")
+    done = subprocess.run(
+        [command, "probe", probe, str(folder / "checkpoint.ckpt"), "--map", "procedural:1", "--out", str(out), "--json", *options_of(arguments)],
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
 def test_evaluation_gives_the_commands_numbers(trained):
     command = os.environ.get("PICTURA_COMMAND")
     folder, done = trained[1], []
@@ -206,15 +219,7 @@ def test_removal_is_the_commands(trained, tmp_path):
     assert all(row["abs_d_value"] in (0, None) for row in nobody["rows"])
     with pytest.raises(pictura.UsageError, match="none, nobody, permuted"):
         pictura.probe_removal([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="some")
-    command = os.environ.get("PICTURA_COMMAND")
-    if not command:
-        pytest.skip("PICTURA_COMMAND names no command")
-    out = subprocess.run(
-        [command, "probe", "removal", str(folder / "checkpoint.ckpt"), "--map", "procedural:1", "--out", str(tmp_path / "out"), "--json", *options_of(options)],
-        capture_output=True, text=True,
-    )  # fmt: skip
-    assert out.returncode == 0, out.stderr
-    theirs = json.loads(out.stdout)
+    theirs = probed_by_command("removal", folder, tmp_path / "out", options)
     assert theirs["rows"] == report["rows"]
     assert (tmp_path / "out" / "cases.csv").read_text() == cases.read_text()
     assert (tmp_path / "out" / "removal.png").exists() and json.loads((tmp_path / "out" / "summary.json").read_text()) == theirs
@@ -235,15 +240,7 @@ def test_pedestrian_is_the_commands(trained, tmp_path):
     assert all(row["abs_d_value"] == 0 for row in nobody["rows"])
     with pytest.raises(pictura.UsageError, match="none, nobody, got 'some'"):
         pictura.probe_pedestrian([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="some")
-    command = os.environ.get("PICTURA_COMMAND")
-    if not command:
-        pytest.skip("PICTURA_COMMAND names no command")
-    out = subprocess.run(
-        [command, "probe", "pedestrian", str(folder / "checkpoint.ckpt"), "--map", "procedural:1", "--out", str(tmp_path / "out"), "--json", *options_of(options)],
-        capture_output=True, text=True,
-    )  # fmt: skip
-    assert out.returncode == 0, out.stderr
-    theirs = json.loads(out.stdout)
+    theirs = probed_by_command("pedestrian", folder, tmp_path / "out", options)
     assert theirs["rows"] == report["rows"]
     assert (tmp_path / "out" / "cases.csv").read_text() == cases.read_text()
     drawn = [f"path_{path:03}.png" for path in range(report["paths"])]
