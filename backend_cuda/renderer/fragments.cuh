@@ -207,8 +207,7 @@ __device__ void store_fragment(const Memory& memory, int fragment, uint32_t face
   memory.next[fragment] = static_cast<Index>(first_of_word<Memory>(before));
 }
 
-// Makes a fragment of each lane's candidate unless its coverage is empty. Counts those that fill their pixel although
-// their row lists it as partly covered, to within rounding: mark_pixel has not seen them.
+// Makes a fragment of each lane's candidate unless its coverage is empty.
 template <typename Memory>
 __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, const Part& part) {
   const int pixel = Memory::pixel_of(candidate.b);
@@ -219,7 +218,6 @@ __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, c
                                                  : pixel_coverage(memory.edges + face.edge_begin, face.edge_count,
                                                                   face.min_area(), part.x_of(pixel), part.y_of(pixel));
   }
-  if (!Memory::covers_fully(candidate.b) && coverage.is_full()) atomicAdd(&memory.state->num_unmarked, 1);
   const bool is_covered = coverage.area > 0.0f;
   const int32_t fragment = warp_allocate_one(&memory.state->num_fragments, is_covered);
   if (!is_covered || fragment >= memory.max_fragments) return;
@@ -277,6 +275,7 @@ __device__ void finish_fragments(const Memory& memory, int count) {
     if (i >= count) continue;
     set_all_visible(i);
     if (!memory.coverage(i).is_full()) continue;
+    atomicAdd(&memory.state->num_full, 1);
     const int pixel = memory.pixel[i];
     const Word full = full_of_word<Memory>(atomicAnd(&memory.pixels[pixel], ~PixelWord<Word>::kFace));
     if (full == Memory::kNone) continue;

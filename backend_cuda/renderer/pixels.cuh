@@ -82,24 +82,20 @@ __device__ void resolve_occlusion(const Memory& memory, const Part& part, int co
   if (!pairs.is_empty()) resolve_pairs<Memory>(pairs.take(), part);
 }
 
-// Divides what is left of the pixels that several fragments cover fully. Such a pixel has one fragment that was its
-// full face, among those from `made` on, unless its full fragments are not marked: then the first of them divides.
+// Divides what is left of the pixels that several fragments cover fully. Of those fragments the first of the pixel's
+// list does it.
 template <typename Memory>
-__device__ __noinline__ void divide_remainders(int made, int count) {
+__device__ __noinline__ void divide_remainders(int count) {
   const Memory memory = Memory::current();
-  const bool are_all_marked = memory.state->num_unmarked == 0;
   PICTURA_NO_UNROLL
-  for (int i = (are_all_marked ? made : 0) + static_cast<int>(threadIdx.x); i < count; i += Memory::kThreads) {
-    const int pixel = memory.pixel[i];
-    if (!are_all_marked) {
-      if (!memory.coverage(i).is_full()) continue;
-      auto first = first_of(memory, pixel);
-      while (!memory.coverage(static_cast<int>(first)).is_full()) first = memory.next[first];
-      if (static_cast<int>(first) != i) continue;
-    }
+  for (int i = static_cast<int>(threadIdx.x); i < count; i += Memory::kThreads) {
+    if (!memory.coverage(i).is_full()) continue;
+    auto first = first_of(memory, memory.pixel[i]);
+    while (!memory.coverage(static_cast<int>(first)).is_full()) first = memory.next[first];
+    if (static_cast<int>(first) != i) continue;
     divide_remainder([&](auto&& visit) {
       PICTURA_NO_UNROLL
-      for (auto at = first_of(memory, pixel); at != Memory::kNone; at = memory.next[at]) {
+      for (auto at = first_of(memory, memory.pixel[i]); at != Memory::kNone; at = memory.next[at]) {
         const auto fragment = static_cast<int>(at);
         uint64_t visible = memory.visible(fragment);
         visit(memory.coverage(fragment), &visible);
@@ -196,7 +192,7 @@ template <typename Memory>
 __device__ void reset_counts(const Memory& memory) {
   BlockState* state = memory.state;
   if (threadIdx.x != 0) return;
-  state->num_rows = state->num_candidates = state->num_fragments = state->num_added = state->num_unmarked = 0;
+  state->num_rows = state->num_candidates = state->num_fragments = state->num_added = state->num_full = 0;
   state->num_composited = state->next_fragments = 0;
 }
 // Clears the pixels and counters. Before a block's first part, and after a part that did not fit. All threads of the
@@ -229,8 +225,8 @@ __device__ bool draw_rows(const Memory& memory, const Part& part, const Visit& v
   if (count > memory.max_fragments) return false;
   resolve_occlusion(memory, part, count);
   sync_block();
-  if (state->num_added + state->num_unmarked != 0) {
-    divide_remainders<Memory>(made, count);
+  if (state->num_full != 0) {
+    divide_remainders<Memory>(count);
     sync_block();
   }
   compute_weights(memory, count, visit, write);

@@ -57,9 +57,12 @@ PICTURA_HD inline float min_area_of(Rgb color, PrimitiveRef primitive) {
 /// Whether a face that needs no clipping is large enough and not behind an occluder. Sets its winding.
 PICTURA_HD inline bool is_quad_visible(const ImageSetting& setting, const ScreenQuad& quad, const FacePlane& plane,
                                        Rgb color, PrimitiveRef primitive, bool* is_clockwise_out) {
-  const bool is_from_below = kind_of(primitive.object_id) == kStripKind && plane.offset > 0.0f;
+  ScreenBounds bounds = quad.bounds;
+  if (kind_of(primitive.object_id) == kStripKind && plane.offset > 0.0f) {  // seen from below
+    bounds.inverse_depth_high *= nearest_standing(plane_distance_m(plane));
+  }
   return find_winding(quad, 2.0f * min_area_of(color, primitive), is_clockwise_out) &&
-         (is_from_below || !setting.occluders.occludes(setting.camera, quad.bounds));
+         !setting.occluders.occludes(setting.camera, bounds);
 }
 
 /// Completes a face with the fields that make_screen_face and make_quad_face leave unset.

@@ -98,6 +98,12 @@ PICTURA_HD inline Vec3 inverse_depth_plane(const PinholeCamera& camera, const Fr
   return {x, y, inverse.z - x * camera.center_x_px - y * camera.center_y_px};
 }
 
+/// Distance of the camera from a plane, along its normal; 0 where it has no inverse depth.
+PICTURA_HD inline float plane_distance_m(const FacePlane& plane) {
+  return has_inverse_depth(plane) ? plane.offset * reciprocal_in_range(sqrt_in_range(dot(plane.normal, plane.normal)))
+                                  : 0.0f;
+}
+
 /// Sets the members of a face that follow from its bounds, which must meet the image, and its plane.
 PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f, const ScreenBounds& bounds,
                                   const FacePlane& plane, ScreenFace* face_out) {
@@ -108,9 +114,7 @@ PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f,
   face_out->inverse_depth_x = inverse_depth.x;
   face_out->inverse_depth_y = inverse_depth.y;
   face_out->inverse_depth_0 = inverse_depth.z;
-  face_out->plane_distance_m = has_inverse_depth(plane)
-                                   ? plane.offset * reciprocal_in_range(sqrt_in_range(dot(plane.normal, plane.normal)))
-                                   : 0.0f;
+  face_out->plane_distance_m = plane_distance_m(plane);
 }
 
 /// Projects a clipped face (camera coordinates) of at most kMaxCorners corners, which lies in `plane`. Calls store_edge

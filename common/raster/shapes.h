@@ -288,6 +288,9 @@ constexpr float kEqualDepth = 1e-4f;
 /// A solid stands on a strip if their outlines overlap on the ground plane and the centre of its base is at most this
 /// far from the strip's plane: upright boxes cut into slopes.
 constexpr float kStanding_m = 0.5f;
+/// Solids that stand on a strip reach at most this far through its plane, but for what culling may then hide of a strip
+/// that is seen from below.
+constexpr float kThroughStrip_m = 4.0f * kStanding_m;
 
 /// Where strips of one level overlap, the one with the lower rank is in front.
 PICTURA_HD constexpr int strip_rank(StripKind kind) {

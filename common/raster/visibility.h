@@ -134,10 +134,17 @@ PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip) {
   return fabsf(dot(normal, middle)) <= kStanding_m * fabsf(normal.z) && overlap_on_ground(solid, strip);
 }
 
-/// Whether a face is a strip that is seen from below. It may be in front of solids that are nearer, because they stand
-/// on it, so none hides it without being asked.
+/// Whether a face is a strip that is seen from below. It is in front of solids that stand on it, also of those that are
+/// nearer, because they reach through it.
 PICTURA_HD inline bool is_strip_from_below(const ScreenFace& face) {
   return is_strip(face) && face.plane_distance_m > 0.0f;
+}
+
+/// How many times the inverse depth of a strip's point that of a solid which stands on it can be, on one ray from an
+/// eye so far below the strip's plane: solids reach kThroughStrip_m through it. Infinite where the eye is within that.
+PICTURA_HD inline float nearest_standing(float plane_distance_m) {
+  return plane_distance_m > kThroughStrip_m ? plane_distance_m * reciprocal_in_range(plane_distance_m - kThroughStrip_m)
+                                            : float_from_bits(0x7F800000u);
 }
 
 /// 1 / depth of a face at a screen point, clamped to the depths of its corners; for strips that range is widened by
@@ -235,11 +242,14 @@ PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
   return float_from_bits(bits_from_float(lowest * kLower) & ~((1u << (32 - kOccluderBoundBits)) - 1));
 }
 
-/// True unless the face lies entirely behind the occluder bound of pixel (x, y). If false, it gets no fragment: the
-/// face of the largest bound would occlude it. A device may test against other full faces' bounds first, in any order:
-/// they are smaller, so what they reject the largest rejects too.
+/// True unless the face lies entirely behind the occluder bound of pixel (x, y), and, if it is a strip seen from below,
+/// behind all that may stand on it. If false, it gets no fragment: the face of the largest bound would occlude it. A
+/// device may test against other full faces' bounds first, in any order: they are smaller, so what they reject the
+/// largest rejects too.
 PICTURA_HD inline bool passes_occluder_bound(const ScreenFace& face, float bound, int x, int y) {
-  return !(center_inverse_depth(face, x, y) + inverse_depth_half_range(face) < bound) || is_strip_from_below(face);
+  const float nearest = center_inverse_depth(face, x, y) + inverse_depth_half_range(face);
+  return !(nearest < bound) ||
+         (is_strip_from_below(face) && !(nearest * nearest_standing(face.plane_distance_m) < bound));
 }
 
 /// Order of fragments, independent of their list: nearer first, then by object id.

@@ -32,8 +32,8 @@ ImageSetting setting_ahead() {
 
 WallFace wall_between(Vec3 a_m, Vec3 b_m, float height_m = 6) { return {a_m, b_m, height_m}; }
 
-/// Whether a wall, as an occluder, occludes the bounds of a strip's face.
-bool occludes(const WallFace& wall, Vec3 a_m, Vec3 b_m) {
+/// The same with a wall as its occluder, where it can be one.
+ImageSetting setting_with(const WallFace& wall) {
   ImageSetting setting = setting_ahead();
   CameraQuad face;
   ScreenQuad quad;
@@ -43,6 +43,12 @@ bool occludes(const WallFace& wall, Vec3 a_m, Vec3 b_m) {
     setting.occluders.occluder[0] = make_occluder(setting.camera, setting.frustum, face.plane, quad, is_clockwise);
     setting.occluders.count = 1;
   }
+  return setting;
+}
+
+/// Whether a wall, as an occluder, occludes the bounds of two points.
+bool occludes(const WallFace& wall, Vec3 a_m, Vec3 b_m) {
+  const ImageSetting setting = setting_with(wall);
   ScreenBounds bounds;
   for (const Vec3 corner_m : {a_m, b_m}) {
     const Vec3 corner = to_camera(setting.camera, corner_m);
@@ -64,6 +70,28 @@ TEST(Occluders, OccludeWhatIsBehindThemInDepthAndOnScreen) {
   EXPECT_FALSE(occludes(wall_between({20, -6, 0}, {-20, 6, 0}), {40, -4, 0}, {50, 4, 0}))
       << "behind the camera, partly";
   EXPECT_FALSE(occludes(wall_between({130, -60, 0}, {130, 60, 0}), {140, -4, 0}, {141, 4, 0})) << "black";
+}
+
+TEST(Occluders, OccludeAStripFromBelowOnlyWhereTheyCannotStandOnIt) {
+  // A wall at 20 m and level strips behind it, 3 m above the eye, so that what stands on one is at most three times
+  // nearer; and, below the eye, one that is hidden anywhere.
+  const ImageSetting setting = setting_with(wall_between({20, -6, 0}, {20, 6, 0}));
+  for (const auto& [distance_m, z_m, is_visible] :
+       {std::tuple{30.0f, 4.5f, true}, {58.0f, 4.5f, true}, {62.0f, 4.5f, false}, {30.0f, 0.0f, false}}) {
+    Strip strip;
+    strip.a_m = {distance_m, 0, z_m};
+    strip.b_m = {distance_m + 20, 0, z_m};
+    strip.side_a = strip.side_b = {0, 1};
+    strip.width_m = 3;
+    strip.kind = StripKind::crosswalk;
+    CameraQuad face;
+    ScreenQuad quad;
+    bool is_clockwise = false;
+    ASSERT_TRUE(quad_to_camera(strip_quad(strip), setting.camera, &face));
+    ASSERT_EQ(project_quad(setting.camera, face.corner, 0, &quad), ClipClass::inside);
+    EXPECT_EQ(is_quad_visible(setting, quad, face.plane, face.color, strip_ref(strip, 0), &is_clockwise), is_visible)
+        << distance_m;
+  }
 }
 
 TEST(Occluders, AreThoseThatCoverMost) {
