@@ -93,7 +93,7 @@ class Steps:
     """Each method makes a step and returns what to record of it, and whether all was as it must be."""
 
     def __init__(self, options, folder):
-        self.options, self.folder, self.sizes = options, folder, [1, options.ranks]
+        self.options, self.folder, self.ranks = options, folder, max(options.ranks)
 
     def start(self, size, name, *more):
         if self.options.init_from and "--resume" not in more:
@@ -105,7 +105,7 @@ class Steps:
         # One step of the optimizer, after which the first moments are a multiple of the clipped gradient.
         more = [*SMALL, "--set", "train.updates=1", "--set", "train.reproducible=true", "--set", "train.precision=fp32",
                 "--set", "train.update_epochs=1", "--set", "train.minibatch_size=65536"]  # fmt: skip
-        cases = {"one": (1, CHUNK), "many": (self.options.ranks, CHUNK), "half": (1, CHUNK // 2)}
+        cases = {"one": (1, CHUNK), "many": (self.ranks, CHUNK), "half": (1, CHUNK // 2)}
         parts = {}
         for name, (size, chunk) in cases.items():
             report = self.start(size, f"equal_{name}", *more, "--set", f"train.forward_chunk={chunk}").report()
@@ -126,17 +126,17 @@ class Steps:
 
     def updates(self):
         more = [*SMALL, "--set", "train.updates=50"]
-        reports = {size: self.start(size, f"updates{size}", *more).report() for size in self.sizes}
+        reports = {size: self.start(size, f"updates{size}", *more).report() for size in (1, self.ranks)}
         return {size: told(report, "episode_return") for size, report in reports.items()}, True
 
     def killed(self):
         run = [*SMALL, "--set", "train.checkpoint_every=2"]
-        ranks = self.start(self.options.ranks, "killed", *run, "--set", "train.updates=100000")
+        ranks = self.start(self.ranks, "killed", *run, "--set", "train.updates=100000")
         while len(ranks.progress()) < 5:
             if any(process.poll() is not None for process in ranks.processes):
                 ranks.report()
             time.sleep(0.1)
-        victim = self.options.ranks - 1
+        victim = self.ranks - 1
         killed_at = time.monotonic()
         ranks.processes[victim].send_signal(signal.SIGKILL)
         others = []
@@ -155,7 +155,7 @@ class Steps:
         result = {"killed_rank": victim, "others": others, "updates_done": len(ranks.progress())}
         # The checkpoint holds at least all but the last updates of checkpoint_every.
         resumed = []
-        for size in (1, self.options.ranks):
+        for size in (1, *self.options.ranks):
             done = 2 + max([int(report["updates"]) for _, report in resumed], default=result["updates_done"])
             report = self.start(size, "killed", *run, "--set", f"train.updates={done}", "--resume").report()
             resumed.append((size, report))
@@ -164,26 +164,30 @@ class Steps:
         return result, is_named
 
     def rate(self):
-        agents, ranks = self.options.agents, self.options.ranks
-        cases = {"one": (1, agents), "each": (ranks, ranks * agents), "in_all": (ranks, agents)}
+        agents = self.options.agents
+        cases = [("one", 1, agents)]
+        for ranks in self.options.ranks:
+            cases += [("each", ranks, ranks * agents), ("in_all", ranks, agents)]
         result = {}
         for size in self.options.sizes.split(","):
             width, height = size.split("x")
-            rows = {}
-            for name, (processes, slots) in cases.items():
+            rows = []
+            for name, processes, slots in cases:
                 settings = {
                     "render.width_px": width, "render.height_px": height, "simulator.num_slots": slots,
                     "train.num_steps": 32, "train.minibatch_size": round(slots * MINIBATCH_OF_AN_AGENT),
                     "train.updates": self.options.updates, "train.schedule": "constant", "train.checkpoint_every": 100000, "train.checkpoint_minutes": 1000,
                 }  # fmt: skip
                 more = [word for key, value in settings.items() for word in ("--set", f"{key}={value}")]
-                run = self.start(processes, f"rate_{name}_{size}", *more)
+                run = self.start(processes, f"rate_{name}_{processes}_{size}", *more)
                 run.report()
-                rows[name] = {"gpus": processes, "agents": slots, **self.rates(run.progress())}
-            for name in ("each", "in_all"):
-                rows[f"{name}_over_one"] = rows[name]["agent_steps_per_s"]["median"] / rows["one"]["agent_steps_per_s"]["median"]
+                row = {"case": name, "gpus": processes, "agents": slots, **self.rates(run.progress())}
+                one = (rows or [row])[0]
+                row["over_one"] = row["agent_steps_per_s"]["median"] / one["agent_steps_per_s"]["median"]
+                row["efficiency"] = row["over_one"] / processes
+                rows.append(row)
+                print(f"{size}: {json.dumps(row)}", flush=True)
             result[size] = rows
-            print(f"{size}: {json.dumps(rows)}", flush=True)
         return result, True
 
     @staticmethod
@@ -212,7 +216,7 @@ def main():
     parser.add_argument("--commit", default="")
     parser.add_argument("--config", default="configs/paper.toml")
     parser.add_argument("--init-from", default="")
-    parser.add_argument("--ranks", type=int, default=2)
+    parser.add_argument("--ranks", type=lambda text: [int(number) for number in text.split(",")], default=[2])
     parser.add_argument("--steps", default=",".join(STEPS))
     parser.add_argument("--sizes", default="32x18,96x54")
     parser.add_argument("--agents", type=int, default=20480)
