@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <optional>
 #include <set>
+#include <utility>
 
-#include "pictura/common/grid.h"
+#include "pictura/map/line_of_sight.h"
 
 namespace pictura {
 
@@ -77,16 +78,6 @@ std::optional<Path> path_through(const RoadMap& map, const Lane& first, float le
   return path;
 }
 
-/// The fraction of a-b at which c-d crosses it, if it does.
-std::optional<float> crossing_fraction(Vec2 a, Vec2 b, Vec2 c, Vec2 d) {
-  const Vec2 along = b - a, across = d - c;
-  const float area = cross(along, across);
-  if (area == 0) return std::nullopt;
-  const float fraction = cross(c - a, across) / area, other_fraction = cross(c - a, along) / area;
-  if (fraction < 0 || fraction > 1 || other_fraction < 0 || other_fraction > 1) return std::nullopt;
-  return fraction;
-}
-
 /// Whether two paths cross inside the junction, at the same level.
 bool paths_cross(const Path& path, const Path& other) {
   for (size_t i = path.first_inside; i + 1 < path.points.size(); ++i) {
@@ -114,54 +105,18 @@ std::optional<PathPose> pose_at(const Path& path, float s_m) {
   return PathPose{path.points[i] + piece * ((s_m - path.s_m[i]) / piece_m), piece.xy() * (1.0f / piece_m)};
 }
 
-/// The walls of a map in a grid, for line-of-sight queries.
-class LineOfSight {
- public:
-  explicit LineOfSight(Span<const WallFace> walls) : walls_(walls) {
-    constexpr float kCell_m = 10.0f;
-    std::vector<Aabb2> boxes;
-    for (const WallFace& wall : walls) boxes.push_back(box_of(wall.a_m.xy(), wall.b_m.xy()));
-    if (!boxes.empty()) grid_ = Grid(boxes, kCell_m);
-  }
+AgentBox car_at(const PathPose& pose) {
+  return {.center_m = pose.position_m,
+          .cos_heading = pose.forward.x,
+          .sin_heading = pose.forward.y,
+          .length_m = kCarLength_m,
+          .width_m = kCarWidth_m,
+          .height_m = kCarHeight_m};
+}
 
-  /// Whether walls block the view of the corners, side midpoints and centre of a car.
-  bool is_hidden(Vec3 eye, const PathPose& car) const {
-    for (int along = -1; along <= 1; ++along) {
-      for (int side = -1; side <= 1; ++side) {
-        const Vec2 xy = car.position_m.xy() + car.forward * (0.5f * kCarLength_m * static_cast<float>(along)) +
-                        left_normal(car.forward) * (0.5f * kCarWidth_m * static_cast<float>(side));
-        if (!is_blocked(eye, {xy.x, xy.y, car.position_m.z + 0.5f * kCarHeight_m})) return false;
-      }
-    }
-    return true;
-  }
-
- private:
-  static Aabb2 box_of(Vec2 a, Vec2 b) {
-    return {{std::min(a.x, b.x), std::min(a.y, b.y)}, {std::max(a.x, b.x), std::max(a.y, b.y)}};
-  }
-
-  bool is_blocked(Vec3 from, Vec3 to) const {
-    if (walls_.empty()) return false;
-    bool blocked = false;
-    visit_items(grid_.view(), box_of(from.xy(), to.xy()), [&](std::size_t i) {
-      if (blocked) return;
-      const WallFace& wall = walls_[i];
-      const auto fraction = crossing_fraction(from.xy(), to.xy(), wall.a_m.xy(), wall.b_m.xy());
-      if (!fraction) return;
-      const float above_m = from.z + (to.z - from.z) * *fraction - 0.5f * (wall.a_m.z + wall.b_m.z);
-      blocked = above_m >= 0 && above_m <= wall.height_m;
-    });
-    return blocked;
-  }
-
-  Span<const WallFace> walls_;
-  Grid grid_;
-};
-
-}  // namespace
-
-BlindApproaches count_blind_approaches(const RoadMap& map, Span<const WallFace> walls, float distance_m) {
+/// Calls f(own path, other path, whether the other's car is hidden) for ordered pairs of crossing paths.
+template <typename F>
+void visit_crossings(const RoadMap& map, Span<const WallFace> walls, float distance_m, const F& f) {
   std::vector<std::vector<Path>> of_junction(map.junctions.size());
   for (const Lane& lane : map.lanes) {
     if (!lane.in_junction || lane.junction < 0 || !is_driven(lane)) continue;
@@ -170,25 +125,43 @@ BlindApproaches count_blind_approaches(const RoadMap& map, Span<const WallFace> 
     }
   }
   const LineOfSight line_of_sight(walls);
-  BlindApproaches count;
-  std::set<int32_t> approaches, blind;
   for (const std::vector<Path>& paths : of_junction) {
     for (const Path& own : paths) {
       for (const Path& other : paths) {
         if (own.road == other.road || !paths_cross(own, other)) continue;
         const auto eye = pose_at(own, -distance_m), car = pose_at(other, -distance_m);
         if (!eye || !car) continue;
-        ++count.crossings;
-        approaches.insert(own.approach);
-        if (!line_of_sight.is_hidden(eye->position_m + Vec3{0, 0, kEyeHeight_m}, *car)) continue;
-        ++count.hidden;
-        blind.insert(own.approach);
+        f(own, other, line_of_sight.is_hidden(eye->position_m + Vec3{0, 0, kEyeHeight_m}, car_at(*car)));
       }
     }
   }
+}
+
+}  // namespace
+
+BlindApproaches count_blind_approaches(const RoadMap& map, Span<const WallFace> walls, float distance_m) {
+  BlindApproaches count;
+  std::set<int32_t> approaches, blind;
+  visit_crossings(map, walls, distance_m, [&](const Path& own, const Path&, bool is_hidden) {
+    ++count.crossings;
+    approaches.insert(own.approach);
+    if (!is_hidden) return;
+    ++count.hidden;
+    blind.insert(own.approach);
+  });
   count.approaches = static_cast<int32_t>(approaches.size());
   count.blind = static_cast<int32_t>(blind.size());
   return count;
+}
+
+std::vector<BlindCrossing> find_blind_crossings(const RoadMap& map, Span<const WallFace> walls, float distance_m) {
+  std::set<std::pair<int32_t, int32_t>> found;
+  visit_crossings(map, walls, distance_m, [&found](const Path& own, const Path& other, bool is_hidden) {
+    if (is_hidden) found.insert({own.approach, other.approach});
+  });
+  std::vector<BlindCrossing> crossings;
+  for (const auto& [approach, other] : found) crossings.push_back({approach, other});
+  return crossings;
 }
 
 }  // namespace pictura

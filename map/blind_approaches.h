@@ -2,6 +2,8 @@
 // need.
 #pragma once
 
+#include <vector>
+
 #include "pictura/common/scene_types.h"
 #include "pictura/map/road_map.h"
 
@@ -19,5 +21,13 @@ struct BlindApproaches {
 
 /// Paths whose lanes begin closer to the junction are left out. The map must be validated.
 BlindApproaches count_blind_approaches(const RoadMap& map, Span<const WallFace> walls, float distance_m = 20.0f);
+
+/// A lane into a junction, and one from whose traffic walls hide it: lanes of a hidden pair.
+struct BlindCrossing {
+  int32_t approach = -1, other_approach = -1;
+};
+/// Each once, in ascending order.
+std::vector<BlindCrossing> find_blind_crossings(const RoadMap& map, Span<const WallFace> walls,
+                                                float distance_m = 20.0f);
 
 }  // namespace pictura

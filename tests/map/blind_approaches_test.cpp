@@ -84,6 +84,22 @@ TEST(BlindApproaches, WallsHideOnlyOnTheirLevelAndInTheirDirection) {
   expect_count(count_blind_approaches(map, short_wall), 2, 1, 2, 1);
 }
 
+TEST(BlindApproaches, AreFoundWithTheLanesOfWhomTheyHide) {
+  const RoadMap map = Crossing().map;
+  constexpr int32_t kEastwards = 1, kNorthwards = 5;  // the lanes that end at the junction
+  EXPECT_TRUE(find_blind_crossings(map, {}).empty());
+  const std::vector<BlindCrossing> both = find_blind_crossings(map, corner(6));
+  ASSERT_EQ(both.size(), 2u);
+  EXPECT_EQ(both[0].approach, kEastwards);
+  EXPECT_EQ(both[0].other_approach, kNorthwards);
+  EXPECT_EQ(both[1].approach, kNorthwards);
+  EXPECT_EQ(both[1].other_approach, kEastwards);
+  const std::vector<WallFace> short_wall{{{-28, -1.2f, 0}, {-24, -7.5f, 0}, 4}};
+  const std::vector<BlindCrossing> one = find_blind_crossings(map, short_wall);
+  ASSERT_EQ(one.size(), 1u);
+  EXPECT_EQ(one[0].approach, kEastwards);
+}
+
 TEST(BlindApproaches, LanesThatBeginTooCloseAreSkipped) {
   const RoadMap map = Crossing().map;
   expect_count(count_blind_approaches(map, corner(6), 40), 2, 2, 2, 2);
