@@ -253,11 +253,15 @@ EvaluateReport evaluate(const EvaluateOptions& options) {
     PolicySession session(options.checkpoint, session_options(options));
     return evaluate(&session, options);
   }
+  EvaluationWorlds worlds;
+  return evaluate(options, &worlds);
+}
+
+EvaluateReport evaluate(const EvaluateOptions& options, EvaluationWorlds* shared) {
   check(options);
   const Driver driver = driver_of(options.controller, options);
-  EvaluationWorlds worlds;
-  worlds.maps = compile_maps_of(options, driver.world);
-  return evaluate(driver, options, &worlds);
+  if (shared->maps.empty()) shared->maps = compile_maps_of(options, driver.world);
+  return evaluate(driver, options, shared);
 }
 
 EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options) {

@@ -90,5 +90,7 @@ EvaluateReport evaluate(const EvaluateOptions& options);
 EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options);
 /// One of several in the same worlds, with an equal number of steps.
 EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options, EvaluationWorlds* worlds);
+/// The same of options.controller.
+EvaluateReport evaluate(const EvaluateOptions& options, EvaluationWorlds* worlds);
 
 }  // namespace pictura
