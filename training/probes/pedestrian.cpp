@@ -185,7 +185,6 @@ class PedestrianProbe {
         add(&trial.share_without_hider);
       }
     }
-    if (queries.empty()) return;
     const std::vector<float> shares = run_.visibility(scene, views, queries);
     for (size_t i = 0; i < shares.size(); ++i) *shares_out[i] = shares[i];
   }

@@ -82,25 +82,24 @@ void write_pedestrian_cases(const std::string& path, const PedestrianResults& re
     const PedestrianPath& one = results.paths[static_cast<size_t>(point.path)];
     const auto at = static_cast<int32_t>(i);
     const Vec3 position_m = point.pedestrian.center_m;
-    file.write(fmt::format("{},{},{},{},{},{},{},{:.3f},{},{:.3f},{},{},{:.3f},{:.3f},{:.3f},{:.3f},{},{}{}\n", i,
-                           point.path, one.scene, csv_quoted(results.setting.maps[static_cast<size_t>(one.map)]),
-                           csv_quoted(results.policies[static_cast<size_t>(one.driver)].name), one.step, one.ego,
-                           one.ego_speed_mps, one.hider, one.hider_distance_m, point.along_m,
-                           static_cast<float>(at - one.first_point - one.first_seen) * kPathSpacing_m, position_m.x,
-                           position_m.y, position_m.z, point.distance_m,
-                           kPathPhaseNames[static_cast<size_t>(one.phase_of(at))], point.visible_share,
-                           response_fields(results, i)));
+    file.write(fmt::format(
+        "{},{},{},{},{},{},{},{:.3f},{},{:.3f},{},{},{:.3f},{:.3f},{:.3f},{:.3f},{},{}{}\n", i, point.path, one.scene,
+        csv_quoted(results.setting.maps[static_cast<size_t>(one.map)]), csv_quoted(results.driver_name(one.driver)),
+        one.step, one.ego, one.ego_speed_mps, one.hider, one.hider_distance_m, point.along_m,
+        static_cast<float>(at - one.first_point - one.first_seen) * kPathSpacing_m, position_m.x, position_m.y,
+        position_m.z, point.distance_m, kPathPhaseNames[static_cast<size_t>(one.phase_of(at))], point.visible_share,
+        response_fields(results, i)));
   }
   file.commit();
 }
 
 std::string pedestrian_summary_json(const PedestrianResults& results, const std::vector<PedestrianRow>& rows,
                                     const std::string& cases_file) {
-  std::vector<int64_t> driven(results.policies.size());
+  std::vector<int32_t> drivers;
   for (const PedestrianPoint& point : results.points)
-    ++driven[static_cast<size_t>(results.paths[static_cast<size_t>(point.path)].driver)];
+    drivers.push_back(results.paths[static_cast<size_t>(point.path)].driver);
   Json json = {{"kind", "pedestrian"},
-               {"policy", policies_json(results, driven)},
+               {"policy", policies_json(results, drivers)},
                {"control", kPedestrianControlNames[static_cast<size_t>(results.control)]},
                {"paths", results.paths.size()},
                {"paths_asked", results.paths_asked},

@@ -9,8 +9,8 @@ namespace pictura {
 /// Adds how many cases and scenes there are, and the estimates.
 void add_means(const ResponseMeans& means, Json* json_out);
 
-/// The policies, each with how many of the cases are of scenes that it drove: `cases_driven` [policies].
-Json policies_json(const ProbeResults& results, const std::vector<int64_t>& cases_driven);
+/// The policies, each with how many of the cases are of scenes that it drove. drivers: [cases].
+Json policies_json(const ProbeResults& results, const std::vector<int32_t>& drivers);
 
 /// Adds the worlds, who drove them and how, and how long it took.
 void add_setting(const ProbeResults& results, Json* json_out);

@@ -10,31 +10,34 @@
 
 namespace pictura {
 
-void ResponseSums::add(int32_t scene, const PairedResponse& response) {
-  OfScene& sums = scenes_[scene];
-  ++sums.cases;
-  sums.value_change += response.value_change();
-  sums.brake_change += response.brake_change();
-  sums.abs_value_change += std::abs(response.value_change());
-  sums.abs_brake_change += std::abs(response.brake_change());
-  sums.changed += !response.is_unchanged();
+int64_t SceneMeans::count() const {
+  int64_t count = 0;
+  for (const auto& [scene, sum] : sums_) count += sum.count;
+  return count;
 }
 
-Estimate ResponseSums::mean_of(double OfScene::* sum) const {
+Estimate SceneMeans::mean() const {
   std::vector<RatioTerm> means;
-  for (const auto& [scene, sums] : scenes_) means.push_back({sums.*sum / static_cast<double>(sums.cases), 1});
+  for (const auto& [scene, sum] : sums_) means.push_back({sum.value / static_cast<double>(sum.count), 1});
   return estimate_ratio(means);
 }
 
+void ResponseSums::add(int32_t scene, const PairedResponse& response) {
+  value_change_.add(scene, response.value_change());
+  brake_change_.add(scene, response.brake_change());
+  abs_value_change_.add(scene, std::abs(response.value_change()));
+  abs_brake_change_.add(scene, std::abs(response.brake_change()));
+  changed_.add(scene, response.is_unchanged() ? 0 : 1);
+}
+
 ResponseMeans ResponseSums::means() const {
-  ResponseMeans means{.scenes = static_cast<int>(scenes_.size())};
-  for (const auto& [scene, sums] : scenes_) means.cases += sums.cases;
-  means.abs_value_change = mean_of(&OfScene::abs_value_change);
-  means.abs_brake_change = mean_of(&OfScene::abs_brake_change);
-  means.value_change = mean_of(&OfScene::value_change);
-  means.brake_change = mean_of(&OfScene::brake_change);
-  means.changed_share = mean_of(&OfScene::changed);
-  return means;
+  return {.cases = changed_.count(),
+          .scenes = changed_.scenes(),
+          .abs_value_change = abs_value_change_.mean(),
+          .abs_brake_change = abs_brake_change_.mean(),
+          .value_change = value_change_.mean(),
+          .brake_change = brake_change_.mean(),
+          .changed_share = changed_.mean()};
 }
 
 std::string response_header(const ProbeResults& results) {
@@ -68,7 +71,8 @@ void add_means(const ResponseMeans& means, Json* json_out) {
   add_estimate("changed_share", means.changed_share, &json);
 }
 
-Json policies_json(const ProbeResults& results, const std::vector<int64_t>& cases_driven) {
+Json policies_json(const ProbeResults& results, const std::vector<int32_t>& drivers) {
+  const int share = results.scenes / static_cast<int>(results.policies.size());
   Json policies = Json::array();
   for (size_t p = 0; p < results.policies.size(); ++p) {
     const ProbedPolicy& policy = results.policies[p];
@@ -76,8 +80,8 @@ Json policies_json(const ProbeResults& results, const std::vector<int64_t>& case
                         {"file", policy.path},
                         {"policy_hash", policy.hash},
                         {"reads_images", policy.reads_images},
-                        {"scenes_driven", results.scenes / static_cast<int>(results.policies.size())},
-                        {"cases_driven", cases_driven[p]}});
+                        {"scenes_driven", results.controller.empty() ? share : 0},
+                        {"cases_driven", std::count(drivers.begin(), drivers.end(), static_cast<int32_t>(p))}});
   }
   return policies;
 }
@@ -92,6 +96,7 @@ void add_setting(const ProbeResults& results, Json* json_out) {
   json["scenes"] = results.scenes;
   json["steps"] = setting.steps;
   json["sample_steps"] = results.sample_steps;
+  json["driver"] = results.controller.empty() ? "policies" : results.controller;
   json["argmax"] = setting.argmax;
   json["seed"] = setting.seed;
   json["device"] = setting.device;

@@ -34,10 +34,16 @@ struct ProbeResults {
   int first_scene = 0, scenes = 0;  // which were driven: an equal share by each policy, in their order
   int sample_steps = 0;
   std::vector<ProbedPolicy> policies;
+  std::string controller;                 // that drove all scenes; empty: the policies did
   std::vector<PairedResponse> responses;  // [cases, policies]
   bool interrupted = false;
   double seconds = 0;
 
+  /// By its index: a controller comes after all policies.
+  const std::string& driver_name(int32_t driver) const {
+    const auto index = static_cast<size_t>(driver);
+    return index < policies.size() ? policies[index].name : controller;
+  }
   const PairedResponse& response(size_t one, size_t policy) const { return responses[one * policies.size() + policy]; }
 };
 
@@ -51,20 +57,34 @@ struct ResponseMeans {
   Estimate changed_share;               // of the cases: in which value or probability are not the same bits
 };
 
-/// Collects them.
+/// The mean over scenes of the means of what was added for them.
+class SceneMeans {
+ public:
+  void add(int32_t scene, double value) {
+    Sum& sum = sums_[scene];
+    sum.value += value;
+    ++sum.count;
+  }
+  int64_t count() const;
+  int scenes() const { return static_cast<int>(sums_.size()); }
+  Estimate mean() const;
+
+ private:
+  struct Sum {
+    double value = 0;
+    int64_t count = 0;
+  };
+  std::map<int32_t, Sum> sums_;
+};
+
+/// Collects responses.
 class ResponseSums {
  public:
   void add(int32_t scene, const PairedResponse& response);
   ResponseMeans means() const;
 
  private:
-  struct OfScene {
-    int64_t cases = 0;
-    double abs_value_change = 0, abs_brake_change = 0, value_change = 0, brake_change = 0, changed = 0;
-  };
-  Estimate mean_of(double OfScene::* sum) const;
-
-  std::map<int32_t, OfScene> scenes_;
+  SceneMeans abs_value_change_, abs_brake_change_, value_change_, brake_change_, changed_;
 };
 
 /// The order of some items by their keys.

@@ -11,6 +11,7 @@
 #include "pictura/common/error.h"
 #include "pictura/simulator/rules/dynamics.h"
 #include "pictura/training/observation.h"
+#include "pictura/training/probes/observation_rows.h"
 
 namespace pictura {
 
@@ -106,6 +107,7 @@ ProbeFrame::ProbeFrame(Simulator& simulator, int steps_done, int drives)
   const auto slots = static_cast<size_t>(simulator.num_slots());
   status = host_copy(Span<const uint8_t>(state.status, slots), device);
   agent_class = host_copy(Span<const uint8_t>(state.agent_class, slots), device);
+  lane = host_copy(Span<const int32_t>(state.lane, slots), device);
   speed_mps = host_copy(Span<const float>(state.speed_mps, slots), device);
   const SceneBatch& scene = simulator.scene();
   boxes = host_copy_of_structs(scene.agents, device);
@@ -148,41 +150,16 @@ int64_t CaseQuota::due(int32_t scene, int step) const {
   return (left + times_left - 1) / times_left;
 }
 
-// Memory for what so many agents observe, of the parts that a simulator observes.
-class ProbeRun::ObservationRows {
- public:
-  ObservationRows(int64_t count, const SimulatorConfig& config) {
-    for (const ObservationArray& array : kObservationArrays) {
-      const auto type = array.type == ElementType::f32 ? at::kFloat : at::kInt;
-      arrays_.push_back(config.observes(array.part)
-                            ? at::zeros({count, array.rows * array.features},
-                                        at::TensorOptions(type).device(torch_device(config.device)))
-                            : at::Tensor());
-    }
-  }
-  ObservationView rows(int64_t begin, int64_t count) const {
-    ObservationView view;
-    const at::Tensor* array = arrays_.data();
-#define X(name, type, rows, features, part, comment)                               \
-  if (array->defined()) view.name = span_of<type>(array->narrow(0, begin, count)); \
-  ++array;
-    PICTURA_OBSERVATION_ARRAYS(X)
-#undef X
-    return view;
-  }
-
- private:
-  std::vector<at::Tensor> arrays_;
-};
-
 // The worlds as policies of one kind observe them: with or without auxiliary slots. All kinds are stepped by the same
 // commands, so that their states are the same bits.
 struct ProbeRun::ObservedWorlds {
+  const SimulatorConfig config;
   std::unique_ptr<Simulator> simulator;
   ObservationRows rows, rows_without;
 
-  ObservedWorlds(const std::string& backend, const SimulatorConfig& config, const CompiledMaps& maps, int64_t batch)
-      : simulator(make_simulator(backend, config, maps, {{0, 1, kFirstEvaluationWorld}})),
+  ObservedWorlds(const std::string& backend, const SimulatorConfig& its_config, const CompiledMaps& maps, int64_t batch)
+      : config(its_config),
+        simulator(make_simulator(backend, config, maps, {{0, 1, kFirstEvaluationWorld}})),
         rows(batch, config),
         rows_without(batch, config) {}
 };
@@ -201,7 +178,8 @@ struct ProbeRun::Pending {
   std::vector<size_t> asked;  // whose visibility the queries are
 };
 
-ProbeRun::ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptions& options, ProbeResults* results_out)
+ProbeRun::ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptions& options, ProbeResults* results_out,
+                   bool needs_walls)
     : options_(options),
       device_(sessions[0]->device()),
       pass_(probe_pass(device_)),
@@ -213,6 +191,7 @@ ProbeRun::ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptio
   const EvaluateOptions& worlds = options.worlds;
   SimulatorConfig config = sessions[0]->evaluation_world(worlds.steps);
   config.seed = worlds.seed;
+  config.walls |= needs_walls;
   for (const PolicySession* session : sessions) {
     PICTURA_CHECK(session->device() == device_, "probe: expected policies on one device, got {} and {}",
                   pictura::name_of(device_), pictura::name_of(session->device()));
@@ -244,6 +223,7 @@ ProbeRun::ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptio
   results_.first_scene = worlds.first_scenario;
   results_.scenes = worlds.scenarios;
   results_.sample_steps = options.sample_steps;
+  results_.controller = worlds.controller;
   const std::vector<std::string> names = names_of(options.policies);
   for (size_t i = 0; i < sessions.size(); ++i) {
     results_.policies.push_back(
@@ -253,10 +233,19 @@ ProbeRun::ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptio
 
 ProbeRun::~ProbeRun() = default;
 
-std::vector<float> ProbeRun::run(const std::function<void(const ProbeFrame&)>& sample) {
+PolicySession& ProbeRun::session(size_t policy) const { return *participants_[policy].session; }
+Renderer* ProbeRun::renderer(size_t policy) const { return participants_[policy].renderer.get(); }
+const SimulatorConfig& ProbeRun::world_of(size_t policy) const { return participants_[policy].worlds->config; }
+
+std::vector<float> ProbeRun::run(const std::function<void(const ProbeFrame&)>& sample, const Watch& watch) {
   sample_ = sample;
-  const auto share = static_cast<int>(participants_.size());
-  for (driver_ = 0; driver_ < share && !results_.interrupted; ++driver_) drive();
+  watch_ = watch;
+  const auto num_policies = static_cast<int>(participants_.size());
+  if (options_.worlds.controller.empty()) {
+    for (driver_ = 0; driver_ < num_policies && !results_.interrupted; ++driver_) drive();
+  } else {
+    drive_by_controller();
+  }
   respond();
   results_.seconds = since_start_.seconds();
   if (options_.worlds.on_progress && !results_.interrupted) options_.worlds.on_progress(1, 0);
@@ -270,35 +259,43 @@ void ProbeRun::begin(Simulator& simulator) {
 }
 
 void ProbeRun::before_step(Span<const Command> commands) {
-  if (step_ > 0 && step_ % options_.sample_steps == 0) sample_(ProbeFrame(*driven_, step_, driver_));
+  const int driver = options_.worlds.controller.empty() ? driver_ : static_cast<int>(participants_.size());
+  if (watch_) watch_(*driven_, driver, commands);
+  if (step_ > 0 && step_ % options_.sample_steps == 0) sample_(ProbeFrame(*driven_, step_, driver));
   for_each_other([&](Simulator& other) { other.step(commands, current_stream(device_)); });
   ++step_;
 }
 
 template <typename F>
 void ProbeRun::for_each_other(const F& f) {
+  if (watch_) return;
   for (const auto& [auxiliary, observed] : observed_) {
     if (observed->simulator && observed->simulator.get() != driven_) f(*observed->simulator);
   }
 }
 
-// The driver's share of the scenes.
-void ProbeRun::drive() {
-  const Participant& driver = participants_[static_cast<size_t>(driver_)];
-  const auto share = static_cast<int>(participants_.size());
+// The worlds that the driver drives, of so many who drive equal shares.
+EvaluateOptions ProbeRun::share_of_driver(int shares) {
   EvaluateOptions worlds = options_.worlds;
   worlds.densities.resize(1);
-  worlds.scenarios /= share;
+  worlds.scenarios /= shares;
   worlds.first_scenario += driver_ * worlds.scenarios;
   worlds.observer = this;
   if (options_.worlds.on_progress) {
-    worlds.on_progress = [this, share](double done, double) {
-      const double fraction = (driver_ + done) / share, elapsed_s = since_start_.seconds();
+    worlds.on_progress = [this, shares](double done, double) {
+      const double fraction = (driver_ + done) / shares, elapsed_s = since_start_.seconds();
       options_.worlds.on_progress(fraction, fraction > 0 ? elapsed_s * (1 - fraction) / fraction : 0);
     };
   }
+  return worlds;
+}
+
+// The driver's share of the scenes.
+void ProbeRun::drive() {
+  const Participant& driver = participants_[static_cast<size_t>(driver_)];
   EvaluationWorlds shared{maps_, driver.renderer.get(), std::move(driver.worlds->simulator)};
-  const EvaluateReport report = evaluate(driver.session, worlds, &shared);
+  const EvaluateReport report =
+      evaluate(driver.session, share_of_driver(static_cast<int>(participants_.size())), &shared);
   driver.worlds->simulator = std::move(shared.simulator);
   driven_ = nullptr;
   const uint64_t state = driver.worlds->simulator->state_hash(current_stream(device_));
@@ -308,6 +305,23 @@ void ProbeRun::drive() {
   });
   results_.interrupted = report.interrupted;
   if (driver_ == 0) results_.setting = report.results.setting;
+}
+
+// All scenes by a controller. What is said of the setting is of the policies.
+void ProbeRun::drive_by_controller() {
+  EvaluateOptions worlds = share_of_driver(1);
+  worlds.device = device_.is_host() ? "cpu" : "cuda";
+  EvaluationWorlds shared{maps_, nullptr, std::move(participants_[0].worlds->simulator)};
+  const EvaluateReport report = evaluate(worlds, &shared);
+  participants_[0].worlds->simulator = std::move(shared.simulator);
+  driven_ = nullptr;
+  results_.interrupted = report.interrupted;
+  const EvaluationSetting& driven = report.results.setting;
+  results_.setting = participants_[0].session->evaluation_setting();
+  results_.setting.maps = driven.maps;
+  results_.setting.steps = driven.steps;
+  results_.setting.argmax = driven.argmax;
+  results_.setting.seed = driven.seed;
 }
 
 void ProbeRun::ask(const ProbeFrame& frame, Span<const ProbePair> pairs) {
@@ -375,13 +389,17 @@ void ProbeRun::add(const ProbeFrame& frame, Span<const ProbePair> pairs) {
 
 std::vector<float> ProbeRun::visibility(const KeptScene& scene, const std::vector<View>& views,
                                         const std::vector<VisibilityQuery>& queries) {
-  const SceneOnDevice on_device(scene, device_);
+  return visibility(SceneOnDevice(scene, device_).scene(), views, queries);
+}
+
+std::vector<float> ProbeRun::visibility(const SceneBatch& scene, const std::vector<View>& views,
+                                        const std::vector<VisibilityQuery>& queries) {
+  if (queries.empty()) return {};
   const DeviceCopy<View> its_views(views, device_);
   const DeviceCopy<VisibilityQuery> its_queries(queries, device_);
   const at::Tensor visible =
       at::empty({static_cast<int64_t>(queries.size())}, at::TensorOptions(at::kFloat).device(torch_device(device_)));
-  measuring_->visibility(on_device.scene(), its_views.span(), its_queries.span(), span_of<float>(visible),
-                         current_stream(device_));
+  measuring_->visibility(scene, its_views.span(), its_queries.span(), span_of<float>(visible), current_stream(device_));
   return host_copy(span_of<const float>(visible), device_);
 }
 
@@ -391,10 +409,8 @@ void ProbeRun::respond() {
   if (count == 0) return;
   const size_t first_share = visible_shares_.size();
   visible_shares_.resize(first_share + count, std::numeric_limits<float>::quiet_NaN());
-  if (!pending_->queries.empty()) {
-    const std::vector<float> shares = visibility(pending_->scene, pending_->views, pending_->queries);
-    for (size_t i = 0; i < shares.size(); ++i) visible_shares_[first_share + pending_->asked[i]] = shares[i];
-  }
+  const std::vector<float> shares = visibility(pending_->scene, pending_->views, pending_->queries);
+  for (size_t i = 0; i < shares.size(); ++i) visible_shares_[first_share + pending_->asked[i]] = shares[i];
 
   const SceneOnDevice on_device(pending_->scene, device_);
   const DeviceCopy<View> views(pending_->views, device_), views_without(pending_->views_without, device_);

@@ -23,8 +23,9 @@ namespace pictura {
 struct ProbeFrame {
   std::vector<WorldSpec> worlds;
   int step = 0;    // done in them
-  int driver = 0;  // index of the policy that drives
+  int driver = 0;  // index of the policy that drives; a controller comes after all of them
   std::vector<uint8_t> status, agent_class;
+  std::vector<int32_t> lane;
   std::vector<float> speed_mps;
   std::vector<AgentBox> boxes;
   std::vector<LightState> lights;
@@ -95,12 +96,18 @@ class CaseQuota {
 class ProbeRun final : public EvaluationObserver {
  public:
   /// Opens nothing: the sessions are of one device, `options` names them. Fills in what results say of the setting.
-  ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptions& options, ProbeResults* results_out);
+  /// With `needs_walls` worlds have walls also where that of the first policy has none.
+  ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptions& options, ProbeResults* results_out,
+           bool needs_walls = false);
   ~ProbeRun() override;
 
-  /// Drives all scenes, each policy its share, and hands out their states of every sample_steps steps, from the first
-  /// such on. Then asks what is left, and returns the visibility of whom all pairs asked for, in the order of ask().
-  std::vector<float> run(const std::function<void(const ProbeFrame&)>& sample);
+  /// Sees every step: worlds before it, who drives, and what agents are told.
+  using Watch = std::function<void(Simulator& simulator, int driver, Span<const Command> commands)>;
+
+  /// Drives all scenes, each policy its share, or options.worlds.controller all, and hands out their states of every
+  /// sample_steps steps, from the first such on. Then asks what is left, and returns the visibility of whom all pairs
+  /// asked for, in the order of ask(). With `watch` states are looked at alone: nothing is to be asked of them.
+  std::vector<float> run(const std::function<void(const ProbeFrame&)>& sample, const Watch& watch = {});
 
   /// Of the present frame. Responses are appended to the results in this order.
   void ask(const ProbeFrame& frame, Span<const ProbePair> pairs);
@@ -108,23 +115,33 @@ class ProbeRun final : public EvaluationObserver {
   /// In the cameras of the first policy that reads images, or in the paper's.
   std::vector<float> visibility(const KeptScene& scene, const std::vector<View>& views,
                                 const std::vector<VisibilityQuery>& queries);
+  /// The same of a scene in the memory of device().
+  std::vector<float> visibility(const SceneBatch& scene, const std::vector<View>& views,
+                                const std::vector<VisibilityQuery>& queries);
   /// What that policy's images are drawn with.
   const RendererConfig& cameras() const { return cameras_; }
   const CompiledMaps& maps() const { return maps_; }
+  Renderer& measuring() { return *measuring_; }
+  Device device() const { return device_; }
+  /// Of a policy: its session, the renderer of its images, if it reads any, and worlds as it observes them.
+  PolicySession& session(size_t policy) const;
+  Renderer* renderer(size_t policy) const;
+  const SimulatorConfig& world_of(size_t policy) const;
 
   void begin(Simulator& simulator) override;
   void before_step(Span<const Command> commands) override;
   void after_step(const StepResult& /*result*/) override {}
 
  private:
-  class ObservationRows;
   struct ObservedWorlds;
   struct Participant;
   struct Pending;
 
   template <typename F>
   void for_each_other(const F& f);
+  EvaluateOptions share_of_driver(int shares);
   void drive();
+  void drive_by_controller();
   void add(const ProbeFrame& frame, Span<const ProbePair> pairs);
   void respond();
 
@@ -139,6 +156,7 @@ class ProbeRun final : public EvaluationObserver {
   RendererConfig cameras_;
   std::unique_ptr<Renderer> measuring_;
   std::function<void(const ProbeFrame&)> sample_;
+  Watch watch_;
   Simulator* driven_ = nullptr;
   int driver_ = 0, step_ = 0;
   std::unique_ptr<Pending> pending_;

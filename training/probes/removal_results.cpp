@@ -113,7 +113,7 @@ void write_removal_cases(const std::string& path, const RemovalResults& results)
     const RemovalCase& one = results.cases[i];
     fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{},{},{},{:d},{:.3f},{:.3f},{:d},", i, one.scene,
                    csv_quoted(results.setting.maps[static_cast<size_t>(one.map)]),
-                   csv_quoted(results.policies[static_cast<size_t>(one.driver)].name), one.step, one.ego, one.user,
+                   csv_quoted(results.driver_name(one.driver)), one.step, one.ego, one.user,
                    one.hidden < 0 ? "" : std::to_string(one.hidden), to_string(one.user_class), one.user_halted,
                    one.distance_m, one.ego_speed_mps, one.is_in_frame());
     if (one.is_in_frame()) fmt::format_to(std::back_inserter(text), "{}", one.occlusion());
@@ -129,10 +129,10 @@ void write_removal_cases(const std::string& path, const RemovalResults& results)
 
 std::string removal_summary_json(const RemovalResults& results, const std::vector<RemovalRow>& rows,
                                  const std::string& cases_file) {
-  std::vector<int64_t> driven(results.policies.size());
-  for (const RemovalCase& one : results.cases) ++driven[static_cast<size_t>(one.driver)];
+  std::vector<int32_t> drivers;
+  for (const RemovalCase& one : results.cases) drivers.push_back(one.driver);
   Json json = {{"kind", "removal"},
-               {"policy", policies_json(results, driven)},
+               {"policy", policies_json(results, drivers)},
                {"control", kRemovalControlNames[static_cast<size_t>(results.control)]},
                {"cases", results.cases.size()},
                {"cases_asked", results.removals_asked},
