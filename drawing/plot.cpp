@@ -12,11 +12,15 @@
 
 namespace pictura {
 
+Rgb series_color(size_t series) {
+  constexpr std::array<Rgb, 7> kColors{hex(0x1F6FEB), hex(0xE8590C), hex(0x2B8A3E), hex(0x9C36B5),
+                                       hex(0xC92A2A), hex(0x0B7285), hex(0x846358)};
+  return kColors[series % kColors.size()];
+}
+
 namespace {
 
 constexpr Rgb kAxisColor = hex(0x3A3F46), kGridColor = hex(0xE3E5E8), kLabelColor = hex(0x5A6068);
-constexpr std::array<Rgb, 7> kSeriesColors{hex(0x1F6FEB), hex(0xE8590C), hex(0x2B8A3E), hex(0x9C36B5),
-                                           hex(0xC92A2A), hex(0x0B7285), hex(0x846358)};
 constexpr double kBandAlpha = 0.18;
 constexpr double kLeft_px = 74, kRight_px = 18, kTop_px = 40, kBottom_px = 50;
 
@@ -152,7 +156,7 @@ void draw_legend(Canvas& canvas, const PlotPanel& panel, const std::vector<Point
   cairo_stroke(canvas.context());
   for (size_t i = 0; i < panel.series.size(); ++i) {
     const double middle = y + 4 + kRow_px * (static_cast<double>(i) + 0.5);
-    canvas.fill_rectangle(x + 8, middle - 1.25, 20, 2.5, kSeriesColors[i % kSeriesColors.size()]);
+    canvas.fill_rectangle(x + 8, middle - 1.25, 20, 2.5, series_color(i));
     canvas.text(x + 36, middle + 4, panel.series[i].name, style);
   }
 }
@@ -177,7 +181,7 @@ std::vector<Point> lay_out_names(const Canvas& canvas, const std::vector<PlotSer
 void draw_names(Canvas& canvas, const std::vector<PlotSeries>& all, const std::vector<Point>& places,
                 const TextStyle& style, double top) {
   for (size_t s = 0; s < all.size(); ++s) {
-    const Rgb color = kSeriesColors[s % kSeriesColors.size()];
+    const Rgb color = series_color(s);
     const double x = places[s].x, middle = top + places[s].y + 0.5 * kNameRow_px;
     if (!all[s].low.empty()) canvas.fill_rectangle(x, middle - 6, kNameLine_px, 12, color, kBandAlpha);
     canvas.fill_rectangle(x, middle - 1.25, kNameLine_px, 2.5, color);
@@ -280,12 +284,12 @@ void draw_panel(Canvas& canvas, const PlotPanel& panel, double x0, double y0, do
   cairo_set_line_join(context, CAIRO_LINE_JOIN_ROUND);
   cairo_set_line_cap(context, CAIRO_LINE_CAP_ROUND);
   for (size_t s = 0; s < panel.series.size(); ++s) {
-    fill_band(canvas, panel.series[s], x_axis, y_axis, kSeriesColors[s % kSeriesColors.size()]);
+    fill_band(canvas, panel.series[s], x_axis, y_axis, series_color(s));
   }
   std::vector<Point> along;
   for (size_t s = 0; s < panel.series.size(); ++s) {
     const PlotSeries& series = panel.series[s];
-    canvas.set_color(kSeriesColors[s % kSeriesColors.size()]);
+    canvas.set_color(series_color(s));
     for (size_t i = 0; i < series.x.size(); ++i) {
       if (!drawable(series, i)) {
         cairo_stroke(context);

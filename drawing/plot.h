@@ -37,6 +37,9 @@ struct PlotPanel {
   std::vector<PlotCell> strip{};  // in ascending order, or empty
 };
 
+/// The colour of a panel's series of this index.
+Rgb series_color(size_t series);
+
 struct PlotOptions {
   int panel_width_px = 560, panel_height_px = 360;
   int columns = 2;
