@@ -5,12 +5,14 @@
 #include <fmt/ranges.h>
 
 #include "pictura/apps/commands.h"
+#include "pictura/apps/corner_figure.h"
 #include "pictura/apps/pedestrian_figure.h"
 #include "pictura/apps/removal_figure.h"
 #include "pictura/cli/evaluation_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/support/file.h"
+#include "pictura/training/probes/corner.h"
 #include "pictura/training/probes/pedestrian.h"
 #include "pictura/training/probes/removal.h"
 
@@ -26,6 +28,10 @@ constexpr std::array<const char*, 3> kPedestrianExamples{
     "pictura probe pedestrian agent.safetensors vector.safetensors --out pedestrian",
     "pictura probe pedestrian runs/a/checkpoint.ckpt --map Town01 --scenes 2 --paths 4 --steps 300",
     "pictura probe pedestrian agent.safetensors --map procedural:1 --agents 40 --paths 8 --control nobody"};
+constexpr std::array<const char*, 3> kCornerExamples{
+    "pictura probe corner agent.safetensors vector.safetensors --out corner",
+    "pictura probe corner runs/a/checkpoint.ckpt --map Town05 --scenes 2 --pairs 20 --driver lane",
+    "pictura probe corner agent.safetensors --map procedural:1,procedural:2 --density light --pairs 10 --min-speed 1"};
 
 std::string footer(const std::array<const char*, 3>& examples) {
   return fmt::format(
@@ -138,6 +144,24 @@ void print_table(const PedestrianResults& results, const std::vector<PedestrianR
              results.points.size(), format_duration(results.seconds));
 }
 
+void print_table(const CornerResults& results, const std::vector<CornerRow>& rows) {
+  const size_t width = name_width(results);
+  fmt::print("{:{}} {:>8} {:>6} {:>9} {:>11} {:>20} {:>20} {:>20}\n", "policy", width, "case", "walls", "revealed",
+             "after (s)", "distance (m)", "speed (m/s)", "deceleration");
+  for (const CornerRow& row : rows) {
+    if (row.less_policy || row.less_case || row.revealed == 0) continue;
+    fmt::print("{:{}} {:>8} {:>6} {:>9} {:>5.1f}-{:>5.1f} {:>20} {:>20} {:>20}\n", results.policies[row.policy].name,
+               width, kCornerCaseNames[static_cast<size_t>(row.its_case)], kWallNames[row.walls ? 0 : 1], row.revealed,
+               row.reveal_s.front(), row.reveal_s.back(), text_of(row.at_reveal.distance_m),
+               text_of(row.at_reveal.speed_mps), text_of(row.at_reveal.deceleration_mps2));
+  }
+  fmt::print(
+      "at the reveal, where line of sight past the walls opens; deceleration over the next 2 s, m/s2\n{}\n"
+      "{} of {} pairs, of {} states with somebody hidden and {} empty ones, in {}\n",
+      kEstimateNote, results.pairs.size(), results.pairs_asked, results.hidden_found, results.empty_found,
+      format_duration(results.seconds));
+}
+
 // Writes summary.json and prints it, or a table.
 template <typename Results, typename Row>
 void report(const ProbeArguments& arguments, const std::string& summary, const Results& results,
@@ -241,14 +265,63 @@ void add_pedestrian_command(CLI::App& probe) {
   });
 }
 
+void add_corner_command(CLI::App& probe) {
+  struct Arguments : ProbeArguments {
+    CornerOptions corner;
+  };
+  auto arguments = std::make_shared<Arguments>();
+  CornerOptions& options = arguments->corner;
+  CLI::App* command = probe.add_subcommand(
+      "corner", "How policies drive on towards blind corners with a hidden vehicle, and towards empty ones like them");
+  add_world_options(command, arguments.get(), &options);
+  command->add_option("--pairs", options.pairs, "Pairs in all: a corner with a hidden vehicle, and an empty one")
+      ->transform(whole_number(1))
+      ->capture_default_str();
+  command
+      ->add_option("--max-distance", options.search.max_distance_m,
+                   "How far before the corner a policy may take over, m; at least 8 m")
+      ->transform(number(8.1, 1000))
+      ->capture_default_str();
+  command
+      ->add_option("--min-speed", options.search.min_speed_mps,
+                   "Of the ego at the takeover and of who is hidden, forwards, m/s")
+      ->transform(number(-100, 100))
+      ->capture_default_str();
+  command
+      ->add_option("--range", options.search.user_range_m, "How far before the junction the hidden vehicle may be, m")
+      ->transform(number(1, 1000))
+      ->capture_default_str();
+  command
+      ->add_option("--driver", arguments->evaluation.evaluate.controller,
+                   "Who drives the scenes in which policies take over, instead of the policies: lane, the lane keeper")
+      ->check(one_of({"lane"}));
+  add_output_options(command, arguments.get(), &options, "probe_corner",
+                     "cases.csv, summary.json, corner.png and example.png");
+  command->footer(footer(kCornerExamples));
+  command->callback([arguments] {
+    CornerOptions& corner = arguments->corner;
+    const CornerResults results = run_probe(&probe_corner, arguments.get(), &corner);
+    const std::vector<CornerRow> rows = summarize(results);
+    const std::string cases_file = arguments->out + "/cases.csv";
+    write_corner_cases(cases_file, results);
+    if (!results.pairs.empty()) draw_corner_figures(results, rows, arguments->out);
+    report(*arguments, corner_summary_json(results, rows, cases_file), results, rows);
+    if (results.interrupted) {
+      throw Interrupted(fmt::format("interrupted; {} of {} pairs are done, and written to {}", results.pairs.size(),
+                                    results.pairs_asked, arguments->out));
+    }
+  });
+}
+
 }  // namespace
 
 void add_probe_command(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("probe", "Ask policies what they see: probe removal, probe pedestrian");
+  CLI::App* command = app.add_subcommand("probe", "Ask policies what they see: probe removal, pedestrian, corner");
   command->require_subcommand(1);
-  command->footer(footer({kRemovalExamples[0], kPedestrianExamples[0], kRemovalExamples[1]}));
+  command->footer(footer({kRemovalExamples[0], kPedestrianExamples[0], kCornerExamples[0]}));
   add_removal_command(*command);
   add_pedestrian_command(*command);
+  add_corner_command(*command);
 }
 
 }  // namespace pictura

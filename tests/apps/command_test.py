@@ -125,7 +125,7 @@ class Typing(CommandCase):
     COMMANDS = [
         ("town",), ("map",), ("render",), ("simulate",), ("replay",), ("train",), ("evaluate",), ("plot",), ("bench", "render"),
         ("bench", "simulate"), ("bench", "history"), ("bench", "quality"), ("bench", "soak"), ("bench", "worlds"),
-        ("bench", "train"), ("bench", "breakdown"), ("probe", "removal"), ("probe", "pedestrian"),
+        ("bench", "train"), ("bench", "breakdown"), ("probe", "removal"), ("probe", "pedestrian"), ("probe", "corner"),
     ]  # fmt: skip
 
     def test_numbers_are_decimal_in_any_notation(self):

@@ -1,0 +1,44 @@
+// What all agents of driven scenes did, state by state, so that some can do it again while another one does not.
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+/// An agent in one state, and the action that it was told there.
+struct DrivenState {
+  Vec3 position_m;  // of its reference point
+  float heading_rad = 0, speed_mps = 0;
+  int32_t lane = -1;
+  AgentStatus status = AgentStatus::absent;
+  uint8_t action = kIdleAction;
+};
+
+/// A scene up to its last step, or to where all of its agents had halted.
+struct DrivenScene {
+  WorldSpec world;
+  int driver = 0;                   // who drove it
+  std::vector<AgentBox> bodies;     // [agents] as they were at first
+  std::vector<float> ahead_m;       // [agents] how far the box's centre is ahead of the reference point
+  std::vector<DrivenState> states;  // [steps, agents]
+
+  /// After so many steps; beyond the last state it stays as it is.
+  const DrivenState& at(int step, int32_t agent) const;
+  AgentBox box_at(int step, int32_t agent) const;
+};
+
+class DrivenScenes {
+ public:
+  /// Adds the states of all worlds before a step. Throws Error where an agent is told something other than an action.
+  void add(Simulator& simulator, int driver, Span<const Command> commands);
+  /// By the number of its scenario.
+  const DrivenScene& of(int32_t scene) const { return scenes_.at(scene); }
+
+ private:
+  std::map<int32_t, DrivenScene> scenes_;
+};
+
+}  // namespace pictura
