@@ -14,6 +14,7 @@
 #include "pictura/simulator/observation_arrays.h"
 #include "pictura/training/evaluation/evaluate.h"
 #include "pictura/training/loop.h"
+#include "pictura/training/probes/corner.h"
 #include "pictura/training/probes/pedestrian.h"
 #include "pictura/training/probes/removal.h"
 #include "pictura/training/session.h"
@@ -457,6 +458,46 @@ paths: in all, each through one state. hider_range_m: how far away the vehicle m
 of the ego, forwards. height_m: of the pedestrian. control: 'none' or 'nobody'. cases_file: a CSV file for every place of every path. Returns a dict, that of
 the command's summary.json (docs/probes.md). ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad
 input.)");
+  module.def(
+      "probe_corner",
+      [](const std::vector<std::string>& policies, const std::vector<std::string>& maps, const std::string& density,
+         int agents_per_world, int first_scene, int scenes, int steps, int64_t pairs, int sample_steps,
+         float max_distance_m, float min_speed_mps, float user_range_m, const std::string& driver, int batch,
+         bool argmax, uint64_t seed, int num_threads, const std::string& device, const std::string& simulator,
+         const std::string& renderer, const std::string& samples, const py::dict& conditioning,
+         const std::string& cases_file, const py::object& on_progress) {
+        CornerOptions options;
+        fill_probe(&options, policies, maps, density, agents_per_world, first_scene, scenes, steps, sample_steps, batch,
+                   argmax, seed, num_threads, device, simulator, renderer, samples, conditioning, on_progress);
+        options.pairs = pairs;
+        options.search.max_distance_m = max_distance_m;
+        options.search.min_speed_mps = min_speed_mps;
+        options.search.user_range_m = user_range_m;
+        options.worlds.controller = driver;
+        const CornerResults results =
+            run_to_an_orderly_end("probe_corner", num_threads, {}, [&options] { return probe_corner(options); });
+        if (!cases_file.empty()) write_corner_cases(cases_file, results);
+        return py::module_::import("json").attr("loads")(corner_summary_json(results, summarize(results), cases_file));
+      },
+      py::arg("policies"), py::arg("maps"), py::kw_only(), py::arg("density") = "medium",
+      py::arg("agents_per_world") = 0, py::arg("first_scene") = 0, py::arg("scenes") = 0,
+      py::arg("steps") = kProbeSteps, py::arg("pairs") = CornerOptions{}.pairs,
+      py::arg("sample_steps") = CornerOptions{}.sample_steps,
+      py::arg("max_distance_m") = CornerOptions{}.search.max_distance_m,
+      py::arg("min_speed_mps") = CornerOptions{}.search.min_speed_mps,
+      py::arg("user_range_m") = CornerOptions{}.search.user_range_m, py::arg("driver") = "",
+      py::arg("batch") = CornerOptions{}.batch, py::arg("argmax") = true, py::arg("seed") = 1,
+      py::arg("num_threads") = 0, py::arg("device") = "auto", py::arg("simulator") = "auto", py::arg("renderer") = "",
+      py::arg("samples") = "", py::arg("conditioning") = py::dict(), py::arg("cases_file") = "",
+      py::arg("on_progress") = py::none(),
+      R"(How policies drive on towards blind corners with a hidden vehicle, and towards empty ones like them, as `pictura probe
+corner` asks it.
+
+policies, maps, density, agents_per_world, scenes, steps, sample_steps and what follows argmax: as in probe_removal(). pairs: in
+all. max_distance_m: how far before the corner a policy may take over. min_speed_mps: of the ego then, and of who is hidden.
+user_range_m: how far before the junction that one may be. driver: 'lane' drives the scenes instead of the policies. batch: pairs
+that are run at once. cases_file: a CSV file for every run. Returns a dict, that of the command's summary.json (docs/probes.md).
+^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.)");
   py::class_<PySession>(module, "PolicySession", R"(
 A saved policy: what it makes of scenes and observations, and the world and cameras that it was trained with. One thread at a
 time, also for a renderer that it is given.)")

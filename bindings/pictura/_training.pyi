@@ -5,7 +5,7 @@ from __future__ import annotations
 import collections.abc
 import pictura._pictura
 import typing
-__all__: list[str] = ['PolicySession', 'evaluate', 'probe_pedestrian', 'probe_removal', 'train']
+__all__: list[str] = ['PolicySession', 'evaluate', 'probe_corner', 'probe_pedestrian', 'probe_removal', 'train']
 class PolicySession:
     """
     A saved policy: what it makes of scenes and observations, and the world and cameras that it was trained with. One thread at a
@@ -62,6 +62,17 @@ def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller
     conditioning: numbers by name. on_progress: called with the fraction that is done and the seconds to come, from a thread of its
     own. Returns a dict: rows, one a density: its counts, and each metric as (value, half of its 95 % interval); seconds,
     agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
+    """
+def probe_corner(policies: collections.abc.Sequence[str], maps: collections.abc.Sequence[str], *, density: str = 'medium', agents_per_world: typing.SupportsInt | typing.SupportsIndex = 0, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, scenes: typing.SupportsInt | typing.SupportsIndex = 0, steps: typing.SupportsInt | typing.SupportsIndex = 600, pairs: typing.SupportsInt | typing.SupportsIndex = 200, sample_steps: typing.SupportsInt | typing.SupportsIndex = 5, max_distance_m: typing.SupportsFloat | typing.SupportsIndex = 25.0, min_speed_mps: typing.SupportsFloat | typing.SupportsIndex = 2.0, user_range_m: typing.SupportsFloat | typing.SupportsIndex = 50.0, driver: str = '', batch: typing.SupportsInt | typing.SupportsIndex = 256, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', conditioning: dict = {}, cases_file: str = '', on_progress: typing.Any = None) -> typing.Any:
+    """
+    How policies drive on towards blind corners with a hidden vehicle, and towards empty ones like them, as `pictura probe
+    corner` asks it.
+    
+    policies, maps, density, agents_per_world, scenes, steps, sample_steps and what follows argmax: as in probe_removal(). pairs: in
+    all. max_distance_m: how far before the corner a policy may take over. min_speed_mps: of the ego then, and of who is hidden.
+    user_range_m: how far before the junction that one may be. driver: 'lane' drives the scenes instead of the policies. batch: pairs
+    that are run at once. cases_file: a CSV file for every run. Returns a dict, that of the command's summary.json (docs/probes.md).
+    ^C raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
     """
 def probe_pedestrian(policies: collections.abc.Sequence[str], maps: collections.abc.Sequence[str], *, density: str = 'medium', agents_per_world: typing.SupportsInt | typing.SupportsIndex = 0, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, scenes: typing.SupportsInt | typing.SupportsIndex = 0, steps: typing.SupportsInt | typing.SupportsIndex = 600, paths: typing.SupportsInt | typing.SupportsIndex = 32, sample_steps: typing.SupportsInt | typing.SupportsIndex = 10, hider_range_m: typing.SupportsFloat | typing.SupportsIndex = 30.0, min_speed_mps: typing.SupportsFloat | typing.SupportsIndex = 1.0, height_m: typing.SupportsFloat | typing.SupportsIndex = 1.2000000476837158, control: str = 'none', batch: typing.SupportsInt | typing.SupportsIndex = 4096, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', conditioning: dict = {}, cases_file: str = '', on_progress: typing.Any = None) -> typing.Any:
     """

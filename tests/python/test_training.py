@@ -247,6 +247,29 @@ def test_pedestrian_is_the_commands(trained, tmp_path):
     assert sorted(each.name for each in (tmp_path / "out").iterdir()) == ["cases.csv", *drawn, "pedestrian.png", "summary.json"]
 
 
+def test_corner_is_the_commands(trained, tmp_path):
+    _, folder, _, _ = trained
+    done, cases = [], tmp_path / "cases.csv"
+    options = {"scenes": 2, "steps": 300, "pairs": 1, "driver": "lane", "agents_per_world": 90, "seed": 3, "num_threads": 2, "device": "cpu"}
+    report = pictura.probe_corner(
+        [str(folder / "checkpoint.ckpt")], ["procedural:1"], cases_file=str(cases), on_progress=lambda fraction, eta_s: done.append(fraction),
+        **options)  # fmt: skip
+    assert report["kind"] == "corner" and report["pairs"] == report["pairs_asked"] == 1 and report["driver"] == "lane" and done[-1] == 1
+    assert report["cases"] == 2 * 3 and report["policy"][0]["scenes_driven"] == 0
+    hidden, removed, empty = report["rows"][:3]
+    assert [row["case"] for row in (hidden, removed, empty)] == ["hidden", "removed", "empty"] and hidden["runs"] == 1
+    assert hidden["speed_curve_mps"][0] == removed["speed_curve_mps"][0] and len(hidden["speed_curve_mps"]) == 81
+    assert hidden["speed_curve_mps"][0] == pytest.approx(empty["speed_curve_mps"][0], abs=0.5)
+    lines = cases.read_text().splitlines()
+    assert len(lines) == 1 + report["cases"] and lines[0].startswith("run,pair,walls,case,policy,scene,map,driver,step,ego,user")
+    with pytest.raises(pictura.UsageError, match="expected one pair or more, got 0"):
+        pictura.probe_corner([str(folder / "checkpoint.ckpt")], ["procedural:1"], pairs=0)
+    theirs = probed_by_command("corner", folder, tmp_path / "out", options)
+    assert theirs["rows"] == report["rows"]
+    assert (tmp_path / "out" / "cases.csv").read_text() == cases.read_text()
+    assert sorted(each.name for each in (tmp_path / "out").iterdir()) == ["cases.csv", "corner.png", "example.png", "summary.json"]
+
+
 def test_the_documents_code_runs(tmp_path, monkeypatch, town):
     monkeypatch.chdir(tmp_path)
     text = (pathlib.Path(__file__).parents[2] / "docs" / "python.md").read_text()
