@@ -155,11 +155,12 @@ void draw_example(const CornerResults& results, const std::string& path) {
   RgbImage page;
   for (const bool walls : {true, false}) {
     const RgbImage top = from_above(results, pair, walls), speeds = speeds_of(results, pair, walls);
+    const int column_px = std::max(top.width_px, speeds.width_px) + kGap_px;
     if (walls) {
-      page = {2 * top.width_px + kGap_px, top.height_px + kGap_px + speeds.height_px, {}};
+      page = {2 * column_px, top.height_px + kGap_px + speeds.height_px, {}};
       page.rgb.assign(size_t{3} * static_cast<size_t>(page.width_px) * static_cast<size_t>(page.height_px), 255);
     }
-    const int left_px = walls ? 0 : top.width_px + kGap_px;
+    const int left_px = walls ? 0 : column_px;
     paste(top, left_px, 0, &page);
     paste(speeds, left_px, top.height_px + kGap_px, &page);
   }

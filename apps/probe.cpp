@@ -1,6 +1,7 @@
 // `pictura probe`: what policies make of what their cameras see, and of what they do not.
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include <fmt/ranges.h>
 
@@ -104,6 +105,7 @@ Results run_probe(Results (*probe)(const Options&), ProbeArguments* arguments, O
 }
 
 std::string text_of(const Estimate& estimate) {
+  if (!std::isfinite(estimate.value)) return "-";
   return fmt::format("{:.4f} +- {:.4f}", estimate.value, estimate.half_width_95);
 }
 
