@@ -11,7 +11,9 @@
 #include "pictura/apps/removal_figure.h"
 #include "pictura/cli/evaluation_options.h"
 #include "pictura/cli/number_options.h"
+#include "pictura/cli/replay_cases.h"
 #include "pictura/cli/report.h"
+#include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
 #include "pictura/training/probes/corner.h"
 #include "pictura/training/probes/pedestrian.h"
@@ -23,7 +25,8 @@ namespace {
 
 constexpr std::array<const char*, 3> kRemovalExamples{
     "pictura probe removal agent.safetensors vector.safetensors --out removal",
-    "pictura probe removal runs/a/checkpoint.ckpt --map Town01 --scenes 2 --removals 2000 --steps 300",
+    "pictura probe removal runs/a/checkpoint.ckpt --map Town01 --scenes 2 --removals 2000 --steps 300 --replay "
+    "case.html",
     "pictura probe removal agent.safetensors --map procedural:1 --agents 40 --removals 1000 --control nobody"};
 constexpr std::array<const char*, 3> kPedestrianExamples{
     "pictura probe pedestrian agent.safetensors vector.safetensors --out pedestrian",
@@ -178,6 +181,7 @@ void report(const ProbeArguments& arguments, const std::string& summary, const R
 void add_removal_command(CLI::App& probe) {
   struct Arguments : ProbeArguments {
     RemovalOptions removal;
+    CaseReplayOptions replay;
     std::string control = kRemovalControlNames[0];
   };
   auto arguments = std::make_shared<Arguments>();
@@ -197,11 +201,15 @@ void add_removal_command(CLI::App& probe) {
                    "case")
       ->check(one_of({kRemovalControlNames.begin(), kRemovalControlNames.end()}))
       ->capture_default_str();
+  add_case_replay_options(command, &arguments->replay);
   add_output_options(command, arguments.get(), &options, "probe_removal", "cases.csv, summary.json and removal.png");
   command->footer(footer(kRemovalExamples));
   command->callback([arguments] {
     RemovalOptions& removal = arguments->removal;
     removal.control = removal_control_named(arguments->control);
+    const std::optional<int64_t> number = arguments->replay.number;
+    if (number && *number >= removal.removals)
+      fail_usage("--case: expected 0 to {}, got {}", removal.removals - 1, *number);
     const RemovalResults results = run_probe(&probe_removal, arguments.get(), &removal);
     const std::vector<RemovalRow> rows = summarize(results);
     const std::string cases_file = arguments->out + "/cases.csv";
@@ -212,12 +220,14 @@ void add_removal_command(CLI::App& probe) {
       throw Interrupted(fmt::format("interrupted; {} of {} removals are done, and written to {}", results.cases.size(),
                                     results.removals_asked, arguments->out));
     }
+    if (!arguments->replay.path.empty()) write_case_replay(arguments->replay, removal, results);
   });
 }
 
 void add_pedestrian_command(CLI::App& probe) {
   struct Arguments : ProbeArguments {
     PedestrianOptions pedestrian;
+    CaseReplayOptions replay;
     std::string control = kPedestrianControlNames[0];
   };
   auto arguments = std::make_shared<Arguments>();
@@ -240,6 +250,7 @@ void add_pedestrian_command(CLI::App& probe) {
   command->add_option("--control", arguments->control, "A control: nobody puts no pedestrian there")
       ->check(one_of({kPedestrianControlNames.begin(), kPedestrianControlNames.end()}))
       ->capture_default_str();
+  add_case_replay_options(command, &arguments->replay);
   add_output_options(command, arguments.get(), &options, "probe_pedestrian",
                      "cases.csv, summary.json, pedestrian.png and path_000.png, path_001.png, ...");
   command->footer(footer(kPedestrianExamples));
@@ -264,6 +275,7 @@ void add_pedestrian_command(CLI::App& probe) {
       throw Interrupted(fmt::format("interrupted; {} of {} paths are done, and written to {} without figures",
                                     results.paths.size(), results.paths_asked, arguments->out));
     }
+    if (!arguments->replay.path.empty()) write_case_replay(arguments->replay, pedestrian, results);
   });
 }
 

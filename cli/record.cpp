@@ -56,9 +56,13 @@ void add_recording_options(CLI::App* command, RecordingOptions* options_out) {
                    "The agent whose decisions and images the replay holds, and that it opens with; default: 0, in "
                    "recorded scenes the self-driving car")
       ->transform(whole_number(0, kMaxAgentsPerWorld - 1));
-  command->add_flag("--cameras", options_out->cameras,
-                    "Keep the followed agent's images of every step as well, without loss: as its policy was trained, "
-                    "else the paper's");
+  add_cameras_option(command, options_out);
+}
+
+CLI::Option* add_cameras_option(CLI::App* command, RecordingOptions* options_out) {
+  return command->add_flag("--cameras", options_out->cameras,
+                           "Keep the followed agent's images of every step as well, without loss: as its policy was "
+                           "trained, else the paper's");
 }
 
 void settle_followed(const DrivenWorld& world, RecordingOptions* options_inout) {

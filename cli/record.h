@@ -23,6 +23,8 @@ struct RecordingOptions {
 
 /// Adds --follow and --cameras.
 void add_recording_options(CLI::App* command, RecordingOptions* options_out);
+/// Adds --cameras alone, for replays that choose whom they follow.
+CLI::Option* add_cameras_option(CLI::App* command, RecordingOptions* options_out);
 /// Follows the world's first agent where nothing was asked for. Throws UsageError unless the world has the followed
 /// one.
 void settle_followed(const DrivenWorld& world, RecordingOptions* options_inout);

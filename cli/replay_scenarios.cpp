@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "pictura/backends/make_simulator.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
@@ -35,6 +36,22 @@ class ScenarioRecorder final : public EvaluationObserver {
   std::optional<Recording> recording_;
 };
 
+// An evaluation in the world of another policy, of which the driver observes what it reads.
+EvaluateReport evaluate_in_world_of(const std::string& path, PolicySession* driver, const EvaluateOptions& options) {
+  const SimulatorConfig its = driver->evaluation_world(options.steps);
+  SimulatorConfig world = PolicySession(path, session_options(options)).evaluation_world(options.steps);
+  world.seed = options.seed;
+  world.vector_observations = its.vector_observations;
+  world.wall_observations = its.wall_observations;
+  world.auxiliary_observations = its.auxiliary_observations;
+  EvaluationWorlds worlds{.maps = compile_maps_of(options, world)};
+  const std::unique_ptr<Renderer> renderer = driver->make_renderer();
+  worlds.renderer = renderer.get();
+  if (renderer) upload_maps(worlds.maps, {}, renderer.get());
+  worlds.simulator = make_simulator(options.simulator, world, worlds.maps, {{0, 1, kFirstEvaluationWorld}});
+  return evaluate(driver, options, &worlds);
+}
+
 double infractions_per_vehicle(const ScenarioCounts& counts) {
   return static_cast<double>(counts.infractions) / static_cast<double>(std::max<int64_t>(1, counts.vehicles));
 }
@@ -48,7 +65,9 @@ void write(const EvaluateOptions& options, const EvaluationResults& results, con
            const ScenarioPlace& place, const std::string& path) {
   if (interrupted()) throw Interrupted("interrupted before all replays were written");
   ScenarioCounts counts;
-  write_replay_and_say_so(path, record_scenario(options, results, place, recording, &counts));
+  const RecordedScenario scenario{.number = place.scenario,
+                                  .agents_per_world = results.densities[place.density].agents_per_world};
+  write_replay_and_say_so(path, record_scenario(options, scenario, recording, &counts));
   const ScenarioCounts& evaluated = counts_of(results, place);
   if (counts.infractions == evaluated.infractions && counts.goals == evaluated.goals) return;
   fmt::print(stderr,
@@ -74,12 +93,12 @@ std::vector<ScenarioPlace> worst_scenarios(const EvaluationResults& results, int
   return places;
 }
 
-Replay record_scenario(const EvaluateOptions& options, const EvaluationResults& results, const ScenarioPlace& place,
+Replay record_scenario(const EvaluateOptions& options, const RecordedScenario& scenario,
                        const RecordingOptions& recording, ScenarioCounts* counts_out) {
   EvaluateOptions one = options;
-  one.agents_per_world = results.densities[place.density].agents_per_world;
-  one.maps = {options.maps[static_cast<size_t>(place.scenario) % options.maps.size()]};
-  one.first_scenario = place.scenario;
+  one.agents_per_world = scenario.agents_per_world;
+  one.maps = {options.maps[static_cast<size_t>(scenario.number) % options.maps.size()]};
+  one.first_scenario = scenario.number;
   one.scenarios = 1;
   one.device = one.simulator = "cpu";
   one.on_progress = nullptr;
@@ -89,7 +108,9 @@ Replay record_scenario(const EvaluateOptions& options, const EvaluationResults& 
   std::unique_ptr<Renderer> renderer = session ? session->make_renderer() : nullptr;
   ScenarioRecorder recorder({session ? one.checkpoint : one.controller, session.get(), renderer.get()}, recording);
   one.observer = &recorder;
-  const EvaluateReport report = session ? evaluate(session.get(), one) : evaluate(one);
+  const EvaluateReport report = !scenario.world_of.empty() ? evaluate_in_world_of(scenario.world_of, session.get(), one)
+                                : session                  ? evaluate(session.get(), one)
+                                                           : evaluate(one);
   if (report.interrupted) throw Interrupted("interrupted while a scenario was recorded");
   *counts_out = report.results.densities[0].scenarios[0];
   return recorder.finish();

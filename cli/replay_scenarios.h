@@ -18,9 +18,16 @@ struct ScenarioPlace {
 /// The scenarios with the most infractions of vehicles a vehicle, worst first; `count` of them, or all.
 std::vector<ScenarioPlace> worst_scenarios(const EvaluationResults& results, int count);
 
+/// A scenario to drive again.
+struct RecordedScenario {
+  int number = 0;
+  int agents_per_world = 0;
+  std::string world_of;  // the policy whose world it is in, as probes have it; empty: the driver's own
+};
+
 /// Drives a scenario again, on the host, and records it. `counts_out` receives what it counted: floating point gives
 /// other bits in batches of other sizes and on devices, so that a policy may drive it otherwise than it was evaluated.
-Replay record_scenario(const EvaluateOptions& options, const EvaluationResults& results, const ScenarioPlace& place,
+Replay record_scenario(const EvaluateOptions& options, const RecordedScenario& scenario,
                        const RecordingOptions& recording, ScenarioCounts* counts_out);
 
 /// As record_scenario() does, into files of a folder, with its gallery, or the worst one into one file. Says on stderr

@@ -70,12 +70,14 @@ void put_body(const ReplayBody& body, std::string* bytes_inout) {
   put_number(static_cast<int32_t>(body.agent_class), bytes_inout);
   for (const int32_t size_cm : {body.length_cm, body.width_cm, body.height_cm}) put_number(size_cm, bytes_inout);
 }
+AgentClass class_from(int32_t number) {
+  PICTURA_CHECK(number >= 0 && number < kNumAgentClasses, "expected a class of 0 to {}, got {}", kNumAgentClasses - 1,
+                number);
+  return static_cast<AgentClass>(number);
+}
 ReplayBody next_body(NumberReader* reader) {
   ReplayBody body;
-  const int32_t agent_class = reader->next();
-  PICTURA_CHECK(agent_class >= 0 && agent_class < kNumAgentClasses, "episodes: expected a class of 0 to {}, got {}",
-                kNumAgentClasses - 1, agent_class);
-  body.agent_class = static_cast<AgentClass>(agent_class);
+  body.agent_class = class_from(reader->next());
   for (int32_t* size_cm : {&body.length_cm, &body.width_cm, &body.height_cm}) *size_cm = reader->next();
   return body;
 }
@@ -87,7 +89,7 @@ std::string episode_bytes(const std::vector<ReplayEpisode>& episodes) {
     for (const int32_t value : {episode.index, episode.first_frame, episode.num_frames}) put_number(value, &bytes);
     for (const ReplayBody& body : episode.agents) put_body(body, &bytes);
     put_number(static_cast<int32_t>(episode.parked.size()), &bytes);
-    for (const ReplayParkedCar& car : episode.parked) {
+    for (const ReplayBox& car : episode.parked) {
       put_body(car.body, &bytes);
       for (const int32_t value : {car.x_cm, car.y_cm, car.z_cm, car.heading_ddeg}) put_number(value, &bytes);
     }
@@ -109,7 +111,7 @@ std::vector<ReplayEpisode> episodes_from(NumberReader reader, int32_t num_agents
     for (int32_t* value : {&episode.index, &episode.first_frame, &episode.num_frames}) *value = reader.next();
     for (int32_t agent = 0; agent < num_agents; ++agent) episode.agents.push_back(next_body(&reader));
     episode.parked.resize(size(reader.next_count()));
-    for (ReplayParkedCar& car : episode.parked) {
+    for (ReplayBox& car : episode.parked) {
       car.body = next_body(&reader);
       for (int32_t* value : {&car.x_cm, &car.y_cm, &car.z_cm, &car.heading_ddeg}) *value = reader.next();
     }
@@ -187,6 +189,66 @@ std::vector<Section> sections_of(const Replay& replay) {
   return sections;
 }
 
+Json case_json(const ReplayCase& probed) {
+  Json inserted = nullptr, answers = Json::array();
+  if (probed.inserted) {
+    const ReplayBox& box = *probed.inserted;
+    inserted = {{"class", static_cast<int>(box.body.agent_class)},
+                {"length_cm", box.body.length_cm},
+                {"width_cm", box.body.width_cm},
+                {"height_cm", box.body.height_cm},
+                {"x_cm", box.x_cm},
+                {"y_cm", box.y_cm},
+                {"z_cm", box.z_cm},
+                {"heading_ddeg", box.heading_ddeg},
+                {"path_cm", probed.path_cm}};
+  }
+  for (const ReplayAnswer& answer : probed.answers) {
+    answers.push_back({{"policy", answer.policy},
+                       {"value", answer.value},
+                       {"value_without", answer.value_without},
+                       {"brake", answer.brake},
+                       {"brake_without", answer.brake_without}});
+  }
+  return {{"what", probed.what},  {"frame", probed.frame},
+          {"ego", probed.ego},    {"removed", probed.removed < 0 ? Json(nullptr) : Json(probed.removed)},
+          {"inserted", inserted}, {"answers", answers}};
+}
+
+ReplayCase case_from(const Json& json, const Replay& replay) {
+  ReplayCase probed;
+  json.at("what").get_to(probed.what);
+  json.at("frame").get_to(probed.frame);
+  json.at("ego").get_to(probed.ego);
+  PICTURA_CHECK(probed.frame >= 0 && probed.frame < replay.num_frames,
+                "header: case: expected a frame below {}, got {}", replay.num_frames, probed.frame);
+  if (!json.at("removed").is_null()) probed.removed = json.at("removed").get<int32_t>();
+  for (const int32_t agent : {probed.ego, std::max(0, probed.removed)}) {
+    PICTURA_CHECK(agent >= 0 && agent < replay.num_agents, "header: case: expected an agent below {}, got {}",
+                  replay.num_agents, agent);
+  }
+  if (const Json& box = json.at("inserted"); !box.is_null()) {
+    ReplayBox& inserted = probed.inserted.emplace();
+    inserted.body.agent_class = class_from(box.at("class").get<int32_t>());
+    for (const auto& [name, value] : {std::pair{"length_cm", &inserted.body.length_cm},
+                                      {"width_cm", &inserted.body.width_cm},
+                                      {"height_cm", &inserted.body.height_cm},
+                                      {"x_cm", &inserted.x_cm},
+                                      {"y_cm", &inserted.y_cm},
+                                      {"z_cm", &inserted.z_cm},
+                                      {"heading_ddeg", &inserted.heading_ddeg}}) {
+      box.at(name).get_to(*value);
+    }
+    box.at("path_cm").get_to(probed.path_cm);
+  }
+  for (const Json& answer : json.at("answers")) {
+    probed.answers.push_back({answer.at("policy").get<std::string>(), answer.at("value").get<double>(),
+                              answer.at("value_without").get<double>(), answer.at("brake").get<double>(),
+                              answer.at("brake_without").get<double>()});
+  }
+  return probed;
+}
+
 Json header_of(const Replay& replay, const std::vector<Section>& sections) {
   const ReplayOrigin& origin = replay.origin;
   Json metrics;
@@ -233,6 +295,7 @@ Json header_of(const Replay& replay, const std::vector<Section>& sections) {
           {"followed", replay.followed},
           {"metrics", metrics},
           {"first_infraction", first_infraction},
+          {"case", replay.probed ? case_json(*replay.probed) : Json(nullptr)},
           {"conditioning", kConditioningNames},
           {"decision_unit", kDecisionUnit},
           {"tracks", tracks},
@@ -300,6 +363,10 @@ void read_header_values(const Json& header, Replay* replay_out) {
     first.at("agent").get_to(replay_out->first_infraction.agent);
   }
   check_header(*replay_out);
+  // Replays without a case may also be of a time when there were none.
+  if (const auto probed = header.find("case"); probed != header.end() && !probed->is_null()) {
+    replay_out->probed = case_from(*probed, *replay_out);
+  }
 }
 
 void read_images(const Json& header, std::string_view page, ReplayImages* images_out) {

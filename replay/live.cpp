@@ -18,7 +18,7 @@ LiveJson body_json(const ReplayBody& body) {
 LiveJson episode_json(const ReplayEpisode& episode) {
   LiveJson bodies = LiveJson::array(), parked = LiveJson::array();
   for (const ReplayBody& body : episode.agents) bodies.push_back(body_json(body));
-  for (const ReplayParkedCar& car : episode.parked) {
+  for (const ReplayBox& car : episode.parked) {
     LiveJson values = body_json(car.body);
     for (const int32_t value : {car.x_cm, car.y_cm, car.z_cm, car.heading_ddeg}) values.push_back(value);
     parked.push_back(values);

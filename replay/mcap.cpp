@@ -133,7 +133,7 @@ Json cube_json(const ReplayBody& body, double x_m, double y_m, double z_m, doubl
 
 Json agents_json(const Replay& replay, const ReplayEpisode& episode, int frame, uint64_t ns) {
   Json cubes = Json::array(), texts = Json::array();
-  for (const ReplayParkedCar& car : episode.parked) {
+  for (const ReplayBox& car : episode.parked) {
     cubes.push_back(cube_json(car.body, car.x_cm / 100.0, car.y_cm / 100.0, car.z_cm / 100.0,
                               car.heading_ddeg * kRadPerDdeg, color_json(0.36, 0.41, 0.47)));
   }

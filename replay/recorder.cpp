@@ -39,6 +39,10 @@ ReplayBody body_of(const AgentBox& box) {
 
 }  // namespace
 
+ReplayBox replay_box(const AgentBox& box) {
+  return {body_of(box), in_cm(box.center_m.x), in_cm(box.center_m.y), in_cm(box.center_m.z), heading_of(box)};
+}
+
 ReplayDecision decision_of(Span<const float> logits, float value) {
   PICTURA_CHECK(logits.size() == kNumActions, "replay: expected {} logits, got {}", kNumActions, logits.size());
   ReplayDecision decision{.value = value};
@@ -113,8 +117,7 @@ struct Recorder::Parts {
     }
     for (size_t i = static_cast<size_t>(replay.num_agents); i < boxes.size(); ++i) {
       if (!boxes[i].drawn) continue;
-      next.parked.push_back({body_of(boxes[i]), in_cm(boxes[i].center_m.x), in_cm(boxes[i].center_m.y),
-                             in_cm(boxes[i].center_m.z), heading_of(boxes[i])});
+      next.parked.push_back(replay_box(boxes[i]));
     }
     replay.episodes.push_back(std::move(next));
     chains.assign(static_cast<size_t>(replay.num_agents), -1);

@@ -45,6 +45,9 @@ struct ReplayDecision {
 /// From a policy's logits [kNumActions].
 ReplayDecision decision_of(Span<const float> logits, float value);
 
+/// A box in a replay's units.
+ReplayBox replay_box(const AgentBox& box);
+
 /// Throws UsageError where the simulator does not work in host memory, or has no such world or agent.
 class Recorder {
  public:

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -73,11 +74,11 @@ struct ReplayBody {
   bool operator==(const ReplayBody&) const = default;
 };
 
-/// A car that stands in its place for the whole episode.
-struct ReplayParkedCar {
+/// A road user that stands in its place: a parked car, for the whole episode, or whom a probe inserts.
+struct ReplayBox {
   ReplayBody body;
   int32_t x_cm = 0, y_cm = 0, z_cm = 0, heading_ddeg = 0;  // tenths of a degree
-  bool operator==(const ReplayParkedCar&) const = default;
+  bool operator==(const ReplayBox&) const = default;
 };
 
 /// The goal chain of an agent from this frame on.
@@ -92,7 +93,7 @@ struct ReplayEpisode {
   int32_t first_frame = 0, num_frames = 0;
   std::vector<ReplayBody> agents;   // [agents]
   std::vector<float> conditioning;  // [agents, kNumConditioning]
-  std::vector<ReplayParkedCar> parked;
+  std::vector<ReplayBox> parked;
   std::vector<ReplayChain> chains;  // by frame
   bool operator==(const ReplayEpisode&) const = default;
 };
@@ -169,6 +170,26 @@ struct ReplayMetrics {
   X(km_driven)                    \
   X(reward)
 
+/// What a policy made of a state with a road user, and of the same state without it: the values, and the probabilities
+/// of braking.
+struct ReplayAnswer {
+  std::string policy;
+  double value = 0, value_without = 0, brake = 0, brake_without = 0;
+  bool operator==(const ReplayAnswer&) const = default;
+};
+
+/// A case of a probe, which this replay leads to: one road user that is removed from a frame, or inserted into it, as
+/// one agent sees it.
+struct ReplayCase {
+  std::string what;  // a sentence for people
+  int32_t frame = 0, ego = 0;
+  int32_t removed = -1;                         // an agent, or -1
+  std::optional<ReplayBox> inserted;            // who stands there in the frame of the case
+  std::vector<std::array<int32_t, 2>> path_cm;  // of whom is inserted: all its places, in their order
+  std::vector<ReplayAnswer> answers;            // of each policy that was asked
+  bool operator==(const ReplayCase&) const = default;
+};
+
 /// Where galleries begin to look; frame -1: nowhere.
 struct ReplayMoment {
   int32_t frame = -1, agent = 0;
@@ -179,6 +200,7 @@ struct Replay {
   ReplayOrigin origin;
   ReplayMetrics metrics;
   ReplayMoment first_infraction;
+  std::optional<ReplayCase> probed;
   int32_t num_agents = 0, num_frames = 0, num_lights = 0;
   int32_t followed = -1;  // the agent whose decisions and images there are, or -1
   std::vector<ReplayShape> map;

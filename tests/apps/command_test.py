@@ -4,6 +4,7 @@ Run by ctest, one entry per class: python3 command_test.py PICTURA [unittest arg
 """
 
 import base64
+import csv
 import fcntl
 import itertools
 import json
@@ -960,6 +961,49 @@ class Replays(CommandCase):
         self.assertEqual(header_of(self.folder / "worst.html")["map"], f"procedural:{1 + worst[0] % 2}:blocks=2x2")
         self.assert_refused(2, "--gallery", *evaluate, "--replays", 2)
         self.assert_refused(2, "--follow: has no effect without --replay", *evaluate, "--follow", 1)
+
+    def test_a_probes_case_is_driven_again_with_its_road_user(self):
+        if not has_torch():
+            self.skipTest("this build has no torch")
+        policies = []
+        # The second drives in the first's world, which has pedestrians and walls.
+        for name, more in {"images": ["simulator.pedestrian_fraction=0.2", "simulator.walls=true"], "vectors": ["policy.modality=vector", "policy.auxiliary=true"]}.items():
+            settings = [word for one in more for word in ("--set", one)]
+            self.json_of("train", *TINY, *settings, "--set", "train.updates=1", "--out", self.folder / name)
+            policies.append(self.folder / name / "checkpoint.ckpt")
+        world = [*policies, "--map", "procedural:1:blocks=2x2", "--agents", 30, "--scenes", 4, "--steps", 40, "--every", 2, "--device", "cpu"]
+        for kind, more in {"removal": ["--removals", 80], "pedestrian": ["--paths", 4, "--min-speed", -100, "--range", 60]}.items():
+            probe = ["probe", kind, *world, *more, "--out", self.folder / kind]
+            path = self.folder / f"{kind}.html"
+            result = run(*probe, "--replay", path)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            with open(self.folder / kind / "cases.csv") as file:
+                cases = list(csv.DictReader(file))
+            changes = [abs(float(case["images/d_value"])) for case in cases]
+            last = max(i for i, case in enumerate(cases) if case["driver"] == "vectors")
+            for number in (changes.index(max(changes)), last):
+                if number == last:
+                    result = run(*probe, "--replay", path, "--case", number, "--cameras")
+                    self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertNotIn("notice", result.stderr)  # it drives as it did
+                header, case = header_of(path), cases[number]
+                shown = header["case"]
+                self.assertIn(f"case {number}: ", shown["what"])
+                self.assertIn(shown["what"], result.stderr)
+                self.assertEqual((shown["frame"], shown["ego"], header["followed"]), (int(case["step"]), int(case["ego"]), int(case["ego"])))
+                self.assertEqual(shown["removed"], int(case["hidden"]) if kind == "removal" else None)
+                self.assertIn(case["driver"], header["policy"])
+                for answer in shown["answers"]:
+                    change = answer["value"] - answer["value_without"]
+                    self.assertAlmostEqual(change, float(case[answer["policy"] + "/d_value"]), 5)
+                if kind == "pedestrian":
+                    self.assertAlmostEqual(shown["inserted"]["x_cm"] / 100, float(case["x_m"]), delta=0.006)
+                    self.assertIn([shown["inserted"]["x_cm"], shown["inserted"]["y_cm"]], shown["inserted"]["path_cm"])
+            self.assertEqual([c["width_px"] for c in header["images"]["cameras"]], [96] * 4)  # the vectors' driver has the paper's
+        result = run(*probe, "--replay", path, "--case", len(cases))  # how many there are is known in the end
+        self.assertEqual((result.returncode, f"--case: expected 0 to {len(cases) - 1}, got {len(cases)}" in result.stderr), (2, True), result.stderr)
+        self.assert_refused(2, "--replay", *probe, "--case", 1)
+        self.assert_refused(2, "--case: expected 0 to 79, got 80", "probe", "removal", *world, "--removals", 80, "--replay", path, "--case", 80)
 
     def test_a_policys_decisions_are_those_that_it_drives_by(self):
         if not has_torch():

@@ -47,6 +47,12 @@ Replay any_replay() {
                    .global_world = 3,
                    .dt_s = 0.05f};
   replay.first_infraction = {31, 2};
+  replay.probed = ReplayCase{.what = "case 3: <b> & so on",
+                             .frame = 49,
+                             .ego = 2,
+                             .inserted = ReplayBox{{AgentClass::pedestrian, 50, 50, 120}, -100, 200, 3, -900},
+                             .path_cm = {{-100, 100}, {-100, 200}},
+                             .answers = {{"a", 1.25, -0.5, 0.1, 0.7}, {"b", 0, 0, 0, 0}}};
   replay.metrics.collisions = 3;
   replay.metrics.km_driven = 1.25;
   replay.num_agents = 3;
@@ -188,6 +194,15 @@ TEST(ReplayFormat, AReplayIsReadBackAsItWas) {
   const auto header = read_replay_header(folder / "a.html");
   EXPECT_EQ(header.at("command"), replay.origin.command);
   EXPECT_EQ(header.at("metrics").at("collisions"), 3);
+  Replay removal = replay;
+  removal.probed->inserted.reset();
+  removal.probed->path_cm.clear();
+  removal.probed->removed = 1;
+  write_replay(folder / "b.html", removal);
+  EXPECT_TRUE(read_replay(folder / "b.html") == removal);
+  removal.probed.reset();
+  write_replay(folder / "c.html", removal);
+  EXPECT_TRUE(read_replay(folder / "c.html") == removal);
 }
 
 TEST(ReplayFormat, WhatIsDamagedIsNamed) {
@@ -214,6 +229,8 @@ TEST(ReplayFormat, WhatIsDamagedIsNamed) {
               HasSubstr("expected a replay of version 1, got version 2"));
   EXPECT_THAT(message(without("\"agents\":3", "\"agents\":4")), HasSubstr("a.html"));
   EXPECT_THAT(message(without("\"agents\":3", "\"agents\":-1")), HasSubstr("agents: expected"));
+  EXPECT_THAT(message(without("\"frame\":49", "\"frame\":50")), HasSubstr("case: expected a frame below 50, got 50"));
+  EXPECT_THAT(message(without("\"ego\":2", "\"ego\":3")), HasSubstr("case: expected an agent below 3, got 3"));
   EXPECT_THAT(message(without("\"map_hash\"", "\"map_mash\"")), HasSubstr("a value is missing"));
   EXPECT_THAT(message(without("{\"format\"", "{\"format")), HasSubstr("damaged JSON"));
 }

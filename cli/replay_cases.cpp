@@ -1,0 +1,139 @@
+#include "pictura/cli/replay_cases.h"
+
+#include <cmath>
+
+#include "pictura/cli/file_options.h"
+#include "pictura/cli/number_options.h"
+#include "pictura/cli/replay_scenarios.h"
+#include "pictura/common/error.h"
+#include "pictura/training/evaluation/infractions.h"
+
+namespace pictura {
+
+namespace {
+
+// Where a case is, and how fast its ego was there.
+struct CasePlace {
+  int32_t scene = 0, driver = 0, step = 0, ego = 0;
+  float ego_speed_mps = 0;
+};
+
+CasePlace place_of(const RemovalCase& one) { return {one.scene, one.driver, one.step, one.ego, one.ego_speed_mps}; }
+CasePlace place_of(const PedestrianPath& one) { return {one.scene, one.driver, one.step, one.ego, one.ego_speed_mps}; }
+
+// The case that was asked for, or the one in which the first policy's value changes most.
+size_t chosen_case(const CaseReplayOptions& options, const ProbeResults& results) {
+  const size_t count = results.responses.size() / results.policies.size();
+  if (count == 0) fail("--replay: the probe found no case");
+  if (options.number) {
+    if (*options.number >= static_cast<int64_t>(count))
+      fail_usage("--case: expected 0 to {}, got {}", count - 1, *options.number);
+    return static_cast<size_t>(*options.number);
+  }
+  size_t largest = 0;
+  const auto change = [&results](size_t i) { return std::abs(results.response(i, 0).value_change()); };
+  for (size_t i = 1; i < count; ++i) {
+    if (change(i) > change(largest)) largest = i;
+  }
+  return largest;
+}
+
+std::string about(const RemovalCase& one, RemovalControl control) {
+  if (one.hidden < 0) return fmt::format("a control: nobody is hidden from agent {}", one.ego);
+  if (control == RemovalControl::permuted)
+    return fmt::format("a control: agent {} is hidden from agent {} instead of agent {}", one.hidden, one.ego,
+                       one.user);
+  return fmt::format("agent {} is hidden from agent {}: a {}{} {:.1f} m away, {}", one.user, one.ego,
+                     one.user_halted ? "halted " : "", to_string(one.user_class), one.distance_m,
+                     one.is_in_frame() ? fmt::format("of which its cameras see {:.0f} %", 100 * one.visible_share)
+                                       : "which no camera sees");
+}
+
+std::string about(const PedestrianPoint& point, const PedestrianPath& path, PedestrianControl control) {
+  if (control == PedestrianControl::nobody)
+    return fmt::format("a control: no pedestrian is shown to agent {}", path.ego);
+  return fmt::format("a pedestrian is shown to agent {}: {:.1f} m away, of which its cameras see {:.0f} %", path.ego,
+                     point.distance_m, 100 * point.visible_share);
+}
+
+// Drives the scene again; `probed` says what the case is about.
+void write(const CaseReplayOptions& options, const ProbeOptions& probe, const ProbeResults& results, size_t number,
+           const CasePlace& place, ReplayCase probed) {
+  EvaluateOptions driven = probe.worlds;
+  driven.checkpoint = probe.policies[static_cast<size_t>(place.driver)];
+  RecordingOptions recording = options.recording;
+  recording.followed = place.ego;
+  ScenarioCounts counts;
+  Replay replay = record_scenario(
+      driven, {.number = place.scene, .agents_per_world = results.agents_per_world, .world_of = probe.policies[0]},
+      recording, &counts);
+  if (place.step >= replay.num_frames) {
+    fail(
+        "--replay: case {} is at step {} of scenario {}, which was over after {} steps when it was driven again: the "
+        "policy's numbers differ in their last bits where batches or devices differ",
+        number, place.step, place.scene, replay.num_frames - 1);
+  }
+  probed.what = fmt::format("case {}: {}", number, probed.what);
+  probed.frame = place.step;
+  probed.ego = place.ego;
+  for (size_t policy = 0; policy < results.policies.size(); ++policy) {
+    const PairedResponse& response = results.response(number, policy);
+    probed.answers.push_back({.policy = results.policies[policy].name,
+                              .value = double{response.value},
+                              .value_without = double{response.value_without},
+                              .brake = double{response.brake},
+                              .brake_without = double{response.brake_without}});
+  }
+  replay.probed = std::move(probed);
+  const double speed_mps = 0.01 * replay.at(Track::speed_mps, place.step, place.ego);
+  write_replay_and_say_so(options.path, replay);
+  fmt::print(stderr, "{}\n", replay.probed->what);
+  // Speeds of replays are rounded to 1 cm/s.
+  if (std::abs(speed_mps - double{place.ego_speed_mps}) < 0.0051) return;
+  fmt::print(stderr,
+             "notice: {}: the ego drives at {:.2f} m/s, in the probe at {:.2f} m/s: the policy's numbers differ in "
+             "their last bits where batches or devices differ\n",
+             options.path, speed_mps, place.ego_speed_mps);
+}
+
+}  // namespace
+
+void add_case_replay_options(CLI::App* command, CaseReplayOptions* options_out) {
+  CLI::Option* const replay =
+      command
+          ->add_option("--replay", options_out->path,
+                       "A page that plays the scene of one case, follows its ego, and marks the road user")
+          ->check(file_ending(".html"));
+  command
+      ->add_option("--case", options_out->number,
+                   "The case of --replay, as numbered in cases.csv; default: where the first policy's value changes "
+                   "most")
+      ->transform(whole_number(0))
+      ->needs(replay);
+  add_cameras_option(command, &options_out->recording)->needs(replay);
+}
+
+void write_case_replay(const CaseReplayOptions& options, const RemovalOptions& probe, const RemovalResults& results) {
+  const size_t number = chosen_case(options, results);
+  const RemovalCase& one = results.cases[number];
+  write(options, probe, results, number, place_of(one), {.what = about(one, results.control), .removed = one.hidden});
+}
+
+void write_case_replay(const CaseReplayOptions& options, const PedestrianOptions& probe,
+                       const PedestrianResults& results) {
+  const size_t number = chosen_case(options, results);
+  const PedestrianPoint& point = results.points[number];
+  const PedestrianPath& path = results.paths[static_cast<size_t>(point.path)];
+  ReplayCase probed{.what = about(point, path, results.control)};
+  if (results.control == PedestrianControl::none) {
+    probed.inserted = replay_box(point.pedestrian);
+    const auto first = results.points.begin() + path.first_point;
+    for (auto at = first; at != first + path.num_points; ++at) {
+      const ReplayBox place = replay_box(at->pedestrian);
+      probed.path_cm.push_back({place.x_cm, place.y_cm});
+    }
+  }
+  write(options, probe, results, number, place_of(path), std::move(probed));
+}
+
+}  // namespace pictura

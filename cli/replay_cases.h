@@ -1,0 +1,31 @@
+// Cases of probes as replays: the scene driven again, with the road user that the case is about marked.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "pictura/cli/record.h"
+#include "pictura/training/probes/pedestrian.h"
+#include "pictura/training/probes/removal.h"
+
+namespace pictura {
+
+struct CaseReplayOptions {
+  std::string path;               // empty: no replay
+  std::optional<int64_t> number;  // of the case, as in cases.csv; nothing: where the first policy's value changes most
+  RecordingOptions recording;     // whom it follows is the case's ego
+};
+
+/// Adds --replay, --case and --cameras.
+void add_case_replay_options(CLI::App* command, CaseReplayOptions* options_out);
+
+/// Drives the case's scene again, on the host, by whom it was driven and in the world of the first policy, and writes
+/// the replay. Says on stderr what it writes, and whether the ego is driven otherwise than it was probed. Throws
+/// UsageError where there is no such case.
+void write_case_replay(const CaseReplayOptions& options, const RemovalOptions& probe, const RemovalResults& results);
+void write_case_replay(const CaseReplayOptions& options, const PedestrianOptions& probe,
+                       const PedestrianResults& results);
+
+}  // namespace pictura
