@@ -138,6 +138,7 @@ class Replay {
     this.episodes.forEach((episode, i) => this.episodeOf.fill(i, episode.first, episode.end));
     this.rewardTerms = header.tracks.filter(track => track.name.startsWith("reward_")).map(track => track.name.slice(7));
     this.events = this.findEvents();
+    this.probed = header.case ?? null;
     if (header.images) this.images = new Images(header.images, frames, imageBytes);
   }
   // Columns have room for `stride` frames.

@@ -15,14 +15,6 @@ const ORDERS = [
   { name: "file", text: "name of the file", of: () => 0 },
 ];
 
-function make(tag, text, name) {
-  const element = document.createElement(tag);
-  if (text !== undefined) element.textContent = text;
-  if (name) element.className = name;
-  return element;
-}
-const byId = id => document.getElementById(id);
-
 const entries = JSON.parse(byId("entries").textContent);
 const most = Object.fromEntries(COLUMNS.map(({ name }) => [name, Math.max(1e-9, ...entries.map(entry => entry.metrics[name]))]));
 const asked = new Set();
@@ -33,7 +25,8 @@ function card(entry) {
   const first = entry.first_infraction;
   // A little before the first infraction, with the one who committed it.
   link.href = encodeURIComponent(entry.file) + (first ? `#step=${Math.max(0, first.frame - Math.round(3 / entry.dt_s))}&agent=${first.agent}&zoom=6` : "");
-  title.append(make("strong", `${entry.map}, seed ${entry.seed}`), make("small", `${entry.policy}, ${entry.agents} agents, ${((entry.frames - 1) * entry.dt_s).toFixed(0)} s; ${entry.file}`));
+  title.append(make("strong", `${entry.map}, ${worldName(entry)}`), make("small", `${policyName(entry)}, ${entry.agents} agents, ${((entry.frames - 1) * entry.dt_s).toFixed(0)} s; ${entry.file}`));
+  title.title = entry.policy;
   link.append(title);
   for (const { name, text, color, digits } of COLUMNS) {
     const value = entry.metrics[name], box = make("div", undefined, value ? "" : "none"), bar = make("i");

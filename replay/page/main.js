@@ -26,11 +26,13 @@ async function main() {
   byId("message").hidden = true;
   byId("app").hidden = false;
 
-  const state = { time: 0, agent: Math.max(0, replay.followed), speed: 1, playing: false, follow: false, goals: false, numbers: false,
+  const state = { time: replay.probed?.frame ?? 0, agent: Math.max(0, replay.followed), speed: 1, playing: false, follow: false, goals: false, numbers: false,
     onlyAgent: false, camera: "", x: 0, y: 0, zoom: 1, isAtEdge: Boolean(live) };
   let theme = readTheme(), isDirty = true;
   const dirty = () => { isDirty = true; };
   const clampFrame = frame => Math.min(last(), Math.max(0, frame));
+
+  const counts = [];  // in the legend
 
   const actions = {
     // In a world that runs, the newest frame is where the page goes on with it.
@@ -44,7 +46,7 @@ async function main() {
       if (live) live.ask({ watch: state.agent });
       dirty();
     },
-    // An event: a second before it, so that it is seen to happen, unless it is already on screen.
+    // An event: its step and its agent, moved into view unless it is already there.
     goTo(event) {
       actions.select(event.agent);
       actions.seek(event.frame);
@@ -56,6 +58,16 @@ async function main() {
       const isIn = px > edge && py > edge && px < world.canvas.width - edge && py < world.canvas.height - edge;
       if (!isIn) { state.x = pose.x_m; state.y = pose.y_m; }
       if (state.zoom < 2) { state.zoom = 4; state.x = pose.x_m; state.y = pose.y_m; }
+      dirty();
+    },
+    // A probe's case: its ego and the road user, both on screen.
+    showCase() {
+      const { ego, removed, inserted } = replay.probed;
+      actions.select(ego);
+      actions.seek(replay.probed.frame);
+      const a = replay.pose(ego, state.time), b = inserted ? { x_m: inserted.x_cm / 100, y_m: inserted.y_cm / 100 } : replay.pose(removed ?? ego, state.time);
+      const size = Math.min(world.canvas.width, world.canvas.height) / world.ratio;
+      Object.assign(state, { follow: false, x: (a.x_m + b.x_m) / 2, y: (a.y_m + b.y_m) / 2, zoom: Math.min(12, 0.5 * size / Math.max(1, Math.hypot(a.x_m - b.x_m, a.y_m - b.y_m))) });
       dirty();
     },
     camera(name) { state.camera = name; dirty(); },
@@ -81,12 +93,14 @@ async function main() {
     follow(follow) { state.follow = follow; if (follow && state.zoom < 2) state.zoom = 5; dirty(); },
     fail,
   };
-  const world = new WorldView(replay, byId("world"), state);
+  fillLegend();
+  const world = new WorldView(replay, byId("world"), state, byId("legend").offsetLeft + byId("legend").offsetWidth);
   const panel = new Panel(replay, state, actions);
   const timeline = new Timeline(replay, state, byId("timeline"), byId("timeline-tip"), actions);
 
   world.resize();
   world.fit();
+  if (replay.probed) actions.showCase();
 
   // Address.
   function readAddress() {
@@ -120,6 +134,8 @@ async function main() {
   function fillMetrics() {
     const m = replay.header.metrics;
     const shown = [["km", m.km_driven.toFixed(1)], ["goals", m.goals_reached], ["collisions", m.collisions], ["off road", m.off_road], ["red lights", m.red_light], ["walls", m.wall_contacts]];
+    // Numbers are of agents that act; in a recording that is only played nobody does.
+    if (!live && m.agent_steps === 0) { byId("metrics").replaceChildren(make("li", "as recorded: nobody acts")); return; }
     byId("metrics").replaceChildren(...shown.map(([name, value]) => {
       const item = make("li");
       item.append(make("b", value), ` ${name}`);
@@ -128,7 +144,8 @@ async function main() {
   }
   function fillHeader() {
     byId("map-name").textContent = header.map;
-    byId("policy-name").textContent = `${header.policy}, seed ${header.seed}`;
+    byId("policy-name").textContent = `${policyName(header)}, ${worldName(header)}`;
+    byId("policy-name").title = header.policy;
     fillMetrics();
     const command = make("code", header.command), about = byId("about").querySelector("dl");
     const facts = [["Command", command], ["Policy", header.policy], ["Policy's hash", header.policy_hash], ["Map", header.map], ["Map's hash", header.map_hash], ["Seed", header.seed],
@@ -141,7 +158,6 @@ async function main() {
       return [make("dt", name), text];
     }));
   }
-  const counts = [];
   function fillLegend() {
     const row = (name, color, ring) => {
       const line = make("div"), dot = make("span", undefined, ring ? "dot ring" : "dot"), count = make("b");
@@ -403,7 +419,6 @@ async function main() {
   readAddress();
   if (live) live.ask({ watch: state.agent });
   fillHeader();
-  fillLegend();
   requestAnimationFrame(now => { before = now; frame(now); });
 }
 

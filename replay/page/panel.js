@@ -2,16 +2,13 @@
 
 const LONG_JERKS = ["-15", "-4", "0", "+4"], LAT_JERKS = ["-4", "0", "+4"];  // m/s3, as the action space has them
 
-const byId = id => document.getElementById(id);
-function make(tag, text, name) {
-  const element = document.createElement(tag);
-  if (text !== undefined) element.textContent = text;
-  if (name) element.className = name;
-  return element;
-}
 const decimals = (value, digits) => (Object.is(value, -0) ? 0 : value).toFixed(digits).replace("-", "\u2212");
-// Of very different sizes: with as many digits as tell them apart.
-const short = value => Math.abs(value) < 5e-8 ? "0" : (Math.abs(value) >= 0.1 ? decimals(value, 2) : Math.abs(value) >= 1e-3 ? decimals(value, 4) : value.toExponential(1).replace(/-/g, "\u2212"));
+// Of very different sizes: three digits that tell them apart, down to the seventh decimal, which is what is recorded.
+function short(value) {
+  if (Math.abs(value) < 5e-8) return "0";
+  const first = Math.floor(Math.log10(Math.abs(value)));
+  return decimals(value, Math.min(7, Math.max(2, 2 - first))).replace(/(\.\d\d\d*?)0+$/, "$1");
+}
 
 class Panel {
   constructor(replay, state, actions) {
@@ -21,6 +18,7 @@ class Panel {
     this.rows = this.makeRewards();
     this.curves = this.makeCurves();
     this.pictures = this.makePictures();
+    this.makeCase();
   }
 
   makeFacts() {
@@ -91,6 +89,21 @@ class Panel {
     });
   }
 
+  // What the probe's case is about, and what each policy made of it.
+  makeCase() {
+    const { probed } = this.replay;
+    if (!probed) return;
+    byId("case").hidden = false;
+    byId("case-what").textContent = probed.what;
+    byId("case-step").textContent = `Step ${probed.frame}`;
+    byId("case-step").addEventListener("click", () => this.actions.showCase());
+    const row = (tag, texts) => { const line = make("tr"); line.append(...texts.map(text => make(tag, text))); return line; };
+    byId("case-answers").append(row("th", ["policy", "V", "\u0394V", "P(brake)", "\u0394P(brake)"]), ...probed.answers.map(answer => {
+      const change = value => (value >= 5e-8 ? "+" : "") + short(value);
+      return row("td", [answer.policy, short(answer.value), change(answer.value - answer.value_without), short(answer.brake), change(answer.brake - answer.brake_without)]);
+    }));
+  }
+
   // Sums of rewards since the episode began, of one agent.
   sumRewards(agent) {
     const { replay } = this, frames = replay.frames;
@@ -138,7 +151,7 @@ class Panel {
         word.style.color = theme[reason.color];
         return word;
       }));
-    } else line.textContent = status === "absent" ? `${status}: it found no place in this episode, or the recording does not have it now` : status === "recorded" ? `${size}, where the recording has it` : `${size}, ${status}, waypoint ${replay.raw("next_waypoint", agent, frame) + 1} of 3`;
+    } else line.textContent = status === "absent" ? `${status}: it found no place in this episode, or the recording does not have it now` : status === "recorded" ? `${size}, as recorded` : `${size}, ${status}, waypoint ${replay.raw("next_waypoint", agent, frame) + 1} of 3`;
     const decision = replay.decision(agent, frame), before = Math.max(replay.episode(frame).first, frame - 1);
     const set = (key, value, digits, unit) => {
       this.facts[key].value.replaceChildren(Number.isFinite(value) ? decimals(value, digits) : "\u2013", make("small", ` ${unit}`));
@@ -148,6 +161,9 @@ class Panel {
     // Who halts is put to rest within a step, which is no braking.
     set("acceleration", status === "halted" ? NaN : frame > before ? (replay.get("speed_mps", agent, frame) - replay.get("speed_mps", agent, before)) / replay.dt_s : 0, 1, "m/s\u00b2");
     set("value", decision ? decision.value : NaN, 2, "");
+    // Who is moved by a recording does nothing of its own, and is paid nothing.
+    const isRecorded = status === "recorded";
+    for (const part of [this.facts.reward.box, this.facts.return.box, byId("action-section"), byId("reward-section")]) part.hidden = isRecorded;
     this.facts.value.box.hidden = !replay.isFollowed(agent, frame) || !replay.decisions;
     const reward = replay.rewardTerms.reduce((sum, term) => sum + replay.get(`reward_${term}`, agent, frame), 0);
     this.facts.reward.value.textContent = short(reward);
@@ -156,7 +172,9 @@ class Panel {
 
   drawActions(frame, agent) {
     const { replay } = this, decision = replay.decision(agent, frame), chosen = replay.action(agent, frame);
-    byId("action-note").textContent = decision ? "probability of each, the chosen one framed" : replay.decisions && replay.followed >= 0 ? `the policy's probabilities are those of agent ${replay.followed}` : "the chosen one framed";
+    byId("action-note").textContent = decision ? "probability of each, the chosen one framed"
+      : !replay.decisions || replay.followed < 0 ? "the chosen one framed"
+      : replay.isFollowed(agent, frame) ? "its policy is not asked now" : `the policy's probabilities are those of agent ${replay.followed}`;
     this.cells.forEach((cell, i) => {
       const p = decision ? decision.probabilities[i] : 0;
       cell.classList.toggle("chosen", i === chosen);

@@ -2,7 +2,8 @@
 
 class Timeline {
   constructor(replay, state, canvas, tip, actions) {
-    Object.assign(this, { replay, state, canvas, tip, actions, kept: null });
+    // What is painted under and over the cursor, until it changes.
+    Object.assign(this, { replay, state, canvas, tip, actions, kept: null, rows: new OffscreenCanvas(1, 1), events: new OffscreenCanvas(1, 1) });
     canvas.addEventListener("pointerdown", event => {
       canvas.setPointerCapture(event.pointerId);
       const found = this.eventAt(event);
@@ -47,18 +48,28 @@ class Timeline {
 
   draw(theme, ratio) {
     const { canvas, replay, state } = this, width = canvas.clientWidth, height = 74;
-    const key = [width, ratio, state.onlyAgent && state.agent, theme, replay.version];
+    const key = [width, ratio, state.onlyAgent && state.agent, state.agent, theme, replay.version];
     if (!this.kept || key.some((part, i) => part !== this.kept[i])) {
-      this.picture = this.picture || document.createElement("canvas");
-      this.picture.width = canvas.width = Math.round(width * ratio);
-      this.picture.height = canvas.height = Math.round(height * ratio);
-      this.paint(this.picture.getContext("2d"), width, ratio, theme);
+      canvas.width = Math.round(width * ratio);
+      canvas.height = Math.round(height * ratio);
+      const repaint = (picture, paint) => {
+        picture.width = canvas.width;  // which clears it
+        picture.height = canvas.height;
+        const context = picture.getContext("2d");
+        context.scale(ratio, ratio);
+        paint(context);
+      };
+      repaint(this.rows, context => this.paintRows(context, width, theme));
+      repaint(this.events, context => {
+        for (const event of replay.events) if (this.shows(event)) this.paintEvent(context, event, width, theme);
+        if (replay.probed) this.paintCase(context, width, theme);
+      });
       this.kept = key;
     }
     const context = canvas.getContext("2d");
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.clearRect(0, 0, canvas.width, canvas.height);
-    context.drawImage(this.picture, 0, 0);
+    context.drawImage(this.rows, 0, 0);
     context.scale(ratio, ratio);
     const x = this.xOf(state.time, width);
     context.fillStyle = theme["--accent"];
@@ -69,10 +80,32 @@ class Timeline {
     context.beginPath();
     context.arc(x, 60, 4, 0, 2 * Math.PI);
     context.fill();
+    // Events lie on the cursor, and those of this step are wider than it.
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.drawImage(this.events, 0, 0);
+    context.scale(ratio, ratio);
+    const at = Math.floor(state.time);
+    for (const event of replay.events) if (event.frame === at && this.shows(event)) this.paintEvent(context, event, width, theme, 7);
   }
-  paint(context, width, ratio, theme) {
+  paintEvent(context, event, width, theme, size) {
+    const isChosen = event.agent === this.state.agent, wide = size ?? (isChosen ? 2.5 : 1.6);
+    context.fillStyle = theme[KINDS[event.kind].color];
+    context.globalAlpha = size || isChosen ? 1 : 0.75;
+    context.fillRect(this.xOf(event.frame, width) - wide / 2, event.kind * 11.5 + 1, wide, 9.5);
+    context.globalAlpha = 1;
+  }
+  // Where a probe's case is.
+  paintCase(context, width, theme) {
+    const x = this.xOf(this.replay.probed.frame, width), isLeft = x < width - 40;
+    context.fillStyle = theme["--case"];
+    context.fillRect(x - 1, 0, 2, 57);
+    context.font = `11px ${theme["--font"]}`;
+    context.textBaseline = "middle";
+    context.textAlign = isLeft ? "left" : "right";
+    context.fillText("case", x + (isLeft ? 5 : -5), 29);
+  }
+  paintRows(context, width, theme) {
     const { replay } = this;
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.font = `11px ${theme["--font"]}`;
     context.textBaseline = "middle";
     KINDS.forEach((kind, row) => {
@@ -87,24 +120,17 @@ class Timeline {
       context.fillStyle = count ? theme["--text"] : theme["--dim"];
       context.fillText(count, this.margin - 5, y + 6);
     });
-    for (const event of replay.events) {
-      if (!this.shows(event)) continue;
-      context.fillStyle = theme[KINDS[event.kind].color];
-      context.globalAlpha = event.agent === this.state.agent ? 1 : 0.75;
-      context.fillRect(this.xOf(event.frame, width) - 1, event.kind * 11.5 + 1, event.agent === this.state.agent ? 2.5 : 1.6, 9.5);
-    }
-    context.globalAlpha = 1;
     context.fillStyle = theme["--dim"];
     for (const episode of replay.episodes) if (episode.first > 0) context.fillRect(this.xOf(episode.first, width) - 0.5, 0, 1, 60);
     // Times at round seconds, about 90 pixels apart.
     const seconds = (replay.frames - 1) * replay.dt_s, wish = seconds / Math.max(1, (width - this.margin) / 90);
     const step = [0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800, 3600].find(s => s >= wish) || 7200;
-    context.textAlign = "center";
     const begin_s = replay.firstStep * replay.dt_s;
     for (let t = Math.ceil(begin_s / step - 1e-6) * step; t <= begin_s + seconds + 1e-6; t += step) {
       const x = this.xOf((t - begin_s) / replay.dt_s, width);
       context.fillRect(x, 58, 1, 3);
-      if (x < width - 14) context.fillText(begin_s + seconds >= 120 && step >= 30 ? `${Math.floor(t / 60)}:${String(Math.round(t % 60)).padStart(2, "0")}` : `${Number(t.toFixed(1))} s`, x, 68);
+      context.textAlign = x < width - 14 ? "center" : "right";
+      context.fillText(begin_s + seconds >= 120 && step >= 30 ? `${Math.floor(t / 60)}:${String(Math.round(t % 60)).padStart(2, "0")}` : `${Number(t.toFixed(1))} s`, Math.min(x, width), 68);
     }
   }
 }

@@ -3,7 +3,7 @@
 const LIGHT_COLORS = ["", "#ff3b3b", "#ffc400", "#25d366"];
 const THEME = ["--ground", "--road", "--road-ramp", "--parking", "--sidewalk", "--green", "--side", "--mark-white", "--mark-yellow", "--mark-other",
   "--edge", "--wall", "--stop", "--crosswalk", "--line", "--text", "--dim", "--accent", "--panel", "--raised", "--vehicle", "--cyclist", "--pedestrian",
-  "--parked", "--outline", "--collision", "--off-road", "--red-light", "--wall-contact", "--goal", "--positive", "--negative", "--font"];
+  "--parked", "--outline", "--collision", "--off-road", "--red-light", "--wall-contact", "--goal", "--case", "--positive", "--negative", "--font"];
 const CLASS_COLORS = ["--vehicle", "--cyclist", "--pedestrian"];
 
 function readTheme() {
@@ -12,8 +12,8 @@ function readTheme() {
 }
 
 class WorldView {
-  constructor(replay, canvas, state) {
-    Object.assign(this, { replay, canvas, state, map: new MapView(replay.map), drawn: [], hover: null });
+  constructor(replay, canvas, state, legend_px) {
+    Object.assign(this, { replay, canvas, state, legend_px, map: new MapView(replay.map), drawn: [], hover: null });
     this.context = canvas.getContext("2d", { alpha: false });
     this.movedAt = -Infinity;
   }
@@ -27,11 +27,15 @@ class WorldView {
     this.canvas.height = height;
   }
 
+  // The whole map, beside the legend where it would lie under it.
   fit() {
-    const [x0, y0, x1, y1] = this.map.box;
-    this.state.x = (x0 + x1) / 2;
+    const [x0, y0, x1, y1] = this.map.box, width = this.canvas.width / this.ratio, height = this.canvas.height / this.ratio, { legend_px } = this;
+    const zoomIn = free => 0.94 * Math.min(free / (x1 - x0), height / (y1 - y0));
+    this.state.zoom = zoomIn(width);
+    const isUnder = (width - (x1 - x0) * this.state.zoom) / 2 < legend_px && legend_px < width / 2;
+    if (isUnder) this.state.zoom = zoomIn(width - legend_px);
+    this.state.x = (x0 + x1) / 2 - (isUnder ? legend_px / 2 / this.state.zoom : 0);
     this.state.y = (y0 + y1) / 2;
-    this.state.zoom = 0.94 * Math.min(this.canvas.width / (x1 - x0), this.canvas.height / (y1 - y0)) / this.ratio;
   }
   zoomBy(factor, px, py) {
     const before = this.metresOf(px, py), zoom = Math.min(60, Math.max(0.05, this.state.zoom * factor));
@@ -95,7 +99,46 @@ class WorldView {
       if (isHalted) this.drawHalt(px, py, length_px, replay.raw("halt_reason", agent, frame), theme);
       if (state.numbers || agent === state.agent || this.scale / this.ratio > 9) this.drawNumber(agent, px, py, length_px, theme);
     }
+    if (replay.probed) this.drawCase(time, frame, theme);
     return isFinal;
+  }
+
+  // The road user of a probe's case, joined with its ego in the case's step; in others only where it would be.
+  drawCase(time, frame, theme) {
+    const { replay, context, ratio } = this, { ego, removed, inserted } = replay.probed, isNow = frame === replay.probed.frame;
+    const isThere = agent => agent !== null && !replay.isAbsent(agent, frame);
+    const pose = inserted ? { x_m: inserted.x_cm / 100, y_m: inserted.y_cm / 100, heading_deg: inserted.heading_ddeg / 10 } : isThere(removed) ? replay.pose(removed, time) : null;
+    if (!pose) return;
+    const body = inserted ? { agentClass: inserted.class, length_m: inserted.length_cm / 100, width_m: inserted.width_cm / 100 } : replay.body(removed, frame);
+    const [px, py] = this.pixelOf(pose.x_m, pose.y_m), radius = 0.7 * Math.max(body.length_m * this.scale, 7 * ratio) + 5 * ratio;
+    context.strokeStyle = theme["--case"];
+    context.lineWidth = 2 * ratio;
+    context.globalAlpha = isNow ? 1 : 0.5;
+    context.setLineDash([4 * ratio, 4 * ratio]);
+    if (inserted && isNow) {
+      context.beginPath();
+      for (const [x, y] of inserted.path_cm) context.lineTo(...this.pixelOf(x / 100, y / 100));
+      context.stroke();
+    }
+    if (isNow && isThere(ego)) {
+      const from = replay.pose(ego, time);
+      context.beginPath();
+      context.moveTo(...this.pixelOf(from.x_m, from.y_m));
+      context.lineTo(px, py);
+      context.stroke();
+    }
+    context.setLineDash([]);
+    if (inserted) this.drawBox(pose, body, theme[CLASS_COLORS[body.agentClass]], theme, isNow ? 1 : 0.4);
+    context.globalAlpha = isNow ? 1 : 0.5;
+    context.beginPath();
+    context.arc(px, py, radius, 0, 2 * Math.PI);
+    if (!inserted) {  // crossed out
+      context.moveTo(px - 0.7 * radius, py + 0.7 * radius);
+      context.lineTo(px + 0.7 * radius, py - 0.7 * radius);
+    }
+    context.stroke();
+    this.drawLabel(inserted ? "inserted" : `${removed}: removed`, px + radius + 4 * ratio, py + 0.7 * radius, theme, "--case");
+    context.globalAlpha = 1;
   }
 
   drawLights(frame, theme) {
@@ -186,16 +229,18 @@ class WorldView {
     });
   }
   drawNumber(agent, px, py, length_px, theme) {
+    this.drawLabel(agent, px + 0.6 * length_px + 4 * this.ratio, py - 0.5 * length_px - 2 * this.ratio, theme, "--text");
+  }
+  drawLabel(text, x, y, theme, color) {
     const { context } = this;
     context.font = `600 ${11 * this.ratio}px ${theme["--font"]}`;
     context.textAlign = "left";
     context.textBaseline = "middle";
     context.lineWidth = 3 * this.ratio;
     context.strokeStyle = theme["--outline"];
-    context.fillStyle = theme["--text"];
-    const x = px + 0.6 * length_px + 4 * this.ratio, y = py - 0.5 * length_px - 2 * this.ratio;
-    context.strokeText(agent, x, y);
-    context.fillText(agent, x, y);
+    context.fillStyle = theme[color];
+    context.strokeText(text, x, y);
+    context.fillText(text, x, y);
   }
 
   drawGoals(time, frame, theme) {

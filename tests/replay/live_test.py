@@ -279,7 +279,7 @@ class Chromium(Served):
         self.browser.wait_for(f"pictura.replay.get('speed_mps', {agent}, {last}) > 1.5")
         self.hold("w", False)
         actions = self.browser.run(f"pictura.replay.tracks.action.slice({agent} * pictura.replay.stride + {at}, {agent} * pictura.replay.stride + pictura.replay.frames).reduce((all, a) => [...all, a - 1], [])")
-        self.assertIn(10, actions)  # 4 m/s3 along, straight on
+        self.assertIn(3, [action // 3 for action in actions])  # 4 m/s3 along; the wheels may still have to be straightened
         self.browser.key("t")
         self.browser.wait_for("pictura.live.driven === -1")
         self.assertEqual(self.browser.errors, [])

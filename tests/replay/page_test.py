@@ -231,6 +231,71 @@ class Chromium(PageCase):
         self.browser.click(x, place["top"] + 1.5 * 11.5)
         self.browser.wait_for(f"pictura.state.time === {event['frame']}")
 
+    def test_the_time_cursor_hides_no_event(self):
+        self.open()
+        event = self.browser.run("pictura.replay.events.find(e => e.kind === 1)")
+        self.browser.run(f"pictura.actions.goTo({json.dumps(event)}); pictura.drawn() && null")
+        place = self.browser.run("(r => ({left: r.left, top: r.top, width: r.width}))(document.getElementById('timeline').getBoundingClientRect())")
+        x, y = round(place["left"] + 78 + event["frame"] / 90 * (place["width"] - 78 - 8)), round(place["top"] + 11.5 + 6)
+        color = bytes.fromhex(self.browser.run("getComputedStyle(document.documentElement).getPropertyValue('--off-road')").strip()[1:])
+        _, _, rows = png_pixels(self.browser.screenshot())
+        shown = [rows[y][3 * i : 3 * i + 3] for i in range(x - 2, x + 3)]
+        self.assertGreaterEqual(shown.count(color), 4, shown)
+
+    def test_numbers_are_plain_decimals(self):
+        self.open(fragment="#agent=4")
+        unit = {track["name"]: track["unit"] for track in self.recorded.header["tracks"]}
+        step = max(range(91), key=lambda f: sum(0 < abs(self.recorded.tracks[name][4][f]) < 1e-4 for name in unit if name.startswith("reward_")))
+        self.browser.run(f"pictura.actions.seek({step}); pictura.drawn() && null")
+        cells = self.browser.run("[...document.querySelectorAll('#rewards tr')].map(row => [...row.cells].map(cell => cell.textContent))")
+        for term, _, now, _ in cells[:-1]:
+            value = self.recorded.tracks["reward_" + term.replace(" ", "_")][4][step]
+            self.assertRegex(now, r"^\u2212?\d+(\.\d+)?$", term)
+            self.assertAlmostEqual(float(now.replace("\u2212", "-")), value, delta=max(0.0051, 0.01 * abs(value)) if abs(value) >= 1 else 0.006 * abs(value) + 1e-9)
+
+    def test_a_recorded_track_shows_what_it_has(self):
+        # Of one whose status is that of tracks in recordings, which only move.
+        self.open(fragment="#step=20&agent=4")
+        self.browser.run("pictura.replay.tracks.status.fill(4); pictura.actions.seek(21); pictura.drawn() && null")
+        self.assertIn("as recorded", self.browser.run("document.getElementById('agent-status').textContent"))
+        self.assertTrue(self.browser.run("document.getElementById('action-section').hidden && document.getElementById('reward-section').hidden"))
+        self.assertEqual(self.browser.errors, [])
+
+    def test_the_whole_map_lies_beside_the_legend(self):
+        self.open()
+        left = self.browser.run("(() => { pictura.drawn(); return document.getElementById('legend').getBoundingClientRect().right; })()")
+        shapes = self.browser.run("Math.min(...pictura.replay.map.filter(s => s.kind !== 'light').flatMap(s => [...s.points].filter((_, i) => i % 2 === 0)))")
+        state, width = self.state(), self.browser.run("document.getElementById('world').clientWidth")
+        self.assertGreaterEqual(width / 2 + (shapes - state["x"]) * state["zoom"], left)
+
+    def test_a_probed_case_is_shown_and_marked(self):
+        alive = [a for a in range(24) if round(self.recorded.tracks["status"][a][20]) == 0]
+        ego, removed = alive[:2]
+        answer = {"policy": "agent", "value": 1.5, "value_without": 1.25, "brake": 0.02, "brake_without": 0.0213}
+        x, y = (round(100 * self.recorded.tracks[name][ego][20]) for name in ("x_m", "y_m"))
+        box = {"class": 2, "length_cm": 50, "width_cm": 50, "height_cm": 120, "x_cm": x + 900, "y_cm": y, "z_cm": 0, "heading_ddeg": 900,
+               "path_cm": [[x + 900, y - 500], [x + 900, y + 500]]}  # fmt: skip
+        case = {"what": "case 7: somebody is gone", "frame": 20, "ego": ego, "removed": removed, "inserted": None, "answers": [answer]}
+        page = self.path.read_text()
+        for name, change in {"removed": {}, "inserted": {"removed": None, "inserted": box}}.items():
+            with self.subTest(name):
+                path = self.folder / "case.html"
+                path.write_text(page.replace('"case":null', '"case":' + json.dumps({**case, **change}), 1))
+                self.open(path)
+                self.assertEqual((self.state()["time"], self.state()["agent"]), (20, ego))
+                text = self.browser.run("document.getElementById('case').innerText")
+                for part in ("somebody is gone", "+0.25", "\u22120.0013", "1.50"):
+                    self.assertIn(part, text)
+                color = bytes.fromhex(self.browser.run("getComputedStyle(document.documentElement).getPropertyValue('--case')").strip()[1:])
+                count = lambda: sum(row[3 * i : 3 * i + 3] == color for row in png_pixels(self.browser.screenshot())[2][50:590] for i in range(0, 930))
+                self.assertGreater(count(), 60)  # the mark's ring
+                self.browser.run("pictura.actions.seek(70); pictura.drawn() && null")
+                self.browser.run("document.getElementById('case-step').click(); pictura.drawn() && null")
+                self.assertEqual(self.state()["time"], 20)
+                self.assertEqual(self.browser.errors, [])
+        self.open()
+        self.assertTrue(self.browser.run("document.getElementById('case').hidden"))
+
     def test_the_address_holds_the_view(self):
         self.open(fragment="#step=42&agent=7&speed=4&zoom=6&follow=1")
         state = self.state()
@@ -289,6 +354,9 @@ class Chromium(PageCase):
         self.browser.run("[...document.querySelectorAll('#filters button')].find(b => b.textContent === 'Off road').click()")
         filtered = self.browser.run(cards)
         self.assertEqual(len(filtered), 3)
+        boxes = self.browser.run("[...document.querySelector('#list a').children].map(e => (r => [r.left, r.right])(e.getBoundingClientRect()))")
+        for (_, right), (left, _) in zip(boxes, boxes[1:]):
+            self.assertLessEqual(right, left)
         name, _, fragment = filtered[0].partition("#")
         self.open(folder / name, "#" + fragment)
         self.assertRegex(fragment, r"step=\d+&agent=\d+")

@@ -1,0 +1,18 @@
+// What the page of a replay and the gallery share.
+
+const byId = id => document.getElementById(id);
+function make(tag, text, name) {
+  const element = document.createElement(tag);
+  if (text !== undefined) element.textContent = text;
+  if (name) element.className = name;
+  return element;
+}
+
+// A policy's file, or its run, since checkpoints of all runs have the same name.
+function policyName({ policy }) {
+  const names = policy.split("/"), isOfRun = /^(checkpoint|policy)\./.test(names.at(-1)) && names.length > 1;
+  return names.at(isOfRun ? -2 : -1);
+}
+// Which world of its map: evaluations number theirs from 2^31, all of one seed.
+const FIRST_SCENARIO = 2 ** 31;
+const worldName = header => header.global_world >= FIRST_SCENARIO ? `scenario ${header.global_world - FIRST_SCENARIO}` : `seed ${header.seed}`;
