@@ -18,10 +18,10 @@ from documents_test import command_lines
 
 PICTURA = ""
 ROOT = commands.ROOT
-PAGES = [ROOT / "README.md"] + [ROOT / f"docs/tutorials/{name}.md" for name in ("first_run", "gpu", "reward", "rig", "map", "look")]
+PAGES = [ROOT / "README.md"] + [ROOT / f"docs/tutorials/{name}.md" for name in ("first_run", "gpu", "reward", "rig", "map", "look", "probe")]
 PAGES += [ROOT / "docs/evaluation.md", ROOT / "docs/training.md"]
 # Of what takes long, less.
-AT_MOST = {"--steps": 20, "--agents": 8, "--scenarios": 2, "--episodes": 1, "--follow": 3, "--egos": 8, "--slots": 32}
+AT_MOST = {"--steps": 20, "--agents": 8, "--scenarios": 2, "--episodes": 1, "--follow": 3, "--egos": 8, "--slots": 32, "--removals": 20, "--paths": 1}
 # What a page in a browser waits for has tests of its own (tests/replay/live_test.py).
 WAITS = "--serve"
 
@@ -42,6 +42,8 @@ def shorter(line):
         words += [] if "--resume" in words else ["--overwrite"]
     if words[0] == "bench":
         words += ["--repeats", "1", "--repeat-seconds", "0.1"] if words[1] in ("render", "simulate") else []
+    if words[0] == "probe":  # whose first states are those of step --every
+        words += ["--every", "5"]
     return words
 
 
@@ -64,7 +66,7 @@ class Tutorials(unittest.TestCase):
                 with self.subTest(f"{page.relative_to(ROOT)}: pictura {line}"):
                     result = subprocess.run([PICTURA, *words], cwd=folder, capture_output=True, text=True, timeout=300)
                     self.assertEqual(result.returncode, 0, f"pictura {shlex.join(words)}\n{result.stderr}")
-                    outputs = [words[i + 1] for i, word in enumerate(words[:-1]) if word in ("--out", "--png", "--svg", "--gallery")]
+                    outputs = [words[i + 1] for i, word in enumerate(words[:-1]) if word in ("--out", "--png", "--svg", "--gallery", "--replay")]
                     for output in outputs:
                         self.assertTrue((folder / output).exists(), f"pictura {shlex.join(words)} wrote no {output}")
                         written.add(output)
