@@ -993,6 +993,10 @@ class Replays(CommandCase):
                 self.assertEqual((shown["frame"], shown["ego"], header["followed"]), (int(case["step"]), int(case["ego"]), int(case["ego"])))
                 self.assertEqual(shown["removed"], int(case["hidden"]) if kind == "removal" else None)
                 self.assertIn(case["driver"], header["policy"])
+                # Of the state as it is driven: with who is removed, without who is inserted.
+                state = "value" if kind == "removal" else "value_without"
+                expected = next(answer[state] for answer in shown["answers"] if answer["policy"] == case["driver"])
+                self.assertAlmostEqual(1e-4 * self.decisions_of(path)[12][shown["frame"]], expected, delta=2e-4)
                 for answer in shown["answers"]:
                     change = answer["value"] - answer["value_without"]
                     self.assertAlmostEqual(change, float(case[answer["policy"] + "/d_value"]), 5)
@@ -1012,18 +1016,11 @@ class Replays(CommandCase):
         path = self.folder / "policy.html"
         checkpoint = self.folder / "run" / "checkpoint.ckpt"
         self.json_of("replay", *self.WORLD, "--policy", checkpoint, "--steps", 20, "--follow", 2, "--cameras", "--out", path)
-        header, page = header_of(path), path.read_text()
+        header = header_of(path)
         self.assertEqual([(c["width_px"], c["height_px"]) for c in header["images"]["cameras"]], [(16, 9)] * 4)
         self.assertRegex(header["policy_hash"], "^[0-9a-f]{16}$")
-        data = zlib.decompress(base64.b64decode(re.search('id="replay-data">(.*?)</script>', page).group(1)))
-        at, columns = 0, {}
-        for section in header["sections"]:
-            columns[section["name"]] = data[at : at + section["bytes"]]
-            at += section["bytes"]
-        actions = self.numbers(columns["action"])[2 * 21 : 3 * 21]  # of agent 2, order 0
-        decisions, numbers = [], self.numbers(columns["decisions"])
-        for column in range(13):
-            decisions.append(list(itertools.accumulate(numbers[column * 21 : (column + 1) * 21])))
+        actions = self.numbers_of(path, "action")[2 * 21 : 3 * 21]  # of agent 2, order 0
+        decisions = self.decisions_of(path)
         asked = 0
         for frame in range(20):
             probabilities = [column[frame] for column in decisions[:12]]
@@ -1034,10 +1031,20 @@ class Replays(CommandCase):
             self.assertGreaterEqual(probabilities[actions[frame + 1] - 1], max(probabilities) - 2)
         self.assertGreater(asked, 5)
 
+    def decisions_of(self, path):
+        """Columns of the followed agent's probabilities and value, in units of 1e-4."""
+        numbers, frames = self.numbers_of(path, "decisions"), header_of(path)["frames"]
+        return [list(itertools.accumulate(numbers[column * frames : (column + 1) * frames])) for column in range(13)]
+
     @staticmethod
-    def numbers(data):
-        found, bits, shift = [], 0, 0
-        for byte in data:
+    def numbers_of(path, name):
+        data = zlib.decompress(base64.b64decode(re.search('id="replay-data">(.*?)</script>', path.read_text()).group(1)))
+        at, found, bits, shift = 0, [], 0, 0
+        for section in header_of(path)["sections"]:
+            if section["name"] == name:
+                break
+            at += section["bytes"]
+        for byte in data[at : at + section["bytes"]]:
             bits |= (byte & 127) << shift
             shift += 7
             if byte < 128:
